@@ -1,0 +1,53 @@
+// Cutting a closed surface by a plane into closed pieces. A pure function: it knows no time, mass or body.
+#pragma once
+
+#include "meshless_surgery/base/result.h"
+#include "meshless_surgery/geometry/plane.h"
+#include "meshless_surgery/geometry/triangle_mesh.h"
+
+namespace meshless {
+
+/// Where a vertex of a piece comes from: sum of weights[k] * parent vertex parents[k]. A vertex that was there before
+/// has one parent of weight 1; one on a cut edge has two; one where two rims cross has four. Unused slots have weight 0
+/// and parent kNoIndex. The same weights interpolate rest position, position and velocity.
+struct VertexOrigin {
+  std::array<Index, 4> parents{{kNoIndex, kNoIndex, kNoIndex, kNoIndex}};
+  std::array<double, 4> weights{{0.0, 0.0, 0.0, 0.0}};
+};
+
+/// One connected piece of the solid: closed, oriented, on one side of the plane.
+struct CutPiece {
+  TriangleMesh mesh;                  // patches filled; the cap's is the patch asked for
+  std::vector<VertexOrigin> origins;  // one a vertex
+  int side = 0;                       // +1: where the normal points; -1: the other
+};
+
+struct CutSurface {
+  std::vector<CutPiece> pieces;  // largest volume first; at least two
+  double cap_area = 0.0;         // [m^2] of one side
+};
+
+struct CutOptions {
+  double band = 1e-7;           // vertices closer to the plane than this times the bounds' diagonal lie on it
+  std::uint32_t cap_patch = 1;  // the patch id of the new faces
+};
+
+/// Refuses: kMissed where no piece would be on one of the sides; kUnsuitableShape where the surface is open or crosses
+/// itself in a way that no closed pieces can be made of. `mesh` need not be embedded.
+Result<CutSurface> cutByPlane(const TriangleMesh& mesh, const Plane& plane, const CutOptions& options = {});
+
+/// The blades' rectangle in the plane: origin + s * x_axis + t * y_axis with 0 <= s <= length, |t| <= width / 2.
+struct Blades {
+  Vec3 origin = Vec3::Zero();
+  Vec3 x_axis = Vec3::UnitX();  // unit
+  Vec3 y_axis = Vec3::UnitY();  // unit, normal to x_axis
+  double length = 0.0;          // [m]; 0: unbounded
+  double width = 0.0;           // [m]; 0: unbounded
+
+  Plane plane() const { return {x_axis.cross(y_axis), origin}; }
+};
+
+/// True where the rectangle meets the surface or lies inside the solid.
+bool bladesMeet(const TriangleMesh& mesh, const Blades& blades);
+
+}  // namespace meshless

@@ -1,0 +1,20 @@
+// An indexed triangle surface.
+#pragma once
+
+#include "meshless_surgery/base/types.h"
+
+namespace meshless {
+
+/// The patch of triangles that came with the mesh; every cut adds patches of its own.
+constexpr std::uint32_t kOuterPatch = 0;
+
+struct TriangleMesh {
+  Points vertices;                     // [m]
+  std::vector<Triangle> triangles;     // counter-clockwise seen from outside
+  std::vector<std::uint32_t> patches;  // one a triangle, or empty: all are kOuterPatch
+
+  bool empty() const { return triangles.empty(); }
+  std::uint32_t patchOf(std::size_t triangle) const { return patches.empty() ? kOuterPatch : patches[triangle]; }
+};
+
+}  // namespace meshless
