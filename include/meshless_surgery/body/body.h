@@ -1,0 +1,79 @@
+// A body: a constant model and a state that changes. Particles carry mass; every vertex of the surface is a particle
+// itself or rides on clusters.
+#pragma once
+
+#include <memory>
+
+#include "meshless_surgery/body/body_def.h"
+#include "meshless_surgery/dynamics/shape_matching.h"
+
+namespace meshless {
+
+/// How a surface vertex follows the particles.
+struct SurfaceBinding {
+  std::vector<Index> particle;   // one a vertex: the particle that it is, or kNoIndex for a rider
+  std::vector<Index> riders;     // vertices that ride, ascending
+  std::vector<Index> offsets;    // riders + 1, into the two below
+  std::vector<Index> clusters;   // that the rider follows
+  std::vector<double> weights;   // add up to 1 for a rider
+  std::vector<double> mobility;  // [1/kg] one a rider: its effective inverse mass
+};
+
+/// Constant while it lives: rest shape, topology, clusters, masses.
+struct BodyModel {
+  Points rest;                  // [m] particles
+  std::vector<double> masses;   // [kg] > 0
+  std::vector<bool> fixed;      // held in place
+  bool any_fixed = false;
+  ParticleGraph graph;
+  ClusterSet clusters;
+  RestShape shape;
+  TriangleMesh surface;         // rest positions of the vertices [m]
+  SurfaceBinding binding;
+  bool solid = true;
+  double spacing = 0.0;         // [m] between interior particles
+  double rest_volume = 0.0;     // [m^3]; 0 where not solid
+  double mass = 0.0;            // [kg]
+  std::uint32_t next_patch = 1; // for the next cut
+};
+using BodyModelPtr = std::shared_ptr<const BodyModel>;
+
+/// Changes with every step.
+struct BodyState {
+  Points positions;   // [m]
+  Points velocities;  // [m/s]
+  std::vector<ClusterPose> poses;
+  Points surface;        // [m] present positions of the surface's vertices; see updateSurface
+  Points rider_offsets;  // [m] one a rider: what a cut left between its place and its clusters' (fades away)
+};
+
+struct PreparedBody {
+  BodyDef def;  // mesh left out: it is in the model
+  BodyModelPtr model;
+  BodyState state;
+};
+
+/// Builds particles, masses, graph, clusters and binding; may take a second for large meshes. Refuses
+/// (kInvalidArgument) bad spacing, material, clusters or pose, (kUnsuitableShape) an empty or flat solid, or more than
+/// 200,000 particles.
+Result<PreparedBody> prepareBody(BodyDef def);
+
+/// The same rest shape with the masses of another density; the second moments too where the mode needs them.
+BodyModelPtr withMaterial(const BodyModelPtr& model, const Material& before, const Material& after);
+
+/// Places state.surface for state.positions and state.poses.
+void updateSurface(const BodyModel& model, BodyState& state);
+
+struct BodyMeasures {
+  double volume = 0.0;  // [m^3] of the present surface; 0 where not solid
+  double area = 0.0;    // [m^2]
+  Vec3 centre_of_mass = Vec3::Zero();
+  Vec3 velocity = Vec3::Zero();          // [m/s] of the centre of mass
+  Vec3 linear_momentum = Vec3::Zero();   // [kg m/s]
+  Vec3 angular_momentum = Vec3::Zero();  // [kg m^2/s] about the centre of mass
+  double kinetic_energy = 0.0;           // [J]
+};
+/// Needs state.surface to be up to date for volume and area.
+BodyMeasures measureBody(const BodyModel& model, const BodyState& state);
+
+}  // namespace meshless

@@ -1,0 +1,22 @@
+// What a user chose of a body, before anything is built from it.
+#pragma once
+
+#include "meshless_surgery/dynamics/clusters.h"
+#include "meshless_surgery/dynamics/material.h"
+#include "meshless_surgery/geometry/triangle_mesh.h"
+
+namespace meshless {
+
+struct BodyDef {
+  std::string name;
+  TriangleMesh mesh;   // in the body's own frame, already scaled [m]; repaired (geometry/mesh_check.h)
+  bool solid = true;   // false: an open surface; no interior particles, no volume, cannot be cut
+  Pose pose;           // body's frame in the world
+  double spacing = 0;  // [m] between interior particles; 0: chosen from the surface
+  ClusterOptions clusters;
+  Material material;
+  std::vector<Box> fixed;          // [m] world frame: particles inside are held in place
+  std::vector<std::string> notes;  // what reading and repairing said
+};
+
+}  // namespace meshless

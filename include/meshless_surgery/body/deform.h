@@ -1,0 +1,44 @@
+// One substep of a body, in the stages that the world runs for all bodies in turn.
+#pragma once
+
+#include "meshless_surgery/body/body.h"
+
+namespace meshless {
+
+/// A particle that ground or sphere pushed in this substep, and how fast it may leave.
+struct TouchedParticle {
+  Index particle = 0;
+  Vec3 normal = Vec3::UnitZ();  // unit, away from the obstacle
+  double obstacle_speed = 0.0;  // [m/s] of the obstacle along the normal
+};
+
+/// Arrays that a body's substep needs and nothing outlives; kept between steps so that stepping allocates nothing.
+struct StepScratch {
+  Points previous;         // [m] positions at the start of the substep
+  Points before_contact;   // [m] positions when contacts began; filled where something can touch
+  Points predicted;
+  Points goals;
+  std::vector<TouchedParticle> touched;
+};
+
+/// Reads positions and velocities; writes positions, velocities, poses and scratch.previous: matches at y = x + h v,
+/// adds the pull, restores the angular momentum that evaluating at y would leak (not where particles are fixed), adds
+/// damping of the motion that deforms and gravity, and moves. Fixed particles stay. beta acts up to 0.95: without any
+/// rigid share energy could grow.
+void matchAndMove(const BodyModel& model, const Material& material, const Vec3& gravity, double h, BodyState& state,
+                  StepScratch& scratch, MatchCounters& counters);
+
+/// v = (x - x_old) / h, after springs and contacts have moved positions. Being pushed out of an obstacle stops a
+/// particle or takes it along, and never throws it: along the normal it keeps at most the speed that it had before the
+/// contact, or the obstacle's.
+void velocitiesFromPositions(const BodyModel& model, double h, BodyState& state, const StepScratch& scratch);
+
+/// [m/s] angular velocity times lever of a body that turns as its particles do on the whole; 0 where it has no extent.
+struct RigidMotion {
+  Vec3 centre = Vec3::Zero();
+  Vec3 velocity = Vec3::Zero();
+  Vec3 spin = Vec3::Zero();  // [rad/s]
+};
+RigidMotion rigidMotionOf(const BodyModel& model, const Points& positions, const Points& velocities);
+
+}  // namespace meshless

@@ -1,0 +1,34 @@
+// What a body is made of.
+#pragma once
+
+#include "meshless_surgery/base/result.h"
+#include "meshless_surgery/base/types.h"
+
+namespace meshless {
+
+/// What the goal shape of a cluster may do besides moving as a rigid body (Mueller et al. 2005, sec. 3.3 and 4).
+enum class MatchMode { kRigid, kLinear, kQuadratic };
+
+const char* toString(MatchMode mode);
+
+/// A material for looks. alpha and beta are the paper's; alpha holds at the reference rate (see stiffnessGain).
+struct Material {
+  std::string name = "default";
+  MatchMode mode = MatchMode::kLinear;
+  double alpha = 0.9;       // 0..1, fraction of the way to the goal in 1/60 s
+  double beta = 0.2;        // 0..1, share of the fitted linear or quadratic map in the goal
+  double density = 1000.0;  // [kg/m^3] > 0
+  double damping = 1.0;     // [1/s] >= 0, decay rate of the motion that deforms
+  double friction = 0.5;    // 0..10, Coulomb
+  Color color{0.62f, 0.22f, 0.18f, 1.0f};         // of the outer surface
+  Color inside_color{0.85f, 0.45f, 0.40f, 1.0f};  // of cut faces
+
+  /// Why the settings are not usable, naming key, value and range; else Done.
+  Status validate() const;
+};
+
+/// Share of the way to the goal that a substep of h [s] moves: 1 - (1 - alpha)^((h / reference)^2). alpha itself at the
+/// reference step 1/60 s, the same stiffness as h shrinks, never above 1.
+double stiffnessGain(double alpha, double h);
+
+}  // namespace meshless

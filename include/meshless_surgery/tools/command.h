@@ -1,0 +1,86 @@
+// What a user can do, as a closed variant: the same values come from services, topics, rviz and a command log. Poses are
+// in the world frame.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <variant>
+
+#include "meshless_surgery/base/ids.h"
+#include "meshless_surgery/body/body.h"
+#include "meshless_surgery/geometry/cut.h"
+
+namespace meshless {
+
+struct PickCommand {
+  Vec3 point = Vec3::Zero();      // [m]
+  Vec3 direction = Vec3::Zero();  // zero: nearest particle to point; else the ray from point
+  std::string body;               // empty: any
+  double max_distance = 0.0;      // [m] >= 0; 0: the default
+  double stiffness = 0.0;         // [N/m] >= 0; 0: the default
+};
+struct MovePickCommand {
+  PickId pick = 0;
+  Vec3 target = Vec3::Zero();  // [m]; takes a locked pick up again
+};
+struct LockCommand {
+  PickId pick = 0;
+  std::optional<Vec3> target;  // [m]; empty: where the free end is
+};
+struct ReleaseCommand {
+  PickId pick = 0;
+};
+struct ClearPicksCommand {};
+struct PushCommand {
+  bool enable = true;
+  double radius = 0.0;           // [m] >= 0; 0: the default
+  Vec3 position = Vec3::Zero();  // [m] of the centre
+  double speed = 0.0;            // [m/s] >= 0; 0: placed there at once
+};
+struct CutCommand {
+  Blades blades;
+  double close_time = 0.0;  // [s] >= 0 of simulated time
+  double roughness = 0.0;   // [m] only 0 so far
+  std::vector<std::string> bodies;  // empty: all that the blades meet
+};
+struct SetMaterialCommand {
+  std::string body;  // empty: all
+  std::function<Result<Material>(const Material&)> change;  // the new material from the present one
+};
+struct SpawnCommand {
+  std::shared_ptr<const PreparedBody> body;
+};
+struct RemoveCommand {
+  std::string body;
+};
+
+using Command = std::variant<PickCommand, MovePickCommand, LockCommand, ReleaseCommand, ClearPicksCommand, PushCommand,
+                             CutCommand, SetMaterialCommand, SpawnCommand, RemoveCommand>;
+
+struct PickReply {
+  PickId pick = 0;
+  std::string body;
+  Index particle = 0;
+  Vec3 position = Vec3::Zero();  // [m] where the tissue was grabbed
+};
+struct CutReply {
+  std::vector<std::string> cut_bodies;  // retired
+  std::vector<std::string> new_bodies;
+  double cap_area = 0.0;                // [m^2] of one side, over all bodies cut
+  double duration = 0.0;                // [s] wall time
+  std::vector<std::string> notes;       // bodies that the blades met and that could not be cut, and why
+};
+/// The blades are closing; World::finishedCut answers with the ticket once they met.
+struct CutStarted {
+  std::uint32_t ticket = 0;
+};
+struct SpawnReply {
+  BodyId id;
+  std::string name;
+  std::size_t particles = 0, triangles = 0, clusters = 0;
+};
+
+using Reply = std::variant<Done, PickReply, CutReply, CutStarted, SpawnReply>;
+
+}  // namespace meshless

@@ -1,0 +1,28 @@
+// Which tissue a pick holds.
+#pragma once
+
+#include "meshless_surgery/tools/tools.h"
+
+namespace meshless {
+
+/// Fills patch and weights with the particles within `radius` [m] of `centre` along the body, shares falling to zero at
+/// the radius and proportional to mass: one particle alone would be pulled out of the tissue as a spike.
+void makeGrasp(const BodyModel& model, Index centre, double radius, Pick& pick);
+
+/// Weighted mean of the patch [m].
+Vec3 graspMean(const Pick& pick, const Points& positions);
+
+/// Moves the patch implicitly towards the free end: its mean goes k h^2 K / (1 + k h^2 K) of the way, K its inverse mass.
+/// Fixed particles stay. Any stiffness and step are stable. Returns the force on the tissue [N].
+Vec3 pullGrasp(const BodyModel& model, const Pick& pick, double h, Points& positions);
+
+/// First hit of a ray with a surface; direction need not be unit length.
+struct RayHit {
+  bool hit = false;
+  double distance = 0.0;  // [m]
+  Index triangle = 0;
+  Vec3 point = Vec3::Zero();
+};
+RayHit castRay(const Points& vertices, const std::vector<Triangle>& triangles, const Vec3& origin, const Vec3& direction);
+
+}  // namespace meshless

@@ -1,0 +1,144 @@
+// The world: owns the bodies and tools, and is the only place where time moves. Not thread-safe: one thread owns it.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <set>
+
+#include "meshless_surgery/contact/textbook.h"
+#include "meshless_surgery/tools/tools.h"
+
+namespace meshless {
+
+enum class ContactMethod { kNone, kTextbook };
+
+struct WorldSettings {
+  Vec3 gravity{0.0, 0.0, -9.81};      // [m/s^2]
+  std::optional<double> ground = 0.0; // [m] height along z
+  double ground_friction = 0.5;
+  double step_rate = 120.0;           // [Hz] 1..10,000
+  int substeps = 1;                   // 1..1,000
+  ContactMethod contact = ContactMethod::kTextbook;
+  double pick_max_distance = 0.05;    // [m]
+  double pick_stiffness = 500.0;      // [N/m]
+  double pick_radius = 0.0;           // [m] of the grasp along the body; 0: three particle spacings
+  double push_radius = 0.02;          // [m]
+
+  Status validate() const;
+};
+
+/// What a scene file says.
+struct SceneDef {
+  std::string name;
+  WorldSettings world;
+  std::map<std::string, Material> materials;
+  std::vector<BodyDef> bodies;
+};
+
+enum class EventType {
+  kPicked, kLocked, kReleased, kCut, kIncised, kTouched, kAsleep, kAwake, kOverBudget, kSpawned, kRemoved, kReset, kFault
+};
+const char* toString(EventType type);
+
+struct Event {
+  EventType type = EventType::kFault;
+  std::uint64_t step = 0;
+  double sim_time = 0.0;  // [s]
+  std::string body;
+  PickId pick = 0;
+  std::string text;       // a sentence
+};
+
+/// Times [s] and work of one step; counters that a scene does not use stay at zero.
+struct StepReport {
+  double total = 0, match = 0, tools = 0, contact = 0, surface = 0;
+  std::size_t bodies = 0;
+  std::size_t substeps = 0;
+  MatchCounters match_counters;
+  ContactCounters contact_counters;
+  std::size_t tetrahedralizations = 0;  // since the start
+  std::size_t ground_contacts = 0;
+  std::size_t push_contacts = 0;
+};
+
+/// What to put into a snapshot; nothing is copied that was not asked for.
+struct SnapshotWants {
+  bool surfaces = false;
+  bool particles = false;
+  bool measures = false;
+};
+
+struct BodySnapshot {
+  BodyId id;
+  std::uint32_t number = 0;  // stable for the body, never used again in a run
+  std::string name;
+  Material material;
+  BodyModelPtr model;
+  Points surface;    // where wanted
+  Points particles;  // where wanted
+  BodyMeasures measures;  // where wanted
+  std::size_t tetrahedra = 0;  // 0 until something needs them
+  bool asleep = false;
+};
+
+struct WorldSnapshot {
+  std::uint64_t step = 0;
+  double sim_time = 0.0;
+  std::uint32_t run = 0;  // grows with each reset: messages of an older run are void
+  std::vector<BodySnapshot> bodies;
+  std::vector<Pick> picks;
+  std::map<PickId, std::string> pick_bodies;
+  PushSphere push;
+  Scissors scissors;
+  StepReport report;
+};
+
+class World {
+ public:
+  explicit World(WorldSettings settings);
+  ~World();
+  World(World&&) noexcept;
+  World& operator=(World&&) noexcept;
+
+  const WorldSettings& settings() const;
+  std::uint64_t stepCount() const;
+  double simTime() const;  // [s]
+
+  /// Does what the user asked for, at once; on an error nothing has changed.
+  Result<Reply> apply(const Command& command);
+
+  /// One step of 1 / step_rate seconds.
+  void step();
+
+  /// The answer to a cut that was started with a close time, once the blades met; taken out by asking.
+  std::optional<Result<CutReply>> finishedCut(std::uint32_t ticket);
+
+  /// Back to the start: only the bodies of addSceneBody, at rest; no picks, no push sphere, blades that were closing
+  /// answer with an error. Time is 0 again, a new run begins.
+  void reset();
+  /// Like SpawnCommand, and brought back by reset.
+  Result<SpawnReply> addSceneBody(std::shared_ptr<const PreparedBody> body);
+
+  /// Bodies in the order in which they came.
+  WorldSnapshot snapshot(const SnapshotWants& wants);
+  /// One body, by name; `rest` gives rest positions for surface and particles. Tetrahedra are made where missing.
+  Result<BodySnapshot> inspect(const std::string& name, bool rest);
+  /// Events since the last call.
+  std::vector<Event> takeEvents();
+  /// FNV-1a over every position, velocity and tool: equal for equal histories.
+  std::uint64_t stateHash() const;
+
+  // tracked tools
+  void setScissors(const Blades& blades, double angle);  // shown from now on
+  void hideScissors();
+  /// The pick that a stream moves: the newest one that is not locked; 0 if none.
+  PickId pickInHand() const;
+  const PushSphere& push() const;
+  const Scissors& scissors() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace meshless

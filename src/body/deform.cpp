@@ -1,0 +1,118 @@
+#include "meshless_surgery/body/deform.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+namespace meshless {
+namespace {
+
+// Fitted goals alone have no shape to return to, and dividing by cbrt(det) is no gradient of a potential: together they
+// feed energy in. A twentieth of the rigid goal is enough that none was seen to grow.
+constexpr double kMostBeta = 0.95;
+
+// The spin that carries the angular momentum, the least one where the points are collinear or fewer.
+Vec3 spinFor(const Mat3& inertia, const Vec3& momentum) {
+  const double scale = inertia.trace();
+  if (!(scale > 0.0)) return Vec3::Zero();
+  const Eigen::SelfAdjointEigenSolver<Mat3> solver(inertia / scale);
+  Vec3 spin = Vec3::Zero();
+  for (int k = 0; k < 3; ++k)
+    if (solver.eigenvalues()[k] > 1e-12)
+      spin += solver.eigenvectors().col(k) * (solver.eigenvectors().col(k).dot(momentum) / (solver.eigenvalues()[k] * scale));
+  return spin;
+}
+
+Vec3 centreOfMass(const BodyModel& model, const Points& positions) {
+  Vec3 sum = Vec3::Zero();
+  for (std::size_t i = 0; i < positions.size(); ++i) sum += model.masses[i] * (positions[i] - positions[0]);
+  return positions[0] + sum / model.mass;
+}
+
+Mat3 inertiaAbout(const BodyModel& model, const Points& positions, const Vec3& centre) {
+  Mat3 moment = Mat3::Zero();
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const Vec3 r = positions[i] - centre;
+    moment += model.masses[i] * r * r.transpose();
+  }
+  return moment.trace() * Mat3::Identity() - moment;
+}
+
+}  // namespace
+
+RigidMotion rigidMotionOf(const BodyModel& model, const Points& positions, const Points& velocities) {
+  RigidMotion motion;
+  motion.centre = centreOfMass(model, positions);
+  for (std::size_t i = 0; i < positions.size(); ++i) motion.velocity += model.masses[i] * velocities[i];
+  motion.velocity /= model.mass;
+  Vec3 momentum = Vec3::Zero();
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    momentum += model.masses[i] * (positions[i] - motion.centre).cross(velocities[i] - motion.velocity);
+  motion.spin = spinFor(inertiaAbout(model, positions, motion.centre), momentum);
+  return motion;
+}
+
+void matchAndMove(const BodyModel& model, const Material& material, const Vec3& gravity, double h, BodyState& state,
+                  StepScratch& scratch, MatchCounters& counters) {
+  const std::size_t n = model.rest.size();
+  Points& x = state.positions;
+  Points& v = state.velocities;
+  scratch.previous = x;
+  scratch.predicted.resize(n);
+  for (std::size_t i = 0; i < n; ++i)
+    scratch.predicted[i] = model.fixed[i] ? x[i] : Vec3(x[i] + h * v[i]);
+  const Points& y = scratch.predicted;
+
+  const double gain = stiffnessGain(material.alpha, h);
+  if (gain > 0.0) {
+    matchShapes({model.rest, model.masses, model.clusters, model.shape}, y, material.mode,
+                std::min(material.beta, kMostBeta), state.poses,
+                scratch.goals, counters);
+    const Points& goals = scratch.goals;
+    if (model.any_fixed) {
+      for (std::size_t i = 0; i < n; ++i) v[i] += gain / h * (goals[i] - y[i]);
+    } else {
+      // The pull is free of torque about y, but it acts on x: the difference is given back as a spin of the body.
+      Vec3 leaked = Vec3::Zero();
+      const Vec3 centre = centreOfMass(model, x);
+      for (std::size_t i = 0; i < n; ++i) {
+        const Vec3 dv = gain / h * (goals[i] - y[i]);
+        v[i] += dv;
+        leaked += model.masses[i] * (x[i] - centre).cross(dv);
+      }
+      const Vec3 spin = spinFor(inertiaAbout(model, x, centre), leaked);
+      for (std::size_t i = 0; i < n; ++i) v[i] -= spin.cross(x[i] - centre);
+    }
+  }
+  if (material.damping > 0.0) {
+    const double lost = 1.0 - std::exp(-material.damping * h);
+    if (model.any_fixed) {
+      for (Vec3& vi : v) vi -= lost * vi;
+    } else {
+      const RigidMotion rigid = rigidMotionOf(model, x, v);
+      for (std::size_t i = 0; i < n; ++i) v[i] -= lost * (v[i] - rigid.velocity - rigid.spin.cross(x[i] - rigid.centre));
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    if (model.fixed[i]) {
+      v[i].setZero();
+    } else {
+      v[i] += h * gravity;
+      x[i] += h * v[i];
+    }
+  }
+}
+
+void velocitiesFromPositions(const BodyModel& model, double h, BodyState& state, const StepScratch& scratch) {
+  for (std::size_t i = 0; i < model.rest.size(); ++i)
+    state.velocities[i] = (state.positions[i] - scratch.previous[i]) / h;
+  for (const TouchedParticle& t : scratch.touched) {
+    Vec3& v = state.velocities[t.particle];
+    const double before = t.normal.dot(scratch.before_contact[t.particle] - scratch.previous[t.particle]) / h;
+    const double excess = t.normal.dot(v) - std::max(before, t.obstacle_speed);
+    if (excess > 0.0) v -= excess * t.normal;
+  }
+}
+
+}  // namespace meshless

@@ -1,0 +1,210 @@
+// From what a user chose to particles, masses, graph, clusters and binding.
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/nearest.h"
+#include "meshless_surgery/geometry/sampling.h"
+
+namespace meshless {
+namespace {
+
+constexpr std::size_t kMaxParticles = 200000;
+constexpr std::size_t kMaxVertexParticles = 6000;  // larger surfaces ride, but for a subset at the spacing
+constexpr double kAutoParticles = 2500.0;          // interior particles aimed at where no spacing is given
+constexpr double kReach = 1.75;                    // of the spacing: how far neighbours along the body may be
+constexpr double kLeastMassShare = 0.1;            // of the mean: no particle is so light that contacts throw it
+
+Error invalid(const std::string& what) { return {ErrorCode::kInvalidArgument, what}; }
+
+bool finite(const Vec3& v) { return v.allFinite(); }
+
+Status validate(const BodyDef& def) {
+  if (def.mesh.empty()) return Error{ErrorCode::kUnsuitableShape, "body '" + def.name + "' has no triangles"};
+  if (!(def.spacing >= 0.0 && def.spacing <= 1e6)) {
+    std::ostringstream text;
+    text << "spacing is " << def.spacing << "; accepted: above 0 to 1e6 m, or 0 to choose it from the surface";
+    return invalid(text.str());
+  }
+  if (!finite(def.pose.translation) || !def.pose.rotation.coeffs().allFinite() ||
+      !(std::abs(def.pose.rotation.norm() - 1.0) < 1e-3))
+    return invalid("pose of body '" + def.name + "' is not finite or its quaternion is not of unit length");
+  const ClusterOptions& c = def.clusters;
+  long cells = 1;
+  for (int n : c.grid) {
+    if (n < 1 || n > 1000) return invalid("clusters.grid has " + std::to_string(n) + " cells; accepted: 1 to 1000");
+    cells *= n;
+  }
+  if (cells > 100000) return invalid("clusters.grid has " + std::to_string(cells) + " cells; accepted: up to 100000");
+  if (c.count < 1 || c.count > 100000)
+    return invalid("clusters.count is " + std::to_string(c.count) + "; accepted: 1 to 100000");
+  if (!(c.overlap >= 0.0 && c.overlap <= 1.0)) {
+    std::ostringstream text;
+    text << "clusters.overlap is " << c.overlap << "; accepted: 0 to 1";
+    return invalid(text.str());
+  }
+  return def.material.validate();
+}
+
+// Vertices that become particles: all, or for fine surfaces a subset about `spacing` apart.
+std::vector<Index> chooseVertexParticles(const Points& vertices, double spacing) {
+  std::vector<Index> particle(vertices.size(), kNoIndex);
+  Index next = 0;
+  if (vertices.size() <= kMaxVertexParticles) {
+    for (Index& p : particle) p = next++;
+    return particle;
+  }
+  const NearestPoints nearest(vertices);
+  const double apart = 0.8 * spacing;
+  std::vector<bool> shadowed(vertices.size(), false);
+  for (Index v = 0; v < vertices.size(); ++v) {
+    if (shadowed[v]) continue;
+    particle[v] = next++;
+    for (Index w : nearest.within(vertices[v], apart)) shadowed[w] = true;
+  }
+  return particle;
+}
+
+ParticleGraph linkParticles(const Points& rest, const TriangleMesh& mesh, const std::vector<Index>& vertex_particle,
+                            double reach, const SolidQuery* solid) {
+  std::vector<std::array<Index, 2>> edges;
+  for (const Triangle& t : mesh.triangles)
+    for (int k = 0; k < 3; ++k) {
+      const Index a = vertex_particle[t[k]], b = vertex_particle[t[(k + 1) % 3]];
+      if (a != kNoIndex && b != kNoIndex) edges.push_back({std::min(a, b), std::max(a, b)});
+    }
+  const NearestPoints nearest(rest);
+  std::vector<Index> links(rest.size(), 0);
+  for (const auto& e : edges) ++links[e[0]], ++links[e[1]];
+  std::sort(edges.begin(), edges.end());
+  const std::size_t surface_edges = std::unique(edges.begin(), edges.end()) - edges.begin();
+  edges.resize(surface_edges);
+  if (solid)
+    for (Index i = 0; i < rest.size(); ++i)
+      for (Index j : nearest.within(rest[i], reach)) {
+        if (j <= i) continue;
+        if (std::binary_search(edges.begin(), edges.begin() + static_cast<std::ptrdiff_t>(surface_edges),
+                               std::array<Index, 2>{i, j}))
+          continue;
+        // Through the air is not along the body.
+        if (!solid->contains(0.5 * (rest[i] + rest[j])) || solid->crosses(rest[i], rest[j])) continue;
+        edges.push_back({i, j});
+        ++links[i], ++links[j];
+      }
+  // A particle on its own (a thin or coarse spot) holds to its nearest neighbour.
+  for (Index i = 0; i < rest.size() && rest.size() > 1; ++i)
+    if (links[i] == 0) {
+      const std::vector<Index> two = nearest.nearest(rest[i], 2);
+      const Index j = two[0] == i ? two[1] : two[0];
+      edges.push_back({std::min(i, j), std::max(i, j)});
+    }
+  return makeGraph(rest, std::move(edges));
+}
+
+// Each particle gets the mass of what is nearest to it.
+std::vector<double> shareMass(const BodyDef& def, const TriangleMesh& mesh, const SolidQuery* solid, const Points& rest,
+                              double volume, double spacing) {
+  std::vector<double> share(rest.size(), 0.0);
+  const NearestPoints nearest(rest);
+  double total = def.material.density * volume;
+  if (solid) {
+    // A third of the spacing: samples half way between two particles would all fall to the same one.
+    const LatticeSample lattice = sampleInterior(mesh, *solid, spacing / 3.0, 0.0, kMaxParticles);
+    for (const Vec3& p : lattice.points) share[nearest.nearest(p)] += 1.0;
+  } else {  // an open surface is a shell as thick as its spacing
+    total = def.material.density * surfaceArea(mesh) * spacing;
+    for (const Triangle& t : mesh.triangles) {
+      const Vec3 &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+      share[nearest.nearest((a + b + c) / 3.0)] += (b - a).cross(c - a).norm();
+    }
+  }
+  double sum = 0.0;
+  for (double s : share) sum += s;
+  const double least = sum > 0.0 ? kLeastMassShare * sum / static_cast<double>(rest.size()) : 1.0;
+  sum = 0.0;
+  for (double& s : share) {
+    s = std::max(s, least);
+    sum += s;
+  }
+  for (double& s : share) s *= total / sum;
+  return share;
+}
+
+}  // namespace
+
+Result<PreparedBody> prepareBody(BodyDef def) {
+  if (Status status = validate(def); !status) return status.error();
+  auto model = std::make_shared<BodyModel>();
+  TriangleMesh& surface = model->surface;
+  surface = std::move(def.mesh);
+  def.mesh = TriangleMesh();
+  const Pose pose{def.pose.rotation.normalized(), def.pose.translation};
+  for (Vec3& v : surface.vertices) v = pose * v;
+  for (const Vec3& v : surface.vertices)
+    if (!finite(v)) return Error{ErrorCode::kUnsuitableShape, "body '" + def.name + "' has vertices that are not finite"};
+  if (surface.patches.empty()) surface.patches.assign(surface.triangles.size(), kOuterPatch);
+
+  const double edge = meanEdgeLength(surface);
+  const Box bounds = boundsOf(surface.vertices);
+  if (!(edge > 0.0)) return Error{ErrorCode::kUnsuitableShape, "body '" + def.name + "' has no extent"};
+  const double volume = def.solid ? signedVolume(surface) : 0.0;
+  if (def.solid && !(volume > 1e-12 * std::pow(bounds.diagonal(), 3.0))) {
+    std::ostringstream text;
+    text << "body '" << def.name << "' encloses a volume of " << volume << " m^3; a solid needs more than 1e-12 of its "
+         << "diagonal cubed";
+    return Error{ErrorCode::kUnsuitableShape, text.str()};
+  }
+  model->solid = def.solid;
+  model->rest_volume = volume;
+  model->spacing = def.spacing;
+  if (!(model->spacing > 0.0))
+    model->spacing = def.solid ? std::max(1.2 * edge, std::cbrt(volume / kAutoParticles)) : edge;
+  if (def.solid && volume / std::pow(model->spacing, 3.0) > static_cast<double>(kMaxParticles)) {
+    std::ostringstream text;
+    text << "spacing " << model->spacing << " m would give body '" << def.name << "' about "
+         << volume / std::pow(model->spacing, 3.0) << " particles; accepted: up to " << kMaxParticles
+         << ", a spacing of at least " << std::cbrt(volume / static_cast<double>(kMaxParticles)) << " m";
+    return invalid(text.str());
+  }
+
+  std::unique_ptr<SolidQuery> solid;
+  if (def.solid) solid = std::make_unique<SolidQuery>(surface);
+  std::vector<Index> vertex_particle = chooseVertexParticles(surface.vertices, model->spacing);
+  for (std::size_t v = 0; v < surface.vertices.size(); ++v)
+    if (vertex_particle[v] != kNoIndex) model->rest.push_back(surface.vertices[v]);
+  if (solid) {
+    const LatticeSample inner = sampleInterior(surface, *solid, model->spacing, 0.5 * model->spacing * (1.0 - 1e-9));
+    model->rest.insert(model->rest.end(), inner.points.begin(), inner.points.end());
+  }
+  if (model->rest.size() > kMaxParticles)
+    return invalid("body '" + def.name + "' has " + std::to_string(model->rest.size()) + " particles; accepted: up to " +
+                   std::to_string(kMaxParticles));
+
+  model->masses = shareMass(def, surface, solid.get(), model->rest, volume, model->spacing);
+  for (double m : model->masses) model->mass += m;
+  model->graph = linkParticles(model->rest, surface, vertex_particle, kReach * model->spacing, solid.get());
+  model->clusters = makeClusters(model->rest, model->graph, def.clusters);
+  model->shape = makeRestShape(model->rest, model->masses, model->clusters);
+  if (def.material.mode == MatchMode::kQuadratic)
+    addQuadraticRest(model->rest, model->masses, model->clusters, model->shape);
+  model->binding = bindSurface(model->rest, model->masses, model->clusters, model->shape, surface.vertices,
+                               std::move(vertex_particle));
+  model->fixed.assign(model->rest.size(), false);
+  for (std::size_t i = 0; i < model->rest.size(); ++i)
+    for (const Box& box : def.fixed)
+      if (box.contains(model->rest[i])) model->fixed[i] = model->any_fixed = true;
+
+  PreparedBody body;
+  body.state.positions = model->rest;
+  body.state.velocities.assign(model->rest.size(), Vec3::Zero());
+  body.state.poses.resize(model->clusters.size());
+  body.state.rider_offsets.assign(model->binding.riders.size(), Vec3::Zero());
+  updateSurface(*model, body.state);
+  body.def = std::move(def);
+  body.model = std::move(model);
+  return body;
+}
+
+}  // namespace meshless

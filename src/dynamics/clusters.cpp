@@ -1,0 +1,369 @@
+#include "meshless_surgery/dynamics/clusters.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <queue>
+#include <set>
+#include <utility>
+
+namespace meshless {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr Index kOneClusterBelow = 65;      // particles; smaller bodies are one cluster by themselves
+constexpr double kAutoRadiusEdges = 3.0;    // reach of an automatic cluster in mean graph edges ...
+constexpr double kAutoRadiusOfSize = 0.2;   // ... or as a share of the bounds' diagonal, whichever is more
+constexpr double kLeastShare = 0.02;        // of a member at the border of a cluster
+
+struct Reached {
+  Index particle;
+  double distance;  // [m] along the body
+};
+
+// Distances along the graph from a few starts, out to `radius`; scratch arrays are reused between searches.
+class GraphSearch {
+ public:
+  explicit GraphSearch(const ParticleGraph& graph) : graph_(graph), distance_(graph.size(), kInfinity) {}
+
+  std::vector<Reached> from(Index start, double radius) {
+    std::vector<Reached> reached;
+    Queue queue;
+    distance_[start] = 0.0;
+    queue.push({0.0, start});
+    touched_.push_back(start);
+    while (!queue.empty()) {
+      const auto [d, i] = queue.top();
+      queue.pop();
+      if (d > distance_[i]) continue;
+      reached.push_back({i, d});
+      for (Index k = graph_.offsets[i]; k < graph_.offsets[i + 1]; ++k) {
+        const Index j = graph_.neighbours[k];
+        const double there = d + graph_.lengths[k];
+        if (there > radius || !(there < distance_[j])) continue;
+        if (distance_[j] == kInfinity) touched_.push_back(j);
+        distance_[j] = there;
+        queue.push({there, j});
+      }
+    }
+    for (Index i : touched_) distance_[i] = kInfinity;
+    touched_.clear();
+    return reached;
+  }
+
+ private:
+  using Entry = std::pair<double, Index>;
+  using Queue = std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>>;
+  const ParticleGraph& graph_;
+  std::vector<double> distance_;
+  std::vector<Index> touched_;
+};
+
+// A cluster under construction; `share` is not yet normalised over the clusters of a particle.
+struct Draft {
+  Index seed = 0;
+  double radius = 0.0;
+  std::vector<std::pair<Index, double>> members;  // particle, share
+};
+
+double shareAt(double distance, double radius) {
+  // Flat in the middle: a peaked share makes a cluster act as if it were small, and small clusters are soft.
+  const double s = radius > 0.0 ? std::min(1.0, distance / radius) : 0.0;
+  return std::max(kLeastShare, 1.0 - s * s);
+}
+
+Draft grow(GraphSearch& search, Index seed, double radius) {
+  Draft draft;
+  draft.seed = seed;
+  draft.radius = radius;
+  for (const Reached& r : search.from(seed, radius)) draft.members.emplace_back(r.particle, shareAt(r.distance, radius));
+  std::sort(draft.members.begin(), draft.members.end());
+  return draft;
+}
+
+ClusterSet assemble(std::vector<Draft> drafts, Index particles) {
+  std::vector<double> total(particles, 0.0);
+  for (const Draft& d : drafts)
+    for (const auto& [i, share] : d.members) total[i] += share;
+  ClusterSet set;
+  set.offsets.push_back(0);
+  for (const Draft& d : drafts) {
+    for (const auto& [i, share] : d.members) {
+      set.members.push_back(i);
+      set.weights.push_back(share / total[i]);
+    }
+    set.offsets.push_back(static_cast<Index>(set.members.size()));
+    set.seeds.push_back(d.seed);
+    set.radii.push_back(d.radius);
+  }
+  return set;
+}
+
+Index nearestTo(const Points& rest, const Vec3& place) {
+  Index best = 0;
+  for (Index i = 1; i < rest.size(); ++i)
+    if ((rest[i] - place).squaredNorm() < (rest[best] - place).squaredNorm()) best = i;
+  return best;
+}
+
+Vec3 meanOf(const Points& rest) {
+  Vec3 sum = Vec3::Zero();
+  for (const Vec3& p : rest) sum += p - rest[0];
+  return rest[0] + sum / static_cast<double>(rest.size());
+}
+
+ClusterSet oneCluster(const Points& rest) {
+  Draft draft;
+  draft.seed = nearestTo(rest, meanOf(rest));
+  draft.radius = kInfinity;
+  for (Index i = 0; i < rest.size(); ++i) draft.members.emplace_back(i, 1.0);
+  return assemble({draft}, static_cast<Index>(rest.size()));
+}
+
+// Seeds that are farthest from each other along the body, until `count` of them or until every particle is within
+// `cover` of one. Returns them with the reach that covers the body.
+struct SeedSet {
+  std::vector<Index> seeds;
+  double cover = 0.0;  // [m] largest distance of a particle from its nearest seed
+};
+SeedSet farthestSeeds(const Points& rest, const ParticleGraph& graph, std::size_t count, double cover) {
+  using Entry = std::pair<double, Index>;
+  std::vector<double> distance(rest.size(), kInfinity);
+  SeedSet set;
+  // The first is the particle farthest from the middle: ends of a body, not its middle, are what a second seed misses.
+  const Vec3 middle = meanOf(rest);
+  Index next = 0;
+  for (Index i = 1; i < rest.size(); ++i)
+    if ((rest[i] - middle).squaredNorm() > (rest[next] - middle).squaredNorm()) next = i;
+  while (true) {
+    set.seeds.push_back(next);
+    std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
+    distance[next] = 0.0;
+    queue.push({0.0, next});
+    while (!queue.empty()) {
+      const auto [d, i] = queue.top();
+      queue.pop();
+      if (d > distance[i]) continue;
+      for (Index k = graph.offsets[i]; k < graph.offsets[i + 1]; ++k) {
+        const Index j = graph.neighbours[k];
+        if (!(d + graph.lengths[k] < distance[j])) continue;
+        distance[j] = d + graph.lengths[k];
+        queue.push({distance[j], j});
+      }
+    }
+    next = static_cast<Index>(std::max_element(distance.begin(), distance.end()) - distance.begin());
+    set.cover = distance[next];
+    // Parts without any path to a seed get one however many were asked for: every particle needs a cluster.
+    if (set.cover == kInfinity) continue;
+    if (set.seeds.size() >= count || set.cover <= cover) return set;
+  }
+}
+
+ClusterSet clustersAround(const SeedSet& set, const ParticleGraph& graph, double radius) {
+  GraphSearch search(graph);
+  std::vector<Draft> drafts;
+  for (Index seed : set.seeds) drafts.push_back(grow(search, seed, radius));
+  return assemble(std::move(drafts), graph.size());
+}
+
+ClusterSet gridClusters(const Points& rest, const ParticleGraph& graph, const ClusterOptions& options) {
+  Box bounds;
+  for (const Vec3& p : rest) bounds.extend(p);
+  const Vec3 cell = (bounds.max - bounds.min).cwiseQuotient(Vec3(options.grid[0], options.grid[1], options.grid[2]));
+  std::vector<Draft> drafts;
+  std::vector<int> part(rest.size(), -1);
+  std::vector<bool> covered(rest.size(), false);
+  for (int z = 0; z < options.grid[2]; ++z)
+    for (int y = 0; y < options.grid[1]; ++y)
+      for (int x = 0; x < options.grid[0]; ++x) {
+        const Vec3 low = bounds.min + cell.cwiseProduct(Vec3(x, y, z));
+        const Vec3 centre = low + 0.5 * cell;
+        const Vec3 reach = cell * (0.5 + options.overlap) + Vec3::Constant(1e-9 * bounds.diagonal());
+        const Vec3 core = cell * 0.5 + Vec3::Constant(1e-9 * bounds.diagonal());
+        std::vector<Index> inside;
+        for (Index i = 0; i < rest.size(); ++i)
+          if (((rest[i] - centre).cwiseAbs().array() <= reach.array()).all()) inside.push_back(i);
+        // Parts of the cell that hang together along the body are clusters of their own.
+        for (Index i : inside) part[i] = 0;
+        int parts = 0;
+        for (Index first : inside) {
+          if (part[first] != 0) continue;
+          part[first] = ++parts;
+          Draft draft;
+          bool has_core = false;
+          std::vector<Index> stack{first};
+          while (!stack.empty()) {
+            const Index i = stack.back();
+            stack.pop_back();
+            const Vec3 away = (rest[i] - centre).cwiseAbs();
+            has_core = has_core || (away.array() <= core.array()).all();
+            const double relative = (away.array() / reach.array()).maxCoeff();
+            draft.members.emplace_back(i, shareAt(relative, 1.0));
+            for (Index k = graph.offsets[i]; k < graph.offsets[i + 1]; ++k)
+              if (part[graph.neighbours[k]] == 0) {
+                part[graph.neighbours[k]] = parts;
+                stack.push_back(graph.neighbours[k]);
+              }
+          }
+          if (!has_core) continue;
+          std::sort(draft.members.begin(), draft.members.end());
+          draft.seed = draft.members[0].first;
+          for (const auto& [i, share] : draft.members) {
+            covered[i] = true;
+            if ((rest[i] - centre).squaredNorm() < (rest[draft.seed] - centre).squaredNorm()) draft.seed = i;
+          }
+          draft.radius = reach.norm();
+          drafts.push_back(std::move(draft));
+        }
+        for (Index i : inside) part[i] = -1;
+      }
+  return assemble(std::move(drafts), graph.size());
+}
+
+double meanLength(const ParticleGraph& graph) {
+  if (graph.lengths.empty()) return 0.0;
+  double sum = 0.0;
+  for (double l : graph.lengths) sum += l;
+  return sum / static_cast<double>(graph.lengths.size());
+}
+
+}  // namespace
+
+ParticleGraph makeGraph(const Points& rest, std::vector<std::array<Index, 2>> edges) {
+  const std::size_t given = edges.size();
+  edges.reserve(2 * given);
+  for (std::size_t e = 0; e < given; ++e) edges.push_back({edges[e][1], edges[e][0]});
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  ParticleGraph graph;
+  graph.offsets.assign(rest.size() + 1, 0);
+  for (const auto& e : edges)
+    if (e[0] != e[1]) {
+      ++graph.offsets[e[0] + 1];
+      graph.neighbours.push_back(e[1]);
+      graph.lengths.push_back((rest[e[0]] - rest[e[1]]).norm());
+    }
+  for (std::size_t i = 0; i < rest.size(); ++i) graph.offsets[i + 1] += graph.offsets[i];
+  return graph;
+}
+
+ClusterSet makeClusters(const Points& rest, const ParticleGraph& graph, const ClusterOptions& options) {
+  const Index particles = graph.size();
+  switch (options.kind) {
+    case ClusterOptions::Kind::kOne: return oneCluster(rest);
+    case ClusterOptions::Kind::kGrid: return gridClusters(rest, graph, options);
+    case ClusterOptions::Kind::kCount: {
+      if (options.count <= 1) return oneCluster(rest);
+      const SeedSet set = farthestSeeds(rest, graph, static_cast<std::size_t>(options.count), 0.0);
+      return clustersAround(set, graph, (1.0 + options.overlap) * set.cover + 1e-12);
+    }
+    case ClusterOptions::Kind::kAuto: break;
+  }
+  if (particles < kOneClusterBelow) return oneCluster(rest);
+  Box bounds;
+  for (const Vec3& p : rest) bounds.extend(p);
+  const double cover = std::max(kAutoRadiusEdges * meanLength(graph), kAutoRadiusOfSize * bounds.diagonal());
+  const SeedSet set = farthestSeeds(rest, graph, particles, cover);
+  return clustersAround(set, graph, (1.2 + options.overlap) * cover);
+}
+
+ParticleGraph subgraph(const ParticleGraph& parent, const std::vector<Index>& kept) {
+  std::vector<Index> renumbered(parent.size(), kNoIndex);
+  for (std::size_t i = 0; i < kept.size(); ++i) renumbered[kept[i]] = static_cast<Index>(i);
+  ParticleGraph graph;
+  graph.offsets.push_back(0);
+  for (Index old : kept) {
+    for (Index k = parent.offsets[old]; k < parent.offsets[old + 1]; ++k)
+      if (renumbered[parent.neighbours[k]] != kNoIndex) {
+        graph.neighbours.push_back(renumbered[parent.neighbours[k]]);
+        graph.lengths.push_back(parent.lengths[k]);
+      }
+    graph.offsets.push_back(static_cast<Index>(graph.neighbours.size()));
+  }
+  return graph;
+}
+
+PieceClusters splitClusters(const ClusterSet& parent, const Points& piece_rest, const ParticleGraph& piece_graph,
+                            const std::vector<Index>& kept) {
+  const Index particles = piece_graph.size();
+  Index largest = 0;
+  for (Index i : kept) largest = std::max(largest, i + 1);
+  for (Index i : parent.members) largest = std::max(largest, i + 1);
+  std::vector<Index> renumbered(largest, kNoIndex);
+  for (std::size_t i = 0; i < kept.size(); ++i) renumbered[kept[i]] = static_cast<Index>(i);
+
+  PieceClusters piece;
+  std::vector<Draft> drafts;
+  std::vector<bool> covered(particles, false);
+  struct Touched {
+    double radius;
+    Vec3 middle;                 // rest mean of the members that stayed
+    std::vector<Index> members;  // that are in the piece
+    std::size_t before;
+  };
+  std::vector<Touched> touched;
+  for (Index c = 0; c < parent.size(); ++c) {
+    Draft draft;
+    draft.radius = parent.radii[c];
+    const Index begin = parent.offsets[c], end = parent.offsets[c + 1];
+    for (Index k = begin; k < end; ++k)
+      if (renumbered[parent.members[k]] != kNoIndex)
+        draft.members.emplace_back(renumbered[parent.members[k]], parent.weights[k]);
+    if (draft.members.empty()) continue;
+    if (draft.members.size() == end - begin) {
+      draft.seed = renumbered[parent.seeds[c]];
+      for (const auto& m : draft.members) covered[m.first] = true;
+      drafts.push_back(std::move(draft));
+      ++piece.kept;
+      continue;
+    }
+    Touched t{parent.radii[c], Vec3::Zero(), {}, end - begin};
+    for (const auto& m : draft.members) t.members.push_back(m.first);
+    // The old seed where it is in the piece; else the middle of what is left of the cluster.
+    if (renumbered[parent.seeds[c]] != kNoIndex)
+      t.middle = piece_rest[renumbered[parent.seeds[c]]];
+    else
+      for (Index i : t.members) t.middle += piece_rest[i] / static_cast<double>(t.members.size());
+    touched.push_back(std::move(t));
+  }
+
+  GraphSearch search(piece_graph);
+  std::set<std::vector<std::pair<Index, double>>> grown;  // two halves of one cluster may grow into the same set
+  const auto growFrom = [&](const std::vector<Index>& candidates, const Vec3& middle, double radius) {
+    Index seed = candidates[0];
+    for (Index i : candidates)
+      if ((piece_rest[i] - middle).squaredNorm() < (piece_rest[seed] - middle).squaredNorm()) seed = i;
+    Draft draft = grow(search, seed, radius);
+    covered[seed] = true;
+    for (const auto& m : draft.members) covered[m.first] = true;
+    std::vector<std::pair<Index, double>> key;
+    for (const auto& m : draft.members) key.emplace_back(m.first, 0.0);
+    if (!grown.insert(key).second) return;
+    drafts.push_back(std::move(draft));
+    ++piece.rebuilt;
+  };
+  // A cluster that lost most of itself grows only where something would be left without one.
+  for (const Touched& t : touched)
+    if (3 * t.members.size() >= t.before) growFrom(t.members, t.middle, t.radius);
+  for (const Touched& t : touched)
+    while (true) {
+      std::vector<Index> bare;
+      for (Index i : t.members)
+        if (!covered[i]) bare.push_back(i);
+      if (bare.empty()) break;
+      growFrom(bare, t.middle, t.radius);
+    }
+  std::vector<Index> bare;
+  for (Index i = 0; i < particles; ++i)
+    if (!covered[i]) bare.push_back(i);
+  if (!bare.empty()) {  // particles that the parent did not have
+    double radius = 0.0;
+    for (double r : parent.radii) radius = std::max(radius, r);
+    for (Index i : bare)
+      if (!covered[i]) growFrom({i}, piece_rest[i], radius);
+  }
+  piece.clusters = assemble(std::move(drafts), particles);
+  return piece;
+}
+
+}  // namespace meshless

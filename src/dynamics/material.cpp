@@ -1,0 +1,45 @@
+#include "meshless_surgery/dynamics/material.h"
+
+#include <cmath>
+#include <sstream>
+
+namespace meshless {
+namespace {
+
+Status outOfRange(const char* key, double value, const char* accepted) {
+  std::ostringstream text;
+  text << key << " is " << value << "; accepted: " << accepted;
+  return Error{ErrorCode::kInvalidArgument, text.str()};
+}
+
+constexpr double kReferenceStep = 1.0 / 60.0;  // [s] alpha holds there
+
+}  // namespace
+
+const char* toString(MatchMode mode) {
+  switch (mode) {
+    case MatchMode::kRigid: return "rigid";
+    case MatchMode::kLinear: return "linear";
+    case MatchMode::kQuadratic: return "quadratic";
+  }
+  return "unknown";
+}
+
+Status Material::validate() const {
+  if (!(alpha >= 0.0 && alpha <= 1.0)) return outOfRange("alpha", alpha, "0 to 1");
+  if (!(beta >= 0.0 && beta <= 1.0)) return outOfRange("beta", beta, "0 to 1");
+  if (!(density > 0.0 && density <= 1e6)) return outOfRange("density", density, "above 0 to 1e6 kg/m^3");
+  if (!(damping >= 0.0 && damping <= 1e6)) return outOfRange("damping", damping, "0 to 1e6 1/s");
+  if (!(friction >= 0.0 && friction <= 10.0)) return outOfRange("friction", friction, "0 to 10");
+  for (const Color& c : {color, inside_color})
+    for (float channel : {c.r, c.g, c.b, c.a})
+      if (!(channel >= 0.0f && channel <= 1.0f)) return outOfRange("a colour's channel", channel, "0 to 1");
+  return Done{};
+}
+
+double stiffnessGain(double alpha, double h) {
+  const double steps = h / kReferenceStep;
+  return 1.0 - std::pow(1.0 - alpha, steps * steps);
+}
+
+}  // namespace meshless

@@ -1,0 +1,171 @@
+#include "meshless_surgery/dynamics/shape_matching.h"
+
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+#include "meshless_surgery/dynamics/rotation.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kLinearRankRatio = 1e-8;     // of the moment's eigenvalues, smallest to largest
+constexpr double kQuadraticRankRatio = 1e-7;  // of the basis in units of the cluster's size
+constexpr double kFullBetaDeterminant = 0.1;  // below it the fitted map fades out, at 0 only the rotation is left
+
+Vec9 quadraticBasis(const Vec3& q) {
+  Vec9 b;
+  b << q.x(), q.y(), q.z(), q.x() * q.x(), q.y() * q.y(), q.z() * q.z(), q.x() * q.y(), q.y() * q.z(), q.z() * q.x();
+  return b;
+}
+
+Vec3 centreOf(const MatchInput& in, Index c, const Points& y) {
+  Vec3 sum = Vec3::Zero();
+  const Vec3 origin = y[in.clusters.members[in.clusters.offsets[c]]];
+  for (Index k = in.clusters.offsets[c]; k < in.clusters.offsets[c + 1]; ++k) {
+    const Index i = in.clusters.members[k];
+    sum += in.masses[i] * in.clusters.weights[k] * (y[i] - origin);
+  }
+  return origin + sum / in.shape.clusters[c].mass;
+}
+
+Mat3 crossMoment(const MatchInput& in, Index c, const Points& y, const Vec3& centre) {
+  const Vec3& rest_centre = in.shape.clusters[c].centre;
+  Mat3 a = Mat3::Zero();
+  for (Index k = in.clusters.offsets[c]; k < in.clusters.offsets[c + 1]; ++k) {
+    const Index i = in.clusters.members[k];
+    a += (in.masses[i] * in.clusters.weights[k]) * (y[i] - centre) * (in.rest[i] - rest_centre).transpose();
+  }
+  return a;
+}
+
+// Centre, rotation and best affine fit; the counters say what it took.
+void fitCluster(const MatchInput& in, Index c, const Points& y, bool affine, ClusterPose& pose, MatchCounters& counters) {
+  const ClusterRest& rest = in.shape.clusters[c];
+  pose.centre = centreOf(in, c, y);
+  const Mat3 a = crossMoment(in, c, y, pose.centre);
+  const RotationResult found = nearestRotation(a, pose.rotation);
+  pose.rotation = found.rotation;
+  ++counters.rotations;
+  if (!found.warm) ++counters.cold_rotations;
+  if (!found.unique) ++counters.rank_fallbacks;
+  if (affine && rest.linear_rank) {
+    pose.deformation = a * rest.moment_inverse;
+    ++counters.linear_fits;
+  } else {
+    pose.deformation = pose.rotation.toRotationMatrix();
+    if (affine) ++counters.rank_fallbacks;
+  }
+}
+
+}  // namespace
+
+RestShape makeRestShape(const Points& rest, const std::vector<double>& masses, const ClusterSet& clusters) {
+  RestShape shape;
+  shape.clusters.resize(clusters.size());
+  for (Index c = 0; c < clusters.size(); ++c) {
+    ClusterRest& r = shape.clusters[c];
+    const Vec3 origin = rest[clusters.members[clusters.offsets[c]]];
+    Vec3 sum = Vec3::Zero();
+    for (Index k = clusters.offsets[c]; k < clusters.offsets[c + 1]; ++k) {
+      const Index i = clusters.members[k];
+      const double m = masses[i] * clusters.weights[k];
+      r.mass += m;
+      sum += m * (rest[i] - origin);
+    }
+    r.centre = origin + sum / r.mass;
+    Mat3 moment = Mat3::Zero();
+    for (Index k = clusters.offsets[c]; k < clusters.offsets[c + 1]; ++k) {
+      const Index i = clusters.members[k];
+      const Vec3 q = rest[i] - r.centre;
+      moment += (masses[i] * clusters.weights[k]) * q * q.transpose();
+    }
+    r.size = std::sqrt(moment.trace() / r.mass);
+    const double scale = moment.trace();
+    if (!(scale > 0.0)) continue;
+    const Eigen::SelfAdjointEigenSolver<Mat3> solver(moment / scale);
+    r.linear_rank = solver.eigenvalues()[0] > kLinearRankRatio * solver.eigenvalues()[2];
+    if (r.linear_rank)
+      r.moment_inverse = solver.eigenvectors() * solver.eigenvalues().cwiseInverse().asDiagonal() *
+                         solver.eigenvectors().transpose() / scale;
+  }
+  return shape;
+}
+
+void addQuadraticRest(const Points& rest, const std::vector<double>& masses, const ClusterSet& clusters,
+                      RestShape& shape) {
+  shape.quadratic.assign(clusters.size(), QuadraticRest());
+  for (Index c = 0; c < clusters.size(); ++c) {
+    ClusterRest& r = shape.clusters[c];
+    QuadraticRest& quadratic = shape.quadratic[c];
+    r.quadratic_rank = false;
+    if (!r.linear_rank) continue;
+    for (Index k = clusters.offsets[c]; k < clusters.offsets[c + 1]; ++k) {
+      const Index i = clusters.members[k];
+      quadratic.mean += (masses[i] * clusters.weights[k] / r.mass) * quadraticBasis((rest[i] - r.centre) / r.size);
+    }
+    Mat9 moment = Mat9::Zero();
+    for (Index k = clusters.offsets[c]; k < clusters.offsets[c + 1]; ++k) {
+      const Index i = clusters.members[k];
+      const Vec9 b = quadraticBasis((rest[i] - r.centre) / r.size) - quadratic.mean;
+      moment += (masses[i] * clusters.weights[k]) * b * b.transpose();
+    }
+    const Eigen::SelfAdjointEigenSolver<Mat9> solver(moment / r.mass);
+    r.quadratic_rank = solver.eigenvalues()[0] > kQuadraticRankRatio * solver.eigenvalues()[8];
+    if (r.quadratic_rank)
+      quadratic.moment_inverse = solver.eigenvectors() * solver.eigenvalues().cwiseInverse().asDiagonal() *
+                                 solver.eigenvectors().transpose() / r.mass;
+  }
+}
+
+void matchShapes(const MatchInput& in, const Points& y, MatchMode mode, double beta, std::vector<ClusterPose>& poses,
+                 Points& goals, MatchCounters& counters) {
+  goals.assign(y.size(), Vec3::Zero());
+  const bool wants_fit = mode != MatchMode::kRigid && beta > 0.0;
+  for (Index c = 0; c < in.clusters.size(); ++c) {
+    const ClusterRest& rest = in.shape.clusters[c];
+    ClusterPose& pose = poses[c];
+    ++counters.clusters;
+    fitCluster(in, c, y, wants_fit, pose, counters);
+    const Mat3 rotation = pose.rotation.toRotationMatrix();
+    Mat3 map = rotation;
+    double share = 0.0;  // of the fitted map; less than beta where the cluster is nearly flat or inverted
+    if (wants_fit && rest.linear_rank) {
+      const double determinant = pose.deformation.determinant();
+      share = beta * std::min(1.0, std::max(0.0, determinant / kFullBetaDeterminant));
+      if (!(share > 0.0)) ++counters.rank_fallbacks;
+      map = share * pose.deformation / std::cbrt(std::max(determinant, kFullBetaDeterminant)) + (1.0 - share) * rotation;
+    }
+    const Index begin = in.clusters.offsets[c], end = in.clusters.offsets[c + 1];
+    if (mode == MatchMode::kQuadratic && share > 0.0 && !rest.quadratic_rank) ++counters.rank_fallbacks;
+    if (mode == MatchMode::kQuadratic && share > 0.0 && rest.quadratic_rank) {
+      const QuadraticRest& quadratic = in.shape.quadratic[c];
+      ++counters.quadratic_moments;
+      Mat39 moment = Mat39::Zero();
+      for (Index k = begin; k < end; ++k) {
+        const Index i = in.clusters.members[k];
+        const Vec9 b = quadraticBasis((in.rest[i] - rest.centre) / rest.size) - quadratic.mean;
+        moment += (in.masses[i] * in.clusters.weights[k]) * (y[i] - pose.centre) * b.transpose();
+      }
+      const Mat39 fit = share * moment * quadratic.moment_inverse;
+      for (Index k = begin; k < end; ++k) {
+        const Index i = in.clusters.members[k];
+        const Vec3 q = in.rest[i] - rest.centre;
+        const Vec9 b = quadraticBasis(q / rest.size) - quadratic.mean;
+        goals[i] += in.clusters.weights[k] * (pose.centre + fit * b + (1.0 - share) * (rotation * q));
+      }
+    } else {
+      for (Index k = begin; k < end; ++k) {
+        const Index i = in.clusters.members[k];
+        goals[i] += in.clusters.weights[k] * (pose.centre + map * (in.rest[i] - rest.centre));
+      }
+    }
+  }
+}
+
+void fitClusters(const MatchInput& in, const Points& positions, std::vector<ClusterPose>& poses) {
+  MatchCounters uncounted;
+  for (Index c = 0; c < in.clusters.size(); ++c) fitCluster(in, c, positions, true, poses[c], uncounted);
+}
+
+}  // namespace meshless

@@ -1,0 +1,88 @@
+#include "meshless_surgery/tools/grasp.h"
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <queue>
+
+namespace meshless {
+
+void makeGrasp(const BodyModel& model, Index centre, double radius, Pick& pick) {
+  using Entry = std::pair<double, Index>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
+  std::map<Index, double> distance;
+  distance[centre] = 0.0;
+  queue.push({0.0, centre});
+  pick.particle = centre;
+  pick.patch.clear();
+  pick.weights.clear();
+  double total = 0.0;
+  while (!queue.empty()) {
+    const auto [d, i] = queue.top();
+    queue.pop();
+    if (d > distance[i]) continue;
+    const double s = radius > 0.0 ? 1.0 - d / radius : 1.0;
+    pick.patch.push_back(i);
+    pick.weights.push_back(model.masses[i] * s * s);
+    total += pick.weights.back();
+    for (Index k = model.graph.offsets[i]; k < model.graph.offsets[i + 1]; ++k) {
+      const Index j = model.graph.neighbours[k];
+      const double there = d + model.graph.lengths[k];
+      if (!(there < radius)) continue;
+      const auto [it, is_new] = distance.emplace(j, there);
+      if (!is_new && !(there < it->second)) continue;
+      it->second = there;
+      queue.push({there, j});
+    }
+  }
+  for (double& w : pick.weights) w /= total;
+}
+
+Vec3 graspMean(const Pick& pick, const Points& positions) {
+  Vec3 sum = Vec3::Zero();
+  const Vec3& origin = positions[pick.patch[0]];
+  for (std::size_t k = 0; k < pick.patch.size(); ++k) sum += pick.weights[k] * (positions[pick.patch[k]] - origin);
+  return origin + sum;
+}
+
+Vec3 pullGrasp(const BodyModel& model, const Pick& pick, double h, Points& positions) {
+  double inverse_mass = 0.0;
+  for (std::size_t k = 0; k < pick.patch.size(); ++k)
+    if (!model.fixed[pick.patch[k]]) inverse_mass += pick.weights[k] * pick.weights[k] / model.masses[pick.patch[k]];
+  const Vec3 stretch = pick.target - pick.offset - graspMean(pick, positions);
+  const double stiff = pick.stiffness * h * h;
+  const Vec3 lambda = stretch * (stiff / (1.0 + stiff * inverse_mass));
+  for (std::size_t k = 0; k < pick.patch.size(); ++k) {
+    const Index i = pick.patch[k];
+    if (!model.fixed[i]) positions[i] += lambda * (pick.weights[k] / model.masses[i]);
+  }
+  return lambda / (h * h);
+}
+
+RayHit castRay(const Points& vertices, const std::vector<Triangle>& triangles, const Vec3& origin, const Vec3& direction) {
+  RayHit best;
+  best.distance = std::numeric_limits<double>::infinity();
+  const Vec3 d = direction.normalized();
+  for (std::size_t t = 0; t < triangles.size(); ++t) {  // Moeller and Trumbore 1997
+    const Vec3& a = vertices[triangles[t][0]];
+    const Vec3 e1 = vertices[triangles[t][1]] - a, e2 = vertices[triangles[t][2]] - a;
+    const Vec3 p = d.cross(e2);
+    const double det = e1.dot(p);
+    if (det == 0.0) continue;
+    const Vec3 s = origin - a;
+    const double u = s.dot(p) / det;
+    if (!(u >= 0.0 && u <= 1.0)) continue;
+    const Vec3 q = s.cross(e1);
+    const double v = d.dot(q) / det;
+    if (!(v >= 0.0 && u + v <= 1.0)) continue;
+    const double distance = e2.dot(q) / det;
+    if (!(distance >= 0.0 && distance < best.distance)) continue;
+    best.hit = true;
+    best.distance = distance;
+    best.triangle = static_cast<Index>(t);
+  }
+  if (best.hit) best.point = origin + best.distance * d;
+  return best;
+}
+
+}  // namespace meshless

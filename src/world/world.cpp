@@ -1,0 +1,299 @@
+// Lifetime of bodies, snapshots, hash. Commands are in world_commands.cpp, cuts in world_cut.cpp, time in world_step.cpp.
+#include "meshless_surgery/world/world.h"
+
+#include <cstring>
+#include <sstream>
+
+#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/tetrahedralize.h"
+#include "meshless_surgery/geometry/inside.h"
+#include "world_impl.h"
+
+namespace meshless {
+
+Error outOfRange(const std::string& name, double value, const std::string& accepted) {
+  std::ostringstream text;
+  text << name << " is " << value << "; accepted: " << accepted;
+  return {ErrorCode::kInvalidArgument, text.str()};
+}
+
+Error notFinite(const std::string& name) {
+  return {ErrorCode::kInvalidArgument, name + " is not finite; accepted: finite numbers"};
+}
+
+const char* toString(EventType type) {
+  switch (type) {
+    case EventType::kPicked: return "picked";
+    case EventType::kLocked: return "locked";
+    case EventType::kReleased: return "released";
+    case EventType::kCut: return "cut";
+    case EventType::kIncised: return "incised";
+    case EventType::kTouched: return "touched";
+    case EventType::kAsleep: return "asleep";
+    case EventType::kAwake: return "awake";
+    case EventType::kOverBudget: return "over budget";
+    case EventType::kSpawned: return "spawned";
+    case EventType::kRemoved: return "removed";
+    case EventType::kReset: return "reset";
+    case EventType::kFault: return "fault";
+  }
+  return "unknown";
+}
+
+Status WorldSettings::validate() const {
+  if (!(gravity.norm() <= 1e4)) return outOfRange("the length of gravity", gravity.norm(), "0 to 1e4 m/s^2");
+  if (ground && !(std::abs(*ground) <= 1e6)) return outOfRange("ground", *ground, "-1e6 to 1e6 m, or none");
+  if (!(ground_friction >= 0.0 && ground_friction <= 10.0)) return outOfRange("ground_friction", ground_friction, "0 to 10");
+  if (!(step_rate >= 1.0 && step_rate <= 10000.0)) return outOfRange("step_rate", step_rate, "1 to 10000 Hz");
+  if (!(substeps >= 1 && substeps <= 1000)) return outOfRange("substeps", substeps, "1 to 1000");
+  if (!(pick_max_distance > 0.0 && pick_max_distance <= 1e6))
+    return outOfRange("pick_max_distance", pick_max_distance, "above 0 to 1e6 m");
+  if (!(pick_stiffness > 0.0 && pick_stiffness <= 1e12))
+    return outOfRange("pick_stiffness", pick_stiffness, "above 0 to 1e12 N/m");
+  if (!(pick_radius >= 0.0 && pick_radius <= 1e6)) return outOfRange("pick_radius", pick_radius, "0 to 1e6 m");
+  if (!(push_radius > 0.0 && push_radius <= 1e6)) return outOfRange("push_radius", push_radius, "above 0 to 1e6 m");
+  return Done{};
+}
+
+// --- Impl: bodies
+
+WorldBody* World::Impl::find(const std::string& name) {
+  for (auto& body : bodies)
+    if (body->name == name) return body.get();
+  return nullptr;
+}
+
+WorldBody* World::Impl::find(const BodyId& id) {
+  for (auto& body : bodies)
+    if (body->id == id) return body.get();
+  return nullptr;
+}
+
+Pick* World::Impl::findPick(PickId id) {
+  for (Pick& pick : picks)
+    if (pick.id == id) return &pick;
+  return nullptr;
+}
+
+void World::Impl::say(EventType type, const std::string& body, PickId pick, const std::string& text) {
+  events.push_back({type, step, static_cast<double>(step) / settings.step_rate, body, pick, text});
+}
+
+std::string World::Impl::knownBodies() const {
+  constexpr std::size_t kMost = 20;
+  std::string list;
+  for (std::size_t i = 0; i < bodies.size() && i < kMost; ++i) list += (i ? ", " : "") + bodies[i]->name;
+  if (bodies.size() > kMost) list += " and " + std::to_string(bodies.size() - kMost) + " more";
+  return list.empty() ? "there are no bodies" : "bodies are: " + list;
+}
+
+WorldBody& World::Impl::admit(std::string name, Material material, BodyModelPtr model, BodyState state) {
+  auto body = std::make_unique<WorldBody>();
+  if (free_slots.empty()) {
+    body->id.slot = static_cast<std::uint32_t>(generations.size());
+    generations.push_back(0);
+  } else {
+    body->id.slot = free_slots.back();
+    free_slots.pop_back();
+  }
+  body->id.generation = generations[body->id.slot];
+  body->number = next_number++;
+  used_names.insert(name);
+  body->name = std::move(name);
+  body->material = std::move(material);
+  body->model = std::move(model);
+  body->state = std::move(state);
+  bodies.push_back(std::move(body));
+  return *bodies.back();
+}
+
+void World::Impl::retire(const BodyId& id) {
+  for (auto it = bodies.begin(); it != bodies.end(); ++it)
+    if ((*it)->id == id) {
+      ++generations[id.slot];
+      free_slots.push_back(id.slot);
+      bodies.erase(it);
+      return;
+    }
+}
+
+Result<SpawnReply> World::Impl::spawn(const PreparedBody& body) {
+  const std::string& name = body.def.name;
+  if (name.empty()) return Error{ErrorCode::kInvalidArgument, "a body needs a name"};
+  if (used_names.count(name))
+    return Error{ErrorCode::kDuplicateName,
+                 "the name '" + name + "' is in use or was retired in this run; " + knownBodies()};
+  WorldBody& admitted = admit(name, body.def.material, body.model, body.state);
+  say(EventType::kSpawned, name, 0, "spawned " + name);
+  return SpawnReply{admitted.id, name, admitted.model->rest.size(), admitted.model->surface.triangles.size(),
+                    admitted.model->clusters.size()};
+}
+
+void World::Impl::refreshSurface(WorldBody& body) {
+  if (body.surface_current) return;
+  updateSurface(*body.model, body.state);
+  body.surface_current = true;
+}
+
+void World::Impl::needContactMesh(WorldBody& body) {
+  if (body.mesh) return;
+  auto mesh = std::make_shared<ContactMesh>();
+  if (body.model->solid && body.model->rest.size() >= 4) {
+    mesh->tetrahedra = tetrahedralize(body.model->rest, SolidQuery(body.model->surface));
+    mesh->faces = boundaryFaces(mesh->tetrahedra);
+    mesh->edges = tetrahedronEdges(mesh->tetrahedra);
+    ++tetrahedralizations;
+  }
+  body.mesh = std::move(mesh);
+}
+
+// --- World
+
+World::World(WorldSettings settings) : impl_(std::make_unique<Impl>()) { impl_->settings = std::move(settings); }
+World::~World() = default;
+World::World(World&&) noexcept = default;
+World& World::operator=(World&&) noexcept = default;
+
+const WorldSettings& World::settings() const { return impl_->settings; }
+std::uint64_t World::stepCount() const { return impl_->step; }
+double World::simTime() const { return static_cast<double>(impl_->step) / impl_->settings.step_rate; }
+const PushSphere& World::push() const { return impl_->push; }
+const Scissors& World::scissors() const { return impl_->scissors; }
+
+Result<Reply> World::apply(const Command& command) {
+  return std::visit([this](const auto& c) { return impl_->apply(c); }, command);
+}
+
+Result<SpawnReply> World::addSceneBody(std::shared_ptr<const PreparedBody> body) {
+  Result<SpawnReply> reply = impl_->spawn(*body);
+  if (reply) impl_->scene.push_back(std::move(body));
+  return reply;
+}
+
+void World::reset() {
+  Impl& w = *impl_;
+  for (const ClosingCut& c : w.closing)
+    w.finished.emplace(c.ticket, Error{ErrorCode::kFailed, "the world was reset before the blades met"});
+  w.closing.clear();
+  while (!w.bodies.empty()) w.retire(w.bodies.back()->id);
+  w.used_names.clear();
+  w.picks.clear();
+  w.push = PushSphere();
+  w.scissors = Scissors();
+  w.step = 0;
+  w.report = StepReport();
+  ++w.run;
+  w.say(EventType::kReset, "", 0, "back to the scene's start");
+  for (const auto& body : w.scene) w.admit(body->def.name, body->def.material, body->model, body->state);
+}
+
+WorldSnapshot World::snapshot(const SnapshotWants& wants) {
+  Impl& w = *impl_;
+  WorldSnapshot shot;
+  shot.step = w.step;
+  shot.sim_time = simTime();
+  shot.run = w.run;
+  for (auto& body : w.bodies) {
+    BodySnapshot b;
+    b.id = body->id;
+    b.number = body->number;
+    b.name = body->name;
+    b.material = body->material;
+    b.model = body->model;
+    if (wants.surfaces || wants.measures) w.refreshSurface(*body);
+    if (wants.surfaces) b.surface = body->state.surface;
+    if (wants.particles) b.particles = body->state.positions;
+    if (wants.measures) b.measures = measureBody(*body->model, body->state);
+    b.tetrahedra = body->mesh ? body->mesh->tetrahedra.size() : 0;
+    shot.bodies.push_back(std::move(b));
+  }
+  shot.picks = w.picks;
+  for (const Pick& pick : w.picks)
+    if (const WorldBody* body = w.find(pick.body)) shot.pick_bodies[pick.id] = body->name;
+  shot.push = w.push;
+  shot.scissors = w.scissors;
+  shot.report = w.report;
+  return shot;
+}
+
+Result<BodySnapshot> World::inspect(const std::string& name, bool rest) {
+  Impl& w = *impl_;
+  WorldBody* body = w.find(name);
+  if (!body) return Error{ErrorCode::kUnknownName, "there is no body '" + name + "'; " + w.knownBodies()};
+  w.needContactMesh(*body);
+  w.refreshSurface(*body);
+  BodySnapshot b;
+  b.id = body->id;
+  b.number = body->number;
+  b.name = body->name;
+  b.material = body->material;
+  b.model = body->model;
+  b.surface = rest ? body->model->surface.vertices : body->state.surface;
+  b.particles = rest ? body->model->rest : body->state.positions;
+  b.measures = measureBody(*body->model, body->state);
+  if (rest) {
+    b.measures.volume = body->model->rest_volume;
+    b.measures.area = surfaceArea(body->model->surface);
+  }
+  b.tetrahedra = body->mesh->tetrahedra.size();
+  return b;
+}
+
+std::vector<Event> World::takeEvents() { return std::exchange(impl_->events, {}); }
+
+std::uint64_t World::stateHash() const {
+  std::uint64_t hash = 14695981039346656037ull;
+  const auto bytes = [&hash](const void* data, std::size_t size) {
+    const auto* byte = static_cast<const unsigned char*>(data);
+    for (std::size_t i = 0; i < size; ++i) hash = (hash ^ byte[i]) * 1099511628211ull;
+  };
+  const auto points = [&bytes](const Points& p) { bytes(p.data(), p.size() * sizeof(Vec3)); };
+  const auto vec = [&bytes](const Vec3& v) { bytes(v.data(), sizeof(Vec3)); };
+  const auto number = [&bytes](double v) { bytes(&v, sizeof v); };
+  const Impl& w = *impl_;
+  bytes(&w.step, sizeof w.step);
+  for (const auto& body : w.bodies) {
+    bytes(body->name.data(), body->name.size());
+    points(body->state.positions);
+    points(body->state.velocities);
+    points(body->state.rider_offsets);
+    for (const ClusterPose& pose : body->state.poses) bytes(pose.rotation.coeffs().data(), 4 * sizeof(double));
+    number(body->material.alpha);
+    number(body->material.beta);
+    number(body->material.damping);
+    number(body->material.friction);
+    number(static_cast<double>(body->material.mode));
+    number(body->model->mass);
+  }
+  for (const Pick& pick : w.picks) {
+    bytes(&pick.id, sizeof pick.id);
+    bytes(&pick.particle, sizeof pick.particle);
+    vec(pick.target);
+    number(pick.stiffness);
+    number(pick.locked ? 1.0 : 0.0);
+  }
+  number(w.push.enabled ? w.push.radius : 0.0);
+  vec(w.push.position);
+  vec(w.push.target);
+  number(w.push.speed);
+  number(w.scissors.shown ? w.scissors.angle : 0.0);
+  vec(w.scissors.blades.origin);
+  for (const ClosingCut& c : w.closing) bytes(&c.done_at, sizeof c.done_at);
+  return hash;
+}
+
+void World::setScissors(const Blades& blades, double angle) {
+  impl_->scissors.shown = true;
+  impl_->scissors.blades = blades;
+  impl_->scissors.angle = angle;
+}
+
+void World::hideScissors() { impl_->scissors.shown = false; }
+
+PickId World::pickInHand() const {
+  for (auto it = impl_->picks.rbegin(); it != impl_->picks.rend(); ++it)
+    if (!it->locked) return it->id;
+  return 0;
+}
+
+}  // namespace meshless

@@ -1,0 +1,190 @@
+// What users do, besides cutting (world_cut.cpp). Everything is checked before anything changes.
+#include <algorithm>
+#include <limits>
+
+#include "meshless_surgery/tools/grasp.h"
+#include "world_impl.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kGraspSpacings = 3.0;  // radius of a grasp in particle spacings where the scene sets none
+
+struct Grabbed {
+  WorldBody* body = nullptr;
+  Index particle = 0;
+  Vec3 point = Vec3::Zero();
+};
+
+double distanceToRay(const Vec3& p, const Vec3& origin, const Vec3& unit) {
+  const double along = std::max(0.0, unit.dot(p - origin));
+  return (p - origin - along * unit).norm();
+}
+
+Error noPick(PickId id, const std::vector<Pick>& picks) {
+  std::string text = "there is no pick " + std::to_string(id);
+  if (picks.empty()) return {ErrorCode::kUnknownName, text + "; no spring is set"};
+  text += "; springs are:";
+  for (std::size_t i = 0; i < picks.size() && i < 20; ++i) text += " " + std::to_string(picks[i].id);
+  return {ErrorCode::kUnknownName, text};
+}
+
+}  // namespace
+
+Result<Reply> World::Impl::apply(const PickCommand& command) {
+  if (!command.point.allFinite()) return notFinite("point");
+  if (!command.direction.allFinite()) return notFinite("direction");
+  if (!(command.max_distance >= 0.0 && command.max_distance <= 1e9))
+    return outOfRange("max_distance", command.max_distance, "0 (the default) to 1e9 m");
+  if (!(command.stiffness >= 0.0 && command.stiffness <= 1e12))
+    return outOfRange("stiffness", command.stiffness, "0 (the default) to 1e12 N/m");
+  if (!command.body.empty() && !find(command.body))
+    return Error{ErrorCode::kUnknownName, "there is no body '" + command.body + "'; " + knownBodies()};
+  if (bodies.empty()) return Error{ErrorCode::kMissed, "there are no bodies to pick"};
+
+  const double reach = command.max_distance > 0.0 ? command.max_distance : settings.pick_max_distance;
+  const bool ray = command.direction.norm() > 0.0;
+  Grabbed grabbed;
+  if (ray) {  // the surface in front; what lies behind it cannot be grabbed
+    double nearest = std::numeric_limits<double>::infinity();
+    for (auto& body : bodies) {
+      if (!command.body.empty() && body->name != command.body) continue;
+      refreshSurface(*body);
+      const RayHit hit = castRay(body->state.surface, body->model->surface.triangles, command.point, command.direction);
+      if (!hit.hit || !(hit.distance < nearest)) continue;
+      nearest = hit.distance;
+      grabbed.body = body.get();
+      grabbed.point = hit.point;
+    }
+    if (grabbed.body) {
+      const Points& p = grabbed.body->state.positions;
+      for (Index i = 1; i < p.size(); ++i)
+        if ((p[i] - grabbed.point).squaredNorm() < (p[grabbed.particle] - grabbed.point).squaredNorm()) grabbed.particle = i;
+    }
+  }
+  if (!grabbed.body) {
+    double nearest = std::numeric_limits<double>::infinity();
+    const Vec3 unit = ray ? Vec3(command.direction.normalized()) : Vec3::Zero();
+    for (auto& body : bodies) {
+      if (!command.body.empty() && body->name != command.body) continue;
+      const Points& p = body->state.positions;
+      for (Index i = 0; i < p.size(); ++i) {
+        const double d = ray ? distanceToRay(p[i], command.point, unit) : (p[i] - command.point).norm();
+        if (!(d < nearest)) continue;
+        nearest = d;
+        grabbed = {body.get(), i, p[i]};
+      }
+    }
+    if (!(nearest <= reach))
+      return Error{ErrorCode::kMissed, "no tissue within " + std::to_string(reach) + " m of the " +
+                                           (ray ? "ray" : "point") + "; the nearest is " + std::to_string(nearest) +
+                                           " m away"};
+  }
+
+  Pick pick;
+  pick.id = next_pick++;
+  pick.body = grabbed.body->id;
+  pick.stiffness = command.stiffness > 0.0 ? command.stiffness : settings.pick_stiffness;
+  makeGrasp(*grabbed.body->model, grabbed.particle,
+            settings.pick_radius > 0.0 ? settings.pick_radius : kGraspSpacings * grabbed.body->model->spacing, pick);
+  pick.target = pick.position = grabbed.point;
+  pick.offset = grabbed.point - graspMean(pick, grabbed.body->state.positions);
+  picks.push_back(pick);
+  say(EventType::kPicked, grabbed.body->name, pick.id, "picked " + grabbed.body->name);
+  return Reply(PickReply{pick.id, grabbed.body->name, grabbed.particle, grabbed.point});
+}
+
+Result<Reply> World::Impl::apply(const MovePickCommand& command) {
+  if (!command.target.allFinite()) return notFinite("target");
+  Pick* pick = findPick(command.pick);
+  if (!pick) return noPick(command.pick, picks);
+  pick->target = command.target;
+  pick->locked = false;
+  return Reply(Done{});
+}
+
+Result<Reply> World::Impl::apply(const LockCommand& command) {
+  if (command.target && !command.target->allFinite()) return notFinite("target");
+  Pick* pick = findPick(command.pick);
+  if (!pick) return noPick(command.pick, picks);
+  if (command.target) pick->target = *command.target;
+  pick->locked = true;
+  const WorldBody* body = find(pick->body);
+  say(EventType::kLocked, body ? body->name : "", pick->id, "locked");
+  return Reply(Done{});
+}
+
+Result<Reply> World::Impl::apply(const ReleaseCommand& command) {
+  const Pick* pick = findPick(command.pick);
+  if (!pick) return noPick(command.pick, picks);
+  const WorldBody* body = find(pick->body);
+  say(EventType::kReleased, body ? body->name : "", command.pick, "released");
+  picks.erase(picks.begin() + (pick - picks.data()));
+  return Reply(Done{});
+}
+
+Result<Reply> World::Impl::apply(const ClearPicksCommand&) {
+  for (const Pick& pick : picks) {
+    const WorldBody* body = find(pick.body);
+    say(EventType::kReleased, body ? body->name : "", pick.id, "released");
+  }
+  picks.clear();
+  return Reply(Done{});
+}
+
+Result<Reply> World::Impl::apply(const PushCommand& command) {
+  if (!command.enable) {
+    push = PushSphere();
+    for (auto& body : bodies) body->touched_by_push = false;
+    return Reply(Done{});
+  }
+  if (!command.position.allFinite()) return notFinite("position");
+  if (!(command.radius >= 0.0 && command.radius <= 1e6))
+    return outOfRange("radius", command.radius, "0 (the default) to 1e6 m");
+  if (!(command.speed >= 0.0 && command.speed <= 1e6)) return outOfRange("speed", command.speed, "0 (at once) to 1e6 m/s");
+  const bool from_nowhere = !push.enabled;
+  push.enabled = true;
+  push.radius = command.radius > 0.0 ? command.radius : settings.push_radius;
+  push.target = command.position;
+  push.speed = command.speed;
+  if (from_nowhere || command.speed == 0.0) push.position = command.position;
+  return Reply(Done{});
+}
+
+Result<Reply> World::Impl::apply(const SetMaterialCommand& command) {
+  if (!command.body.empty() && !find(command.body))
+    return Error{ErrorCode::kUnknownName, "there is no body '" + command.body + "'; " + knownBodies()};
+  std::vector<std::pair<WorldBody*, Material>> changes;
+  for (auto& body : bodies) {
+    if (!command.body.empty() && body->name != command.body) continue;
+    Result<Material> changed = command.change(body->material);
+    if (!changed) return changed.error();
+    if (Status status = changed->validate(); !status) return status.error();
+    changes.emplace_back(body.get(), std::move(*changed));
+  }
+  for (auto& [body, material] : changes) {
+    body->model = withMaterial(body->model, body->material, material);
+    body->material = material;
+  }
+  return Reply(Done{});
+}
+
+Result<Reply> World::Impl::apply(const SpawnCommand& command) {
+  Result<SpawnReply> reply = spawn(*command.body);
+  if (!reply) return reply.error();
+  return Reply(*reply);
+}
+
+Result<Reply> World::Impl::apply(const RemoveCommand& command) {
+  WorldBody* body = find(command.body);
+  if (!body) return Error{ErrorCode::kUnknownName, "there is no body '" + command.body + "'; " + knownBodies()};
+  const BodyId id = body->id;
+  for (const Pick& pick : picks)
+    if (pick.body == id) say(EventType::kReleased, command.body, pick.id, "released: its body was removed");
+  picks.erase(std::remove_if(picks.begin(), picks.end(), [&](const Pick& p) { return p.body == id; }), picks.end());
+  retire(id);
+  say(EventType::kRemoved, command.body, 0, "removed " + command.body);
+  return Reply(Done{});
+}
+
+}  // namespace meshless

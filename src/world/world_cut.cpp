@@ -1,0 +1,193 @@
+// Closing the scissors: which bodies they meet, their pieces, and what becomes of names and springs.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "meshless_surgery/body/cut_body.h"
+#include "meshless_surgery/tools/grasp.h"
+#include "world_impl.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kOpenAngle = 0.5;  // [rad] of blades that a service closes
+
+struct Severed {
+  BodyId parent;
+  CutBody cut;
+};
+
+}  // namespace
+
+Status World::Impl::checkCut(const CutCommand& command) {
+  const Blades& b = command.blades;
+  if (!b.origin.allFinite() || !b.x_axis.allFinite() || !b.y_axis.allFinite()) return notFinite("the blades' pose");
+  if (!(std::abs(b.x_axis.norm() - 1.0) < 1e-6 && std::abs(b.y_axis.norm() - 1.0) < 1e-6 &&
+        std::abs(b.x_axis.dot(b.y_axis)) < 1e-6))
+    return Error{ErrorCode::kInvalidArgument, "the blades' axes are not unit vectors at a right angle"};
+  if (!(b.length >= 0.0 && b.length <= 1e9)) return outOfRange("length", b.length, "0 (unbounded) to 1e9 m");
+  if (!(b.width >= 0.0 && b.width <= 1e9)) return outOfRange("width", b.width, "0 (unbounded) to 1e9 m");
+  if (!(command.close_time >= 0.0 && command.close_time <= 3600.0))
+    return outOfRange("close_time", command.close_time, "0 (at once) to 3600 s");
+  if (!(command.roughness >= 0.0)) return outOfRange("roughness", command.roughness, "0");
+  if (command.roughness > 0.0) {
+    Error error = outOfRange("roughness", command.roughness, "0; rough cuts come with a later version");
+    error.code = ErrorCode::kUnsupported;
+    return error;
+  }
+  for (const std::string& name : command.bodies)
+    if (!find(name)) return Error{ErrorCode::kUnknownName, "there is no body '" + name + "'; " + knownBodies()};
+  return Done{};
+}
+
+Result<Reply> World::Impl::apply(const CutCommand& command) {
+  if (Status status = checkCut(command); !status) return status.error();
+  if (command.close_time == 0.0) {
+    Result<CutReply> reply = cutNow(command);
+    if (!reply) return reply.error();
+    return Reply(*reply);
+  }
+  ClosingCut cut;
+  cut.ticket = next_ticket++;
+  cut.command = command;
+  cut.started_at = step;
+  cut.done_at = step + static_cast<std::uint64_t>(std::ceil(command.close_time * settings.step_rate - 1e-9));
+  cut.start_angle = kOpenAngle;
+  scissors.shown = true;
+  scissors.blades = command.blades;
+  scissors.angle = cut.start_angle;
+  closing.push_back(cut);
+  return Reply(CutStarted{cut.ticket});
+}
+
+void World::Impl::closeBlades() {
+  for (std::size_t i = 0; i < closing.size();) {
+    ClosingCut& c = closing[i];
+    const double whole = static_cast<double>(c.done_at - c.started_at);
+    scissors.blades = c.command.blades;
+    scissors.angle = c.start_angle * static_cast<double>(c.done_at - std::min(step, c.done_at)) / whole;
+    if (step < c.done_at) {
+      ++i;
+      continue;
+    }
+    // Bodies may have been removed or cut by others while the blades closed: the names still there are cut.
+    CutCommand command = c.command;
+    std::string gone;
+    command.bodies.erase(std::remove_if(command.bodies.begin(), command.bodies.end(),
+                                        [&](const std::string& name) {
+                                          if (find(name)) return false;
+                                          gone = name;
+                                          return true;
+                                        }),
+                         command.bodies.end());
+    if (!c.command.bodies.empty() && command.bodies.empty())
+      finished.emplace(c.ticket, Error{ErrorCode::kMissed, "body '" + gone + "' was gone when the blades met"});
+    else
+      finished.emplace(c.ticket, cutNow(command));
+    closing.erase(closing.begin() + static_cast<std::ptrdiff_t>(i));
+    if (closing.empty()) scissors.shown = false;
+  }
+}
+
+std::optional<Result<CutReply>> World::finishedCut(std::uint32_t ticket) {
+  const auto it = impl_->finished.find(ticket);
+  if (it == impl_->finished.end()) return std::nullopt;
+  Result<CutReply> reply = it->second;
+  impl_->finished.erase(it);
+  return reply;
+}
+
+Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
+  const auto start = std::chrono::steady_clock::now();
+  const Plane plane = command.blades.plane();
+  std::vector<Severed> severed;
+  CutReply reply;
+  std::string refused;
+  for (auto& body : bodies) {
+    if (!command.bodies.empty() &&
+        std::find(command.bodies.begin(), command.bodies.end(), body->name) == command.bodies.end())
+      continue;
+    refreshSurface(*body);
+    TriangleMesh present;
+    present.vertices = body->state.surface;
+    present.triangles = body->model->surface.triangles;
+    if (!bladesMeet(present, command.blades)) continue;
+    Result<CutBody> cut = cutBody(*body->model, body->state, plane);
+    if (cut) {
+      severed.push_back({body->id, std::move(*cut)});
+    } else if (cut.error().code != ErrorCode::kMissed) {
+      refused = body->name + " cannot be cut: " + cut.error().detail;
+      reply.notes.push_back(refused);
+    }
+  }
+  if (severed.empty()) {
+    if (!refused.empty()) return Error{ErrorCode::kUnsuitableShape, refused};
+    return Error{ErrorCode::kMissed, command.bodies.empty() ? "the blades met no body; " + knownBodies()
+                                                            : "the blades met none of the bodies named"};
+  }
+
+  // From here nothing fails: parents are retired and their pieces admitted.
+  for (Severed& s : severed) {
+    WorldBody& parent = *find(s.parent);
+    const std::string parent_name = parent.name;
+    const Material material = parent.material;
+    const bool touched = parent.touched_by_push;
+    std::vector<BodyId> children;
+    std::vector<std::vector<Index>> parent_particles;
+    int number = 0;
+    for (BodyPiece& piece : s.cut.pieces) {
+      std::string name;
+      do name = parent_name + "." + std::to_string(++number);
+      while (used_names.count(name));
+      WorldBody& child = admit(name, material, std::move(piece.model), std::move(piece.state));
+      child.touched_by_push = touched;
+      children.push_back(child.id);
+      parent_particles.push_back(std::move(piece.parent_particles));
+      reply.new_bodies.push_back(name);
+    }
+    followPieces(s.parent, children, parent_particles);
+    retire(s.parent);
+    reply.cut_bodies.push_back(parent_name);
+    reply.cap_area += s.cut.cap_area;
+    say(EventType::kCut, parent_name, 0, "cut into " + std::to_string(children.size()) + " pieces");
+  }
+  reply.duration = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return reply;
+}
+
+void World::Impl::followPieces(const BodyId& parent, const std::vector<BodyId>& children,
+                               const std::vector<std::vector<Index>>& parent_particles) {
+  for (Pick& pick : picks) {
+    if (pick.body != parent) continue;
+    for (std::size_t c = 0; c < children.size(); ++c) {
+      const auto find_particle = [&](Index old) {
+        const auto it = std::find(parent_particles[c].begin(), parent_particles[c].end(), old);
+        return it == parent_particles[c].end() ? kNoIndex
+                                               : static_cast<Index>(it - parent_particles[c].begin());
+      };
+      const Index centre = find_particle(pick.particle);
+      if (centre == kNoIndex) continue;
+      Pick followed = pick;
+      followed.body = children[c];
+      followed.particle = centre;
+      followed.patch.clear();
+      followed.weights.clear();
+      double total = 0.0;
+      for (std::size_t k = 0; k < pick.patch.size(); ++k) {
+        const Index now = find_particle(pick.patch[k]);
+        if (now == kNoIndex) continue;
+        followed.patch.push_back(now);
+        followed.weights.push_back(pick.weights[k]);
+        total += pick.weights[k];
+      }
+      for (double& w : followed.weights) w /= total;
+      // The grabbed point is where it was; only the patch around it is smaller now.
+      followed.offset = pick.offset + graspMean(pick, find(parent)->state.positions) -
+                        graspMean(followed, find(children[c])->state.positions);
+      pick = std::move(followed);
+      break;
+    }
+  }
+}
+
+}  // namespace meshless

@@ -1,0 +1,96 @@
+// What the world holds; shared by the files that implement it.
+#pragma once
+
+#include <map>
+#include <set>
+
+#include "meshless_surgery/body/deform.h"
+#include "meshless_surgery/world/world.h"
+
+namespace meshless {
+
+struct WorldBody {
+  BodyId id;
+  std::uint32_t number = 0;
+  std::string name;
+  Material material;
+  BodyModelPtr model;
+  BodyState state;
+  bool surface_current = true;              // state.surface fits state.positions
+  std::shared_ptr<const ContactMesh> mesh;  // made when something first comes near
+  bool touched_by_push = false;
+  StepScratch scratch;
+};
+
+/// Blades on their way together.
+struct ClosingCut {
+  std::uint32_t ticket = 0;
+  CutCommand command;
+  std::uint64_t done_at = 0;  // step
+  double start_angle = 0.5;   // [rad]
+  std::uint64_t started_at = 0;
+};
+
+struct World::Impl {
+  WorldSettings settings;
+  std::uint64_t step = 0;
+  std::uint32_t run = 1;
+  std::vector<std::unique_ptr<WorldBody>> bodies;  // in the order in which they came
+  std::vector<std::uint32_t> generations;          // one a slot
+  std::vector<std::uint32_t> free_slots;
+  std::uint32_t next_number = 1;
+  std::set<std::string> used_names;  // living and retired of this run
+  std::vector<std::shared_ptr<const PreparedBody>> scene;
+  std::vector<Pick> picks;
+  PickId next_pick = 1;
+  PushSphere push;
+  Scissors scissors;
+  std::vector<ClosingCut> closing;
+  std::map<std::uint32_t, Result<CutReply>> finished;
+  std::uint32_t next_ticket = 1;
+  std::vector<Event> events;
+  StepReport report;
+  std::size_t tetrahedralizations = 0;
+
+  WorldBody* find(const std::string& name);
+  WorldBody* find(const BodyId& id);
+  Pick* findPick(PickId id);
+  void say(EventType type, const std::string& body, PickId pick, const std::string& text);
+  WorldBody& admit(std::string name, Material material, BodyModelPtr model, BodyState state);
+  void retire(const BodyId& id);
+  Result<SpawnReply> spawn(const PreparedBody& body);
+  void refreshSurface(WorldBody& body);
+  void needContactMesh(WorldBody& body);
+  std::string knownBodies() const;
+
+  // commands
+  Result<Reply> apply(const PickCommand& command);
+  Result<Reply> apply(const MovePickCommand& command);
+  Result<Reply> apply(const LockCommand& command);
+  Result<Reply> apply(const ReleaseCommand& command);
+  Result<Reply> apply(const ClearPicksCommand& command);
+  Result<Reply> apply(const PushCommand& command);
+  Result<Reply> apply(const CutCommand& command);
+  Result<Reply> apply(const SetMaterialCommand& command);
+  Result<Reply> apply(const SpawnCommand& command);
+  Result<Reply> apply(const RemoveCommand& command);
+  Status checkCut(const CutCommand& command);
+  Result<CutReply> cutNow(const CutCommand& command);
+  void followPieces(const BodyId& parent, const std::vector<BodyId>& children,
+                    const std::vector<std::vector<Index>>& parent_particles);
+
+  // stages of a step
+  void closeBlades();
+  std::vector<WorldBody*> bodiesInContact(double h);
+  void movePush(double h);
+  void pullSprings(double h, double h_frame);
+  void contactBodies(const std::vector<WorldBody*>& near, double h);
+  void contactGroundAndPush(WorldBody& body, double h, const Vec3& push_velocity);
+  void fadeRiderOffsets(WorldBody& body, double h);
+};
+
+/// "<name> is <value>; accepted: <range>"
+Error outOfRange(const std::string& name, double value, const std::string& accepted);
+Error notFinite(const std::string& name);
+
+}  // namespace meshless

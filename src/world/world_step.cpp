@@ -1,0 +1,270 @@
+// The only place where time moves.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "meshless_surgery/body/rider_contact.h"
+#include "meshless_surgery/contact/sphere_and_ground.h"
+#include "meshless_surgery/tools/grasp.h"
+#include "world_impl.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kRiderFade = 0.25;             // [s] in which what a cut left of a rider's offset falls to 1/e
+constexpr double kOffsetGone = 1e-7;            // of the spacing: then it is dropped
+constexpr double kDepenetrationSpeed = 0.5;     // [m/s] at which old overlap of bodies is let out at the least
+constexpr double kPushHopRadii = 0.25;          // longest way of the sphere between two looks at the tissue
+constexpr int kContactPasses = 2;
+
+class Stopwatch {
+ public:
+  explicit Stopwatch(double& seconds) : seconds_(seconds), start_(std::chrono::steady_clock::now()) {}
+  ~Stopwatch() { seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  double& seconds_;
+  std::chrono::steady_clock::time_point start_;
+};
+
+Box sweptBounds(const WorldBody& body, double h) {
+  Box box;
+  for (std::size_t i = 0; i < body.state.positions.size(); ++i) {
+    box.extend(body.state.positions[i]);
+    box.extend(body.state.positions[i] + h * body.state.velocities[i]);
+  }
+  return box;
+}
+
+}  // namespace
+
+void World::step() {
+  Impl& w = *impl_;
+  w.report = StepReport();
+  {
+    const Stopwatch total(w.report.total);
+    const double h = 1.0 / w.settings.step_rate / w.settings.substeps;
+    const double h_frame = 1.0 / w.settings.step_rate;
+    w.closeBlades();
+    const std::vector<WorldBody*> near = w.bodiesInContact(h_frame);
+    for (Pick& pick : w.picks) pick.force.setZero();
+    w.push.force.setZero();
+    w.push.touching = false;
+    for (int substep = 0; substep < w.settings.substeps; ++substep) {
+      {
+        const Stopwatch match(w.report.match);
+        for (auto& body : w.bodies)
+          matchAndMove(*body->model, body->material, w.settings.gravity, h, body->state, body->scratch,
+                       w.report.match_counters);
+      }
+      {
+        const Stopwatch tools(w.report.tools);
+        w.pullSprings(h, h_frame);
+      }
+      {
+        const Stopwatch contact(w.report.contact);
+        for (auto& body : w.bodies) {
+          body->scratch.touched.clear();
+          if (w.settings.ground || w.push.enabled) body->scratch.before_contact = body->state.positions;
+        }
+        w.contactBodies(near, h);
+        w.movePush(h);
+      }
+      for (auto& body : w.bodies) {
+        velocitiesFromPositions(*body->model, h, body->state, body->scratch);
+        w.fadeRiderOffsets(*body, h);
+        body->surface_current = false;
+      }
+    }
+    for (Pick& pick : w.picks)
+      if (const WorldBody* body = w.find(pick.body)) pick.position = graspMean(pick, body->state.positions) + pick.offset;
+    ++w.step;
+    w.report.bodies = w.bodies.size();
+    w.report.substeps = static_cast<std::size_t>(w.settings.substeps);
+    w.report.tetrahedralizations = w.tetrahedralizations;
+  }
+}
+
+std::vector<WorldBody*> World::Impl::bodiesInContact(double h) {
+  std::vector<WorldBody*> near;
+  if (settings.contact == ContactMethod::kNone || bodies.size() < 2) return near;
+  const Stopwatch contact(report.contact);
+  // Sweep along x: sorted by their lower ends, a pair can overlap only until the next one begins beyond.
+  struct Entry {
+    Box box;
+    WorldBody* body;
+    bool near;
+  };
+  std::vector<Entry> order;
+  for (auto& body : bodies) order.push_back({sweptBounds(*body, h), body.get(), false});
+  std::stable_sort(order.begin(), order.end(), [](const Entry& a, const Entry& b) { return a.box.min.x() < b.box.min.x(); });
+  for (std::size_t i = 0; i < order.size(); ++i)
+    for (std::size_t j = i + 1; j < order.size() && order[j].box.min.x() <= order[i].box.max.x(); ++j)
+      if (order[i].box.overlaps(order[j].box)) order[i].near = order[j].near = true;
+  std::set<const WorldBody*> chosen;
+  for (const Entry& e : order)
+    if (e.near) chosen.insert(e.body);
+  for (auto& body : bodies)
+    if (chosen.count(body.get())) {
+      needContactMesh(*body);
+      near.push_back(body.get());
+    }
+  return near;
+}
+
+void World::Impl::pullSprings(double h, double h_frame) {
+  for (Pick& pick : picks)
+    if (WorldBody* body = find(pick.body))
+      pick.force += pullGrasp(*body->model, pick, h, body->state.positions) * (h / h_frame);
+}
+
+void World::Impl::contactBodies(const std::vector<WorldBody*>& near, double h) {
+  if (near.size() < 2) return;
+  std::vector<ContactBody> views;
+  std::vector<std::vector<double>> inverse_masses(near.size());
+  double fastest = 0.0;
+  for (std::size_t b = 0; b < near.size(); ++b) {
+    WorldBody& body = *near[b];
+    for (std::size_t i = 0; i < body.model->masses.size(); ++i) {
+      inverse_masses[b].push_back(body.model->fixed[i] ? 0.0 : 1.0 / body.model->masses[i]);
+      fastest = std::max(fastest, body.state.velocities[i].norm());
+    }
+    ContactBody view;
+    view.mesh = body.mesh.get();
+    view.positions = &body.state.positions;
+    view.previous = &body.scratch.previous;
+    view.inverse_masses = &inverse_masses[b];
+    view.friction = body.material.friction;
+    for (const Vec3& p : body.state.positions) view.bounds.extend(p);
+    views.push_back(view);
+  }
+  const std::vector<Penetration> found = findPenetrations(views, report.contact_counters);
+  if (found.empty()) return;
+  resolvePenetrations(found, views, h * std::max(kDepenetrationSpeed, 2.0 * fastest), report.contact_counters);
+}
+
+// The sphere goes its way in hops, so that a fast one does not jump over tissue.
+void World::Impl::movePush(double h) {
+  int hops = 1;
+  Vec3 velocity = Vec3::Zero();
+  if (push.enabled) {
+    const Vec3 way = push.target - push.position;
+    const double length = std::min(way.norm(), push.speed > 0.0 ? push.speed * h : 0.0);
+    if (length > 0.0) {
+      velocity = way.normalized() * (length / h);
+      hops = static_cast<int>(std::min(1000.0, std::ceil(length / (kPushHopRadii * push.radius))));
+    }
+  }
+  for (int hop = 0; hop < hops; ++hop) {
+    if (push.enabled) push.position += velocity * (h / hops);
+    for (auto& body : bodies) contactGroundAndPush(*body, h, velocity);
+  }
+}
+
+void World::Impl::contactGroundAndPush(WorldBody& body, double h, const Vec3& push_velocity) {
+  const BodyModel& model = *body.model;
+  BodyState& state = body.state;
+  if (!settings.ground && !push.enabled) return;
+  Box bounds;
+  for (const Vec3& p : state.positions) bounds.extend(p);
+  if (!model.binding.riders.empty()) {  // riders reach beyond the particles
+    bounds.min.array() -= 2.0 * model.spacing;
+    bounds.max.array() += 2.0 * model.spacing;
+  }
+  const bool near_ground = settings.ground && bounds.min.z() <= *settings.ground;
+  const bool near_push = push.enabled && (bounds.min.array() <= push.position.array() + push.radius).all() &&
+                         (bounds.max.array() >= push.position.array() - push.radius).all();
+  if (!near_ground && !near_push) {
+    if (body.touched_by_push) body.touched_by_push = false;
+    return;
+  }
+  std::vector<TouchedParticle>& touched = body.scratch.touched;
+  Vec3 push_impulse = Vec3::Zero();  // [kg m] mass times displacement
+  bool hit_push = false;
+  const Vec3 along = push_velocity.norm() > 0.0 ? Vec3(push_velocity.normalized()) : Vec3::UnitZ();
+
+  // Out of the sphere, and where that would be below the ground, sideways along it.
+  const auto outOfSphere = [&](const Vec3& p) -> Vec3 {
+    const Projection out = projectOutOfSphere(p, push.position, push.radius, along);
+    if (!out.inside) return Vec3::Zero();
+    Vec3 there = p + out.depth * out.normal;
+    if (settings.ground && there.z() < *settings.ground) {
+      const double rise = push.position.z() - *settings.ground;
+      if (std::abs(rise) < push.radius) {
+        Vec3 sideways(p.x() - push.position.x(), p.y() - push.position.y(), 0.0);
+        if (!(sideways.norm() > 1e-12 * push.radius)) sideways = Vec3::UnitX();
+        there = push.position + sideways.normalized() * std::sqrt(push.radius * push.radius - rise * rise) * (1.0 + 1e-12);
+        there.z() = *settings.ground;
+      }
+    }
+    return there - p;
+  };
+
+  for (int pass = 0; pass < kContactPasses; ++pass) {
+    if (near_ground) {
+      const double friction = std::sqrt(settings.ground_friction * body.material.friction);
+      for (Index i = 0; i < model.rest.size(); ++i) {
+        if (model.fixed[i]) continue;
+        const Projection out = projectOutOfGround(state.positions[i], *settings.ground);
+        if (!out.inside) continue;
+        state.positions[i] += out.depth * out.normal;
+        state.positions[i] += frictionCorrection(state.positions[i] - body.scratch.previous[i], out.normal, out.depth, friction);
+        touched.push_back({i, out.normal, 0.0});
+        ++report.ground_contacts;
+      }
+      if (!model.binding.riders.empty()) {
+        std::vector<bool> moved(model.rest.size(), false);
+        report.ground_contacts += pushRiders(
+            model,
+            [&](const Vec3& p) -> Vec3 {
+              const Projection out = projectOutOfGround(p, *settings.ground);
+              return out.inside ? Vec3(out.depth * out.normal) : Vec3::Zero();
+            },
+            state, &moved, nullptr);
+        for (Index i = 0; i < model.rest.size(); ++i)
+          if (moved[i]) touched.push_back({i, Vec3::UnitZ(), 0.0});
+      }
+    }
+    if (near_push) {
+      if (!model.binding.riders.empty()) {
+        std::vector<bool> moved(model.rest.size(), false);
+        const std::size_t pushed = pushRiders(model, outOfSphere, state, &moved, &push_impulse);
+        hit_push = hit_push || pushed > 0;
+        report.push_contacts += pushed;
+        for (Index i = 0; i < model.rest.size(); ++i)
+          if (moved[i]) {
+            const Vec3 normal = (state.positions[i] - push.position).normalized();
+            touched.push_back({i, normal, normal.dot(push_velocity)});
+          }
+      }
+      for (Index i = 0; i < model.rest.size(); ++i) {
+        if (model.fixed[i]) continue;
+        const Vec3 shift = outOfSphere(state.positions[i]);
+        if (shift.isZero(0.0)) continue;
+        hit_push = true;
+        state.positions[i] += shift;
+        push_impulse += model.masses[i] * shift;
+        const Vec3 normal = (state.positions[i] - push.position).normalized();
+        touched.push_back({i, normal, normal.dot(push_velocity)});
+        ++report.push_contacts;
+      }
+    }
+  }
+  if (hit_push) {
+    push.touching = true;
+    push.force -= push_impulse / (h * h) / static_cast<double>(settings.substeps);
+    if (!body.touched_by_push) say(EventType::kTouched, body.name, 0, "the push sphere touched " + body.name);
+  }
+  body.touched_by_push = hit_push;
+}
+
+void World::Impl::fadeRiderOffsets(WorldBody& body, double h) {
+  const double left = std::exp(-h / kRiderFade);
+  const double gone = kOffsetGone * body.model->spacing;
+  for (Vec3& offset : body.state.rider_offsets) {
+    offset *= left;
+    if (offset.squaredNorm() < gone * gone) offset.setZero();
+  }
+}
+
+}  // namespace meshless

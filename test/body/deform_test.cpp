@@ -1,0 +1,156 @@
+#include "meshless_surgery/body/deform.h"
+
+#include "support/bodies.h"
+#include "support/random.h"
+
+namespace meshless {
+namespace {
+
+using test::prepared;
+using test::Random;
+
+const MatchMode kModes[] = {MatchMode::kRigid, MatchMode::kLinear, MatchMode::kQuadratic};
+
+double potentialFreeEnergy(const PreparedBody& body, const BodyState& state) {
+  return measureBody(*body.model, state).kinetic_energy;
+}
+
+TEST(MatchAndMove, KeepsLinearAndAngularMomentumOfATumblingBody) {
+  Random random(1);
+  for (MatchMode mode : kModes)
+    for (int count : {1, 9}) {
+      BodyDef def = test::block("b", Vec3(3, -2, 1));
+      def.clusters.kind = ClusterOptions::Kind::kCount;
+      def.clusters.count = count;
+      def.material.mode = mode;
+      PreparedBody body = prepared(def);
+      const Vec3 spin(2, 9, -4), drift(0.3, -0.2, 0.1);
+      for (std::size_t i = 0; i < body.state.positions.size(); ++i)
+        body.state.velocities[i] = drift + spin.cross(body.state.positions[i] - def.pose.translation) + random.vector(0.05);
+      updateSurface(*body.model, body.state);
+      const BodyMeasures before = measureBody(*body.model, body.state);
+      StepScratch scratch;
+      MatchCounters counters;
+      for (int step = 0; step < 600; ++step) {
+        matchAndMove(*body.model, body.def.material, Vec3::Zero(), 1.0 / 120, body.state, scratch, counters);
+        velocitiesFromPositions(*body.model, 1.0 / 120, body.state, scratch);
+      }
+      const BodyMeasures after = measureBody(*body.model, body.state);
+      const double p = before.linear_momentum.norm(), l = before.angular_momentum.norm();
+      EXPECT_LT((after.linear_momentum - before.linear_momentum).norm(), 1e-10 * p);
+      EXPECT_LT((after.angular_momentum - before.angular_momentum).norm(), 1e-9 * l);
+      EXPECT_LE(after.kinetic_energy, before.kinetic_energy * (1.0 + 1e-9));
+    }
+}
+
+TEST(MatchAndMove, ReturnsToItsRestShapeFromAnyState) {
+  Random random(2);
+  enum State { kPlane, kLine, kPoint, kInsideOut, kRandom, kHuge };
+  for (MatchMode mode : kModes)
+    for (State start : {kPlane, kLine, kPoint, kInsideOut, kRandom, kHuge}) {
+      BodyDef def = test::block("b", Vec3::Zero());
+      def.clusters.kind = ClusterOptions::Kind::kOne;
+      def.material.mode = mode;
+      def.material.damping = 5.0;
+      PreparedBody body = prepared(def);
+      for (Vec3& p : body.state.positions) {
+        if (start == kPlane) p.z() = 0;
+        if (start == kLine) p.y() = p.z() = 0;
+        if (start == kPoint) p.setZero();
+        if (start == kInsideOut) p = -p;
+        if (start == kRandom) p = random.vector(0.3);
+        if (start == kHuge) p *= 1e6;
+      }
+      StepScratch scratch;
+      MatchCounters counters;
+      for (int step = 0; step < 3000; ++step) {
+        matchAndMove(*body.model, body.def.material, Vec3::Zero(), 1.0 / 120, body.state, scratch, counters);
+        velocitiesFromPositions(*body.model, 1.0 / 120, body.state, scratch);
+      }
+      ASSERT_TRUE(test::allFinite(body.state.positions)) << "state " << start;
+      std::vector<ClusterPose> poses(1);
+      fitClusters({body.model->rest, body.model->masses, body.model->clusters, body.model->shape}, body.state.positions,
+                  poses);
+      for (std::size_t i = 0; i < body.state.positions.size(); ++i) {
+        const Vec3 home = poses[0].centre + poses[0].rotation * (body.model->rest[i] - body.model->shape.clusters[0].centre);
+        EXPECT_LT((body.state.positions[i] - home).norm(), 1e-3 * 0.25) << "mode " << toString(mode) << " state " << start;
+      }
+    }
+}
+
+TEST(MatchAndMove, NoAlphaBetaOrStepMakesEnergyGrow) {
+  Random random(3);
+  for (MatchMode mode : kModes)
+    for (double alpha : {0.0, 0.3, 1.0})
+      for (double beta : {0.0, 0.5, 0.8, 0.9, 0.95, 1.0})
+        for (double h : {1e-4, 1.0 / 60, 1.0}) {
+          BodyDef def = test::block("b", Vec3::Zero());
+          def.material.mode = mode;
+          def.material.alpha = alpha;
+          def.material.beta = beta;
+          def.material.damping = 0.0;
+          PreparedBody body = prepared(def);
+          for (std::size_t i = 0; i < body.state.positions.size(); ++i) body.state.velocities[i] = random.vector(0.2);
+          const double start = potentialFreeEnergy(body, body.state);
+          StepScratch scratch;
+          MatchCounters counters;
+          double most = 0.0;
+          for (int step = 0; step < 300; ++step) {
+            matchAndMove(*body.model, body.def.material, Vec3::Zero(), h, body.state, scratch, counters);
+            velocitiesFromPositions(*body.model, h, body.state, scratch);
+            most = std::max(most, potentialFreeEnergy(body, body.state));
+          }
+          EXPECT_TRUE(test::allFinite(body.state.positions));
+          EXPECT_LE(most, start * (1.0 + 1e-9)) << toString(mode) << " alpha " << alpha << " beta " << beta << " h " << h;
+        }
+}
+
+TEST(MatchAndMove, FixedParticlesStayAndTheRestHangsFromThem) {
+  BodyDef def = test::block("b", Vec3::Zero());
+  Box box;
+  box.extend(Vec3(-1, -1, -1));
+  box.extend(Vec3(-0.09, 1, 1));
+  def.fixed.push_back(box);
+  PreparedBody body = prepared(def);
+  StepScratch scratch;
+  MatchCounters counters;
+  for (int step = 0; step < 600; ++step) {
+    matchAndMove(*body.model, body.def.material, Vec3(0, 0, -9.81), 1.0 / 120, body.state, scratch, counters);
+    velocitiesFromPositions(*body.model, 1.0 / 120, body.state, scratch);
+  }
+  double lowest = 0.0;
+  for (std::size_t i = 0; i < body.model->rest.size(); ++i) {
+    if (body.model->fixed[i]) {
+      EXPECT_EQ(body.state.positions[i], body.model->rest[i]);
+    }
+    lowest = std::min(lowest, body.state.positions[i].z() - body.model->rest[i].z());
+  }
+  EXPECT_LT(lowest, -1e-4);
+  EXPECT_GT(lowest, -0.3);
+}
+
+TEST(VelocitiesFromPositions, BeingPushedOutNeverThrows) {
+  PreparedBody body = prepared(test::block("b", Vec3::Zero()));
+  StepScratch scratch;
+  MatchCounters counters;
+  const double h = 1.0 / 120;
+  matchAndMove(*body.model, body.def.material, Vec3::Zero(), h, body.state, scratch, counters);
+  scratch.before_contact = body.state.positions;
+  body.state.positions[0] += Vec3(0, 0, 1.0);  // a metre out of an obstacle within one substep
+  scratch.touched = {{0, Vec3::UnitZ(), 0.25}};
+  velocitiesFromPositions(*body.model, h, body.state, scratch);
+  EXPECT_NEAR(body.state.velocities[0].z(), 0.25, 1e-9);
+}
+
+TEST(RigidMotionOf, FindsDriftAndSpin) {
+  PreparedBody body = prepared(test::block("b", Vec3(1, 2, 3)));
+  const Vec3 spin(1, -2, 3), drift(4, 5, 6);
+  for (std::size_t i = 0; i < body.state.positions.size(); ++i)
+    body.state.velocities[i] = drift + spin.cross(body.state.positions[i] - measureBody(*body.model, body.state).centre_of_mass);
+  const RigidMotion motion = rigidMotionOf(*body.model, body.state.positions, body.state.velocities);
+  EXPECT_LT((motion.spin - spin).norm(), 1e-9);
+  EXPECT_LT((motion.velocity - drift).norm(), 1e-9);
+}
+
+}  // namespace
+}  // namespace meshless

@@ -1,0 +1,153 @@
+#include "meshless_surgery/body/body.h"
+
+#include <limits>
+
+#include "meshless_surgery/geometry/inside.h"
+#include "meshless_surgery/geometry/measures.h"
+#include "support/bodies.h"
+
+namespace meshless {
+namespace {
+
+using test::defOf;
+using test::prepared;
+
+TEST(PrepareBody, KeepsTheSurfaceAndSharesTheMassForEveryShape) {
+  for (const shapes::Shape& shape : shapes::allShapes()) {
+    SCOPED_TRACE(shape.name);
+    BodyDef def = defOf(shape.mesh);
+    const double size = boundsOf(shape.mesh.vertices).diagonal();
+    def.spacing = size / 12.0;
+    const PreparedBody body = prepared(def);
+    const BodyModel& m = *body.model;
+    EXPECT_EQ(m.surface.triangles.size(), shape.mesh.triangles.size());
+    EXPECT_NEAR(m.rest_volume, signedVolume(shape.mesh), 1e-12 * size * size * size);
+    EXPECT_NEAR(m.mass, def.material.density * m.rest_volume, 1e-9 * m.mass);
+    double sum = 0.0;
+    for (double mass : m.masses) {
+      EXPECT_GT(mass, 0.0);
+      sum += mass;
+    }
+    EXPECT_NEAR(sum, m.mass, 1e-12 * m.mass);
+    EXPECT_EQ(m.graph.size(), m.rest.size());
+    for (Index i = 0; i < m.graph.size() && m.rest.size() > 1; ++i)
+      EXPECT_LT(m.graph.offsets[i], m.graph.offsets[i + 1]) << "particle " << i << " holds to nothing";
+    ASSERT_EQ(body.state.surface.size(), shape.mesh.vertices.size());
+    for (std::size_t v = 0; v < shape.mesh.vertices.size(); ++v)
+      EXPECT_LT((body.state.surface[v] - shape.mesh.vertices[v]).norm(), 1e-12 * size);
+  }
+}
+
+TEST(PrepareBody, ABallHasItsCentreOfMassInTheMiddle) {
+  const PreparedBody body = prepared(test::ball("ball", Vec3::Zero()));
+  EXPECT_LT(measureBody(*body.model, body.state).centre_of_mass.norm(), 0.002);
+  EXPECT_GT(body.model->rest.size(), body.model->surface.vertices.size()) << "no particles inside";
+}
+
+TEST(PrepareBody, TheGraphGoesAlongTheBodyNotThroughTheAir) {
+  // A U: two legs 0.02 apart, joined at the bottom.
+  TriangleMesh u = shapes::arch();
+  const double size = boundsOf(u.vertices).diagonal();
+  BodyDef def = defOf(u);
+  def.spacing = size / 15.0;
+  const PreparedBody body = prepared(def);
+  const SolidQuery solid(u);
+  for (Index i = 0; i < body.model->graph.size(); ++i)
+    for (Index k = body.model->graph.offsets[i]; k < body.model->graph.offsets[i + 1]; ++k) {
+      const Vec3 middle = 0.5 * (body.model->rest[i] + body.model->rest[body.model->graph.neighbours[k]]);
+      EXPECT_TRUE(solid.contains(middle) || solid.distance(middle) < 1e-9 * size);
+    }
+}
+
+TEST(PrepareBody, AFineSurfaceRidesAndFollowsAnAffineMotionExactly) {
+  BodyDef def = defOf(sphereMesh(0.1, 0.0025));
+  def.spacing = 0.02;
+  const PreparedBody body = prepared(def);
+  EXPECT_GT(body.model->surface.vertices.size(), 6000u);
+  EXPECT_LT(body.model->rest.size(), 3000u);
+  ASSERT_FALSE(body.model->binding.riders.empty());
+  Mat3 map;
+  map << 1.2, 0.1, 0, -0.1, 0.9, 0.05, 0, 0.1, 1.1;
+  BodyState state = body.state;
+  for (Vec3& p : state.positions) p = map * p + Vec3(1, 2, 3);
+  updateSurface(*body.model, state);
+  for (std::size_t v = 0; v < state.surface.size(); ++v)
+    EXPECT_LT((state.surface[v] - (map * body.model->surface.vertices[v] + Vec3(1, 2, 3))).norm(), 1e-9);
+}
+
+TEST(PrepareBody, HoldsWhatLiesInTheFixedBoxes) {
+  BodyDef def = test::block("b", Vec3::Zero());
+  Box box;
+  box.extend(Vec3(-1, -1, -1));
+  box.extend(Vec3(-0.09, 1, 1));
+  def.fixed.push_back(box);
+  const PreparedBody body = prepared(def);
+  EXPECT_TRUE(body.model->any_fixed);
+  for (std::size_t i = 0; i < body.model->rest.size(); ++i)
+    EXPECT_EQ(body.model->fixed[i], body.model->rest[i].x() <= -0.09);
+}
+
+TEST(PrepareBody, AnOpenSurfaceIsAShellWithoutAVolume) {
+  BodyDef def = test::ball();
+  def.mesh.triangles.resize(def.mesh.triangles.size() - 40);
+  def.solid = false;
+  const PreparedBody body = prepared(def);
+  EXPECT_FALSE(body.model->solid);
+  EXPECT_EQ(body.model->rest_volume, 0.0);
+  EXPECT_GT(body.model->mass, 0.0);
+  EXPECT_LE(body.model->rest.size(), body.model->surface.vertices.size());
+}
+
+TEST(PrepareBody, RefusesBadChoicesByName) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto refused = [](const BodyDef& def, const std::string& word) {
+    const Result<PreparedBody> body = prepareBody(def);
+    ASSERT_FALSE(body.ok()) << word;
+    EXPECT_NE(body.error().detail.find(word), std::string::npos) << body.error().detail;
+  };
+  BodyDef def = test::ball();
+  for (double spacing : {-1.0, nan, 1e9}) {
+    def.spacing = spacing;
+    refused(def, "spacing");
+  }
+  def.spacing = 1e-5;
+  refused(def, "particles");
+  def = test::ball();
+  def.clusters.grid = {{0, 1, 1}};
+  refused(def, "grid");
+  def = test::ball();
+  def.clusters.count = 0;
+  refused(def, "count");
+  def = test::ball();
+  def.clusters.overlap = nan;
+  refused(def, "overlap");
+  def = test::ball();
+  def.material.alpha = 2;
+  refused(def, "alpha");
+  def = test::ball();
+  def.pose.translation.x() = nan;
+  refused(def, "pose");
+  def = test::ball();
+  def.mesh = TriangleMesh();
+  refused(def, "no triangles");
+  def = test::ball();
+  def.mesh = shapes::turnedInsideOut(def.mesh);
+  refused(def, "volume");
+}
+
+TEST(WithMaterial, DensityScalesMassAndTheRestStays) {
+  const PreparedBody body = prepared(test::ball());
+  Material after = body.def.material;
+  after.density *= 2.5;
+  const BodyModelPtr heavy = withMaterial(body.model, body.def.material, after);
+  EXPECT_NEAR(heavy->mass, 2.5 * body.model->mass, 1e-12 * heavy->mass);
+  EXPECT_EQ(heavy->rest, body.model->rest);
+  EXPECT_TRUE(heavy->shape.quadratic.empty());
+  after = body.def.material;
+  after.mode = MatchMode::kQuadratic;
+  EXPECT_EQ(withMaterial(body.model, body.def.material, after)->shape.quadratic.size(), body.model->clusters.size());
+  EXPECT_EQ(withMaterial(body.model, body.def.material, body.def.material), body.model);
+}
+
+}  // namespace
+}  // namespace meshless

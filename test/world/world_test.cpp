@@ -1,0 +1,448 @@
+#include "meshless_surgery/world/world.h"
+
+#include <limits>
+
+#include "meshless_surgery/geometry/measures.h"
+#include "support/bodies.h"
+#include "support/mesh_laws.h"
+#include "support/random.h"
+
+namespace meshless {
+namespace {
+
+using test::replyOf;
+
+const double kNan = std::numeric_limits<double>::quiet_NaN();
+
+World ballWorld(WorldSettings settings = {}) {
+  World world(settings);
+  EXPECT_TRUE(world.addSceneBody(test::shared(test::ball())).ok());
+  return world;
+}
+
+CutCommand cutAt(const Vec3& origin, const Vec3& normal) {
+  CutCommand cut;
+  const Vec3 x = normal.unitOrthogonal();
+  cut.blades.x_axis = x;
+  cut.blades.y_axis = normal.cross(x);
+  cut.blades.origin = origin;
+  return cut;
+}
+// Unbounded blades reach from their pivot along +x: put it behind the body.
+CutCommand cutThrough(const Vec3& point, const Vec3& normal) {
+  CutCommand cut = cutAt(point, normal);
+  cut.blades.origin -= 10.0 * cut.blades.x_axis;
+  return cut;
+}
+
+PickCommand pickNear(const Vec3& p) {
+  PickCommand pick;
+  pick.point = p;
+  return pick;
+}
+
+BodySnapshot only(World& world) {
+  WorldSnapshot shot = world.snapshot({true, true, true});
+  EXPECT_EQ(shot.bodies.size(), 1u);
+  return shot.bodies.at(0);
+}
+
+void run(World& world, int steps) {
+  for (int i = 0; i < steps; ++i) world.step();
+}
+
+TEST(WorldSettings, RefuseBadValues) {
+  EXPECT_TRUE(WorldSettings().validate().ok());
+  WorldSettings s;
+  s.step_rate = 0;
+  EXPECT_FALSE(s.validate().ok());
+  s = {};
+  s.gravity.x() = kNan;
+  EXPECT_FALSE(s.validate().ok());
+  s = {};
+  s.substeps = 0;
+  EXPECT_FALSE(s.validate().ok());
+  s = {};
+  s.ground = kNan;
+  EXPECT_FALSE(s.validate().ok());
+}
+
+TEST(World, RefusedCommandsSayWhyAndChangeNothing) {
+  World world = ballWorld();
+  run(world, 5);
+  const PickReply held = replyOf<PickReply>(world.apply(pickNear(Vec3(0, 0, 0.3))));
+  const std::uint64_t before = world.stateHash();
+  std::vector<std::pair<Command, std::string>> bad;
+  PickCommand pick = pickNear(Vec3(kNan, 0, 0));
+  bad.emplace_back(pick, "point");
+  pick = pickNear(Vec3(9, 0, 0));
+  bad.emplace_back(pick, "no tissue within");
+  pick = pickNear(Vec3(0, 0, 0.3));
+  pick.body = "lung";
+  bad.emplace_back(pick, "lung");
+  pick = pickNear(Vec3(0, 0, 0.3));
+  pick.stiffness = -1;
+  bad.emplace_back(pick, "stiffness");
+  pick = pickNear(Vec3(0, 0, 0.3));
+  pick.max_distance = kNan;
+  bad.emplace_back(pick, "max_distance");
+  bad.emplace_back(MovePickCommand{77, Vec3::Zero()}, "77");
+  bad.emplace_back(MovePickCommand{held.pick, Vec3(0, kNan, 0)}, "target");
+  bad.emplace_back(LockCommand{77, std::nullopt}, "77");
+  bad.emplace_back(LockCommand{held.pick, Vec3(kNan, 0, 0)}, "target");
+  bad.emplace_back(ReleaseCommand{77}, "77");
+  PushCommand push;
+  push.radius = -1;
+  bad.emplace_back(push, "radius");
+  push = {};
+  push.position.x() = kNan;
+  bad.emplace_back(push, "position");
+  push = {};
+  push.speed = kNan;
+  bad.emplace_back(push, "speed");
+  bad.emplace_back(cutThrough(Vec3(0, 0, 5), Vec3::UnitZ()), "met no body");
+  CutCommand cut = cutThrough(Vec3(0, 0, 0.2), Vec3::UnitZ());
+  cut.bodies = {"spleen"};
+  bad.emplace_back(cut, "spleen");
+  cut = cutThrough(Vec3(0, 0, 0.2), Vec3::UnitZ());
+  cut.blades.length = -1;
+  bad.emplace_back(cut, "length");
+  cut = cutThrough(Vec3(0, 0, 0.2), Vec3::UnitZ());
+  cut.close_time = kNan;
+  bad.emplace_back(cut, "close_time");
+  cut = cutThrough(Vec3(0, 0, 0.2), Vec3::UnitZ());
+  cut.roughness = 0.01;
+  bad.emplace_back(cut, "roughness");
+  bad.emplace_back(RemoveCommand{"spleen"}, "spleen");
+  bad.emplace_back(SetMaterialCommand{"spleen", [](const Material& m) -> Result<Material> { return m; }}, "spleen");
+  bad.emplace_back(SetMaterialCommand{"",
+                                      [](const Material& m) -> Result<Material> {
+                                        Material worse = m;
+                                        worse.alpha = 3;
+                                        return worse;
+                                      }},
+                   "alpha");
+  bad.emplace_back(SpawnCommand{test::shared(test::ball())}, "ball");
+  for (auto& [command, word] : bad) {
+    const Result<Reply> reply = world.apply(command);
+    ASSERT_FALSE(reply.ok()) << word;
+    EXPECT_NE(reply.error().detail.find(word), std::string::npos) << reply.error().detail;
+    EXPECT_EQ(world.stateHash(), before) << word;
+  }
+}
+
+TEST(World, ABallFallsComesToRestOnTheGroundAndStaysAboveIt) {
+  World world = ballWorld();
+  double highest_energy = 0.0;
+  for (int step = 0; step < 720; ++step) {
+    world.step();
+    for (const Vec3& p : only(world).surface) ASSERT_GE(p.z(), -1e-9);
+    highest_energy = std::max(highest_energy, only(world).measures.kinetic_energy);
+  }
+  const BodySnapshot ball = only(world);
+  EXPECT_LT(ball.measures.kinetic_energy, 1e-3);
+  EXPECT_LT(ball.measures.centre_of_mass.z(), 0.11);
+  EXPECT_GT(ball.measures.centre_of_mass.z(), 0.04);
+  EXPECT_LE(highest_energy, ball.model->mass * 9.81 * 0.2);
+  EXPECT_NEAR(world.simTime(), 6.0, 1e-12);
+}
+
+TEST(World, NeedsNothingThatASceneDoesNotUse) {
+  World world = ballWorld();
+  run(world, 200);
+  const StepReport report = world.snapshot({}).report;
+  EXPECT_EQ(report.tetrahedralizations, 0u);
+  EXPECT_EQ(report.contact_counters.hashed, 0u);
+  EXPECT_EQ(report.push_contacts, 0u);
+  EXPECT_EQ(report.match_counters.quadratic_moments, 0u);
+  EXPECT_GT(report.ground_contacts, 0u);
+  EXPECT_GT(report.match_counters.clusters, 0u);
+}
+
+TEST(World, EqualHistoriesHaveEqualHashes) {
+  std::uint64_t hashes[2];
+  for (std::uint64_t& hash : hashes) {
+    World world = ballWorld();
+    ASSERT_TRUE(world.addSceneBody(test::shared(test::block("block", Vec3(0.05, 0, 0.45)))).ok());
+    run(world, 60);
+    replyOf<PickReply>(world.apply(pickNear(Vec3(0, 0, 0.2))));
+    run(world, 20);
+    replyOf<CutReply>(world.apply(cutThrough(Vec3(0, 0, 0.08), Vec3(1, 0.2, 0.3).normalized())));
+    run(world, 60);
+    hash = world.stateHash();
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+}
+
+TEST(World, APickLiftsALockHoldsAndMovingTakesItUpAgain) {
+  World world = ballWorld();
+  const PickReply pick = replyOf<PickReply>(world.apply(pickNear(Vec3(0, 0, 0.3))));
+  EXPECT_NE(pick.pick, 0u);
+  EXPECT_EQ(pick.body, "ball");
+  EXPECT_EQ(world.pickInHand(), pick.pick);
+  replyOf<Done>(world.apply(MovePickCommand{pick.pick, Vec3(0, 0, 0.8)}));
+  replyOf<Done>(world.apply(LockCommand{pick.pick, std::nullopt}));
+  EXPECT_EQ(world.pickInHand(), 0u);
+  run(world, 600);
+  EXPECT_GT(only(world).measures.centre_of_mass.z(), 0.4);
+  const Pick held = world.snapshot({}).picks.at(0);
+  EXPECT_TRUE(held.locked);
+  // The spring carries the weight; the ball still swings a little.
+  EXPECT_NEAR(held.force.z(), only(world).model->mass * 9.81, 0.1 * only(world).model->mass * 9.81);
+  replyOf<Done>(world.apply(MovePickCommand{pick.pick, Vec3(0.3, 0, 0.8)}));
+  EXPECT_EQ(world.pickInHand(), pick.pick);
+  run(world, 600);
+  EXPECT_GT(only(world).measures.centre_of_mass.x(), 0.2);
+  replyOf<Done>(world.apply(ClearPicksCommand{}));
+  run(world, 600);
+  EXPECT_LT(only(world).measures.centre_of_mass.z(), 0.12);
+  const PickReply again = replyOf<PickReply>(world.apply(pickNear(only(world).particles[0])));
+  EXPECT_GT(again.pick, pick.pick);
+}
+
+TEST(World, ARayGrabsTheSurfaceInFrontOfIt) {
+  World world = ballWorld();
+  PickCommand ray;
+  ray.point = Vec3(0.01, 0.02, 2);
+  ray.direction = Vec3(0, 0, -1);
+  const PickReply pick = replyOf<PickReply>(world.apply(ray));
+  EXPECT_NEAR(pick.position.z(), 0.3, 0.01);
+  ray.point.x() = 0.5;
+  EXPECT_FALSE(world.apply(ray).ok());
+  ray.max_distance = 1.0;
+  EXPECT_TRUE(world.apply(ray).ok());
+}
+
+TEST(World, ThePushSphereTravelsAtItsSpeedAndNoTissueStaysInside) {
+  World world = ballWorld();
+  run(world, 360);
+  PushCommand push;
+  push.radius = 0.04;
+  push.position = Vec3(-0.3, 0, 0.05);
+  replyOf<Done>(world.apply(push));
+  EXPECT_EQ(world.push().position, push.position);
+  push.position = Vec3(0.1, 0, 0.05);
+  push.speed = 0.2;
+  replyOf<Done>(world.apply(push));
+  run(world, 60);
+  EXPECT_NEAR(world.push().position.x(), -0.2, 1e-9);
+  bool touched = false;
+  int touching_steps = 0;
+  const double start = only(world).measures.centre_of_mass.x();
+  for (int step = 0; step < 240; ++step) {
+    world.step();
+    for (const Vec3& p : only(world).surface) ASSERT_GE((p - world.push().position).norm(), 0.04 - 1e-9);
+    for (const Event& e : world.takeEvents()) touched = touched || e.type == EventType::kTouched;
+    if (world.push().touching && ++touching_steps == 1) {
+      EXPECT_LT(world.push().force.x(), 0.0) << "tissue pushes back";
+    }
+  }
+  EXPECT_TRUE(touched);
+  EXPECT_NEAR(world.push().position.x(), 0.1, 1e-9);
+  EXPECT_GT(only(world).measures.centre_of_mass.x(), start + 0.02);
+  push.enable = false;
+  replyOf<Done>(world.apply(push));
+  EXPECT_FALSE(world.push().enabled);
+}
+
+TEST(World, ACutSeversKeepsMomentumNamesThePiecesAndRetiresTheParent) {
+  World world = ballWorld();
+  run(world, 100);
+  const BodySnapshot before = only(world);
+  const CutReply reply = replyOf<CutReply>(world.apply(cutThrough(before.measures.centre_of_mass, Vec3::UnitX())));
+  ASSERT_EQ(reply.cut_bodies, std::vector<std::string>{"ball"});
+  ASSERT_EQ(reply.new_bodies, (std::vector<std::string>{"ball.1", "ball.2"}));
+  EXPECT_GT(reply.cap_area, 0.5 * M_PI * 0.01 * 0.5);
+  const WorldSnapshot shot = world.snapshot({true, true, true});
+  ASSERT_EQ(shot.bodies.size(), 2u);
+  double volume = 0;
+  Vec3 momentum = Vec3::Zero();
+  for (const BodySnapshot& b : shot.bodies) {
+    volume += b.measures.volume;
+    momentum += b.measures.linear_momentum;
+    TriangleMesh mesh = b.model->surface;
+    mesh.vertices = b.surface;
+    EXPECT_TRUE(laws::isClosedOriented(mesh));
+    EXPECT_EQ(b.material.name, before.material.name);
+    EXPECT_TRUE(std::count(b.model->surface.patches.begin(), b.model->surface.patches.end(), 1u) > 0);
+  }
+  EXPECT_NEAR(volume, before.measures.volume, 1e-9 * volume);
+  EXPECT_LT((momentum - before.measures.linear_momentum).norm(), 1e-9);
+  // The name is gone for this run.
+  EXPECT_FALSE(world.apply(SpawnCommand{test::shared(test::ball())}).ok());
+  EXPECT_FALSE(world.inspect("ball", false).ok());
+  EXPECT_TRUE(world.inspect("ball.1", false).ok());
+  run(world, 300);
+  for (const BodySnapshot& b : world.snapshot({true, true, true}).bodies) {
+    EXPECT_TRUE(test::allFinite(b.surface));
+    EXPECT_LT(std::abs(b.measures.volume / b.model->rest_volume - 1.0), 0.4);
+  }
+}
+
+TEST(World, OnlyBodiesThatTheBladesMeetAreSevered) {
+  World world(test::weightless());
+  for (int k = 0; k < 3; ++k)
+    ASSERT_TRUE(world.addSceneBody(test::shared(test::ball("b" + std::to_string(k), Vec3(0.4 * k, 0, 0)))).ok());
+  CutCommand cut = cutAt(Vec3(-0.2, 0, 0), Vec3::UnitZ());
+  cut.blades.x_axis = Vec3::UnitX();
+  cut.blades.y_axis = Vec3::UnitY();
+  cut.blades.length = 0.7;  // reaches b0 and b1
+  cut.blades.width = 0.05;
+  EXPECT_EQ(replyOf<CutReply>(world.apply(cut)).cut_bodies, (std::vector<std::string>{"b0", "b1"}));
+  cut.blades.length = 0;
+  cut.bodies = {"b2"};
+  EXPECT_EQ(replyOf<CutReply>(world.apply(cut)).cut_bodies, (std::vector<std::string>{"b2"}));
+  EXPECT_EQ(world.snapshot({}).bodies.size(), 6u);
+}
+
+TEST(World, SpringsFollowTheirPiece) {
+  World world(test::weightless());
+  ASSERT_TRUE(world.addSceneBody(test::shared(test::ball("ball", Vec3::Zero()))).ok());
+  const PickReply up = replyOf<PickReply>(world.apply(pickNear(Vec3(0, 0, 0.1))));
+  const PickReply down = replyOf<PickReply>(world.apply(pickNear(Vec3(0, 0, -0.1))));
+  replyOf<Done>(world.apply(LockCommand{up.pick, Vec3(0, 0, 0.3)}));
+  replyOf<Done>(world.apply(LockCommand{down.pick, Vec3(0, 0, -0.3)}));
+  replyOf<CutReply>(world.apply(cutThrough(Vec3::Zero(), Vec3::UnitZ())));
+  run(world, 600);
+  const WorldSnapshot shot = world.snapshot({false, false, true});
+  ASSERT_EQ(shot.picks.size(), 2u);
+  for (const Pick& pick : shot.picks) {
+    const std::string body = shot.pick_bodies.at(pick.id);
+    for (const BodySnapshot& b : shot.bodies)
+      if (b.name == body) {
+        EXPECT_EQ(b.measures.centre_of_mass.z() > 0, pick.id == up.pick);
+        EXPECT_GT(std::abs(b.measures.centre_of_mass.z()), 0.15);
+      }
+  }
+}
+
+TEST(World, BladesCloseOverSimulatedTime) {
+  World world = ballWorld();
+  CutCommand cut = cutThrough(Vec3(0, 0, 0.2), Vec3::UnitX());
+  cut.close_time = 0.25;
+  const CutStarted started = replyOf<CutStarted>(world.apply(cut));
+  EXPECT_TRUE(world.scissors().shown);
+  run(world, 30);
+  EXPECT_FALSE(world.finishedCut(started.ticket).has_value());
+  EXPECT_EQ(world.snapshot({}).bodies.size(), 1u);
+  run(world, 1);
+  const std::optional<Result<CutReply>> reply = world.finishedCut(started.ticket);
+  ASSERT_TRUE(reply.has_value());
+  ASSERT_TRUE(reply->ok());
+  EXPECT_EQ((*reply)->new_bodies.size(), 2u);
+  EXPECT_FALSE(world.scissors().shown);
+  EXPECT_FALSE(world.finishedCut(started.ticket).has_value()) << "the answer is taken out by asking";
+}
+
+TEST(World, PiecesCanBeCutAHundredTimes) {
+  test::Random random(11);
+  World world = ballWorld();
+  run(world, 60);
+  const double mass = only(world).model->mass;
+  const std::size_t particles = only(world).model->rest.size();
+  int cuts = 0;
+  for (int attempt = 0; attempt < 140 && cuts < 100; ++attempt) {
+    WorldSnapshot shot = world.snapshot({true, false, true});
+    std::size_t largest = 0;
+    for (std::size_t b = 1; b < shot.bodies.size(); ++b)
+      if (shot.bodies[b].model->rest_volume > shot.bodies[largest].model->rest_volume) largest = b;
+    const BodySnapshot& body = shot.bodies[largest];
+    CutCommand cut = cutThrough(solidCentroid(body.surface, body.model->surface.triangles), random.unit());
+    cut.bodies = {body.name};
+    const Result<Reply> reply = world.apply(cut);
+    if (reply.ok()) {
+      ++cuts;
+    } else {
+      EXPECT_EQ(reply.error().code, ErrorCode::kUnsuitableShape) << reply.error().detail;
+    }
+    world.step();
+  }
+  EXPECT_EQ(cuts, 100);
+  double sum = 0;
+  std::size_t count = 0;
+  for (const BodySnapshot& b : world.snapshot({true, true, true}).bodies) {
+    EXPECT_TRUE(test::allFinite(b.particles));
+    EXPECT_TRUE(test::allFinite(b.surface));
+    sum += b.model->mass;
+    count += b.model->rest.size();
+  }
+  EXPECT_NEAR(sum, mass, 1e-9 * mass);
+  EXPECT_LT(count, particles + 100);
+}
+
+TEST(World, BodiesThatFallOnEachOtherDoNotSinkIn) {
+  WorldSettings settings;
+  settings.substeps = 2;
+  World world(settings);
+  for (int k = 0; k < 3; ++k)
+    ASSERT_TRUE(world.addSceneBody(test::shared(test::block("b" + std::to_string(k), Vec3(0.01 * k, 0, 0.08 + 0.13 * k)))).ok());
+  run(world, 480);
+  const WorldSnapshot shot = world.snapshot({true, true, true});
+  EXPECT_GT(shot.report.tetrahedralizations, 0u);
+  std::vector<double> heights;
+  for (const BodySnapshot& b : shot.bodies) {
+    EXPECT_TRUE(test::allFinite(b.particles));
+    heights.push_back(b.measures.centre_of_mass.z());
+  }
+  EXPECT_GT(heights[1], heights[0] + 0.04);
+  EXPECT_GT(heights[2], heights[1] + 0.02);
+}
+
+TEST(World, ResetBringsBackTheScene) {
+  World world = ballWorld();
+  const std::uint64_t start = world.stateHash();
+  ASSERT_TRUE(world.apply(SpawnCommand{test::shared(test::block("guest", Vec3(0.5, 0, 0.3)))}).ok());
+  run(world, 50);
+  const PickReply pick = replyOf<PickReply>(world.apply(pickNear(Vec3(0, 0, 0.2))));
+  replyOf<CutReply>(world.apply(cutThrough(Vec3(0, 0, 0.1), Vec3::UnitX())));
+  world.reset();
+  EXPECT_EQ(world.stateHash(), start);
+  EXPECT_EQ(world.simTime(), 0.0);
+  EXPECT_EQ(world.snapshot({}).bodies.at(0).name, "ball");
+  EXPECT_GT(replyOf<PickReply>(world.apply(pickNear(Vec3(0, 0, 0.3)))).pick, pick.pick) << "ids are never used twice";
+}
+
+TEST(World, SetMaterialChangesOneOrAll) {
+  World world(test::weightless());
+  ASSERT_TRUE(world.addSceneBody(test::shared(test::ball("a", Vec3(0, 0, 0)))).ok());
+  ASSERT_TRUE(world.addSceneBody(test::shared(test::ball("b", Vec3(1, 0, 0)))).ok());
+  const auto setAlpha = [](double alpha) {
+    return [alpha](const Material& m) -> Result<Material> {
+      Material changed = m;
+      changed.alpha = alpha;
+      changed.mode = MatchMode::kQuadratic;
+      return changed;
+    };
+  };
+  replyOf<Done>(world.apply(SetMaterialCommand{"a", setAlpha(0.25)}));
+  WorldSnapshot shot = world.snapshot({});
+  EXPECT_EQ(shot.bodies[0].material.alpha, 0.25);
+  EXPECT_NE(shot.bodies[1].material.alpha, 0.25);
+  replyOf<Done>(world.apply(SetMaterialCommand{"", setAlpha(0.5)}));
+  shot = world.snapshot({});
+  EXPECT_EQ(shot.bodies[0].material.alpha, 0.5);
+  EXPECT_EQ(shot.bodies[1].material.alpha, 0.5);
+  run(world, 2);
+  EXPECT_GT(world.snapshot({}).report.match_counters.quadratic_moments, 0u);
+}
+
+TEST(World, RemovingABodyLetsItsSpringsGo) {
+  World world = ballWorld();
+  replyOf<PickReply>(world.apply(pickNear(Vec3(0, 0, 0.3))));
+  replyOf<Done>(world.apply(RemoveCommand{"ball"}));
+  EXPECT_TRUE(world.snapshot({}).picks.empty());
+  EXPECT_TRUE(world.snapshot({}).bodies.empty());
+  run(world, 3);
+}
+
+TEST(World, InspectGivesRestAndPresentShape) {
+  World world = ballWorld();
+  run(world, 200);
+  const BodySnapshot now = *world.inspect("ball", false), rest = *world.inspect("ball", true);
+  EXPECT_NEAR(rest.measures.volume, rest.model->rest_volume, 1e-15);
+  EXPECT_NE(now.surface[0], rest.surface[0]);
+  EXPECT_GT(now.tetrahedra, 0u);
+}
+
+}  // namespace
+}  // namespace meshless
