@@ -1,0 +1,39 @@
+// Which files may be read, and meshes and clouds from them.
+#pragma once
+
+#include <functional>
+
+#include "meshless_surgery/base/result.h"
+#include "meshless_surgery/geometry/triangle_mesh.h"
+
+namespace meshless {
+
+/// Folders below which files are read, links resolved; everything else is refused with kForbidden.
+struct FileAccess {
+  std::vector<std::string> folders;
+  /// Folder of a package:// name, or empty where there is none. Not set: package:// is refused.
+  std::function<std::string(const std::string& package)> find_package;
+
+  /// The real path of an existing regular file below one of the folders. A relative path is taken from `base_folder`.
+  Result<std::string> resolve(const std::string& path, const std::string& base_folder) const;
+};
+
+/// Through PCL: PCD, PLY, OBJ, STL, VTK by the file's ending. Polygons are split into triangles. A file without faces is
+/// a cloud: mesh.triangles is empty. Refuses kUnreadable (missing, truncated, unknown ending, more than 512 MiB) and
+/// kUnsuitableShape (no points, more than 2,000,000 points). Non-finite points are left to repairMesh to name, for
+/// surfaces; in clouds they are dropped.
+Result<TriangleMesh> readMeshFile(const std::string& real_path);
+
+/// A mesh or cloud from a file made into what a body needs: scaled, a cloud turned into a closed surface, repaired.
+/// notes say what was done.
+struct LoadedShape {
+  TriangleMesh mesh;
+  bool solid = true;
+  std::vector<std::string> notes;
+};
+Result<LoadedShape> loadShape(const std::string& real_path, double scale);
+
+/// OBJ with 17 significant digits; written beside the file and renamed. false where the disk refuses.
+Status writeObj(const std::string& path, const TriangleMesh& mesh, const std::string& comment);
+
+}  // namespace meshless

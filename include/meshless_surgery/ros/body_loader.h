@@ -1,0 +1,38 @@
+// Bodies for ~spawn: from a file or a primitive to what the world admits. Thread-safe; takes up to seconds.
+#pragma once
+
+#include <map>
+#include <memory>
+
+#include "meshless_surgery/io/scene.h"
+
+namespace meshless {
+
+struct SpawnRequest {
+  std::string name;           // empty: the file's or primitive's name, with _2, _3 ... where it is taken
+  std::string file;           // empty: the primitive
+  std::string primitive;      // box, sphere, cylinder; see primitiveMesh
+  std::vector<double> sizes;  // [m] box: x y z; sphere: radius; cylinder: height radius; before scaling
+  double scale = 1.0;         // > 0
+  Pose pose;
+  std::string material;       // empty: "default"
+};
+
+class BodyLoader {
+ public:
+  /// Relative files are taken from `scene_folder`. Materials by name.
+  BodyLoader(FileAccess access, std::string scene_folder, std::map<std::string, Material> materials);
+
+  /// Refuses what io and body refuse, and kUnknownName for a material.
+  Result<std::shared_ptr<const PreparedBody>> load(const SpawnRequest& request) const;
+
+ private:
+  FileAccess access_;
+  std::string scene_folder_;
+  std::map<std::string, Material> materials_;
+};
+
+/// The same body under another name; nothing is built again.
+std::shared_ptr<const PreparedBody> renamed(const PreparedBody& body, const std::string& name);
+
+}  // namespace meshless

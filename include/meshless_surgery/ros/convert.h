@@ -1,0 +1,32 @@
+// Core values to messages, everything in the world frame.
+#pragma once
+
+#include <meshless_surgery/Event.h>
+#include <meshless_surgery/State.h>
+#include <geometry_msgs/Pose.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <shape_msgs/Mesh.h>
+
+#include "meshless_surgery/ros/runner.h"
+
+namespace meshless {
+
+geometry_msgs::Point toPoint(const Vec3& v);
+geometry_msgs::Vector3 toVector(const Vec3& v);
+geometry_msgs::Quaternion toQuaternion(const Quat& q);
+geometry_msgs::Pose toPose(const Pose& pose);
+/// +x along the blades, +z normal to them.
+Pose poseOf(const Blades& blades);
+Blades bladesAt(const Pose& pose, double length, double width);
+
+/// Needs a snapshot with measures.
+meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatus& status,
+                                const std_msgs::Header& header);
+meshless_surgery::Event toEvent(const Event& event, const std_msgs::Header& header);
+/// Every particle with x y z body rgb. Needs a snapshot with particles.
+sensor_msgs::PointCloud2 toCloud(const WorldSnapshot& snapshot, const std_msgs::Header& header);
+/// x y z alone.
+sensor_msgs::PointCloud2 toCloud(const Points& points, const std_msgs::Header& header);
+shape_msgs::Mesh toMesh(const Points& vertices, const std::vector<Triangle>& triangles);
+
+}  // namespace meshless

@@ -1,0 +1,42 @@
+// Poses of frames in the world frame. tf2 is listened to from the first time that another frame is asked for.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include <ros/time.h>
+#include <std_msgs/Header.h>
+
+#include "meshless_surgery/tools/command.h"
+
+namespace meshless {
+
+class Frames {
+ public:
+  explicit Frames(std::string world_frame);
+  ~Frames();
+
+  const std::string& worldFrame() const { return world_frame_; }
+
+  /// Pose of the header's frame in the world frame; the identity for an empty frame_id. A stamp of 0 is the latest.
+  /// Waits at most 0.2 s (0.5 s right after listening began) of wall time. Refuses kUnknownName, naming the frame.
+  Result<Pose> toWorld(const std_msgs::Header& header);
+
+  /// The latest pose, without waiting; nothing where tf2 does not know the frame (yet).
+  std::optional<Pose> latest(const std::string& frame);
+
+  /// False until another frame was asked for: then no tf topic is subscribed to.
+  bool listening() const;
+
+ private:
+  struct Listener;
+  Listener& listener();
+  bool isWorld(const std::string& frame) const;
+
+  std::string world_frame_;
+  mutable std::mutex mutex_;  // for the creation alone: tf2's buffer has its own
+  std::unique_ptr<Listener> listener_;
+};
+
+}  // namespace meshless

@@ -1,0 +1,36 @@
+// What rviz shows: bodies and tools as a marker array.
+#pragma once
+
+#include <map>
+
+#include <visualization_msgs/MarkerArray.h>
+
+#include "meshless_surgery/world/world.h"
+
+namespace meshless {
+
+/// Remembers what was shown, so that what is gone gets its DELETE.
+class MarkerBuilder {
+ public:
+  explicit MarkerBuilder(std::string world_frame) : world_frame_(std::move(world_frame)) {}
+
+  /// Needs a snapshot with surfaces. One TRIANGLE_LIST a body: ns "bodies", id the body's number, faces of cuts in the
+  /// inside colour, no triangle without an area. Tools in ns "tools": springs 0, their ends 1, push sphere 2,
+  /// scissors 3. `fresh` (someone new listens) and a reset begin with DELETEALL. A DELETE is said in 30 arrays on end:
+  /// a slow listener may lose one.
+  visualization_msgs::MarkerArray build(const WorldSnapshot& snapshot, const ros::Time& stamp, bool fresh);
+  /// A DELETE is still to be said again.
+  bool deleting() const;
+
+ private:
+  using Key = std::pair<std::string, int>;  // ns, id
+
+  visualization_msgs::Marker marker(const std::string& ns, int id, int type, const ros::Time& stamp) const;
+  void addTools(const WorldSnapshot& snapshot, const ros::Time& stamp, visualization_msgs::MarkerArray& array) const;
+
+  std::string world_frame_;
+  std::optional<std::uint32_t> run_;
+  std::map<Key, int> shown_;  // how often a DELETE is still to be said
+};
+
+}  // namespace meshless

@@ -1,0 +1,80 @@
+// Everything that the node says by itself: topics, tf and diagnostics, on a thread of its own. A snapshot is asked for
+// only where someone listens, and made into messages outside of the runner's thread.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <ros/node_handle.h>
+#include <tf2_ros/transform_broadcaster.h>
+
+#include "meshless_surgery/ros/markers.h"
+#include "meshless_surgery/ros/rejections.h"
+#include "meshless_surgery/ros/runner.h"
+#include "meshless_surgery/ros/settings.h"
+#include "meshless_surgery/ros/tool_inputs.h"
+
+namespace meshless {
+
+class Publishers {
+ public:
+  Publishers(const ros::NodeHandle& private_handle, const NodeSettings& settings, WorldRunner& runner,
+             const ToolInputs& tools, const Rejections& rejections);
+  ~Publishers();
+  void start();
+  void stop();
+
+  /// The runner's event sink.
+  void queueEvents(std::vector<Event> events);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Cadence {  // when something is due
+    Clock::duration period{};
+    Clock::time_point next{};
+    bool due(Clock::time_point now);
+  };
+  struct ToolTopics {
+    ros::Publisher pose, force;
+    bool listened() const { return pose.getNumSubscribers() > 0 || force.getNumSubscribers() > 0; }
+  };
+
+  void loop();
+  void publishEvents();
+  void publishTick(Clock::time_point now);
+  void publishTools(const WorldSnapshot& snapshot, const ros::Time& stamp);
+  void publishTool(const ToolTopics& topics, const std::string& frame, const Pose& pose, const Vec3& force,
+                   const ros::Time& stamp, std::vector<geometry_msgs::TransformStamped>& transforms);
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
+
+  NodeSettings settings_;
+  WorldRunner& runner_;
+  const ToolInputs& tools_;
+  const Rejections& rejections_;
+  MarkerBuilder markers_;
+
+  ros::Publisher markers_topic_, points_topic_, state_topic_, events_topic_;
+  ToolTopics pick_topics_, push_topics_, scissors_topics_;
+  tf2_ros::TransformBroadcaster broadcaster_;
+  diagnostic_updater::Updater updater_;
+
+  Cadence markers_due_, points_due_, state_due_, tools_due_, diagnostics_due_;
+  std::atomic<bool> markers_newcomer_{false}, points_newcomer_{false};
+  std::uint64_t markers_revision_ = 0, points_revision_ = 0;
+  ros::Time last_transforms_;
+  std::uint64_t diagnosed_overruns_ = 0;
+  std::uint64_t markers_built_ = 0, points_built_ = 0, states_built_ = 0;  // stay at 0 while nobody listens
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Event> events_;
+  std::uint64_t lost_events_ = 0;
+  bool stopping_ = false;
+  std::thread thread_;
+};
+
+}  // namespace meshless

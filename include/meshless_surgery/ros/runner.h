@@ -1,0 +1,144 @@
+// The thread that owns the World: steps it at its rate and does what others ask for between two steps, paused or not.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "meshless_surgery/world/world.h"
+
+namespace meshless {
+
+/// What steps are paced by. `steady` says that waiting for it takes as long as on a wall clock; another clock (a
+/// simulator's, which may stand still) is polled.
+struct PaceClock {
+  std::function<double()> now;  // [s]
+  bool steady = true;
+
+  static PaceClock wall();
+};
+
+struct RunnerSettings {
+  bool paused = false;       // at the start
+  double max_backlog = 0.1;  // [s] that are caught up with at most; what is beyond is dropped, and counted
+};
+
+struct RunnerStatus {
+  bool paused = false;
+  std::uint64_t steps = 0;        // done by this runner, over resets
+  double step_rate = 0.0;         // [Hz] done, last second
+  double real_time_factor = 0.0;  // simulated over wall time, last second
+  double mean_step = 0.0;         // [s] last second
+  double worst_step = 0.0;        // [s] last second
+  std::uint64_t overruns = 0;     // steps that took longer than they simulate
+  double dropped = 0.0;           // [s] of simulated time that was not caught up with
+};
+
+class WorldRunner {
+ public:
+  using Job = std::function<void(World&)>;
+  using EventSink = std::function<void(std::vector<Event>)>;
+
+  WorldRunner(std::unique_ptr<World> world, const RunnerSettings& settings, PaceClock clock = PaceClock::wall());
+  ~WorldRunner();
+  WorldRunner(const WorldRunner&) = delete;
+  WorldRunner& operator=(const WorldRunner&) = delete;
+
+  /// Called on the runner's thread: must only put the events aside. To be set before start.
+  void setEventSink(EventSink sink) { event_sink_ = std::move(sink); }
+  void start();
+  /// Ends the thread; whoever waits gets kFailed.
+  void stop();
+
+  const WorldSettings& worldSettings() const { return world_settings_; }
+
+  // Each of these returns when its effect is in force; kFailed once stopped. Not to be called from within a job.
+  Result<Reply> apply(const Command& command);
+  /// Waits until the blades met. While paused they meet at once, as time stands still: close_time is then not used.
+  struct CutAnswer {
+    CutReply reply;
+    bool closed_at_once = false;  // though a close time was asked for
+  };
+  Result<CutAnswer> cut(CutCommand command);
+  /// Steps without pacing, paused or not; the simulated time after them [s].
+  Result<double> doSteps(std::uint64_t count);
+  /// The number of the step that is the next one.
+  Result<std::uint64_t> setPaused(bool paused);
+  /// Closing blades and steps that are being done are given up: their callers get kFailed.
+  Status reset();
+  /// A job that only reads.
+  Status look(const Job& job);
+  std::shared_ptr<const WorldSnapshot> snapshot(const SnapshotWants& wants);  // null once stopped
+
+  /// Does not wait; for streams.
+  void post(Job job);
+
+  RunnerStatus status() const;
+  /// Grows with every step and every job that may have changed the world.
+  std::uint64_t revision() const { return revision_.load(); }
+
+ private:
+  struct Waiting {  // a caller
+    std::promise<Status> done;
+    Job job;
+    bool changes = true;
+    bool waited_for = true;
+  };
+  struct ClosingCut {
+    std::uint32_t ticket = 0;
+    std::promise<Result<CutReply>> done;
+  };
+  struct OwedSteps {
+    std::uint64_t total = 0, left = 0;
+    std::promise<Result<double>> done;
+  };
+
+  Status run(Job job, bool changes);
+  void loop();
+  void doJobs();
+  void stepOnce();
+  void answerCuts();
+  void giveUp(const std::string& why);
+  void handOverEvents();
+  void sleepUntil(double due);
+  void record(double step_time);
+  void fail(const std::string& what);
+
+  std::unique_ptr<World> world_;
+  const WorldSettings world_settings_;
+  const double dt_;
+  RunnerSettings settings_;
+  PaceClock clock_;
+  EventSink event_sink_;
+
+  // of the runner's thread alone
+  std::deque<ClosingCut> closing_;
+  std::deque<OwedSteps> owed_;
+  bool paused_ = false;
+  bool fresh_pace_ = true;  // the next step is due now: after a pause, a reset, steps without pacing
+  std::vector<Event> own_events_;
+  double last_over_budget_ = -1e300;
+
+  mutable std::mutex jobs_mutex_;
+  std::condition_variable jobs_changed_;
+  std::deque<std::shared_ptr<Waiting>> jobs_;
+  bool stopping_ = false;
+  bool stopped_ = false;
+
+  struct Sample {
+    double wall, sim, step;  // [s]
+  };
+  mutable std::mutex status_mutex_;
+  std::deque<Sample> samples_;  // of the last second
+  RunnerStatus status_;
+  double started_ = 0.0;
+
+  std::atomic<std::uint64_t> revision_{0};
+  std::thread thread_;
+};
+
+}  // namespace meshless

@@ -1,0 +1,29 @@
+// The node's services: checks at the border, one command each, an answer that always says why.
+#pragma once
+
+#include <memory>
+
+#include <ros/callback_queue.h>
+#include <ros/node_handle.h>
+#include <ros/spinner.h>
+
+#include "meshless_surgery/ros/body_loader.h"
+#include "meshless_surgery/ros/frames.h"
+#include "meshless_surgery/ros/rejections.h"
+#include "meshless_surgery/ros/runner.h"
+
+namespace meshless {
+
+class Services {
+ public:
+  /// Services that may wait (cut, step, spawn) have threads of their own: a waiting one holds nobody else up.
+  Services(const ros::NodeHandle& private_handle, WorldRunner& runner, Frames& frames, const BodyLoader& loader,
+           Rejections& rejections);
+  ~Services();
+
+ private:
+  struct Handlers;
+  std::unique_ptr<Handlers> handlers_;
+};
+
+}  // namespace meshless

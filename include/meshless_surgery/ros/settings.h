@@ -1,0 +1,38 @@
+// The node's parameters, all private to it.
+#pragma once
+
+#include <ros/node_handle.h>
+
+#include "meshless_surgery/ros/runner.h"
+
+namespace meshless {
+
+struct ToolSettings {
+  std::string follow_frame;  // tools/T/follow_frame: a tf frame that the tool follows; empty: the topic ~T/servo_cp
+};
+
+struct NodeSettings {
+  std::string world_frame = "world";
+  std::string tf_prefix;                   // before the published frames' names, with a slash between
+  std::string scene = "liver";             // a name in config/scenes, a path or package://
+  std::vector<std::string> data_folders;   // below which mesh files may be read, besides the package and the scene
+  bool paused = false;                     // start paused
+  double max_backlog = 0.1;                // [s] 0..10
+  double markers_rate = 30.0;              // [Hz] 0.1..30
+  double points_rate = 30.0;               // [Hz] 0.1..120
+  double state_rate = 30.0;                // [Hz] 0.1..1000
+  double tools_rate = 60.0;                // [Hz] 0.1..1000: ~T/measured_cp, ~T/measured_cf and tf
+  ToolSettings pick, push, scissors;
+  std::optional<double> pick_max_distance; // tools/pick/max_distance [m]; absent: the scene's
+  std::optional<double> pick_stiffness;    // tools/pick/stiffness [N/m]; absent: the scene's
+  std::optional<double> push_radius;       // tools/push/radius [m]; absent: the scene's
+  double push_max_speed = 1.0;             // tools/push/max_speed [m/s] at which the sphere follows a stream
+  double scissors_length = 0.06;           // tools/scissors/length [m] of tracked blades
+  double scissors_width = 0.06;            // tools/scissors/width [m] of their opening
+};
+
+/// Refuses kInvalidArgument: a wrong type or a value out of range. Parameters that the node does not know are named in
+/// `unknown`: they are probably misspelt.
+Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std::vector<std::string>& unknown);
+
+}  // namespace meshless

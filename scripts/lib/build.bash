@@ -1,0 +1,76 @@
+# shellcheck shell=bash
+# Configuring and building, out of the checkout. Sourced after common.bash.
+
+# parallelJobs: as many as there are processors, but each with 2 GB: a file with CGAL's Delaunay takes 1 GB and more.
+parallelJobs() {
+  local processors kilobytes limit jobs
+  processors=$(nproc)
+  kilobytes=$(awk '/^MemAvailable:/ {print $2}' /proc/meminfo)
+  limit=$(cat /sys/fs/cgroup/memory.max 2>/dev/null)
+  if [[ $limit =~ ^[0-9]+$ ]] && ((limit / 1024 < kilobytes)); then kilobytes=$((limit / 1024)); fi
+  jobs=$((kilobytes / 2000000))
+  if ((jobs > processors)); then jobs=$processors; fi
+  if ((jobs < 1)); then jobs=1; fi
+  printf '%d\n' "$jobs"
+}
+
+# inCleanEnvironment COMMAND...: a build does not depend on which workspace the terminal has sourced before.
+inCleanEnvironment() {
+  env -u CMAKE_PREFIX_PATH -u ROS_PACKAGE_PATH -u PYTHONPATH -u PYTHONHOME -u ROS_ROOT -u MAKEFLAGS -u MAKELEVEL "$@"
+}
+
+# configure FOLDER CMAKE_ARGUMENTS...: where it has not been done with these arguments yet. Changed CMake files are
+# make's business.
+configure() {
+  local folder=$1 arguments
+  shift
+  arguments=$(printf '%s\n' "$@")
+  if [[ -f $folder/Makefile && $(cat "$folder/configured_with" 2>/dev/null) == "$arguments" ]]; then return 0; fi
+  mkdir -p "$folder" || return
+  rm -f "$folder/configured_with"
+  if ! inCleanEnvironment cmake -S "$checkout" -B "$folder" "$@"; then
+    rm -f "$folder/CMakeCache.txt"  # it remembers what was missing
+    return 1
+  fi
+  printf '%s\n' "$arguments" >"$folder/configured_with"
+}
+
+# build TITLE FOLDER TARGETS... -- CMAKE_ARGUMENTS...: one build at a time in the output folder, by a lock on file 9.
+build() {
+  local title=$1 folder=$2 targets=() log status=0
+  shift 2
+  while (($# > 0)) && [[ $1 != -- ]]; do
+    targets+=("$1")
+    shift
+  done
+  shift
+  if [[ $checkout == *[[:space:]]* ]]; then stop "ROS 1 does not build in a path with spaces: $checkout"; fi
+  mkdir -p "$folder" "$logs" || stop "Cannot write to $output: set MESHLESS_SURGERY_OUTPUT to another folder."
+  exec 9>"$output/lock"
+  if ! flock -n 9; then
+    say "Waiting for another build in $output"
+    flock 9
+  fi
+  log=$logs/$(basename "$folder")
+  runStep "Configuring $title" "$log.configure.log" configure "$folder" "$@" &&
+    runStep "Building $title" "$log.make.log" \
+      inCleanEnvironment make --no-print-directory -C "$folder" -j "$(parallelJobs)" "${targets[@]}" ||
+    status=1
+  exec 9>&-
+  return "$status"
+}
+
+# buildPackage TARGETS...: the node, the tools and, with the target `tests`, the tests.
+buildPackage() {
+  # catkin freezes the tests' environment at the first configuring, and leaves out folders that are not there yet.
+  mkdir -p "$output/devel/lib/python3/dist-packages" || stop "Cannot write to $output."
+  build "the package" "$output/build" "$@" -- -DCATKIN_DEVEL_PREFIX="$output/devel" -DCMAKE_BUILD_TYPE=Release \
+    -DPYTHON_EXECUTABLE=/usr/bin/python3 -DPython3_EXECUTABLE=/usr/bin/python3
+}
+
+# buildSanitized: the core and its tests under AddressSanitizer and UndefinedBehaviorSanitizer, without ROS.
+buildSanitized() {
+  build "the core with sanitizers" "$output/sanitized" all -- -DMESHLESS_SURGERY_CORE_ONLY=ON \
+    -DMESHLESS_SURGERY_SANITIZE=ON -DBUILD_TESTING=ON -DCMAKE_BUILD_TYPE=RelWithDebInfo \
+    "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -g1"
+}

@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+"""test_summary.py neither loses a failure nor counts a test twice."""
+import os
+import tempfile
+import unittest
+
+from test_summary import Counts, Entry, listEntries, parseResults, summarize
+
+CTEST_LOG = '''Test project /tmp/build
+      Start  1: good
+ 1/6 Test  #1: good .............................   Passed    0.02 sec
+ 2/6 Test  #2: wrong ............................***Failed    0.01 sec
+ 3/6 Test  #3: crashed ..........................***Exception: SegFault  0.11 sec
+ 4/6 Test  #4: slow .............................***Timeout 300.01 sec
+ 5/6 Test  #5: absent ...........................***Not Run   0.00 sec
+ 6/6 Test  #6: left_out .........................***Skipped   0.00 sec
+'''
+
+
+def junit(*cases):
+    return '<?xml version="1.0"?><testsuites><testsuite>%s</testsuite></testsuites>' % ''.join(cases)
+
+
+PASSED = '<testcase name="right" classname="Laws" status="run" result="completed"/>'
+FAILED = '<testcase name="wrong" classname="Laws"><failure message="1 is not 2">1 is not 2\nby 1</failure></testcase>'
+ERROR = '<testcase name="broken" classname="Laws"><error type="Exception">no file</error></testcase>'
+SKIPPED = '<testcase name="later" classname="Laws" status="run" result="skipped"><skipped/></testcase>'
+DISABLED = '<testcase name="never" classname="Laws" status="notrun" result="suppressed"/>'
+
+
+class TestSummaryTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+
+    def write(self, name, text):
+        path = os.path.join(self.folder.name, name)
+        with open(path, 'w', encoding='utf-8') as out:
+            out.write(text)
+        return path
+
+    def countsOf(self, *entries):
+        return summarize(list(entries), True)[0]
+
+    def testCtestLines(self):
+        self.assertEqual({'good': 'Passed', 'wrong': 'Failed', 'crashed': 'Exception', 'slow': 'Timeout',
+                          'absent': 'Not Run', 'left_out': 'Skipped'}, parseResults(CTEST_LOG))
+
+    def testEntriesWithoutFiles(self):
+        tests = [{'name': name} for name in ('good', 'wrong', 'crashed', 'slow', 'absent', 'left_out', 'never_started')]
+        counts, failures = summarize(listEntries(tests, parseResults(CTEST_LOG)), False)
+        self.assertEqual(Counts(1, 5, 1), counts)
+        self.assertEqual(5, len(failures))
+        self.assertIn('never_started: did not run', failures)
+
+    def testJunitFileOfCatkin(self):
+        command = ['env.sh', '/usr/bin/python3', '/usr/share/run_tests.py', '/r/gtest-a.xml', '--return-code', 'a --x=b.xml']
+        self.assertEqual([Entry('a', 'Passed', '/r/gtest-a.xml')],
+                         listEntries([{'name': 'a', 'command': command}], {'a': 'Passed'}))
+
+    def testCases(self):
+        path = self.write('gtest-a.xml', junit(PASSED, PASSED, FAILED, ERROR, SKIPPED, DISABLED))
+        counts, failures = summarize([Entry('a', 'Failed', path)], True)
+        self.assertEqual(Counts(2, 2, 2), counts)
+        self.assertIn('by 1', failures[0])
+        self.assertIn('no file', failures[1])
+
+    def testFailureThatNoCaseTells(self):
+        path = self.write('gtest-a.xml', junit(PASSED))
+        self.assertEqual(Counts(1, 1, 0), self.countsOf(Entry('a', 'Timeout', path)))
+        self.assertEqual(Counts(0, 1, 0), self.countsOf(Entry('a', 'Failed', self.write('gtest-b.xml', '<cut off'))))
+        self.assertEqual(Counts(0, 1, 0), self.countsOf(Entry('a', 'Not Run', path)))
+        self.assertEqual(Counts(0, 1, 0), self.countsOf(Entry('a', None, path)))
+
+    def testNoTestIsAFailure(self):
+        self.assertEqual(Counts(0, 1, 0), self.countsOf())
+
+    def testRostestIsNotCountedTwice(self):
+        rostest = junit('<testcase classname="rostest.runner.RosTest" name="testpick"/>',
+                        '<testcase classname="rostest.runner.RosTest" name="testhz"/>')
+        path = self.write('rostest-test_ros_pick.xml', rostest)
+        self.write('rosunit-pick.xml', junit(PASSED, PASSED, SKIPPED))
+        self.assertEqual(Counts(3, 0, 1), self.countsOf(Entry('pick', 'Passed', path)))
+
+    def testRostestThatDiedAfterItsCases(self):
+        rostest = junit('<testcase classname="RosTest" name="testpick"><failure>the node died</failure></testcase>')
+        path = self.write('rostest-test_ros_pick.xml', rostest)
+        self.write('rosunit-pick.xml', junit(PASSED))
+        self.assertEqual(Counts(1, 1, 0), self.countsOf(Entry('pick', 'Failed', path)))
+
+
+if __name__ == '__main__':
+    unittest.main()

@@ -1,0 +1,40 @@
+#include <cmath>
+#include <filesystem>
+#include <sstream>
+
+#include "meshless_surgery/geometry/mesh_check.h"
+#include "meshless_surgery/geometry/surface_from_points.h"
+#include "meshless_surgery/io/files.h"
+
+namespace meshless {
+
+Result<LoadedShape> loadShape(const std::string& real_path, double scale) {
+  if (!(scale > 0.0) || !std::isfinite(scale)) {
+    std::ostringstream text;
+    text << "scale is " << scale << "; accepted: above 0, finite";
+    return Error{ErrorCode::kInvalidArgument, text.str()};
+  }
+  Result<TriangleMesh> read = readMeshFile(real_path);
+  if (!read) return read.error();
+  const std::string name = std::filesystem::path(real_path).filename().string();
+  LoadedShape shape;
+  TriangleMesh mesh = std::move(*read);
+  for (Vec3& p : mesh.vertices) p *= scale;
+  if (mesh.triangles.empty()) {
+    Result<SurfaceFromPoints> surface = surfaceFromPoints(mesh.vertices);
+    if (!surface) return Error{surface.error().code, "'" + name + "': " + surface.error().detail};
+    std::ostringstream note;
+    note << name << " is a cloud of " << mesh.vertices.size() << " points; surface by " << surface->method
+         << ", points from it at most " << surface->max_distance << " m, on average " << surface->mean_distance << " m";
+    shape.notes.push_back(note.str());
+    mesh = std::move(surface->mesh);
+  }
+  Result<RepairedMesh> repaired = repairMesh(mesh);
+  if (!repaired) return Error{repaired.error().code, "'" + name + "': " + repaired.error().detail};
+  shape.mesh = std::move(repaired->mesh);
+  shape.solid = repaired->solid;
+  for (const std::string& note : repaired->notes) shape.notes.push_back(name + ": " + note);
+  return shape;
+}
+
+}  // namespace meshless

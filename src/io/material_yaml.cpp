@@ -1,0 +1,113 @@
+#include "material_yaml.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "meshless_surgery/io/scene.h"
+
+namespace meshless {
+namespace {
+
+void readColor(YamlMap& map, const std::string& key, Color& color) {
+  const YAML::Node node = map.get(key);
+  if (!node.IsDefined()) return;
+  if (!node.IsSequence() || (node.size() != 3 && node.size() != 4)) {
+    map.source().fail(node, key + " is " + shown(node), "[red, green, blue] or with opacity, each 0 to 1");
+    return;
+  }
+  double channels[4] = {0.0, 0.0, 0.0, 1.0};
+  for (std::size_t k = 0; k < node.size(); ++k)
+    readNumber(map.source(), node[k], key + "[" + std::to_string(k) + "]", {0.0, 1.0}, channels[k]);
+  color = {static_cast<float>(channels[0]), static_cast<float>(channels[1]), static_cast<float>(channels[2]),
+           static_cast<float>(channels[3])};
+}
+
+}  // namespace
+
+const char* const kPlainName = "1 to 64 letters, digits, '_', '-' or '.'";
+
+bool isPlainName(const std::string& name) {
+  return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' || c == '.';
+  });
+}
+
+void readMaterial(YamlSource& source, const YAML::Node& node, const std::string& what, Material& material) {
+  YamlMap map(source, node, what);
+  const int mode = map.choice("mode", {"rigid", "linear", "quadratic"});
+  if (mode == 0) material.mode = MatchMode::kRigid;
+  if (mode == 1) material.mode = MatchMode::kLinear;
+  if (mode == 2) material.mode = MatchMode::kQuadratic;
+  map.number("alpha", {0.0, 1.0}, material.alpha);
+  map.number("beta", {0.0, 1.0}, material.beta);
+  map.number("density", {0.0, 1e6, true, "kg/m^3"}, material.density);
+  map.number("damping", {0.0, 1e6, false, "1/s"}, material.damping);
+  map.number("friction", {0.0, 10.0}, material.friction);
+  readColor(map, "color", material.color);
+  readColor(map, "inside_color", material.inside_color);
+  for (const auto& entry : node.IsMap() ? node : YAML::Node(YAML::NodeType::Map))
+    for (const char* key : {"youngs_modulus", "poissons_ratio"})
+      if (entry.first.IsScalar() && entry.first.Scalar() == key)
+        source.fail(entry.first, std::string(key) + " in " + what + ": materials for accuracy are not in this version",
+                    "materials for looks, with mode, alpha, beta, density, damping, friction, color, inside_color",
+                    ErrorCode::kUnsupported);
+  map.finish();
+  if (source.fault) return;
+  // The ranges above are the material's own; this keeps them so.
+  if (const Status status = material.validate(); !status) source.fail(node, what + ": " + status.error().detail, "");
+}
+
+void readMaterialMap(YamlSource& source, const YAML::Node& node, std::map<std::string, Material>& materials) {
+  YamlMap map(source, node, "materials");
+  if (!node.IsMap()) return;
+  for (const auto& entry : node) {
+    if (!entry.first.IsScalar()) continue;  // the map has said so
+    const std::string& name = entry.first.Scalar();
+    if (!isPlainName(name)) source.fail(entry.first, "the material's name is " + shown(entry.first), kPlainName);
+    Material material;
+    material.name = name;
+    readMaterial(source, entry.second, "material '" + name + "'", material);
+    if (source.fault) return;
+    materials[name] = material;
+  }
+}
+
+Result<std::map<std::string, Material>> readMaterials(const std::string& folder) {
+  namespace fs = std::filesystem;
+  std::vector<fs::path> files;
+  std::error_code failed;
+  for (fs::directory_iterator at(folder, failed), end; !failed && at != end; at.increment(failed))
+    if (at->path().extension() == ".yaml" && at->is_regular_file(failed)) files.push_back(at->path());
+  if (failed) return Error{ErrorCode::kUnreadable, "cannot read the materials in '" + folder + "': " + failed.message()};
+  std::sort(files.begin(), files.end());
+  std::map<std::string, Material> materials;
+  for (const fs::path& file : files) {
+    const Result<YAML::Node> root = readYamlFile(file.string(), file.string());
+    if (!root) return root.error();
+    if (root->IsNull()) continue;  // only comments
+    YamlSource source{file.string(), {}};
+    try {
+      readMaterialMap(source, *root, materials);
+    } catch (const YAML::Exception& e) {
+      source.fail(*root, e.what(), "YAML");
+    }
+    if (source.fault) return *source.fault;
+  }
+  return materials;
+}
+
+Result<Material> changeMaterial(const Material& base, const std::string& yaml) {
+  const Result<YAML::Node> root = parseYaml(yaml, "material");
+  if (!root) return root.error();
+  YamlSource source{"material", {}};
+  Material changed = base;
+  try {
+    readMaterial(source, *root, "the material", changed);
+  } catch (const YAML::Exception& e) {
+    source.fail(*root, e.what(), "YAML");
+  }
+  if (source.fault) return *source.fault;
+  return changed;
+}
+
+}  // namespace meshless

@@ -1,0 +1,21 @@
+// Materials in YAML.
+#pragma once
+
+#include <map>
+
+#include "meshless_surgery/dynamics/material.h"
+#include "yaml_map.h"
+
+namespace meshless {
+
+/// Changes `material` by the keys of a map; faults go to the source.
+void readMaterial(YamlSource& source, const YAML::Node& node, const std::string& what, Material& material);
+
+/// A map of names to materials, into `materials`; each starts from the defaults.
+void readMaterialMap(YamlSource& source, const YAML::Node& node, std::map<std::string, Material>& materials);
+
+/// Letters, digits, '_', '-' and '.', 1 to 64 of them: the names of bodies and materials.
+bool isPlainName(const std::string& name);
+extern const char* const kPlainName;  // that, in words
+
+}  // namespace meshless

@@ -1,0 +1,195 @@
+// PCL's readers. It is the only file that includes them.
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+
+#include <pcl/PCLPointCloud2.h>
+#include <pcl/PolygonMesh.h>
+#include <pcl/console/print.h>
+#include <pcl/io/obj_io.h>
+#include <pcl/io/pcd_io.h>
+#include <pcl/io/ply_io.h>
+#include <pcl/io/vtk_lib_io.h>
+
+#include "mesh_check_before.h"
+#include "meshless_surgery/io/files.h"
+
+namespace meshless {
+namespace {
+
+/// PCL's complaints would stand in front of ours.
+class QuietPcl {
+ public:
+  QuietPcl() : level_(pcl::console::getVerbosityLevel()), vtk_(vtkObject::GetGlobalWarningDisplay()) {
+    pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);
+    vtkObject::GlobalWarningDisplayOff();
+  }
+  ~QuietPcl() {
+    pcl::console::setVerbosityLevel(level_);
+    vtkObject::SetGlobalWarningDisplay(vtk_);
+  }
+  QuietPcl(const QuietPcl&) = delete;
+  QuietPcl& operator=(const QuietPcl&) = delete;
+
+ private:
+  pcl::console::VERBOSITY_LEVEL level_;
+  int vtk_;
+};
+
+/// A text that only this process can open as a file.
+class MemoryFile {
+ public:
+  explicit MemoryFile(const std::string& text) : descriptor_(memfd_create("obj", MFD_CLOEXEC)) {
+    std::size_t written = 0;
+    while (descriptor_ >= 0 && written < text.size()) {
+      const ssize_t n = write(descriptor_, text.data() + written, text.size() - written);
+      if (n <= 0) break;
+      written += static_cast<std::size_t>(n);
+    }
+    whole_ = descriptor_ >= 0 && written == text.size();
+  }
+  ~MemoryFile() {
+    if (descriptor_ >= 0) close(descriptor_);
+  }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+
+  bool ok() const { return whole_; }
+  std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
+
+ private:
+  int descriptor_;
+  bool whole_ = false;
+};
+
+/// x, y, z as float or double; false where the cloud has no such fields.
+bool copyPoints(const pcl::PCLPointCloud2& cloud, Points& points) {
+  std::array<const pcl::PCLPointField*, 3> fields{};
+  for (const pcl::PCLPointField& field : cloud.fields)
+    for (int d = 0; d < 3; ++d)
+      if (field.name == std::string(1, "xyz"[d])) fields[d] = &field;
+  const std::size_t size = std::size_t{cloud.width} * cloud.height;
+  for (const pcl::PCLPointField* field : fields) {
+    if (!field) return false;
+    const bool single = field->datatype == pcl::PCLPointField::FLOAT32;
+    if (!single && field->datatype != pcl::PCLPointField::FLOAT64) return false;
+    if (field->offset + (single ? 4u : 8u) > cloud.point_step) return false;
+  }
+  if (size * cloud.point_step > cloud.data.size()) return false;
+  points.resize(size);
+  for (std::size_t k = 0; k < size; ++k)
+    for (int d = 0; d < 3; ++d) {
+      const std::uint8_t* at = cloud.data.data() + k * cloud.point_step + fields[d]->offset;
+      if (fields[d]->datatype == pcl::PCLPointField::FLOAT32) {
+        float x;
+        std::memcpy(&x, at, sizeof x);
+        points[k][d] = x;
+      } else {
+        std::memcpy(&points[k][d], at, sizeof(double));
+      }
+    }
+  return true;
+}
+
+/// A fan of triangles from a corner that sees the others, so that a polygon that is not convex keeps its shape if it can.
+void addPolygon(const std::vector<Index>& corners, TriangleMesh& mesh) {
+  const std::size_t n = corners.size();
+  if (n < 3) return;
+  const bool known = std::all_of(corners.begin(), corners.end(), [&](Index k) { return k < mesh.vertices.size(); });
+  std::size_t start = 0;
+  if (known && n > 3) {
+    const auto at = [&](std::size_t k) -> const Vec3& { return mesh.vertices[corners[k % n]]; };
+    Vec3 normal = Vec3::Zero();
+    for (std::size_t k = 1; k + 1 < n; ++k) normal += (at(k) - at(0)).cross(at(k + 1) - at(0));
+    double best = 0.0;
+    for (std::size_t s = 0; s < std::min<std::size_t>(n, 64); ++s) {
+      double least = 1e300;
+      for (std::size_t k = 1; k + 1 < n; ++k)
+        least = std::min(least, (at(s + k) - at(s)).cross(at(s + k + 1) - at(s)).dot(normal));
+      if (s == 0 || least > best + 1e-9 * std::abs(best)) {
+        best = least;
+        start = s;
+      }
+    }
+  }
+  for (std::size_t k = 1; k + 1 < n; ++k)
+    mesh.triangles.push_back({corners[start], corners[(start + k) % n], corners[(start + k + 1) % n]});
+}
+
+/// Through PCL; false where it failed.
+bool readWithPcl(const std::string& path, MeshFormat format, pcl::PolygonMesh& mesh) {
+  const QuietPcl quiet;
+  switch (format) {
+    case MeshFormat::kPcd: return pcl::io::loadPCDFile(path, mesh.cloud) == 0;
+    case MeshFormat::kPly: return pcl::io::loadPLYFile(path, mesh) == 0;
+    case MeshFormat::kObj: return pcl::io::loadOBJFile(path, mesh) == 0;
+    // These two return the number of polygons, 0 for a cloud and for a failure.
+    case MeshFormat::kStl: return pcl::io::loadPolygonFileSTL(path, mesh) > 0;
+    case MeshFormat::kVtk: return pcl::io::loadPolygonFileVTK(path, mesh) >= 0;
+  }
+  return false;
+}
+
+Result<TriangleMesh> convert(const pcl::PolygonMesh& read, const PromisedCounts& promised, const std::string& name) {
+  TriangleMesh mesh;
+  if (!copyPoints(read.cloud, mesh.vertices))
+    return Error{ErrorCode::kUnreadable, "'" + name + "' has no points with x, y and z as float or double"};
+  if (promised.points && *promised.points != mesh.vertices.size())
+    return Error{ErrorCode::kUnreadable, "'" + name + "' is truncated: it holds " +
+                                             std::to_string(mesh.vertices.size()) + " of " +
+                                             std::to_string(*promised.points) + " points"};
+  if (promised.faces && *promised.faces > read.polygons.size())
+    return Error{ErrorCode::kUnreadable, "'" + name + "' is truncated: it holds " +
+                                             std::to_string(read.polygons.size()) + " of " +
+                                             std::to_string(*promised.faces) + " faces"};
+  std::vector<Index> corners;
+  for (const pcl::Vertices& polygon : read.polygons) {
+    corners.clear();
+    for (const auto corner : polygon.vertices) corners.push_back(static_cast<Index>(corner));
+    addPolygon(corners, mesh);
+  }
+  if (mesh.triangles.empty())
+    mesh.vertices.erase(std::remove_if(mesh.vertices.begin(), mesh.vertices.end(),
+                                       [](const Vec3& p) { return !p.allFinite(); }),
+                        mesh.vertices.end());
+  if (mesh.vertices.empty())
+    return Error{ErrorCode::kUnsuitableShape, "'" + name + "' has no points (or none that is finite)"};
+  if (mesh.vertices.size() > 2000000)
+    return Error{ErrorCode::kUnsuitableShape,
+                 "'" + name + "' has " + std::to_string(mesh.vertices.size()) + " points; accepted: up to 2000000"};
+  return mesh;
+}
+
+}  // namespace
+
+Result<TriangleMesh> readMeshFile(const std::string& real_path) {
+  const std::string name = std::filesystem::path(real_path).filename().string();
+  const Result<MeshFormat> format = meshFormatOf(real_path);
+  if (!format) return format.error();
+  Result<PromisedCounts> promised = checkBeforeReading(real_path, *format);
+  if (!promised) return promised.error();
+  pcl::PolygonMesh mesh;
+  // PCL and VTK throw for bad input, and for memory.
+  try {
+    if (*format != MeshFormat::kPly && *format != MeshFormat::kStl) {
+      const Result<std::string> plain = *format == MeshFormat::kObj   ? plainObj(real_path)
+                                        : *format == MeshFormat::kVtk ? plainVtk(real_path, *promised)
+                                                                      : plainPcd(real_path, *promised);
+      if (!plain) return plain.error();
+      const MemoryFile file(*plain);
+      if (!file.ok()) return Error{ErrorCode::kFailed, "there is no memory to read '" + name + "'"};
+      if (!readWithPcl(file.path(), *format, mesh)) return Error{ErrorCode::kUnreadable, "'" + name + "' cannot be read"};
+    } else if (!readWithPcl(real_path, *format, mesh)) {
+      return Error{ErrorCode::kUnreadable, "'" + name + "' cannot be read: it is truncated or damaged"};
+    }
+    return convert(mesh, *promised, name);
+  } catch (const std::exception& e) {
+    return Error{ErrorCode::kUnreadable, "'" + name + "' cannot be read: " + e.what()};
+  }
+}
+
+}  // namespace meshless

@@ -1,0 +1,414 @@
+#include "meshless_surgery/io/scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <random>
+
+#include "material_yaml.h"
+#include "yaml_map.h"
+
+namespace meshless {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kMaxLength = 1000.0;  // [m] of anything in a scene
+constexpr int kMaxBodies = 10000;
+
+NumberRange lengths(double from = -kMaxLength, bool open = false) { return {from, kMaxLength, open, "m"}; }
+
+void readWorld(YamlSource& source, const YAML::Node& node, WorldSettings& world) {
+  YamlMap map(source, node, "world");
+  map.vector("gravity", {-1000.0, 1000.0, false, "m/s^2"}, world.gravity);
+  const YAML::Node ground = map.get("ground");
+  if (ground.IsDefined()) {
+    double height = 0.0;
+    if (ground.IsNull() || (ground.IsScalar() && ground.Scalar() == "none"))
+      world.ground.reset();
+    else if (!ground.IsScalar() || !YAML::convert<double>::decode(ground, height))
+      source.fail(ground, "ground is " + shown(ground), "a height, " + lengths().text() + ", or none");
+    else if (readNumber(source, ground, "ground", lengths(), height))
+      world.ground = height;
+  }
+  map.number("ground_friction", {0.0, 10.0}, world.ground_friction);
+  map.number("step_rate", {1.0, 10000.0, false, "Hz"}, world.step_rate);
+  map.whole("substeps", 1, 1000, world.substeps);
+  const int contact = map.choice("contact", {"none", "textbook"});
+  if (contact >= 0) world.contact = contact == 0 ? ContactMethod::kNone : ContactMethod::kTextbook;
+  if (const YAML::Node pick = map.get("pick"); pick.IsDefined()) {
+    YamlMap keys(source, pick, "pick");
+    keys.number("max_distance", lengths(0.0, true), world.pick_max_distance);
+    keys.number("stiffness", {0.0, 1e9, true, "N/m"}, world.pick_stiffness);
+    keys.number("radius", lengths(0.0), world.pick_radius);
+    keys.finish();
+  }
+  if (const YAML::Node push = map.get("push"); push.IsDefined()) {
+    YamlMap keys(source, push, "push");
+    keys.number("radius", lengths(0.0, true), world.push_radius);
+    keys.finish();
+  }
+  map.finish();
+  if (source.fault) return;
+  if (const Status status = world.validate(); !status) source.fail(node, "world: " + status.error().detail, "");
+}
+
+Pose readPose(YamlSource& source, const YAML::Node& node) {
+  Pose pose;
+  YamlMap map(source, node, "pose");
+  map.vector("position", lengths(), pose.translation);
+  Vec3 rpy = Vec3::Zero();
+  std::vector<double> xyzw;
+  map.vector("rpy", {-100.0, 100.0, false, "rad"}, rpy);
+  map.numbers("xyzw", 4, {-2.0, 2.0}, xyzw);
+  if (!xyzw.empty() && map.has("rpy")) source.fail(node, "pose has rpy and xyzw", "one of them");
+  pose.rotation = Eigen::AngleAxisd(rpy.z(), Vec3::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vec3::UnitY()) *
+                  Eigen::AngleAxisd(rpy.x(), Vec3::UnitX());
+  if (!xyzw.empty()) {
+    pose.rotation = Quat(xyzw[3], xyzw[0], xyzw[1], xyzw[2]);
+    const double norm = pose.rotation.norm();
+    if (!(std::abs(norm - 1.0) <= 1e-2))
+      source.fail(map.get("xyzw"), "xyzw has the length " + std::to_string(norm), "a unit quaternion, 0.99 to 1.01");
+    else
+      pose.rotation.normalize();
+  }
+  map.finish();
+  return pose;
+}
+
+ClusterOptions readClusters(YamlSource& source, const YAML::Node& node) {
+  ClusterOptions options;
+  const std::string accepted = "auto, one, {grid: [x, y, z], overlap: 0 to 1}, {count: 1 to 100000, overlap: 0 to 1}";
+  if (!node.IsMap()) {
+    if (node.IsScalar() && node.Scalar() == "auto")
+      options.kind = ClusterOptions::Kind::kAuto;
+    else if (node.IsScalar() && node.Scalar() == "one")
+      options.kind = ClusterOptions::Kind::kOne;
+    else
+      source.fail(node, "clusters is " + shown(node), accepted);
+    return options;
+  }
+  YamlMap map(source, node, "clusters");
+  const YAML::Node grid = map.get("grid");
+  const bool has_count = map.has("count");
+  if (grid.IsDefined() == has_count)
+    source.fail(node, has_count ? "clusters has grid and count" : "clusters has no grid and no count", accepted);
+  if (grid.IsDefined()) {
+    options.kind = ClusterOptions::Kind::kGrid;
+    if (!grid.IsSequence() || grid.size() != 3) {
+      source.fail(grid, "grid is " + shown(grid), "a list of 3 whole numbers, 1 to 100000");
+    } else {
+      double cells = 1.0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        readWhole(source, grid[k], "grid[" + std::to_string(k) + "]", 1, 100000, options.grid[k]);
+        cells *= options.grid[k];
+      }
+      if (cells > 100000.0) source.fail(grid, "grid has " + std::to_string(cells) + " cells", "up to 100000 together");
+    }
+  }
+  if (has_count) {
+    options.kind = ClusterOptions::Kind::kCount;
+    map.whole("count", 1, 100000, options.count);
+  }
+  map.number("overlap", {0.0, 1.0}, options.overlap);
+  map.finish();
+  return options;
+}
+
+std::vector<Box> readFixed(YamlSource& source, const YAML::Node& node) {
+  std::vector<Box> boxes;
+  if (!node.IsSequence() || node.size() > 1000) {
+    source.fail(node, "fixed is " + shown(node), "a list of up to 1000 {box: {min: [x, y, z], max: [x, y, z]}}");
+    return boxes;
+  }
+  for (const auto& entry : node) {
+    YamlMap map(source, entry, "fixed");
+    const YAML::Node box = map.get("box");
+    if (!box.IsDefined()) {
+      map.finish();
+      source.fail(entry, "an entry of fixed has no box", "{box: {min: [x, y, z], max: [x, y, z]}}");
+      break;
+    }
+    map.finish();
+    YamlMap corners(source, box, "box");
+    if (!corners.has("min") || !corners.has("max")) source.fail(box, "box has no min or no max", "both");
+    Box read;
+    corners.vector("min", lengths(), read.min);
+    corners.vector("max", lengths(), read.max);
+    corners.finish();
+    if (read.empty()) source.fail(box, "box has a min above its max", "min up to max, along each axis");
+    if (source.fault) break;
+    boxes.push_back(read);
+  }
+  return boxes;
+}
+
+/// The same everywhere, which std::uniform_real_distribution is not.
+class Dice {
+ public:
+  explicit Dice(std::uint64_t seed) : engine_(seed) {}
+  double between(double from, double to) {
+    return from + (to - from) * static_cast<double>(engine_() >> 11) * 0x1.0p-53;
+  }
+  Vec3 inCube(double half) {
+    const double x = between(-half, half), y = between(-half, half), z = between(-half, half);
+    return {x, y, z};
+  }
+  Vec3 direction() {
+    for (;;) {
+      const Vec3 p = inCube(1.0);
+      const double squared = p.squaredNorm();
+      if (squared > 1e-4 && squared <= 1.0) return p / std::sqrt(squared);
+    }
+  }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+/// The poses of a body's copies; `start` is the first one's place.
+std::vector<Pose> readCopies(YamlSource& source, const YAML::Node& node, const Pose& start) {
+  YamlMap map(source, node, "copies");
+  int count = 0, seed = 1;
+  std::array<int, 3> grid{{0, 1, 1}};
+  Vec3 offset = Vec3::Zero();
+  double jitter = 0.0, turn = 0.0;
+  map.whole("count", 1, kMaxBodies, count);
+  const YAML::Node cells = map.get("grid");
+  if (cells.IsDefined()) {
+    if (!cells.IsSequence() || cells.size() != 3)
+      source.fail(cells, "grid is " + shown(cells), "a list of 3 whole numbers, 1 to 10000");
+    else
+      for (std::size_t k = 0; k < 3; ++k)
+        readWhole(source, cells[k], "grid[" + std::to_string(k) + "]", 1, kMaxBodies, grid[k]);
+  }
+  map.vector("offset", lengths(), offset);
+  map.number("jitter", lengths(0.0), jitter);
+  map.number("turn", {0.0, 3.2, false, "rad"}, turn);
+  map.whole("seed", 0, 2147483647, seed);
+  map.finish();
+  if (count == 0 && grid[0] == 0) source.fail(node, "copies has no count and no grid", "one of them, or both");
+  if (grid[0] == 0) grid[0] = count;
+  const double places = static_cast<double>(grid[0]) * grid[1] * grid[2];
+  if (places > kMaxBodies || places < count)
+    source.fail(node, "the grid of copies has " + std::to_string(static_cast<long long>(places)) + " places",
+                std::to_string(std::max(1, count)) + " to " + std::to_string(kMaxBodies));
+  if (source.fault) return {};
+  if (count == 0) count = static_cast<int>(places);
+  std::vector<Pose> poses;
+  Dice dice(static_cast<std::uint64_t>(seed));
+  for (int k = 0; k < count; ++k) {
+    const Vec3 place(k % grid[0], k / grid[0] % grid[1], k / grid[0] / grid[1]);
+    Pose pose = start;
+    pose.translation += place.cwiseProduct(offset) + dice.inCube(jitter);
+    const Vec3 axis = dice.direction();
+    pose.rotation = (Eigen::AngleAxisd(dice.between(0.0, turn), axis) * pose.rotation).normalized();
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+class SceneReader {
+ public:
+  SceneReader(YamlSource& source, std::string folder, const FileAccess& access, SceneDef& scene)
+      : source_(source), folder_(std::move(folder)), access_(access), scene_(scene) {}
+
+  void read(const YAML::Node& root) {
+    YamlMap map(source_, root, "the scene");
+    if (const YAML::Node world = map.get("world"); world.IsDefined()) readWorld(source_, world, scene_.world);
+    if (const YAML::Node materials = map.get("materials"); materials.IsDefined())
+      readMaterialMap(source_, materials, scene_.materials);
+    const YAML::Node bodies = map.get("bodies");
+    map.finish();
+    if (!bodies.IsSequence() || bodies.size() > kMaxBodies) {
+      source_.fail(bodies.IsDefined() ? bodies : root, "bodies is " + shown(bodies), "a list of up to 10000 bodies");
+      return;
+    }
+    for (const auto& body : bodies) {
+      if (source_.fault) return;  // later bodies may take seconds to load
+      readBody(body);
+    }
+  }
+
+ private:
+  void readBody(const YAML::Node& node) {
+    YamlMap map(source_, node, "a body");
+    BodyDef def;
+    // What is cheap to read comes first: no mesh is loaded for a body that is refused.
+    map.text("name", def.name);
+    double scale = 1.0, edge = 0.0;
+    map.number("scale", {0.0, 1e6, true}, scale);
+    map.number("spacing", lengths(0.0, true), def.spacing);
+    map.number("edge", lengths(0.0, true), edge);
+    if (const YAML::Node pose = map.get("pose"); pose.IsDefined()) def.pose = readPose(source_, pose);
+    if (const YAML::Node clusters = map.get("clusters"); clusters.IsDefined())
+      def.clusters = readClusters(source_, clusters);
+    readBodyMaterial(map.get("material"), def.material);
+    if (const YAML::Node fixed = map.get("fixed"); fixed.IsDefined()) def.fixed = readFixed(source_, fixed);
+    std::vector<Pose> poses{def.pose};
+    const YAML::Node copies = map.get("copies");
+    if (copies.IsDefined()) poses = readCopies(source_, copies, def.pose);
+    const YAML::Node file = map.get("file"), primitive = map.get("primitive");
+    if (file.IsDefined() == primitive.IsDefined())
+      source_.fail(node, file.IsDefined() ? "a body has file and primitive" : "a body has no file and no primitive",
+                   "one of them");
+    if (file.IsDefined() && edge > 0.0) source_.fail(map.get("edge"), "edge of a body from a file", "with a primitive");
+    map.finish();
+    if (source_.fault) return;
+
+    if (file.IsDefined())
+      loadFile(file, scale, def);
+    else
+      makePrimitive(primitive, scale, edge, def);
+    if (source_.fault) return;
+    if (!isPlainName(def.name)) source_.fail(node, "the body's name is '" + def.name.substr(0, 60) + "'", kPlainName);
+    if (scene_.bodies.size() + poses.size() > static_cast<std::size_t>(kMaxBodies))
+      source_.fail(node, "the scene has more bodies", "up to 10000");
+    for (std::size_t k = 0; k < poses.size() && !source_.fault; ++k) {
+      BodyDef copy = def;
+      copy.pose = poses[k];
+      if (copies.IsDefined()) copy.name += "_" + std::to_string(k + 1);
+      if (!names_.insert(copy.name).second)
+        source_.fail(node, "two bodies are named '" + copy.name + "'", "each name once", ErrorCode::kDuplicateName);
+      scene_.bodies.push_back(std::move(copy));
+    }
+  }
+
+  void readBodyMaterial(const YAML::Node& node, Material& material) {
+    if (!node.IsDefined()) {
+      const auto found = scene_.materials.find("default");
+      if (found != scene_.materials.end()) material = found->second;
+    } else if (node.IsMap()) {
+      material.name = "own";
+      readMaterial(source_, node, "material", material);
+    } else {
+      std::string name;
+      if (!readText(source_, node, "material", name)) return;
+      const auto found = scene_.materials.find(name);
+      if (found != scene_.materials.end()) {
+        material = found->second;
+      } else if (name != "default") {  // which needs no file
+        std::vector<std::string> known{"default"};
+        std::string accepted = "default";
+        for (const auto& entry : scene_.materials) {
+          if (entry.first == "default") continue;
+          known.push_back(entry.first);
+          accepted += ", " + entry.first;
+        }
+        source_.fail(node, "unknown material " + shown(node) + ", did you mean '" + nearestWord(name, known) + "'?",
+                     accepted, ErrorCode::kUnknownName);
+      }
+    }
+  }
+
+  void loadFile(const YAML::Node& node, double scale, BodyDef& def) {
+    std::string path;
+    if (!readText(source_, node, "file", path)) return;
+    const Result<std::string> real = access_.resolve(path, folder_);
+    if (!real) return source_.fail(node, real.error().detail, "", real.error().code);
+    const auto key = std::make_pair(*real, scale);
+    auto found = shapes_.find(key);
+    if (found == shapes_.end()) {
+      Result<LoadedShape> loaded = loadShape(*real, scale);
+      if (!loaded) return source_.fail(node, loaded.error().detail, "", loaded.error().code);
+      found = shapes_.emplace(key, std::move(*loaded)).first;
+    }
+    def.mesh = found->second.mesh;
+    def.solid = found->second.solid;
+    def.notes = found->second.notes;
+    if (def.name.empty()) def.name = fs::path(*real).stem().string();
+  }
+
+  void makePrimitive(const YAML::Node& node, double scale, double edge, BodyDef& def) {
+    YamlMap map(source_, node, "primitive");
+    const std::vector<std::string> kinds{"box", "sphere", "cylinder"};
+    const std::size_t counts[] = {3, 1, 2};
+    std::string chosen;
+    std::vector<double> sizes;
+    for (std::size_t k = 0; k < kinds.size(); ++k) {
+      const YAML::Node size = map.get(kinds[k]);
+      if (!size.IsDefined()) continue;
+      if (!chosen.empty()) source_.fail(node, "primitive is a " + chosen + " and a " + kinds[k], "one of them");
+      chosen = kinds[k];
+      const NumberRange range{1e-4, kMaxLength, false, "m"};
+      sizes.assign(1, 0.0);
+      if (counts[k] == 1 && size.IsScalar())
+        readNumber(source_, size, chosen, range, sizes[0]);
+      else
+        map.numbers(chosen, counts[k], range, sizes);
+    }
+    map.finish();
+    if (chosen.empty()) source_.fail(node, "primitive is empty", "one of box, sphere, cylinder");
+    if (source_.fault) return;
+    for (double& size : sizes) size *= scale;
+    Result<TriangleMesh> mesh = primitiveMesh(chosen, sizes, edge * scale);
+    if (!mesh) return source_.fail(node, mesh.error().detail, "", mesh.error().code);
+    def.mesh = std::move(*mesh);
+    if (def.name.empty()) def.name = chosen;
+  }
+
+  YamlSource& source_;
+  std::string folder_;
+  const FileAccess& access_;
+  SceneDef& scene_;
+  std::set<std::string> names_;
+  std::map<std::pair<std::string, double>, LoadedShape> shapes_;  // copies and repeated files are read once
+};
+
+/// Material folders that there are and that may be read, each once.
+std::vector<std::string> materialFolders(const std::string& scene_folder, const FileAccess& access) {
+  std::vector<std::string> folders;
+  const auto realFolder = [](const fs::path& folder) {
+    std::error_code failed;
+    const fs::path real = fs::canonical(folder, failed);
+    return !failed && fs::is_directory(real, failed) ? real.string() : std::string();
+  };
+  if (access.find_package) {
+    const std::string package = access.find_package("meshless_surgery");
+    const std::string real = package.empty() ? "" : realFolder(fs::path(package) / "config" / "materials");
+    if (!real.empty()) folders.push_back(real);
+  }
+  const std::string beside = realFolder(fs::path(scene_folder) / ".." / "materials");
+  if (beside.empty() || std::find(folders.begin(), folders.end(), beside) != folders.end()) return folders;
+  // The same rule as for meshes, links resolved: every file in it may be read, or none is.
+  bool any = false, all = true;
+  std::error_code failed;
+  for (fs::directory_iterator at(beside, failed), end; !failed && at != end; at.increment(failed)) {
+    if (at->path().extension() != ".yaml") continue;
+    any = true;
+    all = all && access.resolve(at->path().string(), "").ok();
+  }
+  if (any && all) folders.push_back(beside);
+  return folders;
+}
+
+}  // namespace
+
+Result<SceneDef> readScene(const std::string& file, const FileAccess& access) {
+  std::error_code failed;
+  const fs::path real = fs::canonical(file, failed);
+  if (failed || !fs::is_regular_file(real, failed))
+    return Error{ErrorCode::kUnreadable, "there is no scene '" + file + "'; accepted: a YAML file"};
+  FileAccess scene_access = access;
+  scene_access.folders.push_back(real.parent_path().string());
+
+  SceneDef scene;
+  scene.name = real.stem().string();
+  for (const std::string& folder : materialFolders(real.parent_path().string(), scene_access)) {
+    Result<std::map<std::string, Material>> materials = readMaterials(folder);
+    if (!materials) return materials.error();
+    for (auto& entry : *materials) scene.materials[entry.first] = std::move(entry.second);
+  }
+  const Result<YAML::Node> root = readYamlFile(real.string(), file);
+  if (!root) return root.error();
+  YamlSource source{file, {}};
+  try {
+    SceneReader(source, real.parent_path().string(), scene_access, scene).read(*root);
+  } catch (const YAML::Exception& e) {
+    source.fail(*root, e.what(), "YAML");
+  }
+  if (source.fault) return *source.fault;
+  return scene;
+}
+
+}  // namespace meshless

@@ -1,0 +1,108 @@
+#include "meshless_surgery/ros/border_check.h"
+
+#include <cmath>
+#include <cstdio>
+
+namespace meshless {
+namespace {
+
+constexpr std::size_t kMaxName = 100;
+
+}  // namespace
+
+std::string formatNumber(double value) {
+  if (std::isnan(value)) return "nan";
+  if (std::isinf(value)) return value > 0.0 ? "inf" : "-inf";
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.6g", value);
+  return text;
+}
+
+std::string printable(const std::string& text) {
+  std::string shown = text.substr(0, kMaxName);
+  for (char& c : shown) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+  }
+  if (text.size() > kMaxName) shown += "...";
+  return shown;
+}
+
+void BorderCheck::fault(const std::string& sentence) {
+  if (!error_) error_ = Error{ErrorCode::kInvalidArgument, sentence};
+}
+
+double BorderCheck::number(const std::string& field, double value, double min, double max, const std::string& unit) {
+  if (!(value >= min && value <= max)) {
+    fault(field + " is " + formatNumber(value) + "; accepted: " + formatNumber(min) + ".." + formatNumber(max) +
+          (unit.empty() ? "" : " " + unit));
+  }
+  return value;
+}
+
+Vec3 BorderCheck::point(const std::string& field, const geometry_msgs::Point& value) {
+  number(field + ".x", value.x, -kMaxCoordinate, kMaxCoordinate, "m");
+  number(field + ".y", value.y, -kMaxCoordinate, kMaxCoordinate, "m");
+  number(field + ".z", value.z, -kMaxCoordinate, kMaxCoordinate, "m");
+  return {value.x, value.y, value.z};
+}
+
+Vec3 BorderCheck::direction(const std::string& field, const geometry_msgs::Vector3& value) {
+  number(field + ".x", value.x, -kMaxCoordinate, kMaxCoordinate, "");
+  number(field + ".y", value.y, -kMaxCoordinate, kMaxCoordinate, "");
+  number(field + ".z", value.z, -kMaxCoordinate, kMaxCoordinate, "");
+  return {value.x, value.y, value.z};
+}
+
+Quat BorderCheck::rotation(const std::string& field, const geometry_msgs::Quaternion& value) {
+  number(field + ".x", value.x, -kMaxCoordinate, kMaxCoordinate, "");
+  number(field + ".y", value.y, -kMaxCoordinate, kMaxCoordinate, "");
+  number(field + ".z", value.z, -kMaxCoordinate, kMaxCoordinate, "");
+  number(field + ".w", value.w, -kMaxCoordinate, kMaxCoordinate, "");
+  const Quat rotation(value.w, value.x, value.y, value.z);
+  const double norm = rotation.norm();
+  if (!(norm >= kMinQuaternionNorm && std::isfinite(norm))) {
+    fault(field + " has the norm " + formatNumber(norm) + "; accepted: a quaternion x y z w of a norm of at least " +
+          formatNumber(kMinQuaternionNorm) + ", such as 0 0 0 1");
+    return Quat::Identity();
+  }
+  return rotation.normalized();
+}
+
+Pose BorderCheck::pose(const std::string& field, const geometry_msgs::Pose& value) {
+  Pose checked;
+  checked.translation = point(field + ".position", value.position);
+  checked.rotation = rotation(field + ".orientation", value.orientation);
+  return checked;
+}
+
+Pose BorderCheck::pointPose(const std::string& field, const geometry_msgs::Pose& value) {
+  const auto& q = value.orientation;
+  if (q.x == 0.0 && q.y == 0.0 && q.z == 0.0 && q.w == 0.0) {
+    Pose unturned;
+    unturned.translation = point(field + ".position", value.position);
+    return unturned;
+  }
+  return pose(field, value);
+}
+
+std::string BorderCheck::newName(const std::string& field, const std::string& value) {
+  const bool plain = value.find_first_not_of(
+                         "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.") == std::string::npos;
+  if (!plain || value.size() > kMaxName) {
+    fault(field + " is '" + printable(value) + "'; accepted: letters, digits and _ - . only, at most " +
+          std::to_string(kMaxName) + " of them");
+  }
+  return value;
+}
+
+std::vector<std::string> BorderCheck::names(const std::string& field, const std::vector<std::string>& value) {
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    if (value[i].empty() || value[i].size() > kMaxName) {
+      fault(field + "[" + std::to_string(i) + "] is '" + printable(value[i]) + "'; accepted: names of 1.." +
+            std::to_string(kMaxName) + " characters");
+    }
+  }
+  return value;
+}
+
+}  // namespace meshless

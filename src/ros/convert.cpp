@@ -1,0 +1,199 @@
+#include "meshless_surgery/ros/convert.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+namespace meshless {
+namespace {
+
+sensor_msgs::PointField field(const std::string& name, std::uint32_t offset, std::uint8_t type) {
+  sensor_msgs::PointField field;
+  field.name = name;
+  field.offset = offset;
+  field.datatype = type;
+  field.count = 1;
+  return field;
+}
+
+void setSize(sensor_msgs::PointCloud2& cloud, std::size_t points) {
+  cloud.height = 1;
+  cloud.width = static_cast<std::uint32_t>(points);
+  cloud.row_step = cloud.width * cloud.point_step;
+  cloud.is_dense = true;
+  const std::uint16_t one = 1;
+  std::uint8_t first_byte = 0;
+  std::memcpy(&first_byte, &one, 1);
+  cloud.is_bigendian = first_byte == 0;
+  cloud.data.resize(static_cast<std::size_t>(cloud.row_step));
+}
+
+void setXyz(std::uint8_t* to, const Vec3& p) {
+  const float xyz[3] = {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())};
+  std::memcpy(to, xyz, sizeof(xyz));
+}
+
+/// PCL's packing: 0x00rrggbb in the bits of a float.
+std::uint32_t packed(const Color& color) {
+  const auto byte = [](float channel) {
+    return static_cast<std::uint32_t>(std::lround(255.0f * std::min(1.0f, std::max(0.0f, channel))));
+  };
+  return byte(color.r) << 16 | byte(color.g) << 8 | byte(color.b);
+}
+
+}  // namespace
+
+geometry_msgs::Point toPoint(const Vec3& v) {
+  geometry_msgs::Point point;
+  point.x = v.x();
+  point.y = v.y();
+  point.z = v.z();
+  return point;
+}
+
+geometry_msgs::Vector3 toVector(const Vec3& v) {
+  geometry_msgs::Vector3 vector;
+  vector.x = v.x();
+  vector.y = v.y();
+  vector.z = v.z();
+  return vector;
+}
+
+geometry_msgs::Quaternion toQuaternion(const Quat& q) {
+  geometry_msgs::Quaternion quaternion;
+  quaternion.x = q.x();
+  quaternion.y = q.y();
+  quaternion.z = q.z();
+  quaternion.w = q.w();
+  return quaternion;
+}
+
+geometry_msgs::Pose toPose(const Pose& pose) {
+  geometry_msgs::Pose message;
+  message.position = toPoint(pose.translation);
+  message.orientation = toQuaternion(pose.rotation);
+  return message;
+}
+
+Pose poseOf(const Blades& blades) {
+  Mat3 axes;
+  axes << blades.x_axis, blades.y_axis, blades.x_axis.cross(blades.y_axis);
+  Pose pose;
+  pose.rotation = Quat(axes).normalized();
+  pose.translation = blades.origin;
+  return pose;
+}
+
+Blades bladesAt(const Pose& pose, double length, double width) {
+  Blades blades;
+  blades.origin = pose.translation;
+  blades.x_axis = pose.rotation * Vec3::UnitX();
+  blades.y_axis = pose.rotation * Vec3::UnitY();
+  blades.length = length;
+  blades.width = width;
+  return blades;
+}
+
+meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatus& status,
+                                const std_msgs::Header& header) {
+  meshless_surgery::State state;
+  state.header = header;
+  state.step = snapshot.step;
+  state.sim_time = snapshot.sim_time;
+  state.real_time_factor = status.real_time_factor;
+  state.bodies.reserve(snapshot.bodies.size());
+  for (const BodySnapshot& body : snapshot.bodies) {
+    meshless_surgery::BodyState message;
+    message.name = body.name;
+    message.particles = static_cast<std::uint32_t>(body.model->rest.size());
+    message.triangles = static_cast<std::uint32_t>(body.model->surface.triangles.size());
+    message.tetrahedra = static_cast<std::uint32_t>(body.tetrahedra);
+    message.clusters = body.model->clusters.size();
+    message.volume = body.measures.volume;
+    message.rest_volume = body.model->rest_volume;
+    message.area = body.measures.area;
+    message.mass = body.model->mass;
+    message.centre_of_mass = toPoint(body.measures.centre_of_mass);
+    message.velocity = toVector(body.measures.velocity);
+    message.kinetic_energy = body.measures.kinetic_energy;
+    message.asleep = body.asleep;
+    state.bodies.push_back(std::move(message));
+  }
+  state.picks.reserve(snapshot.picks.size());
+  for (const Pick& pick : snapshot.picks) {
+    meshless_surgery::PickState message;
+    message.pick_id = pick.id;
+    const auto body = snapshot.pick_bodies.find(pick.id);
+    if (body != snapshot.pick_bodies.end()) message.body = body->second;
+    message.locked = pick.locked;
+    message.position = toPoint(pick.position);
+    message.target = toPoint(pick.target);
+    message.force = toVector(pick.force);
+    state.picks.push_back(std::move(message));
+  }
+  return state;
+}
+
+meshless_surgery::Event toEvent(const Event& event, const std_msgs::Header& header) {
+  meshless_surgery::Event message;
+  message.header = header;
+  message.type = toString(event.type);
+  message.body = event.body;
+  message.pick_id = event.pick;
+  message.step = event.step;
+  message.sim_time = event.sim_time;
+  message.text = event.text;
+  return message;
+}
+
+sensor_msgs::PointCloud2 toCloud(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
+  sensor_msgs::PointCloud2 cloud;
+  cloud.header = header;
+  cloud.fields = {field("x", 0, sensor_msgs::PointField::FLOAT32), field("y", 4, sensor_msgs::PointField::FLOAT32),
+                  field("z", 8, sensor_msgs::PointField::FLOAT32), field("body", 12, sensor_msgs::PointField::UINT32),
+                  field("rgb", 16, sensor_msgs::PointField::FLOAT32)};
+  cloud.point_step = 20;
+  std::size_t points = 0;
+  for (const BodySnapshot& body : snapshot.bodies) points += body.particles.size();
+  setSize(cloud, points);
+  std::uint8_t* to = cloud.data.data();
+  for (const BodySnapshot& body : snapshot.bodies) {
+    const std::uint32_t rgb = packed(body.material.color);
+    for (const Vec3& p : body.particles) {
+      setXyz(to, p);
+      std::memcpy(to + 12, &body.number, sizeof(body.number));
+      std::memcpy(to + 16, &rgb, sizeof(rgb));
+      to += cloud.point_step;
+    }
+  }
+  return cloud;
+}
+
+sensor_msgs::PointCloud2 toCloud(const Points& points, const std_msgs::Header& header) {
+  sensor_msgs::PointCloud2 cloud;
+  cloud.header = header;
+  cloud.fields = {field("x", 0, sensor_msgs::PointField::FLOAT32), field("y", 4, sensor_msgs::PointField::FLOAT32),
+                  field("z", 8, sensor_msgs::PointField::FLOAT32)};
+  cloud.point_step = 12;
+  setSize(cloud, points.size());
+  std::uint8_t* to = cloud.data.data();
+  for (const Vec3& p : points) {
+    setXyz(to, p);
+    to += cloud.point_step;
+  }
+  return cloud;
+}
+
+shape_msgs::Mesh toMesh(const Points& vertices, const std::vector<Triangle>& triangles) {
+  shape_msgs::Mesh mesh;
+  mesh.vertices.reserve(vertices.size());
+  for (const Vec3& p : vertices) mesh.vertices.push_back(toPoint(p));
+  mesh.triangles.resize(triangles.size());
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) mesh.triangles[t].vertex_indices[k] = triangles[t][k];
+  }
+  return mesh;
+}
+
+}  // namespace meshless

@@ -1,0 +1,98 @@
+#include "meshless_surgery/ros/frames.h"
+
+#include <chrono>
+#include <thread>
+
+#include <ros/init.h>
+#include <tf2/buffer_core.h>
+#include <tf2/exceptions.h>
+#include <tf2_ros/transform_listener.h>
+
+#include "meshless_surgery/ros/border_check.h"
+
+namespace meshless {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+constexpr std::chrono::milliseconds kWait(200);
+constexpr std::chrono::milliseconds kFirstWait(500);  // static transforms come with the connection
+constexpr std::chrono::milliseconds kPoll(5);
+
+Pose toPose(const geometry_msgs::TransformStamped& transform) {
+  const auto& t = transform.transform.translation;
+  const auto& r = transform.transform.rotation;
+  Pose pose;
+  pose.translation = Vec3(t.x, t.y, t.z);
+  pose.rotation = Quat(r.w, r.x, r.y, r.z).normalized();
+  return pose;
+}
+
+std::string withoutSlash(const std::string& frame) {
+  const std::size_t first = frame.find_first_not_of('/');
+  return first == std::string::npos ? std::string() : frame.substr(first);
+}
+
+}  // namespace
+
+struct Frames::Listener {
+  tf2::BufferCore buffer;
+  tf2_ros::TransformListener listener{buffer};
+  SteadyClock::time_point since = SteadyClock::now();
+};
+
+Frames::Frames(std::string world_frame) : world_frame_(withoutSlash(world_frame)) {}
+Frames::~Frames() = default;
+
+bool Frames::isWorld(const std::string& frame) const { return frame.empty() || frame == world_frame_; }
+
+bool Frames::listening() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return listener_ != nullptr;
+}
+
+Frames::Listener& Frames::listener() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!listener_) listener_ = std::make_unique<Listener>();
+  return *listener_;
+}
+
+Result<Pose> Frames::toWorld(const std_msgs::Header& header) {
+  const std::string frame = withoutSlash(header.frame_id);
+  if (isWorld(frame)) return Pose{};
+  Listener& tf = listener();
+  const auto now = SteadyClock::now();
+  const auto deadline = std::max(now + kWait, tf.since + kFirstWait);
+  std::string why;
+  // Waits on the wall clock: a simulated one may stand still.
+  while (true) {
+    why.clear();
+    if (tf.buffer.canTransform(world_frame_, frame, header.stamp, &why)) {
+      try {
+        const Pose pose = toPose(tf.buffer.lookupTransform(world_frame_, frame, header.stamp));
+        if (pose.translation.allFinite() && pose.rotation.coeffs().allFinite()) return pose;
+        why = "its transform is not finite";
+      } catch (const tf2::TransformException& e) {
+        why = e.what();
+      }
+    }
+    if (SteadyClock::now() >= deadline || !ros::ok()) break;
+    std::this_thread::sleep_for(kPoll);
+  }
+  return Error{ErrorCode::kUnknownName, "header.frame_id is '" + printable(header.frame_id) +
+                                            "'; accepted: a frame that tf2 can bring to '" + world_frame_ +
+                                            "', or empty for it" + (why.empty() ? "" : " (tf2: " + why + ")")};
+}
+
+std::optional<Pose> Frames::latest(const std::string& frame_id) {
+  const std::string frame = withoutSlash(frame_id);
+  if (isWorld(frame)) return Pose{};
+  Listener& tf = listener();
+  try {
+    const Pose pose = toPose(tf.buffer.lookupTransform(world_frame_, frame, ros::Time(0)));
+    if (pose.translation.allFinite() && pose.rotation.coeffs().allFinite()) return pose;
+  } catch (const tf2::TransformException&) {  // not known yet
+  }
+  return std::nullopt;
+}
+
+}  // namespace meshless

@@ -1,0 +1,160 @@
+#include "meshless_surgery/ros/markers.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "meshless_surgery/ros/convert.h"
+
+namespace meshless {
+namespace {
+
+using visualization_msgs::Marker;
+
+constexpr int kSaidDeletes = 30;         // arrays: a second at the highest rate
+constexpr double kThinnest = 1e-8;       // a triangle's height over its longest edge: thinner ones have no area
+constexpr double kShownReach = 0.1;      // [m] of blades without an end
+constexpr double kSpringWidth = 0.0015;  // [m]
+constexpr double kSpringEnd = 0.006;     // [m] diameter
+constexpr double kBladeWidth = 0.12;     // of the blade's length
+
+std_msgs::ColorRGBA toColor(const Color& color) {
+  std_msgs::ColorRGBA message;
+  message.r = color.r;
+  message.g = color.g;
+  message.b = color.b;
+  message.a = color.a;
+  return message;
+}
+
+bool hasArea(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 ab = b - a;
+  const Vec3 ac = c - a;
+  const double longest = std::max({ab.squaredNorm(), ac.squaredNorm(), (c - b).squaredNorm()});
+  return ab.cross(ac).norm() > kThinnest * longest;
+}
+
+void addBody(const BodySnapshot& body, Marker& marker) {
+  const TriangleMesh& mesh = body.model->surface;
+  marker.color = toColor(body.material.color);
+  marker.scale.x = marker.scale.y = marker.scale.z = 1.0;
+  const bool cut = std::any_of(mesh.patches.begin(), mesh.patches.end(), [](auto p) { return p != kOuterPatch; });
+  const auto inside = toColor(body.material.inside_color);
+  marker.points.reserve(3 * mesh.triangles.size());
+  if (cut) marker.colors.reserve(mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Triangle& triangle = mesh.triangles[t];
+    const Vec3& a = body.surface[triangle[0]];
+    const Vec3& b = body.surface[triangle[1]];
+    const Vec3& c = body.surface[triangle[2]];
+    if (!hasArea(a, b, c)) continue;
+    marker.points.push_back(toPoint(a));
+    marker.points.push_back(toPoint(b));
+    marker.points.push_back(toPoint(c));
+    // One colour a triangle; a body without cuts is in the marker's.
+    if (cut) marker.colors.push_back(mesh.patchOf(t) == kOuterPatch ? marker.color : inside);
+  }
+}
+
+void addBlade(const Pose& pose, double length, double angle, Marker& marker) {
+  // A slim triangle from the pivot, its straight edge where it cuts.
+  const double side = angle < 0.0 ? -1.0 : 1.0;
+  const Quat turned = pose.rotation * Quat(Eigen::AngleAxisd(angle, Vec3::UnitZ()));
+  const Vec3 tip = pose.translation + turned * Vec3(length, 0.0, 0.0);
+  const Vec3 back = pose.translation + turned * Vec3(0.0, side * kBladeWidth * length, 0.0);
+  marker.points.push_back(toPoint(pose.translation));
+  marker.points.push_back(toPoint(tip));
+  marker.points.push_back(toPoint(back));
+}
+
+}  // namespace
+
+Marker MarkerBuilder::marker(const std::string& ns, int id, int type, const ros::Time& stamp) const {
+  Marker marker;
+  marker.header.frame_id = world_frame_;
+  marker.header.stamp = stamp;
+  marker.ns = ns;
+  marker.id = id;
+  marker.type = type;
+  marker.action = Marker::ADD;
+  marker.pose.orientation.w = 1.0;
+  return marker;
+}
+
+void MarkerBuilder::addTools(const WorldSnapshot& snapshot, const ros::Time& stamp,
+                             visualization_msgs::MarkerArray& array) const {
+  const auto free_color = toColor({0.2f, 0.9f, 0.3f, 1.0f});
+  const auto locked_color = toColor({1.0f, 0.8f, 0.1f, 1.0f});
+  if (!snapshot.picks.empty()) {
+    Marker springs = marker("tools", 0, Marker::LINE_LIST, stamp);
+    springs.scale.x = kSpringWidth;
+    springs.color = free_color;
+    Marker ends = marker("tools", 1, Marker::SPHERE_LIST, stamp);
+    ends.scale.x = ends.scale.y = ends.scale.z = kSpringEnd;
+    ends.color = free_color;
+    for (const Pick& pick : snapshot.picks) {
+      const auto& color = pick.locked ? locked_color : free_color;
+      springs.points.push_back(toPoint(pick.position));
+      springs.points.push_back(toPoint(pick.target));
+      springs.colors.insert(springs.colors.end(), 2, color);
+      ends.points.push_back(toPoint(pick.target));
+      ends.colors.push_back(color);
+    }
+    array.markers.push_back(std::move(springs));
+    array.markers.push_back(std::move(ends));
+  }
+  if (snapshot.push.enabled) {
+    Marker sphere = marker("tools", 2, Marker::SPHERE, stamp);
+    sphere.pose.position = toPoint(snapshot.push.position);
+    sphere.scale.x = sphere.scale.y = sphere.scale.z = 2.0 * snapshot.push.radius;
+    sphere.color = toColor(snapshot.push.touching ? Color{0.95f, 0.75f, 0.3f, 0.85f} : Color{0.7f, 0.75f, 0.8f, 0.85f});
+    array.markers.push_back(std::move(sphere));
+  }
+  if (snapshot.scissors.shown) {
+    Marker blades = marker("tools", 3, Marker::TRIANGLE_LIST, stamp);
+    blades.scale.x = blades.scale.y = blades.scale.z = 1.0;
+    blades.color = toColor({0.75f, 0.78f, 0.82f, 1.0f});
+    const Pose pose = poseOf(snapshot.scissors.blades);
+    const double length = snapshot.scissors.blades.length > 0.0 ? snapshot.scissors.blades.length : kShownReach;
+    const double half = 0.5 * std::max(0.0, snapshot.scissors.angle);
+    addBlade(pose, length, half, blades);
+    addBlade(pose, length, half > 0.0 ? -half : -1e-9, blades);
+    array.markers.push_back(std::move(blades));
+  }
+}
+
+bool MarkerBuilder::deleting() const {
+  return std::any_of(shown_.begin(), shown_.end(), [](const auto& s) { return s.second > 0 && s.second < kSaidDeletes; });
+}
+
+visualization_msgs::MarkerArray MarkerBuilder::build(const WorldSnapshot& snapshot, const ros::Time& stamp,
+                                                     bool fresh) {
+  visualization_msgs::MarkerArray array;
+  if (fresh || !run_ || *run_ != snapshot.run) {
+    Marker all = marker("", 0, Marker::CUBE, stamp);
+    all.action = Marker::DELETEALL;
+    array.markers.push_back(std::move(all));
+    shown_.clear();
+    run_ = snapshot.run;
+  }
+  const std::size_t first = array.markers.size();
+  for (const BodySnapshot& body : snapshot.bodies) {
+    Marker surface = marker("bodies", static_cast<int>(body.number), Marker::TRIANGLE_LIST, stamp);
+    addBody(body, surface);
+    if (!surface.points.empty()) array.markers.push_back(std::move(surface));
+  }
+  addTools(snapshot, stamp, array);
+
+  std::map<Key, int> now;
+  for (std::size_t m = first; m < array.markers.size(); ++m) now[{array.markers[m].ns, array.markers[m].id}] = kSaidDeletes;
+  for (auto& [key, left] : shown_) {
+    if (now.count(key) > 0 || left == 0) continue;
+    Marker gone = marker(key.first, key.second, Marker::TRIANGLE_LIST, stamp);
+    gone.action = Marker::DELETE;
+    array.markers.push_back(std::move(gone));
+    now[key] = left - 1;
+  }
+  shown_ = std::move(now);
+  return array;
+}
+
+}  // namespace meshless

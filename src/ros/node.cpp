@@ -1,0 +1,181 @@
+#include "meshless_surgery/ros/node.h"
+
+#include <dirent.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <climits>
+#include <cstdlib>
+
+#include <ros/console.h>
+#include <ros/package.h>
+
+#include "meshless_surgery/ros/border_check.h"
+#include "meshless_surgery/ros/publishers.h"
+#include "meshless_surgery/ros/services.h"
+
+namespace meshless {
+namespace {
+
+constexpr char kPackage[] = "meshless_surgery";
+
+bool isFile(const std::string& path) {
+  struct stat info {};
+  return stat(path.c_str(), &info) == 0 && S_ISREG(info.st_mode);
+}
+
+bool isFolder(const std::string& path) {
+  struct stat info {};
+  return stat(path.c_str(), &info) == 0 && S_ISDIR(info.st_mode);
+}
+
+/// With links resolved, as FileAccess compares real paths; unchanged where there is nothing.
+std::string realPath(const std::string& path) {
+  char buffer[PATH_MAX];
+  return realpath(path.c_str(), buffer) != nullptr ? std::string(buffer) : path;
+}
+
+std::string folderOf(const std::string& path) {
+  const std::size_t slash = path.find_last_of('/');
+  return slash == std::string::npos ? "." : path.substr(0, std::max<std::size_t>(slash, 1));
+}
+
+std::string scenesIn(const std::string& folder) {
+  std::vector<std::string> names;
+  if (DIR* dir = opendir(folder.c_str())) {
+    while (const dirent* entry = readdir(dir)) {
+      const std::string file = entry->d_name;
+      if (file.size() > 5 && file.substr(file.size() - 5) == ".yaml") names.push_back(file.substr(0, file.size() - 5));
+    }
+    closedir(dir);
+  }
+  std::sort(names.begin(), names.end());
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+/// The file of a scene that was given as a name in config/scenes, a path or package://.
+Result<std::string> sceneFile(const std::string& scene, const std::string& package_folder) {
+  const std::string scheme = "package://";
+  std::string path;
+  if (scene.compare(0, scheme.size(), scheme) == 0) {
+    const std::size_t slash = scene.find('/', scheme.size());
+    const std::string package = scene.substr(scheme.size(), slash - scheme.size());
+    const std::string folder = ros::package::getPath(package);
+    if (folder.empty() || slash == std::string::npos) {
+      return Error{ErrorCode::kUnreadable,
+                   "scene is '" + printable(scene) + "'; accepted: package://NAME/PATH of a package that is found"};
+    }
+    path = folder + scene.substr(slash);
+  } else if (scene.find('/') != std::string::npos || scene.find(".yaml") != std::string::npos) {
+    path = scene;
+  } else {
+    path = package_folder + "/config/scenes/" + scene + ".yaml";
+  }
+  if (!isFile(path)) {
+    return Error{ErrorCode::kUnreadable, "scene is '" + printable(scene) + "', and there is no file " +
+                                             printable(path) + "; accepted: a path, or one of " +
+                                             scenesIn(package_folder + "/config/scenes")};
+  }
+  return realPath(path);
+}
+
+void applyOverrides(const NodeSettings& settings, WorldSettings& world) {
+  if (settings.pick_max_distance) world.pick_max_distance = *settings.pick_max_distance;
+  if (settings.pick_stiffness) world.pick_stiffness = *settings.pick_stiffness;
+  if (settings.push_radius) world.push_radius = *settings.push_radius;
+}
+
+PaceClock paceClock() {
+  if (!ros::Time::isSimTime()) return PaceClock::wall();
+  return {[] { return ros::Time::now().toSec(); }, false};
+}
+
+}  // namespace
+
+struct DeformerNode::Parts {
+  Parts(const ros::NodeHandle& handle, const NodeSettings& settings, std::unique_ptr<World> world, BodyLoader loader_in)
+      : runner(std::move(world), {settings.paused, settings.max_backlog}, paceClock()),
+        frames(settings.world_frame),
+        loader(std::move(loader_in)),
+        tools(handle, settings, runner, frames, rejections),
+        publishers(handle, settings, runner, tools, rejections) {}
+
+  ~Parts() {
+    // First the world, so that whoever waits for it gets an answer.
+    runner.stop();
+    services.reset();
+    publishers.stop();
+  }
+
+  Rejections rejections;
+  WorldRunner runner;
+  Frames frames;
+  BodyLoader loader;
+  ToolInputs tools;
+  Publishers publishers;
+  std::unique_ptr<Services> services;
+};
+
+DeformerNode::DeformerNode(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+DeformerNode::~DeformerNode() = default;
+
+Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle& private_handle) {
+  std::vector<std::string> unknown;
+  const auto settings = readNodeSettings(private_handle, unknown);
+  if (!settings.ok()) return settings.error();
+  for (const std::string& name : unknown) ROS_WARN_STREAM("parameter ~" << name << " is not known, and not used");
+
+  const std::string package_folder = ros::package::getPath(kPackage);
+  const auto file = sceneFile(settings->scene, package_folder);
+  if (!file.ok()) return file.error();
+  const std::string scene_folder = folderOf(*file);
+
+  FileAccess access;
+  access.folders = {realPath(package_folder), scene_folder};
+  for (const std::string& folder : settings->data_folders) {
+    if (!isFolder(folder)) {
+      return Error{ErrorCode::kUnreadable,
+                   "parameter ~data_folders names '" + printable(folder) + "'; accepted: folders that exist"};
+    }
+    access.folders.push_back(realPath(folder));
+  }
+  access.find_package = [](const std::string& package) { return ros::package::getPath(package); };
+
+  auto scene = readScene(*file, access);
+  if (!scene.ok()) return scene.error();
+  applyOverrides(*settings, scene->world);
+  const Status valid = scene->world.validate();
+  if (!valid.ok()) return valid.error();
+  auto world = std::make_unique<World>(scene->world);
+  std::size_t particles = 0;
+  std::size_t clusters = 0;
+  const std::size_t bodies = scene->bodies.size();
+  for (BodyDef& def : scene->bodies) {
+    const std::string name = def.name;
+    for (const std::string& note : def.notes) ROS_INFO_STREAM("body " << name << ": " << note);
+    auto body = prepareBody(std::move(def));
+    if (!body.ok()) return Error{body.error().code, *file + ": body " + name + ": " + body.error().detail};
+    const auto added = world->addSceneBody(std::make_shared<PreparedBody>(std::move(*body)));
+    if (!added.ok()) return Error{added.error().code, *file + ": body " + name + ": " + added.error().detail};
+    particles += added->particles;
+    clusters += added->clusters;
+  }
+
+  auto parts = std::make_unique<Parts>(private_handle, *settings, std::move(world),
+                                       BodyLoader(access, scene_folder, std::move(scene->materials)));
+  parts->runner.setEventSink(
+      [publishers = &parts->publishers](std::vector<Event> events) { publishers->queueEvents(std::move(events)); });
+  parts->runner.start();
+  parts->publishers.start();
+  // Last, so that who finds them finds a world that runs.
+  parts->services =
+      std::make_unique<Services>(private_handle, parts->runner, parts->frames, parts->loader, parts->rejections);
+  ROS_INFO_STREAM("scene " << *file << ": " << bodies << " bodies, " << particles << " particles, " << clusters
+                           << " clusters, " << scene->world.step_rate << " steps/s of " << scene->world.substeps
+                           << " substeps" << (settings->paused ? ", paused" : ""));
+  return std::unique_ptr<DeformerNode>(new DeformerNode(std::move(parts)));
+}
+
+}  // namespace meshless

@@ -1,0 +1,256 @@
+#include "meshless_surgery/ros/publishers.h"
+
+#include <algorithm>
+
+#include <geometry_msgs/WrenchStamped.h>
+#include <ros/console.h>
+
+#include "meshless_surgery/ros/border_check.h"
+#include "meshless_surgery/ros/convert.h"
+
+namespace meshless {
+namespace {
+
+constexpr std::size_t kMaxQueuedEvents = 10000;
+constexpr double kBehind = 0.95;  // a real-time factor below it is worth a warning
+
+std::chrono::steady_clock::duration periodOf(double rate) {
+  return std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(1.0 / rate));
+}
+
+std::string prefixed(const std::string& prefix, const std::string& frame) {
+  if (prefix.empty()) return frame;
+  return prefix.back() == '/' ? prefix + frame : prefix + "/" + frame;
+}
+
+}  // namespace
+
+bool Publishers::Cadence::due(Clock::time_point now) {
+  if (now < next) return false;
+  next = std::max(next + period, now);
+  return true;
+}
+
+Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings& settings, WorldRunner& runner,
+                       const ToolInputs& tools, const Rejections& rejections)
+    : settings_(settings),
+      runner_(runner),
+      tools_(tools),
+      rejections_(rejections),
+      markers_(settings.world_frame),
+      updater_(ros::NodeHandle(), private_handle) {
+  ros::NodeHandle handle(private_handle);
+  // No latching: what a late listener needs is a full set as of now, and that it gets because it is noticed.
+  markers_topic_ = handle.advertise<visualization_msgs::MarkerArray>(
+      "markers", 5, [this](const ros::SingleSubscriberPublisher&) { markers_newcomer_ = true; });
+  points_topic_ = handle.advertise<sensor_msgs::PointCloud2>(
+      "points", 5, [this](const ros::SingleSubscriberPublisher&) { points_newcomer_ = true; });
+  state_topic_ = handle.advertise<meshless_surgery::State>("state", 10);
+  events_topic_ = handle.advertise<meshless_surgery::Event>("events", 1000);
+  const auto advertiseTool = [&](const std::string& tool) {
+    return ToolTopics{handle.advertise<geometry_msgs::PoseStamped>(tool + "/measured_cp", 10),
+                      handle.advertise<geometry_msgs::WrenchStamped>(tool + "/measured_cf", 10)};
+  };
+  pick_topics_ = advertiseTool("pick");
+  push_topics_ = advertiseTool("push");
+  scissors_topics_ = advertiseTool("scissors");
+
+  updater_.setHardwareID("none");
+  updater_.add("simulation", this, &Publishers::diagnose);
+
+  markers_due_.period = periodOf(settings_.markers_rate);
+  points_due_.period = periodOf(settings_.points_rate);
+  state_due_.period = periodOf(settings_.state_rate);
+  tools_due_.period = periodOf(settings_.tools_rate);
+  diagnostics_due_.period = std::chrono::seconds(1);
+}
+
+Publishers::~Publishers() { stop(); }
+
+void Publishers::start() {
+  const auto now = Clock::now();
+  for (Cadence* cadence : {&markers_due_, &points_due_, &state_due_, &tools_due_, &diagnostics_due_}) {
+    cadence->next = now;
+  }
+  thread_ = std::thread([this] { loop(); });
+}
+
+void Publishers::stop() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Publishers::queueEvents(std::vector<Event> events) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (Event& event : events) events_.push_back(std::move(event));
+    while (events_.size() > kMaxQueuedEvents) {
+      events_.pop_front();
+      ++lost_events_;
+    }
+  }
+  changed_.notify_all();
+}
+
+void Publishers::loop() {
+  while (true) {
+    publishEvents();
+    publishTick(Clock::now());
+    const auto next = std::min(
+        {markers_due_.next, points_due_.next, state_due_.next, tools_due_.next, diagnostics_due_.next});
+    std::unique_lock<std::mutex> lock(mutex_);
+    changed_.wait_until(lock, next, [this] { return stopping_ || !events_.empty(); });
+    if (stopping_) return;
+  }
+}
+
+void Publishers::publishEvents() {
+  std::deque<Event> events;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    events.swap(events_);
+  }
+  for (const Event& event : events) {
+    if (event.type == EventType::kFault) ROS_ERROR_STREAM(event.text);
+  }
+  if (events.empty() || events_topic_.getNumSubscribers() == 0) return;
+  std_msgs::Header header;
+  header.stamp = ros::Time::now();
+  header.frame_id = settings_.world_frame;
+  for (const Event& event : events) events_topic_.publish(toEvent(event, header));
+}
+
+void Publishers::publishTick(Clock::time_point now) {
+  if (diagnostics_due_.due(now)) updater_.force_update();
+
+  // What is due, and has both a listener and news.
+  const std::uint64_t revision = runner_.revision();
+  bool markers = markers_due_.due(now) && markers_topic_.getNumSubscribers() > 0;
+  const bool markers_fresh = markers && markers_newcomer_.exchange(false);
+  markers = markers && (markers_fresh || revision != markers_revision_ || markers_.deleting());
+  bool points = points_due_.due(now) && points_topic_.getNumSubscribers() > 0;
+  points = points && (points_newcomer_.exchange(false) || revision != points_revision_);
+  const bool state = state_due_.due(now) && state_topic_.getNumSubscribers() > 0;
+  const bool tools = tools_due_.due(now);
+  if (!markers && !points && !state && !tools) return;
+
+  SnapshotWants wants;
+  wants.surfaces = markers;
+  wants.particles = points;
+  wants.measures = state;
+  const auto snapshot = runner_.snapshot(wants);
+  if (!snapshot) return;
+  std_msgs::Header header;
+  header.stamp = ros::Time::now();
+  header.frame_id = settings_.world_frame;
+  if (markers) {
+    ++markers_built_;
+    markers_revision_ = revision;
+    markers_topic_.publish(markers_.build(*snapshot, header.stamp, markers_fresh));
+  }
+  if (points) {
+    ++points_built_;
+    points_revision_ = revision;
+    points_topic_.publish(toCloud(*snapshot, header));
+  }
+  if (state) {
+    ++states_built_;
+    state_topic_.publish(toState(*snapshot, runner_.status(), header));
+  }
+  if (tools) publishTools(*snapshot, header.stamp);
+}
+
+void Publishers::publishTools(const WorldSnapshot& snapshot, const ros::Time& stamp) {
+  std::vector<geometry_msgs::TransformStamped> transforms;
+  // The pick in hand is the newest one that is not locked; without one, the hand is where its stream last was.
+  const Pick* in_hand = nullptr;
+  for (const Pick& pick : snapshot.picks) {
+    if (!pick.locked && (in_hand == nullptr || pick.id > in_hand->id)) in_hand = &pick;
+  }
+  auto cursor = tools_.pickCursor();
+  if (in_hand != nullptr) {
+    if (!cursor) cursor = Pose{};
+    cursor->translation = in_hand->target;
+  }
+  if (cursor) {
+    const Vec3 force = in_hand != nullptr ? Vec3(-in_hand->force) : Vec3(Vec3::Zero());
+    publishTool(pick_topics_, "pick_cursor", *cursor, force, stamp, transforms);
+  }
+  if (snapshot.push.enabled) {
+    Pose pose;
+    pose.translation = snapshot.push.position;
+    publishTool(push_topics_, "push_sphere", pose, snapshot.push.force, stamp, transforms);
+  }
+  if (snapshot.scissors.shown) {
+    // The blades part the tissue without resistance.
+    publishTool(scissors_topics_, "scissors", poseOf(snapshot.scissors.blades), Vec3::Zero(), stamp, transforms);
+  }
+  // A clock that stands still: tf2 complains of a stamp said twice.
+  if (!transforms.empty() && stamp != last_transforms_) {
+    last_transforms_ = stamp;
+    broadcaster_.sendTransform(transforms);
+  }
+}
+
+void Publishers::publishTool(const ToolTopics& topics, const std::string& frame, const Pose& pose, const Vec3& force,
+                             const ros::Time& stamp, std::vector<geometry_msgs::TransformStamped>& transforms) {
+  geometry_msgs::TransformStamped transform;
+  transform.header.stamp = stamp;
+  transform.header.frame_id = settings_.world_frame;
+  transform.child_frame_id = prefixed(settings_.tf_prefix, frame);
+  transform.transform.translation = toVector(pose.translation);
+  transform.transform.rotation = toQuaternion(pose.rotation);
+  transforms.push_back(transform);
+  if (topics.pose.getNumSubscribers() > 0) {
+    geometry_msgs::PoseStamped message;
+    message.header = transform.header;
+    message.pose = toPose(pose);
+    topics.pose.publish(message);
+  }
+  if (topics.force.getNumSubscribers() > 0) {
+    geometry_msgs::WrenchStamped message;
+    message.header = transform.header;
+    message.wrench.force = toVector(force);
+    topics.force.publish(message);
+  }
+}
+
+void Publishers::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  const RunnerStatus runner = runner_.status();
+  const Rejections::Summary rejected = rejections_.summary();
+  const bool overrun = runner.overruns > diagnosed_overruns_ && runner.real_time_factor < kBehind && !runner.paused;
+  diagnosed_overruns_ = runner.overruns;
+  if (runner.paused) {
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "paused");
+  } else if (overrun) {
+    status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "slower than real time");
+  } else {
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "runs");
+  }
+  status.add("steps", runner.steps);
+  status.add("step rate wanted [Hz]", formatNumber(runner_.worldSettings().step_rate));
+  status.add("step rate [Hz]", formatNumber(runner.step_rate));
+  status.add("real-time factor", formatNumber(runner.real_time_factor));
+  status.add("mean step [ms]", formatNumber(1e3 * runner.mean_step));
+  status.add("worst step [ms]", formatNumber(1e3 * runner.worst_step));
+  status.add("overruns", runner.overruns);
+  status.add("dropped [s]", formatNumber(runner.dropped));
+  status.add("rejected input", rejected.total);
+  for (const auto& [where, count] : rejected.by_name) status.add("rejected by " + where, count);
+  if (!rejected.last.empty()) status.add("last rejection", rejected.last);
+  std::uint64_t lost = 0;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    lost = lost_events_;
+  }
+  status.add("lost events", lost);
+  status.add("marker arrays built", markers_built_);
+  status.add("point clouds built", points_built_);
+  status.add("states built", states_built_);
+}
+
+}  // namespace meshless

@@ -1,0 +1,342 @@
+#include "meshless_surgery/ros/runner.h"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <sstream>
+
+namespace meshless {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+double wallSeconds() { return std::chrono::duration<double>(SteadyClock::now().time_since_epoch()).count(); }
+
+constexpr double kWindow = 1.0;          // [s] that rates are taken over
+constexpr double kPollClock = 1e-3;      // [s] of wall time between looks at a clock that is not steady
+constexpr double kOverBudgetEvery = 1.0; // [s] between two events
+
+Error stoppedError() { return {ErrorCode::kFailed, "the node is shutting down"}; }
+
+}  // namespace
+
+PaceClock PaceClock::wall() { return {wallSeconds, true}; }
+
+WorldRunner::WorldRunner(std::unique_ptr<World> world, const RunnerSettings& settings, PaceClock clock)
+    : world_(std::move(world)),
+      world_settings_(world_->settings()),
+      dt_(1.0 / world_settings_.step_rate),
+      settings_(settings),
+      clock_(std::move(clock)),
+      paused_(settings.paused) {
+  status_.paused = paused_;
+}
+
+WorldRunner::~WorldRunner() { stop(); }
+
+void WorldRunner::start() {
+  started_ = wallSeconds();
+  thread_ = std::thread([this] { loop(); });
+}
+
+void WorldRunner::stop() {
+  {
+    const std::lock_guard<std::mutex> lock(jobs_mutex_);
+    stopping_ = true;
+  }
+  jobs_changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+  std::deque<std::shared_ptr<Waiting>> left;
+  {
+    const std::lock_guard<std::mutex> lock(jobs_mutex_);
+    stopped_ = true;
+    left.swap(jobs_);
+  }
+  for (const auto& waiting : left) waiting->done.set_value(stoppedError());
+  giveUp(stoppedError().detail);
+}
+
+Status WorldRunner::run(Job job, bool changes) {
+  auto waiting = std::make_shared<Waiting>();
+  waiting->job = std::move(job);
+  waiting->changes = changes;
+  auto done = waiting->done.get_future();
+  {
+    const std::lock_guard<std::mutex> lock(jobs_mutex_);
+    if (stopping_) return stoppedError();
+    jobs_.push_back(std::move(waiting));
+  }
+  jobs_changed_.notify_all();
+  return done.get();
+}
+
+void WorldRunner::post(Job job) {
+  auto waiting = std::make_shared<Waiting>();
+  waiting->job = std::move(job);
+  {
+    const std::lock_guard<std::mutex> lock(jobs_mutex_);
+    if (stopping_) return;
+    jobs_.push_back(std::move(waiting));
+  }
+  jobs_changed_.notify_all();
+}
+
+Status WorldRunner::look(const Job& job) { return run(job, false); }
+
+Result<Reply> WorldRunner::apply(const Command& command) {
+  Result<Reply> reply = stoppedError();
+  const Status done = run([&](World& world) { reply = world.apply(command); }, true);
+  if (!done.ok()) return done.error();
+  return reply;
+}
+
+Result<WorldRunner::CutAnswer> WorldRunner::cut(CutCommand command) {
+  CutAnswer answer;
+  std::optional<Error> error;
+  std::future<Result<CutReply>> later;
+  const Status done = run(
+      [&](World& world) {
+        answer.closed_at_once = paused_ && command.close_time > 0.0;
+        if (paused_) command.close_time = 0.0;
+        auto reply = world.apply(command);
+        if (!reply.ok()) {
+          error = reply.error();
+        } else if (const auto* started = std::get_if<CutStarted>(&*reply)) {
+          closing_.emplace_back();
+          closing_.back().ticket = started->ticket;
+          later = closing_.back().done.get_future();
+        } else if (auto* cut = std::get_if<CutReply>(&*reply)) {
+          answer.reply = std::move(*cut);
+        }
+      },
+      true);
+  if (!done.ok()) return done.error();
+  if (error) return *error;
+  if (later.valid()) {
+    auto reply = later.get();
+    if (!reply.ok()) return reply.error();
+    answer.reply = std::move(*reply);
+  }
+  return answer;
+}
+
+Result<double> WorldRunner::doSteps(std::uint64_t count) {
+  std::future<Result<double>> later;
+  const Status done = run(
+      [&](World&) {
+        owed_.emplace_back();
+        owed_.back().total = owed_.back().left = count;
+        later = owed_.back().done.get_future();
+      },
+      false);
+  if (!done.ok()) return done.error();
+  return later.get();
+}
+
+Result<std::uint64_t> WorldRunner::setPaused(bool paused) {
+  std::uint64_t step = 0;
+  const Status done = run(
+      [&](World& world) {
+        fresh_pace_ = fresh_pace_ || (paused_ && !paused);
+        paused_ = paused;
+        step = world.stepCount();
+        const std::lock_guard<std::mutex> lock(status_mutex_);
+        status_.paused = paused;
+      },
+      true);
+  if (!done.ok()) return done.error();
+  return step;
+}
+
+Status WorldRunner::reset() {
+  return run(
+      [&](World& world) {
+        world.reset();
+        answerCuts();
+        giveUp("the world was reset meanwhile");
+        fresh_pace_ = true;
+      },
+      true);
+}
+
+std::shared_ptr<const WorldSnapshot> WorldRunner::snapshot(const SnapshotWants& wants) {
+  auto taken = std::make_shared<WorldSnapshot>();
+  const Status done = run([&](World& world) { *taken = world.snapshot(wants); }, false);
+  if (!done.ok()) return nullptr;
+  return taken;
+}
+
+RunnerStatus WorldRunner::status() const {
+  const double now = wallSeconds();
+  const std::lock_guard<std::mutex> lock(status_mutex_);
+  RunnerStatus status = status_;
+  const double window = std::min(kWindow, std::max(now - started_, 1e-9));
+  double simulated = 0.0;
+  double busy = 0.0;
+  std::size_t steps = 0;
+  for (const Sample& sample : samples_) {
+    if (sample.wall < now - window) continue;
+    ++steps;
+    simulated += sample.sim;
+    busy += sample.step;
+    status.worst_step = std::max(status.worst_step, sample.step);
+  }
+  status.step_rate = static_cast<double>(steps) / window;
+  status.real_time_factor = simulated / window;
+  status.mean_step = steps > 0 ? busy / static_cast<double>(steps) : 0.0;
+  return status;
+}
+
+void WorldRunner::loop() {
+  double due = 0.0;
+  while (true) {
+    doJobs();
+    handOverEvents();
+    {
+      const std::lock_guard<std::mutex> lock(jobs_mutex_);
+      if (stopping_) return;
+    }
+    if (!owed_.empty()) {
+      stepOnce();
+      fresh_pace_ = true;
+      // Empty now where the step failed.
+      if (!owed_.empty() && --owed_.front().left == 0) {
+        owed_.front().done.set_value(world_->simTime());
+        owed_.pop_front();
+      }
+      continue;
+    }
+    if (paused_) {
+      std::unique_lock<std::mutex> lock(jobs_mutex_);
+      jobs_changed_.wait(lock, [this] { return stopping_ || !jobs_.empty(); });
+      continue;
+    }
+    double now = clock_.now();
+    // A clock that was set back must not stop the world for the time between.
+    if (fresh_pace_ || due > now + 2.0 * dt_) due = now;
+    fresh_pace_ = false;
+    if (now < due) {
+      sleepUntil(due);
+      continue;
+    }
+    const double before = wallSeconds();
+    stepOnce();
+    const double took = wallSeconds() - before;
+    due += dt_;
+    now = clock_.now();
+    const double late = now - due - settings_.max_backlog;
+    {
+      const std::lock_guard<std::mutex> lock(status_mutex_);
+      if (took > dt_) ++status_.overruns;
+      if (late > 0.0) status_.dropped += late;
+    }
+    if (late > 0.0) due += late;
+    if (took > dt_ && before - last_over_budget_ > kOverBudgetEvery) {
+      last_over_budget_ = before;
+      std::ostringstream text;
+      text << "a step took " << 1e3 * took << " ms for " << 1e3 * dt_ << " ms of simulated time; "
+           << status().overruns << " steps did so far";
+      Event event;
+      event.type = EventType::kOverBudget;
+      event.step = world_->stepCount();
+      event.sim_time = world_->simTime();
+      event.text = text.str();
+      own_events_.push_back(std::move(event));
+    }
+  }
+}
+
+void WorldRunner::doJobs() {
+  std::deque<std::shared_ptr<Waiting>> jobs;
+  {
+    const std::lock_guard<std::mutex> lock(jobs_mutex_);
+    jobs.swap(jobs_);
+  }
+  for (const auto& waiting : jobs) {
+    Status done = Done{};
+    try {
+      waiting->job(*world_);
+    } catch (const std::exception& e) {
+      done = Error{ErrorCode::kFailed, std::string("internal fault: ") + e.what()};
+    }
+    if (waiting->changes) ++revision_;
+    answerCuts();
+    // Events first: who waits for the answer finds them under way.
+    handOverEvents();
+    waiting->done.set_value(done);
+  }
+}
+
+void WorldRunner::stepOnce() {
+  const double before = wallSeconds();
+  try {
+    world_->step();
+  } catch (const std::exception& e) {
+    fail(e.what());
+  }
+  ++revision_;
+  record(wallSeconds() - before);
+  answerCuts();
+}
+
+void WorldRunner::answerCuts() {
+  for (auto closing = closing_.begin(); closing != closing_.end();) {
+    auto finished = world_->finishedCut(closing->ticket);
+    if (finished) {
+      closing->done.set_value(std::move(*finished));
+      closing = closing_.erase(closing);
+    } else {
+      ++closing;
+    }
+  }
+}
+
+void WorldRunner::giveUp(const std::string& why) {
+  for (ClosingCut& closing : closing_) closing.done.set_value(Error{ErrorCode::kFailed, "the cut was given up: " + why});
+  closing_.clear();
+  for (OwedSteps& owed : owed_) {
+    owed.done.set_value(Error{ErrorCode::kFailed, std::to_string(owed.total - owed.left) + " of " +
+                                                      std::to_string(owed.total) + " steps were done: " + why});
+  }
+  owed_.clear();
+}
+
+void WorldRunner::handOverEvents() {
+  std::vector<Event> events = world_->takeEvents();
+  events.insert(events.end(), std::make_move_iterator(own_events_.begin()), std::make_move_iterator(own_events_.end()));
+  own_events_.clear();
+  if (!events.empty() && event_sink_) event_sink_(std::move(events));
+}
+
+void WorldRunner::sleepUntil(double due) {
+  std::unique_lock<std::mutex> lock(jobs_mutex_);
+  const double wait = clock_.steady ? due - clock_.now() : kPollClock;
+  if (!(wait > 0.0)) return;
+  jobs_changed_.wait_for(lock, std::chrono::duration<double>(wait), [this] { return stopping_ || !jobs_.empty(); });
+}
+
+void WorldRunner::record(double step_time) {
+  const double now = wallSeconds();
+  const std::lock_guard<std::mutex> lock(status_mutex_);
+  ++status_.steps;
+  samples_.push_back({now, dt_, step_time});
+  while (samples_.front().wall < now - kWindow) samples_.pop_front();
+}
+
+void WorldRunner::fail(const std::string& what) {
+  paused_ = true;
+  {
+    const std::lock_guard<std::mutex> lock(status_mutex_);
+    status_.paused = true;
+  }
+  const std::string why = "a step failed (" + what + "); the world is paused";
+  giveUp(why);
+  Event event;
+  event.type = EventType::kFault;
+  event.step = world_->stepCount();
+  event.sim_time = world_->simTime();
+  event.text = why;
+  own_events_.push_back(std::move(event));
+}
+
+}  // namespace meshless

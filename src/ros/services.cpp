@@ -1,0 +1,366 @@
+#include "meshless_surgery/ros/services.h"
+
+#include <algorithm>
+
+#include <meshless_surgery/Cut.h>
+#include <meshless_surgery/GetBody.h>
+#include <meshless_surgery/Incise.h>
+#include <meshless_surgery/LoadState.h>
+#include <meshless_surgery/Lock.h>
+#include <meshless_surgery/MovePick.h>
+#include <meshless_surgery/Pick.h>
+#include <meshless_surgery/Push.h>
+#include <meshless_surgery/Release.h>
+#include <meshless_surgery/Remove.h>
+#include <meshless_surgery/SaveState.h>
+#include <meshless_surgery/SetMaterial.h>
+#include <meshless_surgery/Spawn.h>
+#include <meshless_surgery/Step.h>
+#include <ros/console.h>
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
+
+#include "meshless_surgery/ros/border_check.h"
+#include "meshless_surgery/ros/convert.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kMaxCloseTime = 60.0;       // [s]
+constexpr double kMaxSpeed = 1e3;            // [m/s]
+constexpr double kMaxStiffness = 1e9;        // [N/m]
+constexpr double kMaxScale = 1e6;
+constexpr std::uint32_t kMaxSteps = 100000;
+constexpr std::size_t kMaxYaml = 64 * 1024;  // bytes
+constexpr int kCutThreads = 4;               // cuts that may wait for their blades at once
+constexpr int kMostSuffix = 10000;           // <name>_N tried for a body without a name of its own
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+}  // namespace
+
+struct Services::Handlers {
+  Handlers(const ros::NodeHandle& private_handle, WorldRunner& runner_in, Frames& frames_in,
+           const BodyLoader& loader_in, Rejections& rejections_in)
+      : runner(runner_in), frames(frames_in), loader(loader_in), rejections(rejections_in) {
+    advertise(private_handle, "pick", &Handlers::pick);
+    advertise(private_handle, "move_pick", &Handlers::movePick);
+    advertise(private_handle, "lock", &Handlers::lock);
+    advertise(private_handle, "release", &Handlers::release);
+    advertise(private_handle, "clear_picks", &Handlers::clearPicks);
+    advertise(private_handle, "push", &Handlers::push);
+    advertise(private_handle, "incise", &Handlers::incise);
+    advertise(private_handle, "remove", &Handlers::remove);
+    advertise(private_handle, "set_material", &Handlers::setMaterial);
+    advertise(private_handle, "get_body", &Handlers::getBody);
+    advertise(private_handle, "pause", &Handlers::pause);
+    advertise(private_handle, "reset", &Handlers::reset);
+    advertise(private_handle, "save", &Handlers::save);
+    advertise(private_handle, "load", &Handlers::load);
+    advertiseApart(private_handle, cut_queue, "cut", &Handlers::cut);
+    advertiseApart(private_handle, step_queue, "step", &Handlers::step);
+    advertiseApart(private_handle, spawn_queue, "spawn", &Handlers::spawn);
+    cut_spinner.start();
+    step_spinner.start();
+    spawn_spinner.start();
+  }
+
+  template <class Request, class Response>
+  void advertise(ros::NodeHandle handle, const std::string& name, bool (Handlers::*handler)(Request&, Response&)) {
+    servers.push_back(handle.advertiseService(name, handler, this));
+  }
+  template <class Request, class Response>
+  void advertiseApart(ros::NodeHandle handle, ros::CallbackQueue& queue, const std::string& name,
+                      bool (Handlers::*handler)(Request&, Response&)) {
+    handle.setCallbackQueue(&queue);
+    servers.push_back(handle.advertiseService(name, handler, this));
+  }
+
+  // Always true: the caller is to see the reason, not a broken call.
+  template <class Response>
+  bool refuse(Response& response, const std::string& service, const Error& error) {
+    response.success = false;
+    response.message = error.detail;
+    if (error.code != ErrorCode::kMissed) rejections.count("~" + service, error.detail);
+    ROS_DEBUG_STREAM("~" << service << " refused: " << error.detail);
+    return true;
+  }
+  template <class Response>
+  bool accept(Response& response, const std::string& message) {
+    response.success = true;
+    response.message = message;
+    return true;
+  }
+  /// For commands whose answer is that they are done.
+  template <class Response>
+  bool applied(Response& response, const std::string& service, const Command& command, const std::string& message) {
+    const auto reply = runner.apply(command);
+    return reply.ok() ? accept(response, message) : refuse(response, service, reply.error());
+  }
+
+  bool pick(meshless_surgery::Pick::Request& request, meshless_surgery::Pick::Response& response) {
+    BorderCheck check;
+    PickCommand command;
+    const Vec3 point = check.point("point", request.point);
+    const Vec3 direction = check.direction("direction", request.direction);
+    command.max_distance = check.number("max_distance", request.max_distance, 0.0, kMaxLength, "m");
+    command.stiffness = check.number("stiffness", request.stiffness, 0.0, kMaxStiffness, "N/m");
+    if (!check.ok()) return refuse(response, "pick", check.error());
+    const auto frame = frames.toWorld(request.header);
+    if (!frame.ok()) return refuse(response, "pick", frame.error());
+    command.point = *frame * point;
+    command.direction = frame->rotation * direction;
+    command.body = request.body;
+    const auto reply = runner.apply(command);
+    if (!reply.ok()) return refuse(response, "pick", reply.error());
+    const auto& picked = std::get<PickReply>(*reply);
+    response.pick_id = picked.pick;
+    response.body = picked.body;
+    response.particle = picked.particle;
+    response.position = toPoint(picked.position);
+    return accept(response, "grabbed " + picked.body + " at particle " + std::to_string(picked.particle));
+  }
+
+  bool movePick(meshless_surgery::MovePick::Request& request, meshless_surgery::MovePick::Response& response) {
+    BorderCheck check;
+    const Vec3 target = check.point("target", request.target);
+    if (!check.ok()) return refuse(response, "move_pick", check.error());
+    const auto frame = frames.toWorld(request.header);
+    if (!frame.ok()) return refuse(response, "move_pick", frame.error());
+    MovePickCommand command;
+    command.pick = request.pick_id;
+    command.target = *frame * target;
+    return applied(response, "move_pick", command, "moved pick " + std::to_string(request.pick_id));
+  }
+
+  bool lock(meshless_surgery::Lock::Request& request, meshless_surgery::Lock::Response& response) {
+    BorderCheck check;
+    const Vec3 target = check.point("target", request.target);
+    if (!check.ok()) return refuse(response, "lock", check.error());
+    LockCommand command;
+    command.pick = request.pick_id;
+    if (request.at_target) {
+      const auto frame = frames.toWorld(request.header);
+      if (!frame.ok()) return refuse(response, "lock", frame.error());
+      command.target = *frame * target;
+    }
+    return applied(response, "lock", command, "locked pick " + std::to_string(request.pick_id));
+  }
+
+  bool release(meshless_surgery::Release::Request& request, meshless_surgery::Release::Response& response) {
+    ReleaseCommand command;
+    command.pick = request.pick_id;
+    return applied(response, "release", command, "released pick " + std::to_string(request.pick_id));
+  }
+
+  bool clearPicks(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+    return applied(response, "clear_picks", ClearPicksCommand{}, "released all picks");
+  }
+
+  bool push(meshless_surgery::Push::Request& request, meshless_surgery::Push::Response& response) {
+    BorderCheck check;
+    PushCommand command;
+    command.enable = request.enable;
+    command.radius = check.number("radius", request.radius, 0.0, kMaxLength, "m");
+    command.speed = check.number("speed", request.speed, 0.0, kMaxSpeed, "m/s");
+    const Pose pose = check.pointPose("pose.pose", request.pose.pose);
+    if (!check.ok()) return refuse(response, "push", check.error());
+    if (request.enable) {
+      const auto frame = frames.toWorld(request.pose.header);
+      if (!frame.ok()) return refuse(response, "push", frame.error());
+      command.position = *frame * pose.translation;
+    }
+    if (!command.enable) return applied(response, "push", command, "removed the push sphere");
+    return applied(response, "push", command,
+                   command.speed > 0.0 ? "the push sphere is on its way" : "placed the push sphere");
+  }
+
+  bool cut(meshless_surgery::Cut::Request& request, meshless_surgery::Cut::Response& response) {
+    BorderCheck check;
+    CutCommand command;
+    const Pose local = check.pose("blades.pose", request.blades.pose);
+    const double length = check.number("length", request.length, 0.0, kMaxLength, "m");
+    const double width = check.number("width", request.width, 0.0, kMaxLength, "m");
+    command.close_time = check.number("close_time", request.close_time, 0.0, kMaxCloseTime, "s");
+    command.roughness = check.number("roughness", request.roughness, 0.0, kMaxLength, "m");
+    command.bodies = check.names("bodies", request.bodies);
+    if (!check.ok()) return refuse(response, "cut", check.error());
+    const auto frame = frames.toWorld(request.blades.header);
+    if (!frame.ok()) return refuse(response, "cut", frame.error());
+    Pose pose;
+    pose.rotation = frame->rotation * local.rotation;
+    pose.translation = *frame * local.translation;
+    command.blades = bladesAt(pose, length, width);
+    const auto answer = runner.cut(std::move(command));
+    if (!answer.ok()) return refuse(response, "cut", answer.error());
+    response.cut_bodies = answer->reply.cut_bodies;
+    response.new_bodies = answer->reply.new_bodies;
+    response.cap_area = answer->reply.cap_area;
+    response.duration = answer->reply.duration;
+    std::string message =
+        "cut " + joined(answer->reply.cut_bodies) + " into " + std::to_string(answer->reply.new_bodies.size()) + " pieces";
+    if (answer->closed_at_once) message += "; the world is paused, so the blades met at once (close_time was not used)";
+    for (const std::string& note : answer->reply.notes) message += "; " + note;
+    return accept(response, message);
+  }
+
+  bool incise(meshless_surgery::Incise::Request& request, meshless_surgery::Incise::Response& response) {
+    BorderCheck check;
+    check.pose("blade.pose", request.blade.pose);
+    check.number("length", request.length, 1e-6, kMaxLength, "m");
+    check.number("depth", request.depth, 1e-6, kMaxLength, "m");
+    check.names("bodies", request.bodies);
+    if (!check.ok()) return refuse(response, "incise", check.error());
+    return refuse(response, "incise",
+                  {ErrorCode::kUnsupported, "partial cuts come with a later version; ~cut severs whole bodies"});
+  }
+
+  bool spawn(meshless_surgery::Spawn::Request& request, meshless_surgery::Spawn::Response& response) {
+    BorderCheck check;
+    SpawnRequest wanted;
+    wanted.name = check.newName("name", request.name);
+    wanted.file = request.file;
+    const Pose local = check.pose("pose.pose", request.pose.pose);
+    wanted.scale = check.number("scale", request.scale, 0.0, kMaxScale, "");
+    if (wanted.scale == 0.0) wanted.scale = 1.0;
+    wanted.material = request.material;
+    if (wanted.file.empty()) {
+      switch (request.primitive.type) {
+        case shape_msgs::SolidPrimitive::BOX:
+          wanted.primitive = "box";
+          break;
+        case shape_msgs::SolidPrimitive::SPHERE:
+          wanted.primitive = "sphere";
+          break;
+        case shape_msgs::SolidPrimitive::CYLINDER:
+          wanted.primitive = "cylinder";
+          break;
+        default:
+          check.fault("primitive.type is " + std::to_string(request.primitive.type) +
+                      "; accepted: 1 (BOX), 2 (SPHERE), 3 (CYLINDER), or a file");
+      }
+      wanted.sizes.assign(request.primitive.dimensions.begin(), request.primitive.dimensions.end());
+    }
+    if (!check.ok()) return refuse(response, "spawn", check.error());
+    const auto frame = frames.toWorld(request.pose.header);
+    if (!frame.ok()) return refuse(response, "spawn", frame.error());
+    wanted.pose.rotation = frame->rotation * local.rotation;
+    wanted.pose.translation = *frame * local.translation;
+    auto body = loader.load(wanted);
+    if (!body.ok()) return refuse(response, "spawn", body.error());
+
+    SpawnCommand command;
+    command.body = *body;
+    auto reply = runner.apply(command);
+    for (int i = 2; request.name.empty() && !reply.ok() && reply.error().code == ErrorCode::kDuplicateName &&
+                    i <= kMostSuffix;
+         ++i) {
+      command.body = renamed(**body, (*body)->def.name + "_" + std::to_string(i));
+      reply = runner.apply(command);
+    }
+    if (!reply.ok()) return refuse(response, "spawn", reply.error());
+    const auto& spawned = std::get<SpawnReply>(*reply);
+    response.name = spawned.name;
+    response.particles = static_cast<std::uint32_t>(spawned.particles);
+    response.triangles = static_cast<std::uint32_t>(spawned.triangles);
+    response.clusters = static_cast<std::uint32_t>(spawned.clusters);
+    std::string message = "added " + spawned.name;
+    for (const std::string& note : command.body->def.notes) message += "; " + note;
+    return accept(response, message);
+  }
+
+  bool remove(meshless_surgery::Remove::Request& request, meshless_surgery::Remove::Response& response) {
+    RemoveCommand command;
+    command.body = request.name;
+    return applied(response, "remove", command, "removed " + request.name);
+  }
+
+  bool setMaterial(meshless_surgery::SetMaterial::Request& request,
+                   meshless_surgery::SetMaterial::Response& response) {
+    BorderCheck check;
+    if (request.yaml.empty() || request.yaml.size() > kMaxYaml) {
+      check.fault("yaml has " + std::to_string(request.yaml.size()) + " bytes; accepted: 1.." +
+                  std::to_string(kMaxYaml) + ", such as {alpha: 0.3}");
+    }
+    if (!check.ok()) return refuse(response, "set_material", check.error());
+    SetMaterialCommand command;
+    command.body = request.body;
+    command.change = [yaml = request.yaml](const Material& present) { return changeMaterial(present, yaml); };
+    return applied(response, "set_material", command,
+                   "changed the material of " + (request.body.empty() ? std::string("all bodies") : request.body));
+  }
+
+  bool getBody(meshless_surgery::GetBody::Request& request, meshless_surgery::GetBody::Response& response) {
+    Result<BodySnapshot> body = Error{};
+    const Status done = runner.look([&](World& world) { body = world.inspect(request.name, request.rest); });
+    if (!done.ok()) return refuse(response, "get_body", done.error());
+    if (!body.ok()) return refuse(response, "get_body", body.error());
+    std_msgs::Header header;
+    header.stamp = ros::Time::now();
+    header.frame_id = frames.worldFrame();
+    response.surface = toMesh(body->surface, body->model->surface.triangles);
+    response.particles = toCloud(body->particles, header);
+    response.volume = body->measures.volume;
+    response.rest_volume = body->model->rest_volume;
+    response.area = body->measures.area;
+    response.mass = body->model->mass;
+    response.clusters = body->model->clusters.size();
+    response.tetrahedra = static_cast<std::uint32_t>(body->tetrahedra);
+    return accept(response, request.name + (request.rest ? " at rest" : " as it is now"));
+  }
+
+  bool pause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response) {
+    const auto step = runner.setPaused(request.data);
+    if (!step.ok()) return refuse(response, "pause", step.error());
+    return accept(response, (request.data ? "paused at step " : "runs from step ") + std::to_string(*step));
+  }
+
+  bool step(meshless_surgery::Step::Request& request, meshless_surgery::Step::Response& response) {
+    if (request.steps < 1 || request.steps > kMaxSteps) {
+      return refuse(response, "step",
+                    {ErrorCode::kInvalidArgument, "steps is " + std::to_string(request.steps) + "; accepted: 1.." +
+                                                      std::to_string(kMaxSteps)});
+    }
+    const auto time = runner.doSteps(request.steps);
+    if (!time.ok()) return refuse(response, "step", time.error());
+    response.sim_time = *time;
+    return accept(response, "did " + std::to_string(request.steps) + " steps");
+  }
+
+  bool reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+    const Status done = runner.reset();
+    if (!done.ok()) return refuse(response, "reset", done.error());
+    return accept(response, "back to the scene's start");
+  }
+
+  bool save(meshless_surgery::SaveState::Request&, meshless_surgery::SaveState::Response& response) {
+    return refuse(response, "save", {ErrorCode::kUnsupported, "saving the state comes with a later version"});
+  }
+
+  bool load(meshless_surgery::LoadState::Request&, meshless_surgery::LoadState::Response& response) {
+    return refuse(response, "load", {ErrorCode::kUnsupported, "loading a state comes with a later version"});
+  }
+
+  WorldRunner& runner;
+  Frames& frames;
+  const BodyLoader& loader;
+  Rejections& rejections;
+  // Queues before servers before spinners: torn down in the other order.
+  ros::CallbackQueue cut_queue, step_queue, spawn_queue;
+  std::vector<ros::ServiceServer> servers;
+  ros::AsyncSpinner cut_spinner{kCutThreads, &cut_queue};
+  ros::AsyncSpinner step_spinner{1, &step_queue};
+  ros::AsyncSpinner spawn_spinner{1, &spawn_queue};
+};
+
+Services::Services(const ros::NodeHandle& private_handle, WorldRunner& runner, Frames& frames,
+                   const BodyLoader& loader, Rejections& rejections)
+    : handlers_(std::make_unique<Handlers>(private_handle, runner, frames, loader, rejections)) {}
+
+Services::~Services() = default;
+
+}  // namespace meshless

@@ -1,0 +1,150 @@
+#include "meshless_surgery/ros/settings.h"
+
+#include <algorithm>
+#include <set>
+
+#include <XmlRpcValue.h>
+#include <ros/names.h>
+#include <ros/param.h>
+
+#include "meshless_surgery/ros/border_check.h"
+
+namespace meshless {
+namespace {
+
+/// Reads parameters and remembers which ones it knows.
+class Reader {
+ public:
+  explicit Reader(const ros::NodeHandle& handle) : handle_(handle) {}
+
+  void read(const std::string& name, std::string& value) {
+    XmlRpc::XmlRpcValue found;
+    if (!get(name, found)) return;
+    // roslaunch turns a name of digits into a number.
+    if (found.getType() == XmlRpc::XmlRpcValue::TypeInt) {
+      value = std::to_string(static_cast<int>(found));
+    } else if (found.getType() == XmlRpc::XmlRpcValue::TypeString) {
+      value = static_cast<std::string>(found);
+    } else {
+      wrongType(name, "a string");
+    }
+  }
+
+  void read(const std::string& name, bool& value) {
+    XmlRpc::XmlRpcValue found;
+    if (!get(name, found)) return;
+    if (found.getType() == XmlRpc::XmlRpcValue::TypeBoolean) {
+      value = static_cast<bool>(found);
+    } else {
+      wrongType(name, "true or false");
+    }
+  }
+
+  void read(const std::string& name, double& value, double min, double max, const std::string& unit) {
+    XmlRpc::XmlRpcValue found;
+    if (!get(name, found)) return;
+    if (found.getType() == XmlRpc::XmlRpcValue::TypeInt) {
+      value = static_cast<int>(found);
+    } else if (found.getType() == XmlRpc::XmlRpcValue::TypeDouble) {
+      value = static_cast<double>(found);
+    } else {
+      wrongType(name, "a number");
+      return;
+    }
+    check.number("parameter ~" + name, value, min, max, unit);
+  }
+
+  void read(const std::string& name, std::optional<double>& value, double min, double max, const std::string& unit) {
+    known_.insert(name);
+    if (!handle_.hasParam(name)) return;
+    double number = 0.0;
+    read(name, number, min, max, unit);
+    value = number;
+  }
+
+  void read(const std::string& name, std::vector<std::string>& value) {
+    XmlRpc::XmlRpcValue found;
+    if (!get(name, found)) return;
+    if (found.getType() == XmlRpc::XmlRpcValue::TypeString) {
+      value = {static_cast<std::string>(found)};
+      if (value[0].empty()) value.clear();
+      return;
+    }
+    if (found.getType() != XmlRpc::XmlRpcValue::TypeArray) {
+      wrongType(name, "a list of strings");
+      return;
+    }
+    for (int i = 0; i < found.size(); ++i) {
+      if (found[i].getType() != XmlRpc::XmlRpcValue::TypeString) {
+        wrongType(name + "[" + std::to_string(i) + "]", "a string");
+        return;
+      }
+      value.push_back(static_cast<std::string>(found[i]));
+    }
+  }
+
+  std::vector<std::string> unknown() const {
+    std::vector<std::string> all;
+    std::vector<std::string> unknown_names;
+    if (!handle_.getParamNames(all)) return unknown_names;
+    const std::string below = handle_.getNamespace() + "/";
+    for (const std::string& full : all) {
+      if (full.compare(0, below.size(), below) != 0) continue;
+      const std::string name = full.substr(below.size());
+      if (known_.count(name) == 0) unknown_names.push_back(name);
+    }
+    std::sort(unknown_names.begin(), unknown_names.end());
+    return unknown_names;
+  }
+
+  BorderCheck check;
+
+ private:
+  bool get(const std::string& name, XmlRpc::XmlRpcValue& value) {
+    known_.insert(name);
+    return handle_.getParam(name, value);
+  }
+  void wrongType(const std::string& name, const std::string& wanted) {
+    check.fault("parameter ~" + name + " is of the wrong type; accepted: " + wanted);
+  }
+
+  ros::NodeHandle handle_;
+  std::set<std::string> known_{"diagnostic_period"};  // diagnostic_updater's
+};
+
+}  // namespace
+
+Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std::vector<std::string>& unknown) {
+  NodeSettings settings;
+  Reader reader(private_handle);
+  reader.read("world_frame", settings.world_frame);
+  reader.read("tf_prefix", settings.tf_prefix);
+  reader.read("scene", settings.scene);
+  reader.read("data_folders", settings.data_folders);
+  reader.read("paused", settings.paused);
+  reader.read("max_backlog", settings.max_backlog, 0.0, 10.0, "s");
+  reader.read("markers_rate", settings.markers_rate, 0.1, 30.0, "Hz");
+  reader.read("points_rate", settings.points_rate, 0.1, 120.0, "Hz");
+  reader.read("state_rate", settings.state_rate, 0.1, 1000.0, "Hz");
+  reader.read("tools_rate", settings.tools_rate, 0.1, 1000.0, "Hz");
+  reader.read("tools/pick/follow_frame", settings.pick.follow_frame);
+  reader.read("tools/push/follow_frame", settings.push.follow_frame);
+  reader.read("tools/scissors/follow_frame", settings.scissors.follow_frame);
+  reader.read("tools/pick/max_distance", settings.pick_max_distance, 1e-6, kMaxLength, "m");
+  reader.read("tools/pick/stiffness", settings.pick_stiffness, 1e-3, 1e9, "N/m");
+  reader.read("tools/push/radius", settings.push_radius, 1e-6, kMaxLength, "m");
+  reader.read("tools/push/max_speed", settings.push_max_speed, 1e-6, 1e3, "m/s");
+  reader.read("tools/scissors/length", settings.scissors_length, 1e-6, kMaxLength, "m");
+  reader.read("tools/scissors/width", settings.scissors_width, 1e-6, kMaxLength, "m");
+  if (settings.world_frame.find_first_not_of('/') == std::string::npos) {
+    reader.check.fault("parameter ~world_frame is '" + printable(settings.world_frame) + "'; accepted: a frame's name");
+  }
+  if (settings.scene.empty()) {
+    reader.check.fault("parameter ~scene is empty; accepted: a scene's name, a path or package://");
+  }
+  if (!reader.check.ok()) return reader.check.error();
+  unknown = reader.unknown();
+  return settings;
+}
+
+}  // namespace meshless

@@ -1,0 +1,457 @@
+#include "meshless_surgery/io/scene.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "io/temporary_folder.h"
+#include "meshless_surgery/geometry/inside.h"
+#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh_check.h"
+#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/sampling.h"
+
+namespace meshless {
+namespace {
+
+bool says(const Error& error, const std::string& words) { return error.detail.find(words) != std::string::npos; }
+
+struct Scene : ::testing::Test {
+  TemporaryFolder folder;
+  FileAccess access;
+
+  void SetUp() override {
+    access.folders = {folder.path()};
+    ASSERT_TRUE(writeObj(folder.file("cube.obj"), boxMesh(Vec3(1, 1, 1), 2, 2, 2), "").ok());
+  }
+  Result<SceneDef> read(const std::string& text) { return readScene(folder.write("scenes/s.yaml", text), access); }
+  SceneDef good(const std::string& text) {
+    Result<SceneDef> scene = read(text);
+    EXPECT_TRUE(scene.ok()) << text << "\n" << (scene.ok() ? "" : scene.error().detail);
+    return scene.ok() ? *scene : SceneDef{};
+  }
+  Error bad(const std::string& text) {
+    const Result<SceneDef> scene = read(text);
+    EXPECT_FALSE(scene.ok()) << text;
+    return scene.ok() ? Error{} : scene.error();
+  }
+};
+
+TEST_F(Scene, DefaultsForEverythingButBodies) {
+  const SceneDef scene = good("bodies:\n  - file: ../cube.obj\n");
+  const WorldSettings defaults;
+  EXPECT_EQ(scene.name, "s");
+  EXPECT_EQ(scene.world.gravity, defaults.gravity);
+  EXPECT_EQ(scene.world.ground, defaults.ground);
+  EXPECT_EQ(scene.world.step_rate, defaults.step_rate);
+  EXPECT_EQ(scene.world.substeps, defaults.substeps);
+  EXPECT_EQ(scene.world.contact, defaults.contact);
+  ASSERT_EQ(scene.bodies.size(), 1u);
+  const BodyDef& body = scene.bodies[0];
+  EXPECT_EQ(body.name, "cube");
+  EXPECT_TRUE(body.solid);
+  EXPECT_EQ(body.spacing, 0.0);
+  EXPECT_EQ(body.clusters.kind, ClusterOptions::Kind::kAuto);
+  EXPECT_EQ(body.material.name, "default");
+  EXPECT_TRUE(body.fixed.empty());
+  EXPECT_NEAR(signedVolume(body.mesh), 1.0, 1e-6);
+  EXPECT_TRUE(good("bodies: []\n").bodies.empty());
+}
+
+TEST_F(Scene, EveryKeyIsRead) {
+  const SceneDef scene = good(R"(
+world: {gravity: [0.1, 0.2, -1.6], ground: -0.5, ground_friction: 0.7, step_rate: 240, substeps: 3, contact: none,
+        pick: {max_distance: 0.04, stiffness: 300, radius: 0.03}, push: {radius: 0.015}}
+materials:
+  wobble: {mode: quadratic, alpha: 0.3, beta: 0.25, density: 950, damping: 2.5, friction: 0.1,
+           color: [0.1, 0.2, 0.3], inside_color: [0.4, 0.5, 0.6, 0.7]}
+bodies:
+  - name: one
+    file: ../cube.obj
+    scale: 0.1
+    pose: {position: [1, 2, 3], rpy: [0, 0, 1.5707963267948966]}
+    spacing: 0.02
+    clusters: {grid: [5, 4, 1], overlap: 0.2}
+    material: wobble
+    fixed: [{box: {min: [-1, -2, -3], max: [1, 2, 3]}}, {box: {min: [5, 5, 5], max: [6, 6, 6]}}]
+  - {name: two, primitive: {sphere: 0.05}, clusters: one, pose: {xyzw: [0, 0, 0, 1]}}
+  - {name: three, primitive: {cylinder: [0.1, 0.02]}, clusters: {count: 20, overlap: 0.4}, edge: 0.01}
+  - {name: four, primitive: {box: [0.1, 0.1, 0.05]}, clusters: auto, scale: 2, material: {mode: rigid, alpha: 1}}
+)");
+  EXPECT_EQ(scene.world.gravity, Vec3(0.1, 0.2, -1.6));
+  EXPECT_EQ(scene.world.ground, -0.5);
+  EXPECT_EQ(scene.world.ground_friction, 0.7);
+  EXPECT_EQ(scene.world.step_rate, 240.0);
+  EXPECT_EQ(scene.world.substeps, 3);
+  EXPECT_EQ(scene.world.contact, ContactMethod::kNone);
+  EXPECT_EQ(scene.world.pick_max_distance, 0.04);
+  EXPECT_EQ(scene.world.pick_stiffness, 300.0);
+  EXPECT_EQ(scene.world.pick_radius, 0.03);
+  EXPECT_EQ(scene.world.push_radius, 0.015);
+  ASSERT_EQ(scene.materials.count("wobble"), 1u);
+  ASSERT_EQ(scene.bodies.size(), 4u);
+  const BodyDef& one = scene.bodies[0];
+  EXPECT_EQ(one.name, "one");
+  EXPECT_NEAR(signedVolume(one.mesh), 1e-3, 1e-9);
+  EXPECT_LT((one.pose * Vec3(1, 0, 0) - Vec3(1, 3, 3)).norm(), 1e-12);
+  EXPECT_EQ(one.spacing, 0.02);
+  EXPECT_EQ(one.clusters.kind, ClusterOptions::Kind::kGrid);
+  EXPECT_EQ(one.clusters.grid, (std::array<int, 3>{{5, 4, 1}}));
+  EXPECT_EQ(one.clusters.overlap, 0.2);
+  EXPECT_EQ(one.material.name, "wobble");
+  EXPECT_EQ(one.material.mode, MatchMode::kQuadratic);
+  EXPECT_EQ(one.material.alpha, 0.3);
+  EXPECT_EQ(one.material.beta, 0.25);
+  EXPECT_EQ(one.material.density, 950.0);
+  EXPECT_EQ(one.material.damping, 2.5);
+  EXPECT_EQ(one.material.friction, 0.1);
+  EXPECT_EQ(one.material.color.b, 0.3f);
+  EXPECT_EQ(one.material.color.a, 1.0f);
+  EXPECT_EQ(one.material.inside_color.a, 0.7f);
+  ASSERT_EQ(one.fixed.size(), 2u);
+  EXPECT_EQ(one.fixed[0].min, Vec3(-1, -2, -3));
+  EXPECT_EQ(one.fixed[1].max, Vec3(6, 6, 6));
+  EXPECT_EQ(scene.bodies[1].clusters.kind, ClusterOptions::Kind::kOne);
+  EXPECT_NEAR(signedVolume(scene.bodies[1].mesh), 4.18879 * 1.25e-4, 0.05 * 5e-4);
+  EXPECT_EQ(scene.bodies[2].clusters.kind, ClusterOptions::Kind::kCount);
+  EXPECT_EQ(scene.bodies[2].clusters.count, 20);
+  EXPECT_NEAR(meanEdgeLength(scene.bodies[2].mesh), 0.01, 0.003);
+  EXPECT_NEAR(signedVolume(scene.bodies[3].mesh), 8 * 5e-4, 1e-9);
+  EXPECT_EQ(scene.bodies[3].material.mode, MatchMode::kRigid);
+  EXPECT_EQ(scene.bodies[3].material.density, Material().density);
+}
+
+TEST_F(Scene, GroundMayBeNone) {
+  for (const char* none : {"none", "~", ""})
+    EXPECT_FALSE(good(std::string("world:\n  ground: ") + none + "\nbodies: []\n").world.ground.has_value()) << none;
+}
+
+TEST_F(Scene, RollPitchYawTurnAboutFixedAxes) {
+  const SceneDef scene = good("bodies: [{primitive: {sphere: 1}, pose: {rpy: [0.3, -0.4, 0.5]}}]\n");
+  const Quat x(Eigen::AngleAxisd(0.3, Vec3::UnitX())), y(Eigen::AngleAxisd(-0.4, Vec3::UnitY())),
+      z(Eigen::AngleAxisd(0.5, Vec3::UnitZ()));
+  const Vec3 p(1, 2, 3);
+  EXPECT_LT((scene.bodies[0].pose * p - z * (y * (x * p))).norm(), 1e-12);
+}
+
+TEST_F(Scene, CopiesFillAGridAndAreTheSameEveryTime) {
+  const std::string text =
+      "bodies: [{name: b, primitive: {sphere: 0.1}, pose: {position: [1, 0, 0]}, "
+      "copies: {count: 7, grid: [2, 2, 2], offset: [1, 2, 3], jitter: 0.1, turn: 0.5, seed: 4}}]\n";
+  const SceneDef scene = good(text), again = good(text);
+  ASSERT_EQ(scene.bodies.size(), 7u);
+  for (int k = 0; k < 7; ++k) {
+    const BodyDef& body = scene.bodies[k];
+    EXPECT_EQ(body.name, "b_" + std::to_string(k + 1));
+    const Vec3 place = Vec3(1, 0, 0) + Vec3(k % 2, 2 * (k / 2 % 2), 3 * (k / 4));
+    EXPECT_LE((body.pose.translation - place).cwiseAbs().maxCoeff(), 0.1);
+    EXPECT_GT((body.pose.translation - place).norm(), 0.0);
+    EXPECT_LE(body.pose.rotation.angularDistance(Quat::Identity()), 0.5 + 1e-12);
+    EXPECT_NEAR(body.pose.rotation.norm(), 1.0, 1e-12);
+    EXPECT_EQ(body.pose.translation, again.bodies[k].pose.translation);
+    EXPECT_EQ(body.pose.rotation.coeffs(), again.bodies[k].pose.rotation.coeffs());
+  }
+  const SceneDef line = good("bodies: [{primitive: {sphere: 0.1}, copies: {count: 3, offset: [0, 0, 1]}}]\n");
+  ASSERT_EQ(line.bodies.size(), 3u);
+  EXPECT_EQ(line.bodies[2].pose.translation, Vec3(0, 0, 0)) << "a row along x, and the offset has none";
+  EXPECT_EQ(good("bodies: [{primitive: {sphere: 0.1}, copies: {grid: [2, 3, 1], offset: [1, 1, 1]}}]\n").bodies.size(), 6u);
+}
+
+TEST_F(Scene, FaultsAreNamedWithFileLineValueAndRange) {
+  struct Case {
+    std::string text;
+    int line;
+    std::vector<std::string> words;
+  };
+  const std::string body = "bodies:\n  - primitive: {sphere: 0.1}\n";
+  const std::vector<Case> cases = {
+      {"world:\n  gravty: [0, 0, 0]\nbodies: []\n", 2, {"unknown key 'gravty' in world", "did you mean 'gravity'", "step_rate"}},
+      {"wrld: {}\nbodies: []\n", 1, {"'wrld'", "did you mean 'world'"}},
+      {body + "    materail: jelly\n", 3, {"'materail'", "did you mean 'material'"}},
+      {body + "    pose: {positon: [0, 0, 0]}\n", 3, {"'positon'", "did you mean 'position'"}},
+      {"materials:\n  a: {alhpa: 0.5}\nbodies: []\n", 2, {"'alhpa' in material 'a'", "did you mean 'alpha'"}},
+      {"world: {step_rate: 0}\nbodies: []\n", 1, {"step_rate is 0", "1 to 10000 Hz"}},
+      {"world: {step_rate: .nan}\nbodies: []\n", 1, {"step_rate is .nan", "1 to 10000"}},
+      {"world: {step_rate: fast}\nbodies: []\n", 1, {"step_rate is 'fast'", "a number"}},
+      {"world: {substeps: 1.5}\nbodies: []\n", 1, {"substeps is '1.5'", "whole number, 1 to 1000"}},
+      {"world: {substeps: 99999999999}\nbodies: []\n", 1, {"substeps"}},
+      {"world: {gravity: [0, 0]}\nbodies: []\n", 1, {"gravity is a list of 2", "a list of 3 numbers"}},
+      {"world: {gravity: [0, 0, .inf]}\nbodies: []\n", 1, {"gravity[2] is .inf"}},
+      {"world: {ground: down}\nbodies: []\n", 1, {"ground is 'down'", "or none"}},
+      {"world: {ground: .nan}\nbodies: []\n", 1, {"ground is .nan"}},
+      {"world: {contact: fast}\nbodies: []\n", 1, {"contact is 'fast'", "none, textbook"}},
+      {"world: {pick: {stiffness: 0}}\nbodies: []\n", 1, {"stiffness is 0", "above 0"}},
+      {"world: {push: {radius: -1}}\nbodies: []\n", 1, {"radius is -1"}},
+      {"world: 5\nbodies: []\n", 1, {"world is '5'", "a map"}},
+      {"world: {ground: 1, ground: 2}\nbodies: []\n", 1, {"the key 'ground' twice"}},
+      {"materials:\n  a: {alpha: 1.5}\nbodies: []\n", 2, {"alpha is 1.5", "0 to 1"}},
+      {"materials:\n  a: {mode: soft}\nbodies: []\n", 2, {"mode is 'soft'", "rigid, linear, quadratic"}},
+      {"materials:\n  a: {density: 0}\nbodies: []\n", 2, {"density is 0", "above 0"}},
+      {"materials:\n  a: {color: [1, 2, 0]}\nbodies: []\n", 2, {"color[1] is 2", "0 to 1"}},
+      {"materials:\n  a: {color: red}\nbodies: []\n", 2, {"color is 'red'", "[red, green, blue]"}},
+      {"materials:\n  'a b': {}\nbodies: []\n", 2, {"'a b'", "letters"}},
+      {"world: {}\n", 1, {"bodies is absent", "a list"}},
+      {"bodies: {a: 1}\n", 1, {"bodies is a map", "a list"}},
+      {"bodies:\n  - name: a\n", 2, {"no file and no primitive"}},
+      {"bodies:\n  - {file: ../cube.obj, primitive: {sphere: 1}}\n", 2, {"file and primitive"}},
+      {body + "    scale: 0\n", 3, {"scale is 0", "above 0"}},
+      {body + "    spacing: -0.1\n", 3, {"spacing is -0.1"}},
+      {body + "    clusters: many\n", 3, {"clusters is 'many'", "auto, one"}},
+      {body + "    clusters: {grid: [0, 1, 1]}\n", 3, {"grid[0] is '0'", "1 to"}},
+      {body + "    clusters: {grid: [1000, 1000, 1000]}\n", 3, {"up to 100000 together"}},
+      {body + "    clusters: {overlap: 0.5}\n", 3, {"no grid and no count"}},
+      {body + "    clusters: {count: 3, overlap: 2}\n", 3, {"overlap is 2", "0 to 1"}},
+      {body + "    material: wood\n", 3, {"unknown material 'wood'", "default"}},
+      {body + "    pose: {rpy: [0, 0, 0], xyzw: [0, 0, 0, 1]}\n", 3, {"rpy and xyzw"}},
+      {body + "    pose: {xyzw: [0, 0, 0, 0]}\n", 3, {"xyzw has the length 0"}},
+      {body + "    fixed: [{ball: 1}]\n", 3, {"'ball'", "did you mean 'box'"}},
+      {body + "    fixed: [{box: {min: [0, 0, 0]}}]\n", 3, {"no min or no max"}},
+      {body + "    fixed: [{box: {min: [0, 0, 1], max: [0, 0, 0]}}]\n", 3, {"min above its max"}},
+      {body + "    copies: {}\n", 3, {"no count and no grid"}},
+      {body + "    copies: {count: 9, grid: [2, 2, 2]}\n", 3, {"8 places", "9 to"}},
+      {body + "    copies: {grid: [100, 100, 100]}\n", 3, {"1000000 places"}},
+      {body + "    name: 'a/b'\n", 2, {"'a/b'", "letters"}},
+      {body + "  - primitive: {sphere: 0.1}\n", 3, {"two bodies are named 'sphere'"}},
+      {"bodies:\n  - primitive: {sphere: 0}\n", 2, {"sphere is 0", "0.0001 to 1000"}},
+      {"bodies:\n  - primitive: {cube: 1}\n", 2, {"'cube'", "did you mean 'box'"}},
+      {"bodies:\n  - primitive: {box: [1, 1]}\n", 2, {"box is a list of 2"}},
+      {"bodies:\n  - {primitive: {box: [1, 1, 1]}, edge: 0.00001}\n", 2, {"edge is 1e-05, too short"}},
+      {"bodies:\n  - file: ../none.obj\n", 2, {"no file '../none.obj'"}},
+      {"bodies:\n  - file: /etc/passwd\n", 2, {"outside the folders"}},
+      {"bodies:\n  - file: [a]\n", 2, {"file is a list of 1", "a text"}},
+      {"bodies: []\n...\n---\nbodies: []\n", 0, {"2 documents"}},
+      {"bodies: [\n", 2, {"YAML"}},
+      {"? [a, b]\n: 1\n", 1, {"a key of the scene is a list"}},
+      {"", 0, {"a map"}},
+  };
+  for (const Case& one : cases) {
+    const Error error = bad(one.text);
+    for (const std::string& word : one.words) EXPECT_TRUE(says(error, word)) << one.text << error.detail;
+    const std::string place = folder.file("scenes/s.yaml") + (one.line > 0 ? ":" + std::to_string(one.line) + ": " : "");
+    EXPECT_EQ(error.detail.compare(0, place.size(), place), 0) << one.text << error.detail;
+  }
+}
+
+TEST_F(Scene, ErrorsHaveTheirCodes) {
+  EXPECT_EQ(bad("bodies: [{file: /etc/passwd}]\n").code, ErrorCode::kForbidden);
+  EXPECT_EQ(bad("bodies: [{file: none.obj}]\n").code, ErrorCode::kUnreadable);
+  EXPECT_EQ(bad("bodies: [{primitive: {sphere: 1}, material: wood}]\n").code, ErrorCode::kUnknownName);
+  EXPECT_EQ(bad("bodies: [{primitive: {sphere: 1}}, {primitive: {sphere: 1}}]\n").code, ErrorCode::kDuplicateName);
+  EXPECT_EQ(bad("world: {substeps: 0}\n").code, ErrorCode::kInvalidArgument);
+  for (const char* key : {"youngs_modulus: 5000", "poissons_ratio: 0.45"}) {
+    const Error error = bad(std::string("materials:\n  soft: {") + key + "}\nbodies: []\n");
+    EXPECT_EQ(error.code, ErrorCode::kUnsupported);
+    EXPECT_TRUE(says(error, "s.yaml:2: ")) << error.detail;
+    EXPECT_TRUE(says(error, "materials for accuracy are not in this version")) << error.detail;
+  }
+  const Result<SceneDef> missing = readScene(folder.file("scenes/none.yaml"), access);
+  ASSERT_FALSE(missing.ok());
+  EXPECT_EQ(missing.error().code, ErrorCode::kUnreadable);
+  EXPECT_FALSE(readScene(folder.path(), access).ok());
+}
+
+TEST_F(Scene, BombsAreDefused) {
+  EXPECT_TRUE(says(bad(std::string((1 << 20) + 1, '#')), "1 MiB"));
+  EXPECT_TRUE(says(bad("bodies: " + std::string(100000, '[')), "deep"));
+  EXPECT_TRUE(says(bad(std::string(400000, '-') + " a"), "s.yaml"));
+  std::string dashes;
+  for (int k = 0; k < 100000; ++k) dashes += "- ";
+  EXPECT_TRUE(says(bad(dashes), "deep"));
+  std::string laughs = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
+  for (int k = 1; k < 12; ++k) {
+    const std::string last = "*a" + std::to_string(k - 1);
+    laughs += "a" + std::to_string(k) + ": &a" + std::to_string(k) + " [" + last;
+    for (int j = 0; j < 9; ++j) laughs += ", " + last;
+    laughs += "]\n";
+  }
+  EXPECT_TRUE(says(bad(laughs + "bodies: []\n"), "aliases"));
+  // Ordinary anchors serve.
+  const SceneDef scene = good(
+      "bodies:\n  - {name: a, primitive: {sphere: 1}, fixed: &hold [{box: {min: [0, 0, 0], max: [1, 1, 1]}}]}\n"
+      "  - {name: b, primitive: {sphere: 1}, fixed: *hold}\n");
+  EXPECT_EQ(scene.bodies[1].fixed.size(), 1u);
+}
+
+TEST_F(Scene, MaterialsAreKnownFromThePackageTheFolderBesideAndTheSceneItself) {
+  folder.write("package/config/materials/a.yaml", "soft: {alpha: 0.1}\nfirm: {alpha: 0.8}\nown: {alpha: 0.7}\n");
+  folder.write("materials/a.yaml", "firm: {alpha: 0.85}\nown: {alpha: 0.75}\n");
+  folder.write("materials/b.yaml", "# only words\n");
+  folder.write("materials/notes.txt", "no: material\n");
+  access.find_package = [this](const std::string& name) {
+    return name == "meshless_surgery" ? folder.file("package") : std::string();
+  };
+  const SceneDef scene = good(
+      "materials: {own: {alpha: 0.95}}\nbodies:\n  - {name: a, primitive: {sphere: 1}, material: soft}\n"
+      "  - {name: b, primitive: {sphere: 1}, material: firm}\n  - {name: c, primitive: {sphere: 1}, material: own}\n");
+  ASSERT_EQ(scene.bodies.size(), 3u);
+  EXPECT_EQ(scene.bodies[0].material.alpha, 0.1);
+  EXPECT_EQ(scene.bodies[1].material.alpha, 0.85);
+  EXPECT_EQ(scene.bodies[2].material.alpha, 0.95);
+  EXPECT_EQ(scene.materials.size(), 3u);
+  // A folder beside the scene that may not be read is not.
+  access.folders = {folder.file("package")};
+  EXPECT_EQ(good("bodies: [{primitive: {sphere: 1}, material: firm}]\n").bodies[0].material.alpha, 0.8);
+  // A fault in a file of materials is named with that file.
+  folder.write("package/config/materials/z.yaml", "soft:\n  alpha: 2\n");
+  EXPECT_TRUE(says(bad("bodies: []\n"), "z.yaml:2: alpha is 2"));
+}
+
+TEST_F(Scene, NotesOfTheMeshArePassedOn) {
+  TriangleMesh inside_out = boxMesh(Vec3(1, 1, 1), 1, 1, 1);
+  for (Triangle& t : inside_out.triangles) std::swap(t[0], t[1]);
+  ASSERT_TRUE(writeObj(folder.file("turned.obj"), inside_out, "").ok());
+  const SceneDef scene = good("bodies: [{file: ../turned.obj}]\n");
+  EXPECT_FALSE(scene.bodies[0].notes.empty());
+  EXPECT_GT(signedVolume(scene.bodies[0].mesh), 0.0);
+}
+
+TEST(ChangeMaterial, ChangesTheKeysItIsGiven) {
+  Material base;
+  base.name = "mine";
+  base.density = 900.0;
+  const Result<Material> changed = changeMaterial(base, "{alpha: 0.9, mode: rigid}");
+  ASSERT_TRUE(changed.ok()) << changed.error().detail;
+  EXPECT_EQ(changed->name, "mine");
+  EXPECT_EQ(changed->alpha, 0.9);
+  EXPECT_EQ(changed->mode, MatchMode::kRigid);
+  EXPECT_EQ(changed->density, 900.0);
+  EXPECT_TRUE(changeMaterial(base, "alpha: 0.1\nbeta: 0.2\n").ok());
+}
+
+TEST(ChangeMaterial, RefusesWhatItDoesNotKnow) {
+  const Material base;
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"alpha: 2", "material:1: alpha is 2"},       {"alpha: .nan", "alpha is .nan"},
+      {"alhpa: 0.5", "did you mean 'alpha'"},       {"beta: 0.5\ndensity: -1", "material:2: density is -1"},
+      {"0.5", "a map"},                             {"", "a map"},
+      {"{alpha: ", "YAML"},                         {"youngs_modulus: 5000", "not in this version"},
+      {"name: other", "unknown key 'name'"}};
+  for (const auto& one : cases) {
+    const Result<Material> changed = changeMaterial(base, one.first);
+    ASSERT_FALSE(changed.ok()) << one.first;
+    EXPECT_TRUE(says(changed.error(), one.second)) << changed.error().detail;
+  }
+}
+
+TEST(ReadMaterials, AFolderThatIsMissingIsUnreadable) {
+  const Result<std::map<std::string, Material>> read = readMaterials("/no/such/folder");
+  ASSERT_FALSE(read.ok());
+  EXPECT_EQ(read.error().code, ErrorCode::kUnreadable);
+}
+
+TEST(PrimitiveMesh, IsClosedAndOfItsSize) {
+  const double pi = 3.14159265358979;
+  struct Case {
+    std::string kind;
+    std::vector<double> sizes;
+    double volume;
+  };
+  for (const Case& one : std::vector<Case>{{"box", {0.1, 0.2, 0.3}, 0.006},
+                                           {"sphere", {0.1}, 4.0 / 3.0 * pi * 1e-3},
+                                           {"cylinder", {0.3, 0.05}, pi * 0.0025 * 0.3}}) {
+    const Result<TriangleMesh> mesh = primitiveMesh(one.kind, one.sizes);
+    ASSERT_TRUE(mesh.ok()) << mesh.error().detail;
+    EXPECT_TRUE(inspectMesh(*mesh).closed());
+    EXPECT_NEAR(signedVolume(*mesh), one.volume, 0.05 * one.volume);
+    EXPECT_GT(mesh->triangles.size(), 200u);
+    EXPECT_LT(mesh->triangles.size(), 1800u);
+    const Result<TriangleMesh> finer = primitiveMesh(one.kind, one.sizes, 0.5 * meanEdgeLength(*mesh));
+    ASSERT_TRUE(finer.ok());
+    EXPECT_GT(finer->triangles.size(), 2 * mesh->triangles.size());
+  }
+}
+
+TEST(PrimitiveMesh, RefusesOtherKindsAndSizes) {
+  for (const std::vector<double>& sizes : std::vector<std::vector<double>>{{}, {0.0}, {-1.0}, {1e9}, {NAN}, {1, 1}})
+    EXPECT_FALSE(primitiveMesh("sphere", sizes).ok());
+  EXPECT_FALSE(primitiveMesh("cone", {1.0}).ok());
+  EXPECT_FALSE(primitiveMesh("sphere", {1.0}, NAN).ok());
+  EXPECT_FALSE(primitiveMesh("sphere", {1.0}, 1e-6).ok());
+}
+
+// --- what the package ships
+
+struct Shipped : ::testing::Test {
+  FileAccess access;
+  const std::string package = SOURCE_DIR;
+
+  void SetUp() override {
+    access.folders = {package};
+    access.find_package = [this](const std::string& name) { return name == "meshless_surgery" ? package : ""; };
+  }
+  SceneDef scene(const std::string& name) {
+    Result<SceneDef> read = readScene(package + "/config/scenes/" + name + ".yaml", access);
+    EXPECT_TRUE(read.ok()) << (read.ok() ? "" : read.error().detail);
+    return read.ok() ? *read : SceneDef{};
+  }
+};
+
+TEST_F(Shipped, MaterialsArePlausible) {
+  const Result<std::map<std::string, Material>> materials = readMaterials(package + "/config/materials");
+  ASSERT_TRUE(materials.ok()) << materials.error().detail;
+  for (const char* name : {"default", "liver", "kidney", "fish", "skin", "fat", "jelly", "rubber"}) {
+    ASSERT_EQ(materials->count(name), 1u) << name;
+    const Material& material = materials->at(name);
+    EXPECT_EQ(material.name, name);
+    EXPECT_TRUE(material.validate().ok());
+    EXPECT_GT(material.density, 800.0);
+    EXPECT_LT(material.density, 1300.0);
+    // A cut shows: the two colours differ.
+    EXPECT_GT(std::abs(material.color.r - material.inside_color.r) + std::abs(material.color.g - material.inside_color.g) +
+                  std::abs(material.color.b - material.inside_color.b), 0.2f) << name;
+  }
+}
+
+TEST_F(Shipped, ScenesLoadAsClosedBodiesAboveTheGround) {
+  const std::vector<std::pair<std::string, std::size_t>> scenes = {
+      {"liver", 1}, {"fish", 1}, {"skin", 1}, {"block", 1}, {"pile", 40}};
+  for (const auto& one : scenes) {
+    const SceneDef def = scene(one.first);
+    ASSERT_EQ(def.bodies.size(), one.second) << one.first;
+    EXPECT_EQ(def.name, one.first);
+    for (const BodyDef& body : def.bodies) {
+      EXPECT_TRUE(body.solid) << one.first;
+      EXPECT_TRUE(body.notes.empty()) << one.first << ": " << (body.notes.empty() ? "" : body.notes[0]);
+      for (const Vec3& p : body.mesh.vertices) EXPECT_GE((body.pose * p).z(), def.world.ground.value_or(-1.0));
+    }
+  }
+}
+
+TEST_F(Shipped, FixedRegionsHoldAPartOfTheBody) {
+  for (const auto& one : std::vector<std::array<double, 2>>{{{0.03, 0.3}}, {{0.05, 0.3}}}) {
+    const bool is_liver = one[0] == 0.03;
+    const SceneDef def = scene(is_liver ? "liver" : "skin");
+    ASSERT_EQ(def.bodies.size(), 1u);
+    std::size_t held = 0;
+    for (const Vec3& p : def.bodies[0].mesh.vertices)
+      held += std::any_of(def.bodies[0].fixed.begin(), def.bodies[0].fixed.end(),
+                          [&](const Box& box) { return box.contains(def.bodies[0].pose * p); });
+    const double share = static_cast<double>(held) / static_cast<double>(def.bodies[0].mesh.vertices.size());
+    EXPECT_GT(share, one[0]) << def.name;
+    EXPECT_LT(share, one[1]) << def.name;
+  }
+}
+
+TEST_F(Shipped, BlocksHaveExactlyOneInnerParticle) {
+  const BodyDef block = scene("block").bodies.at(0);
+  EXPECT_EQ(block.mesh.triangles.size(), 32u);
+  const SolidQuery solid(block.mesh);
+  const LatticeSample inner = sampleInterior(block.mesh, solid, block.spacing, 0.5 * block.spacing);
+  ASSERT_EQ(inner.points.size(), 1u);
+  EXPECT_LT(inner.points[0].norm(), 1e-6);
+}
+
+TEST_F(Shipped, ThePileStartsWithoutOverlap) {
+  const SceneDef pile = scene("pile");
+  std::vector<Box> bounds;
+  for (const BodyDef& body : pile.bodies) {
+    Box box;
+    for (const Vec3& p : body.mesh.vertices) box.extend(body.pose * p);
+    for (const Box& other : bounds) EXPECT_FALSE(box.overlaps(other));
+    bounds.push_back(box);
+  }
+}
+
+}  // namespace
+}  // namespace meshless

@@ -1,0 +1,131 @@
+#include "meshless_surgery/ros/border_check.h"
+
+#include <limits>
+
+#include <gtest/gtest.h>
+
+namespace meshless {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+geometry_msgs::Quaternion quaternion(double x, double y, double z, double w) {
+  geometry_msgs::Quaternion q;
+  q.x = x;
+  q.y = y;
+  q.z = z;
+  q.w = w;
+  return q;
+}
+
+TEST(BorderCheck, AcceptsTheEndsOfARangeAndRefusesWhatIsBeyondOrNoNumber) {
+  for (const double good : {0.0, 0.5, 2.0}) {
+    BorderCheck check;
+    EXPECT_EQ(good, check.number("radius", good, 0.0, 2.0, "m"));
+    EXPECT_TRUE(check.ok()) << good;
+  }
+  for (const double bad : {-1e-300, 2.0000001, kNan, kInf, -kInf}) {
+    BorderCheck check;
+    check.number("radius", bad, 0.0, 2.0, "m");
+    ASSERT_FALSE(check.ok()) << bad;
+    EXPECT_EQ(ErrorCode::kInvalidArgument, check.error().code);
+  }
+}
+
+TEST(BorderCheck, SaysFieldValueAndRange) {
+  BorderCheck check;
+  check.number("radius", -0.25, 0.0, 2.0, "m");
+  ASSERT_FALSE(check.ok());
+  EXPECT_EQ("radius is -0.25; accepted: 0..2 m", check.error().detail);
+}
+
+TEST(BorderCheck, KeepsTheFirstFault) {
+  BorderCheck check;
+  check.number("first", kNan, 0.0, 1.0, "");
+  check.number("second", kNan, 0.0, 1.0, "");
+  ASSERT_FALSE(check.ok());
+  EXPECT_EQ("first is nan; accepted: 0..1", check.error().detail);
+}
+
+TEST(BorderCheck, EachCoordinateOfAPointIsLookedAt) {
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double bad : {kNan, kInf, -kInf, 2.0 * kMaxCoordinate}) {
+      geometry_msgs::Point point;
+      (axis == 0 ? point.x : axis == 1 ? point.y : point.z) = bad;
+      BorderCheck check;
+      check.point("target", point);
+      ASSERT_FALSE(check.ok());
+      EXPECT_EQ(0u, check.error().detail.find(std::string("target.") + "xyz"[axis])) << check.error().detail;
+    }
+  }
+}
+
+TEST(BorderCheck, NormalisesQuaternionsAndRefusesThoseWithoutADirection) {
+  for (const double scale : {1e-5, 1.0, 1e5}) {
+    BorderCheck check;
+    const Quat q = check.rotation("q", quaternion(0.0, scale, 0.0, scale));
+    ASSERT_TRUE(check.ok()) << scale;
+    EXPECT_NEAR(1.0, q.norm(), 1e-12);
+    EXPECT_LT((q * Vec3::UnitX() + Vec3::UnitZ()).norm(), 1e-12);
+  }
+  for (const auto& bad : {quaternion(0, 0, 0, 0), quaternion(0, 0, 0, 1e-7), quaternion(kNan, 0, 0, 1),
+                          quaternion(0, kInf, 0, 1), quaternion(0, 0, -kInf, 1), quaternion(0, 0, 0, kNan)}) {
+    BorderCheck check;
+    const Quat q = check.rotation("q", bad);
+    EXPECT_FALSE(check.ok());
+    EXPECT_NEAR(1.0, q.norm(), 1e-12) << "what is refused must still be no poison";
+  }
+}
+
+TEST(BorderCheck, ToolsThatArePointsNeedNoOrientation) {
+  geometry_msgs::Pose pose;
+  pose.position.x = 0.5;
+  BorderCheck point;
+  EXPECT_EQ(Vec3(0.5, 0.0, 0.0), point.pointPose("pose", pose).translation);
+  EXPECT_TRUE(point.ok());
+  BorderCheck full;
+  full.pose("pose", pose);
+  ASSERT_FALSE(full.ok());
+  EXPECT_NE(std::string::npos, full.error().detail.find("pose.orientation has the norm 0"));
+  pose.orientation.w = kNan;
+  BorderCheck nan;
+  nan.pointPose("pose", pose);
+  EXPECT_FALSE(nan.ok());
+}
+
+TEST(BorderCheck, NewNamesArePlain) {
+  for (const char* good : {"", "liver", "liver.1", "A_b-3"}) {
+    BorderCheck check;
+    check.newName("name", good);
+    EXPECT_TRUE(check.ok()) << good;
+  }
+  for (const std::string& bad : {std::string("a b"), std::string("a/b"), std::string("a\nb"), std::string("\xc3\xa4"),
+                                 std::string(101, 'a'), std::string("a\0b", 3)}) {
+    BorderCheck check;
+    check.newName("name", bad);
+    EXPECT_FALSE(check.ok()) << bad;
+  }
+}
+
+TEST(BorderCheck, NamesOfBodiesAreNotEmptyAndNotEndless) {
+  BorderCheck good;
+  good.names("bodies", {"liver", "any thing"});
+  EXPECT_TRUE(good.ok());
+  BorderCheck empty;
+  empty.names("bodies", {"liver", ""});
+  ASSERT_FALSE(empty.ok());
+  EXPECT_EQ(0u, empty.error().detail.find("bodies[1] is ''"));
+  BorderCheck endless;
+  endless.names("bodies", {std::string(100000, 'a')});
+  ASSERT_FALSE(endless.ok());
+  EXPECT_LT(endless.error().detail.size(), 300u);
+}
+
+TEST(Printable, HidesControlCharactersAndIsBounded) {
+  EXPECT_EQ("a?b?", printable("a\nb\x1b"));
+  EXPECT_EQ(std::string(100, 'x') + "...", printable(std::string(5000, 'x')));
+}
+
+}  // namespace
+}  // namespace meshless

@@ -1,0 +1,372 @@
+#!/usr/bin/env python3
+"""Every service: a good call, and what must be refused."""
+import math
+import os
+import sys
+import tempfile
+
+from geometry_msgs.msg import Point, Vector3
+from shape_msgs.msg import SolidPrimitive
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from deformer_support import ACROSS_X, DeformerTestCase, header, pose_stamped, run  # noqa: E402
+
+NAN = float('nan')
+INF = float('inf')
+
+
+def box(x=0.1, y=0.1, z=0.1):
+    return SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[x, y, z])
+
+
+class PickTest(DeformerTestCase):
+
+    def test_the_nearest_particle_is_grabbed(self):
+        answer = self.pick_left()
+        self.assertEqual('left', answer.body)
+        self.assertGreater(answer.pick_id, 0)
+        self.assertLess(math.dist((answer.position.x, answer.position.y, answer.position.z), (-0.15, 0.0, 0.1)), 0.05)
+        picks = self.state().picks
+        self.assertEqual([(answer.pick_id, 'left', False)], [(p.pick_id, p.body, p.locked) for p in picks])
+
+    def test_a_ray_grabs_the_first_surface_that_it_meets(self):
+        answer = self.good('pick', point=Point(-1.0, 0.01, 0.1), direction=Vector3(1, 0, 0))
+        self.assertEqual('left', answer.body)
+        self.assertAlmostEqual(-0.25, answer.position.x, places=6)
+        back = self.good('pick', point=Point(1.0, 0.01, 0.1), direction=Vector3(-2.5, 0, 0))
+        self.assertEqual('right', back.body)
+        self.assertAlmostEqual(0.25, back.position.x, places=6)
+
+    def test_only_the_body_asked_for(self):
+        answer = self.good('pick', point=Point(-1.0, 0.01, 0.1), direction=Vector3(1, 0, 0), body='right')
+        self.assertEqual('right', answer.body)
+
+    def test_ids_are_never_used_twice(self):
+        ids = []
+        for _ in range(5):
+            answer = self.pick_left()
+            ids.append(answer.pick_id)
+            self.good('release', pick_id=answer.pick_id)
+        self.assertEqual(5, len(set(ids)))
+
+    def test_refusals(self):
+        at = Point(-0.15, 0.0, 0.1)
+        for value, word in ((NAN, 'nan'), (INF, 'inf'), (-INF, '-inf')):
+            self.refused(['point.y', word, 'accepted'], 'pick', point=Point(-0.15, value, 0.1))
+            self.refused(['direction.z', word, 'accepted'], 'pick', point=at, direction=Vector3(0, 0, value))
+            self.refused(['max_distance', word, 'accepted'], 'pick', point=at, max_distance=value)
+            self.refused(['stiffness', word, 'accepted'], 'pick', point=at, stiffness=value)
+        self.refused(['max_distance', '-0.1', '0..'], 'pick', point=at, max_distance=-0.1)
+        self.refused(['stiffness', '-1', '0..'], 'pick', point=at, stiffness=-1.0)
+        self.refused(['no_such_body', 'left', 'right'], 'pick', point=at, body='no_such_body')
+        self.refused(['no_such_frame', 'world'], 'pick', header=header('no_such_frame'), point=at)
+        self.refused(['0.01'], 'pick', point=Point(0.0, 0.0, 0.1), max_distance=0.01)
+        self.refused([], 'pick', point=Point(0.0, 5.0, 0.1), direction=Vector3(0, 1, 0))
+
+    def test_the_world_frame_may_be_named_or_left_out(self):
+        for frame in ('', 'world', '/world'):
+            answer = self.good('pick', header=header(frame), point=Point(-0.15, 0.0, 0.1))
+            self.assertEqual('left', answer.body)
+
+
+class SpringTest(DeformerTestCase):
+
+    def test_moving_pulls_the_tissue(self):
+        pick = self.pick_left()
+        self.good('move_pick', pick_id=pick.pick_id, target=Point(-0.05, 0.0, 0.1))
+        before = self.state().bodies[0].centre_of_mass.x
+        self.good('step', steps=30)
+        state = self.state()
+        self.assertGreater(state.bodies[0].centre_of_mass.x, before + 0.001)
+        self.assertAlmostEqual(-0.05, state.picks[0].target.x)
+
+    def test_a_lock_holds_where_it_is_or_at_the_target(self):
+        pick = self.pick_left()
+        self.good('lock', pick_id=pick.pick_id)
+        state = self.state()
+        self.assertTrue(state.picks[0].locked)
+        self.assertAlmostEqual(pick.position.x, state.picks[0].target.x)
+        self.good('lock', pick_id=pick.pick_id, at_target=True, target=Point(-0.1, 0.02, 0.1))
+        state = self.state()
+        self.assertTrue(state.picks[0].locked)
+        self.assertAlmostEqual(0.02, state.picks[0].target.y)
+
+    def test_any_number_of_locks_and_taking_one_up_again(self):
+        ids = [self.pick_left().pick_id for _ in range(10)]
+        for pick in ids:
+            self.good('lock', pick_id=pick)
+        self.assertEqual(10, sum(p.locked for p in self.state().picks))
+        self.good('move_pick', pick_id=ids[3], target=Point(0, 0, 0))
+        self.assertEqual([ids[3]], [p.pick_id for p in self.state().picks if not p.locked])
+
+    def test_release_and_clear(self):
+        ids = [self.pick_left().pick_id for _ in range(3)]
+        self.good('lock', pick_id=ids[0])
+        self.good('release', pick_id=ids[0])
+        self.assertEqual(ids[1:], [p.pick_id for p in self.state().picks])
+        self.good('clear_picks')
+        self.assertEqual([], self.state().picks)
+
+    def test_refusals(self):
+        pick = self.pick_left().pick_id
+        for service in ('move_pick', 'lock', 'release'):
+            self.refused(['4000000000', str(pick)], service, pick_id=4000000000)
+            self.refused(['0'], service, pick_id=0)
+        self.refused(['target.x', 'nan'], 'move_pick', pick_id=pick, target=Point(NAN, 0, 0))
+        self.refused(['target.z', 'inf'], 'move_pick', pick_id=pick, target=Point(0, 0, INF))
+        self.refused(['no_such_frame'], 'move_pick', pick_id=pick, header=header('no_such_frame'))
+        self.refused(['target.x', 'nan'], 'lock', pick_id=pick, at_target=True, target=Point(NAN, 0, 0))
+        self.refused(['no_such_frame'], 'lock', pick_id=pick, at_target=True, header=header('no_such_frame'))
+
+
+class PushTest(DeformerTestCase):
+
+    def test_it_is_placed_moves_at_its_speed_and_pushes(self):
+        self.good('push', enable=True, radius=0.03, pose=pose_stamped(-0.3, 0.0, 0.1))
+        self.good('push', enable=True, radius=0.03, pose=pose_stamped(-0.2, 0.0, 0.1), speed=0.2)
+        before = self.state().bodies[0].centre_of_mass.x
+        self.good('step', steps=60)  # 0.5 s: it has arrived where the box's middle was
+        self.assertGreater(self.state().bodies[0].centre_of_mass.x, before + 0.005)
+        self.good('push', enable=False)
+
+    def test_an_orientation_may_be_left_out(self):
+        self.good('push', enable=True, pose=pose_stamped(0.0, 0.0, 1.0, quaternion=(0, 0, 0, 0)))
+
+    def test_refusals(self):
+        self.refused(['radius', '-0.01', '0..'], 'push', enable=True, radius=-0.01, pose=pose_stamped())
+        self.refused(['radius', 'nan'], 'push', enable=True, radius=NAN, pose=pose_stamped())
+        self.refused(['speed', '-1'], 'push', enable=True, speed=-1.0, pose=pose_stamped())
+        self.refused(['speed', 'inf'], 'push', enable=True, speed=INF, pose=pose_stamped())
+        self.refused(['position.x', 'nan'], 'push', enable=True, pose=pose_stamped(NAN))
+        self.refused(['orientation', 'nan'], 'push', enable=True, pose=pose_stamped(quaternion=(0, 0, 0, NAN)))
+        self.refused(['no_such_frame'], 'push', enable=True, pose=pose_stamped(frame='no_such_frame'))
+
+
+class CutTest(DeformerTestCase):
+
+    def test_a_cut_gives_sealed_pieces_that_add_up(self):
+        whole = self.good('get_body', name='left')
+        answer = self.good('cut', blades=pose_stamped(-0.19, -1.0, 0.1, ACROSS_X))
+        self.assertEqual(['left'], answer.cut_bodies)
+        self.assertEqual(['left.1', 'left.2'], answer.new_bodies)
+        self.assertAlmostEqual(0.01, answer.cap_area, places=6)
+        self.assertGreaterEqual(answer.duration, 0.0)
+        pieces = [self.good('get_body', name=name) for name in answer.new_bodies]
+        self.assertAlmostEqual(1.0, sum(p.volume for p in pieces) / whole.volume, places=9)
+        self.assertAlmostEqual(1.0, sum(p.mass for p in pieces) / whole.mass, places=9)
+        for piece in pieces:
+            edges = {}
+            for triangle in piece.surface.triangles:
+                v = triangle.vertex_indices
+                for a, b in ((v[0], v[1]), (v[1], v[2]), (v[2], v[0])):
+                    edges[(a, b)] = edges.get((a, b), 0) + 1
+            self.assertTrue(all(edges.get((b, a)) == n for (a, b), n in edges.items()), 'an open edge')
+        self.assertEqual(['left.1', 'left.2', 'right'], sorted(b.name for b in self.state().bodies))
+        self.refused(['left', 'left.1'], 'get_body', name='left')
+
+    def test_only_where_the_blades_reach(self):
+        # Unbounded blades across both boxes; then only those named; then as long as the first box.
+        both = self.good('cut', blades=pose_stamped(-1.0, 0.0, 0.1))
+        self.assertEqual(['left', 'right'], sorted(both.cut_bodies))
+        self.good('reset')
+        one = self.good('cut', blades=pose_stamped(-1.0, 0.0, 0.1), bodies=['right'])
+        self.assertEqual(['right'], one.cut_bodies)
+        self.good('reset')
+        short = self.good('cut', blades=pose_stamped(-0.3, 0.0, 0.1), length=0.2, width=0.3)
+        self.assertEqual(['left'], short.cut_bodies)
+
+    def test_pieces_can_be_cut_again_and_springs_follow(self):
+        pick = self.pick_left()
+        self.good('cut', blades=pose_stamped(-0.2, -1.0, 0.1, ACROSS_X), bodies=['left'])
+        owner = self.state().picks[0].body
+        self.assertIn(owner, ('left.1', 'left.2'))
+        self.assertEqual(pick.pick_id, self.state().picks[0].pick_id)
+        again = self.good('cut', blades=pose_stamped(-1.0, 0.0, 0.1), bodies=[owner])
+        self.assertEqual([owner + '.1', owner + '.2'], again.new_bodies)
+
+    def test_blades_that_close_slowly_meet_at_once_while_paused(self):
+        answer = self.good('cut', blades=pose_stamped(-1.0, 0.0, 0.1), close_time=50.0)
+        self.assertIn('paused', answer.message)
+        self.assertEqual(0, self.state().step)
+
+    def test_refusals(self):
+        blades = pose_stamped(-1.0, 0.0, 0.1)
+        for field in ('length', 'width', 'close_time', 'roughness'):
+            self.refused([field, 'nan', 'accepted'], 'cut', blades=blades, **{field: NAN})
+            self.refused([field, 'inf', 'accepted'], 'cut', blades=blades, **{field: INF})
+            self.refused([field, '-0.5', '0'], 'cut', blades=blades, **{field: -0.5})
+        self.refused(['close_time', '1000', '60'], 'cut', blades=blades, close_time=1000.0)
+        self.refused(['position.x', 'nan'], 'cut', blades=pose_stamped(NAN))
+        self.refused(['orientation', 'norm', '0'], 'cut', blades=pose_stamped(quaternion=(0, 0, 0, 0)))
+        self.refused(['orientation', 'nan'], 'cut', blades=pose_stamped(quaternion=(0, NAN, 0, 1)))
+        self.refused(['no_such_frame'], 'cut', blades=pose_stamped(frame='no_such_frame'))
+        self.refused(['no_such_body'], 'cut', blades=blades, bodies=['left', 'no_such_body'])
+        self.refused(['bodies[0]'], 'cut', blades=blades, bodies=[''])
+        self.refused([], 'cut', blades=pose_stamped(0.0, 0.0, 5.0))
+
+
+class BodiesTest(DeformerTestCase):
+
+    def test_primitives_are_spawned_and_removed(self):
+        sizes = {SolidPrimitive.BOX: [0.1, 0.05, 0.08], SolidPrimitive.SPHERE: [0.05],
+                 SolidPrimitive.CYLINDER: [0.1, 0.03]}
+        volumes = {SolidPrimitive.BOX: 4e-4, SolidPrimitive.SPHERE: 4 / 3 * math.pi * 0.05 ** 3,
+                   SolidPrimitive.CYLINDER: 0.1 * math.pi * 0.03 ** 2}
+        for kind, dimensions in sizes.items():
+            answer = self.good('spawn', name='new%d' % kind, pose=pose_stamped(0.0, 0.0, 1.0),
+                               primitive=SolidPrimitive(type=kind, dimensions=dimensions))
+            self.assertEqual('new%d' % kind, answer.name)
+            for count in (answer.particles, answer.triangles, answer.clusters):
+                self.assertGreater(count, 0)
+            body = self.good('get_body', name=answer.name)
+            self.assertLess(abs(body.volume / volumes[kind] - 1.0), 0.05)
+            self.good('remove', name=answer.name)
+            self.refused([answer.name], 'remove', name=answer.name)
+
+    def test_scale_and_material(self):
+        self.good('spawn', name='big', primitive=box(), scale=2.0, material='stiff', pose=pose_stamped(0, 0, 1))
+        body = self.good('get_body', name='big')
+        self.assertAlmostEqual(8e-3, body.volume, places=9)
+        self.assertAlmostEqual(16.0, body.mass, places=6)
+
+    def test_without_a_name_it_gets_one_of_its_own(self):
+        names = [self.good('spawn', primitive=box(), pose=pose_stamped(0, 0, 1 + i)).name for i in range(3)]
+        self.assertEqual(['box', 'box_2', 'box_3'], names)
+
+    def test_a_file_below_the_scene(self):
+        # Below the scene's folder, where reading is allowed.
+        scenes = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'scenes')
+        answer = self.good('spawn', file=os.path.join(scenes, 'tetrahedron.obj'), pose=pose_stamped(0, 0, 1))
+        self.assertEqual('tetrahedron', answer.name)
+        self.assertEqual(4, answer.triangles)
+        relative = self.good('spawn', name='again', file='tetrahedron.obj', pose=pose_stamped(0, 0, 1))
+        package = self.good('spawn', name='package', pose=pose_stamped(0, 0, 1), scale=0.5,
+                            file='package://meshless_surgery/test/ros/scenes/tetrahedron.obj')
+        volumes = [self.good('get_body', name=a.name).volume for a in (answer, relative, package)]
+        self.assertAlmostEqual(0.1 ** 3 / 6.0, volumes[0], places=9)
+        self.assertAlmostEqual(volumes[0], volumes[1], places=12)
+        self.assertAlmostEqual(volumes[0] / 8.0, volumes[2], places=12)
+
+    def test_refusals_of_spawn(self):
+        at = pose_stamped(0, 0, 1)
+        self.refused(['left'], 'spawn', name='left', primitive=box(), pose=at)
+        self.refused(['name', 'a/b'], 'spawn', name='a/b', primitive=box(), pose=at)
+        self.refused(['primitive.type', '0'], 'spawn', name='x', pose=at)
+        self.refused(['primitive.type', '4'], 'spawn', name='x', pose=at,
+                     primitive=SolidPrimitive(type=SolidPrimitive.CONE, dimensions=[0.1, 0.1]))
+        self.refused(['dimensions', '2', '3'], 'spawn', name='x', pose=at,
+                     primitive=SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.1, 0.1]))
+        for bad, word in ((NAN, 'nan'), (-0.1, '-0.1'), (0.0, '0'), (INF, 'inf')):
+            self.refused(['dimensions', ' y ', word, 'accepted'], 'spawn', name='x', pose=at, primitive=box(0.1, bad, 0.1))
+        self.refused(['scale', '-1'], 'spawn', name='x', primitive=box(), pose=at, scale=-1.0)
+        self.refused(['scale', 'nan'], 'spawn', name='x', primitive=box(), pose=at, scale=NAN)
+        self.refused(['no_such_material'], 'spawn', name='x', primitive=box(), pose=at, material='no_such_material')
+        self.refused(['no_such_frame'], 'spawn', name='x', primitive=box(), pose=pose_stamped(frame='no_such_frame'))
+        self.refused(['orientation'], 'spawn', name='x', primitive=box(), pose=pose_stamped(quaternion=(0, 0, 0, 0)))
+        self.refused(['missing.obj'], 'spawn', name='x', file='missing.obj', pose=at)
+        with tempfile.NamedTemporaryFile(suffix='.obj') as outside:
+            outside.write(b'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n')
+            outside.flush()
+            self.refused([outside.name], 'spawn', name='x', file=outside.name, pose=at)
+
+    def test_refusals_of_remove_and_get_body(self):
+        for service in ('remove', 'get_body'):
+            self.refused(['no_such_body', 'left', 'right'], service, name='no_such_body')
+            self.refused([], service, name='')
+
+    def test_get_body_at_rest_and_as_it_is(self):
+        pick = self.pick_left()
+        self.good('move_pick', pick_id=pick.pick_id, target=Point(0.0, 0.0, 0.1))
+        self.good('step', steps=10)
+        now = self.good('get_body', name='left')
+        rest = self.good('get_body', name='left', rest=True)
+        self.assertEqual(len(now.surface.triangles), len(rest.surface.triangles))
+        self.assertEqual(now.particles.width, rest.particles.width)
+        self.assertEqual(['x', 'y', 'z'], [f.name for f in now.particles.fields])
+        self.assertAlmostEqual(1e-3, rest.volume, places=9)
+        self.assertAlmostEqual(1e-3, now.rest_volume, places=9)
+        self.assertAlmostEqual(0.06, rest.area, places=9)
+        self.assertNotEqual(now.particles.data, rest.particles.data)
+        self.assertEqual('world', now.particles.header.frame_id)
+        self.assertGreater(now.tetrahedra, 0)
+        self.assertGreater(now.clusters, 0)
+
+    def test_set_material(self):
+        self.good('set_material', body='left', yaml='{density: 3000}')
+        self.assertAlmostEqual(3.0, self.good('get_body', name='left').mass, places=6)
+        self.assertAlmostEqual(1.0, self.good('get_body', name='right').mass, places=6)
+        self.good('set_material', yaml='density: 500\nmode: quadratic\nalpha: 0.2')
+        for name in ('left', 'right'):
+            self.assertAlmostEqual(0.5, self.good('get_body', name=name).mass, places=6)
+
+    def test_refusals_of_set_material(self):
+        self.refused(['no_such_body'], 'set_material', body='no_such_body', yaml='{alpha: 0.5}')
+        self.refused(['yaml'], 'set_material', body='left', yaml='')
+        self.refused(['alpha', '1.5'], 'set_material', body='left', yaml='{alpha: 1.5}')
+        self.refused(['alpha'], 'set_material', body='left', yaml='{alpha: .nan}')
+        self.refused(['alpah', 'alpha'], 'set_material', body='left', yaml='{alpah: 0.5}')
+        self.refused([], 'set_material', body='left', yaml='{alpha: [')
+        self.refused([], 'set_material', yaml='just words')
+
+
+class TimeTest(DeformerTestCase):
+
+    def test_steps_are_done_exactly(self):
+        self.assertAlmostEqual(1.0 / 120.0, self.good('step', steps=1).sim_time)
+        self.assertAlmostEqual(0.5, self.good('step', steps=59).sim_time)
+        self.assertEqual(60, self.state().step)
+
+    def test_refusals_of_step(self):
+        self.refused(['steps', '0', '1..100000'], 'step', steps=0)
+        self.refused(['steps', '100001', '1..100000'], 'step', steps=100001)
+
+    def test_pause_and_run(self):
+        self.good('pause', data=False)
+        self.states.next(lambda state: state.step >= 10)
+        answer = self.good('pause', data=True)
+        step = self.state().step
+        self.assertIn(str(step), answer.message)
+        self.assertEqual(step, self.state().step)
+
+    def test_reset_brings_the_start_back(self):
+        start = self.picture()
+        pick = self.pick_left()
+        self.good('move_pick', pick_id=pick.pick_id, target=Point(0, 0, 0))
+        self.good('step', steps=20)
+        self.good('spawn', name='new', primitive=box(), pose=pose_stamped(0, 0, 1))
+        self.good('cut', blades=pose_stamped(-1.0, 0.0, 0.1))
+        self.good('set_material', yaml='{density: 300}')
+        self.assertNotEqual(start, self.picture())
+        self.good('reset')
+        self.assertEqual(start, self.picture())
+
+    def test_the_same_calls_give_the_same_world(self):
+        pictures = []
+        for _ in range(2):
+            self.good('reset')
+            pick = self.pick_left()
+            self.good('move_pick', pick_id=pick.pick_id, target=Point(-0.1, 0.05, 0.1))
+            self.good('step', steps=25)
+            self.good('cut', blades=pose_stamped(-1.0, 0.0, 0.1))
+            self.good('clear_picks')
+            self.good('step', steps=25)
+            pictures.append(self.picture())
+        self.assertEqual(pictures[0], pictures[1])
+
+    def test_blades_close_in_simulated_time(self):
+        self.good('pause', data=False)
+        begun = self.state().step
+        answer = self.good('cut', blades=pose_stamped(-1.0, 0.0, 0.1), close_time=0.5)
+        self.assertEqual(['left', 'right'], sorted(answer.cut_bodies))
+        self.assertGreaterEqual(self.state().step, begun + 60)
+
+    def test_what_comes_with_a_later_version_says_so(self):
+        self.refused(['later version'], 'save', file='name')
+        self.refused(['later version'], 'load', file='name')
+        self.refused(['later version'], 'incise', blade=pose_stamped(), length=0.1, depth=0.1)
+        self.refused(['length', 'nan'], 'incise', blade=pose_stamped(), length=NAN, depth=0.1)
+        self.refused(['depth', '0'], 'incise', blade=pose_stamped(), length=0.1, depth=0.0)
+
+
+if __name__ == '__main__':
+    run('services', PickTest, SpringTest, PushTest, CutTest, BodiesTest, TimeTest)

@@ -1,0 +1,60 @@
+#!/usr/bin/env python3
+"""Two stations in two namespaces do not see each other's worlds."""
+import os
+import sys
+import unittest
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+from meshless_surgery.msg import State
+from tf2_msgs.msg import TFMessage
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from deformer_support import TYPES, Deformer, Recorder, pose_stamped, run  # noqa: E402
+
+
+class StationsTest(unittest.TestCase):
+
+    def setUp(self):
+        self.one = Deformer('/station1/deformer')
+        self.two = Deformer('/station2/deformer')
+
+    def bodies(self, station):
+        states = station.recorder('state', State)
+        asked = rospy.Time.now()
+        names = sorted(b.name for b in states.next(lambda s: s.header.stamp >= asked).bodies)
+        states.close()
+        return names
+
+    def test_each_has_its_own_world(self):
+        self.assertEqual(['left', 'right'], self.bodies(self.one))
+        self.assertEqual(['box'], self.bodies(self.two))
+        self.assertTrue(self.one.call('remove', name='left').success)
+        self.assertEqual(['right'], self.bodies(self.one))
+        self.assertEqual(['box'], self.bodies(self.two))
+        self.assertTrue(self.two.call('step', steps=3).success)
+        self.assertAlmostEqual(1.0 / 120.0, self.one.call('step', steps=1).sim_time)
+
+    def test_every_service_is_in_the_namespace(self):
+        for station in (self.one, self.two):
+            for service in TYPES:
+                rospy.wait_for_service(station.node + '/' + service, 60.0)
+
+    def test_frames_have_the_stations_prefix(self):
+        heard = Recorder('/tf', TFMessage)
+        for station in (self.one, self.two):
+            self.assertTrue(station.call('push', enable=True, pose=pose_stamped(0, 0, 1)).success)
+        for frame in ('station1/push_sphere', 'station2/push_sphere'):
+            heard.wait(lambda m, frame=frame: any(t.child_frame_id == frame for t in m.transforms))
+        self.assertFalse(any(t.child_frame_id == 'push_sphere' for m in heard.messages for t in m.transforms))
+        heard.close()
+
+    def test_diagnostics_tell_them_apart(self):
+        heard = Recorder('/diagnostics', DiagnosticArray)
+        for station in ('station1', 'station2'):
+            heard.wait(lambda a, station=station: any(station in s.name for s in a.status))
+        heard.close()
+
+
+if __name__ == '__main__':
+    run('stations', StationsTest)

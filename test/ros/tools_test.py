@@ -1,0 +1,303 @@
+#!/usr/bin/env python3
+"""Streams and tf frames that move the tools, and what the tools say back."""
+import math
+import os
+import sys
+import threading
+
+import rospy
+import tf2_ros
+from geometry_msgs.msg import Point, PoseStamped, Quaternion, TransformStamped, Vector3, WrenchStamped
+from sensor_msgs.msg import JointState
+from visualization_msgs.msg import Marker, MarkerArray
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from deformer_support import (ACROSS_X, LONG, DeformerTestCase, Recorder, header,  # noqa: E402
+                              pose_stamped, run)
+
+NAN = float('nan')
+
+
+def transform(parent, child, x=0.0, y=0.0, z=0.0, quaternion=(0.0, 0.0, 0.0, 1.0)):
+    message = TransformStamped()
+    message.header.stamp = rospy.Time.now()
+    message.header.frame_id = parent
+    message.child_frame_id = child
+    message.transform.translation = Vector3(x, y, z)
+    message.transform.rotation = Quaternion(*quaternion)
+    return message
+
+
+class Stream:
+    """Says a message again and again until it is closed, as a tracker does."""
+
+    def __init__(self, topic, message):
+        self.message = message
+        self.publisher = rospy.Publisher(topic, type(message), queue_size=10)
+        self.done = threading.Event()
+        self.thread = threading.Thread(target=self._run)
+        self.thread.start()
+
+    def _run(self):
+        while not self.done.wait(0.01):
+            self.publisher.publish(self.message)
+
+    def close(self):
+        self.done.set()
+        self.thread.join()
+        self.publisher.unregister()
+
+
+class Frames:
+    """Says transforms again and again until it is closed."""
+
+    def __init__(self, *transforms):
+        self.transforms = list(transforms)
+        self.broadcaster = tf2_ros.TransformBroadcaster()
+        self.done = threading.Event()
+        self.thread = threading.Thread(target=self._run)
+        self.thread.start()
+
+    def _run(self):
+        while not self.done.wait(0.01):
+            stamp = rospy.Time.now()
+            for message in self.transforms:
+                message.header.stamp = stamp
+            self.broadcaster.sendTransform(self.transforms)
+
+    def close(self):
+        self.done.set()
+        self.thread.join()
+
+
+class StreamTest(DeformerTestCase):
+
+    def setUp(self):
+        super().setUp()
+        self.open = []
+        self.tf = tf2_ros.Buffer()
+        self.listener = tf2_ros.TransformListener(self.tf)
+
+    def tearDown(self):
+        for opened in self.open:
+            opened.close()
+        self.listener.unregister()
+        super().tearDown()
+
+    def stream(self, topic, message):
+        opened = Stream(self.node + '/' + topic, message)
+        self.open.append(opened)
+        return opened
+
+    def record(self, topic, message_type):
+        opened = self.deformer.recorder(topic, message_type)
+        self.open.append(opened)
+        return opened
+
+    def frame(self, name, wanted):
+        end = rospy.Time.now() + rospy.Duration(LONG)
+        while rospy.Time.now() < end:
+            try:
+                found = self.tf.lookup_transform('world', name, rospy.Time(0)).transform
+                if wanted(found.translation):
+                    return found
+            except tf2_ros.TransformException:
+                pass
+            rospy.sleep(0.01)
+        self.fail('no such frame: ' + name)
+
+    def test_the_pick_in_hand_moves_and_locked_ones_do_not(self):
+        locked = self.pick_left().pick_id
+        self.good('lock', pick_id=locked)
+        free = self.pick_left()
+        measured = self.record('pick/measured_cp', PoseStamped)
+        self.stream('pick/servo_cp', pose_stamped(-0.1, 0.05, 0.15))
+        state = self.states.next(lambda s: any(abs(p.target.y - 0.05) < 1e-9 for p in s.picks))
+        targets = {p.pick_id: p.target for p in state.picks}
+        self.assertAlmostEqual(-0.1, targets[free.pick_id].x)
+        self.assertNotAlmostEqual(0.05, targets[locked].y)
+        pose = measured.wait(lambda m: abs(m.pose.position.y - 0.05) < 1e-9)
+        self.assertEqual('world', pose.header.frame_id)
+        self.frame('here/pick_cursor', lambda t: abs(t.y - 0.05) < 1e-9)
+
+    def test_the_force_on_the_hand_is_minus_that_on_the_tissue(self):
+        pick = self.pick_left().pick_id
+        self.good('move_pick', pick_id=pick, target=Point(0.0, 0.0, 0.1))
+        self.good('step', steps=3)
+        on_tissue = self.state().picks[0].force
+        self.assertGreater(on_tissue.x, 0.0)
+        forces = self.record('pick/measured_cf', WrenchStamped)
+        felt = forces.wait()
+        self.assertEqual('world', felt.header.frame_id)
+        self.assertAlmostEqual(-on_tissue.x, felt.wrench.force.x)
+        self.assertAlmostEqual(-on_tissue.y, felt.wrench.force.y)
+        self.assertAlmostEqual(-on_tissue.z, felt.wrench.force.z)
+
+    def test_the_push_sphere_appears_where_the_stream_is_and_then_travels(self):
+        measured = self.record('push/measured_cp', PoseStamped)
+        stream = self.stream('push/servo_cp', pose_stamped(0.0, 0.0, 1.0))
+        measured.wait(lambda m: m.pose.position.z == 1.0)
+        self.frame('here/push_sphere', lambda t: t.z == 1.0)
+        stream.message = pose_stamped(0.0, 0.0, 2.0)
+        # The target is known once a step moved the sphere; from then on at 0.5 m/s at most.
+        heights = [1.0]
+        for _ in range(1000):
+            self.good('step', steps=1)
+            now = rospy.Time.now()
+            heights.append(measured.next(lambda m: m.header.stamp >= now).pose.position.z)
+            if heights[-1] >= 1.1:
+                break
+        self.assertGreaterEqual(heights[-1], 1.1)
+        for low, high in zip(heights, heights[1:]):
+            self.assertLessEqual(high - low, 0.5 / 120.0 + 1e-9)
+
+    def test_the_push_sphere_feels_what_it_pushes(self):
+        forces = self.record('push/measured_cf', WrenchStamped)
+        self.good('push', enable=True, radius=0.03, pose=pose_stamped(-0.3, 0.0, 0.1))
+        self.good('push', enable=True, radius=0.03, pose=pose_stamped(-0.2, 0.0, 0.1), speed=0.3)
+        for _ in range(60):
+            self.good('step', steps=1)
+            now = rospy.Time.now()
+            if forces.next(lambda m: m.header.stamp >= now).wrench.force.x < 0.0:
+                return
+        self.fail('the sphere went into the box and felt nothing')
+
+    def test_the_scissors_cut_when_the_jaw_closes(self):
+        measured = self.record('scissors/measured_cp', PoseStamped)
+        self.stream('scissors/servo_cp', pose_stamped(-0.19, -0.15, 0.1, ACROSS_X))
+        measured.wait(lambda m: abs(m.pose.position.x + 0.19) < 1e-9)
+        self.frame('here/scissors', lambda t: abs(t.x + 0.19) < 1e-9)
+        jaw = self.stream('scissors/jaw/servo_js', JointState(name=['jaw'], position=[0.0]))
+        # A jaw that was never open does not cut.
+        markers = self.record('markers', MarkerArray)
+        markers.wait(lambda a: any(m.ns == 'tools' and m.id == 3 and m.action == Marker.ADD for m in a.markers))
+        self.assertEqual(['left', 'right'], sorted(b.name for b in self.state().bodies))
+        jaw.message = JointState(name=['jaw'], position=[0.4])
+        # Seen by the opening of the blades that are drawn.
+        def opened(array):
+            for m in array.markers:
+                if m.ns == 'tools' and m.id == 3 and m.action == Marker.ADD:
+                    tips = m.points[1], m.points[4]
+                    gap = math.dist((tips[0].x, tips[0].y, tips[0].z), (tips[1].x, tips[1].y, tips[1].z))
+                    return abs(gap - 2 * 0.3 * math.sin(0.2)) < 1e-6
+            return False
+        markers.next(opened)
+        jaw.message = JointState(name=['jaw'], position=[0.0])
+        state = self.states.next(lambda s: len(s.bodies) == 3)
+        self.assertEqual(['left.1', 'left.2', 'right'], sorted(b.name for b in state.bodies))
+        # And once only.
+        self.assertEqual(['left.1', 'left.2', 'right'], sorted(b.name for b in self.state().bodies))
+
+    def test_bad_streams_change_nothing(self):
+        pick = self.pick_left()
+        before = self.picture()
+        self.stream('pick/servo_cp', pose_stamped(NAN, 0.0, 0.0))
+        self.stream('push/servo_cp', pose_stamped(0.0, float('inf'), 0.0))
+        self.stream('scissors/servo_cp', pose_stamped(quaternion=(0, 0, 0, 0)))
+        self.stream('scissors/jaw/servo_js', JointState())
+        from diagnostic_msgs.msg import DiagnosticArray
+        diagnostics = Recorder('/diagnostics', DiagnosticArray)
+        self.open.append(diagnostics)
+
+        def refused(array):
+            for status in array.status:
+                values = {v.key: v.value for v in status.values}
+                if all('rejected by ~' + topic in values for topic in
+                       ('pick/servo_cp', 'push/servo_cp', 'scissors/servo_cp', 'scissors/jaw/servo_js')):
+                    return True
+            return False
+        diagnostics.wait(refused)
+        self.assertEqual(before, self.picture())
+        self.assertEqual(pick.pick_id, self.state().picks[0].pick_id)
+
+    def test_frames_are_sent_only_while_the_tools_exist(self):
+        heard = Recorder('/tf', __import__('tf2_msgs.msg', fromlist=['TFMessage']).TFMessage)
+        self.open.append(heard)
+        self.good('push', enable=True, pose=pose_stamped(0.0, 0.0, 1.0))
+
+        def has(message):
+            return any(t.child_frame_id == 'here/push_sphere' for t in message.transforms)
+        heard.wait(has)
+        self.good('push', enable=False)
+        # Each round trip of a step and a state takes longer than a tick of the frames.
+        begun = rospy.Time.now() + rospy.Duration(0.5)
+        rospy.sleep(1.5)
+        late = [m for m in heard.messages if has(m) and m.transforms[0].header.stamp > begun]
+        self.assertEqual([], late)
+
+
+class InputFrameTest(DeformerTestCase):
+
+    def setUp(self):
+        super().setUp()
+        # A table turned by a quarter about z at x = 0.2: its x axis is the world's y.
+        half = math.sqrt(0.5)
+        self.frames = Frames(transform('world', 'table', x=0.2, z=0.1, quaternion=(0, 0, half, half)))
+
+    def tearDown(self):
+        self.frames.close()
+        super().tearDown()
+
+    def until_known(self, service, **fields):
+        """The first call may come before the frame did."""
+        for _ in range(100):
+            answer = self.call(service, **fields)
+            if answer.success or 'frame' not in answer.message:
+                break
+        self.assertTrue(answer.success, answer.message)
+        return answer
+
+    def test_points_and_directions_are_turned(self):
+        answer = self.until_known('pick', header=header('table'), point=Point(-1.0, 0.01, 0.0), direction=Vector3(1, 0, 0))
+        self.assertEqual('right', answer.body)
+        self.assertAlmostEqual(0.19, answer.position.x, places=6)
+        self.assertAlmostEqual(-0.05, answer.position.y, places=6)
+        self.good('move_pick', header=header('table'), pick_id=answer.pick_id, target=Point(0.0, -0.3, 0.2))
+        target = self.state().picks[0].target
+        for got, wanted in ((target.x, 0.5), (target.y, 0.0), (target.z, 0.3)):
+            self.assertAlmostEqual(wanted, got, places=6)
+        self.good('lock', header=header('/table'), pick_id=answer.pick_id, at_target=True, target=Point(0.1, 0.0, 0.0))
+        self.assertAlmostEqual(0.1, self.state().picks[0].target.y, places=6)
+
+    def test_blades_are_turned(self):
+        # In the table's frame across its y axis: in the world across x.
+        half = math.sqrt(0.5)
+        across_y = (-half, 0.0, 0.0, half)
+        answer = self.until_known('cut', blades=pose_stamped(-1.0, 0.01, 0.0, across_y, frame='table'))
+        self.assertEqual(['right'], answer.cut_bodies)
+        volumes = sorted(self.good('get_body', name=name).volume for name in answer.new_bodies)
+        self.assertAlmostEqual(4e-4, volumes[0], places=8)
+        self.assertAlmostEqual(6e-4, volumes[1], places=8)
+
+    def test_a_frame_and_a_time_that_are_not_known_are_refused(self):
+        self.until_known('pick', header=header('table'), point=Point(0, 0, 0))
+        self.refused(['no_such_frame', 'world'], 'pick', header=header('no_such_frame'), point=Point(0, 0, 0))
+        past = rospy.Time.now() - rospy.Duration(1000)
+        self.refused(['table'], 'pick', header=header('table', past), point=Point(0, 0, 0))
+
+
+class FollowTest(DeformerTestCase):
+    node = '/follower'
+
+    def test_tools_follow_their_frames(self):
+        pick = self.pick_left()
+        frames = Frames(transform('world', 'hand', -0.1, 0.05, 0.1), transform('world', 'ball', 0.0, 0.0, 1.0),
+                        transform('world', 'blades', 0.0, 0.0, 3.0))
+        measured = {tool: self.deformer.recorder(tool + '/measured_cp', PoseStamped)
+                    for tool in ('pick', 'push', 'scissors')}
+        try:
+            measured['pick'].wait(lambda m: abs(m.pose.position.y - 0.05) < 1e-6)
+            measured['push'].wait(lambda m: abs(m.pose.position.z - 1.0) < 1e-6)
+            measured['scissors'].wait(lambda m: abs(m.pose.position.z - 3.0) < 1e-6)
+            state = self.states.next(lambda s: abs(s.picks[0].target.y - 0.05) < 1e-6)
+            self.assertEqual(pick.pick_id, state.picks[0].pick_id)
+            frames.transforms[0].transform.translation.y = 0.08
+            self.states.next(lambda s: abs(s.picks[0].target.y - 0.08) < 1e-6)
+        finally:
+            frames.close()
+            for recorder in measured.values():
+                recorder.close()
+
+
+if __name__ == '__main__':
+    run('tools', StreamTest, InputFrameTest, FollowTest)

@@ -1,0 +1,267 @@
+#!/usr/bin/env python3
+"""Markers, points, state, events and diagnostics; and that nothing is built for nobody."""
+import os
+import struct
+import sys
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Point
+from meshless_surgery.msg import Event
+from sensor_msgs.msg import PointCloud2, PointField
+from shape_msgs.msg import SolidPrimitive
+from visualization_msgs.msg import Marker, MarkerArray
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from deformer_support import ACROSS_X, DeformerTestCase, pose_stamped, run  # noqa: E402
+
+
+def of(array, ns, action):
+    return [m for m in array.markers if m.ns == ns and m.action == action]
+
+
+def area_of(points):
+    total = 0.0
+    for a, b, c in zip(points[0::3], points[1::3], points[2::3]):
+        u = (b.x - a.x, b.y - a.y, b.z - a.z)
+        v = (c.x - a.x, c.y - a.y, c.z - a.z)
+        n = (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
+        area = 0.5 * sum(x * x for x in n) ** 0.5
+        if area == 0.0:
+            raise AssertionError('a triangle without an area')
+        total += area
+    return total
+
+
+class MarkersTest(DeformerTestCase):
+
+    def setUp(self):
+        super().setUp()
+        self.markers = self.deformer.recorder('markers', MarkerArray)
+
+    def tearDown(self):
+        self.markers.close()
+        super().tearDown()
+
+    def test_who_comes_late_gets_the_full_set_even_while_nothing_moves(self):
+        for _ in range(3):
+            late = self.deformer.recorder('markers', MarkerArray)
+            first = late.wait(lambda array: of(array, '', Marker.DELETEALL))
+            bodies = of(first, 'bodies', Marker.ADD)
+            self.assertEqual(2, len(bodies))
+            for body in bodies:
+                self.assertEqual(Marker.TRIANGLE_LIST, body.type)
+                self.assertEqual('world', body.header.frame_id)
+                self.assertAlmostEqual(0.06, area_of(body.points), places=6)
+            late.close()
+
+    def test_a_cut_deletes_the_parent_and_adds_the_pieces_with_their_inside(self):
+        before = self.markers.wait(lambda array: len(of(array, 'bodies', Marker.ADD)) == 2)
+        old = {m.id: m.color for m in of(before, 'bodies', Marker.ADD)}
+        since = self.markers.count()
+        answer = self.good('cut', blades=pose_stamped(-0.19, -1.0, 0.1, ACROSS_X))
+        after = self.markers.wait(lambda array: of(array, 'bodies', Marker.DELETE), since)
+        gone = of(after, 'bodies', Marker.DELETE)
+        self.assertEqual(1, len(gone))
+        self.assertIn(gone[0].id, old)
+        now = of(after, 'bodies', Marker.ADD)
+        self.assertEqual(3, len(now))
+        pieces = [m for m in now if m.id not in old]
+        self.assertEqual(2, len(pieces))
+        for piece in pieces:
+            self.assertEqual(old[gone[0].id], piece.color)
+            self.assertEqual(len(piece.points), 3 * len(piece.colors))
+            inside = [p for t, color in enumerate(piece.colors) if color != piece.color
+                      for p in piece.points[3 * t:3 * t + 3]]
+            self.assertAlmostEqual(answer.cap_area, area_of(inside), places=6)
+
+    def test_a_reset_begins_with_delete_all(self):
+        self.markers.wait(lambda array: len(of(array, 'bodies', Marker.ADD)) == 2)
+        since = self.markers.count()
+        self.good('reset')
+        array = self.markers.wait(lambda array: of(array, '', Marker.DELETEALL), since)
+        self.assertEqual(Marker.DELETEALL, array.markers[0].action)
+        self.assertEqual(2, len(of(array, 'bodies', Marker.ADD)))
+
+    def test_ids_stay_while_bodies_move(self):
+        first = self.markers.wait(lambda array: len(of(array, 'bodies', Marker.ADD)) == 2)
+        pick = self.pick_left()
+        self.good('move_pick', pick_id=pick.pick_id, target=Point(-0.1, 0.0, 0.2))
+        since = self.markers.count()
+        self.good('step', steps=10)
+        later = self.markers.wait(lambda array: of(array, 'bodies', Marker.ADD), since)
+        self.assertEqual(sorted(m.id for m in of(first, 'bodies', Marker.ADD)),
+                         sorted(m.id for m in of(later, 'bodies', Marker.ADD)))
+
+    def test_tools_are_shown_while_they_exist(self):
+        self.pick_left()
+        self.good('push', enable=True, radius=0.03, pose=pose_stamped(0.0, 0.0, 1.0))
+        array = self.markers.wait(lambda array: {0, 1, 2} <= {m.id for m in of(array, 'tools', Marker.ADD)})
+        sphere = [m for m in of(array, 'tools', Marker.ADD) if m.type == Marker.SPHERE][0]
+        self.assertAlmostEqual(0.06, sphere.scale.x)
+        self.assertAlmostEqual(1.0, sphere.pose.position.z)
+        springs = [m for m in of(array, 'tools', Marker.ADD) if m.type == Marker.LINE_LIST][0]
+        self.assertEqual(2, len(springs.points))
+        since = self.markers.count()
+        self.good('clear_picks')
+        self.good('push', enable=False)
+        self.markers.wait(lambda array: {0, 1, 2} <= {m.id for m in of(array, 'tools', Marker.DELETE)}, since)
+
+
+class PointsTest(DeformerTestCase):
+
+    def test_every_particle_with_its_body_and_colour(self):
+        points = self.deformer.recorder('points', PointCloud2)
+        cloud = points.wait()
+        fields = {f.name: f for f in cloud.fields}
+        self.assertEqual(['x', 'y', 'z', 'body', 'rgb'], [f.name for f in cloud.fields])
+        self.assertEqual(PointField.UINT32, fields['body'].datatype)
+        self.assertEqual('world', cloud.header.frame_id)
+        state = self.state()
+        self.assertEqual(sum(b.particles for b in state.bodies), cloud.width * cloud.height)
+        self.assertEqual(len(cloud.data), cloud.row_step * cloud.height)
+        numbers = {}
+        for i in range(cloud.width):
+            at = i * cloud.point_step
+            x, = struct.unpack_from('<f', cloud.data, at + fields['x'].offset)
+            body, = struct.unpack_from('<I', cloud.data, at + fields['body'].offset)
+            numbers.setdefault(body, []).append(x)
+        self.assertEqual(2, len(numbers))
+        for xs in numbers.values():
+            self.assertLess(max(xs) - min(xs), 0.101)
+        points.close()
+
+
+class StateTest(DeformerTestCase):
+
+    def test_all_numbers(self):
+        pick = self.pick_left()
+        self.good('move_pick', pick_id=pick.pick_id, target=Point(0.0, 0.0, 0.1))
+        self.good('step', steps=2)
+        state = self.state()
+        self.assertEqual('world', state.header.frame_id)
+        self.assertEqual(2, state.step)
+        self.assertAlmostEqual(2.0 / 120.0, state.sim_time)
+        self.assertEqual(['left', 'right'], sorted(b.name for b in state.bodies))
+        left = [b for b in state.bodies if b.name == 'left'][0]
+        right = [b for b in state.bodies if b.name == 'right'][0]
+        for body in (left, right):
+            self.assertAlmostEqual(1e-3, body.rest_volume, places=9)
+            self.assertAlmostEqual(1.0, body.mass, places=6)
+            self.assertGreater(body.particles, 8)
+            self.assertGreaterEqual(body.triangles, 12)
+            self.assertGreater(body.clusters, 0)
+        self.assertAlmostEqual(1e-3, right.volume, places=9)
+        self.assertAlmostEqual(0.06, right.area, places=6)
+        self.assertAlmostEqual(0.2, right.centre_of_mass.x, delta=0.01)
+        self.assertLess(right.kinetic_energy, 1e-12)
+        self.assertGreater(left.velocity.x, 0.0)
+        self.assertGreater(left.kinetic_energy, 0.0)
+        spring = state.picks[0]
+        self.assertEqual((pick.pick_id, 'left', False), (spring.pick_id, spring.body, spring.locked))
+        self.assertGreater(spring.force.x, 0.0)
+        self.assertGreater(spring.target.x, spring.position.x)
+
+    def test_a_paused_world_simulates_nothing(self):
+        self.states.next(lambda state: state.real_time_factor == 0.0)
+
+    def test_a_running_world_says_how_fast(self):
+        self.good('pause', data=False)
+        state = self.states.next(lambda state: state.real_time_factor > 0.0)
+        self.assertGreater(state.step, 0)
+
+
+class EventsTest(DeformerTestCase):
+
+    def test_what_happens_is_said_once(self):
+        events = self.deformer.recorder('events', Event)
+        pick = self.pick_left()
+        self.good('lock', pick_id=pick.pick_id)
+        self.good('release', pick_id=pick.pick_id)
+        self.good('step', steps=3)
+        self.good('spawn', name='new', pose=pose_stamped(0, 0, 1),
+                  primitive=SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.1, 0.1, 0.1]))
+        self.good('remove', name='new')
+        self.good('cut', blades=pose_stamped(-0.19, -1.0, 0.1, ACROSS_X))
+        self.good('reset')
+        events.wait(lambda event: event.type == 'reset')
+        said = [(e.type, e.body) for e in events.messages]
+        for wanted in (('picked', 'left'), ('locked', 'left'), ('released', 'left'), ('spawned', 'new'),
+                       ('removed', 'new'), ('cut', 'left'), ('reset', '')):
+            self.assertEqual(1, said.count(wanted), '%s in %s' % (wanted, said))
+        by_type = {e.type: e for e in events.messages}
+        self.assertEqual(pick.pick_id, by_type['picked'].pick_id)
+        self.assertEqual(0, by_type['picked'].step)
+        self.assertEqual(3, by_type['cut'].step)
+        self.assertAlmostEqual(3.0 / 120.0, by_type['cut'].sim_time)
+        for event in events.messages:
+            self.assertEqual('world', event.header.frame_id)
+            self.assertNotEqual('', event.text)
+        events.close()
+
+    def test_the_push_sphere_touches(self):
+        events = self.deformer.recorder('events', Event)
+        self.good('push', enable=True, radius=0.03, pose=pose_stamped(-0.3, 0.0, 0.1))
+        self.good('push', enable=True, radius=0.03, pose=pose_stamped(-0.2, 0.0, 0.1), speed=0.2)
+        self.good('step', steps=60)
+        self.assertEqual('left', events.wait(lambda event: event.type == 'touched').body)
+        events.close()
+
+
+class DiagnosticsTest(DeformerTestCase):
+
+    def setUp(self):
+        super().setUp()
+        self.diagnostics = self.deformer.recorder('/diagnostics', DiagnosticArray)
+
+    def tearDown(self):
+        self.diagnostics.close()
+        super().tearDown()
+
+    def values(self):
+        """Of the second array from now: the first may have been on its way."""
+        since = self.diagnostics.count()
+        self.diagnostics.wait(since=since)
+        array = self.diagnostics.wait(since=since + 1)
+        status = [s for s in array.status if 'deformer' in s.name and 'simulation' in s.name]
+        self.assertEqual(1, len(status))
+        return status[0], {v.key: v.value for v in status[0].values}
+
+    def test_rates_and_rejected_input(self):
+        _, before = self.values()
+        for key in ('step rate [Hz]', 'real-time factor', 'overruns', 'rejected input'):
+            self.assertIn(key, before)
+        self.call('release', pick_id=4000000000)
+        self.call('cut', blades=pose_stamped(float('nan')))
+        _, after = self.values()
+        self.assertEqual(int(before['rejected input']) + 2, int(after['rejected input']))
+        self.assertIn('~cut', after['last rejection'])
+
+    def test_a_miss_is_no_rejected_input(self):
+        _, before = self.values()
+        self.assertFalse(self.call('pick', point=Point(0, 0, 50), max_distance=0.01).success)
+        _, after = self.values()
+        self.assertEqual(before['rejected input'], after['rejected input'])
+
+    def test_nothing_is_built_for_nobody(self):
+        self.states.close()
+        self.good('pause', data=False)
+        self.good('step', steps=10)
+        self.values()
+        _, before = self.values()
+        self.good('step', steps=100)
+        _, after = self.values()
+        self.assertGreater(int(after['steps']), int(before['steps']))
+        for key in ('marker arrays built', 'point clouds built', 'states built'):
+            self.assertEqual(before[key], after[key], key)
+        markers = self.deformer.recorder('markers', MarkerArray)
+        markers.wait()
+        _, watched = self.values()
+        self.assertGreater(int(watched['marker arrays built']), int(after['marker arrays built']))
+        self.assertEqual(after['point clouds built'], watched['point clouds built'])
+        markers.close()
+        self.good('pause', data=True)
+
+
+if __name__ == '__main__':
+    run('topics', MarkersTest, PointsTest, StateTest, EventsTest, DiagnosticsTest)
