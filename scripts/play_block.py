@@ -16,10 +16,11 @@ def scenario(surgeon, play):
     block = surgeon.body("block")
     play.check(block.tetrahedra == 32, "the block has %d tetrahedra" % block.tetrahedra)
     surgeon.live(0.1)
-    before = surgeon.body("block")
-    centre = named(surgeon.state(), "block").centre_of_mass
-    cut = surgeon.cut(pivot=(centre.x, centre.y - 1, centre.z), reach=(0, 1, 0), normal=(1, 0, 0.35))
-    pieces = [surgeon.body(n) for n in cut.new_bodies]
+    with surgeon.still():
+        before = surgeon.body("block")
+        centre = named(surgeon.state(), "block").centre_of_mass
+        cut = surgeon.cut(pivot=(centre.x, centre.y - 1, centre.z), reach=(0, 1, 0), normal=(1, 0, 0.35))
+        pieces = [surgeon.body(n) for n in cut.new_bodies]
     difference = abs(sum(p.volume for p in pieces) / before.volume - 1)
     play.check(len(pieces) == 2 and difference < 1e-9,
                "cut in two in the air: volumes add up to %.1e, masses to %.1e" % (
@@ -31,10 +32,12 @@ def scenario(surgeon, play):
     play.check(apart > 0.03, "the halves lie %.0f mm apart" % (1e3 * apart))
     names = []
     for name in cut.new_bodies:
-        whole = surgeon.body(name)
-        centre = named(surgeon.state(), name).centre_of_mass
-        again = surgeon.cut(pivot=(centre.x - 1, centre.y, centre.z), reach=(1, 0, 0), normal=(0, 1, 0), bodies=[name])
-        parts = [surgeon.body(n) for n in again.new_bodies]
+        with surgeon.still():
+            whole = surgeon.body(name)
+            centre = named(surgeon.state(), name).centre_of_mass
+            again = surgeon.cut(pivot=(centre.x - 1, centre.y, centre.z), reach=(1, 0, 0), normal=(0, 1, 0),
+                                bodies=[name])
+            parts = [surgeon.body(n) for n in again.new_bodies]
         difference = abs(sum(p.volume for p in parts) / whole.volume - 1)
         play.check(difference < 1e-9, "%s cut again into %s: volumes add up to %.1e" % (
             name, ", ".join(again.new_bodies), difference))

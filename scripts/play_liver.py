@@ -36,10 +36,11 @@ def scenario(surgeon, play):
     surgeon.lift_push()
     surgeon.live(0.5)
 
-    before = surgeon.body("liver")
-    xs = [v.x for v in before.surface.vertices]
-    cut = surgeon.cut(pivot=(min(xs) + 0.3 * (max(xs) - min(xs)), -1, 0.1), reach=(0, 1, 0), normal=(1, 0, 0.2))
-    after = [surgeon.body(name) for name in cut.new_bodies]
+    with surgeon.still():
+        before = surgeon.body("liver")
+        xs = [v.x for v in before.surface.vertices]
+        cut = surgeon.cut(pivot=(min(xs) + 0.3 * (max(xs) - min(xs)), -1, 0.1), reach=(0, 1, 0), normal=(1, 0, 0.2))
+        after = [surgeon.body(name) for name in cut.new_bodies]
     difference = abs(sum(b.volume for b in after) / before.volume - 1)
     play.check(len(after) >= 2 and difference < 1e-9,
                "cut %s into %s in %.1f ms; cap %.1f cm^2; volumes add up to %.1e" % (

@@ -9,6 +9,7 @@ A method whose service answers success=false raises Refused with the service's m
 """
 
 import argparse
+import contextlib
 import math
 import sys
 
@@ -68,7 +69,7 @@ class Surgeon:
         self.timeout = timeout
         self._proxies = {}
 
-    def call(self, name, service, **fields):
+    def call(self, name, service, /, **fields):
         if name not in self._proxies:
             rospy.wait_for_service(self.node + "/" + name, self.timeout)
             self._proxies[name] = rospy.ServiceProxy(self.node + "/" + name, service, persistent=True)
@@ -134,6 +135,17 @@ class Surgeon:
 
     def reset(self):
         return self.call("reset", Trigger)
+
+    @contextlib.contextmanager
+    def still(self):
+        """Time stands still inside: what is measured before and after an act then differs by the act alone."""
+        if not self._paused:
+            self.pause(True)
+        try:
+            yield
+        finally:
+            if not self._paused:
+                self.pause(False)
 
     def live(self, seconds, rate=None):
         """Lets simulated time pass: while the world runs, by waiting for it; while it is paused, by stepping it."""

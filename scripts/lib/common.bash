@@ -27,7 +27,7 @@ lastLine() {
 }
 
 # Seconds that a step may take in silence: what has nothing to do is done by then.
-quiet_seconds=4
+quiet_seconds=6
 
 # showProgress TITLE LOG PARENT: a line that counts up on a terminal, a line every 30 s in a file or a pipe.
 showProgress() {

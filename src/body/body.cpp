@@ -5,6 +5,14 @@
 
 namespace meshless {
 
+std::vector<double> matchMasses(const std::vector<double>& masses, const std::vector<bool>& fixed) {
+  constexpr double kHeld = 50.0;  // enough that a cluster follows its held part, little enough to stay well conditioned
+  std::vector<double> heavy = masses;
+  for (std::size_t i = 0; i < heavy.size(); ++i)
+    if (fixed[i]) heavy[i] *= kHeld;
+  return heavy;
+}
+
 BodyModelPtr withMaterial(const BodyModelPtr& model, const Material& before, const Material& after) {
   const bool new_masses = before.density != after.density;
   const bool needs_quadratic = after.mode == MatchMode::kQuadratic && model->shape.quadratic.empty();
@@ -13,14 +21,15 @@ BodyModelPtr withMaterial(const BodyModelPtr& model, const Material& before, con
   if (new_masses) {
     const double ratio = after.density / before.density;
     for (double& m : changed->masses) m *= ratio;
+    for (double& m : changed->match_masses) m *= ratio;
     changed->mass *= ratio;
     for (double& m : changed->binding.mobility) m /= ratio;
     const bool quadratic = !changed->shape.quadratic.empty();
-    changed->shape = makeRestShape(changed->rest, changed->masses, changed->clusters);
+    changed->shape = makeRestShape(changed->rest, changed->match_masses, changed->clusters);
     if (quadratic || needs_quadratic)
-      addQuadraticRest(changed->rest, changed->masses, changed->clusters, changed->shape);
+      addQuadraticRest(changed->rest, changed->match_masses, changed->clusters, changed->shape);
   } else {
-    addQuadraticRest(changed->rest, changed->masses, changed->clusters, changed->shape);
+    addQuadraticRest(changed->rest, changed->match_masses, changed->clusters, changed->shape);
   }
   return changed;
 }
@@ -30,7 +39,7 @@ void updateSurface(const BodyModel& model, BodyState& state) {
   for (std::size_t v = 0; v < state.surface.size(); ++v)
     if (model.binding.particle[v] != kNoIndex) state.surface[v] = state.positions[model.binding.particle[v]];
   if (model.binding.riders.empty()) return;
-  fitClusters({model.rest, model.masses, model.clusters, model.shape}, state.positions, state.poses);
+  fitClusters(matchInput(model), state.positions, state.poses);
   for (Index r = 0; r < model.binding.riders.size(); ++r)
     state.surface[model.binding.riders[r]] = riderPosition(model, state.poses, r) + state.rider_offsets[r];
 }

@@ -157,14 +157,15 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
         child->graph = makeGraph(child->rest, {});
       }
     for (double m : child->masses) child->mass += m;
+    child->match_masses = matchMasses(child->masses, child->fixed);
 
     PieceClusters clusters = splitClusters(model.clusters, child->rest, child->graph, members[p]);
     result.kept_clusters += clusters.kept;
     result.rebuilt_clusters += clusters.rebuilt;
     child->clusters = std::move(clusters.clusters);
-    child->shape = makeRestShape(child->rest, child->masses, child->clusters);
+    child->shape = makeRestShape(child->rest, child->match_masses, child->clusters);
     if (!model.shape.quadratic.empty())
-      addQuadraticRest(child->rest, child->masses, child->clusters, child->shape);
+      addQuadraticRest(child->rest, child->match_masses, child->clusters, child->shape);
 
     std::vector<Index> vertex_particle;
     std::vector<bool> taken(child->rest.size(), false);
@@ -177,10 +178,10 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
       if (mine != kNoIndex) taken[mine] = true;
       vertex_particle.push_back(mine);
     }
-    child->binding = bindSurface(child->rest, child->masses, child->clusters, child->shape, child->surface.vertices,
+    child->binding = bindSurface(child->rest, child->match_masses, child->clusters, child->shape, child->surface.vertices,
                                  std::move(vertex_particle));
     piece.state.poses.resize(child->clusters.size());
-    fitClusters({child->rest, child->masses, child->clusters, child->shape}, piece.state.positions, piece.state.poses);
+    fitClusters(matchInput(*child), piece.state.positions, piece.state.poses);
     piece.state.surface = from.mesh.vertices;
     for (Index r = 0; r < child->binding.riders.size(); ++r)
       piece.state.rider_offsets.push_back(from.mesh.vertices[child->binding.riders[r]] -

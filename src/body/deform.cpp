@@ -66,7 +66,7 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
 
   const double gain = stiffnessGain(material.alpha, h);
   if (gain > 0.0) {
-    matchShapes({model.rest, model.masses, model.clusters, model.shape}, y, material.mode,
+    matchShapes(matchInput(model), y, material.mode,
                 std::min(material.beta, kMostBeta), state.poses,
                 scratch.goals, counters);
     const Points& goals = scratch.goals;

@@ -184,17 +184,18 @@ Result<PreparedBody> prepareBody(BodyDef def) {
 
   model->masses = shareMass(def, surface, solid.get(), model->rest, volume, model->spacing);
   for (double m : model->masses) model->mass += m;
-  model->graph = linkParticles(model->rest, surface, vertex_particle, kReach * model->spacing, solid.get());
-  model->clusters = makeClusters(model->rest, model->graph, def.clusters);
-  model->shape = makeRestShape(model->rest, model->masses, model->clusters);
-  if (def.material.mode == MatchMode::kQuadratic)
-    addQuadraticRest(model->rest, model->masses, model->clusters, model->shape);
-  model->binding = bindSurface(model->rest, model->masses, model->clusters, model->shape, surface.vertices,
-                               std::move(vertex_particle));
   model->fixed.assign(model->rest.size(), false);
   for (std::size_t i = 0; i < model->rest.size(); ++i)
     for (const Box& box : def.fixed)
       if (box.contains(model->rest[i])) model->fixed[i] = model->any_fixed = true;
+  model->match_masses = matchMasses(model->masses, model->fixed);
+  model->graph = linkParticles(model->rest, surface, vertex_particle, kReach * model->spacing, solid.get());
+  model->clusters = makeClusters(model->rest, model->graph, def.clusters);
+  model->shape = makeRestShape(model->rest, model->match_masses, model->clusters);
+  if (def.material.mode == MatchMode::kQuadratic)
+    addQuadraticRest(model->rest, model->match_masses, model->clusters, model->shape);
+  model->binding = bindSurface(model->rest, model->match_masses, model->clusters, model->shape, surface.vertices,
+                               std::move(vertex_particle));
 
   PreparedBody body;
   body.state.positions = model->rest;

@@ -18,7 +18,7 @@ struct ClusterPush {
 std::size_t pushRiders(const BodyModel& model, const Obstacle& obstacle, BodyState& state, std::vector<bool>* touched,
                        Vec3* impulse) {
   const SurfaceBinding& binding = model.binding;
-  const MatchInput input{model.rest, model.masses, model.clusters, model.shape};
+  const MatchInput input = matchInput(model);
   fitClusters(input, state.positions, state.poses);
   std::vector<Index> hit;
   for (Index r = 0; r < binding.riders.size(); ++r)

@@ -9,7 +9,8 @@ namespace meshless {
 /// stand together, ordered by particle. A penetration for which no direction can be found keeps depth 0 and a zero
 /// direction.
 ///
-/// - Edges of a with one end inside b leave b's boundary at a point with a normal. (Exactly: the face's own normal, where
+/// - Edges of a with one end inside b leave b's boundary at a point with a normal. (Exactly: the face's own normal,
+/// where
 ///   the paper interpolates the vertices'; and the exit nearest to the inner end.) A particle with such edges takes the
 ///   mean of their depths and normals, weighted with 1 / distance^2.
 /// - The others take the mean over their neighbours that are done, layer by layer.

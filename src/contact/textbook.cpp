@@ -11,8 +11,8 @@
 namespace meshless {
 namespace {
 
-constexpr double kFlat = 1e-10;      // a tetrahedron whose volume is below this times its cubed size holds nothing
-constexpr double kOnFace = 1e-10;    // barycentric slack, so that no particle is lost between two tetrahedra
+constexpr double kFlat = 1e-10;    // a tetrahedron whose volume is below this times its cubed size holds nothing
+constexpr double kOnFace = 1e-10;  // barycentric slack, so that no particle is lost between two tetrahedra
 constexpr std::int64_t kMaxCellsOfTetrahedron = 512;
 
 bool canContain(const ContactBody& body) { return body.mesh && !body.mesh->tetrahedra.empty(); }

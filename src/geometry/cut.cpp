@@ -1,4 +1,4 @@
-// The stages of a cut, one after the other. docs: DESIGN.md section 4, "Surface".
+// The stages of a cut, one after the other: heights and sides, the rim, the cap, pairing and umbrellas, solids, checks.
 #include "meshless_surgery/geometry/cut.h"
 
 #include <algorithm>

@@ -229,11 +229,11 @@ void subdivide(const Triangle& t, const std::array<Index, 3>& middles, std::vect
   for (std::size_t k = 1; k + 1 < outline.size(); ++k) parts.push_back({outline[0], outline[k], outline[k + 1]});
 }
 
-/// Two pairs of triangles may run between the same two vertices, where a surface touches itself along an edge on the
-/// plane and hangs together at both ends. All but the first get a vertex inside of the edge. `shell_of`, `place_of`:
+/// Two pairs of triangles may run between the same two vertices, where a surface touches itself along an edge
+/// at the plane and hangs together at both ends. All but the first get a vertex inside of the edge. `shell_of`, `place_of`:
 /// for each triangle near the plane its shell (kNoIndex: none) and its number there. False where it cannot be done.
-bool splitDoubleEdges(const Workpiece& work, const Pairing& pairing, const std::vector<Index>& shell_of,
-                      const std::vector<Index>& place_of, std::vector<Shell>& shells) {
+bool splitDoubleEdges(const Pairing& pairing, const std::vector<Index>& shell_of, const std::vector<Index>& place_of,
+                      std::vector<Shell>& shells) {
   struct Pair {
     Index shell, low, high;
     Corner corner;
@@ -372,7 +372,7 @@ Result<std::vector<Shell>> shellsOf(const Workpiece& work, const std::vector<Ind
     piece.mesh.triangles.push_back(triangle);
     piece.mesh.patches.push_back(surface.patches[t]);
   }
-  if (!splitDoubleEdges(work, pairing, near_shell, near_place, shells))
+  if (!splitDoubleEdges(pairing, near_shell, near_place, shells))
     return Error{ErrorCode::kUnsuitableShape, "the surface crosses itself where it is cut, at more places than the new "
                                               "vertices there can be made from"};
   for (Shell& shell : shells) shell.volume = signedVolume(shell.piece.mesh);

@@ -24,7 +24,8 @@ Result<fs::path> expandPackage(const std::string& path, const FileAccess& access
   if (package.empty() || slash == std::string::npos)
     return Error{ErrorCode::kInvalidArgument, "file is '" + path + "'; accepted: package://PACKAGE/PATH"};
   if (!access.find_package)
-    return Error{ErrorCode::kForbidden, "file is '" + path + "', and packages are not looked up here; accepted: a path"};
+    return Error{ErrorCode::kForbidden,
+                 "file is '" + path + "', and packages are not looked up here; accepted: a path"};
   const std::string folder = access.find_package(package);
   if (folder.empty())
     return Error{ErrorCode::kUnknownName, "there is no package '" + package + "' (of '" + path + "')"};
@@ -36,7 +37,8 @@ Result<fs::path> expandPackage(const std::string& path, const FileAccess& access
 Result<std::string> FileAccess::resolve(const std::string& path, const std::string& base_folder) const {
   if (path.empty()) return Error{ErrorCode::kInvalidArgument, "the file's name is empty; accepted: a path"};
   if (path.find('\0') != std::string::npos || path.size() > 4096)
-    return Error{ErrorCode::kInvalidArgument, "the file's name is no path; accepted: up to 4096 characters without NUL"};
+    return Error{ErrorCode::kInvalidArgument,
+                 "the file's name is no path; accepted: up to 4096 characters without NUL"};
   fs::path wanted;
   if (path.compare(0, kPackageScheme.size(), kPackageScheme) == 0) {
     Result<fs::path> expanded = expandPackage(path, *this);

@@ -28,7 +28,8 @@ const char* const kPlainName = "1 to 64 letters, digits, '_', '-' or '.'";
 
 bool isPlainName(const std::string& name) {
   return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' || c == '.';
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
+           c == '.';
   });
 }
 
@@ -78,7 +79,8 @@ Result<std::map<std::string, Material>> readMaterials(const std::string& folder)
   std::error_code failed;
   for (fs::directory_iterator at(folder, failed), end; !failed && at != end; at.increment(failed))
     if (at->path().extension() == ".yaml" && at->is_regular_file(failed)) files.push_back(at->path());
-  if (failed) return Error{ErrorCode::kUnreadable, "cannot read the materials in '" + folder + "': " + failed.message()};
+  if (failed)
+    return Error{ErrorCode::kUnreadable, "cannot read the materials in '" + folder + "': " + failed.message()};
   std::sort(files.begin(), files.end());
   std::map<std::string, Material> materials;
   for (const fs::path& file : files) {

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cctype>
+#include <cerrno>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -43,6 +43,14 @@ std::string lower(std::string text) {
   return text;
 }
 
+/// For a message.
+std::string printable(std::string text) {
+  text = text.substr(0, 60);
+  for (char& c : text)
+    if (!std::isprint(static_cast<unsigned char>(c))) c = '?';
+  return text;
+}
+
 /// The start of the file, as far as a header may reach.
 std::string headOf(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
@@ -72,18 +80,51 @@ Result<PromisedCounts> checkPly(const std::string& path, std::uintmax_t bytes) {
   std::istringstream head(text);
   double points = std::nan(""), faces = 0.0, properties = 0.0;
   bool ended = false;
+  std::string element;
+  std::vector<std::string> names;  // of the element's properties
+  // PCL aborts the process on lists where it expects none: the header must be one that it knows.
+  const auto isType = [](const std::string& word) {
+    for (const char* type : {"char", "uchar", "short", "ushort", "int", "uint", "float", "double", "int8", "uint8",
+                             "int16", "uint16", "int32", "uint32", "float32", "float64"})
+      if (word == type) return true;
+    return false;
+  };
+  const auto isWhole = [&](const std::string& word) {
+    return isType(word) && word.compare(0, 5, "float") != 0 && word != "double";
+  };
   for (std::string line; !ended && std::getline(head, line);) {
     const std::vector<std::string> w = words(line);
+    const auto bad = [&] { return unreadable(path, "has a damaged header: '" + printable(line) + "'"); };
     if (w.empty()) continue;
-    ended = w[0] == "end_header";
-    if (w[0] == "property") properties += 1.0;
-    if (w[0] != "element" || w.size() < 3) continue;
-    const double n = count(w[2]);
-    // No element is shorter than a byte.
-    if (!(n <= static_cast<double>(bytes))) return unreadable(path, "promises " + w[2].substr(0, 30) + " of " +
-                                                                        w[1].substr(0, 30) + " and is truncated");
-    if (w[1] == "vertex") points = n;
-    if (w[1] == "face") faces = n;
+    if (w[0] == "comment" || w[0] == "obj_info" || w[0] == "ply" || w[0] == "format") continue;
+    if (w[0] == "end_header") {
+      ended = true;
+    } else if (w[0] == "property" && w.size() == 3) {
+      // A coordinate of a whole-number type is one that no cloud has room for.
+      const bool coordinate = element == "vertex" && (w[2] == "x" || w[2] == "y" || w[2] == "z");
+      if (element.empty() || !isType(w[1]) || (coordinate && isWhole(w[1]))) return bad();
+      if (std::find(names.begin(), names.end(), w[2]) != names.end()) return bad();
+      names.push_back(w[2]);
+      properties += 1.0;
+    } else if (w[0] == "property" && w.size() == 5 && w[1] == "list") {
+      const bool corners = w[4] == "vertex_indices" || w[4] == "vertex_index";
+      if (element != "face" || !corners || !isWhole(w[2]) || !isWhole(w[3]) || !names.empty()) return bad();
+      names.push_back(w[4]);
+    } else if (w[0] == "element" && w.size() == 3) {
+      const double n = count(w[2]);
+      // No element is shorter than a byte.
+      if (!(n <= static_cast<double>(bytes)))
+        return unreadable(path, "promises " + printable(w[2]) + " of " + printable(w[1]) + " and is truncated");
+      element = w[1];
+      names.clear();
+      if (element == "camera" && n == 1.0) continue;  // PCL's own files have it
+      if (element != "vertex" && element != "face")
+        return unreadable(path, "has the element '" + printable(element) + "'; accepted: vertex, face");
+      if (element == "vertex" ? !std::isnan(points) || faces > 0.0 : std::isnan(points)) return bad();
+      (element == "vertex" ? points : faces) = n;
+    } else {
+      return bad();
+    }
   }
   if (!ended) return unreadable(path, "has a truncated header: it has no end_header");
   if (std::isnan(points)) points = 0.0;
@@ -145,11 +186,14 @@ Result<PromisedCounts> checkBeforeReading(const std::string& path, MeshFormat fo
   if (bytes > kMaxBytes)
     return unreadable(path, "has " + std::to_string(bytes) + " bytes; accepted: up to 536870912 (512 MiB)");
   switch (format) {
-    case MeshFormat::kPly: return checkPly(path, bytes);
-    case MeshFormat::kStl: return checkStl(path, bytes);
+    case MeshFormat::kPly:
+      return checkPly(path, bytes);
+    case MeshFormat::kStl:
+      return checkStl(path, bytes);
     case MeshFormat::kPcd:  // for these, what makes them plain looks at every number
     case MeshFormat::kVtk:
-    case MeshFormat::kObj: break;
+    case MeshFormat::kObj:
+      break;
   }
   return PromisedCounts{};
 }

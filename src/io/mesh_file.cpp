@@ -95,7 +95,8 @@ bool copyPoints(const pcl::PCLPointCloud2& cloud, Points& points) {
   return true;
 }
 
-/// A fan of triangles from a corner that sees the others, so that a polygon that is not convex keeps its shape if it can.
+/// A fan of triangles from a corner that sees the others, so that a polygon that is not convex keeps its shape if it
+/// can.
 void addPolygon(const std::vector<Index>& corners, TriangleMesh& mesh) {
   const std::size_t n = corners.size();
   if (n < 3) return;
@@ -124,12 +125,17 @@ void addPolygon(const std::vector<Index>& corners, TriangleMesh& mesh) {
 bool readWithPcl(const std::string& path, MeshFormat format, pcl::PolygonMesh& mesh) {
   const QuietPcl quiet;
   switch (format) {
-    case MeshFormat::kPcd: return pcl::io::loadPCDFile(path, mesh.cloud) == 0;
-    case MeshFormat::kPly: return pcl::io::loadPLYFile(path, mesh) == 0;
-    case MeshFormat::kObj: return pcl::io::loadOBJFile(path, mesh) == 0;
+    case MeshFormat::kPcd:
+      return pcl::io::loadPCDFile(path, mesh.cloud) == 0;
+    case MeshFormat::kPly:
+      return pcl::io::loadPLYFile(path, mesh) == 0;
+    case MeshFormat::kObj:
+      return pcl::io::loadOBJFile(path, mesh) == 0;
     // These two return the number of polygons, 0 for a cloud and for a failure.
-    case MeshFormat::kStl: return pcl::io::loadPolygonFileSTL(path, mesh) > 0;
-    case MeshFormat::kVtk: return pcl::io::loadPolygonFileVTK(path, mesh) >= 0;
+    case MeshFormat::kStl:
+      return pcl::io::loadPolygonFileSTL(path, mesh) > 0;
+    case MeshFormat::kVtk:
+      return pcl::io::loadPolygonFileVTK(path, mesh) >= 0;
   }
   return false;
 }
@@ -153,9 +159,9 @@ Result<TriangleMesh> convert(const pcl::PolygonMesh& read, const PromisedCounts&
     addPolygon(corners, mesh);
   }
   if (mesh.triangles.empty())
-    mesh.vertices.erase(std::remove_if(mesh.vertices.begin(), mesh.vertices.end(),
-                                       [](const Vec3& p) { return !p.allFinite(); }),
-                        mesh.vertices.end());
+    mesh.vertices.erase(
+        std::remove_if(mesh.vertices.begin(), mesh.vertices.end(), [](const Vec3& p) { return !p.allFinite(); }),
+        mesh.vertices.end());
   if (mesh.vertices.empty())
     return Error{ErrorCode::kUnsuitableShape, "'" + name + "' has no points (or none that is finite)"};
   if (mesh.vertices.size() > 2000000)
@@ -182,7 +188,8 @@ Result<TriangleMesh> readMeshFile(const std::string& real_path) {
       if (!plain) return plain.error();
       const MemoryFile file(*plain);
       if (!file.ok()) return Error{ErrorCode::kFailed, "there is no memory to read '" + name + "'"};
-      if (!readWithPcl(file.path(), *format, mesh)) return Error{ErrorCode::kUnreadable, "'" + name + "' cannot be read"};
+      if (!readWithPcl(file.path(), *format, mesh))
+        return Error{ErrorCode::kUnreadable, "'" + name + "' cannot be read"};
     } else if (!readWithPcl(real_path, *format, mesh)) {
       return Error{ErrorCode::kUnreadable, "'" + name + "' cannot be read: it is truncated or damaged"};
     }

@@ -168,8 +168,8 @@ Result<std::string> plainVtk(const std::string& path, PromisedCounts& promised) 
     if (words[0] == "points") {
       const double n = words.size() == 3 ? count(words[1]) : std::nan("");
       if (n > kMaxPoints)
-        return Error{ErrorCode::kUnsuitableShape, "'" + name + "' has " + words[1].substr(0, 30) +
-                                                      " points; accepted: up to 2000000"};
+        return Error{ErrorCode::kUnsuitableShape,
+                     "'" + name + "' has " + words[1].substr(0, 30) + " points; accepted: up to 2000000"};
       if (!text.numbers(binary, words.size() == 3 ? words[2] : "", 3.0 * n, points))
         return unreadable("is truncated or damaged in its POINTS (float or double)");
       has_points = true;
@@ -182,7 +182,8 @@ Result<std::string> plainVtk(const std::string& path, PromisedCounts& promised) 
       if (words[0] != "polygons") continue;
       polygons = checkCells(read, static_cast<double>(points.size() / 3));
       if (polygons < 0.0 || polygons != (offsets ? std::max(0.0, n - 1.0) : n))
-        return unreadable("has damaged polygons: their sizes and corners do not fit their number and that of the points");
+        return unreadable(
+            "has damaged polygons: their sizes and corners do not fit their number and that of the points");
       cells = std::move(read);
     } else if (words[0] == "triangle_strips") {
       return unreadable("has TRIANGLE_STRIPS; accepted: POLYGONS");

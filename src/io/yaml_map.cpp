@@ -66,7 +66,8 @@ std::size_t editDistance(const std::string& a, const std::string& b) {
         continue;
       }
       d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (a[i - 1] != b[j - 1])});
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+        d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
     }
   return d[a.size()][b.size()];
 }
@@ -88,8 +89,8 @@ Result<YAML::Node> parseYaml(const std::string& text, const std::string& name) {
   try {
     const std::vector<YAML::Node> documents = YAML::LoadAll(text);
     if (documents.size() > 1)
-      return Error{ErrorCode::kInvalidArgument, name + ": has " + std::to_string(documents.size()) +
-                                                    " documents; accepted: one"};
+      return Error{ErrorCode::kInvalidArgument,
+                   name + ": has " + std::to_string(documents.size()) + " documents; accepted: one"};
     std::size_t nodes = 0;
     if (documents.empty()) return YAML::Node();
     if (tooLarge(documents.front(), 0, nodes))
@@ -145,8 +146,7 @@ std::string NumberRange::text() const {
   return out.str();
 }
 
-bool readNumber(YamlSource& source, const YAML::Node& node, const std::string& what, NumberRange range,
-                double& value) {
+bool readNumber(YamlSource& source, const YAML::Node& node, const std::string& what, NumberRange range, double& value) {
   double number = 0.0;
   if (!node.IsScalar() || !YAML::convert<double>::decode(node, number)) {
     source.fail(node, what + " is " + shown(node), "a number, " + range.text());
@@ -259,9 +259,10 @@ void YamlMap::finish() {
     if (!entry.first.IsScalar()) continue;
     const std::string& key = entry.first.Scalar();
     if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
-    source_.fail(entry.first,
-                 "unknown key " + shown(entry.first) + " in " + what_ + ", did you mean '" + nearestWord(key, known_) + "'?",
-                 join(known_));
+    source_.fail(
+        entry.first,
+        "unknown key " + shown(entry.first) + " in " + what_ + ", did you mean '" + nearestWord(key, known_) + "'?",
+        join(known_));
   }
 }
 

@@ -198,7 +198,7 @@ void WorldRunner::loop() {
     }
     if (!owed_.empty()) {
       stepOnce();
-      fresh_pace_ = true;
+      due = std::max(due, clock_.now());  // what they took is no backlog
       // Empty now where the step failed.
       if (!owed_.empty() && --owed_.front().left == 0) {
         owed_.front().done.set_value(world_->simTime());

@@ -21,9 +21,9 @@ void makeGrasp(const BodyModel& model, Index centre, double radius, Pick& pick) 
     const auto [d, i] = queue.top();
     queue.pop();
     if (d > distance[i]) continue;
-    const double s = radius > 0.0 ? 1.0 - d / radius : 1.0;
+    const double s = radius > 0.0 ? d / radius : 0.0;
     pick.patch.push_back(i);
-    pick.weights.push_back(model.masses[i] * s * s);
+    pick.weights.push_back(model.masses[i] * (1.0 - s * s) * (1.0 - s * s));
     total += pick.weights.back();
     for (Index k = model.graph.offsets[i]; k < model.graph.offsets[i + 1]; ++k) {
       const Index j = model.graph.neighbours[k];

@@ -8,7 +8,7 @@
 namespace meshless {
 namespace {
 
-constexpr double kGraspSpacings = 3.0;  // radius of a grasp in particle spacings where the scene sets none
+constexpr double kGraspSpacings = 4.0;  // radius of a grasp in particle spacings where the scene sets none
 
 struct Grabbed {
   WorldBody* body = nullptr;

@@ -69,8 +69,7 @@ TEST(MatchAndMove, ReturnsToItsRestShapeFromAnyState) {
       }
       ASSERT_TRUE(test::allFinite(body.state.positions)) << "state " << start;
       std::vector<ClusterPose> poses(1);
-      fitClusters({body.model->rest, body.model->masses, body.model->clusters, body.model->shape}, body.state.positions,
-                  poses);
+      fitClusters(matchInput(*body.model), body.state.positions, poses);
       for (std::size_t i = 0; i < body.state.positions.size(); ++i) {
         const Vec3 home = poses[0].centre + poses[0].rotation * (body.model->rest[i] - body.model->shape.clusters[0].centre);
         EXPECT_LT((body.state.positions[i] - home).norm(), 1e-3 * 0.25) << "mode " << toString(mode) << " state " << start;

@@ -43,8 +43,7 @@ Body lattice(const Vec3& size, int n, double mass = 1.0) {
   const auto at = [&](int i, int j, int k) { return static_cast<Index>((i * (n + 1) + j) * (n + 1) + k); };
   for (int i = 0; i <= n; ++i)
     for (int j = 0; j <= n; ++j)
-      for (int k = 0; k <= n; ++k)
-        body.positions.push_back(size.cwiseProduct(Vec3(i, j, k) / n - Vec3::Constant(0.5)));
+      for (int k = 0; k <= n; ++k) body.positions.push_back(size.cwiseProduct(Vec3(i, j, k) / n - Vec3::Constant(0.5)));
   std::vector<Tetrahedron> tetrahedra;
   const int orders[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
   for (int i = 0; i < n; ++i)
@@ -204,8 +203,8 @@ TEST(Penetrations, AgreeWithBruteForceOnWhoIsInside) {
       bodies.push_back(k % 2 ? ball(0.05 + 0.01 * k, 15, 100 * round + k)
                              : lattice(Vec3(0.1, 0.08, 0.06) * (0.7 + 0.2 * k), 3));
       const Vec3 axis = Vec3(any(random), any(random), any(random)).normalized();
-      move(bodies.back(), {Quat(Eigen::AngleAxisd(3.0 * any(random), axis)),
-                           0.08 * Vec3(any(random), any(random), any(random))});
+      move(bodies.back(),
+           {Quat(Eigen::AngleAxisd(3.0 * any(random), axis)), 0.08 * Vec3(any(random), any(random), any(random))});
       if (round % 3 == 0)  // torn and partly inverted
         for (Vec3& p : bodies.back().positions) p += 0.02 * Vec3(any(random), any(random), any(random));
     }

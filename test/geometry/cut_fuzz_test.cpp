@@ -30,7 +30,7 @@ class CutFuzz : public testing::Test {
     const testing::AssertionResult law = laws::cutObeysLaws(mesh, plane, options, cut, embedded, worn);
     if (!law && ++faults_ <= 10) {
       const std::string path = testing::TempDir() + "cut_" + std::to_string(seed_) + "_" + std::to_string(faults_) + ".obj";
-      shapes::writeCutCase(path, {mesh, plane, embedded});
+      shapes::writeCutCase(path, {mesh, plane, embedded, worn});
       ADD_FAILURE() << name << ": " << law.message() << "\nwritten to " << path;
     }
     if (cut) return std::move(cut->pieces);
@@ -70,6 +70,8 @@ TEST_F(CutFuzz, PiecesOfPieces) {
     if (pieces.empty()) pool.push_back(mesh);
   }
   EXPECT_EQ(faults_, 0);
+  EXPECT_LE(refused_, 0.002 * static_cast<double>(cuts_ / 4));
+  RecordProperty("refused", static_cast<int>(refused_));
 }
 
 TEST_F(CutFuzz, RandomVoxels) {

@@ -328,7 +328,7 @@ TEST(Cut, CorpusOfOldFaults) {
     ++cases;
     const shapes::CutCase c = shapes::readCutCase(entry.path().string());
     ASSERT_FALSE(c.mesh.empty()) << name;
-    EXPECT_TRUE(laws::cutObeysLaws(c.mesh, c.plane, {}, cutByPlane(c.mesh, c.plane), c.embedded)) << name;
+    EXPECT_TRUE(laws::cutObeysLaws(c.mesh, c.plane, {}, cutByPlane(c.mesh, c.plane), c.embedded, c.worn)) << name;
   }
   EXPECT_GT(cases, 0u);
 }

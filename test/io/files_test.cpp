@@ -47,9 +47,9 @@ std::string objText(const TriangleMesh& mesh) {
 
 std::string plyText(const TriangleMesh& mesh, bool binary, bool with_double = false) {
   const std::string type = with_double ? "double" : "float";
-  std::string out = std::string("ply\nformat ") + (binary ? "binary_little_endian" : "ascii") + " 1.0\nelement vertex " +
-                    std::to_string(mesh.vertices.size()) + "\nproperty " + type + " x\nproperty " + type +
-                    " y\nproperty " + type + " z\n";
+  std::string out = std::string("ply\nformat ") + (binary ? "binary_little_endian" : "ascii") +
+                    " 1.0\nelement vertex " + std::to_string(mesh.vertices.size()) + "\nproperty " + type +
+                    " x\nproperty " + type + " y\nproperty " + type + " z\n";
   if (!mesh.triangles.empty())
     out += "element face " + std::to_string(mesh.triangles.size()) + "\nproperty list uchar int vertex_indices\n";
   out += "end_header\n";
@@ -168,19 +168,22 @@ struct Written {
 TriangleMesh thing() { return cylinderMesh(0.1, 0.03, 0.01); }
 
 std::vector<Written> surfaceFiles() {
-  return {{"ascii.obj", objText(thing())},          {"ascii.ply", plyText(thing(), false)},
-          {"binary.ply", plyText(thing(), true)},   {"double.ply", plyText(thing(), true, true)},
-          {"ascii.stl", stlText(thing(), false)},   {"binary.stl", stlText(thing(), true)},
-          {"ascii.vtk", vtkText(thing(), false)},   {"binary.vtk", vtkText(thing(), true)},
+  return {{"ascii.obj", objText(thing())},        {"ascii.ply", plyText(thing(), false)},
+          {"binary.ply", plyText(thing(), true)}, {"double.ply", plyText(thing(), true, true)},
+          {"ascii.stl", stlText(thing(), false)}, {"binary.stl", stlText(thing(), true)},
+          {"ascii.vtk", vtkText(thing(), false)}, {"binary.vtk", vtkText(thing(), true)},
           {"UPPER.OBJ", objText(thing())}};
 }
 
 std::vector<Written> cloudFiles() {
   TriangleMesh cloud = thing();
   cloud.triangles.clear();
-  return {{"ascii.pcd", pcdText(cloud.vertices, false)}, {"binary.pcd", pcdText(cloud.vertices, true)},
-          {"double.pcd", pcdText(cloud.vertices, true, true)}, {"packed.pcd", compressedPcd(cloud.vertices)},
-          {"cloud.ply", plyText(cloud, true)},           {"cloud.obj", objText(cloud)},
+  return {{"ascii.pcd", pcdText(cloud.vertices, false)},
+          {"binary.pcd", pcdText(cloud.vertices, true)},
+          {"double.pcd", pcdText(cloud.vertices, true, true)},
+          {"packed.pcd", compressedPcd(cloud.vertices)},
+          {"cloud.ply", plyText(cloud, true)},
+          {"cloud.obj", objText(cloud)},
           {"cloud.vtk", vtkText(cloud, false)}};
 }
 
@@ -236,24 +239,68 @@ TEST(ReadMeshFile, PolygonsBecomeTriangles) {
 
 TEST(ReadMeshFile, VtkOfVersionFive) {
   const TemporaryFolder folder;
-  const std::string head = "# vtk DataFile Version 5.1\ntitle\nASCII\nDATASET POLYDATA\nPOINTS 4 double\n"
-                           "0 0 0 1 0 0\n0 1 0 0 0 1\n";
-  const std::string text = head + "POLYGONS 5 12\nOFFSETS vtktypeint64\n0 3 6 9 12\nCONNECTIVITY vtktypeint64\n"
-                                  "0 2 1 0 1 3 0 3 2\n1 2 3\n\nPOINT_DATA 4\nSCALARS s float\nnonsense\n";
+  const std::string head =
+      "# vtk DataFile Version 5.1\ntitle\nASCII\nDATASET POLYDATA\nPOINTS 4 double\n"
+      "0 0 0 1 0 0\n0 1 0 0 0 1\n";
+  const std::string text = head +
+                           "POLYGONS 5 12\nOFFSETS vtktypeint64\n0 3 6 9 12\nCONNECTIVITY vtktypeint64\n"
+                           "0 2 1 0 1 3 0 3 2\n1 2 3\n\nPOINT_DATA 4\nSCALARS s float\nnonsense\n";
   const Result<TriangleMesh> read = readMeshFile(folder.write("a.vtk", text));
   ASSERT_TRUE(read.ok()) << read.error().detail;
   EXPECT_EQ(read->triangles.size(), 4u);
   EXPECT_NEAR(signedVolume(*read), 1.0 / 6.0, 1e-7);
-  for (const char* damaged : {"POLYGONS 5 12\nOFFSETS vtktypeint64\n0 3 6 9 99\nCONNECTIVITY vtktypeint64\n0 2 1 0 1 3 0 3 2 1 2 3\n",
-                              "POLYGONS 5 12\nOFFSETS vtktypeint64\n0 3 6 9 12\nCONNECTIVITY vtktypeint64\n0 2 1 0 1 3 0 3 2 1 2 4\n",
-                              "POLYGONS 4 12\n3 0 1 2\n"})
+  for (const char* damaged :
+       {"POLYGONS 5 12\nOFFSETS vtktypeint64\n0 3 6 9 99\nCONNECTIVITY vtktypeint64\n0 2 1 0 1 3 0 3 2 1 2 3\n",
+        "POLYGONS 5 12\nOFFSETS vtktypeint64\n0 3 6 9 12\nCONNECTIVITY vtktypeint64\n0 2 1 0 1 3 0 3 2 1 2 4\n",
+        "POLYGONS 4 12\n3 0 1 2\n"})
     EXPECT_FALSE(readMeshFile(folder.write("b.vtk", head + damaged)).ok()) << damaged;
+}
+
+TEST(ReadMeshFile, PlyAsPclWritesIt) {
+  const TemporaryFolder folder;
+  std::string text =
+      "ply\nformat ascii 1.0\ncomment by PCL\nelement vertex 4\nproperty float x\nproperty float y\n"
+      "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+      "element camera 1\n";
+  for (const char* name :
+       {"view_px", "view_py", "view_pz", "x_axisx", "x_axisy", "x_axisz", "y_axisx", "y_axisy", "y_axisz", "z_axisx",
+        "z_axisy", "z_axisz", "focal", "scalex", "scaley", "centerx", "centery"})
+    text += std::string("property float ") + name + "\n";
+  text +=
+      "property int viewportx\nproperty int viewporty\nproperty float k1\nproperty float k2\nelement face 4\n"
+      "property list uchar int vertex_indices\nend_header\n";
+  const std::string body =
+      "0 0 0 9 9 9\n1 0 0 9 9 9\n0 1 0 9 9 9\n0 0 1 9 9 9\n"
+      "0 0 0 1 0 0 0 1 0 0 0 1 0 0 0 0 0 4 1 0 0\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
+  const Result<TriangleMesh> read = readMeshFile(folder.write("a.ply", text + body));
+  ASSERT_TRUE(read.ok()) << read.error().detail;
+  EXPECT_EQ(read->triangles.size(), 4u);
+  EXPECT_NEAR(signedVolume(*read), 1.0 / 6.0, 1e-7);
+}
+
+TEST(ReadMeshFile, PlyHeadersThatWouldAbortTheProcessAreRefused) {
+  const TemporaryFolder folder;
+  const std::string good = plyText(thing(), false);
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    return text.replace(text.find(from), from.size(), to);
+  };
+  for (const std::string& text :
+       {with("property float y", "property list uchar int y"),
+        with("property list uchar int vertex_indices", "property list uchar int corners"),
+        with("property float z", "property float y"), with("property float y", "property int y"),
+        with("element face", "element edge"), with("end_header", "end_header_")}) {
+    const Result<TriangleMesh> read = readMeshFile(folder.write("a.ply", text));
+    ASSERT_FALSE(read.ok());
+    EXPECT_EQ(read.error().code, ErrorCode::kUnreadable);
+  }
 }
 
 TEST(ReadMeshFile, PcdWithOtherFieldsBetween) {
   const TemporaryFolder folder;
-  std::string text = "FIELDS rgb y normal x z\nSIZE 4 4 4 8 4\nTYPE U F F F F\nCOUNT 1 1 3 1 1\nWIDTH 2\nHEIGHT 1\n"
-                     "POINTS 2\nDATA ";
+  std::string text =
+      "FIELDS rgb y normal x z\nSIZE 4 4 4 8 4\nTYPE U F F F F\nCOUNT 1 1 3 1 1\nWIDTH 2\nHEIGHT 1\n"
+      "POINTS 2\nDATA ";
   const std::string ascii = text + "ascii\n7 2 0 0 1 1 3\n8 5 0 0 1 4 6\n";
   std::string binary = text + "binary\n";
   for (int k = 0; k < 2; ++k) {
@@ -390,8 +437,10 @@ TEST(ReadMeshFile, HeadersThatPromiseTooMuchAreRefusedBeforeMemoryIsTaken) {
   const std::string n = std::to_string(points.size()), triangles = std::to_string(thing().triangles.size());
   for (const std::string huge : {"4000000000", "1999999", "99999999999999999999", "-5"}) {
     for (const Written& file : std::vector<Written>{
-             {"a.pcd", with(with(pcdText(points, true), "WIDTH " + n, "WIDTH " + huge), "POINTS " + n, "POINTS " + huge)},
-             {"b.pcd", with(with(pcdText(points, false), "WIDTH " + n, "WIDTH " + huge), "POINTS " + n, "POINTS " + huge)},
+             {"a.pcd",
+              with(with(pcdText(points, true), "WIDTH " + n, "WIDTH " + huge), "POINTS " + n, "POINTS " + huge)},
+             {"b.pcd",
+              with(with(pcdText(points, false), "WIDTH " + n, "WIDTH " + huge), "POINTS " + n, "POINTS " + huge)},
              {"c.pcd", with(pcdText(points, true), "WIDTH " + n, "WIDTH " + huge)},
              {"d.pcd", with(pcdText(points, true), "COUNT 1", "COUNT " + huge)},
              {"a.ply", with(plyText(thing(), true), "vertex " + n, "vertex " + huge)},
@@ -427,9 +476,8 @@ TEST(ReadMeshFile, NonFinitePointsOfASurfaceAreNamed) {
   const TemporaryFolder folder;
   TriangleMesh mesh = thing();
   mesh.vertices[5].y() = std::numeric_limits<double>::quiet_NaN();
-  for (const Written& file : std::vector<Written>{{"a.ply", plyText(mesh, true)},
-                                                  {"a.obj", objText(mesh)},
-                                                  {"a.vtk", vtkText(mesh, true)}}) {
+  for (const Written& file :
+       std::vector<Written>{{"a.ply", plyText(mesh, true)}, {"a.obj", objText(mesh)}, {"a.vtk", vtkText(mesh, true)}}) {
     const Result<LoadedShape> shape = loadShape(folder.write(file.name, file.content), 1.0);
     ASSERT_FALSE(shape.ok()) << file.name;
     EXPECT_EQ(shape.error().code, ErrorCode::kUnsuitableShape) << file.name << ": " << shape.error().detail;
@@ -588,11 +636,12 @@ struct Access : ::testing::Test {
 TEST_F(Access, FilesBelowAFolderAreFoundByEveryWayOfNamingThem) {
   const std::string scenes = folder.file("allowed/scenes");
   fs::create_directories(scenes);
-  for (const auto& one : std::vector<std::pair<std::string, std::string>>{{inside, "/"},
-                                                                         {"../meshes/a.obj", scenes},
-                                                                         {"a.obj", folder.file("allowed/meshes")},
-                                                                         {"./x/../a.obj", folder.file("allowed/meshes")},
-                                                                         {inside, "anything"}}) {
+  for (const auto& one :
+       std::vector<std::pair<std::string, std::string>>{{inside, "/"},
+                                                        {"../meshes/a.obj", scenes},
+                                                        {"a.obj", folder.file("allowed/meshes")},
+                                                        {"./x/../a.obj", folder.file("allowed/meshes")},
+                                                        {inside, "anything"}}) {
     const Result<std::string> real = access.resolve(one.first, one.second);
     ASSERT_TRUE(real.ok()) << one.first << ": " << real.error().detail;
     EXPECT_EQ(*real, inside);

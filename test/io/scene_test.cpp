@@ -155,7 +155,8 @@ TEST_F(Scene, CopiesFillAGridAndAreTheSameEveryTime) {
   const SceneDef line = good("bodies: [{primitive: {sphere: 0.1}, copies: {count: 3, offset: [0, 0, 1]}}]\n");
   ASSERT_EQ(line.bodies.size(), 3u);
   EXPECT_EQ(line.bodies[2].pose.translation, Vec3(0, 0, 0)) << "a row along x, and the offset has none";
-  EXPECT_EQ(good("bodies: [{primitive: {sphere: 0.1}, copies: {grid: [2, 3, 1], offset: [1, 1, 1]}}]\n").bodies.size(), 6u);
+  EXPECT_EQ(good("bodies: [{primitive: {sphere: 0.1}, copies: {grid: [2, 3, 1], offset: [1, 1, 1]}}]\n").bodies.size(),
+            6u);
 }
 
 TEST_F(Scene, FaultsAreNamedWithFileLineValueAndRange) {
@@ -166,7 +167,9 @@ TEST_F(Scene, FaultsAreNamedWithFileLineValueAndRange) {
   };
   const std::string body = "bodies:\n  - primitive: {sphere: 0.1}\n";
   const std::vector<Case> cases = {
-      {"world:\n  gravty: [0, 0, 0]\nbodies: []\n", 2, {"unknown key 'gravty' in world", "did you mean 'gravity'", "step_rate"}},
+      {"world:\n  gravty: [0, 0, 0]\nbodies: []\n",
+       2,
+       {"unknown key 'gravty' in world", "did you mean 'gravity'", "step_rate"}},
       {"wrld: {}\nbodies: []\n", 1, {"'wrld'", "did you mean 'world'"}},
       {body + "    materail: jelly\n", 3, {"'materail'", "did you mean 'material'"}},
       {body + "    pose: {positon: [0, 0, 0]}\n", 3, {"'positon'", "did you mean 'position'"}},
@@ -228,7 +231,8 @@ TEST_F(Scene, FaultsAreNamedWithFileLineValueAndRange) {
   for (const Case& one : cases) {
     const Error error = bad(one.text);
     for (const std::string& word : one.words) EXPECT_TRUE(says(error, word)) << one.text << error.detail;
-    const std::string place = folder.file("scenes/s.yaml") + (one.line > 0 ? ":" + std::to_string(one.line) + ": " : "");
+    const std::string place =
+        folder.file("scenes/s.yaml") + (one.line > 0 ? ":" + std::to_string(one.line) + ": " : "");
     EXPECT_EQ(error.detail.compare(0, place.size(), place), 0) << one.text << error.detail;
   }
 }
@@ -322,10 +326,14 @@ TEST(ChangeMaterial, ChangesTheKeysItIsGiven) {
 TEST(ChangeMaterial, RefusesWhatItDoesNotKnow) {
   const Material base;
   const std::vector<std::pair<std::string, std::string>> cases = {
-      {"alpha: 2", "material:1: alpha is 2"},       {"alpha: .nan", "alpha is .nan"},
-      {"alhpa: 0.5", "did you mean 'alpha'"},       {"beta: 0.5\ndensity: -1", "material:2: density is -1"},
-      {"0.5", "a map"},                             {"", "a map"},
-      {"{alpha: ", "YAML"},                         {"youngs_modulus: 5000", "not in this version"},
+      {"alpha: 2", "material:1: alpha is 2"},
+      {"alpha: .nan", "alpha is .nan"},
+      {"alhpa: 0.5", "did you mean 'alpha'"},
+      {"beta: 0.5\ndensity: -1", "material:2: density is -1"},
+      {"0.5", "a map"},
+      {"", "a map"},
+      {"{alpha: ", "YAML"},
+      {"youngs_modulus: 5000", "not in this version"},
       {"name: other", "unknown key 'name'"}};
   for (const auto& one : cases) {
     const Result<Material> changed = changeMaterial(base, one.first);
@@ -398,8 +406,11 @@ TEST_F(Shipped, MaterialsArePlausible) {
     EXPECT_GT(material.density, 800.0);
     EXPECT_LT(material.density, 1300.0);
     // A cut shows: the two colours differ.
-    EXPECT_GT(std::abs(material.color.r - material.inside_color.r) + std::abs(material.color.g - material.inside_color.g) +
-                  std::abs(material.color.b - material.inside_color.b), 0.2f) << name;
+    EXPECT_GT(std::abs(material.color.r - material.inside_color.r) +
+                  std::abs(material.color.g - material.inside_color.g) +
+                  std::abs(material.color.b - material.inside_color.b),
+              0.2f)
+        << name;
   }
 }
 

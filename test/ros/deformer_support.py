@@ -101,8 +101,8 @@ class DeformerTestCase(unittest.TestCase):
 
     def setUp(self):
         self.deformer = Deformer(self.node)
-        self.assertTrue(self.call('reset').success)
         self.assertTrue(self.call('pause', data=True).success)
+        self.assertTrue(self.call('reset').success)
         self.states = self.deformer.recorder('state', State)
 
     def tearDown(self):

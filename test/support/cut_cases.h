@@ -193,12 +193,13 @@ struct CutCase {
   TriangleMesh mesh;
   Plane plane;
   bool embedded = true;
+  bool worn = false;  // see laws::cutObeysLaws
 };
 
 inline void writeCutCase(const std::string& path, const CutCase& c) {
   std::ofstream out(path);
   out << std::setprecision(17) << "# plane " << c.plane.normal.transpose() << " " << c.plane.point.transpose() << "\n";
-  out << "# embedded " << c.embedded << "\n";
+  out << "# embedded " << c.embedded << "\n# worn " << c.worn << "\n";
   for (const Vec3& p : c.mesh.vertices) out << "v " << p.transpose() << "\n";
   for (const Triangle& t : c.mesh.triangles) out << "f " << t[0] + 1 << " " << t[1] + 1 << " " << t[2] + 1 << "\n";
 }
@@ -218,6 +219,7 @@ inline CutCase readCutCase(const std::string& path) {
                           &c.plane.point.y(), &c.plane.point.z()})
           words >> *x;
       if (kind == "embedded") words >> c.embedded;
+      if (kind == "worn") words >> c.worn;
     } else if (kind == "v") {
       Vec3 p;
       words >> p.x() >> p.y() >> p.z();

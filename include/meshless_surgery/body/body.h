@@ -23,6 +23,8 @@ struct SurfaceBinding {
 struct BodyModel {
   Points rest;                  // [m] particles
   std::vector<double> masses;   // [kg] > 0
+  /// What shapes are matched with: the masses, and of fixed particles a multiple, so that the body follows what holds it.
+  std::vector<double> match_masses;
   std::vector<bool> fixed;      // held in place
   bool any_fixed = false;
   ParticleGraph graph;
@@ -36,6 +38,14 @@ struct BodyModel {
   double mass = 0.0;            // [kg]
   std::uint32_t next_patch = 1; // for the next cut
 };
+
+/// The model's view for dynamics/shape_matching.h.
+inline MatchInput matchInput(const BodyModel& model) {
+  return {model.rest, model.match_masses, model.clusters, model.shape};
+}
+/// masses with those of fixed particles made heavy.
+std::vector<double> matchMasses(const std::vector<double>& masses, const std::vector<bool>& fixed);
+
 using BodyModelPtr = std::shared_ptr<const BodyModel>;
 
 /// Changes with every step.

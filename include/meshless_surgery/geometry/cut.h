@@ -32,8 +32,11 @@ struct CutOptions {
   std::uint32_t cap_patch = 1;  // the patch id of the new faces
 };
 
-/// Refuses: kMissed where no piece would be on one of the sides; kUnsuitableShape where the surface is open or crosses
-/// itself in a way that no closed pieces can be made of. `mesh` need not be embedded.
+/// Refuses: kInvalidArgument for a plane or options out of range; kMissed where no piece would be on one of the sides, or
+/// one would be no thicker than the band; kUnsuitableShape where the surface is open or crosses itself in a way that no
+/// closed pieces can be made of. `mesh` need not be embedded. Every edge of a piece that came from the plane has exactly
+/// two triangles; parts of the mesh that share a vertex away from the plane stay one piece. The volumes of the pieces add
+/// up to that of the mesh (1e-9 of it, checked). A cut that fails with this band is tried again with narrower ones.
 Result<CutSurface> cutByPlane(const TriangleMesh& mesh, const Plane& plane, const CutOptions& options = {});
 
 /// The blades' rectangle in the plane: origin + s * x_axis + t * y_axis with 0 <= s <= length, |t| <= width / 2.

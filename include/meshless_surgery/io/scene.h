@@ -22,9 +22,10 @@ namespace meshless {
 ///   clusters      auto | one | {grid: [x, y, z], overlap} | {count, overlap}
 ///   material      a name, or a map of keys over the defaults
 ///   fixed         a list of {box: {min, max}}
-///   copies        {count, grid: [x, y, z], offset: [x, y, z], jitter, turn, seed}: the body `count` times, named NAME_1,
-///                 NAME_2 ..., in cells of a grid (x first) `offset` apart, each moved by up to `jitter` [m] along every
-///                 axis and turned by up to `turn` [rad] about any, by a generator that `seed` starts
+///   copies        {count, grid: [x, y, z], offset: [x, y, z], jitter, turn, seed}: the body `count` times, named
+///   NAME_1,
+///                 NAME_2 ..., in cells of a grid (x first) `offset` apart, each moved by up to `jitter` [m] along
+///                 every axis and turned by up to `turn` [rad] about any, by a generator that `seed` starts
 Result<SceneDef> readScene(const std::string& file, const FileAccess& access);
 
 /// Every *.yaml of a folder, by name: a map of names to materials each; later files override earlier ones.

@@ -21,7 +21,7 @@ struct WorldSettings {
   ContactMethod contact = ContactMethod::kTextbook;
   double pick_max_distance = 0.05;    // [m]
   double pick_stiffness = 500.0;      // [N/m]
-  double pick_radius = 0.0;           // [m] of the grasp along the body; 0: three particle spacings
+  double pick_radius = 0.0;           // [m] of the grasp along the body; 0: four particle spacings
   double push_radius = 0.02;          // [m]
 
   Status validate() const;
