@@ -353,6 +353,23 @@ class TimeTest(DeformerTestCase):
             pictures.append(self.picture())
         self.assertEqual(pictures[0], pictures[1])
 
+    def test_looking_changes_nothing(self):
+        self.states.close()
+        shapes = []
+        for looks in (False, True):
+            self.good('reset')
+            pick = self.pick_left()
+            self.good('move_pick', pick_id=pick.pick_id, target=Point(-0.1, 0.05, 0.1))
+            self.good('step', steps=10)
+            pieces = self.good('cut', blades=pose_stamped(-1.0, 0.0, 0.1), bodies=['left']).new_bodies
+            for _ in range(10):
+                self.good('step', steps=1)
+                if looks:
+                    for name in pieces:
+                        self.good('get_body', name=name)
+            shapes.append([self.good('get_body', name=name).particles.data for name in pieces])
+        self.assertEqual(shapes[0], shapes[1])
+
     def test_blades_close_in_simulated_time(self):
         self.good('pause', data=False)
         begun = self.state().step
