@@ -15,13 +15,13 @@ def scenario(surgeon, play):
     picks = []
     for end in (head, tail):
         pick = surgeon.pick((end.x, end.y, end.z), body="fish", stiffness=2000)
-        surgeon.lock(pick.pick_id, (0.7 * end.x, end.y + 0.09, end.z))
+        surgeon.lock(pick.pick_id, (0.65 * end.x, end.y, end.z))
         picks.append(pick)
     surgeon.live(4.0)
     bent = surgeon.body("fish")
     middle = min(bent.surface.vertices, key=lambda v: abs(v.x))
     h, t = (max(bent.surface.vertices, key=lambda v: v.x), min(bent.surface.vertices, key=lambda v: v.x))
-    sagitta = 0.5 * (h.y + t.y) - middle.y
+    sagitta = ((0.5 * (h.y + t.y) - middle.y) ** 2 + (0.5 * (h.z + t.z) - middle.z) ** 2) ** 0.5
     play.check(sagitta > 0.1 * length, "held bent: its middle lies %.0f mm off the line of its ends, %.0f mm apart of %.0f" % (
         1e3 * sagitta, 1e3 * distance(h, t), 1e3 * length))
     locked = [p for p in surgeon.state().picks if p.locked]

@@ -33,25 +33,45 @@ bool hasArea(const Vec3& a, const Vec3& b, const Vec3& c) {
   return ab.cross(ac).norm() > kThinnest * longest;
 }
 
+// rviz lights a triangle list only where it has one colour: a body with cut faces would turn flat. So the light is in
+// the colours, for every body alike: ambient, a lamp over the left shoulder, and a weak one opposite.
+double lightOn(const Vec3& normal) {
+  static const Vec3 lamp = Vec3(-0.35, -0.55, 0.76).normalized();
+  const double facing = normal.dot(lamp);
+  return 0.42 + (facing > 0.0 ? 0.58 * facing : 0.12 * -facing);
+}
+
+std_msgs::ColorRGBA shaded(std_msgs::ColorRGBA color, double light) {
+  color.r = static_cast<float>(color.r * light);
+  color.g = static_cast<float>(color.g * light);
+  color.b = static_cast<float>(color.b * light);
+  return color;
+}
+
 void addBody(const BodySnapshot& body, Marker& marker) {
   const TriangleMesh& mesh = body.model->surface;
   marker.color = toColor(body.material.color);
   marker.scale.x = marker.scale.y = marker.scale.z = 1.0;
-  const bool cut = std::any_of(mesh.patches.begin(), mesh.patches.end(), [](auto p) { return p != kOuterPatch; });
   const auto inside = toColor(body.material.inside_color);
-  marker.points.reserve(3 * mesh.triangles.size());
-  if (cut) marker.colors.reserve(mesh.triangles.size());
+  // Normals are smooth over the outer surface and over all cut faces, each on their own: the rim between stays sharp.
+  Points normals[2];
+  for (Points& n : normals) n.assign(body.surface.size(), Vec3::Zero());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const Triangle& triangle = mesh.triangles[t];
-    const Vec3& a = body.surface[triangle[0]];
-    const Vec3& b = body.surface[triangle[1]];
-    const Vec3& c = body.surface[triangle[2]];
-    if (!hasArea(a, b, c)) continue;
-    marker.points.push_back(toPoint(a));
-    marker.points.push_back(toPoint(b));
-    marker.points.push_back(toPoint(c));
-    // One colour a triangle; a body without cuts is in the marker's.
-    if (cut) marker.colors.push_back(mesh.patchOf(t) == kOuterPatch ? marker.color : inside);
+    const Triangle& corners = mesh.triangles[t];
+    const Vec3& a = body.surface[corners[0]];
+    const Vec3 normal = (body.surface[corners[1]] - a).cross(body.surface[corners[2]] - a);
+    for (const Index v : corners) normals[mesh.patchOf(t) != kOuterPatch][v] += normal;
+  }
+  marker.points.reserve(3 * mesh.triangles.size());
+  marker.colors.reserve(3 * mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Triangle& corners = mesh.triangles[t];
+    if (!hasArea(body.surface[corners[0]], body.surface[corners[1]], body.surface[corners[2]])) continue;
+    const bool cut = mesh.patchOf(t) != kOuterPatch;
+    for (const Index v : corners) {
+      marker.points.push_back(toPoint(body.surface[v]));
+      marker.colors.push_back(shaded(cut ? inside : marker.color, lightOn(normals[cut][v].normalized())));
+    }
   }
 }
 

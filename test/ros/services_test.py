@@ -367,7 +367,8 @@ class TimeTest(DeformerTestCase):
                 if looks:
                     for name in pieces:
                         self.good('get_body', name=name)
-            shapes.append([self.good('get_body', name=name).particles.data for name in pieces])
+            ends = [self.good('get_body', name=name) for name in pieces]
+            shapes.append([(end.particles.data, end.volume, end.area) for end in ends])
         self.assertEqual(shapes[0], shapes[1])
 
     def test_blades_close_in_simulated_time(self):
