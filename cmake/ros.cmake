@@ -38,13 +38,13 @@ endif()
 if(CATKIN_ENABLE_TESTING)
   find_package(rostest REQUIRED)
   # Through catkin_install_python, which names the interpreter: another python3 may come first on the PATH.
-  file(GLOB test_scripts RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS test/ros/*.py)
+  file(GLOB test_scripts RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS test/ros/*.py test/rviz/*.py)
   if(test_scripts)
     #catkin_lint: ignore_once argument_error
     catkin_install_python(PROGRAMS ${test_scripts}
       DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
   endif()
-  file(GLOB ros_tests RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS test/ros/*.test)
+  file(GLOB ros_tests RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS test/ros/*.test test/rviz/*.test)
   foreach(ros_test IN LISTS ros_tests)
     add_rostest(${ros_test} DEPENDENCIES deformer_node)
   endforeach()

@@ -39,9 +39,10 @@ void updateSurface(const BodyModel& model, BodyState& state) {
   for (std::size_t v = 0; v < state.surface.size(); ++v)
     if (model.binding.particle[v] != kNoIndex) state.surface[v] = state.positions[model.binding.particle[v]];
   if (model.binding.riders.empty()) return;
-  fitClusters(matchInput(model), state.positions, state.poses);
+  std::vector<ClusterPose> poses = state.poses;  // a step's warm start must not depend on who looks
+  fitClusters(matchInput(model), state.positions, poses);
   for (Index r = 0; r < model.binding.riders.size(); ++r)
-    state.surface[model.binding.riders[r]] = riderPosition(model, state.poses, r) + state.rider_offsets[r];
+    state.surface[model.binding.riders[r]] = riderPosition(model, poses, r) + state.rider_offsets[r];
 }
 
 BodyMeasures measureBody(const BodyModel& model, const BodyState& state) {

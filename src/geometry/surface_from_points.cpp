@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <iterator>
 #include <map>
 #include <random>
+#include <unordered_map>
 #include <utility>
 
 #include <Eigen/Eigenvalues>
@@ -123,8 +123,45 @@ void sort(std::vector<Triangle>& triangles) {
   });
 }
 
-/// CGAL orders equal candidates of the front by the addresses of their edges, which differ from run to run; this vertex
-/// has them ordered by the numbers of the edges' vertices instead.
+/// Numbers cells or vertices as they are made: CGAL then compares their handles by these stamps. Without them it
+/// compares addresses, which decide from which side it looks at a facet and so turn results over from run to run.
+template <class Base>
+class Stamped : public Base {
+ public:
+  template <class Tds>
+  struct Rebind_TDS {
+    using Other = Stamped<typename Base::template Rebind_TDS<Tds>::Other>;
+  };
+  using Has_timestamp = CGAL::Tag_true;
+  using Base::Base;
+  Stamped() = default;
+  Stamped(const Stamped& other) : Base(other) {}  // a copy is another one, so it gets a stamp of its own
+  Stamped& operator=(const Stamped&) = delete;
+
+  std::size_t time_stamp() const { return stamp_; }
+  void set_time_stamp(const std::size_t& stamp) { stamp_ = stamp; }
+
+ private:
+  std::size_t stamp_ = static_cast<std::size_t>(-1);  // CGAL's value for none yet
+};
+
+/// Numbers for the front's border edges, in the order in which this thread's reconstruction first queues them.
+class BorderNumbers {
+ public:
+  static std::size_t of(const void* border_edge) {
+    return numbers().emplace(border_edge, numbers().size()).first->second;
+  }
+  static void clear() { numbers().clear(); }
+
+ private:
+  static std::unordered_map<const void*, std::size_t>& numbers() {
+    static thread_local std::unordered_map<const void*, std::size_t> numbers;  // looked up, never walked through
+    return numbers;
+  }
+};
+
+/// The two edges that see the same facet next to them are equal candidates. CGAL's queue takes the one with the lower
+/// address first; this vertex makes it take the one that was queued first.
 template <class Traits, class Base = CGAL::Triangulation_vertex_base_3<Traits>>
 class FrontVertex : public CGAL::Advancing_front_surface_reconstruction_vertex_base_3<Traits, Base> {
   using Parent = CGAL::Advancing_front_surface_reconstruction_vertex_base_3<Traits, Base>;
@@ -139,26 +176,18 @@ class FrontVertex : public CGAL::Advancing_front_surface_reconstruction_vertex_b
   struct Radius_ptr_type {
     typename Parent::criteria first;
     typename Parent::IO_edge_type* second;
-    std::pair<std::size_t, std::size_t> edge;
+    std::size_t number;
 
     Radius_ptr_type(typename Parent::criteria value, typename Parent::IO_edge_type* candidate)
-        : first(value), second(candidate) {
-      const auto& at = candidate->first.first;  // the border's edge: a cell and two of its corners
-      edge = std::minmax({at.first->vertex(at.second)->info(), at.first->vertex(at.third)->info()});
-    }
-    bool operator<(const Radius_ptr_type& o) const {
-      // One facet's value comes out differently in the last digits from either of its sides.
-      const float value = static_cast<float>(first), other = static_cast<float>(o.first);
-      if (value != other) return value < other;
-      return edge != o.edge ? edge < o.edge : std::less<>()(second, o.second);
-    }
+        : first(value), second(candidate), number(BorderNumbers::of(candidate)) {}
+    bool operator<(const Radius_ptr_type& o) const { return first != o.first ? first < o.first : number < o.number; }
   };
 };
 
 std::vector<Triangle> frontTriangles(const Points& points) {
-  using Cell = CGAL::Advancing_front_surface_reconstruction_cell_base_3<Kernel>;
-  using Delaunay =
-      CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<FrontVertex<Kernel>, Cell>>;
+  using Vertex = Stamped<FrontVertex<Kernel>>;
+  using Cell = Stamped<CGAL::Advancing_front_surface_reconstruction_cell_base_3<Kernel>>;
+  using Delaunay = CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<Vertex, Cell>>;
   std::vector<std::pair<Kernel::Point_3, std::size_t>> numbered;
   numbered.reserve(points.size());
   // Grids are full of equal candidates: a shift far below their spacing, the same in every run, tells them apart.
@@ -171,7 +200,9 @@ std::vector<Triangle> frontTriangles(const Points& points) {
   }
   Delaunay delaunay(numbered.begin(), numbered.end());
   CGAL::Advancing_front_surface_reconstruction<Delaunay> front(delaunay);
+  BorderNumbers::clear();
   front.run();
+  BorderNumbers::clear();
   std::vector<std::array<std::size_t, 3>> faces;
   CGAL::write_triple_indices(std::back_inserter(faces), front);
   std::vector<Triangle> triangles;

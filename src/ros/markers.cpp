@@ -12,6 +12,7 @@ using visualization_msgs::Marker;
 
 constexpr int kSaidDeletes = 30;         // arrays: a second at the highest rate
 constexpr double kThinnest = 1e-8;       // a triangle's height over its longest edge: thinner ones have no area
+constexpr double kSmoothUpTo = 0.75;     // cosine between face and vertex normal: the edges of a box stay sharp
 constexpr double kShownReach = 0.1;      // [m] of blades without an end
 constexpr double kSpringWidth = 0.0015;  // [m]
 constexpr double kSpringEnd = 0.006;     // [m] diameter
@@ -68,9 +69,13 @@ void addBody(const BodySnapshot& body, Marker& marker) {
     const Triangle& corners = mesh.triangles[t];
     if (!hasArea(body.surface[corners[0]], body.surface[corners[1]], body.surface[corners[2]])) continue;
     const bool cut = mesh.patchOf(t) != kOuterPatch;
+    const Vec3& a = body.surface[corners[0]];
+    const Vec3 flat = (body.surface[corners[1]] - a).cross(body.surface[corners[2]] - a).normalized();
     for (const Index v : corners) {
+      Vec3 normal = normals[cut][v].normalized();
+      if (!(normal.dot(flat) > kSmoothUpTo)) normal = flat;
       marker.points.push_back(toPoint(body.surface[v]));
-      marker.colors.push_back(shaded(cut ? inside : marker.color, lightOn(normals[cut][v].normalized())));
+      marker.colors.push_back(shaded(cut ? inside : marker.color, lightOn(normal)));
     }
   }
 }

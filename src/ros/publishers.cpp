@@ -142,11 +142,12 @@ void Publishers::publishTick(Clock::time_point now) {
   wants.surfaces = markers;
   wants.particles = points;
   wants.measures = state;
-  const auto snapshot = runner_.snapshot(wants);
-  if (!snapshot) return;
+  // The stamp comes first: who sees one later than an answer sees what was answered.
   std_msgs::Header header;
   header.stamp = ros::Time::now();
   header.frame_id = settings_.world_frame;
+  const auto snapshot = runner_.snapshot(wants);
+  if (!snapshot) return;
   if (markers) {
     ++markers_built_;
     markers_revision_ = revision;

@@ -295,13 +295,13 @@ struct Services::Handlers {
   }
 
   bool getBody(meshless_surgery::GetBody::Request& request, meshless_surgery::GetBody::Response& response) {
+    std_msgs::Header header;
+    header.stamp = ros::Time::now();
+    header.frame_id = frames.worldFrame();
     Result<BodySnapshot> body = Error{};
     const Status done = runner.look([&](World& world) { body = world.inspect(request.name, request.rest); });
     if (!done.ok()) return refuse(response, "get_body", done.error());
     if (!body.ok()) return refuse(response, "get_body", body.error());
-    std_msgs::Header header;
-    header.stamp = ros::Time::now();
-    header.frame_id = frames.worldFrame();
     response.surface = toMesh(body->surface, body->model->surface.triangles);
     response.particles = toCloud(body->particles, header);
     response.volume = body->measures.volume;

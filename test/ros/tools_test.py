@@ -45,6 +45,7 @@ class Stream:
     def close(self):
         self.done.set()
         self.thread.join()
+        rospy.sleep(0.2)  # what is under way arrives before the next test's reset
         self.publisher.unregister()
 
 

@@ -174,6 +174,23 @@ TEST(World, EqualHistoriesHaveEqualHashes) {
   EXPECT_EQ(hashes[0], hashes[1]);
 }
 
+TEST(World, LookingChangesNothing) {
+  std::uint64_t hashes[2];
+  for (int looking = 0; looking < 2; ++looking) {
+    World world = ballWorld();
+    replyOf<CutReply>(world.apply(cutThrough(Vec3(0, 0, 0.2), Vec3(1, 0.2, 0.3).normalized())));
+    for (int step = 0; step < 120; ++step) {
+      world.step();
+      if (looking) {
+        world.snapshot({true, true, true});
+        ASSERT_TRUE(world.inspect("ball.1", step % 2).ok());
+      }
+    }
+    hashes[looking] = world.stateHash();
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+}
+
 TEST(World, APickLiftsALockHoldsAndMovingTakesItUpAgain) {
   World world = ballWorld();
   const PickReply pick = replyOf<PickReply>(world.apply(pickNear(Vec3(0, 0, 0.3))));

@@ -71,7 +71,7 @@ Result<PreparedBody> prepareBody(BodyDef def);
 /// The same rest shape with the masses of another density; the second moments too where the mode needs them.
 BodyModelPtr withMaterial(const BodyModelPtr& model, const Material& before, const Material& after);
 
-/// Places state.surface for state.positions and state.poses.
+/// Places state.surface for state.positions; changes nothing else.
 void updateSurface(const BodyModel& model, BodyState& state);
 
 struct BodyMeasures {

@@ -1,0 +1,109 @@
+#!/usr/bin/env python3
+"""rviz, with the scene's own configuration on a virtual display, shows the tissue where it is: the middles of triangles,
+projected by the configuration's camera, have the tissue's colour in the picture, and have not once the body is removed."""
+import os
+import sys
+import unittest
+
+import numpy
+import rospkg
+import rospy
+import rostest
+import yaml
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+from virtual_display import VirtualDisplay, stop, wait_until  # noqa: E402
+
+from meshless_surgery.srv import GetBody, Remove  # noqa: E402
+from std_srvs.srv import SetBool  # noqa: E402
+from visualization_msgs.msg import MarkerArray  # noqa: E402
+
+BACKGROUND = (34, 38, 44)
+
+
+def call(service, kind, **fields):
+    name = '/deformer/' + service
+    rospy.wait_for_service(name, 60)
+    reply = rospy.ServiceProxy(name, kind)(**fields)
+    assert reply.success, reply.message
+    return reply
+
+
+def view_rectangle(picture):
+    """The 3D view: rows and columns that hold its background."""
+    inside = (picture == BACKGROUND).all(axis=2)
+    rows, columns = numpy.where(inside.sum(axis=1) > 50)[0], numpy.where(inside.sum(axis=0) > 50)[0]
+    if len(rows) == 0 or len(columns) == 0:
+        return None
+    return rows[0], rows[-1] + 1, columns[0], columns[-1] + 1
+
+
+def project(points, view, rectangle):
+    """Pixels (row, column) of points seen by rviz's orbit camera, whose angle of view is the vertical one."""
+    top, bottom, left, right = rectangle
+    focus = numpy.array([view['Focal Point'][axis] for axis in 'XYZ'])
+    yaw, pitch, distance = view['Yaw'], view['Pitch'], view['Distance']
+    back = numpy.array([numpy.cos(yaw) * numpy.cos(pitch), numpy.sin(yaw) * numpy.cos(pitch), numpy.sin(pitch)])
+    side = numpy.cross([0, 0, 1], back)
+    side /= numpy.linalg.norm(side)
+    up = numpy.cross(back, side)
+    relative = points - (focus + distance * back)
+    depth = -relative.dot(back)
+    scale = 0.5 * (bottom - top) / numpy.tan(0.5 * view['Field of View'])
+    columns = 0.5 * (left + right) + scale * relative.dot(side) / depth
+    rows = 0.5 * (top + bottom) - scale * relative.dot(up) / depth
+    return numpy.rint(numpy.stack([rows, columns], axis=1)).astype(int)
+
+
+def has_colour(pixels, colour):
+    """Which pixels are the colour in some light, and not the background."""
+    pixels = pixels.astype(float)
+    length = numpy.linalg.norm(pixels, axis=1)
+    along = pixels.dot(colour) / numpy.linalg.norm(colour)
+    empty = (numpy.abs(pixels - BACKGROUND) < 12).all(axis=1)
+    return (along > 0.95 * length) & ~empty
+
+
+class ShownTest(unittest.TestCase):
+    def test_tissue_is_shown_where_it_is(self):
+        scene, body = rospy.get_param('~scene'), rospy.get_param('~body')
+        config = os.path.join(rospkg.RosPack().get_path('meshless_surgery'), 'config', 'rviz', scene + '.rviz')
+        with open(config) as file:
+            view = yaml.safe_load(file)['Visualization Manager']['Views']['Current']
+        display = VirtualDisplay()
+        self.addCleanup(display.close)
+        rviz = display.start(['rosrun', 'rviz', 'rviz', '-d', config])
+        self.addCleanup(stop, rviz)
+        rospy.sleep(1.0)
+        call('pause', SetBool, data=True)
+        surface = call('get_body', GetBody, name=body).surface
+        vertices = numpy.array([[v.x, v.y, v.z] for v in surface.vertices])
+        middles = vertices[numpy.array([t.vertex_indices for t in surface.triangles])].mean(axis=1)
+        array = rospy.wait_for_message('/deformer/markers', MarkerArray, 60)
+        marker = [m for m in array.markers if m.ns == 'bodies'][0]
+        colour = numpy.array([marker.color.r, marker.color.g, marker.color.b])
+
+        def share_shown():
+            picture = display.screenshot()
+            rectangle = view_rectangle(picture)
+            if rectangle is None or rectangle[1] - rectangle[0] < 300 or rectangle[3] - rectangle[2] < 300:
+                return 0.0
+            pixels = project(middles, view, rectangle)
+            top, bottom, left, right = rectangle
+            seen = pixels[(pixels[:, 0] >= top) & (pixels[:, 0] < bottom) & (pixels[:, 1] >= left) & (pixels[:, 1] < right)]
+            if len(seen) < 0.9 * len(pixels):
+                return 0.0
+            return has_colour(picture[seen[:, 0], seen[:, 1]], colour).mean()
+
+        shown = wait_until(lambda: share_shown() > 0.9, 90)
+        file = os.path.join(os.environ.get('ROS_HOME', '/tmp'), 'shown_%s.png' % scene)
+        display.save(file)
+        print('picture: %s, share of triangles shown where they are: %.3f' % (file, share_shown()))
+        self.assertTrue(shown, 'only %.0f %% of the triangles have the tissue\'s colour' % (100 * share_shown()))
+        call('remove', Remove, name=body)
+        self.assertTrue(wait_until(lambda: share_shown() < 0.05, 30), 'a removed body is still shown')
+
+
+if __name__ == '__main__':
+    rospy.init_node('shown_test')
+    rostest.rosrun('meshless_surgery', 'shown', ShownTest, sys.argv)
