@@ -96,11 +96,11 @@ ClusterOptions readClusters(YamlSource& source, const YAML::Node& node) {
   if (grid.IsDefined()) {
     options.kind = ClusterOptions::Kind::kGrid;
     if (!grid.IsSequence() || grid.size() != 3) {
-      source.fail(grid, "grid is " + shown(grid), "a list of 3 whole numbers, 1 to 100000");
+      source.fail(grid, "grid is " + shown(grid), "a list of 3 whole numbers, 1 to 1000");
     } else {
       double cells = 1.0;
       for (std::size_t k = 0; k < 3; ++k) {
-        readWhole(source, grid[k], "grid[" + std::to_string(k) + "]", 1, 100000, options.grid[k]);
+        readWhole(source, grid[k], "grid[" + std::to_string(k) + "]", 1, 1000, options.grid[k]);
         cells *= options.grid[k];
       }
       if (cells > 100000.0) source.fail(grid, "grid has " + std::to_string(cells) + " cells", "up to 100000 together");

@@ -176,7 +176,8 @@ struct Services::Handlers {
     }
     if (!command.enable) return applied(response, "push", command, "removed the push sphere");
     return applied(response, "push", command,
-                   command.speed > 0.0 ? "the push sphere is on its way" : "placed the push sphere");
+                   command.speed > 0.0 ? "the push sphere goes there at its speed, or is placed there where there was none"
+                                       : "placed the push sphere");
   }
 
   bool cut(meshless_surgery::Cut::Request& request, meshless_surgery::Cut::Response& response) {

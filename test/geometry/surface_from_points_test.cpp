@@ -1,10 +1,18 @@
 #include "meshless_surgery/geometry/surface_from_points.h"
 
+#include <stdio.h>   // popen
+#include <unistd.h>  // readlink
+
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <limits>
+#include <memory>
 #include <random>
 
+#include <CGAL/version.h>
 #include <gtest/gtest.h>
 
 #include "meshless_surgery/geometry/inside.h"
@@ -117,7 +125,7 @@ TEST(SurfaceFromPoints, ThickScatterStillGivesASolid) {
       const double spacing = spacingOf(mesh, cloud.size());
       addNoise(cloud, relative * spacing, 5);
       const Result<SurfaceFromPoints> surface = surfaceFromPoints(cloud);
-#if defined(CGAL_VERSION_NR) && CGAL_VERSION_NR < 1050500000
+#if CGAL_VERSION_NR < 1050500000
       if (!surface.ok()) continue;  // older CGAL cannot wrap
 #endif
       ASSERT_TRUE(surface.ok()) << name << ": " << surface.error().detail;
@@ -150,22 +158,111 @@ TEST(SurfaceFromPoints, DuplicatesChangeNothing) {
   EXPECT_EQ(once->mesh.vertices, twice->mesh.vertices);
 }
 
-void expectRepeats(const Points& cloud) {
-  const Result<SurfaceFromPoints> first = surfaceFromPoints(cloud), second = surfaceFromPoints(cloud);
-  ASSERT_TRUE(first.ok() && second.ok());
-  EXPECT_TRUE(first->mesh.triangles == second->mesh.triangles);
-  EXPECT_TRUE(first->mesh.vertices == second->mesh.vertices);
+struct Cloud {
+  std::string name, method;  // the way that gives its surface
+  Points points;
+};
+
+/// Even and random samples, clean to thick: every way to a surface is taken at least twice.
+std::vector<Cloud> repeatedClouds() {
+  const auto noisy = [](Points points, double deviation) {
+    addNoise(points, deviation, 3);
+    return points;
+  };
+  const TriangleMesh torus = torusMesh(0.1, 0.03, 0.008), sphere = sphereMesh(0.1, 0.01);
+  std::vector<Cloud> clouds = {
+      {"clean torus", "through the points", torus.vertices},
+      {"rough liver", "through the points", noisy(sampled(liverMesh(), 2000, 9), 0.0005)},
+      {"rough sphere", "through the points", noisy(sampled(sphere, 3000, 3), 0.0006)},
+      {"rough torus", "through the points", noisy(sampled(torus, 3000, 3), 0.0006)},
+      {"noisy torus", "through their means", noisy(torus.vertices, 0.0024)},
+      {"noisy sphere", "through their means", noisy(sampled(sphere, 3000, 3), 0.0020)},
+  };
+#if CGAL_VERSION_NR >= 1050500000
+  clouds.push_back({"thick torus", "alpha wrapping", noisy(torus.vertices, 0.0064)});
+  clouds.push_back({"thick sphere", "alpha wrapping", noisy(sampled(sphere, 2000, 3), 0.006)});
+#endif
+  return clouds;
 }
 
-// Known fault: CGAL's front still depends on addresses (see the header).
-TEST(SurfaceFromPoints, DISABLED_TheSameCloudGivesTheSameSurface) {
-  Points cloud = torusMesh(0.1, 0.03, 0.008).vertices;
-  expectRepeats(cloud);
-  addNoise(cloud, 0.0016, 3);
-  expectRepeats(cloud);
-  cloud = sampled(liverMesh(), 2000, 9);
-  addNoise(cloud, 0.001, 1);
-  expectRepeats(cloud);
+/// Leaves holes in the heap, so that what is allocated next lies elsewhere and in another order.
+class ScatteredHeap {
+ public:
+  explicit ScatteredHeap(unsigned seed) {
+    std::mt19937 random(seed);
+    for (unsigned k = 0; k < 5000 + 1000 * (seed % 7); ++k) blocks_.emplace_back(new char[16 + random() % 6000]);
+    for (auto& block : blocks_)
+      if (random() % 2 == 0) block.reset();
+  }
+
+ private:
+  std::vector<std::unique_ptr<char[]>> blocks_;
+};
+
+TEST(SurfaceFromPoints, TheSameCloudGivesTheSameSurface) {
+  unsigned seed = 1;
+  for (const Cloud& cloud : repeatedClouds()) {
+    const Result<SurfaceFromPoints> first = surfaceFromPoints(cloud.points);
+    ASSERT_TRUE(first.ok()) << cloud.name << ": " << first.error().detail;
+    EXPECT_NE(first->method.find(cloud.method), std::string::npos) << cloud.name << " by " << first->method;
+    for (int repeat = 0; repeat < 2; ++repeat) {
+      const ScatteredHeap heap(seed++);
+      const Result<SurfaceFromPoints> again = surfaceFromPoints(cloud.points);
+      ASSERT_TRUE(again.ok()) << cloud.name;
+      EXPECT_TRUE(first->mesh.triangles == again->mesh.triangles) << cloud.name;
+      EXPECT_TRUE(first->mesh.vertices == again->mesh.vertices) << cloud.name;
+      EXPECT_EQ(first->max_distance, again->max_distance) << cloud.name;
+      EXPECT_EQ(first->mean_distance, again->mean_distance) << cloud.name;
+      EXPECT_EQ(first->method, again->method) << cloud.name;
+    }
+  }
+}
+
+std::uint64_t fingerprint(const TriangleMesh& mesh) {
+  std::uint64_t hash = 14695981039346656037ull;  // FNV-1a
+  const auto add = [&](const void* data, std::size_t size) {
+    for (std::size_t k = 0; k < size; ++k) hash = (hash ^ static_cast<const unsigned char*>(data)[k]) * 1099511628211ull;
+  };
+  for (const Vec3& p : mesh.vertices) add(p.data(), 3 * sizeof(double));
+  for (const Triangle& t : mesh.triangles) add(t.data(), 3 * sizeof(Index));
+  return hash;
+}
+
+std::vector<std::string> fingerprints() {
+  std::vector<std::string> lines;
+  for (const Cloud& cloud : repeatedClouds()) {
+    const Result<SurfaceFromPoints> surface = surfaceFromPoints(cloud.points);
+    lines.push_back("surface of " + cloud.name + ": " +
+                    (surface.ok() ? std::to_string(fingerprint(surface->mesh)) : surface.error().detail));
+  }
+  return lines;
+}
+
+constexpr char kChild[] = "SURFACE_TEST_CHILD";  // set to its heap's seed in the processes that the next test starts
+
+TEST(SurfaceFromPoints, AnotherProcessGivesTheSameSurface) {
+  if (const char* seed = std::getenv(kChild)) {
+    const ScatteredHeap heap(static_cast<unsigned>(std::atoi(seed)));
+    for (const std::string& line : fingerprints()) std::printf("%s\n", line.c_str());
+    return;
+  }
+  char self[4096];
+  const ssize_t length = readlink("/proc/self/exe", self, sizeof self);
+  ASSERT_TRUE(length > 0 && static_cast<std::size_t>(length) < sizeof self);
+  const std::vector<std::string> expected = fingerprints();
+  for (const std::string seed : {"2", "3"}) {  // the system gives each its own address layout
+    const std::string command = std::string(kChild) + "=" + seed + " GTEST_OUTPUT= '" +
+                                std::string(self, static_cast<std::size_t>(length)) +
+                                "' --gtest_filter=SurfaceFromPoints.AnotherProcessGivesTheSameSurface";
+    FILE* output = popen(command.c_str(), "r");
+    ASSERT_NE(output, nullptr);
+    std::vector<std::string> lines;
+    char line[512];
+    while (std::fgets(line, sizeof line, output) != nullptr)
+      if (std::string(line).rfind("surface of ", 0) == 0) lines.emplace_back(line, std::strcspn(line, "\n"));
+    EXPECT_EQ(pclose(output), 0);
+    EXPECT_EQ(lines, expected) << "process " << seed;
+  }
 }
 
 TEST(SurfaceFromPoints, FourPointsAreATetrahedron) {

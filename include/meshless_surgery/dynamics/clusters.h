@@ -24,7 +24,7 @@ ParticleGraph makeGraph(const Points& rest, std::vector<std::array<Index, 2>> ed
 struct ClusterOptions {
   enum class Kind { kAuto, kOne, kGrid, kCount };
   Kind kind = Kind::kAuto;
-  std::array<int, 3> grid{{1, 1, 1}};  // cells along x, y, z of the rest bounds, each >= 1; at most 100,000 together
+  std::array<int, 3> grid{{1, 1, 1}};  // cells along x, y, z of the rest bounds, each 1..1000, at most 100,000 together
   int count = 1;                       // >= 1
   double overlap = 0.3;                // 0..1, growth of a cluster beyond its share, relative to its radius
 };
