@@ -3,7 +3,7 @@
 
 #include <map>
 
-#include "meshless_surgery/dynamics/material.h"
+#include "meshless_surgery/body/body_def.h"
 #include "yaml_map.h"
 
 namespace meshless {
