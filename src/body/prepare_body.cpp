@@ -103,6 +103,17 @@ ParticleGraph linkParticles(const Points& rest, const TriangleMesh& mesh, const 
   return makeGraph(rest, std::move(edges));
 }
 
+// What is as near to several goes to them in equal parts: regular bodies have many such samples, and a rule that picks
+// one of them moves the centre of mass.
+void giveToNearest(const NearestPoints& nearest, const Points& rest, const Vec3& p, double amount,
+                   std::vector<double>& share) {
+  const std::vector<Index> near = nearest.nearest(p, 8);
+  const double least = (rest[near[0]] - p).norm();
+  std::size_t equal = 1;
+  while (equal < near.size() && (rest[near[equal]] - p).norm() <= least * (1.0 + 1e-6)) ++equal;
+  for (std::size_t k = 0; k < equal; ++k) share[near[k]] += amount / static_cast<double>(equal);
+}
+
 // Each particle gets the mass of what is nearest to it.
 std::vector<double> shareMass(const BodyDef& def, const TriangleMesh& mesh, const SolidQuery* solid, const Points& rest,
                               double volume, double spacing) {
@@ -112,12 +123,12 @@ std::vector<double> shareMass(const BodyDef& def, const TriangleMesh& mesh, cons
   if (solid) {
     // A third of the spacing: samples half way between two particles would all fall to the same one.
     const LatticeSample lattice = sampleInterior(mesh, *solid, spacing / 3.0, 0.0, kMaxParticles);
-    for (const Vec3& p : lattice.points) share[nearest.nearest(p)] += 1.0;
+    for (const Vec3& p : lattice.points) giveToNearest(nearest, rest, p, 1.0, share);
   } else {  // an open surface is a shell as thick as its spacing
     total = def.material.density * surfaceArea(mesh) * spacing;
     for (const Triangle& t : mesh.triangles) {
       const Vec3 &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
-      share[nearest.nearest((a + b + c) / 3.0)] += (b - a).cross(c - a).norm();
+      giveToNearest(nearest, rest, (a + b + c) / 3.0, (b - a).cross(c - a).norm(), share);
     }
   }
   double sum = 0.0;

@@ -1,7 +1,6 @@
 #include "meshless_surgery/body/cut_body.h"
 
 #include "meshless_surgery/body/deform.h"
-#include "meshless_surgery/body/rider_contact.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "support/bodies.h"
 #include "support/mesh_laws.h"
@@ -145,34 +144,6 @@ TEST(CutBody, AHundredCutsToCrumbsKeepMassVolumeAndParticles) {
   }
   EXPECT_NEAR(mass, whole.model->mass, 1e-9 * mass);
   EXPECT_NEAR(volume, whole.model->rest_volume, 1e-9 * volume);
-}
-
-TEST(PushRiders, LeaveTheObstacleAndMoveTheBodyByTheImpulseGiven) {
-  PreparedBody body = prepared(test::ball("b", Vec3::Zero()));
-  const Result<CutBody> cut = cutBody(*body.model, body.state, {Vec3::UnitZ(), Vec3(0, 0, 0.001)});
-  ASSERT_TRUE(cut.ok());
-  for (const BodyPiece& piece : cut->pieces) {
-    ASSERT_FALSE(piece.model->binding.riders.empty());
-    // A floor a little above the cut (for the upper half), a ceiling a little below it (for the lower).
-    const bool upper = solidCentroid(piece.state.surface, piece.model->surface.triangles).z() > 0;
-    const double level = upper ? 0.003 : -0.001;
-    const Obstacle obstacle = [&](const Vec3& p) -> Vec3 {
-      const double depth = upper ? level - p.z() : p.z() - level;
-      return depth > 0 ? Vec3(0, 0, upper ? depth : -depth) : Vec3::Zero();
-    };
-    BodyState state = piece.state;
-    const Vec3 before = measureBody(*piece.model, state).centre_of_mass;
-    std::vector<bool> touched(piece.model->rest.size(), false);
-    Vec3 impulse = Vec3::Zero();
-    EXPECT_GT(pushRiders(*piece.model, obstacle, state, &touched, &impulse), 10u);
-    EXPECT_GT(std::count(touched.begin(), touched.end(), true), 0);
-    const Vec3 after = measureBody(*piece.model, state).centre_of_mass;
-    EXPECT_LT((piece.model->mass * (after - before) - impulse).norm(), 1e-12);
-    EXPECT_GT(upper ? impulse.z() : -impulse.z(), 0.0);
-    EXPECT_LT((after - before).norm(), 0.004) << "the push overshot";
-    updateSurface(*piece.model, state);
-    for (Index v : piece.model->binding.riders) EXPECT_LT(obstacle(state.surface[v]).norm(), 1e-9);
-  }
 }
 
 }  // namespace

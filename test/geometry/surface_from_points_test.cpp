@@ -221,7 +221,8 @@ TEST(SurfaceFromPoints, TheSameCloudGivesTheSameSurface) {
 std::uint64_t fingerprint(const TriangleMesh& mesh) {
   std::uint64_t hash = 14695981039346656037ull;  // FNV-1a
   const auto add = [&](const void* data, std::size_t size) {
-    for (std::size_t k = 0; k < size; ++k) hash = (hash ^ static_cast<const unsigned char*>(data)[k]) * 1099511628211ull;
+    for (std::size_t k = 0; k < size; ++k)
+      hash = (hash ^ static_cast<const unsigned char*>(data)[k]) * 1099511628211ull;
   };
   for (const Vec3& p : mesh.vertices) add(p.data(), 3 * sizeof(double));
   for (const Triangle& t : mesh.triangles) add(t.data(), 3 * sizeof(Index));

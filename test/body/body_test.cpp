@@ -40,7 +40,9 @@ TEST(PrepareBody, KeepsTheSurfaceAndSharesTheMassForEveryShape) {
 
 TEST(PrepareBody, ABallHasItsCentreOfMassInTheMiddle) {
   const PreparedBody body = prepared(test::ball("ball", Vec3::Zero()));
-  EXPECT_LT(measureBody(*body.model, body.state).centre_of_mass.norm(), 0.002);
+  EXPECT_LT(measureBody(*body.model, body.state).centre_of_mass.norm(), 0.0005);
+  const PreparedBody box = prepared(defOf(boxMesh(Vec3(0.1, 0.1, 0.1), 0.02)));
+  EXPECT_LT(measureBody(*box.model, box.state).centre_of_mass.norm(), 0.0005);
   EXPECT_GT(body.model->rest.size(), body.model->surface.vertices.size()) << "no particles inside";
 }
 
