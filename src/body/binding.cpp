@@ -68,8 +68,8 @@ Vec3 riderPosition(const BodyModel& model, const std::vector<ClusterPose>& poses
   Vec3 sum = Vec3::Zero();
   for (Index k = model.binding.offsets[r]; k < model.binding.offsets[r + 1]; ++k) {
     const Index c = model.binding.clusters[k];
-    sum += model.binding.weights[k] *
-           (poses[c].centre + poses[c].deformation * (rest - model.shape.clusters[c].centre));
+    sum +=
+        model.binding.weights[k] * (poses[c].centre + poses[c].deformation * (rest - model.shape.clusters[c].centre));
   }
   return sum;
 }

@@ -178,8 +178,8 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
       if (mine != kNoIndex) taken[mine] = true;
       vertex_particle.push_back(mine);
     }
-    child->binding = bindSurface(child->rest, child->match_masses, child->clusters, child->shape, child->surface.vertices,
-                                 std::move(vertex_particle));
+    child->binding = bindSurface(child->rest, child->match_masses, child->clusters, child->shape,
+                                 child->surface.vertices, std::move(vertex_particle));
     piece.state.poses.resize(child->clusters.size());
     fitClusters(matchInput(*child), piece.state.positions, piece.state.poses);
     piece.state.surface = from.mesh.vertices;

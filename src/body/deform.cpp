@@ -20,7 +20,8 @@ Vec3 spinFor(const Mat3& inertia, const Vec3& momentum) {
   Vec3 spin = Vec3::Zero();
   for (int k = 0; k < 3; ++k)
     if (solver.eigenvalues()[k] > 1e-12)
-      spin += solver.eigenvectors().col(k) * (solver.eigenvectors().col(k).dot(momentum) / (solver.eigenvalues()[k] * scale));
+      spin += solver.eigenvectors().col(k) *
+              (solver.eigenvectors().col(k).dot(momentum) / (solver.eigenvalues()[k] * scale));
   return spin;
 }
 
@@ -60,15 +61,13 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
   Points& v = state.velocities;
   scratch.previous = x;
   scratch.predicted.resize(n);
-  for (std::size_t i = 0; i < n; ++i)
-    scratch.predicted[i] = model.fixed[i] ? x[i] : Vec3(x[i] + h * v[i]);
+  for (std::size_t i = 0; i < n; ++i) scratch.predicted[i] = model.fixed[i] ? x[i] : Vec3(x[i] + h * v[i]);
   const Points& y = scratch.predicted;
 
   const double gain = stiffnessGain(material.alpha, h);
   if (gain > 0.0) {
-    matchShapes(matchInput(model), y, material.mode,
-                std::min(material.beta, kMostBeta), state.poses,
-                scratch.goals, counters);
+    matchShapes(matchInput(model), y, material.mode, std::min(material.beta, kMostBeta), state.poses, scratch.goals,
+                counters);
     const Points& goals = scratch.goals;
     if (model.any_fixed) {
       for (std::size_t i = 0; i < n; ++i) v[i] += gain / h * (goals[i] - y[i]);
@@ -91,7 +90,8 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
       for (Vec3& vi : v) vi -= lost * vi;
     } else {
       const RigidMotion rigid = rigidMotionOf(model, x, v);
-      for (std::size_t i = 0; i < n; ++i) v[i] -= lost * (v[i] - rigid.velocity - rigid.spin.cross(x[i] - rigid.centre));
+      for (std::size_t i = 0; i < n; ++i)
+        v[i] -= lost * (v[i] - rigid.velocity - rigid.spin.cross(x[i] - rigid.centre));
     }
   }
   for (std::size_t i = 0; i < n; ++i) {

@@ -1,6 +1,7 @@
 // From what a user chose to particles, masses, graph, clusters and binding.
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <sstream>
 
 #include "meshless_surgery/body/binding.h"
@@ -15,7 +16,8 @@ constexpr std::size_t kMaxParticles = 200000;
 constexpr std::size_t kMaxVertexParticles = 6000;  // larger surfaces ride, but for a subset at the spacing
 constexpr double kAutoParticles = 2500.0;          // interior particles aimed at where no spacing is given
 constexpr double kReach = 1.75;                    // of the spacing: how far neighbours along the body may be
-constexpr double kLeastMassShare = 0.1;            // of the mean: no particle is so light that contacts throw it
+constexpr std::size_t kMostLinks = 40;   // of the nearest looked at: vertices finer than the spacing have thousands
+constexpr double kLeastMassShare = 0.1;  // of the mean: no particle is so light that contacts throw it
 
 Error invalid(const std::string& what) { return {ErrorCode::kInvalidArgument, what}; }
 
@@ -75,27 +77,27 @@ ParticleGraph linkParticles(const Points& rest, const TriangleMesh& mesh, const 
       const Index a = vertex_particle[t[k]], b = vertex_particle[t[(k + 1) % 3]];
       if (a != kNoIndex && b != kNoIndex) edges.push_back({std::min(a, b), std::max(a, b)});
     }
+  const auto tidy = [](std::vector<std::array<Index, 2>>& pairs) {
+    std::sort(pairs.begin(), pairs.end());
+    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  };
+  tidy(edges);
   const NearestPoints nearest(rest);
-  std::vector<Index> links(rest.size(), 0);
-  for (const auto& e : edges) ++links[e[0]], ++links[e[1]];
-  std::sort(edges.begin(), edges.end());
-  const std::size_t surface_edges = std::unique(edges.begin(), edges.end()) - edges.begin();
-  edges.resize(surface_edges);
-  if (solid)
+  if (solid) {
+    std::vector<std::array<Index, 2>> near, inner;
     for (Index i = 0; i < rest.size(); ++i)
-      for (Index j : nearest.within(rest[i], reach)) {
-        if (j <= i) continue;
-        if (std::binary_search(edges.begin(), edges.begin() + static_cast<std::ptrdiff_t>(surface_edges),
-                               std::array<Index, 2>{i, j}))
-          continue;
-        // Through the air is not along the body.
-        if (!solid->contains(0.5 * (rest[i] + rest[j])) || solid->crosses(rest[i], rest[j])) continue;
-        edges.push_back({i, j});
-        ++links[i], ++links[j];
-      }
+      for (Index j : nearest.nearest(rest[i], kMostLinks + 1))
+        if (j != i && (rest[j] - rest[i]).norm() <= reach) near.push_back({std::min(i, j), std::max(i, j)});
+    tidy(near);
+    std::set_difference(near.begin(), near.end(), edges.begin(), edges.end(), std::back_inserter(inner));
+    for (const auto& [i, j] : inner)  // through the air is not along the body
+      if (solid->contains(0.5 * (rest[i] + rest[j])) && !solid->crosses(rest[i], rest[j])) edges.push_back({i, j});
+  }
+  std::vector<bool> linked(rest.size(), false);
+  for (const auto& [i, j] : edges) linked[i] = linked[j] = true;
   // A particle on its own (a thin or coarse spot) holds to its nearest neighbour.
   for (Index i = 0; i < rest.size() && rest.size() > 1; ++i)
-    if (links[i] == 0) {
+    if (!linked[i]) {
       const std::vector<Index> two = nearest.nearest(rest[i], 2);
       const Index j = two[0] == i ? two[1] : two[0];
       edges.push_back({std::min(i, j), std::max(i, j)});
@@ -154,7 +156,8 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   const Pose pose{def.pose.rotation.normalized(), def.pose.translation};
   for (Vec3& v : surface.vertices) v = pose * v;
   for (const Vec3& v : surface.vertices)
-    if (!finite(v)) return Error{ErrorCode::kUnsuitableShape, "body '" + def.name + "' has vertices that are not finite"};
+    if (!finite(v))
+      return Error{ErrorCode::kUnsuitableShape, "body '" + def.name + "' has vertices that are not finite"};
   if (surface.patches.empty()) surface.patches.assign(surface.triangles.size(), kOuterPatch);
 
   const double edge = meanEdgeLength(surface);
@@ -190,8 +193,8 @@ Result<PreparedBody> prepareBody(BodyDef def) {
     model->rest.insert(model->rest.end(), inner.points.begin(), inner.points.end());
   }
   if (model->rest.size() > kMaxParticles)
-    return invalid("body '" + def.name + "' has " + std::to_string(model->rest.size()) + " particles; accepted: up to " +
-                   std::to_string(kMaxParticles));
+    return invalid("body '" + def.name + "' has " + std::to_string(model->rest.size()) +
+                   " particles; accepted: up to " + std::to_string(kMaxParticles));
 
   model->masses = shareMass(def, surface, solid.get(), model->rest, volume, model->spacing);
   for (double m : model->masses) model->mass += m;

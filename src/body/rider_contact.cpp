@@ -36,7 +36,8 @@ std::size_t pushRiders(const BodyModel& model, const Obstacle& obstacle, BodySta
         const ClusterRest& cluster = model.shape.clusters[c];
         const Vec3 q = rest - cluster.centre;
         moved += binding.weights[k] * (pushes[c].shift + pushes[c].map * q);
-        inverse_mass += binding.weights[k] * binding.weights[k] * (1.0 / cluster.mass + q.dot(cluster.moment_inverse * q));
+        inverse_mass +=
+            binding.weights[k] * binding.weights[k] * (1.0 / cluster.mass + q.dot(cluster.moment_inverse * q));
       }
       const Vec3 wanted = obstacle(riderPosition(model, state.poses, r) + state.rider_offsets[r] + moved);
       if (wanted.isZero(0.0)) continue;
@@ -62,8 +63,7 @@ std::size_t pushRiders(const BodyModel& model, const Obstacle& obstacle, BodySta
     }
   }
   fitClusters(input, state.positions, state.poses);
-  for (Index r : hit)
-    state.rider_offsets[r] += obstacle(riderPosition(model, state.poses, r) + state.rider_offsets[r]);
+  for (Index r : hit) state.rider_offsets[r] += obstacle(riderPosition(model, state.poses, r) + state.rider_offsets[r]);
   return hit.size();
 }
 

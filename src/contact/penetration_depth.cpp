@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "meshless_surgery/geometry/nearest_on_triangle.h"
+
 #include "cell_table.h"
 
 namespace meshless {
@@ -108,27 +110,6 @@ std::vector<Crossing> meetBoundary(const Points& a, const std::vector<BorderEdge
   return crossings;
 }
 
-/// Point of a triangle nearest to p (Ericson 2005, sec. 5.1.5).
-Vec3 nearestOnTriangle(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& p) {
-  const Vec3 ab = b - a, ac = c - a, ap = p - a;
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0.0 && d2 <= 0.0) return a;
-  const Vec3 bp = p - b;
-  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0.0 && d4 <= d3) return b;
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return a + d1 / (d1 - d3) * ab;
-  const Vec3 cp = p - c;
-  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0.0 && d5 <= d6) return c;
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return a + d2 / (d2 - d6) * ac;
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0.0 && d4 >= d3 && d5 >= d6) return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
-  const double sum = va + vb + vc;
-  return a + vb / sum * ab + vc / sum * ac;
-}
-
 /// The particle of a group that is nearest to a boundary face, and that face.
 struct NearestFace {
   Index local = kNoIndex;
@@ -150,7 +131,7 @@ NearestFace nearestFace(const Points& a, const Penetration* first, const std::ve
       const Vec3& p = a[first[local].particle];
       const double far = radius + std::sqrt(best.squared);
       if ((p - centre).squaredNorm() > far * far) continue;
-      const double squared = (nearestOnTriangle(u, v, w, p) - p).squaredNorm();
+      const double squared = (nearestOnTriangle(p, u, v, w) - p).squaredNorm();
       if (squared < best.squared) best = {local, f, squared};
     }
   }

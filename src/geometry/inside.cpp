@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/nearest_on_triangle.h"
 
 namespace meshless {
 namespace {
@@ -88,28 +89,7 @@ bool segmentMeetsTriangle(const Vec3& p, const Vec3& q, const Corners& t, double
   return (ab >= 0.0 && bc >= 0.0 && ca >= 0.0) || (ab <= 0.0 && bc <= 0.0 && ca <= 0.0);
 }
 
-/// Ericson 2005, sec. 5.1.5.
-Vec3 nearestOnTriangle(const Vec3& p, const Corners& t) {
-  const Vec3 ab = t.b - t.a, ac = t.c - t.a, ap = p - t.a;
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0.0 && d2 <= 0.0) return t.a;
-  const Vec3 bp = p - t.b;
-  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0.0 && d4 <= d3) return t.b;
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 && d1 > d3) return t.a + ab * (d1 / (d1 - d3));
-  const Vec3 cp = p - t.c;
-  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0.0 && d5 <= d6) return t.c;
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 && d2 > d6) return t.a + ac * (d2 / (d2 - d6));
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 && (d4 - d3) + (d5 - d6) > 0.0)
-    return t.b + (t.c - t.b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
-  const double sum = va + vb + vc;
-  if (!(sum > 0.0)) return t.a;  // a triangle without area
-  return t.a + ab * (vb / sum) + ac * (vc / sum);
-}
+Vec3 onTriangle(const Vec3& p, const Corners& t) { return nearestOnTriangle(p, t.a, t.b, t.c); }
 
 double squaredDistance(const Vec3& p, const Box& box) {
   return (box.min - p).cwiseMax(p - box.max).cwiseMax(Vec3::Zero()).squaredNorm();
@@ -177,26 +157,26 @@ struct SolidQuery::Data {
   bool windingByRay(const Vec3& p, const RayDirection& ray, int& winding) const {
     winding = 0;
     const int u = ray.u, v = ray.v, w = ray.w;
-    const bool unsure = visit(
-        [&](const Box& box) { return rayMeetsBox(p, ray.inverse, box); },
-        [&](const Corners& t) {
-          const double az = t.a[w] - p[w], bz = t.b[w] - p[w], cz = t.c[w] - p[w];
-          const double ax = (t.a[u] - p[u]) - ray.shear_u * az, ay = (t.a[v] - p[v]) - ray.shear_v * az;
-          const double bx = (t.b[u] - p[u]) - ray.shear_u * bz, by = (t.b[v] - p[v]) - ray.shear_v * bz;
-          const double cx = (t.c[u] - p[u]) - ray.shear_u * cz, cy = (t.c[v] - p[v]) - ray.shear_v * cz;
-          const double ab = ax * by - ay * bx, bc = bx * cy - by * cx, ca = cx * ay - cy * ax;
-          if ((ab > 0.0 || bc > 0.0 || ca > 0.0) && (ab < 0.0 || bc < 0.0 || ca < 0.0)) return false;
-          if (ab == 0.0 || bc == 0.0 || ca == 0.0) {
-            // On the rim, or beside a triangle seen edge-on: only the first is unsure.
-            const double sum = ab + bc + ca;
-            return sum != 0.0 || (std::min({ax, bx, cx}) <= 0.0 && std::max({ax, bx, cx}) >= 0.0 &&
-                                  std::min({ay, by, cy}) <= 0.0 && std::max({ay, by, cy}) >= 0.0);
-          }
-          const double sum = ab + bc + ca;
-          const double height = (bc * az + ca * bz + ab * cz) / sum;
-          if (height * ray.sign > 0.0) winding += sum * ray.sign > 0.0 ? 1 : -1;
-          return false;
-        });
+    const bool unsure =
+        visit([&](const Box& box) { return rayMeetsBox(p, ray.inverse, box); },
+              [&](const Corners& t) {
+                const double az = t.a[w] - p[w], bz = t.b[w] - p[w], cz = t.c[w] - p[w];
+                const double ax = (t.a[u] - p[u]) - ray.shear_u * az, ay = (t.a[v] - p[v]) - ray.shear_v * az;
+                const double bx = (t.b[u] - p[u]) - ray.shear_u * bz, by = (t.b[v] - p[v]) - ray.shear_v * bz;
+                const double cx = (t.c[u] - p[u]) - ray.shear_u * cz, cy = (t.c[v] - p[v]) - ray.shear_v * cz;
+                const double ab = ax * by - ay * bx, bc = bx * cy - by * cx, ca = cx * ay - cy * ax;
+                if ((ab > 0.0 || bc > 0.0 || ca > 0.0) && (ab < 0.0 || bc < 0.0 || ca < 0.0)) return false;
+                if (ab == 0.0 || bc == 0.0 || ca == 0.0) {
+                  // On the rim, or beside a triangle seen edge-on: only the first is unsure.
+                  const double sum = ab + bc + ca;
+                  return sum != 0.0 || (std::min({ax, bx, cx}) <= 0.0 && std::max({ax, bx, cx}) >= 0.0 &&
+                                        std::min({ay, by, cy}) <= 0.0 && std::max({ay, by, cy}) >= 0.0);
+                }
+                const double sum = ab + bc + ca;
+                const double height = (bc * az + ca * bz + ab * cz) / sum;
+                if (height * ray.sign > 0.0) winding += sum * ray.sign > 0.0 ? 1 : -1;
+                return false;
+              });
     return !unsure;
   }
 
@@ -273,7 +253,7 @@ double SolidQuery::distance(const Vec3& p) const {
     if (entry.squared >= best) continue;
     const Node& node = data_->nodes[entry.node];
     for (Index k = 0; k < node.count; ++k)
-      best = std::min(best, (nearestOnTriangle(p, data_->triangles[node.first + k]) - p).squaredNorm());
+      best = std::min(best, (onTriangle(p, data_->triangles[node.first + k]) - p).squaredNorm());
     if (node.count > 0) continue;
     Entry left = {entry.node + 1, squaredDistance(p, data_->nodes[entry.node + 1].box)};
     Entry right = {node.right, squaredDistance(p, data_->nodes[node.right].box)};

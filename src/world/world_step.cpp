@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "meshless_surgery/body/face_contact.h"
 #include "meshless_surgery/body/rider_contact.h"
 #include "meshless_surgery/contact/sphere_and_ground.h"
 #include "meshless_surgery/tools/grasp.h"
@@ -11,10 +12,10 @@
 namespace meshless {
 namespace {
 
-constexpr double kRiderFade = 0.25;             // [s] in which what a cut left of a rider's offset falls to 1/e
-constexpr double kOffsetGone = 1e-7;            // of the spacing: then it is dropped
-constexpr double kDepenetrationSpeed = 0.5;     // [m/s] at which old overlap of bodies is let out at the least
-constexpr double kPushHopRadii = 0.25;          // longest way of the sphere between two looks at the tissue
+constexpr double kRiderFade = 0.25;          // [s] in which what a cut left of a rider's offset falls to 1/e
+constexpr double kOffsetGone = 1e-7;         // of the spacing: then it is dropped
+constexpr double kDepenetrationSpeed = 0.5;  // [m/s] at which old overlap of bodies is let out at the least
+constexpr double kPushHopRadii = 0.25;       // longest way of the sphere between two looks at the tissue
 constexpr int kContactPasses = 2;
 
 class Stopwatch {
@@ -77,7 +78,8 @@ void World::step() {
       }
     }
     for (Pick& pick : w.picks)
-      if (const WorldBody* body = w.find(pick.body)) pick.position = graspMean(pick, body->state.positions) + pick.offset;
+      if (const WorldBody* body = w.find(pick.body))
+        pick.position = graspMean(pick, body->state.positions) + pick.offset;
     ++w.step;
     w.report.bodies = w.bodies.size();
     w.report.substeps = static_cast<std::size_t>(w.settings.substeps);
@@ -97,7 +99,8 @@ std::vector<WorldBody*> World::Impl::bodiesInContact(double h) {
   };
   std::vector<Entry> order;
   for (auto& body : bodies) order.push_back({sweptBounds(*body, h), body.get(), false});
-  std::stable_sort(order.begin(), order.end(), [](const Entry& a, const Entry& b) { return a.box.min.x() < b.box.min.x(); });
+  std::stable_sort(order.begin(), order.end(),
+                   [](const Entry& a, const Entry& b) { return a.box.min.x() < b.box.min.x(); });
   for (std::size_t i = 0; i < order.size(); ++i)
     for (std::size_t j = i + 1; j < order.size() && order[j].box.min.x() <= order[i].box.max.x(); ++j)
       if (order[i].box.overlaps(order[j].box)) order[i].near = order[j].near = true;
@@ -193,7 +196,8 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, const Vec3& pu
       if (std::abs(rise) < push.radius) {
         Vec3 sideways(p.x() - push.position.x(), p.y() - push.position.y(), 0.0);
         if (!(sideways.norm() > 1e-12 * push.radius)) sideways = Vec3::UnitX();
-        there = push.position + sideways.normalized() * std::sqrt(push.radius * push.radius - rise * rise) * (1.0 + 1e-12);
+        there =
+            push.position + sideways.normalized() * std::sqrt(push.radius * push.radius - rise * rise) * (1.0 + 1e-12);
         there.z() = *settings.ground;
       }
     }
@@ -208,7 +212,8 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, const Vec3& pu
         const Projection out = projectOutOfGround(state.positions[i], *settings.ground);
         if (!out.inside) continue;
         state.positions[i] += out.depth * out.normal;
-        state.positions[i] += frictionCorrection(state.positions[i] - body.scratch.previous[i], out.normal, out.depth, friction);
+        state.positions[i] +=
+            frictionCorrection(state.positions[i] - body.scratch.previous[i], out.normal, out.depth, friction);
         touched.push_back({i, out.normal, 0.0});
         ++report.ground_contacts;
       }
@@ -237,15 +242,19 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, const Vec3& pu
             touched.push_back({i, normal, normal.dot(push_velocity)});
           }
       }
+      const auto isPushed = [&](Index i, const Vec3& shift) {
+        hit_push = true;
+        push_impulse += model.masses[i] * shift;
+        const Vec3 normal = (state.positions[i] - push.position).normalized();
+        touched.push_back({i, normal, normal.dot(push_velocity)});
+      };
+      report.push_contacts += pushFaces(model, push.position, push.radius, state, isPushed);
       for (Index i = 0; i < model.rest.size(); ++i) {
         if (model.fixed[i]) continue;
         const Vec3 shift = outOfSphere(state.positions[i]);
         if (shift.isZero(0.0)) continue;
-        hit_push = true;
         state.positions[i] += shift;
-        push_impulse += model.masses[i] * shift;
-        const Vec3 normal = (state.positions[i] - push.position).normalized();
-        touched.push_back({i, normal, normal.dot(push_velocity)});
+        isPushed(i, shift);
         ++report.push_contacts;
       }
     }

@@ -10,9 +10,9 @@ namespace {
 
 TEST(Measures, OfABoxAreThoseOfTheFormula) {
   const TriangleMesh box = boxMesh(Vec3(0.2, 0.3, 0.5), 3, 4, 5);
-  EXPECT_NEAR(signedVolume(box), 0.03, 1e-15);
-  EXPECT_NEAR(surfaceArea(box), 2 * (0.06 + 0.10 + 0.15), 1e-15);
-  EXPECT_LT(solidCentroid(box).norm(), 1e-15);
+  EXPECT_NEAR(signedVolume(box), 0.03, 1e-14);
+  EXPECT_NEAR(surfaceArea(box), 2 * (0.06 + 0.10 + 0.15), 1e-14);
+  EXPECT_LT(solidCentroid(box).norm(), 1e-14);
   EXPECT_EQ(signedVolume(TriangleMesh()), 0.0);
   EXPECT_EQ(surfaceArea(TriangleMesh()), 0.0);
   EXPECT_EQ(meanEdgeLength(TriangleMesh()), 0.0);

@@ -2,7 +2,9 @@
 
 #include <limits>
 
+#include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/nearest_on_triangle.h"
 #include "support/bodies.h"
 #include "support/mesh_laws.h"
 #include "support/random.h"
@@ -202,10 +204,14 @@ TEST(World, APickLiftsALockHoldsAndMovingTakesItUpAgain) {
   EXPECT_EQ(world.pickInHand(), 0u);
   run(world, 600);
   EXPECT_GT(only(world).measures.centre_of_mass.z(), 0.4);
-  const Pick held = world.snapshot({}).picks.at(0);
-  EXPECT_TRUE(held.locked);
-  // The spring carries the weight; the ball still swings a little.
-  EXPECT_NEAR(held.force.z(), only(world).model->mass * 9.81, 0.1 * only(world).model->mass * 9.81);
+  EXPECT_TRUE(world.snapshot({}).picks.at(0).locked);
+  // The spring carries the weight: on average, since the ball still swings.
+  double mean = 0.0;
+  for (int step = 0; step < 600; ++step) {
+    world.step();
+    mean += world.snapshot({}).picks.at(0).force.z() / 600;
+  }
+  EXPECT_NEAR(mean, only(world).model->mass * 9.81, 0.05 * only(world).model->mass * 9.81);
   replyOf<Done>(world.apply(MovePickCommand{pick.pick, Vec3(0.3, 0, 0.8)}));
   EXPECT_EQ(world.pickInHand(), pick.pick);
   run(world, 600);
@@ -248,7 +254,12 @@ TEST(World, ThePushSphereTravelsAtItsSpeedAndNoTissueStaysInside) {
   const double start = only(world).measures.centre_of_mass.x();
   for (int step = 0; step < 240; ++step) {
     world.step();
-    for (const Vec3& p : only(world).surface) ASSERT_GE((p - world.push().position).norm(), 0.04 - 1e-9);
+    const BodySnapshot shot = only(world);
+    const Vec3 centre = world.push().position;
+    for (const Vec3& p : shot.surface) ASSERT_GE((p - centre).norm(), 0.04 - 1e-9);
+    for (const Triangle& t : shot.model->surface.triangles)
+      ASSERT_GE((nearestOnTriangle(centre, shot.surface[t[0]], shot.surface[t[1]], shot.surface[t[2]]) - centre).norm(),
+                0.036);
     for (const Event& e : world.takeEvents()) touched = touched || e.type == EventType::kTouched;
     if (world.push().touching && ++touching_steps == 1) {
       EXPECT_LT(world.push().force.x(), 0.0) << "tissue pushes back";
@@ -387,22 +398,34 @@ TEST(World, PiecesCanBeCutAHundredTimes) {
   EXPECT_LT(count, particles + 100);
 }
 
-TEST(World, BodiesThatFallOnEachOtherDoNotSinkIn) {
+TEST(World, BodiesThatFallOnEachOtherComeToRestOutsideOfEachOther) {
   WorldSettings settings;
   settings.substeps = 2;
   World world(settings);
   for (int k = 0; k < 3; ++k)
-    ASSERT_TRUE(world.addSceneBody(test::shared(test::block("b" + std::to_string(k), Vec3(0.01 * k, 0, 0.08 + 0.13 * k)))).ok());
-  run(world, 480);
+    ASSERT_TRUE(
+        world.addSceneBody(test::shared(test::block("b" + std::to_string(k), Vec3(0.01 * k, 0, 0.08 + 0.13 * k))))
+            .ok());
+  std::size_t contacts = 0;
+  for (int step = 0; step < 480; ++step) {
+    world.step();
+    contacts += world.snapshot({}).report.contact_counters.corrected;
+  }
+  EXPECT_GT(contacts, 100u);
   const WorldSnapshot shot = world.snapshot({true, true, true});
   EXPECT_GT(shot.report.tetrahedralizations, 0u);
-  std::vector<double> heights;
-  for (const BodySnapshot& b : shot.bodies) {
-    EXPECT_TRUE(test::allFinite(b.particles));
-    heights.push_back(b.measures.centre_of_mass.z());
+  for (const BodySnapshot& a : shot.bodies) {
+    EXPECT_TRUE(test::allFinite(a.particles));
+    EXPECT_GT(a.measures.volume, 0.8 * a.model->rest_volume);
+    TriangleMesh mesh = a.model->surface;
+    mesh.vertices = a.surface;
+    const SolidQuery solid(mesh);
+    for (const BodySnapshot& b : shot.bodies) {
+      if (&a == &b) continue;
+      for (const Vec3& p : b.particles)
+        if (solid.contains(p)) EXPECT_LT(solid.distance(p), 0.01) << b.name << " in " << a.name;
+    }
   }
-  EXPECT_GT(heights[1], heights[0] + 0.04);
-  EXPECT_GT(heights[2], heights[1] + 0.02);
 }
 
 TEST(World, ResetBringsBackTheScene) {
