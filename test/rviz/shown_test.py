@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""rviz, with the scene's own configuration on a virtual display, shows the tissue where it is: the middles of triangles,
-projected by the configuration's camera, have the tissue's colour in the picture, and another one once the body is
-removed."""
+"""The training launch, with rviz on a virtual display and the scene's own configuration, shows the tissue where it is: the
+middles of triangles, projected by the configuration's camera, have the tissue's colour in the picture, and another one
+once the body is removed."""
 import os
 import sys
 import unittest
@@ -73,9 +73,8 @@ class ShownTest(unittest.TestCase):
             view = yaml.safe_load(file)['Visualization Manager']['Views']['Current']
         display = VirtualDisplay()
         self.addCleanup(display.close)
-        rviz = display.start(['rosrun', 'rviz', 'rviz', '-d', config])
-        self.addCleanup(stop, rviz)
-        rospy.sleep(1.0)
+        launch = display.start(['roslaunch', 'meshless_surgery', 'training.launch', 'scene:=' + scene])
+        self.addCleanup(stop, launch)
         call('pause', SetBool, data=True)
         surface = call('get_body', GetBody, name=body).surface
         vertices = numpy.array([[v.x, v.y, v.z] for v in surface.vertices])
