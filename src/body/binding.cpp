@@ -1,20 +1,68 @@
 #include "meshless_surgery/body/binding.h"
 
 #include <algorithm>
-#include <map>
+
+#include <Eigen/Eigenvalues>
 
 #include "meshless_surgery/geometry/nearest.h"
 
 namespace meshless {
 namespace {
 
-constexpr std::size_t kRiderNeighbours = 4;  // particles whose clusters a rider may follow
-constexpr std::size_t kRiderClusters = 3;
+constexpr std::size_t kCarriers = 12;
+constexpr std::size_t kWalk = 64;  // particles looked at around the nearest one, along the body
+constexpr double kLever = 1e-9;    // of the distance to the farthest carrier: less is rounding
+constexpr double kRank = 0.03;     // of the moment's eigenvalues to the largest: below it, extrapolation is wild
+
+// Up to kWalk particles around `start`, by steps along the graph.
+void walk(const ParticleGraph& graph, Index start, std::vector<Index>& found, std::vector<Index>& seen, Index stamp) {
+  found.assign(1, start);
+  seen[start] = stamp;
+  for (std::size_t at = 0; at < found.size() && found.size() < kWalk; ++at)
+    for (Index k = graph.offsets[found[at]]; k < graph.offsets[found[at] + 1] && found.size() < kWalk; ++k) {
+      const Index next = graph.neighbours[k];
+      if (seen[next] == stamp) continue;
+      seen[next] = stamp;
+      found.push_back(next);
+    }
+}
+
+// Weights of the best affine map through the carriers, at p.
+void leastSquaresWeights(const Points& rest, const Vec3& p, const std::vector<Index>& carriers,
+                         std::vector<double>& weights) {
+  const double reach = 1.1 * (rest[carriers.back()] - p).norm() + 1e-300;
+  const std::size_t n = carriers.size();
+  std::vector<double> share(n);
+  double total = 0.0;
+  for (std::size_t k = 0; k < n; ++k) {
+    const double ratio = (rest[carriers[k]] - p).norm() / reach;
+    share[k] = (1.0 - ratio * ratio) * (1.0 - ratio * ratio) / (0.01 + ratio * ratio);
+    total += share[k];
+  }
+  // About the mean: what the particles do not span then drops out by itself.
+  Vec3 mean = Vec3::Zero();
+  for (std::size_t k = 0; k < n; ++k) mean += share[k] / total * (rest[carriers[k]] - p);
+  Mat3 moment = Mat3::Zero();
+  for (std::size_t k = 0; k < n; ++k) {
+    const Vec3 r = (rest[carriers[k]] - p - mean) / reach;
+    moment += share[k] / total * r * r.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Mat3> solver(moment);
+  const double least = kRank * std::max(solver.eigenvalues()[2], 1e-300);
+  Vec3 slope = Vec3::Zero();  // of the weights, along what is spanned
+  for (int axis = 0; axis < 3; ++axis)
+    if (solver.eigenvalues()[axis] > least)
+      slope += solver.eigenvectors().col(axis) *
+               (solver.eigenvectors().col(axis).dot(-mean / reach) / solver.eigenvalues()[axis]);
+  weights.resize(n);
+  for (std::size_t k = 0; k < n; ++k)
+    weights[k] = share[k] / total * (1.0 + slope.dot((rest[carriers[k]] - p - mean) / reach));
+}
 
 }  // namespace
 
-SurfaceBinding bindSurface(const Points& rest, const std::vector<double>& masses, const ClusterSet& clusters,
-                           const RestShape& shape, const Points& surface_rest, std::vector<Index> vertex_particle) {
+SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const ClusterSet& clusters,
+                           const Points& surface_rest, std::vector<Index> vertex_particle) {
   SurfaceBinding binding;
   binding.particle = std::move(vertex_particle);
   binding.offsets.push_back(0);
@@ -22,56 +70,35 @@ SurfaceBinding bindSurface(const Points& rest, const std::vector<double>& masses
     if (binding.particle[v] == kNoIndex) binding.riders.push_back(v);
   if (binding.riders.empty()) return binding;
 
-  std::vector<std::vector<std::pair<Index, double>>> clusters_of(rest.size());
-  for (Index c = 0; c < clusters.size(); ++c)
-    for (Index k = clusters.offsets[c]; k < clusters.offsets[c + 1]; ++k)
-      clusters_of[clusters.members[k]].emplace_back(c, clusters.weights[k]);
+  std::vector<Index> cluster_of(rest.size(), 0);
+  for (Index c = clusters.size(); c-- > 0;)
+    for (Index k = clusters.offsets[c]; k < clusters.offsets[c + 1]; ++k) cluster_of[clusters.members[k]] = c;
   const NearestPoints nearest(rest);
-  std::map<Index, double> pull;  // [1/kg] by particle: its share of a unit impulse on the rider over its mass
+  std::vector<Index> near, seen(rest.size(), kNoIndex);
+  std::vector<double> weights;
+  Index stamp = 0;
   for (Index v : binding.riders) {
-    const std::vector<Index> near = nearest.nearest(surface_rest[v], kRiderNeighbours);
-    const double reach = (rest[near.back()] - surface_rest[v]).norm() + 1e-300;
-    std::map<Index, double> votes;
-    for (Index i : near) {
-      const double closeness = 1.0 / (0.05 + (rest[i] - surface_rest[v]).norm() / reach);
-      for (const auto& [c, w] : clusters_of[i]) votes[c] += closeness * w;
-    }
-    std::vector<std::pair<double, Index>> order;
-    for (const auto& [c, vote] : votes) order.emplace_back(-vote, c);
-    std::sort(order.begin(), order.end());
-    order.resize(std::min(order.size(), kRiderClusters));
-    double total = 0.0;
-    for (const auto& o : order) total -= o.first;
-
-    pull.clear();
-    for (const auto& [minus_vote, c] : order) {
-      const double weight = -minus_vote / total;
-      binding.clusters.push_back(c);
-      binding.weights.push_back(weight);
-      const ClusterRest& r = shape.clusters[c];
-      const Vec3 lever = r.moment_inverse * (surface_rest[v] - r.centre);
-      for (Index k = clusters.offsets[c]; k < clusters.offsets[c + 1]; ++k) {
-        const Index i = clusters.members[k];
-        pull[i] += weight * clusters.weights[k] * (1.0 / r.mass + lever.dot(rest[i] - r.centre));
-      }
-    }
-    double mobility = 0.0;
-    for (const auto& [i, p] : pull) mobility += masses[i] * p * p;
-    binding.mobility.push_back(mobility);
-    binding.offsets.push_back(static_cast<Index>(binding.clusters.size()));
+    const Vec3& p = surface_rest[v];
+    walk(graph, nearest.nearest(p), near, seen, stamp++);
+    const auto closer = [&](Index i, Index j) {
+      const double di = (rest[i] - p).squaredNorm(), dj = (rest[j] - p).squaredNorm();
+      return di != dj ? di < dj : i < j;
+    };
+    const std::size_t count = std::min(near.size(), kCarriers);
+    std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(count), near.end(), closer);
+    near.resize(count);
+    leastSquaresWeights(rest, p, near, weights);
+    Vec3 lever = p;
+    for (std::size_t k = 0; k < near.size(); ++k) lever -= weights[k] * rest[near[k]];
+    const double span = (rest[near.back()] - p).norm();
+    binding.levers.push_back(lever.norm() > kLever * span ? lever : Vec3(Vec3::Zero()));
+    binding.any_lever = binding.any_lever || !binding.levers.back().isZero(0.0);
+    binding.turners.push_back(cluster_of[near[0]]);
+    binding.carriers.insert(binding.carriers.end(), near.begin(), near.end());
+    binding.weights.insert(binding.weights.end(), weights.begin(), weights.end());
+    binding.offsets.push_back(static_cast<Index>(binding.carriers.size()));
   }
   return binding;
-}
-
-Vec3 riderPosition(const BodyModel& model, const std::vector<ClusterPose>& poses, Index r) {
-  const Vec3& rest = model.surface.vertices[model.binding.riders[r]];
-  Vec3 sum = Vec3::Zero();
-  for (Index k = model.binding.offsets[r]; k < model.binding.offsets[r + 1]; ++k) {
-    const Index c = model.binding.clusters[k];
-    sum +=
-        model.binding.weights[k] * (poses[c].centre + poses[c].deformation * (rest - model.shape.clusters[c].centre));
-  }
-  return sum;
 }
 
 }  // namespace meshless

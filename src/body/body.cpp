@@ -5,32 +5,37 @@
 
 namespace meshless {
 
-std::vector<double> matchMasses(const std::vector<double>& masses, const std::vector<bool>& fixed) {
+void makeMoments(BodyModel& model, const Material& material) {
   constexpr double kHeld = 50.0;  // enough that a cluster follows its held part, little enough to stay well conditioned
-  std::vector<double> heavy = masses;
-  for (std::size_t i = 0; i < heavy.size(); ++i)
-    if (fixed[i]) heavy[i] *= kHeld;
-  return heavy;
+  model.match_masses = model.masses;
+  if (!material.elastic())  // stress already carries what is held
+    for (std::size_t i = 0; i < model.masses.size(); ++i)
+      if (model.fixed[i]) model.match_masses[i] *= kHeld;
+  model.shape = makeRestShape(model.rest, model.match_masses, model.clusters);
+  model.elastic.clear();
+  model.highest_frequency = 0.0;
+  if (material.elastic()) {
+    model.elastic = makeElasticRest(model.shape);
+    model.highest_frequency =
+        highestFrequency(matchInput(model), model.elastic,
+                         elasticParameters(material.youngs_modulus, material.poissons_ratio, material.density));
+  } else if (material.mode == MatchMode::kQuadratic) {
+    addQuadraticRest(model.rest, model.match_masses, model.clusters, model.shape);
+  }
 }
 
 BodyModelPtr withMaterial(const BodyModelPtr& model, const Material& before, const Material& after) {
   const bool new_masses = before.density != after.density;
-  const bool needs_quadratic = after.mode == MatchMode::kQuadratic && model->shape.quadratic.empty();
-  if (!new_masses && !needs_quadratic) return model;
+  const bool new_elasticity = before.youngs_modulus != after.youngs_modulus ||
+                              (after.elastic() && before.poissons_ratio != after.poissons_ratio);
+  const bool needs_quadratic =
+      !after.elastic() && after.mode == MatchMode::kQuadratic && model->shape.quadratic.empty();
+  if (!new_masses && !new_elasticity && !needs_quadratic) return model;
   auto changed = std::make_shared<BodyModel>(*model);
-  if (new_masses) {
-    const double ratio = after.density / before.density;
-    for (double& m : changed->masses) m *= ratio;
-    for (double& m : changed->match_masses) m *= ratio;
-    changed->mass *= ratio;
-    for (double& m : changed->binding.mobility) m /= ratio;
-    const bool quadratic = !changed->shape.quadratic.empty();
-    changed->shape = makeRestShape(changed->rest, changed->match_masses, changed->clusters);
-    if (quadratic || needs_quadratic)
-      addQuadraticRest(changed->rest, changed->match_masses, changed->clusters, changed->shape);
-  } else {
-    addQuadraticRest(changed->rest, changed->match_masses, changed->clusters, changed->shape);
-  }
+  const double ratio = after.density / before.density;
+  for (double& m : changed->masses) m *= ratio;
+  changed->mass *= ratio;
+  makeMoments(*changed, after);
   return changed;
 }
 
@@ -38,11 +43,14 @@ void updateSurface(const BodyModel& model, BodyState& state) {
   state.surface.resize(model.surface.vertices.size());
   for (std::size_t v = 0; v < state.surface.size(); ++v)
     if (model.binding.particle[v] != kNoIndex) state.surface[v] = state.positions[model.binding.particle[v]];
-  if (model.binding.riders.empty()) return;
-  std::vector<ClusterPose> poses = state.poses;  // a step's warm start must not depend on who looks
-  fitClusters(matchInput(model), state.positions, poses);
+  std::vector<ClusterPose> poses;
+  if (model.binding.any_lever) {
+    poses = state.poses;  // a copy: a step's warm start must not depend on who looks
+    fitClusters(matchInput(model), state.positions, poses);
+  }
   for (Index r = 0; r < model.binding.riders.size(); ++r)
-    state.surface[model.binding.riders[r]] = riderPosition(model, poses, r) + state.rider_offsets[r];
+    state.surface[model.binding.riders[r]] =
+        riderPosition(model.binding, state.positions, poses, r) + state.rider_offsets[r];
 }
 
 BodyMeasures measureBody(const BodyModel& model, const BodyState& state) {

@@ -54,6 +54,39 @@ RigidMotion rigidMotionOf(const BodyModel& model, const Points& positions, const
   return motion;
 }
 
+double highestFrequencyNow(const BodyModel& model, const BodyState& state) {
+  constexpr double kMargin = 1.1;  // the frequency was found from below, and the stretch is that of the last substep
+  return kMargin * state.stretch * model.highest_frequency;
+}
+
+double stiffnessFactor(const BodyModel& model, const BodyState& state, double h) {
+  const double gain = h * highestFrequencyNow(model, state);
+  return gain > 1.0 ? 1.0 / (gain * gain) : 1.0;
+}
+
+namespace {
+
+// Particle velocities after what the material does, by accelerations taken at y; x is where momentum is counted.
+template <class Acceleration>
+void accelerate(const BodyModel& model, double h, const Points& x, Points& v, const Acceleration& at) {
+  if (model.any_fixed) {
+    for (std::size_t i = 0; i < v.size(); ++i) v[i] += h * at(i);
+    return;
+  }
+  // The pull is free of torque about y, but it acts on x: the difference is given back as a spin of the body.
+  Vec3 leaked = Vec3::Zero();
+  const Vec3 centre = centreOfMass(model, x);
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    const Vec3 dv = h * at(i);
+    v[i] += dv;
+    leaked += model.masses[i] * (x[i] - centre).cross(dv);
+  }
+  const Vec3 spin = spinFor(inertiaAbout(model, x, centre), leaked);
+  for (std::size_t i = 0; i < v.size(); ++i) v[i] -= spin.cross(x[i] - centre);
+}
+
+}  // namespace
+
 void matchAndMove(const BodyModel& model, const Material& material, const Vec3& gravity, double h, BodyState& state,
                   StepScratch& scratch, MatchCounters& counters) {
   const std::size_t n = model.rest.size();
@@ -61,28 +94,25 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
   Points& v = state.velocities;
   scratch.previous = x;
   scratch.predicted.resize(n);
-  for (std::size_t i = 0; i < n; ++i) scratch.predicted[i] = model.fixed[i] ? x[i] : Vec3(x[i] + h * v[i]);
+  const double factor = stiffnessFactor(model, state, h);
+  double ahead = h;  // [s]
+  if (model.highest_frequency > 0.0) ahead = 1.0 / (highestFrequencyNow(model, state) * std::sqrt(factor));
+  for (std::size_t i = 0; i < n; ++i) scratch.predicted[i] = model.fixed[i] ? x[i] : Vec3(x[i] + ahead * v[i]);
   const Points& y = scratch.predicted;
 
-  const double gain = stiffnessGain(material.alpha, h);
-  if (gain > 0.0) {
+  if (material.elastic()) {
+    state.stretch = elasticAccelerations(
+        matchInput(model), model.elastic,
+        elasticParameters(factor * material.youngs_modulus, material.poissons_ratio, material.density), y, state.poses,
+        scratch.goals, counters);
+    const Points& accelerations = scratch.goals;
+    accelerate(model, h, x, v, [&](std::size_t i) -> const Vec3& { return accelerations[i]; });
+  } else if (const double gain = stiffnessGain(material.alpha, h); gain > 0.0) {
     matchShapes(matchInput(model), y, material.mode, std::min(material.beta, kMostBeta), state.poses, scratch.goals,
                 counters);
     const Points& goals = scratch.goals;
-    if (model.any_fixed) {
-      for (std::size_t i = 0; i < n; ++i) v[i] += gain / h * (goals[i] - y[i]);
-    } else {
-      // The pull is free of torque about y, but it acts on x: the difference is given back as a spin of the body.
-      Vec3 leaked = Vec3::Zero();
-      const Vec3 centre = centreOfMass(model, x);
-      for (std::size_t i = 0; i < n; ++i) {
-        const Vec3 dv = gain / h * (goals[i] - y[i]);
-        v[i] += dv;
-        leaked += model.masses[i] * (x[i] - centre).cross(dv);
-      }
-      const Vec3 spin = spinFor(inertiaAbout(model, x, centre), leaked);
-      for (std::size_t i = 0; i < n; ++i) v[i] -= spin.cross(x[i] - centre);
-    }
+    const double pull = gain / (h * h);
+    accelerate(model, h, x, v, [&](std::size_t i) -> Vec3 { return pull * (goals[i] - y[i]); });
   }
   if (material.damping > 0.0) {
     const double lost = 1.0 - std::exp(-material.damping * h);

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/geometry/cell_lattice.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/nearest.h"
 #include "meshless_surgery/geometry/sampling.h"
@@ -15,6 +16,8 @@ namespace {
 constexpr std::size_t kMaxParticles = 200000;
 constexpr std::size_t kMaxVertexParticles = 6000;  // larger surfaces ride, but for a subset at the spacing
 constexpr double kAutoParticles = 2500.0;          // interior particles aimed at where no spacing is given
+constexpr double kAutoCells = 1600.0;              // of a lattice, likewise
+constexpr double kLeastCellFraction = 0.1;         // a sliver of the solid counts as so much of its cell
 constexpr double kReach = 1.75;                    // of the spacing: how far neighbours along the body may be
 constexpr std::size_t kMostLinks = 40;   // of the nearest looked at: vertices finer than the spacing have thousands
 constexpr double kLeastMassShare = 0.1;  // of the mean: no particle is so light that contacts throw it
@@ -147,6 +150,63 @@ std::vector<double> shareMass(const BodyDef& def, const TriangleMesh& mesh, cons
 
 }  // namespace
 
+namespace {
+
+// The particles of a surface and of the space in it.
+Status makeParticles(const BodyDef& def, const SolidQuery* solid, BodyModel& model,
+                     std::vector<Index>& vertex_particle) {
+  const TriangleMesh& surface = model.surface;
+  vertex_particle = chooseVertexParticles(surface.vertices, model.spacing);
+  for (std::size_t v = 0; v < surface.vertices.size(); ++v)
+    if (vertex_particle[v] != kNoIndex) model.rest.push_back(surface.vertices[v]);
+  if (solid) {
+    const LatticeSample inner = sampleInterior(surface, *solid, model.spacing, 0.5 * model.spacing * (1.0 - 1e-9));
+    model.rest.insert(model.rest.end(), inner.points.begin(), inner.points.end());
+  }
+  if (model.rest.size() > kMaxParticles)
+    return invalid("body '" + def.name + "' has " + std::to_string(model.rest.size()) + " particles; accepted: up to " +
+                   std::to_string(kMaxParticles));
+  model.masses = shareMass(def, surface, solid, model.rest, model.rest_volume, model.spacing);
+  model.graph = linkParticles(model.rest, surface, vertex_particle, kReach * model.spacing, solid);
+  model.clusters = makeClusters(model.rest, model.graph, def.clusters);
+  return Done{};
+}
+
+// The corners of the lattice cells that the solid meets; the whole surface rides on them.
+Status makeLatticeParticles(const BodyDef& def, const SolidQuery& solid, BodyModel& model,
+                            std::vector<Index>& vertex_particle) {
+  Result<CellLattice> lattice = divideIntoCells(model.surface, solid, model.spacing);
+  if (!lattice) return Error{lattice.error().code, "body '" + def.name + "': " + lattice.error().detail};
+  if (lattice->corners.size() > kMaxParticles)
+    return invalid("body '" + def.name + "' has " + std::to_string(lattice->corners.size()) +
+                   " particles; accepted: up to " + std::to_string(kMaxParticles));
+  model.rest = std::move(lattice->corners);
+  vertex_particle.assign(model.surface.vertices.size(), kNoIndex);
+  double filled = 0.0;
+  for (CellLattice::Cell& cell : lattice->cells) {
+    cell.fraction = std::max(cell.fraction, kLeastCellFraction);
+    filled += cell.fraction;
+  }
+  std::vector<std::array<Index, 8>> cells;
+  std::vector<double> cell_masses;
+  std::vector<std::array<Index, 2>> edges;
+  model.masses.assign(model.rest.size(), 0.0);
+  for (const CellLattice::Cell& cell : lattice->cells) {
+    cells.push_back(cell.corners);
+    cell_masses.push_back(def.material.density * model.rest_volume * cell.fraction / filled);
+    for (Index k = 0; k < 8; ++k) {
+      model.masses[cell.corners[k]] += cell_masses.back() / 8.0;
+      for (Index bit : {1u, 2u, 4u})
+        if (!(k & bit)) edges.push_back({cell.corners[k], cell.corners[k | bit]});
+    }
+  }
+  model.graph = makeGraph(model.rest, std::move(edges));
+  model.clusters = clustersOfCells(cells, cell_masses, model.masses, 1.01 * std::sqrt(3.0) * model.spacing);
+  return Done{};
+}
+
+}  // namespace
+
 Result<PreparedBody> prepareBody(BodyDef def) {
   if (Status status = validate(def); !status) return status.error();
   auto model = std::make_shared<BodyModel>();
@@ -172,9 +232,16 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   }
   model->solid = def.solid;
   model->rest_volume = volume;
+  const bool cells = def.solid && (def.clusters.kind == ClusterOptions::Kind::kCells ||
+                                   (def.clusters.kind == ClusterOptions::Kind::kAuto && def.material.elastic()));
   model->spacing = def.spacing;
-  if (!(model->spacing > 0.0))
-    model->spacing = def.solid ? std::max(1.2 * edge, std::cbrt(volume / kAutoParticles)) : edge;
+  if (!(model->spacing > 0.0)) {
+    if (!def.solid)
+      model->spacing = edge;
+    else
+      model->spacing =
+          cells ? std::cbrt(volume / kAutoCells) : std::max(1.2 * edge, std::cbrt(volume / kAutoParticles));
+  }
   if (def.solid && volume / std::pow(model->spacing, 3.0) > static_cast<double>(kMaxParticles)) {
     std::ostringstream text;
     text << "spacing " << model->spacing << " m would give body '" << def.name << "' about "
@@ -185,31 +252,20 @@ Result<PreparedBody> prepareBody(BodyDef def) {
 
   std::unique_ptr<SolidQuery> solid;
   if (def.solid) solid = std::make_unique<SolidQuery>(surface);
-  std::vector<Index> vertex_particle = chooseVertexParticles(surface.vertices, model->spacing);
-  for (std::size_t v = 0; v < surface.vertices.size(); ++v)
-    if (vertex_particle[v] != kNoIndex) model->rest.push_back(surface.vertices[v]);
-  if (solid) {
-    const LatticeSample inner = sampleInterior(surface, *solid, model->spacing, 0.5 * model->spacing * (1.0 - 1e-9));
-    model->rest.insert(model->rest.end(), inner.points.begin(), inner.points.end());
-  }
-  if (model->rest.size() > kMaxParticles)
-    return invalid("body '" + def.name + "' has " + std::to_string(model->rest.size()) +
-                   " particles; accepted: up to " + std::to_string(kMaxParticles));
+  std::vector<Index> vertex_particle;
+  if (Status made = cells ? makeLatticeParticles(def, *solid, *model, vertex_particle)
+                          : makeParticles(def, solid.get(), *model, vertex_particle);
+      !made)
+    return made.error();
 
-  model->masses = shareMass(def, surface, solid.get(), model->rest, volume, model->spacing);
   for (double m : model->masses) model->mass += m;
   model->fixed.assign(model->rest.size(), false);
   for (std::size_t i = 0; i < model->rest.size(); ++i)
     for (const Box& box : def.fixed)
       if (box.contains(model->rest[i])) model->fixed[i] = model->any_fixed = true;
-  model->match_masses = matchMasses(model->masses, model->fixed);
-  model->graph = linkParticles(model->rest, surface, vertex_particle, kReach * model->spacing, solid.get());
-  model->clusters = makeClusters(model->rest, model->graph, def.clusters);
-  model->shape = makeRestShape(model->rest, model->match_masses, model->clusters);
-  if (def.material.mode == MatchMode::kQuadratic)
-    addQuadraticRest(model->rest, model->match_masses, model->clusters, model->shape);
-  model->binding = bindSurface(model->rest, model->match_masses, model->clusters, model->shape, surface.vertices,
-                               std::move(vertex_particle));
+  makeMoments(*model, def.material);
+  model->binding =
+      bindSurface(model->rest, model->graph, model->clusters, surface.vertices, std::move(vertex_particle));
 
   PreparedBody body;
   body.state.positions = model->rest;

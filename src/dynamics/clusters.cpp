@@ -257,6 +257,7 @@ ClusterSet makeClusters(const Points& rest, const ParticleGraph& graph, const Cl
       const SeedSet set = farthestSeeds(rest, graph, static_cast<std::size_t>(options.count), 0.0);
       return clustersAround(set, graph, (1.0 + options.overlap) * set.cover + 1e-12);
     }
+    case ClusterOptions::Kind::kCells:
     case ClusterOptions::Kind::kAuto: break;
   }
   if (particles < kOneClusterBelow) return oneCluster(rest);
@@ -265,6 +266,24 @@ ClusterSet makeClusters(const Points& rest, const ParticleGraph& graph, const Cl
   const double cover = std::max(kAutoRadiusEdges * meanLength(graph), kAutoRadiusOfSize * bounds.diagonal());
   const SeedSet set = farthestSeeds(rest, graph, particles, cover);
   return clustersAround(set, graph, (1.2 + options.overlap) * cover);
+}
+
+ClusterSet clustersOfCells(const std::vector<std::array<Index, 8>>& cells, const std::vector<double>& cell_masses,
+                           const std::vector<double>& particle_masses, double radius) {
+  ClusterSet set;
+  set.offsets.push_back(0);
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    std::array<Index, 8> members = cells[c];
+    std::sort(members.begin(), members.end());
+    for (Index i : members) {
+      set.members.push_back(i);
+      set.weights.push_back(cell_masses[c] / 8.0 / particle_masses[i]);
+    }
+    set.offsets.push_back(static_cast<Index>(set.members.size()));
+    set.seeds.push_back(members[0]);
+    set.radii.push_back(radius);
+  }
+  return set;
 }
 
 ParticleGraph subgraph(const ParticleGraph& parent, const std::vector<Index>& kept) {

@@ -26,6 +26,10 @@ const char* toString(MatchMode mode) {
 }
 
 Status Material::validate() const {
+  if (!(youngs_modulus >= 0.0 && youngs_modulus <= 1e12))
+    return outOfRange("youngs_modulus", youngs_modulus, "0 (a material for looks) to 1e12 Pa");
+  if (!(poissons_ratio >= 0.0 && poissons_ratio <= 0.49))
+    return outOfRange("poissons_ratio", poissons_ratio, "0 to 0.49");
   if (!(alpha >= 0.0 && alpha <= 1.0)) return outOfRange("alpha", alpha, "0 to 1");
   if (!(beta >= 0.0 && beta <= 1.0)) return outOfRange("beta", beta, "0 to 1");
   if (!(density > 0.0 && density <= 1e6)) return outOfRange("density", density, "above 0 to 1e6 kg/m^3");

@@ -39,6 +39,8 @@ void readMaterial(YamlSource& source, const YAML::Node& node, const std::string&
   if (mode == 0) material.mode = MatchMode::kRigid;
   if (mode == 1) material.mode = MatchMode::kLinear;
   if (mode == 2) material.mode = MatchMode::kQuadratic;
+  map.number("youngs_modulus", {0.0, 1e12, false, "Pa"}, material.youngs_modulus);
+  map.number("poissons_ratio", {0.0, 0.49}, material.poissons_ratio);
   map.number("alpha", {0.0, 1.0}, material.alpha);
   map.number("beta", {0.0, 1.0}, material.beta);
   map.number("density", {0.0, 1e6, true, "kg/m^3"}, material.density);
@@ -46,12 +48,6 @@ void readMaterial(YamlSource& source, const YAML::Node& node, const std::string&
   map.number("friction", {0.0, 10.0}, material.friction);
   readColor(map, "color", material.color);
   readColor(map, "inside_color", material.inside_color);
-  for (const auto& entry : node.IsMap() ? node : YAML::Node(YAML::NodeType::Map))
-    for (const char* key : {"youngs_modulus", "poissons_ratio"})
-      if (entry.first.IsScalar() && entry.first.Scalar() == key)
-        source.fail(entry.first, std::string(key) + " in " + what + ": materials for accuracy are not in this version",
-                    "materials for looks, with mode, alpha, beta, density, damping, friction, color, inside_color",
-                    ErrorCode::kUnsupported);
   map.finish();
   if (source.fault) return;
   // The ranges above are the material's own; this keeps them so.

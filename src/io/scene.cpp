@@ -34,6 +34,7 @@ void readWorld(YamlSource& source, const YAML::Node& node, WorldSettings& world)
   map.number("ground_friction", {0.0, 10.0}, world.ground_friction);
   map.number("step_rate", {1.0, 10000.0, false, "Hz"}, world.step_rate);
   map.whole("substeps", 1, 1000, world.substeps);
+  map.whole("max_substeps", 1, 1000, world.max_substeps);
   const int contact = map.choice("contact", {"none", "textbook"});
   if (contact >= 0) world.contact = contact == 0 ? ContactMethod::kNone : ContactMethod::kTextbook;
   if (const YAML::Node pick = map.get("pick"); pick.IsDefined()) {
@@ -78,12 +79,15 @@ Pose readPose(YamlSource& source, const YAML::Node& node) {
 
 ClusterOptions readClusters(YamlSource& source, const YAML::Node& node) {
   ClusterOptions options;
-  const std::string accepted = "auto, one, {grid: [x, y, z], overlap: 0 to 1}, {count: 1 to 100000, overlap: 0 to 1}";
+  const std::string accepted =
+      "auto, one, cells, {grid: [x, y, z], overlap: 0 to 1}, {count: 1 to 100000, overlap: 0 to 1}";
   if (!node.IsMap()) {
     if (node.IsScalar() && node.Scalar() == "auto")
       options.kind = ClusterOptions::Kind::kAuto;
     else if (node.IsScalar() && node.Scalar() == "one")
       options.kind = ClusterOptions::Kind::kOne;
+    else if (node.IsScalar() && node.Scalar() == "cells")
+      options.kind = ClusterOptions::Kind::kCells;
     else
       source.fail(node, "clusters is " + shown(node), accepted);
     return options;

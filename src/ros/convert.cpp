@@ -118,6 +118,7 @@ meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatu
     message.velocity = toVector(body.measures.velocity);
     message.kinetic_energy = body.measures.kinetic_energy;
     message.asleep = body.asleep;
+    message.stiffness_factor = body.stiffness_factor;
     state.bodies.push_back(std::move(message));
   }
   state.picks.reserve(snapshot.picks.size());

@@ -46,6 +46,7 @@ Status WorldSettings::validate() const {
   if (!(ground_friction >= 0.0 && ground_friction <= 10.0)) return outOfRange("ground_friction", ground_friction, "0 to 10");
   if (!(step_rate >= 1.0 && step_rate <= 10000.0)) return outOfRange("step_rate", step_rate, "1 to 10000 Hz");
   if (!(substeps >= 1 && substeps <= 1000)) return outOfRange("substeps", substeps, "1 to 1000");
+  if (!(max_substeps >= 1 && max_substeps <= 1000)) return outOfRange("max_substeps", max_substeps, "1 to 1000");
   if (!(pick_max_distance > 0.0 && pick_max_distance <= 1e6))
     return outOfRange("pick_max_distance", pick_max_distance, "above 0 to 1e6 m");
   if (!(pick_stiffness > 0.0 && pick_stiffness <= 1e12))
@@ -204,6 +205,7 @@ WorldSnapshot World::snapshot(const SnapshotWants& wants) {
     if (wants.surfaces) b.surface = body->state.surface;
     if (wants.particles) b.particles = body->state.positions;
     if (wants.measures) b.measures = measureBody(*body->model, body->state);
+    b.stiffness_factor = body->stiffness_factor;
     b.tetrahedra = body->mesh ? body->mesh->tetrahedra.size() : 0;
     shot.bodies.push_back(std::move(b));
   }

@@ -19,6 +19,7 @@ struct WorldBody {
   bool surface_current = true;              // state.surface fits state.positions
   std::shared_ptr<const ContactMesh> mesh;  // made when something first comes near
   bool touched_by_push = false;
+  double stiffness_factor = 1.0;
   StepScratch scratch;
 };
 
@@ -82,10 +83,11 @@ struct World::Impl {
   // stages of a step
   void closeBlades();
   std::vector<WorldBody*> bodiesInContact(double h);
-  void movePush(double h);
+  int chooseSubsteps(double h_frame);
+  void movePush(double h, double h_frame);
   void pullSprings(double h, double h_frame);
   void contactBodies(const std::vector<WorldBody*>& near, double h);
-  void contactGroundAndPush(WorldBody& body, double h, const Vec3& push_velocity);
+  void contactGroundAndPush(WorldBody& body, double h, double h_frame, const Vec3& push_velocity);
   void fadeRiderOffsets(WorldBody& body, double h);
 };
 

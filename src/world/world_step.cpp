@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <sstream>
 
 #include "meshless_surgery/body/face_contact.h"
 #include "meshless_surgery/body/rider_contact.h"
@@ -44,14 +45,15 @@ void World::step() {
   w.report = StepReport();
   {
     const Stopwatch total(w.report.total);
-    const double h = 1.0 / w.settings.step_rate / w.settings.substeps;
     const double h_frame = 1.0 / w.settings.step_rate;
+    const int substeps = w.chooseSubsteps(h_frame);
+    const double h = h_frame / substeps;
     w.closeBlades();
     const std::vector<WorldBody*> near = w.bodiesInContact(h_frame);
     for (Pick& pick : w.picks) pick.force.setZero();
     w.push.force.setZero();
     w.push.touching = false;
-    for (int substep = 0; substep < w.settings.substeps; ++substep) {
+    for (int substep = 0; substep < substeps; ++substep) {
       {
         const Stopwatch match(w.report.match);
         for (auto& body : w.bodies)
@@ -69,7 +71,7 @@ void World::step() {
           if (w.settings.ground || w.push.enabled) body->scratch.before_contact = body->state.positions;
         }
         w.contactBodies(near, h);
-        w.movePush(h);
+        w.movePush(h, h_frame);
       }
       for (auto& body : w.bodies) {
         velocitiesFromPositions(*body->model, h, body->state, body->scratch);
@@ -82,9 +84,30 @@ void World::step() {
         pick.position = graspMean(pick, body->state.positions) + pick.offset;
     ++w.step;
     w.report.bodies = w.bodies.size();
-    w.report.substeps = static_cast<std::size_t>(w.settings.substeps);
+    w.report.substeps = static_cast<std::size_t>(substeps);
     w.report.tetrahedralizations = w.tetrahedralizations;
   }
+}
+
+// As many as the stiffest body needs, within the budget; what the budget takes from a body is said once.
+int World::Impl::chooseSubsteps(double h_frame) {
+  double needed = settings.substeps;
+  for (const auto& body : bodies)
+    needed = std::max(needed, std::ceil(h_frame * highestFrequencyNow(*body->model, body->state)));
+  const int most = std::max(settings.substeps, settings.max_substeps);
+  const int substeps = needed < most ? static_cast<int>(needed) : most;
+  for (auto& body : bodies) {
+    const double factor = stiffnessFactor(*body->model, body->state, h_frame / substeps);
+    if (factor < 1.0 && !(body->stiffness_factor < 1.0)) {
+      std::ostringstream text;
+      text << body->name << " needs " << std::ceil(h_frame * highestFrequencyNow(*body->model, body->state))
+           << " substeps for its material; with " << substeps << " (max_substeps) it has " << 100.0 * factor
+           << " % of its stiffness";
+      say(EventType::kOverBudget, body->name, 0, text.str());
+    }
+    body->stiffness_factor = factor;
+  }
+  return substeps;
 }
 
 std::vector<WorldBody*> World::Impl::bodiesInContact(double h) {
@@ -147,7 +170,7 @@ void World::Impl::contactBodies(const std::vector<WorldBody*>& near, double h) {
 }
 
 // The sphere goes its way in hops, so that a fast one does not jump over tissue.
-void World::Impl::movePush(double h) {
+void World::Impl::movePush(double h, double h_frame) {
   int hops = 1;
   Vec3 velocity = Vec3::Zero();
   if (push.enabled) {
@@ -160,11 +183,11 @@ void World::Impl::movePush(double h) {
   }
   for (int hop = 0; hop < hops; ++hop) {
     if (push.enabled) push.position += velocity * (h / hops);
-    for (auto& body : bodies) contactGroundAndPush(*body, h, velocity);
+    for (auto& body : bodies) contactGroundAndPush(*body, h, h_frame, velocity);
   }
 }
 
-void World::Impl::contactGroundAndPush(WorldBody& body, double h, const Vec3& push_velocity) {
+void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame, const Vec3& push_velocity) {
   const BodyModel& model = *body.model;
   BodyState& state = body.state;
   if (!settings.ground && !push.enabled) return;
@@ -217,37 +240,25 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, const Vec3& pu
         touched.push_back({i, out.normal, 0.0});
         ++report.ground_contacts;
       }
-      if (!model.binding.riders.empty()) {
-        std::vector<bool> moved(model.rest.size(), false);
-        report.ground_contacts += pushRiders(
-            model,
-            [&](const Vec3& p) -> Vec3 {
-              const Projection out = projectOutOfGround(p, *settings.ground);
-              return out.inside ? Vec3(out.depth * out.normal) : Vec3::Zero();
-            },
-            state, &moved, nullptr);
-        for (Index i = 0; i < model.rest.size(); ++i)
-          if (moved[i]) touched.push_back({i, Vec3::UnitZ(), 0.0});
-      }
+      report.ground_contacts += pushRiders(
+          model,
+          [&](const Vec3& p) -> Vec3 {
+            const Projection out = projectOutOfGround(p, *settings.ground);
+            return out.inside ? Vec3(out.depth * out.normal) : Vec3::Zero();
+          },
+          state,
+          [&](Index i, const Vec3&) {
+            touched.push_back({i, Vec3::UnitZ(), 0.0});
+          });
     }
     if (near_push) {
-      if (!model.binding.riders.empty()) {
-        std::vector<bool> moved(model.rest.size(), false);
-        const std::size_t pushed = pushRiders(model, outOfSphere, state, &moved, &push_impulse);
-        hit_push = hit_push || pushed > 0;
-        report.push_contacts += pushed;
-        for (Index i = 0; i < model.rest.size(); ++i)
-          if (moved[i]) {
-            const Vec3 normal = (state.positions[i] - push.position).normalized();
-            touched.push_back({i, normal, normal.dot(push_velocity)});
-          }
-      }
       const auto isPushed = [&](Index i, const Vec3& shift) {
         hit_push = true;
         push_impulse += model.masses[i] * shift;
         const Vec3 normal = (state.positions[i] - push.position).normalized();
         touched.push_back({i, normal, normal.dot(push_velocity)});
       };
+      report.push_contacts += pushRiders(model, outOfSphere, state, isPushed);
       report.push_contacts += pushFaces(model, push.position, push.radius, state, isPushed);
       for (Index i = 0; i < model.rest.size(); ++i) {
         if (model.fixed[i]) continue;
@@ -261,7 +272,7 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, const Vec3& pu
   }
   if (hit_push) {
     push.touching = true;
-    push.force -= push_impulse / (h * h) / static_cast<double>(settings.substeps);
+    push.force -= push_impulse / (h * h_frame);
     if (!body.touched_by_push) say(EventType::kTouched, body.name, 0, "the push sphere touched " + body.name);
   }
   body.touched_by_push = hit_push;

@@ -1,38 +1,80 @@
 #include "meshless_surgery/body/binding.h"
 
+#include "meshless_surgery/geometry/measures.h"
 #include "support/bodies.h"
 
 namespace meshless {
 namespace {
 
-TEST(BindSurface, ParticlesAreThemselvesAndRidersHaveSharesOfOne) {
-  const PreparedBody body = test::prepared(test::ball("b", Vec3::Zero()));
-  const BodyModel& m = *body.model;
-  std::vector<Index> vertex_particle = m.binding.particle;
-  for (std::size_t v = 0; v < vertex_particle.size(); v += 2) vertex_particle[v] = kNoIndex;
-  const SurfaceBinding binding =
-      bindSurface(m.rest, m.match_masses, m.clusters, m.shape, m.surface.vertices, vertex_particle);
-  EXPECT_EQ(binding.particle, vertex_particle);
-  ASSERT_EQ(binding.riders.size(), (vertex_particle.size() + 1) / 2);
-  ASSERT_EQ(binding.offsets.size(), binding.riders.size() + 1);
-  ASSERT_EQ(binding.mobility.size(), binding.riders.size());
-  for (std::size_t r = 0; r < binding.riders.size(); ++r) {
-    EXPECT_EQ(vertex_particle[binding.riders[r]], kNoIndex);
-    double share = 0.0;
-    for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k) {
-      EXPECT_LT(binding.clusters[k], m.clusters.size());
-      share += binding.weights[k];
+Points moved(const Points& points, const Mat3& map, const Vec3& shift) {
+  Points result;
+  for (const Vec3& p : points) result.push_back(map * p + shift);
+  return result;
+}
+
+TEST(BindSurface, RidersFollowEveryAffineMotionExactly) {
+  Mat3 map;
+  map << 1.2, 0.1, 0, -0.1, 0.9, 0.05, 0, 0.1, 1.1;
+  const Vec3 shift(1, -2, 3);
+  for (const shapes::Shape& shape : shapes::simpleShapes()) {
+    SCOPED_TRACE(shape.name);
+    const double size = boundsOf(shape.mesh.vertices).diagonal();
+    BodyDef def = test::defOf(shape.mesh);
+    def.spacing = size / 12.0;
+    const PreparedBody body = test::prepared(def);
+    const BodyModel& m = *body.model;
+    std::vector<Index> vertex_particle = m.binding.particle;
+    for (std::size_t v = 0; v < vertex_particle.size(); v += 2) vertex_particle[v] = kNoIndex;
+    const SurfaceBinding binding = bindSurface(m.rest, m.graph, m.clusters, m.surface.vertices, vertex_particle);
+    EXPECT_EQ(binding.particle, vertex_particle);
+    ASSERT_EQ(binding.offsets.size(), binding.riders.size() + 1);
+    std::vector<ClusterPose> poses(m.clusters.size());
+    for (ClusterPose& pose : poses) pose.deformation = map;
+    const Points positions = moved(m.rest, map, shift), surface = moved(m.surface.vertices, map, shift);
+    for (Index r = 0; r < binding.riders.size(); ++r) {
+      EXPECT_EQ(vertex_particle[binding.riders[r]], kNoIndex);
+      double share = 0.0;
+      for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k) share += binding.weights[k];
+      EXPECT_NEAR(share, 1.0, 1e-12);
+      EXPECT_LT((riderPosition(binding, positions, poses, r) - surface[binding.riders[r]]).norm(), 1e-9 * size);
     }
-    EXPECT_NEAR(share, 1.0, 1e-12);
-    // Lighter than one particle, heavier than the whole body.
-    EXPECT_GT(binding.mobility[r], 1.0 / m.mass);
   }
+}
+
+TEST(BindSurface, ParticlesInAPlaneOrAloneStillCarry) {
+  const Points flat = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
+  const ParticleGraph square = makeGraph(flat, {{0, 1}, {1, 3}, {3, 2}, {2, 0}});
+  const ClusterSet one = makeClusters(flat, square, {});
+  const SurfaceBinding above = bindSurface(flat, square, one, {{0.25, 0.5, 0.1}}, {kNoIndex});
+  // A quarter turn about y takes x to -z and z to x.
+  const Points turned = {{0, 0, 0}, {0, 0, -1}, {0, 1, 0}, {0, 1, -1}};
+  std::vector<ClusterPose> poses(1);
+  poses[0].deformation = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitY()).toRotationMatrix();
+  EXPECT_LT((riderPosition(above, turned, poses, 0) - Vec3(0.1, 0.5, -0.25)).norm(), 1e-12);
+  const Points single = {{1, 2, 3}};
+  const ParticleGraph graph = makeGraph(single, {});
+  const SurfaceBinding lone = bindSurface(single, graph, makeClusters(single, graph, {}), {{1, 2, 4}}, {kNoIndex});
+  EXPECT_LT((riderPosition(lone, {{5, 6, 7}}, poses, 0) - Vec3(6, 6, 7)).norm(), 1e-12);
+}
+
+TEST(BindSurface, OtherPartsThatAreOnlyNearInSpaceDoNotCarry) {
+  // Two rows of particles side by side, joined nowhere.
+  Points rest;
+  std::vector<std::array<Index, 2>> edges;
+  for (Index row = 0; row < 2; ++row)
+    for (Index k = 0; k < 10; ++k) {
+      if (k > 0) edges.push_back({static_cast<Index>(rest.size()) - 1, static_cast<Index>(rest.size())});
+      rest.emplace_back(k, 0.3 * row, 0);
+    }
+  const SurfaceBinding binding = bindSurface(
+      rest, makeGraph(rest, edges), makeClusters(rest, makeGraph(rest, edges), {}), {{4.5, -0.1, 0}}, {kNoIndex});
+  for (Index i : binding.carriers) EXPECT_LT(i, 10u);
 }
 
 TEST(BindSurface, WithoutRidersThereIsNothingToFollow) {
   const PreparedBody body = test::prepared(test::ball());
   EXPECT_TRUE(body.model->binding.riders.empty());
-  EXPECT_TRUE(body.model->binding.clusters.empty());
+  EXPECT_TRUE(body.model->binding.carriers.empty());
 }
 
 }  // namespace

@@ -243,11 +243,10 @@ TEST_F(Scene, ErrorsHaveTheirCodes) {
   EXPECT_EQ(bad("bodies: [{primitive: {sphere: 1}, material: wood}]\n").code, ErrorCode::kUnknownName);
   EXPECT_EQ(bad("bodies: [{primitive: {sphere: 1}}, {primitive: {sphere: 1}}]\n").code, ErrorCode::kDuplicateName);
   EXPECT_EQ(bad("world: {substeps: 0}\n").code, ErrorCode::kInvalidArgument);
-  for (const char* key : {"youngs_modulus: 5000", "poissons_ratio: 0.45"}) {
+  for (const char* key : {"youngs_modulus: -5000", "poissons_ratio: 0.5"}) {
     const Error error = bad(std::string("materials:\n  soft: {") + key + "}\nbodies: []\n");
-    EXPECT_EQ(error.code, ErrorCode::kUnsupported);
+    EXPECT_EQ(error.code, ErrorCode::kInvalidArgument);
     EXPECT_TRUE(says(error, "s.yaml:2: ")) << error.detail;
-    EXPECT_TRUE(says(error, "materials for accuracy are not in this version")) << error.detail;
   }
   const Result<SceneDef> missing = readScene(folder.file("scenes/none.yaml"), access);
   ASSERT_FALSE(missing.ok());
@@ -333,7 +332,8 @@ TEST(ChangeMaterial, RefusesWhatItDoesNotKnow) {
       {"0.5", "a map"},
       {"", "a map"},
       {"{alpha: ", "YAML"},
-      {"youngs_modulus: 5000", "not in this version"},
+      {"youngs_modulus: -1", "youngs_modulus is -1"},
+      {"youngs_modulus: 1e4\npoissons_ratio: 0.5", "material:2: poissons_ratio is 0.5"},
       {"name: other", "unknown key 'name'"}};
   for (const auto& one : cases) {
     const Result<Material> changed = changeMaterial(base, one.first);

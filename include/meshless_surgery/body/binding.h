@@ -5,12 +5,21 @@
 
 namespace meshless {
 
-/// Binds a surface whose vertex v is particle vertex_particle[v], or rides where that is kNoIndex: a rider follows the
-/// clusters of the particles nearest to it at rest, at most three, and is exact where the body moves affinely.
-SurfaceBinding bindSurface(const Points& rest, const std::vector<double>& masses, const ClusterSet& clusters,
-                           const RestShape& shape, const Points& surface_rest, std::vector<Index> vertex_particle);
+/// Binds a surface whose vertex v is particle vertex_particle[v], or rides where that is kNoIndex. A rider is the
+/// moving least-squares mean of up to twelve particles that are near it along the body: smooth, and exact where the
+/// body moves affinely. Directions that the particles hardly span, as in thin sheets and crumbs, follow a cluster of
+/// the nearest one.
+SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const ClusterSet& clusters,
+                           const Points& surface_rest, std::vector<Index> vertex_particle);
 
-/// Where rider r of the binding is by its clusters, without its offset [m].
-Vec3 riderPosition(const BodyModel& model, const std::vector<ClusterPose>& poses, Index r);
+/// Where rider r of the binding is by its carriers, without its offset [m]. poses must fit positions where any_lever.
+inline Vec3 riderPosition(const SurfaceBinding& binding, const Points& positions, const std::vector<ClusterPose>& poses,
+                          Index r) {
+  Vec3 sum = Vec3::Zero();
+  for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k)
+    sum += binding.weights[k] * positions[binding.carriers[k]];
+  if (!binding.levers[r].isZero(0.0)) sum += poses[binding.turners[r]].deformation * binding.levers[r];
+  return sum;
+}
 
 }  // namespace meshless

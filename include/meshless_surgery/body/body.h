@@ -5,46 +5,52 @@
 #include <memory>
 
 #include "meshless_surgery/body/body_def.h"
-#include "meshless_surgery/dynamics/shape_matching.h"
+#include "meshless_surgery/dynamics/elastic.h"
 
 namespace meshless {
 
 /// How a surface vertex follows the particles.
 struct SurfaceBinding {
-  std::vector<Index> particle;   // one a vertex: the particle that it is, or kNoIndex for a rider
-  std::vector<Index> riders;     // vertices that ride, ascending
-  std::vector<Index> offsets;    // riders + 1, into the two below
-  std::vector<Index> clusters;   // that the rider follows
-  std::vector<double> weights;   // add up to 1 for a rider
-  std::vector<double> mobility;  // [1/kg] one a rider: its effective inverse mass
+  std::vector<Index> particle;  // one a vertex: the particle that it is, or kNoIndex for a rider
+  std::vector<Index> riders;    // vertices that ride, ascending
+  std::vector<Index> offsets;   // riders + 1, into the two below
+  std::vector<Index> carriers;  // particles that the rider follows
+  std::vector<double> weights;  // add up to 1 for a rider; may be negative where it lies outside of its carriers
+  Points levers;                // [m] one a rider: what the carriers do not span at rest (thin sheets, crumbs)
+  std::vector<Index> turners;   // one a rider: the cluster whose affine fit takes its lever along
+  bool any_lever = false;
 };
 
 /// Constant while it lives: rest shape, topology, clusters, masses.
 struct BodyModel {
-  Points rest;                  // [m] particles
-  std::vector<double> masses;   // [kg] > 0
-  /// What shapes are matched with: the masses, and of fixed particles a multiple, so that the body follows what holds it.
+  Points rest;                 // [m] particles
+  std::vector<double> masses;  // [kg] > 0
+  /// What shapes are matched with: the masses, and of fixed particles a multiple, so that the body follows what holds
+  /// it.
   std::vector<double> match_masses;
-  std::vector<bool> fixed;      // held in place
+  std::vector<bool> fixed;  // held in place
   bool any_fixed = false;
   ParticleGraph graph;
   ClusterSet clusters;
   RestShape shape;
-  TriangleMesh surface;         // rest positions of the vertices [m]
+  std::vector<ElasticRest> elastic;  // empty where the material is for looks
+  double highest_frequency = 0.0;    // [rad/s] of an elastic material: a substep takes at most 1 / highest_frequency
+  TriangleMesh surface;              // rest positions of the vertices [m]
   SurfaceBinding binding;
   bool solid = true;
-  double spacing = 0.0;         // [m] between interior particles
-  double rest_volume = 0.0;     // [m^3]; 0 where not solid
-  double mass = 0.0;            // [kg]
-  std::uint32_t next_patch = 1; // for the next cut
+  double spacing = 0.0;          // [m] between interior particles
+  double rest_volume = 0.0;      // [m^3]; 0 where not solid
+  double mass = 0.0;             // [kg]
+  std::uint32_t next_patch = 1;  // for the next cut
 };
 
 /// The model's view for dynamics/shape_matching.h.
 inline MatchInput matchInput(const BodyModel& model) {
   return {model.rest, model.match_masses, model.clusters, model.shape};
 }
-/// masses with those of fixed particles made heavy.
-std::vector<double> matchMasses(const std::vector<double>& masses, const std::vector<bool>& fixed);
+/// Makes what the material needs of a model whose particles, masses and clusters are there: match_masses, shape,
+/// elastic and highest_frequency.
+void makeMoments(BodyModel& model, const Material& material);
 
 using BodyModelPtr = std::shared_ptr<const BodyModel>;
 
@@ -54,7 +60,8 @@ struct BodyState {
   Points velocities;  // [m/s]
   std::vector<ClusterPose> poses;
   Points surface;        // [m] present positions of the surface's vertices; see updateSurface
-  Points rider_offsets;  // [m] one a rider: what a cut left between its place and its clusters' (fades away)
+  double stretch = 1.0;  // of an elastic body: by how much its highest frequency has grown since rest
+  Points rider_offsets;  // [m] one a rider: what a cut left between its place and its carriers' (fades away)
 };
 
 struct PreparedBody {
@@ -68,7 +75,7 @@ struct PreparedBody {
 /// 200,000 particles.
 Result<PreparedBody> prepareBody(BodyDef def);
 
-/// The same rest shape with the masses of another density; the second moments too where the mode needs them.
+/// The same rest shape with the masses of another density, and with the moments that the other material needs.
 BodyModelPtr withMaterial(const BodyModelPtr& model, const Material& before, const Material& after);
 
 /// Places state.surface for state.positions; changes nothing else.

@@ -14,8 +14,8 @@ struct TouchedParticle {
 
 /// Arrays that a body's substep needs and nothing outlives; kept between steps so that stepping allocates nothing.
 struct StepScratch {
-  Points previous;         // [m] positions at the start of the substep
-  Points before_contact;   // [m] positions when contacts began; filled where something can touch
+  Points previous;        // [m] positions at the start of the substep
+  Points before_contact;  // [m] positions when contacts began; filled where something can touch
   Points predicted;
   Points goals;
   std::vector<TouchedParticle> touched;
@@ -25,8 +25,16 @@ struct StepScratch {
 /// adds the pull, restores the angular momentum that evaluating at y would leak (not where particles are fixed), adds
 /// damping of the motion that deforms and gravity, and moves. Fixed particles stay. beta acts up to 0.95: without any
 /// rigid share energy could grow.
+/// An elastic material instead accelerates by its stress at y = x + v / highestFrequencyNow, whatever h is: a viscosity
+/// that calms the shortest waves and does not change with the step. Where h is more than 1 / highestFrequencyNow, the
+/// stiffness is lowered by stiffnessFactor, so that every step is stable.
 void matchAndMove(const BodyModel& model, const Material& material, const Vec3& gravity, double h, BodyState& state,
                   StepScratch& scratch, MatchCounters& counters);
+
+/// [rad/s] of an elastic body as it is stretched now; 0 for the others.
+double highestFrequencyNow(const BodyModel& model, const BodyState& state);
+/// 0..1: the share of its stiffness that an elastic body has at substeps of h [s]; 1 for the others.
+double stiffnessFactor(const BodyModel& model, const BodyState& state, double h);
 
 /// v = (x - x_old) / h, after springs and contacts have moved positions. Being pushed out of an obstacle stops a
 /// particle or takes it along, and never throws it: along the normal it keeps at most the speed that it had before the

@@ -20,9 +20,10 @@ struct ParticleGraph {
 /// Builds the graph from undirected edges (duplicates allowed) between n particles at the rest positions.
 ParticleGraph makeGraph(const Points& rest, std::vector<std::array<Index, 2>> edges);
 
-/// How a user wants a body divided.
+/// How a user wants a body divided. Cells are those of a cubic lattice of particles at the body's spacing; auto means them
+/// for materials for accuracy.
 struct ClusterOptions {
-  enum class Kind { kAuto, kOne, kGrid, kCount };
+  enum class Kind { kAuto, kOne, kGrid, kCount, kCells };
   Kind kind = Kind::kAuto;
   std::array<int, 3> grid{{1, 1, 1}};  // cells along x, y, z of the rest bounds, each 1..1000, at most 100,000 together
   int count = 1;                       // >= 1
@@ -40,8 +41,13 @@ struct ClusterSet {
   Index size() const { return offsets.empty() ? 0 : static_cast<Index>(offsets.size() - 1); }
 };
 
-/// Divides the body; the same input gives the same clusters.
+/// Divides the body; the same input gives the same clusters. kCells is for those who have cells (clustersOfCells), and
+/// means auto here.
 ClusterSet makeClusters(const Points& rest, const ParticleGraph& graph, const ClusterOptions& options);
+
+/// A cluster for each group of eight particles, whose masses [kg] are the sums of equal parts of the groups' masses.
+ClusterSet clustersOfCells(const std::vector<std::array<Index, 8>>& cells, const std::vector<double>& cell_masses,
+                           const std::vector<double>& particle_masses, double radius);
 
 /// What becomes of a parent's clusters in a piece that holds the parent's particles `kept` (ascending parent indices):
 /// clusters with all members in the piece stay; the others grow again from their remaining member nearest to the old

@@ -11,9 +11,13 @@ enum class MatchMode { kRigid, kLinear, kQuadratic };
 
 const char* toString(MatchMode mode);
 
-/// A material for looks. alpha and beta are the paper's; alpha holds at the reference rate (see stiffnessGain).
+/// Two families. For looks, where youngs_modulus is 0: mode, alpha and beta are the paper's; alpha holds at the reference
+/// rate (see stiffnessGain). For accuracy, where youngs_modulus is set: the elastic constants of a textbook, without
+/// calibration (dynamics/elastic.h); mode, alpha and beta are then not used.
 struct Material {
   std::string name = "default";
+  double youngs_modulus = 0.0;   // [Pa] 0: for looks
+  double poissons_ratio = 0.45;  // 0..0.49
   MatchMode mode = MatchMode::kLinear;
   double alpha = 0.9;       // 0..1, fraction of the way to the goal in 1/60 s
   double beta = 0.2;        // 0..1, share of the fitted linear or quadratic map in the goal
@@ -23,6 +27,7 @@ struct Material {
   Color color{0.62f, 0.22f, 0.18f, 1.0f};         // of the outer surface
   Color inside_color{0.85f, 0.45f, 0.40f, 1.0f};  // of cut faces
 
+  bool elastic() const { return youngs_modulus > 0.0; }
   /// Why the settings are not usable, naming key, value and range; else Done.
   Status validate() const;
 };

@@ -17,7 +17,8 @@ struct WorldSettings {
   std::optional<double> ground = 0.0; // [m] height along z
   double ground_friction = 0.5;
   double step_rate = 120.0;           // [Hz] 1..10,000
-  int substeps = 1;                   // 1..1,000
+  int substeps = 1;                   // 1..1,000, at the least; an elastic body can need more
+  int max_substeps = 64;              // 1..1,000; beyond it elastic bodies are softer than their material, and it is said
   ContactMethod contact = ContactMethod::kTextbook;
   double pick_max_distance = 0.05;    // [m]
   double pick_stiffness = 500.0;      // [N/m]
@@ -79,6 +80,7 @@ struct BodySnapshot {
   BodyMeasures measures;  // where wanted
   std::size_t tetrahedra = 0;  // 0 until something needs them
   bool asleep = false;
+  double stiffness_factor = 1.0;  // of an elastic material, below 1 where max_substeps are too few for it
 };
 
 struct WorldSnapshot {

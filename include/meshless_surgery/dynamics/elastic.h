@@ -1,0 +1,45 @@
+// Elasticity with Young's modulus and Poisson's ratio on the moments of shape matching: the material for accuracy.
+#pragma once
+
+#include "meshless_surgery/dynamics/shape_matching.h"
+
+namespace meshless {
+
+/// Lame's constants of an isotropic material, and its density.
+struct ElasticParameters {
+  double mu = 0.0;       // [Pa]
+  double lambda = 0.0;   // [Pa]
+  double youngs = 0.0;   // [Pa]
+  double density = 0.0;  // [kg/m^3]
+};
+/// Needs youngs_modulus > 0 [Pa], -1 < poissons_ratio < 0.5, density > 0 [kg/m^3].
+ElasticParameters elasticParameters(double youngs_modulus, double poissons_ratio, double density);
+
+/// Of a cluster's rest shape, in addition to ClusterRest.
+struct ElasticRest {
+  Mat3 spread_inverse = Mat3::Zero();  // [1/m^2] (sum m q q^T / M)^-1
+  double spread = 0.0;                 // [m^2] trace(sum m q q^T / M) / 3
+};
+std::vector<ElasticRest> makeElasticRest(const RestShape& shape);
+
+/// Acceleration of every particle [m/s^2] at the positions y: the weighted mean over its clusters of
+///   -(1/rho) P(F) (sum m q q^T / M)^-1 q - k E / (rho s^2) (p - F q),  P = 2 mu (F - R) + lambda g(J) cof F
+/// with F = A_pq (sum m q q^T)^-1 and R its rotation. g(J) = J - 1, but falls as J^(-2/3) above J = 1.5 and stays as it
+/// is below -0.8: what is torn or turned inside out is drawn back with a bounded stress. It is the gradient of an
+/// energy, conserves linear and angular momentum, and does not change with resolution. Clusters whose points do not
+/// span space resist as a rigid match would, with E/(rho s^2). poses is read (last rotation) and written. With cells of
+/// 2x2x2 particles it is the hexahedron with one integration point, k its hourglass stiffness. Returns how much faster
+/// than at rest the body's highest frequency may be, at least 1: the root of the largest |cof F|^2 / 3 of a cluster.
+double elasticAccelerations(const MatchInput& input, const std::vector<ElasticRest>& elastic,
+                            const ElasticParameters& material, const Points& y, std::vector<ClusterPose>& poses,
+                            Points& accelerations, MatchCounters& counters);
+
+/// The energy [J] whose gradient that is.
+double elasticEnergy(const MatchInput& input, const std::vector<ElasticRest>& elastic,
+                     const ElasticParameters& material, const Points& y, std::vector<ClusterPose> poses);
+
+/// Highest angular frequency [rad/s] of the linearised body at rest, by power iteration (from below, within a percent).
+double highestFrequency(const MatchInput& input, const std::vector<ElasticRest>& elastic,
+                        const ElasticParameters& material);
+
+}  // namespace meshless

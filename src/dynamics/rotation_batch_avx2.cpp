@@ -1,0 +1,12 @@
+// Nearest rotations, 4 doubles at a time. No Eigen and no shared inline functions here: the linker could take an AVX2
+// copy of one for the whole program.
+#include "rotation_sets.h"
+
+#if MESHLESS_ROTATION_X86
+#pragma GCC target("avx2,fma")
+#include <immintrin.h>
+
+#define MESHLESS_ROTATION_SET avx2
+#define MESHLESS_ROTATION_BYTES 32
+#include "rotation_kernel.h"
+#endif

@@ -1,0 +1,10 @@
+// Nearest rotations in whatever the compiler may use everywhere.
+#include "rotation_sets.h"
+
+#if MESHLESS_ROTATION_X86
+#include <immintrin.h>
+#endif
+
+#define MESHLESS_ROTATION_SET baseline
+#define MESHLESS_ROTATION_BYTES 16
+#include "rotation_kernel.h"

@@ -1,0 +1,103 @@
+#include "meshless_surgery/geometry/cell_lattice.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "meshless_surgery/geometry/measures.h"
+#include "support/shapes.h"
+
+namespace meshless {
+namespace {
+
+Result<CellLattice> divided(const TriangleMesh& mesh, double spacing) {
+  return divideIntoCells(mesh, SolidQuery(mesh), spacing);
+}
+
+double filled(const CellLattice& lattice) {
+  double volume = 0.0;
+  for (const CellLattice::Cell& cell : lattice.cells) volume += cell.fraction * std::pow(lattice.spacing, 3.0);
+  return volume;
+}
+
+// Cells reachable from the first over shared corners.
+std::size_t reachable(const CellLattice& lattice) {
+  std::set<Index> corners(lattice.cells[0].corners.begin(), lattice.cells[0].corners.end());
+  std::set<std::size_t> found;
+  for (bool grown = true; grown;) {
+    grown = false;
+    for (std::size_t c = 0; c < lattice.cells.size(); ++c) {
+      if (found.count(c)) continue;
+      for (Index i : lattice.cells[c].corners)
+        if (corners.count(i)) {
+          found.insert(c);
+          corners.insert(lattice.cells[c].corners.begin(), lattice.cells[c].corners.end());
+          grown = true;
+          break;
+        }
+    }
+  }
+  return found.size();
+}
+
+TEST(DivideIntoCells, ABoxOfWholeCellsIsFilledExactly) {
+  const Result<CellLattice> lattice = divided(boxMesh(Vec3(0.2, 0.1, 0.05), 0.05), 0.0125);
+  ASSERT_TRUE(lattice.ok());
+  EXPECT_EQ(lattice->cells.size(), 16u * 8u * 4u);
+  EXPECT_EQ(lattice->corners.size(), 17u * 9u * 5u);
+  for (const CellLattice::Cell& cell : lattice->cells) {
+    EXPECT_EQ(cell.fraction, 1.0);
+    for (Index k = 0; k < 8; ++k) {
+      const Vec3 edge = lattice->corners[cell.corners[k]] - lattice->corners[cell.corners[0]];
+      EXPECT_LT((edge - 0.0125 * Vec3(k & 1, k >> 1 & 1, k >> 2 & 1)).norm(), 1e-12);
+    }
+  }
+}
+
+TEST(DivideIntoCells, EveryShapeIsHeldWithItsVolume) {
+  for (const shapes::Shape& shape : shapes::simpleShapes()) {
+    SCOPED_TRACE(shape.name);
+    const double volume = signedVolume(shape.mesh);
+    const double spacing = std::cbrt(volume / 400.0);
+    const Result<CellLattice> lattice = divided(shape.mesh, spacing);
+    if (!lattice.ok()) {  // a sheet thinner than a quarter of a cell
+      EXPECT_EQ(lattice.error().code, ErrorCode::kUnsuitableShape);
+      continue;
+    }
+    EXPECT_NEAR(filled(*lattice), volume, (shape.name == "thin slab" || shape.name == "disc" ? 0.6 : 0.06) * volume);
+    const SolidQuery solid(shape.mesh);
+    for (const CellLattice::Cell& cell : lattice->cells) {
+      EXPECT_GT(cell.fraction, 0.0);
+      EXPECT_LE(cell.fraction, 1.0);
+      EXPECT_EQ(std::set<Index>(cell.corners.begin(), cell.corners.end()).size(), 8u);
+    }
+    for (const Vec3& corner : lattice->corners)
+      EXPECT_TRUE(solid.contains(corner) || solid.distance(corner) < std::sqrt(3.0) * spacing);
+  }
+}
+
+TEST(DivideIntoCells, PartsThatAreNearInSpaceOnlyShareNoCorner) {
+  // Two slabs with a gap of half a cell, which a cell reaches across.
+  const double spacing = 0.01;
+  TriangleMesh pair = boxMesh(Vec3(0.08, 0.08, 0.0225), 0.02);
+  shapes::append(pair, boxMesh(Vec3(0.08, 0.08, 0.0225), 0.02), Vec3(0, 0, 0.0275));
+  const Result<CellLattice> lattice = divided(pair, spacing);
+  ASSERT_TRUE(lattice.ok());
+  EXPECT_EQ(reachable(*lattice), lattice->cells.size() / 2);
+  const Result<CellLattice> whole = divided(boxMesh(Vec3(0.08, 0.08, 0.05), 0.02), spacing);
+  ASSERT_TRUE(whole.ok());
+  EXPECT_EQ(reachable(*whole), whole->cells.size());
+}
+
+TEST(DivideIntoCells, RefusesWhatItCannotDivide) {
+  const TriangleMesh box = boxMesh(Vec3(0.1, 0.1, 0.1), 0.05);
+  for (double spacing : {0.0, -1.0, 1e-5, std::nan("")}) {
+    const Result<CellLattice> lattice = divided(box, spacing);
+    ASSERT_FALSE(lattice.ok()) << spacing;
+    EXPECT_EQ(lattice.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_NE(lattice.error().detail.find("spacing"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace meshless

@@ -1,0 +1,173 @@
+// Bodies of materials for accuracy, in the world.
+#include "meshless_surgery/body/deform.h"
+#include "support/bodies.h"
+#include "support/mesh_laws.h"
+#include "support/random.h"
+
+namespace meshless {
+namespace {
+
+using test::prepared;
+using test::replyOf;
+
+BodyDef softBar(const std::string& name = "bar") {
+  BodyDef def = test::defOf(boxMesh(Vec3(0.12, 0.04, 0.04), 12, 4, 4), name);
+  def.material.youngs_modulus = 20000.0;
+  def.material.poissons_ratio = 0.4;
+  def.material.damping = 0.0;
+  def.spacing = 0.01;
+  return def;
+}
+
+double energyOf(const BodyModel& model, const Material& m, const BodyState& state) {
+  return measureBody(model, state).kinetic_energy +
+         elasticEnergy(matchInput(model), model.elastic,
+                       elasticParameters(m.youngs_modulus, m.poissons_ratio, m.density), state.positions, state.poses);
+}
+
+TEST(ElasticBody, IsALatticeOfCellsThatItsSurfaceRidesOn) {
+  const PreparedBody body = prepared(softBar());
+  const BodyModel& m = *body.model;
+  EXPECT_EQ(m.clusters.size(), 12u * 4u * 4u);
+  EXPECT_EQ(m.rest.size(), 13u * 5u * 5u);
+  EXPECT_EQ(m.binding.riders.size(), m.surface.vertices.size());
+  EXPECT_NEAR(m.mass, 1000.0 * 0.12 * 0.04 * 0.04, 1e-12);
+  EXPECT_GT(m.highest_frequency, 0.0);
+  for (std::size_t v = 0; v < m.surface.vertices.size(); ++v)
+    EXPECT_LT((body.state.surface[v] - m.surface.vertices[v]).norm(), 1e-12);
+  BodyDef clusters = softBar();
+  clusters.clusters.kind = ClusterOptions::Kind::kOne;
+  EXPECT_EQ(prepared(clusters).model->clusters.size(), 1u) << "clusters of one's own choice are kept";
+}
+
+TEST(ElasticBody, FreeInSpaceKeepsItsMomentaAndNeverGainsEnergy) {
+  for (const ClusterOptions::Kind kind : {ClusterOptions::Kind::kCells, ClusterOptions::Kind::kAuto}) {
+    BodyDef def = softBar();
+    def.clusters.kind = kind;
+    const PreparedBody body = prepared(def);
+    const BodyModel& m = *body.model;
+    BodyState state = body.state;
+    test::Random random(4);
+    for (std::size_t i = 0; i < m.rest.size(); ++i) {
+      state.positions[i] = 1.1 * m.rest[i] + random.vector(0.001);
+      state.velocities[i] = Vec3(1, -2, 0.5) + Vec3(3, 5, 20).cross(m.rest[i]) + random.vector(0.2);
+    }
+    StepScratch scratch;
+    MatchCounters counters;
+    const double h = 0.9 / m.highest_frequency;
+    const BodyMeasures before = measureBody(m, state);
+    double energy = energyOf(m, def.material, state);
+    const double start = energy;
+    for (int step = 0; step < 3000; ++step) {
+      matchAndMove(m, def.material, Vec3::Zero(), h, state, scratch, counters);
+      if (step % 100 == 99) {
+        const double now = energyOf(m, def.material, state);
+        EXPECT_LT(now, energy * (1.0 + 1e-3)) << "step " << step;
+        energy = now;
+      }
+    }
+    const BodyMeasures after = measureBody(m, state);
+    EXPECT_LT((after.linear_momentum - before.linear_momentum).norm(), 3000e-12 * before.linear_momentum.norm());
+    EXPECT_LT((after.angular_momentum - before.angular_momentum).norm(), 3000e-12 * before.angular_momentum.norm());
+    EXPECT_LT(energy, start);
+  }
+}
+
+double sagAt(double step_rate, int substeps) {
+  WorldSettings settings;
+  settings.ground.reset();
+  settings.step_rate = step_rate;
+  settings.substeps = substeps;
+  World world(settings);
+  BodyDef def = softBar();
+  def.material.damping = 20.0;
+  Box end;
+  end.extend(Vec3(-1, -1, -1));
+  end.extend(Vec3(-0.0599, 1, 1));
+  def.fixed.push_back(end);
+  EXPECT_TRUE(world.addSceneBody(test::shared(def)).ok());
+  for (int step = 0; step < 3.0 * step_rate; ++step) world.step();
+  EXPECT_GE(world.snapshot({}).report.substeps, static_cast<std::size_t>(substeps));
+  return world.snapshot({false, false, true}).bodies[0].measures.centre_of_mass.z();
+}
+
+TEST(ElasticBody, SagsTheSameAtEveryStep) {
+  const double sag = sagAt(120.0, 1);
+  EXPECT_LT(sag, -0.0005);
+  EXPECT_NEAR(sagAt(60.0, 1), sag, 0.01 * -sag);
+  EXPECT_NEAR(sagAt(120.0, 40), sag, 0.01 * -sag);
+}
+
+TEST(ElasticBody, TooFewSubstepsSoftenItAndSaySo) {
+  WorldSettings settings;
+  settings.ground.reset();
+  settings.max_substeps = 2;
+  World world(settings);
+  ASSERT_TRUE(world.addSceneBody(test::shared(softBar())).ok());
+  world.takeEvents();
+  for (int step = 0; step < 100; ++step) world.step();
+  const BodySnapshot body = world.snapshot({false, true, false}).bodies[0];
+  EXPECT_LT(body.stiffness_factor, 0.5);
+  EXPECT_GT(body.stiffness_factor, 0.0);
+  EXPECT_TRUE(test::allFinite(body.particles));
+  int said = 0;
+  for (const Event& e : world.takeEvents()) said += e.type == EventType::kOverBudget;
+  EXPECT_EQ(said, 1) << "once, not at every step";
+  settings.max_substeps = 64;
+  World enough(settings);
+  ASSERT_TRUE(enough.addSceneBody(test::shared(softBar())).ok());
+  enough.step();
+  EXPECT_EQ(enough.snapshot({}).bodies[0].stiffness_factor, 1.0);
+}
+
+TEST(ElasticBody, IsPickedPushedCutAndComesToRest) {
+  World world((WorldSettings()));
+  BodyDef def = softBar();
+  def.pose.translation = Vec3(0, 0, 0.05);
+  def.material.damping = 5.0;
+  ASSERT_TRUE(world.addSceneBody(test::shared(def)).ok());
+  PickCommand pick;
+  pick.point = Vec3(0.05, 0, 0.06);
+  const PickReply picked = replyOf<PickReply>(world.apply(pick));
+  replyOf<Done>(world.apply(MovePickCommand{picked.pick, Vec3(0.05, 0.02, 0.12)}));
+  PushCommand push;
+  push.radius = 0.015;
+  push.position = Vec3(-0.05, 0, 0.12);
+  replyOf<Done>(world.apply(push));
+  push.position = Vec3(-0.05, 0, 0.02);
+  push.speed = 0.2;
+  replyOf<Done>(world.apply(push));
+  for (int step = 0; step < 120; ++step) world.step();
+  test::Random random(2);
+  int cuts = 0;
+  double mass = 0.0;
+  for (int attempt = 0; attempt < 12; ++attempt) {
+    const WorldSnapshot shot = world.snapshot({true, false, true});
+    std::size_t largest = 0;
+    for (std::size_t b = 1; b < shot.bodies.size(); ++b)
+      if (shot.bodies[b].model->mass > shot.bodies[largest].model->mass) largest = b;
+    const BodySnapshot& body = shot.bodies[largest];
+    CutCommand cut;
+    const Vec3 normal = random.unit();
+    cut.blades.x_axis = normal.unitOrthogonal();
+    cut.blades.y_axis = normal.cross(cut.blades.x_axis);
+    cut.blades.origin = body.measures.centre_of_mass - 10.0 * cut.blades.x_axis;
+    cut.bodies = {body.name};
+    cuts += world.apply(cut).ok();
+    for (int step = 0; step < 10; ++step) world.step();
+  }
+  EXPECT_GT(cuts, 8);
+  for (int step = 0; step < 240; ++step) world.step();
+  for (const BodySnapshot& body : world.snapshot({true, true, true}).bodies) {
+    EXPECT_TRUE(test::allFinite(body.particles));
+    EXPECT_TRUE(test::allFinite(body.surface));
+    EXPECT_LT(body.measures.velocity.norm(), 5.0);
+    mass += body.model->mass;
+    TriangleMesh mesh = body.model->surface;
+    EXPECT_TRUE(laws::isClosedOriented(mesh));
+  }
+  EXPECT_NEAR(mass, 1000.0 * 0.12 * 0.04 * 0.04, 1e-9);
+}
+
+}  // namespace
+}  // namespace meshless
