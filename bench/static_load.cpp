@@ -59,6 +59,25 @@ std::vector<double> faceAreas(const Points& rest, double top, double spacing) {
   return areas;
 }
 
+// The spacing nearest to the wanted one, within 15 %, for which corners of the lattice lie on the plane x = plane: what
+// is held ends there, and a bar's sag goes with the fourth power of its length.
+double alignedSpacing(const TriangleMesh& mesh, double plane, double wanted) {
+  const Box bounds = boundsOf(mesh.vertices);
+  const double extent = bounds.max.x() - bounds.min.x(), middle = 0.5 * (bounds.min.x() + bounds.max.x());
+  double best = wanted, least = 1e300;
+  for (int k = -1500; k <= 1500; ++k) {
+    const double spacing = wanted * (1.0 + 1e-4 * k);
+    const double cells = std::ceil(extent / spacing - 1e-6);
+    const double place = (plane - (middle - 0.5 * cells * spacing)) / spacing;
+    const double off = std::abs(place - std::round(place)) + 1e-6 * std::abs(k);
+    if (off < least) {
+      least = off;
+      best = spacing;
+    }
+  }
+  return best;
+}
+
 struct Load {
   Points acceleration;  // [m/s^2] of dead forces
   std::vector<bool> held;
@@ -77,7 +96,8 @@ Load makeLoad(const TruthCase& truth, const BodyModel& model, double spacing) {
   load.held.assign(n, false);
   load.target = load.start = model.rest;
   const int axis = axisOf(truth.text("fixed_axis"));
-  for (std::size_t i = 0; i < n; ++i) load.held[i] = model.rest[i][axis] <= truth.number("fixed_below") + kOnFace;
+  for (std::size_t i = 0; i < n; ++i)
+    load.held[i] = model.rest[i][axis] <= truth.number("fixed_below") + 0.01 * spacing + kOnFace;
 
   const std::string kind = truth.text("load");
   const Vec3 top = truth.has("box_max") ? truth.vector("box_max") : Vec3::Zero();
@@ -126,7 +146,9 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
     def.mesh = boxMesh(high - low, settings.spacing);
     def.pose.translation = 0.5 * (low + high);
   }
-  def.spacing = settings.spacing;
+  const double spacing =
+      truth.has("surface") ? alignedSpacing(def.mesh, truth.number("fixed_below"), settings.spacing) : settings.spacing;
+  def.spacing = spacing;
   def.clusters = settings.clusters;
   def.material = settings.material;
   def.material.density = truth.number("density");
@@ -138,7 +160,7 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
   const Result<PreparedBody> body = prepareBody(std::move(def));
   if (!body) return body.error();
   const BodyModel& model = *body->model;
-  const Load load = makeLoad(truth, model, settings.spacing);
+  const Load load = makeLoad(truth, model, spacing);
   double largest = 0.0;
   for (const Vec3& u : truth.displacement) largest = std::max(largest, u.norm());
 
@@ -150,7 +172,7 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
   MatchCounters counters;
   const ElasticParameters parameters =
       elasticParameters(material.youngs_modulus, material.poissons_ratio, material.density);
-  const double rate = std::sqrt(stiffnessGain(material.alpha, 1.0 / 600.0)) * 600.0;  // [rad/s] of a match for looks
+  const double rate = settings.looks_rate;
   const double h = material.elastic() ? 0.6 / model.highest_frequency : 0.5 / rate;
   const auto accelerate = [&] {
     if (material.elastic()) {

@@ -92,12 +92,15 @@ SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const
     for (std::size_t k = 0; k < near.size(); ++k) lever -= weights[k] * rest[near[k]];
     const double span = (rest[near.back()] - p).norm();
     binding.levers.push_back(lever.norm() > kLever * span ? lever : Vec3(Vec3::Zero()));
-    binding.any_lever = binding.any_lever || !binding.levers.back().isZero(0.0);
     binding.turners.push_back(cluster_of[near[0]]);
+    if (!binding.levers.back().isZero(0.0)) binding.lever_clusters.push_back(binding.turners.back());
     binding.carriers.insert(binding.carriers.end(), near.begin(), near.end());
     binding.weights.insert(binding.weights.end(), weights.begin(), weights.end());
     binding.offsets.push_back(static_cast<Index>(binding.carriers.size()));
   }
+  std::sort(binding.lever_clusters.begin(), binding.lever_clusters.end());
+  binding.lever_clusters.erase(std::unique(binding.lever_clusters.begin(), binding.lever_clusters.end()),
+                               binding.lever_clusters.end());
   return binding;
 }
 

@@ -14,6 +14,7 @@ void makeMoments(BodyModel& model, const Material& material) {
   model.shape = makeRestShape(model.rest, model.match_masses, model.clusters);
   model.elastic.clear();
   model.highest_frequency = 0.0;
+  model.specific_stiffness = material.youngs_modulus / material.density;
   if (material.elastic()) {
     model.elastic = makeElasticRest(model.shape);
     model.highest_frequency =
@@ -44,9 +45,9 @@ void updateSurface(const BodyModel& model, BodyState& state) {
   for (std::size_t v = 0; v < state.surface.size(); ++v)
     if (model.binding.particle[v] != kNoIndex) state.surface[v] = state.positions[model.binding.particle[v]];
   std::vector<ClusterPose> poses;
-  if (model.binding.any_lever) {
+  if (!model.binding.lever_clusters.empty()) {
     poses = state.poses;  // a copy: a step's warm start must not depend on who looks
-    fitClusters(matchInput(model), state.positions, poses);
+    fitClusters(matchInput(model), state.positions, model.binding.lever_clusters, poses);
   }
   for (Index r = 0; r < model.binding.riders.size(); ++r)
     state.surface[model.binding.riders[r]] =

@@ -77,25 +77,33 @@ std::vector<int> assignParticles(const BodyModel& model, const BodyState& state,
   return piece_of;
 }
 
-// The moments of the material that the parent has. What a cut leaves of a cluster can be smaller and so faster: the
-// bound of the frequency grows as the square of the size falls, without another search for it.
+// The moments of the material that the parent has. What a cut leaves of a cell can be so narrow that its stress would need
+// a shorter step: it then resists as a flat cluster does, and the parent's frequency holds for the piece as well.
 void inheritMoments(const BodyModel& parent, const std::vector<Index>& members, BodyModel& child) {
+  constexpr double kNarrower = 1.3;
   child.match_masses = child.masses;
   for (std::size_t i = 0; i < members.size(); ++i)
     child.match_masses[i] *= parent.match_masses[members[i]] / parent.masses[members[i]];
   child.shape = makeRestShape(child.rest, child.match_masses, child.clusters);
-  if (!parent.shape.quadratic.empty()) addQuadraticRest(child.rest, child.match_masses, child.clusters, child.shape);
+  if (!parent.shape.quadratic.empty())
+    addQuadraticRest(child.rest, child.match_masses, child.clusters, child.shape);
   if (parent.elastic.empty()) return;
+  double narrowest = 0.0;  // [1/m^2]
+  for (const ElasticRest& e : parent.elastic) narrowest = std::max(narrowest, e.spread_inverse.norm() / std::sqrt(3.0));
   child.elastic = makeElasticRest(child.shape);
-  const auto narrowest = [](const BodyModel& model) {
-    double inverse = 0.0;  // [1/m^2]
-    for (const ElasticRest& e : model.elastic)
-      if (e.spread > 0.0) inverse = std::max({inverse, e.spread_inverse.norm() / std::sqrt(3.0), 1.0 / e.spread});
-    return inverse;
-  };
-  const double before = narrowest(parent), after = narrowest(child);
-  child.highest_frequency = parent.highest_frequency;
-  if (before > 0.0) child.highest_frequency *= std::sqrt(std::max(1.0, after / before));
+  double least = 0.0;
+  for (std::size_t c = 0; c < child.elastic.size(); ++c) {
+    ElasticRest& e = child.elastic[c];
+    if (e.spread_inverse.norm() / std::sqrt(3.0) > kNarrower * narrowest) {
+      child.shape.clusters[c].linear_rank = false;
+      child.shape.clusters[c].moment_inverse.setZero();
+      e.spread_inverse.setZero();
+    }
+    if (e.spread > 0.0) least = std::max(least, 1.0 / e.spread);
+  }
+  child.specific_stiffness = parent.specific_stiffness;
+  child.highest_frequency = std::sqrt(std::max(kNarrower * parent.highest_frequency * parent.highest_frequency,
+                                               parent.specific_stiffness * least));
 }
 
 // A piece without a particle would have no mass: it takes a part of the parent's nearest particle, which moves on with

@@ -14,7 +14,7 @@ std::size_t pushRiders(const BodyModel& model, const Obstacle& obstacle, BodySta
   const SurfaceBinding& binding = model.binding;
   Points& x = state.positions;
   if (binding.riders.empty()) return 0;
-  if (binding.any_lever) fitClusters(matchInput(model), x, state.poses);
+  fitClusters(matchInput(model), x, binding.lever_clusters, state.poses);
   const auto place = [&](Index r) -> Vec3 {
     return riderPosition(binding, x, state.poses, r) + state.rider_offsets[r];
   };
@@ -41,7 +41,7 @@ std::size_t pushRiders(const BodyModel& model, const Obstacle& obstacle, BodySta
         moved(i, shift);
       }
     }
-  if (binding.any_lever) fitClusters(matchInput(model), x, state.poses);
+  fitClusters(matchInput(model), x, binding.lever_clusters, state.poses);
   for (Index r : hit) state.rider_offsets[r] += obstacle(place(r));
   return hit.size();
 }

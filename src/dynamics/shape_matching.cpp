@@ -163,6 +163,12 @@ void matchShapes(const MatchInput& in, const Points& y, MatchMode mode, double b
   }
 }
 
+void fitClusters(const MatchInput& in, const Points& positions, const std::vector<Index>& which,
+                 std::vector<ClusterPose>& poses) {
+  MatchCounters uncounted;
+  for (Index c : which) fitCluster(in, c, positions, true, poses[c], uncounted);
+}
+
 void fitClusters(const MatchInput& in, const Points& positions, std::vector<ClusterPose>& poses) {
   MatchCounters uncounted;
   for (Index c = 0; c < in.clusters.size(); ++c) fitCluster(in, c, positions, true, poses[c], uncounted);

@@ -86,7 +86,7 @@ struct World::Impl {
   int chooseSubsteps(double h_frame);
   void movePush(double h, double h_frame);
   void pullSprings(double h, double h_frame);
-  void contactBodies(const std::vector<WorldBody*>& near, double h);
+  void contactBodies(const std::vector<WorldBody*>& near, double h, int stride);
   void contactGroundAndPush(WorldBody& body, double h, double h_frame, const Vec3& push_velocity);
   void fadeRiderOffsets(WorldBody& body, double h);
 };

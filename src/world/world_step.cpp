@@ -48,6 +48,8 @@ void World::step() {
     const double h_frame = 1.0 / w.settings.step_rate;
     const int substeps = w.chooseSubsteps(h_frame);
     const double h = h_frame / substeps;
+    // What an elastic material needs beyond the scene's substeps is not needed by contacts between bodies.
+    const int stride = std::max(1, substeps / w.settings.substeps);
     w.closeBlades();
     const std::vector<WorldBody*> near = w.bodiesInContact(h_frame);
     for (Pick& pick : w.picks) pick.force.setZero();
@@ -70,7 +72,7 @@ void World::step() {
           body->scratch.touched.clear();
           if (w.settings.ground || w.push.enabled) body->scratch.before_contact = body->state.positions;
         }
-        w.contactBodies(near, h);
+        if ((substep + 1) % stride == 0 || substep + 1 == substeps) w.contactBodies(near, h, stride);
         w.movePush(h, h_frame);
       }
       for (auto& body : w.bodies) {
@@ -144,7 +146,7 @@ void World::Impl::pullSprings(double h, double h_frame) {
       pick.force += pullGrasp(*body->model, pick, h, body->state.positions) * (h / h_frame);
 }
 
-void World::Impl::contactBodies(const std::vector<WorldBody*>& near, double h) {
+void World::Impl::contactBodies(const std::vector<WorldBody*>& near, double h, int stride) {
   if (near.size() < 2) return;
   std::vector<ContactBody> views;
   std::vector<std::vector<double>> inverse_masses(near.size());
@@ -166,7 +168,14 @@ void World::Impl::contactBodies(const std::vector<WorldBody*>& near, double h) {
   }
   const std::vector<Penetration> found = findPenetrations(views, report.contact_counters);
   if (found.empty()) return;
-  resolvePenetrations(found, views, h * std::max(kDepenetrationSpeed, 2.0 * fastest), report.contact_counters);
+  std::vector<Points> before;
+  if (stride > 1)
+    for (const WorldBody* body : near) before.push_back(body->state.positions);
+  resolvePenetrations(found, views, stride * h * std::max(kDepenetrationSpeed, 2.0 * fastest), report.contact_counters);
+  // The way of several substeps in one is not the speed of one.
+  for (std::size_t b = 0; b < before.size(); ++b)
+    for (std::size_t i = 0; i < before[b].size(); ++i)
+      near[b]->scratch.previous[i] += (1.0 - 1.0 / stride) * (near[b]->state.positions[i] - before[b][i]);
 }
 
 // The sphere goes its way in hops, so that a fast one does not jump over tissue.

@@ -12,7 +12,8 @@ namespace meshless {
 SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const ClusterSet& clusters,
                            const Points& surface_rest, std::vector<Index> vertex_particle);
 
-/// Where rider r of the binding is by its carriers, without its offset [m]. poses must fit positions where any_lever.
+/// Where rider r of the binding is by its carriers, without its offset [m]. Poses of
+/// lever_clusters must fit positions.
 inline Vec3 riderPosition(const SurfaceBinding& binding, const Points& positions, const std::vector<ClusterPose>& poses,
                           Index r) {
   Vec3 sum = Vec3::Zero();

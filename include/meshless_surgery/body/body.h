@@ -18,7 +18,7 @@ struct SurfaceBinding {
   std::vector<double> weights;  // add up to 1 for a rider; may be negative where it lies outside of its carriers
   Points levers;                // [m] one a rider: what the carriers do not span at rest (thin sheets, crumbs)
   std::vector<Index> turners;   // one a rider: the cluster whose affine fit takes its lever along
-  bool any_lever = false;
+  std::vector<Index> lever_clusters;  // ascending: those that take a lever along; their poses are needed with positions
 };
 
 /// Constant while it lives: rest shape, topology, clusters, masses.
@@ -34,6 +34,7 @@ struct BodyModel {
   ClusterSet clusters;
   RestShape shape;
   std::vector<ElasticRest> elastic;  // empty where the material is for looks
+  double specific_stiffness = 0.0;   // [m^2/s^2] Young's modulus over density; 0 where the material is for looks
   double highest_frequency = 0.0;    // [rad/s] of an elastic material: a substep takes at most 1 / highest_frequency
   TriangleMesh surface;              // rest positions of the vertices [m]
   SurfaceBinding binding;

@@ -65,7 +65,9 @@ struct MatchInput {
 void matchShapes(const MatchInput& input, const Points& y, MatchMode mode, double beta, std::vector<ClusterPose>& poses,
                  Points& goals, MatchCounters& counters);
 
-/// poses for given positions, without goals: for drawing riders after positions were set by hand.
+/// poses for given positions, without goals: after positions were set by hand. The second: of some clusters alone.
 void fitClusters(const MatchInput& input, const Points& positions, std::vector<ClusterPose>& poses);
+void fitClusters(const MatchInput& input, const Points& positions, const std::vector<Index>& which,
+                 std::vector<ClusterPose>& poses);
 
 }  // namespace meshless
