@@ -88,7 +88,7 @@ bool looksRows(Table& table, const std::string& folder, double spacing) {
                               {MatchMode::kQuadratic, ClusterOptions(), "auto"},
                               {MatchMode::kQuadratic, one, "one"}};
   for (const Variant& variant : variants) {
-    const auto solve = [&](const std::string& name, double softness) -> Result<StaticResult> {
+    const auto solve = [&](const std::string& name, double logarithm) -> Result<StaticResult> {
       const Result<TruthCase> truth = readTruthCase(folder + "/" + name + ".csv");
       if (!truth) return truth.error();
       StaticSettings settings;
@@ -96,12 +96,12 @@ bool looksRows(Table& table, const std::string& folder, double spacing) {
       settings.clusters = variant.clusters;
       settings.material.mode = variant.mode;
       settings.material.beta = variant.mode == MatchMode::kRigid ? 0.0 : 0.5;
-      settings.material.alpha = -std::expm1(-std::exp(softness));
+      settings.looks_rate = std::exp(logarithm);
       settings.max_steps = 6000;
       return solveStatic(*truth, folder, settings);
     };
-    double low = -6.0, high = 4.0;  // of ln(-ln(1 - alpha)), which is even in what matters
-    for (int search = 0; search < 12; ++search) {
+    double low = 2.0, high = 11.0;  // of ln(rate)
+    for (int search = 0; search < 14; ++search) {
       const double a = low + 0.382 * (high - low), b = low + 0.618 * (high - low);
       const Result<StaticResult> at_a = solve("bar_cantilever_small_nu30", a),
                                  at_b = solve("bar_cantilever_small_nu30", b);
@@ -120,11 +120,11 @@ bool looksRows(Table& table, const std::string& folder, double spacing) {
       const Result<TruthCase> truth = readTruthCase(folder + "/" + name + ".csv");
       if (!truth) return false;
       const double scale = truth->number("youngs_modulus") / fitted->number("youngs_modulus");
-      const Result<StaticResult> result = solve(name, best + std::log(scale));
+      const Result<StaticResult> result = solve(name, best + 0.5 * std::log(scale));
       if (!result) return false;
       table.row("fem", name, toString(variant.mode),
-                std::string(variant.name) + " alpha " + shortNumber(-std::expm1(-std::exp(best))) +
-                    " fitted on small cantilever" + (result->at_rest ? "" : " not at rest"),
+                std::string(variant.name) + " " + shortNumber(std::exp(best)) + " rad/s fitted on small cantilever" +
+                    (result->at_rest ? "" : " not at rest"),
                 result->step_ms, result->error);
     }
   }

@@ -77,16 +77,15 @@ std::vector<int> assignParticles(const BodyModel& model, const BodyState& state,
   return piece_of;
 }
 
-// The moments of the material that the parent has. What a cut leaves of a cell can be so narrow that its stress would need
-// a shorter step: it then resists as a flat cluster does, and the parent's frequency holds for the piece as well.
+// The moments of the material that the parent has. What a cut leaves of a cell can be so narrow that its stress would
+// need a shorter step: it then resists as a flat cluster does, and the parent's frequency holds for the piece as well.
 void inheritMoments(const BodyModel& parent, const std::vector<Index>& members, BodyModel& child) {
   constexpr double kNarrower = 1.3;
   child.match_masses = child.masses;
   for (std::size_t i = 0; i < members.size(); ++i)
     child.match_masses[i] *= parent.match_masses[members[i]] / parent.masses[members[i]];
   child.shape = makeRestShape(child.rest, child.match_masses, child.clusters);
-  if (!parent.shape.quadratic.empty())
-    addQuadraticRest(child.rest, child.match_masses, child.clusters, child.shape);
+  if (!parent.shape.quadratic.empty()) addQuadraticRest(child.rest, child.match_masses, child.clusters, child.shape);
   if (parent.elastic.empty()) return;
   double narrowest = 0.0;  // [1/m^2]
   for (const ElasticRest& e : parent.elastic) narrowest = std::max(narrowest, e.spread_inverse.norm() / std::sqrt(3.0));
@@ -102,8 +101,8 @@ void inheritMoments(const BodyModel& parent, const std::vector<Index>& members, 
     if (e.spread > 0.0) least = std::max(least, 1.0 / e.spread);
   }
   child.specific_stiffness = parent.specific_stiffness;
-  child.highest_frequency = std::sqrt(std::max(kNarrower * parent.highest_frequency * parent.highest_frequency,
-                                               parent.specific_stiffness * least));
+  child.highest_frequency = std::sqrt(
+      std::max(kNarrower * parent.highest_frequency * parent.highest_frequency, parent.specific_stiffness * least));
 }
 
 // A piece without a particle would have no mass: it takes a part of the parent's nearest particle, which moves on with
@@ -162,6 +161,7 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
     for (const VertexOrigin& origin : from.origins)
       child->surface.vertices.push_back(interpolate(origin, [&](Index v) { return model.surface.vertices[v]; }));
     child->rest_volume = signedVolume(child->surface);
+    child->rest_area = surfaceArea(child->surface);
 
     piece.parent_particles = members[p];
     std::vector<Index> renumbered(model.rest.size(), kNoIndex);
@@ -208,6 +208,8 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
     piece.state.poses.resize(child->clusters.size());
     fitClusters(matchInput(*child), piece.state.positions, piece.state.poses);
     piece.state.surface = from.mesh.vertices;
+    piece.state.stretch = state.stretch;
+    piece.state.swelling = state.swelling;
     for (Index r = 0; r < child->binding.riders.size(); ++r)
       piece.state.rider_offsets.push_back(from.mesh.vertices[child->binding.riders[r]] -
                                           riderPosition(child->binding, piece.state.positions, piece.state.poses, r));

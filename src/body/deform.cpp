@@ -104,12 +104,12 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
     state.stretch = elasticAccelerations(
         matchInput(model), model.elastic,
         elasticParameters(factor * material.youngs_modulus, material.poissons_ratio, material.density), y, state.poses,
-        scratch.goals, counters);
+        scratch.goals, counters, state.swelling);
     const Points& accelerations = scratch.goals;
     accelerate(model, h, x, v, [&](std::size_t i) -> const Vec3& { return accelerations[i]; });
   } else if (const double gain = stiffnessGain(material.alpha, h); gain > 0.0) {
     matchShapes(matchInput(model), y, material.mode, std::min(material.beta, kMostBeta), state.poses, scratch.goals,
-                counters);
+                counters, state.swelling);
     const Points& goals = scratch.goals;
     const double pull = gain / (h * h);
     accelerate(model, h, x, v, [&](std::size_t i) -> Vec3 { return pull * (goals[i] - y[i]); });

@@ -232,6 +232,7 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   }
   model->solid = def.solid;
   model->rest_volume = volume;
+  model->rest_area = surfaceArea(surface);
   const bool cells = def.solid && (def.clusters.kind == ClusterOptions::Kind::kCells ||
                                    (def.clusters.kind == ClusterOptions::Kind::kAuto && def.material.elastic()));
   model->spacing = def.spacing;

@@ -106,7 +106,7 @@ std::vector<ElasticRest> makeElasticRest(const RestShape& shape) {
 
 double elasticAccelerations(const MatchInput& in, const std::vector<ElasticRest>& elastic,
                             const ElasticParameters& material, const Points& y, std::vector<ClusterPose>& poses,
-                            Points& accelerations, MatchCounters& counters) {
+                            Points& accelerations, MatchCounters& counters, double swelling) {
   accelerations.assign(y.size(), Vec3::Zero());
   double most = 3.0;
   for (Index c = 0; c < in.clusters.size(); ++c) {
@@ -117,9 +117,10 @@ double elasticAccelerations(const MatchInput& in, const std::vector<ElasticRest>
     Mat3 pull = Mat3::Zero();
     double hourglass = material.youngs / (material.density * spread);
     if (f.solid) {
-      const Mat3 cof = cofactor(f.gradient);
+      const Mat3 strained = f.gradient / swelling;
+      const Mat3 cof = cofactor(strained);
       most = std::max(most, cof.squaredNorm());
-      pull = stress(material, f.gradient, f.rotation, cof) * elastic[c].spread_inverse / material.density;
+      pull = stress(material, strained, f.rotation, cof) * elastic[c].spread_inverse / material.density;
       hourglass *= kHourglass;
     }
     for (Index k = in.clusters.offsets[c]; k < in.clusters.offsets[c + 1]; ++k) {

@@ -18,11 +18,42 @@ constexpr double kReferenceStep = 1.0 / 60.0;  // [s] alpha holds there
 
 const char* toString(MatchMode mode) {
   switch (mode) {
-    case MatchMode::kRigid: return "rigid";
-    case MatchMode::kLinear: return "linear";
-    case MatchMode::kQuadratic: return "quadratic";
+    case MatchMode::kRigid:
+      return "rigid";
+    case MatchMode::kLinear:
+      return "linear";
+    case MatchMode::kQuadratic:
+      return "quadratic";
   }
   return "unknown";
+}
+
+double ResponseCurve::at(double error) const {
+  if (points.empty()) return 0.0;
+  if (error <= points.front()[0]) return points.front()[1];
+  for (std::size_t k = 1; k < points.size(); ++k)
+    if (error <= points[k][0]) {
+      const double share = (error - points[k - 1][0]) / (points[k][0] - points[k - 1][0]);
+      return points[k - 1][1] + share * (points[k][1] - points[k - 1][1]);
+    }
+  return points.back()[1];
+}
+
+Status ResponseCurve::validate(const std::string& key) const {
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const std::string at = key + "[" + std::to_string(k) + "]";
+    const double least = k > 0 ? points[k - 1][0] : 0.0, share = k > 0 ? points[k - 1][1] : 0.0;
+    std::ostringstream accepted;
+    if (!(points[k][0] >= least && points[k][0] <= 100.0) || (k > 0 && points[k][0] == least)) {
+      accepted << (k > 0 ? "above " : "") << least << " to 100, ascending relative errors";
+      return outOfRange((at + "[0]").c_str(), points[k][0], accepted.str().c_str());
+    }
+    if (!(points[k][1] >= share && points[k][1] <= 1.0)) {
+      accepted << share << " to 1, shares that never fall";
+      return outOfRange((at + "[1]").c_str(), points[k][1], accepted.str().c_str());
+    }
+  }
+  return Done{};
 }
 
 Status Material::validate() const {
@@ -35,6 +66,8 @@ Status Material::validate() const {
   if (!(density > 0.0 && density <= 1e6)) return outOfRange("density", density, "above 0 to 1e6 kg/m^3");
   if (!(damping >= 0.0 && damping <= 1e6)) return outOfRange("damping", damping, "0 to 1e6 1/s");
   if (!(friction >= 0.0 && friction <= 10.0)) return outOfRange("friction", friction, "0 to 10");
+  if (Status status = volume.validate("volume"); !status) return status;
+  if (Status status = area.validate("area"); !status) return status;
   for (const Color& c : {color, inside_color})
     for (float channel : {c.r, c.g, c.b, c.a})
       if (!(channel >= 0.0f && channel <= 1.0f)) return outOfRange("a colour's channel", channel, "0 to 1");

@@ -119,7 +119,7 @@ void addQuadraticRest(const Points& rest, const std::vector<double>& masses, con
 }
 
 void matchShapes(const MatchInput& in, const Points& y, MatchMode mode, double beta, std::vector<ClusterPose>& poses,
-                 Points& goals, MatchCounters& counters) {
+                 Points& goals, MatchCounters& counters, double swelling) {
   goals.assign(y.size(), Vec3::Zero());
   const bool wants_fit = mode != MatchMode::kRigid && beta > 0.0;
   for (Index c = 0; c < in.clusters.size(); ++c) {
@@ -152,12 +152,12 @@ void matchShapes(const MatchInput& in, const Points& y, MatchMode mode, double b
         const Index i = in.clusters.members[k];
         const Vec3 q = in.rest[i] - rest.centre;
         const Vec9 b = quadraticBasis(q / rest.size) - quadratic.mean;
-        goals[i] += in.clusters.weights[k] * (pose.centre + fit * b + (1.0 - share) * (rotation * q));
+        goals[i] += in.clusters.weights[k] * (pose.centre + swelling * (fit * b + (1.0 - share) * (rotation * q)));
       }
     } else {
       for (Index k = begin; k < end; ++k) {
         const Index i = in.clusters.members[k];
-        goals[i] += in.clusters.weights[k] * (pose.centre + map * (in.rest[i] - rest.centre));
+        goals[i] += in.clusters.weights[k] * (pose.centre + swelling * (map * (in.rest[i] - rest.centre)));
       }
     }
   }

@@ -22,6 +22,35 @@ void readColor(YamlMap& map, const std::string& key, Color& color) {
            static_cast<float>(channels[3])};
 }
 
+// A share for every error, or a table of [relative error, share].
+void readCurve(YamlMap& map, const std::string& key, ResponseCurve& curve) {
+  const YAML::Node node = map.get(key);
+  if (!node.IsDefined()) return;
+  const std::string accepted = "a share 0 to 1, a list of up to 100 pairs [relative error, share], or none";
+  curve.points.clear();
+  if (node.IsNull() || (node.IsScalar() && node.Scalar() == "none")) return;
+  if (node.IsScalar()) {
+    double share = 0.0;
+    if (readNumber(map.source(), node, key, {0.0, 1.0}, share)) curve.points.push_back({0.0, share});
+    return;
+  }
+  if (!node.IsSequence() || node.size() > 100) {
+    map.source().fail(node, key + " is " + shown(node), accepted);
+    return;
+  }
+  for (std::size_t k = 0; k < node.size(); ++k) {
+    if (!node[k].IsSequence() || node[k].size() != 2) {
+      map.source().fail(node[k], key + "[" + std::to_string(k) + "] is " + shown(node[k]), "[relative error, share]");
+      return;
+    }
+    std::array<double, 2> point{};
+    for (std::size_t c = 0; c < 2; ++c)
+      readNumber(map.source(), node[k][c], key + "[" + std::to_string(k) + "][" + std::to_string(c) + "]", {0.0, 100.0},
+                 point[c]);
+    curve.points.push_back(point);
+  }
+}
+
 }  // namespace
 
 const char* const kPlainName = "1 to 64 letters, digits, '_', '-' or '.'";
@@ -46,6 +75,8 @@ void readMaterial(YamlSource& source, const YAML::Node& node, const std::string&
   map.number("density", {0.0, 1e6, true, "kg/m^3"}, material.density);
   map.number("damping", {0.0, 1e6, false, "1/s"}, material.damping);
   map.number("friction", {0.0, 10.0}, material.friction);
+  readCurve(map, "volume", material.volume);
+  readCurve(map, "area", material.area);
   readColor(map, "color", material.color);
   readColor(map, "inside_color", material.inside_color);
   map.finish();

@@ -1,12 +1,13 @@
-// Lifetime of bodies, snapshots, hash. Commands are in world_commands.cpp, cuts in world_cut.cpp, time in world_step.cpp.
+// Lifetime of bodies, snapshots, hash. Commands are in world_commands.cpp, cuts in world_cut.cpp, time in
+// world_step.cpp.
 #include "meshless_surgery/world/world.h"
 
 #include <cstring>
 #include <sstream>
 
+#include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/tetrahedralize.h"
-#include "meshless_surgery/geometry/inside.h"
 #include "world_impl.h"
 
 namespace meshless {
@@ -23,19 +24,32 @@ Error notFinite(const std::string& name) {
 
 const char* toString(EventType type) {
   switch (type) {
-    case EventType::kPicked: return "picked";
-    case EventType::kLocked: return "locked";
-    case EventType::kReleased: return "released";
-    case EventType::kCut: return "cut";
-    case EventType::kIncised: return "incised";
-    case EventType::kTouched: return "touched";
-    case EventType::kAsleep: return "asleep";
-    case EventType::kAwake: return "awake";
-    case EventType::kOverBudget: return "over budget";
-    case EventType::kSpawned: return "spawned";
-    case EventType::kRemoved: return "removed";
-    case EventType::kReset: return "reset";
-    case EventType::kFault: return "fault";
+    case EventType::kPicked:
+      return "picked";
+    case EventType::kLocked:
+      return "locked";
+    case EventType::kReleased:
+      return "released";
+    case EventType::kCut:
+      return "cut";
+    case EventType::kIncised:
+      return "incised";
+    case EventType::kTouched:
+      return "touched";
+    case EventType::kAsleep:
+      return "asleep";
+    case EventType::kAwake:
+      return "awake";
+    case EventType::kOverBudget:
+      return "over budget";
+    case EventType::kSpawned:
+      return "spawned";
+    case EventType::kRemoved:
+      return "removed";
+    case EventType::kReset:
+      return "reset";
+    case EventType::kFault:
+      return "fault";
   }
   return "unknown";
 }
@@ -43,7 +57,8 @@ const char* toString(EventType type) {
 Status WorldSettings::validate() const {
   if (!(gravity.norm() <= 1e4)) return outOfRange("the length of gravity", gravity.norm(), "0 to 1e4 m/s^2");
   if (ground && !(std::abs(*ground) <= 1e6)) return outOfRange("ground", *ground, "-1e6 to 1e6 m, or none");
-  if (!(ground_friction >= 0.0 && ground_friction <= 10.0)) return outOfRange("ground_friction", ground_friction, "0 to 10");
+  if (!(ground_friction >= 0.0 && ground_friction <= 10.0))
+    return outOfRange("ground_friction", ground_friction, "0 to 10");
   if (!(step_rate >= 1.0 && step_rate <= 10000.0)) return outOfRange("step_rate", step_rate, "1 to 10000 Hz");
   if (!(substeps >= 1 && substeps <= 1000)) return outOfRange("substeps", substeps, "1 to 1000");
   if (!(max_substeps >= 1 && max_substeps <= 1000)) return outOfRange("max_substeps", max_substeps, "1 to 1000");

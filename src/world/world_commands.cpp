@@ -59,7 +59,8 @@ Result<Reply> World::Impl::apply(const PickCommand& command) {
     if (grabbed.body) {
       const Points& p = grabbed.body->state.positions;
       for (Index i = 1; i < p.size(); ++i)
-        if ((p[i] - grabbed.point).squaredNorm() < (p[grabbed.particle] - grabbed.point).squaredNorm()) grabbed.particle = i;
+        if ((p[i] - grabbed.point).squaredNorm() < (p[grabbed.particle] - grabbed.point).squaredNorm())
+          grabbed.particle = i;
     }
   }
   if (!grabbed.body) {
@@ -141,7 +142,8 @@ Result<Reply> World::Impl::apply(const PushCommand& command) {
   if (!command.position.allFinite()) return notFinite("position");
   if (!(command.radius >= 0.0 && command.radius <= 1e6))
     return outOfRange("radius", command.radius, "0 (the default) to 1e6 m");
-  if (!(command.speed >= 0.0 && command.speed <= 1e6)) return outOfRange("speed", command.speed, "0 (at once) to 1e6 m/s");
+  if (!(command.speed >= 0.0 && command.speed <= 1e6))
+    return outOfRange("speed", command.speed, "0 (at once) to 1e6 m/s");
   const bool from_nowhere = !push.enabled;
   push.enabled = true;
   push.radius = command.radius > 0.0 ? command.radius : settings.push_radius;

@@ -162,8 +162,7 @@ void World::Impl::followPieces(const BodyId& parent, const std::vector<BodyId>& 
     for (std::size_t c = 0; c < children.size(); ++c) {
       const auto find_particle = [&](Index old) {
         const auto it = std::find(parent_particles[c].begin(), parent_particles[c].end(), old);
-        return it == parent_particles[c].end() ? kNoIndex
-                                               : static_cast<Index>(it - parent_particles[c].begin());
+        return it == parent_particles[c].end() ? kNoIndex : static_cast<Index>(it - parent_particles[c].begin());
       };
       const Index centre = find_particle(pick.particle);
       if (centre == kNoIndex) continue;

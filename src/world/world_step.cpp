@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "meshless_surgery/body/face_contact.h"
+#include "meshless_surgery/body/preserve.h"
 #include "meshless_surgery/body/rider_contact.h"
 #include "meshless_surgery/contact/sphere_and_ground.h"
 #include "meshless_surgery/tools/grasp.h"
@@ -76,6 +77,7 @@ void World::step() {
         w.movePush(h, h_frame);
       }
       for (auto& body : w.bodies) {
+        preserve(*body->model, body->material, body->state, body->scratch, w.report.preserve_counters);
         velocitiesFromPositions(*body->model, h, body->state, body->scratch);
         w.fadeRiderOffsets(*body, h);
         body->surface_current = false;

@@ -320,6 +320,11 @@ TEST(ChangeMaterial, ChangesTheKeysItIsGiven) {
   EXPECT_EQ(changed->mode, MatchMode::kRigid);
   EXPECT_EQ(changed->density, 900.0);
   EXPECT_TRUE(changeMaterial(base, "alpha: 0.1\nbeta: 0.2\n").ok());
+  const Result<Material> held = changeMaterial(base, "{volume: [[0, 0.1], [0.2, 1]], area: 0.5}");
+  ASSERT_TRUE(held.ok()) << held.error().detail;
+  EXPECT_NEAR(held->volume.at(0.1), 0.55, 1e-15);
+  EXPECT_EQ(held->area.at(3.0), 0.5);
+  EXPECT_TRUE(changeMaterial(*held, "volume: none")->volume.points.empty());
 }
 
 TEST(ChangeMaterial, RefusesWhatItDoesNotKnow) {
@@ -333,6 +338,10 @@ TEST(ChangeMaterial, RefusesWhatItDoesNotKnow) {
       {"", "a map"},
       {"{alpha: ", "YAML"},
       {"youngs_modulus: -1", "youngs_modulus is -1"},
+      {"volume: [[0, 0.5], [0.1, 0.2]]", "volume[1][1] is 0.2"},
+      {"area: [0.5]", "area[0] is '0.5'"},
+      {"volume: 2", "volume is 2"},
+      {"area: loose", "area is 'loose'"},
       {"youngs_modulus: 1e4\npoissons_ratio: 0.5", "material:2: poissons_ratio is 0.5"},
       {"name: other", "unknown key 'name'"}};
   for (const auto& one : cases) {

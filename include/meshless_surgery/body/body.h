@@ -11,13 +11,13 @@ namespace meshless {
 
 /// How a surface vertex follows the particles.
 struct SurfaceBinding {
-  std::vector<Index> particle;  // one a vertex: the particle that it is, or kNoIndex for a rider
-  std::vector<Index> riders;    // vertices that ride, ascending
-  std::vector<Index> offsets;   // riders + 1, into the two below
-  std::vector<Index> carriers;  // particles that the rider follows
-  std::vector<double> weights;  // add up to 1 for a rider; may be negative where it lies outside of its carriers
-  Points levers;                // [m] one a rider: what the carriers do not span at rest (thin sheets, crumbs)
-  std::vector<Index> turners;   // one a rider: the cluster whose affine fit takes its lever along
+  std::vector<Index> particle;        // one a vertex: the particle that it is, or kNoIndex for a rider
+  std::vector<Index> riders;          // vertices that ride, ascending
+  std::vector<Index> offsets;         // riders + 1, into the two below
+  std::vector<Index> carriers;        // particles that the rider follows
+  std::vector<double> weights;        // add up to 1 for a rider; may be negative where it lies outside of its carriers
+  Points levers;                      // [m] one a rider: what the carriers do not span at rest (thin sheets, crumbs)
+  std::vector<Index> turners;         // one a rider: the cluster whose affine fit takes its lever along
   std::vector<Index> lever_clusters;  // ascending: those that take a lever along; their poses are needed with positions
 };
 
@@ -41,6 +41,7 @@ struct BodyModel {
   bool solid = true;
   double spacing = 0.0;          // [m] between interior particles
   double rest_volume = 0.0;      // [m^3]; 0 where not solid
+  double rest_area = 0.0;        // [m^2] of the surface
   double mass = 0.0;             // [kg]
   std::uint32_t next_patch = 1;  // for the next cut
 };
@@ -60,9 +61,10 @@ struct BodyState {
   Points positions;   // [m]
   Points velocities;  // [m/s]
   std::vector<ClusterPose> poses;
-  Points surface;        // [m] present positions of the surface's vertices; see updateSurface
-  double stretch = 1.0;  // of an elastic body: by how much its highest frequency has grown since rest
-  Points rider_offsets;  // [m] one a rider: what a cut left between its place and its carriers' (fades away)
+  Points surface;         // [m] present positions of the surface's vertices; see updateSurface
+  double swelling = 1.0;  // of goals, or of the size without stress, where the volume is held
+  double stretch = 1.0;   // of an elastic body: by how much its highest frequency has grown since rest
+  Points rider_offsets;   // [m] one a rider: what a cut left between its place and its carriers' (fades away)
 };
 
 struct PreparedBody {

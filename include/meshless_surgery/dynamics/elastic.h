@@ -32,7 +32,7 @@ std::vector<ElasticRest> makeElasticRest(const RestShape& shape);
 /// than at rest the body's highest frequency may be, at least 1: the root of the largest |cof F|^2 / 3 of a cluster.
 double elasticAccelerations(const MatchInput& input, const std::vector<ElasticRest>& elastic,
                             const ElasticParameters& material, const Points& y, std::vector<ClusterPose>& poses,
-                            Points& accelerations, MatchCounters& counters);
+                            Points& accelerations, MatchCounters& counters, double swelling = 1.0);
 
 /// The energy [J] whose gradient that is.
 double elasticEnergy(const MatchInput& input, const std::vector<ElasticRest>& elastic,

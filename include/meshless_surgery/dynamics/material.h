@@ -11,19 +11,32 @@ enum class MatchMode { kRigid, kLinear, kQuadratic };
 
 const char* toString(MatchMode mode);
 
-/// Two families. For looks, where youngs_modulus is 0: mode, alpha and beta are the paper's; alpha holds at the reference
-/// rate (see stiffnessGain). For accuracy, where youngs_modulus is set: the elastic constants of a textbook, without
-/// calibration (dynamics/elastic.h); mode, alpha and beta are then not used.
+/// How hard something is held, by how far it is off: a table from relative error (>= 0, ascending) to the share of the
+/// error that a substep closes (0..1, never falling), linear between its points and constant beyond. Empty: not held at
+/// all.
+struct ResponseCurve {
+  std::vector<std::array<double, 2>> points;
+
+  double at(double error) const;
+  /// Why it is not usable, naming `key`, value and range; else Done.
+  Status validate(const std::string& key) const;
+};
+
+/// Two families. For looks, where youngs_modulus is 0: mode, alpha and beta are the paper's; alpha holds at the
+/// reference rate (see stiffnessGain). For accuracy, where youngs_modulus is set: the elastic constants of a textbook,
+/// without calibration (dynamics/elastic.h); mode, alpha and beta are then not used.
 struct Material {
   std::string name = "default";
   double youngs_modulus = 0.0;   // [Pa] 0: for looks
   double poissons_ratio = 0.45;  // 0..0.49
   MatchMode mode = MatchMode::kLinear;
-  double alpha = 0.9;       // 0..1, fraction of the way to the goal in 1/60 s
-  double beta = 0.2;        // 0..1, share of the fitted linear or quadratic map in the goal
-  double density = 1000.0;  // [kg/m^3] > 0
-  double damping = 1.0;     // [1/s] >= 0, decay rate of the motion that deforms
-  double friction = 0.5;    // 0..10, Coulomb
+  double alpha = 0.9;                             // 0..1, fraction of the way to the goal in 1/60 s
+  double beta = 0.2;                              // 0..1, share of the fitted linear or quadratic map in the goal
+  double density = 1000.0;                        // [kg/m^3] > 0
+  double damping = 1.0;                           // [1/s] >= 0, decay rate of the motion that deforms
+  double friction = 0.5;                          // 0..10, Coulomb
+  ResponseCurve volume;                           // of the solid's volume
+  ResponseCurve area;                             // of the surface
   Color color{0.62f, 0.22f, 0.18f, 1.0f};         // of the outer surface
   Color inside_color{0.85f, 0.45f, 0.40f, 1.0f};  // of cut faces
 

@@ -62,8 +62,9 @@ struct MatchInput {
 
 /// Goal position of every particle for the positions y: the weighted mean of its clusters' goals. poses is read (last
 /// rotation) and written. Linear and angular momentum of (goal - y) weighted with the masses are zero to rounding.
+/// swelling scales the goals about their centres.
 void matchShapes(const MatchInput& input, const Points& y, MatchMode mode, double beta, std::vector<ClusterPose>& poses,
-                 Points& goals, MatchCounters& counters);
+                 Points& goals, MatchCounters& counters, double swelling = 1.0);
 
 /// poses for given positions, without goals: after positions were set by hand. The second: of some clusters alone.
 void fitClusters(const MatchInput& input, const Points& positions, std::vector<ClusterPose>& poses);

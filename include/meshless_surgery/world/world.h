@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "meshless_surgery/body/preserve.h"
 #include "meshless_surgery/contact/textbook.h"
 #include "meshless_surgery/tools/tools.h"
 
@@ -13,17 +14,17 @@ namespace meshless {
 enum class ContactMethod { kNone, kTextbook };
 
 struct WorldSettings {
-  Vec3 gravity{0.0, 0.0, -9.81};      // [m/s^2]
-  std::optional<double> ground = 0.0; // [m] height along z
+  Vec3 gravity{0.0, 0.0, -9.81};       // [m/s^2]
+  std::optional<double> ground = 0.0;  // [m] height along z
   double ground_friction = 0.5;
-  double step_rate = 120.0;           // [Hz] 1..10,000
-  int substeps = 1;                   // 1..1,000, at the least; an elastic body can need more
-  int max_substeps = 64;              // 1..1,000; beyond it elastic bodies are softer than their material, and it is said
+  double step_rate = 120.0;  // [Hz] 1..10,000
+  int substeps = 1;          // 1..1,000, at the least; an elastic body can need more
+  int max_substeps = 64;     // 1..1,000; beyond it elastic bodies are softer than their material, and it is said
   ContactMethod contact = ContactMethod::kTextbook;
-  double pick_max_distance = 0.05;    // [m]
-  double pick_stiffness = 500.0;      // [N/m]
-  double pick_radius = 0.0;           // [m] of the grasp along the body; 0: four particle spacings
-  double push_radius = 0.02;          // [m]
+  double pick_max_distance = 0.05;  // [m]
+  double pick_stiffness = 500.0;    // [N/m]
+  double pick_radius = 0.0;         // [m] of the grasp along the body; 0: four particle spacings
+  double push_radius = 0.02;        // [m]
 
   Status validate() const;
 };
@@ -37,7 +38,19 @@ struct SceneDef {
 };
 
 enum class EventType {
-  kPicked, kLocked, kReleased, kCut, kIncised, kTouched, kAsleep, kAwake, kOverBudget, kSpawned, kRemoved, kReset, kFault
+  kPicked,
+  kLocked,
+  kReleased,
+  kCut,
+  kIncised,
+  kTouched,
+  kAsleep,
+  kAwake,
+  kOverBudget,
+  kSpawned,
+  kRemoved,
+  kReset,
+  kFault
 };
 const char* toString(EventType type);
 
@@ -47,7 +60,7 @@ struct Event {
   double sim_time = 0.0;  // [s]
   std::string body;
   PickId pick = 0;
-  std::string text;       // a sentence
+  std::string text;  // a sentence
 };
 
 /// Times [s] and work of one step; counters that a scene does not use stay at zero.
@@ -57,6 +70,7 @@ struct StepReport {
   std::size_t substeps = 0;
   MatchCounters match_counters;
   ContactCounters contact_counters;
+  PreserveCounters preserve_counters;
   std::size_t tetrahedralizations = 0;  // since the start
   std::size_t ground_contacts = 0;
   std::size_t push_contacts = 0;
@@ -75,9 +89,9 @@ struct BodySnapshot {
   std::string name;
   Material material;
   BodyModelPtr model;
-  Points surface;    // where wanted
-  Points particles;  // where wanted
-  BodyMeasures measures;  // where wanted
+  Points surface;              // where wanted
+  Points particles;            // where wanted
+  BodyMeasures measures;       // where wanted
   std::size_t tetrahedra = 0;  // 0 until something needs them
   bool asleep = false;
   double stiffness_factor = 1.0;  // of an elastic material, below 1 where max_substeps are too few for it
