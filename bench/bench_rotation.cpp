@@ -1,9 +1,14 @@
-// Run time and largest error of the nearest rotation: the batch in float (cold, and warm from guesses 0.05 rad off),
-// beside the plain double reference and Eigen's JacobiSVD<float> with the sign fix, over kinds of matrices and scales.
+// Run time and largest error of the nearest rotation.
+// cold, warm (guesses 0.05 rad off) and jacobisvd (Eigen's, with the sign fix) run over a mix of all kinds of matrices
+// and scales; real_time is one matrix, `max_error` [rad] is over those whose rotation is unique, `bad` counts results
+// that are no rotation (not unit or orthonormal to 1e-5, or NaN).
+// kinds/... are the same in float for each kind and scale, with each instruction set and the plain double reference:
 // `each` is the time of one rotation, `error_rad` the largest angle to the exact method in double on the same float
-// matrices (where the rotation is unique), `warm` the share solved from the guess.
+// matrices, `unique` the share whose rotation is unique, `warm` the share solved from the guess.
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <memory>
 #include <random>
 #include <string>
@@ -201,7 +206,126 @@ void runSvd(benchmark::State& state, const Input& input) {
   report(state, input, found);
 }
 
+// --- all kinds and scales mixed, in either precision
+
+constexpr int kMixed = 4104;  // matrices, alternately of each kind and scale
+
+template <class Scalar>
+struct Mixed {
+  std::vector<Scalar> matrices = std::vector<Scalar>(9 * kMixed), guesses = std::vector<Scalar>(4 * kMixed);
+  std::vector<Eigen::Matrix<Scalar, 3, 3>> plain;
+  std::vector<Quat> exact;
+  std::vector<bool> unique;
+};
+
+template <class Scalar>
+Mixed<Scalar> makeMixed() {
+  Engine engine(99);
+  Mixed<Scalar> input;
+  for (int i = 0; i < kMixed; ++i) {
+    const Kind kind = kKinds[i % std::size(kKinds)].kind;
+    const double scale = kScales[i / std::size(kKinds) % std::size(kScales)];
+    const Eigen::Matrix<Scalar, 3, 3> a = (scale * randomMatrix(kind, engine)).template cast<Scalar>();
+    const Mat3 wide = a.template cast<double>();
+    input.plain.push_back(a);
+    for (int k = 0; k < 9; ++k) input.matrices[k * kMixed + i] = a(k / 3, k % 3);
+    const Vec3 s = Eigen::JacobiSVD<Mat3>(wide).singularValues();
+    const double third = wide.determinant() < 0.0 ? -s[2] : s[2];
+    // Of the gap, what float distinguishes counts for double too, so that both rows measure the same matrices.
+    input.unique.push_back(2.0 * (s[1] + third) > 1.01 * kRotationUniqueGap<float> * s.norm());
+    input.exact.push_back(nearestRotationExact(wide, Quat::Identity()).rotation);
+    const Quat guess = input.exact.back() * Quat(Eigen::AngleAxisd(kGuessTurn, randomUnit(engine)));
+    for (int k = 0; k < 4; ++k) input.guesses[k * kMixed + i] = static_cast<Scalar>(guess.coeffs()[k]);
+  }
+  return input;
+}
+
+template <class Scalar>
+void reportMixed(benchmark::State& state, const Mixed<Scalar>& input, const std::vector<Quat>& found,
+                 const std::vector<double>& fault) {
+  double largest = 0.0;
+  int bad = 0;
+  for (int i = 0; i < kMixed; ++i) {
+    if (!(fault[i] <= 1e-5)) ++bad;
+    if (!input.unique[i]) continue;
+    const Eigen::Vector4d q = found[i].coeffs(), e = input.exact[i].coeffs();
+    const double angle = 2.0 * std::min((q - e).norm(), (q + e).norm());
+    if (!(angle <= largest)) largest = angle;
+  }
+  state.counters["max_error"] = largest;
+  state.counters["bad"] = bad;
+}
+
+template <class Scalar>
+void runMixed(benchmark::State& state, const Mixed<Scalar>& input, bool warm) {
+  std::vector<Scalar> quaternions(4 * kMixed);
+  RotationBatch<Scalar> batch;
+  batch.count = kMixed;
+  batch.matrices = input.matrices.data();
+  batch.matrix_stride = kMixed;
+  batch.quaternions = quaternions.data();
+  batch.quaternion_stride = kMixed;
+  while (state.KeepRunningBatch(kMixed)) {
+    if (warm) {
+      std::copy(input.guesses.begin(), input.guesses.end(), quaternions.begin());
+      nearestRotationsWarm(batch);
+    } else {
+      nearestRotationsCold(batch);
+    }
+    benchmark::DoNotOptimize(quaternions.data());
+    benchmark::ClobberMemory();
+  }
+  std::vector<Quat> found;
+  std::vector<double> fault;
+  for (int i = 0; i < kMixed; ++i) {
+    found.emplace_back(quaternions[3 * kMixed + i], quaternions[i], quaternions[kMixed + i],
+                       quaternions[2 * kMixed + i]);
+    fault.push_back(std::abs(found.back().norm() - 1.0));
+  }
+  reportMixed(state, input, found, fault);
+}
+
+template <class Scalar>
+void runMixedSvd(benchmark::State& state, const Mixed<Scalar>& input) {
+  using Matrix = Eigen::Matrix<Scalar, 3, 3>;
+  std::vector<Matrix> rotations(kMixed);
+  while (state.KeepRunningBatch(kMixed)) {
+    for (int i = 0; i < kMixed; ++i) {
+      const Eigen::JacobiSVD<Matrix> svd(input.plain[i], Eigen::ComputeFullU | Eigen::ComputeFullV);
+      Matrix u = svd.matrixU();
+      if ((u * svd.matrixV().transpose()).determinant() < Scalar(0)) u.col(2) = -u.col(2);
+      rotations[i].noalias() = u * svd.matrixV().transpose();
+    }
+    benchmark::DoNotOptimize(rotations.data());
+  }
+  std::vector<Quat> found;
+  std::vector<double> fault;
+  for (const Matrix& r : rotations) {
+    const Mat3 wide = r.template cast<double>();
+    found.push_back(Quat(wide).normalized());
+    fault.push_back(wide.determinant() > 0.0 ? (wide.transpose() * wide - Mat3::Identity()).cwiseAbs().maxCoeff()
+                                             : std::numeric_limits<double>::infinity());
+  }
+  reportMixed(state, input, found, fault);
+}
+
+template <class Scalar>
+void registerMixed(const std::string& precision) {
+  const auto input = std::make_shared<const Mixed<Scalar>>(makeMixed<Scalar>());
+  const auto settle = [](benchmark::internal::Benchmark* b) {
+    b->MinTime(0.05)->Repetitions(9)->ReportAggregatesOnly()->Unit(benchmark::kNanosecond);
+  };
+  settle(benchmark::RegisterBenchmark(("cold/" + precision).c_str(),
+                                      [=](benchmark::State& s) { runMixed(s, *input, false); }));
+  settle(benchmark::RegisterBenchmark(("warm/" + precision).c_str(),
+                                      [=](benchmark::State& s) { runMixed(s, *input, true); }));
+  settle(benchmark::RegisterBenchmark(("jacobisvd/" + precision).c_str(),
+                                      [=](benchmark::State& s) { runMixedSvd(s, *input); }));
+}
+
 void registerAll() {
+  registerMixed<float>("float");
+  registerMixed<double>("double");
   const char* const set_names[] = {"baseline", "avx2", "avx512"};
   const auto settle = [](benchmark::internal::Benchmark* b) {
     b->MinTime(0.02)->Repetitions(7)->ReportAggregatesOnly()->Unit(benchmark::kMicrosecond);
@@ -209,7 +333,7 @@ void registerAll() {
   for (const NamedKind& kind : kKinds)
     for (double scale : kScales) {
       const auto input = std::make_shared<const Input>(makeInput(kind.kind, scale));
-      const std::string row = std::string(kind.name) + "/scale:" +
+      const std::string row = std::string("kinds/") + kind.name + "/scale:" +
                               (scale < 1   ? "1e-12"
                                : scale > 1 ? "1e12"
                                            : "1") +

@@ -5,6 +5,17 @@
 
 namespace meshless {
 
+void makeElastic(BodyModel& model) {
+  model.elastic = makeElasticRest(model.shape);
+  for (std::size_t c = 0; c < model.elastic.size(); ++c)
+    if (model.elastic[c].spread_inverse.norm() > model.most_spread_inverse) {
+      model.elastic[c].spread_inverse.setZero();
+      model.shape.clusters[c].moment_inverse.setZero();
+      model.shape.clusters[c].linear_rank = false;
+    }
+  model.elastic_batch = std::make_shared<ElasticBatch>(matchInput(model), model.elastic);
+}
+
 void makeMoments(BodyModel& model, const Material& material) {
   constexpr double kHeld = 50.0;  // enough that a cluster follows its held part, little enough to stay well conditioned
   model.match_masses = model.masses;
@@ -13,10 +24,11 @@ void makeMoments(BodyModel& model, const Material& material) {
       if (model.fixed[i]) model.match_masses[i] *= kHeld;
   model.shape = makeRestShape(model.rest, model.match_masses, model.clusters);
   model.elastic.clear();
+  model.elastic_batch.reset();
   model.highest_frequency = 0.0;
   model.specific_stiffness = material.youngs_modulus / material.density;
   if (material.elastic()) {
-    model.elastic = makeElasticRest(model.shape);
+    makeElastic(model);
     model.highest_frequency =
         highestFrequency(matchInput(model), model.elastic,
                          elasticParameters(material.youngs_modulus, material.poissons_ratio, material.density));

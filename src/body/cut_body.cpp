@@ -87,22 +87,20 @@ void inheritMoments(const BodyModel& parent, const std::vector<Index>& members, 
   child.shape = makeRestShape(child.rest, child.match_masses, child.clusters);
   if (!parent.shape.quadratic.empty()) addQuadraticRest(child.rest, child.match_masses, child.clusters, child.shape);
   if (parent.elastic.empty()) return;
-  double narrowest = 0.0;  // [1/m^2]
-  for (const ElasticRest& e : parent.elastic) narrowest = std::max(narrowest, e.spread_inverse.norm() / std::sqrt(3.0));
-  child.elastic = makeElasticRest(child.shape);
-  double least = 0.0;
-  for (std::size_t c = 0; c < child.elastic.size(); ++c) {
-    ElasticRest& e = child.elastic[c];
-    if (e.spread_inverse.norm() / std::sqrt(3.0) > kNarrower * narrowest) {
-      child.shape.clusters[c].linear_rank = false;
-      child.shape.clusters[c].moment_inverse.setZero();
-      e.spread_inverse.setZero();
-    }
-    if (e.spread > 0.0) least = std::max(least, 1.0 / e.spread);
+  child.most_spread_inverse = parent.most_spread_inverse;
+  double squared = parent.highest_frequency * parent.highest_frequency;
+  if (std::isinf(parent.most_spread_inverse)) {  // the first cut of this body
+    double narrowest = 0.0;
+    for (const ElasticRest& e : parent.elastic) narrowest = std::max(narrowest, e.spread_inverse.norm());
+    child.most_spread_inverse = kNarrower * narrowest;
+    squared *= kNarrower;
   }
+  makeElastic(child);
+  double least = 0.0;
+  for (const ElasticRest& e : child.elastic)
+    if (e.spread > 0.0) least = std::max(least, 1.0 / e.spread);
   child.specific_stiffness = parent.specific_stiffness;
-  child.highest_frequency = std::sqrt(
-      std::max(kNarrower * parent.highest_frequency * parent.highest_frequency, parent.specific_stiffness * least));
+  child.highest_frequency = std::sqrt(std::max(squared, parent.specific_stiffness * least));
 }
 
 // A piece without a particle would have no mass: it takes a part of the parent's nearest particle, which moves on with

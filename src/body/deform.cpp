@@ -101,10 +101,12 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
   const Points& y = scratch.predicted;
 
   if (material.elastic()) {
-    state.stretch = elasticAccelerations(
-        matchInput(model), model.elastic,
-        elasticParameters(factor * material.youngs_modulus, material.poissons_ratio, material.density), y, state.poses,
-        scratch.goals, counters, state.swelling);
+    model.elastic_batch->setRotations(state.poses, scratch.elastic);
+    state.stretch = model.elastic_batch->accelerate(
+        matchInput(model),
+        elasticParameters(factor * material.youngs_modulus, material.poissons_ratio, material.density), y,
+        scratch.elastic, scratch.goals, counters, state.swelling);
+    model.elastic_batch->getRotations(scratch.elastic, state.poses);
     const Points& accelerations = scratch.goals;
     accelerate(model, h, x, v, [&](std::size_t i) -> const Vec3& { return accelerations[i]; });
   } else if (const double gain = stiffnessGain(material.alpha, h); gain > 0.0) {
@@ -135,8 +137,9 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
 }
 
 void velocitiesFromPositions(const BodyModel& model, double h, BodyState& state, const StepScratch& scratch) {
+  const double rate = 1.0 / h;
   for (std::size_t i = 0; i < model.rest.size(); ++i)
-    state.velocities[i] = (state.positions[i] - scratch.previous[i]) / h;
+    state.velocities[i] = rate * (state.positions[i] - scratch.previous[i]);
   for (const TouchedParticle& t : scratch.touched) {
     Vec3& v = state.velocities[t.particle];
     const double before = t.normal.dot(scratch.before_contact[t.particle] - scratch.previous[t.particle]) / h;

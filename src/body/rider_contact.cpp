@@ -10,17 +10,23 @@ constexpr int kSweeps = 4;
 }  // namespace
 
 std::size_t pushRiders(const BodyModel& model, const Obstacle& obstacle, BodyState& state,
-                       const std::function<void(Index particle, const Vec3& shift)>& moved) {
+                       const std::function<void(Index particle, const Vec3& shift)>& moved,
+                       const std::vector<Index>* among) {
   const SurfaceBinding& binding = model.binding;
   Points& x = state.positions;
-  if (binding.riders.empty()) return 0;
+  if (among ? among->empty() : binding.riders.empty()) return 0;
   fitClusters(matchInput(model), x, binding.lever_clusters, state.poses);
   const auto place = [&](Index r) -> Vec3 {
     return riderPosition(binding, x, state.poses, r) + state.rider_offsets[r];
   };
   std::vector<Index> hit;
-  for (Index r = 0; r < binding.riders.size(); ++r)
+  const auto look = [&](Index r) {
     if (!obstacle(place(r)).isZero(0.0)) hit.push_back(r);
+  };
+  if (among)
+    for (Index r : *among) look(r);
+  else
+    for (Index r = 0; r < binding.riders.size(); ++r) look(r);
   if (hit.empty()) return 0;
 
   for (int sweep = 0; sweep < kSweeps; ++sweep)

@@ -19,6 +19,9 @@ struct WorldBody {
   bool surface_current = true;              // state.surface fits state.positions
   std::shared_ptr<const ContactMesh> mesh;  // made when something first comes near
   bool touched_by_push = false;
+  bool low_current = false;          // in this frame
+  std::vector<Index> low_particles;  // that can meet the ground
+  std::vector<Index> low_riders;
   double stiffness_factor = 1.0;
   StepScratch scratch;
 };
@@ -87,6 +90,7 @@ struct World::Impl {
   void movePush(double h, double h_frame);
   void pullSprings(double h, double h_frame);
   void contactBodies(const std::vector<WorldBody*>& near, double h, int stride);
+  void findLow(WorldBody& body, double h_frame);
   void contactGroundAndPush(WorldBody& body, double h, double h_frame, const Vec3& push_velocity);
   void fadeRiderOffsets(WorldBody& body, double h);
 };

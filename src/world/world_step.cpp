@@ -56,6 +56,7 @@ void World::step() {
     for (Pick& pick : w.picks) pick.force.setZero();
     w.push.force.setZero();
     w.push.touching = false;
+    for (auto& body : w.bodies) body->low_current = false;
     for (int substep = 0; substep < substeps; ++substep) {
       {
         const Stopwatch match(w.report.match);
@@ -79,10 +80,10 @@ void World::step() {
       for (auto& body : w.bodies) {
         preserve(*body->model, body->material, body->state, body->scratch, w.report.preserve_counters);
         velocitiesFromPositions(*body->model, h, body->state, body->scratch);
-        w.fadeRiderOffsets(*body, h);
         body->surface_current = false;
       }
     }
+    for (auto& body : w.bodies) w.fadeRiderOffsets(*body, h_frame);
     for (Pick& pick : w.picks)
       if (const WorldBody* body = w.find(pick.body))
         pick.position = graspMean(pick, body->state.positions) + pick.offset;
@@ -238,10 +239,15 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
     return there - p;
   };
 
+  // Who can reach the ground within this frame is found once. A push can send down others.
+  const bool few = near_ground && !near_push;
+  if (few && !body.low_current) findLow(body, h_frame);
+  const Index lookable = static_cast<Index>(few ? body.low_particles.size() : model.rest.size());
   for (int pass = 0; pass < kContactPasses; ++pass) {
     if (near_ground) {
       const double friction = std::sqrt(settings.ground_friction * body.material.friction);
-      for (Index i = 0; i < model.rest.size(); ++i) {
+      for (Index n = 0; n < lookable; ++n) {
+        const Index i = few ? body.low_particles[n] : n;
         if (model.fixed[i]) continue;
         const Projection out = projectOutOfGround(state.positions[i], *settings.ground);
         if (!out.inside) continue;
@@ -260,7 +266,8 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
           state,
           [&](Index i, const Vec3&) {
             touched.push_back({i, Vec3::UnitZ(), 0.0});
-          });
+          },
+          few ? &body.low_riders : nullptr);
     }
     if (near_push) {
       const auto isPushed = [&](Index i, const Vec3& shift) {
@@ -287,6 +294,29 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
     if (!body.touched_by_push) say(EventType::kTouched, body.name, 0, "the push sphere touched " + body.name);
   }
   body.touched_by_push = hit_push;
+}
+
+// Those that would be below the ground at the end of the frame at twice their speed, and half a spacing more. One that
+// is faster still is met in the next frame.
+void World::Impl::findLow(WorldBody& body, double h_frame) {
+  const BodyModel& model = *body.model;
+  const BodyState& state = body.state;
+  const double reach = *settings.ground + 0.5 * model.spacing + std::abs(settings.gravity.z()) * h_frame * h_frame;
+  const auto low = [&](double height, double speed) { return height + std::min(0.0, 2.0 * h_frame * speed) < reach; };
+  body.low_particles.clear();
+  body.low_riders.clear();
+  for (Index i = 0; i < model.rest.size(); ++i)
+    if (low(state.positions[i].z(), state.velocities[i].z())) body.low_particles.push_back(i);
+  const SurfaceBinding& binding = model.binding;
+  for (Index r = 0; r < binding.riders.size(); ++r) {
+    double height = state.rider_offsets[r].z() - binding.levers[r].norm(), speed = 0.0;
+    for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k) {
+      height += binding.weights[k] * state.positions[binding.carriers[k]].z();
+      speed += binding.weights[k] * state.velocities[binding.carriers[k]].z();
+    }
+    if (low(height, speed)) body.low_riders.push_back(r);
+  }
+  body.low_current = true;
 }
 
 void World::Impl::fadeRiderOffsets(WorldBody& body, double h) {

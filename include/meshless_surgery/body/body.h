@@ -2,10 +2,12 @@
 // itself or rides on clusters.
 #pragma once
 
+#include <limits>
 #include <memory>
 
 #include "meshless_surgery/body/body_def.h"
 #include "meshless_surgery/dynamics/elastic.h"
+#include "meshless_surgery/dynamics/elastic_batch.h"
 
 namespace meshless {
 
@@ -34,6 +36,10 @@ struct BodyModel {
   ClusterSet clusters;
   RestShape shape;
   std::vector<ElasticRest> elastic;  // empty where the material is for looks
+  std::shared_ptr<const ElasticBatch> elastic_batch;  // the same, vectorised
+  /// [1/m^2] norm of ElasticRest::spread_inverse: what a cut leaves of a cell can be narrower, so that its stress would
+  /// need a shorter step. It resists as a flat cluster does.
+  double most_spread_inverse = std::numeric_limits<double>::infinity();
   double specific_stiffness = 0.0;   // [m^2/s^2] Young's modulus over density; 0 where the material is for looks
   double highest_frequency = 0.0;    // [rad/s] of an elastic material: a substep takes at most 1 / highest_frequency
   TriangleMesh surface;              // rest positions of the vertices [m]
@@ -53,6 +59,8 @@ inline MatchInput matchInput(const BodyModel& model) {
 /// Makes what the material needs of a model whose particles, masses and clusters are there: match_masses, shape,
 /// elastic and highest_frequency.
 void makeMoments(BodyModel& model, const Material& material);
+/// elastic and elastic_batch from shape, whose clusters beyond most_spread_inverse lose their linear fit.
+void makeElastic(BodyModel& model);
 
 using BodyModelPtr = std::shared_ptr<const BodyModel>;
 

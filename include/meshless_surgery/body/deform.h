@@ -18,6 +18,7 @@ struct StepScratch {
   Points before_contact;  // [m] positions when contacts began; filled where something can touch
   Points predicted;
   Points goals;
+  ElasticBatchState elastic;
   std::vector<TouchedParticle> touched;
 };
 

@@ -1,0 +1,14 @@
+// How a loop is spread over threads, if it is.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+namespace meshless {
+
+/// Calls work(0) .. work(count - 1), in any order and on any threads, and returns when all are done. What is computed
+/// does not depend on it to the bit.
+using ForEach = std::function<void(std::size_t count, const std::function<void(std::size_t)>& work)>;
+void oneAfterAnother(std::size_t count, const std::function<void(std::size_t)>& work);
+
+}  // namespace meshless

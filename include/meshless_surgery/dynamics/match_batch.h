@@ -1,0 +1,85 @@
+// Complete substeps of shape matching in float, vectorised for the widest instructions that the machine has: many
+// bodies of one cluster each, and a body of many overlapping clusters. The same laws as matchAndMove() (body/deform.h),
+// which stays the reference; for free bodies with a material for looks, above ground at most.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "meshless_surgery/dynamics/for_each.h"
+#include "meshless_surgery/dynamics/rotation_batch.h"
+#include "meshless_surgery/dynamics/shape_matching.h"
+
+namespace meshless {
+
+/// What all bodies of a batch share in a substep.
+struct BatchStep {
+  double h = 1.0 / 60.0;  // [s] > 0
+  MatchMode mode = MatchMode::kLinear;
+  double gain = 0.9;     // 0..1, share of the way to the goal in h; see stiffnessGain()
+  double beta = 0.2;     // 0..1, acts up to 0.95
+  double damping = 0.0;  // [1/s]
+  Vec3 gravity = Vec3(0.0, 0.0, -9.81);
+  std::optional<double> ground;  // [m] height
+  double friction = 0.5;         // Coulomb, between ground and body
+  InstructionSet set = widestInstructionSet();
+};
+BatchStep batchStep(const Material& material, double h);
+
+/// Bodies of equally many particles, each in one cluster with all of its particles. Masses and rest shapes may differ.
+/// Positions are kept relative to an origin that follows the body, so that float does not lose them far from the
+/// world's. A body's result depends neither on its place nor on its neighbours, be they NaN.
+class BodyBatch {
+ public:
+  /// True for what the batch can hold: one cluster, of all particles in order and with their full weight.
+  static bool holds(const MatchInput& body);
+
+  /// quadratic: a step may ask for the quadratic mode; the shapes have had addQuadraticRest(). All bodies start at rest
+  /// in their rest shape.
+  BodyBatch(const std::vector<MatchInput>& bodies, bool quadratic);
+  ~BodyBatch();
+  BodyBatch(BodyBatch&&) noexcept;
+  BodyBatch& operator=(BodyBatch&&) noexcept;
+
+  std::size_t size() const;
+  std::size_t particles() const;  // of a body
+
+  void setState(std::size_t body, const Points& positions, const Points& velocities, const Quat& rotation);
+  void getState(std::size_t body, Points& positions, Points& velocities, Quat& rotation) const;
+
+  /// Predicts, matches, restores angular momentum, damps, adds gravity, moves and keeps above ground.
+  void step(const BatchStep& step, MatchCounters& counters, const ForEach& for_each = oneAfterAnother);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// One body of overlapping clusters, in the rigid and linear mode (quadratic is taken as linear). A particle's
+/// 12 numbers m y (x0, 1)^T are formed once and summed by each of its clusters, a cluster's affine map is formed once
+/// and summed by each of its particles, so that a pair costs two sums of 12 numbers. All is kept as displacement from
+/// the rest shape in a frame that moves and turns with the body: what float loses is relative to the displacement.
+class OverlapBatch {
+ public:
+  explicit OverlapBatch(const MatchInput& body);
+  ~OverlapBatch();
+  OverlapBatch(OverlapBatch&&) noexcept;
+  OverlapBatch& operator=(OverlapBatch&&) noexcept;
+
+  /// rotations: one a cluster.
+  void setState(const Points& positions, const Points& velocities, const std::vector<Quat>& rotations);
+  void getState(Points& positions, Points& velocities, std::vector<Quat>& rotations) const;
+
+  void step(const BatchStep& step, MatchCounters& counters, const ForEach& for_each = oneAfterAnother);
+
+  /// As matchShapes(), but for rounding to float relative to the displacement. Takes the place of the state: either
+  /// this or step() is used on an object.
+  void match(const Points& y, MatchMode mode, double beta, std::vector<ClusterPose>& poses, Points& goals,
+             MatchCounters& counters, const ForEach& for_each = oneAfterAnother);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace meshless

@@ -1,0 +1,13 @@
+// Elastic cells, 8 at a time. No Eigen and no shared inline functions here: the linker could take an AVX-512 copy of
+// one for the whole program.
+#include "elastic_batch_sets.h"
+
+#if MESHLESS_ROTATION_X86
+#pragma GCC target("avx512f,avx512dq,avx512vl,avx512bw,fma,prefer-vector-width=512")
+#include <immintrin.h>
+
+#define MESHLESS_ELASTIC_SET avx512
+#define MESHLESS_ELASTIC_ENUM kAvx512
+#define MESHLESS_ELASTIC_BYTES 64
+#include "elastic_batch_kernel.h"
+#endif

@@ -1,0 +1,11 @@
+// Elastic cells in whatever the compiler may use everywhere.
+#include "elastic_batch_sets.h"
+
+#if MESHLESS_ROTATION_X86
+#include <immintrin.h>
+#endif
+
+#define MESHLESS_ELASTIC_SET baseline
+#define MESHLESS_ELASTIC_ENUM kBaseline
+#define MESHLESS_ELASTIC_BYTES 16
+#include "elastic_batch_kernel.h"

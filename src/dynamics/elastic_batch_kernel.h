@@ -1,0 +1,362 @@
+// Elastic forces of a block of small clusters, compiled once for each instruction set: the including file sets the
+// target, MESHLESS_ELASTIC_SET and the width of a vector. A lane is a cluster; no lane sees its neighbours. In double:
+// the forces of a cluster then cancel to 1e-16, and in float it is no faster than what feeds it.
+#ifndef MESHLESS_ELASTIC_SET
+#error \
+    "set MESHLESS_ELASTIC_SET, MESHLESS_ELASTIC_ENUM and MESHLESS_ELASTIC_BYTES before including elastic_batch_kernel.h"
+#endif
+
+namespace meshless::elastic_sets::MESHLESS_ELASTIC_SET {
+namespace {
+
+#define MESHLESS_INLINE inline __attribute__((always_inline))
+
+typedef double Pack __attribute__((vector_size(MESHLESS_ELASTIC_BYTES)));
+typedef long long Mask __attribute__((vector_size(MESHLESS_ELASTIC_BYTES)));
+constexpr int kLanes = MESHLESS_ELASTIC_BYTES / 8;
+
+// As in elastic.cpp.
+constexpr double kLeastVolume = -0.8;
+constexpr double kMostVolume = 1.5;
+
+constexpr int kMostSteps = 4;     // of Newton's method; from one substep to the next two do
+constexpr double kStep6 = 1e-25;  // length^6 of the last step, times the condition number squared: 3e-13 rad are left
+constexpr double kConditioned = 1e-4;  // smallest eigenvalue of the Hessian over its trace
+constexpr double kLongestStep2 = 1.0;  // [rad^2] beyond it the quadratic model says nothing
+
+MESHLESS_INLINE Pack get(const double* from) {
+  Pack x;
+  __builtin_memcpy(&x, from, sizeof(x));
+  return x;
+}
+MESHLESS_INLINE void put(Pack x, double* to) { __builtin_memcpy(to, &x, sizeof(x)); }
+MESHLESS_INLINE Pack all(double x) { return Pack{} + x; }
+MESHLESS_INLINE Pack choose(Mask m, Pack yes, Pack no) { return m ? yes : no; }
+MESHLESS_INLINE bool any(Mask m) {
+#if MESHLESS_ELASTIC_BYTES == 64
+  return _mm512_movepi64_mask((__m512i)m) != 0;
+#elif MESHLESS_ELASTIC_BYTES == 32
+  return _mm256_movemask_pd((__m256d)m) != 0;
+#else
+  return (m[0] | m[1]) != 0;
+#endif
+}
+MESHLESS_INLINE Pack squareRoot(Pack x) {
+#if MESHLESS_ELASTIC_BYTES == 64
+  return _mm512_maskz_sqrt_pd(0xff, x);  // the unmasked one warns of an uninitialised value with GCC 12
+#elif MESHLESS_ELASTIC_BYTES == 32
+  return _mm256_sqrt_pd(x);
+#elif MESHLESS_ROTATION_X86
+  return _mm_sqrt_pd(x);
+#else
+  for (int l = 0; l < kLanes; ++l) x[l] = __builtin_sqrt(x[l]);
+  return x;
+#endif
+}
+
+struct Matrix {
+  Pack m[3][3];
+};
+
+// Between the two passes over a block.
+struct alignas(64) Fits {
+  double gradient[9][kBlock];  // F, row by row
+  double centre[3][kBlock];    // less the first corner
+  double pending[kBlock];      // 1: no rotation was found yet
+};
+
+MESHLESS_INLINE void putMatrix(const Matrix& a, double (*to)[kBlock], int i) {
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) put(a.m[r][c], to[3 * r + c] + i);
+}
+MESHLESS_INLINE Matrix matrixAt(const double (*from)[kBlock], int i) {
+  Matrix a;
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) a.m[r][c] = get(from[3 * r + c] + i);
+  return a;
+}
+
+MESHLESS_INLINE Matrix rotationMatrix(Pack x, Pack y, Pack z, Pack w, Pack s) {  // s = 2 / |q|^2
+  Matrix r;
+  const Pack sx = s * x, sy = s * y, sz = s * z;
+  const Pack xx = sx * x, yy = sy * y, zz = sz * z, xy = sx * y, xz = sx * z, yz = sy * z;
+  const Pack wx = sx * w, wy = sy * w, wz = sz * w;
+  r.m[0][0] = 1.0 - (yy + zz), r.m[0][1] = xy - wz, r.m[0][2] = xz + wy;
+  r.m[1][0] = xy + wz, r.m[1][1] = 1.0 - (xx + zz), r.m[1][2] = yz - wx;
+  r.m[2][0] = xz - wy, r.m[2][1] = yz + wx, r.m[2][2] = 1.0 - (xx + yy);
+  return r;
+}
+
+// Positions relative to the cluster's first corner, into the rows of `forces`.
+void gather(const Block& b) {
+  const int end = (b.count + kLanes - 1) / kLanes * kLanes;
+#if MESHLESS_ELASTIC_BYTES >= 32
+  // Four particles at a time, transposed: instructions that gather are slower.
+  const __m256i three = _mm256_setr_epi64x(-1, -1, -1, 0);
+  for (int i = 0; i < end; i += 4) {
+    __m256d origin[4];
+    for (int k = 0; k < kCorners; ++k) {
+      __m256d p[4];
+      for (int l = 0; l < 4; ++l) {
+        p[l] = _mm256_maskload_pd(b.positions + 3 * static_cast<std::size_t>(b.particles[k * kBlock + i + l]), three);
+        if (k == 0) origin[l] = p[l];
+        p[l] -= origin[l];
+      }
+      const __m256d xz01 = _mm256_unpacklo_pd(p[0], p[1]), y01 = _mm256_unpackhi_pd(p[0], p[1]);
+      const __m256d xz23 = _mm256_unpacklo_pd(p[2], p[3]), y23 = _mm256_unpackhi_pd(p[2], p[3]);
+      double* const to = b.forces + 3 * k * kBlock + i;
+      _mm256_storeu_pd(to, _mm256_permute2f128_pd(xz01, xz23, 0x20));
+      _mm256_storeu_pd(to + kBlock, _mm256_permute2f128_pd(y01, y23, 0x20));
+      _mm256_storeu_pd(to + 2 * kBlock, _mm256_permute2f128_pd(xz01, xz23, 0x31));
+    }
+  }
+#else
+  for (int i = 0; i < end; ++i) {
+    const double* const origin = b.positions + 3 * static_cast<std::size_t>(b.particles[i]);
+    const double ox = origin[0], oy = origin[1], oz = origin[2];
+    for (int k = 0; k < kCorners; ++k) {
+      const double* const p = b.positions + 3 * static_cast<std::size_t>(b.particles[k * kBlock + i]);
+      double* const to = b.forces + 3 * k * kBlock + i;
+      to[0] = p[0] - ox;
+      to[kBlock] = p[1] - oy;
+      to[2 * kBlock] = p[2] - oz;
+    }
+  }
+#endif
+}
+
+// F and centre of a box: sums and differences of its corners.
+MESHLESS_INLINE Matrix fitBox(const Block& b, Fits& fits, int i) {
+  const Pack scale[3] = {all(0.125 / b.half_edges[0]), all(0.125 / b.half_edges[1]), all(0.125 / b.half_edges[2])};
+  Matrix f;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double* const p = b.forces + axis * kBlock + i;
+    const Pack p0 = get(p), p1 = get(p + 3 * kBlock), p2 = get(p + 6 * kBlock), p3 = get(p + 9 * kBlock);
+    const Pack p4 = get(p + 12 * kBlock), p5 = get(p + 15 * kBlock), p6 = get(p + 18 * kBlock);
+    const Pack p7 = get(p + 21 * kBlock);
+    const Pack s0 = p0 + p1, s1 = p2 + p3, s2 = p4 + p5, s3 = p6 + p7;
+    const Pack t0 = s0 + s1, t1 = s2 + s3;
+    put(0.125 * (t0 + t1), fits.centre[axis] + i);
+    f.m[axis][0] = scale[0] * (((p1 - p0) + (p3 - p2)) + ((p5 - p4) + (p7 - p6)));
+    f.m[axis][1] = scale[1] * ((s1 - s0) + (s3 - s2));
+    f.m[axis][2] = scale[2] * (t1 - t0);
+  }
+  return f;
+}
+
+MESHLESS_INLINE Matrix timesInverse(const Matrix& a, const double* shape) {
+  const double* const s = shape + kInverseRow * kBlock;
+  const Pack xx = get(s), xy = get(s + kBlock), xz = get(s + 2 * kBlock), yy = get(s + 3 * kBlock);
+  const Pack yz = get(s + 4 * kBlock), zz = get(s + 5 * kBlock);
+  Matrix f;
+  for (int r = 0; r < 3; ++r) {
+    f.m[r][0] = a.m[r][0] * xx + a.m[r][1] * xy + a.m[r][2] * xz;
+    f.m[r][1] = a.m[r][0] * xy + a.m[r][1] * yy + a.m[r][2] * yz;
+    f.m[r][2] = a.m[r][0] * xz + a.m[r][1] * yz + a.m[r][2] * zz;
+  }
+  return f;
+}
+
+MESHLESS_INLINE Matrix fitAny(const Block& b, Fits& fits, int i) {
+  const double* const shape = b.shape + i;
+  Matrix a = {};
+  Pack centre[3] = {};
+  for (int k = 0; k < kCorners; ++k) {
+    const Pack share = get(shape + (kShareRow + k) * kBlock);
+    const double* const q = shape + (kRestRow + 3 * k) * kBlock;
+    const Pack q0 = get(q), q1 = get(q + kBlock), q2 = get(q + 2 * kBlock);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Pack p = share * get(b.forces + (3 * k + axis) * kBlock + i);
+      centre[axis] += p;
+      a.m[axis][0] += p * q0;
+      a.m[axis][1] += p * q1;
+      a.m[axis][2] += p * q2;
+    }
+  }
+  for (int axis = 0; axis < 3; ++axis) put(centre[axis], fits.centre[axis] + i);
+  return timesInverse(a, shape);
+}
+
+// Newton's method on the rotation vector from the last rotation (Kugelstadt et al. 2018), until it verifies itself: a
+// stationary point with a positive definite Hessian is the maximum of tr(R^T F). The third derivative is zero there, so
+// that what a step leaves is of its third order. A lane that is done changes no more.
+MESHLESS_INLINE void rotate(const Block& b, const Matrix& f, Fits& fits, int i) {
+  double* const q = b.rotations + i;
+  Pack x = get(q), y = get(q + kBlock), z = get(q + 2 * kBlock), w = get(q + 3 * kBlock);
+  Pack s = all(2.0);
+  Mask done = {}, pending = ~done;
+  for (int step = 0; step < kMostSteps; ++step) {
+    const Matrix r = rotationMatrix(x, y, z, w, s);
+    Matrix a;
+    for (int row = 0; row < 3; ++row)
+      for (int c = 0; c < 3; ++c)
+        a.m[row][c] = r.m[0][row] * f.m[0][c] + r.m[1][row] * f.m[1][c] + r.m[2][row] * f.m[2][c];
+    const Pack g0 = a.m[2][1] - a.m[1][2], g1 = a.m[0][2] - a.m[2][0], g2 = a.m[1][0] - a.m[0][1];
+    const Pack h00 = a.m[1][1] + a.m[2][2], h11 = a.m[0][0] + a.m[2][2], h22 = a.m[0][0] + a.m[1][1];
+    const Pack h01 = -0.5 * (a.m[0][1] + a.m[1][0]), h02 = -0.5 * (a.m[0][2] + a.m[2][0]);
+    const Pack h12 = -0.5 * (a.m[1][2] + a.m[2][1]);
+    const Pack c00 = h11 * h22 - h12 * h12, c01 = h02 * h12 - h01 * h22, c02 = h01 * h12 - h02 * h11;
+    const Pack c11 = h00 * h22 - h02 * h02, c12 = h01 * h02 - h00 * h12, c22 = h00 * h11 - h01 * h01;
+    const Pack determinant = h00 * c00 + h01 * c01 + h02 * c02;
+    const Pack half = 0.5 / determinant;
+    const Pack v0 = half * (c00 * g0 + c01 * g1 + c02 * g2);
+    const Pack v1 = half * (c01 * g0 + c11 * g1 + c12 * g2);
+    const Pack v2 = half * (c02 * g0 + c12 * g1 + c22 * g2);
+    const Pack quarter2 = v0 * v0 + v1 * v1 + v2 * v2;
+    const Pack length2 = 4.0 * quarter2;
+    // The two larger eigenvalues have a product of at most (trace/2)^2: 4 det / trace^2 bounds the smallest from below.
+    const Pack trace = h00 + h11 + h22;
+    const Pack trace3 = trace * trace * trace;
+    const Mask sound =
+        (h00 > 0.0) & (c22 > 0.0) & (4.0 * determinant > kConditioned * trace3) & (length2 < kLongestStep2) & pending;
+    const Pack nx = x + w * v0 + y * v2 - z * v1, ny = y + w * v1 + z * v0 - x * v2;
+    const Pack nz = z + w * v2 + x * v1 - y * v0, nw = w - x * v0 - y * v1 - z * v2;
+    x = choose(sound, nx, x), y = choose(sound, ny, y), z = choose(sound, nz, z), w = choose(sound, nw, w);
+    const Mask close =
+        sound & (length2 * length2 * length2 * (trace3 * trace3) <= 16.0 * kStep6 * (determinant * determinant));
+    done |= close;
+    pending = sound & ~close;
+    if (!any(pending)) break;
+    s = 2.0 / (x * x + y * y + z * z + w * w);
+  }
+  const Pack factor = 1.0 / squareRoot(x * x + y * y + z * z + w * w);
+  put(choose(done, x * factor, get(q)), q);
+  put(choose(done, y * factor, get(q + kBlock)), q + kBlock);
+  put(choose(done, z * factor, get(q + 2 * kBlock)), q + 2 * kBlock);
+  put(choose(done, w * factor, get(q + 3 * kBlock)), q + 3 * kBlock);
+  put(choose(done, all(0.0), all(1.0)), fits.pending + i);
+}
+
+// What Newton's method did not find.
+std::size_t rotateCold(const Block& b, const Fits& fits) {
+  int index[kBlock];
+  int count = 0;
+  for (int i = 0; i < b.count; ++i) {
+    index[count] = i;
+    count += fits.pending[i] == 1.0 ? 1 : 0;
+  }
+  if (count == 0) return 0;
+  double matrices[9][kBlock], quaternions[4][kBlock];
+  for (int n = 0; n < count; ++n) {
+    for (int k = 0; k < 9; ++k) matrices[k][n] = fits.gradient[k][index[n]];
+    for (int k = 0; k < 4; ++k) quaternions[k][n] = b.rotations[k * kBlock + index[n]];
+  }
+  RotationBatch<double> batch;
+  batch.count = static_cast<std::size_t>(count);
+  batch.matrices = matrices[0];
+  batch.quaternions = quaternions[0];
+  batch.matrix_stride = batch.quaternion_stride = kBlock;
+  nearestRotationsWarm(batch, InstructionSet::MESHLESS_ELASTIC_ENUM);
+  for (int n = 0; n < count; ++n)
+    for (int k = 0; k < 4; ++k) b.rotations[k * kBlock + index[n]] = quaternions[k][n];
+  return static_cast<std::size_t>(count);
+}
+
+// volumeStrain() of elastic.cpp.
+MESHLESS_INLINE Pack volumeStrain(Pack j) {
+  Pack strain = (j > kLeastVolume ? j : all(kLeastVolume)) - 1.0;
+  const Mask torn = j > kMostVolume;
+  if (any(torn))
+    for (int l = 0; l < kLanes; ++l)
+      if (torn[l]) {
+        const double root = __builtin_cbrt(kMostVolume / j[l]);
+        strain[l] = (kMostVolume - 1.0) * root * root;
+      }
+  return strain;
+}
+
+// Stress over density, and |cof F|^2 into most where it is larger.
+MESHLESS_INLINE Matrix stress(const Block& b, const Matrix& gradient, int i, Pack& most) {
+  Matrix f;
+  for (int row = 0; row < 3; ++row)
+    for (int c = 0; c < 3; ++c) f.m[row][c] = b.shrink * gradient.m[row][c];
+  const double* const q = b.rotations + i;
+  const Matrix r = rotationMatrix(get(q), get(q + kBlock), get(q + 2 * kBlock), get(q + 3 * kBlock), all(2.0));
+  Matrix cof;
+  for (int row = 0; row < 3; ++row)
+    for (int c = 0; c < 3; ++c) {
+      const int r1 = (row + 1) % 3, r2 = (row + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
+      cof.m[row][c] = f.m[r1][c1] * f.m[r2][c2] - f.m[r1][c2] * f.m[r2][c1];
+    }
+  Pack size2 = {};
+  for (int row = 0; row < 3; ++row)
+    for (int c = 0; c < 3; ++c) size2 += cof.m[row][c] * cof.m[row][c];
+  most = size2 > most ? size2 : most;
+  const Pack j = f.m[0][0] * cof.m[0][0] + f.m[0][1] * cof.m[0][1] + f.m[0][2] * cof.m[0][2];
+  const Pack pressure = b.pressure * volumeStrain(j);
+  const Pack shear = all(b.shear);
+  Matrix p;
+  for (int row = 0; row < 3; ++row)
+    for (int c = 0; c < 3; ++c) p.m[row][c] = shear * (f.m[row][c] - r.m[row][c]) + pressure * cof.m[row][c];
+  return p;
+}
+
+// The forces [N] of a cluster on its corners, less their sign: m_ic (P S q + k (p - F q)). They replace the positions.
+MESHLESS_INLINE void pushBox(const Block& b, const Fits& fits, const Matrix& f, const Matrix& p, int i) {
+  const Pack mass = 0.125 * get(b.masses + i);
+  const Pack k = (b.hourglass * b.softness) * mass;
+  for (int axis = 0; axis < 3; ++axis) {
+    Pack h[3];
+    for (int c = 0; c < 3; ++c)
+      h[c] = (mass * (1.0 / b.half_edges[c])) * p.m[axis][c] - (k * b.half_edges[c]) * f.m[axis][c];
+    const Pack middle = -k * get(fits.centre[axis] + i);
+    const Pack low = middle - h[2], high = middle + h[2], sum = h[0] + h[1], difference = h[0] - h[1];
+    double* const to = b.forces + axis * kBlock + i;
+    const auto push = [&](int corner, Pack rest) __attribute__((always_inline)) {
+      double* const at = to + 3 * corner * kBlock;
+      put(k * get(at) + rest, at);
+    };
+    push(0, low - sum), push(1, low + difference), push(2, low - difference), push(3, low + sum);
+    push(4, high - sum), push(5, high + difference), push(6, high - difference), push(7, high + sum);
+  }
+}
+
+MESHLESS_INLINE void pushAny(const Block& b, const Fits& fits, const Matrix& f, const Matrix& p, int i) {
+  const double* const shape = b.shape + i;
+  const Pack mass = get(b.masses + i);
+  const Pack k = b.hourglass * get(shape + kSoftnessRow * kBlock);
+  Matrix pull = timesInverse(p, shape);
+  Pack middle[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int c = 0; c < 3; ++c) pull.m[axis][c] -= k * f.m[axis][c];
+    middle[axis] = k * get(fits.centre[axis] + i);
+  }
+  for (int corner = 0; corner < kCorners; ++corner) {
+    const Pack share = mass * get(shape + (kShareRow + corner) * kBlock);
+    const double* const q = shape + (kRestRow + 3 * corner) * kBlock;
+    const Pack q0 = get(q), q1 = get(q + kBlock), q2 = get(q + 2 * kBlock);
+    for (int axis = 0; axis < 3; ++axis) {
+      double* const at = b.forces + (3 * corner + axis) * kBlock + i;
+      const Pack* const m = pull.m[axis];
+      put(share * (m[0] * q0 + m[1] * q1 + m[2] * q2 + (k * get(at) - middle[axis])), at);
+    }
+  }
+}
+
+}  // namespace
+
+BlockResult accelerate(const Block& b) {
+  BlockResult result;
+  Fits fits;
+  gather(b);
+  for (int i = 0; i < b.count; i += kLanes) {
+    const Matrix f = b.shape ? fitAny(b, fits, i) : fitBox(b, fits, i);
+    putMatrix(f, fits.gradient, i);
+    rotate(b, f, fits, i);
+  }
+  result.cold = rotateCold(b, fits);
+  Pack most = {};
+  for (int i = 0; i < b.count; i += kLanes) {
+    const Matrix f = matrixAt(fits.gradient, i);
+    const Matrix p = stress(b, f, i, most);
+    if (b.shape)
+      pushAny(b, fits, f, p, i);
+    else
+      pushBox(b, fits, f, p, i);
+  }
+  for (int l = 0; l < kLanes; ++l)
+    if (most[l] > result.most) result.most = most[l];
+  return result;
+}
+
+}  // namespace meshless::elastic_sets::MESHLESS_ELASTIC_SET

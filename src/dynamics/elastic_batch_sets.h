@@ -1,0 +1,58 @@
+// What ElasticBatch hands to its kernel: raw pointers into structures of arrays. One entry point for each instruction
+// set; each is compiled in a file of its own.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "meshless_surgery/dynamics/rotation_batch.h"
+#include "rotation_sets.h"
+
+namespace meshless::elastic_sets {
+
+constexpr int kBlock = 64;  // clusters at a time: what is known of them stays in the first-level cache
+constexpr int kCorners = 8;
+
+// Rows of kBlock values in Block::shape.
+constexpr int kRestRow = 0;                         // q, corner by corner [m]
+constexpr int kShareRow = kRestRow + 3 * kCorners;  // m_ic / M_c
+constexpr int kInverseRow = kShareRow + kCorners;   // (sum m q q^T / M)^-1: xx xy xz yy yz zz
+constexpr int kSoftnessRow = kInverseRow + 6;       // 1 / spread [1/m^2]
+constexpr int kShapeRows = kSoftnessRow + 1;
+
+/// Clusters of at most eight members that span space; `shape` is null where all are boxes of one size, their corners in
+/// the order of the bits of x, y, z and of equal mass. Lanes from count to kBlock repeat a cluster.
+struct Block {
+  int count = 0;
+  const double* positions = nullptr;         // xyz of every particle
+  const std::uint32_t* particles = nullptr;  // [kCorners][kBlock]
+  const double* masses = nullptr;            // [kBlock]
+  const double* shape = nullptr;             // [kShapeRows][kBlock]
+  double half_edges[3] = {1.0, 1.0, 1.0};    // [m] of the boxes
+  double softness = 0.0;                     // 1 / spread of the boxes
+  double shrink = 1.0;                       // strain is that of F times this
+  double shear = 0.0;                        // 2 mu / rho
+  double pressure = 0.0;                     // lambda / rho
+  double hourglass = 0.0;                    // k E / rho
+  double* rotations = nullptr;               // [4][kBlock] x y z w, unit
+  double* forces = nullptr;                  // [3 * kCorners][kBlock], written
+};
+
+struct BlockResult {
+  double most = 0.0;  // |cof F|^2
+  std::size_t cold = 0;
+};
+
+namespace baseline {
+BlockResult accelerate(const Block& block);
+}
+#if MESHLESS_ROTATION_X86
+namespace avx2 {
+BlockResult accelerate(const Block& block);
+}
+namespace avx512 {
+BlockResult accelerate(const Block& block);
+}
+#endif
+
+}  // namespace meshless::elastic_sets

@@ -1,0 +1,229 @@
+#include "meshless_surgery/dynamics/match_batch.h"
+
+#include <cassert>
+
+#include <Eigen/Eigenvalues>
+
+#include "match_batch_common.h"
+
+namespace meshless {
+
+namespace match_sets {
+
+constexpr double kMostBeta = 0.95;  // as in body/deform.cpp
+constexpr double kNoExtent = 1e-6;  // of the inertia's trace: float moments are not known better
+
+const Entries& entriesOf(InstructionSet set) {
+#define MESHLESS_MATCH_TABLE(name)                                                                        \
+  {                                                                                                       \
+    name::gatherBodies, name::moveBodies, name::spreadParticles, name::gatherClusters, name::mapClusters, \
+        name::pullParticles, name::moveParticles                                                          \
+  }
+  static const Entries baseline_entries = MESHLESS_MATCH_TABLE(baseline);
+#if MESHLESS_ROTATION_X86
+  static const Entries avx2_entries = MESHLESS_MATCH_TABLE(avx2);
+  static const Entries avx512_entries = MESHLESS_MATCH_TABLE(avx512);
+  if (set == InstructionSet::kAvx512 && instructionSetAvailable(set)) return avx512_entries;
+  if (set == InstructionSet::kAvx2 && instructionSetAvailable(set)) return avx2_entries;
+#endif
+  (void)set;
+  return baseline_entries;
+#undef MESHLESS_MATCH_TABLE
+}
+
+StepNumbers numbersOf(const BatchStep& step) {
+  StepNumbers n;
+  n.h = static_cast<float>(step.h);
+  n.pull = static_cast<float>(step.gain / step.h);
+  n.beta = step.mode == MatchMode::kRigid ? 0.0f : static_cast<float>(std::min(step.beta, kMostBeta));
+  n.lost = step.damping > 0.0 ? static_cast<float>(1.0 - std::exp(-step.damping * step.h)) : 0.0f;
+  for (int k = 0; k < 3; ++k) n.gravity[k] = static_cast<float>(step.gravity[k]);
+  n.friction = static_cast<float>(step.friction);
+  n.ground = step.ground.has_value();
+  n.quadratic = step.mode == MatchMode::kQuadratic && n.beta > 0.0f;
+  return n;
+}
+
+Mat3 inverseWithoutNull(const Mat3& matrix) {
+  if (!matrix.allFinite()) return Mat3::Zero();
+  const Eigen::SelfAdjointEigenSolver<Mat3> solver(matrix);
+  Mat3 inverse = Mat3::Zero();
+  for (int k = 0; k < 3; ++k)
+    if (solver.eigenvalues()[k] > kNoExtent)
+      inverse += solver.eigenvectors().col(k) * solver.eigenvectors().col(k).transpose() / solver.eigenvalues()[k];
+  return inverse;
+}
+
+void count(const std::uint8_t* flags, std::size_t size, MatchCounters& counters) {
+  counters.clusters += size;
+  counters.rotations += size;
+  for (std::size_t i = 0; i < size; ++i) {
+    if (!(flags[i] & kRotationWarm)) ++counters.cold_rotations;
+    if (!(flags[i] & kRotationUnique)) ++counters.rank_fallbacks;
+  }
+}
+
+namespace {
+
+void pseudoInverse(const float m[6], float inverse[6]) {
+  Mat3 matrix;
+  matrix << m[0], m[3], m[5], m[3], m[1], m[4], m[5], m[4], m[2];
+  const Mat3 i = inverseWithoutNull(matrix);
+  const double entries[6] = {i(0, 0), i(1, 1), i(2, 2), i(0, 1), i(1, 2), i(2, 0)};
+  for (int k = 0; k < 6; ++k) inverse[k] = static_cast<float>(entries[k]);
+}
+
+}  // namespace
+}  // namespace match_sets
+
+using namespace match_sets;
+
+BatchStep batchStep(const Material& material, double h) {
+  BatchStep step;
+  step.h = h;
+  step.mode = material.mode;
+  step.gain = stiffnessGain(material.alpha, h);
+  step.beta = material.beta;
+  step.damping = material.damping;
+  step.friction = material.friction;
+  return step;
+}
+
+struct BodyBatch::Impl {
+  std::size_t size = 0, particles = 0, padded = 0;
+  bool has_quadratic = false;
+  Floats fields, constants, quadratic, quaternions;
+  std::vector<std::uint8_t> flags;
+  Points origins;
+
+  float& field(std::size_t body, std::size_t particle, int f) {
+    return fields[((body / kBlock * particles + particle) * kParticleFields + f) * kBlock + body % kBlock];
+  }
+  float& constant(std::size_t body, int f) {
+    return constants[(body / kBlock * kBodyFields + f) * kBlock + body % kBlock];
+  }
+
+  void prepare(std::size_t body, const MatchInput& in) {
+    const ClusterRest& rest = in.shape.clusters[0];
+    const double inverse_size = rest.size > 0.0 ? 1.0 / rest.size : 0.0;
+    constant(body, kSize) = static_cast<float>(rest.size);
+    const Mat3 m = rest.moment_inverse * (rest.mass * rest.size);
+    const double entries[6] = {m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(1, 2), m(2, 0)};
+    for (int k = 0; k < 6; ++k) constant(body, kMoment + k) = static_cast<float>(entries[k]);
+    for (std::size_t i = 0; i < particles; ++i) {
+      const Vec3 q = (in.rest[i] - rest.centre) * inverse_size;
+      for (int k = 0; k < 3; ++k) field(body, i, kQx + k) = static_cast<float>(q[k]);
+      field(body, i, kMass) = static_cast<float>(in.masses[i] / rest.mass);
+    }
+    if (has_quadratic && rest.quadratic_rank) {
+      const QuadraticRest& from = in.shape.quadratic[0];
+      constant(body, kHasQuadratic) = 1.0f;
+      float* to = &quadratic[body / kBlock * kQuadraticFields * kBlock + body % kBlock];
+      for (int k = 0; k < 6; ++k, to += kBlock) *to = static_cast<float>(from.mean[3 + k]);
+      for (int a = 0; a < 9; ++a)
+        for (int b = a; b < 9; ++b, to += kBlock) *to = static_cast<float>(from.moment_inverse(a, b) * rest.mass);
+    }
+  }
+
+  void set(std::size_t body, const Points& positions, const Points& velocities, const Quat& rotation) {
+    Vec3 centre = Vec3::Zero();
+    for (std::size_t i = 0; i < particles; ++i) centre += double(field(body, i, kMass)) * (positions[i] - positions[0]);
+    origins[body] = positions[0] + centre;
+    for (std::size_t i = 0; i < particles; ++i)
+      for (int k = 0; k < 3; ++k) {
+        field(body, i, kX + k) = static_cast<float>(positions[i][k] - origins[body][k]);
+        field(body, i, kVx + k) = static_cast<float>(velocities[i][k]);
+      }
+    for (int k = 0; k < 4; ++k) quaternions[k * padded + body] = static_cast<float>(rotation.coeffs()[k]);
+  }
+};
+
+bool BodyBatch::holds(const MatchInput& body) {
+  if (body.clusters.size() != 1 || body.clusters.members.size() != body.rest.size()) return false;
+  for (Index i = 0; i < body.rest.size(); ++i)
+    if (body.clusters.members[i] != i || body.clusters.weights[i] != 1.0) return false;
+  return true;
+}
+
+BodyBatch::BodyBatch(const std::vector<MatchInput>& bodies, bool quadratic) : impl_(std::make_unique<Impl>()) {
+  Impl& b = *impl_;
+  b.size = bodies.size();
+  b.has_quadratic = quadratic;
+  if (bodies.empty()) return;
+  b.particles = bodies[0].rest.size();
+  b.padded = (b.size + kBlock - 1) / kBlock * kBlock;
+  const std::size_t blocks = b.padded / kBlock;
+  b.fields.assign(blocks * b.particles * kParticleFields * kBlock, 0.0f);
+  b.constants.assign(blocks * kBodyFields * kBlock, 0.0f);
+  if (quadratic) b.quadratic.assign(blocks * kQuadraticFields * kBlock, 0.0f);
+  b.quaternions.assign(4 * b.padded, 0.0f);
+  b.flags.assign(b.padded, 0);
+  b.origins.assign(b.padded, Vec3::Zero());
+  const Points still(b.particles, Vec3::Zero());
+  for (std::size_t i = 0; i < b.padded; ++i) {  // the first body stands in for those that are none
+    const MatchInput& in = bodies[i < b.size ? i : 0];
+    assert(holds(in) && in.rest.size() == b.particles);
+    b.prepare(i, in);
+    b.set(i, in.rest, still, Quat::Identity());
+  }
+}
+
+BodyBatch::~BodyBatch() = default;
+BodyBatch::BodyBatch(BodyBatch&&) noexcept = default;
+BodyBatch& BodyBatch::operator=(BodyBatch&&) noexcept = default;
+std::size_t BodyBatch::size() const { return impl_->size; }
+std::size_t BodyBatch::particles() const { return impl_->particles; }
+
+void BodyBatch::setState(std::size_t body, const Points& positions, const Points& velocities, const Quat& rotation) {
+  impl_->set(body, positions, velocities, rotation);
+}
+
+void BodyBatch::getState(std::size_t body, Points& positions, Points& velocities, Quat& rotation) const {
+  Impl& b = *impl_;
+  positions.resize(b.particles);
+  velocities.resize(b.particles);
+  for (std::size_t i = 0; i < b.particles; ++i)
+    for (int k = 0; k < 3; ++k) {
+      positions[i][k] = b.origins[body][k] + b.field(body, i, kX + k);
+      velocities[i][k] = b.field(body, i, kVx + k);
+    }
+  for (int k = 0; k < 4; ++k) rotation.coeffs()[k] = b.quaternions[k * b.padded + body];
+}
+
+void BodyBatch::step(const BatchStep& step, MatchCounters& counters, const ForEach& for_each) {
+  Impl& b = *impl_;
+  if (b.size == 0) return;
+  assert(step.mode != MatchMode::kQuadratic || b.has_quadratic);
+  const StepNumbers numbers = numbersOf(step);
+  const Entries& entries = entriesOf(step.set);
+  const BodiesView view = {static_cast<int>(b.particles), b.fields.data(), b.constants.data(),
+                           b.has_quadratic ? b.quadratic.data() : nullptr, pseudoInverse};
+  for_each((b.padded + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+    const FlushDenormals flush;
+    BodiesScratch scratch;
+    const std::size_t first = chunk * kChunk, size = std::min<std::size_t>(kChunk, b.padded - first);
+    const int first_block = static_cast<int>(first / kBlock), blocks = static_cast<int>(size / kBlock);
+    if (step.ground)
+      for (std::size_t i = 0; i < size; ++i)
+        b.constant(first + i, kGround) = static_cast<float>(*step.ground - b.origins[first + i].z());
+    entries.gatherBodies(view, numbers, first_block, blocks, scratch);
+    RotationBatch<float> rotations;
+    rotations.count = size;
+    rotations.matrices = scratch.moment[0];
+    rotations.matrix_stride = kChunk;
+    rotations.quaternions = b.quaternions.data() + first;
+    rotations.quaternion_stride = b.padded;
+    rotations.rotations = scratch.rotation[0];
+    rotations.rotation_stride = kChunk;
+    rotations.flags = b.flags.data() + first;
+    nearestRotationsWarm(rotations, step.set);
+    entries.moveBodies(view, numbers, first_block, blocks, scratch);
+    for (int k = 0; k < 3; ++k)
+      for (std::size_t i = 0; i < size; ++i) b.origins[first + i][k] += scratch.shift[k][i];
+  });
+  match_sets::count(b.flags.data(), b.size, counters);
+  if (numbers.beta > 0.0f) counters.linear_fits += b.size;
+  if (numbers.quadratic) counters.quadratic_moments += b.size;
+}
+
+}  // namespace meshless

@@ -1,0 +1,12 @@
+// Steps of many bodies, 8 lanes at a time.
+// No Eigen and no shared inline functions here: the linker could take a copy of one for the whole program.
+#include "match_batch_sets.h"
+
+#if MESHLESS_ROTATION_X86
+#pragma GCC target("avx2,fma")
+#include <immintrin.h>
+
+#define MESHLESS_MATCH_SET avx2
+#define MESHLESS_MATCH_BYTES 32
+#include "match_batch_kernel.h"
+#endif

@@ -1,0 +1,475 @@
+#include "meshless_surgery/dynamics/match_batch.h"
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "meshless_surgery/body/deform.h"
+#include "meshless_surgery/contact/sphere_and_ground.h"
+#include "support/random.h"
+
+namespace meshless {
+namespace {
+
+using test::Random;
+
+constexpr MatchMode kModes[] = {MatchMode::kRigid, MatchMode::kLinear, MatchMode::kQuadratic};
+constexpr double kSpacing = 0.02;  // [m]
+
+std::vector<InstructionSet> sets() {
+  std::vector<InstructionSet> all;
+  for (InstructionSet set : {InstructionSet::kBaseline, InstructionSet::kAvx2, InstructionSet::kAvx512})
+    if (instructionSetAvailable(set)) all.push_back(set);
+  return all;
+}
+
+// A body as the world steps it, with the plain code.
+struct Plain {
+  BodyModel model;
+  BodyState state;
+  StepScratch scratch;
+  MatchCounters counters;
+
+  MatchInput input() const { return matchInput(model); }
+
+  void finish() {
+    model.match_masses = model.masses;
+    model.fixed.assign(model.rest.size(), false);
+    for (double m : model.masses) model.mass += m;
+    model.shape = makeRestShape(model.rest, model.masses, model.clusters);
+    addQuadraticRest(model.rest, model.masses, model.clusters, model.shape);
+    state.positions = model.rest;
+    state.velocities.assign(model.rest.size(), Vec3::Zero());
+    state.poses.resize(model.clusters.size());
+  }
+
+  void step(const Material& material, const BatchStep& s) {
+    matchAndMove(model, material, s.gravity, s.h, state, scratch, counters);
+    scratch.touched.clear();
+    scratch.before_contact = state.positions;
+    if (s.ground)
+      for (Index i = 0; i < model.rest.size(); ++i) {
+        Vec3& x = state.positions[i];
+        const Projection out = projectOutOfGround(x, *s.ground);
+        if (!out.inside) continue;
+        x += out.depth * out.normal;
+        x += frictionCorrection(x - scratch.previous[i], out.normal, out.depth, s.friction);
+        scratch.touched.push_back({i, out.normal, 0.0});
+      }
+    velocitiesFromPositions(model, s.h, state, scratch);
+  }
+
+  Vec3 centre() const { return rigidMotionOf(model, state.positions, state.velocities).centre; }
+  Vec3 momentum() const {
+    Vec3 p = Vec3::Zero();
+    for (std::size_t i = 0; i < model.rest.size(); ++i) p += model.masses[i] * state.velocities[i];
+    return p;
+  }
+  Vec3 angularMomentum() const {
+    Vec3 l = Vec3::Zero();
+    const Vec3 c = centre();
+    for (std::size_t i = 0; i < model.rest.size(); ++i)
+      l += model.masses[i] * (state.positions[i] - c).cross(state.velocities[i]);
+    return l;
+  }
+  // [kg m^2/s] what the angular momentum is small against, should it be near zero
+  double turning() const {
+    double sum = 0.0;
+    const Vec3 c = centre();
+    for (std::size_t i = 0; i < model.rest.size(); ++i)
+      sum += model.masses[i] * (state.positions[i] - c).norm() * state.velocities[i].norm();
+    return sum;
+  }
+  double movement() const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < model.rest.size(); ++i) sum += model.masses[i] * state.velocities[i].norm();
+    return sum;
+  }
+};
+
+void addLattice(int nx, int ny, int nz, double spacing, double jitter, const Vec3& at, Random& random,
+                BodyModel& model) {
+  for (int z = 0; z < nz; ++z)
+    for (int y = 0; y < ny; ++y)
+      for (int x = 0; x < nx; ++x) {
+        model.rest.push_back(at + spacing * (Vec3(x, y, z) + random.vector(jitter)));
+        model.masses.push_back(random.uniform(0.5e-3, 1.5e-3));
+      }
+}
+
+Plain makeBody(Random& random, int nx, int ny, int nz, double scale = 1.0, const Vec3& at = Vec3(0, 0, 0.05)) {
+  Plain body;
+  addLattice(nx, ny, nz, scale * kSpacing, 0.1, at, random, body.model);
+  ClusterSet& set = body.model.clusters;
+  set.offsets = {0, static_cast<Index>(body.model.rest.size())};
+  for (Index i = 0; i < body.model.rest.size(); ++i) set.members.push_back(i);
+  set.weights.assign(set.members.size(), 1.0);
+  body.finish();
+  return body;
+}
+
+// Turned, deformed and in motion.
+void disturb(Plain& body, Random& random, double scale = 1.0, double strain = 0.1) {
+  const Mat3 map = random.rotation().toRotationMatrix() * (Mat3::Identity() + random.matrix(strain));
+  const Vec3 c = body.centre(), spin = random.vector(5.0), velocity = scale * random.vector(0.2);
+  for (std::size_t i = 0; i < body.model.rest.size(); ++i) {
+    const Vec3 r = body.state.positions[i] - c;
+    body.state.positions[i] = c + map * r + scale * random.vector(0.1 * strain * kSpacing);
+    body.state.velocities[i] = velocity + spin.cross(map * r) + scale * random.vector(0.02);
+  }
+}
+
+// Every cluster a particle's neighbourhood of a lattice; equal shares or random ones.
+Plain makeOverlap(Random& random, int n, int width, bool equal) {
+  Plain body;
+  addLattice(n, n, n, kSpacing, 0.05, Vec3(0, 0, 0.05), random, body.model);
+  ClusterSet& set = body.model.clusters;
+  std::vector<double> total(body.model.rest.size(), 0.0);
+  set.offsets = {0};
+  for (int z = 0; z < n; ++z)
+    for (int y = 0; y < n; ++y)
+      for (int x = 0; x < n; ++x) {
+        for (int c = std::max(0, z - width); c <= std::min(n - 1, z + width); ++c)
+          for (int b = std::max(0, y - width); b <= std::min(n - 1, y + width); ++b)
+            for (int a = std::max(0, x - width); a <= std::min(n - 1, x + width); ++a) {
+              const Index i = static_cast<Index>((c * n + b) * n + a);
+              set.members.push_back(i);
+              set.weights.push_back(equal ? 1.0 : random.uniform(0.5, 1.5));
+              total[i] += set.weights.back();
+            }
+        set.offsets.push_back(static_cast<Index>(set.members.size()));
+      }
+  for (std::size_t k = 0; k < set.members.size(); ++k) set.weights[k] /= total[set.members[k]];
+  body.finish();
+  return body;
+}
+
+Material looks(MatchMode mode, double damping) {
+  Material m;
+  m.mode = mode;
+  m.alpha = 0.6;
+  m.beta = 0.5;
+  m.damping = damping;
+  return m;
+}
+
+BodyBatch batchOf(const std::vector<Plain>& bodies) {
+  std::vector<MatchInput> inputs;
+  for (const Plain& b : bodies) inputs.push_back(b.input());
+  BodyBatch batch(inputs, true);
+  for (std::size_t i = 0; i < bodies.size(); ++i)
+    batch.setState(i, bodies[i].state.positions, bodies[i].state.velocities, bodies[i].state.poses[0].rotation);
+  return batch;
+}
+
+void read(const BodyBatch& batch, std::size_t i, Plain& to) {
+  batch.getState(i, to.state.positions, to.state.velocities, to.state.poses[0].rotation);
+}
+void read(const OverlapBatch& batch, Plain& to) {
+  std::vector<Quat> rotations;
+  batch.getState(to.state.positions, to.state.velocities, rotations);
+  for (std::size_t c = 0; c < rotations.size(); ++c) to.state.poses[c].rotation = rotations[c];
+}
+OverlapBatch overlapOf(const Plain& body) {
+  OverlapBatch batch(body.input());
+  std::vector<Quat> rotations;
+  for (const ClusterPose& p : body.state.poses) rotations.push_back(p.rotation);
+  batch.setState(body.state.positions, body.state.velocities, rotations);
+  return batch;
+}
+
+double largestDistance(const Points& a, const Points& b) {
+  double largest = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    if (!((a[i] - b[i]).norm() <= largest)) largest = (a[i] - b[i]).norm();
+  return largest;
+}
+
+// A falling body's velocity is known to float of the velocity, and where it is after the fall to float of the fall.
+constexpr double kOfFall = 1e-6;
+double fallen(const BatchStep& step, int steps) { return 0.5 * step.gravity.norm() * std::pow(steps * step.h, 2.0); }
+
+TEST(BodyBatch, StepsAsTheReferenceInFreeFlight) {
+  for (InstructionSet set : sets())
+    for (MatchMode mode : kModes)
+      for (double scale : {1e-3, 1.0, 1e3}) {
+        Random random(7);
+        std::vector<Plain> bodies;
+        for (int i = 0; i < 37; ++i) {
+          bodies.push_back(makeBody(random, 3, 3, 3, scale, scale * Vec3(1e3, -10.0 * i, 5.0)));
+          disturb(bodies.back(), random, scale);
+        }
+        const Material material = looks(mode, 1.0);
+        BatchStep step = batchStep(material, 1.0 / 120.0);
+        step.gravity *= scale;
+        step.set = set;
+        BodyBatch batch = batchOf(bodies);
+        MatchCounters counters;
+        double first = 0.0, last = 0.0, fast = 0.0;
+        for (int n = 0; n < 100; ++n) {
+          batch.step(step, counters);
+          for (std::size_t i = 0; i < bodies.size(); ++i) {
+            bodies[i].step(material, step);
+            if (n != 0 && n != 99) continue;
+            Plain found = bodies[i];
+            read(batch, i, found);
+            double& largest = n == 0 ? first : last;
+            largest = std::max(largest, largestDistance(found.state.positions, bodies[i].state.positions));
+            if (n == 99) fast = std::max(fast, largestDistance(found.state.velocities, bodies[i].state.velocities));
+          }
+        }
+        EXPECT_LE(first, 2e-7 * 2.0 * kSpacing * scale) << toString(mode);
+        EXPECT_LE(last, 5e-6 * 2.0 * kSpacing * scale + kOfFall * fallen(step, 100)) << toString(mode) << scale;
+        EXPECT_LE(fast, 2e-5 * scale) << toString(mode);
+        EXPECT_EQ(counters.rotations, 3700u);
+        EXPECT_EQ(counters.quadratic_moments, mode == MatchMode::kQuadratic ? 3700u : 0u);
+        EXPECT_EQ(counters.linear_fits, mode == MatchMode::kRigid ? 0u : 3700u);
+      }
+}
+
+TEST(BodyBatch, StaysWithTheReferenceOnTheGround) {
+  for (InstructionSet set : sets())
+    for (MatchMode mode : kModes) {
+      Random random(11);
+      std::vector<Plain> bodies;
+      for (int i = 0; i < 20; ++i) {
+        bodies.push_back(makeBody(random, 3, 3, 3));
+        disturb(bodies.back(), random, 1.0, 0.02);
+      }
+      const Material material = looks(mode, 1.0);
+      BatchStep step = batchStep(material, 1.0 / 120.0);
+      step.ground = 0.0;
+      step.set = set;
+      BodyBatch batch = batchOf(bodies);
+      MatchCounters counters;
+      // A particle that touches one step sooner by rounding lets bodies part: one step and the end state are compared.
+      for (int n = 0; n < 100; ++n) {
+        batch.step(step, counters);
+        double largest = 0.0;
+        for (std::size_t i = 0; i < bodies.size(); ++i) {
+          bodies[i].step(material, step);
+          Plain found = bodies[i];
+          read(batch, i, found);
+          largest = std::max(largest, largestDistance(found.state.positions, bodies[i].state.positions));
+          for (const Vec3& x : found.state.positions) ASSERT_GE(x.z(), -1e-8);
+          // From here on both go from the same state.
+          bodies[i].state.positions = found.state.positions;
+          bodies[i].state.velocities = found.state.velocities;
+          bodies[i].state.poses[0].rotation = found.state.poses[0].rotation.normalized();
+        }
+        ASSERT_LE(largest, 1e-6 * 2.0 * kSpacing) << toString(mode) << " step " << n;
+      }
+    }
+}
+
+TEST(BodyBatch, KeepsMomentum) {
+  for (MatchMode mode : kModes) {
+    Random random(3);
+    std::vector<Plain> bodies;
+    for (int i = 0; i < 16; ++i) {
+      bodies.push_back(makeBody(random, 3, 3, 3));
+      disturb(bodies.back(), random);
+    }
+    BatchStep step = batchStep(looks(mode, 0.0), 1.0 / 120.0);
+    step.gravity.setZero();
+    BodyBatch batch = batchOf(bodies);
+    MatchCounters counters;
+    constexpr int kSteps = 1000;
+    for (int n = 0; n < kSteps; ++n) batch.step(step, counters);
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      Plain after = bodies[i];
+      read(batch, i, after);
+      EXPECT_LE((after.momentum() - bodies[i].momentum()).norm(), 1e-8 * kSteps * bodies[i].movement());
+      EXPECT_LE((after.angularMomentum() - bodies[i].angularMomentum()).norm(), 3e-8 * kSteps * bodies[i].turning());
+    }
+  }
+}
+
+TEST(BodyBatch, BodiesDoNotDependOnPlaceNeighboursOrOrder) {
+  Random random(5);
+  std::vector<Plain> bodies;
+  for (int i = 0; i < 150; ++i) {
+    bodies.push_back(makeBody(random, 3, 2, 3));
+    disturb(bodies.back(), random);
+  }
+  for (InstructionSet set : sets())
+    for (MatchMode mode : kModes) {
+      BatchStep step = batchStep(looks(mode, 1.0), 1.0 / 120.0);
+      step.ground = 0.03;
+      step.set = set;
+      std::vector<Plain> spoiled = bodies;
+      for (int i : {0, 17, 40}) spoiled[i].state.positions[3].x() = std::numeric_limits<double>::quiet_NaN();
+      for (int i : {5, 70}) spoiled[i].state.velocities[3].x() = std::numeric_limits<double>::infinity();
+      const std::vector<Plain> few(bodies.begin() + 130, bodies.begin() + 143);
+      BodyBatch all = batchOf(bodies), with_nan = batchOf(spoiled), part = batchOf(few);
+      MatchCounters counters;
+      for (int n = 0; n < 50; ++n) {
+        all.step(step, counters);
+        with_nan.step(step, counters, [](std::size_t count, const std::function<void(std::size_t)>& work) {
+          for (std::size_t i = count; i > 0; --i) work(i - 1);
+        });
+        part.step(step, counters);
+      }
+      for (std::size_t i = 0; i < bodies.size(); ++i) {
+        if (i == 0 || i == 17 || i == 40 || i == 5 || i == 70) continue;
+        Plain a = bodies[i], b = bodies[i];
+        read(all, i, a);
+        read(with_nan, i, b);
+        ASSERT_EQ(largestDistance(a.state.positions, b.state.positions), 0.0) << i;
+        ASSERT_EQ(largestDistance(a.state.velocities, b.state.velocities), 0.0) << i;
+        if (i < 130 || i >= 143) continue;
+        read(part, i - 130, b);
+        ASSERT_EQ(largestDistance(a.state.positions, b.state.positions), 0.0) << i;
+      }
+    }
+}
+
+// Lines, sheets and crumbs: what has no linear or quadratic fit.
+TEST(BodyBatch, FallsBackWhereTheRankIsMissing) {
+  const std::array<int, 3> sizes[] = {{12, 1, 1}, {4, 3, 1}, {2, 2, 3}, {1, 1, 12}, {3, 2, 2}};
+  for (MatchMode mode : kModes) {
+    Random random(9);
+    std::vector<Plain> bodies;
+    for (const auto& n : sizes) {
+      Plain body;
+      addLattice(n[0], n[1], n[2], kSpacing, 0.0, Vec3::Zero(), random, body.model);
+      body.model.clusters = makeBody(random, 12, 1, 1).model.clusters;
+      body.finish();
+      for (std::size_t i = 0; i < 12; ++i) body.state.velocities[i] = random.vector(0.05);
+      bodies.push_back(std::move(body));
+    }
+    const Material material = looks(mode, 1.0);
+    const BatchStep step = batchStep(material, 1.0 / 120.0);
+    BodyBatch batch = batchOf(bodies);
+    MatchCounters counters;
+    for (int n = 0; n < 20; ++n) {
+      batch.step(step, counters);
+      for (Plain& body : bodies) body.step(material, step);
+    }
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      Plain found = bodies[i];
+      read(batch, i, found);
+      // A line's spin about itself is known to no precision.
+      EXPECT_LE(largestDistance(found.state.positions, bodies[i].state.positions), 1e-4 * kSpacing)
+          << toString(mode) << " " << i;
+    }
+  }
+}
+
+TEST(OverlapBatch, GoalsAreTheReferences) {
+  for (bool equal : {true, false})
+    for (MatchMode mode : {MatchMode::kRigid, MatchMode::kLinear})
+      for (double strain : {0.0, 0.03, 0.3}) {
+        Random random(13);
+        Plain body = makeOverlap(random, 9, 1, equal);
+        disturb(body, random, 1.0, strain);
+        for (Vec3& x : body.state.positions) x += Vec3(100.0, -50.0, 3.0);
+        OverlapBatch batch(body.input());
+        std::vector<ClusterPose> poses = body.state.poses;
+        Points goals, expected;
+        MatchCounters counters;
+        batch.match(body.state.positions, mode, 0.7, poses, goals, counters);
+        matchShapes(body.input(), body.state.positions, mode, 0.7, body.state.poses, expected, counters);
+        EXPECT_LE(largestDistance(goals, expected), (strain < 0.1 ? 2e-7 : 1e-6) * 8.0 * kSpacing) << strain;
+        for (std::size_t c = 0; c < poses.size(); ++c) {
+          ASSERT_LE((poses[c].centre - body.state.poses[c].centre).norm(), 1e-6 * kSpacing);
+          ASSERT_LE(poses[c].rotation.angularDistance(body.state.poses[c].rotation), 1e-5);
+          ASSERT_LE((poses[c].deformation - body.state.poses[c].deformation).norm(), 2e-5);
+        }
+      }
+}
+
+TEST(OverlapBatch, StepsAsTheReference) {
+  for (InstructionSet set : sets())
+    for (bool equal : {true, false})
+      for (MatchMode mode : {MatchMode::kRigid, MatchMode::kLinear}) {
+        Random random(17);
+        Plain body = makeOverlap(random, 7, equal ? 1 : 2, equal);
+        disturb(body, random);
+        const Material material = looks(mode, 1.0);
+        BatchStep step = batchStep(material, 1.0 / 120.0);
+        step.set = set;
+        OverlapBatch batch = overlapOf(body);
+        MatchCounters counters;
+        for (int n = 0; n < 100; ++n) {
+          batch.step(step, counters);
+          body.step(material, step);
+          if (n != 0 && n != 99) continue;
+          Plain found = body;
+          read(batch, found);
+          EXPECT_LE(largestDistance(found.state.positions, body.state.positions),
+                    n == 0 ? 1e-7 * 6.0 * kSpacing : 5e-6 * 6.0 * kSpacing + kOfFall * fallen(step, 100));
+        }
+        EXPECT_EQ(counters.rotations, 100u * body.model.clusters.size());
+      }
+}
+
+TEST(OverlapBatch, StaysWithTheReferenceOnTheGround) {
+  Random random(19);
+  Plain body = makeOverlap(random, 6, 1, true);
+  disturb(body, random, 1.0, 0.02);
+  double lowest = 1.0;
+  for (const Vec3& x : body.state.positions) lowest = std::min(lowest, x.z());
+  const Material material = looks(MatchMode::kLinear, 1.0);
+  BatchStep step = batchStep(material, 1.0 / 120.0);
+  step.ground = lowest - 0.01;
+  MatchCounters counters;
+  OverlapBatch batch = overlapOf(body);
+  for (int n = 0; n < 150; ++n) {
+    batch.step(step, counters);
+    body.step(material, step);
+    Plain found = body;
+    read(batch, found);
+    ASSERT_LE(largestDistance(found.state.positions, body.state.positions), 1e-6 * 6.0 * kSpacing) << n;
+    body.state.positions = found.state.positions;
+    body.state.velocities = found.state.velocities;
+    for (std::size_t c = 0; c < body.state.poses.size(); ++c)
+      body.state.poses[c].rotation = found.state.poses[c].rotation;
+  }
+}
+
+TEST(OverlapBatch, KeepsMomentumAndItsFrame) {
+  for (MatchMode mode : {MatchMode::kRigid, MatchMode::kLinear}) {
+    Random random(23);
+    Plain body = makeOverlap(random, 6, 1, false);
+    disturb(body, random);
+    BatchStep step = batchStep(looks(mode, 0.0), 1.0 / 120.0);
+    step.gravity.setZero();
+    OverlapBatch batch = overlapOf(body);
+    MatchCounters counters;
+    constexpr int kSteps = 1000;
+    for (int n = 0; n < kSteps; ++n) batch.step(step, counters);
+    Plain after = body;
+    read(batch, after);
+    EXPECT_LE((after.momentum() - body.momentum()).norm(), 1e-8 * kSteps * body.movement());
+    EXPECT_LE((after.angularMomentum() - body.angularMomentum()).norm(), 3e-8 * kSteps * body.turning());
+    // The centre of mass goes its way.
+    const Vec3 way = body.centre() + kSteps * step.h * body.momentum() / body.model.mass;
+    EXPECT_LE((after.centre() - way).norm(), 1e-5 * (way - body.centre()).norm());
+  }
+}
+
+TEST(OverlapBatch, OrderOfTheChunksDoesNotMatter) {
+  Random random(29);
+  Plain body = makeOverlap(random, 8, 1, true);
+  disturb(body, random);
+  const BatchStep step = batchStep(looks(MatchMode::kLinear, 1.0), 1.0 / 120.0);
+  OverlapBatch one = overlapOf(body), other = overlapOf(body);
+  MatchCounters counters;
+  for (int n = 0; n < 30; ++n) {
+    one.step(step, counters);
+    other.step(step, counters, [](std::size_t count, const std::function<void(std::size_t)>& work) {
+      for (std::size_t i = count; i > 0; --i) work(i - 1);
+    });
+  }
+  Plain a = body, b = body;
+  read(one, a);
+  read(other, b);
+  EXPECT_EQ(largestDistance(a.state.positions, b.state.positions), 0.0);
+  EXPECT_EQ(largestDistance(a.state.velocities, b.state.velocities), 0.0);
+}
+
+}  // namespace
+}  // namespace meshless
