@@ -1,15 +1,16 @@
 // Run time against error: the deformer against the finite-element truth, and the laws that it must keep. Writes
 // accuracy.csv and, where gnuplot is installed, its plots.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
-#include <functional>
 
 #include <CLI/CLI.hpp>
 
-#include "meshless_surgery/body/deform.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "laws.h"
+#include "plot.h"
 #include "static_load.h"
 
 namespace meshless::bench {
@@ -20,8 +21,14 @@ const char* const kLoads[] = {"bar_cantilever_small", "bar_cantilever_large", "b
                               "bar_twist_180",        "block_indent",         "organ_hang"};
 const char* const kRatios[] = {"nu30", "nu45"};
 
+struct Row {
+  std::string benchmark, name, mode, setting;
+  double run_time_ms, error;
+};
+
 struct Table {
   std::ofstream file;
+  std::vector<Row> rows;
 
   void row(const std::string& benchmark, const std::string& name, const std::string& mode, const std::string& setting,
            double run_time_ms, double error) {
@@ -31,6 +38,7 @@ struct Table {
     file << line << '\n' << std::flush;
     std::puts(line);
     std::fflush(stdout);
+    rows.push_back({benchmark, name, mode, setting, run_time_ms, error});
   }
 };
 
@@ -40,33 +48,62 @@ std::string shortNumber(double value) {
   return text;
 }
 
-// Materials for accuracy: nothing to calibrate. The run time is that of one substep.
+// How far two solutions are from each other, as the error is measured.
+double difference(const StaticResult& a, const StaticResult& b) {
+  double squares = 0.0;
+  for (std::size_t s = 0; s < a.samples.size(); ++s) squares += (a.samples[s] - b.samples[s]).squaredNorm();
+  return std::sqrt(squares / static_cast<double>(a.samples.size())) / a.largest;
+}
+
+// Materials for accuracy: nothing to calibrate. The run time is that of one substep. `fem` is the error against the
+// truth, `self` that against our own finest solution: what is left of `fem` there is the model's.
 bool elasticRows(Table& table, const std::string& folder, const std::vector<double>& spacings) {
-  for (double spacing : spacings)
-    for (const char* load : kLoads)
-      for (const char* ratio : kRatios) {
-        const std::string name = std::string(load) + "_" + ratio;
-        const Result<TruthCase> truth = readTruthCase(folder + "/" + name + ".csv");
-        if (!truth) {
-          std::fprintf(stderr, "%s\n", truth.error().detail.c_str());
-          return false;
-        }
-        StaticSettings settings;
-        settings.spacing = spacing;
-        settings.material.youngs_modulus = 1.0;
+  for (const char* load : kLoads)
+    for (const char* ratio : kRatios) {
+      const std::string name = std::string(load) + "_" + ratio;
+      const Result<TruthCase> truth = readTruthCase(folder + "/" + name + ".csv");
+      if (!truth) {
+        std::fprintf(stderr, "%s\n", truth.error().detail.c_str());
+        return false;
+      }
+      std::vector<StaticResult> results;
+      std::vector<std::string> settings_of;
+      const auto solve = [&](const StaticSettings& settings, const std::string& kind) {
         const Result<StaticResult> result = solveStatic(*truth, folder, settings);
         if (!result) {
           std::fprintf(stderr, "%s: %s\n", name.c_str(), result.error().detail.c_str());
           return false;
         }
         const std::string setting =
-            "cells " + shortNumber(1000.0 * spacing) + " mm " + std::to_string(result->particles);
-        table.row("fem", name, "elastic", setting + (result->at_rest ? "" : " not at rest"), result->step_ms,
-                  result->error);
+            kind + " " + shortNumber(1000.0 * settings.spacing) + " mm " + std::to_string(result->particles);
+        table.row("fem", name, kind == "cells" ? "elastic" : "elastic_wide",
+                  setting + (result->at_rest ? "" : " not at rest"), result->step_ms, result->error);
         if (result->contact_force > 0.0)
           table.row("fem_force", name, "elastic", setting, result->step_ms,
                     std::abs(result->contact_force / truth->number("indentation_force") - 1.0));
+        results.push_back(*result);
+        settings_of.push_back(setting);
+        return true;
+      };
+      StaticSettings settings;
+      settings.material.youngs_modulus = 1.0;
+      settings.clusters.kind = ClusterOptions::Kind::kCells;
+      for (double spacing : spacings) {
+        settings.spacing = spacing;
+        if (!solve(settings, "cells")) return false;
       }
+      for (std::size_t k = 0; k + 1 < results.size(); ++k)
+        table.row("self", name, "elastic", settings_of[k], results[k].step_ms, difference(results[k], results.back()));
+      // The same law on wide overlapping clusters.
+      if (std::string(load).find("bar_") != 0 || std::string(load).find("twist") != std::string::npos) continue;
+      settings.spacing = 0.0125;
+      settings.clusters.kind = ClusterOptions::Kind::kCount;
+      settings.clusters.count = 40;
+      for (double overlap : {0.1, 0.6}) {
+        settings.clusters.overlap = overlap;
+        if (!solve(settings, "40 clusters overlap " + shortNumber(overlap))) return false;
+      }
+    }
   return true;
 }
 
@@ -131,92 +168,103 @@ bool looksRows(Table& table, const std::string& folder, double spacing) {
   return true;
 }
 
-// Drift per step of a free body that spins and rings, relative to what it has.
-void momentumRows(Table& table, int steps) {
-  for (int family = 0; family < 4; ++family) {
-    BodyDef def;
-    def.name = "block";
-    def.mesh = boxMesh(Vec3(0.12, 0.06, 0.04), 12, 6, 4);
-    def.spacing = 0.01;
-    def.material.damping = 0.0;
-    if (family == 3) def.material.youngs_modulus = 20000.0;
-    def.material.mode = family == 0 ? MatchMode::kRigid : family == 1 ? MatchMode::kLinear : MatchMode::kQuadratic;
-    def.material.beta = 0.5;
-    const Material material = def.material;
-    const Result<PreparedBody> body = prepareBody(std::move(def));
-    if (!body) return;
-    BodyState state = body->state;
-    const BodyModel& model = *body->model;
-    for (std::size_t i = 0; i < model.rest.size(); ++i)
-      state.velocities[i] = Vec3(1, -2, 0.5) + Vec3(3, 5, 20).cross(model.rest[i]) +
-                            0.1 * Vec3(std::sin(3.1 * i), std::sin(1.7 * i), std::sin(2.3 * i));
-    const BodyMeasures before = measureBody(model, state);
-    StepScratch scratch;
-    MatchCounters counters;
-    const double h = model.highest_frequency > 0.0 ? 0.9 / model.highest_frequency : 1.0 / 120.0;
-    for (int step = 0; step < steps; ++step) matchAndMove(model, material, Vec3::Zero(), h, state, scratch, counters);
-    const BodyMeasures after = measureBody(model, state);
-    const char* mode = family == 3 ? "elastic" : toString(material.mode);
-    const std::string setting = std::to_string(steps) + " steps";
-    table.row("momentum", "linear", mode, setting, 0.0,
-              (after.linear_momentum - before.linear_momentum).norm() / before.linear_momentum.norm() / steps);
-    table.row("momentum", "angular", mode, setting, 0.0,
-              (after.angular_momentum - before.angular_momentum).norm() / before.angular_momentum.norm() / steps);
-  }
-}
-
-// Sag of a bar held at one end, relative to that at the shortest step.
-void stepRows(Table& table) {
-  std::vector<double> sags;
-  const double steps[] = {1.0 / 960, 1.0 / 480, 1.0 / 240, 1.0 / 120, 1.0 / 60};
-  for (double frame : steps) {
-    BodyDef def;
-    def.name = "bar";
-    def.mesh = boxMesh(Vec3(0.12, 0.04, 0.04), 12, 4, 4);
-    def.spacing = 0.01;
-    def.material.youngs_modulus = 20000.0;
-    def.material.damping = 20.0;
-    Box end;
-    end.extend(Vec3(-1, -1, -1));
-    end.extend(Vec3(-0.0599, 1, 1));
-    def.fixed.push_back(end);
-    const Material material = def.material;
-    const Result<PreparedBody> body = prepareBody(std::move(def));
-    if (!body) return;
-    BodyState state = body->state;
-    StepScratch scratch;
-    MatchCounters counters;
-    for (double t = 0.0; t < 3.0; t += frame) {
-      const int substeps = static_cast<int>(std::ceil(frame * highestFrequencyNow(*body->model, state)));
-      for (int k = 0; k < substeps; ++k)
-        matchAndMove(*body->model, material, Vec3(0, 0, -9.81), frame / substeps, state, scratch, counters);
+// What the deformer must keep (laws.h). Errors are relative, angles in rad; the rows of a step are named by it.
+void lawRows(Table& table, int steps, const std::vector<double>& rates) {
+  const std::string drift_setting = std::to_string(steps) + " steps";
+  for (const Kind& kind : kinds()) {
+    for (bool in_float : {false, true}) {
+      // Overlapping clusters in float take quadratic as linear, and elastic bodies are double alone.
+      if (kind.elastic ? in_float : in_float && kind.mode == MatchMode::kQuadratic && kind.clusters > 1) continue;
+      const std::string precision = in_float ? "float" : "double";
+      if (!kind.elastic)
+        for (double scale : {1e-6, 1.0, 1e6})
+          for (double far : {0.0, 1000.0}) {
+            if (far > 0.0 && scale != 1.0) continue;
+            table.row("patch", kind.name, precision, "size " + shortNumber(scale) + " m at " + shortNumber(far) + " m",
+                      0.0, patchError(kind, in_float, scale, far));
+          }
+      const Drift drift = momentumDrift(kind, in_float, steps);
+      table.row("momentum_linear", kind.name, precision, drift_setting, 0.0, drift.linear);
+      table.row("momentum_angular", kind.name, precision, drift_setting, 0.0, drift.angular);
+      table.row("energy_gain", kind.name, precision, drift_setting, 0.0, drift.energy);
     }
-    sags.push_back(measureBody(*body->model, state).centre_of_mass.z());
-    table.row("step_independence", "sag", "elastic", "frame " + shortNumber(1000.0 * frame) + " ms", 0.0,
-              std::abs(sags.back() / sags.front() - 1.0));
+    for (bool tumbling : {false, true}) {
+      std::vector<double> lengths, errors;
+      for (double rate : rates) {
+        lengths.push_back(1.0 / rate);
+        errors.push_back(spinError(kind, tumbling, 1.0 / rate, 2.0));
+        table.row(tumbling ? "tumbling" : "spin", kind.name, "double", shortNumber(1000.0 / rate), 0.0, errors.back());
+      }
+      table.row(tumbling ? "tumbling_order" : "spin_order", kind.name, "double", "fitted", 0.0,
+                fittedOrder(lengths, errors));
+    }
+    table.row("spin_loss", kind.name, "double", "10 s", 0.0, spinLoss(kind, 1.0 / 60.0, 10.0));
+    const Ringing finest = ringing(kind, 1920.0);
+    const double finest_sag = sag(kind, 1920.0);
+    for (double rate : rates) {
+      const Ringing here = ringing(kind, rate);
+      const std::string setting = shortNumber(1000.0 / rate);
+      table.row("ringing", kind.name, "double", setting, 0.0, std::abs(here.frequency / finest.frequency - 1.0));
+      table.row("decay", kind.name, "double", setting, 0.0, std::abs(here.decay / finest.decay - 1.0));
+      table.row("sag", kind.name, "double", setting, 0.0, std::abs(sag(kind, rate) / finest_sag - 1.0));
+    }
   }
 }
 
-void plot(const std::string& out) {
-  const std::string script = out + "/accuracy.gp";
-  std::ofstream(script)
-      << "set datafile separator ','\nset logscale xy\nset key outside right font ',8'\nset grid\n"
-         "set xlabel 'time of a substep [ms]'\nset ylabel 'RMS error / largest displacement'\n"
-         "set terminal pngcairo size 1100,700\nset output '"
-      << out
-      << "/accuracy.png'\n"
-         "set title 'Run time against error, against the finite-element truth'\n"
-         "cases = 'bar_cantilever_large bar_pull bar_stretch_150 bar_torsion bar_twist_180 block_indent organ_hang'\n"
-         "plot for [c in cases] '"
-      << out
-      << "/accuracy.csv' using "
-         "((strcol(1) eq 'fem' && strcol(2) eq c.'_nu45' && strcol(3) eq 'elastic') ? $5 : 1/0):6 with linespoints "
-         "title c.' nu 0.45' noenhanced, for [m in 'rigid linear quadratic'] '"
-      << out
-      << "/accuracy.csv' using "
-         "((strcol(1) eq 'fem' && strcol(3) eq m) ? $5 : 1/0):6 with points pt 4 title m.' (looks, fitted)'\n";
-  if (std::system(("gnuplot '" + script + "' 2>&1").c_str()) != 0)
-    std::fprintf(stderr, "gnuplot did not make the plot; the table is in %s/accuracy.csv\n", out.c_str());
+// A cube squeezed by 40 %: how much of its volume or area changes, by the curve that holds it.
+void squeezeRows(Table& table) {
+  struct Curve {
+    const char* name;
+    std::vector<std::array<double, 2>> points;
+  };
+  const Curve curves[] = {{"off", {}}, {"lax", {{0.0, 0.0}, {0.1, 0.0}, {0.3, 0.3}}}, {"stiff", {{0.0, 1.0}}}};
+  for (bool elastic : {false, true})
+    for (const Curve& curve : curves)
+      for (bool area : {false, true}) {
+        Material material;
+        material.alpha = 0.8;
+        material.damping = 5.0;
+        if (elastic) {
+          material.youngs_modulus = 500.0;
+          material.poissons_ratio = 0.1;
+        }
+        (area ? material.area : material.volume).points = curve.points;
+        const Squeezed squeezed = squeeze(material);
+        table.row(area ? "squeezed_area" : "squeezed_volume", elastic ? "elastic" : "looks", "double", curve.name, 0.0,
+                  std::abs((area ? squeezed.area : squeezed.volume) - 1.0));
+      }
+}
+
+// The number that a setting begins with: the step [ms].
+double stepOf(const Row& row) { return std::strtod(row.setting.c_str(), nullptr); }
+
+bool plots(const Table& table, const std::string& out) {
+  Plot front;
+  front.title = "Run time against error, against the finite-element truth";
+  front.x = "time of a substep [ms]";
+  front.y = "RMS error / largest displacement";
+  Plot spin, steps;
+  spin.title = "A free block against Euler's equations, after 2 s at 6 rad/s";
+  steps.title = "The same motion at any step: relative to 1/1920 s";
+  spin.x = steps.x = "step [ms]";
+  spin.y = "angle [rad]";
+  steps.y = "relative difference";
+  for (const Row& row : table.rows) {
+    if (row.benchmark == "fem" && row.mode == "elastic" && row.name.find("_nu45") != std::string::npos)
+      front.series[row.name].emplace_back(row.run_time_ms, row.error);
+    if (row.benchmark == "fem" && row.mode == "elastic_wide")
+      front.series["elastic, 40 clusters"].emplace_back(row.run_time_ms, row.error);
+    if (row.benchmark == "fem" && (row.mode == "rigid" || row.mode == "linear" || row.mode == "quadratic"))
+      front.series[row.mode + " (looks, fitted)"].emplace_back(row.run_time_ms, row.error);
+    if ((row.benchmark == "spin" || row.benchmark == "tumbling") && row.setting != "fitted")
+      spin.series[row.benchmark + " " + row.name].emplace_back(stepOf(row), row.error);
+    if (row.benchmark == "ringing" || row.benchmark == "decay" || row.benchmark == "sag")
+      steps.series[row.benchmark + " " + row.name].emplace_back(stepOf(row), std::max(row.error, 1e-7));
+  }
+  for (auto& [name, points] : front.series)
+    if (name.find("looks") != std::string::npos || name.find("40") != std::string::npos)
+      front.points_alone.insert(name);
+  return draw(front, out + "/accuracy.png") && draw(spin, out + "/spin.png") && draw(steps, out + "/steps.png");
 }
 
 }  // namespace
@@ -242,8 +290,11 @@ int main(int argc, char** argv) {
       quick ? std::vector<double>{0.0125} : std::vector<double>{0.025, 0.0125, 0.05 / 7.0, 0.00625};
   if (!elasticRows(table, truth, spacings)) return 1;
   if (!quick && !looksRows(table, truth, 0.0125)) return 1;
-  momentumRows(table, quick ? 500 : 10000);
-  stepRows(table);
-  plot(out);
+  lawRows(table, quick ? 500 : 10000,
+          quick ? std::vector<double>{60.0, 240.0} : std::vector<double>{60, 120, 240, 480, 960});
+  squeezeRows(table);
+  table.file.close();
+  if (!plots(table, out))
+    std::fprintf(stderr, "gnuplot did not make the plots; the table is in %s/accuracy.csv\n", out.c_str());
   return 0;
 }

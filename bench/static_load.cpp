@@ -174,9 +174,11 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
       elasticParameters(material.youngs_modulus, material.poissons_ratio, material.density);
   const double rate = settings.looks_rate;
   const double h = material.elastic() ? 0.6 / model.highest_frequency : 0.5 / rate;
+  ElasticBatchState state;
+  if (material.elastic()) model.elastic_batch->setRotations(poses, state);
   const auto accelerate = [&] {
     if (material.elastic()) {
-      elasticAccelerations(matchInput(model), model.elastic, parameters, x, poses, a, counters);
+      model.elastic_batch->accelerate(matchInput(model), parameters, x, state, a, counters);
     } else {
       matchShapes(matchInput(model), x, material.mode, material.beta, poses, a, counters);
       for (std::size_t i = 0; i < n; ++i) a[i] = rate * rate * (a[i] - x[i]);
@@ -233,12 +235,16 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
   std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2), times.end());
   result.step_ms = times[times.size() / 2];
 
-  accelerate();  // poses for riders
+  if (material.elastic()) model.elastic_batch->getRotations(state, poses);
+  fitClusters(matchInput(model), x, poses);  // for riders
   const SurfaceBinding samples =
       bindSurface(model.rest, model.graph, model.clusters, truth.rest, std::vector<Index>(truth.rest.size(), kNoIndex));
   double squares = 0.0;
-  for (Index s = 0; s < truth.rest.size(); ++s)
-    squares += (riderPosition(samples, x, poses, s) - truth.rest[s] - truth.displacement[s]).squaredNorm();
+  for (Index s = 0; s < truth.rest.size(); ++s) {
+    result.samples.push_back(riderPosition(samples, x, poses, s));
+    squares += (result.samples.back() - truth.rest[s] - truth.displacement[s]).squaredNorm();
+  }
+  result.largest = largest;
   result.error = std::sqrt(squares / static_cast<double>(truth.rest.size())) / largest;
   return result;
 }

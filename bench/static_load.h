@@ -23,6 +23,8 @@ struct StaticResult {
   std::size_t clusters = 0;
   int steps = 0;
   bool at_rest = false;
+  Points samples;        // [m] where the truth's samples are
+  double largest = 0.0;  // [m] displacement of the truth
 };
 
 /// `folder` holds the case's other files (the organ's surface).

@@ -11,16 +11,18 @@ function(add_bench name)
   set(bench_targets ${bench_targets} ${name} PARENT_SCOPE)
 endfunction()
 
-set(truth_sources ${CMAKE_CURRENT_SOURCE_DIR}/bench/static_load.cpp ${CMAKE_CURRENT_SOURCE_DIR}/bench/truth_case.cpp)
+set(truth_sources ${CMAKE_CURRENT_SOURCE_DIR}/bench/static_load.cpp ${CMAKE_CURRENT_SOURCE_DIR}/bench/truth_case.cpp
+    ${CMAKE_CURRENT_SOURCE_DIR}/bench/laws.cpp)
 
 if(CLI11_FOUND)
-  add_bench(accuracy bench/accuracy.cpp ${truth_sources})
+  add_bench(accuracy bench/accuracy.cpp bench/plot.cpp ${truth_sources})
   target_link_libraries(accuracy CLI11::CLI11)
 endif()
 if(benchmark_FOUND)
   add_bench(bench_rotation bench/bench_rotation.cpp)
   target_link_libraries(bench_rotation benchmark::benchmark)
-  add_bench(bench_step bench/bench_step.cpp)
+  add_bench(bench_step bench/bench_step.cpp bench/step_rows.cpp bench/step_pile.cpp bench/step_lattice.cpp
+    bench/step_cells.cpp bench/step_liver.cpp)
   target_link_libraries(bench_step benchmark::benchmark)
   find_package(PkgConfig QUIET)
   if(PKG_CONFIG_FOUND)

@@ -1,6 +1,7 @@
 #include "meshless_surgery/body/binding.h"
 
 #include <algorithm>
+#include <optional>
 
 #include <Eigen/Eigenvalues>
 
@@ -62,7 +63,8 @@ void leastSquaresWeights(const Points& rest, const Vec3& p, const std::vector<In
 }  // namespace
 
 SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const ClusterSet& clusters,
-                           const Points& surface_rest, std::vector<Index> vertex_particle) {
+                           const Points& surface_rest, std::vector<Index> vertex_particle,
+                           const InheritedBinding* inherited) {
   SurfaceBinding binding;
   binding.particle = std::move(vertex_particle);
   binding.offsets.push_back(0);
@@ -73,13 +75,48 @@ SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const
   std::vector<Index> cluster_of(rest.size(), 0);
   for (Index c = clusters.size(); c-- > 0;)
     for (Index k = clusters.offsets[c]; k < clusters.offsets[c + 1]; ++k) cluster_of[clusters.members[k]] = c;
-  const NearestPoints nearest(rest);
+  std::optional<NearestPoints> nearest;  // made where one is bound anew
   std::vector<Index> near, seen(rest.size(), kNoIndex);
   std::vector<double> weights;
   Index stamp = 0;
+  const auto finish = [&](const Vec3& lever) {
+    binding.levers.push_back(lever);
+    binding.turners.push_back(cluster_of[near[0]]);
+    if (!lever.isZero(0.0)) binding.lever_clusters.push_back(binding.turners.back());
+    binding.carriers.insert(binding.carriers.end(), near.begin(), near.end());
+    binding.weights.insert(binding.weights.end(), weights.begin(), weights.end());
+    binding.offsets.push_back(static_cast<Index>(binding.carriers.size()));
+  };
+  const auto inherit = [&](Index v) {
+    const Index r = inherited ? inherited->rider[v] : kNoIndex;
+    if (r == kNoIndex) return false;
+    const SurfaceBinding& parent = inherited->parent;
+    near.clear();
+    for (Index k = parent.offsets[r]; k < parent.offsets[r + 1]; ++k) {
+      near.push_back(inherited->renumbered[parent.carriers[k]]);
+      if (near.back() == kNoIndex || (inherited->separated && inherited->separated(v, near.back()))) return false;
+    }
+    weights.assign(parent.weights.begin() + parent.offsets[r], parent.weights.begin() + parent.offsets[r + 1]);
+    finish(parent.levers[r]);
+    return true;
+  };
   for (Index v : binding.riders) {
+    if (inherit(v)) continue;
     const Vec3& p = surface_rest[v];
-    walk(graph, nearest.nearest(p), near, seen, stamp++);
+    if (!nearest) nearest.emplace(rest);
+    const bool lips = inherited && inherited->separated;
+    Index start = nearest->nearest(p);
+    if (lips) {
+      for (Index i : nearest->nearest(p, kWalk))
+        if (!inherited->separated(v, i)) {
+          start = i;
+          break;
+        }
+    }
+    walk(graph, start, near, seen, stamp++);
+    if (lips)
+      near.erase(std::remove_if(near.begin() + 1, near.end(), [&](Index i) { return inherited->separated(v, i); }),
+                 near.end());
     const auto closer = [&](Index i, Index j) {
       const double di = (rest[i] - p).squaredNorm(), dj = (rest[j] - p).squaredNorm();
       return di != dj ? di < dj : i < j;
@@ -91,12 +128,7 @@ SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const
     Vec3 lever = p;
     for (std::size_t k = 0; k < near.size(); ++k) lever -= weights[k] * rest[near[k]];
     const double span = (rest[near.back()] - p).norm();
-    binding.levers.push_back(lever.norm() > kLever * span ? lever : Vec3(Vec3::Zero()));
-    binding.turners.push_back(cluster_of[near[0]]);
-    if (!binding.levers.back().isZero(0.0)) binding.lever_clusters.push_back(binding.turners.back());
-    binding.carriers.insert(binding.carriers.end(), near.begin(), near.end());
-    binding.weights.insert(binding.weights.end(), weights.begin(), weights.end());
-    binding.offsets.push_back(static_cast<Index>(binding.carriers.size()));
+    finish(lever.norm() > kLever * span ? lever : Vec3(Vec3::Zero()));
   }
   std::sort(binding.lever_clusters.begin(), binding.lever_clusters.end());
   binding.lever_clusters.erase(std::unique(binding.lever_clusters.begin(), binding.lever_clusters.end()),

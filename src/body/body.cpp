@@ -59,7 +59,7 @@ void updateSurface(const BodyModel& model, BodyState& state) {
   std::vector<ClusterPose> poses;
   if (!model.binding.lever_clusters.empty()) {
     poses = state.poses;  // a copy: a step's warm start must not depend on who looks
-    fitClusters(matchInput(model), state.positions, model.binding.lever_clusters, poses);
+    fitClusters(matchInput(model, state), state.positions, model.binding.lever_clusters, poses);
   }
   for (Index r = 0; r < model.binding.riders.size(); ++r)
     state.surface[model.binding.riders[r]] =

@@ -5,6 +5,8 @@
 #include <queue>
 
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/body/rest_places.h"
+#include "meshless_surgery/dynamics/plastic.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/nearest.h"
 
@@ -20,6 +22,9 @@ Vec3 interpolate(const VertexOrigin& origin, const Get& get) {
     if (origin.parents[k] != kNoIndex) sum += origin.weights[k] * get(origin.parents[k]);
   return sum;
 }
+
+// A vertex inside the cap, which no edge of the parent leads to.
+bool insideCap(const VertexOrigin& origin) { return origin.parents[0] == kNoIndex; }
 
 // The parent vertex that a piece's vertex is; kNoIndex for vertices that the cut made.
 Index sameVertex(const VertexOrigin& origin) {
@@ -39,6 +44,19 @@ std::vector<int> assignParticles(const BodyModel& model, const BodyState& state,
       if (piece == kNoPiece) piece = static_cast<int>(p);  // one on the plane goes to the larger piece
     }
   const auto sideOf = [&](Index i) { return plane.height(state.positions[i]) >= 0.0 ? 1 : -1; };
+  // A side with one piece needs no search.
+  int only[2] = {kNoPiece, kNoPiece};
+  for (const int side : {-1, 1}) {
+    int& piece = only[side > 0];
+    for (std::size_t p = 0; p < cut.pieces.size(); ++p)
+      if (cut.pieces[p].side == side) piece = piece == kNoPiece ? static_cast<int>(p) : kNoPiece - 1;
+  }
+  bool all = true;
+  for (Index i = 0; i < model.rest.size(); ++i) {
+    if (piece_of[i] == kNoPiece && only[sideOf(i) > 0] >= 0) piece_of[i] = only[sideOf(i) > 0];
+    all = all && piece_of[i] != kNoPiece;
+  }
+  if (all) return piece_of;
   using Entry = std::pair<double, Index>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
   std::vector<double> distance(model.rest.size(), std::numeric_limits<double>::infinity());
@@ -103,6 +121,29 @@ void inheritMoments(const BodyModel& parent, const std::vector<Index>& members, 
   child.highest_frequency = std::sqrt(std::max(squared, parent.specific_stiffness * least));
 }
 
+// The vertices of a piece in the rest shape.
+Points restVertices(const BodyModel& model, const BodyState& state, const CutPiece& piece, std::uint32_t cap_patch) {
+  Points rest;
+  std::vector<Index> inside;
+  for (Index v = 0; v < piece.origins.size(); ++v) {
+    if (insideCap(piece.origins[v])) inside.push_back(v);
+    rest.push_back(interpolate(piece.origins[v], [&](Index parent) { return model.surface.vertices[parent]; }));
+  }
+  if (inside.empty()) return rest;
+  std::vector<bool> on_cap(rest.size(), false);
+  for (std::size_t t = 0; t < piece.mesh.triangles.size(); ++t)
+    if (piece.mesh.patches[t] == cap_patch)
+      for (Index v : piece.mesh.triangles[t]) on_cap[v] = true;
+  std::vector<KnownPlace> rim;
+  for (Index v = 0; v < rest.size(); ++v)
+    if (on_cap[v] && !insideCap(piece.origins[v])) rim.push_back({piece.mesh.vertices[v], rest[v]});
+  Points present;
+  for (Index v : inside) present.push_back(piece.mesh.vertices[v]);
+  const Points places = restPlaces(model, state, present, rim);
+  for (std::size_t k = 0; k < inside.size(); ++k) rest[inside[k]] = places[k];
+  return rest;
+}
+
 // A piece without a particle would have no mass: it takes a part of the parent's nearest particle, which moves on with
 // the same velocity, so that mass and momentum stay what they were.
 struct Crumb {
@@ -145,6 +186,9 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
     crumbs.push_back(crumb);
   }
 
+  std::vector<Index> rider_of(model.surface.vertices.size(), kNoIndex);
+  for (Index r = 0; r < model.binding.riders.size(); ++r) rider_of[model.binding.riders[r]] = r;
+
   CutBody result;
   result.cap_area = cut->cap_area;
   for (std::size_t p = 0; p < cut->pieces.size(); ++p) {
@@ -156,8 +200,7 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
     child->next_patch = model.next_patch + 1;
     child->surface.triangles = from.mesh.triangles;
     child->surface.patches = from.mesh.patches;
-    for (const VertexOrigin& origin : from.origins)
-      child->surface.vertices.push_back(interpolate(origin, [&](Index v) { return model.surface.vertices[v]; }));
+    child->surface.vertices = restVertices(model, state, from, options.cap_patch);
     child->rest_volume = signedVolume(child->surface);
     child->rest_area = surfaceArea(child->surface);
 
@@ -201,10 +244,17 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
       if (mine != kNoIndex) taken[mine] = true;
       vertex_particle.push_back(mine);
     }
-    child->binding =
-        bindSurface(child->rest, child->graph, child->clusters, child->surface.vertices, std::move(vertex_particle));
+    InheritedBinding inherited{model.binding, {}, renumbered};
+    for (const VertexOrigin& origin : from.origins) {
+      const Index v = sameVertex(origin);
+      inherited.rider.push_back(v == kNoIndex ? kNoIndex : rider_of[v]);
+    }
+    child->binding = bindSurface(child->rest, child->graph, child->clusters, child->surface.vertices,
+                                 std::move(vertex_particle), &inherited);
     piece.state.poses.resize(child->clusters.size());
-    fitClusters(matchInput(*child), piece.state.positions, piece.state.poses);
+    piece.state.plastic =
+        inheritShapes(state.plastic, model.clusters, child->clusters, clusters.origin, piece.parent_particles);
+    fitClusters(matchInput(*child, piece.state), piece.state.positions, piece.state.poses);
     piece.state.surface = from.mesh.vertices;
     piece.state.stretch = state.stretch;
     piece.state.swelling = state.swelling;

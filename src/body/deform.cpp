@@ -5,6 +5,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "meshless_surgery/dynamics/plastic.h"
+
 namespace meshless {
 namespace {
 
@@ -85,48 +87,74 @@ void accelerate(const BodyModel& model, double h, const Points& x, Points& v, co
   for (std::size_t i = 0; i < v.size(); ++i) v[i] -= spin.cross(x[i] - centre);
 }
 
+// Damps what deforms and predicts: y = x + h v, but what deforms goes `ahead` instead of h. How long that takes decides
+// on the viscosity, and must not change how a body spins. A body that is held has no rigid motion of its own. Damping
+// comes before the pull: after it, it would weaken the material.
+void dampAndPredict(const BodyModel& model, double h, double ahead, double damping, const Points& x, Points& v,
+                    Points& y) {
+  const double kept = std::exp(-damping * h);
+  y.resize(x.size());
+  if (model.any_fixed || (ahead == h && !(damping > 0.0))) {
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      v[i] *= kept;
+      y[i] = model.fixed[i] ? x[i] : Vec3(x[i] + ahead * v[i]);
+    }
+    return;
+  }
+  const RigidMotion rigid = rigidMotionOf(model, x, v);
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const Vec3 together = rigid.velocity + rigid.spin.cross(x[i] - rigid.centre);
+    const Vec3 deforming = kept * (v[i] - together);
+    v[i] = together + deforming;
+    y[i] = x[i] + h * together + ahead * deforming;
+  }
+}
+
 }  // namespace
 
 void matchAndMove(const BodyModel& model, const Material& material, const Vec3& gravity, double h, BodyState& state,
                   StepScratch& scratch, MatchCounters& counters) {
-  const std::size_t n = model.rest.size();
   Points& x = state.positions;
   Points& v = state.velocities;
   scratch.previous = x;
-  scratch.predicted.resize(n);
   const double factor = stiffnessFactor(model, state, h);
-  double ahead = h;  // [s]
-  if (model.highest_frequency > 0.0) ahead = 1.0 / (highestFrequencyNow(model, state) * std::sqrt(factor));
-  for (std::size_t i = 0; i < n; ++i) scratch.predicted[i] = model.fixed[i] ? x[i] : Vec3(x[i] + ahead * v[i]);
+  if (material.elastic()) {
+    const double fastest = highestFrequencyNow(model, state) * std::sqrt(factor);
+    const double ahead = fastest > 0.0 ? 1.0 / fastest : h;
+    dampAndPredict(model, h, ahead, material.damping, x, v, scratch.predicted);
+  } else {
+    dampAndPredict(model, h, viscosityTime(material.alpha, h), material.damping, x, v, scratch.predicted);
+  }
   const Points& y = scratch.predicted;
+  const MatchInput input = matchInput(model, state);
+  bool matched = true;
 
   if (material.elastic()) {
-    model.elastic_batch->setRotations(state.poses, scratch.elastic);
-    state.stretch = model.elastic_batch->accelerate(
-        matchInput(model),
-        elasticParameters(factor * material.youngs_modulus, material.poissons_ratio, material.density), y,
-        scratch.elastic, scratch.goals, counters, state.swelling);
-    model.elastic_batch->getRotations(scratch.elastic, state.poses);
+    const ElasticParameters parameters =
+        elasticParameters(factor * material.youngs_modulus, material.poissons_ratio, material.density);
+    if (material.plastic() || !state.plastic.empty()) {
+      state.stretch = elasticAccelerations(input, model.elastic, parameters, y, state.poses, scratch.goals, counters,
+                                           state.swelling);
+    } else {
+      model.elastic_batch->setRotations(state.poses, scratch.elastic);
+      state.stretch = model.elastic_batch->accelerate(input, parameters, y, scratch.elastic, scratch.goals, counters,
+                                                      state.swelling);
+      model.elastic_batch->getRotations(scratch.elastic, state.poses);
+    }
     const Points& accelerations = scratch.goals;
     accelerate(model, h, x, v, [&](std::size_t i) -> const Vec3& { return accelerations[i]; });
   } else if (const double gain = stiffnessGain(material.alpha, h); gain > 0.0) {
-    matchShapes(matchInput(model), y, material.mode, std::min(material.beta, kMostBeta), state.poses, scratch.goals,
-                counters, state.swelling);
+    matchShapes(input, y, material.mode, std::min(material.beta, kMostBeta), state.poses, scratch.goals, counters,
+                state.swelling, material.plastic());
     const Points& goals = scratch.goals;
     const double pull = gain / (h * h);
     accelerate(model, h, x, v, [&](std::size_t i) -> Vec3 { return pull * (goals[i] - y[i]); });
+  } else {
+    matched = false;
   }
-  if (material.damping > 0.0) {
-    const double lost = 1.0 - std::exp(-material.damping * h);
-    if (model.any_fixed) {
-      for (Vec3& vi : v) vi -= lost * vi;
-    } else {
-      const RigidMotion rigid = rigidMotionOf(model, x, v);
-      for (std::size_t i = 0; i < n; ++i)
-        v[i] -= lost * (v[i] - rigid.velocity - rigid.spin.cross(x[i] - rigid.centre));
-    }
-  }
-  for (std::size_t i = 0; i < n; ++i) {
+  if (material.plastic() && matched)
+    counters.plastic_flows += flow(input, material.plasticity, h, state.poses, state.plastic);
+  for (std::size_t i = 0; i < x.size(); ++i) {
     if (model.fixed[i]) {
       v[i].setZero();
     } else {

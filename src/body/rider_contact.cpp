@@ -15,7 +15,7 @@ std::size_t pushRiders(const BodyModel& model, const Obstacle& obstacle, BodySta
   const SurfaceBinding& binding = model.binding;
   Points& x = state.positions;
   if (among ? among->empty() : binding.riders.empty()) return 0;
-  fitClusters(matchInput(model), x, binding.lever_clusters, state.poses);
+  fitClusters(matchInput(model, state), x, binding.lever_clusters, state.poses);
   const auto place = [&](Index r) -> Vec3 {
     return riderPosition(binding, x, state.poses, r) + state.rider_offsets[r];
   };
@@ -47,7 +47,7 @@ std::size_t pushRiders(const BodyModel& model, const Obstacle& obstacle, BodySta
         moved(i, shift);
       }
     }
-  fitClusters(matchInput(model), x, binding.lever_clusters, state.poses);
+  fitClusters(matchInput(model, state), x, binding.lever_clusters, state.poses);
   for (Index r : hit) state.rider_offsets[r] += obstacle(place(r));
   return hit.size();
 }

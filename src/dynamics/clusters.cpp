@@ -11,10 +11,10 @@ namespace meshless {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr Index kOneClusterBelow = 65;      // particles; smaller bodies are one cluster by themselves
-constexpr double kAutoRadiusEdges = 3.0;    // reach of an automatic cluster in mean graph edges ...
-constexpr double kAutoRadiusOfSize = 0.2;   // ... or as a share of the bounds' diagonal, whichever is more
-constexpr double kLeastShare = 0.02;        // of a member at the border of a cluster
+constexpr Index kOneClusterBelow = 65;     // particles; smaller bodies are one cluster by themselves
+constexpr double kAutoRadiusEdges = 3.0;   // reach of an automatic cluster in mean graph edges ...
+constexpr double kAutoRadiusOfSize = 0.2;  // ... or as a share of the bounds' diagonal, whichever is more
+constexpr double kLeastShare = 0.02;       // of a member at the border of a cluster
 
 struct Reached {
   Index particle;
@@ -76,7 +76,8 @@ Draft grow(GraphSearch& search, Index seed, double radius) {
   Draft draft;
   draft.seed = seed;
   draft.radius = radius;
-  for (const Reached& r : search.from(seed, radius)) draft.members.emplace_back(r.particle, shareAt(r.distance, radius));
+  for (const Reached& r : search.from(seed, radius))
+    draft.members.emplace_back(r.particle, shareAt(r.distance, radius));
   std::sort(draft.members.begin(), draft.members.end());
   return draft;
 }
@@ -250,15 +251,18 @@ ParticleGraph makeGraph(const Points& rest, std::vector<std::array<Index, 2>> ed
 ClusterSet makeClusters(const Points& rest, const ParticleGraph& graph, const ClusterOptions& options) {
   const Index particles = graph.size();
   switch (options.kind) {
-    case ClusterOptions::Kind::kOne: return oneCluster(rest);
-    case ClusterOptions::Kind::kGrid: return gridClusters(rest, graph, options);
+    case ClusterOptions::Kind::kOne:
+      return oneCluster(rest);
+    case ClusterOptions::Kind::kGrid:
+      return gridClusters(rest, graph, options);
     case ClusterOptions::Kind::kCount: {
       if (options.count <= 1) return oneCluster(rest);
       const SeedSet set = farthestSeeds(rest, graph, static_cast<std::size_t>(options.count), 0.0);
       return clustersAround(set, graph, (1.0 + options.overlap) * set.cover + 1e-12);
     }
     case ClusterOptions::Kind::kCells:
-    case ClusterOptions::Kind::kAuto: break;
+    case ClusterOptions::Kind::kAuto:
+      break;
   }
   if (particles < kOneClusterBelow) return oneCluster(rest);
   Box bounds;
@@ -303,7 +307,7 @@ ParticleGraph subgraph(const ParticleGraph& parent, const std::vector<Index>& ke
 }
 
 PieceClusters splitClusters(const ClusterSet& parent, const Points& piece_rest, const ParticleGraph& piece_graph,
-                            const std::vector<Index>& kept) {
+                            const std::vector<Index>& kept, const std::vector<bool>& torn) {
   const Index particles = piece_graph.size();
   Index largest = 0;
   for (Index i : kept) largest = std::max(largest, i + 1);
@@ -329,10 +333,11 @@ PieceClusters splitClusters(const ClusterSet& parent, const Points& piece_rest, 
       if (renumbered[parent.members[k]] != kNoIndex)
         draft.members.emplace_back(renumbered[parent.members[k]], parent.weights[k]);
     if (draft.members.empty()) continue;
-    if (draft.members.size() == end - begin) {
+    if (draft.members.size() == end - begin && (torn.empty() || !torn[c])) {
       draft.seed = renumbered[parent.seeds[c]];
       for (const auto& m : draft.members) covered[m.first] = true;
       drafts.push_back(std::move(draft));
+      piece.origin.push_back(c);
       ++piece.kept;
       continue;
     }
@@ -381,6 +386,7 @@ PieceClusters splitClusters(const ClusterSet& parent, const Points& piece_rest, 
     for (Index i : bare)
       if (!covered[i]) growFrom({i}, piece_rest[i], radius);
   }
+  piece.origin.resize(drafts.size(), kNoIndex);
   piece.clusters = assemble(std::move(drafts), particles);
   return piece;
 }

@@ -43,7 +43,8 @@ Mat3 stress(const ElasticParameters& material, const Mat3& f, const Mat3& rotati
 
 struct ClusterFit {
   Vec3 centre;
-  Mat3 gradient;  // F
+  Mat3 gradient;  // F, from the first rest shape
+  Mat3 strained;  // from the one without stress
   Mat3 rotation;
   bool solid;
 };
@@ -73,7 +74,9 @@ ClusterFit fit(const MatchInput& in, Index c, const Points& y, ClusterPose& pose
   } else {
     ++counters.rank_fallbacks;
   }
-  const RotationResult found = nearestRotation(result.solid ? result.gradient : a, pose.rotation);
+  const PlasticShape* const plastic = result.solid ? in.plasticShapeOf(c) : nullptr;
+  result.strained = plastic ? Mat3(result.gradient * plastic->inverse) : result.gradient;
+  const RotationResult found = nearestRotation(result.solid ? result.strained : a, pose.rotation);
   if (!found.warm) ++counters.cold_rotations;
   pose.centre = result.centre;
   pose.rotation = found.rotation;
@@ -117,10 +120,16 @@ double elasticAccelerations(const MatchInput& in, const std::vector<ElasticRest>
     Mat3 pull = Mat3::Zero();
     double hourglass = material.youngs / (material.density * spread);
     if (f.solid) {
-      const Mat3 strained = f.gradient / swelling;
+      const Mat3 strained = f.strained / swelling;
       const Mat3 cof = cofactor(strained);
-      most = std::max(most, cof.squaredNorm());
-      pull = stress(material, strained, f.rotation, cof) * elastic[c].spread_inverse / material.density;
+      double size = cof.squaredNorm();
+      pull = stress(material, strained, f.rotation, cof);
+      if (const PlasticShape* plastic = in.plasticShapeOf(c)) {
+        pull *= plastic->inverse;
+        size *= plastic->stiffening * plastic->stiffening;
+      }
+      most = std::max(most, size);
+      pull *= elastic[c].spread_inverse / material.density;
       hourglass *= kHourglass;
     }
     for (Index k = in.clusters.offsets[c]; k < in.clusters.offsets[c + 1]; ++k) {
@@ -145,8 +154,8 @@ double elasticEnergy(const MatchInput& in, const std::vector<ElasticRest>& elast
     if (f.solid) {
       hourglass *= kHourglass;
       energy += rest.mass / material.density *
-                (material.mu * (f.gradient - f.rotation).squaredNorm() +
-                 material.lambda * volumeEnergy(f.gradient.determinant()));
+                (material.mu * (f.strained - f.rotation).squaredNorm() +
+                 material.lambda * volumeEnergy(f.strained.determinant()));
     }
     for (Index k = in.clusters.offsets[c]; k < in.clusters.offsets[c + 1]; ++k) {
       const Index i = in.clusters.members[k];

@@ -14,10 +14,10 @@ constexpr double kMostBeta = 0.95;  // as in body/deform.cpp
 constexpr double kNoExtent = 1e-6;  // of the inertia's trace: float moments are not known better
 
 const Entries& entriesOf(InstructionSet set) {
-#define MESHLESS_MATCH_TABLE(name)                                                                        \
-  {                                                                                                       \
-    name::gatherBodies, name::moveBodies, name::spreadParticles, name::gatherClusters, name::mapClusters, \
-        name::pullParticles, name::moveParticles                                                          \
+#define MESHLESS_MATCH_TABLE(name)                                                                   \
+  {                                                                                                  \
+    name::gatherBodies, name::moveBodies, name::sumParticles, name::spreadParticles, name::sumLayer, \
+        name::gatherClusters, name::mapClusters, name::pullParticles, name::moveParticles            \
   }
   static const Entries baseline_entries = MESHLESS_MATCH_TABLE(baseline);
 #if MESHLESS_ROTATION_X86
@@ -34,6 +34,7 @@ const Entries& entriesOf(InstructionSet set) {
 StepNumbers numbersOf(const BatchStep& step) {
   StepNumbers n;
   n.h = static_cast<float>(step.h);
+  n.ahead = static_cast<float>(step.ahead);
   n.pull = static_cast<float>(step.gain / step.h);
   n.beta = step.mode == MatchMode::kRigid ? 0.0f : static_cast<float>(std::min(step.beta, kMostBeta));
   n.lost = step.damping > 0.0 ? static_cast<float>(1.0 - std::exp(-step.damping * step.h)) : 0.0f;
@@ -82,6 +83,7 @@ BatchStep batchStep(const Material& material, double h) {
   BatchStep step;
   step.h = h;
   step.mode = material.mode;
+  step.ahead = viscosityTime(material.alpha, h);
   step.gain = stiffnessGain(material.alpha, h);
   step.beta = material.beta;
   step.damping = material.damping;
@@ -92,7 +94,7 @@ BatchStep batchStep(const Material& material, double h) {
 struct BodyBatch::Impl {
   std::size_t size = 0, particles = 0, padded = 0;
   bool has_quadratic = false;
-  Floats fields, constants, quadratic, quaternions;
+  Floats fields, constants, motion, quadratic, quaternions;
   std::vector<std::uint8_t> flags;
   Points origins;
 
@@ -135,11 +137,42 @@ struct BodyBatch::Impl {
         field(body, i, kVx + k) = static_cast<float>(velocities[i][k]);
       }
     for (int k = 0; k < 4; ++k) quaternions[k * padded + body] = static_cast<float>(rotation.coeffs()[k]);
+    findMotion(body);
+  }
+
+  // As every step leaves it for the next.
+  void findMotion(std::size_t body) {
+    const auto at = [&](std::size_t i, int f) {
+      return Vec3(field(body, i, f), field(body, i, f + 1), field(body, i, f + 2));
+    };
+    Vec3 centre = Vec3::Zero(), velocity = Vec3::Zero(), momentum = Vec3::Zero();
+    Mat3 moment = Mat3::Zero();
+    double total = 0.0;  // 1 but for rounding
+    for (std::size_t i = 0; i < particles; ++i) {
+      const double m = field(body, i, kMass);
+      total += m, centre += m * at(i, kX), velocity += m * at(i, kVx);
+    }
+    centre /= total, velocity /= total;
+    for (std::size_t i = 0; i < particles; ++i) {
+      const double m = field(body, i, kMass);
+      const Vec3 r = at(i, kX) - centre;
+      moment += m * r * r.transpose();
+      momentum += m * r.cross(at(i, kVx) - velocity);
+    }
+    const double trace = 2.0 * moment.trace();
+    Mat3 inverse = Mat3::Zero();
+    if (trace > 0.0) inverse = inverseWithoutNull(0.5 * Mat3::Identity() - moment / trace) / trace;
+    const Vec3 spin = inverse * momentum;
+    float* const to = &motion[body / kBlock * kMotionFields * kBlock + body % kBlock];
+    const double numbers[kMotionFields] = {centre[0],     centre[1],     centre[2],     velocity[0],   velocity[1],
+                                           velocity[2],   spin[0],       spin[1],       spin[2],       inverse(0, 0),
+                                           inverse(1, 1), inverse(2, 2), inverse(0, 1), inverse(1, 2), inverse(2, 0)};
+    for (int k = 0; k < kMotionFields; ++k) to[k * kBlock] = static_cast<float>(numbers[k]);
   }
 };
 
 bool BodyBatch::holds(const MatchInput& body) {
-  if (body.clusters.size() != 1 || body.clusters.members.size() != body.rest.size()) return false;
+  if (!isUnplastic(body) || body.clusters.size() != 1 || body.clusters.members.size() != body.rest.size()) return false;
   for (Index i = 0; i < body.rest.size(); ++i)
     if (body.clusters.members[i] != i || body.clusters.weights[i] != 1.0) return false;
   return true;
@@ -155,6 +188,7 @@ BodyBatch::BodyBatch(const std::vector<MatchInput>& bodies, bool quadratic) : im
   const std::size_t blocks = b.padded / kBlock;
   b.fields.assign(blocks * b.particles * kParticleFields * kBlock, 0.0f);
   b.constants.assign(blocks * kBodyFields * kBlock, 0.0f);
+  b.motion.assign(blocks * kMotionFields * kBlock, 0.0f);
   if (quadratic) b.quadratic.assign(blocks * kQuadraticFields * kBlock, 0.0f);
   b.quaternions.assign(4 * b.padded, 0.0f);
   b.flags.assign(b.padded, 0);
@@ -194,10 +228,15 @@ void BodyBatch::step(const BatchStep& step, MatchCounters& counters, const ForEa
   Impl& b = *impl_;
   if (b.size == 0) return;
   assert(step.mode != MatchMode::kQuadratic || b.has_quadratic);
+  assert(step.ahead >= 0.0);
   const StepNumbers numbers = numbersOf(step);
   const Entries& entries = entriesOf(step.set);
-  const BodiesView view = {static_cast<int>(b.particles), b.fields.data(), b.constants.data(),
-                           b.has_quadratic ? b.quadratic.data() : nullptr, pseudoInverse};
+  const BodiesView view = {static_cast<int>(b.particles),
+                           b.fields.data(),
+                           b.constants.data(),
+                           b.motion.data(),
+                           b.has_quadratic ? b.quadratic.data() : nullptr,
+                           pseudoInverse};
   for_each((b.padded + kChunk - 1) / kChunk, [&](std::size_t chunk) {
     const FlushDenormals flush;
     BodiesScratch scratch;

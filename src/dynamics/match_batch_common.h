@@ -45,6 +45,8 @@ class FlushDenormals {
 };
 
 StepNumbers numbersOf(const BatchStep& step);
+/// True where nothing has flowed: the batches know no other rest shape.
+inline bool isUnplastic(const MatchInput& body) { return !body.plastic || body.plastic->empty(); }
 /// (sum of squared eigenvalues aside) inverse of a symmetric matrix of trace 1 but for directions without extent.
 Mat3 inverseWithoutNull(const Mat3& matrix);
 /// Flags of the rotations into counters.

@@ -97,6 +97,36 @@ MESHLESS_INLINE Pack determinantOf(const Pack (&f)[9]) {
 
 // --- bodies of one cluster, lanes across bodies
 
+// A body's rigid motion.
+struct Motion {
+  Vector centre, velocity, spin;
+};
+MESHLESS_INLINE Vector getVector(const float* from) { return {get(from), get(from + kBlock), get(from + 2 * kBlock)}; }
+MESHLESS_INLINE void putVector(const Vector& a, float* to) {
+  put(a.x, to), put(a.y, to + kBlock), put(a.z, to + 2 * kBlock);
+}
+MESHLESS_INLINE Motion motionOf(const BodiesView& view, int block, int lane) {
+  const float* const from = view.motion + static_cast<std::size_t>(block) * kMotionFields * kBlock + lane;
+  return {getVector(from + kMotionCentre * kBlock), getVector(from + kMotionVelocity * kBlock),
+          getVector(from + kMotionSpin * kBlock)};
+}
+
+// Where the match sees a particle, from where the centre of mass will be, and what of its velocity deforms, undamped.
+struct Prediction {
+  Vector r, deforming, y;
+};
+MESHLESS_INLINE Prediction predict(const Motion& body, const StepNumbers& step, const Vector& x, const Vector& v) {
+  Prediction p;
+  p.r = {x.x - body.centre.x, x.y - body.centre.y, x.z - body.centre.z};
+  const Vector turning = cross(body.spin, p.r);
+  p.deforming = {v.x - body.velocity.x - turning.x, v.y - body.velocity.y - turning.y,
+                 v.z - body.velocity.z - turning.z};
+  const float ahead = step.ahead * (1.0f - step.lost);
+  p.y = {p.r.x + (step.h * turning.x + ahead * p.deforming.x), p.r.y + (step.h * turning.y + ahead * p.deforming.y),
+         p.r.z + (step.h * turning.z + ahead * p.deforming.z)};
+  return p;
+}
+
 template <bool kQuadratic>
 void gather(const BodiesView& view, const StepNumbers& step, int block, int lane, int slot, BodiesScratch& s) {
   const int n = view.particles;
@@ -107,15 +137,14 @@ void gather(const BodiesView& view, const StepNumbers& step, int block, int lane
   if (kQuadratic)
     for (int k = 0; k < 6; ++k) mean[k] = get(quadratic + k * kBlock);
   Pack moment[9] = {}, second[18] = {};
-  Vector centre = {}, velocity = {};
+  const Motion body = motionOf(view, block, lane);
   for (int i = 0; i < n; ++i, field += kParticleFields * kBlock) {
     const Pack m = get(field + kMass * kBlock);
     const Vector v = {get(field + kVx * kBlock), get(field + kVy * kBlock), get(field + kVz * kBlock)};
     const Vector x = {get(field + kX * kBlock), get(field + kY * kBlock), get(field + kZ * kBlock)};
     const Vector q = {get(field + kQx * kBlock), get(field + kQy * kBlock), get(field + kQz * kBlock)};
-    centre.x += m * x.x, centre.y += m * x.y, centre.z += m * x.z;
-    velocity.x += m * v.x, velocity.y += m * v.y, velocity.z += m * v.z;
-    const Pack y[3] = {m * (x.x + step.h * v.x), m * (x.y + step.h * v.y), m * (x.z + step.h * v.z)};
+    const Vector at = predict(body, step, x, v).y;
+    const Pack y[3] = {m * at.x, m * at.y, m * at.z};
     for (int r = 0; r < 3; ++r) {
       moment[3 * r] += y[r] * q.x;
       moment[3 * r + 1] += y[r] * q.y;
@@ -131,8 +160,6 @@ void gather(const BodiesView& view, const StepNumbers& step, int block, int lane
   for (int k = 0; k < 9; ++k) put(moment[k], s.moment[k] + slot);
   if (kQuadratic)
     for (int k = 0; k < 18; ++k) put(second[k], s.second[k] + slot);
-  put(centre.x, s.centre[0] + slot), put(centre.y, s.centre[1] + slot), put(centre.z, s.centre[2] + slot);
-  put(velocity.x, s.velocity[0] + slot), put(velocity.y, s.velocity[1] + slot), put(velocity.z, s.velocity[2] + slot);
 }
 
 // Inverse of the inertia; lanes that are nearly a line are left to the plain code.
@@ -219,26 +246,22 @@ void move(const BodiesView& view, const StepNumbers& step, int block, int lane, 
   const int n = view.particles;
   float* const fields = view.fields + static_cast<std::size_t>(block) * n * kParticleFields * kBlock + lane;
   const float* const constant = view.constants + static_cast<std::size_t>(block) * kBodyFields * kBlock + lane;
-  const Vector centre = {get(s.centre[0] + slot), get(s.centre[1] + slot), get(s.centre[2] + slot)};
-  const Vector mean = {get(s.velocity[0] + slot), get(s.velocity[1] + slot), get(s.velocity[2] + slot)};
-  const Pack h = all(step.h);
-  Vector restore = {}, spin = {}, excess = {};
+  float* const motion = view.motion + static_cast<std::size_t>(block) * kMotionFields * kBlock + lane;
+  const Motion body = motionOf(view, block, lane);
+  const Vector& centre = body.centre;
+  Vector restore = {}, excess = {};
   if (step.pull > 0.0f || step.lost > 0.0f) {
-    Vector leaked = {}, turning = {}, pushed = {};
-    Symmetric moment = {};
+    Vector leaked = {}, pushed = {};
     Pack map[9], bend[18] = {}, basis_mean[6] = {};
     goalMap<kFit, kQuadratic>(view, step, s, block, lane, slot, map, bend);
-    const Vector aim = {centre.x + h * mean.x, centre.y + h * mean.y, centre.z + h * mean.z};
     if (kQuadratic)
       for (int k = 0; k < 6; ++k)
         basis_mean[k] = get(view.quadratic + (static_cast<std::size_t>(block) * kQuadraticFields + k) * kBlock + lane);
     float* field = fields;
     for (int i = 0; i < n; ++i, field += kParticleFields * kBlock) {
       const Pack m = get(field + kMass * kBlock);
-      Vector v = {get(field + kVx * kBlock), get(field + kVy * kBlock), get(field + kVz * kBlock)};
-      const Vector x = {get(field + kX * kBlock), get(field + kY * kBlock), get(field + kZ * kBlock)};
-      const Vector q = {get(field + kQx * kBlock), get(field + kQy * kBlock), get(field + kQz * kBlock)};
-      const Vector r = {x.x - centre.x, x.y - centre.y, x.z - centre.z};
+      const Vector v = getVector(field + kVx * kBlock), q = getVector(field + kQx * kBlock);
+      const Prediction p = predict(body, step, getVector(field + kX * kBlock), v);
       Vector goal = {map[0] * q.x + map[1] * q.y + map[2] * q.z, map[3] * q.x + map[4] * q.y + map[5] * q.z,
                      map[6] * q.x + map[7] * q.y + map[8] * q.z};
       if (kQuadratic) {
@@ -247,27 +270,25 @@ void move(const BodiesView& view, const StepNumbers& step, int block, int lane, 
         for (int k = 0; k < 6; ++k)
           goal.x += bend[k] * b[k], goal.y += bend[6 + k] * b[k], goal.z += bend[12 + k] * b[k];
       }
-      const Vector dv = {step.pull * (goal.x + (aim.x - (x.x + h * v.x))),
-                         step.pull * (goal.y + (aim.y - (x.y + h * v.y))),
-                         step.pull * (goal.z + (aim.z - (x.z + h * v.z)))};
-      const Vector mr = {m * r.x, m * r.y, m * r.z};
-      const Vector l = cross(mr, dv);
+      // What deforms has no momentum of its own but for rounding, which is taken off with what the pull leaks.
+      const Vector dv = {step.pull * (goal.x - p.y.x) - step.lost * p.deforming.x,
+                         step.pull * (goal.y - p.y.y) - step.lost * p.deforming.y,
+                         step.pull * (goal.z - p.y.z) - step.lost * p.deforming.z};
+      const Vector mdv = {m * dv.x, m * dv.y, m * dv.z};
+      const Vector l = cross(p.r, mdv);
       leaked.x += l.x, leaked.y += l.y, leaked.z += l.z;
-      pushed.x += m * dv.x, pushed.y += m * dv.y, pushed.z += m * dv.z;
-      moment.xx += mr.x * r.x, moment.yy += mr.y * r.y, moment.zz += mr.z * r.z;
-      moment.xy += mr.x * r.y, moment.yz += mr.y * r.z, moment.zx += mr.z * r.x;
-      if (step.lost > 0.0f) {
-        const Vector t = cross(mr, {v.x - mean.x, v.y - mean.y, v.z - mean.z});
-        turning.x += t.x, turning.y += t.y, turning.z += t.z;
-      }
-      v.x += dv.x, v.y += dv.y, v.z += dv.z;
-      put(v.x, field + kVx * kBlock), put(v.y, field + kVy * kBlock), put(v.z, field + kVz * kBlock);
+      pushed.x += mdv.x, pushed.y += mdv.y, pushed.z += mdv.z;
+      putVector({v.x + dv.x, v.y + dv.y, v.z + dv.z}, field + kVx * kBlock);
     }
-    const Symmetric inverse = inverseInertia(view, moment);
+    const float* const from = motion + kMotionInverse * kBlock;
+    const Symmetric inverse = {get(from),
+                               get(from + kBlock),
+                               get(from + 2 * kBlock),
+                               get(from + 3 * kBlock),
+                               get(from + 4 * kBlock),
+                               get(from + 5 * kBlock)};
     restore = times(inverse, leaked);
     excess = pushed;  // 0 but for rounding, which would add up over many steps
-    // Restored, the angular momentum is what it was: its spin needs no further pass.
-    if (step.lost > 0.0f) spin = times(inverse, turning);
   }
   const Pack far = kFarFromOrigin * get(constant + kSize * kBlock);
   const Mask is_far = (absolute(centre.x) > far) | (absolute(centre.y) > far) | (absolute(centre.z) > far);
@@ -275,19 +296,22 @@ void move(const BodiesView& view, const StepNumbers& step, int block, int lane, 
                         choose(is_far, centre.z, all(0.0f))};
   put(shift.x, s.shift[0] + slot), put(shift.y, s.shift[1] + slot), put(shift.z, s.shift[2] + slot);
 
-  const float kept = 1.0f - step.lost;
-  const Vector both = {kept * restore.x - step.lost * spin.x, kept * restore.y - step.lost * spin.y,
-                       kept * restore.z - step.lost * spin.z};
-  const Vector drift = {step.lost * mean.x + step.h * step.gravity[0] - kept * excess.x,
-                        step.lost * mean.y + step.h * step.gravity[1] - kept * excess.y,
-                        step.lost * mean.z + step.h * step.gravity[2] - kept * excess.z};
+  const float h = step.h;
+  const Vector drift = {h * step.gravity[0] - excess.x, h * step.gravity[1] - excess.y, h * step.gravity[2] - excess.z};
   const Pack ground = get(constant + kGround * kBlock);
+  // Sums of the new state are taken from where it is without the ground, so that they lose nothing far from there.
+  const Vector mean = {body.velocity.x + h * step.gravity[0], body.velocity.y + h * step.gravity[1],
+                       body.velocity.z + h * step.gravity[2]};
+  const Vector to = {centre.x + h * mean.x - shift.x, centre.y + h * mean.y - shift.y, centre.z + h * mean.z - shift.z};
+  Vector off = {}, faster = {}, turning = {};
+  Symmetric moment = {};
   float* field = fields;
   for (int i = 0; i < n; ++i, field += kParticleFields * kBlock) {
-    Vector v = {get(field + kVx * kBlock), get(field + kVy * kBlock), get(field + kVz * kBlock)};
-    const Vector x = {get(field + kX * kBlock), get(field + kY * kBlock), get(field + kZ * kBlock)};
-    const Vector turn = cross(both, {x.x - centre.x, x.y - centre.y, x.z - centre.z});
-    v.x = kept * v.x - turn.x + drift.x, v.y = kept * v.y - turn.y + drift.y, v.z = kept * v.z - turn.z + drift.z;
+    const Pack m = get(field + kMass * kBlock);
+    Vector v = getVector(field + kVx * kBlock);
+    const Vector x = getVector(field + kX * kBlock);
+    const Vector turn = cross(restore, {x.x - centre.x, x.y - centre.y, x.z - centre.z});
+    v.x += drift.x - turn.x, v.y += drift.y - turn.y, v.z += drift.z - turn.z;
     Pack z = x.z + h * v.z;
     if (step.ground) {
       const Mask inside = z < ground;
@@ -297,15 +321,31 @@ void move(const BodiesView& view, const StepNumbers& step, int block, int lane, 
         const Pack cone = step.friction * (ground - z);
         const Pack slide = choose(length > cone, 1.0f - cone / length, all(0.0f));
         v.x = choose(inside, slide * v.x, v.x), v.y = choose(inside, slide * v.y, v.y);
-        v.z = choose(inside, smaller((ground - x.z) * (1.0f / step.h), larger(v.z, all(0.0f))), v.z);
+        v.z = choose(inside, smaller((ground - x.z) * (1.0f / h), larger(v.z, all(0.0f))), v.z);
         z = choose(inside, ground, z);
       }
     }
-    put(v.x, field + kVx * kBlock), put(v.y, field + kVy * kBlock), put(v.z, field + kVz * kBlock);
-    put(x.x + h * v.x - shift.x, field + kX * kBlock);
-    put(x.y + h * v.y - shift.y, field + kY * kBlock);
-    put(z - shift.z, field + kZ * kBlock);
+    const Vector moved = {x.x + h * v.x - shift.x, x.y + h * v.y - shift.y, z - shift.z};
+    putVector(v, field + kVx * kBlock), putVector(moved, field + kX * kBlock);
+    const Vector r = {moved.x - to.x, moved.y - to.y, moved.z - to.z};
+    const Vector mr = {m * r.x, m * r.y, m * r.z};
+    const Vector w = {v.x - mean.x, v.y - mean.y, v.z - mean.z};
+    const Vector l = cross(mr, w);
+    off.x += mr.x, off.y += mr.y, off.z += mr.z;
+    faster.x += m * w.x, faster.y += m * w.y, faster.z += m * w.z;
+    turning.x += l.x, turning.y += l.y, turning.z += l.z;
+    moment.xx += mr.x * r.x, moment.yy += mr.y * r.y, moment.zz += mr.z * r.z;
+    moment.xy += mr.x * r.y, moment.yz += mr.y * r.z, moment.zx += mr.z * r.x;
   }
+  moment.xx -= off.x * off.x, moment.yy -= off.y * off.y, moment.zz -= off.z * off.z;
+  moment.xy -= off.x * off.y, moment.yz -= off.y * off.z, moment.zx -= off.z * off.x;
+  const Vector l = cross(off, faster);
+  const Symmetric inverse = inverseInertia(view, moment);
+  putVector({to.x + off.x, to.y + off.y, to.z + off.z}, motion + kMotionCentre * kBlock);
+  putVector({mean.x + faster.x, mean.y + faster.y, mean.z + faster.z}, motion + kMotionVelocity * kBlock);
+  putVector(times(inverse, {turning.x - l.x, turning.y - l.y, turning.z - l.z}), motion + kMotionSpin * kBlock);
+  putVector({inverse.xx, inverse.yy, inverse.zz}, motion + kMotionInverse * kBlock);
+  putVector({inverse.xy, inverse.yz, inverse.zx}, motion + (kMotionInverse + 3) * kBlock);
 }
 
 // --- overlapping clusters, lanes across particles or clusters, and rows of 12 numbers for their pairs
@@ -316,6 +356,17 @@ MESHLESS_INLINE void transpose(Quad& a, Quad& b, Quad& c, Quad& d) {
   const Quad ef = __builtin_shuffle(a, b, high), gh = __builtin_shuffle(c, d, high);
   a = __builtin_shuffle(ab, cd, first), b = __builtin_shuffle(ab, cd, last);
   c = __builtin_shuffle(ef, gh, first), d = __builtin_shuffle(ef, gh, last);
+}
+
+// Four rows of 12 numbers as columns of [12][kChunk].
+MESHLESS_INLINE void spreadRows(const float (&rows)[4][16], std::size_t column, float (&to)[12][kChunk]) {
+  for (int r = 0; r < 3; ++r) {
+    Quad a = getQuad(rows[0] + 4 * r), b = getQuad(rows[1] + 4 * r);
+    Quad c = getQuad(rows[2] + 4 * r), d = getQuad(rows[3] + 4 * r);
+    transpose(a, b, c, d);
+    putQuad(a, to[4 * r] + column), putQuad(b, to[4 * r + 1] + column), putQuad(c, to[4 * r + 2] + column);
+    putQuad(d, to[4 * r + 3] + column);
+  }
 }
 
 // Sum of rows; four partial sums, because a sum of one would wait for itself.
@@ -347,6 +398,57 @@ MESHLESS_INLINE void sumRows(const float* rows, const Short* index, const float*
   }
 }
 
+// Replaces each of the n rows, `stride` floats apart, by the sum over those at most `width` rows away, whatever the
+// width at three additions a row (van Herk 1992, for sums): the line is cut into blocks as long as the neighbourhood,
+// which is then the end of one block and the beginning of the next. Nothing is ever taken off a sum.
+MESHLESS_INLINE void sumLine(float* rows, std::size_t stride, std::size_t n, std::size_t width, float* line) {
+  const std::size_t length = 2 * width + 1;
+  const std::size_t end = n + width, places = n + 2 * width;  // row i is at place i + width, others are 0
+#pragma GCC unroll 4
+  for (int p = 0; p < kRowPacks; ++p) {
+    float* const row = rows + p * kLanes;
+    float* const tail = line + p * kLanes;  // of place i: the sum from there to the end of its block
+    for (std::size_t block = 0; block < places; block += length) {
+      Pack sum = {};
+      std::size_t at = block + length < end ? block + length : end;
+      for (; at > block && at > width; --at) {
+        sum += get(row + (at - 1 - width) * stride);
+        if (at - 1 < n) put(sum, tail + 16 * (at - 1));
+      }
+      for (; at > block; --at)
+        if (at - 1 < n) put(sum, tail + 16 * (at - 1));
+      if (block > 0) {  // in place: what is overwritten was read `width` rows ago, or by the tails
+        const std::size_t last = block + length - 1 < places ? block + length - 1 : places;
+        sum = Pack{};
+        for (at = block; at < last; ++at) {
+          if (at < end) sum += get(row + (at - width) * stride);
+          const std::size_t i = at + 1 - length;
+          put(get(tail + 16 * i) + sum, row + i * stride);
+        }
+      }
+      if (block < n) put(get(tail + 16 * block), row + block * stride);
+    }
+  }
+}
+
+// Rows summed over the layers of a lattice for `count` (a multiple of 4) consumers, as [12][kChunk].
+void sumLayers(const OverlapView& view, const float* rows, std::size_t first, std::size_t count,
+               float (&to)[12][kChunk]) {
+  for (std::size_t i = 0; i < count; i += 4) {
+    alignas(64) float sums[4][16];
+    for (int j = 0; j < 4; ++j) {
+      Pack sum[kRowPacks] = {};
+      const float* from = rows + 16 * static_cast<std::size_t>(view.layer_begin[first + i + j]);
+      for (std::uint32_t k = view.layer_count[first + i + j]; k > 0; --k, from += 16 * view.layer)
+#pragma GCC unroll 4
+        for (int p = 0; p < kRowPacks; ++p) sum[p] += get(from + p * kLanes);
+#pragma GCC unroll 4
+      for (int p = 0; p < kRowPacks; ++p) put(sum[p], sums[j] + p * kLanes);
+    }
+    spreadRows(sums, i, to);
+  }
+}
+
 // Rows summed for `count` (a multiple of 4) consumers, as [12][kChunk].
 template <bool kWeighted, class Short>
 void sumAll(const float* rows, const std::uint32_t* offsets, const Short* index, const float* weight, std::size_t first,
@@ -355,13 +457,7 @@ void sumAll(const float* rows, const std::uint32_t* offsets, const Short* index,
     alignas(64) float sums[4][16];
     for (int j = 0; j < 4; ++j)
       sumRows<kWeighted>(rows, index, weight, offsets[first + i + j], offsets[first + i + j + 1], sums[j]);
-    for (int r = 0; r < 3; ++r) {
-      Quad a = getQuad(sums[0] + 4 * r), b = getQuad(sums[1] + 4 * r);
-      Quad c = getQuad(sums[2] + 4 * r), d = getQuad(sums[3] + 4 * r);
-      transpose(a, b, c, d);
-      putQuad(a, to[4 * r] + i), putQuad(b, to[4 * r + 1] + i), putQuad(c, to[4 * r + 2] + i);
-      putQuad(d, to[4 * r + 3] + i);
-    }
+    spreadRows(sums, i, to);
   }
 }
 
@@ -372,6 +468,18 @@ void sumPairs(const float* rows, const std::uint32_t* offsets, const std::uint16
   if (short_index) return sumAll<false>(rows, offsets, short_index, weight, first, count, to);
   if (weight) return sumAll<true>(rows, offsets, long_index, weight, first, count, to);
   sumAll<false>(rows, offsets, long_index, weight, first, count, to);
+}
+
+MESHLESS_INLINE void rigidVelocity(const OverlapMotion& motion, const Vector& x, Pack (&together)[3]) {
+  const Vector turning = cross({all(motion.spin[0]), all(motion.spin[1]), all(motion.spin[2])},
+                               {x.x - motion.centre[0], x.y - motion.centre[1], x.z - motion.centre[2]});
+  together[0] = motion.velocity[0] + turning.x;
+  together[1] = motion.velocity[1] + turning.y;
+  together[2] = motion.velocity[2] + turning.z;
+}
+// Where the match sees a particle: what deforms goes a time of its own.
+MESHLESS_INLINE Pack predict(const StepNumbers& step, Pack u, Pack v, Pack together) {
+  return u + (step.h * together + step.ahead * (v - together));
 }
 
 MESHLESS_INLINE double total(Pack x) {
@@ -402,8 +510,7 @@ void moveBodies(const BodiesView& view, const StepNumbers& step, int first_block
         move<false, false>(view, step, first_block + b, lane, b * kBlock + lane, s);
 }
 
-void spreadParticles(const OverlapView& view, const StepNumbers& step, std::size_t first, std::size_t count,
-                     double* sums) {
+void sumParticles(const OverlapView& view, std::size_t first, std::size_t count, double* sums) {
   const std::size_t n = view.particle_stride;
   Pack sum[kOverlapSums] = {};
   for (std::size_t i = first; i < first + count; i += kLanes) {
@@ -417,22 +524,47 @@ void spreadParticles(const OverlapView& view, const StepNumbers& step, std::size
     sum[kSumMoment] += mx.x * x.x, sum[kSumMoment + 1] += mx.y * x.y, sum[kSumMoment + 2] += mx.z * x.z;
     sum[kSumMoment + 3] += mx.x * x.y, sum[kSumMoment + 4] += mx.y * x.z, sum[kSumMoment + 5] += mx.z * x.x;
     sum[kSumSpin] += l.x, sum[kSumSpin + 1] += l.y, sum[kSumSpin + 2] += l.z;
-    if (!(step.pull > 0.0f)) continue;
-    alignas(64) float y[3][kLanes];
-    for (int k = 0; k < 3; ++k) put(u[k] + step.h * v[k], y[k]);
-    for (int l2 = 0; l2 < kLanes; ++l2) {
-      const Quad lever = getQuad(view.lever + 4 * (i + l2));
-      float* const row = view.moments + 16 * (i + l2);
-      putQuad(y[0][l2] * lever, row), putQuad(y[1][l2] * lever, row + 4), putQuad(y[2][l2] * lever, row + 8);
-    }
   }
   for (int k = 0; k < kOverlapSums; ++k) sums[k] = total(sum[k]);
 }
 
+void spreadParticles(const OverlapView& view, const StepNumbers& step, const OverlapMotion& motion, std::size_t first,
+                     std::size_t count) {
+  const std::size_t n = view.particle_stride;
+  for (std::size_t i = first; i < first + count; i += kLanes) {
+    const Pack u[3] = {get(view.u + i), get(view.u + n + i), get(view.u + 2 * n + i)};
+    Pack v[3] = {get(view.v + i), get(view.v + n + i), get(view.v + 2 * n + i)};
+    const Vector x = {get(view.rest + i) + u[0], get(view.rest + n + i) + u[1], get(view.rest + 2 * n + i) + u[2]};
+    Pack together[3];
+    rigidVelocity(motion, x, together);
+    if (step.lost > 0.0f)
+      for (int k = 0; k < 3; ++k) {
+        v[k] -= step.lost * (v[k] - together[k]);
+        put(v[k], view.v + k * n + i);
+      }
+    if (!(step.pull > 0.0f)) continue;
+    alignas(64) float y[3][kLanes];
+    for (int k = 0; k < 3; ++k) put(predict(step, u[k], v[k], together[k]), y[k]);
+    for (int l = 0; l < kLanes; ++l) {
+      const Quad lever = getQuad(view.lever + 4 * (i + l));
+      float* const row = view.moments + 16 * (view.sites ? view.sites[i + l] : i + l);
+      putQuad(y[0][l] * lever, row), putQuad(y[1][l] * lever, row + 4), putQuad(y[2][l] * lever, row + 8);
+    }
+  }
+}
+
+void sumLayer(float* rows, std::size_t nx, std::size_t ny, std::size_t width, float* line) {
+  for (std::size_t y = 0; y < ny; ++y) sumLine(rows + 16 * y * nx, 16, nx, width, line);
+  for (std::size_t x = 0; x < nx; ++x) sumLine(rows + 16 * x, 16 * nx, ny, width, line);
+}
+
 void gatherClusters(const OverlapView& view, std::size_t first, std::size_t count, ClusterScratch& s) {
   alignas(64) float sums[12][kChunk];
-  sumPairs(view.moments, view.member_offsets, view.short_members, view.long_members, view.member_weights, first, count,
-           sums);
+  if (view.sites)
+    sumLayers(view, view.moments, first, count, sums);
+  else
+    sumPairs(view.moments, view.member_offsets, view.short_members, view.long_members, view.member_weights, first,
+             count, sums);
   const float* const constant = view.cluster_constants + first;
   const std::size_t n = view.cluster_stride;
   for (std::size_t i = 0; i < count; i += kLanes) {
@@ -483,8 +615,11 @@ void mapClusters(const OverlapView& view, const StepNumbers& step, std::size_t f
         Quad a = getQuad(rows[4 * r] + l), b = getQuad(rows[4 * r + 1] + l);
         Quad c = getQuad(rows[4 * r + 2] + l), d = getQuad(rows[4 * r + 3] + l);
         transpose(a, b, c, d);
-        float* const to = view.maps + 16 * (first + i + l) + 4 * r;
-        putQuad(a, to), putQuad(b, to + 16), putQuad(c, to + 32), putQuad(d, to + 48);
+        const Quad columns[4] = {a, b, c, d};
+        for (int j = 0; j < 4; ++j) {
+          const std::size_t at = first + i + l + j;
+          putQuad(columns[j], view.maps + 16 * (view.sites ? view.sites[at] : at) + 4 * r);
+        }
       }
     const Pack w = get(view.quaternions + 3 * n + first + i);
     for (int k = 0; k < 4; ++k) {
@@ -495,28 +630,34 @@ void mapClusters(const OverlapView& view, const StepNumbers& step, std::size_t f
   for (int k = 0; k < 4; ++k) quaternion_sum[k] = total(turn[k]);
 }
 
-void pullParticles(const OverlapView& view, const StepNumbers& step, const float* centre, std::size_t first,
+void pullParticles(const OverlapView& view, const StepNumbers& step, const OverlapMotion& motion, std::size_t first,
                    std::size_t count, float* goals, double* leaked) {
   alignas(64) float sums[12][kChunk];
-  sumPairs(view.maps, view.membership_offsets, view.short_memberships, view.long_memberships, view.membership_weights,
-           first, count, sums);
+  if (view.sites)
+    sumLayers(view, view.maps, first, count, sums);
+  else
+    sumPairs(view.maps, view.membership_offsets, view.short_memberships, view.long_memberships, view.membership_weights,
+             first, count, sums);
   const std::size_t n = view.particle_stride;
   Vector lost = {};
   for (std::size_t i = 0; i < count; i += kLanes) {
     const std::size_t at = first + i;
     const Pack m = get(view.mass + at), share = get(view.share + at);
     const Pack x0[3] = {get(view.rest + at), get(view.rest + n + at), get(view.rest + 2 * n + at)};
-    Pack dv[3], r[3];
+    const Pack displaced[3] = {get(view.u + at), get(view.u + n + at), get(view.u + 2 * n + at)};
+    const Vector x = {x0[0] + displaced[0], x0[1] + displaced[1], x0[2] + displaced[2]};
+    Pack dv[3], together[3];
+    rigidVelocity(motion, x, together);
     for (int k = 0; k < 3; ++k) {
       const Pack goal = share * (get(sums[4 * k] + i) * x0[0] + get(sums[4 * k + 1] + i) * x0[1] +
                                  get(sums[4 * k + 2] + i) * x0[2] + get(sums[4 * k + 3] + i));
       if (goals) put(goal, goals + k * n + at);
-      const Pack u = get(view.u + k * n + at), v = get(view.v + k * n + at);
-      dv[k] = step.pull * (goal - (u + step.h * v));
-      r[k] = m * (x0[k] + u - centre[k]);
+      const Pack v = get(view.v + k * n + at);
+      dv[k] = step.pull * (goal - predict(step, displaced[k], v, together[k]));
       if (!goals) put(v + dv[k], view.v + k * n + at);
     }
-    const Vector l = cross({r[0], r[1], r[2]}, {dv[0], dv[1], dv[2]});
+    const Vector r = {m * (x.x - motion.centre[0]), m * (x.y - motion.centre[1]), m * (x.z - motion.centre[2])};
+    const Vector l = cross(r, {dv[0], dv[1], dv[2]});
     lost.x += l.x, lost.y += l.y, lost.z += l.z;
   }
   leaked[0] = total(lost.x), leaked[1] = total(lost.y), leaked[2] = total(lost.z);
@@ -525,20 +666,16 @@ void pullParticles(const OverlapView& view, const StepNumbers& step, const float
 void moveParticles(const OverlapView& view, const StepNumbers& step, const OverlapMotion& motion, std::size_t first,
                    std::size_t count) {
   const std::size_t n = view.particle_stride;
-  const float kept = 1.0f - step.lost, h = step.h;
-  float both[3], drift[3];
-  for (int k = 0; k < 3; ++k) {
-    both[k] = kept * motion.restore[k] - step.lost * motion.spin[k];
-    drift[k] = step.lost * motion.velocity[k] + h * step.gravity[k];
-  }
+  const float h = step.h;
+  const float drift[3] = {h * step.gravity[0], h * step.gravity[1], h * step.gravity[2]};
   const float* const normal = motion.normal;
   for (std::size_t i = first; i < first + count; i += kLanes) {
     const Pack u[3] = {get(view.u + i), get(view.u + n + i), get(view.u + 2 * n + i)};
     const Pack x[3] = {get(view.rest + i) + u[0], get(view.rest + n + i) + u[1], get(view.rest + 2 * n + i) + u[2]};
-    const Vector turn = cross({all(both[0]), all(both[1]), all(both[2])},
+    const Vector turn = cross({all(motion.restore[0]), all(motion.restore[1]), all(motion.restore[2])},
                               {x[0] - motion.centre[0], x[1] - motion.centre[1], x[2] - motion.centre[2]});
-    Pack v[3] = {kept * get(view.v + i) - turn.x + drift[0], kept * get(view.v + n + i) - turn.y + drift[1],
-                 kept * get(view.v + 2 * n + i) - turn.z + drift[2]};
+    Pack v[3] = {get(view.v + i) + (drift[0] - turn.x), get(view.v + n + i) + (drift[1] - turn.y),
+                 get(view.v + 2 * n + i) + (drift[2] - turn.z)};
     Pack step_of[3] = {h * v[0], h * v[1], h * v[2]};
     if (step.ground) {
       const Pack above = normal[0] * x[0] + normal[1] * x[1] + normal[2] * x[2] - motion.height;

@@ -13,14 +13,16 @@ constexpr int kBlock = 16;   // bodies side by side; a multiple of every set's l
 constexpr int kChunk = 128;  // bodies, particles or clusters between two calls of the rotations: stays in the L2 cache
 
 enum ParticleField { kX, kY, kZ, kVx, kVy, kVz, kQx, kQy, kQz, kMass, kParticleFields };
+enum MotionField { kMotionCentre, kMotionVelocity = 3, kMotionSpin = 6, kMotionInverse = 9, kMotionFields = 15 };
 enum BodyField { kSize, kMoment, kGround = kMoment + 6, kHasQuadratic, kBodyFields };
 constexpr int kQuadraticFields = 6 + 45;  // mean of the second order terms, upper triangle of the inverse moment
 
 struct StepNumbers {
-  float h;     // [s]
-  float pull;  // [1/s] share of the way to the goal over h
-  float beta;  // 0: no fit is formed
-  float lost;  // share of the motion that deforms
+  float h;      // [s]
+  float ahead;  // [s] how far what deforms goes for the match
+  float pull;   // [1/s] share of the way to the goal over h
+  float beta;   // 0: no fit is formed
+  float lost;   // share of the motion that deforms
   float gravity[3];
   float friction;
   bool ground;
@@ -32,6 +34,7 @@ struct BodiesView {
   int particles;           // a body
   float* fields;           // of block b, particle i: [kParticleFields][kBlock]
   float* constants;        // of block b: [kBodyFields][kBlock]
+  float* motion;           // of block b, for the present x and v: [kMotionFields][kBlock]
   const float* quadratic;  // of block b: [kQuadraticFields][kBlock]
   /// Pseudo-inverse of a symmetric matrix (xx yy zz xy yz zx), for bodies that are nearly a line.
   void (*pseudoInverse)(const float matrix[6], float inverse[6]);
@@ -41,9 +44,7 @@ struct alignas(64) BodiesScratch {
   float moment[9][kChunk];   // sum m y q^T
   float second[18][kChunk];  // the same with the second order terms, row by row
   float rotation[9][kChunk];
-  float centre[3][kChunk];    // of x
-  float velocity[3][kChunk];  // mean
-  float shift[3][kChunk];     // by which the positions were brought nearer to their origin
+  float shift[3][kChunk];  // by which the positions were brought nearer to their origin
 };
 
 /// One body of overlapping clusters, in a frame that turns with it: x = origin + frame (rest + u). Particle arrays are
@@ -63,6 +64,10 @@ struct OverlapView {
   const std::uint16_t *short_members, *short_memberships;  // null: the long ones
   const std::uint32_t *long_members, *long_memberships;
   const float *member_weights, *membership_weights;  // null: equal shares
+  /// Of a lattice, else null: the row of a particle and of the cluster around it. Rows are then summed along x and y by
+  /// sumLayer(), and along z over layer_count rows from layer_begin on that are `layer` rows apart.
+  const std::uint32_t *sites, *layer_begin, *layer_count;
+  std::size_t layer;
   const float* cluster_constants;  // [16]: moment at rest (xx yy zz xy yz zx), centre, 1 / mass, inverse moment
   float* quaternions;              // [4] in the frame
 };
@@ -77,22 +82,27 @@ struct alignas(64) ClusterScratch {
 enum OverlapSum { kSumX = 0, kSumV = 3, kSumMoment = 6, kSumSpin = 12, kOverlapSums = 15 };
 
 struct OverlapMotion {
-  float centre[3], velocity[3];
-  float restore[3];  // [rad/s] what the pull leaked
-  float spin[3];     // [rad/s] of the body
-  float normal[3];   // of the ground, in the frame
-  float height;      // [m] of the ground along it, from the frame's origin
+  float centre[3], velocity[3], spin[3];  // [m], [m/s], [rad/s] of the body before the pull
+  float restore[3];                       // [rad/s] what the pull leaked
+  float normal[3];                        // of the ground, in the frame
+  float height;                           // [m] of the ground along it, from the frame's origin
 };
 
+/// gatherBodies, moveBodies: what comes before and after the rotations; the latter leaves the motion of the new state.
+/// spreadParticles: damps, and spreads the moments of where the particles are going.
+/// sumLayer: replaces each of nx * ny rows by the sum over those at most `width` away along x and y. `line` is room for
+/// the longer of nx and ny in rows.
 #define MESHLESS_MATCH_ENTRIES                                                                                         \
   void gatherBodies(const BodiesView& view, const StepNumbers& step, int first_block, int blocks, BodiesScratch& s);   \
   void moveBodies(const BodiesView& view, const StepNumbers& step, int first_block, int blocks, BodiesScratch& s);     \
-  void spreadParticles(const OverlapView& view, const StepNumbers& step, std::size_t first, std::size_t count,         \
-                       double* sums);                                                                                  \
+  void sumParticles(const OverlapView& view, std::size_t first, std::size_t count, double* sums);                      \
+  void spreadParticles(const OverlapView& view, const StepNumbers& step, const OverlapMotion& motion,                  \
+                       std::size_t first, std::size_t count);                                                          \
+  void sumLayer(float* rows, std::size_t nx, std::size_t ny, std::size_t width, float* line);                          \
   void gatherClusters(const OverlapView& view, std::size_t first, std::size_t count, ClusterScratch& s);               \
   void mapClusters(const OverlapView& view, const StepNumbers& step, std::size_t first, std::size_t count,             \
                    const ClusterScratch& s, double* quaternion_sum);                                                   \
-  void pullParticles(const OverlapView& view, const StepNumbers& step, const float* centre, std::size_t first,         \
+  void pullParticles(const OverlapView& view, const StepNumbers& step, const OverlapMotion& motion, std::size_t first, \
                      std::size_t count, float* goals, double* leaked);                                                 \
   void moveParticles(const OverlapView& view, const StepNumbers& step, const OverlapMotion& motion, std::size_t first, \
                      std::size_t count);
@@ -112,7 +122,9 @@ MESHLESS_MATCH_ENTRIES
 struct Entries {
   decltype(&baseline::gatherBodies) gatherBodies;
   decltype(&baseline::moveBodies) moveBodies;
+  decltype(&baseline::sumParticles) sumParticles;
   decltype(&baseline::spreadParticles) spreadParticles;
+  decltype(&baseline::sumLayer) sumLayer;
   decltype(&baseline::gatherClusters) gatherClusters;
   decltype(&baseline::mapClusters) mapClusters;
   decltype(&baseline::pullParticles) pullParticles;

@@ -66,6 +66,11 @@ Status Material::validate() const {
   if (!(density > 0.0 && density <= 1e6)) return outOfRange("density", density, "above 0 to 1e6 kg/m^3");
   if (!(damping >= 0.0 && damping <= 1e6)) return outOfRange("damping", damping, "0 to 1e6 1/s");
   if (!(friction >= 0.0 && friction <= 10.0)) return outOfRange("friction", friction, "0 to 10");
+  if (!(plasticity.yield >= 0.0 && plasticity.yield <= 10.0)) return outOfRange("yield", plasticity.yield, "0 to 10");
+  if (!(plasticity.creep >= 0.0 && plasticity.creep <= 1e6))
+    return outOfRange("creep", plasticity.creep, "0 (none) to 1e6 1/s");
+  if (!(plasticity.maximum >= 0.0 && plasticity.maximum <= 3.0))
+    return outOfRange("maximum", plasticity.maximum, "0 to 3");
   if (Status status = volume.validate("volume"); !status) return status;
   if (Status status = area.validate("area"); !status) return status;
   for (const Color& c : {color, inside_color})
@@ -77,6 +82,13 @@ Status Material::validate() const {
 double stiffnessGain(double alpha, double h) {
   const double steps = h / kReferenceStep;
   return 1.0 - std::pow(1.0 - alpha, steps * steps);
+}
+
+double viscosityTime(double alpha, double h) {
+  // A mode's amplitude falls by the root of 1 - gain * time / h in a step: by the same for the same time.
+  const double gain = stiffnessGain(alpha, h);
+  if (!(gain > 0.0)) return kReferenceStep;
+  return h * (1.0 - std::pow(1.0 - alpha, h / kReferenceStep)) / gain;
 }
 
 }  // namespace meshless

@@ -40,11 +40,13 @@ Mat3 crossMoment(const MatchInput& in, Index c, const Points& y, const Vec3& cen
 }
 
 // Centre, rotation and best affine fit; the counters say what it took.
-void fitCluster(const MatchInput& in, Index c, const Points& y, bool affine, ClusterPose& pose, MatchCounters& counters) {
+void fitCluster(const MatchInput& in, Index c, const Points& y, bool affine, ClusterPose& pose,
+                MatchCounters& counters) {
   const ClusterRest& rest = in.shape.clusters[c];
   pose.centre = centreOf(in, c, y);
   const Mat3 a = crossMoment(in, c, y, pose.centre);
-  const RotationResult found = nearestRotation(a, pose.rotation);
+  const PlasticShape* const plastic = in.plasticShapeOf(c);
+  const RotationResult found = nearestRotation(plastic ? Mat3(a * plastic->stretch) : a, pose.rotation);
   pose.rotation = found.rotation;
   ++counters.rotations;
   if (!found.warm) ++counters.cold_rotations;
@@ -54,6 +56,7 @@ void fitCluster(const MatchInput& in, Index c, const Points& y, bool affine, Clu
     ++counters.linear_fits;
   } else {
     pose.deformation = pose.rotation.toRotationMatrix();
+    if (plastic) pose.deformation *= plastic->stretch;
     if (affine) ++counters.rank_fallbacks;
   }
 }
@@ -119,22 +122,24 @@ void addQuadraticRest(const Points& rest, const std::vector<double>& masses, con
 }
 
 void matchShapes(const MatchInput& in, const Points& y, MatchMode mode, double beta, std::vector<ClusterPose>& poses,
-                 Points& goals, MatchCounters& counters, double swelling) {
+                 Points& goals, MatchCounters& counters, double swelling, bool deformations) {
   goals.assign(y.size(), Vec3::Zero());
   const bool wants_fit = mode != MatchMode::kRigid && beta > 0.0;
   for (Index c = 0; c < in.clusters.size(); ++c) {
     const ClusterRest& rest = in.shape.clusters[c];
     ClusterPose& pose = poses[c];
     ++counters.clusters;
-    fitCluster(in, c, y, wants_fit, pose, counters);
-    const Mat3 rotation = pose.rotation.toRotationMatrix();
+    fitCluster(in, c, y, wants_fit || deformations, pose, counters);
+    Mat3 rotation = pose.rotation.toRotationMatrix();
+    if (const PlasticShape* plastic = in.plasticShapeOf(c)) rotation *= plastic->stretch;
     Mat3 map = rotation;
     double share = 0.0;  // of the fitted map; less than beta where the cluster is nearly flat or inverted
     if (wants_fit && rest.linear_rank) {
       const double determinant = pose.deformation.determinant();
       share = beta * std::min(1.0, std::max(0.0, determinant / kFullBetaDeterminant));
       if (!(share > 0.0)) ++counters.rank_fallbacks;
-      map = share * pose.deformation / std::cbrt(std::max(determinant, kFullBetaDeterminant)) + (1.0 - share) * rotation;
+      map =
+          share * pose.deformation / std::cbrt(std::max(determinant, kFullBetaDeterminant)) + (1.0 - share) * rotation;
     }
     const Index begin = in.clusters.offsets[c], end = in.clusters.offsets[c + 1];
     if (mode == MatchMode::kQuadratic && share > 0.0 && !rest.quadratic_rank) ++counters.rank_fallbacks;

@@ -51,6 +51,24 @@ void readCurve(YamlMap& map, const std::string& key, ResponseCurve& curve) {
   }
 }
 
+void readPlasticity(YamlMap& map, Plasticity& plasticity) {
+  const YAML::Node node = map.get("plasticity");
+  if (!node.IsDefined()) return;
+  if (node.IsNull() || (node.IsScalar() && node.Scalar() == "none")) {
+    plasticity = Plasticity();
+    return;
+  }
+  if (!node.IsMap()) {
+    map.source().fail(node, "plasticity is " + shown(node), "{yield: , creep: , maximum: } or none");
+    return;
+  }
+  YamlMap inner(map.source(), node, "plasticity");
+  inner.number("yield", {0.0, 10.0}, plasticity.yield);
+  inner.number("creep", {0.0, 1e6, false, "1/s"}, plasticity.creep);
+  inner.number("maximum", {0.0, 3.0}, plasticity.maximum);
+  inner.finish();
+}
+
 }  // namespace
 
 const char* const kPlainName = "1 to 64 letters, digits, '_', '-' or '.'";
@@ -77,6 +95,7 @@ void readMaterial(YamlSource& source, const YAML::Node& node, const std::string&
   map.number("friction", {0.0, 10.0}, material.friction);
   readCurve(map, "volume", material.volume);
   readCurve(map, "area", material.area);
+  readPlasticity(map, material.plasticity);
   readColor(map, "color", material.color);
   readColor(map, "inside_color", material.inside_color);
   map.finish();

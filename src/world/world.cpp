@@ -275,6 +275,7 @@ std::uint64_t World::stateHash() const {
     points(body->state.velocities);
     points(body->state.rider_offsets);
     for (const ClusterPose& pose : body->state.poses) bytes(pose.rotation.coeffs().data(), 4 * sizeof(double));
+    for (const PlasticShape& shape : body->state.plastic) bytes(shape.stretch.data(), 9 * sizeof(double));
     number(body->material.alpha);
     number(body->material.beta);
     number(body->material.damping);

@@ -191,6 +191,92 @@ double largestDistance(const Points& a, const Points& b) {
 constexpr double kOfFall = 1e-6;
 double fallen(const BatchStep& step, int steps) { return 0.5 * step.gravity.norm() * std::pow(steps * step.h, 2.0); }
 
+TEST(BatchStep, KnowsHowFarAheadTheMatchLooks) {
+  for (double h : {1.0 / 30.0, 1.0 / 60.0, 1.0 / 500.0})
+    EXPECT_EQ(batchStep(looks(MatchMode::kLinear, 1.0), h).ahead, viscosityTime(0.6, h));
+  // Forgotten, it shows.
+  EXPECT_TRUE(std::isnan(BatchStep().ahead));
+}
+
+TEST(BodyBatch, HoldsNothingThatHasFlowed) {
+  Random random(1);
+  const Plain body = makeBody(random, 3, 3, 3);
+  std::vector<PlasticShape> flowed;
+  MatchInput input = body.input();
+  EXPECT_TRUE(BodyBatch::holds(input));
+  input.plastic = &flowed;
+  EXPECT_TRUE(BodyBatch::holds(input));
+  flowed.resize(1);
+  EXPECT_FALSE(BodyBatch::holds(input));
+}
+
+// Long and short steps, with much damping and without.
+TEST(BodyBatch, FollowsTheReferenceAtAnyStep) {
+  for (double rate : {30.0, 60.0, 240.0, 2000.0})
+    for (double damping : {0.0, 1.0, 300.0})
+      for (MatchMode mode : kModes) {
+        Random random(37);
+        std::vector<Plain> bodies;
+        for (int i = 0; i < 20; ++i) {
+          bodies.push_back(makeBody(random, 3, 3, 3));
+          disturb(bodies.back(), random);
+        }
+        const Material material = looks(mode, damping);
+        const BatchStep step = batchStep(material, 1.0 / rate);
+        BodyBatch batch = batchOf(bodies);
+        MatchCounters counters;
+        double far = 0.0, fast = 0.0;
+        for (int n = 0; n < 20; ++n) {
+          batch.step(step, counters);
+          for (Plain& body : bodies) body.step(material, step);
+        }
+        for (std::size_t i = 0; i < bodies.size(); ++i) {
+          Plain found = bodies[i];
+          read(batch, i, found);
+          far = std::max(far, largestDistance(found.state.positions, bodies[i].state.positions));
+          fast = std::max(fast, largestDistance(found.state.velocities, bodies[i].state.velocities));
+        }
+        EXPECT_LE(far, 2e-6 * 2.0 * kSpacing + kOfFall * fallen(step, 20)) << toString(mode) << rate << " " << damping;
+        EXPECT_LE(fast, 1e-5 + kOfFall * 20.0 * step.h * step.gravity.norm())
+            << toString(mode) << rate << " " << damping;
+      }
+}
+
+// However strong the damping, what is left is the motion of a rigid body with the momentum that was there.
+template <class Step>
+void expectRigidAfterDamping(const Plain& before, const Step& after_step) {
+  BatchStep step = batchStep(looks(MatchMode::kLinear, 1e6), 1.0 / 120.0);
+  step.gain = 0.0;
+  step.gravity.setZero();
+  const Plain after = after_step(step);
+  const RigidMotion rigid = rigidMotionOf(before.model, before.state.positions, before.state.velocities);
+  double deforming = 0.0, most = 0.0;
+  for (std::size_t i = 0; i < before.model.rest.size(); ++i) {
+    const Vec3 together = rigid.velocity + rigid.spin.cross(before.state.positions[i] - rigid.centre);
+    deforming = std::max(deforming, (before.state.velocities[i] - together).norm());
+    most = std::max(most, (after.state.velocities[i] - together).norm());
+  }
+  EXPECT_GT(deforming, 1e-2);
+  EXPECT_LE(most, 1e-6);
+}
+TEST(BodyBatch, DampingLeavesTheRigidMotion) {
+  Random random(41);
+  std::vector<Plain> bodies;
+  for (int i = 0; i < 3; ++i) {
+    bodies.push_back(makeBody(random, 3, 3, 3));
+    disturb(bodies.back(), random);
+  }
+  for (std::size_t i = 0; i < bodies.size(); ++i)
+    expectRigidAfterDamping(bodies[i], [&](const BatchStep& step) {
+      BodyBatch batch = batchOf(bodies);
+      MatchCounters counters;
+      batch.step(step, counters);
+      Plain after = bodies[i];
+      read(batch, i, after);
+      return after;
+    });
+}
+
 TEST(BodyBatch, StepsAsTheReferenceInFreeFlight) {
   for (InstructionSet set : sets())
     for (MatchMode mode : kModes)
@@ -265,26 +351,27 @@ TEST(BodyBatch, StaysWithTheReferenceOnTheGround) {
 }
 
 TEST(BodyBatch, KeepsMomentum) {
-  for (MatchMode mode : kModes) {
-    Random random(3);
-    std::vector<Plain> bodies;
-    for (int i = 0; i < 16; ++i) {
-      bodies.push_back(makeBody(random, 3, 3, 3));
-      disturb(bodies.back(), random);
+  for (MatchMode mode : kModes)
+    for (double damping : {0.0, 20.0}) {
+      Random random(3);
+      std::vector<Plain> bodies;
+      for (int i = 0; i < 16; ++i) {
+        bodies.push_back(makeBody(random, 3, 3, 3));
+        disturb(bodies.back(), random);
+      }
+      BatchStep step = batchStep(looks(mode, damping), 1.0 / 120.0);
+      step.gravity.setZero();
+      BodyBatch batch = batchOf(bodies);
+      MatchCounters counters;
+      constexpr int kSteps = 1000;
+      for (int n = 0; n < kSteps; ++n) batch.step(step, counters);
+      for (std::size_t i = 0; i < bodies.size(); ++i) {
+        Plain after = bodies[i];
+        read(batch, i, after);
+        EXPECT_LE((after.momentum() - bodies[i].momentum()).norm(), 1e-8 * kSteps * bodies[i].movement());
+        EXPECT_LE((after.angularMomentum() - bodies[i].angularMomentum()).norm(), 3e-8 * kSteps * bodies[i].turning());
+      }
     }
-    BatchStep step = batchStep(looks(mode, 0.0), 1.0 / 120.0);
-    step.gravity.setZero();
-    BodyBatch batch = batchOf(bodies);
-    MatchCounters counters;
-    constexpr int kSteps = 1000;
-    for (int n = 0; n < kSteps; ++n) batch.step(step, counters);
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      Plain after = bodies[i];
-      read(batch, i, after);
-      EXPECT_LE((after.momentum() - bodies[i].momentum()).norm(), 1e-8 * kSteps * bodies[i].movement());
-      EXPECT_LE((after.angularMomentum() - bodies[i].angularMomentum()).norm(), 3e-8 * kSteps * bodies[i].turning());
-    }
-  }
 }
 
 TEST(BodyBatch, BodiesDoNotDependOnPlaceNeighboursOrOrder) {
@@ -430,25 +517,66 @@ TEST(OverlapBatch, StaysWithTheReferenceOnTheGround) {
   }
 }
 
-TEST(OverlapBatch, KeepsMomentumAndItsFrame) {
-  for (MatchMode mode : {MatchMode::kRigid, MatchMode::kLinear}) {
-    Random random(23);
-    Plain body = makeOverlap(random, 6, 1, false);
-    disturb(body, random);
-    BatchStep step = batchStep(looks(mode, 0.0), 1.0 / 120.0);
-    step.gravity.setZero();
+TEST(OverlapBatch, FollowsTheReferenceAtAnyStep) {
+  for (double rate : {30.0, 60.0, 240.0, 2000.0})
+    for (double damping : {0.0, 300.0}) {
+      Random random(43);
+      Plain body = makeOverlap(random, 5, 1, false);
+      disturb(body, random);
+      const Material material = looks(MatchMode::kLinear, damping);
+      const BatchStep step = batchStep(material, 1.0 / rate);
+      OverlapBatch batch = overlapOf(body);
+      MatchCounters counters;
+      for (int n = 0; n < 20; ++n) {
+        batch.step(step, counters);
+        body.step(material, step);
+      }
+      Plain found = body;
+      read(batch, found);
+      EXPECT_LE(largestDistance(found.state.positions, body.state.positions),
+                1e-6 * 4.0 * kSpacing + kOfFall * fallen(step, 20))
+          << rate << " " << damping;
+      EXPECT_LE(largestDistance(found.state.velocities, body.state.velocities),
+                1e-5 + kOfFall * 20.0 * step.h * step.gravity.norm())
+          << rate << " " << damping;
+    }
+}
+
+TEST(OverlapBatch, DampingLeavesTheRigidMotion) {
+  Random random(47);
+  Plain body = makeOverlap(random, 5, 1, true);
+  disturb(body, random);
+  expectRigidAfterDamping(body, [&](const BatchStep& step) {
     OverlapBatch batch = overlapOf(body);
     MatchCounters counters;
-    constexpr int kSteps = 1000;
-    for (int n = 0; n < kSteps; ++n) batch.step(step, counters);
+    batch.step(step, counters);
+    EXPECT_EQ(counters.rotations, 0u);  // nothing pulls
     Plain after = body;
     read(batch, after);
-    EXPECT_LE((after.momentum() - body.momentum()).norm(), 1e-8 * kSteps * body.movement());
-    EXPECT_LE((after.angularMomentum() - body.angularMomentum()).norm(), 3e-8 * kSteps * body.turning());
-    // The centre of mass goes its way.
-    const Vec3 way = body.centre() + kSteps * step.h * body.momentum() / body.model.mass;
-    EXPECT_LE((after.centre() - way).norm(), 1e-5 * (way - body.centre()).norm());
-  }
+    return after;
+  });
+}
+
+TEST(OverlapBatch, KeepsMomentumAndItsFrame) {
+  for (MatchMode mode : {MatchMode::kRigid, MatchMode::kLinear})
+    for (double damping : {0.0, 20.0}) {
+      Random random(23);
+      Plain body = makeOverlap(random, 6, 1, false);
+      disturb(body, random);
+      BatchStep step = batchStep(looks(mode, damping), 1.0 / 120.0);
+      step.gravity.setZero();
+      OverlapBatch batch = overlapOf(body);
+      MatchCounters counters;
+      constexpr int kSteps = 1000;
+      for (int n = 0; n < kSteps; ++n) batch.step(step, counters);
+      Plain after = body;
+      read(batch, after);
+      EXPECT_LE((after.momentum() - body.momentum()).norm(), 1e-8 * kSteps * body.movement());
+      EXPECT_LE((after.angularMomentum() - body.angularMomentum()).norm(), 3e-8 * kSteps * body.turning());
+      // The centre of mass goes its way.
+      const Vec3 way = body.centre() + kSteps * step.h * body.momentum() / body.model.mass;
+      EXPECT_LE((after.centre() - way).norm(), 1e-5 * (way - body.centre()).norm());
+    }
 }
 
 TEST(OverlapBatch, OrderOfTheChunksDoesNotMatter) {
@@ -467,6 +595,35 @@ TEST(OverlapBatch, OrderOfTheChunksDoesNotMatter) {
   Plain a = body, b = body;
   read(one, a);
   read(other, b);
+  EXPECT_EQ(largestDistance(a.state.positions, b.state.positions), 0.0);
+  EXPECT_EQ(largestDistance(a.state.velocities, b.state.velocities), 0.0);
+}
+
+// What was in the batch before, finite or not, leaves no trace in what is put into it.
+TEST(OverlapBatch, HistoryLeavesNoTrace) {
+  Random random(31);
+  const Plain rest = makeOverlap(random, 5, 1, true);  // 125 particles: the arrays are padded
+  Plain body = rest;
+  disturb(body, random);
+  const BatchStep step = batchStep(looks(MatchMode::kLinear, 1.0), 1.0 / 120.0);
+  MatchCounters counters;
+  OverlapBatch fresh = overlapOf(body), used = overlapOf(rest);
+  Plain spoiled = rest;
+  spoiled.state.velocities[3].x() = std::numeric_limits<double>::infinity();
+  std::vector<Quat> rotations(rest.model.clusters.size(), Quat::Identity());
+  for (const Plain* before : {&rest, static_cast<const Plain*>(&spoiled)}) {
+    used.setState(before->state.positions, before->state.velocities, rotations);
+    for (int n = 0; n < 5; ++n) used.step(step, counters);
+  }
+  for (std::size_t c = 0; c < rotations.size(); ++c) rotations[c] = body.state.poses[c].rotation;
+  used.setState(body.state.positions, body.state.velocities, rotations);
+  for (int n = 0; n < 30; ++n) {
+    fresh.step(step, counters);
+    used.step(step, counters);
+  }
+  Plain a = body, b = body;
+  read(fresh, a);
+  read(used, b);
   EXPECT_EQ(largestDistance(a.state.positions, b.state.positions), 0.0);
   EXPECT_EQ(largestDistance(a.state.velocities, b.state.velocities), 0.0);
 }

@@ -342,6 +342,10 @@ TEST(ChangeMaterial, RefusesWhatItDoesNotKnow) {
       {"area: [0.5]", "area[0] is '0.5'"},
       {"volume: 2", "volume is 2"},
       {"area: loose", "area is 'loose'"},
+      {"plasticity: {creep: -1}", "creep is -1"},
+      {"plasticity: {yeild: 1}", "did you mean 'yield'"},
+      {"plasticity: {maximum: 4}", "maximum is 4"},
+      {"plasticity: 3", "plasticity is '3'"},
       {"youngs_modulus: 1e4\npoissons_ratio: 0.5", "material:2: poissons_ratio is 0.5"},
       {"name: other", "unknown key 'name'"}};
   for (const auto& one : cases) {

@@ -157,8 +157,52 @@ TEST(World, NeedsNothingThatASceneDoesNotUse) {
   EXPECT_EQ(report.contact_counters.hashed, 0u);
   EXPECT_EQ(report.push_contacts, 0u);
   EXPECT_EQ(report.match_counters.quadratic_moments, 0u);
+  EXPECT_EQ(report.match_counters.plastic_flows, 0u);
+  EXPECT_EQ(report.preserve_counters.gradients, 0u);
   EXPECT_GT(report.ground_contacts, 0u);
   EXPECT_GT(report.match_counters.clusters, 0u);
+}
+
+TEST(World, WithoutBetaNoMapIsFitted) {
+  BodyDef def = test::ball();
+  def.material.mode = MatchMode::kQuadratic;
+  def.material.beta = 0.0;
+  World world{WorldSettings()};
+  ASSERT_TRUE(world.addSceneBody(test::shared(def)).ok());
+  run(world, 20);
+  const MatchCounters counters = world.snapshot({}).report.match_counters;
+  EXPECT_GT(counters.rotations, 0u);
+  EXPECT_EQ(counters.linear_fits, 0u);
+  EXPECT_EQ(counters.quadratic_moments, 0u);
+}
+
+TEST(World, APlasticBodyKeepsADentUntilReset) {
+  BodyDef def = test::ball();
+  def.material.plasticity = {0.02, 5.0, 0.8};
+  def.material.alpha = 0.5;
+  World world(test::weightless());
+  ASSERT_TRUE(world.addSceneBody(test::shared(def)).ok());
+  const auto farthest = [&] {
+    double off = 0.0;
+    const BodySnapshot body = only(world);
+    for (std::size_t i = 0; i < body.particles.size(); ++i)
+      for (std::size_t k = 0; k < i; ++k)
+        off = std::max(off, std::abs((body.particles[i] - body.particles[k]).norm() -
+                                     (body.model->rest[i] - body.model->rest[k]).norm()));
+    return off;
+  };
+  const PickReply up = replyOf<PickReply>(world.apply(pickNear(Vec3(0, 0, 0.3))));
+  const PickReply down = replyOf<PickReply>(world.apply(pickNear(Vec3(0, 0, 0.1))));
+  replyOf<Done>(world.apply(MovePickCommand{up.pick, Vec3(0, 0, 0.45)}));
+  replyOf<Done>(world.apply(MovePickCommand{down.pick, Vec3(0, 0, -0.05)}));
+  run(world, 240);
+  EXPECT_GT(farthest(), 0.02);
+  replyOf<Done>(world.apply(ClearPicksCommand{}));
+  run(world, 1200);
+  EXPECT_GT(farthest(), 0.01) << "the dent stays";
+  world.reset();
+  run(world, 600);
+  EXPECT_LT(farthest(), 1e-3);
 }
 
 TEST(World, EqualHistoriesHaveEqualHashes) {
@@ -191,6 +235,33 @@ TEST(World, LookingChangesNothing) {
     hashes[looking] = world.stateHash();
   }
   EXPECT_EQ(hashes[0], hashes[1]);
+}
+
+TEST(World, TheImpulseOfLocksAccountsForTheChangeOfMomentum) {
+  for (bool elastic : {false, true}) {
+    BodyDef def = test::ball();
+    if (elastic) {
+      def.spacing = 0.03;
+      def.material.youngs_modulus = 5000.0;
+    }
+    WorldSettings settings = test::weightless();
+    settings.step_rate = 120;
+    World world(settings);
+    ASSERT_TRUE(world.addSceneBody(test::shared(def)).ok());
+    const PickReply pick = replyOf<PickReply>(world.apply(pickNear(Vec3(0, 0, 0.3))));
+    replyOf<Done>(world.apply(MovePickCommand{pick.pick, Vec3(0.1, 0.2, 0.5)}));
+    replyOf<Done>(world.apply(LockCommand{pick.pick, std::nullopt}));
+    Vec3 before = only(world).measures.linear_momentum, impulse = Vec3::Zero();
+    double largest = 0.0;
+    for (int step = 0; step < 240; ++step) {
+      world.step();
+      impulse += world.snapshot({}).picks.at(0).force / 120.0;
+      const Vec3 now = only(world).measures.linear_momentum;
+      largest = std::max(largest, now.norm());
+      ASSERT_LT((now - before - impulse).norm(), 1e-11 * (1.0 + largest)) << "step " << step;
+    }
+    EXPECT_GT(largest, 0.1) << "it swings";
+  }
 }
 
 TEST(World, APickLiftsALockHoldsAndMovingTakesItUpAgain) {
@@ -381,7 +452,9 @@ TEST(World, PiecesCanBeCutAHundredTimes) {
     if (reply.ok()) {
       ++cuts;
     } else {
-      EXPECT_EQ(reply.error().code, ErrorCode::kUnsuitableShape) << reply.error().detail;
+      // The centroid of a crumpled piece can lie outside of it.
+      EXPECT_TRUE(reply.error().code == ErrorCode::kUnsuitableShape || reply.error().code == ErrorCode::kMissed)
+          << reply.error().detail;
     }
     world.step();
   }

@@ -1,6 +1,8 @@
 // How the vertices of a surface follow the particles.
 #pragma once
 
+#include <functional>
+
 #include "meshless_surgery/body/body.h"
 
 namespace meshless {
@@ -9,8 +11,19 @@ namespace meshless {
 /// moving least-squares mean of up to twelve particles that are near it along the body: smooth, and exact where the
 /// body moves affinely. Directions that the particles hardly span, as in thin sheets and crumbs, follow a cluster of
 /// the nearest one.
+///
+/// Of a piece, riders whose carriers all came along keep them: `inherited` says which rider of the parent a vertex was
+/// (kNoIndex: none) and what the parent's particles are called in the piece (kNoIndex: not there).
+struct InheritedBinding {
+  const SurfaceBinding& parent;
+  std::vector<Index> rider;
+  const std::vector<Index>& renumbered;
+  /// True where a lip lies between a vertex and a particle: it does not follow it. May be empty.
+  std::function<bool(Index vertex, Index particle)> separated;
+};
 SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const ClusterSet& clusters,
-                           const Points& surface_rest, std::vector<Index> vertex_particle);
+                           const Points& surface_rest, std::vector<Index> vertex_particle,
+                           const InheritedBinding* inherited = nullptr);
 
 /// Where rider r of the binding is by its carriers, without its offset [m]. Poses of
 /// lever_clusters must fit positions.

@@ -52,9 +52,9 @@ struct BodyModel {
   std::uint32_t next_patch = 1;  // for the next cut
 };
 
-/// The model's view for dynamics/shape_matching.h.
+/// The model's view for dynamics/shape_matching.h, at rest.
 inline MatchInput matchInput(const BodyModel& model) {
-  return {model.rest, model.match_masses, model.clusters, model.shape};
+  return {model.rest, model.match_masses, model.clusters, model.shape, nullptr};
 }
 /// Makes what the material needs of a model whose particles, masses and clusters are there: match_masses, shape,
 /// elastic and highest_frequency.
@@ -72,8 +72,13 @@ struct BodyState {
   Points surface;         // [m] present positions of the surface's vertices; see updateSurface
   double swelling = 1.0;  // of goals, or of the size without stress, where the volume is held
   double stretch = 1.0;   // of an elastic body: by how much its highest frequency has grown since rest
+  std::vector<PlasticShape> plastic;  // one a cluster once something has flowed; empty before
   Points rider_offsets;   // [m] one a rider: what a cut left between its place and its carriers' (fades away)
 };
+
+inline MatchInput matchInput(const BodyModel& model, const BodyState& state) {
+  return {model.rest, model.match_masses, model.clusters, model.shape, &state.plastic};
+}
 
 struct PreparedBody {
   BodyDef def;  // mesh left out: it is in the model

@@ -56,9 +56,11 @@ struct PieceClusters {
   ClusterSet clusters;
   Index kept = 0;     // clusters taken over unchanged
   Index rebuilt = 0;  // grown again
+  std::vector<Index> origin;  // one a cluster: the parent's that it was, or kNoIndex
 };
+/// torn: one a parent's cluster; those that grow again though all of their members are there. Empty: none.
 PieceClusters splitClusters(const ClusterSet& parent, const Points& piece_rest, const ParticleGraph& piece_graph,
-                            const std::vector<Index>& kept);
+                            const std::vector<Index>& kept, const std::vector<bool>& torn = {});
 
 /// The part of a graph between the kept particles (ascending), renumbered.
 ParticleGraph subgraph(const ParticleGraph& parent, const std::vector<Index>& kept);

@@ -1,8 +1,9 @@
 // Complete substeps of shape matching in float, vectorised for the widest instructions that the machine has: many
 // bodies of one cluster each, and a body of many overlapping clusters. The same laws as matchAndMove() (body/deform.h),
-// which stays the reference; for free bodies with a material for looks, above ground at most.
+// which stays the reference; for free bodies with a material for looks that does not flow, above ground at most.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <optional>
 
@@ -12,9 +13,10 @@
 
 namespace meshless {
 
-/// What all bodies of a batch share in a substep.
+/// What all bodies of a batch share in a substep. h, ahead and gain belong together: batchStep() sets them.
 struct BatchStep {
-  double h = 1.0 / 60.0;  // [s] > 0
+  double h = 1.0 / 60.0;                                    // [s] > 0
+  double ahead = std::numeric_limits<double>::quiet_NaN();  // [s] >= 0, see viscosityTime(); to be set
   MatchMode mode = MatchMode::kLinear;
   double gain = 0.9;     // 0..1, share of the way to the goal in h; see stiffnessGain()
   double beta = 0.2;     // 0..1, acts up to 0.95
@@ -31,7 +33,8 @@ BatchStep batchStep(const Material& material, double h);
 /// world's. A body's result depends neither on its place nor on its neighbours, be they NaN.
 class BodyBatch {
  public:
-  /// True for what the batch can hold: one cluster, of all particles in order and with their full weight.
+  /// True for what the batch can hold: one cluster, of all particles in order and with their full weight, that has not
+  /// flowed (no plastic shape).
   static bool holds(const MatchInput& body);
 
   /// quadratic: a step may ask for the quadratic mode; the shapes have had addQuadraticRest(). All bodies start at rest
@@ -47,7 +50,7 @@ class BodyBatch {
   void setState(std::size_t body, const Points& positions, const Points& velocities, const Quat& rotation);
   void getState(std::size_t body, Points& positions, Points& velocities, Quat& rotation) const;
 
-  /// Predicts, matches, restores angular momentum, damps, adds gravity, moves and keeps above ground.
+  /// Damps, predicts, matches, restores angular momentum, adds gravity, moves and keeps above ground.
   void step(const BatchStep& step, MatchCounters& counters, const ForEach& for_each = oneAfterAnother);
 
  private:
@@ -61,6 +64,7 @@ class BodyBatch {
 /// the rest shape in a frame that moves and turns with the body: what float loses is relative to the displacement.
 class OverlapBatch {
  public:
+  /// Of clusters that have not flowed (no plastic shapes).
   explicit OverlapBatch(const MatchInput& body);
   ~OverlapBatch();
   OverlapBatch(OverlapBatch&&) noexcept;

@@ -22,6 +22,14 @@ struct ResponseCurve {
   Status validate(const std::string& key) const;
 };
 
+/// What is strained beyond the yield keeps some of it (dynamics/plastic.h). Strain: |S - 1| of the stretch S without its
+/// change of volume, 0.1 where a part is drawn out by about 8 %.
+struct Plasticity {
+  double yield = 0.1;    // 0..10
+  double creep = 0.0;    // [1/s] 0..1e6, rate at which the strain beyond the yield is taken on; 0: none
+  double maximum = 0.5;  // 0..3, strain of the rest shape
+};
+
 /// Two families. For looks, where youngs_modulus is 0: mode, alpha and beta are the paper's; alpha holds at the
 /// reference rate (see stiffnessGain). For accuracy, where youngs_modulus is set: the elastic constants of a textbook,
 /// without calibration (dynamics/elastic.h); mode, alpha and beta are then not used.
@@ -37,10 +45,12 @@ struct Material {
   double friction = 0.5;                          // 0..10, Coulomb
   ResponseCurve volume;                           // of the solid's volume
   ResponseCurve area;                             // of the surface
+  Plasticity plasticity;
   Color color{0.62f, 0.22f, 0.18f, 1.0f};         // of the outer surface
   Color inside_color{0.85f, 0.45f, 0.40f, 1.0f};  // of cut faces
 
   bool elastic() const { return youngs_modulus > 0.0; }
+  bool plastic() const { return plasticity.creep > 0.0 && plasticity.maximum > 0.0; }
   /// Why the settings are not usable, naming key, value and range; else Done.
   Status validate() const;
 };
@@ -48,5 +58,9 @@ struct Material {
 /// Share of the way to the goal that a substep of h [s] moves: 1 - (1 - alpha)^((h / reference)^2). alpha itself at the
 /// reference step 1/60 s, the same stiffness as h shrinks, never above 1.
 double stiffnessGain(double alpha, double h);
+
+/// How far ahead of itself a shape is matched [s]: at x + viscosityTime v the pull damps what deforms as much as it does
+/// at the reference step, where this is h. So the decay does not depend on the step either; stable for every h.
+double viscosityTime(double alpha, double h);
 
 }  // namespace meshless

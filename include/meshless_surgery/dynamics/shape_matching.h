@@ -40,7 +40,14 @@ void addQuadraticRest(const Points& rest, const std::vector<double>& masses, con
 struct ClusterPose {
   Vec3 centre = Vec3::Zero();  // [m]
   Quat rotation = Quat::Identity();
-  Mat3 deformation = Mat3::Identity();  // F, the best affine fit; the rotation where the rank does not allow one
+  Mat3 deformation = Mat3::Identity();  // F, the best affine fit; the rigid map where the rank does not allow one
+};
+
+/// The rest shape that a cluster has taken by plastic flow: q becomes stretch * q. Symmetric, of determinant 1.
+struct PlasticShape {
+  Mat3 stretch = Mat3::Identity();
+  Mat3 inverse = Mat3::Identity();
+  double stiffening = 1.0;  // largest eigenvalue of the inverse
 };
 
 /// Work counted, so that tests can hold what a scene does not need at zero.
@@ -50,6 +57,7 @@ struct MatchCounters {
   std::size_t cold_rotations = 0;     // the warm start did not verify
   std::size_t linear_fits = 0;
   std::size_t quadratic_moments = 0;
+  std::size_t plastic_flows = 0;      // clusters whose rest shape has changed
   std::size_t rank_fallbacks = 0;     // linear -> rigid, quadratic -> linear, rigid -> last rotation
 };
 
@@ -58,13 +66,16 @@ struct MatchInput {
   const std::vector<double>& masses;  // [kg]
   const ClusterSet& clusters;
   const RestShape& shape;
+  const std::vector<PlasticShape>* plastic = nullptr;  // one a cluster; null or empty: nothing has flowed
+
+  const PlasticShape* plasticShapeOf(Index c) const { return plastic && !plastic->empty() ? &(*plastic)[c] : nullptr; }
 };
 
 /// Goal position of every particle for the positions y: the weighted mean of its clusters' goals. poses is read (last
 /// rotation) and written. Linear and angular momentum of (goal - y) weighted with the masses are zero to rounding.
-/// swelling scales the goals about their centres.
+/// swelling scales the goals about their centres. deformations: form those of poses even where the mode needs none.
 void matchShapes(const MatchInput& input, const Points& y, MatchMode mode, double beta, std::vector<ClusterPose>& poses,
-                 Points& goals, MatchCounters& counters, double swelling = 1.0);
+                 Points& goals, MatchCounters& counters, double swelling = 1.0, bool deformations = false);
 
 /// poses for given positions, without goals: after positions were set by hand. The second: of some clusters alone.
 void fitClusters(const MatchInput& input, const Points& positions, std::vector<ClusterPose>& poses);

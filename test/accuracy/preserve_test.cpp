@@ -1,50 +1,12 @@
-#include "meshless_surgery/body/preserve.h"
+#include "laws.h"
 
-#include "meshless_surgery/geometry/measures.h"
-#include "support/bodies.h"
+#include <gtest/gtest.h>
 
 namespace meshless {
 namespace {
 
-struct Squeezed {
-  double volume, area;  // relative to rest
-  double speed;         // [m/s] of the fastest particle at the end
-  std::size_t gradients;
-};
-
-// A cube pressed to 60 % of its height between two plates that are slippery, for three seconds.
-Squeezed squeeze(const Material& material) {
-  BodyDef def = test::defOf(boxMesh(Vec3(0.1, 0.1, 0.1), 6, 6, 6));
-  def.spacing = 0.02;
-  def.material = material;
-  const PreparedBody body = test::prepared(def);
-  const BodyModel& m = *body.model;
-  BodyState state = body.state;
-  StepScratch scratch;
-  MatchCounters counted;
-  PreserveCounters counters;
-  const double h = 1.0 / 240.0;
-  for (int step = 0; step < 720; ++step) {
-    const double half = 0.05 * (1.0 - 0.4 * std::min(1.0, step / 120.0));
-    matchAndMove(m, material, Vec3::Zero(), h, state, scratch, counted);
-    scratch.touched.clear();
-    scratch.before_contact = state.positions;
-    for (Index i = 0; i < m.rest.size(); ++i) {
-      double& z = state.positions[i].z();
-      if (std::abs(z) <= half) continue;
-      const double side = z > 0 ? 1.0 : -1.0;
-      z = side * half;
-      scratch.touched.push_back({i, Vec3(0, 0, -side), 0.0});
-    }
-    preserve(m, material, state, scratch, counters);
-    velocitiesFromPositions(m, h, state, scratch);
-  }
-  updateSurface(m, state);
-  Squeezed result{signedVolume(state.surface, m.surface.triangles) / m.rest_volume,
-                  surfaceArea(state.surface, m.surface.triangles) / m.rest_area, 0.0, counters.gradients};
-  for (const Vec3& v : state.velocities) result.speed = std::max(result.speed, v.norm());
-  return result;
-}
+using bench::squeeze;
+using bench::Squeezed;
 
 Material looks() {
   Material material;

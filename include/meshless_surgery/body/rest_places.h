@@ -1,0 +1,21 @@
+// Where points that a blade has put inside a deformed body lie in its rest shape.
+#pragma once
+
+#include "meshless_surgery/body/body.h"
+
+namespace meshless {
+
+/// A point known in both shapes.
+struct KnownPlace {
+  Vec3 present;  // [m]
+  Vec3 rest;     // [m]
+};
+
+/// Rest places of points in the present shape: the affine map of the nearest 16 particles from present to rest, plus
+/// what that map misses at the known places near by (the rim of a cut), spread inwards by inverse squared distance.
+/// Where the particles do not span space, the map follows what they span and keeps lengths across. Neither side of a
+/// cut is asked: both get the same places.
+Points restPlaces(const BodyModel& model, const BodyState& state, const Points& present,
+                  const std::vector<KnownPlace>& known);
+
+}  // namespace meshless
