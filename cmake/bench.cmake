@@ -14,6 +14,10 @@ endfunction()
 set(truth_sources ${CMAKE_CURRENT_SOURCE_DIR}/bench/static_load.cpp ${CMAKE_CURRENT_SOURCE_DIR}/bench/truth_case.cpp
     ${CMAKE_CURRENT_SOURCE_DIR}/bench/laws.cpp)
 
+if(MESHLESS_SURGERY_SANITIZE)  # the core and its tests alone
+  return()
+endif()
+
 if(CLI11_FOUND)
   add_bench(accuracy bench/accuracy.cpp bench/plot.cpp ${truth_sources})
   target_link_libraries(accuracy CLI11::CLI11)
@@ -24,6 +28,10 @@ if(benchmark_FOUND)
   add_bench(bench_step bench/bench_step.cpp bench/step_rows.cpp bench/step_pile.cpp bench/step_lattice.cpp
     bench/step_cells.cpp bench/step_liver.cpp)
   target_link_libraries(bench_step benchmark::benchmark)
+  add_bench(bench_cut bench/bench_cut.cpp bench/cut_cgal_clip.cpp)
+  target_link_libraries(bench_cut benchmark::benchmark CGAL::CGAL)
+  add_bench(bench_incise bench/bench_incise.cpp)
+  target_link_libraries(bench_incise benchmark::benchmark)
   find_package(PkgConfig QUIET)
   if(PKG_CONFIG_FOUND)
     pkg_check_modules(BULLET QUIET bullet)

@@ -17,7 +17,7 @@ def scenario(surgeon, play):
         pick = surgeon.pick((end.x, end.y, end.z), body="fish", stiffness=2000)
         surgeon.lock(pick.pick_id, (0.65 * end.x, end.y, end.z))
         picks.append(pick)
-    surgeon.live(4.0)
+    surgeon.live(10.0)  # it first bends one way and then finds the other
     bent = surgeon.body("fish")
     middle = min(bent.surface.vertices, key=lambda v: abs(v.x))
     h, t = (max(bent.surface.vertices, key=lambda v: v.x), min(bent.surface.vertices, key=lambda v: v.x))

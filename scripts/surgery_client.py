@@ -18,7 +18,7 @@ from geometry_msgs.msg import Point, PoseStamped, Quaternion, Vector3
 from std_srvs.srv import SetBool, Trigger
 
 from meshless_surgery.msg import State
-from meshless_surgery.srv import (Cut, GetBody, Lock, MovePick, Pick, Push, Release, SetMaterial, Step)
+from meshless_surgery.srv import (Cut, GetBody, Incise, Lock, MovePick, Pick, Push, Release, SetMaterial, Step)
 
 
 class Refused(RuntimeError):
@@ -116,6 +116,16 @@ class Surgeon:
     def cut(self, pivot, reach, normal, length=0.0, width=0.0, close_time=0.0, bodies=()):
         return self.call("cut", Cut, blades=blades_pose(pivot, reach, normal), length=length, width=width,
                          close_time=close_time, roughness=0.0, bodies=list(bodies))
+
+    # scalpel
+    def incise(self, start, along, out, length, depth, bodies=()):
+        """Opens the tissue: the blade's edge that stays outside runs from `start` along `along`; `out` points out of it."""
+        x = _normalised(along)
+        y = _normalised(_cross(_cross(x, out), x))
+        blade = PoseStamped()
+        blade.pose.position = Point(*start)
+        blade.pose.orientation = Quaternion(*quaternion_of_axes(x, y, _cross(x, y)))
+        return self.call("incise", Incise, blade=blade, length=length, depth=depth, bodies=list(bodies))
 
     # bodies and time
     def body(self, name, rest=False):

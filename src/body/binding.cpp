@@ -1,6 +1,7 @@
 #include "meshless_surgery/body/binding.h"
 
 #include <algorithm>
+#include <array>
 #include <optional>
 
 #include <Eigen/Eigenvalues>
@@ -33,7 +34,7 @@ void leastSquaresWeights(const Points& rest, const Vec3& p, const std::vector<In
                          std::vector<double>& weights) {
   const double reach = 1.1 * (rest[carriers.back()] - p).norm() + 1e-300;
   const std::size_t n = carriers.size();
-  std::vector<double> share(n);
+  std::array<double, kCarriers> share{};
   double total = 0.0;
   for (std::size_t k = 0; k < n; ++k) {
     const double ratio = (rest[carriers[k]] - p).norm() / reach;
@@ -48,13 +49,19 @@ void leastSquaresWeights(const Points& rest, const Vec3& p, const std::vector<In
     const Vec3 r = (rest[carriers[k]] - p - mean) / reach;
     moment += share[k] / total * r * r.transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<Mat3> solver(moment);
-  const double least = kRank * std::max(solver.eigenvalues()[2], 1e-300);
   Vec3 slope = Vec3::Zero();  // of the weights, along what is spanned
-  for (int axis = 0; axis < 3; ++axis)
-    if (solver.eigenvalues()[axis] > least)
-      slope += solver.eigenvectors().col(axis) *
-               (solver.eigenvectors().col(axis).dot(-mean / reach) / solver.eigenvalues()[axis]);
+  const double trace = moment.trace();
+  // 4 det / trace^2 is below the smallest eigenvalue, and the largest is below the trace.
+  if (4.0 * moment.determinant() > kRank * trace * trace * trace) {
+    slope = moment.inverse() * (-mean / reach);
+  } else {
+    const Eigen::SelfAdjointEigenSolver<Mat3> solver(moment);
+    const double least = kRank * std::max(solver.eigenvalues()[2], 1e-300);
+    for (int axis = 0; axis < 3; ++axis)
+      if (solver.eigenvalues()[axis] > least)
+        slope += solver.eigenvectors().col(axis) *
+                 (solver.eigenvectors().col(axis).dot(-mean / reach) / solver.eigenvalues()[axis]);
+  }
   weights.resize(n);
   for (std::size_t k = 0; k < n; ++k)
     weights[k] = share[k] / total * (1.0 + slope.dot((rest[carriers[k]] - p - mean) / reach));
@@ -77,6 +84,8 @@ SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const
     for (Index k = clusters.offsets[c]; k < clusters.offsets[c + 1]; ++k) cluster_of[clusters.members[k]] = c;
   std::optional<NearestPoints> nearest;  // made where one is bound anew
   std::vector<Index> near, seen(rest.size(), kNoIndex);
+  std::vector<std::vector<Index>> walks;  // around a particle: the next rider starts there too
+  std::vector<std::pair<double, Index>> order;
   std::vector<double> weights;
   Index stamp = 0;
   const auto finish = [&](const Vec3& lever) {
@@ -113,17 +122,16 @@ SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const
           break;
         }
     }
-    walk(graph, start, near, seen, stamp++);
-    if (lips)
-      near.erase(std::remove_if(near.begin() + 1, near.end(), [&](Index i) { return inherited->separated(v, i); }),
-                 near.end());
-    const auto closer = [&](Index i, Index j) {
-      const double di = (rest[i] - p).squaredNorm(), dj = (rest[j] - p).squaredNorm();
-      return di != dj ? di < dj : i < j;
-    };
-    const std::size_t count = std::min(near.size(), kCarriers);
-    std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(count), near.end(), closer);
-    near.resize(count);
+    if (walks.empty()) walks.resize(rest.size());
+    if (walks[start].empty()) walk(graph, start, walks[start], seen, stamp++);
+    order.clear();
+    for (Index i : walks[start])
+      if (i == start || !lips || !inherited->separated(v, i)) order.emplace_back((rest[i] - p).squaredNorm(), i);
+    const auto count = static_cast<std::ptrdiff_t>(std::min(order.size(), kCarriers));
+    if (order.size() > kCarriers) std::nth_element(order.begin(), order.begin() + count - 1, order.end());
+    std::sort(order.begin(), order.begin() + count);
+    near.clear();
+    for (auto at = order.begin(); at != order.begin() + count; ++at) near.push_back(at->second);
     leastSquaresWeights(rest, p, near, weights);
     Vec3 lever = p;
     for (std::size_t k = 0; k < near.size(); ++k) lever -= weights[k] * rest[near[k]];

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "cap_rough.h"
 #include "cut_cap.h"
 #include "cut_parts.h"
 #include "cut_pieces.h"
@@ -22,12 +23,28 @@ std::string number(double x) {
   return text;
 }
 
-Status checkInput(const TriangleMesh& mesh, const Plane& plane, const CutOptions& options) {
+/// Bounds [m] that are not finite where a point is not.
+Box boundsOfAll(const Points& points) {
+  double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300}, nothing = 0.0;
+  for (const Vec3& p : points) {
+    for (int k = 0; k < 3; ++k) {
+      low[k] = p[k] < low[k] ? p[k] : low[k];
+      high[k] = p[k] > high[k] ? p[k] : high[k];
+    }
+    nothing += 0.0 * (p[0] + p[1] + p[2]);
+  }
+  Box box;
+  box.min = Vec3(low[0] + nothing, low[1], low[2]);
+  box.max = Vec3(high[0], high[1], high[2]);
+  return box;
+}
+
+Status checkInput(const TriangleMesh& mesh, const Plane& plane, const CutOptions& options, Box& box) {
   if (!plane.point.allFinite() || !plane.normal.allFinite())
     return Error{ErrorCode::kInvalidArgument, "the plane has a coordinate that is not finite"};
   if (!(std::abs(plane.normal.norm() - 1.0) < 1e-6))
-    return Error{ErrorCode::kInvalidArgument, "the plane's normal has length " + number(plane.normal.norm()) +
-                                                  "; it must be 1 (within 1e-6)"};
+    return Error{ErrorCode::kInvalidArgument,
+                 "the plane's normal has length " + number(plane.normal.norm()) + "; it must be 1 (within 1e-6)"};
   if (!(options.band >= 1e-12 && options.band <= 1e-3))
     return Error{ErrorCode::kInvalidArgument,
                  "the cut's band is " + number(options.band) + "; it must be within 1e-12 .. 1e-3"};
@@ -36,10 +53,17 @@ Status checkInput(const TriangleMesh& mesh, const Plane& plane, const CutOptions
     return Error{ErrorCode::kInvalidArgument, "the surface has " + std::to_string(mesh.patches.size()) +
                                                   " patch ids for " + std::to_string(mesh.triangles.size()) +
                                                   " triangles; it must have one each, or none"};
-  for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+  if (!(options.roughness >= 0.0 && options.roughness < 1e300))
+    return Error{ErrorCode::kInvalidArgument,
+                 "the cut's roughness is " + number(options.roughness) + " m; it must not be negative"};
+  box = boundsOfAll(mesh.vertices);
+  const bool finite = box.min.allFinite() && box.max.allFinite();
+  for (std::size_t v = 0; !finite && v < mesh.vertices.size(); ++v)
     if (!mesh.vertices[v].allFinite())
       return Error{ErrorCode::kUnsuitableShape, "vertex " + std::to_string(v) + " of the surface is not finite"};
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+  Index highest = 0;
+  for (const Triangle& t : mesh.triangles) highest = std::max({highest, t[0], t[1], t[2]});
+  for (std::size_t t = 0; highest >= mesh.vertices.size() && t < mesh.triangles.size(); ++t)
     for (const Index v : mesh.triangles[t])
       if (v >= mesh.vertices.size())
         return Error{ErrorCode::kUnsuitableShape, "triangle " + std::to_string(t) + " names vertex " +
@@ -48,27 +72,102 @@ Status checkInput(const TriangleMesh& mesh, const Plane& plane, const CutOptions
   return Done{};
 }
 
-/// Puts the cap on both sides, layer by layer of winding. Returns the area of one side [m^2].
-double addCap(Workpiece& work, const std::vector<Index>& vertex_of_node, const std::vector<CapTriangle>& cap,
-              std::uint32_t patch) {
+/// A mesh taken apart at the plane, with the cap that is to close it.
+struct Section {
+  Workpiece work;
+  Nodes nodes;
+  std::vector<OutlineSegment> outline;
+  CapCore core;
+  std::vector<CapTriangle> cap;  // all but the core's triangles
+};
+
+/// Puts the cap on both sides, layer by layer of winding. Returns the area of one side [m^2], in the
+/// plane.
+double addCap(Section& section, const CutOptions& options) {
+  Workpiece& work = section.work;
+  work.first_inner = work.endVertex();
+  work.new_positions.reserve(work.new_positions.size() + section.core.places.size());
+  work.new_origins.reserve(work.new_origins.size() + section.core.places.size());
+  for (const Vec2& place : section.core.places) work.addVertex(work.solid(place), VertexOrigin());
+  std::vector<Index> vertex_of_node = section.nodes.lowestVertices();
+  for (Index v = work.first_inner; v < work.endVertex(); ++v) vertex_of_node.push_back(v);
+  const auto sizeOf = [&](Index i, Index j, Index k) {
+    return 0.5 * (work.position(j) - work.position(i)).cross(work.position(k) - work.position(i)).norm();
+  };
   double area = 0.0;
-  for (const CapTriangle& c : cap) {
+  for (const CapTriangle& c : section.cap) {
     const Index i = vertex_of_node[c.nodes[0]], j = vertex_of_node[c.nodes[1]], k = vertex_of_node[c.nodes[2]];
-    const double size =
-        0.5 * (work.positions[j] - work.positions[i]).cross(work.positions[k] - work.positions[i]).norm();
+    const double size = sizeOf(i, j, k);
     const int sign = c.winding > 0 ? 1 : -1;
     for (int layer = sign; std::abs(layer) <= std::abs(c.winding); layer += sign) {
       const Triangle facing_up = {i, j, k}, facing_down = {k, j, i};
-      work.sides[kLower].addCap(sign > 0 ? facing_up : facing_down, patch, layer);
-      work.sides[kUpper].addCap(sign > 0 ? facing_down : facing_up, patch, layer);
+      work.sides[kLower].addCap(sign > 0 ? facing_up : facing_down, options.cap_patch, layer);
+      work.sides[kUpper].addCap(sign > 0 ? facing_down : facing_up, options.cap_patch, layer);
       area += size;
     }
+  }
+  const Index first = work.first_inner;
+  for (const Triangle& t : section.core.triangles) area += sizeOf(first + t[0], first + t[1], first + t[2]);
+
+  if (options.roughness > 0.0) {
+    std::vector<Triangle> inner;
+    for (const CapTriangle& c : section.cap) {
+      const Triangle t = {vertex_of_node[c.nodes[0]], vertex_of_node[c.nodes[1]], vertex_of_node[c.nodes[2]]};
+      if (t[0] >= first || t[1] >= first || t[2] >= first) inner.push_back(t);
+    }
+    for (const Triangle& t : section.core.triangles) inner.push_back({first + t[0], first + t[1], first + t[2]});
+    roughen(work, section.nodes.places, section.outline, section.core, inner, options.roughness, options.seed);
   }
   return area;
 }
 
-/// A last look at what would be handed out.
-Status checkPieces(const TriangleMesh& mesh, const std::vector<CutPiece>& pieces) {
+double sixVolumes(const Points& points, const std::vector<Triangle>& triangles, std::size_t first, const Vec3& origin) {
+  double sum = 0.0;
+  for (std::size_t t = first; t < triangles.size(); ++t) {
+    const Vec3 a = points[triangles[t][0]] - origin, b = points[triangles[t][1]] - origin;
+    sum += a.dot(b.cross(points[triangles[t][2]] - origin));
+  }
+  return sum;
+}
+
+Error volumeError(double sum, double whole) {
+  return {ErrorCode::kUnsuitableShape, "the pieces' volumes would add up to " + number(sum) + " instead of " +
+                                           number(whole) +
+                                           " m^3; the surface crosses itself too badly where it is cut"};
+}
+
+/// What rounding makes of a volume: crumbs far from the origin are only as exact as their coordinates.
+double roundingOf(const TriangleMesh& mesh, const Box& box) {
+  const double rounding = 4e-16 * std::max(box.min.cwiseAbs().maxCoeff(), box.max.cwiseAbs().maxCoeff());
+  return rounding * surfaceArea(mesh);
+}
+
+/// True where the pieces' volumes add up to the mesh's. Untouched triangles count the same in both; left are those that
+/// were touched, in whole and in parts, and the caps.
+Status checkVolumes(const Workpiece& work, const std::vector<Shell>& shells, const Box& box) {
+  double before = 0.0, after = 0.0, magnitude = 0.0;
+  const Points& points = work.mesh->vertices;
+  std::vector<Triangle> touched;
+  for (const Index t : work.touched) touched.push_back(work.mesh->triangles[t]);
+  // A vertex of the mesh: of a flat one the parts are then as small as its volume.
+  const Vec3 origin = touched.empty() ? work.center : points[touched[0][0]];
+  before = sixVolumes(points, touched, 0, origin);
+  double sum = 0.0;
+  for (const Shell& shell : shells) {
+    after += sixVolumes(shell.piece.mesh.vertices, shell.piece.mesh.triangles, shell.untouched, origin);
+    magnitude += std::abs(shell.volume);
+    sum += shell.volume;
+  }
+  const double off = (after - before) / 6.0;
+  if (std::abs(off) <= 1e-9 * magnitude) return Done{};
+  // Rounding, in flat crumbs: what the whole sums say counts.
+  const double whole = signedVolume(*work.mesh);
+  if (std::abs(sum - whole) <= 1e-9 * magnitude + roundingOf(*work.mesh, box)) return Done{};
+  return volumeError(sum, whole);
+}
+
+/// The same for every triangle and edge, from the pieces alone.
+Status checkPieces(const TriangleMesh& mesh, const Box& box, const std::vector<CutPiece>& pieces) {
   double sum = 0.0, magnitude = 0.0;
   for (const CutPiece& piece : pieces) {
     // Every directed edge adds a number that its opposite takes away again: nothing is left of a closed surface.
@@ -84,92 +183,92 @@ Status checkPieces(const TriangleMesh& mesh, const std::vector<CutPiece>& pieces
         if (a == b) return Error{ErrorCode::kUnsuitableShape, "the cut would leave a triangle without area"};
       }
     }
-    if (balance != 0) return Error{ErrorCode::kUnsuitableShape, "the surface is open or not oriented: it has edges with more triangles in "
-                                                     "one direction than in the other"};
+    if (balance != 0) return Error{ErrorCode::kUnsuitableShape, "a piece of the cut would be open"};
     const double volume = signedVolume(piece.mesh);
     sum += volume;
     magnitude += std::abs(volume);
   }
   const double whole = signedVolume(mesh);
-  // Crumbs far from the origin are only as exact as their coordinates.
-  const Box box = boundsOf(mesh.vertices);
-  const double rounding = 4e-16 * std::max(box.min.cwiseAbs().maxCoeff(), box.max.cwiseAbs().maxCoeff());
-  if (!(std::abs(sum - whole) <= 1e-9 * magnitude + rounding * surfaceArea(mesh)))
-    return Error{ErrorCode::kUnsuitableShape, "the pieces' volumes would add up to " + number(sum) + " instead of " +
-                                                  number(whole) +
-                                                  " m^3; the surface crosses itself too badly where it is cut"};
+  if (!(std::abs(sum - whole) <= 1e-9 * magnitude + roundingOf(mesh, box))) return volumeError(sum, whole);
   return Done{};
 }
 
-/// A mesh taken apart at the plane, with the cap that is to close it.
-struct Section {
-  Workpiece work;
-  Nodes nodes;
-  std::vector<CapTriangle> cap;
-};
-
-/// Splits the rim where it meets itself and fills it anew. False where rounding does not let it.
-bool resolve(const std::vector<RimEdge>& rim, Section& section) {
-  if (!splitRim(section.work, rim, section.nodes)) return false;
-  const Result<std::vector<RimEdge>> split = rimOf(section.work);
-  return split && triangulateCap(section.nodes.places, outlineOf(section.nodes, *split), section.cap) == CapState::kFilled;
+/// The section's cap with points inside, and without where those do not fit.
+CapState fill(Section& section, const std::vector<RimEdge>& rim, const CutOptions& options) {
+  const std::vector<Vec2>& places = section.nodes.places;
+  section.outline = outlineOf(section.nodes, rim);
+  section.core = coreOf(places, section.outline, section.work.spacing, options.cap_points);
+  const CapState state = triangulateCap(places, section.outline, section.core, section.cap);
+  if (state == CapState::kFilled || section.core.places.empty()) return state;
+  section.core = {};
+  return triangulateCap(places, section.outline, section.core, section.cap);
 }
 
-Result<CutSurface> finish(const TriangleMesh& mesh, Section section, const CutOptions& options) {
+/// Splits the rim where it meets itself and fills it anew. False where rounding does not let it.
+bool resolve(const std::vector<RimEdge>& rim, Section& section, const CutOptions& options) {
+  if (!splitRim(section.work, rim, section.nodes)) return false;
+  const Result<std::vector<RimEdge>> split = rimOf(section.work);
+  return split && fill(section, *split, options) == CapState::kFilled;
+}
+
+Result<CutSurface> finish(Section section, const Box& box, const CutOptions& options) {
   CutSurface cut;
-  cut.cap_area = addCap(section.work, section.nodes.lowestVertices(), section.cap, options.cap_patch);
-  const std::vector<Index> merged = section.nodes.mergedVertices();
-  std::vector<Shell> shells;
-  for (const Side side : {kUpper, kLower}) {
-    Result<std::vector<Shell>> found = shellsOf(section.work, merged, side);
-    if (!found) return found.error();
-    if (found->empty()) return Error{ErrorCode::kMissed, "the plane only grazes the surface: a side would be empty"};
-    for (Shell& shell : *found) {
-      if (shell.flat)
-        return Error{ErrorCode::kMissed, "the plane only grazes the surface: a piece would be thinner than " +
-                                             number(options.band) + " of its size"};
-      shells.push_back(std::move(shell));
-    }
+  cut.cap_area = addCap(section, options);
+  Workpiece& work = section.work;
+  Result<std::vector<Shell>> shells = shellsOf(work, section.core, section.nodes.mergedVertices(), options.cap_patch);
+  if (!shells) return shells.error();
+  std::array<bool, 2> any{false, false};
+  for (const Shell& shell : *shells) {
+    if (shell.flat)
+      return Error{ErrorCode::kMissed, "the plane only grazes the surface: a piece would be thinner than " +
+                                           number(options.band) + " of its size"};
+    any[shell.piece.side > 0] = true;
   }
-  cut.pieces = piecesOf(std::move(shells));
-  const Status sound = checkPieces(mesh, cut.pieces);
+  if (!any[0] || !any[1]) return Error{ErrorCode::kMissed, "the plane only grazes the surface: a side would be empty"};
+  const Status sound = checkVolumes(work, *shells, box);
   if (!sound) return sound.error();
+  cut.pieces = piecesOf(work, std::move(*shells));
+  if (options.check_pieces) {
+    const Status checked = checkPieces(*work.mesh, box, cut.pieces);
+    if (!checked) return checked.error();
+  }
   return cut;
 }
 
-Result<CutSurface> cutOnce(const TriangleMesh& mesh, const Plane& plane, const CutOptions& options) {
-  Result<Workpiece> split = splitAtPlane(mesh, plane, options);
+Result<CutSurface> cutOnce(const TriangleMesh& mesh, const Plane& plane, const Box& box, const CutOptions& options) {
+  Result<Workpiece> split = splitAtPlane(mesh, plane, options.band, box);
   if (!split) return split.error();
   const Result<std::vector<RimEdge>> rim = rimOf(*split);
   if (!rim) return rim.error();
-  Section plain{std::move(*split), {}, {}};
+  Section plain{std::move(*split), {}, {}, {}, {}};
   plain.nodes = nodesOf(plain.work, *rim);
-  const CapState state = triangulateCap(plain.nodes.places, outlineOf(plain.nodes, *rim), plain.cap);
+  const CapState state = fill(plain, *rim, options);
   if (state == CapState::kUnbalanced)
     return Error{ErrorCode::kUnsuitableShape, "the surface is open or not oriented where the plane meets it"};
   const bool filled = state == CapState::kFilled;
-  if (filled && !hasSlivers(plain.nodes.places, plain.cap)) return finish(mesh, std::move(plain), options);
+  if (filled && !hasSlivers(plain.nodes.places, plain.core, plain.cap)) return finish(std::move(plain), box, options);
 
   // The rim crosses itself, or lies on itself but for rounding.
-  Section resolved{plain.work, plain.nodes, {}};
-  Result<CutSurface> cut = Error{ErrorCode::kUnsuitableShape,
-                                 "the surface crosses itself where it is cut, and cannot be closed there"};
-  if (resolve(*rim, resolved)) cut = finish(mesh, std::move(resolved), options);
-  if (!cut && filled) return finish(mesh, std::move(plain), options);
+  Section resolved{plain.work, plain.nodes, {}, {}, {}};
+  Result<CutSurface> cut =
+      Error{ErrorCode::kUnsuitableShape, "the surface crosses itself where it is cut, and cannot be closed there"};
+  if (resolve(*rim, resolved, options)) cut = finish(std::move(resolved), box, options);
+  if (!cut && filled) return finish(std::move(plain), box, options);
   return cut;
 }
 
 }  // namespace
 
 Result<CutSurface> cutByPlane(const TriangleMesh& mesh, const Plane& plane, const CutOptions& options) {
-  const Status checked = checkInput(mesh, plane, options);
+  Box box;
+  const Status checked = checkInput(mesh, plane, options, box);
   if (!checked) return checked.error();
-  Result<CutSurface> cut = cutOnce(mesh, plane, options);
+  Result<CutSurface> cut = cutOnce(mesh, plane, box, options);
   // Vertices used where they are, a little off the plane, can make a sound rim cross itself: a narrower band has fewer.
   CutOptions narrower = options;
   for (int retry = 0; retry < 2 && !cut && cut.error().code == ErrorCode::kUnsuitableShape; ++retry) {
     narrower.band *= 1e-2;
-    Result<CutSurface> again = cutOnce(mesh, plane, narrower);
+    Result<CutSurface> again = cutOnce(mesh, plane, box, narrower);
     if (again) return again;
   }
   return cut;

@@ -39,7 +39,8 @@ double cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(
 bool bladesMeet(const TriangleMesh& mesh, const Blades& blades) {
   if (!blades.origin.allFinite() || !blades.x_axis.allFinite() || !blades.y_axis.allFinite()) return false;
   if (!(blades.length >= 0.0) || !(blades.width >= 0.0)) return false;
-  const Reach reach{blades.length > 0.0 ? blades.length : kInfinity, blades.width > 0.0 ? 0.5 * blades.width : kInfinity};
+  const Reach reach{blades.length > 0.0 ? blades.length : kInfinity,
+                    blades.width > 0.0 ? 0.5 * blades.width : kInfinity};
   const Plane plane = blades.plane();
   std::vector<double> heights(mesh.vertices.size());
   for (std::size_t v = 0; v < heights.size(); ++v) heights[v] = plane.height(mesh.vertices[v]);

@@ -80,9 +80,9 @@ Vec2 extentOf(const std::vector<Vec2>& nodes) {
 }
 
 struct Link {
-  Index from, to;        // nodes
+  Index from, to;         // nodes
   std::size_t chain, at;  // it runs from chains[chain][at] to the next
-  double low, high;      // its extent along the axis of the sweep
+  double low, high;       // its extent along the axis of the sweep
 };
 
 /// A node to be put into a link, at the fraction `s` of its length.
@@ -230,9 +230,8 @@ class Splitter {
       std::vector<Index>& chain = result_.chains[c];
       for (const std::size_t i : split) {
         std::vector<Insertion>& list = insertions_[i];
-        std::sort(list.begin(), list.end(), [](const Insertion& p, const Insertion& q) {
-          return p.s != q.s ? p.s < q.s : p.node < q.node;
-        });
+        std::sort(list.begin(), list.end(),
+                  [](const Insertion& p, const Insertion& q) { return p.s != q.s ? p.s < q.s : p.node < q.node; });
         std::vector<Index> inner;
         for (const Insertion& insertion : list)
           if (std::find(inner.begin(), inner.end(), insertion.node) == inner.end()) inner.push_back(insertion.node);
@@ -256,10 +255,13 @@ double snapDistance(const std::vector<Vec2>& nodes) {
   return nodes.empty() ? 0.0 : std::max(kSnap * extentOf(nodes).norm(), 1e-300);
 }
 
-bool hasSlivers(const std::vector<Vec2>& nodes, const std::vector<CapTriangle>& cap) {
+bool hasSlivers(const std::vector<Vec2>& nodes, const CapCore& core, const std::vector<CapTriangle>& cap) {
   const double snap = snapDistance(nodes);
+  const auto placeOf = [&](Index n) -> const Vec2& {
+    return n < nodes.size() ? nodes[n] : core.places[n - nodes.size()];
+  };
   for (const CapTriangle& t : cap) {
-    const Vec2 &a = nodes[t.nodes[0]], &b = nodes[t.nodes[1]], &c = nodes[t.nodes[2]];
+    const Vec2 &a = placeOf(t.nodes[0]), &b = placeOf(t.nodes[1]), &c = placeOf(t.nodes[2]);
     const double longest = std::sqrt(std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()}));
     if (!(std::abs(cross(b - a, c - a)) > snap * longest)) return true;
   }

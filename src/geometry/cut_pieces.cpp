@@ -20,29 +20,45 @@ double solidAngle(const TriangleMesh& mesh, const Vec3& p) {
   return 2.0 * half;
 }
 
+/// The vertex farthest from the plane: on the plane a cavity may touch the solid that holds it.
+Vec3 deepestOf(const Workpiece& work, const CutPiece& piece) {
+  Vec3 deepest = piece.mesh.vertices.front();
+  double depth = -1.0;
+  for (const Vec3& p : piece.mesh.vertices) {
+    const double here = std::abs(work.normal.dot(p - work.center));
+    if (here > depth) {
+      depth = here;
+      deepest = p;
+    }
+  }
+  return deepest;
+}
+
 void append(const CutPiece& from, CutPiece& to) {
   const Index offset = static_cast<Index>(to.mesh.vertices.size());
   to.mesh.vertices.insert(to.mesh.vertices.end(), from.mesh.vertices.begin(), from.mesh.vertices.end());
   to.origins.insert(to.origins.end(), from.origins.begin(), from.origins.end());
   to.mesh.patches.insert(to.mesh.patches.end(), from.mesh.patches.begin(), from.mesh.patches.end());
+  for (const Index v : from.cap_interior) to.cap_interior.push_back(v + offset);
   for (const Triangle& t : from.mesh.triangles)
     to.mesh.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
 }
 
 }  // namespace
 
-std::vector<CutPiece> piecesOf(std::vector<Shell> shells) {
+std::vector<CutPiece> piecesOf(const Workpiece& work, std::vector<Shell> shells) {
   std::vector<Box> boxes;
-  for (const Shell& shell : shells) boxes.push_back(boundsOf(shell.piece.mesh.vertices));
+  if (std::any_of(shells.begin(), shells.end(), [](const Shell& shell) { return shell.volume < 0.0; }))
+    for (const Shell& shell : shells) boxes.push_back(boundsOf(shell.piece.mesh.vertices));
   std::vector<Index> holders(shells.size(), kNoIndex);
   for (Index cavity = 0; cavity < shells.size(); ++cavity) {
     if (!(shells[cavity].volume < 0.0)) continue;
-    // On the plane it may touch the solid that holds it.
-    const Vec3& inside = shells[cavity].deepest;
+    const Vec3 inside = deepestOf(work, shells[cavity].piece);
     Index& holder = holders[cavity];
     for (Index s = 0; s < shells.size(); ++s) {
       const Shell& solid = shells[s];
-      if (!(solid.volume > 0.0) || solid.piece.side != shells[cavity].piece.side || !boxes[s].contains(inside)) continue;
+      if (!(solid.volume > 0.0) || solid.piece.side != shells[cavity].piece.side || !boxes[s].contains(inside))
+        continue;
       if (holder != kNoIndex && !(solid.volume < shells[holder].volume)) continue;
       if (solidAngle(solid.piece.mesh, inside) > 2.0 * M_PI) holder = s;
     }

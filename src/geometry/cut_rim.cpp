@@ -8,18 +8,16 @@ namespace meshless {
 namespace cutting {
 namespace {
 
-std::uint64_t edgeKey(Index a, Index b) {
-  return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b);
-}
+std::uint64_t edgeKey(Index a, Index b) { return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b); }
 
 /// Vertices inside an edge, from its lower-numbered end to the other.
 using InnerVertices = std::unordered_map<std::uint64_t, std::vector<Index>>;
 
 /// Splits the triangles at the given edges. What is made inside of a triangle is never an edge to be split.
 void splitTriangles(SideSurface& surface, const InnerVertices& inner) {
-  const std::vector<Index> before = surface.near;
+  const Index before = static_cast<Index>(surface.triangles.size());
   std::vector<Triangle> open;
-  for (const Index t : before) {
+  for (Index t = 0; t < before; ++t) {
     bool first = true;
     open.assign(1, surface.triangles[t]);
     while (!open.empty()) {
@@ -35,7 +33,7 @@ void splitTriangles(SideSurface& surface, const InnerVertices& inner) {
         if (first) {
           surface.triangles[t] = triangle;
         } else {
-          surface.addNear(triangle, surface.patches[t]);
+          surface.add(triangle, surface.patches[t]);
         }
         first = false;
         continue;
@@ -58,20 +56,22 @@ void splitTriangles(SideSurface& surface, const InnerVertices& inner) {
 std::vector<Index> Nodes::lowestVertices() const {
   std::vector<Index> lowest(places.size(), kNoIndex);
   for (Index v = 0; v < of_vertex.size(); ++v)
-    if (of_vertex[v] != kNoIndex) lowest[of_vertex[v]] = std::min(lowest[of_vertex[v]], v);
+    if (of_vertex[v] != kNoIndex) lowest[of_vertex[v]] = std::min(lowest[of_vertex[v]], first_vertex + v);
   return lowest;
 }
 
 std::vector<Index> Nodes::mergedVertices() const {
   const std::vector<Index> lowest = lowestVertices();
   std::vector<Index> merged(of_vertex.size());
-  for (Index v = 0; v < merged.size(); ++v) merged[v] = of_vertex[v] == kNoIndex ? v : lowest[of_vertex[v]];
+  for (Index v = 0; v < merged.size(); ++v)
+    merged[v] = of_vertex[v] == kNoIndex ? first_vertex + v : lowest[of_vertex[v]];
   return merged;
 }
 
 Nodes nodesOf(const Workpiece& work, const std::vector<RimEdge>& rim) {
   Nodes nodes;
-  nodes.of_vertex.assign(work.positions.size(), kNoIndex);
+  nodes.first_vertex = work.mesh_vertices;
+  nodes.of_vertex.assign(work.new_positions.size(), kNoIndex);
   struct Placed {
     double x, y;
     Index vertex;
@@ -79,8 +79,9 @@ Nodes nodesOf(const Workpiece& work, const std::vector<RimEdge>& rim) {
   std::vector<Placed> placed;
   for (const RimEdge& e : rim) {
     for (const Index v : {e.from, e.to}) {
-      if (nodes.of_vertex[v] != kNoIndex) continue;
-      nodes.of_vertex[v] = 0;
+      Index& node = nodes.of_vertex[v - nodes.first_vertex];
+      if (node != kNoIndex) continue;
+      node = 0;
       const Vec2 p = work.flat(v);
       placed.push_back({p.x(), p.y(), v});
     }
@@ -91,7 +92,7 @@ Nodes nodesOf(const Workpiece& work, const std::vector<RimEdge>& rim) {
   for (std::size_t i = 0; i < placed.size(); ++i) {
     if (i == 0 || placed[i].x != placed[i - 1].x || placed[i].y != placed[i - 1].y)
       nodes.places.emplace_back(placed[i].x, placed[i].y);
-    nodes.of_vertex[placed[i].vertex] = static_cast<Index>(nodes.places.size() - 1);
+    nodes.of_vertex[placed[i].vertex - nodes.first_vertex] = static_cast<Index>(nodes.places.size() - 1);
   }
   return nodes;
 }
@@ -100,7 +101,7 @@ std::vector<OutlineSegment> outlineOf(const Nodes& nodes, const std::vector<RimE
   std::vector<OutlineSegment> outline;
   outline.reserve(rim.size());
   for (const RimEdge& e : rim) {
-    const Index from = nodes.of_vertex[e.from], to = nodes.of_vertex[e.to];
+    const Index from = nodes.at(e.from), to = nodes.at(e.to);
     if (from != to) outline.push_back({from, to, e.net});
   }
   return outline;
@@ -108,7 +109,7 @@ std::vector<OutlineSegment> outlineOf(const Nodes& nodes, const std::vector<RimE
 
 bool splitRim(Workpiece& work, const std::vector<RimEdge>& rim, Nodes& nodes) {
   std::vector<OutlineSegment> segments;
-  for (const RimEdge& e : rim) segments.push_back({nodes.of_vertex[e.from], nodes.of_vertex[e.to], e.net});
+  for (const RimEdge& e : rim) segments.push_back({nodes.at(e.from), nodes.at(e.to), e.net});
   SplitOutline split = splitOutline(nodes.places, segments);
   if (!split.ok) return false;
 

@@ -1,7 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <tuple>
 #include <unordered_map>
 
 #include "cut_pieces.h"
@@ -19,13 +17,45 @@ using Corner = Index;
 Corner nextCorner(Corner c) { return c % 3 == 2 ? c - 2 : c + 1; }
 Corner previousCorner(Corner c) { return c % 3 == 0 ? c + 2 : c - 1; }
 
-/// Finds for every edge at the plane, of every triangle there, the edge of the triangle next to it. (All triangles at an
-/// edge with an end on the plane have a corner on the plane.)
+/// A number for each pair of vertices, kNoIndex at first. Best for half as many as there is room for.
+class EdgeTable {
+ public:
+  explicit EdgeTable(std::size_t most) {
+    std::size_t size = 16;
+    while (size <= most) size *= 2;
+    entries_.assign(size, {kNoIndex, kNoIndex, kNoIndex});
+  }
+
+  /// low < kNoIndex. Stays where it is.
+  Index& at(Index low, Index high) {
+    const std::uint64_t key = (static_cast<std::uint64_t>(low) << 32) | high;
+    std::size_t slot = (key * 0x9e3779b97f4a7c15u >> 24) & (entries_.size() - 1);
+    while (entries_[slot].low != kNoIndex && (entries_[slot].low != low || entries_[slot].high != high))
+      slot = (slot + 1) & (entries_.size() - 1);
+    entries_[slot].low = low;
+    entries_[slot].high = high;
+    return entries_[slot].number;
+  }
+
+ private:
+  struct Entry {
+    Index low, high, number;
+  };
+  std::vector<Entry> entries_;
+};
+
+/// Finds for every edge at the plane, of every triangle there, the edge of the triangle next to it. (All triangles at
+/// an edge with an end on the plane have a corner on the plane.)
 class Pairing {
  public:
   Pairing(const Workpiece& work, const std::vector<Index>& merged, const SideSurface& surface)
-      : work_(work), merged_(merged), surface_(surface), partners(3 * surface.near.size(), kNoIndex) {
-    collapsed_.resize(surface.near.size());
+      : work_(work), surface_(surface), partners(3 * surface.triangles.size(), kNoIndex) {
+    vertices_.resize(partners.size());
+    for (Corner c = 0; c < vertices_.size(); ++c) {
+      const Index own = ownVertex(c);
+      vertices_[c] = work.onRim(own) ? merged[own - work.mesh_vertices] : own;
+    }
+    collapsed_.resize(surface.triangles.size());
     for (Index n = 0; n < collapsed_.size(); ++n) {
       const Index a = vertexOf(3 * n), b = vertexOf(3 * n + 1), c = vertexOf(3 * n + 2);
       collapsed_[n] = a == b || b == c || c == a;
@@ -34,30 +64,29 @@ class Pairing {
 
   /// False where the surface is open.
   bool run() {
-    struct Edge {
-      std::uint64_t ends;
-      Corner corner;
-    };
-    std::vector<Edge> edges;
-    edges.reserve(partners.size());
-    for (Corner c = 0; c < partners.size(); ++c) {
+    // Chains of corners at the same edge, ascending.
+    EdgeTable first(partners.size());
+    std::vector<Corner> next(partners.size(), kNoIndex);
+    std::vector<Corner*> head(partners.size(), nullptr);
+    for (Corner c = static_cast<Corner>(partners.size()); c-- > 0;) {
       if (collapsed(c / 3)) continue;
-      const std::uint64_t a = vertexOf(c), b = vertexOf(nextCorner(c));
-      if (work_.onPlane(vertexOf(c)) || work_.onPlane(vertexOf(nextCorner(c))))
-        edges.push_back({(std::min(a, b) << 32) | std::max(a, b), c});
+      const Index a = vertexOf(c), b = vertexOf(nextCorner(c));
+      if (!work_.onRim(a) && !work_.onRim(b)) continue;
+      head[c] = &first.at(std::min(a, b), std::max(a, b));
+      next[c] = *head[c];
+      *head[c] = c;
     }
-    std::sort(edges.begin(), edges.end(), [](const Edge& p, const Edge& q) {
-      return p.ends != q.ends ? p.ends < q.ends : p.corner < q.corner;
-    });
     std::vector<Corner> around;
-    for (std::size_t begin = 0, end = 0; begin < edges.size(); begin = end) {
+    for (Corner c = 0; c < partners.size(); ++c) {
+      if (head[c] == nullptr || *head[c] != c) continue;
       around.clear();
-      for (; end < edges.size() && edges[end].ends == edges[begin].ends; ++end) around.push_back(edges[end].corner);
+      for (Corner k = c; k != kNoIndex; k = next[k]) around.push_back(k);
       if (around.size() == 2) {
         if (vertexOf(around[0]) == vertexOf(around[1])) return false;
         join(around[0], around[1]);
-      } else if (!pairSideBySide(around)) {
-        return false;
+      } else {
+        crowded_ = true;
+        if (!pairSideBySide(around)) return false;
       }
     }
     dropFlaps();
@@ -65,11 +94,14 @@ class Pairing {
   }
 
   /// The vertex itself, and the one that it counts as.
-  Index ownVertex(Corner c) const { return surface_.triangles[surface_.near[c / 3]][c % 3]; }
-  Index vertexOf(Corner c) const { return merged_[ownVertex(c)]; }
+  Index ownVertex(Corner c) const { return surface_.triangles[c / 3][c % 3]; }
+  Index vertexOf(Corner c) const { return vertices_[c]; }
 
   /// Merging vertices took its area: it drops out, and its neighbours meet. So do two that cancel each other.
   bool collapsed(Index near) const { return collapsed_[near]; }
+
+  /// Some edge has more than two triangles.
+  bool crowded() const { return crowded_; }
 
  private:
   void join(Corner c, Corner d) {
@@ -90,15 +122,15 @@ class Pairing {
     };
     const Index a = std::min(vertexOf(around[0]), vertexOf(nextCorner(around[0])));
     const Index b = std::max(vertexOf(around[0]), vertexOf(nextCorner(around[0])));
-    const Vec3 axis = (work_.positions[b] - work_.positions[a]).normalized();
+    const Vec3 axis = (work_.position(b) - work_.position(a)).normalized();
     // Edges on the plane measure from the plane, so that caps lie at exactly 0 and 180 degrees.
-    const Vec3 up = work_.onPlane(a) && work_.onPlane(b) ? work_.normal : axis.unitOrthogonal();
+    const Vec3 up = work_.onRim(a) && work_.onRim(b) ? work_.normal : axis.unitOrthogonal();
     const Vec3 along = up.cross(axis).normalized();
     std::vector<Leaf> leaves;
     int sum = 0;
     for (const Corner c : around) {
-      const Vec3 arm = work_.positions[vertexOf(previousCorner(c))] - work_.positions[a];
-      const std::int32_t layer = surface_.layerOf(surface_.near[c / 3]);
+      const Vec3 arm = work_.position(vertexOf(previousCorner(c))) - work_.position(a);
+      const std::int32_t layer = surface_.layerOf(c / 3);
       double angle = std::atan2(layer != 0 ? 0.0 : up.dot(arm), along.dot(arm));
       if (angle < -kSameAngle) angle += 2.0 * M_PI;
       const bool opens = vertexOf(c) == b;
@@ -152,31 +184,13 @@ class Pairing {
   }
 
   const Workpiece& work_;
-  const std::vector<Index>& merged_;
   const SideSurface& surface_;
-  std::vector<bool> collapsed_;
+  std::vector<Index> vertices_;  // as they count, one a corner
+  std::vector<char> collapsed_;
+  bool crowded_ = false;
 
  public:
   std::vector<Corner> partners;  // kNoIndex for edges off the plane and collapsed triangles
-};
-
-/// Union-find over numbers, the lowest of a set its root.
-class Sets {
- public:
-  explicit Sets(std::size_t count) : parents_(count) { std::iota(parents_.begin(), parents_.end(), Index{0}); }
-
-  Index rootOf(Index i) {
-    while (parents_[i] != i) i = parents_[i] = parents_[parents_[i]];
-    return i;
-  }
-  void unite(Index i, Index j) {
-    i = rootOf(i);
-    j = rootOf(j);
-    parents_[std::max(i, j)] = std::min(i, j);
-  }
-
- private:
-  std::vector<Index> parents_;
 };
 
 /// Corners on the plane, numbered by umbrella.
@@ -191,13 +205,13 @@ Umbrellas umbrellasOf(const Workpiece& work, const Pairing& pairing) {
   for (Corner c = 0; c < corners; ++c) {
     const Corner d = pairing.partners[c];
     if (d == kNoIndex || d < c) continue;
-    if (work.onPlane(pairing.vertexOf(c))) sets.unite(c, nextCorner(d));
-    if (work.onPlane(pairing.vertexOf(d))) sets.unite(d, nextCorner(c));
+    if (work.onRim(pairing.vertexOf(c))) sets.unite(c, nextCorner(d));
+    if (work.onRim(pairing.vertexOf(d))) sets.unite(d, nextCorner(c));
   }
   Umbrellas umbrellas;
   umbrellas.of_corner.assign(corners, kNoIndex);
   for (Corner c = 0; c < corners; ++c) {
-    if (!work.onPlane(pairing.ownVertex(c)) || pairing.collapsed(c / 3)) continue;
+    if (!work.onRim(pairing.ownVertex(c)) || pairing.collapsed(c / 3)) continue;
     Index& number = umbrellas.of_corner[sets.rootOf(c)];  // the root is the lowest corner and so comes first
     if (number == kNoIndex) {
       number = static_cast<Index>(umbrellas.vertices.size());
@@ -209,7 +223,8 @@ Umbrellas umbrellasOf(const Workpiece& work, const Pairing& pairing) {
   return umbrellas;
 }
 
-/// Replaces a triangle with vertices inside of its edges (kNoIndex: none; k is on the edge from corner k) by smaller ones.
+/// Replaces a triangle with vertices inside of its edges (kNoIndex: none; k is on the edge from corner k) by smaller
+/// ones.
 void subdivide(const Triangle& t, const std::array<Index, 3>& middles, std::vector<Triangle>& parts) {
   std::vector<Index> outline;
   std::size_t first = 0;
@@ -230,36 +245,37 @@ void subdivide(const Triangle& t, const std::array<Index, 3>& middles, std::vect
 }
 
 /// Two pairs of triangles may run between the same two vertices, where a surface touches itself along an edge
-/// at the plane and hangs together at both ends. All but the first get a vertex inside of the edge. `shell_of`, `place_of`:
-/// for each triangle near the plane its shell (kNoIndex: none) and its number there. False where it cannot be done.
+/// at the plane and hangs together at both ends. All but the first get a vertex inside of the edge. `shell_of`,
+/// `place_of`: for each triangle near the plane its shell (kNoIndex: none) and its number there. False where it cannot
+/// be done.
 bool splitDoubleEdges(const Pairing& pairing, const std::vector<Index>& shell_of, const std::vector<Index>& place_of,
-                      std::vector<Shell>& shells) {
-  struct Pair {
-    Index shell, low, high;
-    Corner corner;
-  };
-  std::vector<Pair> pairs;
+                      std::vector<Shell>& shells, bool& changed) {
+  if (!pairing.crowded()) return true;
+  // Edges in shells: a shell's vertices count from where the last shell's end.
+  std::vector<Index> first_vertex(shells.size() + 1, 0);
+  for (std::size_t s = 0; s < shells.size(); ++s)
+    first_vertex[s + 1] = first_vertex[s] + static_cast<Index>(shells[s].piece.mesh.vertices.size());
+  EdgeTable seen(pairing.partners.size());
+  std::unordered_map<Corner, Index> middles;
   for (Corner c = 0; c < pairing.partners.size(); ++c) {
     if (pairing.partners[c] == kNoIndex || pairing.partners[c] < c) continue;
-    const Triangle& t = shells[shell_of[c / 3]].piece.mesh.triangles[place_of[c / 3]];
-    const Index a = t[c % 3], b = t[(c + 1) % 3];
-    pairs.push_back({shell_of[c / 3], std::min(a, b), std::max(a, b), c});
-  }
-  std::sort(pairs.begin(), pairs.end(), [](const Pair& p, const Pair& q) {
-    return std::tie(p.shell, p.low, p.high, p.corner) < std::tie(q.shell, q.low, q.high, q.corner);
-  });
-  std::unordered_map<Corner, Index> middles;
-  for (std::size_t i = 1; i < pairs.size(); ++i) {
-    const Pair &p = pairs[i], &before = pairs[i - 1];
-    if (before.shell != p.shell || before.low != p.low || before.high != p.high) continue;
-    CutPiece& piece = shells[p.shell].piece;
+    const Index shell = shell_of[c / 3];
+    CutPiece& piece = shells[shell].piece;
+    const Triangle& t = piece.mesh.triangles[place_of[c / 3]];
+    const Index low = std::min(t[c % 3], t[(c + 1) % 3]), high = std::max(t[c % 3], t[(c + 1) % 3]);
+    Index& count = seen.at(first_vertex[shell] + low, first_vertex[shell] + high);
+    if (count == kNoIndex) {
+      count = 1;
+      continue;
+    }
     VertexOrigin origin;
-    if (!mixOrigins(piece.origins[p.low], piece.origins[p.high], 0.5, origin)) return false;
-    middles[p.corner] = middles[pairing.partners[p.corner]] = static_cast<Index>(piece.mesh.vertices.size());
-    piece.mesh.vertices.push_back(0.5 * (piece.mesh.vertices[p.low] + piece.mesh.vertices[p.high]));
+    if (!mixOrigins(piece.origins[low], piece.origins[high], 0.5, origin)) return false;
+    middles[c] = middles[pairing.partners[c]] = static_cast<Index>(piece.mesh.vertices.size());
+    piece.mesh.vertices.push_back(0.5 * (piece.mesh.vertices[low] + piece.mesh.vertices[high]));
     piece.origins.push_back(origin);
   }
   if (middles.empty()) return true;
+  changed = true;
   std::vector<Triangle> parts;
   for (Index n = 0; n < shell_of.size(); ++n) {
     if (shell_of[n] == kNoIndex) continue;
@@ -284,99 +300,285 @@ bool splitDoubleEdges(const Pairing& pairing, const std::vector<Index>& shell_of
   return true;
 }
 
-}  // namespace
-
-Result<std::vector<Shell>> shellsOf(const Workpiece& work, const std::vector<Index>& merged, Side side) {
-  const SideSurface& surface = work.sides[side];
-  Pairing pairing(work, merged, surface);
-  if (!pairing.run())
-    return Error{ErrorCode::kUnsuitableShape, "the surface is open or not oriented where the plane meets it"};
-  const Umbrellas umbrellas = umbrellasOf(work, pairing);
-
-  // Vertices off the plane keep their numbers, umbrellas follow.
-  const Index vertices = static_cast<Index>(work.positions.size());
-  std::vector<Triangle> corners;  // of every triangle, in those numbers
-  corners.reserve(surface.triangles.size());
-  Sets sets(vertices + umbrellas.vertices.size());
-  std::size_t next_near = 0;
-  for (Index t = 0; t < surface.triangles.size(); ++t) {
-    Triangle numbers = surface.triangles[t];
-    if (next_near < surface.near.size() && surface.near[next_near] == t) {
-      for (Index k = 0; k < 3; ++k) {
-        const Index umbrella = umbrellas.of_corner[3 * next_near + k];
-        if (umbrella != kNoIndex) numbers[k] = vertices + umbrella;
-      }
-      if (pairing.collapsed(static_cast<Index>(next_near++))) numbers[0] = kNoIndex;
-    }
-    corners.push_back(numbers);
-    if (numbers[0] == kNoIndex) continue;
-    sets.unite(numbers[0], numbers[1]);
-    sets.unite(numbers[0], numbers[2]);
+/// What hangs together: untouched parts, then the umbrellas and the core parts of each side.
+class Pieces {
+ public:
+  Pieces(Workpiece& work, const CapCore& core, const std::array<Pairing, 2>& pairings, std::uint32_t cap_patch)
+      : work_(work), core_(core), pairings_(pairings), cap_patch_(cap_patch) {
+    for (int side = 0; side < 2; ++side) umbrellas_[side] = umbrellasOf(work, pairings[side]);
   }
 
-  // Shells in the order of their first triangles.
-  std::vector<Index> shell_of_root(vertices + umbrellas.vertices.size(), kNoIndex), shell_of(corners.size(), kNoIndex);
-  std::vector<Index> counts;
-  for (Index t = 0; t < corners.size(); ++t) {
-    if (corners[t][0] == kNoIndex) continue;
-    Index& shell = shell_of_root[sets.rootOf(corners[t][0])];
-    if (shell == kNoIndex) {
-      shell = static_cast<Index>(counts.size());
-      counts.push_back(0);
+  Result<std::vector<Shell>> run() {
+    addPartsOfTouchedAlone();
+    numberElements();
+    unite();
+    makeShells();
+    addVertices();
+    addUntouched();
+    for (int side = 0; side < 2; ++side) {
+      addTouched(side);
+      addCore(side);
     }
-    shell_of[t] = shell;
-    ++counts[shell];
+    bool changed = false;
+    for (int side = 0; side < 2; ++side)
+      if (!splitDoubleEdges(pairings_[side], near_shell_[side], near_place_[side], shells_, changed))
+        return Error{ErrorCode::kUnsuitableShape,
+                     "the surface crosses itself where it is cut, at more places than the new vertices there can be "
+                     "made from"};
+    for (std::size_t s = 0; s < shells_.size(); ++s)
+      shells_[s].volume = changed ? signedVolume(shells_[s].piece.mesh) : six_volumes_[s] / 6.0;
+    return std::move(shells_);
   }
-  std::vector<Shell> shells(counts.size());
-  for (Index s = 0; s < shells.size(); ++s) {
-    shells[s].flat = true;
-    shells[s].piece.side = side == kUpper ? 1 : -1;
-    shells[s].piece.mesh.triangles.reserve(counts[s]);
-    shells[s].piece.mesh.patches.reserve(counts[s]);
-    shells[s].piece.mesh.vertices.reserve(counts[s] / 2 + 2);  // Euler, for a ball
-    shells[s].piece.origins.reserve(counts[s] / 2 + 2);
-  }
-  std::vector<double> depths(shells.size(), 0.0);
-  std::vector<Index>& local = shell_of_root;  // has served
-  local.assign(local.size(), kNoIndex);
-  std::vector<Index> near_shell, near_place;
-  next_near = 0;
-  for (Index t = 0; t < corners.size(); ++t) {
-    const bool near = next_near < surface.near.size() && surface.near[next_near] == t;
-    next_near += near;
-    if (near) {
-      near_shell.push_back(shell_of[t]);
-      near_place.push_back(shell_of[t] == kNoIndex ? kNoIndex
-                                                   : static_cast<Index>(shells[shell_of[t]].piece.mesh.triangles.size()));
-    }
-    if (shell_of[t] == kNoIndex) continue;
-    Shell& shell = shells[shell_of[t]];
-    CutPiece& piece = shell.piece;
-    Triangle triangle;
-    for (int k = 0; k < 3; ++k) {
-      const Index number = corners[t][k];
-      if (local[number] == kNoIndex) {
-        local[number] = static_cast<Index>(piece.mesh.vertices.size());
-        const Index vertex = number < vertices ? number : umbrellas.vertices[number - vertices];
-        piece.mesh.vertices.push_back(work.positions[vertex]);
-        piece.origins.push_back(work.originOf(vertex));
-        const double depth = std::abs(work.normal.dot(work.positions[vertex] - work.center));
-        if (number < vertices && depth > depths[shell_of[t]]) {
-          depths[shell_of[t]] = depth;
-          shell.deepest = work.positions[vertex];
-          shell.flat = false;
+
+ private:
+  /// Vertices off the plane whose triangles all have a corner on it.
+  void addPartsOfTouchedAlone() {
+    Untouched& parts = work_.untouched;
+    for (int side = 0; side < 2; ++side) {
+      const std::vector<Triangle>& triangles = work_.sides[side].triangles;
+      for (Index t = 0; t < triangles.size(); ++t) {
+        if (pairings_[side].collapsed(t)) continue;
+        for (const Index v : triangles[t]) {
+          if (v >= work_.mesh_vertices || parts.part_of_vertex[v] != kNoIndex) continue;
+          parts.part_of_vertex[v] = static_cast<Index>(parts.sides.size());
+          parts.sides.push_back(static_cast<Side>(side));
+          parts.triangles.push_back(0);
         }
       }
-      triangle[k] = local[number];
     }
-    piece.mesh.triangles.push_back(triangle);
-    piece.mesh.patches.push_back(surface.patches[t]);
   }
-  if (!splitDoubleEdges(pairing, near_shell, near_place, shells))
-    return Error{ErrorCode::kUnsuitableShape, "the surface crosses itself where it is cut, at more places than the new "
-                                              "vertices there can be made from"};
-  for (Shell& shell : shells) shell.volume = signedVolume(shell.piece.mesh);
-  return shells;
+
+  void numberElements() {
+    elements_ = work_.untouched.sides.size();
+    for (int side = 0; side < 2; ++side) {
+      first_umbrella_[side] = static_cast<Index>(elements_);
+      elements_ += umbrellas_[side].vertices.size();
+      first_core_[side] = static_cast<Index>(elements_);
+      elements_ += core_.parts;
+    }
+  }
+
+  Index elementOf(int side, Index vertex, Corner corner) const {
+    if (vertex < work_.mesh_vertices) return work_.untouched.part_of_vertex[vertex];
+    if (vertex >= work_.first_inner) return first_core_[side] + core_.part_of_point[vertex - work_.first_inner];
+    return first_umbrella_[side] + umbrellas_[side].of_corner[corner];
+  }
+
+  void unite() {
+    Sets sets(elements_);
+    near_counts_.assign(elements_, 0);
+    for (int side = 0; side < 2; ++side) {
+      const std::vector<Triangle>& triangles = work_.sides[side].triangles;
+      for (Index t = 0; t < triangles.size(); ++t) {
+        if (pairings_[side].collapsed(t)) continue;
+        Triangle numbers;
+        for (Index k = 0; k < 3; ++k) numbers[k] = elementOf(side, triangles[t][k], 3 * t + k);
+        sets.unite(numbers);
+        ++near_counts_[numbers[0]];
+      }
+      for (const Triangle& t : core_.triangles) ++near_counts_[first_core_[side] + core_.part_of_point[t[0]]];
+    }
+    shell_of_.assign(elements_, kNoIndex);
+    shell_count_ = 0;
+    for (Index e = 0; e < elements_; ++e) {
+      const Index root = sets.rootOf(e);
+      if (root == e) shell_of_[e] = shell_count_++;
+      shell_of_[e] = shell_of_[root];
+    }
+  }
+
+  void makeShells() {
+    const Untouched& parts = work_.untouched;
+    shells_.resize(shell_count_);
+    std::vector<std::size_t> counts(shell_count_, 0);
+    untouched_.assign(shell_count_, 0);
+    for (Shell& shell : shells_) shell.flat = true;
+    for (Index e = 0; e < elements_; ++e) {
+      Shell& shell = shells_[shell_of_[e]];
+      counts[shell_of_[e]] += near_counts_[e];
+      if (e < parts.sides.size()) {
+        shell.flat = false;
+        untouched_[shell_of_[e]] += parts.triangles[e];
+        shell.piece.side = parts.sides[e] == kUpper ? 1 : -1;
+      } else {
+        shell.piece.side = e < first_umbrella_[kLower] ? 1 : -1;
+      }
+    }
+    for (std::size_t s = 0; s < shells_.size(); ++s) {
+      CutPiece& piece = shells_[s].piece;
+      const std::size_t triangles = counts[s] + untouched_[s];
+      piece.mesh.triangles.reserve(triangles);
+      piece.mesh.patches.reserve(triangles);
+      piece.mesh.vertices.reserve(triangles / 2 + 2);  // Euler, for a ball
+      piece.origins.reserve(triangles / 2 + 2);
+      shells_[s].untouched = untouched_[s];
+    }
+    six_volumes_.assign(shell_count_, 0.0);
+    base_.assign(shell_count_, Vec3::Zero());
+    // A shell a side: which one follows from the side of a vertex.
+    simple_ = shell_count_ == 2 && shells_[0].piece.side != shells_[1].piece.side;
+  }
+
+  Index shellOfMeshVertex(Index v) const {
+    if (simple_) return (work_.states[v] > 0) == (shells_[0].piece.side > 0) ? 0 : 1;
+    return shell_of_[work_.untouched.part_of_vertex[v]];
+  }
+
+  Index addVertex(Index shell, Index vertex, const VertexOrigin& origin) {
+    CutPiece& piece = shells_[shell].piece;
+    piece.mesh.vertices.push_back(work_.position(vertex));
+    piece.origins.push_back(origin);
+    return static_cast<Index>(piece.mesh.vertices.size() - 1);
+  }
+
+  void addVertices() {
+    local_.resize(work_.mesh_vertices);
+    const std::vector<Index>& part_of_vertex = work_.untouched.part_of_vertex;
+    const Points& points = work_.mesh->vertices;
+    for (Index v = 0; v < work_.mesh_vertices;) {
+      const Index part = part_of_vertex[v];
+      Index end = v + 1;
+      while (end < work_.mesh_vertices && part_of_vertex[end] == part) ++end;
+      if (part != kNoIndex) {
+        CutPiece& piece = shells_[shell_of_[part]].piece;
+        const Index first = static_cast<Index>(piece.mesh.vertices.size());
+        piece.mesh.vertices.insert(piece.mesh.vertices.end(), points.begin() + v, points.begin() + end);
+        piece.origins.resize(first + (end - v));
+        for (Index k = 0; k < end - v; ++k) {
+          piece.origins[first + k].parents[0] = v + k;
+          piece.origins[first + k].weights[0] = 1.0;
+          local_[v + k] = first + k;
+        }
+      }
+      v = end;
+    }
+    for (int side = 0; side < 2; ++side) {
+      for (Index u = 0; u < umbrellas_[side].vertices.size(); ++u) {
+        const Index vertex = umbrellas_[side].vertices[u];
+        local_umbrella_[side].push_back(
+            addVertex(shell_of_[first_umbrella_[side] + u], vertex, work_.originOf(vertex)));
+      }
+      for (Index point = 0; point < core_.part_of_point.size(); ++point) {
+        const Index shell = shell_of_[first_core_[side] + core_.part_of_point[point]];
+        const Index vertex = work_.first_inner + point;
+        local_inner_[side].push_back(addVertex(shell, vertex, work_.originOf(vertex)));
+        shells_[shell].piece.cap_interior.push_back(local_inner_[side].back());
+      }
+    }
+  }
+
+  void addTriangle(Index shell, const Triangle& local, std::uint32_t patch, const Vec3& a, const Vec3& b,
+                   const Vec3& c) {
+    TriangleMesh& mesh = shells_[shell].piece.mesh;
+    if (mesh.triangles.empty()) base_[shell] = a;
+    const Vec3& base = base_[shell];
+    six_volumes_[shell] += (a - base).dot((b - base).cross(c - base));  // as signedVolume() does
+    mesh.triangles.push_back(local);
+    mesh.patches.push_back(patch);
+  }
+
+  void addUntouched() {
+    const TriangleMesh& mesh = *work_.mesh;
+    std::size_t next_touched = 0;
+    for (std::size_t begin = 0; begin < mesh.triangles.size();) {
+      const std::size_t end =
+          next_touched < work_.touched.size() ? work_.touched[next_touched++] : mesh.triangles.size();
+      for (std::size_t t = begin; t < end;) {
+        const Index shell = shellOfMeshVertex(mesh.triangles[t][0]);
+        std::size_t stop = t + 1;
+        while (stop < end && shellOfMeshVertex(mesh.triangles[stop][0]) == shell) ++stop;
+        addUntouched(shell, t, stop);
+        t = stop;
+      }
+      begin = end + 1;
+    }
+  }
+
+  /// A run of triangles of one shell.
+  void addUntouched(Index shell, std::size_t begin, std::size_t end) {
+    const std::vector<Triangle>& triangles = work_.mesh->triangles;
+    const Points& p = work_.mesh->vertices;
+    TriangleMesh& mesh = shells_[shell].piece.mesh;
+    if (mesh.triangles.empty()) base_[shell] = p[triangles[begin][0]];
+    const Vec3 base = base_[shell];
+    const std::size_t first = mesh.triangles.size();
+    mesh.triangles.resize(first + (end - begin));
+    double sum = six_volumes_[shell];
+    for (std::size_t t = begin; t < end; ++t) {
+      const Triangle& corners = triangles[t];
+      mesh.triangles[first + (t - begin)] = {local_[corners[0]], local_[corners[1]], local_[corners[2]]};
+      sum += (p[corners[0]] - base).dot((p[corners[1]] - base).cross(p[corners[2]] - base));
+    }
+    six_volumes_[shell] = sum;
+    const std::vector<std::uint32_t>& patches = work_.mesh->patches;
+    if (patches.empty()) {
+      mesh.patches.resize(mesh.triangles.size(), kOuterPatch);
+    } else {
+      mesh.patches.insert(mesh.patches.end(), patches.begin() + static_cast<std::ptrdiff_t>(begin),
+                          patches.begin() + static_cast<std::ptrdiff_t>(end));
+    }
+  }
+
+  void addTouched(int side) {
+    const SideSurface& surface = work_.sides[side];
+    near_shell_[side].assign(surface.triangles.size(), kNoIndex);
+    near_place_[side].assign(surface.triangles.size(), kNoIndex);
+    for (Index t = 0; t < surface.triangles.size(); ++t) {
+      if (pairings_[side].collapsed(t)) continue;
+      const Triangle& corners = surface.triangles[t];
+      const Index shell = shell_of_[elementOf(side, corners[0], 3 * t)];
+      near_shell_[side][t] = shell;
+      near_place_[side][t] = static_cast<Index>(shells_[shell].piece.mesh.triangles.size());
+      Triangle local;
+      for (Index k = 0; k < 3; ++k) {
+        const Index v = corners[k];
+        local[k] = v < work_.mesh_vertices  ? local_[v]
+                   : v >= work_.first_inner ? local_inner_[side][v - work_.first_inner]
+                                            : local_umbrella_[side][umbrellas_[side].of_corner[3 * t + k]];
+      }
+      const Points& p = shells_[shell].piece.mesh.vertices;
+      addTriangle(shell, local, surface.patches[t], p[local[0]], p[local[1]], p[local[2]]);
+    }
+  }
+
+  void addCore(int side) {
+    for (const Triangle& t : core_.triangles) {
+      const Index shell = shell_of_[first_core_[side] + core_.part_of_point[t[0]]];
+      const std::vector<Index>& local = local_inner_[side];
+      Triangle triangle = {local[t[0]], local[t[1]], local[t[2]]};
+      if (side == kUpper) std::swap(triangle[1], triangle[2]);
+      const Points& p = shells_[shell].piece.mesh.vertices;
+      addTriangle(shell, triangle, cap_patch_, p[triangle[0]], p[triangle[1]], p[triangle[2]]);
+    }
+  }
+
+  Workpiece& work_;
+  const CapCore& core_;
+  const std::array<Pairing, 2>& pairings_;
+  std::uint32_t cap_patch_;
+  std::array<Umbrellas, 2> umbrellas_;
+  std::size_t elements_ = 0;
+  std::array<Index, 2> first_umbrella_{}, first_core_{};
+  std::vector<Index> near_counts_, shell_of_;
+  Index shell_count_ = 0;
+  bool simple_ = false;
+  std::vector<std::size_t> untouched_;
+  std::vector<Shell> shells_;
+  std::vector<double> six_volumes_;  // [m^3]
+  Points base_;
+  std::vector<Index> local_;  // numbers in the pieces
+  std::array<std::vector<Index>, 2> local_umbrella_, local_inner_, near_shell_, near_place_;
+};
+
+}  // namespace
+
+Result<std::vector<Shell>> shellsOf(Workpiece& work, const CapCore& core, const std::vector<Index>& merged,
+                                    std::uint32_t cap_patch) {
+  std::array<Pairing, 2> pairings{{{work, merged, work.sides[kUpper]}, {work, merged, work.sides[kLower]}}};
+  for (Pairing& pairing : pairings)
+    if (!pairing.run())
+      return Error{ErrorCode::kUnsuitableShape, "the surface is open or not oriented where the plane meets it"};
+  return Pieces(work, core, pairings, cap_patch).run();
 }
 
 }  // namespace cutting

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <unordered_map>
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 
@@ -15,42 +14,56 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
-std::uint64_t edgeKey(Index a, Index b) {
-  return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b);
+std::uint64_t edgeKey(Index a, Index b) { return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b); }
+
+double heightOf(const Workpiece& work, Index vertex) {
+  return work.normal.dot(work.mesh->vertices[vertex] - work.center);
 }
 
 /// Finds or makes the vertex where the plane crosses a mesh edge.
 class EdgeVertices {
  public:
-  EdgeVertices(Workpiece& work, const std::vector<double>& heights) : work_(work), heights_(heights) {}
+  EdgeVertices(Workpiece& work, std::size_t most_edges) : work_(work) {
+    std::size_t size = 16;
+    while (size < 2 * most_edges) size *= 2;
+    entries_.assign(size, {~std::uint64_t{0}, kNoIndex});
+  }
 
   Index at(Index a, Index b) {
-    const auto [entry, fresh] = made_.try_emplace(edgeKey(a, b), kNoIndex);
-    if (fresh) {
-      // From the upper end to the lower whoever asks, so that every triangle at the edge gets the same bits.
-      const Index upper = heights_[a] > 0.0 ? a : b;
-      const Index lower = upper == a ? b : a;
-      entry->second = work_.addBetween(upper, lower, heights_[upper] / (heights_[upper] - heights_[lower]));
+    const std::uint64_t key = edgeKey(a, b);
+    std::size_t slot = (key * 0x9e3779b97f4a7c15u >> 20) & (entries_.size() - 1);
+    while (entries_[slot].key != key) {
+      if (entries_[slot].vertex == kNoIndex) {
+        // From the upper end to the lower whoever asks, so that every triangle at the edge gets the same bits.
+        const Index upper = work_.states[a] > 0 ? a : b;
+        const Index lower = upper == a ? b : a;
+        const double above = heightOf(work_, upper), below = heightOf(work_, lower);
+        entries_[slot] = {key, work_.addBetween(upper, lower, above / (above - below))};
+        break;
+      }
+      slot = (slot + 1) & (entries_.size() - 1);
     }
-    return entry->second;
+    return entries_[slot].vertex;
   }
 
  private:
+  struct Entry {
+    std::uint64_t key;
+    Index vertex;
+  };
   Workpiece& work_;
-  const std::vector<double>& heights_;
-  std::unordered_map<std::uint64_t, Index> made_;
+  std::vector<Entry> entries_;
 };
 
 void addConvex(const Workpiece& work, const std::array<Index, 4>& corners, int count, std::uint32_t patch,
                SideSurface& surface) {
-  if (count == 3) return surface.addNear({corners[0], corners[1], corners[2]}, patch);
-  const Points& p = work.positions;
-  const double diagonal_02 = (p[corners[2]] - p[corners[0]]).squaredNorm();
-  const double diagonal_13 = (p[corners[3]] - p[corners[1]]).squaredNorm();
+  if (count == 3) return surface.add({corners[0], corners[1], corners[2]}, patch);
+  const double diagonal_02 = (work.position(corners[2]) - work.position(corners[0])).squaredNorm();
+  const double diagonal_13 = (work.position(corners[3]) - work.position(corners[1])).squaredNorm();
   const int first = diagonal_02 <= diagonal_13 ? 0 : 1;
   for (int half = 0; half < 2; ++half) {
     const int k = first + 2 * half;
-    surface.addNear({corners[k % 4], corners[(k + 1) % 4], corners[(k + 2) % 4]}, patch);
+    surface.add({corners[k % 4], corners[(k + 1) % 4], corners[(k + 2) % 4]}, patch);
   }
 }
 
@@ -58,9 +71,95 @@ void addConvex(const Workpiece& work, const std::array<Index, 4>& corners, int c
 /// triangulation uses, on the same points, so that the two never disagree.
 Side sideOfCoplanar(const Workpiece& work, const Triangle& t) {
   const Vec2 a = work.flat(t[0]), b = work.flat(t[1]), c = work.flat(t[2]);
-  const auto turn = CGAL::orientation(Kernel::Point_2(a.x(), a.y()), Kernel::Point_2(b.x(), b.y()),
-                                      Kernel::Point_2(c.x(), c.y()));
+  const auto turn =
+      CGAL::orientation(Kernel::Point_2(a.x(), a.y()), Kernel::Point_2(b.x(), b.y()), Kernel::Point_2(c.x(), c.y()));
   return turn == CGAL::LEFT_TURN ? kLower : kUpper;
+}
+
+std::uint64_t scatter(Index vertex) {
+  const std::uint64_t x = (vertex + std::uint64_t{1}) * 0x9e3779b97f4a7c15u;
+  return x ^ (x >> 32);
+}
+
+/// Every directed edge a -> b counts r_a r_b (r_b - r_a) with scattered numbers r, which its opposite takes away again:
+/// nothing is left of a closed surface. A triangle's three edges together are a product.
+std::uint64_t balanceOf(const Triangle& t) {
+  const std::uint64_t a = scatter(t[0]), b = scatter(t[1]), c = scatter(t[2]);
+  return (b - a) * (c - a) * (c - b);
+}
+
+/// Sorts the mesh's triangles into untouched and touched ones. False where it is not closed and oriented.
+Status sortTriangles(Workpiece& work) {
+  const TriangleMesh& mesh = *work.mesh;
+  const signed char* states = work.states.data();
+  std::array<Index, 2> untouched{0, 0};
+  std::uint64_t balance = 0;
+  bool degenerate = false;
+  Sets sets(mesh.vertices.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Triangle& triangle = mesh.triangles[t];
+    balance += balanceOf(triangle);
+    const int state = states[triangle[0]];
+    if (state == 0 || state != states[triangle[1]] || state != states[triangle[2]]) {
+      work.touched.push_back(static_cast<Index>(t));
+      continue;
+    }
+    degenerate |= triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0];
+    ++untouched[state > 0 ? kUpper : kLower];
+    sets.unite(triangle);
+  }
+  if (degenerate) return Error{ErrorCode::kUnsuitableShape, "the surface has a triangle that names a vertex twice"};
+  if (balance != 0)
+    return Error{ErrorCode::kUnsuitableShape,
+                 "the surface is open or not oriented: it has edges with more triangles in one direction than in the "
+                 "other"};
+
+  Untouched& parts = work.untouched;
+  parts.part_of_vertex.assign(mesh.vertices.size(), kNoIndex);
+  const std::vector<Index>& roots = sets.flatten();
+  std::array<Index, 2> parts_on_side{0, 0};
+  for (Index v = 0; v < roots.size(); ++v) {
+    const Index root = roots[v];
+    if (root == v) continue;
+    Index& part = parts.part_of_vertex[root];
+    if (part == kNoIndex) {
+      part = static_cast<Index>(parts.sides.size());
+      parts.sides.push_back(states[root] > 0 ? kUpper : kLower);
+      ++parts_on_side[parts.sides.back()];
+    }
+    parts.part_of_vertex[v] = part;
+  }
+  parts.triangles.assign(parts.sides.size(), 0);
+  if (parts_on_side[kUpper] <= 1 && parts_on_side[kLower] <= 1) {
+    for (std::size_t p = 0; p < parts.sides.size(); ++p) parts.triangles[p] = untouched[parts.sides[p]];
+    return Done{};
+  }
+  std::size_t next_touched = 0;
+  for (Index t = 0; t < mesh.triangles.size(); ++t) {
+    if (next_touched < work.touched.size() && work.touched[next_touched] == t) {
+      ++next_touched;
+    } else {
+      ++parts.triangles[parts.part_of_vertex[mesh.triangles[t][0]]];
+    }
+  }
+  return Done{};
+}
+
+/// Gives the mesh's vertices on the plane their other numbers.
+void renumberOnPlane(Workpiece& work, std::vector<Triangle>& triangles) {
+  std::vector<Index> on_plane;
+  for (const Triangle& t : triangles)
+    for (const Index v : t)
+      if (work.states[v] == 0) on_plane.push_back(v);
+  if (on_plane.empty()) return;
+  std::sort(on_plane.begin(), on_plane.end());
+  on_plane.erase(std::unique(on_plane.begin(), on_plane.end()), on_plane.end());
+  for (const Index v : on_plane) work.addVertex(work.mesh->vertices[v], work.originOf(v));
+  for (Triangle& t : triangles)
+    for (Index& v : t)
+      if (work.states[v] == 0)
+        v = work.mesh_vertices +
+            static_cast<Index>(std::lower_bound(on_plane.begin(), on_plane.end(), v) - on_plane.begin());
 }
 
 }  // namespace
@@ -74,10 +173,9 @@ VertexOrigin Workpiece::originOf(Index vertex) const {
 }
 
 Index Workpiece::addVertex(const Vec3& position, const VertexOrigin& origin) {
-  positions.push_back(position);
-  states.push_back(0);
+  new_positions.push_back(position);
   new_origins.push_back(origin);
-  return static_cast<Index>(positions.size() - 1);
+  return endVertex() - 1;
 }
 
 bool mixOrigins(const VertexOrigin& a, const VertexOrigin& b, double s, VertexOrigin& mixed) {
@@ -102,53 +200,58 @@ Index Workpiece::addBetween(Index a, Index b, double s) {
   const bool fits = mixOrigins(originOf(a), originOf(b), s, origin);
   assert(fits);
   (void)fits;
-  return addVertex(positions[a] + s * (positions[b] - positions[a]), origin);
+  return addVertex(position(a) + s * (position(b) - position(a)), origin);
 }
 
-Result<Workpiece> splitAtPlane(const TriangleMesh& mesh, const Plane& plane, const CutOptions& options) {
+Result<Workpiece> splitAtPlane(const TriangleMesh& mesh, const Plane& plane, double relative_band, const Box& box) {
   Workpiece work;
-  const Box box = boundsOf(mesh.vertices);
   // Never below what rounding makes of a height: crumbs may lie far from the origin.
   const double farthest = box.empty() ? 0.0 : std::max(box.min.cwiseAbs().maxCoeff(), box.max.cwiseAbs().maxCoeff());
-  const double band = std::max(options.band * box.diagonal(), 1e-14 * farthest);
+  const double band = std::max(relative_band * box.diagonal(), 1e-14 * farthest);
   const Vec3 middle = 0.5 * (box.min + box.max);
+  work.mesh = &mesh;
   work.normal = plane.normal.normalized();
   // A plane given by a far point would cost digits at every vertex.
   work.center = middle - work.normal.dot(middle - plane.point) * work.normal;
   work.axis_u = work.normal.unitOrthogonal();
   work.axis_v = work.normal.cross(work.axis_u);
-  work.positions = mesh.vertices;
   work.mesh_vertices = static_cast<Index>(mesh.vertices.size());
 
-  std::vector<double> heights(mesh.vertices.size());
   work.states.resize(mesh.vertices.size());
-  for (std::size_t v = 0; v < heights.size(); ++v) {
-    heights[v] = work.normal.dot(mesh.vertices[v] - work.center);
-    work.states[v] = static_cast<signed char>((heights[v] > band) - (heights[v] < -band));
+  // Copies: a state could be a byte of anything else, for all that the compiler knows.
+  const Vec3 normal = work.normal, center = work.center;
+  const Vec3* points = mesh.vertices.data();
+  signed char* states = work.states.data();
+  for (Index v = 0, end = work.mesh_vertices; v < end; ++v) {
+    const double height = normal.dot(points[v] - center);  // as heightOf()
+    states[v] = static_cast<signed char>((height > band) - (height < -band));
   }
+  const Status sorted = sortTriangles(work);
+  if (!sorted) return sorted.error();
 
-  for (SideSurface& side : work.sides) {
-    side.triangles.reserve(mesh.triangles.size());
-    side.patches.reserve(mesh.triangles.size());
-  }
   bool any_above = false, any_below = false;
-  EdgeVertices edge_vertices(work, heights);
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const Triangle& triangle = mesh.triangles[t];
-    const std::uint32_t patch = mesh.patchOf(t);
-    const std::array<int, 3> s{work.states[triangle[0]], work.states[triangle[1]], work.states[triangle[2]]};
+  for (const Side side : work.untouched.sides) (side == kUpper ? any_above : any_below) = true;
+  std::vector<Triangle> touched;
+  touched.reserve(work.touched.size());
+  for (const Index t : work.touched) touched.push_back(mesh.triangles[t]);
+  renumberOnPlane(work, touched);
+  EdgeVertices edge_vertices(work, 2 * touched.size());
+  double length = 0.0;
+  std::size_t crossed = 0;
+  for (std::size_t i = 0; i < touched.size(); ++i) {
+    const Triangle& triangle = touched[i];
+    const std::uint32_t patch = mesh.patchOf(work.touched[i]);
+    std::array<int, 3> s;
+    for (int k = 0; k < 3; ++k) s[k] = triangle[k] < work.mesh_vertices ? work.states[triangle[k]] : 0;
     const bool above = s[0] > 0 || s[1] > 0 || s[2] > 0, below = s[0] < 0 || s[1] < 0 || s[2] < 0;
     any_above |= above;
     any_below |= below;
     if (!above || !below) {
-      const Side side = above ? kUpper : below ? kLower : sideOfCoplanar(work, triangle);
-      if (s[0] != 0 && s[1] != 0 && s[2] != 0) {
-        work.sides[side].addFar(triangle, patch);
-      } else {
-        work.sides[side].addNear(triangle, patch);
-      }
+      work.sides[above ? kUpper : below ? kLower : sideOfCoplanar(work, triangle)].add(triangle, patch);
       continue;
     }
+    ++crossed;
+    for (int k = 0; k < 3; ++k) length += (work.position(triangle[(k + 1) % 3]) - work.position(triangle[k])).norm();
     std::array<std::array<Index, 4>, 2> polygons;
     std::array<int, 2> counts{0, 0};
     for (int k = 0; k < 3; ++k) {
@@ -165,6 +268,7 @@ Result<Workpiece> splitAtPlane(const TriangleMesh& mesh, const Plane& plane, con
     return Error{ErrorCode::kMissed, std::string("the plane misses the surface: nothing of it is ") +
                                          (any_above ? "below" : "above") + " the plane by more than " +
                                          std::to_string(1e3 * band) + " mm"};
+  if (crossed > 0) work.spacing = length / (3.0 * static_cast<double>(crossed));
   return work;
 }
 
@@ -176,9 +280,8 @@ Result<std::vector<RimEdge>> rimOf(const Workpiece& work) {
   };
   std::vector<HalfEdge> found;
   for (int side = 0; side < 2; ++side) {
-    for (const Index near : work.sides[side].near) {
-      const Triangle& t = work.sides[side].triangles[near];
-      const std::array<bool, 3> on{work.onPlane(t[0]), work.onPlane(t[1]), work.onPlane(t[2])};
+    for (const Triangle& t : work.sides[side].triangles) {
+      const std::array<bool, 3> on{work.onRim(t[0]), work.onRim(t[1]), work.onRim(t[2])};
       if (on[0] + on[1] + on[2] < 2) continue;
       for (int k = 0; k < 3; ++k) {
         const int next = (k + 1) % 3;

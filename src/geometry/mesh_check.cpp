@@ -20,7 +20,7 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
-constexpr double kWeld = 1e-9;      // of the bounds' diagonal
+constexpr double kWeld = 1e-9;       // of the bounds' diagonal
 constexpr double kFlatArea = 1e-14;  // of the squared longest edge: corners on a line
 constexpr double kSmallHole = 0.25;  // of the bounds' diagonal
 constexpr std::size_t kLongestRim = 200;
@@ -89,7 +89,7 @@ struct Orientation {
   std::vector<Index> component;  // one a triangle, numbered in order of their first triangle
   std::vector<char> turn;        // one a triangle; the first triangle of a component keeps its side
   Index components = 0;
-  std::size_t conflicts = 0;     // edges whose two triangles cannot agree
+  std::size_t conflicts = 0;  // edges whose two triangles cannot agree
 };
 
 Orientation orient(const std::vector<Triangle>& triangles, const std::vector<Side>& sides) {
@@ -232,8 +232,8 @@ class Repair {
     mergeVertices();
     dropTriangles();
     flipFlatTriangles();
-    const bool any_area = std::any_of(triangles_.begin(), triangles_.end(),
-                                      [&](const Triangle& t) { return !flat(points_, t); });
+    const bool any_area =
+        std::any_of(triangles_.begin(), triangles_.end(), [&](const Triangle& t) { return !flat(points_, t); });
     if (!any_area) return refuse("no triangle has an area: all corners lie on a line or in a point");
     if (const std::string why = nonManifold(); !why.empty()) return refuse(why);
     if (const std::string why = agree(); !why.empty()) return refuse(why);
@@ -299,10 +299,9 @@ class Repair {
       if (flats.empty()) break;
       const std::vector<Side> sides = sidesOf(triangles_);
       const auto edge = [&](Index a, Index b) {
-        return std::equal_range(sides.begin(), sides.end(), Side{std::min(a, b), std::max(a, b), 0, true},
-                                [](const Side& x, const Side& y) {
-                                  return x.low != y.low ? x.low < y.low : x.high < y.high;
-                                });
+        return std::equal_range(
+            sides.begin(), sides.end(), Side{std::min(a, b), std::max(a, b), 0, true},
+            [](const Side& x, const Side& y) { return x.low != y.low ? x.low < y.low : x.high < y.high; });
       };
       std::set<Index> changed;
       for (const Index f : flats) {

@@ -87,11 +87,11 @@ TriangleMesh sphereMesh(double radius, double edge) {
   TriangleMesh mesh;
   if (!positive(radius) || !positive(edge)) return mesh;
   const double golden = (1.0 + std::sqrt(5.0)) / 2.0;
-  const std::array<Vec3, 12> corners = {
-      Vec3(-1, golden, 0), Vec3(1, golden, 0), Vec3(-1, -golden, 0), Vec3(1, -golden, 0),
-      Vec3(0, -1, golden), Vec3(0, 1, golden), Vec3(0, -1, -golden), Vec3(0, 1, -golden),
-      Vec3(golden, 0, -1), Vec3(golden, 0, 1), Vec3(-golden, 0, -1), Vec3(-golden, 0, 1)};
-  const int faces[20][3] = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+  const std::array<Vec3, 12> corners = {Vec3(-1, golden, 0),  Vec3(1, golden, 0),   Vec3(-1, -golden, 0),
+                                        Vec3(1, -golden, 0),  Vec3(0, -1, golden),  Vec3(0, 1, golden),
+                                        Vec3(0, -1, -golden), Vec3(0, 1, -golden),  Vec3(golden, 0, -1),
+                                        Vec3(golden, 0, 1),   Vec3(-golden, 0, -1), Vec3(-golden, 0, 1)};
+  const int faces[20][3] = {{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
                             {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
                             {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
   const double corner_angle = std::acos(1.0 / std::sqrt(5.0));  // between neighbouring corners

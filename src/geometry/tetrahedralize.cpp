@@ -17,8 +17,7 @@ using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using VertexBase =
     CGAL::Triangulation_vertex_base_with_info_3<Index, Kernel, CGAL::Regular_triangulation_vertex_base_3<Kernel>>;
 using CellBase = CGAL::Regular_triangulation_cell_base_3<Kernel>;
-using Triangulation =
-    CGAL::Regular_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
+using Triangulation = CGAL::Regular_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
 
 constexpr double kFlat = 1e-9;     // of the cubed mean edge
 constexpr double kWeight = 1e-10;  // of the squared spacing
@@ -72,9 +71,9 @@ std::vector<Tetrahedron> cells(const Points& points) {
   for (std::size_t k = 0; k < points.size(); ++k) {
     if (!points[k].allFinite()) continue;
     const Vec3 p = points[k] - origin;
-    weighted.emplace_back(Kernel::Weighted_point_3(Kernel::Point_3(p.x(), p.y(), p.z()),
-                                                   kWeight * spacing * spacing * hashed(k)),
-                          static_cast<Index>(k));
+    weighted.emplace_back(
+        Kernel::Weighted_point_3(Kernel::Point_3(p.x(), p.y(), p.z()), kWeight * spacing * spacing * hashed(k)),
+        static_cast<Index>(k));
   }
   const Triangulation triangulation(weighted.begin(), weighted.end());
   if (triangulation.dimension() < 3) return found;

@@ -52,6 +52,7 @@ struct Services::Handlers {
     advertise(private_handle, "lock", &Handlers::lock);
     advertise(private_handle, "release", &Handlers::release);
     advertise(private_handle, "clear_picks", &Handlers::clearPicks);
+    advertise(private_handle, "open_scissors", &Handlers::openScissors);
     advertise(private_handle, "push", &Handlers::push);
     advertise(private_handle, "incise", &Handlers::incise);
     advertise(private_handle, "remove", &Handlers::remove);
@@ -211,13 +212,33 @@ struct Services::Handlers {
 
   bool incise(meshless_surgery::Incise::Request& request, meshless_surgery::Incise::Response& response) {
     BorderCheck check;
-    check.pose("blade.pose", request.blade.pose);
-    check.number("length", request.length, 1e-6, kMaxLength, "m");
-    check.number("depth", request.depth, 1e-6, kMaxLength, "m");
-    check.names("bodies", request.bodies);
+    InciseCommand command;
+    const Pose local = check.pose("blade.pose", request.blade.pose);
+    command.blade.length = check.number("length", request.length, 1e-6, kMaxLength, "m");
+    command.blade.depth = check.number("depth", request.depth, 1e-6, kMaxLength, "m");
+    command.bodies = check.names("bodies", request.bodies);
     if (!check.ok()) return refuse(response, "incise", check.error());
-    return refuse(response, "incise",
-                  {ErrorCode::kUnsupported, "partial cuts come with a later version; ~cut severs whole bodies"});
+    const auto frame = frames.toWorld(request.blade.header);
+    if (!frame.ok()) return refuse(response, "incise", frame.error());
+    const Mat3 axes = (frame->rotation * local.rotation).toRotationMatrix();
+    command.blade.origin = *frame * local.translation;
+    command.blade.x_axis = axes.col(0);
+    command.blade.y_axis = axes.col(1);
+    const auto answer = runner.apply(command);
+    if (!answer.ok()) return refuse(response, "incise", answer.error());
+    const auto& reply = std::get<InciseReply>(*answer);
+    response.cut_bodies = reply.cut_bodies;
+    response.new_bodies = reply.new_bodies;
+    response.opened_area = reply.opened_area;
+    response.duration = reply.duration;
+    std::string message = "opened " + joined(reply.cut_bodies);
+    if (!reply.new_bodies.empty()) message += ", which came apart into " + joined(reply.new_bodies);
+    for (const std::string& note : reply.notes) message += "; " + note;
+    return accept(response, message);
+  }
+
+  bool openScissors(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+    return applied(response, "open_scissors", OpenScissorsCommand{}, "opened the scissors; nothing was cut");
   }
 
   bool spawn(meshless_surgery::Spawn::Request& request, meshless_surgery::Spawn::Response& response) {

@@ -29,12 +29,8 @@ Status World::Impl::checkCut(const CutCommand& command) {
   if (!(b.width >= 0.0 && b.width <= 1e9)) return outOfRange("width", b.width, "0 (unbounded) to 1e9 m");
   if (!(command.close_time >= 0.0 && command.close_time <= 3600.0))
     return outOfRange("close_time", command.close_time, "0 (at once) to 3600 s");
-  if (!(command.roughness >= 0.0)) return outOfRange("roughness", command.roughness, "0");
-  if (command.roughness > 0.0) {
-    Error error = outOfRange("roughness", command.roughness, "0; rough cuts come with a later version");
-    error.code = ErrorCode::kUnsupported;
-    return error;
-  }
+  if (!(command.roughness >= 0.0 && command.roughness <= 1e6))
+    return outOfRange("roughness", command.roughness, "0 (clean) to 1e6 m");
   for (const std::string& name : command.bodies)
     if (!find(name)) return Error{ErrorCode::kUnknownName, "there is no body '" + name + "'; " + knownBodies()};
   return Done{};
@@ -89,6 +85,15 @@ void World::Impl::closeBlades() {
   }
 }
 
+Result<Reply> World::Impl::apply(const OpenScissorsCommand&) {
+  if (closing.empty()) return Error{ErrorCode::kMissed, "no scissors are closing"};
+  for (const ClosingCut& c : closing)
+    finished.emplace(c.ticket, Error{ErrorCode::kMissed, "the scissors were opened before their blades met"});
+  closing.clear();
+  scissors.shown = false;
+  return Reply(Done{});
+}
+
 std::optional<Result<CutReply>> World::finishedCut(std::uint32_t ticket) {
   const auto it = impl_->finished.find(ticket);
   if (it == impl_->finished.end()) return std::nullopt;
@@ -112,7 +117,8 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
     present.vertices = body->state.surface;
     present.triangles = body->model->surface.triangles;
     if (!bladesMeet(present, command.blades)) continue;
-    Result<CutBody> cut = cutBody(*body->model, body->state, plane);
+    Result<CutBody> cut =
+        cutBody(*body->model, body->state, plane, {command.roughness, static_cast<std::uint32_t>(next_ticket + step)});
     if (cut) {
       severed.push_back({body->id, std::move(*cut)});
     } else if (cut.error().code != ErrorCode::kMissed) {
@@ -128,31 +134,39 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
 
   // From here nothing fails: parents are retired and their pieces admitted.
   for (Severed& s : severed) {
-    WorldBody& parent = *find(s.parent);
-    const std::string parent_name = parent.name;
-    const Material material = parent.material;
-    const bool touched = parent.touched_by_push;
-    std::vector<BodyId> children;
-    std::vector<std::vector<Index>> parent_particles;
-    int number = 0;
-    for (BodyPiece& piece : s.cut.pieces) {
-      std::string name;
-      do name = parent_name + "." + std::to_string(++number);
-      while (used_names.count(name));
-      WorldBody& child = admit(name, material, std::move(piece.model), std::move(piece.state));
-      child.touched_by_push = touched;
-      children.push_back(child.id);
-      parent_particles.push_back(std::move(piece.parent_particles));
-      reply.new_bodies.push_back(name);
-    }
-    followPieces(s.parent, children, parent_particles);
-    retire(s.parent);
+    const std::string parent_name = find(s.parent)->name;
+    const std::vector<std::string> names = replaceByPieces(s.parent, std::move(s.cut.pieces));
+    reply.new_bodies.insert(reply.new_bodies.end(), names.begin(), names.end());
     reply.cut_bodies.push_back(parent_name);
     reply.cap_area += s.cut.cap_area;
-    say(EventType::kCut, parent_name, 0, "cut into " + std::to_string(children.size()) + " pieces");
+    say(EventType::kCut, parent_name, 0, "cut into " + std::to_string(names.size()) + " pieces");
   }
   reply.duration = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return reply;
+}
+
+std::vector<std::string> World::Impl::replaceByPieces(const BodyId& parent_id, std::vector<BodyPiece> pieces) {
+  const WorldBody& parent = *find(parent_id);
+  const std::string parent_name = parent.name;
+  const Material material = parent.material;
+  const bool touched = parent.touched_by_push;
+  std::vector<std::string> names;
+  std::vector<BodyId> children;
+  std::vector<std::vector<Index>> parent_particles;
+  int number = 0;
+  for (BodyPiece& piece : pieces) {
+    std::string name;
+    do name = parent_name + "." + std::to_string(++number);
+    while (used_names.count(name));
+    WorldBody& child = admit(name, material, std::move(piece.model), std::move(piece.state));
+    child.touched_by_push = touched;
+    children.push_back(child.id);
+    parent_particles.push_back(std::move(piece.parent_particles));
+    names.push_back(name);
+  }
+  followPieces(parent_id, children, parent_particles);
+  retire(parent_id);
+  return names;
 }
 
 void World::Impl::followPieces(const BodyId& parent, const std::vector<BodyId>& children,

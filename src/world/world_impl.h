@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/world/world.h"
 
@@ -75,11 +76,15 @@ struct World::Impl {
   Result<Reply> apply(const ClearPicksCommand& command);
   Result<Reply> apply(const PushCommand& command);
   Result<Reply> apply(const CutCommand& command);
+  Result<Reply> apply(const OpenScissorsCommand& command);
+  Result<Reply> apply(const InciseCommand& command);
   Result<Reply> apply(const SetMaterialCommand& command);
   Result<Reply> apply(const SpawnCommand& command);
   Result<Reply> apply(const RemoveCommand& command);
   Status checkCut(const CutCommand& command);
   Result<CutReply> cutNow(const CutCommand& command);
+  /// Retires a body and admits its pieces in its place; their names.
+  std::vector<std::string> replaceByPieces(const BodyId& parent, std::vector<BodyPiece> pieces);
   void followPieces(const BodyId& parent, const std::vector<BodyId>& children,
                     const std::vector<std::vector<Index>>& parent_particles);
 

@@ -1,7 +1,9 @@
 #include "meshless_surgery/body/cut_body.h"
 
 #include "meshless_surgery/body/deform.h"
+#include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/nearest_on_triangle.h"
 #include "support/bodies.h"
 #include "support/mesh_laws.h"
 #include "support/random.h"
@@ -75,6 +77,61 @@ TEST(CutBody, KeepsVolumeMassMomentumAndPlaces) {
     EXPECT_LT((linear - before.linear_momentum).norm(), 1e-9 * before.linear_momentum.norm());
     EXPECT_LT((angular - angularMomentumAbout(Vec3::Zero(), *body.model, body.state)).norm(), 1e-6);
   }
+}
+
+TEST(CutBody, ARoughCutKeepsVolumeAndFitsOnBothSides) {
+  Random random(3);
+  for (int round = 0; round < 8; ++round) {
+    PreparedBody body = prepared(test::defOf(sphereMesh(0.1, 0.015), "b"));
+    disturb(body, random);
+    CutBodyOptions options;
+    options.roughness = 0.01;
+    options.seed = static_cast<std::uint32_t>(round);
+    const Result<CutBody> cut = cutBody(*body.model, body.state, {random.unit(), random.vector(0.03)}, options);
+    ASSERT_TRUE(cut.ok()) << cut.error().detail;
+    double volume = 0.0, rest_volume = 0.0;
+    for (const BodyPiece& piece : cut->pieces) {
+      TriangleMesh present = piece.model->surface;
+      present.vertices = piece.state.surface;
+      EXPECT_TRUE(laws::isClosedOriented(present));
+      volume += signedVolume(present);
+      rest_volume += piece.model->rest_volume;
+    }
+    const double before = measureBody(*body.model, body.state).volume;
+    EXPECT_NEAR(volume, before, 1e-9 * before);
+    EXPECT_NEAR(rest_volume, body.model->rest_volume, 1e-9 * body.model->rest_volume);
+  }
+}
+
+TEST(CutBody, ParticlesLieOnTheirSideOfTheRestCap) {
+  Random random(4);
+  for (bool elastic : {false, true})
+    for (int round = 0; round < 10; ++round) {
+      BodyDef def = test::defOf(sphereMesh(0.1, 0.012), "b");
+      def.spacing = 0.02;
+      if (elastic) def.material.youngs_modulus = 5000.0;
+      PreparedBody body = prepared(def);
+      disturb(body, random);  // bent: the cap is curved in the rest shape
+      const Result<CutBody> cut = cutBody(*body.model, body.state, {random.unit(), random.vector(0.03)});
+      ASSERT_TRUE(cut.ok());
+      for (const BodyPiece& piece : cut->pieces) {
+        const SolidQuery solid(piece.model->surface);
+        for (const Vec3& p : piece.model->rest)
+          if (!solid.contains(p)) {
+            double nearest = 1e9;  // to the cap's triangles
+            for (std::size_t t = 0; t < piece.model->surface.triangles.size(); ++t) {
+              if (piece.model->surface.patches[t] != body.model->next_patch) continue;
+              const Triangle& f = piece.model->surface.triangles[t];
+              const auto& v = piece.model->surface.vertices;
+              nearest = std::min(nearest, (nearestOnTriangle(p, v[f[0]], v[f[1]], v[f[2]]) - p).norm());
+            }
+            // Lattice corners lie outside of the old surface too: of those this says nothing.
+            if (SolidQuery(body.model->surface).contains(p)) {
+              EXPECT_LT(nearest, 0.25 * 0.012) << elastic;
+            }
+          }
+      }
+    }
 }
 
 TEST(CutBody, FarClustersAreKept) {

@@ -26,7 +26,8 @@ TEST(MatchAndMove, KeepsLinearAndAngularMomentumOfATumblingBody) {
       PreparedBody body = prepared(def);
       const Vec3 spin(2, 9, -4), drift(0.3, -0.2, 0.1);
       for (std::size_t i = 0; i < body.state.positions.size(); ++i)
-        body.state.velocities[i] = drift + spin.cross(body.state.positions[i] - def.pose.translation) + random.vector(0.05);
+        body.state.velocities[i] =
+            drift + spin.cross(body.state.positions[i] - def.pose.translation) + random.vector(0.05);
       updateSurface(*body.model, body.state);
       const BodyMeasures before = measureBody(*body.model, body.state);
       StepScratch scratch;
@@ -71,8 +72,10 @@ TEST(MatchAndMove, ReturnsToItsRestShapeFromAnyState) {
       std::vector<ClusterPose> poses(1);
       fitClusters(matchInput(*body.model), body.state.positions, poses);
       for (std::size_t i = 0; i < body.state.positions.size(); ++i) {
-        const Vec3 home = poses[0].centre + poses[0].rotation * (body.model->rest[i] - body.model->shape.clusters[0].centre);
-        EXPECT_LT((body.state.positions[i] - home).norm(), 1e-3 * 0.25) << "mode " << toString(mode) << " state " << start;
+        const Vec3 home =
+            poses[0].centre + poses[0].rotation * (body.model->rest[i] - body.model->shape.clusters[0].centre);
+        EXPECT_LT((body.state.positions[i] - home).norm(), 1e-3 * 0.25)
+            << "mode " << toString(mode) << " state " << start;
       }
     }
 }
@@ -100,7 +103,8 @@ TEST(MatchAndMove, NoAlphaBetaOrStepMakesEnergyGrow) {
             most = std::max(most, potentialFreeEnergy(body, body.state));
           }
           EXPECT_TRUE(test::allFinite(body.state.positions));
-          EXPECT_LE(most, start * (1.0 + 1e-9)) << toString(mode) << " alpha " << alpha << " beta " << beta << " h " << h;
+          EXPECT_LE(most, start * (1.0 + 1e-9))
+              << toString(mode) << " alpha " << alpha << " beta " << beta << " h " << h;
         }
 }
 
@@ -145,7 +149,8 @@ TEST(RigidMotionOf, FindsDriftAndSpin) {
   PreparedBody body = prepared(test::block("b", Vec3(1, 2, 3)));
   const Vec3 spin(1, -2, 3), drift(4, 5, 6);
   for (std::size_t i = 0; i < body.state.positions.size(); ++i)
-    body.state.velocities[i] = drift + spin.cross(body.state.positions[i] - measureBody(*body.model, body.state).centre_of_mass);
+    body.state.velocities[i] =
+        drift + spin.cross(body.state.positions[i] - measureBody(*body.model, body.state).centre_of_mass);
   const RigidMotion motion = rigidMotionOf(*body.model, body.state.positions, body.state.velocities);
   EXPECT_LT((motion.spin - spin).norm(), 1e-9);
   EXPECT_LT((motion.velocity - drift).norm(), 1e-9);

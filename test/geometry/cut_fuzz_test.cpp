@@ -29,7 +29,8 @@ class CutFuzz : public testing::Test {
     Result<CutSurface> cut = cutByPlane(mesh, plane, options);
     const testing::AssertionResult law = laws::cutObeysLaws(mesh, plane, options, cut, embedded, worn);
     if (!law && ++faults_ <= 10) {
-      const std::string path = testing::TempDir() + "cut_" + std::to_string(seed_) + "_" + std::to_string(faults_) + ".obj";
+      const std::string path =
+          testing::TempDir() + "cut_" + std::to_string(seed_) + "_" + std::to_string(faults_) + ".obj";
       shapes::writeCutCase(path, {mesh, plane, embedded, worn});
       ADD_FAILURE() << name << ": " << law.message() << "\nwritten to " << path;
     }
@@ -60,12 +61,14 @@ TEST_F(CutFuzz, PiecesOfPieces) {
   const std::vector<shapes::Shape> all = shapes::hardShapes();
   std::deque<TriangleMesh> pool;
   for (long i = 0; i < cuts_ / 4; ++i) {
-    if (i % 100 == 0) pool.assign(1, i % 200 ? sphereMesh(0.1, 0.03) : all[static_cast<std::size_t>(i / 200) % all.size()].mesh);
+    if (i % 100 == 0)
+      pool.assign(1, i % 200 ? sphereMesh(0.1, 0.03) : all[static_cast<std::size_t>(i / 200) % all.size()].mesh);
     const TriangleMesh mesh = std::move(pool.front());
     pool.pop_front();
     CutOptions options;
     options.cap_patch = static_cast<std::uint32_t>(i % 100 + 1);
-    const std::vector<CutPiece> pieces = cutAndCheck(mesh, shapes::hardPlane(mesh, random), options, true, "a piece", true);
+    const std::vector<CutPiece> pieces =
+        cutAndCheck(mesh, shapes::hardPlane(mesh, random), options, true, "a piece", true);
     for (const CutPiece& piece : pieces) pool.push_back(piece.mesh);
     if (pieces.empty()) pool.push_back(mesh);
   }
@@ -77,8 +80,8 @@ TEST_F(CutFuzz, PiecesOfPieces) {
 TEST_F(CutFuzz, RandomVoxels) {
   std::mt19937 random(seed_ + 2000);
   for (long i = 0; i < cuts_ / 8;) {
-    const TriangleMesh mesh =
-        shapes::randomVoxels(4, 0.1 + 0.005 * static_cast<double>(random() % 100), static_cast<std::uint32_t>(random()));
+    const TriangleMesh mesh = shapes::randomVoxels(4, 0.1 + 0.005 * static_cast<double>(random() % 100),
+                                                   static_cast<std::uint32_t>(random()));
     if (mesh.empty()) continue;
     for (int k = 0; k < 10; ++k, ++i) cutAndCheck(mesh, shapes::hardPlane(mesh, random), {}, true, "voxels");
   }

@@ -97,7 +97,8 @@ TEST(Cut, CavitiesStayWithTheirSolid) {
   for (const CutPiece& piece : above_all->pieces) EXPECT_GT(signedVolume(piece.mesh), 0.0);
   const double ball = signedVolume(sphereMesh(0.03, 0.01)) - signedVolume(sphereMesh(0.01, 0.005));
   double nearest = 1.0;
-  for (const CutPiece& piece : above_all->pieces) nearest = std::min(nearest, std::abs(signedVolume(piece.mesh) - ball));
+  for (const CutPiece& piece : above_all->pieces)
+    nearest = std::min(nearest, std::abs(signedVolume(piece.mesh) - ball));
   EXPECT_LT(nearest, 1e-15);
 }
 
@@ -224,7 +225,8 @@ TEST(Cut, BothSidesOfACutShareTheirPoints) {
   for (const CutPiece& piece : cut->pieces)
     for (std::size_t v = 0; v < piece.origins.size(); ++v)
       if (piece.origins[v].parents[1] != kNoIndex)
-        made[piece.side > 0].push_back({piece.mesh.vertices[v].x(), piece.mesh.vertices[v].y(), piece.mesh.vertices[v].z()});
+        made[piece.side > 0].push_back(
+            {piece.mesh.vertices[v].x(), piece.mesh.vertices[v].y(), piece.mesh.vertices[v].z()});
   for (auto& side : made) std::sort(side.begin(), side.end());
   EXPECT_GT(made[0].size(), 50u);
   EXPECT_EQ(made[0], made[1]);
@@ -260,9 +262,9 @@ TEST(Cut, HundredCutsIntoCrumbs) {
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
   for (int i = 0; i < 100; ++i) {
-    const auto largest = std::max_element(crumbs.begin(), crumbs.end(), [](const TriangleMesh& a, const TriangleMesh& b) {
-      return signedVolume(a) < signedVolume(b);
-    });
+    const auto largest = std::max_element(
+        crumbs.begin(), crumbs.end(),
+        [](const TriangleMesh& a, const TriangleMesh& b) { return signedVolume(a) < signedVolume(b); });
     const TriangleMesh mesh = std::move(*largest);
     crumbs.erase(largest);
     const Plane plane = {Vec3(normal(random), normal(random), normal(random)).normalized(), solidCentroid(mesh)};
@@ -399,10 +401,12 @@ TEST(BladesMeet, AgreesWithSampling) {
       bool inside = false;
       for (int a = 0; a <= 4 && !inside; ++a) {
         for (int b = -2; b <= 2 && !inside; ++b) {
-          const Vec3 p = blades.origin + a / 4.0 * blades.length * blades.x_axis + b / 4.0 * blades.width * blades.y_axis;
+          const Vec3 p =
+              blades.origin + a / 4.0 * blades.length * blades.x_axis + b / 4.0 * blades.width * blades.y_axis;
           double half_angle = 0.0;
           for (const Triangle& t : shape.mesh.triangles) {
-            const Vec3 u = shape.mesh.vertices[t[0]] - p, v = shape.mesh.vertices[t[1]] - p, w = shape.mesh.vertices[t[2]] - p;
+            const Vec3 u = shape.mesh.vertices[t[0]] - p, v = shape.mesh.vertices[t[1]] - p,
+                       w = shape.mesh.vertices[t[2]] - p;
             half_angle += std::atan2(u.dot(v.cross(w)), u.norm() * v.norm() * w.norm() + u.dot(v) * w.norm() +
                                                             v.dot(w) * u.norm() + w.dot(u) * v.norm());
           }

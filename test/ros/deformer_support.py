@@ -15,7 +15,7 @@ from std_srvs.srv import SetBool, Trigger
 
 TYPES = {
     'pick': Pick, 'move_pick': MovePick, 'lock': Lock, 'release': Release, 'clear_picks': Trigger, 'push': Push,
-    'cut': Cut, 'incise': Incise, 'spawn': Spawn, 'remove': Remove, 'set_material': SetMaterial, 'get_body': GetBody,
+    'cut': Cut, 'open_scissors': Trigger, 'incise': Incise, 'spawn': Spawn, 'remove': Remove, 'set_material': SetMaterial, 'get_body': GetBody,
     'pause': SetBool, 'step': Step, 'reset': Trigger, 'save': SaveState, 'load': LoadState,
 }
 # A bound for things that should have happened long before; no test measures time.

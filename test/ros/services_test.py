@@ -184,6 +184,32 @@ class CutTest(DeformerTestCase):
         again = self.good('cut', blades=pose_stamped(-1.0, 0.0, 0.1), bodies=[owner])
         self.assertEqual([owner + '.1', owner + '.2'], again.new_bodies)
 
+    def test_a_rough_cut_adds_up_too(self):
+        whole = self.good('get_body', name='left')
+        answer = self.good('cut', blades=pose_stamped(-0.19, -1.0, 0.1, ACROSS_X), roughness=0.005)
+        pieces = [self.good('get_body', name=name) for name in answer.new_bodies]
+        self.assertAlmostEqual(1.0, sum(p.volume for p in pieces) / whole.volume, places=9)
+
+    def test_an_incision_opens_and_a_second_one_goes_through(self):
+        whole = self.good('get_body', name='left')
+        upwards = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))  # the blade's y axis points up
+        opened = self.good('incise', blade=pose_stamped(-0.3, 0.01, 0.3, upwards), length=0.2, depth=0.19)
+        self.assertEqual(['left'], opened.cut_bodies)
+        self.assertEqual([], opened.new_bodies)
+        self.assertGreater(opened.opened_area, 0.001)
+        self.assertAlmostEqual(1.0, self.good('get_body', name='left').volume / whole.volume, places=9)
+        self.refused(['open there'], 'incise', blade=pose_stamped(-0.3, 0.01, 0.3, upwards), length=0.2, depth=0.19)
+        apart = self.good('incise', blade=pose_stamped(-0.3, 0.01, 0.3, upwards), length=0.2, depth=0.5)
+        self.assertEqual(['left.1', 'left.2'], apart.new_bodies)
+        pieces = [self.good('get_body', name=name) for name in apart.new_bodies]
+        self.assertAlmostEqual(1.0, sum(p.volume for p in pieces) / whole.volume, places=9)
+        self.refused(['met no body'], 'incise', blade=pose_stamped(5.0, 5.0, 5.0, upwards), length=0.2, depth=0.1)
+        self.refused(['reach the surface'], 'incise', blade=pose_stamped(0.19, 0.0, 0.12, upwards), length=0.02,
+                     depth=0.02)
+
+    def test_open_scissors_without_a_cut_says_so(self):
+        self.refused(['no scissors are closing'], 'open_scissors')
+
     def test_blades_that_close_slowly_meet_at_once_while_paused(self):
         answer = self.good('cut', blades=pose_stamped(-1.0, 0.0, 0.1), close_time=50.0)
         self.assertIn('paused', answer.message)
@@ -381,7 +407,6 @@ class TimeTest(DeformerTestCase):
     def test_what_comes_with_a_later_version_says_so(self):
         self.refused(['later version'], 'save', file='name')
         self.refused(['later version'], 'load', file='name')
-        self.refused(['later version'], 'incise', blade=pose_stamped(), length=0.1, depth=0.1)
         self.refused(['length', 'nan'], 'incise', blade=pose_stamped(), length=NAN, depth=0.1)
         self.refused(['depth', '0'], 'incise', blade=pose_stamped(), length=0.1, depth=0.0)
 

@@ -94,7 +94,8 @@ inline std::vector<Shape> hardShapes() {
   all.push_back({"comb", voxelMesh(9, 4, 2, [](int x, int y, int) { return y == 0 || x % 2 == 0; })});
   all.push_back({"plate with holes", voxelMesh(7, 5, 1, [](int x, int y, int) { return x % 2 == 0 || y % 2 == 0; })});
   all.push_back({"stairs", voxelMesh(4, 2, 4, [](int x, int, int z) { return x >= z; })});
-  all.push_back({"box with a cavity", voxelMesh(3, 3, 3, [](int x, int y, int z) { return x != 1 || y != 1 || z != 1; })});
+  all.push_back(
+      {"box with a cavity", voxelMesh(3, 3, 3, [](int x, int y, int z) { return x != 1 || y != 1 || z != 1; })});
   TriangleMesh nested = sphereMesh(1.0, 0.4);
   append(nested, turnedInsideOut(sphereMesh(0.8, 0.4)));
   append(nested, sphereMesh(0.5, 0.25));
@@ -146,10 +147,14 @@ inline Plane hardPlane(const TriangleMesh& mesh, std::mt19937& random) {
     return n.norm() > 1e-12 * a.norm() * b.norm() ? Vec3(n.normalized()) : direction();
   };
   switch (random() % 11) {
-    case 0: return {direction(), somewhere()};
-    case 1: return {axis(), somewhere()};
-    case 2: return {direction(), vertex()};
-    case 3: return {axis(), vertex()};
+    case 0:
+      return {direction(), somewhere()};
+    case 1:
+      return {axis(), somewhere()};
+    case 2:
+      return {direction(), vertex()};
+    case 3:
+      return {axis(), vertex()};
     case 4: {  // along an edge
       const Triangle t = triangle();
       return {facing(mesh.vertices[t[1]] - mesh.vertices[t[0]], direction()), mesh.vertices[t[0]]};

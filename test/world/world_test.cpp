@@ -113,7 +113,7 @@ TEST(World, RefusedCommandsSayWhyAndChangeNothing) {
   cut.close_time = kNan;
   bad.emplace_back(cut, "close_time");
   cut = cutThrough(Vec3(0, 0, 0.2), Vec3::UnitZ());
-  cut.roughness = 0.01;
+  cut.roughness = -0.01;
   bad.emplace_back(cut, "roughness");
   bad.emplace_back(RemoveCommand{"spleen"}, "spleen");
   bad.emplace_back(SetMaterialCommand{"spleen", [](const Material& m) -> Result<Material> { return m; }}, "spleen");
@@ -431,6 +431,68 @@ TEST(World, BladesCloseOverSimulatedTime) {
   EXPECT_EQ((*reply)->new_bodies.size(), 2u);
   EXPECT_FALSE(world.scissors().shown);
   EXPECT_FALSE(world.finishedCut(started.ticket).has_value()) << "the answer is taken out by asking";
+}
+
+TEST(World, OpeningTheScissorsCallsTheCutOff) {
+  World world = ballWorld();
+  EXPECT_EQ(world.apply(OpenScissorsCommand{}).error().code, ErrorCode::kMissed);
+  CutCommand cut = cutThrough(Vec3(0, 0, 0.2), Vec3::UnitX());
+  cut.close_time = 0.5;
+  const CutStarted first = replyOf<CutStarted>(world.apply(cut));
+  const CutStarted second = replyOf<CutStarted>(world.apply(cut));  // while the first closes
+  run(world, 20);
+  replyOf<Done>(world.apply(OpenScissorsCommand{}));
+  run(world, 120);
+  for (const CutStarted& started : {first, second}) {
+    const std::optional<Result<CutReply>> reply = world.finishedCut(started.ticket);
+    ASSERT_TRUE(reply.has_value());
+    ASSERT_FALSE(reply->ok());
+    EXPECT_NE(reply->error().detail.find("opened before"), std::string::npos);
+  }
+  EXPECT_EQ(world.snapshot({}).bodies.size(), 1u);
+  EXPECT_FALSE(world.scissors().shown);
+}
+
+TEST(World, AnIncisionOpensABodyAndASecondOneTakesItApart) {
+  World world(test::weightless());
+  ASSERT_TRUE(world.addSceneBody(test::shared(test::ball("ball", Vec3::Zero()))).ok());
+  const PickReply pick = replyOf<PickReply>(world.apply(pickNear(Vec3(0, 0.1, 0))));
+  InciseCommand incise;
+  incise.blade = {Vec3(-0.2, 0.004, 0.2), Vec3::UnitX(), Vec3::UnitZ(), 0.4, 0.2};
+  const double volume = only(world).model->rest_volume;
+  const InciseReply opened = replyOf<InciseReply>(world.apply(incise));
+  EXPECT_EQ(opened.cut_bodies, std::vector<std::string>{"ball"});
+  EXPECT_TRUE(opened.new_bodies.empty());
+  EXPECT_GT(opened.opened_area, 0.01);
+  EXPECT_EQ(only(world).name, "ball");
+  EXPECT_NEAR(only(world).model->rest_volume, volume, 1e-9 * volume);
+  bool said = false;
+  for (const Event& event : world.takeEvents()) said = said || event.type == EventType::kIncised;
+  EXPECT_TRUE(said);
+  EXPECT_EQ(world.apply(incise).error().code, ErrorCode::kMissed) << "it is open there";
+  run(world, 60);
+  EXPECT_TRUE(test::allFinite(only(world).surface));
+  incise.blade = {Vec3(-0.2, 0.004, -0.2), Vec3::UnitX(), -Vec3::UnitZ(), 0.4, 0.22};
+  const InciseReply apart = replyOf<InciseReply>(world.apply(incise));
+  EXPECT_EQ(apart.new_bodies, (std::vector<std::string>{"ball.1", "ball.2"}));
+  const WorldSnapshot shot = world.snapshot({true, false, true});
+  ASSERT_EQ(shot.bodies.size(), 2u);
+  EXPECT_NEAR(shot.bodies[0].model->rest_volume + shot.bodies[1].model->rest_volume, volume, 1e-9 * volume);
+  ASSERT_EQ(shot.picks.size(), 1u);
+  EXPECT_EQ(shot.picks[0].id, pick.pick) << "the spring follows its piece";
+  run(world, 60);
+
+  InciseCommand bad = incise;
+  bad.blade.depth = 0.0;
+  EXPECT_NE(world.apply(bad).error().detail.find("depth is 0"), std::string::npos);
+  bad = incise;
+  bad.bodies = {"spleen"};
+  EXPECT_EQ(world.apply(bad).error().code, ErrorCode::kUnknownName);
+  bad = incise;
+  bad.blade.origin.x() = kNan;
+  EXPECT_EQ(world.apply(bad).error().code, ErrorCode::kInvalidArgument);
+  bad.blade.origin = Vec3(5, 5, 5);
+  EXPECT_EQ(world.apply(bad).error().code, ErrorCode::kMissed);
 }
 
 TEST(World, PiecesCanBeCutAHundredTimes) {

@@ -19,9 +19,15 @@ struct CutBody {
   Index rebuilt_clusters = 0;
 };
 
+struct CutBodyOptions {
+  double roughness = 0.0;  // [m] amplitude of the fractal displacement of the cut; 0: clean
+  std::uint32_t seed = 0;  // of it
+};
+
 /// The plane is in the world frame and meets the present shape. Rest positions, positions and velocities of new
 /// vertices are interpolated with the same weights; mass and momentum are kept. Refuses kMissed, or kUnsuitableShape
 /// where the body is no solid or no closed pieces can be made. state.surface must be up to date.
-Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Plane& plane);
+Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Plane& plane,
+                        const CutBodyOptions& options = {});
 
 }  // namespace meshless

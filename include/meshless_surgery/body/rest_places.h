@@ -11,8 +11,8 @@ struct KnownPlace {
   Vec3 rest;     // [m]
 };
 
-/// Rest places of points in the present shape: the affine map of the nearest 16 particles from present to rest, plus
-/// what that map misses at the known places near by (the rim of a cut), spread inwards by inverse squared distance.
+/// Rest places of points in the present shape: the affine maps of 16 particles each from present to rest, blended
+/// over the nearest four, plus what they miss at the known places near by (the rim of a cut), spread inwards by inverse squared distance.
 /// Where the particles do not span space, the map follows what they span and keeps lengths across. Neither side of a
 /// cut is asked: both get the same places.
 Points restPlaces(const BodyModel& model, const BodyState& state, const Points& present,

@@ -8,8 +8,9 @@
 namespace meshless {
 
 /// Where a vertex of a piece comes from: sum of weights[k] * parent vertex parents[k]. A vertex that was there before
-/// has one parent of weight 1; one on a cut edge has two; one where two rims cross has four. Unused slots have weight 0
-/// and parent kNoIndex. The same weights interpolate rest position, position and velocity.
+/// has one parent of weight 1; one on a cut edge has two; one where two rims cross has four; one inside the cap has
+/// none. Unused slots have weight 0 and parent kNoIndex. The same weights interpolate rest position, position and
+/// velocity.
 struct VertexOrigin {
   std::array<Index, 4> parents{{kNoIndex, kNoIndex, kNoIndex, kNoIndex}};
   std::array<double, 4> weights{{0.0, 0.0, 0.0, 0.0}};
@@ -19,6 +20,7 @@ struct VertexOrigin {
 struct CutPiece {
   TriangleMesh mesh;                  // patches filled; the cap's is the patch asked for
   std::vector<VertexOrigin> origins;  // one a vertex
+  std::vector<Index> cap_interior;    // its vertices inside the cap; without parents
   int side = 0;                       // +1: where the normal points; -1: the other
 };
 
@@ -27,16 +29,32 @@ struct CutSurface {
   double cap_area = 0.0;         // [m^2] of one side
 };
 
+/// A number of points in the cap that suits most cuts.
+constexpr std::size_t kUsualCapPoints = 4000;
+
 struct CutOptions {
   double band = 1e-7;           // vertices closer to the plane than this times the bounds' diagonal lie on it
   std::uint32_t cap_patch = 1;  // the patch id of the new faces
+
+  // Points inside the cap, at most so many, as far from each other as the vertices of the surface that is cut, or
+  // farther where that would be more. None by default: who asks for them must know where to put vertices without
+  // parents.
+  std::size_t cap_points = 0;
+
+  // The points inside the cap are up to this far from the plane [m], by fractal noise that the seed chooses, the same
+  // on both sides; less near the rim and wherever the cap would meet the rest of the surface. Needs cap_points.
+  double roughness = 0.0;
+  std::uint32_t seed = 0;
+
+  bool check_pieces = false;  // look at every edge and volume of the pieces again, for tests: doubles the time
 };
 
-/// Refuses: kInvalidArgument for a plane or options out of range; kMissed where no piece would be on one of the sides, or
-/// one would be no thicker than the band; kUnsuitableShape where the surface is open or crosses itself in a way that no
-/// closed pieces can be made of. `mesh` need not be embedded. Every edge of a piece that came from the plane has exactly
-/// two triangles; parts of the mesh that share a vertex away from the plane stay one piece. The volumes of the pieces add
-/// up to that of the mesh (1e-9 of it, checked). A cut that fails with this band is tried again with narrower ones.
+/// Refuses: kInvalidArgument for a plane or options out of range; kMissed where no piece would be on one of the sides,
+/// or one would be no thicker than the band; kUnsuitableShape where the surface is open or crosses itself in a way that
+/// no closed pieces can be made of. `mesh` need not be embedded. Every edge of a piece that came from the plane has
+/// exactly two triangles; parts of the mesh that share a vertex away from the plane stay one piece. The volumes of the
+/// pieces add up to that of the mesh (1e-9 of it, checked). A cut that fails with this band is tried again with
+/// narrower ones.
 Result<CutSurface> cutByPlane(const TriangleMesh& mesh, const Plane& plane, const CutOptions& options = {});
 
 /// The blades' rectangle in the plane: origin + s * x_axis + t * y_axis with 0 <= s <= length, |t| <= width / 2.

@@ -10,6 +10,7 @@
 #include "meshless_surgery/base/ids.h"
 #include "meshless_surgery/body/body.h"
 #include "meshless_surgery/geometry/cut.h"
+#include "meshless_surgery/geometry/incise.h"
 
 namespace meshless {
 
@@ -41,8 +42,14 @@ struct PushCommand {
 struct CutCommand {
   Blades blades;
   double close_time = 0.0;  // [s] >= 0 of simulated time
-  double roughness = 0.0;   // [m] only 0 so far
+  double roughness = 0.0;   // [m] amplitude of the fractal displacement of the cut
   std::vector<std::string> bodies;  // empty: all that the blades meet
+};
+/// Opens the scissors: cuts whose blades are closing are called off.
+struct OpenScissorsCommand {};
+struct InciseCommand {
+  Blade blade;
+  std::vector<std::string> bodies;  // empty: all that the blade meets
 };
 struct SetMaterialCommand {
   std::string body;  // empty: all
@@ -56,7 +63,7 @@ struct RemoveCommand {
 };
 
 using Command = std::variant<PickCommand, MovePickCommand, LockCommand, ReleaseCommand, ClearPicksCommand, PushCommand,
-                             CutCommand, SetMaterialCommand, SpawnCommand, RemoveCommand>;
+                             CutCommand, OpenScissorsCommand, InciseCommand, SetMaterialCommand, SpawnCommand, RemoveCommand>;
 
 struct PickReply {
   PickId pick = 0;
@@ -75,12 +82,19 @@ struct CutReply {
 struct CutStarted {
   std::uint32_t ticket = 0;
 };
+struct InciseReply {
+  std::vector<std::string> cut_bodies;  // opened; one that came apart is retired
+  std::vector<std::string> new_bodies;
+  double opened_area = 0.0;             // [m^2] of one lip, over all bodies
+  double duration = 0.0;                // [s] wall time
+  std::vector<std::string> notes;       // bodies that the blade met and that could not be opened, and why
+};
 struct SpawnReply {
   BodyId id;
   std::string name;
   std::size_t particles = 0, triangles = 0, clusters = 0;
 };
 
-using Reply = std::variant<Done, PickReply, CutReply, CutStarted, SpawnReply>;
+using Reply = std::variant<Done, PickReply, CutReply, CutStarted, InciseReply, SpawnReply>;
 
 }  // namespace meshless

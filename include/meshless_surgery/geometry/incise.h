@@ -1,0 +1,66 @@
+// Opening a closed surface along a blade that need not go all the way through. A pure function: it knows no time, mass
+// or body.
+#pragma once
+
+#include "meshless_surgery/base/result.h"
+#include "meshless_surgery/geometry/cut.h"
+#include "meshless_surgery/geometry/plane.h"
+#include "meshless_surgery/geometry/triangle_mesh.h"
+
+namespace meshless {
+
+/// The rectangle origin + s * x_axis + t * y_axis with 0 <= s <= length, -depth <= t <= 0.
+struct Blade {
+  Vec3 origin = Vec3::Zero();   // [m]
+  Vec3 x_axis = Vec3::UnitX();  // unit, along the edge that stays outside
+  Vec3 y_axis = Vec3::UnitY();  // unit, normal to x_axis, out of the tissue
+  double length = 0.0;          // [m] > 0
+  double depth = 0.0;           // [m] > 0
+
+  Plane plane() const { return {x_axis.cross(y_axis), origin}; }
+};
+
+struct InciseOptions {
+  double band = 1e-7;  // what is closer to the blade's plane or border than this times the bounds' diagonal is on it
+  std::uint32_t patch = 1;        // the patch id of the lips
+  double spacing = 0.0;           // [m] between the lips' inner points; 0: the mean edge of the crossed triangles
+  std::size_t max_points = 4000;  // inner points of one lip; the spacing is widened to keep to it
+};
+
+/// A vertex of the lips that is on no surface of the parent: a place near it, in terms of the mouth. The weights (sum
+/// 1) belong to up to four vertices of the same piece, the nearest on the mouth of its lip; they do not make its
+/// position.
+struct LipPoint {
+  Index vertex = kNoIndex;
+  std::array<Index, 4> mouth{{kNoIndex, kNoIndex, kNoIndex, kNoIndex}};
+  std::array<double, 4> weights{{0.0, 0.0, 0.0, 0.0}};
+};
+
+/// A connected solid, closed and oriented. What was there before keeps its order, new vertices follow. Where lips met
+/// at a point, one of the vertices there may stand for another at the same place.
+struct IncisedPiece {
+  TriangleMesh mesh;                  // patches filled
+  std::vector<VertexOrigin> origins;  // one a vertex, on the parent; no parents (weights 0) for lip_points
+  std::vector<LipPoint> lip_points;   // ascending by vertex
+  std::vector<std::int8_t> facing;    // one a triangle: +1 a new lip looking along the blade's normal, -1 one looking
+                                      // against it, 0 no new lip
+};
+
+struct Incision {
+  std::vector<IncisedPiece> pieces;  // largest volume first; one, or several where the body came apart
+  double opened_area = 0.0;          // [m^2] of one lip
+};
+
+/// Opens the solid where the blade's rectangle is. The surface is split along the blade, two lips of the same points
+/// and triangles seal it, facing each other; the vertices of the mouth are doubled except at its ends, those of the
+/// buried front are not. Lips of earlier incisions are surface like any other, whether they lie on each other or have
+/// opened: they are extended, crossed and started from. What is already open in the blade's plane is not opened again.
+/// Refuses, and says why: kInvalidArgument for a blade or options out of range; kMissed where the blade meets no
+/// tissue, lies wholly inside ("does not reach the surface") or where all is "already open there"; kUnsuitableShape
+/// where the surface is open, or crosses itself within the blade (lips that press into each other). Where this fails
+/// only for lips that all but lie in the blade's plane, it is done up to five bands beside it. A blade that leaves the
+/// solid on all sides is a full cut. Pieces of one parent: each connected solid, with the hollows inside of it; what
+/// still shares a vertex away from the blade stays one. Their volumes add up to the parent's within 1e-9 (checked).
+Result<Incision> incise(const TriangleMesh& mesh, const Blade& blade, const InciseOptions& options = {});
+
+}  // namespace meshless

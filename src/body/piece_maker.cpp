@@ -1,0 +1,228 @@
+#include "piece_maker.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <future>
+#include <map>
+#include <optional>
+#include <set>
+
+#include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/body/rest_places.h"
+#include "meshless_surgery/dynamics/plastic.h"
+#include "meshless_surgery/geometry/measures.h"
+
+namespace meshless {
+namespace {
+
+constexpr std::size_t kWorthAThread = 1000;  // vertices
+
+template <class Get>
+Vec3 interpolate(const VertexOrigin& origin, const Get& get) {
+  Vec3 sum = Vec3::Zero();
+  for (int k = 0; k < 4; ++k)
+    if (origin.parents[k] != kNoIndex) sum += origin.weights[k] * get(origin.parents[k]);
+  return sum;
+}
+
+// A vertex inside the cap, which no edge of the parent leads to.
+bool insideCap(const VertexOrigin& origin) { return origin.parents[0] == kNoIndex; }
+
+// The moments of the material that the parent has. What a cut leaves of a cell can be so narrow that its stress would
+// need a shorter step: it then resists as a flat cluster does, and the parent's frequency holds for the piece as well.
+void inheritMoments(const BodyModel& parent, const std::vector<Index>& members, BodyModel& child) {
+  constexpr double kNarrower = 1.3;
+  child.match_masses = child.masses;
+  for (std::size_t i = 0; i < members.size(); ++i)
+    child.match_masses[i] *= parent.match_masses[members[i]] / parent.masses[members[i]];
+  child.shape = makeRestShape(child.rest, child.match_masses, child.clusters);
+  if (!parent.shape.quadratic.empty()) addQuadraticRest(child.rest, child.match_masses, child.clusters, child.shape);
+  if (parent.elastic.empty()) return;
+  child.most_spread_inverse = parent.most_spread_inverse;
+  double squared = parent.highest_frequency * parent.highest_frequency;
+  if (std::isinf(parent.most_spread_inverse)) {  // the first cut of this body
+    double narrowest = 0.0;
+    for (const ElasticRest& e : parent.elastic) narrowest = std::max(narrowest, e.spread_inverse.norm());
+    child.most_spread_inverse = kNarrower * narrowest;
+    squared *= kNarrower;
+  }
+  makeElastic(child);
+  double least = 0.0;
+  for (const ElasticRest& e : child.elastic)
+    if (e.spread > 0.0) least = std::max(least, 1.0 / e.spread);
+  child.specific_stiffness = parent.specific_stiffness;
+  child.highest_frequency = std::sqrt(std::max(squared, parent.specific_stiffness * least));
+}
+
+}  // namespace
+
+Index sameVertex(const VertexOrigin& origin) {
+  return origin.parents[1] == kNoIndex && origin.parents[2] == kNoIndex ? origin.parents[0] : kNoIndex;
+}
+
+// A piece without a particle would have no mass: it takes a part of the parent's nearest particle, which moves on with
+// the same velocity, so that mass and momentum stay what they were.
+struct PieceMaker::Crumb {
+  Index donor;
+  double mass;  // [kg]
+};
+
+PieceMaker::PieceMaker(const BodyModel& model, const BodyState& state, std::uint32_t new_patch)
+    : model_(model), state_(state), new_patch_(new_patch) {
+  rider_of_.assign(model.surface.vertices.size(), kNoIndex);
+  for (Index r = 0; r < model.binding.riders.size(); ++r) rider_of_[model.binding.riders[r]] = r;
+}
+
+void PieceMaker::tear(ParticleGraph graph, std::vector<bool> torn) {
+  graph_ = std::move(graph);
+  torn_ = std::move(torn);
+}
+
+std::vector<BodyPiece> PieceMaker::make(const std::vector<PieceSource>& sources) {
+  double whole = 0.0;
+  for (const PieceSource& source : sources) whole += std::abs(signedVolume(source.mesh));
+  std::vector<double> masses = model_.masses;
+  std::vector<std::optional<Crumb>> crumbs(sources.size());
+  for (std::size_t p = 0; p < sources.size(); ++p) {
+    if (!sources[p].members.empty()) continue;
+    const Vec3 centre = solidCentroid(sources[p].mesh);
+    Crumb crumb{0, 0.0};
+    for (Index i = 0; i < model_.rest.size(); ++i)
+      if ((state_.positions[i] - centre).squaredNorm() < (state_.positions[crumb.donor] - centre).squaredNorm())
+        crumb.donor = i;
+    const double share = whole > 0.0 ? model_.mass * std::abs(signedVolume(sources[p].mesh)) / whole : 0.0;
+    crumb.mass = std::min(std::max(share, 1e-6 * masses[crumb.donor]), 0.5 * masses[crumb.donor]);
+    masses[crumb.donor] -= crumb.mass;
+    crumbs[p] = crumb;
+  }
+  std::vector<Points> rest = restVertices(sources);
+  std::vector<BodyPiece> pieces;
+  pieces.resize(sources.size());
+  std::vector<Counts> counts(sources.size());
+  const auto makeEvery = [&](std::size_t first, std::size_t stride) {
+    for (std::size_t p = first; p < sources.size(); p += stride)
+      pieces[p] = makeOne(sources[p], std::move(rest[p]), masses, crumbs[p] ? &*crumbs[p] : nullptr, counts[p]);
+  };
+  // Pieces do not know of each other: the two large ones of most cuts are made side by side.
+  if (sources.size() > 1 && model_.surface.vertices.size() > kWorthAThread) {
+    auto others = std::async(std::launch::async, [&] { makeEvery(1, 2); });
+    makeEvery(0, 2);
+    others.get();
+  } else {
+    makeEvery(0, 1);
+  }
+  for (const Counts& c : counts) kept_ += c.kept, rebuilt_ += c.rebuilt;
+  return pieces;
+}
+
+BodyPiece PieceMaker::makeOne(const PieceSource& from, Points rest, const std::vector<double>& masses,
+                              const Crumb* crumb, Counts& counts) const {
+  BodyPiece piece;
+  auto child = std::make_shared<BodyModel>();
+  child->solid = true;
+  child->spacing = model_.spacing;
+  child->next_patch = model_.next_patch + 1;
+  child->surface.triangles = from.mesh.triangles;
+  child->surface.patches = from.mesh.patches;
+  child->surface.vertices = std::move(rest);
+  child->rest_volume = signedVolume(child->surface);
+  child->rest_area = surfaceArea(child->surface);
+
+  piece.parent_particles = from.members;
+  std::vector<Index> renumbered(model_.rest.size(), kNoIndex);
+  for (Index i : from.members) {
+    renumbered[i] = static_cast<Index>(child->rest.size());
+    child->rest.push_back(model_.rest[i]);
+    child->masses.push_back(masses[i]);
+    child->fixed.push_back(model_.fixed[i]);
+    child->any_fixed = child->any_fixed || model_.fixed[i];
+    piece.state.positions.push_back(state_.positions[i]);
+    piece.state.velocities.push_back(state_.velocities[i]);
+  }
+  child->graph = subgraph(graph_.offsets.empty() ? model_.graph : graph_, from.members);
+  if (crumb) {
+    child->rest.push_back(solidCentroid(child->surface));
+    child->masses.push_back(crumb->mass);
+    child->fixed.push_back(false);
+    piece.state.positions.push_back(solidCentroid(from.mesh));
+    piece.state.velocities.push_back(state_.velocities[crumb->donor]);
+    piece.parent_particles.push_back(kNoIndex);
+    child->graph = makeGraph(child->rest, {});
+  }
+  for (double m : child->masses) child->mass += m;
+  PieceClusters clusters = splitClusters(model_.clusters, child->rest, child->graph, from.members, torn_);
+  counts = {clusters.kept, clusters.rebuilt};
+  child->clusters = std::move(clusters.clusters);
+  inheritMoments(model_, from.members, *child);
+
+  std::vector<Index> vertex_particle;
+  std::vector<bool> taken(child->rest.size(), false);
+  InheritedBinding inherited{model_.binding, {}, renumbered, nullptr};
+  for (Index at = 0; at < from.origins.size(); ++at) {
+    const Index v = sameVertex(from.origins[at]);
+    inherited.rider.push_back(v == kNoIndex ? kNoIndex : rider_of_[v]);
+    const Index parent = v == kNoIndex ? kNoIndex : model_.binding.particle[v];
+    Index mine = parent == kNoIndex ? kNoIndex : renumbered[parent];
+    // A vertex that was split is in the piece twice; one of the two rides.
+    if (mine != kNoIndex && (taken[mine] || (from.separated && from.separated(at, parent)))) mine = kNoIndex;
+    if (mine != kNoIndex) taken[mine] = true;
+    vertex_particle.push_back(mine);
+  }
+  if (from.separated)
+    inherited.separated = [&](Index vertex, Index particle) {
+      const Index parent = piece.parent_particles[particle];
+      return parent != kNoIndex && from.separated(vertex, parent);
+    };
+  child->binding = bindSurface(child->rest, child->graph, child->clusters, child->surface.vertices,
+                               std::move(vertex_particle), &inherited);
+  piece.state.poses.resize(child->clusters.size());
+  piece.state.plastic =
+      inheritShapes(state_.plastic, model_.clusters, child->clusters, clusters.origin, piece.parent_particles);
+  fitClusters(matchInput(*child, piece.state), piece.state.positions, piece.state.poses);
+  piece.state.surface = from.mesh.vertices;
+  piece.state.stretch = state_.stretch;
+  piece.state.swelling = state_.swelling;
+  for (Index r = 0; r < child->binding.riders.size(); ++r)
+    piece.state.rider_offsets.push_back(from.mesh.vertices[child->binding.riders[r]] -
+                                        riderPosition(child->binding, piece.state.positions, piece.state.poses, r));
+  piece.model = std::move(child);
+  return piece;
+}
+
+// Both sides of a cut have the same points inside: each is looked for once.
+std::vector<Points> PieceMaker::restVertices(const std::vector<PieceSource>& sources) const {
+  std::vector<Points> all;
+  Points inside;
+  std::vector<KnownPlace> rim;
+  std::map<std::array<double, 3>, std::size_t> inside_at;
+  std::set<std::array<double, 3>> rim_at;
+  const auto key = [](const Vec3& p) { return std::array<double, 3>{p.x(), p.y(), p.z()}; };
+  for (const PieceSource& source : sources) {
+    all.emplace_back();
+    bool any = false;
+    for (Index v = 0; v < source.origins.size(); ++v) {
+      all.back().push_back(
+          interpolate(source.origins[v], [&](Index parent) { return model_.surface.vertices[parent]; }));
+      if (!insideCap(source.origins[v])) continue;
+      any = true;
+      if (inside_at.emplace(key(source.mesh.vertices[v]), inside.size()).second)
+        inside.push_back(source.mesh.vertices[v]);
+    }
+    if (!any) continue;
+    for (std::size_t t = 0; t < source.mesh.triangles.size(); ++t) {
+      if (source.mesh.patches[t] != new_patch_) continue;
+      for (Index v : source.mesh.triangles[t])
+        if (!insideCap(source.origins[v]) && rim_at.insert(key(source.mesh.vertices[v])).second)
+          rim.push_back({source.mesh.vertices[v], all.back()[v]});
+    }
+  }
+  if (inside.empty()) return all;
+  const Points places = restPlaces(model_, state_, inside, rim);
+  for (std::size_t s = 0; s < sources.size(); ++s)
+    for (Index v = 0; v < sources[s].origins.size(); ++v)
+      if (insideCap(sources[s].origins[v])) all[s][v] = places[inside_at.at(key(sources[s].mesh.vertices[v]))];
+  return all;
+}
+
+}  // namespace meshless

@@ -1,0 +1,53 @@
+// Bodies made of the parts of another: models and states of the pieces that a blade left.
+#pragma once
+
+#include <functional>
+
+#include "meshless_surgery/body/cut_body.h"
+
+namespace meshless {
+
+/// The parent vertex that a piece's vertex is; kNoIndex for vertices that the blade made.
+Index sameVertex(const VertexOrigin& origin);
+
+struct PieceSource {
+  const TriangleMesh& mesh;                  // present shape; patches filled
+  const std::vector<VertexOrigin>& origins;  // of its vertices
+  std::vector<Index> members;                // the parent's particles, ascending; may be empty: a crumb
+  /// True where the piece's vertex must not follow the parent's particle, for there is a lip between. May be empty.
+  std::function<bool(Index vertex, Index particle)> separated = nullptr;
+};
+
+class PieceMaker {
+ public:
+  /// new_patch: of the faces that the blade made.
+  PieceMaker(const BodyModel& model, const BodyState& state, std::uint32_t new_patch);
+
+  /// The parent's graph without the edges that the blade has cut; the clusters whose members it parts grow again.
+  void tear(ParticleGraph graph, std::vector<bool> torn);
+
+  /// All pieces of the parent: mass and momentum are shared out without a rest.
+  std::vector<BodyPiece> make(const std::vector<PieceSource>& sources);
+
+  Index kept_clusters() const { return kept_; }
+  Index rebuilt_clusters() const { return rebuilt_; }
+
+ private:
+  struct Crumb;
+  struct Counts {
+    Index kept = 0, rebuilt = 0;
+  };
+  BodyPiece makeOne(const PieceSource& source, Points rest, const std::vector<double>& masses, const Crumb* crumb,
+                    Counts& counts) const;
+  std::vector<Points> restVertices(const std::vector<PieceSource>& sources) const;
+
+  const BodyModel& model_;
+  const BodyState& state_;
+  std::uint32_t new_patch_;
+  ParticleGraph graph_;
+  std::vector<bool> torn_;
+  std::vector<Index> rider_of_;
+  Index kept_ = 0, rebuilt_ = 0;
+};
+
+}  // namespace meshless

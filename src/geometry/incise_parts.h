@@ -1,0 +1,123 @@
+// What the stages of an incision hand to each other. Private to geometry's incise*.cpp.
+#pragma once
+
+#include <algorithm>
+#include <unordered_map>
+
+#include "meshless_surgery/geometry/incise.h"
+
+namespace meshless {
+namespace incising {
+
+inline std::uint64_t edgeKey(Index a, Index b) {
+  return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b);
+}
+
+/// An order of places that does not depend on how a mesh is numbered.
+inline bool comesFirst(const Vec3& a, const Vec3& b) {
+  return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+}
+
+/// The blade's coordinates, and its rectangle cut down to where the section is.
+struct Frame {
+  Vec3 origin, x_axis, y_axis, normal;
+  Vec2 low, high;     // [m] of the rectangle
+  double band = 0.0;  // [m] what is closer to the plane or to the rectangle's border lies on it
+
+  Vec2 flat(const Vec3& p) const { return {x_axis.dot(p - origin), y_axis.dot(p - origin)}; }
+  Vec3 lifted(const Vec2& p) const { return origin + p.x() * x_axis + p.y() * y_axis; }
+};
+
+/// An edge of the split surface that lies in the plane, within the rectangle.
+struct RimEdge {
+  enum Kind : char {
+    kCrossed,       // the surface goes through the plane: the triangle above runs from -> to, the solid is to the left
+    kTouchedAbove,  // it touches the plane from above, as the front of an incision can: the solid may be on both sides
+    kTouchedBelow
+  };
+  Index from, to;
+  Kind kind = kCrossed;
+};
+
+/// The surface, its triangles split where the rectangle crosses them: the same points of space, more triangles.
+struct Mouth {
+  Frame frame;
+  Points positions;  // the mesh's, then new ones; not all of them are used
+  Index mesh_vertices = 0;
+  std::vector<VertexOrigin> new_origins;  // of the vertices from mesh_vertices on
+  std::vector<Vec2> places;  // [m] in the frame; of vertices in the plane, on the border exactly if near it
+  std::vector<Triangle> triangles;
+  std::vector<std::uint32_t> patches;
+  std::vector<RimEdge> rim;
+  std::vector<std::array<Vec2, 2>> section;  // the whole plane's, directed, solid to the left
+  double spacing = 0.0;                      // [m] mean edge of the triangles at the rim
+  bool along_edges = false;                  // edges of the mesh are rim
+  bool lies_in_surface = false;              // triangles of the mesh lie in the rectangle
+
+  VertexOrigin originOf(Index vertex) const;
+  /// A vertex at (1 - s) a + s b, its place still to be set.
+  Index addBetween(Index a, Index b, double s);
+};
+
+/// Vertices inside edges, from the lower-numbered end to the other.
+using InnerVertices = std::unordered_map<std::uint64_t, std::vector<Index>>;
+
+/// Splits the triangles at such edges. What is made inside of a triangle is never an edge to be split.
+void splitAtEdges(Mouth& mouth, const InnerVertices& inner);
+
+/// Splits rim edges that pass through vertices of others, as where lips that lie on each other are split in different
+/// places. False where there are none.
+bool splitRimAtVertices(Mouth& mouth);
+
+/// (1 - s) a + s b. False where that has more than four parents.
+bool mixOrigins(const VertexOrigin& a, const VertexOrigin& b, double s, VertexOrigin& mixed);
+
+/// Refuses kMissed where the plane or its rectangle is beside the mesh, kUnsuitableShape where the surface is open.
+Result<Mouth> openMouth(const TriangleMesh& mesh, const Blade& blade, double band);
+
+struct LipNode {
+  Vec2 place;
+  Index vertex = kNoIndex;  // of the mouth: the lowest one here; kNoIndex inside the solid
+};
+
+/// A triangle of the section, seen along the normal from above. Edge k runs from node k to the next.
+struct LipFace {
+  std::array<Index, 3> nodes;                                      // counter-clockwise
+  std::array<Index, 3> neighbors{{kNoIndex, kNoIndex, kNoIndex}};  // faces of the same lip
+  std::array<Index, 3> rim{{kNoIndex, kNoIndex, kNoIndex}};        // rim edges; neither: the buried front
+  std::array<bool, 3> against{{false, false, false}};              // the rim edge runs the other way
+  Index component = 0;
+};
+
+struct Lips {
+  std::vector<LipNode> nodes;
+  std::vector<LipFace> faces;
+  Index components = 0;
+};
+
+/// Fills what of the solid's section lies in the rectangle, as far as it hangs together with the rim. `touched`: edges
+/// where the surface only touches the plane are rim too.
+Result<Lips> fillLips(const Mouth& mouth, const InciseOptions& options, bool touched);
+
+/// The surface opened: mouth and lips joined, not yet taken apart into pieces.
+struct OpenedSurface {
+  struct InnerPoint {
+    Index vertex;
+    Index lip;  // 2 * component, + 1 for the lip of the solid above
+  };
+  TriangleMesh mesh;  // vertices that no triangle uses are left out later
+  std::vector<VertexOrigin> origins;
+  std::vector<std::int8_t> facing;
+  std::vector<InnerPoint> inner_points;    // ascending by vertex
+  std::vector<std::vector<Index>> mouths;  // of each lip: its vertices on the mouth, ascending
+  std::size_t first_new_triangle = 0;
+};
+
+/// Joins triangles at their edges side by side, then splits the mouth's vertices by umbrella.
+Result<OpenedSurface> seal(const Mouth& mouth, const Lips& lips, std::uint32_t patch);
+
+/// Takes the surface apart into its connected solids, hollows with the solid around them.
+Result<std::vector<IncisedPiece>> separate(const OpenedSurface& opened);
+
+}  // namespace incising
+}  // namespace meshless

@@ -1,0 +1,142 @@
+// Vertices put into edges of the mouth.
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include "incise_parts.h"
+
+namespace meshless {
+namespace incising {
+
+VertexOrigin Mouth::originOf(Index vertex) const {
+  if (vertex >= mesh_vertices) return new_origins[vertex - mesh_vertices];
+  VertexOrigin origin;
+  origin.parents[0] = vertex;
+  origin.weights[0] = 1.0;
+  return origin;
+}
+
+bool mixOrigins(const VertexOrigin& a, const VertexOrigin& b, double s, VertexOrigin& mixed) {
+  mixed = VertexOrigin();
+  std::size_t used = 0;
+  const auto add = [&](const VertexOrigin& end, double share) {
+    for (std::size_t k = 0; k < 4 && end.parents[k] != kNoIndex; ++k) {
+      std::size_t slot = 0;
+      while (slot < used && mixed.parents[slot] != end.parents[k]) ++slot;
+      if (slot == 4) return false;
+      if (slot == used) mixed.parents[used++] = end.parents[k];
+      mixed.weights[slot] += share * end.weights[k];
+    }
+    return true;
+  };
+  return add(a, 1.0 - s) && add(b, s);
+}
+
+Index Mouth::addBetween(Index a, Index b, double s) {
+  VertexOrigin origin;
+  // All ends lie in one triangle of the mesh: three parents at the most.
+  const bool fits = mixOrigins(originOf(a), originOf(b), s, origin);
+  assert(fits);
+  (void)fits;
+  const Vec3 position = positions[a] + s * (positions[b] - positions[a]);
+  positions.push_back(position);
+  places.emplace_back(Vec2::Zero());
+  new_origins.push_back(origin);
+  return static_cast<Index>(positions.size() - 1);
+}
+
+void splitAtEdges(Mouth& mouth, const InnerVertices& inner) {
+  const std::size_t count = mouth.triangles.size();
+  std::vector<Triangle> open;
+  for (std::size_t t = 0; t < count; ++t) {
+    open.assign(1, mouth.triangles[t]);
+    bool first = true;
+    while (!open.empty()) {
+      const Triangle v = open.back();
+      open.pop_back();
+      int edge = 0;
+      auto found = inner.end();
+      for (; edge < 3; ++edge) {
+        found = inner.find(edgeKey(v[edge], v[(edge + 1) % 3]));
+        if (found != inner.end()) break;
+      }
+      if (found == inner.end()) {
+        if (first) {
+          mouth.triangles[t] = v;
+        } else {
+          mouth.triangles.push_back(v);
+          mouth.patches.push_back(mouth.patches[t]);
+        }
+        first = false;
+        continue;
+      }
+      const Index a = v[edge], b = v[(edge + 1) % 3], apex = v[(edge + 2) % 3];
+      std::vector<Index> stops = found->second;
+      if (a > b) std::reverse(stops.begin(), stops.end());
+      stops.push_back(b);
+      Index from = a;
+      for (const Index to : stops) {
+        open.push_back({from, to, apex});
+        from = to;
+      }
+    }
+  }
+}
+
+bool splitRimAtVertices(Mouth& mouth) {
+  const double snap = 1e-3 * mouth.frame.band;
+  std::vector<Index> vertices;
+  for (const RimEdge& e : mouth.rim) {
+    vertices.push_back(e.from);
+    vertices.push_back(e.to);
+  }
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+
+  struct Stop {
+    double s;
+    Vec2 place;
+  };
+  InnerVertices inner;
+  std::vector<RimEdge> rim;
+  std::vector<Stop> stops;
+  for (const RimEdge& e : mouth.rim) {
+    // The same stops, to the last bit, for a lip that lies on this one and runs the other way.
+    const bool swapped = comesFirst(mouth.positions[e.to], mouth.positions[e.from]);
+    const Index start = swapped ? e.to : e.from, end = swapped ? e.from : e.to;
+    const Vec2 a = mouth.places[start], edge = mouth.places[end] - a;
+    const double length = edge.norm();
+    stops.clear();
+    for (const Index v : vertices) {
+      const Vec2 arm = mouth.places[v] - a;
+      const double along = edge.dot(arm) / length;
+      if (!(along > snap && along < length - snap)) continue;
+      if (std::abs(edge.x() * arm.y() - edge.y() * arm.x()) <= snap * length)
+        stops.push_back({along / length, mouth.places[v]});
+    }
+    std::sort(stops.begin(), stops.end(), [](const Stop& p, const Stop& q) { return p.s < q.s; });
+    std::vector<Index> chain{start};
+    double last = 0.0;
+    for (const Stop& stop : stops) {
+      if (chain.size() > 1 && (stop.s - last) * length <= snap) continue;
+      last = stop.s;
+      const Index made = mouth.addBetween(start, end, stop.s);
+      mouth.places[made] = stop.place;
+      chain.push_back(made);
+    }
+    chain.push_back(end);
+    if (swapped) std::reverse(chain.begin(), chain.end());
+    for (std::size_t k = 0; k + 1 < chain.size(); ++k) rim.push_back({chain[k], chain[k + 1], e.kind});
+    if (chain.size() == 2) continue;
+    std::vector<Index> between(chain.begin() + 1, chain.end() - 1);
+    if (e.from > e.to) std::reverse(between.begin(), between.end());
+    inner.emplace(edgeKey(e.from, e.to), std::move(between));
+  }
+  if (inner.empty()) return false;
+  mouth.rim = std::move(rim);
+  splitAtEdges(mouth, inner);
+  return true;
+}
+
+}  // namespace incising
+}  // namespace meshless

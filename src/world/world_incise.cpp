@@ -1,0 +1,89 @@
+// Partial cuts: which bodies a blade opens, and what becomes of those that come apart.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "meshless_surgery/body/incise_body.h"
+#include "world_impl.h"
+
+namespace meshless {
+namespace {
+
+Status checkBlade(const Blade& b) {
+  if (!b.origin.allFinite() || !b.x_axis.allFinite() || !b.y_axis.allFinite()) return notFinite("the blade's pose");
+  if (!(std::abs(b.x_axis.norm() - 1.0) < 1e-6 && std::abs(b.y_axis.norm() - 1.0) < 1e-6 &&
+        std::abs(b.x_axis.dot(b.y_axis)) < 1e-6))
+    return Error{ErrorCode::kInvalidArgument, "the blade's axes are not unit vectors at a right angle"};
+  if (!(b.length > 0.0 && b.length <= 1e9)) return outOfRange("length", b.length, "above 0 to 1e9 m");
+  if (!(b.depth > 0.0 && b.depth <= 1e9)) return outOfRange("depth", b.depth, "above 0 to 1e9 m");
+  return Done{};
+}
+
+}  // namespace
+
+Result<Reply> World::Impl::apply(const InciseCommand& command) {
+  const auto start = std::chrono::steady_clock::now();
+  if (Status status = checkBlade(command.blade); !status) return status.error();
+  for (const std::string& name : command.bodies)
+    if (!find(name)) return Error{ErrorCode::kUnknownName, "there is no body '" + name + "'; " + knownBodies()};
+  Box reach;
+  for (double s : {0.0, command.blade.length})
+    for (double t : {0.0, -command.blade.depth})
+      reach.extend(command.blade.origin + s * command.blade.x_axis + t * command.blade.y_axis);
+
+  struct Opened {
+    BodyId id;
+    IncisedBody body;
+  };
+  std::vector<Opened> all;
+  InciseReply reply;
+  std::optional<Error> refused;
+  std::string missed;
+  for (auto& body : bodies) {
+    if (!command.bodies.empty() &&
+        std::find(command.bodies.begin(), command.bodies.end(), body->name) == command.bodies.end())
+      continue;
+    refreshSurface(*body);
+    Box bounds;
+    for (const Vec3& p : body->state.surface) bounds.extend(p);
+    if (!bounds.overlaps(reach)) continue;
+    Result<IncisedBody> opened = inciseBody(*body->model, body->state, command.blade);
+    if (opened) {
+      all.push_back({body->id, std::move(*opened)});
+    } else if (opened.error().code == ErrorCode::kMissed) {
+      missed = body->name + ": " + opened.error().detail;
+    } else {
+      refused = Error{opened.error().code, body->name + " cannot be opened: " + opened.error().detail};
+      reply.notes.push_back(refused->detail);
+    }
+  }
+  if (all.empty()) {
+    if (refused) return *refused;
+    if (!missed.empty()) return Error{ErrorCode::kMissed, missed};
+    return Error{ErrorCode::kMissed, command.bodies.empty() ? "the blade met no body; " + knownBodies()
+                                                            : "the blade met none of the bodies named"};
+  }
+
+  // From here nothing fails.
+  for (Opened& opened : all) {
+    WorldBody& body = *find(opened.id);
+    const std::string name = body.name;
+    reply.cut_bodies.push_back(name);
+    reply.opened_area += opened.body.opened_area;
+    if (opened.body.pieces.size() == 1) {
+      body.model = std::move(opened.body.pieces[0].model);
+      body.state = std::move(opened.body.pieces[0].state);
+      body.mesh.reset();
+      body.surface_current = true;
+      say(EventType::kIncised, name, 0, "opened");
+    } else {
+      const std::vector<std::string> names = replaceByPieces(opened.id, std::move(opened.body.pieces));
+      reply.new_bodies.insert(reply.new_bodies.end(), names.begin(), names.end());
+      say(EventType::kIncised, name, 0, "opened, and came apart into " + std::to_string(names.size()) + " pieces");
+    }
+  }
+  reply.duration = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return Reply(reply);
+}
+
+}  // namespace meshless
