@@ -10,6 +10,7 @@ namespace meshless {
 namespace {
 
 constexpr int kNoPiece = -1;
+constexpr double kOnPlane = 0.1;  // [spacing]
 
 // The piece of every particle. Surface particles are where their vertex is; the others take the piece of the nearest
 // one along the body on their side of the plane.
@@ -23,7 +24,9 @@ std::vector<int> assignParticles(const BodyModel& model, const BodyState& state,
       int& piece = piece_of[model.binding.particle[v]];
       if (piece == kNoPiece) piece = static_cast<int>(p);  // one on the plane goes to the larger piece
     }
-  const auto sideOf = [&](Index i) { return plane.height(state.positions[i]) >= 0.0 ? 1 : -1; };
+  // A layer that lies on the plane but for a little goes to one side as a whole, or the cap's binding were ragged.
+  const double on_plane = kOnPlane * model.spacing;
+  const auto sideOf = [&](Index i) { return plane.height(state.positions[i]) >= -on_plane ? 1 : -1; };
   // A side with one piece needs no search.
   int only[2] = {kNoPiece, kNoPiece};
   for (const int side : {-1, 1}) {

@@ -9,14 +9,17 @@
 namespace meshless {
 namespace {
 
+constexpr double kOnPlane = 0.1;     // [spacing] from the blade: on it
 constexpr std::size_t kLooked = 16;  // vertices near a particle that say where it belongs
 
 // The blade's rectangle as something that links can pass through.
 class Gate {
  public:
-  explicit Gate(const Blade& blade) : blade_(blade), plane_(blade.plane()) {}
+  Gate(const Blade& blade, double spacing) : blade_(blade), plane_(blade.plane()), on_it_(kOnPlane * spacing) {}
 
   int side(const Vec3& p) const { return plane_.height(p) >= 0.0 ? 1 : -1; }
+  /// A layer of particles that lies on the blade but for a little goes to one side as a whole, or the lips were ragged.
+  int particleSide(const Vec3& p) const { return plane_.height(p) >= -on_it_ ? 1 : -1; }
 
   /// The way from a to b passes through the blade; `a_side` and `b_side` stand in for points that lie on its plane.
   bool between(const Vec3& a, int a_side, const Vec3& b, int b_side) const {
@@ -27,11 +30,12 @@ class Gate {
     const double along = r.dot(blade_.x_axis), up = r.dot(blade_.y_axis);
     return along >= 0.0 && along <= blade_.length && up <= 0.0 && up >= -blade_.depth;
   }
-  bool between(const Vec3& a, const Vec3& b) const { return between(a, side(a), b, side(b)); }
+  bool betweenParticles(const Vec3& a, const Vec3& b) const { return between(a, particleSide(a), b, particleSide(b)); }
 
  private:
   Blade blade_;
   Plane plane_;
+  double on_it_;  // [m]
 };
 
 // Which side of the blade each vertex of a piece is on; 0 where both new lips have it (the buried front).
@@ -61,7 +65,7 @@ ParticleGraph cutLinks(const ParticleGraph& graph, const Points& x, const Gate& 
     for (Index k = graph.offsets[i]; k < graph.offsets[i + 1]; ++k) {
       const Index j = graph.neighbours[k];
       // Both directions must agree to the bit.
-      if (gate.between(x[std::min(i, j)], x[std::max(i, j)])) continue;
+      if (gate.betweenParticles(x[std::min(i, j)], x[std::max(i, j)])) continue;
       left.neighbours.push_back(j);
       left.lengths.push_back(graph.lengths[k]);
     }
@@ -81,7 +85,7 @@ std::vector<bool> tornClusters(const ClusterSet& clusters, const ParticleGraph& 
       const Index i = clusters.members[k];
       for (Index e = before.offsets[i]; e < before.offsets[i + 1] && !torn[c]; ++e) {
         const Index j = before.neighbours[e];
-        torn[c] = seen[j] == c && gate.between(x[std::min(i, j)], x[std::max(i, j)]);
+        torn[c] = seen[j] == c && gate.betweenParticles(x[std::min(i, j)], x[std::max(i, j)]);
       }
     }
   }
@@ -130,7 +134,7 @@ std::vector<std::size_t> assignParticles(const std::vector<IncisedPiece>& pieces
     const std::vector<Index> near = nearest.nearest(x[i], kLooked);
     Index best = near[0];
     for (Index v : near)
-      if (!gate.between(vertices[v], side[v], x[i], gate.side(x[i]))) {
+      if (!gate.between(vertices[v], side[v], x[i], gate.particleSide(x[i]))) {
         best = v;
         break;
       }
@@ -161,7 +165,7 @@ Result<IncisedBody> inciseBody(const BodyModel& model, const BodyState& state, c
   Result<Incision> incision = incise(present, blade, options);
   if (!incision) return incision.error();
 
-  const Gate gate(blade);
+  const Gate gate(blade, model.spacing);
   const Points& x = state.positions;
   ParticleGraph graph = cutLinks(model.graph, x, gate);
   std::vector<bool> torn = tornClusters(model.clusters, model.graph, x, gate);
@@ -179,7 +183,7 @@ Result<IncisedBody> inciseBody(const BodyModel& model, const BodyState& state, c
     const IncisedPiece& piece = incision->pieces[p];
     sources.push_back({piece.mesh, piece.origins, std::move(members[p]), [&, p](Index vertex, Index particle) {
                          const Vec3& at = incision->pieces[p].mesh.vertices[vertex];
-                         return gate.between(at, sides[p][vertex], x[particle], gate.side(x[particle]));
+                         return gate.between(at, sides[p][vertex], x[particle], gate.particleSide(x[particle]));
                        }});
   }
   PieceMaker maker(model, state, options.patch);

@@ -65,10 +65,10 @@ class ScenesTest(unittest.TestCase):
             path = os.path.join(CONFIG, 'rviz', scene + '.rviz')
             with open(path) as file:
                 displays = yaml.safe_load(file)['Visualization Manager']['Displays']
-            topics = {d['Class']: d for d in displays}
-            self.assertEqual('/deformer/markers', topics['rviz/MarkerArray']['Marker Topic'])
-            self.assertTrue(topics['rviz/MarkerArray']['Enabled'])
-            self.assertEqual('/deformer/points', topics['rviz/PointCloud2']['Topic'])
+            shown = {d.get('Marker Topic', d.get('Topic')): d for d in displays}
+            self.assertEqual('rviz/MarkerArray', shown['/deformer/markers']['Class'], scene)
+            self.assertTrue(shown['/deformer/markers']['Enabled'], scene)
+            self.assertEqual('rviz/PointCloud2', shown['/deformer/points']['Class'], scene)
 
 
 SCENES = sorted(file[:-5] for file in os.listdir(os.path.join(CONFIG, 'scenes')) if file.endswith('.yaml'))
