@@ -11,6 +11,8 @@
 #include <CGAL/property_map.h>
 #include <CGAL/spatial_sort.h>
 
+#include "split_edges.h"
+
 namespace meshless {
 namespace cutting {
 namespace {
@@ -28,8 +30,6 @@ using FaceBase =
 using Cdt =
     CGAL::Constrained_Delaunay_triangulation_2<Kernel, CGAL::Triangulation_data_structure_2<VertexBase, FaceBase>>;
 
-std::uint64_t pairKey(Index a, Index b) { return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b); }
-
 /// What a constrained edge parts, signed by the direction asked for.
 class Borders {
  public:
@@ -37,10 +37,10 @@ class Borders {
     int weight = 0;
     bool core = false;
   };
-  void add(const OutlineSegment& s) { borders_[pairKey(s.from, s.to)].weight += s.from < s.to ? s.weight : -s.weight; }
-  void addCore(Index from, Index to) { borders_[pairKey(from, to)].core = true; }
+  void add(const OutlineSegment& s) { borders_[edgeKey(s.from, s.to)].weight += s.from < s.to ? s.weight : -s.weight; }
+  void addCore(Index from, Index to) { borders_[edgeKey(from, to)].core = true; }
   Border of(Index from, Index to) const {
-    const auto found = borders_.find(pairKey(from, to));
+    const auto found = borders_.find(edgeKey(from, to));
     if (found == borders_.end()) return {};
     return {from < to ? found->second.weight : -found->second.weight, found->second.core};
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "meshless_surgery/geometry/cut.h"
+#include "split_edges.h"
 
 namespace meshless {
 namespace cutting {
@@ -69,9 +70,6 @@ struct Workpiece {
   /// A vertex at (1 - s) a + s b.
   Index addBetween(Index a, Index b, double s);
 };
-
-/// (1 - s) a + s b. False where that has more than four parents.
-bool mixOrigins(const VertexOrigin& a, const VertexOrigin& b, double s, VertexOrigin& mixed);
 
 /// Rebases the plane, takes heights once and puts every triangle, whole or in parts, on its side.
 /// Refuses kMissed where no vertex is above or none below, kUnsuitableShape where the mesh is not closed and oriented.

@@ -2,56 +2,9 @@
 
 #include <algorithm>
 #include <tuple>
-#include <unordered_map>
 
 namespace meshless {
 namespace cutting {
-namespace {
-
-std::uint64_t edgeKey(Index a, Index b) { return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b); }
-
-/// Vertices inside an edge, from its lower-numbered end to the other.
-using InnerVertices = std::unordered_map<std::uint64_t, std::vector<Index>>;
-
-/// Splits the triangles at the given edges. What is made inside of a triangle is never an edge to be split.
-void splitTriangles(SideSurface& surface, const InnerVertices& inner) {
-  const Index before = static_cast<Index>(surface.triangles.size());
-  std::vector<Triangle> open;
-  for (Index t = 0; t < before; ++t) {
-    bool first = true;
-    open.assign(1, surface.triangles[t]);
-    while (!open.empty()) {
-      const Triangle triangle = open.back();
-      open.pop_back();
-      int edge = 0;
-      auto found = inner.end();
-      for (; edge < 3; ++edge) {
-        found = inner.find(edgeKey(triangle[edge], triangle[(edge + 1) % 3]));
-        if (found != inner.end()) break;
-      }
-      if (found == inner.end()) {
-        if (first) {
-          surface.triangles[t] = triangle;
-        } else {
-          surface.add(triangle, surface.patches[t]);
-        }
-        first = false;
-        continue;
-      }
-      const Index a = triangle[edge], b = triangle[(edge + 1) % 3], apex = triangle[(edge + 2) % 3];
-      std::vector<Index> stops = found->second;
-      if (a > b) std::reverse(stops.begin(), stops.end());
-      stops.push_back(b);
-      Index from = a;
-      for (const Index to : stops) {
-        open.push_back({from, to, apex});
-        from = to;
-      }
-    }
-  }
-}
-
-}  // namespace
 
 std::vector<Index> Nodes::lowestVertices() const {
   std::vector<Index> lowest(places.size(), kNoIndex);
@@ -135,7 +88,7 @@ bool splitRim(Workpiece& work, const std::vector<RimEdge>& rim, Nodes& nodes) {
       }
     }
   }
-  for (SideSurface& side : work.sides) splitTriangles(side, inner);
+  for (SideSurface& side : work.sides) splitAtEdges(side.triangles, side.patches, inner);
   nodes.places = std::move(split.nodes);
   for (Index& node : nodes.of_vertex)
     if (node != kNoIndex) node = split.merged[node];

@@ -14,8 +14,6 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
-std::uint64_t edgeKey(Index a, Index b) { return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b); }
-
 double heightOf(const Workpiece& work, Index vertex) {
   return work.normal.dot(work.mesh->vertices[vertex] - work.center);
 }
@@ -176,22 +174,6 @@ Index Workpiece::addVertex(const Vec3& position, const VertexOrigin& origin) {
   new_positions.push_back(position);
   new_origins.push_back(origin);
   return endVertex() - 1;
-}
-
-bool mixOrigins(const VertexOrigin& a, const VertexOrigin& b, double s, VertexOrigin& mixed) {
-  mixed = VertexOrigin();
-  std::size_t used = 0;
-  const auto add = [&](const VertexOrigin& end, double share) {
-    for (std::size_t k = 0; k < 4 && end.parents[k] != kNoIndex; ++k) {
-      std::size_t slot = 0;
-      while (slot < used && mixed.parents[slot] != end.parents[k]) ++slot;
-      if (slot == 4) return false;
-      if (slot == used) mixed.parents[used++] = end.parents[k];
-      mixed.weights[slot] += share * end.weights[k];
-    }
-    return true;
-  };
-  return add(a, 1.0 - s) && add(b, s);
 }
 
 Index Workpiece::addBetween(Index a, Index b, double s) {

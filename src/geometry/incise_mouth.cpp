@@ -318,7 +318,7 @@ class Opener {
       splitCrossed(c, parts);
       if (!parts.empty()) replace(c.triangle);
     }
-    if (!inside_edge_.empty()) splitAtEdges(mouth_, inside_edge_);
+    if (!inside_edge_.empty()) splitAtEdges(mouth_.triangles, mouth_.patches, inside_edge_);
   }
 
   /// A convex polygon of three or four corners.

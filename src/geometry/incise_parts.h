@@ -5,13 +5,10 @@
 #include <unordered_map>
 
 #include "meshless_surgery/geometry/incise.h"
+#include "split_edges.h"
 
 namespace meshless {
 namespace incising {
-
-inline std::uint64_t edgeKey(Index a, Index b) {
-  return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b);
-}
 
 /// An order of places that does not depend on how a mesh is numbered.
 inline bool comesFirst(const Vec3& a, const Vec3& b) {
@@ -59,18 +56,9 @@ struct Mouth {
   Index addBetween(Index a, Index b, double s);
 };
 
-/// Vertices inside edges, from the lower-numbered end to the other.
-using InnerVertices = std::unordered_map<std::uint64_t, std::vector<Index>>;
-
-/// Splits the triangles at such edges. What is made inside of a triangle is never an edge to be split.
-void splitAtEdges(Mouth& mouth, const InnerVertices& inner);
-
 /// Splits rim edges that pass through vertices of others, as where lips that lie on each other are split in different
 /// places. False where there are none.
 bool splitRimAtVertices(Mouth& mouth);
-
-/// (1 - s) a + s b. False where that has more than four parents.
-bool mixOrigins(const VertexOrigin& a, const VertexOrigin& b, double s, VertexOrigin& mixed);
 
 /// Refuses kMissed where the plane or its rectangle is beside the mesh, kUnsuitableShape where the surface is open.
 Result<Mouth> openMouth(const TriangleMesh& mesh, const Blade& blade, double band);
@@ -101,15 +89,9 @@ Result<Lips> fillLips(const Mouth& mouth, const InciseOptions& options, bool tou
 
 /// The surface opened: mouth and lips joined, not yet taken apart into pieces.
 struct OpenedSurface {
-  struct InnerPoint {
-    Index vertex;
-    Index lip;  // 2 * component, + 1 for the lip of the solid above
-  };
   TriangleMesh mesh;  // vertices that no triangle uses are left out later
   std::vector<VertexOrigin> origins;
   std::vector<std::int8_t> facing;
-  std::vector<InnerPoint> inner_points;    // ascending by vertex
-  std::vector<std::vector<Index>> mouths;  // of each lip: its vertices on the mouth, ascending
   std::size_t first_new_triangle = 0;
 };
 

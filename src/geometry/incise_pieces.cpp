@@ -55,36 +55,7 @@ std::vector<Shell> shellsOf(const TriangleMesh& mesh) {
   return shells;
 }
 
-/// The vertices near `point`, by squared distance: weights of what lies inside.
-LipPoint near(const OpenedSurface& opened, const OpenedSurface::InnerPoint& point) {
-  struct Near {
-    double squared;
-    Index vertex;
-    bool operator<(const Near& o) const { return squared != o.squared ? squared < o.squared : vertex < o.vertex; }
-  };
-  std::array<Near, 4> nearest;
-  nearest.fill({1e300, kNoIndex});
-  const Vec3& p = opened.mesh.vertices[point.vertex];
-  for (const Index v : opened.mouths[point.lip]) {
-    const Near candidate{(opened.mesh.vertices[v] - p).squaredNorm(), v};
-    if (!(candidate < nearest[3])) continue;
-    nearest[3] = candidate;
-    for (int k = 3; k > 0 && nearest[k] < nearest[k - 1]; --k) std::swap(nearest[k], nearest[k - 1]);
-  }
-  LipPoint lip_point;
-  lip_point.vertex = point.vertex;
-  double sum = 0.0;
-  for (int k = 0; k < 4 && nearest[k].vertex != kNoIndex; ++k) {
-    lip_point.mouth[k] = nearest[k].vertex;
-    lip_point.weights[k] = 1.0 / std::max(nearest[k].squared, 1e-300);
-    sum += lip_point.weights[k];
-  }
-  for (double& w : lip_point.weights) w /= sum;
-  return lip_point;
-}
-
-IncisedPiece pieceOf(const OpenedSurface& opened, const std::vector<LipPoint>& lip_points,
-                     const std::vector<Index>& triangles) {
+IncisedPiece pieceOf(const OpenedSurface& opened, const std::vector<Index>& triangles) {
   IncisedPiece piece;
   std::vector<Index> local(opened.mesh.vertices.size(), kNoIndex);
   for (const Index t : triangles)
@@ -106,13 +77,6 @@ IncisedPiece pieceOf(const OpenedSurface& opened, const std::vector<LipPoint>& l
     piece.mesh.triangles.push_back({local[v[0]], local[v[1]], local[v[2]]});
     piece.mesh.patches.push_back(opened.mesh.patches[t]);
     piece.facing.push_back(opened.facing[t]);
-  }
-  for (LipPoint point : lip_points) {
-    if (local[point.vertex] == kNoIndex) continue;
-    point.vertex = local[point.vertex];
-    for (Index& v : point.mouth)
-      if (v != kNoIndex) v = local[v];
-    piece.lip_points.push_back(point);
   }
   return piece;
 }
@@ -149,10 +113,8 @@ Result<std::vector<IncisedPiece>> separate(const OpenedSurface& opened) {
     if (shells[s].holder == kNoIndex) order.push_back(s);
   // A solid's hollows do not count here.
   std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return shells[a].volume > shells[b].volume; });
-  std::vector<LipPoint> lip_points;
-  for (const OpenedSurface::InnerPoint& p : opened.inner_points) lip_points.push_back(near(opened, p));
   std::vector<IncisedPiece> pieces;
-  for (const Index s : order) pieces.push_back(pieceOf(opened, lip_points, shells[s].triangles));
+  for (const Index s : order) pieces.push_back(pieceOf(opened, shells[s].triangles));
   return pieces;
 }
 

@@ -183,7 +183,6 @@ class Sealer {
     for (Index v = 0; v < mouth_.positions.size(); ++v) out_.origins.push_back(mouth_.originOf(v));
     out_.first_new_triangle = mouth_.triangles.size();
     out_.facing.assign(mouth_.triangles.size(), 0);
-    out_.mouths.resize(2 * lips_.components);
     for (const Index t : near_) slots_.push_back(t);
     for (std::size_t l = 0; l < 2 * lips_.faces.size(); ++l) {
       slots_.push_back(static_cast<Index>(out_.mesh.triangles.size()));
@@ -205,7 +204,6 @@ class Sealer {
         const Index v = lip ? lips_.nodes[nodeOf(c)].vertex : lowest[rootOf(c)];
         if (v == kNoIndex) {
           number = addVertex(mouth_.frame.lifted(lips_.nodes[nodeOf(c)].place), VertexOrigin());
-          out_.inner_points.push_back({number, lipOf(c)});
         } else if (lip || kept[v]) {
           number = addVertex(mouth_.positions[v], mouth_.originOf(v));
         } else {
@@ -215,21 +213,7 @@ class Sealer {
       }
       out_.mesh.triangles[slots_[c / 3]][c % 3] = number;
     }
-    for (Index f = 0; f < lips_.faces.size(); ++f) {
-      for (int k = 0; k < 3; ++k) {
-        if (lips_.faces[f].rim[k] == kNoIndex) continue;
-        for (const Corner c : {lower(f, k), upper(f, k)})
-          for (const Corner end : {c, nextCorner(c)})
-            out_.mouths[lipOf(c)].push_back(out_.mesh.triangles[slots_[end / 3]][end % 3]);
-      }
-    }
-    for (std::vector<Index>& m : out_.mouths) {
-      std::sort(m.begin(), m.end());
-      m.erase(std::unique(m.begin(), m.end()), m.end());
-    }
   }
-
-  Index lipOf(Corner c) const { return 2 * lips_.faces[faceOf(c)].component + (isUpper(c) ? 1 : 0); }
 
   Index finalVertex(Corner c) const { return out_.mesh.triangles[slots_[c / 3]][c % 3]; }
 
@@ -263,7 +247,6 @@ class Sealer {
                        "the surface crosses itself where the blade meets it, at more places "
                        "than new vertices can be made from"};
         const Index middle = addVertex(0.5 * (out_.mesh.vertices[a] + out_.mesh.vertices[b]), origin);
-        if (inside) out_.inner_points.push_back({middle, lipOf(c)});
         middles[c] = middles[d] = middle;
         split[c / 3] = split[d / 3] = true;
       }

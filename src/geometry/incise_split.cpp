@@ -16,22 +16,6 @@ VertexOrigin Mouth::originOf(Index vertex) const {
   return origin;
 }
 
-bool mixOrigins(const VertexOrigin& a, const VertexOrigin& b, double s, VertexOrigin& mixed) {
-  mixed = VertexOrigin();
-  std::size_t used = 0;
-  const auto add = [&](const VertexOrigin& end, double share) {
-    for (std::size_t k = 0; k < 4 && end.parents[k] != kNoIndex; ++k) {
-      std::size_t slot = 0;
-      while (slot < used && mixed.parents[slot] != end.parents[k]) ++slot;
-      if (slot == 4) return false;
-      if (slot == used) mixed.parents[used++] = end.parents[k];
-      mixed.weights[slot] += share * end.weights[k];
-    }
-    return true;
-  };
-  return add(a, 1.0 - s) && add(b, s);
-}
-
 Index Mouth::addBetween(Index a, Index b, double s) {
   VertexOrigin origin;
   // All ends lie in one triangle of the mesh: three parents at the most.
@@ -43,44 +27,6 @@ Index Mouth::addBetween(Index a, Index b, double s) {
   places.emplace_back(Vec2::Zero());
   new_origins.push_back(origin);
   return static_cast<Index>(positions.size() - 1);
-}
-
-void splitAtEdges(Mouth& mouth, const InnerVertices& inner) {
-  const std::size_t count = mouth.triangles.size();
-  std::vector<Triangle> open;
-  for (std::size_t t = 0; t < count; ++t) {
-    open.assign(1, mouth.triangles[t]);
-    bool first = true;
-    while (!open.empty()) {
-      const Triangle v = open.back();
-      open.pop_back();
-      int edge = 0;
-      auto found = inner.end();
-      for (; edge < 3; ++edge) {
-        found = inner.find(edgeKey(v[edge], v[(edge + 1) % 3]));
-        if (found != inner.end()) break;
-      }
-      if (found == inner.end()) {
-        if (first) {
-          mouth.triangles[t] = v;
-        } else {
-          mouth.triangles.push_back(v);
-          mouth.patches.push_back(mouth.patches[t]);
-        }
-        first = false;
-        continue;
-      }
-      const Index a = v[edge], b = v[(edge + 1) % 3], apex = v[(edge + 2) % 3];
-      std::vector<Index> stops = found->second;
-      if (a > b) std::reverse(stops.begin(), stops.end());
-      stops.push_back(b);
-      Index from = a;
-      for (const Index to : stops) {
-        open.push_back({from, to, apex});
-        from = to;
-      }
-    }
-  }
 }
 
 bool splitRimAtVertices(Mouth& mouth) {
@@ -134,7 +80,7 @@ bool splitRimAtVertices(Mouth& mouth) {
   }
   if (inner.empty()) return false;
   mouth.rim = std::move(rim);
-  splitAtEdges(mouth, inner);
+  splitAtEdges(mouth.triangles, mouth.patches, inner);
   return true;
 }
 

@@ -27,21 +27,11 @@ struct InciseOptions {
   std::size_t max_points = 4000;  // inner points of one lip; the spacing is widened to keep to it
 };
 
-/// A vertex of the lips that is on no surface of the parent: a place near it, in terms of the mouth. The weights (sum
-/// 1) belong to up to four vertices of the same piece, the nearest on the mouth of its lip; they do not make its
-/// position.
-struct LipPoint {
-  Index vertex = kNoIndex;
-  std::array<Index, 4> mouth{{kNoIndex, kNoIndex, kNoIndex, kNoIndex}};
-  std::array<double, 4> weights{{0.0, 0.0, 0.0, 0.0}};
-};
-
 /// A connected solid, closed and oriented. What was there before keeps its order, new vertices follow. Where lips met
 /// at a point, one of the vertices there may stand for another at the same place.
 struct IncisedPiece {
   TriangleMesh mesh;                  // patches filled
-  std::vector<VertexOrigin> origins;  // one a vertex, on the parent; no parents (weights 0) for lip_points
-  std::vector<LipPoint> lip_points;   // ascending by vertex
+  std::vector<VertexOrigin> origins;  // one a vertex, on the parent; none (weights 0) for those inside the lips
   std::vector<std::int8_t> facing;    // one a triangle: +1 a new lip looking along the blade's normal, -1 one looking
                                       // against it, 0 no new lip
 };
