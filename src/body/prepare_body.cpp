@@ -127,7 +127,7 @@ std::vector<double> shareMass(const BodyDef& def, const TriangleMesh& mesh, cons
   double total = def.material.density * volume;
   if (solid) {
     // A third of the spacing: samples half way between two particles would all fall to the same one.
-    const LatticeSample lattice = sampleInterior(mesh, *solid, spacing / 3.0, 0.0, kMaxParticles);
+    const LatticeSample lattice = sampleInterior(mesh, *solid, spacing / 3.0, 0.0, kMaxParticles, true);
     for (const Vec3& p : lattice.points) giveToNearest(nearest, rest, p, 1.0, share);
   } else {  // an open surface is a shell as thick as its spacing
     total = def.material.density * surfaceArea(mesh) * spacing;

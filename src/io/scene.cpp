@@ -35,8 +35,8 @@ void readWorld(YamlSource& source, const YAML::Node& node, WorldSettings& world)
   map.number("step_rate", {1.0, 10000.0, false, "Hz"}, world.step_rate);
   map.whole("substeps", 1, 1000, world.substeps);
   map.whole("max_substeps", 1, 1000, world.max_substeps);
-  const int contact = map.choice("contact", {"none", "textbook"});
-  if (contact >= 0) world.contact = contact == 0 ? ContactMethod::kNone : ContactMethod::kTextbook;
+  const int contact = map.choice("contact", {"none", "textbook", "rest_shape"});
+  if (contact >= 0) world.contact = static_cast<ContactMethod>(contact);
   if (const YAML::Node pick = map.get("pick"); pick.IsDefined()) {
     YamlMap keys(source, pick, "pick");
     keys.number("max_distance", lengths(0.0, true), world.pick_max_distance);

@@ -194,6 +194,8 @@ void World::reset() {
   while (!w.bodies.empty()) w.retire(w.bodies.back()->id);
   w.used_names.clear();
   w.picks.clear();
+  w.contacts.clear();
+  w.next_sleep_group = 1;
   w.push = PushSphere();
   w.scissors = Scissors();
   w.step = 0;
@@ -221,6 +223,7 @@ WorldSnapshot World::snapshot(const SnapshotWants& wants) {
     if (wants.particles) b.particles = body->state.positions;
     if (wants.measures) b.measures = measureBody(*body->model, body->state);
     b.stiffness_factor = body->stiffness_factor;
+    b.asleep = body->asleep;
     b.tetrahedra = body->mesh ? body->mesh->tetrahedra.size() : 0;
     shot.bodies.push_back(std::move(b));
   }

@@ -91,6 +91,7 @@ Result<Reply> World::Impl::apply(const PickCommand& command) {
   pick.target = pick.position = grabbed.point;
   pick.offset = grabbed.point - graspMean(pick, grabbed.body->state.positions);
   picks.push_back(pick);
+  wake(*grabbed.body);
   say(EventType::kPicked, grabbed.body->name, pick.id, "picked " + grabbed.body->name);
   return Reply(PickReply{pick.id, grabbed.body->name, grabbed.particle, grabbed.point});
 }
@@ -101,6 +102,7 @@ Result<Reply> World::Impl::apply(const MovePickCommand& command) {
   if (!pick) return noPick(command.pick, picks);
   pick->target = command.target;
   pick->locked = false;
+  if (WorldBody* body = find(pick->body)) wake(*body);
   return Reply(Done{});
 }
 
@@ -110,7 +112,8 @@ Result<Reply> World::Impl::apply(const LockCommand& command) {
   if (!pick) return noPick(command.pick, picks);
   if (command.target) pick->target = *command.target;
   pick->locked = true;
-  const WorldBody* body = find(pick->body);
+  WorldBody* body = find(pick->body);
+  if (body && command.target) wake(*body);
   say(EventType::kLocked, body ? body->name : "", pick->id, "locked");
   return Reply(Done{});
 }
@@ -118,7 +121,8 @@ Result<Reply> World::Impl::apply(const LockCommand& command) {
 Result<Reply> World::Impl::apply(const ReleaseCommand& command) {
   const Pick* pick = findPick(command.pick);
   if (!pick) return noPick(command.pick, picks);
-  const WorldBody* body = find(pick->body);
+  WorldBody* body = find(pick->body);
+  if (body) wake(*body);
   say(EventType::kReleased, body ? body->name : "", command.pick, "released");
   picks.erase(picks.begin() + (pick - picks.data()));
   return Reply(Done{});
@@ -126,7 +130,8 @@ Result<Reply> World::Impl::apply(const ReleaseCommand& command) {
 
 Result<Reply> World::Impl::apply(const ClearPicksCommand&) {
   for (const Pick& pick : picks) {
-    const WorldBody* body = find(pick.body);
+    WorldBody* body = find(pick.body);
+    if (body) wake(*body);
     say(EventType::kReleased, body ? body->name : "", pick.id, "released");
   }
   picks.clear();
@@ -134,7 +139,15 @@ Result<Reply> World::Impl::apply(const ClearPicksCommand&) {
 }
 
 Result<Reply> World::Impl::apply(const PushCommand& command) {
+  const auto wakeAround = [this] {
+    if (!push.enabled) return;
+    Box box;
+    box.extend(push.position.array() - push.radius);
+    box.extend(push.position.array() + push.radius);
+    wakeWithin(box);
+  };
   if (!command.enable) {
+    wakeAround();
     push = PushSphere();
     for (auto& body : bodies) body->touched_by_push = false;
     return Reply(Done{});
@@ -144,12 +157,14 @@ Result<Reply> World::Impl::apply(const PushCommand& command) {
     return outOfRange("radius", command.radius, "0 (the default) to 1e6 m");
   if (!(command.speed >= 0.0 && command.speed <= 1e6))
     return outOfRange("speed", command.speed, "0 (at once) to 1e6 m/s");
+  wakeAround();
   const bool from_nowhere = !push.enabled;
   push.enabled = true;
   push.radius = command.radius > 0.0 ? command.radius : settings.push_radius;
   push.target = command.position;
   push.speed = command.speed;
   if (from_nowhere || command.speed == 0.0) push.position = command.position;
+  wakeAround();
   return Reply(Done{});
 }
 
@@ -165,6 +180,7 @@ Result<Reply> World::Impl::apply(const SetMaterialCommand& command) {
     changes.emplace_back(body.get(), std::move(*changed));
   }
   for (auto& [body, material] : changes) {
+    wake(*body);
     body->model = withMaterial(body->model, body->material, material);
     body->material = material;
   }
@@ -184,6 +200,7 @@ Result<Reply> World::Impl::apply(const RemoveCommand& command) {
   for (const Pick& pick : picks)
     if (pick.body == id) say(EventType::kReleased, command.body, pick.id, "released: its body was removed");
   picks.erase(std::remove_if(picks.begin(), picks.end(), [&](const Pick& p) { return p.body == id; }), picks.end());
+  wake(*body);
   retire(id);
   say(EventType::kRemoved, command.body, 0, "removed " + command.body);
   return Reply(Done{});

@@ -146,7 +146,8 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
 }
 
 std::vector<std::string> World::Impl::replaceByPieces(const BodyId& parent_id, std::vector<BodyPiece> pieces) {
-  const WorldBody& parent = *find(parent_id);
+  WorldBody& parent = *find(parent_id);
+  wake(parent);
   const std::string parent_name = parent.name;
   const Material material = parent.material;
   const bool touched = parent.touched_by_push;

@@ -6,9 +6,18 @@
 
 #include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/body/deform.h"
+#include "meshless_surgery/contact/textbook.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless {
+
+/// What contact needs of a model; bodies of one model share it.
+struct ContactModel {
+  ContactModel(BodyModelPtr of_model);
+  BodyModelPtr model;
+  ContactShape shape;
+  std::vector<double> inverse_masses;  // [1/kg] 0 where fixed
+};
 
 struct WorldBody {
   BodyId id;
@@ -19,11 +28,17 @@ struct WorldBody {
   BodyState state;
   bool surface_current = true;              // state.surface fits state.positions
   std::shared_ptr<const ContactMesh> mesh;  // made when something first comes near
+  std::shared_ptr<const ContactModel> contact;  // likewise, of the present model
+  std::vector<ContactMap> maps;                 // of this frame, where it can touch another body
   bool touched_by_push = false;
   bool low_current = false;          // in this frame
   std::vector<Index> low_particles;  // that can meet the ground
   std::vector<Index> low_riders;
   double stiffness_factor = 1.0;
+  Box bounds;                    // [m] of particles and surface, at the start of the last frame in which it was awake
+  bool asleep = false;
+  double still_for = 0.0;        // [s]
+  std::uint32_t sleep_group = 0;  // those that fell asleep together wake together
   StepScratch scratch;
 };
 
@@ -56,6 +71,12 @@ struct World::Impl {
   std::vector<Event> events;
   StepReport report;
   std::size_t tetrahedralizations = 0;
+  std::vector<WorldBody*> awake;  // of this frame, in the order of bodies
+  std::uint32_t next_sleep_group = 1;
+  Contacts contacts;
+  std::vector<LoadedPair> loaded;
+  std::vector<ContactParty> parties;  // one a body, in their order, where contacts are found in rest shapes
+  std::map<const BodyModel*, std::weak_ptr<const ContactModel>> contact_models;
 
   WorldBody* find(const std::string& name);
   WorldBody* find(const BodyId& id);
@@ -89,12 +110,24 @@ struct World::Impl {
                     const std::vector<std::vector<Index>>& parent_particles);
 
   // stages of a step
+  void listAwake();
+  /// The body and all that fell asleep with it.
+  void wake(WorldBody& body);
+  void wakeWithin(const Box& box);
+  void wakePushed(double h_frame);
+  void fallAsleep(double h_frame);
   void closeBlades();
   std::vector<WorldBody*> bodiesInContact(double h);
   int chooseSubsteps(double h_frame);
   void movePush(double h, double h_frame);
   void pullSprings(double h, double h_frame);
   void contactBodies(const std::vector<WorldBody*>& near, double h, int stride);
+  const ContactModel& contactModel(WorldBody& body);
+  void findContacts(double h_frame, double h);
+  void fillParties();
+  void equipParty(WorldBody& body, ContactParty& party, bool meets_bodies);
+  void solveContacts(double h);
+  void liftOutOfGround(WorldBody& body, double h_frame);
   void findLow(WorldBody& body, double h_frame);
   void contactGroundAndPush(WorldBody& body, double h, double h_frame, const Vec3& push_velocity);
   void fadeRiderOffsets(WorldBody& body, double h);

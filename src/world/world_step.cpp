@@ -47,20 +47,27 @@ void World::step() {
   {
     const Stopwatch total(w.report.total);
     const double h_frame = 1.0 / w.settings.step_rate;
+    w.closeBlades();
+    w.wakePushed(h_frame);
+    w.listAwake();
     const int substeps = w.chooseSubsteps(h_frame);
     const double h = h_frame / substeps;
     // What an elastic material needs beyond the scene's substeps is not needed by contacts between bodies.
     const int stride = std::max(1, substeps / w.settings.substeps);
-    w.closeBlades();
     const std::vector<WorldBody*> near = w.bodiesInContact(h_frame);
+    const bool rest_shape = w.settings.contact == ContactMethod::kRestShape;
+    if (rest_shape && !w.awake.empty()) {
+      const Stopwatch contact(w.report.contact);
+      w.findContacts(h_frame, h);
+    }
     for (Pick& pick : w.picks) pick.force.setZero();
     w.push.force.setZero();
     w.push.touching = false;
-    for (auto& body : w.bodies) body->low_current = false;
+    for (WorldBody* body : w.awake) body->low_current = false;
     for (int substep = 0; substep < substeps; ++substep) {
       {
         const Stopwatch match(w.report.match);
-        for (auto& body : w.bodies)
+        for (WorldBody* body : w.awake)
           matchAndMove(*body->model, body->material, w.settings.gravity, h, body->state, body->scratch,
                        w.report.match_counters);
       }
@@ -70,25 +77,33 @@ void World::step() {
       }
       {
         const Stopwatch contact(w.report.contact);
-        for (auto& body : w.bodies) {
+        for (WorldBody* body : w.awake) {
           body->scratch.touched.clear();
-          if (w.settings.ground || w.push.enabled) body->scratch.before_contact = body->state.positions;
+          if (w.push.enabled || (w.settings.ground && !rest_shape)) body->scratch.before_contact = body->state.positions;
         }
-        if ((substep + 1) % stride == 0 || substep + 1 == substeps) w.contactBodies(near, h, stride);
+        if (rest_shape && !w.awake.empty())
+          w.solveContacts(h);
+        else if ((substep + 1) % stride == 0 || substep + 1 == substeps)
+          w.contactBodies(near, h, stride);
         w.movePush(h, h_frame);
       }
-      for (auto& body : w.bodies) {
+      for (WorldBody* body : w.awake) {
         preserve(*body->model, body->material, body->state, body->scratch, w.report.preserve_counters);
         velocitiesFromPositions(*body->model, h, body->state, body->scratch);
         body->surface_current = false;
       }
     }
-    for (auto& body : w.bodies) w.fadeRiderOffsets(*body, h_frame);
+    for (WorldBody* body : w.awake) {
+      if (rest_shape) w.liftOutOfGround(*body, h_frame);
+      w.fadeRiderOffsets(*body, h_frame);
+    }
     for (Pick& pick : w.picks)
       if (const WorldBody* body = w.find(pick.body))
         pick.position = graspMean(pick, body->state.positions) + pick.offset;
+    w.fallAsleep(h_frame);
     ++w.step;
     w.report.bodies = w.bodies.size();
+    for (const auto& body : w.bodies) w.report.asleep += body->asleep;
     w.report.substeps = static_cast<std::size_t>(substeps);
     w.report.tetrahedralizations = w.tetrahedralizations;
   }
@@ -97,11 +112,11 @@ void World::step() {
 // As many as the stiffest body needs, within the budget; what the budget takes from a body is said once.
 int World::Impl::chooseSubsteps(double h_frame) {
   double needed = settings.substeps;
-  for (const auto& body : bodies)
+  for (const WorldBody* body : awake)
     needed = std::max(needed, std::ceil(h_frame * highestFrequencyNow(*body->model, body->state)));
   const int most = std::max(settings.substeps, settings.max_substeps);
   const int substeps = needed < most ? static_cast<int>(needed) : most;
-  for (auto& body : bodies) {
+  for (WorldBody* body : awake) {
     const double factor = stiffnessFactor(*body->model, body->state, h_frame / substeps);
     if (factor < 1.0 && !(body->stiffness_factor < 1.0)) {
       std::ostringstream text;
@@ -117,7 +132,7 @@ int World::Impl::chooseSubsteps(double h_frame) {
 
 std::vector<WorldBody*> World::Impl::bodiesInContact(double h) {
   std::vector<WorldBody*> near;
-  if (settings.contact == ContactMethod::kNone || bodies.size() < 2) return near;
+  if (settings.contact != ContactMethod::kTextbook || bodies.size() < 2) return near;
   const Stopwatch contact(report.contact);
   // Sweep along x: sorted by their lower ends, a pair can overlap only until the next one begins beyond.
   struct Entry {
@@ -181,6 +196,19 @@ void World::Impl::contactBodies(const std::vector<WorldBody*>& near, double h, i
       near[b]->scratch.previous[i] += (1.0 - 1.0 / stride) * (near[b]->state.positions[i] - before[b][i]);
 }
 
+// Whom the sphere meets on its way in this frame.
+void World::Impl::wakePushed(double h_frame) {
+  if (!push.enabled || push.position == push.target) return;
+  Box way;
+  way.extend(push.position);
+  const Vec3 to = push.target - push.position;
+  const double length = std::min(to.norm(), push.speed * h_frame);
+  way.extend(push.position + length * to.normalized());
+  way.min.array() -= push.radius;
+  way.max.array() += push.radius;
+  wakeWithin(way);
+}
+
 // The sphere goes its way in hops, so that a fast one does not jump over tissue.
 void World::Impl::movePush(double h, double h_frame) {
   int hops = 1;
@@ -195,7 +223,7 @@ void World::Impl::movePush(double h, double h_frame) {
   }
   for (int hop = 0; hop < hops; ++hop) {
     if (push.enabled) push.position += velocity * (h / hops);
-    for (auto& body : bodies) contactGroundAndPush(*body, h, h_frame, velocity);
+    for (WorldBody* body : awake) contactGroundAndPush(*body, h, h_frame, velocity);
   }
 }
 
@@ -209,7 +237,8 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
     bounds.min.array() -= 2.0 * model.spacing;
     bounds.max.array() += 2.0 * model.spacing;
   }
-  const bool near_ground = settings.ground && bounds.min.z() <= *settings.ground;
+  const bool solved = settings.contact == ContactMethod::kRestShape && !model.surface.vertices.empty();
+  const bool near_ground = !solved && settings.ground && bounds.min.z() <= *settings.ground;
   const bool near_push = push.enabled && (bounds.min.array() <= push.position.array() + push.radius).all() &&
                          (bounds.max.array() >= push.position.array() - push.radius).all();
   if (!near_ground && !near_push) {

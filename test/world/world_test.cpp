@@ -548,7 +548,7 @@ TEST(World, BodiesThatFallOnEachOtherComeToRestOutsideOfEachOther) {
   }
   EXPECT_GT(contacts, 100u);
   const WorldSnapshot shot = world.snapshot({true, true, true});
-  EXPECT_GT(shot.report.tetrahedralizations, 0u);
+  EXPECT_EQ(shot.report.tetrahedralizations, 0u);
   for (const BodySnapshot& a : shot.bodies) {
     EXPECT_TRUE(test::allFinite(a.particles));
     EXPECT_GT(a.measures.volume, 0.8 * a.model->rest_volume);

@@ -22,12 +22,19 @@ struct ContactBody {
   Box bounds;  // of positions, swept over the substep
 };
 
+/// Work counted, so that tests can hold what a scene does not need at zero.
 struct ContactCounters {
   std::size_t pairs = 0;        // pairs of bodies with overlapping bounds
   std::size_t hashed = 0;       // particles put into the spatial hash
   std::size_t tested = 0;       // particle-in-tetrahedron tests
   std::size_t penetrating = 0;  // particles found inside
   std::size_t corrected = 0;    // contacts that moved something
+  std::size_t bounds_tested = 0;   // boxes compared by the broad phase
+  std::size_t lookups = 0;         // points looked up in rest shapes
+  std::size_t contacts = 0;        // made
+  std::size_t traced = 0;          // paths of fast points followed through rest shapes
+  std::size_t caught = 0;          // of them, those that would have passed through
+  std::size_t expelled = 0;        // pairs of which one is inside the other
 };
 
 }  // namespace meshless

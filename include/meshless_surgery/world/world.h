@@ -6,12 +6,13 @@
 #include <set>
 
 #include "meshless_surgery/body/preserve.h"
-#include "meshless_surgery/contact/textbook.h"
+#include "meshless_surgery/contact/contacts.h"
 #include "meshless_surgery/tools/tools.h"
 
 namespace meshless {
 
-enum class ContactMethod { kNone, kTextbook };
+/// kRestShape: contact/contacts.h. kTextbook: the paper's, contact/textbook.h, for comparison.
+enum class ContactMethod { kNone, kTextbook, kRestShape };
 
 struct WorldSettings {
   Vec3 gravity{0.0, 0.0, -9.81};       // [m/s^2]
@@ -20,7 +21,8 @@ struct WorldSettings {
   double step_rate = 120.0;  // [Hz] 1..10,000
   int substeps = 1;          // 1..1,000, at the least; an elastic body can need more
   int max_substeps = 64;     // 1..1,000; beyond it elastic bodies are softer than their material, and it is said
-  ContactMethod contact = ContactMethod::kTextbook;
+  ContactMethod contact = ContactMethod::kRestShape;
+  bool sleep = true;                // what holds still for half a second costs nothing; with kRestShape
   double pick_max_distance = 0.05;  // [m]
   double pick_stiffness = 500.0;    // [N/m]
   double pick_radius = 0.0;         // [m] of the grasp along the body; 0: four particle spacings
@@ -67,11 +69,14 @@ struct Event {
 struct StepReport {
   double total = 0, match = 0, tools = 0, contact = 0, surface = 0;
   std::size_t bodies = 0;
+  std::size_t asleep = 0;  // of them
+  std::size_t woken = 0;
   std::size_t substeps = 0;
   MatchCounters match_counters;
   ContactCounters contact_counters;
   PreserveCounters preserve_counters;
   std::size_t tetrahedralizations = 0;  // since the start
+  std::size_t contact_shapes = 0;       // rest shapes prepared for contact in this step
   std::size_t ground_contacts = 0;
   std::size_t push_contacts = 0;
 };

@@ -1,0 +1,102 @@
+// What contact knows of a body's rest shape: which triangle is nearest to a point in it, what a path through it meets,
+// and at which points of its surface it feels others. Made for a model once, and filled where something comes near.
+#pragma once
+
+#include <atomic>
+#include <memory>
+
+#include "meshless_surgery/geometry/triangle_mesh.h"
+
+namespace meshless {
+
+/// How the vertices of a surface follow the particles of a body: views, to be kept alive by whoever passes them.
+struct SurfaceRows {
+  const std::vector<Index>* particle = nullptr;  // one a vertex; kNoIndex: it rides
+  const std::vector<Index>* riders = nullptr;    // vertices that ride, ascending
+  const std::vector<Index>* offsets = nullptr;   // riders + 1, into the two below
+  const std::vector<Index>* carriers = nullptr;
+  const std::vector<double>* weights = nullptr;
+};
+
+/// A point of the surface at which a body feels others: a vertex, or a point on a long edge.
+struct ContactSample {
+  std::array<Index, 2> vertices{};  // the same twice for a vertex
+  double share = 0.0;               // of the second
+};
+
+class ContactShape {
+ public:
+  /// `surface`: rest positions [m], closed for solids. spacing [m]: of the particles; vertices that ride are samples
+  /// about so far apart, those that are particles all. Long sharp edges get samples at half the thickness below them.
+  ContactShape(const TriangleMesh& surface, const SurfaceRows& rows, double spacing);
+  ~ContactShape();
+  ContactShape(const ContactShape&) = delete;
+  ContactShape& operator=(const ContactShape&) = delete;
+
+  struct Nearest {
+    Index triangle = kNoIndex;
+    std::array<double, 3> weights{};  // barycentric, of the nearest point
+    double distance = 0.0;            // [m] signed: negative inside
+    bool above = false;               // the point's projection falls into the triangle
+  };
+  /// Of a point in the rest frame; well outside of the bounds only one of the nearest. Signs are those of the nearest
+  /// triangle; on ties (an edge, a vertex) of the one with the larger plane distance. False without triangles, or for
+  /// NaN. Thread-safe.
+  bool nearest(const Vec3& rest, Nearest& found) const;
+
+  /// Where the segment from..to first goes through the surface from outside to inside.
+  struct Hit {
+    Index triangle = kNoIndex;
+    std::array<double, 3> weights{};
+    double time = 0.0;  // 0..1 of the way
+  };
+  bool trace(const Vec3& from, const Vec3& to, Hit& hit) const;
+
+  const TriangleMesh& surface() const { return surface_; }
+  const std::vector<ContactSample>& samples() const { return samples_; }
+  const Box& bounds() const { return bounds_; }
+  /// [m] least of some inward rays: who moves farther in a step can pass through.
+  double thickness() const { return thickness_; }
+  /// [m] least edge of the bounds.
+  double size() const { return size_; }
+  const SurfaceRows& rows() const { return rows_; }
+  /// Of a vertex that rides: its number in rows(); kNoIndex for a particle.
+  Index riderOf(Index vertex) const { return rider_of_.empty() ? kNoIndex : rider_of_[vertex]; }
+  bool rides() const { return !rider_of_.empty(); }
+
+  std::size_t cellsFilled() const { return cells_filled_.load(std::memory_order_relaxed); }
+  std::size_t bytes() const;
+
+ private:
+  struct Cell;
+  const Cell* fill(std::size_t index, const std::array<int, 3>& at) const;
+  void binTriangles();
+  template <class Visit>
+  void visitBins(const Box& box, const Visit& visit) const;
+  double depthAlong(const Vec3& from, const Vec3& direction, double longest) const;
+  void chooseSamples(double spacing);
+  void measureThickness();
+
+  TriangleMesh surface_;
+  SurfaceRows rows_;
+  std::vector<Index> rider_of_;
+  std::vector<ContactSample> samples_;
+  Box bounds_;
+  double size_ = 0.0, thickness_ = 0.0;
+
+  // triangles by bins of a grid
+  Vec3 bin_origin_ = Vec3::Zero();
+  double bin_edge_ = 1.0;
+  std::array<int, 3> bins_{{1, 1, 1}};
+  std::vector<Index> bin_offsets_, bin_triangles_;
+
+  // cells with the triangles that can be nearest to a point in them
+  Vec3 cell_origin_ = Vec3::Zero();
+  double cell_edge_ = 1.0, cells_per_metre_ = 1.0;
+  std::array<int, 3> cells_count_{{0, 0, 0}};
+  std::unique_ptr<std::atomic<const Cell*>[]> cells_;
+  std::size_t cell_total_ = 0;
+  mutable std::atomic<std::size_t> cells_filled_{0};
+};
+
+}  // namespace meshless

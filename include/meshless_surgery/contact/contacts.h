@@ -1,0 +1,104 @@
+// Contact of deformable bodies with each other, with obstacles and with the ground: found in their rest shapes, solved
+// as projections with friction. Knows neither materials nor tools; the world says where bodies are.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+
+#include "meshless_surgery/contact/broad_phase.h"
+#include "meshless_surgery/contact/contact_shape.h"
+#include "meshless_surgery/contact/deformable.h"
+
+namespace meshless {
+
+/// The affine map of a cluster between rest shape and present: present = from_rest (r - rest) + centre.
+struct ContactMap {
+  Mat3 from_rest = Mat3::Identity();
+  Mat3 to_rest = Mat3::Identity();
+  Vec3 rest = Vec3::Zero();    // [m]
+  Vec3 centre = Vec3::Zero();  // [m]
+  bool flipped = false;        // it turns what it maps inside out
+};
+
+/// A body as contact sees it in a frame. Whoever fills it keeps what it points to alive.
+struct ContactParty {
+  std::uint64_t key = 0;                   // of the body for as long as it lives
+  const ContactShape* shape = nullptr;     // filled by the time make() is called
+  Vec3* positions = nullptr;               // [m] one a particle: read and moved
+  const Vec3* previous = nullptr;          // [m] at the start of the substep
+  const double* masses = nullptr;          // [kg]
+  const double* inverse_masses = nullptr;  // [1/kg] 0: held
+  Index particles = 0;
+  const Vec3* surface = nullptr;           // [m] present vertices; null where all are particles
+  const ContactMap* maps = nullptr;        // at the start of the frame; filled by the time make() is called
+  Index map_count = 0;
+  double mass = 0.0;         // [kg]
+  double rigid_share = 0.0;  // 0..1 of an impulse that moves the body as a whole; 0 where it is held
+  double friction = 0.5;
+  Box bounds;                // [m] of the particles (and vertices) now
+  double speed = 0.0;        // [m/s] of the fastest particle
+  bool moves = true;         // false: asleep, or an obstacle; its arrays are not written
+};
+
+struct ContactScene {
+  std::optional<double> ground;  // [m] height along z
+  double ground_friction = 0.5;
+  Vec3 gravity = Vec3::Zero();   // [m/s^2]
+  int passes = 2;                // over all contacts, a substep: there and back
+};
+
+/// Brings a party's maps up to date with its particles (previous: with where they were before the substep).
+using RefitMaps = std::function<void(Index party, bool previous, std::vector<ContactMap>& maps)>;
+
+/// Two parties that press on each other; b is kNoIndex for the ground.
+struct LoadedPair {
+  Index a = 0, b = kNoIndex;
+};
+
+/// Kept between steps: scratch, and what a contact has to remember. The order of parties is that of the bodies.
+class Contacts {
+ public:
+  Contacts();
+  ~Contacts();
+  Contacts(Contacts&&) noexcept;
+  Contacts& operator=(Contacts&&) noexcept;
+
+  /// Which pairs can touch within the frame of h [s]; sets needed() for the parties that need shape, maps and surface.
+  void findPairs(const ContactScene& scene, const std::vector<ContactParty>& parties, double h,
+                 ContactCounters& counters);
+  const std::vector<char>& needed() const;
+
+  /// Finds the contacts of the frame, and lets out old overlap: at a bounded speed, without changing velocities.
+  /// substep: [s] of the solve() calls to come.
+  void make(const std::vector<ContactParty>& parties, double h, double substep, ContactCounters& counters);
+
+  /// Parties that do not move, have a mass, and were reached in make() by one that moves; ascending.
+  const std::vector<Index>& reached() const;
+
+  /// After bodies have moved by a substep: what approached deeper goes back to where it was or to the surface, with
+  /// friction. Impulses are equal and opposite.
+  void solve(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,
+             ContactCounters& counters);
+
+  /// Pairs that pressed on each other in the last solve(); ascending, without duplicates.
+  void loadedPairs(std::vector<LoadedPair>& pairs) const;
+  /// Contacts with the ground that carried load in the last solve().
+  std::size_t groundLoaded() const;
+  /// Points of the last solve() that carry load [m], for display.
+  struct Point {
+    Vec3 position, normal;
+    double impulse;  // [kg m] mass times displacement in the substep
+  };
+  void points(const std::vector<ContactParty>& parties, std::vector<Point>& points) const;
+  /// Deepest overlap that make() found, relative to the smaller body's size, one a contact below the surface.
+  const std::vector<double>& depths() const;
+  /// Forgets what it remembers of pairs.
+  void clear();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace meshless

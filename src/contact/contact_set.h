@@ -1,0 +1,69 @@
+// The contacts of a frame, as the finder makes them and the solver moves them.
+#pragma once
+
+#include "meshless_surgery/contact/contacts.h"
+
+namespace meshless {
+
+/// A share of a particle in a point of a surface.
+struct ContactEntry {
+  Index particle;
+  double weight;
+};
+
+/// A point of party a against a triangle of party b, or against the ground.
+struct Contact {
+  Index a = 0, b = kNoIndex;  // kNoIndex: the ground
+  Index sample = 0;           // of a
+  Index triangle = kNoIndex;  // of b
+  // direct: all corners are particles, normal and weights follow them
+  bool direct = false;
+  bool caught = false;  // has passed through: the side is remembered
+  bool flipped = false;  // the body is inside out where it is touched
+  std::array<Index, 2> point{};
+  double share = 0.0;
+  std::array<Index, 3> corners{};
+  std::array<double, 3> weights{};
+  // else: entries [first, split) of a and [split, end) of b; the normal is that of the frame
+  Index first = 0, split = 0, end = 0;
+  Vec3 offset = Vec3::Zero();  // [m] what riders have beyond their particles: of a less of b
+  Vec3 normal = Vec3::UnitZ();
+  // of the solver
+  double impulse = 0.0;  // [kg m]
+  Vec3 slip_impulse = Vec3::Zero();
+};
+
+/// Who is solved with whom: contacts and parties by islands, which do not know of each other.
+struct IslandPlan {
+  std::vector<Index> contacts, contact_offsets;  // in their order within an island
+  std::vector<Index> parties, party_offsets;     // those that move
+  std::vector<Index> shifts;                     // one a party: where its particles' shifts begin; kNoIndex: none
+
+  Index size() const { return contact_offsets.empty() ? 0 : static_cast<Index>(contact_offsets.size() - 1); }
+  void make(const std::vector<ContactParty>& parties, const std::vector<Contact>& contacts);
+
+ private:
+  std::vector<Index> root_, number_, next_;
+};
+
+/// Moves parties so that what touches does not come nearer.
+class ContactSolver {
+ public:
+  ContactSolver();
+  ~ContactSolver();
+  ContactSolver(ContactSolver&&) noexcept;
+  ContactSolver& operator=(ContactSolver&&) noexcept;
+
+  /// Sweeps back and forth over each island, from the impulses that the contacts had.
+  void solve(const ContactScene& scene, const std::vector<ContactParty>& parties, std::vector<Contact>& contacts,
+             const std::vector<ContactEntry>& entries, const IslandPlan& plan, ContactCounters& counters);
+  /// One sweep that lets out some of the overlap that there is, h [s] after the last; impulses are left alone.
+  void letOut(const ContactScene& scene, const std::vector<ContactParty>& parties, std::vector<Contact>& contacts,
+              const std::vector<ContactEntry>& entries, const IslandPlan& plan, double h, ContactCounters& counters);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace meshless

@@ -1,0 +1,407 @@
+#include "meshless_surgery/contact/contact_shape.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <unordered_map>
+
+#include "meshless_surgery/geometry/nearest_on_triangle.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kBinEdges = 1.5;       // size of a bin in mean edges
+constexpr double kCellEdges = 0.5;      // size of a cell in mean edges
+constexpr double kMostBins = 1 << 18;
+constexpr double kMostCells = 1 << 19;
+constexpr double kLongEdge = 0.1;       // of the body's least extent: shorter edges need no samples
+constexpr double kFlatEdge = 0.996;     // cosine between neighbours: about 5 degrees
+constexpr int kMostEdgeSamples = 64;
+constexpr std::size_t kThicknessRays = 48;
+constexpr double kTie = 1e-9;           // relative: two features are equally near
+
+// Of a triangle, what a query needs, side by side in memory.
+struct Facet {
+  Vec3 a, ab, ac, normal;
+  double g00, g01, g11;  // inverse of the Gram matrix of ab and ac; zero where the triangle has no area
+  Index triangle;
+};
+
+Facet makeFacet(const TriangleMesh& mesh, Index t) {
+  const Triangle& corners = mesh.triangles[t];
+  Facet f;
+  f.a = mesh.vertices[corners[0]];
+  f.ab = mesh.vertices[corners[1]] - f.a;
+  f.ac = mesh.vertices[corners[2]] - f.a;
+  f.normal = f.ab.cross(f.ac).normalized();
+  const double aa = f.ab.squaredNorm(), bb = f.ac.squaredNorm(), ab = f.ab.dot(f.ac);
+  const double det = aa * bb - ab * ab;
+  const double inverse = det > 1e-24 * aa * bb ? 1.0 / det : 0.0;
+  f.g00 = bb * inverse;
+  f.g01 = -ab * inverse;
+  f.g11 = aa * inverse;
+  f.triangle = t;
+  return f;
+}
+
+double meanEdge(const TriangleMesh& mesh) {
+  double sum = 0.0;
+  for (const Triangle& t : mesh.triangles)
+    for (int k = 0; k < 3; ++k) sum += (mesh.vertices[t[k]] - mesh.vertices[t[(k + 1) % 3]]).norm();
+  return mesh.triangles.empty() ? 0.0 : sum / (3.0 * static_cast<double>(mesh.triangles.size()));
+}
+
+double distanceToTriangle(const TriangleMesh& mesh, Index t, const Vec3& p) {
+  const Triangle& c = mesh.triangles[t];
+  return (nearestOnTriangle(p, mesh.vertices[c[0]], mesh.vertices[c[1]], mesh.vertices[c[2]]) - p).norm();
+}
+
+Box boundsOf(const TriangleMesh& mesh, Index t) {
+  Box box;
+  for (Index corner : mesh.triangles[t]) box.extend(mesh.vertices[corner]);
+  return box;
+}
+
+// Entry of a line into the front of a triangle; time in units of the direction, false where it misses.
+bool meets(const TriangleMesh& mesh, Index t, const Vec3& from, const Vec3& direction, double& time,
+           std::array<double, 3>& weights) {
+  const Triangle& c = mesh.triangles[t];
+  const Vec3& a = mesh.vertices[c[0]];
+  const Vec3 ab = mesh.vertices[c[1]] - a, ac = mesh.vertices[c[2]] - a;
+  const Vec3 h = direction.cross(ac);
+  const double det = ab.dot(h);
+  if (!(std::abs(det) > 1e-14 * ab.norm() * ac.norm() * direction.norm())) return false;
+  const Vec3 s = from - a;
+  const double u = s.dot(h) / det;
+  const Vec3 q = s.cross(ab);
+  const double v = direction.dot(q) / det;
+  constexpr double kSlack = 1e-9;  // so that no path slips between two triangles
+  if (!(u >= -kSlack) || !(v >= -kSlack) || !(u + v <= 1.0 + kSlack)) return false;
+  time = ac.dot(q) / det;
+  weights = {1.0 - u - v, u, v};
+  return true;
+}
+
+}  // namespace
+
+struct ContactShape::Cell {
+  std::vector<Facet> facets;
+};
+
+ContactShape::ContactShape(const TriangleMesh& surface, const SurfaceRows& rows, double spacing)
+    : surface_(surface), rows_(rows) {
+  for (const Vec3& p : surface_.vertices) bounds_.extend(p);
+  if (bounds_.empty()) return;
+  size_ = (bounds_.max - bounds_.min).minCoeff();
+  if (rows_.riders && !rows_.riders->empty()) {
+    rider_of_.assign(surface_.vertices.size(), kNoIndex);
+    for (Index r = 0; r < rows_.riders->size(); ++r) rider_of_[(*rows_.riders)[r]] = r;
+  }
+  binTriangles();
+  chooseSamples(spacing);
+  measureThickness();
+  if (surface_.triangles.empty()) return;
+
+  const Vec3 extent = bounds_.max - bounds_.min;
+  cell_edge_ = kCellEdges * meanEdge(surface_);
+  const double padded = (extent.array() + 4.0 * cell_edge_).prod();
+  cell_edge_ = std::max(cell_edge_, std::cbrt(padded / kMostCells));
+  if (!(cell_edge_ > 0.0) || !std::isfinite(cell_edge_)) return;
+  cells_per_metre_ = 1.0 / cell_edge_;
+  cell_origin_ = bounds_.min.array() - 2.0 * cell_edge_;
+  cell_total_ = 1;
+  for (int d = 0; d < 3; ++d) {
+    cells_count_[d] = static_cast<int>(std::ceil(extent[d] * cells_per_metre_)) + 4;
+    cell_total_ *= static_cast<std::size_t>(cells_count_[d]);
+  }
+  cells_ = std::make_unique<std::atomic<const Cell*>[]>(cell_total_);
+}
+
+ContactShape::~ContactShape() {
+  for (std::size_t i = 0; i < cell_total_; ++i) delete cells_[i].load(std::memory_order_relaxed);
+}
+
+std::size_t ContactShape::bytes() const {
+  std::size_t sum = sizeof *this + surface_.vertices.size() * sizeof(Vec3) +
+                    surface_.triangles.size() * sizeof(Triangle) + rider_of_.size() * sizeof(Index) +
+                    samples_.size() * sizeof(ContactSample) +
+                    (bin_offsets_.size() + bin_triangles_.size()) * sizeof(Index) +
+                    cell_total_ * sizeof(std::atomic<const Cell*>);
+  for (std::size_t i = 0; i < cell_total_; ++i)
+    if (const Cell* cell = cells_[i].load(std::memory_order_acquire))
+      sum += sizeof(Cell) + cell->facets.size() * sizeof(Facet);
+  return sum;
+}
+
+void ContactShape::binTriangles() {
+  const Vec3 extent = bounds_.max - bounds_.min;
+  bin_edge_ = kBinEdges * meanEdge(surface_);
+  bin_edge_ = std::max(bin_edge_, std::cbrt((extent.array() + 2.0 * bin_edge_).prod() / kMostBins));
+  if (!(bin_edge_ > 0.0) || !std::isfinite(bin_edge_)) bin_edge_ = 1.0;
+  bin_origin_ = bounds_.min.array() - 0.5 * bin_edge_;
+  std::size_t total = 1;
+  for (int d = 0; d < 3; ++d) {
+    bins_[d] = std::max(1, static_cast<int>(std::ceil(extent[d] / bin_edge_)) + 1);
+    total *= static_cast<std::size_t>(bins_[d]);
+  }
+  bin_offsets_.assign(total + 1, 0);
+  const auto forBins = [this](Index t, const auto& visit) {
+    const Box box = boundsOf(surface_, t);
+    std::array<int, 3> first, last;
+    for (int d = 0; d < 3; ++d) {
+      first[d] = std::clamp(static_cast<int>((box.min[d] - bin_origin_[d]) / bin_edge_), 0, bins_[d] - 1);
+      last[d] = std::clamp(static_cast<int>((box.max[d] - bin_origin_[d]) / bin_edge_), 0, bins_[d] - 1);
+    }
+    for (int x = first[0]; x <= last[0]; ++x)
+      for (int y = first[1]; y <= last[1]; ++y)
+        for (int z = first[2]; z <= last[2]; ++z)
+          visit((static_cast<std::size_t>(x) * bins_[1] + y) * bins_[2] + z);
+  };
+  for (Index t = 0; t < surface_.triangles.size(); ++t) forBins(t, [this](std::size_t bin) { ++bin_offsets_[bin + 1]; });
+  for (std::size_t i = 0; i < total; ++i) bin_offsets_[i + 1] += bin_offsets_[i];
+  bin_triangles_.resize(bin_offsets_.back());
+  std::vector<Index> next(bin_offsets_.begin(), bin_offsets_.end() - 1);
+  for (Index t = 0; t < surface_.triangles.size(); ++t) forBins(t, [&](std::size_t bin) { bin_triangles_[next[bin]++] = t; });
+}
+
+template <class Visit>
+void ContactShape::visitBins(const Box& box, const Visit& visit) const {
+  std::array<int, 3> first, last;
+  for (int d = 0; d < 3; ++d) {
+    const double low = (box.min[d] - bin_origin_[d]) / bin_edge_, high = (box.max[d] - bin_origin_[d]) / bin_edge_;
+    if (!(high >= 0.0) || !(low <= bins_[d])) return;
+    first[d] = low > 0.0 ? std::min(static_cast<int>(low), bins_[d] - 1) : 0;
+    last[d] = high < bins_[d] ? static_cast<int>(high) : bins_[d] - 1;
+  }
+  for (int x = first[0]; x <= last[0]; ++x)
+    for (int y = first[1]; y <= last[1]; ++y)
+      for (int z = first[2]; z <= last[2]; ++z) {
+        const std::size_t bin = (static_cast<std::size_t>(x) * bins_[1] + y) * bins_[2] + z;
+        for (Index k = bin_offsets_[bin]; k < bin_offsets_[bin + 1]; ++k) visit(bin_triangles_[k]);
+      }
+}
+
+// The triangles of which one can be nearest to some point of the cell: those whose distance to the cell's box is not
+// above the least, over triangles, of the farthest that a point of the box can be from it (at a corner: distance to a
+// convex set is convex).
+const ContactShape::Cell* ContactShape::fill(std::size_t index, const std::array<int, 3>& at) const {
+  Box box;
+  box.min = cell_origin_ + cell_edge_ * Vec3(at[0], at[1], at[2]);
+  box.max = box.min.array() + cell_edge_;
+  const Vec3 centre = 0.5 * (box.min + box.max);
+  const double half_diagonal = 0.5 * box.diagonal();
+
+  auto cell = std::make_unique<Cell>();
+  std::vector<Index> around;
+  double nearest = std::numeric_limits<double>::infinity();
+  // Rings of bins until what lies beyond cannot be nearer.
+  const double farthest = (bounds_.max - bounds_.min).norm() + 8.0 * cell_edge_;
+  for (double radius = std::max(bin_edge_, 2.0 * half_diagonal);; radius *= 2.0) {
+    around.clear();
+    Box ball;
+    ball.min = centre.array() - radius;
+    ball.max = centre.array() + radius;
+    visitBins(ball, [&](Index t) { around.push_back(t); });
+    std::sort(around.begin(), around.end());
+    around.erase(std::unique(around.begin(), around.end()), around.end());
+    for (Index t : around) nearest = std::min(nearest, distanceToTriangle(surface_, t, centre));
+    if (nearest + 2.0 * half_diagonal <= radius || radius > farthest) break;
+  }
+  double bound = std::numeric_limits<double>::infinity();
+  for (Index t : around) {
+    if (distanceToTriangle(surface_, t, centre) > nearest + half_diagonal) continue;
+    double worst = 0.0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Vec3 p(corner & 1 ? box.max.x() : box.min.x(), corner & 2 ? box.max.y() : box.min.y(),
+                   corner & 4 ? box.max.z() : box.min.z());
+      worst = std::max(worst, distanceToTriangle(surface_, t, p));
+    }
+    bound = std::min(bound, worst);
+  }
+  bound *= 1.0 + 1e-9;
+  for (Index t : around) {
+    if (distanceToTriangle(surface_, t, centre) - half_diagonal > bound) continue;
+    const Box b = boundsOf(surface_, t);
+    const Vec3 gap = (b.min - box.max).cwiseMax(box.min - b.max).cwiseMax(0.0);
+    if (gap.norm() <= bound) cell->facets.push_back(makeFacet(surface_, t));
+  }
+  cell->facets.shrink_to_fit();
+  const Cell* expected = nullptr;
+  const Cell* made = cell.get();
+  if (cells_[index].compare_exchange_strong(expected, made, std::memory_order_acq_rel)) {
+    cells_filled_.fetch_add(1, std::memory_order_relaxed);
+    return cell.release();
+  }
+  return expected;
+}
+
+bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
+  if (!cells_ || !rest.allFinite()) return false;
+  std::array<int, 3> at;
+  for (int d = 0; d < 3; ++d) {
+    const double c = (rest[d] - cell_origin_[d]) * cells_per_metre_;
+    at[d] = c > 0.0 ? (c < cells_count_[d] ? static_cast<int>(c) : cells_count_[d] - 1) : 0;
+  }
+  const std::size_t index = (static_cast<std::size_t>(at[0]) * cells_count_[1] + at[1]) * cells_count_[2] + at[2];
+  const Cell* cell = cells_[index].load(std::memory_order_acquire);
+  if (!cell) cell = fill(index, at);
+  found.triangle = kNoIndex;
+
+  double best = std::numeric_limits<double>::infinity(), best_height = 0.0;  // squared distance, plane distance
+  for (const Facet& f : cell->facets) {
+    const Vec3 ap = rest - f.a;
+    const double height = f.normal.dot(ap);
+    const double tie = kTie * best;
+    if (height * height > best + tie) continue;
+    const double d1 = f.ab.dot(ap), d2 = f.ac.dot(ap);
+    const double v = f.g00 * d1 + f.g01 * d2, w = f.g01 * d1 + f.g11 * d2;
+    double squared;
+    std::array<double, 3> weights;
+    const bool above = v >= 0.0 && w >= 0.0 && v + w <= 1.0;
+    if (above) {
+      weights = {1.0 - v - w, v, w};
+      squared = height * height;
+    } else {
+      const Vec3 u = nearestWeights(rest, f.a, f.a + f.ab, f.a + f.ac);
+      weights = {u.x(), u.y(), u.z()};
+      squared = (ap - u.y() * f.ab - u.z() * f.ac).squaredNorm();
+    }
+    const bool nearer = squared < best - tie;
+    if (!nearer && !(squared <= best + tie && std::abs(height) > std::abs(best_height))) continue;
+    best = nearer ? squared : std::min(best, squared);
+    best_height = height;
+    found.triangle = f.triangle;
+    found.weights = weights;
+    found.above = above;
+  }
+  found.distance = std::copysign(std::sqrt(best), best_height);
+  return found.triangle != kNoIndex;
+}
+
+bool ContactShape::trace(const Vec3& from, const Vec3& to, Hit& hit) const {
+  const Vec3 way = to - from;
+  if (!way.allFinite()) return false;
+  Box box;
+  box.extend(from);
+  box.extend(to);
+  hit = Hit();
+  double first = 1.0;
+  visitBins(box, [&](Index t) {
+    double time;
+    std::array<double, 3> weights;
+    if (!meets(surface_, t, from, way, time, weights) || !(time >= 0.0 && time <= first)) return;
+    const Triangle& c = surface_.triangles[t];
+    const Vec3& a = surface_.vertices[c[0]];
+    if (!((surface_.vertices[c[1]] - a).cross(surface_.vertices[c[2]] - a).dot(way) < 0.0)) return;  // from behind
+    if (time == first && hit.triangle != kNoIndex && t > hit.triangle) return;
+    first = time;
+    hit = {t, weights, time};
+  });
+  return hit.triangle != kNoIndex;
+}
+
+// How far it is from a point on the surface to the other side.
+double ContactShape::depthAlong(const Vec3& from, const Vec3& direction, double longest) const {
+  double depth = longest;
+  Box box;
+  box.extend(from);
+  box.extend(from + longest * direction);
+  visitBins(box, [&](Index t) {
+    double time;
+    std::array<double, 3> weights;
+    if (meets(surface_, t, from, direction, time, weights) && time > 1e-6 * longest && time < depth) depth = time;
+  });
+  return depth;
+}
+
+void ContactShape::measureThickness() {
+  thickness_ = size_;
+  const double longest = (bounds_.max - bounds_.min).norm();
+  const std::size_t count = surface_.triangles.size();
+  const std::size_t stride = std::max<std::size_t>(1, count / kThicknessRays);
+  std::vector<double> depths;
+  for (std::size_t t = 0; t < count; t += stride) {
+    const Triangle& c = surface_.triangles[t];
+    const Vec3 &p = surface_.vertices[c[0]], &q = surface_.vertices[c[1]], &r = surface_.vertices[c[2]];
+    const Vec3 normal = (q - p).cross(r - p).normalized();
+    const double depth = depthAlong((p + q + r) / 3.0, -normal, longest);
+    if (depth < longest) depths.push_back(depth);
+  }
+  if (depths.empty()) return;
+  // Near edges rays are short however thick the body is: a tenth of them may be.
+  std::sort(depths.begin(), depths.end());
+  thickness_ = depths[depths.size() / 10];
+}
+
+void ContactShape::chooseSamples(double spacing) {
+  const Points& vertices = surface_.vertices;
+  // Riders within most of a spacing of a sample are left out: the surface between the particles is smooth.
+  std::vector<bool> chosen(vertices.size(), true);
+  if (!rider_of_.empty() && spacing > 0.0) {
+    const double apart = 0.9 * spacing, edge = apart;
+    std::unordered_map<std::uint64_t, std::vector<Index>> grid;
+    const auto key = [&](int x, int y, int z) {
+      return (static_cast<std::uint64_t>(x + 2) << 42) ^ (static_cast<std::uint64_t>(y + 2) << 21) ^
+             static_cast<std::uint64_t>(z + 2);
+    };
+    const auto place = [&](Index v) {
+      const Vec3 c = (vertices[v] - bounds_.min) / edge;
+      return std::array<int, 3>{static_cast<int>(c.x()), static_cast<int>(c.y()), static_cast<int>(c.z())};
+    };
+    for (int pass = 0; pass < 2; ++pass)  // particles first
+      for (Index v = 0; v < vertices.size(); ++v) {
+        if ((rider_of_[v] == kNoIndex) != (pass == 0)) continue;
+        const std::array<int, 3> c = place(v);
+        bool free = true;
+        if (pass == 1)
+          for (int x = -1; free && x <= 1; ++x)
+            for (int y = -1; free && y <= 1; ++y)
+              for (int z = -1; free && z <= 1; ++z) {
+                const auto found = grid.find(key(c[0] + x, c[1] + y, c[2] + z));
+                if (found == grid.end()) continue;
+                for (Index other : found->second)
+                  if ((vertices[other] - vertices[v]).squaredNorm() < apart * apart) {
+                    free = false;
+                    break;
+                  }
+              }
+        chosen[v] = free;
+        if (free) grid[key(c[0], c[1], c[2])].push_back(v);
+      }
+  }
+  std::vector<bool> used(vertices.size(), surface_.triangles.empty());
+  for (const Triangle& t : surface_.triangles)
+    for (Index v : t) used[v] = true;
+  for (Index v = 0; v < vertices.size(); ++v)
+    if (chosen[v] && used[v]) samples_.push_back({{v, v}, 0.0});
+
+  const double least = kLongEdge * size_;
+  struct Edge {
+    Index low, high;
+    Vec3 normal;
+  };
+  std::vector<Edge> edges;
+  for (const Triangle& t : surface_.triangles) {
+    const Vec3 normal = (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]).normalized();
+    for (int k = 0; k < 3; ++k) {
+      const Index a = t[k], b = t[(k + 1) % 3];
+      if ((vertices[a] - vertices[b]).norm() > least) edges.push_back({std::min(a, b), std::max(a, b), normal});
+    }
+  }
+  std::stable_sort(edges.begin(), edges.end(), [](const Edge& p, const Edge& q) {
+    return p.low != q.low ? p.low < q.low : p.high < q.high;
+  });
+  const double longest = (bounds_.max - bounds_.min).norm();
+  for (std::size_t k = 0; k + 1 < edges.size(); ++k) {
+    const Edge &e = edges[k], &f = edges[k + 1];
+    if (e.low != f.low || e.high != f.high || e.normal.dot(f.normal) > kFlatEdge) continue;
+    const Vec3 &p = vertices[e.low], &q = vertices[e.high];
+    const Vec3 inwards = -(e.normal + f.normal).normalized();
+    const double half = 0.5 * depthAlong(0.5 * (p + q), inwards, longest);
+    const double length = (q - p).norm();
+    const int parts = std::min(kMostEdgeSamples, static_cast<int>(std::ceil(0.999 * length / half)));
+    for (int n = 1; n < parts; ++n) samples_.push_back({{e.low, e.high}, static_cast<double>(n) / parts});
+  }
+}
+
+}  // namespace meshless

@@ -1,0 +1,426 @@
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+#include "contact_set.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kLetOutShare = 0.3;  // of old overlap, a frame
+constexpr double kLetOutSpeed = 1.0;  // [1/s] times the smaller body's size, at most
+constexpr double kBeside = 0.02;      // barycentric: farther off its triangle a point does not touch it from outside
+constexpr double kFarBeside = 1.0;    // nor from inside
+
+// Inverse of an inertia tensor; what has no extent about an axis does not turn about it.
+Mat3 inverseInertia(const Mat3& inertia) {
+  const double scale = inertia.trace();
+  if (!(scale > 0.0) || !std::isfinite(scale)) return Mat3::Zero();
+  const double det = (inertia / scale).determinant();
+  if (det > 1e-6) return inertia.inverse();
+  const Eigen::SelfAdjointEigenSolver<Mat3> solver(inertia / scale);
+  Mat3 inverse = Mat3::Zero();
+  for (int k = 0; k < 3; ++k)
+    if (solver.eigenvalues()[k] > 1e-9)
+      inverse += solver.eigenvectors().col(k) * solver.eigenvectors().col(k).transpose() /
+                 (solver.eigenvalues()[k] * scale);
+  return inverse;
+}
+
+// A party's motion as a whole by the impulses of the sweeps, added to its particles after them.
+struct Rigid {
+  Vec3 centre = Vec3::Zero();
+  Mat3 inverse_inertia = Mat3::Zero();  // [1/(kg m^2)] times the rigid share
+  double inverse_mass = 0.0;            // [1/kg] times the rigid share
+  double local_share = 0.0;             // 1 - rigid share; 0 where nothing moves
+  Vec3 shift = Vec3::Zero();            // [m]
+  Vec3 turn = Vec3::Zero();             // [rad]
+};
+
+// What does not change about a contact during the sweeps of a substep.
+struct Row {
+  Vec3 normal, lever_a, lever_b;
+  Vec3 arm_a, arm_b;           // [1/(kg m)] turn of each party by a unit impulse along the normal
+  Vec3 slip;                   // [m] tangential, before the sweeps
+  double distance, target;     // [m]
+  double inverse_answer, inverse_answer_along;  // [kg]
+  double friction;
+  double share_a, share_b;     // local shares
+  Contact* contact;
+  bool on_ground, active;
+};
+
+Rigid rigidOf(const ContactParty& party) {
+  Rigid rigid;
+  rigid.local_share = 1.0 - party.rigid_share;
+  if (!(party.rigid_share > 0.0)) return rigid;
+  Vec3 sum = Vec3::Zero();
+  double xx = 0, yy = 0, zz = 0, xy = 0, yz = 0, zx = 0;
+  const Vec3 origin = party.positions[0];
+  for (Index i = 0; i < party.particles; ++i) {
+    const Vec3 r = party.positions[i] - origin;
+    const Vec3 mr = party.masses[i] * r;
+    sum += mr;
+    xx += mr.x() * r.x();
+    yy += mr.y() * r.y();
+    zz += mr.z() * r.z();
+    xy += mr.x() * r.y();
+    yz += mr.y() * r.z();
+    zx += mr.z() * r.x();
+  }
+  const Vec3 offset = sum / party.mass;
+  xx -= sum.x() * offset.x();
+  yy -= sum.y() * offset.y();
+  zz -= sum.z() * offset.z();
+  xy -= sum.x() * offset.y();
+  yz -= sum.y() * offset.z();
+  zx -= sum.z() * offset.x();
+  Mat3 inertia;
+  inertia << yy + zz, -xy, -zx, -xy, xx + zz, -yz, -zx, -yz, xx + yy;
+  rigid.centre = origin + offset;
+  rigid.inverse_inertia = party.rigid_share * inverseInertia(inertia);
+  rigid.inverse_mass = party.rigid_share / party.mass;
+  return rigid;
+}
+
+// Where the two points of a contact are, and how they have moved in the substep.
+struct Gap {
+  Vec3 point_a, point_b;
+  Vec3 motion;              // [m] of a against b since the start of the substep
+  double local_a, local_b;  // [1/kg] how particles answer an impulse at the points
+};
+
+// For a direct contact, normal and weights are made from where the corners are.
+bool readGap(const ContactScene& scene, const std::vector<ContactParty>& parties, Contact& c,
+             const std::vector<ContactEntry>& entries, bool with_motion, Gap& gap) {
+  const ContactParty& a = parties[c.a];
+  gap.local_a = gap.local_b = 0.0;
+  gap.motion.setZero();
+  if (c.direct) {
+    const Index i = c.point[0], j = c.point[1];
+    const double t = c.share, s = 1.0 - t;
+    gap.point_a = a.positions[i];
+    Vec3 before = with_motion ? a.previous[i] : gap.point_a;
+    if (t > 0.0) {
+      gap.point_a = s * gap.point_a + t * a.positions[j];
+      if (with_motion) before = s * before + t * a.previous[j];
+      if (a.moves) gap.local_a = s * s * a.inverse_masses[i] + t * t * a.inverse_masses[j];
+    } else if (a.moves) {
+      gap.local_a = a.inverse_masses[i];
+    }
+    if (with_motion) gap.motion = gap.point_a - before;
+    if (c.b == kNoIndex) {
+      gap.point_b = Vec3(gap.point_a.x(), gap.point_a.y(), *scene.ground);
+      return true;
+    }
+    const ContactParty& b = parties[c.b];
+    const Vec3 &q0 = b.positions[c.corners[0]], &q1 = b.positions[c.corners[1]], &q2 = b.positions[c.corners[2]];
+    const Vec3 e1 = q1 - q0, e2 = q2 - q0, d = gap.point_a - q0;
+    const Vec3 area = e1.cross(e2);
+    const double squared = area.squaredNorm();
+    if (!(squared > 0.0)) return false;
+    const double inverse = 1.0 / squared;
+    const double v = d.cross(e2).dot(area) * inverse, w = e1.cross(d).dot(area) * inverse;
+    const double u = 1.0 - v - w;
+    c.weights = {u, v, w};
+    c.normal = area * ((c.flipped ? -1.0 : 1.0) * std::sqrt(inverse));
+    gap.point_b = q0 + v * e1 + w * e2;
+    if (b.moves)
+      gap.local_b = u * u * b.inverse_masses[c.corners[0]] + v * v * b.inverse_masses[c.corners[1]] +
+                    w * w * b.inverse_masses[c.corners[2]];
+    if (with_motion) {
+      const Vec3 &p0 = b.previous[c.corners[0]], &p1 = b.previous[c.corners[1]], &p2 = b.previous[c.corners[2]];
+      gap.motion -= gap.point_b - (u * p0 + v * p1 + w * p2);
+    }
+    return true;
+  }
+  gap.point_a.setZero();
+  gap.point_b.setZero();
+  for (Index k = c.first; k < c.split; ++k) {
+    const ContactEntry& e = entries[k];
+    gap.point_a += e.weight * a.positions[e.particle];
+    if (with_motion) gap.motion += e.weight * (a.positions[e.particle] - a.previous[e.particle]);
+    if (a.moves) gap.local_a += e.weight * e.weight * a.inverse_masses[e.particle];
+  }
+  gap.point_a += c.offset;
+  if (c.b == kNoIndex) {
+    gap.point_b = Vec3(gap.point_a.x(), gap.point_a.y(), *scene.ground);
+    return true;
+  }
+  const ContactParty& b = parties[c.b];
+  for (Index k = c.split; k < c.end; ++k) {
+    const ContactEntry& e = entries[k];
+    gap.point_b += e.weight * b.positions[e.particle];
+    if (with_motion) gap.motion -= e.weight * (b.positions[e.particle] - b.previous[e.particle]);
+    if (b.moves) gap.local_b += e.weight * e.weight * b.inverse_masses[e.particle];
+  }
+  return true;
+}
+
+// How a body answers an impulse at a lever, along a direction [1/kg].
+double mobility(const Rigid& rigid, const Vec3& lever, double local, const Vec3& along) {
+  const Vec3 arm = lever.cross(along);
+  return rigid.local_share * local + rigid.inverse_mass + arm.dot(rigid.inverse_inertia * arm);
+}
+
+const Rigid kStill{};
+
+}  // namespace
+
+struct ContactSolver::Impl {
+  std::vector<Rigid> rigid;  // one a party
+  std::vector<Vec3> shifts;  // of particles by the local shares of impulses, see IslandPlan::shifts
+  std::vector<Row> rows;
+
+  // inputs of the call
+  const ContactScene* scene = nullptr;
+  const std::vector<ContactParty>* parties = nullptr;
+  const std::vector<ContactEntry>* entries = nullptr;
+  const IslandPlan* plan = nullptr;
+
+  Vec3 localShift(const Contact& c, bool of_a) const {
+    const Index p = of_a ? c.a : c.b;
+    const Index from = plan->shifts[p];
+    if (from == kNoIndex) return Vec3::Zero();
+    const Vec3* s = shifts.data() + from;
+    if (c.direct) {
+      if (!of_a) return c.weights[0] * s[c.corners[0]] + c.weights[1] * s[c.corners[1]] + c.weights[2] * s[c.corners[2]];
+      return c.share > 0.0 ? Vec3((1.0 - c.share) * s[c.point[0]] + c.share * s[c.point[1]]) : s[c.point[0]];
+    }
+    Vec3 sum = Vec3::Zero();
+    for (Index k = of_a ? c.first : c.split; k < (of_a ? c.split : c.end); ++k)
+      sum += (*entries)[k].weight * s[(*entries)[k].particle];
+    return sum;
+  }
+
+  void give(const Contact& c, bool of_a, double local_share, const Vec3& impulse) {
+    const Index p = of_a ? c.a : c.b;
+    const Index from = plan->shifts[p];
+    if (from == kNoIndex) return;
+    Vec3* s = shifts.data() + from;
+    const double* inverse = (*parties)[p].inverse_masses;
+    const Vec3 shift = local_share * impulse;
+    if (c.direct) {
+      if (!of_a) {
+        for (int k = 0; k < 3; ++k) s[c.corners[k]] += (c.weights[k] * inverse[c.corners[k]]) * shift;
+      } else if (c.share > 0.0) {
+        s[c.point[0]] += (1.0 - c.share) * inverse[c.point[0]] * shift;
+        s[c.point[1]] += c.share * inverse[c.point[1]] * shift;
+      } else {
+        s[c.point[0]] += inverse[c.point[0]] * shift;
+      }
+      return;
+    }
+    for (Index k = of_a ? c.first : c.split; k < (of_a ? c.split : c.end); ++k)
+      s[(*entries)[k].particle] += ((*entries)[k].weight * inverse[(*entries)[k].particle]) * shift;
+  }
+
+  void apply(const Row& row, double along_normal, const Vec3& impulse) {
+    Contact& c = *row.contact;
+    Rigid& a = rigid[c.a];
+    const Vec3 across = impulse - along_normal * row.normal;
+    const bool turns = !across.isZero(0.0);
+    give(c, true, row.share_a, impulse);
+    if (a.inverse_mass > 0.0) {
+      a.shift += a.inverse_mass * impulse;
+      a.turn += along_normal * row.arm_a;
+      if (turns) a.turn += a.inverse_inertia * row.lever_a.cross(across);
+    }
+    if (row.on_ground) return;
+    Rigid& b = rigid[c.b];
+    give(c, false, row.share_b, -impulse);
+    if (b.inverse_mass > 0.0) {
+      b.shift -= b.inverse_mass * impulse;
+      b.turn -= along_normal * row.arm_b;
+      if (turns) b.turn -= b.inverse_inertia * row.lever_b.cross(across);
+    }
+  }
+
+  Vec3 relativeShift(const Row& row) const {
+    const Contact& c = *row.contact;
+    const Rigid& a = rigid[c.a];
+    Vec3 d = localShift(c, true) + a.shift + a.turn.cross(row.lever_a);
+    if (!row.on_ground) {
+      const Rigid& b = rigid[c.b];
+      d -= localShift(c, false) + b.shift + b.turn.cross(row.lever_b);
+    }
+    return d;
+  }
+
+  void begin(Index island) {
+    for (Index k = plan->party_offsets[island]; k < plan->party_offsets[island + 1]; ++k) {
+      const Index p = plan->parties[k];
+      rigid[p] = rigidOf((*parties)[p]);
+      std::fill_n(shifts.begin() + plan->shifts[p], (*parties)[p].particles, Vec3::Zero());
+    }
+  }
+
+  void finish(Index island) {
+    for (Index k = plan->party_offsets[island]; k < plan->party_offsets[island + 1]; ++k) {
+      const Index p = plan->parties[k];
+      const ContactParty& party = (*parties)[p];
+      const Rigid& r = rigid[p];
+      if (!r.shift.allFinite() || !r.turn.allFinite()) continue;
+      const Vec3* shift = shifts.data() + plan->shifts[p];
+      if (r.turn.isZero(0.0) && r.shift.isZero(0.0)) {
+        for (Index i = 0; i < party.particles; ++i) party.positions[i] += shift[i];
+      } else {
+        const Vec3 offset = r.shift - r.turn.cross(r.centre);
+        for (Index i = 0; i < party.particles; ++i)
+          party.positions[i] += shift[i] + offset + r.turn.cross(party.positions[i]);
+      }
+    }
+  }
+
+  void start(const ContactScene& of_scene, const std::vector<ContactParty>& of_parties,
+             const std::vector<ContactEntry>& of_entries, const IslandPlan& of_plan) {
+    scene = &of_scene;
+    parties = &of_parties;
+    entries = &of_entries;
+    plan = &of_plan;
+    rigid.resize(of_parties.size());
+    Index particles = 0;
+    for (Index p : of_plan.parties) particles += of_parties[p].particles;
+    if (shifts.size() < particles) shifts.resize(particles);
+  }
+
+  // Fills what both kinds of sweep need; false where there is nothing to hold.
+  bool prepare(Contact& c, bool with_motion, Gap& gap, Row& row) {
+    if (!readGap(*scene, *parties, c, *entries, with_motion, gap)) return false;
+    row.contact = &c;
+    row.on_ground = c.b == kNoIndex;
+    const Rigid& a = (*parties)[c.a].moves ? rigid[c.a] : kStill;
+    const Rigid& b = row.on_ground || !(*parties)[c.b].moves ? kStill : rigid[c.b];
+    row.normal = c.normal;
+    row.lever_a = gap.point_a - a.centre;
+    row.lever_b = gap.point_b - b.centre;
+    row.share_a = a.local_share;
+    row.share_b = b.local_share;
+    const Vec3 turned_a = row.lever_a.cross(c.normal), turned_b = row.lever_b.cross(c.normal);
+    row.arm_a = a.inverse_inertia * turned_a;
+    row.arm_b = b.inverse_inertia * turned_b;
+    const double answer = a.local_share * gap.local_a + b.local_share * gap.local_b + a.inverse_mass + b.inverse_mass +
+                          turned_a.dot(row.arm_a) + turned_b.dot(row.arm_b);
+    if (!(answer > 0.0) || !std::isfinite(answer)) return false;
+    row.inverse_answer = 1.0 / answer;
+    row.distance = c.normal.dot(gap.point_a - gap.point_b);
+    return std::isfinite(row.distance);
+  }
+};
+
+ContactSolver::ContactSolver() : impl_(std::make_unique<Impl>()) {}
+ContactSolver::~ContactSolver() = default;
+ContactSolver::ContactSolver(ContactSolver&&) noexcept = default;
+ContactSolver& ContactSolver::operator=(ContactSolver&&) noexcept = default;
+
+void ContactSolver::solve(const ContactScene& scene, const std::vector<ContactParty>& parties,
+                          std::vector<Contact>& contacts, const std::vector<ContactEntry>& entries,
+                          const IslandPlan& plan, ContactCounters& counters) {
+  Impl& w = *impl_;
+  w.start(scene, parties, entries, plan);
+  for (Index island = 0; island < plan.size(); ++island) {
+    w.begin(island);
+    w.rows.clear();
+    for (Index k = plan.contact_offsets[island]; k < plan.contact_offsets[island + 1]; ++k) {
+      Contact& c = contacts[plan.contacts[k]];
+      Gap gap;
+      Row row;
+      const double was = c.impulse;
+      c.impulse = 0.0;
+      if (!w.prepare(c, true, gap, row)) continue;
+      const double before = row.distance - c.normal.dot(gap.motion);
+      if (c.direct && !row.on_ground) {
+        const double least = std::min({c.weights[0], c.weights[1], c.weights[2]});
+        if (least < (before > 0.0 && !c.caught ? -kBeside : -kFarBeside)) continue;
+      }
+      row.target = std::min(0.0, before);
+      row.slip = gap.motion - c.normal.dot(gap.motion) * c.normal;
+      row.friction = std::sqrt(parties[c.a].friction *
+                               (row.on_ground ? scene.ground_friction : parties[c.b].friction));
+      row.inverse_answer_along = 0.0;
+      if (row.friction > 0.0) {
+        // Along the slip and across it: the larger answer is safe for both.
+        const double length = row.slip.norm();
+        const Vec3 along = length > 0.0 ? Vec3(row.slip / length) : c.normal.unitOrthogonal();
+        const Vec3 across = c.normal.cross(along);
+        const Rigid& a = parties[c.a].moves ? w.rigid[c.a] : kStill;
+        const Rigid& b = row.on_ground || !parties[c.b].moves ? kStill : w.rigid[c.b];
+        const double answer =
+            std::max(mobility(a, row.lever_a, gap.local_a, along) + mobility(b, row.lever_b, gap.local_b, along),
+                     mobility(a, row.lever_a, gap.local_a, across) + mobility(b, row.lever_b, gap.local_b, across));
+        if (answer > 0.0) row.inverse_answer_along = 1.0 / answer;
+      }
+      // From where the last substep ended: stacks converge over substeps, not within one.
+      if (was > 0.0) {
+        c.impulse = was;
+        c.slip_impulse -= c.normal.dot(c.slip_impulse) * c.normal;
+        w.apply(row, c.impulse, c.impulse * c.normal + c.slip_impulse);
+      } else {
+        c.slip_impulse.setZero();
+      }
+      w.rows.push_back(row);
+    }
+    const std::size_t count = w.rows.size();
+    for (int pass = 0; pass < scene.passes; ++pass)
+      for (std::size_t n = 0; n < count; ++n) {
+        const Row& row = w.rows[pass % 2 ? count - 1 - n : n];
+        Contact& c = *row.contact;
+        const Vec3 d = w.relativeShift(row);
+        const double wrong = row.target - row.distance - row.normal.dot(d);
+        if (!(wrong > 0.0) && !(c.impulse > 0.0)) continue;
+        const double change = std::max(-c.impulse, wrong * row.inverse_answer);
+        if (!std::isfinite(change)) continue;
+        c.impulse += change;
+        Vec3 impulse = change * row.normal;
+        if (row.inverse_answer_along > 0.0) {
+          // Friction stops what slips, within the cone of all that presses.
+          const Vec3 slip = row.slip + d - row.normal.dot(d) * row.normal;
+          Vec3 wanted = c.slip_impulse - row.inverse_answer_along * slip;
+          const double cone = row.friction * c.impulse, squared = wanted.squaredNorm();
+          if (squared > cone * cone) wanted *= cone / std::sqrt(squared);
+          impulse += wanted - c.slip_impulse;
+          c.slip_impulse = wanted;
+        }
+        w.apply(row, change, impulse);
+        ++counters.corrected;
+      }
+    w.finish(island);
+  }
+}
+
+void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactParty>& parties,
+                           std::vector<Contact>& contacts, const std::vector<ContactEntry>& entries,
+                           const IslandPlan& plan, double h, ContactCounters& counters) {
+  Impl& w = *impl_;
+  w.start(scene, parties, entries, plan);
+  for (Index island = 0; island < plan.size(); ++island) {
+    w.rows.clear();
+    for (Index k = plan.contact_offsets[island]; k < plan.contact_offsets[island + 1]; ++k) {
+      Contact& c = contacts[plan.contacts[k]];
+      Gap gap;
+      if (!readGap(scene, parties, c, entries, false, gap)) continue;
+      if (!(c.normal.dot(gap.point_a - gap.point_b) < 0.0)) continue;
+      if (c.direct && c.b != kNoIndex && std::min({c.weights[0], c.weights[1], c.weights[2]}) < -kFarBeside) continue;
+      Row row;
+      if (w.rows.empty()) w.begin(island);
+      if (!w.prepare(c, false, gap, row)) continue;
+      double size = parties[c.a].shape->size();
+      if (!row.on_ground) size = std::min(size, parties[c.b].shape->size());
+      const double old = -row.distance;
+      row.target = std::min(kLetOutShare * old, kLetOutSpeed * size * h) - old;
+      w.rows.push_back(row);
+    }
+    if (w.rows.empty()) continue;
+    for (const Row& row : w.rows) {
+      const double wrong = row.target - row.distance - row.normal.dot(w.relativeShift(row));
+      if (!(wrong > 0.0)) continue;
+      const double impulse = wrong * row.inverse_answer;
+      w.apply(row, impulse, impulse * row.normal);
+      ++counters.corrected;
+    }
+    w.finish(island);
+  }
+}
+
+}  // namespace meshless

@@ -1,0 +1,691 @@
+#include "meshless_surgery/contact/contacts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "contact_set.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kMargin = 1e-3;        // of the smaller body's size: contacts are kept while so near
+constexpr double kQuick = 0.25;         // of the thickness: who goes farther is looked up in every substep, or traced
+constexpr double kMovedInRest = 0.005;  // of the size: a lookup is repeated where the deviation moved it farther
+constexpr int kMostLookups = 3;
+constexpr Index kFewMaps = 8;           // so many are searched one by one
+constexpr double kExitTime = 1.0;       // [s] in which one body is let out of another
+constexpr double kExitDeep = 0.05;      // of the size: how deep the deepest point is at the least
+constexpr double kSameShare = 0.8;      // of points inside each other, both ways: bodies at the same place
+
+struct Pair {
+  Index a, b;
+  double reach;  // [m] how far outside a point is taken as a contact to come
+  bool quick;    // looked up anew in every substep
+  bool fast;     // and its paths traced
+};
+
+/// The cluster whose centre is nearest: a grid over the centres.
+class MapFinder {
+ public:
+  void make(const ContactMap* maps, Index count) {
+    maps_ = maps;
+    count_ = count;
+    if (count <= kFewMaps) return;
+    Box box;
+    for (Index m = 0; m < count; ++m)
+      if (maps[m].centre.allFinite()) box.extend(maps[m].centre);
+    if (box.empty()) {
+      count_ = std::min<Index>(count, 1);
+      return;
+    }
+    const Vec3 extent = (box.max - box.min).cwiseMax(1e-9 * box.diagonal());
+    edge_ = std::max(std::cbrt(extent.prod() / count), extent.maxCoeff() / 256.0);
+    if (!(edge_ > 0.0)) edge_ = 1.0;
+    origin_ = box.min;
+    std::size_t total = 1;
+    for (int d = 0; d < 3; ++d) {
+      cells_[d] = std::min(256, static_cast<int>(extent[d] / edge_) + 1);
+      total *= static_cast<std::size_t>(cells_[d]);
+    }
+    offsets_.assign(total + 1, 0);
+    items_.resize(count);
+    for (Index m = 0; m < count; ++m) ++offsets_[cellOf(maps[m].centre) + 1];
+    for (std::size_t i = 0; i < total; ++i) offsets_[i + 1] += offsets_[i];
+    next_.assign(offsets_.begin(), offsets_.end() - 1);
+    for (Index m = 0; m < count; ++m) items_[next_[cellOf(maps[m].centre)]++] = m;
+  }
+
+  Index nearest(const Vec3& p) const {
+    if (count_ <= 1) return 0;
+    Index best = 0;
+    double least = std::numeric_limits<double>::infinity();
+    const auto look = [&](Index m) {
+      const double squared = (maps_[m].centre - p).squaredNorm();
+      if (squared < least || (squared == least && m < best)) {
+        least = squared;
+        best = m;
+      }
+    };
+    if (count_ <= kFewMaps) {
+      for (Index m = 0; m < count_; ++m) look(m);
+      return best;
+    }
+    std::array<int, 3> at;
+    for (int d = 0; d < 3; ++d) at[d] = clampCell(p[d], d);
+    const int most = std::max({cells_[0], cells_[1], cells_[2]});
+    for (int ring = 0; ring <= most; ++ring) {
+      // What lies beyond the rings looked at is farther than their inner radius.
+      if (ring > 0) {
+        const double inner = (ring - 1) * edge_;
+        if (least < std::numeric_limits<double>::infinity() && inner * inner > least) break;
+      }
+      for (int x = std::max(0, at[0] - ring); x <= std::min(cells_[0] - 1, at[0] + ring); ++x)
+        for (int y = std::max(0, at[1] - ring); y <= std::min(cells_[1] - 1, at[1] + ring); ++y)
+          for (int z = std::max(0, at[2] - ring); z <= std::min(cells_[2] - 1, at[2] + ring); ++z) {
+            if (std::max({std::abs(x - at[0]), std::abs(y - at[1]), std::abs(z - at[2])}) != ring) continue;
+            const std::size_t cell = (static_cast<std::size_t>(x) * cells_[1] + y) * cells_[2] + z;
+            for (Index k = offsets_[cell]; k < offsets_[cell + 1]; ++k) look(items_[k]);
+          }
+    }
+    return best;
+  }
+
+ private:
+  int clampCell(double v, int d) const {
+    const double c = (v - origin_[d]) / edge_;
+    return c > 0.0 ? (c < cells_[d] ? static_cast<int>(c) : cells_[d] - 1) : 0;
+  }
+  std::size_t cellOf(const Vec3& p) const {
+    return (static_cast<std::size_t>(clampCell(p.x(), 0)) * cells_[1] + clampCell(p.y(), 1)) * cells_[2] +
+           clampCell(p.z(), 2);
+  }
+
+  const ContactMap* maps_ = nullptr;
+  Index count_ = 0;
+  double edge_ = 1.0;
+  Vec3 origin_ = Vec3::Zero();
+  std::array<int, 3> cells_{{1, 1, 1}};
+  std::vector<Index> offsets_, items_, next_;
+};
+
+Vec3 vertexAt(const ContactParty& party, Index vertex) {
+  return party.surface ? party.surface[vertex] : party.positions[(*party.shape->rows().particle)[vertex]];
+}
+
+Vec3 sampleAt(const ContactParty& party, const ContactSample& sample) {
+  const Vec3 p = vertexAt(party, sample.vertices[0]);
+  return sample.share > 0.0 ? Vec3(p + sample.share * (vertexAt(party, sample.vertices[1]) - p)) : p;
+}
+
+/// How far a point of the surface has moved in the substep [m], by its particles.
+Vec3 vertexMotion(const ContactParty& party, Index vertex) {
+  const SurfaceRows& rows = party.shape->rows();
+  const Index particle = (*rows.particle)[vertex];
+  if (particle != kNoIndex) return party.positions[particle] - party.previous[particle];
+  const Index r = party.shape->riderOf(vertex);
+  Vec3 sum = Vec3::Zero();
+  for (Index k = (*rows.offsets)[r]; k < (*rows.offsets)[r + 1]; ++k) {
+    const Index i = (*rows.carriers)[k];
+    sum += (*rows.weights)[k] * (party.positions[i] - party.previous[i]);
+  }
+  return sum;
+}
+
+/// Appends who carries a vertex; returns what it has beyond its particles [m].
+Vec3 addRow(const ContactParty& party, Index vertex, double weight, std::vector<ContactEntry>& entries) {
+  const SurfaceRows& rows = party.shape->rows();
+  const Index particle = (*rows.particle)[vertex];
+  if (particle != kNoIndex) {
+    entries.push_back({particle, weight});
+    return Vec3::Zero();
+  }
+  const Index r = party.shape->riderOf(vertex);
+  Vec3 rest = party.surface[vertex];
+  for (Index k = (*rows.offsets)[r]; k < (*rows.offsets)[r + 1]; ++k) {
+    const Index i = (*rows.carriers)[k];
+    rest -= (*rows.weights)[k] * party.positions[i];
+    entries.push_back({i, weight * (*rows.weights)[k]});
+  }
+  return weight * rest;
+}
+
+/// Entries of the same particle become one, ascending.
+void tidy(std::vector<ContactEntry>& entries, std::size_t first) {
+  std::sort(entries.begin() + static_cast<std::ptrdiff_t>(first), entries.end(),
+            [](const ContactEntry& p, const ContactEntry& q) { return p.particle < q.particle; });
+  std::size_t out = first;
+  for (std::size_t k = first; k < entries.size(); ++k) {
+    if (out > first && entries[out - 1].particle == entries[k].particle)
+      entries[out - 1].weight += entries[k].weight;
+    else
+      entries[out++] = entries[k];
+  }
+  entries.resize(out);
+}
+
+Box intersection(const Box& a, const Box& b) { return {a.min.cwiseMax(b.min), a.max.cwiseMin(b.max)}; }
+
+Box grown(Box box, double by) {
+  box.min.array() -= by;
+  box.max.array() += by;
+  return box;
+}
+
+using PairKey = std::pair<std::uint64_t, std::uint64_t>;
+
+/// What passed through and is still on the wrong side.
+struct CaughtKey {
+  std::uint64_t a, b;
+  Index sample;
+  bool operator<(const CaughtKey& o) const {
+    return std::tie(a, b, sample) < std::tie(o.a, o.b, o.sample);
+  }
+};
+
+struct Exit {
+  Vec3 direction;  // of a out of b
+  double speed;    // [m/s]
+};
+
+}  // namespace
+
+struct Contacts::Impl {
+  ContactScene scene;
+  BroadPhase broad;
+  std::vector<Box> boxes;
+  std::vector<char> active, needed;
+  std::vector<Pair> pairs;
+  std::vector<Index> grounded;  // parties that can meet the ground
+  std::vector<MapFinder> finders;
+  std::vector<std::vector<ContactMap>> maps_now, maps_before;  // of those in quick pairs
+  std::vector<Contact> contacts, last;  // of this frame and of the one before
+  std::vector<ContactEntry> entries;
+  std::size_t steady_contacts = 0, steady_entries = 0;  // those found once a frame; quick ones follow
+  std::map<CaughtKey, Index> caught;                    // triangle
+  std::map<PairKey, Exit> exits;
+  std::vector<double> depths;
+  std::vector<Index> reached;
+  ContactSolver solver;
+  IslandPlan plan;
+  bool plan_steady = true;  // the plan is that of the steady contacts alone
+  // how many points of a pair are inside, as the lookups count them
+  struct Inside {
+    std::size_t points = 0, inside = 0, near = 0;
+    double deepest = 0.0;
+  };
+
+  bool locate(const ContactParty& b, const MapFinder& finder, const ContactMap* maps, const Vec3& p,
+              ContactShape::Nearest& found, bool& flipped, ContactCounters& counters) const;
+  void addContact(const std::vector<ContactParty>& parties, Index a, Index sample, Index b, Index triangle,
+                  const std::array<double, 3>& weights, bool was_caught, bool flipped);
+  void lookInto(const std::vector<ContactParty>& parties, const Pair& pair, Index a, Index b, const ContactMap* maps,
+                bool every_point, Inside& inside, ContactCounters& counters);
+  void trace(const std::vector<ContactParty>& parties, Index a, Index b, ContactCounters& counters);
+  void addGround(const std::vector<ContactParty>& parties, Index a, double reach);
+  void takeOver();
+  bool letOutWhole(const std::vector<ContactParty>& parties, const Pair& pair, const Inside& of_a, const Inside& of_b,
+                   double h, ContactCounters& counters);
+};
+
+Contacts::Contacts() : impl_(std::make_unique<Impl>()) {}
+Contacts::~Contacts() = default;
+Contacts::Contacts(Contacts&&) noexcept = default;
+Contacts& Contacts::operator=(Contacts&&) noexcept = default;
+
+const std::vector<char>& Contacts::needed() const { return impl_->needed; }
+const std::vector<Index>& Contacts::reached() const { return impl_->reached; }
+const std::vector<double>& Contacts::depths() const { return impl_->depths; }
+
+void Contacts::clear() {
+  impl_->caught.clear();
+  impl_->exits.clear();
+  impl_->contacts.clear();
+  impl_->last.clear();
+  impl_->reached.clear();
+  impl_->depths.clear();
+}
+
+void Contacts::findPairs(const ContactScene& scene, const std::vector<ContactParty>& parties, double h,
+                         ContactCounters& counters) {
+  Impl& w = *impl_;
+  w.scene = scene;
+  w.pairs.clear();
+  w.grounded.clear();
+  w.needed.assign(parties.size(), 0);
+  w.boxes.clear();
+  w.active.clear();
+  const double falling = scene.gravity.norm() * h * h;
+  for (const ContactParty& party : parties) {
+    // Relative kMargin on both sides; what moves reaches as far as it can get.
+    const double diagonal = party.bounds.diagonal();
+    w.boxes.push_back(grown(party.bounds, kMargin * diagonal + (party.moves ? party.speed * h + falling : 0.0)));
+    w.active.push_back(party.moves);
+  }
+  if (parties.size() > 1) {
+    const auto& found = w.broad.find(w.boxes, w.active);
+    counters.bounds_tested += w.broad.tested();
+    for (const auto& pair : found) {
+      w.pairs.push_back({pair[0], pair[1], 0.0, false, false});
+      w.needed[pair[0]] = w.needed[pair[1]] = 1;
+    }
+    counters.pairs += found.size();
+  }
+  if (scene.ground)
+    for (Index a = 0; a < parties.size(); ++a)
+      if (parties[a].moves && parties[a].mass > 0.0 && w.boxes[a].min.z() < *scene.ground) {
+        w.grounded.push_back(a);
+        w.needed[a] |= 2;
+      }
+}
+
+bool Contacts::Impl::locate(const ContactParty& b, const MapFinder& finder, const ContactMap* maps, const Vec3& p,
+                            ContactShape::Nearest& found, bool& flipped, ContactCounters& counters) const {
+  const ContactMap& map = maps[finder.nearest(p)];
+  flipped = map.flipped;
+  const ContactShape& shape = *b.shape;
+  Vec3 rest = map.to_rest * (p - map.centre) + map.rest;
+  const double enough = kMovedInRest * shape.size();
+  for (int n = 0; n < kMostLookups; ++n) {
+    ++counters.lookups;
+    if (!shape.nearest(rest, found)) return false;
+    if (n + 1 == kMostLookups) break;
+    // The surface does not lie where the affine map has it: by so much the point is looked up elsewhere.
+    const Triangle& corners = shape.surface().triangles[found.triangle];
+    Vec3 at_rest = Vec3::Zero(), at_present = Vec3::Zero();
+    for (int k = 0; k < 3; ++k) {
+      at_rest += found.weights[k] * shape.surface().vertices[corners[k]];
+      at_present += found.weights[k] * vertexAt(b, corners[k]);
+    }
+    const Vec3 there = map.to_rest * (p - at_present) + at_rest;
+    if ((there - rest).squaredNorm() < enough * enough) break;
+    rest = there;
+  }
+  return std::isfinite(found.distance);
+}
+
+void Contacts::Impl::addContact(const std::vector<ContactParty>& parties, Index a, Index sample, Index b,
+                                Index triangle, const std::array<double, 3>& weights, bool was_caught,
+                                bool flipped) {
+  const ContactParty& of = parties[a];
+  const ContactSample& s = of.shape->samples()[sample];
+  Contact c;
+  c.a = a;
+  c.b = b;
+  c.sample = sample;
+  c.triangle = triangle;
+  c.weights = weights;
+  c.caught = was_caught;
+  c.flipped = flipped;
+  const std::vector<Index>& particle = *of.shape->rows().particle;
+  c.point = {particle[s.vertices[0]], particle[s.vertices[1]]};
+  c.share = s.share;
+  c.direct = c.point[0] != kNoIndex && c.point[1] != kNoIndex;
+  if (b != kNoIndex) {
+    const ContactShape& shape = *parties[b].shape;
+    for (int k = 0; k < 3; ++k) {
+      c.corners[k] = (*shape.rows().particle)[shape.surface().triangles[triangle][k]];
+      c.direct = c.direct && c.corners[k] != kNoIndex;
+    }
+  }
+  if (!c.direct) {
+    c.first = static_cast<Index>(entries.size());
+    c.offset = addRow(of, s.vertices[0], 1.0 - s.share, entries);
+    if (s.share > 0.0) {
+      c.offset += addRow(of, s.vertices[1], s.share, entries);
+      tidy(entries, c.first);
+    }
+    c.split = static_cast<Index>(entries.size());
+    if (b != kNoIndex) {
+      const ContactParty& with = parties[b];
+      const Triangle& corners = with.shape->surface().triangles[triangle];
+      Vec3 x[3];
+      for (int k = 0; k < 3; ++k) {
+        c.offset -= addRow(with, corners[k], weights[k], entries);
+        x[k] = vertexAt(with, corners[k]);
+      }
+      tidy(entries, c.split);
+      const Vec3 area = (x[1] - x[0]).cross(x[2] - x[0]);
+      const double length = area.norm();
+      if (!(length > 0.0)) {
+        entries.resize(c.first);
+        return;
+      }
+      c.normal = area / (flipped ? -length : length);
+    }
+    c.end = static_cast<Index>(entries.size());
+  }
+  contacts.push_back(c);
+}
+
+// The points of a in the shape of b.
+void Contacts::Impl::lookInto(const std::vector<ContactParty>& parties, const Pair& pair, Index a, Index b,
+                              const ContactMap* maps, bool every_point, Inside& inside, ContactCounters& counters) {
+  const ContactParty &of = parties[a], &with = parties[b];
+  const ContactShape& shape = *with.shape;
+  if (shape.surface().triangles.empty() || with.map_count == 0) return;
+  const Box region = grown(intersection(of.bounds, with.bounds), pair.reach);
+  const double size = shape.size(), near = kMargin * std::min(size, of.shape->size());
+  const std::vector<ContactSample>& samples = of.shape->samples();
+  inside.points = samples.size();
+  for (Index s = 0; s < samples.size(); ++s) {
+    const Vec3 p = sampleAt(of, samples[s]);
+    if (!region.contains(p)) continue;
+    if (!caught.empty()) {
+      const auto held = caught.find({of.key, with.key, s});
+      if (held != caught.end()) continue;  // see trace()
+    }
+    ContactShape::Nearest found;
+    bool flipped = false;
+    if (!locate(with, finders[b], maps, p, found, flipped, counters)) continue;
+    if (found.distance < 0.0) {
+      ++inside.inside;
+      inside.deepest = std::min(inside.deepest, found.distance);
+    }
+    if (found.distance < near) ++inside.near;
+    if (found.distance > pair.reach || (found.distance > near && !found.above && !every_point)) continue;
+    addContact(parties, a, s, b, found.triangle, found.weights, false, flipped);
+    if (found.distance < 0.0) depths.push_back(-found.distance / std::min(size, of.shape->size()));
+  }
+}
+
+// Paths of the substep through the rest shape, and what was caught before.
+void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, Index b, ContactCounters& counters) {
+  const ContactParty &of = parties[a], &with = parties[b];
+  const ContactShape& shape = *with.shape;
+  if (shape.surface().triangles.empty() || with.map_count == 0) return;
+  const std::vector<ContactSample>& samples = of.shape->samples();
+  MapFinder before;
+  before.make(maps_before[b].data(), static_cast<Index>(maps_before[b].size()));
+  const double enough = kQuick * shape.thickness();
+  for (Index s = 0; s < samples.size(); ++s) {
+    if (caught.count({of.key, with.key, s})) continue;
+    const Vec3 p = sampleAt(of, samples[s]);
+    Vec3 motion = vertexMotion(of, samples[s].vertices[0]);
+    if (samples[s].share > 0.0)
+      motion += samples[s].share * (vertexMotion(of, samples[s].vertices[1]) - motion);
+    const Vec3 p0 = p - motion;
+    const Index m1 = finders[b].nearest(p);
+    const ContactMap &map1 = maps_now[b][m1], &map0 = maps_before[b][before.nearest(p0)];
+    const Vec3 to = map1.to_rest * (p - map1.centre) + map1.rest;
+    const Vec3 from = map0.to_rest * (p0 - map0.centre) + map0.rest;
+    if (!((to - from).squaredNorm() > enough * enough)) continue;
+    ++counters.traced;
+    ContactShape::Hit hit;
+    if (!shape.trace(from, to, hit)) continue;
+    ++counters.caught;
+    caught[{of.key, with.key, s}] = hit.triangle;
+  }
+}
+
+void Contacts::Impl::addGround(const std::vector<ContactParty>& parties, Index a, double reach) {
+  const ContactParty& party = parties[a];
+  const std::vector<ContactSample>& samples = party.shape->samples();
+  const double below = *scene.ground + reach;
+  for (Index s = 0; s < samples.size(); ++s) {
+    if (samples[s].share > 0.0) continue;  // between two vertices above a plane nothing is below it
+    const double z = vertexAt(party, samples[s].vertices[0]).z();
+    if (!(z < below)) continue;
+    addContact(parties, a, s, kNoIndex, kNoIndex, {}, false, false);
+    if (z < *scene.ground) depths.push_back((*scene.ground - z) / party.shape->size());
+  }
+}
+
+// What pressed in the last frame is where the solver starts: both lists are in the same order.
+void Contacts::Impl::takeOver() {
+  const auto key = [](const Contact& c) {
+    return std::make_tuple(c.b != kNoIndex, std::min(c.a, c.b), c.b == kNoIndex ? 0 : std::max(c.a, c.b),
+                           c.b != kNoIndex && c.a > c.b, c.sample);
+  };
+  std::size_t old = 0;
+  for (Contact& c : contacts) {
+    while (old < last.size() && key(last[old]) < key(c)) ++old;
+    if (old == last.size()) break;
+    if (key(last[old]) != key(c) || !(last[old].impulse > 0.0)) continue;
+    c.impulse = last[old].impulse;
+    c.slip_impulse = last[old].slip_impulse;
+  }
+}
+
+// One body inside another, or both at the same place: along the cheapest way out, as a whole, until they are apart.
+bool Contacts::Impl::letOutWhole(const std::vector<ContactParty>& parties, const Pair& pair, const Inside& of_a,
+                                 const Inside& of_b, double h, ContactCounters& counters) {
+  const ContactParty &a = parties[pair.a], &b = parties[pair.b];
+  const PairKey key{a.key, b.key};
+  const auto known = exits.find(key);
+  const auto wholly = [](const Inside& in, const ContactParty& party) {
+    return in.points > 0 && in.inside == in.points && -in.deepest > kExitDeep * party.shape->size();
+  };
+  const auto share = [](const Inside& in) {
+    return in.points ? static_cast<double>(in.near) / static_cast<double>(in.points) : 0.0;
+  };
+  if (known == exits.end()) {
+    const bool same = share(of_a) >= kSameShare && share(of_b) >= kSameShare;
+    if (!wholly(of_a, a) && !wholly(of_b, b) && !same) return false;
+  } else if (of_a.inside == 0 && of_b.inside == 0 && of_a.near == 0 && of_b.near == 0) {
+    exits.erase(known);
+    return false;
+  }
+  const double part_a = a.moves && a.rigid_share > 0.0 ? 1.0 / a.mass : 0.0;
+  const double part_b = b.moves && b.rigid_share > 0.0 ? 1.0 / b.mass : 0.0;
+  if (!(part_a + part_b > 0.0)) return false;
+  const auto extent = [](const ContactParty& party, const Vec3& d, bool most) {
+    double value = -std::numeric_limits<double>::infinity();
+    for (const ContactSample& s : party.shape->samples())
+      if (!(s.share > 0.0)) value = std::max(value, (most ? 1.0 : -1.0) * d.dot(vertexAt(party, s.vertices[0])));
+    return value;
+  };
+  Exit exit{Vec3::UnitZ(), 0.0};
+  if (known != exits.end()) {
+    exit = known->second;
+  } else {
+    double least = std::numeric_limits<double>::infinity();
+    for (int x = -1; x <= 1; ++x)
+      for (int y = -1; y <= 1; ++y)
+        for (int z = -1; z <= 1; ++z) {
+          if (!x && !y && !z) continue;
+          const Vec3 d = Vec3(x, y, z).normalized();
+          // Nobody leaves into the ground.
+          if (scene.ground && ((part_a > 0.0 && d.z() < -0.5) || (part_b > 0.0 && part_a == 0.0 && d.z() > 0.5)))
+            continue;
+          const double way = extent(b, d, true) + extent(a, d, false);
+          if (way < least * (1.0 - 1e-9)) {
+            least = way;
+            exit = {d, way / kExitTime};
+          }
+        }
+    if (!std::isfinite(least)) return false;
+    exit.speed = std::clamp(exit.speed, 0.1 * a.shape->size() / kExitTime,
+                            2.0 * std::max(a.shape->size(), b.shape->size()));
+    exits[key] = exit;
+  }
+  ++counters.expelled;
+  const Vec3 way = exit.speed * h * exit.direction / (part_a + part_b);
+  for (Index i = 0; part_a > 0.0 && i < a.particles; ++i) a.positions[i] += part_a * way;
+  for (Index i = 0; part_b > 0.0 && i < b.particles; ++i) b.positions[i] -= part_b * way;
+  return true;
+}
+
+void Contacts::make(const std::vector<ContactParty>& parties, double h, double substep, ContactCounters& counters) {
+  Impl& w = *impl_;
+  if (w.reached.empty()) w.last.swap(w.contacts);
+  w.contacts.clear();
+  w.entries.clear();
+  w.depths.clear();
+  if (w.finders.size() < parties.size()) {
+    w.finders.resize(parties.size());
+    w.maps_now.resize(parties.size());
+    w.maps_before.resize(parties.size());
+  }
+  for (Index p = 0; p < parties.size(); ++p)
+    if (w.needed[p] & 1) w.finders[p].make(parties[p].maps, parties[p].map_count);
+  // From below upwards where it matters: ground first.
+  const double falling = w.scene.gravity.norm() * h * h;
+  for (Index a : w.grounded)
+    w.addGround(parties, a, kMargin * parties[a].shape->size() + parties[a].speed * h + falling);
+  for (Pair& pair : w.pairs) {
+    const ContactParty &a = parties[pair.a], &b = parties[pair.b];
+    const double size = std::min(a.shape->size(), b.shape->size());
+    const double thickness = std::min(a.shape->thickness(), b.shape->thickness());
+    const double way = (a.moves ? a.speed : 0.0) + (b.moves ? b.speed : 0.0);
+    const double most = kQuick * thickness;
+    pair.reach = kMargin * size + std::min(way * h + falling, most);
+    pair.quick = way * h > most;
+    pair.fast = way * substep > most;
+    const std::size_t contacts_before = w.contacts.size(), entries_before = w.entries.size();
+    const std::size_t depths_before = w.depths.size();
+    Impl::Inside of_a, of_b;
+    w.lookInto(parties, pair, pair.a, pair.b, b.maps, false, of_a, counters);
+    w.lookInto(parties, pair, pair.b, pair.a, a.maps, false, of_b, counters);
+    const bool whole = w.letOutWhole(parties, pair, of_a, of_b, h, counters);
+    if (whole) {
+      pair.quick = pair.fast = false;
+      w.depths.resize(depths_before);
+    }
+    if (whole) {
+      w.contacts.resize(contacts_before);
+      w.entries.resize(entries_before);
+    }
+  }
+  counters.contacts += w.contacts.size();
+  w.reached.clear();
+  for (const Contact& c : w.contacts) {
+    if (c.b == kNoIndex) continue;
+    for (Index p : {c.a, c.b})
+      if (!parties[p].moves && parties[p].mass > 0.0) w.reached.push_back(p);
+  }
+  std::sort(w.reached.begin(), w.reached.end());
+  w.reached.erase(std::unique(w.reached.begin(), w.reached.end()), w.reached.end());
+  if (!w.reached.empty()) return;  // they wake, and all is looked at anew
+  w.takeOver();
+  w.plan.make(parties, w.contacts);
+  w.solver.letOut(w.scene, parties, w.contacts, w.entries, w.plan, h, counters);
+  // Quick pairs are looked up again when they have moved.
+  std::size_t out = 0;
+  bool any_quick = false;
+  for (const Pair& pair : w.pairs) any_quick = any_quick || pair.quick;
+  if (any_quick) {
+    std::map<std::pair<Index, Index>, bool> quick;
+    for (const Pair& pair : w.pairs)
+      if (pair.quick) quick[{pair.a, pair.b}] = true;
+    for (const Contact& c : w.contacts)
+      if (c.b == kNoIndex || !quick.count({std::min(c.a, c.b), std::max(c.a, c.b)})) w.contacts[out++] = c;
+    w.contacts.resize(out);
+  }
+  if (any_quick) w.plan.make(parties, w.contacts);
+  w.plan_steady = true;
+  w.steady_contacts = w.contacts.size();
+  w.steady_entries = w.entries.size();
+}
+
+void Contacts::solve(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,
+                     ContactCounters& counters) {
+  Impl& w = *impl_;
+  w.contacts.resize(w.steady_contacts);
+  w.entries.resize(w.steady_entries);
+  std::vector<char> fitted;
+  const double falling = w.scene.gravity.norm() * substep * substep;
+  for (Pair pair : w.pairs) {
+    if (!pair.quick) continue;
+    if (fitted.empty()) fitted.assign(parties.size(), 0);
+    for (Index p : {pair.a, pair.b})
+      if (!(fitted[p] & 1)) {
+        refit(p, false, w.maps_now[p]);
+        w.finders[p].make(w.maps_now[p].data(), static_cast<Index>(w.maps_now[p].size()));
+        fitted[p] |= 1;
+      }
+    if (pair.fast) {
+      for (Index p : {pair.a, pair.b})
+        if (!(fitted[p] & 2)) {
+          refit(p, true, w.maps_before[p]);
+          fitted[p] |= 2;
+        }
+      w.trace(parties, pair.a, pair.b, counters);
+      w.trace(parties, pair.b, pair.a, counters);
+    }
+    const double size = std::min(parties[pair.a].shape->size(), parties[pair.b].shape->size());
+    const double way = (parties[pair.a].moves ? parties[pair.a].speed : 0.0) +
+                       (parties[pair.b].moves ? parties[pair.b].speed : 0.0);
+    const double thickness = std::min(parties[pair.a].shape->thickness(), parties[pair.b].shape->thickness());
+    pair.reach = kMargin * size + std::min(way * substep + falling, kQuick * thickness);
+    const std::size_t before = w.contacts.size();
+    Impl::Inside ignored;
+    std::vector<double> depths;
+    depths.swap(w.depths);
+    w.lookInto(parties, pair, pair.a, pair.b, w.maps_now[pair.b].data(), true, ignored, counters);
+    w.lookInto(parties, pair, pair.b, pair.a, w.maps_now[pair.a].data(), true, ignored, counters);
+    depths.swap(w.depths);
+    counters.contacts += w.contacts.size() - before;
+  }
+  if (!w.caught.empty()) {
+    std::map<std::uint64_t, Index> by_key;
+    for (Index p = 0; p < parties.size(); ++p) by_key[parties[p].key] = p;
+    for (auto it = w.caught.begin(); it != w.caught.end();) {
+      const auto a = by_key.find(it->first.a), b = by_key.find(it->first.b);
+      bool over = a == by_key.end() || b == by_key.end();
+      over = over || !parties[a->second].shape || !parties[b->second].shape ||
+             it->first.sample >= parties[a->second].shape->samples().size() ||
+             it->second >= parties[b->second].shape->surface().triangles.size();
+      if (!over) {
+        const ContactParty &of = parties[a->second], &with = parties[b->second];
+        const Triangle& corners = with.shape->surface().triangles[it->second];
+        const Vec3 q0 = vertexAt(with, corners[0]), q1 = vertexAt(with, corners[1]), q2 = vertexAt(with, corners[2]);
+        const Vec3 p = sampleAt(of, of.shape->samples()[it->first.sample]);
+        const Vec3 area = (q1 - q0).cross(q2 - q0);
+        const double squared = area.squaredNorm();
+        over = !(area.dot(p - q0) < 0.0);
+        if (!over) {
+          const double v = (p - q0).cross(q2 - q0).dot(area) / squared, u = (q1 - q0).cross(p - q0).dot(area) / squared;
+          // Far beside its triangle it has gone round.
+          over = std::min({v, u, 1.0 - v - u}) < -2.0;
+          if (!over) w.addContact(parties, a->second, it->first.sample, b->second, it->second, {1.0 - v - u, v, u}, true,
+                                  false);
+        }
+      }
+      it = over ? w.caught.erase(it) : std::next(it);
+    }
+  }
+  const bool steady = w.contacts.size() == w.steady_contacts;
+  if (!steady || !w.plan_steady) w.plan.make(parties, w.contacts);
+  w.plan_steady = steady;
+  w.solver.solve(w.scene, parties, w.contacts, w.entries, w.plan, counters);
+}
+
+void Contacts::loadedPairs(std::vector<LoadedPair>& pairs) const {
+  pairs.clear();
+  for (const Contact& c : impl_->contacts) {
+    if (!(c.impulse > 0.0)) continue;
+    LoadedPair pair{c.a, c.b};
+    if (c.b != kNoIndex && c.b < c.a) pair = {c.b, c.a};
+    if (pairs.empty() || pairs.back().a != pair.a || pairs.back().b != pair.b) pairs.push_back(pair);
+  }
+  const auto key = [](const LoadedPair& p) { return std::make_pair(p.a, p.b); };
+  std::sort(pairs.begin(), pairs.end(), [&](const LoadedPair& p, const LoadedPair& q) { return key(p) < key(q); });
+  pairs.erase(std::unique(pairs.begin(), pairs.end(),
+                          [&](const LoadedPair& p, const LoadedPair& q) { return key(p) == key(q); }),
+              pairs.end());
+}
+
+std::size_t Contacts::groundLoaded() const {
+  std::size_t count = 0;
+  for (const Contact& c : impl_->contacts) count += c.b == kNoIndex && c.impulse > 0.0;
+  return count;
+}
+
+void Contacts::points(const std::vector<ContactParty>& parties, std::vector<Point>& points) const {
+  points.clear();
+  for (const Contact& c : impl_->contacts) {
+    if (!(c.impulse > 0.0)) continue;
+    const ContactParty& a = parties[c.a];
+    Vec3 p = Vec3::Zero();
+    if (c.direct) {
+      p = (1.0 - c.share) * a.positions[c.point[0]] + c.share * a.positions[c.point[1]];
+    } else {
+      for (Index k = c.first; k < c.split; ++k)
+        p += impl_->entries[k].weight * a.positions[impl_->entries[k].particle];
+    }
+    points.push_back({p, c.normal, c.impulse});
+  }
+}
+
+}  // namespace meshless

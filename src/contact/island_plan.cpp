@@ -1,0 +1,65 @@
+#include <algorithm>
+
+#include "contact_set.h"
+
+namespace meshless {
+namespace {
+
+Index rootOf(std::vector<Index>& root, Index i) {
+  while (root[i] != i) {
+    root[i] = root[root[i]];
+    i = root[i];
+  }
+  return i;
+}
+
+}  // namespace
+
+void IslandPlan::make(const std::vector<ContactParty>& all, const std::vector<Contact>& made) {
+  const Index count = static_cast<Index>(all.size());
+  root_.resize(count);
+  for (Index p = 0; p < count; ++p) root_[p] = p;
+  const auto moves = [&](Index p) { return p != kNoIndex && all[p].moves; };
+  for (const Contact& c : made)
+    if (moves(c.a) && moves(c.b)) {
+      const Index a = rootOf(root_, c.a), b = rootOf(root_, c.b);
+      root_[std::max(a, b)] = std::min(a, b);
+    }
+  // Islands in the order in which their first contact comes.
+  number_.assign(count, kNoIndex);
+  contact_offsets.assign(1, 0);
+  const auto islandOf = [&](const Contact& c) { return rootOf(root_, moves(c.a) ? c.a : c.b); };
+  Index islands = 0;
+  for (const Contact& c : made) {
+    if (!moves(c.a) && !moves(c.b)) continue;
+    const Index root = islandOf(c);
+    if (number_[root] == kNoIndex) {
+      number_[root] = islands++;
+      contact_offsets.push_back(0);
+    }
+    ++contact_offsets[number_[root] + 1];
+  }
+  for (Index i = 0; i < islands; ++i) contact_offsets[i + 1] += contact_offsets[i];
+  contacts.resize(contact_offsets.back());
+  next_.assign(contact_offsets.begin(), contact_offsets.end() - 1);
+  for (Index k = 0; k < made.size(); ++k)
+    if (moves(made[k].a) || moves(made[k].b)) contacts[next_[number_[islandOf(made[k])]]++] = k;
+
+  party_offsets.assign(islands + 1, 0);
+  shifts.assign(count, kNoIndex);
+  const auto island = [&](Index p) { return number_[rootOf(root_, p)]; };
+  for (Index p = 0; p < count; ++p)
+    if (all[p].moves && island(p) != kNoIndex) ++party_offsets[island(p) + 1];
+  for (Index i = 0; i < islands; ++i) party_offsets[i + 1] += party_offsets[i];
+  parties.resize(party_offsets.back());
+  next_.assign(party_offsets.begin(), party_offsets.end() - 1);
+  Index particles = 0;
+  for (Index p = 0; p < count; ++p)
+    if (all[p].moves && island(p) != kNoIndex) parties[next_[island(p)]++] = p;
+  for (Index p : parties) {
+    shifts[p] = particles;
+    particles += all[p].particles;
+  }
+}
+
+}  // namespace meshless

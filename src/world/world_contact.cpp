@@ -1,0 +1,191 @@
+// Contact by rest shapes: what bodies show of themselves, and what comes back.
+#include <algorithm>
+#include <cmath>
+
+#include "meshless_surgery/body/binding.h"
+#include "world_impl.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kLeastRigid = 0.5;       // share of a contact's impulse that moves a body for looks as a whole
+constexpr double kFlattest = 1e-6;        // det of a map: below, the rotation stands in
+constexpr std::size_t kKeptModels = 64;   // more than this many dead entries are cleared away
+
+SurfaceRows rowsOf(const BodyModel& model) {
+  const SurfaceBinding& b = model.binding;
+  return {&b.particle, &b.riders, &b.offsets, &b.carriers, &b.weights};
+}
+
+// The affine fit of one cluster at given positions; the rotation that it has where the fit has no rank.
+ContactMap fitMap(const MatchInput& in, Index c, const Vec3* positions, const ClusterPose& pose) {
+  const ClusterRest& rest = in.shape.clusters[c];
+  ContactMap map;
+  map.rest = rest.centre;
+  Vec3 sum = Vec3::Zero();
+  Mat3 moment = Mat3::Zero();
+  const Vec3 origin = positions[in.clusters.members[in.clusters.offsets[c]]];
+  for (Index k = in.clusters.offsets[c]; k < in.clusters.offsets[c + 1]; ++k) {
+    const Index i = in.clusters.members[k];
+    const double m = in.masses[i] * in.clusters.weights[k];
+    const Vec3 x = m * (positions[i] - origin), q = in.rest[i] - rest.centre;
+    sum += x;
+    for (int d = 0; d < 3; ++d) moment.col(d) += q[d] * x;
+  }
+  map.centre = origin + sum / rest.mass;
+  map.from_rest = rest.linear_rank ? Mat3(moment * rest.moment_inverse) : pose.rotation.toRotationMatrix();
+  double det = map.from_rest.determinant();
+  if (!(std::abs(det) > kFlattest) || !(map.from_rest.squaredNorm() < 1e6)) {
+    map.from_rest = pose.rotation.toRotationMatrix();
+    map.to_rest = map.from_rest.transpose();
+    return map;
+  }
+  map.flipped = det < 0.0;
+  map.to_rest = map.from_rest.inverse();
+  return map;
+}
+
+double speedOf(const WorldBody& body) {
+  double fastest = 0.0;
+  for (const Vec3& v : body.state.velocities) fastest = std::max(fastest, v.squaredNorm());
+  return std::sqrt(fastest);
+}
+
+void fitMaps(const WorldBody& body, const Vec3* positions, std::vector<ContactMap>& maps) {
+  const MatchInput in = matchInput(*body.model, body.state);
+  maps.resize(in.clusters.size());
+  for (Index c = 0; c < in.clusters.size(); ++c) maps[c] = fitMap(in, c, positions, body.state.poses[c]);
+}
+
+}  // namespace
+
+ContactModel::ContactModel(BodyModelPtr of_model)
+    : model(std::move(of_model)), shape(model->surface, rowsOf(*model), model->spacing) {
+  for (std::size_t i = 0; i < model->masses.size(); ++i)
+    inverse_masses.push_back(model->fixed[i] ? 0.0 : 1.0 / model->masses[i]);
+}
+
+const ContactModel& World::Impl::contactModel(WorldBody& body) {
+  if (body.contact && body.contact->model == body.model) return *body.contact;
+  std::weak_ptr<const ContactModel>& known = contact_models[body.model.get()];
+  std::shared_ptr<const ContactModel> contact = known.lock();
+  if (!contact || contact->model != body.model) {
+    contact = std::make_shared<ContactModel>(body.model);
+    known = contact;
+    ++report.contact_shapes;
+    if (contact_models.size() > 2 * bodies.size() + kKeptModels)
+      for (auto it = contact_models.begin(); it != contact_models.end();)
+        it = it->second.expired() ? contact_models.erase(it) : std::next(it);
+  }
+  body.contact = std::move(contact);
+  return *body.contact;
+}
+
+// Who is where, which pairs can touch, and what they need for it: nothing for those that nobody is near. Whom something
+// reaches wakes, and then its neighbours are looked at as well.
+void World::Impl::findContacts(double h_frame, double h) {
+  ContactScene scene;
+  scene.ground = settings.ground;
+  scene.ground_friction = settings.ground_friction;
+  scene.gravity = settings.gravity;
+  for (;;) {
+    fillParties();
+    contacts.findPairs(scene, parties, h_frame, report.contact_counters);
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+      if (contacts.needed()[b]) equipParty(*bodies[b], parties[b], contacts.needed()[b] & 1);
+    contacts.make(parties, h_frame, h, report.contact_counters);
+    bool woken = false;
+    for (Index p : contacts.reached()) {
+      woken = woken || bodies[p]->asleep;
+      wake(*bodies[p]);
+    }
+    if (!woken) return;
+    listAwake();
+  }
+}
+
+void World::Impl::fillParties() {
+  parties.resize(bodies.size());
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    WorldBody& body = *bodies[b];
+    ContactParty& party = parties[b];
+    party = ContactParty();
+    party.key = body.number;
+    party.moves = !body.asleep;
+    party.mass = body.model->mass;
+    party.friction = body.material.friction;
+    party.positions = body.state.positions.data();
+    party.particles = static_cast<Index>(body.state.positions.size());
+    party.masses = body.model->masses.data();
+    if (body.asleep) {
+      party.bounds = body.bounds;
+      continue;
+    }
+    party.rigid_share =
+        body.model->any_fixed || body.material.elastic() ? 0.0 : std::max(kLeastRigid, body.material.alpha);
+    double fastest = 0.0;
+    for (std::size_t i = 0; i < party.particles; ++i) {
+      party.bounds.extend(body.state.positions[i]);
+      fastest = std::max(fastest, body.state.velocities[i].squaredNorm());
+    }
+    party.speed = std::sqrt(fastest);
+    if (!body.model->binding.riders.empty()) {  // riders reach beyond the particles
+      party.bounds.min.array() -= 2.0 * body.model->spacing;
+      party.bounds.max.array() += 2.0 * body.model->spacing;
+    }
+    body.bounds = party.bounds;
+    if (body.model->surface.vertices.empty()) party.bounds = Box();  // nothing to touch with
+  }
+}
+
+void World::Impl::equipParty(WorldBody& body, ContactParty& party, bool meets_bodies) {
+  const ContactModel& model = contactModel(body);
+  party.shape = &model.shape;
+  party.inverse_masses = model.inverse_masses.data();
+  if (model.shape.rides()) {
+    refreshSurface(body);
+    party.surface = body.state.surface.data();
+  }
+  if (meets_bodies) {
+    fitMaps(body, party.positions, body.maps);
+    party.maps = body.maps.data();
+    party.map_count = static_cast<Index>(body.maps.size());
+  }
+}
+
+void World::Impl::solveContacts(double h) {
+  for (std::size_t b = 0; b < bodies.size(); ++b)
+    parties[b].previous = bodies[b]->asleep ? parties[b].positions : bodies[b]->scratch.previous.data();
+  const RefitMaps refit = [this](Index p, bool before, std::vector<ContactMap>& maps) {
+    WorldBody& body = *bodies[p];
+    fitMaps(body, before ? parties[p].previous : parties[p].positions, maps);
+    if (!before && parties[p].surface && !body.asleep) {
+      updateSurface(*body.model, body.state);
+      parties[p].surface = body.state.surface.data();
+    }
+  };
+  contacts.solve(parties, h, refit, report.contact_counters);
+  report.ground_contacts += contacts.groundLoaded();
+}
+
+// What the sweeps leave below the ground, and what is there between the points that contacts hold, is lifted for the
+// eye: particles without a change of speed, riders by the offsets that fade.
+void World::Impl::liftOutOfGround(WorldBody& body, double h_frame) {
+  const SurfaceBinding& binding = body.model->binding;
+  if (!settings.ground || !(body.bounds.min.z() - 2.0 * h_frame * speedOf(body) < *settings.ground)) return;
+  for (Index i : binding.particle)
+    if (i != kNoIndex && body.state.positions[i].z() < *settings.ground && !body.model->fixed[i])
+      body.state.positions[i].z() = *settings.ground;
+  if (binding.riders.empty()) return;
+  findLow(body, h_frame);
+  body.low_current = false;
+  if (body.low_riders.empty()) return;
+  fitClusters(matchInput(*body.model, body.state), body.state.positions, binding.lever_clusters, body.state.poses);
+  for (Index r : body.low_riders) {
+    const double z =
+        riderPosition(binding, body.state.positions, body.state.poses, r).z() + body.state.rider_offsets[r].z();
+    if (z < *settings.ground) body.state.rider_offsets[r].z() += *settings.ground - z;
+  }
+}
+
+}  // namespace meshless
