@@ -14,6 +14,8 @@ endfunction()
 set(truth_sources ${CMAKE_CURRENT_SOURCE_DIR}/bench/static_load.cpp ${CMAKE_CURRENT_SOURCE_DIR}/bench/truth_case.cpp
     ${CMAKE_CURRENT_SOURCE_DIR}/bench/laws.cpp)
 
+set(pile_sources ${CMAKE_CURRENT_SOURCE_DIR}/bench/contact_pile.cpp)
+
 if(MESHLESS_SURGERY_SANITIZE)  # the core and its tests alone
   return()
 endif()

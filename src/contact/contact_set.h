@@ -38,6 +38,7 @@ struct IslandPlan {
   std::vector<Index> contacts, contact_offsets;  // in their order within an island
   std::vector<Index> parties, party_offsets;     // those that move
   std::vector<Index> shifts;                     // one a party: where its particles' shifts begin; kNoIndex: none
+  std::vector<int> passes;                       // one an island: sweeps in a substep
 
   Index size() const { return contact_offsets.empty() ? 0 : static_cast<Index>(contact_offsets.size() - 1); }
   void make(const std::vector<ContactParty>& parties, const std::vector<Contact>& contacts);

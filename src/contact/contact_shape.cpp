@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 #include <unordered_map>
 
 #include "meshless_surgery/geometry/nearest_on_triangle.h"
@@ -278,26 +279,31 @@ bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
   return found.triangle != kNoIndex;
 }
 
-bool ContactShape::trace(const Vec3& from, const Vec3& to, Hit& hit) const {
-  const Vec3 way = to - from;
-  if (!way.allFinite()) return false;
-  Box box;
-  box.extend(from);
-  box.extend(to);
-  hit = Hit();
-  double first = 1.0;
-  visitBins(box, [&](Index t) {
-    double time;
-    std::array<double, 3> weights;
-    if (!meets(surface_, t, from, way, time, weights) || !(time >= 0.0 && time <= first)) return;
-    const Triangle& c = surface_.triangles[t];
-    const Vec3& a = surface_.vertices[c[0]];
-    if (!((surface_.vertices[c[1]] - a).cross(surface_.vertices[c[2]] - a).dot(way) < 0.0)) return;  // from behind
-    if (time == first && hit.triangle != kNoIndex && t > hit.triangle) return;
-    first = time;
-    hit = {t, weights, time};
+Index ContactShape::across(Index triangle, int corner) const {
+  std::call_once(linked_, [this] {
+    struct Edge {
+      Index low, high, triangle;
+      int corner;
+    };
+    std::vector<Edge> edges;
+    edges.reserve(3 * surface_.triangles.size());
+    for (Index t = 0; t < surface_.triangles.size(); ++t)
+      for (int k = 0; k < 3; ++k) {
+        const Index a = surface_.triangles[t][(k + 1) % 3], b = surface_.triangles[t][(k + 2) % 3];
+        edges.push_back({std::min(a, b), std::max(a, b), t, k});
+      }
+    std::sort(edges.begin(), edges.end(), [](const Edge& p, const Edge& q) {
+      return std::tie(p.low, p.high, p.triangle) < std::tie(q.low, q.high, q.triangle);
+    });
+    across_.assign(surface_.triangles.size(), {kNoIndex, kNoIndex, kNoIndex});
+    for (std::size_t k = 0; k + 1 < edges.size(); ++k) {
+      const Edge &e = edges[k], &f = edges[k + 1];
+      if (e.low != f.low || e.high != f.high) continue;
+      across_[e.triangle][e.corner] = f.triangle;
+      across_[f.triangle][f.corner] = e.triangle;
+    }
   });
-  return hit.triangle != kNoIndex;
+  return across_[triangle][corner];
 }
 
 // How far it is from a point on the surface to the other side.

@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kLetOutShare = 0.3;  // of old overlap, a frame
 constexpr double kLetOutSpeed = 1.0;  // [1/s] times the smaller body's size, at most
+constexpr double kCaughtSpeed = 10.0;  // [1/s] likewise, of what has passed through
 constexpr double kBeside = 0.02;      // barycentric: farther off its triangle a point does not touch it from outside
 constexpr double kFarBeside = 1.0;    // nor from inside
 
@@ -31,9 +32,10 @@ Mat3 inverseInertia(const Mat3& inertia) {
 // A party's motion as a whole by the impulses of the sweeps, added to its particles after them.
 struct Rigid {
   Vec3 centre = Vec3::Zero();
-  Mat3 inverse_inertia = Mat3::Zero();  // [1/(kg m^2)] times the rigid share
-  double inverse_mass = 0.0;            // [1/kg] times the rigid share
-  double local_share = 0.0;             // 1 - rigid share; 0 where nothing moves
+  Mat3 inverse_inertia = Mat3::Zero();  // [1/(kg m^2)]
+  double inverse_mass = 0.0;            // [1/kg]
+  double share = 0.0;                   // of an impulse, that moves it as a whole; 0 where it is held
+  bool moves = false;
   Vec3 shift = Vec3::Zero();            // [m]
   Vec3 turn = Vec3::Zero();             // [rad]
 };
@@ -41,19 +43,20 @@ struct Rigid {
 // What does not change about a contact during the sweeps of a substep.
 struct Row {
   Vec3 normal, lever_a, lever_b;
-  Vec3 arm_a, arm_b;           // [1/(kg m)] turn of each party by a unit impulse along the normal
+  Vec3 arm_a, arm_b;           // [1/(kg m)] turn of each party by a unit impulse along the normal, with its share
   Vec3 slip;                   // [m] tangential, before the sweeps
   double distance, target;     // [m]
   double inverse_answer, inverse_answer_along;  // [kg]
   double friction;
-  double share_a, share_b;     // local shares
+  double rigid_a, rigid_b;     // shares of an impulse that move the parties as a whole; the rest moves particles
   Contact* contact;
   bool on_ground, active;
 };
 
 Rigid rigidOf(const ContactParty& party) {
   Rigid rigid;
-  rigid.local_share = 1.0 - party.rigid_share;
+  rigid.moves = true;
+  rigid.share = party.rigid_share;
   if (!(party.rigid_share > 0.0)) return rigid;
   Vec3 sum = Vec3::Zero();
   double xx = 0, yy = 0, zz = 0, xy = 0, yz = 0, zx = 0;
@@ -79,8 +82,8 @@ Rigid rigidOf(const ContactParty& party) {
   Mat3 inertia;
   inertia << yy + zz, -xy, -zx, -xy, xx + zz, -yz, -zx, -yz, xx + yy;
   rigid.centre = origin + offset;
-  rigid.inverse_inertia = party.rigid_share * inverseInertia(inertia);
-  rigid.inverse_mass = party.rigid_share / party.mass;
+  rigid.inverse_inertia = inverseInertia(inertia);
+  rigid.inverse_mass = 1.0 / party.mass;
   return rigid;
 }
 
@@ -159,9 +162,10 @@ bool readGap(const ContactScene& scene, const std::vector<ContactParty>& parties
 }
 
 // How a body answers an impulse at a lever, along a direction [1/kg].
-double mobility(const Rigid& rigid, const Vec3& lever, double local, const Vec3& along) {
+double mobility(const Rigid& rigid, double share, const Vec3& lever, double local, const Vec3& along) {
+  if (!rigid.moves) return 0.0;
   const Vec3 arm = lever.cross(along);
-  return rigid.local_share * local + rigid.inverse_mass + arm.dot(rigid.inverse_inertia * arm);
+  return (1.0 - share) * local + share * (rigid.inverse_mass + arm.dot(rigid.inverse_inertia * arm));
 }
 
 const Rigid kStill{};
@@ -221,19 +225,19 @@ struct ContactSolver::Impl {
     Rigid& a = rigid[c.a];
     const Vec3 across = impulse - along_normal * row.normal;
     const bool turns = !across.isZero(0.0);
-    give(c, true, row.share_a, impulse);
-    if (a.inverse_mass > 0.0) {
-      a.shift += a.inverse_mass * impulse;
+    if (row.rigid_a < 1.0) give(c, true, 1.0 - row.rigid_a, impulse);
+    if (row.rigid_a > 0.0) {
+      a.shift += (row.rigid_a * a.inverse_mass) * impulse;
       a.turn += along_normal * row.arm_a;
-      if (turns) a.turn += a.inverse_inertia * row.lever_a.cross(across);
+      if (turns) a.turn += row.rigid_a * (a.inverse_inertia * row.lever_a.cross(across));
     }
     if (row.on_ground) return;
     Rigid& b = rigid[c.b];
-    give(c, false, row.share_b, -impulse);
-    if (b.inverse_mass > 0.0) {
-      b.shift -= b.inverse_mass * impulse;
+    if (row.rigid_b < 1.0) give(c, false, 1.0 - row.rigid_b, -impulse);
+    if (row.rigid_b > 0.0) {
+      b.shift -= (row.rigid_b * b.inverse_mass) * impulse;
       b.turn -= along_normal * row.arm_b;
-      if (turns) b.turn -= b.inverse_inertia * row.lever_b.cross(across);
+      if (turns) b.turn -= row.rigid_b * (b.inverse_inertia * row.lever_b.cross(across));
     }
   }
 
@@ -295,13 +299,15 @@ struct ContactSolver::Impl {
     row.normal = c.normal;
     row.lever_a = gap.point_a - a.centre;
     row.lever_b = gap.point_b - b.centre;
-    row.share_a = a.local_share;
-    row.share_b = b.local_share;
+    // What has passed through is stopped as a whole: its points alone would be left behind.
+    row.rigid_a = c.caught && a.share > 0.0 ? 1.0 : a.share;
+    row.rigid_b = c.caught && b.share > 0.0 ? 1.0 : b.share;
     const Vec3 turned_a = row.lever_a.cross(c.normal), turned_b = row.lever_b.cross(c.normal);
-    row.arm_a = a.inverse_inertia * turned_a;
-    row.arm_b = b.inverse_inertia * turned_b;
-    const double answer = a.local_share * gap.local_a + b.local_share * gap.local_b + a.inverse_mass + b.inverse_mass +
-                          turned_a.dot(row.arm_a) + turned_b.dot(row.arm_b);
+    row.arm_a = row.rigid_a * (a.inverse_inertia * turned_a);
+    row.arm_b = row.rigid_b * (b.inverse_inertia * turned_b);
+    const double answer = (1.0 - row.rigid_a) * gap.local_a + (1.0 - row.rigid_b) * gap.local_b +
+                          row.rigid_a * a.inverse_mass + row.rigid_b * b.inverse_mass + turned_a.dot(row.arm_a) +
+                          turned_b.dot(row.arm_b);
     if (!(answer > 0.0) || !std::isfinite(answer)) return false;
     row.inverse_answer = 1.0 / answer;
     row.distance = c.normal.dot(gap.point_a - gap.point_b);
@@ -332,7 +338,7 @@ void ContactSolver::solve(const ContactScene& scene, const std::vector<ContactPa
       const double before = row.distance - c.normal.dot(gap.motion);
       if (c.direct && !row.on_ground) {
         const double least = std::min({c.weights[0], c.weights[1], c.weights[2]});
-        if (least < (before > 0.0 && !c.caught ? -kBeside : -kFarBeside)) continue;
+        if (!c.caught && least < (before > 0.0 ? -kBeside : -kFarBeside)) continue;
       }
       row.target = std::min(0.0, before);
       row.slip = gap.motion - c.normal.dot(gap.motion) * c.normal;
@@ -347,8 +353,10 @@ void ContactSolver::solve(const ContactScene& scene, const std::vector<ContactPa
         const Rigid& a = parties[c.a].moves ? w.rigid[c.a] : kStill;
         const Rigid& b = row.on_ground || !parties[c.b].moves ? kStill : w.rigid[c.b];
         const double answer =
-            std::max(mobility(a, row.lever_a, gap.local_a, along) + mobility(b, row.lever_b, gap.local_b, along),
-                     mobility(a, row.lever_a, gap.local_a, across) + mobility(b, row.lever_b, gap.local_b, across));
+            std::max(mobility(a, row.rigid_a, row.lever_a, gap.local_a, along) +
+                         mobility(b, row.rigid_b, row.lever_b, gap.local_b, along),
+                     mobility(a, row.rigid_a, row.lever_a, gap.local_a, across) +
+                         mobility(b, row.rigid_b, row.lever_b, gap.local_b, across));
         if (answer > 0.0) row.inverse_answer_along = 1.0 / answer;
       }
       // From where the last substep ended: stacks converge over substeps, not within one.
@@ -362,7 +370,7 @@ void ContactSolver::solve(const ContactScene& scene, const std::vector<ContactPa
       w.rows.push_back(row);
     }
     const std::size_t count = w.rows.size();
-    for (int pass = 0; pass < scene.passes; ++pass)
+    for (int pass = 0; pass < plan.passes[island]; ++pass)
       for (std::size_t n = 0; n < count; ++n) {
         const Row& row = w.rows[pass % 2 ? count - 1 - n : n];
         Contact& c = *row.contact;
@@ -401,14 +409,17 @@ void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactP
       Gap gap;
       if (!readGap(scene, parties, c, entries, false, gap)) continue;
       if (!(c.normal.dot(gap.point_a - gap.point_b) < 0.0)) continue;
-      if (c.direct && c.b != kNoIndex && std::min({c.weights[0], c.weights[1], c.weights[2]}) < -kFarBeside) continue;
+      if (c.direct && c.b != kNoIndex && !c.caught &&
+          std::min({c.weights[0], c.weights[1], c.weights[2]}) < -kFarBeside)
+        continue;
       Row row;
       if (w.rows.empty()) w.begin(island);
       if (!w.prepare(c, false, gap, row)) continue;
       double size = parties[c.a].shape->size();
       if (!row.on_ground) size = std::min(size, parties[c.b].shape->size());
       const double old = -row.distance;
-      row.target = std::min(kLetOutShare * old, kLetOutSpeed * size * h) - old;
+      row.target = c.caught ? std::min(old, kCaughtSpeed * size * h) - old
+                            : std::min(kLetOutShare * old, kLetOutSpeed * size * h) - old;
       w.rows.push_back(row);
     }
     if (w.rows.empty()) continue;

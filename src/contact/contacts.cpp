@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "cell_table.h"
 #include "contact_set.h"
 
 namespace meshless {
@@ -16,13 +17,17 @@ constexpr int kMostLookups = 3;
 constexpr Index kFewMaps = 8;           // so many are searched one by one
 constexpr double kExitTime = 1.0;       // [s] in which one body is let out of another
 constexpr double kExitDeep = 0.05;      // of the size: how deep the deepest point is at the least
+constexpr double kBesidePath = 1e-6;    // barycentric: no path slips between two triangles
+constexpr double kLongestStep = 0.5;    // of the smaller body's extent: how far quick bodies go in a substep
+constexpr int kCaughtPasses = 24;       // of an island in which something was caught: it has to stop at once
+constexpr int kMostSlides = 8;          // triangles that a caught point goes on in a substep
 constexpr double kSameShare = 0.8;      // of points inside each other, both ways: bodies at the same place
 
 struct Pair {
   Index a, b;
   double reach;  // [m] how far outside a point is taken as a contact to come
   bool quick;    // looked up anew in every substep
-  bool fast;     // and its paths traced
+  double way;   // [m/s] at which its bodies move, at most
 };
 
 /// The cluster whose centre is nearest: a grid over the centres.
@@ -172,6 +177,34 @@ Box grown(Box box, double by) {
   return box;
 }
 
+// What a sweep leaves spreads through a stack as heat does, and grows with the fall in a substep: so much
+// work do stacks need to stand (found with towers of cubes, see docs/method.md).
+constexpr double kStackWork = 4.75;
+constexpr double kMostPasses = 4.0;  // beyond it substeps do more
+constexpr int kFewSubsteps = 4;      // below it two sweeps, there and back
+
+/// Sweeps in a frame of h [s] for an island.
+double stackWork(const ContactScene& scene, const std::vector<ContactParty>& parties, const IslandPlan& plan,
+                 Index island, double h) {
+  const double gravity = scene.gravity.norm();
+  if (!(gravity > 0.0)) return 0.0;
+  const Vec3 up = -scene.gravity / gravity;
+  double low = std::numeric_limits<double>::infinity(), high = -low, size = 0.0;
+  for (Index k = plan.party_offsets[island]; k < plan.party_offsets[island + 1]; ++k) {
+    const ContactParty& party = parties[plan.parties[k]];
+    const Vec3 centre = 0.5 * (party.bounds.min + party.bounds.max);
+    const double reach = 0.5 * up.cwiseAbs().dot(party.bounds.max - party.bounds.min);
+    low = std::min(low, up.dot(centre) - reach);
+    high = std::max(high, up.dot(centre) + reach);
+    size += party.shape->size();
+  }
+  const Index count = plan.party_offsets[island + 1] - plan.party_offsets[island];
+  if (count < 2 || !(size > 0.0)) return 0.0;
+  size /= count;
+  const double layers = std::max(1.0, (high - low) / size);
+  return kStackWork * h * std::sqrt(gravity / size) * std::min(layers * layers, 1e4);
+}
+
 using PairKey = std::pair<std::uint64_t, std::uint64_t>;
 
 /// What passed through and is still on the wrong side.
@@ -198,7 +231,7 @@ struct Contacts::Impl {
   std::vector<Pair> pairs;
   std::vector<Index> grounded;  // parties that can meet the ground
   std::vector<MapFinder> finders;
-  std::vector<std::vector<ContactMap>> maps_now, maps_before;  // of those in quick pairs
+  std::vector<std::vector<ContactMap>> maps_now;  // of those in quick pairs
   std::vector<Contact> contacts, last;  // of this frame and of the one before
   std::vector<ContactEntry> entries;
   std::size_t steady_contacts = 0, steady_entries = 0;  // those found once a frame; quick ones follow
@@ -206,6 +239,8 @@ struct Contacts::Impl {
   std::map<PairKey, Exit> exits;
   std::vector<double> depths;
   std::vector<Index> reached;
+  int needed_substeps = 1;
+  double frame = 0.0;  // [s]
   ContactSolver solver;
   IslandPlan plan;
   bool plan_steady = true;  // the plan is that of the steady contacts alone
@@ -222,8 +257,10 @@ struct Contacts::Impl {
   void lookInto(const std::vector<ContactParty>& parties, const Pair& pair, Index a, Index b, const ContactMap* maps,
                 bool every_point, Inside& inside, ContactCounters& counters);
   void trace(const std::vector<ContactParty>& parties, Index a, Index b, ContactCounters& counters);
+  void addCaught(const std::vector<ContactParty>& parties);
   void addGround(const std::vector<ContactParty>& parties, Index a, double reach);
   void takeOver();
+  void choosePasses(const std::vector<ContactParty>& parties, double substep);
   bool letOutWhole(const std::vector<ContactParty>& parties, const Pair& pair, const Inside& of_a, const Inside& of_b,
                    double h, ContactCounters& counters);
 };
@@ -234,6 +271,7 @@ Contacts::Contacts(Contacts&&) noexcept = default;
 Contacts& Contacts::operator=(Contacts&&) noexcept = default;
 
 const std::vector<char>& Contacts::needed() const { return impl_->needed; }
+int Contacts::neededSubsteps() const { return impl_->needed_substeps; }
 const std::vector<Index>& Contacts::reached() const { return impl_->reached; }
 const std::vector<double>& Contacts::depths() const { return impl_->depths; }
 
@@ -243,6 +281,7 @@ void Contacts::clear() {
   impl_->contacts.clear();
   impl_->last.clear();
   impl_->reached.clear();
+  impl_->needed_substeps = 1;
   impl_->depths.clear();
 }
 
@@ -266,7 +305,7 @@ void Contacts::findPairs(const ContactScene& scene, const std::vector<ContactPar
     const auto& found = w.broad.find(w.boxes, w.active);
     counters.bounds_tested += w.broad.tested();
     for (const auto& pair : found) {
-      w.pairs.push_back({pair[0], pair[1], 0.0, false, false});
+      w.pairs.push_back({pair[0], pair[1], 0.0, false, 0.0});
       w.needed[pair[0]] = w.needed[pair[1]] = 1;
     }
     counters.pairs += found.size();
@@ -389,32 +428,132 @@ void Contacts::Impl::lookInto(const std::vector<ContactParty>& parties, const Pa
   }
 }
 
-// Paths of the substep through the rest shape, and what was caught before.
+// Points of a that a triangle of b swept over in this substep, from its front: who has passed through is remembered.
 void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, Index b, ContactCounters& counters) {
   const ContactParty &of = parties[a], &with = parties[b];
   const ContactShape& shape = *with.shape;
-  if (shape.surface().triangles.empty() || with.map_count == 0) return;
   const std::vector<ContactSample>& samples = of.shape->samples();
-  MapFinder before;
-  before.make(maps_before[b].data(), static_cast<Index>(maps_before[b].size()));
-  const double enough = kQuick * shape.thickness();
+  const std::vector<Triangle>& triangles = shape.surface().triangles;
+  if (triangles.empty()) return;
+  struct Path {
+    Vec3 from, to;
+  };
+  std::vector<Path> paths(samples.size());
+  Box box_a, box_b;
   for (Index s = 0; s < samples.size(); ++s) {
-    if (caught.count({of.key, with.key, s})) continue;
     const Vec3 p = sampleAt(of, samples[s]);
     Vec3 motion = vertexMotion(of, samples[s].vertices[0]);
-    if (samples[s].share > 0.0)
-      motion += samples[s].share * (vertexMotion(of, samples[s].vertices[1]) - motion);
-    const Vec3 p0 = p - motion;
-    const Index m1 = finders[b].nearest(p);
-    const ContactMap &map1 = maps_now[b][m1], &map0 = maps_before[b][before.nearest(p0)];
-    const Vec3 to = map1.to_rest * (p - map1.centre) + map1.rest;
-    const Vec3 from = map0.to_rest * (p0 - map0.centre) + map0.rest;
-    if (!((to - from).squaredNorm() > enough * enough)) continue;
+    if (samples[s].share > 0.0) motion += samples[s].share * (vertexMotion(of, samples[s].vertices[1]) - motion);
+    paths[s] = {p - motion, p};
+    if (!p.allFinite() || !motion.allFinite()) continue;
+    box_a.extend(p);
+    box_a.extend(p - motion);
+  }
+  std::vector<Path> corners(shape.surface().vertices.size());
+  for (Index v = 0; v < corners.size(); ++v) {
+    const Vec3 q = vertexAt(with, v);
+    corners[v] = {q - vertexMotion(with, v), q};
+  }
+  std::vector<Index> near;
+  double size = 0.0;
+  const auto sweptBox = [&](Index t) {
+    Box box;
+    for (Index v : triangles[t]) {
+      box.extend(corners[v].from);
+      box.extend(corners[v].to);
+    }
+    return box;
+  };
+  for (Index t = 0; t < triangles.size(); ++t) {
+    const Box box = sweptBox(t);
+    if (!box.overlaps(box_a)) continue;
+    near.push_back(t);
+    box_b.extend(box.min);
+    box_b.extend(box.max);
+    size += (box.max - box.min).maxCoeff();
+  }
+  if (near.empty() || !(size > 0.0)) return;
+  const Box region = intersection(box_a, box_b);
+  static thread_local CellTable table;
+  table.start(region, size / static_cast<double>(near.size()), 4 * near.size());
+  for (Index k = 0; k < near.size(); ++k) {
+    const CellRange range = table.cellsOf(sweptBox(near[k]));
+    Cell cell;
+    for (cell[0] = range.first[0]; cell[0] <= range.last[0]; ++cell[0])
+      for (cell[1] = range.first[1]; cell[1] <= range.last[1]; ++cell[1])
+        for (cell[2] = range.first[2]; cell[2] <= range.last[2]; ++cell[2]) table.insert(cell, near[k]);
+  }
+  for (Index s = 0; s < samples.size(); ++s) {
+    if (caught.count({of.key, with.key, s})) continue;
+    const Path& path = paths[s];
+    Box box;
+    box.extend(path.from);
+    box.extend(path.to);
+    if (!box.overlaps(region)) continue;
     ++counters.traced;
-    ContactShape::Hit hit;
-    if (!shape.trace(from, to, hit)) continue;
+    double first = 2.0;
+    Index hit = kNoIndex;
+    table.forEach(table.cellsOf(box), [&](Index t) {
+      const Path &p0 = corners[triangles[t][0]], &p1 = corners[triangles[t][1]], &p2 = corners[triangles[t][2]];
+      const Vec3 n0 = (p1.from - p0.from).cross(p2.from - p0.from), n1 = (p1.to - p0.to).cross(p2.to - p0.to);
+      const double h0 = n0.dot(path.from - p0.from), h1 = n1.dot(path.to - p0.to);
+      if (!(h0 >= 0.0) || !(h1 < 0.0)) return;
+      const double d0 = h0 / n0.norm(), d1 = h1 / n1.norm();
+      const double time = d0 / (d0 - d1);
+      if (!(time < first) && !(time == first && t < hit)) return;
+      const auto then = [time](const Path& q) -> Vec3 { return q.from + time * (q.to - q.from); };
+      const Vec3 q = then(p0), e1 = then(p1) - q, e2 = then(p2) - q, d = then(path) - q;
+      const Vec3 area = e1.cross(e2);
+      const double squared = area.squaredNorm();
+      const double v = d.cross(e2).dot(area) / squared, w = e1.cross(d).dot(area) / squared;
+      if (!(v >= -kBesidePath) || !(w >= -kBesidePath) || !(v + w <= 1.0 + kBesidePath)) return;
+      first = time;
+      hit = t;
+    });
+    if (hit == kNoIndex) continue;
     ++counters.caught;
-    caught[{of.key, with.key, s}] = hit.triangle;
+    caught[{of.key, with.key, s}] = hit;
+  }
+}
+
+// Contacts of those that have passed through: with the triangle that they slid to, until they are back outside.
+void Contacts::Impl::addCaught(const std::vector<ContactParty>& parties) {
+  std::map<std::uint64_t, Index> by_key;
+  for (Index p = 0; p < parties.size(); ++p) by_key[parties[p].key] = p;
+  for (auto it = caught.begin(); it != caught.end();) {
+    const auto a = by_key.find(it->first.a), b = by_key.find(it->first.b);
+    bool over = a == by_key.end() || b == by_key.end();
+    over = over || !parties[a->second].shape || !parties[b->second].shape ||
+           it->first.sample >= parties[a->second].shape->samples().size() ||
+           it->second >= parties[b->second].shape->surface().triangles.size();
+    if (!over) {
+      const ContactParty &of = parties[a->second], &with = parties[b->second];
+      const ContactShape& shape = *with.shape;
+      const Vec3 p = sampleAt(of, of.shape->samples()[it->first.sample]);
+      std::array<double, 3> weights{};
+      for (int step = 0;; ++step) {
+        const Triangle& corners = shape.surface().triangles[it->second];
+        const Vec3 q0 = vertexAt(with, corners[0]);
+        const Vec3 e1 = vertexAt(with, corners[1]) - q0, e2 = vertexAt(with, corners[2]) - q0, d = p - q0;
+        const Vec3 area = e1.cross(e2);
+        const double squared = area.squaredNorm();
+        const double v = d.cross(e2).dot(area) / squared, w = e1.cross(d).dot(area) / squared;
+        weights = {1.0 - v - w, v, w};
+        over = !(area.dot(d) < 0.0);
+        const int corner = static_cast<int>(std::min_element(weights.begin(), weights.end()) - weights.begin());
+        if (over || weights[corner] >= 0.0 || step == kMostSlides) break;
+        const Index next = shape.across(it->second, corner);
+        // Not round an edge: there the next one looks another way, and the point is in front of it.
+        if (next == kNoIndex) break;
+        const Triangle& turned = shape.surface().triangles[next];
+        const Vec3 r0 = vertexAt(with, turned[0]);
+        const Vec3 other = (vertexAt(with, turned[1]) - r0).cross(vertexAt(with, turned[2]) - r0);
+        if (!(other.dot(area) > 0.0) || !(other.dot(p - r0) < 0.0)) break;
+        it->second = next;
+      }
+      if (!over) addContact(parties, a->second, it->first.sample, b->second, it->second, weights, true, false);
+    }
+    it = over ? caught.erase(it) : std::next(it);
   }
 }
 
@@ -428,6 +567,19 @@ void Contacts::Impl::addGround(const std::vector<ContactParty>& parties, Index a
     if (!(z < below)) continue;
     addContact(parties, a, s, kNoIndex, kNoIndex, {}, false, false);
     if (z < *scene.ground) depths.push_back((*scene.ground - z) / party.shape->size());
+  }
+}
+
+void Contacts::Impl::choosePasses(const std::vector<ContactParty>& parties, double substep) {
+  plan.passes.resize(plan.size());
+  const double substeps = std::max(1.0, std::round(frame / substep));
+  const int least = substeps < kFewSubsteps ? 2 : 1;
+  for (Index island = 0; island < plan.size(); ++island) {
+    const double work = stackWork(scene, parties, plan, island, frame) / substeps;
+    plan.passes[island] = std::max(least, static_cast<int>(std::ceil(std::min(work, kMostPasses))));
+    if (caught.empty()) continue;
+    for (Index k = plan.contact_offsets[island]; k < plan.contact_offsets[island + 1]; ++k)
+      if (contacts[plan.contacts[k]].caught) plan.passes[island] = kCaughtPasses;
   }
 }
 
@@ -506,7 +658,7 @@ bool Contacts::Impl::letOutWhole(const std::vector<ContactParty>& parties, const
   return true;
 }
 
-void Contacts::make(const std::vector<ContactParty>& parties, double h, double substep, ContactCounters& counters) {
+void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactCounters& counters) {
   Impl& w = *impl_;
   if (w.reached.empty()) w.last.swap(w.contacts);
   w.contacts.clear();
@@ -515,7 +667,6 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, double s
   if (w.finders.size() < parties.size()) {
     w.finders.resize(parties.size());
     w.maps_now.resize(parties.size());
-    w.maps_before.resize(parties.size());
   }
   for (Index p = 0; p < parties.size(); ++p)
     if (w.needed[p] & 1) w.finders[p].make(parties[p].maps, parties[p].map_count);
@@ -523,6 +674,7 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, double s
   const double falling = w.scene.gravity.norm() * h * h;
   for (Index a : w.grounded)
     w.addGround(parties, a, kMargin * parties[a].shape->size() + parties[a].speed * h + falling);
+  double fastest = 0.0;  // substeps that the fastest quick pair asks for
   for (Pair& pair : w.pairs) {
     const ContactParty &a = parties[pair.a], &b = parties[pair.b];
     const double size = std::min(a.shape->size(), b.shape->size());
@@ -531,7 +683,9 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, double s
     const double most = kQuick * thickness;
     pair.reach = kMargin * size + std::min(way * h + falling, most);
     pair.quick = way * h > most;
-    pair.fast = way * substep > most;
+    pair.way = way;
+    const double step = kLongestStep * std::min((a.bounds.max - a.bounds.min).maxCoeff(), (b.bounds.max - b.bounds.min).maxCoeff());
+    if (pair.quick) fastest = std::max(fastest, way * h / step);
     const std::size_t contacts_before = w.contacts.size(), entries_before = w.entries.size();
     const std::size_t depths_before = w.depths.size();
     Impl::Inside of_a, of_b;
@@ -539,7 +693,7 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, double s
     w.lookInto(parties, pair, pair.b, pair.a, a.maps, false, of_b, counters);
     const bool whole = w.letOutWhole(parties, pair, of_a, of_b, h, counters);
     if (whole) {
-      pair.quick = pair.fast = false;
+      pair.quick = false;
       w.depths.resize(depths_before);
     }
     if (whole) {
@@ -558,9 +712,21 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, double s
   w.reached.erase(std::unique(w.reached.begin(), w.reached.end()), w.reached.end());
   if (!w.reached.empty()) return;  // they wake, and all is looked at anew
   w.takeOver();
+  const std::size_t lasting = w.contacts.size(), lasting_entries = w.entries.size();
+  if (!w.caught.empty()) w.addCaught(parties);
   w.plan.make(parties, w.contacts);
+  w.needed_substeps = std::max(1, w.needed_substeps - 1);  // a stack that bounces apart for a frame is still one
+  if (fastest > 1.0) w.needed_substeps = std::max(w.needed_substeps, static_cast<int>(std::ceil(std::min(fastest, 1e6))));
+  for (Index island = 0; island < w.plan.size(); ++island) {
+    const double work = stackWork(w.scene, parties, w.plan, island, h);
+    w.needed_substeps = std::max(w.needed_substeps, static_cast<int>(std::ceil(work / kMostPasses)));
+  }
+  w.frame = h;
   w.solver.letOut(w.scene, parties, w.contacts, w.entries, w.plan, h, counters);
-  // Quick pairs are looked up again when they have moved.
+  // Quick pairs are looked up again when they have moved, and so is what was caught.
+  const bool any_caught = w.contacts.size() > lasting;
+  w.contacts.resize(lasting);
+  w.entries.resize(lasting_entries);
   std::size_t out = 0;
   bool any_quick = false;
   for (const Pair& pair : w.pairs) any_quick = any_quick || pair.quick;
@@ -572,11 +738,15 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, double s
       if (c.b == kNoIndex || !quick.count({std::min(c.a, c.b), std::max(c.a, c.b)})) w.contacts[out++] = c;
     w.contacts.resize(out);
   }
-  if (any_quick) w.plan.make(parties, w.contacts);
+  if (any_quick || any_caught) {
+    w.plan.make(parties, w.contacts);
+  }
   w.plan_steady = true;
   w.steady_contacts = w.contacts.size();
   w.steady_entries = w.entries.size();
 }
+
+void Contacts::begin(const std::vector<ContactParty>& parties, double substep) { impl_->choosePasses(parties, substep); }
 
 void Contacts::solve(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,
                      ContactCounters& counters) {
@@ -589,17 +759,12 @@ void Contacts::solve(const std::vector<ContactParty>& parties, double substep, c
     if (!pair.quick) continue;
     if (fitted.empty()) fitted.assign(parties.size(), 0);
     for (Index p : {pair.a, pair.b})
-      if (!(fitted[p] & 1)) {
-        refit(p, false, w.maps_now[p]);
+      if (!fitted[p]) {
+        refit(p, w.maps_now[p]);
         w.finders[p].make(w.maps_now[p].data(), static_cast<Index>(w.maps_now[p].size()));
-        fitted[p] |= 1;
+        fitted[p] = 1;
       }
-    if (pair.fast) {
-      for (Index p : {pair.a, pair.b})
-        if (!(fitted[p] & 2)) {
-          refit(p, true, w.maps_before[p]);
-          fitted[p] |= 2;
-        }
+    if (pair.way * substep > kQuick * std::min(parties[pair.a].shape->thickness(), parties[pair.b].shape->thickness())) {
       w.trace(parties, pair.a, pair.b, counters);
       w.trace(parties, pair.b, pair.a, counters);
     }
@@ -617,36 +782,12 @@ void Contacts::solve(const std::vector<ContactParty>& parties, double substep, c
     depths.swap(w.depths);
     counters.contacts += w.contacts.size() - before;
   }
-  if (!w.caught.empty()) {
-    std::map<std::uint64_t, Index> by_key;
-    for (Index p = 0; p < parties.size(); ++p) by_key[parties[p].key] = p;
-    for (auto it = w.caught.begin(); it != w.caught.end();) {
-      const auto a = by_key.find(it->first.a), b = by_key.find(it->first.b);
-      bool over = a == by_key.end() || b == by_key.end();
-      over = over || !parties[a->second].shape || !parties[b->second].shape ||
-             it->first.sample >= parties[a->second].shape->samples().size() ||
-             it->second >= parties[b->second].shape->surface().triangles.size();
-      if (!over) {
-        const ContactParty &of = parties[a->second], &with = parties[b->second];
-        const Triangle& corners = with.shape->surface().triangles[it->second];
-        const Vec3 q0 = vertexAt(with, corners[0]), q1 = vertexAt(with, corners[1]), q2 = vertexAt(with, corners[2]);
-        const Vec3 p = sampleAt(of, of.shape->samples()[it->first.sample]);
-        const Vec3 area = (q1 - q0).cross(q2 - q0);
-        const double squared = area.squaredNorm();
-        over = !(area.dot(p - q0) < 0.0);
-        if (!over) {
-          const double v = (p - q0).cross(q2 - q0).dot(area) / squared, u = (q1 - q0).cross(p - q0).dot(area) / squared;
-          // Far beside its triangle it has gone round.
-          over = std::min({v, u, 1.0 - v - u}) < -2.0;
-          if (!over) w.addContact(parties, a->second, it->first.sample, b->second, it->second, {1.0 - v - u, v, u}, true,
-                                  false);
-        }
-      }
-      it = over ? w.caught.erase(it) : std::next(it);
-    }
-  }
+  if (!w.caught.empty()) w.addCaught(parties);
   const bool steady = w.contacts.size() == w.steady_contacts;
-  if (!steady || !w.plan_steady) w.plan.make(parties, w.contacts);
+  if (!steady || !w.plan_steady) {
+    w.plan.make(parties, w.contacts);
+    w.choosePasses(parties, substep);
+  }
   w.plan_steady = steady;
   w.solver.solve(w.scene, parties, w.contacts, w.entries, w.plan, counters);
 }

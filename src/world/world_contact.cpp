@@ -83,7 +83,7 @@ const ContactModel& World::Impl::contactModel(WorldBody& body) {
 
 // Who is where, which pairs can touch, and what they need for it: nothing for those that nobody is near. Whom something
 // reaches wakes, and then its neighbours are looked at as well.
-void World::Impl::findContacts(double h_frame, double h) {
+void World::Impl::findContacts(double h_frame) {
   ContactScene scene;
   scene.ground = settings.ground;
   scene.ground_friction = settings.ground_friction;
@@ -93,7 +93,7 @@ void World::Impl::findContacts(double h_frame, double h) {
     contacts.findPairs(scene, parties, h_frame, report.contact_counters);
     for (std::size_t b = 0; b < bodies.size(); ++b)
       if (contacts.needed()[b]) equipParty(*bodies[b], parties[b], contacts.needed()[b] & 1);
-    contacts.make(parties, h_frame, h, report.contact_counters);
+    contacts.make(parties, h_frame, report.contact_counters);
     bool woken = false;
     for (Index p : contacts.reached()) {
       woken = woken || bodies[p]->asleep;
@@ -156,10 +156,10 @@ void World::Impl::equipParty(WorldBody& body, ContactParty& party, bool meets_bo
 void World::Impl::solveContacts(double h) {
   for (std::size_t b = 0; b < bodies.size(); ++b)
     parties[b].previous = bodies[b]->asleep ? parties[b].positions : bodies[b]->scratch.previous.data();
-  const RefitMaps refit = [this](Index p, bool before, std::vector<ContactMap>& maps) {
+  const RefitMaps refit = [this](Index p, std::vector<ContactMap>& maps) {
     WorldBody& body = *bodies[p];
-    fitMaps(body, before ? parties[p].previous : parties[p].positions, maps);
-    if (!before && parties[p].surface && !body.asleep) {
+    fitMaps(body, parties[p].positions, maps);
+    if (parties[p].surface && !body.asleep) {
       updateSurface(*body.model, body.state);
       parties[p].surface = body.state.surface.data();
     }

@@ -123,7 +123,7 @@ struct World::Impl {
   void pullSprings(double h, double h_frame);
   void contactBodies(const std::vector<WorldBody*>& near, double h, int stride);
   const ContactModel& contactModel(WorldBody& body);
-  void findContacts(double h_frame, double h);
+  void findContacts(double h_frame);
   void fillParties();
   void equipParty(WorldBody& body, ContactParty& party, bool meets_bodies);
   void solveContacts(double h);

@@ -50,16 +50,17 @@ void World::step() {
     w.closeBlades();
     w.wakePushed(h_frame);
     w.listAwake();
+    const bool rest_shape = w.settings.contact == ContactMethod::kRestShape && !w.awake.empty();
+    if (rest_shape) {
+      const Stopwatch contact(w.report.contact);
+      w.findContacts(h_frame);
+    }
     const int substeps = w.chooseSubsteps(h_frame);
     const double h = h_frame / substeps;
+    if (rest_shape) w.contacts.begin(w.parties, h);
     // What an elastic material needs beyond the scene's substeps is not needed by contacts between bodies.
     const int stride = std::max(1, substeps / w.settings.substeps);
     const std::vector<WorldBody*> near = w.bodiesInContact(h_frame);
-    const bool rest_shape = w.settings.contact == ContactMethod::kRestShape;
-    if (rest_shape && !w.awake.empty()) {
-      const Stopwatch contact(w.report.contact);
-      w.findContacts(h_frame, h);
-    }
     for (Pick& pick : w.picks) pick.force.setZero();
     w.push.force.setZero();
     w.push.touching = false;
@@ -81,7 +82,7 @@ void World::step() {
           body->scratch.touched.clear();
           if (w.push.enabled || (w.settings.ground && !rest_shape)) body->scratch.before_contact = body->state.positions;
         }
-        if (rest_shape && !w.awake.empty())
+        if (rest_shape)
           w.solveContacts(h);
         else if ((substep + 1) % stride == 0 || substep + 1 == substeps)
           w.contactBodies(near, h, stride);
@@ -112,10 +113,12 @@ void World::step() {
 // As many as the stiffest body needs, within the budget; what the budget takes from a body is said once.
 int World::Impl::chooseSubsteps(double h_frame) {
   double needed = settings.substeps;
+  if (settings.contact == ContactMethod::kRestShape && !awake.empty())
+    needed = std::max(needed, static_cast<double>(contacts.neededSubsteps()));
   for (const WorldBody* body : awake)
     needed = std::max(needed, std::ceil(h_frame * highestFrequencyNow(*body->model, body->state)));
   const int most = std::max(settings.substeps, settings.max_substeps);
-  const int substeps = needed < most ? static_cast<int>(needed) : most;
+  const int substeps = needed < most ? static_cast<int>(needed) : most;  // NaN: most
   for (WorldBody* body : awake) {
     const double factor = stiffnessFactor(*body->model, body->state, h_frame / substeps);
     if (factor < 1.0 && !(body->stiffness_factor < 1.0)) {

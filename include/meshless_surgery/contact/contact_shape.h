@@ -1,9 +1,10 @@
-// What contact knows of a body's rest shape: which triangle is nearest to a point in it, what a path through it meets,
-// and at which points of its surface it feels others. Made for a model once, and filled where something comes near.
+// What contact knows of a body's rest shape: which triangle is nearest to a point in it, and at which points of its
+// surface it feels others. Made for a model once, and filled where something comes near.
 #pragma once
 
 #include <atomic>
 #include <memory>
+#include <mutex>
 
 #include "meshless_surgery/geometry/triangle_mesh.h"
 
@@ -44,13 +45,9 @@ class ContactShape {
   /// NaN. Thread-safe.
   bool nearest(const Vec3& rest, Nearest& found) const;
 
-  /// Where the segment from..to first goes through the surface from outside to inside.
-  struct Hit {
-    Index triangle = kNoIndex;
-    std::array<double, 3> weights{};
-    double time = 0.0;  // 0..1 of the way
-  };
-  bool trace(const Vec3& from, const Vec3& to, Hit& hit) const;
+  /// The triangle across the edge that lies against a corner of a triangle; kNoIndex at a border. Made when first asked
+  /// for; thread-safe.
+  Index across(Index triangle, int corner) const;
 
   const TriangleMesh& surface() const { return surface_; }
   const std::vector<ContactSample>& samples() const { return samples_; }
@@ -97,6 +94,8 @@ class ContactShape {
   std::unique_ptr<std::atomic<const Cell*>[]> cells_;
   std::size_t cell_total_ = 0;
   mutable std::atomic<std::size_t> cells_filled_{0};
+  mutable std::once_flag linked_;
+  mutable std::vector<std::array<Index, 3>> across_;
 };
 
 }  // namespace meshless

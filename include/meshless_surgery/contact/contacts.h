@@ -45,11 +45,10 @@ struct ContactScene {
   std::optional<double> ground;  // [m] height along z
   double ground_friction = 0.5;
   Vec3 gravity = Vec3::Zero();   // [m/s^2]
-  int passes = 2;                // over all contacts, a substep: there and back
 };
 
-/// Brings a party's maps up to date with its particles (previous: with where they were before the substep).
-using RefitMaps = std::function<void(Index party, bool previous, std::vector<ContactMap>& maps)>;
+/// Brings a party's maps, and its surface where it has one, up to date with its particles.
+using RefitMaps = std::function<void(Index party, std::vector<ContactMap>& maps)>;
 
 /// Two parties that press on each other; b is kNoIndex for the ground.
 struct LoadedPair {
@@ -70,8 +69,13 @@ class Contacts {
   const std::vector<char>& needed() const;
 
   /// Finds the contacts of the frame, and lets out old overlap: at a bounded speed, without changing velocities.
-  /// substep: [s] of the solve() calls to come.
-  void make(const std::vector<ContactParty>& parties, double h, double substep, ContactCounters& counters);
+  void make(const std::vector<ContactParty>& parties, double h, ContactCounters& counters);
+
+  /// Substeps that the frame asks for, as make() found it: tall stacks and fast bodies that are about to meet; 1 where
+  /// there are none.
+  int neededSubsteps() const;
+  /// Before the first solve() of a frame, of substeps of so many seconds.
+  void begin(const std::vector<ContactParty>& parties, double substep);
 
   /// Parties that do not move, have a mass, and were reached in make() by one that moves; ascending.
   const std::vector<Index>& reached() const;
