@@ -19,11 +19,14 @@ constexpr double kLongEdge = 0.1;       // of the body's least extent: shorter e
 constexpr double kFlatEdge = 0.996;     // cosine between neighbours: about 5 degrees
 constexpr int kMostEdgeSamples = 64;
 constexpr std::size_t kThicknessRays = 48;
+constexpr std::uintptr_t kAsked = 4;    // times that the bins are searched before a cell is filled
 constexpr double kTie = 1e-9;           // relative: two features are equally near
 
 // Of a triangle, what a query needs, side by side in memory.
 struct Facet {
   Vec3 a, ab, ac, normal;
+  Vec3 centre;
+  double radius;
   double g00, g01, g11;  // inverse of the Gram matrix of ab and ac; zero where the triangle has no area
   Index triangle;
 };
@@ -35,6 +38,9 @@ Facet makeFacet(const TriangleMesh& mesh, Index t) {
   f.ab = mesh.vertices[corners[1]] - f.a;
   f.ac = mesh.vertices[corners[2]] - f.a;
   f.normal = f.ab.cross(f.ac).normalized();
+  f.centre = f.a + (f.ab + f.ac) / 3.0;
+  f.radius = std::sqrt(std::max({(f.a - f.centre).squaredNorm(), (f.a + f.ab - f.centre).squaredNorm(),
+                                 (f.a + f.ac - f.centre).squaredNorm()}));
   const double aa = f.ab.squaredNorm(), bb = f.ac.squaredNorm(), ab = f.ab.dot(f.ac);
   const double det = aa * bb - ab * ab;
   const double inverse = det > 1e-24 * aa * bb ? 1.0 / det : 0.0;
@@ -115,11 +121,13 @@ ContactShape::ContactShape(const TriangleMesh& surface, const SurfaceRows& rows,
     cells_count_[d] = static_cast<int>(std::ceil(extent[d] * cells_per_metre_)) + 4;
     cell_total_ *= static_cast<std::size_t>(cells_count_[d]);
   }
-  cells_ = std::make_unique<std::atomic<const Cell*>[]>(cell_total_);
+  cells_ = std::make_unique<std::atomic<std::uintptr_t>[]>(cell_total_);
 }
 
 ContactShape::~ContactShape() {
-  for (std::size_t i = 0; i < cell_total_; ++i) delete cells_[i].load(std::memory_order_relaxed);
+  for (std::size_t i = 0; i < cell_total_; ++i)
+    if (const std::uintptr_t cell = cells_[i].load(std::memory_order_relaxed); cell > kAsked)
+      delete reinterpret_cast<const Cell*>(cell);
 }
 
 std::size_t ContactShape::bytes() const {
@@ -127,10 +135,10 @@ std::size_t ContactShape::bytes() const {
                     surface_.triangles.size() * sizeof(Triangle) + rider_of_.size() * sizeof(Index) +
                     samples_.size() * sizeof(ContactSample) +
                     (bin_offsets_.size() + bin_triangles_.size()) * sizeof(Index) +
-                    cell_total_ * sizeof(std::atomic<const Cell*>);
+                    cell_total_ * sizeof(std::atomic<std::uintptr_t>);
   for (std::size_t i = 0; i < cell_total_; ++i)
-    if (const Cell* cell = cells_[i].load(std::memory_order_acquire))
-      sum += sizeof(Cell) + cell->facets.size() * sizeof(Facet);
+    if (const std::uintptr_t cell = cells_[i].load(std::memory_order_acquire); cell > kAsked)
+      sum += sizeof(Cell) + reinterpret_cast<const Cell*>(cell)->facets.size() * sizeof(Facet);
   return sum;
 }
 
@@ -226,17 +234,84 @@ const ContactShape::Cell* ContactShape::fill(std::size_t index, const std::array
     const Vec3 gap = (b.min - box.max).cwiseMax(box.min - b.max).cwiseMax(0.0);
     if (gap.norm() <= bound) cell->facets.push_back(makeFacet(surface_, t));
   }
+  // Nearest first: the others are then dismissed by their bounds.
+  std::stable_sort(cell->facets.begin(), cell->facets.end(), [&](const Facet& f, const Facet& g) {
+    return distanceToTriangle(surface_, f.triangle, centre) < distanceToTriangle(surface_, g.triangle, centre);
+  });
   cell->facets.shrink_to_fit();
-  const Cell* expected = nullptr;
-  const Cell* made = cell.get();
-  if (cells_[index].compare_exchange_strong(expected, made, std::memory_order_acq_rel)) {
-    cells_filled_.fetch_add(1, std::memory_order_relaxed);
-    return cell.release();
+  const std::uintptr_t made = reinterpret_cast<std::uintptr_t>(cell.get());
+  std::uintptr_t known = cells_[index].load(std::memory_order_acquire);
+  while (known <= kAsked)
+    if (cells_[index].compare_exchange_weak(known, made, std::memory_order_acq_rel)) {
+      cells_filled_.fetch_add(1, std::memory_order_relaxed);
+      return cell.release();
+    }
+  return reinterpret_cast<const Cell*>(known);
+}
+
+namespace {
+
+// The nearest so far.
+struct Best {
+  double squared = std::numeric_limits<double>::infinity();
+  double distance = std::numeric_limits<double>::infinity();
+  double height = 0.0;  // over the plane of its triangle
+
+  void offer(const Facet& f, const Vec3& p, ContactShape::Nearest& found) {
+    const double bound = distance + f.radius;
+    if ((p - f.centre).squaredNorm() > bound * bound * (1.0 + kTie)) return;
+    const Vec3 ap = p - f.a;
+    const double over = f.normal.dot(ap);
+    const double tie = kTie * squared;
+    if (over * over > squared + tie) return;
+    const double d1 = f.ab.dot(ap), d2 = f.ac.dot(ap);
+    const double v = f.g00 * d1 + f.g01 * d2, w = f.g01 * d1 + f.g11 * d2;
+    double here;
+    std::array<double, 3> weights;
+    const bool above = v >= 0.0 && w >= 0.0 && v + w <= 1.0 && f.g00 > 0.0;
+    if (above) {
+      weights = {1.0 - v - w, v, w};
+      here = over * over;
+    } else {
+      const Vec3 u = nearestWeights(p, f.a, f.a + f.ab, f.a + f.ac);
+      weights = {u.x(), u.y(), u.z()};
+      here = (ap - u.y() * f.ab - u.z() * f.ac).squaredNorm();
+    }
+    // On ties the larger plane distance, then the lower number: whatever order they come in.
+    const bool nearer = here < squared - tie;
+    if (!nearer) {
+      if (!(here <= squared + tie)) return;
+      const double a = std::abs(over), b = std::abs(height);
+      if (!(a > b * (1.0 + kTie) || (a >= b * (1.0 - kTie) && f.triangle < found.triangle))) return;
+    }
+    squared = std::min(squared, here);
+    distance = std::sqrt(squared);
+    height = over;
+    found.triangle = f.triangle;
+    found.weights = weights;
+    found.above = above;
   }
-  return expected;
+};
+
+}  // namespace
+
+bool ContactShape::searchBins(const Vec3& rest, Nearest& found) const {
+  Best best;
+  Box box;
+  const Vec3 outside = (bounds_.min - rest).cwiseMax(rest - bounds_.max).cwiseMax(0.0);
+  const double farthest = (bounds_.max - bounds_.min).norm() + outside.norm();
+  for (double radius = outside.norm() + 0.5 * bin_edge_;; radius *= 2.0) {
+    box.min = rest.array() - radius;
+    box.max = rest.array() + radius;
+    visitBins(box, [&](Index t) { best.offer(makeFacet(surface_, t), rest, found); });
+    if (best.distance <= radius || radius > farthest) break;
+  }
+  found.distance = std::copysign(best.distance, best.height);
+  return found.triangle != kNoIndex;
 }
 
 bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
+  found.triangle = kNoIndex;
   if (!cells_ || !rest.allFinite()) return false;
   std::array<int, 3> at;
   for (int d = 0; d < 3; ++d) {
@@ -244,38 +319,16 @@ bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
     at[d] = c > 0.0 ? (c < cells_count_[d] ? static_cast<int>(c) : cells_count_[d] - 1) : 0;
   }
   const std::size_t index = (static_cast<std::size_t>(at[0]) * cells_count_[1] + at[1]) * cells_count_[2] + at[2];
-  const Cell* cell = cells_[index].load(std::memory_order_acquire);
-  if (!cell) cell = fill(index, at);
-  found.triangle = kNoIndex;
-
-  double best = std::numeric_limits<double>::infinity(), best_height = 0.0;  // squared distance, plane distance
-  for (const Facet& f : cell->facets) {
-    const Vec3 ap = rest - f.a;
-    const double height = f.normal.dot(ap);
-    const double tie = kTie * best;
-    if (height * height > best + tie) continue;
-    const double d1 = f.ab.dot(ap), d2 = f.ac.dot(ap);
-    const double v = f.g00 * d1 + f.g01 * d2, w = f.g01 * d1 + f.g11 * d2;
-    double squared;
-    std::array<double, 3> weights;
-    const bool above = v >= 0.0 && w >= 0.0 && v + w <= 1.0;
-    if (above) {
-      weights = {1.0 - v - w, v, w};
-      squared = height * height;
-    } else {
-      const Vec3 u = nearestWeights(rest, f.a, f.a + f.ab, f.a + f.ac);
-      weights = {u.x(), u.y(), u.z()};
-      squared = (ap - u.y() * f.ab - u.z() * f.ac).squaredNorm();
-    }
-    const bool nearer = squared < best - tie;
-    if (!nearer && !(squared <= best + tie && std::abs(height) > std::abs(best_height))) continue;
-    best = nearer ? squared : std::min(best, squared);
-    best_height = height;
-    found.triangle = f.triangle;
-    found.weights = weights;
-    found.above = above;
+  const std::uintptr_t known = cells_[index].load(std::memory_order_acquire);
+  if (known < kAsked) {
+    std::uintptr_t asked = known;
+    cells_[index].compare_exchange_strong(asked, known + 1, std::memory_order_acq_rel);
+    return searchBins(rest, found);
   }
-  found.distance = std::copysign(std::sqrt(best), best_height);
+  const Cell* cell = known > kAsked ? reinterpret_cast<const Cell*>(known) : fill(index, at);
+  Best best;
+  for (const Facet& f : cell->facets) best.offer(f, rest, found);
+  found.distance = std::copysign(best.distance, best.height);
   return found.triangle != kNoIndex;
 }
 

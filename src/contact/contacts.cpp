@@ -14,6 +14,8 @@ constexpr double kMargin = 1e-3;        // of the smaller body's size: contacts 
 constexpr double kQuick = 0.25;         // of the thickness: who goes farther is looked up in every substep, or traced
 constexpr double kMovedInRest = 0.005;  // of the size: a lookup is repeated where the deviation moved it farther
 constexpr int kMostLookups = 3;
+constexpr Index kManyPartners = 4;      // from here on it pays to know how far a surface is from its map
+constexpr double kDeviation = 0.1;      // of the bounds' diagonal: how far a surface may be from where its maps have it
 constexpr Index kFewMaps = 8;           // so many are searched one by one
 constexpr double kExitTime = 1.0;       // [s] in which one body is let out of another
 constexpr double kExitDeep = 0.05;      // of the size: how deep the deepest point is at the least
@@ -113,6 +115,23 @@ class MapFinder {
   std::array<int, 3> cells_{{1, 1, 1}};
   std::vector<Index> offsets_, items_, next_;
 };
+
+double speedOf(const ContactParty& party) { return party.velocity.norm() + party.spread; }
+
+/// [m/s] at which two parties can come nearer, at most.
+double approachOf(const ContactParty& a, const ContactParty& b) {
+  Vec3 relative = Vec3::Zero();
+  double spread = 0.0;
+  if (a.moves) {
+    relative += a.velocity;
+    spread += a.spread;
+  }
+  if (b.moves) {
+    relative -= b.velocity;
+    spread += b.spread;
+  }
+  return relative.norm() + spread;
+}
 
 Vec3 vertexAt(const ContactParty& party, Index vertex) {
   return party.surface ? party.surface[vertex] : party.positions[(*party.shape->rows().particle)[vertex]];
@@ -229,8 +248,10 @@ struct Contacts::Impl {
   std::vector<Box> boxes;
   std::vector<char> active, needed;
   std::vector<Pair> pairs;
+  std::vector<Index> partners;  // one a party: how many pairs it is in
   std::vector<Index> grounded;  // parties that can meet the ground
   std::vector<MapFinder> finders;
+  std::vector<double> deviations;  // [m] one a party: how far its surface may be from where its maps have it
   std::vector<std::vector<ContactMap>> maps_now;  // of those in quick pairs
   std::vector<Contact> contacts, last;  // of this frame and of the one before
   std::vector<ContactEntry> entries;
@@ -250,7 +271,7 @@ struct Contacts::Impl {
     double deepest = 0.0;
   };
 
-  bool locate(const ContactParty& b, const MapFinder& finder, const ContactMap* maps, const Vec3& p,
+  bool locate(const ContactParty& b, Index party, const MapFinder& finder, const ContactMap* maps, const Vec3& p, double reach,
               ContactShape::Nearest& found, bool& flipped, ContactCounters& counters) const;
   void addContact(const std::vector<ContactParty>& parties, Index a, Index sample, Index b, Index triangle,
                   const std::array<double, 3>& weights, bool was_caught, bool flipped);
@@ -298,7 +319,7 @@ void Contacts::findPairs(const ContactScene& scene, const std::vector<ContactPar
   for (const ContactParty& party : parties) {
     // Relative kMargin on both sides; what moves reaches as far as it can get.
     const double diagonal = party.bounds.diagonal();
-    w.boxes.push_back(grown(party.bounds, kMargin * diagonal + (party.moves ? party.speed * h + falling : 0.0)));
+    w.boxes.push_back(grown(party.bounds, kMargin * diagonal + (party.moves ? speedOf(party) * h + falling : 0.0)));
     w.active.push_back(party.moves);
   }
   if (parties.size() > 1) {
@@ -318,12 +339,17 @@ void Contacts::findPairs(const ContactScene& scene, const std::vector<ContactPar
       }
 }
 
-bool Contacts::Impl::locate(const ContactParty& b, const MapFinder& finder, const ContactMap* maps, const Vec3& p,
-                            ContactShape::Nearest& found, bool& flipped, ContactCounters& counters) const {
+bool Contacts::Impl::locate(const ContactParty& b, Index party, const MapFinder& finder, const ContactMap* maps, const Vec3& p,
+                            double reach, ContactShape::Nearest& found, bool& flipped, ContactCounters& counters) const {
   const ContactMap& map = maps[finder.nearest(p)];
   flipped = map.flipped;
   const ContactShape& shape = *b.shape;
   Vec3 rest = map.to_rest * (p - map.centre) + map.rest;
+  // So far outside of the rest bounds that no deviation brings it back: nothing to look up.
+  const Box& bounds = shape.bounds();
+  const Vec3 beyond = (bounds.min - rest).cwiseMax(rest - bounds.max).cwiseMax(0.0);
+  const double far = deviations[party] + reach;
+  if (!(beyond.squaredNorm() < far * far)) return false;
   const double enough = kMovedInRest * shape.size();
   for (int n = 0; n < kMostLookups; ++n) {
     ++counters.lookups;
@@ -416,7 +442,7 @@ void Contacts::Impl::lookInto(const std::vector<ContactParty>& parties, const Pa
     }
     ContactShape::Nearest found;
     bool flipped = false;
-    if (!locate(with, finders[b], maps, p, found, flipped, counters)) continue;
+    if (!locate(with, b, finders[b], maps, p, pair.reach, found, flipped, counters)) continue;
     if (found.distance < 0.0) {
       ++inside.inside;
       inside.deepest = std::min(inside.deepest, found.distance);
@@ -668,18 +694,39 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
     w.finders.resize(parties.size());
     w.maps_now.resize(parties.size());
   }
-  for (Index p = 0; p < parties.size(); ++p)
-    if (w.needed[p] & 1) w.finders[p].make(parties[p].maps, parties[p].map_count);
+  w.deviations.resize(parties.size());
+  std::vector<Index>& partners = w.partners;
+  partners.assign(parties.size(), 0);
+  for (const Pair& pair : w.pairs) {
+    ++partners[pair.a];
+    ++partners[pair.b];
+  }
+  for (Index p = 0; p < parties.size(); ++p) {
+    if (!(w.needed[p] & 1)) continue;
+    const ContactParty& party = parties[p];
+    w.finders[p].make(party.maps, party.map_count);
+    w.deviations[p] = kDeviation * party.shape->bounds().diagonal();
+    if (partners[p] < kManyPartners || party.map_count != 1) continue;
+    double farthest = 0.0;
+    for (const ContactSample& s : party.shape->samples()) {
+      if (s.share > 0.0) continue;
+      const Vec3 fitted =
+          party.maps[0].from_rest * (party.shape->surface().vertices[s.vertices[0]] - party.maps[0].rest) +
+          party.maps[0].centre;
+      farthest = std::max(farthest, (vertexAt(party, s.vertices[0]) - fitted).squaredNorm());
+    }
+    w.deviations[p] = std::min(w.deviations[p], 2.0 * std::sqrt(farthest));
+  }
   // From below upwards where it matters: ground first.
   const double falling = w.scene.gravity.norm() * h * h;
   for (Index a : w.grounded)
-    w.addGround(parties, a, kMargin * parties[a].shape->size() + parties[a].speed * h + falling);
+    w.addGround(parties, a, kMargin * parties[a].shape->size() + speedOf(parties[a]) * h + falling);
   double fastest = 0.0;  // substeps that the fastest quick pair asks for
   for (Pair& pair : w.pairs) {
     const ContactParty &a = parties[pair.a], &b = parties[pair.b];
     const double size = std::min(a.shape->size(), b.shape->size());
     const double thickness = std::min(a.shape->thickness(), b.shape->thickness());
-    const double way = (a.moves ? a.speed : 0.0) + (b.moves ? b.speed : 0.0);
+    const double way = approachOf(a, b);
     const double most = kQuick * thickness;
     pair.reach = kMargin * size + std::min(way * h + falling, most);
     pair.quick = way * h > most;
@@ -769,10 +816,8 @@ void Contacts::solve(const std::vector<ContactParty>& parties, double substep, c
       w.trace(parties, pair.b, pair.a, counters);
     }
     const double size = std::min(parties[pair.a].shape->size(), parties[pair.b].shape->size());
-    const double way = (parties[pair.a].moves ? parties[pair.a].speed : 0.0) +
-                       (parties[pair.b].moves ? parties[pair.b].speed : 0.0);
     const double thickness = std::min(parties[pair.a].shape->thickness(), parties[pair.b].shape->thickness());
-    pair.reach = kMargin * size + std::min(way * substep + falling, kQuick * thickness);
+    pair.reach = kMargin * size + std::min(pair.way * substep + falling, kQuick * thickness);
     const std::size_t before = w.contacts.size();
     Impl::Inside ignored;
     std::vector<double> depths;

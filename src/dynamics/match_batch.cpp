@@ -16,8 +16,8 @@ constexpr double kNoExtent = 1e-6;  // of the inertia's trace: float moments are
 const Entries& entriesOf(InstructionSet set) {
 #define MESHLESS_MATCH_TABLE(name)                                                                   \
   {                                                                                                  \
-    name::gatherBodies, name::moveBodies, name::sumParticles, name::spreadParticles, name::sumLayer, \
-        name::gatherClusters, name::mapClusters, name::pullParticles, name::moveParticles            \
+    name::measureBodies, name::gatherBodies, name::moveBodies, name::sumParticles, name::spreadParticles, \
+        name::sumLayer, name::gatherClusters, name::mapClusters, name::pullParticles, name::moveParticles \
   }
   static const Entries baseline_entries = MESHLESS_MATCH_TABLE(baseline);
 #if MESHLESS_ROTATION_X86
@@ -140,6 +140,32 @@ struct BodyBatch::Impl {
     findMotion(body);
   }
 
+  // The first particle is origin enough: the body is around it.
+  void load(std::size_t body, const BatchBody& from) {
+    const Vec3 origin = from.positions[0];
+    origins[body] = origin;
+    float* to = &field(body, 0, kX);
+    for (std::size_t i = 0; i < particles; ++i, to += kParticleFields * kBlock)
+      for (int k = 0; k < 3; ++k) {
+        to[(kX + k) * kBlock] = static_cast<float>(from.positions[i][k] - origin[k]);
+        to[(kVx + k) * kBlock] = static_cast<float>(from.velocities[i][k]);
+      }
+    for (int k = 0; k < 4; ++k) quaternions[k * padded + body] = static_cast<float>(from.rotation->coeffs()[k]);
+  }
+
+  void store(std::size_t body, const BatchBody& to) const {
+    const Vec3 origin = origins[body];
+    const float* from = &fields[(body / kBlock * particles * kParticleFields + kX) * kBlock + body % kBlock];
+    for (std::size_t i = 0; i < particles; ++i, from += kParticleFields * kBlock)
+      for (int k = 0; k < 3; ++k) {
+        to.positions[i][k] = origin[k] + from[(kX + k) * kBlock];
+        to.velocities[i][k] = from[(kVx + k) * kBlock];
+      }
+    Quat rotation;
+    for (int k = 0; k < 4; ++k) rotation.coeffs()[k] = quaternions[k * padded + body];
+    *to.rotation = rotation.normalized();
+  }
+
   // As every step leaves it for the next.
   void findMotion(std::size_t body) {
     const auto at = [&](std::size_t i, int f) {
@@ -225,6 +251,17 @@ void BodyBatch::getState(std::size_t body, Points& positions, Points& velocities
 }
 
 void BodyBatch::step(const BatchStep& step, MatchCounters& counters, const ForEach& for_each) {
+  stepChunks(step, nullptr, counters, for_each);
+}
+
+void BodyBatch::stepInPlace(const std::vector<BatchBody>& bodies, const BatchStep& step, MatchCounters& counters,
+                            const ForEach& for_each) {
+  assert(bodies.size() == impl_->size);
+  stepChunks(step, bodies.data(), counters, for_each);
+}
+
+void BodyBatch::stepChunks(const BatchStep& step, const BatchBody* in_place, MatchCounters& counters,
+                           const ForEach& for_each) {
   Impl& b = *impl_;
   if (b.size == 0) return;
   assert(step.mode != MatchMode::kQuadratic || b.has_quadratic);
@@ -242,6 +279,13 @@ void BodyBatch::step(const BatchStep& step, MatchCounters& counters, const ForEa
     BodiesScratch scratch;
     const std::size_t first = chunk * kChunk, size = std::min<std::size_t>(kChunk, b.padded - first);
     const int first_block = static_cast<int>(first / kBlock), blocks = static_cast<int>(size / kBlock);
+    if (in_place) {
+      bool any = false;
+      for (std::size_t i = first; i < std::min(first + size, b.size); ++i) any = any || in_place[i].moves;
+      if (!any) return;
+      for (std::size_t i = 0; i < size; ++i) b.load(first + i, in_place[std::min(first + i, b.size - 1)]);
+      entries.measureBodies(view, first_block, blocks);
+    }
     if (step.ground)
       for (std::size_t i = 0; i < size; ++i)
         b.constant(first + i, kGround) = static_cast<float>(*step.ground - b.origins[first + i].z());
@@ -259,10 +303,22 @@ void BodyBatch::step(const BatchStep& step, MatchCounters& counters, const ForEa
     entries.moveBodies(view, numbers, first_block, blocks, scratch);
     for (int k = 0; k < 3; ++k)
       for (std::size_t i = 0; i < size; ++i) b.origins[first + i][k] += scratch.shift[k][i];
+    if (in_place)
+      for (std::size_t i = first; i < std::min(first + size, b.size); ++i)
+        if (in_place[i].moves) b.store(i, in_place[i]);
   });
-  match_sets::count(b.flags.data(), b.size, counters);
-  if (numbers.beta > 0.0f) counters.linear_fits += b.size;
-  if (numbers.quadratic) counters.quadratic_moments += b.size;
+  if (!in_place) {
+    match_sets::count(b.flags.data(), b.size, counters);
+    if (numbers.beta > 0.0f) counters.linear_fits += b.size;
+    if (numbers.quadratic) counters.quadratic_moments += b.size;
+    return;
+  }
+  for (std::size_t i = 0; i < b.size; ++i)
+    if (in_place[i].moves) {
+      match_sets::count(&b.flags[i], 1, counters);
+      counters.linear_fits += numbers.beta > 0.0f;
+      counters.quadratic_moments += numbers.quadratic;
+    }
 }
 
 }  // namespace meshless

@@ -191,6 +191,45 @@ MESHLESS_INLINE Symmetric inverseInertia(const BodiesView& view, const Symmetric
   return c;
 }
 
+// The rigid motion of bodies whose particles were put somewhere from outside.
+void measure(const BodiesView& view, int block, int lane) {
+  const int n = view.particles;
+  const float* const fields = view.fields + static_cast<std::size_t>(block) * n * kParticleFields * kBlock + lane;
+  float* const motion = view.motion + static_cast<std::size_t>(block) * kMotionFields * kBlock + lane;
+  Vector centre = {}, mean = {};
+  Pack total = {};
+  const float* field = fields;
+  for (int i = 0; i < n; ++i, field += kParticleFields * kBlock) {
+    const Pack m = get(field + kMass * kBlock);
+    const Vector x = getVector(field + kX * kBlock), v = getVector(field + kVx * kBlock);
+    centre.x += m * x.x, centre.y += m * x.y, centre.z += m * x.z;
+    mean.x += m * v.x, mean.y += m * v.y, mean.z += m * v.z;
+    total += m;
+  }
+  const Pack share = 1.0f / total;
+  centre.x *= share, centre.y *= share, centre.z *= share;
+  mean.x *= share, mean.y *= share, mean.z *= share;
+  Vector turning = {};
+  Symmetric moment = {};
+  field = fields;
+  for (int i = 0; i < n; ++i, field += kParticleFields * kBlock) {
+    const Pack m = get(field + kMass * kBlock);
+    const Vector x = getVector(field + kX * kBlock), v = getVector(field + kVx * kBlock);
+    const Vector r = {x.x - centre.x, x.y - centre.y, x.z - centre.z};
+    const Vector mr = {m * r.x, m * r.y, m * r.z};
+    const Vector l = cross(mr, {v.x - mean.x, v.y - mean.y, v.z - mean.z});
+    turning.x += l.x, turning.y += l.y, turning.z += l.z;
+    moment.xx += mr.x * r.x, moment.yy += mr.y * r.y, moment.zz += mr.z * r.z;
+    moment.xy += mr.x * r.y, moment.yz += mr.y * r.z, moment.zx += mr.z * r.x;
+  }
+  const Symmetric inverse = inverseInertia(view, moment);
+  putVector(centre, motion + kMotionCentre * kBlock);
+  putVector(mean, motion + kMotionVelocity * kBlock);
+  putVector(times(inverse, turning), motion + kMotionSpin * kBlock);
+  putVector({inverse.xx, inverse.yy, inverse.zz}, motion + kMotionInverse * kBlock);
+  putVector({inverse.xy, inverse.yz, inverse.zx}, motion + (kMotionInverse + 3) * kBlock);
+}
+
 // The goal's map of q in units of the size: 3 x 3, and 3 x 6 of the second order.
 template <bool kFit, bool kQuadratic>
 MESHLESS_INLINE void goalMap(const BodiesView& view, const StepNumbers& step, const BodiesScratch& s, int block,
@@ -489,6 +528,11 @@ MESHLESS_INLINE double total(Pack x) {
 }
 
 }  // namespace
+
+void measureBodies(const BodiesView& view, int first_block, int blocks) {
+  for (int b = first_block; b < first_block + blocks; ++b)
+    for (int lane = 0; lane < kBlock; lane += kLanes) measure(view, b, lane);
+}
 
 void gatherBodies(const BodiesView& view, const StepNumbers& step, int first_block, int blocks, BodiesScratch& s) {
   for (int b = 0; b < blocks; ++b)

@@ -92,7 +92,9 @@ struct OverlapMotion {
 /// spreadParticles: damps, and spreads the moments of where the particles are going.
 /// sumLayer: replaces each of nx * ny rows by the sum over those at most `width` away along x and y. `line` is room for
 /// the longer of nx and ny in rows.
+/// measureBodies: the motion that moveBodies leaves, of bodies whose state comes from outside.
 #define MESHLESS_MATCH_ENTRIES                                                                                         \
+  void measureBodies(const BodiesView& view, int first_block, int blocks);                                             \
   void gatherBodies(const BodiesView& view, const StepNumbers& step, int first_block, int blocks, BodiesScratch& s);   \
   void moveBodies(const BodiesView& view, const StepNumbers& step, int first_block, int blocks, BodiesScratch& s);     \
   void sumParticles(const OverlapView& view, std::size_t first, std::size_t count, double* sums);                      \
@@ -120,6 +122,7 @@ MESHLESS_MATCH_ENTRIES
 #endif
 
 struct Entries {
+  decltype(&baseline::measureBodies) measureBodies;
   decltype(&baseline::gatherBodies) gatherBodies;
   decltype(&baseline::moveBodies) moveBodies;
   decltype(&baseline::sumParticles) sumParticles;

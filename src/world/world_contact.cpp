@@ -123,12 +123,13 @@ void World::Impl::fillParties() {
     }
     party.rigid_share =
         body.model->any_fixed || body.material.elastic() ? 0.0 : std::max(kLeastRigid, body.material.alpha);
-    double fastest = 0.0;
+    Box velocities;
     for (std::size_t i = 0; i < party.particles; ++i) {
       party.bounds.extend(body.state.positions[i]);
-      fastest = std::max(fastest, body.state.velocities[i].squaredNorm());
+      velocities.extend(body.state.velocities[i]);
     }
-    party.speed = std::sqrt(fastest);
+    party.velocity = 0.5 * (velocities.min + velocities.max);
+    party.spread = 0.5 * velocities.diagonal();
     if (!body.model->binding.riders.empty()) {  // riders reach beyond the particles
       party.bounds.min.array() -= 2.0 * body.model->spacing;
       party.bounds.max.array() += 2.0 * body.model->spacing;

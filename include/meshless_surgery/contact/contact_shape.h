@@ -67,6 +67,7 @@ class ContactShape {
  private:
   struct Cell;
   const Cell* fill(std::size_t index, const std::array<int, 3>& at) const;
+  bool searchBins(const Vec3& rest, Nearest& found) const;
   void binTriangles();
   template <class Visit>
   void visitBins(const Box& box, const Visit& visit) const;
@@ -91,7 +92,9 @@ class ContactShape {
   Vec3 cell_origin_ = Vec3::Zero();
   double cell_edge_ = 1.0, cells_per_metre_ = 1.0;
   std::array<int, 3> cells_count_{{0, 0, 0}};
-  std::unique_ptr<std::atomic<const Cell*>[]> cells_;
+  // A cell, or how often it was asked for: the first few times the bins are searched, so that a fresh shape answers at
+  // once.
+  mutable std::unique_ptr<std::atomic<std::uintptr_t>[]> cells_;
   std::size_t cell_total_ = 0;
   mutable std::atomic<std::size_t> cells_filled_{0};
   mutable std::once_flag linked_;

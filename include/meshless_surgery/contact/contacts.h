@@ -37,7 +37,8 @@ struct ContactParty {
   double rigid_share = 0.0;  // 0..1 of an impulse that moves the body as a whole; 0 where it is held
   double friction = 0.5;
   Box bounds;                // [m] of the particles (and vertices) now
-  double speed = 0.0;        // [m/s] of the fastest particle
+  Vec3 velocity = Vec3::Zero();  // [m/s] about the middle of its particles' velocities
+  double spread = 0.0;       // [m/s] by which they differ from it at most
   bool moves = true;         // false: asleep, or an obstacle; its arrays are not written
 };
 

@@ -28,6 +28,14 @@ struct BatchStep {
 };
 BatchStep batchStep(const Material& material, double h);
 
+/// Where a body of a batch has its state, particle by particle; who does not move is read and left alone.
+struct BatchBody {
+  Vec3* positions = nullptr;   // [m]
+  Vec3* velocities = nullptr;  // [m/s]
+  Quat* rotation = nullptr;
+  bool moves = true;
+};
+
 /// Bodies of equally many particles, each in one cluster with all of its particles. Masses and rest shapes may differ.
 /// Positions are kept relative to an origin that follows the body, so that float does not lose them far from the
 /// world's. A body's result depends neither on its place nor on its neighbours, be they NaN.
@@ -52,8 +60,13 @@ class BodyBatch {
 
   /// Damps, predicts, matches, restores angular momentum, adds gravity, moves and keeps above ground.
   void step(const BatchStep& step, MatchCounters& counters, const ForEach& for_each = oneAfterAnother);
+  /// The same for states that others change between steps: read from where they are (one a body), and written back.
+  void stepInPlace(const std::vector<BatchBody>& bodies, const BatchStep& step, MatchCounters& counters,
+                   const ForEach& for_each = oneAfterAnother);
 
  private:
+  void stepChunks(const BatchStep& step, const BatchBody* in_place, MatchCounters& counters, const ForEach& for_each);
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
