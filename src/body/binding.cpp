@@ -111,6 +111,7 @@ SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const
   };
   for (Index v : binding.riders) {
     if (inherit(v)) continue;
+    ++binding.bound;
     const Vec3& p = surface_rest[v];
     if (!nearest) nearest.emplace(rest);
     const bool lips = inherited && inherited->separated;

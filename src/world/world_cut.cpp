@@ -139,6 +139,7 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
     reply.new_bodies.insert(reply.new_bodies.end(), names.begin(), names.end());
     reply.cut_bodies.push_back(parent_name);
     reply.cap_area += s.cut.cap_area;
+    reply.work += s.cut.work;
     say(EventType::kCut, parent_name, 0, "cut into " + std::to_string(names.size()) + " pieces");
   }
   reply.duration = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -70,6 +70,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
     const std::string name = body.name;
     reply.cut_bodies.push_back(name);
     reply.opened_area += opened.body.opened_area;
+    reply.work += opened.body.work;
     if (opened.body.pieces.size() == 1) {
       body.model = std::move(opened.body.pieces[0].model);
       body.state = std::move(opened.body.pieces[0].state);

@@ -21,6 +21,7 @@ struct SurfaceBinding {
   Points levers;                      // [m] one a rider: what the carriers do not span at rest (thin sheets, crumbs)
   std::vector<Index> turners;         // one a rider: the cluster whose affine fit takes its lever along
   std::vector<Index> lever_clusters;  // ascending: those that take a lever along; their poses are needed with positions
+  Index bound = 0;                    // riders whose carriers were looked for: those of a parent came along
 };
 
 /// Constant while it lives: rest shape, topology, clusters, masses.
