@@ -213,7 +213,7 @@ void registerRows() {
         name, [=, history = history](benchmark::State& state) { successiveRow(state, bar, slices, history); })
         ->Unit(benchmark::kMillisecond)
         ->UseManualTime()
-        ->MinTime(0.1)
+        ->Iterations(5)
         ->Repetitions(9)
         ->ReportAggregatesOnly();
   }

@@ -17,6 +17,18 @@ struct Severed {
   CutBody cut;
 };
 
+// Nearly every body of a scene with many pieces is beside the plane as a whole.
+bool meetsPlane(const Points& surface, const Plane& plane) {
+  bool above = false, below = false;
+  for (const Vec3& p : surface) {
+    const double height = plane.height(p);
+    above = above || height >= 0.0;
+    below = below || height <= 0.0;
+    if (above && below) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 Status World::Impl::checkCut(const CutCommand& command) {
@@ -113,6 +125,7 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
         std::find(command.bodies.begin(), command.bodies.end(), body->name) == command.bodies.end())
       continue;
     refreshSurface(*body);
+    if (!meetsPlane(body->state.surface, plane)) continue;
     TriangleMesh present;
     present.vertices = body->state.surface;
     present.triangles = body->model->surface.triangles;
