@@ -3,7 +3,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "meshless_surgery/body/cut_body.h"
+#include "meshless_surgery/body/ease.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
 
@@ -133,6 +133,7 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
     Result<CutBody> cut =
         cutBody(*body->model, body->state, plane, {command.roughness, static_cast<std::uint32_t>(next_ticket + step)});
     if (cut) {
+      easeRelease(*body->model, body->state, body->material, substepNow(), isHeld(*body), cut->pieces);
       severed.push_back({body->id, std::move(*cut)});
     } else if (cut.error().code != ErrorCode::kMissed) {
       refused = body->name + " cannot be cut: " + cut.error().detail;
@@ -157,6 +158,11 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
   }
   reply.duration = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return reply;
+}
+
+bool World::Impl::isHeld(const WorldBody& body) const {
+  return body.model->any_fixed ||
+         std::any_of(picks.begin(), picks.end(), [&](const Pick& pick) { return pick.body == body.id; });
 }
 
 std::vector<std::string> World::Impl::replaceByPieces(const BodyId& parent_id, std::vector<BodyPiece> pieces) {
@@ -208,6 +214,25 @@ void World::Impl::followPieces(const BodyId& parent, const std::vector<BodyId>& 
         total += pick.weights[k];
       }
       for (double& w : followed.weights) w /= total;
+      // The pull goes over from the whole patch to what is left of it as what else was cut is let go.
+      for (std::size_t p = 0; p < children.size(); ++p) {
+        WorldBody& child = *find(children[p]);
+        for (std::size_t i = 0; i < parent_particles[p].size(); ++i) {
+          const auto old = std::find(pick.patch.begin(), pick.patch.end(), parent_particles[p][i]);
+          if (old == pick.patch.end() || child.model->fixed[i]) continue;
+          double change = pick.weights[static_cast<std::size_t>(old - pick.patch.begin())];
+          if (p == c)
+            change -= followed.weights[static_cast<std::size_t>(
+                std::find(followed.patch.begin(), followed.patch.end(), i) - followed.patch.begin())];
+          if (change == 0.0) continue;
+          if (child.state.eased.empty()) {
+            child.state.eased.assign(child.model->rest.size(), Vec3::Zero());
+            child.state.eased_for = 0.0;
+            child.state.eased_whole = true;
+          }
+          child.state.eased[i] += change / child.model->masses[i] * pick.force;
+        }
+      }
       // The grabbed point is where it was; only the patch around it is smaller now.
       followed.offset = pick.offset + graspMean(pick, find(parent)->state.positions) -
                         graspMean(followed, find(children[c])->state.positions);

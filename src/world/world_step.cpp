@@ -95,12 +95,18 @@ void World::step() {
 }
 
 // As many as the stiffest body needs, within the budget; what the budget takes from a body is said once.
-int World::Impl::chooseSubsteps(double h_frame) {
+int World::Impl::substepsNeeded(double h_frame) const {
   double needed = settings.substeps;
   for (const auto& body : bodies)
     needed = std::max(needed, std::ceil(h_frame * highestFrequencyNow(*body->model, body->state)));
   const int most = std::max(settings.substeps, settings.max_substeps);
-  const int substeps = needed < most ? static_cast<int>(needed) : most;
+  return needed < most ? static_cast<int>(needed) : most;
+}
+
+double World::Impl::substepNow() const { return 1.0 / settings.step_rate / substepsNeeded(1.0 / settings.step_rate); }
+
+int World::Impl::chooseSubsteps(double h_frame) {
+  const int substeps = substepsNeeded(h_frame);
   for (auto& body : bodies) {
     const double factor = stiffnessFactor(*body->model, body->state, h_frame / substeps);
     if (factor < 1.0 && !(body->stiffness_factor < 1.0)) {

@@ -75,6 +75,9 @@ struct BodyState {
   double stretch = 1.0;   // of an elastic body: by how much its highest frequency has grown since rest
   std::vector<PlasticShape> plastic;  // one a cluster once something has flowed; empty before
   Points rider_offsets;   // [m] one a rider: what a cut left between its place and its carriers' (fades away)
+  Points eased;            // [m/s^2] one a particle where a cut lets go of it little by little, else empty; see ease.h
+  double eased_for = 0.0;  // [s] since that cut
+  bool eased_whole = false;  // what is eased may have a force and a torque
 };
 
 inline MatchInput matchInput(const BodyModel& model, const BodyState& state) {

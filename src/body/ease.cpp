@@ -1,0 +1,56 @@
+#include "meshless_surgery/body/ease.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "meshless_surgery/body/deform.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kNothing = 1e-9;  // of the spacing that a particle would move in a substep: not worth easing
+
+// [m/s^2] of every particle by what the body does to itself.
+Points ownAccelerations(const BodyModel& model, BodyState state, const Material& material, double h) {
+  StepScratch scratch;
+  MatchCounters uncounted;
+  Points accelerations = state.velocities;
+  matchAndMove(model, material, Vec3::Zero(), h, state, scratch, uncounted);
+  for (std::size_t i = 0; i < accelerations.size(); ++i)
+    accelerations[i] = (state.velocities[i] - accelerations[i]) / h;
+  return accelerations;
+}
+
+}  // namespace
+
+void easeRelease(const BodyModel& parent, const BodyState& before, const Material& material, double h, bool held,
+                 std::vector<BodyPiece>& pieces) {
+  if (!(h > 0.0)) return;
+  const Points whole = ownAccelerations(parent, before, material, h);
+  for (BodyPiece& piece : pieces) {
+    const BodyModel& model = *piece.model;
+    Points eased = ownAccelerations(model, piece.state, material, h);
+    for (std::size_t i = 0; i < eased.size(); ++i) {
+      const Index old = piece.parent_particles[i];
+      // A crumb's one particle has nothing to ease.
+      eased[i] = old == kNoIndex || model.fixed[i] ? Vec3(Vec3::Zero()) : Vec3(whole[old] - eased[i]);
+    }
+    if (!held) {
+      const RigidMotion released = rigidMotionOf(model, piece.state.positions, eased);
+      for (std::size_t i = 0; i < eased.size(); ++i)
+        eased[i] -= released.velocity + released.spin.cross(piece.state.positions[i] - released.centre);
+    }
+    double most = 0.0;
+    for (const Vec3& a : eased) most = std::max(most, a.norm());
+    if (!(h * h * most > kNothing * model.spacing)) continue;
+    piece.state.eased = std::move(eased);
+    piece.state.eased_for = 0.0;
+    piece.state.eased_whole = held;
+  }
+}
+
+double easedShare(double eased_for) {
+  return eased_for < kEaseTime ? 0.5 * (1.0 + std::cos(M_PI * eased_for / kEaseTime)) : 0.0;
+}
+
+}  // namespace meshless
