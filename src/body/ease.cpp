@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <future>
 
 #include "meshless_surgery/body/deform.h"
 
@@ -9,6 +10,7 @@ namespace meshless {
 namespace {
 
 constexpr double kNothing = 1e-9;  // of the spacing that a particle would move in a substep: not worth easing
+constexpr std::size_t kWorthAThread = 1000;  // particles
 
 // [m/s^2] of every particle by what the body does to itself.
 Points ownAccelerations(const BodyModel& model, BodyState state, const Material& material, double h) {
@@ -26,10 +28,16 @@ Points ownAccelerations(const BodyModel& model, BodyState state, const Material&
 void easeRelease(const BodyModel& parent, const BodyState& before, const Material& material, double h, bool held,
                  std::vector<BodyPiece>& pieces) {
   if (!(h > 0.0)) return;
-  const Points whole = ownAccelerations(parent, before, material, h);
-  for (BodyPiece& piece : pieces) {
+  // Side by side: together the pieces are as much as the whole.
+  auto uncut = std::async(parent.rest.size() > kWorthAThread ? std::launch::async : std::launch::deferred,
+                          [&] { return ownAccelerations(parent, before, material, h); });
+  std::vector<Points> parts;
+  for (const BodyPiece& piece : pieces) parts.push_back(ownAccelerations(*piece.model, piece.state, material, h));
+  const Points whole = uncut.get();
+  for (std::size_t p = 0; p < pieces.size(); ++p) {
+    BodyPiece& piece = pieces[p];
     const BodyModel& model = *piece.model;
-    Points eased = ownAccelerations(model, piece.state, material, h);
+    Points& eased = parts[p];
     for (std::size_t i = 0; i < eased.size(); ++i) {
       const Index old = piece.parent_particles[i];
       // A crumb's one particle has nothing to ease.
