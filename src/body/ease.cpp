@@ -25,7 +25,7 @@ Points ownAccelerations(const BodyModel& model, BodyState state, const Material&
 
 }  // namespace
 
-void easeRelease(const BodyModel& parent, const BodyState& before, const Material& material, double h, bool held,
+void easeRelease(const BodyModel& parent, const BodyState& before, const Material& material, double h, const std::vector<Index>& held,
                  std::vector<BodyPiece>& pieces) {
   if (!(h > 0.0)) return;
   // Side by side: together the pieces are as much as the whole.
@@ -43,7 +43,11 @@ void easeRelease(const BodyModel& parent, const BodyState& before, const Materia
       // A crumb's one particle has nothing to ease.
       eased[i] = old == kNoIndex || model.fixed[i] ? Vec3(Vec3::Zero()) : Vec3(whole[old] - eased[i]);
     }
-    if (!held) {
+    const auto& mine = piece.parent_particles;
+    const bool is_held = model.any_fixed || std::any_of(held.begin(), held.end(), [&](Index i) {
+                           return std::find(mine.begin(), mine.end(), i) != mine.end();
+                         });
+    if (!is_held) {
       const RigidMotion released = rigidMotionOf(model, piece.state.positions, eased);
       for (std::size_t i = 0; i < eased.size(); ++i)
         eased[i] -= released.velocity + released.spin.cross(piece.state.positions[i] - released.centre);
@@ -53,7 +57,7 @@ void easeRelease(const BodyModel& parent, const BodyState& before, const Materia
     if (!(h * h * most > kNothing * model.spacing)) continue;
     piece.state.eased = std::move(eased);
     piece.state.eased_for = 0.0;
-    piece.state.eased_whole = held;
+    piece.state.eased_whole = is_held;
   }
 }
 

@@ -133,7 +133,7 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
     Result<CutBody> cut =
         cutBody(*body->model, body->state, plane, {command.roughness, static_cast<std::uint32_t>(next_ticket + step)});
     if (cut) {
-      easeRelease(*body->model, body->state, body->material, substepNow(), isHeld(*body), cut->pieces);
+      easeRelease(*body->model, body->state, body->material, substepNow(), heldBySprings(*body), cut->pieces);
       severed.push_back({body->id, std::move(*cut)});
     } else if (cut.error().code != ErrorCode::kMissed) {
       refused = body->name + " cannot be cut: " + cut.error().detail;
@@ -160,9 +160,11 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
   return reply;
 }
 
-bool World::Impl::isHeld(const WorldBody& body) const {
-  return body.model->any_fixed ||
-         std::any_of(picks.begin(), picks.end(), [&](const Pick& pick) { return pick.body == body.id; });
+std::vector<Index> World::Impl::heldBySprings(const WorldBody& body) const {
+  std::vector<Index> held;
+  for (const Pick& pick : picks)
+    if (pick.body == body.id) held.push_back(pick.particle);
+  return held;
 }
 
 std::vector<std::string> World::Impl::replaceByPieces(const BodyId& parent_id, std::vector<BodyPiece> pieces) {
@@ -215,23 +217,17 @@ void World::Impl::followPieces(const BodyId& parent, const std::vector<BodyId>& 
       }
       for (double& w : followed.weights) w /= total;
       // The pull goes over from the whole patch to what is left of it as what else was cut is let go.
-      for (std::size_t p = 0; p < children.size(); ++p) {
-        WorldBody& child = *find(children[p]);
-        for (std::size_t i = 0; i < parent_particles[p].size(); ++i) {
-          const auto old = std::find(pick.patch.begin(), pick.patch.end(), parent_particles[p][i]);
-          if (old == pick.patch.end() || child.model->fixed[i]) continue;
-          double change = pick.weights[static_cast<std::size_t>(old - pick.patch.begin())];
-          if (p == c)
-            change -= followed.weights[static_cast<std::size_t>(
-                std::find(followed.patch.begin(), followed.patch.end(), i) - followed.patch.begin())];
-          if (change == 0.0) continue;
-          if (child.state.eased.empty()) {
-            child.state.eased.assign(child.model->rest.size(), Vec3::Zero());
-            child.state.eased_for = 0.0;
-            child.state.eased_whole = true;
-          }
-          child.state.eased[i] += change / child.model->masses[i] * pick.force;
-        }
+      WorldBody& child = *find(children[c]);
+      if (child.state.eased.empty()) {
+        child.state.eased.assign(child.model->rest.size(), Vec3::Zero());
+        child.state.eased_for = 0.0;
+        child.state.eased_whole = true;
+      }
+      for (std::size_t k = 0, old = 0; k < followed.patch.size(); ++k, ++old) {
+        while (find_particle(pick.patch[old]) != followed.patch[k]) ++old;
+        const Index i = followed.patch[k];
+        if (!child.model->fixed[i])
+          child.state.eased[i] += (pick.weights[old] - followed.weights[k]) / child.model->masses[i] * pick.force;
       }
       // The grabbed point is where it was; only the patch around it is smaller now.
       followed.offset = pick.offset + graspMean(pick, find(parent)->state.positions) -

@@ -83,7 +83,7 @@ struct World::Impl {
   Result<Reply> apply(const RemoveCommand& command);
   Status checkCut(const CutCommand& command);
   Result<CutReply> cutNow(const CutCommand& command);
-  bool isHeld(const WorldBody& body) const;  // by springs or fixed particles
+  std::vector<Index> heldBySprings(const WorldBody& body) const;  // particles in the middle of a grasp
   /// Retires a body and admits its pieces in its place; their names.
   std::vector<std::string> replaceByPieces(const BodyId& parent, std::vector<BodyPiece> pieces);
   void followPieces(const BodyId& parent, const std::vector<BodyId>& children,

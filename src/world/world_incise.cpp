@@ -50,7 +50,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
     if (!bounds.overlaps(reach)) continue;
     Result<IncisedBody> opened = inciseBody(*body->model, body->state, command.blade);
     if (opened) {
-      easeRelease(*body->model, body->state, body->material, substepNow(), isHeld(*body), opened->pieces);
+      easeRelease(*body->model, body->state, body->material, substepNow(), heldBySprings(*body), opened->pieces);
       all.push_back({body->id, std::move(*opened)});
     } else if (opened.error().code == ErrorCode::kMissed) {
       missed = body->name + ": " + opened.error().detail;

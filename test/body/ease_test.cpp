@@ -11,7 +11,9 @@ constexpr double kStep = 1.0 / 120;  // [s]
 std::vector<BodyPiece> eased(const PreparedBody& body, bool held) {
   Result<CutBody> cut = cutBody(*body.model, body.state, {Vec3(1.0, 0.2, 0.1).normalized(), Vec3(0.01, 0, 0)});
   EXPECT_TRUE(cut.ok());
-  easeRelease(*body.model, body.state, body.def.material, kStep, held, cut->pieces);
+  std::vector<Index> particles;
+  for (Index i = 0; held && i < body.model->rest.size(); ++i) particles.push_back(i);
+  easeRelease(*body.model, body.state, body.def.material, kStep, particles, cut->pieces);
   return std::move(cut->pieces);
 }
 

@@ -94,11 +94,12 @@ Vec3 angularMomentumOf(const BodySnapshot& body) {
 
 TEST(CutContinuity, TheNextStepMovesTissueAsItWouldHaveWithoutTheCut) {
   const SnapshotWants wants{true, true, true};
+  // The part of a grasp that a cut takes off loses its pull at once.
   // Two that spin freely, after a quarter second two whose pick is cut through as well, two pulled at both ends.
   const Scenario scenarios[] = {{"spinning", false, true, false, false, 1e-4},
                                 {"spinning, elastic", true, true, false, false, 0.02},
-                                {"spinning and picked", false, true, true, false, 0.07},
-                                {"spinning and picked, elastic", true, true, true, false, 0.1},
+                                {"spinning and picked", false, true, true, false, 0.45},
+                                {"spinning and picked, elastic", true, true, true, false, 0.55},
                                 {"stretched and bent", false, false, false, true, 1e-6},
                                 {"stretched and bent, elastic", true, false, false, true, 0.07}};
   for (const Scenario& scenario : scenarios) {
@@ -128,7 +129,7 @@ TEST(CutContinuity, TheNextStepMovesTissueAsItWouldHaveWithoutTheCut) {
       }
       const Rest rest = splitMotion(pieces[p].particles, differ);
       EXPECT_LE(rest.deforming, scenario.deforms * move);
-      EXPECT_LE(rest.rigid, 0.03 * move);
+      EXPECT_LE(rest.rigid, (scenario.picked ? 0.15 : 0.03) * move);
     }
     if (scenario.picked || scenario.loaded) continue;
     // Nothing is lent from one piece to the other while it is eased.
