@@ -1,9 +1,10 @@
 // Run time of a cut into two sealed halves, and of CGAL's clip of both sides with caps in the same process.
 // sphere/50k is a ball of some 50,000 triangles cut through its middle, with points inside the cap; sphere/50k/plain
 // without; cgal_clip/sphere/50k is CGAL's, without copying the mesh for it. A row fails where the volumes do not add
-// up. Counters: `triangles` of the mesh, `pieces`, `cap_triangles` of both sides. The process keeps the memory that it
-// once had, for all rows: to get it from the system page by page can take as long as the cut. Of the repetitions, the
-// median counts.
+// up. successive/100: cuts without others before them, and the last ten of a hundred, of equal work; `grown` is how many
+// particles more there are than at the start. Counters: `triangles` of the mesh, `pieces`, `cap_triangles` of both
+// sides. The process keeps the memory that it once had, for all rows: to get it from the system page by page can take as
+// long as the cut. Of the repetitions, the median counts.
 #include <malloc.h>
 
 #include <cmath>
@@ -129,6 +130,58 @@ void wholeRow(benchmark::State& state, bool elastic, ContactMethod contact) {
   state.counters["step_before_ms"] = 1e3 * step;
 }
 
+// The mean of ten cuts that take slices off a bar's end, after so many others. Without history the bar is as long as the
+// other is by then, so that the ten do the same work; the world of the others holds their slices too.
+constexpr double kSlice = 0.03;  // [m]
+constexpr int kTimedCuts = 10;
+
+std::shared_ptr<const PreparedBody> barOf(int slices) {
+  BodyDef def;
+  def.name = "bar";
+  def.mesh = boxMesh(Vec3(slices * kSlice, 0.03, 0.03), 2 * slices, 2, 2);
+  def.spacing = 0.01;
+  def.material.youngs_modulus = 5e3;
+  return std::make_shared<const PreparedBody>(*prepareBody(std::move(def)));
+}
+
+void successiveRow(benchmark::State& state, const std::shared_ptr<const PreparedBody>& body, int slices, int history) {
+  WorldSettings settings;
+  settings.gravity.setZero();
+  settings.ground.reset();
+  settings.contact = ContactMethod::kNone;
+  World world(settings);
+  if (!world.addSceneBody(body).ok()) return state.SkipWithError("the bar was refused");
+  const auto cutSlice = [&](int number) {
+    CutCommand cut;
+    const Vec3 normal = Vec3(1.0, 0.05, 0.03).normalized();
+    cut.blades.origin = Vec3(0.5 * slices * kSlice - (number + 1.07) * kSlice, 0.0, 0.0);
+    cut.blades.x_axis = normal.unitOrthogonal();
+    cut.blades.y_axis = normal.cross(cut.blades.x_axis);
+    const Result<Reply> answer = world.apply(cut);
+    if (!answer.ok()) state.SkipWithError(answer.error().detail.c_str());
+    return answer.ok() ? std::get<CutReply>(*answer) : CutReply();
+  };
+  CutWork work;
+  for (auto _ : state) {
+    world.reset();
+    for (int k = 0; k < history; ++k) cutSlice(k);
+    double seconds = 0.0;
+    work = {};
+    for (int k = 0; k < kTimedCuts; ++k) {
+      const CutReply reply = cutSlice(history + k);
+      seconds += reply.duration;
+      work += reply.work;
+    }
+    state.SetIterationTime(seconds / kTimedCuts);
+  }
+  std::size_t particles = 0;
+  for (const BodySnapshot& b : world.snapshot({}).bodies) particles += b.model->rest.size();
+  state.counters["bodies"] = static_cast<double>(world.snapshot({}).bodies.size());
+  state.counters["grown"] = static_cast<double>(particles) - static_cast<double>(body->model->rest.size());
+  state.counters["cap_triangles"] = static_cast<double>(work.new_triangles) / kTimedCuts;
+  state.counters["rebuilt"] = static_cast<double>(work.rebuilt_clusters) / kTimedCuts;
+}
+
 void registerRows() {
   struct Solid {
     const char* name;
@@ -153,6 +206,17 @@ void registerRows() {
         ->UseRealTime()
         ->Repetitions(9)
         ->ReportAggregatesOnly();
+  for (const auto& [name, history] : {std::pair("successive/100/first_ten", 0), {"successive/100/last_ten", 90}}) {
+    const int slices = history + 2 * kTimedCuts;
+    const auto bar = barOf(slices);
+    benchmark::RegisterBenchmark(
+        name, [=, history = history](benchmark::State& state) { successiveRow(state, bar, slices, history); })
+        ->Unit(benchmark::kMillisecond)
+        ->UseManualTime()
+        ->Iterations(5)
+        ->Repetitions(9)
+        ->ReportAggregatesOnly();
+  }
   for (const Solid& solid : {Solid{"sphere", &ball}, Solid{"torus", &ring}}) {
     for (const Size& size : {Size{"5k", 5e3}, Size{"50k", 5e4}, Size{"200k", 2e5}}) {
       const auto mesh = std::make_shared<TriangleMesh>(solid.make(size.triangles));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 
 #include <Eigen/Eigenvalues>
@@ -12,6 +13,8 @@ namespace meshless {
 namespace {
 
 constexpr std::size_t kCarriers = 12;
+constexpr std::size_t kMostCarriers = 40;  // of a rider that twelve would amplify
+constexpr double kSoft[] = {0.01, 0.1, 1.0};  // the softer, the less do the nearest carriers outweigh the others
 constexpr std::size_t kWalk = 64;  // particles looked at around the nearest one, along the body
 constexpr double kLever = 1e-9;    // of the distance to the farthest carrier: less is rounding
 constexpr double kRank = 0.03;     // of the moment's eigenvalues to the largest: below it, extrapolation is wild
@@ -29,16 +32,22 @@ void walk(const ParticleGraph& graph, Index start, std::vector<Index>& found, st
     }
 }
 
+double magnitudeOf(const std::vector<double>& weights) {
+  double sum = 0.0;
+  for (double w : weights) sum += std::abs(w);
+  return sum;
+}
+
 // Weights of the best affine map through the carriers, at p.
-void leastSquaresWeights(const Points& rest, const Vec3& p, const std::vector<Index>& carriers,
+void leastSquaresWeights(const Points& rest, const Vec3& p, const std::vector<Index>& carriers, double soft,
                          std::vector<double>& weights) {
   const double reach = 1.1 * (rest[carriers.back()] - p).norm() + 1e-300;
   const std::size_t n = carriers.size();
-  std::array<double, kCarriers> share{};
+  std::array<double, kMostCarriers> share{};
   double total = 0.0;
   for (std::size_t k = 0; k < n; ++k) {
     const double ratio = (rest[carriers[k]] - p).norm() / reach;
-    share[k] = (1.0 - ratio * ratio) * (1.0 - ratio * ratio) / (0.01 + ratio * ratio);
+    share[k] = (1.0 - ratio * ratio) * (1.0 - ratio * ratio) / (soft + ratio * ratio);
     total += share[k];
   }
   // About the mean: what the particles do not span then drops out by itself.
@@ -65,6 +74,20 @@ void leastSquaresWeights(const Points& rest, const Vec3& p, const std::vector<In
   weights.resize(n);
   for (std::size_t k = 0; k < n; ++k)
     weights[k] = share[k] / total * (1.0 + slope.dot((rest[carriers[k]] - p - mean) / reach));
+  // Too much still: part of the way to the mean, which amplifies nothing. The lever takes what is missing then.
+  const double most = magnitudeOf(weights);
+  if (soft < kSoft[2] || !(most > kMostWeight)) return;
+  double low = 0.0, high = 1.0;  // of the slope
+  const auto at = [&](double part) {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < n; ++k) sum += std::abs(share[k] / total + part * (weights[k] - share[k] / total));
+    return sum;
+  };
+  for (int halving = 0; halving < 30; ++halving) {
+    const double middle = 0.5 * (low + high);
+    (at(middle) > kMostWeight ? high : low) = middle;
+  }
+  for (std::size_t k = 0; k < n; ++k) weights[k] = share[k] / total + low * (weights[k] - share[k] / total);
 }
 
 }  // namespace
@@ -111,6 +134,7 @@ SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const
   };
   for (Index v : binding.riders) {
     if (inherit(v)) continue;
+    ++binding.bound;
     const Vec3& p = surface_rest[v];
     if (!nearest) nearest.emplace(rest);
     const bool lips = inherited && inherited->separated;
@@ -127,12 +151,17 @@ SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const
     order.clear();
     for (Index i : walks[start])
       if (i == start || !lips || !inherited->separated(v, i)) order.emplace_back((rest[i] - p).squaredNorm(), i);
-    const auto count = static_cast<std::ptrdiff_t>(std::min(order.size(), kCarriers));
-    if (order.size() > kCarriers) std::nth_element(order.begin(), order.begin() + count - 1, order.end());
-    std::sort(order.begin(), order.begin() + count);
-    near.clear();
-    for (auto at = order.begin(); at != order.begin() + count; ++at) near.push_back(at->second);
-    leastSquaresWeights(rest, p, near, weights);
+    const auto bind = [&](std::size_t most, double soft) {
+      const auto count = static_cast<std::ptrdiff_t>(std::min(order.size(), most));
+      if (order.size() > most) std::nth_element(order.begin(), order.begin() + count - 1, order.end());
+      std::sort(order.begin(), order.begin() + count);
+      near.clear();
+      for (auto at = order.begin(); at != order.begin() + count; ++at) near.push_back(at->second);
+      leastSquaresWeights(rest, p, near, soft, weights);
+    };
+    bind(kCarriers, kSoft[0]);
+    for (const double soft : {kSoft[1], kSoft[2]})
+      if (magnitudeOf(weights) > kMostWeight) bind(kMostCarriers, soft);
     Vec3 lever = p;
     for (std::size_t k = 0; k < near.size(); ++k) lever -= weights[k] * rest[near[k]];
     const double span = (rest[near.back()] - p).norm();

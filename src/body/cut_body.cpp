@@ -80,6 +80,16 @@ std::vector<int> assignParticles(const BodyModel& model, const BodyState& state,
 
 }  // namespace
 
+CutWork& CutWork::operator+=(const CutWork& other) {
+  new_vertices += other.new_vertices;
+  new_triangles += other.new_triangles;
+  bound_riders += other.bound_riders;
+  kept_riders += other.kept_riders;
+  kept_clusters += other.kept_clusters;
+  rebuilt_clusters += other.rebuilt_clusters;
+  return *this;
+}
+
 Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Plane& plane,
                         const CutBodyOptions& wanted) {
   if (!model.solid)
@@ -107,8 +117,7 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
   result.cap_area = cut->cap_area;
   PieceMaker maker(model, state, options.cap_patch);
   result.pieces = maker.make(sources);
-  result.kept_clusters = maker.kept_clusters();
-  result.rebuilt_clusters = maker.rebuilt_clusters();
+  result.work = maker.work();
   return result;
 }
 

@@ -5,6 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "meshless_surgery/body/ease.h"
 #include "meshless_surgery/dynamics/plastic.h"
 
 namespace meshless {
@@ -112,6 +113,26 @@ void dampAndPredict(const BodyModel& model, double h, double ahead, double dampi
 
 }  // namespace
 
+namespace {
+
+// What is eased fades, and turns with a body that moves freely: across the cut of one that is held it stays equal and
+// opposite.
+void fadeEased(const BodyModel& model, double h, BodyState& state) {
+  state.eased_for += h;
+  if (!(easedShare(state.eased_for) > 0.0)) {
+    state.eased.clear();
+    return;
+  }
+  if (state.eased_whole) return;
+  const Vec3 spin = rigidMotionOf(model, state.positions, state.velocities).spin;
+  const double angle = h * spin.norm();
+  if (!(angle > 0.0)) return;
+  const Mat3 turn = Eigen::AngleAxisd(angle, spin.normalized()).toRotationMatrix();
+  for (Vec3& a : state.eased) a = turn * a;
+}
+
+}  // namespace
+
 void matchAndMove(const BodyModel& model, const Material& material, const Vec3& gravity, double h, BodyState& state,
                   StepScratch& scratch, MatchCounters& counters) {
   Points& x = state.positions;
@@ -128,6 +149,9 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
   const Points& y = scratch.predicted;
   const MatchInput input = matchInput(model, state);
   bool matched = true;
+  // What has no force and no torque goes through accelerate(), which keeps it so.
+  const bool eased = !state.eased.empty() && !state.eased_whole;
+  const double share = easedShare(state.eased_for);
 
   if (material.elastic()) {
     const ElasticParameters parameters =
@@ -142,15 +166,26 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
       model.elastic_batch->getRotations(scratch.elastic, state.poses);
     }
     const Points& accelerations = scratch.goals;
-    accelerate(model, h, x, v, [&](std::size_t i) -> const Vec3& { return accelerations[i]; });
+    if (!eased)
+      accelerate(model, h, x, v, [&](std::size_t i) -> const Vec3& { return accelerations[i]; });
+    else
+      accelerate(model, h, x, v, [&](std::size_t i) -> Vec3 { return accelerations[i] + share * state.eased[i]; });
   } else if (const double gain = stiffnessGain(material.alpha, h); gain > 0.0) {
     matchShapes(input, y, material.mode, std::min(material.beta, kMostBeta), state.poses, scratch.goals, counters,
                 state.swelling, material.plastic());
     const Points& goals = scratch.goals;
     const double pull = gain / (h * h);
-    accelerate(model, h, x, v, [&](std::size_t i) -> Vec3 { return pull * (goals[i] - y[i]); });
+    if (!eased)
+      accelerate(model, h, x, v, [&](std::size_t i) -> Vec3 { return pull * (goals[i] - y[i]); });
+    else
+      accelerate(model, h, x, v, [&](std::size_t i) -> Vec3 { return pull * (goals[i] - y[i]) + share * state.eased[i]; });
   } else {
     matched = false;
+  }
+  if (!state.eased.empty()) {
+    if (state.eased_whole)
+      for (std::size_t i = 0; i < v.size(); ++i) v[i] += h * share * state.eased[i];
+    fadeEased(model, h, state);
   }
   if (material.plastic() && matched)
     counters.plastic_flows += flow(input, material.plasticity, h, state.poses, state.plastic);

@@ -191,8 +191,7 @@ Result<IncisedBody> inciseBody(const BodyModel& model, const BodyState& state, c
   IncisedBody result;
   result.pieces = maker.make(sources);
   result.opened_area = incision->opened_area;
-  result.kept_clusters = maker.kept_clusters();
-  result.rebuilt_clusters = maker.rebuilt_clusters();
+  result.work = maker.work();
   return result;
 }
 

@@ -99,10 +99,10 @@ std::vector<BodyPiece> PieceMaker::make(const std::vector<PieceSource>& sources)
   std::vector<Points> rest = restVertices(sources);
   std::vector<BodyPiece> pieces;
   pieces.resize(sources.size());
-  std::vector<Counts> counts(sources.size());
+  std::vector<CutWork> works(sources.size());
   const auto makeEvery = [&](std::size_t first, std::size_t stride) {
     for (std::size_t p = first; p < sources.size(); p += stride)
-      pieces[p] = makeOne(sources[p], std::move(rest[p]), masses, crumbs[p] ? &*crumbs[p] : nullptr, counts[p]);
+      pieces[p] = makeOne(sources[p], std::move(rest[p]), masses, crumbs[p] ? &*crumbs[p] : nullptr, works[p]);
   };
   // Pieces do not know of each other: the two large ones of most cuts are made side by side.
   if (sources.size() > 1 && model_.surface.vertices.size() > kWorthAThread) {
@@ -112,12 +112,12 @@ std::vector<BodyPiece> PieceMaker::make(const std::vector<PieceSource>& sources)
   } else {
     makeEvery(0, 1);
   }
-  for (const Counts& c : counts) kept_ += c.kept, rebuilt_ += c.rebuilt;
+  for (const CutWork& work : works) work_ += work;
   return pieces;
 }
 
 BodyPiece PieceMaker::makeOne(const PieceSource& from, Points rest, const std::vector<double>& masses,
-                              const Crumb* crumb, Counts& counts) const {
+                              const Crumb* crumb, CutWork& work) const {
   BodyPiece piece;
   auto child = std::make_shared<BodyModel>();
   child->solid = true;
@@ -152,7 +152,8 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, Points rest, const std::v
   }
   for (double m : child->masses) child->mass += m;
   PieceClusters clusters = splitClusters(model_.clusters, child->rest, child->graph, from.members, torn_);
-  counts = {clusters.kept, clusters.rebuilt};
+  work.kept_clusters = clusters.kept;
+  work.rebuilt_clusters = clusters.rebuilt;
   child->clusters = std::move(clusters.clusters);
   inheritMoments(model_, from.members, *child);
 
@@ -161,6 +162,7 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, Points rest, const std::v
   InheritedBinding inherited{model_.binding, {}, renumbered, nullptr};
   for (Index at = 0; at < from.origins.size(); ++at) {
     const Index v = sameVertex(from.origins[at]);
+    if (v == kNoIndex) ++work.new_vertices;
     inherited.rider.push_back(v == kNoIndex ? kNoIndex : rider_of_[v]);
     const Index parent = v == kNoIndex ? kNoIndex : model_.binding.particle[v];
     Index mine = parent == kNoIndex ? kNoIndex : renumbered[parent];
@@ -176,6 +178,9 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, Points rest, const std::v
     };
   child->binding = bindSurface(child->rest, child->graph, child->clusters, child->surface.vertices,
                                std::move(vertex_particle), &inherited);
+  work.bound_riders = child->binding.bound;
+  work.kept_riders = child->binding.riders.size() - child->binding.bound;
+  for (std::uint32_t patch : from.mesh.patches) work.new_triangles += patch == new_patch_;
   piece.state.poses.resize(child->clusters.size());
   piece.state.plastic =
       inheritShapes(state_.plastic, model_.clusters, child->clusters, clusters.origin, piece.parent_particles);

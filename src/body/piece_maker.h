@@ -29,16 +29,12 @@ class PieceMaker {
   /// All pieces of the parent: mass and momentum are shared out without a rest.
   std::vector<BodyPiece> make(const std::vector<PieceSource>& sources);
 
-  Index kept_clusters() const { return kept_; }
-  Index rebuilt_clusters() const { return rebuilt_; }
+  const CutWork& work() const { return work_; }
 
  private:
   struct Crumb;
-  struct Counts {
-    Index kept = 0, rebuilt = 0;
-  };
   BodyPiece makeOne(const PieceSource& source, Points rest, const std::vector<double>& masses, const Crumb* crumb,
-                    Counts& counts) const;
+                    CutWork& work) const;
   std::vector<Points> restVertices(const std::vector<PieceSource>& sources) const;
 
   const BodyModel& model_;
@@ -47,7 +43,7 @@ class PieceMaker {
   ParticleGraph graph_;
   std::vector<bool> torn_;
   std::vector<Index> rider_of_;
-  Index kept_ = 0, rebuilt_ = 0;
+  CutWork work_;
 };
 
 }  // namespace meshless

@@ -41,6 +41,10 @@ std::string joined(const std::vector<std::string>& names) {
   return text;
 }
 
+std::string clustersOf(const CutWork& work) {
+  return std::to_string(work.rebuilt_clusters) + " clusters rebuilt, " + std::to_string(work.kept_clusters) + " kept";
+}
+
 }  // namespace
 
 struct Services::Handlers {
@@ -203,8 +207,11 @@ struct Services::Handlers {
     response.new_bodies = answer->reply.new_bodies;
     response.cap_area = answer->reply.cap_area;
     response.duration = answer->reply.duration;
-    std::string message =
-        "cut " + joined(answer->reply.cut_bodies) + " into " + std::to_string(answer->reply.new_bodies.size()) + " pieces";
+    response.kept_clusters = static_cast<std::uint32_t>(answer->reply.work.kept_clusters);
+    response.rebuilt_clusters = static_cast<std::uint32_t>(answer->reply.work.rebuilt_clusters);
+    std::string message = "cut " + joined(answer->reply.cut_bodies) + " into " +
+                          std::to_string(answer->reply.new_bodies.size()) + " pieces; " +
+                          clustersOf(answer->reply.work);
     if (answer->closed_at_once) message += "; the world is paused, so the blades met at once (close_time was not used)";
     for (const std::string& note : answer->reply.notes) message += "; " + note;
     return accept(response, message);
@@ -231,8 +238,11 @@ struct Services::Handlers {
     response.new_bodies = reply.new_bodies;
     response.opened_area = reply.opened_area;
     response.duration = reply.duration;
+    response.kept_clusters = static_cast<std::uint32_t>(reply.work.kept_clusters);
+    response.rebuilt_clusters = static_cast<std::uint32_t>(reply.work.rebuilt_clusters);
     std::string message = "opened " + joined(reply.cut_bodies);
     if (!reply.new_bodies.empty()) message += ", which came apart into " + joined(reply.new_bodies);
+    message += "; " + clustersOf(reply.work);
     for (const std::string& note : reply.notes) message += "; " + note;
     return accept(response, message);
   }

@@ -3,7 +3,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "meshless_surgery/body/cut_body.h"
+#include "meshless_surgery/body/ease.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
 
@@ -16,6 +16,18 @@ struct Severed {
   BodyId parent;
   CutBody cut;
 };
+
+// Nearly every body of a scene with many pieces is beside the plane as a whole.
+bool meetsPlane(const Points& surface, const Plane& plane) {
+  bool above = false, below = false;
+  for (const Vec3& p : surface) {
+    const double height = plane.height(p);
+    above = above || height >= 0.0;
+    below = below || height <= 0.0;
+    if (above && below) return true;
+  }
+  return false;
+}
 
 }  // namespace
 
@@ -113,6 +125,7 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
         std::find(command.bodies.begin(), command.bodies.end(), body->name) == command.bodies.end())
       continue;
     refreshSurface(*body);
+    if (!meetsPlane(body->state.surface, plane)) continue;
     TriangleMesh present;
     present.vertices = body->state.surface;
     present.triangles = body->model->surface.triangles;
@@ -120,6 +133,7 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
     Result<CutBody> cut =
         cutBody(*body->model, body->state, plane, {command.roughness, static_cast<std::uint32_t>(next_ticket + step)});
     if (cut) {
+      easeRelease(*body->model, body->state, body->material, substepNow(), heldBySprings(*body), cut->pieces);
       severed.push_back({body->id, std::move(*cut)});
     } else if (cut.error().code != ErrorCode::kMissed) {
       refused = body->name + " cannot be cut: " + cut.error().detail;
@@ -139,10 +153,18 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
     reply.new_bodies.insert(reply.new_bodies.end(), names.begin(), names.end());
     reply.cut_bodies.push_back(parent_name);
     reply.cap_area += s.cut.cap_area;
+    reply.work += s.cut.work;
     say(EventType::kCut, parent_name, 0, "cut into " + std::to_string(names.size()) + " pieces");
   }
   reply.duration = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return reply;
+}
+
+std::vector<Index> World::Impl::heldBySprings(const WorldBody& body) const {
+  std::vector<Index> held;
+  for (const Pick& pick : picks)
+    if (pick.body == body.id) held.push_back(pick.particle);
+  return held;
 }
 
 std::vector<std::string> World::Impl::replaceByPieces(const BodyId& parent_id, std::vector<BodyPiece> pieces) {
@@ -195,6 +217,19 @@ void World::Impl::followPieces(const BodyId& parent, const std::vector<BodyId>& 
         total += pick.weights[k];
       }
       for (double& w : followed.weights) w /= total;
+      // The pull goes over from the whole patch to what is left of it as what else was cut is let go.
+      WorldBody& child = *find(children[c]);
+      if (child.state.eased.empty()) {
+        child.state.eased.assign(child.model->rest.size(), Vec3::Zero());
+        child.state.eased_for = 0.0;
+        child.state.eased_whole = true;
+      }
+      for (std::size_t k = 0, old = 0; k < followed.patch.size(); ++k, ++old) {
+        while (find_particle(pick.patch[old]) != followed.patch[k]) ++old;
+        const Index i = followed.patch[k];
+        if (!child.model->fixed[i])
+          child.state.eased[i] += (pick.weights[old] - followed.weights[k]) / child.model->masses[i] * pick.force;
+      }
       // The grabbed point is where it was; only the patch around it is smaller now.
       followed.offset = pick.offset + graspMean(pick, find(parent)->state.positions) -
                         graspMean(followed, find(children[c])->state.positions);

@@ -104,6 +104,7 @@ struct World::Impl {
   Result<Reply> apply(const RemoveCommand& command);
   Status checkCut(const CutCommand& command);
   Result<CutReply> cutNow(const CutCommand& command);
+  std::vector<Index> heldBySprings(const WorldBody& body) const;  // particles in the middle of a grasp
   /// Retires a body and admits its pieces in its place; their names.
   std::vector<std::string> replaceByPieces(const BodyId& parent, std::vector<BodyPiece> pieces);
   void followPieces(const BodyId& parent, const std::vector<BodyId>& children,
@@ -118,6 +119,8 @@ struct World::Impl {
   void fallAsleep(double h_frame);
   void closeBlades();
   std::vector<WorldBody*> bodiesInContact(double h);
+  int substepsNeeded(double h_frame) const;
+  double substepNow() const;  // [s]
   int chooseSubsteps(double h_frame);
   void movePush(double h, double h_frame);
   void pullSprings(double h, double h_frame);

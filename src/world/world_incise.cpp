@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "meshless_surgery/body/ease.h"
 #include "meshless_surgery/body/incise_body.h"
 #include "world_impl.h"
 
@@ -49,6 +50,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
     if (!bounds.overlaps(reach)) continue;
     Result<IncisedBody> opened = inciseBody(*body->model, body->state, command.blade);
     if (opened) {
+      easeRelease(*body->model, body->state, body->material, substepNow(), heldBySprings(*body), opened->pieces);
       all.push_back({body->id, std::move(*opened)});
     } else if (opened.error().code == ErrorCode::kMissed) {
       missed = body->name + ": " + opened.error().detail;
@@ -70,6 +72,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
     const std::string name = body.name;
     reply.cut_bodies.push_back(name);
     reply.opened_area += opened.body.opened_area;
+    reply.work += opened.body.work;
     if (opened.body.pieces.size() == 1) {
       body.model = std::move(opened.body.pieces[0].model);
       body.state = std::move(opened.body.pieces[0].state);

@@ -111,14 +111,20 @@ void World::step() {
 }
 
 // As many as the stiffest body needs, within the budget; what the budget takes from a body is said once.
-int World::Impl::chooseSubsteps(double h_frame) {
+int World::Impl::substepsNeeded(double h_frame) const {
   double needed = settings.substeps;
   if (settings.contact == ContactMethod::kRestShape && !awake.empty())
     needed = std::max(needed, static_cast<double>(contacts.neededSubsteps()));
-  for (const WorldBody* body : awake)
-    needed = std::max(needed, std::ceil(h_frame * highestFrequencyNow(*body->model, body->state)));
+  for (const auto& body : bodies)  // not `awake`: a cut asks between steps
+    if (!body->asleep) needed = std::max(needed, std::ceil(h_frame * highestFrequencyNow(*body->model, body->state)));
   const int most = std::max(settings.substeps, settings.max_substeps);
-  const int substeps = needed < most ? static_cast<int>(needed) : most;  // NaN: most
+  return needed < most ? static_cast<int>(needed) : most;  // NaN: most
+}
+
+double World::Impl::substepNow() const { return 1.0 / settings.step_rate / substepsNeeded(1.0 / settings.step_rate); }
+
+int World::Impl::chooseSubsteps(double h_frame) {
+  const int substeps = substepsNeeded(h_frame);
   for (WorldBody* body : awake) {
     const double factor = stiffnessFactor(*body->model, body->state, h_frame / substeps);
     if (factor < 1.0 && !(body->stiffness_factor < 1.0)) {

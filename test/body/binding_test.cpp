@@ -1,5 +1,6 @@
 #include "meshless_surgery/body/binding.h"
 
+#include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "support/bodies.h"
 
@@ -37,6 +38,45 @@ TEST(BindSurface, RidersFollowEveryAffineMotionExactly) {
       for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k) share += binding.weights[k];
       EXPECT_NEAR(share, 1.0, 1e-12);
       EXPECT_LT((riderPosition(binding, positions, poses, r) - surface[binding.riders[r]]).norm(), 1e-9 * size);
+    }
+  }
+}
+
+TEST(BindSurface, RidersOfAPieceAmplifyLittleAndFollowSmoothMotion) {
+  Mat3 map;
+  map << 1.2, 0.1, 0, -0.1, 0.9, 0.05, 0, 0.1, 1.1;
+  const Vec3 shift(1, -2, 3);
+  for (bool elastic : {false, true}) {
+    BodyDef def = test::defOf(sphereMesh(0.1, 0.012), "ball");
+    def.spacing = 0.018;
+    if (elastic) def.material.youngs_modulus = 5000.0;
+    const PreparedBody body = test::prepared(def);
+    for (int k = 0; k < 6; ++k) {
+      const Vec3 normal = Vec3(std::sin(k), std::cos(1.7 * k), std::sin(2.3 * k + 1.0)).normalized();
+      const Result<CutBody> cut = cutBody(*body.model, body.state, {normal, Vec3(0.01 * std::sin(k), 0.02, 0.0)});
+      ASSERT_TRUE(cut.ok());
+      for (const BodyPiece& piece : cut->pieces) {
+        const BodyModel& m = *piece.model;
+        const SurfaceBinding& binding = m.binding;
+        ASSERT_GT(binding.bound, 0u);
+        std::vector<ClusterPose> poses(m.clusters.size()), still = poses;
+        for (ClusterPose& pose : poses) pose.deformation = map;
+        // Bent by half a radian over the ball's width; the maps of levers are those of the rest shape.
+        const auto bent = [](const Vec3& p) { return Vec3(p.x(), p.y() + 2.5 * p.x() * p.x(), p.z()); };
+        Points curved;
+        for (const Vec3& p : m.rest) curved.push_back(bent(p));
+        const Points positions = moved(m.rest, map, shift), surface = moved(m.surface.vertices, map, shift);
+        for (Index r = 0; r < binding.riders.size(); ++r) {
+          double magnitude = 0.0;
+          for (Index c = binding.offsets[r]; c < binding.offsets[r + 1]; ++c) magnitude += std::abs(binding.weights[c]);
+          EXPECT_LE(magnitude, kMostWeight * (1.0 + 1e-9));
+          const Index v = binding.riders[r];
+          EXPECT_LT((riderPosition(binding, positions, poses, r) - surface[v]).norm(), 1e-10);
+          if (!binding.levers[r].isZero(0.0)) continue;
+          const double miss = (riderPosition(binding, curved, still, r) - bent(m.surface.vertices[v])).norm();
+          EXPECT_LT(miss, 2.5 * std::pow(2.5 * m.spacing, 2));
+        }
+      }
     }
   }
 }

@@ -140,8 +140,8 @@ TEST(CutBody, FarClustersAreKept) {
   ASSERT_GT(body.model->clusters.size(), 3u);
   const Result<CutBody> cut = cutBody(*body.model, body.state, {Vec3::UnitX(), Vec3(0.22, 0, 0)});
   ASSERT_TRUE(cut.ok());
-  EXPECT_GT(cut->kept_clusters, 0u);
-  EXPECT_GT(cut->rebuilt_clusters, 0u);
+  EXPECT_GT(cut->work.kept_clusters, 0u);
+  EXPECT_GT(cut->work.rebuilt_clusters, 0u);
 }
 
 TEST(CutBody, AMissAndAnOpenSurfaceAreRefused) {

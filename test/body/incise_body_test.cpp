@@ -37,7 +37,7 @@ TEST(InciseBody, KeepsVolumeMassPlacesAndParticles) {
     ASSERT_EQ(opened->pieces.size(), 1u);
     const BodyPiece& piece = opened->pieces[0];
     EXPECT_NEAR(opened->opened_area, 0.5 * M_PI * 0.01, 0.05 * M_PI * 0.01);
-    EXPECT_GT(opened->rebuilt_clusters, 0u);
+    EXPECT_GT(opened->work.rebuilt_clusters, 0u);
     EXPECT_NEAR(piece.model->mass, body.model->mass, 1e-12 * body.model->mass);
     EXPECT_NEAR(piece.model->rest_volume, body.model->rest_volume, 1e-9 * body.model->rest_volume);
     ASSERT_EQ(piece.model->rest.size(), body.model->rest.size());

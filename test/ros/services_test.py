@@ -151,6 +151,8 @@ class CutTest(DeformerTestCase):
         self.assertEqual(['left.1', 'left.2'], answer.new_bodies)
         self.assertAlmostEqual(0.01, answer.cap_area, places=6)
         self.assertGreaterEqual(answer.duration, 0.0)
+        self.assertGreater(answer.rebuilt_clusters, 0)
+        self.assertIn('%d clusters rebuilt, %d kept' % (answer.rebuilt_clusters, answer.kept_clusters), answer.message)
         pieces = [self.good('get_body', name=name) for name in answer.new_bodies]
         self.assertAlmostEqual(1.0, sum(p.volume for p in pieces) / whole.volume, places=9)
         self.assertAlmostEqual(1.0, sum(p.mass for p in pieces) / whole.mass, places=9)
@@ -198,6 +200,8 @@ class CutTest(DeformerTestCase):
         self.assertEqual([], opened.new_bodies)
         self.assertGreater(opened.opened_area, 0.001)
         self.assertAlmostEqual(1.0, self.good('get_body', name='left').volume / whole.volume, places=9)
+        self.assertGreater(opened.rebuilt_clusters, 0)
+        self.assertIn('%d kept' % opened.kept_clusters, opened.message)
         self.refused(['open there'], 'incise', blade=pose_stamped(-0.3, 0.01, 0.3, upwards), length=0.2, depth=0.19)
         apart = self.good('incise', blade=pose_stamped(-0.3, 0.01, 0.3, upwards), length=0.2, depth=0.5)
         self.assertEqual(['left.1', 'left.2'], apart.new_bodies)

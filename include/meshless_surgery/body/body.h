@@ -21,6 +21,7 @@ struct SurfaceBinding {
   Points levers;                      // [m] one a rider: what the carriers do not span at rest (thin sheets, crumbs)
   std::vector<Index> turners;         // one a rider: the cluster whose affine fit takes its lever along
   std::vector<Index> lever_clusters;  // ascending: those that take a lever along; their poses are needed with positions
+  Index bound = 0;                    // riders whose carriers were looked for: those of a parent came along
 };
 
 /// Constant while it lives: rest shape, topology, clusters, masses.
@@ -74,6 +75,9 @@ struct BodyState {
   double stretch = 1.0;   // of an elastic body: by how much its highest frequency has grown since rest
   std::vector<PlasticShape> plastic;  // one a cluster once something has flowed; empty before
   Points rider_offsets;   // [m] one a rider: what a cut left between its place and its carriers' (fades away)
+  Points eased;            // [m/s^2] one a particle where a cut lets go of it little by little, else empty; see ease.h
+  double eased_for = 0.0;  // [s] since that cut
+  bool eased_whole = false;  // what is eased may have a force and a torque
 };
 
 inline MatchInput matchInput(const BodyModel& model, const BodyState& state) {

@@ -12,11 +12,22 @@ struct BodyPiece {
   std::vector<Index> parent_particles;  // one a particle of the piece: its index in the parent, or kNoIndex if new
 };
 
+/// What a blade had to make of a body, over all pieces: its work, in counts that no clock blurs.
+struct CutWork {
+  std::size_t new_vertices = 0;      // of the surface
+  std::size_t new_triangles = 0;     // of caps or lips
+  std::size_t bound_riders = 0;      // vertices whose carriers were looked for
+  std::size_t kept_riders = 0;       // that kept theirs
+  std::size_t kept_clusters = 0;     // taken over unchanged
+  std::size_t rebuilt_clusters = 0;  // grown again
+
+  CutWork& operator+=(const CutWork& other);
+};
+
 struct CutBody {
   std::vector<BodyPiece> pieces;  // largest volume first, at least two
   double cap_area = 0.0;          // [m^2] of one side, present shape
-  Index kept_clusters = 0;
-  Index rebuilt_clusters = 0;
+  CutWork work;
 };
 
 struct CutBodyOptions {

@@ -10,8 +10,7 @@ struct IncisedBody {
   /// One where the body holds together: its particles are the parent's, in their order. Else largest volume first.
   std::vector<BodyPiece> pieces;
   double opened_area = 0.0;  // [m^2] of one lip
-  Index kept_clusters = 0;
-  Index rebuilt_clusters = 0;
+  CutWork work;
 };
 
 /// The blade is in the world frame and meets the present shape. Links between particles that pass through the blade are

@@ -8,7 +8,7 @@
 #include <variant>
 
 #include "meshless_surgery/base/ids.h"
-#include "meshless_surgery/body/body.h"
+#include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/geometry/cut.h"
 #include "meshless_surgery/geometry/incise.h"
 
@@ -75,6 +75,7 @@ struct CutReply {
   std::vector<std::string> cut_bodies;  // retired
   std::vector<std::string> new_bodies;
   double cap_area = 0.0;                // [m^2] of one side, over all bodies cut
+  CutWork work;                         // over all bodies cut
   double duration = 0.0;                // [s] wall time
   std::vector<std::string> notes;       // bodies that the blades met and that could not be cut, and why
 };
@@ -86,6 +87,7 @@ struct InciseReply {
   std::vector<std::string> cut_bodies;  // opened; one that came apart is retired
   std::vector<std::string> new_bodies;
   double opened_area = 0.0;             // [m^2] of one lip, over all bodies
+  CutWork work;                         // over all bodies
   double duration = 0.0;                // [s] wall time
   std::vector<std::string> notes;       // bodies that the blade met and that could not be opened, and why
 };

@@ -1,0 +1,68 @@
+#include "meshless_surgery/body/ease.h"
+
+#include <algorithm>
+#include <cmath>
+#include <future>
+
+#include "meshless_surgery/body/deform.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kNothing = 1e-9;  // of the spacing that a particle would move in a substep: not worth easing
+constexpr std::size_t kWorthAThread = 1000;  // particles
+
+// [m/s^2] of every particle by what the body does to itself.
+Points ownAccelerations(const BodyModel& model, BodyState state, const Material& material, double h) {
+  StepScratch scratch;
+  MatchCounters uncounted;
+  Points accelerations = state.velocities;
+  matchAndMove(model, material, Vec3::Zero(), h, state, scratch, uncounted);
+  for (std::size_t i = 0; i < accelerations.size(); ++i)
+    accelerations[i] = (state.velocities[i] - accelerations[i]) / h;
+  return accelerations;
+}
+
+}  // namespace
+
+void easeRelease(const BodyModel& parent, const BodyState& before, const Material& material, double h, const std::vector<Index>& held,
+                 std::vector<BodyPiece>& pieces) {
+  if (!(h > 0.0)) return;
+  // Side by side: together the pieces are as much as the whole.
+  auto uncut = std::async(parent.rest.size() > kWorthAThread ? std::launch::async : std::launch::deferred,
+                          [&] { return ownAccelerations(parent, before, material, h); });
+  std::vector<Points> parts;
+  for (const BodyPiece& piece : pieces) parts.push_back(ownAccelerations(*piece.model, piece.state, material, h));
+  const Points whole = uncut.get();
+  for (std::size_t p = 0; p < pieces.size(); ++p) {
+    BodyPiece& piece = pieces[p];
+    const BodyModel& model = *piece.model;
+    Points& eased = parts[p];
+    for (std::size_t i = 0; i < eased.size(); ++i) {
+      const Index old = piece.parent_particles[i];
+      // A crumb's one particle has nothing to ease.
+      eased[i] = old == kNoIndex || model.fixed[i] ? Vec3(Vec3::Zero()) : Vec3(whole[old] - eased[i]);
+    }
+    const auto& mine = piece.parent_particles;
+    const bool is_held = model.any_fixed || std::any_of(held.begin(), held.end(), [&](Index i) {
+                           return std::find(mine.begin(), mine.end(), i) != mine.end();
+                         });
+    if (!is_held) {
+      const RigidMotion released = rigidMotionOf(model, piece.state.positions, eased);
+      for (std::size_t i = 0; i < eased.size(); ++i)
+        eased[i] -= released.velocity + released.spin.cross(piece.state.positions[i] - released.centre);
+    }
+    double most = 0.0;
+    for (const Vec3& a : eased) most = std::max(most, a.norm());
+    if (!(h * h * most > kNothing * model.spacing)) continue;
+    piece.state.eased = std::move(eased);
+    piece.state.eased_for = 0.0;
+    piece.state.eased_whole = is_held;
+  }
+}
+
+double easedShare(double eased_for) {
+  return eased_for < kEaseTime ? 0.5 * (1.0 + std::cos(M_PI * eased_for / kEaseTime)) : 0.0;
+}
+
+}  // namespace meshless

@@ -1,0 +1,90 @@
+#include "meshless_surgery/body/ease.h"
+
+#include "meshless_surgery/body/deform.h"
+#include "support/bodies.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kStep = 1.0 / 120;  // [s]
+
+std::vector<BodyPiece> eased(const PreparedBody& body, bool held) {
+  Result<CutBody> cut = cutBody(*body.model, body.state, {Vec3(1.0, 0.2, 0.1).normalized(), Vec3(0.01, 0, 0)});
+  EXPECT_TRUE(cut.ok());
+  std::vector<Index> particles;
+  for (Index i = 0; held && i < body.model->rest.size(); ++i) particles.push_back(i);
+  easeRelease(*body.model, body.state, body.def.material, kStep, particles, cut->pieces);
+  return std::move(cut->pieces);
+}
+
+PreparedBody bent(bool elastic) {
+  BodyDef def = test::block("b", Vec3::Zero());
+  def.spacing = 0.02;
+  if (elastic) def.material.youngs_modulus = 5000.0;
+  PreparedBody body = test::prepared(def);
+  for (Vec3& p : body.state.positions) p = Vec3(1.2 * p.x(), p.y() + 2.0 * p.x() * p.x(), 0.9 * p.z());
+  updateSurface(*body.model, body.state);
+  return body;
+}
+
+TEST(EaseRelease, OfAFreeBodyHasNoForceAndNoTorqueOnAnyPiece) {
+  for (bool elastic : {false, true}) {
+    for (const BodyPiece& piece : eased(bent(elastic), false)) {
+      ASSERT_EQ(piece.state.eased.size(), piece.model->rest.size());
+      Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
+      double size = 0.0;
+      for (std::size_t i = 0; i < piece.state.eased.size(); ++i) {
+        const Vec3 f = piece.model->masses[i] * piece.state.eased[i];
+        force += f;
+        torque += piece.state.positions[i].cross(f);
+        size += f.norm();
+      }
+      EXPECT_GT(size, 0.0);
+      EXPECT_LT(force.norm(), 1e-10 * size);
+      EXPECT_LT(torque.norm(), 1e-10 * size);
+    }
+  }
+}
+
+TEST(EaseRelease, OfAHeldBodyIsEqualAndOppositeOnBothSides) {
+  for (bool elastic : {false, true}) {
+    Vec3 both = Vec3::Zero();
+    double one = 0.0;
+    for (const BodyPiece& piece : eased(bent(elastic), true)) {
+      Vec3 force = Vec3::Zero();
+      for (std::size_t i = 0; i < piece.state.eased.size(); ++i) force += piece.model->masses[i] * piece.state.eased[i];
+      both += force;
+      one = std::max(one, force.norm());
+    }
+    EXPECT_GT(one, 0.0);
+    EXPECT_LT(both.norm(), 1e-9 * one);
+  }
+}
+
+TEST(EaseRelease, FadesAndIsGone) {
+  EXPECT_EQ(easedShare(0.0), 1.0);
+  EXPECT_GT(easedShare(kStep), 0.98);
+  EXPECT_EQ(easedShare(kEaseTime), 0.0);
+  const PreparedBody body = bent(false);
+  for (bool held : {false, true}) {
+    BodyPiece piece = eased(body, held)[0];
+    StepScratch scratch;
+    MatchCounters counters;
+    for (double t = 0.0; t < kEaseTime - 1.5 * kStep; t += kStep) {
+      matchAndMove(*piece.model, body.def.material, Vec3::Zero(), kStep, piece.state, scratch, counters);
+      EXPECT_FALSE(piece.state.eased.empty()) << t;
+    }
+    for (int k = 0; k < 2; ++k)
+      matchAndMove(*piece.model, body.def.material, Vec3::Zero(), kStep, piece.state, scratch, counters);
+    EXPECT_TRUE(piece.state.eased.empty());
+    EXPECT_TRUE(test::allFinite(piece.state.positions));
+  }
+}
+
+TEST(EaseRelease, ABodyAtRestHasNothingToEase) {
+  const PreparedBody body = test::prepared(test::block("b", Vec3::Zero()));
+  for (const BodyPiece& piece : eased(body, false)) EXPECT_TRUE(piece.state.eased.empty());
+}
+
+}  // namespace
+}  // namespace meshless

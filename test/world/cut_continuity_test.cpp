@@ -1,0 +1,150 @@
+// In the step after a cut, tissue moves as it would have without it, but for what the released forces explain.
+#include <algorithm>
+
+#include <Eigen/Dense>
+
+#include "support/bodies.h"
+#include "support/random.h"
+
+namespace meshless {
+namespace {
+
+/// A motion of points as a whole: the rigid one nearest to it in the least squares, and what it leaves.
+struct Rest {
+  double rigid = 0.0;      // [m] the largest share of the rigid motion
+  double deforming = 0.0;  // [m]
+};
+
+Rest splitMotion(const Points& at, const Points& moves) {
+  Vec3 centre = Vec3::Zero(), mean = Vec3::Zero();
+  const double n = static_cast<double>(at.size());
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    centre += at[i] / n;
+    mean += moves[i] / n;
+  }
+  Mat3 inertia = Mat3::Zero();
+  Vec3 momentum = Vec3::Zero();
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    const Vec3 r = at[i] - centre;
+    inertia += r.squaredNorm() * Mat3::Identity() - r * r.transpose();
+    momentum += r.cross(moves[i] - mean);
+  }
+  const Vec3 spin = inertia.ldlt().solve(momentum);
+  Rest rest;
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    const Vec3 rigid = mean + spin.cross(at[i] - centre);
+    rest.rigid = std::max(rest.rigid, rigid.norm());
+    rest.deforming = std::max(rest.deforming, (moves[i] - rigid).norm());
+  }
+  return rest;
+}
+
+struct Scenario {
+  const char* name;
+  bool elastic, spinning, picked, loaded;
+  double deforms;  // of the largest move in the step: by how much the pieces may deform otherwise than uncut
+};
+
+World worldOf(const Scenario& s) {
+  BodyDef def = test::defOf(boxMesh(Vec3(0.2, 0.08, 0.08), 16, 6, 6), "bar");
+  def.pose.translation = Vec3(0, 0, 0.2);
+  def.spacing = 0.012;
+  def.material.damping = 2.0;
+  if (s.elastic) {
+    def.material.youngs_modulus = 5000.0;
+    def.material.poissons_ratio = 0.4;
+  }
+  PreparedBody body = test::prepared(def);
+  if (s.spinning)
+    for (std::size_t i = 0; i < body.state.positions.size(); ++i)
+      body.state.velocities[i] = Vec3(2, 3, 4).cross(body.state.positions[i] - def.pose.translation) + Vec3(0.1, 0, 0.2);
+  WorldSettings settings = test::weightless();
+  settings.contact = ContactMethod::kNone;
+  World world(settings);
+  EXPECT_TRUE(world.addSceneBody(std::make_shared<const PreparedBody>(body)).ok());
+  for (int side : {-1, 1}) {
+    if (!s.picked && !s.loaded) continue;
+    if (!s.loaded && side < 0) continue;
+    PickCommand pick;
+    pick.point = Vec3(0.1 * side, 0, 0.2);
+    pick.stiffness = s.loaded ? 2000.0 : 100.0;
+    const PickReply grabbed = test::replyOf<PickReply>(world.apply(pick));
+    MovePickCommand move;
+    move.pick = grabbed.pick;
+    move.target = pick.point + (s.loaded ? Vec3(0.06 * side, 0, 0.06) : Vec3(0.03, 0.02, 0.04));
+    test::replyOf<Done>(world.apply(move));
+  }
+  for (int k = 0; k < 60; ++k) world.step();
+  return world;
+}
+
+/// Askew through the middle.
+CutCommand cutOf(const BodySnapshot& body) {
+  CutCommand cut;
+  const Vec3 normal = Vec3(1.0, 0.3, 0.2).normalized();
+  cut.blades.x_axis = normal.unitOrthogonal();
+  cut.blades.y_axis = normal.cross(cut.blades.x_axis);
+  cut.blades.origin = body.measures.centre_of_mass - 10.0 * cut.blades.x_axis + Vec3(0.01, 0, 0);
+  return cut;
+}
+
+Vec3 angularMomentumOf(const BodySnapshot& body) {
+  return body.measures.angular_momentum + body.measures.centre_of_mass.cross(body.measures.linear_momentum);
+}
+
+TEST(CutContinuity, TheNextStepMovesTissueAsItWouldHaveWithoutTheCut) {
+  const SnapshotWants wants{true, true, true};
+  // The part of a grasp that a cut takes off loses its pull at once.
+  // Two that spin freely, after a quarter second two whose pick is cut through as well, two pulled at both ends.
+  const Scenario scenarios[] = {{"spinning", false, true, false, false, 1e-4},
+                                {"spinning, elastic", true, true, false, false, 0.02},
+                                {"spinning and picked", false, true, true, false, 0.45},
+                                {"spinning and picked, elastic", true, true, true, false, 0.55},
+                                {"stretched and bent", false, false, false, true, 1e-6},
+                                {"stretched and bent, elastic", true, false, false, true, 0.07}};
+  for (const Scenario& scenario : scenarios) {
+    SCOPED_TRACE(scenario.name);
+    World uncut = worldOf(scenario), cut = worldOf(scenario);
+    const Points before = uncut.snapshot(wants).bodies[0].particles;
+    test::replyOf<CutReply>(cut.apply(cutOf(uncut.snapshot(wants).bodies[0])));
+    std::vector<std::vector<Index>> parents;
+    for (const BodySnapshot& piece : cut.snapshot(wants).bodies) {
+      parents.emplace_back();
+      for (const Vec3& p : piece.particles)
+        parents.back().push_back(static_cast<Index>(std::find(before.begin(), before.end(), p) - before.begin()));
+    }
+    ASSERT_EQ(parents.size(), 2u);
+    uncut.step();
+    cut.step();
+    const BodySnapshot whole = uncut.snapshot(wants).bodies[0];
+    double move = 0.0;
+    for (std::size_t i = 0; i < before.size(); ++i) move = std::max(move, (whole.particles[i] - before[i]).norm());
+    ASSERT_GT(move, 1e-3);
+    const std::vector<BodySnapshot> pieces = cut.snapshot(wants).bodies;
+    for (std::size_t p = 0; p < 2; ++p) {
+      Points differ;
+      for (std::size_t i = 0; i < parents[p].size(); ++i) {
+        ASSERT_LT(parents[p][i], before.size());
+        differ.push_back(pieces[p].particles[i] - whole.particles[parents[p][i]]);
+      }
+      const Rest rest = splitMotion(pieces[p].particles, differ);
+      EXPECT_LE(rest.deforming, scenario.deforms * move);
+      EXPECT_LE(rest.rigid, (scenario.picked ? 0.15 : 0.03) * move);
+    }
+    if (scenario.picked || scenario.loaded) continue;
+    // Nothing is lent from one piece to the other while it is eased.
+    for (int step = 0; step < 40; ++step) {
+      Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+      for (const BodySnapshot& piece : cut.snapshot(wants).bodies) {
+        linear += piece.measures.linear_momentum;
+        angular += angularMomentumOf(piece);
+      }
+      EXPECT_LT((linear - whole.measures.linear_momentum).norm(), 1e-11 * linear.norm()) << step;
+      EXPECT_LT((angular - angularMomentumOf(whole)).norm(), 1e-11 * angular.norm()) << step;
+      cut.step();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace meshless

@@ -1,0 +1,114 @@
+// The work of a cut depends on what it meets, not on the cuts before it. Counted, for clocks blur.
+#include "support/bodies.h"
+#include "support/random.h"
+
+namespace meshless {
+namespace {
+
+constexpr int kCuts = 100;
+constexpr double kSlice = 0.03;    // [m]
+constexpr double kSpacing = 0.01;  // [m]
+
+BodyDef bar(bool elastic) {
+  const int slices = kCuts + 2;
+  BodyDef def = test::defOf(boxMesh(Vec3(slices * kSlice, 0.03, 0.03), 2 * slices, 2, 2), "bar");
+  def.spacing = kSpacing;
+  if (elastic) {
+    def.material.youngs_modulus = 5000.0;
+  } else {
+    def.clusters.kind = ClusterOptions::Kind::kGrid;
+    def.clusters.grid = {2 * slices, 1, 1};
+  }
+  return def;
+}
+
+World worldOf(const std::shared_ptr<const PreparedBody>& body) {
+  WorldSettings settings = test::weightless();
+  settings.contact = ContactMethod::kNone;
+  World world(settings);
+  EXPECT_TRUE(world.addSceneBody(body).ok());
+  return world;
+}
+
+/// Takes the slice of that number off the bar's end, askew.
+CutCommand slice(int number) {
+  CutCommand cut;
+  const Vec3 normal = Vec3(1.0, 0.05, 0.03).normalized();
+  cut.blades.origin = Vec3(0.5 * (kCuts + 2) * kSlice - (number + 1.07) * kSlice, 0.0, 0.0);
+  cut.blades.x_axis = normal.unitOrthogonal();
+  cut.blades.y_axis = normal.cross(cut.blades.x_axis);
+  return cut;
+}
+
+std::size_t particlesOf(World& world) {
+  std::size_t sum = 0;
+  for (const BodySnapshot& body : world.snapshot({}).bodies) sum += body.model->rest.size();
+  return sum;
+}
+
+TEST(SuccessiveCuts, TheHundredthDoesTheWorkOfTheSameCutWithoutHistory) {
+  for (bool elastic : {true, false}) {
+    SCOPED_TRACE(elastic ? "elastic" : "looks");
+    const auto body = test::shared(bar(elastic));
+    World world = worldOf(body), fresh = worldOf(body);
+    const std::size_t particles = particlesOf(world);
+    CutWork first;
+    for (int k = 0; k < kCuts; ++k) {
+      const CutReply cut = test::replyOf<CutReply>(world.apply(slice(k)));
+      if (k % 11 == 0) world.step();
+      ASSERT_EQ(cut.new_bodies.size(), 2u) << k;
+      ASSERT_EQ(particlesOf(world), particles) << k;
+      EXPECT_GT(cut.work.rebuilt_clusters, 0u);
+      EXPECT_GT(cut.work.bound_riders, 0u);
+      EXPECT_GT(cut.work.kept_clusters, 0u);
+      if (k == 0) first = cut.work;
+      // Every slice has the same section: what is new does not change, what is kept gets less with the bar.
+      EXPECT_EQ(cut.work.new_vertices, first.new_vertices) << k;
+      EXPECT_EQ(cut.work.new_triangles, first.new_triangles) << k;
+      EXPECT_LE(cut.work.kept_clusters, first.kept_clusters) << k;
+      if (k % 11 != 0) continue;  // 99 too
+      fresh.reset();
+      const CutReply alone = test::replyOf<CutReply>(fresh.apply(slice(k)));
+      EXPECT_EQ(cut.work.new_vertices, alone.work.new_vertices) << k;
+      EXPECT_EQ(cut.work.new_triangles, alone.work.new_triangles) << k;
+      EXPECT_EQ(cut.work.bound_riders, alone.work.bound_riders) << k;
+      EXPECT_EQ(cut.work.rebuilt_clusters, alone.work.rebuilt_clusters) << k;
+      EXPECT_LE(cut.work.kept_clusters, alone.work.kept_clusters) << k;
+    }
+  }
+}
+
+TEST(SuccessiveCuts, CapsThroughOldCapsAreNoFinerThanTheSurfaceWas) {
+  constexpr double kBallEdge = 0.008;  // [m]
+  test::Random random(21);
+  BodyDef def = test::defOf(sphereMesh(0.1, kBallEdge), "ball");
+  def.spacing = 0.012;
+  def.material.youngs_modulus = 5000.0;
+  World world = worldOf(test::shared(def));
+  const std::size_t particles = particlesOf(world);
+  for (int k = 0; k < kCuts; ++k) {
+    const WorldSnapshot shot = world.snapshot({true, false, true});
+    std::size_t largest = 0;
+    for (std::size_t b = 1; b < shot.bodies.size(); ++b)
+      if (shot.bodies[b].model->rest_volume > shot.bodies[largest].model->rest_volume) largest = b;
+    const BodySnapshot& target = shot.bodies[largest];
+    CutCommand cut;
+    const Vec3 normal = random.unit();
+    cut.blades.x_axis = normal.unitOrthogonal();
+    cut.blades.y_axis = normal.cross(cut.blades.x_axis);
+    cut.blades.origin = target.measures.centre_of_mass - 10.0 * cut.blades.x_axis;
+    cut.bodies = {target.name};
+    const CutReply reply = test::replyOf<CutReply>(world.apply(cut));
+    world.step();
+    // Equilateral triangles on both sides and four more at each edge of the rim of a round cap.
+    const double area = reply.cap_area / (kBallEdge * kBallEdge);
+    EXPECT_LT(static_cast<double>(reply.work.new_triangles),
+              1.5 * (area * 8.0 / std::sqrt(3.0) + 4.0 * 2.0 * std::sqrt(M_PI * area)))
+        << k;
+    EXPECT_LE(reply.work.rebuilt_clusters, 2 * target.model->clusters.size()) << k;
+    EXPECT_LT(particlesOf(world), particles + static_cast<std::size_t>(kCuts) / 10) << k;  // crumbs
+  }
+}
+
+}  // namespace
+}  // namespace meshless
