@@ -120,6 +120,7 @@ WorldBody& World::Impl::admit(std::string name, Material material, BodyModelPtr 
   body->model = std::move(model);
   body->state = std::move(state);
   bodies.push_back(std::move(body));
+  batches_current = false;
   return *bodies.back();
 }
 
@@ -129,6 +130,8 @@ void World::Impl::retire(const BodyId& id) {
       ++generations[id.slot];
       free_slots.push_back(id.slot);
       bodies.erase(it);
+      batches.clear();
+      batches_current = false;
       return;
     }
 }

@@ -7,6 +7,7 @@
 #include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/contact/textbook.h"
+#include "meshless_surgery/dynamics/match_batch.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless {
@@ -36,10 +37,18 @@ struct WorldBody {
   std::vector<Index> low_riders;
   double stiffness_factor = 1.0;
   Box bounds;                    // [m] of particles and surface, at the start of the last frame in which it was awake
+  bool batched = false;  // matched with others of its kind
   bool asleep = false;
   double still_for = 0.0;        // [s]
   std::uint32_t sleep_group = 0;  // those that fell asleep together wake together
   StepScratch scratch;
+};
+
+/// Bodies that are matched side by side.
+struct WorldBatch {
+  std::vector<WorldBody*> bodies;
+  std::vector<BatchBody> states;
+  std::unique_ptr<BodyBatch> batch;
 };
 
 /// Blades on their way together.
@@ -73,6 +82,8 @@ struct World::Impl {
   std::size_t tetrahedralizations = 0;
   std::vector<WorldBody*> awake;  // of this frame, in the order of bodies
   std::uint32_t next_sleep_group = 1;
+  std::vector<WorldBatch> batches;
+  bool batches_current = false;  // false: bodies or materials have changed
   Contacts contacts;
   std::vector<LoadedPair> loaded;
   std::vector<ContactParty> parties;  // one a body, in their order, where contacts are found in rest shapes
@@ -112,6 +123,8 @@ struct World::Impl {
 
   // stages of a step
   void listAwake();
+  void groupBatches();
+  void matchBatches(double h);
   /// The body and all that fell asleep with it.
   void wake(WorldBody& body);
   void wakeWithin(const Box& box);

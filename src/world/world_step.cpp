@@ -55,6 +55,7 @@ void World::step() {
       const Stopwatch contact(w.report.contact);
       w.findContacts(h_frame);
     }
+    w.groupBatches();
     const int substeps = w.chooseSubsteps(h_frame);
     const double h = h_frame / substeps;
     if (rest_shape) w.contacts.begin(w.parties, h);
@@ -68,7 +69,9 @@ void World::step() {
     for (int substep = 0; substep < substeps; ++substep) {
       {
         const Stopwatch match(w.report.match);
+        w.matchBatches(h);
         for (WorldBody* body : w.awake)
+          if (!body->batched)
           matchAndMove(*body->model, body->material, w.settings.gravity, h, body->state, body->scratch,
                        w.report.match_counters);
       }

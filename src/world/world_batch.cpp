@@ -1,0 +1,78 @@
+// Many small bodies of one kind are matched side by side in float (dynamics/match_batch.h): several times as fast as one
+// after another, by the same laws.
+#include <algorithm>
+
+#include "world_impl.h"
+
+namespace meshless {
+namespace {
+
+constexpr std::size_t kLeastBodies = 32;      // fewer are not worth going there and back
+constexpr std::size_t kMostParticles = 256;   // larger ones fill the lanes by themselves
+
+bool suits(const WorldBody& body) {
+  const BodyModel& model = *body.model;
+  return !body.material.elastic() && !body.material.plastic() && body.state.plastic.empty() &&
+         body.state.eased.empty() && !model.any_fixed && body.state.swelling == 1.0 && body.material.volume.points.empty() &&
+         body.material.area.points.empty() && model.rest.size() <= kMostParticles && model.rest.size() >= 4 &&
+         body.material.alpha > 0.0 && BodyBatch::holds(matchInput(model, body.state));
+}
+
+bool alike(const WorldBody& a, const WorldBody& b) {
+  return a.model->rest.size() == b.model->rest.size() && a.material.mode == b.material.mode &&
+         a.material.alpha == b.material.alpha && a.material.beta == b.material.beta &&
+         a.material.damping == b.material.damping;
+}
+
+}  // namespace
+
+void World::Impl::groupBatches() {
+  if (batches_current) return;
+  batches_current = true;
+  batches.clear();
+  for (auto& body : bodies) body->batched = false;
+  if (bodies.size() < kLeastBodies) return;
+  std::vector<std::vector<WorldBody*>> groups;
+  for (auto& body : bodies) {
+    if (!suits(*body)) continue;
+    const auto group = std::find_if(groups.begin(), groups.end(),
+                                    [&](const std::vector<WorldBody*>& g) { return alike(*g.front(), *body); });
+    if (group != groups.end())
+      group->push_back(body.get());
+    else
+      groups.push_back({body.get()});
+  }
+  for (std::vector<WorldBody*>& group : groups) {
+    if (group.size() < kLeastBodies) continue;
+    std::vector<MatchInput> inputs;
+    for (WorldBody* body : group) {
+      inputs.push_back(matchInput(*body->model, body->state));
+      body->batched = true;
+    }
+    WorldBatch batch;
+    batch.batch = std::make_unique<BodyBatch>(inputs, group.front()->material.mode == MatchMode::kQuadratic);
+    batch.states.resize(group.size());
+    batch.bodies = std::move(group);
+    batches.push_back(std::move(batch));
+  }
+}
+
+void World::Impl::matchBatches(double h) {
+  for (WorldBatch& batch : batches) {
+    bool any = false;
+    for (std::size_t i = 0; i < batch.bodies.size(); ++i) {
+      WorldBody& body = *batch.bodies[i];
+      batch.states[i] = {body.state.positions.data(), body.state.velocities.data(), &body.state.poses[0].rotation,
+                         !body.asleep};
+      if (body.asleep) continue;
+      any = true;
+      body.scratch.previous = body.state.positions;
+    }
+    if (!any) continue;
+    BatchStep step = batchStep(batch.bodies.front()->material, h);
+    step.gravity = settings.gravity;
+    batch.batch->stepInPlace(batch.states, step, report.match_counters);
+  }
+}
+
+}  // namespace meshless
