@@ -19,6 +19,7 @@ struct Contact {
   // direct: all corners are particles, normal and weights follow them
   bool direct = false;
   bool caught = false;  // has passed through: the side is remembered
+  bool below = true;     // the surface, when it was made
   bool flipped = false;  // the body is inside out where it is touched
   std::array<Index, 2> point{};
   double share = 0.0;
@@ -39,6 +40,7 @@ struct IslandPlan {
   std::vector<Index> parties, party_offsets;     // those that move
   std::vector<Index> shifts;                     // one a party: where its particles' shifts begin; kNoIndex: none
   std::vector<int> passes;                       // one an island: sweeps in a substep
+  std::vector<char> calm;                        // one an island: hardly turns or deforms within the frame
 
   Index size() const { return contact_offsets.empty() ? 0 : static_cast<Index>(contact_offsets.size() - 1); }
   void make(const std::vector<ContactParty>& parties, const std::vector<Contact>& contacts);
@@ -55,9 +57,10 @@ class ContactSolver {
   ContactSolver(ContactSolver&&) noexcept;
   ContactSolver& operator=(ContactSolver&&) noexcept;
 
-  /// Sweeps back and forth over each island, from the impulses that the contacts had.
+  /// Sweeps back and forth over each island, from the impulses that the contacts had. fresh: contacts, plan or parties
+  /// are others than in the last call; else calm islands keep normals, levers and answers.
   void solve(const ContactScene& scene, const std::vector<ContactParty>& parties, std::vector<Contact>& contacts,
-             const std::vector<ContactEntry>& entries, const IslandPlan& plan, ContactCounters& counters);
+             const std::vector<ContactEntry>& entries, const IslandPlan& plan, bool fresh, ContactCounters& counters);
   /// One sweep that lets out some of the overlap that there is, h [s] after the last; impulses are left alone.
   void letOut(const ContactScene& scene, const std::vector<ContactParty>& parties, std::vector<Contact>& contacts,
               const std::vector<ContactEntry>& entries, const IslandPlan& plan, double h, ContactCounters& counters);

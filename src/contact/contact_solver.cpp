@@ -50,7 +50,8 @@ struct Row {
   double friction;
   double rigid_a, rigid_b;     // shares of an impulse that move the parties as a whole; the rest moves particles
   Contact* contact;
-  bool on_ground, active;
+  double local_a, local_b;     // [1/kg] how particles answer an impulse at the points
+  bool on_ground, held;        // held: there is something to hold in this substep
 };
 
 Rigid rigidOf(const ContactParty& party) {
@@ -94,7 +95,8 @@ struct Gap {
   double local_a, local_b;  // [1/kg] how particles answer an impulse at the points
 };
 
-// For a direct contact, normal and weights are made from where the corners are.
+// For a direct contact, normal and weights are made from where the corners are; kKept: those of before, and no answers.
+template <bool kKept>
 bool readGap(const ContactScene& scene, const std::vector<ContactParty>& parties, Contact& c,
              const std::vector<ContactEntry>& entries, bool with_motion, Gap& gap) {
   const ContactParty& a = parties[c.a];
@@ -119,6 +121,12 @@ bool readGap(const ContactScene& scene, const std::vector<ContactParty>& parties
     }
     const ContactParty& b = parties[c.b];
     const Vec3 &q0 = b.positions[c.corners[0]], &q1 = b.positions[c.corners[1]], &q2 = b.positions[c.corners[2]];
+    if (kKept) {
+      const Vec3 &p0 = b.previous[c.corners[0]], &p1 = b.previous[c.corners[1]], &p2 = b.previous[c.corners[2]];
+      gap.point_b = c.weights[0] * q0 + c.weights[1] * q1 + c.weights[2] * q2;
+      gap.motion -= gap.point_b - (c.weights[0] * p0 + c.weights[1] * p1 + c.weights[2] * p2);
+      return true;
+    }
     const Vec3 e1 = q1 - q0, e2 = q2 - q0, d = gap.point_a - q0;
     const Vec3 area = e1.cross(e2);
     const double squared = area.squaredNorm();
@@ -175,7 +183,9 @@ const Rigid kStill{};
 struct ContactSolver::Impl {
   std::vector<Rigid> rigid;  // one a party
   std::vector<Vec3> shifts;  // of particles by the local shares of impulses, see IslandPlan::shifts
-  std::vector<Row> rows;
+  std::vector<Row> rows;                // of all islands in a solve(), kept while nothing turns
+  std::vector<Row> let_rows;            // of an island in letOut()
+  std::vector<Index> row_counts;        // one an island
 
   // inputs of the call
   const ContactScene* scene = nullptr;
@@ -291,7 +301,7 @@ struct ContactSolver::Impl {
 
   // Fills what both kinds of sweep need; false where there is nothing to hold.
   bool prepare(Contact& c, bool with_motion, Gap& gap, Row& row) {
-    if (!readGap(*scene, *parties, c, *entries, with_motion, gap)) return false;
+    if (!readGap<false>(*scene, *parties, c, *entries, with_motion, gap)) return false;
     row.contact = &c;
     row.on_ground = c.b == kNoIndex;
     const Rigid& a = (*parties)[c.a].moves ? rigid[c.a] : kStill;
@@ -313,6 +323,114 @@ struct ContactSolver::Impl {
     row.distance = c.normal.dot(gap.point_a - gap.point_b);
     return std::isfinite(row.distance);
   }
+
+  void solveIsland(Index island, std::vector<Contact>& contacts, bool fresh, std::size_t& corrected) {
+    Row* const first = rows.data() + plan->contact_offsets[island];
+    if (fresh || !plan->calm[island]) {
+      begin(island);
+      Row* row = first;
+      for (Index k = plan->contact_offsets[island]; k < plan->contact_offsets[island + 1]; ++k)
+        if (makeRow(contacts[plan->contacts[k]], *row)) ++row;
+      row_counts[island] = static_cast<Index>(row - first);
+    } else {
+      beginAgain(island);
+      for (Row* row = first; row != first + row_counts[island]; ++row) {
+        Gap gap;
+        readGap<true>(*scene, *parties, *row->contact, *entries, true, gap);
+        row->distance = row->normal.dot(gap.point_a - gap.point_b);
+        const double along = row->normal.dot(gap.motion);
+        row->target = std::min(0.0, row->distance - along);
+        row->slip = gap.motion - along * row->normal;
+      }
+    }
+    // From where the last substep ended: stacks converge over substeps, not within one.
+    for (Row* row = first; row != first + row_counts[island]; ++row) {
+      Contact& c = *row->contact;
+      if (c.impulse > 0.0)
+        apply(*row, c.impulse, c.impulse * row->normal + c.slip_impulse);
+      else
+        c.slip_impulse.setZero();
+    }
+    const Index count = row_counts[island];
+    for (int pass = 0; pass < plan->passes[island]; ++pass)
+      for (Index n = 0; n < count; ++n) corrected += sweep(first[pass % 2 ? count - 1 - n : n]);
+    finish(island);
+  }
+
+  bool makeRow(Contact& c, Row& row) {
+    Gap gap;
+    const double was = c.impulse;
+    c.impulse = 0.0;
+    if (!prepare(c, true, gap, row)) return false;
+    const double along_normal = c.normal.dot(gap.motion);
+    const double before = row.distance - along_normal;
+    if (c.direct && !row.on_ground) {
+      const double least = std::min({c.weights[0], c.weights[1], c.weights[2]});
+      if (!c.caught && least < (before > 0.0 ? -kBeside : -kFarBeside)) return false;
+    }
+    row.target = std::min(0.0, before);
+    row.slip = gap.motion - along_normal * c.normal;
+    const ContactParty &a = (*parties)[c.a], *b = row.on_ground ? nullptr : &(*parties)[c.b];
+    row.friction = std::sqrt(a.friction * (b ? b->friction : scene->ground_friction));
+    row.inverse_answer_along = 0.0;
+    if (row.friction > 0.0) {
+      // Along the slip and across it: the larger answer is safe for both.
+      const double length = row.slip.norm();
+      const Vec3 along = length > 0.0 ? Vec3(row.slip / length) : c.normal.unitOrthogonal();
+      const Vec3 across = c.normal.cross(along);
+      const Rigid& rigid_a = a.moves ? rigid[c.a] : kStill;
+      const Rigid& rigid_b = b && b->moves ? rigid[c.b] : kStill;
+      const double answer = std::max(mobility(rigid_a, row.rigid_a, row.lever_a, gap.local_a, along) +
+                                         mobility(rigid_b, row.rigid_b, row.lever_b, gap.local_b, along),
+                                     mobility(rigid_a, row.rigid_a, row.lever_a, gap.local_a, across) +
+                                         mobility(rigid_b, row.rigid_b, row.lever_b, gap.local_b, across));
+      if (answer > 0.0) row.inverse_answer_along = 1.0 / answer;
+    }
+    c.impulse = was;
+    if (was > 0.0) c.slip_impulse -= c.normal.dot(c.slip_impulse) * c.normal;
+    return true;
+  }
+
+  // One contact of a sweep; 1 where it moved something.
+  std::size_t sweep(const Row& row) {
+    Contact& c = *row.contact;
+    const Vec3 d = relativeShift(row);
+    const double along_normal = row.normal.dot(d);
+    const double wrong = row.target - row.distance - along_normal;
+    if (!(wrong > 0.0) && !(c.impulse > 0.0)) return 0;
+    const double change = std::max(-c.impulse, wrong * row.inverse_answer);
+    if (!std::isfinite(change)) return 0;
+    c.impulse += change;
+    Vec3 impulse = change * row.normal;
+    if (row.inverse_answer_along > 0.0) {
+      // Friction stops what slips, within the cone of all that presses.
+      const Vec3 slip = row.slip + d - along_normal * row.normal;
+      Vec3 wanted = c.slip_impulse - row.inverse_answer_along * slip;
+      const double cone = row.friction * c.impulse, squared = wanted.squaredNorm();
+      if (squared > cone * cone) wanted *= cone / std::sqrt(squared);
+      impulse += wanted - c.slip_impulse;
+      c.slip_impulse = wanted;
+    }
+    apply(row, change, impulse);
+    return 1;
+  }
+
+  // The bodies have hardly turned since begin(): only where they are is found anew.
+  void beginAgain(Index island) {
+    for (Index k = plan->party_offsets[island]; k < plan->party_offsets[island + 1]; ++k) {
+      const Index p = plan->parties[k];
+      const ContactParty& party = (*parties)[p];
+      Rigid& r = rigid[p];
+      r.shift.setZero();
+      r.turn.setZero();
+      std::fill_n(shifts.begin() + plan->shifts[p], party.particles, Vec3::Zero());
+      if (!(r.share > 0.0)) continue;
+      const Vec3 origin = party.positions[0];
+      Vec3 sum = Vec3::Zero();
+      for (Index i = 1; i < party.particles; ++i) sum += party.masses[i] * (party.positions[i] - origin);
+      r.centre = origin + sum / party.mass;
+    }
+  }
 };
 
 ContactSolver::ContactSolver() : impl_(std::make_unique<Impl>()) {}
@@ -322,79 +440,13 @@ ContactSolver& ContactSolver::operator=(ContactSolver&&) noexcept = default;
 
 void ContactSolver::solve(const ContactScene& scene, const std::vector<ContactParty>& parties,
                           std::vector<Contact>& contacts, const std::vector<ContactEntry>& entries,
-                          const IslandPlan& plan, ContactCounters& counters) {
+                          const IslandPlan& plan, bool fresh, ContactCounters& counters) {
   Impl& w = *impl_;
   w.start(scene, parties, entries, plan);
-  for (Index island = 0; island < plan.size(); ++island) {
-    w.begin(island);
-    w.rows.clear();
-    for (Index k = plan.contact_offsets[island]; k < plan.contact_offsets[island + 1]; ++k) {
-      Contact& c = contacts[plan.contacts[k]];
-      Gap gap;
-      Row row;
-      const double was = c.impulse;
-      c.impulse = 0.0;
-      if (!w.prepare(c, true, gap, row)) continue;
-      const double before = row.distance - c.normal.dot(gap.motion);
-      if (c.direct && !row.on_ground) {
-        const double least = std::min({c.weights[0], c.weights[1], c.weights[2]});
-        if (!c.caught && least < (before > 0.0 ? -kBeside : -kFarBeside)) continue;
-      }
-      row.target = std::min(0.0, before);
-      row.slip = gap.motion - c.normal.dot(gap.motion) * c.normal;
-      row.friction = std::sqrt(parties[c.a].friction *
-                               (row.on_ground ? scene.ground_friction : parties[c.b].friction));
-      row.inverse_answer_along = 0.0;
-      if (row.friction > 0.0) {
-        // Along the slip and across it: the larger answer is safe for both.
-        const double length = row.slip.norm();
-        const Vec3 along = length > 0.0 ? Vec3(row.slip / length) : c.normal.unitOrthogonal();
-        const Vec3 across = c.normal.cross(along);
-        const Rigid& a = parties[c.a].moves ? w.rigid[c.a] : kStill;
-        const Rigid& b = row.on_ground || !parties[c.b].moves ? kStill : w.rigid[c.b];
-        const double answer =
-            std::max(mobility(a, row.rigid_a, row.lever_a, gap.local_a, along) +
-                         mobility(b, row.rigid_b, row.lever_b, gap.local_b, along),
-                     mobility(a, row.rigid_a, row.lever_a, gap.local_a, across) +
-                         mobility(b, row.rigid_b, row.lever_b, gap.local_b, across));
-        if (answer > 0.0) row.inverse_answer_along = 1.0 / answer;
-      }
-      // From where the last substep ended: stacks converge over substeps, not within one.
-      if (was > 0.0) {
-        c.impulse = was;
-        c.slip_impulse -= c.normal.dot(c.slip_impulse) * c.normal;
-        w.apply(row, c.impulse, c.impulse * c.normal + c.slip_impulse);
-      } else {
-        c.slip_impulse.setZero();
-      }
-      w.rows.push_back(row);
-    }
-    const std::size_t count = w.rows.size();
-    for (int pass = 0; pass < plan.passes[island]; ++pass)
-      for (std::size_t n = 0; n < count; ++n) {
-        const Row& row = w.rows[pass % 2 ? count - 1 - n : n];
-        Contact& c = *row.contact;
-        const Vec3 d = w.relativeShift(row);
-        const double wrong = row.target - row.distance - row.normal.dot(d);
-        if (!(wrong > 0.0) && !(c.impulse > 0.0)) continue;
-        const double change = std::max(-c.impulse, wrong * row.inverse_answer);
-        if (!std::isfinite(change)) continue;
-        c.impulse += change;
-        Vec3 impulse = change * row.normal;
-        if (row.inverse_answer_along > 0.0) {
-          // Friction stops what slips, within the cone of all that presses.
-          const Vec3 slip = row.slip + d - row.normal.dot(d) * row.normal;
-          Vec3 wanted = c.slip_impulse - row.inverse_answer_along * slip;
-          const double cone = row.friction * c.impulse, squared = wanted.squaredNorm();
-          if (squared > cone * cone) wanted *= cone / std::sqrt(squared);
-          impulse += wanted - c.slip_impulse;
-          c.slip_impulse = wanted;
-        }
-        w.apply(row, change, impulse);
-        ++counters.corrected;
-      }
-    w.finish(island);
-  }
+  // Rows are kept in place: an island has room for all of its contacts.
+  w.rows.resize(plan.contacts.size());
+  w.row_counts.resize(plan.size());
+  for (Index island = 0; island < plan.size(); ++island) w.solveIsland(island, contacts, fresh, counters.corrected);
 }
 
 void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactParty>& parties,
@@ -403,27 +455,28 @@ void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactP
   Impl& w = *impl_;
   w.start(scene, parties, entries, plan);
   for (Index island = 0; island < plan.size(); ++island) {
-    w.rows.clear();
+    w.let_rows.clear();
     for (Index k = plan.contact_offsets[island]; k < plan.contact_offsets[island + 1]; ++k) {
       Contact& c = contacts[plan.contacts[k]];
+      if (!c.below) continue;
       Gap gap;
-      if (!readGap(scene, parties, c, entries, false, gap)) continue;
+      if (!readGap<false>(scene, parties, c, entries, false, gap)) continue;
       if (!(c.normal.dot(gap.point_a - gap.point_b) < 0.0)) continue;
       if (c.direct && c.b != kNoIndex && !c.caught &&
           std::min({c.weights[0], c.weights[1], c.weights[2]}) < -kFarBeside)
         continue;
       Row row;
-      if (w.rows.empty()) w.begin(island);
+      if (w.let_rows.empty()) w.begin(island);
       if (!w.prepare(c, false, gap, row)) continue;
       double size = parties[c.a].shape->size();
       if (!row.on_ground) size = std::min(size, parties[c.b].shape->size());
       const double old = -row.distance;
       row.target = c.caught ? std::min(old, kCaughtSpeed * size * h) - old
                             : std::min(kLetOutShare * old, kLetOutSpeed * size * h) - old;
-      w.rows.push_back(row);
+      w.let_rows.push_back(row);
     }
-    if (w.rows.empty()) continue;
-    for (const Row& row : w.rows) {
+    if (w.let_rows.empty()) continue;
+    for (const Row& row : w.let_rows) {
       const double wrong = row.target - row.distance - row.normal.dot(w.relativeShift(row));
       if (!(wrong > 0.0)) continue;
       const double impulse = wrong * row.inverse_answer;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include "cell_table.h"
 #include "contact_set.h"
@@ -13,6 +14,9 @@ namespace {
 constexpr double kMargin = 1e-3;        // of the smaller body's size: contacts are kept while so near
 constexpr double kQuick = 0.25;         // of the thickness: who goes farther is looked up in every substep, or traced
 constexpr double kMovedInRest = 0.005;  // of the size: a lookup is repeated where the deviation moved it farther
+constexpr std::size_t kLookAnew = 8;    // frames after which a point is looked up though it seems to be where it was
+constexpr double kWellWithin = 0.02;    // barycentric
+constexpr double kNearby = 0.1;         // of the thickness
 constexpr int kMostLookups = 3;
 constexpr Index kManyPartners = 4;      // from here on it pays to know how far a surface is from its map
 constexpr double kDeviation = 0.1;      // of the bounds' diagonal: how far a surface may be from where its maps have it
@@ -200,6 +204,7 @@ Box grown(Box box, double by) {
 // work do stacks need to stand (found with towers of cubes, see docs/method.md).
 constexpr double kStackWork = 4.75;
 constexpr double kMostPasses = 4.0;  // beyond it substeps do more
+constexpr double kCalm = 0.02;       // of the size, how far particles go apart in a frame
 constexpr int kFewSubsteps = 4;      // below it two sweeps, there and back
 
 /// Sweeps in a frame of h [s] for an island.
@@ -222,6 +227,12 @@ double stackWork(const ContactScene& scene, const std::vector<ContactParty>& par
   size /= count;
   const double layers = std::max(1.0, (high - low) / size);
   return kStackWork * h * std::sqrt(gravity / size) * std::min(layers * layers, 1e4);
+}
+
+/// The order in which contacts are made.
+std::tuple<bool, Index, Index, bool, Index> keyOf(const Contact& c) {
+  return {c.b != kNoIndex, std::min(c.a, c.b), c.b == kNoIndex ? 0 : std::max(c.a, c.b), c.b != kNoIndex && c.a > c.b,
+          c.sample};
 }
 
 using PairKey = std::pair<std::uint64_t, std::uint64_t>;
@@ -264,6 +275,11 @@ struct Contacts::Impl {
   double frame = 0.0;  // [s]
   ContactSolver solver;
   IslandPlan plan;
+  std::size_t cursor = 0;   // in `last`, while contacts are made
+  std::size_t frames = 0;
+  std::vector<std::uint64_t> keys;  // of the parties of the last frame
+  bool same_parties = false;        // as in the last frame, in the same order
+  bool fresh = true;        // nothing has been solved since the contacts were made
   bool plan_steady = true;  // the plan is that of the steady contacts alone
   // how many points of a pair are inside, as the lookups count them
   struct Inside {
@@ -275,6 +291,8 @@ struct Contacts::Impl {
               ContactShape::Nearest& found, bool& flipped, ContactCounters& counters) const;
   void addContact(const std::vector<ContactParty>& parties, Index a, Index sample, Index b, Index triangle,
                   const std::array<double, 3>& weights, bool was_caught, bool flipped);
+  bool stillOver(const ContactParty& with, Index a, Index b, Index sample, const Vec3& p, bool anew,
+                 ContactShape::Nearest& found, bool& flipped);
   void lookInto(const std::vector<ContactParty>& parties, const Pair& pair, Index a, Index b, const ContactMap* maps,
                 bool every_point, Inside& inside, ContactCounters& counters);
   void trace(const std::vector<ContactParty>& parties, Index a, Index b, ContactCounters& counters);
@@ -302,6 +320,7 @@ void Contacts::clear() {
   impl_->contacts.clear();
   impl_->last.clear();
   impl_->reached.clear();
+  impl_->keys.clear();
   impl_->needed_substeps = 1;
   impl_->depths.clear();
 }
@@ -423,6 +442,32 @@ void Contacts::Impl::addContact(const std::vector<ContactParty>& parties, Index 
   contacts.push_back(c);
 }
 
+// A point that was over a triangle in the last frame and still is, well within it and near, need not be looked up; now
+// and then it is.
+bool Contacts::Impl::stillOver(const ContactParty& with, Index a, Index b, Index sample, const Vec3& p, bool anew,
+                               ContactShape::Nearest& found, bool& flipped) {
+  const auto mine = std::make_tuple(true, std::min(a, b), std::max(a, b), a > b, sample);
+  while (cursor < last.size() && keyOf(last[cursor]) < mine) ++cursor;
+  if (anew || cursor == last.size() || (frames + sample) % kLookAnew == 0) return false;
+  const Contact& before = last[cursor];
+  if (keyOf(before) != mine || before.caught || !same_parties) return false;
+  const Triangle& corners = with.shape->surface().triangles[before.triangle];
+  const Vec3 q0 = vertexAt(with, corners[0]);
+  const Vec3 e1 = vertexAt(with, corners[1]) - q0, e2 = vertexAt(with, corners[2]) - q0, d = p - q0;
+  const Vec3 area = e1.cross(e2);
+  const double squared = area.squaredNorm();
+  const double v = d.cross(e2).dot(area), w = e1.cross(d).dot(area), least = kWellWithin * squared;
+  if (!(v > least) || !(w > least) || !(squared - v - w > least)) return false;
+  const double height = (before.flipped ? -1.0 : 1.0) * area.dot(d) / std::sqrt(squared);
+  if (!(std::abs(height) < kNearby * with.shape->thickness())) return false;
+  found.triangle = before.triangle;
+  found.weights = {1.0 - (v + w) / squared, v / squared, w / squared};
+  found.distance = height;
+  found.above = true;
+  flipped = before.flipped;
+  return true;
+}
+
 // The points of a in the shape of b.
 void Contacts::Impl::lookInto(const std::vector<ContactParty>& parties, const Pair& pair, Index a, Index b,
                               const ContactMap* maps, bool every_point, Inside& inside, ContactCounters& counters) {
@@ -442,7 +487,8 @@ void Contacts::Impl::lookInto(const std::vector<ContactParty>& parties, const Pa
     }
     ContactShape::Nearest found;
     bool flipped = false;
-    if (!locate(with, b, finders[b], maps, p, pair.reach, found, flipped, counters)) continue;
+    if (!stillOver(with, a, b, s, p, every_point, found, flipped) &&
+        !locate(with, b, finders[b], maps, p, pair.reach, found, flipped, counters)) continue;
     if (found.distance < 0.0) {
       ++inside.inside;
       inside.deepest = std::min(inside.deepest, found.distance);
@@ -450,6 +496,7 @@ void Contacts::Impl::lookInto(const std::vector<ContactParty>& parties, const Pa
     if (found.distance < near) ++inside.near;
     if (found.distance > pair.reach || (found.distance > near && !found.above && !every_point)) continue;
     addContact(parties, a, s, b, found.triangle, found.weights, false, flipped);
+    if (!contacts.empty()) contacts.back().below = found.distance < 0.0;
     if (found.distance < 0.0) depths.push_back(-found.distance / std::min(size, of.shape->size()));
   }
 }
@@ -592,17 +639,24 @@ void Contacts::Impl::addGround(const std::vector<ContactParty>& parties, Index a
     const double z = vertexAt(party, samples[s].vertices[0]).z();
     if (!(z < below)) continue;
     addContact(parties, a, s, kNoIndex, kNoIndex, {}, false, false);
+    contacts.back().below = z < *scene.ground;
     if (z < *scene.ground) depths.push_back((*scene.ground - z) / party.shape->size());
   }
 }
 
 void Contacts::Impl::choosePasses(const std::vector<ContactParty>& parties, double substep) {
   plan.passes.resize(plan.size());
+  plan.calm.resize(plan.size());
   const double substeps = std::max(1.0, std::round(frame / substep));
   const int least = substeps < kFewSubsteps ? 2 : 1;
   for (Index island = 0; island < plan.size(); ++island) {
     const double work = stackWork(scene, parties, plan, island, frame) / substeps;
     plan.passes[island] = std::max(least, static_cast<int>(std::ceil(std::min(work, kMostPasses))));
+    plan.calm[island] = 1;
+    for (Index k = plan.party_offsets[island]; k < plan.party_offsets[island + 1]; ++k) {
+      const ContactParty& party = parties[plan.parties[k]];
+      if (!(party.spread * frame < kCalm * party.shape->size())) plan.calm[island] = 0;
+    }
     if (caught.empty()) continue;
     for (Index k = plan.contact_offsets[island]; k < plan.contact_offsets[island + 1]; ++k)
       if (contacts[plan.contacts[k]].caught) plan.passes[island] = kCaughtPasses;
@@ -611,10 +665,8 @@ void Contacts::Impl::choosePasses(const std::vector<ContactParty>& parties, doub
 
 // What pressed in the last frame is where the solver starts: both lists are in the same order.
 void Contacts::Impl::takeOver() {
-  const auto key = [](const Contact& c) {
-    return std::make_tuple(c.b != kNoIndex, std::min(c.a, c.b), c.b == kNoIndex ? 0 : std::max(c.a, c.b),
-                           c.b != kNoIndex && c.a > c.b, c.sample);
-  };
+  if (!same_parties) return;
+  const auto key = keyOf;
   std::size_t old = 0;
   for (Contact& c : contacts) {
     while (old < last.size() && key(last[old]) < key(c)) ++old;
@@ -687,6 +739,14 @@ bool Contacts::Impl::letOutWhole(const std::vector<ContactParty>& parties, const
 void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactCounters& counters) {
   Impl& w = *impl_;
   if (w.reached.empty()) w.last.swap(w.contacts);
+  w.cursor = 0;
+  ++w.frames;
+  w.same_parties = w.keys.size() == parties.size();
+  w.keys.resize(parties.size());
+  for (Index p = 0; p < parties.size(); ++p) {
+    w.same_parties = w.same_parties && w.keys[p] == parties[p].key;
+    w.keys[p] = parties[p].key;
+  }
   w.contacts.clear();
   w.entries.clear();
   w.depths.clear();
@@ -793,7 +853,10 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   w.steady_entries = w.entries.size();
 }
 
-void Contacts::begin(const std::vector<ContactParty>& parties, double substep) { impl_->choosePasses(parties, substep); }
+void Contacts::begin(const std::vector<ContactParty>& parties, double substep) {
+  impl_->choosePasses(parties, substep);
+  impl_->fresh = true;
+}
 
 void Contacts::solve(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,
                      ContactCounters& counters) {
@@ -834,7 +897,8 @@ void Contacts::solve(const std::vector<ContactParty>& parties, double substep, c
     w.choosePasses(parties, substep);
   }
   w.plan_steady = steady;
-  w.solver.solve(w.scene, parties, w.contacts, w.entries, w.plan, counters);
+  w.solver.solve(w.scene, parties, w.contacts, w.entries, w.plan, w.fresh || !steady, counters);
+  w.fresh = !steady;
 }
 
 void Contacts::loadedPairs(std::vector<LoadedPair>& pairs) const {

@@ -83,7 +83,7 @@ void World::step() {
         const Stopwatch contact(w.report.contact);
         for (WorldBody* body : w.awake) {
           body->scratch.touched.clear();
-          if (w.push.enabled || (w.settings.ground && !rest_shape)) body->scratch.before_contact = body->state.positions;
+          if (w.push.enabled || (w.settings.ground && (!rest_shape || body->model->surface.vertices.empty()))) body->scratch.before_contact = body->state.positions;
         }
         if (rest_shape)
           w.solveContacts(h);
@@ -242,14 +242,14 @@ void World::Impl::movePush(double h, double h_frame) {
 void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame, const Vec3& push_velocity) {
   const BodyModel& model = *body.model;
   BodyState& state = body.state;
-  if (!settings.ground && !push.enabled) return;
+  const bool solved = settings.contact == ContactMethod::kRestShape && !model.surface.vertices.empty();
+  if ((!settings.ground || solved) && !push.enabled) return;  // without a surface, particles are held above the ground
   Box bounds;
   for (const Vec3& p : state.positions) bounds.extend(p);
   if (!model.binding.riders.empty()) {  // riders reach beyond the particles
     bounds.min.array() -= 2.0 * model.spacing;
     bounds.max.array() += 2.0 * model.spacing;
   }
-  const bool solved = settings.contact == ContactMethod::kRestShape && !model.surface.vertices.empty();
   const bool near_ground = !solved && settings.ground && bounds.min.z() <= *settings.ground;
   const bool near_push = push.enabled && (bounds.min.array() <= push.position.array() + push.radius).all() &&
                          (bounds.max.array() >= push.position.array() - push.radius).all();
