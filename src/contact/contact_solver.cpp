@@ -343,18 +343,39 @@ struct ContactSolver::Impl {
         row->slip = gap.motion - along * row->normal;
       }
     }
-    // From where the last substep ended: stacks converge over substeps, not within one.
-    for (Row* row = first; row != first + row_counts[island]; ++row) {
-      Contact& c = *row->contact;
-      if (c.impulse > 0.0)
-        apply(*row, c.impulse, c.impulse * row->normal + c.slip_impulse);
-      else
-        c.slip_impulse.setZero();
-    }
+    startWarm(island, first);
     const Index count = row_counts[island];
     for (int pass = 0; pass < plan->passes[island]; ++pass)
       for (Index n = 0; n < count; ++n) corrected += sweep(first[pass % 2 ? count - 1 - n : n]);
     finish(island);
+  }
+
+  // From where the last substep ended: stacks converge over substeps, not within one. What moves a party as a whole is
+  // summed before it is divided by mass and inertia.
+  void startWarm(Index island, const Row* first) {
+    const auto add = [&](Index p, double share, const Vec3& lever, const Vec3& impulse) {
+      if (!(share > 0.0)) return;
+      rigid[p].shift += share * impulse;
+      rigid[p].turn += share * lever.cross(impulse);
+    };
+    for (const Row* row = first; row != first + row_counts[island]; ++row) {
+      Contact& c = *row->contact;
+      if (!(c.impulse > 0.0)) {
+        c.slip_impulse.setZero();
+        continue;
+      }
+      const Vec3 impulse = c.impulse * row->normal + c.slip_impulse;
+      if (row->rigid_a < 1.0) give(c, true, 1.0 - row->rigid_a, impulse);
+      add(c.a, row->rigid_a, row->lever_a, impulse);
+      if (row->on_ground) continue;
+      if (row->rigid_b < 1.0) give(c, false, 1.0 - row->rigid_b, -impulse);
+      add(c.b, row->rigid_b, row->lever_b, -impulse);
+    }
+    for (Index k = plan->party_offsets[island]; k < plan->party_offsets[island + 1]; ++k) {
+      Rigid& r = rigid[plan->parties[k]];
+      r.shift *= r.inverse_mass;
+      r.turn = r.inverse_inertia * r.turn;
+    }
   }
 
   bool makeRow(Contact& c, Row& row) {
