@@ -39,6 +39,7 @@ World makePile(const PileOptions& options) {
   settings.substeps = options.substeps;
   settings.contact = options.contact;
   settings.sleep = options.sleeping;
+  settings.threads = options.threads;
   World world(settings);
   BodyDef def;
   def.mesh = boxMesh(Vec3::Constant(options.size), 2, 2, 2);

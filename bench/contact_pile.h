@@ -12,6 +12,7 @@ struct PileOptions {
   int substeps = 4;
   ContactMethod contact = ContactMethod::kRestShape;
   bool sleeping = false;
+  int threads = 1;
   bool turned = true;       // by a random yaw
   bool straight = false;    // one column without jitter
 };

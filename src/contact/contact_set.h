@@ -1,6 +1,7 @@
 // The contacts of a frame, as the finder makes them and the solver moves them.
 #pragma once
 
+#include "meshless_surgery/base/for_each.h"
 #include "meshless_surgery/contact/contacts.h"
 
 namespace meshless {
@@ -60,7 +61,7 @@ class ContactSolver {
   /// Sweeps back and forth over each island, from the impulses that the contacts had. fresh: contacts, plan or parties
   /// are others than in the last call; else calm islands keep normals, levers and answers.
   void solve(const ContactScene& scene, const std::vector<ContactParty>& parties, std::vector<Contact>& contacts,
-             const std::vector<ContactEntry>& entries, const IslandPlan& plan, bool fresh, ContactCounters& counters);
+             const std::vector<ContactEntry>& entries, const IslandPlan& plan, bool fresh, const ForEach& for_each, ContactCounters& counters);
   /// One sweep that lets out some of the overlap that there is, h [s] after the last; impulses are left alone.
   void letOut(const ContactScene& scene, const std::vector<ContactParty>& parties, std::vector<Contact>& contacts,
               const std::vector<ContactEntry>& entries, const IslandPlan& plan, double h, ContactCounters& counters);

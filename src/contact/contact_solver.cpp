@@ -11,6 +11,7 @@ namespace {
 constexpr double kLetOutShare = 0.3;  // of old overlap, a frame
 constexpr double kLetOutSpeed = 1.0;  // [1/s] times the smaller body's size, at most
 constexpr double kCaughtSpeed = 10.0;  // [1/s] likewise, of what has passed through
+constexpr Index kTaskContacts = 256;  // of a task at the least
 constexpr double kBeside = 0.02;      // barycentric: farther off its triangle a point does not touch it from outside
 constexpr double kFarBeside = 1.0;    // nor from inside
 
@@ -44,14 +45,13 @@ struct Rigid {
 struct Row {
   Vec3 normal, lever_a, lever_b;
   Vec3 arm_a, arm_b;           // [1/(kg m)] turn of each party by a unit impulse along the normal, with its share
-  Vec3 slip;                   // [m] tangential, before the sweeps
-  double distance, target;     // [m]
-  double inverse_answer, inverse_answer_along;  // [kg]
-  double friction;
-  double rigid_a, rigid_b;     // shares of an impulse that move the parties as a whole; the rest moves particles
-  Contact* contact;
-  double local_a, local_b;     // [1/kg] how particles answer an impulse at the points
-  bool on_ground, held;        // held: there is something to hold in this substep
+  Vec3 slip = Vec3::Zero();    // [m] tangential, before the sweeps
+  double distance = 0.0, target = 0.0;  // [m]
+  double inverse_answer = 0.0, inverse_answer_along = 0.0;  // [kg]
+  double friction = 0.0;
+  double rigid_a = 0.0, rigid_b = 0.0;  // shares of an impulse that move the parties as a whole; the rest moves particles
+  Contact* contact = nullptr;
+  bool on_ground = false;
 };
 
 Rigid rigidOf(const ContactParty& party) {
@@ -185,6 +185,8 @@ struct ContactSolver::Impl {
   std::vector<Vec3> shifts;  // of particles by the local shares of impulses, see IslandPlan::shifts
   std::vector<Row> rows;                // of all islands in a solve(), kept while nothing turns
   std::vector<Row> let_rows;            // of an island in letOut()
+  std::vector<Index> tasks;             // first island of each, and the end
+  std::vector<std::size_t> corrected;   // one a task
   std::vector<Index> row_counts;        // one an island
 
   // inputs of the call
@@ -461,13 +463,24 @@ ContactSolver& ContactSolver::operator=(ContactSolver&&) noexcept = default;
 
 void ContactSolver::solve(const ContactScene& scene, const std::vector<ContactParty>& parties,
                           std::vector<Contact>& contacts, const std::vector<ContactEntry>& entries,
-                          const IslandPlan& plan, bool fresh, ContactCounters& counters) {
+                          const IslandPlan& plan, bool fresh, const ForEach& for_each, ContactCounters& counters) {
   Impl& w = *impl_;
   w.start(scene, parties, entries, plan);
   // Rows are kept in place: an island has room for all of its contacts.
   w.rows.resize(plan.contacts.size());
   w.row_counts.resize(plan.size());
-  for (Index island = 0; island < plan.size(); ++island) w.solveIsland(island, contacts, fresh, counters.corrected);
+  // A task is some islands with about as many contacts as the others'.
+  w.tasks.assign(1, 0);
+  for (Index island = 0; island < plan.size(); ++island)
+    if (plan.contact_offsets[island + 1] - plan.contact_offsets[w.tasks.back()] >= kTaskContacts)
+      w.tasks.push_back(island + 1);
+  if (w.tasks.back() != plan.size()) w.tasks.push_back(plan.size());
+  w.corrected.assign(w.tasks.size() - 1, 0);
+  for_each(w.tasks.size() - 1, [&](std::size_t task) {
+    for (Index island = w.tasks[task]; island < w.tasks[task + 1]; ++island)
+      w.solveIsland(island, contacts, fresh, w.corrected[task]);
+  });
+  for (const std::size_t corrected : w.corrected) counters.corrected += corrected;
 }
 
 void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactParty>& parties,

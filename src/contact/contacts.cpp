@@ -14,6 +14,7 @@ namespace {
 constexpr double kMargin = 1e-3;        // of the smaller body's size: contacts are kept while so near
 constexpr double kQuick = 0.25;         // of the thickness: who goes farther is looked up in every substep, or traced
 constexpr double kMovedInRest = 0.005;  // of the size: a lookup is repeated where the deviation moved it farther
+constexpr std::size_t kTaskPairs = 32, kTaskParties = 128;  // looked at by one task
 constexpr std::size_t kLookAnew = 8;    // frames after which a point is looked up though it seems to be where it was
 constexpr double kWellWithin = 0.02;    // barycentric
 constexpr double kNearby = 0.1;         // of the thickness
@@ -253,6 +254,39 @@ struct Exit {
 
 }  // namespace
 
+namespace {
+
+/// What a task finds; tasks are joined in their order.
+struct Findings {
+  std::vector<Contact> contacts;
+  std::vector<ContactEntry> entries;
+  std::vector<double> depths;
+  ContactCounters counters;
+  std::size_t cursor = 0;  // in the contacts of the last frame
+
+  void clear() {
+    contacts.clear();
+    entries.clear();
+    depths.clear();
+    counters = ContactCounters();
+    cursor = 0;
+  }
+};
+
+/// How many points of one party lie in the other.
+struct Inside {
+  std::size_t points = 0, inside = 0, near = 0;
+  double deepest = 0.0;
+};
+
+/// Where a task has the contacts of a pair.
+struct PairFindings {
+  Inside of_a, of_b;
+  std::size_t contacts = 0, entries = 0, depths = 0;  // ends
+};
+
+}  // namespace
+
 struct Contacts::Impl {
   ContactScene scene;
   BroadPhase broad;
@@ -275,29 +309,27 @@ struct Contacts::Impl {
   double frame = 0.0;  // [s]
   ContactSolver solver;
   IslandPlan plan;
-  std::size_t cursor = 0;   // in `last`, while contacts are made
-  std::size_t frames = 0;
+  std::size_t frames = 0, last_sorted = 0;  // of `last`, before what was found out of turn
   std::vector<std::uint64_t> keys;  // of the parties of the last frame
   bool same_parties = false;        // as in the last frame, in the same order
   bool fresh = true;        // nothing has been solved since the contacts were made
   bool plan_steady = true;  // the plan is that of the steady contacts alone
-  // how many points of a pair are inside, as the lookups count them
-  struct Inside {
-    std::size_t points = 0, inside = 0, near = 0;
-    double deepest = 0.0;
-  };
+  std::vector<Findings> tasks;
+  std::vector<PairFindings> pair_findings;
 
   bool locate(const ContactParty& b, Index party, const MapFinder& finder, const ContactMap* maps, const Vec3& p, double reach,
               ContactShape::Nearest& found, bool& flipped, ContactCounters& counters) const;
-  void addContact(const std::vector<ContactParty>& parties, Index a, Index sample, Index b, Index triangle,
+  void addContact(Findings& to, const std::vector<ContactParty>& parties, Index a, Index sample, Index b, Index triangle,
                   const std::array<double, 3>& weights, bool was_caught, bool flipped);
-  bool stillOver(const ContactParty& with, Index a, Index b, Index sample, const Vec3& p, bool anew,
+  bool stillOver(std::size_t& cursor, const ContactParty& with, Index a, Index b, Index sample, const Vec3& p, bool anew,
                  ContactShape::Nearest& found, bool& flipped);
-  void lookInto(const std::vector<ContactParty>& parties, const Pair& pair, Index a, Index b, const ContactMap* maps,
-                bool every_point, Inside& inside, ContactCounters& counters);
+  void lookInto(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair, Index a, Index b, const ContactMap* maps,
+                bool every_point, Inside& inside);
   void trace(const std::vector<ContactParty>& parties, Index a, Index b, ContactCounters& counters);
   void addCaught(const std::vector<ContactParty>& parties);
-  void addGround(const std::vector<ContactParty>& parties, Index a, double reach);
+  void addGround(Findings& to, const std::vector<ContactParty>& parties, Index a, double reach);
+  void join(const Findings& from, std::size_t contacts_from, std::size_t contacts_to, std::size_t entries_from,
+            std::size_t entries_to);
   void takeOver();
   void choosePasses(const std::vector<ContactParty>& parties, double substep);
   bool letOutWhole(const std::vector<ContactParty>& parties, const Pair& pair, const Inside& of_a, const Inside& of_b,
@@ -388,7 +420,7 @@ bool Contacts::Impl::locate(const ContactParty& b, Index party, const MapFinder&
   return std::isfinite(found.distance);
 }
 
-void Contacts::Impl::addContact(const std::vector<ContactParty>& parties, Index a, Index sample, Index b,
+void Contacts::Impl::addContact(Findings& to, const std::vector<ContactParty>& parties, Index a, Index sample, Index b,
                                 Index triangle, const std::array<double, 3>& weights, bool was_caught,
                                 bool flipped) {
   const ContactParty& of = parties[a];
@@ -413,42 +445,42 @@ void Contacts::Impl::addContact(const std::vector<ContactParty>& parties, Index 
     }
   }
   if (!c.direct) {
-    c.first = static_cast<Index>(entries.size());
-    c.offset = addRow(of, s.vertices[0], 1.0 - s.share, entries);
+    c.first = static_cast<Index>(to.entries.size());
+    c.offset = addRow(of, s.vertices[0], 1.0 - s.share, to.entries);
     if (s.share > 0.0) {
-      c.offset += addRow(of, s.vertices[1], s.share, entries);
-      tidy(entries, c.first);
+      c.offset += addRow(of, s.vertices[1], s.share, to.entries);
+      tidy(to.entries, c.first);
     }
-    c.split = static_cast<Index>(entries.size());
+    c.split = static_cast<Index>(to.entries.size());
     if (b != kNoIndex) {
       const ContactParty& with = parties[b];
       const Triangle& corners = with.shape->surface().triangles[triangle];
       Vec3 x[3];
       for (int k = 0; k < 3; ++k) {
-        c.offset -= addRow(with, corners[k], weights[k], entries);
+        c.offset -= addRow(with, corners[k], weights[k], to.entries);
         x[k] = vertexAt(with, corners[k]);
       }
-      tidy(entries, c.split);
+      tidy(to.entries, c.split);
       const Vec3 area = (x[1] - x[0]).cross(x[2] - x[0]);
       const double length = area.norm();
       if (!(length > 0.0)) {
-        entries.resize(c.first);
+        to.entries.resize(c.first);
         return;
       }
       c.normal = area / (flipped ? -length : length);
     }
-    c.end = static_cast<Index>(entries.size());
+    c.end = static_cast<Index>(to.entries.size());
   }
-  contacts.push_back(c);
+  to.contacts.push_back(c);
 }
 
 // A point that was over a triangle in the last frame and still is, well within it and near, need not be looked up; now
 // and then it is.
-bool Contacts::Impl::stillOver(const ContactParty& with, Index a, Index b, Index sample, const Vec3& p, bool anew,
+bool Contacts::Impl::stillOver(std::size_t& cursor, const ContactParty& with, Index a, Index b, Index sample, const Vec3& p, bool anew,
                                ContactShape::Nearest& found, bool& flipped) {
   const auto mine = std::make_tuple(true, std::min(a, b), std::max(a, b), a > b, sample);
-  while (cursor < last.size() && keyOf(last[cursor]) < mine) ++cursor;
-  if (anew || cursor == last.size() || (frames + sample) % kLookAnew == 0) return false;
+  while (cursor < last_sorted && keyOf(last[cursor]) < mine) ++cursor;
+  if (anew || cursor >= last_sorted || (frames + sample) % kLookAnew == 0) return false;
   const Contact& before = last[cursor];
   if (keyOf(before) != mine || before.caught || !same_parties) return false;
   const Triangle& corners = with.shape->surface().triangles[before.triangle];
@@ -469,8 +501,8 @@ bool Contacts::Impl::stillOver(const ContactParty& with, Index a, Index b, Index
 }
 
 // The points of a in the shape of b.
-void Contacts::Impl::lookInto(const std::vector<ContactParty>& parties, const Pair& pair, Index a, Index b,
-                              const ContactMap* maps, bool every_point, Inside& inside, ContactCounters& counters) {
+void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair, Index a, Index b,
+                              const ContactMap* maps, bool every_point, Inside& inside) {
   const ContactParty &of = parties[a], &with = parties[b];
   const ContactShape& shape = *with.shape;
   if (shape.surface().triangles.empty() || with.map_count == 0) return;
@@ -487,17 +519,17 @@ void Contacts::Impl::lookInto(const std::vector<ContactParty>& parties, const Pa
     }
     ContactShape::Nearest found;
     bool flipped = false;
-    if (!stillOver(with, a, b, s, p, every_point, found, flipped) &&
-        !locate(with, b, finders[b], maps, p, pair.reach, found, flipped, counters)) continue;
+    if (!stillOver(to.cursor, with, a, b, s, p, every_point, found, flipped) &&
+        !locate(with, b, finders[b], maps, p, pair.reach, found, flipped, to.counters)) continue;
     if (found.distance < 0.0) {
       ++inside.inside;
       inside.deepest = std::min(inside.deepest, found.distance);
     }
     if (found.distance < near) ++inside.near;
     if (found.distance > pair.reach || (found.distance > near && !found.above && !every_point)) continue;
-    addContact(parties, a, s, b, found.triangle, found.weights, false, flipped);
-    if (!contacts.empty()) contacts.back().below = found.distance < 0.0;
-    if (found.distance < 0.0) depths.push_back(-found.distance / std::min(size, of.shape->size()));
+    addContact(to, parties, a, s, b, found.triangle, found.weights, false, flipped);
+    if (!to.contacts.empty()) to.contacts.back().below = found.distance < 0.0;
+    if (found.distance < 0.0) to.depths.push_back(-found.distance / std::min(size, of.shape->size()));
   }
 }
 
@@ -591,6 +623,7 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, In
 
 // Contacts of those that have passed through: with the triangle that they slid to, until they are back outside.
 void Contacts::Impl::addCaught(const std::vector<ContactParty>& parties) {
+  Findings found;
   std::map<std::uint64_t, Index> by_key;
   for (Index p = 0; p < parties.size(); ++p) by_key[parties[p].key] = p;
   for (auto it = caught.begin(); it != caught.end();) {
@@ -624,13 +657,14 @@ void Contacts::Impl::addCaught(const std::vector<ContactParty>& parties) {
         if (!(other.dot(area) > 0.0) || !(other.dot(p - r0) < 0.0)) break;
         it->second = next;
       }
-      if (!over) addContact(parties, a->second, it->first.sample, b->second, it->second, weights, true, false);
+      if (!over) addContact(found, parties, a->second, it->first.sample, b->second, it->second, weights, true, false);
     }
     it = over ? caught.erase(it) : std::next(it);
   }
+  join(found, 0, found.contacts.size(), 0, found.entries.size());
 }
 
-void Contacts::Impl::addGround(const std::vector<ContactParty>& parties, Index a, double reach) {
+void Contacts::Impl::addGround(Findings& to, const std::vector<ContactParty>& parties, Index a, double reach) {
   const ContactParty& party = parties[a];
   const std::vector<ContactSample>& samples = party.shape->samples();
   const double below = *scene.ground + reach;
@@ -638,10 +672,28 @@ void Contacts::Impl::addGround(const std::vector<ContactParty>& parties, Index a
     if (samples[s].share > 0.0) continue;  // between two vertices above a plane nothing is below it
     const double z = vertexAt(party, samples[s].vertices[0]).z();
     if (!(z < below)) continue;
-    addContact(parties, a, s, kNoIndex, kNoIndex, {}, false, false);
-    contacts.back().below = z < *scene.ground;
-    if (z < *scene.ground) depths.push_back((*scene.ground - z) / party.shape->size());
+    addContact(to, parties, a, s, kNoIndex, kNoIndex, {}, false, false);
+    to.contacts.back().below = z < *scene.ground;
+    if (z < *scene.ground) to.depths.push_back((*scene.ground - z) / party.shape->size());
   }
+}
+
+// Appends a part of what a task has found; its entries are then numbered from where they come to lie.
+void Contacts::Impl::join(const Findings& from, std::size_t contacts_from, std::size_t contacts_to,
+                          std::size_t entries_from, std::size_t entries_to) {
+  const Index moved = static_cast<Index>(entries.size()) - static_cast<Index>(entries_from);  // modulo 2^32
+  entries.insert(entries.end(), from.entries.begin() + static_cast<std::ptrdiff_t>(entries_from),
+                 from.entries.begin() + static_cast<std::ptrdiff_t>(entries_to));
+  const std::size_t first = contacts.size();
+  contacts.insert(contacts.end(), from.contacts.begin() + static_cast<std::ptrdiff_t>(contacts_from),
+                  from.contacts.begin() + static_cast<std::ptrdiff_t>(contacts_to));
+  if (entries_to > entries_from)
+    for (std::size_t k = first; k < contacts.size(); ++k)
+      if (!contacts[k].direct) {
+        contacts[k].first += moved;
+        contacts[k].split += moved;
+        contacts[k].end += moved;
+      }
 }
 
 void Contacts::Impl::choosePasses(const std::vector<ContactParty>& parties, double substep) {
@@ -669,8 +721,8 @@ void Contacts::Impl::takeOver() {
   const auto key = keyOf;
   std::size_t old = 0;
   for (Contact& c : contacts) {
-    while (old < last.size() && key(last[old]) < key(c)) ++old;
-    if (old == last.size()) break;
+    while (old < last_sorted && key(last[old]) < key(c)) ++old;
+    if (old >= last_sorted) break;
     if (key(last[old]) != key(c) || !(last[old].impulse > 0.0)) continue;
     c.impulse = last[old].impulse;
     c.slip_impulse = last[old].slip_impulse;
@@ -736,10 +788,13 @@ bool Contacts::Impl::letOutWhole(const std::vector<ContactParty>& parties, const
   return true;
 }
 
-void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactCounters& counters) {
+void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactCounters& counters,
+                    const ForEach& for_each) {
   Impl& w = *impl_;
-  if (w.reached.empty()) w.last.swap(w.contacts);
-  w.cursor = 0;
+  if (w.reached.empty()) {
+    w.last.swap(w.contacts);
+    w.last_sorted = std::min(w.steady_contacts, w.last.size());
+  }
   ++w.frames;
   w.same_parties = w.keys.size() == parties.size();
   w.keys.resize(parties.size());
@@ -779,33 +834,73 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   }
   // From below upwards where it matters: ground first.
   const double falling = w.scene.gravity.norm() * h * h;
-  for (Index a : w.grounded)
-    w.addGround(parties, a, kMargin * parties[a].shape->size() + speedOf(parties[a]) * h + falling);
-  double fastest = 0.0;  // substeps that the fastest quick pair asks for
-  for (Pair& pair : w.pairs) {
-    const ContactParty &a = parties[pair.a], &b = parties[pair.b];
-    const double size = std::min(a.shape->size(), b.shape->size());
-    const double thickness = std::min(a.shape->thickness(), b.shape->thickness());
-    const double way = approachOf(a, b);
-    const double most = kQuick * thickness;
-    pair.reach = kMargin * size + std::min(way * h + falling, most);
-    pair.quick = way * h > most;
-    pair.way = way;
-    const double step = kLongestStep * std::min((a.bounds.max - a.bounds.min).maxCoeff(), (b.bounds.max - b.bounds.min).maxCoeff());
-    if (pair.quick) fastest = std::max(fastest, way * h / step);
-    const std::size_t contacts_before = w.contacts.size(), entries_before = w.entries.size();
-    const std::size_t depths_before = w.depths.size();
-    Impl::Inside of_a, of_b;
-    w.lookInto(parties, pair, pair.a, pair.b, b.maps, false, of_a, counters);
-    w.lookInto(parties, pair, pair.b, pair.a, a.maps, false, of_b, counters);
-    const bool whole = w.letOutWhole(parties, pair, of_a, of_b, h, counters);
-    if (whole) {
-      pair.quick = false;
-      w.depths.resize(depths_before);
+  const std::size_t ground_tasks = (w.grounded.size() + kTaskParties - 1) / kTaskParties;
+  const std::size_t pair_tasks = (w.pairs.size() + kTaskPairs - 1) / kTaskPairs;
+  if (w.tasks.size() < ground_tasks + pair_tasks) w.tasks.resize(ground_tasks + pair_tasks);
+  w.pair_findings.resize(w.pairs.size());
+  for_each(ground_tasks + pair_tasks, [&](std::size_t n) {
+    Findings& task = w.tasks[n];
+    task.clear();
+    if (n < ground_tasks) {
+      for (std::size_t k = n * kTaskParties; k < std::min(w.grounded.size(), (n + 1) * kTaskParties); ++k) {
+        const ContactParty& party = parties[w.grounded[k]];
+        w.addGround(task, parties, w.grounded[k], kMargin * party.shape->size() + speedOf(party) * h + falling);
+      }
+      return;
     }
-    if (whole) {
-      w.contacts.resize(contacts_before);
-      w.entries.resize(entries_before);
+    const std::size_t first = (n - ground_tasks) * kTaskPairs;
+    if (first < w.pairs.size()) {
+      const Pair& pair = w.pairs[first];
+      const auto start = std::make_tuple(true, pair.a, pair.b, false, Index{0});
+      task.cursor = static_cast<std::size_t>(
+          std::partition_point(w.last.begin(), w.last.begin() + static_cast<std::ptrdiff_t>(w.last_sorted),
+                               [&](const Contact& c) { return keyOf(c) < start; }) -
+          w.last.begin());
+    }
+    for (std::size_t k = first; k < std::min(w.pairs.size(), first + kTaskPairs); ++k) {
+      Pair& pair = w.pairs[k];
+      const ContactParty &a = parties[pair.a], &b = parties[pair.b];
+      const double size = std::min(a.shape->size(), b.shape->size());
+      const double thickness = std::min(a.shape->thickness(), b.shape->thickness());
+      const double most = kQuick * thickness;
+      pair.way = approachOf(a, b);
+      pair.reach = kMargin * size + std::min(pair.way * h + falling, most);
+      pair.quick = pair.way * h > most;
+      PairFindings& findings = w.pair_findings[k];
+      findings = PairFindings();
+      w.lookInto(task, parties, pair, pair.a, pair.b, b.maps, false, findings.of_a);
+      w.lookInto(task, parties, pair, pair.b, pair.a, a.maps, false, findings.of_b);
+      findings.contacts = task.contacts.size();
+      findings.entries = task.entries.size();
+      findings.depths = task.depths.size();
+    }
+  });
+  double fastest = 0.0;  // substeps that the fastest quick pair asks for
+  for (std::size_t n = 0; n < ground_tasks + pair_tasks; ++n) {
+    const Findings& task = w.tasks[n];
+    counters.lookups += task.counters.lookups;
+    if (n < ground_tasks) {
+      w.join(task, 0, task.contacts.size(), 0, task.entries.size());
+      w.depths.insert(w.depths.end(), task.depths.begin(), task.depths.end());
+      continue;
+    }
+    const std::size_t first = (n - ground_tasks) * kTaskPairs;
+    PairFindings start;
+    for (std::size_t k = first; k < std::min(w.pairs.size(), first + kTaskPairs); ++k) {
+      Pair& pair = w.pairs[k];
+      const PairFindings& findings = w.pair_findings[k];
+      const ContactParty &a = parties[pair.a], &b = parties[pair.b];
+      if (w.letOutWhole(parties, pair, findings.of_a, findings.of_b, h, counters)) {
+        pair.quick = false;
+      } else {
+        w.join(task, start.contacts, findings.contacts, start.entries, findings.entries);
+        w.depths.insert(w.depths.end(), task.depths.begin() + static_cast<std::ptrdiff_t>(start.depths),
+                        task.depths.begin() + static_cast<std::ptrdiff_t>(findings.depths));
+        const double step = kLongestStep * std::min((a.bounds.max - a.bounds.min).maxCoeff(),
+                                                    (b.bounds.max - b.bounds.min).maxCoeff());
+        if (pair.quick) fastest = std::max(fastest, pair.way * h / step);
+      }
+      start = findings;
     }
   }
   counters.contacts += w.contacts.size();
@@ -859,7 +954,7 @@ void Contacts::begin(const std::vector<ContactParty>& parties, double substep) {
 }
 
 void Contacts::solve(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,
-                     ContactCounters& counters) {
+                     ContactCounters& counters, const ForEach& for_each) {
   Impl& w = *impl_;
   w.contacts.resize(w.steady_contacts);
   w.entries.resize(w.steady_entries);
@@ -882,12 +977,12 @@ void Contacts::solve(const std::vector<ContactParty>& parties, double substep, c
     const double thickness = std::min(parties[pair.a].shape->thickness(), parties[pair.b].shape->thickness());
     pair.reach = kMargin * size + std::min(pair.way * substep + falling, kQuick * thickness);
     const std::size_t before = w.contacts.size();
-    Impl::Inside ignored;
-    std::vector<double> depths;
-    depths.swap(w.depths);
-    w.lookInto(parties, pair, pair.a, pair.b, w.maps_now[pair.b].data(), true, ignored, counters);
-    w.lookInto(parties, pair, pair.b, pair.a, w.maps_now[pair.a].data(), true, ignored, counters);
-    depths.swap(w.depths);
+    Inside ignored;
+    Findings found;
+    w.lookInto(found, parties, pair, pair.a, pair.b, w.maps_now[pair.b].data(), true, ignored);
+    w.lookInto(found, parties, pair, pair.b, pair.a, w.maps_now[pair.a].data(), true, ignored);
+    w.join(found, 0, found.contacts.size(), 0, found.entries.size());
+    counters.lookups += found.counters.lookups;
     counters.contacts += w.contacts.size() - before;
   }
   if (!w.caught.empty()) w.addCaught(parties);
@@ -897,7 +992,7 @@ void Contacts::solve(const std::vector<ContactParty>& parties, double substep, c
     w.choosePasses(parties, substep);
   }
   w.plan_steady = steady;
-  w.solver.solve(w.scene, parties, w.contacts, w.entries, w.plan, w.fresh || !steady, counters);
+  w.solver.solve(w.scene, parties, w.contacts, w.entries, w.plan, w.fresh || !steady, for_each, counters);
   w.fresh = !steady;
 }
 

@@ -62,6 +62,7 @@ Status WorldSettings::validate() const {
   if (!(step_rate >= 1.0 && step_rate <= 10000.0)) return outOfRange("step_rate", step_rate, "1 to 10000 Hz");
   if (!(substeps >= 1 && substeps <= 1000)) return outOfRange("substeps", substeps, "1 to 1000");
   if (!(max_substeps >= 1 && max_substeps <= 1000)) return outOfRange("max_substeps", max_substeps, "1 to 1000");
+  if (!(threads >= 1 && threads <= 64)) return outOfRange("threads", threads, "1 to 64");
   if (!(pick_max_distance > 0.0 && pick_max_distance <= 1e6))
     return outOfRange("pick_max_distance", pick_max_distance, "above 0 to 1e6 m");
   if (!(pick_stiffness > 0.0 && pick_stiffness <= 1e12))
@@ -168,7 +169,10 @@ void World::Impl::needContactMesh(WorldBody& body) {
 
 // --- World
 
-World::World(WorldSettings settings) : impl_(std::make_unique<Impl>()) { impl_->settings = std::move(settings); }
+World::World(WorldSettings settings) : impl_(std::make_unique<Impl>()) {
+  impl_->settings = std::move(settings);
+  impl_->for_each = makeForEach(impl_->settings.threads);
+}
 World::~World() = default;
 World::World(World&&) noexcept = default;
 World& World::operator=(World&&) noexcept = default;

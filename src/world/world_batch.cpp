@@ -71,7 +71,7 @@ void World::Impl::matchBatches(double h) {
     if (!any) continue;
     BatchStep step = batchStep(batch.bodies.front()->material, h);
     step.gravity = settings.gravity;
-    batch.batch->stepInPlace(batch.states, step, report.match_counters);
+    batch.batch->stepInPlace(batch.states, step, report.match_counters, for_each);
   }
 }
 

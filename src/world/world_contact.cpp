@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kLeastRigid = 0.5;       // share of a contact's impulse that moves a body for looks as a whole
 constexpr double kFlattest = 1e-6;        // det of a map: below, the rotation stands in
+constexpr std::size_t kTaskBodies = 128;  // looked at by one task
 constexpr std::size_t kKeptModels = 64;   // more than this many dead entries are cleared away
 
 SurfaceRows rowsOf(const BodyModel& model) {
@@ -92,8 +93,16 @@ void World::Impl::findContacts(double h_frame) {
     fillParties();
     contacts.findPairs(scene, parties, h_frame, report.contact_counters);
     for (std::size_t b = 0; b < bodies.size(); ++b)
-      if (contacts.needed()[b]) equipParty(*bodies[b], parties[b], contacts.needed()[b] & 1);
-    contacts.make(parties, h_frame, report.contact_counters);
+      if (contacts.needed()[b]) equipParty(*bodies[b], parties[b]);
+    for_each((bodies.size() + kTaskBodies - 1) / kTaskBodies, [this](std::size_t task) {
+      for (std::size_t b = task * kTaskBodies; b < std::min(bodies.size(), (task + 1) * kTaskBodies); ++b) {
+        if (!(contacts.needed()[b] & 1)) continue;
+        fitMaps(*bodies[b], parties[b].positions, bodies[b]->maps);
+        parties[b].maps = bodies[b]->maps.data();
+        parties[b].map_count = static_cast<Index>(bodies[b]->maps.size());
+      }
+    });
+    contacts.make(parties, h_frame, report.contact_counters, for_each);
     bool woken = false;
     for (Index p : contacts.reached()) {
       woken = woken || bodies[p]->asleep;
@@ -106,9 +115,13 @@ void World::Impl::findContacts(double h_frame) {
 
 void World::Impl::fillParties() {
   parties.resize(bodies.size());
-  for (std::size_t b = 0; b < bodies.size(); ++b) {
-    WorldBody& body = *bodies[b];
-    ContactParty& party = parties[b];
+  for_each((bodies.size() + kTaskBodies - 1) / kTaskBodies, [this](std::size_t task) {
+    for (std::size_t b = task * kTaskBodies; b < std::min(bodies.size(), (task + 1) * kTaskBodies); ++b)
+      fillParty(*bodies[b], parties[b]);
+  });
+}
+
+void World::Impl::fillParty(WorldBody& body, ContactParty& party) {
     party = ContactParty();
     party.key = body.number;
     party.moves = !body.asleep;
@@ -119,7 +132,7 @@ void World::Impl::fillParties() {
     party.masses = body.model->masses.data();
     if (body.asleep) {
       party.bounds = body.bounds;
-      continue;
+      return;
     }
     party.rigid_share =
         body.model->any_fixed || body.material.elastic() ? 0.0 : std::max(kLeastRigid, body.material.alpha);
@@ -136,21 +149,15 @@ void World::Impl::fillParties() {
     }
     body.bounds = party.bounds;
     if (body.model->surface.vertices.empty()) party.bounds = Box();  // nothing to touch with
-  }
 }
 
-void World::Impl::equipParty(WorldBody& body, ContactParty& party, bool meets_bodies) {
+void World::Impl::equipParty(WorldBody& body, ContactParty& party) {
   const ContactModel& model = contactModel(body);
   party.shape = &model.shape;
   party.inverse_masses = model.inverse_masses.data();
   if (model.shape.rides()) {
     refreshSurface(body);
     party.surface = body.state.surface.data();
-  }
-  if (meets_bodies) {
-    fitMaps(body, party.positions, body.maps);
-    party.maps = body.maps.data();
-    party.map_count = static_cast<Index>(body.maps.size());
   }
 }
 
@@ -165,7 +172,7 @@ void World::Impl::solveContacts(double h) {
       parties[p].surface = body.state.surface.data();
     }
   };
-  contacts.solve(parties, h, refit, report.contact_counters);
+  contacts.solve(parties, h, refit, report.contact_counters, for_each);
   report.ground_contacts += contacts.groundLoaded();
 }
 

@@ -60,8 +60,12 @@ struct ClosingCut {
   std::uint64_t started_at = 0;
 };
 
+/// A loop on so many threads.
+ForEach makeForEach(int threads);
+
 struct World::Impl {
   WorldSettings settings;
+  ForEach for_each = oneAfterAnother;
   std::uint64_t step = 0;
   std::uint32_t run = 1;
   std::vector<std::unique_ptr<WorldBody>> bodies;  // in the order in which they came
@@ -125,6 +129,7 @@ struct World::Impl {
   void listAwake();
   void groupBatches();
   void matchBatches(double h);
+  void finishSubstep(double h);
   /// The body and all that fell asleep with it.
   void wake(WorldBody& body);
   void wakeWithin(const Box& box);
@@ -141,7 +146,8 @@ struct World::Impl {
   const ContactModel& contactModel(WorldBody& body);
   void findContacts(double h_frame);
   void fillParties();
-  void equipParty(WorldBody& body, ContactParty& party, bool meets_bodies);
+  void fillParty(WorldBody& body, ContactParty& party);
+  void equipParty(WorldBody& body, ContactParty& party);
   void solveContacts(double h);
   void liftOutOfGround(WorldBody& body, double h_frame);
   void findLow(WorldBody& body, double h_frame);

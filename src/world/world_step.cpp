@@ -19,6 +19,7 @@ constexpr double kOffsetGone = 1e-7;         // of the spacing: then it is dropp
 constexpr double kDepenetrationSpeed = 0.5;  // [m/s] at which old overlap of bodies is let out at the least
 constexpr double kPushHopRadii = 0.25;       // longest way of the sphere between two looks at the tissue
 constexpr int kContactPasses = 2;
+constexpr std::size_t kTaskBodies = 128;  // of a task
 
 class Stopwatch {
  public:
@@ -91,11 +92,7 @@ void World::step() {
           w.contactBodies(near, h, stride);
         w.movePush(h, h_frame);
       }
-      for (WorldBody* body : w.awake) {
-        preserve(*body->model, body->material, body->state, body->scratch, w.report.preserve_counters);
-        velocitiesFromPositions(*body->model, h, body->state, body->scratch);
-        body->surface_current = false;
-      }
+      w.finishSubstep(h);
     }
     for (WorldBody* body : w.awake) {
       if (rest_shape) w.liftOutOfGround(*body, h_frame);
@@ -111,6 +108,18 @@ void World::step() {
     w.report.substeps = static_cast<std::size_t>(substeps);
     w.report.tetrahedralizations = w.tetrahedralizations;
   }
+}
+
+void World::Impl::finishSubstep(double h) {
+  for (WorldBody* body : awake) {
+    if (!body->material.volume.points.empty() || !body->material.area.points.empty() || body->state.swelling != 1.0)
+      preserve(*body->model, body->material, body->state, body->scratch, report.preserve_counters);
+    body->surface_current = false;
+  }
+  for_each((awake.size() + kTaskBodies - 1) / kTaskBodies, [&](std::size_t task) {
+    for (std::size_t b = task * kTaskBodies; b < std::min(awake.size(), (task + 1) * kTaskBodies); ++b)
+      velocitiesFromPositions(*awake[b]->model, h, awake[b]->state, awake[b]->scratch);
+  });
 }
 
 // As many as the stiffest body needs, within the budget; what the budget takes from a body is said once.

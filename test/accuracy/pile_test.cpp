@@ -46,5 +46,18 @@ TEST(Pile, APileSettlesToThePenetrationAndHeightOfTrueCubes) {
   EXPECT_NEAR(m.height, 1.0, 0.01);
 }
 
+TEST(Pile, TwoThreadsGiveWhatOneGivesToTheBit) {
+  std::uint64_t hashes[2];
+  for (const int threads : {1, 2}) {
+    bench::PileOptions options;
+    options.bodies = 300;
+    options.threads = threads;
+    World world = bench::makePile(options);
+    for (int step = 0; step < 150; ++step) world.step();
+    hashes[threads - 1] = world.stateHash();
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+}
+
 }  // namespace
 }  // namespace meshless

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 
+#include "meshless_surgery/base/for_each.h"
 #include "meshless_surgery/contact/broad_phase.h"
 #include "meshless_surgery/contact/contact_shape.h"
 #include "meshless_surgery/contact/deformable.h"
@@ -70,7 +71,8 @@ class Contacts {
   const std::vector<char>& needed() const;
 
   /// Finds the contacts of the frame, and lets out old overlap: at a bounded speed, without changing velocities.
-  void make(const std::vector<ContactParty>& parties, double h, ContactCounters& counters);
+  void make(const std::vector<ContactParty>& parties, double h, ContactCounters& counters,
+            const ForEach& for_each = oneAfterAnother);
 
   /// Substeps that the frame asks for, as make() found it: tall stacks and fast bodies that are about to meet; 1 where
   /// there are none.
@@ -84,7 +86,7 @@ class Contacts {
   /// After bodies have moved by a substep: what approached deeper goes back to where it was or to the surface, with
   /// friction. Impulses are equal and opposite.
   void solve(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,
-             ContactCounters& counters);
+             ContactCounters& counters, const ForEach& for_each = oneAfterAnother);
 
   /// Pairs that pressed on each other in the last solve(); ascending, without duplicates.
   void loadedPairs(std::vector<LoadedPair>& pairs) const;

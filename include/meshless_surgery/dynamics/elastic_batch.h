@@ -2,7 +2,7 @@
 #pragma once
 
 #include "meshless_surgery/dynamics/elastic.h"
-#include "meshless_surgery/dynamics/for_each.h"
+#include "meshless_surgery/base/for_each.h"
 #include "meshless_surgery/dynamics/rotation_batch.h"
 
 namespace meshless {

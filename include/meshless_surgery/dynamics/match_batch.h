@@ -7,7 +7,7 @@
 #include <memory>
 #include <optional>
 
-#include "meshless_surgery/dynamics/for_each.h"
+#include "meshless_surgery/base/for_each.h"
 #include "meshless_surgery/dynamics/rotation_batch.h"
 #include "meshless_surgery/dynamics/shape_matching.h"
 

@@ -9,6 +9,8 @@ namespace meshless {
 /// Calls work(0) .. work(count - 1), in any order and on any threads, and returns when all are done. What is computed
 /// does not depend on it to the bit.
 using ForEach = std::function<void(std::size_t count, const std::function<void(std::size_t)>& work)>;
-void oneAfterAnother(std::size_t count, const std::function<void(std::size_t)>& work);
+inline void oneAfterAnother(std::size_t count, const std::function<void(std::size_t)>& work) {
+  for (std::size_t i = 0; i < count; ++i) work(i);
+}
 
 }  // namespace meshless
