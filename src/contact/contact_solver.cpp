@@ -48,7 +48,7 @@ struct Row {
   Vec3 slip = Vec3::Zero();    // [m] tangential, before the sweeps
   double distance = 0.0, target = 0.0;  // [m]
   double inverse_answer = 0.0, inverse_answer_along = 0.0;  // [kg]
-  double friction = 0.0;
+  double friction = 0.0, restitution = 0.0;
   double rigid_a = 0.0, rigid_b = 0.0;  // shares of an impulse that move the parties as a whole; the rest moves particles
   Contact* contact = nullptr;
   bool on_ground = false;
@@ -194,6 +194,7 @@ struct ContactSolver::Impl {
   const std::vector<ContactParty>* parties = nullptr;
   const std::vector<ContactEntry>* entries = nullptr;
   const IslandPlan* plan = nullptr;
+  double resting = 0.0;  // [m] a substep's approach that is no bounce
 
   Vec3 localShift(const Contact& c, bool of_a) const {
     const Index p = of_a ? c.a : c.b;
@@ -341,11 +342,12 @@ struct ContactSolver::Impl {
         readGap<true>(*scene, *parties, *row->contact, *entries, true, gap);
         row->distance = row->normal.dot(gap.point_a - gap.point_b);
         const double along = row->normal.dot(gap.motion);
-        row->target = std::min(0.0, row->distance - along);
+        row->target = targetOf(row->restitution, row->distance, along);
         row->slip = gap.motion - along * row->normal;
       }
     }
     startWarm(island, first);
+    strikeTogether(first, first + row_counts[island]);
     const Index count = row_counts[island];
     for (int pass = 0; pass < plan->passes[island]; ++pass)
       for (Index n = 0; n < count; ++n) corrected += sweep(first[pass % 2 ? count - 1 - n : n]);
@@ -380,6 +382,48 @@ struct ContactSolver::Impl {
     }
   }
 
+  // Points of a body that strike another at once: one after the other they would turn it. So what they need together goes
+  // to all of them in equal parts first. Only where nothing pressed before.
+  void strikeTogether(const Row* row, const Row* end) {
+    while (row != end) {
+      const Row* first = row;
+      bool pressed = false;
+      for (; row != end && row->contact->a == first->contact->a && row->contact->b == first->contact->b; ++row)
+        pressed = pressed || row->contact->impulse > 0.0;
+      if (pressed || row - first < 2) continue;
+      int count = 0;
+      double wrong = 0.0, local = 0.0;
+      Vec3 lever_a = Vec3::Zero(), lever_b = Vec3::Zero(), normal = Vec3::Zero();
+      const auto lacks = [this](const Row& r) { return r.target - r.distance - r.normal.dot(relativeShift(r)); };
+      const Rigid& a = rigid[first->contact->a];
+      const Rigid& b = first->on_ground ? kStill : rigid[first->contact->b];
+      for (const Row* r = first; r != row; ++r) {
+        const double lack = lacks(*r);
+        if (!(lack > 0.0)) continue;
+        ++count;
+        wrong += lack;
+        lever_a += r->lever_a;
+        lever_b += r->lever_b;
+        normal += r->normal;
+        local += 1.0 / r->inverse_answer - r->rigid_a * a.inverse_mass - r->rigid_b * b.inverse_mass -
+                 r->lever_a.cross(r->normal).dot(r->arm_a) - r->lever_b.cross(r->normal).dot(r->arm_b);
+      }
+      if (count < 2 || !(normal.norm() > 0.5 * count)) continue;
+      normal.normalize();
+      const Vec3 arm_a = (lever_a / count).cross(normal), arm_b = (lever_b / count).cross(normal);
+      const double answer =
+          first->rigid_a * (a.inverse_mass + arm_a.dot(a.inverse_inertia * arm_a)) +
+          first->rigid_b * (b.inverse_mass + arm_b.dot(b.inverse_inertia * arm_b)) + std::max(0.0, local) / (count * count);
+      const double each = wrong / count / answer / count;
+      if (!(answer > 0.0) || !std::isfinite(each)) continue;
+      for (const Row* r = first; r != row; ++r) {
+        if (!(r->target > r->distance)) continue;
+        r->contact->impulse += each;
+        apply(*r, each, each * r->normal);
+      }
+    }
+  }
+
   bool makeRow(Contact& c, Row& row) {
     Gap gap;
     const double was = c.impulse;
@@ -391,9 +435,10 @@ struct ContactSolver::Impl {
       const double least = std::min({c.weights[0], c.weights[1], c.weights[2]});
       if (!c.caught && least < (before > 0.0 ? -kBeside : -kFarBeside)) return false;
     }
-    row.target = std::min(0.0, before);
-    row.slip = gap.motion - along_normal * c.normal;
     const ContactParty &a = (*parties)[c.a], *b = row.on_ground ? nullptr : &(*parties)[c.b];
+    row.restitution = !b ? a.restitution : b->mass > 0.0 ? std::sqrt(a.restitution * b->restitution) : a.restitution;
+    row.target = targetOf(row.restitution, row.distance, along_normal);
+    row.slip = gap.motion - along_normal * c.normal;
     row.friction = std::sqrt(a.friction * (b ? b->friction : scene->ground_friction));
     row.inverse_answer_along = 0.0;
     if (row.friction > 0.0) {
@@ -412,6 +457,15 @@ struct ContactSolver::Impl {
     c.impulse = was;
     if (was > 0.0) c.slip_impulse -= c.normal.dot(c.slip_impulse) * c.normal;
     return true;
+  }
+
+  // No nearer than at the start of the substep, nor than the surface. What bounces goes back from where it was at a share
+  // of the speed at which it came; what only rests does not.
+  double targetOf(double restitution, double distance, double motion) const {
+    const double before = distance - motion;
+    const double rest = std::min(0.0, before);
+    if (!(restitution > 0.0) || !(distance < 0.0) || !(-motion > resting)) return rest;
+    return std::max(rest, before - restitution * motion);
   }
 
   // One contact of a sweep; 1 where it moved something.
@@ -466,6 +520,7 @@ void ContactSolver::solve(const ContactScene& scene, const std::vector<ContactPa
                           const IslandPlan& plan, bool fresh, const ForEach& for_each, ContactCounters& counters) {
   Impl& w = *impl_;
   w.start(scene, parties, entries, plan);
+  w.resting = 2.0 * scene.gravity.norm() * scene.substep * scene.substep;
   // Rows are kept in place: an island has room for all of its contacts.
   w.rows.resize(plan.contacts.size());
   w.row_counts.resize(plan.size());

@@ -949,6 +949,7 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
 }
 
 void Contacts::begin(const std::vector<ContactParty>& parties, double substep) {
+  impl_->scene.substep = substep;
   impl_->choosePasses(parties, substep);
   impl_->fresh = true;
 }

@@ -93,6 +93,7 @@ void readMaterial(YamlSource& source, const YAML::Node& node, const std::string&
   map.number("density", {0.0, 1e6, true, "kg/m^3"}, material.density);
   map.number("damping", {0.0, 1e6, false, "1/s"}, material.damping);
   map.number("friction", {0.0, 10.0}, material.friction);
+  map.number("restitution", {0.0, 1.0}, material.restitution);
   readCurve(map, "volume", material.volume);
   readCurve(map, "area", material.area);
   readPlasticity(map, material.plasticity);

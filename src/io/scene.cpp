@@ -15,6 +15,7 @@ namespace fs = std::filesystem;
 
 constexpr double kMaxLength = 1000.0;  // [m] of anything in a scene
 constexpr int kMaxBodies = 10000;
+constexpr std::size_t kMaxObstacles = 100;
 
 NumberRange lengths(double from = -kMaxLength, bool open = false) { return {from, kMaxLength, open, "m"}; }
 
@@ -35,6 +36,7 @@ void readWorld(YamlSource& source, const YAML::Node& node, WorldSettings& world)
   map.number("step_rate", {1.0, 10000.0, false, "Hz"}, world.step_rate);
   map.whole("substeps", 1, 1000, world.substeps);
   map.whole("max_substeps", 1, 1000, world.max_substeps);
+  map.whole("threads", 1, 64, world.threads);
   const int contact = map.choice("contact", {"none", "textbook", "rest_shape"});
   if (contact >= 0) world.contact = static_cast<ContactMethod>(contact);
   if (const YAML::Node pick = map.get("pick"); pick.IsDefined()) {
@@ -222,7 +224,7 @@ class SceneReader {
     if (const YAML::Node world = map.get("world"); world.IsDefined()) readWorld(source_, world, scene_.world);
     if (const YAML::Node materials = map.get("materials"); materials.IsDefined())
       readMaterialMap(source_, materials, scene_.materials);
-    const YAML::Node bodies = map.get("bodies");
+    const YAML::Node bodies = map.get("bodies"), obstacles = map.get("obstacles");
     map.finish();
     if (!bodies.IsSequence() || bodies.size() > kMaxBodies) {
       source_.fail(bodies.IsDefined() ? bodies : root, "bodies is " + shown(bodies), "a list of up to 10000 bodies");
@@ -231,6 +233,13 @@ class SceneReader {
     for (const auto& body : bodies) {
       if (source_.fault) return;  // later bodies may take seconds to load
       readBody(body);
+    }
+    if (!obstacles.IsDefined()) return;
+    if (!obstacles.IsSequence() || obstacles.size() > kMaxObstacles)
+      return source_.fail(obstacles, "obstacles is " + shown(obstacles), "a list of up to 100 obstacles");
+    for (const auto& obstacle : obstacles) {
+      if (source_.fault) return;
+      readObstacle(obstacle);
     }
   }
 
@@ -276,6 +285,39 @@ class SceneReader {
         source_.fail(node, "two bodies are named '" + copy.name + "'", "each name once", ErrorCode::kDuplicateName);
       scene_.bodies.push_back(std::move(copy));
     }
+  }
+
+  void readObstacle(const YAML::Node& node) {
+    YamlMap map(source_, node, "an obstacle");
+    BodyDef shape;
+    ObstacleDef def;
+    double scale = 1.0, edge = 0.0;
+    map.text("name", shape.name);
+    map.number("scale", {0.0, 1e6, true}, scale);
+    map.number("edge", lengths(0.0, true), edge);
+    map.number("friction", {0.0, 10.0}, def.friction);
+    if (const YAML::Node pose = map.get("pose"); pose.IsDefined()) shape.pose = readPose(source_, pose);
+    const YAML::Node file = map.get("file"), primitive = map.get("primitive");
+    if (file.IsDefined() == primitive.IsDefined())
+      source_.fail(node, file.IsDefined() ? "an obstacle has file and primitive" : "an obstacle has no file and no primitive",
+                   "one of them");
+    map.finish();
+    if (source_.fault) return;
+    if (file.IsDefined())
+      loadFile(file, scale, shape);
+    else
+      makePrimitive(primitive, scale, edge, shape);
+    if (source_.fault) return;
+    if (!isPlainName(shape.name))
+      source_.fail(node, "the obstacle's name is '" + shape.name.substr(0, 60) + "'", kPlainName);
+    if (!shape.solid) source_.fail(node, "the surface of obstacle '" + shape.name + "' is open", "closed surfaces");
+    if (!names_.insert(shape.name).second)
+      source_.fail(node, "the name '" + shape.name + "' is taken", "each name once", ErrorCode::kDuplicateName);
+    if (source_.fault) return;
+    def.name = shape.name;
+    def.mesh = std::move(shape.mesh);
+    for (Vec3& p : def.mesh.vertices) p = shape.pose * p;
+    scene_.obstacles.push_back(std::move(def));
   }
 
   void readBodyMaterial(const YAML::Node& node, Material& material) {

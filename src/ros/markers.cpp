@@ -49,6 +49,20 @@ std_msgs::ColorRGBA shaded(std_msgs::ColorRGBA color, double light) {
   return color;
 }
 
+void addObstacle(const ObstacleDef& obstacle, Marker& marker) {
+  marker.color = toColor(obstacle.color);
+  marker.scale.x = marker.scale.y = marker.scale.z = 1.0;
+  for (const Triangle& t : obstacle.mesh.triangles) {
+    const Vec3 &a = obstacle.mesh.vertices[t[0]], &b = obstacle.mesh.vertices[t[1]], &c = obstacle.mesh.vertices[t[2]];
+    if (!hasArea(a, b, c)) continue;
+    const double light = lightOn((b - a).cross(c - a).normalized());
+    for (const Vec3& p : {a, b, c}) {
+      marker.points.push_back(toPoint(p));
+      marker.colors.push_back(shaded(marker.color, light));
+    }
+  }
+}
+
 void addBody(const BodySnapshot& body, Marker& marker) {
   const TriangleMesh& mesh = body.model->surface;
   marker.color = toColor(body.material.color);
@@ -165,6 +179,11 @@ visualization_msgs::MarkerArray MarkerBuilder::build(const WorldSnapshot& snapsh
   for (const BodySnapshot& body : snapshot.bodies) {
     Marker surface = marker("bodies", static_cast<int>(body.number), Marker::TRIANGLE_LIST, stamp);
     addBody(body, surface);
+    if (!surface.points.empty()) array.markers.push_back(std::move(surface));
+  }
+  for (std::size_t o = 0; o < snapshot.obstacles.size(); ++o) {
+    Marker surface = marker("obstacles", static_cast<int>(o), Marker::TRIANGLE_LIST, stamp);
+    addObstacle(*snapshot.obstacles[o], surface);
     if (!surface.points.empty()) array.markers.push_back(std::move(surface));
   }
   addTools(snapshot, stamp, array);

@@ -162,6 +162,9 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
     particles += added->particles;
     clusters += added->clusters;
   }
+  for (ObstacleDef& def : scene->obstacles)
+    if (const Status added = world->addObstacle(std::move(def)); !added.ok())
+      return Error{added.error().code, *file + ": " + added.error().detail};
 
   auto parts = std::make_unique<Parts>(private_handle, *settings, std::move(world),
                                        BodyLoader(access, scene_folder, std::move(scene->materials)));

@@ -193,6 +193,25 @@ Result<SpawnReply> World::addSceneBody(std::shared_ptr<const PreparedBody> body)
   return reply;
 }
 
+Status World::addObstacle(ObstacleDef obstacle) {
+  Impl& w = *impl_;
+  if (obstacle.name.empty()) return Error{ErrorCode::kInvalidArgument, "an obstacle needs a name"};
+  for (const auto& other : w.obstacles)
+    if (other->def->name == obstacle.name)
+      return Error{ErrorCode::kDuplicateName, "there is an obstacle '" + obstacle.name + "' already"};
+  if (!(obstacle.friction >= 0.0 && obstacle.friction <= 10.0))
+    return outOfRange("friction of obstacle '" + obstacle.name + "'", obstacle.friction, "0 to 10");
+  for (const Vec3& p : obstacle.mesh.vertices)
+    if (!p.allFinite()) return notFinite("a vertex of obstacle '" + obstacle.name + "'");
+  const double volume = obstacle.mesh.empty() ? 0.0 : signedVolume(obstacle.mesh);
+  if (!(volume > 0.0))
+    return Error{ErrorCode::kUnsuitableShape,
+                 "obstacle '" + obstacle.name + "' encloses a volume of " + std::to_string(volume) +
+                     " m^3; accepted: a closed surface, counter-clockwise seen from outside"};
+  w.obstacles.push_back(std::make_unique<WorldObstacle>(std::move(obstacle)));
+  return Done{};
+}
+
 void World::reset() {
   Impl& w = *impl_;
   for (const ClosingCut& c : w.closing)
@@ -234,6 +253,7 @@ WorldSnapshot World::snapshot(const SnapshotWants& wants) {
     b.tetrahedra = body->mesh ? body->mesh->tetrahedra.size() : 0;
     shot.bodies.push_back(std::move(b));
   }
+  for (const auto& obstacle : w.obstacles) shot.obstacles.push_back(obstacle->def);
   shot.picks = w.picks;
   for (const Pick& pick : w.picks)
     if (const WorldBody* body = w.find(pick.body)) shot.pick_bodies[pick.id] = body->name;

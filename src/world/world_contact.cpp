@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kLeastRigid = 0.5;       // share of a contact's impulse that moves a body for looks as a whole
 constexpr double kFlattest = 1e-6;        // det of a map: below, the rotation stands in
+constexpr std::uint64_t kObstacleKey = std::uint64_t{1} << 40;  // beyond the numbers of bodies
 constexpr std::size_t kTaskBodies = 128;  // looked at by one task
 constexpr std::size_t kKeptModels = 64;   // more than this many dead entries are cleared away
 
@@ -59,6 +60,18 @@ void fitMaps(const WorldBody& body, const Vec3* positions, std::vector<ContactMa
 }
 
 }  // namespace
+
+WorldObstacle::WorldObstacle(ObstacleDef of_def)
+    : def(std::make_shared<ObstacleDef>(std::move(of_def))),
+      masses(def->mesh.vertices.size(), 0.0),
+      inverse_masses(def->mesh.vertices.size(), 0.0),
+      maps(1),
+      shape(def->mesh, {&own, nullptr, nullptr, nullptr, nullptr}, 0.0) {
+  for (Index v = 0; v < def->mesh.vertices.size(); ++v) {
+    own.push_back(v);
+    bounds.extend(def->mesh.vertices[v]);
+  }
+}
 
 ContactModel::ContactModel(BodyModelPtr of_model)
     : model(std::move(of_model)), shape(model->surface, rowsOf(*model), model->spacing) {
@@ -114,7 +127,24 @@ void World::Impl::findContacts(double h_frame) {
 }
 
 void World::Impl::fillParties() {
-  parties.resize(bodies.size());
+  parties.resize(bodies.size() + obstacles.size());
+  for (std::size_t o = 0; o < obstacles.size(); ++o) {
+    WorldObstacle& obstacle = *obstacles[o];
+    ContactParty& party = parties[bodies.size() + o];
+    party = ContactParty();
+    party.key = kObstacleKey + o;
+    party.shape = &obstacle.shape;
+    party.positions = obstacle.def->mesh.vertices.data();
+    party.previous = party.positions;
+    party.masses = obstacle.masses.data();
+    party.inverse_masses = obstacle.inverse_masses.data();
+    party.particles = static_cast<Index>(obstacle.def->mesh.vertices.size());
+    party.maps = obstacle.maps.data();
+    party.map_count = 1;
+    party.friction = obstacle.def->friction;
+    party.bounds = obstacle.bounds;
+    party.moves = false;
+  }
   for_each((bodies.size() + kTaskBodies - 1) / kTaskBodies, [this](std::size_t task) {
     for (std::size_t b = task * kTaskBodies; b < std::min(bodies.size(), (task + 1) * kTaskBodies); ++b)
       fillParty(*bodies[b], parties[b]);
@@ -127,6 +157,7 @@ void World::Impl::fillParty(WorldBody& body, ContactParty& party) {
     party.moves = !body.asleep;
     party.mass = body.model->mass;
     party.friction = body.material.friction;
+    party.restitution = body.material.restitution;
     party.positions = body.state.positions.data();
     party.particles = static_cast<Index>(body.state.positions.size());
     party.masses = body.model->masses.data();
@@ -165,6 +196,10 @@ void World::Impl::solveContacts(double h) {
   for (std::size_t b = 0; b < bodies.size(); ++b)
     parties[b].previous = bodies[b]->asleep ? parties[b].positions : bodies[b]->scratch.previous.data();
   const RefitMaps refit = [this](Index p, std::vector<ContactMap>& maps) {
+    if (p >= bodies.size()) {
+      maps = obstacles[p - bodies.size()]->maps;
+      return;
+    }
     WorldBody& body = *bodies[p];
     fitMaps(body, parties[p].positions, maps);
     if (parties[p].surface && !body.asleep) {

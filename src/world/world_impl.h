@@ -20,6 +20,17 @@ struct ContactModel {
   std::vector<double> inverse_masses;  // [1/kg] 0 where fixed
 };
 
+/// A surface that never moves, as contact sees it.
+struct WorldObstacle {
+  explicit WorldObstacle(ObstacleDef of_def);
+  std::shared_ptr<ObstacleDef> def;
+  std::vector<Index> own;  // every vertex is a particle of its own
+  std::vector<double> masses, inverse_masses;
+  std::vector<ContactMap> maps;
+  ContactShape shape;
+  Box bounds;
+};
+
 struct WorldBody {
   BodyId id;
   std::uint32_t number = 0;
@@ -74,6 +85,7 @@ struct World::Impl {
   std::uint32_t next_number = 1;
   std::set<std::string> used_names;  // living and retired of this run
   std::vector<std::shared_ptr<const PreparedBody>> scene;
+  std::vector<std::unique_ptr<WorldObstacle>> obstacles;
   std::vector<Pick> picks;
   PickId next_pick = 1;
   PushSphere push;

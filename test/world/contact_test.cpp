@@ -295,5 +295,58 @@ TEST(Contact, CollidingBodiesKeepTheirMomentumAndLoseEnergy) {
     }
 }
 
+// Dropped from a height: the share of the speed that comes back, squared, is that of the height.
+TEST(Contact, RestitutionGivesBackItsShareOfTheSpeed) {
+  for (const double restitution : {0.0, 0.5, 0.8}) {
+    WorldSettings settings;
+    settings.sleep = false;
+    World world(settings);
+    BodyDef def = box("block", Vec3::Constant(0.1), {2, 2, 2}, Vec3(0, 0, 0.55));
+    def.material.alpha = 1.0;
+    def.material.restitution = restitution;
+    add(world, def);
+    double height = 0.0;
+    bool landed = false;
+    for (int step = 0; step < 240; ++step) {
+      world.step();
+      const BodySnapshot block = seen(world).bodies[0];
+      landed = landed || block.measures.velocity.z() > -0.05;
+      if (step > 2 && landed && step < 120) height = std::max(height, block.measures.centre_of_mass.z() - 0.05);
+    }
+    EXPECT_NEAR(height, 0.5 * restitution * restitution, 0.06) << restitution;
+  }
+}
+
+TEST(Contact, AnObstacleHoldsWhatFallsOnItAndNeverMoves) {
+  WorldSettings settings;
+  settings.ground.reset();
+  World world(settings);
+  ObstacleDef table;
+  table.name = "table";
+  table.mesh = boxMesh(Vec3(1.0, 1.0, 0.05), 1, 1, 1);
+  table.friction = 1.0;
+  const Points before = table.mesh.vertices;
+  ASSERT_TRUE(world.addObstacle(table).ok());
+  EXPECT_FALSE(world.addObstacle(table).ok()) << "the same name";
+  add(world, box("stays", Vec3::Constant(0.1), {2, 2, 2}, Vec3(0.1, 0.0, 0.2)));
+  add(world, box("falls", Vec3::Constant(0.1), {2, 2, 2}, Vec3(0.7, 0.0, 0.2)));
+  for (int step = 0; step < 480; ++step) world.step();
+  const WorldSnapshot shot = seen(world);
+  EXPECT_EQ(shot.obstacles[0]->mesh.vertices, before);
+  EXPECT_NEAR(shot.bodies[0].measures.centre_of_mass.z(), 0.075, 0.002);
+  EXPECT_TRUE(shot.bodies[0].asleep);
+  EXPECT_LT(shot.bodies[1].measures.centre_of_mass.z(), -10.0);
+  ObstacleDef bad = table;
+  bad.name = "open";
+  bad.mesh.triangles.clear();
+  EXPECT_FALSE(world.addObstacle(bad).ok());
+  bad = table;
+  bad.name = "rough";
+  bad.friction = -1.0;
+  const Status refused = world.addObstacle(bad);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.error().detail.find("-1"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace meshless

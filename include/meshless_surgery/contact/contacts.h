@@ -37,6 +37,7 @@ struct ContactParty {
   double mass = 0.0;         // [kg]
   double rigid_share = 0.0;  // 0..1 of an impulse that moves the body as a whole; 0 where it is held
   double friction = 0.5;
+  double restitution = 0.0;  // 0..1
   Box bounds;                // [m] of the particles (and vertices) now
   Vec3 velocity = Vec3::Zero();  // [m/s] about the middle of its particles' velocities
   double spread = 0.0;       // [m/s] by which they differ from it at most
@@ -47,6 +48,7 @@ struct ContactScene {
   std::optional<double> ground;  // [m] height along z
   double ground_friction = 0.5;
   Vec3 gravity = Vec3::Zero();   // [m/s^2]
+  double substep = 0.0;          // [s] of begin()
 };
 
 /// Brings a party's maps, and its surface where it has one, up to date with its particles.

@@ -43,6 +43,7 @@ struct Material {
   double density = 1000.0;                        // [kg/m^3] > 0
   double damping = 1.0;                           // [1/s] >= 0, decay rate of the motion that deforms
   double friction = 0.5;                          // 0..10, Coulomb
+  double restitution = 0.0;                       // 0..1, share of the approach that a contact gives back
   ResponseCurve volume;                           // of the solid's volume
   ResponseCurve area;                             // of the surface
   Plasticity plasticity;

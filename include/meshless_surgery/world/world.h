@@ -32,12 +32,21 @@ struct WorldSettings {
   Status validate() const;
 };
 
+/// A closed surface that never moves: a table, a tray.
+struct ObstacleDef {
+  std::string name;
+  TriangleMesh mesh;  // [m] world frame
+  double friction = 0.5;
+  Color color{0.55f, 0.58f, 0.62f, 1.0f};
+};
+
 /// What a scene file says.
 struct SceneDef {
   std::string name;
   WorldSettings world;
   std::map<std::string, Material> materials;
   std::vector<BodyDef> bodies;
+  std::vector<ObstacleDef> obstacles;
 };
 
 enum class EventType {
@@ -108,6 +117,7 @@ struct WorldSnapshot {
   double sim_time = 0.0;
   std::uint32_t run = 0;  // grows with each reset: messages of an older run are void
   std::vector<BodySnapshot> bodies;
+  std::vector<std::shared_ptr<const ObstacleDef>> obstacles;
   std::vector<Pick> picks;
   std::map<PickId, std::string> pick_bodies;
   PushSphere push;
@@ -140,6 +150,10 @@ class World {
   void reset();
   /// Like SpawnCommand, and brought back by reset.
   Result<SpawnReply> addSceneBody(std::shared_ptr<const PreparedBody> body);
+
+  /// Stays for good; with ContactMethod::kRestShape alone something meets it. Refuses an empty or open surface, a friction
+  /// outside of 0..10, and a name in use.
+  Status addObstacle(ObstacleDef obstacle);
 
   /// Bodies in the order in which they came.
   WorldSnapshot snapshot(const SnapshotWants& wants);
