@@ -7,14 +7,14 @@ namespace meshless::bench {
 
 struct PileOptions {
   int bodies = 1000;
-  double size = 1.0;        // [m] edge of a cube; gaps, heights and jitter scale with it
+  double size = 1.0;  // [m] edge of a cube; gaps, heights and jitter scale with it
   double alpha = 0.9;
   int substeps = 4;
   ContactMethod contact = ContactMethod::kRestShape;
   bool sleeping = false;
   int threads = 1;
-  bool turned = true;       // by a random yaw
-  bool straight = false;    // one column without jitter
+  bool turned = true;     // by a random yaw
+  bool straight = false;  // one column without jitter
 };
 
 /// Columns of ceil(sqrt(bodies / 4)) squared at 1.55 m, layers at 1.3 m from 1 m, jitter 0.05, mass 1, 1/60 s.
@@ -28,11 +28,11 @@ World makePile(const PileOptions& options);
 
 /// Of a settled pile.
 struct PileMeasures {
-  double deepest = 0.0;     // of a particle in another cube or in the ground, relative to the size
-  double p99 = 0.0;         // of those that are in another at all
-  double height = 0.0;      // mean over the cubes of their centre's height, relative to what stacks of true cubes have
-  double fastest = 0.0;     // [m/s]
-  double highest = 0.0;     // [m]
+  double deepest = 0.0;  // of a particle in another cube or in the ground, relative to the size
+  double p99 = 0.0;      // of those that are in another at all
+  double height = 0.0;   // mean over the cubes of their centre's height, relative to what stacks of true cubes have
+  double fastest = 0.0;  // [m/s]
+  double highest = 0.0;  // [m]
   bool finite = true;
 };
 /// positions: 27 particles a cube, in the order of startPile(); depths by the cubes' faces as their corners span them.

@@ -59,9 +59,8 @@ const std::vector<std::array<Index, 2>>& BroadPhase::find(const std::vector<Box>
   };
   for (Index i = 0; i < boxes.size(); ++i)
     if (level_of_[i] != kNoLevel) entries_.push_back({keyOf(level_of_[i], cellOf(boxes[i], level_of_[i])), i});
-  std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
-    return a.key != b.key ? a.key < b.key : a.box < b.box;
-  });
+  std::sort(entries_.begin(), entries_.end(),
+            [](const Entry& a, const Entry& b) { return a.key != b.key ? a.key < b.key : a.box < b.box; });
   std::size_t slots = 64;
   while (slots < 2 * entries_.size()) slots *= 2;
   table_.resize(slots);

@@ -19,7 +19,7 @@ struct Contact {
   Index triangle = kNoIndex;  // of b
   // direct: all corners are particles, normal and weights follow them
   bool direct = false;
-  bool caught = false;  // has passed through: the side is remembered
+  bool caught = false;   // has passed through: the side is remembered
   bool below = true;     // the surface, when it was made
   bool flipped = false;  // the body is inside out where it is touched
   std::array<Index, 2> point{};
@@ -61,7 +61,8 @@ class ContactSolver {
   /// Sweeps back and forth over each island, from the impulses that the contacts had. fresh: contacts, plan or parties
   /// are others than in the last call; else calm islands keep normals, levers and answers.
   void solve(const ContactScene& scene, const std::vector<ContactParty>& parties, std::vector<Contact>& contacts,
-             const std::vector<ContactEntry>& entries, const IslandPlan& plan, bool fresh, const ForEach& for_each, ContactCounters& counters);
+             const std::vector<ContactEntry>& entries, const IslandPlan& plan, bool fresh, const ForEach& for_each,
+             ContactCounters& counters);
   /// One sweep that lets out some of the overlap that there is, h [s] after the last; impulses are left alone.
   void letOut(const ContactScene& scene, const std::vector<ContactParty>& parties, std::vector<Contact>& contacts,
               const std::vector<ContactEntry>& entries, const IslandPlan& plan, double h, ContactCounters& counters);

@@ -11,16 +11,16 @@
 namespace meshless {
 namespace {
 
-constexpr double kBinEdges = 1.5;       // size of a bin in mean edges
-constexpr double kCellEdges = 0.5;      // size of a cell in mean edges
+constexpr double kBinEdges = 1.5;   // size of a bin in mean edges
+constexpr double kCellEdges = 0.5;  // size of a cell in mean edges
 constexpr double kMostBins = 1 << 18;
 constexpr double kMostCells = 1 << 19;
-constexpr double kLongEdge = 0.1;       // of the body's least extent: shorter edges need no samples
-constexpr double kFlatEdge = 0.996;     // cosine between neighbours: about 5 degrees
+constexpr double kLongEdge = 0.1;    // of the body's least extent: shorter edges need no samples
+constexpr double kFlatEdge = 0.996;  // cosine between neighbours: about 5 degrees
 constexpr int kMostEdgeSamples = 64;
 constexpr std::size_t kThicknessRays = 48;
-constexpr std::uintptr_t kAsked = 4;    // times that the bins are searched before a cell is filled
-constexpr double kTie = 1e-9;           // relative: two features are equally near
+constexpr std::uintptr_t kAsked = 4;  // times that the bins are searched before a cell is filled
+constexpr double kTie = 1e-9;         // relative: two features are equally near
 
 // Of a triangle, what a query needs, side by side in memory.
 struct Facet {
@@ -39,8 +39,8 @@ Facet makeFacet(const TriangleMesh& mesh, Index t) {
   f.ac = mesh.vertices[corners[2]] - f.a;
   f.normal = f.ab.cross(f.ac).normalized();
   f.centre = f.a + (f.ab + f.ac) / 3.0;
-  f.radius = std::sqrt(std::max({(f.a - f.centre).squaredNorm(), (f.a + f.ab - f.centre).squaredNorm(),
-                                 (f.a + f.ac - f.centre).squaredNorm()}));
+  f.radius = std::sqrt(std::max(
+      {(f.a - f.centre).squaredNorm(), (f.a + f.ab - f.centre).squaredNorm(), (f.a + f.ac - f.centre).squaredNorm()}));
   const double aa = f.ab.squaredNorm(), bb = f.ac.squaredNorm(), ab = f.ab.dot(f.ac);
   const double det = aa * bb - ab * ab;
   const double inverse = det > 1e-24 * aa * bb ? 1.0 / det : 0.0;
@@ -131,11 +131,10 @@ ContactShape::~ContactShape() {
 }
 
 std::size_t ContactShape::bytes() const {
-  std::size_t sum = sizeof *this + surface_.vertices.size() * sizeof(Vec3) +
-                    surface_.triangles.size() * sizeof(Triangle) + rider_of_.size() * sizeof(Index) +
-                    samples_.size() * sizeof(ContactSample) +
-                    (bin_offsets_.size() + bin_triangles_.size()) * sizeof(Index) +
-                    cell_total_ * sizeof(std::atomic<std::uintptr_t>);
+  std::size_t sum =
+      sizeof *this + surface_.vertices.size() * sizeof(Vec3) + surface_.triangles.size() * sizeof(Triangle) +
+      rider_of_.size() * sizeof(Index) + samples_.size() * sizeof(ContactSample) +
+      (bin_offsets_.size() + bin_triangles_.size()) * sizeof(Index) + cell_total_ * sizeof(std::atomic<std::uintptr_t>);
   for (std::size_t i = 0; i < cell_total_; ++i)
     if (const std::uintptr_t cell = cells_[i].load(std::memory_order_acquire); cell > kAsked)
       sum += sizeof(Cell) + reinterpret_cast<const Cell*>(cell)->facets.size() * sizeof(Facet);
@@ -163,14 +162,15 @@ void ContactShape::binTriangles() {
     }
     for (int x = first[0]; x <= last[0]; ++x)
       for (int y = first[1]; y <= last[1]; ++y)
-        for (int z = first[2]; z <= last[2]; ++z)
-          visit((static_cast<std::size_t>(x) * bins_[1] + y) * bins_[2] + z);
+        for (int z = first[2]; z <= last[2]; ++z) visit((static_cast<std::size_t>(x) * bins_[1] + y) * bins_[2] + z);
   };
-  for (Index t = 0; t < surface_.triangles.size(); ++t) forBins(t, [this](std::size_t bin) { ++bin_offsets_[bin + 1]; });
+  for (Index t = 0; t < surface_.triangles.size(); ++t)
+    forBins(t, [this](std::size_t bin) { ++bin_offsets_[bin + 1]; });
   for (std::size_t i = 0; i < total; ++i) bin_offsets_[i + 1] += bin_offsets_[i];
   bin_triangles_.resize(bin_offsets_.back());
   std::vector<Index> next(bin_offsets_.begin(), bin_offsets_.end() - 1);
-  for (Index t = 0; t < surface_.triangles.size(); ++t) forBins(t, [&](std::size_t bin) { bin_triangles_[next[bin]++] = t; });
+  for (Index t = 0; t < surface_.triangles.size(); ++t)
+    forBins(t, [&](std::size_t bin) { bin_triangles_[next[bin]++] = t; });
 }
 
 template <class Visit>
@@ -447,9 +447,8 @@ void ContactShape::chooseSamples(double spacing) {
       if ((vertices[a] - vertices[b]).norm() > least) edges.push_back({std::min(a, b), std::max(a, b), normal});
     }
   }
-  std::stable_sort(edges.begin(), edges.end(), [](const Edge& p, const Edge& q) {
-    return p.low != q.low ? p.low < q.low : p.high < q.high;
-  });
+  std::stable_sort(edges.begin(), edges.end(),
+                   [](const Edge& p, const Edge& q) { return p.low != q.low ? p.low < q.low : p.high < q.high; });
   const double longest = (bounds_.max - bounds_.min).norm();
   for (std::size_t k = 0; k + 1 < edges.size(); ++k) {
     const Edge &e = edges[k], &f = edges[k + 1];

@@ -8,12 +8,12 @@
 namespace meshless {
 namespace {
 
-constexpr double kLetOutShare = 0.3;  // of old overlap, a frame
-constexpr double kLetOutSpeed = 1.0;  // [1/s] times the smaller body's size, at most
+constexpr double kLetOutShare = 0.3;   // of old overlap, a frame
+constexpr double kLetOutSpeed = 1.0;   // [1/s] times the smaller body's size, at most
 constexpr double kCaughtSpeed = 10.0;  // [1/s] likewise, of what has passed through
-constexpr Index kTaskContacts = 256;  // of a task at the least
-constexpr double kBeside = 0.02;      // barycentric: farther off its triangle a point does not touch it from outside
-constexpr double kFarBeside = 1.0;    // nor from inside
+constexpr Index kTaskContacts = 256;   // of a task at the least
+constexpr double kBeside = 0.02;       // barycentric: farther off its triangle a point does not touch it from outside
+constexpr double kFarBeside = 1.0;     // nor from inside
 
 // Inverse of an inertia tensor; what has no extent about an axis does not turn about it.
 Mat3 inverseInertia(const Mat3& inertia) {
@@ -25,8 +25,8 @@ Mat3 inverseInertia(const Mat3& inertia) {
   Mat3 inverse = Mat3::Zero();
   for (int k = 0; k < 3; ++k)
     if (solver.eigenvalues()[k] > 1e-9)
-      inverse += solver.eigenvectors().col(k) * solver.eigenvectors().col(k).transpose() /
-                 (solver.eigenvalues()[k] * scale);
+      inverse +=
+          solver.eigenvectors().col(k) * solver.eigenvectors().col(k).transpose() / (solver.eigenvalues()[k] * scale);
   return inverse;
 }
 
@@ -37,19 +37,20 @@ struct Rigid {
   double inverse_mass = 0.0;            // [1/kg]
   double share = 0.0;                   // of an impulse, that moves it as a whole; 0 where it is held
   bool moves = false;
-  Vec3 shift = Vec3::Zero();            // [m]
-  Vec3 turn = Vec3::Zero();             // [rad]
+  Vec3 shift = Vec3::Zero();  // [m]
+  Vec3 turn = Vec3::Zero();   // [rad]
 };
 
 // What does not change about a contact during the sweeps of a substep.
 struct Row {
   Vec3 normal, lever_a, lever_b;
-  Vec3 arm_a, arm_b;           // [1/(kg m)] turn of each party by a unit impulse along the normal, with its share
-  Vec3 slip = Vec3::Zero();    // [m] tangential, before the sweeps
-  double distance = 0.0, target = 0.0;  // [m]
+  Vec3 arm_a, arm_b;         // [1/(kg m)] turn of each party by a unit impulse along the normal, with its share
+  Vec3 slip = Vec3::Zero();  // [m] tangential, before the sweeps
+  double distance = 0.0, target = 0.0;                      // [m]
   double inverse_answer = 0.0, inverse_answer_along = 0.0;  // [kg]
   double friction = 0.0, restitution = 0.0;
-  double rigid_a = 0.0, rigid_b = 0.0;  // shares of an impulse that move the parties as a whole; the rest moves particles
+  double rigid_a = 0.0,
+         rigid_b = 0.0;  // shares of an impulse that move the parties as a whole; the rest moves particles
   Contact* contact = nullptr;
   bool on_ground = false;
 };
@@ -181,13 +182,13 @@ const Rigid kStill{};
 }  // namespace
 
 struct ContactSolver::Impl {
-  std::vector<Rigid> rigid;  // one a party
-  std::vector<Vec3> shifts;  // of particles by the local shares of impulses, see IslandPlan::shifts
-  std::vector<Row> rows;                // of all islands in a solve(), kept while nothing turns
-  std::vector<Row> let_rows;            // of an island in letOut()
-  std::vector<Index> tasks;             // first island of each, and the end
-  std::vector<std::size_t> corrected;   // one a task
-  std::vector<Index> row_counts;        // one an island
+  std::vector<Rigid> rigid;            // one a party
+  std::vector<Vec3> shifts;            // of particles by the local shares of impulses, see IslandPlan::shifts
+  std::vector<Row> rows;               // of all islands in a solve(), kept while nothing turns
+  std::vector<Row> let_rows;           // of an island in letOut()
+  std::vector<Index> tasks;            // first island of each, and the end
+  std::vector<std::size_t> corrected;  // one a task
+  std::vector<Index> row_counts;       // one an island
 
   // inputs of the call
   const ContactScene* scene = nullptr;
@@ -202,7 +203,8 @@ struct ContactSolver::Impl {
     if (from == kNoIndex) return Vec3::Zero();
     const Vec3* s = shifts.data() + from;
     if (c.direct) {
-      if (!of_a) return c.weights[0] * s[c.corners[0]] + c.weights[1] * s[c.corners[1]] + c.weights[2] * s[c.corners[2]];
+      if (!of_a)
+        return c.weights[0] * s[c.corners[0]] + c.weights[1] * s[c.corners[1]] + c.weights[2] * s[c.corners[2]];
       return c.share > 0.0 ? Vec3((1.0 - c.share) * s[c.point[0]] + c.share * s[c.point[1]]) : s[c.point[0]];
     }
     Vec3 sum = Vec3::Zero();
@@ -382,8 +384,8 @@ struct ContactSolver::Impl {
     }
   }
 
-  // Points of a body that strike another at once: one after the other they would turn it. So what they need together goes
-  // to all of them in equal parts first. Only where nothing pressed before.
+  // Points of a body that strike another at once: one after the other they would turn it. So what they need together
+  // goes to all of them in equal parts first. Only where nothing pressed before.
   void strikeTogether(const Row* row, const Row* end) {
     while (row != end) {
       const Row* first = row;
@@ -411,9 +413,9 @@ struct ContactSolver::Impl {
       if (count < 2 || !(normal.norm() > 0.5 * count)) continue;
       normal.normalize();
       const Vec3 arm_a = (lever_a / count).cross(normal), arm_b = (lever_b / count).cross(normal);
-      const double answer =
-          first->rigid_a * (a.inverse_mass + arm_a.dot(a.inverse_inertia * arm_a)) +
-          first->rigid_b * (b.inverse_mass + arm_b.dot(b.inverse_inertia * arm_b)) + std::max(0.0, local) / (count * count);
+      const double answer = first->rigid_a * (a.inverse_mass + arm_a.dot(a.inverse_inertia * arm_a)) +
+                            first->rigid_b * (b.inverse_mass + arm_b.dot(b.inverse_inertia * arm_b)) +
+                            std::max(0.0, local) / (count * count);
       const double each = wrong / count / answer / count;
       if (!(answer > 0.0) || !std::isfinite(each)) continue;
       for (const Row* r = first; r != row; ++r) {
@@ -459,8 +461,8 @@ struct ContactSolver::Impl {
     return true;
   }
 
-  // No nearer than at the start of the substep, nor than the surface. What bounces goes back from where it was at a share
-  // of the speed at which it came; what only rests does not.
+  // No nearer than at the start of the substep, nor than the surface. What bounces goes back from where it was at a
+  // share of the speed at which it came; what only rests does not.
   double targetOf(double restitution, double distance, double motion) const {
     const double before = distance - motion;
     const double rest = std::min(0.0, before);

@@ -1,5 +1,5 @@
-// Many small bodies of one kind are matched side by side in float (dynamics/match_batch.h): several times as fast as one
-// after another, by the same laws.
+// Many small bodies of one kind are matched side by side in float (dynamics/match_batch.h): several times as fast as
+// one after another, by the same laws.
 #include <algorithm>
 
 #include "world_impl.h"
@@ -7,15 +7,16 @@
 namespace meshless {
 namespace {
 
-constexpr std::size_t kLeastBodies = 32;      // fewer are not worth going there and back
-constexpr std::size_t kMostParticles = 256;   // larger ones fill the lanes by themselves
+constexpr std::size_t kLeastBodies = 32;     // fewer are not worth going there and back
+constexpr std::size_t kMostParticles = 256;  // larger ones fill the lanes by themselves
 
 bool suits(const WorldBody& body) {
   const BodyModel& model = *body.model;
   return !body.material.elastic() && !body.material.plastic() && body.state.plastic.empty() &&
-         body.state.eased.empty() && !model.any_fixed && body.state.swelling == 1.0 && body.material.volume.points.empty() &&
-         body.material.area.points.empty() && model.rest.size() <= kMostParticles && model.rest.size() >= 4 &&
-         body.material.alpha > 0.0 && BodyBatch::holds(matchInput(model, body.state));
+         body.state.eased.empty() && !model.any_fixed && body.state.swelling == 1.0 &&
+         body.material.volume.points.empty() && body.material.area.points.empty() &&
+         model.rest.size() <= kMostParticles && model.rest.size() >= 4 && body.material.alpha > 0.0 &&
+         BodyBatch::holds(matchInput(model, body.state));
 }
 
 bool alike(const WorldBody& a, const WorldBody& b) {

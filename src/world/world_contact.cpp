@@ -8,11 +8,11 @@
 namespace meshless {
 namespace {
 
-constexpr double kLeastRigid = 0.5;       // share of a contact's impulse that moves a body for looks as a whole
-constexpr double kFlattest = 1e-6;        // det of a map: below, the rotation stands in
+constexpr double kLeastRigid = 0.5;  // share of a contact's impulse that moves a body for looks as a whole
+constexpr double kFlattest = 1e-6;   // det of a map: below, the rotation stands in
 constexpr std::uint64_t kObstacleKey = std::uint64_t{1} << 40;  // beyond the numbers of bodies
-constexpr std::size_t kTaskBodies = 128;  // looked at by one task
-constexpr std::size_t kKeptModels = 64;   // more than this many dead entries are cleared away
+constexpr std::size_t kTaskBodies = 128;                        // looked at by one task
+constexpr std::size_t kKeptModels = 64;                         // more than this many dead entries are cleared away
 
 SurfaceRows rowsOf(const BodyModel& model) {
   const SurfaceBinding& b = model.binding;
@@ -152,34 +152,34 @@ void World::Impl::fillParties() {
 }
 
 void World::Impl::fillParty(WorldBody& body, ContactParty& party) {
-    party = ContactParty();
-    party.key = body.number;
-    party.moves = !body.asleep;
-    party.mass = body.model->mass;
-    party.friction = body.material.friction;
-    party.restitution = body.material.restitution;
-    party.positions = body.state.positions.data();
-    party.particles = static_cast<Index>(body.state.positions.size());
-    party.masses = body.model->masses.data();
-    if (body.asleep) {
-      party.bounds = body.bounds;
-      return;
-    }
-    party.rigid_share =
-        body.model->any_fixed || body.material.elastic() ? 0.0 : std::max(kLeastRigid, body.material.alpha);
-    Box velocities;
-    for (std::size_t i = 0; i < party.particles; ++i) {
-      party.bounds.extend(body.state.positions[i]);
-      velocities.extend(body.state.velocities[i]);
-    }
-    party.velocity = 0.5 * (velocities.min + velocities.max);
-    party.spread = 0.5 * velocities.diagonal();
-    if (!body.model->binding.riders.empty()) {  // riders reach beyond the particles
-      party.bounds.min.array() -= 2.0 * body.model->spacing;
-      party.bounds.max.array() += 2.0 * body.model->spacing;
-    }
-    body.bounds = party.bounds;
-    if (body.model->surface.vertices.empty()) party.bounds = Box();  // nothing to touch with
+  party = ContactParty();
+  party.key = body.number;
+  party.moves = !body.asleep;
+  party.mass = body.model->mass;
+  party.friction = body.material.friction;
+  party.restitution = body.material.restitution;
+  party.positions = body.state.positions.data();
+  party.particles = static_cast<Index>(body.state.positions.size());
+  party.masses = body.model->masses.data();
+  if (body.asleep) {
+    party.bounds = body.bounds;
+    return;
+  }
+  party.rigid_share =
+      body.model->any_fixed || body.material.elastic() ? 0.0 : std::max(kLeastRigid, body.material.alpha);
+  Box velocities;
+  for (std::size_t i = 0; i < party.particles; ++i) {
+    party.bounds.extend(body.state.positions[i]);
+    velocities.extend(body.state.velocities[i]);
+  }
+  party.velocity = 0.5 * (velocities.min + velocities.max);
+  party.spread = 0.5 * velocities.diagonal();
+  if (!body.model->binding.riders.empty()) {  // riders reach beyond the particles
+    party.bounds.min.array() -= 2.0 * body.model->spacing;
+    party.bounds.max.array() += 2.0 * body.model->spacing;
+  }
+  body.bounds = party.bounds;
+  if (body.model->surface.vertices.empty()) party.bounds = Box();  // nothing to touch with
 }
 
 void World::Impl::equipParty(WorldBody& body, ContactParty& party) {

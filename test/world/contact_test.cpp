@@ -113,8 +113,9 @@ TEST(Contact, CrossedBarsDoNotPassThroughEachOther) {
   for (const double speed : {0.2, 1.0, 4.0}) {
     World world(space());
     add(world, box("low", Vec3(1.0, 0.1, 0.1), {1, 1, 1}, Vec3::Zero()));
-    add(world, box("high", Vec3(1.0, 0.1, 0.1), {1, 1, 1}, Vec3(0.03, 0.02, 0.16),
-                   Quat(Eigen::AngleAxisd(0.5 * kPi, Vec3::UnitZ()))),
+    add(world,
+        box("high", Vec3(1.0, 0.1, 0.1), {1, 1, 1}, Vec3(0.03, 0.02, 0.16),
+            Quat(Eigen::AngleAxisd(0.5 * kPi, Vec3::UnitZ()))),
         Vec3(0, 0, -speed));
     const Vec3 before = momentum(world);
     const auto axisOf = [](const BodySnapshot& b, int k) {  // from one end of the bar to the other
@@ -135,8 +136,8 @@ TEST(Contact, CrossedBarsDoNotPassThroughEachOther) {
   }
 }
 
-// A sheet of 5 mm that floats in space, hit by a block of 5 cm. Through: the block's centre has come to the other side of
-// the sheet as the sheet lies then, within its rim.
+// A sheet of 5 mm that floats in space, hit by a block of 5 cm. Through: the block's centre has come to the other side
+// of the sheet as the sheet lies then, within its rim.
 TEST(Contact, FastBodiesDoNotTunnelThroughSheets) {
   std::mt19937 engine(5);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
@@ -151,8 +152,8 @@ TEST(Contact, FastBodiesDoNotTunnelThroughSheets) {
       const double start = 0.06 + 0.05 * std::abs(unit(engine));
       Vec3 velocity(0, 0, -speed);
       if (oblique) velocity = speed * Vec3(0.4 * unit(engine), 0.4 * unit(engine), -1.0).normalized();
-      BodyDef block = box("block", Vec3::Constant(0.05), {2, 2, 2},
-                          Vec3(0.02 * unit(engine), 0.02 * unit(engine), start), turn);
+      BodyDef block =
+          box("block", Vec3::Constant(0.05), {2, 2, 2}, Vec3(0.02 * unit(engine), 0.02 * unit(engine), start), turn);
       block.material.density = light ? 100.0 : 5000.0;
       add(world, sheet);
       add(world, block, velocity);
@@ -180,7 +181,9 @@ TEST(Contact, FastBodiesDoNotTunnelThroughSheets) {
       ++shots;
       met += contacts > 0;
       through += passed;
-if (passed) printf("n %d turned %d oblique %d light %d speed %g contacts %zu\n", n, turned, oblique, light, speed, contacts);
+      if (passed)
+        printf("n %d turned %d oblique %d light %d speed %g contacts %zu\n", n, turned, oblique, light, speed,
+               contacts);
     }
     EXPECT_EQ(through, 0) << "of " << shots << " at " << speed << " m/s";
     EXPECT_EQ(met, shots);
@@ -251,8 +254,9 @@ TEST(Contact, EnergyNeverExceedsItsStartAndNothingBouncesAboveWhereItFellFrom) {
     settings.sleep = false;
     World world(settings);
     for (int k = 0; k < 3; ++k) {
-      BodyDef def = box("b" + std::to_string(k), Vec3(0.12, 0.1, 0.1), {3, 2, 2}, Vec3(0.02 * k, 0.01 * k, 0.2 + 0.16 * k),
-                        Quat(Eigen::AngleAxisd(0.4 + k, Vec3(1, 0.3 * k, 0.5).normalized())));
+      BodyDef def =
+          box("b" + std::to_string(k), Vec3(0.12, 0.1, 0.1), {3, 2, 2}, Vec3(0.02 * k, 0.01 * k, 0.2 + 0.16 * k),
+              Quat(Eigen::AngleAxisd(0.4 + k, Vec3(1, 0.3 * k, 0.5).normalized())));
       def.material.alpha = alpha;
       def.material.damping = 0.0;
       add(world, def);
@@ -273,8 +277,9 @@ TEST(Contact, CollidingBodiesKeepTheirMomentumAndLoseEnergy) {
     for (const double size : {0.001, 0.1, 100.0}) {
       World world(space());
       add(world, box("a", Vec3(1.0, 0.8, 0.6) * size, {3, 2, 2}, far), Vec3(0.5, 0, 0) * size);
-      add(world, box("b", Vec3(0.7, 0.7, 0.7) * size, {2, 2, 2}, far + Vec3(1.3, 0.3, 0.1) * size,
-                     Quat(Eigen::AngleAxisd(0.6, Vec3(1, 2, 3).normalized()))),
+      add(world,
+          box("b", Vec3(0.7, 0.7, 0.7) * size, {2, 2, 2}, far + Vec3(1.3, 0.3, 0.1) * size,
+              Quat(Eigen::AngleAxisd(0.6, Vec3(1, 2, 3).normalized()))),
           Vec3(-0.8, 0, 0) * size);
       const Vec3 before = momentum(world), turning = angularMomentum(world);
       const double mass = seen(world).bodies[0].model->mass, kinetic = energy(world, 0.0);
@@ -287,7 +292,8 @@ TEST(Contact, CollidingBodiesKeepTheirMomentumAndLoseEnergy) {
       EXPECT_GT(contacts, 0u);
       EXPECT_LE((momentum(world) - before).norm(), mass * (1e-9 * size + 1e-13 * far.norm())) << size;
       const double lever = size + far.norm();
-      EXPECT_LE((angularMomentum(world) - turning).norm(), 0.02 * mass * size * size + mass * lever * (1e-9 * size + 1e-13 * far.norm()))
+      EXPECT_LE((angularMomentum(world) - turning).norm(),
+                0.02 * mass * size * size + mass * lever * (1e-9 * size + 1e-13 * far.norm()))
           << size << " m, before " << turning.transpose() << ", after " << angularMomentum(world).transpose();
       const WorldSnapshot shot = seen(world);
       EXPECT_LE(inside(shot.bodies[0], shot.bodies[1]).second, 0.01 * size);

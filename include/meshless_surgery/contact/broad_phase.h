@@ -8,8 +8,8 @@ namespace meshless {
 /// Kept between steps, so that finding allocates nothing once it has grown.
 class BroadPhase {
  public:
-  /// {lower, higher} index of each pair of overlapping boxes, ascending. Empty boxes (and such with NaN) overlap nothing;
-  /// `active`: pairs of two inactive ones are left out. The result is valid until the next call.
+  /// {lower, higher} index of each pair of overlapping boxes, ascending. Empty boxes (and such with NaN) overlap
+  /// nothing; `active`: pairs of two inactive ones are left out. The result is valid until the next call.
   const std::vector<std::array<Index, 2>>& find(const std::vector<Box>& boxes, const std::vector<char>& active);
   /// Boxes compared in the last call.
   std::size_t tested() const { return tested_; }

@@ -31,24 +31,24 @@ struct ContactParty {
   const double* masses = nullptr;          // [kg]
   const double* inverse_masses = nullptr;  // [1/kg] 0: held
   Index particles = 0;
-  const Vec3* surface = nullptr;           // [m] present vertices; null where all are particles
-  const ContactMap* maps = nullptr;        // at the start of the frame; filled by the time make() is called
+  const Vec3* surface = nullptr;     // [m] present vertices; null where all are particles
+  const ContactMap* maps = nullptr;  // at the start of the frame; filled by the time make() is called
   Index map_count = 0;
   double mass = 0.0;         // [kg]
   double rigid_share = 0.0;  // 0..1 of an impulse that moves the body as a whole; 0 where it is held
   double friction = 0.5;
-  double restitution = 0.0;  // 0..1
-  Box bounds;                // [m] of the particles (and vertices) now
+  double restitution = 0.0;      // 0..1
+  Box bounds;                    // [m] of the particles (and vertices) now
   Vec3 velocity = Vec3::Zero();  // [m/s] about the middle of its particles' velocities
-  double spread = 0.0;       // [m/s] by which they differ from it at most
-  bool moves = true;         // false: asleep, or an obstacle; its arrays are not written
+  double spread = 0.0;           // [m/s] by which they differ from it at most
+  bool moves = true;             // false: asleep, or an obstacle; its arrays are not written
 };
 
 struct ContactScene {
   std::optional<double> ground;  // [m] height along z
   double ground_friction = 0.5;
-  Vec3 gravity = Vec3::Zero();   // [m/s^2]
-  double substep = 0.0;          // [s] of begin()
+  Vec3 gravity = Vec3::Zero();  // [m/s^2]
+  double substep = 0.0;         // [s] of begin()
 };
 
 /// Brings a party's maps, and its surface where it has one, up to date with its particles.

@@ -1,0 +1,194 @@
+// Which points of a party are near the surface of another, or of the ground.
+#include <algorithm>
+#include <cmath>
+
+#include "contacts_impl.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kMovedInRest = 0.005;  // of the size: a lookup is repeated where the deviation moved it farther
+constexpr std::size_t kLookAnew = 8;    // frames after which a point is looked up though it seems to be where it was
+constexpr double kWellWithin = 0.02;    // barycentric
+constexpr double kNearby = 0.1;         // of the thickness
+constexpr int kMostLookups = 3;
+
+}  // namespace
+
+bool Contacts::Impl::locate(const ContactParty& b, Index party, const MapFinder& finder, const ContactMap* maps,
+                            const Vec3& p, double reach, ContactShape::Nearest& found, bool& flipped,
+                            ContactCounters& counters) const {
+  const ContactMap& map = maps[finder.nearest(p)];
+  flipped = map.flipped;
+  const ContactShape& shape = *b.shape;
+  Vec3 rest = map.to_rest * (p - map.centre) + map.rest;
+  // So far outside of the rest bounds that no deviation brings it back: nothing to look up.
+  const Box& bounds = shape.bounds();
+  const Vec3 beyond = (bounds.min - rest).cwiseMax(rest - bounds.max).cwiseMax(0.0);
+  const double far = deviations[party] + reach;
+  if (!(beyond.squaredNorm() < far * far)) return false;
+  const double enough = kMovedInRest * shape.size();
+  for (int n = 0; n < kMostLookups; ++n) {
+    ++counters.lookups;
+    if (!shape.nearest(rest, found)) return false;
+    if (n + 1 == kMostLookups) break;
+    // The surface does not lie where the affine map has it: by so much the point is looked up elsewhere.
+    const Triangle& corners = shape.surface().triangles[found.triangle];
+    Vec3 at_rest = Vec3::Zero(), at_present = Vec3::Zero();
+    for (int k = 0; k < 3; ++k) {
+      at_rest += found.weights[k] * shape.surface().vertices[corners[k]];
+      at_present += found.weights[k] * vertexAt(b, corners[k]);
+    }
+    const Vec3 there = map.to_rest * (p - at_present) + at_rest;
+    if ((there - rest).squaredNorm() < enough * enough) break;
+    rest = there;
+  }
+  return std::isfinite(found.distance);
+}
+
+void Contacts::Impl::addContact(Findings& to, const std::vector<ContactParty>& parties, Index a, Index sample, Index b,
+                                Index triangle, const std::array<double, 3>& weights, bool was_caught, bool flipped) {
+  const ContactParty& of = parties[a];
+  const ContactSample& s = of.shape->samples()[sample];
+  Contact c;
+  c.a = a;
+  c.b = b;
+  c.sample = sample;
+  c.triangle = triangle;
+  c.weights = weights;
+  c.caught = was_caught;
+  c.flipped = flipped;
+  const std::vector<Index>& particle = *of.shape->rows().particle;
+  c.point = {particle[s.vertices[0]], particle[s.vertices[1]]};
+  c.share = s.share;
+  c.direct = c.point[0] != kNoIndex && c.point[1] != kNoIndex;
+  if (b != kNoIndex) {
+    const ContactShape& shape = *parties[b].shape;
+    for (int k = 0; k < 3; ++k) {
+      c.corners[k] = (*shape.rows().particle)[shape.surface().triangles[triangle][k]];
+      c.direct = c.direct && c.corners[k] != kNoIndex;
+    }
+  }
+  if (!c.direct) {
+    c.first = static_cast<Index>(to.entries.size());
+    c.offset = addRow(of, s.vertices[0], 1.0 - s.share, to.entries);
+    if (s.share > 0.0) {
+      c.offset += addRow(of, s.vertices[1], s.share, to.entries);
+      tidy(to.entries, c.first);
+    }
+    c.split = static_cast<Index>(to.entries.size());
+    if (b != kNoIndex) {
+      const ContactParty& with = parties[b];
+      const Triangle& corners = with.shape->surface().triangles[triangle];
+      Vec3 x[3];
+      for (int k = 0; k < 3; ++k) {
+        c.offset -= addRow(with, corners[k], weights[k], to.entries);
+        x[k] = vertexAt(with, corners[k]);
+      }
+      tidy(to.entries, c.split);
+      const Vec3 area = (x[1] - x[0]).cross(x[2] - x[0]);
+      const double length = area.norm();
+      if (!(length > 0.0)) {
+        to.entries.resize(c.first);
+        return;
+      }
+      c.normal = area / (flipped ? -length : length);
+    }
+    c.end = static_cast<Index>(to.entries.size());
+  }
+  to.contacts.push_back(c);
+}
+
+// A point that was over a triangle in the last frame and still is, well within it and near, need not be looked up; now
+// and then it is.
+bool Contacts::Impl::stillOver(std::size_t& cursor, const ContactParty& with, Index a, Index b, Index sample,
+                               const Vec3& p, bool anew, ContactShape::Nearest& found, bool& flipped) {
+  const auto mine = std::make_tuple(true, std::min(a, b), std::max(a, b), a > b, sample);
+  while (cursor < last_sorted && keyOf(last[cursor]) < mine) ++cursor;
+  if (anew || cursor >= last_sorted || (frames + sample) % kLookAnew == 0) return false;
+  const Contact& before = last[cursor];
+  if (keyOf(before) != mine || before.caught || !same_parties) return false;
+  const Triangle& corners = with.shape->surface().triangles[before.triangle];
+  const Vec3 q0 = vertexAt(with, corners[0]);
+  const Vec3 e1 = vertexAt(with, corners[1]) - q0, e2 = vertexAt(with, corners[2]) - q0, d = p - q0;
+  const Vec3 area = e1.cross(e2);
+  const double squared = area.squaredNorm();
+  const double v = d.cross(e2).dot(area), w = e1.cross(d).dot(area), least = kWellWithin * squared;
+  if (!(v > least) || !(w > least) || !(squared - v - w > least)) return false;
+  const double height = (before.flipped ? -1.0 : 1.0) * area.dot(d) / std::sqrt(squared);
+  if (!(std::abs(height) < kNearby * with.shape->thickness())) return false;
+  found.triangle = before.triangle;
+  found.weights = {1.0 - (v + w) / squared, v / squared, w / squared};
+  found.distance = height;
+  found.above = true;
+  flipped = before.flipped;
+  return true;
+}
+
+// The points of a in the shape of b.
+void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair, Index a,
+                              Index b, const ContactMap* maps, bool every_point, Inside& inside) {
+  const ContactParty &of = parties[a], &with = parties[b];
+  const ContactShape& shape = *with.shape;
+  if (shape.surface().triangles.empty() || with.map_count == 0) return;
+  const Box region = grown(intersection(of.bounds, with.bounds), pair.reach);
+  const double size = shape.size(), near = kMargin * std::min(size, of.shape->size());
+  const std::vector<ContactSample>& samples = of.shape->samples();
+  inside.points = samples.size();
+  for (Index s = 0; s < samples.size(); ++s) {
+    const Vec3 p = sampleAt(of, samples[s]);
+    if (!region.contains(p)) continue;
+    if (!caught.empty()) {
+      const auto held = caught.find({of.key, with.key, s});
+      if (held != caught.end()) continue;  // see trace()
+    }
+    ContactShape::Nearest found;
+    bool flipped = false;
+    if (!stillOver(to.cursor, with, a, b, s, p, every_point, found, flipped) &&
+        !locate(with, b, finders[b], maps, p, pair.reach, found, flipped, to.counters))
+      continue;
+    if (found.distance < 0.0) {
+      ++inside.inside;
+      inside.deepest = std::min(inside.deepest, found.distance);
+    }
+    if (found.distance < near) ++inside.near;
+    if (found.distance > pair.reach || (found.distance > near && !found.above && !every_point)) continue;
+    addContact(to, parties, a, s, b, found.triangle, found.weights, false, flipped);
+    if (!to.contacts.empty()) to.contacts.back().below = found.distance < 0.0;
+    if (found.distance < 0.0) to.depths.push_back(-found.distance / std::min(size, of.shape->size()));
+  }
+}
+
+void Contacts::Impl::addGround(Findings& to, const std::vector<ContactParty>& parties, Index a, double reach) {
+  const ContactParty& party = parties[a];
+  const std::vector<ContactSample>& samples = party.shape->samples();
+  const double below = *scene.ground + reach;
+  for (Index s = 0; s < samples.size(); ++s) {
+    if (samples[s].share > 0.0) continue;  // between two vertices above a plane nothing is below it
+    const double z = vertexAt(party, samples[s].vertices[0]).z();
+    if (!(z < below)) continue;
+    addContact(to, parties, a, s, kNoIndex, kNoIndex, {}, false, false);
+    to.contacts.back().below = z < *scene.ground;
+    if (z < *scene.ground) to.depths.push_back((*scene.ground - z) / party.shape->size());
+  }
+}
+
+// Appends a part of what a task has found; its entries are then numbered from where they come to lie.
+void Contacts::Impl::join(const Findings& from, std::size_t contacts_from, std::size_t contacts_to,
+                          std::size_t entries_from, std::size_t entries_to) {
+  const Index moved = static_cast<Index>(entries.size()) - static_cast<Index>(entries_from);  // modulo 2^32
+  entries.insert(entries.end(), from.entries.begin() + static_cast<std::ptrdiff_t>(entries_from),
+                 from.entries.begin() + static_cast<std::ptrdiff_t>(entries_to));
+  const std::size_t first = contacts.size();
+  contacts.insert(contacts.end(), from.contacts.begin() + static_cast<std::ptrdiff_t>(contacts_from),
+                  from.contacts.begin() + static_cast<std::ptrdiff_t>(contacts_to));
+  if (entries_to > entries_from)
+    for (std::size_t k = first; k < contacts.size(); ++k)
+      if (!contacts[k].direct) {
+        contacts[k].first += moved;
+        contacts[k].split += moved;
+        contacts[k].end += moved;
+      }
+}
+
+}  // namespace meshless

@@ -1,0 +1,61 @@
+// How much work an island needs.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "contacts_impl.h"
+
+namespace meshless {
+namespace {
+
+// What a sweep leaves spreads through a stack as heat does, and grows with the fall in a substep: so much work do
+// stacks need to stand (found with towers of cubes).
+constexpr double kStackWork = 4.75;
+constexpr double kCalm = 0.02;     // of the size, how far particles go apart in a frame
+constexpr int kFewSubsteps = 4;    // below it two sweeps, there and back
+constexpr int kCaughtPasses = 24;  // of an island in which something was caught: it has to stop at once
+
+}  // namespace
+
+/// Sweeps in a frame of h [s] for an island.
+double stackWork(const ContactScene& scene, const std::vector<ContactParty>& parties, const IslandPlan& plan,
+                 Index island, double h) {
+  const double gravity = scene.gravity.norm();
+  if (!(gravity > 0.0)) return 0.0;
+  const Vec3 up = -scene.gravity / gravity;
+  double low = std::numeric_limits<double>::infinity(), high = -low, size = 0.0;
+  for (Index k = plan.party_offsets[island]; k < plan.party_offsets[island + 1]; ++k) {
+    const ContactParty& party = parties[plan.parties[k]];
+    const Vec3 centre = 0.5 * (party.bounds.min + party.bounds.max);
+    const double reach = 0.5 * up.cwiseAbs().dot(party.bounds.max - party.bounds.min);
+    low = std::min(low, up.dot(centre) - reach);
+    high = std::max(high, up.dot(centre) + reach);
+    size += party.shape->size();
+  }
+  const Index count = plan.party_offsets[island + 1] - plan.party_offsets[island];
+  if (count < 2 || !(size > 0.0)) return 0.0;
+  size /= count;
+  const double layers = std::max(1.0, (high - low) / size);
+  return kStackWork * h * std::sqrt(gravity / size) * std::min(layers * layers, 1e4);
+}
+
+void Contacts::Impl::choosePasses(const std::vector<ContactParty>& parties, double substep) {
+  plan.passes.resize(plan.size());
+  plan.calm.resize(plan.size());
+  const double substeps = std::max(1.0, std::round(frame / substep));
+  const int least = substeps < kFewSubsteps ? 2 : 1;
+  for (Index island = 0; island < plan.size(); ++island) {
+    const double work = stackWork(scene, parties, plan, island, frame) / substeps;
+    plan.passes[island] = std::max(least, static_cast<int>(std::ceil(std::min(work, kMostPasses))));
+    plan.calm[island] = 1;
+    for (Index k = plan.party_offsets[island]; k < plan.party_offsets[island + 1]; ++k) {
+      const ContactParty& party = parties[plan.parties[k]];
+      if (!(party.spread * frame < kCalm * party.shape->size())) plan.calm[island] = 0;
+    }
+    if (caught.empty()) continue;
+    for (Index k = plan.contact_offsets[island]; k < plan.contact_offsets[island + 1]; ++k)
+      if (contacts[plan.contacts[k]].caught) plan.passes[island] = kCaughtPasses;
+  }
+}
+
+}  // namespace meshless

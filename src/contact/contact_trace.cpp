@@ -1,0 +1,147 @@
+// Who has passed through a surface within a substep, and stays known until it is back.
+#include <algorithm>
+#include <map>
+
+#include "cell_table.h"
+#include "contacts_impl.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kBesidePath = 1e-6;  // barycentric: no path slips between two triangles
+constexpr int kMostSlides = 8;        // triangles that a caught point goes on in a substep
+
+}  // namespace
+
+// Points of a that a triangle of b swept over in this substep, from its front: who has passed through is remembered.
+void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, Index b, ContactCounters& counters) {
+  const ContactParty &of = parties[a], &with = parties[b];
+  const ContactShape& shape = *with.shape;
+  const std::vector<ContactSample>& samples = of.shape->samples();
+  const std::vector<Triangle>& triangles = shape.surface().triangles;
+  if (triangles.empty()) return;
+  struct Path {
+    Vec3 from, to;
+  };
+  std::vector<Path> paths(samples.size());
+  Box box_a, box_b;
+  for (Index s = 0; s < samples.size(); ++s) {
+    const Vec3 p = sampleAt(of, samples[s]);
+    Vec3 motion = vertexMotion(of, samples[s].vertices[0]);
+    if (samples[s].share > 0.0) motion += samples[s].share * (vertexMotion(of, samples[s].vertices[1]) - motion);
+    paths[s] = {p - motion, p};
+    if (!p.allFinite() || !motion.allFinite()) continue;
+    box_a.extend(p);
+    box_a.extend(p - motion);
+  }
+  std::vector<Path> corners(shape.surface().vertices.size());
+  for (Index v = 0; v < corners.size(); ++v) {
+    const Vec3 q = vertexAt(with, v);
+    corners[v] = {q - vertexMotion(with, v), q};
+  }
+  std::vector<Index> near;
+  double size = 0.0;
+  const auto sweptBox = [&](Index t) {
+    Box box;
+    for (Index v : triangles[t]) {
+      box.extend(corners[v].from);
+      box.extend(corners[v].to);
+    }
+    return box;
+  };
+  for (Index t = 0; t < triangles.size(); ++t) {
+    const Box box = sweptBox(t);
+    if (!box.overlaps(box_a)) continue;
+    near.push_back(t);
+    box_b.extend(box.min);
+    box_b.extend(box.max);
+    size += (box.max - box.min).maxCoeff();
+  }
+  if (near.empty() || !(size > 0.0)) return;
+  const Box region = intersection(box_a, box_b);
+  static thread_local CellTable table;
+  table.start(region, size / static_cast<double>(near.size()), 4 * near.size());
+  for (Index k = 0; k < near.size(); ++k) {
+    const CellRange range = table.cellsOf(sweptBox(near[k]));
+    Cell cell;
+    for (cell[0] = range.first[0]; cell[0] <= range.last[0]; ++cell[0])
+      for (cell[1] = range.first[1]; cell[1] <= range.last[1]; ++cell[1])
+        for (cell[2] = range.first[2]; cell[2] <= range.last[2]; ++cell[2]) table.insert(cell, near[k]);
+  }
+  for (Index s = 0; s < samples.size(); ++s) {
+    if (caught.count({of.key, with.key, s})) continue;
+    const Path& path = paths[s];
+    Box box;
+    box.extend(path.from);
+    box.extend(path.to);
+    if (!box.overlaps(region)) continue;
+    ++counters.traced;
+    double first = 2.0;
+    Index hit = kNoIndex;
+    table.forEach(table.cellsOf(box), [&](Index t) {
+      const Path &p0 = corners[triangles[t][0]], &p1 = corners[triangles[t][1]], &p2 = corners[triangles[t][2]];
+      const Vec3 n0 = (p1.from - p0.from).cross(p2.from - p0.from), n1 = (p1.to - p0.to).cross(p2.to - p0.to);
+      const double h0 = n0.dot(path.from - p0.from), h1 = n1.dot(path.to - p0.to);
+      if (!(h0 >= 0.0) || !(h1 < 0.0)) return;
+      const double d0 = h0 / n0.norm(), d1 = h1 / n1.norm();
+      const double time = d0 / (d0 - d1);
+      if (!(time < first) && !(time == first && t < hit)) return;
+      const auto then = [time](const Path& q) -> Vec3 { return q.from + time * (q.to - q.from); };
+      const Vec3 q = then(p0), e1 = then(p1) - q, e2 = then(p2) - q, d = then(path) - q;
+      const Vec3 area = e1.cross(e2);
+      const double squared = area.squaredNorm();
+      const double v = d.cross(e2).dot(area) / squared, w = e1.cross(d).dot(area) / squared;
+      if (!(v >= -kBesidePath) || !(w >= -kBesidePath) || !(v + w <= 1.0 + kBesidePath)) return;
+      first = time;
+      hit = t;
+    });
+    if (hit == kNoIndex) continue;
+    ++counters.caught;
+    caught[{of.key, with.key, s}] = hit;
+  }
+}
+
+// Contacts of those that have passed through: with the triangle that they slid to, until they are back outside.
+void Contacts::Impl::addCaught(const std::vector<ContactParty>& parties) {
+  Findings found;
+  std::map<std::uint64_t, Index> by_key;
+  for (Index p = 0; p < parties.size(); ++p) by_key[parties[p].key] = p;
+  for (auto it = caught.begin(); it != caught.end();) {
+    const auto a = by_key.find(it->first.a), b = by_key.find(it->first.b);
+    bool over = a == by_key.end() || b == by_key.end();
+    over = over || !parties[a->second].shape || !parties[b->second].shape ||
+           it->first.sample >= parties[a->second].shape->samples().size() ||
+           it->second >= parties[b->second].shape->surface().triangles.size();
+    if (!over) {
+      const ContactParty &of = parties[a->second], &with = parties[b->second];
+      const ContactShape& shape = *with.shape;
+      const Vec3 p = sampleAt(of, of.shape->samples()[it->first.sample]);
+      std::array<double, 3> weights{};
+      for (int step = 0;; ++step) {
+        const Triangle& corners = shape.surface().triangles[it->second];
+        const Vec3 q0 = vertexAt(with, corners[0]);
+        const Vec3 e1 = vertexAt(with, corners[1]) - q0, e2 = vertexAt(with, corners[2]) - q0, d = p - q0;
+        const Vec3 area = e1.cross(e2);
+        const double squared = area.squaredNorm();
+        const double v = d.cross(e2).dot(area) / squared, w = e1.cross(d).dot(area) / squared;
+        weights = {1.0 - v - w, v, w};
+        over = !(area.dot(d) < 0.0);
+        const int corner = static_cast<int>(std::min_element(weights.begin(), weights.end()) - weights.begin());
+        if (over || weights[corner] >= 0.0 || step == kMostSlides) break;
+        const Index next = shape.across(it->second, corner);
+        // Not round an edge: there the next one looks another way, and the point is in front of it.
+        if (next == kNoIndex) break;
+        const Triangle& turned = shape.surface().triangles[next];
+        const Vec3 r0 = vertexAt(with, turned[0]);
+        const Vec3 other = (vertexAt(with, turned[1]) - r0).cross(vertexAt(with, turned[2]) - r0);
+        if (!(other.dot(area) > 0.0) || !(other.dot(p - r0) < 0.0)) break;
+        it->second = next;
+      }
+      if (!over) addContact(found, parties, a->second, it->first.sample, b->second, it->second, weights, true, false);
+    }
+    it = over ? caught.erase(it) : std::next(it);
+  }
+  join(found, 0, found.contacts.size(), 0, found.entries.size());
+}
+
+}  // namespace meshless

@@ -1,0 +1,134 @@
+// What Contacts keeps; shared by the files that implement it.
+#pragma once
+
+#include <map>
+#include <tuple>
+
+#include "contact_set.h"
+#include "map_finder.h"
+#include "party_points.h"
+
+namespace meshless {
+
+inline constexpr double kMargin = 1e-3;  // of the smaller body's size: contacts are kept while so near
+inline constexpr double kQuick = 0.25;   // of the thickness: who goes farther is looked up in every substep, or traced
+inline constexpr double kMostPasses = 4.0;  // beyond it substeps do more
+
+struct Pair {
+  Index a, b;
+  double reach;  // [m] how far outside a point is taken as a contact to come
+  bool quick;    // looked up anew in every substep
+  double way;    // [m/s] at which its bodies move, at most
+};
+
+inline Box intersection(const Box& a, const Box& b) { return {a.min.cwiseMax(b.min), a.max.cwiseMin(b.max)}; }
+
+inline Box grown(Box box, double by) {
+  box.min.array() -= by;
+  box.max.array() += by;
+  return box;
+}
+
+/// The order in which contacts are made.
+inline std::tuple<bool, Index, Index, bool, Index> keyOf(const Contact& c) {
+  return {c.b != kNoIndex, std::min(c.a, c.b), c.b == kNoIndex ? 0 : std::max(c.a, c.b), c.b != kNoIndex && c.a > c.b,
+          c.sample};
+}
+
+using PairKey = std::pair<std::uint64_t, std::uint64_t>;
+
+/// What passed through and is still on the wrong side.
+struct CaughtKey {
+  std::uint64_t a, b;
+  Index sample;
+  bool operator<(const CaughtKey& o) const { return std::tie(a, b, sample) < std::tie(o.a, o.b, o.sample); }
+};
+
+struct Exit {
+  Vec3 direction;  // of a out of b
+  double speed;    // [m/s]
+};
+
+/// What a task finds; tasks are joined in their order.
+struct Findings {
+  std::vector<Contact> contacts;
+  std::vector<ContactEntry> entries;
+  std::vector<double> depths;
+  ContactCounters counters;
+  std::size_t cursor = 0;  // in the contacts of the last frame
+
+  void clear() {
+    contacts.clear();
+    entries.clear();
+    depths.clear();
+    counters = ContactCounters();
+    cursor = 0;
+  }
+};
+
+/// How many points of one party lie in the other.
+struct Inside {
+  std::size_t points = 0, inside = 0, near = 0;
+  double deepest = 0.0;
+};
+
+/// Where a task has the contacts of a pair.
+struct PairFindings {
+  Inside of_a, of_b;
+  std::size_t contacts = 0, entries = 0, depths = 0;  // ends
+};
+
+/// Sweeps in a frame of h [s] for an island.
+double stackWork(const ContactScene& scene, const std::vector<ContactParty>& parties, const IslandPlan& plan,
+                 Index island, double h);
+
+struct Contacts::Impl {
+  ContactScene scene;
+  BroadPhase broad;
+  std::vector<Box> boxes;
+  std::vector<char> active, needed;
+  std::vector<Pair> pairs;
+  std::vector<Index> partners;  // one a party: how many pairs it is in
+  std::vector<Index> grounded;  // parties that can meet the ground
+  std::vector<MapFinder> finders;
+  std::vector<double> deviations;  // [m] one a party: how far its surface may be from where its maps have it
+  std::vector<std::vector<ContactMap>> maps_now;  // of those in quick pairs
+  std::vector<Contact> contacts, last;            // of this frame and of the one before
+  std::vector<ContactEntry> entries;
+  std::size_t steady_contacts = 0, steady_entries = 0;  // those found once a frame; quick ones follow
+  std::map<CaughtKey, Index> caught;                    // triangle
+  std::map<PairKey, Exit> exits;
+  std::vector<double> depths;
+  std::vector<Index> reached;
+  int needed_substeps = 1;
+  double frame = 0.0;  // [s]
+  ContactSolver solver;
+  IslandPlan plan;
+  std::size_t frames = 0, last_sorted = 0;  // of `last`, before what was found out of turn
+  std::vector<std::uint64_t> keys;          // of the parties of the last frame
+  bool same_parties = false;                // as in the last frame, in the same order
+  bool fresh = true;                        // nothing has been solved since the contacts were made
+  bool plan_steady = true;                  // the plan is that of the steady contacts alone
+  std::vector<Findings> tasks;
+  std::vector<PairFindings> pair_findings;
+
+  bool locate(const ContactParty& b, Index party, const MapFinder& finder, const ContactMap* maps, const Vec3& p,
+              double reach, ContactShape::Nearest& found, bool& flipped, ContactCounters& counters) const;
+  void addContact(Findings& to, const std::vector<ContactParty>& parties, Index a, Index sample, Index b,
+                  Index triangle, const std::array<double, 3>& weights, bool was_caught, bool flipped);
+  bool stillOver(std::size_t& cursor, const ContactParty& with, Index a, Index b, Index sample, const Vec3& p,
+                 bool anew, ContactShape::Nearest& found, bool& flipped);
+  void lookInto(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair, Index a, Index b,
+                const ContactMap* maps, bool every_point, Inside& inside);
+  void trace(const std::vector<ContactParty>& parties, Index a, Index b, ContactCounters& counters);
+  void addCaught(const std::vector<ContactParty>& parties);
+  void addGround(Findings& to, const std::vector<ContactParty>& parties, Index a, double reach);
+  void join(const Findings& from, std::size_t contacts_from, std::size_t contacts_to, std::size_t entries_from,
+            std::size_t entries_to);
+  void takeOver();
+  void choosePasses(const std::vector<ContactParty>& parties, double substep);
+  bool letOutWhole(const std::vector<ContactParty>& parties, const Pair& pair, const Inside& of_a, const Inside& of_b,
+                   double h, ContactCounters& counters);
+};
+
+}  // namespace meshless
