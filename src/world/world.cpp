@@ -50,6 +50,8 @@ const char* toString(EventType type) {
       return "reset";
     case EventType::kFault:
       return "fault";
+    case EventType::kUndone:
+      return "undone";
   }
   return "unknown";
 }
@@ -194,6 +196,7 @@ void World::reset() {
   while (!w.bodies.empty()) w.retire(w.bodies.back()->id);
   w.used_names.clear();
   w.picks.clear();
+  w.undo.clear();
   w.push = PushSphere();
   w.scissors = Scissors();
   w.step = 0;

@@ -94,6 +94,11 @@ Result<Reply> World::Impl::apply(const OpenScissorsCommand&) {
   return Reply(Done{});
 }
 
+Result<Reply> World::Impl::apply(const LiftScissorsCommand&) {
+  scissors.shown = false;
+  return Reply(Done{});
+}
+
 std::optional<Result<CutReply>> World::finishedCut(std::uint32_t ticket) {
   const auto it = impl_->finished.find(ticket);
   if (it == impl_->finished.end()) return std::nullopt;
@@ -133,6 +138,7 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
   }
 
   // From here nothing fails: parents are retired and their pieces admitted.
+  CutUndo before = beforeCut();
   for (Severed& s : severed) {
     const std::string parent_name = find(s.parent)->name;
     const std::vector<std::string> names = replaceByPieces(s.parent, std::move(s.cut.pieces));
@@ -141,6 +147,7 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
     reply.cap_area += s.cut.cap_area;
     say(EventType::kCut, parent_name, 0, "cut into " + std::to_string(names.size()) + " pieces");
   }
+  rememberCut(std::move(before), reply.cut_bodies, reply.new_bodies);
   reply.duration = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return reply;
 }

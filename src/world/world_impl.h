@@ -36,6 +36,23 @@ struct ClosingCut {
   std::uint64_t started_at = 0;
 };
 
+/// The state before a cut or an incision. Models are shared, so that this is the states alone.
+struct CutUndo {
+  struct Body {
+    std::string name;
+    std::uint32_t number = 0;
+    Material material;
+    BodyModelPtr model;
+    BodyState state;
+    bool surface_current = true;
+  };
+  std::vector<Body> bodies;  // all of them, in their order
+  std::vector<Pick> picks;
+  std::vector<std::string> pick_bodies;  // one a pick
+  std::vector<std::string> cut;          // bodies that were cut or opened
+  std::vector<std::string> pieces;       // what they came apart into
+};
+
 struct World::Impl {
   WorldSettings settings;
   std::uint64_t step = 0;
@@ -54,6 +71,7 @@ struct World::Impl {
   std::map<std::uint32_t, Result<CutReply>> finished;
   std::uint32_t next_ticket = 1;
   std::vector<Event> events;
+  std::vector<CutUndo> undo;  // the last is the next to be undone
   StepReport report;
   std::size_t tetrahedralizations = 0;
 
@@ -77,10 +95,14 @@ struct World::Impl {
   Result<Reply> apply(const PushCommand& command);
   Result<Reply> apply(const CutCommand& command);
   Result<Reply> apply(const OpenScissorsCommand& command);
+  Result<Reply> apply(const LiftScissorsCommand& command);
+  Result<Reply> apply(const UndoCutCommand& command);
   Result<Reply> apply(const InciseCommand& command);
   Result<Reply> apply(const SetMaterialCommand& command);
   Result<Reply> apply(const SpawnCommand& command);
   Result<Reply> apply(const RemoveCommand& command);
+  CutUndo beforeCut() const;
+  void rememberCut(CutUndo before, std::vector<std::string> cut, std::vector<std::string> pieces);
   Status checkCut(const CutCommand& command);
   Result<CutReply> cutNow(const CutCommand& command);
   /// Retires a body and admits its pieces in its place; their names.

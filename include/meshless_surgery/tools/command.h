@@ -47,6 +47,10 @@ struct CutCommand {
 };
 /// Opens the scissors: cuts whose blades are closing are called off.
 struct OpenScissorsCommand {};
+/// Takes the scissors away; cuts whose blades are closing go on.
+struct LiftScissorsCommand {};
+/// Back to the state before the last cut or incision; time goes on.
+struct UndoCutCommand {};
 struct InciseCommand {
   Blade blade;
   std::vector<std::string> bodies;  // empty: all that the blade meets
@@ -63,7 +67,8 @@ struct RemoveCommand {
 };
 
 using Command = std::variant<PickCommand, MovePickCommand, LockCommand, ReleaseCommand, ClearPicksCommand, PushCommand,
-                             CutCommand, OpenScissorsCommand, InciseCommand, SetMaterialCommand, SpawnCommand, RemoveCommand>;
+                             CutCommand, OpenScissorsCommand, InciseCommand, SetMaterialCommand, SpawnCommand, RemoveCommand,
+                             LiftScissorsCommand, UndoCutCommand>;
 
 struct PickReply {
   PickId pick = 0;
@@ -95,6 +100,10 @@ struct SpawnReply {
   std::size_t particles = 0, triangles = 0, clusters = 0;
 };
 
-using Reply = std::variant<Done, PickReply, CutReply, CutStarted, InciseReply, SpawnReply>;
+struct UndoCutReply {
+  std::vector<std::string> bodies;  // that were cut, and are whole again
+};
+
+using Reply = std::variant<Done, PickReply, CutReply, CutStarted, InciseReply, SpawnReply, UndoCutReply>;
 
 }  // namespace meshless

@@ -50,7 +50,8 @@ enum class EventType {
   kSpawned,
   kRemoved,
   kReset,
-  kFault
+  kFault,
+  kUndone
 };
 const char* toString(EventType type);
 
@@ -109,6 +110,13 @@ struct WorldSnapshot {
   StepReport report;
 };
 
+/// What a ray met.
+struct ProbeReply {
+  std::string body;
+  Vec3 position = Vec3::Zero();  // [m]
+  Vec3 normal = Vec3::UnitZ();   // unit, out of the tissue
+};
+
 class World {
  public:
   explicit World(WorldSettings settings);
@@ -139,6 +147,8 @@ class World {
   WorldSnapshot snapshot(const SnapshotWants& wants);
   /// One body, by name; `rest` gives rest positions for surface and particles. Tetrahedra are made where missing.
   Result<BodySnapshot> inspect(const std::string& name, bool rest);
+  /// The first surface that the ray from `origin` meets; kMissed where it meets none. Nothing changes.
+  Result<ProbeReply> probe(const Vec3& origin, const Vec3& direction);
   /// Events since the last call.
   std::vector<Event> takeEvents();
   /// FNV-1a over every position, velocity and tool: equal for equal histories.
