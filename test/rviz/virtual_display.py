@@ -32,12 +32,62 @@ class VirtualDisplay:
         width, height = (int(word) for word in size.split())
         return numpy.frombuffer(pixels, dtype=numpy.uint8).reshape(height, width, 3)
 
+    def xdotool(self, *words):
+        subprocess.run(['xdotool'] + [str(word) for word in words], env=self.environment, check=True)
+
     def save(self, file):
         subprocess.run(['import', '-window', 'root', file], env=self.environment, check=True)
 
     def close(self):
         self.server.terminate()
         self.server.wait()
+
+
+class Mouse:
+    """A hand on the display's mouse and keyboard. Places are (row, column)."""
+
+    STEP = 8  # [px] between two places of a drag: a hand does not jump
+
+    def __init__(self, display):
+        self.display = display
+        self.place = None
+
+    def move(self, place):
+        row, column = int(place[0]), int(place[1])
+        if self.place is None:
+            self.display.xdotool('mousemove', column, row)
+        else:
+            count = max(1, int(max(abs(row - self.place[0]), abs(column - self.place[1])) / self.STEP))
+            for i in range(1, count + 1):
+                self.display.xdotool('mousemove', round(self.place[1] + (column - self.place[1]) * i / count),
+                                     round(self.place[0] + (row - self.place[0]) * i / count))
+                time.sleep(0.02)
+        self.place = (row, column)
+        time.sleep(0.1)
+
+    def down(self, button=1):
+        self.display.xdotool('mousedown', button)
+
+    def up(self, button=1):
+        self.display.xdotool('mouseup', button)
+
+    def click(self, button=1):
+        self.display.xdotool('click', button)
+
+    def wheel(self, notches):
+        """Above 0: away from the viewer."""
+        for _ in range(abs(notches)):
+            self.display.xdotool('click', 4 if notches > 0 else 5)
+            time.sleep(0.05)
+
+    def key(self, name):
+        self.display.xdotool('key', name)
+
+    def key_down(self, name):
+        self.display.xdotool('keydown', name)
+
+    def key_up(self, name):
+        self.display.xdotool('keyup', name)
 
 
 def stop(process):
