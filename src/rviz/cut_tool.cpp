@@ -29,7 +29,7 @@ constexpr double kShortest = 0.002;        // [m] of an incision; below it, the 
 constexpr double kMargin = 0.002;          // [m] of the scalpel above the tissue
 constexpr double kAfterStream = 0.15;      // [s] a message of the stream that comes after the lifting brings them back
 constexpr float kLineWidth = 0.0015f;      // [m]
-constexpr float kLineOver = 0.001f;        // [m] above the tissue
+constexpr float kLineOver = 0.002f;        // [m] above the tissue
 
 Ogre::Quaternion firstTurn() {
   // In the camera's frame (x right, y up, z back): the blades reach away, open up and down, and are seen from the side.
@@ -166,10 +166,10 @@ void CutTool::stream() {
 void CutTool::draw() {
   if (hover().over && (hover().position - line_.back().position).length() > 0.5 * kShortest)
     line_.push_back({hover().position, hover().normal});
-  showLine(line_.back().position);
+  showLine();
 }
 
-void CutTool::showLine(const Ogre::Vector3& end) {
+void CutTool::showLine() {
   if (!shown_line_) {
     shown_line_ = std::make_unique<rviz::BillboardLine>(scene_manager_);
     shown_line_->setLineWidth(kLineWidth);
@@ -177,8 +177,8 @@ void CutTool::showLine(const Ogre::Vector3& end) {
   }
   const Ogre::Vector3 over = viewDirection() * -kLineOver;
   shown_line_->clear();
-  shown_line_->addPoint(line_.front().position + over);
-  shown_line_->addPoint(end + over);
+  shown_line_->setMaxPointsPerLine(static_cast<uint32_t>(line_.size()) + 1);
+  for (const Touch& touch : line_) shown_line_->addPoint(touch.position + over);
 }
 
 void CutTool::finishLine() {

@@ -57,7 +57,7 @@ class CutTool : public HandTool {
   void stream();
   void turn(int dx, int dy);
   void draw();
-  void showLine(const Ogre::Vector3& end);
+  void showLine();
   void finishLine();
   void incise(const Touch& end);
 

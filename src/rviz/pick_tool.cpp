@@ -7,6 +7,7 @@
 #include <meshless_surgery/Pick.h>
 #include <meshless_surgery/Release.h>
 #include <pluginlib/class_list_macros.hpp>
+#include <rviz/view_controller.h>
 
 #include "ogre_convert.h"
 
@@ -81,9 +82,9 @@ bool PickTool::onMouse(rviz::ViewportMouseEvent& event) {
       }
       return true;
     case Drag::kCamera:
-      if (event.left()) return false;
-      drag_ = Drag::kNone;
-      return true;
+      if (!camera_pressed_) pressCamera(event);
+      if (!event.left()) drag_ = Drag::kNone;
+      return false;
     case Drag::kOver:
       if (!any_button) drag_ = Drag::kNone;
       return true;
@@ -104,8 +105,10 @@ void PickTool::grab() {
   link().call("pick", question, [this, attempt](const meshless_surgery::Pick::Response& picked) {
     const bool wanted = attempt == attempt_ && drag_ == Drag::kAsking;
     if (!picked.success) {
-      if (wanted) drag_ = Drag::kCamera;
-      if (wanted) say("no tissue there; the drag turns the view");
+      if (!wanted) return;
+      drag_ = Drag::kCamera;
+      camera_pressed_ = false;
+      say("no tissue there; the drag turns the view");
       return;
     }
     if (!wanted) {
@@ -117,6 +120,18 @@ void PickTool::grab() {
     move();
     showStatus();
   });
+}
+
+void PickTool::pressCamera(const rviz::ViewportMouseEvent& event) {
+  // The camera drags from the press on that it has not seen.
+  camera_pressed_ = true;
+  rviz::ViewportMouseEvent press = event;
+  press.type = QEvent::MouseButtonPress;
+  press.acting_button = Qt::LeftButton;
+  press.buttons_down = Qt::LeftButton;
+  press.x = event.last_x;
+  press.y = event.last_y;
+  if (press.panel->getViewController()) press.panel->getViewController()->handleMouseEvent(press);
 }
 
 void PickTool::takeUp(const Locked& locked) {

@@ -43,6 +43,7 @@ class PickTool : public HandTool {
   };
 
   void grab();
+  void pressCamera(const rviz::ViewportMouseEvent& event);
   void takeUp(const Locked& locked);
   void hold(std::uint32_t pick_id, const Ogre::Vector3& point);
   void move();
@@ -55,6 +56,7 @@ class PickTool : public HandTool {
   Drag drag_ = Drag::kNone;
   std::uint32_t attempt_ = 0;  // answers to older ones are let go of
   std::uint32_t pick_id_ = 0;
+  bool camera_pressed_ = false;
   bool taken_up_ = false;  // was locked before
   Ogre::Vector3 plane_point_ = Ogre::Vector3::ZERO;
   Ogre::Vector3 plane_normal_ = Ogre::Vector3::UNIT_X;  // away from the camera

@@ -18,6 +18,7 @@ constexpr double kNotch = 120.0;
 constexpr double kRadiusFactor = 1.15;   // a notch
 constexpr double kSmallest = 0.002;      // [m]
 constexpr double kLargest = 0.2;         // [m]
+constexpr double kLeastFacing = 0.3;     // cosine between the tissue's normal and the view
 constexpr double kSpeed = 1.0;           // [m/s] where its size changes while it is solid
 constexpr double kAfterStream = 0.15;    // [s] a message of the stream that comes after the lifting brings it back
 
@@ -141,10 +142,11 @@ void PushTool::onUpdate(double) {
 void PushTool::showGhost() {
   if (!ghost_) return;
   if (seen() && hover().over) {
-    // In front of the tissue, touching it.
+    // In front of the tissue, touching it where that is even; at its rim not farther than a few radii.
     placed_ = true;
     plane_normal_ = viewDirection();
-    plane_point_ = hover().position + plane_normal_ * (depth_ - radius_);
+    const double facing = std::max(kLeastFacing, -static_cast<double>(hover().normal.dotProduct(plane_normal_)));
+    plane_point_ = hover().position + plane_normal_ * (depth_ - radius_ / facing);
   }
   grip_ = Ogre::Vector3::ZERO;
   ghost_->getRootNode()->setVisible(placed_ && seen());
