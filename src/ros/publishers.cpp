@@ -7,6 +7,7 @@
 
 #include "meshless_surgery/ros/border_check.h"
 #include "meshless_surgery/ros/convert.h"
+#include "meshless_surgery/ros/surfaces.h"
 
 namespace meshless {
 namespace {
@@ -45,6 +46,9 @@ Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings
       "markers", 5, [this](const ros::SingleSubscriberPublisher&) { markers_newcomer_ = true; });
   points_topic_ = handle.advertise<sensor_msgs::PointCloud2>(
       "points", 5, [this](const ros::SingleSubscriberPublisher&) { points_newcomer_ = true; });
+  const auto on_surfaces = [this](const ros::SingleSubscriberPublisher&) { surfaces_newcomer_ = true; };
+  surfaces_topic_ = handle.advertise<meshless_surgery::Surfaces>("surfaces", 2, on_surfaces);
+  strained_surfaces_topic_ = handle.advertise<meshless_surgery::Surfaces>("strained_surfaces", 2, on_surfaces);
   state_topic_ = handle.advertise<meshless_surgery::State>("state", 10);
   events_topic_ = handle.advertise<meshless_surgery::Event>("events", 1000);
   const auto advertiseTool = [&](const std::string& tool) {
@@ -58,7 +62,7 @@ Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings
   updater_.setHardwareID("none");
   updater_.add("simulation", this, &Publishers::diagnose);
 
-  markers_due_.period = periodOf(settings_.markers_rate);
+  markers_due_.period = surfaces_due_.period = periodOf(settings_.markers_rate);
   points_due_.period = periodOf(settings_.points_rate);
   state_due_.period = periodOf(settings_.state_rate);
   tools_due_.period = periodOf(settings_.tools_rate);
@@ -69,7 +73,7 @@ Publishers::~Publishers() { stop(); }
 
 void Publishers::start() {
   const auto now = Clock::now();
-  for (Cadence* cadence : {&markers_due_, &points_due_, &state_due_, &tools_due_, &diagnostics_due_}) {
+  for (Cadence* cadence : {&markers_due_, &surfaces_due_, &points_due_, &state_due_, &tools_due_, &diagnostics_due_}) {
     cadence->next = now;
   }
   thread_ = std::thread([this] { loop(); });
@@ -101,7 +105,7 @@ void Publishers::loop() {
     publishEvents();
     publishTick(Clock::now());
     const auto next = std::min(
-        {markers_due_.next, points_due_.next, state_due_.next, tools_due_.next, diagnostics_due_.next});
+        {markers_due_.next, surfaces_due_.next, points_due_.next, state_due_.next, tools_due_.next, diagnostics_due_.next});
     std::unique_lock<std::mutex> lock(mutex_);
     changed_.wait_until(lock, next, [this] { return stopping_ || !events_.empty(); });
     if (stopping_) return;
@@ -134,12 +138,15 @@ void Publishers::publishTick(Clock::time_point now) {
   markers = markers && (markers_fresh || revision != markers_revision_ || markers_.deleting());
   bool points = points_due_.due(now) && points_topic_.getNumSubscribers() > 0;
   points = points && (points_newcomer_.exchange(false) || revision != points_revision_);
+  bool surfaces = surfaces_due_.due(now) &&
+                  (surfaces_topic_.getNumSubscribers() > 0 || strained_surfaces_topic_.getNumSubscribers() > 0);
+  surfaces = surfaces && (surfaces_newcomer_.exchange(false) || revision != surfaces_revision_);
   const bool state = state_due_.due(now) && state_topic_.getNumSubscribers() > 0;
   const bool tools = tools_due_.due(now);
-  if (!markers && !points && !state && !tools) return;
+  if (!markers && !surfaces && !points && !state && !tools) return;
 
   SnapshotWants wants;
-  wants.surfaces = markers;
+  wants.surfaces = markers || surfaces;
   wants.particles = points;
   wants.measures = state;
   // The stamp comes first: who sees one later than an answer sees what was answered.
@@ -153,6 +160,10 @@ void Publishers::publishTick(Clock::time_point now) {
     markers_revision_ = revision;
     markers_topic_.publish(markers_.build(*snapshot, header.stamp, markers_fresh));
   }
+  if (surfaces) {
+    surfaces_revision_ = revision;
+    publishSurfaces(*snapshot, header);
+  }
   if (points) {
     ++points_built_;
     points_revision_ = revision;
@@ -163,6 +174,13 @@ void Publishers::publishTick(Clock::time_point now) {
     state_topic_.publish(toState(*snapshot, runner_.status(), header));
   }
   if (tools) publishTools(*snapshot, header.stamp);
+}
+
+void Publishers::publishSurfaces(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
+  ++surfaces_built_;
+  if (surfaces_topic_.getNumSubscribers() > 0) surfaces_topic_.publish(toSurfaces(snapshot, header, false));
+  if (strained_surfaces_topic_.getNumSubscribers() > 0)
+    strained_surfaces_topic_.publish(toSurfaces(snapshot, header, true));
 }
 
 void Publishers::publishTools(const WorldSnapshot& snapshot, const ros::Time& stamp) {
@@ -250,6 +268,7 @@ void Publishers::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   }
   status.add("lost events", lost);
   status.add("marker arrays built", markers_built_);
+  status.add("surfaces built", surfaces_built_);
   status.add("point clouds built", points_built_);
   status.add("states built", states_built_);
 }

@@ -84,6 +84,8 @@ ControlPanel::ControlPanel(QWidget* parent) : rviz::Panel(parent), link_(new Nod
   layout->addLayout(buttons);
 
   time_ = new QLabel("no state from the node yet", this);
+  // A longer number must not widen the panel, which would move the view.
+  time_->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Preferred);
   layout->addWidget(time_);
   plot_ = new StepPlot(this);
   layout->addWidget(plot_);
@@ -134,6 +136,7 @@ ControlPanel::ControlPanel(QWidget* parent) : rviz::Panel(parent), link_(new Nod
 
   message_ = new QLabel(this);
   message_->setWordWrap(true);
+  message_->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Preferred);
   layout->addWidget(message_);
 
   timer_ = new QTimer(this);

@@ -46,6 +46,7 @@ class Publishers {
   void loop();
   void publishEvents();
   void publishTick(Clock::time_point now);
+  void publishSurfaces(const WorldSnapshot& snapshot, const std_msgs::Header& header);
   void publishTools(const WorldSnapshot& snapshot, const ros::Time& stamp);
   void publishTool(const ToolTopics& topics, const std::string& frame, const Pose& pose, const Vec3& force,
                    const ros::Time& stamp, std::vector<geometry_msgs::TransformStamped>& transforms);
@@ -57,11 +58,15 @@ class Publishers {
   const Rejections& rejections_;
   MarkerBuilder markers_;
 
+  ros::Publisher surfaces_topic_, strained_surfaces_topic_;
   ros::Publisher markers_topic_, points_topic_, state_topic_, events_topic_;
   ToolTopics pick_topics_, push_topics_, scissors_topics_;
   tf2_ros::TransformBroadcaster broadcaster_;
   diagnostic_updater::Updater updater_;
 
+  Cadence surfaces_due_;
+  std::atomic<bool> surfaces_newcomer_{false};
+  std::uint64_t surfaces_revision_ = 0, surfaces_built_ = 0;
   Cadence markers_due_, points_due_, state_due_, tools_due_, diagnostics_due_;
   std::atomic<bool> markers_newcomer_{false}, points_newcomer_{false};
   std::uint64_t markers_revision_ = 0, points_revision_ = 0;
