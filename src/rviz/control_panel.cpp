@@ -203,9 +203,9 @@ void ControlPanel::refresh() {
   if (!fresh_ || !state_) return;
   fresh_ = false;
   pause_->setText(state_->paused ? "Run" : "Pause");
-  time_->setText(QString("%1 s   %2   %3 ms a step, worst %4 ms")
+  time_->setText(QString("%1 s   %2   step %3 ms, worst %4")
                      .arg(state_->sim_time, 0, 'f', 2)
-                     .arg(state_->paused ? QString("paused") : QString("real time x%1").arg(state_->real_time_factor, 0, 'f', 2))
+                     .arg(state_->paused ? QString("paused") : QString("speed %1").arg(state_->real_time_factor, 0, 'f', 2))
                      .arg(1e3 * state_->mean_step, 0, 'f', 2)
                      .arg(1e3 * state_->worst_step, 0, 'f', 1));
   fillBodies();
