@@ -14,7 +14,9 @@
 namespace meshless {
 namespace {
 
-constexpr float kSmoothUpTo = 0.6f;  // cosine between face and smooth normal: the edges of a box stay sharp
+constexpr float kSmoothUpTo = 0.8f;  // cosine between faces that share a normal: the edges of a box stay sharp
+constexpr float kSelfLight = 0.25f;  // share of the colour that is there without a light: rviz has a lamp and no daylight
+constexpr float kLamp = 0.85f;       // share of the colour that the lamp adds
 constexpr std::uint32_t kNoPlace = std::numeric_limits<std::uint32_t>::max();
 
 Ogre::ColourValue toColour(const std_msgs::ColorRGBA& c) { return Ogre::ColourValue(c.r, c.g, c.b, c.a); }
@@ -42,7 +44,6 @@ BodyShape::BodyShape(Ogre::SceneManager* scene_manager, Ogre::SceneNode* parent)
   pass->setVertexColourTracking(Ogre::TVC_AMBIENT | Ogre::TVC_DIFFUSE);
   pass->setSpecular(0.25f, 0.25f, 0.25f, 1.0f);  // tissue is wet
   pass->setShininess(40.0f);
-  pass->setCullingMode(Ogre::CULL_NONE);  // shells are seen from both sides
   object_ = scene_manager_->createManualObject(name);
   object_->setDynamic(true);
   node_->attachObject(object_);
@@ -57,47 +58,79 @@ BodyShape::~BodyShape() {
 void BodyShape::findCorners(const meshless_surgery::Surface& surface) {
   const std::size_t vertices = surface.vertices.size() / 3;
   const std::size_t triangles = surface.cut.size();
+  faces_.resize(triangles);
+  starts_.assign(vertices + 1, 0);
   for (int cut = 0; cut < 2; ++cut) {
     normals_[cut].assign(vertices, Ogre::Vector3::ZERO);
     place_[cut].assign(vertices, kNoPlace);
   }
-  const auto flatOf = [&](std::size_t t) {
+  for (std::size_t t = 0; t < triangles; ++t) {
     const std::uint32_t* corner = &surface.triangles[3 * t];
     const Ogre::Vector3 a = vertexOf(surface, corner[0]);
-    return (vertexOf(surface, corner[1]) - a).crossProduct(vertexOf(surface, corner[2]) - a);
-  };
-  for (std::size_t t = 0; t < triangles; ++t) {
-    const Ogre::Vector3 flat = flatOf(t);  // as long as the triangle is large
-    for (int k = 0; k < 3; ++k) normals_[surface.cut[t] != 0][surface.triangles[3 * t + k]] += flat;
+    faces_[t] = (vertexOf(surface, corner[1]) - a).crossProduct(vertexOf(surface, corner[2]) - a);  // by its area
+    for (int k = 0; k < 3; ++k) {
+      normals_[surface.cut[t] != 0][corner[k]] += faces_[t];
+      ++starts_[corner[k] + 1];
+    }
   }
   for (auto& normals : normals_)
     for (Ogre::Vector3& normal : normals) normal.normalise();
+  for (std::size_t v = 0; v < vertices; ++v) starts_[v + 1] += starts_[v];
+  around_.resize(3 * triangles);
+  next_.assign(starts_.begin(), starts_.end() - 1);
+  for (std::size_t c = 0; c < 3 * triangles; ++c) around_[next_[surface.triangles[c]]++] = static_cast<std::uint32_t>(c / 3);
 
   corners_.clear();
   indices_.clear();
   indices_.reserve(3 * triangles);
   for (std::size_t t = 0; t < triangles; ++t) {
     const bool cut = surface.cut[t] != 0;
-    const Ogre::Vector3 flat = flatOf(t).normalisedCopy();
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t v = surface.triangles[3 * t + k];
-      const bool smooth = normals_[cut][v].dotProduct(flat) > kSmoothUpTo;
-      std::uint32_t at = smooth ? place_[cut][v] : kNoPlace;
+      std::uint32_t at = place_[cut][v];
       if (at == kNoPlace) {
         at = static_cast<std::uint32_t>(corners_.size());
-        corners_.push_back({v, smooth ? normals_[cut][v] : flat, cut});
-        if (smooth) place_[cut][v] = at;
+        if (isSmooth(surface, v, cut)) {
+          corners_.push_back({v, normals_[cut][v], cut});
+          place_[cut][v] = at;
+        } else {
+          corners_.push_back({v, creasedNormal(surface, t, v), cut});
+        }
       }
       indices_.push_back(at);
     }
   }
 }
 
+bool BodyShape::isSmooth(const meshless_surgery::Surface& surface, std::uint32_t v, bool cut) const {
+  for (std::uint32_t i = starts_[v]; i < starts_[v + 1]; ++i) {
+    const std::uint32_t t = around_[i];
+    if ((surface.cut[t] != 0) == cut && faces_[t].dotProduct(normals_[cut][v]) < kSmoothUpTo * faces_[t].length())
+      return false;
+  }
+  return true;
+}
+
+Ogre::Vector3 BodyShape::creasedNormal(const meshless_surgery::Surface& surface, std::size_t t, std::uint32_t v) const {
+  Ogre::Vector3 normal = faces_[t];
+  for (std::uint32_t i = starts_[v]; i < starts_[v + 1]; ++i) {
+    const std::uint32_t other = around_[i];
+    if (other == t || (surface.cut[other] != 0) != (surface.cut[t] != 0)) continue;
+    if (faces_[other].dotProduct(faces_[t]) > kSmoothUpTo * faces_[other].length() * faces_[t].length())
+      normal += faces_[other];
+  }
+  return normal.normalisedCopy();
+}
+
 void BodyShape::applyLook(const meshless_surgery::Surface& surface, const BodyLook& look) {
   Ogre::Pass* pass = material_->getTechnique(0)->getPass(0);
   const bool clear = look.opacity * static_cast<double>(surface.color.a) < 0.998;
   pass->setSceneBlending(clear ? Ogre::SBT_TRANSPARENT_ALPHA : Ogre::SBT_REPLACE);
-  pass->setDepthWriteEnabled(!clear);
+  // Through clear tissue what is behind it shows, not its own back side: that would be drawn in any order.
+  // Otherwise shells are seen from both sides.
+  pass->setCullingMode(clear ? Ogre::CULL_CLOCKWISE : Ogre::CULL_NONE);
+  pass->setSelfIllumination(look.by_strain ? Ogre::ColourValue(0.12f, 0.12f, 0.12f)
+                                           : toColour(surface.color) * kSelfLight);
   pass->setPolygonMode(look.wire ? Ogre::PM_WIREFRAME : Ogre::PM_SOLID);
 }
 
@@ -131,7 +164,8 @@ void BodyShape::show(const meshless_surgery::Surface& surface, const BodyLook& l
       colour = heatColour(surface.strain[corner.vertex] / look.full_strain);
       colour.a = static_cast<float>(look.opacity);
     }
-    object_->colour(colour);
+    const Ogre::ColourValue lit = colour * kLamp;
+    object_->colour(lit.r, lit.g, lit.b, colour.a);
   }
   for (const std::uint32_t index : indices_) object_->index(index);
   object_->end();

@@ -40,6 +40,9 @@ class BodyShape {
   };
 
   void findCorners(const meshless_surgery::Surface& surface);
+  bool isSmooth(const meshless_surgery::Surface& surface, std::uint32_t v, bool cut) const;
+  /// At a crease: of triangle t and of those around its vertex v that are nearly in its plane.
+  Ogre::Vector3 creasedNormal(const meshless_surgery::Surface& surface, std::size_t t, std::uint32_t v) const;
   void applyLook(const meshless_surgery::Surface& surface, const BodyLook& look);
 
   Ogre::SceneManager* scene_manager_;
@@ -49,7 +52,9 @@ class BodyShape {
   bool begun_ = false;  // the object has its section
   // kept, so that a frame allocates nothing
   std::vector<Ogre::Vector3> normals_[2];      // of the outer surface, and of cuts
-  std::vector<std::uint32_t> place_[2];        // of a vertex among the corners
+  std::vector<std::uint32_t> place_[2];        // of a vertex among the corners, where one normal will do
+  std::vector<Ogre::Vector3> faces_;           // normals, as long as twice the area
+  std::vector<std::uint32_t> starts_, next_, around_;  // triangles around a vertex: around_[starts_[v] .. starts_[v + 1])
   std::vector<Corner> corners_;
   std::vector<std::uint32_t> indices_;
 };

@@ -189,6 +189,17 @@ class StreamTest(DeformerTestCase):
         # And once only.
         self.assertEqual(['left.1', 'left.2', 'right'], sorted(b.name for b in self.state().bodies))
 
+    def test_the_scissors_are_taken_away(self):
+        measured = self.record('scissors/measured_cp', PoseStamped)
+        stream = self.stream('scissors/servo_cp', pose_stamped(0.0, 0.0, 3.0, ACROSS_X))
+        measured.wait()
+        stream.close()
+        self.open.remove(stream)
+        self.good('lift_scissors')
+        lifted = rospy.Time.now()
+        rospy.sleep(1.0)
+        self.assertEqual([], [m for m in measured.messages if m.header.stamp > lifted])
+
     def test_bad_streams_change_nothing(self):
         pick = self.pick_left()
         before = self.picture()
