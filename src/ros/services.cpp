@@ -246,7 +246,7 @@ struct Services::Handlers {
   }
 
   bool liftScissors(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
-    return applied(response, "lift_scissors", LiftScissorsCommand{}, "took the scissors away");
+    return applied(response, "lift_scissors", LiftCommand{}, "took the scissors away");
   }
 
   bool undoCut(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {

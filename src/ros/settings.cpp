@@ -134,6 +134,9 @@ Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std
   reader.read("tools/pick/stiffness", settings.pick_stiffness, 1e-3, 1e9, "N/m");
   reader.read("tools/push/radius", settings.push_radius, 1e-6, kMaxLength, "m");
   reader.read("tools/push/max_speed", settings.push_max_speed, 1e-6, 1e3, "m/s");
+  reader.read("tools/pick/max_speed", settings.pick_max_speed, 1e-6, 1e3, "m/s");
+  reader.read("tools/scissors/max_speed", settings.scissors_max_speed, 1e-6, 1e3, "m/s");
+  reader.read("tools/silence", settings.tools_silence, 0.0, 3600.0, "s");
   reader.read("tools/scissors/length", settings.scissors_length, 1e-6, kMaxLength, "m");
   reader.read("tools/scissors/width", settings.scissors_width, 1e-6, kMaxLength, "m");
   if (settings.world_frame.find_first_not_of('/') == std::string::npos) {

@@ -38,8 +38,15 @@ void PickTool::onDeactivate() {
 
 void PickTool::stateCame(const meshless_surgery::State& state) {
   locked_.clear();
-  for (const auto& pick : state.picks)
+  bool held = false;
+  for (const auto& pick : state.picks) {
     if (pick.locked) locked_.push_back({pick.pick_id, toFixed(pick.target)});
+    held = held || pick.pick_id == pick_id_;
+  }
+  if (drag_ == Drag::kHolding && !held && state.header.stamp > held_since_) {
+    end();
+    say("the spring is gone");
+  }
 }
 
 const PickTool::Locked* PickTool::lockedUnderCursor() const {
@@ -151,6 +158,7 @@ void PickTool::takeUp(const Locked& locked) {
 
 void PickTool::hold(std::uint32_t pick_id, const Ogre::Vector3& point) {
   drag_ = Drag::kHolding;
+  held_since_ = ros::Time::now();
   pick_id_ = pick_id;
   plane_point_ = start_ = target_ = point;
   if (!sphere_) {

@@ -56,6 +56,7 @@ class PickTool : public HandTool {
   Drag drag_ = Drag::kNone;
   std::uint32_t attempt_ = 0;  // answers to older ones are let go of
   std::uint32_t pick_id_ = 0;
+  ros::Time held_since_;
   bool camera_pressed_ = false;
   bool taken_up_ = false;  // was locked before
   Ogre::Vector3 plane_point_ = Ogre::Vector3::ZERO;

@@ -52,6 +52,8 @@ const char* toString(EventType type) {
       return "fault";
     case EventType::kUndone:
       return "undone";
+    case EventType::kLifted:
+      return "lifted";
   }
   return "unknown";
 }
@@ -312,9 +314,14 @@ void World::setScissors(const Blades& blades, double angle) {
 void World::hideScissors() { impl_->scissors.shown = false; }
 
 PickId World::pickInHand() const {
+  const auto held = heldPick();
+  return held ? held->id : 0;
+}
+
+std::optional<Pick> World::heldPick() const {
   for (auto it = impl_->picks.rbegin(); it != impl_->picks.rend(); ++it)
-    if (!it->locked) return it->id;
-  return 0;
+    if (!it->locked) return *it;
+  return std::nullopt;
 }
 
 }  // namespace meshless

@@ -94,11 +94,6 @@ Result<Reply> World::Impl::apply(const OpenScissorsCommand&) {
   return Reply(Done{});
 }
 
-Result<Reply> World::Impl::apply(const LiftScissorsCommand&) {
-  scissors.shown = false;
-  return Reply(Done{});
-}
-
 std::optional<Result<CutReply>> World::finishedCut(std::uint32_t ticket) {
   const auto it = impl_->finished.find(ticket);
   if (it == impl_->finished.end()) return std::nullopt;

@@ -95,7 +95,7 @@ struct World::Impl {
   Result<Reply> apply(const PushCommand& command);
   Result<Reply> apply(const CutCommand& command);
   Result<Reply> apply(const OpenScissorsCommand& command);
-  Result<Reply> apply(const LiftScissorsCommand& command);
+  Result<Reply> apply(const LiftCommand& command);
   Result<Reply> apply(const UndoCutCommand& command);
   Result<Reply> apply(const InciseCommand& command);
   Result<Reply> apply(const SetMaterialCommand& command);

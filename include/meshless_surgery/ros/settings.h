@@ -27,6 +27,9 @@ struct NodeSettings {
   std::optional<double> pick_stiffness;    // tools/pick/stiffness [N/m]; absent: the scene's
   std::optional<double> push_radius;       // tools/push/radius [m]; absent: the scene's
   double push_max_speed = 1.0;             // tools/push/max_speed [m/s] at which the sphere follows a stream
+  double pick_max_speed = 5.0;             // tools/pick/max_speed [m/s] at which the hand follows a stream
+  double scissors_max_speed = 5.0;         // tools/scissors/max_speed [m/s]
+  double tools_silence = 0.5;              // tools/silence [s] without a message after which a tool is lifted; 0: never
   double scissors_length = 0.06;           // tools/scissors/length [m] of tracked blades
   double scissors_width = 0.06;            // tools/scissors/width [m] of their opening
 };

@@ -38,6 +38,7 @@ struct PushCommand {
   double radius = 0.0;           // [m] >= 0; 0: the default
   Vec3 position = Vec3::Zero();  // [m] of the centre
   double speed = 0.0;            // [m/s] >= 0; 0: placed there at once
+  bool streamed = false;         // by a stream, whose silence lifts it
 };
 struct CutCommand {
   Blades blades;
@@ -47,8 +48,14 @@ struct CutCommand {
 };
 /// Opens the scissors: cuts whose blades are closing are called off.
 struct OpenScissorsCommand {};
-/// Takes the scissors away; cuts whose blades are closing go on.
-struct LiftScissorsCommand {};
+enum class ToolKind { kPick, kPush, kScissors };
+/// Takes a tool off the tissue: the pick in hand is released, the sphere removed, the scissors hidden (blades that a
+/// service closes go on). An event says why.
+struct LiftCommand {
+  ToolKind tool = ToolKind::kScissors;
+  bool streamed_only = false;  // not what a service has placed or locked
+  std::string why;             // a sentence; empty: the user wished so, no event
+};
 /// Back to the state before the last cut or incision; time goes on.
 struct UndoCutCommand {};
 struct InciseCommand {
@@ -68,7 +75,7 @@ struct RemoveCommand {
 
 using Command = std::variant<PickCommand, MovePickCommand, LockCommand, ReleaseCommand, ClearPicksCommand, PushCommand,
                              CutCommand, OpenScissorsCommand, InciseCommand, SetMaterialCommand, SpawnCommand, RemoveCommand,
-                             LiftScissorsCommand, UndoCutCommand>;
+                             LiftCommand, UndoCutCommand>;
 
 struct PickReply {
   PickId pick = 0;

@@ -51,7 +51,8 @@ enum class EventType {
   kRemoved,
   kReset,
   kFault,
-  kUndone
+  kUndone,
+  kLifted
 };
 const char* toString(EventType type);
 
@@ -159,6 +160,7 @@ class World {
   void hideScissors();
   /// The pick that a stream moves: the newest one that is not locked; 0 if none.
   PickId pickInHand() const;
+  std::optional<Pick> heldPick() const;  // the same, as it is
   const PushSphere& push() const;
   const Scissors& scissors() const;
 
