@@ -68,10 +68,7 @@ bool PushTool::onMouse(rviz::ViewportMouseEvent& event) {
     case Drag::kAsking:
     case Drag::kSolid:
       if (event.rightDown() && drag_ == Drag::kSolid) {
-        move();
-        standing_ = true;
-        standing_at_ = centre();
-        drag_ = Drag::kOver;
+        leaveAt(centre());
         say("the sphere stays here");
       } else if (event.leftUp() || !event.left()) {
         lift();
@@ -132,6 +129,20 @@ void PushTool::lift() {
   link().call("push", wish, {}, kAfterStream);
 }
 
+void PushTool::leaveAt(const Ogre::Vector3& place) {
+  ++attempt_;
+  standing_ = true;
+  standing_at_ = place;
+  drag_ = Drag::kOver;
+  // By the service: what a stream has placed goes with its silence.
+  meshless_surgery::Push wish;
+  wish.request.enable = true;
+  wish.request.radius = radius_;
+  wish.request.speed = kSpeed;
+  wish.request.pose = poseMessage(place);
+  link().call("push", wish, {}, kAfterStream);
+}
+
 void PushTool::move() { stream_.publish(poseMessage(centre())); }
 
 void PushTool::onUpdate(double) {
@@ -156,10 +167,7 @@ void PushTool::showGhost() {
 
 void PushTool::undoDrag() {
   if (standing_) {
-    // Back to where it was left.
-    stream_.publish(poseMessage(standing_at_));
-    drag_ = Drag::kOver;
-    ++attempt_;
+    leaveAt(standing_at_);
     say("undone: the sphere is where it was");
     return;
   }

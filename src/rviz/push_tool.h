@@ -39,6 +39,7 @@ class PushTool : public HandTool {
   void press();
   void place(double speed);
   void lift();
+  void leaveAt(const Ogre::Vector3& place);
   void move();
   void showGhost();
 

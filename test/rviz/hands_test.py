@@ -301,6 +301,8 @@ class HandsTest(unittest.TestCase):
     def test_a_sphere_pushes_while_the_button_is_down(self):
         eye, side, up, back = camera_axes(self.view)
         rospy.sleep(1.0)
+        call('pause', SetBool, data=True)  # so that the tissue is where it was when the ghost was put before it
+        self.addCleanup(call, 'pause', SetBool, data=False)
         rest = self.body()
         place = self.take('h')
         self.assertEqual([], self.pushes())  # a ghost alone
@@ -316,6 +318,7 @@ class HandsTest(unittest.TestCase):
         point = self.pixel(first)
         self.assertLess(numpy.abs(point - place).max(), 4)
         self.assertAlmostEqual(0.02 * 1.15 ** 2, numpy.linalg.norm(rest - first, axis=1).min(), delta=0.004)
+        call('pause', SetBool, data=False)
         self.mouse.wheel(5)  # away: into the tissue
         self.until(lambda: (vector(self.pushes()[-1].pose.position) - first).dot(back) < -0.02, 'the sphere stays')
         self.until(lambda: self.said('touched'), 'it touched nothing')
