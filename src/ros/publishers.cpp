@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include <geometry_msgs/WrenchStamped.h>
 #include <ros/console.h>
 
 #include "meshless_surgery/ros/border_check.h"
@@ -52,17 +51,17 @@ Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings
   state_topic_ = handle.advertise<meshless_surgery::State>("state", 10);
   events_topic_ = handle.advertise<meshless_surgery::Event>("events", 1000);
   const auto advertiseTool = [&](const std::string& tool) {
-    return ToolTopics{handle.advertise<geometry_msgs::PoseStamped>(tool + "/measured_cp", 10),
-                      handle.advertise<geometry_msgs::WrenchStamped>(tool + "/measured_cf", 10)};
+    return handle.advertise<geometry_msgs::PoseStamped>(tool + "/measured_cp", 10);
   };
-  pick_topics_ = advertiseTool("pick");
-  push_topics_ = advertiseTool("push");
-  scissors_topics_ = advertiseTool("scissors");
+  pick_pose_ = advertiseTool("pick");
+  push_pose_ = advertiseTool("push");
+  scissors_pose_ = advertiseTool("scissors");
 
   updater_.setHardwareID("none");
   updater_.add("simulation", this, &Publishers::diagnose);
 
-  markers_due_.period = surfaces_due_.period = periodOf(settings_.markers_rate);
+  markers_due_.period = periodOf(settings_.markers_rate);
+  surfaces_due_.period = periodOf(settings_.surfaces_rate);
   points_due_.period = periodOf(settings_.points_rate);
   state_due_.period = periodOf(settings_.state_rate);
   tools_due_.period = periodOf(settings_.tools_rate);
@@ -196,17 +195,15 @@ void Publishers::publishTools(const WorldSnapshot& snapshot, const ros::Time& st
     cursor->translation = in_hand->target;
   }
   if (cursor) {
-    const Vec3 force = in_hand != nullptr ? Vec3(-in_hand->force) : Vec3(Vec3::Zero());
-    publishTool(pick_topics_, "pick_cursor", *cursor, force, stamp, transforms);
+    publishTool(pick_pose_, "pick_cursor", *cursor, stamp, transforms);
   }
   if (snapshot.push.enabled) {
     Pose pose;
     pose.translation = snapshot.push.position;
-    publishTool(push_topics_, "push_sphere", pose, snapshot.push.force, stamp, transforms);
+    publishTool(push_pose_, "push_sphere", pose, stamp, transforms);
   }
   if (snapshot.scissors.shown) {
-    // The blades part the tissue without resistance.
-    publishTool(scissors_topics_, "scissors", poseOf(snapshot.scissors.blades), Vec3::Zero(), stamp, transforms);
+    publishTool(scissors_pose_, "scissors", poseOf(snapshot.scissors.blades), stamp, transforms);
   }
   // A clock that stands still: tf2 complains of a stamp said twice.
   if (!transforms.empty() && stamp != last_transforms_) {
@@ -215,7 +212,7 @@ void Publishers::publishTools(const WorldSnapshot& snapshot, const ros::Time& st
   }
 }
 
-void Publishers::publishTool(const ToolTopics& topics, const std::string& frame, const Pose& pose, const Vec3& force,
+void Publishers::publishTool(const ros::Publisher& topic, const std::string& frame, const Pose& pose,
                              const ros::Time& stamp, std::vector<geometry_msgs::TransformStamped>& transforms) {
   geometry_msgs::TransformStamped transform;
   transform.header.stamp = stamp;
@@ -224,17 +221,11 @@ void Publishers::publishTool(const ToolTopics& topics, const std::string& frame,
   transform.transform.translation = toVector(pose.translation);
   transform.transform.rotation = toQuaternion(pose.rotation);
   transforms.push_back(transform);
-  if (topics.pose.getNumSubscribers() > 0) {
+  if (topic.getNumSubscribers() > 0) {
     geometry_msgs::PoseStamped message;
     message.header = transform.header;
     message.pose = toPose(pose);
-    topics.pose.publish(message);
-  }
-  if (topics.force.getNumSubscribers() > 0) {
-    geometry_msgs::WrenchStamped message;
-    message.header = transform.header;
-    message.wrench.force = toVector(force);
-    topics.force.publish(message);
+    topic.publish(message);
   }
 }
 

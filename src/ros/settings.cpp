@@ -124,9 +124,11 @@ Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std
   reader.read("paused", settings.paused);
   reader.read("max_backlog", settings.max_backlog, 0.0, 10.0, "s");
   reader.read("markers_rate", settings.markers_rate, 0.1, 30.0, "Hz");
+  reader.read("surfaces_rate", settings.surfaces_rate, 0.1, 120.0, "Hz");
   reader.read("points_rate", settings.points_rate, 0.1, 120.0, "Hz");
   reader.read("state_rate", settings.state_rate, 0.1, 1000.0, "Hz");
   reader.read("tools_rate", settings.tools_rate, 0.1, 1000.0, "Hz");
+  reader.read("force_rate", settings.force_rate, 1.0, 2000.0, "Hz");
   reader.read("tools/pick/follow_frame", settings.pick.follow_frame);
   reader.read("tools/push/follow_frame", settings.push.follow_frame);
   reader.read("tools/scissors/follow_frame", settings.scissors.follow_frame);

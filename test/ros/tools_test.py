@@ -128,7 +128,8 @@ class StreamTest(DeformerTestCase):
         on_tissue = self.state().picks[0].force
         self.assertGreater(on_tissue.x, 0.0)
         forces = self.record('pick/measured_cf', WrenchStamped)
-        felt = forces.wait()
+        # It goes to a step's force while the next step's time passes.
+        felt = forces.wait(lambda m: abs(m.wrench.force.x + on_tissue.x) < 1e-9)
         self.assertEqual('world', felt.header.frame_id)
         self.assertAlmostEqual(-on_tissue.x, felt.wrench.force.x)
         self.assertAlmostEqual(-on_tissue.y, felt.wrench.force.y)

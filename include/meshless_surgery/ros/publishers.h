@@ -38,18 +38,14 @@ class Publishers {
     Clock::time_point next{};
     bool due(Clock::time_point now);
   };
-  struct ToolTopics {
-    ros::Publisher pose, force;
-    bool listened() const { return pose.getNumSubscribers() > 0 || force.getNumSubscribers() > 0; }
-  };
 
   void loop();
   void publishEvents();
   void publishTick(Clock::time_point now);
   void publishSurfaces(const WorldSnapshot& snapshot, const std_msgs::Header& header);
   void publishTools(const WorldSnapshot& snapshot, const ros::Time& stamp);
-  void publishTool(const ToolTopics& topics, const std::string& frame, const Pose& pose, const Vec3& force,
-                   const ros::Time& stamp, std::vector<geometry_msgs::TransformStamped>& transforms);
+  void publishTool(const ros::Publisher& topic, const std::string& frame, const Pose& pose, const ros::Time& stamp,
+                   std::vector<geometry_msgs::TransformStamped>& transforms);
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   NodeSettings settings_;
@@ -60,7 +56,7 @@ class Publishers {
 
   ros::Publisher surfaces_topic_, strained_surfaces_topic_;
   ros::Publisher markers_topic_, points_topic_, state_topic_, events_topic_;
-  ToolTopics pick_topics_, push_topics_, scissors_topics_;
+  ros::Publisher pick_pose_, push_pose_, scissors_pose_;
   tf2_ros::TransformBroadcaster broadcaster_;
   diagnostic_updater::Updater updater_;
 
