@@ -17,6 +17,7 @@ namespace {
 constexpr float kSmoothUpTo = 0.8f;  // cosine between faces that share a normal: the edges of a box stay sharp
 constexpr float kSelfLight = 0.25f;  // share of the colour that is there without a light: rviz has a lamp and no daylight
 constexpr float kLamp = 0.85f;       // share of the colour that the lamp adds
+constexpr double kSeenThrough = 0.6;  // opacity up to which what is inside of a body shows, whatever is drawn first
 constexpr std::uint32_t kNoPlace = std::numeric_limits<std::uint32_t>::max();
 
 Ogre::ColourValue toColour(const std_msgs::ColorRGBA& c) { return Ogre::ColourValue(c.r, c.g, c.b, c.a); }
@@ -124,8 +125,10 @@ Ogre::Vector3 BodyShape::creasedNormal(const meshless_surgery::Surface& surface,
 
 void BodyShape::applyLook(const meshless_surgery::Surface& surface, const BodyLook& look) {
   Ogre::Pass* pass = material_->getTechnique(0)->getPass(0);
-  const bool clear = look.opacity * static_cast<double>(surface.color.a) < 0.998;
+  const double opacity = look.opacity * static_cast<double>(surface.color.a);
+  const bool clear = opacity < 0.998;
   pass->setSceneBlending(clear ? Ogre::SBT_TRANSPARENT_ALPHA : Ogre::SBT_REPLACE);
+  pass->setDepthWriteEnabled(opacity > kSeenThrough);
   // Through clear tissue what is behind it shows, not its own back side: that would be drawn in any order.
   // Otherwise shells are seen from both sides.
   pass->setCullingMode(clear ? Ogre::CULL_CLOCKWISE : Ogre::CULL_NONE);

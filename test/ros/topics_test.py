@@ -165,6 +165,29 @@ class SurfacesTest(DeformerTestCase):
         self.assertLess(max(self.surface(pulled, 'right').strain), 1e-5)
 
 
+class ClustersTest(DeformerTestCase):
+
+    def test_every_particle_hangs_on_a_centre(self):
+        recorder = self.deformer.recorder('clusters', MarkerArray)
+        self.addCleanup(recorder.close)
+        array = recorder.wait()
+        self.assertEqual(Marker.DELETEALL, array.markers[0].action)
+        for body in self.state().bodies:
+            particles = self.good('get_body', name=body.name).particles
+            at = {struct.unpack_from('fff', particles.data, i * particles.point_step)
+                  for i in range(particles.width * particles.height)}
+            centres = [m for m in of(array, 'centres', Marker.ADD) if len(m.points) == body.clusters]
+            self.assertGreaterEqual(len(centres), 1)
+        members = of(array, 'members', Marker.ADD)
+        self.assertEqual(2, len(members))
+        ends = {struct.unpack('fff', struct.pack('fff', p.x, p.y, p.z)) for m in members for p in m.points[1::2]}
+        self.assertTrue(at <= ends)
+        starts = {(p.x, p.y, p.z) for m in members for p in m.points[0::2]}
+        self.assertEqual({(p.x, p.y, p.z) for m in of(array, 'centres', Marker.ADD) for p in m.points}, starts)
+        for marker in members:
+            self.assertEqual(len(marker.points), len(marker.colors))
+
+
 class PointsTest(DeformerTestCase):
 
     def test_every_particle_with_its_body_and_colour(self):
@@ -309,7 +332,7 @@ class DiagnosticsTest(DeformerTestCase):
         self.good('step', steps=100)
         _, after = self.values()
         self.assertGreater(int(after['steps']), int(before['steps']))
-        for key in ('marker arrays built', 'surfaces built', 'point clouds built', 'states built'):
+        for key in ('marker arrays built', 'surfaces built', 'clusters built', 'point clouds built', 'states built'):
             self.assertEqual(before[key], after[key], key)
         markers = self.deformer.recorder('markers', MarkerArray)
         markers.wait()
@@ -322,4 +345,4 @@ class DiagnosticsTest(DeformerTestCase):
 
 
 if __name__ == '__main__':
-    run('topics', MarkersTest, SurfacesTest, PointsTest, StateTest, EventsTest, DiagnosticsTest)
+    run('topics', MarkersTest, SurfacesTest, ClustersTest, PointsTest, StateTest, EventsTest, DiagnosticsTest)
