@@ -9,8 +9,8 @@ namespace {
 
 using visualization_msgs::Marker;
 
-constexpr double kCentre = 0.3;       // diameter in particle spacings
-constexpr double kLine = 0.04;        // width in particle spacings
+constexpr double kCentre = 0.3;           // diameter in particle spacings
+constexpr double kLine = 0.04;            // width in particle spacings
 constexpr double kGoldenTurn = 0.618034;  // of the hues: neighbours in the list differ
 
 std_msgs::ColorRGBA hue(Index number) {

@@ -26,8 +26,7 @@ ForcePublisher::ForcePublisher(const ros::NodeHandle& private_handle, const Node
   };
   const char* names[] = {"pick", "push", "scissors"};
   for (std::size_t t = 0; t < tools_.size(); ++t)
-    tools_[t].topic =
-        handle.advertise<geometry_msgs::WrenchStamped>(std::string(names[t]) + "/measured_cf", 10, wake);
+    tools_[t].topic = handle.advertise<geometry_msgs::WrenchStamped>(std::string(names[t]) + "/measured_cf", 10, wake);
 }
 
 ForcePublisher::~ForcePublisher() { stop(); }

@@ -90,7 +90,8 @@ std::optional<Frames::Stamped> Frames::latest(const std::string& frame_id) {
   try {
     const auto transform = tf.buffer.lookupTransform(world_frame_, frame, ros::Time(0));
     const Pose pose = toPose(transform);
-    if (pose.translation.allFinite() && pose.rotation.coeffs().allFinite()) return Stamped{pose, transform.header.stamp};
+    if (pose.translation.allFinite() && pose.rotation.coeffs().allFinite())
+      return Stamped{pose, transform.header.stamp};
   } catch (const tf2::TransformException&) {  // not known yet
   }
   return std::nullopt;

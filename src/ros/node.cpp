@@ -171,7 +171,8 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
                                        BodyLoader(access, scene_folder, std::move(scene->materials)));
   parts->runner.setEventSink(
       [publishers = &parts->publishers](std::vector<Event> events) { publishers->queueEvents(std::move(events)); });
-  parts->runner.setStepSink([forces = &parts->forces](const World& changed, double dt) { forces->changed(changed, dt); });
+  parts->runner.setStepSink(
+      [forces = &parts->forces](const World& world_now, double dt) { forces->changed(world_now, dt); });
   parts->runner.start();
   parts->publishers.start();
   parts->forces.start();

@@ -77,7 +77,8 @@ Publishers::~Publishers() { stop(); }
 
 void Publishers::start() {
   const auto now = Clock::now();
-  for (Cadence* cadence : {&markers_due_, &surfaces_due_, &clusters_due_, &points_due_, &state_due_, &tools_due_, &diagnostics_due_}) {
+  for (Cadence* cadence : {&markers_due_, &surfaces_due_, &clusters_due_, &points_due_, &state_due_, &tools_due_,
+                           &diagnostics_due_}) {
     cadence->next = now;
   }
   thread_ = std::thread([this] { loop(); });
@@ -108,8 +109,8 @@ void Publishers::loop() {
   while (true) {
     publishEvents();
     publishTick(Clock::now());
-    const auto next = std::min(
-        {markers_due_.next, surfaces_due_.next, clusters_due_.next, points_due_.next, state_due_.next, tools_due_.next, diagnostics_due_.next});
+    const auto next = std::min({markers_due_.next, surfaces_due_.next, clusters_due_.next, points_due_.next,
+                                state_due_.next, tools_due_.next, diagnostics_due_.next});
     std::unique_lock<std::mutex> lock(mutex_);
     changed_.wait_until(lock, next, [this] { return stopping_ || !events_.empty(); });
     if (stopping_) return;

@@ -13,7 +13,8 @@ constexpr double kLongestTick = 0.05;  // [s] that one call makes up for: who co
 Status ToolMotion::hear(const Pose& wanted, double stamp, double now) {
   if (alive_ && stamp > 0.0 && stamp < stamp_ && stamp_ - stamp <= kRestart) {
     std::ostringstream text;
-    text << "header.stamp is " << stamp_ - stamp << " s older than that of the message before; accepted: stamps that grow";
+    text << "header.stamp is " << stamp_ - stamp
+         << " s older than that of the message before; accepted: stamps that grow";
     return Error{ErrorCode::kInvalidArgument, text.str()};
   }
   wanted_ = wanted;

@@ -15,8 +15,9 @@ namespace meshless {
 namespace {
 
 constexpr float kSmoothUpTo = 0.8f;  // cosine between faces that share a normal: the edges of a box stay sharp
-constexpr float kSelfLight = 0.25f;  // share of the colour that is there without a light: rviz has a lamp and no daylight
-constexpr float kLamp = 0.85f;       // share of the colour that the lamp adds
+constexpr float kSelfLight =
+    0.25f;                      // share of the colour that is there without a light: rviz has a lamp and no daylight
+constexpr float kLamp = 0.85f;  // share of the colour that the lamp adds
 constexpr double kSeenThrough = 0.6;  // opacity up to which what is inside of a body shows, whatever is drawn first
 constexpr std::uint32_t kNoPlace = std::numeric_limits<std::uint32_t>::max();
 
@@ -38,7 +39,8 @@ BodyShape::BodyShape(Ogre::SceneManager* scene_manager, Ogre::SceneNode* parent)
     : scene_manager_(scene_manager), node_(parent->createChildSceneNode()) {
   static int count = 0;
   const std::string name = "meshless_body_" + std::to_string(count++);
-  material_ = Ogre::MaterialManager::getSingleton().create(name, Ogre::ResourceGroupManager::DEFAULT_RESOURCE_GROUP_NAME);
+  material_ =
+      Ogre::MaterialManager::getSingleton().create(name, Ogre::ResourceGroupManager::DEFAULT_RESOURCE_GROUP_NAME);
   material_->setReceiveShadows(false);
   Ogre::Pass* pass = material_->getTechnique(0)->getPass(0);
   pass->setLightingEnabled(true);
@@ -79,7 +81,8 @@ void BodyShape::findCorners(const meshless_surgery::Surface& surface) {
   for (std::size_t v = 0; v < vertices; ++v) starts_[v + 1] += starts_[v];
   around_.resize(3 * triangles);
   next_.assign(starts_.begin(), starts_.end() - 1);
-  for (std::size_t c = 0; c < 3 * triangles; ++c) around_[next_[surface.triangles[c]]++] = static_cast<std::uint32_t>(c / 3);
+  for (std::size_t c = 0; c < 3 * triangles; ++c)
+    around_[next_[surface.triangles[c]]++] = static_cast<std::uint32_t>(c / 3);
 
   corners_.clear();
   indices_.clear();

@@ -20,7 +20,7 @@ struct BodyLook {
   bool by_strain = false;    // by Surface.strain, where the message has it
   double full_strain = 0.3;  // shown red
   double opacity = 1.0;
-  bool wire = false;         // edges of the triangles alone
+  bool wire = false;  // edges of the triangles alone
 };
 
 class BodyShape {
@@ -51,10 +51,11 @@ class BodyShape {
   Ogre::MaterialPtr material_;
   bool begun_ = false;  // the object has its section
   // kept, so that a frame allocates nothing
-  std::vector<Ogre::Vector3> normals_[2];      // of the outer surface, and of cuts
-  std::vector<std::uint32_t> place_[2];        // of a vertex among the corners, where one normal will do
-  std::vector<Ogre::Vector3> faces_;           // normals, as long as twice the area
-  std::vector<std::uint32_t> starts_, next_, around_;  // triangles around a vertex: around_[starts_[v] .. starts_[v + 1])
+  std::vector<Ogre::Vector3> normals_[2];  // of the outer surface, and of cuts
+  std::vector<std::uint32_t> place_[2];    // of a vertex among the corners, where one normal will do
+  std::vector<Ogre::Vector3> faces_;       // normals, as long as twice the area
+  std::vector<std::uint32_t> starts_, next_,
+      around_;  // triangles around a vertex: around_[starts_[v] .. starts_[v + 1])
   std::vector<Corner> corners_;
   std::vector<std::uint32_t> indices_;
 };

@@ -2,6 +2,10 @@
 
 #include <cmath>
 
+#include <meshless_surgery/SetMaterial.h>
+#include <meshless_surgery/Step.h>
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
 #include <QFormLayout>
 #include <QGroupBox>
 #include <QHBoxLayout>
@@ -13,21 +17,17 @@
 #include <QTableWidget>
 #include <QTimer>
 #include <QVBoxLayout>
-#include <meshless_surgery/SetMaterial.h>
-#include <meshless_surgery/Step.h>
 #include <pluginlib/class_list_macros.hpp>
-#include <std_srvs/SetBool.h>
-#include <std_srvs/Trigger.h>
 
 #include "step_plot.h"
 
 namespace meshless {
 namespace {
 
-constexpr int kRefresh = 200;        // [ms]
-constexpr int kTicks = 1000;         // of a slider
+constexpr int kRefresh = 200;           // [ms]
+constexpr int kTicks = 1000;            // of a slider
 constexpr double kMostDamping = 100.0;  // [1/s] of the slider
-constexpr double kUserHolds = 1.0;   // [s] that a slider stays where the user put it, before the node's value is shown
+constexpr double kUserHolds = 1.0;  // [s] that a slider stays where the user put it, before the node's value is shown
 
 enum Column { kName, kVolume, kParticles, kAsleep, kColumns };
 
@@ -130,7 +130,8 @@ ControlPanel::ControlPanel(QWidget* parent) : rviz::Panel(parent), link_(new Nod
     knobs_.push_back(made);
   };
   knob("alpha", 1.0, false, false, "How far tissue goes towards its goal in 1/60 s: 1 is stiff. Materials for looks.");
-  knob("beta", 1.0, false, false, "How much of a linear or quadratic deformation the goal may have. Materials for looks.");
+  knob("beta", 1.0, false, false,
+       "How much of a linear or quadratic deformation the goal may have. Materials for looks.");
   knob("damping", kMostDamping, true, true, "[1/s] of the motion that deforms.");
   layout->addWidget(material_);
 
@@ -203,11 +204,12 @@ void ControlPanel::refresh() {
   if (!fresh_ || !state_) return;
   fresh_ = false;
   pause_->setText(state_->paused ? "Run" : "Pause");
-  time_->setText(QString("%1 s   %2   step %3 ms, worst %4")
-                     .arg(state_->sim_time, 0, 'f', 2)
-                     .arg(state_->paused ? QString("paused") : QString("speed %1").arg(state_->real_time_factor, 0, 'f', 2))
-                     .arg(1e3 * state_->mean_step, 0, 'f', 2)
-                     .arg(1e3 * state_->worst_step, 0, 'f', 1));
+  time_->setText(
+      QString("%1 s   %2   step %3 ms, worst %4")
+          .arg(state_->sim_time, 0, 'f', 2)
+          .arg(state_->paused ? QString("paused") : QString("speed %1").arg(state_->real_time_factor, 0, 'f', 2))
+          .arg(1e3 * state_->mean_step, 0, 'f', 2)
+          .arg(1e3 * state_->worst_step, 0, 'f', 1));
   fillBodies();
   fillMaterial();
 }
@@ -248,8 +250,9 @@ void ControlPanel::fillMaterial() {
   material_->setEnabled(found != nullptr);
   if (!found) return;
   const bool elastic = found->youngs_modulus > 0.0;
-  material_->setTitle("Material of " + selected() +
-                      (elastic ? QString(", for accuracy, %1 kPa").arg(1e-3 * found->youngs_modulus, 0, 'g', 3) : QString()));
+  material_->setTitle(
+      "Material of " + selected() +
+      (elastic ? QString(", for accuracy, %1 kPa").arg(1e-3 * found->youngs_modulus, 0, 'g', 3) : QString()));
   const double numbers[] = {found->alpha, found->beta, found->damping};
   for (std::size_t i = 0; i < knobs_.size(); ++i) {
     Knob& knob = knobs_[i];

@@ -49,7 +49,7 @@ class ControlPanel : public rviz::Panel {
     bool elastic = true;   // whether a material for accuracy uses it
     QSlider* slider = nullptr;
     QLabel* value = nullptr;
-    bool changed = false;  // by the user, and not sent yet
+    bool changed = false;     // by the user, and not sent yet
     double since_user = 1e9;  // [s]
 
     double number() const;

@@ -4,32 +4,32 @@
 #include <cmath>
 
 #include <OgreSceneManager.h>
-#include <QKeyEvent>
-#include <pluginlib/class_list_macros.hpp>
 #include <rviz/properties/float_property.h>
 #include <sensor_msgs/JointState.h>
 #include <std_srvs/Trigger.h>
+#include <QKeyEvent>
+#include <pluginlib/class_list_macros.hpp>
 
 #include "ogre_convert.h"
 
 namespace meshless {
 namespace {
 
-constexpr double kOpen = 0.5;              // [rad]
-constexpr double kInFront = 0.03;          // [m] of the pivot before the tissue: half of the node's default blades
-constexpr double kFirstYaw = 0.6;          // [rad] seen along themselves the blades would be two lines
-constexpr double kWheelStep = 0.005;       // [m] a notch
+constexpr double kOpen = 0.5;         // [rad]
+constexpr double kInFront = 0.03;     // [m] of the pivot before the tissue: half of the node's default blades
+constexpr double kFirstYaw = 0.6;     // [rad] seen along themselves the blades would be two lines
+constexpr double kWheelStep = 0.005;  // [m] a notch
 constexpr double kNotch = 120.0;
 constexpr double kRadiansPerPixel = 0.008;
-constexpr double kRoll = 0.13;             // [rad] a notch
-constexpr double kDepthFactor = 1.15;      // a notch
-constexpr double kShallowest = 0.001;      // [m]
-constexpr double kDeepest = 0.2;           // [m]
-constexpr double kShortest = 0.002;        // [m] of an incision; below it, the mouse only clicked
-constexpr double kMargin = 0.002;          // [m] of the scalpel above the tissue
-constexpr double kAfterStream = 0.15;      // [s] a message of the stream that comes after the lifting brings them back
-constexpr float kLineWidth = 0.0015f;      // [m]
-constexpr float kLineOver = 0.002f;        // [m] above the tissue
+constexpr double kRoll = 0.13;         // [rad] a notch
+constexpr double kDepthFactor = 1.15;  // a notch
+constexpr double kShallowest = 0.001;  // [m]
+constexpr double kDeepest = 0.2;       // [m]
+constexpr double kShortest = 0.002;    // [m] of an incision; below it, the mouse only clicked
+constexpr double kMargin = 0.002;      // [m] of the scalpel above the tissue
+constexpr double kAfterStream = 0.15;  // [s] a message of the stream that comes after the lifting brings them back
+constexpr float kLineWidth = 0.0015f;  // [m]
+constexpr float kLineOver = 0.002f;    // [m] above the tissue
 
 Ogre::Quaternion firstTurn() {
   // In the camera's frame (x right, y up, z back): the blades reach away, open up and down, and are seen from the side.
@@ -44,8 +44,8 @@ CutTool::CutTool() : HandTool('x'), angle_(kOpen), reach_(-kInFront), turn_(firs
 
 void CutTool::onInitialize() {
   HandTool::onInitialize();
-  close_time_ = new rviz::FloatProperty("Close time", 0.6f, "Seconds that the left button is held until the blades meet.",
-                                        getPropertyContainer());
+  close_time_ = new rviz::FloatProperty(
+      "Close time", 0.6f, "Seconds that the left button is held until the blades meet.", getPropertyContainer());
   close_time_->setMin(0.1f);
   close_time_->setMax(10.0f);
 }
@@ -66,6 +66,10 @@ void CutTool::onActivate() {
 void CutTool::onDeactivate() {
   act_ = Act::kNone;
   shown_line_.reset();
+  putAway();
+}
+
+void CutTool::putAway() {
   if (lifted_) return;
   lifted_ = true;
   link().call("lift_scissors", std_srvs::Trigger(), {}, kAfterStream);
@@ -92,6 +96,7 @@ bool CutTool::onMouse(rviz::ViewportMouseEvent& event) {
           return true;
         }
         act_ = Act::kDrawing;
+        putAway();  // one blade in the hand
         line_.assign(1, {hover().position, hover().normal});
       } else if (event.leftDown() && event.shift()) {
         act_ = Act::kTurning;
@@ -150,7 +155,7 @@ void CutTool::onUpdate(double dt) {
   angle_ = act_ == Act::kClosing ? std::max(0.0, angle_ - dt * speed) : std::min(kOpen, angle_ + 2.0 * dt * speed);
   if (act_ == Act::kNone) follow();
   if (act_ == Act::kDrawing) draw();
-  if (placed_) stream();
+  if (placed_ && act_ != Act::kDrawing) stream();
 }
 
 void CutTool::stream() {
@@ -227,8 +232,7 @@ void CutTool::incise(const Touch& end) {
 }
 
 void CutTool::eventCame(const meshless_surgery::Event& event) {
-  if (event.type == "cut" || event.type == "undone")
-    say(QString::fromStdString(event.body + ": " + event.text));
+  if (event.type == "cut" || event.type == "undone") say(QString::fromStdString(event.body + ": " + event.text));
 }
 
 void CutTool::undoDrag() {
@@ -241,16 +245,19 @@ QString CutTool::help() const {
   const QString depth = QString::number(1e3 * depth_, 'f', 1) + " mm";
   switch (act_) {
     case Act::kClosing:
-      return angle_ > 0.0 ? "<b>Keep holding:</b> the blades close.  <b>Release left</b> or <b>Esc:</b> they open again."
-                          : "<b>The blades have met.</b>  <b>Release left:</b> they open again.";
+      return angle_ > 0.0
+                 ? "<b>Keep holding:</b> the blades close.  <b>Release left</b> or <b>Esc:</b> they open again."
+                 : "<b>The blades have met.</b>  <b>Release left:</b> they open again.";
     case Act::kTurning:
       return "<b>Move:</b> turns the blades.  <b>Release left:</b> done.";
     case Act::kDrawing:
       return "<b>Move:</b> the incision ends here, " + depth +
              " deep.  <b>Wheel:</b> deeper, shallower.  <b>Release left:</b> open it.  <b>Esc:</b> undo.";
     default:
-      return "<b>Hold left:</b> close the blades.  <b>Wheel:</b> away, towards.  <b>Shift+drag, shift+wheel:</b> turn.  "
-             "<b>Ctrl+drag:</b> incision, " + depth + " (Ctrl+wheel).  <b>Z:</b> undo cut.  <b>R:</b> clear springs.";
+      return "<b>Hold left:</b> close the blades.  <b>Wheel:</b> away, towards.  <b>Shift+drag, shift+wheel:</b> turn. "
+             " "
+             "<b>Ctrl+drag:</b> incision, " +
+             depth + " (Ctrl+wheel).  <b>Z:</b> undo cut.  <b>R:</b> clear springs.";
   }
 }
 

@@ -55,6 +55,7 @@ class CutTool : public HandTool {
 
   void follow();
   void stream();
+  void putAway();
   void turn(int dx, int dy);
   void draw();
   void showLine();
@@ -62,12 +63,12 @@ class CutTool : public HandTool {
   void incise(const Touch& end);
 
   Act act_ = Act::kNone;
-  double angle_;             // [rad] between the blades
-  bool lifted_ = true;       // the node has no scissors of ours
-  bool placed_ = false;      // the cursor has been over tissue
-  double reach_;             // [m] that the wheel has moved the blades away, from the pivot on the tissue
-  double depth_ = 0.015;     // [m] of an incision
-  Ogre::Quaternion turn_;    // of the blades, in the camera's frame
+  double angle_;           // [rad] between the blades
+  bool lifted_ = true;     // the node has no scissors of ours
+  bool placed_ = false;    // the cursor has been over tissue
+  double reach_;           // [m] that the wheel has moved the blades away, from the pivot on the tissue
+  double depth_ = 0.015;   // [m] of an incision
+  Ogre::Quaternion turn_;  // of the blades, in the camera's frame
   Ogre::Vector3 plane_point_ = Ogre::Vector3::ZERO;
   Ogre::Vector3 pivot_ = Ogre::Vector3::ZERO;
   Ogre::Quaternion orientation_;

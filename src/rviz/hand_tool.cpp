@@ -5,13 +5,13 @@
 
 #include <OgreCamera.h>
 #include <OgreViewport.h>
-#include <QKeyEvent>
 #include <meshless_surgery/Probe.h>
 #include <rviz/display_context.h>
 #include <rviz/frame_manager.h>
 #include <rviz/properties/string_property.h>
 #include <rviz/view_controller.h>
 #include <std_srvs/Trigger.h>
+#include <QKeyEvent>
 
 #include "ogre_convert.h"
 
@@ -48,11 +48,11 @@ void HandTool::updateNode() {
 void HandTool::activate() {
   active_ = true;
   hover_ = Hover();
-  state_ = link_->handle().subscribe<meshless_surgery::State>(
-      link_->nameOf("state"), 1, [this](const meshless_surgery::State::ConstPtr& state) {
-        world_frame_ = state->header.frame_id;
-        stateCame(*state);
-      });
+  state_ = link_->handle().subscribe<meshless_surgery::State>(link_->nameOf("state"), 1,
+                                                              [this](const meshless_surgery::State::ConstPtr& state) {
+                                                                world_frame_ = state->header.frame_id;
+                                                                stateCame(*state);
+                                                              });
   events_ = link_->handle().subscribe<meshless_surgery::Event>(
       link_->nameOf("events"), 100, [this](const meshless_surgery::Event::ConstPtr& event) { eventCame(*event); });
   onActivate();
@@ -147,8 +147,9 @@ void HandTool::probe() {
 }
 
 void HandTool::showCursor() {
-  const Qt::CursorShape shape =
-      dragging() ? Qt::ClosedHandCursor : hover_.over ? Qt::PointingHandCursor : Qt::CrossCursor;
+  const Qt::CursorShape shape = dragging()    ? Qt::ClosedHandCursor
+                                : hover_.over ? Qt::PointingHandCursor
+                                              : Qt::CrossCursor;
   if (getCursor().shape() == shape) return;
   setCursor(shape);
   if (panel_) panel_->setCursor(getCursor());  // rviz does so only with the next event

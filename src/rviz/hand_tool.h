@@ -2,10 +2,10 @@
 // status line. Positions are in rviz's fixed frame.
 #pragma once
 
-#include <QPointer>
 #include <meshless_surgery/Event.h>
 #include <meshless_surgery/State.h>
 #include <rviz/tool.h>
+#include <QPointer>
 
 #ifndef Q_MOC_RUN
 #include <OgrePlane.h>
@@ -102,10 +102,10 @@ class HandTool : public rviz::Tool {
   std::string world_frame_;  // of the node; empty until it is known
   Ogre::Ray ray_;
   Ogre::Viewport* viewport_ = nullptr;
-  int x_ = 0, y_ = 0;      // of the cursor [px]
+  int x_ = 0, y_ = 0;  // of the cursor [px]
   bool active_ = false;
-  bool seen_ = false;      // the cursor is in the view, so that there is a ray
-  bool probing_ = false;   // one question at a time
+  bool seen_ = false;         // the cursor is in the view, so that there is a ray
+  bool probing_ = false;      // one question at a time
   double since_probe_ = 1.0;  // [s]
   bool moved_ = false;
   Hover hover_;

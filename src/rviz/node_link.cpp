@@ -47,7 +47,8 @@ void NodeLink::loop() {
     if (jobs_.empty()) return;
     Job job = std::move(jobs_.front());
     jobs_.pop_front();
-    if (job.delay > 0.0) changed_.wait_for(lock, std::chrono::duration<double>(job.delay), [this] { return stopping_; });
+    if (job.delay > 0.0)
+      changed_.wait_for(lock, std::chrono::duration<double>(job.delay), [this] { return stopping_; });
     lock.unlock();
     job.work();
     lock.lock();

@@ -10,8 +10,8 @@
 #include <string>
 #include <thread>
 
-#include <QObject>
 #include <ros/ros.h>
+#include <QObject>
 
 namespace meshless {
 
@@ -30,8 +30,8 @@ class NodeLink : public QObject {
   /// Calls ~name after `delay` [s]. `done` runs in the GUI's thread, unless this link is gone by then. Where the node
   /// does not answer, `success` is false and the message says so.
   template <class Service>
-  void call(const std::string& name, Service service,
-            std::function<void(const typename Service::Response&)> done = {}, double delay = 0.0) {
+  void call(const std::string& name, Service service, std::function<void(const typename Service::Response&)> done = {},
+            double delay = 0.0) {
     const std::string full = nameOf(name);
     put(delay, [this, full, service = std::move(service), done = std::move(done)]() mutable {
       if (!callOnce(full, service) && !callOnce(full, service)) {

@@ -6,20 +6,20 @@
 #include <meshless_surgery/MovePick.h>
 #include <meshless_surgery/Pick.h>
 #include <meshless_surgery/Release.h>
-#include <pluginlib/class_list_macros.hpp>
 #include <rviz/view_controller.h>
+#include <pluginlib/class_list_macros.hpp>
 
 #include "ogre_convert.h"
 
 namespace meshless {
 namespace {
 
-constexpr double kReach = 0.002;       // [m] beside the surface that still grabs
-constexpr double kWheelStep = 0.005;   // [m] a notch
-constexpr double kNotch = 120.0;       // Qt's unit of a notch
-constexpr double kSphere = 0.009;      // [m] diameter: a little more than the end of a spring in the markers
-constexpr double kNear = 14.0;         // [px] from the middle of a locked sphere
-constexpr double kSayAgain = 0.1;      // [s]
+constexpr double kReach = 0.002;      // [m] beside the surface that still grabs
+constexpr double kWheelStep = 0.005;  // [m] a notch
+constexpr double kNotch = 120.0;      // Qt's unit of a notch
+constexpr double kSphere = 0.009;     // [m] diameter: a little more than the end of a spring in the markers
+constexpr double kNear = 14.0;        // [px] from the middle of a locked sphere
+constexpr double kSayAgain = 0.1;     // [s]
 
 }  // namespace
 
@@ -229,7 +229,8 @@ QString PickTool::help() const {
     case Drag::kCamera:
       return "<b>Left:</b> turns the view.";
     default:
-      return "<b>Left drag:</b> grab tissue, or a locked sphere; beside it, turn the view.  <b>Middle, right, wheel:</b> "
+      return "<b>Left drag:</b> grab tissue, or a locked sphere; beside it, turn the view.  <b>Middle, right, "
+             "wheel:</b> "
              "view.  <b>R:</b> clear all springs.";
   }
 }

@@ -13,14 +13,14 @@
 namespace meshless {
 namespace {
 
-constexpr double kWheelStep = 0.005;     // [m] a notch
+constexpr double kWheelStep = 0.005;  // [m] a notch
 constexpr double kNotch = 120.0;
-constexpr double kRadiusFactor = 1.15;   // a notch
-constexpr double kSmallest = 0.002;      // [m]
-constexpr double kLargest = 0.2;         // [m]
-constexpr double kLeastFacing = 0.3;     // cosine between the tissue's normal and the view
-constexpr double kSpeed = 1.0;           // [m/s] where its size changes while it is solid
-constexpr double kAfterStream = 0.15;    // [s] a message of the stream that comes after the lifting brings it back
+constexpr double kRadiusFactor = 1.15;  // a notch
+constexpr double kSmallest = 0.002;     // [m]
+constexpr double kLargest = 0.2;        // [m]
+constexpr double kLeastFacing = 0.3;    // cosine between the tissue's normal and the view
+constexpr double kSpeed = 1.0;          // [m/s] where its size changes while it is solid
+constexpr double kAfterStream = 0.15;   // [s] a message of the stream that comes after the lifting brings it back
 
 }  // namespace
 
@@ -178,8 +178,8 @@ void PushTool::undoDrag() {
 QString PushTool::help() const {
   const QString size = QString::number(1e3 * radius_, 'f', 1) + " mm";
   if (dragging())
-    return "<b>Move:</b> push in the plane of the view.  <b>Wheel:</b> away, towards.  <b>Ctrl+wheel:</b> radius (" + size +
-           ").  <b>Release left:</b> lift off.  <b>Right:</b> leave it here.  <b>Esc:</b> undo.";
+    return "<b>Move:</b> push in the plane of the view.  <b>Wheel:</b> away, towards.  <b>Ctrl+wheel:</b> radius (" +
+           size + ").  <b>Release left:</b> lift off.  <b>Right:</b> leave it here.  <b>Esc:</b> undo.";
   return "<b>Left drag:</b> push.  <b>Wheel:</b> away, towards.  <b>Ctrl+wheel:</b> radius (" + size +
          ").  <b>Middle, right:</b> view.  <b>R:</b> clear all springs.";
 }

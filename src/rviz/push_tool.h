@@ -32,7 +32,7 @@ class PushTool : public HandTool {
     kNone,
     kAsking,  // the node has not yet said that the sphere is there
     kSolid,
-    kOver     // locked or undone, the button still down
+    kOver  // locked or undone, the button still down
   };
 
   Ogre::Vector3 centre() const;
@@ -47,9 +47,9 @@ class PushTool : public HandTool {
   std::uint32_t attempt_ = 0;
   bool standing_ = false;  // left in place by a right click
   Ogre::Vector3 standing_at_ = Ogre::Vector3::ZERO;
-  bool placed_ = false;       // the cursor has been over tissue, so that there is a plane
-  double radius_ = 0.02;      // [m]
-  double depth_ = 0.0;        // [m] that the wheel has moved it away
+  bool placed_ = false;                              // the cursor has been over tissue, so that there is a plane
+  double radius_ = 0.02;                             // [m]
+  double depth_ = 0.0;                               // [m] that the wheel has moved it away
   Ogre::Vector3 plane_point_ = Ogre::Vector3::ZERO;  // the centre lies in the plane through it that faces the camera
   Ogre::Vector3 plane_normal_ = Ogre::Vector3::UNIT_X;
   Ogre::Vector3 grip_ = Ogre::Vector3::ZERO;

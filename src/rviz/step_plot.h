@@ -12,8 +12,8 @@ class StepPlot : public QWidget {
 
  public:
   struct Sample {
-    double mean_step = 0.0;         // [s]
-    double worst_step = 0.0;        // [s]
+    double mean_step = 0.0;   // [s]
+    double worst_step = 0.0;  // [s]
     double real_time_factor = 0.0;
   };
 

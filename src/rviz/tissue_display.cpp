@@ -3,13 +3,13 @@
 #include <set>
 
 #include <OgreSceneNode.h>
-#include <pluginlib/class_list_macros.hpp>
 #include <rviz/display_context.h>
 #include <rviz/frame_manager.h>
 #include <rviz/properties/bool_property.h>
 #include <rviz/properties/enum_property.h>
 #include <rviz/properties/float_property.h>
 #include <rviz/properties/string_property.h>
+#include <pluginlib/class_list_macros.hpp>
 
 namespace meshless {
 namespace {
@@ -24,8 +24,8 @@ TissueDisplay::TissueDisplay() {
                                    SLOT(listen()));
   colour_->addOption("Material", kByMaterial);
   colour_->addOption("Strain", kByStrain);
-  full_strain_ = new rviz::FloatProperty("Full strain", 0.3f, "Change of length, as a share, that is shown red.", colour_,
-                                         SLOT(changeLook()), this);
+  full_strain_ = new rviz::FloatProperty("Full strain", 0.3f, "Change of length, as a share, that is shown red.",
+                                         colour_, SLOT(changeLook()), this);
   full_strain_->setMin(0.001f);
   opacity_ = new rviz::FloatProperty("Opacity", 1.0f, "Of the bodies.", this, SLOT(changeLook()));
   opacity_->setMin(0.05f);
@@ -105,7 +105,8 @@ void TissueDisplay::draw() {
     if (!shape) shape = std::make_unique<BodyShape>(scene_manager_, scene_node_);
     shape->show(surface, look);
   }
-  for (auto it = bodies_.begin(); it != bodies_.end();) it = seen.count(it->first) > 0 ? std::next(it) : bodies_.erase(it);
+  for (auto it = bodies_.begin(); it != bodies_.end();)
+    it = seen.count(it->first) > 0 ? std::next(it) : bodies_.erase(it);
   if (tools_shown_->getBool()) {
     if (!tools_) tools_ = std::make_unique<ToolsShape>(scene_manager_, scene_node_);
     tools_->show(*surfaces_, full_force_->getFloat());

@@ -29,7 +29,8 @@ void addBlade(Ogre::ManualObject* object, double angle, double side, double leng
   const auto l = static_cast<float>(length);
   const auto w = static_cast<float>(side * kBladeWidth * length);
   const Ogre::Vector3 corners[] = {Ogre::Vector3::ZERO, turn * Ogre::Vector3(l, 0, 0),
-                                   turn * Ogre::Vector3(0.25f * l, w, 0), turn * Ogre::Vector3(-0.15f * l, 0.5f * w, 0)};
+                                   turn * Ogre::Vector3(0.25f * l, w, 0),
+                                   turn * Ogre::Vector3(-0.15f * l, 0.5f * w, 0)};
   const float lights[] = {1.0f, 1.15f, 0.75f, 0.6f};  // the edge shines
   const auto first = static_cast<Ogre::uint32>(object->getCurrentVertexCount());
   for (int k = 0; k < 4; ++k) {
@@ -50,7 +51,8 @@ ToolsShape::ToolsShape(Ogre::SceneManager* scene_manager, Ogre::SceneNode* paren
   springs_->setLineWidth(kSpringWidth);
   push_ = std::make_unique<rviz::Shape>(rviz::Shape::Sphere, scene_manager_, node_);
   push_->getRootNode()->setVisible(false);
-  scissors_material_ = Ogre::MaterialManager::getSingleton().create(name, Ogre::ResourceGroupManager::DEFAULT_RESOURCE_GROUP_NAME);
+  scissors_material_ =
+      Ogre::MaterialManager::getSingleton().create(name, Ogre::ResourceGroupManager::DEFAULT_RESOURCE_GROUP_NAME);
   Ogre::Pass* pass = scissors_material_->getTechnique(0)->getPass(0);
   pass->setLightingEnabled(false);  // thin blades are seen from both sides alike
   pass->setCullingMode(Ogre::CULL_NONE);
@@ -91,7 +93,8 @@ void ToolsShape::showSprings(const std::vector<meshless_surgery::PickState>& pic
   for (std::size_t i = 0; i < picks.size(); ++i) {
     const auto& pick = picks[i];
     if (i > 0) springs_->newLine();
-    const double force = std::sqrt(pick.force.x * pick.force.x + pick.force.y * pick.force.y + pick.force.z * pick.force.z);
+    const double force =
+        std::sqrt(pick.force.x * pick.force.x + pick.force.y * pick.force.y + pick.force.z * pick.force.z);
     const Ogre::ColourValue colour = heatColour(0.5 + 0.5 * std::min(1.0, force / full_force));
     springs_->addPoint(toOgre(pick.position), colour);
     springs_->addPoint(toOgre(pick.target), colour);
@@ -112,7 +115,7 @@ void ToolsShape::showScissors(const meshless_surgery::Surfaces& surfaces) {
   if (!begun_) {
     begun_ = true;
     scissors_->begin(scissors_material_->getName(), Ogre::RenderOperation::OT_TRIANGLE_LIST,
-                   Ogre::ResourceGroupManager::DEFAULT_RESOURCE_GROUP_NAME);
+                     Ogre::ResourceGroupManager::DEFAULT_RESOURCE_GROUP_NAME);
   } else {
     scissors_->beginUpdate(0);
   }

@@ -21,7 +21,8 @@ CutUndo World::Impl::beforeCut() const {
         {body->name, body->number, body->material, body->model, body->state, body->surface_current});
   before.picks = picks;
   for (const Pick& pick : picks) {
-    const auto held = std::find_if(bodies.begin(), bodies.end(), [&](const auto& body) { return body->id == pick.body; });
+    const auto held =
+        std::find_if(bodies.begin(), bodies.end(), [&](const auto& body) { return body->id == pick.body; });
     before.pick_bodies.push_back(held != bodies.end() ? (*held)->name : std::string());
   }
   return before;

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Tracked tools: a stream of 200 Hz drives each of them while the world runs, with poses that jump, come late, are missing or are
-no numbers; a tool whose stream falls silent is lifted off."""
+"""Tracked tools: a stream of 200 Hz drives each of them while the world runs, with poses that jump, come late, are
+missing or are no numbers; a tool whose stream falls silent is lifted off."""
 import math
 import os
 import sys

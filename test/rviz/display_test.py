@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The Tissue display: cut faces in their inside colour, strain and the force of springs by colour, and nothing is asked of the
-node while it is switched off."""
+"""The Tissue display: cut faces in their inside colour, strain and the force of springs by colour, and nothing is asked
+of the node while it is switched off."""
 import os
 import sys
 import tempfile

@@ -7,8 +7,8 @@
 
 namespace meshless {
 
-/// Goes from the force of one step to that of the next in a straight line while the next step's time passes: continuous,
-/// with the same integral over a touch, and exactly zero once a step has measured none.
+/// Goes from the force of one step to that of the next in a straight line while the next step's time passes:
+/// continuous, with the same integral over a touch, and exactly zero once a step has measured none.
 class ForceHold {
  public:
   /// `dt` [s] is what the step simulates; `now` when it was done.

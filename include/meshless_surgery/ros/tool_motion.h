@@ -11,9 +11,9 @@ namespace meshless {
 class ToolMotion {
  public:
   struct Limits {
-    double speed = 5.0;       // [m/s]
-    double turn_speed = 50.0; // [rad/s]
-    double silence = 0.5;     // [s]; 0: it may be silent for ever
+    double speed = 5.0;        // [m/s]
+    double turn_speed = 50.0;  // [rad/s]
+    double silence = 0.5;      // [s]; 0: it may be silent for ever
   };
 
   explicit ToolMotion(const Limits& limits) : limits_(limits) {}
