@@ -162,6 +162,23 @@ class HandsTest(unittest.TestCase):
         self.assertEqual(1, len(self.said('picked')))
         self.assertEqual(1, len(self.said('released')))
 
+    def test_the_cursor_tells_what_is_under_it(self):
+        for key in 'khx':
+            place = self.take(key)
+            corner = (self.rectangle[1] - 60, self.rectangle[2] + 60)
+            self.mouse.move(corner)
+            rospy.sleep(1.0)
+            air = self.display.cursor()
+            self.mouse.move(place)
+            self.until(lambda: self.display.cursor() != air, 'the cursor is the same over tissue, with ' + key)
+            if key == 'k':
+                over = self.display.cursor()
+                self.mouse.down()
+                self.until(lambda: self.display.cursor() not in (air, over), 'the cursor is the same in a drag')
+                self.mouse.up()
+            self.mouse.move(corner)
+            self.until(lambda: self.display.cursor() == air, 'the cursor over tissue stays in the air, with ' + key)
+
     def test_the_wheel_moves_the_plane_and_keeps_its_normal(self):
         back = camera_axes(self.view)[3]
         place, grabbed = self.grab()

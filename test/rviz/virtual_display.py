@@ -1,10 +1,18 @@
 """A display that nobody sees, rviz on it, and pictures of what it shows."""
+import ctypes
 import os
 import signal
 import subprocess
 import time
 
 import numpy
+
+
+class _CursorImage(ctypes.Structure):
+    """XFixesCursorImage, version 2."""
+    _fields_ = [('x', ctypes.c_short), ('y', ctypes.c_short), ('width', ctypes.c_ushort), ('height', ctypes.c_ushort),
+                ('xhot', ctypes.c_ushort), ('yhot', ctypes.c_ushort), ('serial', ctypes.c_ulong),
+                ('pixels', ctypes.POINTER(ctypes.c_ulong)), ('atom', ctypes.c_ulong), ('name', ctypes.c_char_p)]
 
 
 class VirtualDisplay:
@@ -34,6 +42,23 @@ class VirtualDisplay:
 
     def xdotool(self, *words):
         subprocess.run(['xdotool'] + [str(word) for word in words], env=self.environment, check=True)
+
+    def cursor(self):
+        """What the mouse's cursor looks like: its size and pixels. (A screenshot has no cursor.)"""
+        x11, fixes = ctypes.CDLL('libX11.so.6'), ctypes.CDLL('libXfixes.so.3')
+        x11.XOpenDisplay.restype = ctypes.c_void_p
+        fixes.XFixesGetCursorImage.restype = ctypes.POINTER(_CursorImage)
+        connection = ctypes.c_void_p(x11.XOpenDisplay(self.environment['DISPLAY'].encode()))
+        if not connection:
+            raise RuntimeError('the display cannot be opened')
+        major, minor = ctypes.c_int(), ctypes.c_int()
+        fixes.XFixesQueryExtension(connection, ctypes.byref(major), ctypes.byref(minor))
+        image = fixes.XFixesGetCursorImage(connection)
+        shape = image.contents
+        look = shape.width, shape.height, tuple(shape.pixels[i] for i in range(shape.width * shape.height))
+        x11.XFree(image)
+        x11.XCloseDisplay(connection)
+        return look
 
     def save(self, file):
         subprocess.run(['import', '-window', 'root', file], env=self.environment, check=True)
