@@ -1,4 +1,4 @@
-// What a display that draws by itself needs: surfaces as vertices and triangles, a twentieth of the markers' bytes.
+// What a display that draws by itself needs: surfaces as vertices and triangles, about a sixth of the markers' bytes.
 #pragma once
 
 #include <meshless_surgery/Surfaces.h>
