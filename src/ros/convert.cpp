@@ -95,6 +95,23 @@ Blades bladesAt(const Pose& pose, double length, double width) {
   return blades;
 }
 
+std::vector<meshless_surgery::PickState> toPicks(const WorldSnapshot& snapshot) {
+  std::vector<meshless_surgery::PickState> picks;
+  picks.reserve(snapshot.picks.size());
+  for (const Pick& pick : snapshot.picks) {
+    meshless_surgery::PickState message;
+    message.pick_id = pick.id;
+    const auto body = snapshot.pick_bodies.find(pick.id);
+    if (body != snapshot.pick_bodies.end()) message.body = body->second;
+    message.locked = pick.locked;
+    message.position = toPoint(pick.position);
+    message.target = toPoint(pick.target);
+    message.force = toVector(pick.force);
+    picks.push_back(std::move(message));
+  }
+  return picks;
+}
+
 meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatus& status,
                                 const std_msgs::Header& header) {
   meshless_surgery::State state;
@@ -102,6 +119,9 @@ meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatu
   state.step = snapshot.step;
   state.sim_time = snapshot.sim_time;
   state.real_time_factor = status.real_time_factor;
+  state.paused = status.paused;
+  state.mean_step = status.mean_step;
+  state.worst_step = status.worst_step;
   state.bodies.reserve(snapshot.bodies.size());
   for (const BodySnapshot& body : snapshot.bodies) {
     meshless_surgery::BodyState message;
@@ -119,20 +139,13 @@ meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatu
     message.kinetic_energy = body.measures.kinetic_energy;
     message.asleep = body.asleep;
     message.stiffness_factor = body.stiffness_factor;
+    message.alpha = body.material.alpha;
+    message.beta = body.material.beta;
+    message.damping = body.material.damping;
+    message.youngs_modulus = body.material.youngs_modulus;
     state.bodies.push_back(std::move(message));
   }
-  state.picks.reserve(snapshot.picks.size());
-  for (const Pick& pick : snapshot.picks) {
-    meshless_surgery::PickState message;
-    message.pick_id = pick.id;
-    const auto body = snapshot.pick_bodies.find(pick.id);
-    if (body != snapshot.pick_bodies.end()) message.body = body->second;
-    message.locked = pick.locked;
-    message.position = toPoint(pick.position);
-    message.target = toPoint(pick.target);
-    message.force = toVector(pick.force);
-    state.picks.push_back(std::move(message));
-  }
+  state.picks = toPicks(snapshot);
   return state;
 }
 

@@ -83,13 +83,15 @@ Result<Pose> Frames::toWorld(const std_msgs::Header& header) {
                                             "', or empty for it" + (why.empty() ? "" : " (tf2: " + why + ")")};
 }
 
-std::optional<Pose> Frames::latest(const std::string& frame_id) {
+std::optional<Frames::Stamped> Frames::latest(const std::string& frame_id) {
   const std::string frame = withoutSlash(frame_id);
-  if (isWorld(frame)) return Pose{};
+  if (isWorld(frame)) return Stamped{};
   Listener& tf = listener();
   try {
-    const Pose pose = toPose(tf.buffer.lookupTransform(world_frame_, frame, ros::Time(0)));
-    if (pose.translation.allFinite() && pose.rotation.coeffs().allFinite()) return pose;
+    const auto transform = tf.buffer.lookupTransform(world_frame_, frame, ros::Time(0));
+    const Pose pose = toPose(transform);
+    if (pose.translation.allFinite() && pose.rotation.coeffs().allFinite())
+      return Stamped{pose, transform.header.stamp};
   } catch (const tf2::TransformException&) {  // not known yet
   }
   return std::nullopt;

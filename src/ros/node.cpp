@@ -11,6 +11,7 @@
 #include <ros/package.h>
 
 #include "meshless_surgery/ros/border_check.h"
+#include "meshless_surgery/ros/force_publisher.h"
 #include "meshless_surgery/ros/publishers.h"
 #include "meshless_surgery/ros/services.h"
 
@@ -100,13 +101,15 @@ struct DeformerNode::Parts {
         frames(settings.world_frame),
         loader(std::move(loader_in)),
         tools(handle, settings, runner, frames, rejections),
-        publishers(handle, settings, runner, tools, rejections) {}
+        publishers(handle, settings, runner, tools, rejections),
+        forces(handle, settings, tools) {}
 
   ~Parts() {
     // First the world, so that whoever waits for it gets an answer.
     runner.stop();
     services.reset();
     publishers.stop();
+    forces.stop();
   }
 
   Rejections rejections;
@@ -115,6 +118,7 @@ struct DeformerNode::Parts {
   BodyLoader loader;
   ToolInputs tools;
   Publishers publishers;
+  ForcePublisher forces;
   std::unique_ptr<Services> services;
 };
 
@@ -170,8 +174,11 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
                                        BodyLoader(access, scene_folder, std::move(scene->materials)));
   parts->runner.setEventSink(
       [publishers = &parts->publishers](std::vector<Event> events) { publishers->queueEvents(std::move(events)); });
+  parts->runner.setStepSink(
+      [forces = &parts->forces](const World& world_now, double dt) { forces->changed(world_now, dt); });
   parts->runner.start();
   parts->publishers.start();
+  parts->forces.start();
   // Last, so that who finds them finds a world that runs.
   parts->services =
       std::make_unique<Services>(private_handle, parts->runner, parts->frames, parts->loader, parts->rejections);

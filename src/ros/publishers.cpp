@@ -2,16 +2,18 @@
 
 #include <algorithm>
 
-#include <geometry_msgs/WrenchStamped.h>
 #include <ros/console.h>
 
 #include "meshless_surgery/ros/border_check.h"
+#include "meshless_surgery/ros/cluster_markers.h"
 #include "meshless_surgery/ros/convert.h"
+#include "meshless_surgery/ros/surfaces.h"
 
 namespace meshless {
 namespace {
 
 constexpr std::size_t kMaxQueuedEvents = 10000;
+constexpr double kClustersRate = 10.0;  // [Hz]
 constexpr double kBehind = 0.95;  // a real-time factor below it is worth a warning
 
 std::chrono::steady_clock::duration periodOf(double rate) {
@@ -45,20 +47,26 @@ Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings
       "markers", 5, [this](const ros::SingleSubscriberPublisher&) { markers_newcomer_ = true; });
   points_topic_ = handle.advertise<sensor_msgs::PointCloud2>(
       "points", 5, [this](const ros::SingleSubscriberPublisher&) { points_newcomer_ = true; });
+  const auto on_surfaces = [this](const ros::SingleSubscriberPublisher&) { surfaces_newcomer_ = true; };
+  surfaces_topic_ = handle.advertise<meshless_surgery::Surfaces>("surfaces", 2, on_surfaces);
+  strained_surfaces_topic_ = handle.advertise<meshless_surgery::Surfaces>("strained_surfaces", 2, on_surfaces);
+  clusters_topic_ = handle.advertise<visualization_msgs::MarkerArray>(
+      "clusters", 2, [this](const ros::SingleSubscriberPublisher&) { clusters_newcomer_ = true; });
   state_topic_ = handle.advertise<meshless_surgery::State>("state", 10);
   events_topic_ = handle.advertise<meshless_surgery::Event>("events", 1000);
   const auto advertiseTool = [&](const std::string& tool) {
-    return ToolTopics{handle.advertise<geometry_msgs::PoseStamped>(tool + "/measured_cp", 10),
-                      handle.advertise<geometry_msgs::WrenchStamped>(tool + "/measured_cf", 10)};
+    return handle.advertise<geometry_msgs::PoseStamped>(tool + "/measured_cp", 10);
   };
-  pick_topics_ = advertiseTool("pick");
-  push_topics_ = advertiseTool("push");
-  scissors_topics_ = advertiseTool("scissors");
+  pick_pose_ = advertiseTool("pick");
+  push_pose_ = advertiseTool("push");
+  scissors_pose_ = advertiseTool("scissors");
 
   updater_.setHardwareID("none");
   updater_.add("simulation", this, &Publishers::diagnose);
 
   markers_due_.period = periodOf(settings_.markers_rate);
+  clusters_due_.period = periodOf(kClustersRate);
+  surfaces_due_.period = periodOf(settings_.surfaces_rate);
   points_due_.period = periodOf(settings_.points_rate);
   state_due_.period = periodOf(settings_.state_rate);
   tools_due_.period = periodOf(settings_.tools_rate);
@@ -69,7 +77,8 @@ Publishers::~Publishers() { stop(); }
 
 void Publishers::start() {
   const auto now = Clock::now();
-  for (Cadence* cadence : {&markers_due_, &points_due_, &state_due_, &tools_due_, &diagnostics_due_}) {
+  for (Cadence* cadence : {&markers_due_, &surfaces_due_, &clusters_due_, &points_due_, &state_due_, &tools_due_,
+                           &diagnostics_due_}) {
     cadence->next = now;
   }
   thread_ = std::thread([this] { loop(); });
@@ -100,8 +109,8 @@ void Publishers::loop() {
   while (true) {
     publishEvents();
     publishTick(Clock::now());
-    const auto next = std::min(
-        {markers_due_.next, points_due_.next, state_due_.next, tools_due_.next, diagnostics_due_.next});
+    const auto next = std::min({markers_due_.next, surfaces_due_.next, clusters_due_.next, points_due_.next,
+                                state_due_.next, tools_due_.next, diagnostics_due_.next});
     std::unique_lock<std::mutex> lock(mutex_);
     changed_.wait_until(lock, next, [this] { return stopping_ || !events_.empty(); });
     if (stopping_) return;
@@ -134,13 +143,18 @@ void Publishers::publishTick(Clock::time_point now) {
   markers = markers && (markers_fresh || revision != markers_revision_ || markers_.deleting());
   bool points = points_due_.due(now) && points_topic_.getNumSubscribers() > 0;
   points = points && (points_newcomer_.exchange(false) || revision != points_revision_);
+  bool surfaces = surfaces_due_.due(now) &&
+                  (surfaces_topic_.getNumSubscribers() > 0 || strained_surfaces_topic_.getNumSubscribers() > 0);
+  surfaces = surfaces && (surfaces_newcomer_.exchange(false) || revision != surfaces_revision_);
+  bool clusters = clusters_due_.due(now) && clusters_topic_.getNumSubscribers() > 0;
+  clusters = clusters && (clusters_newcomer_.exchange(false) || revision != clusters_revision_);
   const bool state = state_due_.due(now) && state_topic_.getNumSubscribers() > 0;
   const bool tools = tools_due_.due(now);
-  if (!markers && !points && !state && !tools) return;
+  if (!markers && !surfaces && !clusters && !points && !state && !tools) return;
 
   SnapshotWants wants;
-  wants.surfaces = markers;
-  wants.particles = points;
+  wants.surfaces = markers || surfaces;
+  wants.particles = points || clusters;
   wants.measures = state;
   // The stamp comes first: who sees one later than an answer sees what was answered.
   std_msgs::Header header;
@@ -153,6 +167,15 @@ void Publishers::publishTick(Clock::time_point now) {
     markers_revision_ = revision;
     markers_topic_.publish(markers_.build(*snapshot, header.stamp, markers_fresh));
   }
+  if (surfaces) {
+    surfaces_revision_ = revision;
+    publishSurfaces(*snapshot, header);
+  }
+  if (clusters) {
+    ++clusters_built_;
+    clusters_revision_ = revision;
+    clusters_topic_.publish(clusterMarkers(*snapshot, header));
+  }
   if (points) {
     ++points_built_;
     points_revision_ = revision;
@@ -163,6 +186,13 @@ void Publishers::publishTick(Clock::time_point now) {
     state_topic_.publish(toState(*snapshot, runner_.status(), header));
   }
   if (tools) publishTools(*snapshot, header.stamp);
+}
+
+void Publishers::publishSurfaces(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
+  ++surfaces_built_;
+  if (surfaces_topic_.getNumSubscribers() > 0) surfaces_topic_.publish(toSurfaces(snapshot, header, false));
+  if (strained_surfaces_topic_.getNumSubscribers() > 0)
+    strained_surfaces_topic_.publish(toSurfaces(snapshot, header, true));
 }
 
 void Publishers::publishTools(const WorldSnapshot& snapshot, const ros::Time& stamp) {
@@ -178,17 +208,15 @@ void Publishers::publishTools(const WorldSnapshot& snapshot, const ros::Time& st
     cursor->translation = in_hand->target;
   }
   if (cursor) {
-    const Vec3 force = in_hand != nullptr ? Vec3(-in_hand->force) : Vec3(Vec3::Zero());
-    publishTool(pick_topics_, "pick_cursor", *cursor, force, stamp, transforms);
+    publishTool(pick_pose_, "pick_cursor", *cursor, stamp, transforms);
   }
   if (snapshot.push.enabled) {
     Pose pose;
     pose.translation = snapshot.push.position;
-    publishTool(push_topics_, "push_sphere", pose, snapshot.push.force, stamp, transforms);
+    publishTool(push_pose_, "push_sphere", pose, stamp, transforms);
   }
   if (snapshot.scissors.shown) {
-    // The blades part the tissue without resistance.
-    publishTool(scissors_topics_, "scissors", poseOf(snapshot.scissors.blades), Vec3::Zero(), stamp, transforms);
+    publishTool(scissors_pose_, "scissors", poseOf(snapshot.scissors.blades), stamp, transforms);
   }
   // A clock that stands still: tf2 complains of a stamp said twice.
   if (!transforms.empty() && stamp != last_transforms_) {
@@ -197,7 +225,7 @@ void Publishers::publishTools(const WorldSnapshot& snapshot, const ros::Time& st
   }
 }
 
-void Publishers::publishTool(const ToolTopics& topics, const std::string& frame, const Pose& pose, const Vec3& force,
+void Publishers::publishTool(const ros::Publisher& topic, const std::string& frame, const Pose& pose,
                              const ros::Time& stamp, std::vector<geometry_msgs::TransformStamped>& transforms) {
   geometry_msgs::TransformStamped transform;
   transform.header.stamp = stamp;
@@ -206,17 +234,11 @@ void Publishers::publishTool(const ToolTopics& topics, const std::string& frame,
   transform.transform.translation = toVector(pose.translation);
   transform.transform.rotation = toQuaternion(pose.rotation);
   transforms.push_back(transform);
-  if (topics.pose.getNumSubscribers() > 0) {
+  if (topic.getNumSubscribers() > 0) {
     geometry_msgs::PoseStamped message;
     message.header = transform.header;
     message.pose = toPose(pose);
-    topics.pose.publish(message);
-  }
-  if (topics.force.getNumSubscribers() > 0) {
-    geometry_msgs::WrenchStamped message;
-    message.header = transform.header;
-    message.wrench.force = toVector(force);
-    topics.force.publish(message);
+    topic.publish(message);
   }
 }
 
@@ -250,6 +272,8 @@ void Publishers::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   }
   status.add("lost events", lost);
   status.add("marker arrays built", markers_built_);
+  status.add("surfaces built", surfaces_built_);
+  status.add("clusters built", clusters_built_);
   status.add("point clouds built", points_built_);
   status.add("states built", states_built_);
 }

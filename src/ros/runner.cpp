@@ -259,7 +259,10 @@ void WorldRunner::doJobs() {
     } catch (const std::exception& e) {
       done = Error{ErrorCode::kFailed, std::string("internal fault: ") + e.what()};
     }
-    if (waiting->changes) ++revision_;
+    if (waiting->changes) {
+      ++revision_;
+      if (step_sink_) step_sink_(*world_, 0.0);
+    }
     answerCuts();
     // Events first: who waits for the answer finds them under way.
     handOverEvents();
@@ -275,6 +278,7 @@ void WorldRunner::stepOnce() {
     fail(e.what());
   }
   ++revision_;
+  if (step_sink_) step_sink_(*world_, dt_);
   record(wallSeconds() - before);
   answerCuts();
 }

@@ -9,6 +9,7 @@
 #include <meshless_surgery/Lock.h>
 #include <meshless_surgery/MovePick.h>
 #include <meshless_surgery/Pick.h>
+#include <meshless_surgery/Probe.h>
 #include <meshless_surgery/Push.h>
 #include <meshless_surgery/Release.h>
 #include <meshless_surgery/Remove.h>
@@ -57,6 +58,9 @@ struct Services::Handlers {
     advertise(private_handle, "release", &Handlers::release);
     advertise(private_handle, "clear_picks", &Handlers::clearPicks);
     advertise(private_handle, "open_scissors", &Handlers::openScissors);
+    advertise(private_handle, "lift_scissors", &Handlers::liftScissors);
+    advertise(private_handle, "undo_cut", &Handlers::undoCut);
+    advertise(private_handle, "probe", &Handlers::probe);
     advertise(private_handle, "push", &Handlers::push);
     advertise(private_handle, "incise", &Handlers::incise);
     advertise(private_handle, "remove", &Handlers::remove);
@@ -249,6 +253,34 @@ struct Services::Handlers {
 
   bool openScissors(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
     return applied(response, "open_scissors", OpenScissorsCommand{}, "opened the scissors; nothing was cut");
+  }
+
+  bool liftScissors(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+    return applied(response, "lift_scissors", LiftCommand{}, "took the scissors away");
+  }
+
+  bool undoCut(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+    const auto reply = runner.apply(UndoCutCommand{});
+    if (!reply.ok()) return refuse(response, "undo_cut", reply.error());
+    return accept(response, "as before the cut: " + joined(std::get<UndoCutReply>(*reply).bodies));
+  }
+
+  bool probe(meshless_surgery::Probe::Request& request, meshless_surgery::Probe::Response& response) {
+    BorderCheck check;
+    const Vec3 point = check.point("point", request.point);
+    const Vec3 direction = check.direction("direction", request.direction);
+    if (!check.ok()) return refuse(response, "probe", check.error());
+    const auto frame = frames.toWorld(request.header);
+    if (!frame.ok()) return refuse(response, "probe", frame.error());
+    Result<ProbeReply> met = Error{};
+    const Status done =
+        runner.look([&](World& world) { met = world.probe(*frame * point, frame->rotation * direction); });
+    if (!done.ok()) return refuse(response, "probe", done.error());
+    if (!met.ok()) return refuse(response, "probe", met.error());
+    response.body = met->body;
+    response.position = toPoint(met->position);
+    response.normal = toVector(met->normal);
+    return accept(response, "met " + met->body);
   }
 
   bool spawn(meshless_surgery::Spawn::Request& request, meshless_surgery::Spawn::Response& response) {

@@ -124,9 +124,11 @@ Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std
   reader.read("paused", settings.paused);
   reader.read("max_backlog", settings.max_backlog, 0.0, 10.0, "s");
   reader.read("markers_rate", settings.markers_rate, 0.1, 30.0, "Hz");
+  reader.read("surfaces_rate", settings.surfaces_rate, 0.1, 120.0, "Hz");
   reader.read("points_rate", settings.points_rate, 0.1, 120.0, "Hz");
   reader.read("state_rate", settings.state_rate, 0.1, 1000.0, "Hz");
   reader.read("tools_rate", settings.tools_rate, 0.1, 1000.0, "Hz");
+  reader.read("force_rate", settings.force_rate, 1.0, 2000.0, "Hz");
   reader.read("tools/pick/follow_frame", settings.pick.follow_frame);
   reader.read("tools/push/follow_frame", settings.push.follow_frame);
   reader.read("tools/scissors/follow_frame", settings.scissors.follow_frame);
@@ -134,6 +136,9 @@ Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std
   reader.read("tools/pick/stiffness", settings.pick_stiffness, 1e-3, 1e9, "N/m");
   reader.read("tools/push/radius", settings.push_radius, 1e-6, kMaxLength, "m");
   reader.read("tools/push/max_speed", settings.push_max_speed, 1e-6, 1e3, "m/s");
+  reader.read("tools/pick/max_speed", settings.pick_max_speed, 1e-6, 1e3, "m/s");
+  reader.read("tools/scissors/max_speed", settings.scissors_max_speed, 1e-6, 1e3, "m/s");
+  reader.read("tools/silence", settings.tools_silence, 0.0, 3600.0, "s");
   reader.read("tools/scissors/length", settings.scissors_length, 1e-6, kMaxLength, "m");
   reader.read("tools/scissors/width", settings.scissors_width, 1e-6, kMaxLength, "m");
   if (settings.world_frame.find_first_not_of('/') == std::string::npos) {

@@ -1,6 +1,6 @@
 #include "meshless_surgery/ros/tool_inputs.h"
 
-#include <cmath>
+#include <chrono>
 
 #include <ros/console.h>
 
@@ -12,6 +12,13 @@ namespace {
 
 constexpr double kComplainEvery = 5.0;  // [s] of a stream that goes wrong
 constexpr double kMaxJaw = 3.2;         // [rad]
+constexpr double kWatchEvery = 0.01;    // [s] while a tool is there: it goes on, or has fallen silent
+constexpr double kTurnSpeed = 50.0;     // [rad/s]
+constexpr double kUnbounded = 1e12;
+
+double wallSeconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 }  // namespace
 
@@ -21,21 +28,25 @@ ToolInputs::ToolInputs(const ros::NodeHandle& private_handle, const NodeSettings
       runner_(runner),
       frames_(frames),
       rejections_(rejections),
-      follow_posted_(std::make_shared<std::atomic<bool>>(false)) {
+      tools_{Tool{"pick", ToolKind::kPick, settings.pick.follow_frame,
+                  ToolMotion({settings.pick_max_speed, kTurnSpeed, settings.tools_silence}), {}, false},
+             // The world itself holds the sphere to its speed, in simulated time.
+             Tool{"push", ToolKind::kPush, settings.push.follow_frame,
+                  ToolMotion({kUnbounded, kUnbounded, settings.tools_silence}), {}, false},
+             Tool{"scissors", ToolKind::kScissors, settings.scissors.follow_frame,
+                  ToolMotion({settings.scissors_max_speed, kTurnSpeed, settings.tools_silence}), {}, false}} {
   ros::NodeHandle handle(private_handle);
-  const std::pair<const char*, const ToolSettings*> tools[] = {
-      {"pick", &settings_.pick}, {"push", &settings_.push}, {"scissors", &settings_.scissors}};
+  watch_timer_ = handle.createWallTimer(
+      ros::WallDuration(kWatchEvery), [this](const ros::WallTimerEvent&) { watch(); }, false, false);
   bool follows = false;
-  for (const auto& [tool, tool_settings] : tools) {
-    if (!tool_settings->follow_frame.empty()) {
+  for (Tool& tool : tools_) {
+    if (!tool.follow_frame.empty()) {
       follows = true;
       continue;
     }
-    const std::string name = tool;
     subscribers_.push_back(handle.subscribe<geometry_msgs::PoseStamped>(
-        name + "/servo_cp", 10, [this, name](const geometry_msgs::PoseStamped::ConstPtr& message) {
-          onServo(name, message);
-        }));
+        tool.name + "/servo_cp", 10,
+        [this, &tool](const geometry_msgs::PoseStamped::ConstPtr& message) { onServo(tool, message); }));
   }
   subscribers_.push_back(handle.subscribe<sensor_msgs::JointState>(
       "scissors/jaw/servo_js", 10, [this](const sensor_msgs::JointState::ConstPtr& message) { onJaw(message); }));
@@ -49,98 +60,149 @@ ToolInputs::~ToolInputs() = default;
 
 std::optional<Pose> ToolInputs::pickCursor() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return pick_pose_;
+  const ToolMotion& motion = tools_[0].motion;
+  return motion.alive() ? std::optional<Pose>(motion.wanted()) : std::nullopt;
 }
 
-void ToolInputs::onServo(const std::string& tool, const geometry_msgs::PoseStamped::ConstPtr& message) {
+void ToolInputs::reject(const std::string& input, const Error& error) {
+  rejections_.count(input, error.detail);
+  ROS_WARN_STREAM_THROTTLE(kComplainEvery, input << ": " << error.detail);
+}
+
+void ToolInputs::onServo(Tool& tool, const geometry_msgs::PoseStamped::ConstPtr& message) {
+  const std::string input = "~" + tool.name + "/servo_cp";
   BorderCheck check;
-  const Pose local =
-      tool == "scissors" ? check.pose("pose", message->pose) : check.pointPose("pose", message->pose);
-  std::optional<Error> error;
+  const Pose local = tool.kind == ToolKind::kScissors ? check.pose("pose", message->pose)
+                                                      : check.pointPose("pose", message->pose);
+  if (!check.ok()) return reject(input, check.error());
+  const auto frame = frames_.toWorld(message->header);
+  if (!frame.ok()) return reject(input, frame.error());
   Pose pose;
-  if (!check.ok()) {
-    error = check.error();
-  } else {
-    const auto frame = frames_.toWorld(message->header);
-    if (frame.ok()) {
-      pose.rotation = frame->rotation * local.rotation;
-      pose.translation = *frame * local.translation;
-    } else {
-      error = frame.error();
-    }
-  }
-  if (error) {
-    rejections_.count("~" + tool + "/servo_cp", error->detail);
-    ROS_WARN_STREAM_THROTTLE(kComplainEvery, "~" << tool << "/servo_cp: " << error->detail);
-    return;
-  }
-  move(tool, pose);
+  pose.rotation = frame->rotation * local.rotation;
+  pose.translation = *frame * local.translation;
+  hear(tool, pose, message->header.stamp, input);
 }
 
 void ToolInputs::follow() {
-  // One poll in the runner at a time: a world that is late must not gather them.
-  if (follow_posted_->exchange(true)) return;
-  const std::pair<const char*, const ToolSettings*> tools[] = {
-      {"pick", &settings_.pick}, {"push", &settings_.push}, {"scissors", &settings_.scissors}};
-  for (const auto& [tool, tool_settings] : tools) {
-    if (tool_settings->follow_frame.empty()) continue;
-    const auto pose = frames_.latest(tool_settings->follow_frame);
-    if (pose) {
-      move(tool, *pose);
-    } else {
-      ROS_WARN_STREAM_THROTTLE(kComplainEvery, "tools/" << tool << "/follow_frame: tf2 cannot bring '"
-                                                        << tool_settings->follow_frame << "' to '"
-                                                        << frames_.worldFrame() << "' (yet)");
+  for (Tool& tool : tools_) {
+    if (tool.follow_frame.empty()) continue;
+    const auto latest = frames_.latest(tool.follow_frame);
+    if (!latest) {
+      ROS_WARN_STREAM_THROTTLE(kComplainEvery, "tools/" << tool.name << "/follow_frame: tf2 cannot bring '"
+                                                        << tool.follow_frame << "' to '" << frames_.worldFrame()
+                                                        << "' (yet)");
+      continue;
     }
+    // tf2 goes on to give the last transform when nobody says new ones. One that never moves has no stamp.
+    if (!latest->stamp.isZero() && latest->stamp == tool.frame_stamp) continue;
+    tool.frame_stamp = latest->stamp;
+    hear(tool, latest->pose, latest->stamp, "tools/" + tool.name + "/follow_frame");
   }
-  runner_.post([posted = follow_posted_](World&) { *posted = false; });
 }
 
-void ToolInputs::move(const std::string& tool, const Pose& pose) {
-  if (tool == "pick") movePick(pose);
-  if (tool == "push") movePush(pose);
-  if (tool == "scissors") moveScissors(pose);
-}
-
-void ToolInputs::movePick(const Pose& pose) {
+void ToolInputs::hear(Tool& tool, const Pose& pose, const ros::Time& stamp, const std::string& input) {
+  Status heard = Done{};
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    pick_pose_ = pose;
+    heard = tool.motion.hear(pose, stamp.toSec(), wallSeconds());
   }
-  runner_.post([target = pose.translation](World& world) {
-    MovePickCommand command;
-    command.pick = world.pickInHand();
-    command.target = target;
-    if (command.pick != 0) (void)world.apply(command);
-  });
+  if (!heard.ok()) return reject(input, heard.error());
+  watch_timer_.start();
+  postMove(tool);
 }
 
-void ToolInputs::movePush(const Pose& pose) {
-  runner_.post([position = pose.translation, max_speed = settings_.push_max_speed](World& world) {
-    PushCommand command;
-    command.position = position;
-    // It appears where the stream is, and from then on travels, in the size that it has.
-    if (world.push().enabled) {
-      command.radius = world.push().radius;
-      command.speed = max_speed;
+void ToolInputs::watch() {
+  bool any = false;
+  for (Tool& tool : tools_) {
+    bool silent = false;
+    bool under_way = false;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      silent = tool.motion.fellSilent(wallSeconds());
+      under_way = tool.motion.alive() && !tool.motion.arrived();
+      any = any || tool.motion.alive();
+    }
+    if (silent) lift(tool);
+    if (under_way) postMove(tool);
+  }
+  if (any) return;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (const Tool& tool : tools_)
+    if (tool.motion.alive()) return;  // it spoke meanwhile
+  watch_timer_.stop();
+}
+
+void ToolInputs::postMove(Tool& tool) {
+  {
+    // A world that is late must not gather them.
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (tool.posted) return;
+    tool.posted = true;
+  }
+  runner_.post([this, &tool](World& world) { move(tool, world); });
+}
+
+void ToolInputs::move(Tool& tool, World& world) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  tool.posted = false;
+  if (!tool.motion.alive()) return;  // silent since
+  if (tool.kind == ToolKind::kPick) movePick(tool, world);
+  if (tool.kind == ToolKind::kPush) movePush(tool, world);
+  if (tool.kind == ToolKind::kScissors) moveScissors(tool, world);
+}
+
+void ToolInputs::movePick(Tool& tool, World& world) {
+  const auto held = world.heldPick();
+  // From where the spring's end is: it may have been taken into the hand just now.
+  if (held) tool.motion.putAt(held->target);
+  tool.motion.advance(wallSeconds());
+  if (!held) return;
+  MovePickCommand command;
+  command.pick = held->id;
+  command.target = tool.motion.pose().translation;
+  (void)world.apply(command);
+}
+
+void ToolInputs::movePush(Tool& tool, World& world) {
+  tool.motion.advance(wallSeconds());
+  PushCommand command;
+  command.position = tool.motion.pose().translation;
+  command.streamed = true;
+  // It appears where the stream is, and from then on travels, in the size that it has.
+  if (world.push().enabled) {
+    command.radius = world.push().radius;
+    command.speed = settings_.push_max_speed;
+  }
+  (void)world.apply(command);
+}
+
+void ToolInputs::moveScissors(Tool& tool, World& world) {
+  tool.motion.advance(wallSeconds());
+  world.setScissors(bladesAt(tool.motion.pose(), settings_.scissors_length, settings_.scissors_width), jaw_angle_);
+}
+
+void ToolInputs::lift(Tool& tool) {
+  if (tool.kind == ToolKind::kScissors) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    jaw_armed_ = false;
+  }
+  runner_.post([this, &tool](World& world) {
+    LiftCommand command;
+    command.tool = tool.kind;
+    command.streamed_only = true;
+    command.why = "the " + tool.name + " was lifted off: its stream was silent for " +
+                  formatNumber(settings_.tools_silence) + " s";
+    if (tool.kind == ToolKind::kPick) {
+      const auto held = world.heldPick();
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (!held || held->target != tool.motion.pose().translation) return;  // somebody else has moved it
     }
     (void)world.apply(command);
   });
 }
 
-void ToolInputs::moveScissors(const Pose& pose) {
-  double angle = 0.0;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    scissors_pose_ = pose;
-    angle = jaw_angle_;
-  }
-  const Blades blades = bladesAt(pose, settings_.scissors_length, settings_.scissors_width);
-  runner_.post([blades, angle](World& world) { world.setScissors(blades, angle); });
-}
-
 void ToolInputs::onJaw(const sensor_msgs::JointState::ConstPtr& message) {
-  const std::string name = "~scissors/jaw/servo_js";
+  const std::string input = "~scissors/jaw/servo_js";
   BorderCheck check;
   double angle = 0.0;
   if (message->position.empty()) {
@@ -148,37 +210,32 @@ void ToolInputs::onJaw(const sensor_msgs::JointState::ConstPtr& message) {
   } else {
     angle = check.number("position[0]", message->position[0], -kMaxJaw, kMaxJaw, "rad");
   }
-  if (!check.ok()) {
-    rejections_.count(name, check.error().detail);
-    ROS_WARN_STREAM_THROTTLE(kComplainEvery, name << ": " << check.error().detail);
-    return;
-  }
+  if (!check.ok()) return reject(input, check.error());
   angle = std::max(0.0, angle);
   bool closes = false;
-  std::optional<Pose> pose;
+  Pose pose;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     jaw_angle_ = angle;
-    pose = scissors_pose_;
     if (angle > kJawOpen) jaw_armed_ = true;
     if (angle < kJawClosed && jaw_armed_) {
       jaw_armed_ = false;
       closes = true;
     }
+    ToolMotion& motion = tools_[2].motion;
+    if (!motion.alive()) return;  // nobody said (yet, or any more) where the scissors are
+    motion.keepAlive(wallSeconds());
+    pose = motion.pose();
   }
-  if (!pose) return;  // nobody said yet where the scissors are
-  const Blades blades = bladesAt(*pose, settings_.scissors_length, settings_.scissors_width);
-  runner_.post([blades, angle, closes, name, this](World& world) {
+  const Blades blades = bladesAt(pose, settings_.scissors_length, settings_.scissors_width);
+  runner_.post([blades, angle, closes, input, this](World& world) {
     world.setScissors(blades, angle);
     if (!closes) return;
     CutCommand command;
     command.blades = blades;
     const auto reply = world.apply(command);
     // Cutting the air is no fault of the input.
-    if (!reply.ok() && reply.error().code != ErrorCode::kMissed) {
-      rejections_.count(name, reply.error().detail);
-      ROS_WARN_STREAM(name << ": " << reply.error().detail);
-    }
+    if (!reply.ok() && reply.error().code != ErrorCode::kMissed) reject(input, reply.error());
   });
 }
 

@@ -50,6 +50,10 @@ const char* toString(EventType type) {
       return "reset";
     case EventType::kFault:
       return "fault";
+    case EventType::kUndone:
+      return "undone";
+    case EventType::kLifted:
+      return "lifted";
   }
   return "unknown";
 }
@@ -222,6 +226,7 @@ void World::reset() {
   w.picks.clear();
   w.contacts.clear();
   w.next_sleep_group = 1;
+  w.undo.clear();
   w.push = PushSphere();
   w.scissors = Scissors();
   w.step = 0;
@@ -339,9 +344,14 @@ void World::setScissors(const Blades& blades, double angle) {
 void World::hideScissors() { impl_->scissors.shown = false; }
 
 PickId World::pickInHand() const {
+  const auto held = heldPick();
+  return held ? held->id : 0;
+}
+
+std::optional<Pick> World::heldPick() const {
   for (auto it = impl_->picks.rbegin(); it != impl_->picks.rend(); ++it)
-    if (!it->locked) return it->id;
-  return 0;
+    if (!it->locked) return *it;
+  return std::nullopt;
 }
 
 }  // namespace meshless

@@ -163,8 +163,37 @@ Result<Reply> World::Impl::apply(const PushCommand& command) {
   push.radius = command.radius > 0.0 ? command.radius : settings.push_radius;
   push.target = command.position;
   push.speed = command.speed;
+  push.streamed = command.streamed;
   if (from_nowhere || command.speed == 0.0) push.position = command.position;
   wakeAround();
+  return Reply(Done{});
+}
+
+Result<Reply> World::Impl::apply(const LiftCommand& command) {
+  std::string body;
+  PickId id = 0;
+  switch (command.tool) {
+    case ToolKind::kPick: {
+      const auto held = std::find_if(picks.rbegin(), picks.rend(), [](const Pick& pick) { return !pick.locked; });
+      if (held == picks.rend()) return Error{ErrorCode::kMissed, "no pick is in the hand"};
+      if (const WorldBody* of = find(held->body)) body = of->name;
+      id = held->id;
+      say(EventType::kReleased, body, id, "released");
+      picks.erase(std::next(held).base());
+      break;
+    }
+    case ToolKind::kPush:
+      if (!push.enabled || (command.streamed_only && !push.streamed))
+        return Error{ErrorCode::kMissed, "there is no push sphere to lift"};
+      push = PushSphere();
+      for (auto& touched : bodies) touched->touched_by_push = false;
+      break;
+    case ToolKind::kScissors:
+      if (command.streamed_only && !closing.empty()) return Error{ErrorCode::kMissed, "a service closes the scissors"};
+      scissors.shown = false;
+      break;
+  }
+  if (!command.why.empty()) say(EventType::kLifted, body, id, command.why);
   return Reply(Done{});
 }
 

@@ -147,6 +147,7 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
   }
 
   // From here nothing fails: parents are retired and their pieces admitted.
+  CutUndo before = beforeCut();
   for (Severed& s : severed) {
     const std::string parent_name = find(s.parent)->name;
     const std::vector<std::string> names = replaceByPieces(s.parent, std::move(s.cut.pieces));
@@ -156,6 +157,7 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
     reply.work += s.cut.work;
     say(EventType::kCut, parent_name, 0, "cut into " + std::to_string(names.size()) + " pieces");
   }
+  rememberCut(std::move(before), reply.cut_bodies, reply.new_bodies);
   reply.duration = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return reply;
 }

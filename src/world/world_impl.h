@@ -74,6 +74,23 @@ struct ClosingCut {
 /// A loop on so many threads.
 ForEach makeForEach(int threads);
 
+/// The state before a cut or an incision. Models are shared, so that this is the states alone.
+struct CutUndo {
+  struct Body {
+    std::string name;
+    std::uint32_t number = 0;
+    Material material;
+    BodyModelPtr model;
+    BodyState state;
+    bool surface_current = true;
+  };
+  std::vector<Body> bodies;  // all of them, in their order
+  std::vector<Pick> picks;
+  std::vector<std::string> pick_bodies;  // one a pick
+  std::vector<std::string> cut;          // bodies that were cut or opened
+  std::vector<std::string> pieces;       // what they came apart into
+};
+
 struct World::Impl {
   WorldSettings settings;
   ForEach for_each = oneAfterAnother;
@@ -94,6 +111,7 @@ struct World::Impl {
   std::map<std::uint32_t, Result<CutReply>> finished;
   std::uint32_t next_ticket = 1;
   std::vector<Event> events;
+  std::vector<CutUndo> undo;  // the last is the next to be undone
   StepReport report;
   std::size_t tetrahedralizations = 0;
   std::vector<WorldBody*> awake;  // of this frame, in the order of bodies
@@ -125,10 +143,14 @@ struct World::Impl {
   Result<Reply> apply(const PushCommand& command);
   Result<Reply> apply(const CutCommand& command);
   Result<Reply> apply(const OpenScissorsCommand& command);
+  Result<Reply> apply(const LiftCommand& command);
+  Result<Reply> apply(const UndoCutCommand& command);
   Result<Reply> apply(const InciseCommand& command);
   Result<Reply> apply(const SetMaterialCommand& command);
   Result<Reply> apply(const SpawnCommand& command);
   Result<Reply> apply(const RemoveCommand& command);
+  CutUndo beforeCut() const;
+  void rememberCut(CutUndo before, std::vector<std::string> cut, std::vector<std::string> pieces);
   Status checkCut(const CutCommand& command);
   Result<CutReply> cutNow(const CutCommand& command);
   std::vector<Index> heldBySprings(const WorldBody& body) const;  // particles in the middle of a grasp

@@ -67,6 +67,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
   }
 
   // From here nothing fails.
+  CutUndo before = beforeCut();
   for (Opened& opened : all) {
     WorldBody& body = *find(opened.id);
     const std::string name = body.name;
@@ -85,6 +86,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
       say(EventType::kIncised, name, 0, "opened, and came apart into " + std::to_string(names.size()) + " pieces");
     }
   }
+  rememberCut(std::move(before), reply.cut_bodies, reply.new_bodies);
   reply.duration = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return Reply(reply);
 }

@@ -8,7 +8,7 @@ import rospy
 import rosunit
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
 from meshless_surgery.msg import State
-from meshless_surgery.srv import (Cut, GetBody, Incise, LoadState, Lock, MovePick, Pick, Push, Release, Remove,
+from meshless_surgery.srv import (Cut, GetBody, Incise, LoadState, Lock, MovePick, Pick, Probe, Push, Release, Remove,
                                   SaveState, SetMaterial, Spawn, Step)
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
@@ -16,7 +16,7 @@ from std_srvs.srv import SetBool, Trigger
 TYPES = {
     'pick': Pick, 'move_pick': MovePick, 'lock': Lock, 'release': Release, 'clear_picks': Trigger, 'push': Push,
     'cut': Cut, 'open_scissors': Trigger, 'incise': Incise, 'spawn': Spawn, 'remove': Remove, 'set_material': SetMaterial, 'get_body': GetBody,
-    'pause': SetBool, 'step': Step, 'reset': Trigger, 'save': SaveState, 'load': LoadState,
+    'lift_scissors': Trigger, 'undo_cut': Trigger, 'probe': Probe, 'pause': SetBool, 'step': Step, 'reset': Trigger, 'save': SaveState, 'load': LoadState,
 }
 # A bound for things that should have happened long before; no test measures time.
 LONG = 120.0

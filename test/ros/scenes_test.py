@@ -64,10 +64,18 @@ class ScenesTest(unittest.TestCase):
         for scene in ['default'] + SCENES:
             path = os.path.join(CONFIG, 'rviz', scene + '.rviz')
             with open(path) as file:
-                displays = yaml.safe_load(file)['Visualization Manager']['Displays']
+                config = yaml.safe_load(file)
+            displays = config['Visualization Manager']['Displays']
+            tissue = [d for d in displays if d['Class'] == 'meshless_surgery/Tissue']
+            self.assertEqual([True], [d['Enabled'] for d in tissue], scene)
+            self.assertEqual(['/deformer'], [d['Node'] for d in tissue], scene)
+            tools = [t['Class'] for t in config['Visualization Manager']['Tools']]
+            for tool in ('Pick', 'Push', 'Cut'):
+                self.assertIn('meshless_surgery/' + tool, tools, scene)
+            self.assertIn('meshless_surgery/Control', [p['Class'] for p in config['Panels']], scene)
             shown = {d.get('Marker Topic', d.get('Topic')): d for d in displays}
             self.assertEqual('rviz/MarkerArray', shown['/deformer/markers']['Class'], scene)
-            self.assertTrue(shown['/deformer/markers']['Enabled'], scene)
+            self.assertFalse(shown['/deformer/markers']['Enabled'], scene)  # the tissue would be drawn twice
             self.assertEqual('rviz/PointCloud2', shown['/deformer/points']['Class'], scene)
 
 

@@ -214,6 +214,34 @@ class CutTest(DeformerTestCase):
     def test_open_scissors_without_a_cut_says_so(self):
         self.refused(['no scissors are closing'], 'open_scissors')
 
+    def test_a_cut_is_undone(self):
+        self.refused(['no cut to undo'], 'undo_cut')
+        pick = self.pick_left().pick_id
+        self.good('lock', pick_id=pick)
+        self.good('step', steps=5)
+        before = self.picture()
+        self.good('cut', blades=pose_stamped(-0.2, -1.0, 0.1, ACROSS_X), bodies=['left'])
+        self.assertEqual({'left.1', 'left.2', 'right'}, {b.name for b in self.state().bodies})
+        self.assertIn('left', self.good('undo_cut').message)
+        self.assertEqual(before, self.picture())
+        # And a second cut's pieces do not take the names of the first's.
+        again = self.good('cut', blades=pose_stamped(-0.2, -1.0, 0.1, ACROSS_X), bodies=['left'])
+        self.assertEqual(['left.3', 'left.4'], sorted(again.new_bodies))
+        self.good('reset')
+        self.refused(['no cut to undo'], 'undo_cut')
+
+    def test_a_probe_says_what_a_ray_meets(self):
+        before = self.picture()
+        met = self.good('probe', point=Point(-0.21, 0.01, 3.0), direction=Vector3(0, 0, -2))
+        self.assertEqual('left', met.body)
+        self.assertAlmostEqual(0.15, met.position.z, places=6)
+        self.assertAlmostEqual(1.0, met.normal.z, places=6)
+        self.assertEqual(before, self.picture())
+        self.refused(['no tissue'], 'probe', point=Point(0, 0, 3), direction=Vector3(0, 0, 1))
+        self.refused(['direction', '0'], 'probe', point=Point(0, 0, 3))
+        self.refused(['point.y', 'nan'], 'probe', point=Point(0, NAN, 3), direction=Vector3(0, 0, 1))
+        self.refused(['no_such_frame'], 'probe', header=header('no_such_frame'), direction=Vector3(0, 0, 1))
+
     def test_blades_that_close_slowly_meet_at_once_while_paused(self):
         answer = self.good('cut', blades=pose_stamped(-1.0, 0.0, 0.1), close_time=50.0)
         self.assertIn('paused', answer.message)

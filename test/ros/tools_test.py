@@ -128,7 +128,8 @@ class StreamTest(DeformerTestCase):
         on_tissue = self.state().picks[0].force
         self.assertGreater(on_tissue.x, 0.0)
         forces = self.record('pick/measured_cf', WrenchStamped)
-        felt = forces.wait()
+        # It goes to a step's force while the next step's time passes.
+        felt = forces.wait(lambda m: abs(m.wrench.force.x + on_tissue.x) < 1e-9)
         self.assertEqual('world', felt.header.frame_id)
         self.assertAlmostEqual(-on_tissue.x, felt.wrench.force.x)
         self.assertAlmostEqual(-on_tissue.y, felt.wrench.force.y)
@@ -188,6 +189,17 @@ class StreamTest(DeformerTestCase):
         self.assertEqual(['left.1', 'left.2', 'right'], sorted(b.name for b in state.bodies))
         # And once only.
         self.assertEqual(['left.1', 'left.2', 'right'], sorted(b.name for b in self.state().bodies))
+
+    def test_the_scissors_are_taken_away(self):
+        measured = self.record('scissors/measured_cp', PoseStamped)
+        stream = self.stream('scissors/servo_cp', pose_stamped(0.0, 0.0, 3.0, ACROSS_X))
+        measured.wait()
+        stream.close()
+        self.open.remove(stream)
+        self.good('lift_scissors')
+        lifted = rospy.Time.now()
+        rospy.sleep(1.0)
+        self.assertEqual([], [m for m in measured.messages if m.header.stamp > lifted])
 
     def test_bad_streams_change_nothing(self):
         pick = self.pick_left()

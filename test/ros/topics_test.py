@@ -7,7 +7,7 @@ import sys
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point
-from meshless_surgery.msg import Event
+from meshless_surgery.msg import Event, Surfaces
 from sensor_msgs.msg import PointCloud2, PointField
 from shape_msgs.msg import SolidPrimitive
 from visualization_msgs.msg import Marker, MarkerArray
@@ -116,6 +116,78 @@ class MarkersTest(DeformerTestCase):
         self.markers.wait(lambda array: {0, 1, 2} <= {m.id for m in of(array, 'tools', Marker.DELETE)}, since)
 
 
+class SurfacesTest(DeformerTestCase):
+
+    def surface(self, array, name):
+        return [s for s in array.bodies if s.name == name][0]
+
+    def test_who_comes_late_gets_all_even_while_nothing_moves(self):
+        for _ in range(2):
+            late = self.deformer.recorder('surfaces', Surfaces)
+            first = late.wait()
+            late.close()
+            self.assertEqual(['left', 'right'], sorted(s.name for s in first.bodies))
+            for surface in first.bodies:
+                mesh = self.good('get_body', name=surface.name).surface
+                self.assertEqual(3 * len(mesh.vertices), len(surface.vertices))
+                self.assertEqual([i for t in mesh.triangles for i in t.vertex_indices], list(surface.triangles))
+                self.assertEqual(len(mesh.triangles), len(surface.cut))
+                self.assertEqual({0}, set(surface.cut))
+                self.assertEqual((), tuple(surface.strain))
+                for vertex, x in zip(mesh.vertices, surface.vertices[0::3]):
+                    self.assertAlmostEqual(vertex.x, x, places=6)
+
+    def test_cut_faces_are_told_and_tools(self):
+        recorder = self.deformer.recorder('surfaces', Surfaces)
+        self.addCleanup(recorder.close)
+        pieces = self.good('cut', blades=pose_stamped(-0.2, -1.0, 0.1, ACROSS_X), bodies=['left']).new_bodies
+        self.good('pick', point=Point(0.2, 0.0, 0.15), body='right', max_distance=0.05)
+        self.good('push', enable=True, radius=0.03, pose=pose_stamped(0.0, 0.0, 1.0))
+        seen = recorder.next(lambda m: m.push_shown and len(m.bodies) == 3)
+        self.assertEqual(1, len(seen.picks))
+        self.assertAlmostEqual(0.03, seen.push_radius)
+        self.assertEqual(1.0, seen.push_position.z)
+        self.assertFalse(seen.scissors_shown)
+        for name in pieces:
+            surface = self.surface(seen, name)
+            self.assertEqual({0, 1}, set(surface.cut))
+
+    def test_strain_is_zero_at_rest_and_grows_where_tissue_is_pulled(self):
+        recorder = self.deformer.recorder('strained_surfaces', Surfaces)
+        self.addCleanup(recorder.close)
+        rest = recorder.wait(lambda m: m.bodies)
+        self.assertLess(max(self.surface(rest, 'left').strain), 1e-5)
+        pick = self.pick_left().pick_id
+        self.good('lock', pick_id=pick, at_target=True, target=Point(-0.1, 0.0, 0.1))
+        self.good('step', steps=60)
+        pulled = recorder.next(lambda m: max(self.surface(m, 'left').strain) > 0.02)
+        self.assertEqual(len(self.surface(pulled, 'left').vertices), 3 * len(self.surface(pulled, 'left').strain))
+        self.assertLess(max(self.surface(pulled, 'right').strain), 1e-5)
+
+
+class ClustersTest(DeformerTestCase):
+
+    def test_every_particle_hangs_on_a_centre(self):
+        recorder = self.deformer.recorder('clusters', MarkerArray)
+        self.addCleanup(recorder.close)
+        array = recorder.wait()
+        self.assertEqual(Marker.DELETEALL, array.markers[0].action)
+        for body in self.state().bodies:
+            particles = self.good('get_body', name=body.name).particles
+            at = {struct.unpack_from('fff', particles.data, i * particles.point_step)
+                  for i in range(particles.width * particles.height)}
+            centres = [m for m in of(array, 'centres', Marker.ADD) if len(m.points) == body.clusters]
+            self.assertGreaterEqual(len(centres), 1)
+        members = of(array, 'members', Marker.ADD)
+        self.assertEqual(2, len(members))
+        ends = {struct.unpack('fff', struct.pack('fff', p.x, p.y, p.z)) for m in members for p in m.points[1::2]}
+        self.assertTrue(at <= ends)
+        starts = {(p.x, p.y, p.z) for m in members for p in m.points[0::2]}
+        self.assertEqual({(p.x, p.y, p.z) for m in of(array, 'centres', Marker.ADD) for p in m.points}, starts)
+        for marker in members:
+            self.assertEqual(len(marker.points), len(marker.colors))
+
+
 class PointsTest(DeformerTestCase):
 
     def test_every_particle_with_its_body_and_colour(self):
@@ -182,6 +254,7 @@ class StateTest(DeformerTestCase):
 class EventsTest(DeformerTestCase):
 
     def test_what_happens_is_said_once(self):
+        self.state()  # what was said of the reset before is out by then
         events = self.deformer.recorder('events', Event)
         pick = self.pick_left()
         self.good('lock', pick_id=pick.pick_id)
@@ -260,16 +333,17 @@ class DiagnosticsTest(DeformerTestCase):
         self.good('step', steps=100)
         _, after = self.values()
         self.assertGreater(int(after['steps']), int(before['steps']))
-        for key in ('marker arrays built', 'point clouds built', 'states built'):
+        for key in ('marker arrays built', 'surfaces built', 'clusters built', 'point clouds built', 'states built'):
             self.assertEqual(before[key], after[key], key)
         markers = self.deformer.recorder('markers', MarkerArray)
         markers.wait()
         _, watched = self.values()
         self.assertGreater(int(watched['marker arrays built']), int(after['marker arrays built']))
         self.assertEqual(after['point clouds built'], watched['point clouds built'])
+        self.assertEqual(after['surfaces built'], watched['surfaces built'])
         markers.close()
         self.good('pause', data=True)
 
 
 if __name__ == '__main__':
-    run('topics', MarkersTest, PointsTest, StateTest, EventsTest, DiagnosticsTest)
+    run('topics', MarkersTest, SurfacesTest, ClustersTest, PointsTest, StateTest, EventsTest, DiagnosticsTest)

@@ -7,19 +7,16 @@ import sys
 import unittest
 
 import numpy
-import rospkg
 import rospy
 import rostest
-import yaml
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+from rviz_view import BACKGROUND, configured_view, project, view_rectangle  # noqa: E402
 from virtual_display import VirtualDisplay, stop, wait_until  # noqa: E402
 
 from meshless_surgery.srv import GetBody, Remove  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
-
-BACKGROUND = (34, 38, 44)
 
 
 def call(service, kind, **fields):
@@ -28,32 +25,6 @@ def call(service, kind, **fields):
     reply = rospy.ServiceProxy(name, kind)(**fields)
     assert reply.success, reply.message
     return reply
-
-
-def view_rectangle(picture):
-    """The 3D view: rows and columns that hold its background."""
-    inside = (picture == BACKGROUND).all(axis=2)
-    rows, columns = numpy.where(inside.sum(axis=1) > 50)[0], numpy.where(inside.sum(axis=0) > 50)[0]
-    if len(rows) == 0 or len(columns) == 0:
-        return None
-    return rows[0], rows[-1] + 1, columns[0], columns[-1] + 1
-
-
-def project(points, view, rectangle):
-    """Pixels (row, column) of points seen by rviz's orbit camera, whose angle of view is the vertical one."""
-    top, bottom, left, right = rectangle
-    focus = numpy.array([view['Focal Point'][axis] for axis in 'XYZ'])
-    yaw, pitch, distance = view['Yaw'], view['Pitch'], view['Distance']
-    back = numpy.array([numpy.cos(yaw) * numpy.cos(pitch), numpy.sin(yaw) * numpy.cos(pitch), numpy.sin(pitch)])
-    side = numpy.cross([0, 0, 1], back)
-    side /= numpy.linalg.norm(side)
-    up = numpy.cross(back, side)
-    relative = points - (focus + distance * back)
-    depth = -relative.dot(back)
-    scale = 0.5 * (bottom - top) / numpy.tan(0.5 * view['Field of View'])
-    columns = 0.5 * (left + right) + scale * relative.dot(side) / depth
-    rows = 0.5 * (top + bottom) - scale * relative.dot(up) / depth
-    return numpy.rint(numpy.stack([rows, columns], axis=1)).astype(int)
 
 
 def has_colour(pixels, colour):
@@ -68,9 +39,7 @@ def has_colour(pixels, colour):
 class ShownTest(unittest.TestCase):
     def test_tissue_is_shown_where_it_is(self):
         scene, body = rospy.get_param('~scene'), rospy.get_param('~body')
-        config = os.path.join(rospkg.RosPack().get_path('meshless_surgery'), 'config', 'rviz', scene + '.rviz')
-        with open(config) as file:
-            view = yaml.safe_load(file)['Visualization Manager']['Views']['Current']
+        view = configured_view(scene)
         display = VirtualDisplay()
         self.addCleanup(display.close)
         launch = display.start(['roslaunch', 'meshless_surgery', 'training.launch', 'scene:=' + scene])

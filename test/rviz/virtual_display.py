@@ -1,10 +1,18 @@
 """A display that nobody sees, rviz on it, and pictures of what it shows."""
+import ctypes
 import os
 import signal
 import subprocess
 import time
 
 import numpy
+
+
+class _CursorImage(ctypes.Structure):
+    """XFixesCursorImage, version 2."""
+    _fields_ = [('x', ctypes.c_short), ('y', ctypes.c_short), ('width', ctypes.c_ushort), ('height', ctypes.c_ushort),
+                ('xhot', ctypes.c_ushort), ('yhot', ctypes.c_ushort), ('serial', ctypes.c_ulong),
+                ('pixels', ctypes.POINTER(ctypes.c_ulong)), ('atom', ctypes.c_ulong), ('name', ctypes.c_char_p)]
 
 
 class VirtualDisplay:
@@ -32,12 +40,79 @@ class VirtualDisplay:
         width, height = (int(word) for word in size.split())
         return numpy.frombuffer(pixels, dtype=numpy.uint8).reshape(height, width, 3)
 
+    def xdotool(self, *words):
+        subprocess.run(['xdotool'] + [str(word) for word in words], env=self.environment, check=True)
+
+    def cursor(self):
+        """What the mouse's cursor looks like: its size and pixels. (A screenshot has no cursor.)"""
+        x11, fixes = ctypes.CDLL('libX11.so.6'), ctypes.CDLL('libXfixes.so.3')
+        x11.XOpenDisplay.restype = ctypes.c_void_p
+        fixes.XFixesGetCursorImage.restype = ctypes.POINTER(_CursorImage)
+        connection = ctypes.c_void_p(x11.XOpenDisplay(self.environment['DISPLAY'].encode()))
+        if not connection:
+            raise RuntimeError('the display cannot be opened')
+        major, minor = ctypes.c_int(), ctypes.c_int()
+        fixes.XFixesQueryExtension(connection, ctypes.byref(major), ctypes.byref(minor))
+        image = fixes.XFixesGetCursorImage(connection)
+        shape = image.contents
+        look = shape.width, shape.height, tuple(shape.pixels[i] for i in range(shape.width * shape.height))
+        x11.XFree(image)
+        x11.XCloseDisplay(connection)
+        return look
+
     def save(self, file):
         subprocess.run(['import', '-window', 'root', file], env=self.environment, check=True)
 
     def close(self):
         self.server.terminate()
         self.server.wait()
+
+
+class Mouse:
+    """A hand on the display's mouse and keyboard. Places are (row, column)."""
+
+    STEP = 8  # [px] between two places of a drag: a hand does not jump
+
+    def __init__(self, display):
+        self.display = display
+        self.place = None
+
+    def move(self, place):
+        row, column = int(place[0]), int(place[1])
+        if self.place is None:
+            self.display.xdotool('mousemove', column, row)
+        else:
+            count = max(1, int(max(abs(row - self.place[0]), abs(column - self.place[1])) / self.STEP))
+            for i in range(1, count + 1):
+                self.display.xdotool('mousemove', round(self.place[1] + (column - self.place[1]) * i / count),
+                                     round(self.place[0] + (row - self.place[0]) * i / count))
+                time.sleep(0.02)
+        self.place = (row, column)
+        time.sleep(0.1)
+
+    def down(self, button=1):
+        self.display.xdotool('mousedown', button)
+
+    def up(self, button=1):
+        self.display.xdotool('mouseup', button)
+
+    def click(self, button=1):
+        self.display.xdotool('click', button)
+
+    def wheel(self, notches):
+        """Above 0: away from the viewer."""
+        for _ in range(abs(notches)):
+            self.display.xdotool('click', 4 if notches > 0 else 5)
+            time.sleep(0.05)
+
+    def key(self, name):
+        self.display.xdotool('key', name)
+
+    def key_down(self, name):
+        self.display.xdotool('keydown', name)
+
+    def key_up(self, name):
+        self.display.xdotool('keyup', name)
 
 
 def stop(process):

@@ -19,6 +19,7 @@ geometry_msgs::Pose toPose(const Pose& pose);
 Pose poseOf(const Blades& blades);
 Blades bladesAt(const Pose& pose, double length, double width);
 
+std::vector<meshless_surgery::PickState> toPicks(const WorldSnapshot& snapshot);
 /// Needs a snapshot with measures.
 meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatus& status,
                                 const std_msgs::Header& header);

@@ -24,7 +24,11 @@ class Frames {
   Result<Pose> toWorld(const std_msgs::Header& header);
 
   /// The latest pose, without waiting; nothing where tf2 does not know the frame (yet).
-  std::optional<Pose> latest(const std::string& frame);
+  struct Stamped {
+    Pose pose;
+    ros::Time stamp;  // 0 where nothing of it ever moves
+  };
+  std::optional<Stamped> latest(const std::string& frame);
 
   /// False until another frame was asked for: then no tf topic is subscribed to.
   bool listening() const;

@@ -38,17 +38,14 @@ class Publishers {
     Clock::time_point next{};
     bool due(Clock::time_point now);
   };
-  struct ToolTopics {
-    ros::Publisher pose, force;
-    bool listened() const { return pose.getNumSubscribers() > 0 || force.getNumSubscribers() > 0; }
-  };
 
   void loop();
   void publishEvents();
   void publishTick(Clock::time_point now);
+  void publishSurfaces(const WorldSnapshot& snapshot, const std_msgs::Header& header);
   void publishTools(const WorldSnapshot& snapshot, const ros::Time& stamp);
-  void publishTool(const ToolTopics& topics, const std::string& frame, const Pose& pose, const Vec3& force,
-                   const ros::Time& stamp, std::vector<geometry_msgs::TransformStamped>& transforms);
+  void publishTool(const ros::Publisher& topic, const std::string& frame, const Pose& pose, const ros::Time& stamp,
+                   std::vector<geometry_msgs::TransformStamped>& transforms);
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   NodeSettings settings_;
@@ -57,11 +54,16 @@ class Publishers {
   const Rejections& rejections_;
   MarkerBuilder markers_;
 
+  ros::Publisher clusters_topic_, surfaces_topic_, strained_surfaces_topic_;
   ros::Publisher markers_topic_, points_topic_, state_topic_, events_topic_;
-  ToolTopics pick_topics_, push_topics_, scissors_topics_;
+  ros::Publisher pick_pose_, push_pose_, scissors_pose_;
   tf2_ros::TransformBroadcaster broadcaster_;
   diagnostic_updater::Updater updater_;
 
+  Cadence surfaces_due_, clusters_due_;
+  std::atomic<bool> surfaces_newcomer_{false}, clusters_newcomer_{false};
+  std::uint64_t clusters_revision_ = 0, clusters_built_ = 0;
+  std::uint64_t surfaces_revision_ = 0, surfaces_built_ = 0;
   Cadence markers_due_, points_due_, state_due_, tools_due_, diagnostics_due_;
   std::atomic<bool> markers_newcomer_{false}, points_newcomer_{false};
   std::uint64_t markers_revision_ = 0, points_revision_ = 0;

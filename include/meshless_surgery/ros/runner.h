@@ -50,6 +50,10 @@ class WorldRunner {
 
   /// Called on the runner's thread: must only put the events aside. To be set before start.
   void setEventSink(EventSink sink) { event_sink_ = std::move(sink); }
+  /// Called on the runner's thread after every step, with what it simulated [s], and with 0 after every job that may
+  /// have changed the world: must be quick. To be set before start.
+  using StepSink = std::function<void(const World&, double)>;
+  void setStepSink(StepSink sink) { step_sink_ = std::move(sink); }
   void start();
   /// Ends the thread; whoever waits gets kFailed.
   void stop();
@@ -114,6 +118,7 @@ class WorldRunner {
   RunnerSettings settings_;
   PaceClock clock_;
   EventSink event_sink_;
+  StepSink step_sink_;
 
   // of the runner's thread alone
   std::deque<ClosingCut> closing_;

@@ -19,14 +19,19 @@ struct NodeSettings {
   bool paused = false;                     // start paused
   double max_backlog = 0.1;                // [s] 0..10
   double markers_rate = 30.0;              // [Hz] 0.1..30
+  double surfaces_rate = 60.0;             // [Hz] 0.1..120: ~surfaces and ~strained_surfaces
   double points_rate = 30.0;               // [Hz] 0.1..120
   double state_rate = 30.0;                // [Hz] 0.1..1000
-  double tools_rate = 60.0;                // [Hz] 0.1..1000: ~T/measured_cp, ~T/measured_cf and tf
+  double tools_rate = 60.0;                // [Hz] 0.1..1000: ~T/measured_cp and tf
+  double force_rate = 500.0;               // [Hz] 1..2000: ~T/measured_cf
   ToolSettings pick, push, scissors;
   std::optional<double> pick_max_distance; // tools/pick/max_distance [m]; absent: the scene's
   std::optional<double> pick_stiffness;    // tools/pick/stiffness [N/m]; absent: the scene's
   std::optional<double> push_radius;       // tools/push/radius [m]; absent: the scene's
   double push_max_speed = 1.0;             // tools/push/max_speed [m/s] at which the sphere follows a stream
+  double pick_max_speed = 5.0;             // tools/pick/max_speed [m/s] at which the hand follows a stream
+  double scissors_max_speed = 5.0;         // tools/scissors/max_speed [m/s]
+  double tools_silence = 0.5;              // tools/silence [s] without a message after which a tool is lifted; 0: never
   double scissors_length = 0.06;           // tools/scissors/length [m] of tracked blades
   double scissors_width = 0.06;            // tools/scissors/width [m] of their opening
 };

@@ -1,7 +1,8 @@
-// Streams that move the tools: CRTK topics or tf frames.
+// Streams that move the tools: CRTK topics or tf frames. A tool follows at a bounded speed, and is lifted off when its
+// stream falls silent.
 #pragma once
 
-#include <atomic>
+#include <array>
 #include <mutex>
 
 #include <geometry_msgs/PoseStamped.h>
@@ -12,6 +13,7 @@
 #include "meshless_surgery/ros/rejections.h"
 #include "meshless_surgery/ros/runner.h"
 #include "meshless_surgery/ros/settings.h"
+#include "meshless_surgery/ros/tool_motion.h"
 
 namespace meshless {
 
@@ -28,28 +30,41 @@ class ToolInputs {
   std::optional<Pose> pickCursor() const;
 
  private:
-  void onServo(const std::string& tool, const geometry_msgs::PoseStamped::ConstPtr& message);
+  struct Tool {
+    std::string name;
+    ToolKind kind;
+    std::string follow_frame;
+    ToolMotion motion;
+    ros::Time frame_stamp;  // of the transform that was last followed
+    bool posted = false;    // a move waits in the runner: no second one behind it
+  };
+
+  void onServo(Tool& tool, const geometry_msgs::PoseStamped::ConstPtr& message);
   void onJaw(const sensor_msgs::JointState::ConstPtr& message);
+  void reject(const std::string& input, const Error& error);
   void follow();
-  void move(const std::string& tool, const Pose& pose);
-  void movePick(const Pose& pose);
-  void movePush(const Pose& pose);
-  void moveScissors(const Pose& pose);
+  void watch();
+  void hear(Tool& tool, const Pose& pose, const ros::Time& stamp, const std::string& input);
+  void postMove(Tool& tool);
+  void move(Tool& tool, World& world);
+  void movePick(Tool& tool, World& world);
+  void movePush(Tool& tool, World& world);
+  void moveScissors(Tool& tool, World& world);
+  void lift(Tool& tool);
 
   NodeSettings settings_;
   WorldRunner& runner_;
   Frames& frames_;
   Rejections& rejections_;
 
-  mutable std::mutex mutex_;
-  std::optional<Pose> pick_pose_;
-  std::optional<Pose> scissors_pose_;
+  mutable std::mutex mutex_;  // of all below; the runner's jobs take it too
+  std::array<Tool, 3> tools_;
   double jaw_angle_ = 0.5;    // [rad]
   bool jaw_armed_ = false;
 
   std::vector<ros::Subscriber> subscribers_;
   ros::WallTimer follow_timer_;
-  std::shared_ptr<std::atomic<bool>> follow_posted_;  // a poll waits in the runner: no second one behind it
+  ros::WallTimer watch_timer_;  // runs while a tool is there
 };
 
 }  // namespace meshless

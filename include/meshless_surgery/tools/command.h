@@ -38,6 +38,7 @@ struct PushCommand {
   double radius = 0.0;           // [m] >= 0; 0: the default
   Vec3 position = Vec3::Zero();  // [m] of the centre
   double speed = 0.0;            // [m/s] >= 0; 0: placed there at once
+  bool streamed = false;         // by a stream, whose silence lifts it
 };
 struct CutCommand {
   Blades blades;
@@ -47,6 +48,16 @@ struct CutCommand {
 };
 /// Opens the scissors: cuts whose blades are closing are called off.
 struct OpenScissorsCommand {};
+enum class ToolKind { kPick, kPush, kScissors };
+/// Takes a tool off the tissue: the pick in hand is released, the sphere removed, the scissors hidden (blades that a
+/// service closes go on). An event says why.
+struct LiftCommand {
+  ToolKind tool = ToolKind::kScissors;
+  bool streamed_only = false;  // not what a service has placed or locked
+  std::string why;             // a sentence; empty: the user wished so, no event
+};
+/// Back to the state before the last cut or incision; time goes on.
+struct UndoCutCommand {};
 struct InciseCommand {
   Blade blade;
   std::vector<std::string> bodies;  // empty: all that the blade meets
@@ -63,7 +74,8 @@ struct RemoveCommand {
 };
 
 using Command = std::variant<PickCommand, MovePickCommand, LockCommand, ReleaseCommand, ClearPicksCommand, PushCommand,
-                             CutCommand, OpenScissorsCommand, InciseCommand, SetMaterialCommand, SpawnCommand, RemoveCommand>;
+                             CutCommand, OpenScissorsCommand, InciseCommand, SetMaterialCommand, SpawnCommand, RemoveCommand,
+                             LiftCommand, UndoCutCommand>;
 
 struct PickReply {
   PickId pick = 0;
@@ -97,6 +109,10 @@ struct SpawnReply {
   std::size_t particles = 0, triangles = 0, clusters = 0;
 };
 
-using Reply = std::variant<Done, PickReply, CutReply, CutStarted, InciseReply, SpawnReply>;
+struct UndoCutReply {
+  std::vector<std::string> bodies;  // that were cut, and are whole again
+};
+
+using Reply = std::variant<Done, PickReply, CutReply, CutStarted, InciseReply, SpawnReply, UndoCutReply>;
 
 }  // namespace meshless

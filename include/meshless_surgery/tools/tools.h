@@ -27,6 +27,7 @@ struct PushSphere {
   Vec3 position = Vec3::Zero();      // [m]
   Vec3 target = Vec3::Zero();        // [m]
   double speed = 0.0;                // [m/s] towards target
+  bool streamed = false;             // the last to move it was a stream
   bool touching = false;
   Vec3 force = Vec3::Zero();         // [N] on the sphere, mean over the last step
 };

@@ -62,7 +62,9 @@ enum class EventType {
   kSpawned,
   kRemoved,
   kReset,
-  kFault
+  kFault,
+  kUndone,
+  kLifted
 };
 const char* toString(EventType type);
 
@@ -125,6 +127,13 @@ struct WorldSnapshot {
   StepReport report;
 };
 
+/// What a ray met.
+struct ProbeReply {
+  std::string body;
+  Vec3 position = Vec3::Zero();  // [m]
+  Vec3 normal = Vec3::UnitZ();   // unit, out of the tissue
+};
+
 class World {
  public:
   explicit World(WorldSettings settings);
@@ -159,6 +168,8 @@ class World {
   WorldSnapshot snapshot(const SnapshotWants& wants);
   /// One body, by name; `rest` gives rest positions for surface and particles. Tetrahedra are made where missing.
   Result<BodySnapshot> inspect(const std::string& name, bool rest);
+  /// The first surface that the ray from `origin` meets; kMissed where it meets none. Nothing changes.
+  Result<ProbeReply> probe(const Vec3& origin, const Vec3& direction);
   /// Events since the last call.
   std::vector<Event> takeEvents();
   /// FNV-1a over every position, velocity and tool: equal for equal histories.
@@ -169,6 +180,7 @@ class World {
   void hideScissors();
   /// The pick that a stream moves: the newest one that is not locked; 0 if none.
   PickId pickInHand() const;
+  std::optional<Pick> heldPick() const;  // the same, as it is
   const PushSphere& push() const;
   const Scissors& scissors() const;
 

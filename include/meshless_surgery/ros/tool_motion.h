@@ -1,0 +1,49 @@
+// How a streamed tool goes where its stream says: never back in time, no faster than its bound, and only as long as the
+// stream speaks. Times are of a clock that the caller reads [s].
+#pragma once
+
+#include <optional>
+
+#include "meshless_surgery/tools/command.h"
+
+namespace meshless {
+
+class ToolMotion {
+ public:
+  struct Limits {
+    double speed = 5.0;        // [m/s]
+    double turn_speed = 50.0;  // [rad/s]
+    double silence = 0.5;      // [s]; 0: it may be silent for ever
+  };
+
+  explicit ToolMotion(const Limits& limits) : limits_(limits) {}
+
+  /// What the stream said. `stamp` is its own [s], 0 where it has none. Refused kInvalidArgument where it is older than
+  /// the one before, by up to kRestart: beyond that the stream has begun anew. The first pose after a silence is taken
+  /// at once.
+  Status hear(const Pose& wanted, double stamp, double now);
+  /// Another sign of life of the same tool, such as its jaw's.
+  void keepAlive(double now) { heard_ = now; }
+  /// True once the silence has lasted: the tool is to be lifted. Once only; hear() begins anew.
+  bool fellSilent(double now);
+  bool alive() const { return alive_; }
+  bool arrived() const { return arrived_; }
+  const Pose& wanted() const { return wanted_; }
+  const Pose& pose() const { return pose_; }
+
+  /// Moves pose() towards wanted() for the time since the last call.
+  void advance(double now);
+  /// It is elsewhere: another pick was taken into the hand.
+  void putAt(const Vec3& place);
+
+ private:
+  Limits limits_;
+  Pose wanted_, pose_;
+  double stamp_ = 0.0, heard_ = 0.0, advanced_ = 0.0;
+  bool alive_ = false;
+  bool arrived_ = true;
+};
+
+constexpr double kRestart = 1.0;  // [s] back by more than that: a recording that is played again
+
+}  // namespace meshless

@@ -1,0 +1,75 @@
+#include "meshless_surgery/ros/cluster_markers.h"
+
+#include <cmath>
+
+#include "meshless_surgery/ros/convert.h"
+
+namespace meshless {
+namespace {
+
+using visualization_msgs::Marker;
+
+constexpr double kCentre = 0.3;           // diameter in particle spacings
+constexpr double kLine = 0.04;            // width in particle spacings
+constexpr double kGoldenTurn = 0.618034;  // of the hues: neighbours in the list differ
+
+std_msgs::ColorRGBA hue(Index number) {
+  const double turn = 2.0 * M_PI * std::fmod(kGoldenTurn * static_cast<double>(number), 1.0);
+  std_msgs::ColorRGBA color;
+  color.r = static_cast<float>(0.55 + 0.45 * std::cos(turn));
+  color.g = static_cast<float>(0.55 + 0.45 * std::cos(turn - 2.0 * M_PI / 3.0));
+  color.b = static_cast<float>(0.55 + 0.45 * std::cos(turn + 2.0 * M_PI / 3.0));
+  color.a = 1.0f;
+  return color;
+}
+
+Marker markerOf(const BodySnapshot& body, const std_msgs::Header& header, const std::string& ns, int type) {
+  Marker marker;
+  marker.header = header;
+  marker.ns = ns;
+  marker.id = static_cast<int>(body.number);
+  marker.type = type;
+  marker.pose.orientation.w = 1.0;
+  return marker;
+}
+
+}  // namespace
+
+visualization_msgs::MarkerArray clusterMarkers(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
+  visualization_msgs::MarkerArray array;
+  Marker all;
+  all.header = header;
+  all.action = Marker::DELETEALL;
+  array.markers.push_back(all);
+  for (const BodySnapshot& body : snapshot.bodies) {
+    const ClusterSet& clusters = body.model->clusters;
+    Marker centres = markerOf(body, header, "centres", Marker::SPHERE_LIST);
+    centres.scale.x = centres.scale.y = centres.scale.z = kCentre * body.model->spacing;
+    Marker members = markerOf(body, header, "members", Marker::LINE_LIST);
+    members.scale.x = kLine * body.model->spacing;
+    for (Index c = 0; c < clusters.size(); ++c) {
+      Vec3 centre = Vec3::Zero();
+      double mass = 0.0;
+      for (Index k = clusters.offsets[c]; k < clusters.offsets[c + 1]; ++k) {
+        const double share = clusters.weights[k] * body.model->masses[clusters.members[k]];
+        centre += share * body.particles[clusters.members[k]];
+        mass += share;
+      }
+      centre /= mass;
+      const std_msgs::ColorRGBA color = hue(c);
+      centres.points.push_back(toPoint(centre));
+      centres.colors.push_back(color);
+      for (Index k = clusters.offsets[c]; k < clusters.offsets[c + 1]; ++k) {
+        members.points.push_back(toPoint(centre));
+        members.points.push_back(toPoint(body.particles[clusters.members[k]]));
+        members.colors.insert(members.colors.end(), 2, color);
+      }
+    }
+    if (centres.points.empty()) continue;
+    array.markers.push_back(std::move(centres));
+    array.markers.push_back(std::move(members));
+  }
+  return array;
+}
+
+}  // namespace meshless

@@ -1,0 +1,80 @@
+#include "meshless_surgery/ros/surfaces.h"
+
+#include <cmath>
+
+#include "meshless_surgery/ros/convert.h"
+
+namespace meshless {
+namespace {
+
+std_msgs::ColorRGBA toColor(const Color& color) {
+  std_msgs::ColorRGBA message;
+  message.r = color.r;
+  message.g = color.g;
+  message.b = color.b;
+  message.a = color.a;
+  return message;
+}
+
+meshless_surgery::Surface toSurface(const BodySnapshot& body, bool strain) {
+  const TriangleMesh& mesh = body.model->surface;
+  meshless_surgery::Surface message;
+  message.id = body.number;
+  message.name = body.name;
+  message.color = toColor(body.material.color);
+  message.inside_color = toColor(body.material.inside_color);
+  message.vertices.reserve(3 * body.surface.size());
+  for (const Vec3& v : body.surface)
+    for (int axis = 0; axis < 3; ++axis) message.vertices.push_back(static_cast<float>(v[axis]));
+  message.triangles.reserve(3 * mesh.triangles.size());
+  message.cut.reserve(mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (const Index v : mesh.triangles[t]) message.triangles.push_back(static_cast<std::uint32_t>(v));
+    message.cut.push_back(mesh.patchOf(t) != kOuterPatch ? 1 : 0);
+  }
+  if (strain) message.strain = surfaceStrain(mesh.vertices, body.surface, mesh.triangles);
+  return message;
+}
+
+}  // namespace
+
+std::vector<float> surfaceStrain(const Points& rest, const Points& present, const std::vector<Triangle>& triangles) {
+  std::vector<double> squares(rest.size(), 0.0);
+  std::vector<int> counts(rest.size(), 0);
+  for (const Triangle& corners : triangles)
+    for (int k = 0; k < 3; ++k) {
+      const Index a = corners[k];
+      const Index b = corners[(k + 1) % 3];
+      const double length = (rest[a] - rest[b]).norm();
+      if (!(length > 0.0)) continue;
+      const double stretch = (present[a] - present[b]).norm() / length - 1.0;
+      for (const Index v : {a, b}) {
+        squares[v] += stretch * stretch;
+        ++counts[v];
+      }
+    }
+  std::vector<float> strain(rest.size(), 0.0f);
+  for (std::size_t v = 0; v < rest.size(); ++v)
+    if (counts[v] > 0) strain[v] = static_cast<float>(std::sqrt(squares[v] / counts[v]));
+  return strain;
+}
+
+meshless_surgery::Surfaces toSurfaces(const WorldSnapshot& snapshot, const std_msgs::Header& header, bool strain) {
+  meshless_surgery::Surfaces message;
+  message.header = header;
+  message.run = snapshot.run;
+  message.bodies.reserve(snapshot.bodies.size());
+  for (const BodySnapshot& body : snapshot.bodies) message.bodies.push_back(toSurface(body, strain));
+  message.picks = toPicks(snapshot);
+  message.push_shown = snapshot.push.enabled;
+  message.push_position = toPoint(snapshot.push.position);
+  message.push_radius = snapshot.push.radius;
+  message.push_touching = snapshot.push.touching;
+  message.scissors_shown = snapshot.scissors.shown;
+  message.scissors = toPose(poseOf(snapshot.scissors.blades));
+  message.scissors_length = snapshot.scissors.blades.length;
+  message.scissors_angle = snapshot.scissors.angle;
+  return message;
+}
+
+}  // namespace meshless

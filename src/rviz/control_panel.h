@@ -1,0 +1,82 @@
+// The panel: bodies, time, materials, and undo of the last cut.
+#pragma once
+
+#include <rviz/panel.h>
+
+#ifndef Q_MOC_RUN
+#include <meshless_surgery/State.h>
+
+#include "node_link.h"
+#endif
+
+class QGroupBox;
+class QLabel;
+class QLineEdit;
+class QPushButton;
+class QSlider;
+class QTableWidget;
+class QTimer;
+
+namespace meshless {
+
+class StepPlot;
+
+class ControlPanel : public rviz::Panel {
+  Q_OBJECT
+
+ public:
+  explicit ControlPanel(QWidget* parent = nullptr);
+
+  void load(const rviz::Config& config) override;
+  void save(rviz::Config config) const override;
+
+ protected:
+  // The node's state is listened to only while the panel is seen.
+  void showEvent(QShowEvent* event) override;
+  void hideEvent(QHideEvent* event) override;
+
+ private Q_SLOTS:
+  void changeNode();
+  void refresh();
+  void sendMaterial();
+
+ private:
+  /// A material's number and its slider.
+  struct Knob {
+    QString key;
+    double most = 1.0;
+    bool squared = false;  // finer near zero
+    bool elastic = true;   // whether a material for accuracy uses it
+    QSlider* slider = nullptr;
+    QLabel* value = nullptr;
+    bool changed = false;     // by the user, and not sent yet
+    double since_user = 1e9;  // [s]
+
+    double number() const;
+    void set(double number);
+    void label();
+  };
+
+  void listen();
+  void call(const char* name);
+  void fillBodies();
+  void fillMaterial();
+  void say(const QString& text);
+  QString selected() const;
+
+  NodeLink* link_;
+  ros::Subscriber subscriber_;
+  meshless_surgery::State::ConstPtr state_;
+  bool fresh_ = false;
+  QLineEdit* node_;
+  QPushButton* pause_;
+  QLabel* time_;
+  StepPlot* plot_;
+  QTableWidget* bodies_;
+  QGroupBox* material_;
+  std::vector<Knob> knobs_;
+  QLabel* message_;
+  QTimer* timer_;
+};
+
+}  // namespace meshless

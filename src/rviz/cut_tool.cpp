@@ -1,0 +1,266 @@
+#include "cut_tool.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <OgreSceneManager.h>
+#include <rviz/properties/float_property.h>
+#include <sensor_msgs/JointState.h>
+#include <std_srvs/Trigger.h>
+#include <QKeyEvent>
+#include <pluginlib/class_list_macros.hpp>
+
+#include "ogre_convert.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kOpen = 0.5;         // [rad]
+constexpr double kInFront = 0.03;     // [m] of the pivot before the tissue: half of the node's default blades
+constexpr double kFirstYaw = 0.6;     // [rad] seen along themselves the blades would be two lines
+constexpr double kWheelStep = 0.005;  // [m] a notch
+constexpr double kNotch = 120.0;
+constexpr double kRadiansPerPixel = 0.008;
+constexpr double kRoll = 0.13;         // [rad] a notch
+constexpr double kDepthFactor = 1.15;  // a notch
+constexpr double kShallowest = 0.001;  // [m]
+constexpr double kDeepest = 0.2;       // [m]
+constexpr double kShortest = 0.002;    // [m] of an incision; below it, the mouse only clicked
+constexpr double kMargin = 0.002;      // [m] of the scalpel above the tissue
+constexpr double kAfterStream = 0.15;  // [s] a message of the stream that comes after the lifting brings them back
+constexpr float kLineWidth = 0.0015f;  // [m]
+constexpr float kLineOver = 0.002f;    // [m] above the tissue
+
+Ogre::Quaternion firstTurn() {
+  // In the camera's frame (x right, y up, z back): the blades reach away, open up and down, and are seen from the side.
+  const Ogre::Vector3 reach(-std::sin(kFirstYaw), 0.0f, -std::cos(kFirstYaw));
+  const Ogre::Vector3 open = Ogre::Vector3::UNIT_Y;
+  return Ogre::Quaternion(reach, open, reach.crossProduct(open));
+}
+
+}  // namespace
+
+CutTool::CutTool() : HandTool('x'), angle_(kOpen), reach_(-kInFront), turn_(firstTurn()) {}
+
+void CutTool::onInitialize() {
+  HandTool::onInitialize();
+  close_time_ = new rviz::FloatProperty(
+      "Close time", 0.6f, "Seconds that the left button is held until the blades meet.", getPropertyContainer());
+  close_time_->setMin(0.1f);
+  close_time_->setMax(10.0f);
+}
+
+void CutTool::nodeChanged() {
+  pose_stream_ = link().handle().advertise<geometry_msgs::PoseStamped>(link().nameOf("scissors/servo_cp"), 10);
+  jaw_stream_ = link().handle().advertise<sensor_msgs::JointState>(link().nameOf("scissors/jaw/servo_js"), 10);
+}
+
+void CutTool::onActivate() {
+  act_ = Act::kNone;
+  angle_ = kOpen;
+  reach_ = -kInFront;
+  turn_ = firstTurn();
+  placed_ = false;
+}
+
+void CutTool::onDeactivate() {
+  act_ = Act::kNone;
+  shown_line_.reset();
+  putAway();
+}
+
+void CutTool::putAway() {
+  if (lifted_) return;
+  lifted_ = true;
+  link().call("lift_scissors", std_srvs::Trigger(), {}, kAfterStream);
+}
+
+bool CutTool::onMouse(rviz::ViewportMouseEvent& event) {
+  const double notches = event.wheel_delta / kNotch;
+  if (notches != 0.0) {
+    if (act_ == Act::kDrawing || event.control()) {
+      depth_ = std::clamp(depth_ * std::pow(kDepthFactor, notches), kShallowest, kDeepest);
+    } else if (event.shift()) {
+      turn_ = Ogre::Quaternion(Ogre::Radian(static_cast<float>(kRoll * notches)), Ogre::Vector3::UNIT_Z) * turn_;
+    } else {
+      reach_ += notches * kWheelStep;
+    }
+    follow();
+    return true;
+  }
+  switch (act_) {
+    case Act::kNone:
+      if (event.leftDown() && event.control()) {
+        if (!hover().over) {
+          say("an incision begins on tissue");
+          return true;
+        }
+        act_ = Act::kDrawing;
+        putAway();  // one blade in the hand
+        line_.assign(1, {hover().position, hover().normal});
+      } else if (event.leftDown() && event.shift()) {
+        act_ = Act::kTurning;
+      } else if (event.leftDown()) {
+        act_ = placed_ ? Act::kClosing : Act::kOver;
+      } else if (event.middle() || event.right()) {
+        return false;
+      } else {
+        follow();
+      }
+      return true;
+    case Act::kClosing:
+    case Act::kOver:
+      if (!event.left()) act_ = Act::kNone;
+      return true;
+    case Act::kTurning:
+      turn(event.x - event.last_x, event.y - event.last_y);
+      if (!event.left()) act_ = Act::kNone;
+      return true;
+    case Act::kDrawing:
+      draw();
+      if (!event.left()) finishLine();
+      return true;
+  }
+  return true;
+}
+
+bool CutTool::onKey(int key) {
+  if (key != Qt::Key_Z) return false;
+  link().call("undo_cut", std_srvs::Trigger(),
+              [this](const std_srvs::Trigger::Response& answer) { say(QString::fromStdString(answer.message)); });
+  return true;
+}
+
+void CutTool::turn(int dx, int dy) {
+  const Ogre::Quaternion yaw(Ogre::Radian(static_cast<float>(kRadiansPerPixel * dx)), Ogre::Vector3::UNIT_Y);
+  const Ogre::Quaternion pitch(Ogre::Radian(static_cast<float>(kRadiansPerPixel * dy)), Ogre::Vector3::UNIT_X);
+  turn_ = yaw * pitch * turn_;
+  turn_.normalise();
+  orientation_ = viewOrientation() * turn_;
+}
+
+void CutTool::follow() {
+  if (!seen()) return;
+  if (hover().over) {
+    placed_ = true;
+    plane_point_ = hover().position;
+  }
+  const Ogre::Vector3 view = viewDirection();
+  pivot_ = onPlane(view, plane_point_) + view * reach_;
+  orientation_ = viewOrientation() * turn_;
+}
+
+void CutTool::onUpdate(double dt) {
+  const double speed = kOpen / std::max(0.1f, close_time_->getFloat());
+  angle_ = act_ == Act::kClosing ? std::max(0.0, angle_ - dt * speed) : std::min(kOpen, angle_ + 2.0 * dt * speed);
+  if (act_ == Act::kNone) follow();
+  if (act_ == Act::kDrawing) draw();
+  if (placed_ && act_ != Act::kDrawing) stream();
+}
+
+void CutTool::stream() {
+  lifted_ = false;
+  pose_stream_.publish(poseMessage(pivot_, orientation_));
+  sensor_msgs::JointState jaw;
+  jaw.header.stamp = ros::Time::now();
+  jaw.name = {"jaw"};
+  jaw.position = {angle_};
+  jaw_stream_.publish(jaw);
+}
+
+void CutTool::draw() {
+  if (hover().over && (hover().position - line_.back().position).length() > 0.5 * kShortest)
+    line_.push_back({hover().position, hover().normal});
+  showLine();
+}
+
+void CutTool::showLine() {
+  if (!shown_line_) {
+    shown_line_ = std::make_unique<rviz::BillboardLine>(scene_manager_);
+    shown_line_->setLineWidth(kLineWidth);
+    shown_line_->setColor(0.95f, 0.95f, 0.2f, 1.0f);
+  }
+  const Ogre::Vector3 over = viewDirection() * -kLineOver;
+  shown_line_->clear();
+  shown_line_->setMaxPointsPerLine(static_cast<uint32_t>(line_.size()) + 1);
+  for (const Touch& touch : line_) shown_line_->addPoint(touch.position + over);
+}
+
+void CutTool::finishLine() {
+  act_ = Act::kNone;
+  shown_line_.reset();
+  // Where exactly the tissue ends under the cursor is asked once more: what is known is some frames old.
+  meshless_surgery::Probe question;
+  question.request.header = header();
+  question.request.point = toPoint(ray().getOrigin());
+  question.request.direction = toVector(ray().getDirection());
+  link().call("probe", question, [this](const meshless_surgery::Probe::Response& met) {
+    incise(met.success ? Touch{toFixed(met.position), toFixed(met.normal)} : line_.back());
+  });
+}
+
+void CutTool::incise(const Touch& end) {
+  const Touch& start = line_.front();
+  const Ogre::Vector3 along = end.position - start.position;
+  const double length = along.length();
+  if (!(length > kShortest)) {
+    say("too short for an incision: hold Ctrl and draw along the tissue");
+    return;
+  }
+  const Ogre::Vector3 x = along.normalisedCopy();
+  Ogre::Vector3 up = start.normal + end.normal;
+  for (const Touch& touch : line_) up += touch.normal;
+  up -= x * x.dotProduct(up);
+  if (!(up.length() > 1e-6f)) up = -viewDirection() - x * x.dotProduct(-viewDirection());
+  if (!(up.length() > 1e-6f)) {
+    say("the line goes straight away from the viewer: turn the view");
+    return;
+  }
+  up.normalise();
+  // The blade's back is above all tissue that the line went over.
+  double rise = 0.0;
+  for (const Touch& touch : line_)
+    rise = std::max(rise, static_cast<double>((touch.position - start.position).dotProduct(up)));
+  const double margin = rise + kMargin;
+  meshless_surgery::Incise wish;
+  wish.request.blade = poseMessage(start.position + up * margin, Ogre::Quaternion(x, up, x.crossProduct(up)));
+  wish.request.length = length;
+  wish.request.depth = depth_ + margin;
+  link().call("incise", wish, [this](const meshless_surgery::Incise::Response& answer) {
+    say(QString::fromStdString(answer.message));
+  });
+}
+
+void CutTool::eventCame(const meshless_surgery::Event& event) {
+  if (event.type == "cut" || event.type == "undone") say(QString::fromStdString(event.body + ": " + event.text));
+}
+
+void CutTool::undoDrag() {
+  say(act_ == Act::kDrawing ? "undone: no incision" : "undone: the blades open again");
+  shown_line_.reset();
+  act_ = Act::kOver;
+}
+
+QString CutTool::help() const {
+  const QString depth = QString::number(1e3 * depth_, 'f', 1) + " mm";
+  switch (act_) {
+    case Act::kClosing:
+      return angle_ > 0.0
+                 ? "<b>Keep holding:</b> the blades close.  <b>Release left</b> or <b>Esc:</b> they open again."
+                 : "<b>The blades have met.</b>  <b>Release left:</b> they open again.";
+    case Act::kTurning:
+      return "<b>Move:</b> turns the blades.  <b>Release left:</b> done.";
+    case Act::kDrawing:
+      return "<b>Move:</b> the incision ends here, " + depth +
+             " deep.  <b>Wheel:</b> deeper, shallower.  <b>Release left:</b> open it.  <b>Esc:</b> undo.";
+    default:
+      return "<b>Hold left:</b> close the blades.  <b>Wheel:</b> away, towards.  <b>Shift+drag, shift+wheel:</b> turn. "
+             " "
+             "<b>Ctrl+drag:</b> incision, " +
+             depth + " (Ctrl+wheel).  <b>Z:</b> undo cut.  <b>R:</b> clear springs.";
+  }
+}
+
+}  // namespace meshless
+
+PLUGINLIB_EXPORT_CLASS(meshless::CutTool, rviz::Tool)

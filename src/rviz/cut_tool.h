@@ -1,0 +1,81 @@
+// Scissors under the cursor, and with Ctrl a scalpel.
+#pragma once
+
+#include "hand_tool.h"
+
+#ifndef Q_MOC_RUN
+#include <memory>
+#include <vector>
+
+#include <meshless_surgery/Incise.h>
+#include <meshless_surgery/Probe.h>
+#include <rviz/ogre_helpers/billboard_line.h>
+#endif
+
+namespace rviz {
+class FloatProperty;
+}
+
+namespace meshless {
+
+class CutTool : public HandTool {
+  Q_OBJECT
+
+ public:
+  CutTool();
+
+  void onInitialize() override;
+
+ protected:
+  bool onMouse(rviz::ViewportMouseEvent& event) override;
+  bool onKey(int key) override;
+  void onActivate() override;
+  void onDeactivate() override;
+  void onUpdate(double dt) override;
+  bool dragging() const override { return act_ == Act::kClosing || act_ == Act::kTurning || act_ == Act::kDrawing; }
+  bool looksForTissue() const override { return act_ == Act::kNone || act_ == Act::kDrawing; }
+  void undoDrag() override;
+  QString help() const override;
+  void nodeChanged() override;
+  void eventCame(const meshless_surgery::Event& event) override;
+
+ private:
+  enum class Act {
+    kNone,
+    kClosing,  // the left button holds the blades closing, or closed
+    kTurning,  // shift and left
+    kDrawing,  // control and left: an incision
+    kOver      // undone, the button still down
+  };
+  /// Where the tissue was met along the scalpel's line.
+  struct Touch {
+    Ogre::Vector3 position = Ogre::Vector3::ZERO;
+    Ogre::Vector3 normal = Ogre::Vector3::UNIT_Z;
+  };
+
+  void follow();
+  void stream();
+  void putAway();
+  void turn(int dx, int dy);
+  void draw();
+  void showLine();
+  void finishLine();
+  void incise(const Touch& end);
+
+  Act act_ = Act::kNone;
+  double angle_;           // [rad] between the blades
+  bool lifted_ = true;     // the node has no scissors of ours
+  bool placed_ = false;    // the cursor has been over tissue
+  double reach_;           // [m] that the wheel has moved the blades away, from the pivot on the tissue
+  double depth_ = 0.015;   // [m] of an incision
+  Ogre::Quaternion turn_;  // of the blades, in the camera's frame
+  Ogre::Vector3 plane_point_ = Ogre::Vector3::ZERO;
+  Ogre::Vector3 pivot_ = Ogre::Vector3::ZERO;
+  Ogre::Quaternion orientation_;
+  std::vector<Touch> line_;
+  rviz::FloatProperty* close_time_ = nullptr;
+  ros::Publisher pose_stream_, jaw_stream_;
+  std::unique_ptr<rviz::BillboardLine> shown_line_;
+};
+
+}  // namespace meshless

@@ -1,0 +1,116 @@
+// What the three tools share: the ray under the cursor, what tissue it meets, planes that face the camera, keys, the
+// status line. Positions are in rviz's fixed frame.
+#pragma once
+
+#include <meshless_surgery/Event.h>
+#include <meshless_surgery/State.h>
+#include <rviz/tool.h>
+#include <QPointer>
+
+#ifndef Q_MOC_RUN
+#include <OgrePlane.h>
+#include <OgreRay.h>
+#include <geometry_msgs/PoseStamped.h>
+#include <rviz/render_panel.h>
+#include <rviz/viewport_mouse_event.h>
+
+#include "node_link.h"
+#endif
+
+namespace rviz {
+class StringProperty;
+}
+
+namespace meshless {
+
+class HandTool : public rviz::Tool {
+  Q_OBJECT
+
+ public:
+  explicit HandTool(char shortcut_key);
+  ~HandTool() override;
+
+  void onInitialize() override;
+  void activate() override;
+  void deactivate() override;
+  void update(float wall_dt, float ros_dt) override;
+  int processMouseEvent(rviz::ViewportMouseEvent& event) override;
+  int processKeyEvent(QKeyEvent* event, rviz::RenderPanel* panel) override;
+  /// Escape undoes the present drag; without a drag rviz has it.
+  bool eventFilter(QObject* object, QEvent* event) override;
+
+ protected:
+  struct Hover {
+    bool over = false;  // tissue
+    QString body;
+    Ogre::Vector3 position = Ogre::Vector3::ZERO;
+    Ogre::Vector3 normal = Ogre::Vector3::UNIT_Z;
+  };
+
+  // --- of each tool
+  /// False: the camera has the event.
+  virtual bool onMouse(rviz::ViewportMouseEvent& event) = 0;
+  virtual bool onKey(int key);
+  virtual void onActivate() {}
+  virtual void onDeactivate() {}
+  virtual void onUpdate(double dt) { (void)dt; }
+  virtual bool dragging() const = 0;
+  virtual void undoDrag() = 0;
+  /// Whether it matters now what tissue is under the cursor.
+  virtual bool looksForTissue() const { return !dragging(); }
+  /// What the buttons do now.
+  virtual QString help() const = 0;
+  virtual void nodeChanged() {}
+  virtual void stateCame(const meshless_surgery::State& state) { (void)state; }
+  virtual void eventCame(const meshless_surgery::Event& event) { (void)event; }
+
+  // --- for each tool
+  NodeLink& link() { return *link_; }
+  const Ogre::Ray& ray() const { return ray_; }
+  const Hover& hover() const { return hover_; }
+  bool seen() const { return seen_; }
+  bool isActive() const { return active_; }
+  /// Where the camera looks, and which way it is turned.
+  Ogre::Vector3 viewDirection() const;
+  Ogre::Quaternion viewOrientation() const;
+  /// The cursor's ray and the plane through `point` that faces along `normal`; `point` where they do not meet.
+  Ogre::Vector3 onPlane(const Ogre::Vector3& normal, const Ogre::Vector3& point) const;
+  /// Distance on the screen between the cursor and a point; infinite where it is behind the camera.
+  double pixelsTo(const Ogre::Vector3& point) const;
+  geometry_msgs::PoseStamped poseMessage(const Ogre::Vector3& position,
+                                         const Ogre::Quaternion& orientation = Ogre::Quaternion::IDENTITY) const;
+  std_msgs::Header header() const;
+  /// From the node's world frame.
+  Ogre::Vector3 toFixed(const geometry_msgs::Point& point) const;
+  Ogre::Vector3 toFixed(const geometry_msgs::Vector3& direction) const;
+  /// Shown in the status line for some seconds, before the help.
+  void say(const QString& note);
+  void showStatus();
+  void clearSprings();
+
+ private Q_SLOTS:
+  void updateNode();
+
+ private:
+  void probe();
+  void showCursor();
+
+  NodeLink* link_ = nullptr;
+  rviz::StringProperty* node_property_ = nullptr;
+  QPointer<rviz::RenderPanel> panel_;
+  ros::Subscriber state_, events_;
+  std::string world_frame_;  // of the node; empty until it is known
+  Ogre::Ray ray_;
+  Ogre::Viewport* viewport_ = nullptr;
+  int x_ = 0, y_ = 0;  // of the cursor [px]
+  bool active_ = false;
+  bool seen_ = false;         // the cursor is in the view, so that there is a ray
+  bool probing_ = false;      // one question at a time
+  double since_probe_ = 1.0;  // [s]
+  bool moved_ = false;
+  Hover hover_;
+  QString note_;
+  double note_left_ = 0.0;  // [s]
+};
+
+}  // namespace meshless

@@ -1,0 +1,123 @@
+#include "tissue_display.h"
+
+#include <set>
+
+#include <OgreSceneNode.h>
+#include <rviz/display_context.h>
+#include <rviz/frame_manager.h>
+#include <rviz/properties/bool_property.h>
+#include <rviz/properties/enum_property.h>
+#include <rviz/properties/float_property.h>
+#include <rviz/properties/string_property.h>
+#include <pluginlib/class_list_macros.hpp>
+
+namespace meshless {
+namespace {
+
+enum Colouring { kByMaterial, kByStrain };
+
+}  // namespace
+
+TissueDisplay::TissueDisplay() {
+  node_ = new rviz::StringProperty("Node", "/deformer", "The deformer node that is shown.", this, SLOT(listen()));
+  colour_ = new rviz::EnumProperty("Colour by", "Material", "Strain: blue is undeformed, red the full strain.", this,
+                                   SLOT(listen()));
+  colour_->addOption("Material", kByMaterial);
+  colour_->addOption("Strain", kByStrain);
+  full_strain_ = new rviz::FloatProperty("Full strain", 0.3f, "Change of length, as a share, that is shown red.",
+                                         colour_, SLOT(changeLook()), this);
+  full_strain_->setMin(0.001f);
+  opacity_ = new rviz::FloatProperty("Opacity", 1.0f, "Of the bodies.", this, SLOT(changeLook()));
+  opacity_->setMin(0.05f);
+  opacity_->setMax(1.0f);
+  wire_ = new rviz::BoolProperty("Wireframe", false, "The edges of the triangles alone.", this, SLOT(changeLook()));
+  tools_shown_ = new rviz::BoolProperty("Tools", true, "Springs, push sphere and scissors.", this, SLOT(changeLook()));
+  full_force_ = new rviz::FloatProperty("Full force", 20.0f, "Force [N] of a spring that is shown red.", tools_shown_,
+                                        SLOT(changeLook()), this);
+  full_force_->setMin(0.001f);
+}
+
+TissueDisplay::~TissueDisplay() = default;
+
+void TissueDisplay::onInitialize() { tools_ = std::make_unique<ToolsShape>(scene_manager_, scene_node_); }
+
+void TissueDisplay::onEnable() { listen(); }
+
+void TissueDisplay::onDisable() {
+  subscriber_.shutdown();
+  bodies_.clear();
+}
+
+void TissueDisplay::reset() {
+  Display::reset();
+  bodies_.clear();
+  surfaces_.reset();
+}
+
+void TissueDisplay::listen() {
+  if (!isEnabled() || !initialized()) return;
+  std::string error;
+  std::string node = node_->getStdString();
+  if (node.empty() || !ros::names::validate(node, error)) node = "/deformer";
+  // A remapping of the node's name alone moves the display, as it does the tools.
+  const std::string topic =
+      ros::names::resolve(node) + (colour_->getOptionInt() == kByStrain ? "/strained_surfaces" : "/surfaces");
+  setStatus(rviz::StatusProperty::Warn, "Topic", "no message from " + QString::fromStdString(topic) + " yet");
+  subscriber_ = update_nh_.subscribe<meshless_surgery::Surfaces>(
+      topic, 1, [this](const meshless_surgery::Surfaces::ConstPtr& surfaces) {
+        if (!surfaces_ || surfaces_->run != surfaces->run) bodies_.clear();
+        surfaces_ = surfaces;
+        fresh_ = true;
+      });
+}
+
+void TissueDisplay::changeLook() { fresh_ = surfaces_ != nullptr; }
+
+void TissueDisplay::update(float, float) {
+  if (!surfaces_) return;
+  Ogre::Vector3 position;
+  Ogre::Quaternion orientation;
+  if (!context_->getFrameManager()->getTransform(surfaces_->header.frame_id, ros::Time(), position, orientation)) {
+    setStatus(rviz::StatusProperty::Error, "Transform",
+              "no transform from " + QString::fromStdString(surfaces_->header.frame_id) + " to " + fixed_frame_);
+    return;
+  }
+  deleteStatus("Transform");
+  scene_node_->setPosition(position);
+  scene_node_->setOrientation(orientation);
+  // Once a frame, however fast messages come.
+  if (fresh_) draw();
+}
+
+void TissueDisplay::draw() {
+  fresh_ = false;
+  BodyLook look;
+  look.by_strain = colour_->getOptionInt() == kByStrain;
+  look.full_strain = full_strain_->getFloat();
+  look.opacity = opacity_->getFloat();
+  look.wire = wire_->getBool();
+  std::set<std::uint32_t> seen;
+  std::size_t triangles = 0;
+  for (const auto& surface : surfaces_->bodies) {
+    seen.insert(surface.id);
+    triangles += surface.cut.size();
+    auto& shape = bodies_[surface.id];
+    if (!shape) shape = std::make_unique<BodyShape>(scene_manager_, scene_node_);
+    shape->show(surface, look);
+  }
+  for (auto it = bodies_.begin(); it != bodies_.end();)
+    it = seen.count(it->first) > 0 ? std::next(it) : bodies_.erase(it);
+  if (tools_shown_->getBool()) {
+    if (!tools_) tools_ = std::make_unique<ToolsShape>(scene_manager_, scene_node_);
+    tools_->show(*surfaces_, full_force_->getFloat());
+  } else {
+    tools_.reset();
+  }
+  setStatus(rviz::StatusProperty::Ok, "Topic",
+            QString("%1 bodies, %2 triangles").arg(surfaces_->bodies.size()).arg(triangles));
+  context_->queueRender();
+}
+
+}  // namespace meshless
+
+PLUGINLIB_EXPORT_CLASS(meshless::TissueDisplay, rviz::Display)

@@ -1,0 +1,62 @@
+// Shows a node's world: smooth bodies with cut faces in their inside colour, springs by force, sphere and scissors.
+#pragma once
+
+#include <rviz/display.h>
+
+#ifndef Q_MOC_RUN
+#include <map>
+#include <memory>
+
+#include <meshless_surgery/Surfaces.h>
+#include <ros/ros.h>
+
+#include "body_shape.h"
+#include "tools_shape.h"
+#endif
+
+namespace rviz {
+class BoolProperty;
+class EnumProperty;
+class FloatProperty;
+class StringProperty;
+}  // namespace rviz
+
+namespace meshless {
+
+class TissueDisplay : public rviz::Display {
+  Q_OBJECT
+
+ public:
+  TissueDisplay();
+  ~TissueDisplay() override;
+
+  void onInitialize() override;
+  void update(float wall_dt, float ros_dt) override;
+  void reset() override;
+
+ protected:
+  void onEnable() override;
+  void onDisable() override;
+
+ private Q_SLOTS:
+  void listen();
+  void changeLook();
+
+ private:
+  void draw();
+
+  rviz::StringProperty* node_;
+  rviz::EnumProperty* colour_;
+  rviz::FloatProperty* full_strain_;
+  rviz::FloatProperty* opacity_;
+  rviz::BoolProperty* wire_;
+  rviz::BoolProperty* tools_shown_;
+  rviz::FloatProperty* full_force_;
+  ros::Subscriber subscriber_;
+  meshless_surgery::Surfaces::ConstPtr surfaces_;
+  bool fresh_ = false;
+  std::map<std::uint32_t, std::unique_ptr<BodyShape>> bodies_;
+  std::unique_ptr<ToolsShape> tools_;
+};
+
+}  // namespace meshless

@@ -1,0 +1,127 @@
+#include "tools_shape.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <OgreManualObject.h>
+#include <OgreMaterialManager.h>
+#include <OgreResourceGroupManager.h>
+#include <OgreSceneManager.h>
+#include <OgreSceneNode.h>
+#include <OgreTechnique.h>
+
+#include "body_shape.h"
+#include "ogre_convert.h"
+
+namespace meshless {
+namespace {
+
+constexpr float kSpringWidth = 0.0015f;  // [m]
+constexpr float kSpringEnd = 0.007f;     // [m] diameter
+constexpr double kShownReach = 0.1;      // [m] of blades without an end
+constexpr double kBladeWidth = 0.12;     // of the blade's length
+constexpr double kThinnest = 0.001;      // [m] of a sphere
+
+/// One blade from the pivot, its straight edge where it cuts.
+void addBlade(Ogre::ManualObject* object, double angle, double side, double length, const Ogre::ColourValue& colour) {
+  const Ogre::Quaternion turn(Ogre::Radian(static_cast<float>(angle)), Ogre::Vector3::UNIT_Z);
+  const auto l = static_cast<float>(length);
+  const auto w = static_cast<float>(side * kBladeWidth * length);
+  const Ogre::Vector3 corners[] = {Ogre::Vector3::ZERO, turn * Ogre::Vector3(l, 0, 0),
+                                   turn * Ogre::Vector3(0.25f * l, w, 0),
+                                   turn * Ogre::Vector3(-0.15f * l, 0.5f * w, 0)};
+  const float lights[] = {1.0f, 1.15f, 0.75f, 0.6f};  // the edge shines
+  const auto first = static_cast<Ogre::uint32>(object->getCurrentVertexCount());
+  for (int k = 0; k < 4; ++k) {
+    object->position(corners[k]);
+    object->colour(colour * lights[k]);
+  }
+  object->triangle(first, first + 1, first + 2);
+  object->triangle(first, first + 2, first + 3);
+}
+
+}  // namespace
+
+ToolsShape::ToolsShape(Ogre::SceneManager* scene_manager, Ogre::SceneNode* parent)
+    : scene_manager_(scene_manager), node_(parent->createChildSceneNode()) {
+  static int count = 0;
+  const std::string name = "meshless_scissors_" + std::to_string(count++);
+  springs_ = std::make_unique<rviz::BillboardLine>(scene_manager_, node_);
+  springs_->setLineWidth(kSpringWidth);
+  push_ = std::make_unique<rviz::Shape>(rviz::Shape::Sphere, scene_manager_, node_);
+  push_->getRootNode()->setVisible(false);
+  scissors_material_ =
+      Ogre::MaterialManager::getSingleton().create(name, Ogre::ResourceGroupManager::DEFAULT_RESOURCE_GROUP_NAME);
+  Ogre::Pass* pass = scissors_material_->getTechnique(0)->getPass(0);
+  pass->setLightingEnabled(false);  // thin blades are seen from both sides alike
+  pass->setCullingMode(Ogre::CULL_NONE);
+  scissors_ = scene_manager_->createManualObject(name);
+  scissors_->setDynamic(true);
+  node_->createChildSceneNode()->attachObject(scissors_);
+}
+
+ToolsShape::~ToolsShape() {
+  Ogre::SceneNode* scissors_node = scissors_->getParentSceneNode();
+  scene_manager_->destroyManualObject(scissors_);
+  scene_manager_->destroySceneNode(scissors_node);
+  Ogre::MaterialManager::getSingleton().remove(scissors_material_);
+  springs_.reset();
+  ends_.clear();
+  push_.reset();
+  scene_manager_->destroySceneNode(node_);
+}
+
+void ToolsShape::show(const meshless_surgery::Surfaces& surfaces, double full_force) {
+  showSprings(surfaces.picks, full_force);
+  push_->getRootNode()->setVisible(surfaces.push_shown);
+  if (surfaces.push_shown) {
+    push_->setPosition(toOgre(surfaces.push_position));
+    push_->setScale(Ogre::Vector3(static_cast<float>(2.0 * std::max(surfaces.push_radius, kThinnest))));
+    surfaces.push_touching ? push_->setColor(0.95f, 0.75f, 0.3f, 0.85f) : push_->setColor(0.7f, 0.75f, 0.8f, 0.85f);
+  }
+  showScissors(surfaces);
+}
+
+void ToolsShape::showSprings(const std::vector<meshless_surgery::PickState>& picks, double full_force) {
+  springs_->clear();
+  springs_->setNumLines(std::max<std::uint32_t>(1, static_cast<std::uint32_t>(picks.size())));
+  springs_->setMaxPointsPerLine(2);
+  while (ends_.size() < picks.size())
+    ends_.push_back(std::make_unique<rviz::Shape>(rviz::Shape::Sphere, scene_manager_, node_));
+  ends_.resize(picks.size());
+  for (std::size_t i = 0; i < picks.size(); ++i) {
+    const auto& pick = picks[i];
+    if (i > 0) springs_->newLine();
+    const double force =
+        std::sqrt(pick.force.x * pick.force.x + pick.force.y * pick.force.y + pick.force.z * pick.force.z);
+    const Ogre::ColourValue colour = heatColour(0.5 + 0.5 * std::min(1.0, force / full_force));
+    springs_->addPoint(toOgre(pick.position), colour);
+    springs_->addPoint(toOgre(pick.target), colour);
+    ends_[i]->setPosition(toOgre(pick.target));
+    ends_[i]->setScale(Ogre::Vector3(kSpringEnd));
+    pick.locked ? ends_[i]->setColor(1.0f, 0.8f, 0.1f, 1.0f) : ends_[i]->setColor(0.2f, 0.9f, 0.3f, 1.0f);
+  }
+}
+
+void ToolsShape::showScissors(const meshless_surgery::Surfaces& surfaces) {
+  Ogre::SceneNode* node = scissors_->getParentSceneNode();
+  node->setVisible(surfaces.scissors_shown);
+  if (!surfaces.scissors_shown) return;
+  node->setPosition(toOgre(surfaces.scissors.position));
+  node->setOrientation(toOgre(surfaces.scissors.orientation));
+  const double length = surfaces.scissors_length > 0.0 ? surfaces.scissors_length : kShownReach;
+  const double half = 0.5 * std::max(0.0, surfaces.scissors_angle);
+  if (!begun_) {
+    begun_ = true;
+    scissors_->begin(scissors_material_->getName(), Ogre::RenderOperation::OT_TRIANGLE_LIST,
+                     Ogre::ResourceGroupManager::DEFAULT_RESOURCE_GROUP_NAME);
+  } else {
+    scissors_->beginUpdate(0);
+  }
+  addBlade(scissors_, half, 1.0, length, Ogre::ColourValue(0.75f, 0.78f, 0.82f));
+  addBlade(scissors_, -half, -1.0, length, Ogre::ColourValue(0.62f, 0.66f, 0.72f));
+  scissors_->end();
+}
+
+}  // namespace meshless

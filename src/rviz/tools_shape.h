@@ -1,0 +1,41 @@
+// Springs, the push sphere and the scissors.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <meshless_surgery/Surfaces.h>
+#include <rviz/ogre_helpers/billboard_line.h>
+#include <rviz/ogre_helpers/shape.h>
+
+namespace Ogre {
+class ManualObject;
+}
+
+namespace meshless {
+
+class ToolsShape {
+ public:
+  ToolsShape(Ogre::SceneManager* scene_manager, Ogre::SceneNode* parent);
+  ~ToolsShape();
+  ToolsShape(const ToolsShape&) = delete;
+  ToolsShape& operator=(const ToolsShape&) = delete;
+
+  /// Springs are green without a force, red from `full_force` [N] on.
+  void show(const meshless_surgery::Surfaces& surfaces, double full_force);
+
+ private:
+  void showSprings(const std::vector<meshless_surgery::PickState>& picks, double full_force);
+  void showScissors(const meshless_surgery::Surfaces& surfaces);
+
+  Ogre::SceneManager* scene_manager_;
+  Ogre::SceneNode* node_;
+  std::unique_ptr<rviz::BillboardLine> springs_;
+  std::vector<std::unique_ptr<rviz::Shape>> ends_;
+  std::unique_ptr<rviz::Shape> push_;
+  Ogre::ManualObject* scissors_;
+  Ogre::MaterialPtr scissors_material_;
+  bool begun_ = false;  // the scissors have their section
+};
+
+}  // namespace meshless

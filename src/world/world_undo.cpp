@@ -1,0 +1,84 @@
+// The state before a cut, kept so that it can be taken back.
+#include <algorithm>
+
+#include "world_impl.h"
+
+namespace meshless {
+namespace {
+
+constexpr std::size_t kMostUndone = 8;  // cuts that are remembered
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+}  // namespace
+
+CutUndo World::Impl::beforeCut() const {
+  CutUndo before;
+  for (const auto& body : bodies)
+    before.bodies.push_back(
+        {body->name, body->number, body->material, body->model, body->state, body->surface_current});
+  before.picks = picks;
+  for (const Pick& pick : picks) {
+    const auto held =
+        std::find_if(bodies.begin(), bodies.end(), [&](const auto& body) { return body->id == pick.body; });
+    before.pick_bodies.push_back(held != bodies.end() ? (*held)->name : std::string());
+  }
+  return before;
+}
+
+void World::Impl::rememberCut(CutUndo before, std::vector<std::string> cut, std::vector<std::string> pieces) {
+  before.cut = std::move(cut);
+  before.pieces = std::move(pieces);
+  undo.push_back(std::move(before));
+  if (undo.size() > kMostUndone) undo.erase(undo.begin());
+}
+
+Result<Reply> World::Impl::apply(const UndoCutCommand&) {
+  if (undo.empty())
+    return Error{ErrorCode::kMissed, "there is no cut to undo; " + std::to_string(kMostUndone) +
+                                         " are remembered, of the time since the start or the last reset"};
+  CutUndo before = std::move(undo.back());
+  undo.pop_back();
+
+  // What the cut made, and what it opened without parting it, goes.
+  std::vector<BodyId> gone;
+  for (const auto& body : bodies)
+    if (contains(before.pieces, body->name) || contains(before.cut, body->name)) gone.push_back(body->id);
+  for (const BodyId& id : gone) retire(id);
+
+  std::size_t place = 0;  // in the order of bodies
+  for (CutUndo::Body& was : before.bodies) {
+    if (contains(before.cut, was.name)) {
+      WorldBody& body = admit(was.name, std::move(was.material), std::move(was.model), std::move(was.state));
+      body.number = was.number;  // the same body as before, not a new one
+      body.surface_current = was.surface_current;
+      std::rotate(bodies.begin() + static_cast<std::ptrdiff_t>(place), bodies.end() - 1, bodies.end());
+      ++place;
+    } else if (WorldBody* body = find(was.name)) {  // removed since: stays so
+      // The others too are where they were: tissue that has moved into the gap would be inside of what comes back.
+      if (body->state.positions.size() == was.state.positions.size()) {
+        body->state = std::move(was.state);
+        body->surface_current = was.surface_current;
+        body->low_current = false;
+        wake(*body);
+      }
+      ++place;
+    }
+  }
+
+  contacts.clear();  // what pressed then is not what presses now
+
+  picks.clear();
+  for (std::size_t i = 0; i < before.picks.size(); ++i) {
+    const WorldBody* body = find(before.pick_bodies[i]);
+    if (!body) continue;
+    picks.push_back(before.picks[i]);
+    picks.back().body = body->id;
+  }
+  for (const std::string& name : before.cut) say(EventType::kUndone, name, 0, "as before the cut");
+  return Reply(UndoCutReply{before.cut});
+}
+
+}  // namespace meshless

@@ -1,0 +1,95 @@
+#include "meshless_surgery/ros/tool_motion.h"
+
+#include <gtest/gtest.h>
+
+namespace meshless {
+namespace {
+
+Pose at(double x, double angle = 0.0) {
+  Pose pose;
+  pose.translation = Vec3(x, 0, 0);
+  pose.rotation = Quat(Eigen::AngleAxisd(angle, Vec3::UnitZ()));
+  return pose;
+}
+
+TEST(ToolMotion, AppearsWhereTheStreamIs) {
+  ToolMotion motion({1.0, 10.0, 0.5});
+  EXPECT_FALSE(motion.alive());
+  EXPECT_TRUE(motion.hear(at(3.0), 0.0, 100.0).ok());
+  EXPECT_TRUE(motion.alive());
+  EXPECT_TRUE(motion.arrived());
+  EXPECT_EQ(motion.pose().translation.x(), 3.0);
+}
+
+TEST(ToolMotion, AJumpIsTakenAtTheBoundedSpeed) {
+  ToolMotion motion({2.0, 100.0, 0.5});
+  ASSERT_TRUE(motion.hear(at(0.0), 0.0, 0.0).ok());
+  ASSERT_TRUE(motion.hear(at(0.1, 1.0), 0.0, 0.005).ok());
+  double time = 0.005;
+  double before = 0.0;
+  motion.advance(time);
+  EXPECT_NEAR(motion.pose().translation.x(), 0.01, 1e-12);
+  while (!motion.arrived()) {
+    before = motion.pose().translation.x();
+    time += 0.005;
+    motion.advance(time);
+    EXPECT_LE(motion.pose().translation.x() - before, 0.01 + 1e-12);
+    ASSERT_LT(time, 1.0);
+  }
+  EXPECT_NEAR(time, 0.05, 0.006);
+  EXPECT_EQ(motion.pose().translation.x(), 0.1);
+  EXPECT_EQ(motion.pose().rotation.coeffs(), at(0.1, 1.0).rotation.coeffs());
+}
+
+TEST(ToolMotion, TurnsAreBoundedToo) {
+  ToolMotion motion({100.0, 10.0, 0.5});
+  ASSERT_TRUE(motion.hear(at(0.0), 0.0, 0.0).ok());
+  ASSERT_TRUE(motion.hear(at(0.0, 1.0), 0.0, 0.0).ok());
+  motion.advance(0.02);
+  EXPECT_NEAR(motion.pose().rotation.angularDistance(at(0.0).rotation), 0.2, 1e-9);
+}
+
+TEST(ToolMotion, WhoComesLateDoesNotJump) {
+  ToolMotion motion({1.0, 10.0, 0.0});
+  ASSERT_TRUE(motion.hear(at(0.0), 0.0, 0.0).ok());
+  ASSERT_TRUE(motion.hear(at(9.0), 0.0, 3.0).ok());
+  motion.advance(3.0);
+  EXPECT_NEAR(motion.pose().translation.x(), 0.05, 1e-12);
+}
+
+TEST(ToolMotion, OldMessagesAreRefusedUntilTheStreamBeginsAnew) {
+  ToolMotion motion({1.0, 10.0, 0.5});
+  ASSERT_TRUE(motion.hear(at(0.0), 50.00, 0.0).ok());
+  ASSERT_TRUE(motion.hear(at(0.1), 50.01, 0.01).ok());
+  const Status late = motion.hear(at(0.0), 50.00, 0.02);
+  ASSERT_FALSE(late.ok());
+  EXPECT_EQ(late.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_NE(late.error().detail.find("older"), std::string::npos);
+  EXPECT_EQ(motion.wanted().translation.x(), 0.1);
+  EXPECT_TRUE(motion.hear(at(0.2), 50.01, 0.03).ok());  // a coarse clock
+  EXPECT_TRUE(motion.hear(at(0.3), 0.0, 0.04).ok());    // no stamp
+  EXPECT_TRUE(motion.hear(at(0.4), 20.0, 0.05).ok());   // played again
+}
+
+TEST(ToolMotion, SilenceIsSaidOnceAndThenItBeginsAnew) {
+  ToolMotion motion({1.0, 10.0, 0.5});
+  EXPECT_FALSE(motion.fellSilent(1e9));
+  ASSERT_TRUE(motion.hear(at(0.0), 7.0, 10.0).ok());
+  EXPECT_FALSE(motion.fellSilent(10.5));
+  motion.keepAlive(10.4);
+  EXPECT_FALSE(motion.fellSilent(10.8));
+  EXPECT_TRUE(motion.fellSilent(10.95));
+  EXPECT_FALSE(motion.alive());
+  EXPECT_FALSE(motion.fellSilent(12.0));
+  ASSERT_TRUE(motion.hear(at(5.0), 6.9, 13.0).ok());
+  EXPECT_EQ(motion.pose().translation.x(), 5.0);
+}
+
+TEST(ToolMotion, WithoutALimitItMayBeSilent) {
+  ToolMotion motion({1.0, 10.0, 0.0});
+  ASSERT_TRUE(motion.hear(at(0.0), 0.0, 0.0).ok());
+  EXPECT_FALSE(motion.fellSilent(1e6));
+}
+
+}  // namespace
+}  // namespace meshless

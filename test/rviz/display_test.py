@@ -1,0 +1,143 @@
+#!/usr/bin/env python3
+"""The Tissue display: cut faces in their inside colour, strain and the force of springs by colour, and nothing is asked
+of the node while it is switched off."""
+import os
+import sys
+import tempfile
+import unittest
+
+import numpy
+import rospkg
+import rospy
+import rostest
+import yaml
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+from rviz_view import configured_view, project, view_rectangle  # noqa: E402
+from virtual_display import VirtualDisplay, stop, wait_until  # noqa: E402
+
+from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion  # noqa: E402
+from meshless_surgery.msg import State  # noqa: E402
+from meshless_surgery.srv import Cut, Lock, Pick, Remove  # noqa: E402
+from std_srvs.srv import SetBool  # noqa: E402
+
+LONG = 60.0
+LOBE = Point(-0.05, -0.03, 0.1)
+
+
+def call(service, kind, **fields):
+    name = '/deformer/' + service
+    rospy.wait_for_service(name, LONG)
+    reply = rospy.ServiceProxy(name, kind)(**fields)
+    assert reply.success, reply.message
+    return reply
+
+
+class DisplayTest(unittest.TestCase):
+    def start(self, change=lambda display: None):
+        """rviz with the liver's configuration, whose Tissue display `change` may alter."""
+        file = os.path.join(rospkg.RosPack().get_path('meshless_surgery'), 'config', 'rviz', 'liver.rviz')
+        with open(file) as text:
+            config = yaml.safe_load(text)
+        for display in config['Visualization Manager']['Displays']:
+            if display['Class'] == 'meshless_surgery/Tissue':
+                change(display)
+        with tempfile.NamedTemporaryFile('w', suffix='.rviz', delete=False) as changed:
+            yaml.safe_dump(config, changed)
+        self.addCleanup(os.remove, changed.name)
+        self.view = configured_view('liver')
+        self.display = VirtualDisplay()
+        self.addCleanup(self.display.close)
+        launch = self.display.start(['roslaunch', 'meshless_surgery', 'training.launch', 'scene:=liver',
+                                     'rviz_config:=' + changed.name])
+        self.addCleanup(stop, launch)
+        rospy.wait_for_service('/deformer/pick', LONG)
+
+        def shown():
+            self.rectangle = view_rectangle(self.display.screenshot())
+            return self.rectangle is not None and self.rectangle[1] - self.rectangle[0] > 300
+        self.assertTrue(wait_until(shown, 90), 'rviz did not start')
+        rospy.sleep(2.0)
+
+    def pixels(self):
+        top, bottom, left, right = self.rectangle
+        return self.display.screenshot()[top:bottom, left:right].astype(float)
+
+    def save(self, name):
+        file = os.path.join(os.environ.get('ROS_HOME', '/tmp'), 'display_%s.png' % name)
+        self.display.save(file)
+        print('picture: ' + file)
+
+    def until(self, condition, what):
+        self.assertTrue(wait_until(condition, LONG), what)
+
+    def pull(self, target):
+        pick = call('pick', Pick, point=LOBE, max_distance=0.1)
+        call('lock', Lock, pick_id=pick.pick_id, at_target=True, target=target)
+
+    def test_faces_of_a_cut_have_the_inside_colour(self):
+        self.start()
+
+        def inside():
+            picture = self.pixels()
+            red, green = picture[:, :, 0], picture[:, :, 1]
+            return ((red > green + 35) & (green > 0.42 * red)).sum()
+        self.until(lambda: (self.pixels()[:, :, 0] > 100).sum() > 2000, 'no liver')
+        before = inside()
+        call('cut', Cut, blades=PoseStamped(pose=Pose(position=Point(0.0, -1, 0.1),
+                                                      orientation=Quaternion(0.5, 0.5, 0.5, 0.5))))
+        # The camera looks from the right: it sees the face of what lies left of the cut.
+        pieces = rospy.wait_for_message('/deformer/state', State, LONG).bodies
+        call('remove', Remove, name=max(pieces, key=lambda body: body.centre_of_mass.x).name)
+        self.until(lambda: inside() > before + 500, 'no face of the cut is seen')
+        self.save('inside')
+
+    def test_strain_is_shown_where_tissue_is_pulled(self):
+        def by_strain(display):
+            display['Colour by'] = {'Value': 'Strain', 'Full strain': 0.3}
+        self.start(by_strain)
+
+        def count(strong, weak):
+            picture = self.pixels()
+            return (picture[:, :, strong] > 1.5 * picture[:, :, weak] + 30).sum()
+        # Blue where the liver lies as it was made.
+        self.until(lambda: count(2, 0) > 2000, 'no undeformed tissue in the picture')
+        calm = count(0, 2)
+        self.pull(Point(-0.09, -0.08, 0.2))
+        self.until(lambda: count(0, 2) > calm + 500, 'no strained tissue in the picture')
+        self.save('strain')
+
+    def test_a_spring_is_red_under_a_large_force(self):
+        def wire(display):
+            display['Tools'] = {'Value': True, 'Full force': 5}
+            display['Opacity'] = 0.2  # the spring's end in the tissue is inside of it
+        self.start(wire)
+        target = numpy.array([-0.1, -0.1, 0.25])
+        call('pause', SetBool, data=False)
+        self.pull(Point(*target))
+        rospy.sleep(2.0)
+
+        def colour_along_spring():
+            """The most saturated colours near the free end, where the tissue is not."""
+            end = project(target[None], self.view, self.rectangle)[0]
+            part = self.display.screenshot()[end[0] + 2:end[0] + 40, end[1] - 25:end[1] + 40].reshape(-1, 3).astype(float)
+            return part[(part[:, 0] > 120) & (part[:, 1] < 0.5 * part[:, 0]) & (part[:, 2] < 0.5 * part[:, 0])]
+        self.until(lambda: len(colour_along_spring()) > 3, 'no red spring in the picture')
+        self.save('spring')
+
+    def test_nothing_is_built_while_it_is_off(self):
+        def off(display):
+            display['Enabled'] = display['Value'] = False
+        self.start(off)
+        built = []
+        for _ in range(3):
+            array = rospy.wait_for_message('/diagnostics', DiagnosticArray, LONG)
+            built += [value.value for status in array.status for value in status.values if value.key == 'surfaces built']
+        self.assertEqual(3, len(built))
+        self.assertEqual({'0'}, set(built))
+
+
+if __name__ == '__main__':
+    rospy.init_node('display_test')
+    rostest.rosrun('meshless_surgery', 'display', DisplayTest, sys.argv)
