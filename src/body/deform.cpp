@@ -199,7 +199,8 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
   }
 }
 
-void velocitiesFromPositions(const BodyModel& model, double h, BodyState& state, const StepScratch& scratch) {
+void velocitiesFromPositions(const BodyModel& model, double h, BodyState& state, StepScratch& scratch) {
+  scratch.unfelt.setZero();
   const double rate = 1.0 / h;
   for (std::size_t i = 0; i < model.rest.size(); ++i)
     state.velocities[i] = rate * (state.positions[i] - scratch.previous[i]);
@@ -207,7 +208,9 @@ void velocitiesFromPositions(const BodyModel& model, double h, BodyState& state,
     Vec3& v = state.velocities[t.particle];
     const double before = t.normal.dot(scratch.before_contact[t.particle] - scratch.previous[t.particle]) / h;
     const double excess = t.normal.dot(v) - std::max(before, t.obstacle_speed);
-    if (excess > 0.0) v -= excess * t.normal;
+    if (!(excess > 0.0)) continue;
+    v -= excess * t.normal;
+    if (t.by_tool) scratch.unfelt += model.masses[t.particle] * excess * t.normal;
   }
 }
 

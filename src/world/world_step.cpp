@@ -120,6 +120,9 @@ void World::Impl::finishSubstep(double h) {
     for (std::size_t b = task * kTaskBodies; b < std::min(awake.size(), (task + 1) * kTaskBodies); ++b)
       velocitiesFromPositions(*awake[b]->model, h, awake[b]->state, awake[b]->scratch);
   });
+  // Being pushed out does not throw: what the tissue does not get, the tool does not feel.
+  if (push.touching)
+    for (const WorldBody* body : awake) push.force += body->scratch.unfelt * settings.step_rate;
 }
 
 // As many as the stiffest body needs, within the budget; what the budget takes from a body is said once.
@@ -304,7 +307,7 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
         state.positions[i] += out.depth * out.normal;
         state.positions[i] +=
             frictionCorrection(state.positions[i] - body.scratch.previous[i], out.normal, out.depth, friction);
-        touched.push_back({i, out.normal, 0.0});
+        touched.push_back({i, out.normal, 0.0, false});
         ++report.ground_contacts;
       }
       report.ground_contacts += pushRiders(
@@ -315,7 +318,7 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
           },
           state,
           [&](Index i, const Vec3&) {
-            touched.push_back({i, Vec3::UnitZ(), 0.0});
+            touched.push_back({i, Vec3::UnitZ(), 0.0, false});
           },
           few ? &body.low_riders : nullptr);
     }
@@ -324,7 +327,7 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
         hit_push = true;
         push_impulse += model.masses[i] * shift;
         const Vec3 normal = (state.positions[i] - push.position).normalized();
-        touched.push_back({i, normal, normal.dot(push_velocity)});
+        touched.push_back({i, normal, normal.dot(push_velocity), true});
       };
       report.push_contacts += pushRiders(model, outOfSphere, state, isPushed);
       report.push_contacts += pushFaces(model, push.position, push.radius, state, isPushed);

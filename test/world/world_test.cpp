@@ -495,6 +495,32 @@ TEST(World, AnIncisionOpensABodyAndASecondOneTakesItApart) {
   EXPECT_EQ(world.apply(bad).error().code, ErrorCode::kMissed);
 }
 
+TEST(World, ThePushSphereFeelsWhatTheTissueGets) {
+  WorldSettings settings = test::weightless();
+  settings.sleep = false;
+  for (const double speed : {0.1, 0.5}) {
+    World world(settings);
+    ASSERT_TRUE(world.addSceneBody(test::shared(test::ball("ball", Vec3::Zero()))).ok());
+    PushCommand push;
+    push.enable = true;
+    push.radius = 0.03;
+    push.position = Vec3(-0.2, 0.0, 0.0);
+    ASSERT_TRUE(world.apply(push).ok());
+    push.position = Vec3(-0.04, 0.0, 0.0);
+    push.speed = speed;
+    ASSERT_TRUE(world.apply(push).ok());
+    Vec3 felt = Vec3::Zero();
+    for (int step = 0; step < 240; ++step) {
+      world.step();
+      felt += world.push().force / 120.0;
+    }
+    const Vec3 momentum = world.snapshot({true, true, true}).bodies[0].measures.linear_momentum;
+    ASSERT_GT(momentum.x(), 0.0);
+    EXPECT_LE((felt + momentum).norm(), 0.02 * momentum.norm())
+        << "felt " << felt.transpose() << ", given " << momentum.transpose();
+  }
+}
+
 TEST(World, PiecesCanBeCutAHundredTimes) {
   test::Random random(11);
   World world = ballWorld();

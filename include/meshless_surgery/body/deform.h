@@ -10,6 +10,7 @@ struct TouchedParticle {
   Index particle = 0;
   Vec3 normal = Vec3::UnitZ();  // unit, away from the obstacle
   double obstacle_speed = 0.0;  // [m/s] of the obstacle along the normal
+  bool by_tool = false;         // by the push sphere, which feels it
 };
 
 /// Arrays that a body's substep needs and nothing outlives; kept between steps so that stepping allocates nothing.
@@ -20,6 +21,7 @@ struct StepScratch {
   Points goals;
   ElasticBatchState elastic;
   std::vector<TouchedParticle> touched;
+  Vec3 unfelt = Vec3::Zero();  // [kg m/s] by which the tool moved particles further than it threw them
 };
 
 /// Reads positions and velocities; writes positions, velocities, poses and scratch.previous: matches at y = x + h v,
@@ -39,8 +41,8 @@ double stiffnessFactor(const BodyModel& model, const BodyState& state, double h)
 
 /// v = (x - x_old) / h, after springs and contacts have moved positions. Being pushed out of an obstacle stops a
 /// particle or takes it along, and never throws it: along the normal it keeps at most the speed that it had before the
-/// contact, or the obstacle's.
-void velocitiesFromPositions(const BodyModel& model, double h, BodyState& state, const StepScratch& scratch);
+/// contact, or the obstacle's. What is taken from those that a tool touched is scratch.unfelt.
+void velocitiesFromPositions(const BodyModel& model, double h, BodyState& state, StepScratch& scratch);
 
 /// [m/s] angular velocity times lever of a body that turns as its particles do on the whole; 0 where it has no extent.
 struct RigidMotion {
