@@ -38,6 +38,7 @@ World makePile(const PileOptions& options) {
   settings.step_rate = 60.0;
   settings.substeps = options.substeps;
   settings.contact = options.contact;
+  settings.sleep = options.sleeping;
   World world(settings);
   BodyDef def;
   def.mesh = boxMesh(Vec3::Constant(options.size), 2, 2, 2);
