@@ -433,7 +433,7 @@ TEST_F(Shipped, MaterialsArePlausible) {
 
 TEST_F(Shipped, ScenesLoadAsClosedBodiesAboveTheGround) {
   const std::vector<std::pair<std::string, std::size_t>> scenes = {
-      {"liver", 1}, {"fish", 1}, {"skin", 1}, {"block", 1}, {"pile", 40}};
+      {"liver", 1}, {"fish", 1}, {"skin", 1}, {"block", 1}, {"pile", 1000}};
   for (const auto& one : scenes) {
     const SceneDef def = scene(one.first);
     ASSERT_EQ(def.bodies.size(), one.second) << one.first;
