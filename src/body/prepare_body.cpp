@@ -279,4 +279,19 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   return body;
 }
 
+PreparedBody placedCopy(const PreparedBody& body, std::string name, const Pose& pose) {
+  PreparedBody copy = body;
+  copy.def.name = std::move(name);
+  copy.def.pose = pose;
+  const Quat turn = pose.rotation.normalized() * body.def.pose.rotation.normalized().conjugate();
+  const Pose motion{turn, pose.translation - turn * body.def.pose.translation};
+  for (Vec3& p : copy.state.positions) p = motion * p;
+  for (ClusterPose& cluster : copy.state.poses) {
+    cluster.centre = motion * cluster.centre;
+    cluster.rotation = turn * cluster.rotation;
+  }
+  updateSurface(*copy.model, copy.state);
+  return copy;
+}
+
 }  // namespace meshless

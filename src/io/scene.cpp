@@ -39,6 +39,7 @@ void readWorld(YamlSource& source, const YAML::Node& node, WorldSettings& world)
   map.whole("threads", 1, 64, world.threads);
   const int contact = map.choice("contact", {"none", "textbook", "rest_shape"});
   if (contact >= 0) world.contact = static_cast<ContactMethod>(contact);
+  if (const int sleep = map.choice("sleep", {"false", "true"}); sleep >= 0) world.sleep = sleep == 1;
   if (const YAML::Node pick = map.get("pick"); pick.IsDefined()) {
     YamlMap keys(source, pick, "pick");
     keys.number("max_distance", lengths(0.0, true), world.pick_max_distance);
@@ -280,6 +281,7 @@ class SceneReader {
     for (std::size_t k = 0; k < poses.size() && !source_.fault; ++k) {
       BodyDef copy = def;
       copy.pose = poses[k];
+      copy.copy = k > 0;
       if (copies.IsDefined()) copy.name += "_" + std::to_string(k + 1);
       if (!names_.insert(copy.name).second)
         source_.fail(node, "two bodies are named '" + copy.name + "'", "each name once", ErrorCode::kDuplicateName);

@@ -156,12 +156,19 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   std::size_t particles = 0;
   std::size_t clusters = 0;
   const std::size_t bodies = scene->bodies.size();
+  std::shared_ptr<const PreparedBody> first;  // of the copies that share its model
   for (BodyDef& def : scene->bodies) {
     const std::string name = def.name;
     for (const std::string& note : def.notes) ROS_INFO_STREAM("body " << name << ": " << note);
-    auto body = prepareBody(std::move(def));
-    if (!body.ok()) return Error{body.error().code, *file + ": body " + name + ": " + body.error().detail};
-    const auto added = world->addSceneBody(std::make_shared<PreparedBody>(std::move(*body)));
+    std::shared_ptr<const PreparedBody> ready;
+    if (first && def.copy && def.fixed.empty()) {  // boxes fix what is in them: each copy is then another body
+      ready = std::make_shared<PreparedBody>(placedCopy(*first, name, def.pose));
+    } else {
+      auto body = prepareBody(std::move(def));
+      if (!body.ok()) return Error{body.error().code, *file + ": body " + name + ": " + body.error().detail};
+      ready = first = std::make_shared<PreparedBody>(std::move(*body));
+    }
+    const auto added = world->addSceneBody(ready);
     if (!added.ok()) return Error{added.error().code, *file + ": body " + name + ": " + added.error().detail};
     particles += added->particles;
     clusters += added->clusters;

@@ -75,6 +75,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
     reply.opened_area += opened.body.opened_area;
     reply.work += opened.body.work;
     if (opened.body.pieces.size() == 1) {
+      wake(body);
       body.model = std::move(opened.body.pieces[0].model);
       body.state = std::move(opened.body.pieces[0].state);
       body.mesh.reset();

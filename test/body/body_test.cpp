@@ -4,6 +4,7 @@
 
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/body/deform.h"
 #include "support/bodies.h"
 
 namespace meshless {
@@ -135,6 +136,35 @@ TEST(PrepareBody, RefusesBadChoicesByName) {
   def = test::ball();
   def.mesh = shapes::turnedInsideOut(def.mesh);
   refused(def, "volume");
+}
+
+TEST(PlacedCopy, IsTheBodyThatIsPreparedThere) {
+  BodyDef def = test::ball();
+  def.pose = shapes::anyPose();
+  const PreparedBody first = prepared(def);
+  const Pose there{Quat(Eigen::AngleAxisd(2.1, Vec3(0.5, 0.2, -0.9).normalized())), Vec3(-3.0, 2.0, 1.0)};
+  const PreparedBody copy = placedCopy(first, "copy", there);
+  def.name = "copy";
+  def.pose = there;
+  const PreparedBody expected = prepared(def);
+  EXPECT_EQ(copy.def.name, "copy");
+  EXPECT_EQ(copy.model, first.model);
+  ASSERT_EQ(copy.state.positions.size(), first.state.positions.size());
+  // Inner particles are laid out along the axes of the world, surface ones at the vertices.
+  double farthest = 0.0;
+  for (std::size_t v = 0; v < expected.state.surface.size(); ++v)
+    farthest = std::max(farthest, (copy.state.surface[v] - expected.state.surface[v]).norm());
+  EXPECT_LT(farthest, 1e-12);
+  // Its clusters know how they are turned: nothing moves without forces.
+  BodyState state = copy.state;
+  StepScratch scratch;
+  MatchCounters counters;
+  for (int step = 0; step < 5; ++step)
+    matchAndMove(*copy.model, copy.def.material, Vec3::Zero(), 0.01, state, scratch, counters);
+  double moved = 0.0;
+  for (std::size_t i = 0; i < state.positions.size(); ++i)
+    moved = std::max(moved, (state.positions[i] - copy.state.positions[i]).norm());
+  EXPECT_LT(moved, 1e-12);
 }
 
 TEST(WithMaterial, DensityScalesMassAndTheRestStays) {

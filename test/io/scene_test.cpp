@@ -47,6 +47,8 @@ TEST_F(Scene, DefaultsForEverythingButBodies) {
   EXPECT_EQ(scene.world.step_rate, defaults.step_rate);
   EXPECT_EQ(scene.world.substeps, defaults.substeps);
   EXPECT_EQ(scene.world.contact, defaults.contact);
+  EXPECT_EQ(scene.world.contact, ContactMethod::kRestShape);
+  EXPECT_TRUE(scene.world.sleep);
   ASSERT_EQ(scene.bodies.size(), 1u);
   const BodyDef& body = scene.bodies[0];
   EXPECT_EQ(body.name, "cube");
@@ -61,7 +63,7 @@ TEST_F(Scene, DefaultsForEverythingButBodies) {
 
 TEST_F(Scene, EveryKeyIsRead) {
   const SceneDef scene = good(R"(
-world: {gravity: [0.1, 0.2, -1.6], ground: -0.5, ground_friction: 0.7, step_rate: 240, substeps: 3, contact: none,
+world: {gravity: [0.1, 0.2, -1.6], ground: -0.5, ground_friction: 0.7, step_rate: 240, substeps: 3, contact: none, sleep: false,
         pick: {max_distance: 0.04, stiffness: 300, radius: 0.03}, push: {radius: 0.015}}
 materials:
   wobble: {mode: quadratic, alpha: 0.3, beta: 0.25, density: 950, damping: 2.5, friction: 0.1,
@@ -85,6 +87,7 @@ bodies:
   EXPECT_EQ(scene.world.step_rate, 240.0);
   EXPECT_EQ(scene.world.substeps, 3);
   EXPECT_EQ(scene.world.contact, ContactMethod::kNone);
+  EXPECT_FALSE(scene.world.sleep);
   EXPECT_EQ(scene.world.pick_max_distance, 0.04);
   EXPECT_EQ(scene.world.pick_stiffness, 300.0);
   EXPECT_EQ(scene.world.pick_radius, 0.03);
@@ -183,6 +186,7 @@ TEST_F(Scene, FaultsAreNamedWithFileLineValueAndRange) {
       {"world: {gravity: [0, 0, .inf]}\nbodies: []\n", 1, {"gravity[2] is .inf"}},
       {"world: {ground: down}\nbodies: []\n", 1, {"ground is 'down'", "or none"}},
       {"world: {ground: .nan}\nbodies: []\n", 1, {"ground is .nan"}},
+      {"world: {sleep: maybe}\nbodies: []\n", 1, {"sleep is 'maybe'", "false, true"}},
       {"world: {contact: fast}\nbodies: []\n", 1, {"contact is 'fast'", "none, textbook"}},
       {"world: {pick: {stiffness: 0}}\nbodies: []\n", 1, {"stiffness is 0", "above 0"}},
       {"world: {push: {radius: -1}}\nbodies: []\n", 1, {"radius is -1"}},
@@ -429,7 +433,7 @@ TEST_F(Shipped, MaterialsArePlausible) {
 
 TEST_F(Shipped, ScenesLoadAsClosedBodiesAboveTheGround) {
   const std::vector<std::pair<std::string, std::size_t>> scenes = {
-      {"liver", 1}, {"fish", 1}, {"skin", 1}, {"block", 1}, {"pile", 40}};
+      {"liver", 1}, {"fish", 1}, {"skin", 1}, {"block", 1}, {"pile", 1000}};
   for (const auto& one : scenes) {
     const SceneDef def = scene(one.first);
     ASSERT_EQ(def.bodies.size(), one.second) << one.first;

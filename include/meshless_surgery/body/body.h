@@ -95,6 +95,10 @@ struct PreparedBody {
 /// 200,000 particles.
 Result<PreparedBody> prepareBody(BodyDef def);
 
+/// The same body elsewhere, at rest, under another name: model is shared, and stays in the frame of `body`'s pose. Only
+/// for a body without fixed particles and in the state that prepareBody gave it.
+PreparedBody placedCopy(const PreparedBody& body, std::string name, const Pose& pose);
+
 /// The same rest shape with the masses of another density, and with the moments that the other material needs.
 BodyModelPtr withMaterial(const BodyModelPtr& model, const Material& before, const Material& after);
 

@@ -16,6 +16,7 @@ struct BodyDef {
   ClusterOptions clusters;
   Material material;
   std::vector<Box> fixed;          // [m] world frame: particles inside are held in place
+  bool copy = false;               // the same as the body before it in its scene, but for name and pose
   std::vector<std::string> notes;  // what reading and repairing said
 };
 

@@ -1,0 +1,236 @@
+// Run time of a frame of 1/60 s with contact: piles of unit cubes of 27 particles (contact_pile.h) that have fallen for
+// 180 frames, the median of the next 120, with four substeps. pile27/N is this package, bullet_vf/N and bullet_cl/N are
+// Bullet's soft bodies from the same places in the same process (contact_bullet.h), textbook/N the paper's method,
+// asleep/1000 the pile after it fell asleep and awake/1000 the same pile kept awake, sweep/N and sweep_bullet_*/N the
+// growth with the number of bodies. Counters: `deepest` and `p99` penetration relative to the cubes' size, `height`
+// relative to ideal stacks, `contacts` and `lookups` a frame, `contact_ms` and `match_ms` of the frame,
+// `ns_a_contact` the time of all of a frame's contact over its contacts and substeps, `exponent` of a sweep (least
+// squares of log time over log N, on its last row). --out=DIR writes bench_contact.csv and bench_contact.png there.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <string>
+
+#include <benchmark/benchmark.h>
+
+#include "contact_pile.h"
+#include "plot.h"
+
+#ifdef HAVE_BULLET
+#include "contact_bullet.h"
+#endif
+
+namespace meshless::bench {
+namespace {
+
+constexpr int kSettling = 180, kMeasured = 120;  // frames
+constexpr int kLongestFall = 1200;               // frames in which a pile has to be asleep
+
+struct Row {
+  int bodies = 0;
+  double ms = 0.0;
+  PileMeasures measures;
+  double contacts = 0.0;
+};
+std::map<std::string, std::vector<Row>> series;  // what rows measured, for the exponent, the table and the plot
+double awake_ms = 0.0;
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  return n == 0 ? 0.0 : 0.5 * (values[(n - 1) / 2] + values[n / 2]);
+}
+
+/// [ms] median of the measured frames.
+double medianFrame(const std::function<void()>& step, int frames) {
+  std::vector<double> times;
+  for (int n = 0; n < frames; ++n) {
+    const auto start = std::chrono::steady_clock::now();
+    step();
+    times.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+  }
+  return median(times);
+}
+
+double exponentOf(const std::vector<Row>& rows) {
+  double x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
+  const double n = static_cast<double>(rows.size());
+  for (const Row& row : rows) {
+    const double a = std::log(row.bodies), b = std::log(row.ms);
+    x += a;
+    y += b;
+    xx += a * a;
+    xy += a * b;
+  }
+  return (n * xy - x * y) / (n * xx - x * x);
+}
+
+void report(benchmark::State& state, const std::string& name, const Row& row, bool last_of_sweep) {
+  series[name].push_back(row);
+  state.counters["deepest"] = row.measures.deepest;
+  state.counters["p99"] = row.measures.p99;
+  state.counters["height"] = row.measures.height;
+  state.counters["contacts"] = row.contacts;
+  if (last_of_sweep && series[name].size() > 1) state.counters["exponent"] = exponentOf(series[name]);
+  if (!row.measures.finite) state.SkipWithError("a position is not finite");
+}
+
+void runPile(benchmark::State& state, const std::string& name, const PileOptions& options, bool last_of_sweep) {
+  for (auto _ : state) {
+    World world = makePile(options);
+    for (int n = 0; n < kSettling; ++n) world.step();
+    std::vector<double> contact, match;
+    double contacts = 0.0, lookups = 0.0, contact_work = 0.0;
+    Row row;
+    row.bodies = options.bodies;
+    std::vector<double> totals;
+    for (int n = 0; n < kMeasured; ++n) {
+      totals.push_back(medianFrame([&] { world.step(); }, 1));
+      const StepReport report = world.snapshot({}).report;
+      contact.push_back(1e3 * report.contact);
+      match.push_back(1e3 * report.match);
+      const ContactCounters& c = report.contact_counters;
+      contacts += static_cast<double>(options.contact == ContactMethod::kTextbook ? c.penetrating : c.contacts) / kMeasured;
+      lookups += static_cast<double>(c.lookups) / kMeasured;
+      contact_work += static_cast<double>(c.contacts) * static_cast<double>(report.substeps) / kMeasured;
+    }
+    row.ms = median(totals);
+    row.contacts = contacts;
+    row.measures = measurePile(options, world);
+    state.SetIterationTime(1e-3 * row.ms);
+    state.counters["lookups"] = lookups;
+    state.counters["contact_ms"] = median(contact);
+    state.counters["match_ms"] = median(match);
+    if (contact_work > 0.0) state.counters["ns_a_contact"] = 1e6 * median(contact) / contact_work;
+    report(state, name, row, last_of_sweep);
+  }
+}
+
+#ifdef HAVE_BULLET
+void runBullet(benchmark::State& state, const std::string& name, const PileOptions& options, BulletWay way,
+               bool last_of_sweep) {
+  for (auto _ : state) {
+    BulletPile pile(options, way);
+    for (int n = 0; n < kSettling; ++n) pile.step();
+    Row row;
+    row.bodies = options.bodies;
+    row.ms = medianFrame([&] { pile.step(); }, kMeasured);
+    row.contacts = static_cast<double>(pile.contacts());
+    row.measures = measurePile(options, pile.positions());
+    state.SetIterationTime(1e-3 * row.ms);
+    report(state, name, row, last_of_sweep);
+  }
+}
+#endif
+
+/// The pile after it fell asleep, or as long after its fall kept awake.
+void runRest(benchmark::State& state, bool sleeping) {
+  for (auto _ : state) {
+    PileOptions options;
+    options.sleeping = sleeping;
+    World world = makePile(options);
+    int frames = 0;
+    std::size_t asleep = 0;
+    while (frames < (sleeping ? kLongestFall : kSettling) && asleep < static_cast<std::size_t>(options.bodies)) {
+      world.step();
+      ++frames;
+      asleep = world.snapshot({}).report.asleep;
+    }
+    const double ms = medianFrame([&] { world.step(); }, kMeasured);
+    state.SetIterationTime(1e-3 * ms);
+    state.counters["asleep"] = static_cast<double>(asleep);
+    if (sleeping) {
+      state.counters["seconds_until_asleep"] = frames / 60.0;
+      if (awake_ms > 0.0) state.counters["ratio"] = ms / awake_ms;
+    } else {
+      awake_ms = ms;
+    }
+  }
+}
+
+void add(const std::string& name, const std::function<void(benchmark::State&)>& run) {
+  benchmark::RegisterBenchmark(name.c_str(), run)->Unit(benchmark::kMillisecond)->UseManualTime()->Iterations(1);
+}
+
+void registerRows() {
+  const auto of = [](int bodies) {
+    PileOptions options;
+    options.bodies = bodies;
+    return options;
+  };
+  const auto addPile = [&](const std::string& name, const std::string& of_series, PileOptions options, bool last) {
+    add(name, [=](benchmark::State& s) { runPile(s, of_series, options, last); });
+  };
+  for (const int bodies : {100, 1000})
+    addPile("pile27/" + std::to_string(bodies) + "/1threads", "pile27", of(bodies), false);
+#ifdef HAVE_BULLET
+  const std::pair<const char*, BulletWay> ways[] = {{"bullet_vf", BulletWay::kLinks},
+                                                    {"bullet_cl", BulletWay::kCluster}};
+  const auto addBullet = [&](const std::string& name, const std::string& of_series, BulletWay way, int bodies,
+                             bool last) {
+    add(name + "/" + std::to_string(bodies),
+        [=](benchmark::State& s) { runBullet(s, of_series, of(bodies), way, last); });
+  };
+  for (const auto& [name, way] : ways)
+    for (const int bodies : {100, 1000}) addBullet(name, name, way, bodies, false);
+#endif
+  PileOptions textbook = of(100);
+  textbook.contact = ContactMethod::kTextbook;
+  addPile("textbook/100", "textbook", textbook, false);
+  add("awake/1000", [](benchmark::State& s) { runRest(s, false); });
+  add("asleep/1000", [](benchmark::State& s) { runRest(s, true); });
+  for (const int bodies : {10, 30, 100, 300, 1000, 3000, 10000})
+    addPile("sweep/" + std::to_string(bodies), "sweep", of(bodies), bodies == 10000);
+#ifdef HAVE_BULLET
+  for (const auto& [name, way] : ways)
+    for (const int bodies : {10, 30, 100, 300, 1000, 3000})
+      addBullet(std::string("sweep_") + name, std::string("sweep_") + name, way, bodies, bodies == 3000);
+#endif
+}
+
+bool write(const std::string& folder) {
+  std::ofstream table(folder + "/bench_contact.csv");
+  table << "row,bodies,ms,deepest,p99,height,contacts\n";
+  for (const auto& [name, rows] : series)
+    for (const Row& row : rows)
+      table << name << ',' << row.bodies << ',' << row.ms << ',' << row.measures.deepest << ',' << row.measures.p99
+            << ',' << row.measures.height << ',' << row.contacts << '\n';
+  Plot plot;
+  plot.title = "a frame of 1/60 s of piles of cubes, four substeps";
+  plot.x = "bodies";
+  plot.y = "time [ms]";
+  const std::pair<const char*, const char*> drawn[] = {{"sweep", "meshless surgery"},
+                                                       {"sweep_bullet_vf", "Bullet, vertices and faces"},
+                                                       {"sweep_bullet_cl", "Bullet, clusters"}};
+  for (const auto& [name, title] : drawn)
+    for (const Row& row : series[name]) plot.series[title].emplace_back(row.bodies, row.ms);
+  return table.good() && (plot.series.empty() || draw(plot, folder + "/bench_contact.png"));
+}
+
+}  // namespace
+}  // namespace meshless::bench
+
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  std::string folder;
+  for (int k = 1; k < argc; ++k)
+    if (const std::string word = argv[k]; word.rfind("--out=", 0) == 0) {
+      folder = word.substr(6);
+      std::rotate(argv + k, argv + k + 1, argv + argc);
+      --argc;
+      --k;
+    }
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  meshless::bench::registerRows();
+  benchmark::RunSpecifiedBenchmarks();
+  benchmark::Shutdown();
+  if (!folder.empty() && !meshless::bench::write(folder)) {
+    std::fprintf(stderr, "could not write bench_contact.csv and bench_contact.png into %s\n", folder.c_str());
+    return 1;
+  }
+  return 0;
+}

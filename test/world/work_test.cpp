@@ -1,0 +1,459 @@
+// What a scene does not use costs nothing: counters of the step report, sleep, and memory.
+#include <execinfo.h>
+
+#include <atomic>
+#include <cstdio>
+#include <cstdlib>
+#include <new>
+
+#include "contact_pile.h"
+#include "support/bodies.h"
+
+namespace {
+
+std::atomic<bool> counting{false};
+std::atomic<std::size_t> allocations{0};
+
+// Where to set a break point, or what to print: MESHLESS_SHOW_ALLOCATIONS=1 shows the first stacks.
+void count() {
+  if (!counting.load(std::memory_order_relaxed)) return;
+  const std::size_t known = allocations.fetch_add(1, std::memory_order_relaxed);
+  if (known >= 400 || !std::getenv("MESHLESS_SHOW_ALLOCATIONS")) return;
+  counting = false;
+  void* stack[12];
+  backtrace_symbols_fd(stack, backtrace(stack, 12), 2);
+  std::fputs("--\n", stderr);
+  counting = true;
+}
+
+void* take(std::size_t size) {
+  count();
+  if (void* memory = std::malloc(size ? size : 1)) return memory;
+  throw std::bad_alloc();
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) { return take(size); }
+void* operator new[](std::size_t size) { return take(size); }
+void* operator new(std::size_t size, std::align_val_t align) {
+  count();
+  const std::size_t a = static_cast<std::size_t>(align);
+  if (void* memory = std::aligned_alloc(a, (size + a - 1) / a * a)) return memory;
+  throw std::bad_alloc();
+}
+void* operator new[](std::size_t size, std::align_val_t align) { return operator new(size, align); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::align_val_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+
+namespace meshless {
+namespace {
+
+using test::replyOf;
+
+constexpr double kCube = 0.1;  // [m]
+
+BodyDef cube(const std::string& name, const Vec3& at) {
+  BodyDef def = test::defOf(boxMesh(Vec3::Constant(kCube), 2, 2, 2), name);
+  def.pose.translation = at;
+  def.spacing = 0.5 * kCube;
+  def.clusters.kind = ClusterOptions::Kind::kOne;
+  def.material.alpha = 0.9;
+  def.material.damping = 5.0;
+  return def;
+}
+
+void add(World& world, const BodyDef& def) {
+  const Result<SpawnReply> reply = world.addSceneBody(test::shared(def));
+  ASSERT_TRUE(reply.ok()) << reply.error().detail;
+}
+
+StepReport reportOf(World& world) { return world.snapshot({}).report; }
+
+std::vector<Points> particlesOf(World& world) {
+  std::vector<Points> all;
+  for (BodySnapshot& body : world.snapshot({false, true, false}).bodies) all.push_back(std::move(body.particles));
+  return all;
+}
+
+void expectNoContactWork(const ContactCounters& c) {
+  EXPECT_EQ(c.pairs, 0u);
+  EXPECT_EQ(c.hashed, 0u);
+  EXPECT_EQ(c.tested, 0u);
+  EXPECT_EQ(c.penetrating, 0u);
+  EXPECT_EQ(c.corrected, 0u);
+  EXPECT_EQ(c.lookups, 0u);
+  EXPECT_EQ(c.contacts, 0u);
+  EXPECT_EQ(c.traced, 0u);
+  EXPECT_EQ(c.caught, 0u);
+  EXPECT_EQ(c.expelled, 0u);
+}
+
+TEST(Work, OneBodyInTheAirHasMatchingAlone) {
+  World world{WorldSettings()};
+  add(world, cube("cube", Vec3(0, 0, 1.0)));
+  for (int step = 0; step < 20; ++step) {
+    world.step();
+    const StepReport report = reportOf(world);
+    expectNoContactWork(report.contact_counters);
+    EXPECT_EQ(report.contact_counters.bounds_tested, 0u);
+    EXPECT_EQ(report.contact_shapes, 0u);
+    EXPECT_EQ(report.ground_contacts, 0u);
+    EXPECT_EQ(report.push_contacts, 0u);
+    EXPECT_EQ(report.tetrahedralizations, 0u);
+    EXPECT_EQ(report.preserve_counters.gradients, 0u);
+    EXPECT_EQ(report.match_counters.quadratic_moments, 0u);
+    EXPECT_EQ(report.match_counters.plastic_flows, 0u);
+    EXPECT_EQ(report.match_counters.clusters, report.substeps);
+    EXPECT_EQ(report.asleep, 0u);
+    EXPECT_EQ(report.woken, 0u);
+  }
+}
+
+TEST(Work, OneBodyOnTheGroundHasNoPairsAndNoLookups) {
+  WorldSettings settings;
+  settings.sleep = false;
+  World world(settings);
+  add(world, cube("cube", Vec3(0, 0, 0.06)));
+  std::size_t shapes = 0, ground = 0;
+  for (int step = 0; step < 120; ++step) {
+    world.step();
+    const StepReport report = reportOf(world);
+    EXPECT_EQ(report.contact_counters.pairs, 0u);
+    EXPECT_EQ(report.contact_counters.lookups, 0u);
+    EXPECT_EQ(report.contact_counters.bounds_tested, 0u);
+    EXPECT_EQ(report.tetrahedralizations, 0u);
+    shapes += report.contact_shapes;
+    ground += report.ground_contacts;
+  }
+  EXPECT_LE(shapes, 1u);
+  EXPECT_GT(ground, 0u);
+}
+
+TEST(Work, BodiesApartAreLookedAtByTheBroadPhaseAlone) {
+  WorldSettings settings = test::weightless();
+  World world(settings);
+  for (int k = 0; k < 8; ++k) add(world, cube("cube" + std::to_string(k), Vec3(0.3 * k, 0.0, 0.0)));
+  for (int step = 0; step < 20; ++step) {
+    world.step();
+    const StepReport report = reportOf(world);
+    expectNoContactWork(report.contact_counters);
+    EXPECT_EQ(report.contact_shapes, 0u);
+    EXPECT_EQ(report.tetrahedralizations, 0u);
+  }
+}
+
+TEST(Work, OnlyThoseThatComeNearGetAShape) {
+  World world(test::weightless());
+  for (int k = 0; k < 8; ++k) add(world, cube("cube" + std::to_string(k), Vec3(0.3 * k, 0.0, 0.0)));
+  add(world, cube("near", Vec3(0.0, 0.0, 1.0005 * kCube)));
+  world.step();
+  const StepReport report = reportOf(world);
+  EXPECT_EQ(report.contact_counters.pairs, 1u);
+  EXPECT_GT(report.contact_counters.lookups, 0u);
+  EXPECT_LE(report.contact_counters.lookups, 2u * (26u + 24u * 2u)) << "points of two cubes";
+  EXPECT_EQ(report.contact_shapes, 2u);
+  EXPECT_EQ(report.tetrahedralizations, 0u);
+  for (int step = 0; step < 20; ++step) {
+    world.step();
+    EXPECT_EQ(reportOf(world).contact_shapes, 0u) << "a shape is made once";
+  }
+}
+
+TEST(Work, WithoutContactNothingIsLookedFor) {
+  WorldSettings settings = test::weightless();
+  settings.contact = ContactMethod::kNone;
+  World world(settings);
+  add(world, cube("a", Vec3::Zero()));
+  add(world, cube("b", Vec3(0.01, 0.02, 0.03)));
+  for (int step = 0; step < 10; ++step) {
+    world.step();
+    const StepReport report = reportOf(world);
+    expectNoContactWork(report.contact_counters);
+    EXPECT_EQ(report.contact_counters.bounds_tested, 0u);
+    EXPECT_EQ(report.contact_shapes, 0u);
+  }
+}
+
+// --- sleep
+
+/// Towers of two cubes, far from each other; asleep. Islands are {low_k, high_k}.
+World sleepingTowers(int towers) {
+  World world{WorldSettings()};
+  for (int k = 0; k < towers; ++k) {
+    add(world, cube("low" + std::to_string(k), Vec3(0.5 * k, 0.0, 0.501 * kCube)));
+    BodyDef high = cube("high" + std::to_string(k), Vec3(0.5 * k + 0.004, -0.003, 1.502 * kCube));
+    high.pose.rotation = Quat(Eigen::AngleAxisd(0.3, Vec3::UnitZ()));
+    add(world, high);
+  }
+  for (int step = 0; step < 2400 && reportOf(world).asleep < 2u * static_cast<unsigned>(towers); ++step) world.step();
+  EXPECT_EQ(reportOf(world).asleep, 2u * static_cast<unsigned>(towers));
+  world.takeEvents();
+  return world;
+}
+
+std::vector<std::string> awakeBodies(World& world) {
+  std::vector<std::string> names;
+  for (const BodySnapshot& body : world.snapshot({}).bodies)
+    if (!body.asleep) names.push_back(body.name);
+  return names;
+}
+
+using Names = std::vector<std::string>;
+
+TEST(Sleep, AThousandSleepersDoNothingAndMoveByNoBit) {
+  World world{WorldSettings()};
+  const auto first = test::shared(cube("cube", Vec3(0, 0, 0.501 * kCube)));
+  for (int k = 0; k < 1000; ++k) {
+    PreparedBody copy = *first;
+    copy.def.name = "cube" + std::to_string(k);
+    const Vec3 shift(0.2 * (k % 32), 0.2 * (k / 32), 0.0);
+    for (Vec3& p : copy.state.positions) p += shift;
+    for (Vec3& p : copy.state.surface) p += shift;
+    for (ClusterPose& pose : copy.state.poses) pose.centre += shift;
+    ASSERT_TRUE(world.addSceneBody(std::make_shared<const PreparedBody>(std::move(copy))).ok());
+  }
+  for (int step = 0; step < 600 && reportOf(world).asleep < 1000u; ++step) world.step();
+  ASSERT_EQ(reportOf(world).asleep, 1000u);
+  const std::vector<Points> before = particlesOf(world);
+  const auto beginning = world.snapshot({true, false, false});
+  for (int step = 0; step < 120; ++step) {
+    world.step();
+    const StepReport report = reportOf(world);
+    ASSERT_EQ(report.asleep, 1000u);
+    expectNoContactWork(report.contact_counters);
+    EXPECT_EQ(report.contact_counters.bounds_tested, 0u);
+    EXPECT_EQ(report.match_counters.clusters, 0u);
+    EXPECT_EQ(report.match_counters.rotations, 0u);
+    EXPECT_EQ(report.preserve_counters.gradients, 0u);
+    EXPECT_EQ(report.ground_contacts, 0u);
+    EXPECT_EQ(report.contact_shapes, 0u);
+  }
+  EXPECT_EQ(particlesOf(world), before);
+  const auto end = world.snapshot({true, false, false});
+  for (std::size_t b = 0; b < end.bodies.size(); ++b) ASSERT_EQ(end.bodies[b].surface, beginning.bodies[b].surface);
+}
+
+TEST(Sleep, APileOfAHundredIsAsleepAfterTwentySeconds) {
+  bench::PileOptions options;
+  options.bodies = 100;
+  options.sleeping = true;
+  World world = bench::makePile(options);
+  int steps = 0;
+  while (steps < 1200 && reportOf(world).asleep < 100u) {
+    world.step();
+    ++steps;
+  }
+  EXPECT_EQ(reportOf(world).asleep, 100u) << "after " << steps / 60.0 << " s";
+}
+
+/// Does something to tower 1 of three, steps once, and expects that tower and no other awake.
+void expectWakes(const std::string& what, const std::function<void(World&)>& act, const Names& expected) {
+  World world = sleepingTowers(3);
+  act(world);
+  world.step();
+  EXPECT_EQ(awakeBodies(world), expected) << what;
+}
+
+TEST(Sleep, APickWakesItsIslandAndNoOther) {
+  expectWakes("pick", [](World& world) {
+    PickCommand pick;
+    pick.body = "high1";
+    pick.point = Vec3(0.5, 0.0, 2.0 * kCube);
+    replyOf<PickReply>(world.apply(pick));
+  }, {"low1", "high1"});
+}
+
+TEST(Sleep, AMovedPickAndItsReleaseWakeIt) {
+  for (const bool release : {false, true}) {
+    World world = sleepingTowers(2);
+    PickCommand pick;
+    pick.body = "low1";
+    pick.point = Vec3(0.5, 0.05, 0.05);
+    const PickReply picked = replyOf<PickReply>(world.apply(pick));
+    for (int step = 0; step < 1200 && reportOf(world).asleep < 4u; ++step) world.step();
+    ASSERT_EQ(reportOf(world).asleep, 4u) << "a pick that holds still lets its body sleep";
+    if (release)
+      replyOf<Done>(world.apply(ReleaseCommand{picked.pick}));
+    else
+      replyOf<Done>(world.apply(MovePickCommand{picked.pick, picked.position + Vec3(0, 0.02, 0)}));
+    world.step();
+    EXPECT_EQ(awakeBodies(world), (Names{"low1", "high1"})) << release;
+  }
+}
+
+TEST(Sleep, AMaterialWakesItsIslandAndNoOther) {
+  expectWakes("material", [](World& world) {
+    SetMaterialCommand set;
+    set.body = "low1";
+    set.change = [](const Material& m) {
+      Material changed = m;
+      changed.alpha = 0.5;
+      return Result<Material>(changed);
+    };
+    replyOf<Done>(world.apply(set));
+  }, {"low1", "high1"});
+}
+
+TEST(Sleep, ARemovalWakesWhoLeanedOnIt) {
+  expectWakes("removal", [](World& world) { replyOf<Done>(world.apply(RemoveCommand{"low1"})); }, {"high1"});
+}
+
+TEST(Sleep, APushedSphereWakesWhoItReachesInTheSameStep) {
+  expectWakes("push", [](World& world) {
+    PushCommand push;
+    push.radius = 0.03;
+    push.position = Vec3(0.5, -0.075, 0.06);
+    replyOf<Done>(world.apply(push));
+  }, {"low1", "high1"});
+  // On its way: asleep until it is there.
+  World world = sleepingTowers(2);
+  PushCommand push;
+  push.radius = 0.03;
+  push.position = Vec3(0.5, -0.3, 0.06);
+  replyOf<Done>(world.apply(push));
+  push.position.y() = 0.0;
+  push.speed = 0.5;
+  replyOf<Done>(world.apply(push));
+  bool touched = false;
+  for (int step = 0; step < 120 && !touched; ++step) {
+    const Names before = awakeBodies(world);
+    world.step();
+    touched = world.push().touching;
+    if (touched)
+      EXPECT_EQ(awakeBodies(world), (Names{"low1", "high1"}));
+    else if (world.push().position.y() < -0.1)
+      EXPECT_EQ(awakeBodies(world), Names());
+  }
+  EXPECT_TRUE(touched);
+}
+
+TEST(Sleep, ACutWakesItsIslandAndNoOther) {
+  World world = sleepingTowers(3);
+  CutCommand cut;
+  cut.blades.x_axis = Vec3::UnitY();
+  cut.blades.y_axis = Vec3::UnitZ();
+  cut.blades.origin = Vec3(0.51, -1.0, 0.5 * kCube);
+  cut.bodies = {"low1"};
+  const CutReply reply = replyOf<CutReply>(world.apply(cut));
+  ASSERT_EQ(reply.new_bodies.size(), 2u);
+  world.step();
+  Names expected{"high1"};
+  expected.insert(expected.end(), reply.new_bodies.begin(), reply.new_bodies.end());
+  EXPECT_EQ(awakeBodies(world), expected);
+}
+
+TEST(Sleep, AnIncisionWakesItsIslandAndNoOther) {
+  World world = sleepingTowers(3);
+  InciseCommand incise;
+  incise.blade.origin = Vec3(0.49, -0.03, 2.02 * kCube);
+  incise.blade.x_axis = Vec3::UnitY();
+  incise.blade.y_axis = Vec3::UnitZ();
+  incise.blade.length = 0.06;
+  incise.blade.depth = 0.03;
+  incise.bodies = {"high1"};
+  const InciseReply reply = replyOf<InciseReply>(world.apply(incise));
+  ASSERT_EQ(reply.cut_bodies.size(), 1u);
+  world.step();
+  const Names awake = awakeBodies(world);
+  EXPECT_EQ(awake.size(), 2u);
+  for (const std::string& name : awake) EXPECT_NE(name.find('1'), std::string::npos) << name;
+}
+
+TEST(Sleep, ABodyThatFallsOnItWakesAnIslandAsItArrives) {
+  World world = sleepingTowers(2);
+  replyOf<SpawnReply>(world.apply(SpawnCommand{test::shared(cube("stone", Vec3(0.5, 0.0, 3.5 * kCube)))}));
+  bool woken = false;
+  for (int step = 0; step < 120 && !woken; ++step) {
+    world.step();
+    const Names awake = awakeBodies(world);
+    woken = awake.size() > 1;
+    if (woken) EXPECT_EQ(awake, (Names{"low1", "high1", "stone"}));
+    const std::vector<Points> now = particlesOf(world);
+    double low = 1.0, top = 0.0;
+    for (const Vec3& p : now[4]) low = std::min(low, p.z());
+    for (const Vec3& p : now[3]) top = std::max(top, p.z());
+    if (!woken) {
+      EXPECT_GT(low, top - 1e-3 * kCube);
+      EXPECT_EQ(awake, Names{"stone"});
+    }
+  }
+  EXPECT_TRUE(woken);
+}
+
+TEST(Sleep, WakingMovesNothingVisibly) {
+  World world = sleepingTowers(3);
+  SetMaterialCommand same;  // wakes all, and changes nothing
+  same.change = [](const Material& m) { return Result<Material>(m); };
+  const std::vector<Points> before = particlesOf(world);
+  replyOf<Done>(world.apply(same));
+  double most = 0.0;
+  world.step();
+  EXPECT_EQ(awakeBodies(world).size(), 6u);
+  const std::vector<Points> after = particlesOf(world);
+  for (std::size_t b = 0; b < before.size(); ++b)
+    for (std::size_t i = 0; i < before[b].size(); ++i) most = std::max(most, (after[b][i] - before[b][i]).norm());
+  RecordProperty("most", std::to_string(most / kCube));
+  EXPECT_LT(most, 1e-3 * kCube);
+}
+
+TEST(Sleep, AnythingThatFloatsFreeStaysAwake) {
+  World world(test::weightless());
+  add(world, cube("free", Vec3::Zero()));
+  for (int step = 0; step < 240; ++step) world.step();
+  EXPECT_EQ(reportOf(world).asleep, 0u);
+}
+
+// --- memory
+
+TEST(Memory, TheCounterSeesWhatTheLibraryAllocates) {
+  World world = sleepingTowers(1);
+  allocations = 0;
+  counting = true;
+  const WorldSnapshot shot = world.snapshot({false, true, false});
+  counting = false;
+  EXPECT_GE(allocations, 3u);  // bodies, and the particles of two
+  EXPECT_EQ(shot.bodies.size(), 2u);
+}
+
+std::size_t allocationsIn(World& world, int steps) {
+  allocations = 0;
+  counting = true;
+  for (int step = 0; step < steps; ++step) world.step();
+  counting = false;
+  return allocations;
+}
+
+TEST(Memory, SteppingAPileAllocatesNothing) {
+  bench::PileOptions options;
+  options.bodies = 30;
+  World world = bench::makePile(options);
+  for (int step = 0; step < 400; ++step) world.step();
+  EXPECT_EQ(allocationsIn(world, 60), 0u) << "in 60 steps";
+}
+
+TEST(Memory, SteppingALiverOnTheGroundAllocatesNothing) {
+  WorldSettings settings;
+  settings.sleep = false;
+  World world(settings);
+  BodyDef def = test::defOf(liverMesh(), "liver");
+  def.pose.translation = Vec3(0, 0, 0.06);
+  def.spacing = 0.01;
+  add(world, def);
+  for (int step = 0; step < 240; ++step) world.step();
+  EXPECT_EQ(allocationsIn(world, 60), 0u) << "in 60 steps";
+}
+
+TEST(Memory, SleepersAllocateNothing) {
+  World world = sleepingTowers(2);
+  EXPECT_EQ(allocationsIn(world, 60), 0u) << "in 60 steps";
+}
+
+}  // namespace
+}  // namespace meshless
