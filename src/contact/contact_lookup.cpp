@@ -11,13 +11,14 @@ constexpr double kMovedInRest = 0.005;  // of the size: a lookup is repeated whe
 constexpr std::size_t kLookAnew = 8;    // frames after which a point is looked up though it seems to be where it was
 constexpr double kWellWithin = 0.02;    // barycentric
 constexpr double kNearby = 0.1;         // of the thickness
-constexpr int kMostLookups = 3;
+constexpr int kMostLookups = 8;
+constexpr double kSlack = 0.1;  // of the thickness: how much farther a better face may be
 
 }  // namespace
 
 bool Contacts::Impl::locate(const ContactParty& b, Index party, const MapFinder& finder, const ContactMap* maps,
-                            const Vec3& p, double reach, ContactShape::Nearest& found, bool& flipped,
-                            ContactCounters& counters) const {
+                            const Vec3& p, const Vec3& inward, double reach, ContactShape::Nearest& found,
+                            bool& flipped, ContactCounters& counters) const {
   const ContactMap& map = maps[finder.nearest(p)];
   flipped = map.flipped;
   const ContactShape& shape = *b.shape;
@@ -27,10 +28,11 @@ bool Contacts::Impl::locate(const ContactParty& b, Index party, const MapFinder&
   const Vec3 beyond = (bounds.min - rest).cwiseMax(rest - bounds.max).cwiseMax(0.0);
   const double far = deviations[party] + reach;
   if (!(beyond.squaredNorm() < far * far)) return false;
+  const Vec3 inward_rest = (map.to_rest * inward).normalized();
   const double enough = kMovedInRest * shape.size();
   for (int n = 0; n < kMostLookups; ++n) {
     ++counters.lookups;
-    if (!shape.nearest(rest, found)) return false;
+    if (!shape.nearest(rest, inward_rest, kSlack * shape.thickness(), found)) return false;
     if (n + 1 == kMostLookups) break;
     // The surface does not lie where the affine map has it: by so much the point is looked up elsewhere.
     const Triangle& corners = shape.surface().triangles[found.triangle];
@@ -135,6 +137,10 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
   const double size = shape.size(), near = kMargin * std::min(size, of.shape->size());
   const std::vector<ContactSample>& samples = of.shape->samples();
   inside.points = samples.size();
+  const ContactMap* own = maps == with.maps ? of.maps : maps_now[a].data();
+  const auto inwardAt = [&](const Vec3& p, const ContactSample& sample) -> Vec3 {
+    return -(own[finders[a].nearest(p)].to_rest.transpose() * sample.normal).normalized();
+  };
   for (Index s = 0; s < samples.size(); ++s) {
     const Vec3 p = sampleAt(of, samples[s]);
     if (!region.contains(p)) continue;
@@ -145,7 +151,7 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
     ContactShape::Nearest found;
     bool flipped = false;
     if (!stillOver(to.cursor, with, a, b, s, p, every_point, found, flipped) &&
-        !locate(with, b, finders[b], maps, p, pair.reach, found, flipped, to.counters))
+        !locate(with, b, finders[b], maps, p, inwardAt(p, samples[s]), pair.reach, found, flipped, to.counters))
       continue;
     if (found.distance < 0.0) {
       ++inside.inside;

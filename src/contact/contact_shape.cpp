@@ -19,6 +19,7 @@ constexpr double kLongEdge = 0.1;    // of the body's least extent: shorter edge
 constexpr double kFlatEdge = 0.996;  // cosine between neighbours: about 5 degrees
 constexpr int kMostEdgeSamples = 64;
 constexpr std::size_t kThicknessRays = 48;
+constexpr double kFacing = 0.1;       // cosine: a face pushes a body's point into the body
 constexpr std::uintptr_t kAsked = 4;  // times that the bins are searched before a cell is filled
 constexpr double kTie = 1e-9;         // relative: two features are equally near
 
@@ -251,52 +252,136 @@ const ContactShape::Cell* ContactShape::fill(std::size_t index, const std::array
 
 namespace {
 
-// The nearest so far.
+// What a facet is to a point.
+struct Measured {
+  double squared = 0.0, over = 0.0;  // [m^2] distance, [m] height over the plane
+  std::array<double, 3> weights{};
+  bool above = false;
+};
+
+Measured measure(const Facet& f, const Vec3& p) {
+  Measured m;
+  const Vec3 ap = p - f.a;
+  m.over = f.normal.dot(ap);
+  const double d1 = f.ab.dot(ap), d2 = f.ac.dot(ap);
+  const double v = f.g00 * d1 + f.g01 * d2, w = f.g01 * d1 + f.g11 * d2;
+  m.above = v >= 0.0 && w >= 0.0 && v + w <= 1.0 && f.g00 > 0.0;
+  if (m.above) {
+    m.weights = {1.0 - v - w, v, w};
+    m.squared = m.over * m.over;
+  } else {
+    const Vec3 u = nearestWeights(p, f.a, f.a + f.ab, f.a + f.ac);
+    m.weights = {u.x(), u.y(), u.z()};
+    m.squared = (ap - u.y() * f.ab - u.z() * f.ac).squaredNorm();
+  }
+  return m;
+}
+
+// The nearest so far; where several are as near, settle() decides, whatever order they come in.
 struct Best {
+  explicit Best(double size) : least_tie(1e-20 * size * size) {}
+
+  double least_tie;  // [m^2]
   double squared = std::numeric_limits<double>::infinity();
   double distance = std::numeric_limits<double>::infinity();
   double height = 0.0;  // over the plane of its triangle
+  bool tied = false;
+
+  double tie() const { return kTie * squared + least_tie; }
 
   void offer(const Facet& f, const Vec3& p, ContactShape::Nearest& found) {
     const double bound = distance + f.radius;
-    if ((p - f.centre).squaredNorm() > bound * bound * (1.0 + kTie)) return;
-    const Vec3 ap = p - f.a;
-    const double over = f.normal.dot(ap);
-    const double tie = kTie * squared;
-    if (over * over > squared + tie) return;
-    const double d1 = f.ab.dot(ap), d2 = f.ac.dot(ap);
-    const double v = f.g00 * d1 + f.g01 * d2, w = f.g01 * d1 + f.g11 * d2;
-    double here;
-    std::array<double, 3> weights;
-    const bool above = v >= 0.0 && w >= 0.0 && v + w <= 1.0 && f.g00 > 0.0;
-    if (above) {
-      weights = {1.0 - v - w, v, w};
-      here = over * over;
-    } else {
-      const Vec3 u = nearestWeights(p, f.a, f.a + f.ab, f.a + f.ac);
-      weights = {u.x(), u.y(), u.z()};
-      here = (ap - u.y() * f.ab - u.z() * f.ac).squaredNorm();
-    }
-    // On ties the larger plane distance, then the lower number: whatever order they come in.
-    const bool nearer = here < squared - tie;
-    if (!nearer) {
-      if (!(here <= squared + tie)) return;
-      const double a = std::abs(over), b = std::abs(height);
-      if (!(a > b * (1.0 + kTie) || (a >= b * (1.0 - kTie) && f.triangle < found.triangle))) return;
-    }
-    squared = std::min(squared, here);
+    if ((p - f.centre).squaredNorm() > bound * bound * (1.0 + kTie) + least_tie) return;
+    const double over = f.normal.dot(p - f.a);
+    if (over * over > squared + tie()) return;
+    const Measured m = measure(f, p);
+    if (m.squared > squared + tie() || f.triangle == found.triangle) return;
+    const bool nearer = m.squared < squared - tie();
+    tied = !nearer;
+    if (!(m.squared < squared)) return;
+    squared = m.squared;
     distance = std::sqrt(squared);
     height = over;
     found.triangle = f.triangle;
-    found.weights = weights;
-    found.above = above;
+    found.weights = m.weights;
+    found.above = m.above;
   }
+};
+
+// At an edge or a corner. The sign is that of the normals about it, weighted by their angles (Baerentzen and Aanaes
+// 2005); of the faces on that side the one whose plane is farthest is meant, and of equal ones the first.
+class Settler {
+ public:
+  explicit Settler(const Best& best) : limit_(best.squared + 4.0 * best.tie()) {}
+
+  void offer(const Facet& f, const Vec3& p) {
+    const Measured m = measure(f, p);
+    if (!(m.squared <= limit_)) return;
+    for (std::size_t k = 0; k < count_; ++k)
+      if (faces_[k].triangle == f.triangle) return;  // bins show a triangle more than once
+    const Vec3 corners[3] = {f.a, f.a + f.ab, f.a + f.ac};
+    constexpr double kAt = 1e-9;  // barycentric
+    int at = 0;
+    double angle = 3.14159265358979323846;
+    for (int k = 0; k < 3; ++k) at += m.weights[k] > kAt;
+    if (at == 1) {
+      const int k = static_cast<int>(std::max_element(m.weights.begin(), m.weights.end()) - m.weights.begin());
+      const Vec3 u = (corners[(k + 1) % 3] - corners[k]).normalized(),
+                 v = (corners[(k + 2) % 3] - corners[k]).normalized();
+      angle = std::acos(std::clamp(u.dot(v), -1.0, 1.0));
+    } else if (at == 3) {
+      angle *= 2.0;
+    }
+    normals_ += angle * f.normal;
+    away_ = p - (m.weights[0] * corners[0] + m.weights[1] * corners[1] + m.weights[2] * corners[2]);
+    if (count_ < faces_.size()) faces_[count_++] = {f.triangle, m.over, m.weights, m.above};
+  }
+
+  /// +1 outside, -1 inside.
+  double settle(ContactShape::Nearest& found) const {
+    const double sign = normals_.dot(away_) < 0.0 ? -1.0 : 1.0;
+    const Face* best = nullptr;
+    const auto better = [&](const Face& a, const Face& b) {
+      const bool on_side_a = a.over * sign >= 0.0, on_side_b = b.over * sign >= 0.0;
+      if (on_side_a != on_side_b) return on_side_a;
+      if (std::abs(a.over) != std::abs(b.over)) return std::abs(a.over) > std::abs(b.over);
+      return a.triangle < b.triangle;
+    };
+    for (std::size_t k = 0; k < count_; ++k)
+      if (!best || better(faces_[k], *best)) best = &faces_[k];
+    if (best) {
+      found.triangle = best->triangle;
+      found.weights = best->weights;
+      found.above = best->above;
+    }
+    return sign;
+  }
+
+ private:
+  struct Face {
+    Index triangle;
+    double over;
+    std::array<double, 3> weights;
+    bool above;
+  };
+  double limit_;
+  Vec3 normals_ = Vec3::Zero(), away_ = Vec3::Zero();
+  std::array<Face, 48> faces_;  // more never share a corner but in fans, of which any face will do
+  std::size_t count_ = 0;
 };
 
 }  // namespace
 
+template <class Visit>
+void ContactShape::visitNear(const Vec3& rest, double radius, const Visit& visit) const {
+  Box box;
+  box.min = rest.array() - radius;
+  box.max = rest.array() + radius;
+  visitBins(box, visit);
+}
+
 bool ContactShape::searchBins(const Vec3& rest, Nearest& found) const {
-  Best best;
+  Best best(size_);
   Box box;
   const Vec3 outside = (bounds_.min - rest).cwiseMax(rest - bounds_.max).cwiseMax(0.0);
   const double farthest = (bounds_.max - bounds_.min).norm() + outside.norm();
@@ -306,7 +391,14 @@ bool ContactShape::searchBins(const Vec3& rest, Nearest& found) const {
     visitBins(box, [&](Index t) { best.offer(makeFacet(surface_, t), rest, found); });
     if (best.distance <= radius || radius > farthest) break;
   }
-  found.distance = std::copysign(best.distance, best.height);
+  double sign = best.height;
+  if (best.tied) {
+    Settler settler(best);
+    const double around = best.distance + 1e-6 * size_;
+    visitNear(rest, around, [&](Index t) { settler.offer(makeFacet(surface_, t), rest); });
+    sign = settler.settle(found);
+  }
+  found.distance = std::copysign(best.distance, sign);
   return found.triangle != kNoIndex;
 }
 
@@ -326,10 +418,41 @@ bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
     return searchBins(rest, found);
   }
   const Cell* cell = known > kAsked ? reinterpret_cast<const Cell*>(known) : fill(index, at);
-  Best best;
+  Best best(size_);
   for (const Facet& f : cell->facets) best.offer(f, rest, found);
-  found.distance = std::copysign(best.distance, best.height);
+  double sign = best.height;
+  if (best.tied) {
+    Settler settler(best);
+    for (const Facet& f : cell->facets) settler.offer(f, rest);
+    sign = settler.settle(found);
+  }
+  found.distance = std::copysign(best.distance, sign);
   return found.triangle != kNoIndex;
+}
+
+bool ContactShape::nearest(const Vec3& rest, const Vec3& inward, double slack, Nearest& found) const {
+  if (!nearest(rest, found)) return false;
+  if (std::abs(found.distance) > slack || makeFacet(surface_, found.triangle).normal.dot(inward) > kFacing) return true;
+  double best = slack + std::abs(found.distance);
+  Nearest other;
+  visitNear(rest, best, [&](Index t) {
+    const Facet f = makeFacet(surface_, t);
+    if (!(f.normal.dot(inward) > kFacing)) return;
+    const Vec3 u = nearestWeights(rest, f.a, f.a + f.ab, f.a + f.ac);
+    const Vec3 ap = rest - f.a;
+    const double distance = (ap - u.y() * f.ab - u.z() * f.ac).norm(), height = f.normal.dot(ap);
+    // One of its own plane's: a face round the corner is farther than its plane is.
+    if (!(distance < best) || std::abs(height) < 0.99 * distance - 1e-9 * size_) return;
+    if (distance == best && t > other.triangle) return;
+    best = distance;
+    other.triangle = t;
+    other.weights = {u.x(), u.y(), u.z()};
+    other.distance = std::copysign(distance, height);
+    other.above = true;
+  });
+  // Outside of that face the point does not touch; inside of it the sign is its own.
+  if (other.triangle != kNoIndex && other.distance <= 0.0) found = other;
+  return true;
 }
 
 Index ContactShape::across(Index triangle, int corner) const {
@@ -429,10 +552,17 @@ void ContactShape::chooseSamples(double spacing) {
       }
   }
   std::vector<bool> used(vertices.size(), surface_.triangles.empty());
+  Points normals(vertices.size(), Vec3::Zero());
   for (const Triangle& t : surface_.triangles)
-    for (Index v : t) used[v] = true;
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 &p = vertices[t[k]], &q = vertices[t[(k + 1) % 3]], &r = vertices[t[(k + 2) % 3]];
+      // By the angle, so that it does not matter how faces are divided into triangles.
+      const Vec3 pq = (q - p).normalized(), pr = (r - p).normalized();
+      normals[t[k]] += std::acos(std::clamp(pq.dot(pr), -1.0, 1.0)) * pq.cross(pr).normalized();
+      used[t[k]] = true;
+    }
   for (Index v = 0; v < vertices.size(); ++v)
-    if (chosen[v] && used[v]) samples_.push_back({{v, v}, 0.0});
+    if (chosen[v] && used[v]) samples_.push_back({{v, v}, 0.0, normals[v].normalized()});
 
   const double least = kLongEdge * size_;
   struct Edge {
@@ -458,7 +588,7 @@ void ContactShape::chooseSamples(double spacing) {
     const double half = 0.5 * depthAlong(0.5 * (p + q), inwards, longest);
     const double length = (q - p).norm();
     const int parts = std::min(kMostEdgeSamples, static_cast<int>(std::ceil(0.999 * length / half)));
-    for (int n = 1; n < parts; ++n) samples_.push_back({{e.low, e.high}, static_cast<double>(n) / parts});
+    for (int n = 1; n < parts; ++n) samples_.push_back({{e.low, e.high}, static_cast<double>(n) / parts, -inwards});
   }
 }
 

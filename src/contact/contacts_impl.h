@@ -113,7 +113,8 @@ struct Contacts::Impl {
   std::vector<PairFindings> pair_findings;
 
   bool locate(const ContactParty& b, Index party, const MapFinder& finder, const ContactMap* maps, const Vec3& p,
-              double reach, ContactShape::Nearest& found, bool& flipped, ContactCounters& counters) const;
+              const Vec3& inward, double reach, ContactShape::Nearest& found, bool& flipped,
+              ContactCounters& counters) const;
   void addContact(Findings& to, const std::vector<ContactParty>& parties, Index a, Index sample, Index b,
                   Index triangle, const std::array<double, 3>& weights, bool was_caught, bool flipped);
   bool stillOver(std::size_t& cursor, const ContactParty& with, Index a, Index b, Index sample, const Vec3& p,

@@ -23,6 +23,7 @@ struct SurfaceRows {
 struct ContactSample {
   std::array<Index, 2> vertices{};  // the same twice for a vertex
   double share = 0.0;               // of the second
+  Vec3 normal = Vec3::Zero();       // unit, outwards at rest
 };
 
 class ContactShape {
@@ -44,6 +45,10 @@ class ContactShape {
   /// triangle; on ties (an edge, a vertex) of the one with the larger plane distance. False without triangles, or for
   /// NaN. Thread-safe.
   bool nearest(const Vec3& rest, Nearest& found) const;
+  /// The same for a point of another body that reaches into that one along `inward` (unit, in this rest frame): near an
+  /// edge, a face that would push it away from its own body gives way to one that does not and is at most `slack` [m]
+  /// farther. Cubes that lie exactly along each other are held by their tops, not by their sides.
+  bool nearest(const Vec3& rest, const Vec3& inward, double slack, Nearest& found) const;
 
   /// The triangle across the edge that lies against a corner of a triangle; kNoIndex at a border. Made when first asked
   /// for; thread-safe.
@@ -68,6 +73,8 @@ class ContactShape {
   struct Cell;
   const Cell* fill(std::size_t index, const std::array<int, 3>& at) const;
   bool searchBins(const Vec3& rest, Nearest& found) const;
+  template <class Visit>
+  void visitNear(const Vec3& rest, double radius, const Visit& visit) const;
   void binTriangles();
   template <class Visit>
   void visitBins(const Box& box, const Visit& visit) const;
