@@ -288,6 +288,35 @@ TEST(Sleep, AMovedPickAndItsReleaseWakeIt) {
   }
 }
 
+// The spring of a sleeper keeps its force, and moves nothing.
+TEST(Sleep, ABodyThatSleepsOnAStretchedSpringMovesByNoBitAndTheSpringKeepsItsForce) {
+  WorldSettings settings;
+  settings.gravity.setZero();
+  settings.ground.reset();
+  World world(settings);
+  add(world, cube("hung", Vec3::Zero()));
+  PickCommand pick;
+  for (const double side : {-1.0, 1.0}) {
+    pick.point = Vec3(side * 0.05, 0, 0);
+    const PickReply picked = replyOf<PickReply>(world.apply(pick));
+    replyOf<Done>(world.apply(LockCommand{picked.pick, picked.position + Vec3(0.02 * side, 0, 0)}));
+  }
+  int steps = 0;
+  double force = 0.0;
+  while (steps < 2400 && reportOf(world).asleep == 0) {
+    force = world.snapshot({}).picks[0].force.norm();
+    world.step();
+    ++steps;
+  }
+  ASSERT_EQ(reportOf(world).asleep, 1u);
+  ASSERT_GT(force, 0.1);
+  const std::vector<Points> before = particlesOf(world);
+  for (int step = 0; step < 60; ++step) world.step();
+  ASSERT_EQ(reportOf(world).asleep, 1u);
+  EXPECT_EQ(particlesOf(world), before);
+  EXPECT_NEAR(world.snapshot({}).picks[0].force.norm(), force, 0.05 * force);
+}
+
 TEST(Sleep, AMaterialWakesItsIslandAndNoOther) {
   expectWakes("material", [](World& world) {
     SetMaterialCommand set;
