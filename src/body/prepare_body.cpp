@@ -126,8 +126,9 @@ std::vector<double> shareMass(const BodyDef& def, const TriangleMesh& mesh, cons
   const NearestPoints nearest(rest);
   double total = def.material.density * volume;
   if (solid) {
-    // A third of the spacing: samples half way between two particles would all fall to the same one.
-    const LatticeSample lattice = sampleInterior(mesh, *solid, spacing / 3.0, 0.0, kMaxParticles, true);
+    // A third of the spacing: samples half way between two particles would all fall to the same one. A little less, so
+    // that a layer in the faces of a box is inside of all of them, and not of some by rounding.
+    const LatticeSample lattice = sampleInterior(mesh, *solid, (1.0 - 1e-9) * spacing / 3.0, 0.0, kMaxParticles);
     for (const Vec3& p : lattice.points) giveToNearest(nearest, rest, p, 1.0, share);
   } else {  // an open surface is a shell as thick as its spacing
     total = def.material.density * surfaceArea(mesh) * spacing;

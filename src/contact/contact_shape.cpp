@@ -19,6 +19,7 @@ constexpr double kLongEdge = 0.1;    // of the body's least extent: shorter edge
 constexpr double kFlatEdge = 0.996;  // cosine between neighbours: about 5 degrees
 constexpr int kMostEdgeSamples = 64;
 constexpr std::size_t kThicknessRays = 48;
+constexpr double kOnRim = 1e-6;          // of a squared distance: straight above the rim of a face
 constexpr double kFacing = 0.1;       // cosine: a face pushes a body's point into the body
 constexpr std::uintptr_t kAsked = 4;  // times that the bins are searched before a cell is filled
 constexpr double kTie = 1e-9;         // relative: two features are equally near
@@ -273,6 +274,7 @@ Measured measure(const Facet& f, const Vec3& p) {
     const Vec3 u = nearestWeights(p, f.a, f.a + f.ab, f.a + f.ac);
     m.weights = {u.x(), u.y(), u.z()};
     m.squared = (ap - u.y() * f.ab - u.z() * f.ac).squaredNorm();
+    m.above = m.squared <= (1.0 + kOnRim) * m.over * m.over;
   }
   return m;
 }
@@ -312,7 +314,8 @@ struct Best {
 // 2005); of the faces on that side the one whose plane is farthest is meant, and of equal ones the first.
 class Settler {
  public:
-  explicit Settler(const Best& best) : limit_(best.squared + 4.0 * best.tie()) {}
+  explicit Settler(const Best& best)
+      : limit_(best.squared + 4.0 * best.tie()), touches_(best.squared <= 16.0 * best.least_tie) {}
 
   void offer(const Facet& f, const Vec3& p) {
     const Measured m = measure(f, p);
@@ -333,15 +336,19 @@ class Settler {
       angle *= 2.0;
     }
     normals_ += angle * f.normal;
-    away_ = p - (m.weights[0] * corners[0] + m.weights[1] * corners[1] + m.weights[2] * corners[2]);
+    if (f.triangle < first_) {
+      first_ = f.triangle;
+      away_ = p - (m.weights[0] * corners[0] + m.weights[1] * corners[1] + m.weights[2] * corners[2]);
+    }
     if (count_ < faces_.size()) faces_[count_++] = {f.triangle, m.over, m.weights, m.above};
   }
 
   /// +1 outside, -1 inside.
   double settle(ContactShape::Nearest& found) const {
-    const double sign = normals_.dot(away_) < 0.0 ? -1.0 : 1.0;
+    const double sign = !touches_ && normals_.dot(away_) < 0.0 ? -1.0 : 1.0;
     const Face* best = nullptr;
     const auto better = [&](const Face& a, const Face& b) {
+      if (touches_) return a.triangle < b.triangle;  // heights are rounding
       const bool on_side_a = a.over * sign >= 0.0, on_side_b = b.over * sign >= 0.0;
       if (on_side_a != on_side_b) return on_side_a;
       if (std::abs(a.over) != std::abs(b.over)) return std::abs(a.over) > std::abs(b.over);
@@ -365,6 +372,8 @@ class Settler {
     bool above;
   };
   double limit_;
+  bool touches_;  // on the surface itself, which is not inside
+  Index first_ = kNoIndex;
   Vec3 normals_ = Vec3::Zero(), away_ = Vec3::Zero();
   std::array<Face, 48> faces_;  // more never share a corner but in fans, of which any face will do
   std::size_t count_ = 0;

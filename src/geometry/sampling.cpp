@@ -9,20 +9,19 @@ namespace {
 
 /// The lattice's points inside; stops (false) beyond max_points.
 bool collect(const Box& box, const SolidQuery& query, double spacing, double clearance, std::size_t max_points,
-             bool beside, Points& points) {
+             Points& points) {
   points.clear();
-  const Vec3 centre = (0.5 * (box.min + box.max)).array() + (beside ? 0.5 * spacing : 0.0);
+  const Vec3 centre = 0.5 * (box.min + box.max);
   // Half an interval and a little, so that rounding does not lose a layer that touches the bounds.
   std::array<long, 3> reach;
   for (int k = 0; k < 3; ++k)
     reach[k] = static_cast<long>(std::floor(0.5 * (box.max[k] - box.min[k]) / spacing + 1e-9));
-  const long extra = beside ? 1 : 0;
-  for (long k = -reach[2] - extra; k <= reach[2]; ++k)
-    for (long j = -reach[1] - extra; j <= reach[1]; ++j) {
+  for (long k = -reach[2]; k <= reach[2]; ++k)
+    for (long j = -reach[1]; j <= reach[1]; ++j) {
       // No surface is nearer than `known` to where it was measured: up to there, a line's points are all on its side.
       double known = 0.0;
       bool inside = false;
-      for (long i = -reach[0] - extra; i <= reach[0]; ++i, known -= spacing) {
+      for (long i = -reach[0]; i <= reach[0]; ++i, known -= spacing) {
         const Vec3 p = centre + spacing * Vec3(static_cast<double>(i), static_cast<double>(j), static_cast<double>(k));
         const bool decided = inside ? known > clearance && known > 0.0 : known > 0.0;
         if (!decided) {
@@ -40,7 +39,7 @@ bool collect(const Box& box, const SolidQuery& query, double spacing, double cle
 }  // namespace
 
 LatticeSample sampleInterior(const TriangleMesh& mesh, const SolidQuery& query, double spacing, double clearance,
-                             std::size_t max_points, bool beside) {
+                             std::size_t max_points) {
   LatticeSample sample;
   const Box box = boundsOf(mesh.vertices);
   if (!(spacing > 0.0) || !std::isfinite(spacing) || !(clearance >= 0.0) || box.empty()) return sample;
@@ -52,7 +51,7 @@ LatticeSample sampleInterior(const TriangleMesh& mesh, const SolidQuery& query, 
   // Clearance can leave few points of a fine lattice, but then only the outermost layer is kept out.
   const double shell = surfaceArea(mesh) * clearance;
   if (volume > 2.0 * shell && sample.spacing_used < finest) sample.spacing_used = finest;
-  while (!collect(box, query, sample.spacing_used, clearance, max_points, beside, sample.points)) sample.spacing_used *= 1.05;
+  while (!collect(box, query, sample.spacing_used, clearance, max_points, sample.points)) sample.spacing_used *= 1.05;
   return sample;
 }
 

@@ -8,7 +8,7 @@ namespace meshless {
 namespace {
 
 constexpr double kStillFor = 0.5;     // [s]
-constexpr double kStillMean = 0.005;  // [1/s] times the body's size: root mean square of its particles' speeds
+constexpr double kStillMean = 0.01;   // [1/s] times the body's size: root mean square of its particles' speeds
 constexpr double kStillMost = 0.02;   // [1/s] likewise, of the fastest
 
 Index rootOf(std::vector<Index>& root, Index i) {

@@ -63,7 +63,9 @@ void World::step() {
     // What an elastic material needs beyond the scene's substeps is not needed by contacts between bodies.
     const int stride = std::max(1, substeps / w.settings.substeps);
     const std::vector<WorldBody*> near = w.bodiesInContact(h_frame);
-    for (Pick& pick : w.picks) pick.force.setZero();
+    for (Pick& pick : w.picks)
+      if (const WorldBody* body = w.find(pick.body); !body || !body->asleep)  // a body at rest is held as before
+        pick.force.setZero();
     w.push.force.setZero();
     w.push.touching = false;
     for (WorldBody* body : w.awake) body->low_current = false;
@@ -184,7 +186,7 @@ std::vector<WorldBody*> World::Impl::bodiesInContact(double h) {
 
 void World::Impl::pullSprings(double h, double h_frame) {
   for (Pick& pick : picks)
-    if (WorldBody* body = find(pick.body))
+    if (WorldBody* body = find(pick.body); body && !body->asleep)
       pick.force += pullGrasp(*body->model, pick, h, body->state.positions) * (h / h_frame);
 }
 
