@@ -533,7 +533,7 @@ void ContactSolver::solve(const ContactScene& scene, const std::vector<ContactPa
       w.tasks.push_back(island + 1);
   if (w.tasks.back() != plan.size()) w.tasks.push_back(plan.size());
   w.corrected.assign(w.tasks.size() - 1, 0);
-  for_each(w.tasks.size() - 1, [&](std::size_t task) {
+  runEach(for_each, w.tasks.size() - 1, [&](std::size_t task) {
     for (Index island = w.tasks[task]; island < w.tasks[task + 1]; ++island)
       w.solveIsland(island, contacts, fresh, w.corrected[task]);
   });

@@ -138,7 +138,7 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   const std::size_t pair_tasks = (w.pairs.size() + kTaskPairs - 1) / kTaskPairs;
   if (w.tasks.size() < ground_tasks + pair_tasks) w.tasks.resize(ground_tasks + pair_tasks);
   w.pair_findings.resize(w.pairs.size());
-  for_each(ground_tasks + pair_tasks, [&](std::size_t n) {
+  runEach(for_each, ground_tasks + pair_tasks, [&](std::size_t n) {
     Findings& task = w.tasks[n];
     task.clear();
     if (n < ground_tasks) {

@@ -274,7 +274,7 @@ void BodyBatch::stepChunks(const BatchStep& step, const BatchBody* in_place, Mat
                            b.motion.data(),
                            b.has_quadratic ? b.quadratic.data() : nullptr,
                            pseudoInverse};
-  for_each((b.padded + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+  runEach(for_each, (b.padded + kChunk - 1) / kChunk, [&](std::size_t chunk) {
     const FlushDenormals flush;
     BodiesScratch scratch;
     const std::size_t first = chunk * kChunk, size = std::min<std::size_t>(kChunk, b.padded - first);

@@ -118,7 +118,7 @@ void World::Impl::finishSubstep(double h) {
       preserve(*body->model, body->material, body->state, body->scratch, report.preserve_counters);
     body->surface_current = false;
   }
-  for_each((awake.size() + kTaskBodies - 1) / kTaskBodies, [&](std::size_t task) {
+  runEach(for_each, (awake.size() + kTaskBodies - 1) / kTaskBodies, [&](std::size_t task) {
     for (std::size_t b = task * kTaskBodies; b < std::min(awake.size(), (task + 1) * kTaskBodies); ++b)
       velocitiesFromPositions(*awake[b]->model, h, awake[b]->state, awake[b]->scratch);
   });

@@ -13,4 +13,10 @@ inline void oneAfterAnother(std::size_t count, const std::function<void(std::siz
   for (std::size_t i = 0; i < count; ++i) work(i);
 }
 
+/// The same without a copy of the work: a std::function of much that is captured would be allocated.
+template <class Work>
+void runEach(const ForEach& for_each, std::size_t count, const Work& work) {
+  for_each(count, std::cref(work));
+}
+
 }  // namespace meshless
