@@ -1,5 +1,5 @@
 // Run time of a frame of 1/60 s with contact: piles of unit cubes of 27 particles (contact_pile.h) that have fallen for
-// 180 frames, the median of the next 120, with four substeps. pile27/N is this package, bullet_vf/N and bullet_cl/N are
+// 180 frames, the median of the next 120, with four substeps. pile27/N is this package on one and on two threads, bullet_vf/N and bullet_cl/N are
 // Bullet's soft bodies from the same places in the same process (contact_bullet.h), textbook/N the paper's method,
 // asleep/1000 the pile after it fell asleep and awake/1000 the same pile kept awake, sweep/N and sweep_bullet_*/N the
 // growth with the number of bodies. Counters: `deepest` and `p99` penetration relative to the cubes' size, `height`
@@ -166,7 +166,12 @@ void registerRows() {
     add(name, [=](benchmark::State& s) { runPile(s, of_series, options, last); });
   };
   for (const int bodies : {100, 1000})
-    addPile("pile27/" + std::to_string(bodies) + "/1threads", "pile27", of(bodies), false);
+    for (const int threads : {1, 2}) {
+      PileOptions options = of(bodies);
+      options.threads = threads;
+      addPile("pile27/" + std::to_string(bodies) + "/" + std::to_string(threads) + "threads",
+              threads == 1 ? "pile27" : "pile27, 2 threads", options, false);
+    }
 #ifdef HAVE_BULLET
   const std::pair<const char*, BulletWay> ways[] = {{"bullet_vf", BulletWay::kLinks},
                                                     {"bullet_cl", BulletWay::kCluster}};

@@ -441,7 +441,12 @@ bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
 
 bool ContactShape::nearest(const Vec3& rest, const Vec3& inward, double slack, Nearest& found) const {
   if (!nearest(rest, found)) return false;
-  if (std::abs(found.distance) > slack || makeFacet(surface_, found.triangle).normal.dot(inward) > kFacing) return true;
+  if (std::abs(found.distance) > slack) return true;
+  const Triangle& c = surface_.triangles[found.triangle];
+  const Vec3& at = surface_.vertices[c[0]];
+  const Vec3 area = (surface_.vertices[c[1]] - at).cross(surface_.vertices[c[2]] - at);
+  const double facing = area.dot(inward);
+  if (facing > 0.0 && facing * facing > kFacing * kFacing * area.squaredNorm()) return true;
   double best = slack + std::abs(found.distance);
   Nearest other;
   visitNear(rest, best, [&](Index t) {

@@ -6,6 +6,7 @@
 
 #include "meshless_surgery/ros/border_check.h"
 #include "meshless_surgery/ros/cluster_markers.h"
+#include "meshless_surgery/ros/contact_markers.h"
 #include "meshless_surgery/ros/convert.h"
 #include "meshless_surgery/ros/surfaces.h"
 
@@ -14,6 +15,7 @@ namespace {
 
 constexpr std::size_t kMaxQueuedEvents = 10000;
 constexpr double kClustersRate = 10.0;  // [Hz]
+constexpr double kContactsRate = 30.0;  // [Hz]
 constexpr double kBehind = 0.95;  // a real-time factor below it is worth a warning
 
 std::chrono::steady_clock::duration periodOf(double rate) {
@@ -52,6 +54,8 @@ Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings
   strained_surfaces_topic_ = handle.advertise<meshless_surgery::Surfaces>("strained_surfaces", 2, on_surfaces);
   clusters_topic_ = handle.advertise<visualization_msgs::MarkerArray>(
       "clusters", 2, [this](const ros::SingleSubscriberPublisher&) { clusters_newcomer_ = true; });
+  contacts_topic_ = handle.advertise<visualization_msgs::MarkerArray>(
+      "contacts", 2, [this](const ros::SingleSubscriberPublisher&) { contacts_newcomer_ = true; });
   state_topic_ = handle.advertise<meshless_surgery::State>("state", 10);
   events_topic_ = handle.advertise<meshless_surgery::Event>("events", 1000);
   const auto advertiseTool = [&](const std::string& tool) {
@@ -66,6 +70,7 @@ Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings
 
   markers_due_.period = periodOf(settings_.markers_rate);
   clusters_due_.period = periodOf(kClustersRate);
+  contacts_due_.period = periodOf(kContactsRate);
   surfaces_due_.period = periodOf(settings_.surfaces_rate);
   points_due_.period = periodOf(settings_.points_rate);
   state_due_.period = periodOf(settings_.state_rate);
@@ -77,7 +82,7 @@ Publishers::~Publishers() { stop(); }
 
 void Publishers::start() {
   const auto now = Clock::now();
-  for (Cadence* cadence : {&markers_due_, &surfaces_due_, &clusters_due_, &points_due_, &state_due_, &tools_due_,
+  for (Cadence* cadence : {&markers_due_, &surfaces_due_, &clusters_due_, &contacts_due_, &points_due_, &state_due_, &tools_due_,
                            &diagnostics_due_}) {
     cadence->next = now;
   }
@@ -109,7 +114,7 @@ void Publishers::loop() {
   while (true) {
     publishEvents();
     publishTick(Clock::now());
-    const auto next = std::min({markers_due_.next, surfaces_due_.next, clusters_due_.next, points_due_.next,
+    const auto next = std::min({markers_due_.next, surfaces_due_.next, clusters_due_.next, contacts_due_.next, points_due_.next,
                                 state_due_.next, tools_due_.next, diagnostics_due_.next});
     std::unique_lock<std::mutex> lock(mutex_);
     changed_.wait_until(lock, next, [this] { return stopping_ || !events_.empty(); });
@@ -148,14 +153,17 @@ void Publishers::publishTick(Clock::time_point now) {
   surfaces = surfaces && (surfaces_newcomer_.exchange(false) || revision != surfaces_revision_);
   bool clusters = clusters_due_.due(now) && clusters_topic_.getNumSubscribers() > 0;
   clusters = clusters && (clusters_newcomer_.exchange(false) || revision != clusters_revision_);
+  bool contacts = contacts_due_.due(now) && contacts_topic_.getNumSubscribers() > 0;
+  contacts = contacts && (contacts_newcomer_.exchange(false) || revision != contacts_revision_);
   const bool state = state_due_.due(now) && state_topic_.getNumSubscribers() > 0;
   const bool tools = tools_due_.due(now);
-  if (!markers && !surfaces && !clusters && !points && !state && !tools) return;
+  if (!markers && !surfaces && !clusters && !contacts && !points && !state && !tools) return;
 
   SnapshotWants wants;
   wants.surfaces = markers || surfaces;
   wants.particles = points || clusters;
   wants.measures = state;
+  wants.contacts = contacts;
   // The stamp comes first: who sees one later than an answer sees what was answered.
   std_msgs::Header header;
   header.stamp = ros::Time::now();
@@ -175,6 +183,11 @@ void Publishers::publishTick(Clock::time_point now) {
     ++clusters_built_;
     clusters_revision_ = revision;
     clusters_topic_.publish(clusterMarkers(*snapshot, header));
+  }
+  if (contacts) {
+    ++contacts_built_;
+    contacts_revision_ = revision;
+    contacts_topic_.publish(contactMarkers(*snapshot, header));
   }
   if (points) {
     ++points_built_;
@@ -274,6 +287,7 @@ void Publishers::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   status.add("marker arrays built", markers_built_);
   status.add("surfaces built", surfaces_built_);
   status.add("clusters built", clusters_built_);
+  status.add("contacts built", contacts_built_);
   status.add("point clouds built", points_built_);
   status.add("states built", states_built_);
 }

@@ -125,7 +125,7 @@ WorldBody& World::Impl::admit(std::string name, Material material, BodyModelPtr 
   body->model = std::move(model);
   body->state = std::move(state);
   bodies.push_back(std::move(body));
-  batches_current = false;
+  batches_current = contacts_current = false;
   return *bodies.back();
 }
 
@@ -136,7 +136,7 @@ void World::Impl::retire(const BodyId& id) {
       free_slots.push_back(id.slot);
       bodies.erase(it);
       batches.clear();
-      batches_current = false;
+      batches_current = contacts_current = false;
       return;
     }
 }
@@ -259,6 +259,12 @@ WorldSnapshot World::snapshot(const SnapshotWants& wants) {
     shot.bodies.push_back(std::move(b));
   }
   for (const auto& obstacle : w.obstacles) shot.obstacles.push_back(obstacle->def);
+  if (wants.contacts && w.contacts_current) {
+    std::vector<Contacts::Point> points;
+    w.contacts.points(w.parties, points);
+    for (const Contacts::Point& p : points)
+      shot.contacts.push_back({p.position, p.normal, p.impulse / (w.last_substep * w.last_substep)});
+  }
   shot.picks = w.picks;
   for (const Pick& pick : w.picks)
     if (const WorldBody* body = w.find(pick.body)) shot.pick_bodies[pick.id] = body->name;

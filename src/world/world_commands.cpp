@@ -210,7 +210,7 @@ Result<Reply> World::Impl::apply(const SetMaterialCommand& command) {
   }
   for (auto& [body, material] : changes) {
     wake(*body);
-    batches_current = false;
+    batches_current = contacts_current = false;
     body->model = withMaterial(body->model, body->material, material);
     body->material = material;
   }

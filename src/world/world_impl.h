@@ -120,6 +120,8 @@ struct World::Impl {
   bool batches_current = false;  // false: bodies or materials have changed
   Contacts contacts;
   std::vector<LoadedPair> loaded;
+  bool contacts_current = false;  // bodies are those of the last step
+  double last_substep = 0.0;      // [s]
   std::vector<ContactParty> parties;  // one a body, in their order, where contacts are found in rest shapes
   std::map<const BodyModel*, std::weak_ptr<const ContactModel>> contact_models;
 

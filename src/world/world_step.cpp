@@ -104,6 +104,10 @@ void World::step() {
       if (const WorldBody* body = w.find(pick.body))
         pick.position = graspMean(pick, body->state.positions) + pick.offset;
     w.fallAsleep(h_frame);
+    if (rest_shape) {
+      w.contacts_current = true;
+      w.last_substep = h;
+    }
     ++w.step;
     w.report.bodies = w.bodies.size();
     for (const auto& body : w.bodies) w.report.asleep += body->asleep;

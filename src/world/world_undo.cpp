@@ -68,6 +68,7 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
     }
   }
 
+  contacts_current = false;
   contacts.clear();  // what pressed then is not what presses now
 
   picks.clear();

@@ -333,7 +333,7 @@ class DiagnosticsTest(DeformerTestCase):
         self.good('step', steps=100)
         _, after = self.values()
         self.assertGreater(int(after['steps']), int(before['steps']))
-        for key in ('marker arrays built', 'surfaces built', 'clusters built', 'point clouds built', 'states built'):
+        for key in ('marker arrays built', 'surfaces built', 'clusters built', 'contacts built', 'point clouds built', 'states built'):
             self.assertEqual(before[key], after[key], key)
         markers = self.deformer.recorder('markers', MarkerArray)
         markers.wait()

@@ -54,15 +54,16 @@ class Publishers {
   const Rejections& rejections_;
   MarkerBuilder markers_;
 
-  ros::Publisher clusters_topic_, surfaces_topic_, strained_surfaces_topic_;
+  ros::Publisher clusters_topic_, contacts_topic_, surfaces_topic_, strained_surfaces_topic_;
   ros::Publisher markers_topic_, points_topic_, state_topic_, events_topic_;
   ros::Publisher pick_pose_, push_pose_, scissors_pose_;
   tf2_ros::TransformBroadcaster broadcaster_;
   diagnostic_updater::Updater updater_;
 
-  Cadence surfaces_due_, clusters_due_;
-  std::atomic<bool> surfaces_newcomer_{false}, clusters_newcomer_{false};
+  Cadence surfaces_due_, clusters_due_, contacts_due_;
+  std::atomic<bool> surfaces_newcomer_{false}, clusters_newcomer_{false}, contacts_newcomer_{false};
   std::uint64_t clusters_revision_ = 0, clusters_built_ = 0;
+  std::uint64_t contacts_revision_ = 0, contacts_built_ = 0;
   std::uint64_t surfaces_revision_ = 0, surfaces_built_ = 0;
   Cadence markers_due_, points_due_, state_due_, tools_due_, diagnostics_due_;
   std::atomic<bool> markers_newcomer_{false}, points_newcomer_{false};

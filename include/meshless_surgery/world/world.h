@@ -98,6 +98,14 @@ struct SnapshotWants {
   bool surfaces = false;
   bool particles = false;
   bool measures = false;
+  bool contacts = false;  // of the last step, with ContactMethod::kRestShape; none after a change of bodies
+};
+
+/// A point of a body's surface that carries load.
+struct ContactPoint {
+  Vec3 position = Vec3::Zero();
+  Vec3 normal = Vec3::UnitZ();  // unit, of the force on the body
+  double force = 0.0;           // [N] along it, in the last substep
 };
 
 struct BodySnapshot {
@@ -120,6 +128,7 @@ struct WorldSnapshot {
   std::uint32_t run = 0;  // grows with each reset: messages of an older run are void
   std::vector<BodySnapshot> bodies;
   std::vector<std::shared_ptr<const ObstacleDef>> obstacles;
+  std::vector<ContactPoint> contacts;  // where wanted
   std::vector<Pick> picks;
   std::map<PickId, std::string> pick_bodies;
   PushSphere push;

@@ -1,0 +1,54 @@
+#include "meshless_surgery/ros/contact_markers.h"
+
+#include <algorithm>
+
+#include "meshless_surgery/ros/convert.h"
+
+namespace meshless {
+namespace {
+
+using visualization_msgs::Marker;
+
+constexpr double kPoint = 0.25;  // diameter in particle spacings
+constexpr double kLine = 0.06;   // width in particle spacings
+
+Marker markerOf(const std_msgs::Header& header, const std::string& ns, int type, double size) {
+  Marker marker;
+  marker.header = header;
+  marker.ns = ns;
+  marker.type = type;
+  marker.pose.orientation.w = 1.0;
+  marker.scale.x = marker.scale.y = marker.scale.z = size;
+  marker.color.r = 1.0f;
+  marker.color.g = 0.75f;
+  marker.color.b = 0.1f;
+  marker.color.a = 1.0f;
+  return marker;
+}
+
+}  // namespace
+
+visualization_msgs::MarkerArray contactMarkers(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
+  visualization_msgs::MarkerArray array;
+  Marker all;
+  all.header = header;
+  all.action = Marker::DELETEALL;
+  array.markers.push_back(all);
+  double spacing = 0.0, most = 0.0;
+  for (const BodySnapshot& body : snapshot.bodies)
+    spacing = spacing > 0.0 ? std::min(spacing, body.model->spacing) : body.model->spacing;
+  for (const ContactPoint& point : snapshot.contacts) most = std::max(most, point.force);
+  if (snapshot.contacts.empty() || !(most > 0.0)) return array;
+  Marker points = markerOf(header, "points", Marker::SPHERE_LIST, kPoint * spacing);
+  Marker forces = markerOf(header, "forces", Marker::LINE_LIST, kLine * spacing);
+  for (const ContactPoint& point : snapshot.contacts) {
+    points.points.push_back(toPoint(point.position));
+    forces.points.push_back(toPoint(point.position));
+    forces.points.push_back(toPoint(point.position + (spacing * point.force / most) * point.normal));
+  }
+  array.markers.push_back(std::move(points));
+  array.markers.push_back(std::move(forces));
+  return array;
+}
+
+}  // namespace meshless
