@@ -524,9 +524,9 @@ void ContactShape::measureThickness() {
     if (depth < longest) depths.push_back(depth);
   }
   if (depths.empty()) return;
-  // Near edges rays are short however thick the body is: a tenth of them may be.
+  // Near edges rays are short however thick the body is: the middle one says how thick it is on the whole.
   std::sort(depths.begin(), depths.end());
-  thickness_ = depths[depths.size() / 10];
+  thickness_ = depths[depths.size() / 2];
 }
 
 void ContactShape::chooseSamples(double spacing) {

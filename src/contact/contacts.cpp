@@ -262,31 +262,38 @@ void Contacts::solve(const std::vector<ContactParty>& parties, double substep, c
   w.entries.resize(w.steady_entries);
   std::vector<char> fitted;
   const double falling = w.scene.gravity.norm() * substep * substep;
-  for (Pair pair : w.pairs) {
+  w.quick.resize(w.pairs.size());
+  for (std::size_t k = 0; k < w.pairs.size(); ++k) {
+    Pair pair = w.pairs[k];
     if (!pair.quick) continue;
-    if (fitted.empty()) fitted.assign(parties.size(), 0);
-    for (Index p : {pair.a, pair.b})
-      if (!fitted[p]) {
-        refit(p, w.maps_now[p]);
-        w.finders[p].make(w.maps_now[p].data(), static_cast<Index>(w.maps_now[p].size()));
-        fitted[p] = 1;
-      }
-    if (pair.way * substep >
-        kQuick * std::min(parties[pair.a].shape->thickness(), parties[pair.b].shape->thickness())) {
-      w.trace(parties, pair.a, pair.b, counters);
-      w.trace(parties, pair.b, pair.a, counters);
-    }
-    const double size = std::min(parties[pair.a].shape->size(), parties[pair.b].shape->size());
+    QuickFindings& quick = w.quick[k];
     const double thickness = std::min(parties[pair.a].shape->thickness(), parties[pair.b].shape->thickness());
-    pair.reach = kMargin * size + std::min(pair.way * substep + falling, kQuick * thickness);
-    const std::size_t before = w.contacts.size();
-    Inside ignored;
-    Findings found;
-    w.lookInto(found, parties, pair, pair.a, pair.b, w.maps_now[pair.b].data(), true, ignored);
-    w.lookInto(found, parties, pair, pair.b, pair.a, w.maps_now[pair.a].data(), true, ignored);
-    w.join(found, 0, found.contacts.size(), 0, found.entries.size());
-    counters.lookups += found.counters.lookups;
-    counters.contacts += w.contacts.size() - before;
+    // Many short substeps need no look in each of them: only when the bodies may have gone as far as the reach.
+    quick.moved += pair.way * substep;
+    if (w.fresh || !(quick.moved < kQuick * thickness)) {
+      quick.moved = 0.0;
+      if (fitted.empty()) fitted.assign(parties.size(), 0);
+      for (Index p : {pair.a, pair.b})
+        if (!fitted[p]) {
+          refit(p, w.maps_now[p]);
+          w.finders[p].make(w.maps_now[p].data(), static_cast<Index>(w.maps_now[p].size()));
+          fitted[p] = 1;
+        }
+      if (pair.way * substep > kQuick * thickness) {
+        w.trace(parties, pair.a, pair.b, counters);
+        w.trace(parties, pair.b, pair.a, counters);
+      }
+      const double size = std::min(parties[pair.a].shape->size(), parties[pair.b].shape->size());
+      pair.reach = kMargin * size + std::min(pair.way * w.frame + falling, kQuick * thickness);
+      Inside ignored;
+      quick.found.clear();
+      w.lookInto(quick.found, parties, pair, pair.a, pair.b, w.maps_now[pair.b].data(), true, ignored);
+      w.lookInto(quick.found, parties, pair, pair.b, pair.a, w.maps_now[pair.a].data(), true, ignored);
+      counters.lookups += quick.found.counters.lookups;
+      counters.contacts += quick.found.contacts.size();
+    }
+    quick.first = w.contacts.size();
+    w.join(quick.found, 0, quick.found.contacts.size(), 0, quick.found.entries.size());
   }
   if (!w.caught.empty()) w.addCaught(parties);
   const bool steady = w.contacts.size() == w.steady_contacts;
@@ -295,8 +302,17 @@ void Contacts::solve(const std::vector<ContactParty>& parties, double substep, c
     w.choosePasses(parties, substep);
   }
   w.plan_steady = steady;
-  w.solver.solve(w.scene, parties, w.contacts, w.entries, w.plan, w.fresh || !steady, for_each, counters);
-  w.fresh = !steady;
+  w.solver.solve(w.scene, parties, w.contacts, w.entries, w.plan, w.fresh || !steady || !w.was_steady, for_each, counters);
+  w.was_steady = steady;
+  w.fresh = false;
+  for (std::size_t k = 0; k < w.pairs.size(); ++k) {
+    if (!w.pairs[k].quick) continue;
+    QuickFindings& quick = w.quick[k];
+    for (std::size_t n = 0; n < quick.found.contacts.size(); ++n) {
+      quick.found.contacts[n].impulse = w.contacts[quick.first + n].impulse;
+      quick.found.contacts[n].slip_impulse = w.contacts[quick.first + n].slip_impulse;
+    }
+  }
 }
 
 void Contacts::loadedPairs(std::vector<LoadedPair>& pairs) const {

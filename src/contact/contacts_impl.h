@@ -82,6 +82,13 @@ struct PairFindings {
 double stackWork(const ContactScene& scene, const std::vector<ContactParty>& parties, const IslandPlan& plan,
                  Index island, double h);
 
+/// What was last found of a quick pair, and how far its bodies may have gone since.
+struct QuickFindings {
+  Findings found;
+  double moved = 0.0;     // [m]
+  std::size_t first = 0;  // its place among the contacts
+};
+
 struct Contacts::Impl {
   ContactScene scene;
   BroadPhase broad;
@@ -111,6 +118,8 @@ struct Contacts::Impl {
   bool plan_steady = true;                  // the plan is that of the steady contacts alone
   std::vector<Findings> tasks;
   std::vector<PairFindings> pair_findings;
+  std::vector<QuickFindings> quick;  // one a pair; of those that are quick
+  bool was_steady = true;            // the last solve had no others than the steady contacts
 
   bool locate(const ContactParty& b, Index party, const MapFinder& finder, const ContactMap* maps, const Vec3& p,
               const Vec3& inward, double reach, ContactShape::Nearest& found, bool& flipped,

@@ -57,7 +57,7 @@ class ContactShape {
   const TriangleMesh& surface() const { return surface_; }
   const std::vector<ContactSample>& samples() const { return samples_; }
   const Box& bounds() const { return bounds_; }
-  /// [m] least of some inward rays: who moves farther in a step can pass through.
+  /// [m] median of some inward rays: who moves farther in a step can pass through.
   double thickness() const { return thickness_; }
   /// [m] least edge of the bounds.
   double size() const { return size_; }
