@@ -11,6 +11,7 @@ namespace {
 constexpr double kLetOutShare = 0.3;   // of old overlap, a frame
 constexpr double kLetOutSpeed = 1.0;   // [1/s] times the smaller body's size, at most
 constexpr double kCaughtSpeed = 10.0;  // [1/s] likewise, of what has passed through
+constexpr double kRestingSpeed = 0.1;  // of the speed after a fall by half the size: slower bodies do not bounce
 constexpr Index kTaskContacts = 256;   // of a task at the least
 constexpr double kBeside = 0.02;       // barycentric: farther off its triangle a point does not touch it from outside
 constexpr double kFarBeside = 1.0;     // nor from inside
@@ -195,7 +196,6 @@ struct ContactSolver::Impl {
   const std::vector<ContactParty>* parties = nullptr;
   const std::vector<ContactEntry>* entries = nullptr;
   const IslandPlan* plan = nullptr;
-  double resting = 0.0;  // [m] a substep's approach that is no bounce
 
   Vec3 localShift(const Contact& c, bool of_a) const {
     const Index p = of_a ? c.a : c.b;
@@ -344,7 +344,7 @@ struct ContactSolver::Impl {
         readGap<true>(*scene, *parties, *row->contact, *entries, true, gap);
         row->distance = row->normal.dot(gap.point_a - gap.point_b);
         const double along = row->normal.dot(gap.motion);
-        row->target = targetOf(row->restitution, row->distance, along);
+        row->target = targetOf(*row, along);
         row->slip = gap.motion - along * row->normal;
       }
     }
@@ -439,7 +439,13 @@ struct ContactSolver::Impl {
     }
     const ContactParty &a = (*parties)[c.a], *b = row.on_ground ? nullptr : &(*parties)[c.b];
     row.restitution = !b ? a.restitution : b->mass > 0.0 ? std::sqrt(a.restitution * b->restitution) : a.restitution;
-    row.target = targetOf(row.restitution, row.distance, along_normal);
+    if (row.restitution > 0.0) {
+      // The bodies have to approach: particles of a body at rest that tremble would be kept trembling.
+      const double size = b ? std::min(a.shape->size(), b->shape->size()) : a.shape->size();
+      const double approach = c.normal.dot((b ? b->velocity : Vec3(Vec3::Zero())) - a.velocity);
+      if (!(approach > kRestingSpeed * std::sqrt(scene->gravity.norm() * size))) row.restitution = 0.0;
+    }
+    row.target = targetOf(row, along_normal);
     row.slip = gap.motion - along_normal * c.normal;
     row.friction = std::sqrt(a.friction * (b ? b->friction : scene->ground_friction));
     row.inverse_answer_along = 0.0;
@@ -462,12 +468,12 @@ struct ContactSolver::Impl {
   }
 
   // No nearer than at the start of the substep, nor than the surface. What bounces goes back from where it was at a
-  // share of the speed at which it came; what only rests does not.
-  double targetOf(double restitution, double distance, double motion) const {
-    const double before = distance - motion;
+  // share of the speed at which it came.
+  double targetOf(const Row& row, double motion) const {
+    const double before = row.distance - motion;
     const double rest = std::min(0.0, before);
-    if (!(restitution > 0.0) || !(distance < 0.0) || !(-motion > resting)) return rest;
-    return std::max(rest, before - restitution * motion);
+    if (!(row.restitution > 0.0) || !(row.distance < 0.0) || !(motion < 0.0)) return rest;
+    return std::max(rest, before - row.restitution * motion);
   }
 
   // One contact of a sweep; 1 where it moved something.
@@ -522,7 +528,6 @@ void ContactSolver::solve(const ContactScene& scene, const std::vector<ContactPa
                           const IslandPlan& plan, bool fresh, const ForEach& for_each, ContactCounters& counters) {
   Impl& w = *impl_;
   w.start(scene, parties, entries, plan);
-  w.resting = 2.0 * scene.gravity.norm() * scene.substep * scene.substep;
   // Rows are kept in place: an island has room for all of its contacts.
   w.rows.resize(plan.contacts.size());
   w.row_counts.resize(plan.size());

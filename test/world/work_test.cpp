@@ -34,12 +34,10 @@ void* take(std::size_t size) {
 
 }  // namespace
 
-#ifdef __SANITIZE_ADDRESS__
+#ifdef __SANITIZE_ADDRESS__  // which has its own, and tells new from malloc
 constexpr bool kCounts = false;
 #else
 constexpr bool kCounts = true;
-#endif
-#ifndef __SANITIZE_ADDRESS__  // which has its own, and tells new from malloc
 void* operator new(std::size_t size) { return take(size); }
 void* operator new[](std::size_t size) { return take(size); }
 void* operator new(std::size_t size, std::align_val_t align) {
