@@ -24,14 +24,20 @@ constexpr double kFacing = 0.1;       // cosine: a face pushes a body's point in
 constexpr std::uintptr_t kAsked = 4;  // times that the bins are searched before a cell is filled
 constexpr double kTie = 1e-9;         // relative: two features are equally near
 
+}  // namespace
+
 // Of a triangle, what a query needs, side by side in memory.
-struct Facet {
+struct ContactShape::Facet {
   Vec3 a, ab, ac, normal;
   Vec3 centre;
   double radius;
   double g00, g01, g11;  // inverse of the Gram matrix of ab and ac; zero where the triangle has no area
   Index triangle;
 };
+
+namespace {
+
+using Facet = ContactShape::Facet;
 
 Facet makeFacet(const TriangleMesh& mesh, Index t) {
   const Triangle& corners = mesh.triangles[t];
@@ -94,7 +100,7 @@ bool meets(const TriangleMesh& mesh, Index t, const Vec3& from, const Vec3& dire
 }  // namespace
 
 struct ContactShape::Cell {
-  std::vector<Facet> facets;
+  std::vector<Index> triangles;
 };
 
 ContactShape::ContactShape(const TriangleMesh& surface, const SurfaceRows& rows, double spacing)
@@ -106,6 +112,8 @@ ContactShape::ContactShape(const TriangleMesh& surface, const SurfaceRows& rows,
     rider_of_.assign(surface_.vertices.size(), kNoIndex);
     for (Index r = 0; r < rows_.riders->size(); ++r) rider_of_[(*rows_.riders)[r]] = r;
   }
+  facets_.reserve(surface_.triangles.size());
+  for (Index t = 0; t < surface_.triangles.size(); ++t) facets_.push_back(makeFacet(surface_, t));
   binTriangles();
   chooseSamples(spacing);
   measureThickness();
@@ -134,12 +142,12 @@ ContactShape::~ContactShape() {
 
 std::size_t ContactShape::bytes() const {
   std::size_t sum =
-      sizeof *this + surface_.vertices.size() * sizeof(Vec3) + surface_.triangles.size() * sizeof(Triangle) +
+      sizeof *this + surface_.vertices.size() * sizeof(Vec3) + facets_.size() * sizeof(Facet) + surface_.triangles.size() * sizeof(Triangle) +
       rider_of_.size() * sizeof(Index) + samples_.size() * sizeof(ContactSample) +
       (bin_offsets_.size() + bin_triangles_.size()) * sizeof(Index) + cell_total_ * sizeof(std::atomic<std::uintptr_t>);
   for (std::size_t i = 0; i < cell_total_; ++i)
     if (const std::uintptr_t cell = cells_[i].load(std::memory_order_acquire); cell > kAsked)
-      sum += sizeof(Cell) + reinterpret_cast<const Cell*>(cell)->facets.size() * sizeof(Facet);
+      sum += sizeof(Cell) + reinterpret_cast<const Cell*>(cell)->triangles.size() * sizeof(Index);
   return sum;
 }
 
@@ -234,13 +242,13 @@ const ContactShape::Cell* ContactShape::fill(std::size_t index, const std::array
     if (distanceToTriangle(surface_, t, centre) - half_diagonal > bound) continue;
     const Box b = boundsOf(surface_, t);
     const Vec3 gap = (b.min - box.max).cwiseMax(box.min - b.max).cwiseMax(0.0);
-    if (gap.norm() <= bound) cell->facets.push_back(makeFacet(surface_, t));
+    if (gap.norm() <= bound) cell->triangles.push_back(t);
   }
   // Nearest first: the others are then dismissed by their bounds.
-  std::stable_sort(cell->facets.begin(), cell->facets.end(), [&](const Facet& f, const Facet& g) {
-    return distanceToTriangle(surface_, f.triangle, centre) < distanceToTriangle(surface_, g.triangle, centre);
+  std::stable_sort(cell->triangles.begin(), cell->triangles.end(), [&](Index f, Index g) {
+    return distanceToTriangle(surface_, f, centre) < distanceToTriangle(surface_, g, centre);
   });
-  cell->facets.shrink_to_fit();
+  cell->triangles.shrink_to_fit();
   const std::uintptr_t made = reinterpret_cast<std::uintptr_t>(cell.get());
   std::uintptr_t known = cells_[index].load(std::memory_order_acquire);
   while (known <= kAsked)
@@ -397,14 +405,14 @@ bool ContactShape::searchBins(const Vec3& rest, Nearest& found) const {
   for (double radius = outside.norm() + 0.5 * bin_edge_;; radius *= 2.0) {
     box.min = rest.array() - radius;
     box.max = rest.array() + radius;
-    visitBins(box, [&](Index t) { best.offer(makeFacet(surface_, t), rest, found); });
+    visitBins(box, [&](Index t) { best.offer(facets_[t], rest, found); });
     if (best.distance <= radius || radius > farthest) break;
   }
   double sign = best.height;
   if (best.tied) {
     Settler settler(best);
     const double around = best.distance + 1e-6 * size_;
-    visitNear(rest, around, [&](Index t) { settler.offer(makeFacet(surface_, t), rest); });
+    visitNear(rest, around, [&](Index t) { settler.offer(facets_[t], rest); });
     sign = settler.settle(found);
   }
   found.distance = std::copysign(best.distance, sign);
@@ -428,11 +436,11 @@ bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
   }
   const Cell* cell = known > kAsked ? reinterpret_cast<const Cell*>(known) : fill(index, at);
   Best best(size_);
-  for (const Facet& f : cell->facets) best.offer(f, rest, found);
+  for (const Index t : cell->triangles) best.offer(facets_[t], rest, found);
   double sign = best.height;
   if (best.tied) {
     Settler settler(best);
-    for (const Facet& f : cell->facets) settler.offer(f, rest);
+    for (const Index t : cell->triangles) settler.offer(facets_[t], rest);
     sign = settler.settle(found);
   }
   found.distance = std::copysign(best.distance, sign);
@@ -442,19 +450,17 @@ bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
 bool ContactShape::nearest(const Vec3& rest, const Vec3& inward, double slack, Nearest& found) const {
   if (!nearest(rest, found)) return false;
   if (std::abs(found.distance) > slack) return true;
-  const Triangle& c = surface_.triangles[found.triangle];
-  const Vec3& at = surface_.vertices[c[0]];
-  const Vec3 area = (surface_.vertices[c[1]] - at).cross(surface_.vertices[c[2]] - at);
-  const double facing = area.dot(inward);
-  if (facing > 0.0 && facing * facing > kFacing * kFacing * area.squaredNorm()) return true;
+  if (facets_[found.triangle].normal.dot(inward) > kFacing) return true;
   double best = slack + std::abs(found.distance);
   Nearest other;
   visitNear(rest, best, [&](Index t) {
-    const Facet f = makeFacet(surface_, t);
+    const Facet& f = facets_[t];
     if (!(f.normal.dot(inward) > kFacing)) return;
-    const Vec3 u = nearestWeights(rest, f.a, f.a + f.ab, f.a + f.ac);
     const Vec3 ap = rest - f.a;
-    const double distance = (ap - u.y() * f.ab - u.z() * f.ac).norm(), height = f.normal.dot(ap);
+    const double height = f.normal.dot(ap), bound = best + f.radius;
+    if (std::abs(height) > best || (rest - f.centre).squaredNorm() > bound * bound * (1.0 + kTie)) return;
+    const Vec3 u = nearestWeights(rest, f.a, f.a + f.ab, f.a + f.ac);
+    const double distance = (ap - u.y() * f.ab - u.z() * f.ac).norm();
     // One of its own plane's: a face round the corner is farther than its plane is.
     if (!(distance < best) || std::abs(height) < 0.99 * distance - 1e-9 * size_) return;
     if (distance == best && t > other.triangle) return;

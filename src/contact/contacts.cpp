@@ -11,7 +11,7 @@ namespace meshless {
 namespace {
 
 constexpr std::size_t kTaskPairs = 32, kTaskParties = 128;  // looked at by one task
-constexpr Index kManyPartners = 4;    // from here on it pays to know how far a surface is from its map
+constexpr Index kManyPartners = 2;    // from here on it pays to know how far a surface is from its map
 constexpr double kDeviation = 0.1;    // of the bounds' diagonal: how far a surface may be from where its maps have it
 constexpr double kLongestStep = 0.5;  // of the smaller body's extent: how far quick bodies go in a substep
 

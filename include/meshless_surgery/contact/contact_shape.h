@@ -69,6 +69,8 @@ class ContactShape {
   std::size_t cellsFilled() const { return cells_filled_.load(std::memory_order_relaxed); }
   std::size_t bytes() const;
 
+  struct Facet;
+
  private:
   struct Cell;
   const Cell* fill(std::size_t index, const std::array<int, 3>& at) const;
@@ -83,6 +85,7 @@ class ContactShape {
   void measureThickness();
 
   TriangleMesh surface_;
+  std::vector<Facet> facets_;  // one a triangle
   SurfaceRows rows_;
   std::vector<Index> rider_of_;
   std::vector<ContactSample> samples_;
