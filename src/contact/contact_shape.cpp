@@ -132,6 +132,9 @@ ContactShape::ContactShape(const TriangleMesh& surface, const SurfaceRows& rows,
     cell_total_ *= static_cast<std::size_t>(cells_count_[d]);
   }
   cells_ = std::make_unique<std::atomic<std::uintptr_t>[]>(cell_total_);
+  distances_ = std::make_unique<std::atomic<float>[]>(cell_total_);
+  for (std::size_t i = 0; i < cell_total_; ++i)
+    distances_[i].store(std::numeric_limits<float>::quiet_NaN(), std::memory_order_relaxed);
 }
 
 ContactShape::~ContactShape() {
@@ -144,7 +147,7 @@ std::size_t ContactShape::bytes() const {
   std::size_t sum =
       sizeof *this + surface_.vertices.size() * sizeof(Vec3) + facets_.size() * sizeof(Facet) + surface_.triangles.size() * sizeof(Triangle) +
       rider_of_.size() * sizeof(Index) + samples_.size() * sizeof(ContactSample) +
-      (bin_offsets_.size() + bin_triangles_.size()) * sizeof(Index) + cell_total_ * sizeof(std::atomic<std::uintptr_t>);
+      (bin_offsets_.size() + bin_triangles_.size()) * sizeof(Index) + cell_total_ * (sizeof(std::atomic<std::uintptr_t>) + sizeof(std::atomic<float>));
   for (std::size_t i = 0; i < cell_total_; ++i)
     if (const std::uintptr_t cell = cells_[i].load(std::memory_order_acquire); cell > kAsked)
       sum += sizeof(Cell) + reinterpret_cast<const Cell*>(cell)->triangles.size() * sizeof(Index);
@@ -323,9 +326,11 @@ struct Best {
 class Settler {
  public:
   explicit Settler(const Best& best)
-      : limit_(best.squared + 4.0 * best.tie()), touches_(best.squared <= 16.0 * best.least_tie) {}
+      : limit_(best.squared + 4.0 * best.tie()), reach_(std::sqrt(limit_)), touches_(best.squared <= 16.0 * best.least_tie) {}
 
   void offer(const Facet& f, const Vec3& p) {
+    const double bound = reach_ + f.radius, over = f.normal.dot(p - f.a);
+    if ((p - f.centre).squaredNorm() > bound * bound * (1.0 + kTie) || over * over > limit_ * (1.0 + kTie)) return;
     const Measured m = measure(f, p);
     if (!(m.squared <= limit_)) return;
     for (std::size_t k = 0; k < count_; ++k)
@@ -379,7 +384,7 @@ class Settler {
     std::array<double, 3> weights;
     bool above;
   };
-  double limit_;
+  double limit_, reach_;  // [m^2], [m]
   bool touches_;  // on the surface itself, which is not inside
   Index first_ = kNoIndex;
   Vec3 normals_ = Vec3::Zero(), away_ = Vec3::Zero();
@@ -398,6 +403,7 @@ void ContactShape::visitNear(const Vec3& rest, double radius, const Visit& visit
 }
 
 bool ContactShape::searchBins(const Vec3& rest, Nearest& found) const {
+  found.triangle = kNoIndex;
   Best best(size_);
   Box box;
   const Vec3 outside = (bounds_.min - rest).cwiseMax(rest - bounds_.max).cwiseMax(0.0);
@@ -419,15 +425,35 @@ bool ContactShape::searchBins(const Vec3& rest, Nearest& found) const {
   return found.triangle != kNoIndex;
 }
 
-bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
-  found.triangle = kNoIndex;
-  if (!cells_ || !rest.allFinite()) return false;
-  std::array<int, 3> at;
+// The cell of a point, or the one at the border that is nearest to it.
+std::size_t ContactShape::cellAt(const Vec3& rest, std::array<int, 3>& at) const {
   for (int d = 0; d < 3; ++d) {
     const double c = (rest[d] - cell_origin_[d]) * cells_per_metre_;
     at[d] = c > 0.0 ? (c < cells_count_[d] ? static_cast<int>(c) : cells_count_[d] - 1) : 0;
   }
-  const std::size_t index = (static_cast<std::size_t>(at[0]) * cells_count_[1] + at[1]) * cells_count_[2] + at[2];
+  return (static_cast<std::size_t>(at[0]) * cells_count_[1] + at[1]) * cells_count_[2] + at[2];
+}
+
+double ContactShape::clearance(const Vec3& rest) const {
+  if (!cells_ || !rest.allFinite()) return -1.0;
+  std::array<int, 3> at;
+  const std::size_t index = cellAt(rest, at);
+  const Vec3 centre = cell_origin_ + cell_edge_ * Vec3(at[0] + 0.5, at[1] + 0.5, at[2] + 0.5);
+  float known = distances_[index].load(std::memory_order_relaxed);
+  if (std::isnan(known)) {
+    Nearest found;
+    const bool any = searchBins(centre, found);
+    known = any ? static_cast<float>(found.distance) : -std::numeric_limits<float>::infinity();
+    distances_[index].store(known, std::memory_order_relaxed);  // whoever else asks finds the same
+  }
+  return known - 1e-6 * std::abs(known) - (rest - centre).norm();
+}
+
+bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
+  found.triangle = kNoIndex;
+  if (!cells_ || !rest.allFinite()) return false;
+  std::array<int, 3> at;
+  const std::size_t index = cellAt(rest, at);
   const std::uintptr_t known = cells_[index].load(std::memory_order_acquire);
   if (known < kAsked) {
     std::uintptr_t asked = known;

@@ -50,6 +50,10 @@ class ContactShape {
   /// farther. Cubes that lie exactly along each other are held by their tops, not by their sides.
   bool nearest(const Vec3& rest, const Vec3& inward, double slack, Nearest& found) const;
 
+  /// A lower bound [m] of the distance from a point to the surface from outside, quick where the same place was asked
+  /// about before; negative where the point may be inside or near. Thread-safe.
+  double clearance(const Vec3& rest) const;
+
   /// The triangle across the edge that lies against a corner of a triangle; kNoIndex at a border. Made when first asked
   /// for; thread-safe.
   Index across(Index triangle, int corner) const;
@@ -74,6 +78,7 @@ class ContactShape {
  private:
   struct Cell;
   const Cell* fill(std::size_t index, const std::array<int, 3>& at) const;
+  std::size_t cellAt(const Vec3& rest, std::array<int, 3>& at) const;
   bool searchBins(const Vec3& rest, Nearest& found) const;
   template <class Visit>
   void visitNear(const Vec3& rest, double radius, const Visit& visit) const;
@@ -105,6 +110,7 @@ class ContactShape {
   // A cell, or how often it was asked for: the first few times the bins are searched, so that a fresh shape answers at
   // once.
   mutable std::unique_ptr<std::atomic<std::uintptr_t>[]> cells_;
+  mutable std::unique_ptr<std::atomic<float>[]> distances_;  // [m] one a cell, of its centre; NaN: not known yet
   std::size_t cell_total_ = 0;
   mutable std::atomic<std::size_t> cells_filled_{0};
   mutable std::once_flag linked_;
