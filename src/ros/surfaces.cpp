@@ -7,15 +7,6 @@
 namespace meshless {
 namespace {
 
-std_msgs::ColorRGBA toColor(const Color& color) {
-  std_msgs::ColorRGBA message;
-  message.r = color.r;
-  message.g = color.g;
-  message.b = color.b;
-  message.a = color.a;
-  return message;
-}
-
 meshless_surgery::Surface toSurface(const BodySnapshot& body, bool strain) {
   const TriangleMesh& mesh = body.model->surface;
   meshless_surgery::Surface message;
