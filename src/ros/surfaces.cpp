@@ -65,6 +65,7 @@ meshless_surgery::Surfaces toSurfaces(const WorldSnapshot& snapshot, const std_m
   message.scissors = toPose(poseOf(snapshot.scissors.blades));
   message.scissors_length = snapshot.scissors.blades.length;
   message.scissors_angle = snapshot.scissors.angle;
+  message.scissors_width = snapshot.scissors.blades.width;
   return message;
 }
 
