@@ -118,7 +118,7 @@ def rate(node, hand, start, seconds):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--node', default='/deformer')
-    parser.add_argument('--moves', type=int, default=300)
+    parser.add_argument('--moves', type=int, default=300, help='of each topic')
     parser.add_argument('--seconds', type=float, default=10.0, help='of the rate')
     arguments = parser.parse_args(rospy.myargv()[1:])
     node = arguments.node
@@ -158,6 +158,8 @@ def main():
             watch = Watch(node + '/' + topic, kind, value, shows)
             time.sleep(1.0)
             found = latencies(watch, hand, start, arguments.moves)
+            if not found:
+                raise SystemExit('no message of %s showed a move' % (node + '/' + topic))
             print('~pick/servo_cp to ~%s: median %.1f ms, 99 %% below %.1f ms (%d of %d moves seen)' % (
                 topic, share(found, 0.5), share(found, 0.99), len(found), arguments.moves))
     finally:
