@@ -64,7 +64,8 @@ class Watch:
     def __init__(self, topic, kind, value, shows):
         self.value, self.shows = value, shows
         self.latest, self.before, self.seen = None, None, threading.Event()
-        self.subscriber = rospy.Subscriber(topic, kind, self.heard, queue_size=100, tcp_nodelay=True)
+        # Only the newest: a client in Python is slower than large messages come.
+        self.subscriber = rospy.Subscriber(topic, kind, self.heard, queue_size=1, buff_size=1 << 25, tcp_nodelay=True)
 
     def heard(self, message):
         now = time.monotonic()
