@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <limits>
 
 #include <geometry_msgs/WrenchStamped.h>
 
@@ -13,6 +15,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr double kMostLate = 0.05;       // [s] that is caught up with
+constexpr double kClockSet = 0.1;         // [s] that ROS's clock is elsewhere at once
 constexpr double kStiffestPush = 5000.0;  // [N/m] of tissue under the sphere
 
 double wallSeconds() { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); }
@@ -98,6 +101,7 @@ void ForcePublisher::publish(Tool& tool, const std::optional<Pose>& hand, double
 
 void ForcePublisher::loop() {
   double next = wallSeconds();
+  double offset = -std::numeric_limits<double>::infinity();  // [s] of ROS's clock before ours
   std::unique_lock<std::mutex> lock(mutex_);
   while (!stopping_) {
     if (!listened()) {
@@ -113,8 +117,13 @@ void ForcePublisher::loop() {
     const double now = wallSeconds();
     // Who is woken late says what is due, each tick with its own time: an even rate, and a sum without holes.
     next = std::max(next, now - kMostLate);
-    // A simulated clock is read as it is.
-    if (!ros::Time::isSimTime()) stamp += ros::Duration(next - now);
+    // A simulated clock is read as it is. Between two looks at two clocks time may pass: it counts where least did, so that
+    // stamps are even and never go back, unless the clock was set.
+    if (!ros::Time::isSimTime()) {
+      const double looked = stamp.toSec() - now;
+      offset = std::abs(looked - offset) < kClockSet ? std::max(offset, looked) : looked;
+      stamp.fromSec(next + offset);
+    }
     lock.lock();
     publish(tools_[0], pick, next, stamp);
     publish(tools_[1], push, next, stamp);

@@ -62,7 +62,7 @@ class ForcesTest(DeformerTestCase):
         spaces = self.spacing(messages)
         self.assertGreater(len(spaces), 500)
         self.assertGreater(spaces[0], 0.0, 'stamps do not grow')
-        # Two milliseconds by two clocks that are read one after the other.
+        # Two milliseconds, and what a double and two clocks that drift leave of them.
         self.assertLess(spaces[len(spaces) // 2], PERIOD + 2e-5)
         self.assertLess(spaces[int(0.99 * len(spaces))], PERIOD + 5e-4)
 
