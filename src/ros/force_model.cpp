@@ -6,17 +6,17 @@
 namespace meshless {
 namespace {
 
-constexpr double kSmoothing = 0.003;  // [s] streams come in jumps: 200 Hz are as many
-constexpr double kPayBackSteps = 2.0; // slower motion is felt as the steps say it, faster one at once
-constexpr double kFarthest = 0.02;    // [m] before the tool
-constexpr double kMemory = 0.75;      // of what was learned, kept a step
-constexpr double kShortWay = 1e-4;    // [m] ways below it teach little
-constexpr double kFadeSteps = 4.0;    // after a spring is let go, for what is to be paid back
-constexpr double kMoreShare = 0.5;    // of the force that a tool without a spring has anyway ...
-constexpr double kLessShare = 0.9;    // ... and what may be taken from it
-constexpr double kLateSteps = 3.0;    // without a step for so many, the world stands still or is too slow to foresee
+constexpr double kSmoothing = 0.003;    // [s] streams come in jumps: 200 Hz are as many
+constexpr double kPayBackSteps = 2.0;   // slower motion is felt as the steps say it, faster one at once
+constexpr double kFarthest = 0.02;      // [m] before the tool
+constexpr double kMemory = 0.75;        // of what was learned, kept a step
+constexpr double kShortWay = 1e-4;      // [m] ways below it teach little
+constexpr double kFadeSteps = 4.0;      // after a spring is let go, for what is to be paid back
+constexpr double kMoreShare = 0.5;      // of the force that a tool without a spring has anyway ...
+constexpr double kLessShare = 0.9;      // ... and what may be taken from it
+constexpr double kLateSteps = 3.0;      // without a step for so many, the world stands still or is too slow to foresee
 constexpr double kShortestStep = 1e-3;  // [s] to divide by
-constexpr double kLongestTick = 0.05; // [s]
+constexpr double kLongestTick = 0.05;   // [s]
 
 Vec3 withinLength(const Vec3& v, double length) {
   const double norm = v.norm();

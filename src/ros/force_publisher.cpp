@@ -14,7 +14,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double kMostLate = 0.05;       // [s] that is caught up with
+constexpr double kMostLate = 0.05;        // [s] that is caught up with
 constexpr double kClockSet = 0.1;         // [s] that ROS's clock is elsewhere at once
 constexpr double kStiffestPush = 5000.0;  // [N/m] of tissue under the sphere
 
@@ -94,8 +94,7 @@ void ForcePublisher::publish(Tool& tool, const std::optional<Pose>& hand, double
   geometry_msgs::WrenchStamped message;
   message.header.stamp = stamp;
   message.header.frame_id = world_frame_;
-  message.wrench.force =
-      toVector(tool.force.at(now, hand ? std::optional<Vec3>(hand->translation) : std::nullopt));
+  message.wrench.force = toVector(tool.force.at(now, hand ? std::optional<Vec3>(hand->translation) : std::nullopt));
   tool.topic.publish(message);
 }
 
@@ -117,8 +116,8 @@ void ForcePublisher::loop() {
     const double now = wallSeconds();
     // Who is woken late says what is due, each tick with its own time: an even rate, and a sum without holes.
     next = std::max(next, now - kMostLate);
-    // A simulated clock is read as it is. Between two looks at two clocks time may pass: it counts where least did, so that
-    // stamps are even and never go back, unless the clock was set.
+    // A simulated clock is read as it is. Between two looks at two clocks time may pass: it counts where least did, so
+    // that stamps are even and never go back, unless the clock was set.
     if (!ros::Time::isSimTime()) {
       const double looked = stamp.toSec() - now;
       offset = std::abs(looked - offset) < kClockSet ? std::max(offset, looked) : looked;
@@ -129,7 +128,8 @@ void ForcePublisher::loop() {
     publish(tools_[1], push, next, stamp);
     publish(tools_[2], std::nullopt, next, stamp);
     next += period_;
-    const auto due = Clock::time_point(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(next)));
+    const auto due =
+        Clock::time_point(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(next)));
     woken_.wait_until(lock, due, [this] { return stopping_; });
   }
 }

@@ -29,7 +29,8 @@ bool meetsRectangle(const PreviewLine& line, const PreviewBlades& blades) {
   const double half = blades.width > 0.0 ? 0.5 * blades.width : kEndless;
   const Ogre::Vector3 a = line.from - blades.pivot, b = line.to - blades.pivot;
   double first = 0.0, last = 1.0;
-  clip(a.dotProduct(blades.reach), b.dotProduct(blades.reach), blades.length > 0.0 ? 0.0 : -kEndless, length, first, last);
+  clip(a.dotProduct(blades.reach), b.dotProduct(blades.reach), blades.length > 0.0 ? 0.0 : -kEndless, length, first,
+       last);
   clip(a.dotProduct(blades.open), b.dotProduct(blades.open), -half, half, first, last);
   return first <= last;
 }

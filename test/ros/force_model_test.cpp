@@ -228,7 +228,8 @@ TEST(ForceModel, TheSumOverAPullIsTheChangeOfMomentum) {
     };
     const auto measured = [&] {
       ForceModel::Step step;
-      if (const auto held = world.heldPick()) step = {true, held->id, true, -held->force, held->target, world.heldStiffness(), 5.0};
+      if (const auto held = world.heldPick())
+        step = {true, held->id, true, -held->force, held->target, world.heldStiffness(), 5.0};
       return step;
     };
     const Touch pull = touch(world, 1.0 / rate, static_cast<int>(rate), act, measured);

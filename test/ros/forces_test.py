@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The force on a hand: even and frequent whatever the step rate, felt before the next step, without jumps, and gone once
-the tool is free. Times are the stamps' own."""
+"""The force on a hand: even and frequent whatever the step rate, felt before the next step, without jumps, and gone
+once the tool is free. Times are the stamps' own."""
 import math
 import os
 import sys

@@ -38,7 +38,7 @@ class ForcePublisher {
   void publish(Tool& tool, const std::optional<Pose>& hand, double now, const ros::Time& stamp);
 
   const std::string world_frame_;
-  const double period_;                        // [s]
+  const double period_;                           // [s]
   const double pick_max_speed_, push_max_speed_;  // [m/s]
   const ToolInputs& inputs_;
   mutable std::mutex mutex_;
