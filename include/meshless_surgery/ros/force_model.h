@@ -14,9 +14,9 @@ namespace meshless {
 /// from one to the next, and before it what a spring adds for the way that the hand is ahead of the tool in those
 /// steps. The spring is as stiff as the last steps were along the hand's way (secant), at most as the tool says.
 ///
-/// What is felt ahead is felt less later (within three steps): the sum over a touch stays that of the steps. Exactly
-/// zero a step after a tool that only pushes is free, and five steps after a spring was let go. On a tool that only
-/// pushes the force is changed along itself and keeps its sign: nothing ever pulls.
+/// What is felt ahead is felt less later (time constant of two steps): the sum over a touch stays that of the steps.
+/// Exactly zero a step after a tool that only pushes is free, and five steps after a spring was let go. On a tool that
+/// only pushes the force is changed along itself and keeps its sign: nothing ever pulls.
 class ForceModel {
  public:
   struct Step {
@@ -34,7 +34,6 @@ class ForceModel {
   /// The force on the tool [N]; `hand` [m] is where its stream wants it, if one moves it. Times must not go back.
   Vec3 at(double now, const std::optional<Vec3>& hand);
   bool isZero(double now) const;
-  double stiffness() const { return stiffness_.last(); }  // [N/m]
 
  private:
   void fade(double since);
