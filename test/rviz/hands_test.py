@@ -324,6 +324,7 @@ class HandsTest(unittest.TestCase):
             self.mouse.key('h')
             self.mouse.down()
             self.mouse.move((place[0] - 20, place[1]))
+            self.mouse.move(place)  # where no tissue is known, a drag turns the view: and back
             self.mouse.up()
             self.mouse.key('m')
             # The view turns as ever.
