@@ -7,6 +7,9 @@
 namespace meshless {
 namespace {
 
+constexpr double kDeviation = 0.1;      // of the rest bounds' diagonal: how far a surface may be from its maps, at most
+constexpr double kNeighbour = 3.0;      // times what a vertex is off by its own map: by the one beside it
+constexpr double kSameMap = 2.0;        // likewise, between two vertices
 constexpr double kMovedInRest = 0.005;  // of the size: a lookup is repeated where the deviation moved it farther
 constexpr std::size_t kLookAnew = 8;    // frames after which a point is looked up though it seems to be where it was
 constexpr double kWellWithin = 0.02;    // barycentric
@@ -16,7 +19,28 @@ constexpr double kSlack = 0.1;  // of the thickness: how much farther a better f
 
 }  // namespace
 
-bool Contacts::Impl::locate(const ContactParty& b, Index party, const MapFinder& finder, const ContactMap* maps,
+namespace {
+
+// How far a surface may be from where its maps have it, within a region [m].
+double deviationWithin(const ContactParty& party, const MapFinder& finder, const ContactMap* maps, const Box& region) {
+  const ContactShape& shape = *party.shape;
+  const double most = kDeviation * shape.bounds().diagonal();
+  const Box near = grown(region, most);
+  double farthest = 0.0;
+  for (const ContactSample& s : shape.samples()) {
+    if (s.share > 0.0) continue;
+    const Vec3& now = vertexAt(party, s.vertices[0]);
+    if (!near.contains(now)) continue;
+    const ContactMap& map = maps[finder.nearest(now)];
+    const Vec3 fitted = map.from_rest * (shape.surface().vertices[s.vertices[0]] - map.rest) + map.centre;
+    farthest = std::max(farthest, (now - fitted).squaredNorm());
+  }
+  return std::min(most, (party.map_count > 1 ? kNeighbour : kSameMap) * std::sqrt(farthest));
+}
+
+}  // namespace
+
+bool Contacts::Impl::locate(const ContactParty& b, double deviation, const MapFinder& finder, const ContactMap* maps,
                             const Vec3& p, const Vec3& inward, double reach, ContactShape::Nearest& found,
                             bool& flipped, ContactCounters& counters) const {
   const ContactMap& map = maps[finder.nearest(p)];
@@ -26,7 +50,7 @@ bool Contacts::Impl::locate(const ContactParty& b, Index party, const MapFinder&
   // So far outside of the rest bounds that no deviation brings it back: nothing to look up.
   const Box& bounds = shape.bounds();
   const Vec3 beyond = (bounds.min - rest).cwiseMax(rest - bounds.max).cwiseMax(0.0);
-  const double far = deviations[party] + reach;
+  const double far = deviation + reach;
   if (!(beyond.squaredNorm() < far * far) || shape.clearance(rest) > far) return false;
   const Vec3 inward_rest = (map.to_rest * inward).normalized();
   const double enough = kMovedInRest * shape.size();
@@ -142,6 +166,7 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
   const auto inwardAt = [&](const Vec3& p, const ContactSample& sample) -> Vec3 {
     return -(own[finders[a].nearest(p)].to_rest.transpose() * sample.normal).normalized();
   };
+  double deviation = -1.0;  // known once something is looked up
   for (Index s = 0; s < samples.size(); ++s) {
     const Vec3 p = sampleAt(of, samples[s]);
     if (!region.contains(p)) continue;
@@ -151,9 +176,12 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
     }
     ContactShape::Nearest found;
     bool flipped = false;
-    if (!stillOver(to.cursor, with, a, b, s, p, every_point, found, flipped) &&
-        !locate(with, b, finders[b], maps, p, inwardAt(p, samples[s]), pair.reach, found, flipped, to.counters))
-      continue;
+    if (!stillOver(to.cursor, with, a, b, s, p, every_point, found, flipped)) {
+      if (deviation < 0.0) deviation = deviationWithin(with, finders[b], maps, region);
+      if (!locate(with, deviation, finders[b], maps, p, inwardAt(p, samples[s]), pair.reach, found, flipped,
+                  to.counters))
+        continue;
+    }
     if (found.distance < 0.0) {
       ++inside.inside;
       inside.deepest = std::min(inside.deepest, found.distance);

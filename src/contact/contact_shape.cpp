@@ -19,10 +19,11 @@ constexpr double kLongEdge = 0.1;    // of the body's least extent: shorter edge
 constexpr double kFlatEdge = 0.996;  // cosine between neighbours: about 5 degrees
 constexpr int kMostEdgeSamples = 64;
 constexpr std::size_t kThicknessRays = 48;
-constexpr double kOnRim = 1e-6;       // of a squared distance: straight above the rim of a face
-constexpr double kFacing = 0.1;       // cosine: a face pushes a body's point into the body
-constexpr std::uintptr_t kAsked = 4;  // times that the bins are searched before a cell is filled
-constexpr double kTie = 1e-9;         // relative: two features are equally near
+constexpr double kOnRim = 1e-6;        // of a squared distance: straight above the rim of a face
+constexpr double kFacing = 0.1;        // cosine: a face pushes a body's point into the body
+constexpr std::size_t kBounding = 4;   // triangles that tell how far the nearest to a point of a cell can be
+constexpr std::uintptr_t kAsked = 12;  // times that the bins are searched before a cell is filled
+constexpr double kTie = 1e-9;          // relative: two features are equally near
 
 }  // namespace
 
@@ -216,42 +217,46 @@ const ContactShape::Cell* ContactShape::fill(std::size_t index, const std::array
 
   auto cell = std::make_unique<Cell>();
   std::vector<Index> around;
+  std::vector<std::pair<double, Index>> near;  // by their distance from the centre
   double nearest = std::numeric_limits<double>::infinity();
   // Rings of bins until what lies beyond cannot be nearer.
   const double farthest = (bounds_.max - bounds_.min).norm() + 8.0 * cell_edge_;
   for (double radius = std::max(bin_edge_, 2.0 * half_diagonal);; radius *= 2.0) {
     around.clear();
+    near.clear();
     Box ball;
     ball.min = centre.array() - radius;
     ball.max = centre.array() + radius;
     visitBins(ball, [&](Index t) { around.push_back(t); });
     std::sort(around.begin(), around.end());
     around.erase(std::unique(around.begin(), around.end()), around.end());
-    for (Index t : around) nearest = std::min(nearest, distanceToTriangle(surface_, t, centre));
+    for (Index t : around) {
+      const Facet& f = facets_[t];
+      if ((centre - f.centre).norm() - f.radius > nearest + 2.0 * half_diagonal) continue;
+      near.push_back({distanceToTriangle(surface_, t, centre), t});
+      nearest = std::min(nearest, near.back().first);
+    }
     if (nearest + 2.0 * half_diagonal <= radius || radius > farthest) break;
   }
-  double bound = std::numeric_limits<double>::infinity();
-  for (Index t : around) {
-    if (distanceToTriangle(surface_, t, centre) > nearest + half_diagonal) continue;
+  // Nearest first: the others are then dismissed by their bounds.
+  std::sort(near.begin(), near.end());
+  double bound = nearest + half_diagonal;
+  for (std::size_t n = 0; n < std::min(kBounding, near.size()); ++n) {
     double worst = 0.0;
-    for (int corner = 0; corner < 8; ++corner) {
+    for (int corner = 0; corner < 8 && worst < bound; ++corner) {
       const Vec3 p(corner & 1 ? box.max.x() : box.min.x(), corner & 2 ? box.max.y() : box.min.y(),
                    corner & 4 ? box.max.z() : box.min.z());
-      worst = std::max(worst, distanceToTriangle(surface_, t, p));
+      worst = std::max(worst, distanceToTriangle(surface_, near[n].second, p));
     }
     bound = std::min(bound, worst);
   }
   bound *= 1.0 + 1e-9;
-  for (Index t : around) {
-    if (distanceToTriangle(surface_, t, centre) - half_diagonal > bound) continue;
+  for (const auto& [distance, t] : near) {
+    if (distance - half_diagonal > bound) break;
     const Box b = boundsOf(surface_, t);
     const Vec3 gap = (b.min - box.max).cwiseMax(box.min - b.max).cwiseMax(0.0);
     if (gap.norm() <= bound) cell->triangles.push_back(t);
   }
-  // Nearest first: the others are then dismissed by their bounds.
-  std::stable_sort(cell->triangles.begin(), cell->triangles.end(), [&](Index f, Index g) {
-    return distanceToTriangle(surface_, f, centre) < distanceToTriangle(surface_, g, centre);
-  });
   cell->triangles.shrink_to_fit();
   const std::uintptr_t made = reinterpret_cast<std::uintptr_t>(cell.get());
   std::uintptr_t known = cells_[index].load(std::memory_order_acquire);

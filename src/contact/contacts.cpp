@@ -11,9 +11,6 @@ namespace meshless {
 namespace {
 
 constexpr std::size_t kTaskPairs = 32, kTaskParties = 128;  // looked at by one task
-constexpr Index kManyPartners = 2;    // from here on it pays to know how far a surface is from its map
-constexpr double kNeighbour = 3.0;    // times what a vertex is off by its own map: by the one beside it
-constexpr double kDeviation = 0.1;    // of the bounds' diagonal: how far a surface may be from where its maps have it
 constexpr double kLongestStep = 0.5;  // of the smaller body's extent: how far quick bodies go in a substep
 
 double speedOf(const ContactParty& party) { return party.velocity.norm() + party.spread; }
@@ -120,29 +117,9 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
     w.finders.resize(parties.size());
     w.maps_now.resize(parties.size());
   }
-  w.deviations.resize(parties.size());
-  std::vector<Index>& partners = w.partners;
-  partners.assign(parties.size(), 0);
-  for (const Pair& pair : w.pairs) {
-    if (pair.a == pair.b) continue;
-    ++partners[pair.a];
-    ++partners[pair.b];
-  }
   for (Index p = 0; p < parties.size(); ++p) {
     if (!(w.needed[p] & 1)) continue;
-    const ContactParty& party = parties[p];
-    w.finders[p].make(party.maps, party.map_count);
-    w.deviations[p] = kDeviation * party.shape->bounds().diagonal();
-    if (partners[p] < kManyPartners) continue;
-    double farthest = 0.0;
-    for (const ContactSample& s : party.shape->samples()) {
-      if (s.share > 0.0) continue;
-      const Vec3& now = vertexAt(party, s.vertices[0]);
-      const ContactMap& map = party.maps[w.finders[p].nearest(now)];
-      const Vec3 fitted = map.from_rest * (party.shape->surface().vertices[s.vertices[0]] - map.rest) + map.centre;
-      farthest = std::max(farthest, (now - fitted).squaredNorm());
-    }
-    w.deviations[p] = std::min(w.deviations[p], (party.map_count > 1 ? kNeighbour : 2.0) * std::sqrt(farthest));
+    w.finders[p].make(parties[p].maps, parties[p].map_count);
   }
   // From below upwards where it matters: ground first.
   const double falling = w.scene.gravity.norm() * h * h;

@@ -118,10 +118,8 @@ struct Contacts::Impl {
   std::vector<Box> boxes;
   std::vector<char> active, needed;
   std::vector<Pair> pairs;
-  std::vector<Index> partners;  // one a party: how many pairs it is in
   std::vector<Index> grounded;  // parties that can meet the ground
   std::vector<MapFinder> finders;
-  std::vector<double> deviations;  // [m] one a party: how far its surface may be from where its maps have it
   std::vector<std::vector<ContactMap>> maps_now;  // of those in quick pairs
   std::vector<Contact> contacts, last;            // of this frame and of the one before
   std::vector<ContactEntry> entries;
@@ -144,7 +142,7 @@ struct Contacts::Impl {
   std::vector<QuickFindings> quick;  // one a pair; of those that are quick
   bool was_steady = true;            // the last solve had no others than the steady contacts
 
-  bool locate(const ContactParty& b, Index party, const MapFinder& finder, const ContactMap* maps, const Vec3& p,
+  bool locate(const ContactParty& b, double deviation, const MapFinder& finder, const ContactMap* maps, const Vec3& p,
               const Vec3& inward, double reach, ContactShape::Nearest& found, bool& flipped,
               ContactCounters& counters) const;
   void addContact(Findings& to, const std::vector<ContactParty>& parties, Index a, Index number, const ContactSample& s,
