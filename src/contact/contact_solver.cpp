@@ -235,25 +235,18 @@ struct ContactSolver::Impl {
       s[(*entries)[k].particle] += ((*entries)[k].weight * inverse[(*entries)[k].particle]) * shift;
   }
 
-  void apply(const Row& row, double along_normal, const Vec3& impulse) {
-    Contact& c = *row.contact;
-    Rigid& a = rigid[c.a];
-    const Vec3 across = impulse - along_normal * row.normal;
-    const bool turns = !across.isZero(0.0);
+  void apply(const Row& row, const Vec3& impulse) {
+    const Contact& c = *row.contact;
     if (row.rigid_a < 1.0) give(c, true, 1.0 - row.rigid_a, impulse);
-    if (row.rigid_a > 0.0) {
-      a.shift += (row.rigid_a * a.inverse_mass) * impulse;
-      a.turn += along_normal * row.arm_a;
-      if (turns) a.turn += row.rigid_a * (a.inverse_inertia * row.lever_a.cross(across));
-    }
+    if (row.rigid_a > 0.0) push(rigid[c.a], row.rigid_a * impulse, row.lever_a);
     if (row.on_ground) return;
-    Rigid& b = rigid[c.b];
     if (row.rigid_b < 1.0) give(c, false, 1.0 - row.rigid_b, -impulse);
-    if (row.rigid_b > 0.0) {
-      b.shift -= (row.rigid_b * b.inverse_mass) * impulse;
-      b.turn -= along_normal * row.arm_b;
-      if (turns) b.turn -= row.rigid_b * (b.inverse_inertia * row.lever_b.cross(across));
-    }
+    if (row.rigid_b > 0.0) push(rigid[c.b], -row.rigid_b * impulse, row.lever_b);
+  }
+
+  static void push(Rigid& r, const Vec3& impulse, const Vec3& lever) {
+    r.shift += r.inverse_mass * impulse;
+    r.turn += r.inverse_inertia * lever.cross(impulse);
   }
 
   Vec3 relativeShift(const Row& row) const {
@@ -425,7 +418,7 @@ struct ContactSolver::Impl {
       for (const Row* r = first; r != row; ++r) {
         if (!(r->target > r->distance)) continue;
         r->contact->impulse += each;
-        apply(*r, each, each * r->normal);
+        apply(*r, each * r->normal);
       }
     }
   }
@@ -500,7 +493,7 @@ struct ContactSolver::Impl {
       impulse += wanted - c.slip_impulse;
       c.slip_impulse = wanted;
     }
-    apply(row, change, impulse);
+    apply(row, impulse);
     return 1;
   }
 
@@ -577,7 +570,7 @@ void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactP
       const double wrong = row.target - row.distance - row.normal.dot(w.relativeShift(row));
       if (!(wrong > 0.0)) continue;
       const double impulse = wrong * row.inverse_answer;
-      w.apply(row, impulse, impulse * row.normal);
+      w.apply(row, impulse * row.normal);
       ++counters.corrected;
     }
     w.finish(island);
