@@ -28,8 +28,8 @@ Condition changed(const std::string& name, std::function<void(Material&)> change
 
 std::vector<Condition> allConditions() {
   std::vector<Condition> all;
-  for (const double scale : {1e-6, 1e6})
-    all.push_back({scale < 1.0 ? "a micrometre large" : "a hundred kilometres large",
+  for (const double scale : {1e-6, 1e3})
+    all.push_back({scale < 1.0 ? "a fifth of a micrometre large" : "two hundred metres large",
                    [scale](WorldSettings&, BodyDef& body) { body.material.youngs_modulus *= scale * scale; }, true, 30.0, 1.001, true, scale});
   for (const double far : {1e3, 1e6})
     all.push_back({far < 1e4 ? "1 km from the origin" : "1000 km from the origin",
