@@ -11,7 +11,7 @@ constexpr int kRun = 300;  // steps before the scene starts anew: cuts make more
 
 Command randomCommand(test::Random& random, int number) {
   // Now and then a number that no hand gives.
-  const auto size = [&random] { return random.integer(0, 30) ? random.uniform(0.001, 0.3) : std::pow(10.0, random.uniform(-12, 9)); };
+  const auto size = [&random] { return random.integer(0, 30) ? random.uniform(0.001, 0.3) : std::pow(10.0, random.uniform(-12, 6)); };
   const auto place = [&] { return random.integer(0, 50) ? random.vector(0.6) : random.vector(size()); };
   const auto pick = [&] { return static_cast<PickId>(random.integer(1, 12)); };
   switch (random.integer(0, 15)) {
@@ -109,8 +109,8 @@ TEST(RandomCommands, AreSurvived) {
     test::Random random(static_cast<unsigned>(1000 + run));
     for (int step = 0; step < kRun && done < steps; ++step, ++done) {
       for (int n = random.integer(0, 2); n > 0; --n) accepted += twins.apply(randomCommand(random, step)).ok();
-      // 1e9 m away a target may be, and a jump there is gone in a substep.
-      ASSERT_TRUE(twins.step(Vec3::Zero(), 1e15)) << "run " << run;
+      // 1e6 m away a target may be, and a jump there is gone in a substep: 1e10 m/s, and more after a collision.
+      ASSERT_TRUE(twins.step(Vec3::Zero(), 1e12)) << "run " << run;
       if (twins.seen().bodies.size() > 25) break;  // crumbs: all has been tried on these
     }
   }
