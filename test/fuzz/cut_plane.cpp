@@ -1,4 +1,4 @@
-#include "targets.h"
+#include "fuzz/cuts.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   meshless::fuzz::cutPlane(data, size);
