@@ -74,3 +74,20 @@ buildSanitized() {
     -DMESHLESS_SURGERY_SANITIZE=ON -DBUILD_TESTING=ON -DCMAKE_BUILD_TYPE=RelWithDebInfo \
     "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -g1"
 }
+
+# The tests that use more than one thread.
+thread_tests='^(world_work_test|world_world_test|dynamics_match_batch_test|dynamics_elastic_batch_test|stress_.*)$'
+
+# buildThreadSanitized: those under ThreadSanitizer, without ROS.
+buildThreadSanitized() {
+  build "the core with ThreadSanitizer" "$output/tsan" all -- -DMESHLESS_SURGERY_CORE_ONLY=ON \
+    -DMESHLESS_SURGERY_TSAN=ON -DBUILD_TESTING=ON -DCMAKE_BUILD_TYPE=RelWithDebInfo \
+    "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -g1"
+}
+
+# buildFuzzers: the libFuzzer targets, with clang.
+buildFuzzers() {
+  build "the fuzzers" "$output/fuzz" fuzz_mesh_file fuzz_scene_file fuzz_cut_plane -- -DMESHLESS_SURGERY_CORE_ONLY=ON \
+    -DMESHLESS_SURGERY_FUZZ=ON -DBUILD_TESTING=OFF -DCMAKE_C_COMPILER=clang -DCMAKE_CXX_COMPILER=clang++ \
+    -DCMAKE_BUILD_TYPE=RelWithDebInfo "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -g1"
+}

@@ -268,20 +268,47 @@ struct ContactSolver::Impl {
     }
   }
 
-  void finish(Index island) {
+  // Where a party's particle i goes by what the sweeps found, once that is there.
+  template <class Visit>
+  void forEachMove(Index p, const Visit& visit) const {
+    const ContactParty& party = (*parties)[p];
+    const Rigid& r = rigid[p];
+    if (!r.shift.allFinite() || !r.turn.allFinite()) return;
+    const Vec3* shift = shifts.data() + plan->shifts[p];
+    if (r.turn.isZero(0.0) && r.shift.isZero(0.0)) {
+      for (Index i = 0; i < party.particles; ++i) visit(i, shift[i]);
+    } else {
+      const Vec3 offset = r.shift - r.turn.cross(r.centre);
+      for (Index i = 0; i < party.particles; ++i)
+        visit(i, Vec3(shift[i] + offset + r.turn.cross(party.positions[i])));
+    }
+  }
+
+  // The share of what the sweeps found that gives the island no kinetic energy. They answer for the body as a whole and
+  // for its particles in fixed shares: of bodies that swing wildly the whole would be thrown by what only swings, and
+  // few sweeps leave errors. Contacts have none to give, and one share for all keeps momentum.
+  double energyShare(Index island) const {
+    double along = 0.0, squared = 0.0;  // [kg m^2]
     for (Index k = plan->party_offsets[island]; k < plan->party_offsets[island + 1]; ++k) {
       const Index p = plan->parties[k];
       const ContactParty& party = (*parties)[p];
-      const Rigid& r = rigid[p];
-      if (!r.shift.allFinite() || !r.turn.allFinite()) continue;
-      const Vec3* shift = shifts.data() + plan->shifts[p];
-      if (r.turn.isZero(0.0) && r.shift.isZero(0.0)) {
-        for (Index i = 0; i < party.particles; ++i) party.positions[i] += shift[i];
-      } else {
-        const Vec3 offset = r.shift - r.turn.cross(r.centre);
-        for (Index i = 0; i < party.particles; ++i)
-          party.positions[i] += shift[i] + offset + r.turn.cross(party.positions[i]);
-      }
+      forEachMove(p, [&](Index i, const Vec3& move) {
+        along += party.masses[i] * move.dot(party.positions[i] - party.previous[i]);
+        squared += party.masses[i] * move.squaredNorm();
+      });
+    }
+    if (!(2.0 * along + squared > 0.0)) return 1.0;
+    return along < 0.0 ? -2.0 * along / squared : 0.0;
+  }
+
+  void finish(Index island, double share) {
+    for (Index k = plan->party_offsets[island]; k < plan->party_offsets[island + 1]; ++k) {
+      const Index p = plan->parties[k];
+      Vec3* const positions = (*parties)[p].positions;
+      if (share == 1.0)
+        forEachMove(p, [positions](Index i, const Vec3& move) { positions[i] += move; });
+      else
+        forEachMove(p, [positions, share](Index i, const Vec3& move) { positions[i] += share * move; });
     }
   }
 
@@ -350,7 +377,13 @@ struct ContactSolver::Impl {
     const Index count = row_counts[island];
     for (int pass = 0; pass < plan->passes[island]; ++pass)
       for (Index n = 0; n < count; ++n) corrected += sweep(first[pass % 2 ? count - 1 - n : n]);
-    finish(island);
+    const double share = plan->calm[island] ? 1.0 : energyShare(island);
+    if (share < 1.0)
+      for (const Row* row = first; row != first + count; ++row) {
+        row->contact->impulse *= share;
+        row->contact->slip_impulse *= share;
+      }
+    finish(island, share);
   }
 
   // From where the last substep ended: stacks converge over substeps, not within one. What moves a party as a whole is
@@ -573,7 +606,7 @@ void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactP
       w.apply(row, impulse * row.normal);
       ++counters.corrected;
     }
-    w.finish(island);
+    w.finish(island, 1.0);
   }
 }
 

@@ -18,6 +18,7 @@ constexpr int kLanes = MESHLESS_ELASTIC_BYTES / 8;
 // As in elastic.cpp.
 constexpr double kLeastVolume = -0.8;
 constexpr double kMostVolume = 1.5;
+constexpr double kDrawnOut = 12.0;
 
 constexpr int kMostSteps = 4;     // of Newton's method; from one substep to the next two do
 constexpr double kStep6 = 1e-25;  // length^6 of the last step, times the condition number squared: 3e-13 rad are left
@@ -265,29 +266,49 @@ MESHLESS_INLINE Pack volumeStrain(Pack j) {
   return strain;
 }
 
-// Stress over density, and |cof F|^2 into most where it is larger.
+// heldVolume() of elastic.cpp: of what is drawn out far; j and its slope by F are those of the whole volume before.
+MESHLESS_INLINE void holdLess(const Matrix& f, Pack norm2, Pack& j, Matrix& slope, Pack& share) {
+  const Pack beyond = norm2 * (1.0 / kDrawnOut) - 1.0;
+  const Mask drawn = beyond > 0.0;
+  if (!any(drawn)) return;
+  const Pack base = 1.0 + beyond * beyond;
+  const Pack root = squareRoot(base);
+  share = choose(drawn, 1.0 / (root * squareRoot(root)), all(1.0));
+  const Pack turn = choose(drawn, (3.0 / kDrawnOut) * beyond / base * j, all(0.0));
+  for (int row = 0; row < 3; ++row)
+    for (int c = 0; c < 3; ++c) slope.m[row][c] = share * (slope.m[row][c] - turn * f.m[row][c]);
+  j *= share;
+}
+
+// Stress over density, and the steepness of the pressure (stress() of elastic.cpp) into most where it is larger.
 MESHLESS_INLINE Matrix stress(const Block& b, const Matrix& gradient, int i, Pack& most) {
   Matrix f;
   for (int row = 0; row < 3; ++row)
     for (int c = 0; c < 3; ++c) f.m[row][c] = b.shrink * gradient.m[row][c];
   const double* const q = b.rotations + i;
   const Matrix r = rotationMatrix(get(q), get(q + kBlock), get(q + 2 * kBlock), get(q + 3 * kBlock), all(2.0));
-  Matrix cof;
+  Matrix slope;  // cof F
   for (int row = 0; row < 3; ++row)
     for (int c = 0; c < 3; ++c) {
       const int r1 = (row + 1) % 3, r2 = (row + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
-      cof.m[row][c] = f.m[r1][c1] * f.m[r2][c2] - f.m[r1][c2] * f.m[r2][c1];
+      slope.m[row][c] = f.m[r1][c1] * f.m[r2][c2] - f.m[r1][c2] * f.m[r2][c1];
     }
-  Pack size2 = {};
+  Pack j = f.m[0][0] * slope.m[0][0] + f.m[0][1] * slope.m[0][1] + f.m[0][2] * slope.m[0][2];
+  Pack norm2 = {};
   for (int row = 0; row < 3; ++row)
-    for (int c = 0; c < 3; ++c) size2 += cof.m[row][c] * cof.m[row][c];
-  most = size2 > most ? size2 : most;
-  const Pack j = f.m[0][0] * cof.m[0][0] + f.m[0][1] * cof.m[0][1] + f.m[0][2] * cof.m[0][2];
-  const Pack pressure = b.pressure * volumeStrain(j);
+    for (int c = 0; c < 3; ++c) norm2 += f.m[row][c] * f.m[row][c];
+  Pack share = all(1.0);
+  holdLess(f, norm2, j, slope, share);
+  const Pack strain = volumeStrain(j);
+  const Pack pressure = b.pressure * strain;
+  Pack steepness = choose(strain < 0.0, -strain, strain) * (share * squareRoot(norm2));
+  for (int row = 0; row < 3; ++row)
+    for (int c = 0; c < 3; ++c) steepness += slope.m[row][c] * slope.m[row][c];
+  most = steepness > most ? steepness : most;
   const Pack shear = all(b.shear);
   Matrix p;
   for (int row = 0; row < 3; ++row)
-    for (int c = 0; c < 3; ++c) p.m[row][c] = shear * (f.m[row][c] - r.m[row][c]) + pressure * cof.m[row][c];
+    for (int c = 0; c < 3; ++c) p.m[row][c] = shear * (f.m[row][c] - r.m[row][c]) + pressure * slope.m[row][c];
   return p;
 }
 

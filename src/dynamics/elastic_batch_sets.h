@@ -39,7 +39,7 @@ struct Block {
 };
 
 struct BlockResult {
-  double most = 0.0;  // |cof F|^2
+  double most = 0.0;  // the largest steepness, see stress() in elastic.cpp
   std::size_t cold = 0;
 };
 

@@ -390,11 +390,16 @@ void move(const BodiesView& view, const StepNumbers& step, int block, int lane, 
 // --- overlapping clusters, lanes across particles or clusters, and rows of 12 numbers for their pairs
 
 MESHLESS_INLINE void transpose(Quad& a, Quad& b, Quad& c, Quad& d) {
-  const QuadMask low = {0, 4, 1, 5}, high = {2, 6, 3, 7}, first = {0, 1, 4, 5}, last = {2, 3, 6, 7};
-  const Quad ab = __builtin_shuffle(a, b, low), cd = __builtin_shuffle(c, d, low);
-  const Quad ef = __builtin_shuffle(a, b, high), gh = __builtin_shuffle(c, d, high);
-  a = __builtin_shuffle(ab, cd, first), b = __builtin_shuffle(ab, cd, last);
-  c = __builtin_shuffle(ef, gh, first), d = __builtin_shuffle(ef, gh, last);
+#ifdef __clang__  // of the fuzzers
+#define MESHLESS_SHUFFLE(x, y, ...) __builtin_shufflevector(x, y, __VA_ARGS__)
+#else
+#define MESHLESS_SHUFFLE(x, y, ...) __builtin_shuffle(x, y, QuadMask{__VA_ARGS__})
+#endif
+  const Quad ab = MESHLESS_SHUFFLE(a, b, 0, 4, 1, 5), cd = MESHLESS_SHUFFLE(c, d, 0, 4, 1, 5);
+  const Quad ef = MESHLESS_SHUFFLE(a, b, 2, 6, 3, 7), gh = MESHLESS_SHUFFLE(c, d, 2, 6, 3, 7);
+  a = MESHLESS_SHUFFLE(ab, cd, 0, 1, 4, 5), b = MESHLESS_SHUFFLE(ab, cd, 2, 3, 6, 7);
+  c = MESHLESS_SHUFFLE(ef, gh, 0, 1, 4, 5), d = MESHLESS_SHUFFLE(ef, gh, 2, 3, 6, 7);
+#undef MESHLESS_SHUFFLE
 }
 
 // Four rows of 12 numbers as columns of [12][kChunk].

@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::size_t kLeastBodies = 32;     // fewer are not worth going there and back
 constexpr std::size_t kMostParticles = 256;  // larger ones fill the lanes by themselves
+constexpr double kFarthest = 200.0;          // radii of its rest shape that a body may reach in float, or go in a substep
 
 bool suits(const WorldBody& body) {
   const BodyModel& model = *body.model;
@@ -23,6 +24,20 @@ bool alike(const WorldBody& a, const WorldBody& b) {
   return a.model->rest.size() == b.model->rest.size() && a.material.mode == b.material.mode &&
          a.material.alpha == b.material.alpha && a.material.beta == b.material.beta &&
          a.material.damping == b.material.damping;
+}
+
+// What is drawn out or thrown apart without measure is left to double: rounding to float would make it spin, and it
+// would never be whole again. With contact bounds and spread are those of the frame's start, else they are found here.
+bool fitsFloat(WorldBody& body, bool bounds_known, double h) {
+  if (!bounds_known) {
+    Box velocities;
+    body.bounds = Box();
+    for (const Vec3& p : body.state.positions) body.bounds.extend(p);
+    for (const Vec3& v : body.state.velocities) velocities.extend(v);
+    body.spread = 0.5 * velocities.diagonal();
+  }
+  const double most = kFarthest * body.model->shape.clusters[0].size;
+  return body.bounds.diagonal() <= most && h * body.spread <= most;
 }
 
 }  // namespace
@@ -59,13 +74,18 @@ void World::Impl::groupBatches() {
 }
 
 void World::Impl::matchBatches(double h) {
+  const bool bounds_known = settings.contact == ContactMethod::kRestShape;
   for (WorldBatch& batch : batches) {
     bool any = false;
     for (std::size_t i = 0; i < batch.bodies.size(); ++i) {
       WorldBody& body = *batch.bodies[i];
       batch.states[i] = {body.state.positions.data(), body.state.velocities.data(), &body.state.poses[0].rotation,
-                         !body.asleep};
+                         !body.asleep && fitsFloat(body, bounds_known, h)};
       if (body.asleep) continue;
+      if (!batch.states[i].moves) {
+        matchAndMove(*body.model, body.material, settings.gravity, h, body.state, body.scratch, report.match_counters);
+        continue;
+      }
       any = true;
       body.scratch.previous = body.state.positions;
     }

@@ -182,7 +182,7 @@ void World::Impl::fillParty(WorldBody& body, ContactParty& party) {
     velocities.extend(body.state.velocities[i]);
   }
   party.velocity = 0.5 * (velocities.min + velocities.max);
-  party.spread = 0.5 * velocities.diagonal();
+  party.spread = body.spread = 0.5 * velocities.diagonal();
   if (!body.model->binding.riders.empty()) {  // riders reach beyond the particles
     party.bounds.min.array() -= 2.0 * body.model->spacing;
     party.bounds.max.array() += 2.0 * body.model->spacing;

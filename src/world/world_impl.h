@@ -53,6 +53,7 @@ struct WorldBody {
   std::vector<Index> low_riders;
   double stiffness_factor = 1.0;
   Box bounds;                    // [m] of particles and surface, at the start of the last frame in which it was awake
+  double spread = 0.0;   // [m/s] likewise: by how much velocities differ
   bool batched = false;  // matched with others of its kind
   bool asleep = false;
   double still_for = 0.0;        // [s]

@@ -1,0 +1,123 @@
+// Random steps of random commands on a scene of bodies of every kind: 600 of them in the short form
+// (MESHLESS_SURGERY_STRESS in percent of it), a million with scripts/check --long.
+#include <gtest/gtest.h>
+
+#include "support/stress.h"
+
+namespace meshless::stress {
+namespace {
+
+constexpr int kRun = 300;  // steps before the scene starts anew: cuts make more and more of it
+
+Command randomCommand(test::Random& random, int number) {
+  // Now and then a number that no hand gives.
+  const auto size = [&random] { return random.integer(0, 30) ? random.uniform(0.001, 0.3) : std::pow(10.0, random.uniform(-12, 6)); };
+  const auto place = [&] { return random.integer(0, 50) ? random.vector(0.6) : random.vector(size()); };
+  const auto pick = [&] { return static_cast<PickId>(random.integer(1, 12)); };
+  switch (random.integer(0, 15)) {
+    case 0: {
+      PickCommand command;
+      command.point = place();
+      if (random.integer(0, 1)) command.direction = random.vector(1.0);
+      command.max_distance = size();
+      command.stiffness = std::pow(10.0, random.uniform(0, 4));  // stiffer ones: docs/reliability.md, what falls short
+      return command;
+    }
+    case 1:
+    case 2:
+    case 3:
+    case 4:
+      return MovePickCommand{pick(), place()};
+    case 5:
+      return LockCommand{pick(), place()};
+    case 6:
+      return ReleaseCommand{pick()};
+    case 7:
+      return ClearPicksCommand{};
+    case 8:
+    case 9: {
+      PushCommand command;
+      command.enable = random.integer(0, 3) > 0;
+      command.position = place();
+      command.radius = random.uniform(0.001, 0.3);  // larger ones on the ground: docs/reliability.md, what falls short
+      command.speed = random.integer(0, 1) ? size() : 0.0;
+      return command;
+    }
+    case 10: {
+      CutCommand command;
+      if (random.integer(0, 9)) return OpenScissorsCommand{};
+      command.blades.x_axis = random.unit();
+      command.blades.y_axis = command.blades.x_axis.unitOrthogonal();
+      command.blades.origin = place();
+      command.blades.length = random.integer(0, 1) ? size() : 0.0;
+      command.blades.width = random.integer(0, 1) ? size() : 0.0;
+      command.close_time = random.integer(0, 1) ? 0.05 : 0.0;
+      return command;
+    }
+    case 11: {
+      InciseCommand command;
+      command.blade.x_axis = random.unit();
+      command.blade.y_axis = command.blade.x_axis.unitOrthogonal();
+      command.blade.origin = place();
+      command.blade.length = size();
+      command.blade.depth = size();
+      if (random.integer(0, 4)) return LiftCommand{static_cast<ToolKind>(random.integer(0, 2)), false, "random"};
+      return command;
+    }
+    case 12:
+      return UndoCutCommand{};
+    case 13: {
+      Material other;
+      other.mode = static_cast<MatchMode>(random.integer(0, 2));
+      other.alpha = random.uniform(0, 1);
+      other.beta = random.uniform(0, 1);
+      other.density = std::pow(10.0, random.uniform(0, 4));
+      other.damping = random.uniform(0, 10);
+      other.restitution = random.integer(0, 1) ? random.uniform(0, 1) : 0.0;
+      other.youngs_modulus = random.integer(0, 2) ? 0.0 : std::pow(10.0, random.uniform(2, 5));
+      return SetMaterialCommand{"body" + std::to_string(random.integer(0, 5)),
+                                [other](const Material&) -> Result<Material> { return other; }};
+    }
+    case 14: {
+      if (random.integer(0, 9)) return ReleaseCommand{pick()};
+      const std::vector<Kind> kinds = allKinds();
+      Kind kind = kinds[static_cast<std::size_t>(random.integer(0, static_cast<int>(kinds.size()) - 1))];
+      kind.bodies = 36;  // a coarse one
+      BodyDef def = blockOf(kind, "guest" + std::to_string(number), random.vector(0.3));
+      def.pose.translation.z() += 0.4;
+      return SpawnCommand{test::shared(def)};
+    }
+    default:
+      return RemoveCommand{"guest" + std::to_string(random.integer(0, number))};
+  }
+}
+
+TEST(RandomCommands, AreSurvived) {
+  const int steps = std::max(60, static_cast<int>(600.0 * share()));
+  WorldSettings settings;
+  settings.ground = -0.1;
+  // Bodies that pass through each other: contact of what was drawn out and torn takes seconds a step.
+  settings.contact = ContactMethod::kNone;
+  std::vector<std::shared_ptr<const PreparedBody>> scene;
+  for (const Kind& kind : allKinds())
+    if (scene.size() < 6 && kind.bodies == 1)
+      scene.push_back(test::shared(blockOf(Kind{kind.name, kind.mode, kind.elastic, kind.many_clusters, 36},
+                                           "body" + std::to_string(scene.size()),
+                                           Vec3(0.25 * static_cast<double>(scene.size()) - 0.6, 0, 0.05))));
+  std::size_t accepted = 0;
+  for (int done = 0, run = 0; done < steps; ++run) {
+    Twins twins(settings);
+    for (const auto& body : scene) twins.spawn(body);
+    test::Random random(static_cast<unsigned>(1000 + run));
+    for (int step = 0; step < kRun && done < steps; ++step, ++done) {
+      for (int n = random.integer(0, 2); n > 0; --n) accepted += twins.apply(randomCommand(random, step)).ok();
+      // 1e6 m away a target may be, and a jump there is gone in a substep: 1e10 m/s, and more after a collision.
+      ASSERT_TRUE(twins.step(Vec3::Zero(), 1e12)) << "run " << run;
+      if (twins.seen().bodies.size() > 12) break;  // crumbs: all has been tried on these
+    }
+  }
+  EXPECT_GT(accepted, static_cast<std::size_t>(steps / 10));
+}
+
+}  // namespace
+}  // namespace meshless::stress
