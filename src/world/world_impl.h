@@ -71,6 +71,9 @@ struct ClosingCut {
   std::uint64_t started_at = 0;
 };
 
+/// What contact calls obstacles: the first has this key, beyond the numbers of bodies.
+inline constexpr std::uint64_t kObstacleKey = std::uint64_t{1} << 40;
+
 /// A loop on so many threads.
 ForEach makeForEach(int threads);
 
@@ -164,6 +167,7 @@ struct World::Impl {
   // stages of a step
   void listAwake();
   void groupBatches();
+  void addBatch(std::vector<WorldBody*> group);
   void matchBatches(double h);
   void finishSubstep(double h);
   /// The body and all that fell asleep with it.
@@ -190,6 +194,9 @@ struct World::Impl {
   void contactGroundAndPush(WorldBody& body, double h, double h_frame, const Vec3& push_velocity);
   void fadeRiderOffsets(WorldBody& body, double h);
 };
+
+/// Why it cannot be an obstacle, whatever others there are.
+Status checkObstacle(const ObstacleDef& obstacle);
 
 /// "<name> is <value>; accepted: <range>"
 Error outOfRange(const std::string& name, double value, const std::string& accepted);
