@@ -229,14 +229,16 @@ void ModelTable::read(InArchive& archive) {
   archive(count);
   archive.need(count, 1);
   require(count <= kMostModels, "it claims " + std::to_string(count) + " models");
-  for (std::uint64_t i = 0; i < count; ++i) {
-    auto model = std::make_shared<BodyModel>();
-    archive(*model);
-    requireNone(faultOf(*model));
-    if (!model->elastic.empty())
-      model->elastic_batch = std::make_shared<ElasticBatch>(matchInput(*model), model->elastic);
-    add(model);
-  }
+  for (std::uint64_t i = 0; i < count; ++i) readOne(archive);
+}
+
+void ModelTable::readOne(InArchive& archive) {
+  auto model = std::make_shared<BodyModel>();
+  archive(*model);
+  requireNone(faultOf(*model));
+  if (!model->elastic.empty())
+    model->elastic_batch = std::make_shared<ElasticBatch>(matchInput(*model), model->elastic);
+  add(model);
 }
 
 void savePrepared(OutArchive& archive, const PreparedBody& body, std::uint32_t model) {
@@ -352,6 +354,7 @@ std::shared_ptr<const SavedWorld> World::capture() const {
 
 void World::restore(const SavedWorld& saved) {
   Impl& w = *impl_;
+  w.recordState(saved);
   const int threads = w.settings.threads;  // the machine's, not the state's
   w.settings = saved.settings;
   w.settings.threads = threads;

@@ -248,6 +248,7 @@ class ModelTable {
   const BodyModelPtr& at(std::uint32_t place) const;
   /// Reads, checks and completes them.
   void read(InArchive& archive);
+  void readOne(InArchive& archive);
 
  private:
   std::vector<BodyModelPtr> models_;

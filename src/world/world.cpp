@@ -190,6 +190,7 @@ const PushSphere& World::push() const { return impl_->push; }
 const Scissors& World::scissors() const { return impl_->scissors; }
 
 Result<Reply> World::apply(const Command& command) {
+  impl_->record(command);
   return std::visit([this](const auto& c) { return impl_->apply(c); }, command);
 }
 
@@ -225,6 +226,7 @@ Status World::addObstacle(ObstacleDef obstacle) {
 
 void World::reset() {
   Impl& w = *impl_;
+  w.recordReset();
   for (const ClosingCut& c : w.closing)
     w.finished.emplace(c.ticket, Error{ErrorCode::kFailed, "the world was reset before the blades met"});
   w.closing.clear();
@@ -310,9 +312,13 @@ void World::setScissors(const Blades& blades, double angle) {
   impl_->scissors.shown = true;
   impl_->scissors.blades = blades;
   impl_->scissors.angle = angle;
+  impl_->recordScissors();
 }
 
-void World::hideScissors() { impl_->scissors.shown = false; }
+void World::hideScissors() {
+  impl_->scissors.shown = false;
+  impl_->recordScissors();
+}
 
 PickId World::pickInHand() const {
   const auto held = heldPick();

@@ -127,6 +127,7 @@ struct World::Impl {
   double last_substep = 0.0;      // [s]
   std::vector<ContactParty> parties;  // one a body, in their order, where contacts are found in rest shapes
   std::map<const BodyModel*, std::weak_ptr<const ContactModel>> contact_models;
+  RecordSink record_sink;
 
   WorldBody* find(const std::string& name);
   WorldBody* find(const BodyId& id);
@@ -163,6 +164,12 @@ struct World::Impl {
   std::vector<std::string> replaceByPieces(const BodyId& parent, std::vector<BodyPiece> pieces);
   void followPieces(const BodyId& parent, const std::vector<BodyId>& children,
                     const std::vector<std::vector<Index>>& parent_particles);
+
+  // the log of commands, where there is one
+  void record(const Command& command) const;
+  void recordScissors() const;
+  void recordReset() const;
+  void recordState(const SavedWorld& saved) const;
 
   // stages of a step
   void listAwake();

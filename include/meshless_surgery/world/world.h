@@ -194,6 +194,14 @@ class World {
   /// undone is forgotten, and blades that were closing answer with an error.
   void restore(const SavedWorld& saved);
 
+  /// From now on hands the bytes of a log (world/command_log.h) to the sink, piece by piece: the present state first,
+  /// then every command before it is done. Bodies and obstacles of the scene are to be added before. An empty sink ends
+  /// it.
+  using RecordSink = std::function<void(std::string bytes)>;
+  void record(RecordSink sink);
+  /// Puts the present hash into the log, for a replay to compare.
+  void recordHash();
+
   // tracked tools
   void setScissors(const Blades& blades, double angle);  // shown from now on
   void hideScissors();
