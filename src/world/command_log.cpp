@@ -159,7 +159,7 @@ void World::record(RecordSink sink) {
   emit(w.record_sink, RecordKind::kStart, w.step, encode(*capture()));
 }
 
-void World::recordHash() {
+void World::recordHash() const {
   if (impl_->record_sink) emit(impl_->record_sink, RecordKind::kHash, impl_->step, stateHash());
 }
 

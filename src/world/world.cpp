@@ -186,6 +186,7 @@ World& World::operator=(World&&) noexcept = default;
 const WorldSettings& World::settings() const { return impl_->settings; }
 std::uint64_t World::stepCount() const { return impl_->step; }
 double World::simTime() const { return static_cast<double>(impl_->step) / impl_->settings.step_rate; }
+std::size_t World::bodyCount() const { return impl_->bodies.size(); }
 const PushSphere& World::push() const { return impl_->push; }
 const Scissors& World::scissors() const { return impl_->scissors; }
 

@@ -156,6 +156,7 @@ class World {
   const WorldSettings& settings() const;
   std::uint64_t stepCount() const;
   double simTime() const;  // [s]
+  std::size_t bodyCount() const;
 
   /// Does what the user asked for, at once; on an error nothing has changed.
   Result<Reply> apply(const Command& command);
@@ -200,7 +201,7 @@ class World {
   using RecordSink = std::function<void(std::string bytes)>;
   void record(RecordSink sink);
   /// Puts the present hash into the log, for a replay to compare.
-  void recordHash();
+  void recordHash() const;
 
   // tracked tools
   void setScissors(const Blades& blades, double angle);  // shown from now on
