@@ -27,13 +27,14 @@ bool Contacts::Impl::locate(const ContactParty& b, Index party, const MapFinder&
   const Box& bounds = shape.bounds();
   const Vec3 beyond = (bounds.min - rest).cwiseMax(rest - bounds.max).cwiseMax(0.0);
   const double far = deviations[party] + reach;
-  if (!(beyond.squaredNorm() < far * far)) return false;
+  if (!(beyond.squaredNorm() < far * far) || shape.clearance(rest) > far) return false;
   const Vec3 inward_rest = (map.to_rest * inward).normalized();
   const double enough = kMovedInRest * shape.size();
   for (int n = 0; n < kMostLookups; ++n) {
     ++counters.lookups;
     if (!shape.nearest(rest, inward_rest, kSlack * shape.thickness(), found)) return false;
     if (n + 1 == kMostLookups) break;
+    if (found.distance > far) return false;
     // The surface does not lie where the affine map has it: by so much the point is looked up elsewhere.
     const Triangle& corners = shape.surface().triangles[found.triangle];
     Vec3 at_rest = Vec3::Zero(), at_present = Vec3::Zero();

@@ -24,14 +24,20 @@ constexpr double kFacing = 0.1;       // cosine: a face pushes a body's point in
 constexpr std::uintptr_t kAsked = 4;  // times that the bins are searched before a cell is filled
 constexpr double kTie = 1e-9;         // relative: two features are equally near
 
+}  // namespace
+
 // Of a triangle, what a query needs, side by side in memory.
-struct Facet {
+struct ContactShape::Facet {
   Vec3 a, ab, ac, normal;
   Vec3 centre;
   double radius;
   double g00, g01, g11;  // inverse of the Gram matrix of ab and ac; zero where the triangle has no area
   Index triangle;
 };
+
+namespace {
+
+using Facet = ContactShape::Facet;
 
 Facet makeFacet(const TriangleMesh& mesh, Index t) {
   const Triangle& corners = mesh.triangles[t];
@@ -94,7 +100,7 @@ bool meets(const TriangleMesh& mesh, Index t, const Vec3& from, const Vec3& dire
 }  // namespace
 
 struct ContactShape::Cell {
-  std::vector<Facet> facets;
+  std::vector<Index> triangles;
 };
 
 ContactShape::ContactShape(const TriangleMesh& surface, const SurfaceRows& rows, double spacing)
@@ -106,6 +112,8 @@ ContactShape::ContactShape(const TriangleMesh& surface, const SurfaceRows& rows,
     rider_of_.assign(surface_.vertices.size(), kNoIndex);
     for (Index r = 0; r < rows_.riders->size(); ++r) rider_of_[(*rows_.riders)[r]] = r;
   }
+  facets_.reserve(surface_.triangles.size());
+  for (Index t = 0; t < surface_.triangles.size(); ++t) facets_.push_back(makeFacet(surface_, t));
   binTriangles();
   chooseSamples(spacing);
   measureThickness();
@@ -124,6 +132,9 @@ ContactShape::ContactShape(const TriangleMesh& surface, const SurfaceRows& rows,
     cell_total_ *= static_cast<std::size_t>(cells_count_[d]);
   }
   cells_ = std::make_unique<std::atomic<std::uintptr_t>[]>(cell_total_);
+  distances_ = std::make_unique<std::atomic<float>[]>(cell_total_);
+  for (std::size_t i = 0; i < cell_total_; ++i)
+    distances_[i].store(std::numeric_limits<float>::quiet_NaN(), std::memory_order_relaxed);
 }
 
 ContactShape::~ContactShape() {
@@ -134,12 +145,12 @@ ContactShape::~ContactShape() {
 
 std::size_t ContactShape::bytes() const {
   std::size_t sum =
-      sizeof *this + surface_.vertices.size() * sizeof(Vec3) + surface_.triangles.size() * sizeof(Triangle) +
+      sizeof *this + surface_.vertices.size() * sizeof(Vec3) + facets_.size() * sizeof(Facet) + surface_.triangles.size() * sizeof(Triangle) +
       rider_of_.size() * sizeof(Index) + samples_.size() * sizeof(ContactSample) +
-      (bin_offsets_.size() + bin_triangles_.size()) * sizeof(Index) + cell_total_ * sizeof(std::atomic<std::uintptr_t>);
+      (bin_offsets_.size() + bin_triangles_.size()) * sizeof(Index) + cell_total_ * (sizeof(std::atomic<std::uintptr_t>) + sizeof(std::atomic<float>));
   for (std::size_t i = 0; i < cell_total_; ++i)
     if (const std::uintptr_t cell = cells_[i].load(std::memory_order_acquire); cell > kAsked)
-      sum += sizeof(Cell) + reinterpret_cast<const Cell*>(cell)->facets.size() * sizeof(Facet);
+      sum += sizeof(Cell) + reinterpret_cast<const Cell*>(cell)->triangles.size() * sizeof(Index);
   return sum;
 }
 
@@ -234,13 +245,13 @@ const ContactShape::Cell* ContactShape::fill(std::size_t index, const std::array
     if (distanceToTriangle(surface_, t, centre) - half_diagonal > bound) continue;
     const Box b = boundsOf(surface_, t);
     const Vec3 gap = (b.min - box.max).cwiseMax(box.min - b.max).cwiseMax(0.0);
-    if (gap.norm() <= bound) cell->facets.push_back(makeFacet(surface_, t));
+    if (gap.norm() <= bound) cell->triangles.push_back(t);
   }
   // Nearest first: the others are then dismissed by their bounds.
-  std::stable_sort(cell->facets.begin(), cell->facets.end(), [&](const Facet& f, const Facet& g) {
-    return distanceToTriangle(surface_, f.triangle, centre) < distanceToTriangle(surface_, g.triangle, centre);
+  std::stable_sort(cell->triangles.begin(), cell->triangles.end(), [&](Index f, Index g) {
+    return distanceToTriangle(surface_, f, centre) < distanceToTriangle(surface_, g, centre);
   });
-  cell->facets.shrink_to_fit();
+  cell->triangles.shrink_to_fit();
   const std::uintptr_t made = reinterpret_cast<std::uintptr_t>(cell.get());
   std::uintptr_t known = cells_[index].load(std::memory_order_acquire);
   while (known <= kAsked)
@@ -315,9 +326,11 @@ struct Best {
 class Settler {
  public:
   explicit Settler(const Best& best)
-      : limit_(best.squared + 4.0 * best.tie()), touches_(best.squared <= 16.0 * best.least_tie) {}
+      : limit_(best.squared + 4.0 * best.tie()), reach_(std::sqrt(limit_)), touches_(best.squared <= 16.0 * best.least_tie) {}
 
   void offer(const Facet& f, const Vec3& p) {
+    const double bound = reach_ + f.radius, over = f.normal.dot(p - f.a);
+    if ((p - f.centre).squaredNorm() > bound * bound * (1.0 + kTie) || over * over > limit_ * (1.0 + kTie)) return;
     const Measured m = measure(f, p);
     if (!(m.squared <= limit_)) return;
     for (std::size_t k = 0; k < count_; ++k)
@@ -371,7 +384,7 @@ class Settler {
     std::array<double, 3> weights;
     bool above;
   };
-  double limit_;
+  double limit_, reach_;  // [m^2], [m]
   bool touches_;  // on the surface itself, which is not inside
   Index first_ = kNoIndex;
   Vec3 normals_ = Vec3::Zero(), away_ = Vec3::Zero();
@@ -390,6 +403,7 @@ void ContactShape::visitNear(const Vec3& rest, double radius, const Visit& visit
 }
 
 bool ContactShape::searchBins(const Vec3& rest, Nearest& found) const {
+  found.triangle = kNoIndex;
   Best best(size_);
   Box box;
   const Vec3 outside = (bounds_.min - rest).cwiseMax(rest - bounds_.max).cwiseMax(0.0);
@@ -397,29 +411,49 @@ bool ContactShape::searchBins(const Vec3& rest, Nearest& found) const {
   for (double radius = outside.norm() + 0.5 * bin_edge_;; radius *= 2.0) {
     box.min = rest.array() - radius;
     box.max = rest.array() + radius;
-    visitBins(box, [&](Index t) { best.offer(makeFacet(surface_, t), rest, found); });
+    visitBins(box, [&](Index t) { best.offer(facets_[t], rest, found); });
     if (best.distance <= radius || radius > farthest) break;
   }
   double sign = best.height;
   if (best.tied) {
     Settler settler(best);
     const double around = best.distance + 1e-6 * size_;
-    visitNear(rest, around, [&](Index t) { settler.offer(makeFacet(surface_, t), rest); });
+    visitNear(rest, around, [&](Index t) { settler.offer(facets_[t], rest); });
     sign = settler.settle(found);
   }
   found.distance = std::copysign(best.distance, sign);
   return found.triangle != kNoIndex;
 }
 
-bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
-  found.triangle = kNoIndex;
-  if (!cells_ || !rest.allFinite()) return false;
-  std::array<int, 3> at;
+// The cell of a point, or the one at the border that is nearest to it.
+std::size_t ContactShape::cellAt(const Vec3& rest, std::array<int, 3>& at) const {
   for (int d = 0; d < 3; ++d) {
     const double c = (rest[d] - cell_origin_[d]) * cells_per_metre_;
     at[d] = c > 0.0 ? (c < cells_count_[d] ? static_cast<int>(c) : cells_count_[d] - 1) : 0;
   }
-  const std::size_t index = (static_cast<std::size_t>(at[0]) * cells_count_[1] + at[1]) * cells_count_[2] + at[2];
+  return (static_cast<std::size_t>(at[0]) * cells_count_[1] + at[1]) * cells_count_[2] + at[2];
+}
+
+double ContactShape::clearance(const Vec3& rest) const {
+  if (!cells_ || !rest.allFinite()) return -1.0;
+  std::array<int, 3> at;
+  const std::size_t index = cellAt(rest, at);
+  const Vec3 centre = cell_origin_ + cell_edge_ * Vec3(at[0] + 0.5, at[1] + 0.5, at[2] + 0.5);
+  float known = distances_[index].load(std::memory_order_relaxed);
+  if (std::isnan(known)) {
+    Nearest found;
+    const bool any = searchBins(centre, found);
+    known = any ? static_cast<float>(found.distance) : -std::numeric_limits<float>::infinity();
+    distances_[index].store(known, std::memory_order_relaxed);  // whoever else asks finds the same
+  }
+  return known - 1e-6 * std::abs(known) - (rest - centre).norm();
+}
+
+bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
+  found.triangle = kNoIndex;
+  if (!cells_ || !rest.allFinite()) return false;
+  std::array<int, 3> at;
+  const std::size_t index = cellAt(rest, at);
   const std::uintptr_t known = cells_[index].load(std::memory_order_acquire);
   if (known < kAsked) {
     std::uintptr_t asked = known;
@@ -428,11 +462,11 @@ bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
   }
   const Cell* cell = known > kAsked ? reinterpret_cast<const Cell*>(known) : fill(index, at);
   Best best(size_);
-  for (const Facet& f : cell->facets) best.offer(f, rest, found);
+  for (const Index t : cell->triangles) best.offer(facets_[t], rest, found);
   double sign = best.height;
   if (best.tied) {
     Settler settler(best);
-    for (const Facet& f : cell->facets) settler.offer(f, rest);
+    for (const Index t : cell->triangles) settler.offer(facets_[t], rest);
     sign = settler.settle(found);
   }
   found.distance = std::copysign(best.distance, sign);
@@ -442,19 +476,17 @@ bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
 bool ContactShape::nearest(const Vec3& rest, const Vec3& inward, double slack, Nearest& found) const {
   if (!nearest(rest, found)) return false;
   if (std::abs(found.distance) > slack) return true;
-  const Triangle& c = surface_.triangles[found.triangle];
-  const Vec3& at = surface_.vertices[c[0]];
-  const Vec3 area = (surface_.vertices[c[1]] - at).cross(surface_.vertices[c[2]] - at);
-  const double facing = area.dot(inward);
-  if (facing > 0.0 && facing * facing > kFacing * kFacing * area.squaredNorm()) return true;
+  if (facets_[found.triangle].normal.dot(inward) > kFacing) return true;
   double best = slack + std::abs(found.distance);
   Nearest other;
   visitNear(rest, best, [&](Index t) {
-    const Facet f = makeFacet(surface_, t);
+    const Facet& f = facets_[t];
     if (!(f.normal.dot(inward) > kFacing)) return;
-    const Vec3 u = nearestWeights(rest, f.a, f.a + f.ab, f.a + f.ac);
     const Vec3 ap = rest - f.a;
-    const double distance = (ap - u.y() * f.ab - u.z() * f.ac).norm(), height = f.normal.dot(ap);
+    const double height = f.normal.dot(ap), bound = best + f.radius;
+    if (std::abs(height) > best || (rest - f.centre).squaredNorm() > bound * bound * (1.0 + kTie)) return;
+    const Vec3 u = nearestWeights(rest, f.a, f.a + f.ab, f.a + f.ac);
+    const double distance = (ap - u.y() * f.ab - u.z() * f.ac).norm();
     // One of its own plane's: a face round the corner is farther than its plane is.
     if (!(distance < best) || std::abs(height) < 0.99 * distance - 1e-9 * size_) return;
     if (distance == best && t > other.triangle) return;

@@ -299,6 +299,8 @@ struct ContactSolver::Impl {
     entries = &of_entries;
     plan = &of_plan;
     rigid.resize(of_parties.size());
+    for (std::size_t p = 0; p < of_parties.size(); ++p)
+      if (!of_parties[p].moves) rigid[p] = kStill;  // the place may have been that of a body
     Index particles = 0;
     for (Index p : of_plan.parties) particles += of_parties[p].particles;
     if (shifts.size() < particles) shifts.resize(particles);
@@ -337,7 +339,9 @@ struct ContactSolver::Impl {
       for (Index k = plan->contact_offsets[island]; k < plan->contact_offsets[island + 1]; ++k)
         if (makeRow(contacts[plan->contacts[k]], *row)) ++row;
       row_counts[island] = static_cast<Index>(row - first);
+      startWarm(island, first);
     } else {
+      // All impulses of the last substep by the same rows: what they have moved is where this one starts.
       beginAgain(island);
       for (Row* row = first; row != first + row_counts[island]; ++row) {
         Gap gap;
@@ -348,7 +352,6 @@ struct ContactSolver::Impl {
         row->slip = gap.motion - along * row->normal;
       }
     }
-    startWarm(island, first);
     strikeTogether(first, first + row_counts[island]);
     const Index count = row_counts[island];
     for (int pass = 0; pass < plan->passes[island]; ++pass)
@@ -506,9 +509,6 @@ struct ContactSolver::Impl {
       const Index p = plan->parties[k];
       const ContactParty& party = (*parties)[p];
       Rigid& r = rigid[p];
-      r.shift.setZero();
-      r.turn.setZero();
-      std::fill_n(shifts.begin() + plan->shifts[p], party.particles, Vec3::Zero());
       if (!(r.share > 0.0)) continue;
       const Vec3 origin = party.positions[0];
       Vec3 sum = Vec3::Zero();

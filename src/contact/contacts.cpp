@@ -11,7 +11,8 @@ namespace meshless {
 namespace {
 
 constexpr std::size_t kTaskPairs = 32, kTaskParties = 128;  // looked at by one task
-constexpr Index kManyPartners = 4;    // from here on it pays to know how far a surface is from its map
+constexpr Index kManyPartners = 2;    // from here on it pays to know how far a surface is from its map
+constexpr double kNeighbour = 3.0;    // times what a vertex is off by its own map: by the one beside it
 constexpr double kDeviation = 0.1;    // of the bounds' diagonal: how far a surface may be from where its maps have it
 constexpr double kLongestStep = 0.5;  // of the smaller body's extent: how far quick bodies go in a substep
 
@@ -122,16 +123,17 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
     const ContactParty& party = parties[p];
     w.finders[p].make(party.maps, party.map_count);
     w.deviations[p] = kDeviation * party.shape->bounds().diagonal();
-    if (partners[p] < kManyPartners || party.map_count != 1) continue;
+    if (partners[p] < kManyPartners) continue;
     double farthest = 0.0;
     for (const ContactSample& s : party.shape->samples()) {
       if (s.share > 0.0) continue;
+      const Vec3& now = vertexAt(party, s.vertices[0]);
+      const ContactMap& map = party.maps[w.finders[p].nearest(now)];
       const Vec3 fitted =
-          party.maps[0].from_rest * (party.shape->surface().vertices[s.vertices[0]] - party.maps[0].rest) +
-          party.maps[0].centre;
-      farthest = std::max(farthest, (vertexAt(party, s.vertices[0]) - fitted).squaredNorm());
+          map.from_rest * (party.shape->surface().vertices[s.vertices[0]] - map.rest) + map.centre;
+      farthest = std::max(farthest, (now - fitted).squaredNorm());
     }
-    w.deviations[p] = std::min(w.deviations[p], 2.0 * std::sqrt(farthest));
+    w.deviations[p] = std::min(w.deviations[p], (party.map_count > 1 ? kNeighbour : 2.0) * std::sqrt(farthest));
   }
   // From below upwards where it matters: ground first.
   const double falling = w.scene.gravity.norm() * h * h;

@@ -4,10 +4,6 @@
 
 namespace meshless {
 
-Vec3 vertexAt(const ContactParty& party, Index vertex) {
-  return party.surface ? party.surface[vertex] : party.positions[(*party.shape->rows().particle)[vertex]];
-}
-
 Vec3 sampleAt(const ContactParty& party, const ContactSample& sample) {
   const Vec3 p = vertexAt(party, sample.vertices[0]);
   return sample.share > 0.0 ? Vec3(p + sample.share * (vertexAt(party, sample.vertices[1]) - p)) : p;

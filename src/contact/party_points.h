@@ -5,7 +5,9 @@
 
 namespace meshless {
 
-Vec3 vertexAt(const ContactParty& party, Index vertex);
+inline const Vec3& vertexAt(const ContactParty& party, Index vertex) {
+  return party.surface ? party.surface[vertex] : party.positions[(*party.shape->rows().particle)[vertex]];
+}
 Vec3 sampleAt(const ContactParty& party, const ContactSample& sample);
 /// How far a point of the surface has moved in the substep [m], by its particles.
 Vec3 vertexMotion(const ContactParty& party, Index vertex);

@@ -50,6 +50,10 @@ class ContactShape {
   /// farther. Cubes that lie exactly along each other are held by their tops, not by their sides.
   bool nearest(const Vec3& rest, const Vec3& inward, double slack, Nearest& found) const;
 
+  /// A lower bound [m] of the distance from a point to the surface from outside, quick where the same place was asked
+  /// about before; negative where the point may be inside or near. Thread-safe.
+  double clearance(const Vec3& rest) const;
+
   /// The triangle across the edge that lies against a corner of a triangle; kNoIndex at a border. Made when first asked
   /// for; thread-safe.
   Index across(Index triangle, int corner) const;
@@ -69,9 +73,12 @@ class ContactShape {
   std::size_t cellsFilled() const { return cells_filled_.load(std::memory_order_relaxed); }
   std::size_t bytes() const;
 
+  struct Facet;
+
  private:
   struct Cell;
   const Cell* fill(std::size_t index, const std::array<int, 3>& at) const;
+  std::size_t cellAt(const Vec3& rest, std::array<int, 3>& at) const;
   bool searchBins(const Vec3& rest, Nearest& found) const;
   template <class Visit>
   void visitNear(const Vec3& rest, double radius, const Visit& visit) const;
@@ -83,6 +90,7 @@ class ContactShape {
   void measureThickness();
 
   TriangleMesh surface_;
+  std::vector<Facet> facets_;  // one a triangle
   SurfaceRows rows_;
   std::vector<Index> rider_of_;
   std::vector<ContactSample> samples_;
@@ -102,6 +110,7 @@ class ContactShape {
   // A cell, or how often it was asked for: the first few times the bins are searched, so that a fresh shape answers at
   // once.
   mutable std::unique_ptr<std::atomic<std::uintptr_t>[]> cells_;
+  mutable std::unique_ptr<std::atomic<float>[]> distances_;  // [m] one a cell, of its centre; NaN: not known yet
   std::size_t cell_total_ = 0;
   mutable std::atomic<std::size_t> cells_filled_{0};
   mutable std::once_flag linked_;
