@@ -97,7 +97,7 @@ struct Services::Handlers {
   template <class Response>
   bool refuse(Response& response, const std::string& service, const Error& error) {
     response.success = false;
-    response.message = error.detail.size() > kLongestMessage ? error.detail.substr(0, kLongestMessage) + " ..." : error.detail;
+    response.message = printable(error.detail, kLongestMessage);
     if (error.code != ErrorCode::kMissed) rejections.count("~" + service, response.message);
     ROS_DEBUG_STREAM("~" << service << " refused: " << response.message);
     return true;
