@@ -26,7 +26,8 @@ SCENES = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'scenes')
 CALLS = int(os.environ.get('MESHLESS_SURGERY_FUZZ_CALLS') or 2500)
 SEED = int(os.environ.get('MESHLESS_SURGERY_FUZZ_SEED') or 1)
 HANG = 30.0  # [s]; the machine may be loaded. The longest call is printed.
-MOST_MEMORY = 1 << 30  # [bytes] that the node may take on the way
+# [bytes] that the node may take on the way: requests of 100 MB are among them, and its threads keep what they have had.
+MOST_MEMORY = 2 << 30
 LARGE_STRING = 'x' * 10000000
 
 NUMBERS = (0.0, -0.0, 1.0, -1.0, 0.1, 0.05, 0.01, -0.01, 1e-6, 1e-12, 1e-320, 1e6, 1e9, 1e18, 1e154, 1e308, -1e308,
