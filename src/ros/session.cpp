@@ -16,6 +16,7 @@ constexpr std::size_t kWriteAtOnce = 1 << 20;                    // bytes
 constexpr std::size_t kMostBuffered = std::size_t{256} << 20;    // bytes that a slow disk may be behind
 constexpr double kWarnEvery = 10.0;                              // [s]
 
+const std::string kAutosave = "autosave_";  // how the names of autosaves begin
 const std::string kBefore = ".before";  // of an autosave that was not taken up
 
 }  // namespace
@@ -48,6 +49,7 @@ Result<std::string> Session::startLog(World& world) {
   const auto file = folder_.create(settings_.command_log);
   if (!file.ok()) return file.error();
   log_file_ = file->descriptor;
+  log_name_ = file->name;
   logger_ = std::thread([this] { writeLoop(); });
   world.record([this](std::string bytes) { append(std::move(bytes)); });
   return file->name;
@@ -83,6 +85,9 @@ void Session::stop() {
 
 Result<std::size_t> Session::save(WorldRunner& runner, const std::string& name) {
   if (Status valid = SessionFolder::checkName(name); !valid.ok()) return valid.error();
+  if (name.compare(0, kAutosave.size(), kAutosave) == 0 || (!log_name_.empty() && name == log_name_))
+    return Error{ErrorCode::kForbidden,
+                 "file is '" + name + "', which the node itself writes; accepted: another name"};
   SavedWorldPtr saved;
   const Status done = runner.look([&](World& world) { saved = world.capture(); });
   if (!done.ok()) return done.error();
@@ -129,31 +134,32 @@ void Session::changed(const World& world, double dt) {
   }
   {
     const std::lock_guard<std::mutex> lock(save_mutex_);
-    if (due) {
+    if (dt > 0.0) ++steps_seen_;
+    const bool known = unsaved_;
+    unsaved_ = !due;
+    if (due)
       to_save_ = std::move(saved);  // of two that wait the newer one
-      unsaved_ = false;
-    } else if (dt == 0.0) {
-      if (unsaved_) return;
-      unsaved_ = true;
-    } else {
+    else if (known)
       return;
-    }
   }
   save_wanted_.notify_all();
 }
 
-// What users do while time stands still is saved a little later, all at once.
+// Once time stands still, what is not saved yet is saved a little later, all at once.
 void Session::saveLoop() {
   while (true) {
     SavedWorldPtr saved;
     {
       std::unique_lock<std::mutex> lock(save_mutex_);
       save_wanted_.wait(lock, [this] { return stopping_ || to_save_ || unsaved_; });
-      if (!to_save_ && !stopping_)
+      if (!to_save_) {
+        const std::uint64_t seen = steps_seen_;
         save_wanted_.wait_for(lock, kSaveAfterChange, [this] { return stopping_ || to_save_ != nullptr; });
+        if (!stopping_ && !to_save_ && seen != steps_seen_) continue;  // it runs: the period decides
+      }
       if (stopping_) return;
       saved = std::exchange(to_save_, nullptr);
-      unsaved_ = unsaved_ && saved;
+      if (!saved) unsaved_ = false;
     }
     if (!saved && !runner_->look([&](World& world) { saved = world.capture(); }).ok()) return;
     const Status written = folder_.write(settings_.autosave_name, encode(*saved, settings_.origin));

@@ -104,6 +104,7 @@ class SaveTest(SessionCase):
                     self.assertFalse(answer.success, repr(name[:50]))
                     self.assertIn('accepted', answer.message)
                     self.assertLess(len(answer.message), 3000)
+            self.assertFalse(node.call('save', file='autosave_x.state').success)
             self.assertEqual([], os.listdir(self.folder))
             self.assertEqual(before, node.hash())
 

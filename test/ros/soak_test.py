@@ -22,6 +22,11 @@ ROWS = 12               # of the table at the least
 MOST_GROWTH = 64 << 20  # [bytes] between the second quarter and the end
 
 
+def say(line):
+    """Shown at once; what is printed otherwise ends in the result file."""
+    print(line, file=sys.__stdout__, flush=True)
+
+
 class SoakTest(unittest.TestCase):
 
     def setUp(self):
@@ -63,7 +68,7 @@ class SoakTest(unittest.TestCase):
         try:
             began = time.monotonic()
             end = began + 60.0 * MINUTES
-            print('  minute  rounds  memory [MB]  step at rest [ms]', flush=True)
+            say('  minute  rounds  memory [MB]  step at the start [ms]')
             rounds = 0
             while time.monotonic() < end or len(rows) < ROWS:
                 until = time.monotonic() + 60.0 * MINUTES / max(ROWS, MINUTES)
@@ -82,8 +87,8 @@ class SoakTest(unittest.TestCase):
                 with states.changed:
                     del states.messages[:]
                 rows.append((self.memory(node), min(times)))
-                print('%8.1f %7d %12.1f %18.2f' % ((time.monotonic() - began) / 60, rounds, rows[-1][0] / 2 ** 20,
-                                                   1e3 * rows[-1][1]), flush=True)
+                say('%8.1f %7d %12.1f %23.2f' % ((time.monotonic() - began) / 60, rounds, rows[-1][0] / 2 ** 20,
+                                                 1e3 * rows[-1][1]))
             settled = max(memory for memory, _ in rows[:len(rows) // 2])
             self.assertLess(rows[-1][0], settled + MOST_GROWTH)
         finally:

@@ -66,7 +66,8 @@ class Session {
   std::mutex save_mutex_;
   std::condition_variable save_wanted_;
   SavedWorldPtr to_save_;
-  bool unsaved_ = false;  // something has changed between steps
+  bool unsaved_ = false;  // something has changed since the last copy
+  std::uint64_t steps_seen_ = 0;
   bool stopping_ = false;
   std::thread saver_;
 
@@ -75,6 +76,7 @@ class Session {
   std::condition_variable log_grown_;
   std::string log_buffer_;
   int log_file_ = -1;
+  std::string log_name_;
   bool log_failed_ = false;
   bool log_ending_ = false;
   std::thread logger_;
