@@ -60,7 +60,8 @@ Status SessionFolder::checkName(const std::string& name) {
       std::all_of(name.begin(), name.end(), plain))
     return Done{};
   std::string shown = name.substr(0, kLongestName);
-  std::replace_if(shown.begin(), shown.end(), [&](char c) { return !plain(c) && c != '/' && c != ' '; }, '?');
+  std::replace_if(
+      shown.begin(), shown.end(), [&](char c) { return !plain(c) && c != '/' && c != ' '; }, '?');
   return Error{ErrorCode::kInvalidArgument, "file is '" + shown + (name.size() > shown.size() ? "...'" : "'") +
                                                 "; accepted: a name of 1 to " + std::to_string(kLongestName) +
                                                 " letters, digits and ._- that does not begin with a dot, no path"};
@@ -166,8 +167,8 @@ Result<SessionFolder::NewFile> SessionFolder::create(const std::string& name) co
     if (descriptor >= 0) return NewFile{descriptor, numbered};
     if (errno != EEXIST) return refused("write", pathOf(numbered), errno);
   }
-  return Error{ErrorCode::kFailed, "there are " + std::to_string(kMostNumbered) + " files '" + pathOf(name) +
-                                       ".N' already; remove some"};
+  return Error{ErrorCode::kFailed,
+               "there are " + std::to_string(kMostNumbered) + " files '" + pathOf(name) + ".N' already; remove some"};
 }
 
 }  // namespace meshless

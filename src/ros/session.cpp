@@ -9,15 +9,15 @@
 namespace meshless {
 namespace {
 
-constexpr double kCheckEvery = 1.0;                              // [s] simulated between two hashes in the log
-constexpr std::chrono::milliseconds kSaveAfterChange{500};       // while time stands still
-constexpr std::chrono::milliseconds kWriteEvery{200};            // so much of the log is lost when the node is killed
-constexpr std::size_t kWriteAtOnce = 1 << 20;                    // bytes
-constexpr std::size_t kMostBuffered = std::size_t{256} << 20;    // bytes that a slow disk may be behind
-constexpr double kWarnEvery = 10.0;                              // [s]
+constexpr double kCheckEvery = 1.0;                            // [s] simulated between two hashes in the log
+constexpr std::chrono::milliseconds kSaveAfterChange{500};     // while time stands still
+constexpr std::chrono::milliseconds kWriteEvery{200};          // so much of the log is lost when the node is killed
+constexpr std::size_t kWriteAtOnce = 1 << 20;                  // bytes
+constexpr std::size_t kMostBuffered = std::size_t{256} << 20;  // bytes that a slow disk may be behind
+constexpr double kWarnEvery = 10.0;                            // [s]
 
 const std::string kAutosave = "autosave_";  // how the names of autosaves begin
-const std::string kBefore = ".before";  // of an autosave that was not taken up
+const std::string kBefore = ".before";      // of an autosave that was not taken up
 
 }  // namespace
 
@@ -30,8 +30,9 @@ std::string Session::takeUp(World& world) {
   const std::string& name = settings_.autosave_name;
   const auto setAside = [&](const std::string& why) {
     const Status moved = folder_.rename(name, name + kBefore);
-    ROS_WARN_STREAM("the autosave " << name << " in " << folder_.folder() << " is not taken up: " << why
-                                    << (moved.ok() ? "; it is kept as " + name + kBefore : "; " + moved.error().detail));
+    ROS_WARN_STREAM(
+        "the autosave " << name << " in " << folder_.folder() << " is not taken up: " << why
+                        << (moved.ok() ? "; it is kept as " + name + kBefore : "; " + moved.error().detail));
     return std::string();
   };
   const auto bytes = folder_.read(name, kMostStateBytes);
@@ -86,8 +87,7 @@ void Session::stop() {
 Result<std::size_t> Session::save(WorldRunner& runner, const std::string& name) {
   if (Status valid = SessionFolder::checkName(name); !valid.ok()) return valid.error();
   if (name.compare(0, kAutosave.size(), kAutosave) == 0 || (!log_name_.empty() && name == log_name_))
-    return Error{ErrorCode::kForbidden,
-                 "file is '" + name + "', which the node itself writes; accepted: another name"};
+    return Error{ErrorCode::kForbidden, "file is '" + name + "', which the node itself writes; accepted: another name"};
   SavedWorldPtr saved;
   const Status done = runner.look([&](World& world) { saved = world.capture(); });
   if (!done.ok()) return done.error();
@@ -194,8 +194,7 @@ void Session::writeLoop() {
     }
     if (const Status written = writeAll(log_file_, bytes); !written.ok()) {
       const std::lock_guard<std::mutex> lock(log_mutex_);
-      if (!log_failed_)
-        ROS_ERROR_STREAM("the log of commands ends here: cannot write it: " << written.error().detail);
+      if (!log_failed_) ROS_ERROR_STREAM("the log of commands ends here: cannot write it: " << written.error().detail);
       log_failed_ = true;  // what follows a gap could not be replayed
       log_buffer_.clear();
     }

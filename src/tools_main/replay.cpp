@@ -10,8 +10,8 @@
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Replays a log of commands (the parameter command_log of deformer_node) and prints the hash of the state at its end. "
-      "Exit status: 0 where every recorded hash was met, 1 where one was not, 2 where the log cannot be read.");
+      "Replays a log of commands (the parameter command_log of deformer_node) and prints the hash of the state at its "
+      "end. Exit status: 0 where every recorded hash was met, 1 where one was not, 2 where the log cannot be read.");
   std::string file;
   int threads = 1;
   app.add_option("log", file, "the log")->required()->check(CLI::ExistingFile);

@@ -16,7 +16,17 @@ constexpr std::uint32_t kVersion = 1;
 constexpr std::size_t kRecordHeader = 8, kReadAtOnce = 1 << 20;
 constexpr std::uint32_t kMostRecord = 0x7fffffffu;
 
-enum class RecordKind : std::uint8_t { kStart, kCommand, kMaterials, kScissors, kHideScissors, kReset, kState, kHash, kEnd };
+enum class RecordKind : std::uint8_t {
+  kStart,
+  kCommand,
+  kMaterials,
+  kScissors,
+  kHideScissors,
+  kReset,
+  kState,
+  kHash,
+  kEnd
+};
 
 std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(
@@ -177,7 +187,9 @@ void World::Impl::record(const Command& command) const {
     return;
   }
   std::visit(
-      [&](const auto& c) { emit(record_sink, RecordKind::kCommand, step, static_cast<std::uint8_t>(command.index()), c); },
+      [&](const auto& c) {
+        emit(record_sink, RecordKind::kCommand, step, static_cast<std::uint8_t>(command.index()), c);
+      },
       command);
 }
 
@@ -220,7 +232,8 @@ Result<ReplayReport> replay(std::istream& log, int threads) {
     if (header.size() == kRecordHeader) {
       std::memcpy(&length, header.data(), sizeof length);
       std::memcpy(&sum, header.data() + sizeof length, sizeof sum);
-      if (length > kMostRecord) return damaged("record " + std::to_string(number) + " claims " + std::to_string(length) + " bytes");
+      if (length > kMostRecord)
+        return damaged("record " + std::to_string(number) + " claims " + std::to_string(length) + " bytes");
     }
     const std::string body = header.size() == kRecordHeader ? readUpTo(log, length) : std::string();
     if (header.size() < kRecordHeader || body.size() < length) {

@@ -21,7 +21,9 @@ std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(crc32_z(sum, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
-Error unreadable(const std::string& why) { return {ErrorCode::kUnreadable, "this is no state that can be read: " + why}; }
+Error unreadable(const std::string& why) {
+  return {ErrorCode::kUnreadable, "this is no state that can be read: " + why};
+}
 
 void require(bool holds, const std::string& fault) {
   if (!holds) throw ArchiveFault(fault);
@@ -48,17 +50,15 @@ bool areTriangles(const TriangleMesh& mesh) {
 
 template <class Archive>
 void saveBody(Archive& archive, const SavedBody& body, std::uint32_t model) {
-  archive(body.id, body.number, body.name, body.material, model, body.state, body.surface_current,
-          body.touched_by_push, body.stiffness_factor, body.bounds, body.asleep, body.still_for, body.sleep_group,
-          body.batch);
+  archive(body.id, body.number, body.name, body.material, model, body.state, body.surface_current, body.touched_by_push,
+          body.stiffness_factor, body.bounds, body.asleep, body.still_for, body.sleep_group, body.batch);
 }
 
 SavedBody loadBody(InArchive& archive, const ModelTable& models) {
   SavedBody body;
   std::uint32_t model = 0;
-  archive(body.id, body.number, body.name, body.material, model, body.state, body.surface_current,
-          body.touched_by_push, body.stiffness_factor, body.bounds, body.asleep, body.still_for, body.sleep_group,
-          body.batch);
+  archive(body.id, body.number, body.name, body.material, model, body.state, body.surface_current, body.touched_by_push,
+          body.stiffness_factor, body.bounds, body.asleep, body.still_for, body.sleep_group, body.batch);
   body.model = models.at(model);
   requireNone(faultOf(*body.model, body.state));
   requireNone(faultOf(*body.model, body.material));
@@ -110,8 +110,7 @@ void checkTools(const SavedWorld& world) {
         require(pick.particle < body.model->rest.size() && allBelow(pick.patch, body.model->rest.size()),
                 "a pick holds a particle that is not there");
   }
-  for (const ClosingCut& cut : world.closing)
-    require(cut.done_at > cut.started_at, "blades close in no time");
+  for (const ClosingCut& cut : world.closing) require(cut.done_at > cut.started_at, "blades close in no time");
 }
 
 SavedWorldPtr readWorld(InArchive& archive) {
@@ -421,8 +420,8 @@ std::uint64_t World::stateHash() const {
   archive(saved->step, saved->batches_current, saved->batches, saved->used_names, saved->push, saved->scissors);
   // Of a model, which is constant, its size and mass.
   for (const SavedBody& body : saved->bodies) {
-    archive(body.name, body.material, body.state, body.touched_by_push, body.stiffness_factor, body.bounds,
-            body.asleep, body.still_for, body.sleep_group, body.batch);
+    archive(body.name, body.material, body.state, body.touched_by_push, body.stiffness_factor, body.bounds, body.asleep,
+            body.still_for, body.sleep_group, body.batch);
     archive(body.model->mass, static_cast<std::uint64_t>(body.model->rest.size()),
             static_cast<std::uint64_t>(body.model->surface.triangles.size()),
             static_cast<std::uint64_t>(body.model->clusters.members.size()));

@@ -90,16 +90,16 @@ template <class A>
 void serialize(A& archive, Material& v) {
   auto& [name, youngs_modulus, poissons_ratio, mode, alpha, beta, density, damping, friction, restitution, volume, area,
          plasticity, color, inside_color] = v;
-  archive(name, youngs_modulus, poissons_ratio, choice(mode, MatchMode::kQuadratic), alpha, beta, density, damping, friction, restitution, volume,
-          area, plasticity, color, inside_color);
+  archive(name, youngs_modulus, poissons_ratio, choice(mode, MatchMode::kQuadratic), alpha, beta, density, damping,
+          friction, restitution, volume, area, plasticity, color, inside_color);
 }
 template <class A>
 void serialize(A& archive, WorldSettings& v) {
   auto& [gravity, ground, ground_friction, step_rate, substeps, max_substeps, contact, threads, sleep,
          pick_max_distance, pick_stiffness, pick_radius, push_radius] = v;
   archive(gravity, ground, ground_friction, step_rate, substeps, max_substeps,
-          choice(contact, ContactMethod::kRestShape), threads, sleep,
-          pick_max_distance, pick_stiffness, pick_radius, push_radius);
+          choice(contact, ContactMethod::kRestShape), threads, sleep, pick_max_distance, pick_stiffness, pick_radius,
+          push_radius);
 }
 
 // --- models

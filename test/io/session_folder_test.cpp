@@ -42,9 +42,10 @@ TEST_F(SessionFolderTest, WhatIsWrittenIsRead) {
 
 TEST_F(SessionFolderTest, OnlyNames) {
   const SessionFolder folder(base_);
-  for (const std::string name : {"", ".", "..", "../a", "/etc/passwd", "a/b", ".hidden", "a b", "a\nb", "ä",
-                                 "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"
-                                 "aaaaaaaaaaaaaaaaaaaaaa"}) {
+  for (const std::string name :
+       {"", ".", "..", "../a", "/etc/passwd", "a/b", ".hidden", "a b", "a\nb", "ä",
+        "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"
+        "aaaaaaaaaaaaaaaaaaaaaa"}) {
     const Status written = folder.write(name, "x");
     ASSERT_FALSE(written.ok()) << name;
     EXPECT_NE(std::string::npos, written.error().detail.find("accepted")) << written.error().detail;

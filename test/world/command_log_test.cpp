@@ -202,7 +202,8 @@ TEST(CommandLog, ADifferenceIsFound) {
 
 TEST(CommandLog, OtherFilesAndDamagedOnesAreRefused) {
   const Session s = session();
-  for (const std::string& text : {std::string(), std::string("MLSCOMN"), std::string("solid ball\n0 0 0\n0 0 0"), s.log.substr(0, 12)}) {
+  for (const std::string& text :
+       {std::string(), std::string("MLSCOMN"), std::string("solid ball\n0 0 0\n0 0 0"), s.log.substr(0, 12)}) {
     const auto report = replayed(text);
     ASSERT_FALSE(report.ok());
     EXPECT_NE(std::string::npos, report.error().detail.find("no log of commands"));

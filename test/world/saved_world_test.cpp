@@ -65,10 +65,9 @@ World pile() {
     Pose pose;
     pose.translation = Vec3(0.06 * (i % 4) + 0.002 * (i % 7), 0.06 * (i / 4 % 3), 0.05 + 0.07 * (i / 12));
     pose.rotation = Quat(Eigen::AngleAxisd(0.1 * i, Vec3(0.3, 0.5, 0.8).normalized()));
-    EXPECT_TRUE(world
-                    .addSceneBody(std::make_shared<const PreparedBody>(
-                        placedCopy(first, "box_" + std::to_string(i), pose)))
-                    .ok());
+    EXPECT_TRUE(
+        world.addSceneBody(std::make_shared<const PreparedBody>(placedCopy(first, "box_" + std::to_string(i), pose)))
+            .ok());
   }
   run(world, 55);
   return world;
@@ -350,9 +349,9 @@ TEST(DamagedState, OfAnotherKindOrVersion) {
 
 /// With a checksum that is right for what the file says.
 std::string sealed(std::string bytes) {
-  const auto sum = static_cast<std::uint32_t>(
-      crc32_z(crc32_z(0, nullptr, 0), reinterpret_cast<const Bytef*>(bytes.data()) + kStateHeaderBytes,
-              bytes.size() - kStateHeaderBytes));
+  const auto sum = static_cast<std::uint32_t>(crc32_z(crc32_z(0, nullptr, 0),
+                                                      reinterpret_cast<const Bytef*>(bytes.data()) + kStateHeaderBytes,
+                                                      bytes.size() - kStateHeaderBytes));
   std::memcpy(bytes.data() + 12, &sum, sizeof sum);
   const std::uint64_t length = bytes.size() - kStateHeaderBytes;
   std::memcpy(bytes.data() + 16, &length, sizeof length);
@@ -378,8 +377,8 @@ TEST(DamagedState, ForgedAtRandom) {
       std::string forged = bytes;
       const int changes = 1 + static_cast<int>(random.uniform(0, 3));
       for (int c = 0; c < changes; ++c) {
-        const auto at = kStateHeaderBytes +
-                        static_cast<std::size_t>(random.uniform(0, 1) * static_cast<double>(bytes.size() - kStateHeaderBytes - 4));
+        const auto room = static_cast<double>(bytes.size() - kStateHeaderBytes - 4);
+        const auto at = kStateHeaderBytes + static_cast<std::size_t>(random.uniform(0, 1) * room);
         const std::uint32_t values[] = {0u, 1u, 0xffffffffu, 0x7fffffffu, 0x7ff00000u, 1000u};
         const std::uint32_t value = values[static_cast<int>(random.uniform(0, 6)) % 6];
         std::memcpy(forged.data() + (i % 2 ? at / 4 * 4 : at), &value, sizeof value);

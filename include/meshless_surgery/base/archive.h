@@ -62,7 +62,8 @@ class HashArchive : public ByteOutput<HashArchive> {
 class InArchive : public cereal::InputArchive<InArchive, cereal::AllowEmptyClassElision> {
  public:
   /// Keeps a view of the bytes.
-  explicit InArchive(std::string_view bytes) : cereal::InputArchive<InArchive, cereal::AllowEmptyClassElision>(this), left_(bytes) {}
+  explicit InArchive(std::string_view bytes)
+      : cereal::InputArchive<InArchive, cereal::AllowEmptyClassElision>(this), left_(bytes) {}
   void take(void* data, std::size_t size) {
     need(size, 1);
     std::memcpy(data, left_.data(), size);

@@ -1,4 +1,5 @@
-// What contacts remember from step to step: who pressed where and how hard, what is caught, how bodies leave each other.
+// What contacts remember from step to step: who pressed where and how hard, what is caught, how bodies leave each
+// other.
 #pragma once
 
 #include <map>

@@ -11,12 +11,12 @@
 namespace meshless {
 
 struct ReplayReport {
-  std::uint64_t steps = 0;     // done
-  std::uint64_t commands = 0;  // of all kinds: resets and loaded states too
-  std::uint64_t checks = 0;    // hashes compared
+  std::uint64_t steps = 0;      // done
+  std::uint64_t commands = 0;   // of all kinds: resets and loaded states too
+  std::uint64_t checks = 0;     // hashes compared
   std::uint64_t last_step = 0;  // the world's count at the end
-  std::uint64_t hash = 0;      // at the end
-  bool ended = false;          // the recording was ended; else its process was: what came after the last record is lost
+  std::uint64_t hash = 0;       // at the end
+  bool ended = false;  // the recording was ended; else its process was: what came after the last record is lost
   std::uint64_t lost_bytes = 0;  // at the end of the file, of a record that was not written in full
 
   /// The first hash that is not the recorded one; what follows was still done.
@@ -26,8 +26,8 @@ struct ReplayReport {
   std::optional<Difference> difference;
 };
 
-/// Refuses (kUnreadable) what World::record did not write. The same build gives the same hashes on any number of threads
-/// (1..64). A damaged record in the middle ends the replay with an error.
+/// Refuses (kUnreadable) what World::record did not write. The same build gives the same hashes on any number of
+/// threads (1..64). A damaged record in the middle ends the replay with an error.
 Result<ReplayReport> replay(std::istream& log, int threads = 1);
 
 }  // namespace meshless
