@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Every service and input topic with structured random requests, and mesh files that lie: the node answers each call, a
-refusal has a message and changes nothing, and what is accepted leaves finite tissue. MESHLESS_SURGERY_FUZZ_CALLS sets the
-number of calls, MESHLESS_SURGERY_FUZZ_SEED the seed."""
+refusal has a message and changes nothing, and what is accepted leaves finite tissue. MESHLESS_SURGERY_FUZZ_CALLS sets
+the number of calls, MESHLESS_SURGERY_FUZZ_SEED the seed."""
 import math
 import os
 import random
@@ -38,12 +38,13 @@ def mesh_files(folder, outside):
     """Files that claim more than they have, or other things than they are: none of them is a body."""
     files = {
         'vertices.ply': b'ply\nformat ascii 1.0\nelement vertex 4294967295\nproperty float x\nproperty float y\n'
-                        b'property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n',
+                        b'property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n'
+                        b'0 0 0\n',
         'binary.ply': b'ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\n'
                       b'property float y\nproperty float z\nend_header\n' + bytes(120),
         'list.ply': b'ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\n'
-                    b'property float z\nelement face 1\nproperty list int int vertex_indices\nend_header\n' + bytes(36) +
-                    struct.pack('<i', 2000000000),
+                    b'property float z\nelement face 1\nproperty list int int vertex_indices\nend_header\n' +
+                    bytes(36) + struct.pack('<i', 2000000000),
         'negative.ply': b'ply\nformat ascii 1.0\nelement vertex -5\nproperty float x\nend_header\n',
         'count.stl': bytes(80) + struct.pack('<I', 0xffffffff) + bytes(100),
         'cut_off.stl': bytes(80) + struct.pack('<I', 12) + bytes(200),
@@ -54,7 +55,8 @@ def mesh_files(folder, outside):
         'fields.pcd': b'VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1000000000\nWIDTH 3\nHEIGHT 1\n'
                       b'POINTS 3\nDATA binary\n' + bytes(64),
         'compressed.pcd': b'VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 3\nHEIGHT 1\n'
-                          b'POINTS 3\nDATA binary_compressed\n' + struct.pack('<II', 0xfffffff0, 0xfffffff0) + bytes(64),
+                          b'POINTS 3\nDATA binary_compressed\n' + struct.pack('<II', 0xfffffff0, 0xfffffff0) +
+                          bytes(64),
         'points.vtk': b'# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 4294967295 float\n0 0 0\n',
         'polygons.vtk': b'# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 1 0 0 0 1 0\n'
                         b'POLYGONS 1000000000 2147483647\n3 0 1 2\n',
@@ -86,7 +88,8 @@ def yaml_bombs():
         'a%d: &a%d [%s]\n' % (i, i, ', '.join(['*a%d' % (i - 1)] * 9)) for i in range(1, 30))
     return [bomb, '[' * 60000, '{a: ' * 15000, '- ' * 30000, '&a [*a]', '<<: *x', '!!binary x', 'alpha: ' + '9' * 60000,
             '"' + 'a' * 60000, 'x' * 70000, LARGE_STRING, '{alpha: .nan}', '{alpha: 1e999}', '{density: -1}', 'alpha',
-            '\0', '{alpha: 0.3, alpha: 0.4}', '? ? ? ?', '{volume: [[0, 1], [0, 1]]}', '%YAML 9.9\n---\na', '---\n---\n']
+            '\0', '{alpha: 0.3, alpha: 0.4}', '? ? ? ?', '{volume: [[0, 1], [0, 1]]}', '%YAML 9.9\n---\na',
+            '---\n---\n']
 
 
 class Fuzzer:
@@ -95,8 +98,8 @@ class Fuzzer:
         self.rng = rng
         self.files = files
         self.names = names
-        self.strings = ['', 'left', 'right', 'middle', 'left.1', 'left.2', 'no_such', '/', '../..', 'a/b', '/etc/passwd',
-                        'package://meshless_surgery/config/meshes/fish.obj', 'package://', 'ä' * 200, 'x\n\0y',
+        self.strings = ['', 'left', 'right', 'middle', 'left.1', 'left.2', 'no_such', '/', '../..', 'a/b',
+                        '/etc/passwd', 'package://meshless_surgery/config/meshes/fish.obj', 'package://', 'ä' * 200, 'x\n\0y',
                         'x' * 300, '%s%n%d', ' ', 'world', '/world', 'no_such_frame', 'default', 'soft', 'box'] + names
         self.picks = [0]
 
@@ -196,7 +199,8 @@ class Fuzzer:
             return fields
         if service == 'set_material':
             yaml = r.choice(yaml_bombs()) if r.random() < 0.3 else '{%s: %s}' % (
-                r.choice(['alpha', 'beta', 'mode', 'density', 'youngs_modulus', 'friction', 'damping', 'colour', 'volume']),
+                r.choice(['alpha', 'beta', 'mode', 'density', 'youngs_modulus', 'friction', 'damping', 'colour',
+                          'volume']),
                 r.choice([self.number(), self.string()[:200], '[1, 2]', '[[0, 0.5]]', '{}']))
             return dict(body=self.maybe_name(), yaml=yaml)
         if service == 'probe':

@@ -184,7 +184,8 @@ class ListenerTest(RobustCase):
             master = rosgraph.Master('/stalled')
             uri = master.lookupService(node.name + '/hash')
             host, port = uri.split('//')[1].split(':')
-            for data in (b'', b'\xff\xff\xff\xff', b'\x00\x00\x00\x00', b'\x10\x00\x00\x00abc', b'GET / HTTP/1.1\r\n\r\n',
+            for data in (b'', b'\xff\xff\xff\xff', b'\x00\x00\x00\x00', b'\x10\x00\x00\x00abc',
+                         b'GET / HTTP/1.1\r\n\r\n',
                          b'\x04\x00\x00\x00\xff\xff\xff\x7f', bytes(range(256)) * 100):
                 connection = socket.create_connection((host, int(port)))
                 try:

@@ -252,7 +252,8 @@ class SignalTest(SessionCase):
 
                 threads = [threading.Thread(target=ask, args=('save',), kwargs=dict(file='busy')),
                            threading.Thread(target=ask, args=('load',), kwargs=dict(file='first')),
-                           threading.Thread(target=ask, args=('cut',), kwargs=dict(blades=pose_stamped(-1.0, 0.0, 0.1))),
+                           threading.Thread(target=ask, args=('cut',),
+                                            kwargs=dict(blades=pose_stamped(-1.0, 0.0, 0.1))),
                            threading.Thread(target=ask, args=('reset',))]
                 for thread in threads:
                     thread.daemon = True
