@@ -123,6 +123,7 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, Points rest, const std::v
   child->solid = true;
   child->spacing = model_.spacing;
   child->next_patch = model_.next_patch + 1;
+  child->lips = model_.lips || !torn_.empty();
   child->surface.triangles = from.mesh.triangles;
   child->surface.patches = from.mesh.patches;
   child->surface.vertices = std::move(rest);

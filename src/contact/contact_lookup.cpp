@@ -49,14 +49,14 @@ bool Contacts::Impl::locate(const ContactParty& b, Index party, const MapFinder&
   return std::isfinite(found.distance);
 }
 
-void Contacts::Impl::addContact(Findings& to, const std::vector<ContactParty>& parties, Index a, Index sample, Index b,
-                                Index triangle, const std::array<double, 3>& weights, bool was_caught, bool flipped) {
+void Contacts::Impl::addContact(Findings& to, const std::vector<ContactParty>& parties, Index a, Index number,
+                                const ContactSample& s, Index b, Index triangle, const std::array<double, 3>& weights,
+                                bool was_caught, bool flipped) {
   const ContactParty& of = parties[a];
-  const ContactSample& s = of.shape->samples()[sample];
   Contact c;
   c.a = a;
   c.b = b;
-  c.sample = sample;
+  c.sample = number;
   c.triangle = triangle;
   c.weights = weights;
   c.caught = was_caught;
@@ -160,7 +160,7 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
     }
     if (found.distance < near) ++inside.near;
     if (found.distance > pair.reach || (found.distance > near && !found.above && !every_point)) continue;
-    addContact(to, parties, a, s, b, found.triangle, found.weights, false, flipped);
+    addContact(to, parties, a, s, samples[s], b, found.triangle, found.weights, false, flipped);
     if (!to.contacts.empty()) to.contacts.back().below = found.distance < 0.0;
     if (found.distance < 0.0) to.depths.push_back(-found.distance / std::min(size, of.shape->size()));
   }
@@ -174,7 +174,7 @@ void Contacts::Impl::addGround(Findings& to, const std::vector<ContactParty>& pa
     if (samples[s].share > 0.0) continue;  // between two vertices above a plane nothing is below it
     const double z = vertexAt(party, samples[s].vertices[0]).z();
     if (!(z < below)) continue;
-    addContact(to, parties, a, s, kNoIndex, kNoIndex, {}, false, false);
+    addContact(to, parties, a, s, samples[s], kNoIndex, kNoIndex, {}, false, false);
     to.contacts.back().below = z < *scene.ground;
     if (z < *scene.ground) to.depths.push_back((*scene.ground - z) / party.shape->size());
   }

@@ -15,7 +15,7 @@ struct ContactEntry {
 /// A point of party a against a triangle of party b, or against the ground.
 struct Contact {
   Index a = 0, b = kNoIndex;  // kNoIndex: the ground
-  Index sample = 0;           // of a
+  Index sample = 0;           // of a; of a body against itself a vertex
   Index triangle = kNoIndex;  // of b
   // direct: all corners are particles, normal and weights follow them
   bool direct = false;

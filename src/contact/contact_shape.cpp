@@ -19,7 +19,7 @@ constexpr double kLongEdge = 0.1;    // of the body's least extent: shorter edge
 constexpr double kFlatEdge = 0.996;  // cosine between neighbours: about 5 degrees
 constexpr int kMostEdgeSamples = 64;
 constexpr std::size_t kThicknessRays = 48;
-constexpr double kOnRim = 1e-6;          // of a squared distance: straight above the rim of a face
+constexpr double kOnRim = 1e-6;       // of a squared distance: straight above the rim of a face
 constexpr double kFacing = 0.1;       // cosine: a face pushes a body's point into the body
 constexpr std::uintptr_t kAsked = 4;  // times that the bins are searched before a cell is filled
 constexpr double kTie = 1e-9;         // relative: two features are equally near
@@ -144,10 +144,11 @@ ContactShape::~ContactShape() {
 }
 
 std::size_t ContactShape::bytes() const {
-  std::size_t sum =
-      sizeof *this + surface_.vertices.size() * sizeof(Vec3) + facets_.size() * sizeof(Facet) + surface_.triangles.size() * sizeof(Triangle) +
-      rider_of_.size() * sizeof(Index) + samples_.size() * sizeof(ContactSample) +
-      (bin_offsets_.size() + bin_triangles_.size()) * sizeof(Index) + cell_total_ * (sizeof(std::atomic<std::uintptr_t>) + sizeof(std::atomic<float>));
+  std::size_t sum = sizeof *this + surface_.vertices.size() * sizeof(Vec3) + facets_.size() * sizeof(Facet) +
+                    surface_.triangles.size() * sizeof(Triangle) + rider_of_.size() * sizeof(Index) +
+                    samples_.size() * sizeof(ContactSample) +
+                    (bin_offsets_.size() + bin_triangles_.size()) * sizeof(Index) +
+                    cell_total_ * (sizeof(std::atomic<std::uintptr_t>) + sizeof(std::atomic<float>));
   for (std::size_t i = 0; i < cell_total_; ++i)
     if (const std::uintptr_t cell = cells_[i].load(std::memory_order_acquire); cell > kAsked)
       sum += sizeof(Cell) + reinterpret_cast<const Cell*>(cell)->triangles.size() * sizeof(Index);
@@ -326,7 +327,9 @@ struct Best {
 class Settler {
  public:
   explicit Settler(const Best& best)
-      : limit_(best.squared + 4.0 * best.tie()), reach_(std::sqrt(limit_)), touches_(best.squared <= 16.0 * best.least_tie) {}
+      : limit_(best.squared + 4.0 * best.tie()),
+        reach_(std::sqrt(limit_)),
+        touches_(best.squared <= 16.0 * best.least_tie) {}
 
   void offer(const Facet& f, const Vec3& p) {
     const double bound = reach_ + f.radius, over = f.normal.dot(p - f.a);
@@ -385,7 +388,7 @@ class Settler {
     bool above;
   };
   double limit_, reach_;  // [m^2], [m]
-  bool touches_;  // on the surface itself, which is not inside
+  bool touches_;          // on the surface itself, which is not inside
   Index first_ = kNoIndex;
   Vec3 normals_ = Vec3::Zero(), away_ = Vec3::Zero();
   std::array<Face, 48> faces_;  // more never share a corner but in fans, of which any face will do

@@ -319,6 +319,7 @@ struct ContactSolver::Impl {
     // What has passed through is stopped as a whole: its points alone would be left behind.
     row.rigid_a = c.caught && a.share > 0.0 ? 1.0 : a.share;
     row.rigid_b = c.caught && b.share > 0.0 ? 1.0 : b.share;
+    if (c.a == c.b) row.rigid_a = row.rigid_b = 0.0;  // a body does not push itself as a whole
     const Vec3 turned_a = row.lever_a.cross(c.normal), turned_b = row.lever_b.cross(c.normal);
     row.arm_a = row.rigid_a * (a.inverse_inertia * turned_a);
     row.arm_b = row.rigid_b * (b.inverse_inertia * turned_b);
@@ -395,7 +396,7 @@ struct ContactSolver::Impl {
       bool pressed = false;
       for (; row != end && row->contact->a == first->contact->a && row->contact->b == first->contact->b; ++row)
         pressed = pressed || row->contact->impulse > 0.0;
-      if (pressed || row - first < 2) continue;
+      if (pressed || row - first < 2 || first->contact->a == first->contact->b) continue;
       int count = 0;
       double wrong = 0.0, local = 0.0;
       Vec3 lever_a = Vec3::Zero(), lever_b = Vec3::Zero(), normal = Vec3::Zero();

@@ -137,7 +137,9 @@ void Contacts::Impl::addCaught(const std::vector<ContactParty>& parties) {
         if (!(other.dot(area) > 0.0) || !(other.dot(p - r0) < 0.0)) break;
         it->second = next;
       }
-      if (!over) addContact(found, parties, a->second, it->first.sample, b->second, it->second, weights, true, false);
+      if (!over)
+        addContact(found, parties, a->second, it->first.sample, of.shape->samples()[it->first.sample], b->second,
+                   it->second, weights, true, false);
     }
     it = over ? caught.erase(it) : std::next(it);
   }

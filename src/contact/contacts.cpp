@@ -82,6 +82,16 @@ void Contacts::findPairs(const ContactScene& scene, const std::vector<ContactPar
     }
     counters.pairs += found.size();
   }
+  bool any_self = false;
+  for (Index a = 0; a < parties.size(); ++a)
+    if (parties[a].meets_itself && parties[a].moves) {
+      w.pairs.push_back({a, a, 0.0, false, 0.0});
+      w.needed[a] |= 1;
+      any_self = true;
+    }
+  if (any_self)
+    std::sort(w.pairs.begin(), w.pairs.end(),
+              [](const Pair& p, const Pair& q) { return std::tie(p.a, p.b) < std::tie(q.a, q.b); });
   if (scene.ground)
     for (Index a = 0; a < parties.size(); ++a)
       if (parties[a].moves && parties[a].mass > 0.0 && w.boxes[a].min.z() < *scene.ground) {
@@ -115,6 +125,7 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   std::vector<Index>& partners = w.partners;
   partners.assign(parties.size(), 0);
   for (const Pair& pair : w.pairs) {
+    if (pair.a == pair.b) continue;
     ++partners[pair.a];
     ++partners[pair.b];
   }
@@ -129,8 +140,7 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
       if (s.share > 0.0) continue;
       const Vec3& now = vertexAt(party, s.vertices[0]);
       const ContactMap& map = party.maps[w.finders[p].nearest(now)];
-      const Vec3 fitted =
-          map.from_rest * (party.shape->surface().vertices[s.vertices[0]] - map.rest) + map.centre;
+      const Vec3 fitted = map.from_rest * (party.shape->surface().vertices[s.vertices[0]] - map.rest) + map.centre;
       farthest = std::max(farthest, (now - fitted).squaredNorm());
     }
     w.deviations[p] = std::min(w.deviations[p], (party.map_count > 1 ? kNeighbour : 2.0) * std::sqrt(farthest));
@@ -171,8 +181,13 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
       pair.quick = pair.way * h > most;
       PairFindings& findings = w.pair_findings[k];
       findings = PairFindings();
-      w.lookInto(task, parties, pair, pair.a, pair.b, b.maps, false, findings.of_a);
-      w.lookInto(task, parties, pair, pair.b, pair.a, a.maps, false, findings.of_b);
+      if (pair.a == pair.b) {
+        pair.quick = false;
+        w.lookIntoSelf(task, parties, pair);
+      } else {
+        w.lookInto(task, parties, pair, pair.a, pair.b, b.maps, false, findings.of_a);
+        w.lookInto(task, parties, pair, pair.b, pair.a, a.maps, false, findings.of_b);
+      }
       findings.contacts = task.contacts.size();
       findings.entries = task.entries.size();
       findings.depths = task.depths.size();
@@ -182,6 +197,7 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   for (std::size_t n = 0; n < ground_tasks + pair_tasks; ++n) {
     const Findings& task = w.tasks[n];
     counters.lookups += task.counters.lookups;
+    counters.self_points += task.counters.self_points;
     if (n < ground_tasks) {
       w.join(task, 0, task.contacts.size(), 0, task.entries.size());
       w.depths.insert(w.depths.end(), task.depths.begin(), task.depths.end());
@@ -193,7 +209,7 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
       Pair& pair = w.pairs[k];
       const PairFindings& findings = w.pair_findings[k];
       const ContactParty &a = parties[pair.a], &b = parties[pair.b];
-      if (w.letOutWhole(parties, pair, findings.of_a, findings.of_b, h, counters)) {
+      if (pair.a != pair.b && w.letOutWhole(parties, pair, findings.of_a, findings.of_b, h, counters)) {
         pair.quick = false;
       } else {
         w.join(task, start.contacts, findings.contacts, start.entries, findings.entries);
@@ -305,7 +321,8 @@ void Contacts::solve(const std::vector<ContactParty>& parties, double substep, c
     w.choosePasses(parties, substep);
   }
   w.plan_steady = steady;
-  w.solver.solve(w.scene, parties, w.contacts, w.entries, w.plan, w.fresh || !steady || !w.was_steady, for_each, counters);
+  w.solver.solve(w.scene, parties, w.contacts, w.entries, w.plan, w.fresh || !steady || !w.was_steady, for_each,
+                 counters);
   w.was_steady = steady;
   w.fresh = false;
   for (std::size_t k = 0; k < w.pairs.size(); ++k) {

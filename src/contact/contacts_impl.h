@@ -49,12 +49,35 @@ struct Exit {
   double speed;    // [m/s]
 };
 
+/// A body's own faces, where they are now, by cells of a grid.
+class SelfGrid {
+ public:
+  /// reach [m]: how far from a face its cells go.
+  void make(const ContactParty& party, double reach);
+  /// Faces that may be within reach of p, each once, in their order.
+  template <class Visit>
+  void forNear(const Vec3& p, const Visit& visit) const;
+
+ private:
+  template <class Visit>
+  void forCells(const Box& box, const Visit& visit) const;
+  int at(double coordinate, int axis) const;
+
+  std::vector<Box> boxes_;
+  std::vector<Index> offsets_, items_, next_;
+  std::array<int, 3> cells_{{1, 1, 1}};
+  Vec3 origin_ = Vec3::Zero();
+  double edge_ = 1.0;
+};
+
 /// What a task finds; tasks are joined in their order.
 struct Findings {
   std::vector<Contact> contacts;
   std::vector<ContactEntry> entries;
   std::vector<double> depths;
   ContactCounters counters;
+  SelfGrid self_grid;
+  Points self_areas;
   std::size_t cursor = 0;  // in the contacts of the last frame
 
   void clear() {
@@ -124,12 +147,13 @@ struct Contacts::Impl {
   bool locate(const ContactParty& b, Index party, const MapFinder& finder, const ContactMap* maps, const Vec3& p,
               const Vec3& inward, double reach, ContactShape::Nearest& found, bool& flipped,
               ContactCounters& counters) const;
-  void addContact(Findings& to, const std::vector<ContactParty>& parties, Index a, Index sample, Index b,
-                  Index triangle, const std::array<double, 3>& weights, bool was_caught, bool flipped);
+  void addContact(Findings& to, const std::vector<ContactParty>& parties, Index a, Index number, const ContactSample& s,
+                  Index b, Index triangle, const std::array<double, 3>& weights, bool was_caught, bool flipped);
   bool stillOver(std::size_t& cursor, const ContactParty& with, Index a, Index b, Index sample, const Vec3& p,
                  bool anew, ContactShape::Nearest& found, bool& flipped);
   void lookInto(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair, Index a, Index b,
                 const ContactMap* maps, bool every_point, Inside& inside);
+  void lookIntoSelf(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair);
   void trace(const std::vector<ContactParty>& parties, Index a, Index b, ContactCounters& counters);
   void addCaught(const std::vector<ContactParty>& parties);
   void addGround(Findings& to, const std::vector<ContactParty>& parties, Index a, double reach);

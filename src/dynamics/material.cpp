@@ -16,6 +16,18 @@ constexpr double kReferenceStep = 1.0 / 60.0;  // [s] alpha holds there
 
 }  // namespace
 
+const char* toString(SelfContact self_contact) {
+  switch (self_contact) {
+    case SelfContact::kNone:
+      return "none";
+    case SelfContact::kLips:
+      return "lips";
+    case SelfContact::kAll:
+      return "all";
+  }
+  return "unknown";
+}
+
 const char* toString(MatchMode mode) {
   switch (mode) {
     case MatchMode::kRigid:

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "meshless_surgery/ros/convert.h"
+#include "meshless_surgery/ros/marker.h"
 
 namespace meshless {
 namespace {
@@ -23,29 +24,17 @@ std_msgs::ColorRGBA hue(Index number) {
   return color;
 }
 
-Marker markerOf(const BodySnapshot& body, const std_msgs::Header& header, const std::string& ns, int type) {
-  Marker marker;
-  marker.header = header;
-  marker.ns = ns;
-  marker.id = static_cast<int>(body.number);
-  marker.type = type;
-  marker.pose.orientation.w = 1.0;
-  return marker;
-}
-
 }  // namespace
 
 visualization_msgs::MarkerArray clusterMarkers(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
   visualization_msgs::MarkerArray array;
-  Marker all;
-  all.header = header;
-  all.action = Marker::DELETEALL;
-  array.markers.push_back(all);
+  array.markers.push_back(deleteAllMarkers(header));
   for (const BodySnapshot& body : snapshot.bodies) {
     const ClusterSet& clusters = body.model->clusters;
-    Marker centres = markerOf(body, header, "centres", Marker::SPHERE_LIST);
+    const int id = static_cast<int>(body.number);
+    Marker centres = newMarker(header, "centres", id, Marker::SPHERE_LIST);
     centres.scale.x = centres.scale.y = centres.scale.z = kCentre * body.model->spacing;
-    Marker members = markerOf(body, header, "members", Marker::LINE_LIST);
+    Marker members = newMarker(header, "members", id, Marker::LINE_LIST);
     members.scale.x = kLine * body.model->spacing;
     for (Index c = 0; c < clusters.size(); ++c) {
       Vec3 centre = Vec3::Zero();

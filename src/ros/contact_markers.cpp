@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "meshless_surgery/ros/convert.h"
+#include "meshless_surgery/ros/marker.h"
 
 namespace meshless {
 namespace {
@@ -13,16 +14,9 @@ constexpr double kPoint = 0.25;  // diameter in particle spacings
 constexpr double kLine = 0.06;   // width in particle spacings
 
 Marker markerOf(const std_msgs::Header& header, const std::string& ns, int type, double size) {
-  Marker marker;
-  marker.header = header;
-  marker.ns = ns;
-  marker.type = type;
-  marker.pose.orientation.w = 1.0;
+  Marker marker = newMarker(header, ns, 0, type);
   marker.scale.x = marker.scale.y = marker.scale.z = size;
-  marker.color.r = 1.0f;
-  marker.color.g = 0.75f;
-  marker.color.b = 0.1f;
-  marker.color.a = 1.0f;
+  marker.color = toColor({1.0f, 0.75f, 0.1f, 1.0f});
   return marker;
 }
 
@@ -30,10 +24,7 @@ Marker markerOf(const std_msgs::Header& header, const std::string& ns, int type,
 
 visualization_msgs::MarkerArray contactMarkers(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
   visualization_msgs::MarkerArray array;
-  Marker all;
-  all.header = header;
-  all.action = Marker::DELETEALL;
-  array.markers.push_back(all);
+  array.markers.push_back(deleteAllMarkers(header));
   double spacing = 0.0, most = 0.0;
   for (const BodySnapshot& body : snapshot.bodies)
     spacing = spacing > 0.0 ? std::min(spacing, body.model->spacing) : body.model->spacing;

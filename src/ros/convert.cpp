@@ -52,6 +52,15 @@ geometry_msgs::Point toPoint(const Vec3& v) {
   return point;
 }
 
+std_msgs::ColorRGBA toColor(const Color& color) {
+  std_msgs::ColorRGBA message;
+  message.r = color.r;
+  message.g = color.g;
+  message.b = color.b;
+  message.a = color.a;
+  return message;
+}
+
 geometry_msgs::Vector3 toVector(const Vec3& v) {
   geometry_msgs::Vector3 vector;
   vector.x = v.x();

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <limits>
 
 #include <geometry_msgs/WrenchStamped.h>
 
@@ -12,13 +14,21 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr double kMostLate = 0.05;        // [s] that is caught up with
+constexpr double kClockSet = 0.1;         // [s] that ROS's clock is elsewhere at once
+constexpr double kStiffestPush = 5000.0;  // [N/m] of tissue under the sphere
+
 double wallSeconds() { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); }
 
 }  // namespace
 
 ForcePublisher::ForcePublisher(const ros::NodeHandle& private_handle, const NodeSettings& settings,
                                const ToolInputs& inputs)
-    : world_frame_(settings.world_frame), period_(1.0 / settings.force_rate), inputs_(inputs) {
+    : world_frame_(settings.world_frame),
+      period_(1.0 / settings.force_rate),
+      pick_max_speed_(settings.pick_max_speed),
+      push_max_speed_(settings.push_max_speed),
+      inputs_(inputs) {
   ros::NodeHandle handle(private_handle);
   const auto wake = [this](const ros::SingleSubscriberPublisher&) {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -26,7 +36,7 @@ ForcePublisher::ForcePublisher(const ros::NodeHandle& private_handle, const Node
   };
   const char* names[] = {"pick", "push", "scissors"};
   for (std::size_t t = 0; t < tools_.size(); ++t)
-    tools_[t].topic = handle.advertise<geometry_msgs::WrenchStamped>(std::string(names[t]) + "/measured_cf", 10, wake);
+    tools_[t].topic = handle.advertise<geometry_msgs::WrenchStamped>(std::string(names[t]) + "/measured_cf", 100, wake);
 }
 
 ForcePublisher::~ForcePublisher() { stop(); }
@@ -45,58 +55,82 @@ void ForcePublisher::stop() {
 }
 
 void ForcePublisher::changed(const World& world, double dt) {
-  const auto held = world.heldPick();
-  const PushSphere& push = world.push();
+  ForceModel::Step pick;
+  pick.pulls = true;
+  if (const auto held = world.heldPick()) {
+    pick.there = true;
+    pick.id = held->id;
+    pick.force = -held->force;
+    pick.place = held->target;
+    pick.stiffest = world.heldStiffness();
+    pick.speed = pick_max_speed_;
+  }
+  ForceModel::Step push;
+  push.there = world.push().enabled;
+  push.force = world.push().force;
+  push.place = world.push().position;
+  push.stiffest = kStiffestPush;
+  push.speed = world.push().streamed ? push_max_speed_ : 0.0;
+  // The blades part the tissue without resistance.
+  ForceModel::Step scissors;
+  scissors.there = world.scissors().shown;
+  const ForceModel::Step steps[] = {pick, push, scissors};
   const double now = wallSeconds();
   const std::lock_guard<std::mutex> lock(mutex_);
-  const auto measure = [&](Tool& tool, bool there, std::uint32_t id, const Vec3& force) {
-    // Another pick begins with its own force; without a step there is news only of what came and went.
-    if (dt > 0.0 || there != tool.there || id != tool.id) tool.force.stepped(there ? force : Vec3::Zero(), dt, now);
-    tool.there = there;
-    tool.id = id;
-  };
-  measure(tools_[0], held.has_value(), held ? held->id : 0, held ? Vec3(-held->force) : Vec3::Zero());
-  measure(tools_[1], push.enabled, 0, push.force);
-  // The blades part the tissue without resistance.
-  measure(tools_[2], world.scissors().shown, 0, Vec3::Zero());
+  for (std::size_t t = 0; t < tools_.size(); ++t) {
+    tools_[t].there = steps[t].there;
+    tools_[t].force.stepped(steps[t], dt, now);
+  }
 }
 
 bool ForcePublisher::listened() const {
   return std::any_of(tools_.begin(), tools_.end(), [](const Tool& tool) { return tool.topic.getNumSubscribers() > 0; });
 }
 
-void ForcePublisher::publish(Tool& tool, bool there, double now, const ros::Time& stamp) {
+void ForcePublisher::publish(Tool& tool, const std::optional<Pose>& hand, double now, const ros::Time& stamp) {
   if (tool.topic.getNumSubscribers() == 0) return;
   // A tool that is gone is heard until its force has gone too.
-  if (!there && tool.force.isZero(now)) return;
+  if (!tool.there && !hand && tool.force.isZero(now)) return;
   geometry_msgs::WrenchStamped message;
   message.header.stamp = stamp;
   message.header.frame_id = world_frame_;
-  message.wrench.force = toVector(tool.force.at(now));
+  message.wrench.force = toVector(tool.force.at(now, hand ? std::optional<Vec3>(hand->translation) : std::nullopt));
   tool.topic.publish(message);
 }
 
 void ForcePublisher::loop() {
-  const auto period = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(period_));
-  auto next = Clock::now();
+  double next = wallSeconds();
+  double offset = -std::numeric_limits<double>::infinity();  // [s] of ROS's clock before ours
   std::unique_lock<std::mutex> lock(mutex_);
   while (!stopping_) {
     if (!listened()) {
       // A listener wakes it; the wait has an end because one may have come between the question and the wait.
       woken_.wait_for(lock, std::chrono::milliseconds(100));
-      next = Clock::now();
+      next = wallSeconds();
       continue;
     }
     lock.unlock();
-    const bool hand = inputs_.pickCursor().has_value();
-    const ros::Time stamp = ros::Time::now();
+    const std::optional<Pose> pick = inputs_.hand(ToolKind::kPick);
+    const std::optional<Pose> push = inputs_.hand(ToolKind::kPush);
+    ros::Time stamp = ros::Time::now();
     const double now = wallSeconds();
+    // Who is woken late says what is due, each tick with its own time: an even rate, and a sum without holes.
+    next = std::max(next, now - kMostLate);
+    // A simulated clock is read as it is. Between two looks at two clocks time may pass: it counts where least did, so
+    // that stamps are even and never go back, unless the clock was set.
+    if (!ros::Time::isSimTime()) {
+      const double looked = stamp.toSec() - now;
+      offset = std::abs(looked - offset) < kClockSet ? std::max(offset, looked) : looked;
+      stamp.fromSec(next + offset);
+    }
     lock.lock();
-    publish(tools_[0], tools_[0].there || hand, now, stamp);
-    publish(tools_[1], tools_[1].there, now, stamp);
-    publish(tools_[2], tools_[2].there, now, stamp);
-    next = std::max(next + period, Clock::now() - period);
-    woken_.wait_until(lock, next, [this] { return stopping_; });
+    publish(tools_[0], pick, next, stamp);
+    publish(tools_[1], push, next, stamp);
+    publish(tools_[2], std::nullopt, next, stamp);
+    next += period_;
+    const auto due =
+        Clock::time_point(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(next)));
+    woken_.wait_until(lock, due, [this] { return stopping_; });
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "meshless_surgery/ros/convert.h"
+#include "meshless_surgery/ros/marker.h"
 
 namespace meshless {
 namespace {
@@ -17,15 +18,6 @@ constexpr double kShownReach = 0.1;      // [m] of blades without an end
 constexpr double kSpringWidth = 0.0015;  // [m]
 constexpr double kSpringEnd = 0.006;     // [m] diameter
 constexpr double kBladeWidth = 0.12;     // of the blade's length
-
-std_msgs::ColorRGBA toColor(const Color& color) {
-  std_msgs::ColorRGBA message;
-  message.r = color.r;
-  message.g = color.g;
-  message.b = color.b;
-  message.a = color.a;
-  return message;
-}
 
 bool hasArea(const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 ab = b - a;
@@ -107,27 +99,15 @@ void addBlade(const Pose& pose, double length, double angle, Marker& marker) {
 
 }  // namespace
 
-Marker MarkerBuilder::marker(const std::string& ns, int id, int type, const ros::Time& stamp) const {
-  Marker marker;
-  marker.header.frame_id = world_frame_;
-  marker.header.stamp = stamp;
-  marker.ns = ns;
-  marker.id = id;
-  marker.type = type;
-  marker.action = Marker::ADD;
-  marker.pose.orientation.w = 1.0;
-  return marker;
-}
-
-void MarkerBuilder::addTools(const WorldSnapshot& snapshot, const ros::Time& stamp,
-                             visualization_msgs::MarkerArray& array) const {
+void MarkerBuilder::addTools(const WorldSnapshot& snapshot, const std_msgs::Header& header,
+                             visualization_msgs::MarkerArray& array) {
   const auto free_color = toColor({0.2f, 0.9f, 0.3f, 1.0f});
   const auto locked_color = toColor({1.0f, 0.8f, 0.1f, 1.0f});
   if (!snapshot.picks.empty()) {
-    Marker springs = marker("tools", 0, Marker::LINE_LIST, stamp);
+    Marker springs = newMarker(header, "tools", 0, Marker::LINE_LIST);
     springs.scale.x = kSpringWidth;
     springs.color = free_color;
-    Marker ends = marker("tools", 1, Marker::SPHERE_LIST, stamp);
+    Marker ends = newMarker(header, "tools", 1, Marker::SPHERE_LIST);
     ends.scale.x = ends.scale.y = ends.scale.z = kSpringEnd;
     ends.color = free_color;
     for (const Pick& pick : snapshot.picks) {
@@ -142,14 +122,14 @@ void MarkerBuilder::addTools(const WorldSnapshot& snapshot, const ros::Time& sta
     array.markers.push_back(std::move(ends));
   }
   if (snapshot.push.enabled) {
-    Marker sphere = marker("tools", 2, Marker::SPHERE, stamp);
+    Marker sphere = newMarker(header, "tools", 2, Marker::SPHERE);
     sphere.pose.position = toPoint(snapshot.push.position);
     sphere.scale.x = sphere.scale.y = sphere.scale.z = 2.0 * snapshot.push.radius;
     sphere.color = toColor(snapshot.push.touching ? Color{0.95f, 0.75f, 0.3f, 0.85f} : Color{0.7f, 0.75f, 0.8f, 0.85f});
     array.markers.push_back(std::move(sphere));
   }
   if (snapshot.scissors.shown) {
-    Marker blades = marker("tools", 3, Marker::TRIANGLE_LIST, stamp);
+    Marker blades = newMarker(header, "tools", 3, Marker::TRIANGLE_LIST);
     blades.scale.x = blades.scale.y = blades.scale.z = 1.0;
     blades.color = toColor({0.75f, 0.78f, 0.82f, 1.0f});
     const Pose pose = poseOf(snapshot.scissors.blades);
@@ -168,31 +148,32 @@ bool MarkerBuilder::deleting() const {
 visualization_msgs::MarkerArray MarkerBuilder::build(const WorldSnapshot& snapshot, const ros::Time& stamp,
                                                      bool fresh) {
   visualization_msgs::MarkerArray array;
+  std_msgs::Header header;
+  header.frame_id = world_frame_;
+  header.stamp = stamp;
   if (fresh || !run_ || *run_ != snapshot.run) {
-    Marker all = marker("", 0, Marker::CUBE, stamp);
-    all.action = Marker::DELETEALL;
-    array.markers.push_back(std::move(all));
+    array.markers.push_back(deleteAllMarkers(header));
     shown_.clear();
     run_ = snapshot.run;
   }
   const std::size_t first = array.markers.size();
   for (const BodySnapshot& body : snapshot.bodies) {
-    Marker surface = marker("bodies", static_cast<int>(body.number), Marker::TRIANGLE_LIST, stamp);
+    Marker surface = newMarker(header, "bodies", static_cast<int>(body.number), Marker::TRIANGLE_LIST);
     addBody(body, surface);
     if (!surface.points.empty()) array.markers.push_back(std::move(surface));
   }
   for (std::size_t o = 0; o < snapshot.obstacles.size(); ++o) {
-    Marker surface = marker("obstacles", static_cast<int>(o), Marker::TRIANGLE_LIST, stamp);
+    Marker surface = newMarker(header, "obstacles", static_cast<int>(o), Marker::TRIANGLE_LIST);
     addObstacle(*snapshot.obstacles[o], surface);
     if (!surface.points.empty()) array.markers.push_back(std::move(surface));
   }
-  addTools(snapshot, stamp, array);
+  addTools(snapshot, header, array);
 
   std::map<Key, int> now;
   for (std::size_t m = first; m < array.markers.size(); ++m) now[{array.markers[m].ns, array.markers[m].id}] = kSaidDeletes;
   for (auto& [key, left] : shown_) {
     if (now.count(key) > 0 || left == 0) continue;
-    Marker gone = marker(key.first, key.second, Marker::TRIANGLE_LIST, stamp);
+    Marker gone = newMarker(header, key.first, key.second, Marker::TRIANGLE_LIST);
     gone.action = Marker::DELETE;
     array.markers.push_back(std::move(gone));
     now[key] = left - 1;

@@ -215,7 +215,7 @@ void Publishers::publishTools(const WorldSnapshot& snapshot, const ros::Time& st
   for (const Pick& pick : snapshot.picks) {
     if (!pick.locked && (in_hand == nullptr || pick.id > in_hand->id)) in_hand = &pick;
   }
-  auto cursor = tools_.pickCursor();
+  auto cursor = tools_.hand(ToolKind::kPick);
   if (in_hand != nullptr) {
     if (!cursor) cursor = Pose{};
     cursor->translation = in_hand->target;

@@ -7,15 +7,6 @@
 namespace meshless {
 namespace {
 
-std_msgs::ColorRGBA toColor(const Color& color) {
-  std_msgs::ColorRGBA message;
-  message.r = color.r;
-  message.g = color.g;
-  message.b = color.b;
-  message.a = color.a;
-  return message;
-}
-
 meshless_surgery::Surface toSurface(const BodySnapshot& body, bool strain) {
   const TriangleMesh& mesh = body.model->surface;
   meshless_surgery::Surface message;
@@ -74,6 +65,7 @@ meshless_surgery::Surfaces toSurfaces(const WorldSnapshot& snapshot, const std_m
   message.scissors = toPose(poseOf(snapshot.scissors.blades));
   message.scissors_length = snapshot.scissors.blades.length;
   message.scissors_angle = snapshot.scissors.angle;
+  message.scissors_width = snapshot.scissors.blades.width;
   return message;
 }
 

@@ -58,9 +58,9 @@ ToolInputs::ToolInputs(const ros::NodeHandle& private_handle, const NodeSettings
 
 ToolInputs::~ToolInputs() = default;
 
-std::optional<Pose> ToolInputs::pickCursor() const {
+std::optional<Pose> ToolInputs::hand(ToolKind tool) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const ToolMotion& motion = tools_[0].motion;
+  const ToolMotion& motion = tools_[static_cast<std::size_t>(tool)].motion;
   return motion.alive() ? std::optional<Pose>(motion.wanted()) : std::nullopt;
 }
 

@@ -61,11 +61,17 @@ void CutTool::onActivate() {
   reach_ = -kInFront;
   turn_ = firstTurn();
   placed_ = false;
+  surfaces_topic_ = link().handle().subscribe<meshless_surgery::Surfaces>(
+      link().nameOf("surfaces"), 1,
+      [this](const meshless_surgery::Surfaces::ConstPtr& surfaces) { surfaces_ = surfaces; });
 }
 
 void CutTool::onDeactivate() {
   act_ = Act::kNone;
   shown_line_.reset();
+  preview_.reset();
+  surfaces_topic_.shutdown();
+  surfaces_.reset();
   putAway();
 }
 
@@ -156,6 +162,27 @@ void CutTool::onUpdate(double dt) {
   if (act_ == Act::kNone) follow();
   if (act_ == Act::kDrawing) draw();
   if (placed_ && act_ != Act::kDrawing) stream();
+  showPreview();
+}
+
+void CutTool::showPreview() {
+  // The size of the blades is known once the node has taken them up.
+  if (!placed_ || act_ == Act::kDrawing || !surfaces_ || !surfaces_->scissors_shown) {
+    preview_.reset();
+    return;
+  }
+  Ogre::Vector3 origin;
+  Ogre::Quaternion turn;
+  worldPose(origin, turn);
+  const Ogre::Quaternion back = turn.Inverse();
+  PreviewBlades blades;
+  blades.pivot = back * (pivot_ - origin);
+  blades.reach = back * (orientation_ * Ogre::Vector3::UNIT_X);
+  blades.open = back * (orientation_ * Ogre::Vector3::UNIT_Y);
+  blades.length = surfaces_->scissors_length;
+  blades.width = surfaces_->scissors_width;
+  if (!preview_) preview_ = std::make_unique<CutPreview>(scene_manager_);
+  preview_->show(linesOfCut(*surfaces_, blades), origin - viewDirection() * kLineOver, turn);
 }
 
 void CutTool::stream() {

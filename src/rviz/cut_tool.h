@@ -9,7 +9,10 @@
 
 #include <meshless_surgery/Incise.h>
 #include <meshless_surgery/Probe.h>
+#include <meshless_surgery/Surfaces.h>
 #include <rviz/ogre_helpers/billboard_line.h>
+
+#include "cut_preview.h"
 #endif
 
 namespace rviz {
@@ -55,6 +58,7 @@ class CutTool : public HandTool {
 
   void follow();
   void stream();
+  void showPreview();
   void putAway();
   void turn(int dx, int dy);
   void draw();
@@ -76,6 +80,9 @@ class CutTool : public HandTool {
   rviz::FloatProperty* close_time_ = nullptr;
   ros::Publisher pose_stream_, jaw_stream_;
   std::unique_ptr<rviz::BillboardLine> shown_line_;
+  ros::Subscriber surfaces_topic_;  // while the tool is in hand
+  meshless_surgery::Surfaces::ConstPtr surfaces_;
+  std::unique_ptr<CutPreview> preview_;
 };
 
 }  // namespace meshless

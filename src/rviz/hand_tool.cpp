@@ -213,17 +213,23 @@ geometry_msgs::PoseStamped HandTool::poseMessage(const Ogre::Vector3& position,
   return message;
 }
 
-Ogre::Vector3 HandTool::toFixed(const geometry_msgs::Point& point) const {
-  Ogre::Vector3 origin = Ogre::Vector3::ZERO;
-  Ogre::Quaternion turn = Ogre::Quaternion::IDENTITY;
+void HandTool::worldPose(Ogre::Vector3& origin, Ogre::Quaternion& turn) const {
+  origin = Ogre::Vector3::ZERO;
+  turn = Ogre::Quaternion::IDENTITY;
   if (!world_frame_.empty()) context_->getFrameManager()->getTransform(world_frame_, ros::Time(), origin, turn);
+}
+
+Ogre::Vector3 HandTool::toFixed(const geometry_msgs::Point& point) const {
+  Ogre::Vector3 origin;
+  Ogre::Quaternion turn;
+  worldPose(origin, turn);
   return origin + turn * toOgre(point);
 }
 
 Ogre::Vector3 HandTool::toFixed(const geometry_msgs::Vector3& direction) const {
-  Ogre::Vector3 origin = Ogre::Vector3::ZERO;
-  Ogre::Quaternion turn = Ogre::Quaternion::IDENTITY;
-  if (!world_frame_.empty()) context_->getFrameManager()->getTransform(world_frame_, ros::Time(), origin, turn);
+  Ogre::Vector3 origin;
+  Ogre::Quaternion turn;
+  worldPose(origin, turn);
   return turn * toOgre(direction);
 }
 

@@ -80,6 +80,8 @@ class HandTool : public rviz::Tool {
   geometry_msgs::PoseStamped poseMessage(const Ogre::Vector3& position,
                                          const Ogre::Quaternion& orientation = Ogre::Quaternion::IDENTITY) const;
   std_msgs::Header header() const;
+  /// The node's world frame in the fixed one; the same where it is not known (yet).
+  void worldPose(Ogre::Vector3& origin, Ogre::Quaternion& turn) const;
   /// From the node's world frame.
   Ogre::Vector3 toFixed(const geometry_msgs::Point& point) const;
   Ogre::Vector3 toFixed(const geometry_msgs::Vector3& direction) const;

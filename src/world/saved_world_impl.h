@@ -88,10 +88,11 @@ void serialize(A& archive, Plasticity& v) {
 }
 template <class A>
 void serialize(A& archive, Material& v) {
-  auto& [name, youngs_modulus, poissons_ratio, mode, alpha, beta, density, damping, friction, restitution, volume, area,
-         plasticity, color, inside_color] = v;
+  auto& [name, youngs_modulus, poissons_ratio, mode, alpha, beta, density, damping, friction, restitution, self_contact,
+         volume, area, plasticity, color, inside_color] = v;
   archive(name, youngs_modulus, poissons_ratio, choice(mode, MatchMode::kQuadratic), alpha, beta, density, damping,
-          friction, restitution, volume, area, plasticity, color, inside_color);
+          friction, restitution, choice(self_contact, SelfContact::kAll), volume, area, plasticity, color,
+          inside_color);
 }
 template <class A>
 void serialize(A& archive, WorldSettings& v) {
@@ -143,12 +144,12 @@ void serialize(A& archive, SurfaceBinding& v) {
 template <class A>
 void serialize(A& archive, BodyModel& v) {
   auto& [rest, masses, match_masses, fixed, any_fixed, graph, clusters, shape, elastic, elastic_batch,
-         most_spread_inverse, specific_stiffness, highest_frequency, surface, binding, solid, spacing, rest_volume,
-         rest_area, mass, next_patch] = v;
+         most_spread_inverse, specific_stiffness, highest_frequency, surface, binding, solid, lips, spacing,
+         rest_volume, rest_area, mass, next_patch] = v;
   (void)elastic_batch;
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
   archive(rest, masses, match_masses, held, any_fixed, graph, clusters, shape, elastic, most_spread_inverse,
-          specific_stiffness, highest_frequency, surface, binding, solid, spacing, rest_volume, rest_area, mass,
+          specific_stiffness, highest_frequency, surface, binding, solid, lips, spacing, rest_volume, rest_area, mass,
           next_patch);
   if constexpr (std::is_same_v<A, InArchive>) {
     fixed.clear();

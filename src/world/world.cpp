@@ -8,6 +8,7 @@
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/tetrahedralize.h"
+#include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
 
 namespace meshless {
@@ -330,6 +331,12 @@ std::optional<Pick> World::heldPick() const {
   for (auto it = impl_->picks.rbegin(); it != impl_->picks.rend(); ++it)
     if (!it->locked) return *it;
   return std::nullopt;
+}
+
+double World::heldStiffness() const {
+  const auto held = heldPick();
+  const WorldBody* body = held ? impl_->find(held->body) : nullptr;
+  return body ? graspStiffness(*body->model, *held, 1.0 / impl_->settings.step_rate) : 0.0;
 }
 
 }  // namespace meshless

@@ -78,6 +78,12 @@ ContactModel::ContactModel(BodyModelPtr of_model)
     inverse_masses.push_back(model->fixed[i] ? 0.0 : 1.0 / model->masses[i]);
 }
 
+const SelfContactSet& ContactModel::self(bool cuts_alone) const {
+  std::unique_ptr<const SelfContactSet>& set = self_[cuts_alone];
+  if (!set) set = std::make_unique<SelfContactSet>(selfContactSet(shape, cuts_alone, model->spacing));
+  return *set;
+}
+
 const ContactModel& World::Impl::contactModel(WorldBody& body) {
   if (body.contact && body.contact->model == body.model) return *body.contact;
   std::weak_ptr<const ContactModel>& known = contact_models[body.model.get()];
@@ -160,6 +166,9 @@ void World::Impl::fillParty(WorldBody& body, ContactParty& party) {
   party.positions = body.state.positions.data();
   party.particles = static_cast<Index>(body.state.positions.size());
   party.masses = body.model->masses.data();
+  const SelfContact wanted = body.material.self_contact;
+  party.meets_itself =
+      body.material.bends() && (wanted == SelfContact::kAll || (wanted == SelfContact::kLips && body.model->lips));
   if (body.asleep) {
     party.bounds = body.bounds;
     return;
@@ -185,6 +194,7 @@ void World::Impl::equipParty(WorldBody& body, ContactParty& party) {
   const ContactModel& model = contactModel(body);
   party.shape = &model.shape;
   party.inverse_masses = model.inverse_masses.data();
+  if (party.meets_itself) party.self = &model.self(body.material.self_contact == SelfContact::kLips);
   if (model.shape.rides()) {
     refreshSurface(body);
     party.surface = body.state.surface.data();

@@ -18,6 +18,11 @@ struct ContactModel {
   BodyModelPtr model;
   ContactShape shape;
   std::vector<double> inverse_masses;  // [1/kg] 0 where fixed
+  /// Made when first asked for, by one thread.
+  const SelfContactSet& self(bool cuts_alone) const;
+
+ private:
+  mutable std::array<std::unique_ptr<const SelfContactSet>, 2> self_;
 };
 
 /// A surface that never moves, as contact sees it.

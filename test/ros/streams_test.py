@@ -121,6 +121,41 @@ class StreamsTest(DeformerTestCase):
                 self.assertGreaterEqual(pick.target.y, start.y - 1e-6)
         self.assertEqual(200, self.rejected('~pick/servo_cp') - before)
 
+    def test_gaps_below_the_silence_lift_nothing(self):
+        start = self.pick_left().position
+        for _ in range(4):
+            self.say('pick/servo_cp', [pose_stamped(start.x, start.y + 0.01, start.z)] * 5)
+            rospy.sleep(0.25)  # fifty messages are missing
+        self.assertEqual(1, len(self.state().picks))
+        self.assertEqual([], [e for e in self.events.messages if e.type == 'lifted'])
+
+    def test_sphere_and_scissors_bear_late_broken_and_jumping_poses(self):
+        for tool, speed in (('push', 0.5), ('scissors', 2.0)):
+            topic = tool + '/servo_cp'
+            before = self.rejected('~' + topic)
+            measured = self.deformer.recorder(tool + '/measured_cp', PoseStamped)
+            self.say(topic, [pose_stamped(0.0, 0.0, 1.0) for _ in range(20)])
+            measured.wait()
+            poses = []
+            for i in range(60):
+                good = pose_stamped(0.0, 0.0, 1.3)  # a jump
+                good.header.stamp = rospy.Time.now() + rospy.Duration(i / RATE)
+                late = pose_stamped(0.0, 5.0, 1.0)
+                late.header.stamp = good.header.stamp - rospy.Duration(0.1)
+                poses += [good, late, pose_stamped(float('nan'), 0.0, 1.0)]
+            self.say(topic, poses)
+            measured.wait(lambda m: m.pose.position.z > 1.2999)
+            measured.close()
+            self.assertEqual(120, self.rejected('~' + topic) - before)
+            places = measured.messages
+            self.assertEqual(0.0, max(abs(m.pose.position.y) for m in places))
+            for one, other in zip(places, places[1:]):
+                passed = (other.header.stamp - one.header.stamp).to_sec()
+                self.assertLessEqual(other.pose.position.z - one.pose.position.z, speed * (passed + 2 * TICK) + 1e-9, tool)
+            self.assertGreater(len({m.pose.position.z for m in places}), 5, tool)
+            self.lifted(tool)
+            self.events.messages.clear()
+
     def test_a_locked_pick_and_one_that_others_move_are_not_lifted(self):
         start = self.pick_left()
         self.say('pick/servo_cp', [pose_stamped(start.position.x, start.position.y + 0.01, start.position.z)] * 20)

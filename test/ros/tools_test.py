@@ -8,6 +8,7 @@ import threading
 import rospy
 import tf2_ros
 from geometry_msgs.msg import Point, PoseStamped, Quaternion, TransformStamped, Vector3, WrenchStamped
+from meshless_surgery.msg import Event
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -306,10 +307,39 @@ class FollowTest(DeformerTestCase):
             self.assertEqual(pick.pick_id, state.picks[0].pick_id)
             frames.transforms[0].transform.translation.y = 0.08
             self.states.next(lambda s: abs(s.picks[0].target.y - 0.08) < 1e-6)
+            # Frames that nobody says any more: tf2 has the last of each, and yet the tools are lifted off.
+            events = self.deformer.recorder('events', Event)
+            measured['events'] = events
+            frames.close()
+            for tool in ('pick', 'push', 'scissors'):
+                event = events.wait(lambda e: e.type == 'lifted' and tool in e.text)
+                self.assertIn('silent for 0.5 s', event.text)
+            self.assertEqual([], self.state().picks)
+            last = rospy.Time.now()
+            rospy.sleep(0.5)
+            for tool in ('push', 'scissors'):
+                self.assertEqual([], [m for m in measured[tool].messages if m.header.stamp > last], tool)
         finally:
             frames.close()
             for recorder in measured.values():
                 recorder.close()
+
+    def test_a_frame_that_jumps_is_followed_at_a_bounded_speed(self):
+        # Of the pick: 5 m/s, so half a metre takes a tenth of a second; the frame is at once there.
+        start = self.pick_left().position
+        frames = Frames(transform('world', 'hand', start.x, start.y, start.z))
+        try:
+            self.states.next(lambda s: s.picks and abs(s.picks[0].target.y - start.y) < 1e-6)
+            since = self.states.count()
+            frames.transforms[0].transform.translation.y = start.y + 1.0
+            self.states.wait(lambda s: s.picks and s.picks[0].target.y > start.y + 0.999, since)
+        finally:
+            frames.close()
+        states = [s for s in self.states.messages[since:] if s.picks]
+        for one, other in zip(states, states[1:]):
+            passed = (other.header.stamp - one.header.stamp).to_sec()
+            self.assertLessEqual(other.picks[0].target.y - one.picks[0].target.y, 5.0 * (passed + 0.05) + 1e-9)
+        self.assertGreater(len({s.picks[0].target.y for s in states}), 3)
 
 
 if __name__ == '__main__':

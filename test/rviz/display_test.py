@@ -19,8 +19,10 @@ from virtual_display import VirtualDisplay, stop, wait_until  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion  # noqa: E402
 from meshless_surgery.msg import State  # noqa: E402
-from meshless_surgery.srv import Cut, Lock, Pick, Remove  # noqa: E402
+from meshless_surgery.srv import Cut, Lock, Pick, Remove, Spawn  # noqa: E402
+from shape_msgs.msg import SolidPrimitive  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
+from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
 LONG = 60.0
 LOBE = Point(-0.05, -0.03, 0.1)
@@ -35,21 +37,21 @@ def call(service, kind, **fields):
 
 
 class DisplayTest(unittest.TestCase):
-    def start(self, change=lambda display: None):
-        """rviz with the liver's configuration, whose Tissue display `change` may alter."""
-        file = os.path.join(rospkg.RosPack().get_path('meshless_surgery'), 'config', 'rviz', 'liver.rviz')
+    def start(self, change=lambda display: None, name='Tissue', scene='liver'):
+        """rviz with the scene's configuration, whose display of that name `change` may alter."""
+        file = os.path.join(rospkg.RosPack().get_path('meshless_surgery'), 'config', 'rviz', scene + '.rviz')
         with open(file) as text:
             config = yaml.safe_load(text)
         for display in config['Visualization Manager']['Displays']:
-            if display['Class'] == 'meshless_surgery/Tissue':
+            if display['Name'] == name:
                 change(display)
         with tempfile.NamedTemporaryFile('w', suffix='.rviz', delete=False) as changed:
             yaml.safe_dump(config, changed)
         self.addCleanup(os.remove, changed.name)
-        self.view = configured_view('liver')
+        self.view = configured_view(scene)
         self.display = VirtualDisplay()
         self.addCleanup(self.display.close)
-        launch = self.display.start(['roslaunch', 'meshless_surgery', 'training.launch', 'scene:=liver',
+        launch = self.display.start(['roslaunch', 'meshless_surgery', 'training.launch', 'scene:=' + scene,
                                      'rviz_config:=' + changed.name])
         self.addCleanup(stop, launch)
         rospy.wait_for_service('/deformer/pick', LONG)
@@ -126,6 +128,43 @@ class DisplayTest(unittest.TestCase):
         self.until(lambda: len(colour_along_spring()) > 3, 'no red spring in the picture')
         self.save('spring')
 
+    def test_contacts_are_shown_where_bodies_press(self):
+        def on(display):
+            display['Enabled'] = display['Value'] = True
+        self.start(on, 'Contacts', 'block')
+        markers = rospy.wait_for_message('/deformer/contacts', MarkerArray, LONG)
+
+        def points(kinds=('points', 'forces')):
+            array = rospy.wait_for_message('/deformer/contacts', MarkerArray, LONG)
+            return numpy.array([[p.x, p.y, p.z] for m in array.markers if m.ns in kinds for p in m.points])
+        self.assertEqual(Marker.DELETEALL, markers.markers[0].action)
+        self.until(lambda: len(points()) > 3, 'nothing presses on the ground')
+        # A box on the block: now bodies press on each other.
+        call('spawn', Spawn, name='upper', primitive=SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.08, 0.08, 0.08]),
+             pose=PoseStamped(pose=Pose(position=Point(0.0, 0.0, 0.2), orientation=Quaternion(w=1.0))))
+        self.until(lambda: (points(['points']).reshape(-1, 3)[:, 2] > 0.03).sum() > 4, 'the bodies do not press on each other')
+
+        def yellow():
+            """Pixels of the markers' hue, in the light of rviz's lamp."""
+            picture = self.display.screenshot().astype(float)
+            red, green, blue = picture[:, :, 0], picture[:, :, 1], picture[:, :, 2]
+            return (red > 90) & (numpy.abs(green / numpy.maximum(red, 1) - 0.75) < 0.08) & (blue < 0.25 * red)
+        self.until(lambda: yellow().sum() > 20, 'no contact in the picture')
+        # They are where the node says that they are: some points are seen, none of the colour is elsewhere.
+        call('pause', SetBool, data=True)
+        rospy.sleep(1.5)
+        self.save('contacts')
+        marked = points()
+        # Along the lines of the forces, too.
+        count = (len(marked) // 3)
+        starts, ends = marked[count::2], marked[count + 1::2]
+        lines = [starts + share * (ends - starts) for share in numpy.linspace(0.0, 1.0, 11)]
+        pixels = project(numpy.concatenate(lines), self.view, self.rectangle)
+        seen = numpy.argwhere(yellow())
+        self.assertGreater(len(seen), 20)
+        gaps = numpy.array([numpy.abs(pixels - place).max(axis=1).min() for place in seen])
+        self.assertLess(numpy.percentile(gaps, 95), 12)
+
     def test_nothing_is_built_while_it_is_off(self):
         def off(display):
             display['Enabled'] = display['Value'] = False
@@ -133,8 +172,9 @@ class DisplayTest(unittest.TestCase):
         built = []
         for _ in range(3):
             array = rospy.wait_for_message('/diagnostics', DiagnosticArray, LONG)
-            built += [value.value for status in array.status for value in status.values if value.key == 'surfaces built']
-        self.assertEqual(3, len(built))
+            values = {value.key: value.value for status in array.status for value in status.values}
+            built += [values[what + ' built'] for what in ('surfaces', 'marker arrays', 'clusters', 'contacts', 'point clouds')]
+        self.assertEqual(15, len(built))
         self.assertEqual({'0'}, set(built))
 
 

@@ -2,10 +2,13 @@
 """A real mouse on a virtual display works with the tools of the rviz plugin: what the node says of its world, and what the
 picture shows, is what the hand did."""
 import os
+import signal
 import sys
 import unittest
+from xmlrpc.client import ServerProxy
 
 import numpy
+import rosgraph
 import rospy
 import rostest
 
@@ -307,6 +310,39 @@ class HandsTest(unittest.TestCase):
         # It has come back, up to what the first pixels of the drag were before the node had answered.
         self.until(lambda: (self.tissue() != before).sum() < 0.1 * before.sum(), 'the view is not as it was')
 
+    def test_a_node_that_hangs_does_not_freeze_the_view(self):
+        place, _ = self.grab()
+        process = ServerProxy(rosgraph.Master('/hands_test').lookupNode(NODE)).getPid('/hands_test')[2]
+        os.kill(process, signal.SIGSTOP)
+        try:
+            self.mouse.move((place[0] - 60, place[1] - 40))  # a drag, to nobody
+            self.mouse.wheel(2)
+            self.mouse.click(3)                              # a lock that nobody answers
+            self.mouse.up()
+            self.mouse.key('x')                              # another tool, that asks what is under the cursor
+            self.mouse.move(place)
+            self.mouse.key('h')
+            self.mouse.down()
+            self.mouse.move((place[0] - 20, place[1]))
+            self.mouse.move(place)  # where no tissue is known, a drag turns the view: and back
+            self.mouse.up()
+            self.mouse.key('m')
+            # The view turns as ever.
+            before = self.tissue()
+            corner = (self.rectangle[1] - 60, self.rectangle[2] + 60)
+            self.mouse.move(corner)
+            self.mouse.down()
+            self.mouse.move((corner[0], corner[1] + 150))
+            self.assertTrue(wait_until(lambda: (self.tissue() != before).sum() > 0.2 * before.sum(), 10, 0.1),
+                            'the view hangs with the node')
+            self.mouse.move(corner)
+            self.mouse.up()
+        finally:
+            os.kill(process, signal.SIGCONT)
+        # What was asked is then done in the order of its asking: one lock, no sphere.
+        self.until(lambda: [p.locked for p in self.state().picks] == [True], 'the lock is lost')
+        self.until(lambda: not self.pushes(), 'the sphere stays')
+
     # --- push
 
     def pushes(self):
@@ -419,6 +455,52 @@ class HandsTest(unittest.TestCase):
         self.mouse.key('z')
         self.until(lambda: [b.name for b in self.state().bodies] == ['liver'], 'the cut was not undone')
         self.assertEqual(1, len(self.said('undone')))
+
+    CUT_LINE = (51, 230, 255)
+
+    def cut_line(self):
+        """Rows and columns of the pixels that say where the blades will cut."""
+        near = numpy.abs(self.display.screenshot().astype(int) - self.CUT_LINE).max(axis=2) < 12
+        top, bottom, left, right = self.rectangle
+        near[:top] = near[bottom:] = False
+        near[:, :left] = near[:, right:] = False
+        return numpy.argwhere(near)
+
+    def test_a_line_on_the_tissue_says_where_the_blades_will_cut(self):
+        rospy.sleep(1.0)
+        call('pause', SetBool, data=True)  # so that the tissue stays below its line
+        self.addCleanup(call, 'pause', SetBool, data=False)
+        self.assertEqual(0, len(self.cut_line()))
+        place = self.take('x')
+        self.until(lambda: len(self.cut_line()) > 50, 'no line on the tissue')
+        rospy.sleep(0.5)
+        line = self.cut_line()
+        self.save('cut_line')
+        # Each of its pixels is beside an edge of the tissue that the plane of the blades goes through.
+        pose = self.blades()
+        q = pose.orientation
+        normal = numpy.array([2 * (q.x * q.z + q.w * q.y), 2 * (q.y * q.z - q.w * q.x), 1 - 2 * (q.x ** 2 + q.y ** 2)])
+        surface = call('get_body', GetBody, name='liver').surface
+        vertices = numpy.array([vector(v) for v in surface.vertices])
+        triangles = numpy.array([t.vertex_indices for t in surface.triangles])
+        heights = (vertices - vector(pose.position)).dot(normal)
+        crossings = []
+        for a, b in ((0, 1), (1, 2), (2, 0)):
+            i, j = triangles[:, a], triangles[:, b]
+            crossed = (heights[i] < 0) != (heights[j] < 0)
+            i, j = i[crossed], j[crossed]
+            share = (heights[i] / (heights[i] - heights[j]))[:, None]
+            crossings.append(vertices[i] + share * (vertices[j] - vertices[i]))
+        crossings = project(numpy.concatenate(crossings), self.view, self.rectangle)
+        gaps = numpy.array([numpy.linalg.norm(crossings - pixel, axis=1).min() for pixel in line])
+        self.assertLess(numpy.percentile(gaps, 95), 8)
+        # In the air the blades hold nothing, and a tool that is put away shows nothing.
+        self.mouse.move((self.rectangle[0] + 30, self.rectangle[2] + 30))
+        self.until(lambda: len(self.cut_line()) == 0, 'the line stays though the blades are in the air')
+        self.mouse.move(place)
+        self.until(lambda: len(self.cut_line()) > 50, 'no line on the tissue')
+        self.mouse.key('m')
+        self.until(lambda: len(self.cut_line()) == 0, 'the line stays without the tool')
 
     def test_shift_drag_turns_the_blades_and_the_wheel_moves_them(self):
         back = camera_axes(self.view)[3]

@@ -46,6 +46,7 @@ struct BodyModel {
   TriangleMesh surface;              // rest positions of the vertices [m]
   SurfaceBinding binding;
   bool solid = true;
+  bool lips = false;             // an incision has left faces that can press on each other
   double spacing = 0.0;          // [m] between interior particles
   double rest_volume = 0.0;      // [m^3]; 0 where not solid
   double rest_area = 0.0;        // [m^2] of the surface

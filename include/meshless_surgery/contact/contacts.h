@@ -10,6 +10,7 @@
 #include "meshless_surgery/contact/broad_phase.h"
 #include "meshless_surgery/contact/contact_shape.h"
 #include "meshless_surgery/contact/deformable.h"
+#include "meshless_surgery/contact/self_contact.h"
 
 namespace meshless {
 
@@ -41,6 +42,8 @@ struct ContactParty {
   Box bounds;                    // [m] of the particles (and vertices) now
   Vec3 velocity = Vec3::Zero();  // [m/s] about the middle of its particles' velocities
   double spread = 0.0;           // [m/s] by which they differ from it at most
+  bool meets_itself = false;
+  const SelfContactSet* self = nullptr;  // where it meets itself; filled by the time make() is called
   bool moves = true;             // false: asleep, or an obstacle; its arrays are not written
 };
 

@@ -34,6 +34,7 @@ struct ContactCounters {
   std::size_t contacts = 0;        // made
   std::size_t traced = 0;          // paths of fast points followed through rest shapes
   std::size_t caught = 0;          // of them, those that would have passed through
+  std::size_t self_points = 0;     // looked at for contact of a body with itself
   std::size_t expelled = 0;        // pairs of which one is inside the other
 };
 

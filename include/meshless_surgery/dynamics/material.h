@@ -11,6 +11,11 @@ enum class MatchMode { kRigid, kLinear, kQuadratic };
 
 const char* toString(MatchMode mode);
 
+/// What of a body's surface meets the rest of it.
+enum class SelfContact { kNone, kLips, kAll };  // kLips: the faces of cuts, once an incision has opened the body
+
+const char* toString(SelfContact self_contact);
+
 /// How hard something is held, by how far it is off: a table from relative error (>= 0, ascending) to the share of the
 /// error that a substep closes (0..1, never falling), linear between its points and constant beyond. Empty: not held at
 /// all.
@@ -44,12 +49,14 @@ struct Material {
   double damping = 1.0;                           // [1/s] >= 0, decay rate of the motion that deforms
   double friction = 0.5;                          // 0..10, Coulomb
   double restitution = 0.0;                       // 0..1, share of the approach that a contact gives back
+  SelfContact self_contact = SelfContact::kLips;  // never of a body that cannot bend
   ResponseCurve volume;                           // of the solid's volume
   ResponseCurve area;                             // of the surface
   Plasticity plasticity;
   Color color{0.62f, 0.22f, 0.18f, 1.0f};         // of the outer surface
   Color inside_color{0.85f, 0.45f, 0.40f, 1.0f};  // of cut faces
 
+  bool bends() const { return elastic() || mode != MatchMode::kRigid; }
   bool elastic() const { return youngs_modulus > 0.0; }
   bool plastic() const { return plasticity.creep > 0.0 && plasticity.maximum > 0.0; }
   /// Why the settings are not usable, naming key, value and range; else Done.

@@ -6,6 +6,7 @@
 #include <geometry_msgs/Pose.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <shape_msgs/Mesh.h>
+#include <std_msgs/ColorRGBA.h>
 
 #include "meshless_surgery/ros/runner.h"
 
@@ -15,6 +16,7 @@ geometry_msgs::Point toPoint(const Vec3& v);
 geometry_msgs::Vector3 toVector(const Vec3& v);
 geometry_msgs::Quaternion toQuaternion(const Quat& q);
 geometry_msgs::Pose toPose(const Pose& pose);
+std_msgs::ColorRGBA toColor(const Color& color);
 /// +x along the blades, +z normal to them.
 Pose poseOf(const Blades& blades);
 Blades bladesAt(const Pose& pose, double length, double width);

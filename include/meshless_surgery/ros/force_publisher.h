@@ -9,7 +9,7 @@
 
 #include <ros/node_handle.h>
 
-#include "meshless_surgery/ros/force_hold.h"
+#include "meshless_surgery/ros/force_model.h"
 #include "meshless_surgery/ros/settings.h"
 #include "meshless_surgery/ros/tool_inputs.h"
 
@@ -30,16 +30,16 @@ class ForcePublisher {
   struct Tool {
     ros::Publisher topic;
     bool there = false;
-    std::uint32_t id = 0;  // of the pick
-    ForceHold force;       // on the tool
+    ForceModel force;  // on the tool
   };
 
   void loop();
   bool listened() const;
-  void publish(Tool& tool, bool there, double now, const ros::Time& stamp);
+  void publish(Tool& tool, const std::optional<Pose>& hand, double now, const ros::Time& stamp);
 
   const std::string world_frame_;
-  const double period_;  // [s]
+  const double period_;                           // [s]
+  const double pick_max_speed_, push_max_speed_;  // [m/s]
   const ToolInputs& inputs_;
   mutable std::mutex mutex_;
   std::condition_variable woken_;

@@ -26,8 +26,8 @@ class MarkerBuilder {
  private:
   using Key = std::pair<std::string, int>;  // ns, id
 
-  visualization_msgs::Marker marker(const std::string& ns, int id, int type, const ros::Time& stamp) const;
-  void addTools(const WorldSnapshot& snapshot, const ros::Time& stamp, visualization_msgs::MarkerArray& array) const;
+  static void addTools(const WorldSnapshot& snapshot, const std_msgs::Header& header,
+                       visualization_msgs::MarkerArray& array);
 
   std::string world_frame_;
   std::optional<std::uint32_t> run_;

@@ -26,8 +26,8 @@ class ToolInputs {
              Rejections& rejections);
   ~ToolInputs();
 
-  /// The last streamed pose of the pick's hand: shown while no pick is in it.
-  std::optional<Pose> pickCursor() const;
+  /// Where its stream last wanted a tool, while the stream speaks.
+  std::optional<Pose> hand(ToolKind tool) const;
 
  private:
   struct Tool {

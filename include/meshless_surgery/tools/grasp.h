@@ -16,6 +16,10 @@ Vec3 graspMean(const Pick& pick, const Points& positions);
 /// Fixed particles stay. Any stiffness and step are stable. Returns the force on the tissue [N].
 Vec3 pullGrasp(const BodyModel& model, const Pick& pick, double h, Points& positions);
 
+/// The stiffness [N/m] with which the grasp answers within `h` [s], as pullGrasp does it: the spring's own where the
+/// patch is heavy or fixed, less where it gives way.
+double graspStiffness(const BodyModel& model, const Pick& pick, double h);
+
 /// First hit of a ray with a surface; direction need not be unit length.
 struct RayHit {
   bool hit = false;

@@ -209,6 +209,8 @@ class World {
   /// The pick that a stream moves: the newest one that is not locked; 0 if none.
   PickId pickInHand() const;
   std::optional<Pick> heldPick() const;  // the same, as it is
+  /// With how many N/m it answers a move of its free end within a step; 0 without one.
+  double heldStiffness() const;
   const PushSphere& push() const;
   const Scissors& scissors() const;
 
