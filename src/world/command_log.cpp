@@ -211,7 +211,7 @@ void World::Impl::recordState(const SavedWorld& saved) const {
 
 // --- reading
 
-Result<ReplayReport> replay(std::istream& log, int threads) {
+Result<ReplayReport> replay(std::istream& log, int threads, const std::function<void(World& world)>& after_step) {
   if (!(threads >= 1 && threads <= 64)) return outOfRange("threads", threads, "1 to 64");
   ReplayReport report;
   WorldSettings settings;
@@ -250,7 +250,10 @@ Result<ReplayReport> replay(std::istream& log, int threads) {
         return damaged("record " + std::to_string(number) + (started ? " starts again" : " is not the start"));
       if (started && step < world.stepCount())
         return damaged("record " + std::to_string(number) + " goes back to step " + std::to_string(step));
-      for (; started && world.stepCount() < step; ++report.steps) world.step();
+      for (; started && world.stepCount() < step; ++report.steps) {
+        world.step();
+        if (after_step) after_step(world);
+      }
       switch (static_cast<RecordKind>(kind)) {
         case RecordKind::kStart:
         case RecordKind::kState: {

@@ -44,7 +44,9 @@ class SoakTest(unittest.TestCase):
         for _ in range(5):
             pick = node.call('pick', point=Point(rng.choice([-0.2, 0.2, 0.11]), 0.0, 0.1), max_distance=0.2)
             if pick.success:
-                node.good('move_pick', pick_id=pick.pick_id, target=Point(0.0, rng.uniform(-0.1, 0.1), 0.15))
+                at = pick.position
+                node.good('move_pick', pick_id=pick.pick_id,
+                          target=Point(at.x, at.y + rng.uniform(-0.03, 0.03), at.z + 0.03))
             # Pieces are left alone: cut again and again they would be work without end.
             node.call('cut', blades=pose_stamped(rng.uniform(-0.25, 0.25), -1.0, 0.0, ACROSS_X),
                       bodies=[rng.choice(['left', 'right', 'middle'])])
@@ -56,6 +58,7 @@ class SoakTest(unittest.TestCase):
             node.call('spawn', name='guest', scale=1.0, pose=pose_stamped(0.0, 0.0, 0.3),
                       primitive=SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.05, 0.05, 0.05]))
             node.good('step', steps=30)
+            node.good('clear_picks')
             node.good('save', file='soak')
         node.good('load', file='soak')
         node.good('step', steps=30)

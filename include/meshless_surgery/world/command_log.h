@@ -28,6 +28,8 @@ struct ReplayReport {
 
 /// Refuses (kUnreadable) what World::record did not write. The same build gives the same hashes on any number of
 /// threads (1..64). A damaged record in the middle ends the replay with an error.
-Result<ReplayReport> replay(std::istream& log, int threads = 1);
+/// `after_step` may look at the world, and must not change it.
+Result<ReplayReport> replay(std::istream& log, int threads = 1,
+                            const std::function<void(World& world)>& after_step = {});
 
 }  // namespace meshless
