@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A node with random commands for a long time: neither memory nor the work of a step grow.
+"""A node with random commands for a long time: its memory does not grow, and the table shows the time of a step.
 MESHLESS_SURGERY_SOAK_MINUTES sets how long; half a minute without it."""
 import os
 import random
