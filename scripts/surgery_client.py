@@ -18,7 +18,8 @@ from geometry_msgs.msg import Point, PoseStamped, Quaternion, Vector3
 from std_srvs.srv import SetBool, Trigger
 
 from meshless_surgery.msg import State
-from meshless_surgery.srv import (Cut, GetBody, Incise, Lock, MovePick, Pick, Push, Release, SetMaterial, Step)
+from meshless_surgery.srv import (Cut, GetBody, Hash, Incise, LoadState, Lock, MovePick, Pick, Push, Release, SaveState,
+                                  SetMaterial, Step)
 
 
 class Refused(RuntimeError):
@@ -145,6 +146,15 @@ class Surgeon:
 
     def reset(self):
         return self.call("reset", Trigger)
+
+    def save(self, file):
+        return self.call("save", SaveState, file=file)
+
+    def load(self, file):
+        return self.call("load", LoadState, file=file)
+
+    def hash(self):
+        return self.call("hash", Hash).hash
 
     @contextlib.contextmanager
     def still(self):

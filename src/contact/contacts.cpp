@@ -51,6 +51,7 @@ void Contacts::clear() {
   impl_->keys.clear();
   impl_->needed_substeps = 1;
   impl_->depths.clear();
+  impl_->frames = impl_->steady_contacts = 0;  // what follows is as from the start
 }
 
 void Contacts::findPairs(const ContactScene& scene, const std::vector<ContactParty>& parties, double h,

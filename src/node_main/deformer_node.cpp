@@ -1,14 +1,21 @@
 // The node. Everything that it offers is private to its name; see docs/interface.md.
+#include <csignal>
+
 #include <malloc.h>
 #include <ros/ros.h>
 
 #include "meshless_surgery/ros/node.h"
+
+extern "C" void stopInGoodOrder(int) { ros::requestShutdown(); }
 
 int main(int argc, char** argv) {
   // Memory that a cut has used is kept for the next one: fetching it anew costs more than the cut.
   mallopt(M_MMAP_THRESHOLD, 1 << 30);
   mallopt(M_TRIM_THRESHOLD, 1 << 30);
   ros::init(argc, argv, "deformer");
+  // SIGINT is roscpp's; a supervisor's SIGTERM means the same. A disk quota must refuse, not kill.
+  std::signal(SIGTERM, stopInGoodOrder);
+  std::signal(SIGXFSZ, SIG_IGN);
   const ros::NodeHandle private_handle("~");
   // Streams and services that answer at once; those that wait have threads of their own.
   ros::AsyncSpinner spinner(4);

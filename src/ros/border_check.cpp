@@ -1,14 +1,10 @@
 #include "meshless_surgery/ros/border_check.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
 namespace meshless {
-namespace {
-
-constexpr std::size_t kMaxName = 100;
-
-}  // namespace
 
 std::string formatNumber(double value) {
   if (std::isnan(value)) return "nan";
@@ -18,12 +14,15 @@ std::string formatNumber(double value) {
   return text;
 }
 
-std::string printable(const std::string& text) {
-  std::string shown = text.substr(0, kMaxName);
+std::string printable(const std::string& text, std::size_t most) {
+  std::size_t length = std::min(text.size(), most);
+  // Not in the middle of a character.
+  while (length > 0 && length < text.size() && (static_cast<unsigned char>(text[length]) & 0xc0) == 0x80) --length;
+  std::string shown = text.substr(0, length);
   for (char& c : shown) {
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
   }
-  if (text.size() > kMaxName) shown += "...";
+  if (text.size() > length) shown += "...";
   return shown;
 }
 

@@ -9,16 +9,20 @@
 
 #include <ros/console.h>
 #include <ros/package.h>
+#include <ros/param.h>
+#include <ros/this_node.h>
 
 #include "meshless_surgery/ros/border_check.h"
 #include "meshless_surgery/ros/force_publisher.h"
 #include "meshless_surgery/ros/publishers.h"
 #include "meshless_surgery/ros/services.h"
+#include "meshless_surgery/ros/session.h"
 
 namespace meshless {
 namespace {
 
 constexpr char kPackage[] = "meshless_surgery";
+constexpr std::size_t kLongestAutosaveName = 80;
 
 bool isFile(const std::string& path) {
   struct stat info {};
@@ -88,6 +92,31 @@ void applyOverrides(const NodeSettings& settings, WorldSettings& world) {
   if (settings.push_radius) world.push_radius = *settings.push_radius;
 }
 
+/// What a session's files are about. An autosave is taken up by the node that roslaunch starts again after a kill, not
+/// by another launch.
+SessionSettings sessionSettings(const NodeSettings& settings, const std::string& scene_file) {
+  SessionSettings session;
+  session.folder = settings.session_directory;
+  if (session.folder.empty()) {
+    const char* ros_home = std::getenv("ROS_HOME");
+    const char* home = std::getenv("HOME");
+    if (ros_home != nullptr && *ros_home != '\0') {
+      session.folder = std::string(ros_home) + "/meshless_surgery";
+    } else if (home != nullptr && *home != '\0') {
+      session.folder = std::string(home) + "/.ros/meshless_surgery";
+    }
+  }
+  session.command_log = settings.command_log;
+  session.autosave_period = settings.autosave_period;
+  std::string name = ros::this_node::getName();
+  std::replace(name.begin(), name.end(), '/', '_');
+  session.autosave_name = ("autosave" + name).substr(0, kLongestAutosaveName) + ".state";
+  std::string run_id;
+  ros::param::get("/run_id", run_id);
+  session.origin = "scene " + scene_file + ", launch " + run_id;
+  return session;
+}
+
 PaceClock paceClock() {
   if (!ros::Time::isSimTime()) return PaceClock::wall();
   return {[] { return ros::Time::now().toSec(); }, false};
@@ -96,8 +125,10 @@ PaceClock paceClock() {
 }  // namespace
 
 struct DeformerNode::Parts {
-  Parts(const ros::NodeHandle& handle, const NodeSettings& settings, std::unique_ptr<World> world, BodyLoader loader_in)
-      : runner(std::move(world), {settings.paused, settings.max_backlog}, paceClock()),
+  Parts(const ros::NodeHandle& handle, const NodeSettings& settings, std::unique_ptr<World> world, BodyLoader loader_in,
+        std::unique_ptr<Session> session_in)
+      : session(std::move(session_in)),
+        runner(std::move(world), {settings.paused, settings.max_backlog}, paceClock()),
         frames(settings.world_frame),
         loader(std::move(loader_in)),
         tools(handle, settings, runner, frames, rejections),
@@ -105,14 +136,17 @@ struct DeformerNode::Parts {
         forces(handle, settings, tools) {}
 
   ~Parts() {
+    session->endLog(runner);
     // First the world, so that whoever waits for it gets an answer.
     runner.stop();
     services.reset();
     publishers.stop();
     forces.stop();
+    session->stop();
   }
 
   Rejections rejections;
+  std::unique_ptr<Session> session;
   WorldRunner runner;
   Frames frames;
   BodyLoader loader;
@@ -177,18 +211,31 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
     if (const Status added = world->addObstacle(std::move(def)); !added.ok())
       return Error{added.error().code, *file + ": " + added.error().detail};
 
+  auto session = std::make_unique<Session>(sessionSettings(*settings, *file));
+  const std::string taken_up = session->takeUp(*world);
+  if (!taken_up.empty()) ROS_WARN_STREAM(taken_up);
+  const auto log = session->startLog(*world);
+  if (!log.ok()) return Error{log.error().code, "parameter ~command_log: " + log.error().detail};
+  if (!log->empty()) ROS_INFO_STREAM("commands are logged to " << *log);
+
   auto parts = std::make_unique<Parts>(private_handle, *settings, std::move(world),
-                                       BodyLoader(access, scene_folder, std::move(scene->materials)));
+                                       BodyLoader(access, scene_folder, std::move(scene->materials)),
+                                       std::move(session));
   parts->runner.setEventSink(
       [publishers = &parts->publishers](std::vector<Event> events) { publishers->queueEvents(std::move(events)); });
   parts->runner.setStepSink(
-      [forces = &parts->forces](const World& world_now, double dt) { forces->changed(world_now, dt); });
+      [forces = &parts->forces, kept = parts->session.get()](const World& world_now, double dt) {
+        forces->changed(world_now, dt);
+        kept->changed(world_now, dt);
+      });
+  parts->session->start(parts->runner);
   parts->runner.start();
   parts->publishers.start();
   parts->forces.start();
   // Last, so that who finds them finds a world that runs.
   parts->services =
-      std::make_unique<Services>(private_handle, parts->runner, parts->frames, parts->loader, parts->rejections);
+      std::make_unique<Services>(private_handle, parts->runner, parts->frames, parts->loader, parts->rejections,
+                                 *parts->session);
   ROS_INFO_STREAM("scene " << *file << ": " << bodies << " bodies, " << particles << " particles, " << clusters
                            << " clusters, " << scene->world.step_rate << " steps/s of " << scene->world.substeps
                            << " substeps" << (settings->paused ? ", paused" : ""));

@@ -24,11 +24,11 @@ PaceClock PaceClock::wall() { return {wallSeconds, true}; }
 
 WorldRunner::WorldRunner(std::unique_ptr<World> world, const RunnerSettings& settings, PaceClock clock)
     : world_(std::move(world)),
-      world_settings_(world_->settings()),
-      dt_(1.0 / world_settings_.step_rate),
+      dt_(1.0 / world_->settings().step_rate),
       settings_(settings),
       clock_(std::move(clock)),
-      paused_(settings.paused) {
+      paused_(settings.paused),
+      world_settings_(world_->settings()) {
   status_.paused = paused_;
 }
 
@@ -157,6 +157,28 @@ Status WorldRunner::reset() {
         fresh_pace_ = true;
       },
       true);
+}
+
+Status WorldRunner::restore(std::shared_ptr<const SavedWorld> saved, const Job& then) {
+  return run(
+      [&](World& world) {
+        world.restore(*saved);
+        answerCuts();
+        giveUp("another state was loaded meanwhile");
+        fresh_pace_ = true;
+        dt_ = 1.0 / world.settings().step_rate;
+        {
+          const std::lock_guard<std::mutex> lock(status_mutex_);
+          world_settings_ = world.settings();
+        }
+        then(world);
+      },
+      true);
+}
+
+WorldSettings WorldRunner::worldSettings() const {
+  const std::lock_guard<std::mutex> lock(status_mutex_);
+  return world_settings_;
 }
 
 std::shared_ptr<const WorldSnapshot> WorldRunner::snapshot(const SnapshotWants& wants) {

@@ -4,6 +4,7 @@
 
 #include <meshless_surgery/Cut.h>
 #include <meshless_surgery/GetBody.h>
+#include <meshless_surgery/Hash.h>
 #include <meshless_surgery/Incise.h>
 #include <meshless_surgery/LoadState.h>
 #include <meshless_surgery/Lock.h>
@@ -33,6 +34,7 @@ constexpr double kMaxStiffness = 1e9;        // [N/m]
 constexpr double kMaxScale = 1e6;
 constexpr std::uint32_t kMaxSteps = 100000;
 constexpr std::size_t kMaxYaml = 64 * 1024;  // bytes
+constexpr std::size_t kLongestMessage = 2000;  // characters: names of megabytes are not sent back
 constexpr int kCutThreads = 4;               // cuts that may wait for their blades at once
 constexpr int kMostSuffix = 10000;           // <name>_N tried for a body without a name of its own
 
@@ -50,8 +52,8 @@ std::string clustersOf(const CutWork& work) {
 
 struct Services::Handlers {
   Handlers(const ros::NodeHandle& private_handle, WorldRunner& runner_in, Frames& frames_in,
-           const BodyLoader& loader_in, Rejections& rejections_in)
-      : runner(runner_in), frames(frames_in), loader(loader_in), rejections(rejections_in) {
+           const BodyLoader& loader_in, Rejections& rejections_in, Session& session_in)
+      : runner(runner_in), frames(frames_in), loader(loader_in), rejections(rejections_in), session(session_in) {
     advertise(private_handle, "pick", &Handlers::pick);
     advertise(private_handle, "move_pick", &Handlers::movePick);
     advertise(private_handle, "lock", &Handlers::lock);
@@ -68,12 +70,14 @@ struct Services::Handlers {
     advertise(private_handle, "get_body", &Handlers::getBody);
     advertise(private_handle, "pause", &Handlers::pause);
     advertise(private_handle, "reset", &Handlers::reset);
-    advertise(private_handle, "save", &Handlers::save);
-    advertise(private_handle, "load", &Handlers::load);
+    advertise(private_handle, "hash", &Handlers::hash);
     advertiseApart(private_handle, cut_queue, "cut", &Handlers::cut);
     advertiseApart(private_handle, step_queue, "step", &Handlers::step);
     advertiseApart(private_handle, spawn_queue, "spawn", &Handlers::spawn);
+    advertiseApart(private_handle, session_queue, "save", &Handlers::save);
+    advertiseApart(private_handle, session_queue, "load", &Handlers::load);
     cut_spinner.start();
+    session_spinner.start();
     step_spinner.start();
     spawn_spinner.start();
   }
@@ -93,9 +97,9 @@ struct Services::Handlers {
   template <class Response>
   bool refuse(Response& response, const std::string& service, const Error& error) {
     response.success = false;
-    response.message = error.detail;
-    if (error.code != ErrorCode::kMissed) rejections.count("~" + service, error.detail);
-    ROS_DEBUG_STREAM("~" << service << " refused: " << error.detail);
+    response.message = printable(error.detail, kLongestMessage);
+    if (error.code != ErrorCode::kMissed) rejections.count("~" + service, response.message);
+    ROS_DEBUG_STREAM("~" << service << " refused: " << response.message);
     return true;
   }
   template <class Response>
@@ -401,29 +405,46 @@ struct Services::Handlers {
     return accept(response, "back to the scene's start");
   }
 
-  bool save(meshless_surgery::SaveState::Request&, meshless_surgery::SaveState::Response& response) {
-    return refuse(response, "save", {ErrorCode::kUnsupported, "saving the state comes with a later version"});
+  bool save(meshless_surgery::SaveState::Request& request, meshless_surgery::SaveState::Response& response) {
+    const auto bytes = session.save(runner, request.file);
+    if (!bytes.ok()) return refuse(response, "save", bytes.error());
+    return accept(response, "saved " + request.file + ", " + std::to_string(*bytes) + " bytes");
   }
 
-  bool load(meshless_surgery::LoadState::Request&, meshless_surgery::LoadState::Response& response) {
-    return refuse(response, "load", {ErrorCode::kUnsupported, "loading a state comes with a later version"});
+  bool load(meshless_surgery::LoadState::Request& request, meshless_surgery::LoadState::Response& response) {
+    const auto loaded = session.load(runner, request.file);
+    if (!loaded.ok()) return refuse(response, "load", loaded.error());
+    return accept(response, "loaded " + request.file + ": step " + std::to_string(loaded->step) + ", " +
+                                std::to_string(loaded->bodies) + " bodies; cuts before it cannot be undone");
+  }
+
+  bool hash(meshless_surgery::Hash::Request&, meshless_surgery::Hash::Response& response) {
+    const Status done = runner.look([&](World& world) {
+      response.hash = world.stateHash();
+      response.step = world.stepCount();
+      response.sim_time = world.simTime();
+    });
+    if (!done.ok()) return refuse(response, "hash", done.error());
+    return accept(response, "the state before step " + std::to_string(response.step));
   }
 
   WorldRunner& runner;
   Frames& frames;
   const BodyLoader& loader;
   Rejections& rejections;
+  Session& session;
   // Queues before servers before spinners: torn down in the other order.
-  ros::CallbackQueue cut_queue, step_queue, spawn_queue;
+  ros::CallbackQueue cut_queue, step_queue, spawn_queue, session_queue;
   std::vector<ros::ServiceServer> servers;
   ros::AsyncSpinner cut_spinner{kCutThreads, &cut_queue};
   ros::AsyncSpinner step_spinner{1, &step_queue};
   ros::AsyncSpinner spawn_spinner{1, &spawn_queue};
+  ros::AsyncSpinner session_spinner{1, &session_queue};
 };
 
 Services::Services(const ros::NodeHandle& private_handle, WorldRunner& runner, Frames& frames,
-                   const BodyLoader& loader, Rejections& rejections)
-    : handlers_(std::make_unique<Handlers>(private_handle, runner, frames, loader, rejections)) {}
+                   const BodyLoader& loader, Rejections& rejections, Session& session)
+    : handlers_(std::make_unique<Handlers>(private_handle, runner, frames, loader, rejections, session)) {}
 
 Services::~Services() = default;
 

@@ -7,10 +7,13 @@
 #include <ros/names.h>
 #include <ros/param.h>
 
+#include "meshless_surgery/io/session_folder.h"
 #include "meshless_surgery/ros/border_check.h"
 
 namespace meshless {
 namespace {
+
+constexpr double kShortestAutosave = 0.05;  // [s] of simulated time
 
 /// Reads parameters and remembers which ones it knows.
 class Reader {
@@ -121,6 +124,9 @@ Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std
   reader.read("tf_prefix", settings.tf_prefix);
   reader.read("scene", settings.scene);
   reader.read("data_folders", settings.data_folders);
+  reader.read("session_directory", settings.session_directory);
+  reader.read("command_log", settings.command_log);
+  reader.read("autosave_period", settings.autosave_period, 0.0, 3600.0, "s");
   reader.read("paused", settings.paused);
   reader.read("max_backlog", settings.max_backlog, 0.0, 10.0, "s");
   reader.read("markers_rate", settings.markers_rate, 0.1, 30.0, "Hz");
@@ -143,6 +149,14 @@ Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std
   reader.read("tools/scissors/width", settings.scissors_width, 1e-6, kMaxLength, "m");
   if (settings.world_frame.find_first_not_of('/') == std::string::npos) {
     reader.check.fault("parameter ~world_frame is '" + printable(settings.world_frame) + "'; accepted: a frame's name");
+  }
+  if (settings.autosave_period > 0.0 && settings.autosave_period < kShortestAutosave) {
+    reader.check.fault("parameter ~autosave_period is " + formatNumber(settings.autosave_period) +
+                       "; accepted: 0 (none) or " + formatNumber(kShortestAutosave) + "..3600 s");
+  }
+  if (!settings.command_log.empty()) {
+    const Status name = SessionFolder::checkName(settings.command_log);
+    if (!name.ok()) reader.check.fault("parameter ~command_log: " + name.error().detail);
   }
   if (settings.scene.empty()) {
     reader.check.fault("parameter ~scene is empty; accepted: a scene's name, a path or package://");

@@ -1,4 +1,4 @@
-// Lifetime of bodies, snapshots, hash. Commands are in world_commands.cpp, cuts in world_cut.cpp, time in
+// Lifetime of bodies, snapshots. The whole state and its hash are in saved_world.cpp. Commands are in world_commands.cpp, cuts in world_cut.cpp, time in
 // world_step.cpp.
 #include "meshless_surgery/world/world.h"
 
@@ -55,6 +55,8 @@ const char* toString(EventType type) {
       return "undone";
     case EventType::kLifted:
       return "lifted";
+    case EventType::kLoaded:
+      return "loaded";
   }
   return "unknown";
 }
@@ -185,10 +187,12 @@ World& World::operator=(World&&) noexcept = default;
 const WorldSettings& World::settings() const { return impl_->settings; }
 std::uint64_t World::stepCount() const { return impl_->step; }
 double World::simTime() const { return static_cast<double>(impl_->step) / impl_->settings.step_rate; }
+std::size_t World::bodyCount() const { return impl_->bodies.size(); }
 const PushSphere& World::push() const { return impl_->push; }
 const Scissors& World::scissors() const { return impl_->scissors; }
 
 Result<Reply> World::apply(const Command& command) {
+  impl_->record(command);
   return std::visit([this](const auto& c) { return impl_->apply(c); }, command);
 }
 
@@ -198,12 +202,8 @@ Result<SpawnReply> World::addSceneBody(std::shared_ptr<const PreparedBody> body)
   return reply;
 }
 
-Status World::addObstacle(ObstacleDef obstacle) {
-  Impl& w = *impl_;
+Status checkObstacle(const ObstacleDef& obstacle) {
   if (obstacle.name.empty()) return Error{ErrorCode::kInvalidArgument, "an obstacle needs a name"};
-  for (const auto& other : w.obstacles)
-    if (other->def->name == obstacle.name)
-      return Error{ErrorCode::kDuplicateName, "there is an obstacle '" + obstacle.name + "' already"};
   if (!(obstacle.friction >= 0.0 && obstacle.friction <= 10.0))
     return outOfRange("friction of obstacle '" + obstacle.name + "'", obstacle.friction, "0 to 10");
   for (const Vec3& p : obstacle.mesh.vertices)
@@ -213,12 +213,22 @@ Status World::addObstacle(ObstacleDef obstacle) {
     return Error{ErrorCode::kUnsuitableShape,
                  "obstacle '" + obstacle.name + "' encloses a volume of " + std::to_string(volume) +
                      " m^3; accepted: a closed surface, counter-clockwise seen from outside"};
+  return Done{};
+}
+
+Status World::addObstacle(ObstacleDef obstacle) {
+  Impl& w = *impl_;
+  for (const auto& other : w.obstacles)
+    if (other->def->name == obstacle.name)
+      return Error{ErrorCode::kDuplicateName, "there is an obstacle '" + obstacle.name + "' already"};
+  if (Status status = checkObstacle(obstacle); !status) return status.error();
   w.obstacles.push_back(std::make_unique<WorldObstacle>(std::move(obstacle)));
   return Done{};
 }
 
 void World::reset() {
   Impl& w = *impl_;
+  w.recordReset();
   for (const ClosingCut& c : w.closing)
     w.finished.emplace(c.ticket, Error{ErrorCode::kFailed, "the world was reset before the blades met"});
   w.closing.clear();
@@ -300,55 +310,17 @@ Result<BodySnapshot> World::inspect(const std::string& name, bool rest) {
 
 std::vector<Event> World::takeEvents() { return std::exchange(impl_->events, {}); }
 
-std::uint64_t World::stateHash() const {
-  std::uint64_t hash = 14695981039346656037ull;
-  const auto bytes = [&hash](const void* data, std::size_t size) {
-    const auto* byte = static_cast<const unsigned char*>(data);
-    for (std::size_t i = 0; i < size; ++i) hash = (hash ^ byte[i]) * 1099511628211ull;
-  };
-  const auto points = [&bytes](const Points& p) { bytes(p.data(), p.size() * sizeof(Vec3)); };
-  const auto vec = [&bytes](const Vec3& v) { bytes(v.data(), sizeof(Vec3)); };
-  const auto number = [&bytes](double v) { bytes(&v, sizeof v); };
-  const Impl& w = *impl_;
-  bytes(&w.step, sizeof w.step);
-  for (const auto& body : w.bodies) {
-    bytes(body->name.data(), body->name.size());
-    points(body->state.positions);
-    points(body->state.velocities);
-    points(body->state.rider_offsets);
-    for (const ClusterPose& pose : body->state.poses) bytes(pose.rotation.coeffs().data(), 4 * sizeof(double));
-    for (const PlasticShape& shape : body->state.plastic) bytes(shape.stretch.data(), 9 * sizeof(double));
-    number(body->material.alpha);
-    number(body->material.beta);
-    number(body->material.damping);
-    number(body->material.friction);
-    number(static_cast<double>(body->material.mode));
-    number(body->model->mass);
-  }
-  for (const Pick& pick : w.picks) {
-    bytes(&pick.id, sizeof pick.id);
-    bytes(&pick.particle, sizeof pick.particle);
-    vec(pick.target);
-    number(pick.stiffness);
-    number(pick.locked ? 1.0 : 0.0);
-  }
-  number(w.push.enabled ? w.push.radius : 0.0);
-  vec(w.push.position);
-  vec(w.push.target);
-  number(w.push.speed);
-  number(w.scissors.shown ? w.scissors.angle : 0.0);
-  vec(w.scissors.blades.origin);
-  for (const ClosingCut& c : w.closing) bytes(&c.done_at, sizeof c.done_at);
-  return hash;
-}
-
 void World::setScissors(const Blades& blades, double angle) {
   impl_->scissors.shown = true;
   impl_->scissors.blades = blades;
   impl_->scissors.angle = angle;
+  impl_->recordScissors();
 }
 
-void World::hideScissors() { impl_->scissors.shown = false; }
+void World::hideScissors() {
+  impl_->scissors.shown = false;
+  impl_->recordScissors();
+}
 
 PickId World::pickInHand() const {
   const auto held = heldPick();

@@ -60,17 +60,21 @@ void World::Impl::groupBatches() {
   }
   for (std::vector<WorldBody*>& group : groups) {
     if (group.size() < kLeastBodies) continue;
-    std::vector<MatchInput> inputs;
-    for (WorldBody* body : group) {
-      inputs.push_back(matchInput(*body->model, body->state));
-      body->batched = true;
-    }
-    WorldBatch batch;
-    batch.batch = std::make_unique<BodyBatch>(inputs, group.front()->material.mode == MatchMode::kQuadratic);
-    batch.states.resize(group.size());
-    batch.bodies = std::move(group);
-    batches.push_back(std::move(batch));
+    addBatch(std::move(group));
   }
+}
+
+void World::Impl::addBatch(std::vector<WorldBody*> group) {
+  std::vector<MatchInput> inputs;
+  for (WorldBody* body : group) {
+    inputs.push_back(matchInput(*body->model, body->state));
+    body->batched = true;
+  }
+  WorldBatch batch;
+  batch.batch = std::make_unique<BodyBatch>(inputs, group.front()->material.mode == MatchMode::kQuadratic);
+  batch.states.resize(group.size());
+  batch.bodies = std::move(group);
+  batches.push_back(std::move(batch));
 }
 
 void World::Impl::matchBatches(double h) {

@@ -10,7 +10,6 @@ namespace {
 
 constexpr double kLeastRigid = 0.5;  // share of a contact's impulse that moves a body for looks as a whole
 constexpr double kFlattest = 1e-6;   // det of a map: below, the rotation stands in
-constexpr std::uint64_t kObstacleKey = std::uint64_t{1} << 40;  // beyond the numbers of bodies
 constexpr std::size_t kTaskBodies = 128;                        // looked at by one task
 constexpr std::size_t kKeptModels = 64;                         // more than this many dead entries are cleared away
 

@@ -77,6 +77,9 @@ struct ClosingCut {
   std::uint64_t started_at = 0;
 };
 
+/// What contact calls obstacles: the first has this key, beyond the numbers of bodies.
+inline constexpr std::uint64_t kObstacleKey = std::uint64_t{1} << 40;
+
 /// A loop on so many threads.
 ForEach makeForEach(int threads);
 
@@ -130,6 +133,7 @@ struct World::Impl {
   double last_substep = 0.0;      // [s]
   std::vector<ContactParty> parties;  // one a body, in their order, where contacts are found in rest shapes
   std::map<const BodyModel*, std::weak_ptr<const ContactModel>> contact_models;
+  RecordSink record_sink;
 
   WorldBody* find(const std::string& name);
   WorldBody* find(const BodyId& id);
@@ -167,9 +171,16 @@ struct World::Impl {
   void followPieces(const BodyId& parent, const std::vector<BodyId>& children,
                     const std::vector<std::vector<Index>>& parent_particles);
 
+  // the log of commands, where there is one
+  void record(const Command& command) const;
+  void recordScissors() const;
+  void recordReset() const;
+  void recordState(const SavedWorld& saved) const;
+
   // stages of a step
   void listAwake();
   void groupBatches();
+  void addBatch(std::vector<WorldBody*> group);
   void matchBatches(double h);
   void finishSubstep(double h);
   /// The body and all that fell asleep with it.
@@ -196,6 +207,9 @@ struct World::Impl {
   void contactGroundAndPush(WorldBody& body, double h, double h_frame, const Vec3& push_velocity);
   void fadeRiderOffsets(WorldBody& body, double h);
 };
+
+/// Why it cannot be an obstacle, whatever others there are.
+Status checkObstacle(const ObstacleDef& obstacle);
 
 /// "<name> is <value>; accepted: <range>"
 Error outOfRange(const std::string& name, double value, const std::string& accepted);

@@ -1,14 +1,18 @@
 """What the rostests share: calls, recordings of topics, and a picture of the world to compare."""
+import os
+import subprocess
 import sys
+import tempfile
 import threading
 import time
 import unittest
 
+import roslib.packages
 import rospy
 import rosunit
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
 from meshless_surgery.msg import State
-from meshless_surgery.srv import (Cut, GetBody, Incise, LoadState, Lock, MovePick, Pick, Probe, Push, Release, Remove,
+from meshless_surgery.srv import (Cut, GetBody, Hash, Incise, LoadState, Lock, MovePick, Pick, Probe, Push, Release, Remove,
                                   SaveState, SetMaterial, Spawn, Step)
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
@@ -16,7 +20,7 @@ from std_srvs.srv import SetBool, Trigger
 TYPES = {
     'pick': Pick, 'move_pick': MovePick, 'lock': Lock, 'release': Release, 'clear_picks': Trigger, 'push': Push,
     'cut': Cut, 'open_scissors': Trigger, 'incise': Incise, 'spawn': Spawn, 'remove': Remove, 'set_material': SetMaterial, 'get_body': GetBody,
-    'lift_scissors': Trigger, 'undo_cut': Trigger, 'probe': Probe, 'pause': SetBool, 'step': Step, 'reset': Trigger, 'save': SaveState, 'load': LoadState,
+    'lift_scissors': Trigger, 'undo_cut': Trigger, 'probe': Probe, 'pause': SetBool, 'step': Step, 'reset': Trigger, 'save': SaveState, 'load': LoadState, 'hash': Hash,
 }
 # A bound for things that should have happened long before; no test measures time.
 LONG = 120.0
@@ -80,6 +84,69 @@ class Recorder:
 
     def close(self):
         self.subscriber.unregister()
+
+
+class OwnNode:
+    """A deformer_node of this test, with these private parameters; `prefix` goes before its command."""
+
+    count = 0
+
+    def __init__(self, prefix=(), **parameters):
+        OwnNode.count += 1
+        self.name = '/own_deformer_%d' % OwnNode.count
+        for key, value in parameters.items():
+            rospy.set_param('%s/%s' % (self.name, key.replace('__', '/')), value)
+        binary = roslib.packages.find_node('meshless_surgery', 'deformer_node')[0]
+        self.log = tempfile.TemporaryFile(mode='w+', errors='replace')
+        self.process = subprocess.Popen(list(prefix) + [binary, '__name:=' + self.name[1:]], stdout=self.log,
+                                        stderr=self.log)
+        self.deformer = Deformer(self.name)
+
+    def wait(self):
+        """Until it offers its services, the last of which is this one."""
+        end = time.monotonic() + LONG
+        while True:
+            if self.process.poll() is not None:
+                raise AssertionError('the node has ended: ' + self.output())
+            try:
+                rospy.wait_for_service(self.name + '/spawn', 0.5)
+                return self
+            except rospy.ROSException:
+                if time.monotonic() > end:
+                    raise
+
+    def call(self, service, **fields):
+        return self.deformer.call(service, **fields)
+
+    def good(self, service, **fields):
+        answer = self.call(service, **fields)
+        if not answer.success:
+            raise AssertionError('%s: %s' % (service, answer.message))
+        return answer
+
+    def hash(self):
+        return self.good('hash').hash
+
+    def output(self):
+        self.log.flush()
+        position = self.log.tell()
+        self.log.seek(0)
+        text = self.log.read()
+        self.log.seek(position)
+        return text
+
+    def end(self, signal_number=15):
+        """Its exit code after that signal."""
+        self.process.send_signal(signal_number)
+        return self.process.wait(LONG)
+
+    def __enter__(self):
+        return self.wait()
+
+    def __exit__(self, *unused):
+        if self.process.poll() is None:
+            self.end(9)
+        self.log.close()
 
 
 def header(frame='', stamp=rospy.Time(0)):

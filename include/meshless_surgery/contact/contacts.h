@@ -62,6 +62,8 @@ struct LoadedPair {
   Index a = 0, b = kNoIndex;
 };
 
+class ContactsMemory;
+
 /// Kept between steps: scratch, and what a contact has to remember. The order of parties is that of the bodies.
 class Contacts {
  public:
@@ -107,6 +109,10 @@ class Contacts {
   const std::vector<double>& depths() const;
   /// Forgets what it remembers of pairs.
   void clear();
+  /// All that the next frame reads of the ones before, to be given back to contacts of the same parties
+  /// (contact/contacts_memory.h).
+  ContactsMemory memory() const;
+  void recall(const ContactsMemory& memory);
 
  private:
   struct Impl;

@@ -43,7 +43,8 @@ class BorderCheck {
 
 /// At most 6 digits, "nan" and "inf" as such.
 std::string formatNumber(double value);
-/// For messages to people: control characters replaced, cut after 100 characters.
-std::string printable(const std::string& text);
+constexpr std::size_t kMaxName = 100;  // bytes of a name
+/// For messages to people: control characters replaced, cut after `most` bytes.
+std::string printable(const std::string& text, std::size_t most = kMaxName);
 
 }  // namespace meshless

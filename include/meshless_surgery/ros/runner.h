@@ -58,7 +58,8 @@ class WorldRunner {
   /// Ends the thread; whoever waits gets kFailed.
   void stop();
 
-  const WorldSettings& worldSettings() const { return world_settings_; }
+  /// Of the world as it is now: a loaded state brings its own.
+  WorldSettings worldSettings() const;
 
   // Each of these returns when its effect is in force; kFailed once stopped. Not to be called from within a job.
   Result<Reply> apply(const Command& command);
@@ -74,6 +75,8 @@ class WorldRunner {
   Result<std::uint64_t> setPaused(bool paused);
   /// Closing blades and steps that are being done are given up: their callers get kFailed.
   Status reset();
+  /// Becomes the saved state, as reset() does; `then` is done before anything else is.
+  Status restore(std::shared_ptr<const SavedWorld> saved, const Job& then);
   /// A job that only reads.
   Status look(const Job& job);
   std::shared_ptr<const WorldSnapshot> snapshot(const SnapshotWants& wants);  // null once stopped
@@ -113,8 +116,7 @@ class WorldRunner {
   void fail(const std::string& what);
 
   std::unique_ptr<World> world_;
-  const WorldSettings world_settings_;
-  const double dt_;
+  double dt_;  // [s]
   RunnerSettings settings_;
   PaceClock clock_;
   EventSink event_sink_;
@@ -138,6 +140,7 @@ class WorldRunner {
     double wall, sim, step;  // [s]
   };
   mutable std::mutex status_mutex_;
+  WorldSettings world_settings_;
   std::deque<Sample> samples_;  // of the last second
   RunnerStatus status_;
   double started_ = 0.0;

@@ -11,14 +11,15 @@
 #include "meshless_surgery/ros/frames.h"
 #include "meshless_surgery/ros/rejections.h"
 #include "meshless_surgery/ros/runner.h"
+#include "meshless_surgery/ros/session.h"
 
 namespace meshless {
 
 class Services {
  public:
-  /// Services that may wait (cut, step, spawn) have threads of their own: a waiting one holds nobody else up.
+  /// Services that may wait (cut, step, spawn, save and load) have threads of their own: a waiting one holds nobody else up.
   Services(const ros::NodeHandle& private_handle, WorldRunner& runner, Frames& frames, const BodyLoader& loader,
-           Rejections& rejections);
+           Rejections& rejections, Session& session);
   ~Services();
 
  private:

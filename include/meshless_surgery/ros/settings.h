@@ -16,6 +16,9 @@ struct NodeSettings {
   std::string tf_prefix;                   // before the published frames' names, with a slash between
   std::string scene = "liver";             // a name in config/scenes, a path or package://
   std::vector<std::string> data_folders;   // below which mesh files may be read, besides the package and the scene
+  std::string session_directory;           // files are written below it; empty: meshless_surgery below ROS's own folder
+  std::string command_log;                 // a file's name there; empty: no log
+  double autosave_period = 0.0;            // [s] of simulated time, 0 (none) or 0.05..3600
   bool paused = false;                     // start paused
   double max_backlog = 0.1;                // [s] 0..10
   double markers_rate = 30.0;              // [Hz] 0.1..30

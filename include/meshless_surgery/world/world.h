@@ -64,7 +64,8 @@ enum class EventType {
   kReset,
   kFault,
   kUndone,
-  kLifted
+  kLifted,
+  kLoaded
 };
 const char* toString(EventType type);
 
@@ -143,6 +144,8 @@ struct ProbeReply {
   Vec3 normal = Vec3::UnitZ();   // unit, out of the tissue
 };
 
+struct SavedWorld;
+
 class World {
  public:
   explicit World(WorldSettings settings);
@@ -153,6 +156,7 @@ class World {
   const WorldSettings& settings() const;
   std::uint64_t stepCount() const;
   double simTime() const;  // [s]
+  std::size_t bodyCount() const;
 
   /// Does what the user asked for, at once; on an error nothing has changed.
   Result<Reply> apply(const Command& command);
@@ -181,8 +185,23 @@ class World {
   Result<ProbeReply> probe(const Vec3& origin, const Vec3& direction);
   /// Events since the last call.
   std::vector<Event> takeEvents();
-  /// FNV-1a over every position, velocity and tool: equal for equal histories.
+  /// Of all that a later step reads of the state: equal for equal histories since the start or a reset, whoever looked
+  /// on and on however many threads. Settings and models are constant, ids go on over resets: they are left out.
   std::uint64_t stateHash() const;
+
+  /// The whole state as it is now, at the cost of a copy of what changes (world/saved_world.h).
+  std::shared_ptr<const SavedWorld> capture() const;
+  /// Becomes that state, with its settings (but for the threads), scene and obstacles; a new run begins, what could be
+  /// undone is forgotten, and blades that were closing answer with an error.
+  void restore(const SavedWorld& saved);
+
+  /// From now on hands the bytes of a log (world/command_log.h) to the sink, piece by piece: the present state first,
+  /// then every command before it is done. Bodies and obstacles of the scene are to be added before. An empty sink ends
+  /// it.
+  using RecordSink = std::function<void(std::string bytes)>;
+  void record(RecordSink sink);
+  /// Puts the present hash into the log, for a replay to compare.
+  void recordHash() const;
 
   // tracked tools
   void setScissors(const Blades& blades, double angle);  // shown from now on

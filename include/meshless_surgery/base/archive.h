@@ -1,0 +1,211 @@
+// Binary archives by cereal: values to bytes and back, in the machine's own byte order. What is read is not trusted: a
+// size is checked against the bytes that are left before memory is taken, and every fault throws ArchiveFault.
+#pragma once
+
+#include <cstring>
+#include <optional>
+#include <set>
+#include <stdexcept>
+#include <string_view>
+#include <type_traits>
+
+#include <cereal/cereal.hpp>
+
+#include "meshless_surgery/base/types.h"
+
+namespace meshless {
+
+struct ArchiveFault : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Hands bytes to whoever collects them.
+template <class Self>
+class ByteOutput : public cereal::OutputArchive<Self, cereal::AllowEmptyClassElision> {
+ public:
+  explicit ByteOutput(Self* self) : cereal::OutputArchive<Self, cereal::AllowEmptyClassElision>(self) {}
+};
+
+class OutArchive : public ByteOutput<OutArchive> {
+ public:
+  explicit OutArchive(std::string& bytes) : ByteOutput<OutArchive>(this), bytes_(bytes) {}
+  void put(const void* data, std::size_t size) { bytes_.append(static_cast<const char*>(data), size); }
+
+ private:
+  std::string& bytes_;
+};
+
+/// A hash of what would have been written. Not for security.
+class HashArchive : public ByteOutput<HashArchive> {
+ public:
+  HashArchive() : ByteOutput<HashArchive>(this) {}
+  void put(const void* data, std::size_t size) {
+    const auto* bytes = static_cast<const unsigned char*>(data);
+    for (; size >= 8; bytes += 8, size -= 8) {
+      std::uint64_t word;
+      std::memcpy(&word, bytes, 8);
+      mix(word);
+    }
+    for (; size > 0; ++bytes, --size) mix(*bytes);
+  }
+  std::uint64_t hash() const { return hash_; }
+
+ private:
+  // FNV-1a on words; turned, so that what differs in the highest bit alone spreads.
+  void mix(std::uint64_t word) {
+    hash_ ^= word;
+    hash_ = ((hash_ << 23) | (hash_ >> 41)) * 1099511628211ull;
+  }
+  std::uint64_t hash_ = 14695981039346656037ull;
+};
+
+class InArchive : public cereal::InputArchive<InArchive, cereal::AllowEmptyClassElision> {
+ public:
+  /// Keeps a view of the bytes.
+  explicit InArchive(std::string_view bytes)
+      : cereal::InputArchive<InArchive, cereal::AllowEmptyClassElision>(this), left_(bytes) {}
+  void take(void* data, std::size_t size) {
+    need(size, 1);
+    std::memcpy(data, left_.data(), size);
+    left_.remove_prefix(size);
+  }
+  std::size_t left() const { return left_.size(); }
+  /// Throws where `count` elements of at least `bytes` each cannot be there.
+  void need(std::uint64_t count, std::size_t bytes) const {
+    if (count > left_.size() / bytes)
+      throw ArchiveFault("it claims " + std::to_string(count) + " values of " + std::to_string(bytes) +
+                         " bytes where " + std::to_string(left_.size()) + " bytes are left");
+  }
+
+ private:
+  std::string_view left_;
+};
+
+/// Values that are their bytes: numbers, and fixed arrays and matrices of them.
+template <class T>
+struct IsPlain : std::bool_constant<std::is_arithmetic_v<T> && !std::is_same_v<T, bool>> {};
+template <class T, std::size_t n>
+struct IsPlain<std::array<T, n>> : IsPlain<T> {};
+template <class T, int rows, int columns>
+struct IsPlain<Eigen::Matrix<T, rows, columns>> : std::bool_constant<(rows > 0 && columns > 0 && IsPlain<T>::value)> {};
+
+template <class Out, class T, std::enable_if_t<IsPlain<T>::value, int> = 0>
+void save(ByteOutput<Out>& out, const T& value) {
+  static_cast<Out&>(out).put(&value, sizeof value);
+}
+template <class T, std::enable_if_t<IsPlain<T>::value, int> = 0>
+void load(InArchive& in, T& value) {
+  in.take(&value, sizeof value);
+}
+
+// Another byte than 0 or 1 is no bool.
+template <class Out>
+void save(ByteOutput<Out>& out, const bool& value) {
+  const unsigned char byte = value ? 1 : 0;
+  static_cast<Out&>(out).put(&byte, 1);
+}
+inline void load(InArchive& in, bool& value) {
+  unsigned char byte = 0;
+  in.take(&byte, 1);
+  if (byte > 1) throw ArchiveFault("a yes or no is " + std::to_string(byte));
+  value = byte == 1;
+}
+
+/// An enum, written as a number and refused beyond its last value: archive(choice(kind, Kind::kLast)).
+template <class E>
+struct Choice {
+  E& value;
+  E last;
+};
+template <class E>
+Choice<E> choice(E& value, E last) {
+  return {value, last};
+}
+template <class Archive, class E>
+void serialize(Archive& archive, Choice<E>& choice) {
+  auto number = static_cast<std::int32_t>(choice.value);
+  archive(number);
+  if (number < 0 || number > static_cast<std::int32_t>(choice.last))
+    throw ArchiveFault("a choice is " + std::to_string(number) + " of 0.." +
+                       std::to_string(static_cast<std::int32_t>(choice.last)));
+  choice.value = static_cast<E>(number);
+}
+
+template <class Out>
+void save(ByteOutput<Out>& out, const Quat& value) {
+  static_cast<Out&>(out).put(value.coeffs().data(), 4 * sizeof(double));
+}
+inline void load(InArchive& in, Quat& value) { in.take(value.coeffs().data(), 4 * sizeof(double)); }
+
+template <class Out>
+void save(ByteOutput<Out>& out, const std::string& value) {
+  const std::uint64_t size = value.size();
+  static_cast<Out&>(out).put(&size, sizeof size);
+  static_cast<Out&>(out).put(value.data(), value.size());
+}
+inline void load(InArchive& in, std::string& value) {
+  std::uint64_t size = 0;
+  in.take(&size, sizeof size);
+  in.need(size, 1);
+  value.resize(size);
+  in.take(value.data(), size);
+}
+
+template <class Out, class T>
+void save(ByteOutput<Out>& out, const std::vector<T>& values) {
+  const std::uint64_t size = values.size();
+  static_cast<Out&>(out).put(&size, sizeof size);
+  if constexpr (IsPlain<T>::value) {
+    static_cast<Out&>(out).put(values.data(), values.size() * sizeof(T));
+  } else {
+    for (const T& value : values) static_cast<Out&>(out)(value);
+  }
+}
+template <class T>
+void load(InArchive& in, std::vector<T>& values) {
+  std::uint64_t size = 0;
+  in.take(&size, sizeof size);
+  values.clear();
+  if constexpr (IsPlain<T>::value) {
+    in.need(size, sizeof(T));
+    values.resize(size);
+    in.take(values.data(), size * sizeof(T));
+  } else {
+    in.need(size, 1);
+    // One after another: a size that lies runs out of bytes before it takes much memory.
+    for (std::uint64_t i = 0; i < size; ++i) {
+      T value{};
+      in(value);
+      values.push_back(std::move(value));
+    }
+  }
+}
+
+template <class Out, class T>
+void save(ByteOutput<Out>& out, const std::optional<T>& value) {
+  static_cast<Out&>(out)(value.has_value());
+  if (value) static_cast<Out&>(out)(*value);
+}
+template <class T>
+void load(InArchive& in, std::optional<T>& value) {
+  bool there = false;
+  in(there);
+  value.reset();
+  if (!there) return;
+  value.emplace();
+  in(*value);
+}
+
+template <class Out>
+void save(ByteOutput<Out>& out, const std::set<std::string>& values) {
+  save(out, std::vector<std::string>(values.begin(), values.end()));
+}
+inline void load(InArchive& in, std::set<std::string>& values) {
+  std::vector<std::string> read;
+  load(in, read);
+  values = std::set<std::string>(read.begin(), read.end());
+}
+
+}  // namespace meshless
+
+CEREAL_SETUP_ARCHIVE_TRAITS(meshless::InArchive, meshless::OutArchive)

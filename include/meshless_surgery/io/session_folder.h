@@ -1,0 +1,47 @@
+// The one folder that is written to: files by name, whole or not at all.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "meshless_surgery/base/result.h"
+
+namespace meshless {
+
+class SessionFolder {
+ public:
+  /// Made when the first file is written, its parents too. Empty: nothing is written or read.
+  explicit SessionFolder(std::string folder) : folder_(std::move(folder)) {}
+
+  const std::string& folder() const { return folder_; }
+
+  /// Why it is not a file's name; names are 1 to 100 letters, digits and ._- and do not begin with a dot.
+  static Status checkName(const std::string& name);
+
+  /// Written beside it, brought to the disk, and renamed: whoever reads finds the old file or the new one. On failure
+  /// (kFailed: the disk refuses) the old one is still there.
+  Status write(const std::string& name, std::string_view bytes) const;
+  /// Refuses kUnreadable (missing, no regular file, a link to one elsewhere: kForbidden, longer than `most_bytes`)
+  /// before memory is taken.
+  Result<std::string> read(const std::string& name, std::size_t most_bytes) const;
+  bool has(const std::string& name) const;
+  void remove(const std::string& name) const;
+  Status rename(const std::string& from, const std::string& to) const;
+
+  /// A file to append to, that did not exist: `name`, or where that is taken name.2, name.3 ... The caller closes it.
+  struct NewFile {
+    int descriptor = -1;
+    std::string name;
+  };
+  Result<NewFile> create(const std::string& name) const;
+
+ private:
+  Status make() const;
+  std::string pathOf(const std::string& name) const { return folder_ + "/" + name; }
+  std::string folder_;
+};
+
+/// All of it; an error says why not, with errno's words.
+Status writeAll(int descriptor, std::string_view bytes);
+
+}  // namespace meshless

@@ -1,0 +1,85 @@
+// What outlives the node: saved states, the autosave, the log of commands. All files are below one folder.
+#pragma once
+
+#include <condition_variable>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "meshless_surgery/io/session_folder.h"
+#include "meshless_surgery/ros/runner.h"
+#include "meshless_surgery/world/saved_world.h"
+
+namespace meshless {
+
+struct SessionSettings {
+  std::string folder;
+  double autosave_period = 0.0;  // [s] of simulated time; 0: none
+  std::string autosave_name;     // of the file
+  std::string origin;            // an autosave of another origin is not taken up
+  std::string command_log;       // a file's name; empty: none
+};
+
+class Session {
+ public:
+  explicit Session(SessionSettings settings);
+  ~Session();
+
+  /// Before the runner has the world: takes up an autosave that a process of the same origin left behind when it was
+  /// killed, and says so; empty where there is none.
+  std::string takeUp(World& world);
+  /// Likewise: opens the log of commands. Refuses where the disk does.
+  Result<std::string> startLog(World& world);
+
+  /// From now on autosaves are made, of that runner's world.
+  void start(WorldRunner& runner);
+  /// Ends the log, by the runner, which still has to run.
+  void endLog(WorldRunner& runner);
+  /// After the runner has stopped. The autosave goes: whoever stops in good order wants to begin anew.
+  void stop();
+
+  /// The state as it is now, in a file; how many bytes it has.
+  Result<std::size_t> save(WorldRunner& runner, const std::string& name);
+  /// Becomes a state from a file, with its scene; on an error nothing has changed.
+  struct Loaded {
+    std::size_t bytes = 0;
+    std::uint64_t step = 0;
+    std::size_t bodies = 0;
+  };
+  Result<Loaded> load(WorldRunner& runner, const std::string& name);
+
+  /// On the runner's thread, after every step and every job; see WorldRunner::StepSink.
+  void changed(const World& world, double dt);
+
+ private:
+  void saveLoop();
+  void writeLoop();
+  void append(std::string bytes);
+
+  const SessionSettings settings_;
+  const SessionFolder folder_;
+  WorldRunner* runner_ = nullptr;
+
+  // autosaves: copied by the runner, written by a thread of their own
+  double since_save_ = 0.0;   // [s] simulated
+  double since_check_ = 0.0;  // [s] simulated, since the last hash in the log
+  std::mutex save_mutex_;
+  std::condition_variable save_wanted_;
+  SavedWorldPtr to_save_;
+  bool unsaved_ = false;  // something has changed since the last copy
+  std::uint64_t steps_seen_ = 0;
+  bool stopping_ = false;
+  std::thread saver_;
+
+  // the log
+  std::mutex log_mutex_;
+  std::condition_variable log_grown_;
+  std::string log_buffer_;
+  int log_file_ = -1;
+  std::string log_name_;
+  bool log_failed_ = false;
+  bool log_ending_ = false;
+  std::thread logger_;
+};
+
+}  // namespace meshless

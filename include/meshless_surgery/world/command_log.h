@@ -1,0 +1,35 @@
+// A session as a file: the state at its start, every command with the step before which it came, and hashes on the way.
+// World::record writes it; replay does it again and compares.
+#pragma once
+
+#include <functional>
+#include <iosfwd>
+#include <optional>
+
+#include "meshless_surgery/world/world.h"
+
+namespace meshless {
+
+struct ReplayReport {
+  std::uint64_t steps = 0;      // done
+  std::uint64_t commands = 0;   // of all kinds: resets and loaded states too
+  std::uint64_t checks = 0;     // hashes compared
+  std::uint64_t last_step = 0;  // the world's count at the end
+  std::uint64_t hash = 0;       // at the end
+  bool ended = false;  // the recording was ended; else its process was: what came after the last record is lost
+  std::uint64_t lost_bytes = 0;  // at the end of the file, of a record that was not written in full
+
+  /// The first hash that is not the recorded one; what follows was still done.
+  struct Difference {
+    std::uint64_t step = 0, recorded = 0, found = 0;
+  };
+  std::optional<Difference> difference;
+};
+
+/// Refuses (kUnreadable) what World::record did not write. The same build gives the same hashes on any number of
+/// threads (1..64). A damaged record in the middle ends the replay with an error.
+/// `after_step` may look at the world, and must not change it.
+Result<ReplayReport> replay(std::istream& log, int threads = 1,
+                            const std::function<void(World& world)>& after_step = {});
+
+}  // namespace meshless

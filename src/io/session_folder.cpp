@@ -1,0 +1,174 @@
+#include "meshless_surgery/io/session_folder.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "meshless_surgery/io/files.h"
+
+namespace meshless {
+namespace {
+
+constexpr std::size_t kLongestName = 100;
+constexpr int kMostNumbered = 9999;  // files of one name
+
+Error refused(const std::string& what, const std::string& path, int error) {
+  return {ErrorCode::kFailed, "cannot " + what + " '" + path + "': " + std::strerror(error)};
+}
+
+/// Closed when it goes out of scope.
+class Descriptor {
+ public:
+  explicit Descriptor(int descriptor) : descriptor_(descriptor) {}
+  ~Descriptor() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int get() const { return descriptor_; }
+  /// The errors of a late write come with close.
+  bool close() { return ::close(std::exchange(descriptor_, -1)) == 0; }
+
+ private:
+  int descriptor_;
+};
+
+}  // namespace
+
+Status writeAll(int descriptor, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return Error{ErrorCode::kFailed, std::strerror(errno)};
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return Done{};
+}
+
+Status SessionFolder::checkName(const std::string& name) {
+  const auto plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
+           c == '-';
+  };
+  if (!name.empty() && name.size() <= kLongestName && name.front() != '.' &&
+      std::all_of(name.begin(), name.end(), plain))
+    return Done{};
+  std::string shown = name.substr(0, kLongestName);
+  std::replace_if(
+      shown.begin(), shown.end(), [&](char c) { return !plain(c) && c != '/' && c != ' '; }, '?');
+  return Error{ErrorCode::kInvalidArgument, "file is '" + shown + (name.size() > shown.size() ? "...'" : "'") +
+                                                "; accepted: a name of 1 to " + std::to_string(kLongestName) +
+                                                " letters, digits and ._- that does not begin with a dot, no path"};
+}
+
+Status SessionFolder::make() const {
+  if (folder_.empty())
+    return Error{ErrorCode::kForbidden, "no session directory is set; accepted: the parameter session_directory"};
+  std::error_code failed;
+  std::filesystem::create_directories(folder_, failed);
+  if (!std::filesystem::is_directory(folder_, failed))
+    return Error{ErrorCode::kFailed, "cannot make the folder '" + folder_ + "'" +
+                                         (failed ? ": " + failed.message() : std::string(": it is no folder"))};
+  return Done{};
+}
+
+Status SessionFolder::write(const std::string& name, std::string_view bytes) const {
+  if (Status valid = checkName(name); !valid) return valid;
+  if (Status made = make(); !made) return made;
+  const std::string path = pathOf(name);
+  // Of this process and this call: two who save at once do not mix.
+  static std::atomic<unsigned> calls{0};
+  const std::string temporary =
+      folder_ + "/." + name + "." + std::to_string(::getpid()) + "-" + std::to_string(++calls) + ".part";
+  Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0644));
+  if (file.get() < 0) return refused("write", path, errno);
+  Status written = writeAll(file.get(), bytes);
+  if (!written)
+    written = Error{ErrorCode::kFailed, "cannot write '" + path + "': " + written.error().detail};
+  else if (::fsync(file.get()) != 0)
+    written = refused("write", path, errno);
+  if (!file.close() && written) written = refused("write", path, errno);
+  if (written && ::rename(temporary.c_str(), path.c_str()) != 0) written = refused("write", path, errno);
+  if (!written) {
+    ::unlink(temporary.c_str());
+    return written;
+  }
+  // The new name itself; some file systems cannot, and then have it already.
+  const Descriptor folder(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (folder.get() >= 0) (void)::fsync(folder.get());
+  return Done{};
+}
+
+Result<std::string> SessionFolder::read(const std::string& name, std::size_t most_bytes) const {
+  if (Status valid = checkName(name); !valid) return valid.error();
+  if (folder_.empty())
+    return Error{ErrorCode::kForbidden, "no session directory is set; accepted: the parameter session_directory"};
+  FileAccess access;
+  access.folders = {folder_};
+  const Result<std::string> path = access.resolve(name, folder_);
+  if (!path) return path.error();
+  // Not a pipe that was put there meanwhile: opening one would wait.
+  const Descriptor file(::open(path->c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  struct stat info {};
+  if (file.get() < 0 || ::fstat(file.get(), &info) != 0)
+    return Error{ErrorCode::kUnreadable, "cannot read '" + name + "': " + std::strerror(errno)};
+  if (!S_ISREG(info.st_mode))
+    return Error{ErrorCode::kUnreadable, "'" + name + "' is no file; accepted: a regular file"};
+  if (static_cast<std::uint64_t>(info.st_size) > most_bytes)
+    return Error{ErrorCode::kUnreadable, "'" + name + "' has " + std::to_string(info.st_size) +
+                                             " bytes; accepted: up to " + std::to_string(most_bytes)};
+  std::string bytes;
+  try {
+    bytes.resize(static_cast<std::size_t>(info.st_size));
+  } catch (const std::bad_alloc&) {
+    return Error{ErrorCode::kFailed, "there is not enough memory for '" + name + "'"};
+  }
+  std::size_t have = 0;
+  while (have < bytes.size()) {
+    const ssize_t got = ::read(file.get(), bytes.data() + have, bytes.size() - have);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return Error{ErrorCode::kUnreadable, "cannot read '" + name + "': " + std::strerror(errno)};
+    if (got == 0) break;
+    have += static_cast<std::size_t>(got);
+  }
+  bytes.resize(have);
+  return bytes;
+}
+
+bool SessionFolder::has(const std::string& name) const {
+  struct stat info {};
+  return !folder_.empty() && ::lstat(pathOf(name).c_str(), &info) == 0;
+}
+
+void SessionFolder::remove(const std::string& name) const {
+  if (!folder_.empty() && checkName(name)) ::unlink(pathOf(name).c_str());
+}
+
+Status SessionFolder::rename(const std::string& from, const std::string& to) const {
+  if (Status valid = checkName(from); !valid) return valid;
+  if (Status valid = checkName(to); !valid) return valid;
+  if (::rename(pathOf(from).c_str(), pathOf(to).c_str()) != 0) return refused("rename", pathOf(from), errno);
+  return Done{};
+}
+
+Result<SessionFolder::NewFile> SessionFolder::create(const std::string& name) const {
+  if (Status valid = checkName(name); !valid) return valid.error();
+  if (Status made = make(); !made) return made.error();
+  for (int number = 1; number <= kMostNumbered; ++number) {
+    const std::string numbered = number == 1 ? name : name + "." + std::to_string(number);
+    const int descriptor =
+        ::open(pathOf(numbered).c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW | O_APPEND, 0644);
+    if (descriptor >= 0) return NewFile{descriptor, numbered};
+    if (errno != EEXIST) return refused("write", pathOf(numbered), errno);
+  }
+  return Error{ErrorCode::kFailed,
+               "there are " + std::to_string(kMostNumbered) + " files '" + pathOf(name) + ".N' already; remove some"};
+}
+
+}  // namespace meshless

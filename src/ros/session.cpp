@@ -1,0 +1,206 @@
+#include "meshless_surgery/ros/session.h"
+
+#include <unistd.h>
+
+#include <chrono>
+
+#include <ros/console.h>
+
+namespace meshless {
+namespace {
+
+constexpr double kCheckEvery = 1.0;                            // [s] simulated between two hashes in the log
+constexpr std::chrono::milliseconds kSaveAfterChange{500};     // while time stands still
+constexpr std::chrono::milliseconds kWriteEvery{200};          // so much of the log is lost when the node is killed
+constexpr std::size_t kWriteAtOnce = 1 << 20;                  // bytes
+constexpr std::size_t kMostBuffered = std::size_t{256} << 20;  // bytes that a slow disk may be behind
+constexpr double kWarnEvery = 10.0;                            // [s]
+
+const std::string kAutosave = "autosave_";  // how the names of autosaves begin
+const std::string kBefore = ".before";      // of an autosave that was not taken up
+
+}  // namespace
+
+Session::Session(SessionSettings settings) : settings_(std::move(settings)), folder_(settings_.folder) {}
+
+Session::~Session() { stop(); }
+
+std::string Session::takeUp(World& world) {
+  if (!(settings_.autosave_period > 0.0) || !folder_.has(settings_.autosave_name)) return "";
+  const std::string& name = settings_.autosave_name;
+  const auto setAside = [&](const std::string& why) {
+    const Status moved = folder_.rename(name, name + kBefore);
+    ROS_WARN_STREAM(
+        "the autosave " << name << " in " << folder_.folder() << " is not taken up: " << why
+                        << (moved.ok() ? "; it is kept as " + name + kBefore : "; " + moved.error().detail));
+    return std::string();
+  };
+  const auto bytes = folder_.read(name, kMostStateBytes);
+  if (!bytes.ok()) return setAside(bytes.error().detail);
+  const auto decoded = decode(*bytes);
+  if (!decoded.ok()) return setAside(decoded.error().detail);
+  if (decoded->origin != settings_.origin) return setAside("it is of another scene or launch");
+  world.restore(*decoded->world);
+  return "took up the session from the autosave at step " + std::to_string(world.stepCount()) + ", " +
+         std::to_string(world.simTime()) + " s";
+}
+
+Result<std::string> Session::startLog(World& world) {
+  if (settings_.command_log.empty()) return std::string();
+  const auto file = folder_.create(settings_.command_log);
+  if (!file.ok()) return file.error();
+  log_file_ = file->descriptor;
+  log_name_ = file->name;
+  logger_ = std::thread([this] { writeLoop(); });
+  world.record([this](std::string bytes) { append(std::move(bytes)); });
+  return file->name;
+}
+
+void Session::start(WorldRunner& runner) {
+  runner_ = &runner;
+  if (settings_.autosave_period > 0.0) saver_ = std::thread([this] { saveLoop(); });
+}
+
+void Session::endLog(WorldRunner& runner) {
+  if (logger_.joinable()) (void)runner.look([](World& world) { world.record(nullptr); });
+}
+
+void Session::stop() {
+  {
+    const std::lock_guard<std::mutex> lock(save_mutex_);
+    stopping_ = true;
+  }
+  save_wanted_.notify_all();
+  if (saver_.joinable()) {
+    saver_.join();
+    folder_.remove(settings_.autosave_name);
+  }
+  {
+    const std::lock_guard<std::mutex> lock(log_mutex_);
+    log_ending_ = true;
+  }
+  log_grown_.notify_all();
+  if (logger_.joinable()) logger_.join();
+  if (log_file_ >= 0) ::close(std::exchange(log_file_, -1));
+}
+
+Result<std::size_t> Session::save(WorldRunner& runner, const std::string& name) {
+  if (Status valid = SessionFolder::checkName(name); !valid.ok()) return valid.error();
+  if (name.compare(0, kAutosave.size(), kAutosave) == 0 || (!log_name_.empty() && name == log_name_))
+    return Error{ErrorCode::kForbidden, "file is '" + name + "', which the node itself writes; accepted: another name"};
+  SavedWorldPtr saved;
+  const Status done = runner.look([&](World& world) { saved = world.capture(); });
+  if (!done.ok()) return done.error();
+  const std::string bytes = encode(*saved, settings_.origin);
+  if (bytes.size() > kMostStateBytes) {
+    return Error{ErrorCode::kFailed, "the state has " + std::to_string(bytes.size()) + " bytes; accepted: up to " +
+                                         std::to_string(kMostStateBytes)};
+  }
+  if (Status written = folder_.write(name, bytes); !written.ok()) return written.error();
+  return bytes.size();
+}
+
+Result<Session::Loaded> Session::load(WorldRunner& runner, const std::string& name) {
+  const auto bytes = folder_.read(name, kMostStateBytes);
+  if (!bytes.ok()) return bytes.error();
+  const auto decoded = decode(*bytes);
+  if (!decoded.ok()) return Error{decoded.error().code, "'" + name + "': " + decoded.error().detail};
+  Loaded loaded;
+  loaded.bytes = bytes->size();
+  const Status done = runner.restore(decoded->world, [&](World& world) {
+    loaded.step = world.stepCount();
+    loaded.bodies = world.bodyCount();
+  });
+  if (!done.ok()) return done.error();
+  return loaded;
+}
+
+void Session::changed(const World& world, double dt) {
+  if (log_file_ >= 0) {
+    since_check_ += dt;
+    if (since_check_ >= kCheckEvery) {
+      since_check_ = 0.0;
+      world.recordHash();
+    }
+  }
+  if (!(settings_.autosave_period > 0.0)) return;
+  since_save_ += dt;
+  // Half a step early: so much is lost at most, whatever rounding does.
+  const bool due = since_save_ >= settings_.autosave_period - 0.5 * dt && dt > 0.0;
+  SavedWorldPtr saved;
+  if (due) {
+    since_save_ = 0.0;
+    saved = world.capture();
+  }
+  {
+    const std::lock_guard<std::mutex> lock(save_mutex_);
+    if (dt > 0.0) ++steps_seen_;
+    const bool known = unsaved_;
+    unsaved_ = !due;
+    if (due)
+      to_save_ = std::move(saved);  // of two that wait the newer one
+    else if (known)
+      return;
+  }
+  save_wanted_.notify_all();
+}
+
+// Once time stands still, what is not saved yet is saved a little later, all at once.
+void Session::saveLoop() {
+  while (true) {
+    SavedWorldPtr saved;
+    {
+      std::unique_lock<std::mutex> lock(save_mutex_);
+      save_wanted_.wait(lock, [this] { return stopping_ || to_save_ || unsaved_; });
+      if (!to_save_) {
+        const std::uint64_t seen = steps_seen_;
+        save_wanted_.wait_for(lock, kSaveAfterChange, [this] { return stopping_ || to_save_ != nullptr; });
+        if (!stopping_ && !to_save_ && seen != steps_seen_) continue;  // it runs: the period decides
+      }
+      if (stopping_) return;
+      saved = std::exchange(to_save_, nullptr);
+      if (!saved) unsaved_ = false;
+    }
+    if (!saved && !runner_->look([&](World& world) { saved = world.capture(); }).ok()) return;
+    const Status written = folder_.write(settings_.autosave_name, encode(*saved, settings_.origin));
+    if (!written.ok()) ROS_ERROR_STREAM_THROTTLE(kWarnEvery, "the autosave failed: " << written.error().detail);
+  }
+}
+
+void Session::append(std::string bytes) {
+  {
+    const std::lock_guard<std::mutex> lock(log_mutex_);
+    if (log_failed_) return;
+    if (log_buffer_.size() + bytes.size() > kMostBuffered && !log_buffer_.empty()) {
+      log_failed_ = true;
+      ROS_ERROR_STREAM("the log of commands ends here: the disk is too slow for it");
+      return;
+    }
+    log_buffer_ += bytes;
+    if (log_buffer_.size() < kWriteAtOnce) return;
+  }
+  log_grown_.notify_all();
+}
+
+void Session::writeLoop() {
+  while (true) {
+    std::string bytes;
+    bool ending = false;
+    {
+      std::unique_lock<std::mutex> lock(log_mutex_);
+      log_grown_.wait_for(lock, kWriteEvery, [this] { return log_ending_ || log_buffer_.size() >= kWriteAtOnce; });
+      bytes.swap(log_buffer_);
+      ending = log_ending_;
+    }
+    if (const Status written = writeAll(log_file_, bytes); !written.ok()) {
+      const std::lock_guard<std::mutex> lock(log_mutex_);
+      if (!log_failed_) ROS_ERROR_STREAM("the log of commands ends here: cannot write it: " << written.error().detail);
+      log_failed_ = true;  // what follows a gap could not be replayed
+      log_buffer_.clear();
+    }
+    if (ending) break;
+  }
+  (void)::fsync(log_file_);
+}
+
+}  // namespace meshless

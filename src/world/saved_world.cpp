@@ -1,0 +1,443 @@
+// A saved world as bytes, and back. Layout: magic (8 bytes), version (4), checksum of the payload (4), its length (8),
+// payload.
+#include "meshless_surgery/world/saved_world.h"
+
+#include <algorithm>
+
+#include <zlib.h>
+
+#include "meshless_surgery/geometry/measures.h"
+#include "saved_world_impl.h"
+
+namespace meshless {
+namespace {
+
+constexpr std::string_view kMagic = "MLSSTATE";
+constexpr std::uint32_t kVersion = 1;
+constexpr std::uint64_t kMostModels = 1u << 20;
+
+std::uint32_t checksum(std::string_view bytes) {
+  uLong sum = crc32_z(0, nullptr, 0);
+  return static_cast<std::uint32_t>(crc32_z(sum, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+Error unreadable(const std::string& why) {
+  return {ErrorCode::kUnreadable, "this is no state that can be read: " + why};
+}
+
+void require(bool holds, const std::string& fault) {
+  if (!holds) throw ArchiveFault(fault);
+}
+void requireNone(const std::string& fault) { require(fault.empty(), fault); }
+
+template <class T>
+bool allBelow(const std::vector<T>& values, std::size_t end) {
+  return std::all_of(values.begin(), values.end(), [end](T v) { return v < end; });
+}
+bool allBelowOrNone(const std::vector<Index>& values, std::size_t end) {
+  return std::all_of(values.begin(), values.end(), [end](Index v) { return v < end || v == kNoIndex; });
+}
+bool areRows(const std::vector<Index>& offsets, std::size_t rows, std::size_t entries) {
+  return offsets.size() == rows + 1 && offsets.front() == 0 && offsets.back() == entries &&
+         std::is_sorted(offsets.begin(), offsets.end());
+}
+bool areTriangles(const TriangleMesh& mesh) {
+  return (mesh.patches.empty() || mesh.patches.size() == mesh.triangles.size()) &&
+         std::all_of(mesh.triangles.begin(), mesh.triangles.end(), [&](const Triangle& t) {
+           return std::all_of(t.begin(), t.end(), [&](Index v) { return v < mesh.vertices.size(); });
+         });
+}
+
+template <class Archive>
+void saveBody(Archive& archive, const SavedBody& body, std::uint32_t model) {
+  archive(body.id, body.number, body.name, body.material, model, body.state, body.surface_current, body.touched_by_push,
+          body.stiffness_factor, body.bounds, body.asleep, body.still_for, body.sleep_group, body.batch);
+}
+
+SavedBody loadBody(InArchive& archive, const ModelTable& models) {
+  SavedBody body;
+  std::uint32_t model = 0;
+  archive(body.id, body.number, body.name, body.material, model, body.state, body.surface_current, body.touched_by_push,
+          body.stiffness_factor, body.bounds, body.asleep, body.still_for, body.sleep_group, body.batch);
+  body.model = models.at(model);
+  requireNone(faultOf(*body.model, body.state));
+  requireNone(faultOf(*body.model, body.material));
+  return body;
+}
+
+// Everything but bodies, scene and obstacles.
+template <class Archive, class World>
+void rest(Archive& archive, World& world) {
+  archive(world.step, world.batches_current, world.batches, world.generations, world.free_slots, world.next_number,
+          world.used_names, world.picks, world.next_pick, world.push, world.scissors, world.closing, world.next_ticket,
+          world.next_sleep_group, world.contacts);
+}
+
+void checkSlots(const SavedWorld& world) {
+  std::set<std::uint32_t> slots, numbers;
+  std::set<std::string> names;
+  for (const SavedBody& body : world.bodies) {
+    require(body.id.slot < world.generations.size() && body.id.generation == world.generations[body.id.slot],
+            "body '" + body.name + "' has an id that is not in use");
+    require(slots.insert(body.id.slot).second, "two bodies have the same id");
+    require(names.insert(body.name).second && world.used_names.count(body.name), "a name is not in use");
+    require(numbers.insert(body.number).second && body.number < world.next_number, "a body's number is not in use");
+  }
+  for (const std::uint32_t slot : world.free_slots)
+    require(slot < world.generations.size() && slots.insert(slot).second, "a free place is not free");
+}
+
+void checkBatches(const SavedWorld& world) {
+  require(world.batches <= world.bodies.size(), "there are more batches than bodies");
+  std::vector<const SavedBody*> first(world.batches, nullptr);
+  for (const SavedBody& body : world.bodies) {
+    if (body.batch == kNoIndex) continue;
+    require(body.batch < world.batches, "a batch is not there");
+    const SavedBody*& of = first[body.batch];
+    if (!of) of = &body;
+    require(of->model->rest.size() == body.model->rest.size() && of->material.mode == body.material.mode &&
+                BodyBatch::holds(matchInput(*body.model, body.state)),
+            "body '" + body.name + "' does not fit into its batch");
+  }
+  for (const SavedBody* body : first) require(body != nullptr, "a batch is empty");
+}
+
+void checkTools(const SavedWorld& world) {
+  for (const Pick& pick : world.picks) {
+    require(!pick.patch.empty() && pick.patch.size() == pick.weights.size(), "a pick holds nothing");
+    for (const SavedBody& body : world.bodies)
+      if (body.id == pick.body)
+        require(pick.particle < body.model->rest.size() && allBelow(pick.patch, body.model->rest.size()),
+                "a pick holds a particle that is not there");
+  }
+  for (const ClosingCut& cut : world.closing) require(cut.done_at > cut.started_at, "blades close in no time");
+}
+
+SavedWorldPtr readWorld(InArchive& archive) {
+  auto world = std::make_shared<SavedWorld>();
+  archive(world->settings);
+  const Status settings = world->settings.validate();
+  if (!settings.ok()) throw ArchiveFault(settings.error().detail);
+  ModelTable models;
+  models.read(archive);
+  std::uint64_t count = 0;
+  archive(count);
+  archive.need(count, 1);
+  for (std::uint64_t i = 0; i < count; ++i) world->bodies.push_back(loadBody(archive, models));
+  archive(count);
+  archive.need(count, 1);
+  for (std::uint64_t i = 0; i < count; ++i) world->scene.push_back(loadPrepared(archive, models));
+  archive(count);
+  archive.need(count, 1);
+  std::set<std::string> names;
+  for (std::uint64_t i = 0; i < count; ++i) {
+    ObstacleDef obstacle;
+    archive(obstacle);
+    requireNone(faultOf(obstacle));
+    require(names.insert(obstacle.name).second, "two obstacles have the same name");
+    world->obstacles.push_back(std::make_shared<const ObstacleDef>(std::move(obstacle)));
+  }
+  rest(archive, *world);
+  archive(world->tetrahedralizations, world->last_substep);
+  require(archive.left() == 0, std::to_string(archive.left()) + " bytes are left over");
+  checkSlots(*world);
+  checkBatches(*world);
+  checkTools(*world);
+  std::map<std::uint64_t, ContactsMemory::KnownParty> parties;
+  for (const SavedBody& body : world->bodies) parties[body.number].triangles = body.model->surface.triangles.size();
+  for (std::size_t i = 0; i < world->obstacles.size(); ++i)
+    parties[kObstacleKey + i].triangles = world->obstacles[i]->mesh.triangles.size();
+  requireNone(world->contacts.fault(parties));
+  return world;
+}
+
+}  // namespace
+
+// --- checks
+
+std::string faultOf(const BodyModel& m) {
+  const std::size_t particles = m.rest.size(), clusters = m.clusters.size(), vertices = m.surface.vertices.size();
+  if (particles == 0) return "a body has no particles";
+  if (m.masses.size() != particles || m.match_masses.size() != particles || m.fixed.size() != particles)
+    return "a body's masses are not those of its particles";
+  for (std::size_t i = 0; i < particles; ++i)
+    if (!(m.masses[i] > 0.0) || !(m.match_masses[i] > 0.0)) return "a particle has no mass";
+  if (!areRows(m.graph.offsets, particles, m.graph.neighbours.size()) ||
+      m.graph.lengths.size() != m.graph.neighbours.size() || !allBelow(m.graph.neighbours, particles))
+    return "a body's graph is not that of its particles";
+  if (clusters == 0 || !areRows(m.clusters.offsets, clusters, m.clusters.members.size()) ||
+      m.clusters.weights.size() != m.clusters.members.size() || !allBelow(m.clusters.members, particles) ||
+      m.clusters.seeds.size() != clusters || m.clusters.radii.size() != clusters ||
+      !allBelowOrNone(m.clusters.seeds, particles))
+    return "a body's clusters are not those of its particles";
+  for (std::size_t c = 0; c < clusters; ++c)
+    if (m.clusters.offsets[c] == m.clusters.offsets[c + 1]) return "a cluster is empty";
+  if (m.shape.clusters.size() != clusters || (!m.shape.quadratic.empty() && m.shape.quadratic.size() != clusters) ||
+      (!m.elastic.empty() && m.elastic.size() != clusters))
+    return "a body's rest shape is not that of its clusters";
+  if (!areTriangles(m.surface)) return "a body's triangles are not those of its vertices";
+  const SurfaceBinding& b = m.binding;
+  if (b.particle.size() != vertices || !allBelowOrNone(b.particle, particles) || !allBelow(b.riders, vertices) ||
+      !std::is_sorted(b.riders.begin(), b.riders.end()) || !areRows(b.offsets, b.riders.size(), b.carriers.size()) ||
+      b.weights.size() != b.carriers.size() || !allBelow(b.carriers, particles) || b.levers.size() != b.riders.size() ||
+      b.turners.size() != b.riders.size() || !allBelow(b.lever_clusters, clusters))
+    return "a body's surface is not bound to its particles";
+  for (std::size_t r = 0; r < b.riders.size(); ++r)
+    if (!b.levers[r].isZero(0.0) && !(b.turners[r] < clusters)) return "a lever turns with no cluster";
+  return "";
+}
+
+std::string faultOf(const BodyModel& m, const BodyState& s) {
+  const std::size_t particles = m.rest.size(), clusters = m.clusters.size();
+  if (s.positions.size() != particles || s.velocities.size() != particles || s.poses.size() != clusters ||
+      s.surface.size() != m.surface.vertices.size() || (!s.plastic.empty() && s.plastic.size() != clusters) ||
+      s.rider_offsets.size() != m.binding.riders.size() || (!s.eased.empty() && s.eased.size() != particles))
+    return "a body's state is not that of its model";
+  return "";
+}
+
+std::string faultOf(const BodyModel& m, const Material& material) {
+  if (const Status valid = material.validate(); !valid.ok()) return valid.error().detail;
+  if (material.elastic() && !m.elastic_batch) return "an elastic body has no rest shape for it";
+  if (!material.elastic() && material.mode == MatchMode::kQuadratic && m.shape.quadratic.empty())
+    return "a quadratic body has no rest shape for it";
+  return "";
+}
+
+std::string faultOf(const ObstacleDef& obstacle) {
+  if (!areTriangles(obstacle.mesh)) return "an obstacle's triangles are not those of its vertices";
+  const Status valid = checkObstacle(obstacle);
+  return valid.ok() ? "" : valid.error().detail;
+}
+
+// --- models
+
+std::uint32_t ModelTable::add(const BodyModelPtr& model) {
+  const auto [known, is_new] = places_.emplace(model.get(), static_cast<std::uint32_t>(models_.size()));
+  if (is_new) models_.push_back(model);
+  return known->second;
+}
+
+const BodyModelPtr& ModelTable::at(std::uint32_t place) const {
+  require(place < models_.size(), "a body's model is not there");
+  return models_[place];
+}
+
+void ModelTable::read(InArchive& archive) {
+  std::uint64_t count = 0;
+  archive(count);
+  archive.need(count, 1);
+  require(count <= kMostModels, "it claims " + std::to_string(count) + " models");
+  for (std::uint64_t i = 0; i < count; ++i) readOne(archive);
+}
+
+void ModelTable::readOne(InArchive& archive) {
+  auto model = std::make_shared<BodyModel>();
+  archive(*model);
+  requireNone(faultOf(*model));
+  if (!model->elastic.empty())
+    model->elastic_batch = std::make_shared<ElasticBatch>(matchInput(*model), model->elastic);
+  add(model);
+}
+
+void savePrepared(OutArchive& archive, const PreparedBody& body, std::uint32_t model) {
+  archive(body.def, model, body.state);
+}
+
+std::shared_ptr<const PreparedBody> loadPrepared(InArchive& archive, const ModelTable& models) {
+  auto body = std::make_shared<PreparedBody>();
+  std::uint32_t model = 0;
+  archive(body->def, model, body->state);
+  body->model = models.at(model);
+  requireNone(faultOf(*body->model, body->state));
+  requireNone(faultOf(*body->model, body->def.material));
+  return body;
+}
+
+// --- the whole
+
+std::string encode(const SavedWorld& world, const std::string& origin) {
+  std::string bytes(kStateHeaderBytes, '\0');
+  OutArchive archive(bytes);
+  archive(origin, world.settings);
+  ModelTable models;
+  for (const SavedBody& body : world.bodies) models.add(body.model);
+  for (const auto& body : world.scene) models.add(body->model);
+  archive(static_cast<std::uint64_t>(models.models().size()));
+  for (const BodyModelPtr& model : models.models()) archive(*model);
+  archive(static_cast<std::uint64_t>(world.bodies.size()));
+  for (const SavedBody& body : world.bodies) saveBody(archive, body, models.add(body.model));
+  archive(static_cast<std::uint64_t>(world.scene.size()));
+  for (const auto& body : world.scene) savePrepared(archive, *body, models.add(body->model));
+  archive(static_cast<std::uint64_t>(world.obstacles.size()));
+  for (const auto& obstacle : world.obstacles) archive(*obstacle);
+  rest(archive, world);
+  archive(world.tetrahedralizations, world.last_substep);
+
+  std::string header;
+  OutArchive head(header);
+  head.put(kMagic.data(), kMagic.size());
+  const std::string_view payload = std::string_view(bytes).substr(kStateHeaderBytes);
+  head(kVersion, checksum(payload), static_cast<std::uint64_t>(payload.size()));
+  bytes.replace(0, kStateHeaderBytes, header);
+  return bytes;
+}
+
+Result<DecodedWorld> decode(std::string_view bytes) {
+  if (bytes.substr(0, kMagic.size()) != kMagic)
+    return unreadable("it does not begin with " + std::string(kMagic) + ", as states do");
+  if (bytes.size() < kStateHeaderBytes)
+    return unreadable("it has " + std::to_string(bytes.size()) + " bytes; accepted: at least " +
+                      std::to_string(kStateHeaderBytes));
+  DecodedWorld decoded;
+  try {
+    InArchive head(bytes.substr(kMagic.size()));
+    std::uint32_t version = 0, sum = 0;
+    std::uint64_t length = 0;
+    head(version, sum, length);
+    if (version != kVersion)
+      return unreadable("it is of version " + std::to_string(version) + "; accepted: " + std::to_string(kVersion));
+    const std::string_view payload = bytes.substr(kStateHeaderBytes);
+    if (payload.size() != length)
+      return unreadable("it holds " + std::to_string(payload.size()) + " bytes of " + std::to_string(length) +
+                        (payload.size() < length ? ": it was cut off" : ": something follows"));
+    if (checksum(payload) != sum) return unreadable("its checksum is wrong: it was damaged");
+    InArchive archive(payload);
+    archive(decoded.origin);
+    decoded.world = readWorld(archive);
+  } catch (const ArchiveFault& fault) {
+    return unreadable(fault.what());
+  } catch (const std::bad_alloc&) {
+    return unreadable("there is not enough memory for it");
+  }
+  return decoded;
+}
+
+// --- World
+
+std::shared_ptr<const SavedWorld> World::capture() const {
+  const Impl& w = *impl_;
+  auto saved = std::make_shared<SavedWorld>();
+  saved->settings = w.settings;
+  saved->step = w.step;
+  std::map<const WorldBody*, std::uint32_t> batch_of;
+  for (std::size_t i = 0; i < w.batches.size(); ++i)
+    for (const WorldBody* body : w.batches[i].bodies) batch_of[body] = static_cast<std::uint32_t>(i);
+  saved->batches_current = w.batches_current;
+  saved->batches = w.batches_current ? static_cast<std::uint32_t>(w.batches.size()) : 0;
+  for (const auto& body : w.bodies) {
+    const auto batch = batch_of.find(body.get());
+    saved->bodies.push_back({body->id, body->number, body->name, body->material, body->model, body->state,
+                             body->surface_current, body->touched_by_push, body->stiffness_factor, body->bounds,
+                             body->asleep, body->still_for, body->sleep_group,
+                             w.batches_current && batch != batch_of.end() ? batch->second : kNoIndex});
+  }
+  saved->generations = w.generations;
+  saved->free_slots = w.free_slots;
+  saved->next_number = w.next_number;
+  saved->used_names = w.used_names;
+  saved->scene = w.scene;
+  for (const auto& obstacle : w.obstacles) saved->obstacles.push_back(obstacle->def);
+  saved->picks = w.picks;
+  saved->next_pick = w.next_pick;
+  saved->push = w.push;
+  saved->scissors = w.scissors;
+  saved->closing = w.closing;
+  saved->next_ticket = w.next_ticket;
+  saved->tetrahedralizations = w.tetrahedralizations;
+  saved->next_sleep_group = w.next_sleep_group;
+  saved->last_substep = w.last_substep;
+  saved->contacts = w.contacts.memory();
+  return saved;
+}
+
+void World::restore(const SavedWorld& saved) {
+  Impl& w = *impl_;
+  w.recordState(saved);
+  const int threads = w.settings.threads;  // the machine's, not the state's
+  w.settings = saved.settings;
+  w.settings.threads = threads;
+  for (const ClosingCut& c : w.closing)
+    w.finished.emplace(c.ticket, Error{ErrorCode::kFailed, "another state was loaded before the blades met"});
+  w.batches.clear();
+  w.bodies.clear();
+  w.contact_models.clear();
+  for (const SavedBody& from : saved.bodies) {
+    auto body = std::make_unique<WorldBody>();
+    body->id = from.id;
+    body->number = from.number;
+    body->name = from.name;
+    body->material = from.material;
+    body->model = from.model;
+    body->state = from.state;
+    body->surface_current = from.surface_current;
+    body->touched_by_push = from.touched_by_push;
+    body->stiffness_factor = from.stiffness_factor;
+    body->bounds = from.bounds;
+    body->asleep = from.asleep;
+    body->still_for = from.still_for;
+    body->sleep_group = from.sleep_group;
+    w.bodies.push_back(std::move(body));
+  }
+  // Who was matched together then is not who would be grouped now.
+  w.batches_current = saved.batches_current;
+  std::vector<std::vector<WorldBody*>> groups(saved.batches);
+  for (std::size_t b = 0; b < saved.bodies.size(); ++b)
+    if (saved.bodies[b].batch != kNoIndex) groups[saved.bodies[b].batch].push_back(w.bodies[b].get());
+  for (std::vector<WorldBody*>& group : groups) w.addBatch(std::move(group));
+  w.generations = saved.generations;
+  w.free_slots = saved.free_slots;
+  w.next_number = saved.next_number;
+  w.used_names = saved.used_names;
+  w.scene = saved.scene;
+  w.obstacles.clear();
+  for (const auto& obstacle : saved.obstacles) w.obstacles.push_back(std::make_unique<WorldObstacle>(*obstacle));
+  w.picks = saved.picks;
+  w.next_pick = saved.next_pick;
+  w.push = saved.push;
+  w.scissors = saved.scissors;
+  w.closing = saved.closing;
+  w.next_ticket = saved.next_ticket;
+  w.tetrahedralizations = saved.tetrahedralizations;
+  w.next_sleep_group = saved.next_sleep_group;
+  w.last_substep = saved.last_substep;
+  w.step = saved.step;
+  w.undo.clear();
+  w.report = StepReport();
+  w.awake.clear();
+  w.loaded.clear();
+  w.parties.clear();
+  w.contacts_current = false;
+  w.contacts.recall(saved.contacts);
+  ++w.run;
+  w.say(EventType::kLoaded, "", 0, "a saved state was loaded");
+}
+
+// Ids and numbers go on growing over resets, which bring back the same world: they are left out.
+std::uint64_t World::stateHash() const {
+  const auto saved = capture();
+  HashArchive archive;
+  archive(saved->step, saved->batches_current, saved->batches, saved->used_names, saved->push, saved->scissors);
+  // Of a model, which is constant, its size and mass.
+  for (const SavedBody& body : saved->bodies) {
+    archive(body.name, body.material, body.state, body.touched_by_push, body.stiffness_factor, body.bounds, body.asleep,
+            body.still_for, body.sleep_group, body.batch);
+    archive(body.model->mass, static_cast<std::uint64_t>(body.model->rest.size()),
+            static_cast<std::uint64_t>(body.model->surface.triangles.size()),
+            static_cast<std::uint64_t>(body.model->clusters.members.size()));
+  }
+  for (Pick pick : saved->picks) {
+    const auto held = std::find_if(saved->bodies.begin(), saved->bodies.end(),
+                                   [&](const SavedBody& body) { return body.id == pick.body; });
+    pick.body = BodyId{static_cast<std::uint32_t>(held - saved->bodies.begin()), 0};
+    archive(pick);
+  }
+  for (ClosingCut cut : saved->closing) {
+    cut.ticket = 0;
+    archive(cut);
+  }
+  archive(saved->next_sleep_group, saved->contacts);
+  return archive.hash();
+}
+
+}  // namespace meshless

@@ -1,0 +1,263 @@
+// What a saved world holds, and how every part of it is written. Structured bindings name every field of a struct: one
+// that is added and not kept does not compile.
+#pragma once
+
+#include "meshless_surgery/base/archive.h"
+#include "meshless_surgery/contact/contacts_memory.h"
+#include "meshless_surgery/world/saved_world.h"
+#include "world_impl.h"
+
+namespace meshless {
+
+struct SavedBody {
+  BodyId id;
+  std::uint32_t number = 0;
+  std::string name;
+  Material material;
+  BodyModelPtr model;
+  BodyState state;
+  bool surface_current = true;
+  bool touched_by_push = false;
+  double stiffness_factor = 1.0;
+  Box bounds;
+  bool asleep = false;
+  double still_for = 0.0;
+  std::uint32_t sleep_group = 0;
+  std::uint32_t batch = kNoIndex;  // which of World::Impl::batches it is in
+};
+
+struct SavedWorld {
+  WorldSettings settings;
+  std::uint64_t step = 0;
+  std::vector<SavedBody> bodies;
+  bool batches_current = false;
+  std::uint32_t batches = 0;
+  std::vector<std::uint32_t> generations, free_slots;
+  std::uint32_t next_number = 1;
+  std::set<std::string> used_names;
+  std::vector<std::shared_ptr<const PreparedBody>> scene;
+  std::vector<std::shared_ptr<const ObstacleDef>> obstacles;
+  std::vector<Pick> picks;
+  PickId next_pick = 1;
+  PushSphere push;
+  Scissors scissors;
+  std::vector<ClosingCut> closing;
+  std::uint32_t next_ticket = 1;
+  std::uint64_t tetrahedralizations = 0;
+  std::uint32_t next_sleep_group = 1;
+  double last_substep = 0.0;
+  ContactsMemory contacts;
+};
+
+// Writing goes over constant values: cereal takes the const away and hands them to serialize(), which only reads then.
+
+template <class A>
+void serialize(A& archive, BodyId& v) {
+  auto& [slot, generation] = v;
+  archive(slot, generation);
+}
+template <class A>
+void serialize(A& archive, Pose& v) {
+  auto& [rotation, translation] = v;
+  archive(rotation, translation);
+}
+template <class A>
+void serialize(A& archive, Box& v) {
+  auto& [min, max] = v;
+  archive(min, max);
+}
+template <class A>
+void serialize(A& archive, Color& v) {
+  auto& [r, g, b, a] = v;
+  archive(r, g, b, a);
+}
+template <class A>
+void serialize(A& archive, TriangleMesh& v) {
+  auto& [vertices, triangles, patches] = v;
+  archive(vertices, triangles, patches);
+}
+template <class A>
+void serialize(A& archive, ResponseCurve& v) {
+  auto& [points] = v;
+  archive(points);
+}
+template <class A>
+void serialize(A& archive, Plasticity& v) {
+  auto& [yield, creep, maximum] = v;
+  archive(yield, creep, maximum);
+}
+template <class A>
+void serialize(A& archive, Material& v) {
+  auto& [name, youngs_modulus, poissons_ratio, mode, alpha, beta, density, damping, friction, restitution, self_contact,
+         volume, area, plasticity, color, inside_color] = v;
+  archive(name, youngs_modulus, poissons_ratio, choice(mode, MatchMode::kQuadratic), alpha, beta, density, damping,
+          friction, restitution, choice(self_contact, SelfContact::kAll), volume, area, plasticity, color,
+          inside_color);
+}
+template <class A>
+void serialize(A& archive, WorldSettings& v) {
+  auto& [gravity, ground, ground_friction, step_rate, substeps, max_substeps, contact, threads, sleep,
+         pick_max_distance, pick_stiffness, pick_radius, push_radius] = v;
+  archive(gravity, ground, ground_friction, step_rate, substeps, max_substeps,
+          choice(contact, ContactMethod::kRestShape), threads, sleep, pick_max_distance, pick_stiffness, pick_radius,
+          push_radius);
+}
+
+// --- models
+
+template <class A>
+void serialize(A& archive, ParticleGraph& v) {
+  auto& [offsets, neighbours, lengths] = v;
+  archive(offsets, neighbours, lengths);
+}
+template <class A>
+void serialize(A& archive, ClusterSet& v) {
+  auto& [offsets, members, weights, seeds, radii] = v;
+  archive(offsets, members, weights, seeds, radii);
+}
+template <class A>
+void serialize(A& archive, ClusterRest& v) {
+  auto& [mass, centre, size, linear_rank, quadratic_rank, moment_inverse] = v;
+  archive(mass, centre, size, linear_rank, quadratic_rank, moment_inverse);
+}
+template <class A>
+void serialize(A& archive, QuadraticRest& v) {
+  auto& [mean, moment_inverse] = v;
+  archive(mean, moment_inverse);
+}
+template <class A>
+void serialize(A& archive, RestShape& v) {
+  auto& [clusters, quadratic] = v;
+  archive(clusters, quadratic);
+}
+template <class A>
+void serialize(A& archive, ElasticRest& v) {
+  auto& [spread_inverse, spread] = v;
+  archive(spread_inverse, spread);
+}
+template <class A>
+void serialize(A& archive, SurfaceBinding& v) {
+  auto& [particle, riders, offsets, carriers, weights, levers, turners, lever_clusters, bound] = v;
+  archive(particle, riders, offsets, carriers, weights, levers, turners, lever_clusters, bound);
+}
+/// elastic_batch is made again by whoever reads, once all is checked; nullptr until then.
+template <class A>
+void serialize(A& archive, BodyModel& v) {
+  auto& [rest, masses, match_masses, fixed, any_fixed, graph, clusters, shape, elastic, elastic_batch,
+         most_spread_inverse, specific_stiffness, highest_frequency, surface, binding, solid, lips, spacing,
+         rest_volume, rest_area, mass, next_patch] = v;
+  (void)elastic_batch;
+  std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
+  archive(rest, masses, match_masses, held, any_fixed, graph, clusters, shape, elastic, most_spread_inverse,
+          specific_stiffness, highest_frequency, surface, binding, solid, lips, spacing, rest_volume, rest_area, mass,
+          next_patch);
+  if constexpr (std::is_same_v<A, InArchive>) {
+    fixed.clear();
+    for (const std::uint8_t h : held) fixed.push_back(h != 0);
+  }
+}
+
+// --- states
+
+template <class A>
+void serialize(A& archive, ClusterPose& v) {
+  auto& [centre, rotation, deformation] = v;
+  archive(centre, rotation, deformation);
+}
+template <class A>
+void serialize(A& archive, PlasticShape& v) {
+  auto& [stretch, inverse, stiffening] = v;
+  archive(stretch, inverse, stiffening);
+}
+template <class A>
+void serialize(A& archive, BodyState& v) {
+  auto& [positions, velocities, poses, surface, swelling, stretch, plastic, rider_offsets, eased, eased_for,
+         eased_whole] = v;
+  // Where the surface is depends on who looked when, what follows does not.
+  if constexpr (!std::is_same_v<A, HashArchive>) archive(surface);
+  archive(positions, velocities, poses, swelling, stretch, plastic, rider_offsets, eased, eased_for, eased_whole);
+}
+template <class A>
+void serialize(A& archive, ClusterOptions& v) {
+  auto& [kind, grid, count, overlap] = v;
+  archive(choice(kind, ClusterOptions::Kind::kCells), grid, count, overlap);
+}
+template <class A>
+void serialize(A& archive, BodyDef& v) {
+  auto& [name, mesh, solid, pose, spacing, clusters, material, fixed, copy, notes] = v;
+  archive(name, mesh, solid, pose, spacing, clusters, material, fixed, copy, notes);
+}
+template <class A>
+void serialize(A& archive, ObstacleDef& v) {
+  auto& [name, mesh, friction, color] = v;
+  archive(name, mesh, friction, color);
+}
+
+// --- tools and commands
+
+template <class A>
+void serialize(A& archive, Blades& v) {
+  auto& [origin, x_axis, y_axis, length, width] = v;
+  archive(origin, x_axis, y_axis, length, width);
+}
+template <class A>
+void serialize(A& archive, Blade& v) {
+  auto& [origin, x_axis, y_axis, length, depth] = v;
+  archive(origin, x_axis, y_axis, length, depth);
+}
+template <class A>
+void serialize(A& archive, Pick& v) {
+  auto& [id, body, particle, patch, weights, offset, target, locked, stiffness, position, force] = v;
+  archive(id, body, particle, patch, weights, offset, target, locked, stiffness, position, force);
+}
+template <class A>
+void serialize(A& archive, PushSphere& v) {
+  auto& [enabled, radius, position, target, speed, streamed, touching, force] = v;
+  archive(enabled, radius, position, target, speed, streamed, touching, force);
+}
+template <class A>
+void serialize(A& archive, Scissors& v) {
+  auto& [shown, blades, angle] = v;
+  archive(shown, blades, angle);
+}
+template <class A>
+void serialize(A& archive, CutCommand& v) {
+  auto& [blades, close_time, roughness, bodies] = v;
+  archive(blades, close_time, roughness, bodies);
+}
+template <class A>
+void serialize(A& archive, ClosingCut& v) {
+  auto& [ticket, command, done_at, start_angle, started_at] = v;
+  archive(ticket, command, done_at, start_angle, started_at);
+}
+
+// --- checks of what was read
+
+/// Empty where every size fits and every index is in range; else what does not.
+std::string faultOf(const BodyModel& model);
+std::string faultOf(const BodyModel& model, const BodyState& state);
+/// The material's needs of its model.
+std::string faultOf(const BodyModel& model, const Material& material);
+std::string faultOf(const ObstacleDef& obstacle);
+
+/// Models by their place in a file; those that bodies share are written once.
+class ModelTable {
+ public:
+  std::uint32_t add(const BodyModelPtr& model);
+  const std::vector<BodyModelPtr>& models() const { return models_; }
+  /// Throws ArchiveFault for one that is not there.
+  const BodyModelPtr& at(std::uint32_t place) const;
+  /// Reads, checks and completes them.
+  void read(InArchive& archive);
+  void readOne(InArchive& archive);
+
+ private:
+  std::vector<BodyModelPtr> models_;
+  std::map<const BodyModel*, std::uint32_t> places_;
+};
+
+/// A prepared body with its model.
+void savePrepared(OutArchive& archive, const PreparedBody& body, std::uint32_t model);
+std::shared_ptr<const PreparedBody> loadPrepared(InArchive& archive, const ModelTable& models);
+
+}  // namespace meshless

@@ -1,0 +1,390 @@
+#!/usr/bin/env python3
+"""Every service and input topic with structured random requests, and mesh files that lie: the node answers each call, a
+refusal has a message and changes nothing, and what is accepted leaves finite tissue. MESHLESS_SURGERY_FUZZ_CALLS sets
+the number of calls, MESHLESS_SURGERY_FUZZ_SEED the seed."""
+import math
+import os
+import random
+import shutil
+import struct
+import sys
+import tempfile
+import time
+import unittest
+
+import rospy
+from geometry_msgs.msg import Point, PoseStamped, Quaternion, Vector3
+from meshless_surgery.msg import State
+from sensor_msgs.msg import JointState
+from shape_msgs.msg import SolidPrimitive
+from std_msgs.msg import Header
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from deformer_support import LONG, TYPES, OwnNode, pose_stamped, run  # noqa: E402
+
+SCENES = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'scenes')
+CALLS = int(os.environ.get('MESHLESS_SURGERY_FUZZ_CALLS') or 2500)
+SEED = int(os.environ.get('MESHLESS_SURGERY_FUZZ_SEED') or 1)
+HANG = 30.0  # [s]; the machine may be loaded. The longest call is printed.
+# [bytes] that the node may take on the way: requests of 100 MB are among them, and its threads keep what they have had.
+MOST_MEMORY = 2 << 30
+LARGE_STRING = 'x' * 10000000
+
+NUMBERS = (0.0, -0.0, 1.0, -1.0, 0.1, 0.05, 0.01, -0.01, 1e-6, 1e-12, 1e-320, 1e6, 1e9, 1e18, 1e154, 1e308, -1e308,
+           math.nan, math.inf, -math.inf)
+
+
+def mesh_files(folder, outside):
+    """Files that claim more than they have, or other things than they are: none of them is a body."""
+    files = {
+        'vertices.ply': b'ply\nformat ascii 1.0\nelement vertex 4294967295\nproperty float x\nproperty float y\n'
+                        b'property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n'
+                        b'0 0 0\n',
+        'binary.ply': b'ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\n'
+                      b'property float y\nproperty float z\nend_header\n' + bytes(120),
+        'list.ply': b'ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\n'
+                    b'property float z\nelement face 1\nproperty list int int vertex_indices\nend_header\n' +
+                    bytes(36) + struct.pack('<i', 2000000000),
+        'negative.ply': b'ply\nformat ascii 1.0\nelement vertex -5\nproperty float x\nend_header\n',
+        'count.stl': bytes(80) + struct.pack('<I', 0xffffffff) + bytes(100),
+        'cut_off.stl': bytes(80) + struct.pack('<I', 12) + bytes(200),
+        'points.pcd': b'VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 4294967295\nHEIGHT 1\n'
+                      b'VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 4294967295\nDATA binary\n' + bytes(64),
+        'height.pcd': b'VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 65536\nHEIGHT 65536\n'
+                      b'VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 0\nDATA ascii\n0 0 0\n',
+        'fields.pcd': b'VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1000000000\nWIDTH 3\nHEIGHT 1\n'
+                      b'POINTS 3\nDATA binary\n' + bytes(64),
+        'compressed.pcd': b'VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 3\nHEIGHT 1\n'
+                          b'POINTS 3\nDATA binary_compressed\n' + struct.pack('<II', 0xfffffff0, 0xfffffff0) +
+                          bytes(64),
+        'points.vtk': b'# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 4294967295 float\n0 0 0\n',
+        'polygons.vtk': b'# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 1 0 0 0 1 0\n'
+                        b'POLYGONS 1000000000 2147483647\n3 0 1 2\n',
+        'index.obj': b'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4000000000\n',
+        'negative.obj': b'v 0 0 0\nv 1 0 0\nv 0 1 0\nf -1 -2 -9\n',
+        'nan.obj': b'v nan 0 0\nv 1 inf 0\nv 0 1 0\nf 1 2 3\n',
+        'line.obj': b'v 0 0 0' + b' 0' * 2000000 + b'\n',
+        'empty.obj': b'', 'empty.ply': b'', 'empty.stl': b'', 'empty.pcd': b'', 'empty.vtk': b'',
+        'noise.obj': bytes(range(256)) * 400, 'noise.ply': b'ply\n' + bytes(range(256)) * 400,
+        'noise.stl': bytes(range(256)) * 400, 'noise.pcd': b'VERSION .7\n' + bytes(range(256)) * 400,
+        'noise.vtk': b'# vtk DataFile Version 3.0\n' + bytes(range(256)) * 400,
+        'scene.yaml': b'a: &a [1]\n',
+    }
+    for name, data in files.items():
+        with open(os.path.join(folder, name), 'wb') as file:
+            file.write(data)
+    with open(os.path.join(folder, 'sparse.stl'), 'wb') as file:
+        file.truncate(1 << 40)
+    os.mkdir(os.path.join(folder, 'folder.obj'))
+    os.mkfifo(os.path.join(folder, 'pipe.obj'))
+    with open(os.path.join(outside, 'secret.obj'), 'wb') as file:
+        file.write(b'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n')
+    os.symlink(os.path.join(outside, 'secret.obj'), os.path.join(folder, 'link.obj'))
+    return [os.path.join(folder, name) for name in sorted(os.listdir(folder))]
+
+
+def yaml_bombs():
+    bomb = 'a0: &a0 [x, x, x, x, x, x, x, x, x]\n' + ''.join(
+        'a%d: &a%d [%s]\n' % (i, i, ', '.join(['*a%d' % (i - 1)] * 9)) for i in range(1, 30))
+    return [bomb, '[' * 60000, '{a: ' * 15000, '- ' * 30000, '&a [*a]', '<<: *x', '!!binary x', 'alpha: ' + '9' * 60000,
+            '"' + 'a' * 60000, 'x' * 70000, LARGE_STRING, '{alpha: .nan}', '{alpha: 1e999}', '{density: -1}', 'alpha',
+            '\0', '{alpha: 0.3, alpha: 0.4}', '? ? ? ?', '{volume: [[0, 1], [0, 1]]}', '%YAML 9.9\n---\na',
+            '---\n---\n']
+
+
+class Fuzzer:
+
+    def __init__(self, rng, files, names):
+        self.rng = rng
+        self.files = files
+        self.names = names
+        self.strings = ['', 'left', 'right', 'middle', 'left.1', 'left.2', 'no_such', '/', '../..', 'a/b',
+                        '/etc/passwd', 'package://meshless_surgery/config/meshes/fish.obj', 'package://', 'ä' * 200, 'x\n\0y',
+                        'x' * 300, '%s%n%d', ' ', 'world', '/world', 'no_such_frame', 'default', 'soft', 'box'] + names
+        self.picks = [0]
+
+    def number(self):
+        if self.rng.random() < 0.6:
+            return self.rng.uniform(-0.3, 0.3)
+        if self.rng.random() < 0.5:
+            return self.rng.choice(NUMBERS)
+        return math.copysign(10.0 ** self.rng.uniform(-320, 308), self.rng.random() - 0.5)
+
+    def string(self):
+        if self.rng.random() < 0.004:
+            return LARGE_STRING
+        if self.rng.random() < 0.1:
+            return ''.join(chr(self.rng.randint(1, 0x2fff)) for _ in range(self.rng.randint(0, 40)))
+        return self.rng.choice(self.strings)
+
+    def stamp(self):
+        if self.rng.random() < 0.5:
+            return rospy.Time(0)
+        now = rospy.Time.now().to_sec()
+        return rospy.Time.from_sec(self.rng.choice([now, now - 3600.0, now + 3600.0, 1.0, 4e9]))
+
+    def header(self):
+        frame = self.rng.choice(['', 'world', '/world']) if self.rng.random() < 0.7 else self.string()
+        return Header(frame_id=frame, stamp=self.stamp())
+
+    def quaternion(self):
+        kind = self.rng.random()
+        if kind < 0.5:
+            q = [self.rng.gauss(0, 1) for _ in range(4)]
+            norm = math.sqrt(sum(v * v for v in q))
+            return Quaternion(*[v / norm for v in q])
+        if kind < 0.7:
+            return Quaternion(0, 0, 0, 1)
+        return Quaternion(*[self.number() for _ in range(4)])
+
+    def pose(self):
+        stamped = PoseStamped(header=self.header())
+        stamped.pose.position = self.point()
+        stamped.pose.orientation = self.quaternion()
+        return stamped
+
+    def point(self):
+        if self.rng.random() < 0.6:
+            return Point(self.rng.uniform(-0.3, 0.3), self.rng.uniform(-0.1, 0.1), self.rng.uniform(0, 0.15))
+        return Point(self.number(), self.number(), self.number())
+
+    def vector(self):
+        if self.rng.random() < 0.5:
+            return Vector3(0, 0, 0)
+        return Vector3(self.number(), self.number(), self.number())
+
+    def list_of_names(self):
+        if self.rng.random() < 0.7:
+            return []
+        return [self.string() for _ in range(self.rng.choice([1, 1, 2, 5, 2000]))]
+
+    def pick_id(self):
+        return self.rng.choice([self.rng.choice(self.picks), self.picks[-1], 0, 0xffffffff])
+
+    def primitive(self):
+        if self.rng.random() < 0.6:
+            return SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[self.rng.uniform(0.02, 0.2) for _ in range(3)])
+        return SolidPrimitive(type=self.rng.choice([0, 1, 2, 3, 4, 255]),
+                              dimensions=[self.number() for _ in range(self.rng.randint(0, 5))])
+
+    def request(self, service):
+        """Fields of a call: sensible ones, and others."""
+        r = self.rng
+        if service == 'pick':
+            return dict(header=self.header(), point=self.point(), direction=self.vector(), body=self.maybe_name(),
+                        max_distance=r.choice([0.0, self.number()]), stiffness=r.choice([0.0, self.number()]))
+        if service == 'move_pick':
+            return dict(header=self.header(), pick_id=self.pick_id(), target=self.point())
+        if service == 'lock':
+            return dict(header=self.header(), pick_id=self.pick_id(), at_target=r.random() < 0.5, target=self.point())
+        if service == 'release':
+            return dict(pick_id=self.pick_id())
+        if service == 'push':
+            return dict(enable=r.random() < 0.8, radius=r.choice([0.0, self.number()]), pose=self.pose(),
+                        speed=r.choice([0.0, self.number()]))
+        if service == 'cut':
+            return dict(blades=self.pose(), length=r.choice([0.0, self.number()]), width=r.choice([0.0, self.number()]),
+                        close_time=r.choice([0.0, self.number()]), roughness=r.choice([0.0, 0.0, self.number()]),
+                        bodies=self.list_of_names())
+        if service == 'incise':
+            return dict(blade=self.pose(), length=abs(self.number()), depth=self.number(), bodies=self.list_of_names())
+        if service == 'spawn':
+            return dict(name=self.string(), file=r.choice(['', '', self.string(), r.choice(self.files)]),
+                        primitive=self.primitive(), pose=self.pose(), scale=r.choice([0.0, 1.0, self.number()]),
+                        material=r.choice(['', 'soft', self.string()]))
+        if service in ('remove', 'get_body'):
+            fields = dict(name=self.maybe_name())
+            if service == 'get_body':
+                fields['rest'] = r.random() < 0.5
+            return fields
+        if service == 'set_material':
+            yaml = r.choice(yaml_bombs()) if r.random() < 0.3 else '{%s: %s}' % (
+                r.choice(['alpha', 'beta', 'mode', 'density', 'youngs_modulus', 'friction', 'damping', 'colour',
+                          'volume']),
+                r.choice([self.number(), self.string()[:200], '[1, 2]', '[[0, 0.5]]', '{}']))
+            return dict(body=self.maybe_name(), yaml=yaml)
+        if service == 'probe':
+            return dict(header=self.header(), point=self.point(), direction=self.vector())
+        if service == 'step':
+            return dict(steps=r.choice([0, 1, 2, 3, 100001, 0xffffffff]))
+        if service == 'pause':
+            return dict(data=True)
+        if service in ('save', 'load'):
+            return dict(file=r.choice(['state', 'other', self.string()]))
+        return {}
+
+    def maybe_name(self):
+        return self.rng.choice(['', 'left', 'right', 'middle', self.string(), self.string()])
+
+
+class FuzzCase(unittest.TestCase):
+
+    def setUp(self):
+        self.folder = tempfile.mkdtemp(prefix='meshless_fuzz_')
+        for name in ('meshes', 'outside', 'session'):
+            os.mkdir(os.path.join(self.folder, name))
+        self.files = mesh_files(os.path.join(self.folder, 'meshes'), os.path.join(self.folder, 'outside'))
+        self.node = OwnNode(scene=os.path.join(SCENES, 'fuzz.yaml'), paused=True,
+                            data_folders=[os.path.join(self.folder, 'meshes')],
+                            session_directory=os.path.join(self.folder, 'session')).wait()
+        self.proxies = {}
+        self.longest = (0.0, '')
+        self.times = {}
+
+    def tearDown(self):
+        self.node.__exit__()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def call(self, service, **fields):
+        if service not in self.proxies:
+            self.proxies[service] = rospy.ServiceProxy(self.node.name + '/' + service, TYPES[service], persistent=True)
+        began = time.monotonic()
+        try:
+            answer = self.proxies[service](**fields)
+        except (rospy.ServiceException, rospy.exceptions.TransportException) as fault:
+            code = self.node.process.poll()
+            self.fail('~%s %.300r: %s; %s' % (service, fields, fault, 'the node has ended with %s: %s' % (
+                code, self.node.output()[-2000:]) if code is not None else 'the node lives'))
+        took = time.monotonic() - began
+        self.longest = max(self.longest, (took, service))
+        count, total = self.times.get(service, (0, 0.0))
+        self.times[service] = (count + 1, total + took)
+        self.assertLess(took, HANG, '~%s %.300r' % (service, fields))
+        return answer
+
+    def memory(self):
+        with open('/proc/%d/status' % self.node.process.pid, encoding='utf-8') as status:
+            for line in status:
+                if line.startswith('VmHWM:'):
+                    return 1024 * int(line.split()[1])
+        raise AssertionError('no VmHWM')
+
+
+class ServicesTest(FuzzCase):
+
+    def test_refused_calls_change_nothing(self):
+        rng = random.Random(SEED)
+        fuzzer = Fuzzer(rng, self.files, ['guest', 'other'])
+        services = sorted(set(TYPES) - {'hash'})
+        refused = accepted = 0
+        self.call('save', file='state')
+        before = self.call('hash').hash
+        for number in range(CALLS):
+            service = rng.choice(services) if number % 250 else 'reset'
+            fields = fuzzer.request(service)
+            answer = self.call(service, **fields)
+            said = 'call %d: ~%s %.300r: %s' % (number, service, fields, answer.message[:300])
+            self.assertNotEqual('', answer.message, said)
+            self.assertLess(len(answer.message), 5000, said)
+            after = self.call('hash').hash
+            if answer.success:
+                accepted += 1
+                if service == 'pick':
+                    fuzzer.picks.append(answer.pick_id)
+                if service in ('get_body', 'probe', 'pause', 'save'):
+                    self.assertEqual(before, after, said)
+            else:
+                refused += 1
+                self.assertEqual(before, after, said)
+            before = after
+        print('fuzz: %d calls, %d refused, the longest %.2f s (~%s), memory %d MB; calls and seconds by service: %s' % (
+            CALLS, refused, self.longest[0], self.longest[1], self.memory() >> 20,
+            ', '.join('%s %d %.1f' % (name, *self.times[name]) for name in sorted(self.times))))
+        self.assertLess(self.memory(), MOST_MEMORY)
+        self.assertGreater(refused, CALLS // 10)
+        self.assertGreater(accepted, CALLS // 10)
+        self.finite()
+
+    def finite(self):
+        self.call('reset')
+        self.call('step', steps=10)
+        for name in ('left', 'right', 'middle'):
+            body = self.call('get_body', name=name)
+            self.assertTrue(body.success)
+            self.assertTrue(math.isfinite(body.volume) and math.isfinite(body.area))
+
+
+class FilesTest(FuzzCase):
+
+    def test_files_that_lie_are_refused(self):
+        before = self.call('hash').hash
+        for file in self.files:
+            answer = self.call('spawn', name='', file=file, scale=1.0, pose=pose_stamped())
+            self.assertFalse(answer.success, file)
+            self.assertNotEqual('', answer.message, file)
+            self.assertEqual(before, self.call('hash').hash, file)
+        self.assertLess(self.memory(), MOST_MEMORY)
+
+    def test_yaml_bombs_are_refused(self):
+        before = self.call('hash').hash
+        for bomb in yaml_bombs():
+            answer = self.call('set_material', body='left', yaml=bomb)
+            self.assertFalse(answer.success, bomb[:100])
+            self.assertNotEqual('', answer.message)
+            self.assertEqual(before, self.call('hash').hash, bomb[:100])
+        self.assertLess(self.memory(), MOST_MEMORY)
+
+    def test_scene_files_that_lie_are_refused(self):
+        meshes = os.path.join(self.folder, 'meshes')
+        scenes = ['bodies: [{primitive: {box: [1, 1, 1]}, copies: {count: 4000000000, grid: [65536, 65536, 1]}}]',
+                  'bodies: [{primitive: {box: [0.1, 0.1, 0.1], edge: 1e-9}}]',
+                  'bodies: [{primitive: {box: [0.1, 0.1, 0.1]}, spacing: 1e-9}]',
+                  'bodies: [{primitive: {box: [0.1, 0.1, 0.1]}, clusters: {grid: [2000000000, 2000000000, 2]}}]',
+                  'bodies: [{file: vertices.ply}]', 'bodies: [{file: link.obj}]', 'bodies: [{file: /etc/passwd}]',
+                  'bodies: [{file: pipe.obj}]'] + [bomb for bomb in yaml_bombs() if len(bomb) < 100000]
+        for text in scenes:
+            path = os.path.join(meshes, 'hostile.yaml')
+            with open(path, 'w', encoding='utf-8') as file:
+                file.write(text)
+            node = OwnNode(scene=path)
+            try:
+                code = node.process.wait(LONG)
+                self.assertEqual(1, code, text[:100] + ': ' + node.output()[-500:])
+                self.assertIn('hostile.yaml', node.output(), text[:100])
+            finally:
+                node.__exit__()
+
+
+class TopicsTest(FuzzCase):
+
+    def test_streams(self):
+        rng = random.Random(SEED)
+        fuzzer = Fuzzer(rng, self.files, [])
+        topics = ['pick/servo_cp', 'push/servo_cp', 'scissors/servo_cp', 'scissors/jaw/servo_js']
+        publishers = [rospy.Publisher(self.node.name + '/' + topic, JointState if topic.endswith('js') else PoseStamped,
+                                      queue_size=10) for topic in topics]
+        end = time.monotonic() + LONG
+        while any(p.get_num_connections() == 0 for p in publishers) and time.monotonic() < end:
+            time.sleep(0.01)
+        states = []
+        subscriber = rospy.Subscriber(self.node.name + '/state', State, states.append, queue_size=10)
+        for number in range(CALLS):
+            publisher = rng.choice(publishers)
+            if publisher is publishers[3]:
+                message = JointState(header=fuzzer.header())
+                message.name = [fuzzer.string()[:1000] for _ in range(rng.randint(0, 3))]
+                message.position = [fuzzer.number() for _ in range(rng.choice([0, 1, 1, 1, 3, 10000]))]
+                message.effort = [fuzzer.number() for _ in range(rng.randint(0, 3))]
+            else:
+                message = fuzzer.pose()
+            if len(message.header.frame_id) > 1000 and number % 10:
+                message.header.frame_id = ''
+            publisher.publish(message)
+            if number % 20 == 0:
+                self.call('pick', point=Point(-0.2, 0, 0.1), max_distance=10.0)
+                self.assertTrue(self.call('step', steps=3).success)
+            if number % 200 == 199:
+                self.call('reset')
+        self.assertTrue(self.call('hash').success)
+        for topic, publisher in zip(topics, publishers):
+            publisher.unregister()
+        subscriber.unregister()
+        for state in states:
+            for body in state.bodies:
+                self.assertTrue(math.isfinite(body.kinetic_energy) and math.isfinite(body.centre_of_mass.z),
+                                '%s in step %d' % (body.name, state.step))
+        self.assertLess(self.memory(), MOST_MEMORY)
+
+
+if __name__ == '__main__':
+    run('fuzz', ServicesTest, FilesTest, TopicsTest)

@@ -1,0 +1,363 @@
+#!/usr/bin/env python3
+"""Saving, loading, the autosave and the log of commands: nothing is lost, and what is damaged is refused whole."""
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+import xmlrpc.client
+
+import roslib.packages
+import rosgraph
+import rospy
+from geometry_msgs.msg import Point
+from shape_msgs.msg import SolidPrimitive
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from deformer_support import ACROSS_X, LONG, Deformer, OwnNode, pose_stamped, run  # noqa: E402
+
+SCENES = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'scenes')
+BOXES = os.path.join(SCENES, 'boxes.yaml')
+FALLING = os.path.join(SCENES, 'falling.yaml')
+
+
+def box(size):
+    return SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[size, size, size])
+
+
+class SessionCase(unittest.TestCase):
+
+    def setUp(self):
+        self.folder = tempfile.mkdtemp(prefix='meshless_session_')
+
+    def tearDown(self):
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def node(self, prefix=(), **parameters):
+        settings = dict(scene=BOXES, paused=True, session_directory=self.folder)
+        settings.update(parameters)
+        return OwnNode(prefix, **settings)
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def read(self, name):
+        with open(self.path(name), 'rb') as file:
+            return file.read()
+
+    def write(self, name, data):
+        with open(self.path(name), 'wb') as file:
+            file.write(data)
+
+    def work(self, node):
+        """Something of everything, that goes on moving afterwards."""
+        pick = node.good('pick', point=Point(-0.15, 0.0, 0.1), max_distance=0.1)
+        node.good('move_pick', pick_id=pick.pick_id, target=Point(-0.1, 0.03, 0.15))
+        node.good('step', steps=10)
+        node.good('cut', blades=pose_stamped(0.2, -1.0, 0.1, ACROSS_X), bodies=['right'])
+        node.good('spawn', name='guest', primitive=box(0.06), pose=pose_stamped(0.0, 0.3, 0.1), scale=1.0)
+        node.good('set_material', body='guest', yaml='{alpha: 0.2}')
+        node.good('push', enable=True, radius=0.02, pose=pose_stamped(0.0, 0.3, 0.15))
+        node.good('push', enable=True, radius=0.02, pose=pose_stamped(0.0, 0.3, 0.05), speed=0.2)
+        node.good('step', steps=15)
+
+
+class SaveTest(SessionCase):
+
+    def test_it_goes_on_as_if_nothing_had_been(self):
+        with self.node() as node:
+            self.work(node)
+            answer = node.good('save', file='one.state')
+            self.assertIn('one.state', answer.message)
+            saved = node.hash()
+            node.good('step', steps=40)
+            later = node.hash()
+            self.assertNotEqual(saved, later)
+            node.good('load', file='one.state')
+            self.assertEqual(saved, node.hash())
+            node.good('step', steps=40)
+            self.assertEqual(later, node.hash())
+            self.assertEqual(['one.state'], os.listdir(self.folder))
+        # Another process, another scene, more of them at once.
+        with self.node(scene=FALLING) as other:
+            other.good('load', file='one.state')
+            self.assertEqual(saved, other.hash())
+            other.good('step', steps=40)
+            self.assertEqual(later, other.hash())
+            self.assertTrue(other.call('get_body', name='guest').success)
+            other.good('reset')
+            self.assertTrue(other.call('get_body', name='left').success)
+            self.assertFalse(other.call('get_body', name='guest').success)
+
+    def test_names_only(self):
+        with self.node() as node:
+            before = node.hash()
+            for name in ('', '.', '..', '../up', '/etc/passwd', 'a/b', '.hidden', 'a b', 'a\nb', 'x' * 101,
+                         'x' * 10000000):
+                for service in ('save', 'load'):
+                    answer = node.call(service, file=name)
+                    self.assertFalse(answer.success, repr(name[:50]))
+                    self.assertIn('accepted', answer.message)
+                    self.assertLess(len(answer.message), 3000)
+            self.assertFalse(node.call('save', file='autosave_x.state').success)
+            self.assertEqual([], os.listdir(self.folder))
+            self.assertEqual(before, node.hash())
+
+    def test_what_is_damaged_is_refused_whole(self):
+        with self.node() as node:
+            self.work(node)
+            node.good('save', file='good')
+            node.good('step', steps=5)
+            good = self.read('good')
+            before = node.hash()
+            self.write('cut_off', good[:len(good) // 2])
+            self.write('nothing', b'')
+            self.write('longer', good + b'x')
+            self.write('foreign', b'solid box\n' * 1000)
+            self.write('newer', good[:8] + b'\x07' + good[9:])
+            turned = bytearray(good)
+            turned[len(good) // 3] ^= 16
+            self.write('turned', bytes(turned))
+            os.mkfifo(self.path('pipe'))
+            os.mkdir(self.path('folder'))
+            with tempfile.NamedTemporaryFile() as outside:
+                outside.write(good)
+                outside.flush()
+                os.symlink(outside.name, self.path('link'))
+                for name in ('cut_off', 'nothing', 'longer', 'foreign', 'newer', 'turned', 'pipe', 'folder', 'link',
+                             'missing'):
+                    answer = node.call('load', file=name)
+                    self.assertFalse(answer.success, name)
+                    self.assertIn(name, answer.message)
+                    self.assertEqual(before, node.hash(), name)
+            self.assertTrue(node.call('load', file='good').success)
+
+    def test_a_full_disk_keeps_what_was_there(self):
+        with self.node() as node:
+            node.good('save', file='state')
+        old = self.read('state')
+        limit = str(len(old) // 2)
+        with self.node(prefix=('prlimit', '--fsize=%s:%s' % (limit, limit)), command_log='log') as node:
+            before = node.hash()
+            answer = node.call('save', file='state')
+            self.assertFalse(answer.success)
+            self.assertIn('state', answer.message)
+            self.assertEqual(before, node.hash())
+            self.assertEqual(old, self.read('state'))
+            self.assertEqual(['log', 'state'], sorted(os.listdir(self.folder)))
+            # The log of commands has ended, and says so; the node has not.
+            node.good('step', steps=10)
+            end = time.monotonic() + LONG
+            while 'log of commands ends here' not in node.output() and time.monotonic() < end:
+                time.sleep(0.1)
+            self.assertIn('log of commands ends here', node.output())
+            node.good('load', file='state')
+
+    def test_waiting_calls_are_answered(self):
+        with self.node(paused=False) as node:
+            node.good('save', file='state')
+            answers = []
+            thread = threading.Thread(target=lambda: answers.append(
+                node.call('cut', blades=pose_stamped(-1.0, 0.0, 0.1), close_time=50.0)))
+            thread.start()
+            time.sleep(0.5)
+            node.good('load', file='state')
+            thread.join(LONG)
+            self.assertFalse(answers[0].success)
+            self.assertIn('loaded', answers[0].message)
+
+
+class LogTest(SessionCase):
+
+    def replay(self, name, *arguments):
+        binary = roslib.packages.find_node('meshless_surgery', 'replay')[0]
+        return subprocess.run([binary, self.path(name)] + list(arguments), stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, universal_newlines=True, timeout=LONG, check=False)
+
+    def test_a_session_is_replayed_to_the_same_hash(self):
+        with self.node(command_log='log', paused=False) as node:
+            self.work(node)
+            time.sleep(0.5)
+            node.good('pause', data=True)
+            node.good('save', file='state')
+            node.good('reset')
+            self.work(node)
+            node.good('load', file='state')
+            self.work_again(node)
+            last = node.good('hash')
+            self.assertEqual(0, node.end(signal.SIGTERM))
+        for threads in ('1', '2'):
+            result = self.replay('log', '--threads', threads)
+            self.assertEqual(0, result.returncode, result.stdout)
+            self.assertIn('step %d hash %016x' % (last.step, last.hash), result.stdout)
+            self.assertNotIn('breaks off', result.stdout)
+
+    def work_again(self, node):
+        node.good('step', steps=20)
+        node.good('clear_picks')
+        node.good('remove', name='guest')
+        node.good('step', steps=20)
+
+    def test_a_kill_loses_the_last_second_at_most(self):
+        with self.node(command_log='log') as node:
+            self.work(node)
+            last = node.good('hash')
+            time.sleep(1.0)
+            node.end(signal.SIGKILL)
+        result = self.replay('log')
+        self.assertEqual(0, result.returncode, result.stdout)
+        self.assertIn('breaks off', result.stdout)
+        # A log knows of steps by what comes after them: up to the last command it is the same.
+        with self.node(command_log='log') as node:
+            self.work(node)
+            self.assertEqual(last.hash, node.hash())
+            node.end(signal.SIGINT)
+        second = self.replay('log.2')  # the first one is still there
+        self.assertEqual(0, second.returncode, second.stdout)
+        self.assertIn('hash %016x' % last.hash, second.stdout)
+
+    def test_what_is_no_log(self):
+        self.write('log', b'nothing of that kind')
+        self.assertEqual(2, self.replay('log').returncode)
+
+    def test_names_only(self):
+        node = self.node(command_log='../log')
+        self.assertNotEqual(0, node.process.wait(LONG))
+        self.assertIn('command_log', node.output())
+
+
+class SignalTest(SessionCase):
+
+    def test_it_ends_in_good_order_whatever_it_does(self):
+        """SIGTERM and SIGINT while it steps, cuts, saves and loads: exit code 0, and every file is whole."""
+        rng = random.Random(11)
+        sizes = set()
+        for turn in range(6):
+            number = (signal.SIGTERM, signal.SIGINT)[turn % 2]
+            with self.node(paused=False, autosave_period=0.05, command_log='log') as node:
+                node.good('save', file='first')
+                stop = threading.Event()
+
+                def ask(service, stop=stop, node=node, **fields):
+                    while not stop.is_set():
+                        try:
+                            node.call(service, **fields)
+                        except (rospy.ServiceException, rospy.ROSException, OSError):
+                            return
+
+                threads = [threading.Thread(target=ask, args=('save',), kwargs=dict(file='busy')),
+                           threading.Thread(target=ask, args=('load',), kwargs=dict(file='first')),
+                           threading.Thread(target=ask, args=('cut',),
+                                            kwargs=dict(blades=pose_stamped(-1.0, 0.0, 0.1))),
+                           threading.Thread(target=ask, args=('reset',))]
+                for thread in threads:
+                    thread.daemon = True
+                    thread.start()
+                time.sleep(rng.uniform(0.3, 1.0))
+                code = node.end(number)
+                stop.set()
+                self.assertEqual(0, code, node.output())
+            self.assertEqual([], [name for name in os.listdir(self.folder) if name.endswith('.part')])
+            self.assertEqual([], [name for name in os.listdir(self.folder) if name.startswith('autosave')])
+            if os.path.exists(self.path('busy')):
+                sizes.add(len(self.read('busy')))
+                with self.node() as node:
+                    node.good('load', file='busy')
+                    node.good('step', steps=2)
+            os.remove(self.path('log'))
+        self.assertGreater(len(sizes), 0)
+
+
+class RespawnTest(SessionCase):
+
+    def pid(self, name):
+        """The process behind a node, once it answers."""
+        end = time.monotonic() + LONG
+        while time.monotonic() < end:
+            try:
+                code, _, pid = xmlrpc.client.ServerProxy(rosgraph.Master('/test').lookupNode(name)).getPid('/test')
+                if code == 1:
+                    return pid
+            except (OSError, rosgraph.MasterError, xmlrpc.client.Error):
+                pass
+            time.sleep(0.1)
+        raise AssertionError('no node ' + name)
+
+    def test_after_a_kill_it_takes_up_from_the_last_autosave(self):
+        launch = subprocess.Popen(['roslaunch', 'meshless_surgery', 'training.launch', 'rviz:=false', 'scene:=' + BOXES,
+                                   'station:=kept', 'respawn:=true', 'session_directory:=' + self.folder],
+                                  stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            node = Deformer('/kept/deformer')
+            rospy.wait_for_service('/kept/deformer/spawn', LONG)
+            self.assertEqual(0.5, rospy.get_param('/kept/deformer/autosave_period'))
+            for turn in range(2):
+                answer = node.call('cut', blades=pose_stamped(-1.0, 0.0, 0.1, (0, 0, 0, 1)),
+                                   bodies=['left' if turn == 0 else 'right'])
+                self.assertTrue(answer.success, answer.message)
+                pieces = answer.new_bodies
+                self.assertTrue(node.call('step', steps=240).success)
+                self.assertTrue(node.call('pause', data=True).success)
+                time.sleep(2.0)  # a change while time stands still is saved too
+                before = node.call('hash')
+                pid = self.pid('/kept/deformer')
+                os.kill(pid, signal.SIGKILL)
+                end = time.monotonic() + LONG
+                while self.pid('/kept/deformer') == pid and time.monotonic() < end:
+                    time.sleep(0.1)
+                rospy.wait_for_service('/kept/deformer/spawn', LONG)
+                self.assertTrue(node.call('pause', data=True).success)
+                after = node.call('hash')
+                # It runs again since, so that it may be farther; it never begins more than a second before.
+                self.assertGreaterEqual(after.sim_time, before.sim_time - 1.0)
+                for piece in pieces:
+                    self.assertTrue(node.call('get_body', name=piece).success)
+                self.assertTrue(node.call('pause', data=False).success)
+        finally:
+            launch.send_signal(signal.SIGINT)
+            launch.wait(LONG)
+        self.assertEqual([], [name for name in os.listdir(self.folder) if name.startswith('autosave')])
+
+    def test_killed_at_any_time_it_loses_a_second_at_most(self):
+        rng = random.Random(5)
+        for turn in range(3):
+            node = self.node(paused=False, autosave_period=0.5).wait()
+            steps = node.good('step', steps=rng.randint(100, 400))
+            time.sleep(rng.uniform(0.0, 0.7))
+            before = node.good('hash')
+            self.assertGreater(steps.sim_time, 0.5)
+            node.end(signal.SIGKILL)
+            node.log.close()
+            OwnNode.count -= 1  # the same name
+            with self.node(paused=True, autosave_period=0.5) as again:
+                after = again.good('hash')
+                self.assertIn('took up the session from the autosave', again.output())
+                self.assertGreaterEqual(after.sim_time, before.sim_time - 1.0)
+                self.assertGreater(after.sim_time, 0.0)
+                self.assertEqual(0, again.end(signal.SIGTERM))
+
+    def test_an_autosave_of_another_scene_is_set_aside(self):
+        node = self.node(paused=True, autosave_period=0.1).wait()
+        node.good('step', steps=60)
+        time.sleep(1.0)
+        node.end(signal.SIGKILL)
+        name = 'autosave%s.state' % node.name.replace('/', '_')
+        whole = self.read(name)
+        node.log.close()
+        for scene, left in ((FALLING, whole), (BOXES, whole[:1000])):
+            self.write(name, left)
+            OwnNode.count -= 1
+            with self.node(scene=scene, autosave_period=0.1) as again:
+                self.assertEqual(0, again.good('hash').step)
+                self.assertIn('is not taken up', again.output())
+                self.assertEqual(left, self.read(name + '.before'))
+                self.assertEqual(0, again.end(signal.SIGTERM))
+
+
+if __name__ == '__main__':
+    run('session', SaveTest, LogTest, SignalTest, RespawnTest)

@@ -1,0 +1,230 @@
+#include "meshless_surgery/world/command_log.h"
+
+#include <sstream>
+
+#include "meshless_surgery/world/saved_world.h"
+#include "support/bodies.h"
+#include "support/random.h"
+
+namespace meshless {
+namespace {
+
+void run(World& world, int steps) {
+  for (int i = 0; i < steps; ++i) world.step();
+}
+
+/// A session with every command in it, some of them refused.
+struct Session {
+  std::string log;
+  std::vector<std::size_t> ends;  // of the pieces that the sink got
+  std::uint64_t hash = 0, steps = 0;
+};
+
+Session session(bool ended = true, int threads = 1) {
+  Session s;
+  WorldSettings settings;
+  settings.threads = threads;
+  World world(settings);
+  EXPECT_TRUE(world.addSceneBody(test::shared(test::ball())).ok());
+  run(world, 5);
+  world.record([&s](std::string bytes) {
+    s.log += bytes;
+    s.ends.push_back(s.log.size());
+  });
+  const auto apply = [&world](const Command& command, bool accepted = true) {
+    const auto reply = world.apply(command);
+    EXPECT_EQ(accepted, reply.ok()) << command.index() << (reply.ok() ? "" : ": " + reply.error().detail);
+  };
+  SpawnCommand spawn;
+  spawn.body = test::shared(test::block("block", Vec3(0.3, 0, 0.2)));
+  apply(spawn);
+  apply(spawn, false);
+  run(world, 10);
+  PickCommand pick;
+  pick.point = Vec3(0, 0, 0.25);
+  pick.max_distance = 0.2;
+  apply(pick);
+  pick.point = Vec3(9, 9, 9);
+  apply(pick, false);
+  MovePickCommand move;
+  move.pick = 1;
+  move.target = Vec3(0.1, 0, 0.4);
+  apply(move);
+  run(world, 10);
+  LockCommand lock;
+  lock.pick = 1;
+  apply(lock);
+  SetMaterialCommand material;
+  material.change = [](const Material& before) -> Result<Material> {
+    Material after = before;
+    after.alpha *= 0.5;
+    return after;
+  };
+  apply(material);
+  material.change = [](const Material&) -> Result<Material> { return Error{ErrorCode::kInvalidArgument, "no"}; };
+  apply(material, false);
+  PushCommand push;
+  push.position = Vec3(0.3, 0, 0.35);
+  push.radius = 0.05;
+  apply(push);
+  push.position = Vec3(0.3, 0, 0.1);
+  push.speed = 0.2;
+  apply(push);
+  world.recordHash();
+  run(world, 20);
+  CutCommand cut;
+  cut.blades.origin = Vec3(0.3, -1, 0.1);
+  cut.blades.x_axis = Vec3::UnitY();
+  cut.blades.y_axis = Vec3::UnitZ();
+  cut.roughness = 0.002;
+  cut.bodies = {"block"};
+  apply(cut);
+  run(world, 10);
+  apply(UndoCutCommand{});
+  run(world, 5);
+  cut.close_time = 0.1;
+  apply(cut);
+  run(world, 5);
+  apply(OpenScissorsCommand{});
+  apply(cut);
+  run(world, 30);
+  InciseCommand incise;
+  incise.blade.origin = Vec3(-0.3, 0, 0.5);
+  incise.blade.y_axis = Vec3::UnitZ();
+  incise.blade.length = 0.8;
+  incise.blade.depth = 0.3;
+  incise.bodies = {"ball"};
+  apply(incise);
+  world.setScissors(cut.blades, 0.3);
+  run(world, 5);
+  world.hideScissors();
+  const auto middle = world.capture();
+  LiftCommand lift;
+  lift.tool = ToolKind::kPush;
+  apply(lift);
+  ReleaseCommand release;
+  release.pick = 1;
+  apply(release);
+  apply(ClearPicksCommand{});
+  RemoveCommand remove;
+  remove.body = "ball";
+  apply(remove);
+  run(world, 10);
+  world.reset();
+  run(world, 10);
+  world.recordHash();
+  world.restore(*middle);
+  run(world, 25);
+  world.recordHash();
+  s.hash = world.stateHash();
+  s.steps = world.stepCount();
+  if (ended) world.record(nullptr);
+  return s;
+}
+
+Result<ReplayReport> replayed(const std::string& log, int threads = 1) {
+  std::istringstream stream(log);
+  return replay(stream, threads);
+}
+
+TEST(CommandLog, ReplaysToTheSameHash) {
+  const Session s = session();
+  for (const int threads : {1, 2}) {
+    const auto report = replayed(s.log, threads);
+    ASSERT_TRUE(report.ok()) << report.error().detail;
+    EXPECT_FALSE(report->difference.has_value());
+    EXPECT_EQ(s.hash, report->hash);
+    EXPECT_EQ(s.steps, report->last_step);
+    EXPECT_EQ(4u, report->checks);
+    EXPECT_GE(report->commands, 20u);
+    EXPECT_TRUE(report->ended);
+    EXPECT_EQ(0u, report->lost_bytes);
+  }
+}
+
+TEST(CommandLog, TheLogDoesNotChangeTheWorldAndIsTheSameAgain) {
+  const Session once = session(), again = session(true, 2);
+  EXPECT_EQ(once.hash, again.hash);
+  // The state at the start says how many threads there were, and that alone differs.
+  EXPECT_EQ(once.log.size(), again.log.size());
+}
+
+// A process that was killed leaves the pieces that were written, and maybe half of one.
+TEST(CommandLog, WhatWasWrittenBeforeAKillIsReplayed) {
+  const Session s = session(false);
+  const auto whole = replayed(s.log);
+  ASSERT_TRUE(whole.ok());
+  EXPECT_FALSE(whole->ended);
+  EXPECT_EQ(s.hash, whole->hash);
+  std::uint64_t before = 0;
+  for (std::size_t n = 1; n + 1 < s.ends.size(); n += 4) {
+    const auto part = replayed(s.log.substr(0, s.ends[n]));
+    ASSERT_TRUE(part.ok()) << part.error().detail;
+    EXPECT_FALSE(part->difference.has_value());
+    EXPECT_GE(part->commands, before);
+    before = part->commands;
+    const auto torn = replayed(s.log.substr(0, s.ends[n] + 5));
+    ASSERT_TRUE(torn.ok()) << torn.error().detail;
+    EXPECT_EQ(part->hash, torn->hash);
+    EXPECT_EQ(5u, torn->lost_bytes);
+  }
+}
+
+TEST(CommandLog, ADifferenceIsFound) {
+  Session s = session(false);
+  // Another command in the middle, with the right checksum: taken from a session that goes on differently.
+  World world{WorldSettings()};
+  EXPECT_TRUE(world.addSceneBody(test::shared(test::ball())).ok());
+  std::string log;
+  world.record([&log](std::string bytes) { log += bytes; });
+  run(world, 10);
+  world.recordHash();
+  World other{WorldSettings()};
+  EXPECT_TRUE(other.addSceneBody(test::shared(test::ball())).ok());
+  std::vector<std::string> pieces;
+  other.record([&pieces](std::string bytes) { pieces.push_back(std::move(bytes)); });
+  PushCommand push;
+  push.position = Vec3(0, 0, 0.3);
+  EXPECT_TRUE(other.apply(push).ok());
+  run(other, 10);
+  other.recordHash();
+  ASSERT_EQ(4u, pieces.size());
+  const auto same = replayed(pieces[0] + pieces[1] + pieces[2] + pieces[3]);
+  ASSERT_TRUE(same.ok());
+  EXPECT_FALSE(same->difference.has_value());
+  const auto without = replayed(pieces[0] + pieces[1] + pieces[3]);
+  ASSERT_TRUE(without.ok());
+  ASSERT_TRUE(without->difference.has_value());
+  EXPECT_EQ(10u, without->difference->step);
+  EXPECT_EQ(other.stateHash(), without->difference->recorded);
+  EXPECT_EQ(world.stateHash(), without->difference->found);
+}
+
+TEST(CommandLog, OtherFilesAndDamagedOnesAreRefused) {
+  const Session s = session();
+  for (const std::string& text :
+       {std::string(), std::string("MLSCOMN"), std::string("solid ball\n0 0 0\n0 0 0"), s.log.substr(0, 12)}) {
+    const auto report = replayed(text);
+    ASSERT_FALSE(report.ok());
+    EXPECT_NE(std::string::npos, report.error().detail.find("no log of commands"));
+  }
+  std::string newer = s.log;
+  newer[8] = 9;
+  EXPECT_NE(std::string::npos, replayed(newer).error().detail.find("version 9"));
+  test::Random random(3);
+  for (int i = 0; i < 40; ++i) {
+    // After the head, in any record but the last: a length that is wrong there is a checksum that is wrong.
+    std::string damaged = s.log;
+    const std::size_t at = 20 + static_cast<std::size_t>(random.uniform(0, 0.9) * static_cast<double>(s.log.size()));
+    damaged[at] = static_cast<char>(damaged[at] ^ (1 << random.integer(0, 7)));
+    const auto report = replayed(damaged);
+    if (report.ok()) {
+      EXPECT_GT(report->lost_bytes, 0u);  // a length that reaches beyond the end
+    } else {
+      EXPECT_FALSE(report.error().detail.empty());
+    }
+  }
+}
+
+}  // namespace
+}  // namespace meshless
