@@ -188,6 +188,7 @@ struct World::Impl {
   void wakeWithin(const Box& box);
   void wakePushed(double h_frame);
   void fallAsleep(double h_frame);
+  void mendFaults();
   void closeBlades();
   std::vector<WorldBody*> bodiesInContact(double h);
   int substepsNeeded(double h_frame) const;

@@ -100,6 +100,7 @@ void World::step() {
       if (rest_shape) w.liftOutOfGround(*body, h_frame);
       w.fadeRiderOffsets(*body, h_frame);
     }
+    w.mendFaults();
     for (Pick& pick : w.picks)
       if (const WorldBody* body = w.find(pick.body))
         pick.position = graspMean(pick, body->state.positions) + pick.offset;

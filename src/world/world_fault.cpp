@@ -1,0 +1,63 @@
+// The last line: a body whose coordinates are no numbers any more, or out of all bounds, starts anew from rest where it
+// was. Nothing is known to bring it about but what overflows, and a trainee's scene must outlive that too.
+#include <cmath>
+
+#include "world_impl.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kFarthest = 1e12;  // [m], and [m/s] of speeds
+
+// NaN fails it as well.
+bool withinBounds(const Points& points) {
+  for (const Vec3& p : points)
+    if (!(p.cwiseAbs().maxCoeff() < kFarthest)) return false;
+  return true;
+}
+
+void restAnew(WorldBody& body) {
+  const BodyModel& model = *body.model;
+  BodyState& state = body.state;
+  Box at_rest;
+  for (const Vec3& p : model.rest) at_rest.extend(p);
+  Vec3 shift = Vec3::Zero();
+  // Fixed particles are where they are at rest. Others stay about where they last were.
+  if (!model.any_fixed && body.bounds.min.cwiseAbs().maxCoeff() < kFarthest &&
+      body.bounds.max.cwiseAbs().maxCoeff() < kFarthest && !body.bounds.empty())
+    shift = 0.5 * (body.bounds.min + body.bounds.max) - 0.5 * (at_rest.min + at_rest.max);
+  for (std::size_t i = 0; i < model.rest.size(); ++i) state.positions[i] = model.rest[i] + shift;
+  state.velocities.assign(model.rest.size(), Vec3::Zero());
+  for (std::size_t c = 0; c < state.poses.size(); ++c) {
+    state.poses[c] = ClusterPose();
+    state.poses[c].centre = model.shape.clusters[c].centre + shift;
+  }
+  for (std::size_t v = 0; v < state.surface.size(); ++v) state.surface[v] = model.surface.vertices[v] + shift;
+  state.swelling = state.stretch = 1.0;
+  state.plastic.clear();
+  state.rider_offsets.assign(state.rider_offsets.size(), Vec3::Zero());
+  state.eased.clear();
+  state.eased_for = 0.0;
+}
+
+}  // namespace
+
+void World::Impl::mendFaults() {
+  bool any = false;
+  for (WorldBody* body : awake) {
+    if (withinBounds(body->state.positions) && withinBounds(body->state.velocities)) continue;
+    restAnew(*body);
+    body->surface_current = false;
+    body->still_for = 0.0;
+    any = true;
+    ++report.mended;
+    say(EventType::kFault, body->name, 0,
+        "the coordinates of " + body->name + " were not finite any more; it starts anew from rest");
+  }
+  if (!any) return;
+  contacts.clear();
+  contacts_current = false;
+  batches_current = false;
+}
+
+}  // namespace meshless
