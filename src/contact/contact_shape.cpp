@@ -11,7 +11,8 @@
 namespace meshless {
 namespace {
 
-constexpr double kBinEdges = 1.5;   // size of a bin in mean edges
+constexpr double kBinEdges = 3.0;   // size of a bin in mean edges
+constexpr double kFirstRing = 0.5;  // of a bin: how far is searched at first
 constexpr double kCellEdges = 0.5;  // size of a cell in mean edges
 constexpr double kMostBins = 1 << 18;
 constexpr double kMostCells = 1 << 19;
@@ -313,8 +314,9 @@ struct Best {
     if ((p - f.centre).squaredNorm() > bound * bound * (1.0 + kTie) + least_tie) return;
     const double over = f.normal.dot(p - f.a);
     if (over * over > squared + tie()) return;
+    if (f.triangle == found.triangle) return;
     const Measured m = measure(f, p);
-    if (m.squared > squared + tie() || f.triangle == found.triangle) return;
+    if (m.squared > squared + tie()) return;
     const bool nearer = m.squared < squared - tie();
     tied = !nearer;
     if (!(m.squared < squared)) return;
@@ -410,13 +412,16 @@ void ContactShape::visitNear(const Vec3& rest, double radius, const Visit& visit
   visitBins(box, visit);
 }
 
-bool ContactShape::searchBins(const Vec3& rest, Nearest& found) const {
+// `within` [m]: something is known to be so near; infinite where nothing is known.
+bool ContactShape::searchBins(const Vec3& rest, double within, Nearest& found) const {
   found.triangle = kNoIndex;
   Best best(size_);
+  best.distance = within;
+  best.squared = within * within;
   Box box;
   const Vec3 outside = (bounds_.min - rest).cwiseMax(rest - bounds_.max).cwiseMax(0.0);
   const double farthest = (bounds_.max - bounds_.min).norm() + outside.norm();
-  for (double radius = outside.norm() + 0.5 * bin_edge_;; radius *= 2.0) {
+  for (double radius = std::min(within, outside.norm() + kFirstRing * bin_edge_);; radius *= 2.0) {
     box.min = rest.array() - radius;
     box.max = rest.array() + radius;
     visitBins(box, [&](Index t) { best.offer(facets_[t], rest, found); });
@@ -450,7 +455,7 @@ double ContactShape::clearance(const Vec3& rest) const {
   float known = distances_[index].load(std::memory_order_relaxed);
   if (std::isnan(known)) {
     Nearest found;
-    const bool any = searchBins(centre, found);
+    const bool any = searchBins(centre, std::numeric_limits<double>::infinity(), found);
     known = any ? static_cast<float>(found.distance) : -std::numeric_limits<float>::infinity();
     distances_[index].store(known, std::memory_order_relaxed);  // whoever else asks finds the same
   }
@@ -466,7 +471,10 @@ bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
   if (known < kAsked) {
     std::uintptr_t asked = known;
     cells_[index].compare_exchange_strong(asked, known + 1, std::memory_order_acq_rel);
-    return searchBins(rest, found);
+    const double centre = distances_[index].load(std::memory_order_relaxed);
+    const Vec3 from = rest - (cell_origin_ + cell_edge_ * Vec3(at[0] + 0.5, at[1] + 0.5, at[2] + 0.5));
+    const double within = (1.0 + 1e-6) * (std::abs(centre) + from.norm()) + 1e-9 * size_;
+    return searchBins(rest, std::isfinite(within) ? within : std::numeric_limits<double>::infinity(), found);
   }
   const Cell* cell = known > kAsked ? reinterpret_cast<const Cell*>(known) : fill(index, at);
   Best best(size_);
@@ -543,6 +551,9 @@ double ContactShape::depthAlong(const Vec3& from, const Vec3& direction, double 
   box.extend(from);
   box.extend(from + longest * direction);
   visitBins(box, [&](Index t) {
+    const Vec3 to = facets_[t].centre - from;
+    const double along = to.dot(direction), reach = 1.01 * facets_[t].radius;
+    if (along - reach > depth || to.squaredNorm() - along * along > reach * reach) return;  // the ray passes it by
     double time;
     std::array<double, 3> weights;
     if (meets(surface_, t, from, direction, time, weights) && time > 1e-6 * longest && time < depth) depth = time;

@@ -79,7 +79,7 @@ class ContactShape {
   struct Cell;
   const Cell* fill(std::size_t index, const std::array<int, 3>& at) const;
   std::size_t cellAt(const Vec3& rest, std::array<int, 3>& at) const;
-  bool searchBins(const Vec3& rest, Nearest& found) const;
+  bool searchBins(const Vec3& rest, double within, Nearest& found) const;
   template <class Visit>
   void visitNear(const Vec3& rest, double radius, const Visit& visit) const;
   void binTriangles();
