@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kComplainEvery = 5.0;  // [s] of a stream that goes wrong
 constexpr double kMaxJaw = 3.2;         // [rad]
+constexpr double kHeldUp = 0.2;         // [s] between two looks
 constexpr double kWatchEvery = 0.01;    // [s] while a tool is there: it goes on, or has fallen silent
 constexpr double kTurnSpeed = 50.0;     // [rad/s]
 constexpr double kUnbounded = 1e12;
@@ -28,13 +29,25 @@ ToolInputs::ToolInputs(const ros::NodeHandle& private_handle, const NodeSettings
       runner_(runner),
       frames_(frames),
       rejections_(rejections),
-      tools_{Tool{"pick", ToolKind::kPick, settings.pick.follow_frame,
-                  ToolMotion({settings.pick_max_speed, kTurnSpeed, settings.tools_silence}), {}, false},
+      tools_{Tool{"pick",
+                  ToolKind::kPick,
+                  settings.pick.follow_frame,
+                  ToolMotion({settings.pick_max_speed, kTurnSpeed, settings.tools_silence}),
+                  {},
+                  false},
              // The world itself holds the sphere to its speed, in simulated time.
-             Tool{"push", ToolKind::kPush, settings.push.follow_frame,
-                  ToolMotion({kUnbounded, kUnbounded, settings.tools_silence}), {}, false},
-             Tool{"scissors", ToolKind::kScissors, settings.scissors.follow_frame,
-                  ToolMotion({settings.scissors_max_speed, kTurnSpeed, settings.tools_silence}), {}, false}} {
+             Tool{"push",
+                  ToolKind::kPush,
+                  settings.push.follow_frame,
+                  ToolMotion({kUnbounded, kUnbounded, settings.tools_silence}),
+                  {},
+                  false},
+             Tool{"scissors",
+                  ToolKind::kScissors,
+                  settings.scissors.follow_frame,
+                  ToolMotion({settings.scissors_max_speed, kTurnSpeed, settings.tools_silence}),
+                  {},
+                  false}} {
   ros::NodeHandle handle(private_handle);
   watch_timer_ = handle.createWallTimer(
       ros::WallDuration(kWatchEvery), [this](const ros::WallTimerEvent&) { watch(); }, false, false);
@@ -72,8 +85,8 @@ void ToolInputs::reject(const std::string& input, const Error& error) {
 void ToolInputs::onServo(Tool& tool, const geometry_msgs::PoseStamped::ConstPtr& message) {
   const std::string input = "~" + tool.name + "/servo_cp";
   BorderCheck check;
-  const Pose local = tool.kind == ToolKind::kScissors ? check.pose("pose", message->pose)
-                                                      : check.pointPose("pose", message->pose);
+  const Pose local =
+      tool.kind == ToolKind::kScissors ? check.pose("pose", message->pose) : check.pointPose("pose", message->pose);
   if (!check.ok()) return reject(input, check.error());
   const auto frame = frames_.toWorld(message->header);
   if (!frame.ok()) return reject(input, frame.error());
@@ -113,12 +126,20 @@ void ToolInputs::hear(Tool& tool, const Pose& pose, const ros::Time& stamp, cons
 
 void ToolInputs::watch() {
   bool any = false;
+  const double now = wallSeconds();
+  {
+    // Where the node itself was held up, streams have not been silent: what they said is still in their queues.
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (now - watched_ > kHeldUp)
+      for (Tool& tool : tools_) tool.motion.keepAlive(now);
+    watched_ = now;
+  }
   for (Tool& tool : tools_) {
     bool silent = false;
     bool under_way = false;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      silent = tool.motion.fellSilent(wallSeconds());
+      silent = tool.motion.fellSilent(now);
       under_way = tool.motion.alive() && !tool.motion.arrived();
       any = any || tool.motion.alive();
     }

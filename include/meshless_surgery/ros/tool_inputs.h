@@ -59,7 +59,8 @@ class ToolInputs {
 
   mutable std::mutex mutex_;  // of all below; the runner's jobs take it too
   std::array<Tool, 3> tools_;
-  double jaw_angle_ = 0.5;    // [rad]
+  double watched_ = 0.0;    // [s] the last look for silence
+  double jaw_angle_ = 0.5;  // [rad]
   bool jaw_armed_ = false;
 
   std::vector<ros::Subscriber> subscribers_;
