@@ -66,6 +66,7 @@ class InArchive : public cereal::InputArchive<InArchive, cereal::AllowEmptyClass
       : cereal::InputArchive<InArchive, cereal::AllowEmptyClassElision>(this), left_(bytes) {}
   void take(void* data, std::size_t size) {
     need(size, 1);
+    if (size == 0) return;  // data may be null
     std::memcpy(data, left_.data(), size);
     left_.remove_prefix(size);
   }
