@@ -18,6 +18,7 @@ constexpr double kMostBins = 1 << 18;
 constexpr double kMostCells = 1 << 19;
 constexpr double kLongEdge = 0.1;    // of the body's least extent: shorter edges need no samples
 constexpr double kFlatEdge = 0.996;  // cosine between neighbours: about 5 degrees
+constexpr double kMostPlaces = 1e6;  // along an axis of the grid in which samples keep apart
 constexpr int kMostEdgeSamples = 64;
 constexpr std::size_t kThicknessRays = 48;
 constexpr double kOnRim = 1e-6;        // of a squared distance: straight above the rim of a face
@@ -592,8 +593,12 @@ void ContactShape::chooseSamples(double spacing) {
              static_cast<std::uint64_t>(z + 2);
     };
     const auto place = [&](Index v) {
-      const Vec3 c = (vertices[v] - bounds_.min) / edge;
-      return std::array<int, 3>{static_cast<int>(c.x()), static_cast<int>(c.y()), static_cast<int>(c.z())};
+      std::array<int, 3> cell{};
+      for (int d = 0; d < 3; ++d) {
+        const double c = (vertices[v][d] - bounds_.min[d]) / edge;
+        cell[d] = c > 0.0 ? static_cast<int>(std::min(c, kMostPlaces)) : 0;
+      }
+      return cell;
     };
     for (int pass = 0; pass < 2; ++pass)  // particles first
       for (Index v = 0; v < vertices.size(); ++v) {
