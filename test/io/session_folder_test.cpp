@@ -10,6 +10,8 @@
 #include <fstream>
 #include <thread>
 
+#include "io/temporary_folder.h"
+
 namespace meshless {
 namespace {
 
@@ -17,18 +19,13 @@ namespace fs = std::filesystem;
 
 class SessionFolderTest : public testing::Test {
  protected:
-  void SetUp() override {
-    char name[] = "/tmp/session_folder_XXXXXX";
-    ASSERT_NE(nullptr, mkdtemp(name));
-    base_ = name;
-  }
-  void TearDown() override { fs::remove_all(base_); }
   std::vector<std::string> files(const std::string& folder) const {
     std::vector<std::string> names;
     for (const auto& entry : fs::directory_iterator(folder)) names.push_back(entry.path().filename());
     return names;
   }
-  std::string base_;
+  const TemporaryFolder temporary_;
+  const std::string base_ = temporary_.path();
 };
 
 TEST_F(SessionFolderTest, WhatIsWrittenIsRead) {
