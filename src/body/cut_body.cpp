@@ -18,8 +18,8 @@ std::vector<int> assignParticles(const BodyModel& model, const BodyState& state,
                                  const CutSurface& cut) {
   std::vector<int> piece_of(model.rest.size(), kNoPiece);
   for (std::size_t p = 0; p < cut.pieces.size(); ++p)
-    for (const VertexOrigin& origin : cut.pieces[p].origins) {
-      const Index v = sameVertex(origin);
+    for (std::size_t at = 0; at < cut.pieces[p].origins.size(); ++at) {
+      const Index v = cut.pieces[p].origins.same(at);
       if (v == kNoIndex || model.binding.particle[v] == kNoIndex) continue;
       int& piece = piece_of[model.binding.particle[v]];
       if (piece == kNoPiece) piece = static_cast<int>(p);  // one on the plane goes to the larger piece

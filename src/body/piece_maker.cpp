@@ -26,9 +26,6 @@ Vec3 interpolate(const VertexOrigin& origin, const Get& get) {
   return sum;
 }
 
-// A vertex inside the cap, which no edge of the parent leads to.
-bool insideCap(const VertexOrigin& origin) { return origin.parents[0] == kNoIndex; }
-
 // The moments of the material that the parent has. What a cut leaves of a cell can be so narrow that its stress would
 // need a shorter step: it then resists as a flat cluster does, and the parent's frequency holds for the piece as well.
 void inheritMoments(const BodyModel& parent, const std::vector<Index>& members, BodyModel& child) {
@@ -56,10 +53,6 @@ void inheritMoments(const BodyModel& parent, const std::vector<Index>& members, 
 }
 
 }  // namespace
-
-Index sameVertex(const VertexOrigin& origin) {
-  return origin.parents[1] == kNoIndex && origin.parents[2] == kNoIndex ? origin.parents[0] : kNoIndex;
-}
 
 // A piece without a particle would have no mass: it takes a part of the parent's nearest particle, which moves on with
 // the same velocity, so that mass and momentum stay what they were.
@@ -162,7 +155,7 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, Points rest, const std::v
   std::vector<bool> taken(child->rest.size(), false);
   InheritedBinding inherited{model_.binding, {}, renumbered, nullptr};
   for (Index at = 0; at < from.origins.size(); ++at) {
-    const Index v = sameVertex(from.origins[at]);
+    const Index v = from.origins.same(at);
     if (v == kNoIndex) ++work.new_vertices;
     inherited.rider.push_back(v == kNoIndex ? kNoIndex : rider_of_[v]);
     const Index parent = v == kNoIndex ? kNoIndex : model_.binding.particle[v];
@@ -210,7 +203,7 @@ std::vector<Points> PieceMaker::restVertices(const std::vector<PieceSource>& sou
     for (Index v = 0; v < source.origins.size(); ++v) {
       all.back().push_back(
           interpolate(source.origins[v], [&](Index parent) { return model_.surface.vertices[parent]; }));
-      if (!insideCap(source.origins[v])) continue;
+      if (!source.origins.insideCap(v)) continue;
       any = true;
       if (inside_at.emplace(key(source.mesh.vertices[v]), inside.size()).second)
         inside.push_back(source.mesh.vertices[v]);
@@ -219,7 +212,7 @@ std::vector<Points> PieceMaker::restVertices(const std::vector<PieceSource>& sou
     for (std::size_t t = 0; t < source.mesh.triangles.size(); ++t) {
       if (source.mesh.patches[t] != new_patch_) continue;
       for (Index v : source.mesh.triangles[t])
-        if (!insideCap(source.origins[v]) && rim_at.insert(key(source.mesh.vertices[v])).second)
+        if (!source.origins.insideCap(v) && rim_at.insert(key(source.mesh.vertices[v])).second)
           rim.push_back({source.mesh.vertices[v], all.back()[v]});
     }
   }
@@ -227,7 +220,7 @@ std::vector<Points> PieceMaker::restVertices(const std::vector<PieceSource>& sou
   const Points places = restPlaces(model_, state_, inside, rim);
   for (std::size_t s = 0; s < sources.size(); ++s)
     for (Index v = 0; v < sources[s].origins.size(); ++v)
-      if (insideCap(sources[s].origins[v])) all[s][v] = places[inside_at.at(key(sources[s].mesh.vertices[v]))];
+      if (sources[s].origins.insideCap(v)) all[s][v] = places[inside_at.at(key(sources[s].mesh.vertices[v]))];
   return all;
 }
 

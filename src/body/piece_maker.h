@@ -7,13 +7,10 @@
 
 namespace meshless {
 
-/// The parent vertex that a piece's vertex is; kNoIndex for vertices that the blade made.
-Index sameVertex(const VertexOrigin& origin);
-
 struct PieceSource {
-  const TriangleMesh& mesh;                  // present shape; patches filled
-  const std::vector<VertexOrigin>& origins;  // of its vertices
-  std::vector<Index> members;                // the parent's particles, ascending; may be empty: a crumb
+  const TriangleMesh& mesh;      // present shape; patches filled
+  const VertexOrigins& origins;  // of its vertices
+  std::vector<Index> members;    // the parent's particles, ascending; may be empty: a crumb
   /// True where the piece's vertex must not follow the parent's particle, for there is a lip between. May be empty.
   std::function<bool(Index vertex, Index particle)> separated = nullptr;
 };

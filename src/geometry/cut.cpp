@@ -25,17 +25,23 @@ std::string number(double x) {
 
 /// Bounds [m] that are not finite where a point is not.
 Box boundsOfAll(const Points& points) {
-  double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300}, nothing = 0.0;
-  for (const Vec3& p : points) {
-    for (int k = 0; k < 3; ++k) {
-      low[k] = p[k] < low[k] ? p[k] : low[k];
-      high[k] = p[k] > high[k] ? p[k] : high[k];
-    }
-    nothing += 0.0 * (p[0] + p[1] + p[2]);
-  }
+  // Two points at a time, for the sake of vectors; an odd last one is looked at twice.
+  using Two = Eigen::Array<double, 6, 1>;
   Box box;
-  box.min = Vec3(low[0] + nothing, low[1], low[2]);
-  box.max = Vec3(high[0], high[1], high[2]);
+  if (points.empty()) return box;
+  Two low, high;
+  low << points.back().array(), points.back().array();
+  high = low;
+  Two nothing = 0.0 * low;
+  for (std::size_t i = 0; i + 1 < points.size(); i += 2) {
+    const Eigen::Map<const Two> p(points[i].data());
+    low = low.min(p);
+    high = high.max(p);
+    nothing += 0.0 * p;
+  }
+  box.min = low.head<3>().min(low.tail<3>()).matrix();
+  box.max = high.head<3>().max(high.tail<3>()).matrix();
+  box.min.x() += nothing.sum();
   return box;
 }
 
@@ -61,9 +67,12 @@ Status checkInput(const TriangleMesh& mesh, const Plane& plane, const CutOptions
   for (std::size_t v = 0; !finite && v < mesh.vertices.size(); ++v)
     if (!mesh.vertices[v].allFinite())
       return Error{ErrorCode::kUnsuitableShape, "vertex " + std::to_string(v) + " of the surface is not finite"};
-  Index highest = 0;
-  for (const Triangle& t : mesh.triangles) highest = std::max({highest, t[0], t[1], t[2]});
-  for (std::size_t t = 0; highest >= mesh.vertices.size() && t < mesh.triangles.size(); ++t)
+  // The highest bit tells: of v, or of last - v. (There are fewer than 2^31 vertices.)
+  const Index last = static_cast<Index>(mesh.vertices.size()) - 1;
+  Index beyond = mesh.vertices.empty() ? ~Index{0} : 0;
+  const Index* corners = mesh.triangles.front().data();
+  for (std::size_t i = 0; i < 3 * mesh.triangles.size(); ++i) beyond |= corners[i] | (last - corners[i]);
+  for (std::size_t t = 0; (beyond >> 31) != 0 && t < mesh.triangles.size(); ++t)
     for (const Index v : mesh.triangles[t])
       if (v >= mesh.vertices.size())
         return Error{ErrorCode::kUnsuitableShape, "triangle " + std::to_string(t) + " names vertex " +

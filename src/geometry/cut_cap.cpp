@@ -37,6 +37,7 @@ class Borders {
     int weight = 0;
     bool core = false;
   };
+  explicit Borders(std::size_t most) { borders_.reserve(most); }
   void add(const OutlineSegment& s) { borders_[edgeKey(s.from, s.to)].weight += s.from < s.to ? s.weight : -s.weight; }
   void addCore(Index from, Index to) { borders_[edgeKey(from, to)].core = true; }
   Border of(Index from, Index to) const {
@@ -104,7 +105,7 @@ CapState triangulateCap(const std::vector<Vec2>& nodes, const std::vector<Outlin
     handles[i]->info() = static_cast<Index>(i);
     hint = handles[i]->face();
   }
-  Borders borders;
+  Borders borders(segments.size() + core.border.size());
   try {
     for (const OutlineSegment& s : segments) {
       borders.add(s);

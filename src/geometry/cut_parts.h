@@ -95,6 +95,12 @@ class Sets {
   void unite(const Triangle& t) {
     const Index p = parents_[t[0]], q = parents_[t[1]], r = parents_[t[2]];
     if (p == q && q == r) return;
+    if (parents_[p] == p && parents_[q] == q && parents_[r] == r) {
+      const Index lowest = std::min({p, q, r});
+      parents_[p] = parents_[q] = parents_[r] = lowest;
+      parents_[t[0]] = parents_[t[1]] = parents_[t[2]] = lowest;
+      return;
+    }
     unite(t[0], t[1]);
     unite(t[0], t[2]);
   }

@@ -37,7 +37,7 @@ Vec3 deepestOf(const Workpiece& work, const CutPiece& piece) {
 void append(const CutPiece& from, CutPiece& to) {
   const Index offset = static_cast<Index>(to.mesh.vertices.size());
   to.mesh.vertices.insert(to.mesh.vertices.end(), from.mesh.vertices.begin(), from.mesh.vertices.end());
-  to.origins.insert(to.origins.end(), from.origins.begin(), from.origins.end());
+  to.origins.append(from.origins);
   to.mesh.patches.insert(to.mesh.patches.end(), from.mesh.patches.begin(), from.mesh.patches.end());
   for (const Index v : from.cap_interior) to.cap_interior.push_back(v + offset);
   for (const Triangle& t : from.mesh.triangles)

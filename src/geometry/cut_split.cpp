@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <numeric>
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 
@@ -92,21 +93,21 @@ Status sortTriangles(Workpiece& work) {
   const signed char* states = work.states.data();
   std::array<Index, 2> untouched{0, 0};
   std::uint64_t balance = 0;
-  bool degenerate = false;
   Sets sets(mesh.vertices.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const Triangle& triangle = mesh.triangles[t];
-    balance += balanceOf(triangle);
+    const Triangle triangle = mesh.triangles[t];
+    const std::uint64_t share = balanceOf(triangle);
+    balance += share;
     const int state = states[triangle[0]];
     if (state == 0 || state != states[triangle[1]] || state != states[triangle[2]]) {
       work.touched.push_back(static_cast<Index>(t));
       continue;
     }
-    degenerate |= triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0];
+    if (share == 0 && (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0]))
+      return Error{ErrorCode::kUnsuitableShape, "the surface has a triangle that names a vertex twice"};
     ++untouched[state > 0 ? kUpper : kLower];
     sets.unite(triangle);
   }
-  if (degenerate) return Error{ErrorCode::kUnsuitableShape, "the surface has a triangle that names a vertex twice"};
   if (balance != 0)
     return Error{ErrorCode::kUnsuitableShape,
                  "the surface is open or not oriented: it has edges with more triangles in one direction than in the "
@@ -164,10 +165,7 @@ void renumberOnPlane(Workpiece& work, std::vector<Triangle>& triangles) {
 
 VertexOrigin Workpiece::originOf(Index vertex) const {
   if (vertex >= mesh_vertices) return new_origins[vertex - mesh_vertices];
-  VertexOrigin origin;
-  origin.parents[0] = vertex;
-  origin.weights[0] = 1.0;
-  return origin;
+  return VertexOrigin::of(vertex);
 }
 
 Index Workpiece::addVertex(const Vec3& position, const VertexOrigin& origin) {
@@ -217,7 +215,7 @@ Result<Workpiece> splitAtPlane(const TriangleMesh& mesh, const Plane& plane, dou
   touched.reserve(work.touched.size());
   for (const Index t : work.touched) touched.push_back(mesh.triangles[t]);
   renumberOnPlane(work, touched);
-  EdgeVertices edge_vertices(work, 2 * touched.size());
+  EdgeVertices edge_vertices(work, touched.size());  // two at most a triangle, each shared by two
   double length = 0.0;
   std::size_t crossed = 0;
   for (std::size_t i = 0; i < touched.size(); ++i) {
@@ -274,8 +272,16 @@ Result<std::vector<RimEdge>> rimOf(const Workpiece& work) {
       }
     }
   }
-  std::sort(found.begin(), found.end(),
-            [](const HalfEdge& a, const HalfEdge& b) { return a.low != b.low ? a.low < b.low : a.high < b.high; });
+  // By the lower end, then by the higher: few share one.
+  std::vector<Index> ends(work.new_positions.size() + 1, 0);
+  for (const HalfEdge& e : found) ++ends[e.low - work.mesh_vertices + 1];
+  std::partial_sum(ends.begin(), ends.end(), ends.begin());
+  std::vector<HalfEdge> sorted(found.size());
+  for (const HalfEdge& e : found) sorted[ends[e.low - work.mesh_vertices]++] = e;
+  found.swap(sorted);
+  for (std::size_t v = 0, begin = 0; begin < found.size(); begin = ends[v++])
+    std::sort(found.begin() + static_cast<std::ptrdiff_t>(begin), found.begin() + ends[v],
+              [](const HalfEdge& a, const HalfEdge& b) { return a.high < b.high; });
 
   std::vector<RimEdge> rim;
   for (std::size_t begin = 0, end = 0; begin < found.size(); begin = end) {

@@ -90,7 +90,7 @@ Result<Lips> fillLips(const Mouth& mouth, const InciseOptions& options, bool tou
 /// The surface opened: mouth and lips joined, not yet taken apart into pieces.
 struct OpenedSurface {
   TriangleMesh mesh;  // vertices that no triangle uses are left out later
-  std::vector<VertexOrigin> origins;
+  VertexOrigins origins;
   std::vector<std::int8_t> facing;
   std::size_t first_new_triangle = 0;
 };

@@ -67,7 +67,8 @@ IncisedPiece pieceOf(const OpenedSurface& opened, const std::vector<Index>& tria
     if (local[v] == kNoIndex) continue;
     local[v] = static_cast<Index>(piece.mesh.vertices.size());
     piece.mesh.vertices.push_back(opened.mesh.vertices[v]);
-    piece.origins.push_back(opened.origins[v]);
+    const Index same = opened.origins.same(v);
+    same == kNoIndex ? piece.origins.push_back(opened.origins[v]) : piece.origins.addKept(same, same + 1);
   }
   piece.mesh.triangles.reserve(triangles.size());
   piece.mesh.patches.reserve(triangles.size());

@@ -180,7 +180,8 @@ class Sealer {
     out_.mesh.triangles = mouth_.triangles;
     out_.mesh.patches = mouth_.patches;
     out_.origins.reserve(mouth_.positions.size() + 2 * lips_.nodes.size());
-    for (Index v = 0; v < mouth_.positions.size(); ++v) out_.origins.push_back(mouth_.originOf(v));
+    out_.origins.addKept(0, mouth_.mesh_vertices);
+    for (Index v = mouth_.mesh_vertices; v < mouth_.positions.size(); ++v) out_.origins.push_back(mouth_.originOf(v));
     out_.first_new_triangle = mouth_.triangles.size();
     out_.facing.assign(mouth_.triangles.size(), 0);
     for (const Index t : near_) slots_.push_back(t);

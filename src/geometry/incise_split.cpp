@@ -10,10 +10,7 @@ namespace incising {
 
 VertexOrigin Mouth::originOf(Index vertex) const {
   if (vertex >= mesh_vertices) return new_origins[vertex - mesh_vertices];
-  VertexOrigin origin;
-  origin.parents[0] = vertex;
-  origin.weights[0] = 1.0;
-  return origin;
+  return VertexOrigin::of(vertex);
 }
 
 Index Mouth::addBetween(Index a, Index b, double s) {

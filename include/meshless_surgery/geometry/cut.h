@@ -4,24 +4,16 @@
 #include "meshless_surgery/base/result.h"
 #include "meshless_surgery/geometry/plane.h"
 #include "meshless_surgery/geometry/triangle_mesh.h"
+#include "meshless_surgery/geometry/vertex_origins.h"
 
 namespace meshless {
 
-/// Where a vertex of a piece comes from: sum of weights[k] * parent vertex parents[k]. A vertex that was there before
-/// has one parent of weight 1; one on a cut edge has two; one where two rims cross has four; one inside the cap has
-/// none. Unused slots have weight 0 and parent kNoIndex. The same weights interpolate rest position, position and
-/// velocity.
-struct VertexOrigin {
-  std::array<Index, 4> parents{{kNoIndex, kNoIndex, kNoIndex, kNoIndex}};
-  std::array<double, 4> weights{{0.0, 0.0, 0.0, 0.0}};
-};
-
 /// One connected piece of the solid: closed, oriented, on one side of the plane.
 struct CutPiece {
-  TriangleMesh mesh;                  // patches filled; the cap's is the patch asked for
-  std::vector<VertexOrigin> origins;  // one a vertex
-  std::vector<Index> cap_interior;    // its vertices inside the cap; without parents
-  int side = 0;                       // +1: where the normal points; -1: the other
+  TriangleMesh mesh;                // patches filled; the cap's is the patch asked for
+  VertexOrigins origins;            // one a vertex
+  std::vector<Index> cap_interior;  // its vertices inside the cap; without parents
+  int side = 0;                     // +1: where the normal points; -1: the other
 };
 
 struct CutSurface {

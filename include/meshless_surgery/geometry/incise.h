@@ -30,10 +30,10 @@ struct InciseOptions {
 /// A connected solid, closed and oriented. What was there before keeps its order, new vertices follow. Where lips met
 /// at a point, one of the vertices there may stand for another at the same place.
 struct IncisedPiece {
-  TriangleMesh mesh;                  // patches filled
-  std::vector<VertexOrigin> origins;  // one a vertex, on the parent; none (weights 0) for those inside the lips
-  std::vector<std::int8_t> facing;    // one a triangle: +1 a new lip looking along the blade's normal, -1 one looking
-                                      // against it, 0 no new lip
+  TriangleMesh mesh;                // patches filled
+  VertexOrigins origins;            // one a vertex, on the parent; none (weights 0) for those inside the lips
+  std::vector<std::int8_t> facing;  // one a triangle: +1 a new lip looking along the blade's normal, -1 one looking
+                                    // against it, 0 no new lip
 };
 
 struct Incision {
