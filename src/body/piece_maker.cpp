@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <future>
-#include <map>
 #include <optional>
-#include <set>
+#include <unordered_map>
+#include <unordered_set>
 
 #include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/body/rest_places.h"
@@ -25,6 +27,21 @@ Vec3 interpolate(const VertexOrigin& origin, const Get& get) {
     if (origin.parents[k] != kNoIndex) sum += origin.weights[k] * get(origin.parents[k]);
   return sum;
 }
+
+// Of its bits: both sides of a cut have the same places to the bit.
+struct HashOfPlace {
+  std::size_t operator()(const Vec3& p) const {
+    std::uint64_t hash = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      std::uint64_t bits;
+      const double x = p[axis] + 0.0;  // -0 is 0
+      std::memcpy(&bits, &x, sizeof bits);
+      hash = (hash ^ bits) * 0x9e3779b97f4a7c15u;
+      hash ^= hash >> 32;
+    }
+    return hash;
+  }
+};
 
 // The moments of the material that the parent has. What a cut leaves of a cell can be so narrow that its stress would
 // need a shorter step: it then resists as a flat cluster does, and the parent's frequency holds for the piece as well.
@@ -194,25 +211,26 @@ std::vector<Points> PieceMaker::restVertices(const std::vector<PieceSource>& sou
   std::vector<Points> all;
   Points inside;
   std::vector<KnownPlace> rim;
-  std::map<std::array<double, 3>, std::size_t> inside_at;
-  std::set<std::array<double, 3>> rim_at;
-  const auto key = [](const Vec3& p) { return std::array<double, 3>{p.x(), p.y(), p.z()}; };
+  std::unordered_map<Vec3, std::size_t, HashOfPlace> inside_at;
+  std::unordered_set<Vec3, HashOfPlace> rim_at;
   for (const PieceSource& source : sources) {
     all.emplace_back();
     bool any = false;
     for (Index v = 0; v < source.origins.size(); ++v) {
-      all.back().push_back(
-          interpolate(source.origins[v], [&](Index parent) { return model_.surface.vertices[parent]; }));
+      const Index same = source.origins.same(v);
+      all.back().push_back(same != kNoIndex ? model_.surface.vertices[same]
+                                            : interpolate(source.origins[v], [&](Index parent) {
+                                                return model_.surface.vertices[parent];
+                                              }));
       if (!source.origins.insideCap(v)) continue;
       any = true;
-      if (inside_at.emplace(key(source.mesh.vertices[v]), inside.size()).second)
-        inside.push_back(source.mesh.vertices[v]);
+      if (inside_at.emplace(source.mesh.vertices[v], inside.size()).second) inside.push_back(source.mesh.vertices[v]);
     }
     if (!any) continue;
     for (std::size_t t = 0; t < source.mesh.triangles.size(); ++t) {
       if (source.mesh.patches[t] != new_patch_) continue;
       for (Index v : source.mesh.triangles[t])
-        if (!source.origins.insideCap(v) && rim_at.insert(key(source.mesh.vertices[v])).second)
+        if (!source.origins.insideCap(v) && rim_at.insert(source.mesh.vertices[v]).second)
           rim.push_back({source.mesh.vertices[v], all.back()[v]});
     }
   }
@@ -220,7 +238,7 @@ std::vector<Points> PieceMaker::restVertices(const std::vector<PieceSource>& sou
   const Points places = restPlaces(model_, state_, inside, rim);
   for (std::size_t s = 0; s < sources.size(); ++s)
     for (Index v = 0; v < sources[s].origins.size(); ++v)
-      if (sources[s].origins.insideCap(v)) all[s][v] = places[inside_at.at(key(sources[s].mesh.vertices[v]))];
+      if (sources[s].origins.insideCap(v)) all[s][v] = places[inside_at.at(sources[s].mesh.vertices[v])];
   return all;
 }
 

@@ -1,6 +1,7 @@
 #include "meshless_surgery/body/rest_places.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <future>
 
@@ -64,7 +65,10 @@ class Guess {
   Vec3 operator()(const Vec3& p) {
     Vec3 sum = Vec3::Zero();
     double total = 0.0;
-    for (Index i : particles_.nearest(p, kBlended)) {
+    std::array<Index, kBlended> near;
+    const std::size_t count = particles_.nearest(p, kBlended, near.data());
+    for (std::size_t k = 0; k < count; ++k) {
+      const Index i = near[k];
       Map& map = maps_[i];
       if (!map.made) map = mapAround(model_, state_, particles_.nearest(state_.positions[i], kParticles));
       const double weight = 1.0 / ((state_.positions[i] - p).squaredNorm() + 1e-24);
@@ -106,7 +110,10 @@ Points restPlaces(const BodyModel& model, const BodyState& state, const Points& 
     for (std::size_t n = from; n < to; ++n) {
       Vec3 residual = Vec3::Zero();
       double total = 0.0;
-      for (Index k : rim.nearest(present[n], kKnown)) {
+      std::array<Index, kKnown> near;
+      const std::size_t count = rim.nearest(present[n], kKnown, near.data());
+      for (std::size_t i = 0; i < count; ++i) {
+        const Index k = near[i];
         const double w = 1.0 / ((known_at[k] - present[n]).squaredNorm() + 1e-24);
         residual += w * missed[k];
         total += w;

@@ -19,6 +19,8 @@ class NearestPoints {
   Index nearest(const Vec3& p) const;
   /// Up to `count` indices, nearest first.
   std::vector<Index> nearest(const Vec3& p, std::size_t count) const;
+  /// The same into `found`, which has room for `count`. Returns how many there are.
+  std::size_t nearest(const Vec3& p, std::size_t count, Index* found) const;
   /// All within `radius` [m], ascending by index.
   std::vector<Index> within(const Vec3& p, double radius) const;
 
