@@ -162,6 +162,20 @@ Result<PromisedCounts> checkStl(const std::string& path, std::uintmax_t bytes) {
   std::string end(static_cast<std::size_t>(tail), '\0');
   in.read(&end[0], static_cast<std::streamsize>(tail));
   if (lower(end).find("endsolid") == std::string::npos) return unreadable(path, "is truncated: it has no endsolid");
+  // The reader takes a file with other bytes for a binary one, and makes room for as many triangles as they spell.
+  in.clear();
+  in.seekg(0);
+  std::string block(kMaxHeader, '\0');
+  for (std::uintmax_t at = 0; at < bytes; at += block.size()) {
+    in.read(&block[0], static_cast<std::streamsize>(block.size()));
+    const auto read = static_cast<std::size_t>(std::max<std::streamsize>(0, in.gcount()));
+    for (std::size_t i = 0; i < read; ++i) {
+      const auto c = static_cast<unsigned char>(block[i]);
+      if (c > 126 || (c < 32 && !std::isspace(c)))
+        return unreadable(path,
+                          "begins as text and has the byte " + std::to_string(c) + " at " + std::to_string(at + i));
+    }
+  }
   return PromisedCounts{};
 }
 

@@ -6,10 +6,13 @@
 #include <iterator>
 #include <sstream>
 
+#include <yaml-cpp/eventhandler.h>
+
 namespace meshless {
 namespace {
 
 constexpr std::size_t kMaxBytes = 1 << 20;
+constexpr std::size_t kMaxValues = 1000000;
 constexpr int kMaxDepth = 50;  // of brackets and of indentation
 
 std::string where(const std::string& name, const YAML::Mark& mark) {
@@ -45,9 +48,47 @@ bool tooDeep(const std::string& text) {
   return false;
 }
 
+/// Counts what the parser says, before anything is made of it: it has texts of which it makes documents without end.
+class Counter : public YAML::EventHandler {
+ public:
+  std::size_t documents = 0;
+
+  void OnDocumentStart(const YAML::Mark&) override { ++documents; }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t) override { count(mark); }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override { count(mark); }
+  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t, const std::string&) override {
+    count(mark);
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+    count(mark);
+  }
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+    count(mark);
+  }
+  void OnMapEnd() override {}
+
+ private:
+  void count(const YAML::Mark& mark) {
+    if (++values_ > kMaxValues) throw YAML::ParserException(mark, "there are more than 1000000 values");
+  }
+  std::size_t values_ = 0;
+};
+
+/// How many documents there are, up to two.
+std::size_t documentsIn(const std::string& text) {
+  std::istringstream in(text);
+  YAML::Parser parser(in);
+  Counter counter;
+  while (counter.documents < 2 && parser.HandleNextDocument(counter)) {
+  }
+  return counter.documents;
+}
+
 /// Aliases make a node its own descendant, or a small text a huge tree: the whole tree is walked once, and counted.
 bool tooLarge(const YAML::Node& node, int depth, std::size_t& nodes) {
-  if (depth > kMaxDepth || ++nodes > 1000000) return true;
+  if (depth > kMaxDepth || ++nodes > kMaxValues) return true;
   if (node.IsSequence())
     for (const auto& child : node)
       if (tooLarge(child, depth + 1, nodes)) return true;
@@ -87,16 +128,15 @@ Result<YAML::Node> parseYaml(const std::string& text, const std::string& name) {
   if (tooDeep(text))
     return Error{ErrorCode::kInvalidArgument, name + ": is nested too deep; accepted: up to 50 levels"};
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() > 1)
-      return Error{ErrorCode::kInvalidArgument,
-                   name + ": has " + std::to_string(documents.size()) + " documents; accepted: one"};
+    const std::size_t documents = documentsIn(text);
+    if (documents > 1) return Error{ErrorCode::kInvalidArgument, name + ": has more than one document; accepted: one"};
     std::size_t nodes = 0;
-    if (documents.empty()) return YAML::Node();
-    if (tooLarge(documents.front(), 0, nodes))
+    if (documents == 0) return YAML::Node();
+    const YAML::Node document = YAML::Load(text);
+    if (tooLarge(document, 0, nodes))
       return Error{ErrorCode::kInvalidArgument,
                    name + ": is too large with its aliases written out; accepted: up to 50 levels, 1000000 values"};
-    return documents.front();
+    return document;
   } catch (const YAML::Exception& e) {
     return Error{ErrorCode::kInvalidArgument, where(name, e.mark) + ": " + e.msg + "; accepted: YAML"};
   } catch (const std::exception& e) {

@@ -227,7 +227,7 @@ TEST_F(Scene, FaultsAreNamedWithFileLineValueAndRange) {
       {"bodies:\n  - file: ../none.obj\n", 2, {"no file '../none.obj'"}},
       {"bodies:\n  - file: /etc/passwd\n", 2, {"outside the folders"}},
       {"bodies:\n  - file: [a]\n", 2, {"file is a list of 1", "a text"}},
-      {"bodies: []\n...\n---\nbodies: []\n", 0, {"2 documents"}},
+      {"bodies: []\n...\n---\nbodies: []\n", 0, {"more than one document"}},
       {"bodies: [\n", 2, {"YAML"}},
       {"? [a, b]\n: 1\n", 1, {"a key of the scene is a list"}},
       {"", 0, {"a map"}},
