@@ -6,13 +6,13 @@
 #include <tuple>
 #include <unordered_map>
 
+#include "grid_rings.h"
 #include "meshless_surgery/geometry/nearest_on_triangle.h"
 
 namespace meshless {
 namespace {
 
 constexpr double kBinEdges = 3.0;   // size of a bin in mean edges
-constexpr double kFirstRing = 0.5;  // of a bin: how far is searched at first
 constexpr double kCellEdges = 0.5;  // size of a cell in mean edges
 constexpr double kMostBins = 1 << 18;
 constexpr double kMostCells = 1 << 19;
@@ -419,14 +419,14 @@ bool ContactShape::searchBins(const Vec3& rest, double within, Nearest& found) c
   Best best(size_);
   best.distance = within;
   best.squared = within * within;
-  Box box;
-  const Vec3 outside = (bounds_.min - rest).cwiseMax(rest - bounds_.max).cwiseMax(0.0);
-  const double farthest = (bounds_.max - bounds_.min).norm() + outside.norm();
-  for (double radius = std::min(within, outside.norm() + kFirstRing * bin_edge_);; radius *= 2.0) {
-    box.min = rest.array() - radius;
-    box.max = rest.array() + radius;
-    visitBins(box, [&](Index t) { best.offer(facets_[t], rest, found); });
-    if (best.distance <= radius || radius > farthest) break;
+  const Grid grid{bin_origin_, bin_edge_, bins_};
+  const std::array<int, 3> home = grid.cellAt(rest);
+  for (int ring = 0, rings = grid.ringsAround(home); ring <= rings; ++ring) {
+    visitRing(grid, home, ring, [&](std::size_t bin) {
+      for (Index k = bin_offsets_[bin]; k < bin_offsets_[bin + 1]; ++k)
+        best.offer(facets_[bin_triangles_[k]], rest, found);
+    });
+    if (best.distance <= beyondRing(grid, home, ring, rest) - 1e-9 * size_) break;
   }
   double sign = best.height;
   if (best.tied) {

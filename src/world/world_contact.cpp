@@ -1,6 +1,7 @@
 // Contact by rest shapes: what bodies show of themselves, and what comes back.
 #include <algorithm>
 #include <cmath>
+#include <future>
 
 #include "meshless_surgery/body/binding.h"
 #include "world_impl.h"
@@ -8,10 +9,11 @@
 namespace meshless {
 namespace {
 
-constexpr double kLeastRigid = 0.5;  // share of a contact's impulse that moves a body for looks as a whole
-constexpr double kFlattest = 1e-6;   // det of a map: below, the rotation stands in
-constexpr std::size_t kTaskBodies = 128;                        // looked at by one task
-constexpr std::size_t kKeptModels = 64;                         // more than this many dead entries are cleared away
+constexpr double kLeastRigid = 0.5;          // share of a contact's impulse that moves a body for looks as a whole
+constexpr double kFlattest = 1e-6;           // det of a map: below, the rotation stands in
+constexpr std::size_t kWorthAThread = 1000;  // vertices
+constexpr std::size_t kTaskBodies = 128;     // looked at by one task
+constexpr std::size_t kKeptModels = 64;      // more than this many dead entries are cleared away
 
 SurfaceRows rowsOf(const BodyModel& model) {
   const SurfaceBinding& b = model.binding;
@@ -89,15 +91,25 @@ const ContactModel& World::Impl::contactModel(WorldBody& body) {
   std::weak_ptr<const ContactModel>& known = contact_models[body.model.get()];
   std::shared_ptr<const ContactModel> contact = known.lock();
   if (!contact || contact->model != body.model) {
-    contact = std::make_shared<ContactModel>(body.model);
+    if (body.coming_contact.valid()) contact = body.coming_contact.get();
+    if (!contact || contact->model != body.model) contact = std::make_shared<ContactModel>(body.model);
     known = contact;
     ++report.contact_shapes;
     if (contact_models.size() > 2 * bodies.size() + kKeptModels)
       for (auto it = contact_models.begin(); it != contact_models.end();)
         it = it->second.expired() ? contact_models.erase(it) : std::next(it);
   }
+  body.coming_contact = {};
   body.contact = std::move(contact);
   return *body.contact;
+}
+
+// The pieces of a cut lie on each other: their shapes are made while the cut is answered.
+void World::Impl::foreseeContact(WorldBody& body) {
+  if (settings.contact != ContactMethod::kRestShape || body.model->surface.vertices.size() < kWorthAThread) return;
+  body.coming_contact = std::async(std::launch::async, [model = body.model]() -> std::shared_ptr<const ContactModel> {
+    return std::make_shared<ContactModel>(model);
+  });
 }
 
 // Who is where, which pairs can touch, and what they need for it: nothing for those that nobody is near. Whom something

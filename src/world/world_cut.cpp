@@ -185,6 +185,7 @@ std::vector<std::string> World::Impl::replaceByPieces(const BodyId& parent_id, s
     while (used_names.count(name));
     WorldBody& child = admit(name, material, std::move(piece.model), std::move(piece.state));
     child.touched_by_push = touched;
+    if (pieces.size() > 1) foreseeContact(child);
     children.push_back(child.id);
     parent_particles.push_back(std::move(piece.parent_particles));
     names.push_back(name);

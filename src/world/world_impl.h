@@ -1,6 +1,7 @@
 // What the world holds; shared by the files that implement it.
 #pragma once
 
+#include <future>
 #include <map>
 #include <set>
 
@@ -43,20 +44,21 @@ struct WorldBody {
   Material material;
   BodyModelPtr model;
   BodyState state;
-  bool surface_current = true;              // state.surface fits state.positions
-  std::shared_ptr<const ContactMesh> mesh;  // made when something first comes near
-  std::shared_ptr<const ContactModel> contact;  // likewise, of the present model
-  std::vector<ContactMap> maps;                 // of this frame, where it can touch another body
+  bool surface_current = true;                                             // state.surface fits state.positions
+  std::shared_ptr<const ContactMesh> mesh;                                 // made when something first comes near
+  std::shared_ptr<const ContactModel> contact;                             // likewise, of the present model
+  std::shared_future<std::shared_ptr<const ContactModel>> coming_contact;  // being made by another thread
+  std::vector<ContactMap> maps;  // of this frame, where it can touch another body
   bool touched_by_push = false;
   bool low_current = false;          // in this frame
   std::vector<Index> low_particles;  // that can meet the ground
   std::vector<Index> low_riders;
   double stiffness_factor = 1.0;
-  Box bounds;                    // [m] of particles and surface, at the start of the last frame in which it was awake
+  Box bounds;            // [m] of particles and surface, at the start of the last frame in which it was awake
   double spread = 0.0;   // [m/s] likewise: by how much velocities differ
   bool batched = false;  // matched with others of its kind
   bool asleep = false;
-  double still_for = 0.0;        // [s]
+  double still_for = 0.0;         // [s]
   std::uint32_t sleep_group = 0;  // those that fell asleep together wake together
   StepScratch scratch;
 };
@@ -129,8 +131,8 @@ struct World::Impl {
   bool batches_current = false;  // false: bodies or materials have changed
   Contacts contacts;
   std::vector<LoadedPair> loaded;
-  bool contacts_current = false;  // bodies are those of the last step
-  double last_substep = 0.0;      // [s]
+  bool contacts_current = false;      // bodies are those of the last step
+  double last_substep = 0.0;          // [s]
   std::vector<ContactParty> parties;  // one a body, in their order, where contacts are found in rest shapes
   std::map<const BodyModel*, std::weak_ptr<const ContactModel>> contact_models;
   RecordSink record_sink;
@@ -198,6 +200,8 @@ struct World::Impl {
   void pullSprings(double h, double h_frame);
   void contactBodies(const std::vector<WorldBody*>& near, double h, int stride);
   const ContactModel& contactModel(WorldBody& body);
+  /// Begins to make it where it will be needed and takes long.
+  void foreseeContact(WorldBody& body);
   void findContacts(double h_frame);
   void fillParties();
   void fillParty(WorldBody& body, ContactParty& party);
