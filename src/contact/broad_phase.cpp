@@ -74,23 +74,27 @@ const std::vector<std::array<Index, 2>>& BroadPhase::find(const std::vector<Box>
     table_[slot] = {first, end};
     first = end;
   }
-  // Of two boxes on one level both find the other, the lower one counts; of two levels the finer one finds.
+  // Of two levels the finer one finds.
   for (Index i = 0; i < boxes.size(); ++i) {
     if (level_of_[i] == kNoLevel) continue;
     for (int level = level_of_[i]; level < 64; ++level) {
       if (!used[static_cast<std::size_t>(level)]) continue;
       const std::array<std::int64_t, 3> centre = cellOf(boxes[i], level);
+      const bool own = level == level_of_[i];
       std::array<std::int64_t, 3> cell;
-      for (cell[0] = centre[0] - 1; cell[0] <= centre[0] + 1; ++cell[0])
+      for (cell[0] = centre[0] - (own ? 0 : 1); cell[0] <= centre[0] + 1; ++cell[0])
         for (cell[1] = centre[1] - 1; cell[1] <= centre[1] + 1; ++cell[1])
           for (cell[2] = centre[2] - 1; cell[2] <= centre[2] + 1; ++cell[2]) {
+            // Of two cells on one level the one that comes first looks into the other.
+            if (own && cell < centre) continue;
+            const bool same = cell == centre;
             const std::uint64_t key = keyOf(level, cell);
             std::size_t slot = hashOf(key) & (slots - 1);
             while (table_keys_[slot] != kNoKey && table_keys_[slot] != key) slot = (slot + 1) & (slots - 1);
             if (table_keys_[slot] == kNoKey) continue;
             for (Index k = table_[slot][0]; k < table_[slot][1]; ++k) {
               const Index j = entries_[k].box;
-              if (j == i || (level == level_of_[i] && j < i) || (!active[i] && !active[j])) continue;
+              if ((own && same && j <= i) || (!active[i] && !active[j])) continue;
               ++tested_;
               if (boxes[i].overlaps(boxes[j])) pairs_.push_back({std::min(i, j), std::max(i, j)});
             }

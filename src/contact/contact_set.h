@@ -65,7 +65,8 @@ class ContactSolver {
              ContactCounters& counters);
   /// One sweep that lets out some of the overlap that there is, h [s] after the last; impulses are left alone.
   void letOut(const ContactScene& scene, const std::vector<ContactParty>& parties, std::vector<Contact>& contacts,
-              const std::vector<ContactEntry>& entries, const IslandPlan& plan, double h, ContactCounters& counters);
+              const std::vector<ContactEntry>& entries, const IslandPlan& plan, double h, const ForEach& for_each,
+              ContactCounters& counters);
 
  private:
   struct Impl;

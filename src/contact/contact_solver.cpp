@@ -186,7 +186,6 @@ struct ContactSolver::Impl {
   std::vector<Rigid> rigid;            // one a party
   std::vector<Vec3> shifts;            // of particles by the local shares of impulses, see IslandPlan::shifts
   std::vector<Row> rows;               // of all islands in a solve(), kept while nothing turns
-  std::vector<Row> let_rows;           // of an island in letOut()
   std::vector<Index> tasks;            // first island of each, and the end
   std::vector<std::size_t> corrected;  // one a task
   std::vector<Index> row_counts;       // one an island
@@ -279,8 +278,7 @@ struct ContactSolver::Impl {
       for (Index i = 0; i < party.particles; ++i) visit(i, shift[i]);
     } else {
       const Vec3 offset = r.shift - r.turn.cross(r.centre);
-      for (Index i = 0; i < party.particles; ++i)
-        visit(i, Vec3(shift[i] + offset + r.turn.cross(party.positions[i])));
+      for (Index i = 0; i < party.particles; ++i) visit(i, Vec3(shift[i] + offset + r.turn.cross(party.positions[i])));
     }
   }
 
@@ -325,6 +323,8 @@ struct ContactSolver::Impl {
     for (Index p : of_plan.parties) particles += of_parties[p].particles;
     if (shifts.size() < particles) shifts.resize(particles);
   }
+
+  void shareOut();
 
   // Fills what both kinds of sweep need; false where there is nothing to hold.
   bool prepare(Contact& c, bool with_motion, Gap& gap, Row& row) {
@@ -530,6 +530,40 @@ struct ContactSolver::Impl {
     return 1;
   }
 
+  std::size_t letOutIsland(Index island, std::vector<Contact>& contacts, double h) {
+    Row* const first = rows.data() + plan->contact_offsets[island];
+    Row* end = first;
+    for (Index k = plan->contact_offsets[island]; k < plan->contact_offsets[island + 1]; ++k) {
+      Contact& c = contacts[plan->contacts[k]];
+      if (!c.below) continue;
+      Gap gap;
+      if (!readGap<false>(*scene, *parties, c, *entries, false, gap)) continue;
+      if (!(c.normal.dot(gap.point_a - gap.point_b) < 0.0)) continue;
+      if (c.direct && c.b != kNoIndex && !c.caught &&
+          std::min({c.weights[0], c.weights[1], c.weights[2]}) < -kFarBeside)
+        continue;
+      if (end == first) begin(island);
+      if (!prepare(c, false, gap, *end)) continue;
+      double size = (*parties)[c.a].shape->size();
+      if (!end->on_ground) size = std::min(size, (*parties)[c.b].shape->size());
+      const double old = -end->distance;
+      end->target = c.caught ? std::min(old, kCaughtSpeed * size * h) - old
+                             : std::min(kLetOutShare * old, kLetOutSpeed * size * h) - old;
+      ++end;
+    }
+    if (end == first) return 0;
+    std::size_t moved = 0;
+    for (const Row* row = first; row != end; ++row) {
+      const double wrong = row->target - row->distance - row->normal.dot(relativeShift(*row));
+      if (!(wrong > 0.0)) continue;
+      const double impulse = wrong * row->inverse_answer;
+      apply(*row, impulse * row->normal);
+      ++moved;
+    }
+    finish(island, 1.0);
+    return moved;
+  }
+
   // The bodies have hardly turned since begin(): only where they are is found anew.
   void beginAgain(Index island) {
     for (Index k = plan->party_offsets[island]; k < plan->party_offsets[island + 1]; ++k) {
@@ -550,6 +584,16 @@ ContactSolver::~ContactSolver() = default;
 ContactSolver::ContactSolver(ContactSolver&&) noexcept = default;
 ContactSolver& ContactSolver::operator=(ContactSolver&&) noexcept = default;
 
+// Some islands with about as many contacts as the others'.
+void ContactSolver::Impl::shareOut() {
+  tasks.assign(1, 0);
+  for (Index island = 0; island < plan->size(); ++island)
+    if (plan->contact_offsets[island + 1] - plan->contact_offsets[tasks.back()] >= kTaskContacts)
+      tasks.push_back(island + 1);
+  if (tasks.back() != plan->size()) tasks.push_back(plan->size());
+  corrected.assign(tasks.size() - 1, 0);
+}
+
 void ContactSolver::solve(const ContactScene& scene, const std::vector<ContactParty>& parties,
                           std::vector<Contact>& contacts, const std::vector<ContactEntry>& entries,
                           const IslandPlan& plan, bool fresh, const ForEach& for_each, ContactCounters& counters) {
@@ -558,13 +602,7 @@ void ContactSolver::solve(const ContactScene& scene, const std::vector<ContactPa
   // Rows are kept in place: an island has room for all of its contacts.
   w.rows.resize(plan.contacts.size());
   w.row_counts.resize(plan.size());
-  // A task is some islands with about as many contacts as the others'.
-  w.tasks.assign(1, 0);
-  for (Index island = 0; island < plan.size(); ++island)
-    if (plan.contact_offsets[island + 1] - plan.contact_offsets[w.tasks.back()] >= kTaskContacts)
-      w.tasks.push_back(island + 1);
-  if (w.tasks.back() != plan.size()) w.tasks.push_back(plan.size());
-  w.corrected.assign(w.tasks.size() - 1, 0);
+  w.shareOut();
   runEach(for_each, w.tasks.size() - 1, [&](std::size_t task) {
     for (Index island = w.tasks[task]; island < w.tasks[task + 1]; ++island)
       w.solveIsland(island, contacts, fresh, w.corrected[task]);
@@ -574,40 +612,16 @@ void ContactSolver::solve(const ContactScene& scene, const std::vector<ContactPa
 
 void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactParty>& parties,
                            std::vector<Contact>& contacts, const std::vector<ContactEntry>& entries,
-                           const IslandPlan& plan, double h, ContactCounters& counters) {
+                           const IslandPlan& plan, double h, const ForEach& for_each, ContactCounters& counters) {
   Impl& w = *impl_;
   w.start(scene, parties, entries, plan);
-  for (Index island = 0; island < plan.size(); ++island) {
-    w.let_rows.clear();
-    for (Index k = plan.contact_offsets[island]; k < plan.contact_offsets[island + 1]; ++k) {
-      Contact& c = contacts[plan.contacts[k]];
-      if (!c.below) continue;
-      Gap gap;
-      if (!readGap<false>(scene, parties, c, entries, false, gap)) continue;
-      if (!(c.normal.dot(gap.point_a - gap.point_b) < 0.0)) continue;
-      if (c.direct && c.b != kNoIndex && !c.caught &&
-          std::min({c.weights[0], c.weights[1], c.weights[2]}) < -kFarBeside)
-        continue;
-      Row row;
-      if (w.let_rows.empty()) w.begin(island);
-      if (!w.prepare(c, false, gap, row)) continue;
-      double size = parties[c.a].shape->size();
-      if (!row.on_ground) size = std::min(size, parties[c.b].shape->size());
-      const double old = -row.distance;
-      row.target = c.caught ? std::min(old, kCaughtSpeed * size * h) - old
-                            : std::min(kLetOutShare * old, kLetOutSpeed * size * h) - old;
-      w.let_rows.push_back(row);
-    }
-    if (w.let_rows.empty()) continue;
-    for (const Row& row : w.let_rows) {
-      const double wrong = row.target - row.distance - row.normal.dot(w.relativeShift(row));
-      if (!(wrong > 0.0)) continue;
-      const double impulse = wrong * row.inverse_answer;
-      w.apply(row, impulse * row.normal);
-      ++counters.corrected;
-    }
-    w.finish(island, 1.0);
-  }
+  w.rows.resize(plan.contacts.size());
+  w.shareOut();
+  runEach(for_each, w.tasks.size() - 1, [&](std::size_t task) {
+    for (Index island = w.tasks[task]; island < w.tasks[task + 1]; ++island)
+      w.corrected[task] += w.letOutIsland(island, contacts, h);
+  });
+  for (const std::size_t corrected : w.corrected) counters.corrected += corrected;
 }
 
 }  // namespace meshless

@@ -221,7 +221,7 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
     w.needed_substeps = std::max(w.needed_substeps, static_cast<int>(std::ceil(work / kMostPasses)));
   }
   w.frame = h;
-  w.solver.letOut(w.scene, parties, w.contacts, w.entries, w.plan, h, counters);
+  w.solver.letOut(w.scene, parties, w.contacts, w.entries, w.plan, h, for_each, counters);
   // Quick pairs are looked up again when they have moved, and so is what was caught.
   const bool any_caught = w.contacts.size() > lasting;
   w.contacts.resize(lasting);

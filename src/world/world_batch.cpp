@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t kLeastBodies = 32;     // fewer are not worth going there and back
 constexpr std::size_t kMostParticles = 256;  // larger ones fill the lanes by themselves
-constexpr double kFarthest = 200.0;          // radii of its rest shape that a body may reach in float, or go in a substep
+constexpr double kFarthest = 200.0;  // radii of its rest shape that a body may reach in float, or go in a substep
 
 bool suits(const WorldBody& body) {
   const BodyModel& model = *body.model;
@@ -80,18 +80,19 @@ void World::Impl::addBatch(std::vector<WorldBody*> group) {
 void World::Impl::matchBatches(double h) {
   const bool bounds_known = settings.contact == ContactMethod::kRestShape;
   for (WorldBatch& batch : batches) {
-    bool any = false;
-    for (std::size_t i = 0; i < batch.bodies.size(); ++i) {
+    const std::size_t count = batch.bodies.size();
+    forNumbers(count, [&](std::size_t i) {
       WorldBody& body = *batch.bodies[i];
       batch.states[i] = {body.state.positions.data(), body.state.velocities.data(), &body.state.poses[0].rotation,
                          !body.asleep && fitsFloat(body, bounds_known, h)};
-      if (body.asleep) continue;
-      if (!batch.states[i].moves) {
+      if (batch.states[i].moves) body.scratch.previous = body.state.positions;
+    });
+    bool any = false;
+    for (std::size_t i = 0; i < count; ++i) {
+      WorldBody& body = *batch.bodies[i];
+      any = any || batch.states[i].moves;
+      if (!batch.states[i].moves && !body.asleep)
         matchAndMove(*body.model, body.material, settings.gravity, h, body.state, body.scratch, report.match_counters);
-        continue;
-      }
-      any = true;
-      body.scratch.previous = body.state.positions;
     }
     if (!any) continue;
     BatchStep step = batchStep(batch.bodies.front()->material, h);

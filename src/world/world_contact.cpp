@@ -12,7 +12,6 @@ namespace {
 constexpr double kLeastRigid = 0.5;          // share of a contact's impulse that moves a body for looks as a whole
 constexpr double kFlattest = 1e-6;           // det of a map: below, the rotation stands in
 constexpr std::size_t kWorthAThread = 1000;  // vertices
-constexpr std::size_t kTaskBodies = 128;     // looked at by one task
 constexpr std::size_t kKeptModels = 64;      // more than this many dead entries are cleared away
 
 SurfaceRows rowsOf(const BodyModel& model) {
@@ -124,13 +123,11 @@ void World::Impl::findContacts(double h_frame) {
     contacts.findPairs(scene, parties, h_frame, report.contact_counters);
     for (std::size_t b = 0; b < bodies.size(); ++b)
       if (contacts.needed()[b]) equipParty(*bodies[b], parties[b]);
-    for_each((bodies.size() + kTaskBodies - 1) / kTaskBodies, [this](std::size_t task) {
-      for (std::size_t b = task * kTaskBodies; b < std::min(bodies.size(), (task + 1) * kTaskBodies); ++b) {
-        if (!(contacts.needed()[b] & 1)) continue;
-        fitMaps(*bodies[b], parties[b].positions, bodies[b]->maps);
-        parties[b].maps = bodies[b]->maps.data();
-        parties[b].map_count = static_cast<Index>(bodies[b]->maps.size());
-      }
+    forNumbers(bodies.size(), [this](std::size_t b) {
+      if (!(contacts.needed()[b] & 1)) return;
+      fitMaps(*bodies[b], parties[b].positions, bodies[b]->maps);
+      parties[b].maps = bodies[b]->maps.data();
+      parties[b].map_count = static_cast<Index>(bodies[b]->maps.size());
     });
     contacts.make(parties, h_frame, report.contact_counters, for_each);
     bool woken = false;
@@ -162,10 +159,7 @@ void World::Impl::fillParties() {
     party.bounds = obstacle.bounds;
     party.moves = false;
   }
-  for_each((bodies.size() + kTaskBodies - 1) / kTaskBodies, [this](std::size_t task) {
-    for (std::size_t b = task * kTaskBodies; b < std::min(bodies.size(), (task + 1) * kTaskBodies); ++b)
-      fillParty(*bodies[b], parties[b]);
-  });
+  forNumbers(bodies.size(), [this](std::size_t b) { fillParty(*bodies[b], parties[b]); });
 }
 
 void World::Impl::fillParty(WorldBody& body, ContactParty& party) {

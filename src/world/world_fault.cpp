@@ -43,9 +43,14 @@ void restAnew(WorldBody& body) {
 }  // namespace
 
 void World::Impl::mendFaults() {
+  faulty.assign(awake.size(), false);
+  forNumbers(awake.size(), [this](std::size_t b) {
+    faulty[b] = !withinBounds(awake[b]->state.positions) || !withinBounds(awake[b]->state.velocities);
+  });
   bool any = false;
-  for (WorldBody* body : awake) {
-    if (withinBounds(body->state.positions) && withinBounds(body->state.velocities)) continue;
+  for (std::size_t b = 0; b < awake.size(); ++b) {
+    if (!faulty[b]) continue;
+    WorldBody* const body = awake[b];
     restAnew(*body);
     body->surface_current = false;
     body->still_for = 0.0;

@@ -105,6 +105,14 @@ struct CutUndo {
 struct World::Impl {
   WorldSettings settings;
   ForEach for_each = oneAfterAnother;
+  /// work(n) for n below count, shared out over the threads.
+  template <class Work>
+  void forNumbers(std::size_t count, const Work& work) const {
+    constexpr std::size_t kTask = 128;
+    runEach(for_each, (count + kTask - 1) / kTask, [&](std::size_t task) {
+      for (std::size_t n = task * kTask; n < std::min(count, (task + 1) * kTask); ++n) work(n);
+    });
+  }
   std::uint64_t step = 0;
   std::uint32_t run = 1;
   std::vector<std::unique_ptr<WorldBody>> bodies;  // in the order in which they came
@@ -126,6 +134,7 @@ struct World::Impl {
   StepReport report;
   std::size_t tetrahedralizations = 0;
   std::vector<WorldBody*> awake;  // of this frame, in the order of bodies
+  std::vector<char> faulty;       // one each: its coordinates are no numbers
   std::uint32_t next_sleep_group = 1;
   std::vector<WorldBatch> batches;
   bool batches_current = false;  // false: bodies or materials have changed

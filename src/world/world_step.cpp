@@ -19,7 +19,6 @@ constexpr double kOffsetGone = 1e-7;         // of the spacing: then it is dropp
 constexpr double kDepenetrationSpeed = 0.5;  // [m/s] at which old overlap of bodies is let out at the least
 constexpr double kPushHopRadii = 0.25;       // longest way of the sphere between two looks at the tissue
 constexpr int kContactPasses = 2;
-constexpr std::size_t kTaskBodies = 128;  // of a task
 
 class Stopwatch {
  public:
@@ -75,8 +74,8 @@ void World::step() {
         w.matchBatches(h);
         for (WorldBody* body : w.awake)
           if (!body->batched)
-          matchAndMove(*body->model, body->material, w.settings.gravity, h, body->state, body->scratch,
-                       w.report.match_counters);
+            matchAndMove(*body->model, body->material, w.settings.gravity, h, body->state, body->scratch,
+                         w.report.match_counters);
       }
       {
         const Stopwatch tools(w.report.tools);
@@ -86,7 +85,8 @@ void World::step() {
         const Stopwatch contact(w.report.contact);
         for (WorldBody* body : w.awake) {
           body->scratch.touched.clear();
-          if (w.push.enabled || (w.settings.ground && (!rest_shape || body->model->surface.vertices.empty()))) body->scratch.before_contact = body->state.positions;
+          if (w.push.enabled || (w.settings.ground && (!rest_shape || body->model->surface.vertices.empty())))
+            body->scratch.before_contact = body->state.positions;
         }
         if (rest_shape)
           w.solveContacts(h);
@@ -123,10 +123,8 @@ void World::Impl::finishSubstep(double h) {
       preserve(*body->model, body->material, body->state, body->scratch, report.preserve_counters);
     body->surface_current = false;
   }
-  runEach(for_each, (awake.size() + kTaskBodies - 1) / kTaskBodies, [&](std::size_t task) {
-    for (std::size_t b = task * kTaskBodies; b < std::min(awake.size(), (task + 1) * kTaskBodies); ++b)
-      velocitiesFromPositions(*awake[b]->model, h, awake[b]->state, awake[b]->scratch);
-  });
+  forNumbers(awake.size(),
+             [&](std::size_t b) { velocitiesFromPositions(*awake[b]->model, h, awake[b]->state, awake[b]->scratch); });
   // Being pushed out does not throw: what the tissue does not get, the tool does not feel.
   if (push.touching)
     for (const WorldBody* body : awake) push.force += body->scratch.unfelt * settings.step_rate;
