@@ -199,47 +199,65 @@ void World::Impl::followPieces(const BodyId& parent, const std::vector<BodyId>& 
                                const std::vector<std::vector<Index>>& parent_particles) {
   for (Pick& pick : picks) {
     if (pick.body != parent) continue;
+    Pick followed = pick;
     for (std::size_t c = 0; c < children.size(); ++c) {
       const auto find_particle = [&](Index old) {
         const auto it = std::find(parent_particles[c].begin(), parent_particles[c].end(), old);
         return it == parent_particles[c].end() ? kNoIndex : static_cast<Index>(it - parent_particles[c].begin());
       };
       const Index centre = find_particle(pick.particle);
-      if (centre == kNoIndex) continue;
-      Pick followed = pick;
-      followed.body = children[c];
-      followed.particle = centre;
-      followed.patch.clear();
-      followed.weights.clear();
+      // What is left of the patch, and what its weights were.
+      std::vector<Index> patch;
+      std::vector<double> weights, lost;
       double total = 0.0;
       for (std::size_t k = 0; k < pick.patch.size(); ++k) {
         const Index now = find_particle(pick.patch[k]);
         if (now == kNoIndex) continue;
-        followed.patch.push_back(now);
-        followed.weights.push_back(pick.weights[k]);
+        patch.push_back(now);
+        weights.push_back(pick.weights[k]);
         total += pick.weights[k];
       }
-      for (double& w : followed.weights) w /= total;
-      // The pull goes over from the whole patch to what is left of it as what else was cut is let go.
-      WorldBody& child = *find(children[c]);
-      if (child.state.eased.empty()) {
-        child.state.eased.assign(child.model->rest.size(), Vec3::Zero());
-        child.state.eased_for = 0.0;
-        child.state.eased_whole = true;
+      if (patch.empty()) continue;
+      lost = weights;
+      if (centre != kNoIndex) {
+        for (std::size_t k = 0; k < weights.size(); ++k) {
+          weights[k] /= total;
+          lost[k] -= weights[k];
+        }
       }
-      for (std::size_t k = 0, old = 0; k < followed.patch.size(); ++k, ++old) {
-        while (find_particle(pick.patch[old]) != followed.patch[k]) ++old;
-        const Index i = followed.patch[k];
-        if (!child.model->fixed[i])
-          child.state.eased[i] += (pick.weights[old] - followed.weights[k]) / child.model->masses[i] * pick.force;
-      }
+      easePull(*find(children[c]), patch, lost, pick.force, centre != kNoIndex);
+      if (centre == kNoIndex) continue;
+      followed.body = children[c];
+      followed.particle = centre;
+      followed.patch = std::move(patch);
+      followed.weights = std::move(weights);
       // The grabbed point is where it was; only the patch around it is smaller now.
       followed.offset = pick.offset + graspMean(pick, find(parent)->state.positions) -
                         graspMean(followed, find(children[c])->state.positions);
-      pick = std::move(followed);
-      break;
     }
+    pick = std::move(followed);
   }
+}
+
+// The pull goes over from the whole patch to what is left of it as what else was cut is let go; the rest of the patch
+// loses it as slowly. Of a piece that moves freely the pull as a whole ends at once.
+void World::Impl::easePull(WorldBody& body, const std::vector<Index>& patch, const std::vector<double>& lost,
+                           const Vec3& force, bool held) {
+  const BodyModel& model = *body.model;
+  Points pull(model.rest.size(), Vec3::Zero());
+  for (std::size_t k = 0; k < patch.size(); ++k)
+    if (!model.fixed[patch[k]]) pull[patch[k]] = lost[k] / model.masses[patch[k]] * force;
+  if (body.state.eased.empty()) {
+    body.state.eased.assign(model.rest.size(), Vec3::Zero());
+    body.state.eased_for = 0.0;
+    body.state.eased_whole = held || model.any_fixed;
+  }
+  if (!body.state.eased_whole) {
+    const RigidMotion whole = rigidMotionOf(model, body.state.positions, pull);
+    for (std::size_t i = 0; i < pull.size(); ++i)
+      pull[i] -= whole.velocity + whole.spin.cross(body.state.positions[i] - whole.centre);
+  }
+  for (std::size_t i = 0; i < pull.size(); ++i) body.state.eased[i] += pull[i];
 }
 
 }  // namespace meshless

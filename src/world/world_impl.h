@@ -179,6 +179,8 @@ struct World::Impl {
   std::vector<Index> heldBySprings(const WorldBody& body) const;  // particles in the middle of a grasp
   /// Retires a body and admits its pieces in its place; their names.
   std::vector<std::string> replaceByPieces(const BodyId& parent, std::vector<BodyPiece> pieces);
+  void easePull(WorldBody& body, const std::vector<Index>& patch, const std::vector<double>& lost, const Vec3& force,
+                bool held);
   void followPieces(const BodyId& parent, const std::vector<BodyId>& children,
                     const std::vector<std::vector<Index>>& parent_particles);
 
