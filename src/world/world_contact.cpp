@@ -120,6 +120,7 @@ void World::Impl::findContacts(double h_frame) {
         parties[b].map_count = static_cast<Index>(bodies[b]->maps.size());
       }
     });
+    rememberSlow();
     contacts.make(parties, h_frame, report.contact_counters, for_each);
     bool woken = false;
     for (Index p : contacts.reached()) {

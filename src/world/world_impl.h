@@ -58,6 +58,8 @@ struct WorldBody {
   bool asleep = false;
   double still_for = 0.0;        // [s]
   std::uint32_t sleep_group = 0;  // those that fell asleep together wake together
+  bool slow = false;              // may fall asleep in this frame: where it was at its start is known
+  Points frame_start;             // [m] likewise
   StepScratch scratch;
 };
 
@@ -187,6 +189,7 @@ struct World::Impl {
   void wake(WorldBody& body);
   void wakeWithin(const Box& box);
   void wakePushed(double h_frame);
+  void rememberSlow();
   void fallAsleep(double h_frame);
   void mendFaults();
   void closeBlades();
