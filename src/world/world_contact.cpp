@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "meshless_surgery/dynamics/extent.h"
 #include "meshless_surgery/body/binding.h"
 #include "world_impl.h"
 
@@ -176,13 +177,11 @@ void World::Impl::fillParty(WorldBody& body, ContactParty& party) {
   }
   party.rigid_share =
       body.model->any_fixed || body.material.elastic() ? 0.0 : std::max(kLeastRigid, body.material.alpha);
-  Box velocities;
-  for (std::size_t i = 0; i < party.particles; ++i) {
-    party.bounds.extend(body.state.positions[i]);
-    velocities.extend(body.state.velocities[i]);
-  }
+  party.bounds = boundsOf(body.state.positions);
+  const Box velocities = boundsOf(body.state.velocities);
   party.velocity = 0.5 * (velocities.min + velocities.max);
   party.spread = body.spread = 0.5 * velocities.diagonal();
+  body.fastest = party.velocity.norm() + party.spread;
   if (!body.model->binding.riders.empty()) {  // riders reach beyond the particles
     party.bounds.min.array() -= 2.0 * body.model->spacing;
     party.bounds.max.array() += 2.0 * body.model->spacing;
@@ -225,7 +224,10 @@ void World::Impl::solveContacts(double h) {
 // eye: particles without a change of speed, riders by the offsets that fade.
 void World::Impl::liftOutOfGround(WorldBody& body, double h_frame) {
   const SurfaceBinding& binding = body.model->binding;
-  if (!settings.ground || !(body.bounds.min.z() - 2.0 * h_frame * speedOf(body) < *settings.ground)) return;
+  // Far above nobody has to ask how fast it is by now.
+  if (!settings.ground || !(body.bounds.min.z() - body.bounds.diagonal() - h_frame * body.fastest < *settings.ground) ||
+      !(body.bounds.min.z() - 2.0 * h_frame * speedOf(body) < *settings.ground))
+    return;
   for (Index i : binding.particle)
     if (i != kNoIndex && body.state.positions[i].z() < *settings.ground && !body.model->fixed[i])
       body.state.positions[i].z() = *settings.ground;

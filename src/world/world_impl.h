@@ -54,6 +54,7 @@ struct WorldBody {
   double stiffness_factor = 1.0;
   Box bounds;                    // [m] of particles and surface, at the start of the last frame in which it was awake
   double spread = 0.0;   // [m/s] likewise: by how much velocities differ
+  double fastest = 0.0;  // [m/s] likewise: no particle is faster
   bool batched = false;  // matched with others of its kind
   bool asleep = false;
   double still_for = 0.0;        // [s]

@@ -7,6 +7,7 @@
 #include <new>
 
 #include "contact_pile.h"
+#include "meshless_surgery/body/deform.h"
 #include "support/bodies.h"
 
 namespace {
@@ -118,6 +119,55 @@ TEST(Work, OneBodyInTheAirHasMatchingAlone) {
     EXPECT_EQ(report.match_counters.clusters, report.substeps);
     EXPECT_EQ(report.asleep, 0u);
     EXPECT_EQ(report.woken, 0u);
+  }
+}
+
+// With all that a world can do switched on and nothing of it in use: what the deformer alone does, and nothing else.
+TEST(Work, ABodyThatUsesNothingIsDeformedAndNothingElse) {
+  for (const bool elastic : {false, true}) {
+    SCOPED_TRACE(elastic ? "elastic" : "looks");
+    WorldSettings settings;
+    settings.gravity.setZero();
+    BodyDef def = test::block("block", Vec3(0.0, 0.0, 5.0));
+    if (elastic) {
+      def.material.youngs_modulus = 5000.0;
+      def.material.poissons_ratio = 0.3;
+    }
+    PreparedBody body = test::prepared(def);
+    for (std::size_t i = 0; i < body.state.positions.size(); ++i)
+      body.state.velocities[i] = Vec3(0.5, 1.0, 2.0).cross(body.state.positions[i] - def.pose.translation);
+    World world(settings);
+    ASSERT_TRUE(world.addSceneBody(std::make_shared<const PreparedBody>(body)).ok());
+    StepScratch scratch;
+    for (int step = 0; step < 30; ++step) {
+      if (step == 10) allocations = 0;
+      counting = step >= 10;
+      world.step();
+      counting = false;
+      const StepReport report = reportOf(world);
+      MatchCounters alone;
+      const double h = 1.0 / settings.step_rate / static_cast<double>(report.substeps);
+      for (std::size_t n = 0; n < report.substeps; ++n) {
+        matchAndMove(*body.model, def.material, settings.gravity, h, body.state, scratch, alone);
+        velocitiesFromPositions(*body.model, h, body.state, scratch);
+      }
+      const MatchCounters& match = report.match_counters;
+      EXPECT_EQ(match.clusters, alone.clusters);
+      EXPECT_EQ(match.rotations, alone.rotations);
+      EXPECT_EQ(match.linear_fits, alone.linear_fits);
+      EXPECT_EQ(match.quadratic_moments, alone.quadratic_moments);
+      EXPECT_EQ(match.plastic_flows, 0u);
+      expectNoContactWork(report.contact_counters);
+      EXPECT_EQ(report.contact_counters.bounds_tested, 0u);
+      EXPECT_EQ(report.contact_counters.self_points, 0u);
+      EXPECT_EQ(report.preserve_counters.gradients, 0u);
+      EXPECT_EQ(report.contact_shapes, 0u);
+      EXPECT_EQ(report.tetrahedralizations, 0u);
+      EXPECT_EQ(report.ground_contacts, 0u);
+      EXPECT_EQ(report.push_contacts, 0u);
+      EXPECT_EQ(particlesOf(world)[0], body.state.positions) << "to the bit";
+    }
+    if (kCounts) EXPECT_EQ(allocations, 0u);
   }
 }
 
