@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "contact_set.h"
+#include "meshless_surgery/base/bytes.h"
 
 namespace meshless {
 namespace {
@@ -608,6 +609,11 @@ void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactP
     }
     w.finish(island, 1.0);
   }
+}
+
+std::size_t ContactSolver::bytes() const {
+  const Impl& w = *impl_;
+  return sizeof w + bytesOf(w.rigid, w.shifts, w.rows, w.let_rows, w.tasks, w.corrected, w.row_counts);
 }
 
 }  // namespace meshless

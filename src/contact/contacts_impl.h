@@ -57,6 +57,7 @@ class SelfGrid {
   /// Faces that may be within reach of p, each once, in their order.
   template <class Visit>
   void forNear(const Vec3& p, const Visit& visit) const;
+  std::size_t bytes() const { return bytesOf(boxes_, offsets_, items_, next_); }
 
  private:
   template <class Visit>

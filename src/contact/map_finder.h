@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "meshless_surgery/base/bytes.h"
 #include "meshless_surgery/contact/contacts.h"
 
 namespace meshless {
@@ -73,6 +74,8 @@ class MapFinder {
     }
     return best;
   }
+
+  std::size_t bytes() const { return bytesOf(offsets_, items_, next_); }
 
  private:
   static constexpr Index kFewMaps = 8;  // so many are searched one by one

@@ -20,6 +20,7 @@ struct ContactModel {
   std::vector<double> inverse_masses;  // [1/kg] 0 where fixed
   /// Made when first asked for, by one thread.
   const SelfContactSet& self(bool cuts_alone) const;
+  std::size_t bytes() const;  // that it holds, without the model
 
  private:
   mutable std::array<std::unique_ptr<const SelfContactSet>, 2> self_;

@@ -107,6 +107,8 @@ class Contacts {
   void points(const std::vector<ContactParty>& parties, std::vector<Point>& points) const;
   /// Deepest overlap that make() found, relative to the smaller body's size, one a contact below the surface.
   const std::vector<double>& depths() const;
+  /// Bytes that it holds.
+  std::size_t bytes() const;
   /// Forgets what it remembers of pairs.
   void clear();
   /// All that the next frame reads of the ones before, to be given back to contacts of the same parties
