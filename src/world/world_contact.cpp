@@ -2,8 +2,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "meshless_surgery/dynamics/extent.h"
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/dynamics/extent.h"
+#include "meshless_surgery/world/quadratic_fit.h"
 #include "world_impl.h"
 
 namespace meshless {
@@ -53,10 +54,13 @@ double speedOf(const WorldBody& body) {
   return std::sqrt(fastest);
 }
 
-void fitMaps(const WorldBody& body, const Vec3* positions, std::vector<ContactMap>& maps) {
+// The maps of a frame: positions are the body's, which bends within a cluster where its mode is quadratic.
+void fitMaps(WorldBody& body, const Vec3* positions, std::vector<ContactMap>& maps) {
   const MatchInput in = matchInput(*body.model, body.state);
   maps.resize(in.clusters.size());
   for (Index c = 0; c < in.clusters.size(); ++c) maps[c] = fitMap(in, c, positions, body.state.poses[c]);
+  if (!body.material.elastic() && body.material.mode == MatchMode::kQuadratic && !in.shape.quadratic.empty())
+    fitQuadraticMaps(in, positions, maps, body.quadratic_maps);
 }
 
 }  // namespace

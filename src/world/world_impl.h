@@ -48,6 +48,7 @@ struct WorldBody {
   std::shared_ptr<const ContactMesh> mesh;  // made when something first comes near
   std::shared_ptr<const ContactModel> contact;  // likewise, of the present model
   std::vector<ContactMap> maps;                 // of this frame, where it can touch another body
+  std::vector<QuadraticMap> quadratic_maps;     // likewise, where its mode is quadratic; maps point into it
   bool touched_by_push = false;
   bool low_current = false;          // in this frame
   std::vector<Index> low_particles;  // that can meet the ground

@@ -20,7 +20,7 @@ MemoryUse World::memory() const {
     use.particles += body->state.positions.size();
     if (first(body->model.get())) use.models += bytesOf(*body->model);
     use.states += sizeof *body + bytesOf(body->state) + bytesOf(body->scratch) + bytesOf(body->frame_start);
-    use.contact += bytesOf(body->maps, body->low_particles, body->low_riders);
+    use.contact += bytesOf(body->maps, body->quadratic_maps, body->low_particles, body->low_riders);
     if (first(body->contact.get())) use.contact += body->contact->bytes();
     if (first(body->mesh.get()))
       use.contact += sizeof *body->mesh + bytesOf(body->mesh->tetrahedra, body->mesh->faces, body->mesh->edges);

@@ -10,6 +10,7 @@
 #include "meshless_surgery/contact/broad_phase.h"
 #include "meshless_surgery/contact/contact_shape.h"
 #include "meshless_surgery/contact/deformable.h"
+#include "meshless_surgery/contact/quadratic_map.h"
 #include "meshless_surgery/contact/self_contact.h"
 
 namespace meshless {
@@ -21,6 +22,7 @@ struct ContactMap {
   Vec3 rest = Vec3::Zero();    // [m]
   Vec3 centre = Vec3::Zero();  // [m]
   bool flipped = false;        // it turns what it maps inside out
+  const QuadraticMap* quadratic = nullptr;  // where the cluster bends: the better map, to which this is the start
 };
 
 /// A body as contact sees it in a frame. Whoever fills it keeps what it points to alive.
