@@ -71,6 +71,13 @@ class SelfGrid {
   double edge_ = 1.0;
 };
 
+/// A ridge of a body that meets itself, where it is now.
+struct RidgeNow {
+  Box box;
+  Vec3 outward;  // unit
+  Index ridge;
+};
+
 /// What a task finds; tasks are joined in their order.
 struct Findings {
   std::vector<Contact> contacts;
@@ -79,6 +86,7 @@ struct Findings {
   ContactCounters counters;
   SelfGrid self_grid;
   Points self_areas;
+  std::vector<RidgeNow> ridges;
   std::size_t cursor = 0;  // in the contacts of the last frame
 
   void clear() {
@@ -153,6 +161,7 @@ struct Contacts::Impl {
   void lookInto(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair, Index a, Index b,
                 const ContactMap* maps, bool every_point, Inside& inside);
   void lookIntoSelf(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair);
+  void crossRidges(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair);
   void trace(const std::vector<ContactParty>& parties, Index a, Index b, ContactCounters& counters);
   void addCaught(const std::vector<ContactParty>& parties);
   void addGround(Findings& to, const std::vector<ContactParty>& parties, Index a, double reach);

@@ -7,7 +7,7 @@ namespace meshless {
 std::size_t ContactModel::bytes() const {
   std::size_t sum = sizeof *this - sizeof shape + shape.bytes() + bytesOf(inverse_masses);
   for (const auto& set : self_)
-    if (set) sum += sizeof *set + bytesOf(set->vertices, set->triangles);
+    if (set) sum += sizeof *set + bytesOf(set->vertices, set->triangles, set->ridges);
   return sum;
 }
 
