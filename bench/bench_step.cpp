@@ -12,6 +12,7 @@ int main(int argc, char** argv) {
   meshless::bench::registerLattice();
   meshless::bench::registerCells();
   meshless::bench::registerLiver();
+  meshless::bench::registerWorld();
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();
   return 0;

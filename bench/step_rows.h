@@ -87,5 +87,6 @@ void registerPile();
 void registerLattice();
 void registerCells();
 void registerLiver();
+void registerWorld();
 
 }  // namespace meshless::bench

@@ -28,7 +28,7 @@ if(benchmark_FOUND)
   add_bench(bench_rotation bench/bench_rotation.cpp)
   target_link_libraries(bench_rotation benchmark::benchmark)
   add_bench(bench_step bench/bench_step.cpp bench/step_rows.cpp bench/step_pile.cpp bench/step_lattice.cpp
-    bench/step_cells.cpp bench/step_liver.cpp)
+    bench/step_cells.cpp bench/step_liver.cpp bench/step_world.cpp)
   target_link_libraries(bench_step benchmark::benchmark)
   add_bench(bench_cut bench/bench_cut.cpp bench/cut_cgal_clip.cpp)
   target_link_libraries(bench_cut benchmark::benchmark CGAL::CGAL)

@@ -15,6 +15,7 @@ constexpr std::size_t kLookAnew = 8;    // frames after which a point is looked 
 constexpr double kWellWithin = 0.02;    // barycentric
 constexpr double kNearby = 0.1;         // of the thickness
 constexpr int kMostLookups = 8;
+constexpr double kFlattest = 1e-3;  // det of a slope: below, the cluster's affine map tells directions
 constexpr double kSlack = 0.1;  // of the thickness: how much farther a better face may be
 
 }  // namespace
@@ -32,7 +33,8 @@ double deviationWithin(const ContactParty& party, const MapFinder& finder, const
     const Vec3& now = vertexAt(party, s.vertices[0]);
     if (!near.contains(now)) continue;
     const ContactMap& map = maps[finder.nearest(now)];
-    const Vec3 fitted = map.from_rest * (shape.surface().vertices[s.vertices[0]] - map.rest) + map.centre;
+    const Vec3& at_rest = shape.surface().vertices[s.vertices[0]];
+    const Vec3 fitted = map.quadratic ? map.quadratic->at(at_rest) : Vec3(map.from_rest * (at_rest - map.rest) + map.centre);
     farthest = std::max(farthest, (now - fitted).squaredNorm());
   }
   return std::min(most, (party.map_count > 1 ? kNeighbour : kSameMap) * std::sqrt(farthest));
@@ -47,12 +49,18 @@ bool Contacts::Impl::locate(const ContactParty& b, double deviation, const MapFi
   flipped = map.flipped;
   const ContactShape& shape = *b.shape;
   Vec3 rest = map.to_rest * (p - map.centre) + map.rest;
+  const Mat3* to_rest = &map.to_rest;
+  Mat3 bent;
+  if (map.quadratic && map.quadratic->invert(p, shape.bounds().diagonal(), rest, bent)) {
+    to_rest = &bent;
+    flipped = bent.determinant() < 0.0;
+  }
   // So far outside of the rest bounds that no deviation brings it back: nothing to look up.
   const Box& bounds = shape.bounds();
   const Vec3 beyond = (bounds.min - rest).cwiseMax(rest - bounds.max).cwiseMax(0.0);
   const double far = deviation + reach;
   if (!(beyond.squaredNorm() < far * far) || shape.clearance(rest) > far) return false;
-  const Vec3 inward_rest = (map.to_rest * inward).normalized();
+  const Vec3 inward_rest = (*to_rest * inward).normalized();
   const double enough = kMovedInRest * shape.size();
   for (int n = 0; n < kMostLookups; ++n) {
     ++counters.lookups;
@@ -66,7 +74,7 @@ bool Contacts::Impl::locate(const ContactParty& b, double deviation, const MapFi
       at_rest += found.weights[k] * shape.surface().vertices[corners[k]];
       at_present += found.weights[k] * vertexAt(b, corners[k]);
     }
-    const Vec3 there = map.to_rest * (p - at_present) + at_rest;
+    const Vec3 there = *to_rest * (p - at_present) + at_rest;
     if ((there - rest).squaredNorm() < enough * enough) break;
     rest = there;
   }
@@ -164,7 +172,12 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
   inside.points = samples.size();
   const ContactMap* own = maps == with.maps ? of.maps : maps_now[a].data();
   const auto inwardAt = [&](const Vec3& p, const ContactSample& sample) -> Vec3 {
-    return -(own[finders[a].nearest(p)].to_rest.transpose() * sample.normal).normalized();
+    const ContactMap& map = own[finders[a].nearest(p)];
+    if (!map.quadratic) return -(map.to_rest.transpose() * sample.normal).normalized();
+    const Mat3 slope = map.quadratic->slope(of.shape->surface().vertices[sample.vertices[0]]);
+    const double det = slope.determinant();
+    if (!(std::abs(det) > kFlattest)) return -(map.to_rest.transpose() * sample.normal).normalized();
+    return -(slope.inverse().transpose() * sample.normal).normalized();
   };
   double deviation = -1.0;  // known once something is looked up
   for (Index s = 0; s < samples.size(); ++s) {

@@ -45,6 +45,7 @@ struct IslandPlan {
 
   Index size() const { return contact_offsets.empty() ? 0 : static_cast<Index>(contact_offsets.size() - 1); }
   void make(const std::vector<ContactParty>& parties, const std::vector<Contact>& contacts);
+  std::size_t bytes() const;
 
  private:
   std::vector<Index> root_, number_, next_;
@@ -67,6 +68,7 @@ class ContactSolver {
   void letOut(const ContactScene& scene, const std::vector<ContactParty>& parties, std::vector<Contact>& contacts,
               const std::vector<ContactEntry>& entries, const IslandPlan& plan, double h, const ForEach& for_each,
               ContactCounters& counters);
+  std::size_t bytes() const;
 
  private:
   struct Impl;

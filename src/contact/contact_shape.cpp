@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "grid_rings.h"
+#include "meshless_surgery/base/bytes.h"
 #include "meshless_surgery/geometry/nearest_on_triangle.h"
 
 namespace meshless {
@@ -147,15 +148,10 @@ ContactShape::~ContactShape() {
 }
 
 std::size_t ContactShape::bytes() const {
-  std::size_t sum = sizeof *this + surface_.vertices.size() * sizeof(Vec3) + facets_.size() * sizeof(Facet) +
-                    surface_.triangles.size() * sizeof(Triangle) + rider_of_.size() * sizeof(Index) +
-                    samples_.size() * sizeof(ContactSample) +
-                    (bin_offsets_.size() + bin_triangles_.size()) * sizeof(Index) +
-                    cell_total_ * (sizeof(std::atomic<std::uintptr_t>) + sizeof(std::atomic<float>));
-  for (std::size_t i = 0; i < cell_total_; ++i)
-    if (const std::uintptr_t cell = cells_[i].load(std::memory_order_acquire); cell > kAsked)
-      sum += sizeof(Cell) + reinterpret_cast<const Cell*>(cell)->triangles.size() * sizeof(Index);
-  return sum;
+  return sizeof *this + bytesOf(surface_.vertices, surface_.triangles, surface_.patches, facets_, rider_of_, samples_) +
+         bytesOf(bin_offsets_, bin_triangles_, across_) +
+         cell_total_ * (sizeof(std::atomic<std::uintptr_t>) + sizeof(std::atomic<float>)) +
+         cell_bytes_.load(std::memory_order_relaxed);
 }
 
 void ContactShape::binTriangles() {
@@ -265,6 +261,7 @@ const ContactShape::Cell* ContactShape::fill(std::size_t index, const std::array
   while (known <= kAsked)
     if (cells_[index].compare_exchange_weak(known, made, std::memory_order_acq_rel)) {
       cells_filled_.fetch_add(1, std::memory_order_relaxed);
+      cell_bytes_.fetch_add(sizeof(Cell) + bytesOf(cell->triangles), std::memory_order_relaxed);
       return cell.release();
     }
   return reinterpret_cast<const Cell*>(known);

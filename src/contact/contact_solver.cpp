@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "contact_set.h"
+#include "meshless_surgery/base/bytes.h"
 
 namespace meshless {
 namespace {
@@ -622,6 +623,11 @@ void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactP
       w.corrected[task] += w.letOutIsland(island, contacts, h);
   });
   for (const std::size_t corrected : w.corrected) counters.corrected += corrected;
+}
+
+std::size_t ContactSolver::bytes() const {
+  const Impl& w = *impl_;
+  return sizeof w + bytesOf(w.rigid, w.shifts, w.rows, w.tasks, w.corrected, w.row_counts);
 }
 
 }  // namespace meshless

@@ -57,6 +57,7 @@ class SelfGrid {
   /// Faces that may be within reach of p, each once, in their order.
   template <class Visit>
   void forNear(const Vec3& p, const Visit& visit) const;
+  std::size_t bytes() const { return bytesOf(boxes_, offsets_, items_, next_); }
 
  private:
   template <class Visit>
@@ -70,6 +71,13 @@ class SelfGrid {
   double edge_ = 1.0;
 };
 
+/// A ridge of a body that meets itself, where it is now.
+struct RidgeNow {
+  Box box;
+  Vec3 outward;  // unit
+  Index ridge;
+};
+
 /// What a task finds; tasks are joined in their order.
 struct Findings {
   std::vector<Contact> contacts;
@@ -78,6 +86,7 @@ struct Findings {
   ContactCounters counters;
   SelfGrid self_grid;
   Points self_areas;
+  std::vector<RidgeNow> ridges;
   std::size_t cursor = 0;  // in the contacts of the last frame
 
   void clear() {
@@ -152,6 +161,7 @@ struct Contacts::Impl {
   void lookInto(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair, Index a, Index b,
                 const ContactMap* maps, bool every_point, Inside& inside);
   void lookIntoSelf(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair);
+  void crossRidges(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair);
   void trace(const std::vector<ContactParty>& parties, Index a, Index b, ContactCounters& counters);
   void addCaught(const std::vector<ContactParty>& parties);
   void addGround(Findings& to, const std::vector<ContactParty>& parties, Index a, double reach);

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "grid_rings.h"
+#include "meshless_surgery/base/bytes.h"
 #include "meshless_surgery/contact/contacts.h"
 
 namespace meshless {
@@ -66,6 +67,8 @@ class MapFinder {
     }
     return best;
   }
+
+  std::size_t bytes() const { return bytesOf(offsets_, items_, next_); }
 
  private:
   static constexpr Index kFewMaps = 8;  // so many are searched one by one

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include "contacts_impl.h"
 #include "meshless_surgery/geometry/nearest_on_triangle.h"
@@ -16,6 +17,69 @@ constexpr double kOver = 0.9;            // of the distance: a point is over a f
 constexpr double kBehindAtRest = 0.1;    // of the depth: what is behind a face at rest has tissue between
 constexpr double kNearAtRest = 3.0;      // depths
 constexpr int kMostCells = 64;           // along an edge of the grid
+constexpr double kRidge = 0.94;          // cosine of the normals beside a ridge, at most: about 20 degrees
+constexpr double kOutwards = -0.2;       // sine of the angle by which the face beyond it is turned back
+constexpr double kParallel = 0.05;       // sine: ridges along each other do not cross
+constexpr Index kMostRidges = 1 << 15;   // so that a pair of them is told by one number
+
+// Edges of the chosen faces at which they turn outwards, or end.
+std::vector<SelfContactSet::Ridge> ridgesOf(const TriangleMesh& surface, const std::vector<Index>& triangles) {
+  struct Side {
+    std::array<Index, 2> edge;
+    Index triangle, opposite;
+  };
+  std::vector<Side> sides;
+  for (Index t : triangles)
+    for (int k = 0; k < 3; ++k) {
+      const Triangle& c = surface.triangles[t];
+      const Index u = c[(k + 1) % 3], v = c[(k + 2) % 3];
+      sides.push_back({{std::min(u, v), std::max(u, v)}, t, c[k]});
+    }
+  std::sort(sides.begin(), sides.end(),
+            [](const Side& p, const Side& q) { return std::tie(p.edge, p.triangle) < std::tie(q.edge, q.triangle); });
+  const auto normalOf = [&surface](Index t) -> Vec3 {
+    const Triangle& c = surface.triangles[t];
+    const Vec3& a = surface.vertices[c[0]];
+    return (surface.vertices[c[1]] - a).cross(surface.vertices[c[2]] - a).normalized();
+  };
+  std::vector<SelfContactSet::Ridge> ridges;
+  for (std::size_t k = 0; k < sides.size();) {
+    std::size_t end = k + 1;
+    while (end < sides.size() && sides[end].edge == sides[k].edge) ++end;
+    const bool two = end == k + 2;
+    bool ridge = end == k + 1;
+    if (two) {
+      const Vec3 normal = normalOf(sides[k].triangle);
+      const Vec3 beyond = surface.vertices[sides[k + 1].opposite] - surface.vertices[sides[k].edge[0]];
+      ridge = normal.dot(normalOf(sides[k + 1].triangle)) < kRidge && normal.dot(beyond) < kOutwards * beyond.norm();
+    }
+    if (ridge) ridges.push_back({sides[k].edge, {sides[k].triangle, two ? sides[k + 1].triangle : kNoIndex}});
+    k = end;
+  }
+  return ridges;
+}
+
+bool isBehindAtRest(const TriangleMesh& rest, const SelfContactSet::Ridge& ridge, const Vec3& p, double depth) {
+  for (Index f : ridge.faces) {
+    if (f == kNoIndex) continue;
+    const Triangle& c = rest.triangles[f];
+    const Vec3& r0 = rest.vertices[c[0]];
+    const Vec3 area = (rest.vertices[c[1]] - r0).cross(rest.vertices[c[2]] - r0);
+    if (area.dot(p - r0) > -kBehindAtRest * depth * area.norm()) return false;
+  }
+  return true;
+}
+
+// Where two segments, from a along u and from b along v, are nearest; false where that is not within both.
+bool crossing(const Vec3& a, const Vec3& u, const Vec3& b, const Vec3& v, double& s, double& t) {
+  const double uu = u.squaredNorm(), vv = v.squaredNorm(), uv = u.dot(v);
+  const double det = uu * vv - uv * uv;
+  if (!(det > kParallel * kParallel * uu * vv)) return false;
+  const Vec3 d = b - a;
+  s = (u.dot(d) * vv - v.dot(d) * uv) / det;
+  t = (u.dot(d) * uv - v.dot(d) * uu) / det;
+  return s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0;
+}
 
 }  // namespace
 
@@ -31,6 +95,7 @@ SelfContactSet selfContactSet(const ContactShape& shape, bool cuts_alone, double
   }
   for (Index v = 0; v < taken.size(); ++v)
     if (taken[v]) set.vertices.push_back(v);
+  set.ridges = ridgesOf(surface, set.triangles);
   return set;
 }
 
@@ -146,6 +211,80 @@ void Contacts::Impl::lookIntoSelf(Findings& to, const std::vector<ContactParty>&
                {weights_there.x(), weights_there.y(), weights_there.z()}, false, false);
     if (to.contacts.size() > before) to.contacts.back().below = height_there < 0.0;
   }
+  crossRidges(to, parties, pair);
+}
+
+// Ridges that cross: no vertex of one need be over a face of the other. They press along what is across both, out of
+// the second; where they touch stays the same in a frame.
+void Contacts::Impl::crossRidges(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair) {
+  const ContactParty& party = parties[pair.a];
+  const SelfContactSet& set = *party.self;
+  const TriangleMesh& rest = party.shape->surface();
+  if (set.ridges.size() < 2 || set.ridges.size() > kMostRidges) return;
+  const double reach = std::max(pair.reach, set.depth);
+  std::vector<RidgeNow>& now = to.ridges;
+  now.clear();
+  for (Index r = 0; r < set.ridges.size(); ++r) {
+    const SelfContactSet::Ridge& ridge = set.ridges[r];
+    RidgeNow here{{}, Vec3::Zero(), r};
+    for (Index v : ridge.vertices) here.box.extend(vertexAt(party, v));
+    for (Index f : ridge.faces) {
+      if (f == kNoIndex) continue;
+      const Triangle& c = rest.triangles[f];
+      const Vec3& x0 = vertexAt(party, c[0]);
+      here.outward += (vertexAt(party, c[1]) - x0).cross(vertexAt(party, c[2]) - x0).normalized();
+    }
+    here.outward.normalize();
+    if (!here.outward.allFinite() || !std::isfinite(here.box.diagonal())) continue;
+    here.box = grown(here.box, 0.5 * reach);
+    now.push_back(here);
+  }
+  std::sort(now.begin(), now.end(), [](const RidgeNow& p, const RidgeNow& q) {
+    return std::make_pair(p.box.min.x(), p.ridge) < std::make_pair(q.box.min.x(), q.ridge);
+  });
+  const std::size_t first = to.contacts.size();
+  for (std::size_t k = 0; k < now.size(); ++k)
+    for (std::size_t n = k + 1; n < now.size() && now[n].box.min.x() <= now[k].box.max.x(); ++n) {
+      if (now[k].outward.dot(now[n].outward) > kOpposed || !now[k].box.overlaps(now[n].box)) continue;
+      const bool in_order = now[k].ridge < now[n].ridge;
+      const RidgeNow &a = now[in_order ? k : n], &b = now[in_order ? n : k];
+      ++to.counters.self_points;
+      const std::array<Index, 2> &e = set.ridges[a.ridge].vertices, &f = set.ridges[b.ridge].vertices;
+      if (e[0] == f[0] || e[0] == f[1] || e[1] == f[0] || e[1] == f[1]) continue;
+      const Vec3 from_a = vertexAt(party, e[0]), from_b = vertexAt(party, f[0]);
+      const Vec3 along_a = vertexAt(party, e[1]) - from_a, along_b = vertexAt(party, f[1]) - from_b;
+      double s = 0.0, t = 0.0;
+      if (!crossing(from_a, along_a, from_b, along_b, s, t)) continue;
+      Vec3 normal = along_a.cross(along_b).normalized();
+      if (normal.dot(b.outward) < 0.0) normal = -normal;
+      // Each on the outer side of the other.
+      if (!(normal.dot(b.outward) > -kOpposed) || !(normal.dot(a.outward) < kOpposed)) continue;
+      const double height = normal.dot(from_a + s * along_a - from_b - t * along_b);
+      if (!(height < pair.reach) || !(height > -set.depth)) continue;
+      const Vec3 rest_a = rest.vertices[e[0]] + s * (rest.vertices[e[1]] - rest.vertices[e[0]]);
+      const Vec3 rest_b = rest.vertices[f[0]] + t * (rest.vertices[f[1]] - rest.vertices[f[0]]);
+      if ((rest_a - rest_b).norm() < kNearAtRest * set.depth &&
+          isBehindAtRest(rest, set.ridges[b.ridge], rest_a, set.depth))
+        continue;
+      Contact c;
+      c.a = c.b = pair.a;
+      c.sample = static_cast<Index>(rest.vertices.size()) + a.ridge * kMostRidges + b.ridge;
+      c.triangle = set.ridges[b.ridge].faces[0];
+      c.below = height < 0.0;
+      c.normal = normal;
+      c.first = static_cast<Index>(to.entries.size());
+      c.offset = addRow(party, e[0], 1.0 - s, to.entries);
+      c.offset += addRow(party, e[1], s, to.entries);
+      tidy(to.entries, c.first);
+      c.split = static_cast<Index>(to.entries.size());
+      c.offset -= addRow(party, f[0], 1.0 - t, to.entries);
+      c.offset -= addRow(party, f[1], t, to.entries);
+      tidy(to.entries, c.split);
+      c.end = static_cast<Index>(to.entries.size());
+      to.contacts.push_back(c);
+    }
+  std::sort(to.contacts.begin() + static_cast<std::ptrdiff_t>(first), to.contacts.end(),
+            [](const Contact& p, const Contact& q) { return p.sample < q.sample; });
 }
 
 }  // namespace meshless

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "elastic_batch_sets.h"
+#include "meshless_surgery/base/bytes.h"
 
 namespace meshless {
 namespace {
@@ -236,6 +237,12 @@ double ElasticBatch::accelerate(const MatchInput& in, const ElasticParameters& m
   counters.rotations += boxes_ + small_;
   counters.linear_fits += boxes_ + small_;
   return std::max(stretch, std::sqrt(most / 3.0));
+}
+
+std::size_t ElasticBatch::bytes() const {
+  return sizeof *this + bytesOf(clusters_, particles_, masses_, shapes_, force_offsets_, force_places_, inverse_masses_) +
+         bytesOf(others_.offsets, others_.members, others_.weights, others_.seeds, others_.radii) +
+         bytesOf(other_clusters_, other_shape_.clusters, other_shape_.quadratic, other_elastic_);
 }
 
 }  // namespace meshless

@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "match_batch_common.h"
+#include "meshless_surgery/base/bytes.h"
 
 namespace meshless {
 
@@ -232,6 +233,10 @@ BodyBatch::~BodyBatch() = default;
 BodyBatch::BodyBatch(BodyBatch&&) noexcept = default;
 BodyBatch& BodyBatch::operator=(BodyBatch&&) noexcept = default;
 std::size_t BodyBatch::size() const { return impl_->size; }
+std::size_t BodyBatch::bytes() const {
+  const Impl& w = *impl_;
+  return sizeof w + bytesOf(w.fields, w.constants, w.motion, w.quadratic, w.quaternions, w.flags, w.origins);
+}
 std::size_t BodyBatch::particles() const { return impl_->particles; }
 
 void BodyBatch::setState(std::size_t body, const Points& positions, const Points& velocities, const Quat& rotation) {

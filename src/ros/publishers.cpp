@@ -284,6 +284,17 @@ void Publishers::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     lost = lost_events_;
   }
   status.add("lost events", lost);
+  MemoryUse memory;
+  if (runner_.look([&memory](World& world) { memory = world.memory(); }).ok()) {
+    constexpr double kMegabyte = 1e6;
+    const auto megabytes = [](std::size_t bytes) { return formatNumber(static_cast<double>(bytes) / kMegabyte); };
+    status.add("particles", memory.particles);
+    status.add("memory of models [MB]", megabytes(memory.models));
+    status.add("memory of states [MB]", megabytes(memory.states));
+    status.add("memory of contact [MB]", megabytes(memory.contact));
+    status.add("memory for reset and undo [MB]", megabytes(memory.kept));
+    status.add("memory per particle [bytes]", formatNumber(memory.perParticle()));
+  }
   status.add("marker arrays built", markers_built_);
   status.add("surfaces built", surfaces_built_);
   status.add("clusters built", clusters_built_);

@@ -2,6 +2,7 @@
 // one after another, by the same laws.
 #include <algorithm>
 
+#include "meshless_surgery/dynamics/extent.h"
 #include "world_impl.h"
 
 namespace meshless {
@@ -30,10 +31,8 @@ bool alike(const WorldBody& a, const WorldBody& b) {
 // would never be whole again. With contact bounds and spread are those of the frame's start, else they are found here.
 bool fitsFloat(WorldBody& body, bool bounds_known, double h) {
   if (!bounds_known) {
-    Box velocities;
-    body.bounds = Box();
-    for (const Vec3& p : body.state.positions) body.bounds.extend(p);
-    for (const Vec3& v : body.state.velocities) velocities.extend(v);
+    body.bounds = boundsOf(body.state.positions);
+    const Box velocities = boundsOf(body.state.velocities);
     body.spread = 0.5 * velocities.diagonal();
   }
   const double most = kFarthest * body.model->shape.clusters[0].size;

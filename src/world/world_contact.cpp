@@ -4,6 +4,8 @@
 #include <future>
 
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/dynamics/extent.h"
+#include "meshless_surgery/world/quadratic_fit.h"
 #include "world_impl.h"
 
 namespace meshless {
@@ -53,10 +55,13 @@ double speedOf(const WorldBody& body) {
   return std::sqrt(fastest);
 }
 
-void fitMaps(const WorldBody& body, const Vec3* positions, std::vector<ContactMap>& maps) {
+// The maps of a frame: positions are the body's, which bends within a cluster where its mode is quadratic.
+void fitMaps(WorldBody& body, const Vec3* positions, std::vector<ContactMap>& maps) {
   const MatchInput in = matchInput(*body.model, body.state);
   maps.resize(in.clusters.size());
   for (Index c = 0; c < in.clusters.size(); ++c) maps[c] = fitMap(in, c, positions, body.state.poses[c]);
+  if (!body.material.elastic() && body.material.mode == MatchMode::kQuadratic && !in.shape.quadratic.empty())
+    fitQuadraticMaps(in, positions, maps, body.quadratic_maps);
 }
 
 }  // namespace
@@ -129,6 +134,7 @@ void World::Impl::findContacts(double h_frame) {
       parties[b].maps = bodies[b]->maps.data();
       parties[b].map_count = static_cast<Index>(bodies[b]->maps.size());
     });
+    rememberSlow();
     contacts.make(parties, h_frame, report.contact_counters, for_each);
     bool woken = false;
     for (Index p : contacts.reached()) {
@@ -181,13 +187,11 @@ void World::Impl::fillParty(WorldBody& body, ContactParty& party) {
   }
   party.rigid_share =
       body.model->any_fixed || body.material.elastic() ? 0.0 : std::max(kLeastRigid, body.material.alpha);
-  Box velocities;
-  for (std::size_t i = 0; i < party.particles; ++i) {
-    party.bounds.extend(body.state.positions[i]);
-    velocities.extend(body.state.velocities[i]);
-  }
+  party.bounds = boundsOf(body.state.positions);
+  const Box velocities = boundsOf(body.state.velocities);
   party.velocity = 0.5 * (velocities.min + velocities.max);
   party.spread = body.spread = 0.5 * velocities.diagonal();
+  body.fastest = party.velocity.norm() + party.spread;
   if (!body.model->binding.riders.empty()) {  // riders reach beyond the particles
     party.bounds.min.array() -= 2.0 * body.model->spacing;
     party.bounds.max.array() += 2.0 * body.model->spacing;
@@ -230,7 +234,10 @@ void World::Impl::solveContacts(double h) {
 // eye: particles without a change of speed, riders by the offsets that fade.
 void World::Impl::liftOutOfGround(WorldBody& body, double h_frame) {
   const SurfaceBinding& binding = body.model->binding;
-  if (!settings.ground || !(body.bounds.min.z() - 2.0 * h_frame * speedOf(body) < *settings.ground)) return;
+  // Far above nobody has to ask how fast it is by now.
+  if (!settings.ground || !(body.bounds.min.z() - body.bounds.diagonal() - h_frame * body.fastest < *settings.ground) ||
+      !(body.bounds.min.z() - 2.0 * h_frame * speedOf(body) < *settings.ground))
+    return;
   for (Index i : binding.particle)
     if (i != kNoIndex && body.state.positions[i].z() < *settings.ground && !body.model->fixed[i])
       body.state.positions[i].z() = *settings.ground;

@@ -1,20 +1,12 @@
 // The last line: a body whose coordinates are no numbers any more, or out of all bounds, starts anew from rest where it
 // was. Nothing is known to bring it about but what overflows, and a trainee's scene must outlive that too.
-#include <cmath>
-
+#include "meshless_surgery/dynamics/extent.h"
 #include "world_impl.h"
 
 namespace meshless {
 namespace {
 
-constexpr double kFarthest = 1e12;  // [m], and [m/s] of speeds
-
-// NaN fails it as well.
-bool withinBounds(const Points& points) {
-  for (const Vec3& p : points)
-    if (!(p.cwiseAbs().maxCoeff() < kFarthest)) return false;
-  return true;
-}
+constexpr double kFarthest = 1e12;  // [m]
 
 void restAnew(WorldBody& body) {
   const BodyModel& model = *body.model;
@@ -45,7 +37,7 @@ void restAnew(WorldBody& body) {
 void World::Impl::mendFaults() {
   faulty.assign(awake.size(), false);
   forNumbers(awake.size(), [this](std::size_t b) {
-    faulty[b] = !withinBounds(awake[b]->state.positions) || !withinBounds(awake[b]->state.velocities);
+    faulty[b] = !allWithin(awake[b]->state.positions, kFarthest);  // velocities are made of them
   });
   bool any = false;
   for (std::size_t b = 0; b < awake.size(); ++b) {

@@ -21,6 +21,7 @@ struct ContactModel {
   std::vector<double> inverse_masses;  // [1/kg] 0 where fixed
   /// Made when first asked for, by one thread.
   const SelfContactSet& self(bool cuts_alone) const;
+  std::size_t bytes() const;  // that it holds, without the model
 
  private:
   mutable std::array<std::unique_ptr<const SelfContactSet>, 2> self_;
@@ -49,6 +50,7 @@ struct WorldBody {
   std::shared_ptr<const ContactModel> contact;                             // likewise, of the present model
   std::shared_future<std::shared_ptr<const ContactModel>> coming_contact;  // being made by another thread
   std::vector<ContactMap> maps;  // of this frame, where it can touch another body
+  std::vector<QuadraticMap> quadratic_maps;     // likewise, where its mode is quadratic; maps point into it
   bool touched_by_push = false;
   bool low_current = false;          // in this frame
   std::vector<Index> low_particles;  // that can meet the ground
@@ -56,10 +58,13 @@ struct WorldBody {
   double stiffness_factor = 1.0;
   Box bounds;            // [m] of particles and surface, at the start of the last frame in which it was awake
   double spread = 0.0;   // [m/s] likewise: by how much velocities differ
+  double fastest = 0.0;  // [m/s] likewise: no particle is faster
   bool batched = false;  // matched with others of its kind
   bool asleep = false;
   double still_for = 0.0;         // [s]
   std::uint32_t sleep_group = 0;  // those that fell asleep together wake together
+  bool slow = false;              // may fall asleep in this frame: where it was at its start is known
+  Points frame_start;             // [m] likewise
   StepScratch scratch;
 };
 
@@ -200,6 +205,7 @@ struct World::Impl {
   void wake(WorldBody& body);
   void wakeWithin(const Box& box);
   void wakePushed(double h_frame);
+  void rememberSlow();
   void fallAsleep(double h_frame);
   void mendFaults();
   void closeBlades();

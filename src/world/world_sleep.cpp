@@ -10,6 +10,7 @@ namespace {
 constexpr double kStillFor = 0.5;     // [s]
 constexpr double kStillMean = 0.01;   // [1/s] times the body's size: root mean square of its particles' speeds
 constexpr double kStillMost = 0.02;   // [1/s] likewise, of the fastest
+constexpr double kTrembling = 5.0;    // times that: who trembles faster than this within a frame is not looked at
 
 Index rootOf(std::vector<Index>& root, Index i) {
   while (root[i] != i) {
@@ -21,12 +22,14 @@ Index rootOf(std::vector<Index>& root, Index i) {
 
 double sizeOf(const Box& box) { return (box.max - box.min).maxCoeff(); }
 
-bool isStill(const WorldBody& body) {
-  const double size = sizeOf(body.bounds);
+// By where it is a frame later: what trembles from substep to substep and stays where it is does not keep it awake.
+bool isStill(const WorldBody& body, double h_frame) {
+  if (!body.slow) return false;
+  const double size = sizeOf(body.bounds) * h_frame;
   const double most = kStillMost * size, mean = kStillMean * size;
   double sum = 0.0;
-  for (std::size_t i = 0; i < body.state.velocities.size(); ++i) {
-    const double squared = body.state.velocities[i].squaredNorm();
+  for (std::size_t i = 0; i < body.state.positions.size(); ++i) {
+    const double squared = (body.state.positions[i] - body.frame_start[i]).squaredNorm();
     if (!(squared <= most * most)) return false;
     sum += body.model->masses[i] * squared;
   }
@@ -59,13 +62,27 @@ void World::Impl::listAwake() {
     if (!body->asleep) awake.push_back(body.get());
 }
 
+// Where those are that may fall asleep: something is near them, or holds them, and they are slow.
+void World::Impl::rememberSlow() {
+  if (!settings.sleep) return;
+  for (Index b = 0; b < bodies.size(); ++b) {
+    WorldBody& body = *bodies[b];
+    body.slow = false;
+    if (body.asleep || (!contacts.needed()[b] && !body.model->any_fixed && picks.empty())) continue;
+    const double most = kTrembling * kStillMost * sizeOf(body.bounds);
+    body.slow = std::all_of(body.state.velocities.begin(), body.state.velocities.end(),
+                            [most](const Vec3& v) { return v.squaredNorm() <= most * most; });
+    if (body.slow) body.frame_start = body.state.positions;
+  }
+}
+
 // An island sleeps where all of it has held still long enough and something holds it: without that, what drifts slowly
 // through space would stop.
 void World::Impl::fallAsleep(double h_frame) {
   if (!settings.sleep || settings.contact != ContactMethod::kRestShape || awake.empty()) return;
   bool any = false;
   for (WorldBody* body : awake) {
-    body->still_for = isStill(*body) ? body->still_for + h_frame : 0.0;
+    body->still_for = isStill(*body, h_frame) ? body->still_for + h_frame : 0.0;
     any = any || body->still_for >= kStillFor;
   }
   if (!any) return;

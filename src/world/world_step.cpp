@@ -97,8 +97,8 @@ void World::step() {
       w.finishSubstep(h);
     }
     for (WorldBody* body : w.awake) {
-      if (rest_shape) w.liftOutOfGround(*body, h_frame);
       w.fadeRiderOffsets(*body, h_frame);
+      if (rest_shape) w.liftOutOfGround(*body, h_frame);  // after: it lifts by offsets too
     }
     w.mendFaults();
     for (Pick& pick : w.picks)

@@ -318,6 +318,16 @@ class DiagnosticsTest(DeformerTestCase):
         self.assertEqual(int(before['rejected input']) + 2, int(after['rejected input']))
         self.assertIn('~cut', after['last rejection'])
 
+    def test_memory_per_particle(self):
+        _, values = self.values()
+        parts = sum(float(values['memory %s [MB]' % part]) for part in (
+            'of models', 'of states', 'of contact', 'for reset and undo'))
+        particles = int(values['particles'])
+        self.assertGreater(particles, 0)
+        self.assertGreater(parts, 0.0)
+        self.assertAlmostEqual(1e6 * parts / particles, float(values['memory per particle [bytes]']),
+                               delta=1e-3 * 1e6 * parts / particles)
+
     def test_a_miss_is_no_rejected_input(self):
         _, before = self.values()
         self.assertFalse(self.call('pick', point=Point(0, 0, 50), max_distance=0.01).success)

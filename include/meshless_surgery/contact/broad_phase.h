@@ -1,6 +1,7 @@
 // Which boxes overlap: a hierarchy of uniform grids, one level for each power of two of the boxes' sizes.
 #pragma once
 
+#include "meshless_surgery/base/bytes.h"
 #include "meshless_surgery/base/types.h"
 
 namespace meshless {
@@ -13,6 +14,7 @@ class BroadPhase {
   const std::vector<std::array<Index, 2>>& find(const std::vector<Box>& boxes, const std::vector<char>& active);
   /// Boxes compared in the last call.
   std::size_t tested() const { return tested_; }
+  std::size_t bytes() const { return bytesOf(entries_, level_of_, table_, table_keys_, pairs_); }  // that it holds
 
  private:
   struct Entry {

@@ -71,6 +71,7 @@ class ContactShape {
   bool rides() const { return !rider_of_.empty(); }
 
   std::size_t cellsFilled() const { return cells_filled_.load(std::memory_order_relaxed); }
+  /// Bytes that it holds.
   std::size_t bytes() const;
 
   struct Facet;
@@ -112,7 +113,7 @@ class ContactShape {
   mutable std::unique_ptr<std::atomic<std::uintptr_t>[]> cells_;
   mutable std::unique_ptr<std::atomic<float>[]> distances_;  // [m] one a cell, of its centre; NaN: not known yet
   std::size_t cell_total_ = 0;
-  mutable std::atomic<std::size_t> cells_filled_{0};
+  mutable std::atomic<std::size_t> cells_filled_{0}, cell_bytes_{0};
   mutable std::once_flag linked_;
   mutable std::vector<std::array<Index, 3>> across_;
 };

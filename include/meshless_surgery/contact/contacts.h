@@ -10,6 +10,7 @@
 #include "meshless_surgery/contact/broad_phase.h"
 #include "meshless_surgery/contact/contact_shape.h"
 #include "meshless_surgery/contact/deformable.h"
+#include "meshless_surgery/contact/quadratic_map.h"
 #include "meshless_surgery/contact/self_contact.h"
 
 namespace meshless {
@@ -21,6 +22,7 @@ struct ContactMap {
   Vec3 rest = Vec3::Zero();    // [m]
   Vec3 centre = Vec3::Zero();  // [m]
   bool flipped = false;        // it turns what it maps inside out
+  const QuadraticMap* quadratic = nullptr;  // where the cluster bends: the better map, to which this is the start
 };
 
 /// A body as contact sees it in a frame. Whoever fills it keeps what it points to alive.
@@ -107,6 +109,8 @@ class Contacts {
   void points(const std::vector<ContactParty>& parties, std::vector<Point>& points) const;
   /// Deepest overlap that make() found, relative to the smaller body's size, one a contact below the surface.
   const std::vector<double>& depths() const;
+  /// Bytes that it holds.
+  std::size_t bytes() const;
   /// Forgets what it remembers of pairs.
   void clear();
   /// All that the next frame reads of the ones before, to be given back to contacts of the same parties

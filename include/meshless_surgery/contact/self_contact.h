@@ -10,6 +10,12 @@ struct SelfContactSet {
   std::vector<Index> vertices;   // of its surface, ascending
   std::vector<Index> triangles;  // of its surface
   double depth = 0.0;            // [m] how far behind a face a point still counts as behind it
+  /// Edges at which the surface turns outwards at rest, and rims of cuts, with the faces beside them (the second is
+  /// kNoIndex where it is not one of `triangles`): they can cross without a vertex over a face.
+  struct Ridge {
+    std::array<Index, 2> vertices{}, faces{};
+  };
+  std::vector<Ridge> ridges;
 };
 
 /// The faces of cuts alone (patches beyond kOuterPatch), or everything. spacing [m]: of the body's particles.

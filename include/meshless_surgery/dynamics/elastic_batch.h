@@ -38,6 +38,7 @@ class ElasticBatch {
                     InstructionSet set = widestInstructionSet(), const ForEach& for_each = nullptr) const;
 
   Index boxes() const { return boxes_; }           // clusters on the fastest path
+  std::size_t bytes() const;                       // that it holds
   Index others() const { return others_.size(); }  // clusters on the slowest
 
  private:

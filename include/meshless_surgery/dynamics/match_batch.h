@@ -54,6 +54,7 @@ class BodyBatch {
 
   std::size_t size() const;
   std::size_t particles() const;  // of a body
+  std::size_t bytes() const;      // that it holds
 
   void setState(std::size_t body, const Points& positions, const Points& velocities, const Quat& rotation);
   void getState(std::size_t body, Points& positions, Points& velocities, Quat& rotation) const;

@@ -95,6 +95,18 @@ struct StepReport {
   std::size_t mended = 0;  // bodies whose coordinates were not finite, and that start anew from rest
 };
 
+/// Memory that a world holds [bytes]; what several bodies share counts once.
+struct MemoryUse {
+  std::size_t models = 0;   // rest shapes, clusters, surfaces and their binding
+  std::size_t states = 0;   // positions, velocities, poses, and what a step needs beside them
+  std::size_t contact = 0;  // rest shapes as contact sees them, contacts and their solver
+  std::size_t kept = 0;     // for reset and undo
+  std::size_t particles = 0;
+
+  std::size_t total() const { return models + states + contact + kept; }
+  double perParticle() const { return particles ? static_cast<double>(total()) / static_cast<double>(particles) : 0.0; }
+};
+
 /// What to put into a snapshot; nothing is copied that was not asked for.
 struct SnapshotWants {
   bool surfaces = false;
@@ -184,6 +196,8 @@ class World {
   Result<BodySnapshot> inspect(const std::string& name, bool rest);
   /// The first surface that the ray from `origin` meets; kMissed where it meets none. Nothing changes.
   Result<ProbeReply> probe(const Vec3& origin, const Vec3& direction);
+  /// What it holds now; looks at bodies, not at their particles.
+  MemoryUse memory() const;
   /// Events since the last call.
   std::vector<Event> takeEvents();
   /// Of all that a later step reads of the state: equal for equal histories since the start or a reset, whoever looked

@@ -1,0 +1,29 @@
+#include "meshless_surgery/body/body_bytes.h"
+
+namespace meshless {
+
+std::size_t bytesOf(const BodyModel& model) {
+  const ClusterSet& clusters = model.clusters;
+  const SurfaceBinding& binding = model.binding;
+  return sizeof model + bytesOf(model.rest, model.masses, model.match_masses, model.fixed, model.elastic) +
+         bytesOf(model.graph.offsets, model.graph.neighbours, model.graph.lengths) +
+         bytesOf(clusters.offsets, clusters.members, clusters.weights, clusters.seeds, clusters.radii) +
+         bytesOf(model.shape.clusters, model.shape.quadratic) +
+         (model.elastic_batch ? model.elastic_batch->bytes() : 0) +
+         bytesOf(model.surface.vertices, model.surface.triangles, model.surface.patches) +
+         bytesOf(binding.particle, binding.riders, binding.offsets, binding.carriers, binding.weights, binding.levers,
+                 binding.turners, binding.lever_clusters);
+}
+
+std::size_t bytesOf(const BodyState& state) {
+  return bytesOf(state.positions, state.velocities, state.poses, state.surface, state.plastic, state.rider_offsets,
+                 state.eased);
+}
+
+std::size_t bytesOf(const StepScratch& scratch) {
+  const ElasticBatchState& elastic = scratch.elastic;
+  return bytesOf(scratch.previous, scratch.before_contact, scratch.predicted, scratch.goals, scratch.touched) +
+         bytesOf(elastic.rotations, elastic.others, elastic.forces, elastic.largest, elastic.cold);
+}
+
+}  // namespace meshless

@@ -1,0 +1,39 @@
+// How much memory contact holds between frames.
+#include "contacts_impl.h"
+#include "meshless_surgery/base/bytes.h"
+
+namespace meshless {
+namespace {
+
+// Nodes of std::map: what is in them and about what the tree needs.
+template <class Map>
+std::size_t bytesOfMap(const Map& map) {
+  return map.size() * (sizeof(typename Map::value_type) + 4 * sizeof(void*));
+}
+
+std::size_t bytesOfFindings(const Findings& f) {
+  return bytesOf(f.contacts, f.entries, f.depths, f.self_areas, f.ridges) + f.self_grid.bytes();
+}
+
+}  // namespace
+
+std::size_t IslandPlan::bytes() const {
+  return bytesOf(contacts, contact_offsets, parties, party_offsets, shifts, passes, calm) +
+         bytesOf(root_, number_, next_);
+}
+
+std::size_t Contacts::bytes() const {
+  const Impl& w = *impl_;
+  std::size_t sum = sizeof w + w.broad.bytes() + w.solver.bytes() + w.plan.bytes() +
+                    bytesOf(w.boxes, w.active, w.needed, w.pairs, w.grounded, w.finders, w.maps_now, w.contacts,
+                            w.last, w.entries) +
+                    bytesOf(w.depths, w.reached, w.keys, w.tasks, w.pair_findings, w.quick) + bytesOfMap(w.caught) +
+                    bytesOfMap(w.exits);
+  for (const MapFinder& finder : w.finders) sum += finder.bytes();
+  for (const auto& maps : w.maps_now) sum += bytesOf(maps);
+  for (const Findings& task : w.tasks) sum += bytesOfFindings(task);
+  for (const QuickFindings& quick : w.quick) sum += bytesOfFindings(quick.found);
+  return sum;
+}
+
+}  // namespace meshless
