@@ -201,33 +201,6 @@ std::vector<Case> allCases() {
   return thinned(cases);
 }
 
-/// The same bodies in a new world, each without the motion that it has as a whole: what flies would fly on, and what
-/// spins would stay drawn out.
-Twins stoppedAsAWhole(Twins& twins, const WorldSettings& settings, double reach) {
-  EXPECT_TRUE(twins.step(Vec3::Zero(), reach));
-  const WorldSnapshot before = twins.seen();
-  EXPECT_TRUE(twins.step(Vec3::Zero(), reach));
-  Twins calm(settings);
-  for (std::size_t b = 0; b < before.bodies.size(); ++b) {
-    const BodySnapshot& now = twins.seen().bodies[b];
-    PreparedBody body;
-    body.def.name = now.name;
-    body.def.material = now.material;
-    body.model = now.model;
-    body.state.positions = now.particles;
-    for (std::size_t i = 0; i < now.particles.size(); ++i)
-      body.state.velocities.push_back(settings.step_rate * (now.particles[i] - before.bodies[b].particles[i]));
-    const RigidMotion together = rigidMotionOf(*body.model, body.state.positions, body.state.velocities);
-    for (std::size_t i = 0; i < now.particles.size(); ++i)
-      body.state.velocities[i] -= together.velocity + together.spin.cross(now.particles[i] - together.centre);
-    body.state.poses.resize(body.model->clusters.size());
-    body.state.rider_offsets.assign(body.model->binding.riders.size(), Vec3::Zero());
-    updateSurface(*body.model, body.state);
-    calm.spawn(std::make_shared<const PreparedBody>(std::move(body)));
-  }
-  return calm;
-}
-
 class Inputs : public testing::TestWithParam<Case> {};
 
 TEST_P(Inputs, AreSurvived) {
