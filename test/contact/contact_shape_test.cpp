@@ -296,6 +296,35 @@ TEST(ContactShape, SamplesAreTheVerticesAndPointsOnLongSharpEdges) {
   }
 }
 
+// Whichever thread comes first: a cell that is filled says what the search said before it was.
+TEST(ContactShape, WhoHasAskedBeforeDoesNotMatter) {
+  for (const shapes::Shape& shape : shapes::allShapes()) {
+    SCOPED_TRACE(shape.name);
+    const Box bounds = boundsOf(shape.mesh);
+    const double size = bounds.diagonal();
+    const Shaped asked(shape.mesh);
+    test::Random random(5);
+    for (int n = 0; n < 100; ++n) {
+      const Triangle& t = shape.mesh.triangles[static_cast<std::size_t>(
+          random.integer(0, static_cast<int>(shape.mesh.triangles.size()) - 1))];
+      const double u = random.uniform(0, 1), v = random.uniform(0, 1 - u);
+      Vec3 p = (1 - u - v) * shape.mesh.vertices[t[0]] + u * shape.mesh.vertices[t[1]] + v * shape.mesh.vertices[t[2]];
+      // On the surface but for rounding, near it, and beyond the cells.
+      const double off[] = {0.0, 1e-15, 1e-12, 0.01, 1.0};
+      p += off[n % 5] * size * random.unit();
+      ContactShape::Nearest first, later;
+      const Shaped fresh(shape.mesh);
+      ASSERT_TRUE(fresh.shape.nearest(p, first));
+      for (int k = 0; k < 20; ++k) ASSERT_TRUE(asked.shape.nearest(p, later));
+      ASSERT_EQ(first.triangle, later.triangle) << n;
+      ASSERT_EQ(first.distance, later.distance) << n;
+      ASSERT_EQ(std::signbit(first.distance), std::signbit(later.distance)) << n;
+      ASSERT_EQ(first.weights, later.weights) << n;
+      ASSERT_EQ(first.above, later.above) << n;
+    }
+  }
+}
+
 TEST(ContactShape, ThicknessIsThatOfThinParts) {
   EXPECT_NEAR(Shaped(boxMesh(Vec3(0.2, 0.2, 0.002), 0.02)).shape.thickness(), 0.002, 1e-9);
   EXPECT_NEAR(Shaped(boxMesh(Vec3::Ones(), 2, 2, 2)).shape.thickness(), 1.0, 1e-9);
