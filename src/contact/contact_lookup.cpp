@@ -162,6 +162,7 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
   const double size = shape.size(), near = kMargin * std::min(size, of.shape->size());
   const std::vector<ContactSample>& samples = of.shape->samples();
   inside.points = samples.size();
+  if (region.empty()) return;  // near by their speeds alone
   const ContactMap* own = maps == with.maps ? of.maps : maps_now[a].data();
   const auto inwardAt = [&](const Vec3& p, const ContactSample& sample) -> Vec3 {
     return -(own[finders[a].nearest(p)].to_rest.transpose() * sample.normal).normalized();
