@@ -16,7 +16,7 @@ constexpr double kWellWithin = 0.02;    // barycentric
 constexpr double kNearby = 0.1;         // of the thickness
 constexpr int kMostLookups = 8;
 constexpr double kFlattest = 1e-3;  // det of a slope: below, the cluster's affine map tells directions
-constexpr double kSlack = 0.1;  // of the thickness: how much farther a better face may be
+constexpr double kSlack = 0.1;      // of the thickness: how much farther a better face may be
 
 }  // namespace
 
@@ -34,7 +34,8 @@ double deviationWithin(const ContactParty& party, const MapFinder& finder, const
     if (!near.contains(now)) continue;
     const ContactMap& map = maps[finder.nearest(now)];
     const Vec3& at_rest = shape.surface().vertices[s.vertices[0]];
-    const Vec3 fitted = map.quadratic ? map.quadratic->at(at_rest) : Vec3(map.from_rest * (at_rest - map.rest) + map.centre);
+    const Vec3 fitted =
+        map.quadratic ? map.quadratic->at(at_rest) : Vec3(map.from_rest * (at_rest - map.rest) + map.centre);
     farthest = std::max(farthest, (now - fitted).squaredNorm());
   }
   return std::min(most, (party.map_count > 1 ? kNeighbour : kSameMap) * std::sqrt(farthest));
@@ -170,6 +171,7 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
   const double size = shape.size(), near = kMargin * std::min(size, of.shape->size());
   const std::vector<ContactSample>& samples = of.shape->samples();
   inside.points = samples.size();
+  if (region.empty()) return;  // near by their speeds alone
   const ContactMap* own = maps == with.maps ? of.maps : maps_now[a].data();
   const auto inwardAt = [&](const Vec3& p, const ContactSample& sample) -> Vec3 {
     const ContactMap& map = own[finders[a].nearest(p)];

@@ -11,8 +11,10 @@ namespace {
 // What a sweep leaves spreads through a stack as heat does, and grows with the fall in a substep: so much work do
 // stacks need to stand (found with towers of cubes).
 constexpr double kStackWork = 4.75;
-constexpr double kCalm = 0.02;     // of the size, how far particles go apart in a frame
-constexpr int kFewSubsteps = 4;    // below it two sweeps, there and back
+constexpr double kLayerShare =
+    0.7;                         // of the height of a body that is long in one direction alone: a splinter is no layer
+constexpr double kCalm = 0.02;   // of the size, how far particles go apart in a frame
+constexpr int kFewSubsteps = 4;  // below it two sweeps, there and back
 constexpr int kCaughtPasses = 24;  // of an island in which something was caught: it has to stop at once
 
 }  // namespace
@@ -30,7 +32,7 @@ double stackWork(const ContactScene& scene, const std::vector<ContactParty>& par
     const double reach = 0.5 * up.cwiseAbs().dot(party.bounds.max - party.bounds.min);
     low = std::min(low, up.dot(centre) - reach);
     high = std::max(high, up.dot(centre) + reach);
-    size += party.shape->size();
+    size += std::max(party.shape->size(), kLayerShare * 2.0 * reach);
   }
   const Index count = plan.party_offsets[island + 1] - plan.party_offsets[island];
   if (count < 2 || !(size > 0.0)) return 0.0;

@@ -316,7 +316,7 @@ struct Best {
     const Measured m = measure(f, p);
     if (m.squared > squared + tie()) return;
     const bool nearer = m.squared < squared - tie();
-    tied = !nearer;
+    tied = !nearer && std::isfinite(squared);  // not with the infinity that it starts from
     if (!(m.squared < squared)) return;
     squared = m.squared;
     distance = std::sqrt(squared);
@@ -343,6 +343,8 @@ class Settler {
     if (!(m.squared <= limit_)) return;
     for (std::size_t k = 0; k < count_; ++k)
       if (faces_[k].triangle == f.triangle) return;  // bins show a triangle more than once
+    for (const Face& face : more_)
+      if (face.triangle == f.triangle) return;
     const Vec3 corners[3] = {f.a, f.a + f.ab, f.a + f.ac};
     constexpr double kAt = 1e-9;  // barycentric
     int at = 0;
@@ -357,16 +359,23 @@ class Settler {
       angle *= 2.0;
     }
     normals_ += angle * f.normal;
+    angles_ += angle;
     if (f.triangle < first_) {
       first_ = f.triangle;
       away_ = p - (m.weights[0] * corners[0] + m.weights[1] * corners[1] + m.weights[2] * corners[2]);
     }
-    if (count_ < faces_.size()) faces_[count_++] = {f.triangle, m.over, m.weights, m.above};
+    if (count_ == faces_.size()) {
+      more_.push_back({f.triangle, m.over, m.weights, m.above});
+    } else {
+      faces_[count_++] = {f.triangle, m.over, m.weights, m.above};
+    }
   }
 
   /// +1 outside, -1 inside.
   double settle(ContactShape::Nearest& found) const {
-    const double sign = !touches_ && normals_.dot(away_) < 0.0 ? -1.0 : 1.0;
+    // Two lips that lie on each other cancel but for rounding, which the order of the faces would decide.
+    const bool inside = normals_.dot(away_) < -kCancelled * angles_ * away_.norm();
+    const double sign = !touches_ && inside ? -1.0 : 1.0;
     const Face* best = nullptr;
     const auto better = [&](const Face& a, const Face& b) {
       if (touches_) return a.triangle < b.triangle;  // heights are rounding
@@ -377,6 +386,8 @@ class Settler {
     };
     for (std::size_t k = 0; k < count_; ++k)
       if (!best || better(faces_[k], *best)) best = &faces_[k];
+    for (const Face& face : more_)
+      if (better(face, *best)) best = &face;
     if (best) {
       found.triangle = best->triangle;
       found.weights = best->weights;
@@ -392,11 +403,14 @@ class Settler {
     std::array<double, 3> weights;
     bool above;
   };
+  static constexpr double kCancelled = 1e-9;
   double limit_, reach_;  // [m^2], [m]
   bool touches_;          // on the surface itself, which is not inside
   Index first_ = kNoIndex;
   Vec3 normals_ = Vec3::Zero(), away_ = Vec3::Zero();
-  std::array<Face, 48> faces_;  // more never share a corner but in fans, of which any face will do
+  double angles_ = 0.0;
+  std::array<Face, 48> faces_;
+  std::vector<Face> more_;  // those of fans, and of lips with many slivers
   std::size_t count_ = 0;
 };
 
@@ -445,6 +459,13 @@ std::size_t ContactShape::cellAt(const Vec3& rest, std::array<int, 3>& at) const
   return (static_cast<std::size_t>(at[0]) * cells_count_[1] + at[1]) * cells_count_[2] + at[2];
 }
 
+bool ContactShape::isBeyondCells(const Vec3& rest) const {
+  const Vec3 in_cells = (rest - cell_origin_) * cells_per_metre_;
+  for (int d = 0; d < 3; ++d)
+    if (!(in_cells[d] >= 0.0 && in_cells[d] < cells_count_[d])) return true;
+  return false;
+}
+
 double ContactShape::clearance(const Vec3& rest) const {
   if (!cells_ || !rest.allFinite()) return -1.0;
   std::array<int, 3> at;
@@ -466,9 +487,12 @@ bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
   std::array<int, 3> at;
   const std::size_t index = cellAt(rest, at);
   const std::uintptr_t known = cells_[index].load(std::memory_order_acquire);
-  if (known < kAsked) {
+  // A cell at the border does not know what is nearest beyond it: an answer from it would depend on who has asked
+  // before.
+  const bool beyond = isBeyondCells(rest);
+  if (known < kAsked || beyond) {
     std::uintptr_t asked = known;
-    cells_[index].compare_exchange_strong(asked, known + 1, std::memory_order_acq_rel);
+    if (!beyond) cells_[index].compare_exchange_strong(asked, known + 1, std::memory_order_acq_rel);
     const double centre = distances_[index].load(std::memory_order_relaxed);
     const Vec3 from = rest - (cell_origin_ + cell_edge_ * Vec3(at[0] + 0.5, at[1] + 0.5, at[2] + 0.5));
     const double within = (1.0 + 1e-6) * (std::abs(centre) + from.norm()) + 1e-9 * size_;

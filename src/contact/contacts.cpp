@@ -13,6 +13,11 @@ namespace {
 constexpr std::size_t kTaskPairs = 32, kTaskParties = 128;  // looked at by one task
 constexpr double kLongestStep = 0.5;  // of the smaller body's extent: how far quick bodies go in a substep
 
+constexpr double kCrumb =
+    0.05;  // of the largest that moves: smaller bodies ask for no more substeps than one of that size
+
+double extentOf(const ContactParty& party) { return (party.bounds.max - party.bounds.min).maxCoeff(); }
+
 double speedOf(const ContactParty& party) { return party.velocity.norm() + party.spread; }
 
 /// [m/s] at which two parties can come nearer, at most.
@@ -28,6 +33,18 @@ double approachOf(const ContactParty& a, const ContactParty& b) {
     spread += b.spread;
   }
   return relative.norm() + spread;
+}
+
+// Where its surface has been in this substep.
+Box sweptVertices(const ContactParty& party) {
+  Box box;
+  for (Index v = 0; v < party.shape->surface().vertices.size(); ++v) {
+    const Vec3 now = vertexAt(party, v), before = now - vertexMotion(party, v);
+    if (!now.allFinite() || !before.allFinite()) continue;
+    box.extend(now);
+    box.extend(before);
+  }
+  return box;
 }
 
 }  // namespace
@@ -170,6 +187,9 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
       findings.depths = task.depths.size();
     }
   });
+  double largest = 0.0;
+  for (const ContactParty& party : parties)
+    if (party.moves) largest = std::max(largest, extentOf(party));
   double fastest = 0.0;  // substeps that the fastest quick pair asks for
   for (std::size_t n = 0; n < ground_tasks + pair_tasks; ++n) {
     const Findings& task = w.tasks[n];
@@ -192,8 +212,7 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
         w.join(task, start.contacts, findings.contacts, start.entries, findings.entries);
         w.depths.insert(w.depths.end(), task.depths.begin() + static_cast<std::ptrdiff_t>(start.depths),
                         task.depths.begin() + static_cast<std::ptrdiff_t>(findings.depths));
-        const double step =
-            kLongestStep * std::min((a.bounds.max - a.bounds.min).maxCoeff(), (b.bounds.max - b.bounds.min).maxCoeff());
+        const double step = kLongestStep * std::max(kCrumb * largest, std::min(extentOf(a), extentOf(b)));
         if (pair.quick) fastest = std::max(fastest, pair.way * h / step);
       }
       start = findings;
@@ -257,6 +276,7 @@ void Contacts::solve(const std::vector<ContactParty>& parties, double substep, c
   w.contacts.resize(w.steady_contacts);
   w.entries.resize(w.steady_entries);
   std::vector<char> fitted;
+  std::vector<Box> swept;  // of those that are traced
   const double falling = w.scene.gravity.norm() * substep * substep;
   w.quick.resize(w.pairs.size());
   for (std::size_t k = 0; k < w.pairs.size(); ++k) {
@@ -276,8 +296,13 @@ void Contacts::solve(const std::vector<ContactParty>& parties, double substep, c
           fitted[p] = 1;
         }
       if (pair.way * substep > kQuick * thickness) {
-        w.trace(parties, pair.a, pair.b, counters);
-        w.trace(parties, pair.b, pair.a, counters);
+        if (swept.empty()) swept.resize(parties.size());
+        for (Index p : {pair.a, pair.b})
+          if (swept[p].empty()) swept[p] = sweptVertices(parties[p]);
+        if (swept[pair.a].overlaps(swept[pair.b])) {
+          w.trace(parties, pair.a, pair.b, counters);
+          w.trace(parties, pair.b, pair.a, counters);
+        }
       }
       const double size = std::min(parties[pair.a].shape->size(), parties[pair.b].shape->size());
       pair.reach = kMargin * size + std::min(pair.way * w.frame + falling, kQuick * thickness);

@@ -10,7 +10,14 @@ namespace {
 
 constexpr std::size_t kLeastBodies = 32;     // fewer are not worth going there and back
 constexpr std::size_t kMostParticles = 256;  // larger ones fill the lanes by themselves
+constexpr double kMostUneven = 1e4;  // longest over shortest axis of the rest shape, squared: float fits no more
 constexpr double kFarthest = 200.0;  // radii of its rest shape that a body may reach in float, or go in a substep
+
+// One particle a hundred sizes away leaves nothing of the others in a moment of floats.
+bool fitsEvenly(const BodyModel& model) {
+  const ClusterRest& rest = model.shape.clusters[0];
+  return !rest.linear_rank || rest.moment_inverse.norm() * rest.mass * rest.size * rest.size < kMostUneven;
+}
 
 bool suits(const WorldBody& body) {
   const BodyModel& model = *body.model;
@@ -18,7 +25,7 @@ bool suits(const WorldBody& body) {
          body.state.eased.empty() && !model.any_fixed && body.state.swelling == 1.0 &&
          body.material.volume.points.empty() && body.material.area.points.empty() &&
          model.rest.size() <= kMostParticles && model.rest.size() >= 4 && body.material.alpha > 0.0 &&
-         BodyBatch::holds(matchInput(model, body.state));
+         BodyBatch::holds(matchInput(model, body.state)) && fitsEvenly(model);
 }
 
 bool alike(const WorldBody& a, const WorldBody& b) {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <future>
+#include <limits>
 
 #include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/dynamics/extent.h"
@@ -192,12 +193,30 @@ void World::Impl::fillParty(WorldBody& body, ContactParty& party) {
   party.velocity = 0.5 * (velocities.min + velocities.max);
   party.spread = body.spread = 0.5 * velocities.diagonal();
   body.fastest = party.velocity.norm() + party.spread;
-  if (!body.model->binding.riders.empty()) {  // riders reach beyond the particles
-    party.bounds.min.array() -= 2.0 * body.model->spacing;
-    party.bounds.max.array() += 2.0 * body.model->spacing;
-  }
+  const double beyond = riderReach(body);
+  party.bounds.min.array() -= beyond;
+  party.bounds.max.array() += beyond;
   body.bounds = party.bounds;
   if (body.model->surface.vertices.empty()) party.bounds = Box();  // nothing to touch with
+}
+
+// Two spacings, but of crumbs, whose surface is all nearer to their few particles, no more than what they have: where
+// many of them lie together each would be next to all.
+double World::Impl::riderReach(WorldBody& body) {
+  if (body.reach_of == body.model) return body.rider_reach;
+  const BodyModel& model = *body.model;
+  const SurfaceBinding& binding = model.binding;
+  double farthest = 0.0;  // squared, of a rider from its nearest carrier
+  for (Index r = 0; r < binding.riders.size(); ++r) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k)
+      nearest = std::min(nearest,
+                         (model.surface.vertices[binding.riders[r]] - model.rest[binding.carriers[k]]).squaredNorm());
+    farthest = std::max(farthest, nearest);
+  }
+  body.reach_of = body.model;
+  body.rider_reach = 2.0 * std::min(std::sqrt(farthest), model.spacing);
+  return body.rider_reach;
 }
 
 void World::Impl::equipParty(WorldBody& body, ContactParty& party) {

@@ -49,12 +49,14 @@ struct WorldBody {
   std::shared_ptr<const ContactMesh> mesh;                                 // made when something first comes near
   std::shared_ptr<const ContactModel> contact;                             // likewise, of the present model
   std::shared_future<std::shared_ptr<const ContactModel>> coming_contact;  // being made by another thread
-  std::vector<ContactMap> maps;  // of this frame, where it can touch another body
-  std::vector<QuadraticMap> quadratic_maps;     // likewise, where its mode is quadratic; maps point into it
+  std::vector<ContactMap> maps;              // of this frame, where it can touch another body
+  std::vector<QuadraticMap> quadratic_maps;  // likewise, where its mode is quadratic; maps point into it
   bool touched_by_push = false;
   bool low_current = false;          // in this frame
   std::vector<Index> low_particles;  // that can meet the ground
   std::vector<Index> low_riders;
+  BodyModelPtr reach_of;     // the model that rider_reach is of
+  double rider_reach = 0.0;  // [m] how far riders are beyond the bounds of the particles, at most
   double stiffness_factor = 1.0;
   Box bounds;            // [m] of particles and surface, at the start of the last frame in which it was awake
   double spread = 0.0;   // [m/s] likewise: by how much velocities differ
@@ -222,6 +224,7 @@ struct World::Impl {
   void findContacts(double h_frame);
   void fillParties();
   void fillParty(WorldBody& body, ContactParty& party);
+  static double riderReach(WorldBody& body);
   void equipParty(WorldBody& body, ContactParty& party);
   void solveContacts(double h);
   void liftOutOfGround(WorldBody& body, double h_frame);

@@ -53,8 +53,8 @@ Vec3 pointOf(const TriangleMesh& mesh, const ContactShape::Nearest& found) {
 std::vector<shapes::Shape> triedShapes() {
   std::vector<shapes::Shape> tried;
   for (const shapes::Shape& shape : shapes::allShapes())
-    for (const char* name : {"cube of 12 triangles", "box", "thin slab", "sphere", "torus",
-                             "turned torus", "hollow sphere", "arch", "liver"})
+    for (const char* name : {"cube of 12 triangles", "box", "thin slab", "sphere", "torus", "turned torus",
+                             "hollow sphere", "arch", "liver"})
       if (shape.name == name) tried.push_back(shape);
   return tried;
 }
@@ -66,8 +66,8 @@ Points pointsAround(const TriangleMesh& mesh, test::Random& random, int count) {
   Points points;
   for (int k = 0; k < count; ++k) {
     points.push_back(centre + 1.3 * random.vector(1.0).cwiseProduct(half));
-    const Triangle& t = mesh.triangles[static_cast<std::size_t>(
-        random.integer(0, static_cast<int>(mesh.triangles.size()) - 1))];
+    const Triangle& t =
+        mesh.triangles[static_cast<std::size_t>(random.integer(0, static_cast<int>(mesh.triangles.size()) - 1))];
     const double u = random.uniform(0.0, 1.0), v = random.uniform(0.0, 1.0 - u);
     const Vec3 on = mesh.vertices[t[0]] + u * (mesh.vertices[t[1]] - mesh.vertices[t[0]]) +
                     v * (mesh.vertices[t[2]] - mesh.vertices[t[0]]);
@@ -293,6 +293,35 @@ TEST(ContactShape, SamplesAreTheVerticesAndPointsOnLongSharpEdges) {
     const Shaped ball(sphereMesh(0.1, 0.005));
     EXPECT_EQ(onEdges(ball.shape), 0u);
     EXPECT_EQ(ball.shape.samples().size(), ball.shape.surface().vertices.size());
+  }
+}
+
+// Whichever thread comes first: a cell that is filled says what the search said before it was.
+TEST(ContactShape, WhoHasAskedBeforeDoesNotMatter) {
+  for (const shapes::Shape& shape : shapes::allShapes()) {
+    SCOPED_TRACE(shape.name);
+    const Box bounds = boundsOf(shape.mesh);
+    const double size = bounds.diagonal();
+    const Shaped asked(shape.mesh);
+    test::Random random(5);
+    for (int n = 0; n < 100; ++n) {
+      const Triangle& t = shape.mesh.triangles[static_cast<std::size_t>(
+          random.integer(0, static_cast<int>(shape.mesh.triangles.size()) - 1))];
+      const double u = random.uniform(0, 1), v = random.uniform(0, 1 - u);
+      Vec3 p = (1 - u - v) * shape.mesh.vertices[t[0]] + u * shape.mesh.vertices[t[1]] + v * shape.mesh.vertices[t[2]];
+      // On the surface but for rounding, near it, and beyond the cells.
+      const double off[] = {0.0, 1e-15, 1e-12, 0.01, 1.0};
+      p += off[n % 5] * size * random.unit();
+      ContactShape::Nearest first, later;
+      const Shaped fresh(shape.mesh);
+      ASSERT_TRUE(fresh.shape.nearest(p, first));
+      for (int k = 0; k < 20; ++k) ASSERT_TRUE(asked.shape.nearest(p, later));
+      ASSERT_EQ(first.triangle, later.triangle) << n;
+      ASSERT_EQ(first.distance, later.distance) << n;
+      ASSERT_EQ(std::signbit(first.distance), std::signbit(later.distance)) << n;
+      ASSERT_EQ(first.weights, later.weights) << n;
+      ASSERT_EQ(first.above, later.above) << n;
+    }
   }
 }
 

@@ -83,26 +83,31 @@ WorldSettings onGround(double gravity = 9.81) {
 
 std::vector<Input> allInputs() {
   std::vector<Input> all;
-  all.push_back({"a pick of 1e9 N per m dragged at random", dragged(1e9, [](test::Random& r) { return r.vector(0.5); }), 60, kThrown});
+  all.push_back({"a pick of 1e9 N per m dragged at random", dragged(1e9, [](test::Random& r) { return r.vector(0.5); }),
+                 60, kThrown});
   all.push_back({"a pick of 1e12 N per m dragged at random",
                  dragged(1e12, [](test::Random& r) { return r.vector(0.5); }), 60, kThrown});
-  all.push_back({"a pick teleported by kilometres", dragged(1e9, [](test::Random& r) { return r.vector(1e3); }), 60, 2e3 * kThrown});
+  all.push_back({"a pick teleported by kilometres", dragged(1e9, [](test::Random& r) { return r.vector(1e3); }), 60,
+                 2e3 * kThrown});
   all.push_back({"fifty picks against each other", eachStep([](Twins& twins, int step, test::Random& random) {
                    if (step == 0)
                      for (int k = 0; k < 50; ++k) pickAt(twins, random.vector(0.1), 1e9);
                    for (PickId pick = 1; pick <= 50; ++pick)
                      EXPECT_TRUE(twins.apply(MovePickCommand{pick, random.vector(0.3)}).ok());
-                 }), 60, kThrown});
+                 }),
+                 60, kThrown});
   all.push_back({"picks set locked and let go at random", eachStep([](Twins& twins, int step, test::Random& random) {
                    const PickId pick = pickAt(twins, random.vector(0.1), std::pow(10.0, random.uniform(0, 12)));
                    twins.attempt(LockCommand{pick, Vec3(random.vector(0.5))});
                    if (step % 3) twins.attempt(ReleaseCommand{pick});
                    if (step % 20 == 19) twins.attempt(ClearPicksCommand{});
-                 }), 60, kThrown});
-  all.push_back({"a push sphere larger than the body appears inside", eachStep([](Twins& twins, int step, test::Random&) {
-                   twins.attempt(pushAt(Vec3(0.01, 0.02, 0.03), 0.5));
-                   if (step % 40 == 39) twins.attempt(PushCommand{false});
-                 })});
+                 }),
+                 60, kThrown});
+  all.push_back(
+      {"a push sphere larger than the body appears inside", eachStep([](Twins& twins, int step, test::Random&) {
+         twins.attempt(pushAt(Vec3(0.01, 0.02, 0.03), 0.5));
+         if (step % 40 == 39) twins.attempt(PushCommand{false});
+       })});
   all.push_back({"a push sphere teleported at random", eachStep([](Twins& twins, int, test::Random& random) {
                    twins.attempt(pushAt(random.vector(0.1), random.uniform(0.001, 0.1)));
                  })});
@@ -110,42 +115,49 @@ std::vector<Input> allInputs() {
                    Vec3 at = random.vector(0.1);
                    at.x() = step % 2 ? 100.0 : -100.0;
                    twins.attempt(pushAt(at, 0.05, 1e6));
-                 }), 60, 1e5});
+                 }),
+                 60, 1e5});
   all.push_back({"a push sphere of a kilometre", eachStep([](Twins& twins, int, test::Random& random) {
                    twins.attempt(pushAt(random.vector(0.1) - Vec3(0, 0, 1e3), 1e3));
-                 }), 60, 1e4});
+                 }),
+                 60, 1e4});
   all.push_back({"bodies teleported every step", eachStep([](Twins& twins, int step, test::Random& random) {
                    PreparedBody body = test::prepared(blockOf(Kind{}, "stranger" + std::to_string(step)));
                    for (Vec3& p : body.state.positions) p += random.unit();
                    updateSurface(*body.model, body.state);
                    twins.attempt(SpawnCommand{std::make_shared<const PreparedBody>(std::move(body))});
                    if (step > 0) twins.attempt(RemoveCommand{"stranger" + std::to_string(step - 1)});
-                 }), 40, 100.0, false, test::weightless()});
-  all.push_back({"another material every step", eachStep([](Twins& twins, int, test::Random& random) {
-                   Material other;
-                   other.mode = static_cast<MatchMode>(random.integer(0, 2));
-                   other.alpha = random.uniform(0, 1);
-                   other.beta = random.uniform(0, 1);
-                   other.density = std::pow(10.0, random.uniform(-3, 6));
-                   other.damping = random.uniform(0, 10);
-                   other.youngs_modulus = random.integer(0, 1) ? std::pow(10.0, random.uniform(-2, 6)) : 0.0;
-                   other.poissons_ratio = random.uniform(0, 0.49);
-                   twins.attempt(pushAt(random.vector(0.1), 0.03));
-                   EXPECT_TRUE(twins.apply(SetMaterialCommand{"", [other](const Material&) -> Result<Material> {
-                                                                return other;
-                                                              }}).ok());
-                 }), 40, 100.0, false});
+                 }),
+                 40, 100.0, false, test::weightless()});
+  all.push_back(
+      {"another material every step", eachStep([](Twins& twins, int, test::Random& random) {
+         Material other;
+         other.mode = static_cast<MatchMode>(random.integer(0, 2));
+         other.alpha = random.uniform(0, 1);
+         other.beta = random.uniform(0, 1);
+         other.density = std::pow(10.0, random.uniform(-3, 6));
+         other.damping = random.uniform(0, 10);
+         other.youngs_modulus = random.integer(0, 1) ? std::pow(10.0, random.uniform(-2, 6)) : 0.0;
+         other.poissons_ratio = random.uniform(0, 0.49);
+         twins.attempt(pushAt(random.vector(0.1), 0.03));
+         EXPECT_TRUE(
+             twins.apply(SetMaterialCommand{"", [other](const Material&) -> Result<Material> { return other; }}).ok());
+       }),
+       40, 100.0, false});
   all.push_back({"reset every third step", eachStep([](Twins& twins, int step, test::Random& random) {
                    pickAt(twins, random.vector(0.1), 1e9);
                    if (step % 3 == 2) twins.reset();
-                 }), 60, kThrown});
-  all.push_back({"cut to crumbs while picked", [] {
+                 }),
+                 60, kThrown});
+  all.push_back({"cut to crumbs while picked",
+                 [] {
                    return [pick = PickId{0}](Twins& twins, int, test::Random& random) mutable {
                      if (!pick) pick = pickAt(twins, Vec3(0.1, 0.05, 0.05), 1e5);
                      twins.attempt(MovePickCommand{pick, Vec3(0.1, 0.05, 0.05) + random.vector(0.02)});
                      twins.attempt(cutThrough(random.vector(0.05), random.unit()));
                    };
-                 }, 6, kThrown, false});
+                 },
+                 6, kThrown, false});
   all.push_back({"incisions at random", eachStep([](Twins& twins, int, test::Random& random) {
                    InciseCommand incise;
                    incise.blade.x_axis = random.unit();
@@ -154,41 +166,49 @@ std::vector<Input> allInputs() {
                    incise.blade.length = random.uniform(0.01, 0.3);
                    incise.blade.depth = random.uniform(0.01, 0.1);
                    twins.attempt(incise);
-                 }), 20, 100.0, false});
+                 }),
+                 20, 100.0, false});
   all.push_back({"cut and undone", eachStep([](Twins& twins, int step, test::Random& random) {
                    twins.attempt(cutThrough(random.vector(0.05), random.unit()));
                    if (step % 2) twins.attempt(UndoCutCommand{});
                    if (step % 2) twins.attempt(UndoCutCommand{});
-                 }), 10});
-  all.push_back({"gravity of 1e4 on the ground", eachStep([](Twins&, int, test::Random&) {}), 120, 100.0, false,
-                 onGround(1e4)});
-  all.push_back({"dropped from a kilometre", [] {
+                 }),
+                 10});
+  all.push_back(
+      {"gravity of 1e4 on the ground", eachStep([](Twins&, int, test::Random&) {}), 120, 100.0, false, onGround(1e4)});
+  all.push_back({"dropped from a kilometre",
+                 [] {
                    return [](Twins& twins, int step, test::Random&) {
                      if (step) return;
                      PreparedBody body = test::prepared(blockOf(Kind{}, "dropped", Vec3(0, 0, 0.06)));
                      for (Vec3& v : body.state.velocities) v.z() = -std::sqrt(2.0 * 9.81 * 1000.0);
                      twins.attempt(SpawnCommand{std::make_shared<const PreparedBody>(std::move(body))});
                    };
-                 }, 120, 300.0, false, onGround()});
-  all.push_back({"two at the same place", [] {
+                 },
+                 120, 300.0, false, onGround()});
+  all.push_back({"two at the same place",
+                 [] {
                    return [](Twins& twins, int step, test::Random&) {
                      if (step) return;
                      twins.attempt(SpawnCommand{test::shared(blockOf(Kind{}, "same"))});
                    };
-                 }, 120, 30.0, false, test::weightless()});
-  all.push_back({"a million times the mass on top", [] {
+                 },
+                 120, 30.0, false, test::weightless()});
+  all.push_back({"a million times the mass on top",
+                 [] {
                    return [](Twins& twins, int step, test::Random&) {
                      if (step) return;
                      BodyDef heavy = blockOf(Kind{}, "heavy", Vec3(0, 0, 0.11));
                      heavy.material.density = 1e6;
                      twins.attempt(SetMaterialCommand{"block0", [](const Material& m) -> Result<Material> {
-                                                      Material light = m;
-                                                      light.density = 1.0;
-                                                      return light;
-                                                    }});
+                                                        Material light = m;
+                                                        light.density = 1.0;
+                                                        return light;
+                                                      }});
                      twins.attempt(SpawnCommand{test::shared(heavy)});
                    };
-                 }, 120, 30.0, false, onGround()});
+                 },
+                 120, 30.0, false, onGround()});
   return all;
 }
 
@@ -199,33 +219,6 @@ std::vector<Case> allCases() {
   for (const Input& input : allInputs())
     for (const Kind& kind : allKinds()) cases.emplace_back(kind, input);
   return thinned(cases);
-}
-
-/// The same bodies in a new world, each without the motion that it has as a whole: what flies would fly on, and what
-/// spins would stay drawn out.
-Twins stoppedAsAWhole(Twins& twins, const WorldSettings& settings, double reach) {
-  EXPECT_TRUE(twins.step(Vec3::Zero(), reach));
-  const WorldSnapshot before = twins.seen();
-  EXPECT_TRUE(twins.step(Vec3::Zero(), reach));
-  Twins calm(settings);
-  for (std::size_t b = 0; b < before.bodies.size(); ++b) {
-    const BodySnapshot& now = twins.seen().bodies[b];
-    PreparedBody body;
-    body.def.name = now.name;
-    body.def.material = now.material;
-    body.model = now.model;
-    body.state.positions = now.particles;
-    for (std::size_t i = 0; i < now.particles.size(); ++i)
-      body.state.velocities.push_back(settings.step_rate * (now.particles[i] - before.bodies[b].particles[i]));
-    const RigidMotion together = rigidMotionOf(*body.model, body.state.positions, body.state.velocities);
-    for (std::size_t i = 0; i < now.particles.size(); ++i)
-      body.state.velocities[i] -= together.velocity + together.spin.cross(now.particles[i] - together.centre);
-    body.state.poses.resize(body.model->clusters.size());
-    body.state.rider_offsets.assign(body.model->binding.riders.size(), Vec3::Zero());
-    updateSurface(*body.model, body.state);
-    calm.spawn(std::make_shared<const PreparedBody>(std::move(body)));
-  }
-  return calm;
 }
 
 class Inputs : public testing::TestWithParam<Case> {};

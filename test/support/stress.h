@@ -11,8 +11,8 @@
 
 namespace meshless::stress {
 
-/// MESHLESS_SURGERY_STRESS in percent: 100 is the short form. Below, only so much of each table is run and of the random
-/// commands; above, more of what is random.
+/// MESHLESS_SURGERY_STRESS in percent: 100 is the short form. Below, only so much of each table is run and of the
+/// random commands; above, more of what is random.
 inline double share() {
   const char* text = std::getenv("MESHLESS_SURGERY_STRESS");
   const double percent = text ? std::strtod(text, nullptr) : 100.0;
@@ -154,6 +154,31 @@ inline double distanceFromRest(const BodyModel& model, const Points& x) {
   return farthest / bounds.diagonal();
 }
 
+/// How far the farthest particle is from where one of its clusters would have it [m], moved to fit best.
+inline double clusterError(const BodyModel& model, const Points& x) {
+  double farthest = 0.0;
+  for (Index c = 0; c < model.clusters.size(); ++c) {
+    const ClusterRest& rest = model.shape.clusters[c];
+    const Index begin = model.clusters.offsets[c], end = model.clusters.offsets[c + 1];
+    Vec3 centre = Vec3::Zero();
+    Mat3 a = Mat3::Zero();
+    for (Index k = begin; k < end; ++k) {
+      const Index i = model.clusters.members[k];
+      centre += model.masses[i] * model.clusters.weights[k] / rest.mass * x[i];
+    }
+    for (Index k = begin; k < end; ++k) {
+      const Index i = model.clusters.members[k];
+      a += model.masses[i] * model.clusters.weights[k] * (x[i] - centre) * (model.rest[i] - rest.centre).transpose();
+    }
+    const Quat turn = nearestRotationExact(a, Quat::Identity()).rotation;
+    for (Index k = begin; k < end; ++k) {
+      const Index i = model.clusters.members[k];
+      farthest = std::max(farthest, (x[i] - centre - turn * (model.rest[i] - rest.centre)).norm());
+    }
+  }
+  return farthest;
+}
+
 /// Largest distance of a particle from `from` [m].
 inline double reachOf(const Points& x, const Vec3& from) {
   double most = 0.0;
@@ -188,7 +213,7 @@ class EnergyLaw {
   double last() const { return last_; }
 
  private:
-  static constexpr int kWindow = 30;        // steps
+  static constexpr int kWindow = 30;         // steps
   static constexpr double kRounding = 1e-9;  // of the first: floats round relative to it
   static constexpr double kNothing = 1e-12;  // [J]
   double swing_;
@@ -259,5 +284,32 @@ class Twins {
   World one_, two_;
   WorldSnapshot seen_;
 };
+
+/// The same bodies in a new world, each without the motion that it has as a whole: what flies would fly on, and what
+/// spins would stay drawn out.
+inline Twins stoppedAsAWhole(Twins& twins, const WorldSettings& settings, double reach) {
+  EXPECT_TRUE(twins.step(Vec3::Zero(), reach));
+  const WorldSnapshot before = twins.seen();
+  EXPECT_TRUE(twins.step(Vec3::Zero(), reach));
+  Twins calm(settings);
+  for (std::size_t b = 0; b < before.bodies.size(); ++b) {
+    const BodySnapshot& now = twins.seen().bodies[b];
+    PreparedBody body;
+    body.def.name = now.name;
+    body.def.material = now.material;
+    body.model = now.model;
+    body.state.positions = now.particles;
+    for (std::size_t i = 0; i < now.particles.size(); ++i)
+      body.state.velocities.push_back(settings.step_rate * (now.particles[i] - before.bodies[b].particles[i]));
+    const RigidMotion together = rigidMotionOf(*body.model, body.state.positions, body.state.velocities);
+    for (std::size_t i = 0; i < now.particles.size(); ++i)
+      body.state.velocities[i] -= together.velocity + together.spin.cross(now.particles[i] - together.centre);
+    body.state.poses.resize(body.model->clusters.size());
+    body.state.rider_offsets.assign(body.model->binding.riders.size(), Vec3::Zero());
+    updateSurface(*body.model, body.state);
+    calm.spawn(std::make_shared<const PreparedBody>(std::move(body)));
+  }
+  return calm;
+}
 
 }  // namespace meshless::stress

@@ -41,7 +41,7 @@ class ContactShape {
     double distance = 0.0;            // [m] signed: negative inside
     bool above = false;               // the point's projection falls into the triangle
   };
-  /// Of a point in the rest frame; well outside of the bounds only one of the nearest. Signs are those of the nearest
+  /// Of a point in the rest frame, whoever has asked before. Signs are those of the nearest
   /// triangle; on ties (an edge, a vertex) of the one with the larger plane distance. False without triangles, or for
   /// NaN. Thread-safe.
   bool nearest(const Vec3& rest, Nearest& found) const;
@@ -80,6 +80,7 @@ class ContactShape {
   struct Cell;
   const Cell* fill(std::size_t index, const std::array<int, 3>& at) const;
   std::size_t cellAt(const Vec3& rest, std::array<int, 3>& at) const;
+  bool isBeyondCells(const Vec3& rest) const;
   bool searchBins(const Vec3& rest, double within, Nearest& found) const;
   template <class Visit>
   void visitNear(const Vec3& rest, double radius, const Visit& visit) const;
