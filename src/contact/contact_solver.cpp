@@ -10,6 +10,7 @@ namespace meshless {
 namespace {
 
 constexpr double kLetOutShare = 0.3;   // of old overlap, a frame
+constexpr double kLetOutFrom = 5e-4;   // of the smaller body's size: what lies that little in another is left there
 constexpr double kLetOutSpeed = 1.0;   // [1/s] times the smaller body's size, at most
 constexpr double kCaughtSpeed = 10.0;  // [1/s] likewise, of what has passed through
 constexpr double kRestingSpeed = 0.1;  // of the speed after a fall by half the size: slower bodies do not bounce
@@ -188,6 +189,7 @@ struct ContactSolver::Impl {
   std::vector<Vec3> shifts;            // of particles by the local shares of impulses, see IslandPlan::shifts
   std::vector<Row> rows;               // of all islands in a solve(), kept while nothing turns
   std::vector<Row> let_rows;           // of an island in letOut()
+  std::vector<double> let_impulses;    // one a row [kg m]
   std::vector<Index> tasks;            // first island of each, and the end
   std::vector<std::size_t> corrected;  // one a task
   std::vector<Index> row_counts;       // one an island
@@ -594,17 +596,24 @@ void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactP
       if (!w.prepare(c, false, gap, row)) continue;
       double size = parties[c.a].shape->size();
       if (!row.on_ground) size = std::min(size, parties[c.b].shape->size());
-      const double old = -row.distance;
-      row.target = c.caught ? std::min(old, kCaughtSpeed * size * h) - old
-                            : std::min(kLetOutShare * old, kLetOutSpeed * size * h) - old;
+      const double old = std::max(0.0, -row.distance - (c.caught ? 0.0 : kLetOutFrom * size));
+      row.target = row.distance + (c.caught ? std::min(old, kCaughtSpeed * size * h)
+                                            : std::min(kLetOutShare * old, kLetOutSpeed * size * h));
       w.let_rows.push_back(row);
     }
     if (w.let_rows.empty()) continue;
-    for (const Row& row : w.let_rows) {
+    // There and back, and what was too much is taken back: one way alone turns bodies a little in every frame, always to
+    // the same side, and a stack would walk and rock.
+    const std::size_t count = w.let_rows.size();
+    w.let_impulses.assign(count, 0.0);
+    for (std::size_t n = 0; n < 2 * count; ++n) {
+      const std::size_t k = n < count ? n : 2 * count - 1 - n;
+      const Row& row = w.let_rows[k];
       const double wrong = row.target - row.distance - row.normal.dot(w.relativeShift(row));
-      if (!(wrong > 0.0)) continue;
-      const double impulse = wrong * row.inverse_answer;
-      w.apply(row, impulse * row.normal);
+      const double change = std::max(-w.let_impulses[k], wrong * row.inverse_answer);
+      if (change == 0.0 || !std::isfinite(change)) continue;
+      w.let_impulses[k] += change;
+      w.apply(row, change * row.normal);
       ++counters.corrected;
     }
     w.finish(island, 1.0);
@@ -613,7 +622,7 @@ void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactP
 
 std::size_t ContactSolver::bytes() const {
   const Impl& w = *impl_;
-  return sizeof w + bytesOf(w.rigid, w.shifts, w.rows, w.let_rows, w.tasks, w.corrected, w.row_counts);
+  return sizeof w + bytesOf(w.rigid, w.shifts, w.rows, w.let_rows, w.let_impulses, w.tasks, w.corrected, w.row_counts);
 }
 
 }  // namespace meshless
