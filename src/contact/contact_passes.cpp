@@ -14,7 +14,8 @@ constexpr double kStackWork = 4.75;
 constexpr double kLayerShare =
     0.7;                         // of the height of a body that is long in one direction alone: a splinter is no layer
 constexpr double kCalm = 0.02;   // of the size, how far particles go apart in a frame
-constexpr int kFewSubsteps = 4;  // below it two sweeps, there and back
+constexpr int kFewSubsteps = 4;  // below it an island of several bodies is swept so often:
+constexpr int kFewSweeps = 8;    // what sweeps leave would make a stack rock
 constexpr int kCaughtPasses = 24;  // of an island in which something was caught: it has to stop at once
 
 }  // namespace
@@ -45,9 +46,11 @@ void Contacts::Impl::choosePasses(const std::vector<ContactParty>& parties, doub
   plan.passes.resize(plan.size());
   plan.calm.resize(plan.size());
   const double substeps = std::max(1.0, std::round(frame / substep));
-  const int least = substeps < kFewSubsteps ? 2 : 1;
+  const bool few = substeps < kFewSubsteps;
   for (Index island = 0; island < plan.size(); ++island) {
     const double work = stackWork(scene, parties, plan, island, frame) / substeps;
+    const bool alone = plan.party_offsets[island + 1] - plan.party_offsets[island] < 2;
+    const int least = few ? (alone ? 2 : kFewSweeps) : 1;  // even: there and back
     plan.passes[island] = std::max(least, static_cast<int>(std::ceil(std::min(work, kMostPasses))));
     plan.calm[island] = 1;
     for (Index k = plan.party_offsets[island]; k < plan.party_offsets[island + 1]; ++k) {

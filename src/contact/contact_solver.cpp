@@ -10,6 +10,7 @@ namespace meshless {
 namespace {
 
 constexpr double kLetOutShare = 0.3;   // of old overlap, a frame
+constexpr double kLetOutFrom = 5e-4;   // of the smaller body's size: what lies that little in another is left there
 constexpr double kLetOutSpeed = 1.0;   // [1/s] times the smaller body's size, at most
 constexpr double kCaughtSpeed = 10.0;  // [1/s] likewise, of what has passed through
 constexpr double kRestingSpeed = 0.1;  // of the speed after a fall by half the size: slower bodies do not bounce
@@ -187,6 +188,7 @@ struct ContactSolver::Impl {
   std::vector<Rigid> rigid;            // one a party
   std::vector<Vec3> shifts;            // of particles by the local shares of impulses, see IslandPlan::shifts
   std::vector<Row> rows;               // of all islands in a solve(), kept while nothing turns
+  std::vector<double> let_impulses;    // one a row in letOut() [kg m]
   std::vector<Index> tasks;            // first island of each, and the end
   std::vector<std::size_t> corrected;  // one a task
   std::vector<Index> row_counts;       // one an island
@@ -547,18 +549,26 @@ struct ContactSolver::Impl {
       if (!prepare(c, false, gap, *end)) continue;
       double size = (*parties)[c.a].shape->size();
       if (!end->on_ground) size = std::min(size, (*parties)[c.b].shape->size());
-      const double old = -end->distance;
-      end->target = c.caught ? std::min(old, kCaughtSpeed * size * h) - old
-                             : std::min(kLetOutShare * old, kLetOutSpeed * size * h) - old;
+      const double old = std::max(0.0, -end->distance - (c.caught ? 0.0 : kLetOutFrom * size));
+      end->target = end->distance + (c.caught ? std::min(old, kCaughtSpeed * size * h)
+                                              : std::min(kLetOutShare * old, kLetOutSpeed * size * h));
       ++end;
     }
     if (end == first) return 0;
+    // There and back, and what was too much is taken back: one way alone turns bodies a little in every frame, always
+    // to the same side, and a stack would walk and rock.
+    const std::size_t count = static_cast<std::size_t>(end - first);
+    double* const impulses = let_impulses.data() + (first - rows.data());
+    std::fill_n(impulses, count, 0.0);
     std::size_t moved = 0;
-    for (const Row* row = first; row != end; ++row) {
-      const double wrong = row->target - row->distance - row->normal.dot(relativeShift(*row));
-      if (!(wrong > 0.0)) continue;
-      const double impulse = wrong * row->inverse_answer;
-      apply(*row, impulse * row->normal);
+    for (std::size_t n = 0; n < 2 * count; ++n) {
+      const std::size_t k = n < count ? n : 2 * count - 1 - n;
+      const Row& row = first[k];
+      const double wrong = row.target - row.distance - row.normal.dot(relativeShift(row));
+      const double change = std::max(-impulses[k], wrong * row.inverse_answer);
+      if (change == 0.0 || !std::isfinite(change)) continue;
+      impulses[k] += change;
+      apply(row, change * row.normal);
       ++moved;
     }
     finish(island, 1.0);
@@ -617,6 +627,7 @@ void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactP
   Impl& w = *impl_;
   w.start(scene, parties, entries, plan);
   w.rows.resize(plan.contacts.size());
+  w.let_impulses.resize(plan.contacts.size());
   w.shareOut();
   runEach(for_each, w.tasks.size() - 1, [&](std::size_t task) {
     for (Index island = w.tasks[task]; island < w.tasks[task + 1]; ++island)
@@ -627,7 +638,7 @@ void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactP
 
 std::size_t ContactSolver::bytes() const {
   const Impl& w = *impl_;
-  return sizeof w + bytesOf(w.rigid, w.shifts, w.rows, w.tasks, w.corrected, w.row_counts);
+  return sizeof w + bytesOf(w.rigid, w.shifts, w.rows, w.let_impulses, w.tasks, w.corrected, w.row_counts);
 }
 
 }  // namespace meshless

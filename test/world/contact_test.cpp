@@ -354,5 +354,29 @@ TEST(Contact, AnObstacleHoldsWhatFallsOnItAndNeverMoves) {
   EXPECT_NE(refused.error().detail.find("-1"), std::string::npos);
 }
 
+// Vertices of a fresh piece ride with offsets that fade; whoever looks on never sees one below the ground.
+TEST(Contact, PiecesThatLieOnTheGroundAreNotSeenBelowIt) {
+  World world{WorldSettings()};
+  BodyDef def = test::defOf(boxMesh(Vec3(0.12, 0.1, 0.08), 12, 10, 8), "block");
+  def.spacing = 0.02;
+  def.pose.translation = Vec3(0, 0, 0.0401);
+  def.material.youngs_modulus = 4000.0;
+  def.material.poissons_ratio = 0.45;
+  ASSERT_TRUE(world.addSceneBody(test::shared(def)).ok());
+  for (int step = 0; step < 60; ++step) world.step();
+  CutCommand cut;
+  cut.blades.origin = Vec3(0.004, -1.0, 0.04);
+  cut.blades.x_axis = Vec3::UnitY();
+  cut.blades.y_axis = Vec3(0.3, 0.0, 1.0).normalized();
+  ASSERT_EQ(test::replyOf<CutReply>(world.apply(cut)).new_bodies.size(), 2u);
+  for (int step = 0; step < 120; ++step) {
+    world.step();
+    for (const BodySnapshot& body : world.snapshot({true, false, false}).bodies) {
+      EXPECT_FALSE(body.model->binding.riders.empty());
+      for (const Vec3& p : body.surface) ASSERT_GT(p.z(), -1e-9) << body.name << " in step " << step;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace meshless

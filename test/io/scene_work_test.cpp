@@ -1,0 +1,126 @@
+// Nothing for nothing: which stages of a step do work in each of the scenes that are shipped, as they start.
+#include <dirent.h>
+
+#include <map>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "meshless_surgery/io/scene.h"
+#include "meshless_surgery/world/world.h"
+
+namespace meshless {
+namespace {
+
+constexpr int kSteps = 90;
+
+using Names = std::set<std::string>;
+using Work = std::map<std::string, std::size_t>;
+
+void add(Work& work, const StepReport& r) {
+  const MatchCounters& m = r.match_counters;
+  const ContactCounters& c = r.contact_counters;
+  const std::pair<const char*, std::size_t> parts[] = {{"clusters", m.clusters},
+                                                       {"linear fits", m.linear_fits},
+                                                       {"quadratic moments", m.quadratic_moments},
+                                                       {"plastic flows", m.plastic_flows},
+                                                       {"gradients", r.preserve_counters.gradients},
+                                                       {"bounds tested", c.bounds_tested},
+                                                       {"pairs", c.pairs},
+                                                       {"lookups", c.lookups},
+                                                       {"contacts", c.contacts},
+                                                       {"corrected", c.corrected},
+                                                       {"ground contacts", r.ground_contacts},
+                                                       {"contact shapes", r.contact_shapes},
+                                                       {"traced", c.traced},
+                                                       {"caught", c.caught},
+                                                       {"expelled", c.expelled},
+                                                       {"self points", c.self_points},
+                                                       {"push contacts", r.push_contacts},
+                                                       {"hashed", c.hashed},
+                                                       {"tetrahedra tests", c.tested},
+                                                       {"tetrahedralizations", r.tetrahedralizations},
+                                                       {"mended", r.mended}};
+  for (const auto& [name, count] : parts) work[name] += count;
+}
+
+Work workOf(const std::string& scene) {
+  const std::string package = SOURCE_DIR;
+  FileAccess access;
+  access.folders = {package};
+  access.find_package = [&](const std::string&) { return package; };
+  Result<SceneDef> read = readScene(package + "/config/scenes/" + scene, access);
+  EXPECT_TRUE(read.ok()) << (read.ok() ? "" : read.error().detail);
+  Work work;
+  if (!read.ok()) return work;
+  World world(read->world);
+  std::shared_ptr<const PreparedBody> first;  // of the copies that share its model
+  for (BodyDef& def : read->bodies) {
+    std::shared_ptr<const PreparedBody> ready;
+    if (first && def.copy && def.fixed.empty()) {
+      ready = std::make_shared<PreparedBody>(placedCopy(*first, def.name, def.pose));
+    } else {
+      Result<PreparedBody> body = prepareBody(std::move(def));
+      EXPECT_TRUE(body.ok()) << (body.ok() ? "" : body.error().detail);
+      if (!body.ok()) return work;
+      ready = first = std::make_shared<PreparedBody>(std::move(*body));
+    }
+    EXPECT_TRUE(world.addSceneBody(ready).ok());
+  }
+  for (ObstacleDef& def : read->obstacles) EXPECT_TRUE(world.addObstacle(std::move(def)).ok());
+  for (int step = 0; step < kSteps; ++step) {
+    world.step();
+    add(work, world.snapshot({}).report);
+  }
+  return work;
+}
+
+std::vector<std::string> shippedScenes() {
+  std::vector<std::string> names;
+  if (DIR* dir = opendir((std::string(SOURCE_DIR) + "/config/scenes").c_str())) {
+    while (const dirent* entry = readdir(dir))
+      if (std::string(entry->d_name).find(".yaml") != std::string::npos) names.push_back(entry->d_name);
+    closedir(dir);
+  }
+  return names;
+}
+
+TEST(SceneWork, EachShippedSceneDoesWhatItUsesAndNothingElse) {
+  const Names held{"clusters", "linear fits"};
+  const Names on_ground{"clusters", "linear fits", "contact shapes", "contacts", "corrected", "ground contacts"};
+  Names bending = held, bending_on_ground = on_ground;
+  bending.insert("quadratic moments");
+  bending_on_ground.insert("quadratic moments");
+  Names piled = bending_on_ground;
+  piled.insert({"bounds tested", "pairs", "lookups"});
+  const std::map<std::string, Names> expected = {{"block.yaml", bending_on_ground},
+                                                 {"elastic_liver.yaml", on_ground},
+                                                 {"fish.yaml", bending},
+                                                 {"incision.yaml", held},
+                                                 {"liver.yaml", on_ground},
+                                                 {"pile.yaml", piled},
+                                                 {"resection.yaml", on_ground},
+                                                 {"skin.yaml", held}};
+  const Names if_quick{"traced", "caught"};  // blocks of a pile may be, as they fall on each other
+  EXPECT_EQ(shippedScenes().size(), expected.size()) << "a scene has no line here";
+  for (const std::string& scene : shippedScenes()) {
+    SCOPED_TRACE(scene);
+    const Work work = workOf(scene);
+    Names found;
+    std::string text;
+    for (const auto& [name, count] : work)
+      if (count > 0) {
+        found.insert(name);
+        text += name + " " + std::to_string(count / kSteps) + "; ";
+      }
+    RecordProperty(scene, text);
+    const auto known = expected.find(scene);
+    if (known == expected.end()) continue;
+    if (known->second == piled)
+      for (const std::string& name : if_quick) found.erase(name);
+    EXPECT_EQ(found, known->second);
+  }
+}
+
+}  // namespace
+}  // namespace meshless
