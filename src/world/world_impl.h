@@ -199,7 +199,7 @@ struct World::Impl {
   double substepNow() const;  // [s]
   int chooseSubsteps(double h_frame);
   void movePush(double h, double h_frame);
-  void pullSprings(double h, double h_frame);
+  void pullSprings(int substep, int substeps, double h_frame);
   void contactBodies(const std::vector<WorldBody*>& near, double h, int stride);
   const ContactModel& contactModel(WorldBody& body);
   void findContacts(double h_frame);

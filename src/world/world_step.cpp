@@ -80,7 +80,7 @@ void World::step() {
       }
       {
         const Stopwatch tools(w.report.tools);
-        w.pullSprings(h, h_frame);
+        w.pullSprings(substep, substeps, h_frame);
       }
       {
         const Stopwatch contact(w.report.contact);
@@ -101,9 +101,11 @@ void World::step() {
       w.fadeRiderOffsets(*body, h_frame);
     }
     w.mendFaults();
-    for (Pick& pick : w.picks)
+    for (Pick& pick : w.picks) {
+      pick.reached = pick.target;
       if (const WorldBody* body = w.find(pick.body))
         pick.position = graspMean(pick, body->state.positions) + pick.offset;
+    }
     w.fallAsleep(h_frame);
     if (rest_shape) {
       w.contacts_current = true;
@@ -189,10 +191,14 @@ std::vector<WorldBody*> World::Impl::bodiesInContact(double h) {
   return near;
 }
 
-void World::Impl::pullSprings(double h, double h_frame) {
+// A target that jumps is followed evenly over the step: within the first of many substeps it would throw the tissue.
+void World::Impl::pullSprings(int substep, int substeps, double h_frame) {
   for (Pick& pick : picks)
-    if (WorldBody* body = find(pick.body); body && !body->asleep)
-      pick.force += pullGrasp(*body->model, pick, h, body->state.positions) * (h / h_frame);
+    if (WorldBody* body = find(pick.body); body && !body->asleep) {
+      const int left = substeps - substep - 1;
+      const Vec3 end = pick.target - left * (pick.target - pick.reached) / substeps;
+      pick.force += pullGrasp(*body->model, pick, end, h_frame / substeps, body->state.positions) / substeps;
+    }
 }
 
 void World::Impl::contactBodies(const std::vector<WorldBody*>& near, double h, int stride) {
