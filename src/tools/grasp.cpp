@@ -60,8 +60,8 @@ double graspStiffness(const BodyModel& model, const Pick& pick, double h) {
   return pick.stiffness / (1.0 + pick.stiffness * h * h * inverseMass(model, pick));
 }
 
-Vec3 pullGrasp(const BodyModel& model, const Pick& pick, double h, Points& positions) {
-  const Vec3 stretch = pick.target - pick.offset - graspMean(pick, positions);
+Vec3 pullGrasp(const BodyModel& model, const Pick& pick, const Vec3& end, double h, Points& positions) {
+  const Vec3 stretch = end - pick.offset - graspMean(pick, positions);
   const double stiff = pick.stiffness * h * h;
   const Vec3 lambda = stretch * (stiff / (1.0 + stiff * inverseMass(model, pick)));
   for (std::size_t k = 0; k < pick.patch.size(); ++k) {

@@ -88,7 +88,7 @@ Result<Reply> World::Impl::apply(const PickCommand& command) {
   pick.stiffness = command.stiffness > 0.0 ? command.stiffness : settings.pick_stiffness;
   makeGrasp(*grabbed.body->model, grabbed.particle,
             settings.pick_radius > 0.0 ? settings.pick_radius : kGraspSpacings * grabbed.body->model->spacing, pick);
-  pick.target = pick.position = grabbed.point;
+  pick.target = pick.reached = pick.position = grabbed.point;
   pick.offset = grabbed.point - graspMean(pick, grabbed.body->state.positions);
   picks.push_back(pick);
   wake(*grabbed.body);

@@ -146,6 +146,13 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
                                                             : "the blades met none of the bodies named"};
   }
 
+  std::size_t gone = 0, come = 0;
+  for (const Severed& s : severed) {
+    gone += find(s.parent)->model->next_patch > 1;
+    come += s.cut.pieces.size();
+  }
+  if (Status status = checkPieces(gone, come); !status) return status.error();
+
   // From here nothing fails: parents are retired and their pieces admitted.
   CutUndo before = beforeCut();
   for (Severed& s : severed) {
@@ -160,6 +167,16 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
   rememberCut(std::move(before), reply.cut_bodies, reply.new_bodies);
   reply.duration = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return reply;
+}
+
+Status World::Impl::checkPieces(std::size_t gone, std::size_t come) const {
+  std::size_t pieces = 0;
+  for (const auto& body : bodies) pieces += body->model->next_patch > 1;
+  // What opens one and parts nothing is always possible.
+  if (pieces - gone + come <= kMostPieces || come <= gone) return Done{};
+  return Error{ErrorCode::kFailed,
+               "there would be " + std::to_string(pieces - gone + come) + " pieces; accepted: up to " +
+                   std::to_string(kMostPieces) + ": remove some, or name the bodies to be cut"};
 }
 
 std::vector<Index> World::Impl::heldBySprings(const WorldBody& body) const {

@@ -183,6 +183,8 @@ struct World::Impl {
   void rememberCut(CutUndo before, std::vector<std::string> cut, std::vector<std::string> pieces);
   Status checkCut(const CutCommand& command);
   Result<CutReply> cutNow(const CutCommand& command);
+  /// Refuses what would leave more pieces than kMostPieces; `gone` of those there are go, `come` are made.
+  Status checkPieces(std::size_t gone, std::size_t come) const;
   std::vector<Index> heldBySprings(const WorldBody& body) const;  // particles in the middle of a grasp
   /// Retires a body and admits its pieces in its place; their names.
   std::vector<std::string> replaceByPieces(const BodyId& parent, std::vector<BodyPiece> pieces);
@@ -216,7 +218,7 @@ struct World::Impl {
   double substepNow() const;  // [s]
   int chooseSubsteps(double h_frame);
   void movePush(double h, double h_frame);
-  void pullSprings(double h, double h_frame);
+  void pullSprings(int substep, int substeps, double h_frame);
   void contactBodies(const std::vector<WorldBody*>& near, double h, int stride);
   const ContactModel& contactModel(WorldBody& body);
   /// Begins to make it where it will be needed and takes long.
@@ -232,6 +234,10 @@ struct World::Impl {
   void contactGroundAndPush(WorldBody& body, double h, double h_frame, const Vec3& push_velocity);
   void fadeRiderOffsets(WorldBody& body, double h);
 };
+
+/// Bodies that cuts have made or opened, at most: a blade through all of a heap of crumbs would double it, and each of
+/// them is next to all others.
+inline constexpr std::size_t kMostPieces = 1000;
 
 /// Why it cannot be an obstacle, whatever others there are.
 Status checkObstacle(const ObstacleDef& obstacle);

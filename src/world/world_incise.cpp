@@ -66,6 +66,13 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
                                                             : "the blade met none of the bodies named"};
   }
 
+  std::size_t gone = 0, come = 0;
+  for (const Opened& opened : all) {
+    gone += find(opened.id)->model->next_patch > 1;
+    come += opened.body.pieces.size();
+  }
+  if (Status status = checkPieces(gone, come); !status) return status.error();
+
   // From here nothing fails.
   CutUndo before = beforeCut();
   for (Opened& opened : all) {

@@ -79,7 +79,7 @@ void World::step() {
       }
       {
         const Stopwatch tools(w.report.tools);
-        w.pullSprings(h, h_frame);
+        w.pullSprings(substep, substeps, h_frame);
       }
       {
         const Stopwatch contact(w.report.contact);
@@ -101,9 +101,11 @@ void World::step() {
       if (rest_shape) w.liftOutOfGround(*body, h_frame);  // after: it lifts by offsets too
     }
     w.mendFaults();
-    for (Pick& pick : w.picks)
+    for (Pick& pick : w.picks) {
+      pick.reached = pick.target;
       if (const WorldBody* body = w.find(pick.body))
         pick.position = graspMean(pick, body->state.positions) + pick.offset;
+    }
     w.fallAsleep(h_frame);
     if (rest_shape) {
       w.contacts_current = true;
@@ -187,10 +189,14 @@ std::vector<WorldBody*> World::Impl::bodiesInContact(double h) {
   return near;
 }
 
-void World::Impl::pullSprings(double h, double h_frame) {
+// A target that jumps is followed evenly over the step: within the first of many substeps it would throw the tissue.
+void World::Impl::pullSprings(int substep, int substeps, double h_frame) {
   for (Pick& pick : picks)
-    if (WorldBody* body = find(pick.body); body && !body->asleep)
-      pick.force += pullGrasp(*body->model, pick, h, body->state.positions) * (h / h_frame);
+    if (WorldBody* body = find(pick.body); body && !body->asleep) {
+      const int left = substeps - substep - 1;
+      const Vec3 end = pick.target - left * (pick.target - pick.reached) / substeps;
+      pick.force += pullGrasp(*body->model, pick, end, h_frame / substeps, body->state.positions) / substeps;
+    }
 }
 
 void World::Impl::contactBodies(const std::vector<WorldBody*>& near, double h, int stride) {
@@ -279,23 +285,36 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
   bool hit_push = false;
   const Vec3 along = push_velocity.norm() > 0.0 ? Vec3(push_velocity.normalized()) : Vec3::UnitZ();
 
-  // Out of the sphere, and where that would be below the ground, sideways along it.
-  const auto outOfSphere = [&](const Vec3& p) -> Vec3 {
-    const Projection out = projectOutOfSphere(p, push.position, push.radius, along);
+  // Out of a sphere, and where that would be below the ground, sideways along it. lowest: how high p has to stay over it.
+  const auto outOf = [&](const Vec3& p, double radius, double lowest) -> Vec3 {
+    const Projection out = projectOutOfSphere(p, push.position, radius, along);
     if (!out.inside) return Vec3::Zero();
     Vec3 there = p + out.depth * out.normal;
-    if (settings.ground && there.z() < *settings.ground) {
-      const double rise = push.position.z() - *settings.ground;
-      if (std::abs(rise) < push.radius) {
+    const double floor = settings.ground ? *settings.ground + lowest : 0.0;
+    if (settings.ground && there.z() < floor) {
+      const double rise = push.position.z() - floor;
+      if (std::abs(rise) < radius) {
         Vec3 sideways(p.x() - push.position.x(), p.y() - push.position.y(), 0.0);
-        if (!(sideways.norm() > 1e-12 * push.radius)) sideways = Vec3::UnitX();
-        there =
-            push.position + sideways.normalized() * std::sqrt(push.radius * push.radius - rise * rise) * (1.0 + 1e-12);
-        there.z() = *settings.ground;
+        if (!(sideways.norm() > 1e-12 * radius)) sideways = Vec3::UnitX();
+        there = push.position + sideways.normalized() * std::sqrt(radius * radius - rise * rise) * (1.0 + 1e-12);
+        there.z() = floor;
       }
     }
     return there - p;
   };
+  const auto outOfSphere = [&](const Vec3& p) -> Vec3 { return outOf(p, push.radius, 0.0); };
+
+  // Whom the sphere has swallowed it puts out as a whole and as fast as it was: each particle by a way of its own would
+  // go to another side of a sphere that is much larger than the body, and tear it.
+  const Vec3 middle = 0.5 * (bounds.min + bounds.max);
+  const double half = 0.5 * bounds.diagonal();
+  if (near_push && !model.any_fixed && (middle - push.position).norm() + half < push.radius) {
+    const Vec3 shift = outOf(middle, push.radius + half, middle.z() - bounds.min.z());
+    for (Points* points : {&state.positions, &body.scratch.previous, &body.scratch.before_contact})
+      for (Vec3& p : *points) p += shift;
+    push.touching = hit_push = true;
+    ++report.push_contacts;
+  }
 
   // Who can reach the ground within this frame is found once. A push can send down others.
   const bool few = near_ground && !near_push;

@@ -54,6 +54,38 @@ TEST(ManyCuts, AHundredInOnePlaceWhilePicked) {
   RecordProperty("bodies", static_cast<int>(twins.world().bodyCount()));
 }
 
+// A blade without end through everything, again and again: the crumbs would double with each cut.
+TEST(ManyCuts, CrumbsAreBounded) {
+  WorldSettings settings = test::weightless();
+  settings.contact = ContactMethod::kNone;
+  World world(settings);
+  Kind coarse;
+  coarse.bodies = 36;
+  ASSERT_TRUE(world.addSceneBody(test::shared(blockOf(coarse, "block", -Vec3(0.1, 0.05, 0.05)))).ok());
+  test::Random random(41);
+  std::string refusal;
+  std::size_t bodies = 1;
+  for (int cut = 0; cut < 60 && refusal.empty(); ++cut) {
+    CutCommand command;
+    command.blades.x_axis = random.unit();
+    command.blades.y_axis = command.blades.x_axis.unitOrthogonal();
+    command.blades.origin = random.vector(0.03) - 1.0 * command.blades.x_axis;
+    const std::uint64_t before = world.stateHash();
+    const Result<Reply> reply = world.apply(command);
+    if (reply.ok()) {
+      bodies = world.bodyCount();
+      continue;
+    }
+    EXPECT_EQ(world.stateHash(), before);
+    if (reply.error().code == ErrorCode::kFailed) refusal = reply.error().detail;
+  }
+  EXPECT_NE(refusal.find("accepted: up to 1000"), std::string::npos) << refusal;
+  EXPECT_LE(bodies, 1000u);
+  EXPECT_GT(bodies, 300u);
+  ASSERT_TRUE(world.apply(UndoCutCommand{}).ok());
+  EXPECT_LT(world.bodyCount(), bodies);
+}
+
 void inciseOneBody(int incisions, ContactMethod contact) {
   WorldSettings settings = test::weightless();
   settings.contact = contact;

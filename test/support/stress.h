@@ -249,8 +249,8 @@ class Twins {
     two_.reset();
   }
 
-  /// A step of both; then all of the first is looked at: the same as the second to the bit, finite, and no particle or
-  /// vertex farther than `reach` [m] from `centre`.
+  /// A step of both; then all of the first is looked at: the same as the second to the bit, finite without
+  /// having been mended, and no particle or vertex farther than `reach` [m] from `centre`.
   testing::AssertionResult step(const Vec3& centre, double reach) {
     one_.step();
     two_.step();
@@ -270,6 +270,7 @@ class Twins {
     for (const Pick& pick : seen_.picks)
       if (!pick.force.allFinite() || !pick.position.allFinite())
         return testing::AssertionFailure() << at() << "the force of pick " << pick.id << " is not finite";
+    if (seen_.report.mended) return testing::AssertionFailure() << at() << "a body had to start anew from rest";
     if (!seen_.push.force.allFinite()) return testing::AssertionFailure() << at() << "the push force is not finite";
     return testing::AssertionSuccess();
   }

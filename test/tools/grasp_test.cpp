@@ -34,7 +34,7 @@ TEST(PullGrasp, GoesTheImplicitShareOfTheWayAndNeverOvershoots) {
       Points positions = body.state.positions;
       const Vec3 start = graspMean(pick, positions);
       pick.target = start + Vec3(0.5, 0, 0);
-      const Vec3 force = pullGrasp(*body.model, pick, h, positions);
+      const Vec3 force = pullGrasp(*body.model, pick, pick.target, h, positions);
       const double way = (graspMean(pick, positions) - start).x() / 0.5;
       double inverse_mass = 0.0;
       for (std::size_t k = 0; k < pick.patch.size(); ++k)
@@ -62,7 +62,7 @@ TEST(PullGrasp, FixedTissueDoesNotMove) {
   pick.stiffness = 100;
   Points positions = body.state.positions;
   pick.target = graspMean(pick, positions) + Vec3(0.1, 0, 0);
-  EXPECT_NEAR(pullGrasp(*body.model, pick, 1.0 / 120, positions).x(), 10.0, 1e-6);
+  EXPECT_NEAR(pullGrasp(*body.model, pick, pick.target, 1.0 / 120, positions).x(), 10.0, 1e-6);
   EXPECT_EQ(positions, body.state.positions);
 }
 

@@ -12,9 +12,9 @@ void makeGrasp(const BodyModel& model, Index centre, double radius, Pick& pick);
 /// Weighted mean of the patch [m].
 Vec3 graspMean(const Pick& pick, const Points& positions);
 
-/// Moves the patch implicitly towards the free end: its mean goes k h^2 K / (1 + k h^2 K) of the way, K its inverse mass.
+/// Moves the patch implicitly towards the free end at `end` [m]: its mean goes k h^2 K / (1 + k h^2 K) of the way, K its inverse mass.
 /// Fixed particles stay. Any stiffness and step are stable. Returns the force on the tissue [N].
-Vec3 pullGrasp(const BodyModel& model, const Pick& pick, double h, Points& positions);
+Vec3 pullGrasp(const BodyModel& model, const Pick& pick, const Vec3& end, double h, Points& positions);
 
 /// The stiffness [N/m] with which the grasp answers within `h` [s], as pullGrasp does it: the spring's own where the
 /// patch is heavy or fixed, less where it gives way.

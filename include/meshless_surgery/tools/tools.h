@@ -15,6 +15,7 @@ struct Pick {
   std::vector<double> weights;      // add up to 1
   Vec3 offset = Vec3::Zero();       // [m] grabbed point minus the patch's mean, kept so that nothing jumps
   Vec3 target = Vec3::Zero();       // [m] the free end
+  Vec3 reached = Vec3::Zero();      // [m] where it was at the end of the last step: it moves evenly over the substeps
   bool locked = false;
   double stiffness = 0.0;           // [N/m]
   Vec3 position = Vec3::Zero();     // [m] of the tissue's end

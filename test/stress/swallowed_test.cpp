@@ -1,0 +1,51 @@
+// A push sphere hundreds of times larger than the bodies that lie on the ground appears about them, again and again: it
+// puts them out as a whole, and tears nothing.
+#include <gtest/gtest.h>
+
+#include "support/stress.h"
+
+namespace meshless::stress {
+namespace {
+
+constexpr double kSize = 0.25;  // [m] diagonal of a block
+
+class Swallowed : public testing::TestWithParam<Kind> {};
+
+TEST_P(Swallowed, BodiesStayWhole) {
+  for (const double radius : {5.0, 100.0}) {
+    SCOPED_TRACE(radius);
+    WorldSettings settings;
+    Twins twins(settings);
+    for (int b = 0; b < 3; ++b)
+      twins.spawn(test::shared(blockOf(GetParam(), "block" + std::to_string(b), Vec3(0.25 * b, 0.0, 0.001))));
+    test::Random random(3);
+    double reach = 3.0;
+    for (int step = 0; step < 60; ++step) {
+      PushCommand push;
+      push.radius = radius;
+      push.position = radius * Vec3(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-0.5, 1));
+      twins.attempt(push);
+      reach += 2.0 * radius + 3.0;
+      ASSERT_TRUE(twins.step(Vec3::Zero(), reach));
+      for (const BodySnapshot& body : twins.seen().bodies)
+        ASSERT_LT(reachOf(body.particles, body.measures.centre_of_mass), 3.0 * kSize) << "step " << step;
+    }
+    twins.attempt(PushCommand{false});
+    for (int step = 0; step < 240; ++step) ASSERT_TRUE(twins.step(Vec3::Zero(), reach + 100.0));
+    for (const BodySnapshot& body : twins.seen().bodies)
+      EXPECT_LT(reachOf(body.particles, body.measures.centre_of_mass), 0.75 * kSize) << body.name;
+  }
+}
+
+std::vector<Kind> oneByOne() {
+  std::vector<Kind> kinds;
+  for (const Kind& kind : allKinds())
+    if (kind.bodies == 1) kinds.push_back(kind);
+  return kinds;
+}
+
+INSTANTIATE_TEST_SUITE_P(Stress, Swallowed, testing::ValuesIn(thinned(oneByOne())),
+                         [](const auto& info) { return testName(info.param.name); });
+
+}  // namespace
+}  // namespace meshless::stress
