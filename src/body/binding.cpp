@@ -16,6 +16,7 @@ namespace meshless {
 namespace {
 
 constexpr std::size_t kCarriers = 12;
+constexpr std::size_t kEnoughCarriers = 9;    // left of a rider's by a cut: no others are looked for
 constexpr std::size_t kMostCarriers = 40;     // of a rider that twelve would amplify
 constexpr double kSoft[] = {0.01, 0.1, 1.0};  // the softer, the less do the nearest carriers outweigh the others
 constexpr std::size_t kWorthAThread = 1000;   // riders
@@ -131,6 +132,10 @@ class Binder {
     ++part.bound;
     const Points& rest = task_.rest;
     const Vec3& p = task_.surface_rest[v];
+    if (keepMost(v)) {
+      leastSquaresWeights(rest, p, near_, kSoft[0], weights_);
+      if (!(magnitudeOf(weights_) > kMostWeight)) return finishAt(p);
+    }
     const Index start = startOf(v);
     order_.clear();
     for (Index i : walkFrom(start)) {
@@ -144,10 +149,7 @@ class Binder {
       if (soft == kSoft[1]) choose(kMostCarriers);
       leastSquaresWeights(rest, p, near_, soft, weights_);
     }
-    Vec3 lever = p;
-    for (std::size_t k = 0; k < near_.size(); ++k) lever -= weights_[k] * rest[near_[k]];
-    const double span = (rest[near_.back()] - p).norm();
-    finish(lever.norm() > kLever * span ? lever : Vec3(Vec3::Zero()));
+    finishAt(p);
   }
 
   SurfaceBinding part;  // of the riders bound so far; without particle and riders
@@ -169,6 +171,17 @@ class Binder {
     weights_.assign(parent.weights.begin() + parent.offsets[r], parent.weights.begin() + parent.offsets[r + 1]);
     finish(parent.levers[r]);
     return true;
+  }
+
+  /// What a cut left of the carriers, where that is enough.
+  bool keepMost(Index v) {
+    const Index r = task_.inherited ? task_.inherited->rider[v] : kNoIndex;
+    if (r == kNoIndex || task_.inherited->separated) return false;
+    const SurfaceBinding& parent = task_.inherited->parent;
+    near_.clear();
+    for (Index k = parent.offsets[r]; k < parent.offsets[r + 1] && near_.size() < kCarriers; ++k)
+      if (const Index kept = task_.inherited->renumbered[parent.carriers[k]]; kept != kNoIndex) near_.push_back(kept);
+    return near_.size() >= kEnoughCarriers;
   }
 
   /// The nearest particle that the rider may follow.
@@ -218,6 +231,13 @@ class Binder {
     }
     near_.clear();
     for (auto at = order_.begin(); at != end; ++at) near_.push_back(at->second);
+  }
+
+  void finishAt(const Vec3& p) {
+    Vec3 lever = p;
+    for (std::size_t k = 0; k < near_.size(); ++k) lever -= weights_[k] * task_.rest[near_[k]];
+    const double span = (task_.rest[near_.back()] - p).norm();
+    finish(lever.norm() > kLever * span ? lever : Vec3(Vec3::Zero()));
   }
 
   void finish(const Vec3& lever) {
