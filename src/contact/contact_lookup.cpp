@@ -34,7 +34,8 @@ double deviationWithin(const ContactParty& party, const MapFinder& finder, const
     if (!near.contains(now)) continue;
     const ContactMap& map = maps[finder.nearest(now)];
     const Vec3& at_rest = shape.surface().vertices[s.vertices[0]];
-    const Vec3 fitted = map.quadratic ? map.quadratic->at(at_rest) : Vec3(map.from_rest * (at_rest - map.rest) + map.centre);
+    const Vec3 fitted =
+        map.quadratic ? map.quadratic->at(at_rest) : Vec3(map.from_rest * (at_rest - map.rest) + map.centre);
     farthest = std::max(farthest, (now - fitted).squaredNorm());
   }
   return std::min(most, (party.map_count > 1 ? kNeighbour : kSameMap) * std::sqrt(farthest));

@@ -602,8 +602,8 @@ void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactP
       w.let_rows.push_back(row);
     }
     if (w.let_rows.empty()) continue;
-    // There and back, and what was too much is taken back: one way alone turns bodies a little in every frame, always to
-    // the same side, and a stack would walk and rock.
+    // There and back, and what was too much is taken back: one way alone turns bodies a little in every frame, always
+    // to the same side, and a stack would walk and rock.
     const std::size_t count = w.let_rows.size();
     w.let_impulses.assign(count, 0.0);
     for (std::size_t n = 0; n < 2 * count; ++n) {
