@@ -1,7 +1,7 @@
 // What the world adds to a body that uses nothing of it: the same body, in the same process, by World::step() with all
 // that it can do switched on, and by the deformer alone (body/deform.h: match, integrate). Runs alternate, so that a
-// machine that is busy for a while slows both, and the time is the processor's; `over` is the difference of their medians
-// relative to the deformer's.
+// machine that is busy for a while slows both, and the time is the processor's; `over` is the difference of their
+// medians relative to the deformer's.
 #include <time.h>
 
 #include <algorithm>

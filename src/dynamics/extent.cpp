@@ -4,7 +4,7 @@
 
 namespace meshless {
 
-Box boundsOf(const Points& points, InstructionSet set) {
+Box boundsOf(const Points& points, [[maybe_unused]] InstructionSet set) {
   Box box;
   if (points.empty()) return box;
 #if MESHLESS_ROTATION_X86
@@ -17,7 +17,7 @@ Box boundsOf(const Points& points, InstructionSet set) {
   return box;
 }
 
-bool allWithin(const Points& points, double most, InstructionSet set) {
+bool allWithin(const Points& points, double most, [[maybe_unused]] InstructionSet set) {
   if (points.empty()) return true;
 #if MESHLESS_ROTATION_X86
   if (set != InstructionSet::kBaseline && instructionSetAvailable(InstructionSet::kAvx2))

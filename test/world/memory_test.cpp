@@ -56,7 +56,8 @@ TEST(Memory, CopiesOfAModelAreCountedOnce) {
   const auto useOf = [&](int copies) {
     World world(test::weightless());
     for (int k = 0; k < copies; ++k) {
-      auto body = std::make_shared<PreparedBody>(placedCopy(*shared, "block" + std::to_string(k), {Quat::Identity(), Vec3(k, 0, 1.0)}));
+      const Pose pose{Quat::Identity(), Vec3(k, 0, 1.0)};
+      auto body = std::make_shared<PreparedBody>(placedCopy(*shared, "block" + std::to_string(k), pose));
       EXPECT_TRUE(world.addSceneBody(body).ok());
     }
     world.step();
@@ -65,7 +66,8 @@ TEST(Memory, CopiesOfAModelAreCountedOnce) {
   const MemoryUse one = useOf(1), five = useOf(5);
   EXPECT_EQ(five.models, one.models);
   EXPECT_EQ(five.particles, 5 * one.particles);
-  EXPECT_NEAR(static_cast<double>(five.states), 5.0 * static_cast<double>(one.states), 0.05 * static_cast<double>(five.states));
+  const double states = static_cast<double>(five.states);
+  EXPECT_NEAR(states, 5.0 * static_cast<double>(one.states), 0.05 * states);
   EXPECT_EQ(World(WorldSettings()).memory().particles, 0u);
   EXPECT_EQ(World(WorldSettings()).memory().perParticle(), 0.0);
 }
