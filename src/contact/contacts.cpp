@@ -120,14 +120,15 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   if (w.reached.empty()) {
     w.last.swap(w.contacts);
     w.last_sorted = std::min(w.steady_contacts, w.last.size());
+    // Once a frame: where somebody wakes and all is looked at anew, `last` is still of the parties of the frame before.
+    w.same_parties = w.keys.size() == parties.size();
+    w.keys.resize(parties.size());
+    for (Index p = 0; p < parties.size(); ++p) {
+      w.same_parties = w.same_parties && w.keys[p] == parties[p].key;
+      w.keys[p] = parties[p].key;
+    }
   }
   ++w.frames;
-  w.same_parties = w.keys.size() == parties.size();
-  w.keys.resize(parties.size());
-  for (Index p = 0; p < parties.size(); ++p) {
-    w.same_parties = w.same_parties && w.keys[p] == parties[p].key;
-    w.keys[p] = parties[p].key;
-  }
   w.contacts.clear();
   w.entries.clear();
   w.depths.clear();

@@ -41,10 +41,11 @@ std::vector<Kind> oneByOne() {
   std::vector<Kind> kinds;
   for (const Kind& kind : allKinds())
     if (kind.bodies == 1) kinds.push_back(kind);
-  return kinds;
+  const std::vector<Kind> some = thinned(kinds);
+  return some.empty() ? std::vector<Kind>{kinds.front()} : some;
 }
 
-INSTANTIATE_TEST_SUITE_P(Stress, Swallowed, testing::ValuesIn(thinned(oneByOne())),
+INSTANTIATE_TEST_SUITE_P(Stress, Swallowed, testing::ValuesIn(oneByOne()),
                          [](const auto& info) { return testName(info.param.name); });
 
 }  // namespace
