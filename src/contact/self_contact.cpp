@@ -249,7 +249,7 @@ void Contacts::Impl::crossRidges(Findings& to, const std::vector<ContactParty>& 
       const bool in_order = now[k].ridge < now[n].ridge;
       const RidgeNow &a = now[in_order ? k : n], &b = now[in_order ? n : k];
       ++to.counters.self_points;
-      const std::array<Index, 2> &e = set.ridges[a.ridge].vertices, &f = set.ridges[b.ridge].vertices;
+      const std::array<Index, 2>&e = set.ridges[a.ridge].vertices, &f = set.ridges[b.ridge].vertices;
       if (e[0] == f[0] || e[0] == f[1] || e[1] == f[0] || e[1] == f[1]) continue;
       const Vec3 from_a = vertexAt(party, e[0]), from_b = vertexAt(party, f[0]);
       const Vec3 along_a = vertexAt(party, e[1]) - from_a, along_b = vertexAt(party, f[1]) - from_b;

@@ -7,11 +7,11 @@
 
 namespace meshless::extent_sets {
 
-#define MESHLESS_EXTENT_SET(set)                                                            \
-  namespace set {                                                                           \
-  /* low and high: what is known so far. `count` coordinates, a whole number of points. */  \
-  void bounds(const double* x, std::size_t count, double* low, double* high);               \
-  bool within(const double* x, std::size_t count, double most);                             \
+#define MESHLESS_EXTENT_SET(set)                                                           \
+  namespace set {                                                                          \
+  /* low and high: what is known so far. `count` coordinates, a whole number of points. */ \
+  void bounds(const double* x, std::size_t count, double* low, double* high);              \
+  bool within(const double* x, std::size_t count, double most);                            \
   }
 MESHLESS_EXTENT_SET(baseline)
 #if MESHLESS_ROTATION_X86

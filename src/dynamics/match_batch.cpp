@@ -15,8 +15,8 @@ constexpr double kMostBeta = 0.95;  // as in body/deform.cpp
 constexpr double kNoExtent = 1e-6;  // of the inertia's trace: float moments are not known better
 
 const Entries& entriesOf(InstructionSet set) {
-#define MESHLESS_MATCH_TABLE(name)                                                                   \
-  {                                                                                                  \
+#define MESHLESS_MATCH_TABLE(name)                                                                        \
+  {                                                                                                       \
     name::measureBodies, name::gatherBodies, name::moveBodies, name::sumParticles, name::spreadParticles, \
         name::sumLayer, name::gatherClusters, name::mapClusters, name::pullParticles, name::moveParticles \
   }

@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kMaxQueuedEvents = 10000;
 constexpr double kClustersRate = 10.0;  // [Hz]
 constexpr double kContactsRate = 30.0;  // [Hz]
-constexpr double kBehind = 0.95;  // a real-time factor below it is worth a warning
+constexpr double kBehind = 0.95;        // a real-time factor below it is worth a warning
 
 std::chrono::steady_clock::duration periodOf(double rate) {
   return std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(1.0 / rate));
@@ -82,8 +82,8 @@ Publishers::~Publishers() { stop(); }
 
 void Publishers::start() {
   const auto now = Clock::now();
-  for (Cadence* cadence : {&markers_due_, &surfaces_due_, &clusters_due_, &contacts_due_, &points_due_, &state_due_, &tools_due_,
-                           &diagnostics_due_}) {
+  for (Cadence* cadence : {&markers_due_, &surfaces_due_, &clusters_due_, &contacts_due_, &points_due_, &state_due_,
+                           &tools_due_, &diagnostics_due_}) {
     cadence->next = now;
   }
   thread_ = std::thread([this] { loop(); });
@@ -114,8 +114,8 @@ void Publishers::loop() {
   while (true) {
     publishEvents();
     publishTick(Clock::now());
-    const auto next = std::min({markers_due_.next, surfaces_due_.next, clusters_due_.next, contacts_due_.next, points_due_.next,
-                                state_due_.next, tools_due_.next, diagnostics_due_.next});
+    const auto next = std::min({markers_due_.next, surfaces_due_.next, clusters_due_.next, contacts_due_.next,
+                                points_due_.next, state_due_.next, tools_due_.next, diagnostics_due_.next});
     std::unique_lock<std::mutex> lock(mutex_);
     changed_.wait_until(lock, next, [this] { return stopping_ || !events_.empty(); });
     if (stopping_) return;

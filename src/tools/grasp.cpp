@@ -71,7 +71,8 @@ Vec3 pullGrasp(const BodyModel& model, const Pick& pick, const Vec3& end, double
   return lambda / (h * h);
 }
 
-RayHit castRay(const Points& vertices, const std::vector<Triangle>& triangles, const Vec3& origin, const Vec3& direction) {
+RayHit castRay(const Points& vertices, const std::vector<Triangle>& triangles, const Vec3& origin,
+               const Vec3& direction) {
   RayHit best;
   best.distance = std::numeric_limits<double>::infinity();
   const Vec3 d = direction.normalized();

@@ -174,9 +174,9 @@ Status World::Impl::checkPieces(std::size_t gone, std::size_t come) const {
   for (const auto& body : bodies) pieces += body->model->next_patch > 1;
   // What opens one and parts nothing is always possible.
   if (pieces - gone + come <= kMostPieces || come <= gone) return Done{};
-  return Error{ErrorCode::kFailed,
-               "there would be " + std::to_string(pieces - gone + come) + " pieces; accepted: up to " +
-                   std::to_string(kMostPieces) + ": remove some, or name the bodies to be cut"};
+  return Error{ErrorCode::kFailed, "there would be " + std::to_string(pieces - gone + come) +
+                                       " pieces; accepted: up to " + std::to_string(kMostPieces) +
+                                       ": remove some, or name the bodies to be cut"};
 }
 
 std::vector<Index> World::Impl::heldBySprings(const WorldBody& body) const {

@@ -25,8 +25,7 @@ MemoryUse World::memory() const {
     if (first(body->mesh.get()))
       use.contact += sizeof *body->mesh + bytesOf(body->mesh->tetrahedra, body->mesh->faces, body->mesh->edges);
   }
-  for (const WorldBatch& batch : w.batches)
-    use.states += batch.batch->bytes() + bytesOf(batch.bodies, batch.states);
+  for (const WorldBatch& batch : w.batches) use.states += batch.batch->bytes() + bytesOf(batch.bodies, batch.states);
   for (const auto& obstacle : w.obstacles) {
     use.models += bytesOf(obstacle->def->mesh.vertices, obstacle->def->mesh.triangles, obstacle->own) +
                   bytesOf(obstacle->masses, obstacle->inverse_masses, obstacle->maps);

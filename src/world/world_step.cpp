@@ -285,7 +285,8 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
   bool hit_push = false;
   const Vec3 along = push_velocity.norm() > 0.0 ? Vec3(push_velocity.normalized()) : Vec3::UnitZ();
 
-  // Out of a sphere, and where that would be below the ground, sideways along it. lowest: how high p has to stay over it.
+  // Out of a sphere, and where that would be below the ground, sideways along it. lowest: how high p has to stay over
+  // it.
   const auto outOf = [&](const Vec3& p, double radius, double lowest) -> Vec3 {
     const Projection out = projectOutOfSphere(p, push.position, radius, along);
     if (!out.inside) return Vec3::Zero();

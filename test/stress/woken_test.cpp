@@ -16,7 +16,8 @@ TEST(Woken, WhileBodiesGo) {
   constexpr int kGuests = 80;
   World world{WorldSettings()};
   for (int k = 0; k < kGuests; ++k)
-    ASSERT_TRUE(world.apply(SpawnCommand{test::shared(boxAt("guest" + std::to_string(k), Vec3(5.0 + k, 0, 50.0), 1))}).ok());
+    ASSERT_TRUE(
+        world.apply(SpawnCommand{test::shared(boxAt("guest" + std::to_string(k), Vec3(5.0 + k, 0, 50.0), 1))}).ok());
   ASSERT_TRUE(world.addSceneBody(test::shared(boxAt("sleeper", Vec3(-1, 0, 0.001), 2))).ok());
   for (int step = 0; step < 240; ++step) world.step();
   // Of a tower the finest is on top, so that each pair is followed by one of fewer triangles.

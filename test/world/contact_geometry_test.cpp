@@ -24,7 +24,8 @@ WorldSnapshot seen(World& world) { return world.snapshot({true, true, true}); }
 /// A body as contact sees it, at given positions of its particles.
 struct Party {
   Party(const PreparedBody& body, std::uint64_t key)
-      : model(body.model), state(body.state),
+      : model(body.model),
+        state(body.state),
         shape(model->surface,
               {&model->binding.particle, &model->binding.riders, &model->binding.offsets, &model->binding.carriers,
                &model->binding.weights},
@@ -38,8 +39,7 @@ struct Party {
     updateSurface(*model, state);
     maps.clear();
     for (Index c = 0; c < model->clusters.size(); ++c) maps.push_back(fit(c));
-    if (!model->shape.quadratic.empty())
-      fitQuadraticMaps(matchInput(*model), state.positions.data(), maps, quadratics);
+    if (!model->shape.quadratic.empty()) fitQuadraticMaps(matchInput(*model), state.positions.data(), maps, quadratics);
     view.positions = state.positions.data();
     view.previous = state.positions.data();
     view.masses = model->masses.data();

@@ -80,8 +80,8 @@ TEST(Memory, IsWhatTheAllocatorHasGivenOut) {
     const struct mallinfo2 before = mallinfo2();
     const World world = stacked(13, elastic);
     const struct mallinfo2 after = mallinfo2();
-    const double given = static_cast<double>(after.uordblks + after.hblkhd) -
-                         static_cast<double>(before.uordblks + before.hblkhd);
+    const double given =
+        static_cast<double>(after.uordblks + after.hblkhd) - static_cast<double>(before.uordblks + before.hblkhd);
     const double told = static_cast<double>(world.memory().total());
     EXPECT_GT(told, 0.9 * given);
     EXPECT_LT(told, 1.1 * given);

@@ -171,8 +171,9 @@ void addWedge(TriangleMesh& mesh, const Vec3& at, bool along_x, double up) {
     const Vec3 in = along_x ? Vec3(0, -0.04, 0.03 * up) : Vec3(-0.04, 0, 0.03 * up);
     for (const Vec3& p : {Vec3(at + end), Vec3(at + end + out), Vec3(at + end + in)}) mesh.vertices.push_back(p);
   }
-  std::vector<Triangle> triangles{{v, v + 1, v + 2}, {v + 3, v + 5, v + 4}, {v, v + 3, v + 4}, {v, v + 4, v + 1},
-                                  {v, v + 2, v + 5}, {v, v + 5, v + 3},     {v + 1, v + 4, v + 5}, {v + 1, v + 5, v + 2}};
+  std::vector<Triangle> triangles{{v, v + 1, v + 2},     {v + 3, v + 5, v + 4}, {v, v + 3, v + 4},
+                                  {v, v + 4, v + 1},     {v, v + 2, v + 5},     {v, v + 5, v + 3},
+                                  {v + 1, v + 4, v + 5}, {v + 1, v + 5, v + 2}};
   const Vec3 middle = at + Vec3(0, 0, 0.02 * up);
   const Vec3 &a = mesh.vertices[v], &b = mesh.vertices[v + 3], &c = mesh.vertices[v + 4];
   const bool inwards = (b - a).cross(c - a).dot(a - middle) < 0.0;
@@ -227,8 +228,10 @@ TEST(SelfContact, RidgesThatCrossArePressedApartByEqualAndOppositeImpulses) {
     EXPECT_EQ(counters.contacts, 1u);
     contacts.begin(parties, 1.0 / 120.0);
     positions = now;
-    contacts.solve(parties, 1.0 / 120.0, [](Index, std::vector<ContactMap>&) {}, counters);
-    const double above = 0.5 * (positions[0].z() + positions[3].z()), below = 0.5 * (positions[6].z() + positions[9].z());
+    contacts.solve(
+        parties, 1.0 / 120.0, [](Index, std::vector<ContactMap>&) {}, counters);
+    const double above = 0.5 * (positions[0].z() + positions[3].z()),
+                 below = 0.5 * (positions[6].z() + positions[9].z());
     EXPECT_NEAR(above - below, std::max(gap, 0.0), 1e-9);
     Vec3 sum = Vec3::Zero();
     for (Index v = 0; v < positions.size(); ++v) sum += positions[v] - now[v];

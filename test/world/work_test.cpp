@@ -324,7 +324,8 @@ TEST(Sleep, APileOfAThousandIsAsleepAfterTwentySecondsAndDoesNothing) {
   EXPECT_EQ(particlesOf(world), before);
 }
 
-// What trembles between two substeps and stays where it is does not keep a tower awake; the pile's tower 121 did for good.
+// What trembles between two substeps and stays where it is does not keep a tower awake; the pile's tower 121 did for
+// good.
 TEST(Sleep, ATowerThatTremblesWithinItsFramesSleeps) {
   bench::PileOptions options;
   options.sleeping = true;
@@ -361,12 +362,14 @@ void expectWakes(const std::string& what, const std::function<void(World&)>& act
 }
 
 TEST(Sleep, APickWakesItsIslandAndNoOther) {
-  expectWakes("pick", [](World& world) {
-    PickCommand pick;
-    pick.body = "high1";
-    pick.point = Vec3(0.5, 0.0, 2.0 * kCube);
-    replyOf<PickReply>(world.apply(pick));
-  }, {"low1", "high1"});
+  expectWakes("pick",
+              [](World& world) {
+                PickCommand pick;
+                pick.body = "high1";
+                pick.point = Vec3(0.5, 0.0, 2.0 * kCube);
+                replyOf<PickReply>(world.apply(pick));
+              },
+              {"low1", "high1"});
 }
 
 TEST(Sleep, AMovedPickAndItsReleaseWakeIt) {
@@ -417,16 +420,18 @@ TEST(Sleep, ABodyThatSleepsOnAStretchedSpringMovesByNoBitAndTheSpringKeepsItsFor
 }
 
 TEST(Sleep, AMaterialWakesItsIslandAndNoOther) {
-  expectWakes("material", [](World& world) {
-    SetMaterialCommand set;
-    set.body = "low1";
-    set.change = [](const Material& m) {
-      Material changed = m;
-      changed.alpha = 0.5;
-      return Result<Material>(changed);
-    };
-    replyOf<Done>(world.apply(set));
-  }, {"low1", "high1"});
+  expectWakes("material",
+              [](World& world) {
+                SetMaterialCommand set;
+                set.body = "low1";
+                set.change = [](const Material& m) {
+                  Material changed = m;
+                  changed.alpha = 0.5;
+                  return Result<Material>(changed);
+                };
+                replyOf<Done>(world.apply(set));
+              },
+              {"low1", "high1"});
 }
 
 TEST(Sleep, ARemovalWakesWhoLeanedOnIt) {
@@ -434,12 +439,14 @@ TEST(Sleep, ARemovalWakesWhoLeanedOnIt) {
 }
 
 TEST(Sleep, APushedSphereWakesWhoItReachesInTheSameStep) {
-  expectWakes("push", [](World& world) {
-    PushCommand push;
-    push.radius = 0.03;
-    push.position = Vec3(0.5, -0.075, 0.06);
-    replyOf<Done>(world.apply(push));
-  }, {"low1", "high1"});
+  expectWakes("push",
+              [](World& world) {
+                PushCommand push;
+                push.radius = 0.03;
+                push.position = Vec3(0.5, -0.075, 0.06);
+                replyOf<Done>(world.apply(push));
+              },
+              {"low1", "high1"});
   // On its way: asleep until it is there.
   World world = sleepingTowers(2);
   PushCommand push;

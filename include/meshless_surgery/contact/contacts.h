@@ -19,9 +19,9 @@ namespace meshless {
 struct ContactMap {
   Mat3 from_rest = Mat3::Identity();
   Mat3 to_rest = Mat3::Identity();
-  Vec3 rest = Vec3::Zero();    // [m]
-  Vec3 centre = Vec3::Zero();  // [m]
-  bool flipped = false;        // it turns what it maps inside out
+  Vec3 rest = Vec3::Zero();                 // [m]
+  Vec3 centre = Vec3::Zero();               // [m]
+  bool flipped = false;                     // it turns what it maps inside out
   const QuadraticMap* quadratic = nullptr;  // where the cluster bends: the better map, to which this is the start
 };
 
@@ -46,7 +46,7 @@ struct ContactParty {
   double spread = 0.0;           // [m/s] by which they differ from it at most
   bool meets_itself = false;
   const SelfContactSet* self = nullptr;  // where it meets itself; filled by the time make() is called
-  bool moves = true;             // false: asleep, or an obstacle; its arrays are not written
+  bool moves = true;                     // false: asleep, or an obstacle; its arrays are not written
 };
 
 struct ContactScene {

@@ -1,8 +1,8 @@
 // elasticAccelerations() vectorised for the widest instructions that the machine has.
 #pragma once
 
-#include "meshless_surgery/dynamics/elastic.h"
 #include "meshless_surgery/base/for_each.h"
+#include "meshless_surgery/dynamics/elastic.h"
 #include "meshless_surgery/dynamics/rotation_batch.h"
 
 namespace meshless {

@@ -12,8 +12,8 @@ void makeGrasp(const BodyModel& model, Index centre, double radius, Pick& pick);
 /// Weighted mean of the patch [m].
 Vec3 graspMean(const Pick& pick, const Points& positions);
 
-/// Moves the patch implicitly towards the free end at `end` [m]: its mean goes k h^2 K / (1 + k h^2 K) of the way, K its inverse mass.
-/// Fixed particles stay. Any stiffness and step are stable. Returns the force on the tissue [N].
+/// Moves the patch implicitly towards the free end at `end` [m]: its mean goes k h^2 K / (1 + k h^2 K) of the way, K
+/// its inverse mass. Fixed particles stay. Any stiffness and step are stable. Returns the force on the tissue [N].
 Vec3 pullGrasp(const BodyModel& model, const Pick& pick, const Vec3& end, double h, Points& positions);
 
 /// The stiffness [N/m] with which the grasp answers within `h` [s], as pullGrasp does it: the spring's own where the
@@ -27,6 +27,7 @@ struct RayHit {
   Index triangle = 0;
   Vec3 point = Vec3::Zero();
 };
-RayHit castRay(const Points& vertices, const std::vector<Triangle>& triangles, const Vec3& origin, const Vec3& direction);
+RayHit castRay(const Points& vertices, const std::vector<Triangle>& triangles, const Vec3& origin,
+               const Vec3& direction);
 
 }  // namespace meshless

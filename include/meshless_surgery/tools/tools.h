@@ -10,33 +10,33 @@ namespace meshless {
 struct Pick {
   PickId id = 0;
   BodyId body;
-  Index particle = 0;               // where the tissue was grabbed
-  std::vector<Index> patch;         // particles that the grasp holds, the first is `particle`
-  std::vector<double> weights;      // add up to 1
-  Vec3 offset = Vec3::Zero();       // [m] grabbed point minus the patch's mean, kept so that nothing jumps
-  Vec3 target = Vec3::Zero();       // [m] the free end
-  Vec3 reached = Vec3::Zero();      // [m] where it was at the end of the last step: it moves evenly over the substeps
+  Index particle = 0;           // where the tissue was grabbed
+  std::vector<Index> patch;     // particles that the grasp holds, the first is `particle`
+  std::vector<double> weights;  // add up to 1
+  Vec3 offset = Vec3::Zero();   // [m] grabbed point minus the patch's mean, kept so that nothing jumps
+  Vec3 target = Vec3::Zero();   // [m] the free end
+  Vec3 reached = Vec3::Zero();  // [m] where it was at the end of the last step: it moves evenly over the substeps
   bool locked = false;
-  double stiffness = 0.0;           // [N/m]
-  Vec3 position = Vec3::Zero();     // [m] of the tissue's end
-  Vec3 force = Vec3::Zero();        // [N] on the tissue, mean over the last step
+  double stiffness = 0.0;        // [N/m]
+  Vec3 position = Vec3::Zero();  // [m] of the tissue's end
+  Vec3 force = Vec3::Zero();     // [N] on the tissue, mean over the last step
 };
 
 struct PushSphere {
   bool enabled = false;
-  double radius = 0.0;               // [m]
-  Vec3 position = Vec3::Zero();      // [m]
-  Vec3 target = Vec3::Zero();        // [m]
-  double speed = 0.0;                // [m/s] towards target
-  bool streamed = false;             // the last to move it was a stream
+  double radius = 0.0;           // [m]
+  Vec3 position = Vec3::Zero();  // [m]
+  Vec3 target = Vec3::Zero();    // [m]
+  double speed = 0.0;            // [m/s] towards target
+  bool streamed = false;         // the last to move it was a stream
   bool touching = false;
-  Vec3 force = Vec3::Zero();         // [N] on the sphere, mean over the last step
+  Vec3 force = Vec3::Zero();  // [N] on the sphere, mean over the last step
 };
 
 struct Scissors {
   bool shown = false;
   Blades blades;
-  double angle = 0.5;                // [rad] opening
+  double angle = 0.5;  // [rad] opening
 };
 
 }  // namespace meshless

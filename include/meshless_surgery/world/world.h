@@ -186,8 +186,8 @@ class World {
   /// Like SpawnCommand, and brought back by reset.
   Result<SpawnReply> addSceneBody(std::shared_ptr<const PreparedBody> body);
 
-  /// Stays for good; with ContactMethod::kRestShape alone something meets it. Refuses an empty or open surface, a friction
-  /// outside of 0..10, and a name in use.
+  /// Stays for good; with ContactMethod::kRestShape alone something meets it. Refuses an empty or open surface, a
+  /// friction outside of 0..10, and a name in use.
   Status addObstacle(ObstacleDef obstacle);
 
   /// Bodies in the order in which they came.
