@@ -87,6 +87,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
       body.state = std::move(opened.body.pieces[0].state);
       body.mesh.reset();
       body.surface_current = true;
+      batches_current = contacts_current = false;  // they are of the old model
       say(EventType::kIncised, name, 0, "opened");
     } else {
       const std::vector<std::string> names = replaceByPieces(opened.id, std::move(opened.body.pieces));
