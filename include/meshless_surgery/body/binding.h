@@ -13,11 +13,12 @@ constexpr double kMostWeight = 2.0;
 /// Binds a surface whose vertex v is particle vertex_particle[v], or rides where that is kNoIndex. A rider is the
 /// moving least-squares mean of up to twelve particles that are near it along the body: smooth, and exact where the
 /// body moves affinely. One that lies so far beside its particles that its weights would exceed kMostWeight has up to
-/// forty, and where that does not do, follows a cluster for the rest. Directions that the particles hardly span, as in thin sheets and crumbs, follow a cluster of
-/// the nearest one.
+/// forty, and where that does not do, follows a cluster for the rest. Directions that the particles hardly span, as in
+/// thin sheets and crumbs, follow a cluster of the nearest one.
 ///
-/// Of a piece, riders whose carriers all came along keep them: `inherited` says which rider of the parent a vertex was
-/// (kNoIndex: none) and what the parent's particles are called in the piece (kNoIndex: not there).
+/// Of a piece, riders whose carriers all came along keep them, and those that have enough of theirs left get weights for
+/// these: `inherited` says which rider of the parent a vertex was (kNoIndex: none) and what the parent's particles are
+/// called in the piece (kNoIndex: not there).
 struct InheritedBinding {
   const SurfaceBinding& parent;
   std::vector<Index> rider;
