@@ -16,9 +16,9 @@ constexpr double kMostWeight = 2.0;
 /// forty, and where that does not do, follows a cluster for the rest. Directions that the particles hardly span, as in
 /// thin sheets and crumbs, follow a cluster of the nearest one.
 ///
-/// Of a piece, riders whose carriers all came along keep them, and those that have enough of theirs left get weights for
-/// these: `inherited` says which rider of the parent a vertex was (kNoIndex: none) and what the parent's particles are
-/// called in the piece (kNoIndex: not there).
+/// Of a piece, riders whose carriers all came along keep them, and those that have enough of theirs left get weights
+/// for these: `inherited` says which rider of the parent a vertex was (kNoIndex: none) and what the parent's particles
+/// are called in the piece (kNoIndex: not there).
 struct InheritedBinding {
   const SurfaceBinding& parent;
   std::vector<Index> rider;
