@@ -13,8 +13,8 @@ namespace {
 constexpr std::size_t kTaskPairs = 32, kTaskParties = 128;  // looked at by one task
 constexpr double kLongestStep = 0.5;  // of the smaller body's extent: how far quick bodies go in a substep
 
-constexpr double kCrumb =
-    0.2;  // of the largest that moves: smaller bodies ask for no more substeps than one of that size
+// Of the largest that moves: smaller bodies ask for no more substeps than one of that size.
+constexpr double kCrumb = 0.2;
 
 double extentOf(const ContactParty& party) { return (party.bounds.max - party.bounds.min).maxCoeff(); }
 

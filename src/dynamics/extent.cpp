@@ -4,7 +4,7 @@
 
 namespace meshless {
 
-Box boundsOf(const Points& points, [[maybe_unused]] InstructionSet set) {
+Box extentOf(const Points& points, [[maybe_unused]] InstructionSet set) {
   Box box;
   if (points.empty()) return box;
 #if MESHLESS_ROTATION_X86

@@ -38,8 +38,8 @@ bool alike(const WorldBody& a, const WorldBody& b) {
 // would never be whole again. With contact bounds and spread are those of the frame's start, else they are found here.
 bool fitsFloat(WorldBody& body, bool bounds_known, double h) {
   if (!bounds_known) {
-    body.bounds = boundsOf(body.state.positions);
-    const Box velocities = boundsOf(body.state.velocities);
+    body.bounds = extentOf(body.state.positions);
+    const Box velocities = extentOf(body.state.velocities);
     body.spread = 0.5 * velocities.diagonal();
   }
   const double most = kFarthest * body.model->shape.clusters[0].size;

@@ -188,8 +188,8 @@ void World::Impl::fillParty(WorldBody& body, ContactParty& party) {
   }
   party.rigid_share =
       body.model->any_fixed || body.material.elastic() ? 0.0 : std::max(kLeastRigid, body.material.alpha);
-  party.bounds = boundsOf(body.state.positions);
-  const Box velocities = boundsOf(body.state.velocities);
+  party.bounds = extentOf(body.state.positions);
+  const Box velocities = extentOf(body.state.velocities);
   party.velocity = 0.5 * (velocities.min + velocities.max);
   party.spread = body.spread = 0.5 * velocities.diagonal();
   body.fastest = party.velocity.norm() + party.spread;

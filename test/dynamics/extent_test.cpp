@@ -21,7 +21,7 @@ TEST(Extent, BoundsAreThoseOfPointAfterPoint) {
       expected.extend(points.back());
     }
     for (const InstructionSet set : {InstructionSet::kBaseline, widestInstructionSet()}) {
-      const Box box = boundsOf(points, set);
+      const Box box = extentOf(points, set);
       EXPECT_EQ(box.min, expected.min) << count;
       EXPECT_EQ(box.max, expected.max) << count;
       EXPECT_EQ(box.empty(), count == 0);

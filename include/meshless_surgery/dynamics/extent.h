@@ -6,10 +6,10 @@
 
 namespace meshless {
 
-/// Bounds of the points; empty for none. A coordinate that is NaN is passed over.
-Box boundsOf(const Points& points, InstructionSet set = widestInstructionSet());
+/// Bounds of the points [m]; empty for none. As boundsOf(), but a coordinate that is NaN is passed over.
+Box extentOf(const Points& points, InstructionSet set = widestInstructionSet());
 
-/// True where every coordinate is at most `most` (finite, above 0) away from 0; false for NaN.
+/// True where every coordinate is at most `most` (finite, above 0) [m] away from 0; false for NaN.
 bool allWithin(const Points& points, double most, InstructionSet set = widestInstructionSet());
 
 }  // namespace meshless
