@@ -1,17 +1,13 @@
 #include "cut_cap.h"
 
 #include <algorithm>
-#include <unordered_map>
 
 #include <CGAL/Constrained_Delaunay_triangulation_2.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Spatial_sort_traits_adapter_2.h>
 #include <CGAL/Triangulation_face_base_with_info_2.h>
 #include <CGAL/Triangulation_vertex_base_with_info_2.h>
-#include <CGAL/property_map.h>
-#include <CGAL/spatial_sort.h>
 
-#include "split_edges.h"
+#include "edge_table.h"
 
 namespace meshless {
 namespace cutting {
@@ -30,25 +26,52 @@ using FaceBase =
 using Cdt =
     CGAL::Constrained_Delaunay_triangulation_2<Kernel, CGAL::Triangulation_data_structure_2<VertexBase, FaceBase>>;
 
-/// What a constrained edge parts, signed by the direction asked for.
-class Borders {
- public:
-  struct Border {
-    int weight = 0;
-    bool core = false;
-  };
-  explicit Borders(std::size_t most) { borders_.reserve(most); }
-  void add(const OutlineSegment& s) { borders_[edgeKey(s.from, s.to)].weight += s.from < s.to ? s.weight : -s.weight; }
-  void addCore(Index from, Index to) { borders_[edgeKey(from, to)].core = true; }
-  Border of(Index from, Index to) const {
-    const auto found = borders_.find(edgeKey(from, to));
-    if (found == borders_.end()) return {};
-    return {from < to ? found->second.weight : -found->second.weight, found->second.core};
-  }
+/// Every other bit of the result.
+std::uint64_t spread(std::uint32_t bits) {
+  std::uint64_t x = bits;
+  x = (x | (x << 16)) & 0x0000ffff0000ffffu;
+  x = (x | (x << 8)) & 0x00ff00ff00ff00ffu;
+  x = (x | (x << 4)) & 0x0f0f0f0f0f0f0f0fu;
+  x = (x | (x << 2)) & 0x3333333333333333u;
+  return (x | (x << 1)) & 0x5555555555555555u;
+}
 
- private:
-  std::unordered_map<std::uint64_t, Border> borders_;
+/// Along a Morton curve, so that each point is inserted next to the one before. (CGAL's spatial_sort would take a tenth
+/// of a plain cut.)
+void sortByPlace(const std::vector<Kernel::Point_2>& points, std::vector<Index>& order) {
+  if (order.empty()) return;
+  double left = points[order[0]].x(), right = left, low = points[order[0]].y(), high = low;
+  for (const Index i : order) {
+    left = std::min(left, points[i].x());
+    right = std::max(right, points[i].x());
+    low = std::min(low, points[i].y());
+    high = std::max(high, points[i].y());
+  }
+  const double extent = std::max(right - left, high - low);
+  const double scale = extent > 0.0 ? 65535.0 / extent : 0.0;
+  std::vector<std::pair<std::uint64_t, Index>> keyed;
+  keyed.reserve(order.size());
+  for (const Index i : order) {
+    const auto x = static_cast<std::uint32_t>(scale * (points[i].x() - left));
+    const auto y = static_cast<std::uint32_t>(scale * (points[i].y() - low));
+    keyed.emplace_back(spread(x) | spread(y) << 1, i);
+  }
+  std::sort(keyed.begin(), keyed.end());
+  // In rounds, from coarse to fine: without them a rim that runs round is triangulated by thin fans, again and again.
+  std::size_t stride = 1, sorted = 0;
+  while (8 * stride < keyed.size()) stride *= 4;
+  for (std::size_t k = 0; k < keyed.size(); k += stride) order[sorted++] = keyed[k].second;
+  for (; stride > 1; stride /= 4)
+    for (std::size_t k = 0; k < keyed.size(); k += stride / 4)
+      if (k % stride != 0) order[sorted++] = keyed[k].second;
+}
+
+/// What a constrained edge parts, signed by the direction asked for.
+struct Border {
+  int weight = 0;  // from the lower number to the higher
+  bool core = false;
 };
+using Borders = EdgeTable<Border>;
 
 /// Winding numbers spread from the infinite face. False where two ways to a face disagree, or the core is not where the
 /// winding is 1.
@@ -62,8 +85,9 @@ bool floodWindings(Cdt& cdt, const Borders& borders) {
       const Cdt::Face_handle other = face->neighbor(i);
       FaceInfo there = face->info();
       if (face->is_constrained(i)) {
-        const Borders::Border border = borders.of(face->vertex(Cdt::ccw(i))->info(), face->vertex(Cdt::cw(i))->info());
-        there.winding -= border.weight;
+        const Index from = face->vertex(Cdt::ccw(i))->info(), to = face->vertex(Cdt::cw(i))->info();
+        const Border& border = borders.of(from, to);
+        there.winding -= from < to ? border.weight : -border.weight;
         there.in_core ^= border.core;
         if (border.core && there.winding != 1) return false;
       }
@@ -90,29 +114,27 @@ CapState triangulateCap(const std::vector<Vec2>& nodes, const std::vector<Outlin
   for (const Vec2& p : core.places) points.emplace_back(p.x(), p.y());
   std::vector<bool> used(nodes.size(), false);
   for (const OutlineSegment& s : segments) used[s.from] = used[s.to] = true;
-  std::vector<std::size_t> order;
-  for (std::size_t i = 0; i < points.size(); ++i)
+  std::vector<Index> order;
+  for (Index i = 0; i < points.size(); ++i)
     if (i < first_core ? used[i] : !core.inside[i - first_core]) order.push_back(i);
-  using PointMap = CGAL::Pointer_property_map<Kernel::Point_2>::type;
-  CGAL::spatial_sort(order.begin(), order.end(),
-                     CGAL::Spatial_sort_traits_adapter_2<Kernel, PointMap>(CGAL::make_property_map(points)));
+  sortByPlace(points, order);
 
   Cdt cdt;
   std::vector<Cdt::Vertex_handle> handles(points.size());
   Cdt::Face_handle hint;
-  for (const std::size_t i : order) {
+  for (const Index i : order) {
     handles[i] = cdt.insert(points[i], hint);
-    handles[i]->info() = static_cast<Index>(i);
+    handles[i]->info() = i;
     hint = handles[i]->face();
   }
-  Borders borders(segments.size() + core.border.size());
+  Borders borders(2 * (segments.size() + core.border.size()), Border());
   try {
     for (const OutlineSegment& s : segments) {
-      borders.add(s);
+      borders.at(s.from, s.to).weight += s.from < s.to ? s.weight : -s.weight;
       cdt.insert_constraint(handles[s.from], handles[s.to]);
     }
     for (const auto& [from, to] : core.border) {
-      borders.addCore(first_core + from, first_core + to);
+      borders.at(first_core + from, first_core + to).core = true;
       cdt.insert_constraint(handles[first_core + from], handles[first_core + to]);
     }
   } catch (const Cdt::Intersection_of_constraints_exception&) {

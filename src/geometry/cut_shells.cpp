@@ -3,6 +3,7 @@
 #include <unordered_map>
 
 #include "cut_pieces.h"
+#include "edge_table.h"
 #include "meshless_surgery/geometry/measures.h"
 
 namespace meshless {
@@ -16,33 +17,6 @@ constexpr double kSameAngle = 1e-9;  // [rad] faces at an edge that differ by le
 using Corner = Index;
 Corner nextCorner(Corner c) { return c % 3 == 2 ? c - 2 : c + 1; }
 Corner previousCorner(Corner c) { return c % 3 == 0 ? c + 2 : c - 1; }
-
-/// A number for each pair of vertices, kNoIndex at first. Best for half as many as there is room for.
-class EdgeTable {
- public:
-  explicit EdgeTable(std::size_t most) {
-    std::size_t size = 16;
-    while (size <= most) size *= 2;
-    entries_.assign(size, {kNoIndex, kNoIndex, kNoIndex});
-  }
-
-  /// low < kNoIndex. Stays where it is.
-  Index& at(Index low, Index high) {
-    const std::uint64_t key = (static_cast<std::uint64_t>(low) << 32) | high;
-    std::size_t slot = (key * 0x9e3779b97f4a7c15u >> 24) & (entries_.size() - 1);
-    while (entries_[slot].low != kNoIndex && (entries_[slot].low != low || entries_[slot].high != high))
-      slot = (slot + 1) & (entries_.size() - 1);
-    entries_[slot].low = low;
-    entries_[slot].high = high;
-    return entries_[slot].number;
-  }
-
- private:
-  struct Entry {
-    Index low, high, number;
-  };
-  std::vector<Entry> entries_;
-};
 
 /// Finds for every edge at the plane, of every triangle there, the edge of the triangle next to it. (All triangles at
 /// an edge with an end on the plane have a corner on the plane.)
@@ -70,14 +44,14 @@ class Pairing {
     }
     partners.assign(partners.size(), kNoIndex);
     // Chains of corners at the same edge, ascending.
-    EdgeTable first(partners.size());
+    EdgeTable<Corner> first(partners.size(), kNoIndex);
     std::vector<Corner> next(partners.size(), kNoIndex);
     std::vector<Corner*> head(partners.size(), nullptr);
     for (Corner c = static_cast<Corner>(partners.size()); c-- > 0;) {
       if (collapsed(c / 3)) continue;
       const Index a = vertexOf(c), b = vertexOf(nextCorner(c));
       if (!(work_.onRim(a) | work_.onRim(b))) continue;
-      head[c] = &first.at(std::min(a, b), std::max(a, b));
+      head[c] = &first.at(a, b);
       next[c] = *head[c];
       *head[c] = c;
     }
@@ -111,7 +85,7 @@ class Pairing {
  private:
   /// As nearly always: every edge has two triangles that run it in opposite directions. False where one has not.
   bool pairOneToOne() {
-    EdgeTable first(partners.size());
+    EdgeTable<Corner> first(partners.size(), kNoIndex);
     std::size_t open = 0;
     for (Index n = 0; n < collapsed_.size(); ++n) {
       if (collapsed(n)) continue;
@@ -119,7 +93,7 @@ class Pairing {
       for (Corner k = 0; k < 3; ++k) {
         const Index a = v[k], b = v[k == 2 ? 0 : k + 1];
         if (!(work_.onRim(a) | work_.onRim(b))) continue;
-        Corner& other = first.at(std::min(a, b), std::max(a, b));
+        Corner& other = first.at(a, b);
         if (other == kNoIndex) {
           other = 3 * n + k;
           ++open;
@@ -291,7 +265,7 @@ bool splitDoubleEdges(const Pairing& pairing, const std::vector<Index>& shell_of
   std::vector<Index> first_vertex(shells.size() + 1, 0);
   for (std::size_t s = 0; s < shells.size(); ++s)
     first_vertex[s + 1] = first_vertex[s] + static_cast<Index>(shells[s].piece.mesh.vertices.size());
-  EdgeTable seen(pairing.partners.size());
+  EdgeTable<Index> seen(pairing.partners.size(), kNoIndex);
   std::unordered_map<Corner, Index> middles;
   for (Corner c = 0; c < pairing.partners.size(); ++c) {
     if (pairing.partners[c] == kNoIndex || pairing.partners[c] < c) continue;

@@ -7,6 +7,7 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 
 #include "cut_parts.h"
+#include "edge_table.h"
 #include "meshless_surgery/geometry/measures.h"
 
 namespace meshless {
@@ -22,36 +23,23 @@ double heightOf(const Workpiece& work, Index vertex) {
 /// Finds or makes the vertex where the plane crosses a mesh edge.
 class EdgeVertices {
  public:
-  EdgeVertices(Workpiece& work, std::size_t most_edges) : work_(work) {
-    std::size_t size = 16;
-    while (size < 2 * most_edges) size *= 2;
-    entries_.assign(size, {~std::uint64_t{0}, kNoIndex});
-  }
+  EdgeVertices(Workpiece& work, std::size_t most_edges) : work_(work), vertices_(2 * most_edges, kNoIndex) {}
 
   Index at(Index a, Index b) {
-    const std::uint64_t key = edgeKey(a, b);
-    std::size_t slot = (key * 0x9e3779b97f4a7c15u >> 20) & (entries_.size() - 1);
-    while (entries_[slot].key != key) {
-      if (entries_[slot].vertex == kNoIndex) {
-        // From the upper end to the lower whoever asks, so that every triangle at the edge gets the same bits.
-        const Index upper = work_.states[a] > 0 ? a : b;
-        const Index lower = upper == a ? b : a;
-        const double above = heightOf(work_, upper), below = heightOf(work_, lower);
-        entries_[slot] = {key, work_.addBetween(upper, lower, above / (above - below))};
-        break;
-      }
-      slot = (slot + 1) & (entries_.size() - 1);
+    Index& vertex = vertices_.at(a, b);
+    if (vertex == kNoIndex) {
+      // From the upper end to the lower whoever asks, so that every triangle at the edge gets the same bits.
+      const Index upper = work_.states[a] > 0 ? a : b;
+      const Index lower = upper == a ? b : a;
+      const double above = heightOf(work_, upper), below = heightOf(work_, lower);
+      vertex = work_.addBetween(upper, lower, above / (above - below));
     }
-    return entries_[slot].vertex;
+    return vertex;
   }
 
  private:
-  struct Entry {
-    std::uint64_t key;
-    Index vertex;
-  };
   Workpiece& work_;
-  std::vector<Entry> entries_;
+  EdgeTable<Index> vertices_;
 };
 
 void addConvex(const Workpiece& work, const std::array<Index, 4>& corners, int count, std::uint32_t patch,
