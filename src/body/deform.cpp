@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include <Eigen/Eigenvalues>
 
@@ -15,46 +16,65 @@ namespace {
 // feed energy in. A twentieth of the rigid goal is enough that none was seen to grow.
 constexpr double kMostBeta = 0.95;
 
-// The spin that carries the angular momentum, the least one where the points are collinear or fewer.
-Vec3 spinFor(const Mat3& inertia, const Vec3& momentum) {
+// Where a body turns about, and how hard it is to turn.
+struct MassMoments {
+  Vec3 centre = Vec3::Zero();    // [m]
+  Mat3 spin_for = Mat3::Zero();  // [1/(kg m^2)] times an angular momentum: the spin that carries it, the least one
+                                 // where the points are collinear or fewer
+};
+
+Mat3 pseudoInverse(const Mat3& inertia) {
+  Mat3 inverse = Mat3::Zero();
   const double scale = inertia.trace();
-  if (!(scale > 0.0)) return Vec3::Zero();
+  if (!(scale > 0.0)) return inverse;
   const Eigen::SelfAdjointEigenSolver<Mat3> solver(inertia / scale);
-  Vec3 spin = Vec3::Zero();
-  for (int k = 0; k < 3; ++k)
-    if (solver.eigenvalues()[k] > 1e-12)
-      spin += solver.eigenvectors().col(k) *
-              (solver.eigenvectors().col(k).dot(momentum) / (solver.eigenvalues()[k] * scale));
-  return spin;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 axis = solver.eigenvectors().col(k);
+    if (solver.eigenvalues()[k] > 1e-12) inverse += axis * (axis / (solver.eigenvalues()[k] * scale)).transpose();
+  }
+  return inverse;
 }
 
-Vec3 centreOfMass(const BodyModel& model, const Points& positions) {
+MassMoments momentsOf(const BodyModel& model, const Points& positions) {
+  MassMoments moments;
   Vec3 sum = Vec3::Zero();
   for (std::size_t i = 0; i < positions.size(); ++i) sum += model.masses[i] * (positions[i] - positions[0]);
-  return positions[0] + sum / model.mass;
-}
-
-Mat3 inertiaAbout(const BodyModel& model, const Points& positions, const Vec3& centre) {
-  Mat3 moment = Mat3::Zero();
+  moments.centre = positions[0] + sum / model.mass;
+  // Sums of their own instead of a matrix: four times as fast.
+  double xx = 0.0, yy = 0.0, zz = 0.0, xy = 0.0, xz = 0.0, yz = 0.0;
   for (std::size_t i = 0; i < positions.size(); ++i) {
-    const Vec3 r = positions[i] - centre;
-    moment += model.masses[i] * r * r.transpose();
+    const Vec3 r = positions[i] - moments.centre;
+    const double x = model.masses[i] * r.x(), y = model.masses[i] * r.y(), z = model.masses[i] * r.z();
+    xx += x * r.x();
+    yy += y * r.y();
+    zz += z * r.z();
+    xy += x * r.y();
+    xz += x * r.z();
+    yz += y * r.z();
   }
-  return moment.trace() * Mat3::Identity() - moment;
+  Mat3 inertia;
+  inertia << yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy;
+  moments.spin_for = pseudoInverse(inertia);
+  return moments;
 }
 
-}  // namespace
-
-RigidMotion rigidMotionOf(const BodyModel& model, const Points& positions, const Points& velocities) {
+RigidMotion rigidMotionOf(const BodyModel& model, const MassMoments& moments, const Points& positions,
+                          const Points& velocities) {
   RigidMotion motion;
-  motion.centre = centreOfMass(model, positions);
+  motion.centre = moments.centre;
   for (std::size_t i = 0; i < positions.size(); ++i) motion.velocity += model.masses[i] * velocities[i];
   motion.velocity /= model.mass;
   Vec3 momentum = Vec3::Zero();
   for (std::size_t i = 0; i < positions.size(); ++i)
     momentum += model.masses[i] * (positions[i] - motion.centre).cross(velocities[i] - motion.velocity);
-  motion.spin = spinFor(inertiaAbout(model, positions, motion.centre), momentum);
+  motion.spin = moments.spin_for * momentum;
   return motion;
+}
+
+}  // namespace
+
+RigidMotion rigidMotionOf(const BodyModel& model, const Points& positions, const Points& velocities) {
+  return rigidMotionOf(model, momentsOf(model, positions), positions, velocities);
 }
 
 double highestFrequencyNow(const BodyModel& model, const BodyState& state) {
@@ -70,29 +90,32 @@ double stiffnessFactor(const BodyModel& model, const BodyState& state, double h)
 namespace {
 
 // Particle velocities after what the material does, by accelerations taken at y; x is where momentum is counted.
+// `known`: moments of x, where they are known.
 template <class Acceleration>
-void accelerate(const BodyModel& model, double h, const Points& x, Points& v, const Acceleration& at) {
+void accelerate(const BodyModel& model, double h, const Points& x, const std::optional<MassMoments>& known, Points& v,
+                const Acceleration& at) {
   if (model.any_fixed) {
     for (std::size_t i = 0; i < v.size(); ++i) v[i] += h * at(i);
     return;
   }
   // The pull is free of torque about y, but it acts on x: the difference is given back as a spin of the body.
   Vec3 leaked = Vec3::Zero();
-  const Vec3 centre = centreOfMass(model, x);
+  const MassMoments moments = known ? *known : momentsOf(model, x);
+  const Vec3 centre = moments.centre;
   for (std::size_t i = 0; i < v.size(); ++i) {
     const Vec3 dv = h * at(i);
     v[i] += dv;
     leaked += model.masses[i] * (x[i] - centre).cross(dv);
   }
-  const Vec3 spin = spinFor(inertiaAbout(model, x, centre), leaked);
+  const Vec3 spin = moments.spin_for * leaked;
   for (std::size_t i = 0; i < v.size(); ++i) v[i] -= spin.cross(x[i] - centre);
 }
 
 // Damps what deforms and predicts: y = x + h v, but what deforms goes `ahead` instead of h. How long that takes decides
 // on the viscosity, and must not change how a body spins. A body that is held has no rigid motion of its own. Damping
-// comes before the pull: after it, it would weaken the material.
-void dampAndPredict(const BodyModel& model, double h, double ahead, double damping, const Points& x, Points& v,
-                    Points& y) {
+// comes before the pull: after it, it would weaken the material. Returns the moments of x where it needed them.
+std::optional<MassMoments> dampAndPredict(const BodyModel& model, double h, double ahead, double damping,
+                                          const Points& x, Points& v, Points& y) {
   const double kept = std::exp(-damping * h);
   y.resize(x.size());
   if (model.any_fixed || (ahead == h && !(damping > 0.0))) {
@@ -100,15 +123,17 @@ void dampAndPredict(const BodyModel& model, double h, double ahead, double dampi
       v[i] *= kept;
       y[i] = model.fixed[i] ? x[i] : Vec3(x[i] + ahead * v[i]);
     }
-    return;
+    return std::nullopt;
   }
-  const RigidMotion rigid = rigidMotionOf(model, x, v);
+  const MassMoments moments = momentsOf(model, x);
+  const RigidMotion rigid = rigidMotionOf(model, moments, x, v);
   for (std::size_t i = 0; i < x.size(); ++i) {
     const Vec3 together = rigid.velocity + rigid.spin.cross(x[i] - rigid.centre);
     const Vec3 deforming = kept * (v[i] - together);
     v[i] = together + deforming;
     y[i] = x[i] + h * together + ahead * deforming;
   }
+  return moments;
 }
 
 }  // namespace
@@ -139,12 +164,13 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
   Points& v = state.velocities;
   scratch.previous = x;
   const double factor = stiffnessFactor(model, state, h);
+  std::optional<MassMoments> moments;
   if (material.elastic()) {
     const double fastest = highestFrequencyNow(model, state) * std::sqrt(factor);
     const double ahead = fastest > 0.0 ? 1.0 / fastest : h;
-    dampAndPredict(model, h, ahead, material.damping, x, v, scratch.predicted);
+    moments = dampAndPredict(model, h, ahead, material.damping, x, v, scratch.predicted);
   } else {
-    dampAndPredict(model, h, viscosityTime(material.alpha, h), material.damping, x, v, scratch.predicted);
+    moments = dampAndPredict(model, h, viscosityTime(material.alpha, h), material.damping, x, v, scratch.predicted);
   }
   const Points& y = scratch.predicted;
   const MatchInput input = matchInput(model, state);
@@ -167,18 +193,20 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
     }
     const Points& accelerations = scratch.goals;
     if (!eased)
-      accelerate(model, h, x, v, [&](std::size_t i) -> const Vec3& { return accelerations[i]; });
+      accelerate(model, h, x, moments, v, [&](std::size_t i) -> const Vec3& { return accelerations[i]; });
     else
-      accelerate(model, h, x, v, [&](std::size_t i) -> Vec3 { return accelerations[i] + share * state.eased[i]; });
+      accelerate(model, h, x, moments, v,
+                 [&](std::size_t i) -> Vec3 { return accelerations[i] + share * state.eased[i]; });
   } else if (const double gain = stiffnessGain(material.alpha, h); gain > 0.0) {
     matchShapes(input, y, material.mode, std::min(material.beta, kMostBeta), state.poses, scratch.goals, counters,
                 state.swelling, material.plastic());
     const Points& goals = scratch.goals;
     const double pull = gain / (h * h);
     if (!eased)
-      accelerate(model, h, x, v, [&](std::size_t i) -> Vec3 { return pull * (goals[i] - y[i]); });
+      accelerate(model, h, x, moments, v, [&](std::size_t i) -> Vec3 { return pull * (goals[i] - y[i]); });
     else
-      accelerate(model, h, x, v, [&](std::size_t i) -> Vec3 { return pull * (goals[i] - y[i]) + share * state.eased[i]; });
+      accelerate(model, h, x, moments, v,
+                 [&](std::size_t i) -> Vec3 { return pull * (goals[i] - y[i]) + share * state.eased[i]; });
   } else {
     matched = false;
   }
