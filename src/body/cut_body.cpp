@@ -5,6 +5,7 @@
 #include <queue>
 
 #include "piece_maker.h"
+#include "side_by_side.h"
 
 namespace meshless {
 namespace {
@@ -103,7 +104,9 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
   options.cap_points = kUsualCapPoints;
   options.roughness = wanted.roughness;
   options.seed = wanted.seed;
-  Result<CutSurface> cut = cutByPlane(present, plane, options);
+  PieceMaker maker(model, state, options.cap_patch);
+  Result<CutSurface> cut = Error();
+  atOnce([&] { cut = cutByPlane(present, plane, options); }, [&] { maker.foresee(plane); });
   if (!cut) return cut.error();
 
   const std::vector<int> piece_of = assignParticles(model, state, plane, *cut);
@@ -115,7 +118,6 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
     sources.push_back({cut->pieces[p].mesh, cut->pieces[p].origins, std::move(members[p])});
   CutBody result;
   result.cap_area = cut->cap_area;
-  PieceMaker maker(model, state, options.cap_patch);
   result.pieces = maker.make(sources);
   result.work = maker.work();
   return result;

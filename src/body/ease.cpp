@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <future>
 
 #include "meshless_surgery/body/deform.h"
+#include "side_by_side.h"
 
 namespace meshless {
 namespace {
 
 constexpr double kNothing = 1e-9;  // of the spacing that a particle would move in a substep: not worth easing
-constexpr std::size_t kWorthAThread = 1000;  // particles
 
 // [m/s^2] of every particle by what the body does to itself.
 Points ownAccelerations(const BodyModel& model, BodyState state, const Material& material, double h) {
@@ -25,15 +24,18 @@ Points ownAccelerations(const BodyModel& model, BodyState state, const Material&
 
 }  // namespace
 
-void easeRelease(const BodyModel& parent, const BodyState& before, const Material& material, double h, const std::vector<Index>& held,
-                 std::vector<BodyPiece>& pieces) {
+void easeRelease(const BodyModel& parent, const BodyState& before, const Material& material, double h,
+                 const std::vector<Index>& held, std::vector<BodyPiece>& pieces) {
   if (!(h > 0.0)) return;
-  // Side by side: together the pieces are as much as the whole.
-  auto uncut = std::async(parent.rest.size() > kWorthAThread ? std::launch::async : std::launch::deferred,
-                          [&] { return ownAccelerations(parent, before, material, h); });
-  std::vector<Points> parts;
-  for (const BodyPiece& piece : pieces) parts.push_back(ownAccelerations(*piece.model, piece.state, material, h));
-  const Points whole = uncut.get();
+  // The uncut body first: together the pieces are as much.
+  Points whole;
+  std::vector<Points> parts(pieces.size());
+  inChunks(pieces.size() + 1, 1, [&](std::size_t n, std::size_t) {
+    if (n == 0)
+      whole = ownAccelerations(parent, before, material, h);
+    else
+      parts[n - 1] = ownAccelerations(*pieces[n - 1].model, pieces[n - 1].state, material, h);
+  });
   for (std::size_t p = 0; p < pieces.size(); ++p) {
     BodyPiece& piece = pieces[p];
     const BodyModel& model = *piece.model;

@@ -5,20 +5,17 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <future>
 #include <optional>
 #include <unordered_map>
 #include <unordered_set>
 
 #include "meshless_surgery/body/binding.h"
-#include "meshless_surgery/body/rest_places.h"
 #include "meshless_surgery/dynamics/plastic.h"
 #include "meshless_surgery/geometry/measures.h"
+#include "side_by_side.h"
 
 namespace meshless {
 namespace {
-
-constexpr std::size_t kWorthAThread = 1000;  // vertices
 
 template <class Get>
 Vec3 interpolate(const VertexOrigin& origin, const Get& get) {
@@ -89,6 +86,11 @@ void PieceMaker::tear(ParticleGraph graph, std::vector<bool> torn) {
   torn_ = std::move(torn);
 }
 
+void PieceMaker::foresee(const Plane& plane) {
+  rest_places_.emplace(model_, state_);
+  rest_places_->foresee(plane);
+}
+
 std::vector<BodyPiece> PieceMaker::make(const std::vector<PieceSource>& sources) {
   double whole = 0.0;
   for (const PieceSource& source : sources) whole += std::abs(signedVolume(source.mesh));
@@ -110,18 +112,10 @@ std::vector<BodyPiece> PieceMaker::make(const std::vector<PieceSource>& sources)
   std::vector<BodyPiece> pieces;
   pieces.resize(sources.size());
   std::vector<CutWork> works(sources.size());
-  const auto makeEvery = [&](std::size_t first, std::size_t stride) {
-    for (std::size_t p = first; p < sources.size(); p += stride)
-      pieces[p] = makeOne(sources[p], std::move(rest[p]), masses, crumbs[p] ? &*crumbs[p] : nullptr, works[p]);
-  };
   // Pieces do not know of each other: the two large ones of most cuts are made side by side.
-  if (sources.size() > 1 && model_.surface.vertices.size() > kWorthAThread) {
-    auto others = std::async(std::launch::async, [&] { makeEvery(1, 2); });
-    makeEvery(0, 2);
-    others.get();
-  } else {
-    makeEvery(0, 1);
-  }
+  inChunks(sources.size(), 1, [&](std::size_t p, std::size_t) {
+    pieces[p] = makeOne(sources[p], std::move(rest[p]), masses, crumbs[p] ? &*crumbs[p] : nullptr, works[p]);
+  });
   for (const CutWork& work : works) work_ += work;
   return pieces;
 }
@@ -207,7 +201,7 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, Points rest, const std::v
 }
 
 // Both sides of a cut have the same points inside: each is looked for once.
-std::vector<Points> PieceMaker::restVertices(const std::vector<PieceSource>& sources) const {
+std::vector<Points> PieceMaker::restVertices(const std::vector<PieceSource>& sources) {
   std::vector<Points> all;
   Points inside;
   std::vector<KnownPlace> rim;
@@ -235,7 +229,8 @@ std::vector<Points> PieceMaker::restVertices(const std::vector<PieceSource>& sou
     }
   }
   if (inside.empty()) return all;
-  const Points places = restPlaces(model_, state_, inside, rim);
+  if (!rest_places_) rest_places_.emplace(model_, state_);
+  const Points places = rest_places_->of(inside, rim);
   for (std::size_t s = 0; s < sources.size(); ++s)
     for (Index v = 0; v < sources[s].origins.size(); ++v)
       if (sources[s].origins.insideCap(v)) all[s][v] = places[inside_at.at(sources[s].mesh.vertices[v])];

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "meshless_surgery/body/cut_body.h"
+#include "meshless_surgery/body/rest_places.h"
 
 namespace meshless {
 
@@ -23,6 +25,9 @@ class PieceMaker {
   /// The parent's graph without the edges that the blade has cut; the clusters whose members it parts grow again.
   void tear(ParticleGraph graph, std::vector<bool> torn);
 
+  /// Does beforehand what a cut by the plane is sure to need.
+  void foresee(const Plane& plane);
+
   /// All pieces of the parent: mass and momentum are shared out without a rest.
   std::vector<BodyPiece> make(const std::vector<PieceSource>& sources);
 
@@ -32,7 +37,7 @@ class PieceMaker {
   struct Crumb;
   BodyPiece makeOne(const PieceSource& source, Points rest, const std::vector<double>& masses, const Crumb* crumb,
                     CutWork& work) const;
-  std::vector<Points> restVertices(const std::vector<PieceSource>& sources) const;
+  std::vector<Points> restVertices(const std::vector<PieceSource>& sources);
 
   const BodyModel& model_;
   const BodyState& state_;
@@ -40,6 +45,7 @@ class PieceMaker {
   ParticleGraph graph_;
   std::vector<bool> torn_;
   std::vector<Index> rider_of_;
+  std::optional<RestPlaces> rest_places_;
   CutWork work_;
 };
 

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <future>
 
 #include <Eigen/Eigenvalues>
 
 #include "meshless_surgery/dynamics/rotation.h"
 #include "meshless_surgery/geometry/nearest.h"
+#include "side_by_side.h"
 
 namespace meshless {
 namespace {
@@ -16,20 +16,18 @@ namespace {
 constexpr std::size_t kParticles = 16;
 constexpr std::size_t kBlended = 4;  // maps of the nearest particles
 constexpr std::size_t kKnown = 8;
-constexpr std::size_t kWorthAThread = 300;  // points
-constexpr double kSpanned = 1e-4;           // eigenvalue of the spread over the largest: flatter is not spanned
-constexpr double kMostStretch = 10.0;       // of the map: beyond it the particles tell nothing about lengths
+constexpr std::size_t kChunk = 64;     // points
+constexpr double kSpanned = 1e-4;      // eigenvalue of the spread over the largest: flatter is not spanned
+constexpr double kMostStretch = 10.0;  // of the map: beyond it the particles tell nothing about lengths
 
 // The affine map of the particles around one, from the present shape to rest.
 struct Map {
   Vec3 present = Vec3::Zero(), rest = Vec3::Zero();
   Mat3 linear = Mat3::Zero();
-  bool made = false;
+  bool wanted = false;
 };
 
-Map mapAround(const BodyModel& model, const BodyState& state, const std::vector<Index>& near) {
-  Map map;
-  map.made = true;
+void makeMap(const BodyModel& model, const BodyState& state, const std::vector<Index>& near, Map& map) {
   const double count = static_cast<double>(near.size());
   for (Index i : near) {
     map.present += state.positions[i] / count;
@@ -53,60 +51,91 @@ Map mapAround(const BodyModel& model, const BodyState& state, const std::vector<
     }
     map.linear += image * direction.transpose();
   }
-  return map;
 }
 
-// What the maps around the nearest particles say of a point. Maps are made when they are first needed.
-class Guess {
- public:
-  Guess(const BodyModel& model, const BodyState& state, const NearestPoints& particles)
-      : model_(model), state_(state), particles_(particles), maps_(model.rest.size()) {}
+struct Near {
+  std::array<Index, kBlended> particles;
+  std::size_t count;
+};
 
-  Vec3 operator()(const Vec3& p) {
+}  // namespace
+
+struct RestPlaces::Data {
+  const BodyModel& model;
+  const BodyState& state;
+  NearestPoints particles;
+  std::vector<Map> maps;  // of each particle; made where they are wanted
+
+  Data(const BodyModel& m, const BodyState& s) : model(m), state(s), particles(s.positions), maps(m.rest.size()) {}
+
+  void make(const std::vector<Index>& wanted) {
+    inChunks(wanted.size(), kChunk, [&](std::size_t from, std::size_t to) {
+      for (std::size_t n = from; n < to; ++n)
+        makeMap(model, state, particles.nearest(state.positions[wanted[n]], kParticles), maps[wanted[n]]);
+    });
+  }
+
+  std::vector<Near> nearest(const Points& points) const {
+    std::vector<Near> near(points.size());
+    inChunks(points.size(), kChunk, [&](std::size_t from, std::size_t to) {
+      for (std::size_t n = from; n < to; ++n)
+        near[n].count = particles.nearest(points[n], kBlended, near[n].particles.data());
+    });
+    return near;
+  }
+
+  void makeFor(const std::vector<Near>& points) {
+    std::vector<Index> wanted;
+    for (const Near& near : points) {
+      for (std::size_t k = 0; k < near.count; ++k) {
+        Map& map = maps[near.particles[k]];
+        if (!map.wanted) wanted.push_back(near.particles[k]);
+        map.wanted = true;
+      }
+    }
+    make(wanted);
+  }
+
+  // What the maps around the nearest particles say of a point.
+  Vec3 guess(const Vec3& p, const Near& near) const {
     Vec3 sum = Vec3::Zero();
     double total = 0.0;
-    std::array<Index, kBlended> near;
-    const std::size_t count = particles_.nearest(p, kBlended, near.data());
-    for (std::size_t k = 0; k < count; ++k) {
-      const Index i = near[k];
-      Map& map = maps_[i];
-      if (!map.made) map = mapAround(model_, state_, particles_.nearest(state_.positions[i], kParticles));
-      const double weight = 1.0 / ((state_.positions[i] - p).squaredNorm() + 1e-24);
+    for (std::size_t k = 0; k < near.count; ++k) {
+      const Map& map = maps[near.particles[k]];
+      const double weight = 1.0 / ((state.positions[near.particles[k]] - p).squaredNorm() + 1e-24);
       sum += weight * (map.rest + map.linear * (p - map.present));
       total += weight;
     }
     return sum / total;
   }
-
- private:
-  const BodyModel& model_;
-  const BodyState& state_;
-  const NearestPoints& particles_;
-  std::vector<Map> maps_;
 };
 
-}  // namespace
+RestPlaces::RestPlaces(const BodyModel& model, const BodyState& state) : data_(std::make_unique<Data>(model, state)) {}
+RestPlaces::~RestPlaces() = default;
+RestPlaces::RestPlaces(RestPlaces&&) noexcept = default;
 
-Points restPlaces(const BodyModel& model, const BodyState& state, const Points& present,
-                  const std::vector<KnownPlace>& known) {
+void RestPlaces::foresee(const Plane& plane) {
+  std::vector<Index> wanted;
+  for (Index i = 0; i < data_->maps.size(); ++i) {
+    if (!(std::abs(plane.height(data_->state.positions[i])) < data_->model.spacing)) continue;
+    data_->maps[i].wanted = true;
+    wanted.push_back(i);
+  }
+  data_->make(wanted);
+}
+
+Points RestPlaces::of(const Points& present, const std::vector<KnownPlace>& known) {
   Points places(present.size());
   if (present.empty()) return places;
-  const NearestPoints particles(state.positions);
-  Points known_at, missed(known.size());
+  Points known_at;
   for (const KnownPlace& k : known) known_at.push_back(k.present);
   const NearestPoints rim(known_at);
-  const auto inHalves = [](std::size_t count, const auto& work) {
-    if (count < kWorthAThread) return work(0, count);
-    auto half = std::async(std::launch::async, [&] { work(0, count / 2); });
-    work(count / 2, count);
-    half.get();
-  };
-  inHalves(known.size(), [&](std::size_t from, std::size_t to) {
-    Guess guess(model, state, particles);
-    for (std::size_t k = from; k < to; ++k) missed[k] = known[k].rest - guess(known[k].present);
-  });
-  inHalves(present.size(), [&](std::size_t from, std::size_t to) {
-    Guess guess(model, state, particles);
+  const std::vector<Near> near_present = data_->nearest(present), near_known = data_->nearest(known_at);
+  data_->makeFor(near_present);
+  data_->makeFor(near_known);
+  Points missed(known.size());
+  for (std::size_t k = 0; k < known.size(); ++k) missed[k] = known[k].rest - data_->guess(known_at[k], near_known[k]);
+  inChunks(present.size(), kChunk, [&](std::size_t from, std::size_t to) {
     for (std::size_t n = from; n < to; ++n) {
       Vec3 residual = Vec3::Zero();
       double total = 0.0;
@@ -118,7 +147,7 @@ Points restPlaces(const BodyModel& model, const BodyState& state, const Points& 
         residual += w * missed[k];
         total += w;
       }
-      places[n] = guess(present[n]) + (total > 0.0 ? Vec3(residual / total) : residual);
+      places[n] = data_->guess(present[n], near_present[n]) + (total > 0.0 ? Vec3(residual / total) : residual);
     }
   });
   return places;

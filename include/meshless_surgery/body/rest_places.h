@@ -1,7 +1,10 @@
 // Where points that a blade has put inside a deformed body lie in its rest shape.
 #pragma once
 
+#include <memory>
+
 #include "meshless_surgery/body/body.h"
+#include "meshless_surgery/geometry/plane.h"
 
 namespace meshless {
 
@@ -12,10 +15,23 @@ struct KnownPlace {
 };
 
 /// Rest places of points in the present shape: the affine maps of 16 particles each from present to rest, blended
-/// over the nearest four, plus what they miss at the known places near by (the rim of a cut), spread inwards by inverse squared distance.
-/// Where the particles do not span space, the map follows what they span and keeps lengths across. Neither side of a
-/// cut is asked: both get the same places.
-Points restPlaces(const BodyModel& model, const BodyState& state, const Points& present,
-                  const std::vector<KnownPlace>& known);
+/// over the nearest four, plus what they miss at the known places near by (the rim of a cut), spread inwards by inverse
+/// squared distance. Where the particles do not span space, the map follows what they span and keeps lengths across.
+/// Neither side of a cut is asked: both get the same places.
+class RestPlaces {
+ public:
+  /// Both must outlive it.
+  RestPlaces(const BodyModel& model, const BodyState& state);
+  ~RestPlaces();
+  RestPlaces(RestPlaces&&) noexcept;
+
+  /// Makes the maps that points on the plane are likely to want, while others still look for the points.
+  void foresee(const Plane& plane);
+  Points of(const Points& present, const std::vector<KnownPlace>& known);
+
+ private:
+  struct Data;
+  std::unique_ptr<Data> data_;
+};
 
 }  // namespace meshless
