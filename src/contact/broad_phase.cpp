@@ -8,6 +8,9 @@ namespace {
 
 constexpr std::uint64_t kNoKey = ~0ull;
 constexpr int kNoLevel = 1 << 20;
+constexpr double kWider = 0.05;         // of a box's extent: the margin
+constexpr int kWorthIt = 2;             // calls that a search has to hold
+constexpr int kWithout = 8;             // searches without margins after one that did not
 constexpr double kMostCells = 1 << 18;  // coordinates that still fit into 19 bits of a key
 
 std::uint64_t keyOf(int level, const std::array<std::int64_t, 3>& cell) {
@@ -24,11 +27,49 @@ std::size_t hashOf(std::uint64_t key) {
 
 }  // namespace
 
+bool BroadPhase::stillWithin(const std::vector<Box>& boxes, const std::vector<char>& active) const {
+  if (boxes.size() != wide_.size() || active != wide_active_) return false;
+  for (std::size_t i = 0; i < boxes.size(); ++i)
+    if (!((boxes[i].min.array() >= wide_[i].min.array()).all() && (boxes[i].max.array() <= wide_[i].max.array()).all()))
+      return false;
+  return true;
+}
+
 const std::vector<std::array<Index, 2>>& BroadPhase::find(const std::vector<Box>& boxes,
                                                           const std::vector<char>& active) {
-  pairs_.clear();
-  entries_.clear();
   tested_ = 0;
+  if (stillWithin(boxes, active)) {
+    ++held_;
+  } else {
+    // Where all moves, margins only find more that is to be compared.
+    if (without_ > 0) {
+      --without_;
+    } else if (margins_ && held_ < kWorthIt) {
+      without_ = kWithout;
+    }
+    margins_ = without_ == 0;
+    wide_ = boxes;
+    wide_active_ = active;
+    for (Box& box : wide_) {
+      const double margin = margins_ ? kWider * (box.max - box.min).maxCoeff() : 0.0;
+      if (!(margin > 0.0)) continue;  // and empty ones stay so
+      box.min.array() -= margin;
+      box.max.array() += margin;
+    }
+    search(wide_, active, wide_pairs_);
+    held_ = 0;
+  }
+  tested_ += wide_pairs_.size();
+  pairs_.clear();
+  for (const auto& pair : wide_pairs_)
+    if (boxes[pair[0]].overlaps(boxes[pair[1]])) pairs_.push_back(pair);
+  return pairs_;
+}
+
+void BroadPhase::search(const std::vector<Box>& boxes, const std::vector<char>& active,
+                        std::vector<std::array<Index, 2>>& pairs) {
+  pairs.clear();
+  entries_.clear();
   level_of_.assign(boxes.size(), kNoLevel);
   Box region;
   double largest = 0.0;
@@ -37,7 +78,7 @@ const std::vector<std::array<Index, 2>>& BroadPhase::find(const std::vector<Box>
     region.extend(0.5 * (box.min + box.max));
     largest = std::max(largest, (box.max - box.min).maxCoeff());
   }
-  if (region.empty()) return pairs_;
+  if (region.empty()) return;
   // The finest level: cells as large as the largest box of the level; none so fine that a coordinate would not fit.
   const double extent = (region.max - region.min).maxCoeff();
   const double finest = std::max({extent / kMostCells, largest * std::ldexp(1.0, -60), 1e-300});
@@ -96,13 +137,12 @@ const std::vector<std::array<Index, 2>>& BroadPhase::find(const std::vector<Box>
               const Index j = entries_[k].box;
               if ((own && same && j <= i) || (!active[i] && !active[j])) continue;
               ++tested_;
-              if (boxes[i].overlaps(boxes[j])) pairs_.push_back({std::min(i, j), std::max(i, j)});
+              if (boxes[i].overlaps(boxes[j])) pairs.push_back({std::min(i, j), std::max(i, j)});
             }
           }
     }
   }
-  std::sort(pairs_.begin(), pairs_.end());
-  return pairs_;
+  std::sort(pairs.begin(), pairs.end());
 }
 
 }  // namespace meshless

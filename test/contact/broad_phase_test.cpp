@@ -58,6 +58,53 @@ TEST(BroadPhase, FindsThePairsThatComparingAllFinds) {
   EXPECT_GT(met, 10000u);
 }
 
+TEST(BroadPhase, FindsThemWhileTheyMoveABitOrFarOrAtOnce) {
+  for (const double stride : {0.0, 1e-4, 1e-2, 0.3}) {
+    test::Random random(11);
+    BroadPhase broad;
+    std::vector<Box> boxes = randomBoxes(random, 200, 1.0, 1.5);
+    std::vector<char> active(boxes.size(), 1);
+    std::size_t met = 0;
+    for (int step = 0; step < 120; ++step) {
+      for (Box& box : boxes) {
+        const Vec3 shift = random.vector(stride);
+        box.min += shift;
+        box.max += shift;
+        box.max.array() += random.uniform(0.0, 1e-3 * stride);
+      }
+      if (step % 30 == 29) active[static_cast<std::size_t>(random.integer(0, 199))] ^= 1;
+      if (step == 50) boxes[7].min.x() = kNan;
+      if (step == 60) boxes[7] = boxes[8];
+      if (step == 70) boxes[9] = Box();
+      if (step == 80) boxes.push_back(boxes[10]), active.push_back(1);
+      const Pairs expected = everyPair(boxes, active);
+      ASSERT_EQ(broad.find(boxes, active), expected) << "stride " << stride << ", step " << step;
+      met += expected.size();
+    }
+    EXPECT_GT(met, 1000u);
+  }
+}
+
+TEST(BroadPhase, BoxesThatHardlyMoveAreNotLookedForAgain) {
+  test::Random random(12);
+  BroadPhase broad;
+  std::vector<Box> boxes = randomBoxes(random, 300, 0.0, 4.0);
+  const std::vector<char> active(boxes.size(), 1);
+  broad.find(boxes, active);
+  const std::size_t searched = broad.tested();
+  std::size_t looked_anew = 0;
+  for (int step = 0; step < 100; ++step) {
+    for (Box& box : boxes) {
+      const Vec3 shift = random.vector(1e-4 * box.diagonal());
+      box.min += shift;
+      box.max += shift;
+    }
+    broad.find(boxes, active);
+    looked_anew += 2 * broad.tested() > searched;
+  }
+  EXPECT_LE(looked_anew, 3u) << "of 100; a search compares " << searched << ", the last call " << broad.tested();
+}
+
 TEST(BroadPhase, TwoThatAreInactiveAreNoPair) {
   test::Random random(5);
   BroadPhase broad;
