@@ -355,7 +355,10 @@ void Contacts::loadedPairs(std::vector<LoadedPair>& pairs) const {
 
 std::size_t Contacts::groundLoaded() const {
   std::size_t count = 0;
-  for (const Contact& c : impl_->contacts) count += c.b == kNoIndex && c.impulse > 0.0;
+  for (const Contact& c : impl_->contacts) {
+    if (c.b != kNoIndex) break;  // the ground's come first
+    count += c.impulse > 0.0;
+  }
   return count;
 }
 
