@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Every service and input topic with structured random requests, and mesh files that lie: the node answers each call, a
 refusal has a message and changes nothing, and what is accepted leaves finite tissue. MESHLESS_SURGERY_FUZZ_CALLS sets
-the number of calls, MESHLESS_SURGERY_FUZZ_SEED the seed, MESHLESS_SURGERY_FUZZ_HANG the seconds that a call may take."""
+the number of calls, MESHLESS_SURGERY_FUZZ_SEED the seed, MESHLESS_SURGERY_FUZZ_HANG the seconds that a call may
+take."""
 import math
 import os
 import random
@@ -252,7 +253,8 @@ class FuzzCase(unittest.TestCase):
         self.longest = max(self.longest, (took, service))
         count, total = self.times.get(service, (0, 0.0))
         self.times[service] = (count + 1, total + took)
-        self.assertLess(took, HANG, '~%s %.300r' % (service, fields))
+        if not took < HANG:
+            self.fail('~%s %.300r took %.1f s' % (service, fields, took))
         return answer
 
     def memory(self):
@@ -276,20 +278,24 @@ class ServicesTest(FuzzCase):
             service = rng.choice(services) if number % 250 else 'reset'
             fields = fuzzer.request(service)
             answer = self.call(service, **fields)
-            said = 'call %d: ~%s %.300r: %s' % (number, service, fields, answer.message[:300])
-            self.assertNotEqual('', answer.message, said)
-            self.assertLess(len(answer.message), 5000, said)
-            self.assertNotIn('\ufffd', answer.message, said)  # what rospy makes of bytes that are no UTF-8
             after = self.call('hash').hash
+            faults = []
+            if answer.message == '':
+                faults.append('it says nothing')
+            if len(answer.message) > 5000:
+                faults.append('it says %d characters' % len(answer.message))
+            if '\ufffd' in answer.message:  # what rospy makes of bytes that are no UTF-8
+                faults.append('it says what is no text')
+            if after != before and (not answer.success or service in ('get_body', 'probe', 'pause', 'save')):
+                faults.append('the state has changed')
+            if faults:  # only then put into words: there are 100 MB in some requests
+                self.fail('call %d: ~%s %.300r: %r: %s' % (number, service, fields, answer.message[:300], faults))
             if answer.success:
                 accepted += 1
                 if service == 'pick':
                     fuzzer.picks.append(answer.pick_id)
-                if service in ('get_body', 'probe', 'pause', 'save'):
-                    self.assertEqual(before, after, said)
             else:
                 refused += 1
-                self.assertEqual(before, after, said)
             before = after
         print('fuzz: %d calls, %d refused, the longest %.2f s (~%s), memory %d MB; calls and seconds by service: %s' % (
             CALLS, refused, self.longest[0], self.longest[1], self.memory() >> 20,
