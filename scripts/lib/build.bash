@@ -75,6 +75,20 @@ buildSanitized() {
     "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -g1"
 }
 
+# buildSanitizedNode: the node and the replay under the same two, in a folder that rostest can be run from.
+buildSanitizedNode() {
+  local folder=$output/node_sanitized
+  mkdir -p "$folder/devel/lib/python3/dist-packages" || stop "Cannot write to $output."
+  build "the node with sanitizers" "$folder" deformer_node replay meshless_surgery_generate_messages -- \
+    -DCATKIN_DEVEL_PREFIX="$folder/devel" -DMESHLESS_SURGERY_SANITIZE=ON -DCMAKE_BUILD_TYPE=RelWithDebInfo \
+    "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -g1" \
+    -DPYTHON_EXECUTABLE=/usr/bin/python3 -DPython3_EXECUTABLE=/usr/bin/python3
+}
+
+# The rostests that it is put through: all but those that look at the clock, and large scenes.
+sanitized_node_tests='_rostest_test_ros_(session|services|streams|topics|contacts|parameters|stations|fuzz|robust|'
+sanitized_node_tests+='tools)\.test$'
+
 # The tests that use more than one thread.
 thread_tests='^(world_work_test|world_world_test|dynamics_match_batch_test|dynamics_elastic_batch_test|stress_.*)$'
 

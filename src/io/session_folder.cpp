@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <filesystem>
 
@@ -17,9 +18,23 @@ namespace {
 
 constexpr std::size_t kLongestName = 100;
 constexpr int kMostNumbered = 9999;  // files of one name
+const std::string kPart = ".part";   // of files that are being written: .NAME.PROCESS-CALL.part
 
 Error refused(const std::string& what, const std::string& path, int error) {
   return {ErrorCode::kFailed, "cannot " + what + " '" + path + "': " + std::strerror(error)};
+}
+
+/// The process in the name of a file that is being written; 0 of any other file.
+long writerOf(const std::string& name) {
+  if (name.size() <= kPart.size() || name.front() != '.' ||
+      name.compare(name.size() - kPart.size(), kPart.size(), kPart) != 0)
+    return 0;
+  const std::size_t dash = name.rfind('-');
+  const std::size_t dot = dash == std::string::npos ? dash : name.rfind('.', dash);
+  if (dot == std::string::npos || dot == 0 || dash - dot > 10) return 0;
+  const std::string digits = name.substr(dot + 1, dash - dot - 1);
+  if (digits.empty() || digits.find_first_not_of("0123456789") != std::string::npos) return 0;
+  return std::stol(digits);
 }
 
 /// Closed when it goes out of scope.
@@ -85,7 +100,7 @@ Status SessionFolder::write(const std::string& name, std::string_view bytes) con
   // Of this process and this call: two who save at once do not mix.
   static std::atomic<unsigned> calls{0};
   const std::string temporary =
-      folder_ + "/." + name + "." + std::to_string(::getpid()) + "-" + std::to_string(++calls) + ".part";
+      folder_ + "/." + name + "." + std::to_string(::getpid()) + "-" + std::to_string(++calls) + kPart;
   Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0644));
   if (file.get() < 0) return refused("write", path, errno);
   Status written = writeAll(file.get(), bytes);
@@ -155,6 +170,16 @@ Status SessionFolder::rename(const std::string& from, const std::string& to) con
   if (Status valid = checkName(to); !valid) return valid;
   if (::rename(pathOf(from).c_str(), pathOf(to).c_str()) != 0) return refused("rename", pathOf(from), errno);
   return Done{};
+}
+
+void SessionFolder::removeLeftovers() const {
+  std::error_code failed;
+  for (std::filesystem::directory_iterator entry(folder_, failed), end; !failed && entry != end;
+       entry.increment(failed)) {
+    const std::string name = entry->path().filename().string();
+    const long writer = writerOf(name);
+    if (writer > 0 && ::kill(static_cast<pid_t>(writer), 0) != 0 && errno == ESRCH) ::unlink(pathOf(name).c_str());
+  }
 }
 
 Result<SessionFolder::NewFile> SessionFolder::create(const std::string& name) const {

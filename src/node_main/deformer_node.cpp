@@ -6,11 +6,14 @@
 
 #include "meshless_surgery/ros/node.h"
 
+constexpr int kKeptPiece = 8 << 20;  // bytes
+
 extern "C" void stopInGoodOrder(int) { ros::requestShutdown(); }
 
 int main(int argc, char** argv) {
-  // Memory that a cut has used is kept for the next one: fetching it anew costs more than the cut.
-  mallopt(M_MMAP_THRESHOLD, 1 << 30);
+  // Memory that a cut has used is kept for the next one: fetching it anew costs more than the cut. Larger pieces are
+  // those of requests of many megabytes: kept, each thread would hold on to the largest that it has had.
+  mallopt(M_MMAP_THRESHOLD, kKeptPiece);
   mallopt(M_TRIM_THRESHOLD, 1 << 30);
   ros::init(argc, argv, "deformer");
   // SIGINT is roscpp's; a supervisor's SIGTERM means the same. A disk quota must refuse, not kill.

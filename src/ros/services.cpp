@@ -327,7 +327,13 @@ struct Services::Handlers {
     for (int i = 2; request.name.empty() && !reply.ok() && reply.error().code == ErrorCode::kDuplicateName &&
                     i <= kMostSuffix;
          ++i) {
-      command.body = renamed(**body, (*body)->def.name + "_" + std::to_string(i));
+      // Looked for in one go: in a crowd each turn with the world may take long to come.
+      const auto numbered = [&] { return (*body)->def.name + "_" + std::to_string(i); };
+      const Status done = runner.look([&](World& world) {
+        while (i < kMostSuffix && world.nameUsed(numbered())) ++i;
+      });
+      if (!done.ok()) return refuse(response, "spawn", done.error());
+      command.body = renamed(**body, numbered());
       reply = runner.apply(command);
     }
     if (!reply.ok()) return refuse(response, "spawn", reply.error());

@@ -58,6 +58,7 @@ Result<std::string> Session::startLog(World& world) {
 
 void Session::start(WorldRunner& runner) {
   runner_ = &runner;
+  folder_.removeLeftovers();
   if (settings_.autosave_period > 0.0) saver_ = std::thread([this] { saveLoop(); });
 }
 

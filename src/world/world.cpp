@@ -188,6 +188,7 @@ const WorldSettings& World::settings() const { return impl_->settings; }
 std::uint64_t World::stepCount() const { return impl_->step; }
 double World::simTime() const { return static_cast<double>(impl_->step) / impl_->settings.step_rate; }
 std::size_t World::bodyCount() const { return impl_->bodies.size(); }
+bool World::nameUsed(const std::string& name) const { return impl_->used_names.count(name) > 0; }
 const PushSphere& World::push() const { return impl_->push; }
 const Scissors& World::scissors() const { return impl_->scissors; }
 

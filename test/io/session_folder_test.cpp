@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -22,6 +24,7 @@ class SessionFolderTest : public testing::Test {
   std::vector<std::string> files(const std::string& folder) const {
     std::vector<std::string> names;
     for (const auto& entry : fs::directory_iterator(folder)) names.push_back(entry.path().filename());
+    std::sort(names.begin(), names.end());
     return names;
   }
   const TemporaryFolder temporary_;
@@ -131,6 +134,28 @@ TEST_F(SessionFolderTest, WhoeverReadsFindsTheWhole) {
     ASSERT_TRUE(*read == a || *read == b);
   }
   writer.join();
+}
+
+TEST_F(SessionFolderTest, WhatTheKilledLeftIsRemoved) {
+  const SessionFolder folder(base_);
+  const pid_t dead = fork();
+  if (dead == 0) _exit(0);
+  ASSERT_GT(dead, 0);
+  ASSERT_EQ(dead, waitpid(dead, nullptr, 0));
+  const std::string own = ".a.state." + std::to_string(getpid()) + "-1.part";
+  const std::string left = ".a.b-c.state." + std::to_string(dead) + "-17.part";
+  const std::vector<std::string> others = {".1-1.part",        ".a.-1.part", ".a.99999999999-1.part", ".a.part",
+                                           ".a.state.1x-1.part", ".part",      "a.99999-1.part",        "a.state"};
+  for (const std::string& name : others) std::ofstream(base_ + "/" + name) << "x";
+  for (const std::string& name : {own, left}) std::ofstream(base_ + "/" + name) << "x";
+  folder.removeLeftovers();
+  std::vector<std::string> kept = others;
+  kept.push_back(own);
+  std::sort(kept.begin(), kept.end());
+  EXPECT_EQ(kept, files(base_));
+  SessionFolder("").removeLeftovers();
+  SessionFolder(base_ + "/missing").removeLeftovers();
+  EXPECT_FALSE(fs::exists(base_ + "/missing"));
 }
 
 TEST_F(SessionFolderTest, NewFilesNeverReplaceOldOnes) {

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Every service and input topic with structured random requests, and mesh files that lie: the node answers each call, a
 refusal has a message and changes nothing, and what is accepted leaves finite tissue. MESHLESS_SURGERY_FUZZ_CALLS sets
-the number of calls, MESHLESS_SURGERY_FUZZ_SEED the seed."""
+the number of calls, MESHLESS_SURGERY_FUZZ_SEED the seed, MESHLESS_SURGERY_FUZZ_HANG the seconds that a call may
+take."""
 import math
 import os
 import random
@@ -25,7 +26,8 @@ from deformer_support import LONG, TYPES, OwnNode, pose_stamped, run  # noqa: E4
 SCENES = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'scenes')
 CALLS = int(os.environ.get('MESHLESS_SURGERY_FUZZ_CALLS') or 2500)
 SEED = int(os.environ.get('MESHLESS_SURGERY_FUZZ_SEED') or 1)
-HANG = 30.0  # [s]; the machine may be loaded. The longest call is printed.
+# [s]; the machine may be loaded, or the node under sanitizers. The longest call is printed.
+HANG = float(os.environ.get('MESHLESS_SURGERY_FUZZ_HANG') or 30.0)
 # [bytes] that the node may take on the way: requests of 100 MB are among them, and its threads keep what they have had.
 MOST_MEMORY = 2 << 30
 LARGE_STRING = 'x' * 10000000
@@ -135,6 +137,8 @@ class Fuzzer:
             return Quaternion(*[v / norm for v in q])
         if kind < 0.7:
             return Quaternion(0, 0, 0, 1)
+        if kind < 0.75:
+            return Quaternion(0, 0, 0, 0)
         return Quaternion(*[self.number() for _ in range(4)])
 
     def pose(self):
@@ -249,7 +253,8 @@ class FuzzCase(unittest.TestCase):
         self.longest = max(self.longest, (took, service))
         count, total = self.times.get(service, (0, 0.0))
         self.times[service] = (count + 1, total + took)
-        self.assertLess(took, HANG, '~%s %.300r' % (service, fields))
+        if not took < HANG:
+            self.fail('~%s %.300r took %.1f s' % (service, fields, took))
         return answer
 
     def memory(self):
@@ -273,19 +278,24 @@ class ServicesTest(FuzzCase):
             service = rng.choice(services) if number % 250 else 'reset'
             fields = fuzzer.request(service)
             answer = self.call(service, **fields)
-            said = 'call %d: ~%s %.300r: %s' % (number, service, fields, answer.message[:300])
-            self.assertNotEqual('', answer.message, said)
-            self.assertLess(len(answer.message), 5000, said)
             after = self.call('hash').hash
+            faults = []
+            if answer.message == '':
+                faults.append('it says nothing')
+            if len(answer.message) > 5000:
+                faults.append('it says %d characters' % len(answer.message))
+            if '\ufffd' in answer.message:  # what rospy makes of bytes that are no UTF-8
+                faults.append('it says what is no text')
+            if after != before and (not answer.success or service in ('get_body', 'probe', 'pause', 'save')):
+                faults.append('the state has changed')
+            if faults:  # only then put into words: there are 100 MB in some requests
+                self.fail('call %d: ~%s %.300r: %r: %s' % (number, service, fields, answer.message[:300], faults))
             if answer.success:
                 accepted += 1
                 if service == 'pick':
                     fuzzer.picks.append(answer.pick_id)
-                if service in ('get_body', 'probe', 'pause', 'save'):
-                    self.assertEqual(before, after, said)
             else:
                 refused += 1
-                self.assertEqual(before, after, said)
             before = after
         print('fuzz: %d calls, %d refused, the longest %.2f s (~%s), memory %d MB; calls and seconds by service: %s' % (
             CALLS, refused, self.longest[0], self.longest[1], self.memory() >> 20,
@@ -376,6 +386,8 @@ class TopicsTest(FuzzCase):
             if number % 200 == 199:
                 self.call('reset')
         self.assertTrue(self.call('hash').success)
+        print('fuzz: %d messages, the longest call %.2f s (~%s), memory %d MB' % (
+            CALLS, self.longest[0], self.longest[1], self.memory() >> 20))
         for topic, publisher in zip(topics, publishers):
             publisher.unregister()
         subscriber.unregister()

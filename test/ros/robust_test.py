@@ -14,10 +14,11 @@ import unittest
 
 import rosgraph
 import rospy
-from geometry_msgs.msg import Point, TransformStamped
+from geometry_msgs.msg import Point, TransformStamped, Vector3
 from meshless_surgery.msg import Event, State, Surfaces
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import PointCloud2
+from shape_msgs.msg import SolidPrimitive
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
@@ -82,12 +83,14 @@ class CrowdTest(RobustCase):
 
                 try:
                     while time.monotonic() < until:
-                        kind = rng.randrange(12)
+                        kind = rng.randrange(17)
                         at = Point(rng.uniform(-0.25, 0.25), rng.uniform(-0.05, 0.05), rng.uniform(0.0, 0.1))
                         if kind < 4:
                             pick = call('pick', point=at, max_distance=0.05)
                             if pick.success:
                                 call('move_pick', pick_id=pick.pick_id, target=Point(at.x, at.y, at.z + 0.02))
+                                if rng.random() < 0.3:
+                                    call('lock', pick_id=pick.pick_id)
                                 call('release', pick_id=pick.pick_id)
                         elif kind == 4:
                             # The pieces are left alone: cut again and again they would be work without end.
@@ -105,6 +108,22 @@ class CrowdTest(RobustCase):
                             call('hash')
                         elif kind == 10:
                             call('step', steps=rng.randint(1, 5))
+                        elif kind == 11:
+                            call('probe', point=Point(at.x, at.y, 1.0), direction=Vector3(0, 0, -1))
+                        elif kind == 12:
+                            call('set_material', body=rng.choice(['left', 'right']),
+                                 yaml='{alpha: %.2f}' % rng.uniform(0.1, 1.0))
+                        elif kind == 13:
+                            guest = call('spawn', name='', scale=1.0, pose=pose_stamped(at.x, at.y, 1.0),
+                                         primitive=SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.05] * 3))
+                            if guest.success:
+                                call('remove', name=guest.name)
+                        elif kind == 14:
+                            call('incise', blade=pose_stamped(at.x, 0.0, 0.1), length=0.02, depth=0.02,
+                                 bodies=[rng.choice(['left', 'right'])])
+                        elif kind == 15:
+                            call(rng.choice(['clear_picks', 'open_scissors', 'lift_scissors']))
+                            call('pause', data=rng.random() < 0.3)
                         else:
                             call('undo_cut')
                 except Exception as fault:  # pylint: disable=broad-except

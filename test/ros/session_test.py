@@ -158,6 +158,69 @@ class SaveTest(SessionCase):
             self.assertIn('log of commands ends here', node.output())
             node.good('load', file='state')
 
+    def test_a_disk_without_space_keeps_what_was_there(self):
+        """A file system of its own with room for one state and a half, where the machine lets us make one."""
+        small = ('unshare', '-rm', 'sh', '-c', 'mount -t tmpfs -o size=%dk none "$0" && exec "$@"')
+        if subprocess.run(small[:4] + (small[4] % 64, self.folder, 'true'), stderr=subprocess.DEVNULL,
+                          check=False).returncode != 0:
+            self.skipTest('no mounts in a user namespace')
+        with self.node() as node:
+            node.good('save', file='state')
+        kilobytes = os.path.getsize(self.path('state')) * 3 // 2048
+        with self.node(prefix=small[:4] + (small[4] % kilobytes, self.folder)) as node:
+            inside = os.path.join('/proc/%d/root' % node.process.pid, self.folder[1:])
+            node.good('save', file='state')
+            with open(os.path.join(inside, 'state'), 'rb') as file:
+                old = file.read()
+            node.good('step', steps=20)
+            before = node.hash()
+            answer = node.call('save', file='other')
+            self.assertFalse(answer.success)
+            self.assertIn('No space left', answer.message)
+            self.assertEqual(before, node.hash())
+            self.assertFalse(node.call('save', file='state').success)
+            self.assertEqual(['state'], os.listdir(inside))
+            with open(os.path.join(inside, 'state'), 'rb') as file:
+                self.assertEqual(old, file.read())
+            node.good('load', file='state')
+            self.assertEqual(0, node.end(signal.SIGTERM), node.output())
+
+    def test_killed_while_saving_it_leaves_a_whole_file(self):
+        """kill -9 as soon as a write has begun: the file is that of one save or another, and no half of one stays."""
+        whole = set()
+        with self.node() as node:
+            for _ in range(2):
+                node.good('step', steps=1)
+                whole.add(node.hash())
+        for _ in range(4):
+            with self.node() as node:
+                node.good('step', steps=1)
+                node.good('save', file='state')
+                node.good('step', steps=1)
+                node.good('hash')
+                stop = threading.Event()
+
+                def save(stop=stop, node=node):
+                    while not stop.is_set():
+                        try:
+                            node.call('save', file='state')
+                        except (rospy.ServiceException, rospy.ROSException, OSError):
+                            return
+
+                thread = threading.Thread(target=save)
+                thread.daemon = True
+                thread.start()
+                end = time.monotonic() + LONG
+                while len(os.listdir(self.folder)) < 2 and time.monotonic() < end:
+                    pass
+                node.end(signal.SIGKILL)
+                stop.set()
+                thread.join(LONG)
+            with self.node() as node:
+                self.assertEqual(['state'], os.listdir(self.folder))
+                node.good('load', file='state')
+                self.assertIn(node.hash(), whole)
+
     def test_waiting_calls_are_answered(self):
         with self.node(paused=False) as node:
             node.good('save', file='state')

@@ -143,7 +143,8 @@ class SurfacesTest(DeformerTestCase):
         pieces = self.good('cut', blades=pose_stamped(-0.2, -1.0, 0.1, ACROSS_X), bodies=['left']).new_bodies
         self.good('pick', point=Point(0.2, 0.0, 0.15), body='right', max_distance=0.05)
         self.good('push', enable=True, radius=0.03, pose=pose_stamped(0.0, 0.0, 1.0))
-        seen = recorder.next(lambda m: m.push_shown and len(m.bodies) == 3)
+        # Said once while the world is paused, and maybe heard by now.
+        seen = recorder.wait(lambda m: m.push_shown and len(m.bodies) == 3)
         self.assertEqual(1, len(seen.picks))
         self.assertAlmostEqual(0.03, seen.push_radius)
         self.assertEqual(1.0, seen.push_position.z)
@@ -160,7 +161,7 @@ class SurfacesTest(DeformerTestCase):
         pick = self.pick_left().pick_id
         self.good('lock', pick_id=pick, at_target=True, target=Point(-0.1, 0.0, 0.1))
         self.good('step', steps=60)
-        pulled = recorder.next(lambda m: max(self.surface(m, 'left').strain) > 0.02)
+        pulled = recorder.wait(lambda m: max(self.surface(m, 'left').strain) > 0.02)
         self.assertEqual(len(self.surface(pulled, 'left').vertices), 3 * len(self.surface(pulled, 'left').strain))
         self.assertLess(max(self.surface(pulled, 'right').strain), 1e-5)
 

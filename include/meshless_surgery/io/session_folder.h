@@ -27,6 +27,8 @@ class SessionFolder {
   bool has(const std::string& name) const;
   void remove(const std::string& name) const;
   Status rename(const std::string& from, const std::string& to) const;
+  /// Halves that processes of this machine left when they were killed while they wrote. Others' are left alone.
+  void removeLeftovers() const;
 
   /// A file to append to, that did not exist: `name`, or where that is taken name.2, name.3 ... The caller closes it.
   struct NewFile {

@@ -44,7 +44,7 @@ class BorderCheck {
 /// At most 6 digits, "nan" and "inf" as such.
 std::string formatNumber(double value);
 constexpr std::size_t kMaxName = 100;  // bytes of a name
-/// For messages to people: control characters replaced, cut after `most` bytes.
+/// For messages to people: control characters and what is no UTF-8 replaced, cut before `most` bytes are exceeded.
 std::string printable(const std::string& text, std::size_t most = kMaxName);
 
 }  // namespace meshless

@@ -170,6 +170,8 @@ class World {
   std::uint64_t stepCount() const;
   double simTime() const;  // [s]
   std::size_t bodyCount() const;
+  /// By a body that lives or was retired in this run.
+  bool nameUsed(const std::string& name) const;
 
   /// Does what the user asked for, at once; on an error nothing has changed.
   Result<Reply> apply(const Command& command);
