@@ -57,6 +57,10 @@ RigidMotion rigidMotionOf(const BodyModel& model, const Points& positions, const
   return motion;
 }
 
+Vec3 spinWith(const BodyModel& model, const Points& positions, const Vec3& centre, const Vec3& momentum) {
+  return spinFor(inertiaAbout(model, positions, centre), momentum);
+}
+
 double highestFrequencyNow(const BodyModel& model, const BodyState& state) {
   constexpr double kMargin = 1.1;  // the frequency was found from below, and the stretch is that of the last substep
   return kMargin * state.stretch * model.highest_frequency;

@@ -142,6 +142,7 @@ struct World::Impl {
   std::size_t tetrahedralizations = 0;
   std::vector<WorldBody*> awake;  // of this frame, in the order of bodies
   std::vector<char> faulty;       // one each: its coordinates are no numbers
+  std::vector<WorldBody*> wound;  // in findWound()
   std::uint32_t next_sleep_group = 1;
   std::vector<WorldBatch> batches;
   bool batches_current = false;  // false: bodies or materials have changed
@@ -212,6 +213,7 @@ struct World::Impl {
   void rememberSlow();
   void fallAsleep(double h_frame);
   void mendFaults();
+  void findWound();
   void closeBlades();
   std::vector<WorldBody*> bodiesInContact(double h);
   int substepsNeeded(double h_frame) const;

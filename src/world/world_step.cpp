@@ -7,6 +7,7 @@
 #include "meshless_surgery/body/face_contact.h"
 #include "meshless_surgery/body/preserve.h"
 #include "meshless_surgery/body/rider_contact.h"
+#include "meshless_surgery/body/unwind.h"
 #include "meshless_surgery/contact/sphere_and_ground.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
@@ -73,9 +74,13 @@ void World::step() {
         const Stopwatch match(w.report.match);
         w.matchBatches(h);
         for (WorldBody* body : w.awake)
-          if (!body->batched)
-            matchAndMove(*body->model, body->material, w.settings.gravity, h, body->state, body->scratch,
-                         w.report.match_counters);
+          if (!body->batched) {
+            if (body->state.unwinding)
+              unwind(*body->model, w.settings.gravity, h, body->state, body->scratch);
+            else
+              matchAndMove(*body->model, body->material, w.settings.gravity, h, body->state, body->scratch,
+                           w.report.match_counters);
+          }
       }
       {
         const Stopwatch tools(w.report.tools);
@@ -101,6 +106,7 @@ void World::step() {
       if (rest_shape) w.liftOutOfGround(*body, h_frame);  // after: it lifts by offsets too
     }
     w.mendFaults();
+    w.findWound();
     for (Pick& pick : w.picks) {
       pick.reached = pick.target;
       if (const WorldBody* body = w.find(pick.body))
