@@ -130,6 +130,8 @@ struct World::Impl {
   std::vector<std::shared_ptr<const PreparedBody>> scene;
   std::vector<std::unique_ptr<WorldObstacle>> obstacles;
   std::vector<Pick> picks;
+  std::vector<Vec3> pulls;         // [N] one a pick, of this substep
+  std::vector<Vec3> grasped;       // [m] one a pick: in rememberGrasps()
   PickId next_pick = 1;
   PushSphere push;
   Scissors scissors;
@@ -220,7 +222,10 @@ struct World::Impl {
   double substepNow() const;  // [s]
   int chooseSubsteps(double h_frame);
   void movePush(double h, double h_frame);
-  void pullSprings(int substep, int substeps, double h_frame);
+  void pullSprings(int substep, int substeps, double h_frame, bool again = false);
+  /// What is done to tissue between these two, without a velocity, its springs follow evenly over a step.
+  void rememberGrasps();
+  void followGrasps();
   void contactBodies(const std::vector<WorldBody*>& near, double h, int stride);
   const ContactModel& contactModel(WorldBody& body);
   /// Begins to make it where it will be needed and takes long.
