@@ -35,15 +35,12 @@ Mat3 pseudoInverse(const Mat3& inertia) {
   return inverse;
 }
 
-MassMoments momentsOf(const BodyModel& model, const Points& positions) {
-  MassMoments moments;
-  Vec3 sum = Vec3::Zero();
-  for (std::size_t i = 0; i < positions.size(); ++i) sum += model.masses[i] * (positions[i] - positions[0]);
-  moments.centre = positions[0] + sum / model.mass;
+// See MassMoments.
+Mat3 spinFor(const BodyModel& model, const Points& positions, const Vec3& centre) {
   // Sums of their own instead of a matrix: four times as fast.
   double xx = 0.0, yy = 0.0, zz = 0.0, xy = 0.0, xz = 0.0, yz = 0.0;
   for (std::size_t i = 0; i < positions.size(); ++i) {
-    const Vec3 r = positions[i] - moments.centre;
+    const Vec3 r = positions[i] - centre;
     const double x = model.masses[i] * r.x(), y = model.masses[i] * r.y(), z = model.masses[i] * r.z();
     xx += x * r.x();
     yy += y * r.y();
@@ -54,8 +51,14 @@ MassMoments momentsOf(const BodyModel& model, const Points& positions) {
   }
   Mat3 inertia;
   inertia << yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy;
-  moments.spin_for = pseudoInverse(inertia);
-  return moments;
+  return pseudoInverse(inertia);
+}
+
+MassMoments momentsOf(const BodyModel& model, const Points& positions) {
+  Vec3 sum = Vec3::Zero();
+  for (std::size_t i = 0; i < positions.size(); ++i) sum += model.masses[i] * (positions[i] - positions[0]);
+  const Vec3 centre = positions[0] + sum / model.mass;
+  return {centre, spinFor(model, positions, centre)};
 }
 
 RigidMotion rigidMotionOf(const BodyModel& model, const MassMoments& moments, const Points& positions,
@@ -75,6 +78,10 @@ RigidMotion rigidMotionOf(const BodyModel& model, const MassMoments& moments, co
 
 RigidMotion rigidMotionOf(const BodyModel& model, const Points& positions, const Points& velocities) {
   return rigidMotionOf(model, momentsOf(model, positions), positions, velocities);
+}
+
+Vec3 spinWith(const BodyModel& model, const Points& positions, const Vec3& centre, const Vec3& momentum) {
+  return spinFor(model, positions, centre) * momentum;
 }
 
 double highestFrequencyNow(const BodyModel& model, const BodyState& state) {

@@ -60,10 +60,11 @@ double graspStiffness(const BodyModel& model, const Pick& pick, double h) {
   return pick.stiffness / (1.0 + pick.stiffness * h * h * inverseMass(model, pick));
 }
 
-Vec3 pullGrasp(const BodyModel& model, const Pick& pick, const Vec3& end, double h, Points& positions) {
+Vec3 pullGrasp(const BodyModel& model, const Pick& pick, const Vec3& end, double h, Points& positions,
+               const Vec3& given) {
   const Vec3 stretch = end - pick.offset - graspMean(pick, positions);
   const double stiff = pick.stiffness * h * h;
-  const Vec3 lambda = stretch * (stiff / (1.0 + stiff * inverseMass(model, pick)));
+  const Vec3 lambda = (stiff * stretch - h * h * given) / (1.0 + stiff * inverseMass(model, pick));
   for (std::size_t k = 0; k < pick.patch.size(); ++k) {
     const Index i = pick.patch[k];
     if (!model.fixed[i]) positions[i] += lambda * (pick.weights[k] / model.masses[i]);

@@ -13,7 +13,7 @@ namespace meshless {
 namespace {
 
 constexpr std::string_view kMagic = "MLSSTATE";
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kVersion = 3;
 constexpr std::uint64_t kMostModels = 1u << 20;
 
 std::uint32_t checksum(std::string_view bytes) {
@@ -193,6 +193,7 @@ std::string faultOf(const BodyModel& m, const BodyState& s) {
       s.surface.size() != m.surface.vertices.size() || (!s.plastic.empty() && s.plastic.size() != clusters) ||
       s.rider_offsets.size() != m.binding.riders.size() || (!s.eased.empty() && s.eased.size() != particles))
     return "a body's state is not that of its model";
+  if (s.unwinding && (m.any_fixed || clusters < 2)) return "a body that is held or of one cluster unwinds";
   return "";
 }
 

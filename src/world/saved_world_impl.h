@@ -172,10 +172,11 @@ void serialize(A& archive, PlasticShape& v) {
 template <class A>
 void serialize(A& archive, BodyState& v) {
   auto& [positions, velocities, poses, surface, swelling, stretch, plastic, rider_offsets, eased, eased_for,
-         eased_whole] = v;
+         eased_whole, unwinding] = v;
   // Where the surface is depends on who looked when, what follows does not.
   if constexpr (!std::is_same_v<A, HashArchive>) archive(surface);
-  archive(positions, velocities, poses, swelling, stretch, plastic, rider_offsets, eased, eased_for, eased_whole);
+  archive(positions, velocities, poses, swelling, stretch, plastic, rider_offsets, eased, eased_for, eased_whole,
+          unwinding);
 }
 template <class A>
 void serialize(A& archive, ClusterOptions& v) {

@@ -30,6 +30,7 @@ void restAnew(WorldBody& body) {
   state.rider_offsets.assign(state.rider_offsets.size(), Vec3::Zero());
   state.eased.clear();
   state.eased_for = 0.0;
+  state.unwinding = false;
 }
 
 }  // namespace

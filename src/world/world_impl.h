@@ -130,6 +130,8 @@ struct World::Impl {
   std::vector<std::shared_ptr<const PreparedBody>> scene;
   std::vector<std::unique_ptr<WorldObstacle>> obstacles;
   std::vector<Pick> picks;
+  std::vector<Vec3> pulls;         // [N] one a pick, of this substep
+  std::vector<Vec3> grasped;       // [m] one a pick: in rememberGrasps()
   PickId next_pick = 1;
   PushSphere push;
   Scissors scissors;
@@ -142,6 +144,7 @@ struct World::Impl {
   std::size_t tetrahedralizations = 0;
   std::vector<WorldBody*> awake;  // of this frame, in the order of bodies
   std::vector<char> faulty;       // one each: its coordinates are no numbers
+  std::vector<WorldBody*> wound;  // in findWound()
   std::uint32_t next_sleep_group = 1;
   std::vector<WorldBatch> batches;
   bool batches_current = false;  // false: bodies or materials have changed
@@ -212,13 +215,17 @@ struct World::Impl {
   void rememberSlow();
   void fallAsleep(double h_frame);
   void mendFaults();
+  void findWound();
   void closeBlades();
   std::vector<WorldBody*> bodiesInContact(double h);
   int substepsNeeded(double h_frame) const;
   double substepNow() const;  // [s]
   int chooseSubsteps(double h_frame);
   void movePush(double h, double h_frame);
-  void pullSprings(int substep, int substeps, double h_frame);
+  void pullSprings(int substep, int substeps, double h_frame, bool again = false);
+  /// What is done to tissue between these two, without a velocity, its springs follow evenly over a step.
+  void rememberGrasps();
+  void followGrasps();
   void contactBodies(const std::vector<WorldBody*>& near, double h, int stride);
   const ContactModel& contactModel(WorldBody& body);
   /// Begins to make it where it will be needed and takes long.

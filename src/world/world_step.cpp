@@ -7,6 +7,7 @@
 #include "meshless_surgery/body/face_contact.h"
 #include "meshless_surgery/body/preserve.h"
 #include "meshless_surgery/body/rider_contact.h"
+#include "meshless_surgery/body/unwind.h"
 #include "meshless_surgery/contact/sphere_and_ground.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
@@ -53,7 +54,9 @@ void World::step() {
     const bool rest_shape = w.settings.contact == ContactMethod::kRestShape && !w.awake.empty();
     if (rest_shape) {
       const Stopwatch contact(w.report.contact);
+      w.rememberGrasps();
       w.findContacts(h_frame);
+      w.followGrasps();
     }
     w.groupBatches();
     const int substeps = w.chooseSubsteps(h_frame);
@@ -73,9 +76,13 @@ void World::step() {
         const Stopwatch match(w.report.match);
         w.matchBatches(h);
         for (WorldBody* body : w.awake)
-          if (!body->batched)
-            matchAndMove(*body->model, body->material, w.settings.gravity, h, body->state, body->scratch,
-                         w.report.match_counters);
+          if (!body->batched) {
+            if (body->state.unwinding)
+              unwind(*body->model, w.settings.gravity, h, body->state, body->scratch);
+            else
+              matchAndMove(*body->model, body->material, w.settings.gravity, h, body->state, body->scratch,
+                           w.report.match_counters);
+          }
       }
       {
         const Stopwatch tools(w.report.tools);
@@ -94,15 +101,19 @@ void World::step() {
           w.contactBodies(near, h, stride);
         w.movePush(h, h_frame);
       }
+      w.pullSprings(substep, substeps, h_frame, true);
       w.finishSubstep(h);
     }
+    for (Pick& pick : w.picks) pick.reached = pick.target;
+    w.rememberGrasps();
     for (WorldBody* body : w.awake) {
       w.fadeRiderOffsets(*body, h_frame);
       if (rest_shape) w.liftOutOfGround(*body, h_frame);  // after: it lifts by offsets too
     }
+    w.followGrasps();
     w.mendFaults();
+    w.findWound();
     for (Pick& pick : w.picks) {
-      pick.reached = pick.target;
       if (const WorldBody* body = w.find(pick.body))
         pick.position = graspMean(pick, body->state.positions) + pick.offset;
     }
@@ -190,13 +201,35 @@ std::vector<WorldBody*> World::Impl::bodiesInContact(double h) {
 }
 
 // A target that jumps is followed evenly over the step: within the first of many substeps it would throw the tissue.
-void World::Impl::pullSprings(int substep, int substeps, double h_frame) {
-  for (Pick& pick : picks)
-    if (WorldBody* body = find(pick.body); body && !body->asleep) {
-      const int left = substeps - substep - 1;
-      const Vec3 end = pick.target - left * (pick.target - pick.reached) / substeps;
-      pick.force += pullGrasp(*body->model, pick, end, h_frame / substeps, body->state.positions) / substeps;
-    }
+// Again after contacts: what they have moved a stiff spring by they have no energy for, and the next substep would throw
+// the tissue back with it.
+void World::Impl::pullSprings(int substep, int substeps, double h_frame, bool again) {
+  pulls.resize(picks.size(), Vec3::Zero());
+  const double h = h_frame / substeps;
+  for (std::size_t n = 0; n < picks.size(); ++n) {
+    Pick& pick = picks[n];
+    WorldBody* const body = find(pick.body);
+    if (!body || body->asleep) continue;
+    const int left = substeps - substep - 1;
+    const Vec3 end = pick.target - left * (pick.target - pick.reached) / substeps;
+    const Vec3 given = again ? pulls[n] : Vec3(Vec3::Zero());
+    pulls[n] = pullGrasp(*body->model, pick, end, h, body->state.positions, given);
+    pick.force += pulls[n] / substeps;
+  }
+}
+
+void World::Impl::rememberGrasps() {
+  grasped.resize(picks.size());
+  for (std::size_t n = 0; n < picks.size(); ++n)
+    if (const WorldBody* body = find(picks[n].body)) grasped[n] = graspMean(picks[n], body->state.positions);
+}
+
+// Old overlap that is let out, and what is lifted off the ground: a rod would have it back within the first of many
+// substeps, and throw the tissue.
+void World::Impl::followGrasps() {
+  for (std::size_t n = 0; n < picks.size(); ++n)
+    if (const WorldBody* body = find(picks[n].body))
+      picks[n].reached += graspMean(picks[n], body->state.positions) - grasped[n];
 }
 
 void World::Impl::contactBodies(const std::vector<WorldBody*>& near, double h, int stride) {

@@ -2,7 +2,7 @@
 // them is let go, stays finite and bounded, gains no energy, and returns to its rest shape.
 #include <gtest/gtest.h>
 
-#include "support/stress.h"
+#include "support/stress_cases.h"
 
 namespace meshless::stress {
 namespace {
@@ -80,13 +80,6 @@ std::vector<Condition> allConditions() {
 
 using Case = std::tuple<Kind, Condition>;
 
-std::vector<Case> allCases() {
-  std::vector<Case> cases;
-  for (const Condition& condition : allConditions())
-    for (const Kind& kind : allKinds()) cases.emplace_back(kind, condition);
-  return thinned(cases);
-}
-
 class Conditions : public testing::TestWithParam<Case> {};
 
 TEST_P(Conditions, LetGoGoesBack) {
@@ -135,9 +128,8 @@ TEST_P(Conditions, LetGoGoesBack) {
   if (condition.returns) EXPECT_LT(farthest, kRestored);
 }
 
-INSTANTIATE_TEST_SUITE_P(Stress, Conditions, testing::ValuesIn(allCases()), [](const auto& info) {
-  return testName(std::get<1>(info.param).name + " " + std::get<0>(info.param).name);
-});
+INSTANTIATE_TEST_SUITE_P(Stress, Conditions, testing::ValuesIn(crossed(allKinds(), allConditions())),
+                         crossedName<Condition>);
 
 }  // namespace
 }  // namespace meshless::stress

@@ -2,7 +2,7 @@
 // they stay finite and bounded, gain no energy, and every cluster returns to its shape.
 #include <gtest/gtest.h>
 
-#include "support/stress.h"
+#include "support/stress_cases.h"
 
 namespace meshless::stress {
 namespace {
@@ -135,13 +135,6 @@ std::vector<Kind> cloudKinds() {
 
 using Case = std::tuple<Kind, Cloud>;
 
-std::vector<Case> allCases() {
-  std::vector<Case> cases;
-  for (const Cloud& cloud : allClouds())
-    for (const Kind& kind : cloudKinds()) cases.emplace_back(kind, cloud);
-  return thinned(cases);
-}
-
 double sizeOf(const Cloud& cloud) {
   double size = kSize;
   for (const Vec3& p : cloud.points) size = std::max(size, (p - cloud.points[0]).norm());
@@ -201,9 +194,7 @@ TEST_P(OddClouds, FallAndComeToRest) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Stress, OddClouds, testing::ValuesIn(allCases()), [](const auto& info) {
-  return testName(std::get<1>(info.param).name + " " + std::get<0>(info.param).name);
-});
+INSTANTIATE_TEST_SUITE_P(Stress, OddClouds, testing::ValuesIn(crossed(cloudKinds(), allClouds())), crossedName<Cloud>);
 
 }  // namespace
 }  // namespace meshless::stress

@@ -2,7 +2,7 @@
 // the ground they come to rest.
 #include <gtest/gtest.h>
 
-#include "support/stress.h"
+#include "support/stress_cases.h"
 
 namespace meshless::stress {
 namespace {
@@ -45,14 +45,6 @@ CutCommand cutOff(int corners) {
 }
 
 using Case = std::tuple<Kind, int>;
-
-std::vector<Case> allCases() {
-  std::vector<Case> cases;
-  for (int corners = 1; corners <= 4; ++corners)
-    for (const Kind& kind : allKinds())
-      if (kind.bodies == 1) cases.emplace_back(kind, corners);
-  return thinned(cases);
-}
 
 class Pieces : public testing::TestWithParam<Case> {
  protected:
@@ -118,9 +110,11 @@ TEST_P(Pieces, FallAndComeToRest) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Stress, Pieces, testing::ValuesIn(allCases()), [](const auto& info) {
-  return testName(std::get<0>(info.param).name + " of " + std::to_string(std::get<1>(info.param)));
-});
+INSTANTIATE_TEST_SUITE_P(Stress, Pieces, testing::ValuesIn(crossed(kindsAlone(), std::vector<int>{1, 2, 3, 4})),
+                         [](const auto& info) {
+                           return testName(std::get<0>(info.param).name + " of " +
+                                           std::to_string(std::get<1>(info.param)));
+                         });
 
 }  // namespace
 }  // namespace meshless::stress

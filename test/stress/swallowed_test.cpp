@@ -2,7 +2,7 @@
 // puts them out as a whole, and tears nothing.
 #include <gtest/gtest.h>
 
-#include "support/stress.h"
+#include "support/stress_cases.h"
 
 namespace meshless::stress {
 namespace {
@@ -38,11 +38,8 @@ TEST_P(Swallowed, BodiesStayWhole) {
 }
 
 std::vector<Kind> oneByOne() {
-  std::vector<Kind> kinds;
-  for (const Kind& kind : allKinds())
-    if (kind.bodies == 1) kinds.push_back(kind);
-  const std::vector<Kind> some = thinned(kinds);
-  return some.empty() ? std::vector<Kind>{kinds.front()} : some;
+  const std::vector<Kind> some = thinned(kindsAlone());
+  return some.empty() ? std::vector<Kind>{kindsAlone().front()} : some;
 }
 
 INSTANTIATE_TEST_SUITE_P(Stress, Swallowed, testing::ValuesIn(oneByOne()),

@@ -199,7 +199,6 @@ class EnergyLaw {
   testing::AssertionResult holds(double energy) {
     if (!std::isfinite(energy)) return testing::AssertionFailure() << "the energy is " << energy;
     if (steps_ == 0) first_ = energy;
-    last_ = energy;
     window_ = std::max(window_, energy);
     if (++steps_ % kWindow == 0) {
       lowest_ = std::min(lowest_, window_);
@@ -210,7 +209,6 @@ class EnergyLaw {
     return testing::AssertionSuccess();
   }
   double first() const { return first_; }
-  double last() const { return last_; }
 
  private:
   static constexpr int kWindow = 30;         // steps
@@ -218,7 +216,7 @@ class EnergyLaw {
   static constexpr double kNothing = 1e-12;  // [J]
   double swing_;
   int steps_ = 0;
-  double first_ = 0.0, last_ = 0.0, window_ = 0.0, lowest_ = 1e300;
+  double first_ = 0.0, window_ = 0.0, lowest_ = 1e300;
 };
 
 /// Two worlds that live through the same, on one thread and on two, and what both have to hold to.

@@ -343,8 +343,8 @@ TEST(DamagedState, OfAnotherKindOrVersion) {
   expectRefused("", "MLSSTATE");
   expectRefused("solid ball\nfacet normal 0 0 1\n", "MLSSTATE");
   std::string bytes = bytesOf(ballThatFalls());
-  bytes[8] = 3;
-  expectRefused(bytes, "version 3; accepted: 2");
+  bytes[8] = 4;
+  expectRefused(bytes, "version 4; accepted: 3");
 }
 
 /// With a checksum that is right for what the file says.

@@ -79,6 +79,7 @@ struct BodyState {
   Points eased;            // [m/s^2] one a particle where a cut lets go of it little by little, else empty; see ease.h
   double eased_for = 0.0;  // [s] since that cut
   bool eased_whole = false;  // what is eased may have a force and a torque
+  bool unwinding = false;    // it was wound up in itself, and goes back to its shape; see unwind.h
 };
 
 inline MatchInput matchInput(const BodyModel& model, const BodyState& state) {

@@ -51,5 +51,7 @@ struct RigidMotion {
   Vec3 spin = Vec3::Zero();  // [rad/s]
 };
 RigidMotion rigidMotionOf(const BodyModel& model, const Points& positions, const Points& velocities);
+/// [rad/s] with which the particles, turning together about `centre`, have an angular momentum [kg m^2/s].
+Vec3 spinWith(const BodyModel& model, const Points& positions, const Vec3& centre, const Vec3& momentum);
 
 }  // namespace meshless

@@ -14,7 +14,10 @@ Vec3 graspMean(const Pick& pick, const Points& positions);
 
 /// Moves the patch implicitly towards the free end at `end` [m]: its mean goes k h^2 K / (1 + k h^2 K) of the way, K
 /// its inverse mass. Fixed particles stay. Any stiffness and step are stable. Returns the force on the tissue [N].
-Vec3 pullGrasp(const BodyModel& model, const Pick& pick, const Vec3& end, double h, Points& positions);
+/// given [N]: what it has pulled with in this step of h already. Then it answers what others have moved since, and
+/// returns by how much its force has changed: nothing where they have not.
+Vec3 pullGrasp(const BodyModel& model, const Pick& pick, const Vec3& end, double h, Points& positions,
+               const Vec3& given = Vec3::Zero());
 
 /// The stiffness [N/m] with which the grasp answers within `h` [s], as pullGrasp does it: the spring's own where the
 /// patch is heavy or fixed, less where it gives way.
