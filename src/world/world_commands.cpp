@@ -212,6 +212,7 @@ Result<Reply> World::Impl::apply(const SetMaterialCommand& command) {
     wake(*body);
     batches_current = contacts_current = false;
     body->model = withMaterial(body->model, body->material, material);
+    body->surface_current = false;  // fitted with other masses riders move by a rounding: not by who has looked
     body->material = material;
   }
   return Reply(Done{});
