@@ -58,8 +58,7 @@ bool isSlow(const BodyModel& model, const BodyState& state) {
 }  // namespace
 
 bool isWoundUp(const BodyModel& model, const Material& material, const BodyState& state) {
-  if (state.poses.size() < 2 || model.any_fixed || material.plastic() || !state.plastic.empty() ||
-      !state.eased.empty())
+  if (state.poses.size() < 2 || model.any_fixed || material.plastic() || !state.plastic.empty() || !state.eased.empty())
     return false;
   // Where all are within half of that of the first, no two are farther apart.
   const Quat& first = state.poses.front().rotation;

@@ -110,8 +110,8 @@ Pose BorderCheck::pointPose(const std::string& field, const geometry_msgs::Pose&
 }
 
 std::string BorderCheck::newName(const std::string& field, const std::string& value) {
-  const bool plain = value.find_first_not_of(
-                         "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.") == std::string::npos;
+  const bool plain =
+      value.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.") == std::string::npos;
   if (!plain || value.size() > kMaxName) {
     fault(field + " is '" + printable(value) + "'; accepted: letters, digits and _ - . only, at most " +
           std::to_string(kMaxName) + " of them");

@@ -28,15 +28,15 @@
 namespace meshless {
 namespace {
 
-constexpr double kMaxCloseTime = 60.0;       // [s]
-constexpr double kMaxSpeed = 1e3;            // [m/s]
-constexpr double kMaxStiffness = 1e9;        // [N/m]
+constexpr double kMaxCloseTime = 60.0;  // [s]
+constexpr double kMaxSpeed = 1e3;       // [m/s]
+constexpr double kMaxStiffness = 1e9;   // [N/m]
 constexpr double kMaxScale = 1e6;
 constexpr std::uint32_t kMaxSteps = 100000;
-constexpr std::size_t kMaxYaml = 64 * 1024;  // bytes
+constexpr std::size_t kMaxYaml = 64 * 1024;    // bytes
 constexpr std::size_t kLongestMessage = 2000;  // characters: names of megabytes are not sent back
-constexpr int kCutThreads = 4;               // cuts that may wait for their blades at once
-constexpr int kMostSuffix = 10000;           // <name>_N tried for a body without a name of its own
+constexpr int kCutThreads = 4;                 // cuts that may wait for their blades at once
+constexpr int kMostSuffix = 10000;             // <name>_N tried for a body without a name of its own
 
 std::string joined(const std::vector<std::string>& names) {
   std::string text;
@@ -189,8 +189,9 @@ struct Services::Handlers {
     }
     if (!command.enable) return applied(response, "push", command, "removed the push sphere");
     return applied(response, "push", command,
-                   command.speed > 0.0 ? "the push sphere goes there at its speed, or is placed there where there was none"
-                                       : "placed the push sphere");
+                   command.speed > 0.0
+                       ? "the push sphere goes there at its speed, or is placed there where there was none"
+                       : "placed the push sphere");
   }
 
   bool cut(meshless_surgery::Cut::Request& request, meshless_surgery::Cut::Response& response) {
@@ -324,8 +325,8 @@ struct Services::Handlers {
     SpawnCommand command;
     command.body = *body;
     auto reply = runner.apply(command);
-    for (int i = 2; request.name.empty() && !reply.ok() && reply.error().code == ErrorCode::kDuplicateName &&
-                    i <= kMostSuffix;
+    for (int i = 2;
+         request.name.empty() && !reply.ok() && reply.error().code == ErrorCode::kDuplicateName && i <= kMostSuffix;
          ++i) {
       // Looked for in one go: in a crowd each turn with the world may take long to come.
       const auto numbered = [&] { return (*body)->def.name + "_" + std::to_string(i); };
@@ -353,8 +354,7 @@ struct Services::Handlers {
     return applied(response, "remove", command, "removed " + request.name);
   }
 
-  bool setMaterial(meshless_surgery::SetMaterial::Request& request,
-                   meshless_surgery::SetMaterial::Response& response) {
+  bool setMaterial(meshless_surgery::SetMaterial::Request& request, meshless_surgery::SetMaterial::Response& response) {
     BorderCheck check;
     if (request.yaml.empty() || request.yaml.size() > kMaxYaml) {
       check.fault("yaml has " + std::to_string(request.yaml.size()) + " bytes; accepted: 1.." +
@@ -396,8 +396,8 @@ struct Services::Handlers {
   bool step(meshless_surgery::Step::Request& request, meshless_surgery::Step::Response& response) {
     if (request.steps < 1 || request.steps > kMaxSteps) {
       return refuse(response, "step",
-                    {ErrorCode::kInvalidArgument, "steps is " + std::to_string(request.steps) + "; accepted: 1.." +
-                                                      std::to_string(kMaxSteps)});
+                    {ErrorCode::kInvalidArgument,
+                     "steps is " + std::to_string(request.steps) + "; accepted: 1.." + std::to_string(kMaxSteps)});
     }
     const auto time = runner.doSteps(request.steps);
     if (!time.ok()) return refuse(response, "step", time.error());
@@ -448,8 +448,8 @@ struct Services::Handlers {
   ros::AsyncSpinner session_spinner{1, &session_queue};
 };
 
-Services::Services(const ros::NodeHandle& private_handle, WorldRunner& runner, Frames& frames,
-                   const BodyLoader& loader, Rejections& rejections, Session& session)
+Services::Services(const ros::NodeHandle& private_handle, WorldRunner& runner, Frames& frames, const BodyLoader& loader,
+                   Rejections& rejections, Session& session)
     : handlers_(std::make_unique<Handlers>(private_handle, runner, frames, loader, rejections, session)) {}
 
 Services::~Services() = default;

@@ -1,5 +1,5 @@
-// Lifetime of bodies, snapshots. The whole state and its hash are in saved_world.cpp. Commands are in world_commands.cpp, cuts in world_cut.cpp, time in
-// world_step.cpp.
+// Lifetime of bodies, snapshots. The whole state and its hash are in saved_world.cpp. Commands are in
+// world_commands.cpp, cuts in world_cut.cpp, time in world_step.cpp.
 #include "meshless_surgery/world/world.h"
 
 #include <cstring>

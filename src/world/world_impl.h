@@ -130,8 +130,8 @@ struct World::Impl {
   std::vector<std::shared_ptr<const PreparedBody>> scene;
   std::vector<std::unique_ptr<WorldObstacle>> obstacles;
   std::vector<Pick> picks;
-  std::vector<Vec3> pulls;         // [N] one a pick, of this substep
-  std::vector<Vec3> grasped;       // [m] one a pick: in rememberGrasps()
+  std::vector<Vec3> pulls;    // [N] one a pick, of this substep
+  std::vector<Vec3> grasped;  // [m] one a pick: in rememberGrasps()
   PickId next_pick = 1;
   PushSphere push;
   Scissors scissors;

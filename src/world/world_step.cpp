@@ -201,8 +201,8 @@ std::vector<WorldBody*> World::Impl::bodiesInContact(double h) {
 }
 
 // A target that jumps is followed evenly over the step: within the first of many substeps it would throw the tissue.
-// Again after contacts: what they have moved a stiff spring by they have no energy for, and the next substep would throw
-// the tissue back with it.
+// Again after contacts: what they have moved a stiff spring by they have no energy for, and the next substep would
+// throw the tissue back with it.
 void World::Impl::pullSprings(int substep, int substeps, double h_frame, bool again) {
   pulls.resize(picks.size(), Vec3::Zero());
   const double h = h_frame / substeps;

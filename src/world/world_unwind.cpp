@@ -1,5 +1,5 @@
-// Bodies that rest wound up in themselves are led back to their shape once nobody holds them: a trainee who has let go of
-// a body that was dragged through itself would have to reset it.
+// Bodies that rest wound up in themselves are led back to their shape once nobody holds them: a trainee who has let go
+// of a body that was dragged through itself would have to reset it.
 #include <algorithm>
 
 #include "meshless_surgery/body/unwind.h"
@@ -7,7 +7,8 @@
 
 namespace meshless {
 
-// What holds a body may hold it folded: then that is its shape. The ground, others, obstacles, picks and the push sphere.
+// What holds a body may hold it folded: then that is its shape. The ground, others, obstacles, picks and the push
+// sphere.
 void World::Impl::findWound() {
   if (settings.contact == ContactMethod::kTextbook) return;  // it does not know who presses on whom
   for (WorldBody* body : awake)

@@ -144,7 +144,7 @@ TEST_F(SessionFolderTest, WhatTheKilledLeftIsRemoved) {
   ASSERT_EQ(dead, waitpid(dead, nullptr, 0));
   const std::string own = ".a.state." + std::to_string(getpid()) + "-1.part";
   const std::string left = ".a.b-c.state." + std::to_string(dead) + "-17.part";
-  const std::vector<std::string> others = {".1-1.part",        ".a.-1.part", ".a.99999999999-1.part", ".a.part",
+  const std::vector<std::string> others = {".1-1.part",          ".a.-1.part", ".a.99999999999-1.part", ".a.part",
                                            ".a.state.1x-1.part", ".part",      "a.99999-1.part",        "a.state"};
   for (const std::string& name : others) std::ofstream(base_ + "/" + name) << "x";
   for (const std::string& name : {own, left}) std::ofstream(base_ + "/" + name) << "x";

@@ -131,14 +131,14 @@ TEST(Printable, HidesControlCharactersAndIsBounded) {
 TEST(Printable, IsUtf8WhateverComes) {
   const std::string characters = "a\xc3\xa4\xe2\x82\xac\xf0\x9f\x90\x9f\xef\xbf\xbf\xf4\x8f\xbf\xbf";
   EXPECT_EQ(characters, printable(characters));
-  EXPECT_EQ("?", printable("\xc3"));                      // cut off
-  EXPECT_EQ("???'", printable("\xe2\x82\xff'"));          // broken off
-  EXPECT_EQ("?'", printable("\xc3'"));                    // whoever quotes it keeps the quote
-  EXPECT_EQ("??", printable("\xc0\xaf"));                 // a slash, longer than need be
-  EXPECT_EQ("???", printable("\xe0\x9f\xbf"));            // so is this one
-  EXPECT_EQ("????", printable("\xf0\x8f\xbf\xbf"));       // and this
-  EXPECT_EQ("???", printable("\xed\xa0\x80"));            // half of a pair
-  EXPECT_EQ("????", printable("\xf4\x90\x80\x80"));       // beyond the last
+  EXPECT_EQ("?", printable("\xc3"));                 // cut off
+  EXPECT_EQ("???'", printable("\xe2\x82\xff'"));     // broken off
+  EXPECT_EQ("?'", printable("\xc3'"));               // whoever quotes it keeps the quote
+  EXPECT_EQ("??", printable("\xc0\xaf"));            // a slash, longer than need be
+  EXPECT_EQ("???", printable("\xe0\x9f\xbf"));       // so is this one
+  EXPECT_EQ("????", printable("\xf0\x8f\xbf\xbf"));  // and this
+  EXPECT_EQ("???", printable("\xed\xa0\x80"));       // half of a pair
+  EXPECT_EQ("????", printable("\xf4\x90\x80\x80"));  // beyond the last
   EXPECT_EQ("??", printable("\x80\xf5"));
   // Not cut in the middle of a character.
   EXPECT_EQ("aa...", printable("aa\xe2\x82\xac", 4));

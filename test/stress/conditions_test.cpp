@@ -30,13 +30,15 @@ std::vector<Condition> allConditions() {
   std::vector<Condition> all;
   for (const double scale : {1e-6, 1e3})
     all.push_back({scale < 1.0 ? "a fifth of a micrometre large" : "two hundred metres large",
-                   [scale](WorldSettings&, BodyDef& body) { body.material.youngs_modulus *= scale * scale; }, true, 30.0, 1.001, true, scale});
+                   [scale](WorldSettings&, BodyDef& body) { body.material.youngs_modulus *= scale * scale; }, true,
+                   30.0, 1.001, true, scale});
   for (const double far : {1e3, 1e6})
     all.push_back({far < 1e4 ? "1 km from the origin" : "1000 km from the origin",
                    [far](WorldSettings&, BodyDef& body) { body.pose.translation = Vec3(far, -far, 0.5 * far); }});
   all.push_back({"steps of 1 s", [](WorldSettings& world, BodyDef&) { world.step_rate = 1.0; }, true, 600.0});
   all.push_back({"steps of 0.1 s", [](WorldSettings& world, BodyDef&) { world.step_rate = 10.0; }, true, 200.0});
-  all.push_back({"steps of a millisecond", [](WorldSettings& world, BodyDef&) { world.step_rate = 1000.0; }, true, 4.0});
+  all.push_back(
+      {"steps of a millisecond", [](WorldSettings& world, BodyDef&) { world.step_rate = 1000.0; }, true, 4.0});
   all.push_back({"substeps of ten microseconds",
                  [](WorldSettings& world, BodyDef&) {
                    world.step_rate = 10000.0;
@@ -45,36 +47,50 @@ std::vector<Condition> allConditions() {
                  false, 0.02});
   for (const double alpha : {0.0, 1.0})
     for (const double beta : {0.0, 1.0})
-      all.push_back(changed("alpha " + std::to_string(int(alpha)) + " beta " + std::to_string(int(beta)),
-                            [=](Material& m) {
-                              m.alpha = alpha;
-                              m.beta = beta;
-                            },
-                            alpha > 0.0, alpha > 0.0 ? 30.0 : 1.0));
+      all.push_back(changed(
+          "alpha " + std::to_string(int(alpha)) + " beta " + std::to_string(int(beta)),
+          [=](Material& m) {
+            m.alpha = alpha;
+            m.beta = beta;
+          },
+          alpha > 0.0, alpha > 0.0 ? 30.0 : 1.0));
   all.back().swing = 1.1;  // hardly any of the goals is rigid
-  all.push_back(changed("damping of a million", [](Material& m) { m.damping = 1e6; }, false, 1.0));
+  all.push_back(changed(
+      "damping of a million", [](Material& m) { m.damping = 1e6; }, false, 1.0));
   all.push_back(changed("no damping", [](Material& m) { m.damping = 0.0; }));
-  all.push_back(changed("density of a milligram", [](Material& m) { m.density = 1e-6; }, false, 1.0));
-  all.push_back(changed("density of a thousand tons", [](Material& m) { m.density = 1e6; }, false, 1.0));
-  all.push_back(changed("volume and area held",
-                        [](Material& m) { m.volume.points = m.area.points = {{0.0, 1.0}, {1.0, 1.0}}; }, false, 2.0));
+  all.push_back(changed(
+      "density of a milligram", [](Material& m) { m.density = 1e-6; }, false, 1.0));
+  all.push_back(changed(
+      "density of a thousand tons", [](Material& m) { m.density = 1e6; }, false, 1.0));
+  all.push_back(changed(
+      "volume and area held",
+      [](Material& m) {
+        m.volume.points = m.area.points = {{0.0, 1.0}, {1.0, 1.0}};
+      },
+      false, 2.0));
   all.back().potential = false;
-  all.push_back(changed("flowing", [](Material& m) { m.plasticity = {0.0, 1e6, 3.0}; }, false, 2.0));
+  all.push_back(changed(
+      "flowing",
+      [](Material& m) {
+        m.plasticity = {0.0, 1e6, 3.0};
+      },
+      false, 2.0));
   all.back().potential = false;
-  all.push_back(changed("as stiff as diamond",
-                        [](Material& m) {
-                          if (m.elastic()) m.youngs_modulus = 1e12;
-                        },
-                        false, 2.0));
-  all.push_back(changed("as soft as a cloud",
-                        [](Material& m) {
-                          if (m.elastic()) m.youngs_modulus = 1e-3;
-                        },
-                        false, 2.0));
-  all.push_back(changed("hardly compressible",
-                        [](Material& m) {
-                          if (m.elastic()) m.poissons_ratio = 0.49;
-                        }));
+  all.push_back(changed(
+      "as stiff as diamond",
+      [](Material& m) {
+        if (m.elastic()) m.youngs_modulus = 1e12;
+      },
+      false, 2.0));
+  all.push_back(changed(
+      "as soft as a cloud",
+      [](Material& m) {
+        if (m.elastic()) m.youngs_modulus = 1e-3;
+      },
+      false, 2.0));
+  all.push_back(changed("hardly compressible", [](Material& m) {
+    if (m.elastic()) m.poissons_ratio = 0.49;
+  }));
   return all;
 }
 

@@ -1,6 +1,6 @@
 // Random steps of random commands on a scene of bodies of every kind: 600 of them in the short form
-// (MESHLESS_SURGERY_STRESS in percent of it), a million with scripts/check --long. MESHLESS_SURGERY_STRESS_RUN is the run
-// to begin with: that of a failure is there again within seconds.
+// (MESHLESS_SURGERY_STRESS in percent of it), a million with scripts/check --long. MESHLESS_SURGERY_STRESS_RUN is the
+// run to begin with: that of a failure is there again within seconds.
 #include <gtest/gtest.h>
 
 #include "support/stress.h"

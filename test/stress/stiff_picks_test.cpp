@@ -8,8 +8,8 @@ namespace meshless::stress {
 namespace {
 
 constexpr int kDragged = 60, kHeld = 60, kFree = 180;  // steps
-// [J] of 6 kg, kinetic. A jump of a metre stores 5e5 J in the softest of the springs, and what they have drawn out to 80 m
-// holds as much; up to 6e6 J was seen. Where rods are thrown by contacts it is 1e12 to 1e28 J.
+// [J] of 6 kg, kinetic. A jump of a metre stores 5e5 J in the softest of the springs, and what they have drawn out to
+// 80 m holds as much; up to 6e6 J was seen. Where rods are thrown by contacts it is 1e12 to 1e28 J.
 constexpr double kMostEnergy = 2e7;
 
 struct Rod {
@@ -24,9 +24,9 @@ std::vector<Rod> allRods() {
   std::vector<Rod> rods;
   for (const double exponent : {6.0, 9.0, 11.0, 12.0})
     for (const bool ground : {true, false})
-      rods.push_back({"1e" + std::to_string(static_cast<int>(exponent)) + " N per m " +
-                          (ground ? "on the ground" : "in space"),
-                      std::pow(10.0, exponent), ground});
+      rods.push_back(
+          {"1e" + std::to_string(static_cast<int>(exponent)) + " N per m " + (ground ? "on the ground" : "in space"),
+           std::pow(10.0, exponent), ground});
   return rods;
 }
 

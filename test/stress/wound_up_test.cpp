@@ -1,5 +1,5 @@
-// Bodies of several clusters that come to rest wound up in themselves, a cross section turned inside out, are led back to
-// their rest shape once nothing holds them; what is held keeps its shape, whatever that is.
+// Bodies of several clusters that come to rest wound up in themselves, a cross section turned inside out, are led back
+// to their rest shape once nothing holds them; what is held keeps its shape, whatever that is.
 #include <gtest/gtest.h>
 
 #include "meshless_surgery/world/saved_world.h"

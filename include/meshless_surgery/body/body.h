@@ -36,14 +36,14 @@ struct BodyModel {
   ParticleGraph graph;
   ClusterSet clusters;
   RestShape shape;
-  std::vector<ElasticRest> elastic;  // empty where the material is for looks
+  std::vector<ElasticRest> elastic;                   // empty where the material is for looks
   std::shared_ptr<const ElasticBatch> elastic_batch;  // the same, vectorised
   /// [1/m^2] norm of ElasticRest::spread_inverse: what a cut leaves of a cell can be narrower, so that its stress would
   /// need a shorter step. It resists as a flat cluster does.
   double most_spread_inverse = std::numeric_limits<double>::infinity();
-  double specific_stiffness = 0.0;   // [m^2/s^2] Young's modulus over density; 0 where the material is for looks
-  double highest_frequency = 0.0;    // [rad/s] of an elastic material: a substep takes at most 1 / highest_frequency
-  TriangleMesh surface;              // rest positions of the vertices [m]
+  double specific_stiffness = 0.0;  // [m^2/s^2] Young's modulus over density; 0 where the material is for looks
+  double highest_frequency = 0.0;   // [rad/s] of an elastic material: a substep takes at most 1 / highest_frequency
+  TriangleMesh surface;             // rest positions of the vertices [m]
   SurfaceBinding binding;
   bool solid = true;
   bool lips = false;             // an incision has left faces that can press on each other
@@ -71,11 +71,11 @@ struct BodyState {
   Points positions;   // [m]
   Points velocities;  // [m/s]
   std::vector<ClusterPose> poses;
-  Points surface;         // [m] present positions of the surface's vertices; see updateSurface
-  double swelling = 1.0;  // of goals, or of the size without stress, where the volume is held
-  double stretch = 1.0;   // of an elastic body: by how much its highest frequency has grown since rest
+  Points surface;                     // [m] present positions of the surface's vertices; see updateSurface
+  double swelling = 1.0;              // of goals, or of the size without stress, where the volume is held
+  double stretch = 1.0;               // of an elastic body: by how much its highest frequency has grown since rest
   std::vector<PlasticShape> plastic;  // one a cluster once something has flowed; empty before
-  Points rider_offsets;   // [m] one a rider: what a cut left between its place and its carriers' (fades away)
+  Points rider_offsets;    // [m] one a rider: what a cut left between its place and its carriers' (fades away)
   Points eased;            // [m/s^2] one a particle where a cut lets go of it little by little, else empty; see ease.h
   double eased_for = 0.0;  // [s] since that cut
   bool eased_whole = false;  // what is eased may have a force and a torque

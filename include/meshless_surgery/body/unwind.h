@@ -12,9 +12,9 @@ namespace meshless {
 /// poses of the last substep, and costs a quaternion product a cluster where nothing is wound up.
 bool isWoundUp(const BodyModel& model, const Material& material, const BodyState& state);
 
-/// In place of matchAndMove() while state.unwinding: the body moves as a whole, with its momentum, and its particles go to
-/// the rest shape that fits all of them best. That way is not fed into velocities. Sets state.unwinding to false once
-/// it is nearly there, and the clusters do the rest.
+/// In place of matchAndMove() while state.unwinding: the body moves as a whole, with its momentum, and its particles go
+/// to the rest shape that fits all of them best. That way is not fed into velocities. Sets state.unwinding to false
+/// once it is nearly there, and the clusters do the rest.
 void unwind(const BodyModel& model, const Vec3& gravity, double h, BodyState& state, StepScratch& scratch);
 
 }  // namespace meshless

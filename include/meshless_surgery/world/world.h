@@ -92,7 +92,7 @@ struct StepReport {
   std::size_t contact_shapes = 0;       // rest shapes prepared for contact in this step
   std::size_t ground_contacts = 0;
   std::size_t push_contacts = 0;
-  std::size_t mended = 0;  // bodies whose coordinates were not finite, and that start anew from rest
+  std::size_t mended = 0;     // bodies whose coordinates were not finite, and that start anew from rest
   std::size_t unwinding = 0;  // bodies that were wound up in themselves, and are led back to their shape
 };
 
