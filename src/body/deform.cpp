@@ -12,53 +12,55 @@
 namespace meshless {
 namespace {
 
-// Fitted goals alone have no shape to return to, and dividing by cbrt(det) is no gradient of a potential: together they
-// feed energy in. A twentieth of the rigid goal is enough that none was seen to grow.
-constexpr double kMostBeta = 0.95;
+// How hard a body is to turn about a point. Axis by axis: as one matrix, of a body drawn out to a line, the rounding of
+// the axis that turns easily would be a torque about the others.
+class Inertia {
+ public:
+  Inertia(const BodyModel& model, const Points& positions, const Vec3& centre) {
+    // Sums of their own instead of a matrix: four times as fast.
+    double xx = 0.0, yy = 0.0, zz = 0.0, xy = 0.0, xz = 0.0, yz = 0.0;
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      const Vec3 r = positions[i] - centre;
+      const double x = model.masses[i] * r.x(), y = model.masses[i] * r.y(), z = model.masses[i] * r.z();
+      xx += x * r.x();
+      yy += y * r.y();
+      zz += z * r.z();
+      xy += x * r.y();
+      xz += x * r.z();
+      yz += y * r.z();
+    }
+    const double scale = 2.0 * (xx + yy + zz);
+    if (!(scale > 0.0)) return;
+    Mat3 inertia;
+    inertia << yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy;
+    const Eigen::SelfAdjointEigenSolver<Mat3> solver(inertia / scale);
+    axes_ = solver.eigenvectors();
+    for (int k = 0; k < 3; ++k)
+      if (solver.eigenvalues()[k] > 1e-12) inverse_[k] = 1.0 / (solver.eigenvalues()[k] * scale);
+  }
 
-// Where a body turns about, and how hard it is to turn.
-struct MassMoments {
-  Vec3 centre = Vec3::Zero();    // [m]
-  Mat3 spin_for = Mat3::Zero();  // [1/(kg m^2)] times an angular momentum: the spin that carries it, the least one
-                                 // where the points are collinear or fewer
+  // The spin that carries the angular momentum, the least one where the points are collinear or fewer.
+  Vec3 spinFor(const Vec3& momentum) const {
+    Vec3 spin = Vec3::Zero();
+    for (int k = 0; k < 3; ++k) spin += axes_.col(k) * (axes_.col(k).dot(momentum) * inverse_[k]);
+    return spin;
+  }
+
+ private:
+  Mat3 axes_ = Mat3::Identity();
+  Vec3 inverse_ = Vec3::Zero();  // [1/(kg m^2)], 0 where nothing turns
 };
 
-Mat3 pseudoInverse(const Mat3& inertia) {
-  Mat3 inverse = Mat3::Zero();
-  const double scale = inertia.trace();
-  if (!(scale > 0.0)) return inverse;
-  const Eigen::SelfAdjointEigenSolver<Mat3> solver(inertia / scale);
-  for (int k = 0; k < 3; ++k) {
-    const Vec3 axis = solver.eigenvectors().col(k);
-    if (solver.eigenvalues()[k] > 1e-12) inverse += axis * (axis / (solver.eigenvalues()[k] * scale)).transpose();
-  }
-  return inverse;
-}
-
-// See MassMoments.
-Mat3 spinFor(const BodyModel& model, const Points& positions, const Vec3& centre) {
-  // Sums of their own instead of a matrix: four times as fast.
-  double xx = 0.0, yy = 0.0, zz = 0.0, xy = 0.0, xz = 0.0, yz = 0.0;
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    const Vec3 r = positions[i] - centre;
-    const double x = model.masses[i] * r.x(), y = model.masses[i] * r.y(), z = model.masses[i] * r.z();
-    xx += x * r.x();
-    yy += y * r.y();
-    zz += z * r.z();
-    xy += x * r.y();
-    xz += x * r.z();
-    yz += y * r.z();
-  }
-  Mat3 inertia;
-  inertia << yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy;
-  return pseudoInverse(inertia);
-}
+struct MassMoments {
+  Vec3 centre;  // [m]
+  Inertia inertia;
+};
 
 MassMoments momentsOf(const BodyModel& model, const Points& positions) {
   Vec3 sum = Vec3::Zero();
   for (std::size_t i = 0; i < positions.size(); ++i) sum += model.masses[i] * (positions[i] - positions[0]);
   const Vec3 centre = positions[0] + sum / model.mass;
-  return {centre, spinFor(model, positions, centre)};
+  return {centre, Inertia(model, positions, centre)};
 }
 
 RigidMotion rigidMotionOf(const BodyModel& model, const MassMoments& moments, const Points& positions,
@@ -70,7 +72,7 @@ RigidMotion rigidMotionOf(const BodyModel& model, const MassMoments& moments, co
   Vec3 momentum = Vec3::Zero();
   for (std::size_t i = 0; i < positions.size(); ++i)
     momentum += model.masses[i] * (positions[i] - motion.centre).cross(velocities[i] - motion.velocity);
-  motion.spin = moments.spin_for * momentum;
+  motion.spin = moments.inertia.spinFor(momentum);
   return motion;
 }
 
@@ -81,7 +83,7 @@ RigidMotion rigidMotionOf(const BodyModel& model, const Points& positions, const
 }
 
 Vec3 spinWith(const BodyModel& model, const Points& positions, const Vec3& centre, const Vec3& momentum) {
-  return spinFor(model, positions, centre) * momentum;
+  return Inertia(model, positions, centre).spinFor(momentum);
 }
 
 double highestFrequencyNow(const BodyModel& model, const BodyState& state) {
@@ -114,7 +116,7 @@ void accelerate(const BodyModel& model, double h, const Points& x, const std::op
     v[i] += dv;
     leaked += model.masses[i] * (x[i] - centre).cross(dv);
   }
-  const Vec3 spin = moments.spin_for * leaked;
+  const Vec3 spin = moments.inertia.spinFor(leaked);
   for (std::size_t i = 0; i < v.size(); ++i) v[i] -= spin.cross(x[i] - centre);
 }
 
@@ -205,7 +207,7 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
       accelerate(model, h, x, moments, v,
                  [&](std::size_t i) -> Vec3 { return accelerations[i] + share * state.eased[i]; });
   } else if (const double gain = stiffnessGain(material.alpha, h); gain > 0.0) {
-    matchShapes(input, y, material.mode, std::min(material.beta, kMostBeta), state.poses, scratch.goals, counters,
+    matchShapes(input, y, material.mode, actingBeta(material.beta, h), state.poses, scratch.goals, counters,
                 state.swelling, material.plastic());
     const Points& goals = scratch.goals;
     const double pull = gain / (h * h);

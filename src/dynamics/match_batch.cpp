@@ -11,7 +11,6 @@ namespace meshless {
 
 namespace match_sets {
 
-constexpr double kMostBeta = 0.95;  // as in body/deform.cpp
 constexpr double kNoExtent = 1e-6;  // of the inertia's trace: float moments are not known better
 
 const Entries& entriesOf(InstructionSet set) {
@@ -37,7 +36,7 @@ StepNumbers numbersOf(const BatchStep& step) {
   n.h = static_cast<float>(step.h);
   n.ahead = static_cast<float>(step.ahead);
   n.pull = static_cast<float>(step.gain / step.h);
-  n.beta = step.mode == MatchMode::kRigid ? 0.0f : static_cast<float>(std::min(step.beta, kMostBeta));
+  n.beta = step.mode == MatchMode::kRigid ? 0.0f : static_cast<float>(actingBeta(step.beta, step.h));
   n.lost = step.damping > 0.0 ? static_cast<float>(1.0 - std::exp(-step.damping * step.h)) : 0.0f;
   for (int k = 0; k < 3; ++k) n.gravity[k] = static_cast<float>(step.gravity[k]);
   n.friction = static_cast<float>(step.friction);

@@ -108,6 +108,33 @@ TEST(MatchAndMove, NoAlphaBetaOrStepMakesEnergyGrow) {
         }
 }
 
+TEST(MatchAndMove, LongStepsDoNotMakeEnergyGrowEither) {
+  for (double alpha : {0.1, 0.5})
+    for (double h : {0.2, 0.4, 1.0}) {
+      BodyDef def = test::block("b", Vec3::Zero());
+      def.material.mode = MatchMode::kLinear;
+      def.material.alpha = alpha;
+      def.material.beta = 1.0;
+      def.material.damping = 0.0;
+      const PreparedBody prepared_body = prepared(def);
+      for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+        Random random(seed);
+        BodyState state = prepared_body.state;
+        for (Vec3& v : state.velocities) v = random.vector(0.2);
+        const double start = potentialFreeEnergy(prepared_body, state);
+        StepScratch scratch;
+        MatchCounters counters;
+        double most = 0.0;
+        for (int step = 0; step < 100; ++step) {
+          matchAndMove(*prepared_body.model, def.material, Vec3::Zero(), h, state, scratch, counters);
+          velocitiesFromPositions(*prepared_body.model, h, state, scratch);
+          most = std::max(most, potentialFreeEnergy(prepared_body, state));
+        }
+        EXPECT_LE(most, start * (1.0 + 1e-9)) << "alpha " << alpha << ", h " << h << ", seed " << seed;
+      }
+    }
+}
+
 TEST(MatchAndMove, FixedParticlesStayAndTheRestHangsFromThem) {
   BodyDef def = test::block("b", Vec3::Zero());
   Box box;
@@ -143,6 +170,28 @@ TEST(VelocitiesFromPositions, BeingPushedOutNeverThrows) {
   scratch.touched = {{0, Vec3::UnitZ(), 0.25}};
   velocitiesFromPositions(*body.model, h, body.state, scratch);
   EXPECT_NEAR(body.state.velocities[0].z(), 0.25, 1e-9);
+}
+
+TEST(RigidMotionOf, CarriesTheAngularMomentumOfWhatIsDrawnOutToALine) {
+  Random random(4);
+  PreparedBody body = prepared(test::block("b", Vec3::Zero()));
+  const Quat turn = Quat(0.3, -0.7, 0.5, 0.4).normalized();
+  for (const double drawn_out : {1.0, 1e2, 1e4, 1e5}) {
+    Points positions = body.state.positions, velocities = body.state.velocities;
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      positions[i].x() *= drawn_out;
+      positions[i] = turn * positions[i];
+      velocities[i] = random.vector(1.0);
+    }
+    const RigidMotion motion = rigidMotionOf(*body.model, positions, velocities);
+    Vec3 wanted = Vec3::Zero(), carried = Vec3::Zero();
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      const Vec3 arm = body.model->masses[i] * (positions[i] - motion.centre);
+      wanted += arm.cross(velocities[i] - motion.velocity);
+      carried += arm.cross(motion.spin.cross(positions[i] - motion.centre));
+    }
+    EXPECT_LT((carried - wanted).norm(), 1e-9 * wanted.norm()) << "drawn out " << drawn_out << " times";
+  }
 }
 
 TEST(RigidMotionOf, FindsDriftAndSpin) {

@@ -19,7 +19,7 @@ struct BatchStep {
   double ahead = std::numeric_limits<double>::quiet_NaN();  // [s] >= 0, see viscosityTime(); to be set
   MatchMode mode = MatchMode::kLinear;
   double gain = 0.9;     // 0..1, share of the way to the goal in h; see stiffnessGain()
-  double beta = 0.2;     // 0..1, acts up to 0.95
+  double beta = 0.2;     // 0..1, see actingBeta()
   double damping = 0.0;  // [1/s]
   Vec3 gravity = Vec3(0.0, 0.0, -9.81);
   std::optional<double> ground;  // [m] height

@@ -27,8 +27,8 @@ struct ResponseCurve {
   Status validate(const std::string& key) const;
 };
 
-/// What is strained beyond the yield keeps some of it (dynamics/plastic.h). Strain: |S - 1| of the stretch S without its
-/// change of volume, 0.1 where a part is drawn out by about 8 %.
+/// What is strained beyond the yield keeps some of it (dynamics/plastic.h). Strain: |S - 1| of the stretch S without
+/// its change of volume, 0.1 where a part is drawn out by about 8 %.
 struct Plasticity {
   double yield = 0.1;    // 0..10
   double creep = 0.0;    // [1/s] 0..1e6, rate at which the strain beyond the yield is taken on; 0: none
@@ -67,8 +67,11 @@ struct Material {
 /// reference step 1/60 s, the same stiffness as h shrinks, never above 1.
 double stiffnessGain(double alpha, double h);
 
-/// How far ahead of itself a shape is matched [s]: at x + viscosityTime v the pull damps what deforms as much as it does
-/// at the reference step, where this is h. So the decay does not depend on the step either; stable for every h.
+/// How far ahead of itself a shape is matched [s]: at x + viscosityTime v the pull damps what deforms as much as it
+/// does at the reference step, where this is h. So the decay does not depend on the step either; stable for every h.
 double viscosityTime(double alpha, double h);
+
+/// The share of the fitted goal that acts in a step of h [s]: beta up to 0.95, and less in steps above 0.2 s.
+double actingBeta(double beta, double h);
 
 }  // namespace meshless
