@@ -190,14 +190,21 @@ class Binder {
   /// The nearest particle that the rider may follow.
   Index startOf(Index v) const {
     const Vec3& p = task_.surface_rest[v];
-    if (task_.inherited && task_.inherited->separated) {
-      for (Index i : task_.nearest().nearest(p, kWalk))
-        if (!isSeparated(v, i)) return i;
-    } else if (const Index r = task_.inherited ? task_.inherited->rider[v] : kNoIndex; r != kNoIndex) {
+    if (const Index r = task_.inherited ? task_.inherited->rider[v] : kNoIndex; r != kNoIndex) {
       // Carriers are sorted by distance: the first that is left is the nearest.
       const SurfaceBinding& parent = task_.inherited->parent;
       for (Index k = parent.offsets[r]; k < parent.offsets[r + 1]; ++k)
-        if (const Index kept = task_.inherited->renumbered[parent.carriers[k]]; kept != kNoIndex) return kept;
+        if (const Index kept = task_.inherited->renumbered[parent.carriers[k]];
+            kept != kNoIndex && !isSeparated(v, kept))
+          return kept;
+    }
+    if (task_.inherited && task_.inherited->separated) {
+      std::array<Index, kWalk> near;
+      for (const std::size_t looked : {std::size_t{4}, kWalk}) {
+        const std::size_t count = task_.nearest().nearest(p, looked, near.data());
+        for (std::size_t k = 0; k < count; ++k)
+          if (!isSeparated(v, near[k])) return near[k];
+      }
     }
     return task_.nearest().nearest(p);
   }

@@ -5,6 +5,7 @@
 
 #include "meshless_surgery/geometry/nearest.h"
 #include "piece_maker.h"
+#include "side_by_side.h"
 
 namespace meshless {
 namespace {
@@ -162,7 +163,9 @@ Result<IncisedBody> inciseBody(const BodyModel& model, const BodyState& state, c
   present.patches = model.surface.patches;
   InciseOptions options;
   options.patch = model.next_patch;
-  Result<Incision> incision = incise(present, blade, options);
+  PieceMaker maker(model, state, options.patch);
+  Result<Incision> incision = Error();
+  atOnce([&] { incision = incise(present, blade, options); }, [&] { maker.foresee(blade); });
   if (!incision) return incision.error();
 
   const Gate gate(blade, model.spacing);
@@ -186,7 +189,6 @@ Result<IncisedBody> inciseBody(const BodyModel& model, const BodyState& state, c
                          return gate.between(at, sides[p][vertex], x[particle], gate.particleSide(x[particle]));
                        }});
   }
-  PieceMaker maker(model, state, options.patch);
   maker.tear(std::move(graph), std::move(torn));
   IncisedBody result;
   result.pieces = maker.make(sources);

@@ -88,7 +88,17 @@ void PieceMaker::tear(ParticleGraph graph, std::vector<bool> torn) {
 
 void PieceMaker::foresee(const Plane& plane) {
   rest_places_.emplace(model_, state_);
-  rest_places_->foresee(plane);
+  rest_places_->foresee([&](const Vec3& p) { return std::abs(plane.height(p)) < model_.spacing; });
+}
+
+void PieceMaker::foresee(const Blade& blade) {
+  rest_places_.emplace(model_, state_);
+  const Plane plane = blade.plane();
+  rest_places_->foresee([&](const Vec3& p) {
+    const double along = blade.x_axis.dot(p - blade.origin), up = blade.y_axis.dot(p - blade.origin);
+    return std::abs(plane.height(p)) < model_.spacing && along > -model_.spacing &&
+           along < blade.length + model_.spacing && up < model_.spacing && up > -blade.depth - model_.spacing;
+  });
 }
 
 std::vector<BodyPiece> PieceMaker::make(const std::vector<PieceSource>& sources) {

@@ -6,6 +6,7 @@
 
 #include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/body/rest_places.h"
+#include "meshless_surgery/geometry/incise.h"
 
 namespace meshless {
 
@@ -25,8 +26,9 @@ class PieceMaker {
   /// The parent's graph without the edges that the blade has cut; the clusters whose members it parts grow again.
   void tear(ParticleGraph graph, std::vector<bool> torn);
 
-  /// Does beforehand what a cut by the plane is sure to need.
+  /// Does beforehand what a cut by the plane, or an incision by the blade, is sure to need.
   void foresee(const Plane& plane);
+  void foresee(const Blade& blade);
 
   /// All pieces of the parent: mass and momentum are shared out without a rest.
   std::vector<BodyPiece> make(const std::vector<PieceSource>& sources);

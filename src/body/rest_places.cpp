@@ -114,10 +114,10 @@ RestPlaces::RestPlaces(const BodyModel& model, const BodyState& state) : data_(s
 RestPlaces::~RestPlaces() = default;
 RestPlaces::RestPlaces(RestPlaces&&) noexcept = default;
 
-void RestPlaces::foresee(const Plane& plane) {
+void RestPlaces::foresee(const std::function<bool(const Vec3& position)>& likely) {
   std::vector<Index> wanted;
   for (Index i = 0; i < data_->maps.size(); ++i) {
-    if (!(std::abs(plane.height(data_->state.positions[i])) < data_->model.spacing)) continue;
+    if (!likely(data_->state.positions[i])) continue;
     data_->maps[i].wanted = true;
     wanted.push_back(i);
   }

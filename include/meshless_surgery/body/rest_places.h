@@ -1,10 +1,10 @@
 // Where points that a blade has put inside a deformed body lie in its rest shape.
 #pragma once
 
+#include <functional>
 #include <memory>
 
 #include "meshless_surgery/body/body.h"
-#include "meshless_surgery/geometry/plane.h"
 
 namespace meshless {
 
@@ -25,8 +25,8 @@ class RestPlaces {
   ~RestPlaces();
   RestPlaces(RestPlaces&&) noexcept;
 
-  /// Makes the maps that points on the plane are likely to want, while others still look for the points.
-  void foresee(const Plane& plane);
+  /// Makes the maps around particles that are likely to be wanted, while others still look for the points.
+  void foresee(const std::function<bool(const Vec3& position)>& likely);
   Points of(const Points& present, const std::vector<KnownPlace>& known);
 
  private:
