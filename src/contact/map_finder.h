@@ -30,7 +30,8 @@ class MapFinder {
     grid_.origin = box.min;
     std::size_t total = 1;
     for (int d = 0; d < 3; ++d) {
-      grid_.counts[d] = std::min(256, static_cast<int>(extent[d] / grid_.edge) + 1);
+      const double cells = extent[d] / grid_.edge;  // NaN where the box is beyond all numbers
+      grid_.counts[d] = cells >= 255.0 ? 256 : cells > 0.0 ? static_cast<int>(cells) + 1 : 1;
       total *= static_cast<std::size_t>(grid_.counts[d]);
     }
     offsets_.assign(total + 1, 0);
