@@ -72,6 +72,7 @@ RigidMotion rigidMotionOf(const BodyModel& model, const MassMoments& moments, co
   Vec3 momentum = Vec3::Zero();
   for (std::size_t i = 0; i < positions.size(); ++i)
     momentum += model.masses[i] * (positions[i] - motion.centre).cross(velocities[i] - motion.velocity);
+  motion.angular_momentum = momentum;
   motion.spin = moments.inertia.spinFor(momentum);
   return motion;
 }

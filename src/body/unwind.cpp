@@ -75,11 +75,8 @@ void unwind(const BodyModel& model, const Vec3& gravity, double h, BodyState& st
   const RigidMotion before = rigidMotionOf(model, x, v);
   const RestWhole rest = restWholeOf(model);
   Mat3 moment = Mat3::Zero();
-  Vec3 angular = Vec3::Zero();
-  for (std::size_t i = 0; i < x.size(); ++i) {
+  for (std::size_t i = 0; i < x.size(); ++i)
     moment += model.masses[i] * (x[i] - before.centre) * (model.rest[i] - rest.centre).transpose();
-    angular += model.masses[i] * (x[i] - before.centre).cross(v[i] - before.velocity);
-  }
   // Nearest to the rotation of before: where several are equally near, it stays with one.
   const Quat turn = nearestRotation(moment, state.poses.front().rotation).rotation;
   const double share = 1.0 - std::exp(-h / kTime);
@@ -91,7 +88,7 @@ void unwind(const BodyModel& model, const Vec3& gravity, double h, BodyState& st
   }
   // The momentum that it had, in the shape that it has now.
   scratch.previous = x;
-  const Vec3 spin = spinWith(model, x, before.centre, angular);
+  const Vec3 spin = spinWith(model, x, before.centre, before.angular_momentum);
   for (std::size_t i = 0; i < x.size(); ++i) {
     v[i] = before.velocity + spin.cross(x[i] - before.centre) + h * gravity;
     x[i] += h * v[i];

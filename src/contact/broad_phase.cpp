@@ -9,8 +9,7 @@ namespace {
 constexpr std::uint64_t kNoKey = ~0ull;
 constexpr int kNoLevel = 1 << 20;
 constexpr double kWider = 0.05;         // of a box's extent: the margin
-constexpr int kWorthIt = 2;             // calls that a search has to hold
-constexpr int kWithout = 8;             // searches without margins after one that did not
+constexpr int kWithout = 8;             // searches without margins after one that held for fewer calls than kWorthIt
 constexpr double kMostCells = 1 << 18;  // coordinates that still fit into 19 bits of a key
 
 std::uint64_t keyOf(int level, const std::array<std::int64_t, 3>& cell) {
@@ -42,16 +41,14 @@ const std::vector<std::array<Index, 2>>& BroadPhase::find(const std::vector<Box>
     ++held_;
   } else {
     // Where all moves, margins only find more that is to be compared.
-    if (without_ > 0) {
+    if (without_ > 0)
       --without_;
-    } else if (margins_ && held_ < kWorthIt) {
+    else if (held_ < kWorthIt)
       without_ = kWithout;
-    }
-    margins_ = without_ == 0;
     wide_ = boxes;
     wide_active_ = active;
     for (Box& box : wide_) {
-      const double margin = margins_ ? kWider * (box.max - box.min).maxCoeff() : 0.0;
+      const double margin = without_ == 0 ? kWider * (box.max - box.min).maxCoeff() : 0.0;
       if (!(margin > 0.0)) continue;  // and empty ones stay so
       box.min.array() -= margin;
       box.max.array() += margin;

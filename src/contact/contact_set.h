@@ -64,6 +64,11 @@ class ContactSolver {
   void solve(const ContactScene& scene, const std::vector<ContactParty>& parties, std::vector<Contact>& contacts,
              const std::vector<ContactEntry>& entries, const IslandPlan& plan, bool fresh, const ForEach& for_each,
              ContactCounters& counters);
+  /// The same island by island, on any threads, between calls of begin().
+  void begin(const ContactScene& scene, const std::vector<ContactParty>& parties,
+             const std::vector<ContactEntry>& entries, const IslandPlan& plan);
+  void solveIsland(Index island, std::vector<Contact>& contacts, bool fresh, std::size_t& corrected);
+  void letOutIsland(Index island, std::vector<Contact>& contacts, double h, std::size_t& corrected);
   /// One sweep that lets out some of the overlap that there is, h [s] after the last; impulses are left alone.
   void letOut(const ContactScene& scene, const std::vector<ContactParty>& parties, std::vector<Contact>& contacts,
               const std::vector<ContactEntry>& entries, const IslandPlan& plan, double h, const ForEach& for_each,

@@ -330,8 +330,7 @@ struct ContactSolver::Impl {
   void shareOut();
 
   // Fills what both kinds of sweep need; false where there is nothing to hold.
-  bool prepare(Contact& c, bool with_motion, Gap& gap, Row& row) {
-    if (!readGap<false>(*scene, *parties, c, *entries, with_motion, gap)) return false;
+  bool prepare(Contact& c, const Gap& gap, Row& row) {
     row.contact = &c;
     row.on_ground = c.b == kNoIndex;
     const Rigid& a = (*parties)[c.a].moves ? rigid[c.a] : kStill;
@@ -463,7 +462,7 @@ struct ContactSolver::Impl {
     Gap gap;
     const double was = c.impulse;
     c.impulse = 0.0;
-    if (!prepare(c, true, gap, row)) return false;
+    if (!readGap<false>(*scene, *parties, c, *entries, true, gap) || !prepare(c, gap, row)) return false;
     const double along_normal = c.normal.dot(gap.motion);
     const double before = row.distance - along_normal;
     if (c.direct && !row.on_ground) {
@@ -533,23 +532,37 @@ struct ContactSolver::Impl {
     return 1;
   }
 
+  // False where it does not overlap; how much of that is old enough to be let out [m].
+  bool readOverlap(Contact& c, Gap& gap, double& old) {
+    if (!c.below || !readGap<false>(*scene, *parties, c, *entries, false, gap)) return false;
+    const double distance = c.normal.dot(gap.point_a - gap.point_b);
+    if (!(distance < 0.0)) return false;
+    if (c.direct && c.b != kNoIndex && !c.caught && std::min({c.weights[0], c.weights[1], c.weights[2]}) < -kFarBeside)
+      return false;
+    old = std::max(0.0, -distance - (c.caught ? 0.0 : kLetOutFrom * sizeAt(c)));
+    return true;
+  }
+
+  double sizeAt(const Contact& c) const {
+    const double size = (*parties)[c.a].shape->size();
+    return c.b == kNoIndex ? size : std::min(size, (*parties)[c.b].shape->size());
+  }
+
   std::size_t letOutIsland(Index island, std::vector<Contact>& contacts, double h) {
-    Row* const first = rows.data() + plan->contact_offsets[island];
+    const Index from = plan->contact_offsets[island], to = plan->contact_offsets[island + 1];
+    Gap gap;
+    double old = 0.0;
+    // What has settled has nothing to let out.
+    if (std::none_of(plan->contacts.begin() + from, plan->contacts.begin() + to,
+                     [&](Index k) { return readOverlap(contacts[k], gap, old) && old > 0.0; }))
+      return 0;
+    begin(island);
+    Row* const first = rows.data() + from;
     Row* end = first;
-    for (Index k = plan->contact_offsets[island]; k < plan->contact_offsets[island + 1]; ++k) {
+    for (Index k = from; k < to; ++k) {
       Contact& c = contacts[plan->contacts[k]];
-      if (!c.below) continue;
-      Gap gap;
-      if (!readGap<false>(*scene, *parties, c, *entries, false, gap)) continue;
-      if (!(c.normal.dot(gap.point_a - gap.point_b) < 0.0)) continue;
-      if (c.direct && c.b != kNoIndex && !c.caught &&
-          std::min({c.weights[0], c.weights[1], c.weights[2]}) < -kFarBeside)
-        continue;
-      if (end == first) begin(island);
-      if (!prepare(c, false, gap, *end)) continue;
-      double size = (*parties)[c.a].shape->size();
-      if (!end->on_ground) size = std::min(size, (*parties)[c.b].shape->size());
-      const double old = std::max(0.0, -end->distance - (c.caught ? 0.0 : kLetOutFrom * size));
+      if (!readOverlap(c, gap, old) || !prepare(c, gap, *end)) continue;
+      const double size = sizeAt(c);
       end->target = end->distance + (c.caught ? std::min(old, kCaughtSpeed * size * h)
                                               : std::min(kLetOutShare * old, kLetOutSpeed * size * h));
       ++end;
@@ -609,10 +622,7 @@ void ContactSolver::solve(const ContactScene& scene, const std::vector<ContactPa
                           std::vector<Contact>& contacts, const std::vector<ContactEntry>& entries,
                           const IslandPlan& plan, bool fresh, const ForEach& for_each, ContactCounters& counters) {
   Impl& w = *impl_;
-  w.start(scene, parties, entries, plan);
-  // Rows are kept in place: an island has room for all of its contacts.
-  w.rows.resize(plan.contacts.size());
-  w.row_counts.resize(plan.size());
+  begin(scene, parties, entries, plan);
   w.shareOut();
   runEach(for_each, w.tasks.size() - 1, [&](std::size_t task) {
     for (Index island = w.tasks[task]; island < w.tasks[task + 1]; ++island)
@@ -621,13 +631,29 @@ void ContactSolver::solve(const ContactScene& scene, const std::vector<ContactPa
   for (const std::size_t corrected : w.corrected) counters.corrected += corrected;
 }
 
+void ContactSolver::begin(const ContactScene& scene, const std::vector<ContactParty>& parties,
+                          const std::vector<ContactEntry>& entries, const IslandPlan& plan) {
+  Impl& w = *impl_;
+  w.start(scene, parties, entries, plan);
+  // Rows are kept in place: an island has room for all of its contacts.
+  w.rows.resize(plan.contacts.size());
+  w.row_counts.resize(plan.size());
+  w.let_impulses.resize(plan.contacts.size());
+}
+
+void ContactSolver::solveIsland(Index island, std::vector<Contact>& contacts, bool fresh, std::size_t& corrected) {
+  impl_->solveIsland(island, contacts, fresh, corrected);
+}
+
+void ContactSolver::letOutIsland(Index island, std::vector<Contact>& contacts, double h, std::size_t& corrected) {
+  corrected += impl_->letOutIsland(island, contacts, h);
+}
+
 void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactParty>& parties,
                            std::vector<Contact>& contacts, const std::vector<ContactEntry>& entries,
                            const IslandPlan& plan, double h, const ForEach& for_each, ContactCounters& counters) {
   Impl& w = *impl_;
-  w.start(scene, parties, entries, plan);
-  w.rows.resize(plan.contacts.size());
-  w.let_impulses.resize(plan.contacts.size());
+  begin(scene, parties, entries, plan);
   w.shareOut();
   runEach(for_each, w.tasks.size() - 1, [&](std::size_t task) {
     for (Index island = w.tasks[task]; island < w.tasks[task + 1]; ++island)

@@ -241,14 +241,15 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
     w.needed_substeps = std::max(w.needed_substeps, static_cast<int>(std::ceil(work / kMostPasses)));
   }
   w.frame = h;
-  w.solver.letOut(w.scene, parties, w.contacts, w.entries, w.plan, h, for_each, counters);
+  bool any_quick = false;
+  for (const Pair& pair : w.pairs) any_quick = any_quick || pair.quick;
+  w.settled = !any_quick && w.caught.empty();
+  if (!w.settled) w.solver.letOut(w.scene, parties, w.contacts, w.entries, w.plan, h, for_each, counters);
   // Quick pairs are looked up again when they have moved, and so is what was caught.
   const bool any_caught = w.contacts.size() > lasting;
   w.contacts.resize(lasting);
   w.entries.resize(lasting_entries);
   std::size_t out = 0;
-  bool any_quick = false;
-  for (const Pair& pair : w.pairs) any_quick = any_quick || pair.quick;
   if (any_quick) {
     std::map<std::pair<Index, Index>, bool> quick;
     for (const Pair& pair : w.pairs)
@@ -334,6 +335,41 @@ void Contacts::solve(const std::vector<ContactParty>& parties, double substep, c
     for (std::size_t n = 0; n < quick.found.contacts.size(); ++n) {
       quick.found.contacts[n].impulse = w.contacts[quick.first + n].impulse;
       quick.found.contacts[n].slip_impulse = w.contacts[quick.first + n].slip_impulse;
+    }
+  }
+}
+
+bool Contacts::settled() const { return impl_->settled; }
+const std::vector<Index>& Contacts::islandOffsets() const { return impl_->plan.party_offsets; }
+const std::vector<Index>& Contacts::islandParties() const { return impl_->plan.parties; }
+
+void Contacts::letOut(const std::vector<ContactParty>& parties, ContactCounters& counters, const ForEach& for_each) {
+  Impl& w = *impl_;
+  if (w.settled) w.solver.letOut(w.scene, parties, w.contacts, w.entries, w.plan, w.frame, for_each, counters);
+}
+
+void Contacts::letOutIslands(Index first_island, Index end_island, std::size_t& corrected) {
+  Impl& w = *impl_;
+  for (Index island = first_island; island < end_island; ++island)
+    w.solver.letOutIsland(island, w.contacts, w.frame, corrected);
+}
+
+void Contacts::beginIslands(const std::vector<ContactParty>& parties) {
+  Impl& w = *impl_;
+  w.solver.begin(w.scene, parties, w.entries, w.plan);
+  w.fresh = false;
+  w.was_steady = true;
+}
+
+void Contacts::solveIslands(Index first_island, Index end_island, bool first, std::size_t& corrected,
+                            std::size_t& ground_loaded) {
+  Impl& w = *impl_;
+  for (Index island = first_island; island < end_island; ++island) {
+    w.solver.solveIsland(island, w.contacts, first, corrected);
+    for (Index k = w.plan.contact_offsets[island]; k < w.plan.contact_offsets[island + 1]; ++k) {
+      const Contact& c = w.contacts[w.plan.contacts[k]];
+      if (c.b != kNoIndex) break;  // the ground's come first
+      ground_loaded += c.impulse > 0.0;
     }
   }
 }

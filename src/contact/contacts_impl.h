@@ -150,6 +150,7 @@ struct Contacts::Impl {
   std::vector<PairFindings> pair_findings;
   std::vector<QuickFindings> quick;  // one a pair; of those that are quick
   bool was_steady = true;            // the last solve had no others than the steady contacts
+  bool settled = false;              // nothing is quick or caught in this frame
 
   bool locate(const ContactParty& b, double deviation, const MapFinder& finder, const ContactMap* maps, const Vec3& p,
               const Vec3& inward, double reach, ContactShape::Nearest& found, bool& flipped,

@@ -117,6 +117,7 @@ struct BodyBatch::Impl {
       for (int k = 0; k < 3; ++k) field(body, i, kQx + k) = static_cast<float>(q[k]);
       field(body, i, kMass) = static_cast<float>(in.masses[i] / rest.mass);
     }
+    constant(body, kHasQuadratic) = 0.0f;
     if (has_quadratic && rest.quadratic_rank) {
       const QuadraticRest& from = in.shape.quadratic[0];
       constant(body, kHasQuadratic) = 1.0f;
@@ -238,6 +239,11 @@ std::size_t BodyBatch::bytes() const {
 }
 std::size_t BodyBatch::particles() const { return impl_->particles; }
 
+void BodyBatch::refit(std::size_t body, const MatchInput& in) {
+  assert(holds(in) && in.rest.size() == impl_->particles);
+  impl_->prepare(body, in);
+}
+
 void BodyBatch::setState(std::size_t body, const Points& positions, const Points& velocities, const Quat& rotation) {
   impl_->set(body, positions, velocities, rotation);
 }
@@ -255,19 +261,20 @@ void BodyBatch::getState(std::size_t body, Points& positions, Points& velocities
 }
 
 void BodyBatch::step(const BatchStep& step, MatchCounters& counters, const ForEach& for_each) {
-  stepChunks(step, nullptr, counters, for_each);
+  stepChunks(step, nullptr, impl_->size, counters, for_each);
 }
 
 void BodyBatch::stepInPlace(const std::vector<BatchBody>& bodies, const BatchStep& step, MatchCounters& counters,
                             const ForEach& for_each) {
-  assert(bodies.size() == impl_->size);
-  stepChunks(step, bodies.data(), counters, for_each);
+  assert(bodies.size() <= impl_->size);
+  stepChunks(step, bodies.data(), bodies.size(), counters, for_each);
 }
 
-void BodyBatch::stepChunks(const BatchStep& step, const BatchBody* in_place, MatchCounters& counters,
+void BodyBatch::stepChunks(const BatchStep& step, const BatchBody* in_place, std::size_t count, MatchCounters& counters,
                            const ForEach& for_each) {
   Impl& b = *impl_;
-  if (b.size == 0) return;
+  if (count == 0) return;
+  const std::size_t padded = (count + kBlock - 1) / kBlock * kBlock;
   assert(step.mode != MatchMode::kQuadratic || b.has_quadratic);
   assert(step.ahead >= 0.0);
   const StepNumbers numbers = numbersOf(step);
@@ -278,16 +285,16 @@ void BodyBatch::stepChunks(const BatchStep& step, const BatchBody* in_place, Mat
                            b.motion.data(),
                            b.has_quadratic ? b.quadratic.data() : nullptr,
                            pseudoInverse};
-  runEach(for_each, (b.padded + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+  runEach(for_each, (padded + kChunk - 1) / kChunk, [&](std::size_t chunk) {
     const FlushDenormals flush;
     BodiesScratch scratch;
-    const std::size_t first = chunk * kChunk, size = std::min<std::size_t>(kChunk, b.padded - first);
+    const std::size_t first = chunk * kChunk, size = std::min<std::size_t>(kChunk, padded - first);
     const int first_block = static_cast<int>(first / kBlock), blocks = static_cast<int>(size / kBlock);
     if (in_place) {
       bool any = false;
-      for (std::size_t i = first; i < std::min(first + size, b.size); ++i) any = any || in_place[i].moves;
+      for (std::size_t i = first; i < std::min(first + size, count); ++i) any = any || in_place[i].moves;
       if (!any) return;
-      for (std::size_t i = 0; i < size; ++i) b.load(first + i, in_place[std::min(first + i, b.size - 1)]);
+      for (std::size_t i = 0; i < size; ++i) b.load(first + i, in_place[std::min(first + i, count - 1)]);
       entries.measureBodies(view, first_block, blocks);
     }
     if (step.ground)
@@ -308,7 +315,7 @@ void BodyBatch::stepChunks(const BatchStep& step, const BatchBody* in_place, Mat
     for (int k = 0; k < 3; ++k)
       for (std::size_t i = 0; i < size; ++i) b.origins[first + i][k] += scratch.shift[k][i];
     if (in_place)
-      for (std::size_t i = first; i < std::min(first + size, b.size); ++i)
+      for (std::size_t i = first; i < std::min(first + size, count); ++i)
         if (in_place[i].moves) b.store(i, in_place[i]);
   });
   if (!in_place) {
@@ -317,7 +324,7 @@ void BodyBatch::stepChunks(const BatchStep& step, const BatchBody* in_place, Mat
     if (numbers.quadratic) counters.quadratic_moments += b.size;
     return;
   }
-  for (std::size_t i = 0; i < b.size; ++i)
+  for (std::size_t i = 0; i < count; ++i)
     if (in_place[i].moves) {
       match_sets::count(&b.flags[i], 1, counters);
       counters.linear_fits += numbers.beta > 0.0f;

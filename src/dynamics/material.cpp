@@ -106,7 +106,7 @@ double viscosityTime(double alpha, double h) {
 
 // Fitted goals alone have no shape to return to, and dividing by cbrt(det) is no gradient of a potential: together they
 // feed energy in. A twentieth of the rigid goal is enough that none was seen to grow; with half a second and more in
-// one step it was, in one of fifty random starts.
+// one step it was, in one of ten random starts.
 double actingBeta(double beta, double h) {
   constexpr double kMost = 0.95, kLongStep = 0.2;  // [s]
   return std::min(beta, h > kLongStep ? kMost * kLongStep / h : kMost);

@@ -63,6 +63,17 @@ void fitCluster(const MatchInput& in, Index c, const Points& y, bool affine, Clu
 
 }  // namespace
 
+MatchCounters& MatchCounters::operator+=(const MatchCounters& other) {
+  clusters += other.clusters;
+  rotations += other.rotations;
+  cold_rotations += other.cold_rotations;
+  linear_fits += other.linear_fits;
+  quadratic_moments += other.quadratic_moments;
+  plastic_flows += other.plastic_flows;
+  rank_fallbacks += other.rank_fallbacks;
+  return *this;
+}
+
 RestShape makeRestShape(const Points& rest, const std::vector<double>& masses, const ClusterSet& clusters) {
   RestShape shape;
   shape.clusters.resize(clusters.size());

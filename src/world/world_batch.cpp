@@ -34,6 +34,8 @@ bool alike(const WorldBody& a, const WorldBody& b) {
          a.material.damping == b.material.damping;
 }
 
+}  // namespace
+
 // What is drawn out or thrown apart without measure is left to double: rounding to float would make it spin, and it
 // would never be whole again. With contact bounds and spread are those of the frame's start, else they are found here.
 bool fitsFloat(WorldBody& body, bool bounds_known, double h) {
@@ -46,13 +48,11 @@ bool fitsFloat(WorldBody& body, bool bounds_known, double h) {
   return body.bounds.diagonal() <= most && h * body.spread <= most;
 }
 
-}  // namespace
-
 void World::Impl::groupBatches() {
   if (batches_current) return;
   batches_current = true;
   batches.clear();
-  for (auto& body : bodies) body->batched = false;
+  for (auto& body : bodies) body->batch = kNoIndex;
   if (bodies.size() < kLeastBodies) return;
   std::vector<std::vector<WorldBody*>> groups;
   for (auto& body : bodies) {
@@ -74,7 +74,7 @@ void World::Impl::addBatch(std::vector<WorldBody*> group) {
   std::vector<MatchInput> inputs;
   for (WorldBody* body : group) {
     inputs.push_back(matchInput(*body->model, body->state));
-    body->batched = true;
+    body->batch = static_cast<Index>(batches.size());
   }
   WorldBatch batch;
   batch.batch = std::make_unique<BodyBatch>(inputs, group.front()->material.mode == MatchMode::kQuadratic);
@@ -101,9 +101,9 @@ void World::Impl::matchBatches(double h) {
         matchAndMove(*body.model, body.material, settings.gravity, h, body.state, body.scratch, report.match_counters);
     }
     if (!any) continue;
-    BatchStep step = batchStep(batch.bodies.front()->material, h);
-    step.gravity = settings.gravity;
-    batch.batch->stepInPlace(batch.states, step, report.match_counters, for_each);
+    batch.step = batchStep(batch.bodies.front()->material, h);
+    batch.step.gravity = settings.gravity;
+    batch.batch->stepInPlace(batch.states, batch.step, report.match_counters, for_each);
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <future>
 #include <map>
+#include <mutex>
 #include <set>
 
 #include "meshless_surgery/body/cut_body.h"
@@ -58,10 +59,10 @@ struct WorldBody {
   BodyModelPtr reach_of;     // the model that rider_reach is of
   double rider_reach = 0.0;  // [m] how far riders are beyond the bounds of the particles, at most
   double stiffness_factor = 1.0;
-  Box bounds;            // [m] of particles and surface, at the start of the last frame in which it was awake
-  double spread = 0.0;   // [m/s] likewise: by how much velocities differ
-  double fastest = 0.0;  // [m/s] likewise: no particle is faster
-  bool batched = false;  // matched with others of its kind
+  Box bounds;              // [m] of particles and surface, at the start of the last frame in which it was awake
+  double spread = 0.0;     // [m/s] likewise: by how much velocities differ
+  double fastest = 0.0;    // [m/s] likewise: no particle is faster
+  Index batch = kNoIndex;  // matched with others of its kind: one of World::Impl::batches
   bool asleep = false;
   double still_for = 0.0;         // [s]
   std::uint32_t sleep_group = 0;  // those that fell asleep together wake together
@@ -70,11 +71,36 @@ struct WorldBody {
   StepScratch scratch;
 };
 
+/// Room for some bodies of a batch side by side.
+struct BatchLanes {
+  /// As they stand, of no matter which models of the batch.
+  void step(const std::vector<WorldBody*>& some, const BatchStep& step, MatchCounters& counters);
+
+  BodyBatch batch;
+  std::vector<const BodyModel*> models;  // whose rest shapes the lanes hold
+  std::vector<BatchBody> states;
+};
+
 /// Bodies that are matched side by side.
 struct WorldBatch {
   std::vector<WorldBody*> bodies;
   std::vector<BatchBody> states;
   std::unique_ptr<BodyBatch> batch;
+  BatchStep step;                                  // of this frame's substeps
+  std::vector<std::unique_ptr<BatchLanes>> spare;  // that no gang has borrowed
+};
+
+/// Bodies that go through the substeps of a frame by themselves, and what they did in it.
+struct Gang {
+  Index first_island = 0, end_island = 0;
+  std::vector<WorldBody*> bodies, alone;              // all of them, and those matched one by one
+  std::vector<std::vector<WorldBody*>> side_by_side;  // the others, by batches
+  std::vector<std::unique_ptr<BatchLanes>> lanes;     // one a batch, borrowed
+  std::size_t particles = 0;
+  MatchCounters match_counters;
+  PreserveCounters preserve_counters;
+  std::size_t corrected = 0, ground_contacts = 0;
+  double match = 0.0, contact = 0.0;  // [s]
 };
 
 /// Blades on their way together.
@@ -108,6 +134,10 @@ struct CutUndo {
   std::vector<std::string> cut;          // bodies that were cut or opened
   std::vector<std::string> pieces;       // what they came apart into
 };
+
+/// What is drawn out or thrown apart without measure is matched in double. bounds_known: body.bounds and spread are of
+/// this frame, else they are found.
+bool fitsFloat(WorldBody& body, bool bounds_known, double h);
 
 struct World::Impl {
   WorldSettings settings;
@@ -148,6 +178,10 @@ struct World::Impl {
   std::uint32_t next_sleep_group = 1;
   std::vector<WorldBatch> batches;
   bool batches_current = false;  // false: bodies or materials have changed
+  std::mutex lanes_mutex;        // of the batches' spare lanes
+  std::vector<Gang> gangs;
+  std::size_t gang_count = 0;   // of them in use
+  std::vector<char> in_island;  // one a body: in formGangs()
   Contacts contacts;
   std::vector<LoadedPair> loaded;
   bool contacts_current = false;      // bodies are those of the last step
@@ -206,8 +240,17 @@ struct World::Impl {
   void listAwake();
   void groupBatches();
   void addBatch(std::vector<WorldBody*> group);
+  void stepTogether(int substeps, double h_frame);
   void matchBatches(double h);
+  void matchAlone(WorldBody& body, double h, MatchCounters& counters) const;
+  std::unique_ptr<BatchLanes> borrowLanes(WorldBatch& batch);
   void finishSubstep(double h);
+  void keepSize(WorldBody& body, PreserveCounters& counters) const;
+  /// False where all bodies have to take each substep together.
+  bool formGangs(double h);
+  void addToGang(Gang& gang, WorldBody& body, double h);
+  void stepInGangs(int substeps, double h);
+  void stepGang(Gang& gang, int substeps, double h);
   /// The body and all that fell asleep with it.
   void wake(WorldBody& body);
   void wakeWithin(const Box& box);

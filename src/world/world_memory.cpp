@@ -25,7 +25,16 @@ MemoryUse World::memory() const {
     if (first(body->mesh.get()))
       use.contact += sizeof *body->mesh + bytesOf(body->mesh->tetrahedra, body->mesh->faces, body->mesh->edges);
   }
-  for (const WorldBatch& batch : w.batches) use.states += batch.batch->bytes() + bytesOf(batch.bodies, batch.states);
+  for (const WorldBatch& batch : w.batches) {
+    use.states += batch.batch->bytes() + bytesOf(batch.bodies, batch.states, batch.spare);
+    for (const auto& lanes : batch.spare)
+      use.states += sizeof *lanes + lanes->batch.bytes() + bytesOf(lanes->models, lanes->states);
+  }
+  use.states += bytesOf(w.gangs, w.in_island);
+  for (const Gang& gang : w.gangs) {
+    use.states += bytesOf(gang.bodies, gang.alone, gang.side_by_side, gang.lanes);
+    for (const auto& some : gang.side_by_side) use.states += bytesOf(some);
+  }
   for (const auto& obstacle : w.obstacles) {
     use.models += bytesOf(obstacle->def->mesh.vertices, obstacle->def->mesh.triangles, obstacle->own) +
                   bytesOf(obstacle->masses, obstacle->inverse_masses, obstacle->maps);

@@ -56,54 +56,28 @@ void World::step() {
       const Stopwatch contact(w.report.contact);
       w.rememberGrasps();
       w.findContacts(h_frame);
-      w.followGrasps();
     }
     w.groupBatches();
     const int substeps = w.chooseSubsteps(h_frame);
     const double h = h_frame / substeps;
-    if (rest_shape) w.contacts.begin(w.parties, h);
-    // What an elastic material needs beyond the scene's substeps is not needed by contacts between bodies.
-    const int stride = std::max(1, substeps / w.settings.substeps);
-    const std::vector<WorldBody*> near = w.bodiesInContact(h_frame);
+    bool in_gangs = false;
+    if (rest_shape) {
+      const Stopwatch contact(w.report.contact);
+      w.contacts.begin(w.parties, h);
+      in_gangs = w.formGangs(h);
+      if (!in_gangs) w.contacts.letOut(w.parties, w.report.contact_counters, w.for_each);
+      w.followGrasps();
+    }
     for (Pick& pick : w.picks)
       if (const WorldBody* body = w.find(pick.body); !body || !body->asleep)  // a body at rest is held as before
         pick.force.setZero();
     w.push.force.setZero();
     w.push.touching = false;
     for (WorldBody* body : w.awake) body->low_current = false;
-    for (int substep = 0; substep < substeps; ++substep) {
-      {
-        const Stopwatch match(w.report.match);
-        w.matchBatches(h);
-        for (WorldBody* body : w.awake)
-          if (!body->batched) {
-            if (body->state.unwinding)
-              unwind(*body->model, w.settings.gravity, h, body->state, body->scratch);
-            else
-              matchAndMove(*body->model, body->material, w.settings.gravity, h, body->state, body->scratch,
-                           w.report.match_counters);
-          }
-      }
-      {
-        const Stopwatch tools(w.report.tools);
-        w.pullSprings(substep, substeps, h_frame);
-      }
-      {
-        const Stopwatch contact(w.report.contact);
-        for (WorldBody* body : w.awake) {
-          body->scratch.touched.clear();
-          if (w.push.enabled || (w.settings.ground && (!rest_shape || body->model->surface.vertices.empty())))
-            body->scratch.before_contact = body->state.positions;
-        }
-        if (rest_shape)
-          w.solveContacts(h);
-        else if ((substep + 1) % stride == 0 || substep + 1 == substeps)
-          w.contactBodies(near, h, stride);
-        w.movePush(h, h_frame);
-      }
-      w.pullSprings(substep, substeps, h_frame, true);
-      w.finishSubstep(h);
-    }
+    if (in_gangs)
+      w.stepInGangs(substeps, h);
+    else
+      w.stepTogether(substeps, h_frame);
     for (Pick& pick : w.picks) pick.reached = pick.target;
     w.rememberGrasps();
     for (WorldBody* body : w.awake) {
@@ -130,12 +104,57 @@ void World::step() {
   }
 }
 
-void World::Impl::finishSubstep(double h) {
-  for (WorldBody* body : awake) {
-    if (!body->material.volume.points.empty() || !body->material.area.points.empty() || body->state.swelling != 1.0)
-      preserve(*body->model, body->material, body->state, body->scratch, report.preserve_counters);
-    body->surface_current = false;
+// All bodies take each substep before any takes the next.
+void World::Impl::stepTogether(int substeps, double h_frame) {
+  const double h = h_frame / substeps;
+  const bool rest_shape = settings.contact == ContactMethod::kRestShape && !awake.empty();
+  // What an elastic material needs beyond the scene's substeps is not needed by contacts between bodies.
+  const int stride = std::max(1, substeps / settings.substeps);
+  const std::vector<WorldBody*> near = bodiesInContact(h_frame);
+  for (int substep = 0; substep < substeps; ++substep) {
+    {
+      const Stopwatch match(report.match);
+      matchBatches(h);
+      for (WorldBody* body : awake)
+        if (body->batch == kNoIndex) matchAlone(*body, h, report.match_counters);
+    }
+    {
+      const Stopwatch tools(report.tools);
+      pullSprings(substep, substeps, h_frame);
+    }
+    {
+      const Stopwatch contact(report.contact);
+      for (WorldBody* body : awake) {
+        body->scratch.touched.clear();
+        if (push.enabled || (settings.ground && (!rest_shape || body->model->surface.vertices.empty())))
+          body->scratch.before_contact = body->state.positions;
+      }
+      if (rest_shape)
+        solveContacts(h);
+      else if ((substep + 1) % stride == 0 || substep + 1 == substeps)
+        contactBodies(near, h, stride);
+      movePush(h, h_frame);
+    }
+    pullSprings(substep, substeps, h_frame, true);
+    finishSubstep(h);
   }
+}
+
+void World::Impl::matchAlone(WorldBody& body, double h, MatchCounters& counters) const {
+  if (body.state.unwinding)
+    unwind(*body.model, settings.gravity, h, body.state, body.scratch);
+  else
+    matchAndMove(*body.model, body.material, settings.gravity, h, body.state, body.scratch, counters);
+}
+
+void World::Impl::keepSize(WorldBody& body, PreserveCounters& counters) const {
+  if (!body.material.volume.points.empty() || !body.material.area.points.empty() || body.state.swelling != 1.0)
+    preserve(*body.model, body.material, body.state, body.scratch, counters);
+  body.surface_current = false;
+}
+
+void World::Impl::finishSubstep(double h) {
+  for (WorldBody* body : awake) keepSize(*body, report.preserve_counters);
   forNumbers(awake.size(),
              [&](std::size_t b) { velocitiesFromPositions(*awake[b]->model, h, awake[b]->state, awake[b]->scratch); });
   // Being pushed out does not throw: what the tissue does not get, the tool does not feel.

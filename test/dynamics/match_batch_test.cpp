@@ -413,6 +413,44 @@ TEST(BodyBatch, BodiesDoNotDependOnPlaceNeighboursOrOrder) {
     }
 }
 
+// A few at a time in places that were made for others.
+TEST(BodyBatch, BodiesMayTakeTheWrongPlaces) {
+  Random random(6);
+  std::vector<Plain> bodies;
+  for (int i = 0; i < 40; ++i) {
+    bodies.push_back(makeBody(random, 3, 2, 3));
+    disturb(bodies.back(), random);
+  }
+  for (MatchMode mode : kModes) {
+    const BatchStep step = batchStep(looks(mode, 1.0), 1.0 / 120.0);
+    const auto statesOf = [](std::vector<Plain>& of, std::size_t first, std::size_t count) {
+      std::vector<BatchBody> states;
+      for (std::size_t i = first; i < first + count; ++i)
+        states.push_back({of[i].state.positions.data(), of[i].state.velocities.data(), &of[i].state.poses[0].rotation});
+      return states;
+    };
+    std::vector<Plain> own = bodies, others = bodies;
+    BodyBatch batch = batchOf(own);
+    std::vector<MatchInput> narrow(20, bodies[39].input());
+    BodyBatch places(narrow, true);
+    MatchCounters all, some;
+    for (int n = 0; n < 20; ++n) {
+      batch.stepInPlace(statesOf(own, 0, 40), step, all);
+      for (std::size_t first = 0; first < 40; first += 13) {
+        const std::size_t count = std::min<std::size_t>(13, 40 - first);
+        for (std::size_t i = 0; i < count; ++i) places.refit(i, bodies[first + i].input());
+        places.stepInPlace(statesOf(others, first, count), step, some);
+      }
+    }
+    for (std::size_t i = 0; i < 40; ++i) {
+      ASSERT_EQ(largestDistance(own[i].state.positions, others[i].state.positions), 0.0) << i;
+      ASSERT_EQ(largestDistance(own[i].state.velocities, others[i].state.velocities), 0.0) << i;
+    }
+    EXPECT_EQ(all.clusters, some.clusters);
+    EXPECT_EQ(all.rotations, some.rotations);
+  }
+}
+
 // Lines, sheets and crumbs: what has no linear or quadratic fit.
 TEST(BodyBatch, FallsBackWhereTheRankIsMissing) {
   const std::array<int, 3> sizes[] = {{12, 1, 1}, {4, 3, 1}, {2, 2, 3}, {1, 1, 12}, {3, 2, 2}};

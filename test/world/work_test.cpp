@@ -568,11 +568,14 @@ std::size_t allocationsIn(World& world, int steps) {
 
 TEST(Memory, SteppingAPileAllocatesNothing) {
   if (!kCounts) GTEST_SKIP() << "the sanitizer has its own allocator";
-  bench::PileOptions options;
-  options.bodies = 30;
-  World world = bench::makePile(options);
-  for (int step = 0; step < 400; ++step) world.step();
-  EXPECT_EQ(allocationsIn(world, 60), 0u) << "in 60 steps";
+  for (const int bodies : {5, 60}) {
+    bench::PileOptions options;
+    options.bodies = bodies;
+    World world = bench::makePile(options);
+    for (int step = 0; step < 400; ++step) world.step();
+    EXPECT_EQ(reportOf(world).gangs > 0, bodies == 60);
+    EXPECT_EQ(allocationsIn(world, 60), 0u) << "in 60 steps of " << bodies << " bodies";
+  }
 }
 
 TEST(Memory, SteppingALiverOnTheGroundAllocatesNothing) {

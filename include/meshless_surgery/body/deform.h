@@ -48,7 +48,8 @@ void velocitiesFromPositions(const BodyModel& model, double h, BodyState& state,
 struct RigidMotion {
   Vec3 centre = Vec3::Zero();
   Vec3 velocity = Vec3::Zero();
-  Vec3 spin = Vec3::Zero();  // [rad/s]
+  Vec3 spin = Vec3::Zero();              // [rad/s]
+  Vec3 angular_momentum = Vec3::Zero();  // [kg m^2/s] about the centre
 };
 RigidMotion rigidMotionOf(const BodyModel& model, const Points& positions, const Points& velocities);
 /// [rad/s] with which the particles, turning together about `centre`, have an angular momentum [kg m^2/s].

@@ -8,6 +8,11 @@ namespace meshless {
 /// What one substep did; zero where a material preserves nothing.
 struct PreserveCounters {
   std::size_t gradients = 0;
+
+  PreserveCounters& operator+=(const PreserveCounters& other) {
+    gradients += other.gradients;
+    return *this;
+  }
 };
 
 /// Moves the particles along the gradients of volume and area over their masses, so that the share of the error that

@@ -15,9 +15,10 @@ class BroadPhase {
   const std::vector<std::array<Index, 2>>& find(const std::vector<Box>& boxes, const std::vector<char>& active);
   /// Pairs of boxes compared in the last call.
   std::size_t tested() const { return tested_; }
+  /// That it holds.
   std::size_t bytes() const {
     return bytesOf(entries_, level_of_, table_, table_keys_, pairs_, wide_, wide_active_, wide_pairs_);
-  }  // that it holds
+  }
 
  private:
   struct Entry {
@@ -37,9 +38,9 @@ class BroadPhase {
   std::vector<Box> wide_;  // the boxes of the last search, with their margins
   std::vector<char> wide_active_;
   std::vector<std::array<Index, 2>> wide_pairs_;
-  int held_ = 0;          // calls since the last search
-  int without_ = 0;       // searches to come without margins
-  bool margins_ = false;  // the last search had some
+  static constexpr int kWorthIt = 2;  // calls that margins have to hold
+  int held_ = kWorthIt;               // calls since the last search
+  int without_ = 0;                   // searches without margins, the last one included, until they are tried again
 };
 
 }  // namespace meshless

@@ -79,13 +79,17 @@ class Contacts {
                  ContactCounters& counters);
   const std::vector<char>& needed() const;
 
-  /// Finds the contacts of the frame, and lets out old overlap: at a bounded speed, without changing velocities.
+  /// Finds the contacts of the frame. Bodies that are inside others are let out as a whole, and so is old overlap where
+  /// contacts are not settled(): at a bounded speed, without changing velocities.
   void make(const std::vector<ContactParty>& parties, double h, ContactCounters& counters,
             const ForEach& for_each = oneAfterAnother);
 
   /// Substeps that the frame asks for, as make() found it: tall stacks and fast bodies that are about to meet; 1 where
   /// there are none.
   int neededSubsteps() const;
+  /// Lets out old overlap, where make() has left it to this or to letOutIslands().
+  void letOut(const std::vector<ContactParty>& parties, ContactCounters& counters,
+              const ForEach& for_each = oneAfterAnother);
   /// Before the first solve() of a frame, of substeps of so many seconds.
   void begin(const std::vector<ContactParty>& parties, double substep);
 
@@ -96,6 +100,21 @@ class Contacts {
   /// friction. Impulses are equal and opposite.
   void solve(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,
              ContactCounters& counters, const ForEach& for_each = oneAfterAnother);
+
+  /// True where the contacts of the frame stay those that make() found. Then islands, which do not know of each other,
+  /// may go through all substeps one after the other, by solveIslands() in place of solve().
+  bool settled() const;
+  /// The parties of island i are islandParties()[islandOffsets()[i]] .. [islandOffsets()[i + 1] - 1].
+  const std::vector<Index>& islandOffsets() const;
+  const std::vector<Index>& islandParties() const;
+  /// After begin(), before the first solveIslands(). The parties must stay where they are until the last.
+  void beginIslands(const std::vector<ContactParty>& parties);
+  /// As letOut(), for some islands.
+  void letOutIslands(Index first_island, Index end_island, std::size_t& corrected);
+  /// As solve(), for some islands; several threads may each do others. first: of the frame's substeps. Adds to the
+  /// contacts that moved something and to those with the ground that carry load.
+  void solveIslands(Index first_island, Index end_island, bool first, std::size_t& corrected,
+                    std::size_t& ground_loaded);
 
   /// Pairs that pressed on each other in the last solve(); ascending, without duplicates.
   void loadedPairs(std::vector<LoadedPair>& pairs) const;

@@ -56,17 +56,21 @@ class BodyBatch {
   std::size_t particles() const;  // of a body
   std::size_t bytes() const;      // that it holds
 
+  /// Another body's rest shape and masses in the place of this one's. Of as many particles, that it holds().
+  void refit(std::size_t body, const MatchInput& in);
   void setState(std::size_t body, const Points& positions, const Points& velocities, const Quat& rotation);
   void getState(std::size_t body, Points& positions, Points& velocities, Quat& rotation) const;
 
   /// Damps, predicts, matches, restores angular momentum, adds gravity, moves and keeps above ground.
   void step(const BatchStep& step, MatchCounters& counters, const ForEach& for_each = oneAfterAnother);
-  /// The same for states that others change between steps: read from where they are (one a body), and written back.
+  /// The same for states that others change between steps: read from where they are, and written back. Of the first
+  /// bodies.size() bodies, which may be fewer than size().
   void stepInPlace(const std::vector<BatchBody>& bodies, const BatchStep& step, MatchCounters& counters,
                    const ForEach& for_each = oneAfterAnother);
 
  private:
-  void stepChunks(const BatchStep& step, const BatchBody* in_place, MatchCounters& counters, const ForEach& for_each);
+  void stepChunks(const BatchStep& step, const BatchBody* in_place, std::size_t count, MatchCounters& counters,
+                  const ForEach& for_each);
 
   struct Impl;
   std::unique_ptr<Impl> impl_;

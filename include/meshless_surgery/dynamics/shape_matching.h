@@ -59,6 +59,8 @@ struct MatchCounters {
   std::size_t quadratic_moments = 0;
   std::size_t plastic_flows = 0;      // clusters whose rest shape has changed
   std::size_t rank_fallbacks = 0;     // linear -> rigid, quadratic -> linear, rigid -> last rotation
+
+  MatchCounters& operator+=(const MatchCounters& other);
 };
 
 struct MatchInput {

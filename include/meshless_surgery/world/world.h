@@ -85,6 +85,7 @@ struct StepReport {
   std::size_t asleep = 0;  // of them
   std::size_t woken = 0;
   std::size_t substeps = 0;
+  std::size_t gangs = 0;  // groups of islands that took the substeps each by itself; 0: all took each one together
   MatchCounters match_counters;
   ContactCounters contact_counters;
   PreserveCounters preserve_counters;
