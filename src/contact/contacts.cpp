@@ -10,7 +10,8 @@
 namespace meshless {
 namespace {
 
-constexpr std::size_t kTaskPairs = 32, kTaskParties = 128;  // looked at by one task
+constexpr std::size_t kTaskHalves = 64, kTaskParties = 128;  // halves of pairs, and parties, looked at by one task
+constexpr std::size_t kPairTasks = 16;                       // where there are fewer halves than for so many
 constexpr double kLongestStep = 0.5;  // of the smaller body's extent: how far quick bodies go in a substep
 
 // Of the largest that moves: smaller bodies ask for no more substeps than one of that size.
@@ -91,7 +92,7 @@ void Contacts::findPairs(const ContactScene& scene, const std::vector<ContactPar
     const auto& found = w.broad.find(w.boxes, w.active);
     counters.bounds_tested += w.broad.tested();
     for (const auto& pair : found) {
-      w.pairs.push_back({pair[0], pair[1], 0.0, false, 0.0});
+      w.pairs.push_back({pair[0], pair[1], 0.0, false, 0.0, false});
       w.needed[pair[0]] = w.needed[pair[1]] = 1;
     }
     counters.pairs += found.size();
@@ -99,7 +100,7 @@ void Contacts::findPairs(const ContactScene& scene, const std::vector<ContactPar
   bool any_self = false;
   for (Index a = 0; a < parties.size(); ++a)
     if (parties[a].meets_itself && parties[a].moves) {
-      w.pairs.push_back({a, a, 0.0, false, 0.0});
+      w.pairs.push_back({a, a, 0.0, false, 0.0, false});
       w.needed[a] |= 1;
       any_self = true;
     }
@@ -143,9 +144,18 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   // From below upwards where it matters: ground first.
   const double falling = w.scene.gravity.norm() * h * h;
   const std::size_t ground_tasks = (w.grounded.size() + kTaskParties - 1) / kTaskParties;
-  const std::size_t pair_tasks = (w.pairs.size() + kTaskPairs - 1) / kTaskPairs;
+  const std::size_t halves = 2 * w.pairs.size();
+  const std::size_t task_halves = std::clamp<std::size_t>(halves / kPairTasks, 1, kTaskHalves);
+  const std::size_t pair_tasks = (halves + task_halves - 1) / task_halves;
   if (w.tasks.size() < ground_tasks + pair_tasks) w.tasks.resize(ground_tasks + pair_tasks);
-  w.pair_findings.resize(w.pairs.size());
+  w.halves.resize(halves);
+  for (Pair& pair : w.pairs) {
+    const ContactParty &a = parties[pair.a], &b = parties[pair.b];
+    const double most = kQuick * std::min(a.shape->thickness(), b.shape->thickness());
+    pair.way = approachOf(a, b);
+    pair.reach = kMargin * std::min(a.shape->size(), b.shape->size()) + std::min(pair.way * h + falling, most);
+    pair.quick = pair.a != pair.b && pair.way * h > most;
+  }
   runEach(for_each, ground_tasks + pair_tasks, [&](std::size_t n) {
     Findings& task = w.tasks[n];
     task.clear();
@@ -156,32 +166,24 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
       }
       return;
     }
-    const std::size_t first = (n - ground_tasks) * kTaskPairs;
-    if (first < w.pairs.size()) {
-      const Pair& pair = w.pairs[first];
-      const auto start = std::make_tuple(true, pair.a, pair.b, false, Index{0});
+    const std::size_t first = (n - ground_tasks) * task_halves;
+    {
+      const Pair& pair = w.pairs[first / 2];
+      const auto start = std::make_tuple(true, pair.a, pair.b, first % 2 == 1, Index{0});
       task.cursor = static_cast<std::size_t>(
           std::partition_point(w.last.begin(), w.last.begin() + static_cast<std::ptrdiff_t>(w.last_sorted),
                                [&](const Contact& c) { return keyOf(c) < start; }) -
           w.last.begin());
     }
-    for (std::size_t k = first; k < std::min(w.pairs.size(), first + kTaskPairs); ++k) {
-      Pair& pair = w.pairs[k];
-      const ContactParty &a = parties[pair.a], &b = parties[pair.b];
-      const double size = std::min(a.shape->size(), b.shape->size());
-      const double thickness = std::min(a.shape->thickness(), b.shape->thickness());
-      const double most = kQuick * thickness;
-      pair.way = approachOf(a, b);
-      pair.reach = kMargin * size + std::min(pair.way * h + falling, most);
-      pair.quick = pair.way * h > most;
-      PairFindings& findings = w.pair_findings[k];
-      findings = PairFindings();
-      if (pair.a == pair.b) {
-        pair.quick = false;
+    for (std::size_t k = first; k < std::min(halves, first + task_halves); ++k) {
+      const Pair& pair = w.pairs[k / 2];
+      HalfFindings& findings = w.halves[k];
+      findings = HalfFindings();
+      if (pair.a != pair.b) {
+        const Index of = k % 2 ? pair.b : pair.a, in = k % 2 ? pair.a : pair.b;
+        w.lookInto(task, parties, pair, of, in, parties[in].maps, false, findings.inside);
+      } else if (k % 2 == 0) {
         w.lookIntoSelf(task, parties, pair);
-      } else {
-        w.lookInto(task, parties, pair, pair.a, pair.b, b.maps, false, findings.of_a);
-        w.lookInto(task, parties, pair, pair.b, pair.a, a.maps, false, findings.of_b);
       }
       findings.contacts = task.contacts.size();
       findings.entries = task.entries.size();
@@ -201,13 +203,16 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
       w.depths.insert(w.depths.end(), task.depths.begin(), task.depths.end());
       continue;
     }
-    const std::size_t first = (n - ground_tasks) * kTaskPairs;
-    PairFindings start;
-    for (std::size_t k = first; k < std::min(w.pairs.size(), first + kTaskPairs); ++k) {
-      Pair& pair = w.pairs[k];
-      const PairFindings& findings = w.pair_findings[k];
+    const std::size_t first = (n - ground_tasks) * task_halves;
+    HalfFindings start;
+    for (std::size_t k = first; k < std::min(halves, first + task_halves); ++k) {
+      Pair& pair = w.pairs[k / 2];
+      const HalfFindings& findings = w.halves[k];
       const ContactParty &a = parties[pair.a], &b = parties[pair.b];
-      if (pair.a != pair.b && w.letOutWhole(parties, pair, findings.of_a, findings.of_b, h, counters)) {
+      if (k % 2 == 0)
+        pair.expelled =
+            pair.a != pair.b && w.letOutWhole(parties, pair, findings.inside, w.halves[k + 1].inside, h, counters);
+      if (pair.expelled) {
         pair.quick = false;
       } else {
         w.join(task, start.contacts, findings.contacts, start.entries, findings.entries);

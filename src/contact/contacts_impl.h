@@ -16,9 +16,10 @@ inline constexpr double kMostPasses = 4.0;  // beyond it substeps do more
 
 struct Pair {
   Index a, b;
-  double reach;  // [m] how far outside a point is taken as a contact to come
-  bool quick;    // looked up anew in every substep
-  double way;    // [m/s] at which its bodies move, at most
+  double reach;           // [m] how far outside a point is taken as a contact to come
+  bool quick;             // looked up anew in every substep
+  double way;             // [m/s] at which its bodies move, at most
+  bool expelled = false;  // one is inside the other, and let out as a whole
 };
 
 inline Box intersection(const Box& a, const Box& b) { return {a.min.cwiseMax(b.min), a.max.cwiseMin(b.max)}; }
@@ -104,9 +105,9 @@ struct Inside {
   double deepest = 0.0;
 };
 
-/// Where a task has the contacts of a pair.
-struct PairFindings {
-  Inside of_a, of_b;
+/// What one party of a pair has found in the other, and where its task has it.
+struct HalfFindings {
+  Inside inside;
   std::size_t contacts = 0, entries = 0, depths = 0;  // ends
 };
 
@@ -147,7 +148,7 @@ struct Contacts::Impl {
   bool fresh = true;                        // nothing has been solved since the contacts were made
   bool plan_steady = true;                  // the plan is that of the steady contacts alone
   std::vector<Findings> tasks;
-  std::vector<PairFindings> pair_findings;
+  std::vector<HalfFindings> halves;  // two a pair; of a body with itself the second is empty
   std::vector<QuickFindings> quick;  // one a pair; of those that are quick
   bool was_steady = true;            // the last solve had no others than the steady contacts
   bool settled = false;              // nothing is quick or caught in this frame

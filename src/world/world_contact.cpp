@@ -16,6 +16,7 @@ constexpr double kLeastRigid = 0.5;          // share of a contact's impulse tha
 constexpr double kFlattest = 1e-6;           // det of a map: below, the rotation stands in
 constexpr std::size_t kWorthAThread = 1000;  // vertices
 constexpr std::size_t kKeptModels = 64;      // more than this many dead entries are cleared away
+constexpr double kNearPiece = 0.02;          // of the size: beside the bounds of a piece
 
 SurfaceRows rowsOf(const BodyModel& model) {
   const SurfaceBinding& b = model.binding;
@@ -114,6 +115,33 @@ void World::Impl::foreseeContact(WorldBody& body) {
   if (settings.contact != ContactMethod::kRestShape || body.model->surface.vertices.size() < kWorthAThread) return;
   body.coming_contact = std::async(std::launch::async, [model = body.model]() -> std::shared_ptr<const ContactModel> {
     return std::make_shared<ContactModel>(model);
+  });
+}
+
+// Nobody has asked fresh shapes yet, and the first step would ask all at once: where the points of one piece were in
+// the rest shape that they were cut from is where they are in the other's.
+void World::Impl::foreseeMeeting(const std::vector<BodyId>& pieces) {
+  using Coming = std::shared_future<std::shared_ptr<const ContactModel>>;
+  std::vector<Coming> coming;
+  WorldBody* last = nullptr;
+  for (const BodyId& id : pieces) {
+    WorldBody& body = *find(id);
+    if (!body.coming_contact.valid()) continue;
+    coming.push_back(body.coming_contact);
+    last = &body;
+  }
+  if (coming.size() < 2) return;
+  last->coming_meeting = std::async(std::launch::async, [coming] {
+    for (const Coming& a : coming)
+      for (const Coming& b : coming) {
+        if (a.get() == b.get()) continue;
+        const ContactShape &of = a.get()->shape, &in = b.get()->shape;
+        Box near = in.bounds();
+        near.min.array() -= kNearPiece * in.size();
+        near.max.array() += kNearPiece * in.size();
+        for (const ContactSample& sample : of.samples())
+          if (const Vec3& p = of.surface().vertices[sample.vertices[0]]; near.contains(p)) in.clearance(p);
+      }
   });
 }
 

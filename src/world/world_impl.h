@@ -50,6 +50,7 @@ struct WorldBody {
   std::shared_ptr<const ContactMesh> mesh;                                 // made when something first comes near
   std::shared_ptr<const ContactModel> contact;                             // likewise, of the present model
   std::shared_future<std::shared_ptr<const ContactModel>> coming_contact;  // being made by another thread
+  std::future<void> coming_meeting;          // likewise: what its contact is about to look up
   std::vector<ContactMap> maps;              // of this frame, where it can touch another body
   std::vector<QuadraticMap> quadratic_maps;  // likewise, where its mode is quadratic; maps point into it
   bool touched_by_push = false;
@@ -273,6 +274,7 @@ struct World::Impl {
   const ContactModel& contactModel(WorldBody& body);
   /// Begins to make it where it will be needed and takes long.
   void foreseeContact(WorldBody& body);
+  void foreseeMeeting(const std::vector<BodyId>& pieces);
   void findContacts(double h_frame);
   void fillParties();
   void fillParty(WorldBody& body, ContactParty& party);
