@@ -1,10 +1,11 @@
 // Run time of a cut into two sealed halves, and of CGAL's clip of both sides with caps in the same process.
 // sphere/50k is a ball of some 50,000 triangles cut through its middle, with points inside the cap; sphere/50k/plain
 // without; cgal_clip/sphere/50k is CGAL's, without copying the mesh for it. A row fails where the volumes do not add
-// up. successive/100: cuts without others before them, and the last ten of a hundred, of equal work; `grown` is how many
-// particles more there are than at the start. Counters: `triangles` of the mesh, `pieces`, `cap_triangles` of both
-// sides. The process keeps the memory that it once had, for all rows: to get it from the system page by page can take as
-// long as the cut. Of the repetitions, the median counts.
+// up. whole/10k is the command until the pieces have made a step, incision/10k half an incision through the same ball
+// until it is answered. successive/100: cuts without others before them, and the last ten of a hundred, of equal work;
+// `grown` is how many particles more there are than at the start. Counters: `triangles` of the mesh, `pieces`,
+// `cap_triangles` of both sides. The process keeps the memory that it once had, for all rows: to get it from the system
+// page by page can take as long as the cut. Of the repetitions, the median counts.
 #include <malloc.h>
 
 #include <cmath>
@@ -92,24 +93,47 @@ void clipRow(benchmark::State& state, const TriangleMesh& mesh) {
   state.counters["cap_triangles"] = static_cast<double>(clip.capTriangles(plane));
 }
 
-// From the command until the pieces have made their first step; the body is put there anew for each.
-void wholeRow(benchmark::State& state, bool elastic, ContactMethod contact) {
+// From the command until it is answered, or until the pieces have made their first step; the body is put there anew for
+// each.
+struct Whole {
+  const char* name;
+  bool elastic;
+  ContactMethod contact;
+  bool incise;
+};
+
+Command commandOf(const Whole& whole) {
+  const Vec3 on_plane(0.0, 0.01, 0.02), x = Vec3::UnitX(), y(0.0, 0.6, 0.8);
+  if (whole.incise) {
+    InciseCommand incise;  // down to the middle
+    incise.blade.origin = on_plane - 0.2 * x + 0.2 * y;
+    incise.blade.x_axis = x;
+    incise.blade.y_axis = y;
+    incise.blade.length = 0.4;
+    incise.blade.depth = 0.2;
+    return incise;
+  }
+  CutCommand cut;
+  cut.blades.origin = on_plane - 10.0 * x;
+  cut.blades.x_axis = x;
+  cut.blades.y_axis = y;
+  return cut;
+}
+
+void wholeRow(benchmark::State& state, const Whole& whole) {
   BodyDef def;
   def.name = "ball";
   def.mesh = ball(1.15e4);
   def.spacing = 0.0155;
-  if (elastic) def.material.youngs_modulus = 5e3;
+  if (whole.elastic) def.material.youngs_modulus = 5e3;
   const auto body = std::make_shared<const PreparedBody>(*prepareBody(std::move(def)));
   WorldSettings settings;
   settings.ground.reset();
-  settings.contact = contact;
+  settings.contact = whole.contact;
   World world(settings);
   if (!world.addSceneBody(body).ok()) return state.SkipWithError("the body was refused");
-  CutCommand cut;
-  cut.blades.origin = Vec3(-10.0, 0.01, 0.02);
-  cut.blades.x_axis = Vec3::UnitX();
-  cut.blades.y_axis = Vec3(0.0, 0.6, 0.8);
-  CutReply reply;
+  const Command command = commandOf(whole);
+  std::size_t pieces = 0;
   double step = 0.0;
   for (auto _ : state) {
     state.PauseTiming();
@@ -117,21 +141,21 @@ void wholeRow(benchmark::State& state, bool elastic, ContactMethod contact) {
     for (int k = 0; k < 3; ++k) world.step();
     step = world.snapshot({}).report.total;
     state.ResumeTiming();
-    const Result<Reply> answer = world.apply(cut);
-    world.step();
+    const Result<Reply> answer = world.apply(command);
+    if (!whole.incise) world.step();
     state.PauseTiming();
     if (!answer.ok()) return state.SkipWithError(answer.error().detail.c_str());
-    reply = std::get<CutReply>(*answer);
+    pieces = world.snapshot({}).bodies.size();
     state.ResumeTiming();
   }
   state.counters["triangles"] = static_cast<double>(body->model->surface.triangles.size());
   state.counters["particles"] = static_cast<double>(body->model->rest.size());
-  state.counters["pieces"] = static_cast<double>(reply.new_bodies.size());
+  state.counters["pieces"] = static_cast<double>(pieces);
   state.counters["step_before_ms"] = 1e3 * step;
 }
 
-// The mean of ten cuts that take slices off a bar's end, after so many others. Without history the bar is as long as the
-// other is by then, so that the ten do the same work; the world of the others holds their slices too.
+// The mean of ten cuts that take slices off a bar's end, after so many others. Without history the bar is as long as
+// the other is by then, so that the ten do the same work; the world of the others holds their slices too.
 constexpr double kSlice = 0.03;  // [m]
 constexpr int kTimedCuts = 10;
 
@@ -191,17 +215,12 @@ void registerRows() {
     const char* name;
     double triangles;
   };
-  struct Whole {
-    const char* name;
-    bool elastic;
-    ContactMethod contact;
-  };
   // Without contact it is the cut and the step alone; with the textbook contact the pieces get tetrahedra at once.
-  for (const Whole& whole :
-       {Whole{"whole/10k", true, ContactMethod::kNone}, Whole{"whole/10k/looks", false, ContactMethod::kNone},
-        Whole{"whole/10k/textbook", true, ContactMethod::kTextbook}})
-    benchmark::RegisterBenchmark(whole.name,
-                                 [whole](benchmark::State& state) { wholeRow(state, whole.elastic, whole.contact); })
+  for (const Whole& whole : {Whole{"whole/10k", true, ContactMethod::kNone, false},
+                             Whole{"whole/10k/looks", false, ContactMethod::kNone, false},
+                             Whole{"whole/10k/textbook", true, ContactMethod::kTextbook, false},
+                             Whole{"incision/10k", true, ContactMethod::kRestShape, true}})
+    benchmark::RegisterBenchmark(whole.name, [whole](benchmark::State& state) { wholeRow(state, whole); })
         ->Unit(benchmark::kMillisecond)
         ->UseRealTime()
         ->Repetitions(9)
