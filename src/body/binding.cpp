@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <functional>
+#include <limits>
 #include <mutex>
 #include <optional>
 
@@ -20,24 +23,10 @@ constexpr std::size_t kCarriers = 12;
 constexpr std::size_t kEnoughCarriers = 9;    // left of a rider's by a cut: no others are looked for
 constexpr std::size_t kMostCarriers = 40;     // of a rider that twelve would amplify
 constexpr double kSoft[] = {0.01, 0.1, 1.0};  // the softer, the less do the nearest carriers outweigh the others
-constexpr std::size_t kChunk = 256;           // riders
+constexpr std::size_t kChunk = 64;            // riders
 constexpr std::size_t kWalk = 64;             // particles looked at around the nearest one, along the body
 constexpr double kLever = 1e-9;               // of the distance to the farthest carrier: less is rounding
 constexpr double kRank = 0.03;  // of the moment's eigenvalues to the largest: below it, extrapolation is wild
-
-// Puts the `count` least first and in order. (A sixth of the time of std::partial_sort: the order is nearly right.)
-void firstInOrder(std::vector<std::pair<double, Index>>& order, std::size_t count) {
-  for (std::size_t i = 1; i < order.size(); ++i) {
-    const auto entry = order[i];
-    std::size_t k = std::min(i, count);
-    if (i >= count) {
-      if (!(entry < order[count - 1])) continue;
-      order[i] = order[--k];
-    }
-    for (; k > 0 && entry < order[k - 1]; --k) order[k] = order[k - 1];
-    order[k] = entry;
-  }
-}
 
 double magnitudeOf(const std::vector<double>& weights) {
   double sum = 0.0;
@@ -45,33 +34,43 @@ double magnitudeOf(const std::vector<double>& weights) {
   return sum;
 }
 
+// Squared distances in the order of integers, of which comparing takes half the time: their last bits say what it is.
+std::uint64_t orderedKey(double squared, std::size_t which) {
+  std::uint64_t bits;
+  std::memcpy(&bits, &squared, sizeof bits);
+  return bits / kWalk * kWalk + which;
+}
+double squaredOf(std::uint64_t key) {
+  double squared;
+  std::memcpy(&squared, &key, sizeof squared);
+  return squared;
+}
+
+using OfCarriers = Eigen::Array<double, Eigen::Dynamic, 1, 0, static_cast<int>(kMostCarriers), 1>;
+
 // Weights of the best affine map through the carriers, at p.
 void leastSquaresWeights(const Points& rest, const Vec3& p, const std::vector<Index>& carriers, double soft,
                          std::vector<double>& weights) {
-  const double reach = 1.1 * (rest[carriers.back()] - p).norm() + 1e-300;
-  const std::size_t n = carriers.size();
-  std::array<double, kMostCarriers> share;
-  std::array<std::array<double, 3>, kMostCarriers> arms;  // from p, in units of the reach
-  double total = 0.0;
-  Vec3 mean = Vec3::Zero();
-  for (std::size_t k = 0; k < n; ++k) {
-    const Vec3 arm = (rest[carriers[k]] - p) / reach;
-    const double squared = arm.squaredNorm();
-    share[k] = (1.0 - squared) * (1.0 - squared) / (soft + squared);
-    total += share[k];
-    mean += share[k] * arm;
-    arms[k] = {arm.x(), arm.y(), arm.z()};
+  const Eigen::Index n = static_cast<Eigen::Index>(carriers.size());
+  const double scale = 1.0 / (1.1 * (rest[carriers.back()] - p).norm() + 1e-300);
+  OfCarriers x(n), y(n), z(n);  // of the arms from p, in units of the reach
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Vec3& at = rest[carriers[static_cast<std::size_t>(k)]];
+    x[k] = scale * (at.x() - p.x());
+    y[k] = scale * (at.y() - p.y());
+    z[k] = scale * (at.z() - p.z());
   }
-  mean /= total;
+  const OfCarriers squared = x.square() + y.square() + z.square();
+  OfCarriers share = (1.0 - squared).square() / (soft + squared);
+  share *= 1.0 / share.sum();
+  const Vec3 mean((share * x).sum(), (share * y).sum(), (share * z).sum());
   // About the mean: what the particles do not span then drops out by itself.
-  double xx = 0.0, xy = 0.0, xz = 0.0, yy = 0.0, yz = 0.0, zz = 0.0;
-  for (std::size_t k = 0; k < n; ++k) {
-    share[k] /= total;
-    for (int axis = 0; axis < 3; ++axis) arms[k][axis] -= mean[axis];
-    const double x = share[k] * arms[k][0], y = share[k] * arms[k][1], z = share[k] * arms[k][2];
-    xx += x * arms[k][0], xy += x * arms[k][1], xz += x * arms[k][2];
-    yy += y * arms[k][1], yz += y * arms[k][2], zz += z * arms[k][2];
-  }
+  x -= mean.x();
+  y -= mean.y();
+  z -= mean.z();
+  const OfCarriers share_x = share * x, share_y = share * y;
+  const double xx = (share_x * x).sum(), xy = (share_x * y).sum(), xz = (share_x * z).sum();
+  const double yy = (share_y * y).sum(), yz = (share_y * z).sum(), zz = (share * z.square()).sum();
   Mat3 moment;
   moment << xx, xy, xz, xy, yy, yz, xz, yz, zz;
   Vec3 slope = Vec3::Zero();  // of the weights, along what is spanned
@@ -87,23 +86,18 @@ void leastSquaresWeights(const Points& rest, const Vec3& p, const std::vector<In
         slope +=
             solver.eigenvectors().col(axis) * (solver.eigenvectors().col(axis).dot(-mean) / solver.eigenvalues()[axis]);
   }
-  weights.resize(n);
-  for (std::size_t k = 0; k < n; ++k)
-    weights[k] = share[k] * (1.0 + slope[0] * arms[k][0] + slope[1] * arms[k][1] + slope[2] * arms[k][2]);
+  weights.resize(carriers.size());
+  Eigen::Map<Eigen::ArrayXd> found(weights.data(), n);
+  const OfCarriers beyond = share * (slope.x() * x + slope.y() * y + slope.z() * z);
+  found = share + beyond;
+  if (soft < kSoft[2] || !(found.abs().sum() > kMostWeight)) return;
   // Too much still: part of the way to the mean, which amplifies nothing. The lever takes what is missing then.
-  const double most = magnitudeOf(weights);
-  if (soft < kSoft[2] || !(most > kMostWeight)) return;
   double low = 0.0, high = 1.0;  // of the slope
-  const auto at = [&](double part) {
-    double sum = 0.0;
-    for (std::size_t k = 0; k < n; ++k) sum += std::abs(share[k] + part * (weights[k] - share[k]));
-    return sum;
-  };
   for (int halving = 0; halving < 30; ++halving) {
     const double middle = 0.5 * (low + high);
-    (at(middle) > kMostWeight ? high : low) = middle;
+    ((share + middle * beyond).abs().sum() > kMostWeight ? high : low) = middle;
   }
-  for (std::size_t k = 0; k < n; ++k) weights[k] = share[k] + low * (weights[k] - share[k]);
+  found = share + low * beyond;
 }
 
 // Looks for the carriers of riders, one after the other.
@@ -141,17 +135,12 @@ class Binder {
       leastSquaresWeights(rest, p, near_, kSoft[0], weights_);
       if (!(magnitudeOf(weights_) > kMostWeight)) return finishAt(p);
     }
-    const Index start = startOf(v);
-    order_.clear();
-    for (Index i : walkFrom(start)) {
-      if (i == kNoIndex) break;
-      if (i == start || !isSeparated(v, i)) order_.emplace_back((rest[i] - p).squaredNorm(), i);
-    }
-    choose(kCarriers);
+    const Walk& walk = walkFrom(startOf(v));
+    choose(v, walk, kCarriers);
     leastSquaresWeights(rest, p, near_, kSoft[0], weights_);
     for (const double soft : {kSoft[1], kSoft[2]}) {
       if (!(magnitudeOf(weights_) > kMostWeight)) break;
-      if (soft == kSoft[1]) choose(kMostCarriers);
+      if (soft == kSoft[1]) choose(v, walk, kMostCarriers);
       leastSquaresWeights(rest, p, near_, soft, weights_);
     }
     finishAt(p);
@@ -188,7 +177,7 @@ class Binder {
   }
 
   /// The nearest particle that the rider may follow.
-  Index startOf(Index v) const {
+  Index startOf(Index v) {
     const Vec3& p = task_.surface_rest[v];
     if (const Index r = task_.inherited ? task_.inherited->rider[v] : kNoIndex; r != kNoIndex) {
       // Carriers are sorted by distance: the first that is left is the nearest.
@@ -198,6 +187,9 @@ class Binder {
             kept != kNoIndex && !isSeparated(v, kept))
           return kept;
     }
+    if (task_.inherited && !task_.inherited->start.empty())
+      if (const Index known = task_.inherited->start[v]; known != kNoIndex && !isSeparated(v, known))
+        return nearestOf(walkFrom(known), v);
     if (task_.inherited && task_.inherited->separated) {
       std::array<Index, kWalk> near;
       for (const std::size_t looked : {std::size_t{4}, kWalk}) {
@@ -209,38 +201,67 @@ class Binder {
     return task_.nearest().nearest(p);
   }
 
-  // Particles around one, by steps along the graph; fewer than kWalk end with kNoIndex. The next rider starts there
-  // too.
-  using Walk = std::array<Index, kWalk>;
+  // Particles around one, by steps along the graph, the nearest first. The next rider starts there too.
+  struct Walk {
+    std::size_t count = 0;
+    std::array<std::pair<double, Index>, kWalk> found;  // [m] from the first
+  };
   const Walk& walkFrom(Index start) {
     if (walk_of_[start] != kNoIndex) return walks_[walk_of_[start]];
     walk_of_[start] = static_cast<Index>(walks_.size());
-    Walk& found = walks_.emplace_back();
-    std::size_t count = 0;
+    Walk& walk = walks_.emplace_back();
     const auto find = [&](Index i) {
-      if (count == kWalk || seen_[i] == start) return;
+      if (walk.count == kWalk || seen_[i] == start) return;
       seen_[i] = start;
-      found[count++] = i;
+      walk.found[walk.count++] = {(task_.rest[i] - task_.rest[start]).norm(), i};
     };
     find(start);
     const ParticleGraph& graph = task_.graph;
-    for (std::size_t at = 0; at < count && count < kWalk; ++at)
-      for (Index k = graph.offsets[found[at]]; k < graph.offsets[found[at] + 1]; ++k) find(graph.neighbours[k]);
-    if (count < kWalk) found[count] = kNoIndex;
-    return found;
+    for (std::size_t at = 0; at < walk.count && walk.count < kWalk; ++at) {
+      const Index from = walk.found[at].second;
+      for (Index k = graph.offsets[from]; k < graph.offsets[from + 1]; ++k) find(graph.neighbours[k]);
+    }
+    std::sort(walk.found.begin() + 1, walk.found.begin() + static_cast<std::ptrdiff_t>(walk.count));
+    return walk;
   }
 
-  void choose(std::size_t most) {
-    const std::size_t count = std::min(order_.size(), most);
-    const auto end = order_.begin() + static_cast<std::ptrdiff_t>(count);
-    if (most <= kCarriers) {
-      firstInOrder(order_, count);
-    } else {
-      if (order_.size() > most) std::nth_element(order_.begin(), end - 1, order_.end());
-      std::sort(order_.begin(), end);
+  Index nearestOf(const Walk& walk, Index v) const {
+    const Vec3& p = task_.surface_rest[v];
+    Index nearest = walk.found[0].second;
+    const double aside = (task_.rest[nearest] - p).norm();
+    double least = aside;
+    for (std::size_t k = 1; k < walk.count && walk.found[k].first < aside + least; ++k) {
+      const Index i = walk.found[k].second;
+      const double here = (task_.rest[i] - p).norm();
+      if (!(here < least) || isSeparated(v, i)) continue;
+      least = here;
+      nearest = i;
+    }
+    return nearest;
+  }
+
+  // The nearest to the rider in order, up to `most` of those that it may follow.
+  void choose(Index v, const Walk& walk, std::size_t most) {
+    const Vec3& p = task_.surface_rest[v];
+    const double aside = (task_.rest[walk.found[0].second] - p).norm();
+    std::array<std::uint64_t, kMostCarriers> order;
+    std::size_t count = 0;
+    double farthest = std::numeric_limits<double>::infinity();  // squared, once there are enough
+    for (std::size_t k = 0; k < walk.count; ++k) {
+      const auto& [away, i] = walk.found[k];
+      // No other can be nearer than this.
+      if (const double least = away - aside; least > 0.0 && least * least > farthest) break;
+      const double squared = (task_.rest[i] - p).squaredNorm();
+      if (squared > farthest || (k > 0 && isSeparated(v, i))) continue;
+      const std::uint64_t entry = orderedKey(squared, k);
+      if (count == most && entry > order[most - 1]) continue;  // as far, but for rounding
+      std::size_t at = count < most ? count++ : most - 1;
+      for (; at > 0 && entry < order[at - 1]; --at) order[at] = order[at - 1];
+      order[at] = entry;
+      if (count == most) farthest = squaredOf(order[most - 1]);
     }
     near_.clear();
-    for (auto at = order_.begin(); at != end; ++at) near_.push_back(at->second);
+    for (std::size_t k = 0; k < count; ++k) near_.push_back(walk.found[order[k] % kWalk].second);
   }
 
   void finishAt(const Vec3& p) {
@@ -264,7 +285,6 @@ class Binder {
   std::vector<Index> near_, seen_;  // seen_: the last walk that came by
   std::vector<Index> walk_of_;      // of a particle, in walks_
   std::vector<Walk> walks_;
-  std::vector<std::pair<double, Index>> order_;
   std::vector<double> weights_;
 };
 

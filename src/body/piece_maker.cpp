@@ -17,6 +17,8 @@
 namespace meshless {
 namespace {
 
+constexpr std::size_t kChunk = 512;  // riders
+
 template <class Get>
 Vec3 interpolate(const VertexOrigin& origin, const Get& get) {
   Vec3 sum = Vec3::Zero();
@@ -118,7 +120,7 @@ std::vector<BodyPiece> PieceMaker::make(const std::vector<PieceSource>& sources)
     masses[crumb.donor] -= crumb.mass;
     crumbs[p] = crumb;
   }
-  std::vector<Points> rest = restVertices(sources);
+  std::vector<RestShape> rest = restVertices(sources);
   std::vector<BodyPiece> pieces;
   pieces.resize(sources.size());
   std::vector<CutWork> works(sources.size());
@@ -130,7 +132,7 @@ std::vector<BodyPiece> PieceMaker::make(const std::vector<PieceSource>& sources)
   return pieces;
 }
 
-BodyPiece PieceMaker::makeOne(const PieceSource& from, Points rest, const std::vector<double>& masses,
+BodyPiece PieceMaker::makeOne(const PieceSource& from, RestShape rest, const std::vector<double>& masses,
                               const Crumb* crumb, CutWork& work) const {
   BodyPiece piece;
   auto child = std::make_shared<BodyModel>();
@@ -140,7 +142,7 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, Points rest, const std::v
   child->lips = model_.lips || !torn_.empty();
   child->surface.triangles = from.mesh.triangles;
   child->surface.patches = from.mesh.patches;
-  child->surface.vertices = std::move(rest);
+  child->surface.vertices = std::move(rest.vertices);
   child->rest_volume = signedVolume(child->surface);
   child->rest_area = surfaceArea(child->surface);
 
@@ -174,11 +176,12 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, Points rest, const std::v
 
   std::vector<Index> vertex_particle;
   std::vector<bool> taken(child->rest.size(), false);
-  InheritedBinding inherited{model_.binding, {}, renumbered, nullptr};
+  InheritedBinding inherited{model_.binding, {}, renumbered, {}, nullptr};
   for (Index at = 0; at < from.origins.size(); ++at) {
     const Index v = from.origins.same(at);
     if (v == kNoIndex) ++work.new_vertices;
     inherited.rider.push_back(v == kNoIndex ? kNoIndex : rider_of_[v]);
+    inherited.start.push_back(v == kNoIndex ? startOf(from.origins[at], rest.inside[at], renumbered) : kNoIndex);
     const Index parent = v == kNoIndex ? kNoIndex : model_.binding.particle[v];
     Index mine = parent == kNoIndex ? kNoIndex : renumbered[parent];
     // A vertex that was split is in the piece twice; one of the two rides.
@@ -203,48 +206,79 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, Points rest, const std::v
   piece.state.surface = from.mesh.vertices;
   piece.state.stretch = state_.stretch;
   piece.state.swelling = state_.swelling;
-  for (Index r = 0; r < child->binding.riders.size(); ++r)
-    piece.state.rider_offsets.push_back(from.mesh.vertices[child->binding.riders[r]] -
-                                        riderPosition(child->binding, piece.state.positions, piece.state.poses, r));
+  piece.state.rider_offsets.resize(child->binding.riders.size());
+  inChunks(piece.state.rider_offsets.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t r = begin; r < end; ++r)
+      piece.state.rider_offsets[r] =
+          from.mesh.vertices[child->binding.riders[r]] -
+          riderPosition(child->binding, piece.state.positions, piece.state.poses, static_cast<Index>(r));
+  });
   piece.model = std::move(child);
   return piece;
 }
 
 // Both sides of a cut have the same points inside: each is looked for once.
-std::vector<Points> PieceMaker::restVertices(const std::vector<PieceSource>& sources) {
-  std::vector<Points> all;
+std::vector<PieceMaker::RestShape> PieceMaker::restVertices(const std::vector<PieceSource>& sources) {
+  std::vector<RestShape> all;
   Points inside;
   std::vector<KnownPlace> rim;
-  std::unordered_map<Vec3, std::size_t, HashOfPlace> inside_at;
+  std::unordered_map<Vec3, Index, HashOfPlace> inside_at;
   std::unordered_set<Vec3, HashOfPlace> rim_at;
   for (const PieceSource& source : sources) {
-    all.emplace_back();
+    RestShape& shape = all.emplace_back();
+    shape.inside.assign(source.origins.size(), kNoIndex);
     bool any = false;
     for (Index v = 0; v < source.origins.size(); ++v) {
       const Index same = source.origins.same(v);
-      all.back().push_back(same != kNoIndex ? model_.surface.vertices[same]
-                                            : interpolate(source.origins[v], [&](Index parent) {
-                                                return model_.surface.vertices[parent];
-                                              }));
+      shape.vertices.push_back(same != kNoIndex ? model_.surface.vertices[same]
+                                                : interpolate(source.origins[v], [&](Index parent) {
+                                                    return model_.surface.vertices[parent];
+                                                  }));
       if (!source.origins.insideCap(v)) continue;
       any = true;
-      if (inside_at.emplace(source.mesh.vertices[v], inside.size()).second) inside.push_back(source.mesh.vertices[v]);
+      const auto [at, is_new] = inside_at.emplace(source.mesh.vertices[v], static_cast<Index>(inside.size()));
+      shape.inside[v] = at->second;
+      if (is_new) inside.push_back(source.mesh.vertices[v]);
     }
     if (!any) continue;
     for (std::size_t t = 0; t < source.mesh.triangles.size(); ++t) {
       if (source.mesh.patches[t] != new_patch_) continue;
       for (Index v : source.mesh.triangles[t])
         if (!source.origins.insideCap(v) && rim_at.insert(source.mesh.vertices[v]).second)
-          rim.push_back({source.mesh.vertices[v], all.back()[v]});
+          rim.push_back({source.mesh.vertices[v], shape.vertices[v]});
     }
   }
   if (inside.empty()) return all;
   if (!rest_places_) rest_places_.emplace(model_, state_);
-  const Points places = rest_places_->of(inside, rim);
-  for (std::size_t s = 0; s < sources.size(); ++s)
-    for (Index v = 0; v < sources[s].origins.size(); ++v)
-      if (sources[s].origins.insideCap(v)) all[s][v] = places[inside_at.at(sources[s].mesh.vertices[v])];
+  places_ = rest_places_->of(inside, rim);
+  for (RestShape& shape : all)
+    for (Index v = 0; v < shape.vertices.size(); ++v)
+      if (shape.inside[v] != kNoIndex) shape.vertices[v] = places_.rest[shape.inside[v]];
   return all;
+}
+
+Index PieceMaker::startOf(const VertexOrigin& origin, Index inside, const std::vector<Index>& renumbered) const {
+  const auto firstOf = [&](auto begin, auto end) {
+    for (; begin != end; ++begin)
+      if (*begin != kNoIndex && renumbered[*begin] != kNoIndex) return renumbered[*begin];
+    return kNoIndex;
+  };
+  if (inside != kNoIndex) {
+    const auto& nearest = places_.nearest[inside];
+    if (const Index start = firstOf(nearest.begin(), nearest.end()); start != kNoIndex) return start;
+    const auto around = model_.graph.neighbours.begin();
+    return firstOf(around + model_.graph.offsets[nearest[0]], around + model_.graph.offsets[nearest[0] + 1]);
+  }
+  for (const Index parent : origin.parents) {
+    if (parent == kNoIndex) continue;
+    const Index particle = model_.binding.particle[parent], rider = rider_of_[parent];
+    const auto carriers = model_.binding.carriers.begin();
+    const Index start = particle != kNoIndex ? firstOf(&particle, &particle + 1)
+                                             : firstOf(carriers + model_.binding.offsets[rider],
+                                                       carriers + model_.binding.offsets[rider + 1]);
+    if (start != kNoIndex) return start;
+  }
+  return kNoIndex;
 }
 
 }  // namespace meshless

@@ -37,9 +37,16 @@ class PieceMaker {
 
  private:
   struct Crumb;
-  BodyPiece makeOne(const PieceSource& source, Points rest, const std::vector<double>& masses, const Crumb* crumb,
+  /// What is known of a piece's vertices in the rest shape.
+  struct RestShape {
+    Points vertices;
+    std::vector<Index> inside;  // of each: its number in places_, kNoIndex: not inside a cap
+  };
+  BodyPiece makeOne(const PieceSource& source, RestShape rest, const std::vector<double>& masses, const Crumb* crumb,
                     CutWork& work) const;
-  std::vector<Points> restVertices(const std::vector<PieceSource>& sources);
+  std::vector<RestShape> restVertices(const std::vector<PieceSource>& sources);
+  /// A particle of the piece near a vertex that the blade made; kNoIndex: not found at once.
+  Index startOf(const VertexOrigin& origin, Index inside, const std::vector<Index>& renumbered) const;
 
   const BodyModel& model_;
   const BodyState& state_;
@@ -48,6 +55,7 @@ class PieceMaker {
   std::vector<bool> torn_;
   std::vector<Index> rider_of_;
   std::optional<RestPlaces> rest_places_;
+  FoundPlaces places_;
   CutWork work_;
 };
 

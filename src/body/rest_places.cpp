@@ -14,7 +14,6 @@ namespace meshless {
 namespace {
 
 constexpr std::size_t kParticles = 16;
-constexpr std::size_t kBlended = 4;  // maps of the nearest particles
 constexpr std::size_t kKnown = 8;
 constexpr std::size_t kChunk = 64;     // points
 constexpr double kSpanned = 1e-4;      // eigenvalue of the spread over the largest: flatter is not spanned
@@ -53,10 +52,7 @@ void makeMap(const BodyModel& model, const BodyState& state, const std::vector<I
   }
 }
 
-struct Near {
-  std::array<Index, kBlended> particles;
-  std::size_t count;
-};
+using Near = std::array<Index, FoundPlaces::kNear>;
 
 }  // namespace
 
@@ -79,20 +75,20 @@ struct RestPlaces::Data {
     std::vector<Near> near(points.size());
     inChunks(points.size(), kChunk, [&](std::size_t from, std::size_t to) {
       for (std::size_t n = from; n < to; ++n)
-        near[n].count = particles.nearest(points[n], kBlended, near[n].particles.data());
+        for (std::size_t k = particles.nearest(points[n], near[n].size(), near[n].data()); k < near[n].size(); ++k)
+          near[n][k] = kNoIndex;
     });
     return near;
   }
 
   void makeFor(const std::vector<Near>& points) {
     std::vector<Index> wanted;
-    for (const Near& near : points) {
-      for (std::size_t k = 0; k < near.count; ++k) {
-        Map& map = maps[near.particles[k]];
-        if (!map.wanted) wanted.push_back(near.particles[k]);
-        map.wanted = true;
+    for (const Near& near : points)
+      for (const Index particle : near) {
+        if (particle == kNoIndex || maps[particle].wanted) continue;
+        maps[particle].wanted = true;
+        wanted.push_back(particle);
       }
-    }
     make(wanted);
   }
 
@@ -100,9 +96,10 @@ struct RestPlaces::Data {
   Vec3 guess(const Vec3& p, const Near& near) const {
     Vec3 sum = Vec3::Zero();
     double total = 0.0;
-    for (std::size_t k = 0; k < near.count; ++k) {
-      const Map& map = maps[near.particles[k]];
-      const double weight = 1.0 / ((state.positions[near.particles[k]] - p).squaredNorm() + 1e-24);
+    for (const Index particle : near) {
+      if (particle == kNoIndex) break;
+      const Map& map = maps[particle];
+      const double weight = 1.0 / ((state.positions[particle] - p).squaredNorm() + 1e-24);
       sum += weight * (map.rest + map.linear * (p - map.present));
       total += weight;
     }
@@ -124,14 +121,16 @@ void RestPlaces::foresee(const std::function<bool(const Vec3& position)>& likely
   data_->make(wanted);
 }
 
-Points RestPlaces::of(const Points& present, const std::vector<KnownPlace>& known) {
-  Points places(present.size());
-  if (present.empty()) return places;
+FoundPlaces RestPlaces::of(const Points& present, const std::vector<KnownPlace>& known) {
+  FoundPlaces found;
+  if (present.empty()) return found;
+  found.rest.resize(present.size());
   Points known_at;
   for (const KnownPlace& k : known) known_at.push_back(k.present);
   const NearestPoints rim(known_at);
-  const std::vector<Near> near_present = data_->nearest(present), near_known = data_->nearest(known_at);
-  data_->makeFor(near_present);
+  found.nearest = data_->nearest(present);
+  const std::vector<Near> near_known = data_->nearest(known_at);
+  data_->makeFor(found.nearest);
   data_->makeFor(near_known);
   Points missed(known.size());
   for (std::size_t k = 0; k < known.size(); ++k) missed[k] = known[k].rest - data_->guess(known_at[k], near_known[k]);
@@ -147,10 +146,10 @@ Points RestPlaces::of(const Points& present, const std::vector<KnownPlace>& know
         residual += w * missed[k];
         total += w;
       }
-      places[n] = data_->guess(present[n], near_present[n]) + (total > 0.0 ? Vec3(residual / total) : residual);
+      found.rest[n] = data_->guess(present[n], found.nearest[n]) + (total > 0.0 ? Vec3(residual / total) : residual);
     }
   });
-  return places;
+  return found;
 }
 
 }  // namespace meshless

@@ -81,6 +81,33 @@ TEST(BindSurface, RidersOfAPieceAmplifyLittleAndFollowSmoothMotion) {
   }
 }
 
+// A blade knows a particle near each point that it makes; it need not be the nearest.
+TEST(BindSurface, CarriersAreTheNearestFromAnyParticleNearBy) {
+  BodyDef def = test::defOf(sphereMesh(0.1, 0.012), "ball");
+  def.spacing = 0.018;
+  const PreparedBody body = test::prepared(def);
+  const BodyModel& m = *body.model;
+  std::vector<Index> vertex_particle = m.binding.particle, same(m.rest.size());
+  for (std::size_t v = 0; v < vertex_particle.size(); v += 2) vertex_particle[v] = kNoIndex;
+  for (Index i = 0; i < same.size(); ++i) same[i] = i;
+  const SurfaceBinding searched = bindSurface(m.rest, m.graph, m.clusters, m.surface.vertices, vertex_particle);
+  InheritedBinding known{m.binding, std::vector<Index>(vertex_particle.size(), kNoIndex), same, {}, nullptr};
+  for (const Vec3& p : m.surface.vertices) {
+    Index nearest = 0;
+    for (Index i = 0; i < m.rest.size(); ++i)
+      if ((m.rest[i] - p).squaredNorm() < (m.rest[nearest] - p).squaredNorm()) nearest = i;
+    known.start.push_back(m.graph.neighbours[m.graph.offsets[nearest]]);
+  }
+  const SurfaceBinding begun = bindSurface(m.rest, m.graph, m.clusters, m.surface.vertices, vertex_particle, &known);
+  EXPECT_EQ(begun.bound, searched.bound);
+  ASSERT_EQ(begun.offsets, searched.offsets);
+  for (std::size_t r = 0; r < begun.riders.size(); ++r)
+    for (Index k = begun.offsets[r]; k < begun.offsets[r + 1]; ++k) {  // of those as far as each other, any
+      const Vec3& p = m.surface.vertices[begun.riders[r]];
+      EXPECT_NEAR((m.rest[begun.carriers[k]] - p).norm(), (m.rest[searched.carriers[k]] - p).norm(), 1e-12);
+    }
+}
+
 TEST(BindSurface, ParticlesInAPlaneOrAloneStillCarry) {
   const Points flat = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
   const ParticleGraph square = makeGraph(flat, {{0, 1}, {1, 3}, {3, 2}, {2, 0}});

@@ -18,11 +18,13 @@ constexpr double kMostWeight = 2.0;
 ///
 /// Of a piece, riders whose carriers all came along keep them, and those that have enough of theirs left get weights
 /// for these: `inherited` says which rider of the parent a vertex was (kNoIndex: none) and what the parent's particles
-/// are called in the piece (kNoIndex: not there).
+/// are called in the piece (kNoIndex: not there). `start` says which particle of the piece is near a vertex that is new
+/// (kNoIndex: it is looked for).
 struct InheritedBinding {
   const SurfaceBinding& parent;
   std::vector<Index> rider;
   const std::vector<Index>& renumbered;
+  std::vector<Index> start;  // of each vertex; may be empty
   /// True where a lip lies between a vertex and a particle: it does not follow it. May be empty.
   std::function<bool(Index vertex, Index particle)> separated;
 };

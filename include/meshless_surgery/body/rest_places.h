@@ -1,6 +1,7 @@
 // Where points that a blade has put inside a deformed body lie in its rest shape.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <memory>
 
@@ -12,6 +13,13 @@ namespace meshless {
 struct KnownPlace {
   Vec3 present;  // [m]
   Vec3 rest;     // [m]
+};
+
+/// What RestPlaces::of finds of every point.
+struct FoundPlaces {
+  static constexpr std::size_t kNear = 4;
+  Points rest;                                   // [m]
+  std::vector<std::array<Index, kNear>> nearest;  // particles in the present shape, the nearest first; kNoIndex: none
 };
 
 /// Rest places of points in the present shape: the affine maps of 16 particles each from present to rest, blended
@@ -27,7 +35,7 @@ class RestPlaces {
 
   /// Makes the maps around particles that are likely to be wanted, while others still look for the points.
   void foresee(const std::function<bool(const Vec3& position)>& likely);
-  Points of(const Points& present, const std::vector<KnownPlace>& known);
+  FoundPlaces of(const Points& present, const std::vector<KnownPlace>& known);
 
  private:
   struct Data;
