@@ -18,7 +18,7 @@ struct KnownPlace {
 /// What RestPlaces::of finds of every point.
 struct FoundPlaces {
   static constexpr std::size_t kNear = 4;
-  Points rest;                                   // [m]
+  Points rest;                                    // [m]
   std::vector<std::array<Index, kNear>> nearest;  // particles in the present shape, the nearest first; kNoIndex: none
 };
 
