@@ -173,6 +173,10 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, RestShape rest, const std
   work.rebuilt_clusters = clusters.rebuilt;
   child->clusters = std::move(clusters.clusters);
   inheritMoments(model_, from.members, *child);
+  piece.state.poses.resize(child->clusters.size());
+  piece.state.plastic =
+      inheritShapes(state_.plastic, model_.clusters, child->clusters, clusters.origin, piece.parent_particles);
+  fitClusters(matchInput(*child, piece.state), piece.state.positions, piece.state.poses);
 
   std::vector<Index> vertex_particle;
   std::vector<bool> taken(child->rest.size(), false);
@@ -199,10 +203,6 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, RestShape rest, const std
   work.bound_riders = child->binding.bound;
   work.kept_riders = child->binding.riders.size() - child->binding.bound;
   for (std::uint32_t patch : from.mesh.patches) work.new_triangles += patch == new_patch_;
-  piece.state.poses.resize(child->clusters.size());
-  piece.state.plastic =
-      inheritShapes(state_.plastic, model_.clusters, child->clusters, clusters.origin, piece.parent_particles);
-  fitClusters(matchInput(*child, piece.state), piece.state.positions, piece.state.poses);
   piece.state.surface = from.mesh.vertices;
   piece.state.stretch = state_.stretch;
   piece.state.swelling = state_.swelling;
@@ -219,25 +219,29 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, RestShape rest, const std
 
 // Both sides of a cut have the same points inside: each is looked for once.
 std::vector<PieceMaker::RestShape> PieceMaker::restVertices(const std::vector<PieceSource>& sources) {
-  std::vector<RestShape> all;
+  std::vector<RestShape> all(sources.size());
   Points inside;
   std::vector<KnownPlace> rim;
   std::unordered_map<Vec3, Index, HashOfPlace> inside_at;
   std::unordered_set<Vec3, HashOfPlace> rim_at;
-  for (const PieceSource& source : sources) {
-    RestShape& shape = all.emplace_back();
-    shape.inside.assign(source.origins.size(), kNoIndex);
+  inChunks(sources.size(), 1, [&](std::size_t s, std::size_t) {
+    for (Index v = 0; v < sources[s].origins.size(); ++v) {
+      const Index same = sources[s].origins.same(v);
+      all[s].vertices.push_back(same != kNoIndex ? model_.surface.vertices[same]
+                                                 : interpolate(sources[s].origins[v], [&](Index parent) {
+                                                     return model_.surface.vertices[parent];
+                                                   }));
+    }
+  });
+  for (std::size_t s = 0; s < sources.size(); ++s) {
+    const PieceSource& source = sources[s];
+    all[s].inside.assign(source.origins.size(), kNoIndex);
     bool any = false;
     for (Index v = 0; v < source.origins.size(); ++v) {
-      const Index same = source.origins.same(v);
-      shape.vertices.push_back(same != kNoIndex ? model_.surface.vertices[same]
-                                                : interpolate(source.origins[v], [&](Index parent) {
-                                                    return model_.surface.vertices[parent];
-                                                  }));
       if (!source.origins.insideCap(v)) continue;
       any = true;
       const auto [at, is_new] = inside_at.emplace(source.mesh.vertices[v], static_cast<Index>(inside.size()));
-      shape.inside[v] = at->second;
+      all[s].inside[v] = at->second;
       if (is_new) inside.push_back(source.mesh.vertices[v]);
     }
     if (!any) continue;
@@ -245,7 +249,7 @@ std::vector<PieceMaker::RestShape> PieceMaker::restVertices(const std::vector<Pi
       if (source.mesh.patches[t] != new_patch_) continue;
       for (Index v : source.mesh.triangles[t])
         if (!source.origins.insideCap(v) && rim_at.insert(source.mesh.vertices[v]).second)
-          rim.push_back({source.mesh.vertices[v], shape.vertices[v]});
+          rim.push_back({source.mesh.vertices[v], all[s].vertices[v]});
     }
   }
   if (inside.empty()) return all;
