@@ -185,7 +185,7 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, RestShape rest, const std
     const Index v = from.origins.same(at);
     if (v == kNoIndex) ++work.new_vertices;
     inherited.rider.push_back(v == kNoIndex ? kNoIndex : rider_of_[v]);
-    inherited.start.push_back(v == kNoIndex ? startOf(from.origins[at], rest.inside[at], renumbered) : kNoIndex);
+    inherited.start.push_back(v == kNoIndex ? startOf(from, at, rest.inside[at], renumbered) : kNoIndex);
     const Index parent = v == kNoIndex ? kNoIndex : model_.binding.particle[v];
     Index mine = parent == kNoIndex ? kNoIndex : renumbered[parent];
     // A vertex that was split is in the piece twice; one of the two rides.
@@ -261,10 +261,13 @@ std::vector<PieceMaker::RestShape> PieceMaker::restVertices(const std::vector<Pi
   return all;
 }
 
-Index PieceMaker::startOf(const VertexOrigin& origin, Index inside, const std::vector<Index>& renumbered) const {
+Index PieceMaker::startOf(const PieceSource& source, Index vertex, Index inside,
+                          const std::vector<Index>& renumbered) const {
   const auto firstOf = [&](auto begin, auto end) {
     for (; begin != end; ++begin)
-      if (*begin != kNoIndex && renumbered[*begin] != kNoIndex) return renumbered[*begin];
+      if (*begin != kNoIndex && renumbered[*begin] != kNoIndex &&
+          !(source.separated && source.separated(vertex, *begin)))
+        return renumbered[*begin];
     return kNoIndex;
   };
   if (inside != kNoIndex) {
@@ -273,7 +276,7 @@ Index PieceMaker::startOf(const VertexOrigin& origin, Index inside, const std::v
     const auto around = model_.graph.neighbours.begin();
     return firstOf(around + model_.graph.offsets[nearest[0]], around + model_.graph.offsets[nearest[0] + 1]);
   }
-  for (const Index parent : origin.parents) {
+  for (const Index parent : source.origins[vertex].parents) {
     if (parent == kNoIndex) continue;
     const Index particle = model_.binding.particle[parent], rider = rider_of_[parent];
     const auto carriers = model_.binding.carriers.begin();

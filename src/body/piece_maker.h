@@ -45,8 +45,8 @@ class PieceMaker {
   BodyPiece makeOne(const PieceSource& source, RestShape rest, const std::vector<double>& masses, const Crumb* crumb,
                     CutWork& work) const;
   std::vector<RestShape> restVertices(const std::vector<PieceSource>& sources);
-  /// A particle of the piece near a vertex that the blade made; kNoIndex: not found at once.
-  Index startOf(const VertexOrigin& origin, Index inside, const std::vector<Index>& renumbered) const;
+  /// A particle of the piece that a vertex made by the blade may follow, near it; kNoIndex: not found at once.
+  Index startOf(const PieceSource& source, Index vertex, Index inside, const std::vector<Index>& renumbered) const;
 
   const BodyModel& model_;
   const BodyState& state_;
