@@ -1,6 +1,7 @@
 // Which points of a party are near the surface of another, or of the ground.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "contacts_impl.h"
 
@@ -10,6 +11,8 @@ namespace {
 constexpr double kDeviation = 0.1;      // of the rest bounds' diagonal: how far a surface may be from its maps, at most
 constexpr double kNeighbour = 3.0;      // times what a vertex is off by its own map: by the one beside it
 constexpr double kSameMap = 2.0;        // likewise, between two vertices
+constexpr double kLoose = 0.02;         // of the size: a surface that is farther from its maps is looked at itself
+constexpr double kSlopeError = 0.5;     // of a map, at most
 constexpr double kMovedInRest = 0.005;  // of the size: a lookup is repeated where the deviation moved it farther
 constexpr std::size_t kLookAnew = 8;    // frames after which a point is looked up though it seems to be where it was
 constexpr double kWellWithin = 0.02;    // barycentric
@@ -22,8 +25,12 @@ constexpr double kSlack = 0.1;      // of the thickness: how much farther a bett
 
 namespace {
 
-// How far a surface may be from where its maps have it, within a region [m].
-double deviationWithin(const ContactParty& party, const MapFinder& finder, const ContactMap* maps, const Box& region) {
+// How far a surface is from where its maps have it, within a region.
+void look(const ContactParty& party, const MapFinder& finder, const ContactMap* maps, const Box& region,
+          SurfaceNow& surface) {
+  surface.finder.clear();
+  surface.vertices.clear();
+  bool bent = false;
   const ContactShape& shape = *party.shape;
   const double most = kDeviation * shape.bounds().diagonal();
   const Box near = grown(region, most);
@@ -37,15 +44,26 @@ double deviationWithin(const ContactParty& party, const MapFinder& finder, const
     const Vec3 fitted =
         map.quadratic ? map.quadratic->at(at_rest) : Vec3(map.from_rest * (at_rest - map.rest) + map.centre);
     farthest = std::max(farthest, (now - fitted).squaredNorm());
+    bent = bent || map.quadratic;
   }
-  return std::min(most, (party.map_count > 1 ? kNeighbour : kSameMap) * std::sqrt(farthest));
+  surface.deviation = std::min(most, (party.map_count > 1 ? kNeighbour : kSameMap) * std::sqrt(farthest));
+  surface.loose = !bent && surface.deviation > kLoose * shape.size();
+  if (!surface.loose) return;
+  for (Index v = 0; v < shape.surface().vertices.size(); ++v) {
+    const Vec3& now = vertexAt(party, v);
+    if (!near.contains(now)) continue;
+    surface.finder.add(now);
+    surface.vertices.push_back(v);
+  }
+  surface.finder.build();
+  surface.loose = !surface.vertices.empty();
 }
 
 }  // namespace
 
-bool Contacts::Impl::locate(const ContactParty& b, double deviation, const MapFinder& finder, const ContactMap* maps,
-                            const Vec3& p, const Vec3& inward, double reach, ContactShape::Nearest& found,
-                            bool& flipped, ContactCounters& counters) const {
+bool Contacts::Impl::locate(const ContactParty& b, const SurfaceNow& surface, const MapFinder& finder,
+                            const ContactMap* maps, const Vec3& p, const std::function<Vec3()>& inwardAt, double reach,
+                            Index& hint, ContactShape::Nearest& found, bool& flipped, ContactCounters& counters) const {
   const ContactMap& map = maps[finder.nearest(p)];
   flipped = map.flipped;
   const ContactShape& shape = *b.shape;
@@ -56,16 +74,29 @@ bool Contacts::Impl::locate(const ContactParty& b, double deviation, const MapFi
     to_rest = &bent;
     flipped = bent.determinant() < 0.0;
   }
+  double deviation = surface.deviation;
+  if (surface.loose) {
+    // From the nearest vertex, whose place at rest is known.
+    const Index v = surface.vertices[surface.finder.nearest(p)];
+    const Vec3 from = p - vertexAt(b, v);
+    rest = map.to_rest * from + shape.surface().vertices[v];
+    deviation = std::min(deviation, kSlopeError * from.norm());
+    // Neither near the surface nor inside, for the map cannot be so wrong.
+    if (kSlopeError * from.norm() > shape.meanEdge() + reach && shape.isOutside(rest)) return false;
+  }
   // So far outside of the rest bounds that no deviation brings it back: nothing to look up.
   const Box& bounds = shape.bounds();
   const Vec3 beyond = (bounds.min - rest).cwiseMax(rest - bounds.max).cwiseMax(0.0);
   const double far = deviation + reach;
-  if (!(beyond.squaredNorm() < far * far) || shape.clearance(rest) > far) return false;
-  const Vec3 inward_rest = (*to_rest * inward).normalized();
+  if (!(beyond.squaredNorm() < far * far)) return false;
+  const bool near = hint != kNoIndex && shape.distanceTo(hint, rest) <= far;
+  if (!near && shape.clearance(rest, hint) > far) return false;
+  const Vec3 inward_rest = (*to_rest * inwardAt()).normalized();
   const double enough = kMovedInRest * shape.size();
   for (int n = 0; n < kMostLookups; ++n) {
     ++counters.lookups;
-    if (!shape.nearest(rest, inward_rest, kSlack * shape.thickness(), found)) return false;
+    if (!shape.nearest(rest, inward_rest, kSlack * shape.thickness(), found, hint)) return false;
+    hint = found.triangle;
     if (n + 1 == kMostLookups) break;
     if (found.distance > far) return false;
     // The surface does not lie where the affine map has it: by so much the point is looked up elsewhere.
@@ -181,7 +212,8 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
     if (!(std::abs(det) > kFlattest)) return -(map.to_rest.transpose() * sample.normal).normalized();
     return -(slope.inverse().transpose() * sample.normal).normalized();
   };
-  double deviation = -1.0;  // known once something is looked up
+  to.surface.deviation = -1.0;
+  Index hint = kNoIndex;  // the triangle that was found last: the next point is often near it
   for (Index s = 0; s < samples.size(); ++s) {
     const Vec3 p = sampleAt(of, samples[s]);
     if (!region.contains(p)) continue;
@@ -192,8 +224,9 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
     ContactShape::Nearest found;
     bool flipped = false;
     if (!stillOver(to.cursor, with, a, b, s, p, every_point, found, flipped)) {
-      if (deviation < 0.0) deviation = deviationWithin(with, finders[b], maps, region);
-      if (!locate(with, deviation, finders[b], maps, p, inwardAt(p, samples[s]), pair.reach, found, flipped,
+      if (to.surface.deviation < 0.0) look(with, finders[b], maps, region, to.surface);
+      const auto inward = [&] { return inwardAt(p, samples[s]); };
+      if (!locate(with, to.surface, finders[b], maps, p, std::cref(inward), pair.reach, hint, found, flipped,
                   to.counters))
         continue;
     }

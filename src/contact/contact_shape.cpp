@@ -22,11 +22,12 @@ constexpr double kFlatEdge = 0.996;  // cosine between neighbours: about 5 degre
 constexpr double kMostPlaces = 1e6;  // along an axis of the grid in which samples keep apart
 constexpr int kMostEdgeSamples = 64;
 constexpr std::size_t kThicknessRays = 48;
-constexpr double kOnRim = 1e-6;        // of a squared distance: straight above the rim of a face
-constexpr double kFacing = 0.1;        // cosine: a face pushes a body's point into the body
-constexpr std::size_t kBounding = 4;   // triangles that tell how far the nearest to a point of a cell can be
-constexpr std::uintptr_t kAsked = 12;  // times that the bins are searched before a cell is filled
-constexpr double kTie = 1e-9;          // relative: two features are equally near
+constexpr double kOnRim = 1e-6;           // of a squared distance: straight above the rim of a face
+constexpr double kFacing = 0.1;           // cosine: a face pushes a body's point into the body
+constexpr std::size_t kBounding = 4;      // triangles that tell how far the nearest to a point of a cell can be
+constexpr std::uintptr_t kAsked = 12;     // times that the bins are searched before a cell is filled
+constexpr double kSphereRounding = 1e-6;  // relative, of what is kept in single precision
+constexpr double kTie = 1e-9;             // relative: two features are equally near
 
 }  // namespace
 
@@ -63,7 +64,7 @@ Facet makeFacet(const TriangleMesh& mesh, Index t) {
   return f;
 }
 
-double meanEdge(const TriangleMesh& mesh) {
+double meanEdgeOf(const TriangleMesh& mesh) {
   double sum = 0.0;
   for (const Triangle& t : mesh.triangles)
     for (int k = 0; k < 3; ++k) sum += (mesh.vertices[t[k]] - mesh.vertices[t[(k + 1) % 3]]).norm();
@@ -124,7 +125,7 @@ ContactShape::ContactShape(const TriangleMesh& surface, const SurfaceRows& rows,
   if (surface_.triangles.empty()) return;
 
   const Vec3 extent = bounds_.max - bounds_.min;
-  cell_edge_ = kCellEdges * meanEdge(surface_);
+  cell_edge_ = kCellEdges * mean_edge_;
   const double padded = (extent.array() + 4.0 * cell_edge_).prod();
   cell_edge_ = std::max(cell_edge_, std::cbrt(padded / kMostCells));
   if (!(cell_edge_ > 0.0) || !std::isfinite(cell_edge_)) return;
@@ -149,14 +150,16 @@ ContactShape::~ContactShape() {
 
 std::size_t ContactShape::bytes() const {
   return sizeof *this + bytesOf(surface_.vertices, surface_.triangles, surface_.patches, facets_, rider_of_, samples_) +
-         bytesOf(bin_offsets_, bin_triangles_, across_) +
+         bytesOf(bin_offsets_, bin_triangles_, bin_spheres_, across_) +
+         (bin_offsets_.empty() ? 0 : bin_offsets_.size() - 1) +
          cell_total_ * (sizeof(std::atomic<std::uintptr_t>) + sizeof(std::atomic<float>)) +
          cell_bytes_.load(std::memory_order_relaxed);
 }
 
 void ContactShape::binTriangles() {
   const Vec3 extent = bounds_.max - bounds_.min;
-  bin_edge_ = kBinEdges * meanEdge(surface_);
+  mean_edge_ = meanEdgeOf(surface_);
+  bin_edge_ = kBinEdges * mean_edge_;
   bin_edge_ = std::max(bin_edge_, std::cbrt((extent.array() + 2.0 * bin_edge_).prod() / kMostBins));
   if (!(bin_edge_ > 0.0) || !std::isfinite(bin_edge_)) bin_edge_ = 1.0;
   bin_origin_ = bounds_.min.array() - 0.5 * bin_edge_;
@@ -166,6 +169,7 @@ void ContactShape::binTriangles() {
     total *= static_cast<std::size_t>(bins_[d]);
   }
   bin_offsets_.assign(total + 1, 0);
+  bin_sides_ = std::make_unique<std::atomic<signed char>[]>(total);
   const auto forBins = [this](Index t, const auto& visit) {
     const Box box = boundsOf(surface_, t);
     std::array<int, 3> first, last;
@@ -184,6 +188,13 @@ void ContactShape::binTriangles() {
   std::vector<Index> next(bin_offsets_.begin(), bin_offsets_.end() - 1);
   for (Index t = 0; t < surface_.triangles.size(); ++t)
     forBins(t, [&](std::size_t bin) { bin_triangles_[next[bin]++] = t; });
+  const double rounding = kSphereRounding * (extent.norm() + bin_edge_);
+  bin_spheres_.reserve(bin_triangles_.size());
+  for (const Index t : bin_triangles_) {
+    const Facet& f = facets_[t];
+    const Eigen::Vector3f centre = (f.centre - bin_origin_).cast<float>();
+    bin_spheres_.push_back({centre.x(), centre.y(), centre.z(), static_cast<float>(f.radius + rounding)});
+  }
 }
 
 template <class Visit>
@@ -432,10 +443,24 @@ bool ContactShape::searchBins(const Vec3& rest, double within, Nearest& found) c
   best.squared = within * within;
   const Grid grid{bin_origin_, bin_edge_, bins_};
   const std::array<int, 3> home = grid.cellAt(rest);
+  const Eigen::Vector3f p = (rest - bin_origin_).cast<float>();
+  float bound = INFINITY;
+  double farthest = INFINITY;  // squared
+  const auto tighten = [&] {
+    bound = static_cast<float>((1.0 + 10.0 * kSphereRounding) * best.distance);
+    farthest = (best.distance + 1e-9 * size_) * (best.distance + 1e-9 * size_);
+  };
+  tighten();
   for (int ring = 0, rings = grid.ringsAround(home); ring <= rings; ++ring) {
     visitRing(grid, home, ring, [&](std::size_t bin) {
-      for (Index k = bin_offsets_[bin]; k < bin_offsets_[bin + 1]; ++k)
+      if (bin_offsets_[bin] == bin_offsets_[bin + 1] || grid.squaredGap(bin, rest) > farthest) return;
+      for (Index k = bin_offsets_[bin]; k < bin_offsets_[bin + 1]; ++k) {
+        const std::array<float, 4>& sphere = bin_spheres_[k];
+        const float x = p.x() - sphere[0], y = p.y() - sphere[1], z = p.z() - sphere[2], reach = bound + sphere[3];
+        if (x * x + y * y + z * z > reach * reach) continue;
         best.offer(facets_[bin_triangles_[k]], rest, found);
+        tighten();
+      }
     });
     if (best.distance <= beyondRing(grid, home, ring, rest) - 1e-9 * size_) break;
   }
@@ -466,7 +491,25 @@ bool ContactShape::isBeyondCells(const Vec3& rest) const {
   return false;
 }
 
-double ContactShape::clearance(const Vec3& rest) const {
+bool ContactShape::isOutside(const Vec3& rest) const {
+  if (!cells_ || !rest.allFinite()) return false;
+  for (int d = 0; d < 3; ++d)
+    if (rest[d] < bounds_.min[d] || rest[d] > bounds_.max[d]) return true;
+  const Grid grid{bin_origin_, bin_edge_, bins_};
+  const std::array<int, 3> at = grid.cellAt(rest);
+  const std::size_t bin = grid.number(at[0], at[1], at[2]);
+  if (bin_offsets_[bin] != bin_offsets_[bin + 1]) return false;
+  signed char side = bin_sides_[bin].load(std::memory_order_relaxed);
+  if (side == 0) {
+    Nearest found;
+    const Vec3 centre = bin_origin_ + bin_edge_ * Vec3(at[0] + 0.5, at[1] + 0.5, at[2] + 0.5);
+    side = searchBins(centre, std::numeric_limits<double>::infinity(), found) && found.distance > 0.0 ? 1 : -1;
+    bin_sides_[bin].store(side, std::memory_order_relaxed);  // whoever else asks finds the same
+  }
+  return side > 0;
+}
+
+double ContactShape::clearance(const Vec3& rest, Index hint) const {
   if (!cells_ || !rest.allFinite()) return -1.0;
   std::array<int, 3> at;
   const std::size_t index = cellAt(rest, at);
@@ -474,14 +517,19 @@ double ContactShape::clearance(const Vec3& rest) const {
   float known = distances_[index].load(std::memory_order_relaxed);
   if (std::isnan(known)) {
     Nearest found;
-    const bool any = searchBins(centre, std::numeric_limits<double>::infinity(), found);
+    const double most = hint == kNoIndex ? std::numeric_limits<double>::infinity() : distanceTo(hint, centre);
+    const bool any = searchBins(centre, (1.0 + 1e-6) * most + 1e-9 * size_, found);
     known = any ? static_cast<float>(found.distance) : -std::numeric_limits<float>::infinity();
     distances_[index].store(known, std::memory_order_relaxed);  // whoever else asks finds the same
   }
   return known - 1e-6 * std::abs(known) - (rest - centre).norm();
 }
 
-bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
+double ContactShape::distanceTo(Index triangle, const Vec3& rest) const {
+  return std::sqrt(measure(facets_[triangle], rest).squared);
+}
+
+bool ContactShape::nearest(const Vec3& rest, Nearest& found, Index hint) const {
   found.triangle = kNoIndex;
   if (!cells_ || !rest.allFinite()) return false;
   std::array<int, 3> at;
@@ -495,7 +543,9 @@ bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
     if (!beyond) cells_[index].compare_exchange_strong(asked, known + 1, std::memory_order_acq_rel);
     const double centre = distances_[index].load(std::memory_order_relaxed);
     const Vec3 from = rest - (cell_origin_ + cell_edge_ * Vec3(at[0] + 0.5, at[1] + 0.5, at[2] + 0.5));
-    const double within = (1.0 + 1e-6) * (std::abs(centre) + from.norm()) + 1e-9 * size_;
+    double most = hint == kNoIndex ? std::numeric_limits<double>::infinity() : distanceTo(hint, rest);
+    if (std::isfinite(centre)) most = std::min(most, std::abs(centre) + from.norm());
+    const double within = (1.0 + 1e-6) * most + 1e-9 * size_;
     return searchBins(rest, std::isfinite(within) ? within : std::numeric_limits<double>::infinity(), found);
   }
   const Cell* cell = known > kAsked ? reinterpret_cast<const Cell*>(known) : fill(index, at);
@@ -511,8 +561,8 @@ bool ContactShape::nearest(const Vec3& rest, Nearest& found) const {
   return found.triangle != kNoIndex;
 }
 
-bool ContactShape::nearest(const Vec3& rest, const Vec3& inward, double slack, Nearest& found) const {
-  if (!nearest(rest, found)) return false;
+bool ContactShape::nearest(const Vec3& rest, const Vec3& inward, double slack, Nearest& found, Index hint) const {
+  if (!nearest(rest, found, hint)) return false;
   if (std::abs(found.distance) > slack) return true;
   if (facets_[found.triangle].normal.dot(inward) > kFacing) return true;
   double best = slack + std::abs(found.distance);

@@ -12,7 +12,8 @@ std::size_t bytesOfMap(const Map& map) {
 }
 
 std::size_t bytesOfFindings(const Findings& f) {
-  return bytesOf(f.contacts, f.entries, f.depths, f.self_areas, f.ridges) + f.self_grid.bytes();
+  return bytesOf(f.contacts, f.entries, f.depths, f.self_areas, f.ridges, f.surface.vertices) + f.self_grid.bytes() +
+         f.surface.finder.bytes();
 }
 
 }  // namespace

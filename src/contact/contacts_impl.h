@@ -1,6 +1,7 @@
 // What Contacts keeps; shared by the files that implement it.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <tuple>
 
@@ -79,6 +80,14 @@ struct RidgeNow {
   Index ridge;
 };
 
+/// Vertices of a surface where they are now, for the points of another.
+struct SurfaceNow {
+  PointFinder finder;
+  std::vector<Index> vertices;  // as the finder numbers them
+  double deviation = -1.0;      // [m] how far the surface may be from where its maps have it; negative: not known yet
+  bool loose = false;           // by so much that the nearest vertex tells more
+};
+
 /// What a task finds; tasks are joined in their order.
 struct Findings {
   std::vector<Contact> contacts;
@@ -89,6 +98,7 @@ struct Findings {
   Points self_areas;
   std::vector<RidgeNow> ridges;
   std::size_t cursor = 0;  // in the contacts of the last frame
+  SurfaceNow surface;
 
   void clear() {
     contacts.clear();
@@ -153,9 +163,9 @@ struct Contacts::Impl {
   bool was_steady = true;            // the last solve had no others than the steady contacts
   bool settled = false;              // nothing is quick or caught in this frame
 
-  bool locate(const ContactParty& b, double deviation, const MapFinder& finder, const ContactMap* maps, const Vec3& p,
-              const Vec3& inward, double reach, ContactShape::Nearest& found, bool& flipped,
-              ContactCounters& counters) const;
+  bool locate(const ContactParty& b, const SurfaceNow& surface, const MapFinder& finder, const ContactMap* maps,
+              const Vec3& p, const std::function<Vec3()>& inwardAt, double reach, Index& hint,
+              ContactShape::Nearest& found, bool& flipped, ContactCounters& counters) const;
   void addContact(Findings& to, const std::vector<ContactParty>& parties, Index a, Index number, const ContactSample& s,
                   Index b, Index triangle, const std::array<double, 3>& weights, bool was_caught, bool flipped);
   bool stillOver(std::size_t& cursor, const ContactParty& with, Index a, Index b, Index sample, const Vec3& p,

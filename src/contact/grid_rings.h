@@ -28,6 +28,13 @@ struct Grid {
   std::size_t number(int x, int y, int z) const {
     return (static_cast<std::size_t>(x) * counts[1] + y) * counts[2] + z;
   }
+  /// [m^2] the square of how far a point is from a cell; 0 within.
+  double squaredGap(std::size_t number, const Vec3& p) const {
+    const std::size_t z = number % counts[2], xy = number / counts[2];
+    const Vec3 low = origin + edge * Vec3(static_cast<double>(xy / counts[1]), static_cast<double>(xy % counts[1]),
+                                          static_cast<double>(z));
+    return (low - p).cwiseMax(p - low - Vec3::Constant(edge)).cwiseMax(0.0).squaredNorm();
+  }
   /// The last ring around a cell.
   int ringsAround(const std::array<int, 3>& home) const {
     int rings = 0;

@@ -1,4 +1,4 @@
-// The cluster whose centre is nearest to a point: a grid over the centres.
+// The nearest of some points, or the cluster whose centre is nearest: a grid over them.
 #pragma once
 
 #include <algorithm>
@@ -11,15 +11,17 @@
 
 namespace meshless {
 
-class MapFinder {
+class PointFinder {
  public:
-  void make(const ContactMap* maps, Index count) {
-    maps_ = maps;
-    count_ = count;
-    if (count <= kFewMaps) return;
+  void clear() { points_.clear(); }
+  void add(const Vec3& p) { points_.push_back(p); }
+  /// Of what was added.
+  void build() {
+    const Index count = count_ = static_cast<Index>(points_.size());
+    if (count <= kFew) return;
     Box box;
-    for (Index m = 0; m < count; ++m)
-      if (maps[m].centre.allFinite()) box.extend(maps[m].centre);
+    for (const Vec3& p : points_)
+      if (p.allFinite()) box.extend(p);
     if (box.empty()) {
       count_ = std::min<Index>(count, 1);
       return;
@@ -36,25 +38,26 @@ class MapFinder {
     }
     offsets_.assign(total + 1, 0);
     items_.resize(count);
-    for (Index m = 0; m < count; ++m) ++offsets_[cellOf(maps[m].centre) + 1];
+    for (const Vec3& p : points_) ++offsets_[cellOf(p) + 1];
     for (std::size_t i = 0; i < total; ++i) offsets_[i + 1] += offsets_[i];
     next_.assign(offsets_.begin(), offsets_.end() - 1);
-    for (Index m = 0; m < count; ++m) items_[next_[cellOf(maps[m].centre)]++] = m;
+    for (Index n = 0; n < count; ++n) items_[next_[cellOf(points_[n])]++] = n;
   }
 
+  bool empty() const { return points_.empty(); }
   Index nearest(const Vec3& p) const {
     if (count_ <= 1) return 0;
     Index best = 0;
     double least = std::numeric_limits<double>::infinity();
-    const auto look = [&](Index m) {
-      const double squared = (maps_[m].centre - p).squaredNorm();
-      if (squared < least || (squared == least && m < best)) {
+    const auto look = [&](Index n) {
+      const double squared = (points_[n] - p).squaredNorm();
+      if (squared < least || (squared == least && n < best)) {
         least = squared;
-        best = m;
+        best = n;
       }
     };
-    if (count_ <= kFewMaps) {
-      for (Index m = 0; m < count_; ++m) look(m);
+    if (count_ <= kFew) {
+      for (Index n = 0; n < count_; ++n) look(n);
       return best;
     }
     const std::array<int, 3> home = grid_.cellAt(p);
@@ -69,20 +72,34 @@ class MapFinder {
     return best;
   }
 
-  std::size_t bytes() const { return bytesOf(offsets_, items_, next_); }
+  std::size_t bytes() const { return bytesOf(points_, offsets_, items_, next_); }
 
  private:
-  static constexpr Index kFewMaps = 8;  // so many are searched one by one
+  static constexpr Index kFew = 48;  // so many are searched one by one
 
   std::size_t cellOf(const Vec3& p) const {
     const std::array<int, 3> at = grid_.cellAt(p);
     return grid_.number(at[0], at[1], at[2]);
   }
 
-  const ContactMap* maps_ = nullptr;
+  Points points_;
   Index count_ = 0;
   Grid grid_;
   std::vector<Index> offsets_, items_, next_;
+};
+
+class MapFinder {
+ public:
+  void make(const ContactMap* maps, Index count) {
+    finder_.clear();
+    for (Index m = 0; m < count && count > 1; ++m) finder_.add(maps[m].centre);
+    finder_.build();
+  }
+  Index nearest(const Vec3& p) const { return finder_.nearest(p); }
+  std::size_t bytes() const { return finder_.bytes(); }
+
+ private:
+  PointFinder finder_;
 };
 
 }  // namespace meshless

@@ -2,6 +2,7 @@
 // surface it feels others. Made for a model once, and filled where something comes near.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <memory>
 #include <mutex>
@@ -43,16 +44,21 @@ class ContactShape {
   };
   /// Of a point in the rest frame, whoever has asked before. Signs are those of the nearest
   /// triangle; on ties (an edge, a vertex) of the one with the larger plane distance. False without triangles, or for
-  /// NaN. Thread-safe.
-  bool nearest(const Vec3& rest, Nearest& found) const;
+  /// NaN. `hint`: a triangle that may be near makes it quicker, and changes nothing else. Thread-safe.
+  bool nearest(const Vec3& rest, Nearest& found, Index hint = kNoIndex) const;
   /// The same for a point of another body that reaches into that one along `inward` (unit, in this rest frame): near an
   /// edge, a face that would push it away from its own body gives way to one that does not and is at most `slack` [m]
   /// farther. Cubes that lie exactly along each other are held by their tops, not by their sides.
-  bool nearest(const Vec3& rest, const Vec3& inward, double slack, Nearest& found) const;
+  bool nearest(const Vec3& rest, const Vec3& inward, double slack, Nearest& found, Index hint = kNoIndex) const;
 
   /// A lower bound [m] of the distance from a point to the surface from outside, quick where the same place was asked
-  /// about before; negative where the point may be inside or near. Thread-safe.
-  double clearance(const Vec3& rest) const;
+  /// about before; negative where the point may be inside or near. `hint`: as for nearest(). Thread-safe.
+  double clearance(const Vec3& rest, Index hint = kNoIndex) const;
+  /// True only outside, and always where no triangle is near: cheaper than clearance(). Thread-safe.
+  bool isOutside(const Vec3& rest) const;
+
+  /// [m] from a point to a triangle of the surface.
+  double distanceTo(Index triangle, const Vec3& rest) const;
 
   /// The triangle across the edge that lies against a corner of a triangle; kNoIndex at a border. Made when first asked
   /// for; thread-safe.
@@ -63,6 +69,7 @@ class ContactShape {
   const Box& bounds() const { return bounds_; }
   /// [m] median of some inward rays: who moves farther in a step can pass through.
   double thickness() const { return thickness_; }
+  double meanEdge() const { return mean_edge_; }  // [m] of the triangles
   /// [m] least edge of the bounds.
   double size() const { return size_; }
   const SurfaceRows& rows() const { return rows_; }
@@ -97,13 +104,16 @@ class ContactShape {
   std::vector<Index> rider_of_;
   std::vector<ContactSample> samples_;
   Box bounds_;
-  double size_ = 0.0, thickness_ = 0.0;
+  double size_ = 0.0, thickness_ = 0.0, mean_edge_ = 0.0;
 
   // triangles by bins of a grid
   Vec3 bin_origin_ = Vec3::Zero();
   double bin_edge_ = 1.0;
   std::array<int, 3> bins_{{1, 1, 1}};
   std::vector<Index> bin_offsets_, bin_triangles_;
+  std::vector<std::array<float, 4>> bin_spheres_;  // about them: centre from bin_origin_ [m], radius [m]
+
+  mutable std::unique_ptr<std::atomic<signed char>[]> bin_sides_;  // of empty ones: 1 outside, -1 inside, 0 not known
 
   // cells with the triangles that can be nearest to a point in them
   Vec3 cell_origin_ = Vec3::Zero();
