@@ -8,15 +8,16 @@
 namespace meshless {
 namespace {
 
-constexpr double kDeviation = 0.1;      // of the rest bounds' diagonal: how far a surface may be from its maps, at most
-constexpr double kNeighbour = 3.0;      // times what a vertex is off by its own map: by the one beside it
-constexpr double kSameMap = 2.0;        // likewise, between two vertices
-constexpr double kLoose = 0.02;         // of the size: a surface that is farther from its maps is looked at itself
-constexpr double kSlopeError = 0.5;     // of a map, at most
-constexpr double kMovedInRest = 0.005;  // of the size: a lookup is repeated where the deviation moved it farther
-constexpr std::size_t kLookAnew = 8;    // frames after which a point is looked up though it seems to be where it was
-constexpr double kWellWithin = 0.02;    // barycentric
-constexpr double kNearby = 0.1;         // of the thickness
+constexpr double kDeviation = 0.1;  // of the rest bounds' diagonal: how far a surface may be from its maps, at most
+constexpr double kNeighbour = 3.0;  // times what a vertex is off by its own map: by the one beside it
+constexpr double kSameMap = 2.0;    // likewise, between two vertices
+constexpr double kLoose = 0.02;     // of the size: a surface that is farther from its maps is looked at itself
+constexpr std::size_t kFewVertices = 100;  // of a surface: there are few places to ask about, and they are soon known
+constexpr double kSlopeError = 0.5;        // of a map, at most
+constexpr double kMovedInRest = 0.005;     // of the size: a lookup is repeated where the deviation moved it farther
+constexpr std::size_t kLookAnew = 8;       // frames after which a point is looked up though it seems to be where it was
+constexpr double kWellWithin = 0.02;       // barycentric
+constexpr double kNearby = 0.1;            // of the thickness
 constexpr int kMostLookups = 8;
 constexpr double kFlattest = 1e-3;  // det of a slope: below, the cluster's affine map tells directions
 constexpr double kSlack = 0.1;      // of the thickness: how much farther a better face may be
@@ -47,7 +48,7 @@ void look(const ContactParty& party, const MapFinder& finder, const ContactMap* 
     bent = bent || map.quadratic;
   }
   surface.deviation = std::min(most, (party.map_count > 1 ? kNeighbour : kSameMap) * std::sqrt(farthest));
-  surface.loose = !bent && surface.deviation > kLoose * shape.size();
+  surface.loose = !bent && shape.surface().vertices.size() > kFewVertices && surface.deviation > kLoose * shape.size();
   if (!surface.loose) return;
   for (Index v = 0; v < shape.surface().vertices.size(); ++v) {
     const Vec3& now = vertexAt(party, v);

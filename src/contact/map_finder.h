@@ -41,7 +41,12 @@ class PointFinder {
     for (const Vec3& p : points_) ++offsets_[cellOf(p) + 1];
     for (std::size_t i = 0; i < total; ++i) offsets_[i + 1] += offsets_[i];
     next_.assign(offsets_.begin(), offsets_.end() - 1);
-    for (Index n = 0; n < count; ++n) items_[next_[cellOf(points_[n])]++] = n;
+    sorted_.resize(count);
+    for (Index n = 0; n < count; ++n) {
+      const Index place = next_[cellOf(points_[n])]++;
+      items_[place] = n;
+      sorted_[place] = points_[n];
+    }
   }
 
   bool empty() const { return points_.empty(); }
@@ -49,30 +54,33 @@ class PointFinder {
     if (count_ <= 1) return 0;
     Index best = 0;
     double least = std::numeric_limits<double>::infinity();
-    const auto look = [&](Index n) {
-      const double squared = (points_[n] - p).squaredNorm();
+    const auto look = [&](const Vec3& at, Index n) {
+      const double squared = (at - p).squaredNorm();
       if (squared < least || (squared == least && n < best)) {
         least = squared;
         best = n;
       }
     };
     if (count_ <= kFew) {
-      for (Index n = 0; n < count_; ++n) look(n);
+      for (Index n = 0; n < count_; ++n) look(points_[n], n);
       return best;
     }
+    const auto lookIn = [&](std::size_t first, std::size_t last) {
+      for (Index k = offsets_[first]; k < offsets_[last + 1]; ++k) look(sorted_[k], items_[k]);
+    };
+    // The first ring that holds any, then all cells that can hold a nearer one: along z they lie side by side.
     const std::array<int, 3> home = grid_.cellAt(p);
-    for (int ring = 0, rings = grid_.ringsAround(home); ring <= rings; ++ring) {
-      visitRing(grid_, home, ring, [&](std::size_t cell) {
-        for (Index k = offsets_[cell]; k < offsets_[cell + 1]; ++k) look(items_[k]);
-      });
-      // Not by rounding.
-      const double beyond = beyondRing(grid_, home, ring, p) - 1e-9 * grid_.edge;
-      if (beyond > 0.0 && least < beyond * beyond) break;
-    }
+    for (int ring = 0, rings = grid_.ringsAround(home); ring <= rings && !std::isfinite(least); ++ring)
+      visitRing(grid_, home, ring, [&](std::size_t cell) { lookIn(cell, cell); });
+    if (!std::isfinite(least)) return best;
+    const Vec3 around = Vec3::Constant(std::sqrt(least) + 1e-9 * grid_.edge);  // not by rounding
+    const std::array<int, 3> low = grid_.cellAt(p - around), high = grid_.cellAt(p + around);
+    for (int x = low[0]; x <= high[0]; ++x)
+      for (int y = low[1]; y <= high[1]; ++y) lookIn(grid_.number(x, y, low[2]), grid_.number(x, y, high[2]));
     return best;
   }
 
-  std::size_t bytes() const { return bytesOf(points_, offsets_, items_, next_); }
+  std::size_t bytes() const { return bytesOf(points_, sorted_, offsets_, items_, next_); }
 
  private:
   static constexpr Index kFew = 48;  // so many are searched one by one
@@ -82,7 +90,7 @@ class PointFinder {
     return grid_.number(at[0], at[1], at[2]);
   }
 
-  Points points_;
+  Points points_, sorted_;  // as they were added, and by cells
   Index count_ = 0;
   Grid grid_;
   std::vector<Index> offsets_, items_, next_;
