@@ -325,6 +325,42 @@ TEST(ContactShape, WhoHasAskedBeforeDoesNotMatter) {
   }
 }
 
+// A hint tells where to begin, be it right or wrong; what lies outside or clear of the surface is so.
+TEST(ContactShape, HintsAndShortCutsAgreeWithTheSearch) {
+  for (const shapes::Shape& shape : shapes::allShapes()) {
+    SCOPED_TRACE(shape.name);
+    const Box bounds = boundsOf(shape.mesh);
+    const double size = bounds.diagonal();
+    const Shaped plain(shape.mesh), hinted(shape.mesh);
+    test::Random random(6);
+    int outside = 0;
+    for (int n = 0; n < 300; ++n) {
+      const int last = static_cast<int>(shape.mesh.triangles.size()) - 1;
+      const Vec3 somewhere =
+          bounds.min + Vec3(random.uniform(-0.3, 1.3), random.uniform(-0.3, 1.3), random.uniform(-0.3, 1.3))
+                           .cwiseProduct(bounds.max - bounds.min);
+      const Vec3 corner =
+          shape.mesh.vertices[shape.mesh.triangles[static_cast<std::size_t>(random.integer(0, last))][0]];
+      const Vec3 p = n % 3 == 0 ? corner : n % 3 == 1 ? Vec3(corner + 1e-3 * size * random.unit()) : somewhere;
+      const Index hint = static_cast<Index>(random.integer(0, last));
+      ContactShape::Nearest first, later;
+      ASSERT_TRUE(plain.shape.nearest(p, first));
+      ASSERT_TRUE(hinted.shape.nearest(p, later, hint));
+      ASSERT_EQ(first.triangle, later.triangle) << n;
+      ASSERT_EQ(first.distance, later.distance) << n;
+      ASSERT_EQ(first.weights, later.weights) << n;
+      EXPECT_EQ(plain.shape.clearance(p), hinted.shape.clearance(p, hint)) << n;
+      EXPECT_LE(hinted.shape.clearance(p, hint), first.distance + 1e-12 * size) << n;
+      EXPECT_GE(hinted.shape.distanceTo(hint, p), std::abs(first.distance) * (1.0 - 1e-12)) << n;
+      if (hinted.shape.isOutside(p)) {
+        ++outside;
+        EXPECT_GT(first.distance, 0.0) << n;
+      }
+    }
+    EXPECT_GT(outside, 30);
+  }
+}
+
 TEST(ContactShape, ThicknessIsThatOfThinParts) {
   EXPECT_NEAR(Shaped(boxMesh(Vec3(0.2, 0.2, 0.002), 0.02)).shape.thickness(), 0.002, 1e-9);
   EXPECT_NEAR(Shaped(boxMesh(Vec3::Ones(), 2, 2, 2)).shape.thickness(), 1.0, 1e-9);
