@@ -1,11 +1,14 @@
 // Run time of a frame of 1/60 s with contact: piles of unit cubes of 27 particles (contact_pile.h) that have fallen for
-// 180 frames, the median of the next 120, with four substeps. pile27/N is this package on one and on two threads, bullet_vf/N and bullet_cl/N are
-// Bullet's soft bodies from the same places in the same process (contact_bullet.h), textbook/N the paper's method,
-// asleep/1000 the pile after it fell asleep and awake/1000 the same pile kept awake, sweep/N and sweep_bullet_*/N the
-// growth with the number of bodies. Counters: `deepest` and `p99` penetration relative to the cubes' size, `height`
-// relative to ideal stacks, `contacts` and `lookups` a frame, `contact_ms` and `match_ms` of the frame,
-// `ns_a_contact` the time of all of a frame's contact over its contacts and substeps, `exponent` of a sweep (least
-// squares of log time over log N, on its last row). --out=DIR writes bench_contact.csv and bench_contact.png there.
+// 180 frames, the median of the next 120, with four substeps. pile27/N is this package on one and on two threads,
+// bullet_vf/N and bullet_cl/N are Bullet's soft bodies from the same places in the same process (contact_bullet.h),
+// textbook/N the paper's method, asleep/1000 the pile after it fell asleep and awake/1000 the same pile kept awake,
+// sweep/N and sweep_bullet_*/N the growth with the number of bodies. Counters: `deepest` and `p99` penetration relative
+// to the cubes' size, `height` relative to ideal stacks, `contacts` and `lookups` a frame, `contact_ms` and `match_ms`
+// of the frame, `ns_a_contact` the time of all of a frame's contact over its contacts and substeps, `exponent` of a
+// sweep (least squares of log time over log N, on its last row). after_cut/*: by how much the first step after the cut
+// of a ball on a bed takes longer than those before, the median of five; `before_ms`, `first_ms` and `next_ms`
+// (contact_after_cut.h).
+// --out=DIR writes bench_contact.csv and bench_contact.png there.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -17,6 +20,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include "contact_after_cut.h"
 #include "contact_pile.h"
 #include "plot.h"
 
@@ -94,7 +98,8 @@ void runPile(benchmark::State& state, const std::string& name, const PileOptions
       contact.push_back(1e3 * report.contact);
       match.push_back(1e3 * report.match);
       const ContactCounters& c = report.contact_counters;
-      contacts += static_cast<double>(options.contact == ContactMethod::kTextbook ? c.penetrating : c.contacts) / kMeasured;
+      contacts +=
+          static_cast<double>(options.contact == ContactMethod::kTextbook ? c.penetrating : c.contacts) / kMeasured;
       lookups += static_cast<double>(c.lookups) / kMeasured;
       contact_work += static_cast<double>(c.contacts) * static_cast<double>(report.substeps) / kMeasured;
     }
@@ -152,6 +157,24 @@ void runRest(benchmark::State& state, bool sleeping) {
   }
 }
 
+void runAfterCut(benchmark::State& state, const AfterCut& of) {
+  std::vector<double> before, first, next, more;
+  for (auto _ : state) {
+    for (int run = 0; run < 5; ++run) {
+      const AfterCutTimes times = timeAfterCut(of);
+      if (times.before < 0.0) return state.SkipWithError("refused");
+      before.push_back(times.before);
+      first.push_back(times.first);
+      next.push_back(times.next);
+      more.push_back(times.first - times.before);
+    }
+    state.SetIterationTime(1e-3 * std::max(median(more), 0.0));
+  }
+  state.counters["before_ms"] = median(before);
+  state.counters["first_ms"] = median(first);
+  state.counters["next_ms"] = median(next);
+}
+
 void add(const std::string& name, const std::function<void(benchmark::State&)>& run) {
   benchmark::RegisterBenchmark(name.c_str(), run)->Unit(benchmark::kMillisecond)->UseManualTime()->Iterations(1);
 }
@@ -188,6 +211,14 @@ void registerRows() {
   addPile("textbook/100", "textbook", textbook, false);
   add("awake/1000", [](benchmark::State& s) { runRest(s, false); });
   add("asleep/1000", [](benchmark::State& s) { runRest(s, true); });
+  for (const bool elastic : {false, true})
+    for (const bool upright : {false, true})
+      for (const int threads : {1, 2})
+        add(std::string("after_cut/") + (elastic ? "elastic/" : "looks/") + (upright ? "upright/" : "level/") +
+                std::to_string(threads) + "threads",
+            [=](benchmark::State& s) {
+              runAfterCut(s, {elastic, upright, threads});
+            });
   for (const int bodies : {10, 30, 100, 300, 1000, 3000, 10000})
     addPile("sweep/" + std::to_string(bodies), "sweep", of(bodies), bodies == 10000);
 #ifdef HAVE_BULLET
