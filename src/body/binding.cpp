@@ -176,7 +176,7 @@ class Binder {
     return near_.size() >= kEnoughCarriers;
   }
 
-  /// The nearest particle that the rider may follow.
+  /// A particle that the rider may follow, the nearest along the body.
   Index startOf(Index v) {
     const Vec3& p = task_.surface_rest[v];
     if (const Index r = task_.inherited ? task_.inherited->rider[v] : kNoIndex; r != kNoIndex) {
@@ -189,7 +189,7 @@ class Binder {
     }
     if (task_.inherited && !task_.inherited->start.empty())
       if (const Index known = task_.inherited->start[v]; known != kNoIndex && !isSeparated(v, known))
-        return nearestOf(walkFrom(known), v);
+        return climbFrom(known, v);
     if (task_.inherited && task_.inherited->separated) {
       std::array<Index, kWalk> near;
       for (const std::size_t looked : {std::size_t{4}, kWalk}) {
@@ -223,6 +223,15 @@ class Binder {
     }
     std::sort(walk.found.begin() + 1, walk.found.begin() + static_cast<std::ptrdiff_t>(walk.count));
     return walk;
+  }
+
+  /// Nearer and nearer along the body; a blade may have met an edge far from both of its ends.
+  Index climbFrom(Index at, Index v) {
+    for (;;) {
+      const Index next = nearestOf(walkFrom(at), v);
+      if (next == at) return at;
+      at = next;
+    }
   }
 
   Index nearestOf(const Walk& walk, Index v) const {

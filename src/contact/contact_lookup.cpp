@@ -8,10 +8,11 @@
 namespace meshless {
 namespace {
 
-constexpr double kDeviation = 0.1;  // of the rest bounds' diagonal: how far a surface may be from its maps, at most
-constexpr double kNeighbour = 3.0;  // times what a vertex is off by its own map: by the one beside it
-constexpr double kSameMap = 2.0;    // likewise, between two vertices
-constexpr double kLoose = 0.02;     // of the size: a surface that is farther from its maps is looked at itself
+constexpr double kDeviation = 0.1;   // of the rest bounds' diagonal: how far a surface may be from its maps, at most
+constexpr double kNeighbour = 3.0;   // times what a vertex is off by its own map: by the one beside it
+constexpr double kSameMap = 2.0;     // likewise, between two vertices
+constexpr double kLoose = 0.02;      // of the size: a surface that is farther from its maps is looked at itself
+constexpr double kLooseEdges = 0.5;  // of its mean edge: likewise
 constexpr std::size_t kFewVertices = 100;  // of a surface: there are few places to ask about, and they are soon known
 constexpr double kSlopeError = 0.5;        // of a map, at most
 constexpr double kMovedInRest = 0.005;     // of the size: a lookup is repeated where the deviation moved it farther
@@ -48,7 +49,8 @@ void look(const ContactParty& party, const MapFinder& finder, const ContactMap* 
     bent = bent || map.quadratic;
   }
   surface.deviation = std::min(most, (party.map_count > 1 ? kNeighbour : kSameMap) * std::sqrt(farthest));
-  surface.loose = !bent && shape.surface().vertices.size() > kFewVertices && surface.deviation > kLoose * shape.size();
+  surface.loose = !bent && shape.surface().vertices.size() > kFewVertices &&
+                  surface.deviation > std::max(kLoose * shape.size(), kLooseEdges * shape.meanEdge());
   if (!surface.loose) return;
   for (Index v = 0; v < shape.surface().vertices.size(); ++v) {
     const Vec3& now = vertexAt(party, v);
@@ -80,10 +82,10 @@ bool Contacts::Impl::locate(const ContactParty& b, const SurfaceNow& surface, co
     // From the nearest vertex, whose place at rest is known.
     const Index v = surface.vertices[surface.finder.nearest(p)];
     const Vec3 from = p - vertexAt(b, v);
-    rest = map.to_rest * from + shape.surface().vertices[v];
-    deviation = std::min(deviation, kSlopeError * from.norm());
-    // Neither near the surface nor inside, for the map cannot be so wrong.
-    if (kSlopeError * from.norm() > shape.meanEdge() + reach && shape.isOutside(rest)) return false;
+    if (kSlopeError * from.norm() < deviation) {
+      rest = map.to_rest * from + shape.surface().vertices[v];
+      deviation = kSlopeError * from.norm();
+    }
   }
   // So far outside of the rest bounds that no deviation brings it back: nothing to look up.
   const Box& bounds = shape.bounds();
@@ -91,7 +93,7 @@ bool Contacts::Impl::locate(const ContactParty& b, const SurfaceNow& surface, co
   const double far = deviation + reach;
   if (!(beyond.squaredNorm() < far * far)) return false;
   const bool near = hint != kNoIndex && shape.distanceTo(hint, rest) <= far;
-  if (!near && shape.clearance(rest, hint) > far) return false;
+  if (!near && (shape.isClear(rest, far) || shape.clearance(rest, hint) > far)) return false;
   const Vec3 inward_rest = (*to_rest * inwardAt()).normalized();
   const double enough = kMovedInRest * shape.size();
   for (int n = 0; n < kMostLookups; ++n) {

@@ -27,6 +27,7 @@ constexpr double kFacing = 0.1;           // cosine: a face pushes a body's poin
 constexpr std::size_t kBounding = 4;      // triangles that tell how far the nearest to a point of a cell can be
 constexpr std::uintptr_t kAsked = 12;     // times that the bins are searched before a cell is filled
 constexpr double kSphereRounding = 1e-6;  // relative, of what is kept in single precision
+constexpr double kFlat = 1e-12;           // squared sine of a corner: below, a triangle has no area but by rounding
 constexpr double kTie = 1e-9;             // relative: two features are equally near
 
 }  // namespace
@@ -56,7 +57,7 @@ Facet makeFacet(const TriangleMesh& mesh, Index t) {
       {(f.a - f.centre).squaredNorm(), (f.a + f.ab - f.centre).squaredNorm(), (f.a + f.ac - f.centre).squaredNorm()}));
   const double aa = f.ab.squaredNorm(), bb = f.ac.squaredNorm(), ab = f.ab.dot(f.ac);
   const double det = aa * bb - ab * ab;
-  const double inverse = det > 1e-24 * aa * bb ? 1.0 / det : 0.0;
+  const double inverse = det > kFlat * aa * bb ? 1.0 / det : 0.0;
   f.g00 = bb * inverse;
   f.g01 = -ab * inverse;
   f.g11 = aa * inverse;
@@ -382,6 +383,9 @@ class Settler {
     }
   }
 
+  /// The faces there say as much for one side as for the other.
+  bool cancelled() const { return std::abs(normals_.dot(away_)) <= kCancelled * angles_ * away_.norm(); }
+
   /// +1 outside, -1 inside.
   double settle(ContactShape::Nearest& found) const {
     // Two lips that lie on each other cancel but for rounding, which the order of the faces would decide.
@@ -436,7 +440,7 @@ void ContactShape::visitNear(const Vec3& rest, double radius, const Visit& visit
 }
 
 // `within` [m]: something is known to be so near; infinite where nothing is known.
-bool ContactShape::searchBins(const Vec3& rest, double within, Nearest& found) const {
+bool ContactShape::searchBins(const Vec3& rest, double within, Nearest& found, bool* cancelled) const {
   found.triangle = kNoIndex;
   Best best(size_);
   best.distance = within;
@@ -470,7 +474,11 @@ bool ContactShape::searchBins(const Vec3& rest, double within, Nearest& found) c
     const double around = best.distance + 1e-6 * size_;
     visitNear(rest, around, [&](Index t) { settler.offer(facets_[t], rest); });
     sign = settler.settle(found);
+    if (cancelled) *cancelled = settler.cancelled();
   }
+  // Rounding in triangles without area can make what is known too small.
+  if (found.triangle == kNoIndex && std::isfinite(within))
+    return searchBins(rest, std::numeric_limits<double>::infinity(), found, cancelled);
   found.distance = std::copysign(best.distance, sign);
   return found.triangle != kNoIndex;
 }
@@ -491,19 +499,29 @@ bool ContactShape::isBeyondCells(const Vec3& rest) const {
   return false;
 }
 
-bool ContactShape::isOutside(const Vec3& rest) const {
-  if (!cells_ || !rest.allFinite()) return false;
+bool ContactShape::isClear(const Vec3& rest, double by) const {
+  if (!cells_ || !rest.allFinite() || !(by >= 0.0)) return false;
+  const Grid grid{bin_origin_, bin_edge_, bins_};
+  const Vec3 around = Vec3::Constant(by * (1.0 + 1e-6) + 1e-9 * size_);
+  const std::array<int, 3> low = grid.cellAt(rest - around), high = grid.cellAt(rest + around);
+  for (int x = low[0]; x <= high[0]; ++x)
+    for (int y = low[1]; y <= high[1]; ++y) {
+      // Along z they lie side by side.
+      const std::size_t first = grid.number(x, y, low[2]), last = grid.number(x, y, high[2]);
+      if (bin_offsets_[first] != bin_offsets_[last + 1]) return false;
+    }
+  // No triangle is so near: all of the point's bin is on one side.
   for (int d = 0; d < 3; ++d)
     if (rest[d] < bounds_.min[d] || rest[d] > bounds_.max[d]) return true;
-  const Grid grid{bin_origin_, bin_edge_, bins_};
   const std::array<int, 3> at = grid.cellAt(rest);
   const std::size_t bin = grid.number(at[0], at[1], at[2]);
-  if (bin_offsets_[bin] != bin_offsets_[bin + 1]) return false;
   signed char side = bin_sides_[bin].load(std::memory_order_relaxed);
   if (side == 0) {
     Nearest found;
+    bool cancelled = false;  // by lips that lie on each other: they do not tell
     const Vec3 centre = bin_origin_ + bin_edge_ * Vec3(at[0] + 0.5, at[1] + 0.5, at[2] + 0.5);
-    side = searchBins(centre, std::numeric_limits<double>::infinity(), found) && found.distance > 0.0 ? 1 : -1;
+    const bool any = searchBins(centre, std::numeric_limits<double>::infinity(), found, &cancelled);
+    side = any && found.distance > 0.0 && !cancelled ? 1 : -1;
     bin_sides_[bin].store(side, std::memory_order_relaxed);  // whoever else asks finds the same
   }
   return side > 0;
@@ -526,7 +544,8 @@ double ContactShape::clearance(const Vec3& rest, Index hint) const {
 }
 
 double ContactShape::distanceTo(Index triangle, const Vec3& rest) const {
-  return std::sqrt(measure(facets_[triangle], rest).squared);
+  const Facet& f = facets_[triangle];
+  return std::max(std::sqrt(measure(f, rest).squared), (rest - f.centre).norm() - f.radius);
 }
 
 bool ContactShape::nearest(const Vec3& rest, Nearest& found, Index hint) const {
