@@ -108,6 +108,27 @@ TEST(BindSurface, CarriersAreTheNearestFromAnyParticleNearBy) {
     }
 }
 
+// The ends of an edge that a blade met are far from where it met it: what is bound there follows the tissue beside it.
+TEST(BindSurface, TheRimOfACutThroughLargeTrianglesFollowsWhatIsBesideIt) {
+  BodyDef def = test::defOf(boxMesh(Vec3(0.2, 0.2, 0.2), 1, 1, 1), "box");
+  def.spacing = 0.01;
+  const PreparedBody body = test::prepared(def);
+  const Result<CutBody> cut = cutBody(*body.model, body.state, {Vec3(0.02, 0.03, 1.0).normalized(), Vec3(0, 0, 0.001)});
+  ASSERT_TRUE(cut.ok());
+  int bound = 0;
+  for (const BodyPiece& piece : cut->pieces) {
+    const BodyModel& m = *piece.model;
+    for (Index r = 0; r < m.binding.riders.size(); ++r) {
+      const Vec3& p = m.surface.vertices[m.binding.riders[r]];
+      double nearest = 1.0;
+      for (const Vec3& q : m.rest) nearest = std::min(nearest, (q - p).norm());
+      EXPECT_NEAR((m.rest[m.binding.carriers[m.binding.offsets[r]]] - p).norm(), nearest, 1e-12);
+      ++bound;
+    }
+  }
+  EXPECT_GT(bound, 10);
+}
+
 TEST(BindSurface, ParticlesInAPlaneOrAloneStillCarry) {
   const Points flat = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
   const ParticleGraph square = makeGraph(flat, {{0, 1}, {1, 3}, {3, 2}, {2, 0}});

@@ -54,8 +54,8 @@ class ContactShape {
   /// A lower bound [m] of the distance from a point to the surface from outside, quick where the same place was asked
   /// about before; negative where the point may be inside or near. `hint`: as for nearest(). Thread-safe.
   double clearance(const Vec3& rest, Index hint = kNoIndex) const;
-  /// True only where clearance() is more than `by` [m], and for most of what is far from the surface: it looks at bins of
-  /// triangles alone. Thread-safe.
+  /// True only where clearance() is more than `by` [m], and for most of what is far from the surface: it looks at bins
+  /// of triangles alone. Thread-safe.
   bool isClear(const Vec3& rest, double by) const;
 
   /// [m] from a point to a triangle of the surface.
