@@ -19,6 +19,7 @@ constexpr int kLanes = MESHLESS_MATCH_BYTES / 4;
 constexpr int kRowPacks = kLanes == 4 ? 3 : 16 / kLanes;  // vectors that cover the 12 numbers of a row
 
 constexpr float kFullBetaDeterminant = 0.1f;  // as in shape_matching.cpp
+constexpr float kLeastSlope = 1e-30f;          // where a map has no volume to hold, nothing is divided by 0
 constexpr float kLineDeterminant = 1e-4f;     // of the inertia over its trace: nearly a line below it
 constexpr float kFarFromOrigin = 0.5f;        // of the body's size
 
@@ -230,6 +231,27 @@ void measure(const BodiesView& view, int block, int lane) {
   putVector({inverse.xy, inverse.yz, inverse.zx}, motion + (kMotionInverse + 3) * kBlock);
 }
 
+// A fitted map becomes the one of the goal, see withVolumeOfRest() in shape_matching.cpp; returns its share.
+MESHLESS_INLINE Pack holdVolume(const StepNumbers& step, const Symmetric& inverse, Pack (&fit)[9]) {
+  const Pack determinant = determinantOf(fit);
+  const Pack g = cubeRoot(larger(determinant, all(kFullBetaDeterminant)));
+  Pack cofactors[9], gradient[9];
+  for (int r = 0; r < 3; ++r) {
+    const Pack* const u = fit + 3 * ((r + 1) % 3);
+    const Pack* const v = fit + 3 * ((r + 2) % 3);
+    for (int k = 0; k < 3; ++k) {
+      const int i = (k + 1) % 3, j = (k + 2) % 3;
+      cofactors[3 * r + k] = u[i] * v[j] - u[j] * v[i];
+    }
+  }
+  timesSymmetric(cofactors, inverse, gradient);
+  Pack slope = all(0.0f);
+  for (int k = 0; k < 9; ++k) slope += gradient[k] * cofactors[k];
+  const Pack back = 3.0f * g * g * (g - 1.0f) / larger(slope, all(kLeastSlope));
+  for (int k = 0; k < 9; ++k) fit[k] -= back * gradient[k];
+  return step.beta * smaller(all(1.0f), larger(all(0.0f), determinant * (1.0f / kFullBetaDeterminant)));
+}
+
 // The goal's map of q in units of the size: 3 x 3, and 3 x 6 of the second order.
 template <bool kFit, bool kQuadratic>
 MESHLESS_INLINE void goalMap(const BodiesView& view, const StepNumbers& step, const BodiesScratch& s, int block,
@@ -250,12 +272,11 @@ MESHLESS_INLINE void goalMap(const BodiesView& view, const StepNumbers& step, co
                              get(from + 4 * kBlock),
                              get(from + 5 * kBlock)};
   timesSymmetric(moment, inverse, fit);
-  const Pack determinant = determinantOf(fit);
-  const Pack share = step.beta * smaller(all(1.0f), larger(all(0.0f), determinant * (1.0f / kFullBetaDeterminant)));
-  const Pack normalised = share / cubeRoot(larger(determinant, all(kFullBetaDeterminant)));
+  const Pack share = holdVolume(step, inverse, fit);
   const Pack rigid = (1.0f - share) * size;
+  const Pack fitted = share * size;
   if (!kQuadratic) {
-    for (int k = 0; k < 9; ++k) map[k] = size * normalised * fit[k] + rigid * get(s.rotation[k] + slot);
+    for (int k = 0; k < 9; ++k) map[k] = fitted * fit[k] + rigid * get(s.rotation[k] + slot);
     return;
   }
   const float* const triangle =
@@ -275,7 +296,7 @@ MESHLESS_INLINE void goalMap(const BodiesView& view, const StepNumbers& step, co
       }
     for (int k = 0; k < 3; ++k)
       map[3 * r + k] =
-          choose(has, share * out[k], size * normalised * fit[3 * r + k]) + rigid * get(s.rotation[3 * r + k] + slot);
+          choose(has, share * out[k], fitted * fit[3 * r + k]) + rigid * get(s.rotation[3 * r + k] + slot);
     for (int k = 0; k < 6; ++k) bend[6 * r + k] = quadratic_share * out[3 + k];
   }
 }
@@ -646,10 +667,8 @@ void mapClusters(const OverlapView& view, const StepNumbers& step, std::size_t f
       const Symmetric inverse = {get(from),         get(from + n),     get(from + 2 * n),
                                  get(from + 3 * n), get(from + 4 * n), get(from + 5 * n)};
       timesSymmetric(moment, inverse, fit);
-      const Pack determinant = determinantOf(fit);
-      const Pack share = step.beta * smaller(all(1.0f), larger(all(0.0f), determinant * (1.0f / kFullBetaDeterminant)));
-      const Pack normalised = share / cubeRoot(larger(determinant, all(kFullBetaDeterminant)));
-      for (int k = 0; k < 9; ++k) map[k] = normalised * fit[k] + (1.0f - share) * map[k];
+      const Pack share = holdVolume(step, inverse, fit);
+      for (int k = 0; k < 9; ++k) map[k] = share * fit[k] + (1.0f - share) * map[k];
     }
     for (int k = 0; k < 9; k += 4) map[k] -= 1.0f;
     const Pack c0 = get(constant + kCentre * n + i), c1 = get(constant + (kCentre + 1) * n + i);

@@ -13,6 +13,17 @@ constexpr double kLinearRankRatio = 1e-8;     // of the moment's eigenvalues, sm
 constexpr double kQuadraticRankRatio = 1e-7;  // of the basis in units of the cluster's size
 constexpr double kFullBetaDeterminant = 0.1;  // below it the fitted map fades out, at 0 only the rotation is left
 
+// A as near to determinant 1 as one step along the gradient of the determinant comes. The distance is that of the
+// particles, so that by momentum it is without torque; A / cbrt(det A) is no gradient and feeds energy in.
+Mat3 withVolumeOfRest(const Mat3& a, double determinant, const Mat3& moment_inverse) {
+  const double g = std::cbrt(std::max(determinant, kFullBetaDeterminant));
+  Mat3 cofactors;
+  for (int r = 0; r < 3; ++r) cofactors.row(r) = a.row((r + 1) % 3).cross(a.row((r + 2) % 3));
+  const Mat3 gradient = cofactors * moment_inverse;
+  const double slope = gradient.cwiseProduct(cofactors).sum();
+  return slope > 0.0 ? Mat3(a - 3.0 * g * g * (g - 1.0) / slope * gradient) : a;
+}
+
 Vec9 quadraticBasis(const Vec3& q) {
   Vec9 b;
   b << q.x(), q.y(), q.z(), q.x() * q.x(), q.y() * q.y(), q.z() * q.z(), q.x() * q.y(), q.y() * q.z(), q.z() * q.x();
@@ -149,8 +160,7 @@ void matchShapes(const MatchInput& in, const Points& y, MatchMode mode, double b
       const double determinant = pose.deformation.determinant();
       share = beta * std::min(1.0, std::max(0.0, determinant / kFullBetaDeterminant));
       if (!(share > 0.0)) ++counters.rank_fallbacks;
-      map =
-          share * pose.deformation / std::cbrt(std::max(determinant, kFullBetaDeterminant)) + (1.0 - share) * rotation;
+      map = share * withVolumeOfRest(pose.deformation, determinant, rest.moment_inverse) + (1.0 - share) * rotation;
     }
     const Index begin = in.clusters.offsets[c], end = in.clusters.offsets[c + 1];
     if (mode == MatchMode::kQuadratic && share > 0.0 && !rest.quadratic_rank) ++counters.rank_fallbacks;

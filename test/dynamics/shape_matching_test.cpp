@@ -105,6 +105,43 @@ TEST(MatchShapes, AnyVolumeKeepingAffineFieldIsReproducedByLinearAndAnyQuadratic
     }
 }
 
+// What is moved along u and then along v is to cost what it costs the other way round: else a way round brings energy.
+TEST(MatchShapes, ThePullOfAFittedGoalIsNearlyAGradient) {
+  Random random(4);
+  double worst = 0.0;
+  for (int round = 0; round < 200; ++round) {
+    Cloud cloud = randomCloud(random, 40, 1);
+    const Mat3 map = Mat3::Identity() + random.matrix(0.4);
+    if (!(map.determinant() > 0.3)) continue;
+    const Mat3 by_u = random.matrix(1.0), by_v = random.matrix(1.0);
+    Points y, u, v;
+    for (const Vec3& q : cloud.rest) {
+      y.push_back(map * q);
+      u.push_back(by_u * q);
+      v.push_back(by_v * q);
+    }
+    const auto slope = [&](const Points& along, const Points& of) {
+      constexpr double kStep = 1e-5;
+      double sum = 0.0;
+      for (const double side : {1.0, -1.0}) {
+        Points there = y;
+        for (std::size_t i = 0; i < y.size(); ++i) there[i] += side * kStep * along[i];
+        const Points goals = goalsOf(cloud, there, MatchMode::kLinear, 1.0);
+        for (std::size_t i = 0; i < y.size(); ++i)
+          sum += side * cloud.masses[i] * of[i].dot(goals[i] - there[i]) / (2.0 * kStep);
+      }
+      return sum;
+    };
+    double length_u = 0.0, length_v = 0.0;
+    for (std::size_t i = 0; i < y.size(); ++i) {
+      length_u += cloud.masses[i] * u[i].squaredNorm();
+      length_v += cloud.masses[i] * v[i].squaredNorm();
+    }
+    worst = std::max(worst, std::abs(slope(u, v) - slope(v, u)) / std::sqrt(length_u * length_v));
+  }
+  EXPECT_LT(worst, 0.2);  // 0.11; A / cbrt(det A) has 0.62
+}
+
 TEST(MatchShapes, ThePullHasNeitherForceNorTorque) {
   Random random(3);
   for (int round = 0; round < 60; ++round)
