@@ -6,6 +6,7 @@
 #include <tuple>
 #include <unordered_map>
 
+#include "empty_space.h"
 #include "grid_rings.h"
 #include "meshless_surgery/base/bytes.h"
 #include "meshless_surgery/geometry/nearest_on_triangle.h"
@@ -15,6 +16,7 @@ namespace {
 
 constexpr double kBinEdges = 3.0;   // size of a bin in mean edges
 constexpr double kCellEdges = 0.5;  // size of a cell in mean edges
+constexpr double kSpaceEdges = 1.5;  // size of a cell of empty space in mean edges
 constexpr double kMostBins = 1 << 18;
 constexpr double kMostCells = 1 << 19;
 constexpr double kLongEdge = 0.1;    // of the body's least extent: shorter edges need no samples
@@ -105,6 +107,16 @@ bool meets(const TriangleMesh& mesh, Index t, const Vec3& from, const Vec3& dire
 
 }  // namespace
 
+namespace {
+
+// Whether what a sphere holds, a centre and a radius, can be so near to a point.
+bool isWithin(const std::array<float, 4>& sphere, const Eigen::Vector3f& p, float by) {
+  const float x = p.x() - sphere[0], y = p.y() - sphere[1], z = p.z() - sphere[2], reach = by + sphere[3];
+  return !(x * x + y * y + z * z > reach * reach);
+}
+
+}  // namespace
+
 struct ContactShape::Cell {
   std::vector<Index> triangles;
 };
@@ -152,7 +164,6 @@ ContactShape::~ContactShape() {
 std::size_t ContactShape::bytes() const {
   return sizeof *this + bytesOf(surface_.vertices, surface_.triangles, surface_.patches, facets_, rider_of_, samples_) +
          bytesOf(bin_offsets_, bin_triangles_, bin_spheres_, across_) +
-         (bin_offsets_.empty() ? 0 : bin_offsets_.size() - 1) +
          cell_total_ * (sizeof(std::atomic<std::uintptr_t>) + sizeof(std::atomic<float>)) +
          cell_bytes_.load(std::memory_order_relaxed);
 }
@@ -170,7 +181,6 @@ void ContactShape::binTriangles() {
     total *= static_cast<std::size_t>(bins_[d]);
   }
   bin_offsets_.assign(total + 1, 0);
-  bin_sides_ = std::make_unique<std::atomic<signed char>[]>(total);
   const auto forBins = [this](Index t, const auto& visit) {
     const Box box = boundsOf(surface_, t);
     std::array<int, 3> first, last;
@@ -198,6 +208,7 @@ void ContactShape::binTriangles() {
   }
 }
 
+// visit(k) for the places in bin_triangles_ of the bins that a box touches.
 template <class Visit>
 void ContactShape::visitBins(const Box& box, const Visit& visit) const {
   std::array<int, 3> first, last;
@@ -211,7 +222,7 @@ void ContactShape::visitBins(const Box& box, const Visit& visit) const {
     for (int y = first[1]; y <= last[1]; ++y)
       for (int z = first[2]; z <= last[2]; ++z) {
         const std::size_t bin = (static_cast<std::size_t>(x) * bins_[1] + y) * bins_[2] + z;
-        for (Index k = bin_offsets_[bin]; k < bin_offsets_[bin + 1]; ++k) visit(bin_triangles_[k]);
+        for (Index k = bin_offsets_[bin]; k < bin_offsets_[bin + 1]; ++k) visit(k);
       }
 }
 
@@ -237,7 +248,7 @@ const ContactShape::Cell* ContactShape::fill(std::size_t index, const std::array
     Box ball;
     ball.min = centre.array() - radius;
     ball.max = centre.array() + radius;
-    visitBins(ball, [&](Index t) { around.push_back(t); });
+    visitBins(ball, [&](Index k) { around.push_back(bin_triangles_[k]); });
     std::sort(around.begin(), around.end());
     around.erase(std::unique(around.begin(), around.end()), around.end());
     for (Index t : around) {
@@ -383,9 +394,6 @@ class Settler {
     }
   }
 
-  /// The faces there say as much for one side as for the other.
-  bool cancelled() const { return std::abs(normals_.dot(away_)) <= kCancelled * angles_ * away_.norm(); }
-
   /// +1 outside, -1 inside.
   double settle(ContactShape::Nearest& found) const {
     // Two lips that lie on each other cancel but for rounding, which the order of the faces would decide.
@@ -436,11 +444,15 @@ void ContactShape::visitNear(const Vec3& rest, double radius, const Visit& visit
   Box box;
   box.min = rest.array() - radius;
   box.max = rest.array() + radius;
-  visitBins(box, visit);
+  const Eigen::Vector3f p = (rest - bin_origin_).cast<float>();
+  const float around = static_cast<float>((1.0 + 10.0 * kSphereRounding) * radius);
+  visitBins(box, [&](Index k) {
+    if (isWithin(bin_spheres_[k], p, around)) visit(bin_triangles_[k]);
+  });
 }
 
 // `within` [m]: something is known to be so near; infinite where nothing is known.
-bool ContactShape::searchBins(const Vec3& rest, double within, Nearest& found, bool* cancelled) const {
+bool ContactShape::searchBins(const Vec3& rest, double within, Nearest& found) const {
   found.triangle = kNoIndex;
   Best best(size_);
   best.distance = within;
@@ -459,9 +471,7 @@ bool ContactShape::searchBins(const Vec3& rest, double within, Nearest& found, b
     visitRing(grid, home, ring, [&](std::size_t bin) {
       if (bin_offsets_[bin] == bin_offsets_[bin + 1] || grid.squaredGap(bin, rest) > farthest) return;
       for (Index k = bin_offsets_[bin]; k < bin_offsets_[bin + 1]; ++k) {
-        const std::array<float, 4>& sphere = bin_spheres_[k];
-        const float x = p.x() - sphere[0], y = p.y() - sphere[1], z = p.z() - sphere[2], reach = bound + sphere[3];
-        if (x * x + y * y + z * z > reach * reach) continue;
+        if (!isWithin(bin_spheres_[k], p, bound)) continue;
         best.offer(facets_[bin_triangles_[k]], rest, found);
         tighten();
       }
@@ -474,11 +484,10 @@ bool ContactShape::searchBins(const Vec3& rest, double within, Nearest& found, b
     const double around = best.distance + 1e-6 * size_;
     visitNear(rest, around, [&](Index t) { settler.offer(facets_[t], rest); });
     sign = settler.settle(found);
-    if (cancelled) *cancelled = settler.cancelled();
   }
   // Rounding in triangles without area can make what is known too small.
   if (found.triangle == kNoIndex && std::isfinite(within))
-    return searchBins(rest, std::numeric_limits<double>::infinity(), found, cancelled);
+    return searchBins(rest, std::numeric_limits<double>::infinity(), found);
   found.distance = std::copysign(best.distance, sign);
   return found.triangle != kNoIndex;
 }
@@ -500,31 +509,16 @@ bool ContactShape::isBeyondCells(const Vec3& rest) const {
 }
 
 bool ContactShape::isClear(const Vec3& rest, double by) const {
-  if (!cells_ || !rest.allFinite() || !(by >= 0.0)) return false;
-  const Grid grid{bin_origin_, bin_edge_, bins_};
-  const Vec3 around = Vec3::Constant(by * (1.0 + 1e-6) + 1e-9 * size_);
-  const std::array<int, 3> low = grid.cellAt(rest - around), high = grid.cellAt(rest + around);
-  for (int x = low[0]; x <= high[0]; ++x)
-    for (int y = low[1]; y <= high[1]; ++y) {
-      // Along z they lie side by side.
-      const std::size_t first = grid.number(x, y, low[2]), last = grid.number(x, y, high[2]);
-      if (bin_offsets_[first] != bin_offsets_[last + 1]) return false;
-    }
-  // No triangle is so near: all of the point's bin is on one side.
-  for (int d = 0; d < 3; ++d)
-    if (rest[d] < bounds_.min[d] || rest[d] > bounds_.max[d]) return true;
-  const std::array<int, 3> at = grid.cellAt(rest);
-  const std::size_t bin = grid.number(at[0], at[1], at[2]);
-  signed char side = bin_sides_[bin].load(std::memory_order_relaxed);
-  if (side == 0) {
+  std::call_once(spaced_, [this] {
+    space_ = std::make_unique<EmptySpace>(surface_, kSpaceEdges * mean_edge_);
+    // What the search takes for the inside is not empty.
     Nearest found;
-    bool cancelled = false;  // by lips that lie on each other: they do not tell
-    const Vec3 centre = bin_origin_ + bin_edge_ * Vec3(at[0] + 0.5, at[1] + 0.5, at[2] + 0.5);
-    const bool any = searchBins(centre, std::numeric_limits<double>::infinity(), found, &cancelled);
-    side = any && found.distance > 0.0 && !cancelled ? 1 : -1;
-    bin_sides_[bin].store(side, std::memory_order_relaxed);  // whoever else asks finds the same
-  }
-  return side > 0;
+    const Vec3 outside = bounds_.min.array() - mean_edge_;
+    if (!searchBins(outside, std::numeric_limits<double>::infinity(), found) || !(found.distance > 0.0))
+      space_ = std::make_unique<EmptySpace>();
+    cell_bytes_.fetch_add(space_->bytes(), std::memory_order_relaxed);
+  });
+  return space_->around(rest) > by;
 }
 
 double ContactShape::clearance(const Vec3& rest, Index hint) const {
@@ -641,7 +635,8 @@ double ContactShape::depthAlong(const Vec3& from, const Vec3& direction, double 
   Box box;
   box.extend(from);
   box.extend(from + longest * direction);
-  visitBins(box, [&](Index t) {
+  visitBins(box, [&](Index k) {
+    const Index t = bin_triangles_[k];
     const Vec3 to = facets_[t].centre - from;
     const double along = to.dot(direction), reach = 1.01 * facets_[t].radius;
     if (along - reach > depth || to.squaredNorm() - along * along > reach * reach) return;  // the ray passes it by

@@ -11,6 +11,8 @@
 
 namespace meshless {
 
+class EmptySpace;
+
 /// How the vertices of a surface follow the particles of a body: views, to be kept alive by whoever passes them.
 struct SurfaceRows {
   const std::vector<Index>* particle = nullptr;  // one a vertex; kNoIndex: it rides
@@ -54,8 +56,8 @@ class ContactShape {
   /// A lower bound [m] of the distance from a point to the surface from outside, quick where the same place was asked
   /// about before; negative where the point may be inside or near. `hint`: as for nearest(). Thread-safe.
   double clearance(const Vec3& rest, Index hint = kNoIndex) const;
-  /// True only where clearance() is more than `by` [m], and for most of what is far from the surface: it looks at bins
-  /// of triangles alone. Thread-safe.
+  /// True only where clearance() is more than `by` [m], and for most of what is farther by a few edges than that: it
+  /// knows how far it is from a cell to the next one with a triangle. Thread-safe.
   bool isClear(const Vec3& rest, double by) const;
 
   /// [m] from a point to a triangle of the surface.
@@ -89,7 +91,7 @@ class ContactShape {
   const Cell* fill(std::size_t index, const std::array<int, 3>& at) const;
   std::size_t cellAt(const Vec3& rest, std::array<int, 3>& at) const;
   bool isBeyondCells(const Vec3& rest) const;
-  bool searchBins(const Vec3& rest, double within, Nearest& found, bool* cancelled = nullptr) const;
+  bool searchBins(const Vec3& rest, double within, Nearest& found) const;
   template <class Visit>
   void visitNear(const Vec3& rest, double radius, const Visit& visit) const;
   void binTriangles();
@@ -114,7 +116,8 @@ class ContactShape {
   std::vector<Index> bin_offsets_, bin_triangles_;
   std::vector<std::array<float, 4>> bin_spheres_;  // about them: centre from bin_origin_ [m], radius [m]
 
-  mutable std::unique_ptr<std::atomic<signed char>[]> bin_sides_;  // of empty ones: 1 outside, -1 not so, 0 not known
+  mutable std::once_flag spaced_;
+  mutable std::unique_ptr<EmptySpace> space_;
 
   // cells with the triangles that can be nearest to a point in them
   Vec3 cell_origin_ = Vec3::Zero();
