@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Eigenvalues>
 
@@ -15,6 +16,7 @@ constexpr double kLetOutSpeed = 1.0;   // [1/s] times the smaller body's size, a
 constexpr double kCaughtSpeed = 10.0;  // [1/s] likewise, of what has passed through
 constexpr double kRestingSpeed = 0.1;  // of the speed after a fall by half the size: slower bodies do not bounce
 constexpr Index kTaskContacts = 256;   // of a task at the least
+constexpr double kStirred = 0.02;      // of the least body's size, against another in one substep: not calm any more
 constexpr double kBeside = 0.02;       // barycentric: farther off its triangle a point does not touch it from outside
 constexpr double kFarBeside = 1.0;     // nor from inside
 
@@ -192,6 +194,7 @@ struct ContactSolver::Impl {
   std::vector<Index> tasks;            // first island of each, and the end
   std::vector<std::size_t> corrected;  // one a task
   std::vector<Index> row_counts;       // one an island
+  std::vector<char> stirred;           // one an island: not calm, or no more since the frame began
 
   // inputs of the call
   const ContactScene* scene = nullptr;
@@ -356,16 +359,11 @@ struct ContactSolver::Impl {
 
   void solveIsland(Index island, std::vector<Contact>& contacts, bool fresh, std::size_t& corrected) {
     Row* const first = rows.data() + plan->contact_offsets[island];
-    if (fresh || !plan->calm[island]) {
-      begin(island);
-      Row* row = first;
-      for (Index k = plan->contact_offsets[island]; k < plan->contact_offsets[island + 1]; ++k)
-        if (makeRow(contacts[plan->contacts[k]], *row)) ++row;
-      row_counts[island] = static_cast<Index>(row - first);
-      startWarm(island, first);
-    } else {
+    if (fresh) stirred[island] = !plan->calm[island];
+    if (!fresh && !stirred[island]) {
       // All impulses of the last substep by the same rows: what they have moved is where this one starts.
       beginAgain(island);
+      double farthest = 0.0;
       for (Row* row = first; row != first + row_counts[island]; ++row) {
         Gap gap;
         readGap<true>(*scene, *parties, *row->contact, *entries, true, gap);
@@ -373,13 +371,25 @@ struct ContactSolver::Impl {
         const double along = row->normal.dot(gap.motion);
         row->target = targetOf(*row, along);
         row->slip = gap.motion - along * row->normal;
+        farthest = std::max(farthest, gap.motion.squaredNorm());
       }
+      // Calm when the frame began, and then torn along by a spring or a tool.
+      const double most = kStirred * leastSize(island);
+      stirred[island] = !(farthest < most * most);
+    }
+    if (fresh || stirred[island]) {
+      begin(island);
+      Row* row = first;
+      for (Index k = plan->contact_offsets[island]; k < plan->contact_offsets[island + 1]; ++k)
+        if (makeRow(contacts[plan->contacts[k]], *row)) ++row;
+      row_counts[island] = static_cast<Index>(row - first);
+      startWarm(island, first);
     }
     strikeTogether(first, first + row_counts[island]);
     const Index count = row_counts[island];
     for (int pass = 0; pass < plan->passes[island]; ++pass)
       for (Index n = 0; n < count; ++n) corrected += sweep(first[pass % 2 ? count - 1 - n : n]);
-    const double share = plan->calm[island] ? 1.0 : energyShare(island);
+    const double share = stirred[island] ? energyShare(island) : 1.0;
     if (share < 1.0)
       for (const Row* row = first; row != first + count; ++row) {
         row->contact->impulse *= share;
@@ -588,6 +598,13 @@ struct ContactSolver::Impl {
     return moved;
   }
 
+  double leastSize(Index island) const {
+    double least = std::numeric_limits<double>::infinity();
+    for (Index k = plan->party_offsets[island]; k < plan->party_offsets[island + 1]; ++k)
+      least = std::min(least, (*parties)[plan->parties[k]].shape->size());
+    return least;
+  }
+
   // The bodies have hardly turned since begin(): only where they are is found anew.
   void beginAgain(Index island) {
     for (Index k = plan->party_offsets[island]; k < plan->party_offsets[island + 1]; ++k) {
@@ -638,6 +655,7 @@ void ContactSolver::begin(const ContactScene& scene, const std::vector<ContactPa
   // Rows are kept in place: an island has room for all of its contacts.
   w.rows.resize(plan.contacts.size());
   w.row_counts.resize(plan.size());
+  w.stirred.resize(plan.size());
   w.let_impulses.resize(plan.contacts.size());
 }
 
@@ -664,7 +682,7 @@ void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactP
 
 std::size_t ContactSolver::bytes() const {
   const Impl& w = *impl_;
-  return sizeof w + bytesOf(w.rigid, w.shifts, w.rows, w.let_impulses, w.tasks, w.corrected, w.row_counts);
+  return sizeof w + bytesOf(w.rigid, w.shifts, w.rows, w.let_impulses, w.tasks, w.corrected, w.row_counts, w.stirred);
 }
 
 }  // namespace meshless

@@ -219,6 +219,31 @@ std::vector<WorldBody*> World::Impl::bodiesInContact(double h) {
   return near;
 }
 
+namespace {
+
+// What contacts do without a velocity, as letting out what was inside, a spring would answer with one, substep after
+// substep. `impulse`: what the grasp has given after them [kg m], `motion`: of its mean in this substep before that.
+// So much of it becomes velocity as adds no kinetic energy.
+void keepStill(const BodyModel& model, const Pick& pick, const Vec3& motion, const Vec3& impulse,
+               StepScratch& scratch) {
+  double inverse_mass = 0.0;
+  for (std::size_t k = 0; k < pick.patch.size(); ++k)
+    if (!model.fixed[pick.patch[k]]) inverse_mass += pick.weights[k] * pick.weights[k] / model.masses[pick.patch[k]];
+  const double most = impulse.squaredNorm() * inverse_mass;
+  if (!(most > 0.0)) return;
+  const double share = std::clamp(-2.0 * impulse.dot(motion) / most, 0.0, 1.0);
+  const bool compared = scratch.before_contact.size() == scratch.previous.size();
+  for (std::size_t k = 0; k < pick.patch.size(); ++k) {
+    const Index i = pick.patch[k];
+    if (model.fixed[i]) continue;
+    const Vec3 moved = (1.0 - share) * pick.weights[k] / model.masses[i] * impulse;
+    scratch.previous[i] += moved;
+    if (compared) scratch.before_contact[i] += moved;
+  }
+}
+
+}  // namespace
+
 // A target that jumps is followed evenly over the step: within the first of many substeps it would throw the tissue.
 // Again after contacts: what they have moved a stiff spring by they have no energy for, and the next substep would
 // throw the tissue back with it.
@@ -232,8 +257,11 @@ void World::Impl::pullSprings(int substep, int substeps, double h_frame, bool ag
     const int left = substeps - substep - 1;
     const Vec3 end = pick.target - left * (pick.target - pick.reached) / substeps;
     const Vec3 given = again ? pulls[n] : Vec3(Vec3::Zero());
+    const Vec3 motion = again ? Vec3(graspMean(pick, body->state.positions) - graspMean(pick, body->scratch.previous))
+                              : Vec3(Vec3::Zero());
     pulls[n] = pullGrasp(*body->model, pick, end, h, body->state.positions, given);
     pick.force += pulls[n] / substeps;
+    if (again) keepStill(*body->model, pick, motion, h * h * pulls[n], body->scratch);
   }
 }
 
@@ -355,23 +383,44 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
     }
     return there - p;
   };
-  const auto outOfSphere = [&](const Vec3& p) -> Vec3 { return outOf(p, push.radius, 0.0); };
+  // At once by no more than the body is large: what a spring keeps inside would be torn away from it.
+  Box at_rest;
+  if (near_push)
+    for (const Vec3& p : model.rest) at_rest.extend(p);
+  const double longest = near_push ? std::max(at_rest.diagonal(), model.spacing) : 0.0;
+  const auto bounded = [longest](const Vec3& shift) -> Vec3 {
+    const double length = shift.norm();
+    return length > longest ? Vec3(longest / length * shift) : shift;
+  };
+  const auto outOfSphere = [&](const Vec3& p) -> Vec3 { return bounded(outOf(p, push.radius, 0.0)); };
 
   // Whom the sphere has swallowed it puts out as a whole and as fast as it was: each particle by a way of its own would
   // go to another side of a sphere that is much larger than the body, and tear it.
+  bool inside = false;  // still: it goes on as a whole
   const Vec3 middle = 0.5 * (bounds.min + bounds.max);
   const double half = 0.5 * bounds.diagonal();
   if (near_push && !model.any_fixed && (middle - push.position).norm() + half < push.radius) {
-    const Vec3 shift = outOf(middle, push.radius + half, middle.z() - bounds.min.z());
+    const bool held = std::any_of(picks.begin(), picks.end(), [&](const Pick& pick) { return pick.body == body.id; });
+    Vec3 shift = outOf(middle, push.radius + half, middle.z() - bounds.min.z());
+    if (held) {
+      shift = bounded(shift);
+      inside = true;
+    }
     for (Points* points : {&state.positions, &body.scratch.previous, &body.scratch.before_contact})
       for (Vec3& p : *points) p += shift;
     push.touching = hit_push = true;
     ++report.push_contacts;
   }
 
-  // Who can reach the ground within this frame is found once. A push can send down others.
-  const bool few = near_ground && !near_push;
+  // Who can reach the ground within this frame is found once. A push can send down others, and so can a spring.
+  bool few = near_ground && !near_push;
   if (few && !body.low_current) findLow(body, h_frame);
+  if (few) {
+    const auto below = [&](const Vec3& p) { return p.z() < *settings.ground; };
+    const auto listed = std::count_if(body.low_particles.begin(), body.low_particles.end(),
+                                      [&](Index i) { return below(state.positions[i]); });
+    few = std::count_if(state.positions.begin(), state.positions.end(), below) == listed;
+  }
   const Index lookable = static_cast<Index>(few ? body.low_particles.size() : model.rest.size());
   for (int pass = 0; pass < kContactPasses; ++pass) {
     if (near_ground) {
@@ -399,7 +448,7 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
           },
           few ? &body.low_riders : nullptr);
     }
-    if (near_push) {
+    if (near_push && !inside) {
       const auto isPushed = [&](Index i, const Vec3& shift) {
         hit_push = true;
         push_impulse += model.masses[i] * shift;

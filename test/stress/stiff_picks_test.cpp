@@ -71,6 +71,51 @@ TEST_P(StiffPicks, DoNotThrow) {
   if (!rod.on_ground) EXPECT_LE(most, 1.1 * dragged + 1e-6);
 }
 
+struct Held {
+  std::string name;
+  int substeps;
+  bool contact;
+};
+
+void PrintTo(const Held& held, std::ostream* out) { *out << held.name; }
+
+std::vector<Held> allHeld() {
+  std::vector<Held> all;
+  for (const int substeps : {1, 8, 33, 50})
+    for (const bool contact : {false, true})
+      all.push_back({std::to_string(substeps) + " substeps" + (contact ? " with contact" : ""), substeps, contact});
+  return all;
+}
+
+class HeldInTheGround : public testing::TestWithParam<std::tuple<Kind, Held>> {};
+
+// A body that lies there is pulled to a place half a metre below: the ground and the rod cannot both have their way.
+TEST_P(HeldInTheGround, AreNotThrown) {
+  const auto& [kind, held] = GetParam();
+  WorldSettings settings;
+  settings.ground = -0.1;
+  settings.substeps = held.substeps;
+  settings.contact = held.contact ? ContactMethod::kRestShape : ContactMethod::kNone;
+  Kind coarse = kind;
+  coarse.bodies = 36;
+  Twins twins(settings);
+  twins.spawn(test::shared(blockOf(coarse, "block", Vec3(0.15, 0, -0.049))));
+  for (int step = 0; step < 60; ++step) ASSERT_TRUE(twins.step(Vec3::Zero(), 10.0));
+  PickCommand pick;
+  pick.point = Vec3(0.0, 0.1, -0.1);
+  pick.max_distance = 1.0;
+  pick.stiffness = 1e8;
+  const PickId rod = test::replyOf<PickReply>(twins.apply(pick)).pick;
+  twins.attempt(LockCommand{rod, Vec3(0.3, 0.3, -0.55)});
+  for (int step = 0; step < 60; ++step) {
+    ASSERT_TRUE(twins.step(Vec3::Zero(), 1e3));
+    ASSERT_LT(twins.seen().bodies[0].measures.kinetic_energy, kMostEnergy) << "step " << step;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Stress, HeldInTheGround, testing::ValuesIn(crossed(kindsAlone(), allHeld())),
+                         crossedName<Held>);
+
 INSTANTIATE_TEST_SUITE_P(Stress, StiffPicks, testing::ValuesIn(crossed(kindsAlone(), allRods())), crossedName<Rod>);
 
 }  // namespace

@@ -37,6 +37,34 @@ TEST_P(Swallowed, BodiesStayWhole) {
   }
 }
 
+// What a rod holds inside of the sphere neither can have: it is torn between them by no more than it is large at once.
+TEST_P(Swallowed, BodiesThatAreHeldStayFinite) {
+  for (const double radius : {1.0, 1000.0})
+    for (const int substeps : {1, 7}) {
+      SCOPED_TRACE(std::to_string(radius) + " m, " + std::to_string(substeps));
+      WorldSettings settings;
+      settings.substeps = substeps;
+      Twins twins(settings);
+      Kind coarse = GetParam();
+      coarse.bodies = 36;
+      twins.spawn(test::shared(blockOf(coarse, "block", Vec3(0.0, 0.0, 0.001))));
+      for (int step = 0; step < 10; ++step) ASSERT_TRUE(twins.step(Vec3::Zero(), 3.0));
+      PickCommand pick;
+      pick.point = Vec3(0.1, 0.05, 0.05);
+      pick.max_distance = 1.0;
+      pick.stiffness = 2e9;
+      twins.attempt(pick);
+      PushCommand push;
+      push.radius = radius;
+      push.position = 0.3 * radius * Vec3(0.3, -0.2, 0.1);
+      twins.attempt(push);
+      for (int step = 0; step < 60; ++step) {
+        ASSERT_TRUE(twins.step(Vec3::Zero(), 1e3)) << "step " << step;
+        ASSERT_LT(twins.seen().bodies[0].measures.kinetic_energy, 1e7) << "step " << step;
+      }
+    }
+}
+
 std::vector<Kind> oneByOne() {
   const std::vector<Kind> some = thinned(kindsAlone());
   return some.empty() ? std::vector<Kind>{kindsAlone().front()} : some;
