@@ -14,8 +14,8 @@
 namespace meshless {
 namespace {
 
-constexpr double kBinEdges = 3.0;   // size of a bin in mean edges
-constexpr double kCellEdges = 0.5;  // size of a cell in mean edges
+constexpr double kBinEdges = 3.0;    // size of a bin in mean edges
+constexpr double kCellEdges = 0.5;   // size of a cell in mean edges
 constexpr double kSpaceEdges = 1.5;  // size of a cell of empty space in mean edges
 constexpr double kMostBins = 1 << 18;
 constexpr double kMostCells = 1 << 19;

@@ -1,4 +1,5 @@
-// Where nothing of a closed surface is for a long way: a map of distances, coarse and quick to make. Private to contact.
+// Where nothing of a closed surface is for a long way: a map of distances, coarse and quick to make. Private to
+// contact.
 #pragma once
 
 #include <cstddef>

@@ -19,7 +19,9 @@ constexpr int kLanes = MESHLESS_MATCH_BYTES / 4;
 constexpr int kRowPacks = kLanes == 4 ? 3 : 16 / kLanes;  // vectors that cover the 12 numbers of a row
 
 constexpr float kFullBetaDeterminant = 0.1f;  // as in shape_matching.cpp
-constexpr float kLeastSlope = 1e-30f;          // where a map has no volume to hold, nothing is divided by 0
+constexpr int kVolumeSteps = 4;               // likewise
+constexpr float kLeastGradient = 1e-30f;      // where a map has no volume to hold, nothing is divided by 0
+constexpr float kLeastSlope = 1e-3f;          // of the first step's
 constexpr float kLineDeterminant = 1e-4f;     // of the inertia over its trace: nearly a line below it
 constexpr float kFarFromOrigin = 0.5f;        // of the body's size
 
@@ -56,17 +58,6 @@ MESHLESS_INLINE Pack squareRoot(Pack x) {
   for (int l = 0; l < kLanes; ++l) x[l] = __builtin_sqrtf(x[l]);
   return x;
 #endif
-}
-
-// Of numbers of about 1: a guess from the exponent, and two Halley steps.
-MESHLESS_INLINE Pack cubeRoot(Pack x) {
-  const Pack third = __builtin_convertvector((Mask)x, Pack) * (1.0f / 3.0f) + 709921077.0f;
-  Pack t = (Pack) __builtin_convertvector(third, Mask);
-  for (int step = 0; step < 2; ++step) {
-    const Pack t3 = t * t * t;
-    t = t * (t3 + 2.0f * x) / (2.0f * t3 + x);
-  }
-  return t;
 }
 
 struct Vector {
@@ -231,25 +222,43 @@ void measure(const BodiesView& view, int block, int lane) {
   putVector({inverse.xy, inverse.yz, inverse.zx}, motion + (kMotionInverse + 3) * kBlock);
 }
 
+MESHLESS_INLINE void cofactorsOf(const Pack (&a)[9], Pack (&c)[9]) {
+  for (int r = 0; r < 3; ++r) {
+    const Pack* const u = a + 3 * ((r + 1) % 3);
+    const Pack* const v = a + 3 * ((r + 2) % 3);
+    for (int k = 0; k < 3; ++k) {
+      const int i = (k + 1) % 3, j = (k + 2) % 3;
+      c[3 * r + k] = u[i] * v[j] - u[j] * v[i];
+    }
+  }
+}
+
 // A fitted map becomes the one of the goal, see withVolumeOfRest() in shape_matching.cpp; returns its share.
 MESHLESS_INLINE Pack holdVolume(const StepNumbers& step, const Symmetric& inverse, Pack (&fit)[9]) {
   const Pack determinant = determinantOf(fit);
-  const Pack g = cubeRoot(larger(determinant, all(kFullBetaDeterminant)));
-  Pack cofactors[9], gradient[9];
-  for (int r = 0; r < 3; ++r) {
-    const Pack* const u = fit + 3 * ((r + 1) % 3);
-    const Pack* const v = fit + 3 * ((r + 2) % 3);
-    for (int k = 0; k < 3; ++k) {
-      const int i = (k + 1) % 3, j = (k + 2) % 3;
-      cofactors[3 * r + k] = u[i] * v[j] - u[j] * v[i];
-    }
-  }
+  Pack cofactors[9], gradient[9], second[9];
+  cofactorsOf(fit, cofactors);
   timesSymmetric(cofactors, inverse, gradient);
-  Pack slope = all(0.0f);
-  for (int k = 0; k < 9; ++k) slope += gradient[k] * cofactors[k];
-  const Pack back = 3.0f * g * g * (g - 1.0f) / larger(slope, all(kLeastSlope));
-  for (int k = 0; k < 9; ++k) fit[k] -= back * gradient[k];
-  return step.beta * smaller(all(1.0f), larger(all(0.0f), determinant * (1.0f / kFullBetaDeterminant)));
+  Pack c1 = all(kLeastGradient);
+  for (int k = 0; k < 9; ++k) c1 += gradient[k] * cofactors[k];
+  // In units of a first step by the whole volume, so that nothing is too large or small for floats.
+  const Pack unit = 1.0f / c1;
+  for (int k = 0; k < 9; ++k) gradient[k] *= unit;
+  cofactorsOf(gradient, second);
+  Pack c2 = all(0.0f), c3 = all(0.0f);
+  for (int k = 0; k < 9; ++k) c2 += fit[k] * second[k];
+  for (int k = 0; k < 3; ++k) c3 += gradient[k] * second[k];
+  c2 = larger(c2, all(0.0f)), c3 = larger(c3, all(0.0f));  // below by rounding alone where there is any volume
+  const Pack full = larger(all(0.0f), smaller(all(1.0f), determinant * (1.0f / kFullBetaDeterminant)));
+  Pack t = all(0.0f);
+  for (int n = 0; n < kVolumeSteps; ++n) {
+    const Pack value = determinant - t * (1.0f - t * (c2 - t * c3));
+    const Pack slope = 1.0f - t * (2.0f * c2 - 3.0f * t * c3);
+    t += (value - full) / larger(slope, all(kLeastSlope));
+  }
+  t = choose(full > 0.0f, t, all(0.0f));
+  for (int k = 0; k < 9; ++k) fit[k] -= t * gradient[k];
+  return step.beta * full;
 }
 
 // The goal's map of q in units of the size: 3 x 3, and 3 x 6 of the second order.

@@ -11,17 +11,31 @@ namespace {
 
 constexpr double kLinearRankRatio = 1e-8;     // of the moment's eigenvalues, smallest to largest
 constexpr double kQuadraticRankRatio = 1e-7;  // of the basis in units of the cluster's size
+constexpr int kVolumeSteps = 4;
+constexpr double kLeastSlope = 1e-3;          // of the first step's
 constexpr double kFullBetaDeterminant = 0.1;  // below it the fitted map fades out, at 0 only the rotation is left
 
-// A as near to determinant 1 as one step along the gradient of the determinant comes. The distance is that of the
-// particles, so that by momentum it is without torque; A / cbrt(det A) is no gradient and feeds energy in.
-Mat3 withVolumeOfRest(const Mat3& a, double determinant, const Mat3& moment_inverse) {
-  const double g = std::cbrt(std::max(determinant, kFullBetaDeterminant));
+Mat3 cofactorsOf(const Mat3& a) {
   Mat3 cofactors;
   for (int r = 0; r < 3; ++r) cofactors.row(r) = a.row((r + 1) % 3).cross(a.row((r + 2) % 3));
-  const Mat3 gradient = cofactors * moment_inverse;
-  const double slope = gradient.cwiseProduct(cofactors).sum();
-  return slope > 0.0 ? Mat3(a - 3.0 * g * g * (g - 1.0) / slope * gradient) : a;
+  return cofactors;
+}
+
+// A, led to determinant 1 along the gradient of the determinant: near A in the metric of the particles, and so without
+// torque. A / cbrt(det A) is no gradient and feeds energy in.
+Mat3 withVolumeOfRest(const Mat3& a, double determinant, const Mat3& moment_inverse) {
+  if (!(determinant > 0.0)) return a;
+  const Mat3 cofactors = cofactorsOf(a), towards = cofactors * moment_inverse;
+  const Mat3 gradient = towards / cofactors.cwiseProduct(towards).sum(), second = cofactorsOf(gradient);
+  // det (A - t G) is a cubic, convex up to its first root: Newton's method passes it at most in its first step.
+  const double c2 = std::max(0.0, a.cwiseProduct(second).sum()), c3 = std::max(0.0, gradient.row(0).dot(second.row(0)));
+  const double target = std::min(1.0, determinant / kFullBetaDeterminant);
+  double t = 0.0;
+  for (int n = 0; n < kVolumeSteps; ++n) {
+    const double value = determinant - t * (1.0 - t * (c2 - t * c3)), slope = 1.0 - t * (2.0 * c2 - 3.0 * t * c3);
+    t += (value - target) / std::max(slope, kLeastSlope);
+  }
+  return a - t * gradient;
 }
 
 Vec9 quadraticBasis(const Vec3& q) {

@@ -97,7 +97,8 @@ TEST(MatchShapes, AnyVolumeKeepingAffineFieldIsReproducedByLinearAndAnyQuadratic
       for (std::size_t i = 0; i < y.size(); ++i) {
         const Vec3 q = cloud.rest[i] / scale;
         Vec9 b;
-        b << q.x(), q.y(), q.z(), q.x() * q.x(), q.y() * q.y(), q.z() * q.z(), q.x() * q.y(), q.y() * q.z(), q.z() * q.x();
+        b << q.x(), q.y(), q.z(), q.x() * q.x(), q.y() * q.y(), q.z() * q.z(), q.x() * q.y(), q.y() * q.z(),
+            q.z() * q.x();
         y[i] = scale * (quadratic * b) + shift;
       }
       const Points goals = goalsOf(cloud, y, MatchMode::kQuadratic, 1.0);
