@@ -9,6 +9,7 @@ namespace meshless {
 namespace {
 
 constexpr double kBesidePath = 1e-6;  // barycentric: no path slips between two triangles
+constexpr double kSlowPath = 0.25;    // of the thickness: who goes so far through a face is still seen to be near it
 constexpr int kMostSlides = 8;        // triangles that a caught point goes on in a substep
 
 }  // namespace
@@ -68,6 +69,7 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, In
       for (cell[1] = range.first[1]; cell[1] <= range.last[1]; ++cell[1])
         for (cell[2] = range.first[2]; cell[2] <= range.last[2]; ++cell[2]) table.insert(cell, near[k]);
   }
+  const double slow = kSlowPath * shape.thickness();
   for (Index s = 0; s < samples.size(); ++s) {
     if (caught.count({of.key, with.key, s})) continue;
     const Path& path = paths[s];
@@ -84,6 +86,7 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, In
       const double h0 = n0.dot(path.from - p0.from), h1 = n1.dot(path.to - p0.to);
       if (!(h0 >= 0.0) || !(h1 < 0.0)) return;
       const double d0 = h0 / n0.norm(), d1 = h1 / n1.norm();
+      if (d0 - d1 < slow) return;
       const double time = d0 / (d0 - d1);
       if (!(time < first) && !(time == first && t < hit)) return;
       const auto then = [time](const Path& q) -> Vec3 { return q.from + time * (q.to - q.from); };
