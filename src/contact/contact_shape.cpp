@@ -509,6 +509,7 @@ bool ContactShape::isBeyondCells(const Vec3& rest) const {
 }
 
 bool ContactShape::isClear(const Vec3& rest, double by) const {
+  if (!cells_ || !(by >= 0.0)) return false;
   std::call_once(spaced_, [this] {
     space_ = std::make_unique<EmptySpace>(surface_, kSpaceEdges * mean_edge_);
     // What the search takes for the inside is not empty.

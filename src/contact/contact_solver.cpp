@@ -51,6 +51,7 @@ struct Row {
   Vec3 normal, lever_a, lever_b;
   Vec3 arm_a, arm_b;         // [1/(kg m)] turn of each party by a unit impulse along the normal, with its share
   Vec3 slip = Vec3::Zero();  // [m] tangential, before the sweeps
+  double along = 0.0;        // [m] the same along the normal
   double distance = 0.0, target = 0.0;                      // [m]
   double inverse_answer = 0.0, inverse_answer_along = 0.0;  // [kg]
   double friction = 0.0, restitution = 0.0;
@@ -360,6 +361,8 @@ struct ContactSolver::Impl {
   void solveIsland(Index island, std::vector<Contact>& contacts, bool fresh, std::size_t& corrected) {
     Row* const first = rows.data() + plan->contact_offsets[island];
     if (fresh) stirred[island] = !plan->calm[island];
+    // Calm when the frame began, it can be torn along by a spring or a tool since.
+    const double most = stirred[island] ? 0.0 : kStirred * leastSize(island);
     if (!fresh && !stirred[island]) {
       // All impulses of the last substep by the same rows: what they have moved is where this one starts.
       beginAgain(island);
@@ -373,8 +376,6 @@ struct ContactSolver::Impl {
         row->slip = gap.motion - along * row->normal;
         farthest = std::max(farthest, gap.motion.squaredNorm());
       }
-      // Calm when the frame began, and then torn along by a spring or a tool.
-      const double most = kStirred * leastSize(island);
       stirred[island] = !(farthest < most * most);
     }
     if (fresh || stirred[island]) {
@@ -383,6 +384,12 @@ struct ContactSolver::Impl {
       for (Index k = plan->contact_offsets[island]; k < plan->contact_offsets[island + 1]; ++k)
         if (makeRow(contacts[plan->contacts[k]], *row)) ++row;
       row_counts[island] = static_cast<Index>(row - first);
+      if (!stirred[island]) {
+        double farthest = 0.0;
+        for (const Row* r = first; r != row; ++r)
+          farthest = std::max(farthest, r->slip.squaredNorm() + r->along * r->along);
+        stirred[island] = !(farthest < most * most);
+      }
       startWarm(island, first);
     }
     strikeTogether(first, first + row_counts[island]);
@@ -489,6 +496,7 @@ struct ContactSolver::Impl {
     }
     row.target = targetOf(row, along_normal);
     row.slip = gap.motion - along_normal * c.normal;
+    row.along = along_normal;
     row.friction = std::sqrt(a.friction * (b ? b->friction : scene->ground_friction));
     row.inverse_answer_along = 0.0;
     if (row.friction > 0.0) {

@@ -9,8 +9,9 @@ namespace meshless {
 namespace {
 
 constexpr double kBesidePath = 1e-6;  // barycentric: no path slips between two triangles
-constexpr double kSlowPath = 0.25;    // of the thickness: who goes so far through a face is still seen to be near it
-constexpr int kMostSlides = 8;        // triangles that a caught point goes on in a substep
+constexpr double kSlowPath =
+    0.25;  // of the thickness: who meets a face no faster than that in a substep is seen to be near it
+constexpr int kMostSlides = 8;  // triangles that a caught point goes on in a substep
 
 }  // namespace
 

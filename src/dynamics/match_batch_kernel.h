@@ -22,6 +22,7 @@ constexpr float kFullBetaDeterminant = 0.1f;  // as in shape_matching.cpp
 constexpr int kVolumeSteps = 4;               // likewise
 constexpr float kLeastGradient = 1e-30f;      // where a map has no volume to hold, nothing is divided by 0
 constexpr float kLeastSlope = 1e-3f;          // of the first step's
+constexpr float kLeastShare = 1e-6f;          // below, what is cubed leaves the range of a float
 constexpr float kLineDeterminant = 1e-4f;     // of the inertia over its trace: nearly a line below it
 constexpr float kFarFromOrigin = 0.5f;        // of the body's size
 
@@ -256,7 +257,7 @@ MESHLESS_INLINE Pack holdVolume(const StepNumbers& step, const Symmetric& invers
     const Pack slope = 1.0f - t * (2.0f * c2 - 3.0f * t * c3);
     t += (value - full) / larger(slope, all(kLeastSlope));
   }
-  t = choose(full > 0.0f, t, all(0.0f));
+  t = choose(full > kLeastShare, t, all(0.0f));
   for (int k = 0; k < 9; ++k) fit[k] -= t * gradient[k];
   return step.beta * full;
 }

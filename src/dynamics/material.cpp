@@ -104,9 +104,8 @@ double viscosityTime(double alpha, double h) {
   return h * (1.0 - std::pow(1.0 - alpha, h / kReferenceStep)) / gain;
 }
 
-// Fitted goals alone have no shape to return to, and dividing by cbrt(det) is no gradient of a potential: together they
-// feed energy in. A twentieth of the rigid goal is enough that none was seen to grow; with half a second and more in
-// one step it was, in one of ten random starts.
+// Fitted goals alone have no shape to return to: a twentieth of the rigid goal is enough for that, and more with half a
+// second in one step.
 double actingBeta(double beta, double h) {
   constexpr double kMost = 0.95, kLongStep = 0.2;  // [s]
   return std::min(beta, h > kLongStep ? kMost * kLongStep / h : kMost);

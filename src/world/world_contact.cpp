@@ -16,6 +16,7 @@ constexpr double kLeastRigid = 0.5;          // share of a contact's impulse tha
 constexpr double kFlattest = 1e-6;           // det of a map: below, the rotation stands in
 constexpr std::size_t kWorthAThread = 1000;  // vertices
 constexpr std::size_t kKeptModels = 64;      // more than this many dead entries are cleared away
+constexpr double kHeldLift = 0.5;            // of the spacing, a step
 constexpr double kNearPiece = 0.02;          // of the size: beside the bounds of a piece
 
 SurfaceRows rowsOf(const BodyModel& model) {
@@ -287,9 +288,12 @@ void World::Impl::liftOutOfGround(WorldBody& body, double h_frame) {
   if (!settings.ground || !(body.bounds.min.z() - body.bounds.diagonal() - h_frame * body.fastest < *settings.ground) ||
       !(body.bounds.min.z() - 2.0 * h_frame * speedOf(body) < *settings.ground))
     return;
+  // Of what a rod holds down there a little at a time: it would have it all back in the next step.
+  const bool held = std::any_of(picks.begin(), picks.end(), [&](const Pick& pick) { return pick.body == body.id; });
+  const double most = held ? kHeldLift * body.model->spacing : std::numeric_limits<double>::infinity();
   for (Index i : binding.particle)
     if (i != kNoIndex && body.state.positions[i].z() < *settings.ground && !body.model->fixed[i])
-      body.state.positions[i].z() = *settings.ground;
+      body.state.positions[i].z() = std::min(*settings.ground, body.state.positions[i].z() + most);
   if (binding.riders.empty()) return;
   findLow(body, h_frame);
   body.low_current = false;

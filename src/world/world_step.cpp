@@ -396,11 +396,11 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
 
   // Whom the sphere has swallowed it puts out as a whole and as fast as it was: each particle by a way of its own would
   // go to another side of a sphere that is much larger than the body, and tear it.
+  const bool held = std::any_of(picks.begin(), picks.end(), [&](const Pick& pick) { return pick.body == body.id; });
   bool inside = false;  // still: it goes on as a whole
   const Vec3 middle = 0.5 * (bounds.min + bounds.max);
   const double half = 0.5 * bounds.diagonal();
   if (near_push && !model.any_fixed && (middle - push.position).norm() + half < push.radius) {
-    const bool held = std::any_of(picks.begin(), picks.end(), [&](const Pick& pick) { return pick.body == body.id; });
     Vec3 shift = outOf(middle, push.radius + half, middle.z() - bounds.min.z());
     if (held) {
       shift = bounded(shift);
@@ -413,7 +413,7 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
   }
 
   // Who can reach the ground within this frame is found once. A push can send down others, and so can a spring.
-  bool few = near_ground && !near_push;
+  bool few = near_ground && !near_push && !held;
   if (few && !body.low_current) findLow(body, h_frame);
   if (few) {
     const auto below = [&](const Vec3& p) { return p.z() < *settings.ground; };

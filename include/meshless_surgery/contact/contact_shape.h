@@ -56,8 +56,8 @@ class ContactShape {
   /// A lower bound [m] of the distance from a point to the surface from outside, quick where the same place was asked
   /// about before; negative where the point may be inside or near. `hint`: as for nearest(). Thread-safe.
   double clearance(const Vec3& rest, Index hint = kNoIndex) const;
-  /// True only where clearance() is more than `by` [m], and for most of what is farther by a few edges than that: it
-  /// knows how far it is from a cell to the next one with a triangle. Thread-safe.
+  /// True only for a point outside that is more than `by` [m] from the surface, and for most of those that are farther
+  /// by a few edges: it knows how far it is from a cell to the next one with a triangle. Thread-safe.
   bool isClear(const Vec3& rest, double by) const;
 
   /// [m] from a point to a triangle of the surface.
