@@ -8,10 +8,11 @@ namespace meshless::stress {
 namespace {
 
 constexpr int kSteps = 360;
+constexpr double kBeta = 0.95;  // the most that acts
 
 struct Soft {
   std::string name;
-  double alpha, beta;
+  double alpha;
   int substeps;
 };
 
@@ -19,12 +20,10 @@ void PrintTo(const Soft& soft, std::ostream* out) { *out << soft.name; }
 
 std::vector<Soft> allSofts() {
   std::vector<Soft> softs;
-  for (const int percent : {80, 95})
-    for (const int tenths : {1, 5, 9})
-      for (const int substeps : {1, 8, 64})
-        softs.push_back({"alpha 0" + std::to_string(tenths) + " beta " + std::to_string(percent) + " substeps " +
-                             std::to_string(substeps),
-                         0.1 * tenths, 0.01 * percent, substeps});
+  for (const int tenths : {1, 5, 9})
+    for (const int substeps : {1, 8, 64})
+      softs.push_back(
+          {"alpha 0" + std::to_string(tenths) + " substeps " + std::to_string(substeps), 0.1 * tenths, substeps});
   return softs;
 }
 
@@ -46,7 +45,7 @@ class SoftGoals : public testing::TestWithParam<std::tuple<Kind, Soft>> {
     for (int b = 0; b < kind.bodies; ++b) {
       BodyDef def = blockOf(coarse, "block" + std::to_string(b), Vec3(0.3 * (b % 6), 0.3 * (b / 6), 0.05));
       def.material.alpha = soft.alpha;
-      def.material.beta = soft.beta;
+      def.material.beta = kBeta;
       def.material.damping = 2.0;
       Result<PreparedBody> body = prepareBody(std::move(def));
       if (!body) return {};
