@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cofactor.h"
 #include "meshless_surgery/dynamics/rotation.h"
 
 namespace meshless {
@@ -13,14 +14,6 @@ constexpr double kLeastVolume = -0.8;  // J below which the pressure does not gr
 constexpr double kMostVolume = 1.5;    // J above which it falls
 constexpr double kDrawnOut = 12.0;     // |F|^2, 3 at rest, above which the volume counts less and less
 constexpr int kPowerIterations = 60;
-
-Mat3 cofactor(const Mat3& f) {
-  Mat3 c;
-  c.col(0) = f.col(1).cross(f.col(2));
-  c.col(1) = f.col(2).cross(f.col(0));
-  c.col(2) = f.col(0).cross(f.col(1));
-  return c;
-}
 
 // Pressure over lambda, a function of J alone: so it has a potential, whatever the bounds. Above them it falls as cof F
 // grows, or a torn cell would stiffen without end.

@@ -4,6 +4,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "cofactor.h"
 #include "meshless_surgery/dynamics/rotation.h"
 
 namespace meshless {
@@ -11,22 +12,16 @@ namespace {
 
 constexpr double kLinearRankRatio = 1e-8;     // of the moment's eigenvalues, smallest to largest
 constexpr double kQuadraticRankRatio = 1e-7;  // of the basis in units of the cluster's size
-constexpr int kVolumeSteps = 4;
+constexpr int kVolumeSteps = 4;               // of Newton, towards determinant 1
 constexpr double kLeastSlope = 1e-3;          // of the first step's
 constexpr double kFullBetaDeterminant = 0.1;  // below it the fitted map fades out, at 0 only the rotation is left
-
-Mat3 cofactorsOf(const Mat3& a) {
-  Mat3 cofactors;
-  for (int r = 0; r < 3; ++r) cofactors.row(r) = a.row((r + 1) % 3).cross(a.row((r + 2) % 3));
-  return cofactors;
-}
 
 // A, led to determinant 1 along the gradient of the determinant: near A in the metric of the particles, and so without
 // torque. A / cbrt(det A) is no gradient and feeds energy in.
 Mat3 withVolumeOfRest(const Mat3& a, double determinant, const Mat3& moment_inverse) {
   if (!(determinant > 0.0)) return a;
-  const Mat3 cofactors = cofactorsOf(a), towards = cofactors * moment_inverse;
-  const Mat3 gradient = towards / cofactors.cwiseProduct(towards).sum(), second = cofactorsOf(gradient);
+  const Mat3 cofactors = cofactor(a), towards = cofactors * moment_inverse;
+  const Mat3 gradient = towards / cofactors.cwiseProduct(towards).sum(), second = cofactor(gradient);
   // det (A - t G) is a cubic, convex up to its first root: Newton's method passes it at most in its first step.
   const double c2 = std::max(0.0, a.cwiseProduct(second).sum()), c3 = std::max(0.0, gradient.row(0).dot(second.row(0)));
   const double target = std::min(1.0, determinant / kFullBetaDeterminant);

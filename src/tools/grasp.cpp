@@ -6,17 +6,13 @@
 #include <queue>
 
 namespace meshless {
-namespace {
 
-/// Of the mean of what the grasp holds [1/kg].
-double inverseMass(const BodyModel& model, const Pick& pick) {
+double graspInverseMass(const BodyModel& model, const Pick& pick) {
   double inverse_mass = 0.0;
   for (std::size_t k = 0; k < pick.patch.size(); ++k)
     if (!model.fixed[pick.patch[k]]) inverse_mass += pick.weights[k] * pick.weights[k] / model.masses[pick.patch[k]];
   return inverse_mass;
 }
-
-}  // namespace
 
 void makeGrasp(const BodyModel& model, Index centre, double radius, Pick& pick) {
   using Entry = std::pair<double, Index>;
@@ -57,14 +53,14 @@ Vec3 graspMean(const Pick& pick, const Points& positions) {
 }
 
 double graspStiffness(const BodyModel& model, const Pick& pick, double h) {
-  return pick.stiffness / (1.0 + pick.stiffness * h * h * inverseMass(model, pick));
+  return pick.stiffness / (1.0 + pick.stiffness * h * h * graspInverseMass(model, pick));
 }
 
 Vec3 pullGrasp(const BodyModel& model, const Pick& pick, const Vec3& end, double h, Points& positions,
                const Vec3& given) {
   const Vec3 stretch = end - pick.offset - graspMean(pick, positions);
   const double stiff = pick.stiffness * h * h;
-  const Vec3 lambda = (stiff * stretch - h * h * given) / (1.0 + stiff * inverseMass(model, pick));
+  const Vec3 lambda = (stiff * stretch - h * h * given) / (1.0 + stiff * graspInverseMass(model, pick));
   for (std::size_t k = 0; k < pick.patch.size(); ++k) {
     const Index i = pick.patch[k];
     if (!model.fixed[i]) positions[i] += lambda * (pick.weights[k] / model.masses[i]);

@@ -289,8 +289,7 @@ void World::Impl::liftOutOfGround(WorldBody& body, double h_frame) {
       !(body.bounds.min.z() - 2.0 * h_frame * speedOf(body) < *settings.ground))
     return;
   // Of what a rod holds down there a little at a time: it would have it all back in the next step.
-  const bool held = std::any_of(picks.begin(), picks.end(), [&](const Pick& pick) { return pick.body == body.id; });
-  const double most = held ? kHeldLift * body.model->spacing : std::numeric_limits<double>::infinity();
+  const double most = isHeld(body) ? kHeldLift * body.model->spacing : std::numeric_limits<double>::infinity();
   for (Index i : binding.particle)
     if (i != kNoIndex && body.state.positions[i].z() < *settings.ground && !body.model->fixed[i])
       body.state.positions[i].z() = std::min(*settings.ground, body.state.positions[i].z() + most);

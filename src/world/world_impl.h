@@ -268,6 +268,7 @@ struct World::Impl {
   void movePush(double h, double h_frame);
   void pullSprings(int substep, int substeps, double h_frame, bool again = false);
   /// What is done to tissue between these two, without a velocity, its springs follow evenly over a step.
+  bool isHeld(const WorldBody& body) const;  // by a pick
   void rememberGrasps();
   void followGrasps();
   void contactBodies(const std::vector<WorldBody*>& near, double h, int stride);

@@ -226,10 +226,7 @@ namespace {
 // So much of it becomes velocity as adds no kinetic energy.
 void keepStill(const BodyModel& model, const Pick& pick, const Vec3& motion, const Vec3& impulse,
                StepScratch& scratch) {
-  double inverse_mass = 0.0;
-  for (std::size_t k = 0; k < pick.patch.size(); ++k)
-    if (!model.fixed[pick.patch[k]]) inverse_mass += pick.weights[k] * pick.weights[k] / model.masses[pick.patch[k]];
-  const double most = impulse.squaredNorm() * inverse_mass;
+  const double most = impulse.squaredNorm() * graspInverseMass(model, pick);
   if (!(most > 0.0)) return;
   const double share = std::clamp(-2.0 * impulse.dot(motion) / most, 0.0, 1.0);
   const bool compared = scratch.before_contact.size() == scratch.previous.size();
@@ -263,6 +260,10 @@ void World::Impl::pullSprings(int substep, int substeps, double h_frame, bool ag
     pick.force += pulls[n] / substeps;
     if (again) keepStill(*body->model, pick, motion, h * h * pulls[n], body->scratch);
   }
+}
+
+bool World::Impl::isHeld(const WorldBody& body) const {
+  return std::any_of(picks.begin(), picks.end(), [&](const Pick& pick) { return pick.body == body.id; });
 }
 
 void World::Impl::rememberGrasps() {
@@ -396,7 +397,7 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
 
   // Whom the sphere has swallowed it puts out as a whole and as fast as it was: each particle by a way of its own would
   // go to another side of a sphere that is much larger than the body, and tear it.
-  const bool held = std::any_of(picks.begin(), picks.end(), [&](const Pick& pick) { return pick.body == body.id; });
+  const bool held = isHeld(body);
   bool inside = false;  // still: it goes on as a whole
   const Vec3 middle = 0.5 * (bounds.min + bounds.max);
   const double half = 0.5 * bounds.diagonal();

@@ -19,6 +19,9 @@ Vec3 graspMean(const Pick& pick, const Points& positions);
 Vec3 pullGrasp(const BodyModel& model, const Pick& pick, const Vec3& end, double h, Points& positions,
                const Vec3& given = Vec3::Zero());
 
+/// Of the mean of what the grasp holds [1/kg]; 0 where all of it is fixed.
+double graspInverseMass(const BodyModel& model, const Pick& pick);
+
 /// The stiffness [N/m] with which the grasp answers within `h` [s], as pullGrasp does it: the spring's own where the
 /// patch is heavy or fixed, less where it gives way.
 double graspStiffness(const BodyModel& model, const Pick& pick, double h);
