@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 
 #include "contacts_impl.h"
 
@@ -14,11 +15,13 @@ constexpr double kSameMap = 2.0;     // likewise, between two vertices
 constexpr double kLoose = 0.02;      // of the size: a surface that is farther from its maps is looked at itself
 constexpr double kLooseEdges = 0.5;  // of its mean edge: likewise
 constexpr std::size_t kFewVertices = 100;  // of a surface: there are few places to ask about, and they are soon known
-constexpr double kSlopeError = 0.5;        // of a map, at most
-constexpr double kMovedInRest = 0.005;     // of the size: a lookup is repeated where the deviation moved it farther
-constexpr std::size_t kLookAnew = 8;       // frames after which a point is looked up though it seems to be where it was
-constexpr double kWellWithin = 0.02;       // barycentric
-constexpr double kNearby = 0.1;            // of the thickness
+constexpr double kCovering = 0.578;     // of the longest edge: a point of a triangle is as near to one of its corners
+constexpr double kSlopeError = 0.5;     // of a map, at most
+constexpr double kMovedInRest = 0.005;  // of the size: a lookup is repeated where the deviation moved it farther
+constexpr std::size_t kLookAnew = 8;    // frames after which a point is looked up though it seems to be where it was
+constexpr double kWellWithin = 0.02;    // barycentric
+constexpr double kFarBeside = 4.0;      // likewise
+constexpr double kNearby = 0.1;         // of the thickness
 constexpr int kMostLookups = 8;
 constexpr double kFlattest = 1e-3;  // det of a slope: below, the cluster's affine map tells directions
 constexpr double kSlack = 0.1;      // of the thickness: how much farther a better face may be
@@ -60,6 +63,52 @@ void look(const ContactParty& party, const MapFinder& finder, const ContactMap* 
   }
   surface.finder.build();
   surface.loose = !surface.vertices.empty();
+  surface.around = most;
+  double longest = 0.0;
+  for (const Triangle& t : shape.surface().triangles)
+    for (int k = 0; k < 3; ++k)
+      longest = std::max(longest, (vertexAt(party, t[k]) - vertexAt(party, t[(k + 1) % 3])).squaredNorm());
+  surface.gap = kCovering * std::sqrt(longest);
+}
+
+}  // namespace
+
+namespace {
+
+// A point that is well within a triangle, seen from above it, and near: which no search has to confirm.
+bool isOver(const ContactParty& party, Index triangle, const Vec3& p, bool flipped, ContactShape::Nearest& found) {
+  const Triangle& corners = party.shape->surface().triangles[triangle];
+  const Vec3 q0 = vertexAt(party, corners[0]);
+  const Vec3 e1 = vertexAt(party, corners[1]) - q0, e2 = vertexAt(party, corners[2]) - q0, d = p - q0;
+  const Vec3 area = e1.cross(e2);
+  const double squared = area.squaredNorm();
+  const double v = d.cross(e2).dot(area), w = e1.cross(d).dot(area), least = kWellWithin * squared;
+  if (!(v > least) || !(w > least) || !(squared - v - w > least)) return false;
+  const double height = (flipped ? -1.0 : 1.0) * area.dot(d) / std::sqrt(squared);
+  if (!(std::abs(height) < kNearby * party.shape->thickness())) return false;
+  found.triangle = triangle;
+  found.weights = {1.0 - (v + w) / squared, v / squared, w / squared};
+  found.distance = height;
+  found.above = true;
+  return true;
+}
+
+// Where a point is at rest by the triangle that is nearest to it: beside or above it as it is now.
+Vec3 seenFrom(const ContactParty& party, const ContactShape::Nearest& nearest, const Vec3& p, const Mat3& to_rest) {
+  const TriangleMesh& surface = party.shape->surface();
+  const Triangle& corners = surface.triangles[nearest.triangle];
+  const Vec3 q0 = vertexAt(party, corners[0]);
+  const Vec3 e1 = vertexAt(party, corners[1]) - q0, e2 = vertexAt(party, corners[2]) - q0, d = p - q0;
+  const Vec3 area = e1.cross(e2);
+  const double squared = area.squaredNorm();
+  double v = d.cross(e2).dot(area) / squared, w = e1.cross(d).dot(area) / squared;
+  // From far beside it, or where it is all but a line, the map tells more: from the nearest point.
+  if (!(std::max({std::abs(v), std::abs(w), std::abs(1.0 - v - w)}) < kFarBeside)) {
+    v = nearest.weights[1];
+    w = nearest.weights[2];
+  }
+  const Vec3 &r0 = surface.vertices[corners[0]], &r1 = surface.vertices[corners[1]], &r2 = surface.vertices[corners[2]];
+  return r0 + v * (r1 - r0) + w * (r2 - r0) + to_rest * (d - v * e1 - w * e2);
 }
 
 }  // namespace
@@ -80,10 +129,21 @@ bool Contacts::Impl::locate(const ContactParty& b, const SurfaceNow& surface, co
   double deviation = surface.deviation;
   if (surface.loose) {
     // From the nearest vertex, whose place at rest is known.
-    const Index v = surface.vertices[surface.finder.nearest(p)];
-    const Vec3 from = p - vertexAt(b, v);
+    Index v = kNoIndex;
+    Vec3 from, from_vertex;
+    const auto look = [&](double limit) {
+      v = surface.vertices[surface.finder.nearest(p, limit)];
+      from = p - vertexAt(b, v);
+      from_vertex = map.to_rest * from + shape.surface().vertices[v];
+    };
+    const double touching = reach + surface.gap;
+    look(touching);
+    if (from.norm() > touching && surface.around > touching) {
+      if (shape.isOutside(from_vertex)) return false;
+      look(std::numeric_limits<double>::infinity());
+    }
     if (kSlopeError * from.norm() < deviation) {
-      rest = map.to_rest * from + shape.surface().vertices[v];
+      rest = from_vertex;
       deviation = kSlopeError * from.norm();
     }
   }
@@ -93,7 +153,7 @@ bool Contacts::Impl::locate(const ContactParty& b, const SurfaceNow& surface, co
   const double far = deviation + reach;
   if (!(beyond.squaredNorm() < far * far)) return false;
   const bool near = hint != kNoIndex && shape.distanceTo(hint, rest) <= far;
-  if (!near && (shape.isClear(rest, far) || shape.clearance(rest, hint) > far)) return false;
+  if (!near && shape.isClear(rest, far)) return false;
   const Vec3 inward_rest = (*to_rest * inwardAt()).normalized();
   const double enough = kMovedInRest * shape.size();
   for (int n = 0; n < kMostLookups; ++n) {
@@ -102,14 +162,9 @@ bool Contacts::Impl::locate(const ContactParty& b, const SurfaceNow& surface, co
     hint = found.triangle;
     if (n + 1 == kMostLookups) break;
     if (found.distance > far) return false;
+    if (isOver(b, found.triangle, p, flipped, found)) break;
     // The surface does not lie where the affine map has it: by so much the point is looked up elsewhere.
-    const Triangle& corners = shape.surface().triangles[found.triangle];
-    Vec3 at_rest = Vec3::Zero(), at_present = Vec3::Zero();
-    for (int k = 0; k < 3; ++k) {
-      at_rest += found.weights[k] * shape.surface().vertices[corners[k]];
-      at_present += found.weights[k] * vertexAt(b, corners[k]);
-    }
-    const Vec3 there = *to_rest * (p - at_present) + at_rest;
+    const Vec3 there = seenFrom(b, found, p, *to_rest);
     if ((there - rest).squaredNorm() < enough * enough) break;
     rest = there;
   }
@@ -177,20 +232,8 @@ bool Contacts::Impl::stillOver(std::size_t& cursor, const ContactParty& with, In
   while (cursor < last_sorted && keyOf(last[cursor]) < mine) ++cursor;
   if (anew || cursor >= last_sorted || (frames + sample) % kLookAnew == 0) return false;
   const Contact& before = last[cursor];
-  if (keyOf(before) != mine || before.caught || !same_parties) return false;
-  const Triangle& corners = with.shape->surface().triangles[before.triangle];
-  const Vec3 q0 = vertexAt(with, corners[0]);
-  const Vec3 e1 = vertexAt(with, corners[1]) - q0, e2 = vertexAt(with, corners[2]) - q0, d = p - q0;
-  const Vec3 area = e1.cross(e2);
-  const double squared = area.squaredNorm();
-  const double v = d.cross(e2).dot(area), w = e1.cross(d).dot(area), least = kWellWithin * squared;
-  if (!(v > least) || !(w > least) || !(squared - v - w > least)) return false;
-  const double height = (before.flipped ? -1.0 : 1.0) * area.dot(d) / std::sqrt(squared);
-  if (!(std::abs(height) < kNearby * with.shape->thickness())) return false;
-  found.triangle = before.triangle;
-  found.weights = {1.0 - (v + w) / squared, v / squared, w / squared};
-  found.distance = height;
-  found.above = true;
+  if (keyOf(before) != mine || before.caught) return false;
+  if (!isOver(with, before.triangle, p, before.flipped, found)) return false;
   flipped = before.flipped;
   return true;
 }

@@ -31,6 +31,7 @@ struct Contact {
   Vec3 offset = Vec3::Zero();  // [m] what riders have beyond their particles: of a less of b
   Vec3 normal = Vec3::UnitZ();
   // of the solver
+  double answer = 0.0;   // [1/kg] to an impulse, where it is the same in all substeps; 0: it is not, or not known yet
   double impulse = 0.0;  // [kg m]
   Vec3 slip_impulse = Vec3::Zero();
 };

@@ -30,7 +30,8 @@ constexpr std::size_t kBounding = 4;      // triangles that tell how far the nea
 constexpr std::uintptr_t kAsked = 12;     // times that the bins are searched before a cell is filled
 constexpr double kSphereRounding = 1e-6;  // relative, of what is kept in single precision
 constexpr double kFlat = 1e-12;           // squared sine of a corner: below, a triangle has no area but by rounding
-constexpr double kTie = 1e-9;             // relative: two features are equally near
+constexpr float kAskedOnce = std::numeric_limits<float>::infinity();
+constexpr double kTie = 1e-9;  // relative: two features are equally near
 
 }  // namespace
 
@@ -454,30 +455,54 @@ void ContactShape::visitNear(const Vec3& rest, double radius, const Visit& visit
 // `within` [m]: something is known to be so near; infinite where nothing is known.
 bool ContactShape::searchBins(const Vec3& rest, double within, Nearest& found) const {
   found.triangle = kNoIndex;
-  Best best(size_);
-  best.distance = within;
-  best.squared = within * within;
   const Grid grid{bin_origin_, bin_edge_, bins_};
-  const std::array<int, 3> home = grid.cellAt(rest);
   const Eigen::Vector3f p = (rest - bin_origin_).cast<float>();
-  float bound = INFINITY;
-  double farthest = INFINITY;  // squared
-  const auto tighten = [&] {
-    bound = static_cast<float>((1.0 + 10.0 * kSphereRounding) * best.distance);
-    farthest = (best.distance + 1e-9 * size_) * (best.distance + 1e-9 * size_);
+  const double rounding = kSphereRounding * (bounds_.diagonal() + (rest - bin_origin_).norm());
+  // A triangle is no farther than its centre: those tell how near the nearest is, before any is measured.
+  float least = std::numeric_limits<float>::infinity();  // squared
+  Index first_looked_at = kNoIndex;                      // whose centre it is
+  const auto lookAtCentres = [&](std::size_t first, std::size_t last) {
+    for (Index k = bin_offsets_[first]; k < bin_offsets_[last + 1]; ++k) {
+      const std::array<float, 4>& s = bin_spheres_[k];
+      const float x = p.x() - s[0], y = p.y() - s[1], z = p.z() - s[2], squared = x * x + y * y + z * z;
+      if (squared >= least) continue;
+      least = squared;
+      first_looked_at = k;
+    }
   };
-  tighten();
-  for (int ring = 0, rings = grid.ringsAround(home); ring <= rings; ++ring) {
-    visitRing(grid, home, ring, [&](std::size_t bin) {
-      if (bin_offsets_[bin] == bin_offsets_[bin + 1] || grid.squaredGap(bin, rest) > farthest) return;
-      for (Index k = bin_offsets_[bin]; k < bin_offsets_[bin + 1]; ++k) {
+  const auto nearestCentre = [&] { return std::sqrt(static_cast<double>(least)) + rounding; };
+  const auto forBinsWithin = [&](double radius, const auto& visit) {
+    const std::array<int, 3> low = grid.cellAt(rest.array() - radius), high = grid.cellAt(rest.array() + radius);
+    for (int x = low[0]; x <= high[0]; ++x)
+      for (int y = low[1]; y <= high[1]; ++y) visit(grid.number(x, y, low[2]), grid.number(x, y, high[2]));
+  };
+  double most = within;
+  if (!std::isfinite(most)) {
+    const std::array<int, 3> home = grid.cellAt(rest);
+    for (int ring = 0, rings = grid.ringsAround(home); ring <= rings && !std::isfinite(least); ++ring)
+      visitRing(grid, home, ring, [&](std::size_t bin) { lookAtCentres(bin, bin); });
+    most = nearestCentre();
+  }
+  forBinsWithin(most + rounding, lookAtCentres);
+  Best best(size_);
+  const auto search = [&](double distance) {
+    best.distance = distance;
+    best.squared = distance * distance;
+    float bound = INFINITY;
+    const auto tighten = [&] { bound = static_cast<float>((1.0 + 10.0 * kSphereRounding) * best.distance); };
+    if (first_looked_at != kNoIndex) best.offer(facets_[bin_triangles_[first_looked_at]], rest, found);
+    tighten();
+    forBinsWithin(best.distance + rounding, [&](std::size_t first, std::size_t last) {
+      for (Index k = bin_offsets_[first]; k < bin_offsets_[last + 1]; ++k) {
         if (!isWithin(bin_spheres_[k], p, bound)) continue;
         best.offer(facets_[bin_triangles_[k]], rest, found);
         tighten();
       }
     });
-    if (best.distance <= beyondRing(grid, home, ring, rest) - 1e-9 * size_) break;
-  }
+  };
+  search(std::min(most, nearestCentre()));
+  // Rounding in triangles without area can make what is known too small.
+  if (found.triangle == kNoIndex) search(std::numeric_limits<double>::infinity());
   double sign = best.height;
   if (best.tied) {
     Settler settler(best);
@@ -485,9 +510,6 @@ bool ContactShape::searchBins(const Vec3& rest, double within, Nearest& found) c
     visitNear(rest, around, [&](Index t) { settler.offer(facets_[t], rest); });
     sign = settler.settle(found);
   }
-  // Rounding in triangles without area can make what is known too small.
-  if (found.triangle == kNoIndex && std::isfinite(within))
-    return searchBins(rest, std::numeric_limits<double>::infinity(), found);
   found.distance = std::copysign(best.distance, sign);
   return found.triangle != kNoIndex;
 }
@@ -508,34 +530,58 @@ bool ContactShape::isBeyondCells(const Vec3& rest) const {
   return false;
 }
 
-bool ContactShape::isClear(const Vec3& rest, double by) const {
-  if (!cells_ || !(by >= 0.0)) return false;
+const EmptySpace& ContactShape::space() const {
   std::call_once(spaced_, [this] {
     space_ = std::make_unique<EmptySpace>(surface_, kSpaceEdges * mean_edge_);
-    // What the search takes for the inside is not empty.
-    Nearest found;
-    const Vec3 outside = bounds_.min.array() - mean_edge_;
-    if (!searchBins(outside, std::numeric_limits<double>::infinity(), found) || !(found.distance > 0.0))
-      space_ = std::make_unique<EmptySpace>();
     cell_bytes_.fetch_add(space_->bytes(), std::memory_order_relaxed);
   });
-  return space_->around(rest) > by;
+  return *space_;
 }
 
-double ContactShape::clearance(const Vec3& rest, Index hint) const {
-  if (!cells_ || !rest.allFinite()) return -1.0;
+bool ContactShape::isOutside(const Vec3& rest) const { return cells_ && space().isOutside(rest); }
+
+Vec3 ContactShape::cellCentre(const std::array<int, 3>& at) const {
+  return cell_origin_ + cell_edge_ * Vec3(at[0] + 0.5, at[1] + 0.5, at[2] + 0.5);
+}
+
+// Whether a triangle is so near to a point.
+bool ContactShape::anyWithin(const Vec3& rest, double by) const {
+  bool any = false;
+  visitNear(rest, by, [&](Index t) { any = any || !(measure(facets_[t], rest).squared > by * by); });
+  return any;
+}
+
+// [m] signed; whoever else asks finds the same.
+float ContactShape::distanceOfCentre(std::size_t index, const std::array<int, 3>& at) const {
+  Nearest found;
+  const bool any = searchBins(cellCentre(at), std::numeric_limits<double>::infinity(), found);
+  const float known = any ? static_cast<float>(found.distance) : -std::numeric_limits<float>::infinity();
+  distances_[index].store(known, std::memory_order_relaxed);
+  return known;
+}
+
+// Of a cell that nobody has asked about NaN is known, and kAskedOnce when somebody has: only then its centre is worth a
+// search of its own.
+bool ContactShape::isClear(const Vec3& rest, double by) const {
+  if (!cells_ || !(by >= 0.0) || !rest.allFinite()) return false;
+  if (space().around(rest) > by) return true;
   std::array<int, 3> at;
   const std::size_t index = cellAt(rest, at);
-  const Vec3 centre = cell_origin_ + cell_edge_ * Vec3(at[0] + 0.5, at[1] + 0.5, at[2] + 0.5);
   float known = distances_[index].load(std::memory_order_relaxed);
   if (std::isnan(known)) {
-    Nearest found;
-    const double most = hint == kNoIndex ? std::numeric_limits<double>::infinity() : distanceTo(hint, centre);
-    const bool any = searchBins(centre, (1.0 + 1e-6) * most + 1e-9 * size_, found);
-    known = any ? static_cast<float>(found.distance) : -std::numeric_limits<float>::infinity();
-    distances_[index].store(known, std::memory_order_relaxed);  // whoever else asks finds the same
+    distances_[index].store(kAskedOnce, std::memory_order_relaxed);
+    return space().isOutside(rest) && !anyWithin(rest, by);
   }
-  return known - 1e-6 * std::abs(known) - (rest - centre).norm();
+  if (known == kAskedOnce) known = distanceOfCentre(index, at);
+  return known - kSphereRounding * std::abs(known) - (rest - cellCentre(at)).norm() > by;
+}
+
+void ContactShape::foresee(const Vec3& rest) const {
+  if (!cells_ || !rest.allFinite()) return;
+  std::array<int, 3> at;
+  const std::size_t index = cellAt(rest, at);
+  if (const float known = distances_[index].load(std::memory_order_relaxed); std::isnan(known) || known == kAskedOnce)
+    distanceOfCentre(index, at);
 }
 
 double ContactShape::distanceTo(Index triangle, const Vec3& rest) const {
@@ -555,12 +601,15 @@ bool ContactShape::nearest(const Vec3& rest, Nearest& found, Index hint) const {
   if (known < kAsked || beyond) {
     std::uintptr_t asked = known;
     if (!beyond) cells_[index].compare_exchange_strong(asked, known + 1, std::memory_order_acq_rel);
-    const double centre = distances_[index].load(std::memory_order_relaxed);
-    const Vec3 from = rest - (cell_origin_ + cell_edge_ * Vec3(at[0] + 0.5, at[1] + 0.5, at[2] + 0.5));
+    const double centre = distances_[index].load(std::memory_order_relaxed);  // not finite: not known
+    const Vec3 from = rest - cellCentre(at);
     double most = hint == kNoIndex ? std::numeric_limits<double>::infinity() : distanceTo(hint, rest);
     if (std::isfinite(centre)) most = std::min(most, std::abs(centre) + from.norm());
     const double within = (1.0 + 1e-6) * most + 1e-9 * size_;
-    return searchBins(rest, std::isfinite(within) ? within : std::numeric_limits<double>::infinity(), found);
+    if (!searchBins(rest, std::isfinite(within) ? within : std::numeric_limits<double>::infinity(), found))
+      return false;
+    if (isMistaken(rest, found)) found.distance = -found.distance;
+    return true;
   }
   const Cell* cell = known > kAsked ? reinterpret_cast<const Cell*>(known) : fill(index, at);
   Best best(size_);
@@ -572,7 +621,14 @@ bool ContactShape::nearest(const Vec3& rest, Nearest& found, Index hint) const {
     sign = settler.settle(found);
   }
   found.distance = std::copysign(best.distance, sign);
+  if (isMistaken(rest, found)) found.distance = -found.distance;
   return found.triangle != kNoIndex;
+}
+
+// Deep inside, though the point is in the empty space outside: at the tip of a thin rim, where the surface crosses
+// itself, the sign of a corner can be wrong.
+bool ContactShape::isMistaken(const Vec3& rest, const Nearest& found) const {
+  return found.distance < -mean_edge_ && isOutside(rest);
 }
 
 bool ContactShape::nearest(const Vec3& rest, const Vec3& inward, double slack, Nearest& found, Index hint) const {

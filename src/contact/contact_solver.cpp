@@ -159,7 +159,7 @@ bool readGap(const ContactScene& scene, const std::vector<ContactParty>& parties
     const ContactEntry& e = entries[k];
     gap.point_a += e.weight * a.positions[e.particle];
     if (with_motion) gap.motion += e.weight * (a.positions[e.particle] - a.previous[e.particle]);
-    if (a.moves) gap.local_a += e.weight * e.weight * a.inverse_masses[e.particle];
+    if (!kKept && a.moves) gap.local_a += e.weight * e.weight * a.inverse_masses[e.particle];
   }
   gap.point_a += c.offset;
   if (c.b == kNoIndex) {
@@ -171,7 +171,7 @@ bool readGap(const ContactScene& scene, const std::vector<ContactParty>& parties
     const ContactEntry& e = entries[k];
     gap.point_b += e.weight * b.positions[e.particle];
     if (with_motion) gap.motion -= e.weight * (b.positions[e.particle] - b.previous[e.particle]);
-    if (b.moves) gap.local_b += e.weight * e.weight * b.inverse_masses[e.particle];
+    if (!kKept && b.moves) gap.local_b += e.weight * e.weight * b.inverse_masses[e.particle];
   }
   return true;
 }
@@ -358,6 +358,18 @@ struct ContactSolver::Impl {
     return std::isfinite(row.distance);
   }
 
+  // Of a contact whose answer is known: it moves particles alone.
+  bool prepareAgain(Contact& c, const Gap& gap, Row& row) {
+    row.contact = &c;
+    row.on_ground = c.b == kNoIndex;
+    row.normal = c.normal;
+    row.lever_a = row.lever_b = row.arm_a = row.arm_b = Vec3::Zero();
+    row.rigid_a = row.rigid_b = 0.0;
+    row.inverse_answer = 1.0 / c.answer;
+    row.distance = c.normal.dot(gap.point_a - gap.point_b);
+    return std::isfinite(row.distance);
+  }
+
   void solveIsland(Index island, std::vector<Contact>& contacts, bool fresh, std::size_t& corrected) {
     Row* const first = rows.data() + plan->contact_offsets[island];
     if (fresh) stirred[island] = !plan->calm[island];
@@ -479,7 +491,15 @@ struct ContactSolver::Impl {
     Gap gap;
     const double was = c.impulse;
     c.impulse = 0.0;
-    if (!readGap<false>(*scene, *parties, c, *entries, true, gap) || !prepare(c, gap, row)) return false;
+    const bool known = c.answer > 0.0;
+    if (known) {
+      readGap<true>(*scene, *parties, c, *entries, true, gap);
+      if (!prepareAgain(c, gap, row)) return false;
+    } else {
+      if (!readGap<false>(*scene, *parties, c, *entries, true, gap) || !prepare(c, gap, row)) return false;
+      // Of what rides on particles alone normal and weights are those of the frame.
+      if (!c.direct && row.rigid_a == 0.0 && row.rigid_b == 0.0) c.answer = gap.local_a + gap.local_b;
+    }
     const double along_normal = c.normal.dot(gap.motion);
     const double before = row.distance - along_normal;
     if (c.direct && !row.on_ground) {
@@ -499,7 +519,9 @@ struct ContactSolver::Impl {
     row.along = along_normal;
     row.friction = std::sqrt(a.friction * (b ? b->friction : scene->ground_friction));
     row.inverse_answer_along = 0.0;
-    if (row.friction > 0.0) {
+    if (row.friction > 0.0 && c.answer > 0.0) {
+      row.inverse_answer_along = row.inverse_answer;
+    } else if (row.friction > 0.0) {
       // Along the slip and across it: the larger answer is safe for both.
       const double length = row.slip.norm();
       const Vec3 along = length > 0.0 ? Vec3(row.slip / length) : c.normal.unitOrthogonal();

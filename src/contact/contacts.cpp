@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <tuple>
+#include <unordered_map>
 
 #include "contacts_impl.h"
 
@@ -72,6 +73,19 @@ void Contacts::clear() {
   impl_->frames = impl_->steady_contacts = 0;  // what follows is as from the start
 }
 
+void Contacts::forget(std::uint64_t key) {
+  Impl& w = *impl_;
+  const auto isOf = [&w, key](const Contact& c) {
+    return w.keys[c.a] == key || (c.b != kNoIndex && w.keys[c.b] == key);
+  };
+  const auto steady_end =
+      w.contacts.begin() + static_cast<std::ptrdiff_t>(std::min(w.steady_contacts, w.contacts.size()));
+  w.steady_contacts -= static_cast<std::size_t>(std::count_if(w.contacts.begin(), steady_end, isOf));
+  w.contacts.erase(std::remove_if(w.contacts.begin(), w.contacts.end(), isOf), w.contacts.end());
+  for (auto it = w.caught.begin(); it != w.caught.end();)
+    it = it->first.a == key || it->first.b == key ? w.caught.erase(it) : std::next(it);
+}
+
 void Contacts::findPairs(const ContactScene& scene, const std::vector<ContactParty>& parties, double h,
                          ContactCounters& counters) {
   Impl& w = *impl_;
@@ -122,12 +136,7 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
     w.last.swap(w.contacts);
     w.last_sorted = std::min(w.steady_contacts, w.last.size());
     // Once a frame: where somebody wakes and all is looked at anew, `last` is still of the parties of the frame before.
-    w.same_parties = w.keys.size() == parties.size();
-    w.keys.resize(parties.size());
-    for (Index p = 0; p < parties.size(); ++p) {
-      w.same_parties = w.same_parties && w.keys[p] == parties[p].key;
-      w.keys[p] = parties[p].key;
-    }
+    w.followParties(parties);
   }
   ++w.frames;
   w.contacts.clear();
@@ -418,9 +427,34 @@ void Contacts::points(const std::vector<ContactParty>& parties, std::vector<Poin
   }
 }
 
+// Who has come or gone changes the numbers of the others: what was found of those in the last frame holds.
+void Contacts::Impl::followParties(const std::vector<ContactParty>& parties) {
+  bool same = keys.size() == parties.size();
+  for (Index p = 0; same && p < parties.size(); ++p) same = keys[p] == parties[p].key;
+  if (same) return;
+  std::unordered_map<std::uint64_t, Index> number_of;
+  for (Index p = 0; p < parties.size(); ++p) number_of[parties[p].key] = p;
+  std::vector<Index> now(keys.size(), kNoIndex);
+  for (std::size_t p = 0; p < keys.size(); ++p)
+    if (const auto found = number_of.find(keys[p]); found != number_of.end()) now[p] = found->second;
+  last.resize(last_sorted);
+  last.erase(std::remove_if(last.begin(), last.end(),
+                            [&now](Contact& c) {
+                              c.a = now[c.a];
+                              const bool with_body = c.b != kNoIndex;
+                              if (with_body) c.b = now[c.b];
+                              return c.a == kNoIndex || (with_body && c.b == kNoIndex);
+                            }),
+             last.end());
+  const auto before = [](const Contact& c, const Contact& d) { return keyOf(c) < keyOf(d); };
+  if (!std::is_sorted(last.begin(), last.end(), before)) std::stable_sort(last.begin(), last.end(), before);
+  last_sorted = last.size();
+  keys.resize(parties.size());
+  for (Index p = 0; p < parties.size(); ++p) keys[p] = parties[p].key;
+}
+
 // What pressed in the last frame is where the solver starts: both lists are in the same order.
 void Contacts::Impl::takeOver() {
-  if (!same_parties) return;
   const auto key = keyOf;
   std::size_t old = 0;
   for (Contact& c : contacts) {

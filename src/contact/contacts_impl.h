@@ -86,6 +86,8 @@ struct SurfaceNow {
   std::vector<Index> vertices;  // as the finder numbers them
   double deviation = -1.0;      // [m] how far the surface may be from where its maps have it; negative: not known yet
   bool loose = false;           // by so much that the nearest vertex tells more
+  double around = 0.0;          // [m] all vertices that are so near to a point in question are among them
+  double gap = 0.0;             // [m] no point of the surface is farther from all vertices
 };
 
 /// What a task finds; tasks are joined in their order.
@@ -154,7 +156,6 @@ struct Contacts::Impl {
   IslandPlan plan;
   std::size_t frames = 0, last_sorted = 0;  // of `last`, before what was found out of turn
   std::vector<std::uint64_t> keys;          // of the parties of the last frame
-  bool same_parties = false;                // as in the last frame, in the same order
   bool fresh = true;                        // nothing has been solved since the contacts were made
   bool plan_steady = true;                  // the plan is that of the steady contacts alone
   std::vector<Findings> tasks;
@@ -179,6 +180,7 @@ struct Contacts::Impl {
   void addGround(Findings& to, const std::vector<ContactParty>& parties, Index a, double reach);
   void join(const Findings& from, std::size_t contacts_from, std::size_t contacts_to, std::size_t entries_from,
             std::size_t entries_to);
+  void followParties(const std::vector<ContactParty>& parties);
   void takeOver();
   void choosePasses(const std::vector<ContactParty>& parties, double substep);
   bool letOutWhole(const std::vector<ContactParty>& parties, const Pair& pair, const Inside& of_a, const Inside& of_b,

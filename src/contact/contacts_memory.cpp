@@ -9,7 +9,8 @@ namespace meshless {
 template <class Archive>
 void serialize(Archive& archive, Contact& contact) {
   auto& [a, b, sample, triangle, direct, caught, below, flipped, point, share, corners, weights, first, split, end,
-         offset, normal, impulse, slip_impulse] = contact;
+         offset, normal, answer, impulse, slip_impulse] = contact;
+  static_cast<void>(answer);  // within a frame alone
   archive(a, b, sample, triangle, direct, caught, below, flipped, point, share, corners, weights, first, split, end,
           offset, normal, impulse, slip_impulse);
 }

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "meshless_surgery/geometry/measures.h"
+
 namespace meshless {
 namespace {
 
@@ -133,6 +135,7 @@ EmptySpace::EmptySpace(const TriangleMesh& surface, double edge) {
   Box bounds;
   for (const Vec3& p : surface.vertices) bounds.extend(p);
   if (bounds.empty() || !(edge > 0.0) || !std::isfinite(bounds.diagonal()) || !isClosed(surface)) return;
+  if (!(signedVolume(surface) > 0.0)) return;  // inside out: what is around it is its inside
   const Vec3 extent = bounds.max - bounds.min;
   const auto cells = [&](double of, int d) { return std::ceil(extent[d] / of) + 4.0; };
   while (!(cells(edge, 0) * cells(edge, 1) * cells(edge, 2) <= kMostCells)) edge *= 1.1;
@@ -149,14 +152,20 @@ EmptySpace::EmptySpace(const TriangleMesh& surface, double edge) {
   const std::vector<char> outside = outsideOf(grid_, taken);
   gaps_ = squaresTo(grid_, std::move(taken));
   for (std::size_t k = 0; k < total; ++k)
-    gaps_[k] = outside[k] ? static_cast<float>((1.0 - kRounding) * edge) * std::sqrt(gaps_[k]) : 0.0F;
+    gaps_[k] = outside[k] ? static_cast<float>((1.0 - kRounding) * edge) * std::sqrt(gaps_[k]) : -1.0F;
 }
 
 // Beyond the cells a point is at least as far from everything as the cell at the border is.
 double EmptySpace::around(const Vec3& point) const {
   if (!known() || !point.allFinite()) return 0.0;
   const std::array<int, 3> at = grid_.cellAt(point);
-  return gaps_[grid_.number(at[0], at[1], at[2])];
+  return std::max(0.0F, gaps_[grid_.number(at[0], at[1], at[2])]);
+}
+
+bool EmptySpace::isOutside(const Vec3& point) const {
+  if (!known() || !point.allFinite()) return false;
+  const std::array<int, 3> at = grid_.cellAt(point);
+  return gaps_[grid_.number(at[0], at[1], at[2])] >= 0.0F;
 }
 
 }  // namespace meshless

@@ -21,11 +21,13 @@ class EmptySpace {
   bool known() const { return !gaps_.empty(); }
   /// [m] a point is outside and nothing of the surface is nearer than that; 0 where no more is known.
   double around(const Vec3& point) const;
+  /// True only for points that are joined to the outside.
+  bool isOutside(const Vec3& point) const;
   std::size_t bytes() const { return gaps_.capacity() * sizeof(float); }
 
  private:
   Grid grid_;
-  std::vector<float> gaps_;  // [m] one a cell
+  std::vector<float> gaps_;  // [m] one a cell; negative where it is not outside
 };
 
 }  // namespace meshless

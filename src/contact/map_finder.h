@@ -50,7 +50,8 @@ class PointFinder {
   }
 
   bool empty() const { return points_.empty(); }
-  Index nearest(const Vec3& p) const {
+  /// limit [m]: where none is so near, one that is hardly farther than the nearest will do.
+  Index nearest(const Vec3& p, double limit = std::numeric_limits<double>::infinity()) const {
     if (count_ <= 1) return 0;
     Index best = 0;
     double least = std::numeric_limits<double>::infinity();
@@ -73,7 +74,7 @@ class PointFinder {
     for (int ring = 0, rings = grid_.ringsAround(home); ring <= rings && !std::isfinite(least); ++ring)
       visitRing(grid_, home, ring, [&](std::size_t cell) { lookIn(cell, cell); });
     if (!std::isfinite(least)) return best;
-    const Vec3 around = Vec3::Constant(std::sqrt(least) + 1e-9 * grid_.edge);  // not by rounding
+    const Vec3 around = Vec3::Constant(std::min(std::sqrt(least), limit) + 1e-9 * grid_.edge);  // not by rounding
     const std::array<int, 3> low = grid_.cellAt(p - around), high = grid_.cellAt(p + around);
     for (int x = low[0]; x <= high[0]; ++x)
       for (int y = low[1]; y <= high[1]; ++y) lookIn(grid_.number(x, y, low[2]), grid_.number(x, y, high[2]));

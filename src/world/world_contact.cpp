@@ -141,9 +141,8 @@ void World::Impl::foreseeMeeting(const std::vector<BodyId>& pieces) {
         near.min.array() -= kNearPiece * in.size();
         near.max.array() += kNearPiece * in.size();
         for (const ContactSample& sample : of.samples())
-          if (const Vec3& p = of.surface().vertices[sample.vertices[0]];
-              near.contains(p) && !in.isClear(p, in.meanEdge()))
-            in.clearance(p);
+          if (const Vec3& p = of.surface().vertices[sample.vertices[0]]; near.contains(p) && !in.isOutside(p))
+            in.foresee(p);
       }
   });
 }

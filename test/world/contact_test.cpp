@@ -3,6 +3,7 @@
 
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/nearest_on_triangle.h"
+#include "meshless_surgery/world/saved_world.h"
 #include "support/bodies.h"
 #include "support/random.h"
 
@@ -352,6 +353,65 @@ TEST(Contact, AnObstacleHoldsWhatFallsOnItAndNeverMoves) {
   const Status refused = world.addObstacle(bad);
   ASSERT_FALSE(refused.ok());
   EXPECT_NE(refused.error().detail.find("-1"), std::string::npos);
+}
+
+// Who comes and goes elsewhere changes the numbers of the others, and nothing of what presses them.
+TEST(Contact, WhoComesAndGoesElsewhereChangesNothing) {
+  const auto stackOf = [](World& world, bool with_guest) {
+    if (with_guest) add(world, box("guest", Vec3::Constant(0.1), {2, 2, 2}, Vec3(5.0, 0.0, 0.05)));
+    for (int n = 0; n < 3; ++n)
+      add(world, box("block" + std::to_string(n), Vec3::Constant(0.1), {2, 2, 2},
+                     Vec3(0.01 * n, 0.005 * n, 0.05 + 0.1001 * n)));
+  };
+  WorldSettings settings;
+  settings.sleep = false;
+  World alone(settings), visited(settings);
+  stackOf(alone, false);
+  stackOf(visited, true);
+  for (int step = 0; step < 60; ++step) {
+    alone.step();
+    visited.step();
+  }
+  ASSERT_TRUE(visited.apply(RemoveCommand{"guest"}).ok());
+  for (int step = 0; step < 30; ++step) {
+    const WorldSnapshot a = seen(alone), b = seen(visited);
+    ASSERT_EQ(b.bodies.size(), step < 1 || step > 20 ? 3u : 4u);
+    for (std::size_t n = 0; n < 3; ++n) ASSERT_EQ(a.bodies[n].surface, b.bodies[n].surface) << step;
+    if (step == 0) add(visited, box("next", Vec3::Constant(0.1), {2, 2, 2}, Vec3(-5.0, 0.0, 0.05)));
+    if (step == 20) {
+      ASSERT_TRUE(visited.apply(RemoveCommand{"next"}).ok());
+    }
+    alone.step();
+    visited.step();
+  }
+}
+
+// What presses on a body is of its surface before the cut: after an incision it is looked up anew, and kept safely.
+TEST(Contact, AnIncisedBodyThatCarriesAnotherIsSavedAndGoesOn) {
+  WorldSettings settings;
+  World world(settings);
+  add(world, box("below", Vec3(0.2, 0.2, 0.1), {8, 8, 4}, Vec3(0.0, 0.0, 0.05)));
+  add(world, box("above", Vec3(0.1, 0.1, 0.1), {4, 4, 4}, Vec3(0.02, 0.01, 0.1502)));
+  for (int step = 0; step < 60; ++step) world.step();
+  InciseCommand incision;
+  incision.blade.origin = Vec3(-0.2, 0.03, 0.1);
+  incision.blade.x_axis = Vec3::UnitX();
+  incision.blade.y_axis = Vec3::UnitZ();
+  incision.blade.length = 0.4;
+  incision.blade.depth = 0.03;
+  incision.bodies = {"below"};
+  const auto opened = world.apply(incision);
+  ASSERT_TRUE(opened.ok()) << opened.error().detail;
+  const Result<DecodedWorld> decoded = decode(encode(*world.capture()));
+  ASSERT_TRUE(decoded.ok()) << decoded.error().detail;
+  World loaded(settings);
+  loaded.restore(*decoded->world);
+  for (int step = 0; step < 30; ++step) {
+    world.step();
+    loaded.step();
+    ASSERT_EQ(world.stateHash(), loaded.stateHash()) << step;
+  }
+  EXPECT_NEAR(seen(world).bodies[1].measures.centre_of_mass.z(), 0.15, 0.01);
 }
 
 // Vertices of a fresh piece ride with offsets that fade; whoever looks on never sees one below the ground.

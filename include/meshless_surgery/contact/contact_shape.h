@@ -53,12 +53,13 @@ class ContactShape {
   /// farther. Cubes that lie exactly along each other are held by their tops, not by their sides.
   bool nearest(const Vec3& rest, const Vec3& inward, double slack, Nearest& found, Index hint = kNoIndex) const;
 
-  /// A lower bound [m] of the distance from a point to the surface from outside, quick where the same place was asked
-  /// about before; negative where the point may be inside or near. `hint`: as for nearest(). Thread-safe.
-  double clearance(const Vec3& rest, Index hint = kNoIndex) const;
-  /// True only for a point outside that is more than `by` [m] from the surface, and for most of those that are farther
-  /// by a few edges: it knows how far it is from a cell to the next one with a triangle. Thread-safe.
+  /// True only for a point outside that is more than `by` [m] from the surface, and for nearly all of those that are
+  /// farther by half an edge. Quicker where the same place was asked about before. Thread-safe.
   bool isClear(const Vec3& rest, double by) const;
+  /// True only for points outside, and for all that are a few edges from the surface. Thread-safe.
+  bool isOutside(const Vec3& rest) const;
+  /// What isClear() would find out about a place when it is asked again. Thread-safe.
+  void foresee(const Vec3& rest) const;
 
   /// [m] from a point to a triangle of the surface.
   double distanceTo(Index triangle, const Vec3& rest) const;
@@ -92,6 +93,11 @@ class ContactShape {
   std::size_t cellAt(const Vec3& rest, std::array<int, 3>& at) const;
   bool isBeyondCells(const Vec3& rest) const;
   bool searchBins(const Vec3& rest, double within, Nearest& found) const;
+  bool anyWithin(const Vec3& rest, double by) const;
+  bool isMistaken(const Vec3& rest, const Nearest& found) const;
+  const EmptySpace& space() const;
+  Vec3 cellCentre(const std::array<int, 3>& at) const;
+  float distanceOfCentre(std::size_t index, const std::array<int, 3>& at) const;
   template <class Visit>
   void visitNear(const Vec3& rest, double radius, const Visit& visit) const;
   void binTriangles();
@@ -126,7 +132,7 @@ class ContactShape {
   // A cell, or how often it was asked for: the first few times the bins are searched, so that a fresh shape answers at
   // once.
   mutable std::unique_ptr<std::atomic<std::uintptr_t>[]> cells_;
-  mutable std::unique_ptr<std::atomic<float>[]> distances_;  // [m] one a cell, of its centre; NaN: not known yet
+  mutable std::unique_ptr<std::atomic<float>[]> distances_;  // [m] one a cell, of its centre: see isClear()
   std::size_t cell_total_ = 0;
   mutable std::atomic<std::size_t> cells_filled_{0}, cell_bytes_{0};
   mutable std::once_flag linked_;

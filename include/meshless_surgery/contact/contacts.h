@@ -132,6 +132,8 @@ class Contacts {
   std::size_t bytes() const;
   /// Forgets what it remembers of pairs.
   void clear();
+  /// Of a party alone, whose surface is another from now on.
+  void forget(std::uint64_t key);
   /// All that the next frame reads of the ones before, to be given back to contacts of the same parties
   /// (contact/contacts_memory.h).
   ContactsMemory memory() const;
