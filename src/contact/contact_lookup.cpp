@@ -75,19 +75,30 @@ void look(const ContactParty& party, const MapFinder& finder, const ContactMap* 
 
 namespace {
 
-// A point that is well within a triangle, seen from above it, and near: which no search has to confirm.
-bool isOver(const ContactParty& party, Index triangle, const Vec3& p, bool flipped, ContactShape::Nearest& found) {
-  const Triangle& corners = party.shape->surface().triangles[triangle];
+// A point that is well within a triangle, seen from above it, and near: which no search has to confirm. With
+// `known_edges` it may be over an edge as well across which the surface goes on as it is, and up to a ridge from above.
+bool isOver(const ContactParty& party, Index triangle, const Vec3& p, bool flipped, bool known_edges,
+            ContactShape::Nearest& found) {
+  const ContactShape& shape = *party.shape;
+  const Triangle& corners = shape.surface().triangles[triangle];
   const Vec3 q0 = vertexAt(party, corners[0]);
   const Vec3 e1 = vertexAt(party, corners[1]) - q0, e2 = vertexAt(party, corners[2]) - q0, d = p - q0;
   const Vec3 area = e1.cross(e2);
   const double squared = area.squaredNorm();
-  const double v = d.cross(e2).dot(area), w = e1.cross(d).dot(area), least = kWellWithin * squared;
-  if (!(v > least) || !(w > least) || !(squared - v - w > least)) return false;
+  const double v = d.cross(e2).dot(area) / squared, w = e1.cross(d).dot(area) / squared;
   const double height = (flipped ? -1.0 : 1.0) * area.dot(d) / std::sqrt(squared);
-  if (!(std::abs(height) < kNearby * party.shape->thickness())) return false;
+  if (!(std::abs(height) < kNearby * shape.thickness())) return false;
+  const std::array<double, 3> weights{1.0 - v - w, v, w};
+  for (int k = 0; k < 3; ++k) {
+    if (weights[k] > kWellWithin) continue;
+    if (!known_edges || !(weights[k] > -kWellWithin)) return false;
+    const ContactShape::Bend bend = shape.bend(triangle, k);
+    if (bend != ContactShape::Bend::kFlat &&
+        !(bend == ContactShape::Bend::kRidge && weights[k] >= 0.0 && height >= 0.0))
+      return false;
+  }
   found.triangle = triangle;
-  found.weights = {1.0 - (v + w) / squared, v / squared, w / squared};
+  found.weights = weights;
   found.distance = height;
   found.above = true;
   return true;
@@ -162,7 +173,7 @@ bool Contacts::Impl::locate(const ContactParty& b, const SurfaceNow& surface, co
     hint = found.triangle;
     if (n + 1 == kMostLookups) break;
     if (found.distance > far) return false;
-    if (isOver(b, found.triangle, p, flipped, found)) break;
+    if (isOver(b, found.triangle, p, flipped, false, found)) break;
     // The surface does not lie where the affine map has it: by so much the point is looked up elsewhere.
     const Vec3 there = seenFrom(b, found, p, *to_rest);
     if ((there - rest).squaredNorm() < enough * enough) break;
@@ -233,7 +244,7 @@ bool Contacts::Impl::stillOver(std::size_t& cursor, const ContactParty& with, In
   if (anew || cursor >= last_sorted || (frames + sample) % kLookAnew == 0) return false;
   const Contact& before = last[cursor];
   if (keyOf(before) != mine || before.caught) return false;
-  if (!isOver(with, before.triangle, p, before.flipped, found)) return false;
+  if (!isOver(with, before.triangle, p, before.flipped, true, found)) return false;
   flipped = before.flipped;
   return true;
 }

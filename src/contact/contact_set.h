@@ -49,7 +49,7 @@ struct IslandPlan {
   std::size_t bytes() const;
 
  private:
-  std::vector<Index> root_, number_, next_;
+  std::vector<Index> root_, number_, next_, moving_;
 };
 
 /// Moves parties so that what touches does not come nearer.

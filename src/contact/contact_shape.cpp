@@ -164,7 +164,7 @@ ContactShape::~ContactShape() {
 
 std::size_t ContactShape::bytes() const {
   return sizeof *this + bytesOf(surface_.vertices, surface_.triangles, surface_.patches, facets_, rider_of_, samples_) +
-         bytesOf(bin_offsets_, bin_triangles_, bin_spheres_, across_) +
+         bytesOf(bin_offsets_, bin_triangles_, bin_spheres_, across_, bends_) +
          cell_total_ * (sizeof(std::atomic<std::uintptr_t>) + sizeof(std::atomic<float>)) +
          cell_bytes_.load(std::memory_order_relaxed);
 }
@@ -659,31 +659,59 @@ bool ContactShape::nearest(const Vec3& rest, const Vec3& inward, double slack, N
   return true;
 }
 
-Index ContactShape::across(Index triangle, int corner) const {
+// Edges by their lower vertex, and of each those with the same upper one.
+void ContactShape::link() const {
   std::call_once(linked_, [this] {
     struct Edge {
-      Index low, high, triangle;
+      Index high, triangle;
       int corner;
     };
-    std::vector<Edge> edges;
-    edges.reserve(3 * surface_.triangles.size());
-    for (Index t = 0; t < surface_.triangles.size(); ++t)
-      for (int k = 0; k < 3; ++k) {
-        const Index a = surface_.triangles[t][(k + 1) % 3], b = surface_.triangles[t][(k + 2) % 3];
-        edges.push_back({std::min(a, b), std::max(a, b), t, k});
-      }
-    std::sort(edges.begin(), edges.end(), [](const Edge& p, const Edge& q) {
-      return std::tie(p.low, p.high, p.triangle) < std::tie(q.low, q.high, q.triangle);
-    });
+    const auto forEdges = [this](const auto& visit) {
+      for (Index t = 0; t < surface_.triangles.size(); ++t)
+        for (int k = 0; k < 3; ++k) {
+          const Index a = surface_.triangles[t][(k + 1) % 3], b = surface_.triangles[t][(k + 2) % 3];
+          visit(std::min(a, b), Edge{std::max(a, b), t, k});
+        }
+    };
+    std::vector<Index> offsets(surface_.vertices.size() + 1, 0);
+    forEdges([&](Index low, const Edge&) { ++offsets[low + 1]; });
+    for (std::size_t v = 0; v + 1 < offsets.size(); ++v) offsets[v + 1] += offsets[v];
+    std::vector<Edge> edges(offsets.back());
+    std::vector<Index> next(offsets.begin(), offsets.end() - 1);
+    forEdges([&](Index low, const Edge& edge) { edges[next[low]++] = edge; });
     across_.assign(surface_.triangles.size(), {kNoIndex, kNoIndex, kNoIndex});
-    for (std::size_t k = 0; k + 1 < edges.size(); ++k) {
-      const Edge &e = edges[k], &f = edges[k + 1];
-      if (e.low != f.low || e.high != f.high) continue;
-      across_[e.triangle][e.corner] = f.triangle;
-      across_[f.triangle][f.corner] = e.triangle;
+    bends_.resize(surface_.triangles.size());
+    for (std::size_t v = 0; v + 1 < offsets.size(); ++v) {
+      const auto first = edges.begin() + offsets[v], end = edges.begin() + offsets[v + 1];
+      std::stable_sort(first, end, [](const Edge& p, const Edge& q) { return p.high < q.high; });
+      for (auto e = first; e != end && e + 1 != end; ++e) {
+        const auto f = e + 1;
+        if (e->high != f->high) continue;
+        across_[e->triangle][e->corner] = f->triangle;
+        across_[f->triangle][f->corner] = e->triangle;
+      }
     }
+    for (Index t = 0; t < surface_.triangles.size(); ++t)
+      for (int k = 0; k < 3; ++k) bends_[t][k] = bendAt(t, k);
   });
+}
+
+Index ContactShape::across(Index triangle, int corner) const {
+  link();
   return across_[triangle][corner];
+}
+
+ContactShape::Bend ContactShape::bend(Index triangle, int corner) const {
+  link();
+  return bends_[triangle][corner];
+}
+
+ContactShape::Bend ContactShape::bendAt(Index triangle, int corner) const {
+  const Index other = across_[triangle][corner];
+  if (other == kNoIndex) return Bend::kBorder;
+  const Facet &f = facets_[triangle], &g = facets_[other];
+  if (f.normal.dot(g.normal) > kFlatEdge) return Bend::kFlat;
+  return f.normal.dot(g.centre - f.a) < 0.0 ? Bend::kRidge : Bend::kValley;
 }
 
 // How far it is from a point on the surface to the other side.

@@ -286,52 +286,74 @@ void Contacts::begin(const std::vector<ContactParty>& parties, double substep) {
   impl_->fresh = true;
 }
 
+// Quick pairs where they are now, if they may have gone as far as their reach since they were looked at.
+void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,
+                                 ContactCounters& counters, const ForEach& for_each) {
+  const double falling = scene.gravity.norm() * substep * substep;
+  quick.resize(pairs.size());
+  std::vector<Index> moved, to_fit;  // pairs, and parties
+  std::vector<char> fitted;
+  for (Index k = 0; k < pairs.size(); ++k) {
+    const Pair& pair = pairs[k];
+    if (!pair.quick) continue;
+    const double thickness = std::min(parties[pair.a].shape->thickness(), parties[pair.b].shape->thickness());
+    // Many short substeps need no look in each of them.
+    quick[k].moved += pair.way * substep;
+    if (!fresh && quick[k].moved < kQuick * thickness) continue;
+    quick[k].moved = 0.0;
+    moved.push_back(k);
+    if (fitted.empty()) fitted.assign(parties.size(), 0);
+    for (Index p : {pair.a, pair.b})
+      if (!fitted[p]) {
+        to_fit.push_back(p);
+        fitted[p] = 1;
+      }
+  }
+  runEach(for_each, to_fit.size(), [&](std::size_t n) {
+    const Index p = to_fit[n];
+    refit(p, maps_now[p]);
+    finders[p].make(maps_now[p].data(), static_cast<Index>(maps_now[p].size()));
+  });
+  std::vector<Box> swept;  // of those that are traced
+  for (const Index k : moved) {
+    const Pair& pair = pairs[k];
+    const double thickness = std::min(parties[pair.a].shape->thickness(), parties[pair.b].shape->thickness());
+    if (!(pair.way * substep > kQuick * thickness)) continue;
+    if (swept.empty()) swept.resize(parties.size());
+    for (Index p : {pair.a, pair.b})
+      if (swept[p].empty()) swept[p] = sweptVertices(parties[p]);
+    if (!swept[pair.a].overlaps(swept[pair.b])) continue;
+    trace(parties, pair.a, pair.b, counters);
+    trace(parties, pair.b, pair.a, counters);
+  }
+  runEach(for_each, moved.size(), [&](std::size_t n) {
+    Pair pair = pairs[moved[n]];
+    const ContactShape &a = *parties[pair.a].shape, &b = *parties[pair.b].shape;
+    pair.reach = kMargin * std::min(a.size(), b.size()) +
+                 std::min(pair.way * frame + falling, kQuick * std::min(a.thickness(), b.thickness()));
+    Findings& found = quick[moved[n]].found;
+    Inside ignored;
+    found.clear();
+    lookInto(found, parties, pair, pair.a, pair.b, maps_now[pair.b].data(), true, ignored);
+    lookInto(found, parties, pair, pair.b, pair.a, maps_now[pair.a].data(), true, ignored);
+  });
+  for (const Index k : moved) {
+    counters.lookups += quick[k].found.counters.lookups;
+    counters.contacts += quick[k].found.contacts.size();
+  }
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    if (!pairs[k].quick) continue;
+    quick[k].first = contacts.size();
+    join(quick[k].found, 0, quick[k].found.contacts.size(), 0, quick[k].found.entries.size());
+  }
+}
+
 void Contacts::solve(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,
                      ContactCounters& counters, const ForEach& for_each) {
   Impl& w = *impl_;
   w.contacts.resize(w.steady_contacts);
   w.entries.resize(w.steady_entries);
-  std::vector<char> fitted;
-  std::vector<Box> swept;  // of those that are traced
-  const double falling = w.scene.gravity.norm() * substep * substep;
-  w.quick.resize(w.pairs.size());
-  for (std::size_t k = 0; k < w.pairs.size(); ++k) {
-    Pair pair = w.pairs[k];
-    if (!pair.quick) continue;
-    QuickFindings& quick = w.quick[k];
-    const double thickness = std::min(parties[pair.a].shape->thickness(), parties[pair.b].shape->thickness());
-    // Many short substeps need no look in each of them: only when the bodies may have gone as far as the reach.
-    quick.moved += pair.way * substep;
-    if (w.fresh || !(quick.moved < kQuick * thickness)) {
-      quick.moved = 0.0;
-      if (fitted.empty()) fitted.assign(parties.size(), 0);
-      for (Index p : {pair.a, pair.b})
-        if (!fitted[p]) {
-          refit(p, w.maps_now[p]);
-          w.finders[p].make(w.maps_now[p].data(), static_cast<Index>(w.maps_now[p].size()));
-          fitted[p] = 1;
-        }
-      if (pair.way * substep > kQuick * thickness) {
-        if (swept.empty()) swept.resize(parties.size());
-        for (Index p : {pair.a, pair.b})
-          if (swept[p].empty()) swept[p] = sweptVertices(parties[p]);
-        if (swept[pair.a].overlaps(swept[pair.b])) {
-          w.trace(parties, pair.a, pair.b, counters);
-          w.trace(parties, pair.b, pair.a, counters);
-        }
-      }
-      const double size = std::min(parties[pair.a].shape->size(), parties[pair.b].shape->size());
-      pair.reach = kMargin * size + std::min(pair.way * w.frame + falling, kQuick * thickness);
-      Inside ignored;
-      quick.found.clear();
-      w.lookInto(quick.found, parties, pair, pair.a, pair.b, w.maps_now[pair.b].data(), true, ignored);
-      w.lookInto(quick.found, parties, pair, pair.b, pair.a, w.maps_now[pair.a].data(), true, ignored);
-      counters.lookups += quick.found.counters.lookups;
-      counters.contacts += quick.found.contacts.size();
-    }
-    quick.first = w.contacts.size();
-    w.join(quick.found, 0, quick.found.contacts.size(), 0, quick.found.entries.size());
-  }
+  w.lookAtQuick(parties, substep, refit, counters, for_each);
   if (!w.caught.empty()) w.addCaught(parties);
   const bool steady = w.contacts.size() == w.steady_contacts;
   if (!steady || !w.plan_steady) {

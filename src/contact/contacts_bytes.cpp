@@ -20,7 +20,7 @@ std::size_t bytesOfFindings(const Findings& f) {
 
 std::size_t IslandPlan::bytes() const {
   return bytesOf(contacts, contact_offsets, parties, party_offsets, shifts, passes, calm) +
-         bytesOf(root_, number_, next_);
+         bytesOf(root_, number_, next_, moving_);
 }
 
 std::size_t Contacts::bytes() const {

@@ -175,6 +175,8 @@ struct Contacts::Impl {
                 const ContactMap* maps, bool every_point, Inside& inside);
   void lookIntoSelf(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair);
   void crossRidges(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair);
+  void lookAtQuick(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,
+                   ContactCounters& counters, const ForEach& for_each);
   void trace(const std::vector<ContactParty>& parties, Index a, Index b, ContactCounters& counters);
   void addCaught(const std::vector<ContactParty>& parties);
   void addGround(Findings& to, const std::vector<ContactParty>& parties, Index a, double reach);

@@ -20,30 +20,34 @@ void IslandPlan::make(const std::vector<ContactParty>& all, const std::vector<Co
   root_.resize(count);
   for (Index p = 0; p < count; ++p) root_[p] = p;
   const auto moves = [&](Index p) { return p != kNoIndex && all[p].moves; };
-  for (const Contact& c : made)
+  moving_.resize(made.size());  // one of each contact, or none: contacts themselves are large
+  for (std::size_t k = 0; k < made.size(); ++k) {
+    const Contact& c = made[k];
+    moving_[k] = moves(c.a) ? c.a : moves(c.b) ? c.b : kNoIndex;
     if (moves(c.a) && moves(c.b)) {
       const Index a = rootOf(root_, c.a), b = rootOf(root_, c.b);
       root_[std::max(a, b)] = std::min(a, b);
     }
+  }
   // Islands in the order in which their first contact comes.
   number_.assign(count, kNoIndex);
   contact_offsets.assign(1, 0);
-  const auto islandOf = [&](const Contact& c) { return rootOf(root_, moves(c.a) ? c.a : c.b); };
   Index islands = 0;
-  for (const Contact& c : made) {
-    if (!moves(c.a) && !moves(c.b)) continue;
-    const Index root = islandOf(c);
+  for (Index& of : moving_) {
+    if (of == kNoIndex) continue;
+    const Index root = rootOf(root_, of);
     if (number_[root] == kNoIndex) {
       number_[root] = islands++;
       contact_offsets.push_back(0);
     }
-    ++contact_offsets[number_[root] + 1];
+    of = number_[root];
+    ++contact_offsets[of + 1];
   }
   for (Index i = 0; i < islands; ++i) contact_offsets[i + 1] += contact_offsets[i];
   contacts.resize(contact_offsets.back());
   next_.assign(contact_offsets.begin(), contact_offsets.end() - 1);
-  for (Index k = 0; k < made.size(); ++k)
-    if (moves(made[k].a) || moves(made[k].b)) contacts[next_[number_[islandOf(made[k])]]++] = k;
+  for (Index k = 0; k < moving_.size(); ++k)
+    if (moving_[k] != kNoIndex) contacts[next_[moving_[k]]++] = k;
 
   party_offsets.assign(islands + 1, 0);
   shifts.assign(count, kNoIndex);

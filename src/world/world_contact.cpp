@@ -133,6 +133,7 @@ void World::Impl::foreseeMeeting(const std::vector<BodyId>& pieces) {
   }
   if (coming.size() < 2) return;
   last->coming_meeting = std::async(std::launch::async, [coming] {
+    for (const Coming& a : coming) a.get()->shape.link();
     for (const Coming& a : coming)
       for (const Coming& b : coming) {
         if (a.get() == b.get()) continue;

@@ -67,6 +67,11 @@ class ContactShape {
   /// The triangle across the edge that lies against a corner of a triangle; kNoIndex at a border. Made when first asked
   /// for; thread-safe.
   Index across(Index triangle, int corner) const;
+  /// How the surface bends there at rest; flat within 5 degrees. As for across().
+  enum class Bend : char { kBorder, kFlat, kRidge, kValley };
+  Bend bend(Index triangle, int corner) const;
+  /// Makes what the two above need.
+  void link() const;
 
   const TriangleMesh& surface() const { return surface_; }
   const std::vector<ContactSample>& samples() const { return samples_; }
@@ -100,6 +105,7 @@ class ContactShape {
   float distanceOfCentre(std::size_t index, const std::array<int, 3>& at) const;
   template <class Visit>
   void visitNear(const Vec3& rest, double radius, const Visit& visit) const;
+  Bend bendAt(Index triangle, int corner) const;
   void binTriangles();
   template <class Visit>
   void visitBins(const Box& box, const Visit& visit) const;
@@ -137,6 +143,7 @@ class ContactShape {
   mutable std::atomic<std::size_t> cells_filled_{0}, cell_bytes_{0};
   mutable std::once_flag linked_;
   mutable std::vector<std::array<Index, 3>> across_;
+  mutable std::vector<std::array<Bend, 3>> bends_;
 };
 
 }  // namespace meshless
