@@ -125,6 +125,34 @@ void inciseOneBody(int incisions, ContactMethod contact) {
 TEST(ManyCuts, UpToAThousandIncisionsOfOneBody) {
   inciseOneBody(std::clamp(static_cast<int>(120.0 * share()), 20, 1000), ContactMethod::kNone);
 }
+// Short ones all over a slab, at any angle, many across others, as a class of trainees leaves it.
+TEST(ManyCuts, AThousandShortIncisionsOfASlab) {
+  const int incisions = std::max(50, static_cast<int>(1000.0 * std::min(1.0, share())));
+  Twins twins(test::weightless());
+  BodyDef slab = test::defOf(boxMesh(Vec3(0.3, 0.3, 0.03), 15, 15, 2), "slab");
+  slab.spacing = 0.03;
+  twins.spawn(test::shared(slab));
+  test::Random random(53);
+  std::size_t accepted = 0;
+  for (int n = 0; n < incisions; ++n) {
+    InciseCommand incise;
+    incise.blade.y_axis = (Vec3::UnitZ() + random.vector(0.3)).normalized();
+    incise.blade.x_axis = incise.blade.y_axis.cross(random.unit()).normalized();
+    incise.blade.length = random.uniform(0.003, 0.012);
+    incise.blade.depth = random.uniform(0.003, 0.012);
+    incise.blade.origin = Vec3(random.uniform(-0.14, 0.14), random.uniform(-0.14, 0.14), 0.017);
+    const std::uint64_t before = twins.world().stateHash();
+    if (twins.apply(incise).ok())
+      ++accepted;
+    else
+      EXPECT_EQ(twins.world().stateHash(), before) << "incision " << n;
+    if (n % 10 == 9) ASSERT_TRUE(twins.step(Vec3::Zero(), 20.0)) << "incision " << n;
+  }
+  EXPECT_GE(accepted, static_cast<std::size_t>(incisions) / 2);
+  RecordProperty("accepted", static_cast<int>(accepted));
+  RecordProperty("triangles", static_cast<int>(twins.world().snapshot({}).bodies[0].model->surface.triangles.size()));
+}
+
 // What lies against itself by thousands of slivers takes its time.
 TEST(ManyCuts, SixtyIncisionsOfABodyThatMeetsItself) {
   inciseOneBody(std::max(20, static_cast<int>(60.0 * std::min(1.0, share()))), ContactMethod::kRestShape);

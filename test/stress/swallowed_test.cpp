@@ -65,6 +65,71 @@ TEST_P(Swallowed, BodiesThatAreHeldStayFinite) {
     }
 }
 
+// A sphere that goes through the middle of a body appears in it, and is gone after half a second: what it has pushed
+// aside comes back.
+TEST_P(Swallowed, HalfCoveredBodiesComeBack) {
+  test::Random random(5);
+  for (const double radius : {0.03, 0.06, 0.2, 1.0, 30.0}) {
+    SCOPED_TRACE(radius);
+    const WorldSettings settings = test::weightless();
+    Twins twins(settings);
+    twins.spawn(test::shared(blockOf(GetParam(), "block")));
+    PushCommand push;
+    push.radius = radius;
+    push.position = radius * random.unit();
+    twins.attempt(push);
+    const double reach = 10.0 + 4.0 * radius;
+    for (int step = 0; step < 30; ++step) {
+      ASSERT_TRUE(twins.step(Vec3::Zero(), reach)) << "step " << step;
+      const BodySnapshot& body = twins.seen().bodies[0];
+      ASSERT_LT(reachOf(body.particles, body.measures.centre_of_mass), 3.0 * kSize) << "step " << step;
+    }
+    twins.attempt(PushCommand{false});
+    ASSERT_TRUE(twins.step(Vec3::Zero(), reach));
+    Twins stopped = stoppedAsAWhole(twins, settings, reach);
+    EnergyLaw law(1.01);
+    const double h = 1.0 / settings.step_rate;
+    double farthest = 1.0;
+    for (int step = 0; step < 600 && !(farthest < 1e-3); ++step) {
+      ASSERT_TRUE(stopped.step(Vec3::Zero(), reach)) << "step " << step;
+      const BodySnapshot& body = stopped.seen().bodies[0];
+      farthest = distanceFromRest(*body.model, body.particles);
+      ASSERT_TRUE(
+          law.holds(body.measures.kinetic_energy + deformationEnergy(*body.model, body.material, h, body.particles)))
+          << "step " << step;
+    }
+    EXPECT_LT(farthest, 1e-3);
+  }
+}
+
+// A block that is spawned half inside one a hundred times its size, on the ground, is not thrown and leaves it. What is
+// elastic is pressed down between it and the ground: the faces below are nearer.
+TEST_P(Swallowed, ABodyHalfInsideAHugeOneComesOut) {
+  for (const double depth : {0.02, 0.05, 0.1}) {
+    SCOPED_TRACE(depth);
+    Twins twins{WorldSettings()};
+    BodyDef huge = test::defOf(boxMesh(Vec3::Constant(10.0), 4, 4, 4), "huge");
+    huge.spacing = 2.5;
+    huge.pose.translation = Vec3(5.1 - depth, 0.0, 5.0);
+    twins.spawn(test::shared(huge));
+    twins.spawn(test::shared(blockOf(GetParam(), "block", Vec3(0.0, 0.02, 0.051))));
+    for (int step = 0; step < 300; ++step) {
+      ASSERT_TRUE(twins.step(Vec3::Zero(), 40.0)) << "step " << step;
+      const BodySnapshot& block = twins.seen().bodies[1];
+      ASSERT_LT(block.measures.linear_momentum.norm(), block.model->mass * 2.0) << "step " << step;
+      ASSERT_LT(reachOf(block.particles, block.measures.centre_of_mass), 3.0 * kSize) << "step " << step;
+    }
+    const std::vector<BodySnapshot>& bodies = twins.seen().bodies;
+    double left = std::numeric_limits<double>::infinity(), right = -left;
+    for (const Vec3& p : bodies[0].surface) left = std::min(left, p.x());
+    for (const Vec3& p : bodies[1].surface) right = std::max(right, p.x());
+    if (!GetParam().elastic) {
+      EXPECT_LT(right - left, 0.015);
+    }
+    EXPECT_LT(std::abs(bodies[1].measures.centre_of_mass.y()), 0.5);
+  }
+}
+
 std::vector<Kind> oneByOne() {
   const std::vector<Kind> some = thinned(kindsAlone());
   return some.empty() ? std::vector<Kind>{kindsAlone().front()} : some;
