@@ -20,6 +20,7 @@ constexpr double kSlopeError = 0.5;     // of a map, at most
 constexpr double kMovedInRest = 0.005;  // of the size: a lookup is repeated where the deviation moved it farther
 constexpr std::size_t kLookAnew = 8;    // frames after which a point is looked up though it seems to be where it was
 constexpr double kWellWithin = 0.02;    // barycentric
+constexpr double kOnSurface = 0.05;     // of a triangle's extent
 constexpr double kFarBeside = 4.0;      // likewise
 constexpr double kNearby = 0.1;         // of the thickness
 constexpr int kMostLookups = 8;
@@ -76,7 +77,8 @@ void look(const ContactParty& party, const MapFinder& finder, const ContactMap* 
 namespace {
 
 // A point that is well within a triangle, seen from above it, and near: which no search has to confirm. With
-// `known_edges` it may be over an edge as well across which the surface goes on as it is, and up to a ridge from above.
+// `known_edges` it may be over an edge as well across which the surface goes on as it is, or nearly so and the point
+// lies on it, and up to a ridge from above.
 bool isOver(const ContactParty& party, Index triangle, const Vec3& p, bool flipped, bool known_edges,
             ContactShape::Nearest& found) {
   const ContactShape& shape = *party.shape;
@@ -92,10 +94,12 @@ bool isOver(const ContactParty& party, Index triangle, const Vec3& p, bool flipp
   for (int k = 0; k < 3; ++k) {
     if (weights[k] > kWellWithin) continue;
     if (!known_edges || !(weights[k] > -kWellWithin)) return false;
-    const ContactShape::Bend bend = shape.bend(triangle, k);
-    if (bend != ContactShape::Bend::kFlat &&
-        !(bend == ContactShape::Bend::kRidge && weights[k] >= 0.0 && height >= 0.0))
-      return false;
+    using Bend = ContactShape::Bend;
+    const Bend bend = shape.bend(triangle, k);
+    const bool before_it = weights[k] >= 0.0 && height >= 0.0;
+    const bool on_it = height * height < kOnSurface * kOnSurface * std::sqrt(squared);
+    if (bend == Bend::kFlat || (bend == Bend::kRidge && before_it) || (bend == Bend::kGentle && on_it)) continue;
+    return false;
   }
   found.triangle = triangle;
   found.weights = weights;
@@ -235,14 +239,26 @@ void Contacts::Impl::addContact(Findings& to, const std::vector<ContactParty>& p
   to.contacts.push_back(c);
 }
 
-// A point that was over a triangle in the last frame and still is, well within it and near, need not be looked up; now
-// and then it is.
-bool Contacts::Impl::stillOver(std::size_t& cursor, const ContactParty& with, Index a, Index b, Index sample,
-                               const Vec3& p, bool anew, ContactShape::Nearest& found, bool& flipped) {
+// What is known of a pair begins there; second: of its points of b in a.
+void Contacts::Impl::startAt(Findings& to, const std::vector<Contact>& known, std::size_t end, const Pair& pair,
+                             bool second) const {
+  const auto start = std::make_tuple(true, pair.a, pair.b, second, Index{0});
+  to.known = &known;
+  to.known_end = end;
+  to.cursor =
+      static_cast<std::size_t>(std::partition_point(known.begin(), known.begin() + static_cast<std::ptrdiff_t>(end),
+                                                    [&](const Contact& c) { return keyOf(c) < start; }) -
+                               known.begin());
+}
+
+// A point that was over a triangle and still is, and near, need not be looked up; now and then it is.
+bool Contacts::Impl::stillOver(Findings& to, const ContactParty& with, Index a, Index b, Index sample, const Vec3& p,
+                               ContactShape::Nearest& found, bool& flipped) const {
   const auto mine = std::make_tuple(true, std::min(a, b), std::max(a, b), a > b, sample);
-  while (cursor < last_sorted && keyOf(last[cursor]) < mine) ++cursor;
-  if (anew || cursor >= last_sorted || (frames + sample) % kLookAnew == 0) return false;
-  const Contact& before = last[cursor];
+  const std::vector<Contact>& known = *to.known;
+  while (to.cursor < to.known_end && keyOf(known[to.cursor]) < mine) ++to.cursor;
+  if (to.cursor >= to.known_end || (frames + sample) % kLookAnew == 0) return false;
+  const Contact& before = known[to.cursor];
   if (keyOf(before) != mine || before.caught) return false;
   if (!isOver(with, before.triangle, p, before.flipped, true, found)) return false;
   flipped = before.flipped;
@@ -280,7 +296,7 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
     }
     ContactShape::Nearest found;
     bool flipped = false;
-    if (!stillOver(to.cursor, with, a, b, s, p, every_point, found, flipped)) {
+    if (!stillOver(to, with, a, b, s, p, found, flipped)) {
       if (to.surface.deviation < 0.0) look(with, finders[b], maps, region, to.surface);
       const auto inward = [&] { return inwardAt(p, samples[s]); };
       if (!locate(with, to.surface, finders[b], maps, p, std::cref(inward), pair.reach, hint, found, flipped,

@@ -21,6 +21,7 @@ constexpr double kMostBins = 1 << 18;
 constexpr double kMostCells = 1 << 19;
 constexpr double kLongEdge = 0.1;    // of the body's least extent: shorter edges need no samples
 constexpr double kFlatEdge = 0.996;  // cosine between neighbours: about 5 degrees
+constexpr double kGentleEdge = 0.7;  // likewise: 45 degrees
 constexpr double kMostPlaces = 1e6;  // along an axis of the grid in which samples keep apart
 constexpr int kMostEdgeSamples = 64;
 constexpr std::size_t kThicknessRays = 48;
@@ -30,7 +31,8 @@ constexpr std::size_t kBounding = 4;      // triangles that tell how far the nea
 constexpr std::uintptr_t kAsked = 12;     // times that the bins are searched before a cell is filled
 constexpr double kSphereRounding = 1e-6;  // relative, of what is kept in single precision
 constexpr double kFlat = 1e-12;           // squared sine of a corner: below, a triangle has no area but by rounding
-constexpr float kAskedOnce = std::numeric_limits<float>::infinity();
+constexpr float kAskedOnce = 1e30F;       // more than any distance; a cell that was asked about n times has n of them
+constexpr float kAskedEnough = 4.0F * kAskedOnce;
 constexpr double kTie = 1e-9;  // relative: two features are equally near
 
 }  // namespace
@@ -560,28 +562,19 @@ float ContactShape::distanceOfCentre(std::size_t index, const std::array<int, 3>
   return known;
 }
 
-// Of a cell that nobody has asked about NaN is known, and kAskedOnce when somebody has: only then its centre is worth a
-// search of its own.
+// A cell's centre is worth a search of its own only when the cell was asked about again and again.
 bool ContactShape::isClear(const Vec3& rest, double by) const {
   if (!cells_ || !(by >= 0.0) || !rest.allFinite()) return false;
   if (space().around(rest) > by) return true;
   std::array<int, 3> at;
   const std::size_t index = cellAt(rest, at);
   float known = distances_[index].load(std::memory_order_relaxed);
-  if (std::isnan(known)) {
-    distances_[index].store(kAskedOnce, std::memory_order_relaxed);
+  if (std::isnan(known) || (known >= kAskedOnce && known < kAskedEnough)) {
+    distances_[index].store(std::isnan(known) ? kAskedOnce : known + kAskedOnce, std::memory_order_relaxed);
     return space().isOutside(rest) && !anyWithin(rest, by);
   }
-  if (known == kAskedOnce) known = distanceOfCentre(index, at);
+  if (known >= kAskedEnough) known = distanceOfCentre(index, at);
   return known - kSphereRounding * std::abs(known) - (rest - cellCentre(at)).norm() > by;
-}
-
-void ContactShape::foresee(const Vec3& rest) const {
-  if (!cells_ || !rest.allFinite()) return;
-  std::array<int, 3> at;
-  const std::size_t index = cellAt(rest, at);
-  if (const float known = distances_[index].load(std::memory_order_relaxed); std::isnan(known) || known == kAskedOnce)
-    distanceOfCentre(index, at);
 }
 
 double ContactShape::distanceTo(Index triangle, const Vec3& rest) const {
@@ -601,10 +594,10 @@ bool ContactShape::nearest(const Vec3& rest, Nearest& found, Index hint) const {
   if (known < kAsked || beyond) {
     std::uintptr_t asked = known;
     if (!beyond) cells_[index].compare_exchange_strong(asked, known + 1, std::memory_order_acq_rel);
-    const double centre = distances_[index].load(std::memory_order_relaxed);  // not finite: not known
+    const double centre = distances_[index].load(std::memory_order_relaxed);
     const Vec3 from = rest - cellCentre(at);
     double most = hint == kNoIndex ? std::numeric_limits<double>::infinity() : distanceTo(hint, rest);
-    if (std::isfinite(centre)) most = std::min(most, std::abs(centre) + from.norm());
+    if (std::abs(centre) < kAskedOnce) most = std::min(most, std::abs(centre) + from.norm());
     const double within = (1.0 + 1e-6) * most + 1e-9 * size_;
     if (!searchBins(rest, std::isfinite(within) ? within : std::numeric_limits<double>::infinity(), found))
       return false;
@@ -710,7 +703,9 @@ ContactShape::Bend ContactShape::bendAt(Index triangle, int corner) const {
   const Index other = across_[triangle][corner];
   if (other == kNoIndex) return Bend::kBorder;
   const Facet &f = facets_[triangle], &g = facets_[other];
-  if (f.normal.dot(g.normal) > kFlatEdge) return Bend::kFlat;
+  const double cosine = f.normal.dot(g.normal);
+  if (cosine > kFlatEdge) return Bend::kFlat;
+  if (cosine > kGentleEdge) return Bend::kGentle;
   return f.normal.dot(g.centre - f.a) < 0.0 ? Bend::kRidge : Bend::kValley;
 }
 

@@ -86,6 +86,33 @@ void Contacts::forget(std::uint64_t key) {
     it = it->first.a == key || it->first.b == key ? w.caught.erase(it) : std::next(it);
 }
 
+void Contacts::adopt(const Contacts& others) {
+  Impl& w = *impl_;
+  const Impl& from = *others.impl_;
+  std::vector<Index> number_of(from.keys.size(), kNoIndex);
+  const auto numberOf = [&](Index party) {
+    Index& number = number_of[party];
+    if (number != kNoIndex) return number;
+    const auto known = std::find(w.keys.begin(), w.keys.end(), from.keys[party]);
+    number = static_cast<Index>(known - w.keys.begin());
+    if (known == w.keys.end()) w.keys.push_back(from.keys[party]);
+    return number;
+  };
+  w.contacts.resize(std::min(w.steady_contacts, w.contacts.size()));
+  for (const std::vector<Contact>* found : {&from.contacts, &from.quick_known})
+    for (Contact c : *found) {
+      if (c.b == kNoIndex || c.caught) continue;
+      c.a = numberOf(c.a);
+      c.b = numberOf(c.b);
+      c.impulse = 0.0;
+      c.slip_impulse.setZero();
+      w.contacts.push_back(c);
+    }
+  std::stable_sort(w.contacts.begin(), w.contacts.end(),
+                   [](const Contact& c, const Contact& d) { return keyOf(c) < keyOf(d); });
+  w.steady_contacts = w.contacts.size();
+}
+
 void Contacts::findPairs(const ContactScene& scene, const std::vector<ContactParty>& parties, double h,
                          ContactCounters& counters) {
   Impl& w = *impl_;
@@ -140,6 +167,7 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   }
   ++w.frames;
   w.contacts.clear();
+  w.quick_known.clear();
   w.entries.clear();
   w.depths.clear();
   if (w.finders.size() < parties.size()) {
@@ -176,14 +204,7 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
       return;
     }
     const std::size_t first = (n - ground_tasks) * task_halves;
-    {
-      const Pair& pair = w.pairs[first / 2];
-      const auto start = std::make_tuple(true, pair.a, pair.b, first % 2 == 1, Index{0});
-      task.cursor = static_cast<std::size_t>(
-          std::partition_point(w.last.begin(), w.last.begin() + static_cast<std::ptrdiff_t>(w.last_sorted),
-                               [&](const Contact& c) { return keyOf(c) < start; }) -
-          w.last.begin());
-    }
+    w.startAt(task, w.last, w.last_sorted, w.pairs[first / 2], first % 2 == 1);
     for (std::size_t k = first; k < std::min(halves, first + task_halves); ++k) {
       const Pair& pair = w.pairs[k / 2];
       HalfFindings& findings = w.halves[k];
@@ -269,7 +290,10 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
     for (const Pair& pair : w.pairs)
       if (pair.quick) quick[{pair.a, pair.b}] = true;
     for (const Contact& c : w.contacts)
-      if (c.b == kNoIndex || !quick.count({std::min(c.a, c.b), std::max(c.a, c.b)})) w.contacts[out++] = c;
+      if (c.b == kNoIndex || !quick.count({std::min(c.a, c.b), std::max(c.a, c.b)}))
+        w.contacts[out++] = c;
+      else
+        w.quick_known.push_back(c);
     w.contacts.resize(out);
   }
   if (any_quick || any_caught) {
@@ -334,6 +358,7 @@ void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, doubl
     Findings& found = quick[moved[n]].found;
     Inside ignored;
     found.clear();
+    startAt(found, quick_known, quick_known.size(), pair, false);
     lookInto(found, parties, pair, pair.a, pair.b, maps_now[pair.b].data(), true, ignored);
     lookInto(found, parties, pair, pair.b, pair.a, maps_now[pair.a].data(), true, ignored);
   });

@@ -99,7 +99,8 @@ struct Findings {
   SelfGrid self_grid;
   Points self_areas;
   std::vector<RidgeNow> ridges;
-  std::size_t cursor = 0;  // in the contacts of the last frame
+  const std::vector<Contact>* known = nullptr;  // found before, in the order of keyOf
+  std::size_t cursor = 0, known_end = 0;        // in them
   SurfaceNow surface;
 
   void clear() {
@@ -144,6 +145,7 @@ struct Contacts::Impl {
   std::vector<MapFinder> finders;
   std::vector<std::vector<ContactMap>> maps_now;  // of those in quick pairs
   std::vector<Contact> contacts, last;            // of this frame and of the one before
+  std::vector<Contact> quick_known;               // of quick pairs, at the start of this frame
   std::vector<ContactEntry> entries;
   std::size_t steady_contacts = 0, steady_entries = 0;  // those found once a frame; quick ones follow
   std::map<CaughtKey, Index> caught;                    // triangle
@@ -169,8 +171,9 @@ struct Contacts::Impl {
               ContactShape::Nearest& found, bool& flipped, ContactCounters& counters) const;
   void addContact(Findings& to, const std::vector<ContactParty>& parties, Index a, Index number, const ContactSample& s,
                   Index b, Index triangle, const std::array<double, 3>& weights, bool was_caught, bool flipped);
-  bool stillOver(std::size_t& cursor, const ContactParty& with, Index a, Index b, Index sample, const Vec3& p,
-                 bool anew, ContactShape::Nearest& found, bool& flipped);
+  void startAt(Findings& to, const std::vector<Contact>& known, std::size_t end, const Pair& pair, bool second) const;
+  bool stillOver(Findings& to, const ContactParty& with, Index a, Index b, Index sample, const Vec3& p,
+                 ContactShape::Nearest& found, bool& flipped) const;
   void lookInto(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair, Index a, Index b,
                 const ContactMap* maps, bool every_point, Inside& inside);
   void lookIntoSelf(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair);

@@ -317,7 +317,8 @@ Result<DecodedWorld> decode(std::string_view bytes) {
 // --- World
 
 std::shared_ptr<const SavedWorld> World::capture() const {
-  const Impl& w = *impl_;
+  Impl& w = *impl_;
+  w.takeMeetings();  // what they find is part of the state
   auto saved = std::make_shared<SavedWorld>();
   saved->settings = w.settings;
   saved->step = w.step;
@@ -409,6 +410,7 @@ void World::restore(const SavedWorld& saved) {
   w.loaded.clear();
   w.parties.clear();
   w.contacts_current = false;
+  w.meetings.clear();
   w.contacts.recall(saved.contacts);
   ++w.run;
   w.say(EventType::kLoaded, "", 0, "a saved state was loaded");

@@ -236,6 +236,7 @@ void World::reset() {
   while (!w.bodies.empty()) w.retire(w.bodies.back()->id);
   w.used_names.clear();
   w.picks.clear();
+  w.meetings.clear();
   w.contacts.clear();
   w.next_sleep_group = 1;
   w.undo.clear();

@@ -17,7 +17,6 @@ constexpr double kFlattest = 1e-6;           // det of a map: below, the rotatio
 constexpr std::size_t kWorthAThread = 1000;  // vertices
 constexpr std::size_t kKeptModels = 64;      // more than this many dead entries are cleared away
 constexpr double kHeldLift = 0.5;            // of the spacing, a step
-constexpr double kNearPiece = 0.02;          // of the size: beside the bounds of a piece
 
 SurfaceRows rowsOf(const BodyModel& model) {
   const SurfaceBinding& b = model.binding;
@@ -58,13 +57,96 @@ double speedOf(const WorldBody& body) {
   return std::sqrt(fastest);
 }
 
-// The maps of a frame: positions are the body's, which bends within a cluster where its mode is quadratic.
-void fitMaps(WorldBody& body, const Vec3* positions, std::vector<ContactMap>& maps) {
-  const MatchInput in = matchInput(*body.model, body.state);
+// The maps of a frame: a body bends within a cluster where its mode is quadratic. Maps point into `quadratic`.
+void fitMaps(const BodyModel& model, const Material& material, const BodyState& state, std::vector<ContactMap>& maps,
+             std::vector<QuadraticMap>& quadratic) {
+  const MatchInput in = matchInput(model, state);
+  const Vec3* positions = state.positions.data();
   maps.resize(in.clusters.size());
-  for (Index c = 0; c < in.clusters.size(); ++c) maps[c] = fitMap(in, c, positions, body.state.poses[c]);
-  if (!body.material.elastic() && body.material.mode == MatchMode::kQuadratic && !in.shape.quadratic.empty())
-    fitQuadraticMaps(in, positions, maps, body.quadratic_maps);
+  for (Index c = 0; c < in.clusters.size(); ++c) maps[c] = fitMap(in, c, positions, state.poses[c]);
+  if (!material.elastic() && material.mode == MatchMode::kQuadratic && !in.shape.quadratic.empty())
+    fitQuadraticMaps(in, positions, maps, quadratic);
+}
+
+void fitMaps(WorldBody& body) { fitMaps(*body.model, body.material, body.state, body.maps, body.quadratic_maps); }
+
+// Two spacings, but of crumbs, whose surface is all nearer to their few particles, no more than what they have: where
+// many of them lie together each would be next to all.
+double riderReachOf(const BodyModel& model) {
+  const SurfaceBinding& binding = model.binding;
+  double farthest = 0.0;  // squared, of a rider from its nearest carrier
+  for (Index r = 0; r < binding.riders.size(); ++r) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k)
+      nearest = std::min(nearest,
+                         (model.surface.vertices[binding.riders[r]] - model.rest[binding.carriers[k]]).squaredNorm());
+    farthest = std::max(farthest, nearest);
+  }
+  return 2.0 * std::min(std::sqrt(farthest), model.spacing);
+}
+
+// What a party is, and how it moves.
+ContactParty partyOf(const BodyModel& model, const Material& material, BodyState& state, std::uint64_t key) {
+  ContactParty party;
+  party.key = key;
+  party.mass = model.mass;
+  party.friction = material.friction;
+  party.restitution = material.restitution;
+  party.positions = state.positions.data();
+  party.particles = static_cast<Index>(state.positions.size());
+  party.masses = model.masses.data();
+  return party;
+}
+
+void readMotion(const BodyModel& model, const Material& material, const BodyState& state, double rider_reach,
+                ContactParty& party) {
+  party.rigid_share = model.any_fixed || material.elastic() ? 0.0 : std::max(kLeastRigid, material.alpha);
+  party.bounds = extentOf(state.positions);
+  const Box velocities = extentOf(state.velocities);
+  party.velocity = 0.5 * (velocities.min + velocities.max);
+  party.spread = 0.5 * velocities.diagonal();
+  party.bounds.min.array() -= rider_reach;
+  party.bounds.max.array() += rider_reach;
+}
+
+// A body as it was when a cut had been made, for another thread.
+struct Met {
+  std::uint64_t key = 0;
+  BodyModelPtr model;
+  Material material;
+  BodyState state;
+  bool surface_current = false, moves = false;
+  std::shared_future<std::shared_ptr<const ContactModel>> coming;  // or
+  std::shared_ptr<const ContactModel> contact;
+  std::vector<ContactMap> maps;
+  std::vector<QuadraticMap> quadratic_maps;
+};
+
+// What a frame would find of them, where they are.
+std::shared_ptr<const Contacts> meet(std::vector<Met>& met, const ContactScene& scene, double h_frame) {
+  std::vector<ContactParty> parties;
+  for (Met& m : met) {
+    if (m.coming.valid()) m.contact = m.coming.get();
+    m.contact->shape.link();
+    ContactParty party = partyOf(*m.model, m.material, m.state, m.key);
+    party.moves = m.moves;
+    readMotion(*m.model, m.material, m.state, riderReachOf(*m.model), party);
+    party.shape = &m.contact->shape;
+    party.inverse_masses = m.contact->inverse_masses.data();
+    if (m.contact->shape.rides()) {
+      if (!m.surface_current) updateSurface(*m.model, m.state);
+      party.surface = m.state.surface.data();
+    }
+    fitMaps(*m.model, m.material, m.state, m.maps, m.quadratic_maps);
+    party.maps = m.maps.data();
+    party.map_count = static_cast<Index>(m.maps.size());
+    parties.push_back(party);
+  }
+  auto contacts = std::make_shared<Contacts>();
+  ContactCounters counters;
+  contacts->findPairs(scene, parties, h_frame, counters);
+  contacts->make(parties, h_frame, counters, oneAfterAnother);
+  return contacts;
 }
 
 }  // namespace
@@ -119,33 +201,52 @@ void World::Impl::foreseeContact(WorldBody& body) {
   });
 }
 
-// Nobody has asked fresh shapes yet, and the first step would ask all at once: where the points of one piece were in
-// the rest shape that they were cut from is where they are in the other's.
-void World::Impl::foreseeMeeting(const std::vector<BodyId>& pieces) {
-  using Coming = std::shared_future<std::shared_ptr<const ContactModel>>;
-  std::vector<Coming> coming;
-  WorldBody* last = nullptr;
+// The first step after a cut would look up in fresh shapes all points of the pieces, of each other and of what they lie
+// on, and all at once: another thread does while the cut is answered.
+void World::Impl::foreseeMeeting(const BodyId& parent, const std::vector<BodyId>& pieces) {
+  auto met = std::make_shared<std::vector<Met>>();
+  Box around;
   for (const BodyId& id : pieces) {
-    WorldBody& body = *find(id);
-    if (!body.coming_contact.valid()) continue;
-    coming.push_back(body.coming_contact);
-    last = &body;
+    const WorldBody& piece = *find(id);
+    if (!piece.coming_contact.valid()) continue;
+    const Box bounds = extentOf(piece.state.positions);
+    around.extend(bounds.min);
+    around.extend(bounds.max);
+    met->push_back({piece.number,
+                    piece.model,
+                    piece.material,
+                    piece.state,
+                    piece.surface_current,
+                    true,
+                    piece.coming_contact,
+                    nullptr,
+                    {},
+                    {}});
   }
-  if (coming.size() < 2) return;
-  last->coming_meeting = std::async(std::launch::async, [coming] {
-    for (const Coming& a : coming) a.get()->shape.link();
-    for (const Coming& a : coming)
-      for (const Coming& b : coming) {
-        if (a.get() == b.get()) continue;
-        const ContactShape &of = a.get()->shape, &in = b.get()->shape;
-        Box near = in.bounds();
-        near.min.array() -= kNearPiece * in.size();
-        near.max.array() += kNearPiece * in.size();
-        for (const ContactSample& sample : of.samples())
-          if (const Vec3& p = of.surface().vertices[sample.vertices[0]]; near.contains(p) && !in.isOutside(p))
-            in.foresee(p);
-      }
-  });
+  if (met->size() < 2) return;
+  for (const auto& other : bodies) {
+    if (other->id == parent || std::find(pieces.begin(), pieces.end(), other->id) != pieces.end()) continue;
+    if (!other->contact || other->contact->model != other->model || !other->bounds.overlaps(around)) continue;
+    met->push_back({other->number,
+                    other->model,
+                    other->material,
+                    other->state,
+                    other->surface_current,
+                    !other->asleep,
+                    {},
+                    other->contact,
+                    {},
+                    {}});
+  }
+  ContactScene scene;  // without the ground, in which nothing is looked up
+  scene.gravity = settings.gravity;
+  meetings.push_back(std::async(
+      std::launch::async, [met, scene, h_frame = 1.0 / settings.step_rate] { return meet(*met, scene, h_frame); }));
+}
+
+void World::Impl::takeMeetings() {
+  for (auto& meeting : meetings) contacts.adopt(*meeting.get());
+  meetings.clear();
 }
 
 // Who is where, which pairs can touch, and what they need for it: nothing for those that nobody is near. Whom something
@@ -162,7 +263,7 @@ void World::Impl::findContacts(double h_frame) {
       if (contacts.needed()[b]) equipParty(*bodies[b], parties[b]);
     forNumbers(bodies.size(), [this](std::size_t b) {
       if (!(contacts.needed()[b] & 1)) return;
-      fitMaps(*bodies[b], parties[b].positions, bodies[b]->maps);
+      fitMaps(*bodies[b]);
       parties[b].maps = bodies[b]->maps.data();
       parties[b].map_count = static_cast<Index>(bodies[b]->maps.size());
     });
@@ -201,15 +302,8 @@ void World::Impl::fillParties() {
 }
 
 void World::Impl::fillParty(WorldBody& body, ContactParty& party) {
-  party = ContactParty();
-  party.key = body.number;
+  party = partyOf(*body.model, body.material, body.state, body.number);
   party.moves = !body.asleep;
-  party.mass = body.model->mass;
-  party.friction = body.material.friction;
-  party.restitution = body.material.restitution;
-  party.positions = body.state.positions.data();
-  party.particles = static_cast<Index>(body.state.positions.size());
-  party.masses = body.model->masses.data();
   const SelfContact wanted = body.material.self_contact;
   party.meets_itself =
       body.material.bends() && (wanted == SelfContact::kAll || (wanted == SelfContact::kLips && body.model->lips));
@@ -217,36 +311,17 @@ void World::Impl::fillParty(WorldBody& body, ContactParty& party) {
     party.bounds = body.bounds;
     return;
   }
-  party.rigid_share =
-      body.model->any_fixed || body.material.elastic() ? 0.0 : std::max(kLeastRigid, body.material.alpha);
-  party.bounds = extentOf(body.state.positions);
-  const Box velocities = extentOf(body.state.velocities);
-  party.velocity = 0.5 * (velocities.min + velocities.max);
-  party.spread = body.spread = 0.5 * velocities.diagonal();
+  readMotion(*body.model, body.material, body.state, riderReach(body), party);
+  body.spread = party.spread;
   body.fastest = party.velocity.norm() + party.spread;
-  const double beyond = riderReach(body);
-  party.bounds.min.array() -= beyond;
-  party.bounds.max.array() += beyond;
   body.bounds = party.bounds;
   if (body.model->surface.vertices.empty()) party.bounds = Box();  // nothing to touch with
 }
 
-// Two spacings, but of crumbs, whose surface is all nearer to their few particles, no more than what they have: where
-// many of them lie together each would be next to all.
 double World::Impl::riderReach(WorldBody& body) {
   if (body.reach_of == body.model) return body.rider_reach;
-  const BodyModel& model = *body.model;
-  const SurfaceBinding& binding = model.binding;
-  double farthest = 0.0;  // squared, of a rider from its nearest carrier
-  for (Index r = 0; r < binding.riders.size(); ++r) {
-    double nearest = std::numeric_limits<double>::infinity();
-    for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k)
-      nearest = std::min(nearest,
-                         (model.surface.vertices[binding.riders[r]] - model.rest[binding.carriers[k]]).squaredNorm());
-    farthest = std::max(farthest, nearest);
-  }
   body.reach_of = body.model;
-  body.rider_reach = 2.0 * std::min(std::sqrt(farthest), model.spacing);
+  body.rider_reach = riderReachOf(*body.model);
   return body.rider_reach;
 }
 
@@ -270,7 +345,7 @@ void World::Impl::solveContacts(double h) {
       return;
     }
     WorldBody& body = *bodies[p];
-    fitMaps(body, parties[p].positions, maps);
+    fitMaps(*body.model, body.material, body.state, maps, body.quadratic_maps);
     if (parties[p].surface && !body.asleep) {
       updateSurface(*body.model, body.state);
       parties[p].surface = body.state.surface.data();

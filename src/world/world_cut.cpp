@@ -207,7 +207,7 @@ std::vector<std::string> World::Impl::replaceByPieces(const BodyId& parent_id, s
     parent_particles.push_back(std::move(piece.parent_particles));
     names.push_back(name);
   }
-  foreseeMeeting(children);
+  foreseeMeeting(parent_id, children);
   followPieces(parent_id, children, parent_particles);
   retire(parent_id);
   return names;

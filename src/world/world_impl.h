@@ -50,7 +50,6 @@ struct WorldBody {
   std::shared_ptr<const ContactMesh> mesh;                                 // made when something first comes near
   std::shared_ptr<const ContactModel> contact;                             // likewise, of the present model
   std::shared_future<std::shared_ptr<const ContactModel>> coming_contact;  // being made by another thread
-  std::future<void> coming_meeting;          // likewise: what its contact is about to look up
   std::vector<ContactMap> maps;              // of this frame, where it can touch another body
   std::vector<QuadraticMap> quadratic_maps;  // likewise, where its mode is quadratic; maps point into it
   bool touched_by_push = false;
@@ -184,6 +183,7 @@ struct World::Impl {
   std::size_t gang_count = 0;   // of them in use
   std::vector<char> in_island;  // one a body: in formGangs()
   Contacts contacts;
+  std::vector<std::future<std::shared_ptr<const Contacts>>> meetings;  // of fresh pieces, being found by other threads
   std::vector<LoadedPair> loaded;
   bool contacts_current = false;      // bodies are those of the last step
   double last_substep = 0.0;          // [s]
@@ -275,7 +275,8 @@ struct World::Impl {
   const ContactModel& contactModel(WorldBody& body);
   /// Begins to make it where it will be needed and takes long.
   void foreseeContact(WorldBody& body);
-  void foreseeMeeting(const std::vector<BodyId>& pieces);
+  void foreseeMeeting(const BodyId& parent, const std::vector<BodyId>& pieces);
+  void takeMeetings();
   void findContacts(double h_frame);
   void fillParties();
   void fillParty(WorldBody& body, ContactParty& party);

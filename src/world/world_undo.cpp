@@ -69,6 +69,7 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
   }
 
   contacts_current = false;
+  meetings.clear();
   contacts.clear();  // what pressed then is not what presses now
 
   picks.clear();

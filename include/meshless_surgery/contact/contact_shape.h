@@ -58,8 +58,6 @@ class ContactShape {
   bool isClear(const Vec3& rest, double by) const;
   /// True only for points outside, and for all that are a few edges from the surface. Thread-safe.
   bool isOutside(const Vec3& rest) const;
-  /// What isClear() would find out about a place when it is asked again. Thread-safe.
-  void foresee(const Vec3& rest) const;
 
   /// [m] from a point to a triangle of the surface.
   double distanceTo(Index triangle, const Vec3& rest) const;
@@ -67,8 +65,8 @@ class ContactShape {
   /// The triangle across the edge that lies against a corner of a triangle; kNoIndex at a border. Made when first asked
   /// for; thread-safe.
   Index across(Index triangle, int corner) const;
-  /// How the surface bends there at rest; flat within 5 degrees. As for across().
-  enum class Bend : char { kBorder, kFlat, kRidge, kValley };
+  /// How the surface bends there at rest: flat within 5 degrees, gently within 45. As for across().
+  enum class Bend : char { kBorder, kFlat, kGentle, kRidge, kValley };
   Bend bend(Index triangle, int corner) const;
   /// Makes what the two above need.
   void link() const;

@@ -134,6 +134,8 @@ class Contacts {
   void clear();
   /// Of a party alone, whose surface is another from now on.
   void forget(std::uint64_t key);
+  /// Takes over where others have found points to be near (no impulses): the next make() need not search for those.
+  void adopt(const Contacts& others);
   /// All that the next frame reads of the ones before, to be given back to contacts of the same parties
   /// (contact/contacts_memory.h).
   ContactsMemory memory() const;
