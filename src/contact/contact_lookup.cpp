@@ -173,7 +173,7 @@ bool Contacts::Impl::locate(const ContactParty& b, const SurfaceNow& surface, co
   const double enough = kMovedInRest * shape.size();
   for (int n = 0; n < kMostLookups; ++n) {
     ++counters.lookups;
-    if (!shape.nearest(rest, inward_rest, kSlack * shape.thickness(), found, hint)) return false;
+    if (!shape.nearest(rest, inward_rest, kSlack * shape.thickness(), far, found, hint)) return false;
     hint = found.triangle;
     if (n + 1 == kMostLookups) break;
     if (found.distance > far) return false;

@@ -166,7 +166,7 @@ ContactShape::~ContactShape() {
 
 std::size_t ContactShape::bytes() const {
   return sizeof *this + bytesOf(surface_.vertices, surface_.triangles, surface_.patches, facets_, rider_of_, samples_) +
-         bytesOf(bin_offsets_, bin_triangles_, bin_spheres_, across_, bends_) +
+         bytesOf(bin_offsets_, bin_triangles_, bin_spheres_) +
          cell_total_ * (sizeof(std::atomic<std::uintptr_t>) + sizeof(std::atomic<float>)) +
          cell_bytes_.load(std::memory_order_relaxed);
 }
@@ -618,15 +618,16 @@ bool ContactShape::nearest(const Vec3& rest, Nearest& found, Index hint) const {
   return found.triangle != kNoIndex;
 }
 
-// Deep inside, though the point is in the empty space outside: at the tip of a thin rim, where the surface crosses
-// itself, the sign of a corner can be wrong.
+// Inside, though the point is in the empty space outside: at the tip of a thin rim, where the surface crosses itself,
+// the sign of a corner can be wrong.
 bool ContactShape::isMistaken(const Vec3& rest, const Nearest& found) const {
-  return found.distance < -mean_edge_ && isOutside(rest);
+  return found.distance < 0.0 && isOutside(rest);
 }
 
-bool ContactShape::nearest(const Vec3& rest, const Vec3& inward, double slack, Nearest& found, Index hint) const {
+bool ContactShape::nearest(const Vec3& rest, const Vec3& inward, double slack, double reach, Nearest& found,
+                           Index hint) const {
   if (!nearest(rest, found, hint)) return false;
-  if (std::abs(found.distance) > slack) return true;
+  if (std::abs(found.distance) > slack || found.distance > reach) return true;
   if (facets_[found.triangle].normal.dot(inward) > kFacing) return true;
   double best = slack + std::abs(found.distance);
   Nearest other;
@@ -686,6 +687,7 @@ void ContactShape::link() const {
     }
     for (Index t = 0; t < surface_.triangles.size(); ++t)
       for (int k = 0; k < 3; ++k) bends_[t][k] = bendAt(t, k);
+    cell_bytes_.fetch_add(bytesOf(across_, bends_), std::memory_order_relaxed);
   });
 }
 

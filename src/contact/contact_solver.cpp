@@ -498,7 +498,7 @@ struct ContactSolver::Impl {
     } else {
       if (!readGap<false>(*scene, *parties, c, *entries, true, gap) || !prepare(c, gap, row)) return false;
       // Of what rides on particles alone normal and weights are those of the frame.
-      if (!c.direct && row.rigid_a == 0.0 && row.rigid_b == 0.0) c.answer = gap.local_a + gap.local_b;
+      if (!c.direct && c.a != c.b && row.rigid_a == 0.0 && row.rigid_b == 0.0) c.answer = gap.local_a + gap.local_b;
     }
     const double along_normal = c.normal.dot(gap.motion);
     const double before = row.distance - along_normal;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
-#include <limits>
 
 #include "meshless_surgery/base/types.h"
 
@@ -27,13 +26,6 @@ struct Grid {
   }
   std::size_t number(int x, int y, int z) const {
     return (static_cast<std::size_t>(x) * counts[1] + y) * counts[2] + z;
-  }
-  /// [m^2] the square of how far a point is from a cell; 0 within.
-  double squaredGap(std::size_t number, const Vec3& p) const {
-    const std::size_t z = number % counts[2], xy = number / counts[2];
-    const Vec3 low = origin + edge * Vec3(static_cast<double>(xy / counts[1]), static_cast<double>(xy % counts[1]),
-                                          static_cast<double>(z));
-    return (low - p).cwiseMax(p - low - Vec3::Constant(edge)).cwiseMax(0.0).squaredNorm();
   }
   /// The last ring around a cell.
   int ringsAround(const std::array<int, 3>& home) const {
@@ -60,17 +52,6 @@ void visitRing(const Grid& grid, const std::array<int, 3>& home, int ring, const
         if (home[2] + ring < grid.counts[2]) visit(grid.number(x, y, home[2] + ring));
       }
     }
-}
-
-/// What the cells beyond the ring hold is at least so far from p [m]; home is p's cell.
-inline double beyondRing(const Grid& grid, const std::array<int, 3>& home, int ring, const Vec3& p) {
-  double beyond = std::numeric_limits<double>::infinity();
-  for (int d = 0; d < 3; ++d) {
-    if (home[d] - ring > 0) beyond = std::min(beyond, p[d] - (grid.origin[d] + (home[d] - ring) * grid.edge));
-    if (home[d] + ring < grid.counts[d] - 1)
-      beyond = std::min(beyond, grid.origin[d] + (home[d] + ring + 1) * grid.edge - p[d]);
-  }
-  return beyond;
 }
 
 }  // namespace meshless

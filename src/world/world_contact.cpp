@@ -127,6 +127,7 @@ std::shared_ptr<const Contacts> meet(std::vector<Met>& met, const ContactScene& 
   std::vector<ContactParty> parties;
   for (Met& m : met) {
     if (m.coming.valid()) m.contact = m.coming.get();
+    if (!m.contact || m.contact->model != m.model) m.contact = std::make_shared<ContactModel>(m.model);
     m.contact->shape.link();
     ContactParty party = partyOf(*m.model, m.material, m.state, m.key);
     party.moves = m.moves;
@@ -226,14 +227,18 @@ void World::Impl::foreseeMeeting(const BodyId& parent, const std::vector<BodyId>
   if (met->size() < 2) return;
   for (const auto& other : bodies) {
     if (other->id == parent || std::find(pieces.begin(), pieces.end(), other->id) != pieces.end()) continue;
-    if (!other->contact || other->contact->model != other->model || !other->bounds.overlaps(around)) continue;
+    if (!other->bounds.overlaps(around) || other->model->surface.vertices.empty()) continue;
+    // Whoever has been loaded has no shape yet: who is met must not depend on that.
+    if ((!other->contact || other->contact->model != other->model) && !other->coming_contact.valid())
+      foreseeContact(*other);
+    if (!other->coming_contact.valid()) contactModel(*other);
     met->push_back({other->number,
                     other->model,
                     other->material,
                     other->state,
                     other->surface_current,
                     !other->asleep,
-                    {},
+                    other->coming_contact,
                     other->contact,
                     {},
                     {}});
@@ -245,8 +250,9 @@ void World::Impl::foreseeMeeting(const BodyId& parent, const std::vector<BodyId>
 }
 
 void World::Impl::takeMeetings() {
-  for (auto& meeting : meetings) contacts.adopt(*meeting.get());
+  auto taken = std::move(meetings);
   meetings.clear();
+  for (auto& meeting : taken) contacts.adopt(*meeting.get());
 }
 
 // Who is where, which pairs can touch, and what they need for it: nothing for those that nobody is near. Whom something

@@ -50,8 +50,10 @@ class ContactShape {
   bool nearest(const Vec3& rest, Nearest& found, Index hint = kNoIndex) const;
   /// The same for a point of another body that reaches into that one along `inward` (unit, in this rest frame): near an
   /// edge, a face that would push it away from its own body gives way to one that does not and is at most `slack` [m]
-  /// farther. Cubes that lie exactly along each other are held by their tops, not by their sides.
-  bool nearest(const Vec3& rest, const Vec3& inward, double slack, Nearest& found, Index hint = kNoIndex) const;
+  /// farther. Cubes that lie exactly along each other are held by their tops, not by their sides. What is farther than
+  /// `reach` [m] from all stays with the nearest.
+  bool nearest(const Vec3& rest, const Vec3& inward, double slack, double reach, Nearest& found,
+               Index hint = kNoIndex) const;
 
   /// True only for a point outside that is more than `by` [m] from the surface, and for nearly all of those that are
   /// farther by half an edge. Quicker where the same place was asked about before. Thread-safe.
