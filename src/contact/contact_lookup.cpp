@@ -239,27 +239,35 @@ void Contacts::Impl::addContact(Findings& to, const std::vector<ContactParty>& p
   to.contacts.push_back(c);
 }
 
-// What is known of a pair begins there; second: of its points of b in a.
-void Contacts::Impl::startAt(Findings& to, const std::vector<Contact>& known, std::size_t end, const Pair& pair,
-                             bool second) const {
+// Where what is known of a pair begins; second: of its points of b in a.
+std::size_t Contacts::Impl::firstKnown(const std::vector<Contact>& known, std::size_t end, const Pair& pair,
+                                       bool second) const {
   const auto start = std::make_tuple(true, pair.a, pair.b, second, Index{0});
-  to.known = &known;
-  to.known_end = end;
-  to.cursor =
-      static_cast<std::size_t>(std::partition_point(known.begin(), known.begin() + static_cast<std::ptrdiff_t>(end),
-                                                    [&](const Contact& c) { return keyOf(c) < start; }) -
-                               known.begin());
+  return static_cast<std::size_t>(std::partition_point(known.begin(), known.begin() + static_cast<std::ptrdiff_t>(end),
+                                                       [&](const Contact& c) { return keyOf(c) < start; }) -
+                                  known.begin());
 }
 
-// A point that was over a triangle and still is, and near, need not be looked up; now and then it is.
+void Contacts::Impl::startAt(Findings& to, const std::vector<Contact>& known, std::size_t end, const Pair& pair,
+                             bool second) const {
+  to.known = &known;
+  to.known_end = end;
+  to.cursor = firstKnown(known, end, pair, second);
+}
+
+// A point that was over a triangle and still is, and near, need not be looked up; now and then it is. `hint` is the
+// triangle in any case.
 bool Contacts::Impl::stillOver(Findings& to, const ContactParty& with, Index a, Index b, Index sample, const Vec3& p,
-                               ContactShape::Nearest& found, bool& flipped) const {
+                               Index& hint, ContactShape::Nearest& found, bool& flipped) const {
   const auto mine = std::make_tuple(true, std::min(a, b), std::max(a, b), a > b, sample);
+  if (!to.known) return false;
   const std::vector<Contact>& known = *to.known;
   while (to.cursor < to.known_end && keyOf(known[to.cursor]) < mine) ++to.cursor;
-  if (to.cursor >= to.known_end || (frames + sample) % kLookAnew == 0) return false;
+  if (to.cursor >= to.known_end) return false;
   const Contact& before = known[to.cursor];
   if (keyOf(before) != mine || before.caught) return false;
+  hint = before.triangle;
+  if ((frames + sample) % kLookAnew == 0) return false;
   if (!isOver(with, before.triangle, p, before.flipped, true, found)) return false;
   flipped = before.flipped;
   return true;
@@ -296,7 +304,7 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
     }
     ContactShape::Nearest found;
     bool flipped = false;
-    if (!stillOver(to, with, a, b, s, p, found, flipped)) {
+    if (!stillOver(to, with, a, b, s, p, hint, found, flipped)) {
       if (to.surface.deviation < 0.0) look(with, finders[b], maps, region, to.surface);
       const auto inward = [&] { return inwardAt(p, samples[s]); };
       if (!locate(with, to.surface, finders[b], maps, p, std::cref(inward), pair.reach, hint, found, flipped,

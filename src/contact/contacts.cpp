@@ -86,33 +86,6 @@ void Contacts::forget(std::uint64_t key) {
     it = it->first.a == key || it->first.b == key ? w.caught.erase(it) : std::next(it);
 }
 
-void Contacts::adopt(const Contacts& others) {
-  Impl& w = *impl_;
-  const Impl& from = *others.impl_;
-  std::vector<Index> number_of(from.keys.size(), kNoIndex);
-  const auto numberOf = [&](Index party) {
-    Index& number = number_of[party];
-    if (number != kNoIndex) return number;
-    const auto known = std::find(w.keys.begin(), w.keys.end(), from.keys[party]);
-    number = static_cast<Index>(known - w.keys.begin());
-    if (known == w.keys.end()) w.keys.push_back(from.keys[party]);
-    return number;
-  };
-  w.contacts.resize(std::min(w.steady_contacts, w.contacts.size()));
-  for (const std::vector<Contact>* found : {&from.contacts, &from.quick_known})
-    for (Contact c : *found) {
-      if (c.b == kNoIndex || c.caught) continue;
-      c.a = numberOf(c.a);
-      c.b = numberOf(c.b);
-      c.impulse = 0.0;
-      c.slip_impulse.setZero();
-      w.contacts.push_back(c);
-    }
-  std::stable_sort(w.contacts.begin(), w.contacts.end(),
-                   [](const Contact& c, const Contact& d) { return keyOf(c) < keyOf(d); });
-  w.steady_contacts = w.contacts.size();
-}
-
 void Contacts::findPairs(const ContactScene& scene, const std::vector<ContactParty>& parties, double h,
                          ContactCounters& counters) {
   Impl& w = *impl_;
@@ -170,14 +143,8 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   w.quick_known.clear();
   w.entries.clear();
   w.depths.clear();
-  if (w.finders.size() < parties.size()) {
-    w.finders.resize(parties.size());
-    w.maps_now.resize(parties.size());
-  }
-  for (Index p = 0; p < parties.size(); ++p) {
-    if (!(w.needed[p] & 1)) continue;
-    w.finders[p].make(parties[p].maps, parties[p].map_count);
-  }
+  w.prepareLookups(parties, h);
+  w.findForeseen(parties);
   // From below upwards where it matters: ground first.
   const double falling = w.scene.gravity.norm() * h * h;
   const std::size_t ground_tasks = (w.grounded.size() + kTaskParties - 1) / kTaskParties;
@@ -186,13 +153,6 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   const std::size_t pair_tasks = (halves + task_halves - 1) / task_halves;
   if (w.tasks.size() < ground_tasks + pair_tasks) w.tasks.resize(ground_tasks + pair_tasks);
   w.halves.resize(halves);
-  for (Pair& pair : w.pairs) {
-    const ContactParty &a = parties[pair.a], &b = parties[pair.b];
-    const double most = kQuick * std::min(a.shape->thickness(), b.shape->thickness());
-    pair.way = approachOf(a, b);
-    pair.reach = kMargin * std::min(a.shape->size(), b.shape->size()) + std::min(pair.way * h + falling, most);
-    pair.quick = pair.a != pair.b && pair.way * h > most;
-  }
   runEach(for_each, ground_tasks + pair_tasks, [&](std::size_t n) {
     Findings& task = w.tasks[n];
     task.clear();
@@ -211,7 +171,8 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
       findings = HalfFindings();
       if (pair.a != pair.b) {
         const Index of = k % 2 ? pair.b : pair.a, in = k % 2 ? pair.a : pair.b;
-        w.lookInto(task, parties, pair, of, in, parties[in].maps, false, findings.inside);
+        if (!w.takeForeseen(task, k / 2, k % 2 == 1, findings.inside))
+          w.lookInto(task, parties, pair, of, in, parties[in].maps, false, findings.inside);
       } else if (k % 2 == 0) {
         w.lookIntoSelf(task, parties, pair);
       }
@@ -471,6 +432,24 @@ void Contacts::points(const std::vector<ContactParty>& parties, std::vector<Poin
       for (Index k = c.first; k < c.split; ++k) p += impl_->entries[k].weight * a.positions[impl_->entries[k].particle];
     }
     points.push_back({p, c.normal, c.impulse});
+  }
+}
+
+// Maps by where they are, and how far outside of each other points of a pair are looked at.
+void Contacts::Impl::prepareLookups(const std::vector<ContactParty>& parties, double h) {
+  if (finders.size() < parties.size()) {
+    finders.resize(parties.size());
+    maps_now.resize(parties.size());
+  }
+  for (Index p = 0; p < parties.size(); ++p)
+    if (needed[p] & 1) finders[p].make(parties[p].maps, parties[p].map_count);
+  const double falling = scene.gravity.norm() * h * h;
+  for (Pair& pair : pairs) {
+    const ContactParty &a = parties[pair.a], &b = parties[pair.b];
+    const double most = kQuick * std::min(a.shape->thickness(), b.shape->thickness());
+    pair.way = approachOf(a, b);
+    pair.reach = kMargin * std::min(a.shape->size(), b.shape->size()) + std::min(pair.way * h + falling, most);
+    pair.quick = pair.a != pair.b && pair.way * h > most;
   }
 }
 

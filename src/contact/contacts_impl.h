@@ -128,6 +128,19 @@ struct HalfFindings {
 double stackWork(const ContactScene& scene, const std::vector<ContactParty>& parties, const IslandPlan& plan,
                  Index island, double h);
 
+/// What was found ahead of a frame: the points of the pair's a in b, and of its b in a.
+struct Foreseen {
+  Pair pair;
+  std::array<Findings, 2> halves;
+  std::array<Inside, 2> inside;
+};
+
+/// What is taken over for a pair; swapped: it was found with a and b the other way round.
+struct TakenOver {
+  const Foreseen* found = nullptr;
+  bool swapped = false;
+};
+
 /// What was last found of a quick pair, and how far its bodies may have gone since.
 struct QuickFindings {
   Findings found;
@@ -163,16 +176,21 @@ struct Contacts::Impl {
   std::vector<Findings> tasks;
   std::vector<HalfFindings> halves;  // two a pair; of a body with itself the second is empty
   std::vector<QuickFindings> quick;  // one a pair; of those that are quick
-  bool was_steady = true;            // the last solve had no others than the steady contacts
-  bool settled = false;              // nothing is quick or caught in this frame
+  std::vector<ContactParty> seen;    // by lookAhead(), and what it found
+  std::vector<Foreseen> foreseen;
+  std::vector<std::shared_ptr<const Contacts>> ahead;  // whose findings this frame may take over
+  std::vector<TakenOver> taken;                        // one a pair, or none at all
+  bool was_steady = true;                              // the last solve had no others than the steady contacts
+  bool settled = false;                                // nothing is quick or caught in this frame
 
   bool locate(const ContactParty& b, const SurfaceNow& surface, const MapFinder& finder, const ContactMap* maps,
               const Vec3& p, const std::function<Vec3()>& inwardAt, double reach, Index& hint,
               ContactShape::Nearest& found, bool& flipped, ContactCounters& counters) const;
   void addContact(Findings& to, const std::vector<ContactParty>& parties, Index a, Index number, const ContactSample& s,
                   Index b, Index triangle, const std::array<double, 3>& weights, bool was_caught, bool flipped);
+  std::size_t firstKnown(const std::vector<Contact>& known, std::size_t end, const Pair& pair, bool second) const;
   void startAt(Findings& to, const std::vector<Contact>& known, std::size_t end, const Pair& pair, bool second) const;
-  bool stillOver(Findings& to, const ContactParty& with, Index a, Index b, Index sample, const Vec3& p,
+  bool stillOver(Findings& to, const ContactParty& with, Index a, Index b, Index sample, const Vec3& p, Index& hint,
                  ContactShape::Nearest& found, bool& flipped) const;
   void lookInto(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair, Index a, Index b,
                 const ContactMap* maps, bool every_point, Inside& inside);
@@ -185,6 +203,10 @@ struct Contacts::Impl {
   void addGround(Findings& to, const std::vector<ContactParty>& parties, Index a, double reach);
   void join(const Findings& from, std::size_t contacts_from, std::size_t contacts_to, std::size_t entries_from,
             std::size_t entries_to);
+  void prepareLookups(const std::vector<ContactParty>& parties, double h);
+  bool isUnknown(const std::vector<ContactParty>& parties, const Pair& pair) const;
+  void findForeseen(const std::vector<ContactParty>& parties);
+  bool takeForeseen(Findings& to, std::size_t pair, bool second, Inside& inside) const;
   void followParties(const std::vector<ContactParty>& parties);
   void takeOver();
   void choosePasses(const std::vector<ContactParty>& parties, double substep);

@@ -318,7 +318,6 @@ Result<DecodedWorld> decode(std::string_view bytes) {
 
 std::shared_ptr<const SavedWorld> World::capture() const {
   Impl& w = *impl_;
-  w.takeMeetings();  // what they find is part of the state
   auto saved = std::make_shared<SavedWorld>();
   saved->settings = w.settings;
   saved->step = w.step;
@@ -393,7 +392,7 @@ void World::restore(const SavedWorld& saved) {
   w.used_names = saved.used_names;
   w.scene = saved.scene;
   w.obstacles.clear();
-  for (const auto& obstacle : saved.obstacles) w.obstacles.push_back(std::make_unique<WorldObstacle>(*obstacle));
+  for (const auto& obstacle : saved.obstacles) w.obstacles.push_back(std::make_shared<WorldObstacle>(*obstacle));
   w.picks = saved.picks;
   w.next_pick = saved.next_pick;
   w.push = saved.push;

@@ -223,7 +223,7 @@ Status World::addObstacle(ObstacleDef obstacle) {
     if (other->def->name == obstacle.name)
       return Error{ErrorCode::kDuplicateName, "there is an obstacle '" + obstacle.name + "' already"};
   if (Status status = checkObstacle(obstacle); !status) return status.error();
-  w.obstacles.push_back(std::make_unique<WorldObstacle>(std::move(obstacle)));
+  w.obstacles.push_back(std::make_shared<WorldObstacle>(std::move(obstacle)));
   return Done{};
 }
 

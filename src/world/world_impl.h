@@ -158,7 +158,7 @@ struct World::Impl {
   std::uint32_t next_number = 1;
   std::set<std::string> used_names;  // living and retired of this run
   std::vector<std::shared_ptr<const PreparedBody>> scene;
-  std::vector<std::unique_ptr<WorldObstacle>> obstacles;
+  std::vector<std::shared_ptr<WorldObstacle>> obstacles;
   std::vector<Pick> picks;
   std::vector<Vec3> pulls;    // [N] one a pick, of this substep
   std::vector<Vec3> grasped;  // [m] one a pick: in rememberGrasps()
@@ -182,6 +182,8 @@ struct World::Impl {
   std::vector<Gang> gangs;
   std::size_t gang_count = 0;   // of them in use
   std::vector<char> in_island;  // one a body: in formGangs()
+  struct Met;
+  struct Meeting;
   Contacts contacts;
   std::vector<std::future<std::shared_ptr<const Contacts>>> meetings;  // of fresh pieces, being found by other threads
   std::vector<LoadedPair> loaded;
@@ -276,7 +278,7 @@ struct World::Impl {
   /// Begins to make it where it will be needed and takes long.
   void foreseeContact(WorldBody& body);
   void foreseeMeeting(const BodyId& parent, const std::vector<BodyId>& pieces);
-  void takeMeetings();
+  void expectMeetings();
   void findContacts(double h_frame);
   void fillParties();
   void fillParty(WorldBody& body, ContactParty& party);

@@ -87,7 +87,6 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
       body.state = std::move(opened.body.pieces[0].state);
       body.mesh.reset();
       body.surface_current = true;
-      takeMeetings();  // in which it has its old surface
       contacts.forget(body.number);
       if (body.contact || body.material.self_contact != SelfContact::kNone) foreseeContact(body);
       batches_current = contacts_current = false;  // they are of the old model

@@ -55,7 +55,6 @@ void World::step() {
     if (rest_shape) {
       const Stopwatch contact(w.report.contact);
       w.rememberGrasps();
-      w.takeMeetings();
       w.findContacts(h_frame);
     }
     w.groupBatches();

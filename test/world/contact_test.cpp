@@ -417,43 +417,72 @@ TEST(Contact, AnIncisedBodyThatCarriesAnotherIsSavedAndGoesOn) {
 // Another thread finds out beforehand what fresh pieces touch: the first step has little left to look up, and it does
 // not matter whether somebody saves or asks for the hash in between.
 TEST(Contact, WhatFreshPiecesTouchIsKnownBeforeTheFirstStep) {
-  const auto onABed = [] {
-    World world{WorldSettings()};
-    BodyDef bed = test::defOf(boxMesh(Vec3(0.4, 0.4, 0.05), 12, 12, 2), "bed");
-    bed.spacing = 0.04;
-    bed.pose.translation = Vec3(0.0, 0.0, 0.025);
-    add(world, bed);
-    BodyDef ball = test::defOf(sphereMesh(0.1, 0.008), "ball");
-    ball.spacing = 0.025;
-    ball.pose.translation = Vec3(0.0, 0.0, 0.1502);
-    add(world, ball);
-    for (int step = 0; step < 60; ++step) world.step();
-    CutCommand cut;
-    cut.bodies = {"ball"};
-    cut.blades.origin = Vec3(-1.0, 0.0, 0.14);
-    cut.blades.y_axis = Vec3(0.0, 1.0, 0.1).normalized();
-    EXPECT_TRUE(world.apply(cut).ok());
-    return world;
-  };
-  World undisturbed = onABed(), watched = onABed();
-  ASSERT_EQ(undisturbed.snapshot({}).bodies.size(), 3u);
-  const Result<DecodedWorld> decoded = decode(encode(*watched.capture()));
-  ASSERT_TRUE(decoded.ok()) << decoded.error().detail;
-  World loaded{WorldSettings()};
-  loaded.restore(*decoded->world);
-  EXPECT_EQ(watched.stateHash(), loaded.stateHash());
-  for (int step = 0; step < 30; ++step) {
-    for (World* world : {&undisturbed, &watched, &loaded}) world->step();
-    if (step == 0) {
-      const ContactCounters counters = undisturbed.snapshot({}).report.contact_counters;
-      EXPECT_GT(counters.contacts, 200u);
-      EXPECT_LT(2 * counters.lookups, counters.contacts);
+  for (const bool on_obstacle : {false, true}) {
+    const auto onABed = [on_obstacle] {
+      World world{WorldSettings()};
+      const TriangleMesh bed = boxMesh(Vec3(0.4, 0.4, 0.05), 12, 12, 2);
+      if (on_obstacle) {
+        ObstacleDef def;
+        def.name = "bed";
+        def.mesh = bed;
+        for (Vec3& v : def.mesh.vertices) v.z() += 0.025;
+        EXPECT_TRUE(world.addObstacle(def).ok());
+      } else {
+        BodyDef def = test::defOf(bed, "bed");
+        def.spacing = 0.04;
+        def.pose.translation = Vec3(0.0, 0.0, 0.025);
+        add(world, def);
+      }
+      BodyDef ball = test::defOf(sphereMesh(0.1, 0.008), "ball");
+      ball.spacing = 0.025;
+      ball.pose.translation = Vec3(0.0, 0.0, 0.1502);
+      add(world, ball);
+      for (int step = 0; step < 60; ++step) world.step();
+      CutCommand cut;
+      cut.bodies = {"ball"};
+      cut.blades.origin = Vec3(-1.0, 0.0, 0.14);
+      cut.blades.y_axis = Vec3(0.0, 1.0, 0.1).normalized();
+      EXPECT_TRUE(world.apply(cut).ok());
+      return world;
+    };
+    World undisturbed = onABed(), changed = onABed();
+    ASSERT_EQ(undisturbed.snapshot({}).bodies.size(), on_obstacle ? 2u : 3u);
+    // Who has loaded the state has looked at nothing ahead, and finds the same.
+    World loaded{WorldSettings()}, loaded_changed{WorldSettings()};
+    for (World* world : {&loaded, &loaded_changed}) {
+      const Result<DecodedWorld> decoded = decode(encode(*undisturbed.capture()));
+      ASSERT_TRUE(decoded.ok()) << decoded.error().detail;
+      world->restore(*decoded->world);
     }
-    ASSERT_EQ(undisturbed.stateHash(), watched.stateHash()) << step;
-    ASSERT_EQ(undisturbed.stateHash(), loaded.stateHash()) << step;
+    ASSERT_EQ(undisturbed.stateHash(), loaded.stateHash());
+    // And so it does where what was looked up ahead does not hold any more.
+    const SetMaterialCommand bending{"ball.1", [](const Material& was) -> Result<Material> {
+                                       Material material = was;
+                                       material.mode = MatchMode::kQuadratic;
+                                       return material;
+                                     }};
+    for (World* world : {&changed, &loaded_changed}) ASSERT_TRUE(world->apply(bending).ok());
+    for (int step = 0; step < 30; ++step) {
+      for (World* world : {&undisturbed, &changed, &loaded, &loaded_changed}) world->step();
+      if (step == 0) {
+        const ContactCounters counters = undisturbed.snapshot({}).report.contact_counters;
+        EXPECT_GT(counters.contacts, 200u);
+        EXPECT_EQ(counters.lookups, 0u);
+        EXPECT_GT(loaded.snapshot({}).report.contact_counters.lookups, 200u);
+        EXPECT_GT(changed.snapshot({}).report.contact_counters.lookups, 200u);
+      }
+      ASSERT_EQ(undisturbed.stateHash(), loaded.stateHash()) << step;
+      ASSERT_EQ(changed.stateHash(), loaded_changed.stateHash()) << step;
+    }
   }
-  ASSERT_TRUE(watched.apply(UndoCutCommand{}).ok());  // and when the cut is taken back before a step
-  watched.step();
+  World taken_back{WorldSettings()};  // before a step
+  add(taken_back, test::defOf(sphereMesh(0.1, 0.008), "ball"));
+  CutCommand cut;
+  cut.blades.origin = Vec3(-1.0, 0.0, 0.0);
+  ASSERT_TRUE(taken_back.apply(cut).ok());
+  ASSERT_TRUE(taken_back.apply(UndoCutCommand{}).ok());
+  taken_back.step();
+  EXPECT_EQ(taken_back.snapshot({}).bodies.size(), 1u);
 }
 
 // Vertices of a fresh piece ride with offsets that fade; whoever looks on never sees one below the ground.

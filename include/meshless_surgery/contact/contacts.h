@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 
 #include "meshless_surgery/base/for_each.h"
@@ -134,8 +135,12 @@ class Contacts {
   void clear();
   /// Of a party alone, whose surface is another from now on.
   void forget(std::uint64_t key);
-  /// Takes over where others have found points to be near (no impulses): the next make() need not search for those.
-  void adopt(const Contacts& others);
+  /// After findPairs(), on any thread: looks up what make() would of the pairs with one of the first `fresh` parties.
+  /// Moves nothing. What the parties point to has to live as long as this.
+  void lookAhead(const std::vector<ContactParty>& parties, Index fresh, double h);
+  /// What make() may take over until others are expected: of pairs of which nothing else is known, and whose parties
+  /// are to the bit as they were when these looked ahead. It is what make() would find itself.
+  void expect(std::vector<std::shared_ptr<const Contacts>> ahead);
   /// All that the next frame reads of the ones before, to be given back to contacts of the same parties
   /// (contact/contacts_memory.h).
   ContactsMemory memory() const;

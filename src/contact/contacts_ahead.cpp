@@ -1,0 +1,110 @@
+// What is looked up ahead of a frame, by another thread, and taken over where nothing has changed since.
+#include <algorithm>
+#include <unordered_map>
+
+#include "contacts_impl.h"
+
+namespace meshless {
+namespace {
+
+template <class T>
+bool sameValues(const T* a, const T* b, std::size_t count) {
+  return a && b ? std::equal(a, a + count, b) : a == b;
+}
+
+bool sameMaps(const ContactParty& a, const ContactParty& b) {
+  return a.map_count == b.map_count &&
+         std::equal(a.maps, a.maps + a.map_count, b.maps, [](const ContactMap& m, const ContactMap& n) {
+           return m.from_rest == n.from_rest && m.to_rest == n.to_rest && m.rest == n.rest && m.centre == n.centre &&
+                  m.flipped == n.flipped && !m.quadratic == !n.quadratic;
+         });
+}
+
+// All that a lookup reads of a party. Quadratic maps follow from the positions.
+bool isAsItWas(const ContactParty& now, const ContactParty& then) {
+  return now.shape == then.shape && now.particles == then.particles && now.bounds.min == then.bounds.min &&
+         now.bounds.max == then.bounds.max && sameValues(now.positions, then.positions, now.particles) &&
+         sameValues(now.surface, then.surface, now.shape->surface().vertices.size()) && sameMaps(now, then);
+}
+
+}  // namespace
+
+void Contacts::lookAhead(const std::vector<ContactParty>& parties, Index fresh, double h) {
+  Impl& w = *impl_;
+  w.seen = parties;
+  w.foreseen.clear();
+  w.prepareLookups(parties, h);
+  for (const Pair& pair : w.pairs) {
+    if (pair.a >= fresh || pair.a == pair.b) continue;
+    w.foreseen.push_back({pair, {}, {}});
+    for (const bool second : {false, true}) {
+      const Index of = second ? pair.b : pair.a, in = second ? pair.a : pair.b;
+      w.lookInto(w.foreseen.back().halves[second], parties, pair, of, in, parties[in].maps, false,
+                 w.foreseen.back().inside[second]);
+    }
+  }
+}
+
+void Contacts::expect(std::vector<std::shared_ptr<const Contacts>> ahead) { impl_->ahead = std::move(ahead); }
+
+// Of a pair of which anything is known besides, a lookup could find something else.
+bool Contacts::Impl::isUnknown(const std::vector<ContactParty>& parties, const Pair& pair) const {
+  for (const auto& [a, b] : {std::make_pair(pair.a, pair.b), std::make_pair(pair.b, pair.a)}) {
+    const auto held = caught.lower_bound({parties[a].key, parties[b].key, 0});
+    if (held != caught.end() && held->first.a == parties[a].key && held->first.b == parties[b].key) return false;
+  }
+  const std::size_t at = firstKnown(last, last_sorted, pair, false);
+  return at == last_sorted || last[at].b == kNoIndex || std::min(last[at].a, last[at].b) != pair.a ||
+         std::max(last[at].a, last[at].b) != pair.b;
+}
+
+void Contacts::Impl::findForeseen(const std::vector<ContactParty>& parties) {
+  taken.assign(ahead.empty() ? 0 : pairs.size(), {});
+  if (ahead.empty()) return;
+  std::unordered_map<std::uint64_t, Index> number_of;
+  for (Index p = 0; p < parties.size(); ++p) number_of[parties[p].key] = p;
+  for (const auto& others : ahead) {
+    const Impl& from = *others->impl_;
+    std::vector<Index> now(from.seen.size(), kNoIndex);
+    for (Index p = 0; p < from.seen.size(); ++p) {
+      const auto known = number_of.find(from.seen[p].key);
+      if (known != number_of.end() && (needed[known->second] & 1) && isAsItWas(parties[known->second], from.seen[p]))
+        now[p] = known->second;
+    }
+    for (const Foreseen& found : from.foreseen) {
+      const Index a = now[found.pair.a], b = now[found.pair.b];
+      if (a == kNoIndex || b == kNoIndex) continue;
+      const auto pair = std::lower_bound(pairs.begin(), pairs.end(), std::make_pair(std::min(a, b), std::max(a, b)),
+                                         [](const Pair& p, const std::pair<Index, Index>& of) {
+                                           return std::tie(p.a, p.b) < std::tie(of.first, of.second);
+                                         });
+      if (pair == pairs.end() || pair->a != std::min(a, b) || pair->b != std::max(a, b)) continue;
+      if (pair->reach == found.pair.reach && isUnknown(parties, *pair))
+        taken[static_cast<std::size_t>(pair - pairs.begin())] = {&found, a > b};
+    }
+  }
+}
+
+bool Contacts::Impl::takeForeseen(Findings& to, std::size_t pair, bool second, Inside& inside) const {
+  if (taken.empty() || !taken[pair].found) return false;
+  const Foreseen& found = *taken[pair].found;
+  const bool half = second != taken[pair].swapped;
+  const Index entries_before = static_cast<Index>(to.entries.size());
+  const Findings& from = found.halves[half];
+  to.entries.insert(to.entries.end(), from.entries.begin(), from.entries.end());
+  to.depths.insert(to.depths.end(), from.depths.begin(), from.depths.end());
+  for (Contact c : from.contacts) {
+    c.a = second ? pairs[pair].b : pairs[pair].a;
+    c.b = second ? pairs[pair].a : pairs[pair].b;
+    if (!c.direct) {
+      c.first += entries_before;
+      c.split += entries_before;
+      c.end += entries_before;
+    }
+    to.contacts.push_back(c);
+  }
+  inside = found.inside[half];
+  return true;
+}
+
+}  // namespace meshless

@@ -1,0 +1,115 @@
+// What the pieces of a cut touch, found by another thread before the step that asks for it.
+#include <algorithm>
+
+#include "contact_parties.h"
+#include "meshless_surgery/dynamics/extent.h"
+#include "world_impl.h"
+
+namespace meshless {
+
+// A body as it was when a cut had been made, or an obstacle.
+struct World::Impl::Met {
+  std::uint64_t key = 0;
+  BodyModelPtr model;
+  Material material;
+  BodyState state;
+  bool surface_current = false, moves = false;
+  Box bounds;                                                      // where it does not
+  std::shared_future<std::shared_ptr<const ContactModel>> coming;  // or
+  std::shared_ptr<const ContactModel> contact;                     // or
+  std::shared_ptr<WorldObstacle> obstacle;
+  std::vector<ContactMap> maps;
+  std::vector<QuadraticMap> quadratic_maps;
+
+  Met(WorldBody& body, bool is_fresh)
+      : key(body.number),
+        model(body.model),
+        material(body.material),
+        state(body.state),
+        surface_current(body.surface_current),
+        moves(is_fresh || !body.asleep),
+        bounds(body.bounds),
+        coming(body.coming_contact),
+        contact(body.contact && body.contact->model == body.model ? body.contact : nullptr) {}
+  Met(std::shared_ptr<WorldObstacle> of_obstacle, std::uint64_t of_key)
+      : key(of_key), obstacle(std::move(of_obstacle)) {}
+
+  // As fillParty() and equipParty() will fill it.
+  ContactParty party() {
+    if (obstacle) return partyOf(*obstacle, key);
+    if (coming.valid()) contact = coming.get();
+    ContactParty party = partyOf(*model, material, state, key);
+    party.moves = moves;
+    if (moves)
+      readMotion(*model, material, state, riderReachOf(*model), party);
+    else
+      party.bounds = bounds;
+    party.shape = &contact->shape;
+    party.inverse_masses = contact->inverse_masses.data();
+    if (contact->shape.rides()) {
+      if (!surface_current) updateSurface(*model, state);
+      party.surface = state.surface.data();
+    }
+    fitMaps(*model, material, state, maps, quadratic_maps);
+    party.maps = maps.data();
+    party.map_count = static_cast<Index>(maps.size());
+    return party;
+  }
+};
+
+struct World::Impl::Meeting {
+  std::vector<Met> met;  // the pieces first
+  Index fresh = 0;
+  Contacts contacts;
+
+  void find(const ContactScene& scene, double h_frame) {
+    std::vector<ContactParty> parties;
+    for (Met& m : met) {
+      parties.push_back(m.party());
+      parties.back().shape->link();
+    }
+    ContactCounters counters;
+    contacts.findPairs(scene, parties, h_frame, counters);
+    contacts.lookAhead(parties, fresh, h_frame);
+  }
+};
+
+// The first step after a cut would look up in fresh shapes all points of the pieces, of each other and of what they lie
+// on, and all at once: another thread does while the cut is answered.
+void World::Impl::foreseeMeeting(const BodyId& parent, const std::vector<BodyId>& pieces) {
+  auto meeting = std::make_shared<Meeting>();
+  Box around;
+  for (const BodyId& id : pieces) {
+    WorldBody& piece = *find(id);
+    if (!piece.coming_contact.valid()) continue;
+    const Box bounds = extentOf(piece.state.positions);
+    around.extend(bounds.min);
+    around.extend(bounds.max);
+    meeting->met.emplace_back(piece, true);
+  }
+  meeting->fresh = static_cast<Index>(meeting->met.size());
+  if (meeting->fresh < 2) return;
+  for (const auto& other : bodies) {
+    if (other->id == parent || std::find(pieces.begin(), pieces.end(), other->id) != pieces.end()) continue;
+    if (!other->bounds.overlaps(around) || other->model->surface.vertices.empty()) continue;
+    if (!other->coming_contact.valid()) contactModel(*other);
+    meeting->met.emplace_back(*other, false);
+  }
+  for (std::size_t o = 0; o < obstacles.size(); ++o)
+    if (obstacles[o]->bounds.overlaps(around)) meeting->met.emplace_back(obstacles[o], kObstacleKey + o);
+  ContactScene scene;  // without the ground, in which nothing is looked up
+  scene.gravity = settings.gravity;
+  meetings.push_back(std::async(std::launch::async, [meeting, scene, h_frame = 1.0 / settings.step_rate] {
+    meeting->find(scene, h_frame);
+    return std::shared_ptr<const Contacts>(meeting, &meeting->contacts);
+  }));
+}
+
+void World::Impl::expectMeetings() {
+  std::vector<std::shared_ptr<const Contacts>> ahead;
+  for (auto& meeting : meetings) ahead.push_back(meeting.get());
+  meetings.clear();
+  contacts.expect(std::move(ahead));
+}
+
+}  // namespace meshless
