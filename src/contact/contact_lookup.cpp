@@ -19,6 +19,7 @@ constexpr double kCovering = 0.578;     // of the longest edge: a point of a tri
 constexpr double kSlopeError = 0.5;     // of a map, at most
 constexpr double kMovedInRest = 0.005;  // of the size: a lookup is repeated where the deviation moved it farther
 constexpr std::size_t kLookAnew = 8;    // frames after which a point is looked up though it seems to be where it was
+constexpr Index kMostTriangles = 4;     // that a point has slid across since the frame before
 constexpr double kWellWithin = 0.02;    // barycentric
 constexpr double kOnSurface = 0.05;     // of a triangle's extent
 constexpr double kFarBeside = 4.0;      // likewise
@@ -77,9 +78,9 @@ void look(const ContactParty& party, const MapFinder& finder, const ContactMap* 
 namespace {
 
 // A point that is well within a triangle, seen from above it, and near: which no search has to confirm. With
-// `known_edges` it may be over an edge as well across which the surface goes on as it is, or nearly so and the point
-// lies on it, and up to a ridge from above.
-bool isOver(const ContactParty& party, Index triangle, const Vec3& p, bool flipped, bool known_edges,
+// `beyond` it may be over an edge as well across which the surface goes on as it is, or nearly so and the point lies on
+// it, and up to a ridge from above; where it has gone across such an edge, that is the triangle behind it.
+bool isOver(const ContactParty& party, Index triangle, const Vec3& p, bool flipped, Index* beyond,
             ContactShape::Nearest& found) {
   const ContactShape& shape = *party.shape;
   const Triangle& corners = shape.surface().triangles[triangle];
@@ -91,14 +92,19 @@ bool isOver(const ContactParty& party, Index triangle, const Vec3& p, bool flipp
   const double height = (flipped ? -1.0 : 1.0) * area.dot(d) / std::sqrt(squared);
   if (!(std::abs(height) < kNearby * shape.thickness())) return false;
   const std::array<double, 3> weights{1.0 - v - w, v, w};
+  const bool on_it = height * height < kOnSurface * kOnSurface * std::sqrt(squared);
+  int across = -1;  // the edge that it is farthest beyond
   for (int k = 0; k < 3; ++k) {
     if (weights[k] > kWellWithin) continue;
-    if (!known_edges || !(weights[k] > -kWellWithin)) return false;
+    if (!beyond) return false;
     using Bend = ContactShape::Bend;
     const Bend bend = shape.bend(triangle, k);
-    const bool before_it = weights[k] >= 0.0 && height >= 0.0;
-    const bool on_it = height * height < kOnSurface * kOnSurface * std::sqrt(squared);
-    if (bend == Bend::kFlat || (bend == Bend::kRidge && before_it) || (bend == Bend::kGentle && on_it)) continue;
+    const bool goes_on = bend == Bend::kFlat || (bend == Bend::kGentle && on_it);
+    if (!goes_on && !(bend == Bend::kRidge && weights[k] >= 0.0 && height >= 0.0)) return false;
+    if (!(weights[k] > -kWellWithin) && (across < 0 || weights[k] < weights[across])) across = k;
+  }
+  if (across >= 0) {
+    *beyond = shape.across(triangle, across);
     return false;
   }
   found.triangle = triangle;
@@ -177,7 +183,7 @@ bool Contacts::Impl::locate(const ContactParty& b, const SurfaceNow& surface, co
     hint = found.triangle;
     if (n + 1 == kMostLookups) break;
     if (found.distance > far) return false;
-    if (isOver(b, found.triangle, p, flipped, false, found)) break;
+    if (isOver(b, found.triangle, p, flipped, nullptr, found)) break;
     // The surface does not lie where the affine map has it: by so much the point is looked up elsewhere.
     const Vec3 there = seenFrom(b, found, p, *to_rest);
     if ((there - rest).squaredNorm() < enough * enough) break;
@@ -255,8 +261,8 @@ void Contacts::Impl::startAt(Findings& to, const std::vector<Contact>& known, st
   to.cursor = firstKnown(known, end, pair, second);
 }
 
-// A point that was over a triangle and still is, and near, need not be looked up; now and then it is. `hint` is the
-// triangle in any case.
+// A point that was over a triangle and still is, or over one beside it, and near, need not be looked up; now and then
+// it is. `hint` is the triangle in any case.
 bool Contacts::Impl::stillOver(Findings& to, const ContactParty& with, Index a, Index b, Index sample, const Vec3& p,
                                Index& hint, ContactShape::Nearest& found, bool& flipped) const {
   const auto mine = std::make_tuple(true, std::min(a, b), std::max(a, b), a > b, sample);
@@ -268,9 +274,13 @@ bool Contacts::Impl::stillOver(Findings& to, const ContactParty& with, Index a, 
   if (keyOf(before) != mine || before.caught) return false;
   hint = before.triangle;
   if ((frames + sample) % kLookAnew == 0) return false;
-  if (!isOver(with, before.triangle, p, before.flipped, true, found)) return false;
   flipped = before.flipped;
-  return true;
+  for (Index triangle = before.triangle, n = 0; triangle != kNoIndex && n < kMostTriangles; ++n) {
+    hint = triangle;
+    triangle = kNoIndex;
+    if (isOver(with, hint, p, flipped, &triangle, found)) return true;
+  }
+  return false;
 }
 
 // The points of a in the shape of b.
