@@ -90,7 +90,7 @@ sanitized_node_tests='_rostest_test_ros_(session|services|streams|topics|contact
 sanitized_node_tests+='tools)\.test$'
 
 # The tests that use more than one thread.
-thread_tests='^(world_gangs_test|world_work_test|world_world_test|dynamics_match_batch_test|dynamics_elastic_batch_test|stress_.*)$'
+thread_tests='^(world_gangs_test|world_work_test|world_world_test|world_contact_test|dynamics_match_batch_test|dynamics_elastic_batch_test|stress_.*)$'
 
 # buildThreadSanitized: those under ThreadSanitizer, without ROS.
 buildThreadSanitized() {

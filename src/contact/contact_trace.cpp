@@ -16,7 +16,9 @@ constexpr int kMostSlides = 8;  // triangles that a caught point goes on in a su
 }  // namespace
 
 // Points of a that a triangle of b swept over in this substep, from its front: who has passed through is remembered.
-void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, Index b, ContactCounters& counters) {
+void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, Index b, Traced& traced) const {
+  traced.paths = 0;
+  traced.caught.clear();
   const ContactParty &of = parties[a], &with = parties[b];
   const ContactShape& shape = *with.shape;
   const std::vector<ContactSample>& samples = of.shape->samples();
@@ -78,7 +80,7 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, In
     box.extend(path.from);
     box.extend(path.to);
     if (!box.overlaps(region)) continue;
-    ++counters.traced;
+    ++traced.paths;
     double first = 2.0;
     Index hit = kNoIndex;
     table.forEach(table.cellsOf(box), [&](Index t) {
@@ -100,8 +102,7 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, In
       hit = t;
     });
     if (hit == kNoIndex) continue;
-    ++counters.caught;
-    caught[{of.key, with.key, s}] = hit;
+    traced.caught.emplace_back(CaughtKey{of.key, with.key, s}, hit);
   }
 }
 

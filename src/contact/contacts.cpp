@@ -299,7 +299,8 @@ void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, doubl
     refit(p, maps_now[p]);
     finders[p].make(maps_now[p].data(), static_cast<Index>(maps_now[p].size()));
   });
-  std::vector<Box> swept;  // of those that are traced
+  std::vector<Box> swept;     // of those that are traced
+  std::vector<Index> passes;  // pairs that may pass through each other
   for (const Index k : moved) {
     const Pair& pair = pairs[k];
     const double thickness = std::min(parties[pair.a].shape->thickness(), parties[pair.b].shape->thickness());
@@ -308,8 +309,17 @@ void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, doubl
     for (Index p : {pair.a, pair.b})
       if (swept[p].empty()) swept[p] = sweptVertices(parties[p]);
     if (!swept[pair.a].overlaps(swept[pair.b])) continue;
-    trace(parties, pair.a, pair.b, counters);
-    trace(parties, pair.b, pair.a, counters);
+    passes.push_back(k);
+  }
+  if (traced.size() < 2 * passes.size()) traced.resize(2 * passes.size());
+  runEach(for_each, 2 * passes.size(), [&](std::size_t n) {
+    const Pair& pair = pairs[passes[n / 2]];
+    trace(parties, n % 2 ? pair.b : pair.a, n % 2 ? pair.a : pair.b, traced[n]);
+  });
+  for (std::size_t n = 0; n < 2 * passes.size(); ++n) {
+    counters.traced += traced[n].paths;
+    counters.caught += traced[n].caught.size();
+    caught.insert(traced[n].caught.begin(), traced[n].caught.end());
   }
   runEach(for_each, moved.size(), [&](std::size_t n) {
     Pair pair = pairs[moved[n]];

@@ -112,6 +112,12 @@ struct Findings {
   }
 };
 
+/// Who of one party has passed through a triangle of another, and through which.
+struct Traced {
+  std::size_t paths = 0;  // that were followed
+  std::vector<std::pair<CaughtKey, Index>> caught;
+};
+
 /// How many points of one party lie in the other.
 struct Inside {
   std::size_t points = 0, inside = 0, near = 0;
@@ -176,6 +182,7 @@ struct Contacts::Impl {
   std::vector<Findings> tasks;
   std::vector<HalfFindings> halves;  // two a pair; of a body with itself the second is empty
   std::vector<QuickFindings> quick;  // one a pair; of those that are quick
+  std::vector<Traced> traced;        // two a pair that goes far in a substep
   std::vector<ContactParty> seen;    // by lookAhead(), and what it found
   std::vector<Foreseen> foreseen;
   std::vector<std::shared_ptr<const Contacts>> ahead;  // whose findings this frame may take over
@@ -198,7 +205,7 @@ struct Contacts::Impl {
   void crossRidges(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair);
   void lookAtQuick(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,
                    ContactCounters& counters, const ForEach& for_each);
-  void trace(const std::vector<ContactParty>& parties, Index a, Index b, ContactCounters& counters);
+  void trace(const std::vector<ContactParty>& parties, Index a, Index b, Traced& traced) const;
   void addCaught(const std::vector<ContactParty>& parties);
   void addGround(Findings& to, const std::vector<ContactParty>& parties, Index a, double reach);
   void join(const Findings& from, std::size_t contacts_from, std::size_t contacts_to, std::size_t entries_from,

@@ -19,11 +19,8 @@ constexpr double kSpringWidth = 0.0015;  // [m]
 constexpr double kSpringEnd = 0.006;     // [m] diameter
 constexpr double kBladeWidth = 0.12;     // of the blade's length
 
-bool hasArea(const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 ab = b - a;
-  const Vec3 ac = c - a;
-  const double longest = std::max({ab.squaredNorm(), ac.squaredNorm(), (c - b).squaredNorm()});
-  return ab.cross(ac).norm() > kThinnest * longest;
+bool hasArea(double area, const Vec3& a, const Vec3& b, const Vec3& c) {
+  return area > kThinnest * std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()});
 }
 
 // rviz lights a triangle list only where it has one colour: a body with cut faces would turn flat. So the light is in
@@ -46,8 +43,10 @@ void addObstacle(const ObstacleDef& obstacle, Marker& marker) {
   marker.scale.x = marker.scale.y = marker.scale.z = 1.0;
   for (const Triangle& t : obstacle.mesh.triangles) {
     const Vec3 &a = obstacle.mesh.vertices[t[0]], &b = obstacle.mesh.vertices[t[1]], &c = obstacle.mesh.vertices[t[2]];
-    if (!hasArea(a, b, c)) continue;
-    const double light = lightOn((b - a).cross(c - a).normalized());
+    const Vec3 normal = (b - a).cross(c - a);
+    const double area = normal.norm();
+    if (!hasArea(area, a, b, c)) continue;
+    const double light = lightOn(normal / area);
     for (const Vec3& p : {a, b, c}) {
       marker.points.push_back(toPoint(p));
       marker.colors.push_back(shaded(marker.color, light));
@@ -55,33 +54,52 @@ void addObstacle(const ObstacleDef& obstacle, Marker& marker) {
   }
 }
 
+// Unit normals of vertices, and the light on them.
+struct Shading {
+  Points normals;
+  std::vector<double> lights;
+
+  void finish() {
+    lights.reserve(normals.size());
+    for (Vec3& normal : normals) {
+      normal.normalize();
+      lights.push_back(lightOn(normal));
+    }
+  }
+};
+
 void addBody(const BodySnapshot& body, Marker& marker) {
   const TriangleMesh& mesh = body.model->surface;
   marker.color = toColor(body.material.color);
   marker.scale.x = marker.scale.y = marker.scale.z = 1.0;
   const auto inside = toColor(body.material.inside_color);
   // Normals are smooth over the outer surface and over all cut faces, each on their own: the rim between stays sharp.
-  Points normals[2];
-  for (Points& n : normals) n.assign(body.surface.size(), Vec3::Zero());
+  Shading shadings[2];
+  const bool any_cut = std::any_of(mesh.patches.begin(), mesh.patches.end(), [](auto p) { return p != kOuterPatch; });
+  for (const bool cut : {false, true})
+    if (!cut || any_cut) shadings[cut].normals.assign(body.surface.size(), Vec3::Zero());
+  Points areas;
+  areas.reserve(mesh.triangles.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const Triangle& corners = mesh.triangles[t];
     const Vec3& a = body.surface[corners[0]];
-    const Vec3 normal = (body.surface[corners[1]] - a).cross(body.surface[corners[2]] - a);
-    for (const Index v : corners) normals[mesh.patchOf(t) != kOuterPatch][v] += normal;
+    areas.push_back((body.surface[corners[1]] - a).cross(body.surface[corners[2]] - a));
+    for (const Index v : corners) shadings[mesh.patchOf(t) != kOuterPatch].normals[v] += areas.back();
   }
+  for (Shading& shading : shadings) shading.finish();
   marker.points.reserve(3 * mesh.triangles.size());
   marker.colors.reserve(3 * mesh.triangles.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const Triangle& corners = mesh.triangles[t];
-    if (!hasArea(body.surface[corners[0]], body.surface[corners[1]], body.surface[corners[2]])) continue;
+    const double area = areas[t].norm();
+    if (!hasArea(area, body.surface[corners[0]], body.surface[corners[1]], body.surface[corners[2]])) continue;
     const bool cut = mesh.patchOf(t) != kOuterPatch;
-    const Vec3& a = body.surface[corners[0]];
-    const Vec3 flat = (body.surface[corners[1]] - a).cross(body.surface[corners[2]] - a).normalized();
+    const Vec3 flat = areas[t] / area;
     for (const Index v : corners) {
-      Vec3 normal = normals[cut][v].normalized();
-      if (!(normal.dot(flat) > kSmoothUpTo)) normal = flat;
+      const bool smooth = shadings[cut].normals[v].dot(flat) > kSmoothUpTo;
+      const double light = smooth ? shadings[cut].lights[v] : lightOn(flat);
       marker.points.push_back(toPoint(body.surface[v]));
-      marker.colors.push_back(shaded(cut ? inside : marker.color, lightOn(normal)));
+      marker.colors.push_back(shaded(cut ? inside : marker.color, light));
     }
   }
 }
@@ -142,7 +160,8 @@ void MarkerBuilder::addTools(const WorldSnapshot& snapshot, const std_msgs::Head
 }
 
 bool MarkerBuilder::deleting() const {
-  return std::any_of(shown_.begin(), shown_.end(), [](const auto& s) { return s.second > 0 && s.second < kSaidDeletes; });
+  return std::any_of(shown_.begin(), shown_.end(),
+                     [](const auto& s) { return s.second > 0 && s.second < kSaidDeletes; });
 }
 
 visualization_msgs::MarkerArray MarkerBuilder::build(const WorldSnapshot& snapshot, const ros::Time& stamp,
@@ -170,7 +189,8 @@ visualization_msgs::MarkerArray MarkerBuilder::build(const WorldSnapshot& snapsh
   addTools(snapshot, header, array);
 
   std::map<Key, int> now;
-  for (std::size_t m = first; m < array.markers.size(); ++m) now[{array.markers[m].ns, array.markers[m].id}] = kSaidDeletes;
+  for (std::size_t m = first; m < array.markers.size(); ++m)
+    now[{array.markers[m].ns, array.markers[m].id}] = kSaidDeletes;
   for (auto& [key, left] : shown_) {
     if (now.count(key) > 0 || left == 0) continue;
     Marker gone = newMarker(header, key.first, key.second, Marker::TRIANGLE_LIST);
