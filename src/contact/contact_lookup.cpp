@@ -327,8 +327,9 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
     }
     if (found.distance < near) ++inside.near;
     if (found.distance > pair.reach || (found.distance > near && !found.above && !every_point)) continue;
+    const std::size_t before = to.contacts.size();
     addContact(to, parties, a, s, samples[s], b, found.triangle, found.weights, false, flipped);
-    if (!to.contacts.empty()) to.contacts.back().below = found.distance < 0.0;
+    if (to.contacts.size() > before) to.contacts.back().below = found.distance < 0.0;
     if (found.distance < 0.0) to.depths.push_back(-found.distance / std::min(size, of.shape->size()));
   }
 }

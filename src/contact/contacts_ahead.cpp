@@ -45,7 +45,10 @@ void Contacts::lookAhead(const std::vector<ContactParty>& parties, Index fresh, 
   }
 }
 
-void Contacts::expect(std::vector<std::shared_ptr<const Contacts>> ahead) { impl_->ahead = std::move(ahead); }
+void Contacts::expect(std::vector<std::shared_ptr<const Contacts>> ahead) {
+  impl_->taken.clear();
+  impl_->ahead = std::move(ahead);
+}
 
 // Of a pair of which anything is known besides, a lookup could find something else.
 bool Contacts::Impl::isUnknown(const std::vector<ContactParty>& parties, const Pair& pair) const {

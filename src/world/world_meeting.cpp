@@ -38,6 +38,8 @@ struct World::Impl::Met {
   ContactParty party() {
     if (obstacle) return partyOf(*obstacle, key);
     if (coming.valid()) contact = coming.get();
+    // The model may have been replaced since that was begun.
+    if (!contact || contact->model != model) contact = std::make_shared<ContactModel>(model);
     ContactParty party = partyOf(*model, material, state, key);
     party.moves = moves;
     if (moves)
@@ -92,6 +94,8 @@ void World::Impl::foreseeMeeting(const BodyId& parent, const std::vector<BodyId>
   for (const auto& other : bodies) {
     if (other->id == parent || std::find(pieces.begin(), pieces.end(), other->id) != pieces.end()) continue;
     if (!other->bounds.overlaps(around) || other->model->surface.vertices.empty()) continue;
+    const bool has_shape = other->contact && other->contact->model == other->model;
+    if (!has_shape && !other->coming_contact.valid()) foreseeContact(*other);  // one that has been loaded has none yet
     if (!other->coming_contact.valid()) contactModel(*other);
     meeting->met.emplace_back(*other, false);
   }
@@ -106,9 +110,10 @@ void World::Impl::foreseeMeeting(const BodyId& parent, const std::vector<BodyId>
 }
 
 void World::Impl::expectMeetings() {
+  auto taken = std::move(meetings);
+  meetings.clear();  // whatever one of them throws
   std::vector<std::shared_ptr<const Contacts>> ahead;
-  for (auto& meeting : meetings) ahead.push_back(meeting.get());
-  meetings.clear();
+  for (auto& meeting : taken) ahead.push_back(meeting.get());
   contacts.expect(std::move(ahead));
 }
 
