@@ -171,7 +171,7 @@ Result<PromisedCounts> checkStl(const std::string& path, std::uintmax_t bytes) {
     const auto read = static_cast<std::size_t>(std::max<std::streamsize>(0, in.gcount()));
     for (std::size_t i = 0; i < read; ++i) {
       const auto c = static_cast<unsigned char>(block[i]);
-      if (c > 126 || (c < 32 && !std::isspace(c)))
+      if (c > 126 || (c < 32 && c != '\n' && c != '\r' && c != '\t'))
         return unreadable(path,
                           "begins as text and has the byte " + std::to_string(c) + " at " + std::to_string(at + i));
     }
