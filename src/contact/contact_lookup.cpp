@@ -289,12 +289,14 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
   const ContactParty &of = parties[a], &with = parties[b];
   const ContactShape& shape = *with.shape;
   if (shape.surface().triangles.empty() || with.map_count == 0) return;
-  const Box region = grown(intersection(of.bounds, with.bounds), pair.reach);
+  const bool now = maps != with.maps;  // they have moved since the frame began
+  const Box region =
+      grown(now ? intersection(bounds_now[a], bounds_now[b]) : intersection(of.bounds, with.bounds), pair.reach);
   const double size = shape.size(), near = kMargin * std::min(size, of.shape->size());
   const std::vector<ContactSample>& samples = of.shape->samples();
   inside.points = samples.size();
   if (region.empty()) return;  // near by their speeds alone
-  const ContactMap* own = maps == with.maps ? of.maps : maps_now[a].data();
+  const ContactMap* own = now ? maps_now[a].data() : of.maps;
   const auto inwardAt = [&](const Vec3& p, const ContactSample& sample) -> Vec3 {
     const ContactMap& map = own[finders[a].nearest(p)];
     if (!map.quadratic) return -(map.to_rest.transpose() * sample.normal).normalized();

@@ -1,6 +1,7 @@
 // Who has passed through a surface within a substep, and stays known until it is back.
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "cell_table.h"
 #include "contacts_impl.h"
@@ -11,7 +12,8 @@ namespace {
 constexpr double kBesidePath = 1e-6;  // barycentric: no path slips between two triangles
 constexpr double kSlowPath =
     0.25;  // of the thickness: who meets a face no faster than that in a substep is seen to be near it
-constexpr int kMostSlides = 8;  // triangles that a caught point goes on in a substep
+constexpr double kShallow = 0.1;  // of the lesser thickness: likewise, and from inside
+constexpr int kMostSlides = 8;    // triangles that a caught point goes on in a substep
 
 }  // namespace
 
@@ -72,7 +74,7 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, In
       for (cell[1] = range.first[1]; cell[1] <= range.last[1]; ++cell[1])
         for (cell[2] = range.first[2]; cell[2] <= range.last[2]; ++cell[2]) table.insert(cell, near[k]);
   }
-  const double slow = kSlowPath * shape.thickness();
+  const double slow = kSlowPath * shape.thickness(), shallow = kShallow * shape.thickness();
   for (Index s = 0; s < samples.size(); ++s) {
     if (caught.count({of.key, with.key, s})) continue;
     const Path& path = paths[s];
@@ -87,10 +89,11 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, In
       const Path &p0 = corners[triangles[t][0]], &p1 = corners[triangles[t][1]], &p2 = corners[triangles[t][2]];
       const Vec3 n0 = (p1.from - p0.from).cross(p2.from - p0.from), n1 = (p1.to - p0.to).cross(p2.to - p0.to);
       const double h0 = n0.dot(path.from - p0.from), h1 = n1.dot(path.to - p0.to);
-      if (!(h0 >= 0.0) || !(h1 < 0.0)) return;
+      if (!(h1 < 0.0)) return;
+      // What lay on it may have been a hair below.
       const double d0 = h0 / n0.norm(), d1 = h1 / n1.norm();
-      if (d0 - d1 < slow) return;
-      const double time = d0 / (d0 - d1);
+      if (!(d0 >= -shallow) || d0 - d1 < slow) return;
+      const double time = std::max(0.0, d0 / (d0 - d1));
       if (!(time < first) && !(time == first && t < hit)) return;
       const auto then = [time](const Path& q) -> Vec3 { return q.from + time * (q.to - q.from); };
       const Vec3 q = then(p0), e1 = then(p1) - q, e2 = then(p2) - q, d = then(path) - q;
@@ -104,6 +107,40 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, In
     if (hit == kNoIndex) continue;
     traced.caught.emplace_back(CaughtKey{of.key, with.key, s}, hit);
   }
+}
+
+// Where a pair goes slowly, and all that passed through lie just below the planes that they are behind, they are
+// seen there like any other.
+void Contacts::Impl::releaseShallow(const std::vector<ContactParty>& parties) {
+  if (caught.empty()) return;
+  std::map<std::uint64_t, Index> by_key;
+  for (Index p = 0; p < parties.size(); ++p) by_key[parties[p].key] = p;
+  std::set<PairKey> kept;
+  const auto pairOf = [](const CaughtKey& key) { return std::minmax({key.a, key.b}); };
+  for (const auto& [key, triangle] : caught) {
+    const auto a = by_key.find(key.a), b = by_key.find(key.b);
+    if (a == by_key.end() || b == by_key.end() || !isShallow(parties, a->second, b->second, key.sample, triangle))
+      kept.insert(pairOf(key));
+  }
+  for (auto it = caught.begin(); it != caught.end();)
+    it = kept.count(pairOf(it->first)) ? std::next(it) : caught.erase(it);
+}
+
+bool Contacts::Impl::isShallow(const std::vector<ContactParty>& parties, Index a, Index b, Index sample,
+                               Index triangle) const {
+  const auto key = std::make_pair(std::min(a, b), std::max(a, b));
+  const auto pair =
+      std::lower_bound(pairs.begin(), pairs.end(), key, [](const Pair& p, const std::pair<Index, Index>& of) {
+        return std::tie(p.a, p.b) < std::tie(of.first, of.second);
+      });
+  if (pair == pairs.end() || std::make_pair(pair->a, pair->b) != key || pair->quick) return false;
+  const ContactParty &of = parties[a], &with = parties[b];
+  if (sample >= of.shape->samples().size() || triangle >= with.shape->surface().triangles.size()) return false;
+  const Triangle& corners = with.shape->surface().triangles[triangle];
+  const Vec3 q0 = vertexAt(with, corners[0]);
+  const Vec3 area = (vertexAt(with, corners[1]) - q0).cross(vertexAt(with, corners[2]) - q0);
+  const double depth = -area.normalized().dot(sampleAt(of, of.shape->samples()[sample]) - q0);
+  return depth < kShallow * std::min(of.shape->thickness(), with.shape->thickness());
 }
 
 // Contacts of those that have passed through: with the triangle that they slid to, until they are back outside.

@@ -15,6 +15,8 @@ constexpr std::size_t kTaskHalves = 64, kTaskParties = 128;  // halves of pairs,
 constexpr std::size_t kPairTasks = 16;                       // where there are fewer halves than for so many
 constexpr double kLongestStep = 0.5;  // of the smaller body's extent: how far quick bodies go in a substep
 
+constexpr double kMostForSheets = 4.0;  // substeps that a thin body asks for, at most
+
 // Of the largest that moves: smaller bodies ask for no more substeps than one of that size.
 constexpr double kCrumb = 0.2;
 
@@ -35,6 +37,16 @@ double approachOf(const ContactParty& a, const ContactParty& b) {
     spread += b.spread;
   }
   return relative.norm() + spread;
+}
+
+// Where its surface is.
+Box verticesOf(const ContactParty& party) {
+  Box box;
+  for (Index v = 0; v < party.shape->surface().vertices.size(); ++v) {
+    const Vec3 now = vertexAt(party, v);
+    if (now.allFinite()) box.extend(now);
+  }
+  return box;
 }
 
 // Where its surface has been in this substep.
@@ -69,6 +81,7 @@ void Contacts::clear() {
   impl_->reached.clear();
   impl_->keys.clear();
   impl_->needed_substeps = 1;
+  impl_->impulse_substep = 0.0;
   impl_->depths.clear();
   impl_->frames = impl_->steady_contacts = 0;  // what follows is as from the start
 }
@@ -144,6 +157,7 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   w.entries.clear();
   w.depths.clear();
   w.prepareLookups(parties, h);
+  w.releaseShallow(parties);
   w.findForeseen(parties);
   // From below upwards where it matters: ground first.
   const double falling = w.scene.gravity.norm() * h * h;
@@ -211,6 +225,12 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
                         task.depths.begin() + static_cast<std::ptrdiff_t>(findings.depths));
         const double step = kLongestStep * std::max(kCrumb * largest, std::min(extentOf(a), extentOf(b)));
         if (pair.quick) fastest = std::max(fastest, pair.way * h / step);
+        // What lies on a sheet must not fall through it within a substep.
+        if (findings.contacts > start.contacts)
+          for (const ContactParty* party : {&a, &b})
+            if (extentOf(*party) > kCrumb * largest)
+              fastest = std::max(fastest,
+                                 std::min(kMostForSheets, std::sqrt(falling / (kQuick * party->shape->thickness()))));
       }
       start = findings;
     }
@@ -267,6 +287,14 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
 
 void Contacts::begin(const std::vector<ContactParty>& parties, double substep) {
   impl_->scene.substep = substep;
+  // A load moves by its force times the square of the substep.
+  const double before = impl_->impulse_substep, scale = before > 0.0 ? (substep / before) * (substep / before) : 1.0;
+  if (scale != 1.0)
+    for (Contact& c : impl_->contacts) {
+      c.impulse *= scale;
+      c.slip_impulse *= scale;
+    }
+  impl_->impulse_substep = substep;
   impl_->choosePasses(parties, substep);
   impl_->fresh = true;
 }
@@ -297,6 +325,7 @@ void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, doubl
   runEach(for_each, to_fit.size(), [&](std::size_t n) {
     const Index p = to_fit[n];
     refit(p, maps_now[p]);
+    bounds_now[p] = verticesOf(parties[p]);
     finders[p].make(maps_now[p].data(), static_cast<Index>(maps_now[p].size()));
   });
   std::vector<Box> swept;     // of those that are traced
@@ -450,6 +479,7 @@ void Contacts::Impl::prepareLookups(const std::vector<ContactParty>& parties, do
   if (finders.size() < parties.size()) {
     finders.resize(parties.size());
     maps_now.resize(parties.size());
+    bounds_now.resize(parties.size());
   }
   for (Index p = 0; p < parties.size(); ++p)
     if (needed[p] & 1) finders[p].make(parties[p].maps, parties[p].map_count);

@@ -163,6 +163,7 @@ struct Contacts::Impl {
   std::vector<Index> grounded;  // parties that can meet the ground
   std::vector<MapFinder> finders;
   std::vector<std::vector<ContactMap>> maps_now;  // of those in quick pairs
+  std::vector<Box> bounds_now;                    // likewise, of their surfaces
   std::vector<Contact> contacts, last;            // of this frame and of the one before
   std::vector<Contact> quick_known;               // of quick pairs, at the start of this frame
   std::vector<ContactEntry> entries;
@@ -172,7 +173,8 @@ struct Contacts::Impl {
   std::vector<double> depths;
   std::vector<Index> reached;
   int needed_substeps = 1;
-  double frame = 0.0;  // [s]
+  double impulse_substep = 0.0;  // [s] of which the contacts' impulses are; 0: of none
+  double frame = 0.0;            // [s]
   ContactSolver solver;
   IslandPlan plan;
   std::size_t frames = 0, last_sorted = 0;  // of `last`, before what was found out of turn
@@ -207,6 +209,8 @@ struct Contacts::Impl {
                    ContactCounters& counters, const ForEach& for_each);
   void trace(const std::vector<ContactParty>& parties, Index a, Index b, Traced& traced) const;
   void addCaught(const std::vector<ContactParty>& parties);
+  void releaseShallow(const std::vector<ContactParty>& parties);
+  bool isShallow(const std::vector<ContactParty>& parties, Index a, Index b, Index sample, Index triangle) const;
   void addGround(Findings& to, const std::vector<ContactParty>& parties, Index a, double reach);
   void join(const Findings& from, std::size_t contacts_from, std::size_t contacts_to, std::size_t entries_from,
             std::size_t entries_to);

@@ -46,10 +46,11 @@ struct ContactsMemory::Data {
   std::vector<std::uint64_t> keys;
   std::vector<Index> reached;
   std::int32_t needed_substeps = 1;
+  double impulse_substep = 0.0;
 
   template <class Archive>
   void fields(Archive& archive) {
-    archive(contacts, steady_contacts, frames, caught, exits, keys, reached, needed_substeps);
+    archive(contacts, steady_contacts, frames, caught, exits, keys, reached, needed_substeps, impulse_substep);
   }
 };
 
@@ -67,7 +68,7 @@ void save(OutArchive& archive, const ContactsMemory& memory) { memory.data_->fie
 // Without keys: they are other ones for the same bodies after a reset.
 void save(HashArchive& archive, const ContactsMemory& memory) {
   const ContactsMemory::Data& data = *memory.data_;
-  archive(data.contacts, data.steady_contacts, data.frames, data.reached, data.needed_substeps);
+  archive(data.contacts, data.steady_contacts, data.frames, data.reached, data.needed_substeps, data.impulse_substep);
   for (const CaughtPoint& point : data.caught) archive(point.sample, point.triangle);
   for (const ExitOfPair& exit : data.exits) archive(exit.direction, exit.speed);
 }
@@ -91,6 +92,8 @@ std::string ContactsMemory::fault(const std::map<std::uint64_t, KnownParty>& par
     if (party >= data_->keys.size()) return "a party that was reached is " + std::to_string(party);
   if (data_->needed_substeps < 1 || data_->needed_substeps > 1000000)
     return "contacts ask for " + std::to_string(data_->needed_substeps) + " substeps";
+  if (!(data_->impulse_substep >= 0.0 && data_->impulse_substep <= 1.0))
+    return "the last substep of contacts took " + std::to_string(data_->impulse_substep) + " s";
   return "";
 }
 
@@ -106,6 +109,7 @@ ContactsMemory Contacts::memory() const {
   data.keys = w.keys;
   data.reached = w.reached;
   data.needed_substeps = w.needed_substeps;
+  data.impulse_substep = w.impulse_substep;
   return memory;
 }
 
@@ -121,6 +125,7 @@ void Contacts::recall(const ContactsMemory& memory) {
   w.keys = data.keys;
   w.reached = data.reached;
   w.needed_substeps = data.needed_substeps;
+  w.impulse_substep = data.impulse_substep;
 }
 
 }  // namespace meshless

@@ -343,8 +343,8 @@ TEST(DamagedState, OfAnotherKindOrVersion) {
   expectRefused("", "MLSSTATE");
   expectRefused("solid ball\nfacet normal 0 0 1\n", "MLSSTATE");
   std::string bytes = bytesOf(ballThatFalls());
-  bytes[8] = 4;
-  expectRefused(bytes, "version 4; accepted: 3");
+  bytes[8] = 5;
+  expectRefused(bytes, "version 5; accepted: 4");
 }
 
 /// With a checksum that is right for what the file says.
