@@ -310,6 +310,7 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
   for (Index s = 0; s < samples.size(); ++s) {
     const Vec3 p = sampleAt(of, samples[s]);
     if (!region.contains(p)) continue;
+    ++inside.asked;
     if (!caught.empty()) {
       const auto held = caught.find({of.key, with.key, s});
       if (held != caught.end()) continue;  // see trace()

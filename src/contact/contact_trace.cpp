@@ -45,20 +45,25 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, In
     const Vec3 q = vertexAt(with, v);
     corners[v] = {q - vertexMotion(with, v), q};
   }
-  std::vector<Index> near;
+  const double slow = kSlowPath * shape.thickness(), shallow = kShallow * shape.thickness();
+  struct Swept {
+    Index triangle;
+    Box box;
+    Vec3 normal_from, normal_to;
+  };
+  std::vector<Swept> near;
   double size = 0.0;
-  const auto sweptBox = [&](Index t) {
+  for (Index t = 0; t < triangles.size(); ++t) {
     Box box;
     for (Index v : triangles[t]) {
       box.extend(corners[v].from);
       box.extend(corners[v].to);
     }
-    return box;
-  };
-  for (Index t = 0; t < triangles.size(); ++t) {
-    const Box box = sweptBox(t);
+    box = grown(box, shallow);
     if (!box.overlaps(box_a)) continue;
-    near.push_back(t);
+    const Path &p0 = corners[triangles[t][0]], &p1 = corners[triangles[t][1]], &p2 = corners[triangles[t][2]];
+    near.push_back({t, box, (p1.from - p0.from).cross(p2.from - p0.from).normalized(),
+                    (p1.to - p0.to).cross(p2.to - p0.to).normalized()});
     box_b.extend(box.min);
     box_b.extend(box.max);
     size += (box.max - box.min).maxCoeff();
@@ -68,13 +73,12 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, In
   static thread_local CellTable table;
   table.start(region, size / static_cast<double>(near.size()), 4 * near.size());
   for (Index k = 0; k < near.size(); ++k) {
-    const CellRange range = table.cellsOf(sweptBox(near[k]));
+    const CellRange range = table.cellsOf(near[k].box);
     Cell cell;
     for (cell[0] = range.first[0]; cell[0] <= range.last[0]; ++cell[0])
       for (cell[1] = range.first[1]; cell[1] <= range.last[1]; ++cell[1])
-        for (cell[2] = range.first[2]; cell[2] <= range.last[2]; ++cell[2]) table.insert(cell, near[k]);
+        for (cell[2] = range.first[2]; cell[2] <= range.last[2]; ++cell[2]) table.insert(cell, k);
   }
-  const double slow = kSlowPath * shape.thickness(), shallow = kShallow * shape.thickness();
   for (Index s = 0; s < samples.size(); ++s) {
     if (caught.count({of.key, with.key, s})) continue;
     const Path& path = paths[s];
@@ -85,14 +89,13 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, In
     ++traced.paths;
     double first = 2.0;
     Index hit = kNoIndex;
-    table.forEach(table.cellsOf(box), [&](Index t) {
+    table.forEach(table.cellsOf(box), [&](Index k) {
+      if (!near[k].box.overlaps(box)) return;
+      const Index t = near[k].triangle;
       const Path &p0 = corners[triangles[t][0]], &p1 = corners[triangles[t][1]], &p2 = corners[triangles[t][2]];
-      const Vec3 n0 = (p1.from - p0.from).cross(p2.from - p0.from), n1 = (p1.to - p0.to).cross(p2.to - p0.to);
-      const double h0 = n0.dot(path.from - p0.from), h1 = n1.dot(path.to - p0.to);
-      if (!(h1 < 0.0)) return;
+      const double d0 = near[k].normal_from.dot(path.from - p0.from), d1 = near[k].normal_to.dot(path.to - p0.to);
       // What lay on it may have been a hair below.
-      const double d0 = h0 / n0.norm(), d1 = h1 / n1.norm();
-      if (!(d0 >= -shallow) || d0 - d1 < slow) return;
+      if (!(d1 < 0.0) || !(d0 >= -shallow) || d0 - d1 < slow) return;
       const double time = std::max(0.0, d0 / (d0 - d1));
       if (!(time < first) && !(time == first && t < hit)) return;
       const auto then = [time](const Path& q) -> Vec3 { return q.from + time * (q.to - q.from); };

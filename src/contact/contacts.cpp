@@ -15,6 +15,9 @@ constexpr std::size_t kTaskHalves = 64, kTaskParties = 128;  // halves of pairs,
 constexpr std::size_t kPairTasks = 16;                       // where there are fewer halves than for so many
 constexpr double kLongestStep = 0.5;  // of the smaller body's extent: how far quick bodies go in a substep
 
+// How many points of quick pairs a frame asks about, or so: beyond it they are looked at in some of its substeps alone.
+constexpr std::size_t kMostAsked = 50000, kMostAskedEach = 4;  // of all, or so often of each there is
+
 constexpr double kMostForSheets = 4.0;  // substeps that a thin body asks for, at most
 
 // Of the largest that moves: smaller bodies ask for no more substeps than one of that size.
@@ -198,6 +201,9 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   double largest = 0.0;
   for (const ContactParty& party : parties)
     if (party.moves) largest = std::max(largest, extentOf(party));
+  w.asked = w.samples = 0;
+  for (std::size_t p = 0; p < parties.size(); ++p)
+    if (w.needed[p] & 1) w.samples += parties[p].shape->samples().size();
   double fastest = 0.0;  // substeps that the fastest quick pair asks for
   for (std::size_t n = 0; n < ground_tasks + pair_tasks; ++n) {
     const Findings& task = w.tasks[n];
@@ -224,7 +230,10 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
         w.depths.insert(w.depths.end(), task.depths.begin() + static_cast<std::ptrdiff_t>(start.depths),
                         task.depths.begin() + static_cast<std::ptrdiff_t>(findings.depths));
         const double step = kLongestStep * std::max(kCrumb * largest, std::min(extentOf(a), extentOf(b)));
-        if (pair.quick) fastest = std::max(fastest, pair.way * h / step);
+        if (pair.quick) {
+          fastest = std::max(fastest, pair.way * h / step);
+          w.asked += findings.inside.asked;
+        }
         // What lies on a sheet must not fall through it within a substep.
         if (findings.contacts > start.contacts)
           for (const ContactParty* party : {&a, &b})
@@ -297,6 +306,12 @@ void Contacts::begin(const std::vector<ContactParty>& parties, double substep) {
   impl_->impulse_substep = substep;
   impl_->choosePasses(parties, substep);
   impl_->fresh = true;
+  // Heaps of crumbs that are torn together: what was found at the frame's start, and who passes through, has to do.
+  const double most = static_cast<double>(std::max(kMostAsked, kMostAskedEach * impl_->samples));
+  const double looks = most / static_cast<double>(std::max<std::size_t>(1, impl_->asked));
+  const double substeps = std::round(impl_->frame / substep);
+  impl_->look_every = static_cast<int>(std::clamp(std::ceil(substeps / std::max(1.0, looks)), 1.0, 1e6));
+  impl_->substep_number = 0;
 }
 
 // Quick pairs where they are now, if they may have gone as far as their reach since they were looked at.
@@ -304,7 +319,7 @@ void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, doubl
                                  ContactCounters& counters, const ForEach& for_each) {
   const double falling = scene.gravity.norm() * substep * substep;
   quick.resize(pairs.size());
-  std::vector<Index> moved, to_fit;  // pairs, and parties
+  std::vector<Index> moved, far, to_fit;  // pairs, and parties
   std::vector<char> fitted;
   for (Index k = 0; k < pairs.size(); ++k) {
     const Pair& pair = pairs[k];
@@ -312,9 +327,14 @@ void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, doubl
     const double thickness = std::min(parties[pair.a].shape->thickness(), parties[pair.b].shape->thickness());
     // Many short substeps need no look in each of them.
     quick[k].moved += pair.way * substep;
-    if (!fresh && quick[k].moved < kQuick * thickness) continue;
-    quick[k].moved = 0.0;
-    moved.push_back(k);
+    const bool is_far = pair.way * substep > kQuick * thickness;
+    const bool look = fresh || (substep_number % look_every == 0 && quick[k].moved >= kQuick * thickness);
+    if (is_far) far.push_back(k);
+    if (look) {
+      quick[k].moved = 0.0;
+      moved.push_back(k);
+    }
+    if (!is_far && !look) continue;
     if (fitted.empty()) fitted.assign(parties.size(), 0);
     for (Index p : {pair.a, pair.b})
       if (!fitted[p]) {
@@ -330,10 +350,8 @@ void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, doubl
   });
   std::vector<Box> swept;     // of those that are traced
   std::vector<Index> passes;  // pairs that may pass through each other
-  for (const Index k : moved) {
+  for (const Index k : far) {
     const Pair& pair = pairs[k];
-    const double thickness = std::min(parties[pair.a].shape->thickness(), parties[pair.b].shape->thickness());
-    if (!(pair.way * substep > kQuick * thickness)) continue;
     if (swept.empty()) swept.resize(parties.size());
     for (Index p : {pair.a, pair.b})
       if (swept[p].empty()) swept[p] = sweptVertices(parties[p]);
@@ -390,6 +408,7 @@ void Contacts::solve(const std::vector<ContactParty>& parties, double substep, c
                  counters);
   w.was_steady = steady;
   w.fresh = false;
+  ++w.substep_number;
   for (std::size_t k = 0; k < w.pairs.size(); ++k) {
     if (!w.pairs[k].quick) continue;
     QuickFindings& quick = w.quick[k];

@@ -120,7 +120,7 @@ struct Traced {
 
 /// How many points of one party lie in the other.
 struct Inside {
-  std::size_t points = 0, inside = 0, near = 0;
+  std::size_t points = 0, asked = 0, inside = 0, near = 0;  // asked: in the region where both are
   double deepest = 0.0;
 };
 
@@ -179,6 +179,8 @@ struct Contacts::Impl {
   IslandPlan plan;
   std::size_t frames = 0, last_sorted = 0;  // of `last`, before what was found out of turn
   std::vector<std::uint64_t> keys;          // of the parties of the last frame
+  int substep_number = 0, look_every = 1;   // in the frame; substeps between looks at quick pairs
+  std::size_t samples = 0, asked = 0;       // of all parties; of quick pairs where they are near, when the frame began
   bool fresh = true;                        // nothing has been solved since the contacts were made
   bool plan_steady = true;                  // the plan is that of the steady contacts alone
   std::vector<Findings> tasks;

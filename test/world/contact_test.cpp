@@ -408,9 +408,8 @@ TEST(Contact, AnOverhangingBlockStaysOnAThinPlate) {
   }
 }
 
-// Thrown at plates of 5 mm to 3 cm, bodies bounce, turn over and come to rest: nobody on the other side, and few of
-// them (nine, when this was written; 28 of the same, and 15 behind, before points were followed from a hair below)
-// partly in it.
+// Thrown at plates of 5 mm to 3 cm, bodies bounce, turn over and come to rest: nobody on the other side, and few partly
+// in the plate (two of 120 when this was written; 28, and 15 behind it, before points were followed from a hair below).
 TEST(Contact, ThinPlatesHoldWhatTumblesOnThem) {
   test::Random random(7);
   int stayed = 0, below = 0, deep = 0;
@@ -445,7 +444,7 @@ TEST(Contact, ThinPlatesHoldWhatTumblesOnThem) {
   }
   EXPECT_GT(stayed, 30);
   EXPECT_EQ(below, 0);
-  EXPECT_LE(deep, 14);
+  EXPECT_LE(deep, 5);
 }
 
 // Who comes and goes elsewhere changes the numbers of the others, and nothing of what presses them.
