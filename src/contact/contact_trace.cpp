@@ -12,13 +12,21 @@ namespace {
 constexpr double kBesidePath = 1e-6;  // barycentric: no path slips between two triangles
 constexpr double kSlowPath =
     0.25;  // of the thickness: who meets a face no faster than that in a substep is seen to be near it
-constexpr double kShallow = 0.1;  // of the lesser thickness: likewise, and from inside
-constexpr int kMostSlides = 8;    // triangles that a caught point goes on in a substep
+constexpr double kShallow = 0.1;   // of the lesser thickness: likewise, and from inside
+constexpr double kSameSide = 0.5;  // cosine between the normals of faces that look the same way
+constexpr int kMostSlides = 8;     // triangles that a caught point goes on in a substep
+
+Vec3 normalNow(const ContactParty& party, Index triangle) {
+  const Triangle& corners = party.shape->surface().triangles[triangle];
+  const Vec3 q0 = vertexAt(party, corners[0]);
+  return (vertexAt(party, corners[1]) - q0).cross(vertexAt(party, corners[2]) - q0).normalized();
+}
 
 }  // namespace
 
 // Points of a that a triangle of b swept over in this substep, from its front: who has passed through is remembered.
-void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, Index b, Traced& traced) const {
+void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, Index b,
+                           const std::vector<Contact>* found, Traced& traced) const {
   traced.paths = 0;
   traced.caught.clear();
   const ContactParty &of = parties[a], &with = parties[b];
@@ -45,7 +53,22 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, In
     const Vec3 q = vertexAt(with, v);
     corners[v] = {q - vertexMotion(with, v), q};
   }
-  const double slow = kSlowPath * shape.thickness(), shallow = kShallow * shape.thickness();
+  // Who is slower is seen by the next look.
+  const double slow = kSlowPath * shape.thickness() / look_every;
+  const double shallow = kShallow * std::min(of.shape->thickness(), shape.thickness());
+  // What lay on a face may have been a hair below; what had no contact there is outside on the other side of a fin.
+  const auto lay = [&](Index sample, Index triangle) {
+    const auto key = std::make_tuple(true, std::min(a, b), std::max(a, b), a > b, sample);
+    for (const std::vector<Contact>* known : {&quick_known, found}) {
+      if (!known) continue;
+      const auto at =
+          std::partition_point(known->begin(), known->end(), [&](const Contact& c) { return keyOf(c) < key; });
+      if (at != known->end() && keyOf(*at) == key && !at->flipped && at->triangle < triangles.size() &&
+          normalNow(with, at->triangle).dot(normalNow(with, triangle)) > kSameSide)
+        return true;
+    }
+    return false;
+  };
   struct Swept {
     Index triangle;
     Box box;
@@ -94,8 +117,7 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, In
       const Index t = near[k].triangle;
       const Path &p0 = corners[triangles[t][0]], &p1 = corners[triangles[t][1]], &p2 = corners[triangles[t][2]];
       const double d0 = near[k].normal_from.dot(path.from - p0.from), d1 = near[k].normal_to.dot(path.to - p0.to);
-      // What lay on it may have been a hair below.
-      if (!(d1 < 0.0) || !(d0 >= -shallow) || d0 - d1 < slow) return;
+      if (!(d1 < 0.0) || !(d0 >= -shallow) || !(d0 - d1 > slow) || (d0 < 0.0 && !lay(s, t))) return;
       const double time = std::max(0.0, d0 / (d0 - d1));
       if (!(time < first) && !(time == first && t < hit)) return;
       const auto then = [time](const Path& q) -> Vec3 { return q.from + time * (q.to - q.from); };

@@ -306,7 +306,7 @@ void Contacts::begin(const std::vector<ContactParty>& parties, double substep) {
   impl_->impulse_substep = substep;
   impl_->choosePasses(parties, substep);
   impl_->fresh = true;
-  // Heaps of crumbs that are torn together: what was found at the frame's start, and who passes through, has to do.
+  // Heaps of crumbs that are torn together: between looks those that pass through have to do.
   const double most = static_cast<double>(std::max(kMostAsked, kMostAskedEach * impl_->samples));
   const double looks = most / static_cast<double>(std::max<std::size_t>(1, impl_->asked));
   const double substeps = std::round(impl_->frame / substep);
@@ -327,8 +327,8 @@ void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, doubl
     const double thickness = std::min(parties[pair.a].shape->thickness(), parties[pair.b].shape->thickness());
     // Many short substeps need no look in each of them.
     quick[k].moved += pair.way * substep;
-    const bool is_far = pair.way * substep > kQuick * thickness;
     const bool look = fresh || (substep_number % look_every == 0 && quick[k].moved >= kQuick * thickness);
+    const bool is_far = pair.way * substep * look_every > kQuick * thickness;
     if (is_far) far.push_back(k);
     if (look) {
       quick[k].moved = 0.0;
@@ -361,7 +361,8 @@ void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, doubl
   if (traced.size() < 2 * passes.size()) traced.resize(2 * passes.size());
   runEach(for_each, 2 * passes.size(), [&](std::size_t n) {
     const Pair& pair = pairs[passes[n / 2]];
-    trace(parties, n % 2 ? pair.b : pair.a, n % 2 ? pair.a : pair.b, traced[n]);
+    trace(parties, n % 2 ? pair.b : pair.a, n % 2 ? pair.a : pair.b,
+          fresh ? nullptr : &quick[passes[n / 2]].found.contacts, traced[n]);
   });
   for (std::size_t n = 0; n < 2 * passes.size(); ++n) {
     counters.traced += traced[n].paths;

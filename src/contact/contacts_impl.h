@@ -209,7 +209,8 @@ struct Contacts::Impl {
   void crossRidges(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair);
   void lookAtQuick(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,
                    ContactCounters& counters, const ForEach& for_each);
-  void trace(const std::vector<ContactParty>& parties, Index a, Index b, Traced& traced) const;
+  void trace(const std::vector<ContactParty>& parties, Index a, Index b, const std::vector<Contact>* found,
+             Traced& traced) const;
   void addCaught(const std::vector<ContactParty>& parties);
   void releaseShallow(const std::vector<ContactParty>& parties);
   bool isShallow(const std::vector<ContactParty>& parties, Index a, Index b, Index sample, Index triangle) const;

@@ -92,7 +92,7 @@ std::string ContactsMemory::fault(const std::map<std::uint64_t, KnownParty>& par
     if (party >= data_->keys.size()) return "a party that was reached is " + std::to_string(party);
   if (data_->needed_substeps < 1 || data_->needed_substeps > 1000000)
     return "contacts ask for " + std::to_string(data_->needed_substeps) + " substeps";
-  if (!(data_->impulse_substep >= 0.0 && data_->impulse_substep <= 1.0))
+  if (data_->impulse_substep != 0.0 && !(data_->impulse_substep >= 1e-9 && data_->impulse_substep <= 1.0))
     return "the last substep of contacts took " + std::to_string(data_->impulse_substep) + " s";
   return "";
 }
