@@ -294,7 +294,7 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
       grown(now ? intersection(bounds_now[a], bounds_now[b]) : intersection(of.bounds, with.bounds), pair.reach);
   const double size = shape.size(), near = kMargin * std::min(size, of.shape->size());
   const std::vector<ContactSample>& samples = of.shape->samples();
-  inside.points = samples.size();
+  inside.points = samplesFor(pair, *of.shape);
   if (region.empty()) return;  // near by their speeds alone
   const ContactMap* own = now ? maps_now[a].data() : of.maps;
   const auto inwardAt = [&](const Vec3& p, const ContactSample& sample) -> Vec3 {
@@ -307,7 +307,7 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
   };
   to.surface.deviation = -1.0;
   Index hint = kNoIndex;  // the triangle that was found last: the next point is often near it
-  for (Index s = 0; s < samples.size(); ++s) {
+  for (Index s = 0; s < inside.points; ++s) {
     const Vec3 p = sampleAt(of, samples[s]);
     if (!region.contains(p)) continue;
     ++inside.asked;

@@ -25,8 +25,9 @@ Vec3 normalNow(const ContactParty& party, Index triangle) {
 }  // namespace
 
 // Points of a that a triangle of b swept over in this substep, from its front: who has passed through is remembered.
-void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, Index b,
+void Contacts::Impl::trace(const std::vector<ContactParty>& parties, const Pair& pair, bool second,
                            const std::vector<Contact>* found, Traced& traced) const {
+  const Index a = second ? pair.b : pair.a, b = second ? pair.a : pair.b;
   traced.paths = 0;
   traced.caught.clear();
   const ContactParty &of = parties[a], &with = parties[b];
@@ -37,9 +38,10 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, In
   struct Path {
     Vec3 from, to;
   };
-  std::vector<Path> paths(samples.size());
+  const Index count = samplesFor(pair, *of.shape);
+  std::vector<Path> paths(count);
   Box box_a, box_b;
-  for (Index s = 0; s < samples.size(); ++s) {
+  for (Index s = 0; s < count; ++s) {
     const Vec3 p = sampleAt(of, samples[s]);
     Vec3 motion = vertexMotion(of, samples[s].vertices[0]);
     if (samples[s].share > 0.0) motion += samples[s].share * (vertexMotion(of, samples[s].vertices[1]) - motion);
@@ -102,7 +104,7 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, Index a, In
       for (cell[1] = range.first[1]; cell[1] <= range.last[1]; ++cell[1])
         for (cell[2] = range.first[2]; cell[2] <= range.last[2]; ++cell[2]) table.insert(cell, k);
   }
-  for (Index s = 0; s < samples.size(); ++s) {
+  for (Index s = 0; s < count; ++s) {
     if (caught.count({of.key, with.key, s})) continue;
     const Path& path = paths[s];
     Box box;

@@ -160,6 +160,7 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   w.entries.clear();
   w.depths.clear();
   w.prepareLookups(parties, h);
+  w.findHeaps(parties, for_each);
   w.releaseShallow(parties);
   w.findForeseen(parties);
   // From below upwards where it matters: ground first.
@@ -360,9 +361,7 @@ void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, doubl
   }
   if (traced.size() < 2 * passes.size()) traced.resize(2 * passes.size());
   runEach(for_each, 2 * passes.size(), [&](std::size_t n) {
-    const Pair& pair = pairs[passes[n / 2]];
-    trace(parties, n % 2 ? pair.b : pair.a, n % 2 ? pair.a : pair.b,
-          fresh ? nullptr : &quick[passes[n / 2]].found.contacts, traced[n]);
+    trace(parties, pairs[passes[n / 2]], n % 2 == 1, fresh ? nullptr : &quick[passes[n / 2]].found.contacts, traced[n]);
   });
   for (std::size_t n = 0; n < 2 * passes.size(); ++n) {
     counters.traced += traced[n].paths;

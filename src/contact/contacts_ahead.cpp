@@ -82,7 +82,7 @@ void Contacts::Impl::findForeseen(const std::vector<ContactParty>& parties) {
                                            return std::tie(p.a, p.b) < std::tie(of.first, of.second);
                                          });
       if (pair == pairs.end() || pair->a != std::min(a, b) || pair->b != std::max(a, b)) continue;
-      if (pair->reach == found.pair.reach && isUnknown(parties, *pair))
+      if (pair->reach == found.pair.reach && !pair->by_vertices && isUnknown(parties, *pair))
         taken[static_cast<std::size_t>(pair - pairs.begin())] = {&found, a > b};
     }
   }

@@ -17,11 +17,15 @@ inline constexpr double kMostPasses = 4.0;  // beyond it substeps do more
 
 struct Pair {
   Index a, b;
-  double reach;           // [m] how far outside a point is taken as a contact to come
-  bool quick;             // looked up anew in every substep
-  double way;             // [m/s] at which its bodies move, at most
-  bool expelled = false;  // one is inside the other, and let out as a whole
+  double reach;              // [m] how far outside a point is taken as a contact to come
+  bool quick;                // looked up anew in every substep
+  double way;                // [m/s] at which its bodies move, at most
+  bool expelled = false;     // one is inside the other, and let out as a whole
+  bool by_vertices = false;  // points on edges are left out
 };
+
+/// How many of a shape's points are asked about in the pair's other: its vertices come first.
+Index samplesFor(const Pair& pair, const ContactShape& shape);
 
 inline Box intersection(const Box& a, const Box& b) { return {a.min.cwiseMax(b.min), a.max.cwiseMin(b.max)}; }
 
@@ -209,7 +213,7 @@ struct Contacts::Impl {
   void crossRidges(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair);
   void lookAtQuick(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,
                    ContactCounters& counters, const ForEach& for_each);
-  void trace(const std::vector<ContactParty>& parties, Index a, Index b, const std::vector<Contact>* found,
+  void trace(const std::vector<ContactParty>& parties, const Pair& pair, bool second, const std::vector<Contact>* found,
              Traced& traced) const;
   void addCaught(const std::vector<ContactParty>& parties);
   void releaseShallow(const std::vector<ContactParty>& parties);
@@ -217,6 +221,7 @@ struct Contacts::Impl {
   void addGround(Findings& to, const std::vector<ContactParty>& parties, Index a, double reach);
   void join(const Findings& from, std::size_t contacts_from, std::size_t contacts_to, std::size_t entries_from,
             std::size_t entries_to);
+  void findHeaps(const std::vector<ContactParty>& parties, const ForEach& for_each);
   void prepareLookups(const std::vector<ContactParty>& parties, double h);
   bool isUnknown(const std::vector<ContactParty>& parties, const Pair& pair) const;
   void findForeseen(const std::vector<ContactParty>& parties);
