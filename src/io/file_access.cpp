@@ -2,6 +2,7 @@
 #include <filesystem>
 
 #include "meshless_surgery/io/files.h"
+#include "opened_file.h"
 
 namespace meshless {
 namespace {
@@ -48,10 +49,11 @@ Result<std::string> FileAccess::resolve(const std::string& path, const std::stri
     wanted = fs::path(base_folder) / path;  // an absolute path replaces the folder
   }
 
-  // Links and ".." are resolved first: what is outside is refused without a word about what is there.
+  // Links and ".." are resolved first: what is outside is refused without a word about what is there. Nor is a word
+  // said about why a name leads nowhere, as it may do so outside.
   std::error_code failed;
   const fs::path real = fs::weakly_canonical(wanted, failed);
-  if (failed) return Error{ErrorCode::kUnreadable, "cannot find '" + path + "': " + failed.message()};
+  const fs::path judged = failed ? wanted.lexically_normal() : real;
   std::string known;
   bool allowed = false;
   for (const std::string& folder : folders) {
@@ -59,13 +61,15 @@ Result<std::string> FileAccess::resolve(const std::string& path, const std::stri
     const fs::path real_folder = fs::canonical(folder, missing);
     if (missing) continue;
     known += (known.empty() ? "" : ", ") + real_folder.string();
-    allowed = allowed || isBelow(real, real_folder);
+    allowed = allowed || isBelow(judged, real_folder);
   }
   if (!allowed)
     return Error{ErrorCode::kForbidden, "'" + path + "' is outside the folders that may be read; accepted: below " +
                                             (known.empty() ? "none" : known)};
-  if (!fs::exists(real, failed)) return Error{ErrorCode::kUnreadable, "there is no file '" + path + "'"};
-  if (!fs::is_regular_file(real, failed))
+  if (failed) return Error{ErrorCode::kUnreadable, "cannot find '" + path + "'"};
+  const FileKind kind = fileKind(real.string());
+  if (kind == FileKind::kElsewhere) return Error{ErrorCode::kUnreadable, "there is no file '" + path + "'"};
+  if (kind == FileKind::kOther)
     return Error{ErrorCode::kUnreadable, "'" + path + "' is no file; accepted: a regular file"};
   return real.string();
 }

@@ -133,18 +133,27 @@ Result<std::map<std::string, Material>> readMaterials(const std::string& folder)
   std::sort(files.begin(), files.end());
   std::map<std::string, Material> materials;
   for (const fs::path& file : files) {
-    const Result<YAML::Node> root = readYamlFile(file.string(), file.string());
-    if (!root) return root.error();
-    if (root->IsNull()) continue;  // only comments
-    YamlSource source{file.string(), {}};
-    try {
-      readMaterialMap(source, *root, materials);
-    } catch (const YAML::Exception& e) {
-      source.fail(*root, e.what(), "YAML");
-    }
-    if (source.fault) return *source.fault;
+    const fs::path real = fs::canonical(file, failed);
+    const Status read = failed ? Error{ErrorCode::kUnreadable, file.string() + ": is missing"}
+                               : readMaterialFile(real.string(), file.string(), materials);
+    if (!read) return read.error();
   }
   return materials;
+}
+
+Status readMaterialFile(const std::string& real_path, const std::string& name,
+                        std::map<std::string, Material>& materials) {
+  const Result<YAML::Node> root = readYamlFile(real_path, name);
+  if (!root) return root.error();
+  if (root->IsNull()) return Done{};  // only comments
+  YamlSource source{name, {}};
+  try {
+    readMaterialMap(source, *root, materials);
+  } catch (const YAML::Exception& e) {
+    source.fail(*root, e.what(), "YAML");
+  }
+  if (source.fault) return *source.fault;
+  return Done{};
 }
 
 Result<Material> changeMaterial(const Material& base, const std::string& yaml) {

@@ -14,6 +14,10 @@ void readMaterial(YamlSource& source, const YAML::Node& node, const std::string&
 /// A map of names to materials, into `materials`; each starts from the defaults.
 void readMaterialMap(YamlSource& source, const YAML::Node& node, std::map<std::string, Material>& materials);
 
+/// The same from a file: nothing but comments adds nothing. `name` is for messages.
+Status readMaterialFile(const std::string& real_path, const std::string& name,
+                        std::map<std::string, Material>& materials);
+
 /// Letters, digits, '_', '-' and '.', 1 to 64 of them: the names of bodies and materials.
 bool isPlainName(const std::string& name);
 extern const char* const kPlainName;  // that, in words

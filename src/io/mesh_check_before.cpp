@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cerrno>
 #include <cmath>
 #include <cstdint>
@@ -10,37 +9,18 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 #include <vector>
+
+#include "text_words.h"
 
 namespace meshless {
 namespace {
 
-constexpr std::uintmax_t kMaxBytes = 512ull << 20;
-constexpr std::size_t kMaxPoints = 2000000;
-constexpr std::size_t kMaxHeader = 1 << 16;  // bytes
-constexpr std::size_t kMaxPolygon = 1000;    // corners
+constexpr std::size_t kMaxPolygon = 1000;  // corners
 
-std::string fileName(const std::string& path) { return std::filesystem::path(path).filename().string(); }
-
-Error unreadable(const std::string& path, const std::string& what) {
-  return {ErrorCode::kUnreadable, "'" + fileName(path) + "' " + what};
-}
-
-Status checkPoints(const std::string& path, double points) {
-  if (!(points >= 1.0)) return Error{ErrorCode::kUnsuitableShape, "'" + fileName(path) + "' has no points"};
-  if (!(points <= kMaxPoints)) {
-    std::ostringstream text;
-    text << "'" << fileName(path) << "' has " << points << " points; accepted: up to 2000000";
-    return Error{ErrorCode::kUnsuitableShape, text.str()};
-  }
-  return Done{};
-}
-
-std::string lower(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
+Error unreadable(const std::string& name, const std::string& what) {
+  return {ErrorCode::kUnreadable, "'" + name + "' " + what};
 }
 
 /// For a message.
@@ -51,159 +31,221 @@ std::string printable(std::string text) {
   return text;
 }
 
-/// The start of the file, as far as a header may reach.
-std::string headOf(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::string head(kMaxHeader, '\0');
-  in.read(&head[0], static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, in.gcount())));
-  return head;
+/// Bytes of a PLY type; 0 where there is none of this name.
+std::size_t plyBytes(const std::string& type) {
+  for (const char* one : {"char", "uchar", "int8", "uint8"})
+    if (type == one) return 1;
+  for (const char* two : {"short", "ushort", "int16", "uint16"})
+    if (type == two) return 2;
+  for (const char* four : {"int", "uint", "int32", "uint32", "float", "float32"})
+    if (type == four) return 4;
+  return type == "double" || type == "float64" ? 8 : 0;
 }
 
-std::vector<std::string> words(const std::string& line) {
-  std::istringstream in(line);
-  std::vector<std::string> all;
-  for (std::string word; in >> word;) all.push_back(word);
-  return all;
+bool isWhole(const std::string& type) {
+  return plyBytes(type) > 0 && type.compare(0, 5, "float") != 0 && type != "double";
 }
 
-/// A whole number >= 0 as a double, so that no count overflows; NaN where it is none.
-double count(const std::string& word) {
-  if (word.empty() || !std::all_of(word.begin(), word.end(), [](unsigned char c) { return std::isdigit(c); }))
-    return std::nan("");
-  return std::strtod(word.c_str(), nullptr);
+struct PlyElement {
+  double count = 0.0;
+  double properties = 0.0, bytes = 0.0;  // without those of the list, which comes first
+  std::string list_size, list_entry;     // types; empty without a list
+};
+
+/// The whole number of `bytes` at `at`; -1 for a negative one.
+double listSize(const char* at, std::size_t bytes, bool has_sign, bool big_endian) {
+  std::uint64_t value = 0;
+  for (std::size_t k = 0; k < bytes; ++k)
+    value = value << 8 | static_cast<unsigned char>(at[big_endian ? k : bytes - 1 - k]);
+  return has_sign && value >> (8 * bytes - 1) ? -1.0 : static_cast<double>(value);
 }
 
-Result<PromisedCounts> checkPly(const std::string& path, std::uintmax_t bytes) {
-  const std::string text = headOf(path);
-  if (text.compare(0, 3, "ply") != 0) return unreadable(path, "is no PLY file: it does not begin with 'ply'");
-  std::istringstream head(text);
+/// Whether the data holds what the header promises. PCL takes memory for it while it looks.
+Status checkPlyData(const std::string& name, std::string_view data, const std::vector<PlyElement>& elements,
+                    bool big_endian) {
+  double at = 0.0, corners = 0.0;
+  const double end = static_cast<double>(data.size());
+  const Error truncated = unreadable(name, "is truncated or damaged in its data");
+  for (const PlyElement& element : elements) {
+    if (element.list_size.empty()) {
+      at += element.count * element.bytes;
+      if (!(at <= end)) return truncated;
+      continue;
+    }
+    const std::size_t bytes = plyBytes(element.list_size);
+    const double entry = static_cast<double>(plyBytes(element.list_entry));
+    for (double k = 0.0; k < element.count; ++k) {
+      if (!(at + static_cast<double>(bytes) <= end)) return truncated;
+      const double size =
+          listSize(data.data() + static_cast<std::size_t>(at), bytes, element.list_size[0] != 'u', big_endian);
+      if (size < 0.0) return truncated;
+      corners += size;
+      at += static_cast<double>(bytes) + size * entry + element.bytes;
+      if (!(at <= end)) return truncated;
+    }
+  }
+  return checkCounts(name, 1.0, 0.0, corners);
+}
+
+/// The same for data in text, from `from` on: so many words, in lines that PCL may hold.
+Status checkPlyText(const std::string& name, std::string_view text, std::size_t from,
+                    const std::vector<PlyElement>& elements) {
+  if (const std::string fault = notText(text, from); !fault.empty()) return unreadable(name, fault);
+  std::string_view data = text.substr(from);
+  double others = 0.0;  // than corners
+  for (const PlyElement& element : elements)
+    others += element.count * (element.properties + (element.list_size.empty() ? 0.0 : 1.0));
+  double words = 0.0;
+  std::size_t line_number = 0;
+  for (std::string_view line; nextLine(data, line);) {
+    ++line_number;
+    if (line.size() > kMaxLine)
+      return unreadable(name,
+                        "line " + std::to_string(line_number) + " after the header is longer than 65536 characters");
+    for (std::size_t k = 0; k < line.size(); ++k)
+      if (!isBlank(line[k]) && (k == 0 || isBlank(line[k - 1]))) ++words;
+  }
+  if (!(others <= words)) return unreadable(name, "is truncated or damaged in its data");
+  return checkCounts(name, 1.0, 0.0, words - others);
+}
+
+Result<PromisedCounts> checkPly(const std::string& name, std::string_view text) {
+  if (text.substr(0, 3) != "ply") return unreadable(name, "is no PLY file: it does not begin with 'ply'");
+  const double bytes = static_cast<double>(text.size());
+  std::string_view head = headOf(text);
+  const std::size_t head_size = head.size();
   double points = std::nan(""), faces = 0.0, properties = 0.0;
-  bool ended = false;
-  std::string element;
+  bool ended = false, has_faces = false;
+  std::string format, element;
+  std::vector<PlyElement> elements;
   std::vector<std::string> names;  // of the element's properties
   // PCL aborts the process on lists where it expects none: the header must be one that it knows.
-  const auto isType = [](const std::string& word) {
-    for (const char* type : {"char", "uchar", "short", "ushort", "int", "uint", "float", "double", "int8", "uint8",
-                             "int16", "uint16", "int32", "uint32", "float32", "float64"})
-      if (word == type) return true;
-    return false;
-  };
-  const auto isWhole = [&](const std::string& word) {
-    return isType(word) && word.compare(0, 5, "float") != 0 && word != "double";
-  };
-  for (std::string line; !ended && std::getline(head, line);) {
-    const std::vector<std::string> w = words(line);
-    const auto bad = [&] { return unreadable(path, "has a damaged header: '" + printable(line) + "'"); };
+  for (std::string_view line; !ended && nextLine(head, line);) {
+    const std::vector<std::string> w = wordsOf(line);
+    const auto bad = [&] {
+      return unreadable(name, "has a damaged header: '" + printable(std::string(line.substr(0, 60))) + "'");
+    };
     if (w.empty()) continue;
-    if (w[0] == "comment" || w[0] == "obj_info" || w[0] == "ply" || w[0] == "format") continue;
-    if (w[0] == "end_header") {
+    if (w[0] == "comment" || w[0] == "obj_info" || w[0] == "ply") continue;
+    if (w[0] == "format") {
+      if (w.size() < 2 || !format.empty()) return bad();
+      format = w[1];
+      if (format != "ascii" && format != "binary_little_endian" && format != "binary_big_endian") return bad();
+    } else if (w[0] == "end_header") {
       ended = true;
     } else if (w[0] == "property" && w.size() == 3) {
       // A coordinate of a whole-number type is one that no cloud has room for.
       const bool coordinate = element == "vertex" && (w[2] == "x" || w[2] == "y" || w[2] == "z");
-      if (element.empty() || !isType(w[1]) || (coordinate && isWhole(w[1]))) return bad();
+      if (element.empty() || plyBytes(w[1]) == 0 || (coordinate && isWhole(w[1]))) return bad();
       if (std::find(names.begin(), names.end(), w[2]) != names.end()) return bad();
       names.push_back(w[2]);
       properties += 1.0;
+      elements.back().properties += 1.0;
+      elements.back().bytes += static_cast<double>(plyBytes(w[1]));
     } else if (w[0] == "property" && w.size() == 5 && w[1] == "list") {
       const bool corners = w[4] == "vertex_indices" || w[4] == "vertex_index";
       if (element != "face" || !corners || !isWhole(w[2]) || !isWhole(w[3]) || !names.empty()) return bad();
       names.push_back(w[4]);
+      elements.back().list_size = w[2];
+      elements.back().list_entry = w[3];
     } else if (w[0] == "element" && w.size() == 3) {
-      const double n = count(w[2]);
+      const double n = countOf(w[2]);
       // No element is shorter than a byte.
-      if (!(n <= static_cast<double>(bytes)))
-        return unreadable(path, "promises " + printable(w[2]) + " of " + printable(w[1]) + " and is truncated");
+      if (!(n <= bytes))
+        return unreadable(name, "promises " + printable(w[2]) + " of " + printable(w[1]) + " and is truncated");
       element = w[1];
       names.clear();
+      elements.emplace_back();
+      elements.back().count = n;
       if (element == "camera" && n == 1.0) continue;  // PCL's own files have it
       if (element != "vertex" && element != "face")
-        return unreadable(path, "has the element '" + printable(element) + "'; accepted: vertex, face");
-      if (element == "vertex" ? !std::isnan(points) || faces > 0.0 : std::isnan(points)) return bad();
+        return unreadable(name, "has the element '" + printable(element) + "'; accepted: vertex, face");
+      if (element == "vertex" ? !std::isnan(points) : std::isnan(points) || has_faces) return bad();
+      has_faces = element == "face";
       (element == "vertex" ? points : faces) = n;
     } else {
       return bad();
     }
   }
-  if (!ended) return unreadable(path, "has a truncated header: it has no end_header");
+  if (!ended) return unreadable(name, "has a truncated header: it has no end_header");
+  if (format.empty()) return unreadable(name, "has a damaged header: it has no format");
   if (std::isnan(points)) points = 0.0;
-  if (Status status = checkPoints(path, points); !status) return status.error();
-  if (!(8.0 * properties * points <= static_cast<double>(kMaxBytes)))
-    return unreadable(path, "has properties that need more than 512 MiB");
+  if (Status status = checkCounts(name, points, faces, 0.0); !status) return status.error();
+  if (!(8.0 * properties * points <= static_cast<double>(kMaxMeshBytes)))
+    return unreadable(name, "has properties that need more than 512 MiB");
+  const std::size_t data = head_size - head.size();
+  const Status held = format == "ascii"
+                          ? checkPlyText(name, text, data, elements)
+                          : checkPlyData(name, text.substr(data), elements, format == "binary_big_endian");
+  if (!held) return held.error();
   PromisedCounts promised;
   promised.points = static_cast<std::size_t>(points);
   promised.faces = static_cast<std::size_t>(faces);
   return promised;
 }
 
-Result<PromisedCounts> checkStl(const std::string& path, std::uintmax_t bytes) {
-  std::ifstream in(path, std::ios::binary);
-  std::array<char, 84> head{};
-  in.read(head.data(), head.size());
-  const bool whole_header = in.gcount() == static_cast<std::streamsize>(head.size());
+Result<PromisedCounts> checkStl(const std::string& name, std::string_view text) {
+  const std::uint64_t bytes = text.size();
+  const bool whole_header = bytes >= 84;
   std::uint32_t faces = 0;
-  std::memcpy(&faces, head.data() + 80, sizeof faces);
+  if (whole_header) std::memcpy(&faces, text.data() + 80, sizeof faces);
   if (whole_header && 84 + 50ull * faces == bytes) {
-    if (faces == 0) return Error{ErrorCode::kUnsuitableShape, "'" + fileName(path) + "' has no triangles"};
-    if (Status status = checkPoints(path, 3.0 * faces / 4.0); !status) return status.error();
+    if (faces == 0) return Error{ErrorCode::kUnsuitableShape, "'" + name + "' has no triangles"};
+    if (Status status = checkCounts(name, 3.0 * faces / 4.0, faces, 0.0); !status) return status.error();
     return PromisedCounts{};
   }
-  if (std::strncmp(head.data(), "solid", 5) != 0) {
-    if (!whole_header) return unreadable(path, "is no STL file, or truncated");
+  if (text.substr(0, 5) != "solid") {
+    if (!whole_header) return unreadable(name, "is no STL file, or truncated");
     std::ostringstream what;
     what << "promises " << faces << " triangles and is " << (84 + 50ull * faces > bytes ? "truncated" : "longer");
-    return unreadable(path, what.str());
+    return unreadable(name, what.str());
   }
   // Text; its end is a line "endsolid NAME".
-  in.clear();
-  const std::uintmax_t tail = std::min<std::uintmax_t>(bytes, kMaxHeader);
-  in.seekg(static_cast<std::streamoff>(bytes - tail));
-  std::string end(static_cast<std::size_t>(tail), '\0');
-  in.read(&end[0], static_cast<std::streamsize>(tail));
-  if (lower(end).find("endsolid") == std::string::npos) return unreadable(path, "is truncated: it has no endsolid");
+  const std::string_view tail = text.substr(bytes - std::min<std::size_t>(bytes, kMaxHeader));
+  if (lowerCase(tail).find("endsolid") == std::string::npos)
+    return unreadable(name, "is truncated: it has no endsolid");
   // The reader takes a file with other bytes for a binary one, and makes room for as many triangles as they spell.
-  in.clear();
-  in.seekg(0);
-  std::string block(kMaxHeader, '\0');
-  for (std::uintmax_t at = 0; at < bytes; at += block.size()) {
-    in.read(&block[0], static_cast<std::streamsize>(block.size()));
-    const auto read = static_cast<std::size_t>(std::max<std::streamsize>(0, in.gcount()));
-    for (std::size_t i = 0; i < read; ++i) {
-      const auto c = static_cast<unsigned char>(block[i]);
-      if (c > 126 || (c < 32 && c != '\n' && c != '\r' && c != '\t'))
-        return unreadable(path,
-                          "begins as text and has the byte " + std::to_string(c) + " at " + std::to_string(at + i));
-    }
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    const auto c = static_cast<unsigned char>(text[at]);
+    if (c > 126 || (c < 32 && c != '\n' && c != '\r' && c != '\t'))
+      return unreadable(name, "begins as text and has the byte " + std::to_string(c) + " at " + std::to_string(at));
   }
   return PromisedCounts{};
 }
 
 }  // namespace
 
-Result<MeshFormat> meshFormatOf(const std::string& path) {
-  const std::string ending = lower(std::filesystem::path(path).extension().string());
+Status checkCounts(const std::string& name, double points, double faces, double corners) {
+  if (!(points >= 1.0)) return Error{ErrorCode::kUnsuitableShape, "'" + name + "' has no points"};
+  const auto tooMany = [&](double n, const char* of, std::size_t most) {
+    std::ostringstream text;
+    text.precision(15);
+    text << "'" << name << "' has " << n << " " << of << "; accepted: up to " << most;
+    return Error{ErrorCode::kUnsuitableShape, text.str()};
+  };
+  if (!(points <= static_cast<double>(kMaxPoints))) return tooMany(points, "points", kMaxPoints);
+  if (!(faces <= static_cast<double>(kMaxFaces))) return tooMany(faces, "faces", kMaxFaces);
+  if (!(corners <= static_cast<double>(kMaxCorners))) return tooMany(corners, "corners of faces", kMaxCorners);
+  return Done{};
+}
+
+Result<MeshFormat> meshFormatOf(const std::string& name) {
+  const std::string ending = lowerCase(std::filesystem::path(name).extension().string());
   if (ending == ".pcd") return MeshFormat::kPcd;
   if (ending == ".ply") return MeshFormat::kPly;
   if (ending == ".obj") return MeshFormat::kObj;
   if (ending == ".stl") return MeshFormat::kStl;
   if (ending == ".vtk") return MeshFormat::kVtk;
-  return unreadable(path, "is of an unknown kind; accepted endings: .pcd, .ply, .obj, .stl, .vtk");
+  return unreadable(name, "is of an unknown kind; accepted endings: .pcd, .ply, .obj, .stl, .vtk");
 }
 
-Result<PromisedCounts> checkBeforeReading(const std::string& path, MeshFormat format) {
-  std::error_code failed;
-  if (!std::filesystem::is_regular_file(path, failed)) return unreadable(path, "is missing");
-  const std::uintmax_t bytes = std::filesystem::file_size(path, failed);
-  if (failed || !std::ifstream(path)) return unreadable(path, "cannot be opened");
-  if (bytes == 0) return unreadable(path, "is empty");
-  if (bytes > kMaxBytes)
-    return unreadable(path, "has " + std::to_string(bytes) + " bytes; accepted: up to 536870912 (512 MiB)");
+Result<PromisedCounts> checkBeforeReading(const std::string& name, std::string_view text, MeshFormat format) {
+  if (text.empty()) return unreadable(name, "is empty");
   switch (format) {
     case MeshFormat::kPly:
-      return checkPly(path, bytes);
+      return checkPly(name, text);
     case MeshFormat::kStl:
-      return checkStl(path, bytes);
+      return checkStl(name, text);
     case MeshFormat::kPcd:  // for these, what makes them plain looks at every number
     case MeshFormat::kVtk:
     case MeshFormat::kObj:
@@ -212,35 +254,33 @@ Result<PromisedCounts> checkBeforeReading(const std::string& path, MeshFormat fo
   return PromisedCounts{};
 }
 
-Result<std::string> plainObj(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) return unreadable(path, "cannot be opened");
+Result<std::string> plainObj(const std::string& name, std::string_view text) {
+  if (const std::string fault = notText(text); !fault.empty()) return unreadable(name, fault);
   std::string plain;
-  std::size_t points = 0, line_number = 0;
+  std::size_t points = 0, faces = 0, corners = 0, line_number = 0;
   const auto bad = [&](const std::string& what) {
-    return unreadable(path, "line " + std::to_string(line_number) + ": " + what);
+    return unreadable(name, "line " + std::to_string(line_number) + ": " + what);
   };
-  for (std::string line; std::getline(in, line);) {
+  for (std::string_view line; nextLine(text, line);) {
     ++line_number;
-    if (line.size() > 1 << 16) return bad("is longer than 65536 characters");
-    const char first = line.find_first_not_of(" \t") == std::string::npos ? '\0' : line[line.find_first_not_of(" \t")];
-    if (first != 'v' && first != 'f') continue;
-    const std::vector<std::string> w = words(line);
+    if (line.size() > kMaxLine) return bad("is longer than 65536 characters");
+    const std::size_t first = line.find_first_not_of(" \t");
+    if (first == std::string_view::npos || (line[first] != 'v' && line[first] != 'f')) continue;
+    const std::vector<std::string> w = wordsOf(line);
     if (w[0] == "v") {
       if (w.size() < 4) return bad("a vertex needs three numbers, it has " + std::to_string(w.size() - 1));
       plain += "v";
       for (std::size_t k = 1; k < 4; ++k) {
-        char* end = nullptr;
-        const double x = std::strtod(w[k].c_str(), &end);
-        if (*end != '\0') return bad("'" + w[k].substr(0, 30) + "' is no number");
+        const std::optional<double> x = numberOf(w[k]);
+        if (!x) return bad("'" + w[k].substr(0, 30) + "' is no number");
         // What float cannot hold becomes NaN, for the check of the mesh to name.
         char number[32] = "nan";
-        if (std::abs(x) <= 3.4e38) std::snprintf(number, sizeof number, "%.9g", std::abs(x) < 1e-37 ? 0.0 : x);
+        if (std::abs(*x) <= 3.4e38) std::snprintf(number, sizeof number, "%.9g", std::abs(*x) < 1e-37 ? 0.0 : *x);
         plain += " ";
         plain += number;
       }
       plain += "\n";
-      if (++points > kMaxPoints) return checkPoints(path, static_cast<double>(points)).error();
+      ++points;
     } else if (w[0] == "f") {
       if (w.size() < 4) return bad("a face needs three corners, it has " + std::to_string(w.size() - 1));
       if (w.size() > kMaxPolygon + 1) return bad("a face has more than 1000 corners");
@@ -257,9 +297,17 @@ Result<std::string> plainObj(const std::string& path) {
         plain += " " + std::to_string(absolute);
       }
       plain += "\n";
+      ++faces;
+      corners += w.size() - 1;
+    } else {
+      continue;
     }
+    if (points > kMaxPoints || faces > kMaxFaces || corners > kMaxCorners) break;
   }
-  if (points == 0) return Error{ErrorCode::kUnsuitableShape, "'" + fileName(path) + "' has no points"};
+  if (Status status =
+          checkCounts(name, static_cast<double>(points), static_cast<double>(faces), static_cast<double>(corners));
+      !status)
+    return status.error();
   return plain;
 }
 

@@ -2,40 +2,51 @@
 // for them), and the one for OBJ writes past its array where there are more normals than vertices and opens the
 // material files that are named; VTK's follows damaged cells out of its arrays, and PCD's damaged headers. So counts
 // are held against the file's size first, and PCD, OBJ and VTK are handed over rewritten, as their points and faces
-// alone.
+// alone. Everything works on the bytes that were read once: `name` is for messages.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "meshless_surgery/base/result.h"
 
 namespace meshless {
 
+constexpr std::uint64_t kMaxMeshBytes = 512ull << 20;
+constexpr std::size_t kMaxPoints = 2000000;
+constexpr std::size_t kMaxFaces = 8000000;     // a closed surface has twice as many triangles as points
+constexpr std::size_t kMaxCorners = 32000000;  // of all faces together
+
 enum class MeshFormat { kPcd, kPly, kObj, kStl, kVtk };
 
 /// By the file's ending, in any case.
-Result<MeshFormat> meshFormatOf(const std::string& path);
+Result<MeshFormat> meshFormatOf(const std::string& name);
 
 /// What the file's header promises; empty where the format promises nothing.
 struct PromisedCounts {
   std::optional<std::size_t> points, faces;
 };
 
-/// Refuses kUnreadable (missing, empty, too large, truncated as far as it can be seen without reading, bad header) and
-/// kUnsuitableShape (no points, more than 2,000,000).
-Result<PromisedCounts> checkBeforeReading(const std::string& path, MeshFormat format);
+// Each refuses kUnreadable and kUnsuitableShape.
+
+/// Empty, truncated as far as it can be seen without reading, bad header; no points, too many points or faces.
+Result<PromisedCounts> checkBeforeReading(const std::string& name, std::string_view text, MeshFormat format);
 
 /// The points of a PCD file as a binary one with x, y and z alone; a compressed one keeps its fields and gets a checked
-/// header. `promised` gets their number. Refuses kUnreadable and kUnsuitableShape.
-Result<std::string> plainPcd(const std::string& path, PromisedCounts& promised);
+/// header. `promised` gets their number.
+Result<std::string> plainPcd(const std::string& name, std::string_view text, PromisedCounts& promised);
 
 /// The points and polygons of a legacy VTK file (versions up to 5.1, POLYDATA) as a binary one of version 3.0 that
-/// holds nothing else. `promised` gets what it holds. Refuses kUnreadable and kUnsuitableShape.
-Result<std::string> plainVtk(const std::string& path, PromisedCounts& promised);
+/// holds nothing else. `promised` gets what it holds.
+Result<std::string> plainVtk(const std::string& name, std::string_view text, PromisedCounts& promised);
 
 /// The lines of an OBJ file that make its shape: "v x y z" and "f a b c ...", texture and normal numbers left out.
-Result<std::string> plainObj(const std::string& path);
+Result<std::string> plainObj(const std::string& name, std::string_view text);
+
+/// Refuses none and more than 2,000,000, more than 8,000,000 faces and 32,000,000 corners.
+Status checkCounts(const std::string& name, double points, double faces, double corners);
 
 }  // namespace meshless

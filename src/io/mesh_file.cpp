@@ -3,9 +3,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <string_view>
+#include <utility>
 
 #include <pcl/PCLPointCloud2.h>
 #include <pcl/PolygonMesh.h>
@@ -17,6 +20,7 @@
 
 #include "mesh_check_before.h"
 #include "meshless_surgery/io/files.h"
+#include "opened_file.h"
 
 namespace meshless {
 namespace {
@@ -40,13 +44,14 @@ class QuietPcl {
   int vtk_;
 };
 
-/// A text that only this process can open as a file.
+/// A text that only this process can open as a file, for readers that want a name.
 class MemoryFile {
  public:
-  explicit MemoryFile(const std::string& text) : descriptor_(memfd_create("obj", MFD_CLOEXEC)) {
+  explicit MemoryFile(std::string_view text) : descriptor_(memfd_create("mesh", MFD_CLOEXEC)) {
     std::size_t written = 0;
     while (descriptor_ >= 0 && written < text.size()) {
       const ssize_t n = write(descriptor_, text.data() + written, text.size() - written);
+      if (n < 0 && errno == EINTR) continue;
       if (n <= 0) break;
       written += static_cast<std::size_t>(n);
     }
@@ -55,6 +60,8 @@ class MemoryFile {
   ~MemoryFile() {
     if (descriptor_ >= 0) close(descriptor_);
   }
+  MemoryFile(MemoryFile&& other) noexcept
+      : descriptor_(std::exchange(other.descriptor_, -1)), whole_(std::exchange(other.whole_, false)) {}
   MemoryFile(const MemoryFile&) = delete;
   MemoryFile& operator=(const MemoryFile&) = delete;
 
@@ -164,36 +171,44 @@ Result<TriangleMesh> convert(const pcl::PolygonMesh& read, const PromisedCounts&
         mesh.vertices.end());
   if (mesh.vertices.empty())
     return Error{ErrorCode::kUnsuitableShape, "'" + name + "' has no points (or none that is finite)"};
-  if (mesh.vertices.size() > 2000000)
-    return Error{ErrorCode::kUnsuitableShape,
-                 "'" + name + "' has " + std::to_string(mesh.vertices.size()) + " points; accepted: up to 2000000"};
+  if (Status status = checkCounts(name, static_cast<double>(mesh.vertices.size()), 0.0, 0.0); !status)
+    return status.error();
   return mesh;
+}
+
+/// What PCL is to read, in memory: the file as it is, or rewritten. What was read of the file is gone afterwards.
+Result<MemoryFile> fileForPcl(const std::string& real_path, const std::string& name, MeshFormat format,
+                              PromisedCounts& promised) {
+  const Result<FileBytes> read = readFile(real_path, kMaxMeshBytes);
+  if (!read) return Error{read.error().code, "'" + name + "' " + read.error().detail};
+  const std::string_view text = read->text();
+  const Result<PromisedCounts> checked = checkBeforeReading(name, text, format);
+  if (!checked) return checked.error();
+  promised = *checked;
+  if (format == MeshFormat::kPly || format == MeshFormat::kStl) return MemoryFile(text);
+  const Result<std::string> plain = format == MeshFormat::kObj   ? plainObj(name, text)
+                                    : format == MeshFormat::kVtk ? plainVtk(name, text, promised)
+                                                                 : plainPcd(name, text, promised);
+  if (!plain) return plain.error();
+  return MemoryFile(*plain);
 }
 
 }  // namespace
 
 Result<TriangleMesh> readMeshFile(const std::string& real_path) {
   const std::string name = std::filesystem::path(real_path).filename().string();
-  const Result<MeshFormat> format = meshFormatOf(real_path);
+  const Result<MeshFormat> format = meshFormatOf(name);
   if (!format) return format.error();
-  Result<PromisedCounts> promised = checkBeforeReading(real_path, *format);
-  if (!promised) return promised.error();
-  pcl::PolygonMesh mesh;
   // PCL and VTK throw for bad input, and for memory.
   try {
-    if (*format != MeshFormat::kPly && *format != MeshFormat::kStl) {
-      const Result<std::string> plain = *format == MeshFormat::kObj   ? plainObj(real_path)
-                                        : *format == MeshFormat::kVtk ? plainVtk(real_path, *promised)
-                                                                      : plainPcd(real_path, *promised);
-      if (!plain) return plain.error();
-      const MemoryFile file(*plain);
-      if (!file.ok()) return Error{ErrorCode::kFailed, "there is no memory to read '" + name + "'"};
-      if (!readWithPcl(file.path(), *format, mesh))
-        return Error{ErrorCode::kUnreadable, "'" + name + "' cannot be read"};
-    } else if (!readWithPcl(real_path, *format, mesh)) {
+    PromisedCounts promised;
+    const Result<MemoryFile> file = fileForPcl(real_path, name, *format, promised);
+    if (!file) return file.error();
+    if (!file->ok()) return Error{ErrorCode::kFailed, "there is no memory to read '" + name + "'"};
+    pcl::PolygonMesh mesh;
+    if (!readWithPcl(file->path(), *format, mesh))
       return Error{ErrorCode::kUnreadable, "'" + name + "' cannot be read: it is truncated or damaged"};
-    }
-    return convert(mesh, *promised, name);
+    return convert(mesh, promised, name);
   } catch (const std::exception& e) {
     return Error{ErrorCode::kUnreadable, "'" + name + "' cannot be read: " + e.what()};
   }

@@ -1,23 +1,17 @@
-#include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <sstream>
 #include <vector>
 
 #include "mesh_check_before.h"
+#include "text_words.h"
 
 namespace meshless {
 namespace {
 
-constexpr double kMaxPoints = 2000000;
-constexpr double kMaxBytes = 512.0 * 1024 * 1024;
+// LZF writes at most 264 bytes for three that it reads.
+constexpr double kMostUnpacked = 88.0;
 
 struct Field {
   std::string name;
@@ -34,21 +28,14 @@ struct Header {
   std::string data;
 };
 
-/// A whole number >= 0; NaN where it is none.
-double count(const std::string& word) {
-  if (word.empty() || !std::all_of(word.begin(), word.end(), [](unsigned char c) { return std::isdigit(c); }))
-    return std::nan("");
-  return std::strtod(word.c_str(), nullptr);
-}
-
-/// What is wrong with the header, or an empty text. Leaves the stream at the data.
-std::string readHeader(std::istream& in, Header& header) {
+/// What is wrong with the header, or an empty text. Leaves `text` at the data.
+std::string readHeader(std::string_view& text, Header& header) {
   std::vector<std::string> names, sizes, types, counts;
   double width = std::nan(""), height = 1.0, points = std::nan("");
-  std::size_t read = 0;
-  for (std::string line; header.data.empty() && read < (1 << 16) && std::getline(in, line); read += line.size() + 1) {
-    std::istringstream text(line);
-    std::vector<std::string> w(std::istream_iterator<std::string>(text), {});
+  std::string_view head = headOf(text);
+  const std::size_t head_size = head.size();
+  for (std::string_view line; header.data.empty() && nextLine(head, line);) {
+    std::vector<std::string> w = wordsOf(line);
     if (w.size() < 2) continue;
     const std::string key = w[0];
     w.erase(w.begin());
@@ -56,11 +43,12 @@ std::string readHeader(std::istream& in, Header& header) {
     if (key == "SIZE") sizes = w;
     if (key == "TYPE") types = w;
     if (key == "COUNT") counts = w;
-    if (key == "WIDTH") width = count(w[0]);
-    if (key == "HEIGHT") height = count(w[0]);
-    if (key == "POINTS") points = count(w[0]);
+    if (key == "WIDTH") width = countOf(w[0]);
+    if (key == "HEIGHT") height = countOf(w[0]);
+    if (key == "POINTS") points = countOf(w[0]);
     if (key == "DATA") header.data = w[0];
   }
+  text.remove_prefix(head_size - head.size());
   if (header.data.empty()) return "is no PCD file, or its header is truncated: it has no DATA line";
   if (header.data != "ascii" && header.data != "binary" && header.data != "binary_compressed")
     return "has DATA " + header.data.substr(0, 20) + "; accepted: ascii, binary, binary_compressed";
@@ -74,8 +62,8 @@ std::string readHeader(std::istream& in, Header& header) {
     Field field;
     field.name = names[k];
     field.type = types[k][0];
-    field.size = count(sizes[k]);
-    field.count = count(counts[k]);
+    field.size = countOf(sizes[k]);
+    field.count = countOf(counts[k]);
     field.offset = header.step;
     field.column = header.columns;
     const bool real = field.type == 'F' && (field.size == 4 || field.size == 8);
@@ -91,7 +79,9 @@ std::string readHeader(std::istream& in, Header& header) {
   }
   for (int at : header.xyz)
     if (at < 0) return "has no fields x, y and z of float or double";
-  if (header.points <= kMaxPoints && header.step * header.points > kMaxBytes) return "needs more than 512 MiB";
+  if (header.points <= static_cast<double>(kMaxPoints) &&
+      header.step * header.points > static_cast<double>(kMaxMeshBytes))
+    return "needs more than 512 MiB";
   return {};
 }
 
@@ -109,29 +99,35 @@ std::string headerText(const std::vector<Field>& fields, double points, const st
          "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + n + "\nDATA " + data + "\n";
 }
 
+/// The coordinates of one line's point behind `out`; false where it has other columns or they are no numbers.
+bool decodeLine(const Header& header, std::string_view line, std::string& out) {
+  double xyz[3], column = 0.0;
+  for (std::string_view word = nextWord(line); !word.empty(); word = nextWord(line), ++column) {
+    if (column >= header.columns) return false;
+    for (int d = 0; d < 3; ++d) {
+      if (header.fields[static_cast<std::size_t>(header.xyz[d])].column != column) continue;
+      const std::optional<double> x = numberOf(word);
+      if (!x) return false;
+      xyz[d] = *x;
+    }
+  }
+  if (column != header.columns) return false;
+  out.append(reinterpret_cast<const char*>(xyz), sizeof xyz);
+  return true;
+}
+
 /// x, y, z of every point as doubles; false where the data ends first or a coordinate is no number.
-bool decode(const Header& header, const std::string& body, std::string& out) {
+bool decode(const Header& header, std::string_view body, std::string& out) {
   const std::size_t n = static_cast<std::size_t>(header.points);
   if (header.data == "ascii") {
-    std::istringstream lines(body);
-    std::vector<std::string> w;
-    for (std::size_t k = 0; k < n;) {
-      std::string line;
-      if (!std::getline(lines, line)) return false;
-      std::istringstream text(line);
-      w.assign(std::istream_iterator<std::string>(text), {});
-      if (w.empty()) continue;
-      if (static_cast<double>(w.size()) != header.columns) return false;
-      for (int at : header.xyz) {
-        const std::string& word = w[static_cast<std::size_t>(header.fields[at].column)];
-        char* end = nullptr;
-        const double x = std::strtod(word.c_str(), &end);
-        if (*end != '\0') return false;
-        out.append(reinterpret_cast<const char*>(&x), sizeof x);
-      }
+    std::size_t k = 0;
+    for (std::string_view line; k < n && nextLine(body, line);) {
+      std::string_view rest = line;
+      if (nextWord(rest).empty()) continue;
+      if (!decodeLine(header, line, out)) return false;
       ++k;
     }
-    return true;
+    return k == n;
   }
   const std::size_t step = static_cast<std::size_t>(header.step);
   if (n * step > body.size()) return false;
@@ -153,36 +149,32 @@ bool decode(const Header& header, const std::string& body, std::string& out) {
 
 }  // namespace
 
-Result<std::string> plainPcd(const std::string& path, PromisedCounts& promised) {
-  const std::string name = "'" + std::filesystem::path(path).filename().string() + "' ";
-  std::ifstream in(path, std::ios::binary);
-  if (!in) return Error{ErrorCode::kUnreadable, name + "cannot be opened"};
+Result<std::string> plainPcd(const std::string& name, std::string_view text, PromisedCounts& promised) {
+  const auto unreadable = [&](const std::string& what) {
+    return Error{ErrorCode::kUnreadable, "'" + name + "' " + what};
+  };
   Header header;
-  const std::string fault = readHeader(in, header);
-  if (!fault.empty()) return Error{ErrorCode::kUnreadable, name + fault};
-  if (!(header.points >= 1.0)) return Error{ErrorCode::kUnsuitableShape, name + "has no points"};
-  if (!(header.points <= kMaxPoints)) {
-    std::ostringstream text;
-    text << name << "has " << header.points << " points; accepted: up to 2000000";
-    return Error{ErrorCode::kUnsuitableShape, text.str()};
-  }
+  std::string_view body = text;
+  if (const std::string fault = readHeader(body, header); !fault.empty()) return unreadable(fault);
+  if (Status status = checkCounts(name, header.points, 0.0, 0.0); !status) return status.error();
   promised.points = static_cast<std::size_t>(header.points);
-  const std::string body(std::istreambuf_iterator<char>(in), {});
   if (header.data == "binary_compressed") {
     std::uint32_t sizes[2] = {0, 0};  // packed, unpacked
     if (body.size() >= sizeof sizes) std::memcpy(sizes, body.data(), sizeof sizes);
-    if (body.size() < sizeof sizes || sizes[0] > body.size() - sizeof sizes || sizes[1] != header.step * header.points)
-      return Error{ErrorCode::kUnreadable, name + "is truncated or damaged in its compressed data"};
-    return headerText(header.fields, header.points, header.data) + body;
+    if (body.size() < sizeof sizes || sizes[0] > body.size() - sizeof sizes ||
+        sizes[1] != header.step * header.points || sizes[1] > kMostUnpacked * sizes[0])
+      return unreadable("is truncated or damaged in its compressed data");
+    return headerText(header.fields, header.points, header.data).append(body.substr(0, sizeof sizes + sizes[0]));
   }
+  if (header.data == "ascii")
+    if (const std::string fault = notText(text); !fault.empty()) return unreadable(fault);
   std::vector<Field> fields(3);
   for (int d = 0; d < 3; ++d) {
     fields[d].name = std::string(1, "xyz"[d]);
     fields[d].size = 8;
   }
   std::string plain = headerText(fields, header.points, "binary");
-  if (!decode(header, body, plain))
-    return Error{ErrorCode::kUnreadable, name + "is truncated or damaged in its points"};
+  if (!decode(header, body, plain)) return unreadable("is truncated or damaged in its points");
   return plain;
 }
 

@@ -301,7 +301,8 @@ class SceneReader {
     if (const YAML::Node pose = map.get("pose"); pose.IsDefined()) shape.pose = readPose(source_, pose);
     const YAML::Node file = map.get("file"), primitive = map.get("primitive");
     if (file.IsDefined() == primitive.IsDefined())
-      source_.fail(node, file.IsDefined() ? "an obstacle has file and primitive" : "an obstacle has no file and no primitive",
+      source_.fail(node,
+                   file.IsDefined() ? "an obstacle has file and primitive" : "an obstacle has no file and no primitive",
                    "one of them");
     map.finish();
     if (source_.fault) return;
@@ -403,31 +404,38 @@ class SceneReader {
   std::map<std::pair<std::string, double>, LoadedShape> shapes_;  // copies and repeated files are read once
 };
 
-/// Material folders that there are and that may be read, each once.
-std::vector<std::string> materialFolders(const std::string& scene_folder, const FileAccess& access) {
-  std::vector<std::string> folders;
+/// Adds the materials of config/materials of this package, and of the files in ../materials.
+Status readMaterialFolders(const std::string& scene_folder, const FileAccess& access,
+                           std::map<std::string, Material>& materials) {
   const auto realFolder = [](const fs::path& folder) {
     std::error_code failed;
     const fs::path real = fs::canonical(folder, failed);
     return !failed && fs::is_directory(real, failed) ? real.string() : std::string();
   };
+  std::string shared;
   if (access.find_package) {
     const std::string package = access.find_package("meshless_surgery");
-    const std::string real = package.empty() ? "" : realFolder(fs::path(package) / "config" / "materials");
-    if (!real.empty()) folders.push_back(real);
+    shared = package.empty() ? "" : realFolder(fs::path(package) / "config" / "materials");
+    if (!shared.empty()) {
+      Result<std::map<std::string, Material>> read = readMaterials(shared);
+      if (!read) return read.error();
+      materials = std::move(*read);
+    }
   }
   const std::string beside = realFolder(fs::path(scene_folder) / ".." / "materials");
-  if (beside.empty() || std::find(folders.begin(), folders.end(), beside) != folders.end()) return folders;
+  if (beside.empty() || beside == shared) return Done{};
   // The same rule as for meshes, links resolved: every file in it may be read, or none is.
-  bool any = false, all = true;
+  std::map<std::string, std::string> files;  // by name
   std::error_code failed;
   for (fs::directory_iterator at(beside, failed), end; !failed && at != end; at.increment(failed)) {
     if (at->path().extension() != ".yaml") continue;
-    any = true;
-    all = all && access.resolve(at->path().string(), "").ok();
+    const Result<std::string> real = access.resolve(at->path().string(), "");
+    if (!real) return Done{};
+    files[at->path().string()] = *real;
   }
-  if (any && all) folders.push_back(beside);
-  return folders;
+  for (const auto& [name, real] : files)
+    if (Status read = readMaterialFile(real, name, materials); !read) return read;
+  return Done{};
 }
 
 }  // namespace
@@ -442,13 +450,13 @@ Result<SceneDef> readScene(const std::string& file, const FileAccess& access) {
 
   SceneDef scene;
   scene.name = real.stem().string();
-  for (const std::string& folder : materialFolders(real.parent_path().string(), scene_access)) {
-    Result<std::map<std::string, Material>> materials = readMaterials(folder);
-    if (!materials) return materials.error();
-    for (auto& entry : *materials) scene.materials[entry.first] = std::move(entry.second);
-  }
+  if (Status read = readMaterialFolders(real.parent_path().string(), scene_access, scene.materials); !read)
+    return read.error();
   const Result<YAML::Node> root = readYamlFile(real.string(), file);
   if (!root) return root.error();
+  // What it is instead is not shown: any file may be named as the scene.
+  if (!root->IsMap())
+    return Error{ErrorCode::kInvalidArgument, file + ": the scene is not a map; accepted: a map of keys and values"};
   YamlSource source{file, {}};
   try {
     SceneReader(source, real.parent_path().string(), scene_access, scene).read(*root);

@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <iterator>
 #include <sstream>
 
 #include <yaml-cpp/eventhandler.h>
+
+#include "opened_file.h"
 
 namespace meshless {
 namespace {
@@ -145,15 +146,9 @@ Result<YAML::Node> parseYaml(const std::string& text, const std::string& name) {
 }
 
 Result<YAML::Node> readYamlFile(const std::string& real_path, const std::string& name) {
-  std::ifstream in(real_path, std::ios::binary);
-  if (!in) return Error{ErrorCode::kUnreadable, name + ": cannot be opened"};
-  std::string text(kMaxBytes + 1, '\0');
-  in.read(&text[0], static_cast<std::streamsize>(text.size()));
-  if (in.bad() || (in.fail() && !in.eof())) return Error{ErrorCode::kUnreadable, name + ": cannot be read"};
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  if (text.size() > kMaxBytes)
-    return Error{ErrorCode::kUnreadable, name + ": is larger than 1 MiB; accepted: up to 1048576 bytes"};
-  return parseYaml(text, name);
+  const Result<FileBytes> read = readFile(real_path, kMaxBytes);
+  if (!read) return Error{read.error().code, name + ": " + read.error().detail};
+  return parseYaml(std::string(read->text()), name);
 }
 
 std::string shown(const YAML::Node& value) {

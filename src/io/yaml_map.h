@@ -23,7 +23,8 @@ struct YamlSource {
             ErrorCode code = ErrorCode::kInvalidArgument);
 };
 
-/// One document of at most 1 MiB. Refuses kUnreadable, or kInvalidArgument with the line where it is no YAML.
+/// One document of at most 1 MiB. `real_path` has no links in it; `name` is for messages. Refuses kUnreadable, or
+/// kInvalidArgument with the line where it is no YAML.
 Result<YAML::Node> readYamlFile(const std::string& real_path, const std::string& name);
 Result<YAML::Node> parseYaml(const std::string& text, const std::string& name);
 

@@ -18,7 +18,7 @@ inline const std::string& folder() {
   static const std::string path = [] {
     const auto made = std::filesystem::temp_directory_path() / ("meshless_fuzz_" + std::to_string(::getpid()));
     std::filesystem::create_directories(made);
-    return made.string();
+    return std::filesystem::canonical(made).string();  // as files are read: without links
   }();
   return path;
 }

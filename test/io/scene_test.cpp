@@ -241,6 +241,14 @@ TEST_F(Scene, FaultsAreNamedWithFileLineValueAndRange) {
   }
 }
 
+TEST_F(Scene, AnotherFileThatIsNamedIsNotShown) {
+  for (const char* text : {"root:x:0:0:root:/root:/bin/bash\n", "- root\n- x\n", "{root\n"}) {
+    const Error error = bad(text);
+    EXPECT_FALSE(says(error, "root")) << error.detail;
+  }
+  EXPECT_TRUE(says(bad("root:x:0:0\n"), "the scene is not a map"));
+}
+
 TEST_F(Scene, ErrorsHaveTheirCodes) {
   EXPECT_EQ(bad("bodies: [{file: /etc/passwd}]\n").code, ErrorCode::kForbidden);
   EXPECT_EQ(bad("bodies: [{file: none.obj}]\n").code, ErrorCode::kUnreadable);

@@ -15,13 +15,15 @@ struct FileAccess {
   std::function<std::string(const std::string& package)> find_package;
 
   /// The real path of an existing regular file below one of the folders. A relative path is taken from `base_folder`.
+  /// What reads a file opens it once and refuses it where it does not lie at that very path any more.
   Result<std::string> resolve(const std::string& path, const std::string& base_folder) const;
 };
 
-/// Through PCL: PCD, PLY, OBJ, STL, VTK by the file's ending. Polygons are split into triangles. A file without faces is
-/// a cloud: mesh.triangles is empty. Refuses kUnreadable (missing, truncated, unknown ending, more than 512 MiB) and
-/// kUnsuitableShape (no points, more than 2,000,000 points). Non-finite points are left to repairMesh to name, for
-/// surfaces; in clouds they are dropped.
+/// Through PCL: PCD, PLY, OBJ, STL, VTK by the file's ending. Polygons are split into triangles. A file without faces
+/// is a cloud: mesh.triangles is empty. `real_path` has no links in it, as FileAccess::resolve gives it. Refuses
+/// kUnreadable (missing, replaced meanwhile, truncated, unknown ending, more than 512 MiB) and kUnsuitableShape (no
+/// points, more than 2,000,000 points, 8,000,000 faces or 32,000,000 corners of them). Non-finite points are left to
+/// repairMesh to name, for surfaces; in clouds they are dropped.
 Result<TriangleMesh> readMeshFile(const std::string& real_path);
 
 /// A mesh or cloud from a file made into what a body needs: scaled, a cloud turned into a closed surface, repaired.

@@ -1,0 +1,86 @@
+// Lines and words of a text where they stand: nothing is copied, however long they are.
+#pragma once
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace meshless {
+
+constexpr std::size_t kMaxHeader = 1 << 16;  // bytes
+constexpr std::size_t kMaxLine = 1 << 16;    // characters
+constexpr std::size_t kMaxNumber = 4096;     // characters
+
+inline bool isBlank(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
+
+/// Takes the next line off `rest`, without its end; false where there is none.
+inline bool nextLine(std::string_view& rest, std::string_view& line) {
+  if (rest.empty()) return false;
+  const std::size_t end = std::min(rest.find('\n'), rest.size());
+  line = rest.substr(0, end);
+  rest.remove_prefix(std::min(end + 1, rest.size()));
+  return true;
+}
+
+/// Takes the next word off `rest`; empty where there is none.
+inline std::string_view nextWord(std::string_view& rest) {
+  std::size_t from = 0;
+  while (from < rest.size() && isBlank(rest[from])) ++from;
+  std::size_t to = from;
+  while (to < rest.size() && !isBlank(rest[to])) ++to;
+  const std::string_view word = rest.substr(from, to - from);
+  rest.remove_prefix(to);
+  return word;
+}
+
+/// For lines of bounded length.
+inline std::vector<std::string> wordsOf(std::string_view line) {
+  std::vector<std::string> all;
+  for (std::string_view word = nextWord(line); !word.empty(); word = nextWord(line)) all.emplace_back(word);
+  return all;
+}
+
+/// The whole lines at the start, as far as a header may reach.
+inline std::string_view headOf(std::string_view text) {
+  if (text.size() <= kMaxHeader) return text;
+  const std::string_view head = text.substr(0, kMaxHeader);
+  const std::size_t end = head.rfind('\n');
+  return head.substr(0, end == std::string_view::npos ? 0 : end + 1);
+}
+
+/// What is wrong with the bytes of a text from `from` on, for a message; empty where they may be one.
+inline std::string notText(std::string_view text, std::size_t from = 0) {
+  const std::size_t at = text.find('\0', from);
+  return at == std::string_view::npos ? "" : "has the byte 0 at " + std::to_string(at) + "; accepted: text";
+}
+
+/// The number that the word is, or nothing.
+inline std::optional<double> numberOf(std::string_view word) {
+  if (word.empty() || word.size() > kMaxNumber) return std::nullopt;
+  const std::string text(word);
+  char* end = nullptr;
+  const double x = std::strtod(text.c_str(), &end);
+  if (end != text.c_str() + text.size()) return std::nullopt;
+  return x;
+}
+
+/// A whole number >= 0 as a double, so that no count overflows; NaN where it is none.
+inline double countOf(const std::string& word) {
+  if (word.empty() || !std::all_of(word.begin(), word.end(), [](unsigned char c) { return std::isdigit(c); }))
+    return std::nan("");
+  return std::strtod(word.c_str(), nullptr);
+}
+
+inline std::string lowerCase(std::string_view text) {
+  std::string low(text);
+  for (char& c : low) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return low;
+}
+
+}  // namespace meshless
