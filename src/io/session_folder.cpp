@@ -54,6 +54,21 @@ class Descriptor {
   int descriptor_;
 };
 
+/// Reads on until there are so many, or the file ends. False: errno says why.
+bool readUpTo(int descriptor, std::string& bytes, std::size_t size) {
+  std::size_t have = bytes.size();
+  bytes.resize(size);
+  while (have < size) {
+    const ssize_t got = ::read(descriptor, bytes.data() + have, size - have);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return false;
+    if (got == 0) break;
+    have += static_cast<std::size_t>(got);
+  }
+  bytes.resize(have);
+  return true;
+}
+
 }  // namespace
 
 Status writeAll(int descriptor, std::string_view bytes) {
@@ -85,9 +100,9 @@ Status SessionFolder::checkName(const std::string& name) {
 Status SessionFolder::make() const {
   if (folder_.empty())
     return Error{ErrorCode::kForbidden, "no session directory is set; accepted: the parameter session_directory"};
-  std::error_code failed;
+  std::error_code failed, none;
   std::filesystem::create_directories(folder_, failed);
-  if (!std::filesystem::is_directory(folder_, failed))
+  if (!std::filesystem::is_directory(folder_, none))
     return Error{ErrorCode::kFailed, "cannot make the folder '" + folder_ + "'" +
                                          (failed ? ": " + failed.message() : std::string(": it is no folder"))};
   return Done{};
@@ -116,11 +131,16 @@ Status SessionFolder::write(const std::string& name, std::string_view bytes) con
   }
   // The new name itself; some file systems cannot, and then have it already.
   const Descriptor folder(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (folder.get() >= 0) (void)::fsync(folder.get());
+  if (folder.get() < 0 || (::fsync(folder.get()) != 0 && errno != EINVAL))
+    return Error{ErrorCode::kFailed,
+                 "'" + path +
+                     "' is written, but may not outlive a power failure: cannot bring the folder to the disk: " +
+                     std::strerror(errno)};
   return Done{};
 }
 
-Result<std::string> SessionFolder::read(const std::string& name, std::size_t most_bytes) const {
+Result<std::string> SessionFolder::read(const std::string& name, std::size_t most_bytes, std::size_t beginning_bytes,
+                                        const Check& check) const {
   if (Status valid = checkName(name); !valid) return valid.error();
   if (folder_.empty())
     return Error{ErrorCode::kForbidden, "no session directory is set; accepted: the parameter session_directory"};
@@ -138,22 +158,31 @@ Result<std::string> SessionFolder::read(const std::string& name, std::size_t mos
   if (static_cast<std::uint64_t>(info.st_size) > most_bytes)
     return Error{ErrorCode::kUnreadable, "'" + name + "' has " + std::to_string(info.st_size) +
                                              " bytes; accepted: up to " + std::to_string(most_bytes)};
+  const auto unreadable = [&] {
+    return Error{ErrorCode::kUnreadable, "cannot read '" + name + "': " + std::strerror(errno)};
+  };
+  const auto size = static_cast<std::size_t>(info.st_size);
   std::string bytes;
+  if (!readUpTo(file.get(), bytes, std::min(size, beginning_bytes))) return unreadable();
+  if (check) {
+    const Status accepted = check(bytes, size);
+    if (!accepted.ok()) return Error{accepted.error().code, "'" + name + "': " + accepted.error().detail};
+  }
   try {
-    bytes.resize(static_cast<std::size_t>(info.st_size));
+    if (!readUpTo(file.get(), bytes, size)) return unreadable();
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::kFailed, "there is not enough memory for '" + name + "'"};
   }
-  std::size_t have = 0;
-  while (have < bytes.size()) {
-    const ssize_t got = ::read(file.get(), bytes.data() + have, bytes.size() - have);
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) return Error{ErrorCode::kUnreadable, "cannot read '" + name + "': " + std::strerror(errno)};
-    if (got == 0) break;
-    have += static_cast<std::size_t>(got);
-  }
-  bytes.resize(have);
   return bytes;
+}
+
+bool SessionFolder::beginsWith(const std::string& name, std::string_view text) const {
+  if (folder_.empty() || !checkName(name)) return false;
+  const Descriptor file(::open(pathOf(name).c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  struct stat info {};
+  std::string bytes;
+  return file.get() >= 0 && ::fstat(file.get(), &info) == 0 && S_ISREG(info.st_mode) &&
+         readUpTo(file.get(), bytes, text.size()) && bytes == text;
 }
 
 bool SessionFolder::has(const std::string& name) const {

@@ -21,6 +21,16 @@ std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(crc32_z(sum, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
+/// What follows the magic, of at least kStateHeaderBytes.
+struct StateHeader {
+  explicit StateHeader(std::string_view bytes) {
+    InArchive archive(bytes.substr(kMagic.size()));
+    archive(version, sum, length);
+  }
+  std::uint32_t version = 0, sum = 0;
+  std::uint64_t length = 0;
+};
+
 Error unreadable(const std::string& why) {
   return {ErrorCode::kUnreadable, "this is no state that can be read: " + why};
 }
@@ -284,25 +294,28 @@ std::string encode(const SavedWorld& world, const std::string& origin) {
   return bytes;
 }
 
-Result<DecodedWorld> decode(std::string_view bytes) {
-  if (bytes.substr(0, kMagic.size()) != kMagic)
+Status checkStateHeader(std::string_view header, std::uint64_t file_bytes) {
+  if (header.substr(0, kMagic.size()) != kMagic)
     return unreadable("it does not begin with " + std::string(kMagic) + ", as states do");
-  if (bytes.size() < kStateHeaderBytes)
-    return unreadable("it has " + std::to_string(bytes.size()) + " bytes; accepted: at least " +
+  if (header.size() < kStateHeaderBytes || file_bytes < kStateHeaderBytes)
+    return unreadable("it has " + std::to_string(file_bytes) + " bytes; accepted: at least " +
                       std::to_string(kStateHeaderBytes));
+  const StateHeader head(header);
+  if (head.version != kVersion)
+    return unreadable("it is of version " + std::to_string(head.version) + "; accepted: " + std::to_string(kVersion));
+  const std::uint64_t payload_bytes = file_bytes - kStateHeaderBytes;
+  if (payload_bytes != head.length)
+    return unreadable("it holds " + std::to_string(payload_bytes) + " bytes of " + std::to_string(head.length) +
+                      (payload_bytes < head.length ? ": it was cut off" : ": something follows"));
+  return Done{};
+}
+
+Result<DecodedWorld> decode(std::string_view bytes) {
+  if (const Status header = checkStateHeader(bytes, bytes.size()); !header.ok()) return header.error();
   DecodedWorld decoded;
   try {
-    InArchive head(bytes.substr(kMagic.size()));
-    std::uint32_t version = 0, sum = 0;
-    std::uint64_t length = 0;
-    head(version, sum, length);
-    if (version != kVersion)
-      return unreadable("it is of version " + std::to_string(version) + "; accepted: " + std::to_string(kVersion));
     const std::string_view payload = bytes.substr(kStateHeaderBytes);
-    if (payload.size() != length)
-      return unreadable("it holds " + std::to_string(payload.size()) + " bytes of " + std::to_string(length) +
-                        (payload.size() < length ? ": it was cut off" : ": something follows"));
-    if (checksum(payload) != sum) return unreadable("its checksum is wrong: it was damaged");
+    if (checksum(payload) != StateHeader(bytes).sum) return unreadable("its checksum is wrong: it was damaged");
     InArchive archive(payload);
     archive(decoded.origin);
     decoded.world = readWorld(archive);

@@ -93,6 +93,34 @@ TEST_F(SessionFolderTest, OnlyFilesOfASensibleSize) {
   EXPECT_NE(std::string::npos, large.error().detail.find("1099511627776"));
 }
 
+TEST_F(SessionFolderTest, WhatItsBeginningSaysIsLookedAtFirst) {
+  const SessionFolder folder(base_);
+  std::ofstream(base_ + "/large") << "0123456789";
+  fs::resize_file(base_ + "/large", std::uintmax_t{1} << 40);
+  const auto refuses = [](std::string_view beginning, std::uint64_t bytes) -> Status {
+    return Error{ErrorCode::kUnreadable, std::string(beginning) + " of " + std::to_string(bytes)};
+  };
+  const auto large = folder.read("large", ~std::size_t{0}, 4, refuses);  // more than there is memory for
+  ASSERT_FALSE(large.ok());
+  EXPECT_EQ("'large': 0123 of 1099511627776", large.error().detail);
+  ASSERT_TRUE(folder.write("small", "01").ok());
+  EXPECT_EQ("'small': 01 of 2", folder.read("small", 100, 4, refuses).error().detail);
+  const auto accepts = [](std::string_view, std::uint64_t) -> Status { return Done{}; };
+  for (const std::size_t beginning : {0u, 1u, 2u, 5u}) EXPECT_EQ("01", *folder.read("small", 100, beginning, accepts));
+}
+
+TEST_F(SessionFolderTest, HowAFileBegins) {
+  const SessionFolder folder(base_);
+  ASSERT_TRUE(folder.write("a", "begin and end").ok());
+  ASSERT_TRUE(folder.write("short", "beg").ok());
+  fs::create_symlink(base_ + "/a", base_ + "/link");
+  ASSERT_EQ(0, mkfifo((base_ + "/pipe").c_str(), 0600));
+  EXPECT_TRUE(folder.beginsWith("a", "begin"));
+  for (const std::string name : {"short", "link", "pipe", "missing", "../a", "."})
+    EXPECT_FALSE(folder.beginsWith(name, "begin")) << name;
+  EXPECT_FALSE(folder.beginsWith("a", "end"));
+}
+
 // A limit on the size of files refuses as a full disk does, for anybody.
 TEST_F(SessionFolderTest, AFullDiskLeavesWhatWasThere) {
   const SessionFolder folder(base_);

@@ -1,6 +1,7 @@
 // The one folder that is written to: files by name, whole or not at all.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -10,20 +11,30 @@ namespace meshless {
 
 class SessionFolder {
  public:
-  /// Made when the first file is written, its parents too. Empty: nothing is written or read.
+  /// Made when the first file is written, or by make(), its parents too. Empty: nothing is written or read.
   explicit SessionFolder(std::string folder) : folder_(std::move(folder)) {}
 
   const std::string& folder() const { return folder_; }
+  Status make() const;
 
   /// Why it is not a file's name; names are 1 to 100 letters, digits and ._- and do not begin with a dot.
   static Status checkName(const std::string& name);
 
   /// Written beside it, brought to the disk, and renamed: whoever reads finds the old file or the new one. On failure
-  /// (kFailed: the disk refuses) the old one is still there.
+  /// (kFailed: the disk refuses) the old one is still there, unless the detail says that the new one is.
   Status write(const std::string& name, std::string_view bytes) const;
   /// Refuses kUnreadable (missing, no regular file, a link to one elsewhere: kForbidden, longer than `most_bytes`)
   /// before memory is taken.
-  Result<std::string> read(const std::string& name, std::size_t most_bytes) const;
+  Result<std::string> read(const std::string& name, std::size_t most_bytes) const {
+    return read(name, most_bytes, 0, {});
+  }
+  /// Likewise, and refuses what `check` does: it is given the first bytes (fewer where there are no more) and how many
+  /// the file has.
+  using Check = std::function<Status(std::string_view beginning, std::uint64_t file_bytes)>;
+  Result<std::string> read(const std::string& name, std::size_t most_bytes, std::size_t beginning_bytes,
+                           const Check& check) const;
+  /// False too where there is no such file, or only a link.
+  bool beginsWith(const std::string& name, std::string_view text) const;
   bool has(const std::string& name) const;
   void remove(const std::string& name) const;
   Status rename(const std::string& from, const std::string& to) const;
@@ -38,7 +49,6 @@ class SessionFolder {
   Result<NewFile> create(const std::string& name) const;
 
  private:
-  Status make() const;
   std::string pathOf(const std::string& name) const { return folder_ + "/" + name; }
   std::string folder_;
 };

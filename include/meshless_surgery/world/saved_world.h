@@ -26,9 +26,11 @@ struct DecodedWorld {
 /// are checked before memory is taken, and indices before they are used.
 Result<DecodedWorld> decode(std::string_view bytes);
 
-/// Of the encoded form: magic, version, length and checksum come first.
+/// Of the encoded form: magic, version, checksum and length come first.
 constexpr std::size_t kStateHeaderBytes = 24;
-/// A longer file is no state.
-constexpr std::size_t kMostStateBytes = std::size_t{1} << 30;
+/// Refuses, as decode would, what the header of a file of that size says; before the rest of it is read.
+Status checkStateHeader(std::string_view header, std::uint64_t file_bytes);
+/// A longer file is no state. A body of 50,000 vertices takes 20 to 30 MB.
+constexpr std::size_t kMostStateBytes = std::size_t{512} << 20;
 
 }  // namespace meshless
