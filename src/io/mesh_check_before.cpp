@@ -60,9 +60,9 @@ double listSize(const char* at, std::size_t bytes, bool has_sign, bool big_endia
   return has_sign && value >> (8 * bytes - 1) ? -1.0 : static_cast<double>(value);
 }
 
-/// Whether the data holds what the header promises. PCL takes memory for it while it looks.
-Status checkPlyData(const std::string& name, std::string_view data, const std::vector<PlyElement>& elements,
-                    bool big_endian) {
+/// Where the data that the header promises ends. PCL takes memory for it while it looks.
+Result<std::size_t> endOfPlyData(const std::string& name, std::string_view data,
+                                 const std::vector<PlyElement>& elements, bool big_endian) {
   double at = 0.0, corners = 0.0;
   const double end = static_cast<double>(data.size());
   const Error truncated = unreadable(name, "is truncated or damaged in its data");
@@ -84,10 +84,11 @@ Status checkPlyData(const std::string& name, std::string_view data, const std::v
       if (!(at <= end)) return truncated;
     }
   }
-  return checkCounts(name, 1.0, 0.0, corners);
+  if (Status status = checkCounts(name, 1.0, 0.0, corners); !status) return status.error();
+  return static_cast<std::size_t>(at);
 }
 
-/// The same for data in text, from `from` on: so many words, in lines that PCL may hold.
+/// Whether data in text holds it, from `from` on: so many words, in lines that PCL may hold.
 Status checkPlyText(const std::string& name, std::string_view text, std::size_t from,
                     const std::vector<PlyElement>& elements) {
   if (const std::string fault = notText(text, from); !fault.empty()) return unreadable(name, fault);
@@ -174,11 +175,14 @@ Result<PromisedCounts> checkPly(const std::string& name, std::string_view text) 
   if (!(8.0 * properties * points <= static_cast<double>(kMaxMeshBytes)))
     return unreadable(name, "has properties that need more than 512 MiB");
   const std::size_t data = head_size - head.size();
-  const Status held = format == "ascii"
-                          ? checkPlyText(name, text, data, elements)
-                          : checkPlyData(name, text.substr(data), elements, format == "binary_big_endian");
-  if (!held) return held.error();
   PromisedCounts promised;
+  if (format == "ascii") {
+    if (Status status = checkPlyText(name, text, data, elements); !status) return status.error();
+  } else {
+    const Result<std::size_t> end = endOfPlyData(name, text.substr(data), elements, format == "binary_big_endian");
+    if (!end) return end.error();
+    promised.bytes = data + *end;
+  }
   promised.points = static_cast<std::size_t>(points);
   promised.faces = static_cast<std::size_t>(faces);
   return promised;

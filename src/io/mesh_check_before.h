@@ -28,6 +28,7 @@ Result<MeshFormat> meshFormatOf(const std::string& name);
 /// What the file's header promises; empty where the format promises nothing.
 struct PromisedCounts {
   std::optional<std::size_t> points, faces;
+  std::optional<std::size_t> bytes;  // with the header; the file may be longer
 };
 
 // Each refuses kUnreadable and kUnsuitableShape.

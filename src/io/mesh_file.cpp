@@ -185,7 +185,8 @@ Result<MemoryFile> fileForPcl(const std::string& real_path, const std::string& n
   const Result<PromisedCounts> checked = checkBeforeReading(name, text, format);
   if (!checked) return checked.error();
   promised = *checked;
-  if (format == MeshFormat::kPly || format == MeshFormat::kStl) return MemoryFile(text);
+  if (format == MeshFormat::kPly || format == MeshFormat::kStl)
+    return MemoryFile(text.substr(0, promised.bytes.value_or(text.size())));
   const Result<std::string> plain = format == MeshFormat::kObj   ? plainObj(name, text)
                                     : format == MeshFormat::kVtk ? plainVtk(name, text, promised)
                                                                  : plainPcd(name, text, promised);
