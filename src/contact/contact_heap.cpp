@@ -7,23 +7,24 @@
 namespace meshless {
 namespace {
 
-// Points that quick pairs ask about at once, if that is more than all there are.
-constexpr std::size_t kMostInHeap = 12500;
+Index vertexSamples(const ContactShape& shape) {
+  const std::vector<ContactSample>& samples = shape.samples();
+  const auto is_vertex = [](const ContactSample& s) { return !(s.share > 0.0); };
+  return static_cast<Index>(std::partition_point(samples.begin(), samples.end(), is_vertex) - samples.begin());
+}
 
 }  // namespace
 
 Index samplesFor(const Pair& pair, const ContactShape& shape) {
-  const std::vector<ContactSample>& samples = shape.samples();
-  if (!pair.by_vertices) return static_cast<Index>(samples.size());
-  const auto on_edge = [](const ContactSample& s) { return !(s.share > 0.0); };
-  return static_cast<Index>(std::partition_point(samples.begin(), samples.end(), on_edge) - samples.begin());
+  return pair.by_vertices ? vertexSamples(shape) : static_cast<Index>(shape.samples().size());
 }
 
 void Contacts::Impl::findHeaps(const std::vector<ContactParty>& parties, const ForEach& for_each) {
+  heap = false;
   std::vector<Index> quick_pairs;
   std::size_t all = 0, at_most = 0;
   for (Index p = 0; p < parties.size(); ++p)
-    if (needed[p] & 1) all += parties[p].shape->samples().size();
+    if (needed[p] & 1) all += vertexSamples(*parties[p].shape);
   for (Index k = 0; k < pairs.size(); ++k) {
     if (!pairs[k].quick) continue;
     quick_pairs.push_back(k);
@@ -42,7 +43,8 @@ void Contacts::Impl::findHeaps(const std::vector<ContactParty>& parties, const F
         count += region.contains(sampleAt(parties[p], sample));
     in_reach += count;
   });
-  if (in_reach <= bound) return;
+  heap = in_reach > bound;
+  if (!heap) return;
   for (Index k : quick_pairs) pairs[k].by_vertices = true;
 }
 

@@ -24,6 +24,33 @@ Vec3 normalNow(const ContactParty& party, Index triangle) {
 
 }  // namespace
 
+void SweptParty::make(const ContactParty& party, Index count) {
+  const std::vector<ContactSample>& all = party.shape->samples();
+  samples.resize(count);
+  box = Box();
+  for (Index s = 0; s < count; ++s) {
+    const Vec3 p = sampleAt(party, all[s]);
+    Vec3 motion = vertexMotion(party, all[s].vertices[0]);
+    if (all[s].share > 0.0) motion += all[s].share * (vertexMotion(party, all[s].vertices[1]) - motion);
+    samples[s] = {p - motion, p};
+    if (!p.allFinite() || !motion.allFinite()) continue;
+    box.extend(p);
+    box.extend(p - motion);
+  }
+  const TriangleMesh& surface = party.shape->surface();
+  corners.resize(surface.vertices.size());
+  for (Index v = 0; v < corners.size(); ++v) {
+    const Vec3 q = vertexAt(party, v);
+    corners[v] = {q - vertexMotion(party, v), q};
+  }
+  triangles.assign(surface.triangles.size(), Box());
+  for (Index t = 0; t < surface.triangles.size(); ++t)
+    for (Index v : surface.triangles[t]) {
+      triangles[t].extend(corners[v].from);
+      triangles[t].extend(corners[v].to);
+    }
+}
+
 // Points of a that a triangle of b swept over in this substep, from its front: who has passed through is remembered.
 void Contacts::Impl::trace(const std::vector<ContactParty>& parties, const Pair& pair, bool second,
                            const std::vector<Contact>* found, Traced& traced) const {
@@ -32,29 +59,12 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, const Pair&
   traced.caught.clear();
   const ContactParty &of = parties[a], &with = parties[b];
   const ContactShape& shape = *with.shape;
-  const std::vector<ContactSample>& samples = of.shape->samples();
   const std::vector<Triangle>& triangles = shape.surface().triangles;
   if (triangles.empty()) return;
-  struct Path {
-    Vec3 from, to;
-  };
-  const Index count = samplesFor(pair, *of.shape);
-  std::vector<Path> paths(count);
-  Box box_a, box_b;
-  for (Index s = 0; s < count; ++s) {
-    const Vec3 p = sampleAt(of, samples[s]);
-    Vec3 motion = vertexMotion(of, samples[s].vertices[0]);
-    if (samples[s].share > 0.0) motion += samples[s].share * (vertexMotion(of, samples[s].vertices[1]) - motion);
-    paths[s] = {p - motion, p};
-    if (!p.allFinite() || !motion.allFinite()) continue;
-    box_a.extend(p);
-    box_a.extend(p - motion);
-  }
-  std::vector<Path> corners(shape.surface().vertices.size());
-  for (Index v = 0; v < corners.size(); ++v) {
-    const Vec3 q = vertexAt(with, v);
-    corners[v] = {q - vertexMotion(with, v), q};
-  }
+  const Index count = static_cast<Index>(swept[a].samples.size());
+  const std::vector<Path>&paths = swept[a].samples, &corners = swept[b].corners;
+  const Box& box_a = swept[a].box;
+  Box box_b;
   // Who is slower is seen by the next look.
   const double slow = kSlowPath * shape.thickness() / look_every;
   const double shallow = kShallow * std::min(of.shape->thickness(), shape.thickness());
@@ -71,20 +81,15 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, const Pair&
     }
     return false;
   };
-  struct Swept {
+  struct Near {
     Index triangle;
     Box box;
     Vec3 normal_from, normal_to;
   };
-  std::vector<Swept> near;
+  std::vector<Near> near;
   double size = 0.0;
   for (Index t = 0; t < triangles.size(); ++t) {
-    Box box;
-    for (Index v : triangles[t]) {
-      box.extend(corners[v].from);
-      box.extend(corners[v].to);
-    }
-    box = grown(box, shallow);
+    const Box box = grown(swept[b].triangles[t], shallow);
     if (!box.overlaps(box_a)) continue;
     const Path &p0 = corners[triangles[t][0]], &p1 = corners[triangles[t][1]], &p2 = corners[triangles[t][2]];
     near.push_back({t, box, (p1.from - p0.from).cross(p2.from - p0.from).normalized(),

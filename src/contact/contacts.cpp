@@ -308,7 +308,8 @@ void Contacts::begin(const std::vector<ContactParty>& parties, double substep) {
   impl_->choosePasses(parties, substep);
   impl_->fresh = true;
   // Heaps of crumbs that are torn together: between looks those that pass through have to do.
-  const double most = static_cast<double>(std::max(kMostAsked, kMostAskedEach * impl_->samples));
+  const double most =
+      static_cast<double>(impl_->heap ? kMostInHeap : std::max(kMostAsked, kMostAskedEach * impl_->samples));
   const double looks = most / static_cast<double>(std::max<std::size_t>(1, impl_->asked));
   const double substeps = std::round(impl_->frame / substep);
   impl_->look_every = static_cast<int>(std::clamp(std::ceil(substeps / std::max(1.0, looks)), 1.0, 1e6));
@@ -349,16 +350,24 @@ void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, doubl
     bounds_now[p] = verticesOf(parties[p]);
     finders[p].make(maps_now[p].data(), static_cast<Index>(maps_now[p].size()));
   });
-  std::vector<Box> swept;     // of those that are traced
+  std::vector<Box> ways;      // of those that are traced
   std::vector<Index> passes;  // pairs that may pass through each other
   for (const Index k : far) {
     const Pair& pair = pairs[k];
-    if (swept.empty()) swept.resize(parties.size());
+    if (ways.empty()) ways.resize(parties.size());
     for (Index p : {pair.a, pair.b})
-      if (swept[p].empty()) swept[p] = sweptVertices(parties[p]);
-    if (!swept[pair.a].overlaps(swept[pair.b])) continue;
+      if (ways[p].empty()) ways[p] = sweptVertices(parties[p]);
+    if (!ways[pair.a].overlaps(ways[pair.b])) continue;
     passes.push_back(k);
   }
+  std::vector<std::pair<Index, Index>> to_sweep;  // parties, and how many of their points
+  for (const Index k : passes)
+    for (Index p : {pairs[k].a, pairs[k].b}) to_sweep.emplace_back(p, samplesFor(pairs[k], *parties[p].shape));
+  std::sort(to_sweep.begin(), to_sweep.end());
+  to_sweep.erase(std::unique(to_sweep.begin(), to_sweep.end()), to_sweep.end());
+  if (swept.size() < parties.size()) swept.resize(parties.size());
+  runEach(for_each, to_sweep.size(),
+          [&](std::size_t n) { swept[to_sweep[n].first].make(parties[to_sweep[n].first], to_sweep[n].second); });
   if (traced.size() < 2 * passes.size()) traced.resize(2 * passes.size());
   runEach(for_each, 2 * passes.size(), [&](std::size_t n) {
     trace(parties, pairs[passes[n / 2]], n % 2 == 1, fresh ? nullptr : &quick[passes[n / 2]].found.contacts, traced[n]);

@@ -28,13 +28,14 @@ std::size_t Contacts::bytes() const {
   std::size_t sum = sizeof w + w.broad.bytes() + w.solver.bytes() + w.plan.bytes() +
                     bytesOf(w.boxes, w.active, w.needed, w.pairs, w.grounded, w.finders, w.maps_now, w.bounds_now,
                             w.contacts, w.last, w.entries) +
-                    bytesOf(w.depths, w.quick_known, w.reached, w.keys, w.tasks, w.halves, w.quick, w.traced, w.seen,
-                            w.foreseen, w.ahead, w.taken) +
+                    bytesOf(w.depths, w.quick_known, w.reached, w.keys, w.tasks, w.halves, w.quick, w.traced, w.swept,
+                            w.seen, w.foreseen, w.ahead, w.taken) +
                     bytesOfMap(w.caught) + bytesOfMap(w.exits);
   for (const MapFinder& finder : w.finders) sum += finder.bytes();
   for (const auto& maps : w.maps_now) sum += bytesOf(maps);
   for (const Findings& task : w.tasks) sum += bytesOfFindings(task);
   for (const Traced& traced : w.traced) sum += bytesOf(traced.caught);
+  for (const SweptParty& s : w.swept) sum += bytesOf(s.samples, s.corners, s.triangles);
   for (const QuickFindings& quick : w.quick) sum += bytesOfFindings(quick.found);
   for (const Foreseen& found : w.foreseen)
     for (const Findings& half : found.halves) sum += bytesOfFindings(half);

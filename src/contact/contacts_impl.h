@@ -24,6 +24,9 @@ struct Pair {
   bool by_vertices = false;  // points on edges are left out
 };
 
+// Points that quick pairs ask about at once, if that is more than all vertices there are: beyond it they are a heap.
+inline constexpr std::size_t kMostInHeap = 12500;
+
 /// How many of a shape's points are asked about in the pair's other: its vertices come first.
 Index samplesFor(const Pair& pair, const ContactShape& shape);
 
@@ -116,6 +119,21 @@ struct Findings {
   }
 };
 
+/// From where to where something goes in a substep.
+struct Path {
+  Vec3 from, to;
+};
+
+/// What of a party is followed in a substep, for all pairs that it is in.
+struct SweptParty {
+  std::vector<Path> samples, corners;  // of the surface
+  Box box;                             // of the samples' ways
+  std::vector<Box> triangles;          // likewise
+
+  /// The first `count` of its samples.
+  void make(const ContactParty& party, Index count);
+};
+
 /// Who of one party has passed through a triangle of another, and through which.
 struct Traced {
   std::size_t paths = 0;  // that were followed
@@ -185,12 +203,14 @@ struct Contacts::Impl {
   std::vector<std::uint64_t> keys;          // of the parties of the last frame
   int substep_number = 0, look_every = 1;   // in the frame; substeps between looks at quick pairs
   std::size_t samples = 0, asked = 0;       // of all parties; of quick pairs where they are near, when the frame began
+  bool heap = false;                        // quick pairs are looked at by their vertices; see findHeaps()
   bool fresh = true;                        // nothing has been solved since the contacts were made
   bool plan_steady = true;                  // the plan is that of the steady contacts alone
   std::vector<Findings> tasks;
   std::vector<HalfFindings> halves;  // two a pair; of a body with itself the second is empty
   std::vector<QuickFindings> quick;  // one a pair; of those that are quick
   std::vector<Traced> traced;        // two a pair that goes far in a substep
+  std::vector<SweptParty> swept;     // one a party; of those in such pairs
   std::vector<ContactParty> seen;    // by lookAhead(), and what it found
   std::vector<Foreseen> foreseen;
   std::vector<std::shared_ptr<const Contacts>> ahead;  // whose findings this frame may take over
