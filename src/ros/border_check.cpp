@@ -120,6 +120,10 @@ std::string BorderCheck::newName(const std::string& field, const std::string& va
 }
 
 std::vector<std::string> BorderCheck::names(const std::string& field, const std::vector<std::string>& value) {
+  if (value.size() > kMaxNames) {
+    fault(field + " has " + std::to_string(value.size()) + " names; accepted: up to " + std::to_string(kMaxNames));
+    return value;
+  }
   for (std::size_t i = 0; i < value.size(); ++i) {
     if (value[i].empty() || value[i].size() > kMaxName) {
       fault(field + "[" + std::to_string(i) + "] is '" + printable(value[i]) + "'; accepted: names of 1.." +

@@ -61,7 +61,13 @@ Result<Pose> Frames::toWorld(const std_msgs::Header& header) {
   if (isWorld(frame)) return Pose{};
   Listener& tf = listener();
   const auto now = SteadyClock::now();
-  const auto deadline = std::max(now + kWait, tf.since + kFirstWait);
+  // Each that waits holds a thread that others may need.
+  struct Turn {
+    std::atomic<int>& count;
+    const bool may_wait = ++count <= kMostWaiting;
+    ~Turn() { --count; }
+  } turn{waiting_};
+  const auto deadline = turn.may_wait ? std::max(now + kWait, tf.since + kFirstWait) : now;
   std::string why;
   // Waits on the wall clock: a simulated one may stand still.
   while (true) {

@@ -137,12 +137,12 @@ struct DeformerNode::Parts {
 
   ~Parts() {
     session->endLog(runner);
-    // First the world, so that whoever waits for it gets an answer.
+    // First the world, so that whoever waits for it gets an answer; the services last, as a body may be being prepared.
     runner.stop();
-    services.reset();
     publishers.stop();
     forces.stop();
     session->stop();
+    services.reset();
   }
 
   Rejections rejections;

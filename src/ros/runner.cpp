@@ -12,9 +12,9 @@ using SteadyClock = std::chrono::steady_clock;
 
 double wallSeconds() { return std::chrono::duration<double>(SteadyClock::now().time_since_epoch()).count(); }
 
-constexpr double kWindow = 1.0;          // [s] that rates are taken over
-constexpr double kPollClock = 1e-3;      // [s] of wall time between looks at a clock that is not steady
-constexpr double kOverBudgetEvery = 1.0; // [s] between two events
+constexpr double kWindow = 1.0;           // [s] that rates are taken over
+constexpr double kPollClock = 1e-3;       // [s] of wall time between looks at a clock that is not steady
+constexpr double kOverBudgetEvery = 1.0;  // [s] between two events
 
 Error stoppedError() { return {ErrorCode::kFailed, "the node is shutting down"}; }
 
@@ -98,6 +98,13 @@ Result<WorldRunner::CutAnswer> WorldRunner::cut(CutCommand command) {
       [&](World& world) {
         answer.closed_at_once = paused_ && command.close_time > 0.0;
         if (paused_) command.close_time = 0.0;
+        if (command.close_time > 0.0 && closing_.size() >= static_cast<std::size_t>(kMostClosing)) {
+          error = Error{ErrorCode::kFailed,
+                        std::to_string(closing_.size()) + " cuts wait for their blades; accepted: up to " +
+                            std::to_string(kMostClosing) +
+                            " at once, and any number with close_time 0 (open_scissors ends those that wait)"};
+          return;
+        }
         auto reply = world.apply(command);
         if (!reply.ok()) {
           error = reply.error();
@@ -256,8 +263,8 @@ void WorldRunner::loop() {
     if (took > dt_ && before - last_over_budget_ > kOverBudgetEvery) {
       last_over_budget_ = before;
       std::ostringstream text;
-      text << "a step took " << 1e3 * took << " ms for " << 1e3 * dt_ << " ms of simulated time; "
-           << status().overruns << " steps did so far";
+      text << "a step took " << 1e3 * took << " ms for " << 1e3 * dt_ << " ms of simulated time; " << status().overruns
+           << " steps did so far";
       Event event;
       event.type = EventType::kOverBudget;
       event.step = world_->stepCount();
@@ -318,7 +325,8 @@ void WorldRunner::answerCuts() {
 }
 
 void WorldRunner::giveUp(const std::string& why) {
-  for (ClosingCut& closing : closing_) closing.done.set_value(Error{ErrorCode::kFailed, "the cut was given up: " + why});
+  for (ClosingCut& closing : closing_)
+    closing.done.set_value(Error{ErrorCode::kFailed, "the cut was given up: " + why});
   closing_.clear();
   for (OwedSteps& owed : owed_) {
     owed.done.set_value(Error{ErrorCode::kFailed, std::to_string(owed.total - owed.left) + " of " +

@@ -33,10 +33,11 @@ constexpr double kMaxSpeed = 1e3;       // [m/s]
 constexpr double kMaxStiffness = 1e9;   // [N/m]
 constexpr double kMaxScale = 1e6;
 constexpr std::uint32_t kMaxSteps = 100000;
-constexpr std::size_t kMaxYaml = 64 * 1024;    // bytes
-constexpr std::size_t kLongestMessage = 2000;  // characters: names of megabytes are not sent back
-constexpr int kCutThreads = 4;                 // cuts that may wait for their blades at once
-constexpr int kMostSuffix = 10000;             // <name>_N tried for a body without a name of its own
+constexpr std::size_t kMaxYaml = 64 * 1024;                 // bytes
+constexpr std::size_t kLongestMessage = 2000;               // characters: names of megabytes are not sent back
+constexpr int kCutThreads = WorldRunner::kMostClosing + 1;  // one is always there for a cut that need not wait
+constexpr int kSpawnThreads = 2;                            // a large body must not hold up a small one
+constexpr int kMostSuffix = 10000;                          // <name>_N tried for a body without a name of its own
 
 std::string joined(const std::vector<std::string>& names) {
   std::string text;
@@ -444,7 +445,7 @@ struct Services::Handlers {
   std::vector<ros::ServiceServer> servers;
   ros::AsyncSpinner cut_spinner{kCutThreads, &cut_queue};
   ros::AsyncSpinner step_spinner{1, &step_queue};
-  ros::AsyncSpinner spawn_spinner{1, &spawn_queue};
+  ros::AsyncSpinner spawn_spinner{kSpawnThreads, &spawn_queue};
   ros::AsyncSpinner session_spinner{1, &session_queue};
 };
 

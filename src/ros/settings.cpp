@@ -86,6 +86,21 @@ class Reader {
     }
   }
 
+  /// tf names are short and in one line.
+  void frame(const std::string& name, const std::string& value) {
+    const bool plain = std::all_of(value.begin(), value.end(), [](unsigned char c) { return c >= ' ' && c != 0x7f; });
+    if (plain && value.size() <= kMaxName) return;
+    check.fault("parameter ~" + name + " is '" + printable(value) + "'; accepted: at most " + std::to_string(kMaxName) +
+                " characters in one line");
+  }
+
+  /// A value where a group of parameters is expected would hide all of them.
+  void group(const std::string& name) {
+    XmlRpc::XmlRpcValue found;
+    if (handle_.getParam(name, found) && found.getType() != XmlRpc::XmlRpcValue::TypeStruct)
+      wrongType(name, "a group, such as " + name + "/" + (name == "tools" ? "silence" : "follow_frame"));
+  }
+
   std::vector<std::string> unknown() const {
     std::vector<std::string> all;
     std::vector<std::string> unknown_names;
@@ -150,6 +165,12 @@ Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std
   if (settings.world_frame.find_first_not_of('/') == std::string::npos) {
     reader.check.fault("parameter ~world_frame is '" + printable(settings.world_frame) + "'; accepted: a frame's name");
   }
+  reader.frame("world_frame", settings.world_frame);
+  reader.frame("tf_prefix", settings.tf_prefix);
+  reader.frame("tools/pick/follow_frame", settings.pick.follow_frame);
+  reader.frame("tools/push/follow_frame", settings.push.follow_frame);
+  reader.frame("tools/scissors/follow_frame", settings.scissors.follow_frame);
+  for (const char* group : {"tools", "tools/pick", "tools/push", "tools/scissors"}) reader.group(group);
   if (settings.autosave_period > 0.0 && settings.autosave_period < kShortestAutosave) {
     reader.check.fault("parameter ~autosave_period is " + formatNumber(settings.autosave_period) +
                        "; accepted: 0 (none) or " + formatNumber(kShortestAutosave) + "..3600 s");

@@ -43,7 +43,8 @@ class BorderCheck {
 
 /// At most 6 digits, "nan" and "inf" as such.
 std::string formatNumber(double value);
-constexpr std::size_t kMaxName = 100;  // bytes of a name
+constexpr std::size_t kMaxName = 100;      // bytes of a name
+constexpr std::size_t kMaxNames = 100000;  // in a list
 /// For messages to people: control characters and what is no UTF-8 replaced, cut before `most` bytes are exceeded.
 std::string printable(const std::string& text, std::size_t most = kMaxName);
 

@@ -1,6 +1,7 @@
 // Poses of frames in the world frame. tf2 is listened to from the first time that another frame is asked for.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -14,13 +15,16 @@ namespace meshless {
 
 class Frames {
  public:
+  static constexpr int kMostWaiting = 12;  // callers at once
+
   explicit Frames(std::string world_frame);
   ~Frames();
 
   const std::string& worldFrame() const { return world_frame_; }
 
   /// Pose of the header's frame in the world frame; the identity for an empty frame_id. A stamp of 0 is the latest.
-  /// Waits at most 0.2 s (0.5 s right after listening began) of wall time. Refuses kUnknownName, naming the frame.
+  /// Waits at most 0.2 s (0.5 s right after listening began) of wall time, and not at all where kMostWaiting others do.
+  /// Refuses kUnknownName, naming the frame.
   Result<Pose> toWorld(const std_msgs::Header& header);
 
   /// The latest pose, without waiting; nothing where tf2 does not know the frame (yet).
@@ -41,6 +45,7 @@ class Frames {
   std::string world_frame_;
   mutable std::mutex mutex_;  // for the creation alone: tf2's buffer has its own
   std::unique_ptr<Listener> listener_;
+  std::atomic<int> waiting_{0};
 };
 
 }  // namespace meshless

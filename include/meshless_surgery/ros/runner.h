@@ -41,6 +41,7 @@ struct RunnerStatus {
 class WorldRunner {
  public:
   using Job = std::function<void(World&)>;
+  static constexpr int kMostClosing = 16;  // cuts that wait for their blades at once
   using EventSink = std::function<void(std::vector<Event>)>;
 
   WorldRunner(std::unique_ptr<World> world, const RunnerSettings& settings, PaceClock clock = PaceClock::wall());
@@ -64,6 +65,7 @@ class WorldRunner {
   // Each of these returns when its effect is in force; kFailed once stopped. Not to be called from within a job.
   Result<Reply> apply(const Command& command);
   /// Waits until the blades met. While paused they meet at once, as time stands still: close_time is then not used.
+  /// kFailed where kMostClosing others wait already.
   struct CutAnswer {
     CutReply reply;
     bool closed_at_once = false;  // though a close time was asked for
