@@ -1,0 +1,248 @@
+#include "meshless_surgery/io/autosave_file.h"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <set>
+#include <thread>
+
+#include "io/temporary_folder.h"
+#include "meshless_surgery/world/world.h"
+#include "support/bodies.h"
+
+namespace meshless {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::milliseconds;
+
+const std::string kOrigin = "scene here, launch 1";
+
+TEST(AutosaveName, NoTwoNodesHaveTheSame) {
+  EXPECT_EQ("autosave_deformer.state", autosaveNameOf("/deformer"));
+  const std::string longest(90, 'a');
+  std::set<std::string> names;
+  const std::vector<std::string> nodes = {"/a_b",
+                                          "/a/b",
+                                          "/a__b",
+                                          "/a/_b",
+                                          "/a_/b",
+                                          "/a//b",
+                                          "/a-b",
+                                          "/a.b",
+                                          "/a.2d",
+                                          "/a.2db",
+                                          "/a2db",
+                                          "//a_b",
+                                          "",
+                                          "/" + longest,
+                                          "/" + longest + "a",
+                                          "/" + longest + "b",
+                                          "/" + longest.substr(0, 60) + "/a_b",
+                                          "/" + longest.substr(0, 60) + "/a/b"};
+  for (const std::string& node : nodes) {
+    const std::string name = autosaveNameOf(node);
+    EXPECT_TRUE(SessionFolder::checkName(name + ".9.before.9").ok()) << name;
+    names.insert(name);
+  }
+  EXPECT_EQ(nodes.size(), names.size());
+}
+
+class AutosaveFileTest : public testing::Test {
+ protected:
+  AutosaveFileTest() {
+    World world{WorldSettings()};
+    EXPECT_TRUE(world.addSceneBody(test::shared(test::ball())).ok());
+    for (int i = 0; i < 3; ++i) states_.push_back(encode(*world.capture(), kOrigin)), world.step();
+    other_ = encode(*world.capture(), "elsewhere");
+  }
+  AutosaveFile file() const { return AutosaveFile(folder_, "autosave_a.state"); }
+  /// Which of states_ it took up; -1: none.
+  int claimed(AutosaveFile& file, milliseconds patience = milliseconds(0)) {
+    said_.clear();
+    const auto state = file.claim(kOrigin, patience, [this](const std::string& text) { said_ += text + "\n"; });
+    EXPECT_TRUE(state.ok()) << state.error().detail;
+    if (!state.ok() || !*state) return -1;
+    const std::string bytes = encode(**state, kOrigin);
+    return static_cast<int>(std::find(states_.begin(), states_.end(), bytes) - states_.begin());
+  }
+  /// A process that was killed at work with the file.
+  void leave(const std::string& bytes) {
+    AutosaveFile dying = file();
+    claimed(dying);
+    dying.keep();
+    EXPECT_TRUE(dying.write(bytes).ok());
+  }
+  std::vector<std::string> files() const {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::directory_iterator(temporary_.path())) names.push_back(entry.path().filename());
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+  const TemporaryFolder temporary_;
+  const SessionFolder folder_{temporary_.path()};
+  std::vector<std::string> states_;
+  std::string other_, said_;
+};
+
+TEST_F(AutosaveFileTest, WhatTheKilledLeftIsTakenUpAndRemovedInTheEnd) {
+  AutosaveFile first = file();
+  EXPECT_EQ(-1, claimed(first));
+  first.remove();
+  EXPECT_TRUE(files().empty());
+  leave(states_[1]);
+  AutosaveFile next = file();
+  EXPECT_EQ(1, claimed(next));
+  EXPECT_EQ("", said_);
+  next.remove();
+  EXPECT_TRUE(files().empty());
+}
+
+TEST_F(AutosaveFileTest, TheLockEndsWithItsProcess) {
+  int ready[2];
+  ASSERT_EQ(0, pipe(ready));
+  const pid_t holder = fork();
+  if (holder == 0) {
+    AutosaveFile held = file();
+    (void)held.claim(kOrigin, milliseconds(0), [](const std::string&) {});
+    held.keep();
+    (void)held.write(states_[2]);
+    (void)!::write(ready[1], "x", 1);
+    pause();
+    _exit(0);
+  }
+  char byte = 0;
+  ASSERT_EQ(1, ::read(ready[0], &byte, 1));
+  AutosaveFile second = file();
+  EXPECT_EQ(-1, claimed(second));
+  EXPECT_NE(std::string::npos, said_.find("process " + std::to_string(holder))) << said_;
+  EXPECT_NE(std::string::npos, said_.find("autosave_a.state.2")) << said_;
+  second.remove();
+  kill(holder, SIGKILL);
+  ASSERT_EQ(holder, waitpid(holder, nullptr, 0));
+  AutosaveFile third = file();
+  EXPECT_EQ(2, claimed(third));
+  for (const int end : ready) close(end);
+}
+
+TEST_F(AutosaveFileTest, TwoOfOneNameDoNotTouchEachOthers) {
+  AutosaveFile first = file(), second = file();
+  claimed(first);
+  ASSERT_TRUE(first.write(states_[0]).ok());
+  EXPECT_EQ(-1, claimed(second));
+  second.keep();
+  ASSERT_TRUE(second.write(states_[1]).ok());
+  EXPECT_EQ(states_[0], *folder_.read("autosave_a.state", kMostStateBytes));
+  first.remove();
+  EXPECT_EQ(states_[1], *folder_.read("autosave_a.state.2", kMostStateBytes));
+  EXPECT_FALSE(folder_.has("autosave_a.state"));
+}
+
+TEST_F(AutosaveFileTest, WhoWroteUnderAnotherNameFindsItThere) {
+  AutosaveFile first = file();
+  claimed(first);
+  ASSERT_TRUE(first.write(other_).ok());
+  leave(states_[2]);
+  AutosaveFile again = file();
+  EXPECT_EQ(2, claimed(again));
+  EXPECT_EQ("", said_);
+  EXPECT_EQ(other_, *folder_.read("autosave_a.state", kMostStateBytes));
+}
+
+TEST_F(AutosaveFileTest, WhoIsJustEndingIsWaitedFor) {
+  auto first = std::make_unique<AutosaveFile>(folder_, "autosave_a.state");
+  claimed(*first);
+  ASSERT_TRUE(first->write(states_[0]).ok());
+  std::thread ends([&] {
+    std::this_thread::sleep_for(milliseconds(300));
+    first->remove();
+  });
+  AutosaveFile second = file();
+  EXPECT_EQ(-1, claimed(second, milliseconds(60000)));
+  ends.join();
+  EXPECT_NE(std::string::npos, said_.find("waiting")) << said_;
+  ASSERT_TRUE(second.write(states_[1]).ok());
+  EXPECT_EQ(states_[1], *folder_.read("autosave_a.state", kMostStateBytes));
+}
+
+TEST_F(AutosaveFileTest, OnlyWhatIsItsOwnIsRemoved) {
+  AutosaveFile file = this->file();
+  claimed(file);
+  ASSERT_TRUE(file.write(states_[0]).ok());
+  ASSERT_TRUE(folder_.write("autosave_a.state", "somebody else's").ok());
+  file.remove();
+  EXPECT_EQ("somebody else's", *folder_.read("autosave_a.state", 100));
+}
+
+TEST_F(AutosaveFileTest, AFolderThatWasClearedIsTakenAgain) {
+  AutosaveFile first = file();
+  claimed(first);
+  fs::remove_all(temporary_.path());
+  ASSERT_TRUE(first.write(states_[0]).ok());
+  AutosaveFile second = file();
+  EXPECT_EQ(-1, claimed(second));
+  EXPECT_NE("", said_);
+  fs::remove(temporary_.path() + "/.autosave_a.state.lock");
+  AutosaveFile third = file();
+  EXPECT_EQ(0, claimed(third));
+  EXPECT_FALSE(first.write(states_[1]).ok());  // it is the third one's now
+  first.remove();
+  EXPECT_TRUE(folder_.has("autosave_a.state"));
+}
+
+TEST_F(AutosaveFileTest, SomeThatWereSetAsideAreKept) {
+  std::vector<std::string> kept;
+  for (int i = 0; i < 7; ++i) {
+    ASSERT_TRUE(folder_.write("autosave_a.state", "no state " + std::to_string(i)).ok());
+    AutosaveFile next = file();
+    EXPECT_EQ(-1, claimed(next));
+    EXPECT_NE(std::string::npos, said_.find("it is kept as autosave_a.state.before")) << said_;
+    next.remove();
+    std::this_thread::sleep_for(milliseconds(20));  // the time of a file is that of the last tick
+  }
+  for (const std::string& name : files()) kept.push_back(*folder_.read(name, 100));
+  std::sort(kept.begin(), kept.end());
+  EXPECT_EQ((std::vector<std::string>{"no state 2", "no state 3", "no state 4", "no state 5", "no state 6"}), kept);
+}
+
+TEST_F(AutosaveFileTest, AStateThatKillsIsNotTakenUpForEver) {
+  leave(states_[0]);
+  const auto die = [this] {
+    AutosaveFile dying = file();
+    const int state = claimed(dying);
+    dying.keep();
+    return state;
+  };
+  EXPECT_EQ(0, die());
+  EXPECT_EQ(0, die());
+  leave(states_[1]);  // the third time something comes of it
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(1, die());
+  EXPECT_EQ(-1, die());
+  EXPECT_NE(std::string::npos, said_.find("taken up 3 times")) << said_;
+  EXPECT_EQ(states_[1], *folder_.read("autosave_a.state.before", kMostStateBytes));
+}
+
+TEST_F(AutosaveFileTest, WhoDoesNotComeToStartDoesNotCount) {
+  leave(states_[0]);
+  for (int i = 0; i < 5; ++i) {
+    AutosaveFile refused = file();
+    EXPECT_EQ(0, claimed(refused));
+  }
+}
+
+TEST_F(AutosaveFileTest, AFolderThatCannotBe) {
+  for (const std::string path : {"/proc/x", "/dev/null", "/dev/null/x", ""}) {
+    const SessionFolder folder(path);
+    AutosaveFile file(folder, "autosave_a.state");
+    const auto state = file.claim(kOrigin, milliseconds(0), [](const std::string&) {});
+    ASSERT_FALSE(state.ok()) << path;
+    EXPECT_NE(std::string::npos, state.error().detail.find(path)) << state.error().detail;
+  }
+}
+
+}  // namespace
+}  // namespace meshless
