@@ -22,7 +22,6 @@ namespace meshless {
 namespace {
 
 constexpr char kPackage[] = "meshless_surgery";
-constexpr std::size_t kLongestAutosaveName = 80;
 
 bool isFile(const std::string& path) {
   struct stat info {};
@@ -108,9 +107,7 @@ SessionSettings sessionSettings(const NodeSettings& settings, const std::string&
   }
   session.command_log = settings.command_log;
   session.autosave_period = settings.autosave_period;
-  std::string name = ros::this_node::getName();
-  std::replace(name.begin(), name.end(), '/', '_');
-  session.autosave_name = ("autosave" + name).substr(0, kLongestAutosaveName) + ".state";
+  session.autosave_name = autosaveNameOf(ros::this_node::getName());
   std::string run_id;
   ros::param::get("/run_id", run_id);
   session.origin = "scene " + scene_file + ", launch " + run_id;
@@ -212,8 +209,12 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
       return Error{added.error().code, *file + ": " + added.error().detail};
 
   auto session = std::make_unique<Session>(sessionSettings(*settings, *file));
-  const std::string taken_up = session->takeUp(*world);
-  if (!taken_up.empty()) ROS_WARN_STREAM(taken_up);
+  const auto taken_up = session->takeUp(*world);
+  if (!taken_up.ok()) {
+    return Error{taken_up.error().code,
+                 "parameters ~autosave_period and ~session_directory: " + taken_up.error().detail};
+  }
+  if (!taken_up->empty()) ROS_WARN_STREAM(*taken_up);
   const auto log = session->startLog(*world);
   if (!log.ok()) return Error{log.error().code, "parameter ~command_log: " + log.error().detail};
   if (!log->empty()) ROS_INFO_STREAM("commands are logged to " << *log);

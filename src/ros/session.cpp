@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 
 #include <ros/console.h>
@@ -14,39 +15,37 @@ constexpr std::chrono::milliseconds kSaveAfterChange{500};     // while time sta
 constexpr std::chrono::milliseconds kWriteEvery{200};          // so much of the log is lost when the node is killed
 constexpr std::size_t kWriteAtOnce = 1 << 20;                  // bytes
 constexpr std::size_t kMostBuffered = std::size_t{256} << 20;  // bytes that a slow disk may be behind
-constexpr double kWarnEvery = 10.0;                            // [s]
+constexpr double kTryAgainFirst = 0.5, kTryAgainLast = 10.0;   // [s] after an autosave that failed; between: its period
+constexpr std::chrono::seconds kPatience{5};                   // with an older node of the same name
 
-const std::string kAutosave = "autosave_";  // how the names of autosaves begin
-const std::string kBefore = ".before";      // of an autosave that was not taken up
+constexpr std::string_view kLogMagic = "MLSCOMND";  // how logs of commands begin; src/world/command_log.cpp
+
+bool beginsAsAutosave(const std::string& name) { return name.compare(0, kAutosavePrefix.size(), kAutosavePrefix) == 0; }
 
 }  // namespace
 
-Session::Session(SessionSettings settings) : settings_(std::move(settings)), folder_(settings_.folder) {}
+Session::Session(SessionSettings settings)
+    : settings_(std::move(settings)), folder_(settings_.folder), autosave_(folder_, settings_.autosave_name) {}
 
 Session::~Session() { stop(); }
 
-std::string Session::takeUp(World& world) {
-  if (!(settings_.autosave_period > 0.0) || !folder_.has(settings_.autosave_name)) return "";
-  const std::string& name = settings_.autosave_name;
-  const auto setAside = [&](const std::string& why) {
-    const Status moved = folder_.rename(name, name + kBefore);
-    ROS_WARN_STREAM(
-        "the autosave " << name << " in " << folder_.folder() << " is not taken up: " << why
-                        << (moved.ok() ? "; it is kept as " + name + kBefore : "; " + moved.error().detail));
-    return std::string();
-  };
-  const auto bytes = folder_.read(name, kMostStateBytes);
-  if (!bytes.ok()) return setAside(bytes.error().detail);
-  const auto decoded = decode(*bytes);
-  if (!decoded.ok()) return setAside(decoded.error().detail);
-  if (decoded->origin != settings_.origin) return setAside("it is of another scene or launch");
-  world.restore(*decoded->world);
+Result<std::string> Session::takeUp(World& world) {
+  if (!(settings_.autosave_period > 0.0)) return std::string();
+  const auto left =
+      autosave_.claim(settings_.origin, kPatience, [](const std::string& text) { ROS_WARN_STREAM(text); });
+  if (!left.ok()) return left.error();
+  if (!*left) return std::string();
+  world.restore(**left);
   return "took up the session from the autosave at step " + std::to_string(world.stepCount()) + ", " +
          std::to_string(world.simTime()) + " s";
 }
 
 Result<std::string> Session::startLog(World& world) {
   if (settings_.command_log.empty()) return std::string();
+  if (beginsAsAutosave(settings_.command_log))
+    return Error{ErrorCode::kForbidden, "it is '" + settings_.command_log +
+                                            "', as autosaves are named; accepted: a name " +
+                                            "that does not begin with " + kAutosavePrefix};
   const auto file = folder_.create(settings_.command_log);
   if (!file.ok()) return file.error();
   log_file_ = file->descriptor;
@@ -58,6 +57,7 @@ Result<std::string> Session::startLog(World& world) {
 
 void Session::start(WorldRunner& runner) {
   runner_ = &runner;
+  autosave_.keep();
   folder_.removeLeftovers();
   if (settings_.autosave_period > 0.0) saver_ = std::thread([this] { saveLoop(); });
 }
@@ -74,7 +74,7 @@ void Session::stop() {
   save_wanted_.notify_all();
   if (saver_.joinable()) {
     saver_.join();
-    folder_.remove(settings_.autosave_name);
+    autosave_.remove();
   }
   {
     const std::lock_guard<std::mutex> lock(log_mutex_);
@@ -87,22 +87,30 @@ void Session::stop() {
 
 Result<std::size_t> Session::save(WorldRunner& runner, const std::string& name) {
   if (Status valid = SessionFolder::checkName(name); !valid.ok()) return valid.error();
-  if (name.compare(0, kAutosave.size(), kAutosave) == 0 || (!log_name_.empty() && name == log_name_))
+  if (beginsAsAutosave(name) || (!log_name_.empty() && name == log_name_))
     return Error{ErrorCode::kForbidden, "file is '" + name + "', which the node itself writes; accepted: another name"};
+  if (folder_.beginsWith(name, kLogMagic))
+    return Error{ErrorCode::kForbidden, "file is '" + name + "', which is a log of commands; accepted: another name"};
   SavedWorldPtr saved;
   const Status done = runner.look([&](World& world) { saved = world.capture(); });
   if (!done.ok()) return done.error();
-  const std::string bytes = encode(*saved, settings_.origin);
+  const auto bytes = encoded(*saved);
+  if (!bytes.ok()) return bytes.error();
+  if (Status written = folder_.write(name, *bytes); !written.ok()) return written.error();
+  return bytes->size();
+}
+
+Result<std::string> Session::encoded(const SavedWorld& world) const {
+  std::string bytes = encode(world, settings_.origin);
   if (bytes.size() > kMostStateBytes) {
     return Error{ErrorCode::kFailed, "the state has " + std::to_string(bytes.size()) + " bytes; accepted: up to " +
                                          std::to_string(kMostStateBytes)};
   }
-  if (Status written = folder_.write(name, bytes); !written.ok()) return written.error();
-  return bytes.size();
+  return bytes;
 }
 
 Result<Session::Loaded> Session::load(WorldRunner& runner, const std::string& name) {
-  const auto bytes = folder_.read(name, kMostStateBytes);
+  const auto bytes = folder_.read(name, kMostStateBytes, kStateHeaderBytes, checkStateHeader);
   if (!bytes.ok()) return bytes.error();
   const auto decoded = decode(*bytes);
   if (!decoded.ok()) return Error{decoded.error().code, "'" + name + "': " + decoded.error().detail};
@@ -146,26 +154,42 @@ void Session::changed(const World& world, double dt) {
   save_wanted_.notify_all();
 }
 
-// Once time stands still, what is not saved yet is saved a little later, all at once.
 void Session::saveLoop() {
-  while (true) {
-    SavedWorldPtr saved;
-    {
-      std::unique_lock<std::mutex> lock(save_mutex_);
-      save_wanted_.wait(lock, [this] { return stopping_ || to_save_ || unsaved_; });
-      if (!to_save_) {
-        const std::uint64_t seen = steps_seen_;
-        save_wanted_.wait_for(lock, kSaveAfterChange, [this] { return stopping_ || to_save_ != nullptr; });
-        if (!stopping_ && !to_save_ && seen != steps_seen_) continue;  // it runs: the period decides
-      }
-      if (stopping_) return;
-      saved = std::exchange(to_save_, nullptr);
-      if (!saved) unsaved_ = false;
-    }
-    if (!saved && !runner_->look([&](World& world) { saved = world.capture(); }).ok()) return;
-    const Status written = folder_.write(settings_.autosave_name, encode(*saved, settings_.origin));
-    if (!written.ok()) ROS_ERROR_STREAM_THROTTLE(kWarnEvery, "the autosave failed: " << written.error().detail);
+  bool failed = false;
+  std::string said;  // of a failure that lasts
+  SavedWorldPtr saved;
+  while (waitForWork(failed, saved)) {
+    failed = !saved && !runner_->look([&](World& world) { saved = world.capture(); }).ok();
+    if (failed) continue;  // mostly the runner ends just now, and this thread is next
+    const auto bytes = encoded(*saved);
+    const Status written = bytes.ok() ? autosave_.write(*bytes) : Status(bytes.error());
+    failed = !written.ok();
+    const std::string why = failed ? written.error().detail : "";
+    if (failed && why != said) ROS_ERROR_STREAM("the autosave failed, and is tried again: " << why);
+    if (!failed && !said.empty()) ROS_WARN_STREAM("the autosave is written again");
+    said = why;
   }
+}
+
+// Once time stands still, what is not saved yet is saved a little later, all at once; what failed is tried again.
+// False: it is time to stop. Without `saved` the world is to be looked at.
+bool Session::waitForWork(bool failed, SavedWorldPtr& saved) {
+  std::unique_lock<std::mutex> lock(save_mutex_);
+  const auto wanted = [this] { return stopping_ || to_save_; };
+  if (failed) {
+    const double pause = std::clamp(settings_.autosave_period, kTryAgainFirst, kTryAgainLast);
+    save_wanted_.wait_for(lock, std::chrono::duration<double>(pause), wanted);
+  } else {
+    while (true) {
+      save_wanted_.wait(lock, [&] { return wanted() || unsaved_; });
+      const std::uint64_t seen = steps_seen_;
+      // Where it runs the period decides.
+      if (wanted() || save_wanted_.wait_for(lock, kSaveAfterChange, wanted) || seen == steps_seen_) break;
+    }
+  }
+  saved = std::exchange(to_save_, nullptr);
+  if (!saved) unsaved_ = false;
+  return !stopping_;
 }
 
 void Session::append(std::string bytes) {

@@ -4,6 +4,7 @@ import os
 import random
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -30,6 +31,48 @@ def box(size):
     return SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[size, size, size])
 
 
+def until(holds, what):
+    """Waits for it; a bound for what should have happened long before."""
+    end = time.monotonic() + LONG
+    while not holds():
+        if time.monotonic() > end:
+            raise AssertionError(what() if callable(what) else what)
+        time.sleep(0.05)
+
+
+class NamedNode(OwnNode):
+    """A node of that name, of which there may be others: told apart from them by its process and its output."""
+
+    def __init__(self, name, prefix=(), master=None, **parameters):  # pylint: disable=super-init-not-called
+        self.name = name
+        namespace, own = name.rsplit('/', 1)
+        binary = roslib.packages.find_node('meshless_surgery', 'deformer_node')[0]
+        environment = dict(os.environ, ROS_NAMESPACE=namespace or '/', **({'ROS_MASTER_URI': master} if master else {}))
+        self.log = tempfile.TemporaryFile(mode='w+', errors='replace')
+        self.process = subprocess.Popen(
+            list(prefix) + [binary, '__name:=' + own] + ['_%s:=%s' % item for item in parameters.items()],
+            stdout=self.log, stderr=self.log, env=environment)
+        self.deformer = Deformer(name)
+
+    def service(self):
+        """Where the master says that the service is that a node offers last."""
+        try:
+            return rosgraph.Master('/test').lookupService(self.name + '/spawn')
+        except rosgraph.MasterError:
+            return None
+
+    def wait_instead_of(self, service):
+        until(lambda: self.service() not in (None, service) or self.process.poll() is not None, self.output)
+        return self.wait()
+
+    def says(self, text):
+        until(lambda: text in self.output() or self.process.poll() is not None,
+              lambda: 'no "%s" in: %s' % (text, self.output()))
+        if text not in self.output():
+            raise AssertionError('the node has ended without "%s": %s' % (text, self.output()))
+        return self
+
+
 class SessionCase(unittest.TestCase):
 
     def setUp(self):
@@ -53,6 +96,19 @@ class SessionCase(unittest.TestCase):
     def write(self, name, data):
         with open(self.path(name), 'wb') as file:
             file.write(data)
+
+    def named(self, name, **parameters):
+        # So long a period leaves the one autosave that is made when time stands still.
+        settings = dict(scene=BOXES, paused='true', session_directory=self.folder, autosave_period=10.0)
+        settings.update(parameters)
+        node = NamedNode(name, **settings)
+        self.addCleanup(node.__exit__)
+        return node
+
+    def is_saved(self, name, whole=b'MLSSTATE'):
+        """Waits for the file; what it begins with."""
+        until(lambda: os.path.exists(self.path(name)), lambda: 'no %s among %s' % (name, os.listdir(self.folder)))
+        self.assertEqual(whole, self.read(name)[:len(whole)])
 
     def work(self, node):
         """Something of everything, that goes on moving afterwards."""
@@ -129,8 +185,12 @@ class SaveTest(SessionCase):
                 outside.write(good)
                 outside.flush()
                 os.symlink(outside.name, self.path('link'))
+                self.write('sparse', good[:24])
+                os.truncate(self.path('sparse'), 500 << 20)
+                self.write('endless', good)
+                os.truncate(self.path('endless'), 1 << 40)
                 for name in ('cut_off', 'nothing', 'longer', 'foreign', 'newer', 'turned', 'pipe', 'folder', 'link',
-                             'missing'):
+                             'missing', 'sparse', 'endless'):
                     answer = node.call('load', file=name)
                     self.assertFalse(answer.success, name)
                     self.assertIn(name, answer.message)
@@ -289,9 +349,42 @@ class LogTest(SessionCase):
         self.assertEqual(2, self.replay('log').returncode)
 
     def test_names_only(self):
-        node = self.node(command_log='../log')
-        self.assertNotEqual(0, node.process.wait(LONG))
-        self.assertIn('command_log', node.output())
+        for name in ('../log', 'autosave_own_deformer.state', 'autosave_x'):
+            node = self.node(command_log=name, autosave_period=0.1)
+            self.assertNotEqual(0, node.process.wait(LONG))
+            self.assertIn('command_log', node.output())
+            self.assertIn(name, node.output())
+            self.assertIn('accepted', node.output())
+        self.assertEqual([], os.listdir(self.folder))
+
+    def test_a_state_is_not_saved_over_a_log(self):
+        for name in ('log', 'log.2'):
+            with self.node(command_log='log') as node:
+                node.good('step', steps=3)
+                self.assertFalse(node.call('save', file=name).success)
+                self.assertEqual(0, node.end(signal.SIGTERM))
+        before = self.read('log')
+        with self.node(command_log='log') as node:
+            for name in ('log', 'log.2', 'log.3'):
+                answer = node.call('save', file=name)
+                self.assertFalse(answer.success)
+                self.assertIn(name, answer.message)
+                self.assertIn('accepted', answer.message)
+            node.good('save', file='state')
+        self.assertEqual(before, self.read('log'))
+        for name in ('log', 'log.2'):
+            self.assertEqual(0, self.replay(name).returncode)
+
+    def test_a_folder_that_cannot_be_is_said_at_once(self):
+        self.write('file', b'')
+        for folder in ('/proc/x', self.path('file'), self.path('file/below')):
+            for asked in (dict(autosave_period=0.5), dict(command_log='log')):
+                node = self.node(session_directory=folder, **asked)
+                self.assertNotEqual(0, node.process.wait(LONG))
+                self.assertIn(folder, node.output())
+                self.assertIn(list(asked)[0], node.output())
+        with self.node(session_directory='/proc/x') as node:  # nobody needs it
+            self.assertIn('/proc/x', node.call('save', file='state').message)
 
 
 class SignalTest(SessionCase):
@@ -334,6 +427,119 @@ class SignalTest(SessionCase):
                     node.good('step', steps=2)
             os.remove(self.path('log'))
         self.assertGreater(len(sizes), 0)
+
+
+class AutosaveTest(SessionCase):
+
+    def test_what_failed_is_tried_again_while_time_stands_still(self):
+        # What the node says has to fit below the limit too.
+        node = self.named('/limited', prefix=('prlimit', '--fsize=5000:unlimited'), autosave_period=0.5).wait()
+        node.good('step', steps=50)
+        node.says('the autosave failed')
+        time.sleep(3.0)  # several more
+        self.assertEqual(1, node.output().count('the autosave failed'))
+        self.assertFalse(os.path.exists(self.path('autosave_limited.state')))
+        subprocess.check_call(['prlimit', '--pid', str(node.process.pid), '--fsize=unlimited'])
+        self.is_saved('autosave_limited.state')
+        node.says('written again')
+        node.end(signal.SIGKILL)
+        self.assertEqual(50, self.named('/limited').wait().good('hash').step)
+
+    def test_names_do_not_collide(self):
+        names = {'/a_b': 10, '/a/b': 20, '/' + 'long_' * 20 + 'a': 30, '/' + 'long_' * 20 + 'b': 40}
+        nodes = [self.named(name).wait() for name in names]
+        for node in nodes:
+            node.good('step', steps=names[node.name])
+        until(lambda: len([name for name in os.listdir(self.folder) if name.startswith('autosave_')]) == len(nodes),
+              lambda: str(os.listdir(self.folder)))
+        self.assertEqual(0, nodes.pop().end(signal.SIGTERM))
+        for node in nodes:
+            node.end(signal.SIGKILL)
+        for name in list(names)[:-1]:
+            node = self.named(name).wait()
+            self.assertEqual(names[name], node.good('hash').step)
+            self.assertEqual(0, node.end(signal.SIGTERM))
+        self.assertEqual([], os.listdir(self.folder))
+
+    def test_the_second_of_a_name_waits_for_the_end_of_the_first(self):
+        """The master ends the first, which puts its things in order: not those of the second."""
+        first = self.named('/twice').wait()
+        first.good('step', steps=216)
+        self.is_saved('autosave_twice.state')
+        service = first.service()
+        first.process.send_signal(signal.SIGSTOP)  # or it may have ended before the second looks
+        second = self.named('/twice').says('waiting for its end')
+        first.process.send_signal(signal.SIGCONT)
+        self.assertEqual(0, first.process.wait(LONG))
+        second.wait_instead_of(service)
+        self.assertEqual(0, second.good('hash').step)
+        self.assertNotIn('this node\'s autosave is', second.output())
+        second.good('step', steps=7)
+        self.is_saved('autosave_twice.state')
+        last = second.good('hash')
+        second.end(signal.SIGKILL)
+        third = self.named('/twice').wait()
+        self.assertIn('took up the session', third.output())
+        self.assertEqual(last.hash, third.good('hash').hash)
+        self.assertEqual(0, third.end(signal.SIGTERM))
+        self.assertEqual([], os.listdir(self.folder))
+
+    def test_a_first_that_does_not_end_keeps_its_own(self):
+        first = self.named('/twice').wait()
+        first.good('step', steps=216)
+        self.is_saved('autosave_twice.state')
+        whole = self.read('autosave_twice.state')
+        service = first.service()
+        first.process.send_signal(signal.SIGSTOP)
+        second = self.named('/twice').says('this node\'s autosave is autosave_twice.state.2')
+        self.assertIn('process %d' % first.process.pid, second.output())
+        second.wait_instead_of(service).good('step', steps=7)
+        self.is_saved('autosave_twice.state.2')
+        self.assertEqual(whole, self.read('autosave_twice.state'))
+        first.process.send_signal(signal.SIGCONT)
+        self.assertEqual(0, first.end(signal.SIGTERM))
+        self.assertEqual(['.autosave_twice.state.2.lock', 'autosave_twice.state.2'], sorted(os.listdir(self.folder)))
+        second.end(signal.SIGKILL)
+        third = self.named('/twice').wait()
+        self.assertEqual(7, third.good('hash').step)
+
+    def test_two_masters_on_one_machine(self):
+        """The older one ends by SIGTERM, and leaves alone what the younger one has written."""
+        with socket.socket() as free:
+            free.bind(('127.0.0.1', 0))
+            port = free.getsockname()[1]
+        master = subprocess.Popen(['rosmaster', '--core', '-p', str(port)], stdout=subprocess.DEVNULL,
+                                  stderr=subprocess.DEVNULL)
+        self.addCleanup(master.wait)
+        self.addCleanup(master.terminate)
+        uri = 'http://127.0.0.1:%d/' % port
+        older = self.named('/deformer_of_two').wait()
+        older.good('step', steps=5)
+        name = 'autosave_deformer_of_two.state'
+        self.is_saved(name)
+        for start in ('this node\'s autosave is ' + name + '.2', 'took up the session'):
+            younger = self.named('/deformer_of_two', master=uri, paused='false', autosave_period=0.1).says(start)
+            self.is_saved(name + '.2')
+            self.assertFalse(os.path.exists(self.path(name + '.before')))
+            if older.process.poll() is None:
+                self.assertEqual(5, older.good('hash').step)
+                self.assertEqual(0, older.end(signal.SIGTERM))
+            self.assertFalse(os.path.exists(self.path(name)))
+            self.is_saved(name + '.2')
+            younger.end(signal.SIGKILL)
+
+    def test_a_state_that_kills_is_set_aside(self):
+        for turn in range(5):
+            node = self.named('/dying').wait()
+            if turn == 0:
+                node.good('step', steps=9)
+                self.is_saved('autosave_dying.state')
+            self.assertEqual(9 if turn < 4 else 0, node.good('hash').step)
+            node.end(signal.SIGKILL)
+        self.assertIn('taken up 3 times', node.output())
+        with self.node() as other:
+            other.good('load', file='autosave_dying.state.before')
+            self.assertEqual(9, other.good('hash').step)
 
 
 class RespawnTest(SessionCase):
@@ -412,15 +618,16 @@ class RespawnTest(SessionCase):
         name = 'autosave%s.state' % node.name.replace('/', '_')
         whole = self.read(name)
         node.log.close()
-        for scene, left in ((FALLING, whole), (BOXES, whole[:1000])):
+        for scene, left, aside in ((FALLING, whole, '.before'), (BOXES, whole[:1000], '.before.2')):
             self.write(name, left)
             OwnNode.count -= 1
             with self.node(scene=scene, autosave_period=0.1) as again:
                 self.assertEqual(0, again.good('hash').step)
                 self.assertIn('is not taken up', again.output())
-                self.assertEqual(left, self.read(name + '.before'))
+                self.assertEqual(left, self.read(name + aside))
                 self.assertEqual(0, again.end(signal.SIGTERM))
+        self.assertEqual(whole, self.read(name + '.before'))
 
 
 if __name__ == '__main__':
-    run('session', SaveTest, LogTest, SignalTest, RespawnTest)
+    run('session', SaveTest, LogTest, SignalTest, AutosaveTest, RespawnTest)

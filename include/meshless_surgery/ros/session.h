@@ -6,6 +6,7 @@
 #include <string>
 #include <thread>
 
+#include "meshless_surgery/io/autosave_file.h"
 #include "meshless_surgery/io/session_folder.h"
 #include "meshless_surgery/ros/runner.h"
 #include "meshless_surgery/world/saved_world.h"
@@ -25,10 +26,10 @@ class Session {
   explicit Session(SessionSettings settings);
   ~Session();
 
-  /// Before the runner has the world: takes up an autosave that a process of the same origin left behind when it was
-  /// killed, and says so; empty where there is none.
-  std::string takeUp(World& world);
-  /// Likewise: opens the log of commands. Refuses where the disk does.
+  /// Before the runner has the world: takes possession of the autosave's file, takes up what a process of the same
+  /// origin left there when it was killed, and says so; empty where there is none. Refuses where the disk does.
+  Result<std::string> takeUp(World& world);
+  /// Likewise: opens the log of commands. Refuses where the disk does, and names that autosaves have.
   Result<std::string> startLog(World& world);
 
   /// From now on autosaves are made, of that runner's world.
@@ -52,12 +53,15 @@ class Session {
   void changed(const World& world, double dt);
 
  private:
+  Result<std::string> encoded(const SavedWorld& world) const;
   void saveLoop();
+  bool waitForWork(bool failed, SavedWorldPtr& saved);
   void writeLoop();
   void append(std::string bytes);
 
   const SessionSettings settings_;
   const SessionFolder folder_;
+  AutosaveFile autosave_;  // of the thread that writes it, while that runs
   WorldRunner* runner_ = nullptr;
 
   // autosaves: copied by the runner, written by a thread of their own
