@@ -351,6 +351,7 @@ class LogTest(SessionCase):
     def test_names_only(self):
         for name in ('../log', 'autosave_own_deformer.state', 'autosave_x'):
             node = self.node(command_log=name, autosave_period=0.1)
+            self.addCleanup(node.__exit__)
             self.assertNotEqual(0, node.process.wait(LONG))
             self.assertIn('command_log', node.output())
             self.assertIn(name, node.output())
@@ -380,6 +381,7 @@ class LogTest(SessionCase):
         for folder in ('/proc/x', self.path('file'), self.path('file/below')):
             for asked in (dict(autosave_period=0.5), dict(command_log='log')):
                 node = self.node(session_directory=folder, **asked)
+                self.addCleanup(node.__exit__)
                 self.assertNotEqual(0, node.process.wait(LONG))
                 self.assertIn(folder, node.output())
                 self.assertIn(list(asked)[0], node.output())
