@@ -428,18 +428,37 @@ void World::restore(const SavedWorld& saved) {
   w.say(EventType::kLoaded, "", 0, "a saved state was loaded");
 }
 
+template <class T>
+std::uint64_t ContentHashes::of(const std::shared_ptr<const T>& content) {
+  const auto [known, is_new] = known_.try_emplace(content.get());
+  if (is_new) {
+    HashArchive archive;
+    archive(*content);
+    known->second = {content, archive.hash()};
+  }
+  return known->second.hash;
+}
+
+void ContentHashes::tidy() {
+  for (auto it = known_.begin(); it != known_.end();)
+    it = it->second.owner.expired() ? known_.erase(it) : std::next(it);
+}
+
 // Ids and numbers go on growing over resets, which bring back the same world: they are left out.
 std::uint64_t World::stateHash() const {
   const auto saved = capture();
   HashArchive archive;
+  WorldSettings settings = saved->settings;
+  settings.threads = 1;  // they change nothing
+  ContentHashes& known = impl_->content_hashes;
+  known.tidy();
+  archive(settings);
+  for (const auto& obstacle : saved->obstacles) archive(known.of(obstacle));
   archive(saved->step, saved->batches_current, saved->batches, saved->used_names, saved->push, saved->scissors);
-  // Of a model, which is constant, its size and mass.
   for (const SavedBody& body : saved->bodies) {
     archive(body.name, body.material, body.state, body.touched_by_push, body.stiffness_factor, body.bounds, body.asleep,
             body.still_for, body.sleep_group, body.batch);
-    archive(body.model->mass, static_cast<std::uint64_t>(body.model->rest.size()),
-            static_cast<std::uint64_t>(body.model->surface.triangles.size()),
-            static_cast<std::uint64_t>(body.model->clusters.members.size()));
+    archive(known.of(body.model));
   }
   for (Pick pick : saved->picks) {
     const auto held = std::find_if(saved->bodies.begin(), saved->bodies.end(),

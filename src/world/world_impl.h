@@ -5,6 +5,7 @@
 #include <map>
 #include <mutex>
 #include <set>
+#include <unordered_map>
 
 #include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/body/deform.h"
@@ -139,8 +140,25 @@ struct CutUndo {
 /// this frame, else they are found.
 bool fitsFloat(WorldBody& body, bool bounds_known, double h);
 
+/// Hashes of what is shared and does not change, models and obstacles: taken once.
+class ContentHashes {
+ public:
+  template <class T>
+  std::uint64_t of(const std::shared_ptr<const T>& content);
+  /// Forgets those that nobody holds any more: another may come to lie where they were.
+  void tidy();
+
+ private:
+  struct Known {
+    std::weak_ptr<const void> owner;
+    std::uint64_t hash = 0;
+  };
+  std::unordered_map<const void*, Known> known_;
+};
+
 struct World::Impl {
   WorldSettings settings;
+  ContentHashes content_hashes;
   ForEach for_each = oneAfterAnother;
   /// work(n) for n below count, shared out over the threads.
   template <class Work>

@@ -205,7 +205,8 @@ class World {
   /// Events since the last call.
   std::vector<Event> takeEvents();
   /// Of all that a later step reads of the state: equal for equal histories since the start or a reset, whoever looked
-  /// on and on however many threads. Settings and models are constant, ids go on over resets: they are left out.
+  /// on and on however many threads: settings, obstacles and models with their surfaces too. Ids go on over resets, and
+  /// undo only looks back: they are left out.
   std::uint64_t stateHash() const;
 
   /// The whole state as it is now, at the cost of a copy of what changes (world/saved_world.h).
