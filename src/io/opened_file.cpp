@@ -1,7 +1,6 @@
 #include "opened_file.h"
 
 #include <fcntl.h>
-#include <limits.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -9,33 +8,14 @@
 #include <cstring>
 #include <new>
 
+#include "descriptor.h"
+
 namespace meshless {
 namespace {
 
-class Descriptor {
- public:
-  Descriptor(const std::string& path, int flags)
-      : descriptor_(::open(path.c_str(), flags | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK)) {}
-  ~Descriptor() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-
-  int get() const { return descriptor_; }
-  /// O_NOFOLLOW looks at the last part of a path alone; the kernel knows where the file lies. Where it does not say
-  /// (no /proc), nothing is read.
-  bool liesAt(const std::string& path) const {
-    char real[PATH_MAX];
-    const std::string link = "/proc/self/fd/" + std::to_string(descriptor_);
-    const ssize_t size = descriptor_ < 0 ? -1 : ::readlink(link.c_str(), real, sizeof real);
-    return size >= 0 && size < static_cast<ssize_t>(sizeof real) &&
-           std::string_view(real, static_cast<std::size_t>(size)) == path;
-  }
-
- private:
-  int descriptor_;
-};
+Descriptor opened(const std::string& path, int flags) {
+  return Descriptor(::open(path.c_str(), flags | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK));
+}
 
 std::string accepted(std::uint64_t most_bytes) {
   return "; accepted: up to " + std::to_string(most_bytes) + " (" + std::to_string(most_bytes >> 20) + " MiB)";
@@ -44,7 +24,7 @@ std::string accepted(std::uint64_t most_bytes) {
 }  // namespace
 
 FileKind fileKind(const std::string& real_path) {
-  const Descriptor file(real_path, O_PATH);
+  const Descriptor file = opened(real_path, O_PATH);
   struct stat info {};
   if (!file.liesAt(real_path) || ::fstat(file.get(), &info) != 0) return FileKind::kElsewhere;
   return S_ISREG(info.st_mode) ? FileKind::kRegular : FileKind::kOther;
@@ -52,7 +32,7 @@ FileKind fileKind(const std::string& real_path) {
 
 Result<FileBytes> readFile(const std::string& real_path, std::uint64_t most_bytes) {
   const auto unreadable = [](const std::string& what) { return Error{ErrorCode::kUnreadable, what}; };
-  const Descriptor file(real_path, O_RDONLY);
+  const Descriptor file = opened(real_path, O_RDONLY);
   struct stat info {};
   if (!file.liesAt(real_path) || ::fstat(file.get(), &info) != 0)
     return unreadable("is missing, cannot be opened, or was replaced meanwhile");

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "descriptor.h"
 #include "meshless_surgery/io/files.h"
 
 namespace meshless {
@@ -38,22 +39,6 @@ long writerOf(const std::string& name) {
 }
 
 /// Closed when it goes out of scope.
-class Descriptor {
- public:
-  explicit Descriptor(int descriptor) : descriptor_(descriptor) {}
-  ~Descriptor() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return descriptor_; }
-  /// The errors of a late write come with close.
-  bool close() { return ::close(std::exchange(descriptor_, -1)) == 0; }
-
- private:
-  int descriptor_;
-};
-
 /// Reads on until there are so many, or the file ends. False: errno says why.
 bool readUpTo(int descriptor, std::string& bytes, std::size_t size) {
   std::size_t have = bytes.size();
@@ -153,6 +138,8 @@ Result<std::string> SessionFolder::read(const std::string& name, std::size_t mos
   struct stat info {};
   if (file.get() < 0 || ::fstat(file.get(), &info) != 0)
     return Error{ErrorCode::kUnreadable, "cannot read '" + name + "': " + std::strerror(errno)};
+  if (!file.liesAt(*path))  // a folder on the way was replaced meanwhile
+    return Error{ErrorCode::kUnreadable, "there is no file '" + name + "'"};
   if (!S_ISREG(info.st_mode))
     return Error{ErrorCode::kUnreadable, "'" + name + "' is no file; accepted: a regular file"};
   if (static_cast<std::uint64_t>(info.st_size) > most_bytes)
