@@ -6,6 +6,7 @@ import os
 import random
 import shutil
 import socket
+import subprocess
 import sys
 import tempfile
 import threading
@@ -13,6 +14,7 @@ import time
 import unittest
 
 import rosgraph
+import roslib.packages
 import rospy
 from geometry_msgs.msg import Point, TransformStamped, Vector3
 from meshless_surgery.msg import Event, State, Surfaces
@@ -45,11 +47,18 @@ class RobustCase(unittest.TestCase):
         return OwnNode(**settings)
 
     def lives(self, node):
-        """It answers, steps, and its tissue is finite."""
+        """It answers, steps, and its tissue is finite, as it is and after a reset."""
         node.good('pause', data=True)
         before = node.good('hash').step
         node.good('step', steps=5)
         self.assertEqual(before + 5, node.good('hash').step)
+        states = Recorder(node.name + '/state', State)
+        for body in states.next(lambda state: state.step == before + 5).bodies:
+            at = body.centre_of_mass
+            self.assertTrue(all(math.isfinite(v) for v in (body.kinetic_energy, at.x, at.y, at.z)), body)
+            shape = node.good('get_body', name=body.name)
+            self.assertTrue(math.isfinite(shape.volume) and math.isfinite(shape.area), body)
+        states.close()
         node.good('reset')
         node.good('step', steps=20)
         for name in ('left', 'right', 'middle'):
@@ -83,7 +92,7 @@ class CrowdTest(RobustCase):
 
                 try:
                     while time.monotonic() < until:
-                        kind = rng.randrange(17)
+                        kind = rng.randrange(18)
                         at = Point(rng.uniform(-0.25, 0.25), rng.uniform(-0.05, 0.05), rng.uniform(0.0, 0.1))
                         if kind < 4:
                             pick = call('pick', point=at, max_distance=0.05)
@@ -124,6 +133,8 @@ class CrowdTest(RobustCase):
                         elif kind == 15:
                             call(rng.choice(['clear_picks', 'open_scissors', 'lift_scissors']))
                             call('pause', data=rng.random() < 0.3)
+                        elif kind == 16:
+                            call('pick', point=at, header=header('nowhere'))  # it waits for the transform
                         else:
                             call('undo_cut')
                 except Exception as fault:  # pylint: disable=broad-except
@@ -144,7 +155,13 @@ class CrowdTest(RobustCase):
                 CROWD, sum(counts), SECONDS, slow[0], slow[1], str(slow[2]).replace('\n', ' '), slow[3][:200]))
             self.assertLess(slow[0], SLOWEST)
             self.lives(node)
+            last = node.good('hash')
             self.assertEqual(0, node.end(15))
+        replay = subprocess.run([roslib.packages.find_node('meshless_surgery', 'replay')[0],
+                                 os.path.join(self.folder, 'log')], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                universal_newlines=True, check=False)
+        self.assertEqual(0, replay.returncode, replay.stdout[-2000:])
+        self.assertIn('step %d hash %016x' % (last.step, last.hash), replay.stdout)
 
 
 class ListenerTest(RobustCase):
