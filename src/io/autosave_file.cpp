@@ -134,7 +134,7 @@ Result<SavedWorldPtr> AutosaveFile::claim(const std::string& origin, std::chrono
   return takeUp(origin, say);
 }
 
-SavedWorldPtr AutosaveFile::takeUp(const std::string& origin, const Say& say) {
+Result<SavedWorldPtr> AutosaveFile::takeUp(const std::string& origin, const Say& say) {
   const std::optional<FileId> there = idOf(name_);
   int times = 0;
   if (there && before_.file == *there) times = before_.times_taken_up;
@@ -149,8 +149,12 @@ SavedWorldPtr AutosaveFile::takeUp(const std::string& origin, const Say& say) {
       own_ = there;
       ++times;
     } else {
-      say("the autosave " + name_ + " in " + folder_.folder() + " is not taken up: " + read.error().detail + "; " +
-          setAside());
+      const std::string why =
+          "the autosave " + name_ + " in " + folder_.folder() + " is not taken up: " + read.error().detail + "; ";
+      const Result<std::string> aside = setAside();
+      // It would be overwritten.
+      if (!aside.ok()) return Error{aside.error().code, why + "nor can it be set aside: " + aside.error().detail};
+      say(why + "it is kept as " + *aside);
       times = 0;
     }
   }
@@ -159,7 +163,7 @@ SavedWorldPtr AutosaveFile::takeUp(const std::string& origin, const Say& say) {
 }
 
 // The oldest goes where there are too many.
-std::string AutosaveFile::setAside() const {
+Result<std::string> AutosaveFile::setAside() const {
   std::string aside;
   std::optional<FileId> oldest;
   for (int number = 1; number <= kMostAside; ++number) {
@@ -171,7 +175,8 @@ std::string AutosaveFile::setAside() const {
     oldest = there;
   }
   const Status moved = folder_.rename(name_, aside);
-  return moved.ok() ? "it is kept as " + aside : moved.error().detail;
+  if (!moved.ok()) return moved.error();
+  return aside;
 }
 
 Status AutosaveFile::write(std::string_view bytes) {

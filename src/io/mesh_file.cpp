@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <mutex>
 #include <string_view>
 #include <utility>
 
@@ -207,8 +208,14 @@ Result<TriangleMesh> readMeshFile(const std::string& real_path) {
     if (!file) return file.error();
     if (!file->ok()) return Error{ErrorCode::kFailed, "there is no memory to read '" + name + "'"};
     pcl::PolygonMesh mesh;
-    if (!readWithPcl(file->path(), *format, mesh))
-      return Error{ErrorCode::kUnreadable, "'" + name + "' cannot be read: it is truncated or damaged"};
+    bool read = false;
+    {
+      // What PCL and VTK say, and which readers VTK has, is the whole process's.
+      static std::mutex one_at_a_time;
+      const std::lock_guard<std::mutex> lock(one_at_a_time);
+      read = readWithPcl(file->path(), *format, mesh);
+    }
+    if (!read) return Error{ErrorCode::kUnreadable, "'" + name + "' cannot be read: it is truncated or damaged"};
     return convert(mesh, promised, name);
   } catch (const std::exception& e) {
     return Error{ErrorCode::kUnreadable, "'" + name + "' cannot be read: " + e.what()};

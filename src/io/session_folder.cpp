@@ -114,9 +114,10 @@ Status SessionFolder::write(const std::string& name, std::string_view bytes) con
     ::unlink(temporary.c_str());
     return written;
   }
-  // The new name itself; some file systems cannot, and then have it already.
+  // The new name itself. Some file systems cannot, and some folders may not be opened: only a disk's fault is one.
   const Descriptor folder(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (folder.get() < 0 || (::fsync(folder.get()) != 0 && errno != EINVAL))
+  const auto isOfTheDisk = [](int fault) { return fault == EIO || fault == ENOSPC || fault == EDQUOT; };
+  if ((folder.get() < 0 || ::fsync(folder.get()) != 0) && isOfTheDisk(errno))
     return Error{ErrorCode::kFailed,
                  "'" + path +
                      "' is written, but may not outlive a power failure: cannot bring the folder to the disk: " +

@@ -35,6 +35,7 @@ EndOnSignal::~EndOnSignal() {
 void EndOnSignal::wait() {
   std::unique_lock<std::mutex> lock(mutex_);
   started_ = true;
+  changed_.notify_all();
   changed_.wait(lock, [this] { return ending_; });
 }
 
@@ -49,13 +50,17 @@ void EndOnSignal::listen() {
   std::unique_lock<std::mutex> lock(mutex_);
   ending_ = true;
   changed_.notify_all();
-  const bool in_use = started_;
-  lock.unlock();
-  if (!in_use) ros::requestShutdown();  // also ends waiting for a master
-  lock.lock();
-  if (changed_.wait_for(lock, in_use ? kLongestEnd : kLongestStart, [this] { return over_; })) return;
-  const char* why = in_use ? "a body was still being prepared: the node ends without it\n"
-                           : "the node ends before its scene is ready\n";
+  if (!started_) {
+    lock.unlock();
+    ros::requestShutdown();  // also ends waiting for a master
+    lock.lock();
+    changed_.wait_for(lock, kLongestStart, [this] { return over_ || started_; });
+  }
+  if (started_) changed_.wait_for(lock, kLongestEnd, [this] { return over_; });
+  if (over_) return;
+  const char* why = started_
+                        ? "not all has ended in time, such as a body that is being prepared: the node ends without it\n"
+                        : "the node ends before its scene is ready\n";
   (void)!write(STDERR_FILENO, why, std::strlen(why));
   _exit(1);
 }

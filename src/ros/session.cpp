@@ -163,10 +163,10 @@ void Session::saveLoop() {
     if (failed) continue;  // mostly the runner ends just now, and this thread is next
     const auto bytes = encoded(*saved);
     const Status written = bytes.ok() ? autosave_.write(*bytes) : Status(bytes.error());
-    failed = !written.ok();
-    const std::string why = failed ? written.error().detail : "";
-    if (failed && why != said) ROS_ERROR_STREAM("the autosave failed, and is tried again: " << why);
-    if (!failed && !said.empty()) ROS_WARN_STREAM("the autosave is written again");
+    failed = bytes.ok() && !written.ok();  // what is too large is so until it changes
+    const std::string why = written.ok() ? "" : written.error().detail;
+    if (!written.ok() && why != said) ROS_ERROR_STREAM("the autosave failed, and is tried again: " << why);
+    if (written.ok() && !said.empty()) ROS_WARN_STREAM("the autosave is written again");
     said = why;
   }
 }

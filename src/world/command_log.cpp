@@ -12,7 +12,7 @@ namespace meshless {
 namespace {
 
 constexpr std::string_view kMagic = "MLSCOMND";
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;  // of the hashes in it, too
 constexpr std::size_t kRecordHeader = 8, kReadAtOnce = 1 << 20;
 constexpr std::uint32_t kMostRecord = 0x7fffffffu;
 

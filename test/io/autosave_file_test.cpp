@@ -1,10 +1,12 @@
 #include "meshless_surgery/io/autosave_file.h"
 
 #include <gtest/gtest.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <csignal>
 #include <filesystem>
 #include <set>
@@ -64,7 +66,10 @@ class AutosaveFileTest : public testing::Test {
   /// Which of states_ it took up; -1: none.
   int claimed(AutosaveFile& file, milliseconds patience = milliseconds(0)) {
     said_.clear();
-    const auto state = file.claim(kOrigin, patience, [this](const std::string& text) { said_ += text + "\n"; });
+    const auto state = file.claim(kOrigin, patience, [this](const std::string& text) {
+      said_ += text + "\n";
+      has_spoken_ = true;
+    });
     EXPECT_TRUE(state.ok()) << state.error().detail;
     if (!state.ok() || !*state) return -1;
     const std::string bytes = encode(**state, kOrigin);
@@ -87,6 +92,7 @@ class AutosaveFileTest : public testing::Test {
   const SessionFolder folder_{temporary_.path()};
   std::vector<std::string> states_;
   std::string other_, said_;
+  std::atomic<bool> has_spoken_{false};
 };
 
 TEST_F(AutosaveFileTest, WhatTheKilledLeftIsTakenUpAndRemovedInTheEnd) {
@@ -107,6 +113,7 @@ TEST_F(AutosaveFileTest, TheLockEndsWithItsProcess) {
   ASSERT_EQ(0, pipe(ready));
   const pid_t holder = fork();
   if (holder == 0) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
     AutosaveFile held = file();
     (void)held.claim(kOrigin, milliseconds(0), [](const std::string&) {});
     held.keep();
@@ -115,6 +122,7 @@ TEST_F(AutosaveFileTest, TheLockEndsWithItsProcess) {
     pause();
     _exit(0);
   }
+  close(ready[1]);  // so that the end of the child ends the wait
   char byte = 0;
   ASSERT_EQ(1, ::read(ready[0], &byte, 1));
   AutosaveFile second = file();
@@ -126,7 +134,7 @@ TEST_F(AutosaveFileTest, TheLockEndsWithItsProcess) {
   ASSERT_EQ(holder, waitpid(holder, nullptr, 0));
   AutosaveFile third = file();
   EXPECT_EQ(2, claimed(third));
-  for (const int end : ready) close(end);
+  close(ready[0]);
 }
 
 TEST_F(AutosaveFileTest, TwoOfOneNameDoNotTouchEachOthers) {
@@ -157,8 +165,9 @@ TEST_F(AutosaveFileTest, WhoIsJustEndingIsWaitedFor) {
   auto first = std::make_unique<AutosaveFile>(folder_, "autosave_a.state");
   claimed(*first);
   ASSERT_TRUE(first->write(states_[0]).ok());
+  has_spoken_ = false;
   std::thread ends([&] {
-    std::this_thread::sleep_for(milliseconds(300));
+    while (!has_spoken_) std::this_thread::sleep_for(milliseconds(10));
     first->remove();
   });
   AutosaveFile second = file();

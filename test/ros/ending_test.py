@@ -88,9 +88,11 @@ class WaitingTest(EndingCase):
             self.answers = {}
             with self.node() as node:
                 cut = self.in_background('cut', node, 'cut', blades=pose_stamped(-1.0, 0.0, 0.05), close_time=60.0)
-                steps = self.in_background('step', node, 'step', steps=100000)
                 self.until('no autosave', lambda: os.path.isdir(self.session) and self.autosaves())
-                time.sleep(0.5)
+                time.sleep(0.7)
+                # Not before: done as fast as may be they would soon take the blades' time.
+                steps = self.in_background('step', node, 'step', steps=100000)
+                time.sleep(0.3)
                 self.assertEqual(0, node.end(number), node.output())
                 for thread in (cut, steps):
                     thread.join(LONG)
@@ -144,7 +146,7 @@ class SignalTest(EndingCase):
             self.assertEqual({}, self.answers)
             self.until('no autosave', self.autosaves)
             self.assertEqual(1, node.end(signal.SIGTERM), node.output())
-            self.assertIn('a body was still being prepared', node.output())
+            self.assertIn('such as a body that is being prepared', node.output())
             large.join(LONG)
         self.assertEqual([], self.autosaves())
 

@@ -57,8 +57,8 @@ class AutosaveFile {
   bool findOwn(const std::string& origin);
   Status takeName(std::chrono::milliseconds patience, const Say& say);
   Result<SavedWorldPtr> readState(const std::string& name, const std::string& origin) const;
-  SavedWorldPtr takeUp(const std::string& origin, const Say& say);
-  std::string setAside() const;
+  Result<SavedWorldPtr> takeUp(const std::string& origin, const Say& say);
+  Result<std::string> setAside() const;
   void giveBack();
   std::string numbered(int number) const;
   std::string lockPath(const std::string& name) const { return folder_.folder() + "/." + name + ".lock"; }
