@@ -23,13 +23,14 @@ void Contacts::Impl::findHeaps(const std::vector<ContactParty>& parties, const F
   heap = false;
   std::vector<Index> quick_pairs;
   std::size_t all = 0, at_most = 0;
-  for (Index p = 0; p < parties.size(); ++p)
-    if (needed[p] & 1) all += vertexSamples(*parties[p].shape);
   for (Index k = 0; k < pairs.size(); ++k) {
     if (!pairs[k].quick) continue;
     quick_pairs.push_back(k);
     for (Index p : {pairs[k].a, pairs[k].b}) at_most += parties[p].shape->samples().size();
   }
+  if (at_most <= kMostInHeap) return;
+  for (Index p = 0; p < parties.size(); ++p)
+    if (needed[p] & 1) all += vertexSamples(*parties[p].shape);
   const std::size_t bound = std::max(kMostInHeap, all);
   if (at_most <= bound) return;
   std::atomic<std::size_t> in_reach{0};
