@@ -7,6 +7,8 @@
 
 #include <ros/console.h>
 
+#include "meshless_surgery/world/command_log.h"
+
 namespace meshless {
 namespace {
 
@@ -17,8 +19,6 @@ constexpr std::size_t kWriteAtOnce = 1 << 20;                  // bytes
 constexpr std::size_t kMostBuffered = std::size_t{256} << 20;  // bytes that a slow disk may be behind
 constexpr double kTryAgainFirst = 0.5, kTryAgainLast = 10.0;   // [s] after an autosave that failed; between: its period
 constexpr std::chrono::seconds kPatience{5};                   // with an older node of the same name
-
-constexpr std::string_view kLogMagic = "MLSCOMND";  // how logs of commands begin; src/world/command_log.cpp
 
 bool beginsAsAutosave(const std::string& name) { return name.compare(0, kAutosavePrefix.size(), kAutosavePrefix) == 0; }
 
@@ -89,7 +89,7 @@ Result<std::size_t> Session::save(WorldRunner& runner, const std::string& name) 
   if (Status valid = SessionFolder::checkName(name); !valid.ok()) return valid.error();
   if (beginsAsAutosave(name) || (!log_name_.empty() && name == log_name_))
     return Error{ErrorCode::kForbidden, "file is '" + name + "', which the node itself writes; accepted: another name"};
-  if (folder_.beginsWith(name, kLogMagic))
+  if (folder_.beginsWith(name, kCommandLogMagic))
     return Error{ErrorCode::kForbidden, "file is '" + name + "', which is a log of commands; accepted: another name"};
   SavedWorldPtr saved;
   const Status done = runner.look([&](World& world) { saved = world.capture(); });

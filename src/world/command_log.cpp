@@ -11,7 +11,6 @@
 namespace meshless {
 namespace {
 
-constexpr std::string_view kMagic = "MLSCOMND";
 constexpr std::uint32_t kVersion = 2;  // of the hashes in it, too
 constexpr std::size_t kRecordHeader = 8, kReadAtOnce = 1 << 20;
 constexpr std::uint32_t kMostRecord = 0x7fffffffu;
@@ -163,7 +162,7 @@ void World::record(RecordSink sink) {
   if (!w.record_sink) return;
   std::string head;
   OutArchive archive(head);
-  archive.put(kMagic.data(), kMagic.size());
+  archive.put(kCommandLogMagic.data(), kCommandLogMagic.size());
   archive(kVersion);
   w.record_sink(std::move(head));
   emit(w.record_sink, RecordKind::kStart, w.step, encode(*capture()));
@@ -217,11 +216,12 @@ Result<ReplayReport> replay(std::istream& log, int threads, const std::function<
   WorldSettings settings;
   settings.threads = threads;
   World world(settings);
-  const std::string head = readUpTo(log, kMagic.size() + sizeof kVersion);
-  if (head.size() < kMagic.size() + sizeof kVersion || std::string_view(head).substr(0, kMagic.size()) != kMagic)
-    return damaged("it does not begin with " + std::string(kMagic) + ", as logs do");
+  const std::string head = readUpTo(log, kCommandLogMagic.size() + sizeof kVersion);
+  if (head.size() < kCommandLogMagic.size() + sizeof kVersion ||
+      std::string_view(head).substr(0, kCommandLogMagic.size()) != kCommandLogMagic)
+    return damaged("it does not begin with " + std::string(kCommandLogMagic) + ", as logs do");
   std::uint32_t version = 0;
-  std::memcpy(&version, head.data() + kMagic.size(), sizeof version);
+  std::memcpy(&version, head.data() + kCommandLogMagic.size(), sizeof version);
   if (version != kVersion)
     return damaged("it is of version " + std::to_string(version) + "; accepted: " + std::to_string(kVersion));
   bool started = false;

@@ -5,10 +5,13 @@
 #include <functional>
 #include <iosfwd>
 #include <optional>
+#include <string_view>
 
 #include "meshless_surgery/world/world.h"
 
 namespace meshless {
+
+inline constexpr std::string_view kCommandLogMagic = "MLSCOMND";  // the first bytes of every log
 
 struct ReplayReport {
   std::uint64_t steps = 0;      // done
