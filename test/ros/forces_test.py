@@ -9,7 +9,7 @@ import rospy
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from deformer_support import DeformerTestCase, pose_stamped, run  # noqa: E402
+from deformer_support import DeformerTestCase, by_the_clock, pose_stamped, run  # noqa: E402
 
 STREAM = 200.0     # [Hz]
 PERIOD = 0.002     # [s] of measured_cf
@@ -66,6 +66,7 @@ class ForcesTest(DeformerTestCase):
         self.assertLess(spaces[len(spaces) // 2], PERIOD + 2e-5)
         self.assertLess(spaces[int(0.99 * len(spaces))], PERIOD + 5e-4)
 
+    @by_the_clock
     def test_a_pull_is_felt_at_500_hz_and_between_steps(self):
         picked = self.pick_left()
         start = picked.position
@@ -89,6 +90,7 @@ class ForcesTest(DeformerTestCase):
         say(lambda t: (start.x, start.y, start.z), 0.5)
         self.assertEqual([0.0] * 50, [force(m) for m in forces.messages[-50:]])
 
+    @by_the_clock
     def test_a_press_is_felt_from_the_touch_to_the_parting(self):
         self.good('lock', pick_id=self.pick_left().pick_id)  # of the far side: the box stays
         forces = self.record('push/measured_cf')

@@ -12,7 +12,7 @@ from meshless_surgery.msg import Event
 from sensor_msgs.msg import JointState
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from deformer_support import ACROSS_X, DeformerTestCase, pose_stamped, run  # noqa: E402
+from deformer_support import ACROSS_X, DeformerTestCase, by_the_clock, pose_stamped, run  # noqa: E402
 
 RATE = 200.0
 SPEED = 0.5      # tools/pick/max_speed
@@ -55,8 +55,7 @@ class StreamsTest(DeformerTestCase):
             rate.sleep()
 
     def lifted(self, tool):
-        event = self.events.wait(lambda e: e.type == 'lifted')
-        self.assertIn(tool, event.text)
+        event = self.events.wait(lambda e: e.type == 'lifted' and tool in e.text)
         self.assertIn('silent', event.text)
         return event
 
@@ -65,6 +64,7 @@ class StreamsTest(DeformerTestCase):
         array = rospy.wait_for_message('/diagnostics', DiagnosticArray, 60)
         return sum(int(v.value) for s in array.status for v in s.values if v.key == 'rejected by ' + name)
 
+    @by_the_clock
     def test_the_pick_follows_a_circle_and_is_let_go_when_the_stream_ends(self):
         picked = self.pick_left()
         start = picked.position
@@ -86,6 +86,7 @@ class StreamsTest(DeformerTestCase):
         self.assertEqual(picked.pick_id, event.pick_id)
         self.assertEqual([], self.state().picks)
 
+    @by_the_clock
     def test_a_jump_is_made_at_a_bounded_speed(self):
         start = self.pick_left().position
         self.say('pick/servo_cp', [pose_stamped(start.x, start.y, start.z) for _ in range(20)])
@@ -102,6 +103,7 @@ class StreamsTest(DeformerTestCase):
             self.assertLessEqual(distance(one.picks[0].target, other.picks[0].target), SPEED * (passed + TICK) + 1e-9)
         self.assertGreater(len({s.picks[0].target.z for s in states}), 10)
 
+    @by_the_clock
     def test_late_and_broken_messages_change_nothing(self):
         start = self.pick_left().position
         before = self.rejected('~pick/servo_cp')
@@ -121,6 +123,7 @@ class StreamsTest(DeformerTestCase):
                 self.assertGreaterEqual(pick.target.y, start.y - 1e-6)
         self.assertEqual(200, self.rejected('~pick/servo_cp') - before)
 
+    @by_the_clock
     def test_gaps_below_the_silence_lift_nothing(self):
         start = self.pick_left().position
         for _ in range(4):
@@ -129,6 +132,7 @@ class StreamsTest(DeformerTestCase):
         self.assertEqual(1, len(self.state().picks))
         self.assertEqual([], [e for e in self.events.messages if e.type == 'lifted'])
 
+    @by_the_clock
     def test_sphere_and_scissors_bear_late_broken_and_jumping_poses(self):
         for tool, speed in (('push', 0.5), ('scissors', 2.0)):
             topic = tool + '/servo_cp'
@@ -156,6 +160,7 @@ class StreamsTest(DeformerTestCase):
             self.lifted(tool)
             self.events.messages.clear()
 
+    @by_the_clock
     def test_a_locked_pick_and_one_that_others_move_are_not_lifted(self):
         start = self.pick_left()
         self.say('pick/servo_cp', [pose_stamped(start.position.x, start.position.y + 0.01, start.position.z)] * 20)
@@ -166,6 +171,7 @@ class StreamsTest(DeformerTestCase):
         self.assertEqual({start.pick_id, free.pick_id}, {p.pick_id for p in self.state().picks})
         self.assertEqual([], [e for e in self.events.messages if e.type == 'lifted'])
 
+    @by_the_clock
     def test_the_sphere_pushes_and_is_lifted_off(self):
         before = [b for b in self.state().bodies if b.name == 'left'][0].centre_of_mass
         self.good('push', enable=True, radius=0.03, pose=pose_stamped(-0.32, 0.0, 0.1))
@@ -179,6 +185,7 @@ class StreamsTest(DeformerTestCase):
         measured.close()
         self.assertEqual(0, measured.count())
 
+    @by_the_clock
     def test_a_sphere_that_a_service_placed_stays(self):
         self.say('push/servo_cp', [pose_stamped(0.0, 0.0, 1.0)] * 20)
         self.good('push', enable=True, pose=pose_stamped(0.0, 0.0, 1.2))
@@ -188,6 +195,7 @@ class StreamsTest(DeformerTestCase):
         measured.close()
         self.assertEqual([], [e for e in self.events.messages if e.type == 'lifted'])
 
+    @by_the_clock
     def test_the_scissors_come_close_cut_once_and_are_lifted_off(self):
         jaw = self.publisher('scissors/jaw/servo_js', JointState)
         poses, rate = self.publisher('scissors/servo_cp'), rospy.Rate(RATE)
