@@ -68,10 +68,11 @@ buildPackage() {
     -DPYTHON_EXECUTABLE=/usr/bin/python3 -DPython3_EXECUTABLE=/usr/bin/python3
 }
 
-# buildSanitized: the core and its tests under AddressSanitizer and UndefinedBehaviorSanitizer, without ROS.
+# buildSanitized ON|OFF: the core and its tests under AddressSanitizer and UndefinedBehaviorSanitizer, without ROS; with
+# or without the files that are nearly all CGAL's.
 buildSanitized() {
   build "the core with sanitizers" "$output/sanitized" all -- -DMESHLESS_SURGERY_CORE_ONLY=ON \
-    -DMESHLESS_SURGERY_SANITIZE=ON -DBUILD_TESTING=ON -DCMAKE_BUILD_TYPE=RelWithDebInfo \
+    -DMESHLESS_SURGERY_SANITIZE=ON "-DMESHLESS_SURGERY_SANITIZE_CGAL=$1" -DBUILD_TESTING=ON -DCMAKE_BUILD_TYPE=RelWithDebInfo \
     "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -g1"
 }
 
