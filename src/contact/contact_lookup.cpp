@@ -25,8 +25,9 @@ constexpr double kOnSurface = 0.05;     // of a triangle's extent
 constexpr double kFarBeside = 4.0;      // likewise
 constexpr double kNearby = 0.1;         // of the thickness
 constexpr int kMostLookups = 8;
-constexpr double kFlattest = 1e-3;  // det of a slope: below, the cluster's affine map tells directions
-constexpr double kSlack = 0.1;      // of the thickness: how much farther a better face may be
+constexpr double kSamePlace = 1e-6;  // of the size
+constexpr double kFlattest = 1e-3;   // det of a slope: below, the cluster's affine map tells directions
+constexpr double kSlack = 0.1;       // of the thickness: how much farther a better face may be
 
 }  // namespace
 
@@ -177,9 +178,21 @@ bool Contacts::Impl::locate(const ContactParty& b, const SurfaceNow& surface, co
   if (!near && shape.isClear(rest, far)) return false;
   const Vec3 inward_rest = (*to_rest * inwardAt()).normalized();
   const double enough = kMovedInRest * shape.size();
+  // Torn bodies often send a point round the same few places: what the last lookup would find is known then.
+  std::array<Vec3, kMostLookups> places;
+  std::array<ContactShape::Nearest, kMostLookups> founds;
+  const double same = kSamePlace * shape.size();
   for (int n = 0; n < kMostLookups; ++n) {
+    for (int q = n - 2; q >= 0; --q)
+      if ((rest - places[q]).squaredNorm() < same * same) {
+        found = founds[q + (kMostLookups - 1 - q) % (n - q)];
+        hint = found.triangle;
+        return std::isfinite(found.distance);
+      }
+    places[n] = rest;
     ++counters.lookups;
     if (!shape.nearest(rest, inward_rest, kSlack * shape.thickness(), far, found, hint)) return false;
+    founds[n] = found;
     hint = found.triangle;
     if (n + 1 == kMostLookups) break;
     if (found.distance > far) return false;
@@ -283,10 +296,12 @@ bool Contacts::Impl::stillOver(Findings& to, const ContactParty& with, Index a, 
   return false;
 }
 
-// The points of a in the shape of b.
-void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair, Index a,
-                              Index b, const ContactMap* maps, bool every_point, Inside& inside) {
+// The points of one party of a pair in the shape of the other, whose maps these are.
+void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair,
+                              const ContactMap* maps, bool every_point, LookupPart& part) {
+  const Index a = part.second ? pair.b : pair.a, b = part.second ? pair.a : pair.b;
   const ContactParty &of = parties[a], &with = parties[b];
+  Inside& inside = part.inside;
   const ContactShape& shape = *with.shape;
   if (shape.surface().triangles.empty() || with.map_count == 0) return;
   const bool now = maps != with.maps;  // they have moved since the frame began
@@ -294,7 +309,7 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
       grown(now ? intersection(bounds_now[a], bounds_now[b]) : intersection(of.bounds, with.bounds), pair.reach);
   const double size = shape.size(), near = kMargin * std::min(size, of.shape->size());
   const std::vector<ContactSample>& samples = of.shape->samples();
-  inside.points = samplesFor(pair, *of.shape);
+  inside.points = part.end - part.first;
   if (region.empty()) return;  // near by their speeds alone
   const ContactMap* own = now ? maps_now[a].data() : of.maps;
   const auto inwardAt = [&](const Vec3& p, const ContactSample& sample) -> Vec3 {
@@ -307,7 +322,7 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
   };
   to.surface.deviation = -1.0;
   Index hint = kNoIndex;  // the triangle that was found last: the next point is often near it
-  for (Index s = 0; s < inside.points; ++s) {
+  for (Index s = part.first; s < part.end; ++s) {
     const Vec3 p = sampleAt(of, samples[s]);
     if (!region.contains(p)) continue;
     ++inside.asked;
@@ -351,9 +366,13 @@ void Contacts::Impl::addGround(Findings& to, const std::vector<ContactParty>& pa
   }
 }
 
-// Appends a part of what a task has found; its entries are then numbered from where they come to lie.
 void Contacts::Impl::join(const Findings& from, std::size_t contacts_from, std::size_t contacts_to,
                           std::size_t entries_from, std::size_t entries_to) {
+  append(contacts, entries, from, contacts_from, contacts_to, entries_from, entries_to);
+}
+
+void append(std::vector<Contact>& contacts, std::vector<ContactEntry>& entries, const Findings& from,
+            std::size_t contacts_from, std::size_t contacts_to, std::size_t entries_from, std::size_t entries_to) {
   const Index moved = static_cast<Index>(entries.size()) - static_cast<Index>(entries_from);  // modulo 2^32
   entries.insert(entries.end(), from.entries.begin() + static_cast<std::ptrdiff_t>(entries_from),
                  from.entries.begin() + static_cast<std::ptrdiff_t>(entries_to));

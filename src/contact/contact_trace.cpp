@@ -110,12 +110,11 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, const Pair&
         for (cell[2] = range.first[2]; cell[2] <= range.last[2]; ++cell[2]) table.insert(cell, k);
   }
   for (Index s = 0; s < count; ++s) {
-    if (caught.count({of.key, with.key, s})) continue;
     const Path& path = paths[s];
     Box box;
     box.extend(path.from);
     box.extend(path.to);
-    if (!box.overlaps(region)) continue;
+    if (!box.overlaps(region) || caught.count({of.key, with.key, s})) continue;
     ++traced.paths;
     double first = 2.0;
     Index hit = kNoIndex;

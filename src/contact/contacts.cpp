@@ -11,12 +11,11 @@
 namespace meshless {
 namespace {
 
-constexpr std::size_t kTaskHalves = 64, kTaskParties = 128;  // halves of pairs, and parties, looked at by one task
-constexpr std::size_t kPairTasks = 16;                       // where there are fewer halves than for so many
-constexpr double kLongestStep = 0.5;  // of the smaller body's extent: how far quick bodies go in a substep
+constexpr std::size_t kTaskParties = 128;  // looked at by one task
+constexpr double kLongestStep = 0.5;       // of the smaller body's extent: how far quick bodies go in a substep
 
 // How many points of quick pairs a frame asks about, or so: beyond it they are looked at in some of its substeps alone.
-constexpr std::size_t kMostAsked = 50000, kMostAskedEach = 4;  // of all, or so often of each there is
+constexpr std::size_t kMostAsked = 25000, kMostAskedEach = 4;  // of all, or so often of each there is
 
 constexpr double kMostForSheets = 4.0;  // substeps that a thin body asks for, at most
 
@@ -40,28 +39,6 @@ double approachOf(const ContactParty& a, const ContactParty& b) {
     spread += b.spread;
   }
   return relative.norm() + spread;
-}
-
-// Where its surface is.
-Box verticesOf(const ContactParty& party) {
-  Box box;
-  for (Index v = 0; v < party.shape->surface().vertices.size(); ++v) {
-    const Vec3 now = vertexAt(party, v);
-    if (now.allFinite()) box.extend(now);
-  }
-  return box;
-}
-
-// Where its surface has been in this substep.
-Box sweptVertices(const ContactParty& party) {
-  Box box;
-  for (Index v = 0; v < party.shape->surface().vertices.size(); ++v) {
-    const Vec3 now = vertexAt(party, v), before = now - vertexMotion(party, v);
-    if (!now.allFinite() || !before.allFinite()) continue;
-    box.extend(now);
-    box.extend(before);
-  }
-  return box;
 }
 
 }  // namespace
@@ -166,11 +143,10 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   // From below upwards where it matters: ground first.
   const double falling = w.scene.gravity.norm() * h * h;
   const std::size_t ground_tasks = (w.grounded.size() + kTaskParties - 1) / kTaskParties;
-  const std::size_t halves = 2 * w.pairs.size();
-  const std::size_t task_halves = std::clamp<std::size_t>(halves / kPairTasks, 1, kTaskHalves);
-  const std::size_t pair_tasks = (halves + task_halves - 1) / task_halves;
+  w.parts.clear();
+  for (Index k = 0; k < w.pairs.size(); ++k) w.parts.add(parties, w.pairs[k], k);
+  const std::size_t pair_tasks = w.parts.tasks();
   if (w.tasks.size() < ground_tasks + pair_tasks) w.tasks.resize(ground_tasks + pair_tasks);
-  w.halves.resize(halves);
   runEach(for_each, ground_tasks + pair_tasks, [&](std::size_t n) {
     Findings& task = w.tasks[n];
     task.clear();
@@ -181,24 +157,18 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
       }
       return;
     }
-    const std::size_t first = (n - ground_tasks) * task_halves;
-    w.startAt(task, w.last, w.last_sorted, w.pairs[first / 2], first % 2 == 1);
-    for (std::size_t k = first; k < std::min(halves, first + task_halves); ++k) {
-      const Pair& pair = w.pairs[k / 2];
-      HalfFindings& findings = w.halves[k];
-      findings = HalfFindings();
-      if (pair.a != pair.b) {
-        const Index of = k % 2 ? pair.b : pair.a, in = k % 2 ? pair.a : pair.b;
-        if (!w.takeForeseen(task, k / 2, k % 2 == 1, findings.inside))
-          w.lookInto(task, parties, pair, of, in, parties[in].maps, false, findings.inside);
-      } else if (k % 2 == 0) {
+    w.lookUp(n - ground_tasks, task, w.last, w.last_sorted, [&](LookupPart& part) {
+      const Pair& pair = w.pairs[part.pair];
+      if (pair.a == pair.b)
         w.lookIntoSelf(task, parties, pair);
-      }
-      findings.contacts = task.contacts.size();
-      findings.entries = task.entries.size();
-      findings.depths = task.depths.size();
-    }
+      else if (!w.isForeseen(part.pair))
+        w.lookInto(task, parties, pair, parties[part.second ? pair.a : pair.b].maps, false, part);
+      else if (part.first == 0)
+        w.takeForeseen(task, part);
+    });
   });
+  w.inside.assign(2 * w.pairs.size(), Inside());
+  for (const LookupPart& part : w.parts) w.inside[2 * part.pair + part.second].add(part.inside);
   double largest = 0.0;
   for (const ContactParty& party : parties)
     if (party.moves) largest = std::max(largest, extentOf(party));
@@ -215,34 +185,35 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
       w.depths.insert(w.depths.end(), task.depths.begin(), task.depths.end());
       continue;
     }
-    const std::size_t first = (n - ground_tasks) * task_halves;
-    HalfFindings start;
-    for (std::size_t k = first; k < std::min(halves, first + task_halves); ++k) {
-      Pair& pair = w.pairs[k / 2];
-      const HalfFindings& findings = w.halves[k];
+    std::size_t contacts = 0, entries = 0, depths = 0;  // where a part begins
+    for (std::size_t k = w.parts.firstOf(n - ground_tasks); k < w.parts.endOf(n - ground_tasks); ++k) {
+      const LookupPart& part = w.parts[k];
+      Pair& pair = w.pairs[part.pair];
       const ContactParty &a = parties[pair.a], &b = parties[pair.b];
-      if (k % 2 == 0)
-        pair.expelled =
-            pair.a != pair.b && w.letOutWhole(parties, pair, findings.inside, w.halves[k + 1].inside, h, counters);
+      const Inside* const inside = &w.inside[2 * part.pair];
+      if (part.first == 0 && !part.second)
+        pair.expelled = pair.a != pair.b && w.letOutWhole(parties, pair, inside[0], inside[1], h, counters);
       if (pair.expelled) {
         pair.quick = false;
       } else {
-        w.join(task, start.contacts, findings.contacts, start.entries, findings.entries);
-        w.depths.insert(w.depths.end(), task.depths.begin() + static_cast<std::ptrdiff_t>(start.depths),
-                        task.depths.begin() + static_cast<std::ptrdiff_t>(findings.depths));
+        w.join(task, contacts, part.contacts, entries, part.entries);
+        w.depths.insert(w.depths.end(), task.depths.begin() + static_cast<std::ptrdiff_t>(depths),
+                        task.depths.begin() + static_cast<std::ptrdiff_t>(part.depths));
         const double step = kLongestStep * std::max(kCrumb * largest, std::min(extentOf(a), extentOf(b)));
         if (pair.quick) {
           fastest = std::max(fastest, pair.way * h / step);
-          w.asked += findings.inside.asked;
+          w.asked += part.inside.asked;
         }
         // What lies on a sheet must not fall through it within a substep.
-        if (findings.contacts > start.contacts)
+        if (part.contacts > contacts)
           for (const ContactParty* party : {&a, &b})
             if (extentOf(*party) > kCrumb * largest)
               fastest = std::max(fastest,
                                  std::min(kMostForSheets, std::sqrt(falling / (kQuick * party->shape->thickness()))));
       }
-      start = findings;
+      contacts = part.contacts;
+      entries = part.entries;
+      depths = part.depths;
     }
   }
   counters.contacts += w.contacts.size();
@@ -314,90 +285,6 @@ void Contacts::begin(const std::vector<ContactParty>& parties, double substep) {
   const double substeps = std::round(impl_->frame / substep);
   impl_->look_every = static_cast<int>(std::clamp(std::ceil(substeps / std::max(1.0, looks)), 1.0, 1e6));
   impl_->substep_number = 0;
-}
-
-// Quick pairs where they are now, if they may have gone as far as their reach since they were looked at.
-void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,
-                                 ContactCounters& counters, const ForEach& for_each) {
-  const double falling = scene.gravity.norm() * substep * substep;
-  quick.resize(pairs.size());
-  std::vector<Index> moved, far, to_fit;  // pairs, and parties
-  std::vector<char> fitted;
-  for (Index k = 0; k < pairs.size(); ++k) {
-    const Pair& pair = pairs[k];
-    if (!pair.quick) continue;
-    const double thickness = std::min(parties[pair.a].shape->thickness(), parties[pair.b].shape->thickness());
-    // Many short substeps need no look in each of them.
-    quick[k].moved += pair.way * substep;
-    const bool look = fresh || (substep_number % look_every == 0 && quick[k].moved >= kQuick * thickness);
-    const bool is_far = pair.way * substep * look_every > kQuick * thickness;
-    if (is_far) far.push_back(k);
-    if (look) {
-      quick[k].moved = 0.0;
-      moved.push_back(k);
-    }
-    if (!is_far && !look) continue;
-    if (fitted.empty()) fitted.assign(parties.size(), 0);
-    for (Index p : {pair.a, pair.b})
-      if (!fitted[p]) {
-        to_fit.push_back(p);
-        fitted[p] = 1;
-      }
-  }
-  runEach(for_each, to_fit.size(), [&](std::size_t n) {
-    const Index p = to_fit[n];
-    refit(p, maps_now[p]);
-    bounds_now[p] = verticesOf(parties[p]);
-    finders[p].make(maps_now[p].data(), static_cast<Index>(maps_now[p].size()));
-  });
-  std::vector<Box> ways;      // of those that are traced
-  std::vector<Index> passes;  // pairs that may pass through each other
-  for (const Index k : far) {
-    const Pair& pair = pairs[k];
-    if (ways.empty()) ways.resize(parties.size());
-    for (Index p : {pair.a, pair.b})
-      if (ways[p].empty()) ways[p] = sweptVertices(parties[p]);
-    if (!ways[pair.a].overlaps(ways[pair.b])) continue;
-    passes.push_back(k);
-  }
-  std::vector<std::pair<Index, Index>> to_sweep;  // parties, and how many of their points
-  for (const Index k : passes)
-    for (Index p : {pairs[k].a, pairs[k].b}) to_sweep.emplace_back(p, samplesFor(pairs[k], *parties[p].shape));
-  std::sort(to_sweep.begin(), to_sweep.end());
-  to_sweep.erase(std::unique(to_sweep.begin(), to_sweep.end()), to_sweep.end());
-  if (swept.size() < parties.size()) swept.resize(parties.size());
-  runEach(for_each, to_sweep.size(),
-          [&](std::size_t n) { swept[to_sweep[n].first].make(parties[to_sweep[n].first], to_sweep[n].second); });
-  if (traced.size() < 2 * passes.size()) traced.resize(2 * passes.size());
-  runEach(for_each, 2 * passes.size(), [&](std::size_t n) {
-    trace(parties, pairs[passes[n / 2]], n % 2 == 1, fresh ? nullptr : &quick[passes[n / 2]].found.contacts, traced[n]);
-  });
-  for (std::size_t n = 0; n < 2 * passes.size(); ++n) {
-    counters.traced += traced[n].paths;
-    counters.caught += traced[n].caught.size();
-    caught.insert(traced[n].caught.begin(), traced[n].caught.end());
-  }
-  runEach(for_each, moved.size(), [&](std::size_t n) {
-    Pair pair = pairs[moved[n]];
-    const ContactShape &a = *parties[pair.a].shape, &b = *parties[pair.b].shape;
-    pair.reach = kMargin * std::min(a.size(), b.size()) +
-                 std::min(pair.way * frame + falling, kQuick * std::min(a.thickness(), b.thickness()));
-    Findings& found = quick[moved[n]].found;
-    Inside ignored;
-    found.clear();
-    startAt(found, quick_known, quick_known.size(), pair, false);
-    lookInto(found, parties, pair, pair.a, pair.b, maps_now[pair.b].data(), true, ignored);
-    lookInto(found, parties, pair, pair.b, pair.a, maps_now[pair.a].data(), true, ignored);
-  });
-  for (const Index k : moved) {
-    counters.lookups += quick[k].found.counters.lookups;
-    counters.contacts += quick[k].found.contacts.size();
-  }
-  for (std::size_t k = 0; k < pairs.size(); ++k) {
-    if (!pairs[k].quick) continue;
-    quick[k].first = contacts.size();
-    join(quick[k].found, 0, quick[k].found.contacts.size(), 0, quick[k].found.entries.size());
-  }
 }
 
 void Contacts::solve(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,

@@ -39,8 +39,9 @@ void Contacts::lookAhead(const std::vector<ContactParty>& parties, Index fresh, 
     w.foreseen.push_back({pair, {}, {}});
     for (const bool second : {false, true}) {
       const Index of = second ? pair.b : pair.a, in = second ? pair.a : pair.b;
-      w.lookInto(w.foreseen.back().halves[second], parties, pair, of, in, parties[in].maps, false,
-                 w.foreseen.back().inside[second]);
+      LookupPart half{0, second, 0, samplesFor(pair, *parties[of].shape), {}};
+      w.lookInto(w.foreseen.back().halves[second], parties, pair, parties[in].maps, false, half);
+      w.foreseen.back().inside[second] = half.inside;
     }
   }
 }
@@ -88,8 +89,10 @@ void Contacts::Impl::findForeseen(const std::vector<ContactParty>& parties) {
   }
 }
 
-bool Contacts::Impl::takeForeseen(Findings& to, std::size_t pair, bool second, Inside& inside) const {
-  if (taken.empty() || !taken[pair].found) return false;
+// All of that party's points, whatever the part's.
+void Contacts::Impl::takeForeseen(Findings& to, LookupPart& part) const {
+  const Index pair = part.pair;
+  const bool second = part.second;
   const Foreseen& found = *taken[pair].found;
   const bool half = second != taken[pair].swapped;
   const Index entries_before = static_cast<Index>(to.entries.size());
@@ -106,8 +109,7 @@ bool Contacts::Impl::takeForeseen(Findings& to, std::size_t pair, bool second, I
     }
     to.contacts.push_back(c);
   }
-  inside = found.inside[half];
-  return true;
+  part.inside = found.inside[half];
 }
 
 }  // namespace meshless

@@ -25,10 +25,10 @@ std::size_t IslandPlan::bytes() const {
 
 std::size_t Contacts::bytes() const {
   const Impl& w = *impl_;
-  std::size_t sum = sizeof w + w.broad.bytes() + w.solver.bytes() + w.plan.bytes() +
+  std::size_t sum = sizeof w + w.parts.bytes() + w.broad.bytes() + w.solver.bytes() + w.plan.bytes() +
                     bytesOf(w.boxes, w.active, w.needed, w.pairs, w.grounded, w.finders, w.maps_now, w.bounds_now,
                             w.contacts, w.last, w.entries) +
-                    bytesOf(w.depths, w.quick_known, w.reached, w.keys, w.tasks, w.halves, w.quick, w.traced, w.swept,
+                    bytesOf(w.depths, w.quick_known, w.reached, w.keys, w.tasks, w.inside, w.quick, w.traced, w.swept,
                             w.seen, w.foreseen, w.ahead, w.taken) +
                     bytesOfMap(w.caught) + bytesOfMap(w.exits);
   for (const MapFinder& finder : w.finders) sum += finder.bytes();

@@ -1,6 +1,7 @@
 // What Contacts keeps; shared by the files that implement it.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <tuple>
@@ -144,13 +145,42 @@ struct Traced {
 struct Inside {
   std::size_t points = 0, asked = 0, inside = 0, near = 0;  // asked: in the region where both are
   double deepest = 0.0;
+
+  void add(const Inside& other);
 };
 
-/// What one party of a pair has found in the other, and where its task has it.
-struct HalfFindings {
+/// Points of one party of a pair that are looked up in the other, what was found, and where their task has it.
+struct LookupPart {
+  Index pair;
+  bool second;       // of its b in its a
+  Index first, end;  // samples; of a body with itself there is one part, and it is empty
   Inside inside;
   std::size_t contacts = 0, entries = 0, depths = 0;  // ends
 };
+
+/// In the order of pairs, parties and samples. Large bodies make several, so that threads share them; where one ends
+/// goes by the samples alone, so that what is found does not depend on the threads. Some that follow make a task.
+class LookupParts {
+ public:
+  void clear() { parts_.clear(); }
+  void add(const std::vector<ContactParty>& parties, const Pair& pair, Index number);
+  std::size_t tasks() const { return (parts_.size() + perTask() - 1) / perTask(); }
+  std::size_t firstOf(std::size_t task) const { return task * perTask(); }
+  std::size_t endOf(std::size_t task) const { return std::min(parts_.size(), (task + 1) * perTask()); }
+  LookupPart& operator[](std::size_t n) { return parts_[n]; }
+  std::vector<LookupPart>::const_iterator begin() const { return parts_.begin(); }
+  std::vector<LookupPart>::const_iterator end() const { return parts_.end(); }
+  std::size_t bytes() const { return bytesOf(parts_); }
+
+ private:
+  std::size_t perTask() const;
+
+  std::vector<LookupPart> parts_;
+};
+
+/// Appends a part of what a task has found; its entries are then numbered from where they come to lie.
+void append(std::vector<Contact>& contacts, std::vector<ContactEntry>& entries, const Findings& from,
+            std::size_t contacts_from, std::size_t contacts_to, std::size_t entries_from, std::size_t entries_to);
 
 /// Sweeps in a frame of h [s] for an island.
 double stackWork(const ContactScene& scene, const std::vector<ContactParty>& parties, const IslandPlan& plan,
@@ -207,7 +237,8 @@ struct Contacts::Impl {
   bool fresh = true;                        // nothing has been solved since the contacts were made
   bool plan_steady = true;                  // the plan is that of the steady contacts alone
   std::vector<Findings> tasks;
-  std::vector<HalfFindings> halves;  // two a pair; of a body with itself the second is empty
+  LookupParts parts;                 // of this look
+  std::vector<Inside> inside;        // two a pair
   std::vector<QuickFindings> quick;  // one a pair; of those that are quick
   std::vector<Traced> traced;        // two a pair that goes far in a substep
   std::vector<SweptParty> swept;     // one a party; of those in such pairs
@@ -227,8 +258,11 @@ struct Contacts::Impl {
   void startAt(Findings& to, const std::vector<Contact>& known, std::size_t end, const Pair& pair, bool second) const;
   bool stillOver(Findings& to, const ContactParty& with, Index a, Index b, Index sample, const Vec3& p, Index& hint,
                  ContactShape::Nearest& found, bool& flipped) const;
-  void lookInto(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair, Index a, Index b,
-                const ContactMap* maps, bool every_point, Inside& inside);
+  void lookInto(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair, const ContactMap* maps,
+                bool every_point, LookupPart& part);
+  bool isForeseen(Index pair) const { return !taken.empty() && taken[pair].found; }
+  void lookUp(std::size_t task, Findings& to, const std::vector<Contact>& known, std::size_t known_end,
+              const std::function<void(LookupPart&)>& look);
   void lookIntoSelf(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair);
   void crossRidges(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair);
   void lookAtQuick(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,
@@ -245,7 +279,7 @@ struct Contacts::Impl {
   void prepareLookups(const std::vector<ContactParty>& parties, double h);
   bool isUnknown(const std::vector<ContactParty>& parties, const Pair& pair) const;
   void findForeseen(const std::vector<ContactParty>& parties);
-  bool takeForeseen(Findings& to, std::size_t pair, bool second, Inside& inside) const;
+  void takeForeseen(Findings& to, LookupPart& part) const;
   void followParties(const std::vector<ContactParty>& parties);
   void takeOver();
   void choosePasses(const std::vector<ContactParty>& parties, double substep);
