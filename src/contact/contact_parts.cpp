@@ -4,7 +4,7 @@
 namespace meshless {
 namespace {
 
-constexpr Index kPartSamples = 256;      // points of a part
+constexpr Index kPartSamples = 1024;     // points of a part
 constexpr std::size_t kMostParts = 64;   // of a task
 constexpr std::size_t kLeastTasks = 16;  // where there are parts enough
 
@@ -31,18 +31,5 @@ void LookupParts::add(const std::vector<ContactParty>& parties, const Pair& pair
 }
 
 std::size_t LookupParts::perTask() const { return std::clamp<std::size_t>(parts_.size() / kLeastTasks, 1, kMostParts); }
-
-// The parts of a task, with what is known of them from before.
-void Contacts::Impl::lookUp(std::size_t task, Findings& to, const std::vector<Contact>& known, std::size_t known_end,
-                            const std::function<void(LookupPart&)>& look) {
-  for (std::size_t k = parts.firstOf(task); k < parts.endOf(task); ++k) {
-    LookupPart& part = parts[k];
-    if (k == parts.firstOf(task)) startAt(to, known, known_end, pairs[part.pair], part.second);
-    look(part);
-    part.contacts = to.contacts.size();
-    part.entries = to.entries.size();
-    part.depths = to.depths.size();
-  }
-}
 
 }  // namespace meshless

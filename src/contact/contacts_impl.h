@@ -261,8 +261,9 @@ struct Contacts::Impl {
   void lookInto(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair, const ContactMap* maps,
                 bool every_point, LookupPart& part);
   bool isForeseen(Index pair) const { return !taken.empty() && taken[pair].found; }
+  template <class Look>
   void lookUp(std::size_t task, Findings& to, const std::vector<Contact>& known, std::size_t known_end,
-              const std::function<void(LookupPart&)>& look);
+              const Look& look);
   void lookIntoSelf(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair);
   void crossRidges(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair);
   void lookAtQuick(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,
@@ -286,5 +287,19 @@ struct Contacts::Impl {
   bool letOutWhole(const std::vector<ContactParty>& parties, const Pair& pair, const Inside& of_a, const Inside& of_b,
                    double h, ContactCounters& counters);
 };
+
+// The parts of a task, with what is known of them from before.
+template <class Look>
+void Contacts::Impl::lookUp(std::size_t task, Findings& to, const std::vector<Contact>& known, std::size_t known_end,
+                            const Look& look) {
+  for (std::size_t k = parts.firstOf(task); k < parts.endOf(task); ++k) {
+    LookupPart& part = parts[k];
+    if (k == parts.firstOf(task)) startAt(to, known, known_end, pairs[part.pair], part.second);
+    look(part);
+    part.contacts = to.contacts.size();
+    part.entries = to.entries.size();
+    part.depths = to.depths.size();
+  }
+}
 
 }  // namespace meshless
