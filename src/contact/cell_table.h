@@ -69,7 +69,7 @@ class CellTable {
           const Bucket& bucket = buckets_[hash(cell)];
           if (bucket.stamp != stamp_) continue;
           for (Index k = bucket.head; k != kNoIndex; k = entries_[k].next)
-            if (entries_[k].cell == cell) visit(entries_[k].item);
+            if (same(entries_[k].cell, cell)) visit(entries_[k].item);
         }
   }
 
@@ -84,6 +84,8 @@ class CellTable {
     Index next;
   };
 
+  // The arrays' own comparison calls memcmp.
+  static bool same(const Cell& a, const Cell& b) { return a[0] == b[0] && a[1] == b[1] && a[2] == b[2]; }
   std::int32_t coordinate(double x, int d) const {
     return static_cast<std::int32_t>(std::floor((x - region_.min[d]) / edge_));
   }

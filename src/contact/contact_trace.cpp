@@ -100,7 +100,8 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, const Pair&
   }
   if (near.empty() || !(size > 0.0)) return;
   const Box region = intersection(box_a, box_b);
-  static thread_local CellTable table;
+  static thread_local CellTable own_table;
+  CellTable& table = own_table;  // each look at the other asks whose thread it is
   table.start(region, size / static_cast<double>(near.size()), 4 * near.size());
   for (Index k = 0; k < near.size(); ++k) {
     const CellRange range = table.cellsOf(near[k].box);
