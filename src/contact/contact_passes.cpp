@@ -17,6 +17,15 @@ constexpr double kCalm = 0.02;   // of the size, how far particles go apart in a
 constexpr int kFewSubsteps = 4;  // below it an island of several bodies is swept so often:
 constexpr int kFewSweeps = 8;    // what sweeps leave would make a stack rock
 constexpr int kCaughtPasses = 24;  // of an island in which something was caught: it has to stop at once
+// Contacts that such an island sweeps in a substep, or so: more are a heap, which no sweeps would sort out.
+constexpr Index kMostSwept = 20000;
+constexpr int kLeastCaughtPasses = 4;
+
+// Even: there and back.
+int caughtPasses(Index contacts) {
+  return std::clamp(static_cast<int>(kMostSwept / std::max<Index>(1, contacts)) / 2 * 2, kLeastCaughtPasses,
+                    kCaughtPasses);
+}
 
 }  // namespace
 
@@ -58,8 +67,12 @@ void Contacts::Impl::choosePasses(const std::vector<ContactParty>& parties, doub
       if (!(party.spread * frame < kCalm * party.shape->size())) plan.calm[island] = 0;
     }
     if (caught.empty()) continue;
+    const Index count = plan.contact_offsets[island + 1] - plan.contact_offsets[island];
     for (Index k = plan.contact_offsets[island]; k < plan.contact_offsets[island + 1]; ++k)
-      if (contacts[plan.contacts[k]].caught) plan.passes[island] = kCaughtPasses;
+      if (contacts[plan.contacts[k]].caught) {
+        plan.passes[island] = std::max(plan.passes[island], caughtPasses(count));
+        break;
+      }
   }
 }
 

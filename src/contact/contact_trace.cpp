@@ -12,9 +12,10 @@ namespace {
 constexpr double kBesidePath = 1e-6;  // barycentric: no path slips between two triangles
 constexpr double kSlowPath =
     0.25;  // of the thickness: who meets a face no faster than that in a substep is seen to be near it
-constexpr double kShallow = 0.1;   // of the lesser thickness: likewise, and from inside
-constexpr double kSameSide = 0.5;  // cosine between the normals of faces that look the same way
-constexpr int kMostSlides = 8;     // triangles that a caught point goes on in a substep
+constexpr double kShallow = 0.1;     // of the lesser thickness: likewise, and from inside
+constexpr double kSameSide = 0.5;    // cosine between the normals of faces that look the same way
+constexpr std::size_t kFewWays = 8;  // are compared with all faces
+constexpr int kMostSlides = 8;       // triangles that a caught point goes on in a substep
 
 Vec3 normalNow(const ContactParty& party, Index triangle) {
   const Triangle& corners = party.shape->surface().triangles[triangle];
@@ -86,45 +87,72 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, const Pair&
     Box box;
     Vec3 normal_from, normal_to;
   };
-  std::vector<Near> near;
-  double size = 0.0;
+  struct Way {
+    Index sample;
+    Box box;
+  };
+  // Of two bodies that are large and meet in few places, few triangles are near to few ways.
+  static thread_local std::vector<Near> own_near;
+  static thread_local std::vector<Way> own_ways;
+  std::vector<Near>& near = own_near;
+  std::vector<Way>& ways = own_ways;
+  near.clear();
+  ways.clear();
   for (Index t = 0; t < triangles.size(); ++t) {
     const Box box = grown(swept[b].triangles[t], shallow);
     if (!box.overlaps(box_a)) continue;
-    const Path &p0 = corners[triangles[t][0]], &p1 = corners[triangles[t][1]], &p2 = corners[triangles[t][2]];
-    near.push_back({t, box, (p1.from - p0.from).cross(p2.from - p0.from).normalized(),
-                    (p1.to - p0.to).cross(p2.to - p0.to).normalized()});
+    near.push_back({t, box, Vec3::Zero(), Vec3::Zero()});
     box_b.extend(box.min);
     box_b.extend(box.max);
-    size += (box.max - box.min).maxCoeff();
   }
+  if (near.empty()) return;
+  Box region;
+  for (Index s = 0; s < count; ++s) {
+    Box box;
+    box.extend(paths[s].from);
+    box.extend(paths[s].to);
+    if (!box.overlaps(box_b) || caught.count({of.key, with.key, s})) continue;
+    ways.push_back({s, box});
+    region.extend(box.min);
+    region.extend(box.max);
+  }
+  if (ways.empty()) return;
+  double size = 0.0;
+  near.erase(std::remove_if(near.begin(), near.end(), [&](const Near& n) { return !n.box.overlaps(region); }),
+             near.end());
+  for (Near& n : near) {
+    const Triangle& t = triangles[n.triangle];
+    const Path &p0 = corners[t[0]], &p1 = corners[t[1]], &p2 = corners[t[2]];
+    n.normal_from = (p1.from - p0.from).cross(p2.from - p0.from).normalized();
+    n.normal_to = (p1.to - p0.to).cross(p2.to - p0.to).normalized();
+    size += (n.box.max - n.box.min).maxCoeff();
+  }
+  traced.paths = ways.size();
   if (near.empty() || !(size > 0.0)) return;
-  const Box region = intersection(box_a, box_b);
+  region = intersection(region, box_b);
   static thread_local CellTable own_table;
   CellTable& table = own_table;  // each look at the other asks whose thread it is
-  table.start(region, size / static_cast<double>(near.size()), 4 * near.size());
-  for (Index k = 0; k < near.size(); ++k) {
-    const CellRange range = table.cellsOf(near[k].box);
-    Cell cell;
-    for (cell[0] = range.first[0]; cell[0] <= range.last[0]; ++cell[0])
-      for (cell[1] = range.first[1]; cell[1] <= range.last[1]; ++cell[1])
-        for (cell[2] = range.first[2]; cell[2] <= range.last[2]; ++cell[2]) table.insert(cell, k);
+  const bool by_cells = ways.size() > kFewWays;
+  if (by_cells) {
+    table.start(region, size / static_cast<double>(near.size()), 4 * near.size());
+    for (Index k = 0; k < near.size(); ++k) {
+      const CellRange range = table.cellsOf(near[k].box);
+      Cell cell;
+      for (cell[0] = range.first[0]; cell[0] <= range.last[0]; ++cell[0])
+        for (cell[1] = range.first[1]; cell[1] <= range.last[1]; ++cell[1])
+          for (cell[2] = range.first[2]; cell[2] <= range.last[2]; ++cell[2]) table.insert(cell, k);
+    }
   }
-  for (Index s = 0; s < count; ++s) {
-    const Path& path = paths[s];
-    Box box;
-    box.extend(path.from);
-    box.extend(path.to);
-    if (!box.overlaps(region) || caught.count({of.key, with.key, s})) continue;
-    ++traced.paths;
+  for (const Way& way : ways) {
+    const Path& path = paths[way.sample];
     double first = 2.0;
     Index hit = kNoIndex;
-    table.forEach(table.cellsOf(box), [&](Index k) {
-      if (!near[k].box.overlaps(box)) return;
+    const auto meet = [&](Index k) {
+      if (!near[k].box.overlaps(way.box)) return;
       const Index t = near[k].triangle;
       const Path &p0 = corners[triangles[t][0]], &p1 = corners[triangles[t][1]], &p2 = corners[triangles[t][2]];
       const double d0 = near[k].normal_from.dot(path.from - p0.from), d1 = near[k].normal_to.dot(path.to - p0.to);
-      if (!(d1 < 0.0) || !(d0 >= -shallow) || !(d0 - d1 > slow) || (d0 < 0.0 && !lay(s, t))) return;
+      if (!(d1 < 0.0) || !(d0 >= -shallow) || !(d0 - d1 > slow) || (d0 < 0.0 && !lay(way.sample, t))) return;
       const double time = std::max(0.0, d0 / (d0 - d1));
       if (!(time < first) && !(time == first && t < hit)) return;
       const auto then = [time](const Path& q) -> Vec3 { return q.from + time * (q.to - q.from); };
@@ -135,9 +163,13 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, const Pair&
       if (!(v >= -kBesidePath) || !(w >= -kBesidePath) || !(v + w <= 1.0 + kBesidePath)) return;
       first = time;
       hit = t;
-    });
+    };
+    if (by_cells)
+      table.forEach(table.cellsOf(way.box), meet);
+    else
+      for (Index k = 0; k < near.size(); ++k) meet(k);
     if (hit == kNoIndex) continue;
-    traced.caught.emplace_back(CaughtKey{of.key, with.key, s}, hit);
+    traced.caught.emplace_back(CaughtKey{of.key, with.key, way.sample}, hit);
   }
 }
 

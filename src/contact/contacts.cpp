@@ -50,6 +50,7 @@ Contacts& Contacts::operator=(Contacts&&) noexcept = default;
 
 const std::vector<char>& Contacts::needed() const { return impl_->needed; }
 int Contacts::neededSubsteps() const { return impl_->needed_substeps; }
+int Contacts::affordableSubsteps() const { return impl_->affordable_substeps; }
 const std::vector<Index>& Contacts::reached() const { return impl_->reached; }
 const std::vector<double>& Contacts::depths() const { return impl_->depths; }
 
@@ -61,6 +62,7 @@ void Contacts::clear() {
   impl_->reached.clear();
   impl_->keys.clear();
   impl_->needed_substeps = 1;
+  impl_->affordable_substeps = kAnySubsteps;
   impl_->impulse_substep = 0.0;
   impl_->depths.clear();
   impl_->frames = impl_->steady_contacts = 0;  // what follows is as from the start
@@ -232,11 +234,13 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   w.plan.make(parties, w.contacts);
   w.needed_substeps = std::max(1, w.needed_substeps - 1);  // a stack that bounces apart for a frame is still one
   if (fastest > 1.0)
-    w.needed_substeps = std::max(w.needed_substeps, static_cast<int>(std::ceil(std::min(fastest, 1e6))));
+    w.needed_substeps =
+        std::max(w.needed_substeps, static_cast<int>(std::ceil(std::min<double>(fastest, kAnySubsteps))));
   for (Index island = 0; island < w.plan.size(); ++island) {
     const double work = stackWork(w.scene, parties, w.plan, island, h);
     w.needed_substeps = std::max(w.needed_substeps, static_cast<int>(std::ceil(work / kMostPasses)));
   }
+  w.chooseAffordable();
   w.frame = h;
   bool any_quick = false;
   for (const Pair& pair : w.pairs) any_quick = any_quick || pair.quick;

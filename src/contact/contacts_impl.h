@@ -28,6 +28,8 @@ struct Pair {
 // Points that quick pairs ask about at once, if that is more than all vertices there are: beyond it they are a heap.
 inline constexpr std::size_t kMostInHeap = 12500;
 
+inline constexpr int kAnySubsteps = 1000000;
+
 /// How many of a shape's points are asked about in the pair's other: its vertices come first.
 Index samplesFor(const Pair& pair, const ContactShape& shape);
 
@@ -224,7 +226,7 @@ struct Contacts::Impl {
   std::map<PairKey, Exit> exits;
   std::vector<double> depths;
   std::vector<Index> reached;
-  int needed_substeps = 1;
+  int needed_substeps = 1, affordable_substeps = kAnySubsteps;
   double impulse_substep = 0.0;  // [s] of which the contacts' impulses are; 0: of none
   double frame = 0.0;            // [s]
   ContactSolver solver;
@@ -283,6 +285,7 @@ struct Contacts::Impl {
   void takeForeseen(Findings& to, LookupPart& part) const;
   void followParties(const std::vector<ContactParty>& parties);
   void takeOver();
+  void chooseAffordable();
   void choosePasses(const std::vector<ContactParty>& parties, double substep);
   bool letOutWhole(const std::vector<ContactParty>& parties, const Pair& pair, const Inside& of_a, const Inside& of_b,
                    double h, ContactCounters& counters);

@@ -45,12 +45,13 @@ struct ContactsMemory::Data {
   std::vector<ExitOfPair> exits;
   std::vector<std::uint64_t> keys;
   std::vector<Index> reached;
-  std::int32_t needed_substeps = 1;
+  std::int32_t needed_substeps = 1, affordable_substeps = kAnySubsteps;
   double impulse_substep = 0.0;
 
   template <class Archive>
   void fields(Archive& archive) {
-    archive(contacts, steady_contacts, frames, caught, exits, keys, reached, needed_substeps, impulse_substep);
+    archive(contacts, steady_contacts, frames, caught, exits, keys, reached, needed_substeps, affordable_substeps,
+            impulse_substep);
   }
 };
 
@@ -68,7 +69,8 @@ void save(OutArchive& archive, const ContactsMemory& memory) { memory.data_->fie
 // Without keys: they are other ones for the same bodies after a reset.
 void save(HashArchive& archive, const ContactsMemory& memory) {
   const ContactsMemory::Data& data = *memory.data_;
-  archive(data.contacts, data.steady_contacts, data.frames, data.reached, data.needed_substeps, data.impulse_substep);
+  archive(data.contacts, data.steady_contacts, data.frames, data.reached, data.needed_substeps,
+          data.affordable_substeps, data.impulse_substep);
   for (const CaughtPoint& point : data.caught) archive(point.sample, point.triangle);
   for (const ExitOfPair& exit : data.exits) archive(exit.direction, exit.speed);
 }
@@ -90,8 +92,10 @@ std::string ContactsMemory::fault(const std::map<std::uint64_t, KnownParty>& par
     if (!fits(point.b, point.triangle)) return "a caught point's triangle is " + std::to_string(point.triangle);
   for (const Index party : data_->reached)
     if (party >= data_->keys.size()) return "a party that was reached is " + std::to_string(party);
-  if (data_->needed_substeps < 1 || data_->needed_substeps > 1000000)
+  if (data_->needed_substeps < 1 || data_->needed_substeps > kAnySubsteps)
     return "contacts ask for " + std::to_string(data_->needed_substeps) + " substeps";
+  if (data_->affordable_substeps < 1 || data_->affordable_substeps > kAnySubsteps)
+    return "contacts leave " + std::to_string(data_->affordable_substeps) + " substeps";
   if (data_->impulse_substep != 0.0 && !(data_->impulse_substep >= 1e-9 && data_->impulse_substep <= 1.0))
     return "the last substep of contacts took " + std::to_string(data_->impulse_substep) + " s";
   return "";
@@ -109,6 +113,7 @@ ContactsMemory Contacts::memory() const {
   data.keys = w.keys;
   data.reached = w.reached;
   data.needed_substeps = w.needed_substeps;
+  data.affordable_substeps = w.affordable_substeps;
   data.impulse_substep = w.impulse_substep;
   return memory;
 }
@@ -125,6 +130,7 @@ void Contacts::recall(const ContactsMemory& memory) {
   w.keys = data.keys;
   w.reached = data.reached;
   w.needed_substeps = data.needed_substeps;
+  w.affordable_substeps = data.affordable_substeps;
   w.impulse_substep = data.impulse_substep;
 }
 

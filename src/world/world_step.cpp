@@ -162,13 +162,18 @@ void World::Impl::finishSubstep(double h) {
     for (const WorldBody* body : awake) push.force += body->scratch.unfelt * settings.step_rate;
 }
 
-// As many as the stiffest body needs, within the budget; what the budget takes from a body is said once.
+// As many as the stiffest body needs, within the budget and what contacts of a heap leave; what these take from a body
+// is said once.
 int World::Impl::substepsNeeded(double h_frame) const {
-  double needed = settings.substeps;
-  if (settings.contact == ContactMethod::kRestShape && !awake.empty())
-    needed = std::max(needed, static_cast<double>(contacts.neededSubsteps()));
+  double needed = 1.0;
   for (const auto& body : bodies)  // not `awake`: a cut asks between steps
     if (!body->asleep) needed = std::max(needed, std::ceil(h_frame * highestFrequencyNow(*body->model, body->state)));
+  if (settings.contact == ContactMethod::kRestShape && !awake.empty()) {
+    const double most = contacts.affordableSubsteps();
+    if (!(needed < most)) needed = most;
+    needed = std::max(needed, static_cast<double>(contacts.neededSubsteps()));
+  }
+  if (needed < settings.substeps) needed = settings.substeps;
   const int most = std::max(settings.substeps, settings.max_substeps);
   return needed < most ? static_cast<int>(needed) : most;  // NaN: most
 }
@@ -182,8 +187,9 @@ int World::Impl::chooseSubsteps(double h_frame) {
     if (factor < 1.0 && !(body->stiffness_factor < 1.0)) {
       std::ostringstream text;
       text << body->name << " needs " << std::ceil(h_frame * highestFrequencyNow(*body->model, body->state))
-           << " substeps for its material; with " << substeps << " (max_substeps) it has " << 100.0 * factor
-           << " % of its stiffness";
+           << " substeps for its material; with " << substeps
+           << (substeps < settings.max_substeps ? " (the contacts of a heap leave no more)" : " (max_substeps)")
+           << " it has " << 100.0 * factor << " % of its stiffness";
       say(EventType::kOverBudget, body->name, 0, text.str());
     }
     body->stiffness_factor = factor;

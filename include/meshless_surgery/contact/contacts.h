@@ -88,6 +88,8 @@ class Contacts {
   /// Substeps that the frame asks for, as make() found it: tall stacks and fast bodies that are about to meet; 1 where
   /// there are none.
   int neededSubsteps() const;
+  /// Substeps that the frame can afford, as make() found it: of a deep heap fewer than stiff materials would have.
+  int affordableSubsteps() const;
   /// Lets out old overlap, where make() has left it to this or to letOutIslands().
   void letOut(const std::vector<ContactParty>& parties, ContactCounters& counters,
               const ForEach& for_each = oneAfterAnother);
