@@ -16,9 +16,9 @@ Index vertexSamples(const ContactShape& shape) {
 // Work of a substep [about a microsecond]: of a point that has passed through (which is made and swept), of one that is
 // followed, and of any.
 constexpr double kCaughtWork = 4.0, kAskedWork = 0.7, kSampleWork = 0.05;
-constexpr double kMostWork = 2.5e5;  // of a frame, or so: beyond it stiff materials get fewer substeps
-constexpr double kMostStops = 6e4;   // caught points times substeps that contacts ask for
-constexpr double kFewest = 4.0;      // substeps that are always left
+constexpr double kMostWork = 1e5;   // of a frame, or so: beyond it stiff materials get fewer substeps
+constexpr double kMostStops = 2e4;  // caught points times substeps that contacts ask for
+constexpr double kFewest = 4.0;     // substeps that are always left
 
 }  // namespace
 

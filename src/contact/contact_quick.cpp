@@ -1,5 +1,6 @@
 // Pairs that move so far in a frame that they are looked at again within it, and followed between.
 #include <algorithm>
+#include <cmath>
 
 #include "contacts_impl.h"
 
@@ -37,14 +38,17 @@ void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, doubl
   quick.resize(pairs.size());
   std::vector<Index> moved, far, to_fit;  // pairs, and parties
   std::vector<char> fitted;
+  // Who came together within the frame may be many more than when it began: the rest of it they are followed alone.
+  const bool enough = looked > most_looked || (caught.size() > kManyCaught && looked > kMostInHeap);
+  look_gap = enough ? static_cast<int>(std::round(frame / substep)) : look_every;
   for (Index k = 0; k < pairs.size(); ++k) {
     const Pair& pair = pairs[k];
     if (!pair.quick) continue;
     const double thickness = std::min(parties[pair.a].shape->thickness(), parties[pair.b].shape->thickness());
     // Many short substeps need no look in each of them.
     quick[k].moved += pair.way * substep;
-    const bool look = fresh || (substep_number % look_every == 0 && quick[k].moved >= kQuick * thickness);
-    const bool is_far = pair.way * substep * look_every > kQuick * thickness;
+    const bool look = fresh || (!enough && substep_number % look_every == 0 && quick[k].moved >= kQuick * thickness);
+    const bool is_far = pair.way * substep * look_gap > kQuick * thickness;
     if (is_far) far.push_back(k);
     if (look) {
       quick[k].moved = 0.0;
@@ -107,6 +111,7 @@ void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, doubl
   for (const Index k : moved) quick[k].found.clear();
   for (std::size_t n = 0; n < parts.tasks(); ++n) {
     counters.lookups += tasks[n].counters.lookups;
+    looked += tasks[n].counters.lookups;
     counters.contacts += tasks[n].contacts.size();
     std::size_t first = 0, first_entry = 0;
     for (std::size_t k = parts.firstOf(n); k < parts.endOf(n); ++k) {

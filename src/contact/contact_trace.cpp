@@ -67,7 +67,7 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, const Pair&
   const Box& box_a = swept[a].box;
   Box box_b;
   // Who is slower is seen by the next look.
-  const double slow = kSlowPath * shape.thickness() / look_every;
+  const double slow = kSlowPath * shape.thickness() / look_gap;
   const double shallow = kShallow * std::min(of.shape->thickness(), shape.thickness());
   // What lay on a face may have been a hair below; what had no contact there is outside on the other side of a fin.
   const auto lay = [&](Index sample, Index triangle) {

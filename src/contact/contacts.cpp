@@ -15,7 +15,7 @@ constexpr std::size_t kTaskParties = 128;  // looked at by one task
 constexpr double kLongestStep = 0.5;       // of the smaller body's extent: how far quick bodies go in a substep
 
 // How many points of quick pairs a frame asks about, or so: beyond it they are looked at in some of its substeps alone.
-constexpr std::size_t kMostAsked = 25000, kMostAskedEach = 4;  // of all, or so often of each there is
+constexpr std::size_t kMostAsked = 25000, kMostAskedEach = 2;  // of all, or so often of each there is
 
 constexpr double kMostForSheets = 4.0;  // substeps that a thin body asks for, at most
 
@@ -283,9 +283,12 @@ void Contacts::begin(const std::vector<ContactParty>& parties, double substep) {
   impl_->choosePasses(parties, substep);
   impl_->fresh = true;
   // Heaps of crumbs that are torn together: between looks those that pass through have to do.
-  const double most =
-      static_cast<double>(impl_->heap ? kMostInHeap : std::max(kMostAsked, kMostAskedEach * impl_->samples));
-  const double looks = most / static_cast<double>(std::max<std::size_t>(1, impl_->asked));
+  impl_->most_looked = impl_->heap || impl_->caught.size() > kManyCaught
+                           ? kMostInHeap
+                           : std::max(kMostAsked, kMostAskedEach * impl_->samples);
+  impl_->looked = 0;
+  const double looks =
+      static_cast<double>(impl_->most_looked) / static_cast<double>(std::max<std::size_t>(1, impl_->asked));
   const double substeps = std::round(impl_->frame / substep);
   impl_->look_every = static_cast<int>(std::clamp(std::ceil(substeps / std::max(1.0, looks)), 1.0, 1e6));
   impl_->substep_number = 0;

@@ -2,6 +2,7 @@
 // about as often as there are points, not once for each pair.
 #include <gtest/gtest.h>
 
+#include "meshless_surgery/world/saved_world.h"
 #include "support/stress.h"
 
 namespace meshless::stress {
@@ -10,15 +11,15 @@ namespace {
 constexpr int kBars = 40;
 constexpr double kStep = 1.0 / 120.0;  // [s]
 
-TEST(Heap, OfQuickBarsIsLookedAtByVertices) {
-  Twins twins(test::weightless());
-  test::Random random(11);
+// In one place; a spring of 1e4 N/m holds each.
+std::vector<PickId> spawnBars(Twins& twins, test::Random& random, double youngs_modulus) {
   std::vector<PickId> held;
   for (int n = 0; n < kBars; ++n) {
     BodyDef def = test::defOf(boxMesh(Vec3(0.3, 0.01, 0.01), 6, 1, 1), "bar" + std::to_string(n));
     def.pose.translation = random.vector(0.02);
     def.pose.rotation = Eigen::Quaterniond(random.rotation());
     def.spacing = 0.01;
+    def.material.youngs_modulus = youngs_modulus;
     twins.spawn(test::shared(def));
     PickCommand pick;
     pick.body = def.name;
@@ -27,6 +28,13 @@ TEST(Heap, OfQuickBarsIsLookedAtByVertices) {
     pick.stiffness = 1e4;
     held.push_back(test::replyOf<PickReply>(twins.apply(pick)).pick);
   }
+  return held;
+}
+
+TEST(Heap, OfQuickBarsIsLookedAtByVertices) {
+  Twins twins(test::weightless());
+  test::Random random(11);
+  const std::vector<PickId> held = spawnBars(twins, random, 0.0);
   std::size_t asked = 0, traced = 0, contacts = 0;
   for (int k = 0; k < 12; ++k) {
     for (const PickId pick : held) ASSERT_TRUE(twins.apply(MovePickCommand{pick, random.vector(0.03)}).ok());
@@ -54,6 +62,35 @@ TEST(Heap, OfQuickBarsIsLookedAtByVertices) {
     EXPECT_LE(energy, first) << k;
   }
   if (resting == 60) EXPECT_LT(energy, 0.03 * first);
+}
+
+// Each of the many substeps that stiff bodies would have costs what the heap costs: they get fewer, and are softer.
+TEST(Heap, OfStiffBarsLeavesThemFewerSubsteps) {
+  Twins twins(test::weightless());
+  test::Random random(12);
+  const std::vector<PickId> held = spawnBars(twins, random, 1e5);
+  const auto substeps = [&twins] { return twins.world().snapshot({}).report.substeps; };
+  std::size_t alone = 0, in_heap = 1000000;
+  for (int k = 0; k < 8; ++k) {
+    for (const PickId pick : held) ASSERT_TRUE(twins.apply(MovePickCommand{pick, random.vector(0.03)}).ok());
+    ASSERT_TRUE(twins.step(Vec3::Zero(), 5.0)) << k;
+    if (k == 0) alone = substeps();
+    in_heap = std::min(in_heap, substeps());
+  }
+  bool said = false;
+  for (const Event& event : twins.world().takeEvents())
+    said = said || (event.type == EventType::kOverBudget && event.text.find("heap") != std::string::npos);
+  EXPECT_GT(alone, 20U);
+  EXPECT_LE(in_heap, 10U);
+  EXPECT_TRUE(said);
+  // Saved in the heap, a world goes on as it would have.
+  const auto saved = decode(encode(*twins.world().capture(), "here"));
+  ASSERT_TRUE(saved.ok());
+  World again(test::weightless());
+  again.restore(*saved->world);
+  ASSERT_TRUE(twins.step(Vec3::Zero(), 5.0));
+  again.step();
+  EXPECT_EQ(again.stateHash(), twins.world().stateHash());
 }
 
 }  // namespace
