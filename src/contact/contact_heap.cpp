@@ -47,9 +47,16 @@ void Contacts::Impl::findHeaps(const std::vector<ContactParty>& parties, const F
     quick_pairs.push_back(k);
     for (Index p : {pairs[k].a, pairs[k].b}) at_most += parties[p].shape->samples().size();
   }
-  if (at_most <= kMostInHeap) return;
+  many_caught = kManyCaught;
+  if (at_most <= kMostInHeap && caught.size() <= many_caught) return;
   for (Index p = 0; p < parties.size(); ++p)
     if (needed[p] & 1) all += vertexSamples(*parties[p].shape);
+  // So many have passed through that yet more points would not sort it out.
+  many_caught = std::max(many_caught, all / kManyCaughtOf);
+  heap = caught.size() > many_caught;
+  if (heap)
+    for (Index k : quick_pairs) pairs[k].by_vertices = true;
+  if (heap || at_most <= kMostInHeap) return;
   const std::size_t bound = std::max(kMostInHeap, all);
   if (at_most <= bound) return;
   std::atomic<std::size_t> in_reach{0};

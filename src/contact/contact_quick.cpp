@@ -39,7 +39,7 @@ void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, doubl
   std::vector<Index> moved, far, to_fit;  // pairs, and parties
   std::vector<char> fitted;
   // Who came together within the frame may be many more than when it began: the rest of it they are followed alone.
-  const bool enough = looked > most_looked || (caught.size() > kManyCaught && looked > kMostInHeap);
+  const bool enough = looked > most_looked || (caught.size() > many_caught && looked > kMostInHeap);
   look_gap = enough ? static_cast<int>(std::round(frame / substep)) : look_every;
   for (Index k = 0; k < pairs.size(); ++k) {
     const Pair& pair = pairs[k];

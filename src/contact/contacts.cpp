@@ -283,7 +283,7 @@ void Contacts::begin(const std::vector<ContactParty>& parties, double substep) {
   impl_->choosePasses(parties, substep);
   impl_->fresh = true;
   // Heaps of crumbs that are torn together: between looks those that pass through have to do.
-  impl_->most_looked = impl_->heap || impl_->caught.size() > kManyCaught
+  impl_->most_looked = impl_->heap || impl_->caught.size() > impl_->many_caught
                            ? kMostInHeap
                            : std::max(kMostAsked, kMostAskedEach * impl_->samples);
   impl_->looked = 0;

@@ -28,7 +28,8 @@ struct Pair {
 // Points that quick pairs ask about at once, if that is more than all vertices there are: beyond it they are a heap.
 inline constexpr std::size_t kMostInHeap = 12500;
 
-inline constexpr std::size_t kManyCaught = 500;  // points that have passed through: likewise a heap
+// Points that have passed through, and the share of all vertices that they are: more are a heap, too.
+inline constexpr std::size_t kManyCaught = 500, kManyCaughtOf = 4;
 
 inline constexpr int kAnySubsteps = 1000000;
 
@@ -237,6 +238,7 @@ struct Contacts::Impl {
   std::vector<std::uint64_t> keys;          // of the parties of the last frame
   int substep_number = 0, look_every = 1;   // in the frame; substeps between looks at quick pairs
   int look_gap = 1;                         // likewise, from now on
+  std::size_t many_caught = kManyCaught;    // of this frame
   std::size_t looked = 0, most_looked = 0;  // points that looks have asked about in this frame, and may
   std::size_t samples = 0, asked = 0;       // of all parties; of quick pairs where they are near, when the frame began
   bool heap = false;                        // quick pairs are looked at by their vertices; see findHeaps()

@@ -135,7 +135,7 @@ struct BodySnapshot {
   BodyMeasures measures;       // where wanted
   std::size_t tetrahedra = 0;  // 0 until something needs them
   bool asleep = false;
-  double stiffness_factor = 1.0;  // of an elastic material, below 1 where max_substeps are too few for it
+  double stiffness_factor = 1.0;  // of an elastic material, below 1 where it needs more substeps than it may take
 };
 
 struct WorldSnapshot {
