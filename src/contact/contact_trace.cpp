@@ -12,10 +12,11 @@ namespace {
 constexpr double kBesidePath = 1e-6;  // barycentric: no path slips between two triangles
 constexpr double kSlowPath =
     0.25;  // of the thickness: who meets a face no faster than that in a substep is seen to be near it
-constexpr double kShallow = 0.1;     // of the lesser thickness: likewise, and from inside
-constexpr double kSameSide = 0.5;    // cosine between the normals of faces that look the same way
-constexpr std::size_t kFewWays = 8;  // are compared with all faces
-constexpr int kMostSlides = 8;       // triangles that a caught point goes on in a substep
+constexpr double kShallow = 0.1;          // of the lesser thickness: likewise, and from inside
+constexpr double kSameSide = 0.5;         // cosine between the normals of faces that look the same way
+constexpr std::size_t kFewWays = 8;       // are compared with all faces
+constexpr std::int64_t kMostCells = 512;  // of a face
+constexpr int kMostSlides = 8;            // triangles that a caught point goes on in a substep
 
 Vec3 normalNow(const ContactParty& party, Index triangle) {
   const Triangle& corners = party.shape->surface().triangles[triangle];
@@ -133,10 +134,17 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, const Pair&
   static thread_local CellTable own_table;
   CellTable& table = own_table;  // each look at the other asks whose thread it is
   const bool by_cells = ways.size() > kFewWays;
+  static thread_local std::vector<Index> own_large;
+  std::vector<Index>& large = own_large;  // torn triangles among small ones would be in millions of cells
+  large.clear();
   if (by_cells) {
     table.start(region, size / static_cast<double>(near.size()), 4 * near.size());
     for (Index k = 0; k < near.size(); ++k) {
       const CellRange range = table.cellsOf(near[k].box);
+      if (range.count() > kMostCells) {
+        large.push_back(k);
+        continue;
+      }
       Cell cell;
       for (cell[0] = range.first[0]; cell[0] <= range.last[0]; ++cell[0])
         for (cell[1] = range.first[1]; cell[1] <= range.last[1]; ++cell[1])
@@ -164,10 +172,13 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, const Pair&
       first = time;
       hit = t;
     };
-    if (by_cells)
-      table.forEach(table.cellsOf(way.box), meet);
-    else
+    const CellRange range = by_cells ? table.cellsOf(way.box) : CellRange{};
+    if (by_cells && range.count() < static_cast<std::int64_t>(near.size())) {
+      table.forEach(range, meet);
+      for (const Index k : large) meet(k);
+    } else {
       for (Index k = 0; k < near.size(); ++k) meet(k);
+    }
     if (hit == kNoIndex) continue;
     traced.caught.emplace_back(CaughtKey{of.key, with.key, way.sample}, hit);
   }
