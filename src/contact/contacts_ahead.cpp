@@ -35,7 +35,8 @@ void Contacts::lookAhead(const std::vector<ContactParty>& parties, Index fresh, 
   w.foreseen.clear();
   w.prepareLookups(parties, h);
   for (const Pair& pair : w.pairs) {
-    if (pair.a >= fresh || pair.a == pair.b) continue;
+    // What tears apart takes seconds to look up whole; the frame bounds its heaps and has threads.
+    if (pair.a >= fresh || pair.a == pair.b || pair.quick) continue;
     w.foreseen.push_back({pair, {}, {}});
     for (const bool second : {false, true}) {
       const Index of = second ? pair.b : pair.a, in = second ? pair.a : pair.b;
