@@ -26,7 +26,7 @@ Index samplesFor(const Pair& pair, const ContactShape& shape) {
   return pair.by_vertices ? vertexSamples(shape) : static_cast<Index>(shape.samples().size());
 }
 
-// Of quick pairs alone: what lies still is not looked at again within a frame.
+// By what is asked of quick pairs, and what has passed through: what lies still is not looked at again within a frame.
 void Contacts::Impl::chooseAffordable() {
   const double stops = static_cast<double>(caught.size());
   needed_substeps =
