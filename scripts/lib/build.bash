@@ -72,8 +72,8 @@ buildPackage() {
 # or without what takes longest: see MESHLESS_SURGERY_SANITIZE_ALL.
 buildSanitized() {
   build "the core with sanitizers" "$output/sanitized" all -- -DMESHLESS_SURGERY_CORE_ONLY=ON \
-    -DMESHLESS_SURGERY_SANITIZE=ON "-DMESHLESS_SURGERY_SANITIZE_ALL=$1" -DBUILD_TESTING=ON -DCMAKE_BUILD_TYPE=RelWithDebInfo \
-    "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -g1"
+    -DMESHLESS_SURGERY_SANITIZE=ON "-DMESHLESS_SURGERY_SANITIZE_ALL=$1" -DBUILD_TESTING=ON \
+    -DCMAKE_BUILD_TYPE=RelWithDebInfo "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -g1"
 }
 
 # buildSanitizedNode: the node and the replay under the same two, in a folder that rostest can be run from.
@@ -81,8 +81,8 @@ buildSanitizedNode() {
   local folder=$output/node_sanitized
   mkdir -p "$folder/devel/lib/python3/dist-packages" || stop "Cannot write to $output."
   build "the node with sanitizers" "$folder" deformer_node replay meshless_surgery_generate_messages -- \
-    -DCATKIN_DEVEL_PREFIX="$folder/devel" -DMESHLESS_SURGERY_SANITIZE=ON -DMESHLESS_SURGERY_SANITIZE_ALL=ON -DCMAKE_BUILD_TYPE=RelWithDebInfo \
-    "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -g1" \
+    -DCATKIN_DEVEL_PREFIX="$folder/devel" -DMESHLESS_SURGERY_SANITIZE=ON -DMESHLESS_SURGERY_SANITIZE_ALL=ON \
+    -DCMAKE_BUILD_TYPE=RelWithDebInfo "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -g1" \
     -DPYTHON_EXECUTABLE=/usr/bin/python3 -DPython3_EXECUTABLE=/usr/bin/python3
 }
 
@@ -91,7 +91,8 @@ sanitized_node_tests='_rostest_test_ros_(session|services|streams|topics|contact
 sanitized_node_tests+='tools)\.test$'
 
 # The tests that use more than one thread.
-thread_tests='^(world_gangs_test|world_work_test|world_world_test|world_contact_test|dynamics_match_batch_test|dynamics_elastic_batch_test|stress_.*)$'
+thread_tests='^(world_gangs_test|world_work_test|world_world_test|world_contact_test|dynamics_match_batch_test|'
+thread_tests+='dynamics_elastic_batch_test|stress_.*)$'
 
 # buildThreadSanitized: those under ThreadSanitizer, without ROS.
 buildThreadSanitized() {

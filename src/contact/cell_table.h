@@ -39,6 +39,7 @@ class CellTable {
       stamp_ = 1;
     }
     entries_.clear();
+    large_.clear();
   }
 
   /// Cells that a box covers inside the region. The box must overlap the region.
@@ -59,7 +60,20 @@ class CellTable {
     bucket.head = static_cast<Index>(entries_.size() - 1);
   }
 
-  /// Calls visit(item) for every item of every cell in the range.
+  /// Into all cells of a box; where these are more than `most` the item is visited whatever the range.
+  void insert(const Box& box, Index item, std::int64_t most) {
+    const CellRange range = cellsOf(box);
+    if (range.count() > most) {
+      large_.push_back(item);
+      return;
+    }
+    Cell cell;
+    for (cell[0] = range.first[0]; cell[0] <= range.last[0]; ++cell[0])
+      for (cell[1] = range.first[1]; cell[1] <= range.last[1]; ++cell[1])
+        for (cell[2] = range.first[2]; cell[2] <= range.last[2]; ++cell[2]) insert(cell, item);
+  }
+
+  /// Calls visit(item) for every item of every cell in the range, and for the large ones.
   template <class Visit>
   void forEach(const CellRange& range, Visit visit) const {
     Cell cell;
@@ -71,6 +85,7 @@ class CellTable {
           for (Index k = bucket.head; k != kNoIndex; k = entries_[k].next)
             if (same(entries_[k].cell, cell)) visit(entries_[k].item);
         }
+    for (const Index item : large_) visit(item);
   }
 
  private:
@@ -102,6 +117,7 @@ class CellTable {
   std::uint32_t stamp_ = 0;
   std::vector<Bucket> buckets_ = std::vector<Bucket>(64);
   std::vector<Entry> entries_;
+  std::vector<Index> large_;  // items in too many cells
 };
 
 }  // namespace meshless

@@ -12,9 +12,10 @@
 
 namespace meshless {
 
-inline constexpr double kOnRim = 1e-6;      // of a squared distance: straight above the rim of a face
-inline constexpr double kFlatEdge = 0.996;  // cosine between neighbours: about 5 degrees
-inline constexpr double kTie = 1e-9;        // relative: two features are equally near
+inline constexpr double kOnRim = 1e-6;        // of a squared distance: straight above the rim of a face
+inline constexpr double kFlatEdge = 0.996;    // cosine between neighbours: about 5 degrees
+inline constexpr double kTie = 1e-9;          // relative: two features are equally near
+inline constexpr double kNormalSlack = 1e-8;  // of the radius: what a plane is off at the corners of a sliver
 
 // Of a triangle, what a query needs, side by side in memory.
 struct ContactShape::Facet {
@@ -22,7 +23,18 @@ struct ContactShape::Facet {
   Vec3 centre;
   double radius;
   double g00, g01, g11;  // inverse of the Gram matrix of ab and ac; zero where the triangle has no area
+  Vec3 across;           // unit, in the plane, square to the longest edge: the triangle is narrowest along it
+  double low, high;      // [m] along it from a
   Index triangle;
+
+  // Whether a point, so far over the plane and at `from` from a, is farther than that [m^2], whatever the rounding of a
+  // sliver's normal.
+  bool isBeyond(double squared, double over, const Vec3& from) const {
+    const double at = across.dot(from), slack = kNormalSlack * radius;
+    const double beside = std::max({low - at, at - high, slack}) - slack;
+    const double height = std::max(std::abs(over) - slack, 0.0);
+    return height * height + beside * beside > squared;
+  }
 };
 
 // What a facet is to a point.
@@ -66,8 +78,9 @@ struct Best {
   void offer(const ContactShape::Facet& f, const Vec3& p, ContactShape::Nearest& found) {
     const double bound = distance + f.radius;
     if ((p - f.centre).squaredNorm() > bound * bound * (1.0 + kTie) + least_tie) return;
-    const double over = f.normal.dot(p - f.a);
-    if (over * over > squared + tie()) return;
+    const Vec3 from = p - f.a;
+    const double over = f.normal.dot(from);
+    if (over * over > squared + tie() || f.isBeyond(squared + tie(), over, from)) return;
     if (f.triangle == found.triangle) return;
     const Measured m = measure(f, p);
     if (m.squared > squared + tie()) return;
@@ -93,8 +106,11 @@ class Settler {
         touches_(best.squared <= 16.0 * best.least_tie) {}
 
   void offer(const ContactShape::Facet& f, const Vec3& p) {
-    const double bound = reach_ + f.radius, over = f.normal.dot(p - f.a);
-    if ((p - f.centre).squaredNorm() > bound * bound * (1.0 + kTie) || over * over > limit_ * (1.0 + kTie)) return;
+    const double bound = reach_ + f.radius;
+    if ((p - f.centre).squaredNorm() > bound * bound * (1.0 + kTie)) return;
+    const Vec3 from = p - f.a;
+    const double over = f.normal.dot(from), limit = limit_ * (1.0 + kTie);
+    if (over * over > limit || f.isBeyond(limit, over, from)) return;
     const Measured m = measure(f, p);
     if (!(m.squared <= limit_)) return;
     for (std::size_t k = 0; k < count_; ++k)

@@ -13,9 +13,13 @@ Index vertexSamples(const ContactShape& shape) {
   return static_cast<Index>(std::partition_point(samples.begin(), samples.end(), is_vertex) - samples.begin());
 }
 
+std::size_t usualLookups(std::size_t points, const ContactShape& in) {
+  return static_cast<std::size_t>(static_cast<double>(points) * in.crowding());
+}
+
 // Work of a substep [about a microsecond]: of a point that has passed through (which is made and swept), of one that is
 // followed, and of any.
-constexpr double kCaughtWork = 4.0, kAskedWork = 0.7, kSampleWork = 0.05;
+constexpr double kCaughtWork = 4.0, kAskedWork = 1.5, kSampleWork = 0.05;
 constexpr double kMostWork = 1e5;   // of a frame, or so: beyond it stiff materials get fewer substeps
 constexpr double kMostStops = 2e4;  // caught points times substeps that contacts ask for
 constexpr double kFewest = 4.0;     // substeps that are always left
@@ -32,10 +36,10 @@ void Contacts::Impl::chooseAffordable() {
   needed_substeps =
       static_cast<int>(std::min<double>(needed_substeps, std::max(kFewest, kMostStops / std::max(1.0, stops))));
   affordable_substeps = kAnySubsteps;
-  if (asked == 0 && caught.empty()) return;
-  const double work =
-      kCaughtWork * stops + kAskedWork * static_cast<double>(asked) + kSampleWork * static_cast<double>(samples);
+  if (!(asked > 0.0) && caught.empty()) return;
+  const double work = kCaughtWork * stops + kAskedWork * asked + kSampleWork * static_cast<double>(samples);
   affordable_substeps = static_cast<int>(std::clamp<double>(kMostWork / work, kFewest, kAnySubsteps));
+  if (heap) needed_substeps = std::min(needed_substeps, affordable_substeps);
 }
 
 void Contacts::Impl::findHeaps(const std::vector<ContactParty>& parties, const ForEach& for_each) {
@@ -45,7 +49,8 @@ void Contacts::Impl::findHeaps(const std::vector<ContactParty>& parties, const F
   for (Index k = 0; k < pairs.size(); ++k) {
     if (!pairs[k].quick) continue;
     quick_pairs.push_back(k);
-    for (Index p : {pairs[k].a, pairs[k].b}) at_most += parties[p].shape->samples().size();
+    const ContactShape &a = *parties[pairs[k].a].shape, &b = *parties[pairs[k].b].shape;
+    at_most += usualLookups(a.samples().size(), b) + usualLookups(b.samples().size(), a);
   }
   many_caught = kManyCaught;
   if (at_most <= kMostInHeap && caught.size() <= many_caught) return;
@@ -64,11 +69,12 @@ void Contacts::Impl::findHeaps(const std::vector<ContactParty>& parties, const F
     const Pair& pair = pairs[quick_pairs[n]];
     const Box region = grown(intersection(parties[pair.a].bounds, parties[pair.b].bounds), pair.reach);
     if (region.empty()) return;
-    std::size_t count = 0;
-    for (Index p : {pair.a, pair.b})
+    for (Index p : {pair.a, pair.b}) {
+      std::size_t count = 0;
       for (const ContactSample& sample : parties[p].shape->samples())
         count += region.contains(sampleAt(parties[p], sample));
-    in_reach += count;
+      in_reach += usualLookups(count, *parties[p == pair.a ? pair.b : pair.a].shape);
+    }
   });
   heap = in_reach > bound;
   if (!heap) return;

@@ -350,6 +350,7 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
     if (to.contacts.size() > before) to.contacts.back().below = found.distance < 0.0;
     if (found.distance < 0.0) to.depths.push_back(-found.distance / std::min(size, of.shape->size()));
   }
+  inside.work = static_cast<double>(inside.asked) * shape.crowding();
 }
 
 void Contacts::Impl::addGround(Findings& to, const std::vector<ContactParty>& parties, Index a, double reach) {

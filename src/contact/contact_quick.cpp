@@ -111,10 +111,10 @@ void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, doubl
   for (const Index k : moved) quick[k].found.clear();
   for (std::size_t n = 0; n < parts.tasks(); ++n) {
     counters.lookups += tasks[n].counters.lookups;
-    looked += tasks[n].counters.lookups;
     counters.contacts += tasks[n].contacts.size();
     std::size_t first = 0, first_entry = 0;
     for (std::size_t k = parts.firstOf(n); k < parts.endOf(n); ++k) {
+      looked += parts[k].inside.work;
       Findings& found = quick[parts[k].pair].found;
       append(found.contacts, found.entries, tasks[n], first, parts[k].contacts, first_entry, parts[k].entries);
       first = parts[k].contacts;

@@ -1,7 +1,10 @@
 // The points at which a body feels others, and how thick it is.
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 #include <unordered_map>
+#include <unsupported/Eigen/BVH>
 
 #include "contact_bins.h"
 #include "contact_facet.h"
@@ -9,10 +12,14 @@
 namespace meshless {
 namespace {
 
-constexpr double kLongEdge = 0.1;    // of the body's least extent: shorter edges need no samples
-constexpr double kMostPlaces = 1e6;  // along an axis of the grid in which samples keep apart
-constexpr int kMostEdgeSamples = 64;
+constexpr double kLongEdge = 0.1;            // of the body's least extent: shorter edges need no samples
+constexpr double kMostPlaces = 1e6;          // along an axis of the grid in which samples keep apart
+constexpr int kMostEdgeSamples = 64;         // of an edge
+constexpr std::size_t kEdgeSamples = 1000;   // of a body, and
+constexpr std::size_t kEdgeSamplesEach = 4;  // for each of its vertices
 constexpr std::size_t kThicknessRays = 48;
+constexpr std::size_t kManyEdges = 256;
+constexpr double kItself = 1e-6;  // of the longest ray: nearer is the surface from which it comes
 
 // Entry of a line into the front of a triangle; time in units of the direction, false where it misses.
 bool meets(const TriangleMesh& mesh, Index t, const Vec3& from, const Vec3& direction, double& time,
@@ -34,10 +41,47 @@ bool meets(const TriangleMesh& mesh, Index t, const Vec3& from, const Vec3& dire
   return true;
 }
 
+using TriangleTree = Eigen::KdBVH<double, 3, Index>;
+
+TriangleTree makeTree(const TriangleMesh& mesh) {
+  std::vector<Index> triangles(mesh.triangles.size());
+  std::iota(triangles.begin(), triangles.end(), Index{0});
+  std::vector<TriangleTree::Volume> boxes(triangles.size());
+  for (Index t = 0; t < triangles.size(); ++t)
+    for (Index corner : mesh.triangles[t]) boxes[t].extend(mesh.vertices[corner]);
+  return TriangleTree(triangles.begin(), triangles.end(), boxes.begin(), boxes.end());
+}
+
+/// For Eigen::BVMinimize: the first triangle that a ray meets farther than `least`; `depth` is where.
+struct FirstMet {
+  using Scalar = double;
+  const TriangleMesh& mesh;
+  Vec3 from, direction;
+  double least, depth;
+  Eigen::Array3d inverse = direction.array().inverse();
+
+  static constexpr double kNever = std::numeric_limits<double>::max();
+  double minimumOnVolume(const TriangleTree::Volume& box) const {
+    // Along an axis in which the ray does not move: infinities of both signs within, of one sign beyond.
+    const Eigen::Array3d slack = Eigen::Array3d::Constant(1e-6 * depth);
+    const Eigen::Array3d a = (box.min().array() - slack - from.array()) * inverse,
+                         b = (box.max().array() + slack - from.array()) * inverse;
+    const double begin = std::max(0.0, a.min(b).maxCoeff()), end = std::min(depth, a.max(b).minCoeff());
+    return begin <= end ? begin : kNever;
+  }
+  double minimumOnObject(Index t) {
+    double time;
+    std::array<double, 3> weights;
+    if (!meets(mesh, t, from, direction, time, weights) || !(time > least)) return kNever;
+    depth = std::min(depth, time);
+    return time;
+  }
+};
+
 }  // namespace
 
-// How far it is from a point on the surface to the other side.
-double ContactShape::depthAlong(const Vec3& from, const Vec3& direction, double longest) const {
+// How far it is from a point on the surface to the other side; what is nearer than `least` is the surface itself.
+double ContactShape::depthAlong(const Vec3& from, const Vec3& direction, double least, double longest) const {
   double depth = longest;
   Box box;
   box.extend(from);
@@ -49,7 +93,7 @@ double ContactShape::depthAlong(const Vec3& from, const Vec3& direction, double 
     if (along - reach > depth || to.squaredNorm() - along * along > reach * reach) return;  // the ray passes it by
     double time;
     std::array<double, 3> weights;
-    if (meets(surface_, t, from, direction, time, weights) && time > 1e-6 * longest && time < depth) depth = time;
+    if (meets(surface_, t, from, direction, time, weights) && time > least && time < depth) depth = time;
   });
   return depth;
 }
@@ -64,7 +108,7 @@ void ContactShape::measureThickness() {
     const Triangle& c = surface_.triangles[t];
     const Vec3 &p = surface_.vertices[c[0]], &q = surface_.vertices[c[1]], &r = surface_.vertices[c[2]];
     const Vec3 normal = (q - p).cross(r - p).normalized();
-    const double depth = depthAlong((p + q + r) / 3.0, -normal, longest);
+    const double depth = depthAlong((p + q + r) / 3.0, -normal, kItself * longest, longest);
     if (depth < longest) depths.push_back(depth);
   }
   if (depths.empty()) return;
@@ -142,15 +186,48 @@ void ContactShape::chooseSamples(double spacing) {
   std::stable_sort(edges.begin(), edges.end(),
                    [](const Edge& p, const Edge& q) { return p.low != q.low ? p.low < q.low : p.high < q.high; });
   const double longest = (bounds_.max - bounds_.min).norm();
-  for (std::size_t k = 0; k + 1 < edges.size(); ++k) {
+  // Slivers between cuts lie in most bins each: a tree of boxes tells them apart.
+  TriangleTree tree;
+  if (edges.size() > kManyEdges) tree = makeTree(surface_);
+  const auto depthOf = [&](const Vec3& from, const Vec3& direction, double most) {
+    if (edges.size() <= kManyEdges) return depthAlong(from, direction, kItself * longest, most);
+    FirstMet first{surface_, from, direction, kItself * longest, most};
+    Eigen::BVMinimize(tree, first);
+    return first.depth;
+  };
+  struct Sampled {
+    Index edge;
+    double apart;  // [m] samples at most
+    double length;
+    Vec3 inwards;
+  };
+  std::vector<Sampled> sampled;
+  for (Index k = 0; k + 1 < edges.size(); ++k) {
     const Edge &e = edges[k], &f = edges[k + 1];
     if (e.low != f.low || e.high != f.high || e.normal.dot(f.normal) > kFlatEdge) continue;
     const Vec3 &p = vertices[e.low], &q = vertices[e.high];
     const Vec3 inwards = -(e.normal + f.normal).normalized();
-    const double half = 0.5 * depthAlong(0.5 * (p + q), inwards, longest);
     const double length = (q - p).norm();
-    const int parts = std::min(kMostEdgeSamples, static_cast<int>(std::ceil(0.999 * length / half)));
-    for (int n = 1; n < parts; ++n) samples_.push_back({{e.low, e.high}, static_cast<double>(n) / parts, -inwards});
+    // Where the other side is two lengths away an edge needs no samples.
+    const double half = 0.5 * depthOf(0.5 * (p + q), inwards, std::min(longest, 2.0 * length));
+    if (0.999 * length > half) sampled.push_back({k, half, length, inwards});
+  }
+  // Slivers are thinner than they matter: of them all no more than this.
+  const std::size_t most = std::max(kEdgeSamples, kEdgeSamplesEach * samples_.size());
+  double apart = 0.0;
+  const auto partsOf = [&](const Sampled& s) {
+    return std::min(kMostEdgeSamples, static_cast<int>(std::ceil(0.999 * s.length / std::max(s.apart, apart))));
+  };
+  const auto count = [&] {
+    std::size_t sum = 0;
+    for (const Sampled& s : sampled) sum += static_cast<std::size_t>(partsOf(s) - 1);
+    return sum;
+  };
+  for (double wider = 1e-3 * longest; count() > most; wider *= 1.25) apart = wider;
+  for (const Sampled& s : sampled) {
+    const int parts = partsOf(s);
+    for (int n = 1; n < parts; ++n)
+      samples_.push_back({{edges[s.edge].low, edges[s.edge].high}, static_cast<double>(n) / parts, -s.inwards});
   }
 }
 

@@ -18,6 +18,7 @@ constexpr double kCellEdges = 0.5;   // size of a cell in mean edges
 constexpr double kSpaceEdges = 1.5;  // size of a cell of empty space in mean edges
 constexpr double kMostBins = 1 << 18;
 constexpr double kMostCells = 1 << 19;
+constexpr double kUsualCrowd = 50.0;      // triangles of a bin, for one of them
 constexpr double kFacing = 0.1;           // cosine: a face pushes a body's point into the body
 constexpr std::size_t kBounding = 4;      // triangles that tell how far the nearest to a point of a cell can be
 constexpr std::uintptr_t kAsked = 12;     // times that the bins are searched before a cell is filled
@@ -44,6 +45,11 @@ Facet makeFacet(const TriangleMesh& mesh, Index t) {
   f.g00 = bb * inverse;
   f.g01 = -ab * inverse;
   f.g11 = aa * inverse;
+  const Vec3 bc = f.ac - f.ab;
+  const Vec3 longest = bb >= aa && bb >= bc.squaredNorm() ? f.ac : aa >= bc.squaredNorm() ? f.ab : bc;
+  f.across = det > kFlat * aa * bb ? f.normal.cross(longest).normalized() : Vec3::Zero();
+  f.low = std::min({0.0, f.across.dot(f.ab), f.across.dot(f.ac)});
+  f.high = std::max({0.0, f.across.dot(f.ab), f.across.dot(f.ac)});
   f.triangle = t;
   return f;
 }
@@ -156,6 +162,10 @@ void ContactShape::binTriangles() {
   std::vector<Index> next(bin_offsets_.begin(), bin_offsets_.end() - 1);
   for (Index t = 0; t < surface_.triangles.size(); ++t)
     forBins(t, [&](std::size_t bin) { bin_triangles_[next[bin]++] = t; });
+  double squares = 0.0;
+  for (std::size_t i = 0; i < total; ++i) squares += std::pow(bin_offsets_[i + 1] - bin_offsets_[i], 2);
+  if (!bin_triangles_.empty())
+    crowding_ = std::max(1.0, squares / static_cast<double>(bin_triangles_.size()) / kUsualCrowd);
   const double rounding = kSphereRounding * (extent.norm() + bin_edge_);
   bin_spheres_.reserve(bin_triangles_.size());
   for (const Index t : bin_triangles_) {

@@ -134,22 +134,10 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, const Pair&
   static thread_local CellTable own_table;
   CellTable& table = own_table;  // each look at the other asks whose thread it is
   const bool by_cells = ways.size() > kFewWays;
-  static thread_local std::vector<Index> own_large;
-  std::vector<Index>& large = own_large;  // torn triangles among small ones would be in millions of cells
-  large.clear();
   if (by_cells) {
     table.start(region, size / static_cast<double>(near.size()), 4 * near.size());
-    for (Index k = 0; k < near.size(); ++k) {
-      const CellRange range = table.cellsOf(near[k].box);
-      if (range.count() > kMostCells) {
-        large.push_back(k);
-        continue;
-      }
-      Cell cell;
-      for (cell[0] = range.first[0]; cell[0] <= range.last[0]; ++cell[0])
-        for (cell[1] = range.first[1]; cell[1] <= range.last[1]; ++cell[1])
-          for (cell[2] = range.first[2]; cell[2] <= range.last[2]; ++cell[2]) table.insert(cell, k);
-    }
+    // Torn triangles among small ones would be in millions of cells.
+    for (Index k = 0; k < near.size(); ++k) table.insert(near[k].box, k, kMostCells);
   }
   for (const Way& way : ways) {
     const Path& path = paths[way.sample];
@@ -175,7 +163,6 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, const Pair&
     const CellRange range = by_cells ? table.cellsOf(way.box) : CellRange{};
     if (by_cells && range.count() < static_cast<std::int64_t>(near.size())) {
       table.forEach(range, meet);
-      for (const Index k : large) meet(k);
     } else {
       for (Index k = 0; k < near.size(); ++k) meet(k);
     }

@@ -174,7 +174,8 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   double largest = 0.0;
   for (const ContactParty& party : parties)
     if (party.moves) largest = std::max(largest, extentOf(party));
-  w.asked = w.samples = 0;
+  w.asked = 0.0;
+  w.samples = 0;
   for (std::size_t p = 0; p < parties.size(); ++p)
     if (w.needed[p] & 1) w.samples += parties[p].shape->samples().size();
   double fastest = 0.0;  // substeps that the fastest quick pair asks for
@@ -204,7 +205,7 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
         const double step = kLongestStep * std::max(kCrumb * largest, std::min(extentOf(a), extentOf(b)));
         if (pair.quick) {
           fastest = std::max(fastest, pair.way * h / step);
-          w.asked += part.inside.asked;
+          w.asked += part.inside.work;
         }
         // What lies on a sheet must not fall through it within a substep.
         if (part.contacts > contacts)
@@ -283,12 +284,11 @@ void Contacts::begin(const std::vector<ContactParty>& parties, double substep) {
   impl_->choosePasses(parties, substep);
   impl_->fresh = true;
   // Heaps of crumbs that are torn together: between looks those that pass through have to do.
-  impl_->most_looked = impl_->heap || impl_->caught.size() > impl_->many_caught
-                           ? kMostInHeap
-                           : std::max(kMostAsked, kMostAskedEach * impl_->samples);
-  impl_->looked = 0;
-  const double looks =
-      static_cast<double>(impl_->most_looked) / static_cast<double>(std::max<std::size_t>(1, impl_->asked));
+  impl_->most_looked = static_cast<double>(impl_->heap || impl_->caught.size() > impl_->many_caught
+                                               ? kMostInHeap
+                                               : std::max(kMostAsked, kMostAskedEach * impl_->samples));
+  impl_->looked = 0.0;
+  const double looks = impl_->most_looked / std::max(1.0, impl_->asked);
   const double substeps = std::round(impl_->frame / substep);
   impl_->look_every = static_cast<int>(std::clamp(std::ceil(substeps / std::max(1.0, looks)), 1.0, 1e6));
   impl_->substep_number = 0;

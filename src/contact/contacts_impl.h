@@ -67,7 +67,7 @@ struct Exit {
 /// A body's own faces, where they are now, by cells of a grid.
 class SelfGrid {
  public:
-  /// reach [m]: how far from a face its cells go.
+  /// reach [m]: how far from a face its box goes. Keeps the address of the party's faces.
   void make(const ContactParty& party, double reach);
   /// Faces that may be within reach of p, each once, in their order.
   template <class Visit>
@@ -79,8 +79,9 @@ class SelfGrid {
   void forCells(const Box& box, const Visit& visit) const;
   int at(double coordinate, int axis) const;
 
-  std::vector<Box> boxes_;
-  std::vector<Index> offsets_, items_, next_;
+  const std::vector<Index>* triangles_ = nullptr;
+  std::vector<Box> boxes_;                     // of the triangles
+  std::vector<Index> offsets_, items_, next_;  // items: places in both
   std::array<int, 3> cells_{{1, 1, 1}};
   Vec3 origin_ = Vec3::Zero();
   double edge_ = 1.0;
@@ -149,6 +150,7 @@ struct Traced {
 /// How many points of one party lie in the other.
 struct Inside {
   std::size_t points = 0, asked = 0, inside = 0, near = 0;  // asked: in the region where both are
+  double work = 0.0;                                        // of those asked, in usual lookups
   double deepest = 0.0;
 
   void add(const Inside& other);
@@ -239,8 +241,9 @@ struct Contacts::Impl {
   int substep_number = 0, look_every = 1;   // in the frame; substeps between looks at quick pairs
   int look_gap = 1;                         // likewise, from now on
   std::size_t many_caught = kManyCaught;    // of this frame
-  std::size_t looked = 0, most_looked = 0;  // points that looks have asked about in this frame, and may
-  std::size_t samples = 0, asked = 0;       // of all parties; of quick pairs where they are near, when the frame began
+  double looked = 0.0, most_looked = 0.0;   // usual lookups that looks have asked for in this frame, and may
+  double asked = 0.0;                       // as those, of quick pairs where they are near when the frame began
+  std::size_t samples = 0;                  // of all parties
   bool heap = false;                        // quick pairs are looked at by their vertices; see findHeaps()
   bool fresh = true;                        // nothing has been solved since the contacts were made
   bool plan_steady = true;                  // the plan is that of the steady contacts alone

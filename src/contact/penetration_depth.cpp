@@ -74,7 +74,7 @@ std::vector<Crossing> meetBoundary(const Points& a, const std::vector<BorderEdge
   region.min -= margin;
   region.max += margin;
   static thread_local CellTable table;
-  std::vector<Index> near, large;
+  std::vector<Index> near;
   for (Index f = 0; f < b.mesh->faces.size(); ++f)
     if (finite(*b.positions, b.mesh->faces[f]) && boundsOfFace(*b.positions, b.mesh->faces[f]).overlaps(region))
       near.push_back(f);
@@ -83,15 +83,7 @@ std::vector<Crossing> meetBoundary(const Points& a, const std::vector<BorderEdge
     Box box = boundsOfFace(*b.positions, b.mesh->faces[f]);
     box.min -= margin;
     box.max += margin;
-    const CellRange range = table.cellsOf(box);
-    if (range.count() > kMaxCellsOfBox) {
-      large.push_back(f);
-      continue;
-    }
-    Cell cell;
-    for (cell[0] = range.first[0]; cell[0] <= range.last[0]; ++cell[0])
-      for (cell[1] = range.first[1]; cell[1] <= range.last[1]; ++cell[1])
-        for (cell[2] = range.first[2]; cell[2] <= range.last[2]; ++cell[2]) table.insert(cell, f);
+    table.insert(box, f, kMaxCellsOfBox);
   }
   for (std::size_t e = 0; e < edges.size(); ++e) {
     const Vec3 &p = a[edges[e].inside], &q = a[edges[e].outside];
@@ -104,7 +96,6 @@ std::vector<Crossing> meetBoundary(const Points& a, const std::vector<BorderEdge
       for (Index f : near) meet(f);
     } else {
       table.forEach(range, meet);
-      for (Index f : large) meet(f);
     }
   }
   return crossings;

@@ -103,6 +103,7 @@ void SelfGrid::make(const ContactParty& party, double reach) {
   const SelfContactSet& set = *party.self;
   const std::vector<Triangle>& triangles = party.shape->surface().triangles;
   boxes_.clear();
+  triangles_ = &set.triangles;
   Box all;
   double extent = 0.0;
   for (Index t : set.triangles) {
@@ -131,7 +132,7 @@ void SelfGrid::make(const ContactParty& party, double reach) {
   items_.resize(offsets_.back());
   next_.assign(offsets_.begin(), offsets_.end() - 1);
   for (Index k = 0; k < boxes_.size(); ++k)
-    forCells(boxes_[k], [&](std::size_t cell) { items_[next_[cell]++] = set.triangles[k]; });
+    forCells(boxes_[k], [&](std::size_t cell) { items_[next_[cell]++] = k; });
 }
 
 template <class Visit>
@@ -155,7 +156,8 @@ template <class Visit>
 void SelfGrid::forNear(const Vec3& p, const Visit& visit) const {
   const std::size_t cell =
       (static_cast<std::size_t>(at(p.x(), 0)) * cells_[1] + at(p.y(), 1)) * cells_[2] + at(p.z(), 2);
-  for (Index k = offsets_[cell]; k < offsets_[cell + 1]; ++k) visit(items_[k]);
+  for (Index n = offsets_[cell]; n < offsets_[cell + 1]; ++n)
+    if (boxes_[items_[n]].contains(p)) visit((*triangles_)[items_[n]]);
 }
 
 // The points of a body against its own faces, where both are now. Rest shapes say nothing here: lips lie on each other

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/nearest_on_triangle.h"
@@ -294,6 +295,100 @@ TEST(ContactShape, SamplesAreTheVerticesAndPointsOnLongSharpEdges) {
     EXPECT_EQ(onEdges(ball.shape), 0u);
     EXPECT_EQ(ball.shape.samples().size(), ball.shape.surface().vertices.size());
   }
+}
+
+// A plate with a ridge or a valley along y every centimetre.
+TriangleMesh corrugated(const std::vector<double>& heights, double length) {
+  TriangleMesh mesh;
+  const Index n = static_cast<Index>(heights.size());
+  for (Index k = 0; k < n; ++k)
+    for (double z : {0.0, heights[k]})
+      for (double y : {0.0, length}) mesh.vertices.push_back({0.01 * k, y, z});
+  const auto quad = [&](Index a, Index b, Index c, Index d) {
+    mesh.triangles.push_back({a, b, c});
+    mesh.triangles.push_back({a, c, d});
+  };
+  for (Index k = 0; k + 1 < n; ++k) {
+    const Index a = 4 * k, b = a + 4;
+    quad(a + 2, b + 2, b + 3, a + 3);
+    quad(a, a + 1, b + 1, b);
+    quad(a, b, b + 2, a + 2);
+    quad(a + 1, a + 3, b + 3, b + 1);
+  }
+  const Index e = 4 * (n - 1);
+  quad(0, 2, 3, 1);
+  quad(e, e + 1, e + 3, e + 2);
+  return mesh;
+}
+
+double depthBelow(const TriangleMesh& mesh, const Vec3& from, const Vec3& direction) {
+  double depth = std::numeric_limits<double>::infinity();
+  for (const Triangle& t : mesh.triangles) {
+    Mat3 m;
+    m.col(0) = mesh.vertices[t[1]] - mesh.vertices[t[0]];
+    m.col(1) = mesh.vertices[t[2]] - mesh.vertices[t[0]];
+    m.col(2) = -direction;
+    if (std::abs(m.determinant()) < 1e-15) continue;
+    const Vec3 x = m.inverse() * (from - mesh.vertices[t[0]]);
+    if (x[0] >= -1e-9 && x[1] >= -1e-9 && x[0] + x[1] <= 1.0 + 1e-9 && x[2] > 1e-6) depth = std::min(depth, x[2]);
+  }
+  return depth;
+}
+
+TEST(ContactShape, ManyLongEdgesAreSampledByTheDepthBelowThem) {
+  test::Random random(7);
+  std::vector<double> heights;
+  for (int k = 0; k < 150; ++k) heights.push_back(k % 2 ? random.uniform(0.02, 0.03) : random.uniform(0.04, 0.05));
+  const double length = 0.06;
+  const TriangleMesh plate = corrugated(heights, length);
+  const Shaped shaped(plate);
+  std::map<std::array<Index, 2>, int> parts;
+  for (const ContactSample& s : shaped.shape.samples())
+    if (s.share > 0.0) parts[s.vertices] = 1 + parts[s.vertices] + (parts[s.vertices] == 0);
+  for (Index k = 1; k + 1 < heights.size(); ++k) {
+    const Index v = 4 * k + 2;
+    const auto normal = [&](Index a, Index b) -> Vec3 {
+      return Vec3::UnitY().cross(plate.vertices[a] - plate.vertices[b]).normalized();
+    };
+    const Vec3 inwards = -(normal(v - 4, v) + normal(v, v + 4)).normalized();
+    ASSERT_LT(inwards.z(), 0.0);
+    const double half = 0.5 * depthBelow(plate, 0.5 * (plate.vertices[v] + plate.vertices[v + 1]), inwards);
+    const int expected = static_cast<int>(std::ceil(0.999 * length / half));
+    EXPECT_GT(expected, 1);
+    EXPECT_EQ((parts[{v, v + 1}]), expected) << k << " " << half;
+  }
+}
+
+// Between many cuts lie slivers by the thousand: their samples would be most of all there are.
+TEST(ContactShape, SliversHaveNoMoreSamplesThanAFewTimesTheirVertices) {
+  std::vector<double> heights;
+  for (int k = 0; k < 400; ++k) heights.push_back(k % 2 ? 1e-3 : 6e-3);
+  const TriangleMesh plate = corrugated(heights, 0.2);
+  const Shaped shaped(plate);
+  std::map<std::array<Index, 2>, int> of_edge;
+  std::size_t on_edges = 0;
+  for (const ContactSample& s : shaped.shape.samples()) {
+    if (!(s.share > 0.0)) continue;
+    ++on_edges;
+    ++of_edge[s.vertices];
+  }
+  EXPECT_LE(on_edges, 4 * plate.vertices.size());
+  EXPECT_GE(on_edges, 2 * plate.vertices.size());
+  for (Index k = 1; k + 1 < heights.size(); ++k) EXPECT_GE((of_edge[{4 * k + 2, 4 * k + 3}]), 2) << k;
+}
+
+TEST(ContactShape, CrowdedAreMeshesOfSlivers) {
+  for (const shapes::Shape& shape : triedShapes()) EXPECT_LT(Shaped(shape.mesh).shape.crowding(), 2.0) << shape.name;
+  TriangleMesh fan;  // two discs, as of a coin that is cut from its centre
+  fan.vertices = {{0.0, 0.0, -1e-3}, {0.0, 0.0, 1e-3}};
+  const Index n = 1000;
+  for (Index k = 0; k < n; ++k) {
+    const double angle = 2.0 * 3.14159265358979323846 * k / n;
+    fan.vertices.push_back({0.1 * std::cos(angle), 0.1 * std::sin(angle), 0.0});
+    fan.triangles.push_back({0, 2 + (k + 1) % n, 2 + k});
+    fan.triangles.push_back({1, 2 + k, 2 + (k + 1) % n});
+  }
+  EXPECT_GT(Shaped(fan).shape.crowding(), 10.0);
 }
 
 // Whichever thread comes first: a cell that is filled says what the search said before it was.

@@ -79,6 +79,8 @@ class ContactShape {
   /// [m] median of some inward rays: who moves farther in a step can pass through.
   double thickness() const { return thickness_; }
   double meanEdge() const { return mean_edge_; }  // [m] of the triangles
+  /// How many times the work of a usual mesh a lookup is, about: slivers lie around each point in their hundreds.
+  double crowding() const { return crowding_; }
   /// [m] least edge of the bounds.
   double size() const { return size_; }
   const SurfaceRows& rows() const { return rows_; }
@@ -109,7 +111,7 @@ class ContactShape {
   void binTriangles();
   template <class Visit>
   void visitBins(const Box& box, const Visit& visit) const;
-  double depthAlong(const Vec3& from, const Vec3& direction, double longest) const;
+  double depthAlong(const Vec3& from, const Vec3& direction, double least, double longest) const;
   void chooseSamples(double spacing);
   void measureThickness();
 
@@ -119,7 +121,7 @@ class ContactShape {
   std::vector<Index> rider_of_;
   std::vector<ContactSample> samples_;
   Box bounds_;
-  double size_ = 0.0, thickness_ = 0.0, mean_edge_ = 0.0;
+  double size_ = 0.0, thickness_ = 0.0, mean_edge_ = 0.0, crowding_ = 1.0;
 
   // triangles by bins of a grid
   Vec3 bin_origin_ = Vec3::Zero();
