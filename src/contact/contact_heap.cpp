@@ -17,12 +17,16 @@ std::size_t usualLookups(std::size_t points, const ContactShape& in) {
   return static_cast<std::size_t>(static_cast<double>(points) * in.crowding());
 }
 
-// Work of a substep [about a microsecond]: of a point that has passed through (which is made and swept), of one that is
-// followed, and of any.
-constexpr double kCaughtWork = 4.0, kAskedWork = 1.5, kSampleWork = 0.05;
-constexpr double kMostWork = 1e5;   // of a frame, or so: beyond it stiff materials get fewer substeps
-constexpr double kMostStops = 2e4;  // caught points times substeps that contacts ask for
-constexpr double kFewest = 4.0;     // substeps that are always left
+// Work [about a microsecond of one thread]: of a usual lookup with all that follows from it; in a substep, of a point
+// that has passed through, which is made and swept, of one that is followed, and of any.
+constexpr double kLookWork = 5.0, kCaughtWork = 4.0, kFollowWork = 1.5, kSampleWork = 0.05;
+constexpr double kMostWork = 1.5e5;  // of a frame, or so: beyond it stiff materials get fewer substeps
+constexpr double kMostStops = 2e4;   // caught points times substeps that contacts ask for
+constexpr double kFewest = 2.0;      // substeps that are always left
+
+// How many usual lookups quick pairs ask for in a frame, or so: beyond it they are looked up in some of its substeps
+// alone.
+constexpr std::size_t kMostAsked = 25000, kMostAskedEach = 2;  // of all, or so often of each there is
 
 }  // namespace
 
@@ -30,16 +34,30 @@ Index samplesFor(const Pair& pair, const ContactShape& shape) {
   return pair.by_vertices ? vertexSamples(shape) : static_cast<Index>(shape.samples().size());
 }
 
-// By what is asked of quick pairs, and what has passed through: what lies still is not looked at again within a frame.
-void Contacts::Impl::chooseAffordable() {
+double Contacts::Impl::mostLooked() const {
+  // Heaps of crumbs that are torn together: between looks those that pass through have to do.
+  if (heap || caught.size() > many_caught) return static_cast<double>(kMostInHeap);
+  return static_cast<double>(std::max(kMostAsked, kMostAskedEach * samples));
+}
+
+// By what quick pairs ask about, and what has passed through: what lies still is not looked at again within a frame.
+void Contacts::Impl::chooseSubsteps(double torn, double standing) {
   const double stops = static_cast<double>(caught.size());
-  needed_substeps =
-      static_cast<int>(std::min<double>(needed_substeps, std::max(kFewest, kMostStops / std::max(1.0, stops))));
   affordable_substeps = kAnySubsteps;
-  if (!(asked > 0.0) && caught.empty()) return;
-  const double work = kCaughtWork * stops + kAskedWork * asked + kSampleWork * static_cast<double>(samples);
-  affordable_substeps = static_cast<int>(std::clamp<double>(kMostWork / work, kFewest, kAnySubsteps));
-  if (heap) needed_substeps = std::min(needed_substeps, affordable_substeps);
+  if (asked_points > 0 || stops > 0.0) {
+    const double look = kLookWork * asked, looks = std::max(1.0, mostLooked() / std::max(1.0, asked));
+    const double each = kCaughtWork * stops + kFollowWork * static_cast<double>(asked_points) +
+                        kSampleWork * static_cast<double>(samples);
+    double most = kMostWork / (look + each);
+    if (most > looks) most = (kMostWork - looks * look) / each;  // the other substeps are without a look
+    affordable_substeps = static_cast<int>(std::clamp<double>(most, kFewest, kAnySubsteps));
+  }
+  double most = std::max(kFewest, kMostStops / std::max(1.0, stops));
+  if (heap) most = std::min<double>(most, affordable_substeps);
+  // A stack that bounces apart for a frame is still one.
+  standing_substeps =
+      std::max(standing_substeps - 1, static_cast<int>(std::ceil(std::min<double>(standing, kAnySubsteps))));
+  needed_substeps = std::max(standing_substeps, static_cast<int>(std::ceil(std::clamp(torn, 1.0, most))));
 }
 
 void Contacts::Impl::findHeaps(const std::vector<ContactParty>& parties, const ForEach& for_each) {

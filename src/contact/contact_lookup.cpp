@@ -325,11 +325,11 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
   for (Index s = part.first; s < part.end; ++s) {
     const Vec3 p = sampleAt(of, samples[s]);
     if (!region.contains(p)) continue;
-    ++inside.asked;
     if (!caught.empty()) {
       const auto held = caught.find({of.key, with.key, s});
       if (held != caught.end()) continue;  // see trace()
     }
+    ++inside.asked;
     ContactShape::Nearest found;
     bool flipped = false;
     if (!stillOver(to, with, a, b, s, p, hint, found, flipped)) {
@@ -350,7 +350,6 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
     if (to.contacts.size() > before) to.contacts.back().below = found.distance < 0.0;
     if (found.distance < 0.0) to.depths.push_back(-found.distance / std::min(size, of.shape->size()));
   }
-  inside.work = static_cast<double>(inside.asked) * shape.crowding();
 }
 
 void Contacts::Impl::addGround(Findings& to, const std::vector<ContactParty>& parties, Index a, double reach) {

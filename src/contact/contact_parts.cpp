@@ -13,7 +13,6 @@ constexpr std::size_t kLeastTasks = 16;  // where there are parts enough
 void Inside::add(const Inside& other) {
   points += other.points;
   asked += other.asked;
-  work += other.work;
   inside += other.inside;
   near += other.near;
   deepest = std::min(deepest, other.deepest);

@@ -68,12 +68,14 @@ void Contacts::Impl::choosePasses(const std::vector<ContactParty>& parties, doub
     }
     if (caught.empty()) continue;
     const Index count = plan.contact_offsets[island + 1] - plan.contact_offsets[island];
-    for (Index k = plan.contact_offsets[island]; k < plan.contact_offsets[island + 1]; ++k)
-      if (contacts[plan.contacts[k]].caught) {
-        plan.passes[island] = std::max(plan.passes[island], caughtPasses(count));
-        break;
-      }
+    if (anyCaught(island)) plan.passes[island] = std::max(plan.passes[island], caughtPasses(count));
   }
+}
+
+bool Contacts::Impl::anyCaught(Index island) const {
+  for (Index k = plan.contact_offsets[island]; k < plan.contact_offsets[island + 1]; ++k)
+    if (contacts[plan.contacts[k]].caught) return true;
+  return false;
 }
 
 }  // namespace meshless

@@ -114,7 +114,9 @@ void Contacts::Impl::lookAtQuick(const std::vector<ContactParty>& parties, doubl
     counters.contacts += tasks[n].contacts.size();
     std::size_t first = 0, first_entry = 0;
     for (std::size_t k = parts.firstOf(n); k < parts.endOf(n); ++k) {
-      looked += parts[k].inside.work;
+      const Pair& pair = pairs[parts[k].pair];
+      looked +=
+          static_cast<double>(parts[k].inside.asked) * parties[parts[k].second ? pair.a : pair.b].shape->crowding();
       Findings& found = quick[parts[k].pair].found;
       append(found.contacts, found.entries, tasks[n], first, parts[k].contacts, first_entry, parts[k].entries);
       first = parts[k].contacts;

@@ -16,9 +16,9 @@ constexpr double kLongEdge = 0.1;            // of the body's least extent: shor
 constexpr double kMostPlaces = 1e6;          // along an axis of the grid in which samples keep apart
 constexpr int kMostEdgeSamples = 64;         // of an edge
 constexpr std::size_t kEdgeSamples = 1000;   // of a body, and
-constexpr std::size_t kEdgeSamplesEach = 4;  // for each of its vertices
+constexpr std::size_t kEdgeSamplesEach = 4;  // for each sample at a vertex
 constexpr std::size_t kThicknessRays = 48;
-constexpr std::size_t kManyEdges = 256;
+constexpr std::size_t kManyRays = 128;
 constexpr double kItself = 1e-6;  // of the longest ray: nearer is the surface from which it comes
 
 // Entry of a line into the front of a triangle; time in units of the direction, false where it misses.
@@ -186,33 +186,34 @@ void ContactShape::chooseSamples(double spacing) {
   std::stable_sort(edges.begin(), edges.end(),
                    [](const Edge& p, const Edge& q) { return p.low != q.low ? p.low < q.low : p.high < q.high; });
   const double longest = (bounds_.max - bounds_.min).norm();
-  // Slivers between cuts lie in most bins each: a tree of boxes tells them apart.
-  TriangleTree tree;
-  if (edges.size() > kManyEdges) tree = makeTree(surface_);
-  const auto depthOf = [&](const Vec3& from, const Vec3& direction, double most) {
-    if (edges.size() <= kManyEdges) return depthAlong(from, direction, kItself * longest, most);
-    FirstMet first{surface_, from, direction, kItself * longest, most};
-    Eigen::BVMinimize(tree, first);
-    return first.depth;
-  };
   struct Sampled {
-    Index edge;
-    double apart;  // [m] samples at most
+    Index low, high;
     double length;
     Vec3 inwards;
+    double apart;  // [m] samples at most
   };
-  std::vector<Sampled> sampled;
-  for (Index k = 0; k + 1 < edges.size(); ++k) {
+  std::vector<Sampled> sharp;
+  for (std::size_t k = 0; k + 1 < edges.size(); ++k) {
     const Edge &e = edges[k], &f = edges[k + 1];
     if (e.low != f.low || e.high != f.high || e.normal.dot(f.normal) > kFlatEdge) continue;
-    const Vec3 &p = vertices[e.low], &q = vertices[e.high];
     const Vec3 inwards = -(e.normal + f.normal).normalized();
-    const double length = (q - p).norm();
-    // Where the other side is two lengths away an edge needs no samples.
-    const double half = 0.5 * depthOf(0.5 * (p + q), inwards, std::min(longest, 2.0 * length));
-    if (0.999 * length > half) sampled.push_back({k, half, length, inwards});
+    sharp.push_back({e.low, e.high, (vertices[e.high] - vertices[e.low]).norm(), inwards, 0.0});
   }
-  // Slivers are thinner than they matter: of them all no more than this.
+  // Slivers between cuts lie in most bins each: a tree of boxes tells them apart.
+  const bool by_tree = sharp.size() > kManyRays;
+  TriangleTree tree;
+  if (by_tree) tree = makeTree(surface_);
+  for (Sampled& s : sharp) {
+    const Vec3 middle = 0.5 * (vertices[s.low] + vertices[s.high]);
+    // Where the other side is two lengths away an edge needs no samples.
+    FirstMet first{surface_, middle, s.inwards, kItself * longest, std::min(longest, 2.0 * s.length)};
+    if (by_tree)
+      Eigen::BVMinimize(tree, first);
+    else
+      first.depth = depthAlong(middle, s.inwards, first.least, first.depth);
+    s.apart = 0.5 * first.depth;
+  }
+  // Slivers are thinner than they matter: of all edges together no more than this.
   const std::size_t most = std::max(kEdgeSamples, kEdgeSamplesEach * samples_.size());
   double apart = 0.0;
   const auto partsOf = [&](const Sampled& s) {
@@ -220,14 +221,13 @@ void ContactShape::chooseSamples(double spacing) {
   };
   const auto count = [&] {
     std::size_t sum = 0;
-    for (const Sampled& s : sampled) sum += static_cast<std::size_t>(partsOf(s) - 1);
+    for (const Sampled& s : sharp) sum += static_cast<std::size_t>(partsOf(s) - 1);
     return sum;
   };
   for (double wider = 1e-3 * longest; count() > most; wider *= 1.25) apart = wider;
-  for (const Sampled& s : sampled) {
+  for (const Sampled& s : sharp) {
     const int parts = partsOf(s);
-    for (int n = 1; n < parts; ++n)
-      samples_.push_back({{edges[s.edge].low, edges[s.edge].high}, static_cast<double>(n) / parts, -s.inwards});
+    for (int n = 1; n < parts; ++n) samples_.push_back({{s.low, s.high}, static_cast<double>(n) / parts, -s.inwards});
   }
 }
 

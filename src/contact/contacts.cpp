@@ -14,9 +14,6 @@ namespace {
 constexpr std::size_t kTaskParties = 128;  // looked at by one task
 constexpr double kLongestStep = 0.5;       // of the smaller body's extent: how far quick bodies go in a substep
 
-// How many points of quick pairs a frame asks about, or so: beyond it they are looked at in some of its substeps alone.
-constexpr std::size_t kMostAsked = 25000, kMostAskedEach = 2;  // of all, or so often of each there is
-
 constexpr double kMostForSheets = 4.0;  // substeps that a thin body asks for, at most
 
 // Of the largest that moves: smaller bodies ask for no more substeps than one of that size.
@@ -61,7 +58,7 @@ void Contacts::clear() {
   impl_->last.clear();
   impl_->reached.clear();
   impl_->keys.clear();
-  impl_->needed_substeps = 1;
+  impl_->needed_substeps = impl_->standing_substeps = 1;
   impl_->affordable_substeps = kAnySubsteps;
   impl_->impulse_substep = 0.0;
   impl_->depths.clear();
@@ -175,10 +172,10 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   for (const ContactParty& party : parties)
     if (party.moves) largest = std::max(largest, extentOf(party));
   w.asked = 0.0;
-  w.samples = 0;
+  w.asked_points = w.samples = 0;
   for (std::size_t p = 0; p < parties.size(); ++p)
     if (w.needed[p] & 1) w.samples += parties[p].shape->samples().size();
-  double fastest = 0.0;  // substeps that the fastest quick pair asks for
+  double fastest = 0.0;  // substeps that quick pairs, sheets and islands with what has passed through ask for
   for (std::size_t n = 0; n < ground_tasks + pair_tasks; ++n) {
     const Findings& task = w.tasks[n];
     counters.lookups += task.counters.lookups;
@@ -205,7 +202,11 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
         const double step = kLongestStep * std::max(kCrumb * largest, std::min(extentOf(a), extentOf(b)));
         if (pair.quick) {
           fastest = std::max(fastest, pair.way * h / step);
-          w.asked += part.inside.work;
+          if (part.first == 0) {
+            const double crowding = (part.second ? a : b).shape->crowding();
+            w.asked_points += inside[part.second].asked;
+            w.asked += static_cast<double>(inside[part.second].asked) * crowding;
+          }
         }
         // What lies on a sheet must not fall through it within a substep.
         if (part.contacts > contacts)
@@ -233,15 +234,12 @@ void Contacts::make(const std::vector<ContactParty>& parties, double h, ContactC
   const std::size_t lasting = w.contacts.size(), lasting_entries = w.entries.size();
   if (!w.caught.empty()) w.addCaught(parties);
   w.plan.make(parties, w.contacts);
-  w.needed_substeps = std::max(1, w.needed_substeps - 1);  // a stack that bounces apart for a frame is still one
-  if (fastest > 1.0)
-    w.needed_substeps =
-        std::max(w.needed_substeps, static_cast<int>(std::ceil(std::min<double>(fastest, kAnySubsteps))));
+  double standing = 1.0;  // substeps that stacks ask for
   for (Index island = 0; island < w.plan.size(); ++island) {
-    const double work = stackWork(w.scene, parties, w.plan, island, h);
-    w.needed_substeps = std::max(w.needed_substeps, static_cast<int>(std::ceil(work / kMostPasses)));
+    double& asks = w.anyCaught(island) ? fastest : standing;
+    asks = std::max(asks, stackWork(w.scene, parties, w.plan, island, h) / kMostPasses);
   }
-  w.chooseAffordable();
+  w.chooseSubsteps(fastest, standing);
   w.frame = h;
   bool any_quick = false;
   for (const Pair& pair : w.pairs) any_quick = any_quick || pair.quick;
@@ -283,10 +281,7 @@ void Contacts::begin(const std::vector<ContactParty>& parties, double substep) {
   impl_->impulse_substep = substep;
   impl_->choosePasses(parties, substep);
   impl_->fresh = true;
-  // Heaps of crumbs that are torn together: between looks those that pass through have to do.
-  impl_->most_looked = static_cast<double>(impl_->heap || impl_->caught.size() > impl_->many_caught
-                                               ? kMostInHeap
-                                               : std::max(kMostAsked, kMostAskedEach * impl_->samples));
+  impl_->most_looked = impl_->mostLooked();
   impl_->looked = 0.0;
   const double looks = impl_->most_looked / std::max(1.0, impl_->asked);
   const double substeps = std::round(impl_->frame / substep);

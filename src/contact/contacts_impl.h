@@ -25,7 +25,8 @@ struct Pair {
   bool by_vertices = false;  // points on edges are left out
 };
 
-// Points that quick pairs ask about at once, if that is more than all vertices there are: beyond it they are a heap.
+// Usual lookups that quick pairs ask for at once, if that is more than all vertices there are: beyond it they are a
+// heap.
 inline constexpr std::size_t kMostInHeap = 12500;
 
 // Points that have passed through, and the share of all vertices that they are: more are a heap, too.
@@ -67,7 +68,7 @@ struct Exit {
 /// A body's own faces, where they are now, by cells of a grid.
 class SelfGrid {
  public:
-  /// reach [m]: how far from a face its box goes. Keeps the address of the party's faces.
+  /// reach [m]: how far from a face its box goes; what is in none is near none. Keeps the address of the party's faces.
   void make(const ContactParty& party, double reach);
   /// Faces that may be within reach of p, each once, in their order.
   template <class Visit>
@@ -149,8 +150,7 @@ struct Traced {
 
 /// How many points of one party lie in the other.
 struct Inside {
-  std::size_t points = 0, asked = 0, inside = 0, near = 0;  // asked: in the region where both are
-  double work = 0.0;                                        // of those asked, in usual lookups
+  std::size_t points = 0, asked = 0, inside = 0, near = 0;  // asked: not caught, in the region where both are
   double deepest = 0.0;
 
   void add(const Inside& other);
@@ -231,7 +231,7 @@ struct Contacts::Impl {
   std::map<PairKey, Exit> exits;
   std::vector<double> depths;
   std::vector<Index> reached;
-  int needed_substeps = 1, affordable_substeps = kAnySubsteps;
+  int needed_substeps = 1, standing_substeps = 1, affordable_substeps = kAnySubsteps;  // standing: for stacks
   double impulse_substep = 0.0;  // [s] of which the contacts' impulses are; 0: of none
   double frame = 0.0;            // [s]
   ContactSolver solver;
@@ -243,6 +243,7 @@ struct Contacts::Impl {
   std::size_t many_caught = kManyCaught;    // of this frame
   double looked = 0.0, most_looked = 0.0;   // usual lookups that looks have asked for in this frame, and may
   double asked = 0.0;                       // as those, of quick pairs where they are near when the frame began
+  std::size_t asked_points = 0;             // likewise, in points
   std::size_t samples = 0;                  // of all parties
   bool heap = false;                        // quick pairs are looked at by their vertices; see findHeaps()
   bool fresh = true;                        // nothing has been solved since the contacts were made
@@ -294,7 +295,9 @@ struct Contacts::Impl {
   void takeForeseen(Findings& to, LookupPart& part) const;
   void followParties(const std::vector<ContactParty>& parties);
   void takeOver();
-  void chooseAffordable();
+  double mostLooked() const;
+  void chooseSubsteps(double torn, double standing);
+  bool anyCaught(Index island) const;
   void choosePasses(const std::vector<ContactParty>& parties, double substep);
   bool letOutWhole(const std::vector<ContactParty>& parties, const Pair& pair, const Inside& of_a, const Inside& of_b,
                    double h, ContactCounters& counters);

@@ -45,13 +45,13 @@ struct ContactsMemory::Data {
   std::vector<ExitOfPair> exits;
   std::vector<std::uint64_t> keys;
   std::vector<Index> reached;
-  std::int32_t needed_substeps = 1, affordable_substeps = kAnySubsteps;
+  std::int32_t needed_substeps = 1, affordable_substeps = kAnySubsteps, standing_substeps = 1;
   double impulse_substep = 0.0;
 
   template <class Archive>
   void fields(Archive& archive) {
     archive(contacts, steady_contacts, frames, caught, exits, keys, reached, needed_substeps, affordable_substeps,
-            impulse_substep);
+            standing_substeps, impulse_substep);
   }
 };
 
@@ -70,7 +70,7 @@ void save(OutArchive& archive, const ContactsMemory& memory) { memory.data_->fie
 void save(HashArchive& archive, const ContactsMemory& memory) {
   const ContactsMemory::Data& data = *memory.data_;
   archive(data.contacts, data.steady_contacts, data.frames, data.reached, data.needed_substeps,
-          data.affordable_substeps, data.impulse_substep);
+          data.affordable_substeps, data.standing_substeps, data.impulse_substep);
   for (const CaughtPoint& point : data.caught) archive(point.sample, point.triangle);
   for (const ExitOfPair& exit : data.exits) archive(exit.direction, exit.speed);
 }
@@ -96,6 +96,8 @@ std::string ContactsMemory::fault(const std::map<std::uint64_t, KnownParty>& par
     return "contacts ask for " + std::to_string(data_->needed_substeps) + " substeps";
   if (data_->affordable_substeps < 1 || data_->affordable_substeps > kAnySubsteps)
     return "contacts leave " + std::to_string(data_->affordable_substeps) + " substeps";
+  if (data_->standing_substeps < 1 || data_->standing_substeps > kAnySubsteps)
+    return "stacks ask for " + std::to_string(data_->standing_substeps) + " substeps";
   if (data_->impulse_substep != 0.0 && !(data_->impulse_substep >= 1e-9 && data_->impulse_substep <= 1.0))
     return "the last substep of contacts took " + std::to_string(data_->impulse_substep) + " s";
   return "";
@@ -114,6 +116,7 @@ ContactsMemory Contacts::memory() const {
   data.reached = w.reached;
   data.needed_substeps = w.needed_substeps;
   data.affordable_substeps = w.affordable_substeps;
+  data.standing_substeps = w.standing_substeps;
   data.impulse_substep = w.impulse_substep;
   return memory;
 }
@@ -131,6 +134,7 @@ void Contacts::recall(const ContactsMemory& memory) {
   w.reached = data.reached;
   w.needed_substeps = data.needed_substeps;
   w.affordable_substeps = data.affordable_substeps;
+  w.standing_substeps = data.standing_substeps;
   w.impulse_substep = data.impulse_substep;
 }
 

@@ -50,6 +50,49 @@ Vec3 pointOf(const TriangleMesh& mesh, const ContactShape::Nearest& found) {
   return p;
 }
 
+// A plate with a ridge or a valley along y every centimetre.
+TriangleMesh corrugated(const std::vector<double>& heights, double length) {
+  TriangleMesh mesh;
+  const Index n = static_cast<Index>(heights.size());
+  for (Index k = 0; k < n; ++k)
+    for (double z : {0.0, heights[k]})
+      for (double y : {0.0, length}) mesh.vertices.push_back({0.01 * k, y, z});
+  const auto quad = [&](Index a, Index b, Index c, Index d) {
+    mesh.triangles.push_back({a, b, c});
+    mesh.triangles.push_back({a, c, d});
+  };
+  for (Index k = 0; k + 1 < n; ++k) {
+    const Index a = 4 * k, b = a + 4;
+    quad(a + 2, b + 2, b + 3, a + 3);
+    quad(a, a + 1, b + 1, b);
+    quad(a, b, b + 2, a + 2);
+    quad(a + 1, a + 3, b + 3, b + 1);
+  }
+  const Index e = 4 * (n - 1);
+  quad(0, 2, 3, 1);
+  quad(e, e + 1, e + 3, e + 2);
+  return mesh;
+}
+
+// Two shallow cones of n slivers each about one axis, as of a coin that is cut from its centre.
+TriangleMesh slicedCoin(Index n) {
+  TriangleMesh mesh;
+  mesh.vertices = {{0.0, 0.0, -1e-2}, {0.0, 0.0, 1e-2}};
+  for (Index k = 0; k < n; ++k) {
+    const double angle = 2.0 * 3.14159265358979323846 * k / n;
+    mesh.vertices.push_back({0.1 * std::cos(angle), 0.1 * std::sin(angle), 0.0});
+    mesh.triangles.push_back({0, 2 + (k + 1) % n, 2 + k});
+    mesh.triangles.push_back({1, 2 + k, 2 + (k + 1) % n});
+  }
+  return mesh;
+}
+
+std::vector<shapes::Shape> withSlivers(std::vector<shapes::Shape> shapes) {
+  shapes.push_back({"sliced coin", slicedCoin(400)});
+  shapes.push_back({"corrugated plate", corrugated({0.02, 0.05, 0.03, 0.06, 0.01, 0.04}, 0.2)});
+  return shapes;
+}
+
 // Without corners sharper than a cube's, which have tests of their own.
 std::vector<shapes::Shape> triedShapes() {
   std::vector<shapes::Shape> tried;
@@ -81,7 +124,7 @@ Points pointsAround(const TriangleMesh& mesh, test::Random& random, int count) {
 
 TEST(ContactShape, NearestIsWhatASearchOfAllTrianglesFinds) {
   test::Random random(21);
-  for (const shapes::Shape& tried : triedShapes()) {
+  for (const shapes::Shape& tried : withSlivers(triedShapes())) {
     const Shaped shaped(tried.mesh);
     const double size = boundsOf(tried.mesh).diagonal();
     const SolidQuery solid(tried.mesh);
@@ -297,30 +340,6 @@ TEST(ContactShape, SamplesAreTheVerticesAndPointsOnLongSharpEdges) {
   }
 }
 
-// A plate with a ridge or a valley along y every centimetre.
-TriangleMesh corrugated(const std::vector<double>& heights, double length) {
-  TriangleMesh mesh;
-  const Index n = static_cast<Index>(heights.size());
-  for (Index k = 0; k < n; ++k)
-    for (double z : {0.0, heights[k]})
-      for (double y : {0.0, length}) mesh.vertices.push_back({0.01 * k, y, z});
-  const auto quad = [&](Index a, Index b, Index c, Index d) {
-    mesh.triangles.push_back({a, b, c});
-    mesh.triangles.push_back({a, c, d});
-  };
-  for (Index k = 0; k + 1 < n; ++k) {
-    const Index a = 4 * k, b = a + 4;
-    quad(a + 2, b + 2, b + 3, a + 3);
-    quad(a, a + 1, b + 1, b);
-    quad(a, b, b + 2, a + 2);
-    quad(a + 1, a + 3, b + 3, b + 1);
-  }
-  const Index e = 4 * (n - 1);
-  quad(0, 2, 3, 1);
-  quad(e, e + 1, e + 3, e + 2);
-  return mesh;
-}
-
 double depthBelow(const TriangleMesh& mesh, const Vec3& from, const Vec3& direction) {
   double depth = std::numeric_limits<double>::infinity();
   for (const Triangle& t : mesh.triangles) {
@@ -379,21 +398,16 @@ TEST(ContactShape, SliversHaveNoMoreSamplesThanAFewTimesTheirVertices) {
 
 TEST(ContactShape, CrowdedAreMeshesOfSlivers) {
   for (const shapes::Shape& shape : triedShapes()) EXPECT_LT(Shaped(shape.mesh).shape.crowding(), 2.0) << shape.name;
-  TriangleMesh fan;  // two discs, as of a coin that is cut from its centre
-  fan.vertices = {{0.0, 0.0, -1e-3}, {0.0, 0.0, 1e-3}};
-  const Index n = 1000;
-  for (Index k = 0; k < n; ++k) {
-    const double angle = 2.0 * 3.14159265358979323846 * k / n;
-    fan.vertices.push_back({0.1 * std::cos(angle), 0.1 * std::sin(angle), 0.0});
-    fan.triangles.push_back({0, 2 + (k + 1) % n, 2 + k});
-    fan.triangles.push_back({1, 2 + k, 2 + (k + 1) % n});
-  }
-  EXPECT_GT(Shaped(fan).shape.crowding(), 10.0);
+  EXPECT_GT(Shaped(slicedCoin(1000)).shape.crowding(), 10.0);
 }
 
 // Whichever thread comes first: a cell that is filled says what the search said before it was.
 TEST(ContactShape, WhoHasAskedBeforeDoesNotMatter) {
-  for (const shapes::Shape& shape : shapes::allShapes()) {
+  std::vector<shapes::Shape> tried = withSlivers(shapes::allShapes());
+  TriangleMesh flat = boxMesh(Vec3(0.1, 0.1, 0.1), 0.05);  // corners with sines of 1e-3 down to 1e-5
+  for (Vec3& p : flat.vertices) p.y() *= p.x() > 0.0 ? 1e-3 : 1e-5;
+  tried.push_back({"flattened box", flat});
+  for (const shapes::Shape& shape : tried) {
     SCOPED_TRACE(shape.name);
     const Box bounds = boundsOf(shape.mesh);
     const double size = bounds.diagonal();

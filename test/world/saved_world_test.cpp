@@ -388,8 +388,8 @@ TEST(DamagedState, OfAnotherKindOrVersion) {
   expectRefused("", "MLSSTATE");
   expectRefused("solid ball\nfacet normal 0 0 1\n", "MLSSTATE");
   std::string bytes = bytesOf(ballThatFalls());
-  bytes[8] = 6;
-  expectRefused(bytes, "version 6; accepted: 5");
+  bytes[8] = 7;
+  expectRefused(bytes, "version 7; accepted: 6");
 }
 
 // The text at the start is of a length that is known to lie where it lies.
