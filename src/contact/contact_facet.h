@@ -15,7 +15,7 @@ namespace meshless {
 inline constexpr double kOnRim = 1e-6;        // of a squared distance: straight above the rim of a face
 inline constexpr double kFlatEdge = 0.996;    // cosine between neighbours: about 5 degrees
 inline constexpr double kTie = 1e-9;          // relative: two features are equally near
-inline constexpr double kNormalSlack = 1e-8;  // of the radius: what a plane is off at the corners of a sliver
+inline constexpr double kNormalSlack = 1e-8;  // of the radius: more than planes are off at corners as sharp as kFlat
 
 // Of a triangle, what a query needs, side by side in memory.
 struct ContactShape::Facet {

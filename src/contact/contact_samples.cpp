@@ -18,8 +18,8 @@ constexpr int kMostEdgeSamples = 64;         // of an edge
 constexpr std::size_t kEdgeSamples = 1000;   // of a body, and
 constexpr std::size_t kEdgeSamplesEach = 4;  // for each sample at a vertex
 constexpr std::size_t kThicknessRays = 48;
-constexpr std::size_t kManyRays = 128;
-constexpr double kItself = 1e-6;  // of the longest ray: nearer is the surface from which it comes
+constexpr std::size_t kManyRays = 128;  // beyond it a tree of the triangles is worth making
+constexpr double kItself = 1e-6;        // of the longest ray: nearer is the surface from which it comes
 
 // Entry of a line into the front of a triangle; time in units of the direction, false where it misses.
 bool meets(const TriangleMesh& mesh, Index t, const Vec3& from, const Vec3& direction, double& time,
