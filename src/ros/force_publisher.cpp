@@ -15,6 +15,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr double kMostLate = 0.05;        // [s] that is caught up with
+constexpr double kHole = 2.0;             // ticks without a word are a hole ...
+constexpr double kLateStep = 3.0;         // ... and so many steps without one
 constexpr double kClockSet = 0.1;         // [s] that ROS's clock is elsewhere at once
 constexpr double kStiffestPush = 5000.0;  // [N/m] of tissue under the sphere
 
@@ -77,10 +79,18 @@ void ForcePublisher::changed(const World& world, double dt) {
   const ForceModel::Step steps[] = {pick, push, scissors};
   const double now = wallSeconds();
   const std::lock_guard<std::mutex> lock(mutex_);
+  if (dt > 0.0) {
+    if (now - stepped_at_ > kLateStep * dt) bridge(now, now - stepped_at_);
+    stepped_at_ = now;
+  }
   for (std::size_t t = 0; t < tools_.size(); ++t) {
     tools_[t].there = steps[t].there;
     tools_[t].force.stepped(steps[t], dt, now);
   }
+}
+
+void ForcePublisher::bridge(double from, double length) {
+  for (Tool& tool : tools_) tool.bridge.open(from, std::min(length, kMostLate));
 }
 
 bool ForcePublisher::listened() const {
@@ -90,23 +100,24 @@ bool ForcePublisher::listened() const {
 void ForcePublisher::publish(Tool& tool, const std::optional<Pose>& hand, double now, const ros::Time& stamp) {
   if (tool.topic.getNumSubscribers() == 0) return;
   // A tool that is gone is heard until its force has gone too.
-  if (!tool.there && !hand && tool.force.isZero(now)) return;
+  if (!tool.there && !hand && tool.force.isZero(now) && !tool.bridge.isOpen(now)) return;
   geometry_msgs::WrenchStamped message;
   message.header.stamp = stamp;
   message.header.frame_id = world_frame_;
-  message.wrench.force = toVector(tool.force.at(now, hand ? std::optional<Vec3>(hand->translation) : std::nullopt));
+  const Vec3 force = tool.force.at(now, hand ? std::optional<Vec3>(hand->translation) : std::nullopt);
+  message.wrench.force = toVector(tool.bridge.across(now, force));
   tool.topic.publish(message);
 }
 
 void ForcePublisher::loop() {
-  double next = wallSeconds();
+  double next = wallSeconds(), woke = next;
   double offset = -std::numeric_limits<double>::infinity();  // [s] of ROS's clock before ours
   std::unique_lock<std::mutex> lock(mutex_);
   while (!stopping_) {
     if (!listened()) {
       // A listener wakes it; the wait has an end because one may have come between the question and the wait.
       woken_.wait_for(lock, std::chrono::milliseconds(100));
-      next = wallSeconds();
+      next = woke = wallSeconds();
       continue;
     }
     lock.unlock();
@@ -116,6 +127,8 @@ void ForcePublisher::loop() {
     const double now = wallSeconds();
     // Who is woken late says what is due, each tick with its own time: an even rate, and a sum without holes.
     next = std::max(next, now - kMostLate);
+    const double slept = now - woke;
+    woke = now;
     // A simulated clock is read as it is. Between two looks at two clocks time may pass: it counts where least did, so
     // that stamps are even and never go back, unless the clock was set.
     if (!ros::Time::isSimTime()) {
@@ -124,6 +137,7 @@ void ForcePublisher::loop() {
       stamp.fromSec(next + offset);
     }
     lock.lock();
+    if (slept > kHole * period_) bridge(next, slept);
     publish(tools_[0], pick, next, stamp);
     publish(tools_[1], push, next, stamp);
     publish(tools_[2], std::nullopt, next, stamp);

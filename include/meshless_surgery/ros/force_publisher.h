@@ -10,6 +10,7 @@
 #include <ros/node_handle.h>
 
 #include "meshless_surgery/ros/force_model.h"
+#include "meshless_surgery/ros/hole_bridge.h"
 #include "meshless_surgery/ros/settings.h"
 #include "meshless_surgery/ros/tool_inputs.h"
 
@@ -31,9 +32,11 @@ class ForcePublisher {
     ros::Publisher topic;
     bool there = false;
     ForceModel force;  // on the tool
+    HoleBridge<Vec3> bridge{Vec3::Zero()};
   };
 
   void loop();
+  void bridge(double from, double length);
   bool listened() const;
   void publish(Tool& tool, const std::optional<Pose>& hand, double now, const ros::Time& stamp);
 
@@ -44,6 +47,7 @@ class ForcePublisher {
   mutable std::mutex mutex_;
   std::condition_variable woken_;
   std::array<Tool, 3> tools_;  // pick, push, scissors
+  double stepped_at_ = 0.0;    // [s]
   bool stopping_ = false;
   std::thread thread_;
 };
