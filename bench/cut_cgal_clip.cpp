@@ -60,8 +60,17 @@ std::size_t CgalClip::capTriangles(const Plane& plane) const {
   return count;
 }
 
+std::array<double, 2> CgalClip::volumes() const {
+  return {CGAL::to_double(pmp::volume(impl_->sides[0])), CGAL::to_double(pmp::volume(impl_->sides[1]))};
+}
+
+std::array<double, 2> CgalClip::areas() const {
+  return {CGAL::to_double(pmp::area(impl_->sides[0])), CGAL::to_double(pmp::area(impl_->sides[1]))};
+}
+
 double CgalClip::volume() const {
-  return CGAL::to_double(pmp::volume(impl_->sides[0])) + CGAL::to_double(pmp::volume(impl_->sides[1]));
+  const std::array<double, 2> both = volumes();
+  return both[0] + both[1];
 }
 
 }  // namespace meshless::bench

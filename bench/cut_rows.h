@@ -1,6 +1,8 @@
-// What bench_cut measures against. CGAL's headers stay in a translation unit of their own.
+// What bench_cut measures against, and an oracle for the tests of cuts. CGAL's headers stay in a translation unit of
+// their own.
 #pragma once
 
+#include <array>
 #include <cstddef>
 
 #include "meshless_surgery/geometry/plane.h"
@@ -22,6 +24,9 @@ class CgalClip {
   bool run(const Plane& plane);
   std::size_t capTriangles(const Plane& plane) const;  // of both sides after run()
   double volume() const;                               // [m^3] of both sides after run()
+  /// [m^3] and [m^2], cap included, of the side below the plane and of the one above it, after run().
+  std::array<double, 2> volumes() const;
+  std::array<double, 2> areas() const;
 
  private:
   struct Impl;

@@ -1,4 +1,5 @@
-// A value that is said at every tick of a clock, where ticks were missed. Times are of a clock that the caller reads [s].
+// A value that is said at every tick of a clock, where ticks were missed. Times are of a clock that the caller reads
+// [s].
 #pragma once
 
 namespace meshless {
