@@ -51,15 +51,14 @@ class DisplayTest(unittest.TestCase):
         self.view = configured_view(scene)
         self.display = VirtualDisplay()
         self.addCleanup(self.display.close)
-        launch = self.display.start(['roslaunch', 'meshless_surgery', 'training.launch', 'scene:=' + scene,
-                                     'rviz_config:=' + changed.name])
-        self.addCleanup(stop, launch)
-        rospy.wait_for_service('/deformer/pick', LONG)
 
         def shown():
             self.rectangle = view_rectangle(self.display.screenshot())
             return self.rectangle is not None and self.rectangle[1] - self.rectangle[0] > 300
-        self.assertTrue(wait_until(shown, 90), 'rviz did not start')
+        launch = self.display.start_rviz(['roslaunch', 'meshless_surgery', 'training.launch', 'scene:=' + scene,
+                                          'rviz_config:=' + changed.name], shown)
+        self.addCleanup(stop, launch)
+        rospy.wait_for_service('/deformer/pick', LONG)
         rospy.sleep(2.0)
 
     def pixels(self):

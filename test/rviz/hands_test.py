@@ -41,18 +41,17 @@ class HandsTest(unittest.TestCase):
     def setUpClass(cls):
         cls.view = configured_view('liver')
         cls.display = VirtualDisplay()
-        cls.launch = cls.display.start(['roslaunch', 'meshless_surgery', 'training.launch', 'scene:=liver'])
+
+        def shown():
+            cls.rectangle = view_rectangle(cls.display.screenshot())
+            return cls.rectangle is not None and cls.rectangle[1] - cls.rectangle[0] > 300 and cls.tissue().sum() > 2000
+        cls.launch = cls.display.start_rviz(['roslaunch', 'meshless_surgery', 'training.launch', 'scene:=liver'], shown)
         cls.events = []
         cls.poses = {'push': [], 'scissors': []}
         rospy.wait_for_service(NODE + '/reset', LONG)
         cls.heard = [rospy.Subscriber(NODE + '/events', Event, cls.events.append, queue_size=100)]
         for tool, poses in cls.poses.items():
             cls.heard.append(rospy.Subscriber('%s/%s/measured_cp' % (NODE, tool), PoseStamped, poses.append, queue_size=10))
-
-        def shown():
-            cls.rectangle = view_rectangle(cls.display.screenshot())
-            return cls.rectangle is not None and cls.rectangle[1] - cls.rectangle[0] > 300 and cls.tissue().sum() > 2000
-        assert wait_until(shown, 90), 'rviz shows no tissue'
         cls.mouse = Mouse(cls.display)
 
     @classmethod

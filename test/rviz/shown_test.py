@@ -42,7 +42,8 @@ class ShownTest(unittest.TestCase):
         view = configured_view(scene)
         display = VirtualDisplay()
         self.addCleanup(display.close)
-        launch = display.start(['roslaunch', 'meshless_surgery', 'training.launch', 'scene:=' + scene])
+        launch = display.start_rviz(['roslaunch', 'meshless_surgery', 'training.launch', 'scene:=' + scene],
+                                    lambda: view_rectangle(display.screenshot()) is not None)
         self.addCleanup(stop, launch)
         call('pause', SetBool, data=True)
         surface = call('get_body', GetBody, name=body).surface

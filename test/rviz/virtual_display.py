@@ -1,8 +1,10 @@
 """A display that nobody sees, rviz on it, and pictures of what it shows."""
 import ctypes
 import os
+import re
 import signal
 import subprocess
+import tempfile
 import time
 
 import numpy
@@ -13,6 +15,9 @@ class _CursorImage(ctypes.Structure):
     _fields_ = [('x', ctypes.c_short), ('y', ctypes.c_short), ('width', ctypes.c_ushort), ('height', ctypes.c_ushort),
                 ('xhot', ctypes.c_ushort), ('yhot', ctypes.c_ushort), ('serial', ctypes.c_ulong),
                 ('pixels', ctypes.POINTER(ctypes.c_ulong)), ('atom', ctypes.c_ulong), ('name', ctypes.c_char_p)]
+
+
+RVIZ_CRASHED = re.compile(r'\[rviz-\d+\] process has died \[pid \d+, exit code -11')
 
 
 class VirtualDisplay:
@@ -28,8 +33,23 @@ class VirtualDisplay:
             raise RuntimeError('Xvfb did not start')
         self.environment = dict(os.environ, DISPLAY=':' + number)
 
-    def start(self, command):
-        return subprocess.Popen(command, env=self.environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    def start_rviz(self, command, shown, seconds=90):
+        """A roslaunch with rviz, once `shown()`. As its windows come up rviz can die of an X event for a window that is
+        gone (in QGuiApplicationPrivate::processNativeEvent, once in some hundred starts): then it is started once more."""
+        for attempt in range(2):
+            with tempfile.NamedTemporaryFile() as output:
+                process = subprocess.Popen(command, env=self.environment, stdout=output, stderr=subprocess.STDOUT)
+
+                def crashed():
+                    with open(output.name, errors='replace') as text:
+                        return RVIZ_CRASHED.search(text.read())
+                if wait_until(lambda: crashed() or shown(), seconds) and not crashed():
+                    return process
+                again = attempt == 0 and crashed()
+            stop(process)
+            if not again:
+                raise AssertionError('rviz did not show its view')
+            print('rviz crashed as it started, and is started once more')
 
     def screenshot(self):
         """height x width x 3 bytes."""
