@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 
-NOTED = 0.005    # [s] from here on a standstill is written down
+NOTED = 0.01     # [s] from here on a standstill is written down
 LOOK = 0.002     # [s] between two looks
 READY = 'ready'
 
