@@ -60,6 +60,14 @@ class ForcesTest(DeformerTestCase):
         self.open.append(recorder.subscriber)
         return recorder
 
+    def hold(self):
+        """A pick in a hand that has kept still for a while: the pick, its forces from then on, and what moves it."""
+        picked = self.pick_left()
+        forces = self.record('pick/measured_cf')
+        say = self.stream('pick/servo_cp')
+        say(lambda t: (picked.position.x, picked.position.y, picked.position.z), 0.3)
+        return picked, forces, say
+
     def spacing(self, messages):
         stamps = [m.header.stamp.to_sec() for m in messages]
         return sorted(other - one for one, other in zip(stamps, stamps[1:]))
@@ -81,11 +89,8 @@ class ForcesTest(DeformerTestCase):
 
     @by_the_clock
     def test_a_pull_is_felt_at_500_hz_and_between_steps(self):
-        picked = self.pick_left()
+        picked, forces, say = self.hold()
         start = picked.position
-        forces = self.record('pick/measured_cf')
-        say = self.stream('pick/servo_cp')
-        say(lambda t: (start.x, start.y, start.z), 0.3)
         since = forces.count()
         say(lambda t: (start.x, start.y + 0.01 * (1.0 - math.cos(2 * math.pi * 2 * t)), start.z), 2.0)
         messages = forces.messages[since:]
@@ -105,11 +110,8 @@ class ForcesTest(DeformerTestCase):
     @by_the_clock
     def test_a_node_that_stood_still_makes_no_jump_of_it(self):
         _, _, pid = xmlrpc.client.ServerProxy(rosgraph.Master('/test').lookupNode(self.node)).getPid('/test')
-        picked = self.pick_left()
+        picked, forces, say = self.hold()
         start = picked.position
-        forces = self.record('pick/measured_cf')
-        say = self.stream('pick/servo_cp')
-        say(lambda t: (start.x, start.y, start.z), 0.3)
         since = forces.count()
 
         def stand_still():
