@@ -33,37 +33,3 @@ if(client_scripts)
   catkin_install_python(PROGRAMS ${client_scripts}
     DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 endif()
-
-# --- tests with a roscore; each .test file has its own
-if(CATKIN_ENABLE_TESTING)
-  find_package(rostest REQUIRED)
-  # Through catkin_install_python, which names the interpreter: another python3 may come first on the PATH.
-  file(GLOB test_scripts RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS test/ros/*.py test/rviz/*.py)
-  if(test_scripts)
-    #catkin_lint: ignore_once argument_error
-    catkin_install_python(PROGRAMS ${test_scripts}
-      DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-  endif()
-  file(GLOB ros_tests RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS test/ros/*.test test/rviz/*.test)
-  # A node keeps one processor busy, and most tests look at the clock of the simulation or at a screen that is drawn by
-  # software: they run alone. These wait for what they ask for, however long it takes.
-  set(patient_tests contacts parameters scenes services session stations tools)
-  foreach(ros_test IN LISTS ros_tests)
-    add_rostest(${ros_test} DEPENDENCIES deformer_node)
-    get_filename_component(test_name ${ros_test} NAME_WE)
-    string(REPLACE "/" "_" test_entry ${ros_test})
-    set(test_entry _ctest_${PROJECT_NAME}_rostest_${test_entry})
-    if(NOT test_name IN_LIST patient_tests)
-      set_tests_properties(${test_entry} PROPERTIES RUN_SERIAL TRUE)
-    elseif(test_name STREQUAL session)
-      set_tests_properties(${test_entry} PROPERTIES COST 120)  # the longest, beside all the others
-    endif()
-  endforeach()
-  file(GLOB ros_unit_tests CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/test/ros/*_test.cpp)
-  foreach(source IN LISTS ros_unit_tests)
-    get_filename_component(test_name ${source} NAME_WE)
-    catkin_add_gtest(ros_${test_name} ${source})
-    target_include_directories(ros_${test_name} PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/test)
-    target_link_libraries(ros_${test_name} ${PROJECT_NAME}_ros ${catkin_LIBRARIES} GTest::gtest_main Threads::Threads)
-  endforeach()
-endif()

@@ -19,15 +19,26 @@ inCleanEnvironment() {
   env -u CMAKE_PREFIX_PATH -u ROS_PACKAGE_PATH -u PYTHONPATH -u PYTHONHOME -u ROS_ROOT -u MAKEFLAGS -u MAKELEVEL "$@"
 }
 
+# What every build here goes by: a linker and a compiler cache that are used where they are installed.
+commonArguments() {
+  printf '%s\n' -G Ninja
+  if command -v ld.lld >/dev/null; then
+    printf '%s\n' -DCMAKE_EXE_LINKER_FLAGS=-fuse-ld=lld -DCMAKE_SHARED_LINKER_FLAGS=-fuse-ld=lld
+  fi
+  if command -v ccache >/dev/null; then printf '%s\n' -DCMAKE_CXX_COMPILER_LAUNCHER=ccache; fi
+}
+export CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:-pch_defines,time_macros,include_file_mtime,include_file_ctime}
+
 # configure FOLDER CMAKE_ARGUMENTS...: where it has not been done with these arguments yet. Changed CMake files are
-# make's business.
+# ninja's business.
 configure() {
   local folder=$1 arguments
   shift
   arguments=$(printf '%s\n' "$@")
-  if [[ -f $folder/Makefile && $(cat "$folder/configured_with" 2>/dev/null) == "$arguments" ]]; then return 0; fi
+  if [[ -f $folder/build.ninja && $(cat "$folder/configured_with" 2>/dev/null) == "$arguments" ]]; then return 0; fi
   mkdir -p "$folder" || return
   rm -f "$folder/configured_with"
+  if [[ ! -f $folder/build.ninja ]]; then rm -rf "$folder/CMakeCache.txt" "$folder/CMakeFiles"; fi  # another generator's
   if ! inCleanEnvironment cmake -S "$checkout" -B "$folder" "$@"; then
     rm -f "$folder/CMakeCache.txt"  # it remembers what was missing
     return 1
@@ -37,7 +48,8 @@ configure() {
 
 # build TITLE FOLDER TARGETS... -- CMAKE_ARGUMENTS...: one build at a time in the output folder, by a lock on file 9.
 build() {
-  local title=$1 folder=$2 targets=() log status=0
+  local title=$1 folder=$2 targets=() common log status=0
+  mapfile -t common < <(commonArguments)
   shift 2
   while (($# > 0)) && [[ $1 != -- ]]; do
     targets+=("$1")
@@ -52,9 +64,9 @@ build() {
     flock 9
   fi
   log=$logs/$(basename "$folder")
-  runStep "Configuring $title" "$log.configure.log" configure "$folder" "$@" &&
-    runStep "Building $title" "$log.make.log" \
-      inCleanEnvironment make --no-print-directory -C "$folder" -j "$(parallelJobs)" "${targets[@]}" ||
+  runStep "Configuring $title" "$log.configure.log" configure "$folder" "${common[@]}" "$@" &&
+    runStep "Building $title" "$log.build.log" \
+      inCleanEnvironment ninja -C "$folder" -j "$(parallelJobs)" "${targets[@]}" ||
     status=1
   exec 9>&-
   return "$status"
@@ -68,10 +80,10 @@ buildPackage() {
     -DPYTHON_EXECUTABLE=/usr/bin/python3 -DPython3_EXECUTABLE=/usr/bin/python3
 }
 
-# buildSanitized ON|OFF: the core and its tests under AddressSanitizer and UndefinedBehaviorSanitizer, without ROS; with
+# buildSanitized ON|OFF TARGETS...: the core and its tests under AddressSanitizer and UndefinedBehaviorSanitizer, without ROS; with
 # or without what takes longest: see MESHLESS_SURGERY_SANITIZE_ALL.
 buildSanitized() {
-  build "the core with sanitizers" "$output/sanitized" all -- -DMESHLESS_SURGERY_CORE_ONLY=ON \
+  build "the core with sanitizers" "$output/sanitized" "${@:2}" -- -DMESHLESS_SURGERY_CORE_ONLY=ON \
     -DMESHLESS_SURGERY_SANITIZE=ON "-DMESHLESS_SURGERY_SANITIZE_ALL=$1" -DBUILD_TESTING=ON \
     -DCMAKE_BUILD_TYPE=RelWithDebInfo "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -g1"
 }
@@ -90,9 +102,8 @@ buildSanitizedNode() {
 sanitized_node_tests='_rostest_test_ros_(session|services|streams|topics|contacts|parameters|stations|fuzz|robust|'
 sanitized_node_tests+='tools)\.test$'
 
-# The tests that use more than one thread.
-thread_tests='^(world_gangs_test|world_work_test|world_world_test|world_contact_test|dynamics_match_batch_test|'
-thread_tests+='dynamics_elastic_batch_test|stress_.*)$'
+# The rooms whose tests use more than one thread.
+thread_tests='^(world|dynamics|stress)$'
 
 # buildThreadSanitized: those under ThreadSanitizer, without ROS.
 buildThreadSanitized() {

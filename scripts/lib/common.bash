@@ -59,8 +59,11 @@ trap stopProgress EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM
 
+# What took how long: "SECONDS TITLE" for each logged command.
+stages=()
+
 # runLogged TITLE LOG COMMAND...: runs the command with its output in LOG and shows its progress; the command's status,
-# and its time in step_seconds. (File 9 is the lock of a build; who shows its progress shall not hold it.)
+# and its time in step_seconds and stages. (File 9 is the lock of a build; who shows its progress shall not hold it.)
 runLogged() {
   local title=$1 log=$2 status=0 start=$SECONDS
   shift 2
@@ -71,6 +74,7 @@ runLogged() {
   "$@" >"$log" 2>&1 </dev/null || status=$?
   stopProgress
   step_seconds=$((SECONDS - start))
+  stages+=("$step_seconds $title")
   return "$status"
 }
 

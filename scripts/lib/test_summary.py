@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Counts what a run of ctest did: the cases in the JUnit files that its tests wrote, or ctest's own entries.
+"""Counts what a run of ctest did: the cases in the JUnit files that its tests wrote, and the entries that write none.
 
-test_summary.py --build FOLDER --log FILE --out FILE --count cases|entries [-- CTEST_ARGUMENTS]
+test_summary.py --build FOLDER --log FILE --out FILE [--times FILE] [-- CTEST_ARGUMENTS]
 
-The log is ctest's output. Every test that ctest lists under the same arguments counts: one that did not run has failed.
-Prints what failed, and writes "passed failed skipped" to --out.
+The log is ctest's output. Every test that ctest lists under the same arguments counts: one that did not run has failed, and
+so has a program none of whose shares had a case. Prints what failed, writes "passed failed skipped" to --out, and adds a
+line "seconds name" for each case to --times.
 """
 import argparse
 import collections
@@ -19,7 +20,7 @@ Counts = collections.namedtuple('Counts', 'passed failed skipped')
 # One test of ctest: its name, its result ('Passed', 'Failed', 'Timeout', ...) or None, and its JUnit file or None.
 Entry = collections.namedtuple('Entry', 'name result junit')
 # One case of a JUnit file; text is the failure's.
-Case = collections.namedtuple('Case', 'name outcome text')
+Case = collections.namedtuple('Case', 'name outcome text seconds', defaults=(0.0,))
 
 RESULT_LINE = re.compile(r'^\s*\d+/\d+ Test\s+#\d+: (\S+) \.*\s*(?:\*\*\*)?([A-Z][A-Za-z ]*?)(?::.*|\s+[\d.]+ sec.*)?$')
 SHOWN_LINES = 12
@@ -36,11 +37,12 @@ def parseResults(log_text):
 
 
 def listEntries(tests, results):
-    """tests: the list in ctest's --show-only=json-v1. catkin's command names the JUnit file after run_tests.py."""
+    """tests: the list in ctest's --show-only=json-v1. catkin's command names the JUnit file after run_tests.py, others
+    as gtest's option."""
     entries = []
     for test in tests:
         command = test.get('command', [])
-        junit = None
+        junit = next((word.split(':', 1)[1] for word in command if word.startswith('--gtest_output=xml:')), None)
         for before, argument in zip(command, command[1:]):
             if os.path.basename(before) == 'run_tests.py' and argument.endswith('.xml'):
                 junit = argument
@@ -60,12 +62,13 @@ def readCases(path):
         wrong = case.find('failure')
         if wrong is None:
             wrong = case.find('error')
+        seconds = float(case.get('time') or 0.0)
         if wrong is not None:
-            cases.append(Case(name, 'failed', wrong.text or wrong.get('message') or ''))
+            cases.append(Case(name, 'failed', wrong.text or wrong.get('message') or '', seconds))
         elif case.find('skipped') is not None or case.get('result') == 'skipped' or case.get('status') == 'notrun':
-            cases.append(Case(name, 'skipped', ''))
+            cases.append(Case(name, 'skipped', '', seconds))
         else:
-            cases.append(Case(name, 'passed', ''))
+            cases.append(Case(name, 'passed', '', seconds))
     return cases
 
 
@@ -88,14 +91,19 @@ def allCases(entry):
     return detailed
 
 
-def summarize(entries, count_cases):
-    """The counts, and a text for each failure."""
+def summarize(entries):
+    """The counts, a text for each failure, and the cases."""
     passed = failed = skipped = 0
     failures = []
+    all_cases = []
+    in_program = collections.Counter()
     for entry in entries:
         went_well = entry.result in ('Passed', 'Skipped')
-        cases = allCases(entry) if count_cases and entry.junit and entry.result not in (None, 'Not Run') else None
-        if cases:
+        cases = allCases(entry) if entry.junit and entry.result not in (None, 'Not Run') else None
+        program = re.sub(r'_\d+$', '', entry.name)  # several entries run a share of it each
+        if cases is not None:
+            in_program[program] += len(cases)
+            all_cases += cases
             passed += sum(case.outcome == 'passed' for case in cases)
             skipped += sum(case.outcome == 'skipped' for case in cases)
             wrong = [case for case in cases if case.outcome == 'failed']
@@ -103,17 +111,20 @@ def summarize(entries, count_cases):
             failures += ['%s: %s\n%s' % (entry.name, case.name, shorten(case.text)) for case in wrong]
             if went_well or wrong:
                 continue
-        elif went_well:
+        elif went_well and not entry.junit:
             passed += entry.result == 'Passed'
             skipped += entry.result == 'Skipped'
             continue
         # Cases alone do not tell of a crash at the end, a time limit or a test that was never started.
         failed += 1
-        failures.append('%s: %s' % (entry.name, entry.result or 'did not run'))
+        failures.append('%s: %s' % (entry.name, 'no results' if went_well else entry.result or 'did not run'))
+    for program in sorted(name for name, cases in in_program.items() if not cases):
+        failed += 1
+        failures.append(program + ': without a test')
     if not entries:
         failed += 1
         failures.append('no test was found')
-    return Counts(passed, failed, skipped), failures
+    return Counts(passed, failed, skipped), failures, all_cases
 
 
 def shorten(text):
@@ -128,7 +139,7 @@ def main():
     parser.add_argument('--build', required=True, help='the folder in which ctest ran')
     parser.add_argument('--log', required=True, help="ctest's output")
     parser.add_argument('--out', required=True, help='where to write "passed failed skipped"')
-    parser.add_argument('--count', choices=('cases', 'entries'), required=True)
+    parser.add_argument('--times', help='where to add the seconds of each case')
     parser.add_argument('ctest_arguments', nargs='*')
     options = parser.parse_args()
 
@@ -137,13 +148,17 @@ def main():
     with open(options.log, encoding='utf-8', errors='replace') as log:
         results = parseResults(log.read())
     entries = listEntries(json.loads(listed.stdout)['tests'], results)
-    counts, failures = summarize(entries, options.count == 'cases')
+    counts, failures, cases = summarize(entries)
     for failure in failures:
         print('FAILED ' + failure)
     if failures:
         print('The whole log: ' + options.log)
     with open(options.out, 'w', encoding='utf-8') as out:
         print(*counts, file=out)
+    if options.times:
+        with open(options.times, 'a', encoding='utf-8') as out:
+            for case in cases:
+                print('%.3f %s' % (case.seconds, case.name.replace(' ', '_')), file=out)
 
 
 if __name__ == '__main__':

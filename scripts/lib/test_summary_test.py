@@ -40,7 +40,7 @@ class TestSummaryTest(unittest.TestCase):
         return path
 
     def countsOf(self, *entries):
-        return summarize(list(entries), True)[0]
+        return summarize(list(entries))[0]
 
     def testCtestLines(self):
         self.assertEqual({'good': 'Passed', 'wrong': 'Failed', 'crashed': 'Exception', 'slow': 'Timeout',
@@ -48,7 +48,7 @@ class TestSummaryTest(unittest.TestCase):
 
     def testEntriesWithoutFiles(self):
         tests = [{'name': name} for name in ('good', 'wrong', 'crashed', 'slow', 'absent', 'left_out', 'never_started')]
-        counts, failures = summarize(listEntries(tests, parseResults(CTEST_LOG)), False)
+        counts, failures, _ = summarize(listEntries(tests, parseResults(CTEST_LOG)))
         self.assertEqual(Counts(1, 5, 1), counts)
         self.assertEqual(5, len(failures))
         self.assertIn('never_started: did not run', failures)
@@ -58,9 +58,26 @@ class TestSummaryTest(unittest.TestCase):
         self.assertEqual([Entry('a', 'Passed', '/r/gtest-a.xml')],
                          listEntries([{'name': 'a', 'command': command}], {'a': 'Passed'}))
 
+    def testJunitFileOfGtest(self):
+        command = ['env', 'GTEST_SHARD_INDEX=0', 'a_tests', '--gtest_output=xml:/r/gtest-a_0.xml']
+        self.assertEqual([Entry('a_0', 'Passed', '/r/gtest-a_0.xml')],
+                         listEntries([{'name': 'a_0', 'command': command}], {'a_0': 'Passed'}))
+
+    def testAShareWithoutACaseIsFineAndAProgramWithoutOneIsNot(self):
+        full = Entry('a_0', 'Passed', self.write('gtest-a_0.xml', junit(PASSED)))
+        empty = [Entry(name, 'Passed', self.write('gtest-%s.xml' % name, junit())) for name in ('a_1', 'b_0', 'b_1')]
+        self.assertEqual(Counts(1, 0, 0), self.countsOf(full, empty[0]))
+        self.assertEqual(Counts(1, 1, 0), self.countsOf(full, *empty))
+        self.assertEqual(Counts(0, 1, 0), self.countsOf(Entry('a', 'Passed', '/nowhere/gtest-a.xml')))
+
+    def testSeconds(self):
+        slow = PASSED.replace('status', 'time="2.5" status')
+        cases = summarize([Entry('a', 'Passed', self.write('gtest-a.xml', junit(slow)))])[2]
+        self.assertEqual([2.5], [case.seconds for case in cases])
+
     def testCases(self):
         path = self.write('gtest-a.xml', junit(PASSED, PASSED, FAILED, ERROR, SKIPPED, DISABLED))
-        counts, failures = summarize([Entry('a', 'Failed', path)], True)
+        counts, failures, _ = summarize([Entry('a', 'Failed', path)])
         self.assertEqual(Counts(2, 2, 2), counts)
         self.assertIn('by 1', failures[0])
         self.assertIn('no file', failures[1])

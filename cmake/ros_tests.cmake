@@ -1,0 +1,39 @@
+# Tests of the ROS side: one program of test/ros/*_test.cpp, and the rostests, each with a master of its own. Included where
+# tests are built.
+find_package(rostest REQUIRED)
+
+file(GLOB ros_unit_tests CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/test/ros/*_test.cpp)
+add_test_program(ros 1 SOURCES ${ros_unit_tests} LABELS ros LINKS ${PROJECT_NAME}_ros ${catkin_LIBRARIES})
+target_include_directories(ros_tests SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+add_dependencies(check_ros deformer_node make_meshes replay ${PROJECT_NAME}_generate_messages)
+add_custom_target(check_rviz DEPENDS deformer_node ${PROJECT_NAME}_generate_messages)
+if(TARGET ${PROJECT_NAME}_rviz)
+  add_dependencies(check_rviz ${PROJECT_NAME}_rviz)
+endif()
+
+# Through catkin_install_python, which names the interpreter: another python3 may come first on the PATH.
+file(GLOB test_scripts RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS test/ros/*.py test/rviz/*.py)
+if(test_scripts)
+  #catkin_lint: ignore_once argument_error
+  catkin_install_python(PROGRAMS ${test_scripts}
+    DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+endif()
+
+# A node keeps one processor busy, and most tests look at the clock of the simulation or at a screen that is drawn by
+# software: they run alone. These wait for what they ask for, however long it takes.
+set(patient_tests contacts parameters scenes services session stations tools)
+file(GLOB ros_tests RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS test/ros/*.test test/rviz/*.test)
+foreach(ros_test IN LISTS ros_tests)
+  add_rostest(${ros_test} DEPENDENCIES deformer_node)
+  get_filename_component(test_name ${ros_test} NAME_WE)
+  get_filename_component(room ${ros_test} DIRECTORY)
+  get_filename_component(room ${room} NAME)
+  string(REPLACE "/" "_" test_entry ${ros_test})
+  set(test_entry _ctest_${PROJECT_NAME}_rostest_${test_entry})
+  set_tests_properties(${test_entry} PROPERTIES LABELS ${room})
+  if(NOT test_name IN_LIST patient_tests)
+    set_tests_properties(${test_entry} PROPERTIES RUN_SERIAL TRUE)
+  elseif(test_name STREQUAL session)
+    set_tests_properties(${test_entry} PROPERTIES COST 120)  # the longest, beside all the others
+  endif()
+endforeach()
