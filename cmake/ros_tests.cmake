@@ -21,6 +21,9 @@ endif()
 
 # A node keeps one processor busy, and most tests look at the clock of the simulation or at a screen that is drawn by
 # software: they run alone. These wait for what they ask for, however long it takes.
+# For scripts/check --full: what takes long for what it adds.
+set(full_tests display ending forces fuzz hands parameters play_block play_fish play_incision play_pile play_resection play_skin
+  robust scenes session shown_block shown_fish shown_skin soak)
 set(patient_tests contacts parameters scenes services session stations tools)
 file(GLOB ros_tests RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS test/ros/*.test test/rviz/*.test)
 foreach(ros_test IN LISTS ros_tests)
@@ -30,7 +33,11 @@ foreach(ros_test IN LISTS ros_tests)
   get_filename_component(room ${room} NAME)
   string(REPLACE "/" "_" test_entry ${ros_test})
   set(test_entry _ctest_${PROJECT_NAME}_rostest_${test_entry})
-  set_tests_properties(${test_entry} PROPERTIES LABELS ${room})
+  set(labels ${room})
+  if(test_name IN_LIST full_tests)
+    list(APPEND labels full)
+  endif()
+  set_tests_properties(${test_entry} PROPERTIES LABELS "${labels}")
   if(NOT test_name IN_LIST patient_tests)
     set_tests_properties(${test_entry} PROPERTIES RUN_SERIAL TRUE)
   elseif(test_name STREQUAL session)
