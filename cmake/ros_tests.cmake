@@ -1,6 +1,8 @@
 # Tests of the ROS side: one program of test/ros/*_test.cpp, and the rostests, each with a master of its own. Included where
 # tests are built.
-find_package(rostest REQUIRED)
+if(CATKIN_ENABLE_TESTING)
+  find_package(rostest REQUIRED)
+endif()
 
 file(GLOB ros_unit_tests CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/test/ros/*_test.cpp)
 add_test_program(ros 1 SOURCES ${ros_unit_tests} LABELS ros LINKS ${PROJECT_NAME}_ros ${catkin_LIBRARIES})
