@@ -81,6 +81,7 @@ double alignedSpacing(const TriangleMesh& mesh, double plane, double wanted) {
 struct Load {
   Points acceleration;  // [m/s^2] of dead forces
   std::vector<bool> held;
+  std::vector<Index> moved;    // of them, those of the end that is moved
   Points target;               // of held particles [m]
   Points start;                // a first guess [m]
   Vec3 sphere = Vec3::Zero();  // centre [m]
@@ -120,6 +121,7 @@ Load makeLoad(const TruthCase& truth, const BodyModel& model, double spacing) {
       load.start[i] = Eigen::AngleAxisd(share * angle, Vec3::UnitX()) * model.rest[i] + share * shift;
       if (model.rest[i].x() >= top.x() - kOnFace) {
         load.held[i] = true;
+        load.moved.push_back(static_cast<Index>(i));
         load.target[i] = load.start[i];
       }
     }
@@ -232,6 +234,12 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
   }
   result.at_rest = calm >= 50;
   result.contact_force = -sphere_push.z();
+  accelerate();
+  for (const Index i : load.moved) {
+    const Vec3 force = -model.masses[i] * a[i];
+    result.end_force += force;
+    result.end_moment += x[i].cross(force).x();
+  }
   std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2), times.end());
   result.step_ms = times[times.size() / 2];
 

@@ -16,9 +16,11 @@ struct StaticSettings {
 };
 
 struct StaticResult {
-  double error = 0.0;          // RMS distance to the truth over its largest displacement
-  double contact_force = 0.0;  // [N] of the sphere, where there is one
-  double step_ms = 0.0;        // [ms] of one evaluation of all particles' accelerations, median
+  double error = 0.0;             // RMS distance to the truth over its largest displacement
+  double contact_force = 0.0;     // [N] of the sphere, where there is one
+  Vec3 end_force = Vec3::Zero();  // [N] on the body, of what holds the end that is moved
+  double end_moment = 0.0;        // [N m] of it about the x axis
+  double step_ms = 0.0;           // [ms] of one evaluation of all particles' accelerations, median
   std::size_t particles = 0;
   std::size_t clusters = 0;
   int steps = 0;

@@ -10,13 +10,18 @@ namespace {
 
 const char* const kFolder = TRUTH_FOLDER;
 
-StaticResult solved(const std::string& name, double spacing) {
+TruthCase truthOf(const std::string& name) {
   const Result<TruthCase> truth = readTruthCase(std::string(kFolder) + "/" + name + ".csv");
   EXPECT_TRUE(truth.ok()) << (truth.ok() ? "" : truth.error().detail);
+  return *truth;
+}
+
+StaticResult solved(const std::string& name, double spacing) {
+  const TruthCase truth = truthOf(name);
   StaticSettings settings;
   settings.spacing = spacing;
   settings.material.youngs_modulus = 1.0;
-  const Result<StaticResult> result = solveStatic(*truth, kFolder, settings);
+  const Result<StaticResult> result = solveStatic(truth, kFolder, settings);
   EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().detail);
   EXPECT_TRUE(result->at_rest) << name;
   return *result;
@@ -34,6 +39,37 @@ TEST(AgainstFiniteElements, TheIndentedBlockWithin2PercentAt1800Particles) {
     const StaticResult result = solved(std::string("block_indent") + nu, 0.05 / 7.0);
     EXPECT_EQ(result.particles, 1800u);
     EXPECT_LT(result.error, 0.02) << nu;
+  }
+}
+
+// What is moved to a place goes there whatever its stiffness: the force alone tells. A bar of four cells across is too
+// stiff in twist by a sixth, and by a quarter of that with eight.
+TEST(AgainstFiniteElements, TheForceOfStretchAndTheMomentOfTwist) {
+  for (const char* nu : {"_nu30", "_nu45"}) {
+    const std::string stretch = std::string("bar_stretch_150") + nu;
+    EXPECT_NEAR(solved(stretch, 0.0125).end_force.x() / truthOf(stretch).vector("end_force").x(), 1.0, 0.01) << stretch;
+    for (const char* angle : {"bar_twist_90", "bar_twist_180"}) {
+      const std::string twist = std::string(angle) + nu;
+      const double moment = truthOf(twist).number("end_moment_x");
+      const double coarse = solved(twist, 0.0125).end_moment / moment,
+                   fine = solved(twist, 0.00625).end_moment / moment;
+      EXPECT_NEAR(fine, 1.0, 0.05) << twist;
+      EXPECT_LT(std::abs(fine - 1.0), 0.4 * std::abs(coarse - 1.0)) << twist;
+    }
+  }
+}
+
+// The sphere touches particles of the top face alone, so that less than the whole face of contact presses: its force is
+// too small, by less where the spacing is finer.
+TEST(AgainstFiniteElements, TheForceOfTheIndentingSphere) {
+  for (const char* nu : {"_nu30", "_nu45"}) {
+    const std::string name = std::string("block_indent") + nu;
+    const double force = truthOf(name).number("indentation_force");
+    const double coarse = solved(name, 0.0125).contact_force / force,
+                 fine = solved(name, 0.05 / 7.0).contact_force / force;
+    EXPECT_GT(fine, 0.9) << nu;
+    EXPECT_LT(fine, 1.0) << nu;
+    EXPECT_LT(1.0 - fine, 0.6 * (1.0 - coarse)) << nu;
   }
 }
 

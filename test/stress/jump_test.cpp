@@ -6,7 +6,12 @@
 namespace meshless::stress {
 namespace {
 
-double fastestAfterJump(int substeps, bool elastic) {
+struct Fastest {
+  double held = 0.0;      // the patch that the pick holds, over the speed of the jump within a step
+  double particle = 0.0;  // [m/s] any particle
+};
+
+Fastest fastestAfterJump(int substeps, bool elastic) {
   WorldSettings settings = test::weightless();
   settings.contact = ContactMethod::kNone;
   settings.substeps = settings.max_substeps = substeps;
@@ -19,27 +24,33 @@ double fastestAfterJump(int substeps, bool elastic) {
   pick.stiffness = 1e12;
   const PickId held = test::replyOf<PickReply>(world.apply(pick)).pick;
   EXPECT_TRUE(world.apply(MovePickCommand{held, Vec3(-1.0, 0.0, 0.0)}).ok());
-  Points before = world.snapshot({false, true, false}).bodies[0].particles;
-  double fastest = 0.0;
+  WorldSnapshot before = world.snapshot({false, true, false});
+  const double fair = settings.step_rate * (before.picks[0].target - before.picks[0].position).norm();  // [m/s]
+  Fastest fastest;
   for (int step = 0; step < 30; ++step) {
     world.step();
-    const Points now = world.snapshot({false, true, false}).bodies[0].particles;
-    for (std::size_t i = 0; i < now.size(); ++i)
-      fastest = std::max(fastest, settings.step_rate * (now[i] - before[i]).norm());
+    const WorldSnapshot now = world.snapshot({false, true, false});
+    const auto speed = [&](const Vec3& a, const Vec3& b) { return settings.step_rate * (b - a).norm(); };
+    fastest.held = std::max(fastest.held, speed(before.picks[0].position, now.picks[0].position) / fair);
+    const Points &from = before.bodies[0].particles, &to = now.bodies[0].particles;
+    for (std::size_t i = 0; i < to.size(); ++i) fastest.particle = std::max(fastest.particle, speed(from[i], to[i]));
+    EXPECT_LT((now.picks[0].position - now.picks[0].target).norm(), 1e-3) << "step " << step;
     before = now;
   }
-  const WorldSnapshot shot = world.snapshot({});
-  EXPECT_LT((shot.picks[0].position - shot.picks[0].target).norm(), 1e-3);
   return fastest;
 }
 
 TEST(Jump, IsFollowedWithinTheStepAndNoFaster) {
-  const double fair = 120.0;  // [m/s] a metre within a step
-  for (const bool elastic : {false, true})
+  for (const bool elastic : {false, true}) {
+    // The middle of a patch goes farther than its mean: with one substep that is all that there is to it.
+    const double middle = fastestAfterJump(1, elastic).particle;
     for (const int substeps : {1, 8, 64}) {
       SCOPED_TRACE(substeps);
-      EXPECT_LT(fastestAfterJump(substeps, elastic), 4.0 * fair);
+      const Fastest fastest = fastestAfterJump(substeps, elastic);
+      EXPECT_LT(fastest.held, 1.01);
+      EXPECT_LE(fastest.particle, middle);
     }
+  }
 }
 
 }  // namespace

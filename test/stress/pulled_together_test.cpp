@@ -1,11 +1,14 @@
-// Bodies that springs pull into one place, one of them cut and one opened: they press on each other for good, and come
-// to rest.
+// Bodies that springs pull into one place, one of them cut and one opened: they press on each other for good, and
+// hold nearly still.
 #include "support/bodies.h"
 
 namespace meshless {
 namespace {
 
-constexpr int kSettling = 60, kSteps = 150;
+constexpr int kSettling = 60, kSteps = 240;
+// [J] of 1.5 kg: 0.16 m/s. Contact of now leaves them shivering, at 0.01 J for some steps: they are not at rest, and
+// this is no more than that they do not gain.
+constexpr double kShiver = 0.02;
 
 void pullTogether(double stiffness) {
   World world{WorldSettings()};
@@ -48,7 +51,7 @@ void pullTogether(double stiffness) {
       ASSERT_TRUE(test::allFinite(body.particles)) << k;
       kinetic += body.measures.kinetic_energy;
     }
-    ASSERT_LT(kinetic, 0.1) << k;  // [J] of 1.5 kg: 0.4 m/s
+    ASSERT_LT(kinetic, kShiver) << k;
   }
 }
 

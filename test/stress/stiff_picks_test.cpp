@@ -8,9 +8,11 @@ namespace meshless::stress {
 namespace {
 
 constexpr int kDragged = 60, kHeld = 60, kFree = 180;  // steps
-// [J] of 6 kg, kinetic. A jump of a metre stores 5e5 J in the softest of the springs, and what they have drawn out to
-// 80 m holds as much; up to 6e6 J was seen. Where rods are thrown by contacts it is 1e12 to 1e28 J.
-constexpr double kMostEnergy = 2e7;
+// [J] kinetic. All three blocks (6 kg) as fast as the target's longest jump (1.73 m) within a step have 1.3e5 J: what a
+// rod drags has no more. 6e4 J was seen at the most.
+constexpr double kMostDragged = 1.3e5;
+// [J] kinetic, of 2 kg that are pulled by 0.57 m within a step: 4.7e3 J. Contact of now adds to it, up to 1.0e4 J.
+constexpr double kMostPulled = 4.7e3, kMostPulledInContact = 1.2e4;
 
 struct Rod {
   std::string name;
@@ -61,7 +63,7 @@ TEST_P(StiffPicks, DoNotThrow) {
       energy += deformationEnergy(*body.model, body.material, 1.0 / settings.step_rate, body.particles);
     }
     energy += kinetic;
-    ASSERT_LT(kinetic, kMostEnergy) << "step " << step;
+    ASSERT_LT(kinetic, kMostDragged) << "step " << step;
     if (step == kDragged + kHeld) dragged = energy;
     if (step > kDragged + kHeld) most = std::max(most, energy);
   }
@@ -109,7 +111,8 @@ TEST_P(HeldInTheGround, AreNotThrown) {
   twins.attempt(LockCommand{rod, Vec3(0.3, 0.3, -0.55)});
   for (int step = 0; step < 60; ++step) {
     ASSERT_TRUE(twins.step(Vec3::Zero(), 1e3));
-    ASSERT_LT(twins.seen().bodies[0].measures.kinetic_energy, kMostEnergy) << "step " << step;
+    ASSERT_LT(twins.seen().bodies[0].measures.kinetic_energy, held.contact ? kMostPulledInContact : kMostPulled)
+        << "step " << step;
   }
 }
 

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "meshless_surgery/contact/contacts.h"
+#include "meshless_surgery/dynamics/rotation.h"
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/world/quadratic_fit.h"
 #include "support/bodies.h"
@@ -233,10 +234,19 @@ TEST(ContactGeometry, BodiesThatWereTurnedInsideOutStayFiniteAndPart) {
   }
 }
 
+/// By how much a body is turned out of its upright rest shape [rad].
+double tiltOf(const BodySnapshot& body) {
+  Mat3 a = Mat3::Zero();
+  for (std::size_t i = 0; i < body.particles.size(); ++i)
+    a += body.model->masses[i] * (body.particles[i] - body.measures.centre_of_mass) * body.model->rest[i].transpose();
+  const Vec3 up = nearestRotationExact(a, Quat::Identity()).rotation * Vec3::UnitZ();
+  return std::atan2(up.head<2>().norm(), up.z());
+}
+
 // Edge on edge and side along side: samples of the upper one lie exactly in the planes of the lower one's sides, and
 // those sides are as near to them as its top is.
 TEST(ContactGeometry, CubesStackedExactlyAlongEachOtherStand) {
-  for (const double alpha : {0.99, 1.0}) {
+  for (const double alpha : {0.9, 0.99, 1.0}) {
     WorldSettings settings;
     settings.sleep = false;
     World world(settings);
@@ -246,19 +256,30 @@ TEST(ContactGeometry, CubesStackedExactlyAlongEachOtherStand) {
       def.material.damping = 5.0;
       ASSERT_TRUE(world.addSceneBody(test::shared(def)).ok());
     }
+    // Soft ones wobble: contact of now cannot do better, and they should be held as still as the others.
+    const double way = alpha < 0.99 ? 0.05 : 0.002, tilt = alpha < 0.99 ? 0.02 : 0.005;
+    std::vector<Vec3> settled;  // [m] their centres, after a second
     for (int step = 0; step < 1200; ++step) {
       world.step();
       if (step % 10) continue;
       const WorldSnapshot shot = seen(world);
       for (int k = 0; k + 1 < 3; ++k) {
-        double low = 1.0, top = 0.0;
-        for (const Vec3& p : shot.bodies[k + 1].particles) low = std::min(low, p.z());
-        for (const Vec3& p : shot.bodies[k].particles) top = std::max(top, p.z());
-        EXPECT_GT(low, top - 0.02 * 0.1) << "cube " << k << " at alpha " << alpha << ": deep, or it rocks";
-        EXPECT_LT(deepestIn(shot.bodies[k + 1], shot.bodies[k]), 0.01 * 0.1);
-        EXPECT_LT(deepestIn(shot.bodies[k], shot.bodies[k + 1]), 0.01 * 0.1);
+        const double deep =
+            std::max(deepestIn(shot.bodies[k + 1], shot.bodies[k]), deepestIn(shot.bodies[k], shot.bodies[k + 1]));
+        EXPECT_LT(deep, (step < 120 ? 0.005 : 0.002) * 0.1)
+            << "cube " << k << " at alpha " << alpha << ", step " << step;
       }
-      EXPECT_GT(shot.bodies[2].measures.centre_of_mass.z(), 0.99 * 0.25) << alpha;
+      // Soft ones are pressed flatter by those on them, and then stay so: they neither sink, nor walk, nor rock.
+      for (int k = 0; k < 3; ++k) {
+        const BodySnapshot& cube = shot.bodies[k];
+        const Vec3 centre = cube.measures.centre_of_mass;
+        if (step == 120) settled.push_back(centre);
+        if (step >= 120)
+          EXPECT_LT((centre - settled[k]).norm(), way * 0.1)
+              << "cube " << k << " at alpha " << alpha << ", step " << step;
+        EXPECT_LT(tiltOf(cube), tilt) << "cube " << k << " at alpha " << alpha << ", step " << step;
+      }
+      EXPECT_GT(shot.bodies[2].measures.centre_of_mass.z(), (alpha < 0.99 ? 0.96 : 0.99) * 0.25) << alpha;
     }
   }
 }
