@@ -36,7 +36,7 @@ bool Publishers::Cadence::due(Clock::time_point now) {
 }
 
 Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings& settings, WorldRunner& runner,
-                       const ToolInputs& tools, const Rejections& rejections)
+                       const StreamedTools& tools, const Rejections& rejections)
     : settings_(settings),
       runner_(runner),
       tools_(tools),

@@ -13,20 +13,17 @@ using SteadyClock = std::chrono::steady_clock;
 double wallSeconds() { return std::chrono::duration<double>(SteadyClock::now().time_since_epoch()).count(); }
 
 constexpr double kWindow = 1.0;           // [s] that rates are taken over
-constexpr double kPollClock = 1e-3;       // [s] of wall time between looks at a clock that is not steady
 constexpr double kOverBudgetEvery = 1.0;  // [s] between two events
 
 Error stoppedError() { return {ErrorCode::kFailed, "the node is shutting down"}; }
 
 }  // namespace
 
-PaceClock PaceClock::wall() { return {wallSeconds, true}; }
-
-WorldRunner::WorldRunner(std::unique_ptr<World> world, const RunnerSettings& settings, PaceClock clock)
+WorldRunner::WorldRunner(std::unique_ptr<World> world, const RunnerSettings& settings, const Clock& clock)
     : world_(std::move(world)),
       dt_(1.0 / world_->settings().step_rate),
       settings_(settings),
-      clock_(std::move(clock)),
+      clock_(clock),
       paused_(settings.paused),
       world_settings_(world_->settings()) {
   status_.paused = paused_;
@@ -241,8 +238,7 @@ void WorldRunner::loop() {
       continue;
     }
     double now = clock_.now();
-    // A clock that was set back must not stop the world for the time between.
-    if (fresh_pace_ || due > now + 2.0 * dt_) due = now;
+    if (fresh_pace_) due = now;
     fresh_pace_ = false;
     if (now < due) {
       sleepUntil(due);
@@ -344,7 +340,7 @@ void WorldRunner::handOverEvents() {
 
 void WorldRunner::sleepUntil(double due) {
   std::unique_lock<std::mutex> lock(jobs_mutex_);
-  const double wait = clock_.steady ? due - clock_.now() : kPollClock;
+  const double wait = clock_.wallUntil(due);
   if (!(wait > 0.0)) return;
   jobs_changed_.wait_for(lock, std::chrono::duration<double>(wait), [this] { return stopping_ || !jobs_.empty(); });
 }

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include <diagnostic_updater/diagnostic_updater.h>
+#include <geometry_msgs/PoseStamped.h>
 #include <ros/node_handle.h>
 #include <tf2_ros/transform_broadcaster.h>
 
@@ -16,14 +17,14 @@
 #include "meshless_surgery/ros/rejections.h"
 #include "meshless_surgery/ros/runner.h"
 #include "meshless_surgery/ros/settings.h"
-#include "meshless_surgery/ros/tool_inputs.h"
+#include "meshless_surgery/ros/streamed_tools.h"
 
 namespace meshless {
 
 class Publishers {
  public:
   Publishers(const ros::NodeHandle& private_handle, const NodeSettings& settings, WorldRunner& runner,
-             const ToolInputs& tools, const Rejections& rejections);
+             const StreamedTools& tools, const Rejections& rejections);
   ~Publishers();
   void start();
   void stop();
@@ -50,7 +51,7 @@ class Publishers {
 
   NodeSettings settings_;
   WorldRunner& runner_;
-  const ToolInputs& tools_;
+  const StreamedTools& tools_;
   const Rejections& rejections_;
   MarkerBuilder markers_;
 

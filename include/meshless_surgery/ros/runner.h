@@ -9,18 +9,10 @@
 #include <mutex>
 #include <thread>
 
+#include "meshless_surgery/ros/clock.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless {
-
-/// What steps are paced by. `steady` says that waiting for it takes as long as on a wall clock; another clock (a
-/// simulator's, which may stand still) is polled.
-struct PaceClock {
-  std::function<double()> now;  // [s]
-  bool steady = true;
-
-  static PaceClock wall();
-};
 
 struct RunnerSettings {
   bool paused = false;       // at the start
@@ -44,7 +36,8 @@ class WorldRunner {
   static constexpr int kMostClosing = 16;  // cuts that wait for their blades at once
   using EventSink = std::function<void(std::vector<Event>)>;
 
-  WorldRunner(std::unique_ptr<World> world, const RunnerSettings& settings, PaceClock clock = PaceClock::wall());
+  /// Steps are paced by `clock`, which outlives it; what they cost is measured on the wall.
+  WorldRunner(std::unique_ptr<World> world, const RunnerSettings& settings, const Clock& clock);
   ~WorldRunner();
   WorldRunner(const WorldRunner&) = delete;
   WorldRunner& operator=(const WorldRunner&) = delete;
@@ -120,7 +113,7 @@ class WorldRunner {
   std::unique_ptr<World> world_;
   double dt_;  // [s]
   RunnerSettings settings_;
-  PaceClock clock_;
+  const Clock& clock_;
   EventSink event_sink_;
   StepSink step_sink_;
 
