@@ -94,6 +94,20 @@ TEST(StreamedTools, AJumpIsMadeAtABoundedSpeed) {
   }
 }
 
+TEST(StreamedTools, AToolGoesOnToWhereItsStreamLastWantedIt) {
+  for (const std::size_t tool : {kPick, kScissors}) {
+    ToolBench bench(slowTools());
+    const Vec3 start = tool == kPick ? bench.pick().position : Vec3(0, 0, 1.0);
+    const Vec3 end = start + Vec3(0, 0, 0.15);  // 0.3 s away
+    ASSERT_TRUE(bench.tools.hear(static_cast<ToolKind>(tool), poseAt(start), 0.0).ok());
+    bench.run(0.01);
+    ASSERT_TRUE(bench.tools.hear(static_cast<ToolKind>(tool), poseAt(end), 0.0).ok());
+    bench.run(0.35);
+    const Vec3 place = tool == kPick ? bench.world->heldPick()->target : bench.world->scissors().blades.origin;
+    EXPECT_LT((place - end).norm(), 1e-9) << tool;
+  }
+}
+
 TEST(StreamedTools, AGapInAStreamIsNoLeaveToJump) {
   ToolBench bench(slowTools());
   const Vec3 start = bench.pick().position;

@@ -35,6 +35,8 @@ class ToolBench {
   PerTool<Hand> hands;
   /// The whole node stands still: what streams say meanwhile waits in their queues.
   std::function<bool(double)> stands_still = [](double) { return false; };
+  /// Those alone who say the forces.
+  std::function<bool(double)> forces_stand_still = [](double) { return false; };
 
   const NodeSettings settings;
   HandClock hand_clock;
@@ -110,8 +112,11 @@ class ToolBench {
       const auto hand = tools.hand(tool);
       return hand ? std::optional<Vec3>(hand->translation) : std::nullopt;
     };
-    while (auto tick = forces_.next(now(), {place(ToolKind::kPick), place(ToolKind::kPush), std::nullopt}))
+    while (!forces_stand_still(time)) {
+      auto tick = forces_.next(now(), {place(ToolKind::kPick), place(ToolKind::kPush), std::nullopt});
+      if (!tick) break;
       ticks.push_back(std::move(*tick));
+    }
     after_each(time);
   }
   static bool isDue(double& last, double period, double time) {
