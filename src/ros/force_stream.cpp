@@ -1,11 +1,12 @@
 #include "meshless_surgery/ros/force_stream.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace meshless {
 namespace {
 
-constexpr double kHole = 2.0;             // ticks without a word are a hole ...
+constexpr double kHole = 2.0;             // more ticks than that due at once are a hole ...
 constexpr double kLateStep = 3.0;         // ... and so many steps without one
 constexpr double kStiffestPush = 5000.0;  // [N/m] of tissue under the sphere
 
@@ -52,8 +53,9 @@ void ForceStream::bridge(double from, double length) {
 std::optional<ForceStream::Tick> ForceStream::next(double now, const PerTool<std::optional<Vec3>>& hands) {
   if (now < next_) return std::nullopt;
   next_ = std::max(next_, now - kMostLate);
-  if (now - woke_ > kHole * period_) bridge(next_, now - woke_);
-  woke_ = now;
+  // The last of those that are due is the first that is not bridged: a clock may be told in steps of many ticks.
+  const double said = next_ - period_, due = std::floor((now - said) / period_);
+  if (due > kHole) bridge(said, (due - 0.5) * period_);
   Tick tick;
   tick.time = next_;
   for (std::size_t t = 0; t < tools_.size(); ++t) {

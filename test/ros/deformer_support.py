@@ -281,9 +281,9 @@ class InStepTestCase(DeformerTestCase):
         self.good('pause', data=paused)
         self.runs_since = None if paused else (self.clock.now, self.state().step)
 
-    def advance(self, seconds=PERIOD):
-        """The state once that time has passed, and all that was due by then is done."""
-        self.clock.advance(seconds)
+    def advance(self, seconds=None):
+        """The state once that time (or PERIOD) has passed, and all that was due by then is done."""
+        self.clock.advance(self.PERIOD if seconds is None else seconds)
         now = self.clock.stamp()
         steps = 0
         if self.runs_since:

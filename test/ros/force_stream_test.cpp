@@ -134,14 +134,19 @@ TEST(ForceStream, WhoStoodStillMakesNoJumpOfIt) {
     }
 }
 
-// A clock that is told in steps of 10 ms, as a bag's is: each tick has its own time.
-TEST(ForceStream, ACoarseClockMakesNoHolesInTheStamps) {
+// A clock that is told in steps of 10 ms, as a bag's is: each tick has its own time, and what is zero is exactly so.
+TEST(ForceStream, ACoarseClockMakesNoHoles) {
   ForceStream stream(0.002);
   stream.begin(0.0);
   std::vector<double> times;
   for (int i = 0; i <= 100; ++i) {
-    stream.stepped({ForceModel::Step{true, 1, true, Vec3(1, 0, 0), Vec3::Zero(), 100.0, 1.0}, {}, {}}, 0.01, 0.01 * i);
-    while (const auto tick = stream.next(0.01 * i, {})) times.push_back(tick->time);
+    const Vec3 force = i < 50 ? Vec3(1, 0, 0) : Vec3::Zero();
+    stream.stepped({ForceModel::Step{true, 1, true, force, Vec3::Zero(), 100.0, 1.0}, {}, {}}, 0.01, 0.01 * i);
+    while (const auto tick = stream.next(0.01 * i, {})) {
+      times.push_back(tick->time);
+      if (i > 2 && i < 50) EXPECT_EQ(*tick->forces[kPick], Vec3(1, 0, 0)) << tick->time;
+      if (i > 53) EXPECT_EQ(*tick->forces[kPick], Vec3::Zero()) << tick->time;
+    }
   }
   ASSERT_GT(times.size(), 490u);
   for (std::size_t i = 1; i < times.size(); ++i) EXPECT_NEAR(times[i] - times[i - 1], 0.002, 1e-9);

@@ -13,7 +13,7 @@ from geometry_msgs.msg import PoseStamped, WrenchStamped
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from deformer_support import LONG, DeformerTestCase, InStepTestCase, pose_stamped, run  # noqa: E402
 
-PERIOD = 0.002     # [s] of measured_cf
+PERIOD = 0.002     # [s] of measured_cf, and of the hand's messages
 
 
 def force(message):
@@ -31,6 +31,7 @@ def spacing(messages):
 
 
 class ForcesTest(InStepTestCase):
+    PERIOD = PERIOD
 
     def setUp(self):
         super().setUp()
@@ -39,7 +40,7 @@ class ForcesTest(InStepTestCase):
     def record_forces(self, tool):
         self.forces = self.record(tool + '/measured_cf', WrenchStamped)
 
-    def advance(self, seconds=InStepTestCase.PERIOD):
+    def advance(self, seconds=None):
         state = super().advance(seconds)
         if getattr(self, 'forces', None) and self.forces.count():
             last = self.clock.stamp() - rospy.Duration(PERIOD + 1e-6)
@@ -56,12 +57,12 @@ class ForcesTest(InStepTestCase):
         picked = self.pick_left()
         start = picked.position
         self.record_forces('pick')
-        self.say('pick/servo_cp', [pose_stamped(start.x, start.y, start.z) for _ in range(60)])
+        self.say('pick/servo_cp', [pose_stamped(start.x, start.y, start.z) for _ in range(150)])
         since = self.forces.count()
-        self.say('pick/servo_cp', [pose_stamped(start.x, start.y + 0.01 * (1.0 - math.cos(2 * math.pi * 2 * i / 200)), start.z)
-                                   for i in range(400)])
+        self.say('pick/servo_cp', [pose_stamped(start.x, start.y + 0.01 * (1.0 - math.cos(2 * math.pi * 2 * i * PERIOD)), start.z)
+                                   for i in range(1000)])
         messages = self.forces.messages[since:]
-        self.assert_even(messages, 400 * self.PERIOD)
+        self.assert_even(messages, 1000 * PERIOD)
         values = [m.wrench.force.y for m in messages]
         self.assertLess(min(values), -0.5)
         # Smooth: no part of a way that takes the hand many ticks is felt in one.
@@ -72,20 +73,20 @@ class ForcesTest(InStepTestCase):
         self.assertGreater(slopes, 3 * 2.0 * self.step_rate if self.step_rate < 60 else 2.0 * 2.0 * self.step_rate)
         # Let go: zero, and then nothing but the hand in the air.
         self.good('release', pick_id=picked.pick_id)
-        self.say('pick/servo_cp', [pose_stamped(start.x, start.y, start.z) for _ in range(100)])
+        self.say('pick/servo_cp', [pose_stamped(start.x, start.y, start.z) for _ in range(200)])
         self.assertEqual([0.0] * 50, [force(m) for m in self.forces.messages[-50:]])
 
     def test_a_press_is_felt_from_the_touch_to_the_parting(self):
         self.good('lock', pick_id=self.pick_left().pick_id)  # of the far side: the box stays
         self.record_forces('push')
         self.good('push', enable=True, radius=0.03, pose=pose_stamped(-0.30, 0.0, 0.1))
-        self.say('push/servo_cp', [pose_stamped(-0.30, 0.0, 0.1) for _ in range(60)])
+        self.say('push/servo_cp', [pose_stamped(-0.30, 0.0, 0.1) for _ in range(100)])
         in_air = self.forces.count()
         self.assertEqual([0.0] * in_air, [force(m) for m in self.forces.messages[:in_air]])
-        self.say('push/servo_cp', [pose_stamped(-0.30 + 0.06 * math.sin(math.pi * min(1.0, i / 200)), 0.0, 0.1)
-                                   for i in range(280)])
+        self.say('push/servo_cp', [pose_stamped(-0.30 + 0.06 * math.sin(math.pi * min(1.0, i * PERIOD)), 0.0, 0.1)
+                                   for i in range(700)])
         messages = self.forces.messages[in_air:]
-        self.assert_even(messages, 280 * self.PERIOD)
+        self.assert_even(messages, 700 * PERIOD)
         values = [m.wrench.force.x for m in messages]
         self.assertLess(min(values), -0.2, 'the sphere felt nothing')
         # It never pulls, is smooth, and zero when free.

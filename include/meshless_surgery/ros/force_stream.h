@@ -29,7 +29,7 @@ class ForceStream {
   void stepped(const PerTool<ForceModel::Step>& steps, double dt, double now);
 
   /// Ticks begin now.
-  void begin(double now) { next_ = woke_ = now; }
+  void begin(double now) { next_ = now; }
   /// When the next tick is due.
   double due() const { return next_; }
   struct Tick {
@@ -50,7 +50,7 @@ class ForceStream {
 
   const double period_;  // [s]
   PerTool<Tool> tools_;
-  double next_ = 0.0, woke_ = 0.0, stepped_at_ = 0.0;
+  double next_ = 0.0, stepped_at_ = 0.0;
 };
 
 }  // namespace meshless
