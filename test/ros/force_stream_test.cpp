@@ -57,6 +57,7 @@ TEST(ForceStream, APullIsFeltEvenlyAndBetweenSteps) {
     int slopes = 0;
     for (std::size_t i = 2; i < pull.values.size(); ++i)
       slopes += std::abs(pull.values[i] - 2.0 * pull.values[i - 1] + pull.values[i - 2]) > 1e-9;
+    std::printf("%g Hz: %d slopes of %zu\n", rate, slopes, pull.values.size());
     EXPECT_GT(slopes, (rate < 60.0 ? 3.0 : 2.0) * 2.0 * rate) << rate;
     // Let go: zero, and then nothing but the hand in the air.
     ASSERT_TRUE(bench.world->apply(Command(ReleaseCommand{picked.pick})).ok());
