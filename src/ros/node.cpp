@@ -155,13 +155,14 @@ DeformerNode::~DeformerNode() = default;
 
 Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle& private_handle) {
   std::vector<std::string> unknown;
-  const auto settings = readNodeSettings(private_handle, unknown);
+  auto settings = readNodeSettings(private_handle, unknown);
   if (!settings.ok()) return settings.error();
   for (const std::string& name : unknown) ROS_WARN_STREAM("parameter ~" << name << " is not known, and not used");
 
   const std::string package_folder = ros::package::getPath(kPackage);
   const auto file = sceneFile(settings->scene, package_folder);
   if (!file.ok()) return file.error();
+  settings->scene = *file;
   const std::string scene_folder = folderOf(*file);
 
   FileAccess access;

@@ -144,6 +144,7 @@ Result<std::uint64_t> WorldRunner::setPaused(bool paused) {
         fresh_pace_ = fresh_pace_ || (paused_ && !paused);
         paused_ = paused;
         step = world.stepCount();
+        if (!paused) mended();
         const std::lock_guard<std::mutex> lock(status_mutex_);
         status_.paused = paused;
       },
@@ -158,6 +159,7 @@ Status WorldRunner::reset() {
         world.reset();
         answerCuts();
         giveUp("the world was reset meanwhile");
+        mended();
         fresh_pace_ = true;
       },
       true);
@@ -169,6 +171,7 @@ Status WorldRunner::restore(std::shared_ptr<const SavedWorld> saved, const Job& 
         world.restore(*saved);
         answerCuts();
         giveUp("another state was loaded meanwhile");
+        mended();
         fresh_pace_ = true;
         dt_ = 1.0 / world.settings().step_rate;
         {
@@ -299,11 +302,12 @@ void WorldRunner::stepOnce() {
   const double before = wallSeconds();
   try {
     world_->step();
+    ++revision_;
+    if (step_sink_) step_sink_(*world_, dt_);
   } catch (const std::exception& e) {
+    ++revision_;
     fail(e.what());
   }
-  ++revision_;
-  if (step_sink_) step_sink_(*world_, dt_);
   record(wallSeconds() - before);
   answerCuts();
 }
@@ -353,13 +357,19 @@ void WorldRunner::record(double step_time) {
   while (samples_.front().wall < now - kWindow) samples_.pop_front();
 }
 
+void WorldRunner::mended() {
+  const std::lock_guard<std::mutex> lock(status_mutex_);
+  status_.fault.clear();
+}
+
 void WorldRunner::fail(const std::string& what) {
   paused_ = true;
+  const std::string why = "a step failed (" + what + "); the world is paused";
   {
     const std::lock_guard<std::mutex> lock(status_mutex_);
     status_.paused = true;
+    status_.fault = why;
   }
-  const std::string why = "a step failed (" + what + "); the world is paused";
   giveUp(why);
   Event event;
   event.type = EventType::kFault;

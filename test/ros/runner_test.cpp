@@ -1,5 +1,8 @@
 #include "meshless_surgery/ros/runner.h"
 
+#include <diagnostic_updater/DiagnosticStatusWrapper.h>
+
+#include "meshless_surgery/ros/publishers.h"
 #include "ros/hand_clock.h"
 #include "ros/scene_support.h"
 
@@ -207,6 +210,50 @@ TEST(Runner, TheRevisionTellsWhetherSomethingMayHaveChanged) {
   EXPECT_EQ(start + 1, runner.revision());
   ASSERT_TRUE(runner.doSteps(3).ok());
   EXPECT_EQ(start + 4, runner.revision());
+}
+
+TEST(Runner, AStepThatFailsPausesTheWorldAndSaysWhyUntilItRunsAgain) {
+  WorldRunner runner(twoBoxes(), pausedAtStart(), wallClock());
+  std::atomic<bool> broken{true};
+  runner.setStepSink([&](const World&, double dt) {
+    if (dt > 0.0 && broken) throw std::runtime_error("a broken part");
+  });
+  std::mutex mutex;
+  std::vector<Event> events;
+  runner.setEventSink([&](std::vector<Event> some) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    events.insert(events.end(), some.begin(), some.end());
+  });
+  runner.start();
+  const auto summary = [&] {
+    diagnostic_updater::DiagnosticStatusWrapper status;
+    summarize(runner.status(), 0, status);
+    return std::pair<int, std::string>(status.level, status.message);
+  };
+  const std::pair<int, std::string> paused{diagnostic_msgs::DiagnosticStatus::OK, "paused"};
+  EXPECT_EQ(paused, summary());
+  const auto fail = [&] {
+    broken = true;
+    EXPECT_TRUE(runner.setPaused(false).ok());
+    waitUntil([&] { return runner.status().paused; });
+    EXPECT_EQ(diagnostic_msgs::DiagnosticStatus::ERROR, summary().first);
+    EXPECT_NE(std::string::npos, summary().second.find("a broken part")) << summary().second;
+    broken = false;
+  };
+  fail();
+  ASSERT_TRUE(runner.setPaused(true).ok());  // mends nothing
+  EXPECT_EQ(diagnostic_msgs::DiagnosticStatus::ERROR, summary().first);
+  {
+    const std::lock_guard<std::mutex> lock(mutex);
+    EXPECT_TRUE(std::any_of(events.begin(), events.end(), [](const Event& e) { return e.type == EventType::kFault; }));
+  }
+  ASSERT_TRUE(runner.setPaused(false).ok());
+  EXPECT_EQ("", runner.status().fault);
+  ASSERT_TRUE(runner.setPaused(true).ok());
+  EXPECT_EQ(paused, summary());
+  fail();
+  ASSERT_TRUE(runner.reset().ok());
+  EXPECT_EQ(paused, summary());
 }
 
 TEST(Runner, StepsThatTakeLongerThanTheySimulateAreReported) {

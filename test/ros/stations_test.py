@@ -1,9 +1,13 @@
 #!/usr/bin/env python3
 """Two stations in two namespaces do not see each other's worlds."""
 import os
+import signal
 import sys
+import time
 import unittest
+from xmlrpc.client import ServerProxy
 
+import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from meshless_surgery.msg import State
@@ -56,5 +60,17 @@ class StationsTest(unittest.TestCase):
         heard.close()
 
 
+class DeadStationTest(unittest.TestCase):
+    """After the others: one station's node dies."""
+
+    def test_the_others_go_on(self):
+        dead, alive = Deformer('/station2/deformer'), Deformer('/station1/deformer')
+        pid = ServerProxy(rosgraph.Master('/test').lookupNode(dead.node)).getPid('/test')[2]
+        os.kill(pid, signal.SIGKILL)
+        for _ in range(50):  # roslaunch looks ten times a second, and would end this test too
+            time.sleep(0.1)
+            self.assertTrue(alive.call('step', steps=1).success)
+
+
 if __name__ == '__main__':
-    run('stations', StationsTest)
+    run('stations', StationsTest, DeadStationTest)

@@ -21,6 +21,7 @@ struct RunnerSettings {
 
 struct RunnerStatus {
   bool paused = false;
+  std::string fault;              // why a step that failed has paused the world; empty: it did not, or runs again
   std::uint64_t steps = 0;        // done by this runner, over resets
   double step_rate = 0.0;         // [Hz] done, last second
   double real_time_factor = 0.0;  // simulated over wall time, last second
@@ -45,7 +46,7 @@ class WorldRunner {
   /// Called on the runner's thread: must only put the events aside. To be set before start.
   void setEventSink(EventSink sink) { event_sink_ = std::move(sink); }
   /// Called on the runner's thread after every step, with what it simulated [s], and with 0 after every job that may
-  /// have changed the world: must be quick. To be set before start.
+  /// have changed the world: must be quick. A step fails where it throws. To be set before start.
   using StepSink = std::function<void(const World&, double)>;
   void setStepSink(StepSink sink) { step_sink_ = std::move(sink); }
   void start();
@@ -109,6 +110,7 @@ class WorldRunner {
   void sleepUntil(double due);
   void record(double step_time);
   void fail(const std::string& what);
+  void mended();
 
   std::unique_ptr<World> world_;
   double dt_;  // [s]
