@@ -5,6 +5,8 @@ find_package(roslib REQUIRED)
 target_include_directories(${PROJECT_NAME}_ros SYSTEM PRIVATE ${roslib_INCLUDE_DIRS})
 target_link_libraries(${PROJECT_NAME}_ros PRIVATE ${roslib_LIBRARIES})
 
+target_compile_definitions(${PROJECT_NAME}_ros PRIVATE MESHLESS_SURGERY_VERSION="${${PROJECT_NAME}_VERSION}")
+
 target_include_directories(deformer_node PRIVATE include)
 
 # --- install

@@ -5,25 +5,31 @@
     pick = surgeon.pick((0, 0, 0.1))
     surgeon.lock(pick.pick_id, (0, 0, 0.2))
 
-A method whose service answers success=false raises Refused with the service's message. Metres, seconds, radians.
+A method whose service answers success=false raises Refused with the service's message. What changes something is sent once:
+where the connection breaks before the answer it raises Unanswered, which says how the world is now. Metres, seconds, radians.
 """
 
 import argparse
 import contextlib
 import math
+import select
 import sys
 
 import rospy
 from geometry_msgs.msg import Point, PoseStamped, Quaternion, Vector3
 from std_srvs.srv import SetBool, Trigger
 
-from meshless_surgery.msg import State
+from meshless_surgery.msg import Info, State
 from meshless_surgery.srv import (Cut, GetBody, Hash, Incise, LoadState, Lock, MovePick, Pick, Push, Release, SaveState,
                                   SetMaterial, Step)
 
 
 class Refused(RuntimeError):
     """A service answered success=false; the text is its message."""
+
+
+class Unanswered(RuntimeError):
+    """A request was sent and not answered: it may have been done, or not. The text says how the world is now."""
 
 
 def quaternion_of_axes(x, y, z):
@@ -71,18 +77,33 @@ class Surgeon:
         self._proxies = {}
 
     def call(self, name, service, /, **fields):
+        if name in self._proxies and self._ended(self._proxies[name]):
+            del self._proxies[name]
         if name not in self._proxies:
             rospy.wait_for_service(self.node + "/" + name, self.timeout)
             self._proxies[name] = rospy.ServiceProxy(self.node + "/" + name, service, persistent=True)
         try:
             reply = self._proxies[name](**fields)
-        except rospy.ServiceException:
-            # A connection may have died meanwhile: once more on a new one.
-            self._proxies[name] = rospy.ServiceProxy(self.node + "/" + name, service, persistent=True)
-            reply = self._proxies[name](**fields)
+        except (rospy.ServiceException, rospy.exceptions.TransportException) as error:
+            del self._proxies[name]
+            raise Unanswered("%s was sent once and not answered (%s); %s" % (name, error, self._now()))
         if not reply.success:
             raise Refused("%s: %s" % (name, reply.message))
         return reply
+
+    @staticmethod
+    def _ended(proxy):
+        """The node has closed the connection since the last answer: nothing but its end can have come."""
+        transport = proxy.transport
+        return transport is not None and (transport.socket is None or bool(select.select([transport.socket], [], [], 0)[0]))
+
+    def _now(self):
+        try:
+            state = self.state()
+        except rospy.ROSException:
+            return "the node does not answer either: does it run?"
+        return "the world is at step %d, with the bodies %s and %d springs" % (
+            state.step, ", ".join(body.name for body in state.bodies) or "none", len(state.picks))
 
     # springs
     def pick(self, point, direction=(0, 0, 0), body="", stiffness=0.0, max_distance=0.0):
@@ -138,6 +159,10 @@ class Surgeon:
     def state(self):
         return rospy.wait_for_message(self.node + "/state", State, self.timeout)
 
+    def info(self):
+        """What runs there: scene, step rate, bodies."""
+        return rospy.wait_for_message(self.node + "/info", Info, self.timeout)
+
     def pause(self, paused=True):
         return self.call("pause", SetBool, data=paused)
 
@@ -171,7 +196,7 @@ class Surgeon:
         """Lets simulated time pass: while the world runs, by waiting for it; while it is paused, by stepping it."""
         start = self.state()
         if self._paused:
-            self.step(max(1, int(round(seconds * (rate or 120)))))
+            self.step(max(1, int(round(seconds * (rate or self.info().step_rate)))))
             return
         while not rospy.is_shutdown():
             if self.state().sim_time - start.sim_time >= seconds:
@@ -218,7 +243,7 @@ class Play:
         """Runs scenario(surgeon, play); returns 0 where everything held."""
         try:
             scenario(self.start(), self)
-        except (Refused, rospy.ROSException, rospy.ServiceException) as error:
+        except (Refused, Unanswered, rospy.ROSException, rospy.ServiceException) as error:
             self.say("  WRONG " + str(error))
             self.failures += 1
         finally:

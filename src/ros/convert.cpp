@@ -158,6 +158,31 @@ meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatu
   return state;
 }
 
+meshless_surgery::Info toInfo(const WorldSnapshot& snapshot, const WorldSettings& settings) {
+  meshless_surgery::Info info;
+  info.step_rate = settings.step_rate;
+  info.substeps = static_cast<std::uint32_t>(settings.substeps);
+  info.max_substeps = static_cast<std::uint32_t>(settings.max_substeps);
+  info.bodies.reserve(snapshot.bodies.size());
+  for (const BodySnapshot& body : snapshot.bodies) {
+    const BodyModel& model = *body.model;
+    meshless_surgery::BodyInfo message;
+    message.name = body.name;
+    message.particles = static_cast<std::uint32_t>(model.rest.size());
+    message.triangles = static_cast<std::uint32_t>(model.surface.triangles.size());
+    message.clusters = static_cast<std::uint32_t>(model.clusters.size());
+    message.spacing = model.spacing;
+    message.mass = model.mass;
+    const auto held = std::count(model.fixed.begin(), model.fixed.end(), true);
+    message.held = model.rest.empty() ? 0.0 : static_cast<double>(held) / static_cast<double>(model.rest.size());
+    message.substeps_needed =
+        static_cast<std::uint32_t>(std::max(1.0, std::ceil(model.highest_frequency / settings.step_rate)));
+    message.stiffness_factor = body.stiffness_factor;
+    info.bodies.push_back(std::move(message));
+  }
+  return info;
+}
+
 meshless_surgery::Event toEvent(const Event& event, const std_msgs::Header& header) {
   meshless_surgery::Event message;
   message.header = header;

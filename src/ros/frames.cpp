@@ -1,5 +1,6 @@
 #include "meshless_surgery/ros/frames.h"
 
+#include <algorithm>
 #include <chrono>
 #include <thread>
 
@@ -56,37 +57,45 @@ Frames::Listener& Frames::listener() {
   return *listener_;
 }
 
-Result<Pose> Frames::toWorld(const std_msgs::Header& header) {
+Result<Pose> Frames::lookUp(const std_msgs::Header& header) {
   const std::string frame = withoutSlash(header.frame_id);
   if (isWorld(frame)) return Pose{};
   Listener& tf = listener();
-  const auto now = SteadyClock::now();
+  std::string why;
+  if (tf.buffer.canTransform(world_frame_, frame, header.stamp, &why)) {
+    try {
+      const Pose pose = toPose(tf.buffer.lookupTransform(world_frame_, frame, header.stamp));
+      if (pose.translation.allFinite() && pose.rotation.coeffs().allFinite()) return pose;
+      why = "its transform is not finite";
+    } catch (const tf2::TransformException& e) {
+      why = e.what();
+    }
+  }
+  return Error{ErrorCode::kUnknownName, "header.frame_id is '" + printable(header.frame_id) +
+                                            "'; accepted: a frame that tf2 can bring to '" + world_frame_ +
+                                            "', or empty for it" + (why.empty() ? "" : " (tf2: " + why + ")")};
+}
+
+SteadyClock::time_point Frames::waitEnd() const {
+  const auto end = SteadyClock::now() + kWait;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return listener_ ? std::max(end, listener_->since + kFirstWait) : SteadyClock::now() + kFirstWait;
+}
+
+Result<Pose> Frames::toWorld(const std_msgs::Header& header) {
   // Each that waits holds a thread that others may need.
   struct Turn {
     std::atomic<int>& count;
     const bool may_wait = ++count <= kMostWaiting;
     ~Turn() { --count; }
   } turn{waiting_};
-  const auto deadline = turn.may_wait ? std::max(now + kWait, tf.since + kFirstWait) : now;
-  std::string why;
+  const auto end = turn.may_wait ? waitEnd() : SteadyClock::now();
   // Waits on the wall clock: a simulated one may stand still.
   while (true) {
-    why.clear();
-    if (tf.buffer.canTransform(world_frame_, frame, header.stamp, &why)) {
-      try {
-        const Pose pose = toPose(tf.buffer.lookupTransform(world_frame_, frame, header.stamp));
-        if (pose.translation.allFinite() && pose.rotation.coeffs().allFinite()) return pose;
-        why = "its transform is not finite";
-      } catch (const tf2::TransformException& e) {
-        why = e.what();
-      }
-    }
-    if (SteadyClock::now() >= deadline || !ros::ok()) break;
+    const auto pose = lookUp(header);
+    if (pose.ok() || SteadyClock::now() >= end || !ros::ok()) return pose;
     std::this_thread::sleep_for(kPoll);
   }
-  return Error{ErrorCode::kUnknownName, "header.frame_id is '" + printable(header.frame_id) +
-                                            "'; accepted: a frame that tf2 can bring to '" + world_frame_ +
-                                            "', or empty for it" + (why.empty() ? "" : " (tf2: " + why + ")")};
 }
 
 std::optional<Frames::Stamped> Frames::latest(const std::string& frame_id) {

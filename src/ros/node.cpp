@@ -17,6 +17,7 @@
 #include "meshless_surgery/ros/publishers.h"
 #include "meshless_surgery/ros/services.h"
 #include "meshless_surgery/ros/session.h"
+#include "meshless_surgery/ros/tool_inputs.h"
 
 namespace meshless {
 namespace {
@@ -114,23 +115,18 @@ SessionSettings sessionSettings(const NodeSettings& settings, const std::string&
   return session;
 }
 
-PaceClock paceClock() {
-  if (!ros::Time::isSimTime()) return PaceClock::wall();
-  return {[] { return ros::Time::now().toSec(); }, false};
-}
-
 }  // namespace
 
 struct DeformerNode::Parts {
   Parts(const ros::NodeHandle& handle, const NodeSettings& settings, std::unique_ptr<World> world, BodyLoader loader_in,
         std::unique_ptr<Session> session_in)
       : session(std::move(session_in)),
-        runner(std::move(world), {settings.paused, settings.max_backlog}, paceClock()),
+        runner(std::move(world), {settings.paused, settings.max_backlog}, clock),
         frames(settings.world_frame),
         loader(std::move(loader_in)),
-        tools(handle, settings, runner, frames, rejections),
-        publishers(handle, settings, runner, tools, rejections),
-        forces(handle, settings, tools) {}
+        inputs(handle, settings, clock, runner, frames, rejections),
+        publishers(handle, settings, runner, inputs.tools(), rejections),
+        forces(handle, settings, clock, inputs.tools()) {}
 
   ~Parts() {
     session->endLog(runner);
@@ -142,12 +138,13 @@ struct DeformerNode::Parts {
     services.reset();
   }
 
+  const Clock clock;  // of all below
   Rejections rejections;
   std::unique_ptr<Session> session;
   WorldRunner runner;
   Frames frames;
   BodyLoader loader;
-  ToolInputs tools;
+  ToolInputs inputs;
   Publishers publishers;
   ForcePublisher forces;
   std::unique_ptr<Services> services;
@@ -158,13 +155,14 @@ DeformerNode::~DeformerNode() = default;
 
 Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle& private_handle) {
   std::vector<std::string> unknown;
-  const auto settings = readNodeSettings(private_handle, unknown);
+  auto settings = readNodeSettings(private_handle, unknown);
   if (!settings.ok()) return settings.error();
   for (const std::string& name : unknown) ROS_WARN_STREAM("parameter ~" << name << " is not known, and not used");
 
   const std::string package_folder = ros::package::getPath(kPackage);
   const auto file = sceneFile(settings->scene, package_folder);
   if (!file.ok()) return file.error();
+  settings->scene = *file;
   const std::string scene_folder = folderOf(*file);
 
   FileAccess access;
@@ -219,24 +217,22 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   if (!log.ok()) return Error{log.error().code, "parameter ~command_log: " + log.error().detail};
   if (!log->empty()) ROS_INFO_STREAM("commands are logged to " << *log);
 
-  auto parts = std::make_unique<Parts>(private_handle, *settings, std::move(world),
-                                       BodyLoader(access, scene_folder, std::move(scene->materials)),
-                                       std::move(session));
+  auto parts =
+      std::make_unique<Parts>(private_handle, *settings, std::move(world),
+                              BodyLoader(access, scene_folder, std::move(scene->materials)), std::move(session));
   parts->runner.setEventSink(
       [publishers = &parts->publishers](std::vector<Event> events) { publishers->queueEvents(std::move(events)); });
-  parts->runner.setStepSink(
-      [forces = &parts->forces, kept = parts->session.get()](const World& world_now, double dt) {
-        forces->changed(world_now, dt);
-        kept->changed(world_now, dt);
-      });
+  parts->runner.setStepSink([forces = &parts->forces, kept = parts->session.get()](const World& world_now, double dt) {
+    forces->changed(world_now, dt);
+    kept->changed(world_now, dt);
+  });
   parts->session->start(parts->runner);
   parts->runner.start();
   parts->publishers.start();
   parts->forces.start();
   // Last, so that who finds them finds a world that runs.
-  parts->services =
-      std::make_unique<Services>(private_handle, parts->runner, parts->frames, parts->loader, parts->rejections,
-                                 *parts->session);
+  parts->services = std::make_unique<Services>(private_handle, parts->runner, parts->frames, parts->loader,
+                                               parts->rejections, *parts->session);
   ROS_INFO_STREAM("scene " << *file << ": " << bodies << " bodies, " << particles << " particles, " << clusters
                            << " clusters, " << scene->world.step_rate << " steps/s of " << scene->world.substeps
                            << " substeps" << (settings->paused ? ", paused" : ""));

@@ -16,6 +16,7 @@ namespace {
 constexpr std::size_t kMaxQueuedEvents = 10000;
 constexpr double kClustersRate = 10.0;  // [Hz]
 constexpr double kContactsRate = 30.0;  // [Hz]
+constexpr double kInfoRate = 5.0;       // [Hz] of looks whether there is news
 constexpr double kBehind = 0.95;        // a real-time factor below it is worth a warning
 
 std::chrono::steady_clock::duration periodOf(double rate) {
@@ -29,6 +30,20 @@ std::string prefixed(const std::string& prefix, const std::string& frame) {
 
 }  // namespace
 
+void summarize(const RunnerStatus& runner, std::uint64_t overruns_before,
+               diagnostic_updater::DiagnosticStatusWrapper& status) {
+  using Level = diagnostic_msgs::DiagnosticStatus;
+  if (!runner.fault.empty()) {
+    status.summary(Level::ERROR, runner.fault);
+  } else if (runner.paused) {
+    status.summary(Level::OK, "paused");
+  } else if (runner.overruns > overruns_before && runner.real_time_factor < kBehind) {
+    status.summary(Level::WARN, "slower than real time");
+  } else {
+    status.summary(Level::OK, "runs");
+  }
+}
+
 bool Publishers::Cadence::due(Clock::time_point now) {
   if (now < next) return false;
   next = std::max(next + period, now);
@@ -36,7 +51,7 @@ bool Publishers::Cadence::due(Clock::time_point now) {
 }
 
 Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings& settings, WorldRunner& runner,
-                       const ToolInputs& tools, const Rejections& rejections)
+                       const StreamedTools& tools, const Rejections& rejections)
     : settings_(settings),
       runner_(runner),
       tools_(tools),
@@ -56,6 +71,7 @@ Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings
       "clusters", 2, [this](const ros::SingleSubscriberPublisher&) { clusters_newcomer_ = true; });
   contacts_topic_ = handle.advertise<visualization_msgs::MarkerArray>(
       "contacts", 2, [this](const ros::SingleSubscriberPublisher&) { contacts_newcomer_ = true; });
+  info_topic_ = handle.advertise<meshless_surgery::Info>("info", 1, true);
   state_topic_ = handle.advertise<meshless_surgery::State>("state", 10);
   events_topic_ = handle.advertise<meshless_surgery::Event>("events", 1000);
   const auto advertiseTool = [&](const std::string& tool) {
@@ -73,6 +89,7 @@ Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings
   contacts_due_.period = periodOf(kContactsRate);
   surfaces_due_.period = periodOf(settings_.surfaces_rate);
   points_due_.period = periodOf(settings_.points_rate);
+  info_due_.period = periodOf(kInfoRate);
   state_due_.period = periodOf(settings_.state_rate);
   tools_due_.period = periodOf(settings_.tools_rate);
   diagnostics_due_.period = std::chrono::seconds(1);
@@ -82,8 +99,8 @@ Publishers::~Publishers() { stop(); }
 
 void Publishers::start() {
   const auto now = Clock::now();
-  for (Cadence* cadence : {&markers_due_, &surfaces_due_, &clusters_due_, &contacts_due_, &points_due_, &state_due_,
-                           &tools_due_, &diagnostics_due_}) {
+  for (Cadence* cadence : {&info_due_, &markers_due_, &surfaces_due_, &clusters_due_, &contacts_due_, &points_due_,
+                           &state_due_, &tools_due_, &diagnostics_due_}) {
     cadence->next = now;
   }
   thread_ = std::thread([this] { loop(); });
@@ -114,8 +131,9 @@ void Publishers::loop() {
   while (true) {
     publishEvents();
     publishTick(Clock::now());
-    const auto next = std::min({markers_due_.next, surfaces_due_.next, clusters_due_.next, contacts_due_.next,
-                                points_due_.next, state_due_.next, tools_due_.next, diagnostics_due_.next});
+    const auto next =
+        std::min({info_due_.next, markers_due_.next, surfaces_due_.next, clusters_due_.next, contacts_due_.next,
+                  points_due_.next, state_due_.next, tools_due_.next, diagnostics_due_.next});
     std::unique_lock<std::mutex> lock(mutex_);
     changed_.wait_until(lock, next, [this] { return stopping_ || !events_.empty(); });
     if (stopping_) return;
@@ -157,7 +175,8 @@ void Publishers::publishTick(Clock::time_point now) {
   contacts = contacts && (contacts_newcomer_.exchange(false) || revision != contacts_revision_);
   const bool state = state_due_.due(now) && state_topic_.getNumSubscribers() > 0;
   const bool tools = tools_due_.due(now);
-  if (!markers && !surfaces && !clusters && !contacts && !points && !state && !tools) return;
+  const bool info = info_due_.due(now) && (revision != info_revision_ || info_.version.empty());
+  if (!info && !markers && !surfaces && !clusters && !contacts && !points && !state && !tools) return;
 
   SnapshotWants wants;
   wants.surfaces = markers || surfaces;
@@ -198,7 +217,23 @@ void Publishers::publishTick(Clock::time_point now) {
     ++states_built_;
     state_topic_.publish(toState(*snapshot, runner_.status(), header));
   }
+  if (info) {
+    info_revision_ = revision;
+    publishInfo(*snapshot, header);
+  }
   if (tools) publishTools(*snapshot, header.stamp);
+}
+
+void Publishers::publishInfo(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
+  meshless_surgery::Info info = toInfo(snapshot, runner_.worldSettings());
+  info.scene = settings_.scene;
+  info.version = MESHLESS_SURGERY_VERSION;
+  info.world_frame = settings_.world_frame;
+  info.header = info_.header;
+  if (info == info_) return;
+  info.header = header;
+  info_ = info;
+  info_topic_.publish(info_);
 }
 
 void Publishers::publishSurfaces(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
@@ -258,15 +293,8 @@ void Publishers::publishTool(const ros::Publisher& topic, const std::string& fra
 void Publishers::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   const RunnerStatus runner = runner_.status();
   const Rejections::Summary rejected = rejections_.summary();
-  const bool overrun = runner.overruns > diagnosed_overruns_ && runner.real_time_factor < kBehind && !runner.paused;
+  summarize(runner, diagnosed_overruns_, status);
   diagnosed_overruns_ = runner.overruns;
-  if (runner.paused) {
-    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "paused");
-  } else if (overrun) {
-    status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "slower than real time");
-  } else {
-    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "runs");
-  }
   status.add("steps", runner.steps);
   status.add("step rate wanted [Hz]", formatNumber(runner_.worldSettings().step_rate));
   status.add("step rate [Hz]", formatNumber(runner.step_rate));

@@ -13,20 +13,17 @@ using SteadyClock = std::chrono::steady_clock;
 double wallSeconds() { return std::chrono::duration<double>(SteadyClock::now().time_since_epoch()).count(); }
 
 constexpr double kWindow = 1.0;           // [s] that rates are taken over
-constexpr double kPollClock = 1e-3;       // [s] of wall time between looks at a clock that is not steady
 constexpr double kOverBudgetEvery = 1.0;  // [s] between two events
 
 Error stoppedError() { return {ErrorCode::kFailed, "the node is shutting down"}; }
 
 }  // namespace
 
-PaceClock PaceClock::wall() { return {wallSeconds, true}; }
-
-WorldRunner::WorldRunner(std::unique_ptr<World> world, const RunnerSettings& settings, PaceClock clock)
+WorldRunner::WorldRunner(std::unique_ptr<World> world, const RunnerSettings& settings, const Clock& clock)
     : world_(std::move(world)),
       dt_(1.0 / world_->settings().step_rate),
       settings_(settings),
-      clock_(std::move(clock)),
+      clock_(clock),
       paused_(settings.paused),
       world_settings_(world_->settings()) {
   status_.paused = paused_;
@@ -147,6 +144,7 @@ Result<std::uint64_t> WorldRunner::setPaused(bool paused) {
         fresh_pace_ = fresh_pace_ || (paused_ && !paused);
         paused_ = paused;
         step = world.stepCount();
+        if (!paused) mended();
         const std::lock_guard<std::mutex> lock(status_mutex_);
         status_.paused = paused;
       },
@@ -161,6 +159,7 @@ Status WorldRunner::reset() {
         world.reset();
         answerCuts();
         giveUp("the world was reset meanwhile");
+        mended();
         fresh_pace_ = true;
       },
       true);
@@ -172,6 +171,7 @@ Status WorldRunner::restore(std::shared_ptr<const SavedWorld> saved, const Job& 
         world.restore(*saved);
         answerCuts();
         giveUp("another state was loaded meanwhile");
+        mended();
         fresh_pace_ = true;
         dt_ = 1.0 / world.settings().step_rate;
         {
@@ -241,8 +241,7 @@ void WorldRunner::loop() {
       continue;
     }
     double now = clock_.now();
-    // A clock that was set back must not stop the world for the time between.
-    if (fresh_pace_ || due > now + 2.0 * dt_) due = now;
+    if (fresh_pace_) due = now;
     fresh_pace_ = false;
     if (now < due) {
       sleepUntil(due);
@@ -303,11 +302,12 @@ void WorldRunner::stepOnce() {
   const double before = wallSeconds();
   try {
     world_->step();
+    ++revision_;
+    if (step_sink_) step_sink_(*world_, dt_);
   } catch (const std::exception& e) {
+    ++revision_;
     fail(e.what());
   }
-  ++revision_;
-  if (step_sink_) step_sink_(*world_, dt_);
   record(wallSeconds() - before);
   answerCuts();
 }
@@ -344,7 +344,7 @@ void WorldRunner::handOverEvents() {
 
 void WorldRunner::sleepUntil(double due) {
   std::unique_lock<std::mutex> lock(jobs_mutex_);
-  const double wait = clock_.steady ? due - clock_.now() : kPollClock;
+  const double wait = clock_.wallUntil(due);
   if (!(wait > 0.0)) return;
   jobs_changed_.wait_for(lock, std::chrono::duration<double>(wait), [this] { return stopping_ || !jobs_.empty(); });
 }
@@ -357,13 +357,19 @@ void WorldRunner::record(double step_time) {
   while (samples_.front().wall < now - kWindow) samples_.pop_front();
 }
 
+void WorldRunner::mended() {
+  const std::lock_guard<std::mutex> lock(status_mutex_);
+  status_.fault.clear();
+}
+
 void WorldRunner::fail(const std::string& what) {
   paused_ = true;
+  const std::string why = "a step failed (" + what + "); the world is paused";
   {
     const std::lock_guard<std::mutex> lock(status_mutex_);
     status_.paused = true;
+    status_.fault = why;
   }
-  const std::string why = "a step failed (" + what + "); the world is paused";
   giveUp(why);
   Event event;
   event.type = EventType::kFault;

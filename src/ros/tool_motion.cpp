@@ -4,11 +4,6 @@
 #include <sstream>
 
 namespace meshless {
-namespace {
-
-constexpr double kLongestTick = 0.05;  // [s] that one call makes up for: who comes late does not jump
-
-}  // namespace
 
 Status ToolMotion::hear(const Pose& wanted, double stamp, double now) {
   if (alive_ && stamp > 0.0 && stamp < stamp_ && stamp_ - stamp <= kRestart) {
@@ -19,7 +14,7 @@ Status ToolMotion::hear(const Pose& wanted, double stamp, double now) {
   }
   wanted_ = wanted;
   if (stamp > 0.0) stamp_ = stamp;
-  heard_ = now;
+  keepAlive(now);
   arrived_ = false;
   if (!alive_) {
     alive_ = true;
@@ -30,15 +25,22 @@ Status ToolMotion::hear(const Pose& wanted, double stamp, double now) {
   return Done{};
 }
 
+void ToolMotion::keepAlive(double now) {
+  looked_ = now;
+  silent_ = 0.0;
+}
+
 bool ToolMotion::fellSilent(double now) {
-  if (!alive_ || !(limits_.silence > 0.0) || !(now - heard_ > limits_.silence)) return false;
+  silent_ += std::min(now - looked_, kLongestTick);
+  looked_ = now;
+  if (!alive_ || !(limits_.silence > 0.0) || !(silent_ > limits_.silence)) return false;
   alive_ = false;
   stamp_ = 0.0;
   return true;
 }
 
 void ToolMotion::advance(double now) {
-  const double dt = std::clamp(now - advanced_, 0.0, kLongestTick);
+  const double dt = std::min(now - advanced_, kLongestTick);
   advanced_ = now;
   const Vec3 way = wanted_.translation - pose_.translation;
   const double angle = pose_.rotation.angularDistance(wanted_.rotation);

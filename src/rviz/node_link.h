@@ -27,14 +27,16 @@ class NodeLink : public QObject {
   const std::string& node() const { return node_; }
   std::string nameOf(const std::string& name) const { return node_ + "/" + name; }
 
-  /// Calls ~name after `delay` [s]. `done` runs in the GUI's thread, unless this link is gone by then. Where the node
-  /// does not answer, `success` is false and the message says so.
+  /// Calls ~name after `delay` [s], once: what was asked may have been done although the answer is lost. `done` runs in
+  /// the GUI's thread, unless this link is gone by then. Where the node does not answer, `success` is false and the
+  /// message says so; what has become of it ~state and ~events say.
   template <class Service>
   void call(const std::string& name, Service service, std::function<void(const typename Service::Response&)> done = {},
             double delay = 0.0) {
     const std::string full = nameOf(name);
     put(delay, [this, full, service = std::move(service), done = std::move(done)]() mutable {
-      if (!callOnce(full, service) && !callOnce(full, service)) {
+      if (!clientOf<Service>(full).call(service)) {
+        forget(full);  // a persistent connection does not come back by itself
         service.response = typename Service::Response();
         service.response.success = false;
         service.response.message = full + " does not answer: does the node run?";
@@ -51,13 +53,6 @@ class NodeLink : public QObject {
     std::function<void()> work;
   };
 
-  template <class Service>
-  bool callOnce(const std::string& name, Service& service) {
-    ros::ServiceClient client = clientOf<Service>(name);
-    if (client.call(service)) return true;
-    forget(name);  // a persistent connection does not come back by itself
-    return false;
-  }
   template <class Service>
   ros::ServiceClient clientOf(const std::string& name) {
     const std::lock_guard<std::mutex> lock(mutex_);

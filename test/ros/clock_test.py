@@ -2,60 +2,47 @@
 """With use_sim_time the world steps by /clock, and services answer while the clock stands still."""
 import os
 import sys
-import threading
-import time
-import unittest
 
-import rospy
 from geometry_msgs.msg import Point
-from meshless_surgery.msg import State
-from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from deformer_support import Deformer, run  # noqa: E402
+from deformer_support import InStepTestCase, run  # noqa: E402
 
 
-class ClockTest(unittest.TestCase):
-
-    def setUp(self):
-        # rospy's own waiting sleeps by the clock that this test holds: it must tick.
-        self.now = 100.0
-        self.publisher = rospy.Publisher('/clock', Clock, queue_size=10)
-        self.done = threading.Event()
-        self.thread = threading.Thread(target=self._tick)
-        self.thread.start()
-        self.deformer = Deformer()
-        self.states = self.deformer.recorder('state', State)
-
-    def tearDown(self):
-        self.done.set()
-        self.thread.join()
-        self.states.close()
-
-    def _tick(self):
-        while not self.done.wait(0.005):
-            self.publisher.publish(Clock(clock=rospy.Time.from_sec(self.now)))
+class ClockTest(InStepTestCase):
+    scene = 'falling'
 
     def settled(self):
-        """The step at which the world rests while the clock does."""
+        """The step at which the world rests while the clock does. Each state asks the thread that steps."""
         while True:
-            step = self.states.next().step
             since = self.states.count()
-            last = self.states.wait(since=since + 20)
-            if last.step == step:
+            step = self.states.wait(since=since + 1).step
+            if self.states.wait(since=since + 20).step == step:
                 return step
 
     def test_steps_follow_the_clock(self):
-        first = self.settled()
-        self.now = 101.0
-        # Ten seconds of backlog would be dropped beyond its bound; a second in small ticks is not.
         begun = self.settled()
-        for _ in range(100):
-            self.now += 0.01
-            time.sleep(0.02)
-        self.assertGreater(begun, first)
-        self.assertAlmostEqual(begun + 120, self.settled(), delta=2)
+        self.pass_time(1.0)
+        self.assertAlmostEqual(begun + 120, self.settled(), delta=1)
+        # Beyond the backlog time is dropped.
+        begun = self.settled()
+        self.runs_since = None
+        self.clock.advance(10.0)
+        self.assertAlmostEqual(begun + 13, self.settled(), delta=2)
+
+    def test_a_clock_that_is_set_back_goes_on(self):
+        begun = self.settled()
+        self.clock.now -= 500.0
+        self.runs_since = None
+        self.clock.advance(0.0)
+        self.assertAlmostEqual(begun, self.settled(), delta=1)
+        begun = self.settled()
+        for _ in range(10):
+            self.clock.advance(0.05)
+            self.settled()
+        self.assertAlmostEqual(begun + 60, self.settled(), delta=2)
+        self.clock.now += 500.0
 
     def test_services_answer_while_the_clock_stands_still(self):
         before = self.settled()

@@ -1,5 +1,4 @@
 """What the rostests share: calls, recordings of topics, and a picture of the world to compare."""
-import functools
 import os
 import subprocess
 import sys
@@ -12,10 +11,10 @@ import roslib.packages
 import rospy
 import rosunit
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
-from meshless_surgery.msg import State
+from meshless_surgery.msg import Event, State
 from meshless_surgery.srv import (Cut, GetBody, Hash, Incise, LoadState, Lock, MovePick, Pick, Probe, Push, Release, Remove,
                                   SaveState, SetMaterial, Spawn, Step)
-from standstill import Standstill
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
@@ -27,9 +26,6 @@ TYPES = {
 }
 # A bound for things that should have happened long before; no test measures time.
 LONG = 120.0
-# Of tests that move a hand by the clock: who shares a host stands still at times.
-STOOD_STILL = 0.02  # [s]
-ATTEMPTS = 8
 
 
 class Deformer:
@@ -92,23 +88,26 @@ class Recorder:
         self.subscriber.unregister()
 
 
-def by_the_clock(test):
-    """Of a test whose hand moves by the clock: where it fails and a processor stood still meanwhile, it is done again. A
-    failure while they ran stands, and the last one. The test finds the watch in self.standstill."""
-    @functools.wraps(test)
-    def wrapper(self):
-        for attempt in range(ATTEMPTS):
-            with Standstill() as self.standstill:
-                try:
-                    return test(self)
-                except AssertionError as failure:
-                    if attempt + 1 == ATTEMPTS or self.standstill.longest() < STOOD_STILL:
-                        raise
-                    print('%s: done again: a processor stood still for %.2f s: %s' % (
-                        test.__name__, self.standstill.longest(), failure))
-            self.tearDown()
-            self.setUp()
-    return wrapper
+class HandClock:
+    """The time of all nodes that start inside of it: /clock, which stands still but where the test moves it. The test itself
+    goes by the wall."""
+
+    def __init__(self, begin=1000.0):
+        self.now = begin
+        rospy.set_param('/use_sim_time', True)
+        self.publisher = rospy.Publisher('/clock', Clock, queue_size=100, latch=True)
+        self.advance(0.0)
+
+    def advance(self, seconds):
+        self.now += seconds
+        self.publisher.publish(Clock(clock=self.stamp()))
+
+    def stamp(self):
+        return rospy.Time.from_sec(self.now)
+
+    def close(self):
+        rospy.delete_param('/use_sim_time')
+        self.publisher.unregister()
 
 
 class OwnNode:
@@ -233,6 +232,100 @@ class DeformerTestCase(unittest.TestCase):
     def pick_left(self):
         return self.good('pick', point=Point(-0.15, 0.0, 0.1), direction=Vector3(0, 0, 0), body='left',
                          max_distance=0.05)
+
+
+class InStepTestCase(DeformerTestCase):
+    """A node of its own, whose clock goes on only once it has done all that was due: however long one of the two stands
+    still, what the test sees is the same. Starts every test from the scene's start, running."""
+
+    scene = 'boxes'
+    step_rate = 120.0
+    parameters = {}
+    PERIOD = 0.005  # [s] between two messages of a stream
+
+    @classmethod
+    def setUpClass(cls):
+        cls.clock = HandClock()
+        scene = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'scenes', cls.scene + '.yaml')
+        cls.own = OwnNode(scene=scene, state_rate=1000.0, **cls.parameters)
+        cls.node = cls.own.name
+        cls.own.wait()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.own.end()
+        cls.own.__exit__()
+        cls.clock.close()
+
+    def setUp(self):
+        self.opened = []
+        self.publishers = {}
+        self.runs_since = None
+        super().setUp()
+        self.events = self.record('events', Event)
+        self.pause(False)
+
+    def tearDown(self):
+        for opened in self.opened:
+            opened.close()
+        for publisher in self.publishers.values():
+            publisher.unregister()
+        super().tearDown()
+
+    def record(self, topic, message_type):
+        recorder = self.deformer.recorder(topic, message_type)
+        self.opened.append(recorder)
+        return recorder
+
+    def pause(self, paused):
+        self.good('pause', data=paused)
+        self.runs_since = None if paused else (self.clock.now, self.state().step)
+
+    def advance(self, seconds=None):
+        """The state once that time (or PERIOD) has passed, and all that was due by then is done."""
+        self.clock.advance(self.PERIOD if seconds is None else seconds)
+        now = self.clock.stamp()
+        steps = 0
+        if self.runs_since:
+            begin, step = self.runs_since
+            steps = step + int((self.clock.now - begin) * self.step_rate - 1e-6)
+        return self.states.wait(lambda s: s.header.stamp >= now and s.step >= steps, max(0, self.states.count() - 1))
+
+    def pass_time(self, seconds):
+        """What was said at each of its moments."""
+        return [self.advance() for _ in range(int(round(seconds / self.PERIOD)))]
+
+    def state(self):
+        return self.advance(0.001)
+
+    def publisher(self, topic, kind=PoseStamped):
+        if topic not in self.publishers:
+            publisher = rospy.Publisher(self.node + '/' + topic, kind, queue_size=100)
+            self.publishers[topic] = publisher
+            end = time.monotonic() + LONG
+            while publisher.get_num_connections() == 0:
+                self.assertLess(time.monotonic(), end, 'nobody listens to ' + topic)
+                time.sleep(0.005)
+        return self.publishers[topic]
+
+    def say(self, topic, poses):
+        """One pose after the other, a moment each; the states in between."""
+        publisher, states = self.publisher(topic), []
+        for pose in poses:
+            if pose.header.stamp.is_zero():
+                pose.header.stamp = self.clock.stamp()
+            publisher.publish(pose)
+            states.append(self.advance())
+        return states
+
+    def until(self, wanted, what):
+        """Time passes until wanted(state) holds."""
+        end = time.monotonic() + LONG
+        while True:
+            state = self.advance()
+            if wanted(state):
+                return state
+            self.assertLess(time.monotonic(), end, what)
 
 
 def run(name, *cases):

@@ -49,6 +49,15 @@ TEST(HoleBridge, AHoleInABridgeGoesOnFromWhatWasSaid) {
   EXPECT_EQ(bridge.across(0.2, -4.0), -4.0);
 }
 
+TEST(HoleBridge, AShortHoleDoesNotEndALongBridge) {
+  HoleBridge<double> bridge(0.0);
+  bridge.open(0.1, 0.1);
+  EXPECT_NEAR(bridge.across(0.15, 10.0), 5.0, 1e-12);
+  bridge.open(0.15, 0.006);
+  EXPECT_NEAR(bridge.across(0.16, 10.0), 6.0, 1e-12);
+  EXPECT_EQ(bridge.across(0.201, 10.0), 10.0);
+}
+
 // A step that came late, and then the ticks that were missed before it.
 TEST(HoleBridge, UntilTheBridgeBeginsNothingNewIsSaid) {
   HoleBridge<double> bridge(0.0);

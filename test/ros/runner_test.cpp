@@ -1,17 +1,13 @@
 #include "meshless_surgery/ros/runner.h"
 
+#include <diagnostic_updater/DiagnosticStatusWrapper.h>
+
+#include "meshless_surgery/ros/publishers.h"
+#include "ros/hand_clock.h"
 #include "ros/scene_support.h"
 
 namespace meshless {
 namespace {
-
-/// A clock that stands still until it is set.
-struct HandClock {
-  std::shared_ptr<std::atomic<double>> time = std::make_shared<std::atomic<double>>(100.0);
-  PaceClock clock() const {
-    return {[time = time] { return time->load(); }, false};
-  }
-};
 
 RunnerSettings pausedAtStart() {
   RunnerSettings settings;
@@ -31,7 +27,7 @@ void waitUntil(const std::function<bool()>& true_at_last) {
 }
 
 TEST(Runner, APausedWorldAnswersAndDoesNotStep) {
-  WorldRunner runner(twoBoxes(), pausedAtStart());
+  WorldRunner runner(twoBoxes(), pausedAtStart(), wallClock());
   runner.start();
   PickCommand pick;
   pick.point = Vec3(0.05, 0.05, 0.05);
@@ -43,7 +39,7 @@ TEST(Runner, APausedWorldAnswersAndDoesNotStep) {
 }
 
 TEST(Runner, StepsAreDoneExactlyPausedOrNot) {
-  WorldRunner runner(twoBoxes(), pausedAtStart());
+  WorldRunner runner(twoBoxes(), pausedAtStart(), wallClock());
   runner.start();
   const auto time = runner.doSteps(30);
   ASSERT_TRUE(time.ok());
@@ -54,25 +50,25 @@ TEST(Runner, StepsAreDoneExactlyPausedOrNot) {
 }
 
 TEST(Runner, StepsFollowTheClockAndNotTheWall) {
-  const HandClock hand;
-  WorldRunner runner(twoBoxes(), {}, hand.clock());
+  HandClock hand;
+  WorldRunner runner(twoBoxes(), {}, hand.clock);
   runner.start();
   waitUntil([&] { return stepCount(runner) == 1; });  // the first is due at once
-  *hand.time = 100.0 + 5.5 / 120.0;
+  hand.time = 100.0 + 5.5 / 120.0;
   waitUntil([&] { return stepCount(runner) == 6; });
-  *hand.time = 100.0 + 6.5 / 120.0;
+  hand.time = 100.0 + 6.5 / 120.0;
   waitUntil([&] { return stepCount(runner) == 7; });
   EXPECT_EQ(0.0, runner.status().dropped);
 }
 
 TEST(Runner, ABacklogBeyondItsBoundIsDroppedAndCounted) {
-  const HandClock hand;
+  HandClock hand;
   RunnerSettings settings;
   settings.max_backlog = 0.1;
-  WorldRunner runner(twoBoxes(), settings, hand.clock());
+  WorldRunner runner(twoBoxes(), settings, hand.clock);
   runner.start();
   waitUntil([&] { return stepCount(runner) == 1; });
-  *hand.time = 200.0;
+  hand.time = 200.0;
   // One step finds the clock far ahead, the rest is the bound's: 0.1 s of 1/120 s.
   waitUntil([&] { return stepCount(runner) >= 13; });
   EXPECT_NEAR(100.0 - 0.1 - 2.0 / 120.0, runner.status().dropped, 1e-6);
@@ -80,18 +76,19 @@ TEST(Runner, ABacklogBeyondItsBoundIsDroppedAndCounted) {
 }
 
 TEST(Runner, AClockThatIsSetBackDoesNotStopTheWorld) {
-  const HandClock hand;
-  WorldRunner runner(twoBoxes(), {}, hand.clock());
+  HandClock hand;
+  WorldRunner runner(twoBoxes(), {}, hand.clock);
   runner.start();
   waitUntil([&] { return stepCount(runner) == 1; });
-  *hand.time = 5.0;
-  waitUntil([&] { return stepCount(runner) >= 2; });
-  *hand.time = 5.0 + 1.5 / 120.0;
-  waitUntil([&] { return stepCount(runner) >= 3; });
+  hand.time = 5.0;
+  hand.clock.now();
+  hand.time = 5.0 + 2.5 / 120.0;
+  waitUntil([&] { return stepCount(runner) == 3; });
+  EXPECT_EQ(0.0, runner.status().dropped);
 }
 
 TEST(Runner, ACutWaitsForItsBladesAndHoldsNobodyUp) {
-  WorldRunner runner(twoBoxes(), pausedAtStart());
+  WorldRunner runner(twoBoxes(), pausedAtStart(), wallClock());
   runner.start();
   ASSERT_TRUE(runner.setPaused(false).ok());
   CutCommand command = cutAcross(0.01);
@@ -112,7 +109,7 @@ TEST(Runner, ACutWaitsForItsBladesAndHoldsNobodyUp) {
 }
 
 TEST(Runner, WhilePausedTheBladesMeetAtOnce) {
-  WorldRunner runner(twoBoxes(), pausedAtStart());
+  WorldRunner runner(twoBoxes(), pausedAtStart(), wallClock());
   runner.start();
   CutCommand command = cutAcross(0.01);
   command.close_time = 30.0;
@@ -124,8 +121,8 @@ TEST(Runner, WhilePausedTheBladesMeetAtOnce) {
 }
 
 TEST(Runner, AResetAnswersACutThatWaits) {
-  const HandClock hand;
-  WorldRunner runner(twoBoxes(), {}, hand.clock());
+  HandClock hand;
+  WorldRunner runner(twoBoxes(), {}, hand.clock);
   runner.start();
   CutCommand command = cutAcross(0.01);
   command.close_time = 30.0;
@@ -144,7 +141,7 @@ TEST(Runner, AResetAnswersACutThatWaits) {
 }
 
 TEST(Runner, AnErrorComesBackAndNothingChanges) {
-  WorldRunner runner(twoBoxes(), pausedAtStart());
+  WorldRunner runner(twoBoxes(), pausedAtStart(), wallClock());
   runner.start();
   std::uint64_t before = 0;
   std::uint64_t after = 0;
@@ -158,7 +155,7 @@ TEST(Runner, AnErrorComesBackAndNothingChanges) {
 }
 
 TEST(Runner, JobsThatThrowAreAnsweredAndTheNextOneRuns) {
-  WorldRunner runner(twoBoxes(), pausedAtStart());
+  WorldRunner runner(twoBoxes(), pausedAtStart(), wallClock());
   runner.start();
   const Status thrown = runner.look([](World&) { throw std::runtime_error("a broken job"); });
   ASSERT_FALSE(thrown.ok());
@@ -167,8 +164,8 @@ TEST(Runner, JobsThatThrowAreAnsweredAndTheNextOneRuns) {
 }
 
 TEST(Runner, WhoWaitsWhenItStopsIsAnswered) {
-  const HandClock hand;
-  WorldRunner runner(twoBoxes(), {}, hand.clock());
+  HandClock hand;
+  WorldRunner runner(twoBoxes(), {}, hand.clock);
   runner.start();
   CutCommand command = cutAcross(0.01);
   command.close_time = 30.0;
@@ -186,7 +183,7 @@ TEST(Runner, WhoWaitsWhenItStopsIsAnswered) {
 }
 
 TEST(Runner, EventsAreHandedOverBeforeTheAnswer) {
-  WorldRunner runner(twoBoxes(), pausedAtStart());
+  WorldRunner runner(twoBoxes(), pausedAtStart(), wallClock());
   std::mutex mutex;
   std::vector<Event> events;
   runner.setEventSink([&](std::vector<Event> some) {
@@ -203,7 +200,7 @@ TEST(Runner, EventsAreHandedOverBeforeTheAnswer) {
 }
 
 TEST(Runner, TheRevisionTellsWhetherSomethingMayHaveChanged) {
-  WorldRunner runner(twoBoxes(), pausedAtStart());
+  WorldRunner runner(twoBoxes(), pausedAtStart(), wallClock());
   runner.start();
   const auto start = runner.revision();
   stepCount(runner);
@@ -213,6 +210,50 @@ TEST(Runner, TheRevisionTellsWhetherSomethingMayHaveChanged) {
   EXPECT_EQ(start + 1, runner.revision());
   ASSERT_TRUE(runner.doSteps(3).ok());
   EXPECT_EQ(start + 4, runner.revision());
+}
+
+TEST(Runner, AStepThatFailsPausesTheWorldAndSaysWhyUntilItRunsAgain) {
+  WorldRunner runner(twoBoxes(), pausedAtStart(), wallClock());
+  std::atomic<bool> broken{true};
+  runner.setStepSink([&](const World&, double dt) {
+    if (dt > 0.0 && broken) throw std::runtime_error("a broken part");
+  });
+  std::mutex mutex;
+  std::vector<Event> events;
+  runner.setEventSink([&](std::vector<Event> some) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    events.insert(events.end(), some.begin(), some.end());
+  });
+  runner.start();
+  const auto summary = [&] {
+    diagnostic_updater::DiagnosticStatusWrapper status;
+    summarize(runner.status(), 0, status);
+    return std::pair<int, std::string>(status.level, status.message);
+  };
+  const std::pair<int, std::string> paused{diagnostic_msgs::DiagnosticStatus::OK, "paused"};
+  EXPECT_EQ(paused, summary());
+  const auto fail = [&] {
+    broken = true;
+    EXPECT_TRUE(runner.setPaused(false).ok());
+    waitUntil([&] { return runner.status().paused; });
+    EXPECT_EQ(diagnostic_msgs::DiagnosticStatus::ERROR, summary().first);
+    EXPECT_NE(std::string::npos, summary().second.find("a broken part")) << summary().second;
+    broken = false;
+  };
+  fail();
+  ASSERT_TRUE(runner.setPaused(true).ok());  // mends nothing
+  EXPECT_EQ(diagnostic_msgs::DiagnosticStatus::ERROR, summary().first);
+  {
+    const std::lock_guard<std::mutex> lock(mutex);
+    EXPECT_TRUE(std::any_of(events.begin(), events.end(), [](const Event& e) { return e.type == EventType::kFault; }));
+  }
+  ASSERT_TRUE(runner.setPaused(false).ok());
+  EXPECT_EQ("", runner.status().fault);
+  ASSERT_TRUE(runner.setPaused(true).ok());
+  EXPECT_EQ(paused, summary());
+  fail();
+  ASSERT_TRUE(runner.reset().ok());
+  EXPECT_EQ(paused, summary());
 }
 
 TEST(Runner, StepsThatTakeLongerThanTheySimulateAreReported) {
@@ -225,7 +266,7 @@ TEST(Runner, StepsThatTakeLongerThanTheySimulateAreReported) {
     const auto body = softBox("b" + std::to_string(i), Vec3(0.3 * i, 0.0, 0.2));
     ASSERT_TRUE(body && world->addSceneBody(body).ok());
   }
-  WorldRunner runner(std::move(world), {});
+  WorldRunner runner(std::move(world), {}, wallClock());
   std::mutex mutex;
   bool said = false;
   runner.setEventSink([&](std::vector<Event> some) {

@@ -1,16 +1,21 @@
 #!/usr/bin/env python3
 """Two stations in two namespaces do not see each other's worlds."""
 import os
+import signal
+import subprocess
 import sys
+import time
 import unittest
+from xmlrpc.client import ServerProxy
 
+import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from meshless_surgery.msg import State
 from tf2_msgs.msg import TFMessage
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from deformer_support import TYPES, Deformer, Recorder, pose_stamped, run  # noqa: E402
+from deformer_support import LONG, TYPES, Deformer, Recorder, pose_stamped, run  # noqa: E402
 
 
 class StationsTest(unittest.TestCase):
@@ -56,5 +61,27 @@ class StationsTest(unittest.TestCase):
         heard.close()
 
 
+class DeadStationTest(unittest.TestCase):
+
+    def test_the_others_go_on(self):
+        # A launch of its own, which a required node would end.
+        scenes = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'scenes')
+        launch = subprocess.Popen(['roslaunch', os.path.join(scenes, 'two_stations.launch')], stdout=subprocess.DEVNULL,
+                                  stderr=subprocess.STDOUT)
+        try:
+            dead, alive = Deformer('/dies/deformer'), Deformer('/lives/deformer')
+            self.assertTrue(dead.call('step', steps=1).success)
+            self.assertTrue(alive.call('step', steps=1).success)
+            pid = ServerProxy(rosgraph.Master('/test').lookupNode(dead.node)).getPid('/test')[2]
+            os.kill(pid, signal.SIGKILL)
+            for _ in range(30):  # roslaunch looks ten times a second
+                time.sleep(0.1)
+                self.assertTrue(alive.call('step', steps=1).success)
+            self.assertIsNone(launch.poll())
+        finally:
+            launch.send_signal(signal.SIGINT)
+            launch.wait(LONG)
+
+
 if __name__ == '__main__':
-    run('stations', StationsTest)
+    run('stations', StationsTest, DeadStationTest)

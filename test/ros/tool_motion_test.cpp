@@ -71,24 +71,37 @@ TEST(ToolMotion, OldMessagesAreRefusedUntilTheStreamBeginsAnew) {
   EXPECT_TRUE(motion.hear(at(0.4), 20.0, 0.05).ok());   // played again
 }
 
+/// Looked at every 10 ms; when it fell silent, or `until`.
+double silentAt(ToolMotion& motion, double now, double until) {
+  for (; now < until; now += 0.01)
+    if (motion.fellSilent(now)) return now;
+  return until;
+}
+
 TEST(ToolMotion, SilenceIsSaidOnceAndThenItBeginsAnew) {
   ToolMotion motion({1.0, 10.0, 0.5});
-  EXPECT_FALSE(motion.fellSilent(1e9));
+  EXPECT_EQ(silentAt(motion, 0.0, 10.0), 10.0);
   ASSERT_TRUE(motion.hear(at(0.0), 7.0, 10.0).ok());
-  EXPECT_FALSE(motion.fellSilent(10.5));
+  EXPECT_EQ(silentAt(motion, 10.0, 10.4), 10.4);
   motion.keepAlive(10.4);
-  EXPECT_FALSE(motion.fellSilent(10.8));
-  EXPECT_TRUE(motion.fellSilent(10.95));
+  EXPECT_NEAR(silentAt(motion, 10.4, 12.0), 10.905, 0.0075);
   EXPECT_FALSE(motion.alive());
-  EXPECT_FALSE(motion.fellSilent(12.0));
+  EXPECT_EQ(silentAt(motion, 11.0, 13.0), 13.0);
   ASSERT_TRUE(motion.hear(at(5.0), 6.9, 13.0).ok());
   EXPECT_EQ(motion.pose().translation.x(), 5.0);
+}
+
+TEST(ToolMotion, WhoLooksLateHeardNoSilence) {
+  ToolMotion motion({1.0, 10.0, 0.5});
+  ASSERT_TRUE(motion.hear(at(0.0), 0.0, 0.0).ok());
+  EXPECT_FALSE(motion.fellSilent(1000.0));
+  EXPECT_NEAR(silentAt(motion, 1000.0, 1002.0), 1000.455, 0.0075);
 }
 
 TEST(ToolMotion, WithoutALimitItMayBeSilent) {
   ToolMotion motion({1.0, 10.0, 0.0});
   ASSERT_TRUE(motion.hear(at(0.0), 0.0, 0.0).ok());
-  EXPECT_FALSE(motion.fellSilent(1e6));
+  EXPECT_EQ(silentAt(motion, 0.0, 1000.0), 1000.0);
 }
 
 }  // namespace

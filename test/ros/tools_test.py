@@ -8,7 +8,6 @@ import threading
 import rospy
 import tf2_ros
 from geometry_msgs.msg import Point, PoseStamped, Quaternion, TransformStamped, Vector3, WrenchStamped
-from meshless_surgery.msg import Event
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -43,9 +42,12 @@ class Stream:
         while not self.done.wait(0.01):
             self.publisher.publish(self.message)
 
-    def close(self):
+    def stop(self):
         self.done.set()
         self.thread.join()
+
+    def close(self):
+        self.stop()
         rospy.sleep(0.2)  # what is under way arrives before the next test's reset
         self.publisher.unregister()
 
@@ -195,8 +197,10 @@ class StreamTest(DeformerTestCase):
         measured = self.record('scissors/measured_cp', PoseStamped)
         stream = self.stream('scissors/servo_cp', pose_stamped(0.0, 0.0, 3.0, ACROSS_X))
         measured.wait()
-        stream.close()
-        self.open.remove(stream)
+        # All that it has said is heard once its last pose is.
+        stream.stop()
+        stream.publisher.publish(pose_stamped(0.0, 0.0, 4.0, ACROSS_X))
+        measured.wait(lambda m: m.pose.position.z == 4.0)
         self.good('lift_scissors')
         lifted = rospy.Time.now()
         rospy.sleep(1.0)
@@ -233,8 +237,7 @@ class StreamTest(DeformerTestCase):
             return any(t.child_frame_id == 'here/push_sphere' for t in message.transforms)
         heard.wait(has)
         self.good('push', enable=False)
-        # Each round trip of a step and a state takes longer than a tick of the frames.
-        begun = rospy.Time.now() + rospy.Duration(0.5)
+        begun = rospy.Time.now()
         rospy.sleep(1.5)
         late = [m for m in heard.messages if has(m) and m.transforms[0].header.stamp > begun]
         self.assertEqual([], late)
@@ -290,57 +293,5 @@ class InputFrameTest(DeformerTestCase):
         self.refused(['table'], 'pick', header=header('table', past), point=Point(0, 0, 0))
 
 
-class FollowTest(DeformerTestCase):
-    node = '/follower'
-
-    def test_tools_follow_their_frames(self):
-        pick = self.pick_left()
-        frames = Frames(transform('world', 'hand', -0.1, 0.05, 0.1), transform('world', 'ball', 0.0, 0.0, 1.0),
-                        transform('world', 'blades', 0.0, 0.0, 3.0))
-        measured = {tool: self.deformer.recorder(tool + '/measured_cp', PoseStamped)
-                    for tool in ('pick', 'push', 'scissors')}
-        try:
-            measured['pick'].wait(lambda m: abs(m.pose.position.y - 0.05) < 1e-6)
-            measured['push'].wait(lambda m: abs(m.pose.position.z - 1.0) < 1e-6)
-            measured['scissors'].wait(lambda m: abs(m.pose.position.z - 3.0) < 1e-6)
-            state = self.states.next(lambda s: abs(s.picks[0].target.y - 0.05) < 1e-6)
-            self.assertEqual(pick.pick_id, state.picks[0].pick_id)
-            frames.transforms[0].transform.translation.y = 0.08
-            self.states.next(lambda s: abs(s.picks[0].target.y - 0.08) < 1e-6)
-            # Frames that nobody says any more: tf2 has the last of each, and yet the tools are lifted off.
-            events = self.deformer.recorder('events', Event)
-            measured['events'] = events
-            frames.close()
-            for tool in ('pick', 'push', 'scissors'):
-                event = events.wait(lambda e: e.type == 'lifted' and tool in e.text)
-                self.assertIn('silent for 0.5 s', event.text)
-            self.assertEqual([], self.state().picks)
-            last = rospy.Time.now()
-            rospy.sleep(0.5)
-            for tool in ('push', 'scissors'):
-                self.assertEqual([], [m for m in measured[tool].messages if m.header.stamp > last], tool)
-        finally:
-            frames.close()
-            for recorder in measured.values():
-                recorder.close()
-
-    def test_a_frame_that_jumps_is_followed_at_a_bounded_speed(self):
-        # Of the pick: 5 m/s, so half a metre takes a tenth of a second; the frame is at once there.
-        start = self.pick_left().position
-        frames = Frames(transform('world', 'hand', start.x, start.y, start.z))
-        try:
-            self.states.next(lambda s: s.picks and abs(s.picks[0].target.y - start.y) < 1e-6)
-            since = self.states.count()
-            frames.transforms[0].transform.translation.y = start.y + 1.0
-            self.states.wait(lambda s: s.picks and s.picks[0].target.y > start.y + 0.999, since)
-        finally:
-            frames.close()
-        states = [s for s in self.states.messages[since:] if s.picks]
-        for one, other in zip(states, states[1:]):
-            passed = (other.header.stamp - one.header.stamp).to_sec()
-            self.assertLessEqual(other.picks[0].target.y - one.picks[0].target.y, 5.0 * (passed + 0.05) + 1e-9)
-        self.assertGreater(len({s.picks[0].target.y for s in states}), 3)
-
-
 if __name__ == '__main__':
-    run('tools', StreamTest, InputFrameTest, FollowTest)
+    run('tools', StreamTest, InputFrameTest)

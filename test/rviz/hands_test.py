@@ -350,6 +350,12 @@ class HandsTest(unittest.TestCase):
         rospy.sleep(0.5)
         return list(self.poses['push'])
 
+    def sphere(self):
+        """Where it is now, whenever that is said."""
+        self.poses['push'].clear()
+        self.until(lambda: self.poses['push'], 'no sphere', 0.02)
+        return vector(self.poses['push'][-1].pose.position)
+
     def test_a_sphere_pushes_while_the_button_is_down(self):
         eye, side, up, back = camera_axes(self.view)
         rospy.sleep(1.0)
@@ -365,14 +371,14 @@ class HandsTest(unittest.TestCase):
         self.mouse.key_up('ctrl')
         self.mouse.down()
         self.until(lambda: self.pushes(), 'no sphere')
-        first = vector(self.pushes()[-1].pose.position)
+        first = self.sphere()
         # Before the tissue, touching it where the cursor is, with the radius of the wheel.
         point = self.pixel(first)
         self.assertLess(numpy.abs(point - place).max(), 4)
         self.assertAlmostEqual(0.02 * 1.15 ** 2, numpy.linalg.norm(rest - first, axis=1).min(), delta=0.004)
         call('pause', SetBool, data=False)
         self.mouse.wheel(5)  # away: into the tissue
-        self.until(lambda: (vector(self.pushes()[-1].pose.position) - first).dot(back) < -0.02, 'the sphere stays')
+        self.until(lambda: (self.sphere() - first).dot(back) < -0.02, 'the sphere stays')
         self.until(lambda: self.said('touched'), 'it touched nothing')
         now = self.body()
         dented = numpy.linalg.norm(now - rest, axis=1)
@@ -388,14 +394,14 @@ class HandsTest(unittest.TestCase):
         self.mouse.click(3)
         self.mouse.up()
         rospy.sleep(0.5)
-        left = vector(self.pushes()[-1].pose.position)
+        left = self.sphere()
         self.mouse.key('m')
-        self.assertLess(numpy.linalg.norm(vector(self.pushes()[-1].pose.position) - left), 1e-6)
+        self.assertLess(numpy.linalg.norm(self.sphere() - left), 1e-6)
         self.mouse.key('h')
         self.mouse.move((place[0] + 2, place[1]))
         self.mouse.down()
         self.mouse.move((place[0] - 80, place[1]))
-        self.until(lambda: (vector(self.pushes()[-1].pose.position) - left)[2] > 0.02, 'the sphere was not taken up')
+        self.until(lambda: (self.sphere() - left)[2] > 0.02, 'the sphere was not taken up')
         self.mouse.up()
         self.until(lambda: not self.pushes(), 'the sphere was not lifted off')
 

@@ -1,9 +1,10 @@
 // Core values to messages, everything in the world frame.
 #pragma once
 
-#include <meshless_surgery/Event.h>
-#include <meshless_surgery/State.h>
 #include <geometry_msgs/Pose.h>
+#include <meshless_surgery/Event.h>
+#include <meshless_surgery/Info.h>
+#include <meshless_surgery/State.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <shape_msgs/Mesh.h>
 #include <std_msgs/ColorRGBA.h>
@@ -25,6 +26,8 @@ std::vector<meshless_surgery::PickState> toPicks(const WorldSnapshot& snapshot);
 /// Needs a snapshot with measures.
 meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatus& status,
                                 const std_msgs::Header& header);
+/// Without what a world does not know of itself: header, scene, version, world_frame.
+meshless_surgery::Info toInfo(const WorldSnapshot& snapshot, const WorldSettings& settings);
 meshless_surgery::Event toEvent(const Event& event, const std_msgs::Header& header);
 /// Every particle with x y z body rgb. Needs a snapshot with particles.
 sensor_msgs::PointCloud2 toCloud(const WorldSnapshot& snapshot, const std_msgs::Header& header);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -26,6 +27,10 @@ class Frames {
   /// Waits at most 0.2 s (0.5 s right after listening began) of wall time, and not at all where kMostWaiting others do.
   /// Refuses kUnknownName, naming the frame.
   Result<Pose> toWorld(const std_msgs::Header& header);
+
+  /// The same without waiting, and until when one should wait where it is refused.
+  Result<Pose> lookUp(const std_msgs::Header& header);
+  std::chrono::steady_clock::time_point waitEnd() const;
 
   /// The latest pose, without waiting; nothing where tf2 does not know the frame (yet).
   struct Stamped {

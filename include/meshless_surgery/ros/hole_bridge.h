@@ -2,6 +2,8 @@
 // [s].
 #pragma once
 
+#include <algorithm>
+
 namespace meshless {
 
 /// Whoever stood still for many ticks has a value from before and one from after, and a hand would feel the difference
@@ -12,12 +14,13 @@ class HoleBridge {
  public:
   explicit HoleBridge(const Value& value) : held_(value), said_(value) {}
 
-  /// From the tick at `from` on, for `length` [s]. One that is to begin later stays: until then nothing new is said.
+  /// From the tick at `from` on, for `length` [s], or as long as the one before lasts. One that is to begin later
+  /// stays: until then nothing new is said.
   void open(double from, double length) {
     if (length_ > 0.0 && from < from_) return;
     held_ = said_;
+    length_ = std::max(length, from_ + length_ - from);
     from_ = from;
-    length_ = length;
   }
   /// What is said at `now`, where the value is `value`.
   Value across(double now, const Value& value) {

@@ -9,6 +9,8 @@
 #include <thread>
 
 #include <diagnostic_updater/diagnostic_updater.h>
+#include <geometry_msgs/PoseStamped.h>
+#include <meshless_surgery/Info.h>
 #include <ros/node_handle.h>
 #include <tf2_ros/transform_broadcaster.h>
 
@@ -16,14 +18,18 @@
 #include "meshless_surgery/ros/rejections.h"
 #include "meshless_surgery/ros/runner.h"
 #include "meshless_surgery/ros/settings.h"
-#include "meshless_surgery/ros/tool_inputs.h"
+#include "meshless_surgery/ros/streamed_tools.h"
 
 namespace meshless {
+
+/// Level and message of the diagnostics: an error where a step has failed, a warning where time falls behind.
+void summarize(const RunnerStatus& runner, std::uint64_t overruns_before,
+               diagnostic_updater::DiagnosticStatusWrapper& status);
 
 class Publishers {
  public:
   Publishers(const ros::NodeHandle& private_handle, const NodeSettings& settings, WorldRunner& runner,
-             const ToolInputs& tools, const Rejections& rejections);
+             const StreamedTools& tools, const Rejections& rejections);
   ~Publishers();
   void start();
   void stop();
@@ -42,6 +48,7 @@ class Publishers {
   void loop();
   void publishEvents();
   void publishTick(Clock::time_point now);
+  void publishInfo(const WorldSnapshot& snapshot, const std_msgs::Header& header);
   void publishSurfaces(const WorldSnapshot& snapshot, const std_msgs::Header& header);
   void publishTools(const WorldSnapshot& snapshot, const ros::Time& stamp);
   void publishTool(const ros::Publisher& topic, const std::string& frame, const Pose& pose, const ros::Time& stamp,
@@ -50,12 +57,12 @@ class Publishers {
 
   NodeSettings settings_;
   WorldRunner& runner_;
-  const ToolInputs& tools_;
+  const StreamedTools& tools_;
   const Rejections& rejections_;
   MarkerBuilder markers_;
 
   ros::Publisher clusters_topic_, contacts_topic_, surfaces_topic_, strained_surfaces_topic_;
-  ros::Publisher markers_topic_, points_topic_, state_topic_, events_topic_;
+  ros::Publisher markers_topic_, points_topic_, state_topic_, events_topic_, info_topic_;
   ros::Publisher pick_pose_, push_pose_, scissors_pose_;
   tf2_ros::TransformBroadcaster broadcaster_;
   diagnostic_updater::Updater updater_;
@@ -65,7 +72,9 @@ class Publishers {
   std::uint64_t clusters_revision_ = 0, clusters_built_ = 0;
   std::uint64_t contacts_revision_ = 0, contacts_built_ = 0;
   std::uint64_t surfaces_revision_ = 0, surfaces_built_ = 0;
-  Cadence markers_due_, points_due_, state_due_, tools_due_, diagnostics_due_;
+  meshless_surgery::Info info_;  // as it was said last
+  std::uint64_t info_revision_ = 0;
+  Cadence info_due_, markers_due_, points_due_, state_due_, tools_due_, diagnostics_due_;
   std::atomic<bool> markers_newcomer_{false}, points_newcomer_{false};
   std::uint64_t markers_revision_ = 0, points_revision_ = 0;
   ros::Time last_transforms_;

@@ -9,18 +9,10 @@
 #include <mutex>
 #include <thread>
 
+#include "meshless_surgery/ros/clock.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless {
-
-/// What steps are paced by. `steady` says that waiting for it takes as long as on a wall clock; another clock (a
-/// simulator's, which may stand still) is polled.
-struct PaceClock {
-  std::function<double()> now;  // [s]
-  bool steady = true;
-
-  static PaceClock wall();
-};
 
 struct RunnerSettings {
   bool paused = false;       // at the start
@@ -29,6 +21,7 @@ struct RunnerSettings {
 
 struct RunnerStatus {
   bool paused = false;
+  std::string fault;              // why a step that failed has paused the world; empty: it did not, or runs again
   std::uint64_t steps = 0;        // done by this runner, over resets
   double step_rate = 0.0;         // [Hz] done, last second
   double real_time_factor = 0.0;  // simulated over wall time, last second
@@ -44,7 +37,8 @@ class WorldRunner {
   static constexpr int kMostClosing = 16;  // cuts that wait for their blades at once
   using EventSink = std::function<void(std::vector<Event>)>;
 
-  WorldRunner(std::unique_ptr<World> world, const RunnerSettings& settings, PaceClock clock = PaceClock::wall());
+  /// Steps are paced by `clock`, which outlives it; what they cost is measured on the wall.
+  WorldRunner(std::unique_ptr<World> world, const RunnerSettings& settings, const Clock& clock);
   ~WorldRunner();
   WorldRunner(const WorldRunner&) = delete;
   WorldRunner& operator=(const WorldRunner&) = delete;
@@ -52,7 +46,7 @@ class WorldRunner {
   /// Called on the runner's thread: must only put the events aside. To be set before start.
   void setEventSink(EventSink sink) { event_sink_ = std::move(sink); }
   /// Called on the runner's thread after every step, with what it simulated [s], and with 0 after every job that may
-  /// have changed the world: must be quick. To be set before start.
+  /// have changed the world: must be quick. A step fails where it throws. To be set before start.
   using StepSink = std::function<void(const World&, double)>;
   void setStepSink(StepSink sink) { step_sink_ = std::move(sink); }
   void start();
@@ -116,11 +110,12 @@ class WorldRunner {
   void sleepUntil(double due);
   void record(double step_time);
   void fail(const std::string& what);
+  void mended();
 
   std::unique_ptr<World> world_;
   double dt_;  // [s]
   RunnerSettings settings_;
-  PaceClock clock_;
+  const Clock& clock_;
   EventSink event_sink_;
   StepSink step_sink_;
 

@@ -1,8 +1,9 @@
-// Streams that move the tools: CRTK topics or tf frames. A tool follows at a bounded speed, and is lifted off when its
-// stream falls silent.
+// Streams that move the tools: CRTK topics or tf frames.
 #pragma once
 
 #include <array>
+#include <chrono>
+#include <deque>
 #include <mutex>
 
 #include <geometry_msgs/PoseStamped.h>
@@ -13,59 +14,46 @@
 #include "meshless_surgery/ros/rejections.h"
 #include "meshless_surgery/ros/runner.h"
 #include "meshless_surgery/ros/settings.h"
-#include "meshless_surgery/ros/tool_motion.h"
+#include "meshless_surgery/ros/streamed_tools.h"
 
 namespace meshless {
 
-constexpr double kJawOpen = 0.1;     // [rad] the jaw must have been opened beyond ...
-constexpr double kJawClosed = 0.02;  // [rad] ... and close below, to cut
-
 class ToolInputs {
  public:
-  ToolInputs(const ros::NodeHandle& private_handle, const NodeSettings& settings, WorldRunner& runner, Frames& frames,
-             Rejections& rejections);
-  ~ToolInputs();
+  ToolInputs(const ros::NodeHandle& private_handle, const NodeSettings& settings, const Clock& clock,
+             WorldRunner& runner, Frames& frames, Rejections& rejections);
 
-  /// Where its stream last wanted a tool, while the stream speaks.
-  std::optional<Pose> hand(ToolKind tool) const;
+  const StreamedTools& tools() const { return tools_; }
 
  private:
-  struct Tool {
-    std::string name;
-    ToolKind kind;
+  struct Message {
+    geometry_msgs::PoseStamped::ConstPtr message;
+    std::chrono::steady_clock::time_point until;  // it waits for its transform
+  };
+  struct Input {
+    std::string name;  // of the topic or parameter
+    ToolKind tool;
     std::string follow_frame;
-    ToolMotion motion;
-    ros::Time frame_stamp;  // of the transform that was last followed
-    bool posted = false;    // a move waits in the runner: no second one behind it
+    ros::Time frame_stamp;        // of the transform that was last followed
+    std::deque<Message> waiting;  // the oldest first
   };
 
-  void onServo(Tool& tool, const geometry_msgs::PoseStamped::ConstPtr& message);
+  void onServo(Input& input, const geometry_msgs::PoseStamped::ConstPtr& message);
   void onJaw(const sensor_msgs::JointState::ConstPtr& message);
+  void look();
+  void hearWaiting(Input& input);
+  void follow(Input& input);
+  void hear(const Input& input, const Pose& pose, const ros::Time& stamp);
   void reject(const std::string& input, const Error& error);
-  void follow();
-  void watch();
-  void hear(Tool& tool, const Pose& pose, const ros::Time& stamp, const std::string& input);
-  void postMove(Tool& tool);
-  void move(Tool& tool, World& world);
-  void movePick(Tool& tool, World& world);
-  void movePush(Tool& tool, World& world);
-  void moveScissors(Tool& tool, World& world);
-  void lift(Tool& tool);
 
-  NodeSettings settings_;
-  WorldRunner& runner_;
   Frames& frames_;
   Rejections& rejections_;
+  StreamedTools tools_;
 
-  mutable std::mutex mutex_;  // of all below; the runner's jobs take it too
-  std::array<Tool, 3> tools_;
-  double watched_ = 0.0;    // [s] the last look for silence
-  double jaw_angle_ = 0.5;  // [rad]
-  bool jaw_armed_ = false;
-
+  std::mutex mutex_;  // of the inputs
+  std::array<Input, 3> inputs_;
   std::vector<ros::Subscriber> subscribers_;
-  ros::WallTimer follow_timer_;
-  ros::WallTimer watch_timer_;  // runs while a tool is there
+  ros::WallTimer look_timer_;
 };
 
 }  // namespace meshless

@@ -10,6 +10,9 @@ namespace meshless {
 
 class ToolMotion {
  public:
+  /// [s] of movement and of silence that one call makes up for at most: who comes late neither jumps nor was silent.
+  static constexpr double kLongestTick = 0.05;
+
   struct Limits {
     double speed = 5.0;        // [m/s]
     double turn_speed = 50.0;  // [rad/s]
@@ -23,8 +26,9 @@ class ToolMotion {
   /// at once.
   Status hear(const Pose& wanted, double stamp, double now);
   /// Another sign of life of the same tool, such as its jaw's.
-  void keepAlive(double now) { heard_ = now; }
-  /// True once the silence has lasted: the tool is to be lifted. Once only; hear() begins anew.
+  void keepAlive(double now);
+  /// True once the silence has lasted: the tool is to be lifted. Once only; hear() begins anew. To be asked all the
+  /// time: who asks late was held up itself, and what the stream said is still on its way to hear().
   bool fellSilent(double now);
   bool alive() const { return alive_; }
   bool arrived() const { return arrived_; }
@@ -39,7 +43,7 @@ class ToolMotion {
  private:
   Limits limits_;
   Pose wanted_, pose_;
-  double stamp_ = 0.0, heard_ = 0.0, advanced_ = 0.0;
+  double stamp_ = 0.0, looked_ = 0.0, silent_ = 0.0, advanced_ = 0.0;
   bool alive_ = false;
   bool arrived_ = true;
 };

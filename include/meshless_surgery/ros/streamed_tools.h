@@ -1,0 +1,65 @@
+// Tools that streams move: each goes where its stream says at a bounded speed, and is lifted off when the stream falls
+// silent. No ROS in here but the clock: see ToolInputs for the topics and frames.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <mutex>
+
+#include "meshless_surgery/ros/clock.h"
+#include "meshless_surgery/ros/settings.h"
+#include "meshless_surgery/ros/tool_motion.h"
+#include "meshless_surgery/world/world.h"
+
+namespace meshless {
+
+constexpr double kJawOpen = 0.1;     // [rad] the jaw must have been opened beyond ...
+constexpr double kJawClosed = 0.02;  // [rad] ... and close below, to cut
+
+class StreamedTools {
+ public:
+  /// Has a job done between two steps, later or at once, without waiting for it: WorldRunner::post.
+  using Post = std::function<void(std::function<void(World&)>)>;
+  /// A cut of the jaw that was refused.
+  using Refused = std::function<void(const Error&)>;
+
+  /// `clock` outlives it.
+  StreamedTools(const NodeSettings& settings, const Clock& clock, Post post, Refused refused);
+
+  /// What a stream said; `stamp` is its own [s], 0 where it has none. Refused as by ToolMotion::hear.
+  Status hear(ToolKind tool, const Pose& pose, double stamp);
+  /// The opening of the jaw [rad]. Closed after it was open: all that the blades meet is cut.
+  void hearJaw(double angle);
+  /// To be called at least every ToolMotion::kLongestTick: tools go on, and those whose streams are silent are lifted.
+  void look();
+
+  /// Where its stream last wanted a tool, while the stream speaks.
+  std::optional<Pose> hand(ToolKind tool) const;
+
+ private:
+  struct Tool {
+    std::string name;
+    ToolKind kind;
+    ToolMotion motion;
+    bool posted = false;  // a move waits for the world: no second one behind it
+  };
+
+  void postMove(Tool& tool);
+  void move(Tool& tool, World& world);
+  void movePick(Tool& tool, World& world);
+  void movePush(Tool& tool, World& world);
+  void moveScissors(Tool& tool, World& world);
+  void lift(Tool& tool);
+
+  const NodeSettings settings_;
+  const Clock& clock_;
+  const Post post_;
+  const Refused refused_;
+
+  mutable std::mutex mutex_;  // of all below; the posted jobs take it too
+  std::array<Tool, 3> tools_;
+  double jaw_angle_ = 0.5;  // [rad]
+  bool jaw_armed_ = false;
+};
+
+}  // namespace meshless

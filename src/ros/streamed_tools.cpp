@@ -1,0 +1,151 @@
+#include "meshless_surgery/ros/streamed_tools.h"
+
+#include <algorithm>
+
+#include "meshless_surgery/ros/border_check.h"
+#include "meshless_surgery/ros/convert.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kTurnSpeed = 50.0;  // [rad/s]
+constexpr double kUnbounded = 1e12;
+
+}  // namespace
+
+StreamedTools::StreamedTools(const NodeSettings& settings, const Clock& clock, Post post, Refused refused)
+    : settings_(settings),
+      clock_(clock),
+      post_(std::move(post)),
+      refused_(std::move(refused)),
+      tools_{Tool{"pick", ToolKind::kPick, ToolMotion({settings.pick_max_speed, kTurnSpeed, settings.tools_silence})},
+             // The world itself holds the sphere to its speed, in simulated time.
+             Tool{"push", ToolKind::kPush, ToolMotion({kUnbounded, kUnbounded, settings.tools_silence})},
+             Tool{"scissors", ToolKind::kScissors,
+                  ToolMotion({settings.scissors_max_speed, kTurnSpeed, settings.tools_silence})}} {}
+
+std::optional<Pose> StreamedTools::hand(ToolKind tool) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const ToolMotion& motion = tools_[static_cast<std::size_t>(tool)].motion;
+  return motion.alive() ? std::optional<Pose>(motion.wanted()) : std::nullopt;
+}
+
+Status StreamedTools::hear(ToolKind kind, const Pose& pose, double stamp) {
+  Tool& tool = tools_[static_cast<std::size_t>(kind)];
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (const Status heard = tool.motion.hear(pose, stamp, clock_.now()); !heard.ok()) return heard;
+  }
+  postMove(tool);
+  return Done{};
+}
+
+void StreamedTools::look() {
+  for (Tool& tool : tools_) {
+    bool silent = false;
+    bool under_way = false;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      silent = tool.motion.fellSilent(clock_.now());
+      under_way = tool.motion.alive() && !tool.motion.arrived();
+      if (silent && tool.kind == ToolKind::kScissors) jaw_armed_ = false;
+    }
+    if (silent) lift(tool);
+    if (under_way) postMove(tool);
+  }
+}
+
+void StreamedTools::postMove(Tool& tool) {
+  {
+    // A world that is late must not gather them.
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (tool.posted) return;
+    tool.posted = true;
+  }
+  post_([this, &tool](World& world) { move(tool, world); });
+}
+
+void StreamedTools::move(Tool& tool, World& world) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  tool.posted = false;
+  if (!tool.motion.alive()) return;  // silent since
+  if (tool.kind == ToolKind::kPick) movePick(tool, world);
+  if (tool.kind == ToolKind::kPush) movePush(tool, world);
+  if (tool.kind == ToolKind::kScissors) moveScissors(tool, world);
+}
+
+void StreamedTools::movePick(Tool& tool, World& world) {
+  const auto held = world.heldPick();
+  // From where the spring's end is: it may have been taken into the hand just now.
+  if (held) tool.motion.putAt(held->target);
+  tool.motion.advance(clock_.now());
+  if (!held) return;
+  MovePickCommand command;
+  command.pick = held->id;
+  command.target = tool.motion.pose().translation;
+  (void)world.apply(command);
+}
+
+void StreamedTools::movePush(Tool& tool, World& world) {
+  tool.motion.advance(clock_.now());
+  PushCommand command;
+  command.position = tool.motion.pose().translation;
+  command.streamed = true;
+  // It appears where the stream is, and from then on travels, in the size that it has.
+  if (world.push().enabled) {
+    command.radius = world.push().radius;
+    command.speed = settings_.push_max_speed;
+  }
+  (void)world.apply(command);
+}
+
+void StreamedTools::moveScissors(Tool& tool, World& world) {
+  tool.motion.advance(clock_.now());
+  world.setScissors(bladesAt(tool.motion.pose(), settings_.scissors_length, settings_.scissors_width), jaw_angle_);
+}
+
+void StreamedTools::lift(Tool& tool) {
+  post_([this, &tool](World& world) {
+    LiftCommand command;
+    command.tool = tool.kind;
+    command.streamed_only = true;
+    command.why = "the " + tool.name + " was lifted off: its stream was silent for " +
+                  formatNumber(settings_.tools_silence) + " s";
+    if (tool.kind == ToolKind::kPick) {
+      const auto held = world.heldPick();
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (!held || held->target != tool.motion.pose().translation) return;  // somebody else has moved it
+    }
+    (void)world.apply(command);
+  });
+}
+
+void StreamedTools::hearJaw(double angle) {
+  bool closes = false;
+  Pose pose;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    jaw_angle_ = angle;
+    if (angle > kJawOpen) jaw_armed_ = true;
+    if (angle < kJawClosed && jaw_armed_) {
+      jaw_armed_ = false;
+      closes = true;
+    }
+    ToolMotion& motion = tools_[static_cast<std::size_t>(ToolKind::kScissors)].motion;
+    if (!motion.alive()) return;  // nobody said (yet, or any more) where the scissors are
+    motion.keepAlive(clock_.now());
+    pose = motion.pose();
+  }
+  const Blades blades = bladesAt(pose, settings_.scissors_length, settings_.scissors_width);
+  post_([this, blades, angle, closes](World& world) {
+    world.setScissors(blades, angle);
+    if (!closes) return;
+    CutCommand command;
+    command.blades = blades;
+    const auto reply = world.apply(command);
+    // Cutting the air is no fault of the input.
+    if (!reply.ok() && reply.error().code != ErrorCode::kMissed) refused_(reply.error());
+  });
+}
+
+}  // namespace meshless

@@ -1,0 +1,280 @@
+#include "meshless_surgery/ros/streamed_tools.h"
+
+#include "ros/tool_bench.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kSpeed = 0.5;  // [m/s]
+constexpr std::size_t kPick = 0, kPush = 1, kScissors = 2;
+
+NodeSettings slowTools() {
+  NodeSettings settings;
+  settings.pick_max_speed = settings.push_max_speed = settings.scissors_max_speed = kSpeed;
+  settings.scissors_length = settings.scissors_width = 0.3;
+  return settings;
+}
+
+ToolBench::Hand still(const Vec3& place) {
+  return [place](double) { return poseAt(place); };
+}
+
+/// Blades in the plane x = const, reaching along y.
+Pose acrossX(double x) {
+  Mat3 axes;
+  axes.col(0) = Vec3::UnitY();
+  axes.col(1) = Vec3::UnitZ();
+  axes.col(2) = Vec3::UnitX();
+  Pose pose;
+  pose.rotation = Quat(axes);
+  pose.translation = Vec3(x, -0.15, 0.0);
+  return pose;
+}
+
+TEST(StreamedTools, ThePickFollowsACircleAndIsLetGoWhenItsStreamHasBeenSilent) {
+  ToolBench bench(slowTools());
+  const PickReply picked = bench.pick();
+  const auto circle = [&](double time) {
+    const double angle = 2.0 * M_PI * time;
+    return Vec3(picked.position + 0.02 * Vec3(0, std::sin(angle), 1.0 - std::cos(angle)));
+  };
+  bench.hands[kPick] = [&](double time) { return poseAt(circle(time)); };
+  double farthest = 0.0;
+  Vec3 low = Vec3::Zero(), high = Vec3::Zero();
+  bench.after_each = [&](double time) {
+    if (time < 0.1) return;
+    const auto held = bench.world->heldPick();
+    ASSERT_TRUE(held);
+    farthest = std::max(farthest, (held->target - circle(time)).norm());
+    low = low.cwiseMin(held->target - picked.position);
+    high = high.cwiseMax(held->target - picked.position);
+  };
+  bench.run(1.25);
+  EXPECT_LT(farthest, 0.02 * 2.0 * M_PI * 2.0 * ToolBench::kStream);  // two messages late at most
+  EXPECT_LT(low.y(), -0.019);
+  EXPECT_GT(high.y(), 0.019);
+  EXPECT_GT(high.z(), 0.039);
+
+  bench.hands[kPick] = {};
+  bench.after_each = [](double) {};
+  bench.run(bench.settings.tools_silence - 0.01);
+  EXPECT_TRUE(bench.world->heldPick());
+  EXPECT_TRUE(bench.tools.hand(ToolKind::kPick));
+  bench.run(0.02);
+  EXPECT_FALSE(bench.world->heldPick());
+  EXPECT_FALSE(bench.tools.hand(ToolKind::kPick));
+  const auto lifted = bench.said(EventType::kLifted);
+  ASSERT_EQ(lifted.size(), 1u);
+  EXPECT_EQ(lifted[0].pick, picked.pick);
+  EXPECT_NE(lifted[0].text.find("the pick was lifted off: its stream was silent for 0.5 s"), std::string::npos);
+}
+
+TEST(StreamedTools, AJumpIsMadeAtABoundedSpeed) {
+  for (const std::size_t tool : {kPick, kPush, kScissors}) {
+    ToolBench bench(slowTools());
+    const Vec3 start = tool == kPick ? bench.pick().position : Vec3(0, 0, 1.0);
+    const auto place = [&]() -> Vec3 {
+      if (tool == kPick) return bench.world->heldPick()->target;
+      return tool == kPush ? bench.world->push().position : bench.world->scissors().blades.origin;
+    };
+    bench.hands[tool] = still(start);
+    bench.run(0.1);
+    bench.hands[tool] = still(start + Vec3(0, 0, 0.3));
+    const double begun = bench.now();
+    double steepest = 0.0, before = place().z(), arrived = 0.0;
+    bench.after_each = [&](double time) {
+      steepest = std::max(steepest, place().z() - before);
+      before = place().z();
+      if (arrived == 0.0 && place().z() > start.z() + 0.3 - 1e-9) arrived = time;
+    };
+    bench.run(1.0);
+    // A message's or a step's worth at once, and a look's and a stream's gap more at the begin.
+    EXPECT_LT(steepest, kSpeed * 0.0125) << tool;
+    EXPECT_NEAR(arrived - begun, 0.3 / kSpeed, 0.02) << tool;
+  }
+}
+
+TEST(StreamedTools, AToolGoesOnToWhereItsStreamLastWantedIt) {
+  for (const std::size_t tool : {kPick, kScissors}) {
+    ToolBench bench(slowTools());
+    const Vec3 start = tool == kPick ? bench.pick().position : Vec3(0, 0, 1.0);
+    const Vec3 end = start + Vec3(0, 0, 0.15);  // 0.3 s away
+    ASSERT_TRUE(bench.tools.hear(static_cast<ToolKind>(tool), poseAt(start), 0.0).ok());
+    bench.run(0.01);
+    ASSERT_TRUE(bench.tools.hear(static_cast<ToolKind>(tool), poseAt(end), 0.0).ok());
+    bench.run(0.35);
+    const Vec3 place = tool == kPick ? bench.world->heldPick()->target : bench.world->scissors().blades.origin;
+    EXPECT_LT((place - end).norm(), 1e-9) << tool;
+  }
+}
+
+TEST(StreamedTools, AGapInAStreamIsNoLeaveToJump) {
+  ToolBench bench(slowTools());
+  const Vec3 start = bench.pick().position;
+  bench.hands[kPick] = still(start);
+  bench.run(0.1);
+  bench.hands[kPick] = {};
+  bench.run(0.4);
+  double before = start.y(), steepest = 0.0;
+  bench.after_each = [&](double) {
+    const double place = bench.world->heldPick()->target.y();
+    steepest = std::max(steepest, place - before);
+    before = place;
+  };
+  bench.hands[kPick] = still(start + Vec3(0, 0.3, 0));
+  bench.run(1.0);
+  EXPECT_LE(steepest, kSpeed * ToolMotion::kLongestTick + 1e-9);
+  EXPECT_NEAR(before, start.y() + 0.3, 1e-9);
+}
+
+TEST(StreamedTools, LateMessagesChangeNothingAndAreRefused) {
+  for (const std::size_t tool : {kPick, kPush, kScissors}) {
+    ToolBench bench(slowTools());
+    const Vec3 start = tool == kPick ? bench.pick().position : Vec3(0, 0, 1.0);
+    bench.hands[tool] = [&](double time) {
+      EXPECT_FALSE(time > 0.02 &&
+                   bench.tools.hear(static_cast<ToolKind>(tool), poseAt(Vec3(0, -5, 0)), 100.0 + time - 0.1).ok());
+      return poseAt(start);
+    };
+    bench.run(0.5);
+    EXPECT_LT((bench.tools.hand(static_cast<ToolKind>(tool))->translation - start).norm(), 1e-12);
+    if (tool == kPick) EXPECT_LT((bench.world->heldPick()->target - start).norm(), 1e-12);
+    if (tool == kPush) EXPECT_LT((bench.world->push().position - start).norm(), 1e-12);
+    if (tool == kScissors) EXPECT_LT((bench.world->scissors().blades.origin - start).norm(), 1e-12);
+  }
+}
+
+TEST(StreamedTools, GapsBelowTheSilenceLiftNothing) {
+  ToolBench bench(slowTools());
+  const Vec3 start = bench.pick().position;
+  bench.hands[kPick] = [&](double time) {
+    return std::fmod(time, 0.5) < 0.02 ? std::optional<Pose>(poseAt(start)) : std::nullopt;
+  };
+  bench.run(5.0);
+  EXPECT_TRUE(bench.world->heldPick());
+  EXPECT_TRUE(bench.said(EventType::kLifted).empty());
+}
+
+TEST(StreamedTools, WhileTheClockStandsNobodyIsSilent) {
+  ToolBench bench(slowTools());
+  bench.hands[kPush] = still(Vec3(0, 0, 1.0));
+  bench.run(0.1);
+  for (int i = 0; i < 10000; ++i) bench.tools.look();
+  EXPECT_TRUE(bench.tools.hand(ToolKind::kPush));
+  EXPECT_TRUE(bench.world->push().enabled);
+  // Nor is silence made up for where the clock was set: forth, and back.
+  bench.hand_clock.time = 1e6;
+  bench.tools.look();
+  bench.hand_clock.time = 50.0;
+  for (int i = 0; i < 100; ++i) bench.tools.look();
+  EXPECT_TRUE(bench.tools.hand(ToolKind::kPush));
+}
+
+// Its messages wait in a queue of ten while the stream goes on.
+TEST(StreamedTools, ANodeThatStoodStillLiftsNobodyOffAndDoesNotJump) {
+  for (const double seconds : {0.3, 0.7, 5.0}) {
+    ToolBench bench(slowTools());
+    const Vec3 start = bench.pick().position;
+    bench.hands[kPick] = [&](double time) { return poseAt(start + Vec3(0, 0.1 * time, 0)); };
+    bench.hands[kPush] = still(Vec3(0, 0, 1.0));
+    bench.stands_still = [&](double time) { return time > 1.0 && time < 1.0 + seconds; };
+    double before = start.y(), steepest = 0.0;
+    bench.after_each = [&](double) {
+      const double place = bench.world->heldPick()->target.y();
+      steepest = std::max(steepest, place - before);
+      before = place;
+    };
+    bench.run(1.0 + seconds + 2.0);
+    EXPECT_TRUE(bench.said(EventType::kLifted).empty()) << seconds;
+    EXPECT_LE(steepest, kSpeed * ToolMotion::kLongestTick + 1e-9) << seconds;
+    EXPECT_NEAR(before, start.y() + 0.1 * (3.0 + seconds), 0.002) << seconds;
+  }
+}
+
+TEST(StreamedTools, ALockedPickAndOneThatOthersMovedAreNotLifted) {
+  ToolBench bench(slowTools());
+  const PickReply locked = bench.pick();
+  bench.hands[kPick] = still(locked.position + Vec3(0, 0.01, 0));
+  bench.run(0.1);
+  bench.hands[kPick] = {};
+  LockCommand lock;
+  lock.pick = locked.pick;
+  ASSERT_TRUE(bench.world->apply(lock).ok());
+  const PickReply free = bench.pick();
+  MovePickCommand move;
+  move.pick = free.pick;
+  move.target = Vec3(-0.15, 0, 0.02);
+  ASSERT_TRUE(bench.world->apply(move).ok());
+  bench.run(1.5);
+  EXPECT_FALSE(bench.tools.hand(ToolKind::kPick));
+  EXPECT_EQ(bench.world->snapshot({}).picks.size(), 2u);
+  EXPECT_TRUE(bench.said(EventType::kLifted).empty());
+}
+
+TEST(StreamedTools, TheSphereAppearsPushesAndIsLiftedOff) {
+  ToolBench bench(slowTools());
+  SnapshotWants measures{false, false, true};
+  const auto place = [&] { return bench.world->snapshot(measures).bodies[0].measures.centre_of_mass.x(); };
+  const double before = place();
+  bench.hands[kPush] = [](double time) { return poseAt(Vec3(-0.12 + 0.2 * time, 0, 0)); };
+  bench.run(0.5);
+  EXPECT_GT(place(), before + 0.005);
+  EXPECT_FALSE(bench.said(EventType::kTouched).empty());
+  bench.hands[kPush] = {};
+  bench.run(0.6);
+  EXPECT_FALSE(bench.world->push().enabled);
+  EXPECT_EQ(bench.said(EventType::kLifted).size(), 1u);
+}
+
+TEST(StreamedTools, ASphereThatAServicePlacedStays) {
+  ToolBench bench(slowTools());
+  bench.hands[kPush] = still(Vec3(0, 0, 1.0));
+  bench.run(0.1);
+  bench.hands[kPush] = {};
+  PushCommand push;
+  push.position = Vec3(0, 0, 1.2);
+  ASSERT_TRUE(bench.world->apply(push).ok());
+  bench.run(1.5);
+  EXPECT_TRUE(bench.world->push().enabled);
+  EXPECT_EQ(bench.world->push().position.z(), 1.2);
+  EXPECT_TRUE(bench.said(EventType::kLifted).empty());
+}
+
+TEST(StreamedTools, TheScissorsCutOnceWhenTheJawClosesAndAreLiftedOff) {
+  ToolBench bench(slowTools());
+  bench.tools.hearJaw(0.6);  // nobody has said where the blades are
+  bench.tools.hearJaw(0.0);
+  bench.run(0.1);
+  EXPECT_TRUE(bench.said(EventType::kCut).empty());
+  bench.hands[kScissors] = [](double) { return acrossX(0.01); };
+  bench.run(0.1);
+  for (const double angle : {0.05, 0.0}) bench.tools.hearJaw(angle);  // was never open
+  bench.run(0.1);
+  EXPECT_TRUE(bench.said(EventType::kCut).empty());
+  for (const double angle : {0.6, 0.3, 0.05, 0.01, 0.0, 0.01, 0.05, 0.0}) {
+    bench.tools.hearJaw(angle);
+    bench.run(0.01);
+  }
+  EXPECT_EQ(bench.said(EventType::kCut).size(), 1u);
+  EXPECT_EQ(bench.world->snapshot({}).bodies.size(), 3u);
+  // The jaw's messages are a sign of life too.
+  bench.hands[kScissors] = {};
+  for (int i = 0; i < 10; ++i) {
+    bench.run(0.2);
+    bench.tools.hearJaw(0.6);
+  }
+  EXPECT_TRUE(bench.world->scissors().shown);
+  bench.run(0.6);
+  EXPECT_FALSE(bench.world->scissors().shown);
+  EXPECT_EQ(bench.said(EventType::kLifted).size(), 1u);
+  // A jaw that was open when they were lifted does not cut where they come back.
+  bench.hands[kScissors] = [](double) { return acrossX(0.51); };
+  bench.run(0.1);
+  bench.tools.hearJaw(0.0);
+  bench.run(0.1);
+  EXPECT_EQ(bench.said(EventType::kCut).size(), 1u);
+  EXPECT_TRUE(bench.refused.empty());
+}
+
+}  // namespace
+}  // namespace meshless
