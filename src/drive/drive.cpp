@@ -60,9 +60,7 @@ class Run {
     return Done{};
   }
 
-  /// After it the bands, which another run looks at, hold what this one did.
-  void play(const VolumeBands& bands) {
-    bands_ = bands;
+  void play() {
     began_ = processorSeconds();
     while (options_.hands && withinBudget() && hand_.act(world_)) step(false);
     report_.hand = hand_.counts();
@@ -84,7 +82,7 @@ class Run {
     if (!report_.state) keepState();
   }
 
-  const VolumeBands& seenBands() const { return seen_bands_; }
+  const std::vector<PieceVolume>& volumes() const { return volumes_; }
 
  private:
   bool withinBudget() const { return processorSeconds() - began_ <= options_.budget; }
@@ -121,10 +119,12 @@ class Run {
 
   void look(const Seen& seen) {
     note(Law::kFinite, seen.time, finiteLaw(seen));
-    widenBands(seen, seen_bands_);
     if (report_.findings[static_cast<std::size_t>(Law::kFinite)].broken()) return;  // the others would say so again
     note(Law::kMass, seen.time, massLaw(start_, seen));
-    note(Law::kVolume, seen.time, volumeLaw(seen, bands_));
+    for (PieceVolume& piece : volumesOf(seen)) {
+      if (piece.elastic) note(Law::kVolume, volumeLaw({piece}, {}));
+      volumes_.push_back(std::move(piece));
+    }
     note(Law::kDepth, seen.time, depthLaw(seen));
     note(Law::kCrossings, seen.time, crossingLaw(seen));
     note(Law::kFolds, seen.time, foldLaw(seen));
@@ -147,10 +147,12 @@ class Run {
     return reply;
   }
 
-  void note(Law law, double time, Finding finding) {
-    Finding& worst = report_.findings[static_cast<std::size_t>(law)];
+  void note(Law law, double time, const Finding& finding) {
+    note(law, {finding.score, words(time, " s: ", finding.text)});
+  }
+  void note(Law law, const Finding& finding) {
     const bool first = finding.broken() && report_.broken() == 0;
-    worst.take(finding.score, words(time, " s: ", finding.text));
+    report_.findings[static_cast<std::size_t>(law)].take(finding);
     if (first && options_.record) keepState();
   }
 
@@ -165,10 +167,16 @@ class Run {
   Hand hand_;
   double began_ = 0.0;
   MassBooks start_;
-  VolumeBands bands_, seen_bands_;
+  std::vector<PieceVolume> volumes_;
   std::optional<Seen> falling_;  // since then, freely
   std::vector<AloneLook> alone_;
 };
+
+std::vector<PieceVolume> ofLooks(std::vector<PieceVolume> pieces) {
+  pieces.erase(std::remove_if(pieces.begin(), pieces.end(), [](const PieceVolume& piece) { return piece.elastic; }),
+               pieces.end());
+  return pieces;
+}
 
 }  // namespace
 
@@ -197,25 +205,26 @@ DriveReport drive(const DriveScene& scene, const DriveOptions& options) {
   }
   report.family = any_elastic && any_looks ? "mixed" : any_elastic ? "elastic" : "looks";
 
-  VolumeBands bands;
-  if (any_looks && options.cuts) {  // what the same bodies do uncut
-    DriveReport uncut;
-    DriveOptions without = options;
-    without.record = false;
-    Run run(scene, without, false, uncut);
-    if (Status status = run.setUp(scene); !status) {
-      report.refused = status.error().detail;
-      return report;
-    }
-    run.play({});
-    bands = run.seenBands();
-  }
   Run run(scene, options, options.cuts, report);
   if (Status status = run.setUp(scene); !status) {
     report.refused = status.error().detail;
     return report;
   }
-  run.play(bands);
+  run.play();
+  const std::vector<PieceVolume> looks = ofLooks(run.volumes());
+  if (!report.finished || !options.cuts || !volumeLaw(looks, {}).broken()) return report;
+
+  // Materials for looks may do what they do uncut.
+  DriveReport uncut;
+  DriveOptions without = options;
+  without.record = false;
+  Run other(scene, without, false, uncut);
+  VolumeBands bands;
+  if (other.setUp(scene)) {
+    other.play();
+    widenBands(ofLooks(other.volumes()), bands);
+  }
+  report.findings[static_cast<std::size_t>(Law::kVolume)].take(volumeLaw(looks, bands));
   return report;
 }
 

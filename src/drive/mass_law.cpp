@@ -25,10 +25,11 @@ Finding massLaw(const MassBooks& start, const Seen& seen) {
   Finding worst;
   for (const auto& [root, mass] : start.mass)
     worst.take(std::abs(now.mass[root] - mass) / (kMassRounding * mass),
-               words("the pieces of ", root, " weigh ", now.mass[root] / mass, " of it"));
+               words("the pieces of ", root, " weigh ", now.mass[root] / mass - 1.0, " of it more"));
   for (const auto& [root, volume] : start.rest_volume)
     worst.take(std::abs(now.rest_volume[root] - volume) / (kVolumeRounding * volume),
-               words("the rest volumes of ", root, "'s pieces are ", now.rest_volume[root] / volume, " of its own"));
+               words("the rest volumes of ", root, "'s pieces are ", now.rest_volume[root] / volume - 1.0,
+                     " of its own more"));
   for (const auto& [root, mass] : now.mass)
     if (!start.mass.count(root)) worst.take(2.0, root + " was not there at the start");
   return worst;

@@ -13,7 +13,7 @@
 namespace meshless {
 namespace {
 
-constexpr int kTries = 40, kRefinements = 10;
+constexpr int kTries = 40, kRefinements = 4;
 constexpr int kRelaxations = 12;         // of the surface's vertices: enough for even triangles
 constexpr double kTrianglesPerCell = 3;  // triangles of a surface net in a cell's square of area, over all directions
 constexpr std::size_t kDraft = 4000;     // triangles of the mesh that shows genus and area
@@ -138,7 +138,7 @@ Result<TriangleMesh> randomOrgan(std::uint64_t seed, int genus, double size, std
     const TriangleMesh draft = surfaceOf(organ, draft_cell, 2);
     if (draft.empty() || inspectMesh(draft, false).components != 1 || genusOf(draft) != genus) continue;
     double cell = std::sqrt(kTrianglesPerCell * surfaceArea(draft) / static_cast<double>(triangles));
-    for (int refinement = 0; refinement < kRefinements; ++refinement, cell *= 0.9) {
+    for (int refinement = 0; refinement < kRefinements; ++refinement, cell *= 0.85) {
       TriangleMesh mesh = surfaceOf(organ, cell, kRelaxations);
       if (!isSound(mesh, genus)) continue;
       const Box box = boundsOf(mesh.vertices);

@@ -10,9 +10,9 @@ namespace meshless {
 
 struct DriveOptions {
   bool cuts = true;
-  bool hands = true;      // false: the scene is left alone from the start
-  double budget = 120.0;  // [s] of processor time for steps and looks; beyond it the scene is given up
-  bool record = false;    // keep the log of commands and a state
+  bool hands = true;     // false: the scene is left alone from the start
+  double budget = 60.0;  // [s] of processor time for steps and looks; beyond it the scene is given up
+  bool record = false;   // keep the log of commands and a state
 };
 
 struct DriveReport {
@@ -42,8 +42,9 @@ struct DriveReport {
 };
 
 /// Half a second to settle, the hand, then five seconds alone. Laws are looked at after every simulated second and at
-/// the end; masses, momenta and energies twelve times a second and around each cut. Where materials for looks are cut,
-/// the scene is first played without cuts, for the volume law.
+/// the end; masses, momenta and energies twelve times a second and around each cut. Where a material for looks leaves
+/// the elastic ones' band of volume, the scene is played again without cuts, to see what it does then; of a scene that
+/// did not finish or that is not cut its volume is not judged.
 DriveReport drive(const DriveScene& scene, const DriveOptions& options = {});
 
 }  // namespace meshless

@@ -6,6 +6,17 @@
 
 namespace meshless {
 
+/// Of a piece, at one time.
+struct PieceVolume {
+  double time = 0.0;  // [s]
+  std::string name;
+  bool elastic = false;
+  double ratio = 1.0;  // present over rest volume
+};
+
+/// Of the pieces that no hand is on: what is stretched may grow by what its Poisson's ratio says. A surface is needed.
+std::vector<PieceVolume> volumesOf(const Seen& seen);
+
 /// Of present over rest volume.
 struct VolumeBand {
   double low = 0.9, high = 1.1;
@@ -13,13 +24,12 @@ struct VolumeBand {
 /// By the root's name, of materials for looks: what the same body does in the same scene without cuts.
 using VolumeBands = std::map<std::string, VolumeBand>;
 
-/// Each piece whose material is elastic, between 0.9 and 1.1 of its rest volume; the others in their root's band, which
-/// is no narrower than that; without a band they are not looked at. Bodies that a hand is on are not looked at: what is
-/// stretched may grow by what its Poisson's ratio says.
-Finding volumeLaw(const Seen& seen, const VolumeBands& bands);
+/// Each piece whose material is elastic, between 0.9 and 1.1 of its rest volume; the others in their root's band, and
+/// in the same where it has none.
+Finding volumeLaw(const std::vector<PieceVolume>& pieces, const VolumeBands& bands);
 
-/// Widens each body's band by what it does now, and kBandMargin.
-void widenBands(const Seen& seen, VolumeBands& bands);
+/// Widens each body's band by what it did, and kBandMargin.
+void widenBands(const std::vector<PieceVolume>& pieces, VolumeBands& bands);
 constexpr double kBandMargin = 0.02;
 
 }  // namespace meshless
