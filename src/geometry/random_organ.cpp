@@ -13,7 +13,7 @@
 namespace meshless {
 namespace {
 
-constexpr int kTries = 40, kRefinements = 4;
+constexpr int kTries = 400, kRefinements = 4;
 constexpr int kRelaxations = 12;         // of the surface's vertices: enough for even triangles
 constexpr double kTrianglesPerCell = 3;  // triangles of a surface net in a cell's square of area, over all directions
 constexpr std::size_t kDraft = 4000;     // triangles of the mesh that shows genus and area

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <fstream>
 #include <iostream>
@@ -41,6 +42,10 @@ std::string shippedMaterials() {
   }
   return MATERIALS_FOLDER;
 }
+
+/// Ctrl-C: the scenes that are being played are the last; what was found until then is said.
+volatile std::sig_atomic_t enough = 0;
+void stop(int) { enough = 1; }
 
 /// Of the worst so far alone: a log has some megabytes.
 void dropLogs(std::vector<std::unique_ptr<DriveReport>>& done) {
@@ -126,13 +131,15 @@ int main(int argc, char** argv) {
   std::vector<std::unique_ptr<DriveReport>> done(count);
   std::mutex mutex;
   std::uint64_t next = 0, printed = 0;
+  std::signal(SIGINT, stop);
+  std::signal(SIGTERM, stop);
   meshless::printHead(std::cout);
   const auto work = [&] {
     for (;;) {
       std::uint64_t mine = 0;
       {
         const std::lock_guard<std::mutex> lock(mutex);
-        if (next == count) return;
+        if (next == count || enough) return;
         mine = next++;
       }
       auto report = std::make_unique<DriveReport>();
@@ -155,7 +162,8 @@ int main(int argc, char** argv) {
   for (std::thread& thread : threads) thread.join();
 
   std::vector<DriveReport> reports;
-  for (const auto& report : done) reports.push_back(std::move(*report));
+  for (const auto& report : done)
+    if (report) reports.push_back(std::move(*report));
   meshless::printSummary(std::cout, reports);
   bool written = true;
   if (!out.empty()) {
@@ -174,7 +182,7 @@ int main(int argc, char** argv) {
     if (written) std::cout << "Written to " << out << '\n';
   }
   if (!written) return 2;
-  for (const DriveReport& report : reports)
-    if (!report.holds()) return 1;
-  return 0;
+  const bool all_hold =
+      std::all_of(reports.begin(), reports.end(), [](const DriveReport& report) { return report.holds(); });
+  return all_hold && reports.size() == count ? 0 : 1;
 }
