@@ -71,6 +71,7 @@ set(shares_contact 2)
 set(links_io ${PROJECT_NAME}_io ZLIB::ZLIB)
 set(links_world ZLIB::ZLIB)  # forged states have the right checksum
 set(links_stress ${PROJECT_NAME}_io)
+set(links_drive ${PROJECT_NAME}_drive)
 set(links_accuracy bench_truth bench_pile)
 
 # The accuracy tests are many steps of plain arithmetic: nothing that sanitizers have not seen in the rooms.

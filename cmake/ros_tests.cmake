@@ -8,6 +8,7 @@ file(GLOB ros_unit_tests CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/test/ros/
 add_test_program(ros 1 SOURCES ${ros_unit_tests} LABELS ros LINKS ${PROJECT_NAME}_ros ${catkin_LIBRARIES})
 target_include_directories(ros_tests SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
 add_dependencies(check_ros deformer_node make_meshes replay ${PROJECT_NAME}_generate_messages)
+add_dependencies(check_drive drive)  # scripts/check plays random scenes with it
 add_custom_target(check_rviz DEPENDS deformer_node ${PROJECT_NAME}_generate_messages)
 if(TARGET ${PROJECT_NAME}_rviz)
   add_dependencies(check_rviz ${PROJECT_NAME}_rviz)

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
+#include "implicit_shapes.h"
 #include "isosurface.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/mesh_check.h"
@@ -12,54 +12,12 @@
 namespace meshless {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
-/// Union with a fillet about k [m] wide.
-double blend(double a, double b, double k) {
-  const double h = std::max(k - std::abs(a - b), 0.0) / k;
-  return std::min(a, b) - 0.25 * k * h * h;
-}
 double carve(double solid, double tool, double k) { return -blend(-solid, tool, k); }
-
-/// Distance to an ellipsoid, to first order near its surface.
-double ellipsoid(const Vec3& p, const Vec3& radii) {
-  const Vec3 scaled = p.cwiseQuotient(radii);
-  const double norm = scaled.norm();
-  const double slope = scaled.cwiseQuotient(radii).norm();
-  return slope > 0.0 ? (norm - 1.0) * norm / slope : -radii.minCoeff();
-}
 
 Vec3 turnedZ(const Vec3& p, double angle) {
   const double c = std::cos(angle), s = std::sin(angle);
   return {c * p.x() + s * p.y(), c * p.y() - s * p.x(), p.z()};
 }
-
-/// Smooth, seeded, about -1..1: a few plane waves of wavelengths near `wavelength` [m].
-class Unevenness {
- public:
-  Unevenness(unsigned seed, double wavelength) {
-    // mt19937's numbers are the same everywhere, those of the standard distributions are not.
-    std::mt19937 random(seed);
-    const auto unit = [&] { return static_cast<double>(random()) / 4294967296.0; };
-    for (Wave& wave : waves_) {
-      const double z = 2.0 * unit() - 1.0, angle = 2.0 * kPi * unit(), r = std::sqrt(1.0 - z * z);
-      wave.number = 2.0 * kPi / (wavelength * (0.7 + 0.6 * unit())) * Vec3(r * std::cos(angle), r * std::sin(angle), z);
-      wave.phase = 2.0 * kPi * unit();
-    }
-  }
-  double at(const Vec3& p) const {
-    double sum = 0.0;
-    for (const Wave& wave : waves_) sum += std::sin(wave.number.dot(p) + wave.phase);
-    return sum / std::sqrt(static_cast<double>(waves_.size()) * 2.0);
-  }
-
- private:
-  struct Wave {
-    Vec3 number;
-    double phase;
-  };
-  std::array<Wave, 8> waves_;
-};
 
 /// One closed embedded surface about the origin. Where a fold falls so between the lattice's nodes that its two sides
 /// share an edge, a slightly finer lattice parts them.

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <random>
 
 #include "material_yaml.h"
+#include "meshless_surgery/base/random.h"
 #include "yaml_map.h"
 
 namespace meshless {
@@ -150,29 +150,6 @@ std::vector<Box> readFixed(YamlSource& source, const YAML::Node& node) {
   return boxes;
 }
 
-/// The same everywhere, which std::uniform_real_distribution is not.
-class Dice {
- public:
-  explicit Dice(std::uint64_t seed) : engine_(seed) {}
-  double between(double from, double to) {
-    return from + (to - from) * static_cast<double>(engine_() >> 11) * 0x1.0p-53;
-  }
-  Vec3 inCube(double half) {
-    const double x = between(-half, half), y = between(-half, half), z = between(-half, half);
-    return {x, y, z};
-  }
-  Vec3 direction() {
-    for (;;) {
-      const Vec3 p = inCube(1.0);
-      const double squared = p.squaredNorm();
-      if (squared > 1e-4 && squared <= 1.0) return p / std::sqrt(squared);
-    }
-  }
-
- private:
-  std::mt19937_64 engine_;
-};
-
 /// The poses of a body's copies; `start` is the first one's place.
 std::vector<Pose> readCopies(YamlSource& source, const YAML::Node& node, const Pose& start) {
   YamlMap map(source, node, "copies");
@@ -203,7 +180,7 @@ std::vector<Pose> readCopies(YamlSource& source, const YAML::Node& node, const P
   if (source.fault) return {};
   if (count == 0) count = static_cast<int>(places);
   std::vector<Pose> poses;
-  Dice dice(static_cast<std::uint64_t>(seed));
+  Random dice(static_cast<std::uint64_t>(seed));
   for (int k = 0; k < count; ++k) {
     const Vec3 place(k % grid[0], k / grid[0] % grid[1], k / grid[0] / grid[1]);
     Pose pose = start;

@@ -1,0 +1,17 @@
+// Nothing is inside another.
+#pragma once
+
+#include "meshless_surgery/drive/finding.h"
+#include "meshless_surgery/drive/seen.h"
+
+namespace meshless {
+
+/// [m] that a vertex may be inside another body: 1 mm, or a hundredth of the smaller body's size where that is more.
+double allowedDepth(double smaller_size);
+
+/// No vertex of a body is deeper than that inside another one, an obstacle or the ground, and none of an obstacle
+/// inside a body. Inside is where the other surface winds around the vertex (geometry/inside.h); the depth is the
+/// distance to that surface. Knows nothing of how contacts are found.
+Finding depthLaw(const Seen& seen);
+
+}  // namespace meshless

@@ -1,0 +1,35 @@
+// A solid keeps its volume.
+#pragma once
+
+#include "meshless_surgery/drive/finding.h"
+#include "meshless_surgery/drive/seen.h"
+
+namespace meshless {
+
+/// Of a piece, at one time.
+struct PieceVolume {
+  double time = 0.0;  // [s]
+  std::string name;
+  bool elastic = false;
+  double ratio = 1.0;  // present over rest volume
+};
+
+/// Of the pieces that no hand is on: what is stretched may grow by what its Poisson's ratio says. A surface is needed.
+std::vector<PieceVolume> volumesOf(const Seen& seen);
+
+/// Of present over rest volume.
+struct VolumeBand {
+  double low = 0.9, high = 1.1;
+};
+/// By the root's name, of materials for looks: what the same body does in the same scene without cuts.
+using VolumeBands = std::map<std::string, VolumeBand>;
+
+/// Each piece whose material is elastic, between 0.9 and 1.1 of its rest volume; the others in their root's band, and
+/// in the same where it has none.
+Finding volumeLaw(const std::vector<PieceVolume>& pieces, const VolumeBands& bands);
+
+/// Widens each body's band by what it did, and kBandMargin.
+void widenBands(const std::vector<PieceVolume>& pieces, VolumeBands& bands);
+constexpr double kBandMargin = 0.02;
+
+}  // namespace meshless

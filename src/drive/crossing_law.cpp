@@ -1,0 +1,90 @@
+#include "meshless_surgery/drive/crossing_law.h"
+
+#include <algorithm>
+
+#include "meshless_surgery/drive/depth_law.h"
+#include "meshless_surgery/geometry/inside.h"
+#include "meshless_surgery/geometry/measures.h"
+#include "words.h"
+
+namespace meshless {
+namespace {
+
+struct Surface {
+  const std::string* name;
+  const TriangleMesh* mesh;
+  Box bounds;
+  double size;
+};
+
+Box boxOf(const Vec3& p, const Vec3& q) {
+  Box box;
+  box.extend(p);
+  box.extend(q);
+  return box;
+}
+
+/// The segment goes through the triangle, and both ends are farther than `margin` from its plane.
+bool goesThrough(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c, double margin) {
+  const Vec3 normal = (b - a).cross(c - a).normalized();
+  const double at_p = normal.dot(p - a), at_q = normal.dot(q - a);
+  if (!(std::min(at_p, at_q) < -margin && std::max(at_p, at_q) > margin)) return false;
+  const Vec3 pa = a - p, pb = b - p, pc = c - p, d = q - p;
+  const double ab = d.dot(pa.cross(pb)), bc = d.dot(pb.cross(pc)), ca = d.dot(pc.cross(pa));
+  return (ab >= 0.0 && bc >= 0.0 && ca >= 0.0) || (ab <= 0.0 && bc <= 0.0 && ca <= 0.0);
+}
+
+bool goesThrough(const Vec3& p, const Vec3& q, const TriangleMesh& mesh, double margin) {
+  const Box box = boxOf(p, q);
+  return std::any_of(mesh.triangles.begin(), mesh.triangles.end(), [&](const Triangle& t) {
+    const Vec3 &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+    Box face = boxOf(a, b);
+    face.extend(c);
+    return face.overlaps(box) && goesThrough(p, q, a, b, c, margin);
+  });
+}
+
+std::size_t crossings(const Surface& a, const Surface& b) {
+  const double margin = 0.1 * allowedDepth(std::min(a.size, b.size));
+  std::vector<std::array<Index, 2>> edges;
+  for (const Triangle& t : a.mesh->triangles)
+    for (int k = 0; k < 3; ++k) {
+      const Index v = t[k], w = t[(k + 1) % 3];
+      if (v < w && boxOf(a.mesh->vertices[v], a.mesh->vertices[w]).overlaps(b.bounds)) edges.push_back({v, w});
+    }
+  if (edges.empty()) return 0;
+  const SolidQuery query(*b.mesh);
+  return static_cast<std::size_t>(std::count_if(edges.begin(), edges.end(), [&](const std::array<Index, 2>& edge) {
+    const Vec3 &p = a.mesh->vertices[edge[0]], &q = a.mesh->vertices[edge[1]];
+    return query.crosses(p, q) && goesThrough(p, q, *b.mesh, margin);
+  }));
+}
+
+}  // namespace
+
+Finding crossingLaw(const Seen& seen) {
+  std::vector<Surface> surfaces;
+  for (const SeenBody& body : seen.bodies)
+    surfaces.push_back({&body.name, &body.surface, boundsOf(body.surface.vertices), body.size});
+  const std::size_t bodies = surfaces.size();
+  for (const auto& obstacle : seen.obstacles) {
+    const Box bounds = boundsOf(obstacle->mesh.vertices);
+    surfaces.push_back({&obstacle->name, &obstacle->mesh, bounds, bounds.diagonal()});
+  }
+  std::size_t sum = 0, most = 0;
+  std::string where;
+  for (std::size_t a = 0; a < bodies; ++a)
+    for (std::size_t b = a + 1; b < surfaces.size(); ++b) {
+      if (!surfaces[a].bounds.overlaps(surfaces[b].bounds)) continue;
+      const std::size_t count = crossings(surfaces[a], surfaces[b]) + crossings(surfaces[b], surfaces[a]);
+      sum += count;
+      if (count <= most) continue;
+      most = count;
+      where = *surfaces[a].name + " and " + *surfaces[b].name;
+    }
+  Finding worst;
+  if (sum > 0) worst.take(1.0 + static_cast<double>(sum), words(sum, " edges go through faces, most of ", where));
+  return worst;
+}
+
+}  // namespace meshless
