@@ -178,23 +178,25 @@ Status makeLatticeParticles(const BodyDef& def, const SolidQuery& solid, BodyMod
                             std::vector<Index>& vertex_particle) {
   Result<CellLattice> lattice = divideIntoCells(model.surface, solid, model.spacing);
   if (!lattice) return Error{lattice.error().code, "body '" + def.name + "': " + lattice.error().detail};
-  if (lattice->corners.size() > kMaxParticles)
-    return invalid("body '" + def.name + "' has " + std::to_string(lattice->corners.size()) +
-                   " particles; accepted: up to " + std::to_string(kMaxParticles));
-  model.rest = std::move(lattice->corners);
+  if (lattice->corners > kMaxParticles)
+    return invalid("body '" + def.name + "' has " + std::to_string(lattice->corners) + " particles; accepted: up to " +
+                   std::to_string(kMaxParticles));
+  model.rest = cornerPlaces(*lattice);
   vertex_particle.assign(model.surface.vertices.size(), kNoIndex);
+  std::vector<double> fractions;
   double filled = 0.0;
-  for (CellLattice::Cell& cell : lattice->cells) {
-    cell.fraction = std::max(cell.fraction, kLeastCellFraction);
-    filled += cell.fraction;
+  for (const LatticeCell& cell : lattice->cells) {
+    fractions.push_back(std::max(momentsOf(cell.filled).fraction, kLeastCellFraction));
+    filled += fractions.back();
   }
   std::vector<std::array<Index, 8>> cells;
   std::vector<double> cell_masses;
   std::vector<std::array<Index, 2>> edges;
   model.masses.assign(model.rest.size(), 0.0);
-  for (const CellLattice::Cell& cell : lattice->cells) {
+  for (std::size_t c = 0; c < lattice->cells.size(); ++c) {
+    const LatticeCell& cell = lattice->cells[c];
     cells.push_back(cell.corners);
-    cell_masses.push_back(def.material.density * model.rest_volume * cell.fraction / filled);
+    cell_masses.push_back(def.material.density * model.rest_volume * fractions[c] / filled);
     for (Index k = 0; k < 8; ++k) {
       model.masses[cell.corners[k]] += cell_masses.back() / 8.0;
       for (Index bit : {1u, 2u, 4u})

@@ -1,168 +1,115 @@
 #include "meshless_surgery/geometry/cell_lattice.h"
 
 #include <cmath>
-#include <numeric>
 #include <sstream>
 
 #include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/union_find.h"
 
 namespace meshless {
 namespace {
 
-constexpr int kSub = 4;  // samples of a cell along each axis
-constexpr int kSamples = kSub * kSub * kSub;
-
-class UnionFind {
- public:
-  explicit UnionFind(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0u); }
-  Index find(Index i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  // The lower index stays the root, so that the result does not depend on the order.
-  void join(Index a, Index b) {
-    a = find(a);
-    b = find(b);
-    if (a < b) parent_[b] = a;
-    if (b < a) parent_[a] = b;
-  }
-
- private:
-  std::vector<Index> parent_;
-};
-
-// Which of the samples of each cell lie in the solid, and which part of the cell they belong to (kNoPart: outside).
-constexpr std::uint8_t kNoPart = 255;
-using Parts = std::array<std::uint8_t, kSamples>;
-
-int sampleAt(int x, int y, int z) { return x + kSub * (y + kSub * z); }
-
-// Numbers the parts that are joined by faces of samples; returns how many.
-int numberParts(const std::array<bool, kSamples>& inside, Parts& parts) {
-  parts.fill(kNoPart);
-  int count = 0;
-  std::array<int, kSamples> stack;
-  for (int start = 0; start < kSamples; ++start) {
-    if (!inside[start] || parts[start] != kNoPart) continue;
-    int depth = 0;
-    stack[depth++] = start;
-    parts[start] = static_cast<std::uint8_t>(count);
-    while (depth > 0) {
-      const int at = stack[--depth];
-      const int place[3] = {at % kSub, at / kSub % kSub, at / (kSub * kSub)};
-      const int stride[3] = {1, kSub, kSub * kSub};
-      for (int axis = 0; axis < 3; ++axis)
-        for (int step : {-1, 1}) {
-          if (place[axis] + step < 0 || place[axis] + step >= kSub) continue;
-          const int next = at + step * stride[axis];
-          if (!inside[next] || parts[next] != kNoPart) continue;
-          parts[next] = static_cast<std::uint8_t>(count);
-          stack[depth++] = next;
-        }
-    }
-    ++count;
-  }
-  return count;
+// The samples of a cell that lie in the solid. Those of a cell far from the surface are all as its middle is.
+SampleSet samplesInside(const SolidQuery& solid, const Vec3& lower, double spacing) {
+  const Vec3 middle = lower + Vec3::Constant(0.5 * spacing);
+  if (solid.distance(middle) > 0.8661 * spacing) return solid.contains(middle) ? kAllSamples : kNoSample;
+  SampleSet inside = kNoSample;
+  for (int bit = 0; bit < 64; ++bit)
+    if (solid.contains(lower + spacing * samplePlace(bit))) inside |= SampleSet{1} << bit;
+  return inside;
 }
 
 }  // namespace
+
+Points cornerPlaces(const CellLattice& lattice) {
+  Points places(lattice.corners);
+  for (const LatticeCell& cell : lattice.cells)
+    for (int k = 0; k < 8; ++k)
+      places[cell.corners[k]] = lattice.restPlace(cell, Vec3(k & 1, k >> 1 & 1, k >> 2 & 1));
+  return places;
+}
+
+CornerUses cornerUses(const CellLattice& lattice) {
+  CornerUses uses;
+  uses.offsets.assign(lattice.corners + 1, 0);
+  for (const LatticeCell& cell : lattice.cells)
+    for (const Index corner : cell.corners) ++uses.offsets[corner + 1];
+  for (Index i = 0; i < lattice.corners; ++i) uses.offsets[i + 1] += uses.offsets[i];
+  uses.cells.resize(uses.offsets.back());
+  std::vector<Index> next(uses.offsets.begin(), uses.offsets.end() - 1);
+  for (Index c = 0; c < lattice.cells.size(); ++c)
+    for (const Index corner : lattice.cells[c].corners) uses.cells[next[corner]++] = c;
+  return uses;
+}
+
+SampleSet faceLinks(const LatticeCell& lower, const LatticeCell& upper, int axis) {
+  const int across = (kCellSamples - 1) * kSampleStride[axis];
+  return lower.samples & kUpperLayer[axis] & ((upper.samples & kLowerLayer[axis]) << across);
+}
 
 Result<CellLattice> divideIntoCells(const TriangleMesh& mesh, const SolidQuery& solid, double spacing,
                                     std::size_t max_cells) {
   const Box bounds = boundsOf(mesh.vertices);
   const Vec3 extent = bounds.max - bounds.min;
-  std::array<long, 3> n;
+  std::array<std::int32_t, 3> n;
   double boxes = 1.0;
   for (int k = 0; k < 3; ++k) {
     const double count = std::max(1.0, std::ceil(extent[k] / spacing - 1e-6));
     boxes *= count;
-    n[k] = count < 1e9 ? static_cast<long>(count) : 0;
+    n[k] = count < 1e9 ? static_cast<std::int32_t>(count) : 0;
   }
   if (!(spacing > 0.0) || !(boxes <= static_cast<double>(max_cells))) {
     std::ostringstream text;
     text << "spacing is " << spacing << " m, which makes " << boxes << " cells; accepted: at most " << max_cells;
     return Error{ErrorCode::kInvalidArgument, text.str()};
   }
-  const Vec3 origin = 0.5 * (bounds.min + bounds.max) - 0.5 * spacing * Vec3(n[0], n[1], n[2]);
-  const auto cellAt = [&](long x, long y, long z) { return static_cast<std::size_t>(x + n[0] * (y + n[1] * z)); };
-
-  // Samples: those of a cell far from the surface are all as its middle is.
-  const std::size_t total = static_cast<std::size_t>(n[0] * n[1] * n[2]);
-  std::vector<Parts> parts(total);
-  std::vector<Index> first_part(total + 1, 0);
-  for (long z = 0; z < n[2]; ++z)
-    for (long y = 0; y < n[1]; ++y)
-      for (long x = 0; x < n[0]; ++x) {
-        const Vec3 corner = origin + spacing * Vec3(x, y, z);
-        const Vec3 middle = corner + Vec3::Constant(0.5 * spacing);
-        std::array<bool, kSamples> inside;
-        if (solid.distance(middle) > 0.8661 * spacing) {
-          inside.fill(solid.contains(middle));
-        } else {
-          for (int k = 0; k < kSamples; ++k)
-            inside[k] = solid.contains(
-                corner + spacing / kSub * (Vec3(k % kSub, k / kSub % kSub, k / (kSub * kSub)) + Vec3::Constant(0.5)));
+  CellLattice lattice;
+  lattice.spacing = spacing;
+  lattice.origin = 0.5 * (bounds.min + bounds.max) - 0.5 * spacing * Vec3(n[0], n[1], n[2]);
+  const auto at = [&](std::int32_t x, std::int32_t y, std::int32_t z) {
+    return static_cast<std::size_t>(x) + static_cast<std::size_t>(n[0]) * (y + static_cast<std::size_t>(n[1]) * z);
+  };
+  // The parts in the cells, in lattice order.
+  std::vector<Index> first(static_cast<std::size_t>(boxes) + 1, 0);
+  for (std::int32_t z = 0; z < n[2]; ++z)
+    for (std::int32_t y = 0; y < n[1]; ++y)
+      for (std::int32_t x = 0; x < n[0]; ++x) {
+        LatticeCell cell;
+        cell.place = {x, y, z};
+        SampleSet inside = samplesInside(solid, lattice.restPlace(cell, Vec3::Zero()), spacing);
+        while (inside) {
+          cell.samples = cell.filled = connectedPart(inside, cell.parted);
+          inside &= ~cell.samples;
+          lattice.cells.push_back(cell);
         }
-        const std::size_t cell = cellAt(x, y, z);
-        first_part[cell + 1] = static_cast<Index>(numberParts(inside, parts[cell]));
+        first[at(x, y, z) + 1] = static_cast<Index>(lattice.cells.size());
       }
-  for (std::size_t c = 0; c < total; ++c) first_part[c + 1] += first_part[c];
-  if (first_part[total] == 0) {
+  if (lattice.cells.empty()) {
     std::ostringstream text;
     text << "spacing is " << spacing << " m, and no sample of a quarter of it lies in the solid; accepted: less";
     return Error{ErrorCode::kUnsuitableShape, text.str()};
   }
 
   // Corners of parts that continue into each other through a face are the same.
-  UnionFind corners(static_cast<std::size_t>(first_part[total]) * 8);
-  for (long z = 0; z < n[2]; ++z)
-    for (long y = 0; y < n[1]; ++y)
-      for (long x = 0; x < n[0]; ++x) {
-        const std::size_t a = cellAt(x, y, z);
-        const long place[3] = {x, y, z};
-        for (int axis = 0; axis < 3; ++axis) {
-          if (place[axis] + 1 >= n[axis]) continue;
-          const std::size_t b = cellAt(x + (axis == 0), y + (axis == 1), z + (axis == 2));
-          for (int u = 0; u < kSub; ++u)
-            for (int v = 0; v < kSub; ++v) {
-              int upper[3], lower[3];
-              upper[axis] = kSub - 1, lower[axis] = 0;
-              upper[(axis + 1) % 3] = lower[(axis + 1) % 3] = u;
-              upper[(axis + 2) % 3] = lower[(axis + 2) % 3] = v;
-              const std::uint8_t pa = parts[a][sampleAt(upper[0], upper[1], upper[2])];
-              const std::uint8_t pb = parts[b][sampleAt(lower[0], lower[1], lower[2])];
-              if (pa == kNoPart || pb == kNoPart) continue;
-              for (Index corner = 0; corner < 8; ++corner)
-                if (corner >> axis & 1)
-                  corners.join((first_part[a] + pa) * 8 + corner, (first_part[b] + pb) * 8 + (corner ^ (1u << axis)));
-            }
-        }
-      }
-
-  CellLattice lattice;
-  lattice.spacing = spacing;
-  std::vector<Index> number(static_cast<std::size_t>(first_part[total]) * 8, kNoIndex);
-  for (long z = 0; z < n[2]; ++z)
-    for (long y = 0; y < n[1]; ++y)
-      for (long x = 0; x < n[0]; ++x) {
-        const std::size_t cell = cellAt(x, y, z);
-        for (Index part = first_part[cell]; part < first_part[cell + 1]; ++part) {
-          CellLattice::Cell made;
-          int filled = 0;
-          for (std::uint8_t p : parts[cell]) filled += p == part - first_part[cell];
-          made.fraction = static_cast<double>(filled) / kSamples;
-          for (Index corner = 0; corner < 8; ++corner) {
-            Index& at = number[corners.find(part * 8 + corner)];
-            if (at == kNoIndex) {
-              at = static_cast<Index>(lattice.corners.size());
-              lattice.corners.push_back(origin +
-                                        spacing * Vec3(x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2 & 1)));
-            }
-            made.corners[corner] = at;
-          }
-          lattice.cells.push_back(made);
-        }
-      }
+  UnionFind corners(lattice.cells.size() * 8);
+  for (Index a = 0; a < lattice.cells.size(); ++a) {
+    const LatticeCell& lower = lattice.cells[a];
+    for (int axis = 0; axis < 3; ++axis) {
+      if (lower.place[axis] + 1 >= n[axis]) continue;
+      const std::size_t next = at(lower.place[0] + (axis == 0), lower.place[1] + (axis == 1), lower.place[2] + (axis == 2));
+      for (Index b = first[next]; b < first[next + 1]; ++b)
+        if (faceLinks(lower, lattice.cells[b], axis))
+          for (Index k = 0; k < 8; ++k)
+            if (k >> axis & 1) corners.join(a * 8 + k, b * 8 + (k ^ (1u << axis)));
+    }
+  }
+  std::vector<Index> number(lattice.cells.size() * 8, kNoIndex);
+  for (Index c = 0; c < lattice.cells.size(); ++c)
+    for (Index k = 0; k < 8; ++k) {
+      Index& known = number[corners.find(c * 8 + k)];
+      if (known == kNoIndex) known = lattice.corners++;
+      lattice.cells[c].corners[k] = known;
+    }
   return lattice;
 }
 

@@ -16,7 +16,7 @@ Result<CellLattice> divided(const TriangleMesh& mesh, double spacing) {
 
 double filled(const CellLattice& lattice) {
   double volume = 0.0;
-  for (const CellLattice::Cell& cell : lattice.cells) volume += cell.fraction * std::pow(lattice.spacing, 3.0);
+  for (const LatticeCell& cell : lattice.cells) volume += momentsOf(cell.filled).fraction * std::pow(lattice.spacing, 3.0);
   return volume;
 }
 
@@ -44,11 +44,11 @@ TEST(DivideIntoCells, ABoxOfWholeCellsIsFilledExactly) {
   const Result<CellLattice> lattice = divided(boxMesh(Vec3(0.2, 0.1, 0.05), 0.05), 0.0125);
   ASSERT_TRUE(lattice.ok());
   EXPECT_EQ(lattice->cells.size(), 16u * 8u * 4u);
-  EXPECT_EQ(lattice->corners.size(), 17u * 9u * 5u);
-  for (const CellLattice::Cell& cell : lattice->cells) {
-    EXPECT_EQ(cell.fraction, 1.0);
+  EXPECT_EQ(lattice->corners, 17u * 9u * 5u);
+  for (const LatticeCell& cell : lattice->cells) {
+    EXPECT_EQ(momentsOf(cell.filled).fraction, 1.0);
     for (Index k = 0; k < 8; ++k) {
-      const Vec3 edge = lattice->corners[cell.corners[k]] - lattice->corners[cell.corners[0]];
+      const Vec3 edge = cornerPlaces(*lattice)[cell.corners[k]] - cornerPlaces(*lattice)[cell.corners[0]];
       EXPECT_LT((edge - 0.0125 * Vec3(k & 1, k >> 1 & 1, k >> 2 & 1)).norm(), 1e-12);
     }
   }
@@ -66,12 +66,12 @@ TEST(DivideIntoCells, EveryShapeIsHeldWithItsVolume) {
     }
     EXPECT_NEAR(filled(*lattice), volume, (shape.name == "thin slab" || shape.name == "disc" ? 0.6 : 0.06) * volume);
     const SolidQuery solid(shape.mesh);
-    for (const CellLattice::Cell& cell : lattice->cells) {
-      EXPECT_GT(cell.fraction, 0.0);
-      EXPECT_LE(cell.fraction, 1.0);
+    for (const LatticeCell& cell : lattice->cells) {
+      EXPECT_GT(momentsOf(cell.filled).fraction, 0.0);
+      EXPECT_LE(momentsOf(cell.filled).fraction, 1.0);
       EXPECT_EQ(std::set<Index>(cell.corners.begin(), cell.corners.end()).size(), 8u);
     }
-    for (const Vec3& corner : lattice->corners)
+    for (const Vec3& corner : cornerPlaces(*lattice))
       EXPECT_TRUE(solid.contains(corner) || solid.distance(corner) < std::sqrt(3.0) * spacing);
   }
 }

@@ -2,26 +2,60 @@
 #pragma once
 
 #include "meshless_surgery/base/result.h"
+#include "meshless_surgery/geometry/cell_samples.h"
 #include "meshless_surgery/geometry/inside.h"
 
 namespace meshless {
 
-/// Where the solid comes apart inside a lattice cell (two fingers, the walls of a slit), each part has a copy of the
-/// cell with corners of its own, shared with the cells that it continues into (Nesme et al. 2009). Gaps thinner than a
-/// quarter of the spacing are not seen.
-struct CellLattice {
-  struct Cell {
-    std::array<Index, 8> corners;  // bit 0, 1, 2 of the position: upper end along x, y, z
-    double fraction = 0.0;         // of the cell's volume that this part fills, 0 < fraction <= 1
-  };
-  double spacing = 0.0;     // [m]
-  Points corners;           // [m] inside the solid or less than a cell away from it
-  std::vector<Cell> cells;  // in lattice order
+/// A copy of a lattice cell: one for each part of the solid in it that hangs together (two fingers, the walls of a slit, the
+/// sides of a cut), with all eight corners. Nesme et al. 2009; Sifakis et al. 2007.
+struct LatticeCell {
+  std::array<Index, 8> corners{};           // bits 0, 1, 2 of the position: upper end along x, y, z
+  std::array<std::int32_t, 3> place{};      // in the lattice
+  SampleSet samples = kNoSample;            // the part; none of a crumb that is smaller than a sample
+  SampleSet filled = kNoSample;             // what its moments are of: the part, or of a crumb the part that it came from
+  LinkSet parted{};                         // links of its samples that a blade has cut
+  double mass_share = 1.0;                  // of what `filled` weighs; 0 of a bridge
+  double stiffness_share = 1.0;             // of what `filled` resists with
+  /// Where a blade ends within the cell, the parts beside it are cells of their own and one more, the bridge, that has all
+  /// of their samples holds them together with a share of their stiffness. kNoIndex: no bridge; of a bridge: itself.
+  Index bridge = kNoIndex;
+
+  bool isBridge(Index self) const { return bridge == self; }
 };
 
-/// The lattice is centred on the bounds; a box whose edges are whole multiples of the spacing is filled exactly.
-/// Refuses (kInvalidArgument) a spacing with more than max_cells cells in the bounds, (kUnsuitableShape) a solid so
-/// thin that no sample of a quarter of the spacing lies in it.
+struct CellLattice {
+  double spacing = 0.0;        // [m]
+  Vec3 origin = Vec3::Zero();  // [m] lower end of the cell 0, 0, 0
+  Index corners = 0;           // how many
+  std::vector<LatticeCell> cells;
+
+  /// [m] of a point in a cell, each coordinate of `at` 0..1 inside of it.
+  Vec3 restPlace(const LatticeCell& cell, const Vec3& at) const {
+    return origin + spacing * (Vec3(cell.place[0], cell.place[1], cell.place[2]) + at);
+  }
+  /// The inverse of it.
+  Vec3 placeIn(const LatticeCell& cell, const Vec3& rest) const {
+    return (rest - origin) / spacing - Vec3(cell.place[0], cell.place[1], cell.place[2]);
+  }
+};
+
+/// [m] of every corner.
+Points cornerPlaces(const CellLattice& lattice);
+
+/// Which cells use each corner (compressed rows).
+struct CornerUses {
+  std::vector<Index> offsets;  // corners + 1
+  std::vector<Index> cells;
+};
+CornerUses cornerUses(const CellLattice& lattice);
+
+/// The links across the face between two cells of which `upper` is next to `lower` along the axis, in bits of `lower`.
+SampleSet faceLinks(const LatticeCell& lower, const LatticeCell& upper, int axis);
+
+/// The lattice is centred on the bounds; a box whose edges are whole multiples of the spacing is filled exactly. Gaps
+/// thinner than a quarter of the spacing are not seen. Refuses (kInvalidArgument) a spacing with more than max_cells cells
+/// in the bounds, (kUnsuitableShape) a solid so thin that no sample of a quarter of the spacing lies in it.
 Result<CellLattice> divideIntoCells(const TriangleMesh& mesh, const SolidQuery& solid, double spacing,
                                     std::size_t max_cells = 4000000);
 

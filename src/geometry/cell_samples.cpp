@@ -1,0 +1,54 @@
+#include "meshless_surgery/geometry/cell_samples.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kEqualShare = 0.5;  // of a part's mass that its corners get in equal parts
+
+}  // namespace
+
+Vec3 samplePlace(int bit) {
+  return (Vec3(bit % kCellSamples, bit / kCellSamples % kCellSamples, bit / (kCellSamples * kCellSamples)) +
+          Vec3::Constant(0.5)) /
+         kCellSamples;
+}
+
+SampleSet connectedPart(SampleSet within, const LinkSet& parted) {
+  SampleSet part = within & (~within + 1);
+  for (;;) {
+    SampleSet grown = part;
+    for (int axis = 0; axis < 3; ++axis) {
+      const int stride = kSampleStride[axis];
+      const SampleSet linked = ~parted[axis] & ~kUpperLayer[axis];  // to the next one in the cell
+      grown |= ((grown & linked) << stride) | ((grown >> stride) & linked);
+    }
+    grown &= within;
+    if (grown == part) return part;
+    part = grown;
+  }
+}
+
+FilledMoments momentsOf(SampleSet samples) {
+  FilledMoments m;
+  const double count = countSamples(samples);
+  m.fraction = count / 64.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    double sum = 0.0, squared = 0.0;
+    for (int n = 0; n < kCellSamples; ++n) {
+      const double here = countSamples(samples & sampleLayer(axis, n)), at = (2.0 * n + 1.0) / kCellSamples - 1.0;
+      sum += here * at;
+      squared += here * at * at;
+    }
+    m.centroid[axis] = sum / count;
+    // A sample is a little box itself.
+    m.variance[axis] = squared / count - m.centroid[axis] * m.centroid[axis] + 1.0 / (3.0 * kCellSamples * kCellSamples);
+  }
+  for (SampleSet left = samples; left; left &= left - 1) {
+    const Vec3 at = samplePlace(lowestSample(left));
+    for (int k = 0; k < 8; ++k) m.corner_shares[k] += trilinearWeight(k, at);
+  }
+  for (double& share : m.corner_shares) share = (1.0 - kEqualShare) * share / count + kEqualShare / 8.0;
+  return m;
+}
+
+}  // namespace meshless
