@@ -3,61 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cofactor.h"
+#include "elastic_law.h"
 #include "meshless_surgery/dynamics/rotation.h"
 
 namespace meshless {
 namespace {
 
-constexpr double kHourglass = 0.3;     // stiffness of what is not affine, in units of E / s^2
-constexpr double kLeastVolume = -0.8;  // J below which the pressure does not grow
-constexpr double kMostVolume = 1.5;    // J above which it falls
-constexpr double kDrawnOut = 12.0;     // |F|^2, 3 at rest, above which the volume counts less and less
+constexpr double kHourglass = 0.3;  // stiffness of what is not affine, in units of E / s^2
 constexpr int kPowerIterations = 60;
-
-// Pressure over lambda, a function of J alone: so it has a potential, whatever the bounds. Above them it falls as cof F
-// grows, or a torn cell would stiffen without end.
-double volumeStrain(double j) {
-  if (j > kMostVolume) return (kMostVolume - 1.0) * std::pow(kMostVolume / j, 2.0 / 3.0);
-  return std::max(j, kLeastVolume) - 1.0;
-}
-double volumeEnergy(double j) {
-  if (j > kMostVolume) {
-    const double strain = kMostVolume - 1.0;
-    return 0.5 * strain * strain + 3.0 * strain * kMostVolume * (std::cbrt(j / kMostVolume) - 1.0);
-  }
-  const double strain = std::max(j, kLeastVolume) - 1.0;
-  return 0.5 * strain * strain + (j < kLeastVolume ? strain * (j - kLeastVolume) : 0.0);
-}
-
-// The volume that is held: J, and of what is drawn out far the share J s(|F|^2). Without it the pressure of a needle or
-// a sheet stiffens with the square of its length, beyond what any step resolves: torn cells threw themselves apart.
-struct HeldVolume {
-  double j = 1.0;
-  Mat3 slope = Mat3::Zero();  // by F
-  double share = 1.0;
-};
-HeldVolume heldVolume(const Mat3& f) {
-  HeldVolume held;
-  held.slope = cofactor(f);
-  held.j = f.determinant();
-  const double beyond = f.squaredNorm() / kDrawnOut - 1.0;
-  if (!(beyond > 0.0)) return held;
-  const double base = 1.0 + beyond * beyond;
-  held.share = 1.0 / (std::sqrt(base) * std::sqrt(std::sqrt(base)));  // base^(-3/4): J s stays bounded
-  held.slope = held.share * (held.slope - (3.0 * beyond / (base * kDrawnOut) * held.j) * f);
-  held.j *= held.share;
-  return held;
-}
-
-// First Piola-Kirchhoff stress of the fixed-corotated law. `steepness`: the square of how much faster than at rest the
-// pressure makes the cluster, times 3.
-Mat3 stress(const ElasticParameters& material, const Mat3& f, const Mat3& rotation, double& steepness) {
-  const HeldVolume held = heldVolume(f);
-  const double strain = volumeStrain(held.j);
-  steepness = held.slope.squaredNorm() + std::abs(strain) * held.share * f.norm();
-  return 2.0 * material.mu * (f - rotation) + material.lambda * strain * held.slope;
-}
 
 struct ClusterFit {
   Vec3 centre;
@@ -140,7 +93,7 @@ double elasticAccelerations(const MatchInput& in, const std::vector<ElasticRest>
     if (f.solid) {
       const Mat3 strained = f.strained / swelling;
       double steepness = 3.0;
-      pull = stress(material, strained, f.rotation, steepness);
+      pull = elastic_law::stress(material, strained, f.rotation, steepness);
       if (const PlasticShape* plastic = in.plasticShapeOf(c)) {
         pull *= plastic->inverse;
         steepness *= plastic->stiffening * plastic->stiffening;
@@ -170,9 +123,7 @@ double elasticEnergy(const MatchInput& in, const std::vector<ElasticRest>& elast
     double hourglass = material.youngs / (material.density * spread);
     if (f.solid) {
       hourglass *= kHourglass;
-      energy += rest.mass / material.density *
-                (material.mu * (f.strained - f.rotation).squaredNorm() +
-                 material.lambda * volumeEnergy(heldVolume(f.strained).j));
+      energy += rest.mass / material.density * elastic_law::energyDensity(material, f.strained, f.rotation);
     }
     for (Index k = in.clusters.offsets[c]; k < in.clusters.offsets[c + 1]; ++k) {
       const Index i = in.clusters.members[k];

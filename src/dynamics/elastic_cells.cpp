@@ -1,0 +1,150 @@
+#include "meshless_surgery/dynamics/elastic_cells.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "elastic_law.h"
+#include "lanczos.h"
+#include "meshless_surgery/dynamics/rotation.h"
+
+namespace meshless {
+namespace {
+
+// Of the trilinear map about the centroid, each the coefficient of the product of the coordinates whose bits are set:
+// 0 the centroid itself, 1, 2 and 4 the gradient's columns, the others hourglass modes.
+using Coefficients = std::array<Vec3, 8>;
+
+// Axis by axis the two ends become their weighted mean and half their difference.
+Coefficients coefficientsOf(const ElasticCell& cell, const Points& y, const Vec3& origin) {
+  Coefficients a;
+  for (int k = 0; k < 8; ++k) a[k] = y[cell.corners[k]] - origin;
+  for (int axis = 0; axis < 3; ++axis)
+    for (int k = 0; k < 8; ++k) {
+      if (k >> axis & 1) continue;
+      Vec3 &low = a[k], &high = a[k | 1 << axis];
+      const Vec3 difference = 0.5 * (high - low);
+      low = 0.5 * (low + high) + cell.centroid[axis] * difference;
+      high = difference;
+    }
+  return a;
+}
+
+// The transpose: what works on coefficients, as forces on the corners.
+void addForces(const ElasticCell& cell, Coefficients f, Points& forces) {
+  for (int axis = 0; axis < 3; ++axis)
+    for (int k = 0; k < 8; ++k) {
+      if (k >> axis & 1) continue;
+      Vec3 &mean = f[k], &difference = f[k | 1 << axis];
+      const Vec3 apart = 0.5 * (cell.centroid[axis] * mean + difference), half = 0.5 * mean;
+      mean = half - apart;
+      difference = half + apart;
+    }
+  for (int k = 0; k < 8; ++k) forces[cell.corners[k]] += f[k];
+}
+
+Mat3 gradientOf(const Coefficients& a, double half_edge) {
+  Mat3 gradient;
+  gradient << a[1], a[2], a[4];
+  return gradient / half_edge;
+}
+
+// The derivatives of the energy by the coefficients, for what it is by the gradient (times the volume).
+Coefficients slopes(const ElasticCells& body, const ElasticCell& cell, const ElasticParameters& material,
+                    const Coefficients& a, const Mat3& by_gradient) {
+  const double volume = cell.mass / material.density;
+  Coefficients f;
+  f[0].setZero();
+  for (int axis = 0; axis < 3; ++axis) f[1 << axis] = (volume / body.half_edge) * by_gradient.col(axis);
+  const double stiffness = material.youngs * volume / (body.half_edge * body.half_edge);
+  for (int mode : elastic_law::kHourglassModes)
+    f[mode] = stiffness * elastic_law::hourglassStiffness(cell.variance, mode) * a[mode];
+  return f;
+}
+
+const PlasticShape* shapeOf(const std::vector<PlasticShape>* plastic, std::size_t c) {
+  return plastic && !plastic->empty() ? &(*plastic)[c] : nullptr;
+}
+
+struct Fit {
+  Coefficients coefficients;
+  Mat3 strained;  // the gradient, from the rest shape without stress
+  Mat3 rotation;
+};
+
+Fit fit(const ElasticCells& body, const ElasticCell& cell, const Points& y, double swelling, const PlasticShape* shape,
+        ClusterPose& pose, MatchCounters& counters) {
+  const Vec3 origin = y[cell.corners[0]];
+  Fit result;
+  result.coefficients = coefficientsOf(cell, y, origin);
+  pose.centre = origin + result.coefficients[0];
+  pose.deformation = gradientOf(result.coefficients, body.half_edge);
+  const Mat3 unstressed = shape ? Mat3(pose.deformation * shape->inverse) : pose.deformation;
+  const RotationResult found = nearestRotation(unstressed, pose.rotation);
+  pose.rotation = found.rotation;
+  result.rotation = found.rotation.toRotationMatrix();
+  result.strained = unstressed / swelling;
+  ++counters.clusters;
+  ++counters.rotations;
+  ++counters.linear_fits;
+  if (!found.warm) ++counters.cold_rotations;
+  return result;
+}
+
+}  // namespace
+
+double elasticAccelerations(const ElasticCells& body, const ElasticParameters& material, const Points& y,
+                            std::vector<ClusterPose>& poses, Points& accelerations, MatchCounters& counters,
+                            double swelling, const std::vector<PlasticShape>* plastic) {
+  Points& forces = accelerations;  // less their sign, until the end
+  forces.assign(y.size(), Vec3::Zero());
+  double most = 3.0;
+  for (std::size_t c = 0; c < body.cells.size(); ++c) {
+    const ElasticCell& cell = body.cells[c];
+    const PlasticShape* const shape = shapeOf(plastic, c);
+    const Fit f = fit(body, cell, y, swelling, shape, poses[c], counters);
+    double steepness = 3.0;
+    Mat3 by_gradient = elastic_law::stress(material, f.strained, f.rotation, steepness);
+    if (shape) {
+      by_gradient *= shape->inverse;
+      steepness *= shape->stiffening * shape->stiffening;
+    }
+    most = std::max(most, steepness);
+    addForces(cell, slopes(body, cell, material, f.coefficients, by_gradient), forces);
+  }
+  for (std::size_t i = 0; i < forces.size(); ++i) accelerations[i] = -forces[i] / body.masses[i];
+  return std::sqrt(most / 3.0);
+}
+
+double elasticEnergy(const ElasticCells& body, const ElasticParameters& material, const Points& y,
+                     std::vector<ClusterPose> poses, double swelling, const std::vector<PlasticShape>* plastic) {
+  double energy = 0.0;
+  MatchCounters uncounted;
+  for (std::size_t c = 0; c < body.cells.size(); ++c) {
+    const ElasticCell& cell = body.cells[c];
+    const Fit f = fit(body, cell, y, swelling, shapeOf(plastic, c), poses[c], uncounted);
+    // By F, not F / swelling: the factor is the derivative's.
+    const double volume = cell.mass / material.density;
+    energy += volume * swelling * elastic_law::energyDensity(material, f.strained, f.rotation);
+    const double stiffness = material.youngs * volume / (body.half_edge * body.half_edge);
+    for (int mode : elastic_law::kHourglassModes)
+      energy +=
+          0.5 * stiffness * elastic_law::hourglassStiffness(cell.variance, mode) * f.coefficients[mode].squaredNorm();
+  }
+  return energy;
+}
+
+double highestFrequency(const ElasticCells& body, const ElasticParameters& material) {
+  return highestFrequency(body.masses, [&](const Points& displacements, Points& accelerations) {
+    Points& forces = accelerations;
+    forces.assign(displacements.size(), Vec3::Zero());
+    for (const ElasticCell& cell : body.cells) {
+      const Coefficients a = coefficientsOf(cell, displacements, Vec3::Zero());
+      const Mat3 g = gradientOf(a, body.half_edge);
+      const Mat3 by_gradient = material.mu * (g + g.transpose()) + material.lambda * g.trace() * Mat3::Identity();
+      addForces(cell, slopes(body, cell, material, a, by_gradient), forces);
+    }
+    for (std::size_t i = 0; i < forces.size(); ++i) accelerations[i] = -forces[i] / body.masses[i];
+  });
+}
+
+}  // namespace meshless

@@ -1,0 +1,347 @@
+#include "meshless_surgery/dynamics/elastic_cells.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+
+#include "meshless_surgery/dynamics/plastic.h"
+#include "support/cells.h"
+
+namespace meshless {
+namespace {
+
+using test::CellBody;
+using test::cutCells;
+using test::kCellDensity;
+using test::kCellEdge;
+using test::Random;
+using test::wholeCells;
+
+const ElasticParameters kSoft = elasticParameters(5000.0, 0.4, kCellDensity);
+const double kScale = kSoft.youngs / (kSoft.density * kCellEdge);  // [m/s^2] of the material's accelerations
+
+Points accelerations(const CellBody& body, const Points& y, double swelling = 1.0,
+                     const std::vector<PlasticShape>* plastic = nullptr) {
+  Points a;
+  MatchCounters counters;
+  std::vector<ClusterPose> poses = body.poses;
+  elasticAccelerations(body.cells, kSoft, y, poses, a, counters, swelling, plastic);
+  return a;
+}
+
+Points moved(const CellBody& body, const Mat3& map, const Vec3& shift, double noise, Random& random) {
+  Points y;
+  for (const Vec3& p : body.rest) y.push_back(map * (p + random.vector(noise)) + shift);
+  return y;
+}
+
+std::vector<PlasticShape> someShapes(std::size_t count, Random& random) {
+  std::vector<PlasticShape> shapes;
+  for (std::size_t c = 0; c < count; ++c) {
+    Mat3 logarithm = random.matrix(0.2);
+    logarithm = (logarithm + logarithm.transpose()).eval();
+    logarithm -= logarithm.trace() / 3.0 * Mat3::Identity();
+    shapes.push_back(plasticShape(logarithm));
+  }
+  return shapes;
+}
+
+// Inertial mass times acceleration, its largest and its sums.
+struct Balance {
+  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
+  double scale = 0.0, reach = 0.0;
+
+  Balance(const CellBody& body, const Points& y, const Points& a) {
+    for (std::size_t i = 0; i < y.size(); ++i) {
+      force += body.cells.masses[i] * a[i];
+      torque += body.cells.masses[i] * (y[i] - y[0]).cross(a[i]);
+      scale += body.cells.masses[i] * a[i].norm();
+      reach = std::max(reach, (y[i] - y[0]).norm());
+    }
+  }
+};
+
+TEST(ElasticCells, WholeOnesAreTheFormerBoxes) {
+  // Cells of 2x2x2 particles with the general kernel of elastic.h: k = 0.3 against everything that is not affine.
+  Random random(1);
+  CellBody body = wholeCells(3, 2, 2);
+  std::vector<std::array<Index, 8>> corners;
+  std::vector<double> cell_masses;
+  std::fill(body.cells.masses.begin(), body.cells.masses.end(), 0.0);
+  for (ElasticCell& cell : body.cells.cells) {
+    cell.mass *= random.uniform(0.3, 1.0);
+    for (Index i : cell.corners) body.cells.masses[i] += cell.mass / 8.0;
+    corners.push_back(cell.corners);
+    cell_masses.push_back(cell.mass);
+  }
+  const ClusterSet clusters = clustersOfCells(corners, cell_masses, body.cells.masses, kCellEdge);
+  const RestShape shape = makeRestShape(body.rest, body.cells.masses, clusters);
+  const std::vector<ElasticRest> elastic = makeElasticRest(shape);
+  const std::vector<PlasticShape> plastic = someShapes(clusters.size(), random);
+  for (double noise : {1e-5, 1e-3, 5e-3})
+    for (double swelling : {1.0, 1.1})
+      for (const std::vector<PlasticShape>* shapes :
+           {static_cast<const std::vector<PlasticShape>*>(nullptr), &plastic}) {
+        const MatchInput input{body.rest, body.cells.masses, clusters, shape, shapes};
+        const Points y = moved(body, random.rotation().toRotationMatrix(), random.vector(0.1), noise, random);
+        Points former, a;
+        std::vector<ClusterPose> former_poses(clusters.size()), poses = body.poses;
+        MatchCounters former_counters, counters;
+        const double former_stretch =
+            elasticAccelerations(input, elastic, kSoft, y, former_poses, former, former_counters, swelling);
+        const double stretch = elasticAccelerations(body.cells, kSoft, y, poses, a, counters, swelling, shapes);
+        EXPECT_NEAR(stretch, former_stretch, 1e-11 * former_stretch);
+        for (std::size_t i = 0; i < y.size(); ++i) EXPECT_LT((a[i] - former[i]).norm(), 1e-11 * kScale);
+        for (std::size_t c = 0; c < poses.size(); ++c) {
+          EXPECT_LT((poses[c].centre - former_poses[c].centre).norm(), 1e-14);
+          EXPECT_LT((poses[c].deformation - former_poses[c].deformation).norm(), 1e-11);
+        }
+        EXPECT_EQ(counters.clusters, former_counters.clusters);
+        EXPECT_EQ(counters.rotations, former_counters.rotations);
+        EXPECT_EQ(counters.linear_fits, former_counters.linear_fits);
+        if (swelling == 1.0) {
+          const double energy = elasticEnergy(input, elastic, kSoft, y, body.poses);
+          EXPECT_NEAR(elasticEnergy(body.cells, kSoft, y, body.poses, 1.0, shapes), energy, 1e-11 * energy);
+        }
+      }
+}
+
+TEST(ElasticCells, AnAffineMapStressesEachAsItShouldAndNoModeFeelsIt) {
+  // Forces of the stress of the map, by the trilinear shape functions' gradients at the centroid.
+  Random random(2);
+  const CellBody body = cutCells(4, 3, 2, 1);
+  for (int trial = 0; trial < 10; ++trial) {
+    const Mat3 map = Mat3::Identity() + random.matrix(0.15);
+    const Vec3 shift = random.vector(0.1);
+    const Points y = moved(body, map, shift, 0.0, random);
+    const Eigen::JacobiSVD<Mat3> svd(map, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    const Mat3 rotation = svd.matrixU() * svd.matrixV().transpose();
+    const double j = map.determinant();
+    ASSERT_LT(j, 1.5);
+    const Mat3 stress = 2.0 * kSoft.mu * (map - rotation) + kSoft.lambda * (j - 1.0) * j * map.inverse().transpose();
+    Points expected(y.size(), Vec3::Zero()), a;
+    for (const ElasticCell& cell : body.cells.cells)
+      for (int k = 0; k < 8; ++k) {
+        Vec3 sign, gradient;
+        for (int axis = 0; axis < 3; ++axis) sign[axis] = k >> axis & 1 ? 1.0 : -1.0;
+        for (int axis = 0; axis < 3; ++axis) {
+          const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+          gradient[axis] = sign[axis] / 8.0 * (1.0 + sign[b] * cell.centroid[b]) * (1.0 + sign[c] * cell.centroid[c]) /
+                           body.cells.half_edge;
+        }
+        const Index i = cell.corners[k];
+        expected[i] -= cell.mass / kSoft.density / body.cells.masses[i] * stress * gradient;
+      }
+    MatchCounters counters;
+    std::vector<ClusterPose> poses = body.poses;
+    elasticAccelerations(body.cells, kSoft, y, poses, a, counters);
+    for (std::size_t i = 0; i < y.size(); ++i) EXPECT_LT((a[i] - expected[i]).norm(), 1e-12 * 10.0 * kScale);
+    for (std::size_t c = 0; c < poses.size(); ++c) {
+      const ElasticCell& cell = body.cells.cells[c];
+      const Vec3 middle = body.rest[cell.corners[0]] + 0.5 * kCellEdge * (Vec3::Ones() + cell.centroid);
+      // A copy's own corners lie where the cell's are.
+      EXPECT_LT((poses[c].centre - (map * middle + shift)).norm(), 1e-14);
+      EXPECT_LT((poses[c].deformation - map).norm(), 1e-12);
+      EXPECT_LT((poses[c].rotation.toRotationMatrix() - rotation).norm(), 1e-6);
+    }
+  }
+}
+
+TEST(ElasticCells, PullWithYoungsModulusHoweverThickTheBarIs) {
+  // A bar whose outermost cells are filled in part has the area that is filled.
+  const double e = 1e-5, nu = 0.4;
+  for (double width : {1.0, 0.6, 0.1}) {
+    CellBody body = wholeCells(4, 3, 1);
+    for (std::size_t c = 8; c < 12; ++c) test::fill({-1, -1, -1}, {1, 2.0 * width - 1.0, 1}, body.cells.cells[c]);
+    test::finish(body);
+    Points y;
+    for (const Vec3& p : body.rest) y.emplace_back((1 + e) * p.x(), (1 - nu * e) * p.y(), (1 - nu * e) * p.z());
+    const Points a = accelerations(body, y);
+    double pull = 0.0;
+    for (std::size_t i = 0; i < y.size(); ++i)
+      if (body.rest[i].x() == 0.0) pull += body.cells.masses[i] * a[i].x();
+    // The cell's own centroid is clamped at 0.9, and its gradient is the same anywhere.
+    const double expected = kSoft.youngs * e * (2.0 + width) * kCellEdge * kCellEdge;
+    EXPECT_NEAR(pull, expected, 1e-4 * expected) << width;
+  }
+}
+
+TEST(ElasticCells, AModeIsAsStiffAsWhatFillsTheCellIsWide) {
+  const Vec3 variance(0.3, 0.2, 0.05);
+  const double volume = 3e-7;
+  const struct {
+    int mode;
+    double least;
+  } modes[] = {{3, 0.2}, {5, 0.05}, {6, 0.05}, {7, 0.05}};
+  Random random(3);
+  for (const auto& [mode, least] : modes) {
+    CellBody body = wholeCells(1, 1, 1);
+    ElasticCell& cell = body.cells.cells[0];
+    cell.mass = volume * kCellDensity;
+    cell.centroid = Vec3(0.4, -0.7, 0.2);
+    cell.variance = variance;
+    const Vec3 a = random.vector(1e-3);
+    Points y = body.rest;
+    for (int k = 0; k < 8; ++k) {
+      double product = 1.0;
+      for (int axis = 0; axis < 3; ++axis)
+        if (mode >> axis & 1) product *= (k >> axis & 1 ? 1.0 : -1.0) - cell.centroid[axis];
+      y[cell.corners[k]] += product * a;
+    }
+    const double expected =
+        0.5 * volume * 0.9 * kSoft.youngs * least * a.squaredNorm() / (0.25 * kCellEdge * kCellEdge);
+    EXPECT_NEAR(elasticEnergy(body.cells, kSoft, y, body.poses), expected, 1e-12 * expected) << mode;
+  }
+}
+
+TEST(ElasticCells, AreTheGradientOfTheEnergyAndKeepMomentum) {
+  Random random(4);
+  for (int trial = 0; trial < 6; ++trial) {
+    const CellBody body = cutCells(2, 2, 1, 10 + trial);
+    const std::vector<PlasticShape> shapes = someShapes(trial % 2 == 0 ? 0 : body.cells.cells.size(), random);
+    const double swelling = trial < 3 ? 1.0 : 0.9;
+    const Points y = moved(body, random.rotation().toRotationMatrix(), Vec3::Zero(), 0.0012, random);
+    const Points a = accelerations(body, y, swelling, &shapes);
+    const Balance balance(body, y, a);
+    EXPECT_LT(balance.force.norm(), 1e-12 * balance.scale);
+    EXPECT_LT(balance.torque.norm(), 1e-12 * balance.scale * balance.reach);
+    for (std::size_t i = 0; i < y.size(); ++i)
+      for (int axis = 0; axis < 3; ++axis) {
+        const double step = 1e-7;
+        Points up = y, down = y;
+        up[i][axis] += step;
+        down[i][axis] -= step;
+        const double slope = (elasticEnergy(body.cells, kSoft, up, body.poses, swelling, &shapes) -
+                              elasticEnergy(body.cells, kSoft, down, body.poses, swelling, &shapes)) /
+                             (2.0 * step);
+        EXPECT_NEAR(-slope, body.cells.masses[i] * a[i][axis], 1e-6 * balance.scale);
+      }
+  }
+}
+
+TEST(ElasticCells, KeepMomentumWhateverTheMassesAreAndHoweverTheyAreThrown) {
+  Random random(5);
+  for (double noise : {1e-6, 1e-4, 1e-2, 1.0}) {
+    CellBody body = cutCells(4, 3, 3, 3);
+    for (double& m : body.cells.masses) m = std::pow(10.0, random.uniform(-5.0, -1.0));
+    const Points y = moved(body, random.rotation().toRotationMatrix(), Vec3::Zero(), noise, random);
+    const Balance balance(body, y, accelerations(body, y));
+    EXPECT_LT(balance.force.norm(), 1e-12 * balance.scale);
+    EXPECT_LT(balance.torque.norm(), 1e-12 * balance.scale * balance.reach);
+  }
+}
+
+TEST(ElasticCells, TurnedInputGivesTurnedOutput) {
+  Random random(6);
+  const CellBody body = cutCells(3, 3, 2, 4);
+  const Points y = moved(body, Mat3::Identity(), Vec3::Zero(), 1e-3, random);
+  const Points a = accelerations(body, y);
+  for (int trial = 0; trial < 10; ++trial) {
+    const Mat3 turn = random.rotation().toRotationMatrix();
+    const Vec3 shift = random.vector(0.1);
+    Points turned;
+    for (const Vec3& p : y) turned.push_back(turn * p + shift);
+    const Points b = accelerations(body, turned);
+    for (std::size_t i = 0; i < a.size(); ++i) EXPECT_LT((b[i] - turn * a[i]).norm(), 1e-11 * kScale);
+  }
+}
+
+TEST(ElasticCells, FarFromRestAreTheGradientTooAndStayFinite) {
+  Random random(7);
+  for (int trial = 0; trial < 60; ++trial) {
+    const CellBody body = cutCells(1, 1, 1, 20 + trial);
+    const double size = std::pow(10.0, random.uniform(-1.0, 2.0));
+    const Mat3 map = random.matrix(size) + Mat3(Vec3(random.uniform(0, 20), 1, 1).asDiagonal());
+    const Points y = moved(body, map, Vec3::Zero(), 1e-4, random);
+    std::vector<ClusterPose> poses = body.poses;
+    Points a;
+    MatchCounters counters;
+    EXPECT_LT(elasticAccelerations(body.cells, kSoft, y, poses, a, counters), 5.0) << map;
+    const double scale = Balance(body, y, a).scale;
+    for (std::size_t i = 0; i < y.size(); ++i)
+      for (int axis = 0; axis < 3; ++axis) {
+        const double step = 1e-8 * size;
+        Points up = y, down = y;
+        up[i][axis] += step;
+        down[i][axis] -= step;
+        const double slope =
+            (elasticEnergy(body.cells, kSoft, up, poses) - elasticEnergy(body.cells, kSoft, down, poses)) /
+            (2.0 * step);
+        EXPECT_NEAR(-slope, body.cells.masses[i] * a[i][axis], 1e-4 * scale) << map;
+      }
+  }
+  const CellBody body = cutCells(2, 2, 2, 5);
+  for (const Points& y : {Points(body.rest.size(), Vec3::Zero()),
+                          moved(body, Mat3(Vec3(1, 0, 0).asDiagonal()), Vec3::Zero(), 0.0, random)})
+    for (const Vec3& a : accelerations(body, y)) EXPECT_TRUE(a.allFinite());
+}
+
+// By differences of the accelerations at rest, and all eigenvalues.
+double frequencyOf(const CellBody& body, const ElasticParameters& material) {
+  const Eigen::Index size = static_cast<Eigen::Index>(3 * body.rest.size());
+  Eigen::MatrixXd stiffness(size, size);
+  const double step = 1e-6 * kCellEdge;
+  std::vector<ClusterPose> poses = body.poses;
+  MatchCounters counters;
+  for (Eigen::Index column = 0; column < size; ++column) {
+    Points up = body.rest, down = body.rest, a, b;
+    up[column / 3][column % 3] += step;
+    down[column / 3][column % 3] -= step;
+    elasticAccelerations(body.cells, material, up, poses, a, counters);
+    elasticAccelerations(body.cells, material, down, poses, b, counters);
+    for (Eigen::Index row = 0; row < size; ++row)
+      stiffness(row, column) = -std::sqrt(body.cells.masses[row / 3] / body.cells.masses[column / 3]) *
+                               (a[row / 3][row % 3] - b[row / 3][row % 3]) / (2.0 * step);
+  }
+  const Eigen::MatrixXd symmetric = 0.5 * (stiffness + stiffness.transpose());
+  return std::sqrt(
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(symmetric, Eigen::EigenvaluesOnly).eigenvalues()[size - 1]);
+}
+
+TEST(HighestFrequencyOfCells, IsTheLargestEigenvalueFromBelow) {
+  for (double nu : {0.0, 0.3, 0.45}) {
+    const ElasticParameters material = elasticParameters(5000.0, nu, kCellDensity);
+    for (const CellBody& body : {wholeCells(1, 1, 1), wholeCells(4, 3, 3), cutCells(3, 3, 2, 1), cutCells(4, 3, 2, 2),
+                                 cutCells(4, 2, 2, 3, 0.2), cutCells(1, 1, 1, 4)}) {
+      const double exact = frequencyOf(body, material), found = highestFrequency(body.cells, material);
+      EXPECT_LT(found, (1.0 + 1e-5) * exact);
+      EXPECT_GT(found, 0.99 * exact);
+    }
+  }
+  EXPECT_EQ(highestFrequency(ElasticCells(), kSoft), 0.0);
+}
+
+TEST(HighestFrequencyOfCells, NoStepOfOneOverItMakesEnergyGrow) {
+  // As body/deform.h steps: a margin of 1.1, the stretch of the last step, accelerations at x + v / frequency.
+  Random random(8);
+  for (unsigned seed = 0; seed < 6; ++seed)
+    for (double noise : {1e-5, 5e-4, 5e-3}) {
+      const CellBody body = cutCells(4, 3, 2, 30 + seed);
+      const double frequency = highestFrequency(body.cells, kSoft);
+      Points x = moved(body, Mat3::Identity(), Vec3::Zero(), noise, random), v(x.size(), Vec3::Zero()), a;
+      std::vector<ClusterPose> poses = body.poses;
+      MatchCounters counters;
+      double stretch = elasticAccelerations(body.cells, kSoft, x, poses, a, counters), before = 0.0;
+      const double start = elasticEnergy(body.cells, kSoft, x, poses);
+      for (int step = 0; step < 300; ++step) {
+        const double h = 1.0 / (1.1 * stretch * frequency);
+        Points y = x;
+        for (std::size_t i = 0; i < x.size(); ++i) y[i] += h * v[i];
+        stretch = elasticAccelerations(body.cells, kSoft, y, poses, a, counters);
+        double kinetic = 0.0;
+        for (std::size_t i = 0; i < x.size(); ++i) {
+          v[i] += h * a[i];
+          x[i] += h * v[i];
+          kinetic += 0.5 * body.cells.masses[i] * v[i].squaredNorm();
+        }
+        before = kinetic + elasticEnergy(body.cells, kSoft, x, poses);
+        ASSERT_LT(before, 1.001 * start) << "seed " << seed << " noise " << noise << " step " << step;
+      }
+      EXPECT_LT(before, 0.5 * start);
+    }
+}
+
+}  // namespace
+}  // namespace meshless
