@@ -1,0 +1,80 @@
+// Narrow phase: which features of two surfaces, or of a surface and a plane or sphere, are near each other in a frame,
+// and on which side. Pure functions: they read surfaces and what was remembered, and append to their results.
+#pragma once
+
+#include "meshless_surgery/contact/surface_frame.h"
+
+namespace meshless {
+
+/// A point of surface a (a vertex, or on an edge) near a point of surface b (on a face, or on an edge) or of what has
+/// no surface.
+struct FeaturePair {
+  enum class Kind : std::uint8_t { kVertexFace, kEdgeEdge, kPlane, kSphere };
+  Kind kind = Kind::kVertexFace;
+  std::uint8_t order = 0;           // among those of one vertex
+  std::uint8_t of_a = 1, of_b = 3;  // how many of the vertices are of a, then of b
+  std::array<Index, 2> features{};  // names it in the next frame: a vertex and kNoIndex, or two edges
+  std::array<Index, 4> vertices{};  // first those of a
+  std::array<double, 4> shares{};   // of the vertices; add up to 1 for a, to -1 for b
+  Vec3 normal = Vec3::UnitZ();      // unit, from b to a
+  double gap = 0.0;                 // [m] along it; negative: inside
+};
+
+/// The side on which a vertex of a was of b: its normal says where out is once it is inside.
+struct RememberedSide {
+  Index vertex = 0;
+  double depth = 0.0;  // [m] how deep inside
+  Vec3 normal = Vec3::UnitZ();
+};
+
+/// Features that are apart and near enough to meet in the frame: a vertex and a face, or two edges.
+struct WatchedFeatures {
+  std::array<Index, 4> vertices{};  // first those of a
+  std::uint8_t of_a = 1;            // 1 or 2
+};
+
+/// What is found, one after another.
+struct FoundFeatures {
+  std::vector<FeaturePair> pairs;
+  std::vector<RememberedSide> sides;  // to be remembered
+  std::vector<WatchedFeatures> watched;
+};
+
+struct PairSearch {
+  struct Side {
+    const ContactSurface* surface = nullptr;
+    const SurfaceFrame* frame = nullptr;
+  };
+  Side a, b;
+  double h = 0.0;       // [s] of the frame
+  double length = 0.0;  // [m] the shorter mean edge of the two
+  bool first = true;    // nothing is remembered: look for what is inside
+  enum class Self { kNo, kCuts, kAll } self = Self::kNo;
+  const RememberedSide* remembered = nullptr;  // ascending by vertex
+  std::size_t remembered_count = 0;
+};
+
+/// [m] how near something is looked for at rest, beside what is swept; of surfaces with such a mean edge.
+double searchMargin(double edge_length);
+
+/// Vertices of a, ascending, that are near enough to b to be looked up.
+std::vector<Index> verticesNear(const PairSearch& search);
+
+/// Vertices of a against the faces of b: up to three pairs each, of different directions, the nearest
+/// first. Signs by pseudonormals (Baerentzen and Aanaes 2005); where several faces are equally near, the vertex is on
+/// the side of the one that its own faces oppose most, so that the twin faces of a fresh cut are on the right sides.
+/// Directions that the vertex's faces do not oppose are left out. Returns the vertices that were looked up.
+std::size_t findVertexFace(const PairSearch& search, const Index* vertices, std::size_t count, FoundFeatures& found);
+
+/// Ridges against ridges, where their common normal is between the normals of both (the Gauss map): the sign needs no
+/// memory.
+void findEdgeEdge(const PairSearch& search, FoundFeatures& found);
+
+/// Vertices of a over the plane z = height.
+void findPlane(const PairSearch& search, double height, std::vector<FeaturePair>& pairs);
+
+/// Features of a next to a sphere that moves by `way` [m] in the frame; a vertex, edge or face comes once.
+void findSphere(const PairSearch& search, const Vec3& centre, double radius, const Vec3& way,
+                std::vector<FeaturePair>& pairs);
+
+}  // namespace meshless

@@ -1,0 +1,44 @@
+// Groups of particles that answer a contact partly as rigid bodies: the clusters of a material for looks, which pulls
+// them back to rigid shapes within a frame.
+#pragma once
+
+#include "meshless_surgery/base/bytes.h"
+#include "meshless_surgery/base/types.h"
+
+namespace meshless {
+
+struct RigidGroups {
+  /// Compressed rows of members with weights that add up to 1 over the groups of a particle; masses [kg] > 0 of
+  /// particles.
+  RigidGroups(const std::vector<Index>& group_offsets, const std::vector<Index>& group_members,
+              const std::vector<double>& group_weights, const std::vector<double>& particle_masses);
+
+  std::vector<Index> offsets, members;
+  std::vector<double> weights;
+  std::vector<double> masses;                // [kg] of particles
+  std::vector<Index> of_offsets, of_groups;  // the groups of each particle, compressed rows
+  std::vector<double> of_weights;
+
+  Index size() const { return static_cast<Index>(offsets.size() - 1); }
+  std::size_t bytes() const {
+    return sizeof *this + bytesOf(offsets, members, weights, masses, of_offsets, of_groups, of_weights);
+  }
+};
+
+/// How a group has been moved in a substep, about its centre at the substep's start.
+struct GroupMotion {
+  bool current = false;                 // mass, centre and inverse_inertia are of this substep
+  double inverse_mass = 0.0;            // [1/kg]
+  Vec3 centre = Vec3::Zero();           // [m]
+  Mat3 inverse_inertia = Mat3::Zero();  // [1/(kg m^2)]; no turn about an axis with nothing beside it
+  Vec3 shift = Vec3::Zero();            // [m]
+  Vec3 turn = Vec3::Zero();             // [rad]
+};
+
+/// Centre and inertia for positions [m], without motion yet.
+GroupMotion groupAt(const RigidGroups& groups, Index group, const Vec3* positions);
+
+/// Inverse of an inertia; directions below 1e-12 of the largest stay 0.
+Mat3 inverseInertia(const Mat3& inertia);
+
+}  // namespace meshless

@@ -1,0 +1,27 @@
+// Where a surface is at the start of a frame, how it moves, and the boxes of what it sweeps.
+#pragma once
+
+#include "meshless_surgery/contact/contact_surface.h"
+
+namespace meshless {
+
+struct SurfaceFrame {
+  Points vertices;          // [m]
+  Points velocities;        // [m/s] of the vertices
+  Points face_normals;      // unit; zero where a face has no area
+  Points vertex_normals;    // unit, of the areas around; zero without
+  TreeBoxes boxes;          // of faces, swept by their velocities in the frame
+  std::vector<char> ridge;  // one an edge: convex, and turned by more than kRidge
+  std::vector<Index> ridges;
+  Box bounds;  // swept
+
+  std::size_t bytes() const {
+    return bytesOf(vertices, velocities, face_normals, vertex_normals, ridge, ridges) + boxes.bytes();
+  }
+};
+
+/// vertices [m]: one a vertex. velocities [m/s]: one a particle; null: it does not move. h [s]: of the frame.
+void placeFrame(const ContactSurface& surface, const Vec3* vertices, const Vec3* velocities, double h,
+                SurfaceFrame& frame);
+
+}  // namespace meshless

@@ -1,0 +1,413 @@
+#include "meshless_surgery/contact/feature_pairs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "meshless_surgery/geometry/nearest_on_triangle.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kMargin = 0.12;        // of the mean edge
+constexpr double kAhead = 1.2;          // times the way of a frame: who speeds up is met too
+constexpr double kTie = 2e-3;           // of the mean edge: nearer than this two surfaces touch
+constexpr double kDeepest = 2.0;        // mean edges: deeper inside nobody is looked for
+constexpr double kDeeper = 1.3;         // times as deep as it was: who is inside may have gone on
+constexpr double kLeastOpposed = 0.05;  // cosine by which a direction has to oppose a face of who is pushed along it
+constexpr double kSameWay = 0.9;        // cosine from which a second direction of a vertex says nothing new
+constexpr double kSelfOpposed = 0.3;    // cosine by which faces of one body oppose each other where they may meet
+constexpr double kParallel = 0.05;      // sine between edges below which they have no common normal
+constexpr double kEnd = 0.01;           // of an edge: nearer to its end a vertex meets what is there
+
+struct Candidate {
+  Index face = 0;
+  Vec3 weights, point;
+  double distance = 0.0, reach = 0.0;
+  int corners = 0;  // of the face that the nearest point lies between: 1 at a vertex, 2 on an edge, 3 inside
+};
+
+FloatBox boxAround(const Vec3& p, const Vec3& q, double by) {
+  FloatBox box;
+  box.extend(p.cwiseMin(q) - Vec3::Constant(by));
+  box.extend(p.cwiseMax(q) + Vec3::Constant(by));
+  return box;
+}
+
+bool isOutOf(const Box& bounds, const Vec3& p, const Vec3& q, double by) {
+  return ((p.cwiseMin(q).array() - by) > bounds.max.array()).any() ||
+         ((p.cwiseMax(q).array() + by) < bounds.min.array()).any();
+}
+
+/// Cosine by which a direction opposes the vertex: the most of its own normal and those of its faces.
+double opposition(const PairSearch::Side& side, Index v, const Vec3& direction) {
+  double most = -direction.dot(side.frame->vertex_normals[v]);
+  const ContactSurface& s = *side.surface;
+  for (Index k = s.face_offsets[v]; k < s.face_offsets[v + 1]; ++k)
+    most = std::max(most, -direction.dot(side.frame->face_normals[s.faces[k]]));
+  return most;
+}
+
+class VertexSearch {
+ public:
+  VertexSearch(const PairSearch& search, FoundFeatures& found)
+      : search_(search),
+        a_(search.a),
+        b_(search.b),
+        tie_(kTie * search.length),
+        margin_(searchMargin(search.length)),
+        pairs_(found.pairs),
+        sides_(found.sides),
+        watched_(found.watched) {}
+
+  /// False where the vertex is out of the other's bounds.
+  bool find(Index v) {
+    if (search_.self == PairSearch::Self::kCuts && !a_.surface->cut_vertices[v]) return false;
+    remembered_ = recall(v);
+    const Vec3& p = a_.frame->vertices[v];
+    const Vec3 end = p + search_.h * a_.frame->velocities[v];
+    // Who is inside is looked for as deep as it was, and a little more.
+    const double deepest = kDeepest * search_.length;
+    const double deep = remembered_ ? std::min(deepest, kDeeper * remembered_->depth) : 0.0;
+    if (isOutOf(b_.frame->bounds, p, end, margin_ + deep)) return false;
+    gather(v, p, end, margin_ + deep);
+    if (candidates_.empty() && search_.first) gather(v, p, end, margin_ + deepest);
+    if (candidates_.empty()) return true;
+    const Candidate& best = chooseNearest(v);
+    const double distance = signedDistance(best, p);
+    made_ = 0;
+    if (distance >= -tie_)
+      meetOutside(v, p, best);
+    else if (-distance <= deepest && (search_.self == PairSearch::Self::kNo || remembered_))
+      meetInside(v, p, -distance);
+    return true;
+  }
+
+ private:
+  const RememberedSide* recall(Index v) const {
+    const RememberedSide* const end = search_.remembered + search_.remembered_count;
+    const RememberedSide* const at = std::lower_bound(
+        search_.remembered, end, v, [](const RememberedSide& side, Index vertex) { return side.vertex < vertex; });
+    return at != end && at->vertex == v ? at : nullptr;
+  }
+
+  bool mayMeet(Index v, Index face) const {
+    if (search_.self == PairSearch::Self::kNo) return true;
+    if (search_.self == PairSearch::Self::kCuts && !b_.surface->cut_faces[face]) return false;
+    for (const Index corner : b_.surface->triangles[face])
+      if (corner == v) return false;
+    return b_.frame->face_normals[face].dot(a_.frame->vertex_normals[v]) < -kSelfOpposed;
+  }
+
+  void gather(Index v, const Vec3& p, const Vec3& end, double look) {
+    candidates_.clear();
+    const Vec3& velocity = a_.frame->velocities[v];
+    b_.surface->tree.query(b_.frame->boxes, boxAround(p, end, look), [&](Index face) {
+      if (!mayMeet(v, face)) return;
+      const Triangle& t = b_.surface->triangles[face];
+      const Points &x = b_.frame->vertices, &u = b_.frame->velocities;
+      Candidate c;
+      c.face = face;
+      c.weights = nearestWeights(p, x[t[0]], x[t[1]], x[t[2]]);
+      c.point = c.weights[0] * x[t[0]] + c.weights[1] * x[t[1]] + c.weights[2] * x[t[2]];
+      c.distance = (p - c.point).norm();
+      c.reach = kAhead * search_.h *
+                (velocity - (c.weights[0] * u[t[0]] + c.weights[1] * u[t[1]] + c.weights[2] * u[t[2]])).norm();
+      if (c.distance > look + c.reach) return;
+      c.reach += margin_;
+      c.corners = static_cast<int>((c.weights.array() > 0.0).count());
+      candidates_.push_back(c);
+    });
+  }
+
+  const Candidate& chooseNearest(Index v) const {
+    double nearest = candidates_.front().distance;
+    for (const Candidate& c : candidates_) nearest = std::min(nearest, c.distance);
+    const Candidate* best = nullptr;
+    double most = -3.0;
+    for (const Candidate& c : candidates_) {
+      if (c.distance > nearest + tie_) continue;
+      const double opposed = opposition(a_, v, b_.frame->face_normals[c.face]) + (c.corners == 3 ? 1e-6 : 0.0);
+      if (!(opposed > most)) continue;
+      most = opposed;
+      best = &c;
+    }
+    return best ? *best : candidates_.front();
+  }
+
+  double signedDistance(const Candidate& best, const Vec3& p) const {
+    const Vec3 way = p - best.point;
+    if (best.distance <= tie_) return b_.frame->face_normals[best.face].dot(way);
+    // A sheet has no inside: it is where it was.
+    if (!b_.surface->closed) return remembered_ && remembered_->normal.dot(way) < 0.0 ? -best.distance : best.distance;
+    Vec3 pseudonormal = Vec3::Zero();
+    for (const Candidate& c : candidates_) {
+      if (!((c.point - best.point).squaredNorm() <= 1e-18 * search_.length * search_.length)) continue;
+      pseudonormal += angleAt(c) * b_.frame->face_normals[c.face];
+    }
+    return pseudonormal.dot(way) >= 0.0 ? best.distance : -best.distance;
+  }
+
+  /// Of the face at a vertex; 1 elsewhere, where both sides count alike.
+  double angleAt(const Candidate& c) const {
+    if (c.corners != 1) return 1.0;
+    const Triangle& t = b_.surface->triangles[c.face];
+    const int k = c.weights[0] > 0.0 ? 0 : c.weights[1] > 0.0 ? 1 : 2;
+    const Vec3& at = b_.frame->vertices[t[k]];
+    const Vec3 to = b_.frame->vertices[t[(k + 1) % 3]] - at, other = b_.frame->vertices[t[(k + 2) % 3]] - at;
+    const double lengths = to.norm() * other.norm();
+    return lengths > 0.0 ? std::acos(std::clamp(to.dot(other) / lengths, -1.0, 1.0)) : 0.0;
+  }
+
+  bool mayPush(Index v, const Vec3& normal) const {
+    return !b_.surface->closed || !a_.surface->closed || opposition(a_, v, normal) > kLeastOpposed;
+  }
+
+  void meetOutside(Index v, const Vec3& p, const Candidate& best) {
+    for (const Candidate& c : candidates_)
+      if (c.distance <= c.reach) {
+        const Triangle& t = b_.surface->triangles[c.face];
+        watched_.push_back({{v, t[0], t[1], t[2]}, 1});
+      }
+    const Vec3& face_normal = b_.frame->face_normals[best.face];
+    if (best.distance <= tie_) {
+      Vec3 normal = face_normal;
+      if (!b_.surface->closed && remembered_ && remembered_->normal.dot(normal) < 0.0) normal = -normal;
+      if (mayPush(v, normal)) add(v, best, normal, normal.dot(p - best.point));
+    } else if (best.distance <= best.reach) {
+      const Vec3 normal = (p - best.point) / best.distance;
+      if (mayPush(v, normal)) add(v, best, normal, best.distance);
+    }
+    if (made_ > 0) sides_.push_back({v, 0.0, used_[0]});
+    if (!b_.surface->closed) return;
+    for (const Candidate& c : candidates_) {
+      if (made_ == used_.size()) break;
+      if (&c == &best || c.corners != 3 || c.distance > c.reach) continue;
+      const Vec3& normal = b_.frame->face_normals[c.face];
+      if (normal.dot(p - c.point) < 0.0 || !mayPush(v, normal)) continue;
+      if (std::any_of(used_.begin(), used_.begin() + made_, [&](const Vec3& u) { return u.dot(normal) > kSameWay; }))
+        continue;
+      add(v, c, normal, c.distance);
+    }
+  }
+
+  // Out by the face that is near, that the vertex opposes, and on whose side it was.
+  void meetInside(Index v, const Vec3& p, double depth) {
+    const Candidate* out = nullptr;
+    double least = std::numeric_limits<double>::infinity(), gap = 0.0;
+    for (const Candidate& c : candidates_) {
+      const Vec3& normal = b_.frame->face_normals[c.face];
+      const double height = normal.dot(p - c.point);
+      if (height > 0.0 || (c.corners != 3 && -height < 0.5 * c.distance)) continue;
+      const double opposed = b_.surface->closed ? opposition(a_, v, normal) : 1.0;
+      if (!(opposed > kLeastOpposed)) continue;
+      double cost = c.distance / (opposed * opposed);
+      if (remembered_) {
+        const double same = normal.dot(remembered_->normal);
+        cost /= kLeastOpposed + std::max(0.0, same) * same;
+      }
+      if (!(cost < least)) continue;
+      least = cost;
+      out = &c;
+      gap = c.corners == 3 ? height : -c.distance;
+    }
+    if (!out) return;
+    const Vec3& normal = b_.frame->face_normals[out->face];
+    add(v, *out, normal, gap);
+    sides_.push_back({v, depth, normal});
+  }
+
+  void add(Index v, const Candidate& c, const Vec3& normal, double gap) {
+    const Triangle& t = b_.surface->triangles[c.face];
+    FeaturePair pair;
+    pair.order = static_cast<std::uint8_t>(made_);
+    pair.features = {v, kNoIndex};
+    pair.vertices = {v, t[0], t[1], t[2]};
+    pair.shares = {1.0, -c.weights[0], -c.weights[1], -c.weights[2]};
+    pair.normal = normal;
+    pair.gap = gap;
+    pairs_.push_back(pair);
+    used_[made_++] = normal;
+  }
+
+  const PairSearch& search_;
+  const PairSearch::Side a_, b_;
+  const double tie_, margin_;
+  std::vector<FeaturePair>& pairs_;
+  std::vector<RememberedSide>& sides_;
+  std::vector<WatchedFeatures>& watched_;
+  std::vector<Candidate> candidates_;
+  const RememberedSide* remembered_ = nullptr;
+  std::size_t made_ = 0;
+  std::array<Vec3, 3> used_;
+};
+
+// Both of the arc's ends are as far from its middle: inside is who is nearer.
+bool isInArc(const SurfaceFrame& frame, const ContactEdge& edge, const Vec3& direction) {
+  const Vec3& first = frame.face_normals[edge.faces[0]];
+  if (edge.faces[1] == kNoIndex) return true;
+  const Vec3 middle = (first + frame.face_normals[edge.faces[1]]).normalized();
+  return direction.dot(middle) >= first.dot(middle) - 1e-9;
+}
+
+// Who is inside as a whole goes out by one face, the nearest to any of its vertices: each by a face of its own, they
+// would go to all sides.
+void leadOut(const PairSearch& search, FoundFeatures& found) {
+  if (found.sides.size() != search.a.surface->vertices() || found.pairs.size() != found.sides.size()) return;
+  std::size_t nearest = 0;
+  for (std::size_t n = 0; n < found.sides.size(); ++n) {
+    if (!(found.sides[n].depth > 0.0)) return;
+    if (found.pairs[n].gap > found.pairs[nearest].gap) nearest = n;
+  }
+  const FeaturePair by = found.pairs[nearest];
+  Vec3 at = Vec3::Zero();
+  for (int k = 1; k < 4; ++k) at -= by.shares[k] * search.b.frame->vertices[by.vertices[k]];
+  for (std::size_t n = 0; n < found.pairs.size(); ++n) {
+    FeaturePair& pair = found.pairs[n];
+    const Index v = pair.vertices[0];
+    pair.vertices = {v, by.vertices[1], by.vertices[2], by.vertices[3]};
+    pair.shares = by.shares;
+    pair.normal = found.sides[n].normal = by.normal;
+    pair.gap = by.normal.dot(search.a.frame->vertices[v] - at);
+  }
+}
+
+}  // namespace
+
+double searchMargin(double edge_length) { return kMargin * edge_length; }
+
+std::vector<Index> verticesNear(const PairSearch& search) {
+  double deepest = 0.0;
+  for (std::size_t k = 0; k < search.remembered_count; ++k)
+    deepest = std::max(deepest, kDeeper * search.remembered[k].depth);
+  if (search.first) deepest = kDeepest * search.length;
+  const ContactSurface& a = *search.a.surface;
+  std::vector<char> near(a.vertices(), 0);
+  a.tree.queryTree(search.a.frame->boxes, search.b.surface->tree, search.b.frame->boxes,
+                   searchMargin(search.length) + std::min(deepest, kDeepest * search.length), [&](Index face) {
+                     for (const Index v : a.triangles[face]) near[v] = 1;
+                   });
+  std::vector<Index> vertices;
+  for (Index v = 0; v < near.size(); ++v)
+    if (near[v]) vertices.push_back(v);
+  return vertices;
+}
+
+std::size_t findVertexFace(const PairSearch& search, const Index* vertices, std::size_t count, FoundFeatures& found) {
+  VertexSearch each(search, found);
+  std::size_t looked = 0;
+  for (std::size_t n = 0; n < count; ++n) looked += each.find(vertices[n]);
+  if (search.self == PairSearch::Self::kNo && count == search.a.surface->vertices()) leadOut(search, found);
+  return looked;
+}
+
+void findEdgeEdge(const PairSearch& search, FoundFeatures& found) {
+  const SurfaceFrame &a = *search.a.frame, &b = *search.b.frame;
+  const ContactSurface &sa = *search.a.surface, &sb = *search.b.surface;
+  const double margin = searchMargin(search.length), deepest = 0.5 * kDeepest * search.length;
+  for (const Index e : a.ridges) {
+    const ContactEdge& of_a = sa.edges[e];
+    const Vec3 &a0 = a.vertices[of_a.vertices[0]], &a1 = a.vertices[of_a.vertices[1]];
+    const Vec3 &v0 = a.velocities[of_a.vertices[0]], &v1 = a.velocities[of_a.vertices[1]];
+    const Vec3 low = a0.cwiseMin(a1).cwiseMin(a0 + search.h * v0).cwiseMin(a1 + search.h * v1);
+    const Vec3 high = a0.cwiseMax(a1).cwiseMax(a0 + search.h * v0).cwiseMax(a1 + search.h * v1);
+    if (isOutOf(b.bounds, low, high, margin)) continue;
+    const auto meet = [&](Index other) {
+      const ContactEdge& of_b = sb.edges[other];
+      found.watched.push_back({{of_a.vertices[0], of_a.vertices[1], of_b.vertices[0], of_b.vertices[1]}, 2});
+      const Vec3 &b0 = b.vertices[of_b.vertices[0]], &b1 = b.vertices[of_b.vertices[1]];
+      const Vec3 along_a = a1 - a0, along_b = b1 - b0, between = a0 - b0;
+      Vec3 normal = along_a.cross(along_b);
+      const double sine = normal.norm();
+      if (!(sine > kParallel * along_a.norm() * along_b.norm())) return;
+      normal /= sine;
+      Vec3 outwards = b.face_normals[of_b.faces[0]];
+      if (of_b.faces[1] != kNoIndex) outwards += b.face_normals[of_b.faces[1]];
+      if (normal.dot(outwards) < 0.0) normal = -normal;
+      if (!isInArc(b, of_b, normal) || !isInArc(a, of_a, -normal)) return;
+      // Where they are nearest to each other.
+      const double aa = along_a.squaredNorm(), ab = along_a.dot(along_b), bb = along_b.squaredNorm();
+      const double da = along_a.dot(between), db = along_b.dot(between), det = aa * bb - ab * ab;
+      const double s = (ab * db - bb * da) / det, t = (aa * db - ab * da) / det;
+      if (!(s > kEnd && s < 1.0 - kEnd && t > kEnd && t < 1.0 - kEnd)) return;
+      const double gap = normal.dot(between + s * along_a - t * along_b);
+      const Vec3 velocity =
+          (1.0 - s) * v0 + s * v1 - (1.0 - t) * b.velocities[of_b.vertices[0]] - t * b.velocities[of_b.vertices[1]];
+      if (gap > margin + kAhead * search.h * velocity.norm() || gap < -deepest) return;
+      FeaturePair pair;
+      pair.kind = FeaturePair::Kind::kEdgeEdge;
+      pair.of_a = pair.of_b = 2;
+      pair.features = {e, other};
+      pair.vertices = {of_a.vertices[0], of_a.vertices[1], of_b.vertices[0], of_b.vertices[1]};
+      pair.shares = {1.0 - s, s, t - 1.0, -t};
+      pair.normal = normal;
+      pair.gap = gap;
+      found.pairs.push_back(pair);
+    };
+    FloatBox box = boxAround(low, high, margin);
+    sb.tree.query(b.boxes, box, [&](Index face) {
+      for (const Index other : sb.face_edges[face])
+        if (b.ridge[other] && sb.edges[other].faces[0] == face) meet(other);
+    });
+  }
+}
+
+void findPlane(const PairSearch& search, double height, std::vector<FeaturePair>& pairs) {
+  const SurfaceFrame& a = *search.a.frame;
+  const double margin = searchMargin(search.length);
+  for (Index v = 0; v < a.vertices.size(); ++v) {
+    const double gap = a.vertices[v].z() - height;
+    if (gap > margin + kAhead * search.h * std::max(0.0, -a.velocities[v].z())) continue;
+    FeaturePair pair;
+    pair.kind = FeaturePair::Kind::kPlane;
+    pair.of_b = 0;
+    pair.features = {v, kNoIndex};
+    pair.vertices = {v, kNoIndex, kNoIndex, kNoIndex};
+    pair.shares = {1.0, 0.0, 0.0, 0.0};
+    pair.gap = gap;
+    pairs.push_back(pair);
+  }
+}
+
+void findSphere(const PairSearch& search, const Vec3& centre, double radius, const Vec3& way,
+                std::vector<FeaturePair>& pairs) {
+  const SurfaceFrame& a = *search.a.frame;
+  const ContactSurface& surface = *search.a.surface;
+  const double reach = radius + searchMargin(search.length);
+  std::set<std::array<Index, 3>> seen;
+  const auto meet = [&](std::array<Index, 3> corners, Vec3 weights) {
+    // Only the corners that count, ascending: faces around a vertex find it once.
+    FeaturePair pair;
+    pair.kind = FeaturePair::Kind::kSphere;
+    pair.of_a = pair.of_b = 0;
+    std::array<Index, 3> name{kNoIndex, kNoIndex, kNoIndex};
+    for (int k = 0; k < 3; ++k)
+      if (weights[k] > 0.0) {
+        name[pair.of_a] = pair.vertices[pair.of_a] = corners[k];
+        pair.shares[pair.of_a++] = weights[k];
+      }
+    std::sort(name.begin(), name.end());
+    Vec3 point = Vec3::Zero(), velocity = Vec3::Zero();
+    for (int k = 0; k < pair.of_a; ++k) {
+      point += pair.shares[k] * a.vertices[pair.vertices[k]];
+      velocity += pair.shares[k] * a.velocities[pair.vertices[k]];
+    }
+    const double distance = (point - centre).norm();
+    if (distance > reach + kAhead * (search.h * velocity - way).norm() || !seen.insert(name).second) return;
+    pair.features = {name[0], name[1]};
+    pair.order = static_cast<std::uint8_t>(pair.of_a);
+    pair.normal = distance > 0.0 ? Vec3((point - centre) / distance) : Vec3(Vec3::UnitZ());
+    pair.gap = distance - radius;
+    pairs.push_back(pair);
+  };
+  const FloatBox box = boxAround(centre, centre + way, reach);
+  surface.tree.query(a.boxes, box, [&](Index face) {
+    const Triangle& t = surface.triangles[face];
+    meet(t, nearestWeights(centre, a.vertices[t[0]], a.vertices[t[1]], a.vertices[t[2]]));
+    for (int k = 0; k < 3; ++k) meet({t[k], t[(k + 1) % 3], t[(k + 2) % 3]}, Vec3::UnitX());
+  });
+  if (surface.triangles.empty())
+    for (Index v = 0; v < a.vertices.size(); ++v) meet({v, kNoIndex, kNoIndex}, Vec3::UnitX());
+}
+
+}  // namespace meshless

@@ -1,0 +1,130 @@
+// Which features meet, and on which side they are.
+#include "meshless_surgery/contact/feature_pairs.h"
+
+#include <gtest/gtest.h>
+
+#include "meshless_surgery/geometry/primitives.h"
+
+namespace meshless {
+namespace {
+
+/// A surface whose vertices are particles, somewhere.
+struct Placed {
+  Placed(TriangleMesh of_mesh, const Vec3& at, const Vec3& velocity = Vec3::Zero(), double h = 0.01)
+      : mesh(std::move(of_mesh)), surface(mesh, ownSupports(static_cast<Index>(mesh.vertices.size()))) {
+    for (Vec3& p : mesh.vertices) p += at;
+    const Points velocities(mesh.vertices.size(), velocity);
+    placeFrame(surface, mesh.vertices.data(), velocities.data(), h, frame);
+  }
+  TriangleMesh mesh;
+  ContactSurface surface;
+  SurfaceFrame frame;
+};
+
+PairSearch between(const Placed& a, const Placed& b) {
+  PairSearch search;
+  search.a = {&a.surface, &a.frame};
+  search.b = {&b.surface, &b.frame};
+  search.h = 0.01;
+  search.length = std::min(a.surface.edge_length, b.surface.edge_length);
+  return search;
+}
+
+std::vector<FeaturePair> vertexFace(const PairSearch& search, std::vector<RememberedSide>* sides = nullptr) {
+  FoundFeatures found;
+  const std::vector<Index> near = verticesNear(search);
+  findVertexFace(search, near.data(), near.size(), found);
+  if (sides) *sides = found.sides;
+  return found.pairs;
+}
+
+TEST(FeaturePairs, AVertexAboveAFaceMeetsItWithTheGapBetweenThem) {
+  const Placed low(boxMesh(Vec3(1, 1, 1), 4, 4, 4), Vec3::Zero());
+  const Placed high(boxMesh(Vec3(0.4, 0.4, 0.4), 1, 1, 1), Vec3(0.03, 0.02, 0.71));
+  const std::vector<FeaturePair> pairs = vertexFace(between(high, low));
+  ASSERT_EQ(pairs.size(), 4u) << "the lower corners";
+  for (const FeaturePair& pair : pairs) {
+    EXPECT_NEAR((pair.normal - Vec3::UnitZ()).norm(), 0.0, 1e-12);
+    EXPECT_NEAR(pair.gap, 0.01, 1e-12);
+    double of_a = 0.0, of_b = 0.0;
+    for (int k = 0; k < 4; ++k) (k < pair.of_a ? of_a : of_b) += pair.shares[k];
+    EXPECT_NEAR(of_a, 1.0, 1e-12);
+    EXPECT_NEAR(of_b, -1.0, 1e-12);
+  }
+}
+
+TEST(FeaturePairs, NothingIsMetBeyondTheMarginAndTheWayOfTheFrame) {
+  const Placed low(boxMesh(Vec3(1, 1, 1), 4, 4, 4), Vec3::Zero());
+  const Vec3 at(0.03, 0.02, 0.8);
+  EXPECT_TRUE(vertexFace(between(Placed(boxMesh(Vec3(0.4, 0.4, 0.4), 1, 1, 1), at), low)).empty());
+  EXPECT_EQ(vertexFace(between(Placed(boxMesh(Vec3(0.4, 0.4, 0.4), 1, 1, 1), at, Vec3(0, 0, -10)), low)).size(), 4u);
+}
+
+TEST(FeaturePairs, AVertexInsideGoesOutByTheNearFaceThatItOpposes) {
+  const Placed low(boxMesh(Vec3(1, 1, 1), 4, 4, 4), Vec3::Zero());
+  const Placed high(boxMesh(Vec3(0.4, 0.4, 0.4), 1, 1, 1), Vec3(0.03, 0.02, 0.65));
+  std::vector<RememberedSide> sides;
+  const std::vector<FeaturePair> pairs = vertexFace(between(high, low), &sides);
+  ASSERT_EQ(pairs.size(), 4u);
+  for (const FeaturePair& pair : pairs) {
+    EXPECT_NEAR((pair.normal - Vec3::UnitZ()).norm(), 0.0, 1e-12);
+    EXPECT_NEAR(pair.gap, -0.05, 1e-12);
+  }
+  ASSERT_EQ(sides.size(), 4u);
+  EXPECT_NEAR(sides[0].depth, 0.05, 1e-12);
+}
+
+// The halves of a cut block lie on each other: each of the twin faces is outside of the other.
+TEST(FeaturePairs, TwinFacesOfACutAreOnTheRightSides) {
+  const Placed left(boxMesh(Vec3(1, 1, 1), 4, 4, 4), Vec3(-0.5, 0, 0));
+  const Placed right(boxMesh(Vec3(1, 1, 1), 4, 4, 4), Vec3(0.5, 0, 0));
+  for (const bool of_left : {true, false}) {
+    const std::vector<FeaturePair> pairs = vertexFace(of_left ? between(left, right) : between(right, left));
+    std::size_t met = 0;
+    for (const FeaturePair& pair : pairs) {
+      EXPECT_NEAR(pair.gap, 0.0, 1e-9);
+      if (pair.order == 0) EXPECT_NEAR((pair.normal - (of_left ? -1.0 : 1.0) * Vec3::UnitX()).norm(), 0.0, 1e-9);
+      met += pair.order == 0;
+    }
+    EXPECT_EQ(met, 25u);
+  }
+}
+
+TEST(FeaturePairs, RidgesThatCrossMeetAlongTheirCommonNormal) {
+  const double half = std::sqrt(0.5);
+  TriangleMesh bar = boxMesh(Vec3(2, 1, 1), 1, 1, 1);
+  TriangleMesh turned = bar;
+  for (Vec3& p : turned.vertices) p = Vec3(p.x(), half * (p.y() - p.z()), half * (p.y() + p.z()));  // on an edge
+  TriangleMesh across = turned;
+  for (Vec3& p : across.vertices) p = Vec3(-p.y(), p.x(), p.z());
+  for (const double gap : {0.02, -0.02}) {
+    const Placed low(turned, Vec3::Zero()), high(across, Vec3(0.05, 0.03, 2.0 * half + gap));
+    FoundFeatures found;
+    findEdgeEdge(between(high, low), found);
+    const std::vector<FeaturePair>& pairs = found.pairs;
+    ASSERT_EQ(pairs.size(), 1u);
+    EXPECT_NEAR((pairs[0].normal - Vec3::UnitZ()).norm(), 0.0, 1e-9);
+    EXPECT_NEAR(pairs[0].gap, gap, 1e-9);
+    EXPECT_TRUE(vertexFace(between(high, low)).empty()) << "no vertex is near a face";
+  }
+}
+
+TEST(FeaturePairs, AThinSlabDoesNotMeetItsOwnOtherSide) {
+  const Placed slab(boxMesh(Vec3(1, 1, 0.01), 8, 8, 1), Vec3::Zero());
+  PairSearch search = between(slab, slab);
+  search.self = PairSearch::Self::kAll;
+  EXPECT_TRUE(vertexFace(search).empty());
+}
+
+TEST(FeaturePairs, ASphereMeetsEachFeatureOnce) {
+  const Placed block(boxMesh(Vec3(1, 1, 1), 2, 2, 2), Vec3::Zero());
+  PairSearch search = between(block, block);
+  std::vector<FeaturePair> pairs;
+  findSphere(search, Vec3(0.0, 0.0, 0.59), 0.1, Vec3::Zero(), pairs);
+  ASSERT_EQ(pairs.size(), 1u) << "the vertex below it, around which there are six faces";
+  EXPECT_NEAR(pairs[0].gap, -0.01, 1e-12);
+  EXPECT_NEAR((pairs[0].normal + Vec3::UnitZ()).norm(), 0.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace meshless
