@@ -74,7 +74,11 @@ Result<Shape> makeShape(Random& random) {
   Shape shape;
   if (kind < 0.6) {
     const int genus = random.whole(0, 3);
-    Result<TriangleMesh> mesh = randomOrgan(random.bits(), genus, size, static_cast<std::size_t>(triangles));
+    const std::uint64_t seed = random.bits();
+    Result<TriangleMesh> mesh = randomOrgan(seed, genus, size, static_cast<std::size_t>(triangles));
+    // Some take more than they were asked for, to show their rings.
+    for (double fewer = 0.7; mesh && mesh->triangles.size() > static_cast<std::size_t>(kMost); fewer *= 0.7)
+      mesh = randomOrgan(seed, genus, size, static_cast<std::size_t>(fewer * triangles));
     if (!mesh) return mesh.error();
     shape = {std::move(*mesh), words("organ of genus ", genus)};
   } else if (kind < 0.8) {

@@ -20,9 +20,8 @@ SampleSet connectedPart(SampleSet within, const LinkSet& parted) {
     for (int axis = 0; axis < 3; ++axis) {
       const int stride = kSampleStride[axis];
       const SampleSet linked = ~parted[axis] & ~kUpperLayer[axis];  // to the next one in the cell
-      grown |= ((grown & linked) << stride) | ((grown >> stride) & linked);
+      grown |= (((grown & linked) << stride) | ((grown >> stride) & linked)) & within;
     }
-    grown &= within;
     if (grown == part) return part;
     part = grown;
   }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "meshless_surgery/geometry/union_find.h"
 #include "support/random.h"
 
 namespace meshless {
@@ -54,6 +55,40 @@ TEST(CellSamples, LayersThatAreCutComeApart) {
   // The last sample of a row has no neighbour in the first of the next.
   EXPECT_EQ(connectedPart(SampleSet{1} << sampleBit(3, 0, 0) | SampleSet{1} << sampleBit(0, 1, 0), {}),
             SampleSet{1} << sampleBit(3, 0, 0));
+}
+
+TEST(CellSamples, PartsThatOnlyTouchAtAnEdgeOrACornerAreNotConnected) {
+  const SampleSet first = SampleSet{1} << sampleBit(1, 1, 1);
+  for (const int other : {sampleBit(2, 2, 1), sampleBit(1, 2, 2), sampleBit(2, 1, 2), sampleBit(2, 2, 2)})
+    EXPECT_EQ(connectedPart(first | SampleSet{1} << other, {}), first) << other;
+  EXPECT_EQ(connectedPart(first | SampleSet{1} << sampleBit(2, 1, 1) | SampleSet{1} << sampleBit(2, 2, 1), {}),
+            first | SampleSet{1} << sampleBit(2, 1, 1) | SampleSet{1} << sampleBit(2, 2, 1));
+}
+
+// One link after the other.
+SampleSet connectedPartBySteps(SampleSet within, const LinkSet& parted) {
+  UnionFind samples(64);
+  for (int bit = 0; bit < 64; ++bit)
+    for (int axis = 0; axis < 3; ++axis) {
+      if (kUpperLayer[axis] >> bit & 1 || parted[axis] >> bit & 1) continue;
+      const int next = bit + kSampleStride[axis];
+      if (within >> bit & within >> next & 1) samples.join(bit, next);
+    }
+  SampleSet part = kNoSample;
+  for (int bit = 0; bit < 64; ++bit)
+    if (within >> bit & 1 && samples.find(bit) == samples.find(lowestSample(within))) part |= SampleSet{1} << bit;
+  return part;
+}
+
+TEST(CellSamples, AConnectedPartIsWhatLinksReachOneByOne) {
+  test::Random random(2);
+  for (int n = 0; n < 500; ++n) {
+    const SampleSet within = bitsOf(random) | (n % 2 ? bitsOf(random) : kNoSample);
+    LinkSet parted{};
+    if (n % 3)
+      for (SampleSet& links : parted) links = bitsOf(random);
+    EXPECT_EQ(connectedPart(within, parted), connectedPartBySteps(within, parted));
+  }
 }
 
 }  // namespace
