@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/primitives.h"
 
@@ -152,6 +153,7 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
       truth.has("surface") ? alignedSpacing(def.mesh, truth.number("fixed_below"), settings.spacing) : settings.spacing;
   def.spacing = spacing;
   def.clusters = settings.clusters;
+  def.cells = settings.cells;
   def.material = settings.material;
   def.material.density = truth.number("density");
   if (def.material.elastic()) {
@@ -245,8 +247,16 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
 
   if (material.elastic()) model.elastic_batch->getRotations(state, poses);
   fitClusters(matchInput(model), x, poses);  // for riders
-  const SurfaceBinding samples =
-      bindSurface(model.rest, model.graph, model.clusters, truth.rest, std::vector<Index>(truth.rest.size(), kNoIndex));
+  SurfaceBinding samples;
+  if (model.lattice) {
+    const CellFinder finder(*model.lattice);
+    std::vector<Index> cells;
+    for (const Vec3& p : truth.rest) cells.push_back(finder.carrier(p));
+    samples = bindToCells(*model.lattice, truth.rest, cells);
+  } else {
+    samples = bindSurface(model.rest, model.graph, model.clusters, truth.rest,
+                          std::vector<Index>(truth.rest.size(), kNoIndex));
+  }
   double squares = 0.0;
   for (Index s = 0; s < truth.rest.size(); ++s) {
     result.samples.push_back(riderPosition(samples, x, poses, s));

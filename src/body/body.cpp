@@ -1,12 +1,18 @@
 #include "meshless_surgery/body/body.h"
 
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/measures.h"
 
 namespace meshless {
 
 void makeElastic(BodyModel& model) {
   model.elastic = makeElasticRest(model.shape);
+  if (model.lattice) {
+    model.cells = std::make_shared<ElasticCells>(elasticCellsOf(model));
+    model.elastic_batch = std::make_shared<ElasticBatch>(*model.cells);
+    return;
+  }
   for (std::size_t c = 0; c < model.elastic.size(); ++c)
     if (model.elastic[c].spread_inverse.norm() > model.most_spread_inverse) {
       model.elastic[c].spread_inverse.setZero();
@@ -22,16 +28,19 @@ void makeMoments(BodyModel& model, const Material& material) {
   if (!material.elastic())  // stress already carries what is held
     for (std::size_t i = 0; i < model.masses.size(); ++i)
       if (model.fixed[i]) model.match_masses[i] *= kHeld;
+  if (model.lattice) weighCells(model, material.elastic());
   model.shape = makeRestShape(model.rest, model.match_masses, model.clusters);
   model.elastic.clear();
   model.elastic_batch.reset();
+  model.cells.reset();
   model.highest_frequency = 0.0;
   model.specific_stiffness = material.youngs_modulus / material.density;
   if (material.elastic()) {
     makeElastic(model);
-    model.highest_frequency =
-        highestFrequency(matchInput(model), model.elastic,
-                         elasticParameters(material.youngs_modulus, material.poissons_ratio, material.density));
+    const ElasticParameters parameters =
+        elasticParameters(material.youngs_modulus, material.poissons_ratio, material.density);
+    model.highest_frequency = model.cells ? highestFrequency(*model.cells, parameters)
+                                          : highestFrequency(matchInput(model), model.elastic, parameters);
   } else if (material.mode == MatchMode::kQuadratic) {
     addQuadraticRest(model.rest, model.match_masses, model.clusters, model.shape);
   }
@@ -48,6 +57,7 @@ BodyModelPtr withMaterial(const BodyModelPtr& model, const Material& before, con
   const double ratio = after.density / before.density;
   for (double& m : changed->masses) m *= ratio;
   changed->mass *= ratio;
+  changed->cell_mass *= ratio;
   makeMoments(*changed, after);
   return changed;
 }

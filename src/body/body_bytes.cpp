@@ -9,6 +9,8 @@ std::size_t bytesOf(const BodyModel& model) {
          bytesOf(model.graph.offsets, model.graph.neighbours, model.graph.lengths) +
          bytesOf(clusters.offsets, clusters.members, clusters.weights, clusters.seeds, clusters.radii) +
          bytesOf(model.shape.clusters, model.shape.quadratic) +
+         (model.lattice ? bytesOf(model.lattice->cells, model.tissue) : 0) +
+         (model.cells ? bytesOf(model.cells->cells, model.cells->masses) : 0) +
          (model.elastic_batch ? model.elastic_batch->bytes() : 0) +
          bytesOf(model.surface.vertices, model.surface.triangles, model.surface.patches) +
          bytesOf(binding.particle, binding.riders, binding.offsets, binding.carriers, binding.weights, binding.levers,

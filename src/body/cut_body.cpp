@@ -95,6 +95,8 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
                         const CutBodyOptions& wanted) {
   if (!model.solid)
     return Error{ErrorCode::kUnsuitableShape, "its surface is open, so it cannot be cut into closed pieces"};
+  if (model.lattice)
+    return Error{ErrorCode::kUnsuitableShape, "its cells are filled in part, which cannot be cut yet; accepted: cells: whole"};
   TriangleMesh present;
   present.vertices = state.surface;
   present.triangles = model.surface.triangles;

@@ -193,7 +193,9 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
     const ElasticParameters parameters =
         elasticParameters(factor * material.youngs_modulus, material.poissons_ratio, material.density);
     if (material.plastic() || !state.plastic.empty()) {
-      state.stretch = elasticAccelerations(input, model.elastic, parameters, y, state.poses, scratch.goals, counters,
+      state.stretch = model.cells ? elasticAccelerations(*model.cells, parameters, y, state.poses, scratch.goals,
+                                                         counters, state.swelling, &state.plastic)
+                                  : elasticAccelerations(input, model.elastic, parameters, y, state.poses, scratch.goals, counters,
                                            state.swelling);
     } else {
       model.elastic_batch->setRotations(state.poses, scratch.elastic);

@@ -157,6 +157,8 @@ std::vector<std::size_t> assignParticles(const std::vector<IncisedPiece>& pieces
 
 Result<IncisedBody> inciseBody(const BodyModel& model, const BodyState& state, const Blade& blade) {
   if (!model.solid) return Error{ErrorCode::kUnsuitableShape, "its surface is open, so it has no inside to be opened"};
+  if (model.lattice)
+    return Error{ErrorCode::kUnsuitableShape, "its cells are filled in part, which cannot be cut yet; accepted: cells: whole"};
   TriangleMesh present;
   present.vertices = state.surface;
   present.triangles = model.surface.triangles;

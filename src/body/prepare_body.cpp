@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/cell_lattice.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/nearest.h"
@@ -181,8 +182,16 @@ Status makeLatticeParticles(const BodyDef& def, const SolidQuery& solid, BodyMod
   if (lattice->corners > kMaxParticles)
     return invalid("body '" + def.name + "' has " + std::to_string(lattice->corners) + " particles; accepted: up to " +
                    std::to_string(kMaxParticles));
-  model.rest = cornerPlaces(*lattice);
   vertex_particle.assign(model.surface.vertices.size(), kNoIndex);
+  if (def.cells == CellFill::kFilled) {
+    double filled = 0.0;
+    for (const LatticeCell& cell : lattice->cells) filled += momentsOf(cell.filled).fraction;
+    model.cell_mass = def.material.density * model.rest_volume / filled;
+    model.lattice = std::make_shared<CellLattice>(std::move(*lattice));
+    makeParticlesOfCells(model);
+    return Done{};
+  }
+  model.rest = cornerPlaces(*lattice);
   std::vector<double> fractions;
   double filled = 0.0;
   for (const LatticeCell& cell : lattice->cells) {
@@ -205,6 +214,40 @@ Status makeLatticeParticles(const BodyDef& def, const SolidQuery& solid, BodyMod
   }
   model.graph = makeGraph(model.rest, std::move(edges));
   model.clusters = clustersOfCells(cells, cell_masses, model.masses, 1.01 * std::sqrt(3.0) * model.spacing);
+  return Done{};
+}
+
+// A box holds the corners in it that are tissue, and those of a cell with tissue in the box: not what is only there to
+// carry tissue elsewhere.
+void holdParticles(const std::vector<Box>& boxes, BodyModel& model) {
+  model.fixed.assign(model.rest.size(), false);
+  const auto inside = [&](const Vec3& p) {
+    return std::any_of(boxes.begin(), boxes.end(), [&](const Box& box) { return box.contains(p); });
+  };
+  if (boxes.empty()) return;
+  std::vector<bool> holds = model.tissue.empty() ? std::vector<bool>(model.rest.size(), true) : model.tissue;
+  if (model.lattice)
+    for (const LatticeCell& cell : model.lattice->cells)
+      for (SampleSet left = cell.samples; left; left &= left - 1)
+        if (inside(model.lattice->restPlace(cell, samplePlace(lowestSample(left)))))
+          for (const Index corner : cell.corners) holds[corner] = true;
+  for (std::size_t i = 0; i < model.rest.size(); ++i)
+    if (holds[i] && inside(model.rest[i])) model.fixed[i] = model.any_fixed = true;
+}
+
+Status bindFilled(const BodyDef& def, BodyModel& model) {
+  const CellFinder finder(*model.lattice);
+  std::vector<Index> cells;
+  for (const Vec3& v : model.surface.vertices) {
+    cells.push_back(finder.carrier(v));
+    if (cells.back() == kNoIndex) {
+      std::ostringstream text;
+      text << "body '" << def.name << "' has a vertex at " << v.transpose() << " more than two cells of " << model.spacing
+           << " m from the nearest that is filled; a smaller spacing sees what is thin";
+      return Error{ErrorCode::kUnsuitableShape, text.str()};
+    }
+  }
+  model.binding = bindToCells(*model.lattice, model.surface.vertices, cells);
   return Done{};
 }
 
@@ -238,6 +281,9 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   model->rest_area = surfaceArea(surface);
   const bool cells = def.solid && (def.clusters.kind == ClusterOptions::Kind::kCells ||
                                    (def.clusters.kind == ClusterOptions::Kind::kAuto && def.material.elastic()));
+  if (def.cells == CellFill::kFilled && !cells)
+    return invalid("body '" + def.name +
+                   "' has cells: filled but no lattice; accepted: with an elastic material or clusters: cells, of a solid");
   model->spacing = def.spacing;
   if (!(model->spacing > 0.0)) {
     if (!def.solid)
@@ -263,13 +309,14 @@ Result<PreparedBody> prepareBody(BodyDef def) {
     return made.error();
 
   for (double m : model->masses) model->mass += m;
-  model->fixed.assign(model->rest.size(), false);
-  for (std::size_t i = 0; i < model->rest.size(); ++i)
-    for (const Box& box : def.fixed)
-      if (box.contains(model->rest[i])) model->fixed[i] = model->any_fixed = true;
+  holdParticles(def.fixed, *model);
   makeMoments(*model, def.material);
-  model->binding =
-      bindSurface(model->rest, model->graph, model->clusters, surface.vertices, std::move(vertex_particle));
+  if (model->lattice) {
+    if (Status bound = bindFilled(def, *model); !bound) return bound.error();
+  } else {
+    model->binding =
+        bindSurface(model->rest, model->graph, model->clusters, surface.vertices, std::move(vertex_particle));
+  }
 
   PreparedBody body;
   body.state.positions = model->rest;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "elastic_batch_sets.h"
+#include "elastic_law.h"
 #include "meshless_surgery/base/bytes.h"
 
 namespace meshless {
@@ -74,36 +75,79 @@ ElasticBatch::ElasticBatch(const MatchInput& in, const std::vector<ElasticRest>&
     other_shape_.clusters.push_back(rest);
     other_elastic_.push_back(elastic[c]);
   }
-  boxes_ = static_cast<Index>(box_clusters.size());
-  small_ = static_cast<Index>(small_clusters.size());
-  box_blocks_ = (box_clusters.size() + kBlock - 1) / kBlock;
-  blocks_ = box_blocks_ + (small_clusters.size() + kBlock - 1) / kBlock;
-  clusters_.assign(blocks_ * kBlock, kNoIndex);
-  particles_.assign(blocks_ * kBlock * kCorners, 0);
-  masses_.assign(blocks_ * kBlock, 0.0);
+  makeBlocks(box_clusters.size(), small_clusters.size());
   shapes_.assign((blocks_ - box_blocks_) * kBlock * elastic_sets::kShapeRows, 0.0);
   addLanes(in, elastic, box_clusters, true);
   addLanes(in, elastic, small_clusters, false);
 
+  findForces(
+      in.rest.size(), [&](Index c) { return in.clusters.offsets[c + 1] - in.clusters.offsets[c]; }, in.masses);
+}
+
+ElasticBatch::ElasticBatch(const ElasticCells& body) {
+  others_.offsets.push_back(0);
+  half_edges_ = Vec3::Constant(body.half_edge);
+  softness_ = 1.0 / (body.half_edge * body.half_edge);
+  std::vector<Index> whole, partial;
+  for (Index c = 0; c < body.cells.size(); ++c) {
+    const ElasticCell& cell = body.cells[c];
+    const bool is_whole = cell.centroid.cwiseAbs().maxCoeff() < kSameBox &&
+                          (cell.variance - Vec3::Constant(1.0 / 3.0)).cwiseAbs().maxCoeff() < kSameBox;
+    (is_whole ? whole : partial).push_back(c);
+  }
+  makeBlocks(whole.size(), partial.size());
+  cells_.assign((blocks_ - box_blocks_) * kBlock * elastic_sets::kCellRows, 0.0);
+  const auto add = [&](const std::vector<Index>& cells, std::size_t first) {
+    for (std::size_t n = 0; n < (cells.size() + kBlock - 1) / kBlock * kBlock; ++n) {
+      const std::size_t block = first + n / kBlock, i = n % kBlock;
+      const Index c = cells[std::min(n, cells.size() - 1)];
+      const ElasticCell& cell = body.cells[c];
+      if (n < cells.size()) clusters_[block * kBlock + i] = c;
+      masses_[block * kBlock + i] = cell.mass;
+      for (int k = 0; k < kCorners; ++k) particles_[(block * kCorners + k) * kBlock + i] = cell.corners[k];
+      if (block < box_blocks_) continue;
+      double* const rows = cells_.data() + (block - box_blocks_) * kBlock * elastic_sets::kCellRows + i;
+      for (int axis = 0; axis < 3; ++axis) rows[(elastic_sets::kCentroidRow + axis) * kBlock] = cell.centroid[axis];
+      for (int m = 0; m < 4; ++m)
+        rows[(elastic_sets::kModeRow + m) * kBlock] =
+            elastic_law::hourglassStiffness(cell.variance, elastic_law::kHourglassModes[m]) / kHourglass;
+    }
+  };
+  add(whole, 0);
+  add(partial, box_blocks_);
+  findForces(body.masses.size(), [](Index) { return Index{kCorners}; }, body.masses);
+}
+
+void ElasticBatch::makeBlocks(std::size_t boxes, std::size_t others) {
+  boxes_ = static_cast<Index>(boxes);
+  small_ = static_cast<Index>(others);
+  box_blocks_ = (boxes + kBlock - 1) / kBlock;
+  blocks_ = box_blocks_ + (others + kBlock - 1) / kBlock;
+  clusters_.assign(blocks_ * kBlock, kNoIndex);
+  particles_.assign(blocks_ * kBlock * kCorners, 0);
+  masses_.assign(blocks_ * kBlock, 0.0);
+}
+
+void ElasticBatch::findForces(std::size_t particles, const std::function<Index(Index)>& members,
+                              const std::vector<double>& masses) {
   // Cluster order of lanes: a particle's forces are added in the same order whatever the threads and the vectors are.
   const auto forEachPlace = [&](const auto& visit) {
     for (std::size_t lane = 0; lane < clusters_.size(); ++lane) {
       if (clusters_[lane] == kNoIndex) continue;
       const std::size_t block = lane / kBlock, i = lane % kBlock;
-      const Index members = in.clusters.offsets[clusters_[lane] + 1] - in.clusters.offsets[clusters_[lane]];
-      for (Index k = 0; k < members; ++k)
+      for (Index k = 0; k < members(clusters_[lane]); ++k)
         visit(particles_[(block * kCorners + k) * kBlock + i], (block * kCorners + k) * 3 * kBlock + i);
     }
   };
-  force_offsets_.assign(in.rest.size() + 1, 0);
+  force_offsets_.assign(particles + 1, 0);
   forEachPlace([&](std::uint32_t particle, std::size_t) { ++force_offsets_[particle + 1]; });
-  for (std::size_t i = 0; i < in.rest.size(); ++i) force_offsets_[i + 1] += force_offsets_[i];
+  for (std::size_t i = 0; i < particles; ++i) force_offsets_[i + 1] += force_offsets_[i];
   force_places_.resize(force_offsets_.back());
   std::vector<std::uint32_t> next(force_offsets_.begin(), force_offsets_.end() - 1);
   forEachPlace([&](std::uint32_t particle, std::size_t place) {
     force_places_[next[particle]++] = static_cast<std::uint32_t>(place);
   });
-  for (double m : in.masses) inverse_masses_.push_back(1.0 / m);
+  for (double m : masses) inverse_masses_.push_back(1.0 / m);
 }
 
 void ElasticBatch::addLanes(const MatchInput& in, const std::vector<ElasticRest>& elastic,
@@ -204,7 +248,10 @@ double ElasticBatch::accelerate(const MatchInput& in, const ElasticParameters& m
     block.positions = y.data()->data();
     block.particles = particles_.data() + index * kCorners * kBlock;
     block.masses = masses_.data() + index * kBlock;
-    if (!boxes) block.shape = shapes_.data() + (index - box_blocks_) * kBlock * elastic_sets::kShapeRows;
+    if (!boxes && cells_.empty())
+      block.shape = shapes_.data() + (index - box_blocks_) * kBlock * elastic_sets::kShapeRows;
+    else if (!boxes)
+      block.cells = cells_.data() + (index - box_blocks_) * kBlock * elastic_sets::kCellRows;
     for (int k = 0; k < 3; ++k) block.half_edges[k] = half_edges_[k];
     block.softness = softness_;
     block.shrink = 1.0 / swelling;
@@ -240,7 +287,7 @@ double ElasticBatch::accelerate(const MatchInput& in, const ElasticParameters& m
 }
 
 std::size_t ElasticBatch::bytes() const {
-  return sizeof *this + bytesOf(clusters_, particles_, masses_, shapes_) +
+  return sizeof *this + bytesOf(clusters_, particles_, masses_, shapes_, cells_) +
          bytesOf(force_offsets_, force_places_, inverse_masses_) +
          bytesOf(others_.offsets, others_.members, others_.weights, others_.seeds, others_.radii) +
          bytesOf(other_clusters_, other_shape_.clusters, other_shape_.quadratic, other_elastic_);

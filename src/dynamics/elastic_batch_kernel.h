@@ -145,6 +145,31 @@ MESHLESS_INLINE Matrix fitBox(const Block& b, Fits& fits, int i) {
   return f;
 }
 
+// F of a cell that is filled in part: axis by axis its corners become their mean at the centroid and half their
+// difference. The coefficients of the hourglass modes replace the positions of the corners 3, 5, 6, 7.
+MESHLESS_INLINE Matrix fitCell(const Block& b, int i) {
+  const double* const cell = b.cells + i;
+  const Pack scale = all(1.0 / b.half_edges[0]);
+  Matrix f;
+  for (int axis = 0; axis < 3; ++axis) {
+    double* const p = b.forces + axis * kBlock + i;
+    Pack a[kCorners];
+    for (int k = 0; k < kCorners; ++k) a[k] = get(p + 3 * k * kBlock);
+    for (int d = 0; d < 3; ++d) {
+      const Pack at = get(cell + (kCentroidRow + d) * kBlock);
+      for (int k = 0; k < kCorners; ++k) {
+        if (k >> d & 1) continue;
+        const Pack low = a[k], high = a[k | 1 << d], half = 0.5 * (high - low);
+        a[k] = 0.5 * (low + high) + at * half;
+        a[k | 1 << d] = half;
+      }
+    }
+    f.m[axis][0] = scale * a[1], f.m[axis][1] = scale * a[2], f.m[axis][2] = scale * a[4];
+    put(a[3], p + 9 * kBlock), put(a[5], p + 15 * kBlock), put(a[6], p + 18 * kBlock), put(a[7], p + 21 * kBlock);
+  }
+  return f;
+}
+
 MESHLESS_INLINE Matrix timesInverse(const Matrix& a, const double* shape) {
   const double* const s = shape + kInverseRow * kBlock;
   const Pack xx = get(s), xy = get(s + kBlock), xz = get(s + 2 * kBlock), yy = get(s + 3 * kBlock);
@@ -354,6 +379,32 @@ MESHLESS_INLINE void pushAny(const Block& b, const Fits& fits, const Matrix& f, 
   }
 }
 
+// The transpose of fitCell().
+MESHLESS_INLINE void pushCell(const Block& b, const Matrix& p, int i) {
+  constexpr int kModes[4] = {3, 5, 6, 7};
+  const double* const cell = b.cells + i;
+  const Pack mass = get(b.masses + i);
+  const Pack pull = mass * (1.0 / b.half_edges[0]), stiffness = (b.hourglass * b.softness) * mass;
+  for (int axis = 0; axis < 3; ++axis) {
+    double* const to = b.forces + axis * kBlock + i;
+    Pack a[kCorners];
+    a[0] = Pack{};
+    a[1] = pull * p.m[axis][0], a[2] = pull * p.m[axis][1], a[4] = pull * p.m[axis][2];
+    for (int m = 0; m < 4; ++m)
+      a[kModes[m]] = stiffness * get(cell + (kModeRow + m) * kBlock) * get(to + 3 * kModes[m] * kBlock);
+    for (int d = 0; d < 3; ++d) {
+      const Pack at = get(cell + (kCentroidRow + d) * kBlock);
+      for (int k = 0; k < kCorners; ++k) {
+        if (k >> d & 1) continue;
+        const Pack half = 0.5 * a[k], apart = at * half + 0.5 * a[k | 1 << d];
+        a[k] = half - apart;
+        a[k | 1 << d] = half + apart;
+      }
+    }
+    for (int k = 0; k < kCorners; ++k) put(a[k], to + 3 * k * kBlock);
+  }
+}
+
 }  // namespace
 
 BlockResult accelerate(const Block& b) {
@@ -361,7 +412,7 @@ BlockResult accelerate(const Block& b) {
   Fits fits;
   gather(b);
   for (int i = 0; i < b.count; i += kLanes) {
-    const Matrix f = b.shape ? fitAny(b, fits, i) : fitBox(b, fits, i);
+    const Matrix f = b.cells ? fitCell(b, i) : b.shape ? fitAny(b, fits, i) : fitBox(b, fits, i);
     putMatrix(f, fits.gradient, i);
     rotate(b, f, fits, i);
   }
@@ -370,7 +421,9 @@ BlockResult accelerate(const Block& b) {
   for (int i = 0; i < b.count; i += kLanes) {
     const Matrix f = matrixAt(fits.gradient, i);
     const Matrix p = stress(b, f, i, most);
-    if (b.shape)
+    if (b.cells)
+      pushCell(b, p, i);
+    else if (b.shape)
       pushAny(b, fits, f, p, i);
     else
       pushBox(b, fits, f, p, i);

@@ -20,14 +20,21 @@ constexpr int kInverseRow = kShareRow + kCorners;   // (sum m q q^T / M)^-1: xx 
 constexpr int kSoftnessRow = kInverseRow + 6;       // 1 / spread [1/m^2]
 constexpr int kShapeRows = kSoftnessRow + 1;
 
+// Rows of kBlock values in Block::cells.
+constexpr int kCentroidRow = 0;                    // half edges
+constexpr int kModeRow = kCentroidRow + 3;         // stiffness of modes xy, xz, yz, xyz over that of a whole cell
+constexpr int kCellRows = kModeRow + 4;
+
 /// Clusters of at most eight members that span space; `shape` is null where all are boxes of one size, their corners in
-/// the order of the bits of x, y, z and of equal mass. Lanes from count to kBlock repeat a cluster.
+/// the order of the bits of x, y, z and of equal mass. `cells`: of cubes that are filled in part, corners in that order.
+/// Lanes from count to kBlock repeat a cluster.
 struct Block {
   int count = 0;
   const double* positions = nullptr;         // xyz of every particle
   const std::uint32_t* particles = nullptr;  // [kCorners][kBlock]
   const double* masses = nullptr;            // [kBlock]
   const double* shape = nullptr;             // [kShapeRows][kBlock]
+  const double* cells = nullptr;             // [kCellRows][kBlock]
   double half_edges[3] = {1.0, 1.0, 1.0};    // [m] of the boxes
   double softness = 0.0;                     // 1 / spread of the boxes
   double shrink = 1.0;                       // strain is that of F times this

@@ -234,6 +234,12 @@ class SceneReader {
     if (const YAML::Node pose = map.get("pose"); pose.IsDefined()) def.pose = readPose(source_, pose);
     if (const YAML::Node clusters = map.get("clusters"); clusters.IsDefined())
       def.clusters = readClusters(source_, clusters);
+    if (const YAML::Node cells = map.get("cells"); cells.IsDefined()) {
+      if (cells.IsScalar() && (cells.Scalar() == "whole" || cells.Scalar() == "filled"))
+        def.cells = cells.Scalar() == "filled" ? CellFill::kFilled : CellFill::kWhole;
+      else
+        source_.fail(cells, "cells is " + shown(cells), "whole, filled");
+    }
     readBodyMaterial(map.get("material"), def.material);
     if (const YAML::Node fixed = map.get("fixed"); fixed.IsDefined()) def.fixed = readFixed(source_, fixed);
     std::vector<Pose> poses{def.pose};

@@ -203,13 +203,15 @@ sensor_msgs::PointCloud2 toCloud(const WorldSnapshot& snapshot, const std_msgs::
                   field("rgb", 16, sensor_msgs::PointField::FLOAT32)};
   cloud.point_step = 20;
   std::size_t points = 0;
-  for (const BodySnapshot& body : snapshot.bodies) points += body.particles.size();
+  for (const BodySnapshot& body : snapshot.bodies)
+    for (Index i = 0; i < body.particles.size(); ++i) points += body.model->isTissue(i);
   setSize(cloud, points);
   std::uint8_t* to = cloud.data.data();
   for (const BodySnapshot& body : snapshot.bodies) {
     const std::uint32_t rgb = packed(body.material.color);
-    for (const Vec3& p : body.particles) {
-      setXyz(to, p);
+    for (Index i = 0; i < body.particles.size(); ++i) {
+      if (!body.model->isTissue(i)) continue;
+      setXyz(to, body.particles[i]);
       std::memcpy(to + 12, &body.number, sizeof(body.number));
       std::memcpy(to + 16, &rgb, sizeof(rgb));
       to += cloud.point_step;

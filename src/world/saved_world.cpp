@@ -6,6 +6,8 @@
 
 #include <zlib.h>
 
+#include "meshless_surgery/body/filled_cells.h"
+#include "meshless_surgery/geometry/cut_lattice.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "saved_world_impl.h"
 
@@ -13,7 +15,7 @@ namespace meshless {
 namespace {
 
 constexpr std::string_view kMagic = "MLSSTATE";
-constexpr std::uint32_t kVersion = 6;
+constexpr std::uint32_t kVersion = 7;
 constexpr std::uint64_t kMostModels = 1u << 20;
 
 std::uint32_t checksum(std::string_view bytes) {
@@ -185,6 +187,27 @@ std::string faultOf(const BodyModel& m) {
   if (m.shape.clusters.size() != clusters || (!m.shape.quadratic.empty() && m.shape.quadratic.size() != clusters) ||
       (!m.elastic.empty() && m.elastic.size() != clusters))
     return "a body's rest shape is not that of its clusters";
+  if (m.lattice) {
+    const std::vector<LatticeCell>& cells = m.lattice->cells;
+    if (cells.size() != clusters || m.lattice->corners != particles || !(m.lattice->spacing > 0.0) || !(m.cell_mass > 0.0))
+      return "a body's lattice is not that of its clusters";
+    for (Index c = 0; c < cells.size(); ++c) {
+      const LatticeCell& cell = cells[c];
+      if (m.clusters.offsets[c] != 8 * c ||
+          !std::equal(cell.corners.begin(), cell.corners.end(), m.clusters.members.begin() + 8 * c) || !cell.filled ||
+          (cell.bridge != kNoIndex && !(cell.bridge < cells.size() && cells[cell.bridge].bridge == cell.bridge)))
+        return "a body's lattice is not that of its clusters";
+      if (!(cell.mass_share >= 0.0 && cell.mass_share <= 1.0) || !(cell.stiffness_share > 0.0 && cell.stiffness_share <= 1.0))
+        return "a cell has a share of itself that is none";
+    }
+    double boxes = 1.0;  // tables of all places are made
+    for (int k = 0; k < 3; ++k) {
+      const auto [low, high] = std::minmax_element(
+          cells.begin(), cells.end(), [k](const LatticeCell& a, const LatticeCell& b) { return a.place[k] < b.place[k]; });
+      boxes *= static_cast<double>(high->place[k]) - low->place[k] + 1.0;
+    }
+    if (!(boxes <= 4e6)) return "the cells of a body's lattice are far apart";
+  }
   if (!areTriangles(m.surface)) return "a body's triangles are not those of its vertices";
   const SurfaceBinding& b = m.binding;
   if (b.particle.size() != vertices || !allBelowOrNone(b.particle, particles) || !allBelow(b.riders, vertices) ||
@@ -246,8 +269,13 @@ void ModelTable::readOne(InArchive& archive) {
   auto model = std::make_shared<BodyModel>();
   archive(*model);
   requireNone(faultOf(*model));
-  if (!model->elastic.empty())
+  if (model->lattice) model->tissue = cornersWithTissue(*model->lattice);
+  if (!model->elastic.empty() && model->lattice) {
+    model->cells = std::make_shared<ElasticCells>(elasticCellsOf(*model));
+    model->elastic_batch = std::make_shared<ElasticBatch>(*model->cells);
+  } else if (!model->elastic.empty()) {
     model->elastic_batch = std::make_shared<ElasticBatch>(matchInput(*model), model->elastic);
+  }
   add(model);
 }
 

@@ -140,18 +140,31 @@ void serialize(A& archive, SurfaceBinding& v) {
   auto& [particle, riders, offsets, carriers, weights, levers, turners, lever_clusters, bound] = v;
   archive(particle, riders, offsets, carriers, weights, levers, turners, lever_clusters, bound);
 }
-/// elastic_batch is made again by whoever reads, once all is checked; nullptr until then.
+template <class A>
+void serialize(A& archive, LatticeCell& v) {
+  auto& [corners, place, samples, filled, parted, mass_share, stiffness_share, bridge] = v;
+  archive(corners, place, samples, filled, parted, mass_share, stiffness_share, bridge);
+}
+template <class A>
+void serialize(A& archive, CellLattice& v) {
+  auto& [spacing, origin, corners, cells] = v;
+  archive(spacing, origin, corners, cells);
+}
+/// elastic_batch, cells and tissue are made again by whoever reads, once all is checked; empty until then.
 template <class A>
 void serialize(A& archive, BodyModel& v) {
   auto& [rest, masses, match_masses, fixed, any_fixed, graph, clusters, shape, elastic, elastic_batch,
-         most_spread_inverse, specific_stiffness, highest_frequency, surface, binding, solid, lips, spacing,
+         lattice, cell_mass, cells, tissue, most_spread_inverse, specific_stiffness, highest_frequency, surface, binding, solid, lips, spacing,
          rest_volume, rest_area, mass, next_patch] = v;
-  (void)elastic_batch;
+  (void)elastic_batch, (void)cells, (void)tissue;
+  auto of_cells = lattice ? *lattice : CellLattice();
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
+  archive(of_cells, cell_mass);
   archive(rest, masses, match_masses, held, any_fixed, graph, clusters, shape, elastic, most_spread_inverse,
           specific_stiffness, highest_frequency, surface, binding, solid, lips, spacing, rest_volume, rest_area, mass,
           next_patch);
   if constexpr (std::is_same_v<A, InArchive>) {
+    if (!of_cells.cells.empty()) lattice = std::make_shared<CellLattice>(std::move(of_cells));
     fixed.clear();
     for (const std::uint8_t h : held) fixed.push_back(h != 0);
   }
@@ -185,8 +198,8 @@ void serialize(A& archive, ClusterOptions& v) {
 }
 template <class A>
 void serialize(A& archive, BodyDef& v) {
-  auto& [name, mesh, solid, pose, spacing, clusters, material, fixed, copy, notes] = v;
-  archive(name, mesh, solid, pose, spacing, clusters, material, fixed, copy, notes);
+  auto& [name, mesh, solid, pose, spacing, clusters, cells, material, fixed, copy, notes] = v;
+  archive(name, mesh, solid, pose, spacing, clusters, choice(cells, CellFill::kFilled), material, fixed, copy, notes);
 }
 template <class A>
 void serialize(A& archive, ObstacleDef& v) {

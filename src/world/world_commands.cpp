@@ -58,9 +58,12 @@ Result<Reply> World::Impl::apply(const PickCommand& command) {
     }
     if (grabbed.body) {
       const Points& p = grabbed.body->state.positions;
-      for (Index i = 1; i < p.size(); ++i)
-        if ((p[i] - grabbed.point).squaredNorm() < (p[grabbed.particle] - grabbed.point).squaredNorm())
-          grabbed.particle = i;
+      double closest = std::numeric_limits<double>::infinity();
+      for (Index i = 0; i < p.size(); ++i) {
+        if (!grabbed.body->model->isTissue(i) || !((p[i] - grabbed.point).squaredNorm() < closest)) continue;
+        closest = (p[i] - grabbed.point).squaredNorm();
+        grabbed.particle = i;
+      }
     }
   }
   if (!grabbed.body) {
@@ -70,6 +73,7 @@ Result<Reply> World::Impl::apply(const PickCommand& command) {
       if (!command.body.empty() && body->name != command.body) continue;
       const Points& p = body->state.positions;
       for (Index i = 0; i < p.size(); ++i) {
+        if (!body->model->isTissue(i)) continue;
         const double d = ray ? distanceToRay(p[i], command.point, unit) : (p[i] - command.point).norm();
         if (!(d < nearest)) continue;
         nearest = d;

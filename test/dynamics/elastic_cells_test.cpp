@@ -6,6 +6,7 @@
 
 #include <Eigen/Dense>
 
+#include "meshless_surgery/dynamics/elastic_batch.h"
 #include "meshless_surgery/dynamics/plastic.h"
 #include "support/cells.h"
 
@@ -341,6 +342,44 @@ TEST(HighestFrequencyOfCells, NoStepOfOneOverItMakesEnergyGrow) {
       }
       EXPECT_LT(before, 0.5 * start);
     }
+}
+
+// The vectorised step is the plain one, whatever the instructions, the tail of a vector and the shape that the body has.
+TEST(ElasticCells, InVectorsAreTheReference) {
+  Random random(31);
+  std::vector<CellBody> bodies = {wholeCells(3, 2, 2), cutCells(13, 5, 2, 3)};
+  for (unsigned n = 1; n <= 17; ++n) bodies.push_back(cutCells(static_cast<int>(n), 1, 1, n));
+  for (const CellBody& body : bodies) {
+    const ElasticBatch batch(body.cells);
+    EXPECT_EQ(batch.others(), 0u);
+    for (const double noise : {0.0, 1e-5, 1e-3, 6e-3})
+      for (const double swelling : {1.0, 1.1}) {
+        const Points y = moved(body, random.rotation().toRotationMatrix(), random.vector(0.1), noise, random);
+        Points expected;
+        MatchCounters counted;
+        std::vector<ClusterPose> poses = body.poses;
+        const double stretch = elasticAccelerations(body.cells, kSoft, y, poses, expected, counted, swelling);
+        double scale = kScale;
+        for (const Vec3& a : expected) scale = std::max(scale, a.norm());
+        for (const InstructionSet set : {InstructionSet::kBaseline, InstructionSet::kAvx2, InstructionSet::kAvx512}) {
+          if (!instructionSetAvailable(set)) continue;
+          ElasticBatchState state;
+          Points found;
+          MatchCounters counters;
+          batch.setRotations(body.poses, state);
+          EXPECT_NEAR(batch.accelerate({body.rest, body.cells.masses, {}, {}}, kSoft, y, state, found, counters, swelling, set),
+                      stretch, 1e-9 * stretch);
+          ASSERT_EQ(found.size(), expected.size());
+          for (std::size_t i = 0; i < y.size(); ++i) EXPECT_LE((found[i] - expected[i]).norm(), 1e-9 * scale);
+          const Balance balance(body, y, found);
+          EXPECT_LT(balance.force.norm(), 1e-12 * (balance.scale + body.cells.masses[0] * kScale));
+          EXPECT_LT(balance.torque.norm(), 1e-12 * (balance.scale + body.cells.masses[0] * kScale) * balance.reach);
+          EXPECT_EQ(counters.rotations, counted.rotations);
+        }
+      }
+  }
+  EXPECT_EQ(ElasticBatch(wholeCells(3, 2, 2).cells).boxes(), 12u);
+  EXPECT_LT(ElasticBatch(cutCells(3, 2, 2, 1).cells).boxes(), 12u);
 }
 
 }  // namespace

@@ -77,9 +77,9 @@ bodies:
     clusters: {grid: [5, 4, 1], overlap: 0.2}
     material: wobble
     fixed: [{box: {min: [-1, -2, -3], max: [1, 2, 3]}}, {box: {min: [5, 5, 5], max: [6, 6, 6]}}]
-  - {name: two, primitive: {sphere: 0.05}, clusters: one, pose: {xyzw: [0, 0, 0, 1]}}
+  - {name: two, primitive: {sphere: 0.05}, clusters: one, cells: whole, pose: {xyzw: [0, 0, 0, 1]}}
   - {name: three, primitive: {cylinder: [0.1, 0.02]}, clusters: {count: 20, overlap: 0.4}, edge: 0.01}
-  - {name: four, primitive: {box: [0.1, 0.1, 0.05]}, clusters: auto, scale: 2, material: {mode: rigid, alpha: 1}}
+  - {name: four, primitive: {box: [0.1, 0.1, 0.05]}, clusters: cells, cells: filled, scale: 2, material: {mode: rigid, alpha: 1}}
 )");
   EXPECT_EQ(scene.world.gravity, Vec3(0.1, 0.2, -1.6));
   EXPECT_EQ(scene.world.ground, -0.5);
@@ -121,6 +121,8 @@ bodies:
   EXPECT_EQ(scene.bodies[2].clusters.count, 20);
   EXPECT_NEAR(meanEdgeLength(scene.bodies[2].mesh), 0.01, 0.003);
   EXPECT_NEAR(signedVolume(scene.bodies[3].mesh), 8 * 5e-4, 1e-9);
+  EXPECT_EQ(scene.bodies[2].cells, CellFill::kWhole);
+  EXPECT_EQ(scene.bodies[3].cells, CellFill::kFilled);
   EXPECT_EQ(scene.bodies[3].material.mode, MatchMode::kRigid);
   EXPECT_EQ(scene.bodies[3].material.density, Material().density);
 }
@@ -204,6 +206,7 @@ TEST_F(Scene, FaultsAreNamedWithFileLineValueAndRange) {
       {"bodies:\n  - {file: ../cube.obj, primitive: {sphere: 1}}\n", 2, {"file and primitive"}},
       {body + "    scale: 0\n", 3, {"scale is 0", "above 0"}},
       {body + "    spacing: -0.1\n", 3, {"spacing is -0.1"}},
+      {body + "    cells: half\n", 3, {"cells is 'half'", "whole, filled"}},
       {body + "    clusters: many\n", 3, {"clusters is 'many'", "auto, one"}},
       {body + "    clusters: {grid: [0, 1, 1]}\n", 3, {"grid[0] is '0'", "1 to"}},
       {body + "    clusters: {grid: [1000, 1000, 1000]}\n", 3, {"up to 100000 together"}},

@@ -82,6 +82,31 @@ World pileAtRest() {
   return world;
 }
 
+World filledCells() {
+  World world{WorldSettings()};
+  BodyDef def = test::block("block", Vec3(0, 0, 0.06));
+  def.spacing = 0.027;
+  def.cells = CellFill::kFilled;
+  def.material.youngs_modulus = 5000.0;
+  def.material.density = 1000.0;
+  EXPECT_TRUE(world.addSceneBody(test::shared(def)).ok());
+  def.name = "held";
+  def.pose.translation = Vec3(0.4, 0.0, 0.1);
+  def.fixed = {{Vec3(-1, -1, -1), Vec3(0.32, 1, 1)}};
+  def.material.plasticity.yield = 0.01;
+  def.material.plasticity.creep = 20.0;
+  def.material.plasticity.maximum = 1.0;
+  EXPECT_TRUE(world.addSceneBody(test::shared(def)).ok());
+  run(world, 10);
+  replyOf<PickReply>(world.apply(pickNear(Vec3(0.1, 0.0, 0.1))));
+  MovePickCommand move;
+  move.pick = 1;
+  move.target = Vec3(0.15, 0.02, 0.18);
+  EXPECT_TRUE(world.apply(move).ok());
+  run(world, 10);
+  return world;
+}
+
 World elasticCut() {
   World world{WorldSettings()};
   BodyDef def = test::block("block", Vec3(0, 0, 0.06));
@@ -189,6 +214,7 @@ std::vector<Case> cases() {
                    push.position = Vec3(0.1, 0.06, 0.05);
                    EXPECT_TRUE(world.apply(push).ok());
                  }});
+  all.push_back({"filled cells", filledCells});
   all.push_back({"elastic, cut", elasticCut});
   all.push_back({"plastic", plastic, [](World& world, int step) {
                    if (step == 20) EXPECT_TRUE(world.apply(cutThrough(Vec3(0, 0, 0.05), Vec3::UnitX())).ok());
@@ -403,7 +429,7 @@ TEST(DamagedState, ThatClaimsMoreThanItHas) {
 
 // Somebody forged it, checksum and all: refused, or a world that can step.
 TEST(DamagedState, ForgedAtRandom) {
-  for (const World& world : {elasticCut(), everyTool()}) {
+  for (const World& world : {elasticCut(), filledCells(), everyTool()}) {
     const std::string bytes = encode(*world.capture());
     test::Random random(7);
     int refused = 0, read = 0;

@@ -8,6 +8,7 @@
 #include "meshless_surgery/body/body_def.h"
 #include "meshless_surgery/dynamics/elastic.h"
 #include "meshless_surgery/dynamics/elastic_batch.h"
+#include "meshless_surgery/geometry/cell_lattice.h"
 
 namespace meshless {
 
@@ -38,6 +39,12 @@ struct BodyModel {
   RestShape shape;
   std::vector<ElasticRest> elastic;                   // empty where the material is for looks
   std::shared_ptr<const ElasticBatch> elastic_batch;  // the same, vectorised
+  /// Of a body whose cells know how far they are filled (CellFill::kFilled), else null. Cluster c is cell c, corner by
+  /// corner.
+  std::shared_ptr<const CellLattice> lattice;
+  double cell_mass = 0.0;                       // [kg] of a whole cell of it
+  std::shared_ptr<const ElasticCells> cells;    // of it, where the material is elastic
+  std::vector<bool> tissue;                     // one a corner of it: no ghost; empty where all particles are tissue
   /// [1/m^2] norm of ElasticRest::spread_inverse: what a cut leaves of a cell can be narrower, so that its stress would
   /// need a shorter step. It resists as a flat cluster does.
   double most_spread_inverse = std::numeric_limits<double>::infinity();
@@ -52,6 +59,9 @@ struct BodyModel {
   double rest_area = 0.0;        // [m^2] of the surface
   double mass = 0.0;             // [kg]
   std::uint32_t next_patch = 1;  // for the next cut
+
+  /// False for a corner of a cell that no tissue is near: it carries what it must, and nobody shows or picks it.
+  bool isTissue(Index particle) const { return tissue.empty() || tissue[particle]; }
 };
 
 /// The model's view for dynamics/shape_matching.h, at rest.

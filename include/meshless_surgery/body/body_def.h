@@ -7,6 +7,9 @@
 
 namespace meshless {
 
+/// What a lattice knows of its cells: nothing, so that each counts as whole but for its mass; or how far each is filled.
+enum class CellFill { kWhole, kFilled };
+
 struct BodyDef {
   std::string name;
   TriangleMesh mesh;   // in the body's own frame, already scaled [m]; repaired (geometry/mesh_check.h)
@@ -14,6 +17,7 @@ struct BodyDef {
   Pose pose;           // body's frame in the world
   double spacing = 0;  // [m] between interior particles; 0: chosen from the surface
   ClusterOptions clusters;
+  CellFill cells = CellFill::kWhole;  // kFilled needs a lattice: an elastic material, or clusters of cells
   Material material;
   std::vector<Box> fixed;          // [m] world frame: particles inside are held in place
   bool copy = false;               // the same as the body before it in its scene, but for name and pose

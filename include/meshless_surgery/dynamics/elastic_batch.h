@@ -1,8 +1,10 @@
 // elasticAccelerations() vectorised for the widest instructions that the machine has.
 #pragma once
 
+#include <functional>
+
 #include "meshless_surgery/base/for_each.h"
-#include "meshless_surgery/dynamics/elastic.h"
+#include "meshless_surgery/dynamics/elastic_cells.h"
 #include "meshless_surgery/dynamics/rotation_batch.h"
 
 namespace meshless {
@@ -23,12 +25,14 @@ class ElasticBatch {
  public:
   /// `elastic` is makeElasticRest() of input.shape. Keeps no reference.
   ElasticBatch(const MatchInput& input, const std::vector<ElasticRest>& elastic);
+  /// Of cells that are filled in part; those that are whole are boxes. Keeps no reference.
+  explicit ElasticBatch(const ElasticCells& body);
 
   /// The rotations of poses into a state, made to fit this batch, and back. Nothing else of a pose is read or written.
   void setRotations(const std::vector<ClusterPose>& poses, ElasticBatchState& state) const;
   void getRotations(const ElasticBatchState& state, std::vector<ClusterPose>& poses) const;
 
-  /// As elasticAccelerations() for the input that this was made from, in double: what differs is rounding, and a
+  /// As elasticAccelerations() for the input or the cells that this was made from (then input is not read), in double: what differs is rounding, and a
   /// rotation is found to 1e-12 rad. A particle that is not finite spoils its clusters' particles and no others.
   /// Allocates nothing once state and accelerations have their sizes (but where the reference does). Results do not
   /// depend on for_each to the bit; without it all runs on the calling thread. They differ in the last bits between
@@ -44,6 +48,9 @@ class ElasticBatch {
  private:
   void addLanes(const MatchInput& input, const std::vector<ElasticRest>& elastic, const std::vector<Index>& clusters,
                 bool boxes);
+  void makeBlocks(std::size_t boxes, std::size_t others);
+  void findForces(std::size_t particles, const std::function<Index(Index cluster)>& members,
+                  const std::vector<double>& masses);
   void sumForces(std::size_t first, std::size_t last, const double* forces, Points& accelerations) const;
 
   // Blocks of lanes: first those of boxes alone. `clusters_` names a lane's cluster, kNoIndex where a block is padded.
@@ -53,6 +60,7 @@ class ElasticBatch {
   std::vector<std::uint32_t> particles_;
   std::vector<double> masses_;
   std::vector<double> shapes_;  // of blocks that are not of boxes
+  std::vector<double> cells_;   // likewise, of cells that are filled in part
   Vec3 half_edges_ = Vec3::Ones();
   double softness_ = 0.0;
   // Where the forces on a particle lie, in the order of its clusters' lanes.

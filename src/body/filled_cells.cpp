@@ -1,0 +1,202 @@
+#include "meshless_surgery/body/filled_cells.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "meshless_surgery/geometry/cut_lattice.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kFarthestCentroid = 0.9;  // [half edges] a fit nearer to a face would need weights near zero
+constexpr int kWellFilled = 16;            // of 64 samples
+
+Vec3 centroidOf(const FilledMoments& moments) {
+  return moments.centroid.cwiseMax(-kFarthestCentroid).cwiseMin(kFarthestCentroid);
+}
+
+// [spacing^2] from a place in the cell to its nearest sample.
+double squaredToSample(const LatticeCell& cell, const Vec3& at) {
+  const int nearest[3] = {std::clamp(static_cast<int>(std::floor(4.0 * at.x())), 0, 3),
+                          std::clamp(static_cast<int>(std::floor(4.0 * at.y())), 0, 3),
+                          std::clamp(static_cast<int>(std::floor(4.0 * at.z())), 0, 3)};
+  const int bit = sampleBit(nearest[0], nearest[1], nearest[2]);
+  if (cell.samples >> bit & 1) return (samplePlace(bit) - at).squaredNorm();
+  double least = std::numeric_limits<double>::infinity();
+  for (SampleSet left = cell.samples; left; left &= left - 1)
+    least = std::min(least, (samplePlace(lowestSample(left)) - at).squaredNorm());
+  return least;
+}
+
+}  // namespace
+
+void makeParticlesOfCells(BodyModel& model) {
+  const CellLattice& lattice = *model.lattice;
+  model.rest = cornerPlaces(lattice);
+  model.masses.assign(lattice.corners, 0.0);
+  model.tissue = cornersWithTissue(lattice);
+  ClusterSet& clusters = model.clusters;
+  clusters = ClusterSet();
+  clusters.offsets.push_back(0);
+  std::vector<std::array<Index, 2>> edges;
+  for (const LatticeCell& cell : lattice.cells) {
+    const FilledMoments moments = momentsOf(cell.filled);
+    for (Index k = 0; k < 8; ++k) {
+      model.masses[cell.corners[k]] += model.cell_mass * moments.fraction * cell.mass_share * moments.corner_shares[k];
+      clusters.members.push_back(cell.corners[k]);
+      for (Index bit : {1u, 2u, 4u})
+        if (!(k & bit)) edges.push_back({cell.corners[k], cell.corners[k | bit]});
+    }
+    clusters.offsets.push_back(static_cast<Index>(clusters.members.size()));
+    clusters.seeds.push_back(cell.corners[0]);
+    clusters.radii.push_back(1.01 * std::sqrt(3.0) * lattice.spacing);
+  }
+  clusters.weights.assign(clusters.members.size(), 0.0);
+  model.graph = makeGraph(model.rest, std::move(edges));
+}
+
+void weighCells(BodyModel& model, bool elastic) {
+  const CellLattice& lattice = *model.lattice;
+  ClusterSet& clusters = model.clusters;
+  std::vector<double> sum(lattice.corners, 0.0);
+  for (std::size_t c = 0; c < lattice.cells.size(); ++c) {
+    const LatticeCell& cell = lattice.cells[c];
+    const FilledMoments moments = momentsOf(cell.filled);
+    const double mass = model.cell_mass * moments.fraction * cell.stiffness_share;
+    const Vec3 at = 0.5 * (centroidOf(moments) + Vec3::Ones());
+    for (int k = 0; k < 8; ++k) {
+      double& weight = clusters.weights[8 * c + static_cast<std::size_t>(k)];
+      weight = mass * (elastic ? trilinearWeight(k, at) : moments.corner_shares[k]);
+      sum[cell.corners[k]] += weight;
+    }
+  }
+  for (std::size_t m = 0; m < clusters.members.size(); ++m)
+    clusters.weights[m] /= elastic ? model.masses[clusters.members[m]] : sum[clusters.members[m]];
+}
+
+ElasticCells elasticCellsOf(const BodyModel& model) {
+  const CellLattice& lattice = *model.lattice;
+  ElasticCells elastic;
+  elastic.half_edge = 0.5 * lattice.spacing;
+  elastic.masses = model.match_masses;
+  for (std::size_t c = 0; c < lattice.cells.size(); ++c) {
+    const FilledMoments moments = momentsOf(lattice.cells[c].filled);
+    elastic.cells.push_back(
+        {lattice.cells[c].corners, model.shape.clusters[c].mass, centroidOf(moments), moments.variance});
+  }
+  return elastic;
+}
+
+CellFinder::CellFinder(const CellLattice& lattice) : lattice_(lattice) {
+  std::array<std::int32_t, 3> upper = lattice.cells[0].place;
+  lower_ = upper;
+  for (const LatticeCell& cell : lattice.cells)
+    for (int k = 0; k < 3; ++k) {
+      lower_[k] = std::min(lower_[k], cell.place[k]);
+      upper[k] = std::max(upper[k], cell.place[k]);
+    }
+  std::size_t count = 1;
+  for (int k = 0; k < 3; ++k) {
+    size_[k] = upper[k] - lower_[k] + 1;
+    count *= static_cast<std::size_t>(size_[k]);
+  }
+  cells_.resize(count + 1);  // the last is that of no place
+  for (Index c = 0; c < lattice.cells.size(); ++c) {
+    const auto& p = lattice.cells[c].place;
+    cells_[static_cast<std::size_t>(p[0] - lower_[0]) +
+           static_cast<std::size_t>(size_[0]) *
+               (static_cast<std::size_t>(p[1] - lower_[1]) +
+                static_cast<std::size_t>(size_[1]) * static_cast<std::size_t>(p[2] - lower_[2]))]
+        .push_back(c);
+  }
+}
+
+const std::vector<Index>& CellFinder::at(const std::array<std::int32_t, 3>& place) const {
+  std::size_t index = 0;
+  for (int k = 2; k >= 0; --k) {
+    if (place[k] < lower_[k] || place[k] >= lower_[k] + size_[k]) return cells_.back();
+    index = index * static_cast<std::size_t>(size_[k]) + static_cast<std::size_t>(place[k] - lower_[k]);
+  }
+  return cells_[index];
+}
+
+Index CellFinder::nearest(const Vec3& rest, const Allowed& allowed) const {
+  const Vec3 place = (rest - lattice_.origin) / lattice_.spacing;
+  std::array<std::int32_t, 3> own;
+  for (int k = 0; k < 3; ++k) {
+    if (!(std::abs(place[k]) < 1e9)) return kNoIndex;
+    own[k] = static_cast<std::int32_t>(std::floor(place[k]));
+  }
+  Index best = kNoIndex;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::int32_t reach = 0; reach <= 2; ++reach) {
+    for (std::int32_t z = -reach; z <= reach; ++z)
+      for (std::int32_t y = -reach; y <= reach; ++y)
+        for (std::int32_t x = -reach; x <= reach; ++x) {
+          if (std::max({std::abs(x), std::abs(y), std::abs(z)}) != reach) continue;
+          for (const Index c : at({own[0] + x, own[1] + y, own[2] + z})) {
+            const LatticeCell& cell = lattice_.cells[c];
+            if (cell.isBridge(c) || !cell.samples) continue;
+            const Vec3 in = place - Vec3(cell.place[0], cell.place[1], cell.place[2]);
+            if ((in - in.cwiseMax(0.0).cwiseMin(1.0)).squaredNorm() >= least || (allowed && !allowed(c))) continue;
+            const double squared = squaredToSample(cell, in);
+            if (squared < least) {
+              least = squared;
+              best = c;
+            }
+          }
+        }
+    // What is farther away by whole cells is not nearer.
+    if (best != kNoIndex && least <= static_cast<double>(reach) * reach + 0.02) break;
+  }
+  return best;
+}
+
+Index CellFinder::carrier(const Vec3& rest, const Allowed& allowed) const {
+  const Index own = nearest(rest, allowed);
+  if (own == kNoIndex) return own;
+  const LatticeCell& cell = lattice_.cells[own];
+  if (countSamples(cell.samples) >= kWellFilled) return own;
+  Index best = own;
+  double least = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis)
+    for (const int step : {-1, 1}) {
+      std::array<std::int32_t, 3> place = cell.place;
+      place[axis] += step;
+      for (const Index c : at(place)) {
+        const LatticeCell& other = lattice_.cells[c];
+        if (other.isBridge(c) || countSamples(other.samples) < kWellFilled || (allowed && !allowed(c))) continue;
+        const LatticeCell &lower = step > 0 ? cell : other, &upper = step > 0 ? other : cell;
+        if (!(faceLinks(lower, upper, axis) & ~lower.parted[axis])) continue;
+        const double squared = squaredToSample(other, lattice_.placeIn(other, rest));
+        if (squared < least) {
+          least = squared;
+          best = c;
+        }
+      }
+    }
+  return best;
+}
+
+SurfaceBinding bindToCells(const CellLattice& lattice, const Points& surface_rest, const std::vector<Index>& cell) {
+  SurfaceBinding binding;
+  binding.particle.assign(surface_rest.size(), kNoIndex);
+  binding.offsets.push_back(0);
+  for (Index v = 0; v < surface_rest.size(); ++v) {
+    binding.riders.push_back(v);
+    const LatticeCell& carrier = lattice.cells[cell[v]];
+    const Vec3 at = lattice.placeIn(carrier, surface_rest[v]);
+    for (int k = 0; k < 8; ++k) {
+      binding.carriers.push_back(carrier.corners[k]);
+      binding.weights.push_back(trilinearWeight(k, at));
+    }
+    binding.offsets.push_back(static_cast<Index>(binding.carriers.size()));
+  }
+  binding.levers.assign(surface_rest.size(), Vec3::Zero());
+  binding.turners = cell;
+  binding.bound = static_cast<Index>(surface_rest.size());
+  return binding;
+}
+
+}  // namespace meshless
