@@ -35,6 +35,7 @@ void makeMoments(BodyModel& model, const Material& material) {
   model.cells.reset();
   model.highest_frequency = 0.0;
   model.specific_stiffness = material.youngs_modulus / material.density;
+  model.poissons_ratio = material.poissons_ratio;
   if (material.elastic()) {
     makeElastic(model);
     const ElasticParameters parameters =

@@ -4,6 +4,7 @@
 #include <limits>
 #include <queue>
 
+#include "cut_cells.h"
 #include "piece_maker.h"
 #include "side_by_side.h"
 
@@ -91,12 +92,30 @@ CutWork& CutWork::operator+=(const CutWork& other) {
   return *this;
 }
 
+namespace {
+
+Result<CutBody> cutFilled(const BodyModel& model, const BodyState& state, const Plane& plane,
+                          const TriangleMesh& present, const CutOptions& options) {
+  const Result<CutSurface> cut = cutByPlane(present, plane, options);
+  if (!cut) return cut.error();
+  std::vector<CellPieceSource> sources;
+  for (const CutPiece& piece : cut->pieces)
+    sources.push_back({piece.mesh, piece.origins, std::vector<int>(piece.mesh.vertices.size(), piece.side)});
+  CutBody result;
+  result.cap_area = cut->cap_area;
+  Result<std::vector<BodyPiece>> pieces =
+      cutCells(model, state, BladeGate(plane), sources, options.cap_patch, result.work);
+  if (!pieces) return pieces.error();
+  result.pieces = std::move(*pieces);
+  return result;
+}
+
+}  // namespace
+
 Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Plane& plane,
                         const CutBodyOptions& wanted) {
   if (!model.solid)
     return Error{ErrorCode::kUnsuitableShape, "its surface is open, so it cannot be cut into closed pieces"};
-  if (model.lattice)
-    return Error{ErrorCode::kUnsuitableShape, "its cells are filled in part, which cannot be cut yet; accepted: cells: whole"};
   TriangleMesh present;
   present.vertices = state.surface;
   present.triangles = model.surface.triangles;
@@ -106,6 +125,7 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
   options.cap_points = kUsualCapPoints;
   options.roughness = wanted.roughness;
   options.seed = wanted.seed;
+  if (model.lattice) return cutFilled(model, state, plane, present, options);
   PieceMaker maker(model, state, options.cap_patch);
   Result<CutSurface> cut = Error();
   atOnce([&] { cut = cutByPlane(present, plane, options); }, [&] { maker.foresee(plane); });

@@ -195,8 +195,8 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
     if (material.plastic() || !state.plastic.empty()) {
       state.stretch = model.cells ? elasticAccelerations(*model.cells, parameters, y, state.poses, scratch.goals,
                                                          counters, state.swelling, &state.plastic)
-                                  : elasticAccelerations(input, model.elastic, parameters, y, state.poses, scratch.goals, counters,
-                                           state.swelling);
+                                  : elasticAccelerations(input, model.elastic, parameters, y, state.poses,
+                                                         scratch.goals, counters, state.swelling);
     } else {
       model.elastic_batch->setRotations(state.poses, scratch.elastic);
       state.stretch = model.elastic_batch->accelerate(input, parameters, y, scratch.elastic, scratch.goals, counters,

@@ -26,7 +26,7 @@ Points ownAccelerations(const BodyModel& model, BodyState state, const Material&
 
 void easeRelease(const BodyModel& parent, const BodyState& before, const Material& material, double h,
                  const std::vector<Index>& held, std::vector<BodyPiece>& pieces) {
-  if (!(h > 0.0)) return;
+  if (!(h > 0.0) || parent.lattice) return;  // what is left of filled cells pulls as before but for what was cut
   // The uncut body first: together the pieces are as much.
   Points whole;
   std::vector<Points> parts(pieces.size());

@@ -16,20 +16,19 @@ Vec3 centroidOf(const FilledMoments& moments) {
   return moments.centroid.cwiseMax(-kFarthestCentroid).cwiseMin(kFarthestCentroid);
 }
 
-// [spacing^2] from a place in the cell to its nearest sample.
-double squaredToSample(const LatticeCell& cell, const Vec3& at) {
+}  // namespace
+
+double squaredToSamples(SampleSet samples, const Vec3& at) {
   const int nearest[3] = {std::clamp(static_cast<int>(std::floor(4.0 * at.x())), 0, 3),
                           std::clamp(static_cast<int>(std::floor(4.0 * at.y())), 0, 3),
                           std::clamp(static_cast<int>(std::floor(4.0 * at.z())), 0, 3)};
   const int bit = sampleBit(nearest[0], nearest[1], nearest[2]);
-  if (cell.samples >> bit & 1) return (samplePlace(bit) - at).squaredNorm();
+  if (samples >> bit & 1) return (samplePlace(bit) - at).squaredNorm();
   double least = std::numeric_limits<double>::infinity();
-  for (SampleSet left = cell.samples; left; left &= left - 1)
+  for (SampleSet left = samples; left; left &= left - 1)
     least = std::min(least, (samplePlace(lowestSample(left)) - at).squaredNorm());
   return least;
 }
-
-}  // namespace
 
 void makeParticlesOfCells(BodyModel& model) {
   const CellLattice& lattice = *model.lattice;
@@ -139,8 +138,8 @@ Index CellFinder::nearest(const Vec3& rest, const Allowed& allowed) const {
             const LatticeCell& cell = lattice_.cells[c];
             if (cell.isBridge(c) || !cell.samples) continue;
             const Vec3 in = place - Vec3(cell.place[0], cell.place[1], cell.place[2]);
-            if ((in - in.cwiseMax(0.0).cwiseMin(1.0)).squaredNorm() >= least || (allowed && !allowed(c))) continue;
-            const double squared = squaredToSample(cell, in);
+            if ((in - in.cwiseMax(0.0).cwiseMin(1.0)).squaredNorm() >= least) continue;
+            const double squared = squaredToSamples(allowed ? allowed(c) : cell.samples, in);
             if (squared < least) {
               least = squared;
               best = c;
@@ -166,10 +165,10 @@ Index CellFinder::carrier(const Vec3& rest, const Allowed& allowed) const {
       place[axis] += step;
       for (const Index c : at(place)) {
         const LatticeCell& other = lattice_.cells[c];
-        if (other.isBridge(c) || countSamples(other.samples) < kWellFilled || (allowed && !allowed(c))) continue;
+        if (other.isBridge(c) || countSamples(other.samples) < kWellFilled) continue;
         const LatticeCell &lower = step > 0 ? cell : other, &upper = step > 0 ? other : cell;
         if (!(faceLinks(lower, upper, axis) & ~lower.parted[axis])) continue;
-        const double squared = squaredToSample(other, lattice_.placeIn(other, rest));
+        const double squared = squaredToSamples(allowed ? allowed(c) : other.samples, lattice_.placeIn(other, rest));
         if (squared < least) {
           least = squared;
           best = c;

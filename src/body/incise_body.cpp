@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 
+#include "cut_cells.h"
 #include "meshless_surgery/geometry/nearest.h"
 #include "piece_maker.h"
 #include "side_by_side.h"
@@ -155,16 +156,35 @@ std::vector<std::size_t> assignParticles(const std::vector<IncisedPiece>& pieces
 
 }  // namespace
 
+namespace {
+
+Result<IncisedBody> inciseFilled(const BodyModel& model, const BodyState& state, const Blade& blade,
+                                 const TriangleMesh& present, const InciseOptions& options) {
+  const Result<Incision> incision = incise(present, blade, options);
+  if (!incision) return incision.error();
+  const Gate gate(blade, model.spacing);
+  std::vector<CellPieceSource> sources;
+  for (const IncisedPiece& piece : incision->pieces)
+    sources.push_back({piece.mesh, piece.origins, sidesOf(piece, gate)});
+  IncisedBody result;
+  result.opened_area = incision->opened_area;
+  Result<std::vector<BodyPiece>> pieces = cutCells(model, state, BladeGate(blade), sources, options.patch, result.work);
+  if (!pieces) return pieces.error();
+  result.pieces = std::move(*pieces);
+  return result;
+}
+
+}  // namespace
+
 Result<IncisedBody> inciseBody(const BodyModel& model, const BodyState& state, const Blade& blade) {
   if (!model.solid) return Error{ErrorCode::kUnsuitableShape, "its surface is open, so it has no inside to be opened"};
-  if (model.lattice)
-    return Error{ErrorCode::kUnsuitableShape, "its cells are filled in part, which cannot be cut yet; accepted: cells: whole"};
   TriangleMesh present;
   present.vertices = state.surface;
   present.triangles = model.surface.triangles;
   present.patches = model.surface.patches;
   InciseOptions options;
   options.patch = model.next_patch;
+  if (model.lattice) return inciseFilled(model, state, blade, present, options);
   PieceMaker maker(model, state, options.patch);
   Result<Incision> incision = Error();
   atOnce([&] { incision = incise(present, blade, options); }, [&] { maker.foresee(blade); });

@@ -242,8 +242,8 @@ Status bindFilled(const BodyDef& def, BodyModel& model) {
     cells.push_back(finder.carrier(v));
     if (cells.back() == kNoIndex) {
       std::ostringstream text;
-      text << "body '" << def.name << "' has a vertex at " << v.transpose() << " more than two cells of " << model.spacing
-           << " m from the nearest that is filled; a smaller spacing sees what is thin";
+      text << "body '" << def.name << "' has a vertex at " << v.transpose() << " more than two cells of "
+           << model.spacing << " m from the nearest that is filled; a smaller spacing sees what is thin";
       return Error{ErrorCode::kUnsuitableShape, text.str()};
     }
   }
@@ -282,8 +282,9 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   const bool cells = def.solid && (def.clusters.kind == ClusterOptions::Kind::kCells ||
                                    (def.clusters.kind == ClusterOptions::Kind::kAuto && def.material.elastic()));
   if (def.cells == CellFill::kFilled && !cells)
-    return invalid("body '" + def.name +
-                   "' has cells: filled but no lattice; accepted: with an elastic material or clusters: cells, of a solid");
+    return invalid(
+        "body '" + def.name +
+        "' has cells: filled but no lattice; accepted: with an elastic material or clusters: cells, of a solid");
   model->spacing = def.spacing;
   if (!(model->spacing > 0.0)) {
     if (!def.solid)

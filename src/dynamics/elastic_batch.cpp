@@ -115,7 +115,8 @@ ElasticBatch::ElasticBatch(const ElasticCells& body) {
   };
   add(whole, 0);
   add(partial, box_blocks_);
-  findForces(body.masses.size(), [](Index) { return Index{kCorners}; }, body.masses);
+  findForces(
+      body.masses.size(), [](Index) { return Index{kCorners}; }, body.masses);
 }
 
 void ElasticBatch::makeBlocks(std::size_t boxes, std::size_t others) {

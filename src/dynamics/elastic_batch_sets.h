@@ -21,13 +21,13 @@ constexpr int kSoftnessRow = kInverseRow + 6;       // 1 / spread [1/m^2]
 constexpr int kShapeRows = kSoftnessRow + 1;
 
 // Rows of kBlock values in Block::cells.
-constexpr int kCentroidRow = 0;                    // half edges
-constexpr int kModeRow = kCentroidRow + 3;         // stiffness of modes xy, xz, yz, xyz over that of a whole cell
+constexpr int kCentroidRow = 0;             // half edges
+constexpr int kModeRow = kCentroidRow + 3;  // stiffness of modes xy, xz, yz, xyz over that of a whole cell
 constexpr int kCellRows = kModeRow + 4;
 
 /// Clusters of at most eight members that span space; `shape` is null where all are boxes of one size, their corners in
-/// the order of the bits of x, y, z and of equal mass. `cells`: of cubes that are filled in part, corners in that order.
-/// Lanes from count to kBlock repeat a cluster.
+/// the order of the bits of x, y, z and of equal mass. `cells`: of cubes that are filled in part, corners in that
+/// order. Lanes from count to kBlock repeat a cluster.
 struct Block {
   int count = 0;
   const double* positions = nullptr;         // xyz of every particle

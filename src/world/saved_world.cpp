@@ -189,7 +189,8 @@ std::string faultOf(const BodyModel& m) {
     return "a body's rest shape is not that of its clusters";
   if (m.lattice) {
     const std::vector<LatticeCell>& cells = m.lattice->cells;
-    if (cells.size() != clusters || m.lattice->corners != particles || !(m.lattice->spacing > 0.0) || !(m.cell_mass > 0.0))
+    if (cells.size() != clusters || m.clusters.members.size() != 8 * clusters || m.lattice->corners != particles ||
+        !(m.lattice->spacing > 0.0) || !(m.cell_mass > 0.0))
       return "a body's lattice is not that of its clusters";
     for (Index c = 0; c < cells.size(); ++c) {
       const LatticeCell& cell = cells[c];
@@ -197,13 +198,15 @@ std::string faultOf(const BodyModel& m) {
           !std::equal(cell.corners.begin(), cell.corners.end(), m.clusters.members.begin() + 8 * c) || !cell.filled ||
           (cell.bridge != kNoIndex && !(cell.bridge < cells.size() && cells[cell.bridge].bridge == cell.bridge)))
         return "a body's lattice is not that of its clusters";
-      if (!(cell.mass_share >= 0.0 && cell.mass_share <= 1.0) || !(cell.stiffness_share > 0.0 && cell.stiffness_share <= 1.0))
+      if (!(cell.mass_share >= 0.0 && cell.mass_share <= 1.0) ||
+          !(cell.stiffness_share > 0.0 && cell.stiffness_share <= 1.0))
         return "a cell has a share of itself that is none";
     }
     double boxes = 1.0;  // tables of all places are made
     for (int k = 0; k < 3; ++k) {
-      const auto [low, high] = std::minmax_element(
-          cells.begin(), cells.end(), [k](const LatticeCell& a, const LatticeCell& b) { return a.place[k] < b.place[k]; });
+      const auto [low, high] =
+          std::minmax_element(cells.begin(), cells.end(),
+                              [k](const LatticeCell& a, const LatticeCell& b) { return a.place[k] < b.place[k]; });
       boxes *= static_cast<double>(high->place[k]) - low->place[k] + 1.0;
     }
     if (!(boxes <= 4e6)) return "the cells of a body's lattice are far apart";
@@ -216,7 +219,12 @@ std::string faultOf(const BodyModel& m) {
       b.turners.size() != b.riders.size() || !allBelow(b.lever_clusters, clusters))
     return "a body's surface is not bound to its particles";
   for (std::size_t r = 0; r < b.riders.size(); ++r)
-    if (!b.levers[r].isZero(0.0) && !(b.turners[r] < clusters)) return "a lever turns with no cluster";
+    if (!b.levers[r].isZero(0.0) &&
+        std::find(b.lever_clusters.begin(), b.lever_clusters.end(), b.turners[r]) == b.lever_clusters.end())
+      return "a lever turns with no cluster";
+  // The next cut asks for the cell of a vertex, whether it has a lever or not.
+  if (m.lattice && (b.riders.size() != vertices || !allBelow(b.turners, clusters)))
+    return "a body's surface does not ride on its cells";
   return "";
 }
 

@@ -153,16 +153,16 @@ void serialize(A& archive, CellLattice& v) {
 /// elastic_batch, cells and tissue are made again by whoever reads, once all is checked; empty until then.
 template <class A>
 void serialize(A& archive, BodyModel& v) {
-  auto& [rest, masses, match_masses, fixed, any_fixed, graph, clusters, shape, elastic, elastic_batch,
-         lattice, cell_mass, cells, tissue, most_spread_inverse, specific_stiffness, highest_frequency, surface, binding, solid, lips, spacing,
-         rest_volume, rest_area, mass, next_patch] = v;
+  auto& [rest, masses, match_masses, fixed, any_fixed, graph, clusters, shape, elastic, elastic_batch, lattice,
+         cell_mass, cells, tissue, most_spread_inverse, specific_stiffness, poissons_ratio, highest_frequency, surface,
+         binding, solid, lips, spacing, rest_volume, rest_area, mass, next_patch] = v;
   (void)elastic_batch, (void)cells, (void)tissue;
   auto of_cells = lattice ? *lattice : CellLattice();
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
   archive(of_cells, cell_mass);
   archive(rest, masses, match_masses, held, any_fixed, graph, clusters, shape, elastic, most_spread_inverse,
-          specific_stiffness, highest_frequency, surface, binding, solid, lips, spacing, rest_volume, rest_area, mass,
-          next_patch);
+          specific_stiffness, poissons_ratio, highest_frequency, surface, binding, solid, lips, spacing, rest_volume,
+          rest_area, mass, next_patch);
   if constexpr (std::is_same_v<A, InArchive>) {
     if (!of_cells.cells.empty()) lattice = std::make_shared<CellLattice>(std::move(of_cells));
     fixed.clear();

@@ -344,7 +344,8 @@ TEST(HighestFrequencyOfCells, NoStepOfOneOverItMakesEnergyGrow) {
     }
 }
 
-// The vectorised step is the plain one, whatever the instructions, the tail of a vector and the shape that the body has.
+// The vectorised step is the plain one, whatever the instructions, the tail of a vector and the shape that the body
+// has.
 TEST(ElasticCells, InVectorsAreTheReference) {
   Random random(31);
   std::vector<CellBody> bodies = {wholeCells(3, 2, 2), cutCells(13, 5, 2, 3)};
@@ -367,8 +368,9 @@ TEST(ElasticCells, InVectorsAreTheReference) {
           Points found;
           MatchCounters counters;
           batch.setRotations(body.poses, state);
-          EXPECT_NEAR(batch.accelerate({body.rest, body.cells.masses, {}, {}}, kSoft, y, state, found, counters, swelling, set),
-                      stretch, 1e-9 * stretch);
+          EXPECT_NEAR(
+              batch.accelerate({body.rest, body.cells.masses, {}, {}}, kSoft, y, state, found, counters, swelling, set),
+              stretch, 1e-9 * stretch);
           ASSERT_EQ(found.size(), expected.size());
           for (std::size_t i = 0; i < y.size(); ++i) EXPECT_LE((found[i] - expected[i]).norm(), 1e-9 * scale);
           const Balance balance(body, y, found);

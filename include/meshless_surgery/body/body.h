@@ -42,13 +42,14 @@ struct BodyModel {
   /// Of a body whose cells know how far they are filled (CellFill::kFilled), else null. Cluster c is cell c, corner by
   /// corner.
   std::shared_ptr<const CellLattice> lattice;
-  double cell_mass = 0.0;                       // [kg] of a whole cell of it
-  std::shared_ptr<const ElasticCells> cells;    // of it, where the material is elastic
-  std::vector<bool> tissue;                     // one a corner of it: no ghost; empty where all particles are tissue
+  double cell_mass = 0.0;                     // [kg] of a whole cell of it
+  std::shared_ptr<const ElasticCells> cells;  // of it, where the material is elastic
+  std::vector<bool> tissue;                   // one a corner of it: no ghost; empty where all particles are tissue
   /// [1/m^2] norm of ElasticRest::spread_inverse: what a cut leaves of a cell can be narrower, so that its stress would
   /// need a shorter step. It resists as a flat cluster does.
   double most_spread_inverse = std::numeric_limits<double>::infinity();
   double specific_stiffness = 0.0;  // [m^2/s^2] Young's modulus over density; 0 where the material is for looks
+  double poissons_ratio = 0.0;      // of an elastic material
   double highest_frequency = 0.0;   // [rad/s] of an elastic material: a substep takes at most 1 / highest_frequency
   TriangleMesh surface;             // rest positions of the vertices [m]
   SurfaceBinding binding;

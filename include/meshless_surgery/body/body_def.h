@@ -7,7 +7,8 @@
 
 namespace meshless {
 
-/// What a lattice knows of its cells: nothing, so that each counts as whole but for its mass; or how far each is filled.
+/// What a lattice knows of its cells: nothing, so that each counts as whole but for its mass; or how far each is
+/// filled.
 enum class CellFill { kWhole, kFilled };
 
 struct BodyDef {

@@ -24,7 +24,8 @@ ElasticCells elasticCellsOf(const BodyModel& model);
 /// Which cell a place in the rest shape belongs to: the one with the nearest sample.
 class CellFinder {
  public:
-  using Allowed = std::function<bool(Index cell)>;
+  /// The samples of a cell that count; kNoSample where it does not.
+  using Allowed = std::function<SampleSet(Index cell)>;
 
   /// Keeps a reference.
   explicit CellFinder(const CellLattice& lattice);
@@ -43,6 +44,9 @@ class CellFinder {
   std::array<std::int32_t, 3> lower_{}, size_{};
   std::vector<std::vector<Index>> cells_;
 };
+
+/// [spacing^2] from a place in a cell to the nearest of the samples; infinite where there are none.
+double squaredToSamples(SampleSet samples, const Vec3& at);
 
 /// Every vertex rides on the corners of its cell with trilinear weights; `cell` one a vertex.
 SurfaceBinding bindToCells(const CellLattice& lattice, const Points& surface_rest, const std::vector<Index>& cell);

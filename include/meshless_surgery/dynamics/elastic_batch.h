@@ -32,11 +32,11 @@ class ElasticBatch {
   void setRotations(const std::vector<ClusterPose>& poses, ElasticBatchState& state) const;
   void getRotations(const ElasticBatchState& state, std::vector<ClusterPose>& poses) const;
 
-  /// As elasticAccelerations() for the input or the cells that this was made from (then input is not read), in double: what differs is rounding, and a
-  /// rotation is found to 1e-12 rad. A particle that is not finite spoils its clusters' particles and no others.
-  /// Allocates nothing once state and accelerations have their sizes (but where the reference does). Results do not
-  /// depend on for_each to the bit; without it all runs on the calling thread. They differ in the last bits between
-  /// instruction sets.
+  /// As elasticAccelerations() for the input or the cells that this was made from (then input is not read), in double:
+  /// what differs is rounding, and a rotation is found to 1e-12 rad. A particle that is not finite spoils its clusters'
+  /// particles and no others. Allocates nothing once state and accelerations have their sizes (but where the reference
+  /// does). Results do not depend on for_each to the bit; without it all runs on the calling thread. They differ in the
+  /// last bits between instruction sets.
   double accelerate(const MatchInput& input, const ElasticParameters& material, const Points& y,
                     ElasticBatchState& state, Points& accelerations, MatchCounters& counters, double swelling = 1.0,
                     InstructionSet set = widestInstructionSet(), const ForEach& for_each = nullptr) const;

@@ -34,7 +34,12 @@ struct CellLattice {
   Vec3 restPlace(const LatticeCell& cell, const Vec3& at) const {
     return origin + spacing * (Vec3(cell.place[0], cell.place[1], cell.place[2]) + at);
   }
-  /// The inverse of it.
+  /// Of the cells that a point is in, if there are any.
+  std::array<std::int32_t, 3> placeOf(const Vec3& rest) const {
+    const Vec3 at = ((rest - origin) / spacing).array().floor();
+    return {static_cast<std::int32_t>(at.x()), static_cast<std::int32_t>(at.y()), static_cast<std::int32_t>(at.z())};
+  }
+  /// The inverse of restPlace().
   Vec3 placeIn(const LatticeCell& cell, const Vec3& rest) const {
     return (rest - origin) / spacing - Vec3(cell.place[0], cell.place[1], cell.place[2]);
   }

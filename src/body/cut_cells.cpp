@@ -1,0 +1,577 @@
+#include "cut_cells.h"
+
+#include <algorithm>
+#include <map>
+#include <sstream>
+#include <tuple>
+#include <utility>
+
+#include <Eigen/Dense>
+
+#include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/body/filled_cells.h"
+#include "meshless_surgery/geometry/cut_lattice.h"
+#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/union_find.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kCrumb = 1.0 / 64.0;  // of a cell, for a piece of it that no sample sees
+
+// What is known of a vertex of a piece before its new cell is.
+struct Rider {
+  Vec3 rest;  // [m]
+  Index was;  // the parent's cell that it followed
+  bool made;  // by this blade
+};
+
+// The place in a cell that is at q; false where Newton's method finds none near it.
+bool invert(const LatticeCell& cell, const Points& x, const Vec3& q, double size, Vec3& at) {
+  at = Vec3::Constant(0.5);
+  for (int step = 0; step < 20; ++step) {
+    Vec3 p = Vec3::Zero();
+    Mat3 slope = Mat3::Zero();
+    for (int k = 0; k < 8; ++k) {
+      const Vec3& corner = x[cell.corners[k]];
+      p += trilinearWeight(k, at) * corner;
+      for (int axis = 0; axis < 3; ++axis) {
+        Vec3 along = at;
+        along[axis] = 1.0;  // the weight is linear along an axis
+        const int on = k | 1 << axis;
+        slope.col(axis) += (k >> axis & 1 ? 1.0 : -1.0) * trilinearWeight(on, along) * corner;
+      }
+    }
+    const Vec3 miss = q - p;
+    if (miss.norm() < 1e-13 * size) return true;
+    const Vec3 step_by = slope.fullPivLu().solve(miss);
+    if (!step_by.allFinite() || !((at + step_by - Vec3::Constant(0.5)).norm() < 10.0)) return false;
+    at += step_by;
+  }
+  return false;
+}
+
+class CellCutter {
+ public:
+  CellCutter(const BodyModel& model, const BodyState& state, const BladeGate& gate,
+             const std::vector<CellPieceSource>& sources)
+      : model_(model),
+        state_(state),
+        gate_(gate),
+        sources_(sources),
+        before_(*model.lattice),
+        cut_(cutLattice(before_, state.positions, gate)),
+        children_(before_.cells.size()),
+        sample_sides_(cut_.lattice.cells.size()) {
+    for (Index c = 0; c < cells().size(); ++c) children_[cut_.parent_cell[c]].push_back(c);
+  }
+
+  Result<std::vector<BodyPiece>> run(std::uint32_t new_patch, CutWork& work) {
+    riders_.resize(sources_.size());
+    for (std::size_t p = 0; p < sources_.size(); ++p)
+      for (Index v = 0; v < sources_[p].origins.size(); ++v) {
+        riders_[p].push_back(riderOf(p, v));
+        if (riders_[p].back().was != kNoIndex) continue;
+        std::ostringstream text;
+        text << "the blade made a point at " << sources_[p].mesh.vertices[v].transpose()
+             << " that lies in none of its cells";
+        return Error{ErrorCode::kUnsuitableShape, text.str()};
+      }
+    choosePieces();
+    sampled_ = static_cast<Index>(cells().size());
+    bind();
+    joinThePieces();
+    std::vector<BodyPiece> pieces;
+    for (std::size_t p = 0; p < sources_.size(); ++p) pieces.push_back(make(p, new_patch, work));
+    return pieces;
+  }
+
+ private:
+  std::vector<LatticeCell>& cells() { return cut_.lattice.cells; }
+
+  // --- where vertices come from
+
+  Rider riderOf(std::size_t p, Index v) {
+    const VertexOrigins& origins = sources_[p].origins;
+    Rider rider{Vec3::Zero(), kNoIndex, origins.same(v) == kNoIndex};
+    if (origins.insideCap(v)) return insideOf(sources_[p].mesh.vertices[v]);
+    const VertexOrigin origin = origins[v];
+    double most = -1.0;
+    for (int k = 0; k < 4; ++k) {
+      if (origin.parents[k] == kNoIndex) continue;
+      rider.rest += origin.weights[k] * model_.surface.vertices[origin.parents[k]];
+      if (origin.weights[k] <= most) continue;
+      most = origin.weights[k];
+      rider.was = model_.binding.turners[origin.parents[k]];
+    }
+    if (!rider.made) rider.rest = model_.surface.vertices[origin.parents[0]];
+    return rider;
+  }
+
+  // By the inverse of the map of the cell whose samples are nearest. Both sides of a cut get the same place.
+  Rider insideOf(const Vec3& q) {
+    const auto [known, is_new] = inside_.emplace(std::array<double, 3>{q.x(), q.y(), q.z()}, Rider{q, kNoIndex, true});
+    if (!is_new) return known->second;
+    if (boxes_.empty())
+      for (Index c = 0; c < before_.cells.size(); ++c) {
+        if (before_.cells[c].isBridge(c)) continue;
+        boxes_.emplace_back(Box(), c);
+        for (const Index corner : before_.cells[c].corners) boxes_.back().first.extend(state_.positions[corner]);
+        const Box& box = boxes_.back().first;
+        double low = gate_.height(state_.positions[before_.cells[c].corners[0]]), high = low;
+        for (const Index corner : before_.cells[c].corners) {
+          low = std::min(low, gate_.height(state_.positions[corner]));
+          high = std::max(high, gate_.height(state_.positions[corner]));
+        }
+        const double wide = 0.5 * (box.max - box.min).norm();
+        if (low > wide || high < -wide) boxes_.pop_back();
+      }
+    for (const double margin : {0.01, 0.5, 2.0}) {
+      double least = 1e300;
+      for (const auto& [box, c] : boxes_) {
+        const Vec3 wider = margin * (box.max - box.min);
+        if (((q - box.min + wider).array() < 0.0).any() || ((box.max + wider - q).array() < 0.0).any()) continue;
+        Vec3 at;
+        if (!invert(before_.cells[c], state_.positions, q, before_.spacing, at)) continue;
+        // What lies in a cell and next to one of its samples is as good as what lies on it.
+        const SampleSet samples = before_.cells[c].samples ? before_.cells[c].samples : before_.cells[c].filled;
+        const double outside = (at - at.cwiseMax(0.0).cwiseMin(1.0)).norm();
+        const double distance = outside + std::max(0.0, std::sqrt(squaredToSamples(samples, at)) - 0.22);
+        if (!(distance < least)) continue;
+        least = distance;
+        known->second = {before_.restPlace(before_.cells[c], at), c, true};
+      }
+      if (least < 0.5) break;
+    }
+    return known->second;
+  }
+
+  // --- cells that a vertex may follow
+
+  bool together(Index a, Index b) const {  // in the parent
+    if (a == b) return true;
+    const auto &p = before_.cells[a].corners, &q = before_.cells[b].corners;
+    return std::any_of(p.begin(), p.end(), [&](Index i) { return std::find(q.begin(), q.end(), i) != q.end(); });
+  }
+
+  // Samples of a cell that no blade hides from a vertex.
+  SampleSet seen(Index c, const Vec3& q, int side) {
+    const LatticeCell& cell = cut_.lattice.cells[c];
+    if (side == 0) return cell.samples;
+    if (gate_.unbounded()) return cell.samples & (side > 0 ? cut_.above[c] : ~cut_.above[c]);
+    const auto placed = [&](const Vec3& at) {
+      Vec3 p = Vec3::Zero();
+      for (int k = 0; k < 8; ++k)
+        p += trilinearWeight(k, at) * state_.positions[before_.cells[cut_.parent_cell[c]].corners[k]];
+      return p;
+    };
+    if (!cut_.changed[c]) {
+      const Vec3 middle = placed(Vec3::Constant(0.5));
+      return gate_.between(q, side, middle, gate_.side(middle)) ? kNoSample : cell.samples;
+    }
+    Points& places = sample_sides_[c];
+    if (places.empty())
+      for (int bit = 0; bit < 64; ++bit) places.push_back(placed(samplePlace(bit)));
+    SampleSet open = kNoSample;
+    for (SampleSet left = cell.samples; left; left &= left - 1) {
+      const int bit = lowestSample(left);
+      if (!gate_.between(q, side, places[static_cast<std::size_t>(bit)], cut_.above[c] >> bit & 1 ? 1 : -1))
+        open |= SampleSet{1} << bit;
+    }
+    return open;
+  }
+
+  // The cell of vertex v of source p, among those of `piece` (any where it is negative).
+  Index cellOf(const CellFinder& finder, std::size_t p, Index v, int piece) {
+    const Rider& rider = riders_[p][v];
+    const auto in_piece = [&](Index c) { return piece < 0 || piece_of_[component_[c]] == piece; };
+    const std::vector<Index>& copies = children_[rider.was];
+    if (copies.size() == 1 && !cut_.changed[copies[0]] && in_piece(copies[0])) return copies[0];
+    const int side = sources_[p].side[v];
+    const Vec3& q = sources_[p].mesh.vertices[v];
+    if (side == 0)  // a buried front rides on what holds the two sides together
+      for (const Index c : finder.at(cut_.lattice.placeOf(rider.rest)))
+        if (cells()[c].isBridge(c) && together(cut_.parent_cell[c], rider.was) && in_piece(c)) return c;
+    return finder.carrier(rider.rest, [&](Index c) {
+      return in_piece(c) && together(cut_.parent_cell[c], rider.was) ? seen(c, q, side) : kNoSample;
+    });
+  }
+
+  // --- which cells are in which piece
+
+  void choosePieces() {
+    UnionFind corners(cut_.lattice.corners);
+    for (const LatticeCell& cell : cells())
+      for (int k = 1; k < 8; ++k) corners.join(cell.corners[0], cell.corners[k]);
+    std::map<Index, Index> names;
+    for (const LatticeCell& cell : cells())
+      component_.push_back(
+          names.emplace(corners.find(cell.corners[0]), static_cast<Index>(names.size())).first->second);
+    piece_of_.assign(names.size(), sources_.size() == 1 ? 0 : -1);
+    seen_.assign(names.size(), false);
+    std::vector<std::map<int, int>> votes(names.size());
+    const CellFinder finder(cut_.lattice);
+    for (std::size_t p = 0; p < sources_.size(); ++p)
+      for (Index v = 0; v < riders_[p].size(); ++v) {
+        if (riders_[p][v].made) continue;
+        const Index c = cellOf(finder, p, v, -1);
+        if (c != kNoIndex) ++votes[component_[c]][static_cast<int>(p)];
+      }
+    for (Index n = 0; n < names.size(); ++n) {
+      seen_[n] = !votes[n].empty();
+      int most = 0;
+      for (const auto& [p, count] : votes[n])
+        if (count > most) {
+          most = count;
+          piece_of_[n] = p;
+        }
+    }
+    // What no vertex is in goes with most of its neighbours, of those on its side first.
+    const auto above = [&](Index c) {
+      return 2 * countSamples(cells()[c].samples & cut_.above[c]) >= countSamples(cells()[c].samples);
+    };
+    for (bool again = true; again;) {
+      again = false;
+      std::vector<std::map<int, int>> near(names.size());
+      std::vector<std::vector<Index>> users(before_.corners);
+      for (Index c = 0; c < cells().size(); ++c)
+        for (const Index corner : cells()[c].corners) users[cut_.parent_corner[corner]].push_back(c);
+      for (const std::vector<Index>& at : users)
+        for (const Index a : at) {
+          if (piece_of_[component_[a]] >= 0) continue;
+          for (const Index b : at)
+            if (piece_of_[component_[b]] >= 0)
+              near[component_[a]][piece_of_[component_[b]]] += above(a) == above(b) ? 1000 : 1;
+        }
+      for (Index n = 0; n < names.size(); ++n) {
+        int most = 0;
+        for (const auto& [p, count] : near[n])
+          if (count > most) {
+            most = count;
+            piece_of_[n] = p;
+            again = true;
+          }
+      }
+    }
+    for (int& piece : piece_of_) piece = std::max(piece, 0);
+  }
+
+  // --- the surface; what has no cell gets crumbs
+
+  void bind() {
+    const CellFinder finder(cut_.lattice);
+    std::map<std::pair<std::size_t, Index>, Index> crumbs;
+    carriers_.resize(sources_.size());
+    for (std::size_t p = 0; p < sources_.size(); ++p)
+      for (Index v = 0; v < riders_[p].size(); ++v) {
+        Index c = cellOf(finder, p, v, static_cast<int>(p));
+        if (c == kNoIndex) {
+          const Index was = withMass(riders_[p][v].was);
+          const auto [known, is_new] = crumbs.emplace(std::make_pair(p, was), static_cast<Index>(cells().size()));
+          c = known->second;
+          if (is_new) addCrumb(was, static_cast<int>(p));
+        }
+        carriers_[p].push_back(c);
+      }
+  }
+
+  // A bridge has no mass to give: one of what it joins.
+  Index withMass(Index was) const {
+    if (before_.cells[was].isBridge(was))
+      for (Index part = 0; part < before_.cells.size(); ++part)
+        if (part != was && before_.cells[part].bridge == was) return part;
+    return was;
+  }
+
+  // A crumb is a copy of the whole cell with a share of what it weighs: corner by corner nothing is lost.
+  void shareWithCrumbs() {
+    std::map<Index, int> taken;
+    for (Index c = sampled_; c < cells().size(); ++c) ++taken[cut_.parent_cell[c]];
+    for (const auto& [was, count] : taken) {
+      const double part = std::min(0.5, count * kCrumb);
+      for (const Index c : children_[was]) {
+        cells()[c].mass_share *= 1.0 - part;
+        cells()[c].stiffness_share *= 1.0 - part;
+      }
+    }
+    for (Index c = sampled_; c < cells().size(); ++c) {
+      const Index was = cut_.parent_cell[c];
+      const double part = std::min(0.5, taken[was] * kCrumb) / taken[was];
+      cells()[c].mass_share = before_.cells[was].mass_share * part;
+      cells()[c].stiffness_share = before_.cells[was].stiffness_share * part;
+    }
+  }
+
+  Index addCrumb(Index was, int piece) {
+    LatticeCell crumb = before_.cells[was];
+    crumb.samples = kNoSample;
+    crumb.bridge = kNoIndex;
+    for (Index& corner : crumb.corners) {
+      cut_.parent_corner.push_back(corner);
+      corner = cut_.lattice.corners++;
+    }
+    component_.push_back(static_cast<Index>(piece_of_.size()));
+    piece_of_.push_back(piece);
+    seen_.push_back(true);
+    cells().push_back(crumb);
+    cut_.parent_cell.push_back(was);
+    cut_.above.push_back(kNoSample);
+    cut_.changed.push_back(true);
+    sample_sides_.emplace_back();
+    return static_cast<Index>(cells().size()) - 1;
+  }
+
+  // --- what the surface holds together and samples do not see
+
+  void joinThePieces() {
+    // With room for a crumb of every cell and piece.
+    UnionFind corners(cut_.lattice.corners + 8 * before_.cells.size() * sources_.size());
+    const auto joinCells = [&](Index a, Index b) {
+      for (const Index i : cells()[a].corners)
+        for (const Index j : cells()[b].corners)
+          if (cut_.parent_corner[i] == cut_.parent_corner[j]) corners.join(i, j);
+    };
+    for (std::size_t p = 0; p < sources_.size(); ++p)
+      for (const Triangle& t : sources_[p].mesh.triangles)
+        for (int k = 0; k < 3; ++k) {
+          const Index a = carriers_[p][t[k]], b = carriers_[p][t[(k + 1) % 3]];
+          if (component_[a] != component_[b]) joinCells(a, b);
+        }
+    // What no vertex is in holds to its neighbours in the piece.
+    std::vector<std::vector<Index>> users(before_.corners);
+    for (Index c = 0; c < cells().size(); ++c)
+      for (const Index corner : cells()[c].corners) users[cut_.parent_corner[corner]].push_back(c);
+    for (const std::vector<Index>& at : users)
+      for (const Index a : at)
+        if (!seen_[component_[a]])
+          for (const Index b : at)
+            if (piece_of_[component_[a]] == piece_of_[component_[b]]) joinCells(a, b);
+    for (std::size_t p = 0; p < sources_.size(); ++p)
+      while (joinByTheShortestWay(static_cast<int>(p), corners, joinCells, 4) ||
+             joinByTheShortestWay(static_cast<int>(p), corners, joinCells, 1)) {
+      }
+    shareWithCrumbs();
+    std::vector<Index> number(cut_.lattice.corners, kNoIndex), parents;
+    for (LatticeCell& cell : cells())
+      for (Index& corner : cell.corners) {
+        Index& known = number[corners.find(corner)];
+        if (known == kNoIndex) {
+          known = static_cast<Index>(parents.size());
+          parents.push_back(cut_.parent_corner[corner]);
+        }
+        corner = known;
+      }
+    cut_.lattice.corners = static_cast<Index>(parents.size());
+    cut_.parent_corner = std::move(parents);
+    chooseHeirs();
+  }
+
+  // Two parts of a piece that nothing joins get crumbs of the parent's cells on the shortest way between, from face to
+  // face where they share at least 4 corners. False where there is one part, or no way.
+  template <class Join>
+  bool joinByTheShortestWay(int piece, UnionFind& corners, const Join& joinCells, int least_shared) {
+    UnionFind parts(component_.size());  // of components
+    std::map<Index, Index> user;
+    std::vector<Index> mine;
+    for (Index c = 0; c < cells().size(); ++c) {
+      if (piece_of_[component_[c]] != piece) continue;
+      mine.push_back(c);
+      for (const Index corner : cells()[c].corners) {
+        const auto [known, is_new] = user.emplace(corners.find(corner), component_[c]);
+        if (!is_new) parts.join(known->second, component_[c]);
+      }
+    }
+    const auto partOf = [&](Index c) { return parts.find(component_[c]); };
+    if (mine.empty() || std::all_of(mine.begin(), mine.end(), [&](Index c) { return partOf(c) == partOf(mine[0]); }))
+      return false;
+    // The smallest part looks for another: breadth first over the parent's cells.
+    std::map<Index, int> sizes;
+    for (const Index c : mine) ++sizes[partOf(c)];
+    const Index lost = std::min_element(sizes.begin(), sizes.end(), [](const auto& a, const auto& b) {
+                         return a.second < b.second;
+                       })->first;
+    std::vector<Index> there(before_.cells.size(), kNoIndex), from(before_.cells.size(), kNoIndex), queue;
+    for (const Index c : mine)
+      if (partOf(c) != lost) there[cut_.parent_cell[c]] = c;
+    for (const Index c : mine) {
+      const Index was = cut_.parent_cell[c];
+      if (partOf(c) != lost || from[was] != kNoIndex) continue;
+      from[was] = was;
+      queue.push_back(was);
+    }
+    const CornerUses uses = cornerUses(before_);
+    for (std::size_t n = 0; n < queue.size(); ++n) {
+      const Index at = queue[n];
+      if (there[at] != kNoIndex) {
+        Index next = there[at], way = at;
+        while (from[way] != way) {
+          way = from[way];
+          Index here = kNoIndex;
+          if (from[way] == way) {
+            for (const Index c : mine)
+              if (partOf(c) == lost && cut_.parent_cell[c] == way) here = c;
+          } else {
+            here = addCrumb(withMass(way), piece);
+          }
+          joinCells(here, next);
+          next = here;
+        }
+        if (way == at)  // both are of one cell
+          for (const Index c : mine)
+            if (partOf(c) == lost && cut_.parent_cell[c] == at) joinCells(c, next);
+        return true;
+      }
+      std::map<Index, int> shared;
+      for (const Index corner : before_.cells[at].corners)
+        for (Index u = uses.offsets[corner]; u < uses.offsets[corner + 1]; ++u) ++shared[uses.cells[u]];
+      for (const auto& [other, count] : shared)
+        if (count >= least_shared && from[other] == kNoIndex && !before_.cells[other].isBridge(other)) {
+          from[other] = at;
+          queue.push_back(other);
+        }
+    }
+    return false;
+  }
+
+  // The one copy of each of the parent's particles that goes on as it: with tissue, the first of them.
+  void chooseHeirs() {
+    const std::vector<bool> tissue = cornersWithTissue(cut_.lattice);
+    heir_.assign(before_.corners, kNoIndex);
+    for (Index i = 0; i < cut_.lattice.corners; ++i) {
+      Index& heir = heir_[cut_.parent_corner[i]];
+      if (heir == kNoIndex || (tissue[i] && !tissue[heir])) heir = i;
+    }
+    // Tissue is what a clamp holds; where none of the copies has any, it holds them all.
+    holds_.assign(cut_.lattice.corners, false);
+    for (Index i = 0; i < cut_.lattice.corners; ++i) holds_[i] = tissue[i] || !tissue[heir_[cut_.parent_corner[i]]];
+  }
+
+  // --- bodies
+
+  BodyPiece make(std::size_t p, std::uint32_t new_patch, CutWork& work) {
+    const CellPieceSource& from = sources_[p];
+    BodyPiece piece;
+    auto child = std::make_shared<BodyModel>();
+    child->solid = true;
+    child->spacing = model_.spacing;
+    child->next_patch = model_.next_patch + 1;
+    child->lips = model_.lips || !gate_.unbounded();
+    child->surface.triangles = from.mesh.triangles;
+    child->surface.patches = from.mesh.patches;
+    for (const Rider& rider : riders_[p]) child->surface.vertices.push_back(rider.rest);
+    child->rest_volume = signedVolume(child->surface);
+    child->rest_area = surfaceArea(child->surface);
+
+    auto lattice = std::make_shared<CellLattice>();
+    lattice->spacing = before_.spacing;
+    lattice->origin = before_.origin;
+    std::vector<Index> cell_of, renumbered(cells().size(), kNoIndex), corner_of;
+    for (Index c = 0; c < cells().size(); ++c) {
+      if (piece_of_[component_[c]] != static_cast<int>(p)) continue;
+      renumbered[c] = static_cast<Index>(cell_of.size());
+      cell_of.push_back(c);
+      corner_of.insert(corner_of.end(), cells()[c].corners.begin(), cells()[c].corners.end());
+    }
+    std::sort(corner_of.begin(), corner_of.end(), [&](Index a, Index b) {
+      const auto order = [&](Index i) {
+        return std::make_tuple(heir_[cut_.parent_corner[i]] != i, cut_.parent_corner[i], i);
+      };
+      return order(a) < order(b);
+    });
+    corner_of.erase(std::unique(corner_of.begin(), corner_of.end()), corner_of.end());
+    std::vector<Index> corner_number(cut_.lattice.corners, kNoIndex);
+    for (Index i = 0; i < corner_of.size(); ++i) corner_number[corner_of[i]] = i;
+    lattice->corners = static_cast<Index>(corner_of.size());
+    for (const Index c : cell_of) {
+      LatticeCell cell = cells()[c];
+      for (Index& corner : cell.corners) corner = corner_number[corner];
+      if (cell.bridge != kNoIndex) cell.bridge = renumbered[cell.bridge];
+      lattice->cells.push_back(cell);
+    }
+    for (const Index i : corner_of) {
+      const Index parent = cut_.parent_corner[i];
+      const bool fixed = model_.fixed[parent] && holds_[i];
+      child->fixed.push_back(fixed);
+      child->any_fixed = child->any_fixed || fixed;
+      piece.parent_particles.push_back(heir_[parent] == i ? parent : kNoIndex);
+      piece.state.positions.push_back(state_.positions[parent]);
+      piece.state.velocities.push_back(state_.velocities[parent]);
+    }
+    child->lattice = lattice;
+    child->cell_mass = model_.cell_mass;
+    makeParticlesOfCells(*child);
+    for (const double m : child->masses) child->mass += m;
+    inheritMoments(*child, corner_of);
+
+    for (const Index c : cell_of) {
+      piece.state.poses.push_back(state_.poses[cut_.parent_cell[c]]);
+      if (!state_.plastic.empty()) piece.state.plastic.push_back(state_.plastic[cut_.parent_cell[c]]);
+      ++(cut_.changed[c] ? work.rebuilt_clusters : work.kept_clusters);
+    }
+    fitClusters(matchInput(*child, piece.state), piece.state.positions, piece.state.poses);
+    std::vector<Index> carriers;
+    for (const Index c : carriers_[p]) carriers.push_back(renumbered[c]);
+    child->binding = bindToCells(*lattice, child->surface.vertices, carriers);
+    for (const Rider& rider : riders_[p]) {
+      ++(rider.made ? work.bound_riders : work.kept_riders);
+      work.new_vertices += rider.made;
+    }
+    for (const std::uint32_t patch : from.mesh.patches) work.new_triangles += patch == new_patch;
+    piece.state.surface = from.mesh.vertices;
+    piece.state.stretch = state_.stretch;
+    piece.state.swelling = state_.swelling;
+    for (Index r = 0; r < child->binding.riders.size(); ++r)
+      piece.state.rider_offsets.push_back(from.mesh.vertices[r] -
+                                          riderPosition(child->binding, piece.state.positions, piece.state.poses, r));
+    piece.model = std::move(child);
+    return piece;
+  }
+
+  void inheritMoments(BodyModel& child, const std::vector<Index>& corner_of) const {
+    const bool elastic = !model_.elastic.empty();
+    child.match_masses = child.masses;
+    if (!elastic)
+      for (std::size_t i = 0; i < corner_of.size(); ++i) {
+        const Index parent = cut_.parent_corner[corner_of[i]];
+        if (child.fixed[i]) child.match_masses[i] *= model_.match_masses[parent] / model_.masses[parent];
+      }
+    weighCells(child, elastic);
+    child.shape = makeRestShape(child.rest, child.match_masses, child.clusters);
+    if (!model_.shape.quadratic.empty()) addQuadraticRest(child.rest, child.match_masses, child.clusters, child.shape);
+    child.specific_stiffness = model_.specific_stiffness;
+    child.poissons_ratio = model_.poissons_ratio;
+    if (!elastic) return;
+    makeElastic(child);
+    child.highest_frequency =
+        highestFrequency(*child.cells, elasticParameters(child.specific_stiffness, child.poissons_ratio, 1.0));
+  }
+
+  const BodyModel& model_;
+  const BodyState& state_;
+  const BladeGate& gate_;
+  const std::vector<CellPieceSource>& sources_;
+  const CellLattice& before_;
+  CutLattice cut_;
+  std::vector<std::vector<Index>> children_;  // of each of the parent's cells
+  std::vector<Points> sample_sides_;          // present places of a cell's samples, once asked for
+  std::vector<std::vector<Rider>> riders_;    // of each source
+  std::map<std::array<double, 3>, Rider> inside_;
+  std::vector<std::pair<Box, Index>> boxes_;  // present, of the parent's cells near the blade's plane
+  std::vector<Index> component_;              // of each cell
+  std::vector<int> piece_of_;                 // of each component
+  Index sampled_ = 0;                         // cells before crumbs were made
+  std::vector<bool> seen_;                    // a vertex is in it
+  std::vector<std::vector<Index>> carriers_;  // of each source's vertices
+  std::vector<Index> heir_;                   // of each of the parent's corners
+  std::vector<bool> holds_;                   // one a corner
+};
+
+}  // namespace
+
+Result<std::vector<BodyPiece>> cutCells(const BodyModel& model, const BodyState& state, const BladeGate& gate,
+                                        const std::vector<CellPieceSource>& sources, std::uint32_t new_patch,
+                                        CutWork& work) {
+  return CellCutter(model, state, gate, sources).run(new_patch, work);
+}
+
+}  // namespace meshless

@@ -1,0 +1,248 @@
+// Bodies of filled cells that a blade parts: copies of cells, and what they keep.
+#include <cmath>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "meshless_surgery/body/cut_body.h"
+#include "meshless_surgery/body/deform.h"
+#include "meshless_surgery/body/filled_cells.h"
+#include "meshless_surgery/body/incise_body.h"
+#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/organs.h"
+#include "meshless_surgery/geometry/union_find.h"
+#include "support/bodies.h"
+#include "support/mesh_laws.h"
+#include "support/random.h"
+
+namespace meshless {
+namespace {
+
+using test::prepared;
+using test::Random;
+
+BodyDef filled(const TriangleMesh& mesh, double spacing, bool elastic = true) {
+  BodyDef def = test::defOf(mesh);
+  def.spacing = spacing;
+  def.cells = CellFill::kFilled;
+  def.clusters.kind = ClusterOptions::Kind::kCells;
+  def.material.youngs_modulus = elastic ? 5e3 : 0.0;
+  def.material.poissons_ratio = 0.4;
+  def.material.density = 1000.0;
+  return def;
+}
+
+PreparedBody bodyOf(int round) {
+  const bool elastic = round % 4 != 3;
+  if (round % 2) return prepared(filled(sphereMesh(0.1, 0.03), 0.037, elastic));
+  return prepared(filled(boxMesh(Vec3(0.2, 0.11, 0.09), 8, 4, 4), 0.03, elastic));
+}
+
+// Bent smoothly, and it spins.
+void bend(PreparedBody& body, Random& random) {
+  const Vec3 spin = random.vector(3.0), wave = random.vector(8.0), push = random.vector(0.02);
+  for (std::size_t i = 0; i < body.state.positions.size(); ++i) {
+    Vec3& p = body.state.positions[i];
+    p += push * std::sin(wave.dot(p)) + Vec3(0.1, 0.2, 0.3);
+    body.state.velocities[i] = spin.cross(p) + Vec3(0.3, -0.2, 0.1) + random.vector(0.1);
+  }
+  updateSurface(*body.model, body.state);
+}
+
+struct Sums {
+  double volume = 0.0, rest_volume = 0.0, mass = 0.0;
+  Vec3 centre = Vec3::Zero(), linear = Vec3::Zero(), angular = Vec3::Zero();
+
+  void add(const BodyModel& model, const BodyState& state) {
+    volume += signedVolume(state.surface, model.surface.triangles);
+    rest_volume += model.rest_volume;
+    mass += model.mass;
+    for (std::size_t i = 0; i < model.masses.size(); ++i) {
+      centre += model.masses[i] * state.positions[i];
+      linear += model.masses[i] * state.velocities[i];
+      angular += model.masses[i] * state.positions[i].cross(state.velocities[i]);
+    }
+  }
+};
+
+void expectSame(const Sums& a, const Sums& b) {
+  EXPECT_NEAR(a.volume, b.volume, 1e-9 * b.volume);
+  EXPECT_NEAR(a.rest_volume, b.rest_volume, 1e-9 * b.rest_volume);
+  EXPECT_NEAR(a.mass, b.mass, 1e-12 * b.mass);
+  EXPECT_LT((a.centre - b.centre).norm(), 1e-12 * b.mass);
+  EXPECT_LT((a.linear - b.linear).norm(), 1e-12 * b.mass);
+  EXPECT_LT((a.angular - b.angular).norm(), 1e-12 * b.mass);
+}
+
+std::size_t partsOf(const BodyModel& model) {
+  UnionFind corners(model.rest.size());
+  for (const LatticeCell& cell : model.lattice->cells)
+    for (const Index corner : cell.corners) corners.join(cell.corners[0], corner);
+  std::set<Index> parts;
+  for (Index i = 0; i < model.rest.size(); ++i) parts.insert(corners.find(i));
+  return parts.size();
+}
+
+void expectSound(const BodyPiece& piece, const BodyModel& parent, const BodyState& before) {
+  TriangleMesh present = piece.model->surface;
+  present.vertices = piece.state.surface;
+  EXPECT_TRUE(laws::isClosedOriented(present));
+  EXPECT_EQ(partsOf(*piece.model), 1u);
+  for (const double m : piece.model->masses) EXPECT_GT(m, 0.0);
+  ASSERT_EQ(piece.parent_particles.size(), piece.model->rest.size());
+  for (std::size_t i = 0; i < piece.parent_particles.size(); ++i) {
+    const Index old = piece.parent_particles[i];
+    if (old == kNoIndex) continue;
+    EXPECT_EQ(piece.state.positions[i], before.positions[old]);
+    EXPECT_EQ(piece.state.velocities[i], before.velocities[old]);
+    EXPECT_LT((piece.model->rest[i] - parent.rest[old]).norm(), 1e-12);
+  }
+  BodyState redrawn = piece.state;
+  updateSurface(*piece.model, redrawn);
+  for (std::size_t v = 0; v < redrawn.surface.size(); ++v)
+    EXPECT_LT((redrawn.surface[v] - piece.state.surface[v]).norm(), 1e-9);
+  if (!piece.model->cells) return;
+  EXPECT_GT(piece.model->highest_frequency, 0.5 * parent.highest_frequency);
+}
+
+TEST(CutCells, KeepMassMomentumVolumeAndPlaces) {
+  Random random(1);
+  for (int round = 0; round < 40; ++round) {
+    SCOPED_TRACE(round);
+    PreparedBody body = bodyOf(round);
+    bend(body, random);
+    const Plane plane{random.unit(), Vec3(0.1, 0.2, 0.3) + random.vector(0.04)};
+    const Result<CutBody> cut = cutBody(*body.model, body.state, plane);
+    ASSERT_TRUE(cut.ok()) << cut.error().detail;
+    Sums before, after;
+    before.add(*body.model, body.state);
+    std::vector<int> heirs(body.model->rest.size(), 0);
+    for (const BodyPiece& piece : cut->pieces) {
+      expectSound(piece, *body.model, body.state);
+      after.add(*piece.model, piece.state);
+      for (const Index old : piece.parent_particles)
+        if (old != kNoIndex) ++heirs[old];
+    }
+    expectSame(after, before);
+    for (const int n : heirs) EXPECT_EQ(n, 1);
+  }
+}
+
+TEST(CutCells, IncisionsKeepMassMomentumAndTheParticlesNumbers) {
+  Random random(2);
+  int opened = 0;
+  for (int round = 0; round < 40; ++round) {
+    SCOPED_TRACE(round);
+    PreparedBody body = bodyOf(round);
+    bend(body, random);
+    Blade blade;
+    const Quat turn = random.rotation();
+    blade.x_axis = turn * Vec3::UnitX();
+    blade.y_axis = turn * Vec3::UnitY();
+    blade.length = random.uniform(0.05, 0.4);
+    blade.depth = random.uniform(0.1, 0.3);
+    blade.origin = Vec3(0.1, 0.2, 0.3) + random.vector(0.03) + blade.y_axis * 0.15 - 0.5 * blade.length * blade.x_axis;
+    const Result<IncisedBody> incised = inciseBody(*body.model, body.state, blade);
+    if (!incised.ok()) continue;
+    ++opened;
+    Sums before, after;
+    before.add(*body.model, body.state);
+    for (const BodyPiece& piece : incised->pieces) {
+      expectSound(piece, *body.model, body.state);
+      after.add(*piece.model, piece.state);
+    }
+    expectSame(after, before);
+    if (incised->pieces.size() > 1) continue;
+    const BodyPiece& piece = incised->pieces[0];
+    for (Index i = 0; i < piece.parent_particles.size(); ++i)
+      EXPECT_EQ(piece.parent_particles[i], i < body.model->rest.size() ? i : kNoIndex);
+  }
+  EXPECT_GT(opened, 20);
+}
+
+// What nothing holds apart is not moved: each piece is accelerated as the whole was, but for what was cut.
+TEST(CutCells, APieceAtRestStaysAtRest) {
+  PreparedBody body = prepared(filled(boxMesh(Vec3(0.2, 0.11, 0.09), 8, 4, 4), 0.03));
+  const Result<CutBody> cut = cutBody(*body.model, body.state, Plane{Vec3(1, 0.3, 0.1).normalized(), Vec3(0.01, 0, 0)});
+  ASSERT_TRUE(cut.ok());
+  for (const BodyPiece& piece : cut->pieces) {
+    BodyState state = piece.state;
+    StepScratch scratch;
+    MatchCounters counters;
+    for (int n = 0; n < 20; ++n)
+      matchAndMove(*piece.model, body.def.material, Vec3::Zero(), 0.5 / piece.model->highest_frequency, state, scratch,
+                   counters);
+    for (std::size_t i = 0; i < state.positions.size(); ++i)
+      EXPECT_LT((state.positions[i] - piece.state.positions[i]).norm(), 1e-12);
+  }
+}
+
+// A clamp holds the copies that have tissue; the other side of the cut goes free.
+TEST(CutCells, AClampHoldsTheSideThatItIsOn) {
+  BodyDef def = filled(boxMesh(Vec3(0.2, 0.09, 0.09), 8, 4, 4), 0.03);
+  def.fixed = {{Vec3(-1, -1, -1), Vec3(-0.08, 1, 1)}};
+  const PreparedBody body = prepared(def);
+  ASSERT_TRUE(body.model->any_fixed);
+  const Result<CutBody> cut = cutBody(*body.model, body.state, Plane{Vec3::UnitX(), Vec3(-0.074, 0, 0)});
+  ASSERT_TRUE(cut.ok());
+  ASSERT_EQ(cut->pieces.size(), 2u);
+  EXPECT_FALSE(cut->pieces[0].model->any_fixed);
+  EXPECT_TRUE(cut->pieces[1].model->any_fixed);
+}
+
+// Slices thinner than a sample: no cell sees them, and they are bodies with mass all the same.
+TEST(CutCells, SliversHaveCellsOfTheirOwn) {
+  const PreparedBody body = prepared(filled(boxMesh(Vec3(0.2, 0.09, 0.09), 16, 8, 8), 0.03));
+  for (const double at : {0.0999, 0.099, 0.097, 0.095}) {
+    SCOPED_TRACE(at);
+    const Result<CutBody> cut = cutBody(*body.model, body.state, Plane{Vec3::UnitX(), Vec3(at, 0, 0)});
+    ASSERT_TRUE(cut.ok()) << cut.error().detail;
+    Sums before, after;
+    before.add(*body.model, body.state);
+    for (const BodyPiece& piece : cut->pieces) {
+      expectSound(piece, *body.model, body.state);
+      after.add(*piece.model, piece.state);
+    }
+    expectSame(after, before);
+  }
+}
+
+TEST(CutCells, ManyCutsAfterEachOther) {
+  Random random(5);
+  PreparedBody whole = prepared(filled(sphereMesh(0.1, 0.02), 0.02));
+  struct Part {
+    BodyModelPtr model;
+    BodyState state;
+  };
+  std::vector<Part> parts{{whole.model, whole.state}};
+  Sums before, after;
+  before.add(*whole.model, whole.state);
+  int cuts = 0;
+  for (int n = 0; n < 30; ++n) {
+    const Plane plane{random.unit(), random.vector(0.05)};
+    std::vector<Part> next;
+    for (Part& part : parts) {
+      Result<CutBody> cut = cutBody(*part.model, part.state, plane);
+      if (!cut.ok()) {
+        EXPECT_EQ(cut.error().code, ErrorCode::kMissed) << cut.error().detail;
+        next.push_back(std::move(part));
+        continue;
+      }
+      ++cuts;
+      for (BodyPiece& piece : cut->pieces) {
+        expectSound(piece, *part.model, part.state);
+        next.push_back({std::move(piece.model), std::move(piece.state)});
+      }
+    }
+    parts = std::move(next);
+    if (parts.size() > 60) parts.resize(60);
+    if (n == 4) {
+      for (const Part& part : parts) after.add(*part.model, part.state);
+      expectSame(after, before);
+    }
+  }
+  EXPECT_GT(cuts, 100);
+}
+
+}  // namespace
+}  // namespace meshless
