@@ -13,6 +13,7 @@
 #include "meshless_surgery/geometry/cut_lattice.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/union_find.h"
+#include "side_by_side.h"
 
 namespace meshless {
 namespace {
@@ -81,8 +82,10 @@ class CellCutter {
     sampled_ = static_cast<Index>(cells().size());
     bind();
     joinThePieces();
-    std::vector<BodyPiece> pieces;
-    for (std::size_t p = 0; p < sources_.size(); ++p) pieces.push_back(make(p, new_patch, work));
+    std::vector<BodyPiece> pieces(sources_.size());
+    std::vector<CutWork> works(sources_.size());
+    inChunks(sources_.size(), 1, [&](std::size_t p, std::size_t) { pieces[p] = make(p, new_patch, works[p]); });
+    for (const CutWork& done : works) work += done;
     return pieces;
   }
 
@@ -371,14 +374,15 @@ class CellCutter {
   template <class Join>
   bool joinByTheShortestWay(int piece, UnionFind& corners, const Join& joinCells, int least_shared) {
     UnionFind parts(component_.size());  // of components
-    std::map<Index, Index> user;
+    std::vector<Index> user(cut_.lattice.corners, kNoIndex);
     std::vector<Index> mine;
     for (Index c = 0; c < cells().size(); ++c) {
       if (piece_of_[component_[c]] != piece) continue;
       mine.push_back(c);
       for (const Index corner : cells()[c].corners) {
-        const auto [known, is_new] = user.emplace(corners.find(corner), component_[c]);
-        if (!is_new) parts.join(known->second, component_[c]);
+        Index& known = user[corners.find(corner)];
+        if (known == kNoIndex) known = component_[c];
+        parts.join(known, component_[c]);
       }
     }
     const auto partOf = [&](Index c) { return parts.find(component_[c]); };

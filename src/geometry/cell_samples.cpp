@@ -3,7 +3,13 @@
 namespace meshless {
 namespace {
 
+constexpr SampleSet kLayers[3][kCellSamples] = {
+    {sampleLayer(0, 0), sampleLayer(0, 1), sampleLayer(0, 2), sampleLayer(0, 3)},
+    {sampleLayer(1, 0), sampleLayer(1, 1), sampleLayer(1, 2), sampleLayer(1, 3)},
+    {sampleLayer(2, 0), sampleLayer(2, 1), sampleLayer(2, 2), sampleLayer(2, 3)}};
 constexpr double kEqualShare = 0.5;  // of a part's mass that its corners get in equal parts
+
+FilledMoments computedMoments(SampleSet samples);
 
 }  // namespace
 
@@ -28,13 +34,20 @@ SampleSet connectedPart(SampleSet within, const LinkSet& parted) {
 }
 
 FilledMoments momentsOf(SampleSet samples) {
+  static const FilledMoments kWhole = computedMoments(kAllSamples);  // most are
+  return samples == kAllSamples ? kWhole : computedMoments(samples);
+}
+
+namespace {
+
+FilledMoments computedMoments(SampleSet samples) {
   FilledMoments m;
   const double count = countSamples(samples);
   m.fraction = count / 64.0;
   for (int axis = 0; axis < 3; ++axis) {
     double sum = 0.0, squared = 0.0;
     for (int n = 0; n < kCellSamples; ++n) {
-      const double here = countSamples(samples & sampleLayer(axis, n)), at = (2.0 * n + 1.0) / kCellSamples - 1.0;
+      const double here = countSamples(samples & kLayers[axis][n]), at = (2.0 * n + 1.0) / kCellSamples - 1.0;
       sum += here * at;
       squared += here * at * at;
     }
@@ -49,5 +62,7 @@ FilledMoments momentsOf(SampleSet samples) {
   for (double& share : m.corner_shares) share = (1.0 - kEqualShare) * share / count + kEqualShare / 8.0;
   return m;
 }
+
+}  // namespace
 
 }  // namespace meshless

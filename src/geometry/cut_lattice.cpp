@@ -10,7 +10,7 @@ namespace {
 constexpr double kOnPlane = 1e-9;  // of the spacing: a layer of corners so close to the plane lies on it
 
 // Samples of the eighth of a cell at a corner.
-SampleSet eighthAt(int corner) {
+constexpr SampleSet eighthAt(int corner) {
   SampleSet eighth = kAllSamples;
   for (int axis = 0; axis < 3; ++axis) {
     const int from = corner >> axis & 1 ? 2 : 0;
@@ -18,6 +18,8 @@ SampleSet eighthAt(int corner) {
   }
   return eighth;
 }
+constexpr std::array<SampleSet, 8> kEighths = {eighthAt(0), eighthAt(1), eighthAt(2), eighthAt(3),
+                                               eighthAt(4), eighthAt(5), eighthAt(6), eighthAt(7)};
 
 // The part with a sample nearest to the corner; of equally near ones the larger.
 Index partAt(const std::vector<LatticeCell>& cells, const std::vector<Index>& parts, int corner) {
@@ -385,7 +387,7 @@ std::vector<bool> cornersWithTissue(const CellLattice& lattice) {
   std::vector<bool> tissue(lattice.corners, false);
   for (const LatticeCell& cell : lattice.cells)
     for (int k = 0; k < 8; ++k)
-      if (cell.samples & eighthAt(k)) tissue[cell.corners[k]] = true;
+      if (cell.samples & kEighths[k]) tissue[cell.corners[k]] = true;
   return tissue;
 }
 
