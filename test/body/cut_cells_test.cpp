@@ -180,10 +180,10 @@ TEST(CutCells, APieceAtRestStaysAtRest) {
 // A clamp holds the copies that have tissue; the other side of the cut goes free.
 TEST(CutCells, AClampHoldsTheSideThatItIsOn) {
   BodyDef def = filled(boxMesh(Vec3(0.2, 0.09, 0.09), 8, 4, 4), 0.03);
-  def.fixed = {{Vec3(-1, -1, -1), Vec3(-0.08, 1, 1)}};
+  def.fixed = {{Vec3(-1, -1, -1), Vec3(-0.0905, 1, 1)}};
   const PreparedBody body = prepared(def);
   ASSERT_TRUE(body.model->any_fixed);
-  const Result<CutBody> cut = cutBody(*body.model, body.state, Plane{Vec3::UnitX(), Vec3(-0.074, 0, 0)});
+  const Result<CutBody> cut = cutBody(*body.model, body.state, Plane{Vec3::UnitX(), Vec3(-0.09, 0, 0)});
   ASSERT_TRUE(cut.ok());
   ASSERT_EQ(cut->pieces.size(), 2u);
   EXPECT_FALSE(cut->pieces[0].model->any_fixed);
