@@ -5,6 +5,8 @@
 #include <cstring>
 #include <limits>
 
+#include <meshless_surgery/Release.h>
+
 namespace meshless {
 namespace {
 
@@ -181,6 +183,31 @@ meshless_surgery::Info toInfo(const WorldSnapshot& snapshot, const WorldSettings
     info.bodies.push_back(std::move(message));
   }
   return info;
+}
+
+std::int32_t toErrorCode(ErrorCode code) {
+  using Answer = meshless_surgery::ReleaseResponse;  // any: test/messages_test.py holds them to the same constants
+  switch (code) {
+    case ErrorCode::kInvalidArgument:
+      return Answer::INVALID_ARGUMENT;
+    case ErrorCode::kUnknownName:
+      return Answer::UNKNOWN_NAME;
+    case ErrorCode::kDuplicateName:
+      return Answer::DUPLICATE_NAME;
+    case ErrorCode::kUnreadable:
+      return Answer::UNREADABLE;
+    case ErrorCode::kForbidden:
+      return Answer::FORBIDDEN;
+    case ErrorCode::kUnsuitableShape:
+      return Answer::UNSUITABLE_SHAPE;
+    case ErrorCode::kMissed:
+      return Answer::MISSED;
+    case ErrorCode::kUnsupported:
+      return Answer::UNSUPPORTED;
+    case ErrorCode::kFailed:
+      break;
+  }
+  return Answer::FAILED;
 }
 
 meshless_surgery::Event toEvent(const Event& event, const std_msgs::Header& header) {

@@ -1,6 +1,7 @@
 #include "meshless_surgery/ros/services.h"
 
 #include <algorithm>
+#include <type_traits>
 
 #include <meshless_surgery/Cut.h>
 #include <meshless_surgery/GetBody.h>
@@ -47,6 +48,16 @@ std::string joined(const std::vector<std::string>& names) {
 
 std::string clustersOf(const CutWork& work) {
   return std::to_string(work.rebuilt_clusters) + " clusters rebuilt, " + std::to_string(work.kept_clusters) + " kept";
+}
+
+template <class Response, class = void>
+struct HasErrorCode : std::false_type {};  // std_srvs' answers
+template <class Response>
+struct HasErrorCode<Response, std::void_t<decltype(Response::error_code)>> : std::true_type {};
+
+template <class Response>
+void setErrorCode(Response& response, std::int32_t code) {
+  if constexpr (HasErrorCode<Response>::value) response.error_code = code;
 }
 
 }  // namespace
@@ -99,6 +110,7 @@ struct Services::Handlers {
   bool refuse(Response& response, const std::string& service, const Error& error) {
     response.success = false;
     response.message = printable(error.detail, kLongestMessage);
+    setErrorCode(response, toErrorCode(error.code));
     if (error.code != ErrorCode::kMissed) rejections.count("~" + service, response.message);
     ROS_DEBUG_STREAM("~" << service << " refused: " << response.message);
     return true;
@@ -107,6 +119,7 @@ struct Services::Handlers {
   bool accept(Response& response, const std::string& message) {
     response.success = true;
     response.message = message;
+    setErrorCode(response, 0);
     return true;
   }
   /// For commands whose answer is that they are done.

@@ -203,6 +203,7 @@ class DeformerTestCase(unittest.TestCase):
         answer = self.call(service, **fields)
         self.assertTrue(answer.success, '%s: %s' % (service, answer.message))
         self.assertNotEqual('', answer.message)
+        self.assertEqual(0, getattr(answer, 'error_code', 0), service)
         return answer
 
     def state(self):
@@ -224,6 +225,7 @@ class DeformerTestCase(unittest.TestCase):
         before = self.picture()
         answer = self.call(service, **fields)
         self.assertFalse(answer.success, service + ' was not refused: ' + answer.message)
+        self.assertNotEqual(0, getattr(answer, 'error_code', 1), service)
         for word in words:
             self.assertIn(word, answer.message)
         self.assertEqual(before, self.picture())

@@ -4,8 +4,10 @@ import math
 import os
 import sys
 import tempfile
+import threading
 
 from geometry_msgs.msg import Point, Vector3
+from meshless_surgery.srv import CutResponse, SpawnResponse, StepResponse
 from shape_msgs.msg import SolidPrimitive
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
@@ -441,5 +443,45 @@ class TimeTest(DeformerTestCase):
         self.refused(['depth', '0'], 'incise', blade=pose_stamped(), length=0.1, depth=0.0)
 
 
+class ErrorCodeTest(DeformerTestCase):
+
+    def test_each_refusal_says_of_which_kind_it_is(self):
+        at = pose_stamped(0, 0, 1)
+        with tempfile.NamedTemporaryFile(suffix='.obj') as outside:
+            outside.write(b'v 0 0 0\n')
+            outside.flush()
+            for code, service, fields in (
+                    (SpawnResponse.INVALID_ARGUMENT, 'pick', dict(point=Point(NAN, 0, 0))),
+                    (SpawnResponse.INVALID_ARGUMENT, 'step', dict(steps=0)),
+                    (SpawnResponse.UNKNOWN_NAME, 'get_body', dict(name='no_such_body')),
+                    (SpawnResponse.UNKNOWN_NAME, 'release', dict(pick_id=4000000000)),
+                    (SpawnResponse.UNKNOWN_NAME, 'cut', dict(blades=pose_stamped(frame='no_such_frame'))),
+                    (SpawnResponse.DUPLICATE_NAME, 'spawn', dict(name='left', primitive=box(), pose=at)),
+                    (SpawnResponse.UNREADABLE, 'spawn', dict(name='x', file='missing.obj', pose=at)),
+                    (SpawnResponse.FORBIDDEN, 'spawn', dict(name='x', file=outside.name, pose=at)),
+                    (SpawnResponse.UNSUITABLE_SHAPE, 'spawn', dict(name='x', file='flat.obj', pose=at)),
+                    (SpawnResponse.MISSED, 'cut', dict(blades=pose_stamped(0.0, 0.0, 5.0))),
+                    (SpawnResponse.MISSED, 'probe', dict(point=Point(0, 0, 3), direction=Vector3(0, 0, 1)))):
+                with self.subTest(service=service, code=code):
+                    self.assertEqual(code, self.refused([], service, **fields).error_code)
+
+    def test_what_was_given_up_has_failed(self):
+        self.good('pause', data=False)
+        answers = []
+        closing = threading.Thread(target=lambda: answers.append(self.call('cut', blades=pose_stamped(-1.0, 0.0, 0.1),
+                                                                           close_time=60.0)))
+        closing.start()
+        while not self.call('open_scissors').success:  # not closing yet
+            pass
+        closing.join()
+        self.assertEqual([(False, CutResponse.MISSED)], [(a.success, a.error_code) for a in answers])
+        closing = threading.Thread(target=lambda: answers.append(self.call('step', steps=100000)))
+        closing.start()
+        self.states.next(lambda state: state.step > 100)
+        self.good('reset')
+        closing.join()
+        self.assertEqual((False, StepResponse.FAILED), (answers[1].success, answers[1].error_code))
+
+
 if __name__ == '__main__':
-    run('services', PickTest, SpringTest, PushTest, CutTest, BodiesTest, TimeTest)
+    run('services', ErrorCodeTest, PickTest, SpringTest, PushTest, CutTest, BodiesTest, TimeTest)

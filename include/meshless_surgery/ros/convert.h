@@ -28,6 +28,8 @@ meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatu
                                 const std_msgs::Header& header);
 /// Without what a world does not know of itself: header, scene, version, world_frame.
 meshless_surgery::Info toInfo(const WorldSnapshot& snapshot, const WorldSettings& settings);
+/// The constant of every answer's error_code.
+std::int32_t toErrorCode(ErrorCode code);
 meshless_surgery::Event toEvent(const Event& event, const std_msgs::Header& header);
 /// Every particle with x y z body rgb. Needs a snapshot with particles.
 sensor_msgs::PointCloud2 toCloud(const WorldSnapshot& snapshot, const std_msgs::Header& header);
