@@ -1,18 +1,22 @@
 #!/usr/bin/env python3
 """The Python client: it goes by what the node says of itself, and sends what changes something once."""
+import math
 import os
 import sys
+import tempfile
 import unittest
 
 import rospy
+import tf2_ros
+from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
+from meshless_surgery import ErrorCode, Refused, Surgeon, SurgeryError, Unanswered
 from meshless_surgery.msg import Info
+from meshless_surgery.poses import blades_pose
 from meshless_surgery.srv import Cut
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, HERE)
-sys.path.insert(0, os.path.join(HERE, '..', '..', 'scripts'))
 from deformer_support import OwnNode, Recorder, run  # noqa: E402
-from surgery_client import Surgeon, Unanswered  # noqa: E402
 
 SCENE = os.path.join(HERE, 'scenes', 'boxes_at_30.yaml')
 
@@ -78,5 +82,152 @@ class ClientTest(unittest.TestCase):
                     surgeon.step(1)
 
 
+class SurgeonTest(unittest.TestCase):
+    """Every method once, on the world and not on what it was asked for."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.session = tempfile.TemporaryDirectory()
+        cls.running = OwnNode(scene=os.path.join(HERE, 'scenes', 'boxes.yaml'), paused=True, tools__silence=0.0,
+                              session_directory=cls.session.name).wait()
+        cls.surgeon = Surgeon(cls.running.name)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.running.end()
+        cls.running.__exit__()
+        cls.session.cleanup()
+
+    def setUp(self):
+        self.surgeon.stepped()
+        self.surgeon.reset()
+
+    def bodies(self):
+        return sorted(body.name for body in self.surgeon.state().bodies)
+
+    def test_springs(self):
+        pick = self.surgeon.pick((-0.15, 0, 0.1), max_distance=0.1)
+        self.surgeon.move(pick.pick_id, (-0.1, 0.02, 0.1))
+        self.assertAlmostEqual(0.02, self.surgeon.state().picks[0].target.y)
+        self.surgeon.lock(pick.pick_id, (-0.1, 0.03, 0.1))
+        self.assertTrue(self.surgeon.state().picks[0].locked)
+        self.assertAlmostEqual(0.03, self.surgeon.state().picks[0].target.y)
+        self.surgeon.release(pick.pick_id)
+        self.assertEqual([], self.surgeon.state().picks)
+        self.surgeon.pick((-1, 0, 0.1), direction=(1, 0, 0))
+        self.surgeon.clear()
+        self.assertEqual([], self.surgeon.state().picks)
+
+    def test_probe_says_what_is_there_and_missed_where_nothing_is(self):
+        met = self.surgeon.probe((-1, 0.01, 0.1), (1, 0, 0))
+        self.assertEqual('left', met.body)
+        self.assertAlmostEqual(-1.0, met.normal.x)
+        with self.assertRaises(Refused) as refused:
+            self.surgeon.probe((0, 0, 1), (0, 0, 1))
+        self.assertEqual((ErrorCode.MISSED, 'probe'), (refused.exception.code, refused.exception.service))
+        self.assertIsInstance(refused.exception, SurgeryError)
+
+    def test_bodies_come_and_go(self):
+        self.surgeon.spawn(name='ball', sphere=0.03, position=(0, 0, 1))
+        self.surgeon.spawn(name='brick', box=(0.1, 0.1, 0.05), position=(0, 0, 2), scale=2.0, material='stiff')
+        self.surgeon.spawn(name='rod', cylinder=(0.2, 0.02), position=(0, 0, 3))
+        self.surgeon.spawn(file='tetrahedron.obj', position=(0, 0, 4))
+        self.assertEqual(['ball', 'brick', 'left', 'right', 'rod', 'tetrahedron'], self.bodies())
+        self.assertAlmostEqual(8 * 5e-4, self.surgeon.body('brick').volume)
+        self.surgeon.remove('ball')
+        self.assertNotIn('ball', self.bodies())
+        self.surgeon.set_material('brick', '{density: 500}')
+        for given in ({}, dict(box=(1, 1, 1), sphere=1.0), dict(file='x.obj', sphere=1.0)):
+            with self.assertRaises(ValueError):
+                self.surgeon.spawn(name='x', **given)
+
+    def test_cuts_incisions_and_back(self):
+        across = dict(pivot=(-0.2, -1, 0.1), reach=(0, 1, 0), normal=(1, 0, 0), bodies=['left'])
+        pieces = self.surgeon.cut(**across).new_bodies
+        self.assertEqual(sorted(pieces) + ['right'], self.bodies())
+        self.surgeon.undo()
+        self.assertEqual(['left', 'right'], self.bodies())
+        smooth = self.surgeon.cut(**across).cap_area
+        self.surgeon.undo()
+        self.assertGreater(self.surgeon.cut(roughness=0.005, **across).cap_area, 1.01 * smooth)
+        opened = self.surgeon.incise(start=(0.17, 0.0, 0.15), along=(1, 0, 0), out=(0, 0, 1), length=0.06, depth=0.03,
+                                     bodies=['right'])
+        self.assertEqual(['right'], opened.cut_bodies)
+        self.assertAlmostEqual(0.06 * 0.03, opened.opened_area, places=5)
+        with self.assertRaises(Refused) as refused:
+            self.surgeon.open_scissors()
+        self.assertIsNone(refused.exception.code)
+        self.surgeon.lift_scissors()
+
+    def test_the_push_sphere(self):
+        self.surgeon.push((0, 0, 1), radius=0.02)
+        with self.surgeon.stream('push') as push:
+            self.assertAlmostEqual(1.0, push.measured().pose.position.z)
+        self.surgeon.lift_push()
+
+    def test_saved_and_loaded_it_is_the_same(self):
+        self.surgeon.pick((-0.15, 0, 0.1), max_distance=0.1)
+        self.surgeon.step(3)
+        before = self.surgeon.hash()
+        self.surgeon.save('here.state')
+        self.surgeon.step(3)
+        self.assertNotEqual(before, self.surgeon.hash())
+        self.surgeon.load('here.state')
+        self.assertEqual(before, self.surgeon.hash())
+
+    def test_streams_move_tools_and_cut(self):
+        self.surgeon.pick((-0.15, 0, 0.1), max_distance=0.1)
+        with self.surgeon.stream('pick') as hand:
+            while abs(self.surgeon.state().picks[0].target.y - 0.02) > 1e-6:
+                hand.move((-0.15, 0.02, 0.1))
+            self.assertAlmostEqual(0.02, hand.measured().pose.position.y)
+            self.assertTrue(math.isfinite(hand.force().wrench.force.y))
+            with self.assertRaises(ValueError):
+                hand.jaw(0.1)
+        blades = blades_pose((-0.2, -0.05, 0.1), (0, 1, 0), (1, 0, 0)).pose.orientation
+        with self.surgeon.stream('scissors') as scissors:
+            angle = 0.5
+            while len(self.bodies()) == 2:
+                scissors.move((-0.2, -0.03, 0.1), (blades.x, blades.y, blades.z, blades.w))
+                scissors.jaw(angle)
+                angle = 0.5 - angle
+        with self.assertRaises(ValueError):
+            self.surgeon.stream('saw')
+
+    def test_positions_are_in_the_surgeons_frame(self):
+        broadcaster = tf2_ros.StaticTransformBroadcaster()
+        table = TransformStamped(child_frame_id='table')
+        table.header.frame_id = 'world'
+        table.transform.translation = Vector3(0.2, 0, 0.1)
+        half = math.sqrt(0.5)
+        table.transform.rotation = Quaternion(0, 0, half, half)  # its x axis is the world's y
+        broadcaster.sendTransform(table)
+        at_table = Surgeon(self.running.name, frame='table')
+        for _ in range(100):  # until the node has heard of it
+            try:
+                pick = at_table.pick((-1, 0.01, 0), direction=(1, 0, 0))
+                break
+            except Refused as refused:
+                self.assertEqual(ErrorCode.UNKNOWN_NAME, refused.code)
+        self.assertEqual('right', pick.body)
+        self.assertAlmostEqual(0.19, pick.position.x, places=6)
+        cut = at_table.cut(pivot=(0, 1, 0), reach=(0, -1, 0), normal=(1, 0, 0))
+        self.assertEqual(['left', 'right'], sorted(cut.cut_bodies))
+        self.surgeon.undo()
+        at_table.lock(pick.pick_id, (0.1, 0, 0))
+        self.assertAlmostEqual(0.1, self.surgeon.state().picks[0].target.y)
+        at_table.move(pick.pick_id, (0.1, 0, 0), frame='world')
+        self.assertAlmostEqual(0.1, self.surgeon.state().picks[0].target.x)
+
+    def test_time_passes_by_steps_alone_until_it_runs(self):
+        self.surgeon.step(5)
+        self.assertEqual(5, self.surgeon.state().step)
+        self.surgeon.runs()
+        self.surgeon.live(0.1)
+        with self.surgeon.still():
+            self.assertTrue(self.surgeon.state().paused)
+        self.assertFalse(self.surgeon.state().paused)
+
+
 if __name__ == '__main__':
-    run('client', ClientTest)
+    run('client', ClientTest, SurgeonTest)

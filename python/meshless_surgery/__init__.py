@@ -1,0 +1,19 @@
+"""Soft tissue for surgical training: a running deformer's services, topics and errors in plain Python numbers.
+
+    from meshless_surgery import Surgeon, Refused
+    surgeon = Surgeon('/deformer')
+    pick = surgeon.pick((0, 0, 0.1))
+
+`meshless_surgery.testing` has what a test of a scene needs. Messages and services are in `meshless_surgery.msg` and `.srv`.
+"""
+
+_PLACES = {'Surgeon': 'surgeon', 'ToolStream': 'streams', 'SurgeryError': 'errors', 'Refused': 'errors',
+           'Unanswered': 'errors', 'ErrorCode': 'errors'}
+
+
+def __getattr__(name):
+    # Not before it is asked for: who only reads messages needs no rospy.
+    if name not in _PLACES:
+        raise AttributeError("module 'meshless_surgery' has no attribute '%s'" % name)
+    import importlib
+    return getattr(importlib.import_module('meshless_surgery.' + _PLACES[name]), name)

@@ -1,0 +1,28 @@
+"""What can go wrong, as exceptions."""
+import enum
+
+from meshless_surgery.srv import ReleaseResponse
+
+# The constants that every answer of the package has.
+ErrorCode = enum.IntEnum('ErrorCode', [(name, getattr(ReleaseResponse, name)) for name in (
+    'OK', 'INVALID_ARGUMENT', 'UNKNOWN_NAME', 'DUPLICATE_NAME', 'UNREADABLE', 'FORBIDDEN', 'UNSUITABLE_SHAPE', 'MISSED',
+    'UNSUPPORTED', 'FAILED')])
+
+
+class SurgeryError(RuntimeError):
+    """Any of these."""
+
+
+class Refused(SurgeryError):
+    """A service answered success=false, and nothing has changed. `service` is its name, `message` what it said, and `code` an
+    ErrorCode, or None where the service is of std_srvs, whose answers have none."""
+
+    def __init__(self, service, message, code=None):
+        super().__init__('%s: %s' % (service, message))
+        self.service = service
+        self.message = message
+        self.code = None if code is None else ErrorCode(code)
+
+
+class Unanswered(SurgeryError):
+    """A request was sent and not answered: it may have been done, or not. The text says how the world is now."""

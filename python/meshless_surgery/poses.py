@@ -1,0 +1,53 @@
+"""Poses of blades, from the directions that a surgeon thinks in."""
+import math
+
+from geometry_msgs.msg import Point, PoseStamped, Quaternion
+
+
+def normalised(v):
+    length = math.sqrt(sum(c * c for c in v))
+    return tuple(c / length for c in v)
+
+
+def cross(a, b):
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def quaternion_of_axes(x, y, z):
+    """Quaternion (xyzw) of the rotation whose columns are three orthonormal axes."""
+    m = [[x[i], y[i], z[i]] for i in range(3)]
+    trace = m[0][0] + m[1][1] + m[2][2]
+    if trace > 0:
+        s = 2.0 * math.sqrt(1.0 + trace)
+        return ((m[2][1] - m[1][2]) / s, (m[0][2] - m[2][0]) / s, (m[1][0] - m[0][1]) / s, 0.25 * s)
+    i = max(range(3), key=lambda k: m[k][k])
+    j, k = (i + 1) % 3, (i + 2) % 3
+    s = 2.0 * math.sqrt(1.0 + m[i][i] - m[j][j] - m[k][k])
+    q = [0.0] * 4
+    q[i] = 0.25 * s
+    q[j] = (m[j][i] + m[i][j]) / s
+    q[k] = (m[k][i] + m[i][k]) / s
+    q[3] = (m[k][j] - m[j][k]) / s
+    return tuple(q)
+
+
+def pose_stamped(position, orientation=(0.0, 0.0, 0.0, 1.0), frame=''):
+    pose = PoseStamped()
+    pose.header.frame_id = frame
+    pose.pose.position = Point(*position)
+    pose.pose.orientation = Quaternion(*orientation)
+    return pose
+
+
+def blades_pose(pivot, reach, normal, frame=''):
+    """Pose of blades that pivot at a point, reach along `reach` and cut the plane of `normal`."""
+    z = normalised(normal)
+    y = normalised(cross(z, reach))
+    return pose_stamped(pivot, quaternion_of_axes(cross(y, z), y, z), frame)
+
+
+def blade_pose(start, along, out, frame=''):
+    """Pose of a blade whose edge outside of the tissue runs from `start` along `along`; `out` points out of the tissue."""
+    x = normalised(along)
+    y = normalised(cross(cross(x, out), x))
+    return pose_stamped(start, quaternion_of_axes(x, y, cross(x, y)), frame)

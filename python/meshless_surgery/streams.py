@@ -1,0 +1,67 @@
+"""A tool that a stream of poses moves."""
+import time
+
+import rospy
+from geometry_msgs.msg import PoseStamped, WrenchStamped
+from sensor_msgs.msg import JointState
+
+from meshless_surgery.poses import pose_stamped
+
+TOOLS = ('pick', 'push', 'scissors')
+
+
+class ToolStream:
+    """One of the tools `pick`, `push` and `scissors`, by its topics. The node lifts a tool off whose stream is silent for
+    `tools/silence` (0.5 s). Ends with close(), or as a context."""
+
+    def __init__(self, node, tool, frame='', timeout=30.0):
+        if tool not in TOOLS:
+            raise ValueError("tool is '%s'; accepted: %s" % (tool, ', '.join(TOOLS)))
+        self.tool = tool
+        self.frame = frame
+        self.timeout = timeout
+        self._topic = '%s/%s/' % (node, tool)
+        self._poses = rospy.Publisher(self._topic + 'servo_cp', PoseStamped, queue_size=10, tcp_nodelay=True)
+        self._jaws = None
+        if tool == 'scissors':
+            self._jaws = rospy.Publisher(self._topic + 'jaw/servo_js', JointState, queue_size=10, tcp_nodelay=True)
+        for publisher in (self._poses, self._jaws):
+            self._connect(publisher)
+
+    def _connect(self, publisher):
+        end = time.monotonic() + self.timeout
+        while publisher is not None and publisher.get_num_connections() == 0:
+            if rospy.is_shutdown() or time.monotonic() > end:
+                raise rospy.ROSException('nobody listens to ' + publisher.resolved_name)
+            time.sleep(0.005)
+
+    def move(self, position, orientation=(0.0, 0.0, 0.0, 1.0), stamp=None):
+        """Where the tool is to be, as of `stamp` (now)."""
+        pose = pose_stamped(position, orientation, self.frame)
+        pose.header.stamp = rospy.Time.now() if stamp is None else stamp
+        self._poses.publish(pose)
+
+    def jaw(self, angle):
+        """Opening of the scissors [rad]: closed after they were open, they cut."""
+        if self._jaws is None:
+            raise ValueError('the %s has no jaw' % self.tool)
+        self._jaws.publish(JointState(name=['jaw'], position=[angle]))
+
+    def measured(self):
+        """The next PoseStamped of where the tool is."""
+        return rospy.wait_for_message(self._topic + 'measured_cp', PoseStamped, self.timeout)
+
+    def force(self):
+        """The next WrenchStamped on the tool."""
+        return rospy.wait_for_message(self._topic + 'measured_cf', WrenchStamped, self.timeout)
+
+    def close(self):
+        for publisher in (self._poses, self._jaws):
+            if publisher is not None:
+                publisher.unregister()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *unused):
+        self.close()

@@ -1,0 +1,210 @@
+"""The services of a running deformer as methods."""
+import contextlib
+import select
+
+import rospy
+from geometry_msgs.msg import Point, Vector3
+from shape_msgs.msg import SolidPrimitive
+from std_msgs.msg import Header
+from std_srvs.srv import SetBool, Trigger
+
+from meshless_surgery.errors import Refused, Unanswered
+from meshless_surgery.msg import Info, State
+from meshless_surgery.poses import blade_pose, blades_pose, pose_stamped
+from meshless_surgery.srv import (Cut, GetBody, Hash, Incise, LoadState, Lock, MovePick, Pick, Probe, Push, Release, Remove,
+                                  SaveState, SetMaterial, Spawn, Step)
+from meshless_surgery.streams import ToolStream
+
+
+class Surgeon:
+    """Works on the tissue of one node. Metres, seconds, radians, quaternions x y z w.
+
+    A method whose service answers success=false raises Refused with its message and code. Each request is sent once: where the
+    connection breaks before the answer, Unanswered says how the world is now. `frame` is the tf frame of all positions,
+    directions and poses, and each method takes another one; empty is the world frame."""
+
+    def __init__(self, node='/deformer', timeout=30.0, frame=''):
+        self.node = node
+        self.timeout = timeout
+        self.frame = frame
+        self._proxies = {}
+        self._paused = False
+
+    def call(self, name, service, /, **fields):
+        """Any service of the node."""
+        if name in self._proxies and self._ended(self._proxies[name]):
+            del self._proxies[name]
+        if name not in self._proxies:
+            rospy.wait_for_service(self.node + '/' + name, self.timeout)
+            self._proxies[name] = rospy.ServiceProxy(self.node + '/' + name, service, persistent=True)
+        try:
+            reply = self._proxies[name](**fields)
+        except (rospy.ServiceException, rospy.exceptions.TransportException) as error:
+            del self._proxies[name]
+            raise Unanswered('%s was sent once and not answered (%s); %s' % (name, error, self._now()))
+        if not reply.success:
+            raise Refused(name, reply.message, getattr(reply, 'error_code', None))
+        return reply
+
+    @staticmethod
+    def _ended(proxy):
+        """The node has closed the connection since the last answer: nothing but its end can have come."""
+        transport = proxy.transport
+        return transport is not None and (transport.socket is None or bool(select.select([transport.socket], [], [], 0)[0]))
+
+    def _now(self):
+        try:
+            state = self.state()
+        except rospy.ROSException:
+            return 'the node does not answer either: does it run?'
+        return 'the world is at step %d, with the bodies %s and %d springs' % (
+            state.step, ', '.join(body.name for body in state.bodies) or 'none', len(state.picks))
+
+    def _frame(self, frame):
+        return self.frame if frame is None else frame
+
+    def _header(self, frame):
+        return Header(frame_id=self._frame(frame))
+
+    # springs
+    def pick(self, point, direction=(0, 0, 0), body='', stiffness=0.0, max_distance=0.0, frame=None):
+        return self.call('pick', Pick, header=self._header(frame), point=Point(*point), direction=Vector3(*direction),
+                         body=body, stiffness=stiffness, max_distance=max_distance)
+
+    def move(self, pick_id, target, frame=None):
+        return self.call('move_pick', MovePick, header=self._header(frame), pick_id=pick_id, target=Point(*target))
+
+    def lock(self, pick_id, target=None, frame=None):
+        return self.call('lock', Lock, header=self._header(frame), pick_id=pick_id, at_target=target is not None,
+                         target=Point(*(target or (0, 0, 0))))
+
+    def release(self, pick_id):
+        return self.call('release', Release, pick_id=pick_id)
+
+    def clear(self):
+        return self.call('clear_picks', Trigger)
+
+    def probe(self, point, direction, frame=None):
+        """What tissue a ray meets; Refused with MISSED where it meets none."""
+        return self.call('probe', Probe, header=self._header(frame), point=Point(*point), direction=Vector3(*direction))
+
+    # push sphere
+    def push(self, position, radius=0.0, speed=0.0, frame=None):
+        return self.call('push', Push, enable=True, radius=radius, pose=pose_stamped(position, frame=self._frame(frame)),
+                         speed=speed)
+
+    def lift_push(self):
+        return self.call('push', Push, enable=False, radius=0.0, pose=pose_stamped((0, 0, 0)), speed=0.0)
+
+    # scissors
+    def cut(self, pivot, reach, normal, length=0.0, width=0.0, close_time=0.0, bodies=(), roughness=0.0, frame=None):
+        """Severs what blades meet that pivot at a point, reach along `reach`, and lie in the plane of `normal`."""
+        return self.call('cut', Cut, blades=blades_pose(pivot, reach, normal, self._frame(frame)), length=length,
+                         width=width, close_time=close_time, roughness=roughness, bodies=list(bodies))
+
+    def open_scissors(self):
+        """Scissors that another thread closes open again; its cut is refused."""
+        return self.call('open_scissors', Trigger)
+
+    def lift_scissors(self):
+        return self.call('lift_scissors', Trigger)
+
+    # scalpel
+    def incise(self, start, along, out, length, depth, bodies=(), frame=None):
+        """Opens the tissue: the blade's edge that stays outside runs from `start` along `along`; `out` points out of it."""
+        return self.call('incise', Incise, blade=blade_pose(start, along, out, self._frame(frame)), length=length,
+                         depth=depth, bodies=list(bodies))
+
+    def undo(self):
+        """Back to before the last cut or incision."""
+        return self.call('undo_cut', Trigger)
+
+    # bodies
+    def spawn(self, name='', file='', box=None, sphere=None, cylinder=None, position=(0, 0, 0),
+              orientation=(0, 0, 0, 1), scale=0.0, material='', frame=None):
+        """A body from a file, or one of `box` (x, y, z), `sphere` radius, `cylinder` (height, radius)."""
+        shapes = {SolidPrimitive.BOX: box, SolidPrimitive.SPHERE: None if sphere is None else (sphere,),
+                  SolidPrimitive.CYLINDER: cylinder}
+        given = [(kind, list(sizes)) for kind, sizes in shapes.items() if sizes is not None]
+        if len(given) + bool(file) != 1:
+            raise ValueError('%d shapes are given; accepted: one of file, box, sphere, cylinder' % (len(given) + bool(file)))
+        primitive = SolidPrimitive(type=given[0][0], dimensions=given[0][1]) if given else SolidPrimitive()
+        return self.call('spawn', Spawn, name=name, file=file, primitive=primitive, scale=scale, material=material,
+                         pose=pose_stamped(position, orientation, self._frame(frame)))
+
+    def remove(self, name):
+        return self.call('remove', Remove, name=name)
+
+    def body(self, name, rest=False):
+        """Surface, particles and measures."""
+        return self.call('get_body', GetBody, name=name, rest=rest)
+
+    def set_material(self, body, yaml):
+        return self.call('set_material', SetMaterial, body=body, yaml=yaml)
+
+    # the world
+    def state(self):
+        return rospy.wait_for_message(self.node + '/state', State, self.timeout)
+
+    def info(self):
+        """What runs there: scene, step rate, bodies."""
+        return rospy.wait_for_message(self.node + '/info', Info, self.timeout)
+
+    def reset(self):
+        return self.call('reset', Trigger)
+
+    def save(self, file):
+        return self.call('save', SaveState, file=file)
+
+    def load(self, file):
+        return self.call('load', LoadState, file=file)
+
+    def hash(self):
+        """A number for the whole state: equal for equal histories."""
+        return self.call('hash', Hash).hash
+
+    def stream(self, tool, frame=None):
+        """The topics of a tool: a ToolStream."""
+        return ToolStream(self.node, tool, self._frame(frame), self.timeout)
+
+    # time
+    def pause(self, paused=True):
+        return self.call('pause', SetBool, data=paused)
+
+    def step(self, steps):
+        return self.call('step', Step, steps=steps)
+
+    @contextlib.contextmanager
+    def still(self):
+        """Time stands still inside: what is measured before and after an act then differs by the act alone."""
+        if not self._paused:
+            self.pause(True)
+        try:
+            yield
+        finally:
+            if not self._paused:
+                self.pause(False)
+
+    def live(self, seconds, rate=None):
+        """Lets simulated time pass: while the world runs, by waiting for it; after stepped(), by stepping it."""
+        start = self.state()
+        if self._paused:
+            self.step(max(1, int(round(seconds * (rate or self.info().step_rate)))))
+            return
+        while not rospy.is_shutdown():
+            if self.state().sim_time - start.sim_time >= seconds:
+                return
+
+    def stepped(self):
+        """From here on time moves by live() and step() alone: the same on a slow machine as on a fast one."""
+        self.pause(True)
+        self._paused = True
+
+    def runs(self):
+        """Takes stepped() back."""
+        self.pause(False)
+        self._paused = False
+
+    @property
+    def is_stepped(self):
+        return self._paused
