@@ -13,6 +13,18 @@ constexpr double kUnbounded = 1e12;
 
 }  // namespace
 
+const char* toString(Operating state) {
+  switch (state) {
+    case Operating::kDisabled:
+      return "DISABLED";
+    case Operating::kEnabled:
+      return "ENABLED";
+    case Operating::kPaused:
+      break;
+  }
+  return "PAUSED";
+}
+
 StreamedTools::StreamedTools(const NodeSettings& settings, const Clock& clock, Post post, Refused refused)
     : settings_(settings),
       clock_(clock),
@@ -34,10 +46,68 @@ Status StreamedTools::hear(ToolKind kind, const Pose& pose, double stamp) {
   Tool& tool = tools_[static_cast<std::size_t>(kind)];
   {
     const std::lock_guard<std::mutex> lock(mutex_);
+    if (tool.state != Operating::kEnabled) {
+      return Error{ErrorCode::kInvalidArgument, "the " + tool.name + " is " + toString(tool.state) +
+                                                    "; accepted once its state_command was " +
+                                                    (tool.state == Operating::kPaused ? "resume" : "enable")};
+    }
     if (const Status heard = tool.motion.hear(pose, stamp, clock_.now()); !heard.ok()) return heard;
   }
   postMove(tool);
   return Done{};
+}
+
+Status StreamedTools::command(ToolKind kind, const std::string& word) {
+  Tool& tool = tools_[static_cast<std::size_t>(kind)];
+  bool lifted = false;
+  bool halted = false;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const bool enabled = tool.state == Operating::kEnabled, paused = tool.state == Operating::kPaused;
+    if (word == "enable" && !paused) {
+      tool.state = Operating::kEnabled;
+    } else if (word == "disable") {
+      lifted = tool.motion.alive();
+      tool.motion.end();
+      if (kind == ToolKind::kScissors) jaw_armed_ = false;
+      tool.state = Operating::kDisabled;
+    } else if (word == "pause" && enabled) {
+      halted = tool.motion.alive();
+      tool.state = Operating::kPaused;
+    } else if (word == "resume" && paused) {
+      tool.motion.keepAlive(clock_.now());
+      tool.state = Operating::kEnabled;
+    } else if (word != "home") {  // there is nothing to home
+      const char* fits = enabled ? "disable, pause, home" : paused ? "disable, resume, home" : "enable, home";
+      return Error{ErrorCode::kInvalidArgument, "the " + tool.name + " is " + toString(tool.state) +
+                                                    " and the command is '" + printable(word) + "'; accepted: " + fits};
+    }
+  }
+  if (halted) halt(tool);
+  if (lifted) lift(tool, "it was disabled");
+  return Done{};
+}
+
+StreamedTools::Condition StreamedTools::condition(ToolKind kind) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const Tool& tool = tools_[static_cast<std::size_t>(kind)];
+  return {tool.state, tool.motion.alive() && !tool.motion.arrived()};
+}
+
+void StreamedTools::halt(Tool& tool) {
+  post_([this, &tool](World& world) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!tool.motion.alive()) return;
+    if (tool.kind != ToolKind::kPush) return tool.motion.halt(tool.motion.pose().translation);
+    // The world moves the sphere to where its stream was, unless a service has moved it since.
+    if (!world.push().enabled || !world.push().streamed) return;
+    PushCommand command;
+    command.position = world.push().position;
+    command.radius = world.push().radius;
+    command.streamed = true;
+    (void)world.apply(command);
+    tool.motion.halt(command.position);
+  });
 }
 
 void StreamedTools::look() {
@@ -46,11 +116,12 @@ void StreamedTools::look() {
     bool under_way = false;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
+      if (tool.state == Operating::kPaused) tool.motion.keepAlive(clock_.now());
       silent = tool.motion.fellSilent(clock_.now());
       under_way = tool.motion.alive() && !tool.motion.arrived();
       if (silent && tool.kind == ToolKind::kScissors) jaw_armed_ = false;
     }
-    if (silent) lift(tool);
+    if (silent) lift(tool, "its stream was silent for " + formatNumber(settings_.tools_silence) + " s");
     if (under_way) postMove(tool);
   }
 }
@@ -104,13 +175,12 @@ void StreamedTools::moveScissors(Tool& tool, World& world) {
   world.setScissors(bladesAt(tool.motion.pose(), settings_.scissors_length, settings_.scissors_width), jaw_angle_);
 }
 
-void StreamedTools::lift(Tool& tool) {
-  post_([this, &tool](World& world) {
+void StreamedTools::lift(Tool& tool, const std::string& why) {
+  post_([this, &tool, why](World& world) {
     LiftCommand command;
     command.tool = tool.kind;
     command.streamed_only = true;
-    command.why = "the " + tool.name + " was lifted off: its stream was silent for " +
-                  formatNumber(settings_.tools_silence) + " s";
+    command.why = "the " + tool.name + " was lifted off: " + why;
     if (tool.kind == ToolKind::kPick) {
       const auto held = world.heldPick();
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -125,6 +195,7 @@ void StreamedTools::hearJaw(double angle) {
   Pose pose;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
+    if (tools_[static_cast<std::size_t>(ToolKind::kScissors)].state != Operating::kEnabled) return;
     jaw_angle_ = angle;
     if (angle > kJawOpen) jaw_armed_ = true;
     if (angle < kJawClosed && jaw_armed_) {

@@ -3,6 +3,7 @@
 #include <ros/console.h>
 
 #include "meshless_surgery/ros/border_check.h"
+#include "meshless_surgery/ros/crtk_messages.h"
 
 namespace meshless {
 namespace {
@@ -11,7 +12,7 @@ constexpr double kComplainEvery = 5.0;    // [s] of a stream that goes wrong
 constexpr double kMaxJaw = 3.2;           // [rad]
 constexpr double kLookEvery = 0.005;      // [s] on the wall: also where /clock is played ten times as fast
 constexpr std::size_t kMostWaiting = 10;  // messages of a stream
-constexpr char kJaw[] = "~scissors/jaw/servo_js";
+constexpr const char* kJaws[] = {"scissors/jaw/servo_js", "scissors/jaw/servo_jp"};
 
 }  // namespace
 
@@ -21,7 +22,7 @@ ToolInputs::ToolInputs(const ros::NodeHandle& private_handle, const NodeSettings
       rejections_(rejections),
       tools_(
           settings, clock, [&runner](std::function<void(World&)> job) { runner.post(std::move(job)); },
-          [this](const Error& error) { reject(kJaw, error); }),
+          [this](const Error& error) { reject(std::string("~") + kJaws[0], error); }),
       inputs_{Input{"pick", ToolKind::kPick, settings.pick.follow_frame, {}, {}},
               Input{"push", ToolKind::kPush, settings.push.follow_frame, {}, {}},
               Input{"scissors", ToolKind::kScissors, settings.scissors.follow_frame, {}, {}}} {
@@ -30,15 +31,23 @@ ToolInputs::ToolInputs(const ros::NodeHandle& private_handle, const NodeSettings
   const auto hints = ros::TransportHints().tcpNoDelay();
   for (Input& input : inputs_) {
     const std::string topic = input.name + "/servo_cp";
+    const std::string commands = input.name + "/state_command";
+    subscribers_.push_back(handle.subscribe<CrtkString>(
+        commands, 10, [this, &input, commands](const boost::shared_ptr<const CrtkString>& message) {
+          const Status done = tools_.command(input.tool, message->string);
+          if (!done.ok()) reject("~" + commands, done.error());
+        }));
     input.name = input.follow_frame.empty() ? "~" + topic : "tools/" + input.name + "/follow_frame";
     if (!input.follow_frame.empty()) continue;
     subscribers_.push_back(handle.subscribe<geometry_msgs::PoseStamped>(
         topic, 10, [this, &input](const geometry_msgs::PoseStamped::ConstPtr& message) { onServo(input, message); }, {},
         hints));
   }
-  subscribers_.push_back(handle.subscribe<sensor_msgs::JointState>(
-      "scissors/jaw/servo_js", 10, [this](const sensor_msgs::JointState::ConstPtr& message) { onJaw(message); }, {},
-      hints));
+  for (const std::string jaw : kJaws) {
+    subscribers_.push_back(handle.subscribe<sensor_msgs::JointState>(
+        jaw, 10, [this, jaw](const sensor_msgs::JointState::ConstPtr& message) { onJaw("~" + jaw, *message); }, {},
+        hints));
+  }
   look_timer_ = handle.createWallTimer(ros::WallDuration(kLookEvery), [this](const ros::WallTimerEvent&) { look(); });
 }
 
@@ -77,6 +86,7 @@ void ToolInputs::hearWaiting(Input& input) {
 }
 
 void ToolInputs::follow(Input& input) {
+  if (tools_.condition(input.tool).state != Operating::kEnabled) return;
   const auto latest = frames_.latest(input.follow_frame);
   if (!latest) {
     ROS_WARN_STREAM_THROTTLE(kComplainEvery, input.name << ": tf2 cannot bring '" << input.follow_frame << "' to '"
@@ -105,15 +115,15 @@ void ToolInputs::look() {
   tools_.look();
 }
 
-void ToolInputs::onJaw(const sensor_msgs::JointState::ConstPtr& message) {
+void ToolInputs::onJaw(const std::string& topic, const sensor_msgs::JointState& message) {
   BorderCheck check;
   double angle = 0.0;
-  if (message->position.empty()) {
+  if (message.position.empty()) {
     check.fault("position is empty; accepted: position[0], the opening angle in rad");
   } else {
-    angle = check.number("position[0]", message->position[0], -kMaxJaw, kMaxJaw, "rad");
+    angle = check.number("position[0]", message.position[0], -kMaxJaw, kMaxJaw, "rad");
   }
-  if (!check.ok()) return reject(kJaw, check.error());
+  if (!check.ok()) return reject(topic, check.error());
   tools_.hearJaw(std::max(0.0, angle));
 }
 

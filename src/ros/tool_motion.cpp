@@ -34,8 +34,7 @@ bool ToolMotion::fellSilent(double now) {
   silent_ += std::min(now - looked_, kLongestTick);
   looked_ = now;
   if (!alive_ || !(limits_.silence > 0.0) || !(silent_ > limits_.silence)) return false;
-  alive_ = false;
-  stamp_ = 0.0;
+  end();
   return true;
 }
 
@@ -55,6 +54,17 @@ void ToolMotion::advance(double now) {
   }
   pose_.translation += share * way;
   pose_.rotation = pose_.rotation.slerp(share, wanted_.rotation);
+}
+
+void ToolMotion::halt(const Vec3& place) {
+  pose_.translation = place;
+  wanted_ = pose_;
+  arrived_ = true;
+}
+
+void ToolMotion::end() {
+  alive_ = false;
+  stamp_ = 0.0;
 }
 
 void ToolMotion::putAt(const Vec3& place) {

@@ -276,5 +276,99 @@ TEST(StreamedTools, TheScissorsCutOnceWhenTheJawClosesAndAreLiftedOff) {
   EXPECT_TRUE(bench.refused.empty());
 }
 
+TEST(StreamedTools, APausedToolStaysWhereItIsUntilItIsResumed) {
+  ToolBench bench(slowTools());
+  const Vec3 start = bench.pick().position;
+  bench.hands[kPick] = [&](double time) { return poseAt(start + Vec3(0, 0, 0.1 * time)); };
+  bench.run(0.3);
+  EXPECT_EQ(Operating::kEnabled, bench.tools.condition(ToolKind::kPick).state);
+  ASSERT_TRUE(bench.tools.command(ToolKind::kPick, "pause").ok());
+  const Vec3 stopped = bench.world->heldPick()->target;
+  EXPECT_GT(stopped.z(), start.z() + 0.02);
+  EXPECT_TRUE(bench.refused.empty());
+  bench.run(0.3);
+  bench.hands[kPick] = {};
+  bench.run(2.0 * bench.settings.tools_silence);
+  EXPECT_EQ(Operating::kPaused, bench.tools.condition(ToolKind::kPick).state);
+  EXPECT_FALSE(bench.tools.condition(ToolKind::kPick).busy);
+  ASSERT_TRUE(bench.world->heldPick());
+  EXPECT_EQ(stopped, bench.world->heldPick()->target);
+  EXPECT_TRUE(bench.said(EventType::kLifted).empty());
+  ASSERT_FALSE(bench.refused.empty());
+  EXPECT_NE(std::string::npos, bench.refused[0].find("PAUSED"));
+  // Once it is resumed it hears, and is silent, as before.
+  ASSERT_TRUE(bench.tools.command(ToolKind::kPick, "resume").ok());
+  bench.hands[kPick] = still(start);
+  bench.run(0.5);
+  EXPECT_EQ(start, bench.world->heldPick()->target);
+  bench.hands[kPick] = {};
+  bench.run(bench.settings.tools_silence + 0.1);
+  EXPECT_EQ(1u, bench.said(EventType::kLifted).size());
+}
+
+TEST(StreamedTools, APausedSphereStopsOnItsWay) {
+  ToolBench bench(slowTools());
+  bench.hands[kPush] = still(Vec3(0, 0, 1.0));
+  bench.run(0.1);
+  bench.hands[kPush] = still(Vec3(0, 0, 2.0));
+  bench.run(0.2);
+  ASSERT_TRUE(bench.tools.command(ToolKind::kPush, "pause").ok());
+  const Vec3 stopped = bench.world->push().position;
+  EXPECT_GT(stopped.z(), 1.05);
+  EXPECT_LT(stopped.z(), 1.15);
+  bench.run(0.5);
+  EXPECT_EQ(stopped, bench.world->push().position);
+  ASSERT_TRUE(bench.tools.command(ToolKind::kPush, "resume").ok());
+  bench.run(0.2);
+  EXPECT_GT(bench.world->push().position.z(), stopped.z() + 0.05);
+}
+
+TEST(StreamedTools, ADisabledToolIsLiftedAndHearsNothing) {
+  ToolBench bench(slowTools());
+  bench.hands[kPush] = still(Vec3(0, 0, 1.0));
+  bench.run(0.1);
+  ASSERT_TRUE(bench.world->push().enabled);
+  ASSERT_TRUE(bench.tools.command(ToolKind::kPush, "disable").ok());
+  bench.run(0.1);
+  EXPECT_FALSE(bench.world->push().enabled);
+  ASSERT_EQ(1u, bench.said(EventType::kLifted).size());
+  EXPECT_EQ("the push was lifted off: it was disabled", bench.said(EventType::kLifted)[0].text);
+  ASSERT_TRUE(bench.tools.command(ToolKind::kPush, "enable").ok());
+  bench.run(0.1);
+  EXPECT_TRUE(bench.world->push().enabled);
+}
+
+TEST(StreamedTools, ScissorsThatArePausedDoNotCut) {
+  ToolBench bench(slowTools());
+  bench.hands[kScissors] = [](double) { return acrossX(0.0); };
+  bench.run(0.1);
+  bench.tools.hearJaw(0.5);
+  ASSERT_TRUE(bench.tools.command(ToolKind::kScissors, "pause").ok());
+  bench.tools.hearJaw(0.0);
+  bench.run(0.1);
+  EXPECT_TRUE(bench.said(EventType::kCut).empty());
+  ASSERT_TRUE(bench.tools.command(ToolKind::kScissors, "resume").ok());
+  bench.tools.hearJaw(0.0);
+  bench.run(0.1);
+  EXPECT_EQ(1u, bench.said(EventType::kCut).size());
+}
+
+TEST(StreamedTools, CommandsThatDoNotFitAreRefusedWithThoseThatDo) {
+  ToolBench bench(slowTools());
+  const auto refusal = [&](const std::string& word) {
+    const Status done = bench.tools.command(ToolKind::kPick, word);
+    return done.ok() ? std::string() : done.error().detail;
+  };
+  EXPECT_NE(std::string::npos,
+            refusal("jump").find("ENABLED and the command is 'jump'; accepted: disable, pause, home"));
+  EXPECT_NE(std::string::npos, refusal("resume").find("accepted: disable, pause, home"));
+  EXPECT_EQ("", refusal("pause"));
+  EXPECT_NE(std::string::npos, refusal("enable").find("PAUSED"));
+  EXPECT_EQ("", refusal("disable"));
+  EXPECT_NE(std::string::npos, refusal("pause").find("DISABLED and the command is 'pause'; accepted: enable, home"));
+  EXPECT_EQ("", refusal("enable"));
+  EXPECT_EQ("", refusal("home"));
+}
+
 }  // namespace
 }  // namespace meshless

@@ -16,6 +16,10 @@ namespace meshless {
 constexpr double kJawOpen = 0.1;     // [rad] the jaw must have been opened beyond ...
 constexpr double kJawClosed = 0.02;  // [rad] ... and close below, to cut
 
+/// Whether a tool hears its stream, in CRTK's words.
+enum class Operating { kDisabled, kEnabled, kPaused };
+const char* toString(Operating state);
+
 class StreamedTools {
  public:
   /// Has a job done between two steps, later or at once, without waiting for it: WorldRunner::post.
@@ -26,12 +30,22 @@ class StreamedTools {
   /// `clock` outlives it.
   StreamedTools(const NodeSettings& settings, const Clock& clock, Post post, Refused refused);
 
-  /// What a stream said; `stamp` is its own [s], 0 where it has none. Refused as by ToolMotion::hear.
+  /// What a stream said; `stamp` is its own [s], 0 where it has none. Refused as by ToolMotion::hear, and where the
+  /// tool is not enabled.
   Status hear(ToolKind tool, const Pose& pose, double stamp);
   /// The opening of the jaw [rad]. Closed after it was open: all that the blades meet is cut.
   void hearJaw(double angle);
   /// To be called at least every ToolMotion::kLongestTick: tools go on, and those whose streams are silent are lifted.
   void look();
+
+  /// One of CRTK's: enable, disable (what its stream placed is lifted), pause (it stays where it is), resume, home.
+  /// Refused kInvalidArgument where the word is not known or does not fit the state.
+  Status command(ToolKind tool, const std::string& word);
+  struct Condition {
+    Operating state = Operating::kEnabled;
+    bool busy = false;  // it is on its way to where its stream wants it
+  };
+  Condition condition(ToolKind tool) const;
 
   /// Where its stream last wanted a tool, while the stream speaks.
   std::optional<Pose> hand(ToolKind tool) const;
@@ -41,6 +55,7 @@ class StreamedTools {
     std::string name;
     ToolKind kind;
     ToolMotion motion;
+    Operating state = Operating::kEnabled;
     bool posted = false;  // a move waits for the world: no second one behind it
   };
 
@@ -49,7 +64,8 @@ class StreamedTools {
   void movePick(Tool& tool, World& world);
   void movePush(Tool& tool, World& world);
   void moveScissors(Tool& tool, World& world);
-  void lift(Tool& tool);
+  void halt(Tool& tool);
+  void lift(Tool& tool, const std::string& why);
 
   const NodeSettings settings_;
   const Clock& clock_;

@@ -39,7 +39,7 @@ class ToolInputs {
   };
 
   void onServo(Input& input, const geometry_msgs::PoseStamped::ConstPtr& message);
-  void onJaw(const sensor_msgs::JointState::ConstPtr& message);
+  void onJaw(const std::string& topic, const sensor_msgs::JointState& message);
   void look();
   void hearWaiting(Input& input);
   void follow(Input& input);

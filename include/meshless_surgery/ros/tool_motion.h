@@ -37,6 +37,10 @@ class ToolMotion {
 
   /// Moves pose() towards wanted() for the time since the last call.
   void advance(double now);
+  /// It stays there: what the stream wanted is forgotten.
+  void halt(const Vec3& place);
+  /// As once the silence has lasted.
+  void end();
   /// It is elsewhere: another pick was taken into the hand.
   void putAt(const Vec3& place);
 
