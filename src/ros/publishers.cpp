@@ -2,20 +2,26 @@
 
 #include <algorithm>
 
+#include <diagnostic_msgs/DiagnosticStatus.h>
 #include <ros/console.h>
+#include <sensor_msgs/JointState.h>
 
 #include "meshless_surgery/ros/border_check.h"
 #include "meshless_surgery/ros/cluster_markers.h"
 #include "meshless_surgery/ros/contact_markers.h"
 #include "meshless_surgery/ros/convert.h"
+#include "meshless_surgery/ros/crtk_messages.h"
 #include "meshless_surgery/ros/surfaces.h"
 
 namespace meshless {
 namespace {
 
+constexpr const char* kTools[] = {"pick", "push", "scissors"};
+constexpr const char* kToolFrames[] = {"pick_cursor", "push_sphere", "scissors"};
 constexpr std::size_t kMaxQueuedEvents = 10000;
 constexpr double kClustersRate = 10.0;  // [Hz]
 constexpr double kContactsRate = 30.0;  // [Hz]
+constexpr double kCompleteRate = 1.0;   // [Hz] of vertices of all bodies, moved or not
 constexpr double kInfoRate = 5.0;       // [Hz] of looks whether there is news
 constexpr double kBehind = 0.95;        // a real-time factor below it is worth a warning
 
@@ -71,15 +77,19 @@ Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings
       "clusters", 2, [this](const ros::SingleSubscriberPublisher&) { clusters_newcomer_ = true; });
   contacts_topic_ = handle.advertise<visualization_msgs::MarkerArray>(
       "contacts", 2, [this](const ros::SingleSubscriberPublisher&) { contacts_newcomer_ = true; });
+  topology_topic_ = handle.advertise<meshless_surgery::Topology>("topology", 2, true);
+  vertices_topic_ = handle.advertise<meshless_surgery::Vertices>(
+      "vertices", 5, [this](const ros::SingleSubscriberPublisher&) { vertices_newcomer_ = true; });
   info_topic_ = handle.advertise<meshless_surgery::Info>("info", 1, true);
   state_topic_ = handle.advertise<meshless_surgery::State>("state", 10);
   events_topic_ = handle.advertise<meshless_surgery::Event>("events", 1000);
-  const auto advertiseTool = [&](const std::string& tool) {
-    return handle.advertise<geometry_msgs::PoseStamped>(tool + "/measured_cp", 10);
-  };
-  pick_pose_ = advertiseTool("pick");
-  push_pose_ = advertiseTool("push");
-  scissors_pose_ = advertiseTool("scissors");
+  for (std::size_t t = 0; t < tool_topics_.size(); ++t) {
+    const std::string tool = kTools[t];
+    tool_topics_[t].measured = handle.advertise<geometry_msgs::PoseStamped>(tool + "/measured_cp", 10);
+    tool_topics_[t].setpoint = handle.advertise<geometry_msgs::PoseStamped>(tool + "/setpoint_cp", 10);
+    tool_topics_[t].state = handle.advertise<CrtkOperatingState>(tool + "/operating_state", 10, true);
+  }
+  jaw_topic_ = handle.advertise<sensor_msgs::JointState>("scissors/jaw/measured_js", 10);
 
   updater_.setHardwareID("none");
   updater_.add("simulation", this, &Publishers::diagnose);
@@ -88,6 +98,8 @@ Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings
   clusters_due_.period = periodOf(kClustersRate);
   contacts_due_.period = periodOf(kContactsRate);
   surfaces_due_.period = periodOf(settings_.surfaces_rate);
+  vertices_due_.period = periodOf(settings_.vertices_rate);
+  complete_due_.period = periodOf(kCompleteRate);
   points_due_.period = periodOf(settings_.points_rate);
   info_due_.period = periodOf(kInfoRate);
   state_due_.period = periodOf(settings_.state_rate);
@@ -99,8 +111,8 @@ Publishers::~Publishers() { stop(); }
 
 void Publishers::start() {
   const auto now = Clock::now();
-  for (Cadence* cadence : {&info_due_, &markers_due_, &surfaces_due_, &clusters_due_, &contacts_due_, &points_due_,
-                           &state_due_, &tools_due_, &diagnostics_due_}) {
+  for (Cadence* cadence : {&info_due_, &vertices_due_, &complete_due_, &markers_due_, &surfaces_due_, &clusters_due_,
+                           &contacts_due_, &points_due_, &state_due_, &tools_due_, &diagnostics_due_}) {
     cadence->next = now;
   }
   thread_ = std::thread([this] { loop(); });
@@ -132,8 +144,8 @@ void Publishers::loop() {
     publishEvents();
     publishTick(Clock::now());
     const auto next =
-        std::min({info_due_.next, markers_due_.next, surfaces_due_.next, clusters_due_.next, contacts_due_.next,
-                  points_due_.next, state_due_.next, tools_due_.next, diagnostics_due_.next});
+        std::min({info_due_.next, vertices_due_.next, markers_due_.next, surfaces_due_.next, clusters_due_.next,
+                  contacts_due_.next, points_due_.next, state_due_.next, tools_due_.next, diagnostics_due_.next});
     std::unique_lock<std::mutex> lock(mutex_);
     changed_.wait_until(lock, next, [this] { return stopping_ || !events_.empty(); });
     if (stopping_) return;
@@ -166,6 +178,9 @@ void Publishers::publishTick(Clock::time_point now) {
   markers = markers && (markers_fresh || revision != markers_revision_ || markers_.deleting());
   bool points = points_due_.due(now) && points_topic_.getNumSubscribers() > 0;
   points = points && (points_newcomer_.exchange(false) || revision != points_revision_);
+  bool vertices = vertices_due_.due(now) && vertices_topic_.getNumSubscribers() > 0;
+  const bool vertices_fresh = vertices && vertices_newcomer_.exchange(false);
+  vertices = vertices && (vertices_fresh || revision != vertices_revision_);
   bool surfaces = surfaces_due_.due(now) &&
                   (surfaces_topic_.getNumSubscribers() > 0 || strained_surfaces_topic_.getNumSubscribers() > 0);
   surfaces = surfaces && (surfaces_newcomer_.exchange(false) || revision != surfaces_revision_);
@@ -176,10 +191,10 @@ void Publishers::publishTick(Clock::time_point now) {
   const bool state = state_due_.due(now) && state_topic_.getNumSubscribers() > 0;
   const bool tools = tools_due_.due(now);
   const bool info = info_due_.due(now) && (revision != info_revision_ || info_.version.empty());
-  if (!info && !markers && !surfaces && !clusters && !contacts && !points && !state && !tools) return;
+  if (!info && !vertices && !markers && !surfaces && !clusters && !contacts && !points && !state && !tools) return;
 
   SnapshotWants wants;
-  wants.surfaces = markers || surfaces;
+  wants.surfaces = markers || surfaces || vertices;
   wants.particles = points || clusters;
   wants.measures = state;
   wants.contacts = contacts;
@@ -193,6 +208,13 @@ void Publishers::publishTick(Clock::time_point now) {
     ++markers_built_;
     markers_revision_ = revision;
     markers_topic_.publish(markers_.build(*snapshot, header.stamp, markers_fresh));
+  }
+  if (info || vertices) publishTopology(*snapshot, header);
+  if (vertices) {
+    ++vertices_built_;
+    vertices_revision_ = revision;
+    const auto moved = moving_.vertices(*snapshot, header, vertices_fresh || complete_due_.due(now));
+    if (moved.complete || !moved.bodies.empty()) vertices_topic_.publish(moved);
   }
   if (surfaces) {
     surfaces_revision_ = revision;
@@ -236,6 +258,10 @@ void Publishers::publishInfo(const WorldSnapshot& snapshot, const std_msgs::Head
   info_topic_.publish(info_);
 }
 
+void Publishers::publishTopology(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
+  if (const auto changed = moving_.change(snapshot, header)) topology_topic_.publish(*changed);
+}
+
 void Publishers::publishSurfaces(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
   ++surfaces_built_;
   if (surfaces_topic_.getNumSubscribers() > 0) surfaces_topic_.publish(toSurfaces(snapshot, header, false));
@@ -255,17 +281,28 @@ void Publishers::publishTools(const WorldSnapshot& snapshot, const ros::Time& st
     if (!cursor) cursor = Pose{};
     cursor->translation = in_hand->target;
   }
+  std::optional<Shown> shown;
   if (cursor) {
-    publishTool(pick_pose_, "pick_cursor", *cursor, stamp, transforms);
+    const auto hand = tools_.hand(ToolKind::kPick);
+    shown = Shown{*cursor, hand ? *hand : *cursor};
   }
+  publishTool(ToolKind::kPick, shown, stamp, transforms);
+  shown.reset();
   if (snapshot.push.enabled) {
-    Pose pose;
-    pose.translation = snapshot.push.position;
-    publishTool(push_pose_, "push_sphere", pose, stamp, transforms);
+    shown = Shown{};
+    shown->measured.translation = snapshot.push.position;
+    shown->setpoint.translation = snapshot.push.target;
   }
+  publishTool(ToolKind::kPush, shown, stamp, transforms);
+  shown.reset();
   if (snapshot.scissors.shown) {
-    publishTool(scissors_pose_, "scissors", poseOf(snapshot.scissors.blades), stamp, transforms);
+    const Pose pose = poseOf(snapshot.scissors.blades);
+    const auto hand = tools_.hand(ToolKind::kScissors);
+    shown = Shown{pose, hand ? *hand : pose};
   }
+  publishTool(ToolKind::kScissors, shown, stamp, transforms);
+  publishJaw(snapshot.scissors, stamp);
+  publishConditions(snapshot, stamp);
   // A clock that stands still: tf2 complains of a stamp said twice.
   if (!transforms.empty() && stamp != last_transforms_) {
     last_transforms_ = stamp;
@@ -273,20 +310,57 @@ void Publishers::publishTools(const WorldSnapshot& snapshot, const ros::Time& st
   }
 }
 
-void Publishers::publishTool(const ros::Publisher& topic, const std::string& frame, const Pose& pose,
-                             const ros::Time& stamp, std::vector<geometry_msgs::TransformStamped>& transforms) {
+void Publishers::publishTool(ToolKind tool, const std::optional<Shown>& shown, const ros::Time& stamp,
+                             std::vector<geometry_msgs::TransformStamped>& transforms) {
+  ToolTopics& topics = tool_topics_[static_cast<std::size_t>(tool)];
+  // CRTK: what is not valid carries the stamp 0. Said once, when the tool goes.
+  if (!shown && !topics.there) return;
+  topics.there = shown.has_value();
+  geometry_msgs::PoseStamped message;
+  message.header.frame_id = settings_.world_frame;
+  if (shown) message.header.stamp = stamp;
+  message.pose = toPose(shown ? shown->measured : Pose{});
+  if (topics.measured.getNumSubscribers() > 0) topics.measured.publish(message);
+  if (topics.setpoint.getNumSubscribers() > 0) {
+    if (shown) message.pose = toPose(shown->setpoint);
+    topics.setpoint.publish(message);
+  }
+  if (!shown) return;
   geometry_msgs::TransformStamped transform;
-  transform.header.stamp = stamp;
-  transform.header.frame_id = settings_.world_frame;
-  transform.child_frame_id = prefixed(settings_.tf_prefix, frame);
-  transform.transform.translation = toVector(pose.translation);
-  transform.transform.rotation = toQuaternion(pose.rotation);
+  transform.header = message.header;
+  transform.child_frame_id = prefixed(settings_.tf_prefix, kToolFrames[static_cast<std::size_t>(tool)]);
+  transform.transform.translation = toVector(shown->measured.translation);
+  transform.transform.rotation = toQuaternion(shown->measured.rotation);
   transforms.push_back(transform);
-  if (topic.getNumSubscribers() > 0) {
-    geometry_msgs::PoseStamped message;
-    message.header = transform.header;
-    message.pose = toPose(pose);
-    topic.publish(message);
+}
+
+void Publishers::publishJaw(const Scissors& scissors, const ros::Time& stamp) {
+  if (!scissors.shown && !jaw_there_) return;
+  jaw_there_ = scissors.shown;
+  if (jaw_topic_.getNumSubscribers() == 0) return;
+  sensor_msgs::JointState message;
+  message.header.frame_id = settings_.world_frame;
+  if (scissors.shown) message.header.stamp = stamp;
+  message.name = {"jaw"};
+  message.position = {scissors.shown ? scissors.angle : 0.0};
+  jaw_topic_.publish(message);
+}
+
+void Publishers::publishConditions(const WorldSnapshot& snapshot, const ros::Time& stamp) {
+  const bool fault = !runner_.status().fault.empty();
+  const bool sphere_travels = snapshot.push.enabled && snapshot.push.position != snapshot.push.target;
+  for (std::size_t t = 0; t < tool_topics_.size(); ++t) {
+    const StreamedTools::Condition condition = tools_.condition(static_cast<ToolKind>(t));
+    ToolTopics& topics = tool_topics_[t];
+    CrtkOperatingState message;
+    message.state = fault ? "FAULT" : toString(condition.state);
+    const bool busy = condition.busy || (static_cast<ToolKind>(t) == ToolKind::kPush && sphere_travels);
+    message.is_busy = busy && !fault ? 1 : 0;
+    if (message.state == topics.said_state && (message.is_busy != 0) == topics.said_busy) continue;
+    topics.said_state = message.state;
+    topics.said_busy = message.is_busy != 0;
+    message.header.stamp = stamp;
+    topics.state.publish(message);
   }
 }
 
@@ -325,6 +399,7 @@ void Publishers::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   }
   status.add("marker arrays built", markers_built_);
   status.add("surfaces built", surfaces_built_);
+  status.add("vertices built", vertices_built_);
   status.add("clusters built", clusters_built_);
   status.add("contacts built", contacts_built_);
   status.add("point clouds built", points_built_);

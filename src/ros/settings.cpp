@@ -146,6 +146,7 @@ Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std
   reader.read("max_backlog", settings.max_backlog, 0.0, 10.0, "s");
   reader.read("markers_rate", settings.markers_rate, 0.1, 30.0, "Hz");
   reader.read("surfaces_rate", settings.surfaces_rate, 0.1, 120.0, "Hz");
+  reader.read("vertices_rate", settings.vertices_rate, 0.1, 120.0, "Hz");
   reader.read("points_rate", settings.points_rate, 0.1, 120.0, "Hz");
   reader.read("state_rate", settings.state_rate, 0.1, 1000.0, "Hz");
   reader.read("tools_rate", settings.tools_rate, 0.1, 1000.0, "Hz");

@@ -1,19 +1,22 @@
 #!/usr/bin/env python3
 """Markers, points, state, events and diagnostics; and that nothing is built for nobody."""
+import io
 import os
 import struct
 import sys
 
+import numpy
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point
-from meshless_surgery.msg import Event, Surfaces
+from meshless_surgery.msg import Event, Surfaces, Topology, Vertices
+from meshless_surgery.surfaces import SurfaceReader
 from sensor_msgs.msg import PointCloud2, PointField
 from shape_msgs.msg import SolidPrimitive
 from visualization_msgs.msg import Marker, MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from deformer_support import ACROSS_X, DeformerTestCase, pose_stamped, run  # noqa: E402
+from deformer_support import ACROSS_X, DeformerTestCase, OwnNode, Recorder, pose_stamped, run  # noqa: E402
 
 
 def of(array, ns, action):
@@ -164,6 +167,78 @@ class SurfacesTest(DeformerTestCase):
         pulled = recorder.wait(lambda m: max(self.surface(m, 'left').strain) > 0.02)
         self.assertEqual(len(self.surface(pulled, 'left').vertices), 3 * len(self.surface(pulled, 'left').strain))
         self.assertLess(max(self.surface(pulled, 'right').strain), 1e-5)
+
+
+class MovingSurfacesTest(DeformerTestCase):
+    """~topology and ~vertices: what bags hold in place of ~surfaces."""
+
+    def setUp(self):
+        super().setUp()
+        self.reader = SurfaceReader()
+        self.topologies = self.deformer.recorder('topology', Topology)
+        self.addCleanup(self.topologies.close)
+        self.vertices = self.deformer.recorder('vertices', Vertices)
+        self.addCleanup(self.vertices.close)
+
+    def surfaces(self, wanted):
+        """As the reader has them once it has heard vertices for which wanted(message) holds."""
+        last = self.vertices.wait(wanted)
+        self.topologies.wait(lambda m: (m.run, m.topology) == (last.run, last.topology))
+        for message in self.topologies.messages + self.vertices.messages[:self.vertices.messages.index(last) + 1]:
+            self.reader.hear(message)
+        return self.reader.surfaces()
+
+    def assert_like_the_bodies(self, surfaces):
+        self.assertEqual(sorted(b.name for b in self.state().bodies), sorted(surfaces))
+        for name, surface in surfaces.items():
+            mesh = self.good('get_body', name=name).surface
+            self.assertEqual([list(t.vertex_indices) for t in mesh.triangles], surface.triangles.tolist())
+            off = numpy.abs(numpy.array([[v.x, v.y, v.z] for v in mesh.vertices]) - surface.vertices)
+            self.assertLess(off.max(), 1e-5)
+
+    def test_who_comes_late_gets_all_even_while_nothing_moves(self):
+        surfaces = self.surfaces(lambda m: m.complete)
+        self.assert_like_the_bodies(surfaces)
+        self.assertFalse(surfaces['left'].cut.any())
+
+    def test_after_a_cut_there_is_another_topology(self):
+        first = self.topologies.wait()
+        self.vertices.wait(lambda m: m.complete)
+        self.good('cut', blades=pose_stamped(-0.2, -1.0, 0.1, ACROSS_X), bodies=['left'])
+        surfaces = self.surfaces(lambda m: m.topology > first.topology and len(m.bodies) == 3)
+        self.assert_like_the_bodies(surfaces)
+        self.assertTrue(surfaces['left.1'].cut.any())
+
+    def test_what_moves_is_said_and_the_rest_is_not(self):
+        self.vertices.wait(lambda m: m.complete)
+        pick = self.pick_left().pick_id
+        self.good('lock', pick_id=pick, at_target=True, target=Point(-0.1, 0.0, 0.1))
+        for _ in range(20):
+            self.good('step', steps=2)
+        partial = self.vertices.wait(lambda m: not m.complete)
+        self.assertEqual(1, len(partial.bodies))
+        left = [b.id for b in self.topologies.messages[-1].bodies if b.name == 'left']
+        self.assertEqual(left, [b.id for b in partial.bodies])
+        self.good('reset')
+        self.assert_like_the_bodies(self.surfaces(lambda m: m.run > partial.run))
+
+    def test_an_hour_of_the_liver_is_less_than_two_gigabytes(self):
+        with OwnNode(scene='liver', paused=True) as node:
+            def bytes_of(topic, kind):
+                recorder = Recorder(node.name + '/' + topic, kind)
+                message = recorder.wait(lambda m: m.bodies)
+                recorder.close()
+                buffer = io.BytesIO()
+                message.serialize(buffer)
+                return len(buffer.getvalue())
+            vertices, whole = bytes_of('vertices', Vertices), bytes_of('surfaces', Surfaces)
+            rates = {name: rospy.get_param('%s/%s' % (node.name, name), default)
+                     for name, default in (('vertices_rate', 30.0), ('surfaces_rate', 60.0))}
+            hour = 3600.0 * rates['vertices_rate'] * (vertices + 60)  # a bag adds about as much to each
+            print('~vertices: %d bytes, %.2f MB/s, %.2f GB an hour; ~surfaces: %d bytes, %.2f MB/s; ~topology once: %d bytes' % (
+                vertices, vertices * rates['vertices_rate'] / 1e6, hour / 1e9, whole, whole * rates['surfaces_rate'] / 1e6,
+                bytes_of('topology', Topology)))
+            self.assertLess(hour, 2e9)
 
 
 class ClustersTest(DeformerTestCase):
@@ -345,7 +420,7 @@ class DiagnosticsTest(DeformerTestCase):
         self.good('step', steps=100)
         _, after = self.values()
         self.assertGreater(int(after['steps']), int(before['steps']))
-        for key in ('marker arrays built', 'surfaces built', 'clusters built', 'contacts built', 'point clouds built', 'states built'):
+        for key in ('marker arrays built', 'surfaces built', 'vertices built', 'clusters built', 'contacts built', 'point clouds built', 'states built'):
             self.assertEqual(before[key], after[key], key)
         markers = self.deformer.recorder('markers', MarkerArray)
         markers.wait()
@@ -358,4 +433,4 @@ class DiagnosticsTest(DeformerTestCase):
 
 
 if __name__ == '__main__':
-    run('topics', MarkersTest, SurfacesTest, ClustersTest, PointsTest, StateTest, EventsTest, DiagnosticsTest)
+    run('topics', MarkersTest, SurfacesTest, MovingSurfacesTest, ClustersTest, PointsTest, StateTest, EventsTest, DiagnosticsTest)

@@ -14,7 +14,9 @@
 #include <ros/node_handle.h>
 #include <tf2_ros/transform_broadcaster.h>
 
+#include "meshless_surgery/ros/force_stream.h"
 #include "meshless_surgery/ros/markers.h"
+#include "meshless_surgery/ros/moving_surfaces.h"
 #include "meshless_surgery/ros/rejections.h"
 #include "meshless_surgery/ros/runner.h"
 #include "meshless_surgery/ros/settings.h"
@@ -49,10 +51,16 @@ class Publishers {
   void publishEvents();
   void publishTick(Clock::time_point now);
   void publishInfo(const WorldSnapshot& snapshot, const std_msgs::Header& header);
+  void publishTopology(const WorldSnapshot& snapshot, const std_msgs::Header& header);
   void publishSurfaces(const WorldSnapshot& snapshot, const std_msgs::Header& header);
   void publishTools(const WorldSnapshot& snapshot, const ros::Time& stamp);
-  void publishTool(const ros::Publisher& topic, const std::string& frame, const Pose& pose, const ros::Time& stamp,
+  struct Shown {  // where a tool is, and where it was told to go
+    Pose measured, setpoint;
+  };
+  void publishTool(ToolKind tool, const std::optional<Shown>& shown, const ros::Time& stamp,
                    std::vector<geometry_msgs::TransformStamped>& transforms);
+  void publishJaw(const Scissors& scissors, const ros::Time& stamp);
+  void publishConditions(const WorldSnapshot& snapshot, const ros::Time& stamp);
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   NodeSettings settings_;
@@ -60,13 +68,26 @@ class Publishers {
   const StreamedTools& tools_;
   const Rejections& rejections_;
   MarkerBuilder markers_;
+  MovingSurfaces moving_;
 
+  ros::Publisher topology_topic_, vertices_topic_;
   ros::Publisher clusters_topic_, contacts_topic_, surfaces_topic_, strained_surfaces_topic_;
   ros::Publisher markers_topic_, points_topic_, state_topic_, events_topic_, info_topic_;
-  ros::Publisher pick_pose_, push_pose_, scissors_pose_;
+  struct ToolTopics {
+    ros::Publisher measured, setpoint, state;
+    bool there = false;      // as was said last
+    std::string said_state;  // empty: not yet
+    bool said_busy = false;
+  };
+  PerTool<ToolTopics> tool_topics_;
+  ros::Publisher jaw_topic_;
+  bool jaw_there_ = false;
   tf2_ros::TransformBroadcaster broadcaster_;
   diagnostic_updater::Updater updater_;
 
+  Cadence vertices_due_, complete_due_;
+  std::atomic<bool> vertices_newcomer_{false};
+  std::uint64_t vertices_revision_ = 0, vertices_built_ = 0;
   Cadence surfaces_due_, clusters_due_, contacts_due_;
   std::atomic<bool> surfaces_newcomer_{false}, clusters_newcomer_{false}, contacts_newcomer_{false};
   std::uint64_t clusters_revision_ = 0, clusters_built_ = 0;

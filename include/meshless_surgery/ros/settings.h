@@ -23,6 +23,7 @@ struct NodeSettings {
   double max_backlog = 0.1;                // [s] 0..10
   double markers_rate = 30.0;              // [Hz] 0.1..30
   double surfaces_rate = 60.0;             // [Hz] 0.1..120: ~surfaces and ~strained_surfaces
+  double vertices_rate = 30.0;             // [Hz] 0.1..120: ~vertices
   double points_rate = 30.0;               // [Hz] 0.1..120
   double state_rate = 30.0;                // [Hz] 0.1..1000
   double tools_rate = 60.0;                // [Hz] 0.1..1000: ~T/measured_cp and tf

@@ -1,0 +1,37 @@
+// Surfaces for bags and slow networks: triangles where they change, vertices in six bytes each, of what has moved.
+#pragma once
+
+#include <map>
+#include <optional>
+
+#include <meshless_surgery/Topology.h>
+#include <meshless_surgery/Vertices.h>
+
+#include "meshless_surgery/world/world.h"
+
+namespace meshless {
+
+class MovingSurfaces {
+ public:
+  /// The topology, where it is another one than at the last call. Needs no more than a snapshot's models.
+  std::optional<meshless_surgery::Topology> change(const WorldSnapshot& snapshot, const std_msgs::Header& header);
+  /// All bodies where that is wished or the topology has changed since the last call; else those that have moved since.
+  /// Needs a snapshot with surfaces, the one of the last change().
+  meshless_surgery::Vertices vertices(const WorldSnapshot& snapshot, const std_msgs::Header& header, bool complete);
+
+ private:
+  struct Known {
+    std::uint32_t number;
+    BodyModelPtr model;  // held, so that its address is not another one's
+    Color color, inside_color;
+  };
+  bool isKnown(const WorldSnapshot& snapshot) const;
+
+  std::vector<Known> known_;
+  std::uint32_t run_ = 0;
+  std::uint32_t topology_ = 0;                                    // 0: none yet
+  std::uint32_t said_topology_ = 0;                               // of the last vertices
+  std::map<std::uint32_t, meshless_surgery::BodyVertices> said_;  // by the body's number
+};
+
+}  // namespace meshless
