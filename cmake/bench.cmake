@@ -1,6 +1,5 @@
 # Benchmarks: executables without ROS. Built where their libraries are; a source file bench/<name>.cpp with a line below.
 find_package(benchmark QUIET)
-find_package(CLI11 QUIET)
 set(bench_targets)
 
 function(add_bench name)
@@ -28,10 +27,8 @@ if(MESHLESS_SURGERY_SANITIZE)  # the core and its tests alone
   return()
 endif()
 
-if(CLI11_FOUND)
-  add_bench(accuracy bench/accuracy.cpp bench/plot.cpp)
-  target_link_libraries(accuracy bench_truth CLI11::CLI11)
-endif()
+add_bench(accuracy bench/accuracy.cpp bench/plot.cpp)
+target_link_libraries(accuracy bench_truth CLI11::CLI11)
 if(benchmark_FOUND)
   add_bench(bench_rotation bench/bench_rotation.cpp)
   target_link_libraries(bench_rotation benchmark::benchmark)

@@ -12,26 +12,18 @@ target_include_directories(deformer_node PRIVATE include)
 # --- install
 # scripts/train and scripts/check are for a checkout; tests and clients are installed by catkin_install_python below.
 #catkin_lint: ignore uninstalled_script
-set(room_targets)
-foreach(room IN LISTS core_rooms)
-  list(APPEND room_targets ${PROJECT_NAME}_${room})
-endforeach()
 # The linter does not look into add_room().
 #catkin_lint: ignore_once undefined_target
-install(TARGETS ${PROJECT_NAME}_ros ${room_targets}
+install(TARGETS ${PROJECT_NAME}_ros
   ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
 install(TARGETS deformer_node drive make_meshes replay ${bench_targets}
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-install(DIRECTORY include/${PROJECT_NAME}/
-  DESTINATION ${CATKIN_PACKAGE_INCLUDE_DESTINATION}
-  FILES_MATCHING PATTERN "*.h")
-install(DIRECTORY config launch
-  DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
-file(GLOB client_scripts RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS scripts/*.py)
-if(client_scripts)
-  #catkin_lint: ignore_once argument_error
-  catkin_install_python(PROGRAMS ${client_scripts}
-    DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-endif()
+install(DIRECTORY bench/truth/data
+  DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/bench/truth)
+# Where programs of the devel space look for them, too.
+set(devel_share ${CATKIN_DEVEL_PREFIX}/share/${PROJECT_NAME})
+file(MAKE_DIRECTORY ${devel_share}/bench/truth)
+file(CREATE_LINK ${CMAKE_CURRENT_SOURCE_DIR}/config ${devel_share}/config SYMBOLIC)
+file(CREATE_LINK ${CMAKE_CURRENT_SOURCE_DIR}/bench/truth/data ${devel_share}/bench/truth/data SYMBOLIC)

@@ -77,6 +77,7 @@ buildPackage() {
   # catkin freezes the tests' environment at the first configuring, and leaves out folders that are not there yet.
   mkdir -p "$output/devel/lib/python3/dist-packages" || stop "Cannot write to $output."
   build "the package" "$output/build" "$@" -- -DCATKIN_DEVEL_PREFIX="$output/devel" -DCMAKE_BUILD_TYPE=Release \
+    -DCMAKE_INSTALL_PREFIX="$output/install" \
     -DPYTHON_EXECUTABLE=/usr/bin/python3 -DPython3_EXECUTABLE=/usr/bin/python3
 }
 

@@ -1,6 +1,5 @@
 // Plays scenes that nobody wrote and holds them to laws.
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -16,6 +15,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "meshless_surgery/base/share_folder.h"
 #include "meshless_surgery/drive/drive_table.h"
 #include "meshless_surgery/io/scene.h"
 #include "meshless_surgery/world/saved_world.h"
@@ -30,17 +30,12 @@ constexpr std::size_t kLogs = 10;
 const std::map<std::string, ContactMethod> kContacts{
     {"none", ContactMethod::kNone}, {"textbook", ContactMethod::kTextbook}, {"rest_shape", ContactMethod::kRestShape}};
 
-/// Beside an installed program, or of the checkout that it was built from.
 std::string shippedMaterials() {
-  char self[4096];
-  const ssize_t length = ::readlink("/proc/self/exe", self, sizeof self);
-  if (length > 0) {
-    const std::string program(self, static_cast<std::size_t>(length));
-    const std::string folder = program.substr(0, program.rfind('/')) + "/../../share/meshless_surgery/config/materials";
-    struct stat info {};
-    if (::stat(folder.c_str(), &info) == 0) return folder;
-  }
-  return MATERIALS_FOLDER;
+#ifdef MATERIALS_FOLDER
+  return MATERIALS_FOLDER;  // of the checkout: a build without ROS has no share folder
+#else
+  return meshless::shareFolder() + "/config/materials";
+#endif
 }
 
 /// Ctrl-C: the scenes that are being played are the last; what was found until then is said.
