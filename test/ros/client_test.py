@@ -147,9 +147,10 @@ class SurgeonTest(unittest.TestCase):
         self.assertEqual(sorted(pieces) + ['right'], self.bodies())
         self.surgeon.undo()
         self.assertEqual(['left', 'right'], self.bodies())
-        smooth = self.surgeon.cut(**across).cap_area
-        self.surgeon.undo()
-        self.assertGreater(self.surgeon.cut(roughness=0.005, **across).cap_area, 1.01 * smooth)
+        with self.assertRaises(Refused) as refused:
+            self.surgeon.cut(roughness=-0.5, **across)
+        self.assertEqual(ErrorCode.INVALID_ARGUMENT, refused.exception.code)
+        self.assertIn('roughness', refused.exception.message)
         opened = self.surgeon.incise(start=(0.17, 0.0, 0.15), along=(1, 0, 0), out=(0, 0, 1), length=0.06, depth=0.03,
                                      bodies=['right'])
         self.assertEqual(['right'], opened.cut_bodies)
