@@ -15,15 +15,29 @@ from deformer_support import LONG, run  # noqa: E402
 PORT = 11399
 NODE_HOST, HAND_HOST = '10.213.77.1', '10.213.77.2'
 HAND = '''
+import os, threading, traceback
 import rospy
 from meshless_surgery import Surgeon
-rospy.init_node('hand')
-surgeon = Surgeon('/far/deformer', %r)
-pick = surgeon.pick((-0.15, 0, 0.1), max_distance=0.1)
-with surgeon.stream('pick') as stream:
-    while abs(surgeon.state().picks[0].target.y - 0.03) > 1e-9:
-        stream.move((-0.15, 0.03, 0.1))
-print('moved', pick.body, surgeon.info().step_rate)
+def work():
+    surgeon = Surgeon('/far/deformer', %r)
+    pick = surgeon.pick((-0.15, 0, 0.1), max_distance=0.1)
+    stream, done = surgeon.stream('pick'), threading.Event()
+    def say():
+        while not done.wait(0.01):
+            stream.move((-0.15, 0.03, 0.1))
+    threading.Thread(target=say, daemon=True).start()
+    def target():
+        return [p.target for p in surgeon.state().picks if p.pick_id == pick.pick_id][0]
+    while abs(target().y - 0.03) > 1e-9:
+        pass
+    print('moved', pick.body, surgeon.info().step_rate, flush=True)
+try:
+    rospy.init_node('hand')
+    work()
+    os._exit(0)
+except Exception:
+    traceback.print_exc()
+    os._exit(1)  # whatever its threads still wait for
 '''
 
 
