@@ -12,7 +12,8 @@ set(rooms_folder lib/cmake/${PROJECT_NAME}_rooms)
 set(room_targets)
 foreach(room IN LISTS core_rooms)
   list(APPEND room_targets ${PROJECT_NAME}_${room})
-  set_target_properties(${PROJECT_NAME}_${room} PROPERTIES EXPORT_NAME ${room})
+  # They find each other without the environment of ROS.
+  set_target_properties(${PROJECT_NAME}_${room} PROPERTIES EXPORT_NAME ${room} INSTALL_RPATH "$ORIGIN")
 endforeach()
 # The linter does not look into add_room().
 #catkin_lint: ignore_once undefined_target
