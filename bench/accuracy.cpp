@@ -274,7 +274,7 @@ bool plots(const Table& table, const std::string& out) {
 int main(int argc, char** argv) {
   using namespace meshless::bench;
   CLI::App app{"Accuracy of the deformer: accuracy.csv and its plots"};
-  std::string out = ".", truth = shareFolder() + "/bench/truth/data";
+  std::string out = ".", truth = meshless::shareFolder() + "/bench/truth/data";
   bool quick = false;
   app.add_option("--out", out, "folder for accuracy.csv and the plots")->check(CLI::ExistingDirectory);
   app.add_option("--truth", truth, "folder of the finite-element truth")->check(CLI::ExistingDirectory);
