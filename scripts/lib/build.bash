@@ -27,6 +27,8 @@ commonArguments() {
   fi
   if command -v ccache >/dev/null; then printf '%s\n' -DCMAKE_CXX_COMPILER_LAUNCHER=ccache; fi
 }
+# No messages for Lisp: a process for each of them, and nothing here reads what it writes.
+export ROS_LANG_DISABLE=${ROS_LANG_DISABLE-genlisp}
 export CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:-pch_defines,time_macros,include_file_mtime,include_file_ctime}
 
 # configure FOLDER CMAKE_ARGUMENTS...: where it has not been done with these arguments yet. Changed CMake files are

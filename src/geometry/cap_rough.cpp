@@ -4,13 +4,11 @@
 #include <cmath>
 #include <memory>
 
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include "exact.h"
 
 namespace meshless {
 namespace cutting {
 namespace {
-
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
 constexpr double kSteepest = 0.5;  // height over distance to the rim
 constexpr double kRamp = 2.0;      // spacings
@@ -98,35 +96,23 @@ double distanceTo(const Vec2& p, const Vec2& a, const Vec2& b) {
   return (p - a - s * edge).norm();
 }
 
-using Corners = std::array<Vec3, 3>;
-
-Kernel::Point_3 point(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+using exact::Corners;
 
 /// True where two triangles have more in common than the corners and the edge that they share.
-bool meet(const Corners& c, const Corners& s) {
+bool meet(Corners c, Corners s) {
   for (int axis = 0; axis < 3; ++axis) {
     if (std::max({c[0][axis], c[1][axis], c[2][axis]}) < std::min({s[0][axis], s[1][axis], s[2][axis]})) return false;
     if (std::max({s[0][axis], s[1][axis], s[2][axis]}) < std::min({c[0][axis], c[1][axis], c[2][axis]})) return false;
   }
-  std::array<int, 3> shared_c{}, shared_s{};
-  int shared = 0;
+  int shared = 0;  // those go first
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
+    for (int j = shared; j < 3; ++j)
       if (c[i] == s[j]) {
-        shared_c[shared % 3] = i;
-        shared_s[shared++ % 3] = j;
+        std::swap(c[shared], c[i]);
+        std::swap(s[shared++], s[j]);
+        break;
       }
-  const Kernel::Triangle_3 first(point(c[0]), point(c[1]), point(c[2])), second(point(s[0]), point(s[1]), point(s[2]));
-  if (shared > 2 || first.is_degenerate() || second.is_degenerate()) return true;
-  if (shared == 0) return CGAL::do_intersect(first, second);
-  if (shared == 1) {
-    const int i = shared_c[0], j = shared_s[0];
-    return CGAL::do_intersect(Kernel::Segment_3(point(c[(i + 1) % 3]), point(c[(i + 2) % 3])), second) ||
-           CGAL::do_intersect(Kernel::Segment_3(point(s[(j + 1) % 3]), point(s[(j + 2) % 3])), first);
-  }
-  const Kernel::Point_3 a = point(c[shared_c[0]]), b = point(c[shared_c[1]]);
-  const Kernel::Point_3 p = point(c[3 - shared_c[0] - shared_c[1]]), q = point(s[3 - shared_s[0] - shared_s[1]]);
-  return CGAL::coplanar(a, b, p, q) && CGAL::coplanar_orientation(a, b, p, q) == CGAL::POSITIVE;
+  return shared > 2 || exact::onALine(c) || exact::onALine(s) || exact::meet(c, s, shared);
 }
 
 class Roughness {

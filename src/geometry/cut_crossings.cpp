@@ -4,23 +4,15 @@
 #include <tuple>
 #include <unordered_map>
 
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-
 #include "cut_cap.h"
+#include "exact.h"
 
 namespace meshless {
 namespace cutting {
 namespace {
 
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-
 constexpr double kSnap = 1e-12;  // of the outline's size
 constexpr int kMaxRounds = 40;
-
-int turn(const Vec2& a, const Vec2& b, const Vec2& c) {
-  return static_cast<int>(
-      CGAL::orientation(Kernel::Point_2(a.x(), a.y()), Kernel::Point_2(b.x(), b.y()), Kernel::Point_2(c.x(), c.y())));
-}
 
 double cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); }
 
@@ -189,7 +181,7 @@ class Splitter {
     touched |= touch(j, p.from);
     touched |= touch(j, p.to);
     if (touched || p.from == q.from || p.from == q.to || p.to == q.from || p.to == q.to) return;
-    if (turn(a, b, c) * turn(a, b, d) >= 0 || turn(c, d, a) * turn(c, d, b) >= 0) return;
+    if (exact::turn(a, b, c) * exact::turn(a, b, d) >= 0 || exact::turn(c, d, a) * exact::turn(c, d, b) >= 0) return;
     const double height_a = cross(d - c, a - c), height_b = cross(d - c, b - c);
     double s = height_a / (height_a - height_b);
     if (!(s > 0.0 && s < 1.0)) s = 0.5;  // all but parallel: any point of both will do

@@ -4,17 +4,14 @@
 #include <cmath>
 #include <numeric>
 
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-
 #include "cut_parts.h"
 #include "edge_table.h"
+#include "exact.h"
 #include "meshless_surgery/geometry/measures.h"
 
 namespace meshless {
 namespace cutting {
 namespace {
-
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
 double heightOf(const Workpiece& work, Index vertex) {
   return work.normal.dot(work.mesh->vertices[vertex] - work.center);
@@ -57,10 +54,7 @@ void addConvex(const Workpiece& work, const std::array<Index, 4>& corners, int c
 /// A triangle that lies on the plane bounds the solid below it where it faces up. The test is the one that the cap's
 /// triangulation uses, on the same points, so that the two never disagree.
 Side sideOfCoplanar(const Workpiece& work, const Triangle& t) {
-  const Vec2 a = work.flat(t[0]), b = work.flat(t[1]), c = work.flat(t[2]);
-  const auto turn =
-      CGAL::orientation(Kernel::Point_2(a.x(), a.y()), Kernel::Point_2(b.x(), b.y()), Kernel::Point_2(c.x(), c.y()));
-  return turn == CGAL::LEFT_TURN ? kLower : kUpper;
+  return exact::turn(work.flat(t[0]), work.flat(t[1]), work.flat(t[2])) > 0 ? kLower : kUpper;
 }
 
 std::uint64_t scatter(Index vertex) {

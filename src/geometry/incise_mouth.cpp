@@ -3,16 +3,13 @@
 #include <cmath>
 #include <unordered_map>
 
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-
+#include "exact.h"
 #include "incise_parts.h"
 #include "meshless_surgery/geometry/measures.h"
 
 namespace meshless {
 namespace incising {
 namespace {
-
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
 enum class Reach { kInside, kBorder, kOutside };
 
@@ -125,9 +122,7 @@ class Opener {
   /// A triangle that lies in the plane bounds the solid below it where it faces up. Exact on its places, as the lips'
   /// triangulation is.
   bool facesUp(const Triangle& v) const {
-    const Vec2 &a = mouth_.places[v[0]], &b = mouth_.places[v[1]], &c = mouth_.places[v[2]];
-    return CGAL::orientation(Kernel::Point_2(a.x(), a.y()), Kernel::Point_2(b.x(), b.y()),
-                             Kernel::Point_2(c.x(), c.y())) == CGAL::LEFT_TURN;
+    return exact::turn(mouth_.places[v[0]], mouth_.places[v[1]], mouth_.places[v[2]]) > 0;
   }
 
   void addCrossed(Index t, const std::array<int, 3>& s) {

@@ -9,16 +9,14 @@
 #include <unordered_map>
 #include <utility>
 
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/box_intersection_d.h>
 
+#include "exact.h"
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
 
 namespace meshless {
 namespace {
-
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
 constexpr double kWeld = 1e-9;       // of the bounds' diagonal
 constexpr double kFlatArea = 1e-14;  // of the squared longest edge: corners on a line
@@ -141,20 +139,19 @@ Orientation orient(const std::vector<Triangle>& triangles, const std::vector<Sid
 
 /// Exact: meet in more than the corners and the edge that they share.
 bool trianglesCross(const Points& points, const Triangle& s, const Triangle& t) {
-  const auto point = [&](Index v) { return Kernel::Point_3(points[v].x(), points[v].y(), points[v].z()); };
-  std::vector<Index> common, only_s, only_t;
-  for (const Index v : s) (std::find(t.begin(), t.end(), v) != t.end() ? common : only_s).push_back(v);
+  const auto corners = [&](Index a, Index b, Index c) { return exact::Corners{points[a], points[b], points[c]}; };
+  if (exact::onALine(corners(s[0], s[1], s[2])) || exact::onALine(corners(t[0], t[1], t[2]))) return false;
+  std::vector<Index> first, second;  // the common ones, then the others
+  for (const Index v : s)
+    if (std::find(t.begin(), t.end(), v) != t.end()) first.push_back(v);
+  second = first;
+  const std::size_t common = first.size();
+  for (const Index v : s)
+    if (std::find(t.begin(), t.end(), v) == t.end()) first.push_back(v);
   for (const Index v : t)
-    if (std::find(s.begin(), s.end(), v) == s.end()) only_t.push_back(v);
-  const Kernel::Triangle_3 ts(point(s[0]), point(s[1]), point(s[2])), tt(point(t[0]), point(t[1]), point(t[2]));
-  if (ts.is_degenerate() || tt.is_degenerate() || common.size() == 3) return false;
-  if (common.empty()) return CGAL::do_intersect(ts, tt);
-  if (common.size() == 1)
-    return CGAL::do_intersect(Kernel::Segment_3(point(only_s[0]), point(only_s[1])), tt) ||
-           CGAL::do_intersect(Kernel::Segment_3(point(only_t[0]), point(only_t[1])), ts);
-  // Hinged on an edge: they overlap only when folded flat onto each other.
-  const Kernel::Point_3 a = point(common[0]), b = point(common[1]), p = point(only_s[0]), q = point(only_t[0]);
-  return CGAL::coplanar(a, b, p, q) && CGAL::coplanar_orientation(a, b, p, q) == CGAL::POSITIVE;
+    if (std::find(s.begin(), s.end(), v) == s.end()) second.push_back(v);
+  return common < 3 && exact::meet(corners(first[0], first[1], first[2]), corners(second[0], second[1], second[2]),
+                                   static_cast<int>(common));
 }
 
 std::size_t crossingPairs(const Points& points, const std::vector<Triangle>& triangles) {

@@ -80,7 +80,9 @@ Organ makeOrgan(std::uint64_t seed, int genus) {
     ring.centre = blob.centre + blob.turn.transpose() * blob.radii.cwiseProduct(on_sphere);
     // One half inside, the other a handle: its axis lies in the skin.
     const Vec3 axis = out.cross(random.direction()).normalized();
-    ring.turn = Quat::FromTwoVectors(axis, Vec3::UnitZ()).toRotationMatrix();
+    ring.turn.row(2) = axis;
+    ring.turn.row(0) = axis.unitOrthogonal();
+    ring.turn.row(1) = axis.cross(axis.unitOrthogonal());
     organ.rings.push_back(ring);
   }
   for (const Blob& blob : organ.blobs) {

@@ -130,6 +130,7 @@ TEST(SurfaceFromPoints, ThickScatterStillGivesASolid) {
 #endif
       ASSERT_TRUE(surface.ok()) << name << ": " << surface.error().detail;
       expectSolid(*surface, name);
+      expectTrueDistances(*surface, cloud, name);
       EXPECT_LT(surface->mean_distance, 1.6 * scatter) << name;
       EXPECT_LT(surface->max_distance, 6.5 * scatter) << name;
       // Through the means it is in the middle of the scatter, a wrapping around nearly all of it: no more than two
@@ -139,6 +140,43 @@ TEST(SurfaceFromPoints, ThickScatterStillGivesASolid) {
       EXPECT_LT(out, 2.0 * scatter) << name << " by " << surface->method;
     }
   }
+}
+
+#if CGAL_VERSION_NR >= 1050500000
+// A wrapping whose ball fits through the hole is a shell with nothing inside.
+TEST(SurfaceFromPoints, AHoleInThickScatterIsSpanned) {
+  const TriangleMesh liver = liverMesh();
+  const double spacing = spacingOf(liver, liver.vertices.size());
+  const double scatter = 0.8 * spacing;
+  const Vec3 top = *std::max_element(liver.vertices.begin(), liver.vertices.end(),
+                                     [](const Vec3& a, const Vec3& b) { return a.z() < b.z(); });
+  for (const double width : {8.0, 12.0}) {  // [spacings]
+    Points cloud;
+    for (const Vec3& p : liver.vertices)
+      if ((p - top).norm() > 0.5 * width * spacing) cloud.push_back(p);
+    addNoise(cloud, scatter, 5);
+    const Result<SurfaceFromPoints> surface = surfaceFromPoints(cloud);
+    ASSERT_TRUE(surface.ok()) << width << ": " << surface.error().detail;
+    expectSolid(*surface, "liver");
+    EXPECT_EQ(surface->method, "alpha wrapping") << width;
+    const double out = (signedVolume(surface->mesh) - signedVolume(liver)) / surfaceArea(liver);
+    EXPECT_GT(out, 0.0) << width;
+    EXPECT_LT(out, 3.0 * scatter) << width;
+  }
+}
+#endif
+
+TEST(SurfaceFromPoints, PointsBesideItAreNoBodyOfTheirOwn) {
+  const TriangleMesh sphere = sphereMesh(0.1, 0.01);
+  const double spacing = spacingOf(sphere, sphere.vertices.size());
+  Points cloud = sphere.vertices;
+  for (const Vec3& p : shapes::tetrahedron().vertices)
+    cloud.push_back(Vec3(0.0, 0.0, 0.1 + 2.0 * spacing) + 0.3 * spacing * p);
+  const Result<SurfaceFromPoints> surface = surfaceFromPoints(cloud);
+  ASSERT_TRUE(surface.ok()) << surface.error().detail;
+  expectSolid(*surface, "sphere");
+  EXPECT_EQ(inspectMesh(surface->mesh, false).components, 1u) << surface->method;
+  EXPECT_NEAR(signedVolume(surface->mesh) / signedVolume(sphere), 1.0, 0.01) << surface->method;
 }
 
 TEST(SurfaceFromPoints, TwoBodiesStayTwo) {
