@@ -219,12 +219,14 @@ Status makeLatticeParticles(const BodyDef& def, const SolidQuery& solid, BodyMod
 
 // A box holds the corners in it that are tissue, and those of a cell with tissue in the box: not what is only there to
 // carry tissue elsewhere.
-void holdParticles(const std::vector<Box>& boxes, BodyModel& model) {
+void holdParticles(const std::vector<HeldRegion>& regions, const Pose& pose, BodyModel& model) {
   model.fixed.assign(model.rest.size(), false);
   const auto inside = [&](const Vec3& p) {
-    return std::any_of(boxes.begin(), boxes.end(), [&](const Box& box) { return box.contains(p); });
+    return std::any_of(regions.begin(), regions.end(), [&](const HeldRegion& held) {
+      return held.region.contains(held.in_world ? p : pose.rotation.conjugate() * (p - pose.translation));
+    });
   };
-  if (boxes.empty()) return;
+  if (regions.empty()) return;
   std::vector<bool> holds = model.tissue.empty() ? std::vector<bool>(model.rest.size(), true) : model.tissue;
   if (model.lattice)
     for (const LatticeCell& cell : model.lattice->cells)
@@ -310,7 +312,7 @@ Result<PreparedBody> prepareBody(BodyDef def) {
     return made.error();
 
   for (double m : model->masses) model->mass += m;
-  holdParticles(def.fixed, *model);
+  holdParticles(def.fixed, pose, *model);
   makeMoments(*model, def.material);
   if (model->lattice) {
     if (Status bound = bindFilled(def, *model); !bound) return bound.error();

@@ -197,6 +197,19 @@ void serialize(A& archive, ClusterOptions& v) {
   archive(choice(kind, ClusterOptions::Kind::kCells), grid, count, overlap);
 }
 template <class A>
+void serialize(A& archive, Plane& v) {
+  auto& [normal, point] = v;
+  archive(normal, point);
+}
+template <class A>
+void serialize(A& archive, Region& v) {
+  archive(choice(v.kind, Region::Kind::kSphere), v.box, v.plane, v.centre, v.radius);
+}
+template <class A>
+void serialize(A& archive, HeldRegion& v) {
+  archive(v.region, v.in_world);
+}
+template <class A>
 void serialize(A& archive, BodyDef& v) {
   auto& [name, mesh, solid, pose, spacing, clusters, cells, material, fixed, copy, notes] = v;
   archive(name, mesh, solid, pose, spacing, clusters, choice(cells, CellFill::kFilled), material, fixed, copy, notes);

@@ -113,8 +113,8 @@ bodies:
   EXPECT_EQ(one.material.color.a, 1.0f);
   EXPECT_EQ(one.material.inside_color.a, 0.7f);
   ASSERT_EQ(one.fixed.size(), 2u);
-  EXPECT_EQ(one.fixed[0].min, Vec3(-1, -2, -3));
-  EXPECT_EQ(one.fixed[1].max, Vec3(6, 6, 6));
+  EXPECT_EQ(one.fixed[0].region.box.min, Vec3(-1, -2, -3));
+  EXPECT_EQ(one.fixed[1].region.box.max, Vec3(6, 6, 6));
   EXPECT_EQ(scene.bodies[1].clusters.kind, ClusterOptions::Kind::kOne);
   EXPECT_NEAR(signedVolume(scene.bodies[1].mesh), 4.18879 * 1.25e-4, 0.05 * 5e-4);
   EXPECT_EQ(scene.bodies[2].clusters.kind, ClusterOptions::Kind::kCount);
@@ -465,7 +465,7 @@ TEST_F(Shipped, FixedRegionsHoldAPartOfTheBody) {
     std::size_t held = 0;
     for (const Vec3& p : def.bodies[0].mesh.vertices)
       held += std::any_of(def.bodies[0].fixed.begin(), def.bodies[0].fixed.end(),
-                          [&](const Box& box) { return box.contains(def.bodies[0].pose * p); });
+                          [&](const HeldRegion& fixed) { return fixed.region.contains(def.bodies[0].pose * p); });
     const double share = static_cast<double>(held) / static_cast<double>(def.bodies[0].mesh.vertices.size());
     EXPECT_GT(share, one[0]) << def.name;
     EXPECT_LT(share, one[1]) << def.name;
