@@ -3,45 +3,18 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <limits>
-#include <sstream>
 
 #include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/primitives.h"
+#include "truth_surface.h"
 
 namespace meshless::bench {
 namespace {
 
 constexpr double kOnFace = 1e-9;  // [m]
-
-// Vertices and triangles of an OBJ file.
-Result<TriangleMesh> readSurface(const std::string& file) {
-  std::ifstream in(file);
-  if (!in) return Error{ErrorCode::kUnreadable, "cannot read '" + file + "'"};
-  TriangleMesh mesh;
-  std::string line, kind;
-  while (std::getline(in, line)) {
-    std::istringstream words(line);
-    words >> kind;
-    if (kind == "v") {
-      Vec3 p;
-      words >> p.x() >> p.y() >> p.z();
-      mesh.vertices.push_back(p);
-    } else if (kind == "f") {
-      Triangle t;
-      for (Index& corner : t) {
-        std::string word;
-        words >> word;
-        corner = static_cast<Index>(std::strtoul(word.c_str(), nullptr, 10)) - 1;
-      }
-      mesh.triangles.push_back(t);
-    }
-  }
-  return mesh;
-}
 
 int axisOf(const std::string& name) { return name == "y" ? 1 : name == "z" ? 2 : 0; }
 
