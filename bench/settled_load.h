@@ -12,7 +12,7 @@ struct SettledResult {
   double error = 0.0;  // RMS distance to the truth over its largest displacement; over the surface where it has areas
   double tip = 0.0;    // displacement over the truth's, where that is largest
   double share_kept = 1.0;  // of the stiffness
-  double moving = 0.0;      // of the largest displacement, in the last frame times the time constant
+  double moving = 0.0;      // of the largest displacement, in the last time constant
   double step_ms = 0.0;     // [ms] of a frame, mean
 };
 

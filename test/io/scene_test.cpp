@@ -38,6 +38,21 @@ struct Scene : ::testing::Test {
   }
 };
 
+TEST_F(Scene, HeldRegionsAreBoxesPlanesAndSpheres) {
+  const SceneDef scene = good(
+      "bodies:\n  - file: ../cube.obj\n    material: {young: 5000}\n    fixed:\n"
+      "      - {plane: {point: [1, 2, 3], normal: [0, 0, 2]}, frame: body}\n"
+      "      - {sphere: {centre: [1, 2, 3], radius: 0.5}, frame: world}\n");
+  const BodyDef& body = scene.bodies.at(0);
+  EXPECT_EQ(body.material.youngs_modulus, 5000.0);
+  ASSERT_EQ(body.fixed.size(), 2u);
+  EXPECT_FALSE(body.fixed[0].in_world);
+  EXPECT_EQ(body.fixed[0].region.height(Vec3(9, 9, 3.5)), 0.5);
+  EXPECT_TRUE(body.fixed[1].in_world);
+  EXPECT_TRUE(body.fixed[1].region.contains(Vec3(1, 2, 2.5)));
+  EXPECT_FALSE(body.fixed[1].region.contains(Vec3(1, 2, 2.4)));
+}
+
 TEST_F(Scene, DefaultsForEverythingButBodies) {
   const SceneDef scene = good("bodies:\n  - file: ../cube.obj\n");
   const WorldSettings defaults;
@@ -218,6 +233,16 @@ TEST_F(Scene, FaultsAreNamedWithFileLineValueAndRange) {
       {body + "    fixed: [{ball: 1}]\n", 3, {"'ball'", "did you mean 'box'"}},
       {body + "    fixed: [{box: {min: [0, 0, 0]}}]\n", 3, {"no min or no max"}},
       {body + "    fixed: [{box: {min: [0, 0, 1], max: [0, 0, 0]}}]\n", 3, {"min above its max"}},
+      {body + "    fixed: [{plane: {point: [0, 0, 1]}}]\n", 3, {"no point or no normal"}},
+      {body + "    fixed: [{plane: {point: [0, 0, 1], normal: [0, 0, 0]}}]\n", 3, {"normal has the length 0"}},
+      {body + "    fixed: [{sphere: {centre: [0, 0, 1], radius: 0}}]\n", 3, {"radius is 0", "above 0"}},
+      {body + "    fixed: [{sphere: {centre: [0, 0, 1], radius: 1}, plane: {point: [0, 0, 1], normal: [0, 0, 1]}}]\n",
+       3,
+       {"several shapes"}},
+      {body + "    fixed: [{sphere: {centre: [0, 0, 1], radius: 1}, frame: wrold}]\n", 3, {"wrold", "world"}},
+      {body + "    material: {young: 5000, alpha: 0.5}\n", 3, {"alpha beside young"}},
+      {body + "    material: {youngs_modulus: 5000, alpha: 0.5}\n", 3, {"alpha beside youngs_modulus"}},
+      {body + "    material: {youngs_modulus: 5000, young: 5000}\n", 3, {"young and youngs_modulus"}},
       {body + "    copies: {}\n", 3, {"no count and no grid"}},
       {body + "    copies: {count: 9, grid: [2, 2, 2]}\n", 3, {"8 places", "9 to"}},
       {body + "    copies: {grid: [100, 100, 100]}\n", 3, {"1000000 places"}},

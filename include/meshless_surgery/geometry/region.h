@@ -1,6 +1,8 @@
 // A part of space that a user names: what is held there, or of which material it is.
 #pragma once
 
+#include <string>
+
 #include "meshless_surgery/base/types.h"
 #include "meshless_surgery/geometry/plane.h"
 
@@ -23,6 +25,8 @@ struct Region {
 
   /// [m] below 0 inside; outside of a box the largest distance along an axis.
   double height(const Vec3& p) const;
+  /// For messages: "the box from 0 0 0 to 1 1 1".
+  std::string text() const;
   /// Its border is inside.
   bool contains(const Vec3& p) const { return height(p) <= 0.0; }
 };
