@@ -12,6 +12,7 @@
 #include "laws.h"
 #include "meshless_surgery/base/share_folder.h"
 #include "plot.h"
+#include "settled_load.h"
 #include "static_load.h"
 
 namespace meshless::bench {
@@ -21,6 +22,20 @@ const char* const kLoads[] = {"bar_cantilever_small", "bar_cantilever_large", "b
                               "bar_stretch_150",      "bar_torsion",          "bar_twist_90",
                               "bar_twist_180",        "block_indent",         "organ_hang"};
 const char* const kRatios[] = {"nu30", "nu45"};
+// Made by bench/truth/calculix.py.
+const char* const kSettled[] = {"bar",
+                                "bar_nu45",
+                                "bar_nu49",
+                                "bar_turned",
+                                "bar_awkward_000",
+                                "bar_awkward_260",
+                                "bar_awkward_282",
+                                "bar_awkward_322",
+                                "bar_oblique_clamp",
+                                "taper",
+                                "tube",
+                                "curved",
+                                "angle"};
 
 struct Row {
   std::string benchmark, name, mode, setting;
@@ -105,6 +120,46 @@ bool elasticRows(Table& table, const std::string& folder, const std::vector<doub
         if (!solve(settings, "40 clusters overlap " + shortNumber(overlap))) return false;
       }
     }
+  return true;
+}
+
+// Bodies as users have them, through World::step: at the default spacing and finer. The run time is that of a frame.
+// The organ at its own spacings.
+bool settledRows(Table& table, const std::string& folder, const std::string& part, const std::vector<double>& finer) {
+  struct Entry {
+    std::string folder, name;
+    std::vector<double> spacings;  // [m] none: the default and finer
+  };
+  std::vector<Entry> entries;
+  for (const char* name : kSettled) entries.push_back({CALCULIX_FOLDER, name, {}});
+  for (const char* ratio : kRatios)
+    entries.push_back({folder, std::string("organ_hang_") + ratio, {0.0, 0.0125, 0.01, 0.008}});
+  for (const Entry& entry : entries) {
+    if (entry.name.find(part) == std::string::npos) continue;
+    const Result<TruthCase> truth = readTruthCase(entry.folder + "/" + entry.name + ".csv");
+    if (!truth) {
+      std::fprintf(stderr, "%s\n", truth.error().detail.c_str());
+      return false;
+    }
+    for (const CellFill cells : {CellFill::kWhole, CellFill::kFilled}) {
+      const std::string mode = cells == CellFill::kFilled ? "filled" : "whole";
+      const auto add = [&](double times, double spacing) {
+        const Result<SettledResult> result = settle(*truth, entry.folder, cells, times, spacing);
+        if (!result) {  // a clamp that holds nothing, for one
+          table.row("settled", entry.name, mode, "refused", 0.0, 1.0);
+          std::fprintf(stderr, "%s: %s\n", entry.name.c_str(), result.error().detail.c_str());
+          return;
+        }
+        const std::string setting = shortNumber(1000.0 * result->spacing) + " mm " + std::to_string(result->particles);
+        table.row("settled", entry.name, mode, setting + (result->moving > 3e-4 ? " not at rest" : ""), result->step_ms,
+                  result->error);
+        table.row("settled_tip", entry.name, mode, setting, result->step_ms, std::abs(result->tip - 1.0));
+      };
+      if (entry.spacings.empty())
+        for (const double times : finer) add(times, 0.0);
+      for (const double spacing : entry.spacings) add(1.0, spacing);
+    }
+  }
   return true;
 }
 
@@ -275,10 +330,13 @@ int main(int argc, char** argv) {
   using namespace meshless::bench;
   CLI::App app{"Accuracy of the deformer: accuracy.csv and its plots"};
   std::string out = ".", truth = meshless::shareFolder() + "/bench/truth/data";
+  std::string settled;
   bool quick = false;
   app.add_option("--out", out, "folder for accuracy.csv and the plots")->check(CLI::ExistingDirectory);
   app.add_option("--truth", truth, "folder of the finite-element truth")->check(CLI::ExistingDirectory);
   app.add_flag("--quick", quick, "coarse bodies and few steps: minutes become seconds");
+  CLI::Option* const only =
+      app.add_option("--settled", settled, "only bodies as users have them whose name has this in it");
   CLI11_PARSE(app, argc, argv);
   Table table;
   table.file.open(out + "/accuracy.csv");
@@ -287,8 +345,11 @@ int main(int argc, char** argv) {
     return 1;
   }
   table.file << "benchmark,case,mode,setting,run_time_ms,error\n";
+  if (only->count() > 0) return settledRows(table, truth, settled, {1.0, 1.26, 1.59, 2.0}) ? 0 : 1;
   const std::vector<double> spacings =
       quick ? std::vector<double>{0.0125} : std::vector<double>{0.025, 0.0125, 0.05 / 7.0, 0.00625};
+  if (!settledRows(table, truth, "", quick ? std::vector<double>{1.0} : std::vector<double>{1.0, 1.26, 1.59, 2.0}))
+    return 1;
   if (!elasticRows(table, truth, spacings)) return 1;
   if (!quick && !looksRows(table, truth, 0.0125)) return 1;
   lawRows(table, quick ? 500 : 10000,

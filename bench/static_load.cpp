@@ -3,45 +3,18 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <limits>
-#include <sstream>
 
 #include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/primitives.h"
+#include "truth_surface.h"
 
 namespace meshless::bench {
 namespace {
 
 constexpr double kOnFace = 1e-9;  // [m]
-
-// Vertices and triangles of an OBJ file.
-Result<TriangleMesh> readSurface(const std::string& file) {
-  std::ifstream in(file);
-  if (!in) return Error{ErrorCode::kUnreadable, "cannot read '" + file + "'"};
-  TriangleMesh mesh;
-  std::string line, kind;
-  while (std::getline(in, line)) {
-    std::istringstream words(line);
-    words >> kind;
-    if (kind == "v") {
-      Vec3 p;
-      words >> p.x() >> p.y() >> p.z();
-      mesh.vertices.push_back(p);
-    } else if (kind == "f") {
-      Triangle t;
-      for (Index& corner : t) {
-        std::string word;
-        words >> word;
-        corner = static_cast<Index>(std::strtoul(word.c_str(), nullptr, 10)) - 1;
-      }
-      mesh.triangles.push_back(t);
-    }
-  }
-  return mesh;
-}
 
 int axisOf(const std::string& name) { return name == "y" ? 1 : name == "z" ? 2 : 0; }
 
@@ -90,27 +63,27 @@ struct Load {
   std::vector<bool> on_sphere_face;
 };
 
-Load makeLoad(const TruthCase& truth, const BodyModel& model, double spacing) {
-  const std::size_t n = model.rest.size();
+// `rest` is where the particles were put.
+Load makeLoad(const TruthCase& truth, const BodyModel& model, const Points& rest, double spacing) {
+  const std::size_t n = rest.size();
   Load load;
   const Vec3 gravity = truth.vector("gravity");
   load.acceleration.assign(n, gravity);
   load.held.assign(n, false);
-  load.target = load.start = model.rest;
+  load.target = load.start = rest;
   const int axis = axisOf(truth.text("fixed_axis"));
   for (std::size_t i = 0; i < n; ++i)
-    load.held[i] = model.rest[i][axis] <= truth.number("fixed_below") + 0.01 * spacing + kOnFace;
+    load.held[i] = rest[i][axis] <= truth.number("fixed_below") + 0.01 * spacing + kOnFace;
 
   const std::string kind = truth.text("load");
   const Vec3 top = truth.has("box_max") ? truth.vector("box_max") : Vec3::Zero();
   if (kind == "end_traction" || kind == "end_torsion") {
-    const std::vector<double> areas = faceAreas(model.rest, top.x(), spacing);
+    const std::vector<double> areas = faceAreas(rest, top.x(), spacing);
     const Vec3 centre(top.x(), 0.0, 0.0);
     for (std::size_t i = 0; i < n; ++i) {
-      const Vec3 traction =
-          kind == "end_traction"
-              ? truth.vector("traction")
-              : Vec3(truth.number("torsion_traction_slope") * Vec3::UnitX().cross(model.rest[i] - centre));
+      const Vec3 traction = kind == "end_traction"
+                                ? truth.vector("traction")
+                                : Vec3(truth.number("torsion_traction_slope") * Vec3::UnitX().cross(rest[i] - centre));
       load.acceleration[i] += areas[i] / model.masses[i] * traction;
     }
   } else if (kind == "end_rotation" || kind == "end_stretch") {
@@ -118,9 +91,9 @@ Load makeLoad(const TruthCase& truth, const BodyModel& model, double spacing) {
     const double angle = kind == "end_rotation" ? truth.number("moved_rotation_degrees") * M_PI / 180.0 : 0.0;
     const Vec3 shift = kind == "end_stretch" ? truth.vector("moved_translation") : Vec3::Zero();
     for (std::size_t i = 0; i < n; ++i) {
-      const double share = (model.rest[i].x() - truth.vector("box_min").x()) / length;
-      load.start[i] = Eigen::AngleAxisd(share * angle, Vec3::UnitX()) * model.rest[i] + share * shift;
-      if (model.rest[i].x() >= top.x() - kOnFace) {
+      const double share = (rest[i].x() - truth.vector("box_min").x()) / length;
+      load.start[i] = Eigen::AngleAxisd(share * angle, Vec3::UnitX()) * rest[i] + share * shift;
+      if (rest[i].x() >= top.x() - kOnFace) {
         load.held[i] = true;
         load.moved.push_back(static_cast<Index>(i));
         load.target[i] = load.start[i];
@@ -130,7 +103,7 @@ Load makeLoad(const TruthCase& truth, const BodyModel& model, double spacing) {
     load.radius = truth.number("sphere_radius");
     load.sphere = truth.vector("sphere_center");
     load.on_sphere_face.assign(n, false);
-    for (std::size_t i = 0; i < n; ++i) load.on_sphere_face[i] = model.rest[i].z() > top.z() - kOnFace;
+    for (std::size_t i = 0; i < n; ++i) load.on_sphere_face[i] = rest[i].z() > top.z() - kOnFace;
   }
   return load;
 }
@@ -164,7 +137,7 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
   const Result<PreparedBody> body = prepareBody(std::move(def));
   if (!body) return body.error();
   const BodyModel& model = *body->model;
-  const Load load = makeLoad(truth, model, spacing);
+  const Load load = makeLoad(truth, model, body->state.positions, spacing);
   double largest = 0.0;
   for (const Vec3& u : truth.displacement) largest = std::max(largest, u.norm());
 
@@ -172,7 +145,7 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
   Points x = load.start, v(n, Vec3::Zero()), a;
   for (std::size_t i = 0; i < n; ++i)
     if (load.held[i]) x[i] = load.target[i];
-  std::vector<ClusterPose> poses(model.clusters.size());
+  std::vector<ClusterPose> poses = body->state.poses;
   MatchCounters counters;
   const ElasticParameters parameters =
       elasticParameters(material.youngs_modulus, material.poissons_ratio, material.density);
@@ -250,9 +223,14 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
   SurfaceBinding samples;
   if (model.lattice) {
     const CellFinder finder(*model.lattice);
+    const Pose& placed = body->state.placed;
+    Points places;
     std::vector<Index> cells;
-    for (const Vec3& p : truth.rest) cells.push_back(finder.carrier(p));
-    samples = bindToCells(*model.lattice, truth.rest, cells);
+    for (const Vec3& p : truth.rest) {
+      places.push_back(placed.rotation.conjugate() * (p - placed.translation));
+      cells.push_back(finder.carrier(places.back()));
+    }
+    samples = bindToCells(*model.lattice, places, cells);
   } else {
     samples = bindSurface(model.rest, model.graph, model.clusters, truth.rest,
                           std::vector<Index>(truth.rest.size(), kNoIndex));

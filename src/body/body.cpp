@@ -1,5 +1,7 @@
 #include "meshless_surgery/body/body.h"
 
+#include <cmath>
+
 #include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/measures.h"
@@ -22,6 +24,14 @@ void makeElastic(BodyModel& model) {
   model.elastic_batch = std::make_shared<ElasticBatch>(matchInput(model), model.elastic);
 }
 
+void makeClamp(BodyModel& model) {
+  model.clamp.reset();
+  if (model.clamp_points.empty()) return;
+  const double density = model.cell_mass / std::pow(model.lattice->spacing, 3.0);
+  model.clamp = std::make_shared<Clamp>(*model.lattice, model.clamp_points, model.fixed, model.masses, density);
+  model.any_fixed = true;
+}
+
 void makeMoments(BodyModel& model, const Material& material) {
   constexpr double kHeld = 50.0;  // enough that a cluster follows its held part, little enough to stay well conditioned
   model.match_masses = model.masses;
@@ -29,6 +39,7 @@ void makeMoments(BodyModel& model, const Material& material) {
     for (std::size_t i = 0; i < model.masses.size(); ++i)
       if (model.fixed[i]) model.match_masses[i] *= kHeld;
   if (model.lattice) weighCells(model, material.elastic());
+  makeClamp(model);
   model.shape = makeRestShape(model.rest, model.match_masses, model.clusters);
   model.elastic.clear();
   model.elastic_batch.reset();

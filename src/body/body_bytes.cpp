@@ -10,6 +10,7 @@ std::size_t bytesOf(const BodyModel& model) {
          bytesOf(clusters.offsets, clusters.members, clusters.weights, clusters.seeds, clusters.radii) +
          bytesOf(model.shape.clusters, model.shape.quadratic) +
          (model.lattice ? bytesOf(model.lattice->cells, model.tissue) : 0) +
+         (model.clamp ? model.clamp->bytes() + bytesOf(model.clamp_points, model.carried) : 0) +
          (model.cells ? bytesOf(model.cells->cells, model.cells->masses) : 0) +
          (model.elastic_batch ? model.elastic_batch->bytes() : 0) +
          bytesOf(model.surface.vertices, model.surface.triangles, model.surface.patches) +
@@ -24,7 +25,8 @@ std::size_t bytesOf(const BodyState& state) {
 
 std::size_t bytesOf(const StepScratch& scratch) {
   const ElasticBatchState& elastic = scratch.elastic;
-  return bytesOf(scratch.previous, scratch.before_contact, scratch.predicted, scratch.goals, scratch.touched) +
+  return scratch.clamp.bytes() +
+         bytesOf(scratch.previous, scratch.before_contact, scratch.predicted, scratch.goals, scratch.touched) +
          bytesOf(elastic.rotations, elastic.others, elastic.forces, elastic.largest, elastic.cold);
 }
 

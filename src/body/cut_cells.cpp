@@ -1,6 +1,7 @@
 #include "cut_cells.h"
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <sstream>
 #include <tuple>
@@ -445,9 +446,6 @@ class CellCutter {
       Index& heir = heir_[cut_.parent_corner[i]];
       if (heir == kNoIndex || (tissue[i] && !tissue[heir])) heir = i;
     }
-    // Tissue is what a clamp holds; where none of the copies has any, it holds them all.
-    holds_.assign(cut_.lattice.corners, false);
-    for (Index i = 0; i < cut_.lattice.corners; ++i) holds_[i] = tissue[i] || !tissue[heir_[cut_.parent_corner[i]]];
   }
 
   // --- bodies
@@ -494,9 +492,6 @@ class CellCutter {
     }
     for (const Index i : corner_of) {
       const Index parent = cut_.parent_corner[i];
-      const bool fixed = model_.fixed[parent] && holds_[i];
-      child->fixed.push_back(fixed);
-      child->any_fixed = child->any_fixed || fixed;
       piece.parent_particles.push_back(heir_[parent] == i ? parent : kNoIndex);
       piece.state.positions.push_back(state_.positions[parent]);
       piece.state.velocities.push_back(state_.velocities[parent]);
@@ -504,6 +499,8 @@ class CellCutter {
     child->lattice = lattice;
     child->cell_mass = model_.cell_mass;
     makeParticlesOfCells(*child);
+    holdCorners(*child);
+    inheritClamp(*child, renumbered);
     for (const double m : child->masses) child->mass += m;
     inheritMoments(*child, corner_of);
 
@@ -524,11 +521,36 @@ class CellCutter {
     piece.state.surface = from.mesh.vertices;
     piece.state.stretch = state_.stretch;
     piece.state.swelling = state_.swelling;
+    piece.state.placed = state_.placed;
     for (Index r = 0; r < child->binding.riders.size(); ++r)
       piece.state.rider_offsets.push_back(from.mesh.vertices[r] -
                                           riderPosition(child->binding, piece.state.positions, piece.state.poses, r));
     piece.model = std::move(child);
     return piece;
+  }
+
+  // What is held stays held, by the copy of its cell with the nearest tissue on its side of the blade.
+  void inheritClamp(BodyModel& child, const std::vector<Index>& renumbered) const {
+    for (ClampPoint point : model_.clamp_points) {
+      Vec3 now = Vec3::Zero();
+      for (int k = 0; k < 8; ++k)
+        now += trilinearWeight(k, point.at) * state_.positions[before_.cells[point.cell].corners[k]];
+      const bool above = gate_.height(now) >= 0.0;
+      Index best = kNoIndex;
+      double least = std::numeric_limits<double>::infinity();
+      for (const Index c : children_[point.cell]) {
+        if (cut_.lattice.cells[c].isBridge(c)) continue;
+        const SampleSet side = !cut_.changed[c] ? kAllSamples : above ? cut_.above[c] : ~cut_.above[c];
+        const double squared = squaredToSamples(cut_.lattice.cells[c].samples & side, point.at);
+        if (squared < least) {
+          least = squared;
+          best = c;
+        }
+      }
+      if (best == kNoIndex || renumbered[best] == kNoIndex) continue;
+      point.cell = renumbered[best];
+      child.clamp_points.push_back(point);
+    }
   }
 
   void inheritMoments(BodyModel& child, const std::vector<Index>& corner_of) const {
@@ -540,6 +562,7 @@ class CellCutter {
         if (child.fixed[i]) child.match_masses[i] *= model_.match_masses[parent] / model_.masses[parent];
       }
     weighCells(child, elastic);
+    makeClamp(child);
     child.shape = makeRestShape(child.rest, child.match_masses, child.clusters);
     if (!model_.shape.quadratic.empty()) addQuadraticRest(child.rest, child.match_masses, child.clusters, child.shape);
     child.specific_stiffness = model_.specific_stiffness;
@@ -567,7 +590,6 @@ class CellCutter {
   std::vector<bool> seen_;                    // a vertex is in it
   std::vector<std::vector<Index>> carriers_;  // of each source's vertices
   std::vector<Index> heir_;                   // of each of the parent's corners
-  std::vector<bool> holds_;                   // one a corner
 };
 
 }  // namespace

@@ -233,9 +233,13 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
     if (model.fixed[i]) {
       v[i].setZero();
     } else {
-      v[i] += h * gravity;
+      v[i] += model.carried.empty() ? Vec3(h * gravity) : Vec3(h * (1.0 - model.carried[i]) * gravity);
       x[i] += h * v[i];
     }
+  }
+  if (model.clamp) {
+    const double fastest = highestFrequencyNow(model, state), share = fastest > 0.0 ? h * fastest * h * fastest : 1.0;
+    scratch.clamp.hold(model.clamp, share, model.rest, state.placed, x);
   }
 }
 

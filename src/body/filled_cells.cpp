@@ -12,8 +12,8 @@ namespace {
 constexpr double kFarthestCentroid = 0.9;  // [half edges] a fit nearer to a face would need weights near zero
 constexpr int kWellFilled = 16;            // of 64 samples
 
-Vec3 centroidOf(const FilledMoments& moments) {
-  return moments.centroid.cwiseMax(-kFarthestCentroid).cwiseMin(kFarthestCentroid);
+Vec3 centroidOf(const Resistance& resists) {
+  return resists.centroid.cwiseMax(-kFarthestCentroid).cwiseMin(kFarthestCentroid);
 }
 
 }  // namespace
@@ -34,6 +34,7 @@ void makeParticlesOfCells(BodyModel& model) {
   const CellLattice& lattice = *model.lattice;
   model.rest = cornerPlaces(lattice);
   model.masses.assign(lattice.corners, 0.0);
+  std::vector<double> held(lattice.corners, 0.0);
   model.tissue = cornersWithTissue(lattice);
   ClusterSet& clusters = model.clusters;
   clusters = ClusterSet();
@@ -41,6 +42,11 @@ void makeParticlesOfCells(BodyModel& model) {
   std::vector<std::array<Index, 2>> edges;
   for (const LatticeCell& cell : lattice.cells) {
     const FilledMoments moments = momentsOf(cell.filled);
+    if (const SampleSet still = cell.filled & cell.held) {
+      const FilledMoments of_held = momentsOf(still);
+      for (Index k = 0; k < 8; ++k)
+        held[cell.corners[k]] += model.cell_mass * of_held.fraction * cell.mass_share * of_held.corner_shares[k];
+    }
     for (Index k = 0; k < 8; ++k) {
       model.masses[cell.corners[k]] += model.cell_mass * moments.fraction * cell.mass_share * moments.corner_shares[k];
       clusters.members.push_back(cell.corners[k]);
@@ -52,7 +58,21 @@ void makeParticlesOfCells(BodyModel& model) {
     clusters.radii.push_back(1.01 * std::sqrt(3.0) * lattice.spacing);
   }
   clusters.weights.assign(clusters.members.size(), 0.0);
+  model.carried.clear();
+  if (std::any_of(held.begin(), held.end(), [](double mass) { return mass > 0.0; }))
+    for (Index i = 0; i < lattice.corners; ++i) model.carried.push_back(std::min(1.0, held[i] / model.masses[i]));
   model.graph = makeGraph(model.rest, std::move(edges));
+}
+
+void holdCorners(BodyModel& model) {
+  std::vector<bool> moves(model.lattice->corners, false);
+  for (const LatticeCell& cell : model.lattice->cells)
+    if ((cell.samples ? cell.samples : cell.filled) & ~cell.held)
+      for (const Index corner : cell.corners) moves[corner] = true;
+  model.fixed.assign(model.lattice->corners, false);
+  model.any_fixed = false;
+  for (Index i = 0; i < model.lattice->corners; ++i)
+    if (!moves[i]) model.fixed[i] = model.any_fixed = true;
 }
 
 void weighCells(BodyModel& model, bool elastic) {
@@ -62,8 +82,8 @@ void weighCells(BodyModel& model, bool elastic) {
   for (std::size_t c = 0; c < lattice.cells.size(); ++c) {
     const LatticeCell& cell = lattice.cells[c];
     const FilledMoments moments = momentsOf(cell.filled);
-    const double mass = model.cell_mass * moments.fraction * cell.stiffness_share;
-    const Vec3 at = 0.5 * (centroidOf(moments) + Vec3::Ones());
+    const double mass = model.cell_mass * cell.stiffness_share * (elastic ? cell.resists.fraction : moments.fraction);
+    const Vec3 at = 0.5 * (centroidOf(cell.resists) + Vec3::Ones());
     for (int k = 0; k < 8; ++k) {
       double& weight = clusters.weights[8 * c + static_cast<std::size_t>(k)];
       weight = mass * (elastic ? trilinearWeight(k, at) : moments.corner_shares[k]);
@@ -80,9 +100,9 @@ ElasticCells elasticCellsOf(const BodyModel& model) {
   elastic.half_edge = 0.5 * lattice.spacing;
   elastic.masses = model.match_masses;
   for (std::size_t c = 0; c < lattice.cells.size(); ++c) {
-    const FilledMoments moments = momentsOf(lattice.cells[c].filled);
+    const Resistance& resists = lattice.cells[c].resists;
     elastic.cells.push_back(
-        {lattice.cells[c].corners, model.shape.clusters[c].mass, centroidOf(moments), moments.variance});
+        {lattice.cells[c].corners, model.shape.clusters[c].mass, centroidOf(resists), resists.variance});
   }
   return elastic;
 }

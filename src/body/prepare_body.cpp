@@ -2,11 +2,13 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <sstream>
 
 #include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/cell_lattice.h"
+#include "meshless_surgery/geometry/main_axes.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/nearest.h"
 #include "meshless_surgery/geometry/sampling.h"
@@ -174,9 +176,21 @@ Status makeParticles(const BodyDef& def, const SolidQuery* solid, BodyModel& mod
   return Done{};
 }
 
+// [m] from a place in the rest shape, which was put at `placed`, to what is held of a body at `pose`; null where
+// nothing is.
+HeldHeight heldHeight(const std::vector<HeldRegion>& regions, const Pose& placed, const Pose& pose) {
+  if (regions.empty()) return nullptr;
+  return [regions, placed, pose](const Vec3& rest) {
+    const Vec3 there = placed * rest, own = pose.rotation.conjugate() * (there - pose.translation);
+    double least = std::numeric_limits<double>::infinity();
+    for (const HeldRegion& held : regions) least = std::min(least, held.region.height(held.in_world ? there : own));
+    return least;
+  };
+}
+
 // The corners of the lattice cells that the solid meets; the whole surface rides on them.
-Status makeLatticeParticles(const BodyDef& def, const SolidQuery& solid, BodyModel& model,
-                            std::vector<Index>& vertex_particle) {
+Status makeLatticeParticles(const BodyDef& def, const SolidQuery& solid, const Pose& placed, const Pose& pose,
+                            BodyModel& model, std::vector<Index>& vertex_particle) {
   Result<CellLattice> lattice = divideIntoCells(model.surface, solid, model.spacing);
   if (!lattice) return Error{lattice.error().code, "body '" + def.name + "': " + lattice.error().detail};
   if (lattice->corners > kMaxParticles)
@@ -187,8 +201,15 @@ Status makeLatticeParticles(const BodyDef& def, const SolidQuery& solid, BodyMod
     double filled = 0.0;
     for (const LatticeCell& cell : lattice->cells) filled += momentsOf(cell.filled).fraction;
     model.cell_mass = def.material.density * model.rest_volume / filled;
+    const HeldHeight held = heldHeight(def.fixed, placed, pose);
+    findResistance(solid, held, *lattice);
+    // In units of what a cell of that mass resists with.
+    const double unit = std::pow(model.spacing, 3.0) * filled / model.rest_volume;
+    for (LatticeCell& cell : lattice->cells) cell.resists.fraction *= unit;
+    if (held) model.clamp_points = findClampPoints(*lattice, solid, held);
     model.lattice = std::make_shared<CellLattice>(std::move(*lattice));
     makeParticlesOfCells(model);
+    holdCorners(model);
     return Done{};
   }
   model.rest = cornerPlaces(*lattice);
@@ -217,22 +238,46 @@ Status makeLatticeParticles(const BodyDef& def, const SolidQuery& solid, BodyMod
   return Done{};
 }
 
-// A box holds the corners in it that are tissue, and those of a cell with tissue in the box: not what is only there to
-// carry tissue elsewhere.
-void holdParticles(const std::vector<Box>& boxes, BodyModel& model) {
+void holdParticles(const std::vector<HeldRegion>& regions, const Pose& pose, BodyModel& model) {
   model.fixed.assign(model.rest.size(), false);
   const auto inside = [&](const Vec3& p) {
-    return std::any_of(boxes.begin(), boxes.end(), [&](const Box& box) { return box.contains(p); });
+    return std::any_of(regions.begin(), regions.end(), [&](const HeldRegion& held) {
+      return held.region.contains(held.in_world ? p : pose.rotation.conjugate() * (p - pose.translation));
+    });
   };
-  if (boxes.empty()) return;
-  std::vector<bool> holds = model.tissue.empty() ? std::vector<bool>(model.rest.size(), true) : model.tissue;
-  if (model.lattice)
-    for (const LatticeCell& cell : model.lattice->cells)
-      for (SampleSet left = cell.samples; left; left &= left - 1)
-        if (inside(model.lattice->restPlace(cell, samplePlace(lowestSample(left)))))
-          for (const Index corner : cell.corners) holds[corner] = true;
+  if (regions.empty()) return;
   for (std::size_t i = 0; i < model.rest.size(); ++i)
-    if (holds[i] && inside(model.rest[i])) model.fixed[i] = model.any_fixed = true;
+    if (inside(model.rest[i])) model.fixed[i] = model.any_fixed = true;
+}
+
+// Every region holds something, or whoever wrote it is wrong about where the body is.
+Status checkHeld(const BodyDef& def, const Pose& placed, const Pose& pose, const BodyModel& model) {
+  Points held;
+  if (model.lattice) {
+    for (const ClampPoint& point : model.clamp_points)
+      held.push_back(model.lattice->restPlace(model.lattice->cells[point.cell], point.at));
+    for (const LatticeCell& cell : model.lattice->cells)
+      for (SampleSet left = cell.samples & cell.held; left; left &= left - 1)
+        held.push_back(model.lattice->restPlace(cell, samplePlace(lowestSample(left))));
+  } else {
+    for (std::size_t i = 0; i < model.rest.size(); ++i)
+      if (model.fixed[i]) held.push_back(model.rest[i]);
+  }
+  const double near = 1e-6 * model.spacing;
+  for (std::size_t r = 0; r < def.fixed.size(); ++r) {
+    const HeldHeight height = heldHeight({def.fixed[r]}, placed, pose);
+    if (std::any_of(held.begin(), held.end(), [&](const Vec3& p) { return height(p) <= near; })) continue;
+    Box bounds;
+    for (const Vec3& v : model.surface.vertices)
+      bounds.extend(def.fixed[r].in_world ? placed * v : pose.rotation.conjugate() * (placed * v - pose.translation));
+    std::ostringstream text;
+    text << "body '" << def.name << "': fixed[" << r << "], " << def.fixed[r].region.text()
+         << (def.fixed[r].in_world ? " in the world's frame" : " in the body's frame")
+         << ", holds nothing of it; accepted: what meets the body, which reaches from " << bounds.min.transpose()
+         << " to " << bounds.max.transpose() << " there, at a spacing of " << model.spacing << " m";
+    return invalid(text.str());
+  }
+  return Done{};
 }
 
 Status bindFilled(const BodyDef& def, BodyModel& model) {
@@ -260,7 +305,21 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   surface = std::move(def.mesh);
   def.mesh = TriangleMesh();
   const Pose pose{def.pose.rotation.normalized(), def.pose.translation};
-  for (Vec3& v : surface.vertices) v = pose * v;
+  const bool cells = def.solid && (def.clusters.kind == ClusterOptions::Kind::kCells ||
+                                   (def.clusters.kind == ClusterOptions::Kind::kAuto && def.material.elastic()));
+  if (def.cells == CellFill::kFilled && !cells)
+    return invalid(
+        "body '" + def.name +
+        "' has cells: filled but no lattice; accepted: with an elastic material or clusters: cells, of a solid");
+  // A lattice lies along the body's own axes, so that turning the body turns all that is made of it.
+  Pose placed;
+  if (def.cells == CellFill::kFilled) {
+    const Mat3 axes = mainAxes(surface);
+    for (Vec3& v : surface.vertices) v = axes.transpose() * v;
+    placed = {pose.rotation * Quat(axes), pose.translation};
+  } else {
+    for (Vec3& v : surface.vertices) v = pose * v;
+  }
   for (const Vec3& v : surface.vertices)
     if (!finite(v))
       return Error{ErrorCode::kUnsuitableShape, "body '" + def.name + "' has vertices that are not finite"};
@@ -279,12 +338,6 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   model->solid = def.solid;
   model->rest_volume = volume;
   model->rest_area = surfaceArea(surface);
-  const bool cells = def.solid && (def.clusters.kind == ClusterOptions::Kind::kCells ||
-                                   (def.clusters.kind == ClusterOptions::Kind::kAuto && def.material.elastic()));
-  if (def.cells == CellFill::kFilled && !cells)
-    return invalid(
-        "body '" + def.name +
-        "' has cells: filled but no lattice; accepted: with an elastic material or clusters: cells, of a solid");
   model->spacing = def.spacing;
   if (!(model->spacing > 0.0)) {
     if (!def.solid)
@@ -304,13 +357,14 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   std::unique_ptr<SolidQuery> solid;
   if (def.solid) solid = std::make_unique<SolidQuery>(surface);
   std::vector<Index> vertex_particle;
-  if (Status made = cells ? makeLatticeParticles(def, *solid, *model, vertex_particle)
+  if (Status made = cells ? makeLatticeParticles(def, *solid, placed, pose, *model, vertex_particle)
                           : makeParticles(def, solid.get(), *model, vertex_particle);
       !made)
     return made.error();
 
   for (double m : model->masses) model->mass += m;
-  holdParticles(def.fixed, *model);
+  if (!model->lattice) holdParticles(def.fixed, pose, *model);
+  if (Status holds = checkHeld(def, placed, pose, *model); !holds) return holds.error();
   makeMoments(*model, def.material);
   if (model->lattice) {
     if (Status bound = bindFilled(def, *model); !bound) return bound.error();
@@ -320,9 +374,11 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   }
 
   PreparedBody body;
-  body.state.positions = model->rest;
+  body.state.placed = placed;
+  for (const Vec3& p : model->rest) body.state.positions.push_back(placed * p);
   body.state.velocities.assign(model->rest.size(), Vec3::Zero());
   body.state.poses.resize(model->clusters.size());
+  for (ClusterPose& cluster : body.state.poses) cluster.rotation = placed.rotation;
   body.state.rider_offsets.assign(model->binding.riders.size(), Vec3::Zero());
   updateSurface(*model, body.state);
   body.def = std::move(def);
@@ -337,6 +393,7 @@ PreparedBody placedCopy(const PreparedBody& body, std::string name, const Pose& 
   const Quat turn = pose.rotation.normalized() * body.def.pose.rotation.normalized().conjugate();
   const Pose motion{turn, pose.translation - turn * body.def.pose.translation};
   for (Vec3& p : copy.state.positions) p = motion * p;
+  copy.state.placed = {(turn * body.state.placed.rotation).normalized(), motion * body.state.placed.translation};
   for (ClusterPose& cluster : copy.state.poses) {
     cluster.centre = motion * cluster.centre;
     cluster.rotation = turn * cluster.rotation;

@@ -24,8 +24,7 @@ SampleSet samplesInside(const SolidQuery& solid, const Vec3& lower, double spaci
 Points cornerPlaces(const CellLattice& lattice) {
   Points places(lattice.corners);
   for (const LatticeCell& cell : lattice.cells)
-    for (int k = 0; k < 8; ++k)
-      places[cell.corners[k]] = lattice.restPlace(cell, Vec3(k & 1, k >> 1 & 1, k >> 2 & 1));
+    for (int k = 0; k < 8; ++k) places[cell.corners[k]] = lattice.restPlace(cell, Vec3(k & 1, k >> 1 & 1, k >> 2 & 1));
   return places;
 }
 
@@ -80,6 +79,8 @@ Result<CellLattice> divideIntoCells(const TriangleMesh& mesh, const SolidQuery& 
         while (inside) {
           cell.samples = cell.filled = connectedPart(inside, cell.parted);
           inside &= ~cell.samples;
+          const FilledMoments moments = momentsOf(cell.filled);
+          cell.resists = {moments.fraction, moments.centroid, moments.variance};
           lattice.cells.push_back(cell);
         }
         first[at(x, y, z) + 1] = static_cast<Index>(lattice.cells.size());
@@ -96,7 +97,8 @@ Result<CellLattice> divideIntoCells(const TriangleMesh& mesh, const SolidQuery& 
     const LatticeCell& lower = lattice.cells[a];
     for (int axis = 0; axis < 3; ++axis) {
       if (lower.place[axis] + 1 >= n[axis]) continue;
-      const std::size_t next = at(lower.place[0] + (axis == 0), lower.place[1] + (axis == 1), lower.place[2] + (axis == 2));
+      const std::size_t next =
+          at(lower.place[0] + (axis == 0), lower.place[1] + (axis == 1), lower.place[2] + (axis == 2));
       for (Index b = first[next]; b < first[next + 1]; ++b)
         if (faceLinks(lower, lattice.cells[b], axis))
           for (Index k = 0; k < 8; ++k)

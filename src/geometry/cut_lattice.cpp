@@ -182,7 +182,8 @@ class Cutter {
         faceLinks(a, b, axis) & ~lower.parted[axis] & (above_[p] ^ ((above_[q] & kLowerLayer[axis]) << across));
     if (!crossing) return;
     SampleSet cut = throughBlade(crossing, a, above_[p], b, above_[q], axis, true);
-    const bool plane_in_face = !(lower.tip[0] | lower.tip[1] | lower.tip[2] | upper.tip[0] | upper.tip[1] | upper.tip[2]);
+    const bool plane_in_face =
+        !(lower.tip[0] | lower.tip[1] | lower.tip[2] | upper.tip[0] | upper.tip[1] | upper.tip[2]);
     if (lower.inside_cut && upper.inside_cut) {
       cut = crossing;  // both are parted altogether, and bridged
     } else if (plane_in_face) {
@@ -194,6 +195,7 @@ class Cutter {
   }
 
   void add(LatticeCell cell, Index parent, bool changed) {
+    cell.resists = resistanceOf(before_.cells[parent], cell.filled);
     result_.lattice.cells.push_back(cell);
     result_.parent_cell.push_back(parent);
     result_.changed.push_back(changed);

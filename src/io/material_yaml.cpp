@@ -86,7 +86,16 @@ void readMaterial(YamlSource& source, const YAML::Node& node, const std::string&
   if (mode == 0) material.mode = MatchMode::kRigid;
   if (mode == 1) material.mode = MatchMode::kLinear;
   if (mode == 2) material.mode = MatchMode::kQuadratic;
-  map.number("youngs_modulus", {0.0, 1e12, false, "Pa"}, material.youngs_modulus);
+  if (map.has("young") && map.has("youngs_modulus"))
+    source.fail(map.get("young"), what + " has young and youngs_modulus, which are the same", "one of them");
+  const std::string youngs = map.has("young") ? "young" : "youngs_modulus";
+  const double before = material.youngs_modulus;
+  material.youngs_modulus = 0.0;
+  map.number(youngs, {0.0, 1e12, false, "Pa"}, material.youngs_modulus);
+  if (map.has("alpha") && material.youngs_modulus > 0.0)
+    source.fail(map.get("alpha"), what + " has alpha beside " + youngs + ", which takes its place",
+                "alpha, for looks, or youngs_modulus, for accuracy");
+  if (!map.has(youngs)) material.youngs_modulus = before;
   map.number("poissons_ratio", {0.0, 0.49}, material.poissons_ratio);
   map.number("alpha", {0.0, 1.0}, material.alpha);
   map.number("beta", {0.0, 1.0}, material.beta);

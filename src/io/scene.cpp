@@ -122,32 +122,66 @@ ClusterOptions readClusters(YamlSource& source, const YAML::Node& node) {
   return options;
 }
 
-std::vector<Box> readFixed(YamlSource& source, const YAML::Node& node) {
-  std::vector<Box> boxes;
+Box readBox(YamlSource& source, const YAML::Node& node) {
+  Box box;
+  YamlMap corners(source, node, "box");
+  if (!corners.has("min") || !corners.has("max")) source.fail(node, "box has no min or no max", "both");
+  corners.vector("min", lengths(), box.min);
+  corners.vector("max", lengths(), box.max);
+  corners.finish();
+  if (box.empty()) source.fail(node, "box has a min above its max", "min up to max, along each axis");
+  return box;
+}
+
+Plane readPlane(YamlSource& source, const YAML::Node& node) {
+  Plane plane;
+  YamlMap map(source, node, "plane");
+  if (!map.has("point") || !map.has("normal")) source.fail(node, "plane has no point or no normal", "both");
+  map.vector("point", lengths(), plane.point);
+  map.vector("normal", {-1000.0, 1000.0}, plane.normal);
+  map.finish();
+  if (!(plane.normal.norm() > 1e-6)) source.fail(node, "normal has the length 0", "a direction, longer than 1e-6");
+  plane.normal.normalize();
+  return plane;
+}
+
+Region readSphere(YamlSource& source, const YAML::Node& node) {
+  Region sphere = Region::sphere(Vec3::Zero(), 0.0);
+  YamlMap map(source, node, "sphere");
+  if (!map.has("centre") || !map.has("radius")) source.fail(node, "sphere has no centre or no radius", "both");
+  map.vector("centre", lengths(), sphere.centre);
+  map.number("radius", lengths(0.0, true), sphere.radius);
+  map.finish();
+  return sphere;
+}
+
+std::vector<HeldRegion> readFixed(YamlSource& source, const YAML::Node& node) {
+  const std::string accepted =
+      "{box: {min, max}}, {plane: {point, normal}} (what is below it) or {sphere: {centre, radius}}, and frame: world "
+      "or "
+      "body";
+  std::vector<HeldRegion> regions;
   if (!node.IsSequence() || node.size() > 1000) {
-    source.fail(node, "fixed is " + shown(node), "a list of up to 1000 {box: {min: [x, y, z], max: [x, y, z]}}");
-    return boxes;
+    source.fail(node, "fixed is " + shown(node), "a list of up to 1000 of " + accepted);
+    return regions;
   }
   for (const auto& entry : node) {
     YamlMap map(source, entry, "fixed");
-    const YAML::Node box = map.get("box");
-    if (!box.IsDefined()) {
-      map.finish();
-      source.fail(entry, "an entry of fixed has no box", "{box: {min: [x, y, z], max: [x, y, z]}}");
-      break;
-    }
+    const YAML::Node box = map.get("box"), plane = map.get("plane"), sphere = map.get("sphere");
+    HeldRegion read;
+    read.in_world = map.choice("frame", {"world", "body"}) != 1;
     map.finish();
-    YamlMap corners(source, box, "box");
-    if (!corners.has("min") || !corners.has("max")) source.fail(box, "box has no min or no max", "both");
-    Box read;
-    corners.vector("min", lengths(), read.min);
-    corners.vector("max", lengths(), read.max);
-    corners.finish();
-    if (read.empty()) source.fail(box, "box has a min above its max", "min up to max, along each axis");
+    const int shapes = box.IsDefined() + plane.IsDefined() + sphere.IsDefined();
+    if (shapes == 0) source.fail(entry, "an entry of fixed has no box, no plane and no sphere", accepted);
+    if (shapes > 1) source.fail(entry, "an entry of fixed has several shapes", accepted);
     if (source.fault) break;
-    boxes.push_back(read);
+    if (box.IsDefined()) read.region = readBox(source, box);
+    if (plane.IsDefined()) read.region = Region::below(readPlane(source, plane));
+    if (sphere.IsDefined()) read.region = readSphere(source, sphere);
+    if (source.fault) break;
+    regions.push_back(read);
   }
-  return boxes;
+  return regions;
 }
 
 /// The poses of a body's copies; `start` is the first one's place.

@@ -15,7 +15,7 @@ namespace meshless {
 namespace {
 
 constexpr std::string_view kMagic = "MLSSTATE";
-constexpr std::uint32_t kVersion = 7;
+constexpr std::uint32_t kVersion = 8;
 constexpr std::uint64_t kMostModels = 1u << 20;
 
 std::uint32_t checksum(std::string_view bytes) {
@@ -202,6 +202,14 @@ std::string faultOf(const BodyModel& m) {
           !(cell.stiffness_share > 0.0 && cell.stiffness_share <= 1.0))
         return "a cell has a share of itself that is none";
     }
+    if (!m.carried.empty() && m.carried.size() != particles) return "what is carried is not a body's particles";
+    for (const ClampPoint& point : m.clamp_points)
+      if (!(point.cell < cells.size()) || !point.at.allFinite() || !(point.area > 0.0 && point.area < 1e12))
+        return "a clamp holds nothing of its body's cells";
+    for (const LatticeCell& cell : cells)
+      if (!(cell.resists.fraction > 0.0) || !cell.resists.centroid.allFinite() ||
+          !(cell.resists.variance.minCoeff() > 0.0))
+        return "a cell resists with nothing";
     double boxes = 1.0;  // tables of all places are made
     for (int k = 0; k < 3; ++k) {
       const auto [low, high] =
@@ -277,7 +285,10 @@ void ModelTable::readOne(InArchive& archive) {
   auto model = std::make_shared<BodyModel>();
   archive(*model);
   requireNone(faultOf(*model));
-  if (model->lattice) model->tissue = cornersWithTissue(*model->lattice);
+  if (model->lattice) {
+    model->tissue = cornersWithTissue(*model->lattice);
+    makeClamp(*model);
+  }
   if (!model->elastic.empty() && model->lattice) {
     model->cells = std::make_shared<ElasticCells>(elasticCellsOf(*model));
     model->elastic_batch = std::make_shared<ElasticBatch>(*model->cells);

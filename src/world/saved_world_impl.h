@@ -141,25 +141,36 @@ void serialize(A& archive, SurfaceBinding& v) {
   archive(particle, riders, offsets, carriers, weights, levers, turners, lever_clusters, bound);
 }
 template <class A>
+void serialize(A& archive, Resistance& v) {
+  auto& [fraction, centroid, variance] = v;
+  archive(fraction, centroid, variance);
+}
+template <class A>
+void serialize(A& archive, ClampPoint& v) {
+  auto& [cell, at, area] = v;
+  archive(cell, at, area);
+}
+template <class A>
 void serialize(A& archive, LatticeCell& v) {
-  auto& [corners, place, samples, filled, parted, mass_share, stiffness_share, bridge] = v;
-  archive(corners, place, samples, filled, parted, mass_share, stiffness_share, bridge);
+  auto& [corners, place, samples, filled, held, resists, parted, mass_share, stiffness_share, bridge] = v;
+  archive(corners, place, samples, filled, held, resists, parted, mass_share, stiffness_share, bridge);
 }
 template <class A>
 void serialize(A& archive, CellLattice& v) {
   auto& [spacing, origin, corners, cells] = v;
   archive(spacing, origin, corners, cells);
 }
-/// elastic_batch, cells and tissue are made again by whoever reads, once all is checked; empty until then.
+/// elastic_batch, cells, clamp and tissue are made again by whoever reads, once all is checked; empty until then.
 template <class A>
 void serialize(A& archive, BodyModel& v) {
   auto& [rest, masses, match_masses, fixed, any_fixed, graph, clusters, shape, elastic, elastic_batch, lattice,
-         cell_mass, cells, tissue, most_spread_inverse, specific_stiffness, poissons_ratio, highest_frequency, surface,
-         binding, solid, lips, spacing, rest_volume, rest_area, mass, next_patch] = v;
-  (void)elastic_batch, (void)cells, (void)tissue;
+         cell_mass, cells, clamp_points, clamp, carried, tissue, most_spread_inverse, specific_stiffness,
+         poissons_ratio, highest_frequency, surface, binding, solid, lips, spacing, rest_volume, rest_area, mass,
+         next_patch] = v;
+  (void)elastic_batch, (void)cells, (void)clamp, (void)tissue;
   auto of_cells = lattice ? *lattice : CellLattice();
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
-  archive(of_cells, cell_mass);
+  archive(of_cells, cell_mass, clamp_points, carried);
   archive(rest, masses, match_masses, held, any_fixed, graph, clusters, shape, elastic, most_spread_inverse,
           specific_stiffness, poissons_ratio, highest_frequency, surface, binding, solid, lips, spacing, rest_volume,
           rest_area, mass, next_patch);
@@ -185,16 +196,29 @@ void serialize(A& archive, PlasticShape& v) {
 template <class A>
 void serialize(A& archive, BodyState& v) {
   auto& [positions, velocities, poses, surface, swelling, stretch, plastic, rider_offsets, eased, eased_for,
-         eased_whole, unwinding] = v;
+         eased_whole, unwinding, placed] = v;
   // Where the surface is depends on who looked when, what follows does not.
   if constexpr (!std::is_same_v<A, HashArchive>) archive(surface);
   archive(positions, velocities, poses, swelling, stretch, plastic, rider_offsets, eased, eased_for, eased_whole,
-          unwinding);
+          unwinding, placed);
 }
 template <class A>
 void serialize(A& archive, ClusterOptions& v) {
   auto& [kind, grid, count, overlap] = v;
   archive(choice(kind, ClusterOptions::Kind::kCells), grid, count, overlap);
+}
+template <class A>
+void serialize(A& archive, Plane& v) {
+  auto& [normal, point] = v;
+  archive(normal, point);
+}
+template <class A>
+void serialize(A& archive, Region& v) {
+  archive(choice(v.kind, Region::Kind::kSphere), v.box, v.plane, v.centre, v.radius);
+}
+template <class A>
+void serialize(A& archive, HeldRegion& v) {
+  archive(v.region, v.in_world);
 }
 template <class A>
 void serialize(A& archive, BodyDef& v) {

@@ -12,19 +12,21 @@ void restAnew(WorldBody& body) {
   const BodyModel& model = *body.model;
   BodyState& state = body.state;
   Box at_rest;
-  for (const Vec3& p : model.rest) at_rest.extend(p);
+  const Pose& placed = state.placed;
+  for (const Vec3& p : model.rest) at_rest.extend(placed * p);
   Vec3 shift = Vec3::Zero();
   // Fixed particles are where they are at rest. Others stay about where they last were.
   if (!model.any_fixed && body.bounds.min.cwiseAbs().maxCoeff() < kFarthest &&
       body.bounds.max.cwiseAbs().maxCoeff() < kFarthest && !body.bounds.empty())
     shift = 0.5 * (body.bounds.min + body.bounds.max) - 0.5 * (at_rest.min + at_rest.max);
-  for (std::size_t i = 0; i < model.rest.size(); ++i) state.positions[i] = model.rest[i] + shift;
+  for (std::size_t i = 0; i < model.rest.size(); ++i) state.positions[i] = placed * model.rest[i] + shift;
   state.velocities.assign(model.rest.size(), Vec3::Zero());
   for (std::size_t c = 0; c < state.poses.size(); ++c) {
     state.poses[c] = ClusterPose();
-    state.poses[c].centre = model.shape.clusters[c].centre + shift;
+    state.poses[c].centre = placed * model.shape.clusters[c].centre + shift;
+    state.poses[c].rotation = placed.rotation;
   }
-  for (std::size_t v = 0; v < state.surface.size(); ++v) state.surface[v] = model.surface.vertices[v] + shift;
+  for (std::size_t v = 0; v < state.surface.size(); ++v) state.surface[v] = placed * model.surface.vertices[v] + shift;
   state.swelling = state.stretch = 1.0;
   state.plastic.clear();
   state.rider_offsets.assign(state.rider_offsets.size(), Vec3::Zero());

@@ -38,6 +38,21 @@ struct Scene : ::testing::Test {
   }
 };
 
+TEST_F(Scene, HeldRegionsAreBoxesPlanesAndSpheres) {
+  const SceneDef scene = good(
+      "bodies:\n  - file: ../cube.obj\n    material: {young: 5000}\n    fixed:\n"
+      "      - {plane: {point: [1, 2, 3], normal: [0, 0, 2]}, frame: body}\n"
+      "      - {sphere: {centre: [1, 2, 3], radius: 0.5}, frame: world}\n");
+  const BodyDef& body = scene.bodies.at(0);
+  EXPECT_EQ(body.material.youngs_modulus, 5000.0);
+  ASSERT_EQ(body.fixed.size(), 2u);
+  EXPECT_FALSE(body.fixed[0].in_world);
+  EXPECT_EQ(body.fixed[0].region.height(Vec3(9, 9, 3.5)), 0.5);
+  EXPECT_TRUE(body.fixed[1].in_world);
+  EXPECT_TRUE(body.fixed[1].region.contains(Vec3(1, 2, 2.5)));
+  EXPECT_FALSE(body.fixed[1].region.contains(Vec3(1, 2, 2.4)));
+}
+
 TEST_F(Scene, DefaultsForEverythingButBodies) {
   const SceneDef scene = good("bodies:\n  - file: ../cube.obj\n");
   const WorldSettings defaults;
@@ -113,8 +128,8 @@ bodies:
   EXPECT_EQ(one.material.color.a, 1.0f);
   EXPECT_EQ(one.material.inside_color.a, 0.7f);
   ASSERT_EQ(one.fixed.size(), 2u);
-  EXPECT_EQ(one.fixed[0].min, Vec3(-1, -2, -3));
-  EXPECT_EQ(one.fixed[1].max, Vec3(6, 6, 6));
+  EXPECT_EQ(one.fixed[0].region.box.min, Vec3(-1, -2, -3));
+  EXPECT_EQ(one.fixed[1].region.box.max, Vec3(6, 6, 6));
   EXPECT_EQ(scene.bodies[1].clusters.kind, ClusterOptions::Kind::kOne);
   EXPECT_NEAR(signedVolume(scene.bodies[1].mesh), 4.18879 * 1.25e-4, 0.05 * 5e-4);
   EXPECT_EQ(scene.bodies[2].clusters.kind, ClusterOptions::Kind::kCount);
@@ -218,6 +233,16 @@ TEST_F(Scene, FaultsAreNamedWithFileLineValueAndRange) {
       {body + "    fixed: [{ball: 1}]\n", 3, {"'ball'", "did you mean 'box'"}},
       {body + "    fixed: [{box: {min: [0, 0, 0]}}]\n", 3, {"no min or no max"}},
       {body + "    fixed: [{box: {min: [0, 0, 1], max: [0, 0, 0]}}]\n", 3, {"min above its max"}},
+      {body + "    fixed: [{plane: {point: [0, 0, 1]}}]\n", 3, {"no point or no normal"}},
+      {body + "    fixed: [{plane: {point: [0, 0, 1], normal: [0, 0, 0]}}]\n", 3, {"normal has the length 0"}},
+      {body + "    fixed: [{sphere: {centre: [0, 0, 1], radius: 0}}]\n", 3, {"radius is 0", "above 0"}},
+      {body + "    fixed: [{sphere: {centre: [0, 0, 1], radius: 1}, plane: {point: [0, 0, 1], normal: [0, 0, 1]}}]\n",
+       3,
+       {"several shapes"}},
+      {body + "    fixed: [{sphere: {centre: [0, 0, 1], radius: 1}, frame: wrold}]\n", 3, {"wrold", "world"}},
+      {body + "    material: {young: 5000, alpha: 0.5}\n", 3, {"alpha beside young"}},
+      {body + "    material: {youngs_modulus: 5000, alpha: 0.5}\n", 3, {"alpha beside youngs_modulus"}},
+      {body + "    material: {youngs_modulus: 5000, young: 5000}\n", 3, {"young and youngs_modulus"}},
       {body + "    copies: {}\n", 3, {"no count and no grid"}},
       {body + "    copies: {count: 9, grid: [2, 2, 2]}\n", 3, {"8 places", "9 to"}},
       {body + "    copies: {grid: [100, 100, 100]}\n", 3, {"1000000 places"}},
@@ -465,7 +490,7 @@ TEST_F(Shipped, FixedRegionsHoldAPartOfTheBody) {
     std::size_t held = 0;
     for (const Vec3& p : def.bodies[0].mesh.vertices)
       held += std::any_of(def.bodies[0].fixed.begin(), def.bodies[0].fixed.end(),
-                          [&](const Box& box) { return box.contains(def.bodies[0].pose * p); });
+                          [&](const HeldRegion& fixed) { return fixed.region.contains(def.bodies[0].pose * p); });
     const double share = static_cast<double>(held) / static_cast<double>(def.bodies[0].mesh.vertices.size());
     EXPECT_GT(share, one[0]) << def.name;
     EXPECT_LT(share, one[1]) << def.name;

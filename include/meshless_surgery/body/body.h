@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "meshless_surgery/body/body_def.h"
+#include "meshless_surgery/body/clamp.h"
 #include "meshless_surgery/dynamics/elastic.h"
 #include "meshless_surgery/dynamics/elastic_batch.h"
 #include "meshless_surgery/geometry/cell_lattice.h"
@@ -44,6 +45,9 @@ struct BodyModel {
   std::shared_ptr<const CellLattice> lattice;
   double cell_mass = 0.0;                     // [kg] of a whole cell of it
   std::shared_ptr<const ElasticCells> cells;  // of it, where the material is elastic
+  std::vector<ClampPoint> clamp_points;       // of it: where free tissue ends at what is held
+  std::shared_ptr<const Clamp> clamp;         // of them; null where there are none
+  std::vector<double> carried;                // of a corner's weight, by what holds it; empty where nothing does
   std::vector<bool> tissue;                   // one a corner of it: no ghost; empty where all particles are tissue
   /// [1/m^2] norm of ElasticRest::spread_inverse: what a cut leaves of a cell can be narrower, so that its stress would
   /// need a shorter step. It resists as a flat cluster does.
@@ -72,6 +76,8 @@ inline MatchInput matchInput(const BodyModel& model) {
 /// Makes what the material needs of a model whose particles, masses and clusters are there: match_masses, shape,
 /// elastic and highest_frequency.
 void makeMoments(BodyModel& model, const Material& material);
+/// clamp, from clamp_points.
+void makeClamp(BodyModel& model);
 /// elastic and elastic_batch from shape, whose clusters beyond most_spread_inverse lose their linear fit.
 void makeElastic(BodyModel& model);
 
@@ -91,6 +97,7 @@ struct BodyState {
   double eased_for = 0.0;  // [s] since that cut
   bool eased_whole = false;  // what is eased may have a force and a torque
   bool unwinding = false;    // it was wound up in itself, and goes back to its shape; see unwind.h
+  Pose placed;               // where the rest shape was put: what is held stays there
 };
 
 inline MatchInput matchInput(const BodyModel& model, const BodyState& state) {

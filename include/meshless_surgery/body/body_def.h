@@ -3,6 +3,7 @@
 
 #include "meshless_surgery/dynamics/clusters.h"
 #include "meshless_surgery/dynamics/material.h"
+#include "meshless_surgery/geometry/region.h"
 #include "meshless_surgery/geometry/triangle_mesh.h"
 
 namespace meshless {
@@ -10,6 +11,17 @@ namespace meshless {
 /// What a lattice knows of its cells: nothing, so that each counts as whole but for its mass; or how far each is
 /// filled.
 enum class CellFill { kWhole, kFilled };
+
+/// Tissue in there is held in place.
+struct HeldRegion {
+  Region region;
+  bool in_world = true;  // else it is in the body's own frame, and goes where the body is placed
+
+  HeldRegion() = default;
+  HeldRegion(const Box& box) : region(box) {}
+  HeldRegion(const Vec3& min, const Vec3& max) : region(min, max) {}
+  HeldRegion(const Region& there, bool world) : region(there), in_world(world) {}
+};
 
 struct BodyDef {
   std::string name;
@@ -20,7 +32,7 @@ struct BodyDef {
   ClusterOptions clusters;
   CellFill cells = CellFill::kWhole;  // kFilled needs a lattice: an elastic material, or clusters of cells
   Material material;
-  std::vector<Box> fixed;          // [m] world frame: particles inside are held in place
+  std::vector<HeldRegion> fixed;
   bool copy = false;               // the same as the body before it in its scene, but for name and pose
   std::vector<std::string> notes;  // what reading and repairing said
 };

@@ -19,6 +19,7 @@ struct StepScratch {
   Points before_contact;  // [m] positions when contacts began; filled where something can touch
   Points predicted;
   Points goals;
+  ClampStep clamp;
   ElasticBatchState elastic;
   std::vector<TouchedParticle> touched;
   Vec3 unfelt = Vec3::Zero();  // [kg m/s] by which the tool moved particles further than it threw them

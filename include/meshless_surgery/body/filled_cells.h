@@ -13,6 +13,9 @@ namespace meshless {
 /// clusters are made by weighCells().
 void makeParticlesOfCells(BodyModel& model);
 
+/// fixed and any_fixed: corners stay where all of the tissue around them is held.
+void holdCorners(BodyModel& model);
+
 /// Weights of the clusters of model.lattice. Elastic: those that make a cell's affine fit the trilinear map's gradient
 /// at the centroid of what fills it, and its mass what it resists with; they need not add up to 1. Else every particle
 /// is shared out to its cells, in proportion to what they have of it.

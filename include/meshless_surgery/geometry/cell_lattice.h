@@ -1,24 +1,36 @@
 // A solid divided into the cells of a cubic lattice, with corners that only connected cells share.
 #pragma once
 
+#include <functional>
+
 #include "meshless_surgery/base/result.h"
 #include "meshless_surgery/geometry/cell_samples.h"
 #include "meshless_surgery/geometry/inside.h"
 
 namespace meshless {
 
-/// A copy of a lattice cell: one for each part of the solid in it that hangs together (two fingers, the walls of a slit, the
-/// sides of a cut), with all eight corners. Nesme et al. 2009; Sifakis et al. 2007.
+/// How much of a cell resists, and where, in units of momentsOf(): what is filled and not held.
+struct Resistance {
+  double fraction = 1.0;
+  Vec3 centroid = Vec3::Zero();
+  Vec3 variance = Vec3::Constant(1.0 / 3.0);
+};
+
+/// A copy of a lattice cell: one for each part of the solid in it that hangs together (two fingers, the walls of a
+/// slit, the sides of a cut), with all eight corners. Nesme et al. 2009; Sifakis et al. 2007.
 struct LatticeCell {
-  std::array<Index, 8> corners{};           // bits 0, 1, 2 of the position: upper end along x, y, z
-  std::array<std::int32_t, 3> place{};      // in the lattice
-  SampleSet samples = kNoSample;            // the part; none of a crumb that is smaller than a sample
-  SampleSet filled = kNoSample;             // what its moments are of: the part, or of a crumb the part that it came from
-  LinkSet parted{};                         // links of its samples that a blade has cut
-  double mass_share = 1.0;                  // of what `filled` weighs; 0 of a bridge
-  double stiffness_share = 1.0;             // of what `filled` resists with
-  /// Where a blade ends within the cell, the parts beside it are cells of their own and one more, the bridge, that has all
-  /// of their samples holds them together with a share of their stiffness. kNoIndex: no bridge; of a bridge: itself.
+  std::array<Index, 8> corners{};       // bits 0, 1, 2 of the position: upper end along x, y, z
+  std::array<std::int32_t, 3> place{};  // in the lattice
+  SampleSet samples = kNoSample;        // the part; none of a crumb that is smaller than a sample
+  SampleSet filled = kNoSample;         // what its moments are of: the part, or of a crumb the part that it came from
+  SampleSet held = kNoSample;           // samples in what is held in place: they weigh, and do not resist
+  Resistance resists;                   // of `filled`
+  LinkSet parted{};                     // links of its samples that a blade has cut
+  double mass_share = 1.0;              // of what `filled` weighs; 0 of a bridge
+  double stiffness_share = 1.0;         // of what `filled` resists with
+  /// Where a blade ends within the cell, the parts beside it are cells of their own and one more, the bridge, that has
+  /// all of their samples holds them together with a share of their stiffness. kNoIndex: no bridge; of a bridge:
+  /// itself.
   Index bridge = kNoIndex;
 
   bool isBridge(Index self) const { return bridge == self; }
@@ -58,9 +70,19 @@ CornerUses cornerUses(const CellLattice& lattice);
 /// The links across the face between two cells of which `upper` is next to `lower` along the axis, in bits of `lower`.
 SampleSet faceLinks(const LatticeCell& lower, const LatticeCell& upper, int axis);
 
+/// What is left of a cell's resistance by a blade that leaves it `filled`.
+Resistance resistanceOf(const LatticeCell& before, SampleSet filled);
+
+/// [m] from a place to what is held, below 0 in it.
+using HeldHeight = std::function<double(const Vec3& rest)>;
+/// Which samples are held, and what resists, finer than by whole samples: how far the surface and what is held reach
+/// into the eighth of a sample. Tissue that no sample sees counts with the nearest cell that has one. `held` may be
+/// null.
+void findResistance(const SolidQuery& solid, const HeldHeight& held, CellLattice& lattice);
+
 /// The lattice is centred on the bounds; a box whose edges are whole multiples of the spacing is filled exactly. Gaps
-/// thinner than a quarter of the spacing are not seen. Refuses (kInvalidArgument) a spacing with more than max_cells cells
-/// in the bounds, (kUnsuitableShape) a solid so thin that no sample of a quarter of the spacing lies in it.
+/// thinner than a quarter of the spacing are not seen. Refuses (kInvalidArgument) a spacing with more than max_cells
+/// cells in the bounds, (kUnsuitableShape) a solid so thin that no sample of a quarter of the spacing lies in it.
 Result<CellLattice> divideIntoCells(const TriangleMesh& mesh, const SolidQuery& solid, double spacing,
                                     std::size_t max_cells = 4000000);
 

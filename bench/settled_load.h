@@ -1,0 +1,23 @@
+// A body under a load of the truth as a user has it: placed, held and loaded in a World that steps until it is at rest.
+#pragma once
+
+#include "meshless_surgery/body/body_def.h"
+#include "truth_case.h"
+
+namespace meshless::bench {
+
+struct SettledResult {
+  double spacing = 0.0;  // [m]
+  std::size_t particles = 0;
+  double error = 0.0;  // RMS distance to the truth over its largest displacement; over the surface where it has areas
+  double tip = 0.0;    // displacement over the truth's, where that is largest
+  double share_kept = 1.0;  // of the stiffness
+  double moving = 0.0;      // of the largest displacement, in the last time constant
+  double step_ms = 0.0;     // [ms] of a frame, mean
+};
+
+/// At the default spacing divided by `finer`, or at `spacing` [m] where that is given. `folder` holds the surface.
+Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, CellFill cells, double finer,
+                             double spacing = 0.0);
+
+}  // namespace meshless::bench
