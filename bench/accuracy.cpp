@@ -131,7 +131,7 @@ bool settledRows(Table& table, const std::string& folder, const std::string& par
     std::vector<double> spacings;  // [m] none: the default and finer
   };
   std::vector<Entry> entries;
-  for (const char* name : kSettled) entries.push_back({CALCULIX_FOLDER, name, {}});
+  for (const char* name : kSettled) entries.push_back({folder + "/../calculix", name, {}});
   for (const char* ratio : kRatios)
     entries.push_back({folder, std::string("organ_hang_") + ratio, {0.0, 0.0125, 0.01, 0.008}});
   for (const Entry& entry : entries) {

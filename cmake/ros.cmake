@@ -20,7 +20,7 @@ install(TARGETS ${PROJECT_NAME}_ros
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
 install(TARGETS deformer_node drive make_meshes replay ${bench_targets}
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-install(DIRECTORY bench/truth/data
+install(DIRECTORY bench/truth/data bench/truth/calculix
   DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/bench/truth)
 # Where programs of the devel space look for them, too.
 set(devel_share ${CATKIN_DEVEL_PREFIX}/share/${PROJECT_NAME})

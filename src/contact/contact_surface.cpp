@@ -1,6 +1,7 @@
 #include "meshless_surgery/contact/contact_surface.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace meshless {
 namespace {
@@ -38,6 +39,11 @@ VertexSupports ownSupports(Index vertices) {
 ContactSurface::ContactSurface(const TriangleMesh& rest, VertexSupports vertex_supports)
     : triangles(rest.triangles), supports(std::move(vertex_supports)) {
   const Index count = static_cast<Index>(supports.offsets.size() - 1);
+  for (Index v = 0; v < count; ++v) {
+    double sum = 0.0;
+    for (Index k = supports.offsets[v]; k < supports.offsets[v + 1]; ++k) sum += std::abs(supports.weights[k]);
+    supports.most_weight = std::max(supports.most_weight, sum);
+  }
   face_edges.resize(triangles.size());
   for (const HalfEdge& half : halfEdgesOf(triangles)) {
     if (edges.empty() || edges.back().vertices != half.ends) {

@@ -9,9 +9,12 @@
 namespace meshless {
 namespace {
 
-constexpr double kMargin = 0.12;        // of the mean edge
+constexpr double kMargin = 0.2;         // of the mean edge
 constexpr double kAhead = 1.2;          // times the way of a frame: who speeds up is met too
 constexpr double kTie = 2e-3;           // of the mean edge: nearer than this two surfaces touch
+constexpr double kStillApart = 0.75;    // of the distance of a nearer face: one that reaches no higher is behind it
+constexpr double kSlope = 0.02;         // of the mean edge: nor one that rises by less over it
+constexpr double kTouching = 1e-3;      // of the mean edge: nearer than this only a face that opposes tells the sides
 constexpr double kDeepest = 2.0;        // mean edges: deeper inside nobody is looked for
 constexpr double kDeeper = 1.3;         // times as deep as it was: who is inside may have gone on
 constexpr double kLeastOpposed = 0.05;  // cosine by which a direction has to oppose a face of who is pushed along it
@@ -55,6 +58,7 @@ class VertexSearch {
         a_(search.a),
         b_(search.b),
         tie_(kTie * search.length),
+        touching_(kTouching * search.length),
         margin_(searchMargin(search.length)),
         pairs_(found.pairs),
         sides_(found.sides),
@@ -121,12 +125,13 @@ class VertexSearch {
   }
 
   const Candidate& chooseNearest(Index v) const {
-    double nearest = candidates_.front().distance;
-    for (const Candidate& c : candidates_) nearest = std::min(nearest, c.distance);
+    const auto first = std::min_element(candidates_.begin(), candidates_.end(),
+                                        [](const Candidate& x, const Candidate& y) { return x.distance < y.distance; });
+    if (first->distance > tie_) return *first;  // signs hold at the nearest point alone
     const Candidate* best = nullptr;
     double most = -3.0;
     for (const Candidate& c : candidates_) {
-      if (c.distance > nearest + tie_) continue;
+      if (c.distance > tie_) continue;
       const double opposed = opposition(a_, v, b_.frame->face_normals[c.face]) + (c.corners == 3 ? 1e-6 : 0.0);
       if (!(opposed > most)) continue;
       most = opposed;
@@ -145,7 +150,40 @@ class VertexSearch {
       if (!((c.point - best.point).squaredNorm() <= 1e-18 * search_.length * search_.length)) continue;
       pseudonormal += angleAt(c) * b_.frame->face_normals[c.face];
     }
-    return pseudonormal.dot(way) >= 0.0 ? best.distance : -best.distance;
+    return pseudonormal.dot(way) >= 0.0 || windingAround(p) <= 0 ? best.distance : -best.distance;
+  }
+
+  /// How often the surface goes around a point, by a ray along x. Where a surface is folded, pseudonormals can take its
+  /// outside for its inside; this cannot.
+  int windingAround(const Vec3& p) const {
+    Vec3 far = p;
+    far.x() = std::max(p.x(), b_.frame->bounds.max.x()) + search_.length;
+    int winding = 0;
+    b_.surface->tree.query(b_.frame->boxes, boxAround(p, far, 0.0), [&](Index face) {
+      const Triangle& t = b_.surface->triangles[face];
+      std::array<Vec3, 3> corner;
+      for (int k = 0; k < 3; ++k) corner[k] = b_.frame->vertices[t[k]] - p;
+      // Edges that the ray's shadow on the y axis crosses; each end belongs to one side, so that neighbours agree.
+      double crossed[2];  // z where they cross it
+      double x[2];
+      int edges = 0;
+      for (int k = 0; k < 3; ++k) {
+        // From the lower end to the upper, so that both faces of an edge compute the same.
+        const Vec3 &from = corner[k], &to = corner[(k + 1) % 3];
+        const Vec3& low = from.y() < to.y() ? from : to;
+        const Vec3& high = from.y() < to.y() ? to : from;
+        if (!(low.y() <= 0.0 && high.y() > 0.0)) continue;
+        const double s = -low.y() / (high.y() - low.y());
+        crossed[edges] = low.z() + s * (high.z() - low.z());
+        x[edges] = low.x() + s * (high.x() - low.x());
+        ++edges;
+      }
+      if (edges != 2 || (crossed[0] <= 0.0) == (crossed[1] <= 0.0)) return;
+      const double s = -crossed[0] / (crossed[1] - crossed[0]);
+      if (!(x[0] + s * (x[1] - x[0]) > 0.0)) return;
+      winding += (corner[1] - corner[0]).cross(corner[2] - corner[0]).x() > 0.0 ? 1 : -1;
+    });
+    return winding;
   }
 
   /// Of the face at a vertex; 1 elsewhere, where both sides count alike.
@@ -164,16 +202,14 @@ class VertexSearch {
   }
 
   void meetOutside(Index v, const Vec3& p, const Candidate& best) {
-    for (const Candidate& c : candidates_)
-      if (c.distance <= c.reach) {
-        const Triangle& t = b_.surface->triangles[c.face];
-        watched_.push_back({{v, t[0], t[1], t[2]}, 1});
-      }
+    watch(v, p, best);
     const Vec3& face_normal = b_.frame->face_normals[best.face];
     if (best.distance <= tie_) {
       Vec3 normal = face_normal;
       if (!b_.surface->closed && remembered_ && remembered_->normal.dot(normal) < 0.0) normal = -normal;
-      if (mayPush(v, normal)) add(v, best, normal, normal.dot(p - best.point));
+      if (mayPush(v, normal)) {
+        add(v, best, normal, normal.dot(p - best.point));
+      }
     } else if (best.distance <= best.reach) {
       const Vec3 normal = (p - best.point) / best.distance;
       if (mayPush(v, normal)) add(v, best, normal, best.distance);
@@ -189,6 +225,31 @@ class VertexSearch {
         continue;
       add(v, c, normal, c.distance);
     }
+  }
+
+  // The nearest face, and those that the plane between it and the vertex does not part from the vertex too.
+  void watch(Index v, const Vec3& p, const Candidate& best) {
+    std::array<std::pair<Vec3, double>, 4> planes;  // normal, and how high others may reach along it
+    std::size_t count = 0;
+    const auto isBelow = [&](const Triangle& t) {
+      for (std::size_t n = 0; n < count; ++n) {
+        double highest = -std::numeric_limits<double>::infinity();
+        for (const Index corner : t) highest = std::max(highest, planes[n].first.dot(b_.frame->vertices[corner] - p));
+        if (highest <= planes[n].second) return true;
+      }
+      return false;
+    };
+    const auto take = [&](const Candidate& c) {
+      const Triangle& t = b_.surface->triangles[c.face];
+      const bool touches = c.distance <= touching_;
+      if (touches && (&c != &best || !mayPush(v, b_.frame->face_normals[c.face]))) return;
+      const Vec3 normal = touches ? b_.frame->face_normals[c.face] : Vec3((p - c.point) / c.distance);
+      watched_.push_back({{v, t[0], t[1], t[2]}, 1, normal, touches ? -touching_ : kLeastLeft * c.distance});
+      if (count < planes.size()) planes[count++] = {normal, kSlope * search_.length - kStillApart * c.distance};
+    };
+    if (best.distance <= best.reach) take(best);
+    for (const Candidate& c : candidates_)
+      if (&c != &best && c.distance <= c.reach && !isBelow(b_.surface->triangles[c.face])) take(c);
   }
 
   // Out by the face that is near, that the vertex opposes, and on whose side it was.
@@ -232,7 +293,7 @@ class VertexSearch {
 
   const PairSearch& search_;
   const PairSearch::Side a_, b_;
-  const double tie_, margin_;
+  const double tie_, touching_, margin_;
   std::vector<FeaturePair>& pairs_;
   std::vector<RememberedSide>& sides_;
   std::vector<WatchedFeatures>& watched_;
@@ -242,12 +303,51 @@ class VertexSearch {
   std::array<Vec3, 3> used_;
 };
 
+// Ericson 2005, Real-Time Collision Detection, sec. 5.1.9.
+Vec3 betweenSegments(const Vec3& p, const Vec3& p_end, const Vec3& q, const Vec3& q_end, double& s, double& t) {
+  const Vec3 u = p_end - p, v = q_end - q, w = p - q;
+  const double a = u.squaredNorm(), e = v.squaredNorm(), f = v.dot(w);
+  s = t = 0.0;
+  if (a > 0.0 && e > 0.0) {
+    const double b = u.dot(v), c = u.dot(w), det = a * e - b * b;
+    s = det > 0.0 ? std::clamp((b * f - c * e) / det, 0.0, 1.0) : 0.0;
+    t = (b * s + f) / e;
+    if (t < 0.0) {
+      t = 0.0;
+      s = std::clamp(-c / a, 0.0, 1.0);
+    } else if (t > 1.0) {
+      t = 1.0;
+      s = std::clamp((b - c) / a, 0.0, 1.0);
+    }
+  } else if (a > 0.0) {
+    s = std::clamp(-u.dot(w) / a, 0.0, 1.0);
+  } else if (e > 0.0) {
+    t = std::clamp(f / e, 0.0, 1.0);
+  }
+  return w + s * u - t * v;
+}
+
 // Both of the arc's ends are as far from its middle: inside is who is nearer.
 bool isInArc(const SurfaceFrame& frame, const ContactEdge& edge, const Vec3& direction) {
   const Vec3& first = frame.face_normals[edge.faces[0]];
   if (edge.faces[1] == kNoIndex) return true;
   const Vec3 middle = (first + frame.face_normals[edge.faces[1]]).normalized();
   return direction.dot(middle) >= first.dot(middle) - 1e-9;
+}
+
+// Where they are near enough to meet in the frame.
+void watchEdges(const PairSearch& search, const ContactEdge& of_a, const ContactEdge& of_b,
+                std::vector<WatchedFeatures>& watched) {
+  const SurfaceFrame &a = *search.a.frame, &b = *search.b.frame;
+  const std::array<Index, 2>&va = of_a.vertices, &vb = of_b.vertices;
+  const PairDistance apart =
+      distanceOfPair(2, {a.vertices[va[0]], a.vertices[va[1]], b.vertices[vb[0]], b.vertices[vb[1]]});
+  if (apart.distance <= kTouching * search.length) return;
+  double fastest = 0.0;
+  for (const Index v : va)
+    for (const Index w : vb) fastest = std::max(fastest, (a.velocities[v] - b.velocities[w]).squaredNorm());
+  if (apart.distance > searchMargin(search.length) + kAhead * search.h * std::sqrt(fastest)) return;
+  watched.push_back({{va[0], va[1], vb[0], vb[1]}, 2, apart.between / apart.distance, kLeastLeft * apart.distance});
 }
 
 // Who is inside as a whole goes out by one face, the nearest to any of its vertices: each by a face of its own, they
@@ -274,7 +374,23 @@ void leadOut(const PairSearch& search, FoundFeatures& found) {
 
 }  // namespace
 
+PairDistance distanceOfPair(int of_a, const std::array<Vec3, 4>& corners) {
+  PairDistance nearest;
+  if (of_a == 1) {
+    const Vec3 weights = nearestWeights(corners[0], corners[1], corners[2], corners[3]);
+    nearest.shares = {1.0, -weights[0], -weights[1], -weights[2]};
+    nearest.between = corners[0] - weights[0] * corners[1] - weights[1] * corners[2] - weights[2] * corners[3];
+  } else {
+    double s = 0.0, t = 0.0;
+    nearest.between = betweenSegments(corners[0], corners[1], corners[2], corners[3], s, t);
+    nearest.shares = {1.0 - s, s, t - 1.0, -t};
+  }
+  nearest.distance = nearest.between.norm();
+  return nearest;
+}
+
 double searchMargin(double edge_length) { return kMargin * edge_length; }
+double touchingDistance(double edge_length) { return kTouching * edge_length; }
 
 std::vector<Index> verticesNear(const PairSearch& search) {
   double deepest = 0.0;
@@ -314,7 +430,7 @@ void findEdgeEdge(const PairSearch& search, FoundFeatures& found) {
     if (isOutOf(b.bounds, low, high, margin)) continue;
     const auto meet = [&](Index other) {
       const ContactEdge& of_b = sb.edges[other];
-      found.watched.push_back({{of_a.vertices[0], of_a.vertices[1], of_b.vertices[0], of_b.vertices[1]}, 2});
+      watchEdges(search, of_a, of_b, found.watched);
       const Vec3 &b0 = b.vertices[of_b.vertices[0]], &b1 = b.vertices[of_b.vertices[1]];
       const Vec3 along_a = a1 - a0, along_b = b1 - b0, between = a0 - b0;
       Vec3 normal = along_a.cross(along_b);

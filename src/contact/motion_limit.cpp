@@ -1,60 +1,26 @@
 #include "meshless_surgery/contact/motion_limit.h"
 
 #include <algorithm>
+#include <cmath>
+#include <tuple>
 
-#include "meshless_surgery/geometry/nearest_on_triangle.h"
+#include "meshless_surgery/contact/rigid_groups.h"
 
 namespace meshless {
 namespace {
 
-constexpr double kLeastLeft = 0.1;  // of the distance, after a substep
-constexpr int kPasses = 6;          // of impulses, and of holding back
-
-// Ericson 2005, Real-Time Collision Detection, sec. 5.1.9.
-Vec3 betweenSegments(const Vec3& p, const Vec3& p_end, const Vec3& q, const Vec3& q_end, double& s, double& t) {
-  const Vec3 u = p_end - p, v = q_end - q, w = p - q;
-  const double a = u.squaredNorm(), e = v.squaredNorm(), f = v.dot(w);
-  s = t = 0.0;
-  if (a > 0.0 && e > 0.0) {
-    const double b = u.dot(v), c = u.dot(w), det = a * e - b * b;
-    s = det > 0.0 ? std::clamp((b * f - c * e) / det, 0.0, 1.0) : 0.0;
-    t = (b * s + f) / e;
-    if (t < 0.0) {
-      t = 0.0;
-      s = std::clamp(-c / a, 0.0, 1.0);
-    } else if (t > 1.0) {
-      t = 1.0;
-      s = std::clamp((b - c) / a, 0.0, 1.0);
-    }
-  } else if (a > 0.0) {
-    s = std::clamp(-u.dot(w) / a, 0.0, 1.0);
-  } else if (e > 0.0) {
-    t = std::clamp(f / e, 0.0, 1.0);
-  }
-  return w + s * u - t * v;
-}
+constexpr int kPasses = 3;  // of so many rounds of impulses, before particles are held where they were
 
 }  // namespace
 
-PairDistance distanceOfPair(const WatchedPair& pair, const std::array<Vec3, 4>& corners) {
-  PairDistance nearest;
-  if (pair.of_a == 1) {
-    const Vec3 weights = nearestWeights(corners[0], corners[1], corners[2], corners[3]);
-    nearest.shares = {1.0, -weights[0], -weights[1], -weights[2]};
-    nearest.between = corners[0] - weights[0] * corners[1] - weights[1] * corners[2] - weights[2] * corners[3];
-  } else {
-    double s = 0.0, t = 0.0;
-    nearest.between = betweenSegments(corners[0], corners[1], corners[2], corners[3], s, t);
-    nearest.shares = {1.0 - s, s, t - 1.0, -t};
-  }
-  nearest.distance = nearest.between.norm();
-  return nearest;
+void WatchedSet::start() {
+  gone = 0.0;
+  until.assign(features.size(), 0.0);
 }
 
-double motionShare(const WatchedPair& pair, const std::array<Vec3, 4>& start, const std::array<Vec3, 4>& end,
-                   PairDistance& met) {
+double motionShare(int of_a, const std::array<Vec3, 4>& start, const std::array<Vec3, 4>& end, PairDistance& met) {
   constexpr int kMostAdvances = 40;
-  met = distanceOfPair(pair, start);
+  met = distanceOfPair(of_a, start);
   const double least = kLeastLeft * met.distance;
   double share = 0.0;
   for (int n = 0; n < kMostAdvances && met.distance > 0.0; ++n) {
@@ -63,7 +29,7 @@ double motionShare(const WatchedPair& pair, const std::array<Vec3, 4>& start, co
     double towards_a = 0.0, towards_b = 0.0;
     for (int k = 0; k < 4; ++k) {
       const double along = normal.dot(end[k] - start[k]);
-      if (k < pair.of_a)
+      if (k < of_a)
         towards_b = std::max(towards_b, -along);
       else
         towards_a = std::max(towards_a, along);
@@ -73,168 +39,211 @@ double motionShare(const WatchedPair& pair, const std::array<Vec3, 4>& start, co
     share += (met.distance - least) / (towards_a + towards_b);
     std::array<Vec3, 4> now;
     for (int k = 0; k < 4; ++k) now[k] = start[k] + share * (end[k] - start[k]);
-    met = distanceOfPair(pair, now);
+    met = distanceOfPair(of_a, now);
   }
   return share;
 }
 
-void MotionLimit::clear() {
-  points_.clear();
-  named_.clear();
-  pairs_.clear();
-}
+namespace {
 
-void MotionLimit::watch(Index a, Index b, const std::array<Index, 4>& vertices, std::uint8_t of_a) {
-  WatchedPair pair;
-  pair.of_a = of_a;
-  pairs_.push_back(pair);
-  for (int k = 0; k < 4; ++k) named_.push_back({k < of_a ? a : b, vertices[static_cast<std::size_t>(k)]});
-}
+class Limit {
+ public:
+  Limit(const std::vector<WatchedPairs>& pairs, std::vector<LimitedBody>& bodies, const std::vector<Index>& members,
+        LimitScratch& scratch)
+      : pairs_(pairs), bodies_(bodies), members_(members), scratch_(scratch) {}
 
-void MotionLimit::begin(const std::vector<LimitedBody>& bodies,
-                        const std::function<Vec3(const LimitedPoint&)>& vertex_at, double touching) {
-  touching_ = touching;
-  points_ = named_;
-  std::sort(points_.begin(), points_.end());
-  points_.erase(std::unique(points_.begin(), points_.end()), points_.end());
-  for (std::size_t n = 0; n < named_.size(); ++n)
-    pairs_[n / 4].corners[n % 4] =
-        static_cast<Index>(std::lower_bound(points_.begin(), points_.end(), named_[n]) - points_.begin());
-  offsets_.assign(points_.size(), Vec3::Zero());
-  place(bodies, false, end_);
-  for (std::size_t p = 0; p < points_.size(); ++p) offsets_[p] = vertex_at(points_[p]) - end_[p];
-  lengths_.resize(points_.size());
-}
-
-void MotionLimit::place(const std::vector<LimitedBody>& bodies, bool before, Points& at) const {
-  at.resize(points_.size());
-  for (std::size_t p = 0; p < points_.size(); ++p) {
-    const LimitedBody& body = bodies[points_[p].body];
-    at[p] = offsets_[p] + body.supports->sum(points_[p].vertex, before && body.moves ? body.previous : body.positions);
-  }
-}
-
-double MotionLimit::shareOf(const std::vector<LimitedBody>& bodies, const WatchedPair& pair, PairDistance& met) const {
-  std::array<Vec3, 4> start, end;
-  for (std::size_t k = 0; k < 4; ++k) {
-    const LimitedPoint& point = points_[pair.corners[k]];
-    start[k] = start_[pair.corners[k]];
-    end[k] = offsets_[pair.corners[k]] + bodies[point.body].supports->sum(point.vertex, bodies[point.body].positions);
-  }
-  return motionShare(pair, start, end, met);
-}
-
-void MotionLimit::findMeeting(const std::vector<LimitedBody>& bodies) {
-  place(bodies, false, end_);
-  for (std::size_t p = 0; p < points_.size(); ++p) lengths_[p] = (end_[p] - start_[p]).norm();
-  meeting_.clear();
-  for (Index n = 0; n < pairs_.size(); ++n) {
-    WatchedPair& pair = pairs_[n];
-    double of_a = 0.0, of_b = 0.0;
-    for (int k = 0; k < 4; ++k) {
-      double& most = k < pair.of_a ? of_a : of_b;
-      most = std::max(most, lengths_[pair.corners[k]]);
+  /// Those that would meet: of all that may by how far bodies have gone, and then of what has been edited.
+  std::size_t find() {
+    for (const Index b : members_) again_ ? bodies_[b].placeEdited() : bodies_[b].place();
+    scratch_.meeting.clear();
+    for (std::size_t n = 0; n < pairs_.size(); ++n) {
+      const WatchedPairs& pairs = pairs_[n];
+      WatchedSet& set = *pairs.set;
+      if (!again_) set.gone += bodies_[pairs.a].way + bodies_[pairs.b].way;
+      for (std::size_t f = 0; f < set.features.size(); ++f)
+        if (again_ ? isMoved(pairs, set.features[f]) : set.gone > set.until[f])
+          if (wouldMeet(pairs, f)) scratch_.meeting.push_back({n, f});
     }
-    if (of_a + of_b < (1.0 - kLeastLeft) * pair.slack) {
-      pair.slack -= of_a + of_b;
-      continue;
-    }
-    std::array<Vec3, 4> start;
-    for (std::size_t k = 0; k < 4; ++k) start[k] = start_[pair.corners[k]];
-    const double distance = distanceOfPair(pair, start).distance;
-    pair.slack = std::max(0.0, distance - of_a - of_b);
-    if (!(distance > touching_) || of_a + of_b < (1.0 - kLeastLeft) * distance) continue;
-    PairDistance met;
-    if (shareOf(bodies, pair, met) < 1.0) meeting_.push_back(n);
+    again_ = true;
+    for (const Index b : members_) std::fill(bodies_[b].edited.begin(), bodies_[b].edited.end(), 0);
+    return scratch_.meeting.size();
   }
-}
 
-// An impulse along what is between them where they meet, that leaves twice of it.
-void MotionLimit::part(const std::vector<LimitedBody>& bodies, const WatchedPair& pair, const PairDistance& met) {
-  if (!(met.distance > 0.0)) return;
-  const Vec3 normal = met.between / met.distance;
-  held_.clear();
-  double gap = 0.0;
-  for (std::size_t k = 0; k < 4; ++k) {
-    const LimitedPoint& point = points_[pair.corners[k]];
-    const LimitedBody& body = bodies[point.body];
-    gap += met.shares[k] * normal.dot(offsets_[pair.corners[k]] + body.supports->sum(point.vertex, body.positions));
-    if (!body.moves) continue;
-    for (Index n = body.supports->offsets[point.vertex]; n < body.supports->offsets[point.vertex + 1]; ++n) {
-      const Index particle = body.supports->particles[n];
-      const double coefficient = met.shares[k] * body.supports->weights[n];
-      const auto known = std::find_if(held_.begin(), held_.end(), [&](const Held& held) {
-        return held.body == point.body && held.particle == particle;
+  // An impulse along what is between them where they meet, that leaves twice of it.
+  void part() {
+    for (const LimitScratch::Meeting& meeting : scratch_.meeting) {
+      const WatchedPairs& pairs = pairs_[meeting.pairs];
+      const WatchedFeatures& watched = pairs.set->features[meeting.features];
+      std::array<Vec3, 4> start, end;
+      place(pairs, watched, start, end);
+      PairDistance met;
+      if (watched.least < 0.0)
+        met = distanceOfPair(watched.of_a, start);
+      else if (motionShare(watched.of_a, start, end, met) == 1.0 || !(met.distance > 0.0))
+        continue;
+      const Vec3 normal = watched.least < 0.0 ? watched.normal : Vec3(met.between / met.distance);
+      double gap = 0.0;
+      for (std::size_t k = 0; k < 4; ++k) gap += met.shares[k] * normal.dot(end[k]);
+      scratch_.held.clear();
+      eachSupport(pairs, watched, [&](Index body, Index particle, std::size_t corner, double weight) {
+        const double coefficient = met.shares[corner] * weight;
+        for (LimitScratch::Held& held : scratch_.held)
+          if (held.body == body && held.particle == particle) {
+            held.share += coefficient;
+            return;
+          }
+        scratch_.held.push_back({body, particle, coefficient});
       });
-      if (known != held_.end())
-        known->share += coefficient;
-      else
-        held_.push_back({point.body, particle, coefficient});
+      double answer = 0.0;
+      for (const LimitScratch::Held& held : scratch_.held)
+        answer += held.share * held.share * bodies_[held.body].inverse_masses[held.particle];
+      const double impulse = (2.0 * met.distance - gap) / answer;
+      if (!(answer > 0.0) || !(impulse > 0.0)) continue;
+      for (const LimitScratch::Held& held : scratch_.held) {
+        LimitedBody& body = bodies_[held.body];
+        body.positions[held.particle] += held.share * body.inverse_masses[held.particle] * impulse * normal;
+        body.edited[held.particle] = 1;
+      }
     }
   }
-  double answer = 0.0;
-  for (const Held& held : held_) answer += held.share * held.share * bodies[held.body].inverse_masses[held.particle];
-  const double impulse = (2.0 * met.distance - gap) / answer;
-  if (!(answer > 0.0) || !(impulse > 0.0)) return;
-  for (const Held& held : held_) {
-    const LimitedBody& body = bodies[held.body];
-    body.positions[held.particle] += held.share * body.inverse_masses[held.particle] * impulse * normal;
-  }
-}
 
-std::size_t MotionLimit::holdBack(const std::vector<LimitedBody>& bodies, double& least) {
-  findMeeting(bodies);
-  held_.clear();
-  least = 1.0;
-  for (const Index n : meeting_) {
-    PairDistance met;
-    const double share = shareOf(bodies, pairs_[n], met);
-    least = std::min(least, share);
-    for (const Index corner : pairs_[n].corners) {
-      const LimitedPoint& point = points_[corner];
-      const LimitedBody& body = bodies[point.body];
+  /// Particles of those that meet stay where they were. Each pass holds more of them, so that passes end.
+  void hold() {
+    for (const LimitScratch::Meeting& meeting : scratch_.meeting) {
+      const WatchedPairs& pairs = pairs_[meeting.pairs];
+      eachSupport(pairs, pairs.set->features[meeting.features], [&](Index body, Index particle, std::size_t, double) {
+        bodies_[body].positions[particle] = bodies_[body].previous[particle];
+        bodies_[body].edited[particle] = 1;
+      });
+    }
+  }
+
+ private:
+  bool wouldMeet(const WatchedPairs& pairs, std::size_t f) {
+    WatchedFeatures& watched = pairs.set->features[f];
+    double& until = pairs.set->until[f];
+    const Vec3 *const of_a = bodies_[pairs.a].vertices.data(), *const of_b = bodies_[pairs.b].vertices.data();
+    const double height = heightOver(watched, of_a, of_b);
+    if (height > watched.least) {
+      until = pairs.set->gone + height - std::max(0.0, watched.least);
+      return false;
+    }
+    std::array<Vec3, 4> start, end;
+    place(pairs, watched, start, end);
+    PairDistance met = distanceOfPair(watched.of_a, start);
+    if (watched.least < 0.0 && !(met.distance > -watched.least)) {
+      const double now = alongNormal(watched, met, end);
+      return now < watched.least && now < alongNormal(watched, met, start);
+    }
+    if (!(met.distance > pairs.touching) || (watched.least < 0.0 && watched.normal.dot(met.between) < 0.0))
+      return false;
+    watched.normal = met.between / met.distance;
+    watched.least = kLeastLeft * met.distance;
+    return heightOver(watched, of_a, of_b) <= watched.least && motionShare(watched.of_a, start, end, met) < 1.0;
+  }
+
+  /// [m] of the lowest corner of a over the highest of b.
+  static double heightOver(const WatchedFeatures& watched, const Vec3* of_a, const Vec3* of_b) {
+    const Vec3& n = watched.normal;
+    const auto& v = watched.vertices;
+    if (watched.of_a == 1)
+      return n.dot(of_a[v[0]]) - std::max({n.dot(of_b[v[1]]), n.dot(of_b[v[2]]), n.dot(of_b[v[3]])});
+    return std::min(n.dot(of_a[v[0]]), n.dot(of_a[v[1]])) - std::max(n.dot(of_b[v[2]]), n.dot(of_b[v[3]]));
+  }
+
+  bool isMoved(const WatchedPairs& pairs, const WatchedFeatures& watched) const {
+    for (std::size_t k = 0; k < 4; ++k)
+      if (bodies_[k < watched.of_a ? pairs.a : pairs.b].vertex_moved[watched.vertices[k]]) return true;
+    return false;
+  }
+
+  static double alongNormal(const WatchedFeatures& watched, const PairDistance& at,
+                            const std::array<Vec3, 4>& corners) {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < 4; ++k) sum += at.shares[k] * watched.normal.dot(corners[k]);
+    return sum;
+  }
+
+  void place(const WatchedPairs& pairs, const WatchedFeatures& watched, std::array<Vec3, 4>& start,
+             std::array<Vec3, 4>& end) const {
+    for (std::size_t k = 0; k < 4; ++k) {
+      const LimitedBody& body = bodies_[k < watched.of_a ? pairs.a : pairs.b];
+      end[k] = body.vertexAt(watched.vertices[k], body.positions);
+      start[k] = body.moves ? body.vertexAt(watched.vertices[k], body.previous) : end[k];
+    }
+  }
+
+  template <class Visit>
+  void eachSupport(const WatchedPairs& pairs, const WatchedFeatures& watched, const Visit& visit) const {
+    for (std::size_t k = 0; k < 4; ++k) {
+      const Index number = k < watched.of_a ? pairs.a : pairs.b;
+      const LimitedBody& body = bodies_[number];
       if (!body.moves) continue;
-      for (Index k = body.supports->offsets[point.vertex]; k < body.supports->offsets[point.vertex + 1]; ++k)
-        held_.push_back({point.body, body.supports->particles[k], share});
+      for (Index n = body.supports->offsets[watched.vertices[k]]; n < body.supports->offsets[watched.vertices[k] + 1];
+           ++n)
+        visit(number, body.supports->particles[n], k, body.supports->weights[n]);
     }
   }
-  return meeting_.size();
+
+  const std::vector<WatchedPairs>& pairs_;
+  std::vector<LimitedBody>& bodies_;
+  const std::vector<Index>& members_;
+  LimitScratch& scratch_;
+  bool again_ = false;  // only what has been edited since the last find()
+};
+
+/// Mass, momentum and angular momentum times h, about the origin of the first particle, and how hard they are to turn.
+struct Momentum {
+  double mass = 0.0;
+  Vec3 centre = Vec3::Zero(), linear = Vec3::Zero(), angular = Vec3::Zero();
+  Mat3 inertia = Mat3::Zero();
+};
+Momentum momentumOf(const std::vector<LimitedBody>& bodies, const std::vector<Index>& members) {
+  Momentum all;
+  const Vec3& origin = bodies[members.front()].previous[0];
+  Mat3 moment = Mat3::Zero();
+  for (const Index b : members)
+    for (Index i = 0; i < bodies[b].particles; ++i) {
+      const double m = 1.0 / bodies[b].inverse_masses[i];
+      const Vec3 arm = bodies[b].previous[i] - origin, way = m * (bodies[b].positions[i] - bodies[b].previous[i]);
+      all.mass += m;
+      all.centre += m * arm;
+      all.linear += way;
+      all.angular += arm.cross(way);
+      moment += m * arm * arm.transpose();
+    }
+  all.centre /= all.mass;
+  all.angular -= all.centre.cross(all.linear);
+  moment -= all.mass * all.centre * all.centre.transpose();
+  all.inertia = moment.trace() * Mat3::Identity() - moment;
+  all.centre += origin;
+  return all;
 }
 
-std::size_t MotionLimit::apply(const std::vector<LimitedBody>& bodies, const std::vector<Index>& members) {
-  if (pairs_.empty()) return 0;
-  place(bodies, true, start_);
-  std::size_t met = 0;
-  for (int pass = 0; pass < kPasses; ++pass) {
-    findMeeting(bodies);
-    if (meeting_.empty()) return met;
-    if (pass == 0) met = meeting_.size();
-    for (const Index n : meeting_) {
-      PairDistance where;
-      if (shareOf(bodies, pairs_[n], where) < 1.0) part(bodies, pairs_[n], where);
-    }
-  }
-  double least = 1.0;
-  for (int pass = 0; pass < kPasses; ++pass) {
-    if (holdBack(bodies, least) == 0) return met;
-    // The least share of each particle.
-    std::sort(held_.begin(), held_.end(), [](const Held& x, const Held& y) {
-      return std::tie(x.body, x.particle, x.share) < std::tie(y.body, y.particle, y.share);
-    });
-    for (std::size_t n = 0; n < held_.size(); ++n) {
-      if (n > 0 && held_[n].body == held_[n - 1].body && held_[n].particle == held_[n - 1].particle) continue;
-      const LimitedBody& body = bodies[held_[n].body];
-      const Vec3& from = body.previous[held_[n].particle];
-      Vec3& to = body.positions[held_[n].particle];
-      to = from + held_[n].share * (to - from);
-    }
-  }
-  // All on their straight ways, and none farther than the first to meet.
-  if (holdBack(bodies, least) == 0) return met;
-  for (const Index member : members)
-    for (Index i = 0; i < bodies[member].particles; ++i)
-      bodies[member].positions[i] =
-          bodies[member].previous[i] + least * (bodies[member].positions[i] - bodies[member].previous[i]);
+}  // namespace
+
+std::size_t limitMotion(const std::vector<WatchedPairs>& pairs, std::vector<LimitedBody>& bodies,
+                        const std::vector<Index>& members, bool free, LimitScratch& scratch) {
+  if (pairs.empty()) return 0;
+  Limit limit(pairs, bodies, members, scratch);
+  const std::size_t met = limit.find();
+  if (met == 0) return 0;
+  Momentum before;
+  if (free) before = momentumOf(bodies, members);
+  int pass = 0;
+  do {
+    if (pass++ < kPasses)
+      for (int n = 0; n < kPasses; ++n) limit.part();
+    else
+      limit.hold();
+  } while (limit.find() > 0);
+  if (!free) return met;
+  const Momentum after = momentumOf(bodies, members);
+  const Vec3 shift = (before.linear - after.linear) / before.mass;
+  const Vec3 turn = inverseInertia(before.inertia) * (before.angular - after.angular);
+  for (const Index b : members)
+    for (Index i = 0; i < bodies[b].particles; ++i)
+      bodies[b].positions[i] += shift + turn.cross(bodies[b].previous[i] - before.centre);
   return met;
 }
 

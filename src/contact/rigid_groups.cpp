@@ -34,18 +34,18 @@ Mat3 inverseInertia(const Mat3& inertia) {
   return inverse;
 }
 
-GroupMotion groupAt(const RigidGroups& groups, Index group, const Vec3* positions) {
+GroupMotion groupAt(const RigidGroups& groups, Index group, const std::function<Vec3(Index particle)>& position) {
   GroupMotion motion;
   motion.current = true;
   const Index begin = groups.offsets[group], end = groups.offsets[group + 1];
-  const Vec3& origin = positions[groups.members[begin]];
+  const Vec3 origin = position(groups.members[begin]);
   double mass = 0.0;
   Vec3 sum = Vec3::Zero();
   Mat3 moment = Mat3::Zero();
   for (Index k = begin; k < end; ++k) {
     const Index i = groups.members[k];
     const double m = groups.weights[k] * groups.masses[i];
-    const Vec3 arm = positions[i] - origin;
+    const Vec3 arm = position(i) - origin;
     mass += m;
     sum += m * arm;
     moment += m * arm * arm.transpose();

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <utility>
 
 namespace meshless {
 namespace {
 
-constexpr Index kChunk = 256;                            // vertices of a task
-constexpr double kTolerance = 1e-3;                      // of the mean edge, of the solver in a substep
-constexpr double kTouching = 1e-3;                       // of the mean edge: nearer than this nothing is held apart
+constexpr double kSkin = 0.05;                           // of the mean edge: surfaces rest so far above each other
+constexpr double kAhead = 1.2;                           // times the way of a frame: who speeds up is met too
 constexpr std::uint64_t kGroundKey = ~std::uint64_t{0};  // beyond those of bodies and obstacles
 constexpr std::uint64_t kSphereKey = kGroundKey - 1;
 
@@ -28,36 +28,42 @@ Box grown(const Box& box, double by) {
   return larger;
 }
 
-RowBody rowBody(const Collider& c, Index number) {
-  RowBody body;
-  body.number = number;
-  body.surface = c.surface;
-  body.inverse_masses = c.inverse_masses;
-  body.positions = c.positions;
-  body.own_share = 1.0 - c.rigid_share;
-  body.moves = c.moves;
-  return body;
+double restitutionOf(const Collider& a, const Collider* b) {
+  if (!b || b->obstacle) return a.restitution;
+  return a.obstacle ? b->restitution : std::sqrt(a.restitution * b->restitution);
+}
+
+// Rows ascend by their names where features do.
+const ContactRow* rowOfName(const std::vector<ContactRow>& rows, const ContactRow& like) {
+  const auto at = std::lower_bound(rows.begin(), rows.end(), like,
+                                   [](const ContactRow& x, const ContactRow& y) { return x.name() < y.name(); });
+  return at != rows.end() && at->name() == like.name() ? &*at : nullptr;
 }
 
 }  // namespace
 
-void SurfaceContacts::begin(const std::vector<Collider>& colliders) {
-  memory_ = memory();
-  set_.clear();
-  sides_.clear();
-  moving_.clear();
-  islands_.clear();
-  std::set<std::uint64_t> there{kGroundKey, kSphereKey};
-  for (const Collider& c : colliders) there.insert(c.key);
-  memory_.filter([&](std::uint64_t a, std::uint64_t b) { return there.count(a) && there.count(b); });
+SurfaceContacts::Pair& SurfaceContacts::pairOf(Kind kind, const std::vector<Collider>& colliders, Index a, Index b,
+                                               std::uint64_t key_b) {
+  std::unique_ptr<Pair>& pair = known_[{colliders[a].key, key_b, kind}];
+  if (!pair) {
+    pair = std::make_unique<Pair>();
+    pair->kind = kind;
+    pair->key_a = colliders[a].key;
+    pair->key_b = key_b;
+  }
+  pair->a = a;
+  pair->b = b;
+  pairs_.push_back(pair.get());
+  return *pair;
 }
 
 void SurfaceContacts::findPairs(const SurfaceScene& scene, const std::vector<Collider>& colliders,
                                 ContactCounters& counters) {
-  const std::size_t count = colliders.size();
+  const Index count = static_cast<Index>(colliders.size());
   std::vector<Box> boxes(count);
   std::vector<char> active(count);
   needed_.assign(count, 0);
+  pairs_.clear();
   std::optional<Box> sphere;
   if (scene.sphere) {
     sphere.emplace();
@@ -65,200 +71,230 @@ void SurfaceContacts::findPairs(const SurfaceScene& scene, const std::vector<Col
     sphere->extend(scene.sphere->centre + scene.sphere->way);
     *sphere = grown(*sphere, scene.sphere->radius);
   }
-  for (std::size_t c = 0; c < count; ++c) {
+  std::map<std::uint64_t, Index> number;
+  for (Index c = 0; c < count; ++c) {
     const Collider& collider = colliders[c];
+    number[collider.key] = c;
     active[c] = collider.moves;
+    needed_[c] = collider.grasped;
     if (collider.bounds.empty()) continue;
     boxes[c] = grown(collider.bounds, searchMargin(collider.edge_length));
     if (!collider.moves) continue;
-    if (scene.ground && boxes[c].min.z() <= *scene.ground) needed_[c] = 1;
-    if (sphere && boxes[c].overlaps(*sphere)) needed_[c] = 1;
-    if (scene.between_bodies && collider.self != PairSearch::Self::kNo) needed_[c] = 1;
+    if (scene.ground && boxes[c].min.z() <= *scene.ground) pairOf(Kind::kGround, colliders, c, kNoIndex, kGroundKey);
+    if (sphere && boxes[c].overlaps(*sphere)) pairOf(Kind::kSphere, colliders, c, kNoIndex, kSphereKey);
+    if (collider.self != PairSearch::Self::kNo) pairOf(Kind::kVertexFace, colliders, c, c, collider.key);
   }
-  near_.clear();
-  if (!scene.between_bodies) return;
-  near_ = broad_phase_.find(boxes, active);
-  counters.pairs += near_.size();
-  counters.bounds_tested += broad_phase_.tested();
-  for (const auto& [a, b] : near_) needed_[a] = needed_[b] = 1;
-}
-
-PairSearch SurfaceContacts::searchOf(const SurfaceScene& scene, const std::vector<Collider>& colliders, Index a,
-                                     Index b, std::vector<RememberedSide>& remembered) const {
-  PairSearch search;
-  search.a = {colliders[a].surface, &frames_[a]};
-  search.b = {colliders[b].surface, &frames_[b]};
-  search.h = scene.h;
-  search.length = std::min(colliders[a].edge_length, colliders[b].edge_length);
-  if (a == b) search.self = colliders[a].self;
-  remembered.clear();
-  const auto [first, end] = memory_.sidesOf(colliders[a].key, colliders[b].key);
-  for (std::size_t k = first; k < end; ++k) remembered.push_back(memory_.sides[k].side);
-  search.first = remembered.empty();
-  search.remembered = remembered.data();
-  search.remembered_count = remembered.size();
-  return search;
-}
-
-void SurfaceContacts::listTasks(const SurfaceScene& scene, const std::vector<Collider>& colliders,
-                                const ForEach& for_each) {
-  tasks_.clear();
-  looking_.clear();
-  const auto addVertices = [&](Index a, Index b) { looking_.push_back({a, b}); };
-  for (Index c = 0; c < colliders.size(); ++c) {
-    if (!needed_[c] || !colliders[c].moves) continue;
-    const double margin = searchMargin(colliders[c].edge_length);
-    if (scene.ground && frames_[c].bounds.min.z() - margin <= *scene.ground)
-      tasks_.push_back({Task::Kind::kGround, c, kNoIndex});
-    if (scene.sphere) tasks_.push_back({Task::Kind::kSphere, c, kNoIndex});
-    if (scene.between_bodies && colliders[c].self != PairSearch::Self::kNo) addVertices(c, c);
-  }
-  for (const auto& [a, b] : near_) {
+  for (const auto& [a, b] : broad_phase_.find(boxes, active)) {
     if (colliders[a].obstacle && colliders[b].obstacle) continue;
-    if (!grown(frames_[a].bounds, searchMargin(std::min(colliders[a].edge_length, colliders[b].edge_length)))
-             .overlaps(frames_[b].bounds))
-      continue;
-    addVertices(a, b);
-    addVertices(b, a);
-    tasks_.push_back({Task::Kind::kEdgeEdge, a, b});
+    ++counters.pairs;
+    pairOf(Kind::kVertexFace, colliders, a, b, colliders[b].key);
+    pairOf(Kind::kVertexFace, colliders, b, a, colliders[a].key);
+    pairOf(Kind::kEdgeEdge, colliders, a, b, colliders[b].key);
   }
-  near_vertices_.resize(looking_.size());
-  runEach(for_each, looking_.size(), [&](std::size_t n) {
-    std::vector<RememberedSide> remembered;
-    near_vertices_[n] = verticesNear(searchOf(scene, colliders, looking_[n][0], looking_[n][1], remembered));
-  });
-  for (Index n = 0; n < looking_.size(); ++n) {
-    const Index count = static_cast<Index>(near_vertices_[n].size());
-    for (Index v = 0; v < count; v += kChunk)
-      tasks_.push_back({Task::Kind::kVertexFace, looking_[n][0], looking_[n][1], n, v, std::min(count, v + kChunk)});
+  counters.bounds_tested += broad_phase_.tested();
+  for (const Pair* pair : pairs_) {
+    needed_[pair->a] = 1;
+    if (pair->b != kNoIndex) needed_[pair->b] = 1;
+  }
+  // Between those that sleep all stays as it was; what is apart is forgotten.
+  std::set<const Pair*> near(pairs_.begin(), pairs_.end());
+  for (auto at = known_.begin(); at != known_.end();) {
+    const Pair& pair = *at->second;
+    const auto a = number.find(pair.key_a), b = number.find(pair.key_b);
+    const bool still = a != number.end() && !colliders[a->second].moves &&
+                       (pair.key_b == kGroundKey || (b != number.end() && !colliders[b->second].moves));
+    at = still || near.count(&pair) ? std::next(at) : known_.erase(at);
   }
 }
 
-void SurfaceContacts::placeFrames(const SurfaceScene& scene, const std::vector<Collider>& colliders,
-                                  const ForEach& for_each) {
-  frames_.resize(colliders.size());
-  frame_of_.resize(colliders.size(), 0);
-  runEach(for_each, colliders.size(), [&](std::size_t c) {
-    const Collider& collider = colliders[c];
-    if (!needed_[c]) {
-      frame_of_[c] = 0;
-      return;
+void SurfaceContacts::findMoved(const SurfaceScene& scene, const std::vector<Collider>& colliders) {
+  const Index count = static_cast<Index>(colliders.size());
+  for (auto at = ways_.begin(); at != ways_.end();) {
+    const bool near = std::any_of(colliders.begin(), colliders.end(), [&](const Collider& c) {
+      return c.key == at->first && (needed_[&c - colliders.data()] || !c.moves);  // rows of who sleeps count from it
+    });
+    at = near ? std::next(at) : ways_.erase(at);
+  }
+  std::vector<KeptWay*> ways(count, nullptr);
+  for (Index c = 0; c < count; ++c)
+    if (needed_[c]) {
+      ways[c] = &ways_[colliders[c].key];
+      ways[c]->key = colliders[c].key;
     }
-    if (collider.obstacle && frame_of_[c] == collider.key) return;
-    frame_of_[c] = collider.obstacle ? collider.key : 0;
-    placeFrame(*collider.surface, collider.vertices, collider.moves ? collider.velocities : nullptr, scene.h,
-               frames_[c]);
-  });
+  for (Index c = 0; c < count; ++c) {
+    if (!ways[c] || colliders[c].obstacle) continue;
+    KeptWay& way = *ways[c];
+    const Collider& collider = colliders[c];
+    const VertexSupports& supports = collider.surface->supports;
+    const Index vertices = collider.surface->vertices();
+    const bool known = way.last.size() == vertices;
+    way.last.resize(vertices, Vec3::Zero());
+    double farthest = 0.0, fastest = 0.0;
+    for (Index v = 0; v < vertices && collider.moves; ++v) {
+      const Vec3 place = supports.sum(v, collider.positions);
+      farthest = std::max(farthest, (place - way.last[v]).squaredNorm());
+      fastest = std::max(fastest, supports.sum(v, collider.velocities).squaredNorm());
+      way.last[v] = place;
+    }
+    way.ahead = kAhead * scene.h * std::sqrt(fastest);
+    if (known) way.gone += std::sqrt(farthest);
+  }
+  moved_.assign(count, 0);
+  for (Pair* pair : pairs_) {
+    const Collider& a = colliders[pair->a];
+    const Collider* const b = pair->b == kNoIndex ? nullptr : &colliders[pair->b];
+    const double length = b ? std::min(a.edge_length, b->edge_length) : a.edge_length;
+    const double skin = b ? kSkin * std::min(a.edge_length, b->edge_length) : 0.0;
+    double gone = ways[pair->a]->gone - pair->way_a + ways[pair->a]->ahead;
+    if (b) gone += ways[pair->b]->gone - pair->way_b + ways[pair->b]->ahead;
+    pair->stale =
+        !pair->found || pair->kind == Kind::kSphere || restitutionOf(a, b) > 0.0 || gone > searchMargin(length) - skin;
+    if (!pair->stale) continue;
+    pair->way_a = ways[pair->a]->gone;
+    if (b) pair->way_b = ways[pair->b]->gone;
+    moved_[pair->a] = 1;
+    if (b) moved_[pair->b] = 1;
+  }
 }
 
 void SurfaceContacts::find(const SurfaceScene& scene, const std::vector<Collider>& colliders, ContactCounters& counters,
                            const ForEach& for_each) {
-  frame_h_ = scene.h;
-  moving_.clear();
-  for (const Collider& c : colliders)
-    if (c.moves) moving_.push_back(c.key);
-  std::sort(moving_.begin(), moving_.end());
-  placeFrames(scene, colliders, for_each);
-  listTasks(scene, colliders, for_each);
-  if (found_.size() < tasks_.size()) found_.resize(tasks_.size());
-  runEach(for_each, tasks_.size(), [&](std::size_t t) {
-    findTask(scene, colliders, tasks_[t], found_[t]);
-    makeRows(scene, colliders, tasks_[t], found_[t]);
+  frames_.resize(colliders.size());
+  frame_of_.resize(colliders.size(), 0);
+  runEach(for_each, colliders.size(), [&](std::size_t c) {
+    const Collider& collider = colliders[c];
+    if (!moved_[c] || (collider.obstacle && frame_of_[c] == collider.key)) return;
+    frame_of_[c] = collider.obstacle ? collider.key : 0;
+    placeFrame(*collider.surface, collider.vertices, collider.moves ? collider.velocities : nullptr, scene.h,
+               frames_[c]);
+    Points& offsets = ways_.find(collider.key)->second.offsets;
+    offsets.resize(collider.surface->vertices());
+    for (Index v = 0; v < offsets.size(); ++v)
+      offsets[v] = frames_[c].vertices[v] - collider.surface->supports.sum(v, collider.positions);
   });
-  set_.clear();
-  sides_.clear();
-  reached_.clear();
-  for (std::size_t t = 0; t < tasks_.size(); ++t) {
-    const Found& found = found_[t];
-    set_.append(found.rows);
-    counters.lookups += found.looked;
-    for (const RememberedSide& side : found.features.sides)
-      sides_.push_back({colliders[tasks_[t].a].key, colliders[tasks_[t].b].key, side});
+  const auto isEdges = [this](std::size_t n) { return pairs_[n]->kind == Kind::kEdgeEdge; };
+  runEach(for_each, pairs_.size(), [&](std::size_t n) {
+    if (pairs_[n]->stale && !isEdges(n)) findPair(scene, colliders, *pairs_[n]);
+  });
+  runEach(for_each, pairs_.size(), [&](std::size_t n) {  // these ask who is inside
+    if (pairs_[n]->stale && isEdges(n)) findPair(scene, colliders, *pairs_[n]);
+  });
+  for (const Pair* pair : pairs_) {
+    counters.contacts += pair->set.rows.size();
+    if (pair->stale) counters.lookups += pair->set.rows.size();
   }
-  counters.contacts += set_.rows.size();
-  for (const ContactRow& row : set_.rows) {
-    if (row.b == kNoIndex) continue;
-    for (const Index c : {row.a, row.b})
-      if (!colliders[c].moves && !colliders[c].obstacle && row.gap + scene.h * approach(colliders, row) < 0.0)
-        reached_.push_back(c);
-  }
-  std::sort(reached_.begin(), reached_.end());
-  reached_.erase(std::unique(reached_.begin(), reached_.end()), reached_.end());
+  listReached(scene, colliders);
   joinIslands(colliders);
 }
 
-double SurfaceContacts::approach(const std::vector<Collider>& colliders, const ContactRow& row) const {
-  Vec3 velocity = Vec3::Zero();
-  for (Index k = row.begin; k < row.end; ++k) {
-    const Collider& c = colliders[k < row.middle ? row.a : row.b];
-    if (c.moves) velocity += set_.entries[k].coefficient * c.velocities[set_.entries[k].particle];
+void SurfaceContacts::findPair(const SurfaceScene& scene, const std::vector<Collider>& colliders, Pair& pair) const {
+  const Collider& a = colliders[pair.a];
+  const Collider& b = colliders[pair.b == kNoIndex ? pair.a : pair.b];
+  FoundFeatures found;
+  PairSearch search;
+  search.a = {a.surface, &frames_[pair.a]};
+  search.b = {b.surface, &frames_[pair.b == kNoIndex ? pair.a : pair.b]};
+  search.h = scene.h;
+  search.length = std::min(a.edge_length, b.edge_length);
+  if (pair.a == pair.b) search.self = a.self;
+  search.remembered = pair.sides.data();
+  search.remembered_count = pair.sides.size();
+  search.first = !pair.found;
+  switch (pair.kind) {
+    case Kind::kGround:
+      findPlane(search, *scene.ground, found.pairs);
+      break;
+    case Kind::kSphere:
+      findSphere(search, scene.sphere->centre, scene.sphere->radius, scene.sphere->way, found.pairs);
+      break;
+    case Kind::kEdgeEdge:
+      findEdgeEdge(search, found);
+      // What is inside must be free to come out.
+      if (isInside(pair.key_a, pair.key_b) || isInside(pair.key_b, pair.key_a)) found.watched.clear();
+      break;
+    case Kind::kVertexFace: {
+      const std::vector<Index> near = verticesNear(search);
+      findVertexFace(search, near.data(), near.size(), found);
+    }
   }
-  return row.normal.dot(velocity);
+  makeRows(scene, colliders, found, pair);
+  pair.sides = std::move(found.sides);
+  pair.watched.features = std::move(found.watched);
+  pair.watched.start();
+  pair.found = true;
 }
 
-void SurfaceContacts::findTask(const SurfaceScene& scene, const std::vector<Collider>& colliders, const Task& task,
-                               Found& found) const {
-  found.features.pairs.clear();
-  found.features.sides.clear();
-  found.features.watched.clear();
-  found.rows.clear();
-  found.looked = 0;
-  std::vector<RememberedSide> remembered;
-  const bool alone = task.b == kNoIndex;
-  const PairSearch search = searchOf(scene, colliders, task.a, alone ? task.a : task.b, remembered);
-  switch (task.kind) {
-    case Task::Kind::kGround:
-      return findPlane(search, *scene.ground, found.features.pairs);
-    case Task::Kind::kSphere:
-      return findSphere(search, scene.sphere->centre, scene.sphere->radius, scene.sphere->way, found.features.pairs);
-    case Task::Kind::kEdgeEdge:
-      return findEdgeEdge(search, found.features);
-    case Task::Kind::kVertexFace:
-      found.looked =
-          findVertexFace(search, near_vertices_[task.near].data() + task.begin, task.end - task.begin, found.features);
-  }
+bool SurfaceContacts::isInside(std::uint64_t key_a, std::uint64_t key_b) const {
+  const auto pair = known_.find({key_a, key_b, Kind::kVertexFace});
+  return pair != known_.end() && std::any_of(pair->second->sides.begin(), pair->second->sides.end(),
+                                             [](const RememberedSide& side) { return side.depth > 0.0; });
 }
 
-void SurfaceContacts::makeRows(const SurfaceScene& scene, const std::vector<Collider>& colliders, const Task& task,
-                               Found& found) const {
-  const Collider& a = colliders[task.a];
-  const Collider* const b = task.b == kNoIndex ? nullptr : &colliders[task.b];
-  const bool ground = task.kind == Task::Kind::kGround;
-  const double other_friction = b ? b->friction : ground ? scene.ground_friction : a.friction;
+void SurfaceContacts::makeRows(const SurfaceScene& scene, const std::vector<Collider>& colliders,
+                               const FoundFeatures& found, Pair& pair) const {
+  const Collider& a = colliders[pair.a];
+  const Collider* const b = pair.b == kNoIndex ? nullptr : &colliders[pair.b];
+  const double other_friction = b ? b->friction : pair.kind == Kind::kGround ? scene.ground_friction : a.friction;
   const double friction = std::sqrt(a.friction * other_friction);
-  const double restitution = b && !b->obstacle ? std::sqrt(a.restitution * b->restitution) : a.restitution;
-  const double skin = b ? skinOf(std::min(a.edge_length, b->edge_length)) : 0.0;
-  const RowBody of_a = rowBody(a, task.a), of_b = b ? rowBody(*b, task.b) : RowBody();
-  for (const FeaturePair& pair : found.features.pairs) {
-    ContactRow* const row = makeRow(pair, of_a, of_b, skin, found.rows);
-    if (!row) continue;
-    row->friction = friction;
-    row->key.a = a.key;
-    row->key.b = b ? b->key : ground ? kGroundKey : kSphereKey;
-    row->impulse = memory_.forceOf(row->key);
-    const double share = b && b->obstacle ? a.restitution : a.obstacle ? b->restitution : restitution;
-    if (!(share > 0.0)) continue;
+  const double restitution = restitutionOf(a, b);
+  const double skin = b ? kSkin * std::min(a.edge_length, b->edge_length) : 0.0;
+  RowBody of_a{a.surface, a.positions, frames_[pair.a].vertices.data()}, of_b;
+  if (b) of_b = {b->surface, b->positions, frames_[pair.b].vertices.data()};
+  std::vector<ContactRow> old;
+  old.swap(pair.set.rows);
+  pair.set.clear();
+  for (const FeaturePair& features : found.pairs) {
+    ContactRow& row = makeRow(features, of_a, of_b, pair.a == pair.b, skin, pair.set);
+    row.friction = friction;
+    if (!(restitution > 0.0)) continue;
     double speed = 0.0;  // along the normal
-    for (int k = 0; k < pair.of_a + pair.of_b; ++k)
-      speed += pair.shares[k] * pair.normal.dot(frames_[k < pair.of_a ? task.a : task.b].velocities[pair.vertices[k]]);
+    for (int k = 0; k < features.of_a + features.of_b; ++k)
+      speed += features.shares[k] *
+               features.normal.dot(frames_[k < features.of_a ? pair.a : pair.b].velocities[features.vertices[k]]);
     // What gravity gives within a frame is no approach.
-    if (-speed > 2.0 * scene.gravity * scene.h) row->bounce = -speed * share;
+    if (-speed > 2.0 * scene.gravity * scene.h) row.bounce = -speed * restitution;
   }
+  std::sort(pair.set.rows.begin(), pair.set.rows.end(),
+            [](const ContactRow& x, const ContactRow& y) { return x.name() < y.name(); });
+  for (ContactRow& row : pair.set.rows)
+    if (const ContactRow* before = rowOfName(old, row)) row.impulse = before->impulse;
+}
+
+void SurfaceContacts::listReached(const SurfaceScene& scene, const std::vector<Collider>& colliders) {
+  reached_.clear();
+  for (const Pair* pair : pairs_) {
+    if (pair->b == kNoIndex) continue;
+    const auto sleeps = [&](Index c) { return !colliders[c].moves && !colliders[c].obstacle; };
+    if (!sleeps(pair->a) && !sleeps(pair->b)) continue;
+    for (const ContactRow& row : pair->set.rows) {
+      double gap = row.constant, approach = 0.0;
+      for (Index k = row.begin; k < row.end; ++k) {
+        const Collider& c = colliders[k < row.middle ? pair->a : pair->b];
+        const RowEntry& entry = pair->set.entries[k];
+        gap += entry.coefficient * row.normal.dot(c.positions[entry.particle]);
+        if (c.moves) approach += entry.coefficient * row.normal.dot(c.velocities[entry.particle]);
+      }
+      if (!(gap + scene.h * approach < 0.0)) continue;
+      for (const Index c : {pair->a, pair->b})
+        if (sleeps(c)) reached_.push_back(c);
+      break;
+    }
+  }
+  std::sort(reached_.begin(), reached_.end());
+  reached_.erase(std::unique(reached_.begin(), reached_.end()), reached_.end());
 }
 
 void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
   const Index count = static_cast<Index>(colliders.size());
+  fillSlots(colliders);
   std::vector<Index> root(count), number(count, kNoIndex);
   for (Index c = 0; c < count; ++c) root[c] = c;
   const auto moves = [&](Index c) { return c != kNoIndex && colliders[c].moves; };
-  const auto join = [&](Index x, Index y) {
-    if (!moves(x) || !moves(y)) return;
-    const Index a = rootOf(root, x), b = rootOf(root, y);
+  for (const Pair* pair : pairs_) {
+    if ((pair->set.rows.empty() && pair->watched.features.empty()) || !moves(pair->a) || !moves(pair->b)) continue;
+    const Index a = rootOf(root, pair->a), b = rootOf(root, pair->b);
     root[std::max(a, b)] = std::min(a, b);
-  };
-  for (const ContactRow& row : set_.rows) join(row.a, row.b);
-  for (std::size_t t = 0; t < tasks_.size(); ++t)
-    if (!found_[t].features.watched.empty()) join(tasks_[t].a, tasks_[t].b);
+  }
   islands_.clear();
   for (Index c = 0; c < count; ++c) {
     if (!moves(c)) continue;
@@ -269,87 +305,149 @@ void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
     }
     islands_[island].bodies.push_back(c);
   }
-  for (Index r = 0; r < set_.rows.size(); ++r) {
-    const ContactRow& row = set_.rows[r];
-    const Index of = moves(row.a) ? row.a : moves(row.b) ? row.b : kNoIndex;
+  std::vector<char> held(islands_.size(), 0);
+  for (Pair* pair : pairs_) {
+    if (pair->set.rows.empty() && pair->watched.features.empty()) continue;
+    const Index of = moves(pair->a) ? pair->a : moves(pair->b) ? pair->b : kNoIndex;
     if (of == kNoIndex) continue;
-    Island& island = islands_[number[rootOf(root, of)]];
-    island.rows.push_back(r);
-    if (row.b == kNoIndex || !moves(row.a) || !moves(row.b)) island.free = false;
+    const Index island = number[rootOf(root, of)];
+    if (!pair->set.rows.empty()) islands_[island].rows.push_back({&pair->set, pair->a, pair->b});
+    held[island] = held[island] || !moves(pair->a) || !moves(pair->b);
+    if (!pair->watched.features.empty())
+      islands_[island].watched.push_back(
+          {&pair->watched, pair->a, pair->b,
+           touchingDistance(std::min(colliders[pair->a].edge_length, colliders[pair->b].edge_length))});
   }
-  for (std::size_t t = 0; t < tasks_.size(); ++t) {
-    const Index of = moves(tasks_[t].a) ? tasks_[t].a : moves(tasks_[t].b) ? tasks_[t].b : kNoIndex;
-    if (of == kNoIndex || found_[t].features.watched.empty()) continue;
-    MotionLimit& limit = islands_[number[rootOf(root, of)]].limit;
-    for (const WatchedFeatures& w : found_[t].features.watched)
-      limit.watch(tasks_[t].a, tasks_[t].b, w.vertices, w.of_a);
+  for (std::size_t n = 0; n < islands_.size(); ++n) {
+    Island& island = islands_[n];
+    bool any_held = held[n];
+    for (const Index b : island.bodies) any_held = any_held || colliders[b].held;
+    if (!any_held) island.free = island.bodies;
   }
-  lengths_.resize(count);
-  limited_.resize(count);
+  listWatched();
+}
+
+void SurfaceContacts::fillSlots(const std::vector<Collider>& colliders) {
+  const Index count = static_cast<Index>(colliders.size());
+  first_slots_.assign(count + 1, 0);
+  for (Index c = 0; c < count; ++c) first_slots_[c + 1] = first_slots_[c] + (needed_[c] ? colliders[c].particles : 0);
+  now_.resize(first_slots_[count]);
+  before_.resize(first_slots_[count]);
   solver_bodies_.resize(count);
+  limited_.resize(count);
   for (Index c = 0; c < count; ++c) {
     const Collider& collider = colliders[c];
-    lengths_[c] = collider.edge_length;
     SolverBody& body = solver_bodies_[c];
-    body.positions = collider.positions;
-    body.previous = collider.positions;
-    body.inverse_masses = collider.inverse_masses;
-    body.particles = collider.particles;
+    body.now = now_.data() + first_slots_[c];
+    body.before = before_.data() + first_slots_[c];
+    body.particles = needed_[c] ? collider.particles : 0;
+    body.moves = collider.moves;
+    body.edge_length = collider.edge_length;
     body.groups = collider.groups;
     body.rigid_share = collider.moves && collider.groups ? collider.rigid_share : 0.0;
-    limited_[c] = {collider.surface ? &collider.surface->supports : nullptr,
-                   collider.positions,
-                   collider.positions,
-                   collider.particles,
-                   collider.moves,
-                   collider.inverse_masses};
     body.motions.assign(body.rigid_share > 0.0 ? collider.groups->size() : 0, GroupMotion());
+    for (Index i = 0; i < body.particles; ++i) {
+      const Vec3& p = collider.positions[i];
+      body.now[i] = {p.x(), p.y(), p.z(), collider.moves ? collider.inverse_masses[i] : 0.0};
+      before_[first_slots_[c] + i] = body.now[i];
+    }
+    const auto way = ways_.find(collider.key);
+    LimitedBody& limited = limited_[c];
+    limited.supports = collider.surface ? &collider.surface->supports : nullptr;
+    limited.offsets = way == ways_.end() || way->second.offsets.empty() ? nullptr : way->second.offsets.data();
+    limited.positions = collider.positions;
+    limited.previous = collider.positions;
+    limited.particles = collider.particles;
+    limited.moves = collider.moves;
+    limited.inverse_masses = collider.inverse_masses;
+    limited.watched.clear();
   }
-  for (Island& island : islands_)
-    for (const Index c : island.bodies)
-      if (colliders[c].inverse_masses)
-        for (Index i = 0; island.free && i < colliders[c].particles; ++i)
-          island.free = colliders[c].inverse_masses[i] > 0.0;
 }
 
-std::size_t SurfaceContacts::beginIsland(Index island, SolverScratch& scratch) {
-  Island& of = islands_[island];
-  double shortest = std::numeric_limits<double>::infinity();
-  for (const Index b : of.bodies) shortest = std::min(shortest, lengths_[b]);
-  of.tolerance = kTolerance * shortest;
-  of.limit.begin(
-      limited_, [this](const LimitedPoint& p) { return frames_[p.body].vertices[p.vertex]; }, kTouching * shortest);
-  std::vector<Points> before;
-  if (std::none_of(of.rows.begin(), of.rows.end(), [this](Index r) { return set_.rows[r].gap < 0.0; })) return 0;
-  for (const Index b : of.bodies) {
-    before.emplace_back(solver_bodies_[b].positions, solver_bodies_[b].positions + solver_bodies_[b].particles);
-    setPrevious(b, before.back().data());
-  }
-  const std::size_t moved = letOut(set_, of.rows.data(), of.rows.size(), lengths_, frame_h_, solver_bodies_, scratch);
-  if (moved > 0) of.limit.apply(limited_, of.bodies);
-  return moved;
+// Vertices that are watched, each once.
+void SurfaceContacts::listWatched() {
+  std::vector<std::vector<char>> seen(limited_.size());
+  for (const Island& island : islands_)
+    for (const WatchedPairs& pairs : island.watched)
+      for (const WatchedFeatures& watched : pairs.set->features)
+        for (std::size_t k = 0; k < 4; ++k) {
+          const Index c = k < watched.of_a ? pairs.a : pairs.b;
+          LimitedBody& body = limited_[c];
+          if (seen[c].empty()) {
+            seen[c].assign(body.supports->offsets.size() - 1, 0);
+            body.vertices.resize(seen[c].size());
+            body.vertex_moved.resize(seen[c].size());
+            body.edited.assign(body.particles, 0);
+          }
+          if (std::exchange(seen[c][watched.vertices[k]], 1)) continue;
+          body.watched.push_back(watched.vertices[k]);
+        }
+  for (LimitedBody& body : limited_)
+    if (!body.moves) body.place();
 }
 
-void SurfaceContacts::solveIsland(Index island, SolverStep step, bool first, std::vector<SpringRow>& springs,
-                                  SolverScratch& scratch, SolverCounters& counters) {
-  const Island& of = islands_[island];
+void SurfaceContacts::solveIsland(Index number, SolverStep step, bool first, const std::vector<const Vec3*>& previous,
+                                  std::vector<SpringRow>& springs, SolverScratch& scratch, LimitScratch& limit_scratch,
+                                  SolverCounters& counters) {
+  Island& island = islands_[number];
+  if (island.rows.empty() && springs.empty() && island.watched.empty()) return;
   step.warm = first ? step.h * step.h : 1.0;
-  step.tolerance = of.tolerance;
-  solveRows(set_, of.rows.data(), of.rows.size(), springs, solver_bodies_, step, of.free && springs.empty(), scratch,
-            counters);
-  counters.limited += islands_[island].limit.apply(limited_, of.bodies);
+  for (std::size_t n = 0; n < island.bodies.size(); ++n) {
+    const Index b = island.bodies[n];
+    SolverBody& body = solver_bodies_[b];
+    Slot* const before = before_.data() + first_slots_[b];
+    limited_[b].previous = previous[n];
+    for (Index i = 0; i < body.particles; ++i) {
+      const Vec3 &p = limited_[b].positions[i], &q = previous[n][i];
+      body.now[i].x = p.x();
+      body.now[i].y = p.y();
+      body.now[i].z = p.z();
+      before[i].x = q.x();
+      before[i].y = q.y();
+      before[i].z = q.z();
+    }
+  }
+  static const std::vector<Index> kNone;
+  solveRows(island.rows, springs, solver_bodies_, step, springs.empty() ? island.free : kNone, scratch, counters);
+  for (const Index b : island.bodies) {
+    const SolverBody& body = solver_bodies_[b];
+    for (Index i = 0; i < body.particles; ++i)
+      limited_[b].positions[i] = Vec3(body.now[i].x, body.now[i].y, body.now[i].z);
+  }
+  counters.limited += limitMotion(island.watched, limited_, island.bodies, !island.free.empty(), limit_scratch);
+}
+
+Vec3 SurfaceContacts::sphereImpulse(Index island) const {
+  Vec3 sum = Vec3::Zero();
+  for (const SolverRows& rows : islands_[island].rows)
+    for (const ContactRow& row : rows.set->rows)
+      if (row.kind == FeaturePair::Kind::kSphere) sum += row.impulse;
+  return sum;
+}
+
+void SurfaceContacts::pushedBySphere(std::vector<char>& pushed) const {
+  pushed.assign(needed_.size(), 0);
+  for (const Pair* pair : pairs_)
+    if (pair->kind == Kind::kSphere)
+      for (const ContactRow& row : pair->set.rows) pushed[pair->a] = pushed[pair->a] || !row.impulse.isZero(0.0);
 }
 
 void SurfaceContacts::finishIsland(Index island, double h) {
-  for (const Index r : islands_[island].rows) set_.rows[r].impulse /= h * h;
+  for (const SolverRows& rows : islands_[island].rows)
+    for (ContactRow& row : rows.set->rows) row.impulse /= h * h;
 }
 
 void SurfaceContacts::loadedSurfaces(std::vector<LoadedSurfaces>& pairs) const {
   pairs.clear();
-  for (const ContactRow& row : set_.rows)
-    if (!row.impulse.isZero(0.0) && row.kind != FeaturePair::Kind::kSphere)
-      pairs.push_back({std::min(row.a, row.b), std::max(row.a, row.b)});
-  const auto less = [](const LoadedSurfaces& x, const LoadedSurfaces& y) { return std::tie(x.a, x.b) < std::tie(y.a, y.b); };
+  for (const Pair* pair : pairs_) {
+    if (pair->kind == Kind::kSphere) continue;
+    if (std::any_of(pair->set.rows.begin(), pair->set.rows.end(),
+                    [](const ContactRow& row) { return !row.impulse.isZero(0.0); }))
+      pairs.push_back({std::min(pair->a, pair->b), std::max(pair->a, pair->b)});
+  }
+  const auto less = [](const LoadedSurfaces& x, const LoadedSurfaces& y) {
+    return std::tie(x.a, x.b) < std::tie(y.a, y.b);
+  };
   std::sort(pairs.begin(), pairs.end(), less);
   pairs.erase(std::unique(pairs.begin(), pairs.end(),
                           [](const LoadedSurfaces& x, const LoadedSurfaces& y) { return x.a == y.a && x.b == y.b; }),
@@ -358,62 +456,72 @@ void SurfaceContacts::loadedSurfaces(std::vector<LoadedSurfaces>& pairs) const {
 
 void SurfaceContacts::points(const std::vector<Collider>& colliders, std::vector<Point>& points) const {
   points.clear();
-  for (const ContactRow& row : set_.rows) {
-    const double force = row.normal.dot(row.impulse);
-    if (!(force > 0.0) || row.kind == FeaturePair::Kind::kSphere) continue;
-    Vec3 at = Vec3::Zero();
-    double share = 0.0;
-    for (Index k = row.begin; k < row.middle; ++k) {
-      at += set_.entries[k].coefficient * colliders[row.a].positions[set_.entries[k].particle];
-      share += set_.entries[k].coefficient;
+  for (const Pair* pair : pairs_) {
+    if (pair->kind == Kind::kSphere) continue;
+    for (const ContactRow& row : pair->set.rows) {
+      const double force = row.normal.dot(row.impulse);
+      if (!(force > 0.0)) continue;
+      Vec3 at = Vec3::Zero();
+      double share = 0.0;
+      for (Index k = row.begin; k < row.middle; ++k) {
+        at += pair->set.entries[k].coefficient * colliders[pair->a].positions[pair->set.entries[k].particle];
+        share += pair->set.entries[k].coefficient;
+      }
+      if (share > 0.5) points.push_back({at, row.normal, force});
     }
-    if (share > 0.5) points.push_back({at, row.normal, force});
   }
 }
 
-// What has not moved was not looked for, and is as it was.
-ContactMemory SurfaceContacts::memory() const {
-  ContactMemory now = memory_;
-  const auto moved = [&](std::uint64_t key) { return std::binary_search(moving_.begin(), moving_.end(), key); };
-  now.filter([&](std::uint64_t a, std::uint64_t b) { return !moved(a) && !moved(b); });
-  for (const ContactRow& row : set_.rows)
-    if (!row.impulse.isZero(0.0)) now.forces.push_back({row.key, row.impulse});
-  now.sides.insert(now.sides.end(), sides_.begin(), sides_.end());
-  now.sort();
-  return now;
+std::size_t SurfaceContacts::rows() const {
+  std::size_t sum = 0;
+  for (const Pair* pair : pairs_) sum += pair->set.rows.size();
+  return sum;
 }
 
-void SurfaceContacts::recall(ContactMemory memory) {
+SurfaceMemory SurfaceContacts::memory() const {
+  SurfaceMemory memory;
+  for (const auto& [name, pair] : known_) memory.pairs.push_back(*pair);
+  for (const auto& [key, way] : ways_) memory.ways.push_back(way);
+  return memory;
+}
+
+void SurfaceContacts::recall(const SurfaceMemory& memory) {
   clear();
-  memory_ = std::move(memory);
+  for (const KeptPair& kept : memory.pairs) {
+    auto pair = std::make_unique<Pair>();
+    static_cast<KeptPair&>(*pair) = kept;
+    known_[{kept.key_a, kept.key_b, kept.kind}] = std::move(pair);
+  }
+  for (const KeptWay& way : memory.ways) ways_[way.key] = way;
 }
 
 void SurfaceContacts::clear() {
-  set_.clear();
-  sides_.clear();
-  moving_.clear();
+  pairs_.clear();
+  known_.clear();
+  ways_.clear();
   islands_.clear();
-  memory_ = ContactMemory();
+  needed_.clear();
+  moved_.clear();
   std::fill(frame_of_.begin(), frame_of_.end(), 0);
 }
 
 void SurfaceContacts::forget(std::uint64_t key) {
-  ContactMemory kept = memory();
-  kept.filter([key](std::uint64_t a, std::uint64_t b) { return a != key && b != key; });
-  recall(std::move(kept));
+  islands_.clear();
+  pairs_.clear();
+  ways_.erase(key);
+  for (auto at = known_.begin(); at != known_.end();)
+    at = at->second->key_a == key || at->second->key_b == key ? known_.erase(at) : std::next(at);
 }
 
 std::size_t SurfaceContacts::bytes() const {
-  std::size_t sum = broad_phase_.bytes() +
-                    bytesOf(near_, needed_, frames_, frame_of_, tasks_, found_, looking_, reached_) +
-                    bytesOf(set_.rows, set_.entries, lengths_, solver_bodies_, islands_, memory_.forces, memory_.sides,
-                            sides_, moving_);
+  std::size_t sum = broad_phase_.bytes() + bytesOf(needed_, moved_, pairs_, frames_, frame_of_, reached_, now_, before_,
+                                                   first_slots_, solver_bodies_, limited_, islands_);
   for (const SurfaceFrame& frame : frames_) sum += frame.bytes();
-  for (const Found& found : found_)
-    sum += bytesOf(found.features.pairs, found.features.sides, found.features.watched, found.rows.rows,
-                   found.rows.entries);
+  for (const auto& [name, pair] : known_)
+    sum += sizeof(Pair) + bytesOf(pair->set.rows, pair->set.entries, pair->sides) + pair->watched.bytes();
+  for (const auto& [key, way] : ways_) sum += sizeof(KeptWay) + bytesOf(way.last);
   for (const SolverBody& body : solver_bodies_) sum += bytesOf(body.motions);
-  for (const Island& island : islands_) sum += bytesOf(island.bodies, island.rows) + island.limit.bytes();
+  for (const Island& island : islands_) sum += bytesOf(island.bodies, island.free, island.rows, island.watched);
   return sum;
 }
 

@@ -23,10 +23,28 @@ bool isRidge(const ContactSurface& surface, const SurfaceFrame& frame, const Con
 
 }  // namespace
 
+namespace {
+
+void placeNormals(const ContactSurface& surface, SurfaceFrame& frame) {
+  frame.face_normals.resize(surface.triangles.size());
+  frame.vertex_normals.assign(frame.vertices.size(), Vec3::Zero());
+  for (Index f = 0; f < surface.triangles.size(); ++f) {
+    const Triangle& t = surface.triangles[f];
+    const Vec3& a = frame.vertices[t[0]];
+    const Vec3 area = (frame.vertices[t[1]] - a).cross(frame.vertices[t[2]] - a);
+    frame.face_normals[f] = unitOrZero(area);
+    for (const Index v : t) frame.vertex_normals[v] += area;
+  }
+  for (Vec3& normal : frame.vertex_normals) normal = unitOrZero(normal);
+}
+
+}  // namespace
+
 void placeFrame(const ContactSurface& surface, const Vec3* vertices, const Vec3* velocities, double h,
                 SurfaceFrame& frame) {
   const Index count = surface.vertices();
   frame.vertices.assign(vertices, vertices + count);
+  placeNormals(surface, frame);
   frame.velocities.resize(count);
   std::vector<FloatBox> swept(count);
   frame.bounds = Box();
@@ -39,22 +57,12 @@ void placeFrame(const ContactSurface& surface, const Vec3* vertices, const Vec3*
     frame.bounds.extend(p);
     frame.bounds.extend(end);
   }
-  frame.face_normals.resize(surface.triangles.size());
   frame.boxes.items.resize(surface.triangles.size());
-  frame.vertex_normals.assign(count, Vec3::Zero());
   for (Index f = 0; f < surface.triangles.size(); ++f) {
-    const Triangle& t = surface.triangles[f];
-    const Vec3& a = frame.vertices[t[0]];
-    const Vec3 area = (frame.vertices[t[1]] - a).cross(frame.vertices[t[2]] - a);
-    frame.face_normals[f] = unitOrZero(area);
     FloatBox box;
-    for (const Index v : t) {
-      frame.vertex_normals[v] += area;
-      box.extend(swept[v]);
-    }
+    for (const Index v : surface.triangles[f]) box.extend(swept[v]);
     frame.boxes.items[f] = box;
   }
-  for (Vec3& normal : frame.vertex_normals) normal = unitOrZero(normal);
   surface.tree.refit(frame.boxes);
   frame.ridge.resize(surface.edges.size());
   frame.ridges.clear();

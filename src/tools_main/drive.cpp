@@ -27,8 +27,10 @@ using meshless::DriveReport;
 
 constexpr std::size_t kLogs = 10;
 
-const std::map<std::string, ContactMethod> kContacts{
-    {"none", ContactMethod::kNone}, {"textbook", ContactMethod::kTextbook}, {"rest_shape", ContactMethod::kRestShape}};
+const std::map<std::string, ContactMethod> kContacts{{"none", ContactMethod::kNone},
+                                                     {"textbook", ContactMethod::kTextbook},
+                                                     {"rest_shape", ContactMethod::kRestShape},
+                                                     {"surface", ContactMethod::kSurface}};
 
 std::string shippedMaterials() {
 #ifdef MATERIALS_FOLDER
@@ -74,7 +76,7 @@ int main(int argc, char** argv) {
       "what. Exit status: 0 where every seed holds, 1 where one does not, 2 where it could not begin.");
   std::uint64_t seed = 1, count = 1;
   int jobs = 1;
-  std::string out, contact, materials;
+  std::string out, contact, cells, materials;
   meshless::DriveChoices choices;
   meshless::DriveOptions options;
   bool no_cuts = false, no_hands = false;
@@ -91,7 +93,9 @@ int main(int argc, char** argv) {
   app.add_option("--budget", options.budget, "[s] of processor time for a scene; then it did not finish")
       ->check(CLI::Range(1.0, 1e6))
       ->capture_default_str();
-  app.add_option("--contact", contact, "the method of contact: none, textbook, rest_shape; else the default");
+  app.add_option("--contact", contact, "the method of contact: none, textbook, rest_shape, surface; else the default");
+  app.add_option("--cells", cells, "of elastic bodies: whole or filled; else the default")
+      ->check(CLI::IsMember({"whole", "filled"}));
   app.add_option("--material", choices.material, "elastic, looks, or a name in config/materials alone");
   app.add_option("--support", choices.support, "ground, tray, bowl, hung or stack alone");
   app.add_option("--organs", choices.most_organs, "at most so many bodies, 1 to 3")->capture_default_str();
@@ -100,6 +104,7 @@ int main(int argc, char** argv) {
   app.add_option("--materials", materials, "folder of material files; else the shipped ones")
       ->check(CLI::ExistingDirectory);
   CLI11_PARSE(app, argc, argv);
+  if (!cells.empty()) choices.cells = cells == "filled" ? meshless::CellFill::kFilled : meshless::CellFill::kWhole;
   options.cuts = !no_cuts && !no_hands;
   options.hands = !no_hands;
   options.record = !out.empty();
@@ -110,7 +115,8 @@ int main(int argc, char** argv) {
   };
   if (!contact.empty()) {
     const auto found = kContacts.find(contact);
-    if (found == kContacts.end()) return fail("contact is '" + contact + "'; accepted: none, textbook, rest_shape");
+    if (found == kContacts.end())
+      return fail("contact is '" + contact + "'; accepted: none, textbook, rest_shape, surface");
     choices.contact = found->second;
   }
   auto shipped = meshless::readMaterials(materials.empty() ? shippedMaterials() : materials);

@@ -15,7 +15,7 @@ namespace meshless {
 namespace {
 
 constexpr std::string_view kMagic = "MLSSTATE";
-constexpr std::uint32_t kVersion = 8;
+constexpr std::uint32_t kVersion = 9;
 constexpr std::uint64_t kMostModels = 1u << 20;
 
 std::uint32_t checksum(std::string_view bytes) {
@@ -82,7 +82,7 @@ template <class Archive, class World>
 void rest(Archive& archive, World& world) {
   archive(world.step, world.batches_current, world.batches, world.generations, world.free_slots, world.next_number,
           world.used_names, world.picks, world.next_pick, world.push, world.scissors, world.closing, world.next_ticket,
-          world.next_sleep_group, world.contacts);
+          world.next_sleep_group, world.contacts, world.surface_contacts);
 }
 
 void checkSlots(const SavedWorld& world) {
@@ -160,6 +160,16 @@ SavedWorldPtr readWorld(InArchive& archive) {
   for (std::size_t i = 0; i < world->obstacles.size(); ++i)
     parties[kObstacleKey + i].triangles = world->obstacles[i]->mesh.triangles.size();
   requireNone(world->contacts.fault(parties));
+  std::map<std::uint64_t, SurfaceMemory::Known> colliders;
+  for (const SavedBody& body : world->bodies) {
+    const std::size_t particles = body.model->rest.size(), vertices = body.model->surface.vertices.size();
+    colliders[body.number] = {particles, vertices > 0 ? vertices : particles};
+  }
+  for (std::size_t i = 0; i < world->obstacles.size(); ++i) {
+    const std::size_t vertices = world->obstacles[i]->mesh.vertices.size();
+    colliders[kObstacleKey + i] = {vertices, vertices};
+  }
+  requireNone(world->surface_contacts.fault(colliders));
   return world;
 }
 
@@ -409,6 +419,7 @@ std::shared_ptr<const SavedWorld> World::capture() const {
   saved->next_sleep_group = w.next_sleep_group;
   saved->last_substep = w.last_substep;
   saved->contacts = w.contacts.memory();
+  saved->surface_contacts = w.surface_contacts.memory();
   return saved;
 }
 
@@ -471,6 +482,7 @@ void World::restore(const SavedWorld& saved) {
   w.contacts_current = false;
   w.meetings.clear();
   w.contacts.recall(saved.contacts);
+  w.surface_contacts.recall(saved.surface_contacts);
   ++w.run;
   w.say(EventType::kLoaded, "", 0, "a saved state was loaded");
 }
@@ -517,7 +529,7 @@ std::uint64_t World::stateHash() const {
     cut.ticket = 0;
     archive(cut);
   }
-  archive(saved->next_sleep_group, saved->contacts);
+  archive(saved->next_sleep_group, saved->contacts, saved->surface_contacts);
   return archive.hash();
 }
 

@@ -47,6 +47,7 @@ struct SavedWorld {
   std::uint32_t next_sleep_group = 1;
   double last_substep = 0.0;
   ContactsMemory contacts;
+  SurfaceMemory surface_contacts;
 };
 
 // Writing goes over constant values: cereal takes the const away and hands them to serialize(), which only reads then.
@@ -98,9 +99,8 @@ template <class A>
 void serialize(A& archive, WorldSettings& v) {
   auto& [gravity, ground, ground_friction, step_rate, substeps, max_substeps, contact, threads, sleep,
          pick_max_distance, pick_stiffness, pick_radius, push_radius] = v;
-  archive(gravity, ground, ground_friction, step_rate, substeps, max_substeps,
-          choice(contact, ContactMethod::kRestShape), threads, sleep, pick_max_distance, pick_stiffness, pick_radius,
-          push_radius);
+  archive(gravity, ground, ground_friction, step_rate, substeps, max_substeps, choice(contact, ContactMethod::kSurface),
+          threads, sleep, pick_max_distance, pick_stiffness, pick_radius, push_radius);
 }
 
 // --- models

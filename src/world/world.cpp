@@ -238,6 +238,7 @@ void World::reset() {
   w.picks.clear();
   w.meetings.clear();
   w.contacts.clear();
+  w.surface_contacts.clear();
   w.next_sleep_group = 1;
   w.undo.clear();
   w.push = PushSphere();
@@ -272,7 +273,11 @@ WorldSnapshot World::snapshot(const SnapshotWants& wants) {
     shot.bodies.push_back(std::move(b));
   }
   for (const auto& obstacle : w.obstacles) shot.obstacles.push_back(obstacle->def);
-  if (wants.contacts && w.contacts_current) {
+  if (wants.contacts && w.contacts_current && w.settings.contact == ContactMethod::kSurface) {
+    std::vector<SurfaceContacts::Point> points;
+    w.surface_contacts.points(w.colliders, points);
+    for (const SurfaceContacts::Point& p : points) shot.contacts.push_back({p.position, p.normal, p.force});
+  } else if (wants.contacts && w.contacts_current) {
     std::vector<Contacts::Point> points;
     w.contacts.points(w.parties, points);
     for (const Contacts::Point& p : points)

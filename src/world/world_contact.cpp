@@ -36,7 +36,8 @@ WorldObstacle::WorldObstacle(ObstacleDef of_def)
       masses(def->mesh.vertices.size(), 0.0),
       inverse_masses(def->mesh.vertices.size(), 0.0),
       maps(1),
-      shape(def->mesh, {&own, nullptr, nullptr, nullptr, nullptr}, 0.0) {
+      shape(def->mesh, {&own, nullptr, nullptr, nullptr, nullptr}, 0.0),
+      surface(def->mesh, ownSupports(static_cast<Index>(def->mesh.vertices.size()))) {
   for (Index v = 0; v < def->mesh.vertices.size(); ++v) {
     own.push_back(v);
     bounds.extend(def->mesh.vertices[v]);

@@ -56,6 +56,7 @@ void World::Impl::mendFaults() {
   }
   if (!any) return;
   contacts.clear();
+  surface_contacts.clear();
   contacts_current = false;
   batches_current = false;
 }

@@ -12,6 +12,7 @@
 #include "meshless_surgery/contact/textbook.h"
 #include "meshless_surgery/dynamics/match_batch.h"
 #include "meshless_surgery/world/world.h"
+#include "surface_model.h"
 
 namespace meshless {
 
@@ -37,6 +38,7 @@ struct WorldObstacle {
   std::vector<double> masses, inverse_masses;
   std::vector<ContactMap> maps;
   ContactShape shape;
+  ContactSurface surface;
   Box bounds;
 };
 
@@ -51,6 +53,10 @@ struct WorldBody {
   std::shared_ptr<const ContactMesh> mesh;                                 // made when something first comes near
   std::shared_ptr<const ContactModel> contact;                             // likewise, of the present model
   std::shared_future<std::shared_ptr<const ContactModel>> coming_contact;  // being made by another thread
+  std::shared_ptr<const SurfaceModel> surface_model;                       // made when something first comes near
+  BodyModelPtr measured;                                                   // the model that these two are of
+  double edge_length = 0.0;                                                // [m] mean, of the surface
+  double surface_reach = 0.0;                // [m] how far the surface is beyond the particles, at most
   std::vector<ContactMap> maps;              // of this frame, where it can touch another body
   std::vector<QuadraticMap> quadratic_maps;  // likewise, where its mode is quadratic; maps point into it
   bool touched_by_push = false;
@@ -101,6 +107,24 @@ struct Gang {
   MatchCounters match_counters;
   PreserveCounters preserve_counters;
   std::size_t corrected = 0, ground_contacts = 0;
+  double match = 0.0, contact = 0.0;  // [s]
+};
+
+/// An island of contact and what it did in a frame.
+struct SurfaceWork {
+  std::vector<WorldBody*> bodies;
+  std::vector<Pick*> picks;
+  int substeps = 1;
+  std::vector<const Vec3*> previous;  // [m] one a body
+  std::vector<SpringRow> springs;     // one a pick
+  SolverScratch solver_scratch;
+  LimitScratch limit_scratch;
+  std::vector<MatchCounters> each_counters;
+  MatchCounters match_counters;
+  PreserveCounters preserve_counters;
+  SolverCounters solver_counters;
+  Vec3 push_force = Vec3::Zero();     // [N] of the push sphere on the tissue
+  bool touched = false;               // by it
   double match = 0.0, contact = 0.0;  // [s]
 };
 
@@ -209,6 +233,10 @@ struct World::Impl {
   double last_substep = 0.0;          // [s]
   std::vector<ContactParty> parties;  // one a body, in their order, where contacts are found in rest shapes
   std::map<const BodyModel*, std::weak_ptr<const ContactModel>> contact_models;
+  SurfaceContacts surface_contacts;
+  std::vector<Collider> colliders;  // bodies in their order, then obstacles
+  std::vector<SurfaceWork> surface_work;
+  std::vector<char> pushed;
   RecordSink record_sink;
 
   WorldBody* find(const std::string& name);
@@ -262,6 +290,9 @@ struct World::Impl {
   void groupBatches();
   void addBatch(std::vector<WorldBody*> group);
   void stepTogether(int substeps, double h_frame);
+  void stepWithSurfaces(double h_frame);
+  void clearForces();
+  void finishStep(double h_frame);
   void matchBatches(double h);
   void matchAlone(WorldBody& body, double h, MatchCounters& counters) const;
   std::unique_ptr<BatchLanes> borrowLanes(WorldBatch& batch);
@@ -303,6 +334,17 @@ struct World::Impl {
   static double riderReach(WorldBody& body);
   void equipParty(WorldBody& body, ContactParty& party);
   void solveContacts(double h);
+  const SurfaceModel& surfaceModel(WorldBody& body);
+  static void measureSurface(WorldBody& body);
+  static void fillCollider(WorldBody& body, double h_frame, Collider& collider);
+  void findSurfaceContacts(double h_frame);
+  Vec3 pushWay(double h_frame) const;  // [m] of the push sphere in a frame
+  int substepsOf(const std::vector<WorldBody*>& some, double h_frame);
+  void stepSurfaces(double h_frame);
+  void stepIsland(std::size_t island, double h_frame, const ForEach& each);
+  /// Who presses on whom: for who sleeps, and who is wound up.
+  void listLoaded();
+  bool isNearAnything(Index body) const;
   void liftOutOfGround(WorldBody& body, double h_frame);
   void findLow(WorldBody& body, double h_frame);
   void contactGroundAndPush(WorldBody& body, double h, double h_frame, const Vec3& push_velocity);

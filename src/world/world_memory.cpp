@@ -22,6 +22,7 @@ MemoryUse World::memory() const {
     use.states += sizeof *body + bytesOf(body->state) + bytesOf(body->scratch) + bytesOf(body->frame_start);
     use.contact += bytesOf(body->maps, body->quadratic_maps, body->low_particles, body->low_riders);
     if (first(body->contact.get())) use.contact += body->contact->bytes();
+    if (first(body->surface_model.get())) use.contact += body->surface_model->bytes();
     if (first(body->mesh.get()))
       use.contact += sizeof *body->mesh + bytesOf(body->mesh->tetrahedra, body->mesh->faces, body->mesh->edges);
   }
@@ -38,9 +39,9 @@ MemoryUse World::memory() const {
   for (const auto& obstacle : w.obstacles) {
     use.models += bytesOf(obstacle->def->mesh.vertices, obstacle->def->mesh.triangles, obstacle->own) +
                   bytesOf(obstacle->masses, obstacle->inverse_masses, obstacle->maps);
-    use.contact += obstacle->shape.bytes();
+    use.contact += obstacle->shape.bytes() + obstacle->surface.bytes();
   }
-  use.contact += w.contacts.bytes() + bytesOf(w.parties, w.loaded);
+  use.contact += w.contacts.bytes() + w.surface_contacts.bytes() + bytesOf(w.parties, w.colliders, w.loaded);
   for (const auto& body : w.scene) {
     if (!first(body.get())) continue;
     if (first(body->model.get())) use.kept += bytesOf(*body->model);

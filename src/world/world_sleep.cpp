@@ -68,7 +68,7 @@ void World::Impl::rememberSlow() {
   for (Index b = 0; b < bodies.size(); ++b) {
     WorldBody& body = *bodies[b];
     body.slow = false;
-    if (body.asleep || (!contacts.needed()[b] && !body.model->any_fixed && picks.empty())) continue;
+    if (body.asleep || (!isNearAnything(b) && !body.model->any_fixed && picks.empty())) continue;
     const double most = kTrembling * kStillMost * sizeOf(body.bounds);
     body.slow = std::all_of(body.state.velocities.begin(), body.state.velocities.end(),
                             [most](const Vec3& v) { return v.squaredNorm() <= most * most; });
@@ -76,10 +76,24 @@ void World::Impl::rememberSlow() {
   }
 }
 
+bool World::Impl::isNearAnything(Index body) const {
+  return settings.contact == ContactMethod::kSurface ? surface_contacts.needed()[body] : contacts.needed()[body];
+}
+
+void World::Impl::listLoaded() {
+  loaded.clear();
+  if (settings.contact == ContactMethod::kRestShape) contacts.loadedPairs(loaded);
+  if (settings.contact != ContactMethod::kSurface) return;
+  std::vector<LoadedSurfaces> pairs;
+  surface_contacts.loadedSurfaces(pairs);
+  for (const LoadedSurfaces& pair : pairs) loaded.push_back({pair.a, pair.b});
+}
+
 // An island sleeps where all of it has held still long enough and something holds it: without that, what drifts slowly
 // through space would stop.
 void World::Impl::fallAsleep(double h_frame) {
-  if (!settings.sleep || settings.contact != ContactMethod::kRestShape || awake.empty()) return;
+  if (!settings.sleep || awake.empty()) return;
+  if (settings.contact != ContactMethod::kRestShape && settings.contact != ContactMethod::kSurface) return;
   bool any = false;
   for (WorldBody* body : awake) {
     body->still_for = isStill(*body, h_frame) ? body->still_for + h_frame : 0.0;
@@ -93,7 +107,7 @@ void World::Impl::fallAsleep(double h_frame) {
     root[b] = b;
     held[b] = bodies[b]->model->any_fixed;
   }
-  contacts.loadedPairs(loaded);
+  listLoaded();
   for (const LoadedPair& pair : loaded) {
     if (pair.a >= bodies.size()) continue;
     if (pair.b >= bodies.size()) {  // the ground, or an obstacle

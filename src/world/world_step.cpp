@@ -57,6 +57,10 @@ void World::step() {
       w.rememberGrasps();
       w.findContacts(h_frame);
     }
+    if (w.settings.contact == ContactMethod::kSurface) {
+      w.stepWithSurfaces(h_frame);
+      return;
+    }
     w.groupBatches();
     const int substeps = w.chooseSubsteps(h_frame);
     const double h = h_frame / substeps;
@@ -68,11 +72,7 @@ void World::step() {
       if (!in_gangs) w.contacts.letOut(w.parties, w.report.contact_counters, w.for_each);
       w.followGrasps();
     }
-    for (Pick& pick : w.picks)
-      if (const WorldBody* body = w.find(pick.body); !body || !body->asleep)  // a body at rest is held as before
-        pick.force.setZero();
-    w.push.force.setZero();
-    w.push.touching = false;
+    w.clearForces();
     for (WorldBody* body : w.awake) body->low_current = false;
     if (in_gangs)
       w.stepInGangs(substeps, h);
@@ -85,23 +85,42 @@ void World::step() {
       if (rest_shape) w.liftOutOfGround(*body, h_frame);  // after: it lifts by offsets too
     }
     w.followGrasps();
-    w.mendFaults();
-    w.findWound();
-    for (Pick& pick : w.picks) {
-      if (const WorldBody* body = w.find(pick.body))
-        pick.position = graspMean(pick, body->state.positions) + pick.offset;
-    }
-    w.fallAsleep(h_frame);
-    if (rest_shape) {
-      w.contacts_current = true;
-      w.last_substep = h;
-    }
-    ++w.step;
-    w.report.bodies = w.bodies.size();
-    for (const auto& body : w.bodies) w.report.asleep += body->asleep;
+    if (rest_shape) w.last_substep = h;
     w.report.substeps = static_cast<std::size_t>(substeps);
-    w.report.tetrahedralizations = w.tetrahedralizations;
+    w.finishStep(h_frame);
   }
+}
+
+void World::Impl::stepWithSurfaces(double h_frame) {
+  clearForces();
+  {
+    const Stopwatch contact(report.contact);
+    findSurfaceContacts(h_frame);
+  }
+  stepSurfaces(h_frame);
+  for (Pick& pick : picks) pick.reached = pick.target;
+  finishStep(h_frame);
+}
+
+void World::Impl::clearForces() {
+  for (Pick& pick : picks)
+    if (const WorldBody* body = find(pick.body); !body || !body->asleep)  // a body at rest is held as before
+      pick.force.setZero();
+  push.force.setZero();
+  push.touching = false;
+}
+
+void World::Impl::finishStep(double h_frame) {
+  mendFaults();
+  findWound();
+  for (Pick& pick : picks)
+    if (const WorldBody* body = find(pick.body)) pick.position = graspMean(pick, body->state.positions) + pick.offset;
+  fallAsleep(h_frame);
+  contacts_current = !awake.empty() || contacts_current;
+  ++step;
+  report.bodies = bodies.size();
+  for (const auto& body : bodies) report.asleep += body->asleep;
+  report.tetrahedralizations = tetrahedralizations;
 }
 
 // All bodies take each substep before any takes the next.

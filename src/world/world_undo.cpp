@@ -71,6 +71,7 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
   contacts_current = false;
   meetings.clear();
   contacts.clear();  // what pressed then is not what presses now
+  surface_contacts.clear();
 
   picks.clear();
   for (std::size_t i = 0; i < before.picks.size(); ++i) {

@@ -14,8 +14,7 @@ void World::Impl::findWound() {
   for (WorldBody* body : awake)
     if (body->state.unwinding || isWoundUp(*body->model, body->material, body->state)) wound.push_back(body);
   if (wound.empty()) return;
-  loaded.clear();
-  if (settings.contact == ContactMethod::kRestShape) contacts.loadedPairs(loaded);
+  listLoaded();
   for (WorldBody* body : wound) {
     const auto is = [&](Index b) { return b < bodies.size() && bodies[b].get() == body; };
     const bool touched = std::any_of(loaded.begin(), loaded.end(), [&](const LoadedPair& pair) {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "meshless_surgery/geometry/primitives.h"
 
 namespace meshless {
@@ -88,6 +90,26 @@ TEST(FeaturePairs, TwinFacesOfACutAreOnTheRightSides) {
     }
     EXPECT_EQ(met, 25u);
   }
+}
+
+// The middle of the top is drawn down through the body and out of its bottom: faces of this spike look into it. Who is
+// beside it is outside, though behind the nearest face.
+TEST(FeaturePairs, WhoIsOutsideBesideAFoldedSpikeIsNotTakenForOneInside) {
+  TriangleMesh mesh = boxMesh(Vec3(1, 1, 1), 4, 4, 4);
+  const auto top = std::find_if(mesh.vertices.begin(), mesh.vertices.end(),
+                                [](const Vec3& p) { return (p - Vec3(0, 0, 0.5)).norm() < 1e-9; });
+  ASSERT_NE(top, mesh.vertices.end());
+  top->z() = -0.9;
+  const Placed spike(mesh, Vec3::Zero());
+  const Placed beside(boxMesh(Vec3(0.2, 0.2, 0.2), 2, 2, 2), Vec3(0.15, 0.0, -0.72));
+  std::vector<RememberedSide> sides;
+  const std::vector<FeaturePair> pairs = vertexFace(between(beside, spike), &sides);
+  ASSERT_FALSE(pairs.empty());
+  for (const FeaturePair& pair : pairs) {
+    EXPECT_GE(pair.gap, 0.0);
+    EXPECT_GT(pair.normal.x(), 0.0);
+  }
+  for (const RememberedSide& side : sides) EXPECT_EQ(side.depth, 0.0);
 }
 
 TEST(FeaturePairs, RidgesThatCrossMeetAlongTheirCommonNormal) {

@@ -2,6 +2,8 @@
 // and on which side. Pure functions: they read surfaces and what was remembered, and append to their results.
 #pragma once
 
+#include <limits>
+
 #include "meshless_surgery/contact/surface_frame.h"
 
 namespace meshless {
@@ -27,11 +29,23 @@ struct RememberedSide {
   Vec3 normal = Vec3::UnitZ();
 };
 
-/// Features that are apart and near enough to meet in the frame: a vertex and a face, or two edges.
+/// Features that are apart and near enough to meet in the frame: a vertex and a face, or two edges. A plane between
+/// them shows that they stay so.
 struct WatchedFeatures {
-  std::array<Index, 4> vertices{};  // first those of a
-  std::uint8_t of_a = 1;            // 1 or 2
+  std::array<Index, 4> vertices{};                         // first those of a
+  std::uint8_t of_a = 1;                                   // 1 or 2
+  Vec3 normal = Vec3::Zero();                              // unit, from b to a
+  double least = std::numeric_limits<double>::infinity();  // [m] along it, by which they are to stay apart; below 0:
+                                                           // they touch, and this is how far they may come
 };
+
+struct PairDistance {
+  Vec3 between = Vec3::Zero();     // [m] of the nearest points, from b to a
+  double distance = 0.0;           // [m]
+  std::array<double, 4> shares{};  // of the corners in it: 1 in all for a, -1 for b
+};
+/// The nearest points of a vertex and a face (of_a = 1), or of two edges (of_a = 2); corners of a first.
+PairDistance distanceOfPair(int of_a, const std::array<Vec3, 4>& corners);
 
 /// What is found, one after another.
 struct FoundFeatures {
@@ -54,8 +68,13 @@ struct PairSearch {
   std::size_t remembered_count = 0;
 };
 
+/// Of the distance of two features, at the least left after a substep.
+constexpr double kLeastLeft = 0.1;
+
 /// [m] how near something is looked for at rest, beside what is swept; of surfaces with such a mean edge.
 double searchMargin(double edge_length);
+/// [m] features that are nearer touch: only a face that opposes tells the sides.
+double touchingDistance(double edge_length);
 
 /// Vertices of a, ascending, that are near enough to b to be looked up.
 std::vector<Index> verticesNear(const PairSearch& search);

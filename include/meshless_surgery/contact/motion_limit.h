@@ -3,85 +3,89 @@
 // displacement truncation, Chen et al. 2025, "Offset geometric contact").
 #pragma once
 
-#include <functional>
-#include <tuple>
+#include <cmath>
 
-#include "meshless_surgery/contact/contact_surface.h"
+#include "meshless_surgery/contact/feature_pairs.h"
 
 namespace meshless {
 
-/// A vertex and a face, or two edges, which are near each other; corners by their place in a list of points.
-struct WatchedPair {
-  std::array<Index, 4> corners{};  // first those of a
-  std::uint8_t of_a = 1;           // 1 or 2
-  double slack = 0.0;              // [m] by which they are apart at least; 0: not known
-};
-
-struct PairDistance {
-  Vec3 between = Vec3::Zero();     // [m] of the nearest points, from b to a
-  double distance = 0.0;           // [m]
-  std::array<double, 4> shares{};  // of the corners in it: 1 in all for a, -1 for b
-};
-/// The nearest points of a vertex and a face, or of two edges.
-PairDistance distanceOfPair(const WatchedPair& pair, const std::array<Vec3, 4>& corners);
-
 /// How far the corners can go from `start` to `end` [m] together until the pair is nearer than a tenth of its distance
 /// at the start, by conservative advancement: 1 where it never is. met: the pair there.
-double motionShare(const WatchedPair& pair, const std::array<Vec3, 4>& start, const std::array<Vec3, 4>& end,
-                   PairDistance& met);
-
-/// A vertex by its body and its place there.
-struct LimitedPoint {
-  Index body = 0, vertex = 0;
-  bool operator<(const LimitedPoint& o) const { return std::tie(body, vertex) < std::tie(o.body, o.vertex); }
-  bool operator==(const LimitedPoint& o) const { return body == o.body && vertex == o.vertex; }
-};
+double motionShare(int of_a, const std::array<Vec3, 4>& start, const std::array<Vec3, 4>& end, PairDistance& met);
 
 /// A body whose particles are held back; what it points to has to live as long.
 struct LimitedBody {
   const VertexSupports* supports = nullptr;
+  const Vec3* offsets = nullptr;   // [m] of vertices from the sum of their supports; null: none
   Vec3* positions = nullptr;       // [m]
   const Vec3* previous = nullptr;  // [m] at the start of the substep
   Index particles = 0;
   bool moves = true;
   const double* inverse_masses = nullptr;  // [1/kg] 0: held
+  std::vector<Index> watched;              // vertices
+  Points vertices;                         // [m] of them now, by their numbers
+  double way = 0.0;                        // [m] that any of them has gone in the substep, at most
+
+  std::vector<char> edited, vertex_moved;  // one a particle; one a vertex: by what was edited
+
+  void place() {
+    double farthest = 0.0;
+    for (const Index v : watched) {
+      vertices[v] = vertexAt(v, positions);
+      if (moves) farthest = std::max(farthest, (vertices[v] - vertexAt(v, previous)).squaredNorm());
+    }
+    way = std::sqrt(farthest);
+  }
+  /// Where a particle was edited.
+  void placeEdited() {
+    for (const Index v : watched) {
+      bool moved = false;
+      for (Index k = supports->offsets[v]; k < supports->offsets[v + 1]; ++k)
+        moved |= edited[supports->particles[k]] != 0;
+      vertex_moved[v] = moved;
+      if (moved) vertices[v] = vertexAt(v, positions);
+    }
+  }
+  Vec3 vertexAt(Index v, const Vec3* at) const {
+    return offsets ? Vec3(supports->sum(v, at) + offsets[v]) : supports->sum(v, at);
+  }
 };
 
-/// The watched pairs of some bodies over the substeps of a frame.
-class MotionLimit {
- public:
-  void clear();
-  /// Corners of the pair: first of_a of body a.
-  void watch(Index a, Index b, const std::array<Index, 4>& vertices, std::uint8_t of_a);
-  /// After the last watch(). vertex_at(point): where it is now [m], with the particles at their present places.
-  void begin(const std::vector<LimitedBody>& bodies, const std::function<Vec3(const LimitedPoint&)>& vertex_at,
-             double touching);
-  /// Moves particles so that no watched pair meets on the way from previous to positions: by impulses between the two,
-  /// equal and opposite, and where these do not do, by scaling the ways of some particles or of all of the bodies
-  /// `members`. Returns how many pairs would have met.
-  std::size_t apply(const std::vector<LimitedBody>& bodies, const std::vector<Index>& members);
-  std::size_t bytes() const { return bytesOf(points_, named_, offsets_, start_, end_, lengths_, pairs_); }
+/// Features of two bodies, and until when none of them has to be looked at.
+struct WatchedSet {
+  std::vector<WatchedFeatures> features;
+  std::vector<double> until;  // [m] one a feature: of `gone`
+  double gone = 0.0;          // [m] by which they can have come nearer to each other since they were found
 
- private:
-  void place(const std::vector<LimitedBody>& bodies, bool before, Points& at) const;
-  /// Pairs that would meet, of those that may.
-  void findMeeting(const std::vector<LimitedBody>& bodies);
-  double shareOf(const std::vector<LimitedBody>& bodies, const WatchedPair& pair, PairDistance& met) const;
-  void part(const std::vector<LimitedBody>& bodies, const WatchedPair& pair, const PairDistance& met);
-  std::size_t holdBack(const std::vector<LimitedBody>& bodies, double& least);
+  void start();
+  std::size_t bytes() const { return bytesOf(features, until); }
+};
 
-  std::vector<LimitedPoint> points_, named_;  // each once; four a pair
-  Points offsets_;                            // [m] of points from the sum of their supports
-  Points start_, end_;
-  std::vector<double> lengths_;
-  std::vector<WatchedPair> pairs_;
-  double touching_ = 0.0;
+/// What is watched between two bodies, a and b by their place in a list.
+struct WatchedPairs {
+  WatchedSet* set = nullptr;
+  Index a = 0, b = 0;
+  double touching = 0.0;  // [m] nearer than this nothing tells the sides
+};
+
+/// Scratch of one thread.
+struct LimitScratch {
+  struct Meeting {
+    std::size_t pairs, features;
+  };
   struct Held {
     Index body, particle;
     double share;
   };
-  std::vector<Held> held_;
-  std::vector<Index> meeting_;  // of pairs
+  std::vector<Meeting> meeting;
+  std::vector<Held> held;
 };
+
+/// Moves particles so that no watched pair meets on the way from previous to positions: by impulses between the two,
+/// equal and opposite, and where these do not do, by holding particles where they were. members: all of them that move;
+/// free: nothing holds them, and what was held back goes to all of them together, so that momentum and angular momentum
+/// stay. Returns how many pairs would have met.
+std::size_t limitMotion(const std::vector<WatchedPairs>& pairs, std::vector<LimitedBody>& bodies,
+                        const std::vector<Index>& members, bool free, LimitScratch& scratch);
 
 }  // namespace meshless

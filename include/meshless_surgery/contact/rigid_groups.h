@@ -2,6 +2,8 @@
 // them back to rigid shapes within a frame.
 #pragma once
 
+#include <functional>
+
 #include "meshless_surgery/base/bytes.h"
 #include "meshless_surgery/base/types.h"
 
@@ -36,7 +38,7 @@ struct GroupMotion {
 };
 
 /// Centre and inertia for positions [m], without motion yet.
-GroupMotion groupAt(const RigidGroups& groups, Index group, const Vec3* positions);
+GroupMotion groupAt(const RigidGroups& groups, Index group, const std::function<Vec3(Index particle)>& position);
 
 /// Inverse of an inertia; directions below 1e-12 of the largest stay 0.
 Mat3 inverseInertia(const Mat3& inertia);

@@ -11,8 +11,9 @@
 
 namespace meshless {
 
-/// kRestShape: contact/contacts.h. kTextbook: the paper's, contact/textbook.h, for comparison.
-enum class ContactMethod { kNone, kTextbook, kRestShape };
+/// kRestShape: contact/contacts.h. kSurface: contact/surface_contacts.h. kTextbook: the paper's, contact/textbook.h,
+/// for comparison.
+enum class ContactMethod { kNone, kTextbook, kRestShape, kSurface };
 
 struct WorldSettings {
   Vec3 gravity{0.0, 0.0, -9.81};       // [m/s^2]

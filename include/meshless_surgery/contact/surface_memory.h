@@ -1,0 +1,90 @@
+// All that contact in present space keeps from frame to frame.
+#pragma once
+
+#include <map>
+
+#include "meshless_surgery/base/archive.h"
+#include "meshless_surgery/contact/contact_rows.h"
+#include "meshless_surgery/contact/motion_limit.h"
+
+namespace meshless {
+
+/// What is between two colliders: vertices, or edges, of the first against the second.
+struct KeptPair {
+  enum class Kind : std::uint8_t { kVertexFace, kEdgeEdge, kGround, kSphere };
+  Kind kind = Kind::kVertexFace;
+  std::uint64_t key_a = 0, key_b = 0;  // of the colliders; key_b beyond all of theirs: of the ground or the sphere
+  bool found = false;                  // once at least
+  double way_a = 0.0, way_b = 0.0;     // [m] that they had gone when it was found
+  RowSet set;
+  std::vector<RememberedSide> sides;  // ascending by vertex
+  WatchedSet watched;
+};
+
+/// How far a collider has gone since it was first near something.
+struct KeptWay {
+  std::uint64_t key = 0;
+  Points last;         // [m] sums of the supports of vertices
+  Points offsets;      // [m] of vertices from these sums, when its frame was placed last
+  double gone = 0.0;   // [m] sum of the farthest way of any vertex in each frame
+  double ahead = 0.0;  // [m] in this frame, as fast as it is
+};
+
+struct SurfaceMemory {
+  std::vector<KeptPair> pairs;
+  std::vector<KeptWay> ways;
+
+  struct Known {
+    std::size_t particles = 0, vertices = 0;
+  };
+  /// Why it cannot be, for colliders by their keys; empty where it can. Of memory that was read from a file.
+  std::string fault(const std::map<std::uint64_t, Known>& colliders) const;
+};
+
+template <class A>
+void serialize(A& archive, RowEntry& v) {
+  auto& [coefficient, particle] = v;
+  archive(coefficient, particle);
+}
+template <class A>
+void serialize(A& archive, ContactRow& v) {
+  auto& [normal, constant, gap, rise, friction, bounce, impulse, begin, middle, end, kind, order, features] = v;
+  archive(normal, constant, gap, rise, friction, bounce, impulse, begin, middle, end, kind, order, features);
+}
+template <class A>
+void serialize(A& archive, RowSet& v) {
+  auto& [rows, entries] = v;
+  archive(rows, entries);
+}
+template <class A>
+void serialize(A& archive, RememberedSide& v) {
+  auto& [vertex, depth, normal] = v;
+  archive(vertex, depth, normal);
+}
+template <class A>
+void serialize(A& archive, WatchedFeatures& v) {
+  auto& [vertices, of_a, normal, least] = v;
+  archive(vertices, of_a, normal, least);
+}
+template <class A>
+void serialize(A& archive, WatchedSet& v) {
+  auto& [features, until, gone] = v;
+  archive(features, until, gone);
+}
+template <class A>
+void serialize(A& archive, KeptPair& v) {
+  auto& [kind, key_a, key_b, found, way_a, way_b, set, sides, watched] = v;
+  archive(kind, key_a, key_b, found, way_a, way_b, set, sides, watched);
+}
+template <class A>
+void serialize(A& archive, KeptWay& v) {
+  auto& [key, last, offsets, gone, ahead] = v;
+  archive(key, last, offsets, gone, ahead);
+}
+template <class A>
+void serialize(A& archive, SurfaceMemory& v) {
+  auto& [pairs, ways] = v;
+  archive(pairs, ways);
+}
+
+}  // namespace meshless

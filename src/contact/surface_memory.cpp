@@ -1,0 +1,58 @@
+#include "meshless_surgery/contact/surface_memory.h"
+
+#include <cmath>
+
+namespace meshless {
+namespace {
+
+bool isUnit(const Vec3& v) { return std::abs(v.squaredNorm() - 1.0) < 1e-3; }
+
+std::string faultOf(const KeptPair& pair, const SurfaceMemory::Known& a, const SurfaceMemory::Known& b) {
+  if (pair.kind > KeptPair::Kind::kSphere) return "a pair of contact is of no kind that there is";
+  const RowSet& set = pair.set;
+  const bool with_itself = pair.key_a == pair.key_b;
+  for (const ContactRow& row : set.rows) {
+    if (row.begin > row.middle || row.middle > row.end || row.end > set.entries.size() ||
+        row.kind > FeaturePair::Kind::kSphere)
+      return "a contact names particles beyond its list";
+    for (Index k = row.begin; k < row.end; ++k)
+      if (set.entries[k].particle >= (k < row.middle || with_itself ? a : b).particles ||
+          !std::isfinite(set.entries[k].coefficient))
+        return "a contact names a particle that is not there";
+    if (!isUnit(row.normal) || !row.impulse.allFinite() || !std::isfinite(row.constant) || !std::isfinite(row.rise) ||
+        !(row.friction >= 0.0) || !(row.bounce >= 0.0))
+      return "a contact is not finite";
+  }
+  for (const RememberedSide& side : pair.sides)
+    if (side.vertex >= a.vertices || !isUnit(side.normal) || !(side.depth >= 0.0))
+      return "contact remembers the side of a vertex that is not there";
+  if (pair.watched.until.size() != pair.watched.features.size()) return "contact watches features that are not there";
+  for (const WatchedFeatures& watched : pair.watched.features) {
+    if (watched.of_a < 1 || watched.of_a > 2) return "contact watches features of no kind that there is";
+    for (std::size_t k = 0; k < 4; ++k)
+      if (watched.vertices[k] >= (k < watched.of_a ? a : b).vertices)
+        return "contact watches a vertex that is not there";
+  }
+  return {};
+}
+
+}  // namespace
+
+// Of colliders that are gone nothing is read any more.
+std::string SurfaceMemory::fault(const std::map<std::uint64_t, Known>& colliders) const {
+  for (const KeptPair& pair : pairs) {
+    const bool alone = pair.kind == KeptPair::Kind::kGround || pair.kind == KeptPair::Kind::kSphere;
+    const auto a = colliders.find(pair.key_a), b = colliders.find(pair.key_b);
+    if (a == colliders.end() || (!alone && b == colliders.end())) continue;
+    if (const std::string fault = faultOf(pair, a->second, alone ? Known() : b->second); !fault.empty()) return fault;
+  }
+  for (const KeptWay& way : ways) {
+    const auto known = colliders.find(way.key);
+    if (known == colliders.end()) continue;
+    if (!way.offsets.empty() && way.offsets.size() != known->second.vertices)
+      return "contact knows the places of vertices that are not there";
+  }
+  return {};
+}
+
+}  // namespace meshless

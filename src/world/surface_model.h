@@ -1,0 +1,19 @@
+// What contact in present space needs of a model; bodies of one model share it.
+#pragma once
+
+#include "meshless_surgery/body/body.h"
+#include "meshless_surgery/contact/surface_contacts.h"
+
+namespace meshless {
+
+struct SurfaceModel {
+  explicit SurfaceModel(BodyModelPtr of_model);
+  BodyModelPtr model;
+  ContactSurface surface;
+  std::vector<double> inverse_masses;         // [1/kg] 0 where fixed
+  std::unique_ptr<const RigidGroups> groups;  // of a material for looks
+  double reach = 0.0;                         // [m] how far riders are beyond the bounds of the particles, at most
+  std::size_t bytes() const;                  // without the model
+};
+
+}  // namespace meshless

@@ -1,0 +1,421 @@
+// Laws of contact in present space, on whole bodies in a world.
+#include <cmath>
+
+#include "meshless_surgery/geometry/inside.h"
+#include "support/bodies.h"
+
+namespace meshless {
+namespace {
+
+using test::replyOf;
+
+constexpr double kG = 9.81;
+
+WorldSettings surface(WorldSettings settings = {}) {
+  settings.contact = ContactMethod::kSurface;
+  return settings;
+}
+
+WorldSettings space() {
+  WorldSettings settings = surface(test::weightless());
+  settings.sleep = false;
+  return settings;
+}
+
+/// Elastic, of four cells along its longest side.
+BodyDef block(const std::string& name, const Vec3& at, const Vec3& size = Vec3::Constant(0.1)) {
+  const double cell = size.maxCoeff() / 4.0;
+  const auto parts = [cell](double length) { return std::max(1, static_cast<int>(std::lround(length / cell))); };
+  BodyDef def = test::defOf(boxMesh(size, parts(size.x()), parts(size.y()), parts(size.z())), name);
+  def.pose.translation = at;
+  def.spacing = cell;
+  def.cells = CellFill::kFilled;
+  def.material.youngs_modulus = 2e4;
+  def.material.poissons_ratio = 0.4;
+  def.material.density = 1000.0;
+  def.material.damping = 5.0;
+  def.material.friction = 0.5;
+  return def;
+}
+
+void add(World& world, const BodyDef& def, const Vec3& velocity = Vec3::Zero(), const Vec3& spin = Vec3::Zero()) {
+  PreparedBody body = test::prepared(def);
+  for (std::size_t i = 0; i < body.state.velocities.size(); ++i)
+    body.state.velocities[i] = velocity + spin.cross(body.state.positions[i] - def.pose.translation);
+  const Result<SpawnReply> reply = world.addSceneBody(std::make_shared<const PreparedBody>(std::move(body)));
+  ASSERT_TRUE(reply.ok()) << reply.error().detail;
+}
+
+void run(World& world, double seconds) {
+  const int steps = static_cast<int>(std::lround(seconds * world.settings().step_rate));
+  for (int n = 0; n < steps; ++n) world.step();
+}
+
+// Two flat blocks that lie on each other: cubes as soft would buckle.
+BodyDef slab(const std::string& name, const Vec3& at, double youngs_modulus = 1e5) {
+  BodyDef def = block(name, at, Vec3(0.1, 0.1, 0.05));
+  def.material.youngs_modulus = youngs_modulus;
+  return def;
+}
+void addStack(World& world, double youngs_modulus = 1e5) {
+  add(world, slab("low", Vec3(0, 0, 0.0255), youngs_modulus));
+  add(world, slab("high", Vec3(0.013, 0.007, 0.0765), youngs_modulus));
+}
+
+WorldSnapshot seen(World& world) { return world.snapshot({true, true, true, true}); }
+Vec3 centre(World& world, std::size_t body) { return seen(world).bodies[body].measures.centre_of_mass; }
+Vec3 velocity(World& world, std::size_t body) {
+  const BodySnapshot b = seen(world).bodies[body];
+  return b.measures.linear_momentum / b.model->mass;
+}
+
+struct Books {
+  Vec3 momentum = Vec3::Zero(), angular = Vec3::Zero();
+  double kinetic = 0.0;
+};
+Books books(World& world) {
+  Books sum;
+  for (const BodySnapshot& b : seen(world).bodies) {
+    sum.momentum += b.measures.linear_momentum;
+    sum.angular += b.measures.angular_momentum + b.measures.centre_of_mass.cross(b.measures.linear_momentum);
+    sum.kinetic += b.measures.kinetic_energy;
+  }
+  return sum;
+}
+
+/// [m] of the deepest vertex of a inside b.
+double depth(const BodySnapshot& a, const BodySnapshot& b) {
+  TriangleMesh mesh = b.model->surface;
+  mesh.vertices = b.surface;
+  const SolidQuery solid(mesh);
+  double deepest = 0.0;
+  for (const Vec3& p : a.surface)
+    if (solid.contains(p)) deepest = std::max(deepest, solid.distance(p));
+  return deepest;
+}
+double depthBetween(World& world) {
+  const WorldSnapshot shot = seen(world);
+  return std::max(depth(shot.bodies[0], shot.bodies[1]), depth(shot.bodies[1], shot.bodies[0]));
+}
+
+double lowest(const BodySnapshot& body) {
+  double z = std::numeric_limits<double>::infinity();
+  for (const Vec3& p : body.surface) z = std::min(z, p.z());
+  return z;
+}
+
+ObstacleDef table(double thickness = 0.05, double friction = 0.5) {
+  ObstacleDef def;
+  def.name = "table";
+  def.mesh = boxMesh(Vec3(0.6, 0.6, thickness), 6, 6, 1);
+  def.friction = friction;
+  return def;
+}
+
+TEST(SurfaceContact, ABlockComesToRestOnTheGroundAndSleeps) {
+  World world(surface());
+  add(world, block("block", Vec3(0, 0, 0.07)));
+  run(world, 3.0);
+  const BodySnapshot body = seen(world).bodies[0];
+  EXPECT_TRUE(body.asleep);
+  EXPECT_NEAR(body.measures.centre_of_mass.z(), 0.05, 0.003) << "it settles under its weight";
+  EXPECT_LT(body.measures.centre_of_mass.head<2>().norm(), 0.001);
+  EXPECT_GT(lowest(body), -2e-4);
+}
+
+TEST(SurfaceContact, ABlockComesToRestOnAnObstacleAndSleeps) {
+  WorldSettings settings = surface();
+  settings.ground.reset();
+  World world(settings);
+  ASSERT_TRUE(world.addObstacle(table()).ok());
+  add(world, block("block", Vec3(0.02, 0.01, 0.1)));
+  run(world, 3.0);
+  const BodySnapshot body = seen(world).bodies[0];
+  EXPECT_TRUE(body.asleep);
+  EXPECT_NEAR(body.measures.centre_of_mass.z(), 0.075, 0.004);
+  EXPECT_LT((body.measures.centre_of_mass - Vec3(0.02, 0.01, 0)).head<2>().norm(), 0.001);
+  EXPECT_GT(lowest(body), 0.025 - 2e-4);
+}
+
+TEST(SurfaceContact, ABlockComesToRestOnAnotherAndBothSleep) {
+  World world(surface());
+  addStack(world);
+  run(world, 4.0);
+  const WorldSnapshot shot = seen(world);
+  EXPECT_TRUE(shot.bodies[0].asleep);
+  EXPECT_TRUE(shot.bodies[1].asleep);
+  EXPECT_NEAR(shot.bodies[0].measures.centre_of_mass.z(), 0.025, 0.0015);
+  EXPECT_NEAR(shot.bodies[1].measures.centre_of_mass.z(), 0.075, 0.003);
+  EXPECT_LT((shot.bodies[1].measures.centre_of_mass - Vec3(0.013, 0.007, 0)).head<2>().norm(), 0.002);
+  EXPECT_LT(depthBetween(world), 0.001);
+}
+
+// As above, with a material five times as soft.
+TEST(SurfaceContact, SoftBlocksOnEachOtherSleep) {
+  World world(surface());
+  addStack(world, 2e4);
+  run(world, 6.0);
+  double speed = 0.0;
+  for (const BodySnapshot& b : seen(world).bodies)
+    speed = std::max(speed, std::sqrt(2.0 * b.measures.kinetic_energy / b.model->mass));
+  EXPECT_LT(depthBetween(world), 0.001);
+  EXPECT_LT((centre(world, 1) - Vec3(0.013, 0.007, 0)).head<2>().norm(), 0.004);
+  EXPECT_LT(speed, 0.02);
+  if (world.snapshot({}).report.asleep < 2)
+    GTEST_SKIP() << "they tremble and do not sleep: " << speed << " m/s after 6 s";
+}
+
+// In the last substep before they sleep, forces of the ground are the weight.
+TEST(SurfaceContact, TheGroundCarriesTheWeight) {
+  WorldSettings settings = surface();
+  settings.sleep = false;
+  World world(settings);
+  add(world, block("block", Vec3(0, 0, 0.0505)));
+  run(world, 2.0);
+  const WorldSnapshot shot = seen(world);
+  double force = 0.0;
+  for (const ContactPoint& point : shot.contacts) force += point.force * point.normal.z();
+  EXPECT_NEAR(force, shot.bodies[0].model->mass * kG, 0.01 * shot.bodies[0].model->mass * kG);
+}
+
+class Incline : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(SurfaceContact, Incline, testing::Bool(),
+                         [](const auto& info) { return info.param ? "OnAnObstacle" : "OnTheGround"; });
+
+/// Gravity as on a slope of this angle, along x.
+World slope(double angle, bool obstacle) {
+  WorldSettings settings = surface();
+  settings.sleep = false;
+  settings.gravity = kG * Vec3(std::sin(angle), 0.0, -std::cos(angle));
+  settings.ground_friction = 0.32;
+  if (obstacle) settings.ground.reset();
+  World world(settings);
+  ObstacleDef plate = table(0.05, 0.32);
+  plate.mesh = boxMesh(Vec3(3.0, 0.6, 0.05), 12, 3, 1);
+  if (obstacle) EXPECT_TRUE(world.addObstacle(plate).ok());
+  add(world, block("block", Vec3(-0.5, 0.003, obstacle ? 0.0465 : 0.0201), Vec3(0.12, 0.12, 0.04)));
+  return world;
+}
+
+TEST_P(Incline, ItSticksBelowTheAngleOfFriction) {  // 0.4: the geometric mean of 0.5 and 0.32
+  World world = slope(std::atan(0.3), GetParam());
+  run(world, 0.5);
+  const Vec3 before = centre(world, 0);
+  run(world, 1.0);
+  EXPECT_LT((centre(world, 0) - before).norm(), 5e-4);
+}
+
+TEST_P(Incline, ItSlidesAboveTheAngleOfFrictionAsCoulombSays) {
+  const double angle = std::atan(0.6);
+  World world = slope(angle, GetParam());
+  run(world, 0.3);
+  const double before = velocity(world, 0).x();
+  run(world, 0.4);
+  const double expected = kG * (std::sin(angle) - 0.4 * std::cos(angle));
+  EXPECT_NEAR((velocity(world, 0).x() - before) / 0.4, expected, 0.1 * expected);
+  EXPECT_LT(std::abs(centre(world, 0).y() - 0.003), 0.005);
+}
+
+TEST(SurfaceContact, MomentumAndAngularMomentumStayInACollision) {
+  for (const double speed : {0.5, 4.0}) {
+    SCOPED_TRACE(speed);
+    World world(space());
+    add(world, block("a", Vec3(0, 0, 0)), Vec3(speed, 0, 0), Vec3(0.3, 0.5, 2.0));
+    BodyDef other = block("b", Vec3(0.14, 0.03, 0.04));
+    other.pose.rotation = Quat(Eigen::AngleAxisd(0.5, Vec3(0.3, 1.0, 0.2).normalized()));
+    other.material.youngs_modulus = 1e4;
+    add(world, other, Vec3(-0.3 * speed, 0, 0));
+    const Books before = books(world);
+    std::size_t met = 0;
+    double kinetic = before.kinetic;
+    for (int step = 0; step < 90; ++step) {
+      world.step();
+      met += world.snapshot({}).report.contact_counters.corrected > 0;
+      kinetic = std::max(kinetic, books(world).kinetic);
+    }
+    const Books after = books(world);
+    EXPECT_GT(met, 0u);
+    EXPECT_GT(velocity(world, 1).x(), -0.1 * speed) << "it was hit";
+    EXPECT_LT((after.momentum - before.momentum).norm(), 1e-9 * before.momentum.norm());
+    EXPECT_LT((after.angular - before.angular).norm(), 1e-9 * before.momentum.norm() * 0.1);
+    EXPECT_LT(kinetic, before.kinetic * (1.0 + 1e-6));
+    EXPECT_LT(depthBetween(world), 0.001);
+  }
+}
+
+/// [m] of the lowest vertex ever, of a block thrown onto the table.
+double lowestOfThrown(double speed, double thickness, double youngs_modulus) {
+  World world(space());
+  EXPECT_TRUE(world.addObstacle(table(thickness)).ok());
+  BodyDef def = block("block", Vec3(0.01, 0.02, 0.12));
+  def.pose.rotation = Quat(Eigen::AngleAxisd(0.4, Vec3(1.0, 0.3, 0.1).normalized()));
+  def.material.youngs_modulus = youngs_modulus;
+  add(world, def, Vec3(0, 0, -speed));
+  double z = 1.0;
+  for (int step = 0; step < 40; ++step) {
+    world.step();
+    z = std::min(z, lowest(seen(world).bodies[0]));
+  }
+  return z;
+}
+
+// Whatever the speed, on what is thinner than the way of a step.
+TEST(SurfaceContact, AThrownBlockDoesNotGoThroughAThinPlate) {
+  for (const double speed : {2.0, 8.0}) EXPECT_GT(lowestOfThrown(speed, 0.004, 2e4), 0.0) << speed;
+  for (const double speed : {8.0, 20.0}) EXPECT_GT(lowestOfThrown(speed, 0.004, 2e5), 0.0) << speed;
+}
+
+// The pressure of the impact is ten times what the material resists with: it is crushed, but on this side of the plate.
+TEST(SurfaceContact, ABlockThatIsCrushedDoesNotGoThroughAPlate) {
+  for (const double thickness : {0.004, 0.02}) {
+    const double z = lowestOfThrown(16.0, thickness, 2e4);
+    if (!(z > 0.0)) GTEST_SKIP() << "it goes through " << thickness << " m: to " << z << " m";
+  }
+}
+
+TEST(SurfaceContact, ResultsDoNotDependOnThreads) {
+  std::uint64_t hash[2];
+  for (const int threads : {1, 2}) {
+    WorldSettings settings = surface();
+    settings.threads = threads;
+    World world(settings);
+    ASSERT_TRUE(world.addObstacle(table()).ok());
+    add(world, block("low", Vec3(0, 0, 0.08)));
+    add(world, block("high", Vec3(0.02, 0.01, 0.19)), Vec3(0.2, 0, -1.0));
+    add(world, block("beside", Vec3(0.6, 0, 0.055)));
+    run(world, 0.4);
+    hash[threads - 1] = world.stateHash();
+  }
+  EXPECT_EQ(hash[0], hash[1]);
+}
+
+TEST(SurfaceContact, ThePushSphereIsFeltAndNotPassedThrough) {
+  World world(space());
+  BodyDef def = block("block", Vec3::Zero());
+  def.fixed.push_back(Box{Vec3(-1, -1, -1), Vec3(1, 1, -0.049)});
+  add(world, def);
+  PushCommand push;
+  push.radius = 0.03;
+  push.position = Vec3(0.004, 0.003, 0.09);
+  ASSERT_TRUE(world.apply(push).ok());
+  run(world, 0.1);
+  EXPECT_EQ(world.push().force.norm(), 0.0);
+  push.position.z() = 0.07;  // a centimetre deep
+  push.speed = 0.1;
+  ASSERT_TRUE(world.apply(push).ok());
+  double last = 0.0;
+  run(world, 0.6);
+  EXPECT_TRUE(world.push().touching);
+  last = world.push().force.z();
+  EXPECT_GT(std::abs(last), 0.5);
+  EXPECT_LT(world.push().force.head<2>().norm(), 0.3 * std::abs(last));
+  for (const Vec3& p : seen(world).bodies[0].surface) EXPECT_GT((p - push.position).norm(), push.radius - 1e-3);
+  const double shallow = std::abs(last);
+  push.position.z() = 0.06;
+  ASSERT_TRUE(world.apply(push).ok());
+  run(world, 0.6);
+  EXPECT_GT(std::abs(world.push().force.z()), 1.5 * shallow);
+  for (const Vec3& p : seen(world).bodies[0].surface) EXPECT_GT((p - push.position).norm(), push.radius - 1e-3);
+  push.position.z() = 0.2;
+  ASSERT_TRUE(world.apply(push).ok());
+  run(world, 1.5);
+  EXPECT_EQ(world.push().force.norm(), 0.0);
+  EXPECT_NEAR(seen(world).bodies[0].measures.volume, 1e-3, 1e-5) << "it comes back";
+}
+
+TEST(SurfaceContact, APickLiftsABlockOffAnother) {
+  World world(surface());
+  addStack(world);
+  run(world, 3.0);
+  PickCommand pick;
+  pick.point = Vec3(0.013, 0.007, 0.1);
+  pick.body = "high";
+  pick.stiffness = 2000.0;
+  const PickReply reply = replyOf<PickReply>(world.apply(pick));
+  EXPECT_EQ(reply.body, "high");
+  const Vec3 low = centre(world, 0), high = centre(world, 1);
+  for (int n = 1; n <= 60; ++n) {
+    MovePickCommand move;
+    move.pick = reply.pick;
+    move.target = reply.position + Vec3(0, 0, 0.15 * n / 60.0);
+    ASSERT_TRUE(world.apply(move).ok());
+    world.step();
+  }
+  run(world, 2.0);
+  EXPECT_GT(centre(world, 1).z() - high.z(), 0.1);
+  EXPECT_LT((centre(world, 0) - low).norm(), 0.005);
+  EXPECT_GT(lowest(seen(world).bodies[1]), 0.08);
+  EXPECT_EQ(depthBetween(world), 0.0);
+}
+
+TEST(SurfaceContact, WhoIsFarFromAllCostsNothing) {
+  WorldSettings settings = space();
+  settings.ground = -10.0;
+  World world(settings);
+  add(world, block("a", Vec3::Zero()), Vec3(0.1, 0, 0), Vec3(0, 0, 1));
+  add(world, block("b", Vec3(1, 0, 0)));
+  for (int step = 0; step < 20; ++step) {
+    world.step();
+    const StepReport report = world.snapshot({}).report;
+    EXPECT_EQ(report.contact_counters.pairs, 0u);
+    EXPECT_EQ(report.contact_counters.contacts, 0u);
+    EXPECT_EQ(report.contact_counters.lookups, 0u);
+    EXPECT_EQ(report.contact_counters.corrected, 0u);
+    EXPECT_EQ(report.contact_shapes, 0u);
+  }
+}
+
+// Who lies still next to each other is looked up now and then, and who sleeps never.
+TEST(SurfaceContact, WhoLiesStillIsNotLookedUp) {
+  World world(surface());
+  addStack(world);
+  run(world, 0.8);
+  std::size_t looked = 0, rows = 0;
+  for (int step = 0; step < 240; ++step) {
+    world.step();
+    const StepReport report = world.snapshot({}).report;
+    looked += report.contact_counters.lookups;
+    rows += report.contact_counters.contacts;
+  }
+  EXPECT_LT(looked, rows / 4);
+  EXPECT_EQ(world.snapshot({}).report.asleep, 2u);
+  EXPECT_EQ(world.snapshot({}).report.contact_counters.contacts, 0u);
+}
+
+TEST(SurfaceContact, WhoSleepsIsWokenByWhatFallsOnIt) {
+  World world(surface());
+  add(world, slab("low", Vec3(0, 0, 0.0255)));
+  run(world, 2.0);
+  ASSERT_TRUE(seen(world).bodies[0].asleep);
+  SpawnCommand spawn;
+  spawn.body = test::shared(slab("high", Vec3(0.013, 0.007, 0.082)));
+  ASSERT_TRUE(world.apply(spawn).ok());
+  std::size_t woken = 0;
+  for (int step = 0; step < 60; ++step) {
+    world.step();
+    woken += world.snapshot({}).report.woken;
+    EXPECT_LT(depthBetween(world), 0.001) << step;
+  }
+  EXPECT_GT(woken, 0u);
+  run(world, 3.0);
+  EXPECT_EQ(world.snapshot({}).report.asleep, 2u);
+  EXPECT_NEAR(centre(world, 1).z(), 0.075, 0.003);
+}
+
+TEST(SurfaceContact, BodiesSpawnedInEachOtherPartSlowly) {
+  World world(space());
+  add(world, block("a", Vec3::Zero()));
+  add(world, block("b", Vec3(0.013, 0.007, 0.05)));
+  const double mass = 2.0;  // [kg]
+  for (int step = 0; step < 720; ++step) {
+    world.step();
+    const Books now = books(world);
+    ASSERT_LT(now.kinetic, 0.5 * mass * 0.1 * 0.1) << "step " << step;
+    ASSERT_LT(now.momentum.norm(), 1e-9);
+  }
+  EXPECT_LT(depthBetween(world), 0.001);
+  for (const BodySnapshot& b : seen(world).bodies) EXPECT_NEAR(b.measures.volume, 1e-3, 2e-5);
+}
+
+}  // namespace
+}  // namespace meshless
