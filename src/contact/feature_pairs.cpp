@@ -150,7 +150,9 @@ class VertexSearch {
       if (!((c.point - best.point).squaredNorm() <= 1e-18 * search_.length * search_.length)) continue;
       pseudonormal += angleAt(c) * b_.frame->face_normals[c.face];
     }
-    return pseudonormal.dot(way) >= 0.0 || windingAround(p) <= 0 ? best.distance : -best.distance;
+    const bool outside =
+        pseudonormal.dot(way) >= 0.0 || (search_.self == PairSearch::Self::kNo && windingAround(p) <= 0);
+    return outside ? best.distance : -best.distance;
   }
 
   /// How often the surface goes around a point, by a ray along x. Where a surface is folded, pseudonormals can take its
