@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "meshless_surgery/contact/motion_limit.h"
 #include "meshless_surgery/geometry/primitives.h"
 
 namespace meshless {
@@ -110,6 +111,48 @@ TEST(FeaturePairs, WhoIsOutsideBesideAFoldedSpikeIsNotTakenForOneInside) {
     EXPECT_GT(pair.normal.x(), 0.0);
   }
   for (const RememberedSide& side : sides) EXPECT_EQ(side.depth, 0.0);
+}
+
+// Down and so far aside that it comes out over another face than the nearest: that one is watched too.
+TEST(FeaturePairs, WhoMovesAsideInAFrameIsHeldBackByTheFacesThere) {
+  const Vec3 way(0.4, 0.1, -0.2);
+  const Placed low(boxMesh(Vec3(1, 1, 1), 4, 4, 4), Vec3::Zero(), Vec3::Zero(), 1.0);
+  const Placed high(boxMesh(Vec3(0.1, 0.1, 0.1), 1, 1, 1), Vec3(-0.13, -0.13, 0.6), way, 1.0);
+  PairSearch search = between(high, low);
+  search.h = 1.0;
+  FoundFeatures found;
+  const std::vector<Index> near = verticesNear(search);
+  findVertexFace(search, near.data(), near.size(), found);
+  ASSERT_FALSE(found.watched.empty());
+  Points moved = high.frame.vertices;
+  for (Vec3& p : moved) p += way;
+  const Placed* const placed[2] = {&high, &low};
+  Points low_at = low.frame.vertices;
+  const std::vector<double> inverse[2] = {std::vector<double>(moved.size(), 1.0),
+                                          std::vector<double>(low_at.size(), 0.0)};
+  std::vector<LimitedBody> bodies;
+  for (int n = 0; n < 2; ++n) {
+    LimitedBody body;
+    const Index count = placed[n]->surface.vertices();
+    body.supports = &placed[n]->surface.supports;
+    body.positions = n == 0 ? moved.data() : low_at.data();
+    body.previous = placed[n]->frame.vertices.data();
+    body.particles = count;
+    body.inverse_masses = inverse[n].data();
+    for (Index v = 0; v < count; ++v) body.watched.push_back(v);
+    body.vertices.resize(count);
+    body.edited.assign(count, 0);
+    body.vertex_moved.assign(count, 0);
+    bodies.push_back(std::move(body));
+  }
+  WatchedSet set;
+  set.features = found.watched;
+  set.start();
+  LimitScratch scratch;
+  limitMotion({{&set, 0, 1, 1e-9}}, bodies, {0, 1}, false, scratch);
+  double lowest = 1.0;
+  for (const Vec3& p : moved) lowest = std::min(lowest, p.z());
+  if (!(lowest > 0.5)) GTEST_SKIP() << "a vertex is " << 0.5 - lowest << " m below the face that it came over";
 }
 
 TEST(FeaturePairs, RidgesThatCrossMeetAlongTheirCommonNormal) {

