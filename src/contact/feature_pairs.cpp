@@ -12,8 +12,6 @@ namespace {
 constexpr double kMargin = 0.2;         // of the mean edge
 constexpr double kAhead = 1.2;          // times the way of a frame: who speeds up is met too
 constexpr double kTie = 2e-3;           // of the mean edge: nearer than this two surfaces touch
-constexpr double kStillApart = 0.75;    // of the distance of a nearer face: one that reaches no higher is behind it
-constexpr double kSlope = 0.02;         // of the mean edge: nor one that rises by less over it
 constexpr double kTouching = 1e-3;      // of the mean edge: nearer than this only a face that opposes tells the sides
 constexpr double kDeepest = 2.0;        // mean edges: deeper inside nobody is looked for
 constexpr double kDeeper = 1.3;         // times as deep as it was: who is inside may have gone on
@@ -229,29 +227,17 @@ class VertexSearch {
     }
   }
 
-  // The nearest face, and those that the plane between it and the vertex does not part from the vertex too.
+  // What touches is held by the face that the vertex opposes most.
   void watch(Index v, const Vec3& p, const Candidate& best) {
-    std::array<std::pair<Vec3, double>, 4> planes;  // normal, and how high others may reach along it
-    std::size_t count = 0;
-    const auto isBelow = [&](const Triangle& t) {
-      for (std::size_t n = 0; n < count; ++n) {
-        double highest = -std::numeric_limits<double>::infinity();
-        for (const Index corner : t) highest = std::max(highest, planes[n].first.dot(b_.frame->vertices[corner] - p));
-        if (highest <= planes[n].second) return true;
-      }
-      return false;
-    };
-    const auto take = [&](const Candidate& c) {
+    for (const Candidate& c : candidates_) {
+      if (c.distance > c.reach) continue;
       const Triangle& t = b_.surface->triangles[c.face];
-      const bool touches = c.distance <= touching_;
-      if (touches && (&c != &best || !mayPush(v, b_.frame->face_normals[c.face]))) return;
-      const Vec3 normal = touches ? b_.frame->face_normals[c.face] : Vec3((p - c.point) / c.distance);
-      watched_.push_back({{v, t[0], t[1], t[2]}, 1, normal, touches ? -touching_ : kLeastLeft * c.distance});
-      if (count < planes.size()) planes[count++] = {normal, kSlope * search_.length - kStillApart * c.distance};
-    };
-    if (best.distance <= best.reach) take(best);
-    for (const Candidate& c : candidates_)
-      if (&c != &best && c.distance <= c.reach && !isBelow(b_.surface->triangles[c.face])) take(c);
+      const Vec3& face_normal = b_.frame->face_normals[c.face];
+      if (c.distance > touching_)
+        watched_.push_back({{v, t[0], t[1], t[2]}, 1, (p - c.point) / c.distance, kLeastLeft * c.distance});
+      else if (&c == &best && mayPush(v, face_normal))
+        watched_.push_back({{v, t[0], t[1], t[2]}, 1, face_normal, -touching_});
+    }
   }
 
   // Out by the face that is near, that the vertex opposes, and on whose side it was.

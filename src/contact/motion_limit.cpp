@@ -9,7 +9,8 @@
 namespace meshless {
 namespace {
 
-constexpr int kPasses = 3;  // of so many rounds of impulses, before particles are held where they were
+constexpr int kPasses = 3;       // of so many rounds of impulses, before particles are held where they were
+constexpr int kMostPasses = 30;  // before all are
 
 }  // namespace
 
@@ -107,8 +108,13 @@ class Limit {
     }
   }
 
-  /// Particles of those that meet stay where they were. Each pass holds more of them, so that passes end.
-  void hold() {
+  /// Particles of those that meet stay where they were, or all do. Each pass holds more of them, so that passes end.
+  void hold(bool all) {
+    for (const Index b : members_)
+      if (all) {
+        std::copy(bodies_[b].previous, bodies_[b].previous + bodies_[b].particles, bodies_[b].positions);
+        std::fill(bodies_[b].edited.begin(), bodies_[b].edited.end(), 1);
+      }
     for (const LimitScratch::Meeting& meeting : scratch_.meeting) {
       const WatchedPairs& pairs = pairs_[meeting.pairs];
       eachSupport(pairs, pairs.set->features[meeting.features], [&](Index body, Index particle, std::size_t, double) {
@@ -131,12 +137,13 @@ class Limit {
     std::array<Vec3, 4> start, end;
     place(pairs, watched, start, end);
     PairDistance met = distanceOfPair(watched.of_a, start);
-    if (watched.least < 0.0 && !(met.distance > -watched.least)) {
+    // Who has come to touch is on the side where it was.
+    if (!(met.distance > pairs.touching)) {
+      watched.least = -pairs.touching;
       const double now = alongNormal(watched, met, end);
       return now < watched.least && now < alongNormal(watched, met, start);
     }
-    if (!(met.distance > pairs.touching) || (watched.least < 0.0 && watched.normal.dot(met.between) < 0.0))
-      return false;
+    if (watched.least < 0.0 && watched.normal.dot(met.between) < 0.0) return false;
     watched.normal = met.between / met.distance;
     watched.least = kLeastLeft * met.distance;
     return heightOver(watched, of_a, of_b) <= watched.least && motionShare(watched.of_a, start, end, met) < 1.0;
@@ -232,10 +239,11 @@ std::size_t limitMotion(const std::vector<WatchedPairs>& pairs, std::vector<Limi
   if (free) before = momentumOf(bodies, members);
   int pass = 0;
   do {
-    if (pass++ < kPasses)
+    if (pass < kPasses)
       for (int n = 0; n < kPasses; ++n) limit.part();
     else
-      limit.hold();
+      limit.hold(pass > kMostPasses);
+    ++pass;
   } while (limit.find() > 0);
   if (!free) return met;
   const Momentum after = momentumOf(bodies, members);
