@@ -86,8 +86,9 @@ TEST(FeaturePairs, TwinFacesOfACutAreOnTheRightSides) {
     std::size_t met = 0;
     for (const FeaturePair& pair : pairs) {
       EXPECT_NEAR(pair.gap, 0.0, 1e-9);
-      if (pair.order == 0) EXPECT_NEAR((pair.normal - (of_left ? -1.0 : 1.0) * Vec3::UnitX()).norm(), 0.0, 1e-9);
-      met += pair.order == 0;
+      if (pair.order != 0) continue;
+      EXPECT_NEAR((pair.normal - (of_left ? -1.0 : 1.0) * Vec3::UnitX()).norm(), 0.0, 1e-9);
+      ++met;
     }
     EXPECT_EQ(met, 25u);
   }

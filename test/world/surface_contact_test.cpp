@@ -192,7 +192,7 @@ World slope(double angle, bool obstacle) {
   World world(settings);
   ObstacleDef plate = table(0.05, 0.32);
   plate.mesh = boxMesh(Vec3(3.0, 0.6, 0.05), 12, 3, 1);
-  if (obstacle) EXPECT_TRUE(world.addObstacle(plate).ok());
+  EXPECT_TRUE(!obstacle || world.addObstacle(plate).ok());
   add(world, block("block", Vec3(-0.5, 0.003, obstacle ? 0.0465 : 0.0201), Vec3(0.12, 0.12, 0.04)));
   return world;
 }
