@@ -1,5 +1,6 @@
 // Bodies of filled cells in a world: picks, cuts and what is left of them.
 #include <algorithm>
+#include <cmath>
 
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/organs.h"
