@@ -68,7 +68,7 @@ class LabTest(unittest.TestCase):
         answer = station.call('cut', blades=pose_stamped(-0.2, -1.0, 0.1, (0.5, 0.5, 0.5, 0.5)), bodies=['left'])
         self.assertTrue(answer.success, answer.message)
         volumes = {name: station.call('get_body', name=name).volume for name in ('left.1', 'left.2', 'right')}
-        time.sleep(2.0)  # until all of it has been said; a complete one comes each second
+        time.sleep(2.0)  # until all of it has been said and recorded
         recorder = subprocess.run(['rosnode', 'kill', '/station1/record'], stdout=subprocess.DEVNULL, check=True)
         self.assertEqual(0, recorder.returncode)
         pattern = os.path.join(self.folder.name, 'station1_*.bag')

@@ -189,9 +189,18 @@ class MovingSurfacesTest(DeformerTestCase):
         """As the reader has them once it has heard vertices for which wanted(message) holds."""
         last = self.vertices.wait(wanted)
         self.topologies.wait(lambda m: (m.run, m.topology) == (last.run, last.topology))
-        for message in self.topologies.messages + self.vertices.messages[:self.vertices.messages.index(last) + 1]:
+        topologies, vertices = self.topologies.messages, self.vertices.messages
+        vertices = vertices[:vertices.index(last) + 1]
+        vertices_first = SurfaceReader()
+        for message in vertices + topologies:
+            vertices_first.hear(message)
+        for message in topologies + vertices:
             self.reader.hear(message)
-        return self.reader.surfaces()
+        surfaces = self.reader.surfaces()
+        self.assertEqual(sorted(surfaces), sorted(vertices_first.surfaces()))
+        for name, surface in vertices_first.surfaces().items():
+            numpy.testing.assert_array_equal(surfaces[name].vertices, surface.vertices)
+        return surfaces
 
     def assert_like_the_bodies(self, surfaces):
         self.assertEqual(sorted(b.name for b in self.state().bodies), sorted(surfaces))
