@@ -4,6 +4,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "meshless_surgery/contact/contact_rows.h"
 #include "meshless_surgery/contact/rigid_groups.h"
 
 namespace meshless {
@@ -95,11 +96,14 @@ class Limit {
           }
         scratch_.held.push_back({body, particle, coefficient});
       });
-      double answer = 0.0;
-      for (const LimitScratch::Held& held : scratch_.held)
-        answer += held.share * held.share * bodies_[held.body].inverse_masses[held.particle];
+      double answer = 0.0, farthest = 0.0;
+      for (const LimitScratch::Held& held : scratch_.held) {
+        const double way = held.share * bodies_[held.body].inverse_masses[held.particle];
+        answer += held.share * way;
+        farthest = std::max(farthest, std::abs(way));
+      }
       const double impulse = (2.0 * met.distance - gap) / answer;
-      if (!(answer > 0.0) || !(impulse > 0.0)) continue;
+      if (!canAnswer(answer, farthest) || !(impulse > 0.0)) continue;
       for (const LimitScratch::Held& held : scratch_.held) {
         LimitedBody& body = bodies_[held.body];
         body.positions[held.particle] += held.share * body.inverse_masses[held.particle] * impulse * normal;

@@ -73,8 +73,9 @@ class Solver {
     active.middle = static_cast<Index>(scratch_.levers.size());
     if (b != kNoIndex) addLevers(entries, row.middle, row.end, b);
     active.end = static_cast<Index>(scratch_.levers.size());
-    double answer = ownAnswer(entries, row.begin, row.middle, a);  // [1/kg]
-    if (b != kNoIndex) answer += ownAnswer(entries, row.middle, row.end, b);
+    double answer = 0.0, farthest = 0.0;  // [1/kg]
+    addOwnAnswer(entries, row.begin, row.middle, a, answer, farthest);
+    if (b != kNoIndex) addOwnAnswer(entries, row.middle, row.end, b, answer, farthest);
     active.sideways = answer;
     for (Index k = active.levers; k < active.end; ++k) {
       const Lever& lever = scratch_.levers[k];
@@ -86,7 +87,8 @@ class Solver {
       // Of all directions together: none across answers more.
       active.sideways += straight + body.rigid_share * lever.arm.squaredNorm() * motion.inverse_inertia.trace();
     }
-    if (!(answer > 0.0)) {
+    if (!canAnswer(answer, farthest)) {
+      row.impulse.setZero();
       scratch_.levers.resize(active.levers);
       return;
     }
@@ -153,12 +155,15 @@ class Solver {
   }
 
  private:
-  double ownAnswer(const RowEntry* entries, Index begin, Index end, Index number) const {
+  void addOwnAnswer(const RowEntry* entries, Index begin, Index end, Index number, double& answer,
+                    double& farthest) const {
     const SolverBody& body = bodies_[number];
-    double answer = 0.0;
-    for (Index k = begin; k < end; ++k)
-      answer += entries[k].coefficient * entries[k].coefficient * body.now[entries[k].particle].inverse_mass;
-    return (1.0 - body.rigid_share) * answer;
+    for (Index k = begin; k < end; ++k) {
+      const double way =
+          (1.0 - body.rigid_share) * entries[k].coefficient * body.now[entries[k].particle].inverse_mass;
+      answer += entries[k].coefficient * way;
+      farthest = std::max(farthest, std::abs(way));
+    }
   }
 
   static void pushSide(const RowEntry* entries, Index begin, Index end, SolverBody& body, const Vec3& impulse) {

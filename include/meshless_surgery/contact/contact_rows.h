@@ -38,6 +38,11 @@ struct RowSet {
   }
 };
 
+/// Whether particles can close a gap: none of them then moves by more than 20 times of it. A point can hang on what is
+/// held but for a share of 1e-8, and two points on the same particles; such gaps are left as they are.
+/// answer: sum of coefficient^2 w, farthest: the largest |coefficient| w [1/kg].
+inline bool canAnswer(double answer, double farthest) { return 20.0 * answer > farthest; }
+
 /// A body for makeRow().
 struct RowBody {
   const ContactSurface* surface = nullptr;
