@@ -307,13 +307,9 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   const Pose pose{def.pose.rotation.normalized(), def.pose.translation};
   const bool cells = def.solid && (def.clusters.kind == ClusterOptions::Kind::kCells ||
                                    (def.clusters.kind == ClusterOptions::Kind::kAuto && def.material.elastic()));
-  if (def.cells == CellFill::kFilled && !cells)
-    return invalid(
-        "body '" + def.name +
-        "' has cells: filled but no lattice; accepted: with an elastic material or clusters: cells, of a solid");
   // A lattice lies along the body's own axes, so that turning the body turns all that is made of it.
   Pose placed;
-  if (def.cells == CellFill::kFilled) {
+  if (cells && def.cells == CellFill::kFilled) {
     const Mat3 axes = mainAxes(surface);
     for (Vec3& v : surface.vertices) v = axes.transpose() * v;
     placed = {pose.rotation * Quat(axes), pose.translation};

@@ -6,8 +6,7 @@
 namespace meshless {
 namespace {
 
-constexpr double kTurn = 20.0;          // [rad] a substep: frequency of the spring that opens an overlap
-constexpr double kDampingRatio = 10.0;  // of it: it creeps open and does not swing
+constexpr double kOutTime = 0.1;        // [s] in which an overlap falls to 1/e: what is let out slowly gains no speed
 constexpr int kMostSweeps = 4;          // of a substep
 constexpr double kTolerance = 2e-3;     // mean edges: sweeps end where no row was corrected by more
 constexpr double kOutSpeed = 0.5;       // [1/s] mean edges: faster nothing is let out
@@ -19,15 +18,6 @@ Four& four(Slot& slot) { return reinterpret_cast<Four&>(slot); }
 Vec3 vec3(const Four& v) { return {v[0], v[1], v[2]}; }
 Four four(const Vec3& v) { return Four{v[0], v[1], v[2], 0.0}; }
 Vec3 at(const Slot& slot) { return {slot.x, slot.y, slot.z}; }
-
-/// Share of an overlap that goes in a substep, and what the spring's damping and give make of mass and impulse.
-struct Softness {
-  double open, mass, keep;
-};
-constexpr Softness softness() {
-  const double damped = 2.0 * kDampingRatio + kTurn, stiff = kTurn * damped;
-  return {kTurn / damped, stiff / (1.0 + stiff), 1.0 / (1.0 + stiff)};
-}
 
 class Solver {
  public:
@@ -95,15 +85,10 @@ class Solver {
     const double gap = row.normal.dot(active.start) + row.constant;
     active.target = row.bounce * h;
     active.mass = 1.0 / answer;
-    active.keep = 0.0;
-    if (row.bounce > 0.0) {
+    if (row.bounce > 0.0)
       active.target += gap;
-    } else if (gap < 0.0) {
-      constexpr Softness kSoft = softness();
-      active.target = gap + std::min(-kSoft.open * gap, kOutSpeed * bodies_[a].edge_length * h);
-      active.mass = kSoft.mass / answer;
-      active.keep = kSoft.keep;
-    }
+    else if (gap < 0.0)
+      active.target = gap + h * std::min(-gap / kOutTime, kOutSpeed * bodies_[a].edge_length);
     scratch_.active.push_back(active);
   }
 
@@ -134,7 +119,7 @@ class Solver {
     ContactRow& row = *active.row;
     const Vec3 now = sumNow(active);
     const double gap = row.normal.dot(now) + row.constant, pressed = row.normal.dot(row.impulse);
-    const double press = std::max(0.0, pressed + active.mass * (active.target - gap) - active.keep * pressed);
+    const double press = std::max(0.0, pressed + active.mass * (active.target - gap));
     Vec3 slid = now - active.start;
     slid -= row.normal.dot(slid) * row.normal;
     Vec3 across = row.impulse - pressed * row.normal - slid / active.sideways;
@@ -283,9 +268,9 @@ void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& spri
   for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
     const std::size_t count = scratch.active.size();
     double worst = 0.0;
+    for (SpringRow& spring : springs) pull(spring, bodies[spring.body], step.h);  // contacts have the last word
     for (std::size_t n = 0; n < count; ++n)
       worst = std::max(worst, solver.visit(scratch.active[sweep % 2 ? count - 1 - n : n]));
-    for (SpringRow& spring : springs) pull(spring, bodies[spring.body], step.h);
     counters.visits += count;
     if (sweep > 0 && !(worst > kTolerance)) break;
   }

@@ -153,7 +153,7 @@ void World::Impl::findSurfaceContacts(double h_frame) {
       colliders[b].inverse_masses = model.inverse_masses.data();
       if (model.groups && !bodies[b]->material.elastic()) {
         colliders[b].groups = model.groups.get();
-        colliders[b].rigid_share = stiffnessGain(bodies[b]->material.alpha, h_frame / settings.substeps);
+        colliders[b].rigid_share = bodies[b]->material.alpha;
       }
     }
     surface_contacts.findMoved(scene, colliders);

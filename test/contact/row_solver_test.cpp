@@ -152,6 +152,33 @@ TEST(RowSolver, WhoIsHeldStaysAndTheOtherIsStopped) {
   for (const Vec3& p : clash.after[1]) EXPECT_GT(p.z(), 0.045);
 }
 
+// A point on what is held, but for a share that is rounding: what is free of it would have to go to the moon.
+TEST(RowSolver, AGapThatAlmostAllHeldParticlesLackThrowsNobody) {
+  for (const double share : {1e-8, 1e-3}) {
+    RowSet set;
+    ContactRow row;
+    row.constant = -0.01;
+    row.middle = row.end = 2;
+    set.entries = {{1.0 - share, 0}, {share, 1}};
+    set.rows.push_back(row);
+    std::vector<Slot> now(2), before(2);
+    now[1].inverse_mass = 1.0;
+    std::vector<SolverBody> bodies(1);
+    bodies[0].now = now.data();
+    bodies[0].before = before.data();
+    bodies[0].particles = 2;
+    bodies[0].edge_length = 0.01;
+    std::vector<SpringRow> springs;
+    SolverStep step;
+    step.h = kH;
+    SolverScratch scratch;
+    SolverCounters counters;
+    solveRows({{&set, 0, kNoIndex}}, springs, bodies, step, {}, scratch, counters);
+    EXPECT_EQ(counters.active, 0u);
+    EXPECT_EQ(now[1].z, 0.0);
+  }
+}
+
 TEST(RowSolver, RowsPressAndNeverPull) {
   for (const double share : {0.0, 0.9}) {
     Clash clash(share, 0.5);

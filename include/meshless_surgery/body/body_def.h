@@ -30,7 +30,7 @@ struct BodyDef {
   Pose pose;           // body's frame in the world
   double spacing = 0;  // [m] between interior particles; 0: chosen from the surface
   ClusterOptions clusters;
-  CellFill cells = CellFill::kWhole;  // kFilled needs a lattice: an elastic material, or clusters of cells
+  CellFill cells = CellFill::kFilled;  // of a lattice: an elastic material, or clusters of cells
   Material material;
   std::vector<HeldRegion> fixed;
   bool copy = false;               // the same as the body before it in its scene, but for name and pose
