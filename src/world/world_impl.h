@@ -339,7 +339,7 @@ struct World::Impl {
   static void fillCollider(WorldBody& body, double h_frame, Collider& collider);
   void findSurfaceContacts(double h_frame);
   Vec3 pushWay(double h_frame) const;  // [m] of the push sphere in a frame
-  int substepsOf(const std::vector<WorldBody*>& some, double h_frame);
+  int substepsOf(const std::vector<WorldBody*>& some, bool may_meet, double h_frame);
   void stepSurfaces(double h_frame);
   void stepIsland(std::size_t island, double h_frame, const ForEach& each);
   /// Who presses on whom: for who sleeps, and who is wound up.

@@ -12,6 +12,8 @@
 namespace meshless {
 namespace {
 
+constexpr int kContactSubsteps = 4;  // at least, where something may meet: in longer ones stacks of stiff bodies rock
+
 // Bodies without a surface meet others by their particles.
 ContactSurface surfaceOf(const BodyModel& model) {
   if (model.surface.vertices.empty()) return {TriangleMesh(), ownSupports(static_cast<Index>(model.rest.size()))};
@@ -184,11 +186,14 @@ Vec3 World::Impl::pushWay(double h_frame) const {
   return length > most ? Vec3(way * (most / length)) : way;
 }
 
-/// Substeps that the stiffest body of an island needs; what is taken from a body is said once.
-int World::Impl::substepsOf(const std::vector<WorldBody*>& some, double h_frame) {
-  double needed = settings.substeps;
-  for (const WorldBody* body : some)
+/// Substeps that the stiffest body of an island and its contacts need: nobody who may meet something goes farther than an
+/// edge in one. What is taken from a body is said once.
+int World::Impl::substepsOf(const std::vector<WorldBody*>& some, bool may_meet, double h_frame) {
+  double needed = may_meet ? std::max(settings.substeps, kContactSubsteps) : settings.substeps;
+  for (const WorldBody* body : some) {
     needed = std::max(needed, std::ceil(h_frame * highestFrequencyNow(*body->model, body->state)));
+    if (may_meet) needed = std::max(needed, std::ceil(h_frame * body->fastest / body->edge_length));
+  }
   const int most = std::max(settings.substeps, settings.max_substeps);
   const int substeps = needed < most ? static_cast<int>(needed) : most;  // NaN: most
   for (WorldBody* body : some) {
@@ -221,7 +226,7 @@ void World::Impl::stepSurfaces(double h_frame) {
     }
     total += particles;
     largest = std::max(largest, particles);
-    work.substeps = substepsOf(work.bodies, h_frame);
+    work.substeps = substepsOf(work.bodies, !islands[n].rows.empty() || !islands[n].watched.empty(), h_frame);
     work.picks.clear();
     for (Pick& pick : picks) {
       const WorldBody* const body = find(pick.body);
