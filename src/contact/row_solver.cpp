@@ -7,6 +7,7 @@ namespace meshless {
 namespace {
 
 constexpr double kOutTime = 0.1;        // [s] in which an overlap falls to 1/e: what is let out slowly gains no speed
+constexpr double kOutStiffness = 800.0;  // of it, over the inertia that it moves: impulses end where two can't both be met
 constexpr int kMostSweeps = 4;          // of a substep
 constexpr double kTolerance = 2e-3;     // mean edges: sweeps end where no row was corrected by more
 constexpr double kOutSpeed = 0.5;       // [1/s] mean edges: faster nothing is let out
@@ -85,10 +86,14 @@ class Solver {
     const double gap = row.normal.dot(active.start) + row.constant;
     active.target = row.bounce * h;
     active.mass = 1.0 / answer;
-    if (row.bounce > 0.0)
+    active.keep = 0.0;
+    if (row.bounce > 0.0) {
       active.target += gap;
-    else if (gap < 0.0)
+    } else if (gap < 0.0) {
       active.target = gap + h * std::min(-gap / kOutTime, kOutSpeed * bodies_[a].edge_length);
+      active.keep = 1.0 / (1.0 + kOutStiffness);
+      active.mass = (1.0 - active.keep) / answer;
+    }
     scratch_.active.push_back(active);
   }
 
@@ -119,7 +124,9 @@ class Solver {
     ContactRow& row = *active.row;
     const Vec3 now = sumNow(active);
     const double gap = row.normal.dot(now) + row.constant, pressed = row.normal.dot(row.impulse);
-    const double press = std::max(0.0, pressed + active.mass * (active.target - gap));
+    // Nobody who is not dragged goes farther than an edge in a substep: more than that is not asked for at once.
+    const double lacking = std::min(active.target - gap, bodies_[active.a].edge_length);
+    const double press = std::max(0.0, pressed + active.mass * lacking - active.keep * pressed);
     Vec3 slid = now - active.start;
     slid -= row.normal.dot(slid) * row.normal;
     Vec3 across = row.impulse - pressed * row.normal - slid / active.sideways;

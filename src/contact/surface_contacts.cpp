@@ -181,6 +181,7 @@ void SurfaceContacts::find(const SurfaceScene& scene, const std::vector<Collider
   });
   for (const Pair* pair : pairs_) {
     counters.contacts += pair->set.rows.size();
+    if (pair->a == pair->b) counters.self_points += pair->set.rows.size();
     if (pair->stale) counters.lookups += pair->set.rows.size();
   }
   listReached(scene, colliders);

@@ -153,7 +153,7 @@ void World::Impl::findSurfaceContacts(double h_frame) {
       const SurfaceModel& model = surfaceModel(*bodies[b]);
       colliders[b].surface = &model.surface;
       colliders[b].inverse_masses = model.inverse_masses.data();
-      if (model.groups && !bodies[b]->material.elastic()) {
+      if (model.groups && !bodies[b]->material.elastic() && !colliders[b].grasped) {
         colliders[b].groups = model.groups.get();
         colliders[b].rigid_share = bodies[b]->material.alpha;
       }

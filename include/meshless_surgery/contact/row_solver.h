@@ -1,6 +1,6 @@
 // Gauss-Seidel on rows in small steps: displacements of a substep that keep every gap open, with friction. A gap that
 // is open closes at most; an overlap gets no deeper and fades, at a bounded speed (Macklin et al. 2019, "Small steps in
-// physics simulation"). Springs come before contacts in each sweep: whoever pulls, gaps stay open. Conserves linear and, in bodies that nothing holds, angular momentum.
+// physics simulation"). Conserves linear and, in bodies that nothing holds, angular momentum.
 #pragma once
 
 #include "meshless_surgery/contact/contact_rows.h"
@@ -75,7 +75,7 @@ struct SolverScratch {
     Index levers, middle, end;  // of a, then of b
     Vec3 start;                 // [m] sum of coefficient x at the start of the substep
     double target;              // [m] gap that is asked for at least
-    double mass;                // [kg] impulse for a gap that is 1 m short
+    double mass, keep;          // [kg] impulse for a gap that is 1 m short, and what goes of the impulse meanwhile
     double sideways;            // [1/kg] across the normal
   };
   std::vector<Active> active;
