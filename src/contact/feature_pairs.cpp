@@ -383,7 +383,8 @@ void findVerticesNear(const PairSearch& search, SearchScratch& scratch) {
   const ContactSurface& a = *search.a.surface;
   scratch.near.assign(a.vertices(), 0);
   a.tree.queryTree(search.a.frame->boxes, search.b.surface->tree, search.b.frame->boxes,
-                   searchMargin(search.length) + std::min(deepest, kDeepest * search.length), scratch.query, [&](Index face) {
+                   searchMargin(search.length) + std::min(deepest, kDeepest * search.length), scratch.query,
+                   [&](Index face) {
                      for (const Index v : a.triangles[face]) scratch.near[v] = 1;
                    });
   scratch.vertices.clear();

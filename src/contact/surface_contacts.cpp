@@ -104,8 +104,8 @@ void SurfaceContacts::findPairs(const SurfaceScene& scene, const std::vector<Col
   };
   for (auto at = known_.begin(); at != known_.end();) {
     Pair& pair = *at->second;
-    const bool kept = std::exchange(pair.near, false) ||
-                      (stays(pair.key_a) && (pair.key_b == kGroundKey || stays(pair.key_b)));
+    const bool kept =
+        std::exchange(pair.near, false) || (stays(pair.key_a) && (pair.key_b == kGroundKey || stays(pair.key_b)));
     at = kept ? std::next(at) : known_.erase(at);
   }
 }
@@ -249,8 +249,8 @@ bool SurfaceContacts::isInside(std::uint64_t key_a, std::uint64_t key_b) const {
                                              [](const RememberedSide& side) { return side.depth > 0.0; });
 }
 
-void SurfaceContacts::makeRows(const SurfaceScene& scene, const std::vector<Collider>& colliders,
-                               Scratch& scratch, Pair& pair) const {
+void SurfaceContacts::makeRows(const SurfaceScene& scene, const std::vector<Collider>& colliders, Scratch& scratch,
+                               Pair& pair) const {
   const Collider& a = colliders[pair.a];
   const Collider* const b = pair.b == kNoIndex ? nullptr : &colliders[pair.b];
   const double other_friction = b ? b->friction : pair.kind == Kind::kGround ? scene.ground_friction : a.friction;
@@ -546,7 +546,8 @@ void SurfaceContacts::forget(std::uint64_t key) {
 
 std::size_t SurfaceContacts::bytes() const {
   constexpr std::size_t kNode = 48;  // of a map, with what the allocator keeps of it
-  std::size_t sum = broad_phase_.bytes() + bytesOf(boxes_, active_, needed_, moved_, numbers_, ways_of_, pairs_, spare_) +
+  std::size_t sum = broad_phase_.bytes() +
+                    bytesOf(boxes_, active_, needed_, moved_, numbers_, ways_of_, pairs_, spare_) +
                     bytesOf(frames_, frame_of_, reached_, now_, before_, first_slots_, solver_bodies_, limited_) +
                     bytesOf(islands_, spare_islands_, root_, island_of_, island_held_);
   for (const SurfaceFrame& frame : frames_) sum += frame.bytes();
