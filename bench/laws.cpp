@@ -77,7 +77,11 @@ void simulate(const BodyModel& model, const Material& material, const Vec3& grav
   const auto steps = static_cast<int>(std::lround(seconds / h));
   for (int step = 1; step <= steps; ++step) {
     const int substeps = std::max(1, static_cast<int>(std::ceil(h * highestFrequencyNow(model, state))));
-    for (int k = 0; k < substeps; ++k) matchAndMove(model, material, gravity, h / substeps, state, scratch, counters);
+    for (int k = 0; k < substeps; ++k) {
+      matchAndMove(model, material, gravity, h / substeps, state, scratch, counters);
+      // What clamps have taken back is no velocity.
+      if (model.clamp) velocitiesFromPositions(model, h / substeps, state, scratch);
+    }
     watch(step * h);
   }
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "meshless_surgery/geometry/nearest_on_triangle.h"
 
@@ -21,12 +20,7 @@ constexpr double kSelfOpposed = 0.3;    // cosine by which faces of one body opp
 constexpr double kParallel = 0.05;      // sine between edges below which they have no common normal
 constexpr double kEnd = 0.01;           // of an edge: nearer to its end a vertex meets what is there
 
-struct Candidate {
-  Index face = 0;
-  Vec3 weights, point;
-  double distance = 0.0, reach = 0.0;
-  int corners = 0;  // of the face that the nearest point lies between: 1 at a vertex, 2 on an edge, 3 inside
-};
+using Candidate = NearFace;
 
 FloatBox boxAround(const Vec3& p, const Vec3& q, double by) {
   FloatBox box;
@@ -51,16 +45,17 @@ double opposition(const PairSearch::Side& side, Index v, const Vec3& direction) 
 
 class VertexSearch {
  public:
-  VertexSearch(const PairSearch& search, FoundFeatures& found)
+  VertexSearch(const PairSearch& search, SearchScratch& scratch)
       : search_(search),
         a_(search.a),
         b_(search.b),
         tie_(kTie * search.length),
         touching_(kTouching * search.length),
         margin_(searchMargin(search.length)),
-        pairs_(found.pairs),
-        sides_(found.sides),
-        watched_(found.watched) {}
+        pairs_(scratch.found.pairs),
+        sides_(scratch.found.sides),
+        watched_(scratch.found.watched),
+        candidates_(scratch.faces) {}
 
   /// False where the vertex is out of the other's bounds.
   bool find(Index v) {
@@ -285,7 +280,7 @@ class VertexSearch {
   std::vector<FeaturePair>& pairs_;
   std::vector<RememberedSide>& sides_;
   std::vector<WatchedFeatures>& watched_;
-  std::vector<Candidate> candidates_;
+  std::vector<Candidate>& candidates_;
   const RememberedSide* remembered_ = nullptr;
   std::size_t made_ = 0;
   std::array<Vec3, 3> used_;
@@ -380,28 +375,29 @@ PairDistance distanceOfPair(int of_a, const std::array<Vec3, 4>& corners) {
 double searchMargin(double edge_length) { return kMargin * edge_length; }
 double touchingDistance(double edge_length) { return kTouching * edge_length; }
 
-std::vector<Index> verticesNear(const PairSearch& search) {
+void findVerticesNear(const PairSearch& search, SearchScratch& scratch) {
   double deepest = 0.0;
   for (std::size_t k = 0; k < search.remembered_count; ++k)
     deepest = std::max(deepest, kDeeper * search.remembered[k].depth);
   if (search.first) deepest = kDeepest * search.length;
   const ContactSurface& a = *search.a.surface;
-  std::vector<char> near(a.vertices(), 0);
+  scratch.near.assign(a.vertices(), 0);
   a.tree.queryTree(search.a.frame->boxes, search.b.surface->tree, search.b.frame->boxes,
-                   searchMargin(search.length) + std::min(deepest, kDeepest * search.length), [&](Index face) {
-                     for (const Index v : a.triangles[face]) near[v] = 1;
+                   searchMargin(search.length) + std::min(deepest, kDeepest * search.length), scratch.query,
+                   [&](Index face) {
+                     for (const Index v : a.triangles[face]) scratch.near[v] = 1;
                    });
-  std::vector<Index> vertices;
-  for (Index v = 0; v < near.size(); ++v)
-    if (near[v]) vertices.push_back(v);
-  return vertices;
+  scratch.vertices.clear();
+  for (Index v = 0; v < a.vertices(); ++v)
+    if (scratch.near[v]) scratch.vertices.push_back(v);
 }
 
-std::size_t findVertexFace(const PairSearch& search, const Index* vertices, std::size_t count, FoundFeatures& found) {
-  VertexSearch each(search, found);
+std::size_t findVertexFace(const PairSearch& search, SearchScratch& scratch) {
+  VertexSearch each(search, scratch);
   std::size_t looked = 0;
-  for (std::size_t n = 0; n < count; ++n) looked += each.find(vertices[n]);
-  if (search.self == PairSearch::Self::kNo && count == search.a.surface->vertices()) leadOut(search, found);
+  for (const Index v : scratch.vertices) looked += each.find(v);
+  if (search.self == PairSearch::Self::kNo && scratch.vertices.size() == search.a.surface->vertices())
+    leadOut(search, scratch.found);
   return looked;
 }
 
@@ -478,27 +474,30 @@ void findSphere(const PairSearch& search, const Vec3& centre, double radius, con
   const SurfaceFrame& a = *search.a.frame;
   const ContactSurface& surface = *search.a.surface;
   const double reach = radius + searchMargin(search.length);
-  std::set<std::array<Index, 3>> seen;
   const auto meet = [&](std::array<Index, 3> corners, Vec3 weights) {
-    // Only the corners that count, ascending: faces around a vertex find it once.
+    // Only the corners that count, ascending: faces around a vertex find the same.
     FeaturePair pair;
     pair.kind = FeaturePair::Kind::kSphere;
     pair.of_a = pair.of_b = 0;
-    std::array<Index, 3> name{kNoIndex, kNoIndex, kNoIndex};
-    for (int k = 0; k < 3; ++k)
-      if (weights[k] > 0.0) {
-        name[pair.of_a] = pair.vertices[pair.of_a] = corners[k];
-        pair.shares[pair.of_a++] = weights[k];
+    pair.vertices.fill(kNoIndex);
+    for (int k = 0; k < 3; ++k) {
+      if (!(weights[k] > 0.0)) continue;
+      int at = pair.of_a++;
+      for (; at > 0 && pair.vertices[at - 1] > corners[k]; --at) {
+        pair.vertices[at] = pair.vertices[at - 1];
+        pair.shares[at] = pair.shares[at - 1];
       }
-    std::sort(name.begin(), name.end());
+      pair.vertices[at] = corners[k];
+      pair.shares[at] = weights[k];
+    }
     Vec3 point = Vec3::Zero(), velocity = Vec3::Zero();
     for (int k = 0; k < pair.of_a; ++k) {
       point += pair.shares[k] * a.vertices[pair.vertices[k]];
       velocity += pair.shares[k] * a.velocities[pair.vertices[k]];
     }
     const double distance = (point - centre).norm();
-    if (distance > reach + kAhead * (search.h * velocity - way).norm() || !seen.insert(name).second) return;
-    pair.features = {name[0], name[1]};
+    if (distance > reach + kAhead * (search.h * velocity - way).norm()) return;
+    pair.features = {pair.vertices[0], pair.vertices[1]};
     pair.order = static_cast<std::uint8_t>(pair.of_a);
     pair.normal = distance > 0.0 ? Vec3((point - centre) / distance) : Vec3(Vec3::UnitZ());
     pair.gap = distance - radius;
@@ -512,6 +511,11 @@ void findSphere(const PairSearch& search, const Vec3& centre, double radius, con
   });
   if (surface.triangles.empty())
     for (Index v = 0; v < a.vertices.size(); ++v) meet({v, kNoIndex, kNoIndex}, Vec3::UnitX());
+  std::sort(pairs.begin(), pairs.end(),
+            [](const FeaturePair& x, const FeaturePair& y) { return x.vertices < y.vertices; });
+  pairs.erase(std::unique(pairs.begin(), pairs.end(),
+                          [](const FeaturePair& x, const FeaturePair& y) { return x.vertices == y.vertices; }),
+              pairs.end());
 }
 
 }  // namespace meshless

@@ -271,7 +271,10 @@ void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& spri
     }
   }
   counters.active += scratch.active.size();
-  for (const auto& active : scratch.active) solver.warmStart(active, step.warm);
+  for (const auto& active : scratch.active) {
+    counters.ground += active.row->kind == FeaturePair::Kind::kPlane;
+    solver.warmStart(active, step.warm);
+  }
   for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
     const std::size_t count = scratch.active.size();
     double worst = 0.0;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <utility>
 
 namespace meshless {
@@ -53,6 +52,7 @@ SurfaceContacts::Pair& SurfaceContacts::pairOf(Kind kind, const std::vector<Coll
   }
   pair->a = a;
   pair->b = b;
+  pair->near = true;
   pairs_.push_back(pair.get());
   return *pair;
 }
@@ -60,8 +60,8 @@ SurfaceContacts::Pair& SurfaceContacts::pairOf(Kind kind, const std::vector<Coll
 void SurfaceContacts::findPairs(const SurfaceScene& scene, const std::vector<Collider>& colliders,
                                 ContactCounters& counters) {
   const Index count = static_cast<Index>(colliders.size());
-  std::vector<Box> boxes(count);
-  std::vector<char> active(count);
+  boxes_.assign(count, Box());
+  active_.assign(count, 0);
   needed_.assign(count, 0);
   pairs_.clear();
   std::optional<Box> sphere;
@@ -71,20 +71,21 @@ void SurfaceContacts::findPairs(const SurfaceScene& scene, const std::vector<Col
     sphere->extend(scene.sphere->centre + scene.sphere->way);
     *sphere = grown(*sphere, scene.sphere->radius);
   }
-  std::map<std::uint64_t, Index> number;
+  numbers_.clear();
   for (Index c = 0; c < count; ++c) {
     const Collider& collider = colliders[c];
-    number[collider.key] = c;
-    active[c] = collider.moves;
+    numbers_.push_back({collider.key, c});
+    active_[c] = collider.moves;
     needed_[c] = collider.grasped;
     if (collider.bounds.empty()) continue;
-    boxes[c] = grown(collider.bounds, searchMargin(collider.edge_length));
+    boxes_[c] = grown(collider.bounds, searchMargin(collider.edge_length));
     if (!collider.moves) continue;
-    if (scene.ground && boxes[c].min.z() <= *scene.ground) pairOf(Kind::kGround, colliders, c, kNoIndex, kGroundKey);
-    if (sphere && boxes[c].overlaps(*sphere)) pairOf(Kind::kSphere, colliders, c, kNoIndex, kSphereKey);
+    if (scene.ground && boxes_[c].min.z() <= *scene.ground) pairOf(Kind::kGround, colliders, c, kNoIndex, kGroundKey);
+    if (sphere && boxes_[c].overlaps(*sphere)) pairOf(Kind::kSphere, colliders, c, kNoIndex, kSphereKey);
     if (collider.self != PairSearch::Self::kNo) pairOf(Kind::kVertexFace, colliders, c, c, collider.key);
   }
-  for (const auto& [a, b] : broad_phase_.find(boxes, active)) {
+  std::sort(numbers_.begin(), numbers_.end());
+  for (const auto& [a, b] : broad_phase_.find(boxes_, active_)) {
     if (colliders[a].obstacle && colliders[b].obstacle) continue;
     ++counters.pairs;
     pairOf(Kind::kVertexFace, colliders, a, b, colliders[b].key);
@@ -97,25 +98,32 @@ void SurfaceContacts::findPairs(const SurfaceScene& scene, const std::vector<Col
     if (pair->b != kNoIndex) needed_[pair->b] = 1;
   }
   // Between those that sleep all stays as it was; what is apart is forgotten.
-  std::set<const Pair*> near(pairs_.begin(), pairs_.end());
+  const auto stays = [&](std::uint64_t key) {
+    const Index c = colliderOf(key);
+    return c != kNoIndex && !colliders[c].moves;
+  };
   for (auto at = known_.begin(); at != known_.end();) {
-    const Pair& pair = *at->second;
-    const auto a = number.find(pair.key_a), b = number.find(pair.key_b);
-    const bool still = a != number.end() && !colliders[a->second].moves &&
-                       (pair.key_b == kGroundKey || (b != number.end() && !colliders[b->second].moves));
-    at = still || near.count(&pair) ? std::next(at) : known_.erase(at);
+    Pair& pair = *at->second;
+    const bool kept =
+        std::exchange(pair.near, false) || (stays(pair.key_a) && (pair.key_b == kGroundKey || stays(pair.key_b)));
+    at = kept ? std::next(at) : known_.erase(at);
   }
+}
+
+Index SurfaceContacts::colliderOf(std::uint64_t key) const {
+  const auto at = std::lower_bound(numbers_.begin(), numbers_.end(), std::make_pair(key, Index{0}));
+  return at != numbers_.end() && at->first == key ? at->second : kNoIndex;
 }
 
 void SurfaceContacts::findMoved(const SurfaceScene& scene, const std::vector<Collider>& colliders) {
   const Index count = static_cast<Index>(colliders.size());
   for (auto at = ways_.begin(); at != ways_.end();) {
-    const bool near = std::any_of(colliders.begin(), colliders.end(), [&](const Collider& c) {
-      return c.key == at->first && (needed_[&c - colliders.data()] || !c.moves);  // rows of who sleeps count from it
-    });
+    const Index c = colliderOf(at->first);
+    const bool near = c != kNoIndex && (needed_[c] || !colliders[c].moves);  // rows of who sleeps count from it
     at = near ? std::next(at) : ways_.erase(at);
   }
-  std::vector<KeptWay*> ways(count, nullptr);
+  std::vector<KeptWay*>& ways = ways_of_;
+  ways.assign(count, nullptr);
   for (Index c = 0; c < count; ++c)
     if (needed_[c]) {
       ways[c] = &ways_[colliders[c].key];
@@ -182,16 +190,26 @@ void SurfaceContacts::find(const SurfaceScene& scene, const std::vector<Collider
   for (const Pair* pair : pairs_) {
     counters.contacts += pair->set.rows.size();
     if (pair->a == pair->b) counters.self_points += pair->set.rows.size();
-    if (pair->stale) counters.lookups += pair->set.rows.size();
+    if (pair->stale) counters.lookups += pair->looked_up;
   }
   listReached(scene, colliders);
   joinIslands(colliders);
 }
 
-void SurfaceContacts::findPair(const SurfaceScene& scene, const std::vector<Collider>& colliders, Pair& pair) const {
+void SurfaceContacts::findPair(const SurfaceScene& scene, const std::vector<Collider>& colliders, Pair& pair) {
   const Collider& a = colliders[pair.a];
   const Collider& b = colliders[pair.b == kNoIndex ? pair.a : pair.b];
-  FoundFeatures found;
+  std::unique_ptr<Scratch> scratch;
+  {
+    const std::lock_guard<std::mutex> lock(spare_mutex_);
+    if (!spare_.empty()) {
+      scratch = std::move(spare_.back());
+      spare_.pop_back();
+    }
+  }
+  if (!scratch) scratch = std::make_unique<Scratch>();
+  FoundFeatures& found = scratch->search.found;
+  scratch->search.clear();
   PairSearch search;
   search.a = {a.surface, &frames_[pair.a]};
   search.b = {b.surface, &frames_[pair.b == kNoIndex ? pair.a : pair.b]};
@@ -213,16 +231,17 @@ void SurfaceContacts::findPair(const SurfaceScene& scene, const std::vector<Coll
       // What is inside must be free to come out.
       if (isInside(pair.key_a, pair.key_b) || isInside(pair.key_b, pair.key_a)) found.watched.clear();
       break;
-    case Kind::kVertexFace: {
-      const std::vector<Index> near = verticesNear(search);
-      findVertexFace(search, near.data(), near.size(), found);
-    }
+    case Kind::kVertexFace:
+      findVerticesNear(search, scratch->search);
+      pair.looked_up = findVertexFace(search, scratch->search);
   }
-  makeRows(scene, colliders, found, pair);
-  pair.sides = std::move(found.sides);
-  pair.watched.features = std::move(found.watched);
+  makeRows(scene, colliders, *scratch, pair);
+  pair.sides.assign(found.sides.begin(), found.sides.end());
+  pair.watched.features.assign(found.watched.begin(), found.watched.end());
   pair.watched.start();
   pair.found = true;
+  const std::lock_guard<std::mutex> lock(spare_mutex_);
+  spare_.push_back(std::move(scratch));
 }
 
 bool SurfaceContacts::isInside(std::uint64_t key_a, std::uint64_t key_b) const {
@@ -231,8 +250,8 @@ bool SurfaceContacts::isInside(std::uint64_t key_a, std::uint64_t key_b) const {
                                              [](const RememberedSide& side) { return side.depth > 0.0; });
 }
 
-void SurfaceContacts::makeRows(const SurfaceScene& scene, const std::vector<Collider>& colliders,
-                               const FoundFeatures& found, Pair& pair) const {
+void SurfaceContacts::makeRows(const SurfaceScene& scene, const std::vector<Collider>& colliders, Scratch& scratch,
+                               Pair& pair) const {
   const Collider& a = colliders[pair.a];
   const Collider* const b = pair.b == kNoIndex ? nullptr : &colliders[pair.b];
   const double other_friction = b ? b->friction : pair.kind == Kind::kGround ? scene.ground_friction : a.friction;
@@ -241,10 +260,10 @@ void SurfaceContacts::makeRows(const SurfaceScene& scene, const std::vector<Coll
   const double skin = b ? kSkin * std::min(a.edge_length, b->edge_length) : 0.0;
   RowBody of_a{a.surface, a.positions, frames_[pair.a].vertices.data()}, of_b;
   if (b) of_b = {b->surface, b->positions, frames_[pair.b].vertices.data()};
-  std::vector<ContactRow> old;
-  old.swap(pair.set.rows);
+  const std::vector<ContactRow>& old = scratch.old;
+  scratch.old.assign(pair.set.rows.begin(), pair.set.rows.end());
   pair.set.clear();
-  for (const FeaturePair& features : found.pairs) {
+  for (const FeaturePair& features : scratch.search.found.pairs) {
     ContactRow& row = makeRow(features, of_a, of_b, pair.a == pair.b, skin, pair.set);
     row.friction = friction;
     if (!(restitution > 0.0)) continue;
@@ -288,7 +307,9 @@ void SurfaceContacts::listReached(const SurfaceScene& scene, const std::vector<C
 void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
   const Index count = static_cast<Index>(colliders.size());
   fillSlots(colliders);
-  std::vector<Index> root(count), number(count, kNoIndex);
+  std::vector<Index>&root = root_, &number = island_of_;
+  root.resize(count);
+  number.assign(count, kNoIndex);
   for (Index c = 0; c < count; ++c) root[c] = c;
   const auto moves = [&](Index c) { return c != kNoIndex && colliders[c].moves; };
   for (const Pair* pair : pairs_) {
@@ -296,17 +317,28 @@ void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
     const Index a = rootOf(root, pair->a), b = rootOf(root, pair->b);
     root[std::max(a, b)] = std::min(a, b);
   }
-  islands_.clear();
+  // The first gets back what it had.
+  for (; !islands_.empty(); islands_.pop_back()) {
+    Island& island = islands_.back();
+    island.bodies.clear();
+    island.free.clear();
+    island.rows.clear();
+    island.watched.clear();
+    spare_islands_.push_back(std::move(island));
+  }
   for (Index c = 0; c < count; ++c) {
     if (!moves(c)) continue;
     Index& island = number[rootOf(root, c)];
     if (island == kNoIndex) {
       island = static_cast<Index>(islands_.size());
-      islands_.emplace_back();
+      if (spare_islands_.empty()) spare_islands_.emplace_back();
+      islands_.push_back(std::move(spare_islands_.back()));
+      spare_islands_.pop_back();
     }
     islands_[island].bodies.push_back(c);
   }
-  std::vector<char> held(islands_.size(), 0);
+  std::vector<char>& held = island_held_;
+  held.assign(islands_.size(), 0);
   for (Pair* pair : pairs_) {
     if (pair->set.rows.empty() && pair->watched.features.empty()) continue;
     const Index of = moves(pair->a) ? pair->a : moves(pair->b) ? pair->b : kNoIndex;
@@ -365,22 +397,20 @@ void SurfaceContacts::fillSlots(const std::vector<Collider>& colliders) {
   }
 }
 
-// Vertices that are watched, each once.
+// Vertices that are watched, each once; vertex_moved tells them meanwhile.
 void SurfaceContacts::listWatched() {
-  std::vector<std::vector<char>> seen(limited_.size());
   for (const Island& island : islands_)
     for (const WatchedPairs& pairs : island.watched)
       for (const WatchedFeatures& watched : pairs.set->features)
         for (std::size_t k = 0; k < 4; ++k) {
           const Index c = k < watched.of_a ? pairs.a : pairs.b;
           LimitedBody& body = limited_[c];
-          if (seen[c].empty()) {
-            seen[c].assign(body.supports->offsets.size() - 1, 0);
-            body.vertices.resize(seen[c].size());
-            body.vertex_moved.resize(seen[c].size());
+          if (body.watched.empty()) {
+            body.vertices.resize(body.supports->offsets.size() - 1);
+            body.vertex_moved.assign(body.vertices.size(), 0);
             body.edited.assign(body.particles, 0);
           }
-          if (std::exchange(seen[c][watched.vertices[k]], 1)) continue;
+          if (std::exchange(body.vertex_moved[watched.vertices[k]], 1)) continue;
           body.watched.push_back(watched.vertices[k]);
         }
   for (LimitedBody& body : limited_)
@@ -501,6 +531,7 @@ void SurfaceContacts::clear() {
   known_.clear();
   ways_.clear();
   islands_.clear();
+  numbers_.clear();
   needed_.clear();
   moved_.clear();
   std::fill(frame_of_.begin(), frame_of_.end(), 0);
@@ -515,14 +546,21 @@ void SurfaceContacts::forget(std::uint64_t key) {
 }
 
 std::size_t SurfaceContacts::bytes() const {
-  std::size_t sum = broad_phase_.bytes() + bytesOf(needed_, moved_, pairs_, frames_, frame_of_, reached_, now_, before_,
-                                                   first_slots_, solver_bodies_, limited_, islands_);
+  constexpr std::size_t kNode = 48;  // of a map, with what the allocator keeps of it
+  std::size_t sum = broad_phase_.bytes() +
+                    bytesOf(boxes_, active_, needed_, moved_, numbers_, ways_of_, pairs_, spare_) +
+                    bytesOf(frames_, frame_of_, reached_, now_, before_, first_slots_, solver_bodies_, limited_) +
+                    bytesOf(islands_, spare_islands_, root_, island_of_, island_held_);
   for (const SurfaceFrame& frame : frames_) sum += frame.bytes();
+  for (const auto& scratch : spare_) sum += sizeof *scratch + scratch->search.bytes() + bytesOf(scratch->old);
   for (const auto& [name, pair] : known_)
-    sum += sizeof(Pair) + bytesOf(pair->set.rows, pair->set.entries, pair->sides) + pair->watched.bytes();
-  for (const auto& [key, way] : ways_) sum += sizeof(KeptWay) + bytesOf(way.last);
+    sum += kNode + sizeof name + sizeof(Pair) + bytesOf(pair->set.rows, pair->set.entries, pair->sides) +
+           pair->watched.bytes();
+  for (const auto& [key, way] : ways_) sum += kNode + sizeof way + bytesOf(way.last, way.offsets);
   for (const SolverBody& body : solver_bodies_) sum += bytesOf(body.motions);
-  for (const Island& island : islands_) sum += bytesOf(island.bodies, island.free, island.rows, island.watched);
+  for (const LimitedBody& body : limited_) sum += bytesOf(body.watched, body.vertices, body.edited, body.vertex_moved);
+  for (const std::vector<Island>* islands : {&islands_, &spare_islands_})
+    for (const Island& island : *islands) sum += bytesOf(island.bodies, island.free, island.rows, island.watched);
   return sum;
 }
 

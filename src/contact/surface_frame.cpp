@@ -46,21 +46,21 @@ void placeFrame(const ContactSurface& surface, const Vec3* vertices, const Vec3*
   frame.vertices.assign(vertices, vertices + count);
   placeNormals(surface, frame);
   frame.velocities.resize(count);
-  std::vector<FloatBox> swept(count);
+  frame.swept.assign(count, FloatBox());
   frame.bounds = Box();
   for (Index v = 0; v < count; ++v) {
     const Vec3& p = frame.vertices[v];
     frame.velocities[v] = velocities ? surface.supports.sum(v, velocities) : Vec3(Vec3::Zero());
     const Vec3 end = p + h * frame.velocities[v];
-    swept[v].extend(p);
-    swept[v].extend(end);
+    frame.swept[v].extend(p);
+    frame.swept[v].extend(end);
     frame.bounds.extend(p);
     frame.bounds.extend(end);
   }
   frame.boxes.items.resize(surface.triangles.size());
   for (Index f = 0; f < surface.triangles.size(); ++f) {
     FloatBox box;
-    for (const Index v : surface.triangles[f]) box.extend(swept[v]);
+    for (const Index v : surface.triangles[f]) box.extend(frame.swept[v]);
     frame.boxes.items[f] = box;
   }
   surface.tree.refit(frame.boxes);

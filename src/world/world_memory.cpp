@@ -41,7 +41,12 @@ MemoryUse World::memory() const {
                   bytesOf(obstacle->masses, obstacle->inverse_masses, obstacle->maps);
     use.contact += obstacle->shape.bytes() + obstacle->surface.bytes();
   }
-  use.contact += w.contacts.bytes() + w.surface_contacts.bytes() + bytesOf(w.parties, w.colliders, w.loaded);
+  use.contact += w.contacts.bytes() + w.surface_contacts.bytes() + bytesOf(w.parties, w.colliders, w.loaded) +
+                 bytesOf(w.surface_work);
+  for (const SurfaceWork& work : w.surface_work)
+    use.contact += bytesOf(work.bodies, work.picks, work.previous, work.springs, work.each_counters) +
+                   bytesOf(work.solver_scratch.active, work.solver_scratch.levers, work.limit_scratch.meeting,
+                           work.limit_scratch.held);
   for (const auto& body : w.scene) {
     if (!first(body.get())) continue;
     if (first(body->model.get())) use.kept += bytesOf(*body->model);

@@ -93,11 +93,15 @@ void World::step() {
 
 void World::Impl::stepWithSurfaces(double h_frame) {
   clearForces();
-  {
-    const Stopwatch contact(report.contact);
-    findSurfaceContacts(h_frame);
+  report.substeps = static_cast<std::size_t>(settings.substeps);  // at the least
+  if (!awake.empty()) {
+    {
+      const Stopwatch contact(report.contact);
+      findSurfaceContacts(h_frame);
+    }
+    stepSurfaces(h_frame);
   }
-  stepSurfaces(h_frame);
+  if (push.enabled) push.position += pushWay(h_frame);
   for (Pick& pick : picks) pick.reached = pick.target;
   finishStep(h_frame);
 }

@@ -244,6 +244,7 @@ void World::Impl::stepSurfaces(double h_frame) {
     report.match_counters += work.match_counters;
     report.preserve_counters += work.preserve_counters;
     report.contact_counters.corrected += work.solver_counters.active;
+    report.ground_contacts += work.solver_counters.ground;
     report.match += work.match;
     report.contact += work.contact;
     if (!work.touched) continue;
@@ -251,7 +252,6 @@ void World::Impl::stepSurfaces(double h_frame) {
     push.force -= work.push_force;
   }
   if (!push.enabled) return;
-  push.position += pushWay(h_frame);
   surface_contacts.pushedBySphere(pushed);
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     WorldBody& body = *bodies[b];

@@ -69,12 +69,14 @@ TEST(BindSurface, RidersOfAPieceAmplifyLittleAndFollowSmoothMotion) {
         for (Index r = 0; r < binding.riders.size(); ++r) {
           double magnitude = 0.0;
           for (Index c = binding.offsets[r]; c < binding.offsets[r + 1]; ++c) magnitude += std::abs(binding.weights[c]);
-          EXPECT_LE(magnitude, kMostWeight * (1.0 + 1e-9));
+          // The weights of a cell add up to more the farther beyond it: 3 one whole cell beyond a face, where the
+          // tissue there hardly fills the cell next to it.
+          EXPECT_LE(magnitude, (elastic ? 3.0 : kMostWeight) * (1.0 + 1e-9));
           const Index v = binding.riders[r];
           EXPECT_LT((riderPosition(binding, positions, poses, r) - surface[v]).norm(), 1e-10);
           if (!binding.levers[r].isZero(0.0)) continue;
           const double miss = (riderPosition(binding, curved, still, r) - bent(m.surface.vertices[v])).norm();
-          EXPECT_LT(miss, 2.5 * std::pow(2.5 * m.spacing, 2));
+          EXPECT_LT(miss, 2.5 * std::pow((elastic ? 1.42 : 2.5) * m.spacing, 2));
         }
       }
     }

@@ -145,13 +145,18 @@ TEST(FilledCells, AClampHoldsTissueAlone) {
       << refused.error().detail;
 }
 
-TEST(FilledCells, NeedALattice) {
+TEST(FilledCells, AreOfALatticeAlone) {
   BodyDef def = defOf(sphereMesh(0.03, 0.01), 0.011, false);
   def.clusters.kind = ClusterOptions::Kind::kAuto;
-  const Result<PreparedBody> refused = prepareBody(def);
-  ASSERT_FALSE(refused.ok());
-  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_NE(refused.error().detail.find("cells: filled"), std::string::npos) << refused.error().detail;
+  ASSERT_EQ(def.cells, CellFill::kFilled);
+  const PreparedBody body = *prepareBody(def);
+  def.cells = CellFill::kWhole;
+  const PreparedBody whole = *prepareBody(def);
+  EXPECT_FALSE(body.model->lattice);
+  EXPECT_EQ(body.model->rest, whole.model->rest);
+  EXPECT_EQ(body.model->masses, whole.model->masses);
+  EXPECT_EQ(body.model->clusters.members, whole.model->clusters.members);
+  EXPECT_EQ(body.state.surface, whole.state.surface);
 }
 
 }  // namespace

@@ -34,9 +34,10 @@ PairSearch between(const Placed& a, const Placed& b) {
 }
 
 std::vector<FeaturePair> vertexFace(const PairSearch& search, std::vector<RememberedSide>* sides = nullptr) {
-  FoundFeatures found;
-  const std::vector<Index> near = verticesNear(search);
-  findVertexFace(search, near.data(), near.size(), found);
+  SearchScratch scratch;
+  findVerticesNear(search, scratch);
+  findVertexFace(search, scratch);
+  const FoundFeatures& found = scratch.found;
   if (sides) *sides = found.sides;
   return found.pairs;
 }
@@ -121,9 +122,10 @@ TEST(FeaturePairs, WhoMovesAsideInAFrameIsHeldBackByTheFacesThere) {
   const Placed high(boxMesh(Vec3(0.1, 0.1, 0.1), 1, 1, 1), Vec3(-0.13, -0.13, 0.6), way, 1.0);
   PairSearch search = between(high, low);
   search.h = 1.0;
-  FoundFeatures found;
-  const std::vector<Index> near = verticesNear(search);
-  findVertexFace(search, near.data(), near.size(), found);
+  SearchScratch search_scratch;
+  findVerticesNear(search, search_scratch);
+  findVertexFace(search, search_scratch);
+  const FoundFeatures& found = search_scratch.found;
   ASSERT_FALSE(found.watched.empty());
   Points moved = high.frame.vertices;
   for (Vec3& p : moved) p += way;

@@ -227,7 +227,7 @@ TEST(SurfaceContacts, RowsThatAreKeptDoTheSameAsRowsFoundAnew) {
   SurfaceContacts contacts, fresh;
   const ContactCounters first = clash.find(contacts);
   EXPECT_GT(first.lookups, 0u);
-  EXPECT_EQ(first.lookups, first.contacts);
+  EXPECT_LE(first.lookups, clash.before[0].size() + clash.before[1].size()) << "each vertex once";
   const ContactCounters second = clash.find(contacts);
   EXPECT_EQ(second.lookups, 0u);
   EXPECT_EQ(second.contacts, first.contacts);

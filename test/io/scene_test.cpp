@@ -62,7 +62,7 @@ TEST_F(Scene, DefaultsForEverythingButBodies) {
   EXPECT_EQ(scene.world.step_rate, defaults.step_rate);
   EXPECT_EQ(scene.world.substeps, defaults.substeps);
   EXPECT_EQ(scene.world.contact, defaults.contact);
-  EXPECT_EQ(scene.world.contact, ContactMethod::kRestShape);
+  EXPECT_EQ(scene.world.contact, ContactMethod::kSurface);
   EXPECT_TRUE(scene.world.sleep);
   ASSERT_EQ(scene.bodies.size(), 1u);
   const BodyDef& body = scene.bodies[0];
@@ -70,6 +70,7 @@ TEST_F(Scene, DefaultsForEverythingButBodies) {
   EXPECT_TRUE(body.solid);
   EXPECT_EQ(body.spacing, 0.0);
   EXPECT_EQ(body.clusters.kind, ClusterOptions::Kind::kAuto);
+  EXPECT_EQ(body.cells, CellFill::kFilled);
   EXPECT_EQ(body.material.name, "default");
   EXPECT_TRUE(body.fixed.empty());
   EXPECT_NEAR(signedVolume(body.mesh), 1.0, 1e-6);
@@ -136,7 +137,8 @@ bodies:
   EXPECT_EQ(scene.bodies[2].clusters.count, 20);
   EXPECT_NEAR(meanEdgeLength(scene.bodies[2].mesh), 0.01, 0.003);
   EXPECT_NEAR(signedVolume(scene.bodies[3].mesh), 8 * 5e-4, 1e-9);
-  EXPECT_EQ(scene.bodies[2].cells, CellFill::kWhole);
+  EXPECT_EQ(scene.bodies[1].cells, CellFill::kWhole);
+  EXPECT_EQ(scene.bodies[2].cells, BodyDef().cells);
   EXPECT_EQ(scene.bodies[3].cells, CellFill::kFilled);
   EXPECT_EQ(scene.bodies[3].material.mode, MatchMode::kRigid);
   EXPECT_EQ(scene.bodies[3].material.density, Material().density);

@@ -591,6 +591,32 @@ TEST(Memory, SteppingALiverOnTheGroundAllocatesNothing) {
   EXPECT_EQ(allocationsIn(world, 60), 0u) << "in 60 steps";
 }
 
+// A stack for looks that the push sphere touches, and one of elastic blocks.
+TEST(Memory, SteppingBodiesThatPressOnEachOtherAllocatesNothing) {
+  if (!kCounts) GTEST_SKIP() << "the sanitizer has its own allocator";
+  WorldSettings settings;
+  settings.sleep = false;
+  World world(settings);
+  for (const int k : {0, 1, 2, 3}) {
+    BodyDef def = cube("cube" + std::to_string(k), Vec3(0.5 * (k / 2), 0.0, (0.501 + 1.001 * (k % 2)) * kCube));
+    def.material.restitution = 0.2;  // so that rows are found anew in every frame
+    if (k >= 2) {
+      def.material.youngs_modulus = 20000.0;
+      def.material.poissons_ratio = 0.3;
+    }
+    add(world, def);
+  }
+  PushCommand push;
+  push.radius = 0.03;
+  push.position = Vec3(0.0, -0.079, 0.06);
+  replyOf<Done>(world.apply(push));
+  for (int step = 0; step < 240; ++step) world.step();
+  EXPECT_EQ(reportOf(world).contact_counters.pairs, 2u);
+  EXPECT_GT(reportOf(world).contact_counters.lookups, 0u);
+  EXPECT_GT(reportOf(world).contact_counters.corrected, 0u);
+  EXPECT_EQ(allocationsIn(world, 60), 0u) << "in 60 steps";
+}
+
 TEST(Memory, SleepersAllocateNothing) {
   if (!kCounts) GTEST_SKIP() << "the sanitizer has its own allocator";
   World world = sleepingTowers(2);

@@ -45,6 +45,13 @@ struct TreeBoxes {
   std::size_t bytes() const { return bytesOf(items, nodes); }
 };
 
+/// Scratch of BoxTree::queryTree().
+struct TreeQuery {
+  std::vector<std::array<Index, 2>> stack;
+  std::vector<char> seen;
+  std::size_t bytes() const { return bytesOf(stack, seen); }
+};
+
 class BoxTree {
  public:
   BoxTree() = default;
@@ -77,10 +84,11 @@ class BoxTree {
   /// visit(item) for each in a leaf that is nearer than `by` [m] to a leaf of another tree; an item may come again.
   template <class Visit>
   void queryTree(const TreeBoxes& boxes, const BoxTree& other, const TreeBoxes& other_boxes, double by,
-                 const Visit& visit) const {
+                 TreeQuery& query, const Visit& visit) const {
     if (nodes_.empty() || other.nodes_.empty()) return;
-    std::vector<std::array<Index, 2>> stack{{0, 0}};
-    std::vector<char> seen(nodes_.size(), 0);
+    auto& [stack, seen] = query;
+    stack.assign(1, {0, 0});
+    seen.assign(nodes_.size(), 0);
     while (!stack.empty()) {
       const auto [mine, theirs] = stack.back();
       stack.pop_back();

@@ -54,6 +54,32 @@ struct FoundFeatures {
   std::vector<WatchedFeatures> watched;
 };
 
+/// A face near a vertex.
+struct NearFace {
+  Index face = 0;
+  Vec3 weights, point;
+  double distance = 0.0, reach = 0.0;
+  int corners = 0;  // of the face that the nearest point lies between: 1 at a vertex, 2 on an edge, 3 inside
+};
+
+/// Scratch of one search after another.
+struct SearchScratch {
+  FoundFeatures found;
+  std::vector<Index> vertices;  // near the other
+  std::vector<NearFace> faces;  // of one vertex
+  std::vector<char> near;       // one a vertex
+  TreeQuery query;
+
+  void clear() {
+    found.pairs.clear();
+    found.sides.clear();
+    found.watched.clear();
+  }
+  std::size_t bytes() const {
+    return bytesOf(found.pairs, found.sides, found.watched, vertices, faces, near) + query.bytes();
+  }
+};
+
 struct PairSearch {
   struct Side {
     const ContactSurface* surface = nullptr;
@@ -76,14 +102,14 @@ double searchMargin(double edge_length);
 /// [m] features that are nearer touch: only a face that opposes tells the sides.
 double touchingDistance(double edge_length);
 
-/// Vertices of a, ascending, that are near enough to b to be looked up.
-std::vector<Index> verticesNear(const PairSearch& search);
+/// Vertices of a, ascending, that are near enough to b to be looked up, to scratch.vertices.
+void findVerticesNear(const PairSearch& search, SearchScratch& scratch);
 
-/// Vertices of a against the faces of b: up to three pairs each, of different directions, the nearest
+/// scratch.vertices of a against the faces of b, to scratch.found: up to three pairs each, of different directions, the nearest
 /// first. Signs by pseudonormals (Baerentzen and Aanaes 2005); where several faces are equally near, the vertex is on
 /// the side of the one that its own faces oppose most, so that the twin faces of a fresh cut are on the right sides.
 /// Directions that the vertex's faces do not oppose are left out. Returns the vertices that were looked up.
-std::size_t findVertexFace(const PairSearch& search, const Index* vertices, std::size_t count, FoundFeatures& found);
+std::size_t findVertexFace(const PairSearch& search, SearchScratch& scratch);
 
 /// Ridges against ridges, where their common normal is between the normals of both (the Gauss map): the sign needs no
 /// memory.

@@ -5,6 +5,7 @@
 
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 
 #include "meshless_surgery/base/for_each.h"
@@ -115,32 +116,45 @@ class SurfaceContacts {
   using Kind = KeptPair::Kind;
   struct Pair : KeptPair {
     Index a = 0, b = kNoIndex;  // colliders of this frame
-    bool stale = true;
+    bool stale = true, near = false;
+    std::size_t looked_up = 0;  // vertices, when it was found last
+  };
+  /// Of one thread.
+  struct Scratch {
+    SearchScratch search;
+    std::vector<ContactRow> old;
   };
   using PairName = std::tuple<std::uint64_t, std::uint64_t, Kind>;
   Pair& pairOf(Kind kind, const std::vector<Collider>& colliders, Index a, Index b, std::uint64_t key_b);
-  void findPair(const SurfaceScene& scene, const std::vector<Collider>& colliders, Pair& pair) const;
+  Index colliderOf(std::uint64_t key) const;  // kNoIndex: none
+  void findPair(const SurfaceScene& scene, const std::vector<Collider>& colliders, Pair& pair);
   bool isInside(std::uint64_t key_a, std::uint64_t key_b) const;
-  void makeRows(const SurfaceScene& scene, const std::vector<Collider>& colliders, const FoundFeatures& found,
-                Pair& pair) const;
+  void makeRows(const SurfaceScene& scene, const std::vector<Collider>& colliders, Scratch& scratch, Pair& pair) const;
   void listReached(const SurfaceScene& scene, const std::vector<Collider>& colliders);
   void joinIslands(const std::vector<Collider>& colliders);
   void listWatched();
   void fillSlots(const std::vector<Collider>& colliders);
 
   BroadPhase broad_phase_;
-  std::vector<char> needed_, moved_;
+  std::vector<Box> boxes_;
+  std::vector<char> active_, needed_, moved_;
+  std::vector<std::pair<std::uint64_t, Index>> numbers_;  // of colliders by their keys, ascending
   std::map<PairName, std::unique_ptr<Pair>> known_;
   std::map<std::uint64_t, KeptWay> ways_;
+  std::vector<KeptWay*> ways_of_;        // one a collider; null where nothing is near
   std::vector<Pair*> pairs_;             // of this frame
   std::vector<SurfaceFrame> frames_;     // one a collider; filled where moved_
   std::vector<std::uint64_t> frame_of_;  // key of the obstacle whose frame stays
+  std::mutex spare_mutex_;
+  std::vector<std::unique_ptr<Scratch>> spare_;
   std::vector<Index> reached_;
   std::vector<std::size_t> first_slots_;  // one a collider
   std::vector<Slot> now_, before_;
   std::vector<SolverBody> solver_bodies_;
   std::vector<LimitedBody> limited_;
-  std::vector<Island> islands_;
+  std::vector<Island> islands_, spare_islands_;
+  std::vector<Index> root_, island_of_;  // one a collider
+  std::vector<char> island_held_;
 };
 
 }  // namespace meshless

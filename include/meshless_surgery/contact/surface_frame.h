@@ -13,10 +13,11 @@ struct SurfaceFrame {
   TreeBoxes boxes;          // of faces, swept by their velocities in the frame
   std::vector<char> ridge;  // one an edge: convex, and turned by more than kRidge
   std::vector<Index> ridges;
-  Box bounds;  // swept
+  Box bounds;                   // swept
+  std::vector<FloatBox> swept;  // of vertices
 
   std::size_t bytes() const {
-    return bytesOf(vertices, velocities, face_normals, vertex_normals, ridge, ridges) + boxes.bytes();
+    return bytesOf(vertices, velocities, face_normals, vertex_normals, ridge, ridges, swept) + boxes.bytes();
   }
 };
 
