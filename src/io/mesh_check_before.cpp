@@ -259,6 +259,8 @@ Result<PromisedCounts> checkBeforeReading(const std::string& name, std::string_v
 }
 
 Result<std::string> plainObj(const std::string& name, std::string_view text) {
+  // Some programs write their whole buffer.
+  while (!text.empty() && text.back() == '\0') text.remove_suffix(1);
   if (const std::string fault = notText(text); !fault.empty()) return unreadable(name, fault);
   std::string plain;
   std::size_t points = 0, faces = 0, corners = 0, line_number = 0;

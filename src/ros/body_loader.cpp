@@ -11,8 +11,8 @@ std::string stem(const std::string& path) {
   std::string name = file.substr(0, file.find_last_of('.'));
   // A file may be called anything, a body may not.
   for (char& c : name) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
-                       c == '-' || c == '.';
+    const bool plain =
+        (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' || c == '.';
     if (!plain) c = '_';
   }
   return name.substr(0, 90);
@@ -48,7 +48,7 @@ Result<std::shared_ptr<const PreparedBody>> BodyLoader::load(const SpawnRequest&
   } else {
     const auto path = access_.resolve(request.file, scene_folder_);
     if (!path.ok()) return path.error();
-    auto shape = loadShape(*path, request.scale);
+    auto shape = loadShape(*path, request.scale, request.repair);
     if (!shape.ok()) return shape.error();
     def.mesh = std::move(shape->mesh);
     def.solid = shape->solid;

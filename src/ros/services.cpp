@@ -50,6 +50,14 @@ std::string clustersOf(const CutWork& work) {
   return std::to_string(work.rebuilt_clusters) + " clusters rebuilt, " + std::to_string(work.kept_clusters) + " kept";
 }
 
+MeshRepair repairOf(const std::string& name, BorderCheck& check) {
+  const std::vector<std::string>& names = meshRepairNames();
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found != names.end()) return static_cast<MeshRepair>(found - names.begin());
+  if (!name.empty()) check.fault("repair is '" + printable(name) + "'; accepted: " + joined(names));
+  return MeshRepair::kMend;
+}
+
 template <class Response, class = void>
 struct HasErrorCode : std::false_type {};  // std_srvs' answers
 template <class Response>
@@ -311,6 +319,7 @@ struct Services::Handlers {
     wanted.scale = check.number("scale", request.scale, 0.0, kMaxScale, "");
     if (wanted.scale == 0.0) wanted.scale = 1.0;
     wanted.material = request.material;
+    wanted.repair = repairOf(request.repair, check);
     if (wanted.file.empty()) {
       switch (request.primitive.type) {
         case shape_msgs::SolidPrimitive::BOX:

@@ -15,7 +15,8 @@ struct SpawnRequest {
   std::vector<double> sizes;  // [m] box: x y z; sphere: radius; cylinder: height radius; before scaling
   double scale = 1.0;         // > 0
   Pose pose;
-  std::string material;       // empty: "default"
+  std::string material;                   // empty: "default"
+  MeshRepair repair = MeshRepair::kMend;  // of a file's surface
 };
 
 class BodyLoader {
