@@ -4,6 +4,7 @@ import select
 
 import rospy
 from geometry_msgs.msg import Point, Vector3
+from sensor_msgs.msg import PointCloud2
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
@@ -12,7 +13,7 @@ from meshless_surgery.errors import Refused, Unanswered
 from meshless_surgery.msg import Info, State
 from meshless_surgery.poses import blade_pose, blades_pose, pose_stamped
 from meshless_surgery.srv import (Cut, GetBody, Hash, Incise, LoadState, Lock, MovePick, Pick, Probe, Push, Release, Remove,
-                                  SaveState, SetMaterial, Spawn, Step)
+                                  SaveState, SetMaterial, Spawn, SpawnCloud, Step)
 from meshless_surgery.streams import ToolStream
 
 
@@ -121,8 +122,9 @@ class Surgeon:
 
     # bodies
     def spawn(self, name='', file='', box=None, sphere=None, cylinder=None, position=(0, 0, 0),
-              orientation=(0, 0, 0, 1), scale=0.0, material='', frame=None):
-        """A body from a file, or one of `box` (x, y, z), `sphere` radius, `cylinder` (height, radius)."""
+              orientation=(0, 0, 0, 1), scale=0.0, material='', repair='', frame=None):
+        """A body from a file, or one of `box` (x, y, z), `sphere` radius, `cylinder` (height, radius). `repair` of a file's
+        surface: none, mend, wrap; empty: mend."""
         shapes = {SolidPrimitive.BOX: box, SolidPrimitive.SPHERE: None if sphere is None else (sphere,),
                   SolidPrimitive.CYLINDER: cylinder}
         given = [(kind, list(sizes)) for kind, sizes in shapes.items() if sizes is not None]
@@ -130,7 +132,12 @@ class Surgeon:
             raise ValueError('%d shapes are given; accepted: one of file, box, sphere, cylinder' % (len(given) + bool(file)))
         primitive = SolidPrimitive(type=given[0][0], dimensions=given[0][1]) if given else SolidPrimitive()
         return self.call('spawn', Spawn, name=name, file=file, primitive=primitive, scale=scale, material=material,
-                         pose=pose_stamped(position, orientation, self._frame(frame)))
+                         repair=repair, pose=pose_stamped(position, orientation, self._frame(frame)))
+
+    def spawn_cloud(self, name='', cloud=None, topic='', timeout=0.0, scale=0.0, voxel=0.0, outliers=0.0, material=''):
+        """A body from a sensor_msgs/PointCloud2, or from the next one of a topic."""
+        return self.call('spawn_cloud', SpawnCloud, name=name, cloud=cloud or PointCloud2(), topic=topic, timeout=timeout,
+                         scale=scale, voxel=voxel, outliers=outliers, material=material)
 
     def remove(self, name):
         return self.call('remove', Remove, name=name)

@@ -208,7 +208,8 @@ std::vector<Index> weld(const Points& points, double tolerance) {
 /// The steps of a repair, in their order; each works on the triangles that the one before left.
 class Repair {
  public:
-  explicit Repair(const TriangleMesh& mesh) : points_(mesh.vertices), triangles_(mesh.triangles) {}
+  Repair(const TriangleMesh& mesh, const RepairRules& rules)
+      : points_(mesh.vertices), triangles_(mesh.triangles), rules_(rules) {}
 
   Result<RepairedMesh> run() {
     if (triangles_.empty() || points_.empty())
@@ -226,7 +227,8 @@ class Repair {
     diagonal_ = boundsOf(points_).diagonal();
     if (!(diagonal_ > 0.0) || !std::isfinite(diagonal_))
       return refuse("no triangle has an area: the vertices extend over " + std::to_string(diagonal_) + " m");
-    mergeVertices();
+    merged_.assign(points_.size(), 0);
+    if (rules_.merge_vertices) mergeVertices();
     dropTriangles();
     flipFlatTriangles();
     const bool any_area =
@@ -234,10 +236,11 @@ class Repair {
     if (!any_area) return refuse("no triangle has an area: all corners lie on a line or in a point");
     if (const std::string why = nonManifold(); !why.empty()) return refuse(why);
     if (const std::string why = agree(); !why.empty()) return refuse(why);
-    closeHoles();
+    if (rules_.close_holes) closeHoles();
     splitTouchingVertices();
     const std::size_t open = openEdges();
     result_.solid = open == 0;
+    result_.open_edges = open;
     turnOutwards();
     dropVertices();
     if (open > 0)
@@ -263,7 +266,6 @@ class Repair {
     for (std::size_t v = 0; v < same.size(); ++v) merged += same[v] != v;
     for (Triangle& t : triangles_)
       for (Index& v : t) v = same[v];
-    merged_.assign(points_.size(), 0);
     for (std::size_t v = 0; v < same.size(); ++v) merged_[v] = same[v] != v;
     if (merged > 0) note("merged " + count(merged, "vertex", "vertices") + " at the place of another");
   }
@@ -588,6 +590,7 @@ class Repair {
 
   Points points_;
   std::vector<Triangle> triangles_;
+  const RepairRules rules_;
   std::vector<Index> component_;  // one a triangle, once they agree
   std::vector<char> merged_;      // one a vertex
   Index components_ = 0;
@@ -626,6 +629,16 @@ MeshReport inspectMesh(const TriangleMesh& mesh, bool check_intersections) {
   return report;
 }
 
-Result<RepairedMesh> repairMesh(const TriangleMesh& mesh) { return Repair(mesh).run(); }
+Result<RepairedMesh> repairMesh(const TriangleMesh& mesh, const RepairRules& rules) {
+  return Repair(mesh, rules).run();
+}
+
+TriangleMesh withMergedVertices(const TriangleMesh& mesh) {
+  const std::vector<Index> same = weld(mesh.vertices, kWeld * boundsOf(mesh.vertices).diagonal());
+  TriangleMesh merged = mesh;
+  for (Triangle& t : merged.triangles)
+    for (Index& v : t) v = same[v];
+  return merged;
+}
 
 }  // namespace meshless

@@ -2,13 +2,12 @@
 #include <filesystem>
 #include <sstream>
 
-#include "meshless_surgery/geometry/mesh_check.h"
 #include "meshless_surgery/geometry/surface_from_points.h"
 #include "meshless_surgery/io/files.h"
 
 namespace meshless {
 
-Result<LoadedShape> loadShape(const std::string& real_path, double scale) {
+Result<LoadedShape> loadShape(const std::string& real_path, double scale, MeshRepair repair) {
   if (!(scale > 0.0) || !std::isfinite(scale)) {
     std::ostringstream text;
     text << "scale is " << scale << "; accepted: above 0, finite";
@@ -29,7 +28,7 @@ Result<LoadedShape> loadShape(const std::string& real_path, double scale) {
     shape.notes.push_back(note.str());
     mesh = std::move(surface->mesh);
   }
-  Result<RepairedMesh> repaired = repairMesh(mesh);
+  Result<RepairedMesh> repaired = repairMesh(mesh, repair);
   if (!repaired) return Error{repaired.error().code, "'" + name + "': " + repaired.error().detail};
   shape.mesh = std::move(repaired->mesh);
   shape.solid = repaired->solid;

@@ -259,6 +259,10 @@ Result<PromisedCounts> checkBeforeReading(const std::string& name, std::string_v
 }
 
 Result<std::string> plainObj(const std::string& name, std::string_view text) {
+  // Some programs write their whole buffer. More of them are a hole in a file, and no text.
+  const std::size_t end = text.find_last_not_of('\0') + 1;  // 0: nothing else
+  constexpr std::size_t kMostNuls = 65536;
+  if (text.size() - end <= kMostNuls) text = text.substr(0, end);
   if (const std::string fault = notText(text); !fault.empty()) return unreadable(name, fault);
   std::string plain;
   std::size_t points = 0, faces = 0, corners = 0, line_number = 0;

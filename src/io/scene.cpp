@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <tuple>
 
 #include "material_yaml.h"
 #include "meshless_surgery/base/random.h"
@@ -265,6 +266,7 @@ class SceneReader {
     map.number("scale", {0.0, 1e6, true}, scale);
     map.number("spacing", lengths(0.0, true), def.spacing);
     map.number("edge", lengths(0.0, true), edge);
+    const MeshRepair repair = readRepair(map);
     if (const YAML::Node pose = map.get("pose"); pose.IsDefined()) def.pose = readPose(source_, pose);
     if (const YAML::Node clusters = map.get("clusters"); clusters.IsDefined())
       def.clusters = readClusters(source_, clusters);
@@ -284,11 +286,13 @@ class SceneReader {
       source_.fail(node, file.IsDefined() ? "a body has file and primitive" : "a body has no file and no primitive",
                    "one of them");
     if (file.IsDefined() && edge > 0.0) source_.fail(map.get("edge"), "edge of a body from a file", "with a primitive");
+    if (primitive.IsDefined() && map.has("repair"))
+      source_.fail(map.get("repair"), "repair of a primitive", "with a file");
     map.finish();
     if (source_.fault) return;
 
     if (file.IsDefined())
-      loadFile(file, scale, def);
+      loadFile(file, scale, repair, def);
     else
       makePrimitive(primitive, scale, edge, def);
     if (source_.fault) return;
@@ -314,6 +318,7 @@ class SceneReader {
     map.text("name", shape.name);
     map.number("scale", {0.0, 1e6, true}, scale);
     map.number("edge", lengths(0.0, true), edge);
+    const MeshRepair repair = readRepair(map);
     map.number("friction", {0.0, 10.0}, def.friction);
     if (const YAML::Node pose = map.get("pose"); pose.IsDefined()) shape.pose = readPose(source_, pose);
     const YAML::Node file = map.get("file"), primitive = map.get("primitive");
@@ -321,10 +326,12 @@ class SceneReader {
       source_.fail(node,
                    file.IsDefined() ? "an obstacle has file and primitive" : "an obstacle has no file and no primitive",
                    "one of them");
+    if (primitive.IsDefined() && map.has("repair"))
+      source_.fail(map.get("repair"), "repair of a primitive", "with a file");
     map.finish();
     if (source_.fault) return;
     if (file.IsDefined())
-      loadFile(file, scale, shape);
+      loadFile(file, scale, repair, shape);
     else
       makePrimitive(primitive, scale, edge, shape);
     if (source_.fault) return;
@@ -367,15 +374,20 @@ class SceneReader {
     }
   }
 
-  void loadFile(const YAML::Node& node, double scale, BodyDef& def) {
+  static MeshRepair readRepair(YamlMap& map) {
+    const int chosen = map.choice("repair", meshRepairNames());
+    return chosen < 0 ? MeshRepair::kMend : static_cast<MeshRepair>(chosen);
+  }
+
+  void loadFile(const YAML::Node& node, double scale, MeshRepair repair, BodyDef& def) {
     std::string path;
     if (!readText(source_, node, "file", path)) return;
     const Result<std::string> real = access_.resolve(path, folder_);
     if (!real) return source_.fail(node, real.error().detail, "", real.error().code);
-    const auto key = std::make_pair(*real, scale);
+    const auto key = std::make_tuple(*real, scale, repair);
     auto found = shapes_.find(key);
     if (found == shapes_.end()) {
-      Result<LoadedShape> loaded = loadShape(*real, scale);
+      Result<LoadedShape> loaded = loadShape(*real, scale, repair);
       if (!loaded) return source_.fail(node, loaded.error().detail, "", loaded.error().code);
       found = shapes_.emplace(key, std::move(*loaded)).first;
     }
@@ -418,7 +430,8 @@ class SceneReader {
   const FileAccess& access_;
   SceneDef& scene_;
   std::set<std::string> names_;
-  std::map<std::pair<std::string, double>, LoadedShape> shapes_;  // copies and repeated files are read once
+  std::map<std::tuple<std::string, double, MeshRepair>, LoadedShape>
+      shapes_;  // copies and repeated files are read once
 };
 
 /// Adds the materials of config/materials of this package, and of the files in ../materials.

@@ -11,8 +11,8 @@ std::string stem(const std::string& path) {
   std::string name = file.substr(0, file.find_last_of('.'));
   // A file may be called anything, a body may not.
   for (char& c : name) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
-                       c == '-' || c == '.';
+    const bool plain =
+        (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' || c == '.';
     if (!plain) c = '_';
   }
   return name.substr(0, 90);
@@ -23,20 +23,23 @@ std::string stem(const std::string& path) {
 BodyLoader::BodyLoader(FileAccess access, std::string scene_folder, std::map<std::string, Material> materials)
     : access_(std::move(access)), scene_folder_(std::move(scene_folder)), materials_(std::move(materials)) {}
 
+Result<Material> BodyLoader::material(const std::string& name) const {
+  const auto found = materials_.find(name.empty() ? "default" : name);
+  if (found != materials_.end()) return found->second;
+  if (name.empty() || name == "default") return Material{};
+  std::string known;
+  for (const auto& [other, unused] : materials_) known += (known.empty() ? "" : ", ") + other;
+  return Error{ErrorCode::kUnknownName,
+               "material is '" + printable(name) + "'; accepted: " + (known.empty() ? "default" : known)};
+}
+
 Result<std::shared_ptr<const PreparedBody>> BodyLoader::load(const SpawnRequest& request) const {
   BodyDef def;
   def.pose = request.pose;
 
-  const std::string material = request.material.empty() ? "default" : request.material;
-  const auto found = materials_.find(material);
-  if (found != materials_.end()) {
-    def.material = found->second;
-  } else if (!request.material.empty() && request.material != "default") {
-    std::string known;
-    for (const auto& [name, unused] : materials_) known += (known.empty() ? "" : ", ") + name;
-    return Error{ErrorCode::kUnknownName,
-                 "material is '" + printable(request.material) + "'; accepted: " + (known.empty() ? "default" : known)};
-  }
+  auto chosen = material(request.material);
+  if (!chosen.ok()) return chosen.error();
+  def.material = std::move(*chosen);
 
   if (request.file.empty()) {
     std::vector<double> sizes = request.sizes;
@@ -48,7 +51,7 @@ Result<std::shared_ptr<const PreparedBody>> BodyLoader::load(const SpawnRequest&
   } else {
     const auto path = access_.resolve(request.file, scene_folder_);
     if (!path.ok()) return path.error();
-    auto shape = loadShape(*path, request.scale);
+    auto shape = loadShape(*path, request.scale, request.repair);
     if (!shape.ok()) return shape.error();
     def.mesh = std::move(shape->mesh);
     def.solid = shape->solid;
@@ -56,6 +59,29 @@ Result<std::shared_ptr<const PreparedBody>> BodyLoader::load(const SpawnRequest&
     def.name = stem(*path);
   }
   if (!request.name.empty()) def.name = request.name;
+  auto body = prepareBody(std::move(def));
+  if (!body.ok()) return body.error();
+  return std::shared_ptr<const PreparedBody>(std::make_shared<PreparedBody>(std::move(*body)));
+}
+
+Result<std::shared_ptr<const PreparedBody>> BodyLoader::load(const CloudRequest& request, std::size_t& left) const {
+  BodyDef def;
+  def.name = request.name;
+  auto chosen = material(request.material);
+  if (!chosen.ok()) return chosen.error();
+  def.material = std::move(*chosen);
+  auto made = shapeOfCloud(request.points, request.filter);
+  if (!made.ok()) return made.error();
+  left = made->points;
+  def.mesh = std::move(made->shape.mesh);
+  def.notes = std::move(made->shape.notes);
+  Vec3 low = def.mesh.vertices[0], high = low;
+  for (const Vec3& p : def.mesh.vertices) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  def.pose.translation = 0.5 * (low + high);
+  for (Vec3& p : def.mesh.vertices) p -= def.pose.translation;
   auto body = prepareBody(std::move(def));
   if (!body.ok()) return body.error();
   return std::shared_ptr<const PreparedBody>(std::make_shared<PreparedBody>(std::move(*body)));

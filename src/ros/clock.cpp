@@ -20,6 +20,14 @@ Clock::Clock() : Clock([] { return ros::Time::now(); }, ros::Time::isSimTime()) 
 
 Clock::Clock(Source source, bool may_stand) : source_(std::move(source)), may_stand_(may_stand) {}
 
+Clock Clock::steady() {
+  const auto source = [] {
+    const ros::SteadyTime now = ros::SteadyTime::now();
+    return ros::Time(now.sec, now.nsec);
+  };
+  return Clock(source, false);
+}
+
 double Clock::now() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   const ros::Time said = source_();

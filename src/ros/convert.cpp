@@ -1,6 +1,7 @@
 #include "meshless_surgery/ros/convert.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -271,6 +272,49 @@ shape_msgs::Mesh toMesh(const Points& vertices, const std::vector<Triangle>& tri
     for (std::size_t k = 0; k < 3; ++k) mesh.triangles[t].vertex_indices[k] = triangles[t][k];
   }
   return mesh;
+}
+
+Result<Points> toPoints(const sensor_msgs::PointCloud2& cloud) {
+  const auto fault = [](const std::string& why) { return Error{ErrorCode::kInvalidArgument, "cloud " + why}; };
+  if (cloud.is_bigendian) return fault("is big-endian; accepted: little-endian");
+  std::array<const sensor_msgs::PointField*, 3> fields{};
+  for (const sensor_msgs::PointField& field : cloud.fields)
+    for (std::size_t d = 0; d < 3; ++d)
+      if (field.name == std::string(1, "xyz"[d])) fields[d] = &field;
+  for (const sensor_msgs::PointField* field : fields) {
+    if (field == nullptr) return fault("has not the fields x, y and z");
+    const bool single = field->datatype == sensor_msgs::PointField::FLOAT32;
+    if (!single && field->datatype != sensor_msgs::PointField::FLOAT64)
+      return fault("." + field->name + " is of datatype " + std::to_string(field->datatype) +
+                   "; accepted: 7 (FLOAT32), 8 (FLOAT64)");
+    if (std::uint64_t{field->offset} + (single ? 4u : 8u) > cloud.point_step)
+      return fault("." + field->name + " begins at byte " + std::to_string(field->offset) + " of " +
+                   std::to_string(cloud.point_step) + " of a point");
+  }
+  const std::uint64_t row = std::uint64_t{cloud.width} * cloud.point_step;
+  if (cloud.row_step < row || (cloud.height > 0 && cloud.data.size() / cloud.height < cloud.row_step))
+    return fault("has " + std::to_string(cloud.data.size()) + " bytes and a row_step of " +
+                 std::to_string(cloud.row_step) + "; accepted: height " + std::to_string(cloud.height) +
+                 " times a row_step of at least " + std::to_string(row));
+  Points points;
+  if (cloud.width == 0) return points;  // of however many rows
+  points.reserve(std::size_t{cloud.width} * cloud.height);
+  for (std::size_t r = 0; r < cloud.height; ++r)
+    for (std::size_t c = 0; c < cloud.width; ++c) {
+      const std::uint8_t* at = cloud.data.data() + r * cloud.row_step + c * cloud.point_step;
+      Vec3 point;
+      for (int d = 0; d < 3; ++d) {
+        float single = 0.0f;
+        if (fields[d]->datatype == sensor_msgs::PointField::FLOAT32) {
+          std::memcpy(&single, at + fields[d]->offset, sizeof single);
+          point[d] = single;
+        } else {
+          std::memcpy(&point[d], at + fields[d]->offset, sizeof(double));
+        }
+      }
+      points.push_back(point);
+    }
+  return points;
 }
 
 }  // namespace meshless

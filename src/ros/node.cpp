@@ -13,6 +13,7 @@
 #include <ros/this_node.h>
 
 #include "meshless_surgery/ros/border_check.h"
+#include "meshless_surgery/ros/clock_publisher.h"
 #include "meshless_surgery/ros/force_publisher.h"
 #include "meshless_surgery/ros/publishers.h"
 #include "meshless_surgery/ros/services.h"
@@ -119,13 +120,16 @@ SessionSettings sessionSettings(const NodeSettings& settings, const std::string&
 
 struct DeformerNode::Parts {
   Parts(const ros::NodeHandle& handle, const NodeSettings& settings, std::unique_ptr<World> world, BodyLoader loader_in,
-        std::unique_ptr<Session> session_in)
-      : session(std::move(session_in)),
-        runner(std::move(world), {settings.paused, settings.max_backlog}, clock),
+        std::unique_ptr<Session> session_in, std::unique_ptr<Rejections> rejections_in,
+        std::unique_ptr<ClockPublisher> clock_publisher_in)
+      : rejections(std::move(rejections_in)),
+        clock_publisher(std::move(clock_publisher_in)),
+        session(std::move(session_in)),
+        runner(std::move(world), {settings.paused, settings.max_backlog}, clock_publisher ? wall : clock),
         frames(settings.world_frame),
         loader(std::move(loader_in)),
-        inputs(handle, settings, clock, runner, frames, rejections),
-        publishers(handle, settings, runner, inputs.tools(), rejections),
+        inputs(handle, settings, clock, runner, frames, *rejections),
+        publishers(handle, settings, runner, inputs.tools(), *rejections),
         forces(handle, settings, clock, inputs.tools()) {}
 
   ~Parts() {
@@ -138,8 +142,11 @@ struct DeformerNode::Parts {
     services.reset();
   }
 
-  const Clock clock;  // of all below
-  Rejections rejections;
+  std::unique_ptr<Rejections> rejections;
+  std::unique_ptr<ClockPublisher> clock_publisher;  // null: without publish_clock
+  const Clock clock =
+      clock_publisher ? Clock([this] { return clock_publisher->now(); }, true) : Clock();  // of all below
+  const Clock wall = Clock::steady();  // of the steps alone, where they make the time
   std::unique_ptr<Session> session;
   WorldRunner runner;
   Frames frames;
@@ -158,6 +165,14 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   auto settings = readNodeSettings(private_handle, unknown);
   if (!settings.ok()) return settings.error();
   for (const std::string& name : unknown) ROS_WARN_STREAM("parameter ~" << name << " is not known, and not used");
+
+  auto rejections = std::make_unique<Rejections>();
+  std::unique_ptr<ClockPublisher> clock_publisher;
+  if (settings->publish_clock) {
+    auto started = ClockPublisher::start(*rejections);
+    if (!started.ok()) return started.error();
+    clock_publisher = std::move(*started);
+  }
 
   const std::string package_folder = ros::package::getPath(kPackage);
   const auto file = sceneFile(settings->scene, package_folder);
@@ -217,12 +232,14 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   if (!log.ok()) return Error{log.error().code, "parameter ~command_log: " + log.error().detail};
   if (!log->empty()) ROS_INFO_STREAM("commands are logged to " << *log);
 
-  auto parts =
-      std::make_unique<Parts>(private_handle, *settings, std::move(world),
-                              BodyLoader(access, scene_folder, std::move(scene->materials)), std::move(session));
+  auto parts = std::make_unique<Parts>(private_handle, *settings, std::move(world),
+                                       BodyLoader(access, scene_folder, std::move(scene->materials)),
+                                       std::move(session), std::move(rejections), std::move(clock_publisher));
   parts->runner.setEventSink(
       [publishers = &parts->publishers](std::vector<Event> events) { publishers->queueEvents(std::move(events)); });
-  parts->runner.setStepSink([forces = &parts->forces, kept = parts->session.get()](const World& world_now, double dt) {
+  parts->runner.setStepSink([forces = &parts->forces, kept = parts->session.get(),
+                             clock = parts->clock_publisher.get()](const World& world_now, double dt) {
+    if (clock != nullptr && dt > 0.0) clock->advance(dt);
     forces->changed(world_now, dt);
     kept->changed(world_now, dt);
   });
@@ -232,7 +249,7 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   parts->forces.start();
   // Last, so that who finds them finds a world that runs.
   parts->services = std::make_unique<Services>(private_handle, parts->runner, parts->frames, parts->loader,
-                                               parts->rejections, *parts->session);
+                                               *parts->rejections, *parts->session);
   ROS_INFO_STREAM("scene " << *file << ": " << bodies << " bodies, " << particles << " particles, " << clusters
                            << " clusters, " << scene->world.step_rate << " steps/s of " << scene->world.substeps
                            << " substeps" << (settings->paused ? ", paused" : ""));

@@ -1,6 +1,7 @@
 #include "meshless_surgery/ros/services.h"
 
 #include <algorithm>
+#include <chrono>
 #include <type_traits>
 
 #include <meshless_surgery/Cut.h>
@@ -18,8 +19,10 @@
 #include <meshless_surgery/SaveState.h>
 #include <meshless_surgery/SetMaterial.h>
 #include <meshless_surgery/Spawn.h>
+#include <meshless_surgery/SpawnCloud.h>
 #include <meshless_surgery/Step.h>
 #include <ros/console.h>
+#include <ros/names.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 
@@ -33,6 +36,10 @@ constexpr double kMaxCloseTime = 60.0;  // [s]
 constexpr double kMaxSpeed = 1e3;       // [m/s]
 constexpr double kMaxStiffness = 1e9;   // [N/m]
 constexpr double kMaxScale = 1e6;
+constexpr double kMaxCloudTimeout = 60.0;  // [s]
+constexpr double kCloudTimeout = 5.0;      // [s]
+constexpr double kCloudPoll = 0.05;        // [s]
+constexpr double kMaxOutliers = 100.0;     // standard deviations
 constexpr std::uint32_t kMaxSteps = 100000;
 constexpr std::size_t kMaxYaml = 64 * 1024;                 // bytes
 constexpr std::size_t kLongestMessage = 2000;               // characters: names of megabytes are not sent back
@@ -48,6 +55,14 @@ std::string joined(const std::vector<std::string>& names) {
 
 std::string clustersOf(const CutWork& work) {
   return std::to_string(work.rebuilt_clusters) + " clusters rebuilt, " + std::to_string(work.kept_clusters) + " kept";
+}
+
+MeshRepair repairOf(const std::string& name, BorderCheck& check) {
+  const std::vector<std::string>& names = meshRepairNames();
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found != names.end()) return static_cast<MeshRepair>(found - names.begin());
+  if (!name.empty()) check.fault("repair is '" + printable(name) + "'; accepted: " + joined(names));
+  return MeshRepair::kMend;
 }
 
 template <class Response, class = void>
@@ -86,11 +101,13 @@ struct Services::Handlers {
     advertiseApart(private_handle, cut_queue, "cut", &Handlers::cut);
     advertiseApart(private_handle, step_queue, "step", &Handlers::step);
     advertiseApart(private_handle, spawn_queue, "spawn", &Handlers::spawn);
+    advertiseApart(private_handle, cloud_queue, "spawn_cloud", &Handlers::spawnCloud);
     advertiseApart(private_handle, session_queue, "save", &Handlers::save);
     advertiseApart(private_handle, session_queue, "load", &Handlers::load);
     cut_spinner.start();
     session_spinner.start();
     step_spinner.start();
+    cloud_spinner.start();
     spawn_spinner.start();
   }
 
@@ -311,6 +328,7 @@ struct Services::Handlers {
     wanted.scale = check.number("scale", request.scale, 0.0, kMaxScale, "");
     if (wanted.scale == 0.0) wanted.scale = 1.0;
     wanted.material = request.material;
+    wanted.repair = repairOf(request.repair, check);
     if (wanted.file.empty()) {
       switch (request.primitive.type) {
         case shape_msgs::SolidPrimitive::BOX:
@@ -336,22 +354,28 @@ struct Services::Handlers {
     auto body = loader.load(wanted);
     if (!body.ok()) return refuse(response, "spawn", body.error());
 
+    return add(response, "spawn", *body, request.name.empty());
+  }
+
+  /// `numbered`: <name>_2, <name>_3 ... where the name is taken.
+  template <class Response>
+  bool add(Response& response, const std::string& service, const std::shared_ptr<const PreparedBody>& body,
+           bool numbered) {
     SpawnCommand command;
-    command.body = *body;
+    command.body = body;
     auto reply = runner.apply(command);
-    for (int i = 2;
-         request.name.empty() && !reply.ok() && reply.error().code == ErrorCode::kDuplicateName && i <= kMostSuffix;
+    for (int i = 2; numbered && !reply.ok() && reply.error().code == ErrorCode::kDuplicateName && i <= kMostSuffix;
          ++i) {
       // Looked for in one go: in a crowd each turn with the world may take long to come.
-      const auto numbered = [&] { return (*body)->def.name + "_" + std::to_string(i); };
+      const auto name = [&] { return body->def.name + "_" + std::to_string(i); };
       const Status done = runner.look([&](World& world) {
-        while (i < kMostSuffix && world.nameUsed(numbered())) ++i;
+        while (i < kMostSuffix && world.nameUsed(name())) ++i;
       });
-      if (!done.ok()) return refuse(response, "spawn", done.error());
-      command.body = renamed(**body, numbered());
+      if (!done.ok()) return refuse(response, service, done.error());
+      command.body = renamed(*body, name());
       reply = runner.apply(command);
     }
-    if (!reply.ok()) return refuse(response, "spawn", reply.error());
+    if (!reply.ok()) return refuse(response, service, reply.error());
     const auto& spawned = std::get<SpawnReply>(*reply);
     response.name = spawned.name;
     response.particles = static_cast<std::uint32_t>(spawned.particles);
@@ -360,6 +384,63 @@ struct Services::Handlers {
     std::string message = "added " + spawned.name;
     for (const std::string& note : command.body->def.notes) message += "; " + note;
     return accept(response, message);
+  }
+
+  bool spawnCloud(meshless_surgery::SpawnCloud::Request& request, meshless_surgery::SpawnCloud::Response& response) {
+    BorderCheck check;
+    CloudRequest wanted;
+    if (const std::string name = check.newName("name", request.name); !name.empty()) wanted.name = name;
+    const double timeout = check.number("timeout", request.timeout, 0.0, kMaxCloudTimeout, "s");
+    const double scale = check.number("scale", request.scale, 0.0, kMaxScale, "");
+    wanted.filter.voxel = check.number("voxel", request.voxel, 0.0, kMaxLength, "m");
+    const double outliers = check.number("outliers", request.outliers, 0.0, kMaxOutliers, "");
+    if (outliers > 0.0) wanted.filter.outliers = outliers;
+    wanted.material = request.material;
+    const bool given = !request.cloud.data.empty();
+    if (given == !request.topic.empty())
+      check.fault(given ? "cloud and topic are given; accepted: one of them"
+                        : "cloud has no points and topic is empty; accepted: one of them");
+    std::string why;
+    if (!ros::names::validate(request.topic, why))
+      check.fault("topic is '" + printable(request.topic) + "'; accepted: a topic's name");
+    if (!check.ok()) return refuse(response, "spawn_cloud", check.error());
+    sensor_msgs::PointCloud2ConstPtr heard;
+    if (!given) {
+      heard = nextCloud(request.topic, timeout > 0.0 ? timeout : kCloudTimeout);
+      if (!heard) {
+        return refuse(response, "spawn_cloud",
+                      {ErrorCode::kMissed, "no sensor_msgs/PointCloud2 came on '" + printable(request.topic) +
+                                               "' within " + formatNumber(timeout > 0.0 ? timeout : kCloudTimeout) +
+                                               " s; accepted: a topic that is published"});
+      }
+    }
+    const sensor_msgs::PointCloud2& cloud = heard ? *heard : request.cloud;
+    auto points = toPoints(cloud);
+    if (!points.ok()) return refuse(response, "spawn_cloud", points.error());
+    const auto frame = frames.toWorld(cloud.header);
+    if (!frame.ok()) return refuse(response, "spawn_cloud", frame.error());
+    // Lengths of the cloud are scaled, those of tf are metres.
+    for (Vec3& p : *points) p = *frame * Vec3((scale > 0.0 ? scale : 1.0) * p);
+    wanted.points = std::move(*points);
+    std::size_t left = 0;
+    auto body = loader.load(wanted, left);
+    if (!body.ok()) return refuse(response, "spawn_cloud", body.error());
+    response.points = static_cast<std::uint32_t>(left);
+    return add(response, "spawn_cloud", *body, request.name.empty());
+  }
+
+  /// By the wall, as a simulated clock may stand still; null where none comes, or the node ends.
+  sensor_msgs::PointCloud2ConstPtr nextCloud(const std::string& topic, double timeout) {
+    sensor_msgs::PointCloud2ConstPtr heard;
+    ros::CallbackQueue queue;
+    ros::NodeHandle handle;
+    handle.setCallbackQueue(&queue);
+    const ros::Subscriber subscriber = handle.subscribe<sensor_msgs::PointCloud2>(
+        topic, 1, [&heard](const sensor_msgs::PointCloud2ConstPtr& cloud) { heard = cloud; });
+    const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(timeout);
+    while (!heard && std::chrono::steady_clock::now() < end && runner.look([](World&) {}).ok())
+      queue.callAvailable(ros::WallDuration(kCloudPoll));
+    return heard;
   }
 
   bool remove(meshless_surgery::Remove::Request& request, meshless_surgery::Remove::Response& response) {
@@ -454,11 +535,12 @@ struct Services::Handlers {
   Rejections& rejections;
   Session& session;
   // Queues before servers before spinners: torn down in the other order.
-  ros::CallbackQueue cut_queue, step_queue, spawn_queue, session_queue;
+  ros::CallbackQueue cut_queue, step_queue, spawn_queue, cloud_queue, session_queue;
   std::vector<ros::ServiceServer> servers;
   ros::AsyncSpinner cut_spinner{kCutThreads, &cut_queue};
   ros::AsyncSpinner step_spinner{1, &step_queue};
   ros::AsyncSpinner spawn_spinner{kSpawnThreads, &spawn_queue};
+  ros::AsyncSpinner cloud_spinner{kSpawnThreads, &cloud_queue};
   ros::AsyncSpinner session_spinner{1, &session_queue};
 };
 

@@ -143,6 +143,7 @@ Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std
   reader.read("command_log", settings.command_log);
   reader.read("autosave_period", settings.autosave_period, 0.0, 3600.0, "s");
   reader.read("paused", settings.paused);
+  reader.read("publish_clock", settings.publish_clock);
   reader.read("max_backlog", settings.max_backlog, 0.0, 10.0, "s");
   reader.read("markers_rate", settings.markers_rate, 0.1, 30.0, "Hz");
   reader.read("surfaces_rate", settings.surfaces_rate, 0.1, 120.0, "Hz");

@@ -535,6 +535,43 @@ TEST(LoadShape, ACloudGetsAClosedSurfaceAndSaysHow) {
   EXPECT_NE(shape->notes[0].find("cloud of " + std::to_string(points.size()) + " points"), std::string::npos);
 }
 
+TEST(LoadShape, RepairsAsFarAsItIsAsked) {
+  const TemporaryFolder folder;
+  TriangleMesh open = thing();
+  const Triangle t = open.triangles[open.triangles.size() / 2];
+  open.triangles.push_back({t[1], t[0], static_cast<Index>(open.vertices.size())});  // a fin
+  open.vertices.push_back(open.vertices[t[0]] + 0.3 * (open.vertices[t[1]] - open.vertices[t[0]]) +
+                          0.3 * (open.vertices[t[0]] - open.vertices[t[2]]));
+  const std::string path = folder.write("fin.obj", objText(open));
+  const Result<LoadedShape> refused = loadShape(path, 1.0, MeshRepair::kNone);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().code, ErrorCode::kUnsuitableShape);
+  EXPECT_TRUE(says(refused.error(), "'fin.obj': the surface is not manifold")) << refused.error().detail;
+  const double volume = signedVolume(thing());
+  for (const MeshRepair repair : {MeshRepair::kMend, MeshRepair::kWrap}) {
+    const Result<LoadedShape> shape = loadShape(path, 1.0, repair);
+    ASSERT_TRUE(shape.ok()) << shape.error().detail;
+    EXPECT_TRUE(shape->solid);
+    EXPECT_NEAR(signedVolume(shape->mesh), volume, (repair == MeshRepair::kMend ? 1e-5 : 0.2) * volume);
+    ASSERT_FALSE(shape->notes.empty());
+    EXPECT_EQ(shape->notes[0].compare(0, 8, "fin.obj:"), 0) << shape->notes[0];
+  }
+}
+
+TEST(LoadShape, NulsAfterTheLastLineOfAnObjAreNothing) {
+  const TemporaryFolder folder;
+  const std::string text = objText(thing());
+  for (const std::size_t nuls : {1u, 65536u}) {
+    const Result<LoadedShape> shape = loadShape(folder.write("a.obj", text + std::string(nuls, '\0')), 1.0);
+    ASSERT_TRUE(shape.ok()) << shape.error().detail;
+    EXPECT_EQ(shape->mesh.triangles.size(), thing().triangles.size());
+  }
+  EXPECT_FALSE(loadShape(folder.write("a.obj", std::string(1, '\0') + text), 1.0).ok());
+  EXPECT_FALSE(loadShape(folder.write("a.obj", text + std::string(1, '\0') + "v 0 0 0\n"), 1.0).ok());
+  EXPECT_FALSE(loadShape(folder.write("a.obj", std::string(100, '\0')), 1.0).ok());
+  EXPECT_FALSE(loadShape(folder.write("a.obj", text + std::string(65537, '\0')), 1.0).ok());
+}
+
 TEST(LoadShape, SaysWhatWasRepaired) {
   const TemporaryFolder folder;
   TriangleMesh inside_out = thing();

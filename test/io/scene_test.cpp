@@ -53,6 +53,26 @@ TEST_F(Scene, HeldRegionsAreBoxesPlanesAndSpheres) {
   EXPECT_FALSE(body.fixed[1].region.contains(Vec3(1, 2, 2.4)));
 }
 
+TEST_F(Scene, EachBodySaysHowFarItsFileIsRepaired) {
+  // A cube with a fin.
+  std::string fin = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\nv 0.5 -0.5 0\n";
+  fin += "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\nf 1 2 9\n";
+  folder.write("fin.obj", fin);
+  const SceneDef scene = good(
+      "obstacles:\n  - {name: tray, file: ../fin.obj}\nbodies:\n  - {file: ../fin.obj}\n"
+      "  - {name: wrapped, file: ../fin.obj, repair: wrap}\n  - {name: cube, file: ../cube.obj, repair: none}\n");
+  ASSERT_EQ(scene.bodies.size(), 3u);
+  EXPECT_EQ(scene.bodies[0].mesh.triangles.size(), 12u);
+  EXPECT_NE(scene.bodies[0].notes.back().find("the surface now encloses 1 m^3"), std::string::npos)
+      << scene.bodies[0].notes.back();
+  EXPECT_GT(scene.bodies[1].mesh.triangles.size(), 500u);
+  EXPECT_EQ(scene.bodies[2].mesh.triangles.size(), 48u);
+  const Error refused = bad("bodies:\n  - {file: ../fin.obj, repair: none}\n");
+  EXPECT_NE(refused.detail.find("s.yaml:2: "), std::string::npos) << refused.detail;
+  EXPECT_NE(refused.detail.find("'fin.obj': the surface is not manifold"), std::string::npos) << refused.detail;
+  EXPECT_NE(bad("bodies:\n  - {primitive: {sphere: 1}, repair: mend}\n").detail.find("with a file"), std::string::npos);
+}
+
 TEST_F(Scene, DefaultsForEverythingButBodies) {
   const SceneDef scene = good("bodies:\n  - file: ../cube.obj\n");
   const WorldSettings defaults;
@@ -224,6 +244,7 @@ TEST_F(Scene, FaultsAreNamedWithFileLineValueAndRange) {
       {body + "    scale: 0\n", 3, {"scale is 0", "above 0"}},
       {body + "    spacing: -0.1\n", 3, {"spacing is -0.1"}},
       {body + "    cells: half\n", 3, {"cells is 'half'", "whole, filled"}},
+      {body + "    repair: weld\n", 3, {"repair is 'weld'", "none, mend, wrap"}},
       {body + "    clusters: many\n", 3, {"clusters is 'many'", "auto, one"}},
       {body + "    clusters: {grid: [0, 1, 1]}\n", 3, {"grid[0] is '0'", "1 to"}},
       {body + "    clusters: {grid: [1000, 1000, 1000]}\n", 3, {"up to 100000 together"}},

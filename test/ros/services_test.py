@@ -307,6 +307,21 @@ class BodiesTest(DeformerTestCase):
         self.assertAlmostEqual(volumes[0], volumes[1], places=12)
         self.assertAlmostEqual(volumes[0] / 8.0, volumes[2], places=12)
 
+    def test_a_dirty_file_is_repaired_as_far_as_asked(self):
+        at = pose_stamped(0, 0, 1)
+        for repair in ('', 'mend'):
+            answer = self.good('spawn', file='dirty.obj', pose=at, repair=repair)
+            self.assertEqual(4, answer.triangles)
+            self.assertIn('dropped 1 open piece', answer.message)
+            self.assertAlmostEqual(0.1 ** 3 / 6.0, self.good('get_body', name=answer.name).volume, places=9)
+        wrapped = self.good('spawn', file='dirty.obj', pose=at, repair='wrap')
+        self.assertGreater(wrapped.triangles, 100)
+        self.assertIn('wrapped it', wrapped.message)
+        self.assertIn('the surface now encloses', wrapped.message)
+        refused = self.refused(['dirty.obj', 'not manifold', 'up to 3 triangles'], 'spawn', file='dirty.obj', pose=at, repair='none')
+        self.assertEqual(SpawnResponse.UNSUITABLE_SHAPE, refused.error_code)
+        self.refused(["repair is 'weld'", 'none, mend, wrap'], 'spawn', file='dirty.obj', pose=at, repair='weld')
+
     def test_refusals_of_spawn(self):
         at = pose_stamped(0, 0, 1)
         self.refused(['left'], 'spawn', name='left', primitive=box(), pose=at)

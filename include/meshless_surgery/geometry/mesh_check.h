@@ -30,6 +30,7 @@ struct RepairedMesh {
   TriangleMesh mesh;
   bool solid = true;               // closed and oriented: can be filled, cut, given a volume
   bool self_intersecting = false;  // loaded all the same
+  std::size_t open_edges = 0;      // with a triangle on one side only
   std::vector<std::string> notes;
 };
 
@@ -42,6 +43,14 @@ struct RepairedMesh {
 /// with an area, non-manifold, one-sided.
 /// A surface that stays open is not refused: solid is false and a note says how many edges are open. One that crosses
 /// itself is not refused either: self_intersecting is set and a note gives the number of crossing pairs.
-Result<RepairedMesh> repairMesh(const TriangleMesh& mesh);
+struct RepairRules {
+  bool merge_vertices = true;
+  bool close_holes = true;
+};
+Result<RepairedMesh> repairMesh(const TriangleMesh& mesh, const RepairRules& rules = {});
+
+/// Its triangles' corners at the first of the vertices that are at one place, as repairMesh merges them. Vertices are
+/// finite, and those that triangles name are there.
+TriangleMesh withMergedVertices(const TriangleMesh& mesh);
 
 }  // namespace meshless

@@ -4,7 +4,7 @@
 #include <functional>
 
 #include "meshless_surgery/base/result.h"
-#include "meshless_surgery/geometry/triangle_mesh.h"
+#include "meshless_surgery/geometry/mend.h"
 
 namespace meshless {
 
@@ -26,14 +26,14 @@ struct FileAccess {
 /// repairMesh to name, for surfaces; in clouds they are dropped.
 Result<TriangleMesh> readMeshFile(const std::string& real_path);
 
-/// A mesh or cloud from a file made into what a body needs: scaled, a cloud turned into a closed surface, repaired.
-/// notes say what was done.
+/// A mesh or cloud from a file made into what a body needs: scaled, a cloud turned into a closed surface, repaired as
+/// far as `repair` goes. notes say what was done.
 struct LoadedShape {
   TriangleMesh mesh;
   bool solid = true;
   std::vector<std::string> notes;
 };
-Result<LoadedShape> loadShape(const std::string& real_path, double scale);
+Result<LoadedShape> loadShape(const std::string& real_path, double scale, MeshRepair repair = MeshRepair::kMend);
 
 /// OBJ with 17 significant digits; written beside the file and renamed. false where the disk refuses.
 Status writeObj(const std::string& path, const TriangleMesh& mesh, const std::string& comment);

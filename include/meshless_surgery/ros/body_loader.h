@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 
+#include "meshless_surgery/io/cloud_shape.h"
 #include "meshless_surgery/io/scene.h"
 
 namespace meshless {
@@ -15,7 +16,15 @@ struct SpawnRequest {
   std::vector<double> sizes;  // [m] box: x y z; sphere: radius; cylinder: height radius; before scaling
   double scale = 1.0;         // > 0
   Pose pose;
-  std::string material;       // empty: "default"
+  std::string material;                   // empty: "default"
+  MeshRepair repair = MeshRepair::kMend;  // of a file's surface
+};
+
+struct CloudRequest {
+  std::string name = "cloud";
+  Points points;  // [m] world frame
+  CloudFilter filter;
+  std::string material;  // empty: "default"
 };
 
 class BodyLoader {
@@ -26,7 +35,12 @@ class BodyLoader {
   /// Refuses what io and body refuse, and kUnknownName for a material.
   Result<std::shared_ptr<const PreparedBody>> load(const SpawnRequest& request) const;
 
+  /// Its frame is the world's, at the middle of the cloud's surface. `left`: the points that were not filtered away.
+  Result<std::shared_ptr<const PreparedBody>> load(const CloudRequest& request, std::size_t& left) const;
+
  private:
+  Result<Material> material(const std::string& name) const;
+
   FileAccess access_;
   std::string scene_folder_;
   std::map<std::string, Material> materials_;

@@ -18,6 +18,8 @@ class Clock {
   Clock();
   /// `may_stand` says that waiting on the wall does not bring the source on.
   Clock(Source source, bool may_stand);
+  /// The wall's, which nobody sets: for a node that makes /clock itself, and would wait for itself by it.
+  static Clock steady();
 
   double now() const;
   /// What the source calls that time [s].

@@ -33,6 +33,8 @@ std::int32_t toErrorCode(ErrorCode code);
 meshless_surgery::Event toEvent(const Event& event, const std_msgs::Header& header);
 /// Every particle with x y z body rgb. Needs a snapshot with particles.
 sensor_msgs::PointCloud2 toCloud(const WorldSnapshot& snapshot, const std_msgs::Header& header);
+/// Of x y z as float32 or float64. Refuses kInvalidArgument: other fields, big-endian, less data than it says.
+Result<Points> toPoints(const sensor_msgs::PointCloud2& cloud);
 /// x y z alone.
 sensor_msgs::PointCloud2 toCloud(const Points& points, const std_msgs::Header& header);
 shape_msgs::Mesh toMesh(const Points& vertices, const std::vector<Triangle>& triangles);

@@ -37,7 +37,8 @@ class WorldRunner {
   static constexpr int kMostClosing = 16;  // cuts that wait for their blades at once
   using EventSink = std::function<void(std::vector<Event>)>;
 
-  /// Steps are paced by `clock`, which outlives it; what they cost is measured on the wall.
+  /// Steps are paced by `clock`, which outlives it and must not be one that they move themselves. What they cost is
+  /// measured on the wall.
   WorldRunner(std::unique_ptr<World> world, const RunnerSettings& settings, const Clock& clock);
   ~WorldRunner();
   WorldRunner(const WorldRunner&) = delete;

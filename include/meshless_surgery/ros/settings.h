@@ -20,6 +20,7 @@ struct NodeSettings {
   std::string command_log;                 // a file's name there; empty: no log
   double autosave_period = 0.0;            // [s] of simulated time, 0 (none) or 0.05..3600
   bool paused = false;                     // start paused
+  bool publish_clock = false;              // the simulated time is /clock; /use_sim_time has to be set
   double max_backlog = 0.1;                // [s] 0..10
   double markers_rate = 30.0;              // [Hz] 0.1..30
   double surfaces_rate = 60.0;             // [Hz] 0.1..120: ~surfaces and ~strained_surfaces

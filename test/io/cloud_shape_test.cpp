@@ -1,0 +1,76 @@
+#include "meshless_surgery/io/cloud_shape.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/primitives.h"
+
+namespace meshless {
+namespace {
+
+/// What a noisy sensor sees of a sphere of 0.1 m: `stray` points are anywhere in a box of 0.4 m.
+Points seen(std::size_t count, std::size_t stray, const Vec3& centre = Vec3::Zero()) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> anywhere(-0.2, 0.2);
+  Points points;
+  for (std::size_t k = 0; k < count; ++k) {
+    const Vec3 out(normal(random), normal(random), normal(random));
+    points.push_back(centre + (0.1 + 2e-4 * normal(random)) * out.normalized());
+  }
+  for (std::size_t k = 0; k < stray; ++k)
+    points.push_back(centre + Vec3(anywhere(random), anywhere(random), anywhere(random)));
+  return points;
+}
+
+const double kVolume = 4.0 / 3.0 * M_PI * 1e-3;
+
+void expectRefused(const Points& cloud, const CloudFilter& filter, ErrorCode code, const std::string& words) {
+  const auto made = shapeOfCloud(cloud, filter);
+  ASSERT_FALSE(made.ok()) << "should say: " << words;
+  EXPECT_EQ(made.error().code, code);
+  EXPECT_NE(made.error().detail.find(words), std::string::npos) << made.error().detail;
+}
+
+TEST(CloudShape, NoiseAndStrayPointsAreFilteredAndTheSurfaceIsClosed) {
+  for (const Vec3& centre : {Vec3(0.0, 0.0, 0.0), Vec3(900.0, -700.0, 500.0)}) {
+    Points cloud = seen(60000, 40, centre);
+    cloud.push_back(Vec3::Constant(std::nan("")));
+    const auto made = shapeOfCloud(cloud, {0.006, 3.0});
+    ASSERT_TRUE(made.ok()) << made.error().detail;
+    EXPECT_TRUE(made->shape.solid);
+    EXPECT_TRUE(inspectMesh(made->shape.mesh).closed());
+    EXPECT_NEAR(signedVolume(made->shape.mesh), kVolume, 0.03 * kVolume) << made->shape.notes[1];
+    EXPECT_LT(made->points, 10000u);
+    EXPECT_NE(made->shape.notes[0].find("of 60041 points 1 were not finite"), std::string::npos)
+        << made->shape.notes[0];
+  }
+}
+
+TEST(CloudShape, TheGridIsChosenFromTheCloud) {
+  const auto made = shapeOfCloud(seen(60000, 0), {});
+  ASSERT_TRUE(made.ok()) << made.error().detail;
+  EXPECT_NEAR(signedVolume(made->shape.mesh), kVolume, 0.03 * kVolume);
+}
+
+TEST(CloudShape, OtherUnitsAndOddValuesAreRefused) {
+  Points millimetres = seen(1000, 0);
+  for (Vec3& p : millimetres) p *= 1000.0;
+  expectRefused(millimetres, {}, ErrorCode::kUnsuitableShape, "scale 0.001 is for a cloud in millimetres");
+  Points tiny = seen(1000, 0);
+  for (Vec3& p : tiny) p *= 1e-3;
+  expectRefused(tiny, {}, ErrorCode::kUnsuitableShape, "m across; accepted: 0.001..10 m");
+  expectRefused(seen(1000, 0), {1.0, 3.0}, ErrorCode::kInvalidArgument, "voxel is 1 m; accepted for this cloud");
+  expectRefused(seen(1000, 0), {1e-9, 3.0}, ErrorCode::kInvalidArgument, "voxel is 1e-09 m");
+  expectRefused(seen(3, 0), {}, ErrorCode::kUnsuitableShape, "3 finite points");
+  expectRefused({}, {}, ErrorCode::kUnsuitableShape, "0 finite points");
+  expectRefused(seen(400000, 0), {4e-4, 3.0}, ErrorCode::kUnsuitableShape, "accepted: up to 50000");
+  Points flat = seen(1000, 0);
+  for (Vec3& p : flat) p.z() = 0.0;
+  expectRefused(flat, {}, ErrorCode::kUnsuitableShape, "points that are left");
+}
+
+}  // namespace
+}  // namespace meshless
