@@ -7,7 +7,10 @@
 // of the frame, `ns_a_contact` the time of all of a frame's contact over its contacts and substeps, `exponent` of a
 // sweep (least squares of log time over log N, on its last row). after_cut/*: by how much the first step after the cut
 // of a ball on a bed takes longer than those before, the median of five; `before_ms`, `first_ms` and `next_ms`
-// (contact_after_cut.h).
+// (contact_after_cut.h). pieces/organ/MATERIAL/CUTS: an organ on the ground, cut through its middle (contact_pieces.h);
+// the time is that of the third simulated second, `uncut_s` of one before the cuts, `early_s` twice that of the first
+// half second, `first_ms` of the first step; at the end volumes of pieces over rest, `mm_s` the root mean square of the
+// speed, and how many are `asleep`.
 // --out=DIR writes bench_contact.csv and bench_contact.png there.
 #include <algorithm>
 #include <chrono>
@@ -17,10 +20,12 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <tuple>
 
 #include <benchmark/benchmark.h>
 
 #include "contact_after_cut.h"
+#include "contact_pieces.h"
 #include "contact_pile.h"
 #include "plot.h"
 
@@ -175,6 +180,22 @@ void runAfterCut(benchmark::State& state, const AfterCut& of) {
   state.counters["next_ms"] = median(next);
 }
 
+void runPieces(benchmark::State& state, const Pieces& of) {
+  for (auto _ : state) {
+    const PiecesTimes times = timePieces(of);
+    if (times.late < 0.0) return state.SkipWithError("refused");
+    state.SetIterationTime(times.late);
+    state.counters["uncut_s"] = times.uncut;
+    state.counters["early_s"] = times.early;
+    state.counters["first_ms"] = times.first;
+    state.counters["least_volume"] = times.least_volume;
+    state.counters["most_volume"] = times.most_volume;
+    state.counters["mm_s"] = 1e3 * times.speed;
+    state.counters["pieces"] = static_cast<double>(times.pieces);
+    state.counters["asleep"] = static_cast<double>(times.asleep);
+  }
+}
+
 void add(const std::string& name, const std::function<void(benchmark::State&)>& run) {
   benchmark::RegisterBenchmark(name.c_str(), run)->Unit(benchmark::kMillisecond)->UseManualTime()->Iterations(1);
 }
@@ -219,6 +240,26 @@ void registerRows() {
             [=](benchmark::State& s) {
               runAfterCut(s, {elastic, upright, threads});
             });
+  const auto material = [](double youngs_modulus, double friction) {
+    Material of_organ;
+    of_organ.youngs_modulus = youngs_modulus;
+    of_organ.density = 1060.0;
+    of_organ.damping = 4.0;
+    of_organ.friction = friction;
+    return of_organ;
+  };
+  const std::tuple<const char*, Pieces> organs[] = {{"elastic_liver/4", {1, 0, 4, material(4500.0, 0.3), 1}},
+                                                    {"elastic_liver/6", {2, 0, 6, material(4500.0, 0.3), 1}},
+                                                    {"elastic_kidney/3", {3, 2, 3, material(5000.0, 0.3), 1}},
+                                                    {"elastic_muscle/1", {4, 0, 1, material(11100.0, 0.4), 1}},
+                                                    {"default/6", {5, 0, 6, Material(), 1}}};
+  for (const auto& [name, pieces] : organs)
+    for (const int threads : {1, 2}) {
+      Pieces on_threads = pieces;
+      on_threads.threads = threads;
+      add(std::string("pieces/organ/") + name + "/" + std::to_string(threads) + "threads",
+          [=](benchmark::State& s) { runPieces(s, on_threads); });
+    }
   for (const int bodies : {10, 30, 100, 300, 1000, 3000, 10000})
     addPile("sweep/" + std::to_string(bodies), "sweep", of(bodies), bodies == 10000);
 #ifdef HAVE_BULLET

@@ -1,0 +1,85 @@
+#include "contact_pieces.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <random>
+
+#include "meshless_surgery/body/body.h"
+#include "meshless_surgery/geometry/random_organ.h"
+#include "meshless_surgery/world/world.h"
+
+namespace meshless::bench {
+namespace {
+
+double secondsOf(World& world, int steps) {
+  const auto start = std::chrono::steady_clock::now();
+  for (int n = 0; n < steps; ++n) world.step();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Through the centre of mass of all.
+bool cutAll(World& world, std::mt19937_64& random) {
+  Vec3 centre = Vec3::Zero();
+  double mass = 0.0;
+  for (const BodySnapshot& body : world.snapshot({false, false, true}).bodies) {
+    centre += body.model->mass * body.measures.centre_of_mass;
+    mass += body.model->mass;
+  }
+  std::normal_distribution<double> normal;
+  const Vec3 across = Vec3(normal(random), normal(random), normal(random)).normalized();
+  CutCommand cut;
+  cut.blades.x_axis = across.unitOrthogonal();
+  cut.blades.y_axis = across.cross(cut.blades.x_axis);
+  cut.blades.origin = centre / mass - 10.0 * cut.blades.x_axis;
+  return world.apply(cut).ok();
+}
+
+}  // namespace
+
+PiecesTimes timePieces(const Pieces& of) {
+  PiecesTimes times;
+  BodyDef def;
+  def.name = "organ";
+  Result<TriangleMesh> mesh = randomOrgan(of.seed, of.genus, 0.2, 4120);
+  if (!mesh) return times;
+  Box box;
+  for (const Vec3& p : mesh->vertices) box.extend(p);
+  def.mesh = std::move(*mesh);
+  def.pose.translation = Vec3(0.0, 0.0, 0.002 - box.min.z());
+  def.material = of.material;
+  Result<PreparedBody> body = prepareBody(std::move(def));
+  WorldSettings settings;
+  settings.threads = of.threads;
+  World world(settings);
+  if (!body || !world.addSceneBody(std::make_shared<const PreparedBody>(std::move(*body))).ok()) return times;
+  const int second = static_cast<int>(settings.step_rate);
+  (void)secondsOf(world, second);
+  const double uncut = secondsOf(world, second);
+  std::mt19937_64 random(of.seed);
+  for (int n = 0; n < of.cuts; ++n)
+    if (!cutAll(world, random)) return times;
+  const double first = secondsOf(world, 1);
+  times.early = 2.0 * (first + secondsOf(world, second / 2 - 1));
+  (void)secondsOf(world, second + second / 2);
+  times.late = secondsOf(world, second);
+  times.first = 1e3 * first;
+  times.uncut = uncut;
+  const WorldSnapshot shot = world.snapshot({true, false, true});
+  times.least_volume = 1e9;
+  double energy = 0.0, mass = 0.0;
+  for (const BodySnapshot& piece : shot.bodies) {
+    const double share = piece.measures.volume / piece.model->rest_volume;
+    times.least_volume = std::min(times.least_volume, share);
+    times.most_volume = std::max(times.most_volume, share);
+    energy += piece.measures.kinetic_energy;
+    mass += piece.model->mass;
+  }
+  times.speed = std::sqrt(2.0 * energy / mass);
+  times.pieces = shot.bodies.size();
+  times.asleep = shot.report.asleep;
+  return times;
+}
+
+}  // namespace meshless::bench
