@@ -11,7 +11,7 @@ generate_messages(DEPENDENCIES geometry_msgs sensor_msgs shape_msgs std_msgs)
 #catkin_lint: ignore missing_export_lib
 catkin_package(
   INCLUDE_DIRS include
-  CATKIN_DEPENDS geometry_msgs message_runtime roscpp sensor_msgs shape_msgs std_msgs std_srvs visualization_msgs)
+  CATKIN_DEPENDS geometry_msgs message_runtime roscpp rosgraph_msgs sensor_msgs shape_msgs std_msgs std_srvs visualization_msgs)
 
 install(DIRECTORY config launch
   DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})

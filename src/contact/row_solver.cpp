@@ -6,7 +6,7 @@
 namespace meshless {
 namespace {
 
-constexpr double kOutTime = 0.1;        // [s] in which an overlap falls to 1/e: what is let out slowly gains no speed
+constexpr double kOutTime = 0.03;        // [s] in which an overlap falls to 1/e: what is let out slowly gains no speed
 constexpr double kOutStiffness = 800.0;  // of it, over the inertia that it moves: impulses end where two can't both be met
 constexpr int kMostSweeps = 4;          // of a substep
 constexpr double kTolerance = 2e-3;     // mean edges: sweeps end where no row was corrected by more

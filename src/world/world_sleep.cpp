@@ -30,7 +30,7 @@ bool isStill(const WorldBody& body, double h_frame) {
   double sum = 0.0;
   for (std::size_t i = 0; i < body.state.positions.size(); ++i) {
     const double squared = (body.state.positions[i] - body.frame_start[i]).squaredNorm();
-    if (!(squared <= most * most)) return false;
+    if (!(squared <= most * most) && body.model->isTissue(i)) return false;  // nobody sees the far corner of a cell
     sum += body.model->masses[i] * squared;
   }
   return sum <= mean * mean * body.model->mass;
@@ -70,8 +70,9 @@ void World::Impl::rememberSlow() {
     body.slow = false;
     if (body.asleep || (!isNearAnything(b) && !body.model->any_fixed && picks.empty())) continue;
     const double most = kTrembling * kStillMost * sizeOf(body.bounds);
-    body.slow = std::all_of(body.state.velocities.begin(), body.state.velocities.end(),
-                            [most](const Vec3& v) { return v.squaredNorm() <= most * most; });
+    body.slow = true;
+    for (std::size_t i = 0; i < body.state.velocities.size() && body.slow; ++i)
+      body.slow = body.state.velocities[i].squaredNorm() <= most * most || !body.model->isTissue(i);
     if (body.slow) body.frame_start = body.state.positions;
   }
 }

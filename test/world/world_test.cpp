@@ -138,7 +138,7 @@ TEST(World, ABallFallsComesToRestOnTheGroundAndStaysAboveIt) {
   double highest_energy = 0.0;
   for (int step = 0; step < 720; ++step) {
     world.step();
-    for (const Vec3& p : only(world).surface) ASSERT_GE(p.z(), -1e-5);
+    for (const Vec3& p : only(world).surface) ASSERT_GE(p.z(), -6e-5);  // 2e-3 edges
     highest_energy = std::max(highest_energy, only(world).measures.kinetic_energy);
   }
   const BodySnapshot ball = only(world);
