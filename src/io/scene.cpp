@@ -38,7 +38,7 @@ void readWorld(YamlSource& source, const YAML::Node& node, WorldSettings& world)
   map.whole("substeps", 1, 1000, world.substeps);
   map.whole("max_substeps", 1, 1000, world.max_substeps);
   map.whole("threads", 1, 64, world.threads);
-  const int contact = map.choice("contact", {"none", "textbook", "rest_shape", "surface"});
+  const int contact = map.choice("contact", {"none", "textbook", "rest_shape", "surface", "auto"});
   if (contact >= 0) world.contact = static_cast<ContactMethod>(contact);
   if (const int sleep = map.choice("sleep", {"false", "true"}); sleep >= 0) world.sleep = sleep == 1;
   if (const YAML::Node pick = map.get("pick"); pick.IsDefined()) {

@@ -30,7 +30,8 @@ constexpr std::size_t kLogs = 10;
 const std::map<std::string, ContactMethod> kContacts{{"none", ContactMethod::kNone},
                                                      {"textbook", ContactMethod::kTextbook},
                                                      {"rest_shape", ContactMethod::kRestShape},
-                                                     {"surface", ContactMethod::kSurface}};
+                                                     {"surface", ContactMethod::kSurface},
+                                                     {"auto", ContactMethod::kAuto}};
 
 std::string shippedMaterials() {
 #ifdef MATERIALS_FOLDER
@@ -93,7 +94,7 @@ int main(int argc, char** argv) {
   app.add_option("--budget", options.budget, "[s] of processor time for a scene; then it did not finish")
       ->check(CLI::Range(1.0, 1e6))
       ->capture_default_str();
-  app.add_option("--contact", contact, "the method of contact: none, textbook, rest_shape, surface; else the default");
+  app.add_option("--contact", contact, "the method of contact: none, textbook, rest_shape, surface, auto; else the default");
   app.add_option("--cells", cells, "of elastic bodies: whole or filled; else the default")
       ->check(CLI::IsMember({"whole", "filled"}));
   app.add_option("--material", choices.material, "elastic, looks, or a name in config/materials alone");
@@ -116,7 +117,7 @@ int main(int argc, char** argv) {
   if (!contact.empty()) {
     const auto found = kContacts.find(contact);
     if (found == kContacts.end())
-      return fail("contact is '" + contact + "'; accepted: none, textbook, rest_shape, surface");
+      return fail("contact is '" + contact + "'; accepted: none, textbook, rest_shape, surface, auto");
     choices.contact = found->second;
   }
   auto shipped = meshless::readMaterials(materials.empty() ? shippedMaterials() : materials);

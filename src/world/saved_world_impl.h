@@ -99,7 +99,7 @@ template <class A>
 void serialize(A& archive, WorldSettings& v) {
   auto& [gravity, ground, ground_friction, step_rate, substeps, max_substeps, contact, threads, sleep,
          pick_max_distance, pick_stiffness, pick_radius, push_radius] = v;
-  archive(gravity, ground, ground_friction, step_rate, substeps, max_substeps, choice(contact, ContactMethod::kSurface),
+  archive(gravity, ground, ground_friction, step_rate, substeps, max_substeps, choice(contact, ContactMethod::kAuto),
           threads, sleep, pick_max_distance, pick_stiffness, pick_radius, push_radius);
 }
 

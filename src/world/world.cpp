@@ -273,7 +273,7 @@ WorldSnapshot World::snapshot(const SnapshotWants& wants) {
     shot.bodies.push_back(std::move(b));
   }
   for (const auto& obstacle : w.obstacles) shot.obstacles.push_back(obstacle->def);
-  if (wants.contacts && w.contacts_current && w.settings.contact == ContactMethod::kSurface) {
+  if (wants.contacts && w.contacts_current && w.contactMethod() == ContactMethod::kSurface) {
     std::vector<SurfaceContacts::Point> points;
     w.surface_contacts.points(w.colliders, points);
     for (const SurfaceContacts::Point& p : points) shot.contacts.push_back({p.position, p.normal, p.force});

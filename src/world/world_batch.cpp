@@ -84,7 +84,7 @@ void World::Impl::addBatch(std::vector<WorldBody*> group) {
 }
 
 void World::Impl::matchBatches(double h) {
-  const bool bounds_known = settings.contact == ContactMethod::kRestShape;
+  const bool bounds_known = contactMethod() == ContactMethod::kRestShape;
   for (WorldBatch& batch : batches) {
     const std::size_t count = batch.bodies.size();
     forNumbers(count, [&](std::size_t i) {

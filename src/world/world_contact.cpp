@@ -76,7 +76,7 @@ const ContactModel& World::Impl::contactModel(WorldBody& body) {
 
 // The pieces of a cut lie on each other: their shapes are made while the cut is answered.
 void World::Impl::foreseeContact(WorldBody& body) {
-  if (settings.contact != ContactMethod::kRestShape || body.model->surface.vertices.size() < kWorthAThread) return;
+  if (contactMethod() != ContactMethod::kRestShape || body.model->surface.vertices.size() < kWorthAThread) return;
   body.coming_contact = std::async(std::launch::async, [model = body.model]() -> std::shared_ptr<const ContactModel> {
     return std::make_shared<ContactModel>(model);
   });

@@ -337,6 +337,11 @@ struct World::Impl {
   const SurfaceModel& surfaceModel(WorldBody& body);
   static void measureSurface(WorldBody& body);
   static void fillCollider(WorldBody& body, double h_frame, Collider& collider);
+  bool any_elastic = false;  // as the last step began
+  ContactMethod contactMethod() const {
+    if (settings.contact != ContactMethod::kAuto) return settings.contact;
+    return any_elastic ? ContactMethod::kSurface : ContactMethod::kRestShape;
+  }
   void findSurfaceContacts(double h_frame);
   Vec3 pushWay(double h_frame) const;  // [m] of the push sphere in a frame
   int substepsOf(const std::vector<WorldBody*>& some, bool may_meet, double h_frame);

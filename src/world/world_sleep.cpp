@@ -78,13 +78,13 @@ void World::Impl::rememberSlow() {
 }
 
 bool World::Impl::isNearAnything(Index body) const {
-  return settings.contact == ContactMethod::kSurface ? surface_contacts.needed()[body] : contacts.needed()[body];
+  return contactMethod() == ContactMethod::kSurface ? surface_contacts.needed()[body] : contacts.needed()[body];
 }
 
 void World::Impl::listLoaded() {
   loaded.clear();
-  if (settings.contact == ContactMethod::kRestShape) contacts.loadedPairs(loaded);
-  if (settings.contact != ContactMethod::kSurface) return;
+  if (contactMethod() == ContactMethod::kRestShape) contacts.loadedPairs(loaded);
+  if (contactMethod() != ContactMethod::kSurface) return;
   std::vector<LoadedSurfaces> pairs;
   surface_contacts.loadedSurfaces(pairs);
   for (const LoadedSurfaces& pair : pairs) loaded.push_back({pair.a, pair.b});
@@ -94,7 +94,7 @@ void World::Impl::listLoaded() {
 // through space would stop.
 void World::Impl::fallAsleep(double h_frame) {
   if (!settings.sleep || awake.empty()) return;
-  if (settings.contact != ContactMethod::kRestShape && settings.contact != ContactMethod::kSurface) return;
+  if (contactMethod() != ContactMethod::kRestShape && contactMethod() != ContactMethod::kSurface) return;
   bool any = false;
   for (WorldBody* body : awake) {
     body->still_for = isStill(*body, h_frame) ? body->still_for + h_frame : 0.0;

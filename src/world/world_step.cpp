@@ -49,15 +49,16 @@ void World::step() {
     const Stopwatch total(w.report.total);
     const double h_frame = 1.0 / w.settings.step_rate;
     w.closeBlades();
+    w.any_elastic = std::any_of(w.bodies.begin(), w.bodies.end(), [](const auto& b) { return b->material.elastic(); });
     w.wakePushed(h_frame);
     w.listAwake();
-    const bool rest_shape = w.settings.contact == ContactMethod::kRestShape && !w.awake.empty();
+    const bool rest_shape = w.contactMethod() == ContactMethod::kRestShape && !w.awake.empty();
     if (rest_shape) {
       const Stopwatch contact(w.report.contact);
       w.rememberGrasps();
       w.findContacts(h_frame);
     }
-    if (w.settings.contact == ContactMethod::kSurface) {
+    if (w.contactMethod() == ContactMethod::kSurface) {
       w.stepWithSurfaces(h_frame);
       return;
     }
@@ -130,7 +131,7 @@ void World::Impl::finishStep(double h_frame) {
 // All bodies take each substep before any takes the next.
 void World::Impl::stepTogether(int substeps, double h_frame) {
   const double h = h_frame / substeps;
-  const bool rest_shape = settings.contact == ContactMethod::kRestShape && !awake.empty();
+  const bool rest_shape = contactMethod() == ContactMethod::kRestShape && !awake.empty();
   // What an elastic material needs beyond the scene's substeps is not needed by contacts between bodies.
   const int stride = std::max(1, substeps / settings.substeps);
   const std::vector<WorldBody*> near = bodiesInContact(h_frame);
@@ -191,7 +192,7 @@ int World::Impl::substepsNeeded(double h_frame) const {
   double needed = 1.0;
   for (const auto& body : bodies)  // not `awake`: a cut asks between steps
     if (!body->asleep) needed = std::max(needed, std::ceil(h_frame * highestFrequencyNow(*body->model, body->state)));
-  if (settings.contact == ContactMethod::kRestShape && !awake.empty()) {
+  if (contactMethod() == ContactMethod::kRestShape && !awake.empty()) {
     const double most = contacts.affordableSubsteps();
     if (!(needed < most)) needed = most;
     needed = std::max(needed, static_cast<double>(contacts.neededSubsteps()));
@@ -222,7 +223,7 @@ int World::Impl::chooseSubsteps(double h_frame) {
 
 std::vector<WorldBody*> World::Impl::bodiesInContact(double h) {
   std::vector<WorldBody*> near;
-  if (settings.contact != ContactMethod::kTextbook || bodies.size() < 2) return near;
+  if (contactMethod() != ContactMethod::kTextbook || bodies.size() < 2) return near;
   const Stopwatch contact(report.contact);
   // Sweep along x: sorted by their lower ends, a pair can overlap only until the next one begins beyond.
   struct Entry {
@@ -375,7 +376,7 @@ void World::Impl::movePush(double h, double h_frame) {
 void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame, const Vec3& push_velocity) {
   const BodyModel& model = *body.model;
   BodyState& state = body.state;
-  const bool solved = settings.contact == ContactMethod::kRestShape && !model.surface.vertices.empty();
+  const bool solved = contactMethod() == ContactMethod::kRestShape && !model.surface.vertices.empty();
   if ((!settings.ground || solved) && !push.enabled) return;  // without a surface, particles are held above the ground
   Box bounds;
   for (const Vec3& p : state.positions) bounds.extend(p);

@@ -10,7 +10,7 @@ namespace meshless {
 // What holds a body may hold it folded: then that is its shape. The ground, others, obstacles, picks and the push
 // sphere.
 void World::Impl::findWound() {
-  if (settings.contact == ContactMethod::kTextbook) return;  // it does not know who presses on whom
+  if (contactMethod() == ContactMethod::kTextbook) return;  // it does not know who presses on whom
   for (WorldBody* body : awake)
     if (body->state.unwinding || isWoundUp(*body->model, body->material, body->state)) wound.push_back(body);
   if (wound.empty()) return;

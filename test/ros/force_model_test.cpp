@@ -262,8 +262,7 @@ TEST(ForceModel, TheSumOverAPressIsTheChangeOfMomentum) {
     };
     const Touch press = touch(world, 1.0 / rate, static_cast<int>(1.2 * rate), act, measured);
     ASSERT_GT(press.momentum.norm(), 0.01);
-    // The touch is of eight steps, or of three: what was felt ahead of its last one is not paid back.
-    EXPECT_LT((press.felt + press.momentum).norm(), (rate > 60.0 ? 0.06 : 0.25) * press.momentum.norm()) << rate << " Hz";
+    EXPECT_LT((press.felt + press.momentum).norm(), 0.02 * press.momentum.norm()) << rate << " Hz";
     EXPECT_TRUE(press.zero_at_end) << rate << " Hz";
     EXPECT_LE(press.steepest, 2.0 * press.strongest * kTick * rate) << rate << " Hz";
   }

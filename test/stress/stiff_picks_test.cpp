@@ -8,11 +8,12 @@ namespace meshless::stress {
 namespace {
 
 constexpr int kDragged = 60, kHeld = 60, kFree = 180;  // steps
-// [J] kinetic. All three blocks (6 kg) as fast as the target's longest jump (1.73 m) within a step have 1.3e5 J. What
-// they tear at and run into adds to it: 3e5 J was seen, 1e7 J of elastic cells that are torn to threads.
-constexpr double kMostDragged = 6e5, kMostDraggedCells = 2e7;
-// Energy that they gain once they are let go, from overlaps that open: times what they had.
-constexpr double kMostGained = 10.0;
+// [J] kinetic. All three blocks (6 kg) as fast as the target's longest jump (1.73 m) within a step have 1.3e5 J: what a
+// rod drags has no more. 6e4 J was seen at the most.
+constexpr double kMostDragged = 1.3e5;
+// Elastic bodies, in contact of surfaces, are torn to threads, and overlaps that open then give them energy: 1e7 J was
+// seen, and 2.4 times of what they had when they are let go.
+constexpr double kMostDraggedElastic = 2e7, kMostGainedElastic = 5.0;
 // [J] kinetic, of 2 kg that are pulled by 0.57 m within a step: 4.7e3 J. Contact of now adds to it, up to 1.0e4 J.
 constexpr double kMostPulled = 4.7e3, kMostPulledInContact = 1.2e4;
 
@@ -65,14 +66,14 @@ TEST_P(StiffPicks, DoNotThrow) {
       energy += deformationEnergy(*body.model, body.material, 1.0 / settings.step_rate, body.particles);
     }
     energy += kinetic;
-    ASSERT_LT(kinetic, kind.elastic ? kMostDraggedCells : kMostDragged) << "step " << step;
+    ASSERT_LT(kinetic, kind.elastic ? kMostDraggedElastic : kMostDragged) << "step " << step;
     if (step == kDragged + kHeld) dragged = energy;
     if (step > kDragged + kHeld) most = std::max(most, energy);
   }
-  // What flies apart then falls, and meets others.
+  // What flies apart then falls, and meets others; more than it had it does not get.
   RecordProperty("dragged", std::to_string(dragged));
   RecordProperty("most", std::to_string(most));
-  if (!rod.on_ground) EXPECT_LE(most, kMostGained * dragged + 1e-6);
+  if (!rod.on_ground) EXPECT_LE(most, (kind.elastic ? kMostGainedElastic : 1.1) * dragged + 1e-6);
 }
 
 struct Held {

@@ -102,8 +102,8 @@ TEST_P(Swallowed, HalfCoveredBodiesComeBack) {
   }
 }
 
-// A block that is spawned half inside one a hundred times its size, on the ground, is not thrown, and leaves it where its
-// side is the nearest way. Deeper, or where it is elastic, the faces below are nearer: it is pressed on the ground.
+// A block that is spawned half inside one a hundred times its size, on the ground, is not thrown and leaves it. What is
+// elastic is pressed down between it and the ground: the faces below are nearer.
 TEST_P(Swallowed, ABodyHalfInsideAHugeOneComesOut) {
   for (const double depth : {0.02, 0.05, 0.1}) {
     SCOPED_TRACE(depth);
@@ -113,7 +113,7 @@ TEST_P(Swallowed, ABodyHalfInsideAHugeOneComesOut) {
     huge.pose.translation = Vec3(5.1 - depth, 0.0, 5.0);
     twins.spawn(test::shared(huge));
     twins.spawn(test::shared(blockOf(GetParam(), "block", Vec3(0.0, 0.02, 0.051))));
-    for (int step = 0; step < 600; ++step) {
+    for (int step = 0; step < 300; ++step) {
       ASSERT_TRUE(twins.step(Vec3::Zero(), 40.0)) << "step " << step;
       const BodySnapshot& block = twins.seen().bodies[1];
       ASSERT_LT(block.measures.linear_momentum.norm(), block.model->mass * 2.0) << "step " << step;
@@ -123,8 +123,8 @@ TEST_P(Swallowed, ABodyHalfInsideAHugeOneComesOut) {
     double left = std::numeric_limits<double>::infinity(), right = -left;
     for (const Vec3& p : bodies[0].surface) left = std::min(left, p.x());
     for (const Vec3& p : bodies[1].surface) right = std::max(right, p.x());
-    if (!GetParam().elastic && depth < 0.03) {
-      EXPECT_LT(right - left, 0.025);
+    if (!GetParam().elastic) {
+      EXPECT_LT(right - left, 0.015);
     }
     EXPECT_LT(std::abs(bodies[1].measures.centre_of_mass.y()), 0.5);
   }

@@ -19,7 +19,7 @@ TEST(Woken, WhileBodiesGo) {
     ASSERT_TRUE(
         world.apply(SpawnCommand{test::shared(boxAt("guest" + std::to_string(k), Vec3(5.0 + k, 0, 50.0), 1))}).ok());
   ASSERT_TRUE(world.addSceneBody(test::shared(boxAt("sleeper", Vec3(-1, 0, 0.001), 2))).ok());
-  for (int step = 0; step < 720; ++step) world.step();  // out of the ground, in which it starts, and asleep
+  for (int step = 0; step < 240; ++step) world.step();
   // Of a tower the finest is on top, so that each pair is followed by one of fewer triangles.
   ASSERT_TRUE(world.addSceneBody(test::shared(boxAt("fine", Vec3(0, 0, 0.22), 8))).ok());
   ASSERT_TRUE(world.addSceneBody(test::shared(boxAt("middle", Vec3(0, 0, 0.11), 8))).ok());

@@ -1,4 +1,4 @@
-// Laws of contact, on whole bodies in a world.
+// Laws of contact in rest shapes, on whole bodies in a world.
 #include <cmath>
 
 #include "meshless_surgery/geometry/inside.h"
@@ -84,7 +84,7 @@ TEST(Contact, ABodySpawnedInsideAnotherIsLetOutSlowlyAndMomentumStays) {
     const Vec3 before = momentum(world);
     const double scale = seen(world).bodies[0].model->mass * size;
     Vec3 last = seen(world).bodies[1].measures.centre_of_mass - seen(world).bodies[0].measures.centre_of_mass;
-    for (int step = 0; step < 1200; ++step) {
+    for (int step = 0; step < 240; ++step) {
       world.step();
       const WorldSnapshot shot = seen(world);
       const Vec3 apart = shot.bodies[1].measures.centre_of_mass - shot.bodies[0].measures.centre_of_mass;
@@ -138,11 +138,11 @@ TEST(Contact, CrossedBarsDoNotPassThroughEachOther) {
 }
 
 // A sheet of 5 mm that floats in space, hit by a block of 5 cm. Through: the block's centre has come to the other side
-// of the sheet as the sheet lies then, within its rim. Two of 120 do; at 20 m/s and more it is every sixth.
+// of the sheet as the sheet lies then, within its rim.
 TEST(Contact, FastBodiesDoNotTunnelThroughSheets) {
   std::mt19937 engine(5);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
-  for (const double speed : {1.0, 5.0}) {
+  for (const double speed : {5.0, 20.0, 40.0}) {
     int through = 0, shots = 0, met = 0;
     for (int n = 0; n < 120; ++n) {
       const bool turned = n % 3 >= 1, oblique = n % 3 == 2, light = n % 2;
@@ -186,7 +186,7 @@ TEST(Contact, FastBodiesDoNotTunnelThroughSheets) {
         printf("n %d turned %d oblique %d light %d speed %g contacts %zu\n", n, turned, oblique, light, speed,
                contacts);
     }
-    EXPECT_LE(through, shots / 50) << "of " << shots << " at " << speed << " m/s";
+    EXPECT_EQ(through, 0) << "of " << shots << " at " << speed << " m/s";
     EXPECT_EQ(met, shots);
   }
 }
@@ -302,25 +302,25 @@ TEST(Contact, CollidingBodiesKeepTheirMomentumAndLoseEnergy) {
     }
 }
 
-// Dropped from half a metre: the share of the speed that comes back.
+// Dropped from a height: the share of the speed that comes back, squared, is that of the height.
 TEST(Contact, RestitutionGivesBackItsShareOfTheSpeed) {
-  for (const double restitution : {0.0, 0.5, 0.9}) {
+  for (const double restitution : {0.0, 0.5, 0.8}) {
     WorldSettings settings;
     settings.sleep = false;
-    settings.substeps = 4;
     World world(settings);
     BodyDef def = box("block", Vec3::Constant(0.1), {2, 2, 2}, Vec3(0, 0, 0.55));
     def.material.alpha = 1.0;
     def.material.restitution = restitution;
     add(world, def);
-    double down = 0.0, up = 0.0;
-    for (int step = 0; step < 90; ++step) {
+    double height = 0.0;
+    bool landed = false;
+    for (int step = 0; step < 240; ++step) {
       world.step();
-      const double speed = seen(world).bodies[0].measures.velocity.z();
-      down = std::min(down, speed);
-      up = std::max(up, speed);
+      const BodySnapshot block = seen(world).bodies[0];
+      landed = landed || block.measures.velocity.z() > -0.05;
+      if (step > 2 && landed && step < 120) height = std::max(height, block.measures.centre_of_mass.z() - 0.05);
     }
-    EXPECT_NEAR(up, -restitution * down, -0.05 * down) << restitution;
+    EXPECT_NEAR(height, 0.5 * restitution * restitution, 0.06) << restitution;
   }
 }
 
@@ -340,7 +340,7 @@ TEST(Contact, AnObstacleHoldsWhatFallsOnItAndNeverMoves) {
   for (int step = 0; step < 480; ++step) world.step();
   const WorldSnapshot shot = seen(world);
   EXPECT_EQ(shot.obstacles[0]->mesh.vertices, before);
-  EXPECT_NEAR(shot.bodies[0].measures.centre_of_mass.z(), 0.075, 0.003);  // the skin is a twentieth of an edge
+  EXPECT_NEAR(shot.bodies[0].measures.centre_of_mass.z(), 0.075, 0.002);
   EXPECT_TRUE(shot.bodies[0].asleep);
   EXPECT_LT(shot.bodies[1].measures.centre_of_mass.z(), -10.0);
   ObstacleDef bad = table;
@@ -355,10 +355,43 @@ TEST(Contact, AnObstacleHoldsWhatFallsOnItAndNeverMoves) {
   EXPECT_NE(refused.error().detail.find("-1"), std::string::npos);
 }
 
-// Thrown, it comes to rest in few and longer substeps, with the impulses of the many short ones of the impact. (At 30 m/s
-// it is crushed, springs back off the plate and tips over the rim.)
+// A point that has passed through is remembered, and its island swept more often, until it is outside again. Under a
+// load it comes to lie a hair below: that is a contact like any other.
+TEST(Contact, WhoWasCaughtAndLiesJustBelowIsLetGo) {
+  test::Random random(3);
+  WorldSettings settings = space();
+  settings.step_rate = 60.0;
+  settings.substeps = 1;
+  settings.gravity = {0.0, 0.0, -9.81};
+  settings.ground = 0.0;
+  World world(settings);
+  for (int column = 0; column < 6; ++column)
+    for (int layer = 0; layer < 2; ++layer) {
+      const Vec3 at(0.3 * column, 0.0, 0.026 + 0.08 * layer);
+      const Quat turn(Eigen::AngleAxisd(random.uniform(-0.4, 0.4), Vec3::UnitZ()));
+      BodyDef block = box("block" + std::to_string(2 * column + layer), {0.1, 0.1, 0.05}, {2, 2, 1}, at, turn);
+      block.material.mode = MatchMode::kQuadratic;
+      block.material.alpha = 0.92;
+      block.material.beta = 0.3;
+      add(world, block, Vec3(0.0, 0.0, -3.0 * layer));
+    }
+  std::size_t caught = 0;
+  for (int step = 0; step < 90; ++step) {
+    world.step();
+    caught += seen(world).report.contact_counters.caught;
+  }
+  EXPECT_GT(caught, 0u);
+  for (int step = 0; step < 10; ++step) {
+    world.step();
+    const StepReport report = seen(world).report;
+    // Eight sweeps in a substep, and what is let out; 24 where something is caught.
+    EXPECT_LE(report.contact_counters.corrected, 9 * report.substeps * report.contact_counters.contacts);
+  }
+}
+
+// Thrown, it comes to rest in few and longer substeps, with the impulses of the many short ones of the impact.
 TEST(Contact, AnOverhangingBlockStaysOnAThinPlate) {
-  for (const double speed : {3.0, 10.0}) {
+  for (const double speed : {3.0, 10.0, 30.0}) {
     WorldSettings settings = space();
     settings.gravity = {0.0, 0.0, -9.81};
     settings.step_rate = 60.0;
@@ -375,8 +408,8 @@ TEST(Contact, AnOverhangingBlockStaysOnAThinPlate) {
   }
 }
 
-// Thrown at plates of 5 mm to 3 cm, bodies are crushed, bounce, turn over and come to rest: nobody on the other side, and
-// few partly in the plate (three of 120 when this was written).
+// Thrown at plates of 5 mm to 3 cm, bodies bounce, turn over and come to rest: nobody on the other side, and few partly
+// in the plate (two of 120 when this was written; 28, and 15 behind it, before points were followed from a hair below).
 TEST(Contact, ThinPlatesHoldWhatTumblesOnThem) {
   test::Random random(7);
   int stayed = 0, below = 0, deep = 0;
@@ -399,16 +432,18 @@ TEST(Contact, ThinPlatesHoldWhatTumblesOnThem) {
     block.material.alpha = random.uniform(0.8, 1.0);
     const double speed = random.uniform(1.0, 40.0);
     add(world, block, speed * Vec3(0.3 * tilt.x(), 0.3 * tilt.y(), -1.0).normalized());
-    bool left = false;
+    bool left = false, behind = false;
     for (int step = 0; step < 2.0 * settings.step_rate && !left; ++step) {
       world.step();
-      left = seen(world).bodies[0].measures.centre_of_mass.head<2>().cwiseAbs().maxCoeff() > 1.9;
+      const Vec3 centre = seen(world).bodies[0].measures.centre_of_mass;
+      left = centre.head<2>().cwiseAbs().maxCoeff() > 1.9;
+      behind = behind || (!left && centre.z() < 0.0);
     }
+    below += behind;
     if (left) continue;
     ++stayed;
     double lowest = 1.0;
     const WorldSnapshot last = seen(world);
-    below += last.bodies[0].measures.centre_of_mass.z() < 0.0;
     for (const Vec3& v : last.bodies[0].surface) lowest = std::min(lowest, v.z());
     deep += lowest < 0.5 * thickness - 0.002;
   }
@@ -476,16 +511,12 @@ TEST(Contact, AnIncisedBodyThatCarriesAnotherIsSavedAndGoesOn) {
   EXPECT_NEAR(seen(world).bodies[1].measures.centre_of_mass.z(), 0.15, 0.01);
 }
 
-// In rest shapes another thread finds out beforehand what fresh pieces touch: the first step has little left to look
-// up. With either method it does not matter whether somebody saves or asks for the hash in between.
-TEST(Contact, WhatFreshPiecesTouchIsTheSameWhoeverLooksBeforeTheFirstStep) {
-  for (const int round : {0, 1, 2, 3}) {
-    SCOPED_TRACE(round);
-    const bool on_obstacle = round % 2 == 1, known = round < 2;
-    WorldSettings settings;
-    settings.contact = known ? ContactMethod::kRestShape : ContactMethod::kSurface;
-    const auto onABed = [&] {
-      World world(settings);
+// Another thread finds out beforehand what fresh pieces touch: the first step has little left to look up, and it does
+// not matter whether somebody saves or asks for the hash in between.
+TEST(Contact, WhatFreshPiecesTouchIsKnownBeforeTheFirstStep) {
+  for (const bool on_obstacle : {false, true}) {
+    const auto onABed = [on_obstacle] {
+      World world{WorldSettings()};
       const TriangleMesh bed = boxMesh(Vec3(0.4, 0.4, 0.05), 12, 12, 2);
       if (on_obstacle) {
         ObstacleDef def;
@@ -514,7 +545,7 @@ TEST(Contact, WhatFreshPiecesTouchIsTheSameWhoeverLooksBeforeTheFirstStep) {
     World undisturbed = onABed(), changed = onABed();
     ASSERT_EQ(undisturbed.snapshot({}).bodies.size(), on_obstacle ? 2u : 3u);
     // Who has loaded the state has looked at nothing ahead, and finds the same.
-    World loaded(settings), loaded_changed(settings);
+    World loaded{WorldSettings()}, loaded_changed{WorldSettings()};
     for (World* world : {&loaded, &loaded_changed}) {
       const Result<DecodedWorld> decoded = decode(encode(*undisturbed.capture()));
       ASSERT_TRUE(decoded.ok()) << decoded.error().detail;
@@ -541,18 +572,15 @@ TEST(Contact, WhatFreshPiecesTouchIsTheSameWhoeverLooksBeforeTheFirstStep) {
       if (step == 0) {
         const ContactCounters counters = undisturbed.snapshot({}).report.contact_counters;
         EXPECT_GT(counters.contacts, 200u);
-        const std::size_t lookups = loaded.snapshot({}).report.contact_counters.lookups;
-        EXPECT_EQ(counters.lookups, known ? 0u : lookups);
-        EXPECT_GT(lookups, 200u);
+        EXPECT_EQ(counters.lookups, 0u);
+        EXPECT_GT(loaded.snapshot({}).report.contact_counters.lookups, 200u);
         EXPECT_GT(changed.snapshot({}).report.contact_counters.lookups, 200u);
       }
       ASSERT_EQ(undisturbed.stateHash(), loaded.stateHash()) << step;
       ASSERT_EQ(changed.stateHash(), loaded_changed.stateHash()) << step;
     }
   }
-  WorldSettings settings;
-  settings.contact = ContactMethod::kRestShape;
-  World taken_back(settings);  // before a step
+  World taken_back{WorldSettings()};  // before a step
   add(taken_back, test::defOf(sphereMesh(0.1, 0.008), "ball"));
   CutCommand cut;
   cut.blades.origin = Vec3(-1.0, 0.0, 0.0);

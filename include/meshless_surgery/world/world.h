@@ -11,9 +11,9 @@
 
 namespace meshless {
 
-/// kRestShape: contact/contacts.h. kSurface: contact/surface_contacts.h. kTextbook: the paper's, contact/textbook.h,
-/// for comparison.
-enum class ContactMethod { kNone, kTextbook, kRestShape, kSurface };
+/// kRestShape: contact/contacts.h. kSurface: contact/surface_contacts.h. kAuto: kSurface as soon as a body is elastic, else
+/// kRestShape. kTextbook: the paper's, contact/textbook.h, for comparison.
+enum class ContactMethod { kNone, kTextbook, kRestShape, kSurface, kAuto };
 
 struct WorldSettings {
   Vec3 gravity{0.0, 0.0, -9.81};       // [m/s^2]
@@ -22,7 +22,7 @@ struct WorldSettings {
   double step_rate = 120.0;  // [Hz] 1..10,000
   int substeps = 1;          // 1..1,000, at the least; an elastic body can need more
   int max_substeps = 64;     // 1..1,000; beyond it elastic bodies are softer than their material, and it is said
-  ContactMethod contact = ContactMethod::kSurface;
+  ContactMethod contact = ContactMethod::kAuto;
   int threads = 1;                  // 1..64; results do not depend on it to the bit
   bool sleep = true;                // what holds still for half a second costs nothing; with kRestShape
   double pick_max_distance = 0.05;  // [m]

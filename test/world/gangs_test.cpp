@@ -1,4 +1,4 @@
-// Islands take the substeps of a frame by themselves: to the bit the same on any number of threads, whoever else is there.
+// Islands that take the substeps of a frame by themselves do to the bit what they do when all take each one together.
 #include "support/bodies.h"
 
 namespace meshless {
@@ -56,29 +56,37 @@ Seen look(World& world) {
   return seen;
 }
 
-TEST(Islands, DoTheSameOnAnyNumberOfThreadsAndBesideOthers) {
+TEST(Gangs, DoWhatAllDoTogether) {
   WorldSettings settings;
   settings.substeps = 4;
-  World alone(settings), beside(settings);
+  settings.contact = ContactMethod::kRestShape;
+  World by_themselves(settings), together(settings);
   settings.threads = 2;
   World on_threads(settings);
-  for (World* world : {&alone, &beside, &on_threads}) addStacks(*world);
+  for (World* world : {&by_themselves, &together, &on_threads}) addStacks(*world);
+  // A tool far away: with one in the world all take each substep together.
   BodyDef far = test::block("far", Vec3(50.0, 0.0, 1.0));
-  ASSERT_TRUE(beside.addSceneBody(test::shared(far)).ok());
+  ASSERT_TRUE(together.addSceneBody(test::shared(far)).ok());
   PickCommand pick;
   pick.point = Vec3(50.0, 0.0, 1.05);
   pick.max_distance = 0.1;
-  ASSERT_TRUE(beside.apply(pick).ok());
+  ASSERT_TRUE(together.apply(pick).ok());
+
+  std::size_t in_gangs = 0;
   for (int step = 0; step < 240; ++step) {
-    for (World* world : {&alone, &beside, &on_threads}) world->step();
-    const Seen one = look(alone), other = look(beside);
+    for (World* world : {&by_themselves, &together, &on_threads}) world->step();
+    const Seen one = look(by_themselves), all = look(together), two = look(on_threads);
+    in_gangs += one.report.gangs > 1 && two.report.gangs > 1;
+    ASSERT_EQ(all.report.gangs, 0u);
     ASSERT_EQ(one.particles.size(), 64u);
-    ASSERT_EQ(one.particles, other.particles) << "step " << step;
-    ASSERT_EQ(alone.stateHash(), on_threads.stateHash()) << "step " << step;
-    ASSERT_EQ(one.report.contact_counters.corrected, other.report.contact_counters.corrected);
-    ASSERT_EQ(one.report.preserve_counters.gradients, other.report.preserve_counters.gradients);
-    ASSERT_EQ(one.report.asleep, other.report.asleep);
+    ASSERT_EQ(one.particles, all.particles) << "step " << step;
+    ASSERT_EQ(by_themselves.stateHash(), on_threads.stateHash()) << "step " << step;
+    ASSERT_EQ(one.report.contact_counters.corrected, all.report.contact_counters.corrected);
+    ASSERT_EQ(one.report.ground_contacts, all.report.ground_contacts);
+    ASSERT_EQ(one.report.preserve_counters.gradients, all.report.preserve_counters.gradients);
+    ASSERT_EQ(one.report.asleep, all.report.asleep);
   }
+  EXPECT_GT(in_gangs, 60u);
 }
 
 }  // namespace
