@@ -333,6 +333,31 @@ class Cutter {
     return found;
   }
 
+  Vec3 middleOf(Index c) const {
+    const LatticeCell &cell = result_.lattice.cells[c], &was = before_.cells[result_.parent_cell[c]];
+    Vec3 sum = Vec3::Zero();
+    for (SampleSet left = cell.samples; left; left &= left - 1) sum += positionOf(was, lowestSample(left));
+    if (cell.samples) return sum / countSamples(cell.samples);
+    for (const Index corner : was.corners) sum += x_[corner] / 8.0;
+    return sum;
+  }
+
+  // Cells may share a corner that no link passes: a thin part of the surface goes from one to the other. A blade
+  // between them parts them there.
+  void openBetweenSides(std::vector<bool>& open) const {
+    const std::vector<LatticeCell>& cells = result_.lattice.cells;
+    std::vector<std::array<std::vector<Index>, 2>> on(before_.corners);
+    for (Index c = 0; c < cells.size(); ++c)
+      if (!cells[c].isBridge(c))
+        for (const Index corner : cells[c].corners)
+          if (!open[corner]) on[corner][sideOf(c) > 0].push_back(c);
+    for (Index corner = 0; corner < before_.corners; ++corner)
+      for (const Index a : on[corner][0])
+        for (const Index b : on[corner][1])
+          if (!open[corner] && (gate_.unbounded() || gate_.between(middleOf(a), -1, middleOf(b), 1)))
+            open[corner] = true;
+  }
+
   void joinCorners() {
     std::vector<LatticeCell>& cells = result_.lattice.cells;
     // Corners of the parent that a changed cell has are shared out anew; the others stay as they were.
@@ -341,6 +366,7 @@ class Cutter {
     for (Index c = 0; c < cells.size(); ++c)
       if (result_.changed[c])
         for (const Index corner : cells[c].corners) open[corner] = true;
+    openBetweenSides(open);
     std::vector<std::vector<Index>> users(before_.corners);  // nodes, 8 c + k
     for (Index c = 0; c < cells.size(); ++c)
       if (!cells[c].isBridge(c))

@@ -10,6 +10,7 @@
 #include "meshless_surgery/body/incise_body.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/organs.h"
+#include "meshless_surgery/geometry/random_organ.h"
 #include "meshless_surgery/geometry/union_find.h"
 #include "support/bodies.h"
 #include "support/mesh_laws.h"
@@ -242,6 +243,38 @@ TEST(CutCells, ManyCutsAfterEachOther) {
     }
   }
   EXPECT_GT(cuts, 100);
+}
+
+// Thin slices among them: films that go from cell to cell by corners that no sample is next to.
+TEST(CutCells, PiecesOfRandomOrgansWeighWhatTheirVolumesDo) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const Result<TriangleMesh> mesh = randomOrgan(seed, static_cast<int>(seed % 3), 0.2, 2000);
+    ASSERT_TRUE(mesh.ok());
+    Random random(static_cast<std::uint32_t>(seed));
+    std::vector<PreparedBody> pieces{prepared(filled(*mesh, 0.0109))};
+    for (int cut = 0; cut < 4; ++cut) {
+      const Plane plane{random.unit(), solidCentroid(*mesh) + random.vector(0.003)};
+      std::vector<PreparedBody> next;
+      for (PreparedBody& piece : pieces) {
+        Result<CutBody> parts = cutBody(*piece.model, piece.state, plane);
+        if (!parts.ok() && parts.error().code == ErrorCode::kMissed) {
+          next.push_back(std::move(piece));
+          continue;
+        }
+        ASSERT_TRUE(parts.ok()) << parts.error().detail;
+        for (BodyPiece& part : parts->pieces) next.push_back({BodyDef(), std::move(part.model), std::move(part.state)});
+      }
+      pieces = std::move(next);
+    }
+    EXPECT_GT(pieces.size(), 8u);
+    for (const PreparedBody& piece : pieces) {
+      const BodyModel& model = *piece.model;
+      // By samples: of a layer of a quarter of a cell all or nothing is counted.
+      EXPECT_NEAR(model.mass / 1000.0, model.rest_volume,
+                  0.1 * model.rest_volume + model.rest_area * model.spacing / 32.0)
+          << seed << ": " << model.rest_volume / std::pow(model.spacing, 3) << " cells";
+    }
+  }
 }
 
 }  // namespace

@@ -15,8 +15,7 @@ namespace {
 using test::Random;
 
 CellLattice latticeOf(const TriangleMesh& mesh, double cells) {
-  Result<CellLattice> lattice =
-      divideIntoCells(mesh, SolidQuery(mesh), std::cbrt(signedVolume(mesh) / cells));
+  Result<CellLattice> lattice = divideIntoCells(mesh, SolidQuery(mesh), std::cbrt(signedVolume(mesh) / cells));
   EXPECT_TRUE(lattice.ok());
   return lattice ? *lattice : CellLattice();
 }
@@ -103,12 +102,41 @@ TEST(CutLattice, APlaneThroughCellsPartsABarAltogether) {
   }
 }
 
+// Where a film of tissue passes a corner, no samples link the cells that it goes through.
+TEST(CutLattice, ABladeBetweenCellsThatShareOneCornerAlonePartsThem) {
+  CellLattice lattice;
+  lattice.spacing = 0.01;
+  lattice.corners = 15;
+  for (int n = 0; n < 2; ++n) {
+    LatticeCell cell;
+    cell.place = {n, n, n};
+    cell.samples = cell.filled = kAllSamples;
+    for (Index k = 0; k < 8; ++k) cell.corners[k] = 7 * n + k;
+    lattice.cells.push_back(cell);
+  }
+  const Points corners = cornerPlaces(lattice);
+  const Vec3 across = Vec3::Ones().normalized(), shared = corners[7];
+  Blade blade;
+  blade.x_axis = across.unitOrthogonal();
+  blade.y_axis = across.cross(blade.x_axis);
+  blade.length = blade.depth = 0.02;
+  blade.origin = shared - 0.01 * blade.x_axis + 0.01 * blade.y_axis;
+  Blade beside = blade;
+  beside.origin += 0.03 * blade.x_axis;
+  for (const auto& [gate, parts] :
+       {std::pair(BladeGate(Plane{across, shared}), 2u), {BladeGate(blade), 2u}, {BladeGate(beside), 1u}}) {
+    const CutLattice cut = cutLattice(lattice, corners, gate);
+    expectSound(lattice, cut);
+    EXPECT_EQ(componentsOf(cut.lattice), parts);
+  }
+}
+
 TEST(CutLattice, RandomCutsOfEveryShapeKeepEverySampleAndTheMassOfEveryCorner) {
   Random random(3);
   for (const shapes::Shape& shape : shapes::simpleShapes()) {
     SCOPED_TRACE(shape.name);
-    const Result<CellLattice> divided = divideIntoCells(
-        shape.mesh, SolidQuery(shape.mesh), std::cbrt(signedVolume(shape.mesh) / 300.0));
+    const Result<CellLattice> divided =
+        divideIntoCells(shape.mesh, SolidQuery(shape.mesh), std::cbrt(signedVolume(shape.mesh) / 300.0));
     if (!divided) continue;
     CellLattice lattice = *divided;
     Points corners = cornerPlaces(lattice);
@@ -164,8 +192,8 @@ TEST(CutLattice, ATipInACellIsBridgedByWhatIsNotCut) {
 
 TEST(CutLattice, ABladeBesideTheSolidChangesNothing) {
   const CellLattice bar = latticeOf(boxMesh(Vec3(0.2, 0.05, 0.05), 0.0125), 500.0);
-  const CutLattice cut =
-      cutLattice(bar, cornerPlaces(bar), BladeGate(Blade{Vec3(0.01, -0.1, 0.08), Vec3::UnitY(), Vec3::UnitZ(), 0.2, 0.02}));
+  const CutLattice cut = cutLattice(bar, cornerPlaces(bar),
+                                    BladeGate(Blade{Vec3(0.01, -0.1, 0.08), Vec3::UnitY(), Vec3::UnitZ(), 0.2, 0.02}));
   EXPECT_EQ(cut.lattice.corners, bar.corners);
   for (const bool changed : cut.changed) EXPECT_FALSE(changed);
 }
