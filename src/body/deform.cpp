@@ -122,9 +122,10 @@ void accelerate(const BodyModel& model, double h, const Points& x, const std::op
 }
 
 // Damps what deforms and predicts: y = x + h v, but what deforms goes `ahead` instead of h. How long that takes decides
-// on the viscosity, and must not change how a body spins. A body that is held has no rigid motion of its own. Damping
+// on the viscosity, and must not change how a body spins. A body that is held has no rigid motion of its own, and one
+// that lies on something no spin: rolling, tissue is kneaded. Damping
 // comes before the pull: after it, it would weaken the material. Returns the moments of x where it needed them.
-std::optional<MassMoments> dampAndPredict(const BodyModel& model, double h, double ahead, double damping,
+std::optional<MassMoments> dampAndPredict(const BodyModel& model, double h, double ahead, double damping, bool lies,
                                           const Points& x, Points& v, Points& y) {
   const double kept = std::exp(-damping * h);
   y.resize(x.size());
@@ -137,9 +138,10 @@ std::optional<MassMoments> dampAndPredict(const BodyModel& model, double h, doub
   }
   const MassMoments moments = momentsOf(model, x);
   const RigidMotion rigid = rigidMotionOf(model, moments, x, v);
+  const double spin_kept = lies ? kept : 1.0;
   for (std::size_t i = 0; i < x.size(); ++i) {
-    const Vec3 together = rigid.velocity + rigid.spin.cross(x[i] - rigid.centre);
-    const Vec3 deforming = kept * (v[i] - together);
+    const Vec3 turning = rigid.spin.cross(x[i] - rigid.centre);
+    const Vec3 deforming = kept * (v[i] - rigid.velocity - turning), together = rigid.velocity + spin_kept * turning;
     v[i] = together + deforming;
     y[i] = x[i] + h * together + ahead * deforming;
   }
@@ -178,9 +180,10 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
   if (material.elastic()) {
     const double fastest = highestFrequencyNow(model, state) * std::sqrt(factor);
     const double ahead = fastest > 0.0 ? 1.0 / fastest : h;
-    moments = dampAndPredict(model, h, ahead, material.damping, x, v, scratch.predicted);
+    moments = dampAndPredict(model, h, ahead, material.damping, scratch.lies, x, v, scratch.predicted);
   } else {
-    moments = dampAndPredict(model, h, viscosityTime(material.alpha, h), material.damping, x, v, scratch.predicted);
+    moments = dampAndPredict(model, h, viscosityTime(material.alpha, h), material.damping, scratch.lies, x, v,
+                             scratch.predicted);
   }
   const Points& y = scratch.predicted;
   const MatchInput input = matchInput(model, state);

@@ -286,7 +286,11 @@ void World::Impl::stepIsland(std::size_t number, double h_frame, const ForEach& 
     spring.stiffness = pick->stiffness;
     work.springs.push_back(spring);
   }
-  for (WorldBody* body : some) body->scratch.touched.clear();
+  const bool held = surface_contacts.islands()[number].free.empty() && !surface_contacts.islands()[number].rows.empty();
+  for (WorldBody* body : some) {
+    body->scratch.touched.clear();
+    body->scratch.lies = held;
+  }
   const Vec3 way = push.enabled ? pushWay(h_frame) : Vec3(Vec3::Zero());
   SolverStep step;
   step.h = h;

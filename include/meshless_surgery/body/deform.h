@@ -22,6 +22,7 @@ struct StepScratch {
   ClampStep clamp;
   ElasticBatchState elastic;
   std::vector<TouchedParticle> touched;
+  bool lies = false;      // on something that does not move: its spin is damped as what deforms
   Vec3 unfelt = Vec3::Zero();  // [kg m/s] by which the tool moved particles further than it threw them
 };
 
