@@ -60,6 +60,7 @@ class Limit {
     scratch_.meeting.clear();
     for (std::size_t n = 0; n < pairs_.size(); ++n) {
       const WatchedPairs& pairs = pairs_[n];
+      if (again_ && !bodies_[pairs.a].any_moved && !bodies_[pairs.b].any_moved) continue;
       WatchedSet& set = *pairs.set;
       if (!again_) set.gone += bodies_[pairs.a].way + bodies_[pairs.b].way;
       for (std::size_t f = 0; f < set.features.size(); ++f)

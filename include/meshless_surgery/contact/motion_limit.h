@@ -3,6 +3,7 @@
 // displacement truncation, Chen et al. 2025, "Offset geometric contact").
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "meshless_surgery/contact/feature_pairs.h"
@@ -27,6 +28,7 @@ struct LimitedBody {
   double way = 0.0;                        // [m] that any of them has gone in the substep, at most
 
   std::vector<char> edited, vertex_moved;  // one a particle; one a vertex: by what was edited
+  bool any_moved = false;                  // any vertex
 
   void place() {
     double farthest = 0.0;
@@ -38,6 +40,8 @@ struct LimitedBody {
   }
   /// Where a particle was edited.
   void placeEdited() {
+    any_moved = std::find(edited.begin(), edited.end(), 1) != edited.end();
+    if (!any_moved) return;
     for (const Index v : watched) {
       bool moved = false;
       for (Index k = supports->offsets[v]; k < supports->offsets[v + 1]; ++k)
