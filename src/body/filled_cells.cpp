@@ -101,8 +101,10 @@ ElasticCells elasticCellsOf(const BodyModel& model) {
   elastic.masses = model.match_masses;
   for (std::size_t c = 0; c < lattice.cells.size(); ++c) {
     const Resistance& resists = lattice.cells[c].resists;
-    elastic.cells.push_back(
-        {lattice.cells[c].corners, model.shape.clusters[c].mass, centroidOf(resists), resists.variance});
+    // What a hardly filled cell has of its own does not hold its far corners, and what touches the surface throws them.
+    Vec3 variance = resists.variance;
+    if (resists.fraction < kWellFilled / 64.0) variance = variance.cwiseMax(Resistance().variance);
+    elastic.cells.push_back({lattice.cells[c].corners, model.shape.clusters[c].mass, centroidOf(resists), variance});
   }
   return elastic;
 }
