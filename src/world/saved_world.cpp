@@ -506,6 +506,17 @@ void ContentHashes::tidy() {
 // Ids and numbers go on growing over resets, which bring back the same world: they are left out.
 std::uint64_t World::stateHash() const {
   const auto saved = capture();
+  const auto placeOf = [&](std::uint64_t key) {
+    const auto body =
+        std::find_if(saved->bodies.begin(), saved->bodies.end(), [&](const SavedBody& b) { return b.number == key; });
+    return body == saved->bodies.end() ? key : static_cast<std::uint64_t>(body - saved->bodies.begin());
+  };
+  SurfaceMemory surfaces = saved->surface_contacts;
+  for (KeptPair& pair : surfaces.pairs) {
+    pair.key_a = placeOf(pair.key_a);
+    pair.key_b = placeOf(pair.key_b);
+  }
+  for (KeptWay& way : surfaces.ways) way.key = placeOf(way.key);
   HashArchive archive;
   WorldSettings settings = saved->settings;
   settings.threads = 1;  // they change nothing
@@ -529,7 +540,7 @@ std::uint64_t World::stateHash() const {
     cut.ticket = 0;
     archive(cut);
   }
-  archive(saved->next_sleep_group, saved->contacts, saved->surface_contacts);
+  archive(saved->next_sleep_group, saved->contacts, surfaces);
   return archive.hash();
 }
 

@@ -323,6 +323,19 @@ TEST(SavedWorld, ResetGoesToTheStartOfTheSceneThatWasSaved) {
   EXPECT_EQ(world.stateHash(), again.stateHash());
 }
 
+TEST(SavedWorld, AfterAResetItGoesTheSameWay) {
+  for (World (*make)() : {&pile, &elasticCut, &everyTool}) {
+    World world = make();
+    std::uint64_t hashes[2];
+    for (std::uint64_t& hash : hashes) {
+      world.reset();
+      run(world, 60);
+      hash = world.stateHash();
+    }
+    EXPECT_EQ(hashes[0], hashes[1]);
+  }
+}
+
 TEST(SavedWorld, SettingsAndObstaclesComeAlong) {
   World world = everyTool();
   World again = reloaded(world, 3);
