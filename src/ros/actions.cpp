@@ -165,8 +165,14 @@ class Server {
   void end() {
     std::unique_lock<std::mutex> lock(mutex_);
     ending_ = true;
-    for (auto open = open_.begin(); open != open_.end();)
-      open = open->second->answerUnlessBegun("the node is shutting down", true) ? closed(open) : std::next(open);
+    for (auto open = open_.begin(); open != open_.end();) {
+      if (open->second->answerUnlessBegun("the node is shutting down", true)) {
+        ROS_INFO_STREAM("aborted the goal " << open->first << ": the node is shutting down");
+        open = closed(open);
+      } else {
+        ++open;
+      }
+    }
     all_done_.wait_for(lock, kLongestEnd, [this] { return open_.empty(); });
   }
 

@@ -214,13 +214,20 @@ TEST(Runner, ACutThatIsCancelledWhilePausedLeavesTheOther) {
   EXPECT_EQ(3u, runner.snapshot({})->bodies.size());
 }
 
+struct Told : Progress {
+  void tell() override { told = true; }
+  std::atomic<bool> told{false};
+};
+
 TEST(Runner, StepsThatAreCancelledEndAfterAWholeOneAndLeaveTheNext) {
   WorldRunner runner(twoBoxes(), pausedAtStart(), wallClock());
   runner.start();
-  Progress first, second;
+  Told first, second;
   auto a = std::async(std::launch::async, [&] { return runner.doSteps(1u << 30, &first); });
   waitUntil([&] { return first.stepsDone() > 5; });
   auto b = std::async(std::launch::async, [&] { return runner.doSteps(20, &second); });
+  waitUntil([&] { return second.told.load(); });  // it waits for the first
+  EXPECT_EQ(0u, second.stepsDone());
   EXPECT_FALSE(first.cancel());
   runner.endCancelled();
   const auto cancelled = a.get();
