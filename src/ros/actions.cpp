@@ -167,7 +167,7 @@ class Server {
     ending_ = true;
     for (auto open = open_.begin(); open != open_.end();) {
       if (open->second->answerUnlessBegun("the node is shutting down", true)) {
-        ROS_INFO_STREAM("aborted the goal " << open->first << ": the node is shutting down");
+        ROS_WARN_STREAM("aborted the goal " << open->first << ": the node is shutting down");
         open = closed(open);
       } else {
         ++open;
