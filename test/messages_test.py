@@ -53,6 +53,25 @@ class ErrorCodeTest(unittest.TestCase):
             self.assertRegex(docs, r'\| `%s` \| %d \|' % (name, number))
 
 
+class ActionTest(unittest.TestCase):
+
+    def test_goals_and_results_have_the_fields_of_the_service(self):
+        """So one handler works on both."""
+        actions = sorted(glob.glob(os.path.join(CHECKOUT, 'action', '*.action')))
+        self.assertEqual(4, len(actions))
+        for action in actions:
+            name = os.path.splitext(os.path.basename(action))[0]
+            with self.subTest(action=name):
+                goal, result, feedback = (fields(part) for part in text(action).split('---\n'))
+                request, answer = (fields(part) for part in text('srv/%s.srv' % name).split('---\n'))
+                self.assertEqual(request, goal)
+                more = [('uint32', 'steps_done', None)] if name == 'Step' else []
+                self.assertEqual(answer, [field for field in result if field not in more])
+                self.assertEqual(len(answer) + len(more), len(result))
+                self.assertIn(('string', 'WAITING', 'waiting'), feedback)
+                self.assertIn(('string', 'phase', None), feedback)
+
+
 class EventTest(unittest.TestCase):
 
     def test_every_type_that_the_core_knows_has_its_constant(self):

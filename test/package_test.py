@@ -11,7 +11,7 @@ CHECKOUT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 # How includes begin -> the key of package.xml. '': the compiler's, the system's and our own.
 INCLUDES = (
-    (r'ros/package\.h', 'roslib'), (r'ros/|XmlRpcValue\.h', 'roscpp'), (r'(pluginlib|rviz|diagnostic_updater|tf2|tf2_ros)/', None),
+    (r'ros/package\.h', 'roslib'), (r'ros/|XmlRpcValue\.h', 'roscpp'), (r'(pluginlib|rviz|diagnostic_updater|tf2|tf2_ros|actionlib)/', None),
     (r'\w+_(msgs|srvs)/', None), (r'(Eigen|unsupported/Eigen)/', 'eigen'), (r'CGAL/', 'libcgal-dev'), (r'pcl/', 'libpcl-all-dev'),
     (r'yaml-cpp/', 'yaml-cpp'), (r'tbb/', 'tbb'), (r'zlib\.h', 'zlib'), (r'nanoflann\.hpp', 'libnanoflann-dev'),
     (r'cereal/', 'libcereal-dev'), (r'CLI/', 'cli11'), (r'(Q[A-Z]\w*|Qt\w*/.*)$', 'qtbase5-dev'), (r'Ogre\w*\.h', 'rviz'),
@@ -20,7 +20,7 @@ INCLUDES = (
     (r'meshless_surgery/', ''), (r'[a-z_]+$', ''),
 )
 # What runs when a library of that header runs; the others are templates, or their run time has a name of its own.
-LINKED = {'roscpp', 'roslib', 'diagnostic_updater', 'tf2', 'tf2_ros', 'libcgal-dev', 'libpcl-all-dev', 'yaml-cpp', 'tbb', 'zlib',
+LINKED = {'roscpp', 'roslib', 'actionlib', 'diagnostic_updater', 'tf2', 'tf2_ros', 'libcgal-dev', 'libpcl-all-dev', 'yaml-cpp', 'tbb', 'zlib',
           'pluginlib', 'rviz'}
 MODULES = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml', 'rospkg': 'python3-rospkg-modules', 'tf2_ros': 'tf2_ros'}
 ROS_MODULES = {'rospy', 'roslib', 'rosgraph', 'rosunit', 'rostest', 'tf2_ros', 'genpy', 'actionlib', 'rosbag', 'dynamic_reconfigure'}
@@ -38,6 +38,7 @@ DEBIAN = {
     'rosbash': ['rosbash'], 'message_generation': ['ros-message-generation'], 'message_runtime': ['ros-message-runtime'],
     'roscpp': ['libroscpp-dev'], 'roslib': ['libroslib-dev'], 'rostest': ['librostest-dev', 'python3-rostest'],
     'tf2': ['libtf2-dev'], 'tf2_ros': ['libtf2-ros-dev', 'python3-tf2-ros'], 'diagnostic_updater': ['libdiagnostic-updater-dev'],
+    'actionlib': ['libactionlib-dev', 'python3-actionlib'],
     'rosgraph_msgs': [], 'genpy': [], 'rosgraph': [], 'rosunit': [], 'tf2_msgs': ['ros-tf2-msgs'],  # come with rospy, rostest
 }
 # CMake's package -> the key. Those of catkin have the key's name.
@@ -105,7 +106,7 @@ def declared(*tags):
 
 def in_messages():
     return {match for path in files('msg/*.msg', 'srv/*.srv', 'action/*.action')
-            for match in re.findall(r'^(\w+)/\w+', read(path), re.MULTILINE)} | {'std_msgs'}  # Header
+            for match in re.findall(r'^(\w+)/\w+', read(path), re.MULTILINE)} | {'std_msgs', 'actionlib_msgs'}  # Header; each action
 
 
 @unittest.skipIf(sys.version_info < (3, 10), 'Python 3.10 knows the names of its own modules')

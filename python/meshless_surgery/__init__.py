@@ -8,6 +8,7 @@
 """
 
 _PLACES = {'Surgeon': 'surgeon', 'ToolStream': 'streams', 'SurgeryError': 'errors', 'Refused': 'errors',
+           'Cancelled': 'errors', 'Goal': 'goals',
            'Unanswered': 'errors', 'ErrorCode': 'errors'}
 
 

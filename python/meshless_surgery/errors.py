@@ -24,5 +24,14 @@ class Refused(SurgeryError):
         self.code = None if code is None else ErrorCode(code)
 
 
+class Cancelled(SurgeryError):
+    """A goal was cancelled. `action` is its name, `result` what the node answered: steps_done of a step; nothing else was done."""
+
+    def __init__(self, action, result):
+        super().__init__('%s: %s' % (action, result.message))
+        self.action = action
+        self.result = result
+
+
 class Unanswered(SurgeryError):
     """A request was sent and not answered: it may have been done, or not. The text says how the world is now."""

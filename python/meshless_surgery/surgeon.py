@@ -10,6 +10,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
 from meshless_surgery.errors import Refused, Unanswered
+from meshless_surgery.goals import Goals
 from meshless_surgery.msg import Info, State
 from meshless_surgery.poses import blade_pose, blades_pose, pose_stamped
 from meshless_surgery.srv import (Cut, GetBody, Hash, Incise, LoadState, Lock, MovePick, Pick, Probe, Push, Release, Remove,
@@ -29,6 +30,7 @@ class Surgeon:
         self.timeout = timeout
         self.frame = frame
         self._proxies = {}
+        self._goals = Goals(node, timeout)
         self._paused = False
 
     def call(self, name, service, /, **fields):
@@ -46,6 +48,19 @@ class Surgeon:
         if not reply.success:
             raise Refused(name, reply.message, getattr(reply, 'error_code', None))
         return reply
+
+    # Goals of the actions: as the methods without _async, which say what they take. They do not wait; each returns a Goal.
+    def cut_async(self, *args, feedback=None, **named):
+        return Surgeon.cut(_Sender(self, feedback), *args, **named)
+
+    def incise_async(self, *args, feedback=None, **named):
+        return Surgeon.incise(_Sender(self, feedback), *args, **named)
+
+    def step_async(self, steps, feedback=None):
+        return Surgeon.step(_Sender(self, feedback), steps)
+
+    def spawn_async(self, *args, feedback=None, **named):
+        return Surgeon.spawn(_Sender(self, feedback), *args, **named)
 
     @staticmethod
     def _ended(proxy):
@@ -215,3 +230,14 @@ class Surgeon:
     @property
     def is_stepped(self):
         return self._paused
+
+
+class _Sender(Surgeon):
+    """Sends as a goal what a Surgeon's method would call as a service."""
+
+    def __init__(self, surgeon, feedback):
+        super().__init__(surgeon.node, surgeon.timeout, surgeon.frame)
+        self._goals, self._feedback = surgeon._goals, feedback
+
+    def call(self, name, service, /, **fields):
+        return self._goals.send(name, fields, self._feedback)

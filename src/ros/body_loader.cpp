@@ -33,7 +33,12 @@ Result<Material> BodyLoader::material(const std::string& name) const {
                "material is '" + printable(name) + "'; accepted: " + (known.empty() ? "default" : known)};
 }
 
-Result<std::shared_ptr<const PreparedBody>> BodyLoader::load(const SpawnRequest& request) const {
+Result<std::shared_ptr<const PreparedBody>> BodyLoader::load(const SpawnRequest& request, Progress* progress) const {
+  const auto at = [&](Progress::Phase phase) {
+    if (progress == nullptr) return;
+    progress->enter(phase);
+    progress->tell();
+  };
   BodyDef def;
   def.pose = request.pose;
 
@@ -51,6 +56,7 @@ Result<std::shared_ptr<const PreparedBody>> BodyLoader::load(const SpawnRequest&
   } else {
     const auto path = access_.resolve(request.file, scene_folder_);
     if (!path.ok()) return path.error();
+    at(Progress::Phase::kReading);
     auto shape = loadShape(*path, request.scale, request.repair);
     if (!shape.ok()) return shape.error();
     def.mesh = std::move(shape->mesh);
@@ -59,6 +65,11 @@ Result<std::shared_ptr<const PreparedBody>> BodyLoader::load(const SpawnRequest&
     def.name = stem(*path);
   }
   if (!request.name.empty()) def.name = request.name;
+  if (progress != nullptr && progress->cancelled()) {
+    progress->end();
+    return Error{ErrorCode::kFailed, "cancelled before it was prepared"};
+  }
+  at(Progress::Phase::kPreparing);
   auto body = prepareBody(std::move(def));
   if (!body.ok()) return body.error();
   return std::shared_ptr<const PreparedBody>(std::make_shared<PreparedBody>(std::move(*body)));

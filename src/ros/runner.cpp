@@ -8,6 +8,7 @@
 namespace meshless {
 namespace {
 
+using Phase = Progress::Phase;
 using SteadyClock = std::chrono::steady_clock;
 
 double wallSeconds() { return std::chrono::duration<double>(SteadyClock::now().time_since_epoch()).count(); }
@@ -15,7 +16,17 @@ double wallSeconds() { return std::chrono::duration<double>(SteadyClock::now().t
 constexpr double kWindow = 1.0;           // [s] that rates are taken over
 constexpr double kOverBudgetEvery = 1.0;  // [s] between two events
 
+constexpr std::chrono::milliseconds kTellEvery(50);
+
 Error stoppedError() { return {ErrorCode::kFailed, "the node is shutting down"}; }
+Error cancelledError(const std::string& when) { return {ErrorCode::kFailed, "cancelled " + when}; }
+
+/// What comes later, telling meanwhile how far it is.
+template <class Value>
+Value awaited(std::future<Value>& later, Progress* progress) {
+  while (progress != nullptr && later.wait_for(kTellEvery) != std::future_status::ready) progress->tell();
+  return later.get();
+}
 
 }  // namespace
 
@@ -80,19 +91,33 @@ void WorldRunner::post(Job job) {
 
 Status WorldRunner::look(const Job& job) { return run(job, false); }
 
-Result<Reply> WorldRunner::apply(const Command& command) {
+Result<Reply> WorldRunner::apply(const Command& command, Progress* progress) {
   Result<Reply> reply = stoppedError();
-  const Status done = run([&](World& world) { reply = world.apply(command); }, true);
+  const Status done = run(
+      [&](World& world) {
+        if (progress != nullptr && !progress->begin()) {
+          reply = cancelledError("before it began");
+          return;
+        }
+        if (progress != nullptr)
+          progress->enter(std::holds_alternative<SpawnCommand>(command) ? Phase::kAdding : Phase::kCutting);
+        reply = world.apply(command);
+      },
+      true);
   if (!done.ok()) return done.error();
   return reply;
 }
 
-Result<WorldRunner::CutAnswer> WorldRunner::cut(CutCommand command) {
+Result<WorldRunner::CutAnswer> WorldRunner::cut(CutCommand command, Progress* progress) {
   CutAnswer answer;
   std::optional<Error> error;
   std::future<Result<CutReply>> later;
   const Status done = run(
       [&](World& world) {
+        if (progress != nullptr && !progress->begin()) {
+          error = cancelledError("before it began");
+          return;
+        }
         answer.closed_at_once = paused_ && command.close_time > 0.0;
         if (paused_) command.close_time = 0.0;
         if (command.close_time > 0.0 && closing_.size() >= static_cast<std::size_t>(kMostClosing)) {
@@ -102,14 +127,19 @@ Result<WorldRunner::CutAnswer> WorldRunner::cut(CutCommand command) {
                             " at once, and any number with close_time 0 (open_scissors ends those that wait)"};
           return;
         }
+        if (progress != nullptr) progress->enter(command.close_time > 0.0 ? Phase::kClosing : Phase::kCutting);
         auto reply = world.apply(command);
         if (!reply.ok()) {
           error = reply.error();
         } else if (const auto* started = std::get_if<CutStarted>(&*reply)) {
           closing_.emplace_back();
           closing_.back().ticket = started->ticket;
+          closing_.back().progress = progress;
+          closing_.back().begin = world.simTime();
+          closing_.back().close_time = command.close_time;
           later = closing_.back().done.get_future();
         } else if (auto* cut = std::get_if<CutReply>(&*reply)) {
+          if (progress != nullptr) progress->close(1.0);
           answer.reply = std::move(*cut);
         }
       },
@@ -117,24 +147,55 @@ Result<WorldRunner::CutAnswer> WorldRunner::cut(CutCommand command) {
   if (!done.ok()) return done.error();
   if (error) return *error;
   if (later.valid()) {
-    auto reply = later.get();
+    auto reply = awaited(later, progress);
     if (!reply.ok()) return reply.error();
     answer.reply = std::move(*reply);
   }
   return answer;
 }
 
-Result<double> WorldRunner::doSteps(std::uint64_t count) {
+std::string WorldRunner::OwedSteps::doneSoFar() const {
+  return std::to_string(total - left) + " of " + std::to_string(total) + " steps were done";
+}
+
+Result<double> WorldRunner::doSteps(std::uint64_t count, Progress* progress) {
   std::future<Result<double>> later;
   const Status done = run(
       [&](World&) {
+        if (progress != nullptr && !progress->begin()) return;
         owed_.emplace_back();
+        owed_.back().progress = progress;
         owed_.back().total = owed_.back().left = count;
         later = owed_.back().done.get_future();
       },
       false);
   if (!done.ok()) return done.error();
-  return later.get();
+  if (!later.valid()) return cancelledError("before it began");
+  return awaited(later, progress);
+}
+
+void WorldRunner::endCancelled() {
+  post([this](World& world) {
+    for (ClosingCut& cut : closing_) {
+      if (cut.progress == nullptr || !cut.progress->cancelled()) continue;
+      if (!world.apply(OpenBladesCommand{cut.ticket}).ok()) continue;
+      (void)world.finishedCut(cut.ticket);  // instead of its answer
+      cut.progress->end();
+      cut.done.set_value(cancelledError("before the blades met"));
+      cut.ticket = 0;
+    }
+    closing_.erase(
+        std::remove_if(closing_.begin(), closing_.end(), [](const ClosingCut& cut) { return cut.ticket == 0; }),
+        closing_.end());
+    for (OwedSteps& owed : owed_) {
+      if (owed.progress == nullptr || !owed.progress->cancelled()) continue;
+      owed.progress->end();
+      owed.done.set_value(cancelledError("when " + owed.doneSoFar()));
+      owed.total = 0;
+    }
+    owed_.erase(std::remove_if(owed_.begin(), owed_.end(), [](const OwedSteps& owed) { return owed.total == 0; }),
+                owed_.end());
+  });
 }
 
 Result<std::uint64_t> WorldRunner::setPaused(bool paused) {
@@ -228,9 +289,15 @@ void WorldRunner::loop() {
     if (!owed_.empty()) {
       stepOnce();
       due = std::max(due, clock_.now());  // what they took is no backlog
-      // Empty now where the step failed.
-      if (!owed_.empty() && --owed_.front().left == 0) {
-        owed_.front().done.set_value(world_->simTime());
+      if (owed_.empty()) continue;        // the step failed
+      OwedSteps& owed = owed_.front();
+      --owed.left;
+      if (owed.progress != nullptr) {
+        owed.progress->enter(Phase::kStepping);
+        owed.progress->step(owed.total - owed.left, world_->simTime());
+      }
+      if (owed.left == 0) {
+        owed.done.set_value(world_->simTime());
         owed_.pop_front();
       }
       continue;
@@ -300,6 +367,7 @@ void WorldRunner::doJobs() {
 
 void WorldRunner::stepOnce() {
   const double before = wallSeconds();
+  tellCuts();
   try {
     world_->step();
     ++revision_;
@@ -310,6 +378,16 @@ void WorldRunner::stepOnce() {
   }
   record(wallSeconds() - before);
   answerCuts();
+}
+
+void WorldRunner::tellCuts() {
+  for (const ClosingCut& cut : closing_) {
+    if (cut.progress == nullptr) continue;
+    const double share = (world_->simTime() - cut.begin) / cut.close_time;
+    const bool meet = share > 1.0 - 1e-9;  // times are rounded
+    cut.progress->close(meet ? 1.0 : std::max(share, 0.0));
+    if (meet) cut.progress->enter(Phase::kCutting);
+  }
 }
 
 void WorldRunner::answerCuts() {
@@ -329,8 +407,7 @@ void WorldRunner::giveUp(const std::string& why) {
     closing.done.set_value(Error{ErrorCode::kFailed, "the cut was given up: " + why});
   closing_.clear();
   for (OwedSteps& owed : owed_) {
-    owed.done.set_value(Error{ErrorCode::kFailed, std::to_string(owed.total - owed.left) + " of " +
-                                                      std::to_string(owed.total) + " steps were done: " + why});
+    owed.done.set_value(Error{ErrorCode::kFailed, owed.doneSoFar() + ": " + why});
   }
   owed_.clear();
 }

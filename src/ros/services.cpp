@@ -1,8 +1,6 @@
 #include "meshless_surgery/ros/services.h"
 
-#include <algorithm>
 #include <chrono>
-#include <type_traits>
 
 #include <meshless_surgery/Cut.h>
 #include <meshless_surgery/GetBody.h>
@@ -21,66 +19,37 @@
 #include <meshless_surgery/Spawn.h>
 #include <meshless_surgery/SpawnCloud.h>
 #include <meshless_surgery/Step.h>
-#include <ros/console.h>
 #include <ros/names.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 
-#include "meshless_surgery/ros/border_check.h"
-#include "meshless_surgery/ros/convert.h"
+#include "actions.h"
+#include "long_work.h"
 
 namespace meshless {
 namespace {
 
-constexpr double kMaxCloseTime = 60.0;  // [s]
-constexpr double kMaxSpeed = 1e3;       // [m/s]
-constexpr double kMaxStiffness = 1e9;   // [N/m]
-constexpr double kMaxScale = 1e6;
-constexpr double kMaxCloudTimeout = 60.0;  // [s]
-constexpr double kCloudTimeout = 5.0;      // [s]
-constexpr double kCloudPoll = 0.05;        // [s]
-constexpr double kMaxOutliers = 100.0;     // standard deviations
-constexpr std::uint32_t kMaxSteps = 100000;
+constexpr double kMaxSpeed = 1e3;                           // [m/s]
+constexpr double kMaxStiffness = 1e9;                       // [N/m]
+constexpr double kMaxCloudTimeout = 60.0;                   // [s]
+constexpr double kCloudTimeout = 5.0;                       // [s]
+constexpr double kCloudPoll = 0.05;                         // [s]
+constexpr double kMaxOutliers = 100.0;                      // standard deviations
 constexpr std::size_t kMaxYaml = 64 * 1024;                 // bytes
-constexpr std::size_t kLongestMessage = 2000;               // characters: names of megabytes are not sent back
 constexpr int kCutThreads = WorldRunner::kMostClosing + 1;  // one is always there for a cut that need not wait
 constexpr int kSpawnThreads = 2;                            // a large body must not hold up a small one
-constexpr int kMostSuffix = 10000;                          // <name>_N tried for a body without a name of its own
-
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
-std::string clustersOf(const CutWork& work) {
-  return std::to_string(work.rebuilt_clusters) + " clusters rebuilt, " + std::to_string(work.kept_clusters) + " kept";
-}
-
-MeshRepair repairOf(const std::string& name, BorderCheck& check) {
-  const std::vector<std::string>& names = meshRepairNames();
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found != names.end()) return static_cast<MeshRepair>(found - names.begin());
-  if (!name.empty()) check.fault("repair is '" + printable(name) + "'; accepted: " + joined(names));
-  return MeshRepair::kMend;
-}
-
-template <class Response, class = void>
-struct HasErrorCode : std::false_type {};  // std_srvs' answers
-template <class Response>
-struct HasErrorCode<Response, std::void_t<decltype(Response::error_code)>> : std::true_type {};
-
-template <class Response>
-void setErrorCode(Response& response, std::int32_t code) {
-  if constexpr (HasErrorCode<Response>::value) response.error_code = code;
-}
 
 }  // namespace
 
-struct Services::Handlers {
+struct Services::Handlers : Answers {
   Handlers(const ros::NodeHandle& private_handle, WorldRunner& runner_in, Frames& frames_in,
            const BodyLoader& loader_in, Rejections& rejections_in, Session& session_in)
-      : runner(runner_in), frames(frames_in), loader(loader_in), rejections(rejections_in), session(session_in) {
+      : Answers{rejections_in},
+        runner(runner_in),
+        frames(frames_in),
+        session(session_in),
+        work(runner_in, frames_in, loader_in, rejections_in),
+        actions(private_handle, work, {cut_queue, step_queue, spawn_queue}) {
     advertise(private_handle, "pick", &Handlers::pick);
     advertise(private_handle, "move_pick", &Handlers::movePick);
     advertise(private_handle, "lock", &Handlers::lock);
@@ -111,6 +80,8 @@ struct Services::Handlers {
     spawn_spinner.start();
   }
 
+  ~Handlers() { actions.end(); }
+
   template <class Request, class Response>
   void advertise(ros::NodeHandle handle, const std::string& name, bool (Handlers::*handler)(Request&, Response&)) {
     servers.push_back(handle.advertiseService(name, handler, this));
@@ -122,23 +93,6 @@ struct Services::Handlers {
     servers.push_back(handle.advertiseService(name, handler, this));
   }
 
-  // Always true: the caller is to see the reason, not a broken call.
-  template <class Response>
-  bool refuse(Response& response, const std::string& service, const Error& error) {
-    response.success = false;
-    response.message = printable(error.detail, kLongestMessage);
-    setErrorCode(response, toErrorCode(error.code));
-    if (error.code != ErrorCode::kMissed) rejections.count("~" + service, response.message);
-    ROS_DEBUG_STREAM("~" << service << " refused: " << response.message);
-    return true;
-  }
-  template <class Response>
-  bool accept(Response& response, const std::string& message) {
-    response.success = true;
-    response.message = message;
-    setErrorCode(response, 0);
-    return true;
-  }
   /// For commands whose answer is that they are done.
   template <class Response>
   bool applied(Response& response, const std::string& service, const Command& command, const std::string& message) {
@@ -226,65 +180,11 @@ struct Services::Handlers {
   }
 
   bool cut(meshless_surgery::Cut::Request& request, meshless_surgery::Cut::Response& response) {
-    BorderCheck check;
-    CutCommand command;
-    const Pose local = check.pose("blades.pose", request.blades.pose);
-    const double length = check.number("length", request.length, 0.0, kMaxLength, "m");
-    const double width = check.number("width", request.width, 0.0, kMaxLength, "m");
-    command.close_time = check.number("close_time", request.close_time, 0.0, kMaxCloseTime, "s");
-    command.roughness = check.number("roughness", request.roughness, 0.0, kMaxLength, "m");
-    command.bodies = check.names("bodies", request.bodies);
-    if (!check.ok()) return refuse(response, "cut", check.error());
-    const auto frame = frames.toWorld(request.blades.header);
-    if (!frame.ok()) return refuse(response, "cut", frame.error());
-    Pose pose;
-    pose.rotation = frame->rotation * local.rotation;
-    pose.translation = *frame * local.translation;
-    command.blades = bladesAt(pose, length, width);
-    const auto answer = runner.cut(std::move(command));
-    if (!answer.ok()) return refuse(response, "cut", answer.error());
-    response.cut_bodies = answer->reply.cut_bodies;
-    response.new_bodies = answer->reply.new_bodies;
-    response.cap_area = answer->reply.cap_area;
-    response.duration = answer->reply.duration;
-    response.kept_clusters = static_cast<std::uint32_t>(answer->reply.work.kept_clusters);
-    response.rebuilt_clusters = static_cast<std::uint32_t>(answer->reply.work.rebuilt_clusters);
-    std::string message = "cut " + joined(answer->reply.cut_bodies) + " into " +
-                          std::to_string(answer->reply.new_bodies.size()) + " pieces; " +
-                          clustersOf(answer->reply.work);
-    if (answer->closed_at_once) message += "; the world is paused, so the blades met at once (close_time was not used)";
-    for (const std::string& note : answer->reply.notes) message += "; " + note;
-    return accept(response, message);
+    return work.cut(request, response, "cut");
   }
 
   bool incise(meshless_surgery::Incise::Request& request, meshless_surgery::Incise::Response& response) {
-    BorderCheck check;
-    InciseCommand command;
-    const Pose local = check.pose("blade.pose", request.blade.pose);
-    command.blade.length = check.number("length", request.length, 1e-6, kMaxLength, "m");
-    command.blade.depth = check.number("depth", request.depth, 1e-6, kMaxLength, "m");
-    command.bodies = check.names("bodies", request.bodies);
-    if (!check.ok()) return refuse(response, "incise", check.error());
-    const auto frame = frames.toWorld(request.blade.header);
-    if (!frame.ok()) return refuse(response, "incise", frame.error());
-    const Mat3 axes = (frame->rotation * local.rotation).toRotationMatrix();
-    command.blade.origin = *frame * local.translation;
-    command.blade.x_axis = axes.col(0);
-    command.blade.y_axis = axes.col(1);
-    const auto answer = runner.apply(command);
-    if (!answer.ok()) return refuse(response, "incise", answer.error());
-    const auto& reply = std::get<InciseReply>(*answer);
-    response.cut_bodies = reply.cut_bodies;
-    response.new_bodies = reply.new_bodies;
-    response.opened_area = reply.opened_area;
-    response.duration = reply.duration;
-    response.kept_clusters = static_cast<std::uint32_t>(reply.work.kept_clusters);
-    response.rebuilt_clusters = static_cast<std::uint32_t>(reply.work.rebuilt_clusters);
-    std::string message = "opened " + joined(reply.cut_bodies);
-    if (!reply.new_bodies.empty()) message += ", which came apart into " + joined(reply.new_bodies);
-    message += "; " + clustersOf(reply.work);
-    for (const std::string& note : reply.notes) message += "; " + note;
-    return accept(response, message);
+    return work.incise(request, response, "incise");
   }
 
   bool openScissors(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
@@ -320,70 +220,7 @@ struct Services::Handlers {
   }
 
   bool spawn(meshless_surgery::Spawn::Request& request, meshless_surgery::Spawn::Response& response) {
-    BorderCheck check;
-    SpawnRequest wanted;
-    wanted.name = check.newName("name", request.name);
-    wanted.file = request.file;
-    const Pose local = check.pose("pose.pose", request.pose.pose);
-    wanted.scale = check.number("scale", request.scale, 0.0, kMaxScale, "");
-    if (wanted.scale == 0.0) wanted.scale = 1.0;
-    wanted.material = request.material;
-    wanted.repair = repairOf(request.repair, check);
-    if (wanted.file.empty()) {
-      switch (request.primitive.type) {
-        case shape_msgs::SolidPrimitive::BOX:
-          wanted.primitive = "box";
-          break;
-        case shape_msgs::SolidPrimitive::SPHERE:
-          wanted.primitive = "sphere";
-          break;
-        case shape_msgs::SolidPrimitive::CYLINDER:
-          wanted.primitive = "cylinder";
-          break;
-        default:
-          check.fault("primitive.type is " + std::to_string(request.primitive.type) +
-                      "; accepted: 1 (BOX), 2 (SPHERE), 3 (CYLINDER), or a file");
-      }
-      wanted.sizes.assign(request.primitive.dimensions.begin(), request.primitive.dimensions.end());
-    }
-    if (!check.ok()) return refuse(response, "spawn", check.error());
-    const auto frame = frames.toWorld(request.pose.header);
-    if (!frame.ok()) return refuse(response, "spawn", frame.error());
-    wanted.pose.rotation = frame->rotation * local.rotation;
-    wanted.pose.translation = *frame * local.translation;
-    auto body = loader.load(wanted);
-    if (!body.ok()) return refuse(response, "spawn", body.error());
-
-    return add(response, "spawn", *body, request.name.empty());
-  }
-
-  /// `numbered`: <name>_2, <name>_3 ... where the name is taken.
-  template <class Response>
-  bool add(Response& response, const std::string& service, const std::shared_ptr<const PreparedBody>& body,
-           bool numbered) {
-    SpawnCommand command;
-    command.body = body;
-    auto reply = runner.apply(command);
-    for (int i = 2; numbered && !reply.ok() && reply.error().code == ErrorCode::kDuplicateName && i <= kMostSuffix;
-         ++i) {
-      // Looked for in one go: in a crowd each turn with the world may take long to come.
-      const auto name = [&] { return body->def.name + "_" + std::to_string(i); };
-      const Status done = runner.look([&](World& world) {
-        while (i < kMostSuffix && world.nameUsed(name())) ++i;
-      });
-      if (!done.ok()) return refuse(response, service, done.error());
-      command.body = renamed(*body, name());
-      reply = runner.apply(command);
-    }
-    if (!reply.ok()) return refuse(response, service, reply.error());
-    const auto& spawned = std::get<SpawnReply>(*reply);
-    response.name = spawned.name;
-    response.particles = static_cast<std::uint32_t>(spawned.particles);
-    response.triangles = static_cast<std::uint32_t>(spawned.triangles);
-    response.clusters = static_cast<std::uint32_t>(spawned.clusters);
-    std::string message = "added " + spawned.name;
-    for (const std::string& note : command.body->def.notes) message += "; " + note;
-    return accept(response, message);
+    return work.spawn(request, response, "spawn");
   }
 
   bool spawnCloud(meshless_surgery::SpawnCloud::Request& request, meshless_surgery::SpawnCloud::Response& response) {
@@ -423,10 +260,10 @@ struct Services::Handlers {
     for (Vec3& p : *points) p = *frame * Vec3((scale > 0.0 ? scale : 1.0) * p);
     wanted.points = std::move(*points);
     std::size_t left = 0;
-    auto body = loader.load(wanted, left);
+    auto body = work.loader.load(wanted, left);
     if (!body.ok()) return refuse(response, "spawn_cloud", body.error());
     response.points = static_cast<std::uint32_t>(left);
-    return add(response, "spawn_cloud", *body, request.name.empty());
+    return work.add(response, "spawn_cloud", *body, request.name.empty());
   }
 
   /// By the wall, as a simulated clock may stand still; null where none comes, or the node ends.
@@ -489,15 +326,7 @@ struct Services::Handlers {
   }
 
   bool step(meshless_surgery::Step::Request& request, meshless_surgery::Step::Response& response) {
-    if (request.steps < 1 || request.steps > kMaxSteps) {
-      return refuse(response, "step",
-                    {ErrorCode::kInvalidArgument,
-                     "steps is " + std::to_string(request.steps) + "; accepted: 1.." + std::to_string(kMaxSteps)});
-    }
-    const auto time = runner.doSteps(request.steps);
-    if (!time.ok()) return refuse(response, "step", time.error());
-    response.sim_time = *time;
-    return accept(response, "did " + std::to_string(request.steps) + " steps");
+    return work.step(request, response, "step");
   }
 
   bool reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
@@ -531,12 +360,12 @@ struct Services::Handlers {
 
   WorldRunner& runner;
   Frames& frames;
-  const BodyLoader& loader;
-  Rejections& rejections;
   Session& session;
+  const LongWork work;
   // Queues before servers before spinners: torn down in the other order.
   ros::CallbackQueue cut_queue, step_queue, spawn_queue, cloud_queue, session_queue;
   std::vector<ros::ServiceServer> servers;
+  Actions actions;
   ros::AsyncSpinner cut_spinner{kCutThreads, &cut_queue};
   ros::AsyncSpinner step_spinner{1, &step_queue};
   ros::AsyncSpinner spawn_spinner{kSpawnThreads, &spawn_queue};

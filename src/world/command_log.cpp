@@ -62,6 +62,11 @@ void serialize(A&, OpenScissorsCommand&) {}
 template <class A>
 void serialize(A&, UndoCutCommand&) {}
 template <class A>
+void serialize(A& archive, OpenBladesCommand& v) {
+  auto& [ticket] = v;
+  archive(ticket);
+}
+template <class A>
 void serialize(A& archive, PushCommand& v) {
   auto& [enable, radius, position, speed, streamed] = v;
   archive(enable, radius, position, speed, streamed);

@@ -68,12 +68,16 @@ Result<Reply> World::Impl::apply(const CutCommand& command) {
   return Reply(CutStarted{cut.ticket});
 }
 
+void World::Impl::showBlades(const ClosingCut& cut) {
+  const double whole = static_cast<double>(cut.done_at - cut.started_at);
+  scissors.blades = cut.command.blades;
+  scissors.angle = cut.start_angle * static_cast<double>(cut.done_at - std::min(step, cut.done_at)) / whole;
+}
+
 void World::Impl::closeBlades() {
   for (std::size_t i = 0; i < closing.size();) {
     ClosingCut& c = closing[i];
-    const double whole = static_cast<double>(c.done_at - c.started_at);
-    scissors.blades = c.command.blades;
-    scissors.angle = c.start_angle * static_cast<double>(c.done_at - std::min(step, c.done_at)) / whole;
+    showBlades(c);
     if (step < c.done_at) {
       ++i;
       continue;
@@ -103,6 +107,18 @@ Result<Reply> World::Impl::apply(const OpenScissorsCommand&) {
     finished.emplace(c.ticket, Error{ErrorCode::kMissed, "the scissors were opened before their blades met"});
   closing.clear();
   scissors.shown = false;
+  return Reply(Done{});
+}
+
+Result<Reply> World::Impl::apply(const OpenBladesCommand& command) {
+  const auto found =
+      std::find_if(closing.begin(), closing.end(), [&](const ClosingCut& cut) { return cut.ticket == command.ticket; });
+  if (found == closing.end())
+    return Error{ErrorCode::kMissed, "no blades of the cut " + std::to_string(command.ticket) + " are closing"};
+  finished.emplace(found->ticket, Error{ErrorCode::kMissed, "the blades were opened before they met"});
+  closing.erase(found);
+  scissors.shown = !closing.empty();
+  if (scissors.shown) showBlades(closing.back());
   return Reply(Done{});
 }
 

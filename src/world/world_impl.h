@@ -259,6 +259,7 @@ struct World::Impl {
   Result<Reply> apply(const PushCommand& command);
   Result<Reply> apply(const CutCommand& command);
   Result<Reply> apply(const OpenScissorsCommand& command);
+  Result<Reply> apply(const OpenBladesCommand& command);
   Result<Reply> apply(const LiftCommand& command);
   Result<Reply> apply(const UndoCutCommand& command);
   Result<Reply> apply(const InciseCommand& command);
@@ -312,6 +313,7 @@ struct World::Impl {
   void mendFaults();
   void findWound();
   void closeBlades();
+  void showBlades(const ClosingCut& cut);
   std::vector<WorldBody*> bodiesInContact(double h);
   int substepsNeeded(double h_frame) const;
   double substepNow() const;  // [s]

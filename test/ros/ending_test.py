@@ -12,6 +12,7 @@ import time
 import unittest
 
 import rospy
+from meshless_surgery import Refused, Surgeon, Unanswered
 from shape_msgs.msg import SolidPrimitive
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
@@ -144,10 +145,16 @@ class SignalTest(EndingCase):
             node.good('spawn', name='small', scale=1.0, pose=pose_stamped(0.0, 0.0, 1.0),
                       primitive=SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.1, 0.1, 0.1]))
             self.assertEqual({}, self.answers)
+            heard = []
+            goal = Surgeon(node.name, LONG).spawn_async('large_too', file=self.cloud(), feedback=heard.append)
+            self.until('it does not begin', lambda: any(message.phase == 'reading' for message in heard))
             self.until('no autosave', self.autosaves)
             self.assertEqual(1, node.end(signal.SIGTERM), node.output())
             self.assertIn('such as a body that is being prepared', node.output())
             large.join(LONG)
+            with self.assertRaises((Refused, Unanswered)):  # the message of the first may be lost
+                goal.result(LONG)
+            self.assertIn('aborted the goal ' + goal.id, node.output())
         self.assertEqual([], self.autosaves())
 
     def test_before_the_scene_is_ready(self):

@@ -182,6 +182,99 @@ TEST(Runner, WhoWaitsWhenItStopsIsAnswered) {
   EXPECT_EQ(nullptr, runner.snapshot({}));
 }
 
+TEST(Runner, ACutThatIsCancelledWhilePausedLeavesTheOther) {
+  HandClock hand;
+  WorldRunner runner(twoBoxes(), {}, hand.clock);
+  runner.start();
+  Progress first, second;
+  CutCommand command = cutAcross(0.01);
+  command.close_time = 0.5;
+  command.bodies = {"a"};
+  auto a = std::async(std::launch::async, [&] { return runner.cut(command, &first); });
+  waitUntil([&] { return first.phase() == Progress::Phase::kClosing; });
+  CutCommand other = cutAcross(0.51);
+  other.close_time = 0.5;
+  other.bodies = {"b"};
+  auto b = std::async(std::launch::async, [&] { return runner.cut(other, &second); });
+  waitUntil([&] { return second.phase() == Progress::Phase::kClosing; });
+  ASSERT_TRUE(runner.setPaused(true).ok());
+  EXPECT_FALSE(first.cancel()) << "it has begun: the runner answers";
+  runner.endCancelled();
+  const auto cancelled = a.get();
+  ASSERT_FALSE(cancelled.ok());
+  EXPECT_TRUE(first.ended());
+  EXPECT_NE(std::string::npos, cancelled.error().detail.find("before the blades met")) << cancelled.error().detail;
+  ASSERT_TRUE(runner.doSteps(62).ok());
+  const auto done = b.get();
+  ASSERT_TRUE(done.ok()) << done.error().detail;
+  EXPECT_EQ(std::vector<std::string>{"b"}, done->reply.cut_bodies);
+  EXPECT_FALSE(second.ended());
+  EXPECT_EQ(Progress::Phase::kCutting, second.phase());
+  EXPECT_EQ(1.0, second.closed());
+  EXPECT_EQ(3u, runner.snapshot({})->bodies.size());
+}
+
+struct Told : Progress {
+  void tell() override { told = true; }
+  std::atomic<bool> told{false};
+};
+
+TEST(Runner, StepsThatAreCancelledEndAfterAWholeOneAndLeaveTheNext) {
+  WorldRunner runner(twoBoxes(), pausedAtStart(), wallClock());
+  runner.start();
+  Told first, second;
+  auto a = std::async(std::launch::async, [&] { return runner.doSteps(1u << 30, &first); });
+  waitUntil([&] { return first.stepsDone() > 5; });
+  auto b = std::async(std::launch::async, [&] { return runner.doSteps(20, &second); });
+  waitUntil([&] { return second.told.load(); });  // it waits for the first
+  EXPECT_EQ(0u, second.stepsDone());
+  EXPECT_FALSE(first.cancel());
+  runner.endCancelled();
+  const auto cancelled = a.get();
+  ASSERT_FALSE(cancelled.ok());
+  EXPECT_TRUE(first.ended());
+  ASSERT_TRUE(b.get().ok());
+  EXPECT_EQ(20u, second.stepsDone());
+  EXPECT_EQ(first.stepsDone() + 20, stepCount(runner));
+  EXPECT_NEAR(static_cast<double>(first.stepsDone()) / 120.0, first.simTime(), 1e-9);
+}
+
+TEST(Runner, WhatIsCancelledBeforeItBeginsIsNotDone) {
+  WorldRunner runner(twoBoxes(), pausedAtStart(), wallClock());
+  runner.start();
+  std::uint64_t before = 0, after = 0;
+  ASSERT_TRUE(runner.look([&](World& world) { before = world.stateHash(); }).ok());
+  const auto cancelled = [](Progress& progress) {
+    EXPECT_TRUE(progress.cancel()) << "who cancels is to answer";
+    EXPECT_FALSE(progress.cancel()) << "once";
+    return &progress;
+  };
+  Progress cut, spawn, steps;
+  EXPECT_FALSE(runner.cut(cutAcross(0.01), cancelled(cut)).ok());
+  SpawnCommand command;
+  command.body = softBox("c", Vec3(0, 0, 1));
+  EXPECT_FALSE(runner.apply(command, cancelled(spawn)).ok());
+  EXPECT_FALSE(runner.doSteps(3, cancelled(steps)).ok());
+  for (Progress* progress : {&cut, &spawn, &steps}) {
+    EXPECT_TRUE(progress->ended());
+    EXPECT_FALSE(progress->finish()) << "it has been answered";
+  }
+  ASSERT_TRUE(runner.look([&](World& world) { after = world.stateHash(); }).ok());
+  EXPECT_EQ(before, after);
+}
+
+TEST(Runner, WhatIsDoneCanNotBeCancelled) {
+  WorldRunner runner(twoBoxes(), pausedAtStart(), wallClock());
+  runner.start();
+  Progress progress;
+  ASSERT_TRUE(runner.cut(cutAcross(0.01), &progress).ok());
+  EXPECT_FALSE(progress.cancel());
+  runner.endCancelled();
+  EXPECT_TRUE(progress.finish());
+  EXPECT_FALSE(progress.ended());
+  EXPECT_EQ(3u, runner.snapshot({})->bodies.size());
+}
+
 TEST(Runner, EventsAreHandedOverBeforeTheAnswer) {
   WorldRunner runner(twoBoxes(), pausedAtStart(), wallClock());
   std::mutex mutex;

@@ -87,6 +87,8 @@ Session session(bool ended = true, int threads = 1) {
   run(world, 5);
   apply(OpenScissorsCommand{});
   apply(cut);
+  apply(OpenBladesCommand{2});  // of the second that closes
+  apply(cut);
   run(world, 30);
   InciseCommand incise;
   incise.blade.origin = Vec3(-0.3, 0, 0.5);

@@ -453,6 +453,30 @@ TEST(World, OpeningTheScissorsCallsTheCutOff) {
   EXPECT_FALSE(world.scissors().shown);
 }
 
+TEST(World, OpeningTheBladesOfOneCutLeavesTheOther) {
+  World world = ballWorld();
+  CutCommand cut = cutThrough(Vec3(0, 0, 0.2), Vec3::UnitX());
+  cut.close_time = 0.5;
+  const CutStarted first = replyOf<CutStarted>(world.apply(cut));
+  cut.blades.origin.x() += 0.01;
+  const CutStarted second = replyOf<CutStarted>(world.apply(cut));
+  run(world, 20);
+  EXPECT_EQ(world.apply(OpenBladesCommand{second.ticket + 1}).error().code, ErrorCode::kMissed);
+  replyOf<Done>(world.apply(OpenBladesCommand{second.ticket}));
+  const std::optional<Result<CutReply>> opened = world.finishedCut(second.ticket);
+  ASSERT_TRUE(opened.has_value());
+  EXPECT_EQ(opened->error().code, ErrorCode::kMissed);
+  EXPECT_TRUE(world.scissors().shown);
+  EXPECT_NEAR(0.0, world.scissors().blades.origin.x(), 1e-12) << "the blades of the cut that goes on";
+  run(world, 60);
+  const std::optional<Result<CutReply>> reply = world.finishedCut(first.ticket);
+  ASSERT_TRUE(reply.has_value());
+  ASSERT_TRUE(reply->ok());
+  EXPECT_EQ((*reply)->new_bodies.size(), 2u);
+  EXPECT_FALSE(world.scissors().shown);
+  EXPECT_EQ(world.apply(OpenBladesCommand{first.ticket}).error().code, ErrorCode::kMissed);
+}
+
 TEST(World, AnIncisionOpensABodyAndASecondOneTakesItApart) {
   World world(test::weightless());
   ASSERT_TRUE(world.addSceneBody(test::shared(test::ball("ball", Vec3::Zero()))).ok());

@@ -6,6 +6,7 @@
 
 #include "meshless_surgery/io/cloud_shape.h"
 #include "meshless_surgery/io/scene.h"
+#include "meshless_surgery/ros/progress.h"
 
 namespace meshless {
 
@@ -32,8 +33,9 @@ class BodyLoader {
   /// Relative files are taken from `scene_folder`. Materials by name.
   BodyLoader(FileAccess access, std::string scene_folder, std::map<std::string, Material> materials);
 
-  /// Refuses what io and body refuse, and kUnknownName for a material.
-  Result<std::shared_ptr<const PreparedBody>> load(const SpawnRequest& request) const;
+  /// Refuses what io and body refuse, and kUnknownName for a material. Where `progress` is cancelled it ends after what
+  /// it is at, with kFailed.
+  Result<std::shared_ptr<const PreparedBody>> load(const SpawnRequest& request, Progress* progress = nullptr) const;
 
   /// Its frame is the world's, at the middle of the cloud's surface. `left`: the points that were not filtered away.
   Result<std::shared_ptr<const PreparedBody>> load(const CloudRequest& request, std::size_t& left) const;

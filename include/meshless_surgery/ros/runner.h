@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "meshless_surgery/ros/clock.h"
+#include "meshless_surgery/ros/progress.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless {
@@ -58,16 +59,20 @@ class WorldRunner {
   WorldSettings worldSettings() const;
 
   // Each of these returns when its effect is in force; kFailed once stopped. Not to be called from within a job.
-  Result<Reply> apply(const Command& command);
+  // Those with `progress` say there how far they are. Where it was cancelled before they had begun nothing is done, and
+  // the answer is kFailed.
+  Result<Reply> apply(const Command& command, Progress* progress = nullptr);
   /// Waits until the blades met. While paused they meet at once, as time stands still: close_time is then not used.
-  /// kFailed where kMostClosing others wait already.
+  /// kFailed where kMostClosing others wait already. Blades that are closing can be cancelled.
   struct CutAnswer {
     CutReply reply;
     bool closed_at_once = false;  // though a close time was asked for
   };
-  Result<CutAnswer> cut(CutCommand command);
-  /// Steps without pacing, paused or not; the simulated time after them [s].
-  Result<double> doSteps(std::uint64_t count);
+  Result<CutAnswer> cut(CutCommand command, Progress* progress = nullptr);
+  /// Steps without pacing, paused or not; the simulated time after them [s]. Can be cancelled between two of them.
+  Result<double> doSteps(std::uint64_t count, Progress* progress = nullptr);
+  /// Looks for closing blades and steps whose progress was cancelled meanwhile, and ends them. Does not wait.
+  void endCancelled();
   /// The number of the step that is the next one.
   Result<std::uint64_t> setPaused(bool paused);
   /// Closing blades and steps that are being done are given up: their callers get kFailed.
@@ -95,16 +100,22 @@ class WorldRunner {
   struct ClosingCut {
     std::uint32_t ticket = 0;
     std::promise<Result<CutReply>> done;
+    Progress* progress = nullptr;  // or null; lives until `done` is set
+    double begin = 0.0;            // [s] simulated
+    double close_time = 0.0;       // [s]
   };
   struct OwedSteps {
     std::uint64_t total = 0, left = 0;
     std::promise<Result<double>> done;
+    Progress* progress = nullptr;  // as above
+    std::string doneSoFar() const;
   };
 
   Status run(Job job, bool changes);
   void loop();
   void doJobs();
   void stepOnce();
+  void tellCuts();
   void answerCuts();
   void giveUp(const std::string& why);
   void handOverEvents();

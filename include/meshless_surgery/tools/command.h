@@ -48,6 +48,10 @@ struct CutCommand {
 };
 /// Opens the scissors: cuts whose blades are closing are called off.
 struct OpenScissorsCommand {};
+/// Opens the blades of one cut: it is called off, and the others go on.
+struct OpenBladesCommand {
+  std::uint32_t ticket = 0;  // of its CutStarted
+};
 enum class ToolKind { kPick, kPush, kScissors };
 /// Takes a tool off the tissue: the pick in hand is released, the sphere removed, the scissors hidden (blades that a
 /// service closes go on). An event says why.
@@ -75,7 +79,7 @@ struct RemoveCommand {
 
 using Command = std::variant<PickCommand, MovePickCommand, LockCommand, ReleaseCommand, ClearPicksCommand, PushCommand,
                              CutCommand, OpenScissorsCommand, InciseCommand, SetMaterialCommand, SpawnCommand, RemoveCommand,
-                             LiftCommand, UndoCutCommand>;
+                             LiftCommand, UndoCutCommand, OpenBladesCommand>;
 
 struct PickReply {
   PickId pick = 0;
