@@ -304,10 +304,15 @@ Result<BodySnapshot> World::inspect(const std::string& name, bool rest) {
   b.name = body->name;
   b.material = body->material;
   b.model = body->model;
-  b.surface = rest ? body->model->surface.vertices : body->state.surface;
-  b.particles = rest ? body->model->rest : body->state.positions;
+  b.surface = body->state.surface;
+  b.particles = body->state.positions;
   b.measures = measureBody(*body->model, body->state);
-  if (rest) {
+  if (rest) {  // where it was put: the model's frame may be another one
+    const Pose& placed = body->state.placed;
+    b.surface = body->model->surface.vertices;
+    b.particles = body->model->rest;
+    for (Points* points : {&b.surface, &b.particles})
+      for (Vec3& p : *points) p = placed * p;
     b.measures.volume = body->model->rest_volume;
     b.measures.area = surfaceArea(body->model->surface);
   }

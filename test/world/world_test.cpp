@@ -672,5 +672,34 @@ TEST(World, InspectGivesRestAndPresentShape) {
   EXPECT_GT(now.tetrahedra, 0u);
 }
 
+TEST(World, TheRestShapeIsWhereTheBodyWasPut) {
+  for (const bool elastic : {false, true}) {
+    BodyDef def = test::defOf(boxMesh(Vec3(0.1, 0.06, 0.04), 4, 3, 2), "bar");
+    if (elastic) def.material.youngs_modulus = 5e3;
+    def.pose = {Quat(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized())), Vec3(0.3, -0.2, 0.5)};
+    Points put;
+    for (const Vec3& v : def.mesh.vertices) put.push_back(def.pose * v);
+    World world{WorldSettings()};
+    ASSERT_TRUE(world.addSceneBody(test::shared(def)).ok());
+    for (int cut = 0; cut < 2; ++cut) {
+      run(world, 30);
+      for (const BodySnapshot& body : world.snapshot({}).bodies) {
+        const BodySnapshot rest = *world.inspect(body.name, true);
+        std::size_t found = 0;
+        for (const Vec3& p : rest.surface)
+          found += std::any_of(put.begin(), put.end(), [&](const Vec3& q) { return (p - q).norm() < 1e-12; });
+        EXPECT_GE(found, cut ? put.size() / 4 : put.size()) << body.name << ", elastic " << elastic;
+        Box of_particles, of_surface;
+        for (const Vec3& p : rest.particles) of_particles.extend(p);
+        for (const Vec3& p : rest.surface) of_surface.extend(p);
+        EXPECT_LT((of_particles.min - of_surface.min).norm() + (of_particles.max - of_surface.max).norm(), 0.05);
+      }
+      if (cut > 0) continue;
+      const Vec3 middle = only(world).measures.centre_of_mass;
+      replyOf<CutReply>(world.apply(cutThrough(middle, def.pose.rotation * Vec3::UnitX())));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace meshless

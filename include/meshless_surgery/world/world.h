@@ -197,7 +197,8 @@ class World {
 
   /// Bodies in the order in which they came.
   WorldSnapshot snapshot(const SnapshotWants& wants);
-  /// One body, by name; `rest` gives rest positions for surface and particles. Tetrahedra are made where missing.
+  /// One body, by name; `rest`: surface and particles in the rest shape, where the body was put. Tetrahedra are made
+  /// where missing.
   Result<BodySnapshot> inspect(const std::string& name, bool rest);
   /// The first surface that the ray from `origin` meets; kMissed where it meets none. Nothing changes.
   Result<ProbeReply> probe(const Vec3& origin, const Vec3& direction);
