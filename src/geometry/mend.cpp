@@ -46,7 +46,8 @@ Vec3 toVec(const Kernel::Point_3& p) { return {p.x(), p.y(), p.z()}; }
 Soup toSoup(const TriangleMesh& mesh) {
   Soup soup;
   for (const Vec3& p : mesh.vertices) soup.first.emplace_back(p.x(), p.y(), p.z());
-  for (const Triangle& t : mesh.triangles) soup.second.push_back({t[0], t[1], t[2]});
+  for (const Triangle& t : mesh.triangles)  // CGAL's repair of triangles (CGAL 5.5) takes none with a vertex twice
+    if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) soup.second.push_back({t[0], t[1], t[2]});
   return soup;
 }
 
