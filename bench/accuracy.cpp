@@ -71,7 +71,7 @@ double difference(const StaticResult& a, const StaticResult& b) {
   return std::sqrt(squares / static_cast<double>(a.samples.size())) / a.largest;
 }
 
-// Materials for accuracy: nothing to calibrate. The run time is that of one substep. `fem` is the error against the
+// Elastic materials: nothing to calibrate. The run time is that of one substep. `fem` is the error against the
 // truth, `self` that against our own finest solution: what is left of `fem` there is the model's.
 bool elasticRows(Table& table, const std::string& folder, const std::vector<double>& spacings) {
   for (const char* load : kLoads)
@@ -163,9 +163,9 @@ bool settledRows(Table& table, const std::string& folder, const std::string& par
   return true;
 }
 
-// Materials for looks: one scalar, fitted to the small cantilever; what is left there, and on the other loads, is the
+// Appearance materials: one scalar, fitted to the small cantilever; what is left there, and on the other loads, is the
 // model's own error.
-bool looksRows(Table& table, const std::string& folder, double spacing) {
+bool appearanceRows(Table& table, const std::string& folder, double spacing) {
   struct Variant {
     MatchMode mode;
     ClusterOptions clusters;
@@ -189,7 +189,7 @@ bool looksRows(Table& table, const std::string& folder, double spacing) {
       settings.clusters = variant.clusters;
       settings.material.mode = variant.mode;
       settings.material.beta = variant.mode == MatchMode::kRigid ? 0.0 : 0.5;
-      settings.looks_rate = std::exp(logarithm);
+      settings.appearance_rate = std::exp(logarithm);
       settings.max_steps = 6000;
       return solveStatic(*truth, folder, settings);
     };
@@ -205,7 +205,7 @@ bool looksRows(Table& table, const std::string& folder, double spacing) {
         low = a;
     }
     const double best = 0.5 * (low + high);
-    // The truth's bodies are of different stiffness; a scalar for looks goes with it.
+    // The truth's bodies are of different stiffness; the scalar of an appearance material goes with it.
     const Result<TruthCase> fitted = readTruthCase(folder + "/bar_cantilever_small_nu30.csv");
     for (const char* load :
          {"bar_cantilever_small", "bar_cantilever_large", "bar_pull", "bar_stretch_150", "bar_torsion"}) {
@@ -351,7 +351,7 @@ int main(int argc, char** argv) {
   if (!settledRows(table, truth, "", quick ? std::vector<double>{1.0} : std::vector<double>{1.0, 1.26, 1.59, 2.0}))
     return 1;
   if (!elasticRows(table, truth, spacings)) return 1;
-  if (!quick && !looksRows(table, truth, 0.0125)) return 1;
+  if (!quick && !appearanceRows(table, truth, 0.0125)) return 1;
   lawRows(table, quick ? 500 : 10000,
           quick ? std::vector<double>{60.0, 240.0} : std::vector<double>{60, 120, 240, 480, 960});
   squeezeRows(table);

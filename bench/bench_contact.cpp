@@ -3,7 +3,7 @@
 // bullet_vf/N and bullet_cl/N are Bullet's soft bodies from the same places in the same process (contact_bullet.h),
 // textbook/N the paper's method, asleep/1000 the pile after it fell asleep and awake/1000 the same pile kept awake,
 // sweep/N and sweep_bullet_*/N the growth with the number of bodies. Counters: `deepest` and `p99` penetration relative
-// to the cubes' size, `height` relative to ideal stacks, `contacts` and `lookups` a frame, `contact_ms` and `match_ms`
+// to the cubes' size, `height` relative to ideal stacks, `contacts` and `queries` a frame, `contact_ms` and `match_ms`
 // of the frame, `ns_a_contact` the time of all of a frame's contact over its contacts and substeps, `exponent` of a
 // sweep (least squares of log time over log N, on its last row). after_cut/*: by how much the first step after the cut
 // of a ball on a bed takes longer than those before, the median of five; `before_ms`, `first_ms` and `next_ms`
@@ -93,7 +93,7 @@ void runPile(benchmark::State& state, const std::string& name, const PileOptions
     World world = makePile(options);
     for (int n = 0; n < kSettling; ++n) world.step();
     std::vector<double> contact, match;
-    double contacts = 0.0, lookups = 0.0, contact_work = 0.0;
+    double contacts = 0.0, queries = 0.0, contact_work = 0.0;
     Row row;
     row.bodies = options.bodies;
     std::vector<double> totals;
@@ -105,14 +105,14 @@ void runPile(benchmark::State& state, const std::string& name, const PileOptions
       const ContactCounters& c = report.contact_counters;
       contacts +=
           static_cast<double>(options.contact == ContactMethod::kTextbook ? c.penetrating : c.contacts) / kMeasured;
-      lookups += static_cast<double>(c.lookups) / kMeasured;
+      queries += static_cast<double>(c.queries) / kMeasured;
       contact_work += static_cast<double>(c.contacts) * static_cast<double>(report.substeps) / kMeasured;
     }
     row.ms = median(totals);
     row.contacts = contacts;
     row.measures = measurePile(options, world);
     state.SetIterationTime(1e-3 * row.ms);
-    state.counters["lookups"] = lookups;
+    state.counters["lookups"] = queries;
     state.counters["contact_ms"] = median(contact);
     state.counters["match_ms"] = median(match);
     if (contact_work > 0.0) state.counters["ns_a_contact"] = 1e6 * median(contact) / contact_work;

@@ -1,7 +1,7 @@
 // Run time of an incision's geometry: half through, into surfaces of about 10,000 triangles.
-// <shape>/half opens a fresh surface; <shape>/cross opens one that has a mouth already, across it; <shape>/full goes
+// <shape>/half opens a fresh surface; <shape>/cross opens one across an incision that it has already; <shape>/full goes
 // through. real_time is one incision; `triangles` are those of the surface, `lip_points` the new inner points of the
-// lips, `area` [m^2] what was opened.
+// wound faces, `area` [m^2] what was opened.
 #include <algorithm>
 #include <cmath>
 #include <string>

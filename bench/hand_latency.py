@@ -141,7 +141,7 @@ def main():
         def force(message):
             return message.wrench.force
 
-        def felt(one, other):
+        def force_changed(one, other):
             return math.dist((one.x, one.y, one.z), (other.x, other.y, other.z)) > FORCE_CHANGE
 
         def shown_in_surfaces(message):
@@ -153,7 +153,7 @@ def main():
 
         def moved(one, other):
             return abs(one - other) > 0.25 * MOVE
-        for topic, kind, value, shows in (('pick/measured_cf', WrenchStamped, force, felt),
+        for topic, kind, value, shows in (('pick/measured_cf', WrenchStamped, force, force_changed),
                                           ('surfaces', Surfaces, shown_in_surfaces, moved),
                                           ('markers', MarkerArray, shown_in_markers, moved)):
             watch = Watch(node + '/' + topic, kind, value, shows)

@@ -27,8 +27,8 @@ double patchError(const Kind& kind, bool in_float, double scale, double far);
 struct Drift {
   double linear = 0.0;  // of the momentum, relative, per step
   double angular = 0.0;
-  double energy = 0.0;  // largest rise of the kinetic energy above its start, relative to it (looks: at release from
-                        // the rest shape, all energy is kinetic)
+  double energy = 0.0;  // largest rise of the kinetic energy above its start, relative to it (of appearance
+                        // materials: at release from the rest shape, all energy is kinetic)
 };
 /// Of a free cloud of random overlapping clusters that spins and rings.
 Drift momentumDrift(const Kind& kind, bool in_float, int steps);
@@ -47,7 +47,7 @@ struct Ringing {
   int half_waves = 0;      // seen
 };
 /// Of a free block's length after a stretch of 4 %, in frames of 1/rate [s] and the substeps that the material needs.
-/// Looks: omega h = 0.1 at 1/60 s.
+/// Appearance materials: omega h = 0.1 at 1/60 s.
 Ringing ringing(const Kind& kind, double rate);
 /// [m] of the free end of a block held at the other, at rest.
 double sag(const Kind& kind, double rate);

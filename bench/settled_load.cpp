@@ -141,7 +141,7 @@ Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, 
   fitClusters(matchInput(*model), after.particles, poses);  // for levers
   double squares = 0.0, area = 0.0;
   for (Index s = 0; s < truth.rest.size(); ++s) {
-    const Vec3 now = riderPosition(samples, after.particles, poses, s);
+    const Vec3 now = embeddedPosition(samples, after.particles, poses, s);
     const Vec3 moved = pose.rotation.conjugate() * (now - pose.translation) - truth.rest[s];
     squares += areas[s] * (moved - truth.displacement[s]).squaredNorm();
     area += areas[s];

@@ -149,7 +149,7 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
   MatchCounters counters;
   const ElasticParameters parameters =
       elasticParameters(material.youngs_modulus, material.poissons_ratio, material.density);
-  const double rate = settings.looks_rate;
+  const double rate = settings.appearance_rate;
   const double h = material.elastic() ? 0.6 / model.highest_frequency : 0.5 / rate;
   ElasticBatchState state;
   if (material.elastic()) model.elastic_batch->setRotations(poses, state);
@@ -219,7 +219,7 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
   result.step_ms = times[times.size() / 2];
 
   if (material.elastic()) model.elastic_batch->getRotations(state, poses);
-  fitClusters(matchInput(model), x, poses);  // for riders
+  fitClusters(matchInput(model), x, poses);  // for embedded vertices
   SurfaceBinding samples;
   if (model.lattice) {
     const CellFinder finder(*model.lattice);
@@ -237,7 +237,7 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
   }
   double squares = 0.0;
   for (Index s = 0; s < truth.rest.size(); ++s) {
-    result.samples.push_back(riderPosition(samples, x, poses, s));
+    result.samples.push_back(embeddedPosition(samples, x, poses, s));
     squares += (result.samples.back() - truth.rest[s] - truth.displacement[s]).squaredNorm();
   }
   result.largest = largest;

@@ -10,8 +10,8 @@ struct StaticSettings {
   double spacing = 0.0125;  // [m] between particles
   ClusterOptions clusters;  // cells, unless another kind is tried
   CellFill cells = CellFill::kWhole;
-  Material material;        // elastic: E, nu and density are taken from the case; else as it is, for looks
-  double looks_rate = 0.0;  // [rad/s] of a material for looks: accelerations are looks_rate^2 (goal - x)
+  Material material;             // elastic: E, nu and density are taken from the case; else as it is
+  double appearance_rate = 0.0;  // [rad/s] of an appearance material: accelerations are appearance_rate^2 (goal - x)
   int max_steps = 60000;
   double rest = 1e-6;  // of the largest displacement, per characteristic time: then it is at rest
 };

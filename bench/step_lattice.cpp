@@ -51,7 +51,7 @@ Points positionsOf(const Batch& batch) {
 
 template <class Batch>
 void runLattice(benchmark::State& state, const Plain& body, InstructionSet set, bool two_threads) {
-  const Material material = lookOf(MatchMode::kLinear);
+  const Material material = appearanceOf(MatchMode::kLinear);
   BatchStep step = stepOf(material);
   step.set = set;
   Batch batch(matchInput(body.model));
@@ -85,7 +85,7 @@ void runLattice(benchmark::State& state, const Plain& body, InstructionSet set, 
 }
 
 void runPlainLattice(benchmark::State& state, const Plain& from) {
-  const Material material = lookOf(MatchMode::kLinear);
+  const Material material = appearanceOf(MatchMode::kLinear);
   const BatchStep step = stepOf(material);
   Plain body = from;
   int steps = 0;

@@ -1,4 +1,4 @@
-// Frames of the world: a liver with its ligament held, and a body with and without a fine surface that rides on it.
+// Frames of the world: a liver with its ligament held, and a body with and without a fine surface embedded in it.
 #include <algorithm>
 
 #include "meshless_surgery/geometry/organs.h"
@@ -56,7 +56,7 @@ std::shared_ptr<const PreparedBody> makeBall(bool elastic, bool surface) {
   model.solid = false;
   without.model = std::make_shared<BodyModel>(std::move(model));
   without.state.surface.clear();
-  without.state.rider_offsets.clear();
+  without.state.embedded_offsets.clear();
   return std::make_shared<PreparedBody>(std::move(without));
 }
 
@@ -88,11 +88,11 @@ void runFrames(benchmark::State& state, const std::shared_ptr<const PreparedBody
   state.counters["substeps"] = substeps / frames;
   state.counters["particles"] = static_cast<double>(body->model->rest.size());
   state.counters["triangles"] = static_cast<double>(body->model->surface.triangles.size());
-  state.counters["riders"] = static_cast<double>(body->model->binding.riders.size());
+  state.counters["riders"] = static_cast<double>(body->model->binding.embedded.size());
 }
 
 // The same body in a plain loop on elasticAccelerations(), with the substeps that the world takes and without the
-// ground, its riders or anything else to meet.
+// ground, its embedded vertices or anything else to meet.
 void runPlainLiver(benchmark::State& state, const std::shared_ptr<const PreparedBody>& liver) {
   if (!liver) return state.SkipWithError("the body could not be prepared");
   Plain body;

@@ -70,7 +70,7 @@ int sameOnOneThread(Pile& pile, const BatchStep& step, const ForEach& for_each) 
 }
 
 void runPile(benchmark::State& state, Pile& pile, MatchMode mode, InstructionSet set, bool two_threads) {
-  const Material material = lookOf(mode);
+  const Material material = appearanceOf(mode);
   BatchStep step = stepOf(material);
   step.set = set;
   MatchCounters counters;
@@ -103,7 +103,7 @@ void runPile(benchmark::State& state, Pile& pile, MatchMode mode, InstructionSet
 }
 
 void runPlainPile(benchmark::State& state, const Pile& pile, MatchMode mode) {
-  const Material material = lookOf(mode);
+  const Material material = appearanceOf(mode);
   const BatchStep step = stepOf(material);
   std::vector<Plain> bodies = pile.bodies;
   int steps = 0;

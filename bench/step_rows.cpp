@@ -115,7 +115,7 @@ void throwIn(Plain& body, Engine& engine, double height, double spin) {
   for (ClusterPose& pose : body.state.poses) pose.rotation = turn;
 }
 
-Material lookOf(MatchMode mode) {
+Material appearanceOf(MatchMode mode) {
   Material material;
   material.mode = mode;
   material.alpha = 0.5;

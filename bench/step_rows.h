@@ -73,7 +73,7 @@ void addLattice(int n, BodyModel& model);
 // In the air, turned and in motion, a little out of shape.
 void throwIn(Plain& body, Engine& engine, double height, double spin);
 
-Material lookOf(MatchMode mode);
+Material appearanceOf(MatchMode mode);
 BatchStep stepOf(const Material& material);
 
 // The substep of matchAndMove() for an elastic material on elasticAccelerations(), and land().

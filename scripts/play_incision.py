@@ -27,10 +27,10 @@ def scenario(surgeon, play):
         surgeon.lock(pick.pick_id, (p.x, p.y + 0.012 * side, p.z))
     surgeon.live(3.0)
     spread = surgeon.body("skin")
-    lips = [[v for v in spread.surface.vertices if abs(v.x) < 0.004 and side * v.y > 0 and v.z > top - 0.004]
-            for side in (-1, 1)]
-    gap = min(distance(a, b) for a in lips[0] for b in lips[1])
-    play.check(gap > 0.006, "spread by two locks its lips are %.1f mm apart" % (1e3 * gap))
+    wound_faces = [[v for v in spread.surface.vertices if abs(v.x) < 0.004 and side * v.y > 0 and v.z > top - 0.004]
+                   for side in (-1, 1)]
+    gap = min(distance(a, b) for a in wound_faces[0] for b in wound_faces[1])
+    play.check(gap > 0.006, "spread by two locks its wound faces are %.1f mm apart" % (1e3 * gap))
     held = [p.force.y for p in surgeon.state().picks]
     play.check(len(held) == 2 and all(abs(f) > 0.01 for f in held), "they hold it with %s N" % ", ".join(
         "%.2f" % abs(f) for f in held))

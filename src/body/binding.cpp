@@ -20,11 +20,11 @@ namespace meshless {
 namespace {
 
 constexpr std::size_t kCarriers = 12;
-constexpr std::size_t kEnoughCarriers = 9;    // left of a rider's by a cut: no others are looked for
-constexpr std::size_t kMostCarriers = 40;     // of a rider that twelve would amplify
+constexpr std::size_t kEnoughCarriers = 9;    // that a cut leaves of a vertex: no others are searched for
+constexpr std::size_t kMostCarriers = 40;     // of a vertex that twelve would amplify
 constexpr double kSoft[] = {0.01, 0.1, 1.0};  // the softer, the less do the nearest carriers outweigh the others
-constexpr std::size_t kChunk = 64;            // riders
-constexpr std::size_t kWalk = 64;             // particles looked at around the nearest one, along the body
+constexpr std::size_t kChunk = 64;            // embedded vertices
+constexpr std::size_t kWalk = 64;             // particles tried around the nearest one, along the body
 constexpr double kLever = 1e-9;               // of the distance to the farthest carrier: less is rounding
 constexpr double kRank = 0.03;  // of the moment's eigenvalues to the largest: below it, extrapolation is wild
 
@@ -100,7 +100,7 @@ void leastSquaresWeights(const Points& rest, const Vec3& p, const std::vector<In
   found = share + low * beyond;
 }
 
-// Looks for the carriers of riders, one after the other.
+// Finds the carriers of embedded vertices, one after the other.
 class Binder {
  public:
   struct Task {
@@ -115,15 +115,15 @@ class Binder {
   explicit Binder(const Task& task)
       : task_(task), seen_(task.rest.size(), kNoIndex), walk_of_(task.rest.size(), kNoIndex) {}
 
-  /// From here on riders are bound into `part`, without particle and riders.
-  void begin(std::size_t riders, SurfaceBinding& part) {
+  /// From here on vertices are bound into `part`; its `particle` and `embedded` stay empty.
+  void begin(std::size_t count, SurfaceBinding& part) {
     part_ = &part;
-    part.offsets.reserve(riders + 1);
+    part.offsets.reserve(count + 1);
     part.offsets.push_back(0);
-    part.levers.reserve(riders);
-    part.turners.reserve(riders);
-    part.carriers.reserve(kCarriers * riders);
-    part.weights.reserve(kCarriers * riders);
+    part.levers.reserve(count);
+    part.turners.reserve(count);
+    part.carriers.reserve(kCarriers * count);
+    part.weights.reserve(kCarriers * count);
   }
 
   void bind(Index v) {
@@ -152,7 +152,7 @@ class Binder {
   }
 
   bool inherit(Index v) {
-    const Index r = task_.inherited ? task_.inherited->rider[v] : kNoIndex;
+    const Index r = task_.inherited ? task_.inherited->embedded[v] : kNoIndex;
     if (r == kNoIndex) return false;
     const SurfaceBinding& parent = task_.inherited->parent;
     near_.clear();
@@ -167,7 +167,7 @@ class Binder {
 
   /// What a cut left of the carriers, where that is enough.
   bool keepMost(Index v) {
-    const Index r = task_.inherited ? task_.inherited->rider[v] : kNoIndex;
+    const Index r = task_.inherited ? task_.inherited->embedded[v] : kNoIndex;
     if (r == kNoIndex || task_.inherited->separated) return false;
     const SurfaceBinding& parent = task_.inherited->parent;
     near_.clear();
@@ -176,10 +176,10 @@ class Binder {
     return near_.size() >= kEnoughCarriers;
   }
 
-  /// A particle that the rider may follow, the nearest along the body.
+  /// The particle nearest to the vertex along the body that it may follow.
   Index startOf(Index v) {
     const Vec3& p = task_.surface_rest[v];
-    if (const Index r = task_.inherited ? task_.inherited->rider[v] : kNoIndex; r != kNoIndex) {
+    if (const Index r = task_.inherited ? task_.inherited->embedded[v] : kNoIndex; r != kNoIndex) {
       // Carriers are sorted by distance: the first that is left is the nearest.
       const SurfaceBinding& parent = task_.inherited->parent;
       for (Index k = parent.offsets[r]; k < parent.offsets[r + 1]; ++k)
@@ -192,8 +192,8 @@ class Binder {
         return climbFrom(known, v);
     if (task_.inherited && task_.inherited->separated) {
       std::array<Index, kWalk> near;
-      for (const std::size_t looked : {std::size_t{4}, kWalk}) {
-        const std::size_t count = task_.nearest().nearest(p, looked, near.data());
+      for (const std::size_t most : {std::size_t{4}, kWalk}) {
+        const std::size_t count = task_.nearest().nearest(p, most, near.data());
         for (std::size_t k = 0; k < count; ++k)
           if (!isSeparated(v, near[k])) return near[k];
       }
@@ -201,7 +201,7 @@ class Binder {
     return task_.nearest().nearest(p);
   }
 
-  // Particles around one, by steps along the graph, the nearest first. The next rider starts there too.
+  // Particles around one, by steps along the graph, the nearest first. The next vertex starts there too.
   struct Walk {
     std::size_t count = 0;
     std::array<std::pair<double, Index>, kWalk> found;  // [m] from the first
@@ -249,7 +249,7 @@ class Binder {
     return nearest;
   }
 
-  // The nearest to the rider in order, up to `most` of those that it may follow.
+  // The particles nearest to the vertex in order, up to `most` of those that it may follow.
   void choose(Index v, const Walk& walk, std::size_t most) {
     const Vec3& p = task_.surface_rest[v];
     const double aside = (task_.rest[walk.found[0].second] - p).norm();
@@ -322,8 +322,8 @@ SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const
   binding.particle = std::move(vertex_particle);
   binding.offsets.push_back(0);
   for (Index v = 0; v < surface_rest.size(); ++v)
-    if (binding.particle[v] == kNoIndex) binding.riders.push_back(v);
-  if (binding.riders.empty()) return binding;
+    if (binding.particle[v] == kNoIndex) binding.embedded.push_back(v);
+  if (binding.embedded.empty()) return binding;
 
   std::vector<Index> cluster_of(rest.size(), 0);
   for (Index c = clusters.size(); c-- > 0;)
@@ -334,16 +334,16 @@ SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const
                             std::call_once(once, [&] { nearest.emplace(rest); });
                             return *nearest;
                           }};
-  const std::size_t riders = binding.riders.size();
-  std::vector<SurfaceBinding> parts((riders + kChunk - 1) / kChunk);
+  const std::size_t count = binding.embedded.size();
+  std::vector<SurfaceBinding> parts((count + kChunk - 1) / kChunk);
   tbb::enumerable_thread_specific<Binder> binders([&] { return Binder(task); });
-  inChunks(riders, kChunk, [&](std::size_t from, std::size_t to) {
+  inChunks(count, kChunk, [&](std::size_t from, std::size_t to) {
     Binder& binder = binders.local();
     binder.begin(to - from, parts[from / kChunk]);
-    for (std::size_t r = from; r < to; ++r) binder.bind(binding.riders[r]);
+    for (std::size_t r = from; r < to; ++r) binder.bind(binding.embedded[r]);
   });
-  binding.carriers.reserve(kCarriers * riders);
-  binding.weights.reserve(kCarriers * riders);
+  binding.carriers.reserve(kCarriers * count);
+  binding.weights.reserve(kCarriers * count);
   for (const SurfaceBinding& part : parts) appendPart(part, binding);
   std::sort(binding.lever_clusters.begin(), binding.lever_clusters.end());
   binding.lever_clusters.erase(std::unique(binding.lever_clusters.begin(), binding.lever_clusters.end()),

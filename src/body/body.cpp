@@ -80,12 +80,12 @@ void updateSurface(const BodyModel& model, BodyState& state) {
     if (model.binding.particle[v] != kNoIndex) state.surface[v] = state.positions[model.binding.particle[v]];
   std::vector<ClusterPose> poses;
   if (!model.binding.lever_clusters.empty()) {
-    poses = state.poses;  // a copy: a step's warm start must not depend on who looks
+    poses = state.poses;  // a copy: a step's warm start must not depend on when the surface is read
     fitClusters(matchInput(model, state), state.positions, model.binding.lever_clusters, poses);
   }
-  for (Index r = 0; r < model.binding.riders.size(); ++r)
-    state.surface[model.binding.riders[r]] =
-        riderPosition(model.binding, state.positions, poses, r) + state.rider_offsets[r];
+  for (Index r = 0; r < model.binding.embedded.size(); ++r)
+    state.surface[model.binding.embedded[r]] =
+        embeddedPosition(model.binding, state.positions, poses, r) + state.embedded_offsets[r];
 }
 
 BodyMeasures measureBody(const BodyModel& model, const BodyState& state) {

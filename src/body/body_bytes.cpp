@@ -14,12 +14,12 @@ std::size_t bytesOf(const BodyModel& model) {
          (model.cells ? bytesOf(model.cells->cells, model.cells->masses) : 0) +
          (model.elastic_batch ? model.elastic_batch->bytes() : 0) +
          bytesOf(model.surface.vertices, model.surface.triangles, model.surface.patches) +
-         bytesOf(binding.particle, binding.riders, binding.offsets, binding.carriers, binding.weights, binding.levers,
+         bytesOf(binding.particle, binding.embedded, binding.offsets, binding.carriers, binding.weights, binding.levers,
                  binding.turners, binding.lever_clusters);
 }
 
 std::size_t bytesOf(const BodyState& state) {
-  return bytesOf(state.positions, state.velocities, state.poses, state.surface, state.plastic, state.rider_offsets,
+  return bytesOf(state.positions, state.velocities, state.poses, state.surface, state.plastic, state.embedded_offsets,
                  state.eased);
 }
 

@@ -85,8 +85,8 @@ std::vector<int> assignParticles(const BodyModel& model, const BodyState& state,
 CutWork& CutWork::operator+=(const CutWork& other) {
   new_vertices += other.new_vertices;
   new_triangles += other.new_triangles;
-  bound_riders += other.bound_riders;
-  kept_riders += other.kept_riders;
+  bound_embedded += other.bound_embedded;
+  kept_embedded += other.kept_embedded;
   kept_clusters += other.kept_clusters;
   rebuilt_clusters += other.rebuilt_clusters;
   return *this;

@@ -21,8 +21,8 @@ namespace {
 
 constexpr double kCrumb = 1.0 / 64.0;  // of a cell, for a piece of it that no sample sees
 
-// What is known of a vertex of a piece before its new cell is.
-struct Rider {
+// A vertex of a piece whose new cell is not known yet.
+struct EmbeddedVertex {
   Vec3 rest;  // [m]
   Index was;  // the parent's cell that it followed
   bool made;  // by this blade
@@ -69,11 +69,11 @@ class CellCutter {
   }
 
   Result<std::vector<BodyPiece>> run(std::uint32_t new_patch, CutWork& work) {
-    riders_.resize(sources_.size());
+    embedded_.resize(sources_.size());
     for (std::size_t p = 0; p < sources_.size(); ++p)
       for (Index v = 0; v < sources_[p].origins.size(); ++v) {
-        riders_[p].push_back(riderOf(p, v));
-        if (riders_[p].back().was != kNoIndex) continue;
+        embedded_[p].push_back(embeddedOf(p, v));
+        if (embedded_[p].back().was != kNoIndex) continue;
         std::ostringstream text;
         text << "the blade made a point at " << sources_[p].mesh.vertices[v].transpose()
              << " that lies in none of its cells";
@@ -95,26 +95,27 @@ class CellCutter {
 
   // --- where vertices come from
 
-  Rider riderOf(std::size_t p, Index v) {
+  EmbeddedVertex embeddedOf(std::size_t p, Index v) {
     const VertexOrigins& origins = sources_[p].origins;
-    Rider rider{Vec3::Zero(), kNoIndex, origins.same(v) == kNoIndex};
+    EmbeddedVertex embedded{Vec3::Zero(), kNoIndex, origins.same(v) == kNoIndex};
     if (origins.insideCap(v)) return insideOf(sources_[p].mesh.vertices[v]);
     const VertexOrigin origin = origins[v];
     double most = -1.0;
     for (int k = 0; k < 4; ++k) {
       if (origin.parents[k] == kNoIndex) continue;
-      rider.rest += origin.weights[k] * model_.surface.vertices[origin.parents[k]];
+      embedded.rest += origin.weights[k] * model_.surface.vertices[origin.parents[k]];
       if (origin.weights[k] <= most) continue;
       most = origin.weights[k];
-      rider.was = model_.binding.turners[origin.parents[k]];
+      embedded.was = model_.binding.turners[origin.parents[k]];
     }
-    if (!rider.made) rider.rest = model_.surface.vertices[origin.parents[0]];
-    return rider;
+    if (!embedded.made) embedded.rest = model_.surface.vertices[origin.parents[0]];
+    return embedded;
   }
 
   // By the inverse of the map of the cell whose samples are nearest. Both sides of a cut get the same place.
-  Rider insideOf(const Vec3& q) {
-    const auto [known, is_new] = inside_.emplace(std::array<double, 3>{q.x(), q.y(), q.z()}, Rider{q, kNoIndex, true});
+  EmbeddedVertex insideOf(const Vec3& q) {
+    const auto [known, is_new] =
+        inside_.emplace(std::array<double, 3>{q.x(), q.y(), q.z()}, EmbeddedVertex{q, kNoIndex, true});
     if (!is_new) return known->second;
     if (boxes_.empty())
       for (Index c = 0; c < before_.cells.size(); ++c) {
@@ -187,17 +188,17 @@ class CellCutter {
 
   // The cell of vertex v of source p, among those of `piece` (any where it is negative).
   Index cellOf(const CellFinder& finder, std::size_t p, Index v, int piece) {
-    const Rider& rider = riders_[p][v];
+    const EmbeddedVertex& embedded = embedded_[p][v];
     const auto in_piece = [&](Index c) { return piece < 0 || piece_of_[component_[c]] == piece; };
-    const std::vector<Index>& copies = children_[rider.was];
+    const std::vector<Index>& copies = children_[embedded.was];
     if (copies.size() == 1 && !cut_.changed[copies[0]] && in_piece(copies[0])) return copies[0];
     const int side = sources_[p].side[v];
     const Vec3& q = sources_[p].mesh.vertices[v];
-    if (side == 0)  // a buried front rides on what holds the two sides together
-      for (const Index c : finder.at(cut_.lattice.placeOf(rider.rest)))
-        if (cells()[c].isBridge(c) && together(cut_.parent_cell[c], rider.was) && in_piece(c)) return c;
-    return finder.carrier(rider.rest, [&](Index c) {
-      return in_piece(c) && together(cut_.parent_cell[c], rider.was) ? seen(c, q, side) : kNoSample;
+    if (side == 0)  // a buried front is embedded in what holds the two sides together
+      for (const Index c : finder.at(cut_.lattice.placeOf(embedded.rest)))
+        if (cells()[c].isBridge(c) && together(cut_.parent_cell[c], embedded.was) && in_piece(c)) return c;
+    return finder.carrier(embedded.rest, [&](Index c) {
+      return in_piece(c) && together(cut_.parent_cell[c], embedded.was) ? seen(c, q, side) : kNoSample;
     });
   }
 
@@ -216,8 +217,8 @@ class CellCutter {
     std::vector<std::map<int, int>> votes(names.size());
     const CellFinder finder(cut_.lattice);
     for (std::size_t p = 0; p < sources_.size(); ++p)
-      for (Index v = 0; v < riders_[p].size(); ++v) {
-        if (riders_[p][v].made) continue;
+      for (Index v = 0; v < embedded_[p].size(); ++v) {
+        if (embedded_[p][v].made) continue;
         const Index c = cellOf(finder, p, v, -1);
         if (c != kNoIndex) ++votes[component_[c]][static_cast<int>(p)];
       }
@@ -267,10 +268,10 @@ class CellCutter {
     std::map<std::pair<std::size_t, Index>, Index> crumbs;
     carriers_.resize(sources_.size());
     for (std::size_t p = 0; p < sources_.size(); ++p)
-      for (Index v = 0; v < riders_[p].size(); ++v) {
+      for (Index v = 0; v < embedded_[p].size(); ++v) {
         Index c = cellOf(finder, p, v, static_cast<int>(p));
         if (c == kNoIndex) {
-          const Index was = withMass(riders_[p][v].was);
+          const Index was = withMass(embedded_[p][v].was);
           const auto [known, is_new] = crumbs.emplace(std::make_pair(p, was), static_cast<Index>(cells().size()));
           c = known->second;
           if (is_new) addCrumb(was, static_cast<int>(p));
@@ -389,7 +390,7 @@ class CellCutter {
     const auto partOf = [&](Index c) { return parts.find(component_[c]); };
     if (mine.empty() || std::all_of(mine.begin(), mine.end(), [&](Index c) { return partOf(c) == partOf(mine[0]); }))
       return false;
-    // The smallest part looks for another: breadth first over the parent's cells.
+    // The smallest part finds another: breadth first over the parent's cells.
     std::map<Index, int> sizes;
     for (const Index c : mine) ++sizes[partOf(c)];
     const Index lost = std::min_element(sizes.begin(), sizes.end(), [](const auto& a, const auto& b) {
@@ -457,10 +458,10 @@ class CellCutter {
     child->solid = true;
     child->spacing = model_.spacing;
     child->next_patch = model_.next_patch + 1;
-    child->lips = model_.lips || !gate_.unbounded();
+    child->incised = model_.incised || !gate_.unbounded();
     child->surface.triangles = from.mesh.triangles;
     child->surface.patches = from.mesh.patches;
-    for (const Rider& rider : riders_[p]) child->surface.vertices.push_back(rider.rest);
+    for (const EmbeddedVertex& embedded : embedded_[p]) child->surface.vertices.push_back(embedded.rest);
     child->rest_volume = signedVolume(child->surface);
     child->rest_area = surfaceArea(child->surface);
 
@@ -513,18 +514,18 @@ class CellCutter {
     std::vector<Index> carriers;
     for (const Index c : carriers_[p]) carriers.push_back(renumbered[c]);
     child->binding = bindToCells(*lattice, child->surface.vertices, carriers);
-    for (const Rider& rider : riders_[p]) {
-      ++(rider.made ? work.bound_riders : work.kept_riders);
-      work.new_vertices += rider.made;
+    for (const EmbeddedVertex& embedded : embedded_[p]) {
+      ++(embedded.made ? work.bound_embedded : work.kept_embedded);
+      work.new_vertices += embedded.made;
     }
     for (const std::uint32_t patch : from.mesh.patches) work.new_triangles += patch == new_patch;
     piece.state.surface = from.mesh.vertices;
     piece.state.stretch = state_.stretch;
     piece.state.swelling = state_.swelling;
     piece.state.placed = state_.placed;
-    for (Index r = 0; r < child->binding.riders.size(); ++r)
-      piece.state.rider_offsets.push_back(from.mesh.vertices[r] -
-                                          riderPosition(child->binding, piece.state.positions, piece.state.poses, r));
+    for (Index r = 0; r < child->binding.embedded.size(); ++r)
+      piece.state.embedded_offsets.push_back(
+          from.mesh.vertices[r] - embeddedPosition(child->binding, piece.state.positions, piece.state.poses, r));
     piece.model = std::move(child);
     return piece;
   }
@@ -579,10 +580,10 @@ class CellCutter {
   const std::vector<CellPieceSource>& sources_;
   const CellLattice& before_;
   CutLattice cut_;
-  std::vector<std::vector<Index>> children_;  // of each of the parent's cells
-  std::vector<Points> sample_sides_;          // present places of a cell's samples, once asked for
-  std::vector<std::vector<Rider>> riders_;    // of each source
-  std::map<std::array<double, 3>, Rider> inside_;
+  std::vector<std::vector<Index>> children_;           // of each of the parent's cells
+  std::vector<Points> sample_sides_;                   // present places of a cell's samples, once asked for
+  std::vector<std::vector<EmbeddedVertex>> embedded_;  // of each source
+  std::map<std::array<double, 3>, EmbeddedVertex> inside_;
   std::vector<std::pair<Box, Index>> boxes_;  // present, of the parent's cells near the blade's plane
   std::vector<Index> component_;              // of each cell
   std::vector<int> piece_of_;                 // of each component

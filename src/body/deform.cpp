@@ -247,7 +247,7 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
 }
 
 void velocitiesFromPositions(const BodyModel& model, double h, BodyState& state, StepScratch& scratch) {
-  scratch.unfelt.setZero();
+  scratch.unreported.setZero();
   const double rate = 1.0 / h;
   for (std::size_t i = 0; i < model.rest.size(); ++i)
     state.velocities[i] = rate * (state.positions[i] - scratch.previous[i]);
@@ -257,7 +257,7 @@ void velocitiesFromPositions(const BodyModel& model, double h, BodyState& state,
     const double excess = t.normal.dot(v) - std::max(before, t.obstacle_speed);
     if (!(excess > 0.0)) continue;
     v -= excess * t.normal;
-    if (t.by_tool) scratch.unfelt += model.masses[t.particle] * excess * t.normal;
+    if (t.by_tool) scratch.unreported += model.masses[t.particle] * excess * t.normal;
   }
 }
 

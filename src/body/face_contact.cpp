@@ -11,7 +11,8 @@ std::size_t pushFaces(const BodyModel& model, const Vec3& centre, double radius,
   std::size_t pushed = 0;
   for (const Triangle& t : model.surface.triangles) {
     const Index i[3] = {particle_of[t[0]], particle_of[t[1]], particle_of[t[2]]};
-    if (i[0] == kNoIndex || i[1] == kNoIndex || i[2] == kNoIndex) continue;  // where a rider is, is not known here
+    if (i[0] == kNoIndex || i[1] == kNoIndex || i[2] == kNoIndex)
+      continue;  // the places of embedded vertices are unknown
     const Vec3 &a = x[i[0]], &b = x[i[1]], &c = x[i[2]];
     if (((a.cwiseMin(b).cwiseMin(c) - centre).array() >= radius).any() ||
         ((centre - a.cwiseMax(b).cwiseMax(c)).array() >= radius).any())

@@ -205,7 +205,7 @@ SurfaceBinding bindToCells(const CellLattice& lattice, const Points& surface_res
   binding.particle.assign(surface_rest.size(), kNoIndex);
   binding.offsets.push_back(0);
   for (Index v = 0; v < surface_rest.size(); ++v) {
-    binding.riders.push_back(v);
+    binding.embedded.push_back(v);
     const LatticeCell& carrier = lattice.cells[cell[v]];
     const Vec3 at = lattice.placeIn(carrier, surface_rest[v]);
     for (int k = 0; k < 8; ++k) {

@@ -11,8 +11,8 @@
 namespace meshless {
 namespace {
 
-constexpr double kOnPlane = 0.1;     // [spacing] from the blade: on it
-constexpr std::size_t kLooked = 16;  // vertices near a particle that say where it belongs
+constexpr double kOnPlane = 0.1;           // [spacing] from the blade: on it
+constexpr std::size_t kNearVertices = 16;  // vertices near a particle that say where it belongs
 
 // The blade's rectangle as something that links can pass through.
 class Gate {
@@ -20,7 +20,7 @@ class Gate {
   Gate(const Blade& blade, double spacing) : blade_(blade), plane_(blade.plane()), on_it_(kOnPlane * spacing) {}
 
   int side(const Vec3& p) const { return plane_.height(p) >= 0.0 ? 1 : -1; }
-  /// A layer of particles that lies on the blade but for a little goes to one side as a whole, or the lips were ragged.
+  /// A layer of particles that nearly lies on the blade goes to one side as a whole. Otherwise wound faces were ragged.
   int particleSide(const Vec3& p) const { return plane_.height(p) >= -on_it_ ? 1 : -1; }
 
   /// The way from a to b passes through the blade; `a_side` and `b_side` stand in for points that lie on its plane.
@@ -40,17 +40,17 @@ class Gate {
   double on_it_;  // [m]
 };
 
-// Which side of the blade each vertex of a piece is on; 0 where both new lips have it (the buried front).
+// The side of the blade that each vertex of a piece is on; 0 where both new wound faces have it (the buried front).
 std::vector<int> sidesOf(const IncisedPiece& piece, const Gate& gate) {
   std::vector<int> side;
   for (const Vec3& p : piece.mesh.vertices) side.push_back(gate.side(p));
-  std::vector<bool> on_lip(side.size(), false), both(side.size(), false);
+  std::vector<bool> on_wound_face(side.size(), false), both(side.size(), false);
   for (std::size_t t = 0; t < piece.mesh.triangles.size(); ++t) {
     if (piece.facing[t] == 0) continue;
     for (Index v : piece.mesh.triangles[t]) {
-      const int here = -piece.facing[t];  // the tissue is behind the lip
-      if (on_lip[v] && side[v] != here) both[v] = true;
-      on_lip[v] = true;
+      const int here = -piece.facing[t];  // the tissue is behind the wound face
+      if (on_wound_face[v] && side[v] != here) both[v] = true;
+      on_wound_face[v] = true;
       side[v] = here;
     }
   }
@@ -117,7 +117,7 @@ std::vector<Index> partsOf(const ParticleGraph& graph) {
   return part;
 }
 
-// The piece of every particle: that of the nearest vertex that no lip hides, by vote of those that hold together.
+// The piece of every particle: that of the nearest vertex that no wound face hides. Particles that hold together vote.
 std::vector<std::size_t> assignParticles(const std::vector<IncisedPiece>& pieces, const ParticleGraph& graph,
                                          const Points& x, const Gate& gate) {
   Points vertices;
@@ -133,7 +133,7 @@ std::vector<std::size_t> assignParticles(const std::vector<IncisedPiece>& pieces
   const std::vector<Index> part = partsOf(graph);
   std::map<std::pair<Index, std::size_t>, int> votes;
   for (Index i = 0; i < x.size(); ++i) {
-    const std::vector<Index> near = nearest.nearest(x[i], kLooked);
+    const std::vector<Index> near = nearest.nearest(x[i], kNearVertices);
     Index best = near[0];
     for (Index v : near)
       if (!gate.between(vertices[v], side[v], x[i], gate.particleSide(x[i]))) {

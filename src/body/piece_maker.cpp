@@ -17,7 +17,7 @@
 namespace meshless {
 namespace {
 
-constexpr std::size_t kChunk = 512;  // riders
+constexpr std::size_t kChunk = 512;  // embedded vertices
 
 template <class Get>
 Vec3 interpolate(const VertexOrigin& origin, const Get& get) {
@@ -79,8 +79,8 @@ struct PieceMaker::Crumb {
 
 PieceMaker::PieceMaker(const BodyModel& model, const BodyState& state, std::uint32_t new_patch)
     : model_(model), state_(state), new_patch_(new_patch) {
-  rider_of_.assign(model.surface.vertices.size(), kNoIndex);
-  for (Index r = 0; r < model.binding.riders.size(); ++r) rider_of_[model.binding.riders[r]] = r;
+  embedded_of_.assign(model.surface.vertices.size(), kNoIndex);
+  for (Index r = 0; r < model.binding.embedded.size(); ++r) embedded_of_[model.binding.embedded[r]] = r;
 }
 
 void PieceMaker::tear(ParticleGraph graph, std::vector<bool> torn) {
@@ -139,7 +139,7 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, RestShape rest, const std
   child->solid = true;
   child->spacing = model_.spacing;
   child->next_patch = model_.next_patch + 1;
-  child->lips = model_.lips || !torn_.empty();
+  child->incised = model_.incised || !torn_.empty();
   child->surface.triangles = from.mesh.triangles;
   child->surface.patches = from.mesh.patches;
   child->surface.vertices = std::move(rest.vertices);
@@ -184,11 +184,11 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, RestShape rest, const std
   for (Index at = 0; at < from.origins.size(); ++at) {
     const Index v = from.origins.same(at);
     if (v == kNoIndex) ++work.new_vertices;
-    inherited.rider.push_back(v == kNoIndex ? kNoIndex : rider_of_[v]);
+    inherited.embedded.push_back(v == kNoIndex ? kNoIndex : embedded_of_[v]);
     inherited.start.push_back(v == kNoIndex ? startOf(from, at, rest.inside[at], renumbered) : kNoIndex);
     const Index parent = v == kNoIndex ? kNoIndex : model_.binding.particle[v];
     Index mine = parent == kNoIndex ? kNoIndex : renumbered[parent];
-    // A vertex that was split is in the piece twice; one of the two rides.
+    // A vertex that was split is in the piece twice; one of the two is embedded.
     if (mine != kNoIndex && (taken[mine] || (from.separated && from.separated(at, parent)))) mine = kNoIndex;
     if (mine != kNoIndex) taken[mine] = true;
     vertex_particle.push_back(mine);
@@ -200,24 +200,24 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, RestShape rest, const std
     };
   child->binding = bindSurface(child->rest, child->graph, child->clusters, child->surface.vertices,
                                std::move(vertex_particle), &inherited);
-  work.bound_riders = child->binding.bound;
-  work.kept_riders = child->binding.riders.size() - child->binding.bound;
+  work.bound_embedded = child->binding.bound;
+  work.kept_embedded = child->binding.embedded.size() - child->binding.bound;
   for (std::uint32_t patch : from.mesh.patches) work.new_triangles += patch == new_patch_;
   piece.state.surface = from.mesh.vertices;
   piece.state.stretch = state_.stretch;
   piece.state.swelling = state_.swelling;
-  piece.state.rider_offsets.resize(child->binding.riders.size());
-  inChunks(piece.state.rider_offsets.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+  piece.state.embedded_offsets.resize(child->binding.embedded.size());
+  inChunks(piece.state.embedded_offsets.size(), kChunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t r = begin; r < end; ++r)
-      piece.state.rider_offsets[r] =
-          from.mesh.vertices[child->binding.riders[r]] -
-          riderPosition(child->binding, piece.state.positions, piece.state.poses, static_cast<Index>(r));
+      piece.state.embedded_offsets[r] =
+          from.mesh.vertices[child->binding.embedded[r]] -
+          embeddedPosition(child->binding, piece.state.positions, piece.state.poses, static_cast<Index>(r));
   });
   piece.model = std::move(child);
   return piece;
 }
 
-// Both sides of a cut have the same points inside: each is looked for once.
+// Both sides of a cut have the same points inside: each is searched for once.
 std::vector<PieceMaker::RestShape> PieceMaker::restVertices(const std::vector<PieceSource>& sources) {
   std::vector<RestShape> all(sources.size());
   Points inside;
@@ -278,11 +278,11 @@ Index PieceMaker::startOf(const PieceSource& source, Index vertex, Index inside,
   }
   for (const Index parent : source.origins[vertex].parents) {
     if (parent == kNoIndex) continue;
-    const Index particle = model_.binding.particle[parent], rider = rider_of_[parent];
+    const Index particle = model_.binding.particle[parent], embedded = embedded_of_[parent];
     const auto carriers = model_.binding.carriers.begin();
     const Index start = particle != kNoIndex ? firstOf(&particle, &particle + 1)
-                                             : firstOf(carriers + model_.binding.offsets[rider],
-                                                       carriers + model_.binding.offsets[rider + 1]);
+                                             : firstOf(carriers + model_.binding.offsets[embedded],
+                                                       carriers + model_.binding.offsets[embedded + 1]);
     if (start != kNoIndex) return start;
   }
   return kNoIndex;

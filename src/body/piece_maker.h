@@ -14,7 +14,8 @@ struct PieceSource {
   const TriangleMesh& mesh;      // present shape; patches filled
   const VertexOrigins& origins;  // of its vertices
   std::vector<Index> members;    // the parent's particles, ascending; may be empty: a crumb
-  /// True where the piece's vertex must not follow the parent's particle, for there is a lip between. May be empty.
+  /// True where a wound face lies between the piece's vertex and the parent's particle: it must not follow it. May be
+  /// empty.
   std::function<bool(Index vertex, Index particle)> separated = nullptr;
 };
 
@@ -53,7 +54,7 @@ class PieceMaker {
   std::uint32_t new_patch_;
   ParticleGraph graph_;
   std::vector<bool> torn_;
-  std::vector<Index> rider_of_;
+  std::vector<Index> embedded_of_;
   std::optional<RestPlaces> rest_places_;
   FoundPlaces places_;
   CutWork work_;

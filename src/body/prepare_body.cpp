@@ -17,13 +17,13 @@ namespace meshless {
 namespace {
 
 constexpr std::size_t kMaxParticles = 200000;
-constexpr std::size_t kMaxVertexParticles = 6000;  // larger surfaces ride, but for a subset at the spacing
+constexpr std::size_t kMaxVertexParticles = 6000;  // larger surfaces are embedded, but for a subset at the spacing
 constexpr double kAutoParticles = 2500.0;          // interior particles aimed at where no spacing is given
 constexpr double kAutoCells = 1600.0;              // of a lattice, likewise
 constexpr double kLeastCellFraction = 0.1;         // a sliver of the solid counts as so much of its cell
 constexpr double kReach = 1.75;                    // of the spacing: how far neighbours along the body may be
-constexpr std::size_t kMostLinks = 40;   // of the nearest looked at: vertices finer than the spacing have thousands
-constexpr double kLeastMassShare = 0.1;  // of the mean: no particle is so light that contacts throw it
+constexpr std::size_t kMostLinks = 40;             // of the nearest: vertices finer than the spacing have thousands
+constexpr double kLeastMassShare = 0.1;            // of the mean: no particle is so light that contacts throw it
 
 Error invalid(const std::string& what) { return {ErrorCode::kInvalidArgument, what}; }
 
@@ -188,7 +188,7 @@ HeldHeight heldHeight(const std::vector<HeldRegion>& regions, const Pose& placed
   };
 }
 
-// The corners of the lattice cells that the solid meets; the whole surface rides on them.
+// The corners of the lattice cells that the solid meets; the whole surface is embedded in them.
 Status makeLatticeParticles(const BodyDef& def, const SolidQuery& solid, const Pose& placed, const Pose& pose,
                             BodyModel& model, std::vector<Index>& vertex_particle) {
   Result<CellLattice> lattice = divideIntoCells(model.surface, solid, model.spacing);
@@ -375,7 +375,7 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   body.state.velocities.assign(model->rest.size(), Vec3::Zero());
   body.state.poses.resize(model->clusters.size());
   for (ClusterPose& cluster : body.state.poses) cluster.rotation = placed.rotation;
-  body.state.rider_offsets.assign(model->binding.riders.size(), Vec3::Zero());
+  body.state.embedded_offsets.assign(model->binding.embedded.size(), Vec3::Zero());
   updateSurface(*model, body.state);
   body.def = std::move(def);
   body.model = std::move(model);

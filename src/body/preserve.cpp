@@ -35,15 +35,15 @@ Points areaGradient(const Points& x, const std::vector<Triangle>& triangles) {
   return gradient;
 }
 
-// From vertices to the particles that they are or ride on.
+// From vertices to the particles that they are, or to their carriers.
 Points onParticles(const BodyModel& model, const Points& of_vertices) {
   const SurfaceBinding& binding = model.binding;
   Points gradient(model.rest.size(), Vec3::Zero());
   for (std::size_t v = 0; v < of_vertices.size(); ++v)
     if (binding.particle[v] != kNoIndex) gradient[binding.particle[v]] += of_vertices[v];
-  for (Index r = 0; r < binding.riders.size(); ++r)
+  for (Index r = 0; r < binding.embedded.size(); ++r)
     for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k)
-      gradient[binding.carriers[k]] += binding.weights[k] * of_vertices[binding.riders[r]];
+      gradient[binding.carriers[k]] += binding.weights[k] * of_vertices[binding.embedded[r]];
   return gradient;
 }
 

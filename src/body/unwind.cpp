@@ -9,14 +9,14 @@ namespace meshless {
 namespace {
 
 constexpr double kHalfMostTurn = M_PI / 3.0;  // [rad] half of what clusters may be turned against their neighbours
-constexpr double kSlow = 0.05;                // [1/s] times the body's size: root mean square speed of what deforms
+constexpr double kSlow = 0.05;                // [1/s] times its radius: root mean square speed of what deforms
 constexpr double kTime = 0.1;                 // [s] in which what is wrong falls to 1/e
-constexpr double kThere = 0.02;               // of the size, farthest particle
+constexpr double kThere = 0.02;               // of the radius, farthest particle
 
 // Of the rest shape: root of the mean square distance from its centre [m], and that centre.
 struct RestWhole {
   Vec3 centre = Vec3::Zero();
-  double size = 0.0;
+  double radius = 0.0;
 };
 
 RestWhole restWholeOf(const BodyModel& model) {
@@ -25,7 +25,7 @@ RestWhole restWholeOf(const BodyModel& model) {
   double squared = 0.0;
   for (std::size_t i = 0; i < model.rest.size(); ++i)
     squared += model.masses[i] / model.mass * (model.rest[i] - whole.centre).squaredNorm();
-  whole.size = std::sqrt(squared);
+  whole.radius = std::sqrt(squared);
   return whole;
 }
 
@@ -52,7 +52,7 @@ bool isSlow(const BodyModel& model, const BodyState& state) {
     const Vec3 rigid = together.velocity + together.spin.cross(state.positions[i] - together.centre);
     squared += model.masses[i] / model.mass * (state.velocities[i] - rigid).squaredNorm();
   }
-  return squared <= std::pow(kSlow * restWholeOf(model).size, 2);
+  return squared <= std::pow(kSlow * restWholeOf(model).radius, 2);
 }
 
 }  // namespace
@@ -94,7 +94,7 @@ void unwind(const BodyModel& model, const Vec3& gravity, double h, BodyState& st
     x[i] += h * v[i];
   }
   for (ClusterPose& pose : state.poses) pose.rotation = turn;
-  state.unwinding = farthest > std::pow(kThere * rest.size, 2);
+  state.unwinding = farthest > std::pow(kThere * rest.radius, 2);
 }
 
 }  // namespace meshless

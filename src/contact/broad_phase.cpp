@@ -123,7 +123,7 @@ void BroadPhase::search(const std::vector<Box>& boxes, const std::vector<char>& 
       for (cell[0] = centre[0] - (own ? 0 : 1); cell[0] <= centre[0] + 1; ++cell[0])
         for (cell[1] = centre[1] - 1; cell[1] <= centre[1] + 1; ++cell[1])
           for (cell[2] = centre[2] - 1; cell[2] <= centre[2] + 1; ++cell[2]) {
-            // Of two cells on one level the one that comes first looks into the other.
+            // Of two cells on one level the one that comes first is compared with the other.
             if (own && cell < centre) continue;
             const bool same = cell == centre;
             const std::uint64_t key = keyOf(level, cell);

@@ -8,20 +8,20 @@
 namespace meshless {
 namespace {
 
-constexpr double kExitTime = 1.0;   // [s] in which one body is let out of another
+constexpr double kExitTime = 1.0;   // [s] in which one body leaves another
 constexpr double kExitDeep = 0.05;  // of the size: how deep the deepest point is at the least
 constexpr double kSameShare = 0.8;  // of points inside each other, both ways: bodies at the same place
 
 }  // namespace
 
-// One body inside another, or both at the same place: along the cheapest way out, as a whole, until they are apart.
-bool Contacts::Impl::letOutWhole(const std::vector<ContactParty>& parties, const Pair& pair, const Inside& of_a,
-                                 const Inside& of_b, double h, ContactCounters& counters) {
-  const ContactParty &a = parties[pair.a], &b = parties[pair.b];
+// One body is inside another, or both are at the same place: they are moved apart as a whole, along the cheapest way.
+bool Contacts::Impl::depenetrateWhole(const std::vector<ShapeCollider>& colliders, const Pair& pair, const Inside& of_a,
+                                      const Inside& of_b, double h, ContactCounters& counters) {
+  const ShapeCollider &a = colliders[pair.a], &b = colliders[pair.b];
   const PairKey key{a.key, b.key};
   const auto known = exits.find(key);
-  const auto wholly = [](const Inside& in, const ContactParty& party) {
-    return in.points > 0 && in.inside == in.points && -in.deepest > kExitDeep * party.shape->size();
+  const auto wholly = [](const Inside& in, const ShapeCollider& collider) {
+    return in.points > 0 && in.inside == in.points && -in.deepest > kExitDeep * collider.shape->size();
   };
   const auto share = [](const Inside& in) {
     return in.points ? static_cast<double>(in.near) / static_cast<double>(in.points) : 0.0;
@@ -36,10 +36,10 @@ bool Contacts::Impl::letOutWhole(const std::vector<ContactParty>& parties, const
   const double part_a = a.moves && a.rigid_share > 0.0 ? 1.0 / a.mass : 0.0;
   const double part_b = b.moves && b.rigid_share > 0.0 ? 1.0 / b.mass : 0.0;
   if (!(part_a + part_b > 0.0)) return false;
-  const auto extent = [](const ContactParty& party, const Vec3& d, bool most) {
+  const auto extent = [](const ShapeCollider& collider, const Vec3& d, bool most) {
     double value = -std::numeric_limits<double>::infinity();
-    for (const ContactSample& s : party.shape->samples())
-      if (!(s.share > 0.0)) value = std::max(value, (most ? 1.0 : -1.0) * d.dot(vertexAt(party, s.vertices[0])));
+    for (const ContactSample& s : collider.shape->samples())
+      if (!(s.share > 0.0)) value = std::max(value, (most ? 1.0 : -1.0) * d.dot(vertexAt(collider, s.vertices[0])));
     return value;
   };
   Exit exit{Vec3::UnitZ(), 0.0};
@@ -52,7 +52,7 @@ bool Contacts::Impl::letOutWhole(const std::vector<ContactParty>& parties, const
         for (int z = -1; z <= 1; ++z) {
           if (!x && !y && !z) continue;
           const Vec3 d = Vec3(x, y, z).normalized();
-          // Nobody leaves into the ground.
+          // No body leaves into the ground.
           if (scene.ground && ((part_a > 0.0 && d.z() < -0.5) || (part_b > 0.0 && part_a == 0.0 && d.z() > 0.5)))
             continue;
           const double way = extent(b, d, true) + extent(a, d, false);

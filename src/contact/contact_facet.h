@@ -145,7 +145,7 @@ class Settler {
 
   /// +1 outside, -1 inside.
   double settle(ContactShape::Nearest& found) const {
-    // Two lips that lie on each other cancel but for rounding, which the order of the faces would decide.
+    // The two wound faces that lie on each other cancel but for rounding, which the order of the faces would decide.
     const bool inside = normals_.dot(away_) < -kCancelled * angles_ * away_.norm();
     const double sign = !touches_ && inside ? -1.0 : 1.0;
     const Face* best = nullptr;
@@ -182,7 +182,7 @@ class Settler {
   Vec3 normals_ = Vec3::Zero(), away_ = Vec3::Zero();
   double angles_ = 0.0;
   std::array<Face, 48> faces_;
-  std::vector<Face> more_;  // those of fans, and of lips with many slivers
+  std::vector<Face> more_;  // those of fans, and of wound faces with many slivers
   std::size_t count_ = 0;
 };
 

@@ -1,4 +1,4 @@
-// Lookups in parts that threads share.
+// Queries in parts that threads share.
 #include "contacts_impl.h"
 
 namespace meshless {
@@ -18,18 +18,18 @@ void Inside::add(const Inside& other) {
   deepest = std::min(deepest, other.deepest);
 }
 
-void LookupParts::add(const std::vector<ContactParty>& parties, const Pair& pair, Index number) {
+void QueryParts::add(const std::vector<ShapeCollider>& colliders, const Pair& pair, Index number) {
   if (pair.a == pair.b) {
     parts_.push_back({number, false, 0, 0, {}});
     return;
   }
   for (const bool second : {false, true}) {
-    const Index count = samplesFor(pair, *parties[second ? pair.b : pair.a].shape);
+    const Index count = samplesFor(pair, *colliders[second ? pair.b : pair.a].shape);
     for (Index first = 0; first == 0 || first < count; first += kPartSamples)
       parts_.push_back({number, second, first, std::min(count, first + kPartSamples), {}});
   }
 }
 
-std::size_t LookupParts::perTask() const { return std::clamp<std::size_t>(parts_.size() / kLeastTasks, 1, kMostParts); }
+std::size_t QueryParts::perTask() const { return std::clamp<std::size_t>(parts_.size() / kLeastTasks, 1, kMostParts); }
 
 }  // namespace meshless

@@ -30,41 +30,41 @@ int caughtPasses(Index contacts) {
 }  // namespace
 
 /// Sweeps in a frame of h [s] for an island.
-double stackWork(const ContactScene& scene, const std::vector<ContactParty>& parties, const IslandPlan& plan,
+double stackWork(const ContactScene& scene, const std::vector<ShapeCollider>& colliders, const IslandPlan& plan,
                  Index island, double h) {
   const double gravity = scene.gravity.norm();
   if (!(gravity > 0.0)) return 0.0;
   const Vec3 up = -scene.gravity / gravity;
   double low = std::numeric_limits<double>::infinity(), high = -low, size = 0.0;
-  for (Index k = plan.party_offsets[island]; k < plan.party_offsets[island + 1]; ++k) {
-    const ContactParty& party = parties[plan.parties[k]];
-    const Vec3 centre = 0.5 * (party.bounds.min + party.bounds.max);
-    const double reach = 0.5 * up.cwiseAbs().dot(party.bounds.max - party.bounds.min);
+  for (Index k = plan.collider_offsets[island]; k < plan.collider_offsets[island + 1]; ++k) {
+    const ShapeCollider& collider = colliders[plan.colliders[k]];
+    const Vec3 centre = 0.5 * (collider.bounds.min + collider.bounds.max);
+    const double reach = 0.5 * up.cwiseAbs().dot(collider.bounds.max - collider.bounds.min);
     low = std::min(low, up.dot(centre) - reach);
     high = std::max(high, up.dot(centre) + reach);
-    size += std::max(party.shape->size(), kLayerShare * 2.0 * reach);
+    size += std::max(collider.shape->size(), kLayerShare * 2.0 * reach);
   }
-  const Index count = plan.party_offsets[island + 1] - plan.party_offsets[island];
+  const Index count = plan.collider_offsets[island + 1] - plan.collider_offsets[island];
   if (count < 2 || !(size > 0.0)) return 0.0;
   size /= count;
   const double layers = std::max(1.0, (high - low) / size);
   return kStackWork * h * std::sqrt(gravity / size) * std::min(layers * layers, 1e4);
 }
 
-void Contacts::Impl::choosePasses(const std::vector<ContactParty>& parties, double substep) {
+void Contacts::Impl::choosePasses(const std::vector<ShapeCollider>& colliders, double substep) {
   plan.passes.resize(plan.size());
   plan.calm.resize(plan.size());
   const double substeps = std::max(1.0, std::round(frame / substep));
   const bool few = substeps < kFewSubsteps;
   for (Index island = 0; island < plan.size(); ++island) {
-    const double work = stackWork(scene, parties, plan, island, frame) / substeps;
-    const bool alone = plan.party_offsets[island + 1] - plan.party_offsets[island] < 2;
+    const double work = stackWork(scene, colliders, plan, island, frame) / substeps;
+    const bool alone = plan.collider_offsets[island + 1] - plan.collider_offsets[island] < 2;
     const int least = few ? (alone ? 2 : kFewSweeps) : 1;  // even: there and back
     plan.passes[island] = std::max(least, static_cast<int>(std::ceil(std::min(work, kMostPasses))));
     plan.calm[island] = 1;
-    for (Index k = plan.party_offsets[island]; k < plan.party_offsets[island + 1]; ++k) {
-      const ContactParty& party = parties[plan.parties[k]];
-      if (!(party.spread * frame < kCalm * party.shape->size())) plan.calm[island] = 0;
+    for (Index k = plan.collider_offsets[island]; k < plan.collider_offsets[island + 1]; ++k) {
+      const ShapeCollider& collider = colliders[plan.colliders[k]];
+      if (!(collider.spread * frame < kCalm * collider.shape->size())) plan.calm[island] = 0;
     }
     if (caught.empty()) continue;
     const Index count = plan.contact_offsets[island + 1] - plan.contact_offsets[island];

@@ -1,4 +1,4 @@
-// The points at which a body feels others, and how thick it is.
+// The points of a body that are queried in others, and how thick it is.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -119,9 +119,9 @@ void ContactShape::measureThickness() {
 
 void ContactShape::chooseSamples(double spacing) {
   const Points& vertices = surface_.vertices;
-  // Riders within most of a spacing of a sample are left out: the surface between the particles is smooth.
+  // Embedded vertices nearer to a sample than most of a spacing are left out: the surface between particles is smooth.
   std::vector<bool> chosen(vertices.size(), true);
-  if (!rider_of_.empty() && spacing > 0.0) {
+  if (!embedded_of_.empty() && spacing > 0.0) {
     const double apart = 0.9 * spacing, edge = apart;
     std::unordered_map<std::uint64_t, std::vector<Index>> grid;
     const auto key = [&](int x, int y, int z) {
@@ -138,7 +138,7 @@ void ContactShape::chooseSamples(double spacing) {
     };
     for (int pass = 0; pass < 2; ++pass)  // particles first
       for (Index v = 0; v < vertices.size(); ++v) {
-        if ((rider_of_[v] == kNoIndex) != (pass == 0)) continue;
+        if ((embedded_of_[v] == kNoIndex) != (pass == 0)) continue;
         const std::array<int, 3> c = place(v);
         bool free = true;
         if (pass == 1)

@@ -89,9 +89,9 @@ ContactShape::ContactShape(const TriangleMesh& surface, const SurfaceRows& rows,
   for (const Vec3& p : surface_.vertices) bounds_.extend(p);
   if (bounds_.empty()) return;
   size_ = (bounds_.max - bounds_.min).minCoeff();
-  if (rows_.riders && !rows_.riders->empty()) {
-    rider_of_.assign(surface_.vertices.size(), kNoIndex);
-    for (Index r = 0; r < rows_.riders->size(); ++r) rider_of_[(*rows_.riders)[r]] = r;
+  if (rows_.embedded && !rows_.embedded->empty()) {
+    embedded_of_.assign(surface_.vertices.size(), kNoIndex);
+    for (Index r = 0; r < rows_.embedded->size(); ++r) embedded_of_[(*rows_.embedded)[r]] = r;
   }
   facets_.reserve(surface_.triangles.size());
   for (Index t = 0; t < surface_.triangles.size(); ++t) facets_.push_back(makeFacet(surface_, t));
@@ -125,7 +125,8 @@ ContactShape::~ContactShape() {
 }
 
 std::size_t ContactShape::bytes() const {
-  return sizeof *this + bytesOf(surface_.vertices, surface_.triangles, surface_.patches, facets_, rider_of_, samples_) +
+  return sizeof *this +
+         bytesOf(surface_.vertices, surface_.triangles, surface_.patches, facets_, embedded_of_, samples_) +
          bytesOf(bin_offsets_, bin_triangles_, bin_spheres_) +
          cell_total_ * (sizeof(std::atomic<std::uintptr_t>) + sizeof(std::atomic<float>)) +
          cell_bytes_.load(std::memory_order_relaxed);
@@ -259,14 +260,14 @@ bool ContactShape::searchBins(const Vec3& rest, double within, Nearest& found) c
   const double rounding = kSphereRounding * (bounds_.diagonal() + (rest - bin_origin_).norm());
   // A triangle is no farther than its centre: those tell how near the nearest is, before any is measured.
   float least = std::numeric_limits<float>::infinity();  // squared
-  Index first_looked_at = kNoIndex;                      // whose centre it is
-  const auto lookAtCentres = [&](std::size_t first, std::size_t last) {
+  Index first_searched = kNoIndex;                       // whose centre it is
+  const auto searchCentres = [&](std::size_t first, std::size_t last) {
     for (Index k = bin_offsets_[first]; k < bin_offsets_[last + 1]; ++k) {
       const std::array<float, 4>& s = bin_spheres_[k];
       const float x = p.x() - s[0], y = p.y() - s[1], z = p.z() - s[2], squared = x * x + y * y + z * z;
       if (squared >= least) continue;
       least = squared;
-      first_looked_at = k;
+      first_searched = k;
     }
   };
   const auto nearestCentre = [&] { return std::sqrt(static_cast<double>(least)) + rounding; };
@@ -279,17 +280,17 @@ bool ContactShape::searchBins(const Vec3& rest, double within, Nearest& found) c
   if (!std::isfinite(most)) {
     const std::array<int, 3> home = grid.cellAt(rest);
     for (int ring = 0, rings = grid.ringsAround(home); ring <= rings && !std::isfinite(least); ++ring)
-      visitRing(grid, home, ring, [&](std::size_t bin) { lookAtCentres(bin, bin); });
+      visitRing(grid, home, ring, [&](std::size_t bin) { searchCentres(bin, bin); });
     most = nearestCentre();
   }
-  forBinsWithin(most + rounding, lookAtCentres);
+  forBinsWithin(most + rounding, searchCentres);
   Best best(size_);
   const auto search = [&](double distance) {
     best.distance = distance;
     best.squared = distance * distance;
     float bound = INFINITY;
     const auto tighten = [&] { bound = static_cast<float>((1.0 + 10.0 * kSphereRounding) * best.distance); };
-    if (first_looked_at != kNoIndex) best.offer(facets_[bin_triangles_[first_looked_at]], rest, found);
+    if (first_searched != kNoIndex) best.offer(facets_[bin_triangles_[first_searched]], rest, found);
     tighten();
     forBinsWithin(best.distance + rounding, [&](std::size_t first, std::size_t last) {
       for (Index k = bin_offsets_[first]; k < bin_offsets_[last + 1]; ++k) {

@@ -10,15 +10,15 @@
 namespace meshless {
 namespace {
 
-constexpr double kLetOutShare = 0.3;   // of old overlap, a frame
-constexpr double kLetOutFrom = 5e-4;   // of the smaller body's size: what lies that little in another is left there
-constexpr double kLetOutSpeed = 1.0;   // [1/s] times the smaller body's size, at most
-constexpr double kCaughtSpeed = 10.0;  // [1/s] likewise, of what has passed through
-constexpr double kRestingSpeed = 0.1;  // of the speed after a fall by half the size: slower bodies do not bounce
-constexpr Index kTaskContacts = 256;   // of a task at the least
-constexpr double kStirred = 0.02;      // of the least body's size, against another in one substep: not calm any more
-constexpr double kBeside = 0.02;       // barycentric: farther off its triangle a point does not touch it from outside
-constexpr double kFarBeside = 1.0;     // nor from inside
+constexpr double kDepenetrationShare = 0.3;  // of old overlap, a frame
+constexpr double kDepenetrationFrom = 5e-4;  // of the smaller body's size: less overlap is left
+constexpr double kDepenetrationSpeed = 1.0;  // [1/s] times the smaller body's size, at most
+constexpr double kCaughtSpeed = 10.0;        // [1/s] likewise, of what has passed through
+constexpr double kRestingSpeed = 0.1;        // of the speed after a fall by half the size: slower bodies do not bounce
+constexpr Index kTaskContacts = 256;         // of a task at the least
+constexpr double kStirred = 0.02;   // of the least body's size, against another in one substep: not calm any more
+constexpr double kBeside = 0.02;    // barycentric: farther off its triangle a point does not touch it from outside
+constexpr double kFarBeside = 1.0;  // nor from inside
 
 // Inverse of an inertia tensor; what has no extent about an axis does not turn about it.
 Mat3 inverseInertia(const Mat3& inertia) {
@@ -35,7 +35,7 @@ Mat3 inverseInertia(const Mat3& inertia) {
   return inverse;
 }
 
-// A party's motion as a whole by the impulses of the sweeps, added to its particles after them.
+// A collider's motion as a whole by the impulses of the sweeps, added to its particles after them.
 struct Rigid {
   Vec3 centre = Vec3::Zero();
   Mat3 inverse_inertia = Mat3::Zero();  // [1/(kg m^2)]
@@ -49,29 +49,29 @@ struct Rigid {
 // What does not change about a contact during the sweeps of a substep.
 struct Row {
   Vec3 normal, lever_a, lever_b;
-  Vec3 arm_a, arm_b;         // [1/(kg m)] turn of each party by a unit impulse along the normal, with its share
+  Vec3 arm_a, arm_b;         // [1/(kg m)] turn of each collider by a unit impulse along the normal, with its share
   Vec3 slip = Vec3::Zero();  // [m] tangential, before the sweeps
   double along = 0.0;        // [m] the same along the normal
   double distance = 0.0, target = 0.0;                      // [m]
   double inverse_answer = 0.0, inverse_answer_along = 0.0;  // [kg]
   double friction = 0.0, restitution = 0.0;
   double rigid_a = 0.0,
-         rigid_b = 0.0;  // shares of an impulse that move the parties as a whole; the rest moves particles
+         rigid_b = 0.0;  // shares of an impulse that move the colliders as a whole; the rest moves particles
   Contact* contact = nullptr;
   bool on_ground = false;
 };
 
-Rigid rigidOf(const ContactParty& party) {
+Rigid rigidOf(const ShapeCollider& collider) {
   Rigid rigid;
   rigid.moves = true;
-  rigid.share = party.rigid_share;
-  if (!(party.rigid_share > 0.0)) return rigid;
+  rigid.share = collider.rigid_share;
+  if (!(collider.rigid_share > 0.0)) return rigid;
   Vec3 sum = Vec3::Zero();
   double xx = 0, yy = 0, zz = 0, xy = 0, yz = 0, zx = 0;
-  const Vec3 origin = party.positions[0];
-  for (Index i = 0; i < party.particles; ++i) {
-    const Vec3 r = party.positions[i] - origin;
-    const Vec3 mr = party.masses[i] * r;
+  const Vec3 origin = collider.positions[0];
+  for (Index i = 0; i < collider.particles; ++i) {
+    const Vec3 r = collider.positions[i] - origin;
+    const Vec3 mr = collider.masses[i] * r;
     sum += mr;
     xx += mr.x() * r.x();
     yy += mr.y() * r.y();
@@ -80,7 +80,7 @@ Rigid rigidOf(const ContactParty& party) {
     yz += mr.y() * r.z();
     zx += mr.z() * r.x();
   }
-  const Vec3 offset = sum / party.mass;
+  const Vec3 offset = sum / collider.mass;
   xx -= sum.x() * offset.x();
   yy -= sum.y() * offset.y();
   zz -= sum.z() * offset.z();
@@ -91,7 +91,7 @@ Rigid rigidOf(const ContactParty& party) {
   inertia << yy + zz, -xy, -zx, -xy, xx + zz, -yz, -zx, -yz, xx + yy;
   rigid.centre = origin + offset;
   rigid.inverse_inertia = inverseInertia(inertia);
-  rigid.inverse_mass = 1.0 / party.mass;
+  rigid.inverse_mass = 1.0 / collider.mass;
   return rigid;
 }
 
@@ -104,9 +104,9 @@ struct Gap {
 
 // For a direct contact, normal and weights are made from where the corners are; kKept: those of before, and no answers.
 template <bool kKept>
-bool readGap(const ContactScene& scene, const std::vector<ContactParty>& parties, Contact& c,
+bool readGap(const ContactScene& scene, const std::vector<ShapeCollider>& colliders, Contact& c,
              const std::vector<ContactEntry>& entries, bool with_motion, Gap& gap) {
-  const ContactParty& a = parties[c.a];
+  const ShapeCollider& a = colliders[c.a];
   gap.local_a = gap.local_b = 0.0;
   gap.motion.setZero();
   if (c.direct) {
@@ -126,7 +126,7 @@ bool readGap(const ContactScene& scene, const std::vector<ContactParty>& parties
       gap.point_b = Vec3(gap.point_a.x(), gap.point_a.y(), *scene.ground);
       return true;
     }
-    const ContactParty& b = parties[c.b];
+    const ShapeCollider& b = colliders[c.b];
     const Vec3 &q0 = b.positions[c.corners[0]], &q1 = b.positions[c.corners[1]], &q2 = b.positions[c.corners[2]];
     if (kKept) {
       const Vec3 &p0 = b.previous[c.corners[0]], &p1 = b.previous[c.corners[1]], &p2 = b.previous[c.corners[2]];
@@ -166,7 +166,7 @@ bool readGap(const ContactScene& scene, const std::vector<ContactParty>& parties
     gap.point_b = Vec3(gap.point_a.x(), gap.point_a.y(), *scene.ground);
     return true;
   }
-  const ContactParty& b = parties[c.b];
+  const ShapeCollider& b = colliders[c.b];
   for (Index k = c.split; k < c.end; ++k) {
     const ContactEntry& e = entries[k];
     gap.point_b += e.weight * b.positions[e.particle];
@@ -188,18 +188,18 @@ const Rigid kStill{};
 }  // namespace
 
 struct ContactSolver::Impl {
-  std::vector<Rigid> rigid;            // one a party
-  std::vector<Vec3> shifts;            // of particles by the local shares of impulses, see IslandPlan::shifts
-  std::vector<Row> rows;               // of all islands in a solve(), kept while nothing turns
-  std::vector<double> let_impulses;    // one a row in letOut() [kg m]
-  std::vector<Index> tasks;            // first island of each, and the end
-  std::vector<std::size_t> corrected;  // one a task
-  std::vector<Index> row_counts;       // one an island
-  std::vector<char> stirred;           // one an island: not calm, or no more since the frame began
+  std::vector<Rigid> rigid;                    // one a collider
+  std::vector<Vec3> shifts;                    // of particles by the local shares of impulses, see IslandPlan::shifts
+  std::vector<Row> rows;                       // of all islands in a solve(), kept while nothing turns
+  std::vector<double> depenetration_impulses;  // one a row in depenetrate() [kg m]
+  std::vector<Index> tasks;                    // first island of each, and the end
+  std::vector<std::size_t> corrected;          // one a task
+  std::vector<Index> row_counts;               // one an island
+  std::vector<char> stirred;                   // one an island: not calm, or no more since the frame began
 
   // inputs of the call
   const ContactScene* scene = nullptr;
-  const std::vector<ContactParty>* parties = nullptr;
+  const std::vector<ShapeCollider>* colliders = nullptr;
   const std::vector<ContactEntry>* entries = nullptr;
   const IslandPlan* plan = nullptr;
 
@@ -224,7 +224,7 @@ struct ContactSolver::Impl {
     const Index from = plan->shifts[p];
     if (from == kNoIndex) return;
     Vec3* s = shifts.data() + from;
-    const double* inverse = (*parties)[p].inverse_masses;
+    const double* inverse = (*colliders)[p].inverse_masses;
     const Vec3 shift = local_share * impulse;
     if (c.direct) {
       if (!of_a) {
@@ -267,25 +267,26 @@ struct ContactSolver::Impl {
   }
 
   void begin(Index island) {
-    for (Index k = plan->party_offsets[island]; k < plan->party_offsets[island + 1]; ++k) {
-      const Index p = plan->parties[k];
-      rigid[p] = rigidOf((*parties)[p]);
-      std::fill_n(shifts.begin() + plan->shifts[p], (*parties)[p].particles, Vec3::Zero());
+    for (Index k = plan->collider_offsets[island]; k < plan->collider_offsets[island + 1]; ++k) {
+      const Index p = plan->colliders[k];
+      rigid[p] = rigidOf((*colliders)[p]);
+      std::fill_n(shifts.begin() + plan->shifts[p], (*colliders)[p].particles, Vec3::Zero());
     }
   }
 
-  // Where a party's particle i goes by what the sweeps found, once that is there.
+  // Where a collider's particle i goes by what the sweeps found, once that is there.
   template <class Visit>
   void forEachMove(Index p, const Visit& visit) const {
-    const ContactParty& party = (*parties)[p];
+    const ShapeCollider& collider = (*colliders)[p];
     const Rigid& r = rigid[p];
     if (!r.shift.allFinite() || !r.turn.allFinite()) return;
     const Vec3* shift = shifts.data() + plan->shifts[p];
     if (r.turn.isZero(0.0) && r.shift.isZero(0.0)) {
-      for (Index i = 0; i < party.particles; ++i) visit(i, shift[i]);
+      for (Index i = 0; i < collider.particles; ++i) visit(i, shift[i]);
     } else {
       const Vec3 offset = r.shift - r.turn.cross(r.centre);
-      for (Index i = 0; i < party.particles; ++i) visit(i, Vec3(shift[i] + offset + r.turn.cross(party.positions[i])));
+      for (Index i = 0; i < collider.particles; ++i)
+        visit(i, Vec3(shift[i] + offset + r.turn.cross(collider.positions[i])));
     }
   }
 
@@ -294,12 +295,12 @@ struct ContactSolver::Impl {
   // few sweeps leave errors. Contacts have none to give, and one share for all keeps momentum.
   double energyShare(Index island) const {
     double along = 0.0, squared = 0.0;  // [kg m^2]
-    for (Index k = plan->party_offsets[island]; k < plan->party_offsets[island + 1]; ++k) {
-      const Index p = plan->parties[k];
-      const ContactParty& party = (*parties)[p];
+    for (Index k = plan->collider_offsets[island]; k < plan->collider_offsets[island + 1]; ++k) {
+      const Index p = plan->colliders[k];
+      const ShapeCollider& collider = (*colliders)[p];
       forEachMove(p, [&](Index i, const Vec3& move) {
-        along += party.masses[i] * move.dot(party.positions[i] - party.previous[i]);
-        squared += party.masses[i] * move.squaredNorm();
+        along += collider.masses[i] * move.dot(collider.positions[i] - collider.previous[i]);
+        squared += collider.masses[i] * move.squaredNorm();
       });
     }
     if (!(2.0 * along + squared > 0.0)) return 1.0;
@@ -307,9 +308,9 @@ struct ContactSolver::Impl {
   }
 
   void finish(Index island, double share) {
-    for (Index k = plan->party_offsets[island]; k < plan->party_offsets[island + 1]; ++k) {
-      const Index p = plan->parties[k];
-      Vec3* const positions = (*parties)[p].positions;
+    for (Index k = plan->collider_offsets[island]; k < plan->collider_offsets[island + 1]; ++k) {
+      const Index p = plan->colliders[k];
+      Vec3* const positions = (*colliders)[p].positions;
       if (share == 1.0)
         forEachMove(p, [positions](Index i, const Vec3& move) { positions[i] += move; });
       else
@@ -317,17 +318,17 @@ struct ContactSolver::Impl {
     }
   }
 
-  void start(const ContactScene& of_scene, const std::vector<ContactParty>& of_parties,
+  void start(const ContactScene& of_scene, const std::vector<ShapeCollider>& of_colliders,
              const std::vector<ContactEntry>& of_entries, const IslandPlan& of_plan) {
     scene = &of_scene;
-    parties = &of_parties;
+    colliders = &of_colliders;
     entries = &of_entries;
     plan = &of_plan;
-    rigid.resize(of_parties.size());
-    for (std::size_t p = 0; p < of_parties.size(); ++p)
-      if (!of_parties[p].moves) rigid[p] = kStill;  // the place may have been that of a body
+    rigid.resize(of_colliders.size());
+    for (std::size_t p = 0; p < of_colliders.size(); ++p)
+      if (!of_colliders[p].moves) rigid[p] = kStill;  // the place may have been that of a body
     Index particles = 0;
-    for (Index p : of_plan.parties) particles += of_parties[p].particles;
+    for (Index p : of_plan.colliders) particles += of_colliders[p].particles;
     if (shifts.size() < particles) shifts.resize(particles);
   }
 
@@ -337,8 +338,8 @@ struct ContactSolver::Impl {
   bool prepare(Contact& c, const Gap& gap, Row& row) {
     row.contact = &c;
     row.on_ground = c.b == kNoIndex;
-    const Rigid& a = (*parties)[c.a].moves ? rigid[c.a] : kStill;
-    const Rigid& b = row.on_ground || !(*parties)[c.b].moves ? kStill : rigid[c.b];
+    const Rigid& a = (*colliders)[c.a].moves ? rigid[c.a] : kStill;
+    const Rigid& b = row.on_ground || !(*colliders)[c.b].moves ? kStill : rigid[c.b];
     row.normal = c.normal;
     row.lever_a = gap.point_a - a.centre;
     row.lever_b = gap.point_b - b.centre;
@@ -381,7 +382,7 @@ struct ContactSolver::Impl {
       double farthest = 0.0;
       for (Row* row = first; row != first + row_counts[island]; ++row) {
         Gap gap;
-        readGap<true>(*scene, *parties, *row->contact, *entries, true, gap);
+        readGap<true>(*scene, *colliders, *row->contact, *entries, true, gap);
         row->distance = row->normal.dot(gap.point_a - gap.point_b);
         const double along = row->normal.dot(gap.motion);
         row->target = targetOf(*row, along);
@@ -417,8 +418,8 @@ struct ContactSolver::Impl {
     finish(island, share);
   }
 
-  // From where the last substep ended: stacks converge over substeps, not within one. What moves a party as a whole is
-  // summed before it is divided by mass and inertia.
+  // From where the last substep ended: stacks converge over substeps, not within one. What moves a collider as a whole
+  // is summed before it is divided by mass and inertia.
   void startWarm(Index island, const Row* first) {
     const auto add = [&](Index p, double share, const Vec3& lever, const Vec3& impulse) {
       if (!(share > 0.0)) return;
@@ -438,8 +439,8 @@ struct ContactSolver::Impl {
       if (row->rigid_b < 1.0) give(c, false, 1.0 - row->rigid_b, -impulse);
       add(c.b, row->rigid_b, row->lever_b, -impulse);
     }
-    for (Index k = plan->party_offsets[island]; k < plan->party_offsets[island + 1]; ++k) {
-      Rigid& r = rigid[plan->parties[k]];
+    for (Index k = plan->collider_offsets[island]; k < plan->collider_offsets[island + 1]; ++k) {
+      Rigid& r = rigid[plan->colliders[k]];
       r.shift *= r.inverse_mass;
       r.turn = r.inverse_inertia * r.turn;
     }
@@ -493,11 +494,11 @@ struct ContactSolver::Impl {
     c.impulse = 0.0;
     const bool known = c.answer > 0.0;
     if (known) {
-      readGap<true>(*scene, *parties, c, *entries, true, gap);
+      readGap<true>(*scene, *colliders, c, *entries, true, gap);
       if (!prepareAgain(c, gap, row)) return false;
     } else {
-      if (!readGap<false>(*scene, *parties, c, *entries, true, gap) || !prepare(c, gap, row)) return false;
-      // Of what rides on particles alone normal and weights are those of the frame.
+      if (!readGap<false>(*scene, *colliders, c, *entries, true, gap) || !prepare(c, gap, row)) return false;
+      // Where an embedded vertex takes part and no body moves as a whole, normal and weights are those of the frame.
       if (!c.direct && c.a != c.b && row.rigid_a == 0.0 && row.rigid_b == 0.0) c.answer = gap.local_a + gap.local_b;
     }
     const double along_normal = c.normal.dot(gap.motion);
@@ -506,7 +507,7 @@ struct ContactSolver::Impl {
       const double least = std::min({c.weights[0], c.weights[1], c.weights[2]});
       if (!c.caught && least < (before > 0.0 ? -kBeside : -kFarBeside)) return false;
     }
-    const ContactParty &a = (*parties)[c.a], *b = row.on_ground ? nullptr : &(*parties)[c.b];
+    const ShapeCollider &a = (*colliders)[c.a], *b = row.on_ground ? nullptr : &(*colliders)[c.b];
     row.restitution = !b ? a.restitution : b->mass > 0.0 ? std::sqrt(a.restitution * b->restitution) : a.restitution;
     if (row.restitution > 0.0) {
       // The bodies have to approach: particles of a body at rest that tremble would be kept trembling.
@@ -572,27 +573,27 @@ struct ContactSolver::Impl {
     return 1;
   }
 
-  // False where it does not overlap; how much of that is old enough to be let out [m].
+  // False where the contact does not overlap. `old` [m]: the part of the overlap that is depenetrated.
   bool readOverlap(Contact& c, Gap& gap, double& old) {
-    if (!c.below || !readGap<false>(*scene, *parties, c, *entries, false, gap)) return false;
+    if (!c.below || !readGap<false>(*scene, *colliders, c, *entries, false, gap)) return false;
     const double distance = c.normal.dot(gap.point_a - gap.point_b);
     if (!(distance < 0.0)) return false;
     if (c.direct && c.b != kNoIndex && !c.caught && std::min({c.weights[0], c.weights[1], c.weights[2]}) < -kFarBeside)
       return false;
-    old = std::max(0.0, -distance - (c.caught ? 0.0 : kLetOutFrom * sizeAt(c)));
+    old = std::max(0.0, -distance - (c.caught ? 0.0 : kDepenetrationFrom * sizeAt(c)));
     return true;
   }
 
   double sizeAt(const Contact& c) const {
-    const double size = (*parties)[c.a].shape->size();
-    return c.b == kNoIndex ? size : std::min(size, (*parties)[c.b].shape->size());
+    const double size = (*colliders)[c.a].shape->size();
+    return c.b == kNoIndex ? size : std::min(size, (*colliders)[c.b].shape->size());
   }
 
-  std::size_t letOutIsland(Index island, std::vector<Contact>& contacts, double h) {
+  std::size_t depenetrateIsland(Index island, std::vector<Contact>& contacts, double h) {
     const Index from = plan->contact_offsets[island], to = plan->contact_offsets[island + 1];
     Gap gap;
     double old = 0.0;
-    // What has settled has nothing to let out.
+    // In what has settled nothing is left to depenetrate.
     if (std::none_of(plan->contacts.begin() + from, plan->contacts.begin() + to,
                      [&](Index k) { return readOverlap(contacts[k], gap, old) && old > 0.0; }))
       return 0;
@@ -604,14 +605,14 @@ struct ContactSolver::Impl {
       if (!readOverlap(c, gap, old) || !prepare(c, gap, *end)) continue;
       const double size = sizeAt(c);
       end->target = end->distance + (c.caught ? std::min(old, kCaughtSpeed * size * h)
-                                              : std::min(kLetOutShare * old, kLetOutSpeed * size * h));
+                                              : std::min(kDepenetrationShare * old, kDepenetrationSpeed * size * h));
       ++end;
     }
     if (end == first) return 0;
     // There and back, and what was too much is taken back: one way alone turns bodies a little in every frame, always
     // to the same side, and a stack would walk and rock.
     const std::size_t count = static_cast<std::size_t>(end - first);
-    double* const impulses = let_impulses.data() + (first - rows.data());
+    double* const impulses = depenetration_impulses.data() + (first - rows.data());
     std::fill_n(impulses, count, 0.0);
     std::size_t moved = 0;
     for (std::size_t n = 0; n < 2 * count; ++n) {
@@ -630,22 +631,22 @@ struct ContactSolver::Impl {
 
   double leastSize(Index island) const {
     double least = std::numeric_limits<double>::infinity();
-    for (Index k = plan->party_offsets[island]; k < plan->party_offsets[island + 1]; ++k)
-      least = std::min(least, (*parties)[plan->parties[k]].shape->size());
+    for (Index k = plan->collider_offsets[island]; k < plan->collider_offsets[island + 1]; ++k)
+      least = std::min(least, (*colliders)[plan->colliders[k]].shape->size());
     return least;
   }
 
   // The bodies have hardly turned since begin(): only where they are is found anew.
   void beginAgain(Index island) {
-    for (Index k = plan->party_offsets[island]; k < plan->party_offsets[island + 1]; ++k) {
-      const Index p = plan->parties[k];
-      const ContactParty& party = (*parties)[p];
+    for (Index k = plan->collider_offsets[island]; k < plan->collider_offsets[island + 1]; ++k) {
+      const Index p = plan->colliders[k];
+      const ShapeCollider& collider = (*colliders)[p];
       Rigid& r = rigid[p];
       if (!(r.share > 0.0)) continue;
-      const Vec3 origin = party.positions[0];
+      const Vec3 origin = collider.positions[0];
       Vec3 sum = Vec3::Zero();
-      for (Index i = 1; i < party.particles; ++i) sum += party.masses[i] * (party.positions[i] - origin);
-      r.centre = origin + sum / party.mass;
+      for (Index i = 1; i < collider.particles; ++i) sum += collider.masses[i] * (collider.positions[i] - origin);
+      r.centre = origin + sum / collider.mass;
     }
   }
 };
@@ -665,11 +666,11 @@ void ContactSolver::Impl::shareOut() {
   corrected.assign(tasks.size() - 1, 0);
 }
 
-void ContactSolver::solve(const ContactScene& scene, const std::vector<ContactParty>& parties,
+void ContactSolver::solve(const ContactScene& scene, const std::vector<ShapeCollider>& colliders,
                           std::vector<Contact>& contacts, const std::vector<ContactEntry>& entries,
                           const IslandPlan& plan, bool fresh, const ForEach& for_each, ContactCounters& counters) {
   Impl& w = *impl_;
-  begin(scene, parties, entries, plan);
+  begin(scene, colliders, entries, plan);
   w.shareOut();
   runEach(for_each, w.tasks.size() - 1, [&](std::size_t task) {
     for (Index island = w.tasks[task]; island < w.tasks[task + 1]; ++island)
@@ -678,41 +679,42 @@ void ContactSolver::solve(const ContactScene& scene, const std::vector<ContactPa
   for (const std::size_t corrected : w.corrected) counters.corrected += corrected;
 }
 
-void ContactSolver::begin(const ContactScene& scene, const std::vector<ContactParty>& parties,
+void ContactSolver::begin(const ContactScene& scene, const std::vector<ShapeCollider>& colliders,
                           const std::vector<ContactEntry>& entries, const IslandPlan& plan) {
   Impl& w = *impl_;
-  w.start(scene, parties, entries, plan);
+  w.start(scene, colliders, entries, plan);
   // Rows are kept in place: an island has room for all of its contacts.
   w.rows.resize(plan.contacts.size());
   w.row_counts.resize(plan.size());
   w.stirred.resize(plan.size());
-  w.let_impulses.resize(plan.contacts.size());
+  w.depenetration_impulses.resize(plan.contacts.size());
 }
 
 void ContactSolver::solveIsland(Index island, std::vector<Contact>& contacts, bool fresh, std::size_t& corrected) {
   impl_->solveIsland(island, contacts, fresh, corrected);
 }
 
-void ContactSolver::letOutIsland(Index island, std::vector<Contact>& contacts, double h, std::size_t& corrected) {
-  corrected += impl_->letOutIsland(island, contacts, h);
+void ContactSolver::depenetrateIsland(Index island, std::vector<Contact>& contacts, double h, std::size_t& corrected) {
+  corrected += impl_->depenetrateIsland(island, contacts, h);
 }
 
-void ContactSolver::letOut(const ContactScene& scene, const std::vector<ContactParty>& parties,
-                           std::vector<Contact>& contacts, const std::vector<ContactEntry>& entries,
-                           const IslandPlan& plan, double h, const ForEach& for_each, ContactCounters& counters) {
+void ContactSolver::depenetrate(const ContactScene& scene, const std::vector<ShapeCollider>& colliders,
+                                std::vector<Contact>& contacts, const std::vector<ContactEntry>& entries,
+                                const IslandPlan& plan, double h, const ForEach& for_each, ContactCounters& counters) {
   Impl& w = *impl_;
-  begin(scene, parties, entries, plan);
+  begin(scene, colliders, entries, plan);
   w.shareOut();
   runEach(for_each, w.tasks.size() - 1, [&](std::size_t task) {
     for (Index island = w.tasks[task]; island < w.tasks[task + 1]; ++island)
-      w.corrected[task] += w.letOutIsland(island, contacts, h);
+      w.corrected[task] += w.depenetrateIsland(island, contacts, h);
   });
   for (const std::size_t corrected : w.corrected) counters.corrected += corrected;
 }
 
 std::size_t ContactSolver::bytes() const {
   const Impl& w = *impl_;
-  return sizeof w + bytesOf(w.rigid, w.shifts, w.rows, w.let_impulses, w.tasks, w.corrected, w.row_counts, w.stirred);
+  return sizeof w +
+         bytesOf(w.rigid, w.shifts, w.rows, w.depenetration_impulses, w.tasks, w.corrected, w.row_counts, w.stirred);
 }
 
 }  // namespace meshless

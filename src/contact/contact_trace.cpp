@@ -1,4 +1,4 @@
-// Who has passed through a surface within a substep, and stays known until it is back.
+// Points that have passed through a surface within a substep. They stay known until they are back outside.
 #include <algorithm>
 #include <map>
 #include <set>
@@ -11,39 +11,39 @@ namespace {
 
 constexpr double kBesidePath = 1e-6;  // barycentric: no path slips between two triangles
 constexpr double kSlowPath =
-    0.25;  // of the thickness: who meets a face no faster than that in a substep is seen to be near it
-constexpr double kShallow = 0.1;          // of the lesser thickness: likewise, and from inside
-constexpr double kSameSide = 0.5;         // cosine between the normals of faces that look the same way
+    0.25;  // of the thickness: a point that meets a face no faster than that in a substep is found by a query
+constexpr double kShallow = 0.1;          // of the smaller thickness: likewise, and from inside
+constexpr double kSameSide = 0.5;         // cosine between the normals of faces that face the same way
 constexpr std::size_t kFewWays = 8;       // are compared with all faces
 constexpr std::int64_t kMostCells = 512;  // of a face
 constexpr int kMostSlides = 8;            // triangles that a caught point goes on in a substep
 
-Vec3 normalNow(const ContactParty& party, Index triangle) {
-  const Triangle& corners = party.shape->surface().triangles[triangle];
-  const Vec3 q0 = vertexAt(party, corners[0]);
-  return (vertexAt(party, corners[1]) - q0).cross(vertexAt(party, corners[2]) - q0).normalized();
+Vec3 normalNow(const ShapeCollider& collider, Index triangle) {
+  const Triangle& corners = collider.shape->surface().triangles[triangle];
+  const Vec3 q0 = vertexAt(collider, corners[0]);
+  return (vertexAt(collider, corners[1]) - q0).cross(vertexAt(collider, corners[2]) - q0).normalized();
 }
 
 }  // namespace
 
-void SweptParty::make(const ContactParty& party, Index count) {
-  const std::vector<ContactSample>& all = party.shape->samples();
+void SweptCollider::make(const ShapeCollider& collider, Index count) {
+  const std::vector<ContactSample>& all = collider.shape->samples();
   samples.resize(count);
   box = Box();
   for (Index s = 0; s < count; ++s) {
-    const Vec3 p = sampleAt(party, all[s]);
-    Vec3 motion = vertexMotion(party, all[s].vertices[0]);
-    if (all[s].share > 0.0) motion += all[s].share * (vertexMotion(party, all[s].vertices[1]) - motion);
+    const Vec3 p = sampleAt(collider, all[s]);
+    Vec3 motion = vertexMotion(collider, all[s].vertices[0]);
+    if (all[s].share > 0.0) motion += all[s].share * (vertexMotion(collider, all[s].vertices[1]) - motion);
     samples[s] = {p - motion, p};
     if (!p.allFinite() || !motion.allFinite()) continue;
     box.extend(p);
     box.extend(p - motion);
   }
-  const TriangleMesh& surface = party.shape->surface();
+  const TriangleMesh& surface = collider.shape->surface();
   corners.resize(surface.vertices.size());
   for (Index v = 0; v < corners.size(); ++v) {
-    const Vec3 q = vertexAt(party, v);
-    corners[v] = {q - vertexMotion(party, v), q};
+    const Vec3 q = vertexAt(collider, v);
+    corners[v] = {q - vertexMotion(collider, v), q};
   }
   triangles.assign(surface.triangles.size(), Box());
   for (Index t = 0; t < surface.triangles.size(); ++t)
@@ -53,13 +53,13 @@ void SweptParty::make(const ContactParty& party, Index count) {
     }
 }
 
-// Points of a that a triangle of b swept over in this substep, from its front: who has passed through is remembered.
-void Contacts::Impl::trace(const std::vector<ContactParty>& parties, const Pair& pair, bool second,
+// Finds the points of a that a triangle of b has swept over in this substep, coming from its front.
+void Contacts::Impl::trace(const std::vector<ShapeCollider>& colliders, const Pair& pair, bool second,
                            const std::vector<Contact>* found, Traced& traced) const {
   const Index a = second ? pair.b : pair.a, b = second ? pair.a : pair.b;
   traced.paths = 0;
   traced.caught.clear();
-  const ContactParty &of = parties[a], &with = parties[b];
+  const ShapeCollider &of = colliders[a], &with = colliders[b];
   const ContactShape& shape = *with.shape;
   const std::vector<Triangle>& triangles = shape.surface().triangles;
   if (triangles.empty()) return;
@@ -67,13 +67,13 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, const Pair&
   const std::vector<Path>&paths = swept[a].samples, &corners = swept[b].corners;
   const Box& box_a = swept[a].box;
   Box box_b;
-  // Who is slower is seen by the next look.
-  const double slow = kSlowPath * shape.thickness() / look_gap;
+  // A slower point is found by the next query.
+  const double slow = kSlowPath * shape.thickness() / query_gap;
   const double shallow = kShallow * std::min(of.shape->thickness(), shape.thickness());
   // What lay on a face may have been a hair below; what had no contact there is outside on the other side of a fin.
   const auto lay = [&](Index sample, Index triangle) {
     const auto key = std::make_tuple(true, std::min(a, b), std::max(a, b), a > b, sample);
-    for (const std::vector<Contact>* known : {&quick_known, found}) {
+    for (const std::vector<Contact>* known : {&fast_known, found}) {
       if (!known) continue;
       const auto at =
           std::partition_point(known->begin(), known->end(), [&](const Contact& c) { return keyOf(c) < key; });
@@ -132,7 +132,7 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, const Pair&
   if (near.empty() || !(size > 0.0)) return;
   region = intersection(region, box_b);
   static thread_local CellTable own_table;
-  CellTable& table = own_table;  // each look at the other asks whose thread it is
+  CellTable& table = own_table;  // each access of the other asks whose thread it is
   const bool by_cells = ways.size() > kFewWays;
   if (by_cells) {
     table.start(region, size / static_cast<double>(near.size()), 4 * near.size());
@@ -171,32 +171,32 @@ void Contacts::Impl::trace(const std::vector<ContactParty>& parties, const Pair&
   }
 }
 
-// Where a pair goes slowly, and all that passed through lie just below the planes that they are behind, they are
-// seen there like any other.
-void Contacts::Impl::releaseShallow(const std::vector<ContactParty>& parties) {
+// Where a pair is slow and all its caught points lie just below their triangles, they are forgotten: queries find them
+// like any other.
+void Contacts::Impl::releaseShallow(const std::vector<ShapeCollider>& colliders) {
   if (caught.empty()) return;
   std::map<std::uint64_t, Index> by_key;
-  for (Index p = 0; p < parties.size(); ++p) by_key[parties[p].key] = p;
+  for (Index p = 0; p < colliders.size(); ++p) by_key[colliders[p].key] = p;
   std::set<PairKey> kept;
   const auto pairOf = [](const CaughtKey& key) { return std::minmax({key.a, key.b}); };
   for (const auto& [key, triangle] : caught) {
     const auto a = by_key.find(key.a), b = by_key.find(key.b);
-    if (a == by_key.end() || b == by_key.end() || !isShallow(parties, a->second, b->second, key.sample, triangle))
+    if (a == by_key.end() || b == by_key.end() || !isShallow(colliders, a->second, b->second, key.sample, triangle))
       kept.insert(pairOf(key));
   }
   for (auto it = caught.begin(); it != caught.end();)
     it = kept.count(pairOf(it->first)) ? std::next(it) : caught.erase(it);
 }
 
-bool Contacts::Impl::isShallow(const std::vector<ContactParty>& parties, Index a, Index b, Index sample,
+bool Contacts::Impl::isShallow(const std::vector<ShapeCollider>& colliders, Index a, Index b, Index sample,
                                Index triangle) const {
   const auto key = std::make_pair(std::min(a, b), std::max(a, b));
   const auto pair =
       std::lower_bound(pairs.begin(), pairs.end(), key, [](const Pair& p, const std::pair<Index, Index>& of) {
         return std::tie(p.a, p.b) < std::tie(of.first, of.second);
       });
-  if (pair == pairs.end() || std::make_pair(pair->a, pair->b) != key || pair->quick) return false;
-  const ContactParty &of = parties[a], &with = parties[b];
+  if (pair == pairs.end() || std::make_pair(pair->a, pair->b) != key || pair->fast) return false;
+  const ShapeCollider &of = colliders[a], &with = colliders[b];
   if (sample >= of.shape->samples().size() || triangle >= with.shape->surface().triangles.size()) return false;
   const Triangle& corners = with.shape->surface().triangles[triangle];
   const Vec3 q0 = vertexAt(with, corners[0]);
@@ -205,19 +205,19 @@ bool Contacts::Impl::isShallow(const std::vector<ContactParty>& parties, Index a
   return depth < kShallow * std::min(of.shape->thickness(), with.shape->thickness());
 }
 
-// Contacts of those that have passed through: with the triangle that they slid to, until they are back outside.
-void Contacts::Impl::addCaught(const std::vector<ContactParty>& parties) {
+// Adds contacts of the points that have passed through, each with the triangle that it slid to, until it is outside.
+void Contacts::Impl::addCaught(const std::vector<ShapeCollider>& colliders) {
   Findings found;
   std::map<std::uint64_t, Index> by_key;
-  for (Index p = 0; p < parties.size(); ++p) by_key[parties[p].key] = p;
+  for (Index p = 0; p < colliders.size(); ++p) by_key[colliders[p].key] = p;
   for (auto it = caught.begin(); it != caught.end();) {
     const auto a = by_key.find(it->first.a), b = by_key.find(it->first.b);
     bool over = a == by_key.end() || b == by_key.end();
-    over = over || !parties[a->second].shape || !parties[b->second].shape ||
-           it->first.sample >= parties[a->second].shape->samples().size() ||
-           it->second >= parties[b->second].shape->surface().triangles.size();
+    over = over || !colliders[a->second].shape || !colliders[b->second].shape ||
+           it->first.sample >= colliders[a->second].shape->samples().size() ||
+           it->second >= colliders[b->second].shape->surface().triangles.size();
     if (!over) {
-      const ContactParty &of = parties[a->second], &with = parties[b->second];
+      const ShapeCollider &of = colliders[a->second], &with = colliders[b->second];
       const ContactShape& shape = *with.shape;
       const Vec3 p = sampleAt(of, of.shape->samples()[it->first.sample]);
       std::array<double, 3> weights{};
@@ -233,7 +233,7 @@ void Contacts::Impl::addCaught(const std::vector<ContactParty>& parties) {
         const int corner = static_cast<int>(std::min_element(weights.begin(), weights.end()) - weights.begin());
         if (over || weights[corner] >= 0.0 || step == kMostSlides) break;
         const Index next = shape.across(it->second, corner);
-        // Not round an edge: there the next one looks another way, and the point is in front of it.
+        // Not round an edge: there the next triangle faces another way, and the point is in front of it.
         if (next == kNoIndex) break;
         const Triangle& turned = shape.surface().triangles[next];
         const Vec3 r0 = vertexAt(with, turned[0]);
@@ -242,7 +242,7 @@ void Contacts::Impl::addCaught(const std::vector<ContactParty>& parties) {
         it->second = next;
       }
       if (!over)
-        addContact(found, parties, a->second, it->first.sample, of.shape->samples()[it->first.sample], b->second,
+        addContact(found, colliders, a->second, it->first.sample, of.shape->samples()[it->first.sample], b->second,
                    it->second, weights, true, false);
     }
     it = over ? caught.erase(it) : std::next(it);

@@ -19,7 +19,7 @@ std::size_t bytesOfFindings(const Findings& f) {
 }  // namespace
 
 std::size_t IslandPlan::bytes() const {
-  return bytesOf(contacts, contact_offsets, parties, party_offsets, shifts, passes, calm) +
+  return bytesOf(contacts, contact_offsets, colliders, collider_offsets, shifts, passes, calm) +
          bytesOf(root_, number_, next_, moving_);
 }
 
@@ -28,15 +28,15 @@ std::size_t Contacts::bytes() const {
   std::size_t sum = sizeof w + w.parts.bytes() + w.broad.bytes() + w.solver.bytes() + w.plan.bytes() +
                     bytesOf(w.boxes, w.active, w.needed, w.pairs, w.grounded, w.finders, w.maps_now, w.bounds_now,
                             w.contacts, w.last, w.entries) +
-                    bytesOf(w.depths, w.quick_known, w.reached, w.keys, w.tasks, w.inside, w.quick, w.traced, w.swept,
+                    bytesOf(w.depths, w.fast_known, w.reached, w.keys, w.tasks, w.inside, w.fast, w.traced, w.swept,
                             w.seen, w.foreseen, w.ahead, w.taken) +
                     bytesOfMap(w.caught) + bytesOfMap(w.exits);
   for (const MapFinder& finder : w.finders) sum += finder.bytes();
   for (const auto& maps : w.maps_now) sum += bytesOf(maps);
   for (const Findings& task : w.tasks) sum += bytesOfFindings(task);
   for (const Traced& traced : w.traced) sum += bytesOf(traced.caught);
-  for (const SweptParty& s : w.swept) sum += bytesOf(s.samples, s.corners, s.triangles);
-  for (const QuickFindings& quick : w.quick) sum += bytesOfFindings(quick.found);
+  for (const SweptCollider& s : w.swept) sum += bytesOf(s.samples, s.corners, s.triangles);
+  for (const FastFindings& fast : w.fast) sum += bytesOfFindings(fast.found);
   for (const Foreseen& found : w.foreseen)
     for (const Findings& half : found.halves) sum += bytesOfFindings(half);
   return sum;

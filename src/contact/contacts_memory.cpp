@@ -76,22 +76,22 @@ void save(HashArchive& archive, const ContactsMemory& memory) {
 }
 void load(InArchive& archive, ContactsMemory& memory) { memory.data_->fields(archive); }
 
-std::string ContactsMemory::fault(const std::map<std::uint64_t, KnownParty>& parties) const {
-  // Of one that is gone nothing is looked up.
+std::string ContactsMemory::fault(const std::map<std::uint64_t, KnownCollider>& colliders) const {
+  // Of a collider that is gone nothing is queried.
   const auto fits = [&](std::uint64_t key, Index triangle) {
-    const auto known = parties.find(key);
-    return known == parties.end() || triangle < known->second.triangles;
+    const auto known = colliders.find(key);
+    return known == colliders.end() || triangle < known->second.triangles;
   };
   for (const Contact& c : data_->contacts) {
-    if (c.a >= data_->keys.size()) return "a contact is of party " + std::to_string(c.a);
+    if (c.a >= data_->keys.size()) return "a contact is of collider " + std::to_string(c.a);
     if (c.b == kNoIndex) continue;
-    if (c.b >= data_->keys.size()) return "a contact is of party " + std::to_string(c.b);
+    if (c.b >= data_->keys.size()) return "a contact is of collider " + std::to_string(c.b);
     if (!fits(data_->keys[c.b], c.triangle)) return "a contact's triangle is " + std::to_string(c.triangle);
   }
   for (const CaughtPoint& point : data_->caught)
     if (!fits(point.b, point.triangle)) return "a caught point's triangle is " + std::to_string(point.triangle);
-  for (const Index party : data_->reached)
-    if (party >= data_->keys.size()) return "a party that was reached is " + std::to_string(party);
+  for (const Index collider : data_->reached)
+    if (collider >= data_->keys.size()) return "a collider that was reached is " + std::to_string(collider);
   if (data_->needed_substeps < 1 || data_->needed_substeps > kAnySubsteps)
     return "contacts ask for " + std::to_string(data_->needed_substeps) + " substeps";
   if (data_->affordable_substeps < 1 || data_->affordable_substeps > kAnySubsteps)

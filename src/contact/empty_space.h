@@ -1,4 +1,4 @@
-// Where nothing of a closed surface is for a long way: a map of distances, coarse and quick to make. Private to
+// Where nothing of a closed surface is for a long way: a map of distances, coarse and fast to make. Private to
 // contact.
 #pragma once
 

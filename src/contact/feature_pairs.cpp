@@ -9,12 +9,12 @@ namespace meshless {
 namespace {
 
 constexpr double kMargin = 0.2;         // of the mean edge
-constexpr double kAhead = 1.2;          // times the way of a frame: who speeds up is met too
+constexpr double kAhead = 1.2;          // times the way of a frame: what speeds up is met too
 constexpr double kTie = 2e-3;           // of the mean edge: nearer than this two surfaces touch
 constexpr double kTouching = 1e-3;      // of the mean edge: nearer than this only a face that opposes tells the sides
-constexpr double kDeepest = 2.0;        // mean edges: deeper inside nobody is looked for
-constexpr double kDeeper = 1.3;         // times as deep as it was: who is inside may have gone on
-constexpr double kLeastOpposed = 0.05;  // cosine by which a direction has to oppose a face of who is pushed along it
+constexpr double kDeepest = 2.0;        // mean edges: deeper inside nothing is searched for
+constexpr double kDeeper = 1.3;         // times as deep as it was: a vertex inside may have gone on
+constexpr double kLeastOpposed = 0.05;  // cosine by which a direction has to oppose a face of the pushed body
 constexpr double kSameWay = 0.9;        // cosine from which a second direction of a vertex says nothing new
 constexpr double kSelfOpposed = 0.3;    // cosine by which faces of one body oppose each other where they may meet
 constexpr double kParallel = 0.05;      // sine between edges below which they have no common normal
@@ -63,7 +63,7 @@ class VertexSearch {
     remembered_ = recall(v);
     const Vec3& p = a_.frame->vertices[v];
     const Vec3 end = p + search_.h * a_.frame->velocities[v];
-    // Who is inside is looked for as deep as it was, and a little more.
+    // A vertex inside is searched for as deep as it was, and a little more.
     const double deepest = kDeepest * search_.length;
     const double deep = remembered_ ? std::min(deepest, kDeeper * remembered_->depth) : 0.0;
     if (isOutOf(b_.frame->bounds, p, end, margin_ + deep)) return false;
@@ -96,10 +96,10 @@ class VertexSearch {
     return b_.frame->face_normals[face].dot(a_.frame->vertex_normals[v]) < -kSelfOpposed;
   }
 
-  void gather(Index v, const Vec3& p, const Vec3& end, double look) {
+  void gather(Index v, const Vec3& p, const Vec3& end, double within) {
     candidates_.clear();
     const Vec3& velocity = a_.frame->velocities[v];
-    b_.surface->tree.query(b_.frame->boxes, boxAround(p, end, look), [&](Index face) {
+    b_.surface->tree.query(b_.frame->boxes, boxAround(p, end, within), [&](Index face) {
       if (!mayMeet(v, face)) return;
       const Triangle& t = b_.surface->triangles[face];
       const Points &x = b_.frame->vertices, &u = b_.frame->velocities;
@@ -110,7 +110,7 @@ class VertexSearch {
       c.distance = (p - c.point).norm();
       c.reach = kAhead * search_.h *
                 (velocity - (c.weights[0] * u[t[0]] + c.weights[1] * u[t[1]] + c.weights[2] * u[t[2]])).norm();
-      if (c.distance > look + c.reach) return;
+      if (c.distance > within + c.reach) return;
       c.reach += margin_;
       c.corners = static_cast<int>((c.weights.array() > 0.0).count());
       candidates_.push_back(c);
@@ -394,11 +394,11 @@ void findVerticesNear(const PairSearch& search, SearchScratch& scratch) {
 
 std::size_t findVertexFace(const PairSearch& search, SearchScratch& scratch) {
   VertexSearch each(search, scratch);
-  std::size_t looked = 0;
-  for (const Index v : scratch.vertices) looked += each.find(v);
+  std::size_t queried = 0;
+  for (const Index v : scratch.vertices) queried += each.find(v);
   if (search.self == PairSearch::Self::kNo && scratch.vertices.size() == search.a.surface->vertices())
     leadOut(search, scratch.found);
-  return looked;
+  return queried;
 }
 
 void findEdgeEdge(const PairSearch& search, FoundFeatures& found) {

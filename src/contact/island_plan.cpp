@@ -15,7 +15,7 @@ Index rootOf(std::vector<Index>& root, Index i) {
 
 }  // namespace
 
-void IslandPlan::make(const std::vector<ContactParty>& all, const std::vector<Contact>& made) {
+void IslandPlan::make(const std::vector<ShapeCollider>& all, const std::vector<Contact>& made) {
   const Index count = static_cast<Index>(all.size());
   root_.resize(count);
   for (Index p = 0; p < count; ++p) root_[p] = p;
@@ -49,18 +49,18 @@ void IslandPlan::make(const std::vector<ContactParty>& all, const std::vector<Co
   for (Index k = 0; k < moving_.size(); ++k)
     if (moving_[k] != kNoIndex) contacts[next_[moving_[k]]++] = k;
 
-  party_offsets.assign(islands + 1, 0);
+  collider_offsets.assign(islands + 1, 0);
   shifts.assign(count, kNoIndex);
   const auto island = [&](Index p) { return number_[rootOf(root_, p)]; };
   for (Index p = 0; p < count; ++p)
-    if (all[p].moves && island(p) != kNoIndex) ++party_offsets[island(p) + 1];
-  for (Index i = 0; i < islands; ++i) party_offsets[i + 1] += party_offsets[i];
-  parties.resize(party_offsets.back());
-  next_.assign(party_offsets.begin(), party_offsets.end() - 1);
+    if (all[p].moves && island(p) != kNoIndex) ++collider_offsets[island(p) + 1];
+  for (Index i = 0; i < islands; ++i) collider_offsets[i + 1] += collider_offsets[i];
+  colliders.resize(collider_offsets.back());
+  next_.assign(collider_offsets.begin(), collider_offsets.end() - 1);
   Index particles = 0;
   for (Index p = 0; p < count; ++p)
-    if (all[p].moves && island(p) != kNoIndex) parties[next_[island(p)]++] = p;
-  for (Index p : parties) {
+    if (all[p].moves && island(p) != kNoIndex) colliders[next_[island(p)]++] = p;
+  for (Index p : colliders) {
     shifts[p] = particles;
     particles += all[p].particles;
   }

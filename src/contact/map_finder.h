@@ -55,7 +55,7 @@ class PointFinder {
     if (count_ <= 1) return 0;
     Index best = 0;
     double least = std::numeric_limits<double>::infinity();
-    const auto look = [&](const Vec3& at, Index n) {
+    const auto compare = [&](const Vec3& at, Index n) {
       const double squared = (at - p).squaredNorm();
       if (squared < least || (squared == least && n < best)) {
         least = squared;
@@ -63,21 +63,21 @@ class PointFinder {
       }
     };
     if (count_ <= kFew) {
-      for (Index n = 0; n < count_; ++n) look(points_[n], n);
+      for (Index n = 0; n < count_; ++n) compare(points_[n], n);
       return best;
     }
-    const auto lookIn = [&](std::size_t first, std::size_t last) {
-      for (Index k = offsets_[first]; k < offsets_[last + 1]; ++k) look(sorted_[k], items_[k]);
+    const auto compareIn = [&](std::size_t first, std::size_t last) {
+      for (Index k = offsets_[first]; k < offsets_[last + 1]; ++k) compare(sorted_[k], items_[k]);
     };
     // The first ring that holds any, then all cells that can hold a nearer one: along z they lie side by side.
     const std::array<int, 3> home = grid_.cellAt(p);
     for (int ring = 0, rings = grid_.ringsAround(home); ring <= rings && !std::isfinite(least); ++ring)
-      visitRing(grid_, home, ring, [&](std::size_t cell) { lookIn(cell, cell); });
+      visitRing(grid_, home, ring, [&](std::size_t cell) { compareIn(cell, cell); });
     if (!std::isfinite(least)) return best;
     const Vec3 around = Vec3::Constant(std::min(std::sqrt(least), limit) + 1e-9 * grid_.edge);  // not by rounding
     const std::array<int, 3> low = grid_.cellAt(p - around), high = grid_.cellAt(p + around);
     for (int x = low[0]; x <= high[0]; ++x)
-      for (int y = low[1]; y <= high[1]; ++y) lookIn(grid_.number(x, y, low[2]), grid_.number(x, y, high[2]));
+      for (int y = low[1]; y <= high[1]; ++y) compareIn(grid_.number(x, y, low[2]), grid_.number(x, y, high[2]));
     return best;
   }
 

@@ -142,7 +142,7 @@ class Limit {
     std::array<Vec3, 4> start, end;
     place(pairs, watched, start, end);
     PairDistance met = distanceOfPair(watched.of_a, start);
-    // Who has come to touch is on the side where it was.
+    // A feature that has come to touch is on the side where it was.
     if (!(met.distance > pairs.touching)) {
       watched.least = -pairs.touching;
       const double now = alongNormal(watched, met, end);

@@ -10,7 +10,7 @@
 namespace meshless {
 namespace {
 
-constexpr std::int64_t kMaxCellsOfBox = 1000;  // beyond it, looking at every face is cheaper than at the cells
+constexpr std::int64_t kMaxCellsOfBox = 1000;  // beyond it, testing every face is cheaper than testing the cells
 constexpr double kOnEdge = 1e-9;               // barycentric slack, so that no ray slips through between two faces
 constexpr double kNear = 1e-12;                // of an edge's length: at the crossing itself
 

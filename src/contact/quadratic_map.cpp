@@ -18,15 +18,15 @@ QuadraticMap::Basis QuadraticMap::basis(const Vec3& q) {
   return b;
 }
 
-Vec3 QuadraticMap::at(const Vec3& r) const { return fit * (basis((r - rest) / size) - mean) + centre; }
+Vec3 QuadraticMap::at(const Vec3& r) const { return fit * (basis((r - rest) / scale) - mean) + centre; }
 
 Mat3 QuadraticMap::slope(const Vec3& r) const {
-  const Vec3 q = (r - rest) / size;
+  const Vec3 q = (r - rest) / scale;
   Mat3 s;
   s.col(0) = fit.col(0) + 2.0 * q.x() * fit.col(3) + q.y() * fit.col(6) + q.z() * fit.col(8);
   s.col(1) = fit.col(1) + 2.0 * q.y() * fit.col(4) + q.x() * fit.col(6) + q.z() * fit.col(7);
   s.col(2) = fit.col(2) + 2.0 * q.z() * fit.col(5) + q.y() * fit.col(7) + q.x() * fit.col(8);
-  return s / size;
+  return s / scale;
 }
 
 bool QuadraticMap::invert(const Vec3& present, double most, Vec3& r, Mat3& to_rest) const {
@@ -39,10 +39,10 @@ bool QuadraticMap::invert(const Vec3& present, double most, Vec3& r, Mat3& to_re
     Vec3 way = to_rest * missing;
     const double length = way.norm();
     if (!std::isfinite(length)) return false;
-    if (length > kLongestStep * size) way *= kLongestStep * size / length;
+    if (length > kLongestStep * scale) way *= kLongestStep * scale / length;
     guess += way;
     if ((guess - r).squaredNorm() > most * most) return false;
-    if (length < kClose * size) {
+    if (length < kClose * scale) {
       r = guess;
       return true;
     }

@@ -6,11 +6,11 @@
 namespace meshless {
 namespace {
 
-constexpr double kOutTime = 0.03;        // [s] in which an overlap falls to 1/e: what is let out slowly gains no speed
+constexpr double kOutTime = 0.03;        // [s] in which an overlap falls to 1/e: what is removed slowly gains no speed
 constexpr double kOutStiffness = 800.0;  // of it, over the inertia that it moves: impulses end where two can't both be met
 constexpr int kMostSweeps = 4;          // of a substep
 constexpr double kTolerance = 2e-3;     // mean edges: sweeps end where no row was corrected by more
-constexpr double kOutSpeed = 0.5;       // [1/s] mean edges: faster nothing is let out
+constexpr double kOutSpeed = 0.5;       // [1/s] mean edges: overlap is removed no faster
 
 using Four = double __attribute__((vector_size(32), may_alias));
 

@@ -99,16 +99,16 @@ SelfContactSet selfContactSet(const ContactShape& shape, bool cuts_alone, double
   return set;
 }
 
-void SelfGrid::make(const ContactParty& party, double reach) {
-  const SelfContactSet& set = *party.self;
-  const std::vector<Triangle>& triangles = party.shape->surface().triangles;
+void SelfGrid::make(const ShapeCollider& collider, double reach) {
+  const SelfContactSet& set = *collider.self;
+  const std::vector<Triangle>& triangles = collider.shape->surface().triangles;
   boxes_.clear();
   triangles_ = &set.triangles;
   Box all;
   double extent = 0.0;
   for (Index t : set.triangles) {
     Box box;
-    for (Index corner : triangles[t]) box.extend(vertexAt(party, corner));
+    for (Index corner : triangles[t]) box.extend(vertexAt(collider, corner));
     extent += box.diagonal();
     boxes_.push_back(grown(box, reach));
     all.extend(box.min);
@@ -160,25 +160,25 @@ void SelfGrid::forNear(const Vec3& p, const Visit& visit) const {
     if (boxes_[items_[n]].contains(p)) visit((*triangles_)[items_[n]]);
 }
 
-// The points of a body against its own faces, where both are now. Rest shapes say nothing here: lips lie on each other
-// in them.
-void Contacts::Impl::lookIntoSelf(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair) {
-  const ContactParty& party = parties[pair.a];
-  const SelfContactSet& set = *party.self;
-  const ContactShape& shape = *party.shape;
+// The points of a body against its own faces, where both are now. Rest shapes say nothing here: in them, wound faces
+// lie on each other.
+void Contacts::Impl::querySelf(Findings& to, const std::vector<ShapeCollider>& colliders, const Pair& pair) {
+  const ShapeCollider& collider = colliders[pair.a];
+  const SelfContactSet& set = *collider.self;
+  const ContactShape& shape = *collider.shape;
   const TriangleMesh& rest = shape.surface();
-  to.self_grid.make(party, std::max(pair.reach, set.depth));
+  to.self_grid.make(collider, std::max(pair.reach, set.depth));
   Points& areas = to.self_areas;  // about the vertices, as they are now
   areas.assign(rest.vertices.size(), Vec3::Zero());
   for (Index t : set.triangles) {
     const Triangle& c = rest.triangles[t];
-    const Vec3& x0 = vertexAt(party, c[0]);
-    const Vec3 area = (vertexAt(party, c[1]) - x0).cross(vertexAt(party, c[2]) - x0);
+    const Vec3& x0 = vertexAt(collider, c[0]);
+    const Vec3 area = (vertexAt(collider, c[1]) - x0).cross(vertexAt(collider, c[2]) - x0);
     for (Index v : c) areas[v] += area;
   }
   for (Index v : set.vertices) {
     ++to.counters.self_points;
-    const Vec3 p = vertexAt(party, v);
+    const Vec3 p = vertexAt(collider, v);
     if (!p.allFinite()) continue;
     const Vec3 outward = areas[v].normalized();
     const Vec3& at_rest = rest.vertices[v];
@@ -189,7 +189,7 @@ void Contacts::Impl::lookIntoSelf(Findings& to, const std::vector<ContactParty>&
       const Triangle& c = rest.triangles[t];
       for (Index corner : c)
         if (corner == v) return;
-      const Vec3 &x0 = vertexAt(party, c[0]), &x1 = vertexAt(party, c[1]), &x2 = vertexAt(party, c[2]);
+      const Vec3 &x0 = vertexAt(collider, c[0]), &x1 = vertexAt(collider, c[1]), &x2 = vertexAt(collider, c[2]);
       const Vec3 area = (x1 - x0).cross(x2 - x0);
       const double length = area.norm();
       if (!(length > 0.0) || area.dot(outward) > kOpposed * length) return;
@@ -209,19 +209,19 @@ void Contacts::Impl::lookIntoSelf(Findings& to, const std::vector<ContactParty>&
     });
     if (face == kNoIndex) continue;
     const std::size_t before = to.contacts.size();
-    addContact(to, parties, pair.a, v, {{v, v}, 0.0, Vec3::Zero()}, pair.a, face,
+    addContact(to, colliders, pair.a, v, {{v, v}, 0.0, Vec3::Zero()}, pair.a, face,
                {weights_there.x(), weights_there.y(), weights_there.z()}, false, false);
     if (to.contacts.size() > before) to.contacts.back().below = height_there < 0.0;
   }
-  crossRidges(to, parties, pair);
+  crossRidges(to, colliders, pair);
 }
 
 // Ridges that cross: no vertex of one need be over a face of the other. They press along what is across both, out of
 // the second; where they touch stays the same in a frame.
-void Contacts::Impl::crossRidges(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair) {
-  const ContactParty& party = parties[pair.a];
-  const SelfContactSet& set = *party.self;
-  const TriangleMesh& rest = party.shape->surface();
+void Contacts::Impl::crossRidges(Findings& to, const std::vector<ShapeCollider>& colliders, const Pair& pair) {
+  const ShapeCollider& collider = colliders[pair.a];
+  const SelfContactSet& set = *collider.self;
+  const TriangleMesh& rest = collider.shape->surface();
   if (set.ridges.size() < 2 || set.ridges.size() > kMostRidges) return;
   const double reach = std::max(pair.reach, set.depth);
   std::vector<RidgeNow>& now = to.ridges;
@@ -229,12 +229,12 @@ void Contacts::Impl::crossRidges(Findings& to, const std::vector<ContactParty>& 
   for (Index r = 0; r < set.ridges.size(); ++r) {
     const SelfContactSet::Ridge& ridge = set.ridges[r];
     RidgeNow here{{}, Vec3::Zero(), r};
-    for (Index v : ridge.vertices) here.box.extend(vertexAt(party, v));
+    for (Index v : ridge.vertices) here.box.extend(vertexAt(collider, v));
     for (Index f : ridge.faces) {
       if (f == kNoIndex) continue;
       const Triangle& c = rest.triangles[f];
-      const Vec3& x0 = vertexAt(party, c[0]);
-      here.outward += (vertexAt(party, c[1]) - x0).cross(vertexAt(party, c[2]) - x0).normalized();
+      const Vec3& x0 = vertexAt(collider, c[0]);
+      here.outward += (vertexAt(collider, c[1]) - x0).cross(vertexAt(collider, c[2]) - x0).normalized();
     }
     here.outward.normalize();
     if (!here.outward.allFinite() || !std::isfinite(here.box.diagonal())) continue;
@@ -253,8 +253,8 @@ void Contacts::Impl::crossRidges(Findings& to, const std::vector<ContactParty>& 
       ++to.counters.self_points;
       const std::array<Index, 2>&e = set.ridges[a.ridge].vertices, &f = set.ridges[b.ridge].vertices;
       if (e[0] == f[0] || e[0] == f[1] || e[1] == f[0] || e[1] == f[1]) continue;
-      const Vec3 from_a = vertexAt(party, e[0]), from_b = vertexAt(party, f[0]);
-      const Vec3 along_a = vertexAt(party, e[1]) - from_a, along_b = vertexAt(party, f[1]) - from_b;
+      const Vec3 from_a = vertexAt(collider, e[0]), from_b = vertexAt(collider, f[0]);
+      const Vec3 along_a = vertexAt(collider, e[1]) - from_a, along_b = vertexAt(collider, f[1]) - from_b;
       double s = 0.0, t = 0.0;
       if (!crossing(from_a, along_a, from_b, along_b, s, t)) continue;
       Vec3 normal = along_a.cross(along_b).normalized();
@@ -275,12 +275,12 @@ void Contacts::Impl::crossRidges(Findings& to, const std::vector<ContactParty>& 
       c.below = height < 0.0;
       c.normal = normal;
       c.first = static_cast<Index>(to.entries.size());
-      c.offset = addRow(party, e[0], 1.0 - s, to.entries);
-      c.offset += addRow(party, e[1], s, to.entries);
+      c.offset = addRow(collider, e[0], 1.0 - s, to.entries);
+      c.offset += addRow(collider, e[1], s, to.entries);
       tidy(to.entries, c.first);
       c.split = static_cast<Index>(to.entries.size());
-      c.offset -= addRow(party, f[0], 1.0 - t, to.entries);
-      c.offset -= addRow(party, f[1], t, to.entries);
+      c.offset -= addRow(collider, f[0], 1.0 - t, to.entries);
+      c.offset -= addRow(collider, f[1], t, to.entries);
       tidy(to.entries, c.split);
       c.end = static_cast<Index>(to.entries.size());
       to.contacts.push_back(c);

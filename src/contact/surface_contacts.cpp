@@ -8,7 +8,7 @@ namespace meshless {
 namespace {
 
 constexpr double kSkin = 0.05;                           // of the mean edge: surfaces rest so far above each other
-constexpr double kAhead = 1.2;                           // times the way of a frame: who speeds up is met too
+constexpr double kAhead = 1.2;                           // times the way of a frame: what speeds up is met too
 constexpr std::uint64_t kGroundKey = ~std::uint64_t{0};  // beyond those of bodies and obstacles
 constexpr std::uint64_t kSphereKey = kGroundKey - 1;
 
@@ -119,7 +119,7 @@ void SurfaceContacts::findMoved(const SurfaceScene& scene, const std::vector<Col
   const Index count = static_cast<Index>(colliders.size());
   for (auto at = ways_.begin(); at != ways_.end();) {
     const Index c = colliderOf(at->first);
-    const bool near = c != kNoIndex && (needed_[c] || !colliders[c].moves);  // rows of who sleeps count from it
+    const bool near = c != kNoIndex && (needed_[c] || !colliders[c].moves);  // a sleeping collider's rows count from it
     at = near ? std::next(at) : ways_.erase(at);
   }
   std::vector<KeptWay*>& ways = ways_of_;
@@ -184,13 +184,13 @@ void SurfaceContacts::find(const SurfaceScene& scene, const std::vector<Collider
   runEach(for_each, pairs_.size(), [&](std::size_t n) {
     if (pairs_[n]->stale && !isEdges(n)) findPair(scene, colliders, *pairs_[n]);
   });
-  runEach(for_each, pairs_.size(), [&](std::size_t n) {  // these ask who is inside
+  runEach(for_each, pairs_.size(), [&](std::size_t n) {  // these ask which vertices are inside
     if (pairs_[n]->stale && isEdges(n)) findPair(scene, colliders, *pairs_[n]);
   });
   for (const Pair* pair : pairs_) {
     counters.contacts += pair->set.rows.size();
     if (pair->a == pair->b) counters.self_points += pair->set.rows.size();
-    if (pair->stale) counters.lookups += pair->looked_up;
+    if (pair->stale) counters.queries += pair->queried;
   }
   listReached(scene, colliders);
   joinIslands(colliders);
@@ -233,7 +233,7 @@ void SurfaceContacts::findPair(const SurfaceScene& scene, const std::vector<Coll
       break;
     case Kind::kVertexFace:
       findVerticesNear(search, scratch->search);
-      pair.looked_up = findVertexFace(search, scratch->search);
+      pair.queried = findVertexFace(search, scratch->search);
   }
   makeRows(scene, colliders, *scratch, pair);
   pair.sides.assign(found.sides.begin(), found.sides.end());

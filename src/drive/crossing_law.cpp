@@ -14,7 +14,7 @@ struct Surface {
   const std::string* name;
   const TriangleMesh* mesh;
   Box bounds;
-  double size;
+  double diagonal;
 };
 
 Box boxOf(const Vec3& p, const Vec3& q) {
@@ -45,7 +45,7 @@ bool goesThrough(const Vec3& p, const Vec3& q, const TriangleMesh& mesh, double 
 }
 
 std::size_t crossings(const Surface& a, const Surface& b) {
-  const double margin = 0.1 * allowedDepth(std::min(a.size, b.size));
+  const double margin = 0.1 * allowedDepth(std::min(a.diagonal, b.diagonal));
   std::vector<std::array<Index, 2>> edges;
   for (const Triangle& t : a.mesh->triangles)
     for (int k = 0; k < 3; ++k) {
@@ -65,7 +65,7 @@ std::size_t crossings(const Surface& a, const Surface& b) {
 Finding crossingLaw(const Seen& seen) {
   std::vector<Surface> surfaces;
   for (const SeenBody& body : seen.bodies)
-    surfaces.push_back({&body.name, &body.surface, boundsOf(body.surface.vertices), body.size});
+    surfaces.push_back({&body.name, &body.surface, boundsOf(body.surface.vertices), body.diagonal});
   const std::size_t bodies = surfaces.size();
   for (const auto& obstacle : seen.obstacles) {
     const Box bounds = boundsOf(obstacle->mesh.vertices);

@@ -15,12 +15,12 @@ struct Solid {
   const std::string* name;
   const TriangleMesh* surface;
   Box bounds;
-  double size;
+  double diagonal;
   std::unique_ptr<SolidQuery> query;  // once somebody asks
 };
 
 void vertexDepth(const Solid& a, Solid& b, Finding& worst) {
-  const double allowed = allowedDepth(std::min(a.size, b.size));
+  const double allowed = allowedDepth(std::min(a.diagonal, b.diagonal));
   for (const Vec3& p : a.surface->vertices) {
     if (!b.bounds.contains(p)) continue;
     if (!b.query) b.query = std::make_unique<SolidQuery>(*b.surface);
@@ -32,13 +32,13 @@ void vertexDepth(const Solid& a, Solid& b, Finding& worst) {
 
 }  // namespace
 
-double allowedDepth(double smaller_size) { return std::max(1e-3, 0.01 * smaller_size); }
+double allowedDepth(double smaller_diagonal) { return std::max(1e-3, 0.01 * smaller_diagonal); }
 
 Finding depthLaw(const Seen& seen) {
   Finding worst;
   std::vector<Solid> solids;
   for (const SeenBody& body : seen.bodies)
-    solids.push_back({&body.name, &body.surface, boundsOf(body.surface.vertices), body.size, nullptr});
+    solids.push_back({&body.name, &body.surface, boundsOf(body.surface.vertices), body.diagonal, nullptr});
   const std::size_t bodies = solids.size();
   for (const auto& obstacle : seen.obstacles) {
     const Box bounds = boundsOf(obstacle->mesh.vertices);
@@ -48,7 +48,7 @@ Finding depthLaw(const Seen& seen) {
     if (seen.ground)
       for (const Vec3& p : solids[a].surface->vertices)
         if (const double depth = *seen.ground - p.z(); depth > 0.0)
-          worst.take(depth / allowedDepth(solids[a].size),
+          worst.take(depth / allowedDepth(solids[a].diagonal),
                      words("a vertex of ", *solids[a].name, " is ", 1e3 * depth, " mm below the ground"));
     for (std::size_t b = a + 1; b < solids.size(); ++b) {
       if (!solids[a].bounds.overlaps(solids[b].bounds)) continue;

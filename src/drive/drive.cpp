@@ -172,7 +172,7 @@ class Run {
   std::vector<AloneLook> alone_;
 };
 
-std::vector<PieceVolume> ofLooks(std::vector<PieceVolume> pieces) {
+std::vector<PieceVolume> ofAppearance(std::vector<PieceVolume> pieces) {
   pieces.erase(std::remove_if(pieces.begin(), pieces.end(), [](const PieceVolume& piece) { return piece.elastic; }),
                pieces.end());
   return pieces;
@@ -197,13 +197,13 @@ DriveReport drive(const DriveScene& scene, const DriveOptions& options) {
   DriveReport report;
   report.seed = scene.seed;
   report.support = scene.support;
-  bool any_looks = false, any_elastic = false;
+  bool any_appearance = false, any_elastic = false;
   for (const std::string& organ : scene.organs) report.organs += (report.organs.empty() ? "" : " + ") + organ;
   for (const BodyDef& body : scene.def.bodies) {
     report.materials += (report.materials.empty() ? "" : " + ") + body.material.name;
-    (body.material.elastic() ? any_elastic : any_looks) = true;
+    (body.material.elastic() ? any_elastic : any_appearance) = true;
   }
-  report.family = any_elastic && any_looks ? "mixed" : any_elastic ? "elastic" : "looks";
+  report.family = any_elastic && any_appearance ? "mixed" : any_elastic ? "elastic" : "looks";
 
   Run run(scene, options, options.cuts, report);
   if (Status status = run.setUp(scene); !status) {
@@ -211,10 +211,10 @@ DriveReport drive(const DriveScene& scene, const DriveOptions& options) {
     return report;
   }
   run.play();
-  const std::vector<PieceVolume> looks = ofLooks(run.volumes());
-  if (!report.finished || !options.cuts || !volumeLaw(looks, {}).broken()) return report;
+  const std::vector<PieceVolume> appearance = ofAppearance(run.volumes());
+  if (!report.finished || !options.cuts || !volumeLaw(appearance, {}).broken()) return report;
 
-  // Materials for looks may do what they do uncut.
+  // Appearance materials may do what they do uncut.
   DriveReport uncut;
   DriveOptions without = options;
   without.record = false;
@@ -222,9 +222,9 @@ DriveReport drive(const DriveScene& scene, const DriveOptions& options) {
   VolumeBands bands;
   if (other.setUp(scene)) {
     other.play();
-    widenBands(ofLooks(other.volumes()), bands);
+    widenBands(ofAppearance(other.volumes()), bands);
   }
-  report.findings[static_cast<std::size_t>(Law::kVolume)].take(volumeLaw(looks, bands));
+  report.findings[static_cast<std::size_t>(Law::kVolume)].take(volumeLaw(appearance, bands));
   return report;
 }
 

@@ -22,7 +22,7 @@ AloneLook alone(const Seen& seen) {
   look.time = seen.time;
   const double g = seen.gravity.norm();
   for (const SeenBody& body : seen.bodies)
-    look.pieces.push_back({body.name, body.speed(), g > 0.0 ? -seen.gravity.dot(body.centre) / g : 0.0, body.size});
+    look.pieces.push_back({body.name, body.speed(), g > 0.0 ? -seen.gravity.dot(body.centre) / g : 0.0, body.diagonal});
   return look;
 }
 
@@ -42,7 +42,7 @@ Finding energyLaw(const std::vector<AloneLook>& looks, double gravity) {
       const auto before = seconds[number - 1].energy.find(piece.name);
       if (before == seconds[number - 1].energy.end()) continue;
       const double fastest = seconds[number - 1].fastest;
-      const double allowed = gravity * allowedDepth(piece.size) + 2.0 * fastest * fastest;
+      const double allowed = gravity * allowedDepth(piece.diagonal) + 2.0 * fastest * fastest;
       // Without gravity and motion, rounding's.
       worst.take((energy - before->second) / (allowed + 1e-8),
                  words(piece.name, " at ", look.time, " s has ", energy - before->second, " J/kg more than before"));

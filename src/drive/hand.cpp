@@ -168,7 +168,7 @@ void Hand::cut(World& world, Random& random) {
   double top = 0.0;
   const Target target = anyBody(world, random, top);
   CutCommand command;
-  Blades& blades = command.blades;
+  ScissorBlades& blades = command.blades;
   Vec3 normal = random.direction();
   if (random.chance(0.5)) normal = normalTo(Vec3::UnitZ(), random);
   blades.x_axis = normalTo(normal, random);

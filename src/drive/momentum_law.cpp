@@ -26,7 +26,7 @@ Totals totalsOf(const Seen& seen) {
     sum.centre += body.mass * body.centre;
     sum.linear += body.linear_momentum;
     sum.moving += body.mass * body.speed();
-    sum.size = std::max(sum.size, body.size);
+    sum.size = std::max(sum.size, body.diagonal);
   }
   sum.centre /= sum.mass;
   for (const SeenBody& body : seen.bodies) {
@@ -53,7 +53,7 @@ bool fallsFreely(const Seen& seen, double seconds) {
   for (const SeenBody& body : seen.bodies) {
     if (body.handled || body.fixed || body.surface.empty()) return false;
     // Parts of it may be faster than it is on the mean.
-    const double way = 4.0 * body.speed() * seconds + seen.gravity.norm() * seconds * seconds + 0.05 * body.size;
+    const double way = 4.0 * body.speed() * seconds + seen.gravity.norm() * seconds * seconds + 0.05 * body.diagonal;
     Box reach = boundsOf(body.surface.vertices);
     reach.min.array() -= way;
     reach.max.array() += way;

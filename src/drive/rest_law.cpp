@@ -12,7 +12,7 @@ constexpr double kRest = 0.01;  // [1/s] of its size
 Finding restLaw(const Seen& seen) {
   Finding worst;
   for (const SeenBody& body : seen.bodies)
-    worst.take(body.speed() / (kRest * body.size), words(body.name, " moves at ", 1e3 * body.speed(), " mm/s"));
+    worst.take(body.speed() / (kRest * body.diagonal), words(body.name, " moves at ", 1e3 * body.speed(), " mm/s"));
   return worst;
 }
 

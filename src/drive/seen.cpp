@@ -40,7 +40,7 @@ Seen see(World& world, bool surfaces) {
     body.centre = from.measures.centre_of_mass;
     body.linear_momentum = from.measures.linear_momentum;
     body.angular_momentum = from.measures.angular_momentum;
-    body.size = boundsOf(from.model->surface.vertices).diagonal();
+    body.diagonal = boundsOf(from.model->surface.vertices).diagonal();
     body.particles_finite =
         std::all_of(from.particles.begin(), from.particles.end(), [](const Vec3& p) { return p.allFinite(); });
     if (surfaces) {

@@ -73,7 +73,7 @@ std::vector<ElasticRest> makeElasticRest(const RestShape& shape) {
   for (std::size_t c = 0; c < elastic.size(); ++c) {
     const ClusterRest& rest = shape.clusters[c];
     elastic[c].spread_inverse = rest.mass * rest.moment_inverse;
-    elastic[c].spread = rest.size * rest.size / 3.0;
+    elastic[c].spread = rest.radius * rest.radius / 3.0;
   }
   return elastic;
 }

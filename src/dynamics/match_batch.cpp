@@ -107,9 +107,9 @@ struct BodyBatch::Impl {
 
   void prepare(std::size_t body, const MatchInput& in) {
     const ClusterRest& rest = in.shape.clusters[0];
-    const double inverse_size = rest.size > 0.0 ? 1.0 / rest.size : 0.0;
-    constant(body, kSize) = static_cast<float>(rest.size);
-    const Mat3 m = rest.moment_inverse * (rest.mass * rest.size);
+    const double inverse_size = rest.radius > 0.0 ? 1.0 / rest.radius : 0.0;
+    constant(body, kSize) = static_cast<float>(rest.radius);
+    const Mat3 m = rest.moment_inverse * (rest.mass * rest.radius);
     const double entries[6] = {m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(1, 2), m(2, 0)};
     for (int k = 0; k < 6; ++k) constant(body, kMoment + k) = static_cast<float>(entries[k]);
     for (std::size_t i = 0; i < particles; ++i) {

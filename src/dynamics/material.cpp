@@ -20,7 +20,7 @@ const char* toString(SelfContact self_contact) {
   switch (self_contact) {
     case SelfContact::kNone:
       return "none";
-    case SelfContact::kLips:
+    case SelfContact::kWoundFaces:
       return "lips";
     case SelfContact::kAll:
       return "all";
@@ -70,7 +70,7 @@ Status ResponseCurve::validate(const std::string& key) const {
 
 Status Material::validate() const {
   if (!(youngs_modulus >= 0.0 && youngs_modulus <= 1e12))
-    return outOfRange("youngs_modulus", youngs_modulus, "0 (a material for looks) to 1e12 Pa");
+    return outOfRange("youngs_modulus", youngs_modulus, "0 (an appearance material) to 1e12 Pa");
   if (!(poissons_ratio >= 0.0 && poissons_ratio <= 0.49))
     return outOfRange("poissons_ratio", poissons_ratio, "0 to 0.49");
   if (!(alpha >= 0.0 && alpha <= 1.0)) return outOfRange("alpha", alpha, "0 to 1");

@@ -114,7 +114,7 @@ RestShape makeRestShape(const Points& rest, const std::vector<double>& masses, c
       const Vec3 q = rest[i] - r.centre;
       moment += (masses[i] * clusters.weights[k]) * q * q.transpose();
     }
-    r.size = std::sqrt(moment.trace() / r.mass);
+    r.radius = std::sqrt(moment.trace() / r.mass);
     const double scale = moment.trace();
     if (!(scale > 0.0)) continue;
     const Eigen::SelfAdjointEigenSolver<Mat3> solver(moment / scale);
@@ -136,12 +136,12 @@ void addQuadraticRest(const Points& rest, const std::vector<double>& masses, con
     if (!r.linear_rank) continue;
     for (Index k = clusters.offsets[c]; k < clusters.offsets[c + 1]; ++k) {
       const Index i = clusters.members[k];
-      quadratic.mean += (masses[i] * clusters.weights[k] / r.mass) * quadraticBasis((rest[i] - r.centre) / r.size);
+      quadratic.mean += (masses[i] * clusters.weights[k] / r.mass) * quadraticBasis((rest[i] - r.centre) / r.radius);
     }
     Mat9 moment = Mat9::Zero();
     for (Index k = clusters.offsets[c]; k < clusters.offsets[c + 1]; ++k) {
       const Index i = clusters.members[k];
-      const Vec9 b = quadraticBasis((rest[i] - r.centre) / r.size) - quadratic.mean;
+      const Vec9 b = quadraticBasis((rest[i] - r.centre) / r.radius) - quadratic.mean;
       moment += (masses[i] * clusters.weights[k]) * b * b.transpose();
     }
     const Eigen::SelfAdjointEigenSolver<Mat9> solver(moment / r.mass);
@@ -179,14 +179,14 @@ void matchShapes(const MatchInput& in, const Points& y, MatchMode mode, double b
       Mat39 moment = Mat39::Zero();
       for (Index k = begin; k < end; ++k) {
         const Index i = in.clusters.members[k];
-        const Vec9 b = quadraticBasis((in.rest[i] - rest.centre) / rest.size) - quadratic.mean;
+        const Vec9 b = quadraticBasis((in.rest[i] - rest.centre) / rest.radius) - quadratic.mean;
         moment += (in.masses[i] * in.clusters.weights[k]) * (y[i] - pose.centre) * b.transpose();
       }
       const Mat39 fit = share * moment * quadratic.moment_inverse;
       for (Index k = begin; k < end; ++k) {
         const Index i = in.clusters.members[k];
         const Vec3 q = in.rest[i] - rest.centre;
-        const Vec9 b = quadraticBasis(q / rest.size) - quadratic.mean;
+        const Vec9 b = quadraticBasis(q / rest.radius) - quadratic.mean;
         goals[i] += in.clusters.weights[k] * (pose.centre + swelling * (fit * b + (1.0 - share) * (rotation * q)));
       }
     } else {

@@ -36,7 +36,7 @@ double cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(
 
 }  // namespace
 
-bool bladesMeet(const TriangleMesh& mesh, const Blades& blades) {
+bool bladesMeet(const TriangleMesh& mesh, const ScissorBlades& blades) {
   if (!blades.origin.allFinite() || !blades.x_axis.allFinite() || !blades.y_axis.allFinite()) return false;
   if (!(blades.length >= 0.0) || !(blades.width >= 0.0)) return false;
   const Reach reach{blades.length > 0.0 ? blades.length : kInfinity,

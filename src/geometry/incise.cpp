@@ -1,4 +1,4 @@
-// The stages of an incision, one after the other: the mouth, the lips, joining them, solids, checks.
+// The stages of an incision, one after the other: the wound rim, the wound faces, the joined surface, solids, checks.
 #include "meshless_surgery/geometry/incise.h"
 
 #include <algorithm>
@@ -40,7 +40,7 @@ Status checkBlade(const Blade& blade, const InciseOptions& options) {
                  "the incision's band is " + number(options.band) + "; it must be within 1e-12 .. 1e-3"};
   if (!(options.spacing >= 0.0) || !std::isfinite(options.spacing))
     return Error{ErrorCode::kInvalidArgument,
-                 "the lips' spacing is " + number(options.spacing) + " m; it must be 0 or above, and finite"};
+                 "the wound faces' spacing is " + number(options.spacing) + " m; it must be 0 or above, and finite"};
   return Done{};
 }
 
@@ -85,7 +85,7 @@ double areaOf(const TriangleMesh& mesh, std::size_t t) {
   return 0.5 * (mesh.vertices[v[1]] - mesh.vertices[v[0]]).cross(mesh.vertices[v[2]] - mesh.vertices[v[0]]).norm();
 }
 
-/// A last look at what would be handed out.
+/// A last check of what would be handed out.
 Status checkOpened(const TriangleMesh& mesh, const OpenedSurface& opened) {
   const double before = signedVolume(mesh), after = signedVolume(opened.mesh), area = surfaceArea(mesh);
   const Box box = boundsOf(mesh.vertices);
@@ -107,18 +107,18 @@ Status checkOpened(const TriangleMesh& mesh, const OpenedSurface& opened) {
 /// `in_surface`: set where triangles of the mesh lie in the blade.
 Result<Incision> inciseOnce(const TriangleMesh& mesh, const Blade& blade, const InciseOptions& options,
                             bool& in_surface) {
-  Result<Mouth> mouth = openMouth(mesh, blade, options.band);
-  if (!mouth) return mouth.error();
-  in_surface |= mouth->lies_in_surface;
-  // Fronts and mouths of earlier incisions in the plane may lie on the rim, split in other places.
-  if (mouth->along_edges) splitRimAtVertices(*mouth);
-  Result<Lips> lips = fillLips(*mouth, options, true);
-  const auto failed = [&] { return !lips && lips.error().code == ErrorCode::kUnsuitableShape; };
-  if (failed() && splitRimAtVertices(*mouth)) lips = fillLips(*mouth, options, true);
+  Result<SplitSurface> surface = splitAtBlade(mesh, blade, options.band);
+  if (!surface) return surface.error();
+  in_surface |= surface->lies_in_surface;
+  // Fronts and rims of earlier incisions in the plane may lie on the rim, split in other places.
+  if (surface->along_edges) splitRimAtVertices(*surface);
+  Result<WoundFaces> wound = fillWoundFaces(*surface, options, true);
+  const auto failed = [&] { return !wound && wound.error().code == ErrorCode::kUnsuitableShape; };
+  if (failed() && splitRimAtVertices(*surface)) wound = fillWoundFaces(*surface, options, true);
   // Where the rim crosses itself, what only touches the plane may be why.
-  if (failed()) lips = fillLips(*mouth, options, false);
-  if (!lips) return lips.error();
-  const Result<OpenedSurface> opened = seal(*mouth, *lips, options.patch);
+  if (failed()) wound = fillWoundFaces(*surface, options, false);
+  if (!wound) return wound.error();
+  const Result<OpenedSurface> opened = seal(*surface, *wound, options.patch);
   if (!opened) return opened.error();
   const Status sound = checkOpened(mesh, *opened);
   if (!sound) return sound.error();
@@ -147,8 +147,9 @@ Result<Incision> incise(const TriangleMesh& mesh, const Blade& blade, const Inci
     Result<Incision> again = inciseOnce(mesh, blade, narrower, in_surface);
     if (again) return again;
   }
-  // Lips that all but lie in the blade's plane cross it where rounding will: beside it they do not. Not where lips do
-  // lie in it, for a second cut beside the first would part a sheet from the tissue.
+  // Wound faces that nearly lie in the blade's plane cross it wherever rounding has it; a little beside the plane they
+  // do not. This is not done where wound faces do lie in it: a second cut beside the first would part a sheet from the
+  // tissue.
   for (int retry = 0; retry < 2 && failed() && !in_surface; ++retry) {
     Blade beside = blade;
     beside.origin +=

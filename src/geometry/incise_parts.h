@@ -37,7 +37,7 @@ struct RimEdge {
 };
 
 /// The surface, its triangles split where the rectangle crosses them: the same points of space, more triangles.
-struct Mouth {
+struct SplitSurface {
   Frame frame;
   Points positions;  // the mesh's, then new ones; not all of them are used
   Index mesh_vertices = 0;
@@ -56,38 +56,39 @@ struct Mouth {
   Index addBetween(Index a, Index b, double s);
 };
 
-/// Splits rim edges that pass through vertices of others, as where lips that lie on each other are split in different
-/// places. False where there are none.
-bool splitRimAtVertices(Mouth& mouth);
+/// Splits rim edges that pass through vertices of others. There are such edges where wound faces that lie on each other
+/// are split in different places. False where there are none.
+bool splitRimAtVertices(SplitSurface& surface);
 
 /// Refuses kMissed where the plane or its rectangle is beside the mesh, kUnsuitableShape where the surface is open.
-Result<Mouth> openMouth(const TriangleMesh& mesh, const Blade& blade, double band);
+Result<SplitSurface> splitAtBlade(const TriangleMesh& mesh, const Blade& blade, double band);
 
-struct LipNode {
+struct WoundNode {
   Vec2 place;
-  Index vertex = kNoIndex;  // of the mouth: the lowest one here; kNoIndex inside the solid
+  Index vertex = kNoIndex;  // of the rim: the lowest one here; kNoIndex inside the solid
 };
 
 /// A triangle of the section, seen along the normal from above. Edge k runs from node k to the next.
-struct LipFace {
+struct WoundTriangle {
   std::array<Index, 3> nodes;                                      // counter-clockwise
-  std::array<Index, 3> neighbors{{kNoIndex, kNoIndex, kNoIndex}};  // faces of the same lip
+  std::array<Index, 3> neighbors{{kNoIndex, kNoIndex, kNoIndex}};  // across the edges, of the same wound face
   std::array<Index, 3> rim{{kNoIndex, kNoIndex, kNoIndex}};        // rim edges; neither: the buried front
   std::array<bool, 3> against{{false, false, false}};              // the rim edge runs the other way
   Index component = 0;
 };
 
-struct Lips {
-  std::vector<LipNode> nodes;
-  std::vector<LipFace> faces;
+/// Both wound faces have these triangles, with opposite directions.
+struct WoundFaces {
+  std::vector<WoundNode> nodes;
+  std::vector<WoundTriangle> triangles;
   Index components = 0;
 };
 
-/// Fills what of the solid's section lies in the rectangle, as far as it hangs together with the rim. `touched`: edges
+/// Fills the part of the solid's section that lies in the rectangle and hangs together with the rim. `touched`: edges
 /// where the surface only touches the plane are rim too.
-Result<Lips> fillLips(const Mouth& mouth, const InciseOptions& options, bool touched);
+Result<WoundFaces> fillWoundFaces(const SplitSurface& surface, const InciseOptions& options, bool touched);
 
-/// The surface opened: mouth and lips joined, not yet taken apart into pieces.
+/// The opened surface: the wound faces are joined to it at the rim. It is not yet taken apart into pieces.
 struct OpenedSurface {
   TriangleMesh mesh;  // vertices that no triangle uses are left out later
   VertexOrigins origins;
@@ -95,8 +96,8 @@ struct OpenedSurface {
   std::size_t first_new_triangle = 0;
 };
 
-/// Joins triangles at their edges side by side, then splits the mouth's vertices by umbrella.
-Result<OpenedSurface> seal(const Mouth& mouth, const Lips& lips, std::uint32_t patch);
+/// Joins triangles at their edges side by side, then splits the vertices of the rim by umbrella.
+Result<OpenedSurface> seal(const SplitSurface& surface, const WoundFaces& wound, std::uint32_t patch);
 
 /// Takes the surface apart into its connected solids, hollows with the solid around them.
 Result<std::vector<IncisedPiece>> separate(const OpenedSurface& opened);

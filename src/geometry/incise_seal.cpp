@@ -1,4 +1,4 @@
-// Joins the split surface and the lips into one closed surface again, opened along the mouth.
+// Joins the split surface and the wound faces into one closed surface again, opened along the wound rim.
 #include <algorithm>
 #include <numeric>
 #include <unordered_map>
@@ -9,7 +9,7 @@ namespace meshless {
 namespace incising {
 namespace {
 
-/// Corners of the triangles at the mouth, three a triangle; corner c is also the edge from its vertex to that of
+/// Corners of the triangles at the rim, three a triangle. Corner c also stands for the edge from its vertex to that of
 /// nextCorner(c).
 using Corner = Index;
 Corner nextCorner(Corner c) { return c % 3 == 2 ? c - 2 : c + 1; }
@@ -22,17 +22,18 @@ Error branches(Index a, Index b) {
 
 class Sealer {
  public:
-  Sealer(const Mouth& mouth, const Lips& lips, std::uint32_t patch) : mouth_(mouth), lips_(lips), patch_(patch) {}
+  Sealer(const SplitSurface& surface, const WoundFaces& wound, std::uint32_t patch)
+      : surface_(surface), wound_(wound), patch_(patch) {}
 
   Result<OpenedSurface> run() {
     gather();
     const Status joined = joinMesh();
     if (!joined) return joined.error();
     // Two rim edges between the same vertices, or one that is no edge of the mesh: it is finer than rounding there.
-    for (const LipFace& face : lips_.faces)
+    for (const WoundTriangle& face : wound_.triangles)
       for (const Index r : face.rim)
-        if (r != kNoIndex && at_rim_.count(r) == 0) return branches(mouth_.rim[r].from, mouth_.rim[r].to);
-    joinLips();
+        if (r != kNoIndex && at_rim_.count(r) == 0) return branches(surface_.rim[r].from, surface_.rim[r].to);
+    joinWoundFaces();
     for (Corner c = 0; c < partners_.size(); ++c) {
       const Corner d = partners_[c];
       if (d == kNoIndex || d < c) continue;
@@ -48,37 +49,37 @@ class Sealer {
   }
 
  private:
-  /// Triangles of the mesh with a corner on the mouth, then the lower lip's, then the upper lip's.
+  /// Triangles of the mesh with a corner on the rim, then those of the lower wound face, then those of the upper one.
   void gather() {
-    on_mouth_.assign(mouth_.positions.size(), false);
-    for (const LipFace& face : lips_.faces)
+    on_rim_.assign(surface_.positions.size(), false);
+    for (const WoundTriangle& face : wound_.triangles)
       for (const Index r : face.rim) {
         if (r == kNoIndex) continue;
-        const RimEdge& e = mouth_.rim[r];
-        on_mouth_[e.from] = on_mouth_[e.to] = true;
+        const RimEdge& e = surface_.rim[r];
+        on_rim_[e.from] = on_rim_[e.to] = true;
         rim_of_edge_.emplace(edgeKey(e.from, e.to), r);
       }
-    for (Index t = 0; t < mouth_.triangles.size(); ++t) {
-      const Triangle& v = mouth_.triangles[t];
-      if (on_mouth_[v[0]] || on_mouth_[v[1]] || on_mouth_[v[2]]) near_.push_back(t);
+    for (Index t = 0; t < surface_.triangles.size(); ++t) {
+      const Triangle& v = surface_.triangles[t];
+      if (on_rim_[v[0]] || on_rim_[v[1]] || on_rim_[v[2]]) near_.push_back(t);
     }
-    const std::size_t corners = 3 * (near_.size() + 2 * lips_.faces.size());
+    const std::size_t corners = 3 * (near_.size() + 2 * wound_.triangles.size());
     partners_.assign(corners, kNoIndex);
     parents_.resize(corners);
     std::iota(parents_.begin(), parents_.end(), Index{0});
   }
 
-  Index vertexOf(Corner c) const { return mouth_.triangles[near_[c / 3]][c % 3]; }
+  Index vertexOf(Corner c) const { return surface_.triangles[near_[c / 3]][c % 3]; }
   Corner lower(Index face, int edge) const { return static_cast<Corner>(3 * (near_.size() + face)) + edge; }
-  /// The upper lip runs the other way round: its corners are nodes 0, 2, 1.
+  /// The upper wound face runs the other way round: its corners are nodes 0, 2, 1.
   Corner upper(Index face, int edge) const {
-    return static_cast<Corner>(3 * (near_.size() + lips_.faces.size() + face)) + (2 - edge);
+    return static_cast<Corner>(3 * (near_.size() + wound_.triangles.size() + face)) + (2 - edge);
   }
-  Index faceOf(Corner c) const { return static_cast<Index>((c / 3 - near_.size()) % lips_.faces.size()); }
-  bool isLip(Corner c) const { return c / 3 >= near_.size(); }
-  bool isUpper(Corner c) const { return c / 3 >= near_.size() + lips_.faces.size(); }
+  Index faceOf(Corner c) const { return static_cast<Index>((c / 3 - near_.size()) % wound_.triangles.size()); }
+  bool isWoundFace(Corner c) const { return c / 3 >= near_.size(); }
+  bool isUpper(Corner c) const { return c / 3 >= near_.size() + wound_.triangles.size(); }
   Index nodeOf(Corner c) const {
-    const std::array<Index, 3>& n = lips_.faces[faceOf(c)].nodes;
+    const std::array<Index, 3>& n = wound_.triangles[faceOf(c)].nodes;
     return isUpper(c) ? n[(3 - c % 3) % 3] : n[c % 3];
   }
 
@@ -105,7 +106,7 @@ class Sealer {
     std::vector<Edge> edges;
     for (Corner c = 0; c < 3 * near_.size(); ++c) {
       const Index a = vertexOf(c), b = vertexOf(nextCorner(c));
-      if (on_mouth_[a] || on_mouth_[b]) edges.push_back({edgeKey(a, b), c});
+      if (on_rim_[a] || on_rim_[b]) edges.push_back({edgeKey(a, b), c});
     }
     std::sort(edges.begin(), edges.end(),
               [](const Edge& p, const Edge& q) { return p.ends != q.ends ? p.ends < q.ends : p.corner < q.corner; });
@@ -122,16 +123,16 @@ class Sealer {
         join(c, d);
       } else {
         // The triangle above runs as the rim does.
-        const RimEdge& e = mouth_.rim[rim->second];
+        const RimEdge& e = surface_.rim[rim->second];
         at_rim_[rim->second] = vertexOf(c) == e.from ? std::array<Corner, 2>{c, d} : std::array<Corner, 2>{d, c};
       }
     }
     return Done{};
   }
 
-  void joinLips() {
-    for (Index f = 0; f < lips_.faces.size(); ++f) {
-      const LipFace& face = lips_.faces[f];
+  void joinWoundFaces() {
+    for (Index f = 0; f < wound_.triangles.size(); ++f) {
+      const WoundTriangle& face = wound_.triangles[f];
       for (int k = 0; k < 3; ++k) {
         if (face.rim[k] != kNoIndex) {
           joinAtRim(f, k);
@@ -140,7 +141,7 @@ class Sealer {
         } else if (face.neighbors[k] > f) {
           const Index other = face.neighbors[k];
           int edge = 0;
-          while (lips_.faces[other].nodes[edge] != face.nodes[(k + 1) % 3]) ++edge;
+          while (wound_.triangles[other].nodes[edge] != face.nodes[(k + 1) % 3]) ++edge;
           join(lower(f, k), lower(other, edge));
           join(upper(f, k), upper(other, edge));
         }
@@ -149,15 +150,16 @@ class Sealer {
   }
 
   void joinAtRim(Index f, int k) {
-    const LipFace& face = lips_.faces[f];
+    const WoundTriangle& face = wound_.triangles[f];
     auto [along, back] = at_rim_.at(face.rim[k]);
     if (face.against[k]) std::swap(along, back);
-    const RimEdge::Kind kind = mouth_.rim[face.rim[k]].kind;
+    const RimEdge::Kind kind = surface_.rim[face.rim[k]].kind;
     const auto [entry, fresh] = touched_.try_emplace(face.rim[k], std::array<Index, 2>{f, static_cast<Index>(k)});
     join(upper(f, k), along);
     join(lower(f, k), back);
     if (kind == RimEdge::kCrossed || fresh) return;
-    // The lips pass below or above what is touched: there they go on, on the other side each half has its own.
+    // The wound faces pass below or above the touching edge. On that side they go on; on the other, each half has its
+    // own.
     const auto [other, edge] = entry->second;
     if (kind == RimEdge::kTouchedAbove) {
       join(upper(other, static_cast<int>(edge)), back);
@@ -176,37 +178,38 @@ class Sealer {
 
   /// The first umbrella of a vertex keeps it, the others get one of their own.
   void build() {
-    out_.mesh.vertices = mouth_.positions;
-    out_.mesh.triangles = mouth_.triangles;
-    out_.mesh.patches = mouth_.patches;
-    out_.origins.reserve(mouth_.positions.size() + 2 * lips_.nodes.size());
-    out_.origins.addKept(0, mouth_.mesh_vertices);
-    for (Index v = mouth_.mesh_vertices; v < mouth_.positions.size(); ++v) out_.origins.push_back(mouth_.originOf(v));
-    out_.first_new_triangle = mouth_.triangles.size();
-    out_.facing.assign(mouth_.triangles.size(), 0);
+    out_.mesh.vertices = surface_.positions;
+    out_.mesh.triangles = surface_.triangles;
+    out_.mesh.patches = surface_.patches;
+    out_.origins.reserve(surface_.positions.size() + 2 * wound_.nodes.size());
+    out_.origins.addKept(0, surface_.mesh_vertices);
+    for (Index v = surface_.mesh_vertices; v < surface_.positions.size(); ++v)
+      out_.origins.push_back(surface_.originOf(v));
+    out_.first_new_triangle = surface_.triangles.size();
+    out_.facing.assign(surface_.triangles.size(), 0);
     for (const Index t : near_) slots_.push_back(t);
-    for (std::size_t l = 0; l < 2 * lips_.faces.size(); ++l) {
+    for (std::size_t l = 0; l < 2 * wound_.triangles.size(); ++l) {
       slots_.push_back(static_cast<Index>(out_.mesh.triangles.size()));
       out_.mesh.triangles.push_back({kNoIndex, kNoIndex, kNoIndex});
       out_.mesh.patches.push_back(patch_);
-      out_.facing.push_back(l < lips_.faces.size() ? 1 : -1);
+      out_.facing.push_back(l < wound_.triangles.size() ? 1 : -1);
     }
     // Where vertices at the same place come together, the lowest stands for them.
     std::vector<Index> lowest(partners_.size(), kNoIndex);
     for (Corner c = 0; c < 3 * near_.size(); ++c)
-      if (on_mouth_[vertexOf(c)]) lowest[rootOf(c)] = std::min(lowest[rootOf(c)], vertexOf(c));
+      if (on_rim_[vertexOf(c)]) lowest[rootOf(c)] = std::min(lowest[rootOf(c)], vertexOf(c));
     std::vector<Index> of_root(partners_.size(), kNoIndex);
-    std::vector<bool> kept(mouth_.positions.size(), false);
+    std::vector<bool> kept(surface_.positions.size(), false);
     for (Corner c = 0; c < partners_.size(); ++c) {
-      const bool lip = isLip(c);
-      if (!lip && !on_mouth_[vertexOf(c)]) continue;
+      const bool in_wound = isWoundFace(c);
+      if (!in_wound && !on_rim_[vertexOf(c)]) continue;
       Index& number = of_root[rootOf(c)];  // the root is the lowest corner and so comes first
       if (number == kNoIndex) {
-        const Index v = lip ? lips_.nodes[nodeOf(c)].vertex : lowest[rootOf(c)];
+        const Index v = in_wound ? wound_.nodes[nodeOf(c)].vertex : lowest[rootOf(c)];
         if (v == kNoIndex) {
-          number = addVertex(mouth_.frame.lifted(lips_.nodes[nodeOf(c)].place), VertexOrigin());
-        } else if (lip || kept[v]) {
-          number = addVertex(mouth_.positions[v], mouth_.originOf(v));
+          number = addVertex(surface_.frame.lifted(wound_.nodes[nodeOf(c)].place), VertexOrigin());
+        } else if (in_wound || kept[v]) {
+          number = addVertex(surface_.positions[v], surface_.originOf(v));
         } else {
           kept[v] = true;
           number = v;
@@ -218,8 +221,8 @@ class Sealer {
 
   Index finalVertex(Corner c) const { return out_.mesh.triangles[slots_[c / 3]][c % 3]; }
 
-  /// Where two pairs of triangles run between the same two vertices, as both lips do between two points of the front,
-  /// each gets a vertex of its own in the middle.
+  /// Where two pairs of triangles have an edge between the same two vertices, each pair gets a vertex of its own in its
+  /// middle. Both wound faces have such edges between two points of the front.
   Status splitDoubleEdges() {
     struct Pair {
       std::uint64_t ends;
@@ -241,7 +244,7 @@ class Sealer {
       for (std::size_t i = begin; i < end; ++i) {
         const Corner c = pairs[i].corner, d = partners_[c];
         const Index a = finalVertex(c), b = finalVertex(nextCorner(c));
-        const bool inside = isLip(c) && isLip(d);
+        const bool inside = isWoundFace(c) && isWoundFace(d);
         VertexOrigin origin;
         if (!inside && !mixOrigins(out_.origins[a], out_.origins[b], 0.5, origin))
           return Error{ErrorCode::kUnsuitableShape,
@@ -272,7 +275,7 @@ class Sealer {
   }
 
   /// Replaces a triangle with vertices inside of its edges (kNoIndex: none; k is on the edge from corner k) by smaller
-  /// ones, the same for lips that lie on each other.
+  /// ones, the same for wound faces that lie on each other.
   void subdivide(const Triangle& t, const std::array<Index, 3>& middles, std::vector<Triangle>& parts) const {
     const int count = (middles[0] != kNoIndex) + (middles[1] != kNoIndex) + (middles[2] != kNoIndex);
     if (count == 3) {
@@ -302,11 +305,11 @@ class Sealer {
     }
   }
 
-  /// Every edge with an end on the mouth or on the lips has exactly two triangles.
+  /// Every edge with an end on the wound rim or on the wound faces has exactly two triangles.
   Status check() const {
     std::vector<bool> touched(out_.mesh.vertices.size(), false);
-    for (std::size_t v = mouth_.positions.size(); v < touched.size(); ++v) touched[v] = true;
-    for (std::size_t v = 0; v < mouth_.positions.size(); ++v) touched[v] = on_mouth_[v];
+    for (std::size_t v = surface_.positions.size(); v < touched.size(); ++v) touched[v] = true;
+    for (std::size_t v = 0; v < surface_.positions.size(); ++v) touched[v] = on_rim_[v];
     std::vector<std::uint64_t> edges;
     for (const Index slot : slots_) {
       const Triangle& t = out_.mesh.triangles[slot];
@@ -326,24 +329,24 @@ class Sealer {
     return Done{};
   }
 
-  const Mouth& mouth_;
-  const Lips& lips_;
+  const SplitSurface& surface_;
+  const WoundFaces& wound_;
   const std::uint32_t patch_;
-  std::vector<bool> on_mouth_;  // vertices that are to be doubled, or are an end
+  std::vector<bool> on_rim_;  // vertices that are to be doubled, or are an end
   std::unordered_map<std::uint64_t, Index> rim_of_edge_;
   std::unordered_map<Index, std::array<Corner, 2>> at_rim_;  // the edges of the triangles above and below
   std::unordered_map<Index, std::array<Index, 2>> touched_;  // the face and edge that came first to a rim edge
   std::vector<Index> near_;                                  // triangles
   std::vector<Corner> partners_;
   std::vector<Index> parents_;
-  std::vector<Index> slots_;  // triangles of the result: near ones, lower lips, upper lips, then parts of those
+  std::vector<Index> slots_;  // triangles of the result: near ones, lower face, upper face, then parts of those
   OpenedSurface out_;
 };
 
 }  // namespace
 
-Result<OpenedSurface> seal(const Mouth& mouth, const Lips& lips, std::uint32_t patch) {
-  return Sealer(mouth, lips, patch).run();
+Result<OpenedSurface> seal(const SplitSurface& surface, const WoundFaces& wound, std::uint32_t patch) {
+  return Sealer(surface, wound, patch).run();
 }
 
 }  // namespace incising

@@ -1,4 +1,4 @@
-// Vertices put into edges of the mouth.
+// New vertices in edges of the rim.
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -8,12 +8,12 @@
 namespace meshless {
 namespace incising {
 
-VertexOrigin Mouth::originOf(Index vertex) const {
+VertexOrigin SplitSurface::originOf(Index vertex) const {
   if (vertex >= mesh_vertices) return new_origins[vertex - mesh_vertices];
   return VertexOrigin::of(vertex);
 }
 
-Index Mouth::addBetween(Index a, Index b, double s) {
+Index SplitSurface::addBetween(Index a, Index b, double s) {
   VertexOrigin origin;
   // All ends lie in one triangle of the mesh: three parents at the most.
   const bool fits = mixOrigins(originOf(a), originOf(b), s, origin);
@@ -26,10 +26,10 @@ Index Mouth::addBetween(Index a, Index b, double s) {
   return static_cast<Index>(positions.size() - 1);
 }
 
-bool splitRimAtVertices(Mouth& mouth) {
-  const double snap = 1e-3 * mouth.frame.band;
+bool splitRimAtVertices(SplitSurface& surface) {
+  const double snap = 1e-3 * surface.frame.band;
   std::vector<Index> vertices;
-  for (const RimEdge& e : mouth.rim) {
+  for (const RimEdge& e : surface.rim) {
     vertices.push_back(e.from);
     vertices.push_back(e.to);
   }
@@ -43,19 +43,19 @@ bool splitRimAtVertices(Mouth& mouth) {
   InnerVertices inner;
   std::vector<RimEdge> rim;
   std::vector<Stop> stops;
-  for (const RimEdge& e : mouth.rim) {
-    // The same stops, to the last bit, for a lip that lies on this one and runs the other way.
-    const bool swapped = comesFirst(mouth.positions[e.to], mouth.positions[e.from]);
+  for (const RimEdge& e : surface.rim) {
+    // The same stops, to the last bit, for a wound face that lies on this one and runs the other way.
+    const bool swapped = comesFirst(surface.positions[e.to], surface.positions[e.from]);
     const Index start = swapped ? e.to : e.from, end = swapped ? e.from : e.to;
-    const Vec2 a = mouth.places[start], edge = mouth.places[end] - a;
+    const Vec2 a = surface.places[start], edge = surface.places[end] - a;
     const double length = edge.norm();
     stops.clear();
     for (const Index v : vertices) {
-      const Vec2 arm = mouth.places[v] - a;
+      const Vec2 arm = surface.places[v] - a;
       const double along = edge.dot(arm) / length;
       if (!(along > snap && along < length - snap)) continue;
       if (std::abs(edge.x() * arm.y() - edge.y() * arm.x()) <= snap * length)
-        stops.push_back({along / length, mouth.places[v]});
+        stops.push_back({along / length, surface.places[v]});
     }
     std::sort(stops.begin(), stops.end(), [](const Stop& p, const Stop& q) { return p.s < q.s; });
     std::vector<Index> chain{start};
@@ -63,8 +63,8 @@ bool splitRimAtVertices(Mouth& mouth) {
     for (const Stop& stop : stops) {
       if (chain.size() > 1 && (stop.s - last) * length <= snap) continue;
       last = stop.s;
-      const Index made = mouth.addBetween(start, end, stop.s);
-      mouth.places[made] = stop.place;
+      const Index made = surface.addBetween(start, end, stop.s);
+      surface.places[made] = stop.place;
       chain.push_back(made);
     }
     chain.push_back(end);
@@ -76,8 +76,8 @@ bool splitRimAtVertices(Mouth& mouth) {
     inner.emplace(edgeKey(e.from, e.to), std::move(between));
   }
   if (inner.empty()) return false;
-  mouth.rim = std::move(rim);
-  splitAtEdges(mouth.triangles, mouth.patches, inner);
+  surface.rim = std::move(rim);
+  splitAtEdges(surface.triangles, surface.patches, inner);
   return true;
 }
 

@@ -94,7 +94,7 @@ void readMaterial(YamlSource& source, const YAML::Node& node, const std::string&
   map.number(youngs, {0.0, 1e12, false, "Pa"}, material.youngs_modulus);
   if (map.has("alpha") && material.youngs_modulus > 0.0)
     source.fail(map.get("alpha"), what + " has alpha beside " + youngs + ", which takes its place",
-                "alpha, for looks, or youngs_modulus, for accuracy");
+                "alpha, of an appearance material, or youngs_modulus, of an elastic one");
   if (!map.has(youngs)) material.youngs_modulus = before;
   map.number("poissons_ratio", {0.0, 0.49}, material.poissons_ratio);
   map.number("alpha", {0.0, 1.0}, material.alpha);

@@ -88,7 +88,7 @@ geometry_msgs::Pose toPose(const Pose& pose) {
   return message;
 }
 
-Pose poseOf(const Blades& blades) {
+Pose poseOf(const ScissorBlades& blades) {
   Mat3 axes;
   axes << blades.x_axis, blades.y_axis, blades.x_axis.cross(blades.y_axis);
   Pose pose;
@@ -97,8 +97,8 @@ Pose poseOf(const Blades& blades) {
   return pose;
 }
 
-Blades bladesAt(const Pose& pose, double length, double width) {
-  Blades blades;
+ScissorBlades bladesAt(const Pose& pose, double length, double width) {
+  ScissorBlades blades;
   blades.origin = pose.translation;
   blades.x_axis = pose.rotation * Vec3::UnitX();
   blades.y_axis = pose.rotation * Vec3::UnitY();

@@ -7,7 +7,7 @@ namespace meshless {
 namespace {
 
 constexpr double kSmoothing = 0.003;    // [s] streams come in jumps: 200 Hz are as many
-constexpr double kPayBackSteps = 2.0;   // slower motion is felt as the steps say it, faster one at once
+constexpr double kPayBackSteps = 2.0;   // of slower motion the force is the steps'; of faster one it comes at once
 constexpr double kFarthest = 0.02;      // [m] before the tool
 constexpr double kMemory = 0.75;        // of what was learned, kept a step
 constexpr double kShortWay = 1e-4;      // [m] ways below it teach little
@@ -35,7 +35,7 @@ void ForceModel::stepped(const Step& step, double dt, double now) {
   step_ = step;
   if (!step.there) {
     step_.pulls = before.pulls;
-    // Gone between two steps: what the last one measured is still felt until the next is due.
+    // Gone between two steps: the force of the last one goes on until the next is due.
     leaves_ = dt > 0.0 ? now : std::max(now, stepped_at_ + dt_);
     return;
   }
@@ -47,12 +47,12 @@ void ForceModel::stepped(const Step& step, double dt, double now) {
   } else {
     learn(step.force - before.force, step.place - before.place);
   }
-  // A spring is known before it has been felt; what is pushed is not.
+  // The stiffness of a spring is known before it is measured; that of what is pushed is not.
   const double known = step.pulls ? step.stiffest : 0.0;
-  const double felt = std::clamp(work_ / (way_squared_ + kShortWay * kShortWay), 0.0, step.stiffest);
+  const double measured = std::clamp(work_ / (way_squared_ + kShortWay * kShortWay), 0.0, step.stiffest);
   force_.stepped(step.force, dt_, now);
   place_.stepped(step.place, dt_, now);
-  stiffness_.stepped(learned_ ? felt : known, dt_, now);
+  stiffness_.stepped(learned_ ? measured : known, dt_, now);
   share_.stepped(1.0, dt_, now);
   stepped_at_ = now;
 }
@@ -78,7 +78,7 @@ Vec3 ForceModel::at(double now, const std::optional<Vec3>& hand) {
   const Vec3 force = force_.at(now);
   const double share = share_.at(now);
   if (share == 0.0 || (!step_.pulls && force.isZero(0.0))) {
-    // What a sphere has felt ahead of one touch is felt less in the next.
+    // What a sphere has reported ahead in one touch is taken off in the next.
     offset_.setZero();
     if (share == 0.0) ahead_.setZero();
     return force;

@@ -207,7 +207,7 @@ void StreamedTools::hearJaw(double angle) {
     motion.keepAlive(clock_.now());
     pose = motion.pose();
   }
-  const Blades blades = bladesAt(pose, settings_.scissors_length, settings_.scissors_width);
+  const ScissorBlades blades = bladesAt(pose, settings_.scissors_length, settings_.scissors_width);
   post_([this, blades, angle, closes](World& world) {
     world.setScissors(blades, angle);
     if (!closes) return;

@@ -129,9 +129,9 @@ ControlPanel::ControlPanel(QWidget* parent) : rviz::Panel(parent), link_(new Nod
     });
     knobs_.push_back(made);
   };
-  knob("alpha", 1.0, false, false, "How far tissue goes towards its goal in 1/60 s: 1 is stiff. Materials for looks.");
+  knob("alpha", 1.0, false, false, "How far tissue goes towards its goal in 1/60 s: 1 is stiff. Appearance materials.");
   knob("beta", 1.0, false, false,
-       "How much of a linear or quadratic deformation the goal may have. Materials for looks.");
+       "How much of a linear or quadratic deformation the goal may have. Appearance materials.");
   knob("damping", kMostDamping, true, true, "[1/s] of the motion that deforms.");
   layout->addWidget(material_);
 
@@ -252,7 +252,7 @@ void ControlPanel::fillMaterial() {
   const bool elastic = found->youngs_modulus > 0.0;
   material_->setTitle(
       "Material of " + selected() +
-      (elastic ? QString(", for accuracy, %1 kPa").arg(1e-3 * found->youngs_modulus, 0, 'g', 3) : QString()));
+      (elastic ? QString(", elastic, %1 kPa").arg(1e-3 * found->youngs_modulus, 0, 'g', 3) : QString()));
   const double numbers[] = {found->alpha, found->beta, found->damping};
   for (std::size_t i = 0; i < knobs_.size(); ++i) {
     Knob& knob = knobs_[i];

@@ -46,7 +46,7 @@ class ControlPanel : public rviz::Panel {
     QString key;
     double most = 1.0;
     bool squared = false;  // finer near zero
-    bool elastic = true;   // whether a material for accuracy uses it
+    bool elastic = true;   // whether an elastic material uses it
     QSlider* slider = nullptr;
     QLabel* value = nullptr;
     bool changed = false;     // by the user, and not sent yet

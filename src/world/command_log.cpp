@@ -291,7 +291,7 @@ Result<ReplayReport> replay(std::istream& log, int threads, const std::function<
           break;
         }
         case RecordKind::kScissors: {
-          Blades blades;
+          ScissorBlades blades;
           double angle = 0.0;
           archive(blades, angle);
           world.setScissors(blades, angle);

@@ -13,11 +13,11 @@ void fitQuadraticMaps(const MatchInput& in, const Vec3* positions, std::vector<C
     map.mean = from.mean;
     map.rest = rest.centre;
     map.centre = maps[c].centre;
-    map.size = rest.size;
+    map.scale = rest.radius;
     Mat39 moment = Mat39::Zero();
     for (Index k = in.clusters.offsets[c]; k < in.clusters.offsets[c + 1]; ++k) {
       const Index i = in.clusters.members[k];
-      const QuadraticMap::Basis b = QuadraticMap::basis((in.rest[i] - rest.centre) / rest.size) - from.mean;
+      const QuadraticMap::Basis b = QuadraticMap::basis((in.rest[i] - rest.centre) / rest.radius) - from.mean;
       moment += (in.masses[i] * in.clusters.weights[k]) * (positions[i] - maps[c].centre) * b.transpose();
     }
     map.fit = moment * from.moment_inverse;

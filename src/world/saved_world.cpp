@@ -155,11 +155,11 @@ SavedWorldPtr readWorld(InArchive& archive) {
   checkSlots(*world);
   checkBatches(*world);
   checkTools(*world);
-  std::map<std::uint64_t, ContactsMemory::KnownParty> parties;
-  for (const SavedBody& body : world->bodies) parties[body.number].triangles = body.model->surface.triangles.size();
+  std::map<std::uint64_t, ContactsMemory::KnownCollider> known;
+  for (const SavedBody& body : world->bodies) known[body.number].triangles = body.model->surface.triangles.size();
   for (std::size_t i = 0; i < world->obstacles.size(); ++i)
-    parties[kObstacleKey + i].triangles = world->obstacles[i]->mesh.triangles.size();
-  requireNone(world->contacts.fault(parties));
+    known[kObstacleKey + i].triangles = world->obstacles[i]->mesh.triangles.size();
+  requireNone(world->contacts.fault(known));
   std::map<std::uint64_t, SurfaceMemory::Known> colliders;
   for (const SavedBody& body : world->bodies) {
     const std::size_t particles = body.model->rest.size(), vertices = body.model->surface.vertices.size();
@@ -231,18 +231,19 @@ std::string faultOf(const BodyModel& m) {
   }
   if (!areTriangles(m.surface)) return "a body's triangles are not those of its vertices";
   const SurfaceBinding& b = m.binding;
-  if (b.particle.size() != vertices || !allBelowOrNone(b.particle, particles) || !allBelow(b.riders, vertices) ||
-      !std::is_sorted(b.riders.begin(), b.riders.end()) || !areRows(b.offsets, b.riders.size(), b.carriers.size()) ||
-      b.weights.size() != b.carriers.size() || !allBelow(b.carriers, particles) || b.levers.size() != b.riders.size() ||
-      b.turners.size() != b.riders.size() || !allBelow(b.lever_clusters, clusters))
+  if (b.particle.size() != vertices || !allBelowOrNone(b.particle, particles) || !allBelow(b.embedded, vertices) ||
+      !std::is_sorted(b.embedded.begin(), b.embedded.end()) ||
+      !areRows(b.offsets, b.embedded.size(), b.carriers.size()) || b.weights.size() != b.carriers.size() ||
+      !allBelow(b.carriers, particles) || b.levers.size() != b.embedded.size() ||
+      b.turners.size() != b.embedded.size() || !allBelow(b.lever_clusters, clusters))
     return "a body's surface is not bound to its particles";
-  for (std::size_t r = 0; r < b.riders.size(); ++r)
+  for (std::size_t r = 0; r < b.embedded.size(); ++r)
     if (!b.levers[r].isZero(0.0) &&
         std::find(b.lever_clusters.begin(), b.lever_clusters.end(), b.turners[r]) == b.lever_clusters.end())
       return "a lever turns with no cluster";
   // The next cut asks for the cell of a vertex, whether it has a lever or not.
-  if (m.lattice && (b.riders.size() != vertices || !allBelow(b.turners, clusters)))
-    return "a body's surface does not ride on its cells";
+  if (m.lattice && (b.embedded.size() != vertices || !allBelow(b.turners, clusters)))
+    return "a body's surface is not embedded in its cells";
   return "";
 }
 
@@ -250,7 +251,7 @@ std::string faultOf(const BodyModel& m, const BodyState& s) {
   const std::size_t particles = m.rest.size(), clusters = m.clusters.size();
   if (s.positions.size() != particles || s.velocities.size() != particles || s.poses.size() != clusters ||
       s.surface.size() != m.surface.vertices.size() || (!s.plastic.empty() && s.plastic.size() != clusters) ||
-      s.rider_offsets.size() != m.binding.riders.size() || (!s.eased.empty() && s.eased.size() != particles))
+      s.embedded_offsets.size() != m.binding.embedded.size() || (!s.eased.empty() && s.eased.size() != particles))
     return "a body's state is not that of its model";
   if (s.unwinding && (m.any_fixed || clusters < 2)) return "a body that is held or of one cluster unwinds";
   return "";
@@ -478,7 +479,7 @@ void World::restore(const SavedWorld& saved) {
   w.report = StepReport();
   w.awake.clear();
   w.loaded.clear();
-  w.parties.clear();
+  w.shape_colliders.clear();
   w.contacts_current = false;
   w.meetings.clear();
   w.contacts.recall(saved.contacts);

@@ -137,8 +137,8 @@ void serialize(A& archive, ElasticRest& v) {
 }
 template <class A>
 void serialize(A& archive, SurfaceBinding& v) {
-  auto& [particle, riders, offsets, carriers, weights, levers, turners, lever_clusters, bound] = v;
-  archive(particle, riders, offsets, carriers, weights, levers, turners, lever_clusters, bound);
+  auto& [particle, embedded, offsets, carriers, weights, levers, turners, lever_clusters, bound] = v;
+  archive(particle, embedded, offsets, carriers, weights, levers, turners, lever_clusters, bound);
 }
 template <class A>
 void serialize(A& archive, Resistance& v) {
@@ -165,14 +165,14 @@ template <class A>
 void serialize(A& archive, BodyModel& v) {
   auto& [rest, masses, match_masses, fixed, any_fixed, graph, clusters, shape, elastic, elastic_batch, lattice,
          cell_mass, cells, clamp_points, clamp, carried, tissue, most_spread_inverse, specific_stiffness,
-         poissons_ratio, highest_frequency, surface, binding, solid, lips, spacing, rest_volume, rest_area, mass,
+         poissons_ratio, highest_frequency, surface, binding, solid, incised, spacing, rest_volume, rest_area, mass,
          next_patch] = v;
   (void)elastic_batch, (void)cells, (void)clamp, (void)tissue;
   auto of_cells = lattice ? *lattice : CellLattice();
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
   archive(of_cells, cell_mass, clamp_points, carried);
   archive(rest, masses, match_masses, held, any_fixed, graph, clusters, shape, elastic, most_spread_inverse,
-          specific_stiffness, poissons_ratio, highest_frequency, surface, binding, solid, lips, spacing, rest_volume,
+          specific_stiffness, poissons_ratio, highest_frequency, surface, binding, solid, incised, spacing, rest_volume,
           rest_area, mass, next_patch);
   if constexpr (std::is_same_v<A, InArchive>) {
     if (!of_cells.cells.empty()) lattice = std::make_shared<CellLattice>(std::move(of_cells));
@@ -195,11 +195,11 @@ void serialize(A& archive, PlasticShape& v) {
 }
 template <class A>
 void serialize(A& archive, BodyState& v) {
-  auto& [positions, velocities, poses, surface, swelling, stretch, plastic, rider_offsets, eased, eased_for,
+  auto& [positions, velocities, poses, surface, swelling, stretch, plastic, embedded_offsets, eased, eased_for,
          eased_whole, unwinding, placed] = v;
-  // Where the surface is depends on who looked when, what follows does not.
+  // Whether the surface is up to date depends on when it was read. The fields that follow do not.
   if constexpr (!std::is_same_v<A, HashArchive>) archive(surface);
-  archive(positions, velocities, poses, swelling, stretch, plastic, rider_offsets, eased, eased_for, eased_whole,
+  archive(positions, velocities, poses, swelling, stretch, plastic, embedded_offsets, eased, eased_for, eased_whole,
           unwinding, placed);
 }
 template <class A>
@@ -234,7 +234,7 @@ void serialize(A& archive, ObstacleDef& v) {
 // --- tools and commands
 
 template <class A>
-void serialize(A& archive, Blades& v) {
+void serialize(A& archive, ScissorBlades& v) {
   auto& [origin, x_axis, y_axis, length, width] = v;
   archive(origin, x_axis, y_axis, length, width);
 }

@@ -11,8 +11,8 @@ struct SurfaceModel {
   BodyModelPtr model;
   ContactSurface surface;
   std::vector<double> inverse_masses;         // [1/kg] 0 where fixed
-  std::unique_ptr<const RigidGroups> groups;  // of a material for looks
-  double reach = 0.0;                         // [m] how far riders are beyond the bounds of the particles, at most
+  std::unique_ptr<const RigidGroups> groups;  // of an appearance material
+  double reach = 0.0;                         // [m] of embedded vertices beyond the bounds of the particles, at most
   std::size_t bytes() const;                  // without the model
 };
 

@@ -279,7 +279,7 @@ WorldSnapshot World::snapshot(const SnapshotWants& wants) {
     for (const SurfaceContacts::Point& p : points) shot.contacts.push_back({p.position, p.normal, p.force});
   } else if (wants.contacts && w.contacts_current) {
     std::vector<Contacts::Point> points;
-    w.contacts.points(w.parties, points);
+    w.contacts.points(w.shape_colliders, points);
     for (const Contacts::Point& p : points)
       shot.contacts.push_back({p.position, p.normal, p.impulse / (w.last_substep * w.last_substep)});
   }
@@ -322,7 +322,7 @@ Result<BodySnapshot> World::inspect(const std::string& name, bool rest) {
 
 std::vector<Event> World::takeEvents() { return std::exchange(impl_->events, {}); }
 
-void World::setScissors(const Blades& blades, double angle) {
+void World::setScissors(const ScissorBlades& blades, double angle) {
   impl_->scissors.shown = true;
   impl_->scissors.blades = blades;
   impl_->scissors.angle = angle;

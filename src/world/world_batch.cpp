@@ -16,7 +16,7 @@ constexpr double kFarthest = 200.0;  // radii of its rest shape that a body may 
 // One particle a hundred sizes away leaves nothing of the others in a moment of floats.
 bool fitsEvenly(const BodyModel& model) {
   const ClusterRest& rest = model.shape.clusters[0];
-  return !rest.linear_rank || rest.moment_inverse.norm() * rest.mass * rest.size * rest.size < kMostUneven;
+  return !rest.linear_rank || rest.moment_inverse.norm() * rest.mass * rest.radius * rest.radius < kMostUneven;
 }
 
 bool suits(const WorldBody& body) {
@@ -44,7 +44,7 @@ bool fitsFloat(WorldBody& body, bool bounds_known, double h) {
     const Box velocities = extentOf(body.state.velocities);
     body.spread = 0.5 * velocities.diagonal();
   }
-  const double most = kFarthest * body.model->shape.clusters[0].size;
+  const double most = kFarthest * body.model->shape.clusters[0].radius;
   return body.bounds.diagonal() <= most && h * body.spread <= most;
 }
 

@@ -216,7 +216,8 @@ Result<Reply> World::Impl::apply(const SetMaterialCommand& command) {
     wake(*body);
     batches_current = contacts_current = false;
     body->model = withMaterial(body->model, body->material, material);
-    body->surface_current = false;  // fitted with other masses riders move by a rounding: not by who has looked
+    // Other masses move embedded vertices by a rounding. Whether the surface was read before must make no difference.
+    body->surface_current = false;
     body->material = material;
   }
   return Reply(Done{});

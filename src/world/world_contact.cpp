@@ -4,9 +4,9 @@
 #include <future>
 #include <limits>
 
-#include "contact_parties.h"
 #include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/dynamics/extent.h"
+#include "shape_colliders.h"
 #include "world_impl.h"
 
 namespace meshless {
@@ -18,7 +18,7 @@ constexpr double kHeldLift = 0.5;            // of the spacing, a step
 
 SurfaceRows rowsOf(const BodyModel& model) {
   const SurfaceBinding& b = model.binding;
-  return {&b.particle, &b.riders, &b.offsets, &b.carriers, &b.weights};
+  return {&b.particle, &b.embedded, &b.offsets, &b.carriers, &b.weights};
 }
 
 double speedOf(const WorldBody& body) {
@@ -82,8 +82,8 @@ void World::Impl::foreseeContact(WorldBody& body) {
   });
 }
 
-// Who is where, which pairs can touch, and what they need for it: nothing for those that nobody is near. Whom something
-// reaches wakes, and then its neighbours are looked at as well.
+// Finds where the bodies are, which pairs can touch, and their contacts. What contact needs of a body is made only
+// where something is near. A body that is reached wakes, and then all is found again with its neighbours.
 void World::Impl::findContacts(double h_frame) {
   ContactScene scene;
   scene.ground = settings.ground;
@@ -91,18 +91,18 @@ void World::Impl::findContacts(double h_frame) {
   scene.gravity = settings.gravity;
   expectMeetings();
   for (;;) {
-    fillParties();
-    contacts.findPairs(scene, parties, h_frame, report.contact_counters);
+    fillShapeColliders();
+    contacts.findPairs(scene, shape_colliders, h_frame, report.contact_counters);
     for (std::size_t b = 0; b < bodies.size(); ++b)
-      if (contacts.needed()[b]) equipParty(*bodies[b], parties[b]);
+      if (contacts.needed()[b]) equipShapeCollider(*bodies[b], shape_colliders[b]);
     forNumbers(bodies.size(), [this](std::size_t b) {
       if (!(contacts.needed()[b] & 1)) return;
       fitMaps(*bodies[b]);
-      parties[b].maps = bodies[b]->maps.data();
-      parties[b].map_count = static_cast<Index>(bodies[b]->maps.size());
+      shape_colliders[b].maps = bodies[b]->maps.data();
+      shape_colliders[b].map_count = static_cast<Index>(bodies[b]->maps.size());
     });
     rememberSlow();
-    contacts.make(parties, h_frame, report.contact_counters, for_each);
+    contacts.make(shape_colliders, h_frame, report.contact_counters, for_each);
     bool woken = false;
     for (Index p : contacts.reached()) {
       woken = woken || bodies[p]->asleep;
@@ -114,51 +114,51 @@ void World::Impl::findContacts(double h_frame) {
   contacts.expect({});
 }
 
-void World::Impl::fillParties() {
-  parties.resize(bodies.size() + obstacles.size());
+void World::Impl::fillShapeColliders() {
+  shape_colliders.resize(bodies.size() + obstacles.size());
   for (std::size_t o = 0; o < obstacles.size(); ++o)
-    parties[bodies.size() + o] = partyOf(*obstacles[o], kObstacleKey + o);
-  forNumbers(bodies.size(), [this](std::size_t b) { fillParty(*bodies[b], parties[b]); });
+    shape_colliders[bodies.size() + o] = shapeColliderOf(*obstacles[o], kObstacleKey + o);
+  forNumbers(bodies.size(), [this](std::size_t b) { fillShapeCollider(*bodies[b], shape_colliders[b]); });
 }
 
-void World::Impl::fillParty(WorldBody& body, ContactParty& party) {
-  party = partyOf(*body.model, body.material, body.state, body.number);
-  party.moves = !body.asleep;
+void World::Impl::fillShapeCollider(WorldBody& body, ShapeCollider& collider) {
+  collider = shapeColliderOf(*body.model, body.material, body.state, body.number);
+  collider.moves = !body.asleep;
   const SelfContact wanted = body.material.self_contact;
-  party.meets_itself =
-      body.material.bends() && (wanted == SelfContact::kAll || (wanted == SelfContact::kLips && body.model->lips));
+  collider.meets_itself = body.material.bends() &&
+                          (wanted == SelfContact::kAll || (wanted == SelfContact::kWoundFaces && body.model->incised));
   if (body.asleep) {
-    party.bounds = body.bounds;
+    collider.bounds = body.bounds;
     return;
   }
-  readMotion(*body.model, body.material, body.state, riderReach(body), party);
-  body.spread = party.spread;
-  body.fastest = party.velocity.norm() + party.spread;
-  body.bounds = party.bounds;
-  if (body.model->surface.vertices.empty()) party.bounds = Box();  // nothing to touch with
+  readMotion(*body.model, body.material, body.state, embeddedReach(body), collider);
+  body.spread = collider.spread;
+  body.fastest = collider.velocity.norm() + collider.spread;
+  body.bounds = collider.bounds;
+  if (body.model->surface.vertices.empty()) collider.bounds = Box();  // nothing to touch with
 }
 
-double World::Impl::riderReach(WorldBody& body) {
-  if (body.reach_of == body.model) return body.rider_reach;
+double World::Impl::embeddedReach(WorldBody& body) {
+  if (body.reach_of == body.model) return body.embedded_reach;
   body.reach_of = body.model;
-  body.rider_reach = riderReachOf(*body.model);
-  return body.rider_reach;
+  body.embedded_reach = embeddedReachOf(*body.model);
+  return body.embedded_reach;
 }
 
-void World::Impl::equipParty(WorldBody& body, ContactParty& party) {
+void World::Impl::equipShapeCollider(WorldBody& body, ShapeCollider& collider) {
   const ContactModel& model = contactModel(body);
-  party.shape = &model.shape;
-  party.inverse_masses = model.inverse_masses.data();
-  if (party.meets_itself) party.self = &model.self(body.material.self_contact == SelfContact::kLips);
-  if (model.shape.rides()) {
+  collider.shape = &model.shape;
+  collider.inverse_masses = model.inverse_masses.data();
+  if (collider.meets_itself) collider.self = &model.self(body.material.self_contact == SelfContact::kWoundFaces);
+  if (model.shape.hasEmbedded()) {
     refreshSurface(body);
-    party.surface = body.state.surface.data();
+    collider.surface = body.state.surface.data();
   }
 }
 
 void World::Impl::solveContacts(double h) {
   for (std::size_t b = 0; b < bodies.size(); ++b)
-    parties[b].previous = bodies[b]->asleep ? parties[b].positions : bodies[b]->scratch.previous.data();
+    shape_colliders[b].previous = bodies[b]->asleep ? shape_colliders[b].positions : bodies[b]->scratch.previous.data();
   const RefitMaps refit = [this](Index p, std::vector<ContactMap>& maps) {
     if (p >= bodies.size()) {
       maps = obstacles[p - bodies.size()]->maps;
@@ -166,37 +166,38 @@ void World::Impl::solveContacts(double h) {
     }
     WorldBody& body = *bodies[p];
     fitMaps(*body.model, body.material, body.state, maps, body.quadratic_maps);
-    if (parties[p].surface && !body.asleep) {
+    if (shape_colliders[p].surface && !body.asleep) {
       updateSurface(*body.model, body.state);
-      parties[p].surface = body.state.surface.data();
+      shape_colliders[p].surface = body.state.surface.data();
     }
   };
-  contacts.solve(parties, h, refit, report.contact_counters, for_each);
+  contacts.solve(shape_colliders, h, refit, report.contact_counters, for_each);
   report.ground_contacts += contacts.groundLoaded();
 }
 
-// What the sweeps leave below the ground, and what is there between the points that contacts hold, is lifted for the
-// eye: particles without a change of speed, riders by the offsets that fade.
+// Lifts for the eye what the sweeps leave below the ground, and what is there between the points that contacts hold:
+// particles without a change of speed, embedded vertices by their offsets, which fade.
 void World::Impl::liftOutOfGround(WorldBody& body, double h_frame) {
   const SurfaceBinding& binding = body.model->binding;
-  // Far above nobody has to ask how fast it is by now.
+  // Far above the ground its speed need not be computed.
   if (!settings.ground || !(body.bounds.min.z() - body.bounds.diagonal() - h_frame * body.fastest < *settings.ground) ||
       !(body.bounds.min.z() - 2.0 * h_frame * speedOf(body) < *settings.ground))
     return;
-  // Of what a rod holds down there a little at a time: it would have it all back in the next step.
+  // What a stiff pick holds down there is lifted a little at a time: the pick would pull all of it back in the next
+  // step.
   const double most = isHeld(body) ? kHeldLift * body.model->spacing : std::numeric_limits<double>::infinity();
   for (Index i : binding.particle)
     if (i != kNoIndex && body.state.positions[i].z() < *settings.ground && !body.model->fixed[i])
       body.state.positions[i].z() = std::min(*settings.ground, body.state.positions[i].z() + most);
-  if (binding.riders.empty()) return;
+  if (binding.embedded.empty()) return;
   findLow(body, h_frame);
   body.low_current = false;
-  if (body.low_riders.empty()) return;
+  if (body.low_embedded.empty()) return;
   fitClusters(matchInput(*body.model, body.state), body.state.positions, binding.lever_clusters, body.state.poses);
-  for (Index r : body.low_riders) {
+  for (Index r : body.low_embedded) {
     const double z =
-        riderPosition(binding, body.state.positions, body.state.poses, r).z() + body.state.rider_offsets[r].z();
-    if (z < *settings.ground) body.state.rider_offsets[r].z() += *settings.ground - z;
+        embeddedPosition(binding, body.state.positions, body.state.poses, r).z() + body.state.embedded_offsets[r].z();
+    if (z < *settings.ground) body.state.embedded_offsets[r].z() += *settings.ground - z;
   }
 }
 

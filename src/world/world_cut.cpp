@@ -32,7 +32,7 @@ bool meetsPlane(const Points& surface, const Plane& plane) {
 }  // namespace
 
 Status World::Impl::checkCut(const CutCommand& command) {
-  const Blades& b = command.blades;
+  const ScissorBlades& b = command.blades;
   if (!b.origin.allFinite() || !b.x_axis.allFinite() || !b.y_axis.allFinite()) return notFinite("the blades' pose");
   if (!(std::abs(b.x_axis.norm() - 1.0) < 1e-6 && std::abs(b.y_axis.norm() - 1.0) < 1e-6 &&
         std::abs(b.x_axis.dot(b.y_axis)) < 1e-6))

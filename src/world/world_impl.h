@@ -62,9 +62,9 @@ struct WorldBody {
   bool touched_by_push = false;
   bool low_current = false;          // in this frame
   std::vector<Index> low_particles;  // that can meet the ground
-  std::vector<Index> low_riders;
-  BodyModelPtr reach_of;     // the model that rider_reach is of
-  double rider_reach = 0.0;  // [m] how far riders are beyond the bounds of the particles, at most
+  std::vector<Index> low_embedded;
+  BodyModelPtr reach_of;        // the model that embedded_reach is of
+  double embedded_reach = 0.0;  // [m] of embedded vertices beyond the bounds of the particles, at most
   double stiffness_factor = 1.0;
   Box bounds;              // [m] of particles and surface, at the start of the last frame in which it was awake
   double spread = 0.0;     // [m/s] likewise: by how much velocities differ
@@ -94,11 +94,11 @@ struct WorldBatch {
   std::vector<BatchBody> states;
   std::unique_ptr<BodyBatch> batch;
   BatchStep step;                                  // of this frame's substeps
-  std::vector<std::unique_ptr<BatchLanes>> spare;  // that no gang has borrowed
+  std::vector<std::unique_ptr<BatchLanes>> spare;  // that no island batch has borrowed
 };
 
-/// Bodies that go through the substeps of a frame by themselves, and what they did in it.
-struct Gang {
+/// Some islands that one thread takes through all substeps of a frame, and their work in it.
+struct IslandBatch {
   Index first_island = 0, end_island = 0;
   std::vector<WorldBody*> bodies, alone;              // all of them, and those matched one by one
   std::vector<std::vector<WorldBody*>> side_by_side;  // the others, by batches
@@ -221,17 +221,17 @@ struct World::Impl {
   std::vector<WorldBatch> batches;
   bool batches_current = false;  // false: bodies or materials have changed
   std::mutex lanes_mutex;        // of the batches' spare lanes
-  std::vector<Gang> gangs;
-  std::size_t gang_count = 0;   // of them in use
-  std::vector<char> in_island;  // one a body: in formGangs()
+  std::vector<IslandBatch> island_batches;
+  std::size_t island_batch_count = 0;  // of them in use
+  std::vector<char> in_island;         // one a body: in formIslandBatches()
   struct Met;
   struct Meeting;
   Contacts contacts;
   std::vector<std::future<std::shared_ptr<const Contacts>>> meetings;  // of fresh pieces, being found by other threads
   std::vector<LoadedPair> loaded;
-  bool contacts_current = false;      // bodies are those of the last step
-  double last_substep = 0.0;          // [s]
-  std::vector<ContactParty> parties;  // one a body, in their order, where contacts are found in rest shapes
+  bool contacts_current = false;               // bodies are those of the last step
+  double last_substep = 0.0;                   // [s]
+  std::vector<ShapeCollider> shape_colliders;  // one a body, in their order, where contacts are found in rest shapes
   std::map<const BodyModel*, std::weak_ptr<const ContactModel>> contact_models;
   SurfaceContacts surface_contacts;
   std::vector<Collider> colliders;  // bodies in their order, then obstacles
@@ -300,10 +300,10 @@ struct World::Impl {
   void finishSubstep(double h);
   void keepSize(WorldBody& body, PreserveCounters& counters) const;
   /// False where all bodies have to take each substep together.
-  bool formGangs(double h);
-  void addToGang(Gang& gang, WorldBody& body, double h);
-  void stepInGangs(int substeps, double h);
-  void stepGang(Gang& gang, int substeps, double h);
+  bool formIslandBatches(double h);
+  void addToIslandBatch(IslandBatch& island_batch, WorldBody& body, double h);
+  void stepInIslandBatches(int substeps, double h);
+  void stepIslandBatch(IslandBatch& island_batch, int substeps, double h);
   /// The body and all that fell asleep with it.
   void wake(WorldBody& body);
   void wakeWithin(const Box& box);
@@ -331,10 +331,10 @@ struct World::Impl {
   void foreseeMeeting(const BodyId& parent, const std::vector<BodyId>& pieces);
   void expectMeetings();
   void findContacts(double h_frame);
-  void fillParties();
-  void fillParty(WorldBody& body, ContactParty& party);
-  static double riderReach(WorldBody& body);
-  void equipParty(WorldBody& body, ContactParty& party);
+  void fillShapeColliders();
+  void fillShapeCollider(WorldBody& body, ShapeCollider& collider);
+  static double embeddedReach(WorldBody& body);
+  void equipShapeCollider(WorldBody& body, ShapeCollider& collider);
   void solveContacts(double h);
   const SurfaceModel& surfaceModel(WorldBody& body);
   static void measureSurface(WorldBody& body);
@@ -355,7 +355,7 @@ struct World::Impl {
   void liftOutOfGround(WorldBody& body, double h_frame);
   void findLow(WorldBody& body, double h_frame);
   void contactGroundAndPush(WorldBody& body, double h, double h_frame, const Vec3& push_velocity);
-  void fadeRiderOffsets(WorldBody& body, double h);
+  void fadeEmbeddedOffsets(WorldBody& body, double h);
 };
 
 /// Bodies that cuts have made or opened, at most: a blade through all of a heap of crumbs would double it, and each of

@@ -1,8 +1,8 @@
 // What the pieces of a cut touch, found by another thread before the step that asks for it.
 #include <algorithm>
 
-#include "contact_parties.h"
 #include "meshless_surgery/dynamics/extent.h"
+#include "shape_colliders.h"
 #include "world_impl.h"
 
 namespace meshless {
@@ -34,28 +34,28 @@ struct World::Impl::Met {
   Met(std::shared_ptr<WorldObstacle> of_obstacle, std::uint64_t of_key)
       : key(of_key), obstacle(std::move(of_obstacle)) {}
 
-  // As fillParty() and equipParty() will fill it.
-  ContactParty party() {
-    if (obstacle) return partyOf(*obstacle, key);
+  // As fillShapeCollider() and equipShapeCollider() will fill it.
+  ShapeCollider collider() {
+    if (obstacle) return shapeColliderOf(*obstacle, key);
     if (coming.valid()) contact = coming.get();
     // The model may have been replaced since that was begun.
     if (!contact || contact->model != model) contact = std::make_shared<ContactModel>(model);
-    ContactParty party = partyOf(*model, material, state, key);
-    party.moves = moves;
+    ShapeCollider collider = shapeColliderOf(*model, material, state, key);
+    collider.moves = moves;
     if (moves)
-      readMotion(*model, material, state, riderReachOf(*model), party);
+      readMotion(*model, material, state, embeddedReachOf(*model), collider);
     else
-      party.bounds = bounds;
-    party.shape = &contact->shape;
-    party.inverse_masses = contact->inverse_masses.data();
-    if (contact->shape.rides()) {
+      collider.bounds = bounds;
+    collider.shape = &contact->shape;
+    collider.inverse_masses = contact->inverse_masses.data();
+    if (contact->shape.hasEmbedded()) {
       if (!surface_current) updateSurface(*model, state);
-      party.surface = state.surface.data();
+      collider.surface = state.surface.data();
     }
     fitMaps(*model, material, state, maps, quadratic_maps);
-    party.maps = maps.data();
-    party.map_count = static_cast<Index>(maps.size());
-    return party;
+    collider.maps = maps.data();
+    collider.map_count = static_cast<Index>(maps.size());
+    return collider;
   }
 };
 
@@ -65,19 +65,19 @@ struct World::Impl::Meeting {
   Contacts contacts;
 
   void find(const ContactScene& scene, double h_frame) {
-    std::vector<ContactParty> parties;
+    std::vector<ShapeCollider> colliders;
     for (Met& m : met) {
-      parties.push_back(m.party());
-      parties.back().shape->link();
+      colliders.push_back(m.collider());
+      colliders.back().shape->link();
     }
     ContactCounters counters;
-    contacts.findPairs(scene, parties, h_frame, counters);
-    contacts.lookAhead(parties, fresh, h_frame);
+    contacts.findPairs(scene, colliders, h_frame, counters);
+    contacts.queryAhead(colliders, fresh, h_frame);
   }
 };
 
-// The first step after a cut would look up in fresh shapes all points of the pieces, of each other and of what they lie
-// on, and all at once: another thread does while the cut is answered.
+// After a cut, the first step would have to query all points of the pieces at once, in fresh shapes: in each other and
+// in what they lie on. Another thread does so while the cut is answered.
 void World::Impl::foreseeMeeting(const BodyId& parent, const std::vector<BodyId>& pieces) {
   auto meeting = std::make_shared<Meeting>();
   Box around;
@@ -101,7 +101,7 @@ void World::Impl::foreseeMeeting(const BodyId& parent, const std::vector<BodyId>
   }
   for (std::size_t o = 0; o < obstacles.size(); ++o)
     if (obstacles[o]->bounds.overlaps(around)) meeting->met.emplace_back(obstacles[o], kObstacleKey + o);
-  ContactScene scene;  // without the ground, in which nothing is looked up
+  ContactScene scene;  // without the ground, in which nothing is queried
   scene.gravity = settings.gravity;
   meetings.push_back(std::async(std::launch::async, [meeting, scene, h_frame = 1.0 / settings.step_rate] {
     meeting->find(scene, h_frame);

@@ -20,7 +20,7 @@ MemoryUse World::memory() const {
     use.particles += body->state.positions.size();
     if (first(body->model.get())) use.models += bytesOf(*body->model);
     use.states += sizeof *body + bytesOf(body->state) + bytesOf(body->scratch) + bytesOf(body->frame_start);
-    use.contact += bytesOf(body->maps, body->quadratic_maps, body->low_particles, body->low_riders);
+    use.contact += bytesOf(body->maps, body->quadratic_maps, body->low_particles, body->low_embedded);
     if (first(body->contact.get())) use.contact += body->contact->bytes();
     if (first(body->surface_model.get())) use.contact += body->surface_model->bytes();
     if (first(body->mesh.get()))
@@ -31,17 +31,17 @@ MemoryUse World::memory() const {
     for (const auto& lanes : batch.spare)
       use.states += sizeof *lanes + lanes->batch.bytes() + bytesOf(lanes->models, lanes->states);
   }
-  use.states += bytesOf(w.gangs, w.in_island);
-  for (const Gang& gang : w.gangs) {
-    use.states += bytesOf(gang.bodies, gang.alone, gang.side_by_side, gang.lanes);
-    for (const auto& some : gang.side_by_side) use.states += bytesOf(some);
+  use.states += bytesOf(w.island_batches, w.in_island);
+  for (const IslandBatch& island_batch : w.island_batches) {
+    use.states += bytesOf(island_batch.bodies, island_batch.alone, island_batch.side_by_side, island_batch.lanes);
+    for (const auto& some : island_batch.side_by_side) use.states += bytesOf(some);
   }
   for (const auto& obstacle : w.obstacles) {
     use.models += bytesOf(obstacle->def->mesh.vertices, obstacle->def->mesh.triangles, obstacle->own) +
                   bytesOf(obstacle->masses, obstacle->inverse_masses, obstacle->maps);
     use.contact += obstacle->shape.bytes() + obstacle->surface.bytes();
   }
-  use.contact += w.contacts.bytes() + w.surface_contacts.bytes() + bytesOf(w.parties, w.colliders, w.loaded) +
+  use.contact += w.contacts.bytes() + w.surface_contacts.bytes() + bytesOf(w.shape_colliders, w.colliders, w.loaded) +
                  bytesOf(w.surface_work);
   for (const SurfaceWork& work : w.surface_work)
     use.contact += bytesOf(work.bodies, work.picks, work.previous, work.springs, work.each_counters) +

@@ -1,4 +1,4 @@
-// What a ray meets, for cursors: a look at the world that changes nothing.
+// What a ray meets, for cursors. It changes nothing.
 #include <limits>
 
 #include "meshless_surgery/tools/grasp.h"

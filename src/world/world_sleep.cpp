@@ -10,7 +10,7 @@ namespace {
 constexpr double kStillFor = 0.5;    // [s]
 constexpr double kStillMean = 0.01;  // [1/s] times the body's size: root mean square of its particles' speeds
 constexpr double kStillMost = 0.02;  // [1/s] likewise, of the fastest
-constexpr double kTrembling = 5.0;   // times that: who trembles faster than this within a frame is not looked at
+constexpr double kTrembling = 5.0;   // times that: a body that trembles faster within a frame is not checked
 
 Index rootOf(std::vector<Index>& root, Index i) {
   while (root[i] != i) {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <sstream>
 
+#include "meshless_surgery/body/embedded_contact.h"
 #include "meshless_surgery/body/face_contact.h"
 #include "meshless_surgery/body/preserve.h"
-#include "meshless_surgery/body/rider_contact.h"
 #include "meshless_surgery/body/unwind.h"
 #include "meshless_surgery/contact/sphere_and_ground.h"
 #include "meshless_surgery/tools/grasp.h"
@@ -15,10 +15,10 @@
 namespace meshless {
 namespace {
 
-constexpr double kRiderFade = 0.25;          // [s] in which what a cut left of a rider's offset falls to 1/e
+constexpr double kEmbeddedFade = 0.25;       // [s] in which offsets of embedded vertices fall to 1/e
 constexpr double kOffsetGone = 1e-7;         // of the spacing: then it is dropped
-constexpr double kDepenetrationSpeed = 0.5;  // [m/s] at which old overlap of bodies is let out at the least
-constexpr double kPushHopRadii = 0.25;       // longest way of the sphere between two looks at the tissue
+constexpr double kDepenetrationSpeed = 0.5;  // [m/s] at which bodies are depenetrated at the least
+constexpr double kPushHopRadii = 0.25;       // longest way of the sphere before the tissue is moved out of it
 constexpr int kContactPasses = 2;
 
 class Stopwatch {
@@ -65,24 +65,24 @@ void World::step() {
     w.groupBatches();
     const int substeps = w.chooseSubsteps(h_frame);
     const double h = h_frame / substeps;
-    bool in_gangs = false;
+    bool in_island_batches = false;
     if (rest_shape) {
       const Stopwatch contact(w.report.contact);
-      w.contacts.begin(w.parties, h);
-      in_gangs = w.formGangs(h);
-      if (!in_gangs) w.contacts.letOut(w.parties, w.report.contact_counters, w.for_each);
+      w.contacts.begin(w.shape_colliders, h);
+      in_island_batches = w.formIslandBatches(h);
+      if (!in_island_batches) w.contacts.depenetrate(w.shape_colliders, w.report.contact_counters, w.for_each);
       w.followGrasps();
     }
     w.clearForces();
     for (WorldBody* body : w.awake) body->low_current = false;
-    if (in_gangs)
-      w.stepInGangs(substeps, h);
+    if (in_island_batches)
+      w.stepInIslandBatches(substeps, h);
     else
       w.stepTogether(substeps, h_frame);
     for (Pick& pick : w.picks) pick.reached = pick.target;
     w.rememberGrasps();
     for (WorldBody* body : w.awake) {
-      w.fadeRiderOffsets(*body, h_frame);
+      w.fadeEmbeddedOffsets(*body, h_frame);
       if (rest_shape) w.liftOutOfGround(*body, h_frame);  // after: it lifts by offsets too
     }
     w.followGrasps();
@@ -181,9 +181,9 @@ void World::Impl::finishSubstep(double h) {
   for (WorldBody* body : awake) keepSize(*body, report.preserve_counters);
   forNumbers(awake.size(),
              [&](std::size_t b) { velocitiesFromPositions(*awake[b]->model, h, awake[b]->state, awake[b]->scratch); });
-  // Being pushed out does not throw: what the tissue does not get, the tool does not feel.
+  // Being pushed out does not throw: the tool does not report the force that the tissue does not get.
   if (push.touching)
-    for (const WorldBody* body : awake) push.force += body->scratch.unfelt * settings.step_rate;
+    for (const WorldBody* body : awake) push.force += body->scratch.unreported * settings.step_rate;
 }
 
 // As many as the stiffest body needs, within the budget and what contacts of a heap leave; what these take from a body
@@ -251,9 +251,9 @@ std::vector<WorldBody*> World::Impl::bodiesInContact(double h) {
 
 namespace {
 
-// What contacts do without a velocity, as letting out what was inside, a spring would answer with one, substep after
-// substep. `impulse`: what the grasp has given after them [kg m], `motion`: of its mean in this substep before that.
-// So much of it becomes velocity as adds no kinetic energy.
+// Contacts move some tissue without a velocity, as in depenetration. A spring would answer that with a velocity,
+// substep after substep. `impulse` [kg m]: what the grasp has given after the contacts; `motion` [m]: of its mean in
+// this substep before that. Only so much of the impulse becomes velocity as adds no kinetic energy.
 void keepStill(const BodyModel& model, const Pick& pick, const Vec3& motion, const Vec3& impulse,
                StepScratch& scratch) {
   const double most = impulse.squaredNorm() * graspInverseMass(model, pick);
@@ -302,8 +302,8 @@ void World::Impl::rememberGrasps() {
     if (const WorldBody* body = find(picks[n].body)) grasped[n] = graspMean(picks[n], body->state.positions);
 }
 
-// Old overlap that is let out, and what is lifted off the ground: a rod would have it back within the first of many
-// substeps, and throw the tissue.
+// Springs follow tissue that is depenetrated or lifted off the ground evenly over the step. Otherwise a stiff pick
+// would pull it back within the first of many substeps, and throw it.
 void World::Impl::followGrasps() {
   for (std::size_t n = 0; n < picks.size(); ++n)
     if (const WorldBody* body = find(picks[n].body))
@@ -380,7 +380,7 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
   if ((!settings.ground || solved) && !push.enabled) return;  // without a surface, particles are held above the ground
   Box bounds;
   for (const Vec3& p : state.positions) bounds.extend(p);
-  if (!model.binding.riders.empty()) {  // riders reach beyond the particles
+  if (!model.binding.embedded.empty()) {  // embedded vertices reach beyond the particles
     bounds.min.array() -= 2.0 * model.spacing;
     bounds.max.array() += 2.0 * model.spacing;
   }
@@ -452,11 +452,11 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
                                       [&](Index i) { return below(state.positions[i]); });
     few = std::count_if(state.positions.begin(), state.positions.end(), below) == listed;
   }
-  const Index lookable = static_cast<Index>(few ? body.low_particles.size() : model.rest.size());
+  const Index count = static_cast<Index>(few ? body.low_particles.size() : model.rest.size());
   for (int pass = 0; pass < kContactPasses; ++pass) {
     if (near_ground) {
       const double friction = std::sqrt(settings.ground_friction * body.material.friction);
-      for (Index n = 0; n < lookable; ++n) {
+      for (Index n = 0; n < count; ++n) {
         const Index i = few ? body.low_particles[n] : n;
         if (model.fixed[i]) continue;
         const Projection out = projectOutOfGround(state.positions[i], *settings.ground);
@@ -467,7 +467,7 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
         touched.push_back({i, out.normal, 0.0, false});
         ++report.ground_contacts;
       }
-      report.ground_contacts += pushRiders(
+      report.ground_contacts += pushEmbedded(
           model,
           [&](const Vec3& p) -> Vec3 {
             const Projection out = projectOutOfGround(p, *settings.ground);
@@ -477,7 +477,7 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
           [&](Index i, const Vec3&) {
             touched.push_back({i, Vec3::UnitZ(), 0.0, false});
           },
-          few ? &body.low_riders : nullptr);
+          few ? &body.low_embedded : nullptr);
     }
     if (near_push && !inside) {
       const auto isPushed = [&](Index i, const Vec3& shift) {
@@ -486,7 +486,7 @@ void World::Impl::contactGroundAndPush(WorldBody& body, double h, double h_frame
         const Vec3 normal = (state.positions[i] - push.position).normalized();
         touched.push_back({i, normal, normal.dot(push_velocity), true});
       };
-      report.push_contacts += pushRiders(model, outOfSphere, state, isPushed);
+      report.push_contacts += pushEmbedded(model, outOfSphere, state, isPushed);
       report.push_contacts += pushFaces(model, push.position, push.radius, state, isPushed);
       for (Index i = 0; i < model.rest.size(); ++i) {
         if (model.fixed[i]) continue;
@@ -514,25 +514,25 @@ void World::Impl::findLow(WorldBody& body, double h_frame) {
   const double reach = *settings.ground + 0.5 * model.spacing + std::abs(settings.gravity.z()) * h_frame * h_frame;
   const auto low = [&](double height, double speed) { return height + std::min(0.0, 2.0 * h_frame * speed) < reach; };
   body.low_particles.clear();
-  body.low_riders.clear();
+  body.low_embedded.clear();
   for (Index i = 0; i < model.rest.size(); ++i)
     if (low(state.positions[i].z(), state.velocities[i].z())) body.low_particles.push_back(i);
   const SurfaceBinding& binding = model.binding;
-  for (Index r = 0; r < binding.riders.size(); ++r) {
-    double height = state.rider_offsets[r].z() - binding.levers[r].norm(), speed = 0.0;
+  for (Index r = 0; r < binding.embedded.size(); ++r) {
+    double height = state.embedded_offsets[r].z() - binding.levers[r].norm(), speed = 0.0;
     for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k) {
       height += binding.weights[k] * state.positions[binding.carriers[k]].z();
       speed += binding.weights[k] * state.velocities[binding.carriers[k]].z();
     }
-    if (low(height, speed)) body.low_riders.push_back(r);
+    if (low(height, speed)) body.low_embedded.push_back(r);
   }
   body.low_current = true;
 }
 
-void World::Impl::fadeRiderOffsets(WorldBody& body, double h) {
-  const double left = std::exp(-h / kRiderFade);
+void World::Impl::fadeEmbeddedOffsets(WorldBody& body, double h) {
+  const double left = std::exp(-h / kEmbeddedFade);
   const double gone = kOffsetGone * body.model->spacing;
-  for (Vec3& offset : body.state.rider_offsets) {
+  for (Vec3& offset : body.state.embedded_offsets) {
     offset *= left;
     if (offset.squaredNorm() < gone * gone) offset.setZero();
   }

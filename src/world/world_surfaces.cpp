@@ -4,9 +4,9 @@
 #include <cmath>
 #include <sstream>
 
-#include "contact_parties.h"
 #include "meshless_surgery/dynamics/extent.h"
 #include "meshless_surgery/tools/grasp.h"
+#include "shape_colliders.h"
 #include "world_impl.h"
 
 namespace meshless {
@@ -20,15 +20,15 @@ ContactSurface surfaceOf(const BodyModel& model) {
   const SurfaceBinding& binding = model.binding;
   const Index count = static_cast<Index>(model.surface.vertices.size());
   VertexSupports supports;
-  std::vector<Index> rider(count, kNoIndex);
-  for (Index r = 0; r < binding.riders.size(); ++r) rider[binding.riders[r]] = r;
+  std::vector<Index> embedded(count, kNoIndex);
+  for (Index r = 0; r < binding.embedded.size(); ++r) embedded[binding.embedded[r]] = r;
   supports.offsets.push_back(0);
   for (Index v = 0; v < count; ++v) {
-    if (rider[v] == kNoIndex) {
+    if (embedded[v] == kNoIndex) {
       supports.particles.push_back(binding.particle[v]);
       supports.weights.push_back(1.0);
     } else {
-      for (Index k = binding.offsets[rider[v]]; k < binding.offsets[rider[v] + 1]; ++k) {
+      for (Index k = binding.offsets[embedded[v]]; k < binding.offsets[embedded[v] + 1]; ++k) {
         supports.particles.push_back(binding.carriers[k]);
         supports.weights.push_back(binding.weights[k]);
       }
@@ -68,7 +68,7 @@ SurfaceModel::SurfaceModel(BodyModelPtr of_model) : model(std::move(of_model)), 
   if (!(model->specific_stiffness > 0.0) && !model->any_fixed)
     groups = std::make_unique<RigidGroups>(model->clusters.offsets, model->clusters.members, model->clusters.weights,
                                            model->masses);
-  reach = riderReachOf(*model);
+  reach = embeddedReachOf(*model);
 }
 
 std::size_t SurfaceModel::bytes() const {
@@ -113,14 +113,14 @@ void World::Impl::fillCollider(WorldBody& body, double h_frame, Collider& collid
   const SelfContact wanted = body.material.self_contact;
   if (!body.material.bends() || wanted == SelfContact::kNone) return;
   if (wanted == SelfContact::kAll) collider.self = PairSearch::Self::kAll;
-  if (wanted == SelfContact::kLips && body.model->lips) collider.self = PairSearch::Self::kCuts;
+  if (wanted == SelfContact::kWoundFaces && body.model->incised) collider.self = PairSearch::Self::kCuts;
 }
 
 // Once a model; a body's key figures are needed before anybody is near.
 void World::Impl::measureSurface(WorldBody& body) {
   if (body.measured == body.model) return;
   body.measured = body.model;
-  body.surface_reach = riderReachOf(*body.model);
+  body.surface_reach = embeddedReachOf(*body.model);
   double sum = 0.0;
   std::size_t count = 0;
   const TriangleMesh& surface = body.model->surface;
@@ -129,7 +129,7 @@ void World::Impl::measureSurface(WorldBody& body) {
   body.edge_length = count > 0 ? sum / static_cast<double>(count) : body.model->spacing;
 }
 
-// Rows of the frame. Whom something reaches wakes, and then its neighbours are looked at as well.
+// Rows of the frame. A body that is reached wakes, and then all is found again with its neighbours.
 void World::Impl::findSurfaceContacts(double h_frame) {
   SurfaceScene scene;
   scene.ground = settings.ground;
@@ -186,8 +186,8 @@ Vec3 World::Impl::pushWay(double h_frame) const {
   return length > most ? Vec3(way * (most / length)) : way;
 }
 
-/// Substeps that the stiffest body of an island and its contacts need: nobody who may meet something goes farther than an
-/// edge in one. What is taken from a body is said once.
+/// Substeps that the stiffest body of an island and its contacts need: no body that may meet something goes farther
+/// than an edge in one. What is taken from a body is said once.
 int World::Impl::substepsOf(const std::vector<WorldBody*>& some, bool may_meet, double h_frame) {
   double needed = may_meet ? std::max(settings.substeps, kContactSubsteps) : settings.substeps;
   for (const WorldBody* body : some) {
@@ -329,7 +329,7 @@ void World::Impl::stepIsland(std::size_t number, double h_frame, const ForEach& 
     work.match += secondsSince(last);
   }
   surface_contacts.finishIsland(static_cast<Index>(number), h);
-  for (WorldBody* body : some) fadeRiderOffsets(*body, h_frame);
+  for (WorldBody* body : some) fadeEmbeddedOffsets(*body, h_frame);
 }
 
 }  // namespace meshless

@@ -8,7 +8,7 @@ namespace {
 using bench::squeeze;
 using bench::Squeezed;
 
-Material looks() {
+Material appearance() {
   Material material;
   material.alpha = 0.8;
   material.damping = 5.0;
@@ -39,7 +39,7 @@ TEST(ResponseCurve, MustBeMonotone) {
 }
 
 TEST(Preserve, AStiffCurveHoldsTheVolumeOfASqueezedCubeALaxOneLiesBetween) {
-  Material material = looks();
+  Material material = appearance();
   const Squeezed off = squeeze(material);
   EXPECT_LT(off.volume, 0.9);
   EXPECT_EQ(off.gradients, 0u) << "nothing is formed that no material asks for";
@@ -67,7 +67,7 @@ TEST(Preserve, TheSameForAMaterialForAccuracy) {
 }
 
 TEST(Preserve, AreaIsHeldNearerByACurve) {
-  Material material = looks();
+  Material material = appearance();
   const double off = squeeze(material).area;
   material.area.points = {{0.0, 1.0}};
   const Squeezed held = squeeze(material);

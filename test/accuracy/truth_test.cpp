@@ -1,4 +1,4 @@
-// The deformer against the finite-element truth (bench/truth): materials for accuracy, without calibration.
+// The deformer against the finite-element truth (bench/truth): elastic materials, without calibration.
 #include <gtest/gtest.h>
 
 #include <string>

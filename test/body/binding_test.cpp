@@ -13,7 +13,7 @@ Points moved(const Points& points, const Mat3& map, const Vec3& shift) {
   return result;
 }
 
-TEST(BindSurface, RidersFollowEveryAffineMotionExactly) {
+TEST(BindSurface, EmbeddedVerticesFollowEveryAffineMotionExactly) {
   Mat3 map;
   map << 1.2, 0.1, 0, -0.1, 0.9, 0.05, 0, 0.1, 1.1;
   const Vec3 shift(1, -2, 3);
@@ -28,21 +28,21 @@ TEST(BindSurface, RidersFollowEveryAffineMotionExactly) {
     for (std::size_t v = 0; v < vertex_particle.size(); v += 2) vertex_particle[v] = kNoIndex;
     const SurfaceBinding binding = bindSurface(m.rest, m.graph, m.clusters, m.surface.vertices, vertex_particle);
     EXPECT_EQ(binding.particle, vertex_particle);
-    ASSERT_EQ(binding.offsets.size(), binding.riders.size() + 1);
+    ASSERT_EQ(binding.offsets.size(), binding.embedded.size() + 1);
     std::vector<ClusterPose> poses(m.clusters.size());
     for (ClusterPose& pose : poses) pose.deformation = map;
     const Points positions = moved(m.rest, map, shift), surface = moved(m.surface.vertices, map, shift);
-    for (Index r = 0; r < binding.riders.size(); ++r) {
-      EXPECT_EQ(vertex_particle[binding.riders[r]], kNoIndex);
+    for (Index r = 0; r < binding.embedded.size(); ++r) {
+      EXPECT_EQ(vertex_particle[binding.embedded[r]], kNoIndex);
       double share = 0.0;
       for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k) share += binding.weights[k];
       EXPECT_NEAR(share, 1.0, 1e-12);
-      EXPECT_LT((riderPosition(binding, positions, poses, r) - surface[binding.riders[r]]).norm(), 1e-9 * size);
+      EXPECT_LT((embeddedPosition(binding, positions, poses, r) - surface[binding.embedded[r]]).norm(), 1e-9 * size);
     }
   }
 }
 
-TEST(BindSurface, RidersOfAPieceAmplifyLittleAndFollowSmoothMotion) {
+TEST(BindSurface, EmbeddedVerticesOfAPieceAmplifyLittleAndFollowSmoothMotion) {
   Mat3 map;
   map << 1.2, 0.1, 0, -0.1, 0.9, 0.05, 0, 0.1, 1.1;
   const Vec3 shift(1, -2, 3);
@@ -66,16 +66,16 @@ TEST(BindSurface, RidersOfAPieceAmplifyLittleAndFollowSmoothMotion) {
         Points curved;
         for (const Vec3& p : m.rest) curved.push_back(bent(p));
         const Points positions = moved(m.rest, map, shift), surface = moved(m.surface.vertices, map, shift);
-        for (Index r = 0; r < binding.riders.size(); ++r) {
+        for (Index r = 0; r < binding.embedded.size(); ++r) {
           double magnitude = 0.0;
           for (Index c = binding.offsets[r]; c < binding.offsets[r + 1]; ++c) magnitude += std::abs(binding.weights[c]);
           // The weights of a cell add up to more the farther beyond it: 3 one whole cell beyond a face, where the
           // tissue there hardly fills the cell next to it.
           EXPECT_LE(magnitude, (elastic ? 3.0 : kMostWeight) * (1.0 + 1e-9));
-          const Index v = binding.riders[r];
-          EXPECT_LT((riderPosition(binding, positions, poses, r) - surface[v]).norm(), 1e-10);
+          const Index v = binding.embedded[r];
+          EXPECT_LT((embeddedPosition(binding, positions, poses, r) - surface[v]).norm(), 1e-10);
           if (!binding.levers[r].isZero(0.0)) continue;
-          const double miss = (riderPosition(binding, curved, still, r) - bent(m.surface.vertices[v])).norm();
+          const double miss = (embeddedPosition(binding, curved, still, r) - bent(m.surface.vertices[v])).norm();
           EXPECT_LT(miss, 2.5 * std::pow((elastic ? 1.42 : 2.5) * m.spacing, 2));
         }
       }
@@ -103,9 +103,9 @@ TEST(BindSurface, CarriersAreTheNearestFromAnyParticleNearBy) {
   const SurfaceBinding begun = bindSurface(m.rest, m.graph, m.clusters, m.surface.vertices, vertex_particle, &known);
   EXPECT_EQ(begun.bound, searched.bound);
   ASSERT_EQ(begun.offsets, searched.offsets);
-  for (std::size_t r = 0; r < begun.riders.size(); ++r)
+  for (std::size_t r = 0; r < begun.embedded.size(); ++r)
     for (Index k = begun.offsets[r]; k < begun.offsets[r + 1]; ++k) {  // of those as far as each other, any
-      const Vec3& p = m.surface.vertices[begun.riders[r]];
+      const Vec3& p = m.surface.vertices[begun.embedded[r]];
       EXPECT_NEAR((m.rest[begun.carriers[k]] - p).norm(), (m.rest[searched.carriers[k]] - p).norm(), 1e-12);
     }
 }
@@ -120,8 +120,8 @@ TEST(BindSurface, TheRimOfACutThroughLargeTrianglesFollowsWhatIsBesideIt) {
   int bound = 0;
   for (const BodyPiece& piece : cut->pieces) {
     const BodyModel& m = *piece.model;
-    for (Index r = 0; r < m.binding.riders.size(); ++r) {
-      const Vec3& p = m.surface.vertices[m.binding.riders[r]];
+    for (Index r = 0; r < m.binding.embedded.size(); ++r) {
+      const Vec3& p = m.surface.vertices[m.binding.embedded[r]];
       double nearest = 1.0;
       for (const Vec3& q : m.rest) nearest = std::min(nearest, (q - p).norm());
       EXPECT_NEAR((m.rest[m.binding.carriers[m.binding.offsets[r]]] - p).norm(), nearest, 1e-12);
@@ -140,11 +140,11 @@ TEST(BindSurface, ParticlesInAPlaneOrAloneStillCarry) {
   const Points turned = {{0, 0, 0}, {0, 0, -1}, {0, 1, 0}, {0, 1, -1}};
   std::vector<ClusterPose> poses(1);
   poses[0].deformation = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitY()).toRotationMatrix();
-  EXPECT_LT((riderPosition(above, turned, poses, 0) - Vec3(0.1, 0.5, -0.25)).norm(), 1e-12);
+  EXPECT_LT((embeddedPosition(above, turned, poses, 0) - Vec3(0.1, 0.5, -0.25)).norm(), 1e-12);
   const Points single = {{1, 2, 3}};
   const ParticleGraph graph = makeGraph(single, {});
   const SurfaceBinding lone = bindSurface(single, graph, makeClusters(single, graph, {}), {{1, 2, 4}}, {kNoIndex});
-  EXPECT_LT((riderPosition(lone, {{5, 6, 7}}, poses, 0) - Vec3(6, 6, 7)).norm(), 1e-12);
+  EXPECT_LT((embeddedPosition(lone, {{5, 6, 7}}, poses, 0) - Vec3(6, 6, 7)).norm(), 1e-12);
 }
 
 TEST(BindSurface, OtherPartsThatAreOnlyNearInSpaceDoNotCarry) {
@@ -161,9 +161,9 @@ TEST(BindSurface, OtherPartsThatAreOnlyNearInSpaceDoNotCarry) {
   for (Index i : binding.carriers) EXPECT_LT(i, 10u);
 }
 
-TEST(BindSurface, WithoutRidersThereIsNothingToFollow) {
+TEST(BindSurface, WithoutEmbeddedVerticesThereIsNothingToFollow) {
   const PreparedBody body = test::prepared(test::ball());
-  EXPECT_TRUE(body.model->binding.riders.empty());
+  EXPECT_TRUE(body.model->binding.embedded.empty());
   EXPECT_TRUE(body.model->binding.carriers.empty());
 }
 

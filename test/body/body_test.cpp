@@ -68,7 +68,7 @@ TEST(PrepareBody, AFineSurfaceRidesAndFollowsAnAffineMotionExactly) {
   const PreparedBody body = prepared(def);
   EXPECT_GT(body.model->surface.vertices.size(), 6000u);
   EXPECT_LT(body.model->rest.size(), 3000u);
-  ASSERT_FALSE(body.model->binding.riders.empty());
+  ASSERT_FALSE(body.model->binding.embedded.empty());
   Mat3 map;
   map << 1.2, 0.1, 0, -0.1, 0.9, 0.05, 0, 0.1, 1.1;
   BodyState state = body.state;

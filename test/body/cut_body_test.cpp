@@ -64,7 +64,7 @@ TEST(CutBody, KeepsVolumeMassMomentumAndPlaces) {
         EXPECT_EQ(piece.state.velocities[i], body.state.velocities[old]);
         EXPECT_EQ(piece.model->rest[i], body.model->rest[old]);
       }
-      // Drawn where the knife left it, riders too.
+      // Drawn where the blade left it, embedded vertices too.
       BodyState redrawn = piece.state;
       updateSurface(*piece.model, redrawn);
       for (std::size_t v = 0; v < redrawn.surface.size(); ++v)

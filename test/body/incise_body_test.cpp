@@ -65,7 +65,7 @@ TEST(InciseBody, KeepsVolumeMassPlacesAndParticles) {
   }
 }
 
-// Half cut, held by the two sides of the mouth and drawn apart: how wide the mouth is in the end.
+// Half cut, held on both sides of the wound and drawn apart: how wide the wound is in the end.
 double opening(const PreparedBody& start, bool clusters_kept) {
   PreparedBody body = start;
   const Result<IncisedBody> opened = inciseBody(*body.model, body.state, downwards(Vec3(-0.2, 0.0, 0.2), 0.4, 0.2));
@@ -92,7 +92,7 @@ double opening(const PreparedBody& start, bool clusters_kept) {
     velocitiesFromPositions(m, h, body.state, scratch);
   }
   updateSurface(m, body.state);
-  // Between what is right and left of the mouth's middle, at the top.
+  // Between what is right and left of the wound's middle, at the top.
   Vec3 at[2] = {Vec3::Zero(), Vec3::Zero()}, rest[2] = {Vec3::Zero(), Vec3::Zero()};
   double count[2] = {0.0, 0.0};
   for (std::size_t i = 0; i < m.rest.size(); ++i) {

@@ -177,7 +177,7 @@ TEST(ContactShape, FilledCellsAnswerAsTheFirstSearchesDo) {
 }
 
 // Exactly on an edge both of its triangles are at no distance but rounding's: the answer must not change with the order
-// in which they are looked at, or two threads would not give what one gives.
+// in which they are queried, or two threads would not give what one gives.
 TEST(ContactShape, FilledCellsAnswerAsTheFirstSearchesDoOnTheSurfaceToo) {
   for (const shapes::Shape& tried : triedShapes()) {
     const Shaped shaped(tried.mesh);
@@ -265,7 +265,7 @@ TEST(ContactShape, FarPointsAreOutsideAndNearerToNoCornerOfTheBounds) {
   }
 }
 
-TEST(ContactShape, WhatCannotBeLookedUpIsSaid) {
+TEST(ContactShape, WhatCannotBeQueriedIsSaid) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   ContactShape::Nearest found;
   const Shaped cube(boxMesh(Vec3::Ones(), 2, 2, 2));

@@ -173,7 +173,7 @@ TEST(MotionLimit, WhoIsHeldIsNotMovedAndNotPassed) {
   }
 }
 
-// A set that has seen how far apart its features are looks at them again before they can have met.
+// A set that has measured how far apart its features are checks them again before they can have met.
 TEST(MotionLimit, NothingIsMissedOverManySubsteps) {
   test::Random random(17);
   for (int n = 0; n < 100; ++n) {

@@ -226,10 +226,10 @@ TEST(SurfaceContacts, RowsThatAreKeptDoTheSameAsRowsFoundAnew) {
   for (Clash* each : {&clash, &anew}) each->stand();
   SurfaceContacts contacts, fresh;
   const ContactCounters first = clash.find(contacts);
-  EXPECT_GT(first.lookups, 0u);
-  EXPECT_LE(first.lookups, clash.before[0].size() + clash.before[1].size()) << "each vertex once";
+  EXPECT_GT(first.queries, 0u);
+  EXPECT_LE(first.queries, clash.before[0].size() + clash.before[1].size()) << "each vertex once";
   const ContactCounters second = clash.find(contacts);
-  EXPECT_EQ(second.lookups, 0u);
+  EXPECT_EQ(second.queries, 0u);
   EXPECT_EQ(second.contacts, first.contacts);
   clash.move(contacts);
   solve(anew, fresh);
@@ -246,7 +246,7 @@ TEST(SurfaceContacts, WhoHasMovedIsFoundAnew) {
   SurfaceContacts contacts;
   clash.find(contacts);
   for (Vec3& p : clash.before[1]) p.x() += 0.02;
-  EXPECT_GT(clash.find(contacts).lookups, 0u);
+  EXPECT_GT(clash.find(contacts).queries, 0u);
 }
 
 TEST(SurfaceContacts, WhoSleepsKeepsTheRowsWithTheirForces) {
@@ -259,11 +259,11 @@ TEST(SurfaceContacts, WhoSleepsKeepsTheRowsWithTheirForces) {
   for (Collider& c : clash.colliders) c.moves = false;
   for (int frame = 0; frame < 3; ++frame) {
     const ContactCounters counters = clash.find(contacts);
-    EXPECT_EQ(counters.lookups, 0u);
+    EXPECT_EQ(counters.queries, 0u);
     EXPECT_TRUE(contacts.islands().empty());
   }
   for (Collider& c : clash.colliders) c.moves = true;
-  EXPECT_EQ(clash.find(contacts).lookups, 0u);
+  EXPECT_EQ(clash.find(contacts).queries, 0u);
   const std::vector<ContactRow> after = rowsOf(contacts);
   ASSERT_EQ(after.size(), before.size());
   double force = 0.0;
@@ -294,7 +294,7 @@ TEST(SurfaceContacts, WhoWakesAndMovesIsFoundAnew) {
   for (Collider& c : clash.colliders) c.moves = true;
   clash.find(contacts);
   for (Vec3& p : clash.before[1]) p.x() += 0.03;
-  EXPECT_GT(clash.find(contacts).lookups, 0u);
+  EXPECT_GT(clash.find(contacts).queries, 0u);
 }
 
 TEST(SurfaceContacts, WhatIsForgottenIsFoundAnewWithoutForces) {
@@ -305,7 +305,7 @@ TEST(SurfaceContacts, WhatIsForgottenIsFoundAnewWithoutForces) {
   contacts.finishIsland(0, kH);
   contacts.forget(1);
   EXPECT_EQ(contacts.rows(), 0u);
-  EXPECT_GT(clash.find(contacts).lookups, 0u);
+  EXPECT_GT(clash.find(contacts).queries, 0u);
   for (const ContactRow& row : rowsOf(contacts)) EXPECT_EQ(row.impulse, Vec3::Zero());
 }
 

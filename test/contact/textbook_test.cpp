@@ -373,7 +373,7 @@ TEST(Penetrations, DoNotMindFlatInvertedAndHugeTetrahedra) {
   }
 }
 
-TEST(Penetrations, NothingToLookAtIsFine) {
+TEST(Penetrations, NothingToQueryIsFine) {
   ContactCounters counters;
   EXPECT_TRUE(findPenetrations({}, counters).empty());
   std::vector<Body> bodies(3);

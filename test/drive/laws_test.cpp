@@ -149,7 +149,7 @@ TEST(VolumeLaw, FindsASqueezedPiece) {
   EXPECT_TRUE(volumeLaw(volumesOf(inverted), {}).broken());
 }
 
-TEST(VolumeLaw, HoldsLooksToWhatTheyDoUncut) {
+TEST(VolumeLaw, HoldsAppearanceMaterialsToWhatTheyDoUncut) {
   Seen uncut = sound();
   uncut.bodies[1].elastic = false;
   for (Vec3& p : uncut.bodies[1].surface.vertices) p.x() *= 0.7;
@@ -171,7 +171,7 @@ TEST(DepthLaw, FindsAVertexTwoMillimetresInsideAnother) {
       if ((p - Vec3(x, 0.01, 0.1)).norm() < 1e-9) p += Vec3(x < 0.0 ? 0.002 : 0.0, 0, -0.002);
     const Finding found = depthLaw(pressed);
     EXPECT_TRUE(found.broken()) << x;
-    EXPECT_NEAR(found.score, 0.002 / allowedDepth(seen.bodies[0].size), 1e-6);
+    EXPECT_NEAR(found.score, 0.002 / allowedDepth(seen.bodies[0].diagonal), 1e-6);
   }
   Seen slight = seen;
   for (Vec3& p : slight.bodies[1].surface.vertices) p.z() -= 0.0008;
@@ -205,7 +205,7 @@ TEST(DepthLaw, FindsWhatIsInTheGroundOrAnObstacle) {
 }
 
 TEST(CrossingLaw, FindsAnEdgeThroughAFace) {
-  // A rod through both boxes: no vertex of anybody is inside another one.
+  // A rod through both boxes: no vertex of a body is inside another one.
   Seen seen = sound();
   TriangleMesh rod = boxMesh(Vec3(0.004, 0.004, 0.5), 1, 1, 1);
   seen.bodies.push_back(bodyOf("rod", rod, Vec3(0.005, 0.0033, 0.3)));

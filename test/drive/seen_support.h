@@ -20,7 +20,7 @@ inline SeenBody bodyOf(const std::string& name, const TriangleMesh& mesh, const 
   body.rest_volume = signedVolume(mesh);
   body.mass = 1000.0 * body.rest_volume;
   body.centre = at;
-  body.size = boundsOf(body.rest).diagonal();
+  body.diagonal = boundsOf(body.rest).diagonal();
   return body;
 }
 

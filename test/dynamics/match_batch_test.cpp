@@ -146,7 +146,7 @@ Plain makeOverlap(Random& random, int n, int width, bool equal) {
   return body;
 }
 
-Material looks(MatchMode mode, double damping) {
+Material appearance(MatchMode mode, double damping) {
   Material m;
   m.mode = mode;
   m.alpha = 0.6;
@@ -193,7 +193,7 @@ double fallen(const BatchStep& step, int steps) { return 0.5 * step.gravity.norm
 
 TEST(BatchStep, KnowsHowFarAheadTheMatchLooks) {
   for (double h : {1.0 / 30.0, 1.0 / 60.0, 1.0 / 500.0})
-    EXPECT_EQ(batchStep(looks(MatchMode::kLinear, 1.0), h).ahead, viscosityTime(0.6, h));
+    EXPECT_EQ(batchStep(appearance(MatchMode::kLinear, 1.0), h).ahead, viscosityTime(0.6, h));
   // Forgotten, it shows.
   EXPECT_TRUE(std::isnan(BatchStep().ahead));
 }
@@ -221,7 +221,7 @@ TEST(BodyBatch, FollowsTheReferenceAtAnyStep) {
           bodies.push_back(makeBody(random, 3, 3, 3));
           disturb(bodies.back(), random);
         }
-        const Material material = looks(mode, damping);
+        const Material material = appearance(mode, damping);
         const BatchStep step = batchStep(material, 1.0 / rate);
         BodyBatch batch = batchOf(bodies);
         MatchCounters counters;
@@ -245,7 +245,7 @@ TEST(BodyBatch, FollowsTheReferenceAtAnyStep) {
 // However strong the damping, what is left is the motion of a rigid body with the momentum that was there.
 template <class Step>
 void expectRigidAfterDamping(const Plain& before, const Step& after_step) {
-  BatchStep step = batchStep(looks(MatchMode::kLinear, 1e6), 1.0 / 120.0);
+  BatchStep step = batchStep(appearance(MatchMode::kLinear, 1e6), 1.0 / 120.0);
   step.gain = 0.0;
   step.gravity.setZero();
   const Plain after = after_step(step);
@@ -287,7 +287,7 @@ TEST(BodyBatch, StepsAsTheReferenceInFreeFlight) {
           bodies.push_back(makeBody(random, 3, 3, 3, scale, scale * Vec3(1e3, -10.0 * i, 5.0)));
           disturb(bodies.back(), random, scale);
         }
-        const Material material = looks(mode, 1.0);
+        const Material material = appearance(mode, 1.0);
         BatchStep step = batchStep(material, 1.0 / 120.0);
         step.gravity *= scale;
         step.set = set;
@@ -324,7 +324,7 @@ TEST(BodyBatch, StaysWithTheReferenceOnTheGround) {
         bodies.push_back(makeBody(random, 3, 3, 3));
         disturb(bodies.back(), random, 1.0, 0.02);
       }
-      const Material material = looks(mode, 1.0);
+      const Material material = appearance(mode, 1.0);
       BatchStep step = batchStep(material, 1.0 / 120.0);
       step.ground = 0.0;
       step.set = set;
@@ -359,7 +359,7 @@ TEST(BodyBatch, KeepsMomentum) {
         bodies.push_back(makeBody(random, 3, 3, 3));
         disturb(bodies.back(), random);
       }
-      BatchStep step = batchStep(looks(mode, damping), 1.0 / 120.0);
+      BatchStep step = batchStep(appearance(mode, damping), 1.0 / 120.0);
       step.gravity.setZero();
       BodyBatch batch = batchOf(bodies);
       MatchCounters counters;
@@ -383,7 +383,7 @@ TEST(BodyBatch, BodiesDoNotDependOnPlaceNeighboursOrOrder) {
   }
   for (InstructionSet set : sets())
     for (MatchMode mode : kModes) {
-      BatchStep step = batchStep(looks(mode, 1.0), 1.0 / 120.0);
+      BatchStep step = batchStep(appearance(mode, 1.0), 1.0 / 120.0);
       step.ground = 0.03;
       step.set = set;
       std::vector<Plain> spoiled = bodies;
@@ -422,7 +422,7 @@ TEST(BodyBatch, BodiesMayTakeTheWrongPlaces) {
     disturb(bodies.back(), random);
   }
   for (MatchMode mode : kModes) {
-    const BatchStep step = batchStep(looks(mode, 1.0), 1.0 / 120.0);
+    const BatchStep step = batchStep(appearance(mode, 1.0), 1.0 / 120.0);
     const auto statesOf = [](std::vector<Plain>& of, std::size_t first, std::size_t count) {
       std::vector<BatchBody> states;
       for (std::size_t i = first; i < first + count; ++i)
@@ -465,7 +465,7 @@ TEST(BodyBatch, FallsBackWhereTheRankIsMissing) {
       for (std::size_t i = 0; i < 12; ++i) body.state.velocities[i] = random.vector(0.05);
       bodies.push_back(std::move(body));
     }
-    const Material material = looks(mode, 1.0);
+    const Material material = appearance(mode, 1.0);
     const BatchStep step = batchStep(material, 1.0 / 120.0);
     BodyBatch batch = batchOf(bodies);
     MatchCounters counters;
@@ -513,7 +513,7 @@ TEST(OverlapBatch, StepsAsTheReference) {
         Random random(17);
         Plain body = makeOverlap(random, 7, equal ? 1 : 2, equal);
         disturb(body, random);
-        const Material material = looks(mode, 1.0);
+        const Material material = appearance(mode, 1.0);
         BatchStep step = batchStep(material, 1.0 / 120.0);
         step.set = set;
         OverlapBatch batch = overlapOf(body);
@@ -537,7 +537,7 @@ TEST(OverlapBatch, StaysWithTheReferenceOnTheGround) {
   disturb(body, random, 1.0, 0.02);
   double lowest = 1.0;
   for (const Vec3& x : body.state.positions) lowest = std::min(lowest, x.z());
-  const Material material = looks(MatchMode::kLinear, 1.0);
+  const Material material = appearance(MatchMode::kLinear, 1.0);
   BatchStep step = batchStep(material, 1.0 / 120.0);
   step.ground = lowest - 0.01;
   MatchCounters counters;
@@ -561,7 +561,7 @@ TEST(OverlapBatch, FollowsTheReferenceAtAnyStep) {
       Random random(43);
       Plain body = makeOverlap(random, 5, 1, false);
       disturb(body, random);
-      const Material material = looks(MatchMode::kLinear, damping);
+      const Material material = appearance(MatchMode::kLinear, damping);
       const BatchStep step = batchStep(material, 1.0 / rate);
       OverlapBatch batch = overlapOf(body);
       MatchCounters counters;
@@ -601,7 +601,7 @@ TEST(OverlapBatch, KeepsMomentumAndItsFrame) {
       Random random(23);
       Plain body = makeOverlap(random, 6, 1, false);
       disturb(body, random);
-      BatchStep step = batchStep(looks(mode, damping), 1.0 / 120.0);
+      BatchStep step = batchStep(appearance(mode, damping), 1.0 / 120.0);
       step.gravity.setZero();
       OverlapBatch batch = overlapOf(body);
       MatchCounters counters;
@@ -621,7 +621,7 @@ TEST(OverlapBatch, OrderOfTheChunksDoesNotMatter) {
   Random random(29);
   Plain body = makeOverlap(random, 8, 1, true);
   disturb(body, random);
-  const BatchStep step = batchStep(looks(MatchMode::kLinear, 1.0), 1.0 / 120.0);
+  const BatchStep step = batchStep(appearance(MatchMode::kLinear, 1.0), 1.0 / 120.0);
   OverlapBatch one = overlapOf(body), other = overlapOf(body);
   MatchCounters counters;
   for (int n = 0; n < 30; ++n) {
@@ -643,7 +643,7 @@ TEST(OverlapBatch, HistoryLeavesNoTrace) {
   const Plain rest = makeOverlap(random, 5, 1, true);  // 125 particles: the arrays are padded
   Plain body = rest;
   disturb(body, random);
-  const BatchStep step = batchStep(looks(MatchMode::kLinear, 1.0), 1.0 / 120.0);
+  const BatchStep step = batchStep(appearance(MatchMode::kLinear, 1.0), 1.0 / 120.0);
   MatchCounters counters;
   OverlapBatch fresh = overlapOf(body), used = overlapOf(rest);
   Plain spoiled = rest;

@@ -134,7 +134,7 @@ void disturb(Plain& body, Random& random, double strain = 0.1) {
   }
 }
 
-Material looks(MatchMode mode, double damping) {
+Material appearance(MatchMode mode, double damping) {
   Material m;
   m.mode = mode;
   m.alpha = 0.6;
@@ -297,7 +297,7 @@ TEST(SummedBatch, StepsAsTheReference) {
         Random random(17);
         Plain body = makeBlock(random, shape.size, shape.width, shape.hole);
         disturb(body, random);
-        const Material material = looks(mode, 1.0);
+        const Material material = appearance(mode, 1.0);
         BatchStep step = batchStep(material, 1.0 / 120.0);
         step.set = set;
         SummedBatch batch(body.input());
@@ -326,7 +326,7 @@ TEST(SummedBatch, StaysWithTheReferenceOnTheGround) {
   disturb(body, random, 0.02);
   double lowest = 10.0;
   for (const Vec3& x : body.state.positions) lowest = std::min(lowest, x.z());
-  const Material material = looks(MatchMode::kLinear, 1.0);
+  const Material material = appearance(MatchMode::kLinear, 1.0);
   BatchStep step = batchStep(material, 1.0 / 120.0);
   step.ground = lowest - 0.01;
   MatchCounters counters;
@@ -374,7 +374,7 @@ TEST(SummedBatch, KeepsMomentum) {
       disturb(body, random);
       constexpr int kSteps = 1000;
       for (double damping : {0.0, 20.0}) {
-        BatchStep step = batchStep(looks(mode, damping), 1.0 / 120.0);
+        BatchStep step = batchStep(appearance(mode, damping), 1.0 / 120.0);
         step.gravity.setZero();
         const auto summed = drift<SummedBatch>(body, step, kSteps), pairs = drift<OverlapBatch>(body, step, kSteps);
         EXPECT_LE(summed[0], 3e-8 * kSteps);
@@ -388,7 +388,7 @@ TEST(SummedBatch, ThreadsAndHistoryLeaveNoTrace) {
   Random random(29);
   Plain body = makeBlock(random, {11, 10, 9}, 2, 7);
   disturb(body, random);
-  BatchStep step = batchStep(looks(MatchMode::kLinear, 1.0), 1.0 / 120.0);
+  BatchStep step = batchStep(appearance(MatchMode::kLinear, 1.0), 1.0 / 120.0);
   step.ground = 0.0;
   const auto backwards = [](std::size_t count, const std::function<void(std::size_t)>& work) {
     for (std::size_t i = count; i > 0; --i) work(i - 1);
@@ -423,7 +423,7 @@ TEST(SummedBatch, SurvivesWhatIsNotFinite) {
   SummedBatch batch(body.input());
   write(body, batch);
   MatchCounters counters;
-  const BatchStep step = batchStep(looks(MatchMode::kLinear, 1.0), 1.0 / 120.0);
+  const BatchStep step = batchStep(appearance(MatchMode::kLinear, 1.0), 1.0 / 120.0);
   for (int n = 0; n < 3; ++n) batch.step(step, counters);
   EXPECT_EQ(counters.rotations, 3 * body.model.clusters.size());
   // Put back to rest, nothing of it is left.

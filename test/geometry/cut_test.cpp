@@ -337,7 +337,7 @@ TEST(Cut, CorpusOfOldFaults) {
 
 TEST(BladesMeet, WhatIsWithinReach) {
   const TriangleMesh cube = boxMesh(Vec3(1, 1, 1), 3, 3, 3);
-  Blades blades;
+  ScissorBlades blades;
   blades.origin = Vec3(-2, 0, 0.1);
   EXPECT_TRUE(bladesMeet(cube, blades)) << "unbounded";
   blades.length = 1.4;
@@ -359,7 +359,7 @@ TEST(BladesMeet, WhatIsWithinReach) {
 
 TEST(BladesMeet, ARectangleWithinTheSolidOrItsCavity) {
   const TriangleMesh hollow = shapes::hollowSphere();  // radii 0.1 and 0.05
-  Blades blades;
+  ScissorBlades blades;
   blades.length = 0.01;
   blades.width = 0.01;
   blades.origin = Vec3(0.07, 0, 0);
@@ -372,7 +372,7 @@ TEST(BladesMeet, ARectangleWithinTheSolidOrItsCavity) {
 
 TEST(BladesMeet, LiesInAFace) {
   const TriangleMesh cube = boxMesh(Vec3(1, 1, 1), 1, 1, 1);
-  Blades blades;
+  ScissorBlades blades;
   blades.length = 0.01;
   blades.width = 0.01;
   blades.origin = Vec3(0.1, 0.3, 0.5);
@@ -392,7 +392,7 @@ TEST(BladesMeet, AgreesWithSampling) {
     const double size = box.diagonal();
     int met = 0;
     for (int i = 0; i < 60; ++i) {
-      Blades blades;
+      ScissorBlades blades;
       blades.x_axis = Vec3(normal(random), normal(random), normal(random)).normalized();
       blades.y_axis = blades.x_axis.cross(Vec3(normal(random), normal(random), normal(random))).normalized();
       blades.origin = 0.5 * (box.min + box.max) + 0.5 * size * Vec3(unit(random), unit(random), unit(random));

@@ -65,7 +65,7 @@ inline testing::AssertionResult incisionObeysLaws(const TriangleMesh& mesh, cons
   if (incision.pieces.empty()) return testing::AssertionFailure() << "no pieces";
   if (!(incision.opened_area > 0.0)) return testing::AssertionFailure() << "opened " << incision.opened_area;
   double sum = 0.0;
-  std::array<double, 2> lips{0.0, 0.0};
+  std::array<double, 2> wound_areas{0.0, 0.0};
   std::size_t tiny = 0;
   std::vector<int> seen(mesh.vertices.size(), 0);
   for (std::size_t i = 0; i < incision.pieces.size(); ++i) {
@@ -84,32 +84,32 @@ inline testing::AssertionResult incisionObeysLaws(const TriangleMesh& mesh, cons
     if (!(volume > 0.0)) return where() << "volume " << volume;
     sum += volume;
     tiny += countTiny(piece.mesh);
-    std::vector<bool> on_lip(piece.mesh.vertices.size(), false);
+    std::vector<bool> on_wound_face(piece.mesh.vertices.size(), false);
     for (std::size_t t = 0; t < piece.mesh.triangles.size(); ++t) {
       if (piece.facing[t] == 0) continue;
       const Triangle& v = piece.mesh.triangles[t];
       if (piece.mesh.patches[t] != options.patch)
-        return where() << "triangle " << t << " of the lips has another patch";
-      for (const Index k : v) on_lip[k] = true;
+        return where() << "triangle " << t << " of the wound faces has another patch";
+      for (const Index k : v) on_wound_face[k] = true;
       const Vec3 normal = (piece.mesh.vertices[v[1]] - piece.mesh.vertices[v[0]])
                               .cross(piece.mesh.vertices[v[2]] - piece.mesh.vertices[v[0]]);
-      lips[piece.facing[t] > 0] += 0.5 * normal.norm();
+      wound_areas[piece.facing[t] > 0] += 0.5 * normal.norm();
       if (!(piece.facing[t] * normal.dot(plane.normal) > 0.0) && normal.norm() > band * size)
         return where() << "triangle " << t << " faces the other way";
     }
     for (Index v = 0; v < piece.mesh.vertices.size(); ++v) {
       const Vec3& p = piece.mesh.vertices[v];
       const VertexOrigin& origin = piece.origins[v];
-      if (on_lip[v]) {
+      if (on_wound_face[v]) {
         const Vec3 r = p - blade.origin;
         const double x = blade.x_axis.dot(r), y = blade.y_axis.dot(r);
         if (!(std::abs(plane.height(p)) <= 5.0 * band && x >= -band && x <= blade.length + band &&
               y >= -blade.depth - band && y <= band))
-          return where() << "vertex " << v << " of the lips is not within the blade: " << x << ", " << y << ", "
+          return where() << "vertex " << v << " of the wound faces is not within the blade: " << x << ", " << y << ", "
                          << plane.height(p);
       }
       if (origin.parents[0] == kNoIndex) {
-        if (!on_lip[v]) return where() << "vertex " << v << " has no parents";
+        if (!on_wound_face[v]) return where() << "vertex " << v << " has no parents";
         continue;
       }
       Vec3 made = Vec3::Zero();
@@ -130,7 +130,7 @@ inline testing::AssertionResult incisionObeysLaws(const TriangleMesh& mesh, cons
   for (Index v = 0; v < seen.size(); ++v) {
     const bool in_plane = std::abs(plane.height(mesh.vertices[v])) <= 5.0 * band;
     bool there = seen[v] > 0;
-    // Where lips met at a point, another vertex at the same place may stand for it now.
+    // Where wound faces met at a point, another vertex at the same place may stand for it now.
     for (Index w = 0; in_plane && !there && w < seen.size(); ++w)
       there = seen[w] > 0 && (mesh.vertices[w] - mesh.vertices[v]).norm() <= band;
     if (!there || (seen[v] > 1 && !in_plane))
@@ -140,9 +140,9 @@ inline testing::AssertionResult incisionObeysLaws(const TriangleMesh& mesh, cons
   if (!(std::abs(sum - whole) <= 1e-11 * whole))
     return testing::AssertionFailure() << "volumes add up to " << sum << " instead of " << whole;
   if (tiny > countTiny(mesh, 1e-12)) return testing::AssertionFailure() << tiny << " triangles without area";
-  for (const double area : lips)
+  for (const double area : wound_areas)
     if (!(std::abs(area - incision.opened_area) <= 1e-12 * incision.opened_area))
-      return testing::AssertionFailure() << "a lip of " << area << ", " << incision.opened_area << " reported";
+      return testing::AssertionFailure() << "a wound face of " << area << ", " << incision.opened_area << " reported";
   if (embedded) {
     const double expected = openedAreaOracle(mesh, blade);
     if (!(std::abs(expected - incision.opened_area) <= 1e-9 * expected + 4.0 * band * size))
@@ -169,7 +169,7 @@ inline int shellCount(const TriangleMesh& mesh) {
 
 namespace meshless::shapes {
 
-/// A blade that looks along `down` with its upper edge's middle at `middle`.
+/// A blade that points along `down` with its upper edge's middle at `middle`.
 inline Blade bladeAt(const Vec3& middle, const Vec3& down, const Vec3& along, double length, double depth) {
   Blade blade;
   blade.y_axis = -down.normalized();
@@ -194,8 +194,8 @@ inline Blade anyBlade(const TriangleMesh& mesh, test::Random& random) {
                  above + random.uniform(0.02, 0.6) * size);
 }
 
-/// Opens the lips of an incision as a load would: a smooth field that parts the two sides of the blade by up to `gap`
-/// [m] on each side, fades out away from the blade and is nothing at its ends and its front.
+/// Opens an incision as a load would, by a smooth field that moves each wound face by up to `gap` [m]. It fades out
+/// away from the blade, and is nothing at its ends and its front.
 inline void spread(IncisedPiece& piece, const Blade& blade, double gap) {
   const Plane plane = blade.plane();
   TriangleMesh& mesh = piece.mesh;
@@ -205,7 +205,7 @@ inline void spread(IncisedPiece& piece, const Blade& blade, double gap) {
     const double height = plane.height(mesh.vertices[v]);
     if (std::abs(height) > 1e-6 * size) sides[v] = height > 0.0 ? 1.0 : -1.0;
   }
-  // In the plane: the side that the triangles there are on, or the lip's; both is none.
+  // In the plane: the side that the triangles there are on, or the wound face's; both is none.
   std::vector<int> marks(mesh.vertices.size(), 0);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     double sum = -2.0 * piece.facing[t];

@@ -1,5 +1,5 @@
-// Sequences of four blades, with lips that lie on each other and lips that have opened in between. The environment
-// variable MESHLESS_SURGERY_INCISE_FUZZ gives the number of further sequences on each shape.
+// Sequences of four blades. Wound faces lie on each other, or have opened in between. The environment variable
+// MESHLESS_SURGERY_INCISE_FUZZ gives the number of further sequences on each shape.
 #include <cstdlib>
 #include <map>
 
@@ -178,7 +178,7 @@ class Cells {
   std::vector<bool> parted_;
 };
 
-// Fronts, borders, mouths, edges and vertices all in the same places, on purpose.
+// Fronts, borders, rims, edges and vertices all in the same places, on purpose.
 TEST(InciseSequences, OnALattice) {
   constexpr int kCells = 6;
   int opened = 0, refused = 0, apart = 0, hanging = 0, count = 150;

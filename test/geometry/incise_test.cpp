@@ -49,7 +49,7 @@ TEST(Incise, OpensOnlyWhereTheBladeIs) {
     }
 }
 
-TEST(Incise, FrontAndEndsStayJoinedAndTheMouthIsDoubled) {
+TEST(Incise, FrontAndEndsStayJoinedAndTheRimIsDoubled) {
   const TriangleMesh mesh = ball();
   const Blade blade = slit(0.08, 0.05);
   const Result<Incision> cut = incise(mesh, blade);
@@ -164,7 +164,7 @@ TEST(Incise, CrossesAndStartsFromEarlierOnes) {
       {"X", slit(0.08, 0.06, Vec3(0.3, 1.0, 0.0))},
       {"X at a right angle", slit(0.08, 0.05, Vec3::UnitY())},
       {"T", slit(0.05, 0.05, Vec3::UnitY(), Vec3(0.0, 0.025, 0.0))},
-      {"from a lip, under the surface",
+      {"from a wound face, under the surface",
        bladeAt(at(Vec3(0.0, 0.0, 0.07)), turned(Vec3::UnitY()), turned(Vec3::UnitX()), 0.03, 0.02)},
       {"across the front, under the surface",
        bladeAt(at(Vec3(0.0, -0.02, 0.05)), turned(Vec3::UnitY()), turned(Vec3::UnitZ()), 0.03, 0.04)}};
@@ -336,7 +336,7 @@ TEST(Incise, TurnedScaledAndRepeatedInputGivesTheSame) {
   }
 }
 
-TEST(Incise, LipsHaveTheSpacingOfTheSurface) {
+TEST(Incise, WoundFacesHaveTheSpacingOfTheSurface) {
   const TriangleMesh mesh = sphereMesh(0.1, 0.01);
   const Blade blade = bladeAt(Vec3(0.0, 0.003, 0.11), -Vec3::UnitZ(), Vec3::UnitX(), 0.5, 0.11);
   const Result<Incision> cut = incise(mesh, blade);

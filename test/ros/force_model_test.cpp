@@ -38,17 +38,18 @@ TEST(StepHold, WithoutATimeItIsThereAtOnce) {
   EXPECT_EQ(hold.at(2.0), 5.0);
 }
 
-/// What a hand on a fixed spring of `stiffness` [N/m] feels on its way x(t) along x, and what it should.
-struct Felt {
+/// The force that is reported to a hand on a fixed spring of `stiffness` [N/m] on its way x(t) along x, and what it
+/// should be.
+struct Reported {
   double error = 0.0;     // root of the mean square [N]
   double without = 0.0;   // the same of the straight line between steps alone
   double steepest = 0.0;  // change in a tick [N]
 };
 
-Felt feelSpring(double stiffness, double known, double step, bool pulls, const std::function<double(double)>& x) {
+Reported reportSpring(double stiffness, double known, double step, bool pulls, const std::function<double(double)>& x) {
   ForceModel model;
   StepHold<double> line{0.0};
-  Felt felt;
+  Reported reported;
   double next_step = 0.0, before = 0.0;
   int ticks = 0;
   for (double time = 0.0; time < 2.0; time += kTick, ++ticks) {
@@ -64,15 +65,15 @@ Felt feelSpring(double stiffness, double known, double step, bool pulls, const s
     EXPECT_EQ(model.at(time, hand).y(), 0.0);
     const double wanted = -stiffness * x(time);
     if (time > 0.2) {
-      felt.error += std::pow(force - wanted, 2);
-      felt.without += std::pow(line.at(time) - wanted, 2);
-      felt.steepest = std::max(felt.steepest, std::abs(force - before));
+      reported.error += std::pow(force - wanted, 2);
+      reported.without += std::pow(line.at(time) - wanted, 2);
+      reported.steepest = std::max(reported.steepest, std::abs(force - before));
     }
     before = force;
   }
-  felt.error = std::sqrt(felt.error / ticks);
-  felt.without = std::sqrt(felt.without / ticks);
-  return felt;
+  reported.error = std::sqrt(reported.error / ticks);
+  reported.without = std::sqrt(reported.without / ticks);
+  return reported;
 }
 
 TEST(ForceModel, TheHandFeelsItsMotionBeforeTheNextStep) {
@@ -80,15 +81,15 @@ TEST(ForceModel, TheHandFeelsItsMotionBeforeTheNextStep) {
     for (const double step : {1.0 / 120.0, 1.0 / 30.0}) {
       // Eight steps a wave.
       const auto waves = [&](double t) { return 0.01 + 0.002 * std::sin(2.0 * M_PI * t / (8.0 * step)); };
-      const Felt felt = feelSpring(300.0, pulls ? 300.0 : 5000.0, step, pulls, waves);
-      EXPECT_LT(felt.error, 0.6 * felt.without) << "pulls " << pulls << ", step " << step;
-      EXPECT_GT(felt.without, 0.05);
+      const Reported reported = reportSpring(300.0, pulls ? 300.0 : 5000.0, step, pulls, waves);
+      EXPECT_LT(reported.error, 0.6 * reported.without) << "pulls " << pulls << ", step " << step;
+      EXPECT_GT(reported.without, 0.05);
       // The wave's own is 0.11 N a tick at most, and up to as much again where a step corrects.
-      EXPECT_LT(felt.steepest, 0.25) << "pulls " << pulls << ", step " << step;
+      EXPECT_LT(reported.steepest, 0.25) << "pulls " << pulls << ", step " << step;
     }
 }
 
-TEST(ForceModel, AMoveIsFeltAtOnceAndCorrectedWithoutAJump) {
+TEST(ForceModel, AMoveIsReportedAtOnceAndCorrectedWithoutAJump) {
   ForceModel model;
   const ForceModel::Step held{true, 1, true, Vec3::Zero(), Vec3::Zero(), 200.0, 5.0};
   for (int i = 0; i < 10; ++i) model.stepped(held, kStep, i * kStep);
@@ -163,9 +164,9 @@ TEST(ForceModel, FreeIsExactlyZero) {
   EXPECT_TRUE(model.isZero(19 * kStep));
 }
 
-/// A hand with a stream of 200 Hz acts on a free body; what it feels at 500 Hz from the model.
+/// A hand with a stream of 200 Hz acts on a free body; the model reports its force at 500 Hz.
 struct Touch {
-  Vec3 felt = Vec3::Zero();      // [N s]
+  Vec3 reported = Vec3::Zero();  // [N s]
   Vec3 momentum = Vec3::Zero();  // of the body
   double strongest = 0.0, steepest = 0.0;
   bool zero_at_end = false;
@@ -194,7 +195,7 @@ Touch touch(World& world, double step, int steps, const std::function<std::optio
     for (; tick < now + step; tick += kTick) {
       hear(tick);
       const Vec3 force = model.at(tick, hand);
-      touch.felt += kTick * force;
+      touch.reported += kTick * force;
       touch.strongest = std::max(touch.strongest, force.norm());
       touch.steepest = std::max(touch.steepest, (force - before).norm());
       before = force;
@@ -234,7 +235,7 @@ TEST(ForceModel, TheSumOverAPullIsTheChangeOfMomentum) {
     };
     const Touch pull = touch(world, 1.0 / rate, static_cast<int>(rate), act, measured);
     ASSERT_GT(pull.momentum.norm(), 0.01);
-    EXPECT_LT((pull.felt + pull.momentum).norm(), 0.02 * pull.momentum.norm()) << rate << " Hz";
+    EXPECT_LT((pull.reported + pull.momentum).norm(), 0.02 * pull.momentum.norm()) << rate << " Hz";
     EXPECT_TRUE(pull.zero_at_end) << rate << " Hz";
     EXPECT_LE(pull.steepest, 2.0 * pull.strongest * kTick * rate) << rate << " Hz";
   }
@@ -262,7 +263,7 @@ TEST(ForceModel, TheSumOverAPressIsTheChangeOfMomentum) {
     };
     const Touch press = touch(world, 1.0 / rate, static_cast<int>(1.2 * rate), act, measured);
     ASSERT_GT(press.momentum.norm(), 0.01);
-    EXPECT_LT((press.felt + press.momentum).norm(), 0.02 * press.momentum.norm()) << rate << " Hz";
+    EXPECT_LT((press.reported + press.momentum).norm(), 0.02 * press.momentum.norm()) << rate << " Hz";
     EXPECT_TRUE(press.zero_at_end) << rate << " Hz";
     EXPECT_LE(press.steepest, 2.0 * press.strongest * kTick * rate) << rate << " Hz";
   }

@@ -40,7 +40,7 @@ Heard heard(const ToolBench& bench, std::size_t tool, int axis, double since) {
   return heard;
 }
 
-TEST(ForceStream, APullIsFeltEvenlyAndBetweenSteps) {
+TEST(ForceStream, APullIsReportedEvenlyAndBetweenSteps) {
   for (const double rate : kRates) {
     ToolBench bench({}, rate);
     const PickReply picked = bench.pick();
@@ -50,10 +50,10 @@ TEST(ForceStream, APullIsFeltEvenlyAndBetweenSteps) {
     EXPECT_NEAR(pull.shortest, ToolBench::kTick, 1e-9);
     EXPECT_NEAR(pull.longest, ToolBench::kTick, 1e-9);
     EXPECT_LT(pull.low, -0.5);
-    // No part of a way that takes the hand many ticks is felt in one.
+    // No part of a way that takes the hand many ticks is reported in one.
     std::printf("%g Hz: the steepest tick has %.3f of the pull's range\n", rate, pull.steepest / pull.range());
     EXPECT_LT(pull.steepest, 0.05 * pull.range()) << rate;
-    // The straight line between two steps has one slope; a hand that is felt between them has many.
+    // The straight line between two steps has one slope; a hand that is followed between them has many.
     int slopes = 0;
     for (std::size_t i = 2; i < pull.values.size(); ++i)
       slopes += std::abs(pull.values[i] - 2.0 * pull.values[i - 1] + pull.values[i - 2]) > 1e-9;
@@ -75,7 +75,7 @@ TEST(ForceStream, APullIsFeltEvenlyAndBetweenSteps) {
   }
 }
 
-TEST(ForceStream, APressIsFeltFromTheTouchToThePartingAndNeverPulls) {
+TEST(ForceStream, APressIsReportedFromTheTouchToThePartingAndNeverPulls) {
   for (const double rate : kRates) {
     ToolBench bench({}, rate);
     PickCommand far_side;
@@ -99,7 +99,7 @@ TEST(ForceStream, APressIsFeltFromTheTouchToThePartingAndNeverPulls) {
     EXPECT_GT(air.times[std::min(touch, air.times.size() - 1)], 0.3);
     const Heard press = heard(bench, kPush, 0, 0.3);
     EXPECT_NEAR(press.longest, ToolBench::kTick, 1e-9);
-    EXPECT_LT(press.low, -0.2) << "the sphere felt nothing";
+    EXPECT_LT(press.low, -0.2) << "the sphere reported nothing";
     EXPECT_LE(press.high, 0.0);
     std::printf("%g Hz: the press was %.2f N at most, its steepest tick has %.3f of it\n", rate, -press.low,
                 press.steepest / press.range());

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The force on a hand: even and frequent whatever the step rate, felt before the next step, without jumps, and gone
+"""The force on a hand: even and frequent whatever the step rate, reported before the next step, without jumps, and gone
 once the tool is free. By a clock that the test moves; force_stream_test.cpp has the same laws in a time of its own, with nodes that
 stand still. On the wall's clock only what a standstill cannot break."""
 import math
@@ -53,7 +53,7 @@ class ForcesTest(InStepTestCase):
         self.assertAlmostEqual(PERIOD, spaces[0], delta=1e-6)
         self.assertAlmostEqual(PERIOD, spaces[-1], delta=1e-6)
 
-    def test_a_pull_is_felt_at_500_hz_and_between_steps(self):
+    def test_a_pull_is_reported_at_500_hz_and_between_steps(self):
         picked = self.pick_left()
         start = picked.position
         self.record_forces('pick')
@@ -65,10 +65,10 @@ class ForcesTest(InStepTestCase):
         self.assert_even(messages, 1000 * PERIOD)
         values = [m.wrench.force.y for m in messages]
         self.assertLess(min(values), -0.5)
-        # Smooth: no part of a way that takes the hand many ticks is felt in one.
+        # Smooth: no part of a way that takes the hand many ticks is reported in one.
         print('%g Hz: the steepest tick has %.3f of the range' % (self.step_rate, steepest(values) / (max(values) - min(values))))
         self.assertLess(steepest(values), 0.1 * (max(values) - min(values)))
-        # The straight line between two steps has one slope; a hand that is felt between them has many.
+        # The straight line between two steps has one slope; a hand that is followed between them has many.
         slopes = sum(abs((c - b) - (b - a)) > 1e-9 for a, b, c in zip(values, values[1:], values[2:]))
         print('%g Hz: %d slopes of %d' % (self.step_rate, slopes, len(values)))
         self.assertGreater(slopes, (3.0 if self.step_rate < 60 else 1.5) * 2.0 * self.step_rate)
@@ -77,7 +77,7 @@ class ForcesTest(InStepTestCase):
         self.say('pick/servo_cp', [pose_stamped(start.x, start.y, start.z) for _ in range(200)])
         self.assertEqual([0.0] * 50, [force(m) for m in self.forces.messages[-50:]])
 
-    def test_a_press_is_felt_from_the_touch_to_the_parting(self):
+    def test_a_press_is_reported_from_the_touch_to_the_parting(self):
         self.good('lock', pick_id=self.pick_left().pick_id)  # of the far side: the box stays
         self.record_forces('push')
         self.good('push', enable=True, radius=0.03, pose=pose_stamped(-0.30, 0.0, 0.1))
@@ -89,7 +89,7 @@ class ForcesTest(InStepTestCase):
         messages = self.forces.messages[in_air:]
         self.assert_even(messages, 700 * PERIOD)
         values = [m.wrench.force.x for m in messages]
-        self.assertLess(min(values), -0.2, 'the sphere felt nothing')
+        self.assertLess(min(values), -0.2, 'the sphere reported nothing')
         # It never pulls, is smooth, and zero when free.
         print('%g Hz: the press was %.2f N at most, the steepest tick has %.3f of it' % (
             self.step_rate, -min(values), steepest(values) / -min(values)))
@@ -105,7 +105,7 @@ class SlowForcesTest(ForcesTest):
 
 class RealTimeTest(DeformerTestCase):
     """By the system's clock: however long anybody stands still, no two ticks are closer than their period, a sphere never
-    pulls, and what is free feels nothing. How even and smooth it was here is printed."""
+    pulls, and the force of what is free is zero. How even and smooth it was here is printed."""
 
     def setUp(self):
         super().setUp()
@@ -123,7 +123,7 @@ class RealTimeTest(DeformerTestCase):
         begun = time.monotonic()
         while not done():
             passed = time.monotonic() - begun
-            self.assertLess(passed, LONG, 'the hand felt nothing of what it should')
+            self.assertLess(passed, LONG, 'the force did not follow the hand')
             pose = pose_stamped(start.x, start.y + 0.01 * (1.0 - math.cos(2 * math.pi * 2 * passed)), start.z)
             pose.header.stamp = rospy.Time.now()
             self.publisher.publish(pose)

@@ -431,7 +431,7 @@ class TimeTest(DeformerTestCase):
     def test_looking_changes_nothing(self):
         self.states.close()
         shapes = []
-        for looks in (False, True):
+        for reads in (False, True):
             self.good('reset')
             pick = self.pick_left()
             self.good('move_pick', pick_id=pick.pick_id, target=Point(-0.1, 0.05, 0.1))
@@ -439,7 +439,7 @@ class TimeTest(DeformerTestCase):
             pieces = self.good('cut', blades=pose_stamped(-1.0, 0.0, 0.1), bodies=['left']).new_bodies
             for _ in range(10):
                 self.good('step', steps=1)
-                if looks:
+                if reads:
                     for name in pieces:
                         self.good('get_body', name=name)
             ends = [self.good('get_body', name=name) for name in pieces]

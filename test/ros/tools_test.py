@@ -132,11 +132,11 @@ class StreamTest(DeformerTestCase):
         self.assertGreater(on_tissue.x, 0.0)
         forces = self.record('pick/measured_cf', WrenchStamped)
         # It goes to a step's force while the next step's time passes.
-        felt = forces.wait(lambda m: abs(m.wrench.force.x + on_tissue.x) < 1e-9)
-        self.assertEqual('world', felt.header.frame_id)
-        self.assertAlmostEqual(-on_tissue.x, felt.wrench.force.x)
-        self.assertAlmostEqual(-on_tissue.y, felt.wrench.force.y)
-        self.assertAlmostEqual(-on_tissue.z, felt.wrench.force.z)
+        reported = forces.wait(lambda m: abs(m.wrench.force.x + on_tissue.x) < 1e-9)
+        self.assertEqual('world', reported.header.frame_id)
+        self.assertAlmostEqual(-on_tissue.x, reported.wrench.force.x)
+        self.assertAlmostEqual(-on_tissue.y, reported.wrench.force.y)
+        self.assertAlmostEqual(-on_tissue.z, reported.wrench.force.z)
 
     def test_the_push_sphere_appears_where_the_stream_is_and_then_travels(self):
         measured = self.record('push/measured_cp', PoseStamped)
@@ -156,7 +156,7 @@ class StreamTest(DeformerTestCase):
         for low, high in zip(heights, heights[1:]):
             self.assertLessEqual(high - low, 0.5 / 120.0 + 1e-9)
 
-    def test_the_push_sphere_feels_what_it_pushes(self):
+    def test_the_push_sphere_reports_the_force_of_what_it_pushes(self):
         forces = self.record('push/measured_cf', WrenchStamped)
         self.good('push', enable=True, radius=0.03, pose=pose_stamped(-0.3, 0.0, 0.1))
         self.good('push', enable=True, radius=0.03, pose=pose_stamped(-0.2, 0.0, 0.1), speed=0.3)
@@ -165,7 +165,7 @@ class StreamTest(DeformerTestCase):
             now = rospy.Time.now()
             if forces.next(lambda m: m.header.stamp >= now).wrench.force.x < 0.0:
                 return
-        self.fail('the sphere went into the box and felt nothing')
+        self.fail('the sphere went into the box and reported nothing')
 
     def test_the_scissors_cut_when_the_jaw_closes(self):
         measured = self.record('scissors/measured_cp', PoseStamped)

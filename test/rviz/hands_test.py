@@ -544,7 +544,7 @@ class HandsTest(unittest.TestCase):
         self.until(lambda: self.said('incised'), 'nothing was opened')
         bodies = self.state().bodies
         self.assertEqual(['liver'], [b.name for b in bodies])
-        # Two lips: the surface is larger by both.
+        # The surface is larger by both wound faces.
         self.mouse.move((place[0] + 150, place[1] + 200))
         rospy.sleep(1.0)
         self.save('incision')

@@ -31,7 +31,7 @@ std::vector<PickId> spawnBars(Twins& twins, test::Random& random, double youngs_
   return held;
 }
 
-TEST(Heap, OfQuickBarsIsLookedAtByVertices) {
+TEST(Heap, OfFastBarsIsQueriedByVertices) {
   Twins twins(test::weightless());
   test::Random random(11);
   const std::vector<PickId> held = spawnBars(twins, random, 0.0);
@@ -40,7 +40,7 @@ TEST(Heap, OfQuickBarsIsLookedAtByVertices) {
     for (const PickId pick : held) ASSERT_TRUE(twins.apply(MovePickCommand{pick, random.vector(0.03)}).ok());
     ASSERT_TRUE(twins.step(Vec3::Zero(), 5.0)) << k;
     const ContactCounters counters = twins.world().snapshot({}).report.contact_counters;
-    asked = std::max(asked, counters.lookups);
+    asked = std::max(asked, counters.queries);
     traced = std::max(traced, counters.traced);
     if (k > 0) contacts = std::max(contacts, counters.contacts);
   }
@@ -50,7 +50,7 @@ TEST(Heap, OfQuickBarsIsLookedAtByVertices) {
   EXPECT_GT(contacts, 500U);
 
   ASSERT_TRUE(twins.apply(ClearPicksCommand{}).ok());
-  // Let go, they come to rest. What passed unseen is let out of overlap and bends them a little: 0.01 J of 4.2 J.
+  // Let go, they come to rest. Overlap that was not noticed is depenetrated and bends them a little: 0.01 J of 4.2 J.
   double first = 0.0, energy = 0.0;
   const int resting = std::max(5, static_cast<int>(60 * std::min(1.0, share())));
   for (int k = 0; k < resting; ++k) {

@@ -1,5 +1,6 @@
-// Springs as stiff as rods that drag a body at random against others and through the ground: what contacts, what is let
-// out and what is lifted do to the tissue, a rod has no energy to give for. It drags at 30 m/s; it does not throw.
+// Stiff picks drag a body at random, at 30 m/s, against others and through the ground. Contacts, depenetration and
+// lifting off the ground move the tissue against the pick. It must not answer with energy: it drags, and does not
+// throw.
 #include <gtest/gtest.h>
 
 #include "support/stress_cases.h"
@@ -9,38 +10,38 @@ namespace {
 
 constexpr int kDragged = 60, kHeld = 60, kFree = 180;  // steps
 // [J] kinetic. All three blocks (6 kg) as fast as the target's longest jump (1.73 m) within a step have 1.3e5 J: what a
-// rod drags has no more. 6e4 J was seen at the most.
+// stiff pick drags has no more. 6e4 J was seen at the most.
 constexpr double kMostDragged = 1.3e5;
-// Elastic bodies, in contact of surfaces, are torn to threads, and overlaps that open then give them energy: 2.7e7 J was
-// seen, and 2.4 times of what they had when they are let go.
+// Elastic bodies, in contact of surfaces, are torn to threads, and overlaps that open then give them energy: 2.7e7 J
+// was seen, and 2.4 times of what they had when they are let go.
 constexpr double kMostDraggedElastic = 6e7, kMostGainedElastic = 5.0;
 // [J] kinetic, of 2 kg that are pulled by 0.57 m within a step: 4.7e3 J. Contact of now adds to it, up to 1.0e4 J.
 constexpr double kMostPulled = 4.7e3, kMostPulledInContact = 1.2e4;
 
-struct Rod {
+struct StiffPick {
   std::string name;
   double stiffness;  // [N/m]
   bool on_ground;
 };
 
-void PrintTo(const Rod& rod, std::ostream* out) { *out << rod.name; }
+void PrintTo(const StiffPick& stiff_pick, std::ostream* out) { *out << stiff_pick.name; }
 
-std::vector<Rod> allRods() {
-  std::vector<Rod> rods;
+std::vector<StiffPick> allStiffPicks() {
+  std::vector<StiffPick> stiff_picks;
   for (const double exponent : {6.0, 9.0, 11.0, 12.0})
     for (const bool ground : {true, false})
-      rods.push_back(
+      stiff_picks.push_back(
           {"1e" + std::to_string(static_cast<int>(exponent)) + " N per m " + (ground ? "on the ground" : "in space"),
            std::pow(10.0, exponent), ground});
-  return rods;
+  return stiff_picks;
 }
 
-class StiffPicks : public testing::TestWithParam<std::tuple<Kind, Rod>> {};
+class StiffPicks : public testing::TestWithParam<std::tuple<Kind, StiffPick>> {};
 
 TEST_P(StiffPicks, DoNotThrow) {
-  const auto& [kind, rod] = GetParam();
+  const auto& [kind, stiff_pick] = GetParam();
   WorldSettings settings = test::weightless();
-  if (rod.on_ground) {
+  if (stiff_pick.on_ground) {
     settings = WorldSettings();
     settings.ground = -0.1;
   }
@@ -52,7 +53,7 @@ TEST_P(StiffPicks, DoNotThrow) {
   PickCommand pick;
   pick.point = Vec3(0.1, 0.05, 0.05);
   pick.max_distance = 1.0;
-  pick.stiffness = rod.stiffness;
+  pick.stiffness = stiff_pick.stiffness;
   const PickId held = test::replyOf<PickReply>(twins.apply(pick)).pick;
   test::Random random(0);
   double dragged = 0.0, most = 0.0;  // [J] when the drag ended, and after
@@ -73,7 +74,7 @@ TEST_P(StiffPicks, DoNotThrow) {
   // What flies apart then falls, and meets others; more than it had it does not get.
   RecordProperty("dragged", std::to_string(dragged));
   RecordProperty("most", std::to_string(most));
-  if (!rod.on_ground) EXPECT_LE(most, (kind.elastic ? kMostGainedElastic : 1.1) * dragged + 1e-6);
+  if (!stiff_pick.on_ground) EXPECT_LE(most, (kind.elastic ? kMostGainedElastic : 1.1) * dragged + 1e-6);
 }
 
 struct Held {
@@ -94,7 +95,7 @@ std::vector<Held> allHeld() {
 
 class HeldInTheGround : public testing::TestWithParam<std::tuple<Kind, Held>> {};
 
-// A body that lies there is pulled to a place half a metre below: the ground and the rod cannot both have their way.
+// A body that lies there is pulled to a place half a metre below. The ground and the stiff pick contradict each other.
 TEST_P(HeldInTheGround, AreNotThrown) {
   const auto& [kind, held] = GetParam();
   WorldSettings settings;
@@ -110,8 +111,8 @@ TEST_P(HeldInTheGround, AreNotThrown) {
   pick.point = Vec3(0.0, 0.1, -0.1);
   pick.max_distance = 1.0;
   pick.stiffness = 1e8;
-  const PickId rod = test::replyOf<PickReply>(twins.apply(pick)).pick;
-  twins.attempt(LockCommand{rod, Vec3(0.3, 0.3, -0.55)});
+  const PickId stiff_pick = test::replyOf<PickReply>(twins.apply(pick)).pick;
+  twins.attempt(LockCommand{stiff_pick, Vec3(0.3, 0.3, -0.55)});
   for (int step = 0; step < 60; ++step) {
     ASSERT_TRUE(twins.step(Vec3::Zero(), 1e3));
     ASSERT_LT(twins.seen().bodies[0].measures.kinetic_energy, held.contact ? kMostPulledInContact : kMostPulled)
@@ -122,7 +123,8 @@ TEST_P(HeldInTheGround, AreNotThrown) {
 INSTANTIATE_TEST_SUITE_P(Stress, HeldInTheGround, testing::ValuesIn(crossed(kindsAlone(), allHeld())),
                          crossedName<Held>);
 
-INSTANTIATE_TEST_SUITE_P(Stress, StiffPicks, testing::ValuesIn(crossed(kindsAlone(), allRods())), crossedName<Rod>);
+INSTANTIATE_TEST_SUITE_P(Stress, StiffPicks, testing::ValuesIn(crossed(kindsAlone(), allStiffPicks())),
+                         crossedName<StiffPick>);
 
 }  // namespace
 }  // namespace meshless::stress

@@ -37,7 +37,8 @@ TEST_P(Swallowed, BodiesStayWhole) {
   }
 }
 
-// What a rod holds inside of the sphere neither can have: it is torn between them by no more than it is large at once.
+// A stiff pick holds tissue inside of the sphere, and they contradict each other. At once the tissue is moved by no
+// more than its own size.
 TEST_P(Swallowed, BodiesThatAreHeldStayFinite) {
   for (const double radius : {1.0, 1000.0})
     for (const int substeps : {1, 7}) {

@@ -27,7 +27,7 @@ inline std::shared_ptr<const PreparedBody> shared(const BodyDef& def) {
   return std::make_shared<const PreparedBody>(prepared(def));
 }
 
-/// A ball, small enough to be quick, large enough for several clusters.
+/// A ball, small enough to be computed fast, large enough for several clusters.
 inline BodyDef ball(const std::string& name = "ball", const Vec3& at = Vec3(0, 0, 0.2)) {
   BodyDef def = defOf(sphereMesh(0.1, 0.03), name);
   def.pose.translation = at;

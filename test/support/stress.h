@@ -104,7 +104,7 @@ inline std::shared_ptr<const PreparedBody> inState(PreparedBody body, const SetS
   return std::make_shared<const PreparedBody>(std::move(body));
 }
 
-/// Energy of deformation [J] at substeps of h [s]. For materials for looks that of springs from particles to the goals
+/// Energy of deformation [J] at substeps of h [s]. For appearance materials that of springs from particles to the goals
 /// of their clusters: exact for rigid goals, and what is near it for fitted ones.
 inline double deformationEnergy(const BodyModel& model, const Material& material, double h, const Points& x) {
   const MatchInput in = matchInput(model);
@@ -304,7 +304,7 @@ inline Twins stoppedAsAWhole(Twins& twins, const WorldSettings& settings, double
     for (std::size_t i = 0; i < now.particles.size(); ++i)
       body.state.velocities[i] -= together.velocity + together.spin.cross(now.particles[i] - together.centre);
     body.state.poses.resize(body.model->clusters.size());
-    body.state.rider_offsets.assign(body.model->binding.riders.size(), Vec3::Zero());
+    body.state.embedded_offsets.assign(body.model->binding.embedded.size(), Vec3::Zero());
     updateSurface(*body.model, body.state);
     calm.spawn(std::make_shared<const PreparedBody>(std::move(body)));
   }

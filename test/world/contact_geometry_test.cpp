@@ -23,12 +23,12 @@ BodyDef box(const std::string& name, const Vec3& size, const std::array<int, 3>&
 WorldSnapshot seen(World& world) { return world.snapshot({true, true, true}); }
 
 /// A body as contact sees it, at given positions of its particles.
-struct Party {
-  Party(const PreparedBody& body, std::uint64_t key)
+struct BodyView {
+  BodyView(const PreparedBody& body, std::uint64_t key)
       : model(body.model),
         state(body.state),
         shape(model->surface,
-              {&model->binding.particle, &model->binding.riders, &model->binding.offsets, &model->binding.carriers,
+              {&model->binding.particle, &model->binding.embedded, &model->binding.offsets, &model->binding.carriers,
                &model->binding.weights},
               model->spacing) {
     view.key = key;
@@ -36,7 +36,7 @@ struct Party {
     for (double m : model->masses) inverse_masses.push_back(1.0 / m);
   }
 
-  const ContactParty& see() {
+  const ShapeCollider& see() {
     updateSurface(*model, state);
     maps.clear();
     for (Index c = 0; c < model->clusters.size(); ++c) maps.push_back(fit(c));
@@ -46,7 +46,7 @@ struct Party {
     view.masses = model->masses.data();
     view.inverse_masses = inverse_masses.data();
     view.particles = static_cast<Index>(state.positions.size());
-    view.surface = shape.rides() ? state.surface.data() : nullptr;
+    view.surface = shape.hasEmbedded() ? state.surface.data() : nullptr;
     view.maps = maps.data();
     view.map_count = static_cast<Index>(maps.size());
     view.mass = model->mass;
@@ -88,7 +88,7 @@ struct Party {
   std::vector<double> inverse_masses;
   std::vector<ContactMap> maps;
   std::vector<QuadraticMap> quadratics;
-  ContactParty view;
+  ShapeCollider view;
 };
 
 /// Along x an arc of 90 degrees about y; heights stay.
@@ -112,7 +112,7 @@ double worstDepth(ClusterOptions::Kind kind, MatchMode mode, double length, doub
   def.clusters.kind = kind;
   def.clusters.count = 12;
   def.material.mode = mode;
-  Party bar(test::prepared(def), 1);
+  BodyView bar(test::prepared(def), 1);
   EXPECT_EQ(bar.model->clusters.size() > 1, kind == ClusterOptions::Kind::kCount);
   for (Vec3& p : bar.state.positions) p = bent(p, length);
   bar.see();
@@ -123,7 +123,7 @@ double worstDepth(ClusterOptions::Kind kind, MatchMode mode, double length, doub
   BodyDef sharp = test::defOf(needle(3.0 * thick, 0.1 * thick), "needle");
   sharp.clusters.kind = ClusterOptions::Kind::kOne;
   sharp.spacing = 10.0 * thick;  // corners alone
-  Party probe(test::prepared(sharp), 2);
+  BodyView probe(test::prepared(sharp), 2);
   const Points at_rest = probe.state.positions;
   double worst = 0.0;
   for (const double share : {-0.42, -0.3, -0.21, -0.1, 0.013, 0.17, 0.25, 0.38})
@@ -136,12 +136,12 @@ double worstDepth(ClusterOptions::Kind kind, MatchMode mode, double length, doub
           const Quat turn = Quat::FromTwoVectors(Vec3::UnitZ(), out);
           for (std::size_t i = 0; i < at_rest.size(); ++i) probe.state.positions[i] = turn * at_rest[i] + tip;
           EXPECT_TRUE(solid.contains(tip));
-          const std::vector<ContactParty> parties{bar.see(), probe.see()};
+          const std::vector<ShapeCollider> colliders{bar.see(), probe.see()};
           Contacts contacts;
           ContactCounters counters;
-          contacts.findPairs({}, parties, 1.0 / 120.0, counters);
+          contacts.findPairs({}, colliders, 1.0 / 120.0, counters);
           EXPECT_EQ(counters.pairs, 1u);
-          contacts.make(parties, 1.0 / 120.0, counters);
+          contacts.make(colliders, 1.0 / 120.0, counters);
           double deepest = 0.0;
           for (const double d : contacts.depths())
             deepest = std::max(deepest, d * std::min(probe.shape.size(), bar.shape.size()));
@@ -164,17 +164,17 @@ TEST(ContactGeometry, TheDepthInAQuadraticBodyOfOneClusterBentBy90DegreesIsTrue)
 
 TEST(ContactGeometry, AQuadraticMapIsInvertedWhereItDoesNotFold) {
   QuadraticMap map;
-  map.size = 0.2;
+  map.scale = 0.2;
   map.rest = Vec3(1.0, -2.0, 0.5);
   map.centre = Vec3(0.3, 0.1, -4.0);
-  map.fit.leftCols<3>() = map.size * Mat3(Eigen::AngleAxisd(2.0, Vec3(1, 2, 3).normalized()));
+  map.fit.leftCols<3>() = map.scale * Mat3(Eigen::AngleAxisd(2.0, Vec3(1, 2, 3).normalized()));
   map.fit.col(3) = Vec3(0.03, -0.02, 0.03);
   map.fit.col(7) = Vec3(-0.02, 0.02, 0.01);
   for (const double x : {-0.3, -0.1, 0.0, 0.2, 0.3})
     for (const double z : {-0.2, 0.0, 0.15}) {
       const Vec3 r = map.rest + Vec3(x, 0.5 * x - z, z);
       const Vec3 p = map.at(r);
-      const Mat3 linear = map.fit.leftCols<3>() / map.size;
+      const Mat3 linear = map.fit.leftCols<3>() / map.scale;
       Vec3 found = linear.inverse() * (p - map.centre) + map.rest;  // without the quadratic part
       Mat3 to_rest;
       ASSERT_TRUE(map.invert(p, 1.0, found, to_rest));

@@ -76,7 +76,7 @@ std::pair<std::size_t, double> inside(const BodySnapshot& a, const BodySnapshot&
   return found;
 }
 
-TEST(Contact, ABodySpawnedInsideAnotherIsLetOutSlowlyAndMomentumStays) {
+TEST(Contact, ABodySpawnedInsideAnotherIsDepenetratedSlowlyAndMomentumStays) {
   for (const double size : {0.01, 1.0, 20.0}) {
     World world(space());
     add(world, box("large", Vec3::Constant(size), {4, 4, 4}, Vec3::Zero()), Vec3(0.1, 0.0, 0.0) * size);
@@ -384,7 +384,7 @@ TEST(Contact, WhoWasCaughtAndLiesJustBelowIsLetGo) {
   for (int step = 0; step < 10; ++step) {
     world.step();
     const StepReport report = seen(world).report;
-    // Eight sweeps in a substep, and what is let out; 24 where something is caught.
+    // Eight sweeps in a substep, and depenetration; 24 where something is caught.
     EXPECT_LE(report.contact_counters.corrected, 9 * report.substeps * report.contact_counters.contacts);
   }
 }
@@ -483,7 +483,7 @@ TEST(Contact, WhoComesAndGoesElsewhereChangesNothing) {
   }
 }
 
-// What presses on a body is of its surface before the cut: after an incision it is looked up anew, and kept safely.
+// Contacts refer to a body's surface. After an incision they are found anew, and the state can be saved.
 TEST(Contact, AnIncisedBodyThatCarriesAnotherIsSavedAndGoesOn) {
   WorldSettings settings;
   World world(settings);
@@ -511,7 +511,7 @@ TEST(Contact, AnIncisedBodyThatCarriesAnotherIsSavedAndGoesOn) {
   EXPECT_NEAR(seen(world).bodies[1].measures.centre_of_mass.z(), 0.15, 0.01);
 }
 
-// Another thread finds out beforehand what fresh pieces touch: the first step has little left to look up, and it does
+// Another thread finds out beforehand what fresh pieces touch: the first step has few queries left, and it does
 // not matter whether somebody saves or asks for the hash in between.
 TEST(Contact, WhatFreshPiecesTouchIsKnownBeforeTheFirstStep) {
   for (const bool on_obstacle : {false, true}) {
@@ -544,7 +544,7 @@ TEST(Contact, WhatFreshPiecesTouchIsKnownBeforeTheFirstStep) {
     };
     World undisturbed = onABed(), changed = onABed();
     ASSERT_EQ(undisturbed.snapshot({}).bodies.size(), on_obstacle ? 2u : 3u);
-    // Who has loaded the state has looked at nothing ahead, and finds the same.
+    // A world that has loaded the state has queried nothing ahead, and finds the same.
     World loaded{WorldSettings()}, loaded_changed{WorldSettings()};
     for (World* world : {&loaded, &loaded_changed}) {
       const Result<DecodedWorld> decoded = decode(encode(*undisturbed.capture()));
@@ -552,7 +552,7 @@ TEST(Contact, WhatFreshPiecesTouchIsKnownBeforeTheFirstStep) {
       world->restore(*decoded->world);
     }
     ASSERT_EQ(undisturbed.stateHash(), loaded.stateHash());
-    // And so it does where what was looked up ahead does not hold any more.
+    // It also finds the same where the queries ahead do not hold any more.
     const SetMaterialCommand bending{"ball.1", [](const Material& was) -> Result<Material> {
                                        Material material = was;
                                        material.mode = MatchMode::kQuadratic;
@@ -572,9 +572,9 @@ TEST(Contact, WhatFreshPiecesTouchIsKnownBeforeTheFirstStep) {
       if (step == 0) {
         const ContactCounters counters = undisturbed.snapshot({}).report.contact_counters;
         EXPECT_GT(counters.contacts, 200u);
-        EXPECT_EQ(counters.lookups, 0u);
-        EXPECT_GT(loaded.snapshot({}).report.contact_counters.lookups, 200u);
-        EXPECT_GT(changed.snapshot({}).report.contact_counters.lookups, 200u);
+        EXPECT_EQ(counters.queries, 0u);
+        EXPECT_GT(loaded.snapshot({}).report.contact_counters.queries, 200u);
+        EXPECT_GT(changed.snapshot({}).report.contact_counters.queries, 200u);
       }
       ASSERT_EQ(undisturbed.stateHash(), loaded.stateHash()) << step;
       ASSERT_EQ(changed.stateHash(), loaded_changed.stateHash()) << step;
@@ -590,7 +590,7 @@ TEST(Contact, WhatFreshPiecesTouchIsKnownBeforeTheFirstStep) {
   EXPECT_EQ(taken_back.snapshot({}).bodies.size(), 1u);
 }
 
-// Vertices of a fresh piece ride with offsets that fade; whoever looks on never sees one below the ground.
+// Embedded vertices of a fresh piece have offsets that fade. A snapshot never shows one below the ground.
 TEST(Contact, PiecesThatLieOnTheGroundAreNotSeenBelowIt) {
   World world{WorldSettings()};
   BodyDef def = test::defOf(boxMesh(Vec3(0.12, 0.1, 0.08), 12, 10, 8), "block");
@@ -608,7 +608,7 @@ TEST(Contact, PiecesThatLieOnTheGroundAreNotSeenBelowIt) {
   for (int step = 0; step < 120; ++step) {
     world.step();
     for (const BodySnapshot& body : world.snapshot({true, false, false}).bodies) {
-      EXPECT_FALSE(body.model->binding.riders.empty());
+      EXPECT_FALSE(body.model->binding.embedded.empty());
       // Sweeps end where no gap is corrected by more than 2e-3 edges, and a fresh piece is held by many at once.
       for (const Vec3& p : body.surface) ASSERT_GT(p.z(), -3e-4) << body.name << " in step " << step;
     }

@@ -1,4 +1,4 @@
-// Bodies of materials for accuracy, in the world.
+// Bodies of elastic materials, in the world.
 #include "meshless_surgery/body/deform.h"
 #include "support/bodies.h"
 #include "support/mesh_laws.h"
@@ -30,7 +30,7 @@ TEST(ElasticBody, IsALatticeOfCellsThatItsSurfaceRidesOn) {
   const BodyModel& m = *body.model;
   EXPECT_EQ(m.clusters.size(), 12u * 4u * 4u);
   EXPECT_EQ(m.rest.size(), 13u * 5u * 5u);
-  EXPECT_EQ(m.binding.riders.size(), m.surface.vertices.size());
+  EXPECT_EQ(m.binding.embedded.size(), m.surface.vertices.size());
   EXPECT_NEAR(m.mass, 1000.0 * 0.12 * 0.04 * 0.04, 1e-12);
   EXPECT_GT(m.highest_frequency, 0.0);
   for (std::size_t v = 0; v < m.surface.vertices.size(); ++v)

@@ -30,7 +30,7 @@ World stacked(int edge, bool elastic) {
 
 TEST(Memory, GrowsWithTheParticlesAndHardlyForEachOfThem) {
   for (const bool elastic : {false, true}) {
-    SCOPED_TRACE(elastic ? "elastic" : "looks");
+    SCOPED_TRACE(elastic ? "elastic" : "appearance");
     MemoryUse last;
     for (const int edge : {6, 9, 13}) {
       const MemoryUse use = stacked(edge, elastic).memory();
@@ -75,7 +75,7 @@ TEST(Memory, CopiesOfAModelAreCountedOnce) {
 #ifndef __SANITIZE_ADDRESS__  // which has an allocator of its own
 TEST(Memory, IsWhatTheAllocatorHasGivenOut) {
   for (const bool elastic : {false, true}) {
-    SCOPED_TRACE(elastic ? "elastic" : "looks");
+    SCOPED_TRACE(elastic ? "elastic" : "appearance");
     stacked(9, elastic);  // what is made once for all worlds
     const struct mallinfo2 before = mallinfo2();
     const World world = stacked(13, elastic);

@@ -295,7 +295,7 @@ TEST_P(SavedWorldCase, GoesOnAsIfItHadNeverBeenAway) {
       again = std::move(third);
     }
   }
-  // Surfaces are placed when somebody looks. Tetrahedra are made anew after a state was loaded, and counted: the only
+  // Surfaces are placed when they are read. Tetrahedra are made anew after a state was loaded, and counted: the only
   // bytes that differ.
   for (World* world : {&uninterrupted, &again}) (void)world->snapshot({true, true, true, true});
   if (c.name != "textbook") EXPECT_TRUE(bytesWithOneThread(uninterrupted) == bytesWithOneThread(again));

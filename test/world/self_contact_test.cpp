@@ -1,4 +1,4 @@
-// A body that meets itself: lips of an incision, and a strip that is folded over.
+// A body that meets itself: wound faces of an incision, and a strip that is folded over.
 #include "meshless_surgery/contact/contacts.h"
 #include "support/bodies.h"
 
@@ -23,8 +23,8 @@ BodyDef bar(SelfContact self_contact, bool elastic) {
   return def;
 }
 
-/// How far corresponding points of the lips of a cut across x have passed each other at most [m]; negative: apart.
-double lipsPassed(const BodySnapshot& body) {
+/// How far corresponding points of the wound faces have passed each other along x, at most [m]; negative: apart.
+double woundFacesPassed(const BodySnapshot& body) {
   const TriangleMesh& mesh = body.model->surface;
   std::vector<double> facing(mesh.vertices.size(), 0.0);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
@@ -47,7 +47,7 @@ double lipsPassed(const BodySnapshot& body) {
 
 struct Sagged {
   double passed = 0.0, lowest = 0.0;  // [m]
-  std::size_t looked_at = 0;
+  std::size_t queried = 0;
 };
 
 /// A bar between two walls sags under its weight: a slit in its top is pressed together.
@@ -70,8 +70,8 @@ Sagged sag(SelfContact self_contact, bool elastic) {
   Sagged sagged;
   for (int k = 0; k < 240; ++k) world.step();
   const WorldSnapshot shot = world.snapshot({true, true, false});
-  sagged.looked_at = shot.report.contact_counters.self_points;
-  sagged.passed = lipsPassed(shot.bodies[0]);
+  sagged.queried = shot.report.contact_counters.self_points;
+  sagged.passed = woundFacesPassed(shot.bodies[0]);
   for (const Vec3& p : shot.bodies[0].surface) {
     EXPECT_TRUE(p.allFinite());
     sagged.lowest = std::min(sagged.lowest, p.z());
@@ -79,21 +79,21 @@ Sagged sag(SelfContact self_contact, bool elastic) {
   return sagged;
 }
 
-TEST(SelfContact, LipsThatPressOnEachOtherStayApart) {
+TEST(SelfContact, WoundFacesThatPressOnEachOtherStayApart) {
   for (const bool elastic : {false, true}) {
-    SCOPED_TRACE(elastic ? "elastic" : "looks");
-    const Sagged free = sag(SelfContact::kNone, elastic), held = sag(SelfContact::kLips, elastic);
-    EXPECT_EQ(free.looked_at, 0u);
-    EXPECT_GT(held.looked_at, 0u);
+    SCOPED_TRACE(elastic ? "elastic" : "appearance");
+    const Sagged free = sag(SelfContact::kNone, elastic), held = sag(SelfContact::kWoundFaces, elastic);
+    EXPECT_EQ(free.queried, 0u);
+    EXPECT_GT(held.queried, 0u);
     EXPECT_GT(free.passed, 0.003) << "else nothing presses";
     EXPECT_LT(held.passed, 0.1 * free.passed);
-    EXPECT_GT(held.lowest, free.lowest) << "closed lips carry";
+    EXPECT_GT(held.lowest, free.lowest) << "closed wound faces carry";
   }
 }
 
-TEST(SelfContact, NothingIsLookedAtWhereNothingCanMeet) {
+TEST(SelfContact, NothingIsQueriedWhereNothingCanMeet) {
   World world(test::weightless());
-  BodyDef soft = bar(SelfContact::kLips, false);
+  BodyDef soft = bar(SelfContact::kWoundFaces, false);
   ASSERT_TRUE(world.addSceneBody(test::shared(soft)).ok());
   world.step();
   EXPECT_EQ(world.snapshot({}).report.contact_counters.self_points, 0u) << "no incision";
@@ -203,33 +203,33 @@ TEST(SelfContact, RidgesThatCrossArePressedApartByEqualAndOppositeImpulses) {
     }
     Points positions = before;
     ContactMap map;
-    ContactParty party;
-    party.key = 1;
-    party.shape = &shape;
-    party.positions = positions.data();
-    party.previous = before.data();
-    party.masses = masses.data();
-    party.inverse_masses = inverse.data();
-    party.particles = static_cast<Index>(positions.size());
-    party.maps = &map;
-    party.map_count = 1;
-    party.mass = 1.2;
-    party.friction = 0.0;
-    party.meets_itself = true;
-    party.self = &set;
-    for (const Vec3& p : before) party.bounds.extend(p);
-    party.velocity = Vec3(0, 0, -0.5);
-    party.spread = 1.0;
-    const std::vector<ContactParty> parties{party};
+    ShapeCollider collider;
+    collider.key = 1;
+    collider.shape = &shape;
+    collider.positions = positions.data();
+    collider.previous = before.data();
+    collider.masses = masses.data();
+    collider.inverse_masses = inverse.data();
+    collider.particles = static_cast<Index>(positions.size());
+    collider.maps = &map;
+    collider.map_count = 1;
+    collider.mass = 1.2;
+    collider.friction = 0.0;
+    collider.meets_itself = true;
+    collider.self = &set;
+    for (const Vec3& p : before) collider.bounds.extend(p);
+    collider.velocity = Vec3(0, 0, -0.5);
+    collider.spread = 1.0;
+    const std::vector<ShapeCollider> colliders{collider};
     Contacts contacts;
     ContactCounters counters;
-    contacts.findPairs({}, parties, 1.0 / 120.0, counters);
-    contacts.make(parties, 1.0 / 120.0, counters);
+    contacts.findPairs({}, colliders, 1.0 / 120.0, counters);
+    contacts.make(colliders, 1.0 / 120.0, counters);
     EXPECT_EQ(counters.contacts, 1u);
-    contacts.begin(parties, 1.0 / 120.0);
+    contacts.begin(colliders, 1.0 / 120.0);
     positions = now;
     contacts.solve(
-        parties, 1.0 / 120.0, [](Index, std::vector<ContactMap>&) {}, counters);
+        colliders, 1.0 / 120.0, [](Index, std::vector<ContactMap>&) {}, counters);
     const double above = 0.5 * (positions[0].z() + positions[3].z()),
                  below = 0.5 * (positions[6].z() + positions[9].z());
     EXPECT_NEAR(above - below, std::max(gap, 0.0), 1e-9);

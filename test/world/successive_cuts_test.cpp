@@ -48,7 +48,7 @@ std::size_t particlesOf(World& world) {
 
 TEST(SuccessiveCuts, TheHundredthDoesTheWorkOfTheSameCutWithoutHistory) {
   for (bool elastic : {true, false}) {
-    SCOPED_TRACE(elastic ? "elastic" : "looks");
+    SCOPED_TRACE(elastic ? "elastic" : "appearance");
     const auto body = test::shared(bar(elastic));
     World world = worldOf(body), fresh = worldOf(body);
     const std::size_t particles = particlesOf(world);
@@ -62,7 +62,7 @@ TEST(SuccessiveCuts, TheHundredthDoesTheWorkOfTheSameCutWithoutHistory) {
       const std::size_t copies = particlesOf(world) - before;
       ASSERT_LE(copies, elastic ? 3u * 16u : 0u) << k;
       EXPECT_GT(cut.work.rebuilt_clusters, 0u);
-      EXPECT_GT(cut.work.bound_riders, 0u);
+      EXPECT_GT(cut.work.bound_embedded, 0u);
       EXPECT_GT(cut.work.kept_clusters, 0u);
       if (k == 0) first = cut.work;
       // Every slice has the same section: what is new does not change, what is kept gets less with the bar.
@@ -75,9 +75,9 @@ TEST(SuccessiveCuts, TheHundredthDoesTheWorkOfTheSameCutWithoutHistory) {
       EXPECT_EQ(copies, particlesOf(fresh) - particles) << k;
       EXPECT_EQ(cut.work.new_vertices, alone.work.new_vertices) << k;
       EXPECT_EQ(cut.work.new_triangles, alone.work.new_triangles) << k;
-      // The cap of the cut before is near enough that some of its riders lose a carrier.
-      EXPECT_GE(cut.work.bound_riders, alone.work.bound_riders) << k;
-      EXPECT_LE(cut.work.bound_riders, 1.6 * alone.work.bound_riders) << k;
+      // The cap of the cut before is near enough that some of its embedded vertices lose a carrier.
+      EXPECT_GE(cut.work.bound_embedded, alone.work.bound_embedded) << k;
+      EXPECT_LE(cut.work.bound_embedded, 1.6 * alone.work.bound_embedded) << k;
       EXPECT_EQ(cut.work.rebuilt_clusters, alone.work.rebuilt_clusters) << k;
       EXPECT_LE(cut.work.kept_clusters, alone.work.kept_clusters) << k;
     }

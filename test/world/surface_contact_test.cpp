@@ -306,7 +306,7 @@ TEST(SurfaceContact, ResultsDoNotDependOnThreads) {
   EXPECT_EQ(hash[0], hash[1]);
 }
 
-TEST(SurfaceContact, ThePushSphereIsFeltAndNotPassedThrough) {
+TEST(SurfaceContact, ThePushSphereReportsItsForceAndIsNotPassedThrough) {
   World world(space());
   BodyDef def = block("block", Vec3::Zero());
   def.fixed.push_back(Box{Vec3(-1, -1, -1), Vec3(1, 1, -0.049)});
@@ -378,25 +378,25 @@ TEST(SurfaceContact, WhoIsFarFromAllCostsNothing) {
     const StepReport report = world.snapshot({}).report;
     EXPECT_EQ(report.contact_counters.pairs, 0u);
     EXPECT_EQ(report.contact_counters.contacts, 0u);
-    EXPECT_EQ(report.contact_counters.lookups, 0u);
+    EXPECT_EQ(report.contact_counters.queries, 0u);
     EXPECT_EQ(report.contact_counters.corrected, 0u);
     EXPECT_EQ(report.contact_shapes, 0u);
   }
 }
 
-// Who lies still next to each other is looked up now and then, and who sleeps never.
-TEST(SurfaceContact, WhoLiesStillIsNotLookedUp) {
+// Bodies that lie still next to each other are queried now and then, sleeping ones never.
+TEST(SurfaceContact, WhoLiesStillIsNotQueried) {
   World world(surface());
   addStack(world);
   run(world, 0.8);
-  std::size_t looked = 0, rows = 0;
+  std::size_t queried = 0, rows = 0;
   for (int step = 0; step < 240; ++step) {
     world.step();
     const StepReport report = world.snapshot({}).report;
-    looked += report.contact_counters.lookups;
+    queried += report.contact_counters.queries;
     rows += report.contact_counters.contacts;
   }
-  EXPECT_LT(looked, rows / 4);
+  EXPECT_LT(queried, rows / 4);
   EXPECT_EQ(world.snapshot({}).report.asleep, 2u);
   EXPECT_EQ(world.snapshot({}).report.contact_counters.contacts, 0u);
 }

@@ -94,7 +94,7 @@ void expectNoContactWork(const ContactCounters& c) {
   EXPECT_EQ(c.tested, 0u);
   EXPECT_EQ(c.penetrating, 0u);
   EXPECT_EQ(c.corrected, 0u);
-  EXPECT_EQ(c.lookups, 0u);
+  EXPECT_EQ(c.queries, 0u);
   EXPECT_EQ(c.contacts, 0u);
   EXPECT_EQ(c.traced, 0u);
   EXPECT_EQ(c.caught, 0u);
@@ -125,7 +125,7 @@ TEST(Work, OneBodyInTheAirHasMatchingAlone) {
 // With all that a world can do switched on and nothing of it in use: what the deformer alone does, and nothing else.
 TEST(Work, ABodyThatUsesNothingIsDeformedAndNothingElse) {
   for (const bool elastic : {false, true}) {
-    SCOPED_TRACE(elastic ? "elastic" : "looks");
+    SCOPED_TRACE(elastic ? "elastic" : "appearance");
     WorldSettings settings;
     settings.gravity.setZero();
     BodyDef def = test::block("block", Vec3(0.0, 0.0, 5.0));
@@ -171,7 +171,7 @@ TEST(Work, ABodyThatUsesNothingIsDeformedAndNothingElse) {
   }
 }
 
-TEST(Work, OneBodyOnTheGroundHasNoPairsAndNoLookups) {
+TEST(Work, OneBodyOnTheGroundHasNoPairsAndNoQueries) {
   WorldSettings settings;
   settings.sleep = false;
   World world(settings);
@@ -181,7 +181,7 @@ TEST(Work, OneBodyOnTheGroundHasNoPairsAndNoLookups) {
     world.step();
     const StepReport report = reportOf(world);
     EXPECT_EQ(report.contact_counters.pairs, 0u);
-    EXPECT_EQ(report.contact_counters.lookups, 0u);
+    EXPECT_EQ(report.contact_counters.queries, 0u);
     EXPECT_EQ(report.contact_counters.bounds_tested, 0u);
     EXPECT_EQ(report.tetrahedralizations, 0u);
     shapes += report.contact_shapes;
@@ -211,8 +211,8 @@ TEST(Work, OnlyThoseThatComeNearGetAShape) {
   world.step();
   const StepReport report = reportOf(world);
   EXPECT_EQ(report.contact_counters.pairs, 1u);
-  EXPECT_GT(report.contact_counters.lookups, 0u);
-  EXPECT_LE(report.contact_counters.lookups, 2u * (26u + 24u * 2u)) << "points of two cubes";
+  EXPECT_GT(report.contact_counters.queries, 0u);
+  EXPECT_LE(report.contact_counters.queries, 2u * (26u + 24u * 2u)) << "points of two cubes";
   EXPECT_EQ(report.contact_shapes, 2u);
   EXPECT_EQ(report.tetrahedralizations, 0u);
   for (int step = 0; step < 20; ++step) {
@@ -298,7 +298,7 @@ TEST(Sleep, AThousandSleepersDoNothingAndMoveByNoBit) {
 /// What a step has done, in pieces of work.
 std::size_t workIn(const StepReport& report) {
   const ContactCounters& c = report.contact_counters;
-  return report.match_counters.clusters + c.bounds_tested + c.pairs + c.lookups + c.contacts + c.corrected + c.traced +
+  return report.match_counters.clusters + c.bounds_tested + c.pairs + c.queries + c.contacts + c.corrected + c.traced +
          report.ground_contacts;
 }
 
@@ -590,7 +590,7 @@ TEST(Memory, SteppingALiverOnTheGroundAllocatesNothing) {
   EXPECT_EQ(allocationsIn(world, 60), 0u) << "in 60 steps";
 }
 
-// A stack for looks that the push sphere touches, and one of elastic blocks.
+// A stack of an appearance material that the push sphere touches, and one of elastic blocks.
 TEST(Memory, SteppingBodiesThatPressOnEachOtherAllocatesNothing) {
   if (!kCounts) GTEST_SKIP() << "the sanitizer has its own allocator";
   WorldSettings settings;
@@ -611,7 +611,7 @@ TEST(Memory, SteppingBodiesThatPressOnEachOtherAllocatesNothing) {
   replyOf<Done>(world.apply(push));
   for (int step = 0; step < 240; ++step) world.step();
   EXPECT_EQ(reportOf(world).contact_counters.pairs, 2u);
-  EXPECT_GT(reportOf(world).contact_counters.lookups, 0u);
+  EXPECT_GT(reportOf(world).contact_counters.queries, 0u);
   EXPECT_GT(reportOf(world).contact_counters.corrected, 0u);
   EXPECT_EQ(allocationsIn(world, 60), 0u) << "in 60 steps";
 }

@@ -533,15 +533,15 @@ TEST(World, ThePushSphereFeelsWhatTheTissueGets) {
     push.position = Vec3(-0.04, 0.0, 0.0);
     push.speed = speed;
     ASSERT_TRUE(world.apply(push).ok());
-    Vec3 felt = Vec3::Zero();
+    Vec3 reported = Vec3::Zero();
     for (int step = 0; step < 240; ++step) {
       world.step();
-      felt += world.push().force / 120.0;
+      reported += world.push().force / 120.0;
     }
     const Vec3 momentum = world.snapshot({true, true, true}).bodies[0].measures.linear_momentum;
     ASSERT_GT(momentum.x(), 0.0);
-    EXPECT_LE((felt + momentum).norm(), 0.02 * momentum.norm())
-        << "felt " << felt.transpose() << ", given " << momentum.transpose();
+    EXPECT_LE((reported + momentum).norm(), 0.02 * momentum.norm())
+        << "reported " << reported.transpose() << ", given " << momentum.transpose();
   }
 }
 

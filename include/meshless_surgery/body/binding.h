@@ -7,35 +7,36 @@
 
 namespace meshless {
 
-/// Sum of the magnitudes of a rider's weights at most: by so much can it amplify what its carriers do one by one.
+/// The largest sum of the magnitudes of an embedded vertex's weights. By so much can the vertex amplify what each of
+/// its carriers does.
 constexpr double kMostWeight = 2.0;
 
-/// Binds a surface whose vertex v is particle vertex_particle[v], or rides where that is kNoIndex. A rider is the
-/// moving least-squares mean of up to twelve particles that are near it along the body: smooth, and exact where the
-/// body moves affinely. One that lies so far beside its particles that its weights would exceed kMostWeight has up to
-/// forty, and where that does not do, follows a cluster for the rest. Directions that the particles hardly span, as in
-/// thin sheets and crumbs, follow a cluster of the nearest one.
+/// Binds a surface whose vertex v is particle vertex_particle[v], or is embedded where that is kNoIndex. An embedded
+/// vertex is the moving least-squares mean of up to twelve particles that are near it along the body, its carriers. It
+/// moves smoothly, and exactly where the body moves affinely. A vertex that lies so far beside its carriers that its
+/// weights would exceed kMostWeight has up to forty of them. Where these are not enough, it follows a cluster for the
+/// rest. Directions that the carriers hardly span, as in thin sheets and crumbs, follow a cluster of the nearest one.
 ///
-/// Of a piece, riders whose carriers all came along keep them, and those that have enough of theirs left get weights
-/// for these: `inherited` says which rider of the parent a vertex was (kNoIndex: none) and what the parent's particles
-/// are called in the piece (kNoIndex: not there). `start` says which particle of the piece is near a vertex that is new
-/// (kNoIndex: it is looked for).
+/// The embedded vertices of a piece keep their carriers where all of them are in the piece. Those that have enough
+/// carriers left get weights for these. `embedded` says which embedded vertex of the parent a vertex was (kNoIndex:
+/// none), `renumbered` what number the parent's particles have in the piece (kNoIndex: they are not in it), and `start`
+/// which particle of the piece is near a new vertex (kNoIndex: it is searched for).
 struct InheritedBinding {
   const SurfaceBinding& parent;
-  std::vector<Index> rider;
+  std::vector<Index> embedded;
   const std::vector<Index>& renumbered;
   std::vector<Index> start;  // of each vertex; may be empty
-  /// True where a lip lies between a vertex and a particle: it does not follow it. May be empty.
+  /// True where a wound face lies between a vertex and a particle: the vertex does not follow it. May be empty.
   std::function<bool(Index vertex, Index particle)> separated;
 };
 SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const ClusterSet& clusters,
                            const Points& surface_rest, std::vector<Index> vertex_particle,
                            const InheritedBinding* inherited = nullptr);
 
-/// Where rider r of the binding is by its carriers, without its offset [m]. Poses of
-/// lever_clusters must fit positions.
-inline Vec3 riderPosition(const SurfaceBinding& binding, const Points& positions, const std::vector<ClusterPose>& poses,
-                          Index r) {
+/// Where the carriers of embedded vertex r have it, without its offset [m]. The poses of lever_clusters must fit
+/// positions.
+inline Vec3 embeddedPosition(const SurfaceBinding& binding, const Points& positions,
+                             const std::vector<ClusterPose>& poses, Index r) {
   Vec3 sum = Vec3::Zero();
   for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k)
     sum += binding.weights[k] * positions[binding.carriers[k]];

@@ -1,5 +1,5 @@
 // A body: a constant model and a state that changes. Particles carry mass; every vertex of the surface is a particle
-// itself or rides on clusters.
+// or is embedded between some.
 #pragma once
 
 #include <limits>
@@ -15,15 +15,15 @@ namespace meshless {
 
 /// How a surface vertex follows the particles.
 struct SurfaceBinding {
-  std::vector<Index> particle;        // one a vertex: the particle that it is, or kNoIndex for a rider
-  std::vector<Index> riders;          // vertices that ride, ascending
-  std::vector<Index> offsets;         // riders + 1, into the two below
-  std::vector<Index> carriers;        // particles that the rider follows
-  std::vector<double> weights;        // add up to 1 for a rider; may be negative where it lies outside of its carriers
-  Points levers;                      // [m] one a rider: what the carriers do not span at rest (thin sheets, crumbs)
-  std::vector<Index> turners;         // one a rider: the cluster whose affine fit takes its lever along
+  std::vector<Index> particle;        // one a vertex: the particle that it is, or kNoIndex for an embedded vertex
+  std::vector<Index> embedded;        // embedded vertices, ascending
+  std::vector<Index> offsets;         // one each, into the two below; and one more, their end
+  std::vector<Index> carriers;        // particles that the embedded vertices follow
+  std::vector<double> weights;        // add up to 1 for a vertex; some are negative where it lies outside of them
+  Points levers;                      // [m] one each: what the carriers do not span at rest (thin sheets, crumbs)
+  std::vector<Index> turners;         // one each: the cluster whose affine fit takes the lever along
   std::vector<Index> lever_clusters;  // ascending: those that take a lever along; their poses are needed with positions
-  Index bound = 0;                    // riders whose carriers were looked for: those of a parent came along
+  Index bound = 0;                    // embedded vertices whose carriers were searched for; the others have a parent's
 };
 
 /// Constant while it lives: rest shape, topology, clusters, masses.
@@ -38,7 +38,7 @@ struct BodyModel {
   ParticleGraph graph;
   ClusterSet clusters;
   RestShape shape;
-  std::vector<ElasticRest> elastic;                   // empty where the material is for looks
+  std::vector<ElasticRest> elastic;                   // empty where the material is an appearance material
   std::shared_ptr<const ElasticBatch> elastic_batch;  // the same, vectorised
   /// Of a body whose cells know how far they are filled (CellFill::kFilled), else null. Cluster c is cell c, corner by
   /// corner.
@@ -52,13 +52,13 @@ struct BodyModel {
   /// [1/m^2] norm of ElasticRest::spread_inverse: what a cut leaves of a cell can be narrower, so that its stress would
   /// need a shorter step. It resists as a flat cluster does.
   double most_spread_inverse = std::numeric_limits<double>::infinity();
-  double specific_stiffness = 0.0;  // [m^2/s^2] Young's modulus over density; 0 where the material is for looks
+  double specific_stiffness = 0.0;  // [m^2/s^2] Young's modulus over density; 0 of an appearance material
   double poissons_ratio = 0.0;      // of an elastic material
   double highest_frequency = 0.0;   // [rad/s] of an elastic material: a substep takes at most 1 / highest_frequency
   TriangleMesh surface;             // rest positions of the vertices [m]
   SurfaceBinding binding;
   bool solid = true;
-  bool lips = false;             // an incision has left faces that can press on each other
+  bool incised = false;          // it has wound faces, which can press on each other
   double spacing = 0.0;          // [m] between interior particles
   double rest_volume = 0.0;      // [m^3]; 0 where not solid
   double rest_area = 0.0;        // [m^2] of the surface
@@ -92,7 +92,8 @@ struct BodyState {
   double swelling = 1.0;              // of goals, or of the size without stress, where the volume is held
   double stretch = 1.0;               // of an elastic body: by how much its highest frequency has grown since rest
   std::vector<PlasticShape> plastic;  // one a cluster once something has flowed; empty before
-  Points rider_offsets;    // [m] one a rider: what a cut left between its place and its carriers' (fades away)
+  // [m] One for each embedded vertex: from where its carriers have it to where it is. A cut makes it, and it fades.
+  Points embedded_offsets;
   Points eased;            // [m/s^2] one a particle where a cut lets go of it little by little, else empty; see ease.h
   double eased_for = 0.0;  // [s] since that cut
   bool eased_whole = false;  // what is eased may have a force and a torque

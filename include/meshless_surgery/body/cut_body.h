@@ -15,9 +15,9 @@ struct BodyPiece {
 /// What a blade had to make of a body, over all pieces: its work, in counts that no clock blurs.
 struct CutWork {
   std::size_t new_vertices = 0;      // of the surface
-  std::size_t new_triangles = 0;     // of caps or lips
-  std::size_t bound_riders = 0;      // vertices whose carriers were looked for
-  std::size_t kept_riders = 0;       // that kept theirs
+  std::size_t new_triangles = 0;     // of caps or wound faces
+  std::size_t bound_embedded = 0;    // embedded vertices whose carriers were searched for
+  std::size_t kept_embedded = 0;     // embedded vertices that kept theirs
   std::size_t kept_clusters = 0;     // taken over unchanged
   std::size_t rebuilt_clusters = 0;  // grown again
 

@@ -10,7 +10,7 @@ struct TouchedParticle {
   Index particle = 0;
   Vec3 normal = Vec3::UnitZ();  // unit, away from the obstacle
   double obstacle_speed = 0.0;  // [m/s] of the obstacle along the normal
-  bool by_tool = false;         // by the push sphere, which feels it
+  bool by_tool = false;         // by the push sphere, which reports the force
 };
 
 /// Arrays that a body's substep needs and nothing outlives; kept between steps so that stepping allocates nothing.
@@ -23,7 +23,7 @@ struct StepScratch {
   ElasticBatchState elastic;
   std::vector<TouchedParticle> touched;
   bool lies = false;      // on something that does not move: its spin is damped as what deforms
-  Vec3 unfelt = Vec3::Zero();  // [kg m/s] by which the tool moved particles further than it threw them
+  Vec3 unreported = Vec3::Zero();  // [kg m/s] of the tool's push that particles do not keep: it does not report that
 };
 
 /// Reads positions and velocities; writes positions, velocities, poses and scratch.previous: matches at y = x + h v,
@@ -43,7 +43,7 @@ double stiffnessFactor(const BodyModel& model, const BodyState& state, double h)
 
 /// v = (x - x_old) / h, after springs and contacts have moved positions. Being pushed out of an obstacle stops a
 /// particle or takes it along, and never throws it: along the normal it keeps at most the speed that it had before the
-/// contact, or the obstacle's. What is taken from those that a tool touched is scratch.unfelt.
+/// contact, or the obstacle's. What those lose so that a tool touched is added to scratch.unreported.
 void velocitiesFromPositions(const BodyModel& model, double h, BodyState& state, StepScratch& scratch);
 
 /// [m/s] angular velocity times lever of a body that turns as its particles do on the whole; 0 where it has no extent.

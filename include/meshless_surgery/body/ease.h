@@ -1,4 +1,4 @@
-// A blade takes forces away at once. What its pieces feel of that inside is let go little by little, as tissue parts.
+// A cut takes forces away at once. Inside the pieces they are released little by little, as tissue parts.
 #pragma once
 
 #include "meshless_surgery/body/cut_body.h"
@@ -8,10 +8,11 @@ namespace meshless {
 /// [s] until nothing is left of what easeRelease() holds back.
 constexpr double kEaseTime = 0.15;
 
-/// Lets the particles of the pieces be accelerated in the next substep of h [s] as they were in the uncut body `before`;
-/// what the cut changes comes within kEaseTime. Of a piece that moves freely the force and the torque across the cut are
-/// released at once, as a rigid acceleration: what is eased has neither, so that its momentum is its own alone and
-/// nothing throws it. Of one that has fixed particles, or one of the parent's particles in `held`, they are eased too.
+/// Lets the particles of the pieces be accelerated in the next substep of h [s] as they were in the uncut body
+/// `before`; what the cut changes comes within kEaseTime. Of a piece that moves freely the force and the torque across
+/// the cut are released at once, as a rigid acceleration: what is eased has neither, so that its momentum is its own
+/// alone and nothing throws it. Of one that has fixed particles, or one of the parent's particles in `held`, they are
+/// eased too.
 void easeRelease(const BodyModel& parent, const BodyState& before, const Material& material, double h, const std::vector<Index>& held,
                  std::vector<BodyPiece>& pieces);
 

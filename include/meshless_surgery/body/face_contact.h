@@ -9,7 +9,7 @@
 namespace meshless {
 
 /// Moves every triangle that reaches into the sphere (centre and radius in [m]) out of it, by one Gauss-Seidel sweep
-/// over its corners with their inverse masses. Corners that are fixed or ride stay (see rider_contact.h).
+/// over its corners with their inverse masses. Corners that are fixed or embedded stay (see embedded_contact.h).
 /// moved(particle, shift [m]) is told of each. Returns how many triangles were pushed.
 std::size_t pushFaces(const BodyModel& model, const Vec3& centre, double radius, BodyState& state,
                       const std::function<void(Index particle, const Vec3& shift)>& moved);

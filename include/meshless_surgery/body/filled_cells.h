@@ -1,5 +1,5 @@
 // Bodies whose lattice knows how far each cell is filled: particles are its corners, masses and stiffness those of what
-// fills the cells, and the surface rides on them.
+// fills the cells, and the surface is embedded in them.
 #pragma once
 
 #include <functional>
@@ -51,7 +51,7 @@ class CellFinder {
 /// [spacing^2] from a place in a cell to the nearest of the samples; infinite where there are none.
 double squaredToSamples(SampleSet samples, const Vec3& at);
 
-/// Every vertex rides on the corners of its cell with trilinear weights; `cell` one a vertex.
+/// Every vertex is embedded in its cell: its carriers are the corners, with trilinear weights. `cell`: one a vertex.
 SurfaceBinding bindToCells(const CellLattice& lattice, const Points& surface_rest, const std::vector<Index>& cell);
 
 }  // namespace meshless

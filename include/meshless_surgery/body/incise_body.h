@@ -9,13 +9,13 @@ namespace meshless {
 struct IncisedBody {
   /// One where the body holds together: its particles are the parent's, in their order. Else largest volume first.
   std::vector<BodyPiece> pieces;
-  double opened_area = 0.0;  // [m^2] of one lip
+  double opened_area = 0.0;  // [m^2] of one wound face
   CutWork work;
 };
 
 /// The blade is in the world frame and meets the present shape. Links between particles that pass through the blade are
-/// cut, clusters that it parts grow again along the links that are left, and what rides on a lip follows particles on its
-/// side alone. Positions, velocities and masses stay. Refuses as incise() does, and a body that is no solid.
+/// cut. Clusters that it parts grow again along the links that are left. Vertices of a wound face follow only particles
+/// on its side. Positions, velocities and masses stay. Refuses as incise() does, and a body that is no solid.
 Result<IncisedBody> inciseBody(const BodyModel& model, const BodyState& state, const Blade& blade);
 
 }  // namespace meshless

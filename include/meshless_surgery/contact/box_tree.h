@@ -32,7 +32,8 @@ struct FloatBox {
       if (static_cast<double>(min[k]) - by > o.max[k] || static_cast<double>(o.min[k]) - by > max[k]) return false;
     return true;
   }
-  float size() const { return (max[0] - min[0]) + (max[1] - min[1]) + (max[2] - min[2]); }
+  /// The sum of its three edges.
+  float edgeSum() const { return (max[0] - min[0]) + (max[1] - min[1]) + (max[2] - min[2]); }
   bool overlaps(const FloatBox& o) const {
     return min[0] <= o.max[0] && o.min[0] <= max[0] && min[1] <= o.max[1] && o.min[1] <= max[1] && min[2] <= o.max[2] &&
            o.min[2] <= max[2];
@@ -97,7 +98,7 @@ class BoxTree {
       if (a.count > 0 && b.count > 0) {
         seen[mine] = 1;
         for (Index k = a.first; k < a.first + a.count; ++k) visit(items_[k]);
-      } else if (b.count == 0 && (a.count > 0 || boxes.nodes[mine].size() < other_boxes.nodes[theirs].size())) {
+      } else if (b.count == 0 && (a.count > 0 || boxes.nodes[mine].edgeSum() < other_boxes.nodes[theirs].edgeSum())) {
         stack.push_back({mine, b.first});
         stack.push_back({mine, b.first + 1});
       } else {

@@ -7,7 +7,7 @@
 namespace meshless {
 
 /// Kept between steps: finding allocates nothing once it has grown, and boxes that stay about where they were are
-/// looked for again only when one has left the margin around it. What is found does not depend on it.
+/// searched for again only when one has left the margin around it. What is found does not depend on it.
 class BroadPhase {
  public:
   /// {lower, higher} index of each pair of overlapping boxes, ascending. Empty boxes (and such with NaN) overlap

@@ -1,5 +1,5 @@
-// What contact knows of a body's rest shape: which triangle is nearest to a point in it, and at which points of its
-// surface it feels others. Made for a model once, and filled where something comes near.
+// What contact knows of a body's rest shape: which triangle is nearest to a point in it, and which points of its
+// surface are queried in other shapes. Made once for a model, and filled where something comes near.
 #pragma once
 
 #include <array>
@@ -15,14 +15,14 @@ class EmptySpace;
 
 /// How the vertices of a surface follow the particles of a body: views, to be kept alive by whoever passes them.
 struct SurfaceRows {
-  const std::vector<Index>* particle = nullptr;  // one a vertex; kNoIndex: it rides
-  const std::vector<Index>* riders = nullptr;    // vertices that ride, ascending
-  const std::vector<Index>* offsets = nullptr;   // riders + 1, into the two below
+  const std::vector<Index>* particle = nullptr;  // one a vertex; kNoIndex: it is embedded
+  const std::vector<Index>* embedded = nullptr;  // embedded vertices, ascending
+  const std::vector<Index>* offsets = nullptr;   // one each, into the two below; and one more, their end
   const std::vector<Index>* carriers = nullptr;
   const std::vector<double>* weights = nullptr;
 };
 
-/// A point of the surface at which a body feels others: a vertex, or a point on a long edge.
+/// A point of the surface that is queried in other shapes: a vertex, or a point on a long edge.
 struct ContactSample {
   std::array<Index, 2> vertices{};  // the same twice for a vertex
   double share = 0.0;               // of the second
@@ -31,7 +31,7 @@ struct ContactSample {
 
 class ContactShape {
  public:
-  /// `surface`: rest positions [m], closed for solids. spacing [m]: of the particles; vertices that ride are samples
+  /// `surface`: rest positions [m], closed for solids. spacing [m]: of the particles; embedded vertices are samples
   /// about so far apart, those that are particles all. Long sharp edges get samples at half the thickness below them.
   /// On all edges together these are at most 1,000, or four for each on a vertex.
   ContactShape(const TriangleMesh& surface, const SurfaceRows& rows, double spacing);
@@ -47,7 +47,7 @@ class ContactShape {
   };
   /// Of a point in the rest frame, whoever has asked before. Signs are those of the nearest
   /// triangle; on ties (an edge, a vertex) of the one with the larger plane distance. False without triangles, or for
-  /// NaN. `hint`: a triangle that may be near makes it quicker, and changes nothing else. Thread-safe.
+  /// NaN. `hint`: a triangle that may be near makes it faster, and changes nothing else. Thread-safe.
   bool nearest(const Vec3& rest, Nearest& found, Index hint = kNoIndex) const;
   /// The same for a point of another body that reaches into that one along `inward` (unit, in this rest frame): near an
   /// edge, a face that would push it away from its own body gives way to one that does not and is at most `slack` [m]
@@ -57,7 +57,7 @@ class ContactShape {
                Index hint = kNoIndex) const;
 
   /// True only for a point outside that is more than `by` [m] from the surface, and for nearly all of those that are
-  /// farther by half an edge. Quicker where the same place was asked about before. Thread-safe.
+  /// farther by half an edge. Faster where the same place was asked about before. Thread-safe.
   bool isClear(const Vec3& rest, double by) const;
   /// True only for points outside, and for all that are a few edges from the surface. Thread-safe.
   bool isOutside(const Vec3& rest) const;
@@ -80,14 +80,14 @@ class ContactShape {
   /// [m] median of some inward rays: who moves farther in a step can pass through.
   double thickness() const { return thickness_; }
   double meanEdge() const { return mean_edge_; }  // [m] of the triangles
-  /// How many times the work of a usual mesh a lookup is, about: slivers lie around each point in their hundreds.
+  /// The work of a query, relative to one in a usual mesh, about: with slivers, hundreds lie around each point.
   double crowding() const { return crowding_; }
-  /// [m] least edge of the bounds.
+  /// [m] least edge of the bounds. Margins and limits of contact are relative to it.
   double size() const { return size_; }
   const SurfaceRows& rows() const { return rows_; }
-  /// Of a vertex that rides: its number in rows(); kNoIndex for a particle.
-  Index riderOf(Index vertex) const { return rider_of_.empty() ? kNoIndex : rider_of_[vertex]; }
-  bool rides() const { return !rider_of_.empty(); }
+  /// Of an embedded vertex: its number in rows(); kNoIndex for a particle.
+  Index embeddedOf(Index vertex) const { return embedded_of_.empty() ? kNoIndex : embedded_of_[vertex]; }
+  bool hasEmbedded() const { return !embedded_of_.empty(); }
 
   std::size_t cellsFilled() const { return cells_filled_.load(std::memory_order_relaxed); }
   /// Bytes that it holds.
@@ -119,7 +119,7 @@ class ContactShape {
   TriangleMesh surface_;
   std::vector<Facet> facets_;  // one a triangle
   SurfaceRows rows_;
-  std::vector<Index> rider_of_;
+  std::vector<Index> embedded_of_;
   std::vector<ContactSample> samples_;
   Box bounds_;
   double size_ = 0.0, thickness_ = 0.0, mean_edge_ = 0.0, crowding_ = 1.0;

@@ -26,8 +26,9 @@ struct ContactMap {
   const QuadraticMap* quadratic = nullptr;  // where the cluster bends: the better map, to which this is the start
 };
 
-/// A body as contact sees it in a frame. Whoever fills it keeps what it points to alive.
-struct ContactParty {
+/// A collider (a body or an obstacle) as contact in rest shapes sees it in a frame. Whoever fills it keeps what it
+/// points to alive. Contact of surfaces has a Collider of its own (contact/surface_contacts.h).
+struct ShapeCollider {
   std::uint64_t key = 0;                   // of the body for as long as it lives
   const ContactShape* shape = nullptr;     // filled by the time make() is called
   Vec3* positions = nullptr;               // [m] one a particle: read and moved
@@ -57,17 +58,17 @@ struct ContactScene {
   double substep = 0.0;         // [s] of begin()
 };
 
-/// Brings a party's maps, and its surface where it has one, up to date with its particles.
-using RefitMaps = std::function<void(Index party, std::vector<ContactMap>& maps)>;
+/// Brings a collider's maps, and its surface where it has one, up to date with its particles.
+using RefitMaps = std::function<void(Index collider, std::vector<ContactMap>& maps)>;
 
-/// Two parties that press on each other; b is kNoIndex for the ground.
+/// Two colliders that press on each other; b is kNoIndex for the ground.
 struct LoadedPair {
   Index a = 0, b = kNoIndex;
 };
 
 class ContactsMemory;
 
-/// Kept between steps: scratch, and what a contact has to remember. The order of parties is that of the bodies.
+/// Kept between steps: scratch, and what a contact has to remember. The order of colliders is that of the bodies.
 class Contacts {
  public:
   Contacts();
@@ -75,14 +76,15 @@ class Contacts {
   Contacts(Contacts&&) noexcept;
   Contacts& operator=(Contacts&&) noexcept;
 
-  /// Which pairs can touch within the frame of h [s]; sets needed() for the parties that need shape, maps and surface.
-  void findPairs(const ContactScene& scene, const std::vector<ContactParty>& parties, double h,
+  /// Which pairs can touch within the frame of h [s]; sets needed() for the colliders that need shape, maps and
+  /// surface.
+  void findPairs(const ContactScene& scene, const std::vector<ShapeCollider>& colliders, double h,
                  ContactCounters& counters);
   const std::vector<char>& needed() const;
 
-  /// Finds the contacts of the frame. Bodies that are inside others are let out as a whole, and so is old overlap where
-  /// contacts are not settled(): at a bounded speed, without changing velocities.
-  void make(const std::vector<ContactParty>& parties, double h, ContactCounters& counters,
+  /// Finds the contacts of the frame. A body inside another one is moved out as a whole. Where contacts are not
+  /// settled(), old overlap is depenetrated too: at a bounded speed, without a change of velocities.
+  void make(const std::vector<ShapeCollider>& colliders, double h, ContactCounters& counters,
             const ForEach& for_each = oneAfterAnother);
 
   /// Substeps that the frame asks for, as make() found it: tall stacks and fast bodies that are about to meet; 1 where
@@ -90,30 +92,30 @@ class Contacts {
   int neededSubsteps() const;
   /// Substeps that the frame can afford, as make() found it: of a deep heap fewer than stiff materials would have.
   int affordableSubsteps() const;
-  /// Lets out old overlap, where make() has left it to this or to letOutIslands().
-  void letOut(const std::vector<ContactParty>& parties, ContactCounters& counters,
-              const ForEach& for_each = oneAfterAnother);
+  /// Removes old overlap where make() has not: either this or depenetrateIslands() has to be called then.
+  void depenetrate(const std::vector<ShapeCollider>& colliders, ContactCounters& counters,
+                   const ForEach& for_each = oneAfterAnother);
   /// Before the first solve() of a frame, of substeps of so many seconds.
-  void begin(const std::vector<ContactParty>& parties, double substep);
+  void begin(const std::vector<ShapeCollider>& colliders, double substep);
 
-  /// Parties that do not move, have a mass, and were reached in make() by one that moves; ascending.
+  /// Colliders that do not move, have a mass, and were reached in make() by one that moves; ascending.
   const std::vector<Index>& reached() const;
 
   /// After bodies have moved by a substep: what approached deeper goes back to where it was or to the surface, with
   /// friction. Impulses are equal and opposite.
-  void solve(const std::vector<ContactParty>& parties, double substep, const RefitMaps& refit,
+  void solve(const std::vector<ShapeCollider>& colliders, double substep, const RefitMaps& refit,
              ContactCounters& counters, const ForEach& for_each = oneAfterAnother);
 
   /// True where the contacts of the frame stay those that make() found. Then islands, which do not know of each other,
   /// may go through all substeps one after the other, by solveIslands() in place of solve().
   bool settled() const;
-  /// The parties of island i are islandParties()[islandOffsets()[i]] .. [islandOffsets()[i + 1] - 1].
+  /// The colliders of island i are islandColliders()[islandOffsets()[i]] .. [islandOffsets()[i + 1] - 1].
   const std::vector<Index>& islandOffsets() const;
-  const std::vector<Index>& islandParties() const;
-  /// After begin(), before the first solveIslands(). The parties must stay where they are until the last.
-  void beginIslands(const std::vector<ContactParty>& parties);
-  /// As letOut(), for some islands.
-  void letOutIslands(Index first_island, Index end_island, std::size_t& corrected);
+  const std::vector<Index>& islandColliders() const;
+  /// After begin(), before the first solveIslands(). The colliders must stay where they are until the last.
+  void beginIslands(const std::vector<ShapeCollider>& colliders);
+  /// As depenetrate(), for some islands.
+  void depenetrateIslands(Index first_island, Index end_island, std::size_t& corrected);
   /// As solve(), for some islands; several threads may each do others. first: of the frame's substeps. Adds to the
   /// contacts that moved something and to those with the ground that carry load.
   void solveIslands(Index first_island, Index end_island, bool first, std::size_t& corrected,
@@ -128,22 +130,23 @@ class Contacts {
     Vec3 position, normal;
     double impulse;  // [kg m] mass times displacement in the substep
   };
-  void points(const std::vector<ContactParty>& parties, std::vector<Point>& points) const;
-  /// Deepest overlap that make() found, relative to the smaller body's size, one a contact below the surface.
+  void points(const std::vector<ShapeCollider>& colliders, std::vector<Point>& points) const;
+  /// How deep each contact below the surface was when make() found it, relative to the smaller body's size
+  /// (ContactShape::size()).
   const std::vector<double>& depths() const;
   /// Bytes that it holds.
   std::size_t bytes() const;
   /// Forgets what it remembers of pairs.
   void clear();
-  /// Of a party alone, whose surface is another from now on.
+  /// Of a collider alone, whose surface is another from now on.
   void forget(std::uint64_t key);
-  /// After findPairs(), on any thread: looks up what make() would of the pairs with one of the first `fresh` parties.
-  /// Moves nothing. What the parties point to has to live as long as this.
-  void lookAhead(const std::vector<ContactParty>& parties, Index fresh, double h);
-  /// What make() may take over until others are expected: of pairs of which nothing else is known, and whose parties
-  /// are to the bit as they were when these looked ahead. It is what make() would find itself.
+  /// After findPairs(), on any thread: does the queries of make() for the pairs with one of the first `fresh`
+  /// colliders. Moves nothing. What the colliders point to has to live as long as this.
+  void queryAhead(const std::vector<ShapeCollider>& colliders, Index fresh, double h);
+  /// From now on make() may take over what these have found by queryAhead(). It does so for pairs of which nothing else
+  /// is known and whose colliders are to the bit as they were then. It would find the same itself.
   void expect(std::vector<std::shared_ptr<const Contacts>> ahead);
-  /// All that the next frame reads of the ones before, to be given back to contacts of the same parties
+  /// All that the next frame reads of the ones before, to be given back to contacts of the same colliders
   /// (contact/contacts_memory.h).
   ContactsMemory memory() const;
   void recall(const ContactsMemory& memory);

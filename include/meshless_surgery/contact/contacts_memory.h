@@ -19,11 +19,11 @@ class ContactsMemory {
   ContactsMemory(const ContactsMemory&);
   ContactsMemory& operator=(const ContactsMemory&);
 
-  struct KnownParty {
+  struct KnownCollider {
     std::size_t triangles = 0;
   };
-  /// Why it cannot be of these parties (by key), of memory that was read from a file; empty where it can.
-  std::string fault(const std::map<std::uint64_t, KnownParty>& parties) const;
+  /// For memory that was read from a file: why it does not fit these colliders (by key); empty where it does.
+  std::string fault(const std::map<std::uint64_t, KnownCollider>& colliders) const;
 
  private:
   friend class Contacts;

@@ -30,11 +30,11 @@ struct ContactCounters {
   std::size_t penetrating = 0;  // particles found inside
   std::size_t corrected = 0;    // contacts that moved something
   std::size_t bounds_tested = 0;   // boxes compared by the broad phase
-  std::size_t lookups = 0;         // points looked up in shapes, or surfaces, by the step itself
+  std::size_t queries = 0;         // of the narrow phase by the step itself: points in shapes, vertices near surfaces
   std::size_t contacts = 0;        // made
   std::size_t traced = 0;          // paths of fast points followed through rest shapes
   std::size_t caught = 0;          // of them, those that would have passed through
-  std::size_t self_points = 0;     // looked at for contact of a body with itself
+  std::size_t self_points = 0;     // queried for contact of a body with itself
   std::size_t expelled = 0;        // pairs of which one is inside the other
 };
 

@@ -88,7 +88,7 @@ struct PairSearch {
   Side a, b;
   double h = 0.0;       // [s] of the frame
   double length = 0.0;  // [m] the shorter mean edge of the two
-  bool first = true;    // nothing is remembered: look for what is inside
+  bool first = true;    // nothing is remembered: search for what is inside
   enum class Self { kNo, kCuts, kAll } self = Self::kNo;
   const RememberedSide* remembered = nullptr;  // ascending by vertex
   std::size_t remembered_count = 0;
@@ -97,18 +97,18 @@ struct PairSearch {
 /// Of the distance of two features, at the least left after a substep.
 constexpr double kLeastLeft = 0.1;
 
-/// [m] how near something is looked for at rest, beside what is swept; of surfaces with such a mean edge.
+/// [m] The margin of a search at rest, beside what is swept, of surfaces with such a mean edge.
 double searchMargin(double edge_length);
 /// [m] features that are nearer touch: only a face that opposes tells the sides.
 double touchingDistance(double edge_length);
 
-/// Vertices of a, ascending, that are near enough to b to be looked up, to scratch.vertices.
+/// Vertices of a, ascending, that are near enough to b to be queried, to scratch.vertices.
 void findVerticesNear(const PairSearch& search, SearchScratch& scratch);
 
-/// scratch.vertices of a against the faces of b, to scratch.found: up to three pairs each, of different directions, the nearest
-/// first. Signs by pseudonormals (Baerentzen and Aanaes 2005); where several faces are equally near, the vertex is on
-/// the side of the one that its own faces oppose most, so that the twin faces of a fresh cut are on the right sides.
-/// Directions that the vertex's faces do not oppose are left out. Returns the vertices that were looked up.
+/// scratch.vertices of a against the faces of b, to scratch.found: up to three pairs each, of different directions, the
+/// nearest first. Signs by pseudonormals (Baerentzen and Aanaes 2005); where several faces are equally near, the vertex
+/// is on the side of the one that its own faces oppose most, so that the twin faces of a fresh cut are on the right
+/// sides. Directions that the vertex's faces do not oppose are left out. Returns the vertices that were queried.
 std::size_t findVertexFace(const PairSearch& search, SearchScratch& scratch);
 
 /// Ridges against ridges, where their common normal is between the normals of both (the Gauss map): the sign needs no

@@ -55,7 +55,7 @@ struct LimitedBody {
   }
 };
 
-/// Features of two bodies, and until when none of them has to be looked at.
+/// Features of two bodies, and until when none of them has to be checked.
 struct WatchedSet {
   std::vector<WatchedFeatures> features;
   std::vector<double> until;  // [m] one a feature: of `gone`

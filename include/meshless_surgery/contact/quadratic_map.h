@@ -5,7 +5,7 @@
 
 namespace meshless {
 
-/// present = fit (b(q) - mean) + centre, with q = (r - rest) / size and b = (x y z xx yy zz xy yz zx).
+/// present = fit (b(q) - mean) + centre, with q = (r - rest) / scale and b = (x y z xx yy zz xy yz zx).
 struct QuadraticMap {
   using Basis = Eigen::Matrix<double, 9, 1>;
 
@@ -13,7 +13,7 @@ struct QuadraticMap {
   Basis mean = Basis::Zero();
   Vec3 rest = Vec3::Zero();    // [m]
   Vec3 centre = Vec3::Zero();  // [m]
-  double size = 1.0;           // [m]
+  double scale = 1.0;          // [m]
 
   static Basis basis(const Vec3& q);
   Vec3 at(const Vec3& r) const;

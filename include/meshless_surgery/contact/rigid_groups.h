@@ -1,4 +1,4 @@
-// Groups of particles that answer a contact partly as rigid bodies: the clusters of a material for looks, which pulls
+// Groups of particles that answer a contact partly as rigid bodies: the clusters of an appearance material, which pulls
 // them back to rigid shapes within a frame.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Where a body can meet itself: folded over, or the lips of an incision against each other.
+// Where a body can meet itself: folded over, or the wound faces of an incision against each other.
 #pragma once
 
 #include "meshless_surgery/contact/contact_shape.h"

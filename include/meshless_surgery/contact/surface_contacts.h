@@ -117,7 +117,7 @@ class SurfaceContacts {
   struct Pair : KeptPair {
     Index a = 0, b = kNoIndex;  // colliders of this frame
     bool stale = true, near = false;
-    std::size_t looked_up = 0;  // vertices, when it was found last
+    std::size_t queried = 0;  // vertices, when it was found last
   };
   /// Of one thread.
   struct Scratch {

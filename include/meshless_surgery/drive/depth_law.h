@@ -6,8 +6,9 @@
 
 namespace meshless {
 
-/// [m] that a vertex may be inside another body: 1 mm, or a hundredth of the smaller body's size where that is more.
-double allowedDepth(double smaller_size);
+/// [m] that a vertex may be inside another body: 1 mm, or a hundredth of the smaller body's diagonal where that is
+/// more.
+double allowedDepth(double smaller_diagonal);
 
 /// No vertex of a body is deeper than that inside another one, an obstacle or the ground, and none of an obstacle
 /// inside a body. Inside is where the other surface winds around the vertex (geometry/inside.h); the depth is the

@@ -41,10 +41,10 @@ struct DriveReport {
   double badness() const;
 };
 
-/// Half a second to settle, the hand, then five seconds alone. Laws are looked at after every simulated second and at
-/// the end; masses, momenta and energies twelve times a second and around each cut. Where a material for looks leaves
-/// the elastic ones' band of volume, the scene is played again without cuts, to see what it does then; of a scene that
-/// did not finish or that is not cut its volume is not judged.
+/// Half a second to settle, the hand, then five seconds alone. Laws are checked after every simulated second and at the
+/// end; masses, momenta and energies twelve times a second and around each cut. Where the volume of an appearance
+/// material leaves the band of elastic ones, the scene is played again without cuts, for a band of its own. Its volume
+/// is not judged where the scene did not finish or is not cut.
 DriveReport drive(const DriveScene& scene, const DriveOptions& options = {});
 
 }  // namespace meshless

@@ -27,9 +27,9 @@ struct DriveScene {
 /// One to three organs: random implicit surfaces of genus 0 to 3, the shipped shapes of other seeds, or primitives, 5
 /// to 30 cm, 500 to 30,000 triangles (shipped slabs and blocks as many as they have); shipped or random materials;
 /// beside each other on the ground or on a tray, in a bowl, hung by their upper ends, or on each other. The world has
-/// its defaults. Random materials for accuracy can carry their own weight: E is at least density g size, and so large
-/// that the weight changes the volume by 4 % at most. Refuses (kUnknownName) a material or a support that is not there,
-/// (kInvalidArgument) other choices out of range.
+/// its defaults. Random elastic materials can carry their own weight: E is at least density times g times the body's
+/// longest edge, and so large that the weight changes the volume by 4 % at most. Refuses (kUnknownName) a material or a
+/// support that is not there, (kInvalidArgument) other choices out of range.
 Result<DriveScene> makeDriveScene(std::uint64_t seed, const DriveChoices& choices);
 
 }  // namespace meshless

@@ -6,7 +6,7 @@
 
 namespace meshless {
 
-/// No piece is faster than 1 % of its size a second, root mean square.
+/// No piece is faster than 1 % of its diagonal a second, root mean square.
 Finding restLaw(const Seen& seen);
 
 /// Each body sleeps.

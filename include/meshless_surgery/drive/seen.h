@@ -10,7 +10,7 @@ struct SeenBody {
   TriangleMesh surface;  // [m] present, world frame; empty where it was not wanted
   Points rest;           // [m] of the same vertices
   bool particles_finite = true;
-  bool elastic = false;  // a material for accuracy
+  bool elastic = false;  // an elastic material
   bool handled = false;  // a pick, a lock or the push sphere is on it
   bool fixed = false;    // some of it is held in place
   bool asleep = false;
@@ -20,7 +20,7 @@ struct SeenBody {
   Vec3 centre = Vec3::Zero();            // [m] of mass
   Vec3 linear_momentum = Vec3::Zero();   // [kg m/s]
   Vec3 angular_momentum = Vec3::Zero();  // [kg m^2/s] about the centre of mass
-  double size = 0.0;                     // [m] diagonal of the bounds at rest
+  double diagonal = 0.0;                 // [m] of the bounds at rest
 
   double speed() const { return mass > 0.0 ? std::sqrt(2.0 * kinetic_energy / mass) : 0.0; }  // [m/s] root mean square
 };
@@ -34,7 +34,7 @@ struct Seen {
   std::size_t mended = 0;        // bodies that had to start anew from rest in the last step
 };
 
-/// Without surfaces it is quick, and does for masses, momenta and energies.
+/// Without surfaces it is fast, and does for masses, momenta and energies.
 Seen see(World& world, bool surfaces);
 
 /// The name of the body of the scene that a piece was once part of: the world names pieces PARENT.1, PARENT.2 ...

@@ -21,7 +21,7 @@ std::vector<PieceVolume> volumesOf(const Seen& seen);
 struct VolumeBand {
   double low = 0.9, high = 1.1;
 };
-/// By the root's name, of materials for looks: what the same body does in the same scene without cuts.
+/// By the root's name, for appearance materials: the volumes of the same body in the same scene without cuts.
 using VolumeBands = std::map<std::string, VolumeBand>;
 
 /// Each piece whose material is elastic, between 0.9 and 1.1 of its rest volume; the others in their root's band, and

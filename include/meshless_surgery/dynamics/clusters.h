@@ -20,8 +20,8 @@ struct ParticleGraph {
 /// Builds the graph from undirected edges (duplicates allowed) between n particles at the rest positions.
 ParticleGraph makeGraph(const Points& rest, std::vector<std::array<Index, 2>> edges);
 
-/// How a user wants a body divided. Cells are those of a cubic lattice of particles at the body's spacing; auto means them
-/// for materials for accuracy.
+/// How a user wants a body divided. Cells are those of a cubic lattice of particles at the body's spacing; auto means
+/// them for elastic materials.
 struct ClusterOptions {
   enum class Kind { kAuto, kOne, kGrid, kCount, kCells };
   Kind kind = Kind::kAuto;

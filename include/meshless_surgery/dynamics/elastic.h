@@ -1,4 +1,4 @@
-// Elasticity with Young's modulus and Poisson's ratio on the moments of shape matching: the material for accuracy.
+// Elasticity with Young's modulus and Poisson's ratio on the moments of shape matching: elastic materials.
 #pragma once
 
 #include "meshless_surgery/dynamics/shape_matching.h"
@@ -26,8 +26,8 @@ std::vector<ElasticRest> makeElasticRest(const RestShape& shape);
 ///   -(1/rho) P(F) (sum m q q^T / M)^-1 q - k E / (rho s^2) (p - F q),  P = 2 mu (F - R) + lambda g(J) cof F
 /// with F = A_pq (sum m q q^T)^-1 and R its rotation. g(J) = J - 1, but falls as J^(-2/3) above J = 1.5 and stays as it
 /// is below -0.8: what is torn or turned inside out is drawn back with a bounded stress. Where |F|^2 is above 12 (3 at
-/// rest), J is replaced by J s(|F|^2), which stays bounded: a needle would stiffen without end. It is the gradient of an
-/// energy, conserves linear and angular momentum, and does not change with resolution. Clusters whose points do not
+/// rest), J is replaced by J s(|F|^2), which stays bounded: a needle would stiffen without end. It is the gradient of
+/// an energy, conserves linear and angular momentum, and does not change with resolution. Clusters whose points do not
 /// span space resist as a rigid match would, with E/(rho s^2). poses is read (last rotation) and written. With cells of
 /// 2x2x2 particles it is the hexahedron with one integration point, k its hourglass stiffness. Returns how much faster
 /// than at rest the body's highest frequency may be, at least 1: the root of the largest (|dJ/dF|^2 + |g| |F|) / 3 of a

@@ -1,6 +1,6 @@
 // Complete substeps of shape matching in float, vectorised for the widest instructions that the machine has: many
 // bodies of one cluster each, and a body of many overlapping clusters. The same laws as matchAndMove() (body/deform.h),
-// which stays the reference; for free bodies with a material for looks that does not flow, above ground at most.
+// which stays the reference; for free bodies with an appearance material that does not flow, above ground at most.
 #pragma once
 
 #include <limits>

@@ -12,7 +12,8 @@ enum class MatchMode { kRigid, kLinear, kQuadratic };
 const char* toString(MatchMode mode);
 
 /// What of a body's surface meets the rest of it.
-enum class SelfContact { kNone, kLips, kAll };  // kLips: the faces of cuts, once an incision has opened the body
+/// kWoundFaces: the faces of cuts and incisions, once an incision has opened the body.
+enum class SelfContact { kNone, kWoundFaces, kAll };
 
 const char* toString(SelfContact self_contact);
 
@@ -35,23 +36,23 @@ struct Plasticity {
   double maximum = 0.5;  // 0..3, strain of the rest shape
 };
 
-/// Two families. For looks, where youngs_modulus is 0: mode, alpha and beta are the paper's; alpha holds at the
-/// reference rate (see stiffnessGain). For accuracy, where youngs_modulus is set: the elastic constants of a textbook,
-/// without calibration (dynamics/elastic.h); mode, alpha and beta are then not used.
+/// Two families. An appearance material has a youngs_modulus of 0: mode, alpha and beta are the paper's; alpha holds at
+/// the reference rate (see stiffnessGain). An elastic material has a youngs_modulus: the elastic constants of a
+/// textbook, without calibration (dynamics/elastic.h); mode, alpha and beta are then not used.
 struct Material {
   std::string name = "default";
-  double youngs_modulus = 0.0;   // [Pa] 0: for looks
+  double youngs_modulus = 0.0;   // [Pa] 0: an appearance material
   double poissons_ratio = 0.45;  // 0..0.49
   MatchMode mode = MatchMode::kLinear;
-  double alpha = 0.9;                             // 0..1, fraction of the way to the goal in 1/60 s
-  double beta = 0.2;                              // 0..1, share of the fitted linear or quadratic map in the goal
-  double density = 1000.0;                        // [kg/m^3] > 0
-  double damping = 1.0;                           // [1/s] >= 0, decay rate of the motion that deforms
-  double friction = 0.5;                          // 0..10, Coulomb
-  double restitution = 0.0;                       // 0..1, share of the approach that a contact gives back
-  SelfContact self_contact = SelfContact::kLips;  // never of a body that cannot bend
-  ResponseCurve volume;                           // of the solid's volume
-  ResponseCurve area;                             // of the surface
+  double alpha = 0.9;                                   // 0..1, fraction of the way to the goal in 1/60 s
+  double beta = 0.2;                                    // 0..1, share of the fitted linear or quadratic map in the goal
+  double density = 1000.0;                              // [kg/m^3] > 0
+  double damping = 1.0;                                 // [1/s] >= 0, decay rate of the motion that deforms
+  double friction = 0.5;                                // 0..10, Coulomb
+  double restitution = 0.0;                             // 0..1, share of the approach that a contact gives back
+  SelfContact self_contact = SelfContact::kWoundFaces;  // never of a body that cannot bend
+  ResponseCurve volume;                                 // of the solid's volume
+  ResponseCurve area;                                   // of the surface
   Plasticity plasticity;
   Color color{0.62f, 0.22f, 0.18f, 1.0f};         // of the outer surface
   Color inside_color{0.85f, 0.45f, 0.40f, 1.0f};  // of cut faces

@@ -14,15 +14,15 @@ using Mat39 = Eigen::Matrix<double, 3, 9>;
 struct ClusterRest {
   double mass = 0.0;           // [kg]
   Vec3 centre = Vec3::Zero();  // [m]
-  double size = 0.0;           // [m] root of the mean square of |q|
+  double radius = 0.0;         // [m] root of the mean square of |q|
   bool linear_rank = false;    // the points span space: a linear map can be fitted
   bool quadratic_rank = false;
   Mat3 moment_inverse = Mat3::Zero();  // [1/(kg m^2)] (sum m q q^T)^-1 where linear_rank
 };
 
-/// Of the centred quadratic basis, in units of the cluster's size; formed only where a body is quadratic.
+/// Of the centred quadratic basis, in units of the cluster's radius; formed only where a body is quadratic.
 struct QuadraticRest {
-  Vec9 mean = Vec9::Zero();            // mass mean of (qx qy qz qx^2 qy^2 qz^2 qxqy qyqz qzqx) / size
+  Vec9 mean = Vec9::Zero();            // mass mean of (qx qy qz qx^2 qy^2 qz^2 qxqy qyqz qzqx) / radius
   Mat9 moment_inverse = Mat9::Zero();  // [1/kg]
 };
 

@@ -49,8 +49,9 @@ struct CutOptions {
 /// narrower ones.
 Result<CutSurface> cutByPlane(const TriangleMesh& mesh, const Plane& plane, const CutOptions& options = {});
 
-/// The blades' rectangle in the plane: origin + s * x_axis + t * y_axis with 0 <= s <= length, |t| <= width / 2.
-struct Blades {
+/// The rectangle of a pair of scissors' blades, in the plane of the cut: origin + s * x_axis + t * y_axis with 0 <= s
+/// <= length, |t| <= width / 2.
+struct ScissorBlades {
   Vec3 origin = Vec3::Zero();
   Vec3 x_axis = Vec3::UnitX();  // unit
   Vec3 y_axis = Vec3::UnitY();  // unit, normal to x_axis
@@ -61,6 +62,6 @@ struct Blades {
 };
 
 /// True where the rectangle meets the surface or lies inside the solid.
-bool bladesMeet(const TriangleMesh& mesh, const Blades& blades);
+bool bladesMeet(const TriangleMesh& mesh, const ScissorBlades& blades);
 
 }  // namespace meshless

@@ -1,4 +1,4 @@
-// The clusters that a body is matched in, for looking.
+// The clusters that a body is matched in, for display.
 #pragma once
 
 #include <visualization_msgs/MarkerArray.h>

@@ -1,4 +1,4 @@
-// Where bodies press on each other, on obstacles and on the ground, for looking.
+// Where bodies press on each other, on obstacles and on the ground, for display.
 #pragma once
 
 #include <visualization_msgs/MarkerArray.h>

@@ -19,8 +19,8 @@ geometry_msgs::Quaternion toQuaternion(const Quat& q);
 geometry_msgs::Pose toPose(const Pose& pose);
 std_msgs::ColorRGBA toColor(const Color& color);
 /// +x along the blades, +z normal to them.
-Pose poseOf(const Blades& blades);
-Blades bladesAt(const Pose& pose, double length, double width);
+Pose poseOf(const ScissorBlades& blades);
+ScissorBlades bladesAt(const Pose& pose, double length, double width);
 
 std::vector<meshless_surgery::PickState> toPicks(const WorldSnapshot& snapshot);
 /// Needs a snapshot with measures.

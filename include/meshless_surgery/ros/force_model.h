@@ -10,11 +10,12 @@
 
 namespace meshless {
 
-/// Steps come late and seldom; the hand feels its own motion at once. The force is the steps' own in a straight line
+/// Steps come late and seldom; the force follows the hand's own motion at once. It is the steps' own in a straight line
 /// from one to the next, and before it what a spring adds for the way that the hand is ahead of the tool in those
 /// steps. The spring is as stiff as the last steps were along the hand's way (secant), at most as the tool says.
 ///
-/// What is felt ahead is felt less later (time constant of two steps): the sum over a touch stays that of the steps.
+/// What is reported ahead of the steps is taken off later (time constant of two steps): the sum over a touch stays that
+/// of the steps.
 /// Exactly zero a step after a tool that only pushes is free, and five steps after a spring was let go. On a tool that
 /// only pushes the force is changed along itself and keeps its sign: nothing ever pulls.
 class ForceModel {
@@ -50,7 +51,7 @@ class ForceModel {
   double work_ = 0.0, way_squared_ = 0.0;  // of the last steps: -force change times way, and way squared
   bool learned_ = false;
   Vec3 offset_ = Vec3::Zero();  // [m] smoothed, of the hand before the tool
-  Vec3 ahead_ = Vec3::Zero();   // [N s] that was felt beyond the steps' own
+  Vec3 ahead_ = Vec3::Zero();   // [N s] that was reported beyond the steps' own
 };
 
 }  // namespace meshless

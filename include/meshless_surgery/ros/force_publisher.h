@@ -1,4 +1,4 @@
-// ~T/measured_cf at a rate of its own: for hands that feel. Sleeps while nobody listens.
+// ~T/measured_cf at a rate of its own: for haptic devices. Sleeps while nobody listens.
 #pragma once
 
 #include <condition_variable>

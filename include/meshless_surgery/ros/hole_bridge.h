@@ -6,9 +6,9 @@
 
 namespace meshless {
 
-/// Whoever stood still for many ticks has a value from before and one from after, and a hand would feel the difference
-/// in one tick. Across the hole, and as long as that lasted, the value goes over in a straight line from what was said
-/// last; from then on, and without holes, it is exactly what it is. Between two values of one sign it keeps that sign.
+/// Whoever stood still for many ticks has a value from before and one from after, and the force would jump within one
+/// tick. Across the hole, and as long as that lasted, the value goes over in a straight line from what was said last;
+/// from then on, and without holes, it is exactly what it is. Between two values of one sign it keeps that sign.
 template <class Value>
 class HoleBridge {
  public:

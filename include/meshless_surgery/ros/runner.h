@@ -48,7 +48,7 @@ class WorldRunner {
   /// Called on the runner's thread: must only put the events aside. To be set before start.
   void setEventSink(EventSink sink) { event_sink_ = std::move(sink); }
   /// Called on the runner's thread after every step, with what it simulated [s], and with 0 after every job that may
-  /// have changed the world: must be quick. A step fails where it throws. To be set before start.
+  /// have changed the world: must be fast. A step fails where it throws. To be set before start.
   using StepSink = std::function<void(const World&, double)>;
   void setStepSink(StepSink sink) { step_sink_ = std::move(sink); }
   void start();

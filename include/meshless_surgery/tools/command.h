@@ -1,5 +1,5 @@
-// What a user can do, as a closed variant: the same values come from services, topics, rviz and a command log. Poses are
-// in the world frame.
+// What a user can do, as a closed variant: the same values come from services, topics, rviz and a command log. Poses
+// are in the world frame.
 #pragma once
 
 #include <functional>
@@ -41,7 +41,7 @@ struct PushCommand {
   bool streamed = false;         // by a stream, whose silence lifts it
 };
 struct CutCommand {
-  Blades blades;
+  ScissorBlades blades;
   double close_time = 0.0;  // [s] >= 0 of simulated time
   double roughness = 0.0;   // [m] amplitude of the fractal displacement of the cut
   std::vector<std::string> bodies;  // empty: all that the blades meet
@@ -102,7 +102,7 @@ struct CutStarted {
 struct InciseReply {
   std::vector<std::string> cut_bodies;  // opened; one that came apart is retired
   std::vector<std::string> new_bodies;
-  double opened_area = 0.0;             // [m^2] of one lip, over all bodies
+  double opened_area = 0.0;             // [m^2] of one wound face, over all bodies
   CutWork work;                         // over all bodies
   double duration = 0.0;                // [s] wall time
   std::vector<std::string> notes;       // bodies that the blade met and that could not be opened, and why

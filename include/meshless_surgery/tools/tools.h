@@ -35,7 +35,7 @@ struct PushSphere {
 
 struct Scissors {
   bool shown = false;
-  Blades blades;
+  ScissorBlades blades;
   double angle = 0.5;  // [rad] opening
 };
 

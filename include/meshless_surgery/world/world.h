@@ -11,8 +11,8 @@
 
 namespace meshless {
 
-/// kRestShape: contact/contacts.h. kSurface: contact/surface_contacts.h. kAuto: kSurface as soon as a body is elastic, else
-/// kRestShape. kTextbook: the paper's, contact/textbook.h, for comparison.
+/// kRestShape: contact/contacts.h. kSurface: contact/surface_contacts.h. kAuto: kSurface as soon as a body is elastic,
+/// else kRestShape. kTextbook: the paper's, contact/textbook.h, for comparison.
 enum class ContactMethod { kNone, kTextbook, kRestShape, kSurface, kAuto };
 
 struct WorldSettings {
@@ -24,7 +24,7 @@ struct WorldSettings {
   int max_substeps = 64;     // 1..1,000; beyond it elastic bodies are softer than their material, and it is said
   ContactMethod contact = ContactMethod::kAuto;
   int threads = 1;                  // 1..64; results do not depend on it to the bit
-  bool sleep = true;                // what holds still for half a second costs nothing; with kRestShape
+  bool sleep = true;                // what holds still for half a second costs nothing; with kRestShape and kSurface
   double pick_max_distance = 0.05;  // [m]
   double pick_stiffness = 500.0;    // [N/m]
   double pick_radius = 0.0;         // [m] of the grasp along the body; 0: four particle spacings
@@ -86,7 +86,7 @@ struct StepReport {
   std::size_t asleep = 0;  // of them
   std::size_t woken = 0;
   std::size_t substeps = 0;
-  std::size_t gangs = 0;  // groups of islands that took the substeps each by itself; 0: all took each one together
+  std::size_t island_batches = 0;  // that took the substeps each by itself; 0: all bodies took each substep together
   MatchCounters match_counters;
   ContactCounters contact_counters;
   PreserveCounters preserve_counters;
@@ -115,7 +115,7 @@ struct SnapshotWants {
   bool surfaces = false;
   bool particles = false;
   bool measures = false;
-  bool contacts = false;  // of the last step, with ContactMethod::kRestShape; none after a change of bodies
+  bool contacts = false;  // of the last step, with kRestShape and kSurface; none after a change of bodies
 };
 
 /// A point of a body's surface that carries load.
@@ -191,8 +191,8 @@ class World {
   /// Like SpawnCommand, and brought back by reset.
   Result<SpawnReply> addSceneBody(std::shared_ptr<const PreparedBody> body);
 
-  /// Stays for good; with ContactMethod::kRestShape alone something meets it. Refuses an empty or open surface, a
-  /// friction outside of 0..10, and a name in use.
+  /// Stays for good. Bodies meet it with ContactMethod::kRestShape and kSurface (so with kAuto too), and with no other
+  /// method. Refuses an empty or open surface, a friction outside of 0..10, and a name in use.
   Status addObstacle(ObstacleDef obstacle);
 
   /// Bodies in the order in which they came.
@@ -202,13 +202,13 @@ class World {
   Result<BodySnapshot> inspect(const std::string& name, bool rest);
   /// The first surface that the ray from `origin` meets; kMissed where it meets none. Nothing changes.
   Result<ProbeReply> probe(const Vec3& origin, const Vec3& direction);
-  /// What it holds now; looks at bodies, not at their particles.
+  /// What it holds now. Reads bodies, not their particles.
   MemoryUse memory() const;
   /// Events since the last call.
   std::vector<Event> takeEvents();
-  /// Of all that a later step reads of the state: equal for equal histories since the start or a reset, whoever looked
-  /// on and on however many threads: settings, obstacles and models with their surfaces too. Ids go on over resets, and
-  /// undo only looks back: they are left out.
+  /// Of all that a later step reads of the state, settings, obstacles and models with their surfaces too. It is equal
+  /// for equal histories since the start or a reset, whatever was read meanwhile and however many threads there are.
+  /// Ids are left out, because they go on over resets, and so is what only undo reads.
   std::uint64_t stateHash() const;
 
   /// The whole state as it is now, at the cost of a copy of what changes (world/saved_world.h).
@@ -226,7 +226,7 @@ class World {
   void recordHash() const;
 
   // tracked tools
-  void setScissors(const Blades& blades, double angle);  // shown from now on
+  void setScissors(const ScissorBlades& blades, double angle);  // shown from now on
   void hideScissors();
   /// The pick that a stream moves: the newest one that is not locked; 0 if none.
   PickId pickInHand() const;

@@ -1,4 +1,4 @@
-// Which points of a party are near the surface of another, or of the ground.
+// Which points of a collider are near the surface of another, or of the ground.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -12,19 +12,19 @@ namespace {
 constexpr double kDeviation = 0.1;   // of the rest bounds' diagonal: how far a surface may be from its maps, at most
 constexpr double kNeighbour = 3.0;   // times what a vertex is off by its own map: by the one beside it
 constexpr double kSameMap = 2.0;     // likewise, between two vertices
-constexpr double kLoose = 0.02;      // of the size: a surface that is farther from its maps is looked at itself
+constexpr double kLoose = 0.02;      // of the size: where a surface is farther from its maps, queries start at vertices
 constexpr double kLooseEdges = 0.5;  // of its mean edge: likewise
-constexpr std::size_t kFewVertices = 100;  // of a surface: there are few places to ask about, and they are soon known
+constexpr std::size_t kFewVertices = 100;  // of a surface: there are few places to query, and they are soon known
 constexpr double kCovering = 0.578;     // of the longest edge: a point of a triangle is as near to one of its corners
 constexpr double kSlopeError = 0.5;     // of a map, at most
-constexpr double kMovedInRest = 0.005;  // of the size: a lookup is repeated where the deviation moved it farther
-constexpr std::size_t kLookAnew = 8;    // frames after which a point is looked up though it seems to be where it was
+constexpr double kMovedInRest = 0.005;  // of the size: a query is repeated where the deviation moved it farther
+constexpr std::size_t kQueryAnew = 8;   // frames after which a point is queried though it seems to be where it was
 constexpr Index kMostTriangles = 4;     // that a point has slid across since the frame before
 constexpr double kWellWithin = 0.02;    // barycentric
 constexpr double kOnSurface = 0.05;     // of a triangle's extent
 constexpr double kFarBeside = 4.0;      // likewise
 constexpr double kNearby = 0.1;         // of the thickness
-constexpr int kMostLookups = 8;
+constexpr int kMostQueries = 8;
 constexpr double kSamePlace = 1e-6;  // of the size
 constexpr double kFlattest = 1e-3;   // det of a slope: below, the cluster's affine map tells directions
 constexpr double kSlack = 0.1;       // of the thickness: how much farther a better face may be
@@ -34,18 +34,18 @@ constexpr double kSlack = 0.1;       // of the thickness: how much farther a bet
 namespace {
 
 // How far a surface is from where its maps have it, within a region.
-void look(const ContactParty& party, const MapFinder& finder, const ContactMap* maps, const Box& region,
-          SurfaceNow& surface) {
+void measureDeviation(const ShapeCollider& collider, const MapFinder& finder, const ContactMap* maps, const Box& region,
+                      SurfaceNow& surface) {
   surface.finder.clear();
   surface.vertices.clear();
   bool bent = false;
-  const ContactShape& shape = *party.shape;
+  const ContactShape& shape = *collider.shape;
   const double most = kDeviation * shape.bounds().diagonal();
   const Box near = grown(region, most);
   double farthest = 0.0;
   for (const ContactSample& s : shape.samples()) {
     if (s.share > 0.0) continue;
-    const Vec3& now = vertexAt(party, s.vertices[0]);
+    const Vec3& now = vertexAt(collider, s.vertices[0]);
     if (!near.contains(now)) continue;
     const ContactMap& map = maps[finder.nearest(now)];
     const Vec3& at_rest = shape.surface().vertices[s.vertices[0]];
@@ -54,12 +54,12 @@ void look(const ContactParty& party, const MapFinder& finder, const ContactMap* 
     farthest = std::max(farthest, (now - fitted).squaredNorm());
     bent = bent || map.quadratic;
   }
-  surface.deviation = std::min(most, (party.map_count > 1 ? kNeighbour : kSameMap) * std::sqrt(farthest));
+  surface.deviation = std::min(most, (collider.map_count > 1 ? kNeighbour : kSameMap) * std::sqrt(farthest));
   surface.loose = !bent && shape.surface().vertices.size() > kFewVertices &&
                   surface.deviation > std::max(kLoose * shape.size(), kLooseEdges * shape.meanEdge());
   if (!surface.loose) return;
   for (Index v = 0; v < shape.surface().vertices.size(); ++v) {
-    const Vec3& now = vertexAt(party, v);
+    const Vec3& now = vertexAt(collider, v);
     if (!near.contains(now)) continue;
     surface.finder.add(now);
     surface.vertices.push_back(v);
@@ -70,7 +70,7 @@ void look(const ContactParty& party, const MapFinder& finder, const ContactMap* 
   double longest = 0.0;
   for (const Triangle& t : shape.surface().triangles)
     for (int k = 0; k < 3; ++k)
-      longest = std::max(longest, (vertexAt(party, t[k]) - vertexAt(party, t[(k + 1) % 3])).squaredNorm());
+      longest = std::max(longest, (vertexAt(collider, t[k]) - vertexAt(collider, t[(k + 1) % 3])).squaredNorm());
   surface.gap = kCovering * std::sqrt(longest);
 }
 
@@ -81,12 +81,12 @@ namespace {
 // A point that is well within a triangle, seen from above it, and near: which no search has to confirm. With
 // `beyond` it may be over an edge as well across which the surface goes on as it is, or nearly so and the point lies on
 // it, and up to a ridge from above; where it has gone across such an edge, that is the triangle behind it.
-bool isOver(const ContactParty& party, Index triangle, const Vec3& p, bool flipped, Index* beyond,
+bool isOver(const ShapeCollider& collider, Index triangle, const Vec3& p, bool flipped, Index* beyond,
             ContactShape::Nearest& found) {
-  const ContactShape& shape = *party.shape;
+  const ContactShape& shape = *collider.shape;
   const Triangle& corners = shape.surface().triangles[triangle];
-  const Vec3 q0 = vertexAt(party, corners[0]);
-  const Vec3 e1 = vertexAt(party, corners[1]) - q0, e2 = vertexAt(party, corners[2]) - q0, d = p - q0;
+  const Vec3 q0 = vertexAt(collider, corners[0]);
+  const Vec3 e1 = vertexAt(collider, corners[1]) - q0, e2 = vertexAt(collider, corners[2]) - q0, d = p - q0;
   const Vec3 area = e1.cross(e2);
   const double squared = area.squaredNorm();
   const double v = d.cross(e2).dot(area) / squared, w = e1.cross(d).dot(area) / squared;
@@ -116,11 +116,11 @@ bool isOver(const ContactParty& party, Index triangle, const Vec3& p, bool flipp
 }
 
 // Where a point is at rest by the triangle that is nearest to it: beside or above it as it is now.
-Vec3 seenFrom(const ContactParty& party, const ContactShape::Nearest& nearest, const Vec3& p, const Mat3& to_rest) {
-  const TriangleMesh& surface = party.shape->surface();
+Vec3 seenFrom(const ShapeCollider& collider, const ContactShape::Nearest& nearest, const Vec3& p, const Mat3& to_rest) {
+  const TriangleMesh& surface = collider.shape->surface();
   const Triangle& corners = surface.triangles[nearest.triangle];
-  const Vec3 q0 = vertexAt(party, corners[0]);
-  const Vec3 e1 = vertexAt(party, corners[1]) - q0, e2 = vertexAt(party, corners[2]) - q0, d = p - q0;
+  const Vec3 q0 = vertexAt(collider, corners[0]);
+  const Vec3 e1 = vertexAt(collider, corners[1]) - q0, e2 = vertexAt(collider, corners[2]) - q0, d = p - q0;
   const Vec3 area = e1.cross(e2);
   const double squared = area.squaredNorm();
   double v = d.cross(e2).dot(area) / squared, w = e1.cross(d).dot(area) / squared;
@@ -135,7 +135,7 @@ Vec3 seenFrom(const ContactParty& party, const ContactShape::Nearest& nearest, c
 
 }  // namespace
 
-bool Contacts::Impl::locate(const ContactParty& b, const SurfaceNow& surface, const MapFinder& finder,
+bool Contacts::Impl::locate(const ShapeCollider& b, const SurfaceNow& surface, const MapFinder& finder,
                             const ContactMap* maps, const Vec3& p, const std::function<Vec3()>& inwardAt, double reach,
                             Index& hint, ContactShape::Nearest& found, bool& flipped, ContactCounters& counters) const {
   const ContactMap& map = maps[finder.nearest(p)];
@@ -153,23 +153,23 @@ bool Contacts::Impl::locate(const ContactParty& b, const SurfaceNow& surface, co
     // From the nearest vertex, whose place at rest is known.
     Index v = kNoIndex;
     Vec3 from, from_vertex;
-    const auto look = [&](double limit) {
+    const auto startAtVertex = [&](double limit) {
       v = surface.vertices[surface.finder.nearest(p, limit)];
       from = p - vertexAt(b, v);
       from_vertex = map.to_rest * from + shape.surface().vertices[v];
     };
     const double touching = reach + surface.gap;
-    look(touching);
+    startAtVertex(touching);
     if (from.norm() > touching && surface.around > touching) {
       if (shape.isOutside(from_vertex)) return false;
-      look(std::numeric_limits<double>::infinity());
+      startAtVertex(std::numeric_limits<double>::infinity());
     }
     if (kSlopeError * from.norm() < deviation) {
       rest = from_vertex;
       deviation = kSlopeError * from.norm();
     }
   }
-  // So far outside of the rest bounds that no deviation brings it back: nothing to look up.
+  // So far outside of the rest bounds that no deviation brings it back: no query is needed.
   const Box& bounds = shape.bounds();
   const Vec3 beyond = (bounds.min - rest).cwiseMax(rest - bounds.max).cwiseMax(0.0);
   const double far = deviation + reach;
@@ -178,26 +178,26 @@ bool Contacts::Impl::locate(const ContactParty& b, const SurfaceNow& surface, co
   if (!near && shape.isClear(rest, far)) return false;
   const Vec3 inward_rest = (*to_rest * inwardAt()).normalized();
   const double enough = kMovedInRest * shape.size();
-  // Torn bodies often send a point round the same few places: what the last lookup would find is known then.
-  std::array<Vec3, kMostLookups> places;
-  std::array<ContactShape::Nearest, kMostLookups> founds;
+  // In torn bodies a point often goes round the same few places: then what the last query would find is known.
+  std::array<Vec3, kMostQueries> places;
+  std::array<ContactShape::Nearest, kMostQueries> founds;
   const double same = kSamePlace * shape.size();
-  for (int n = 0; n < kMostLookups; ++n) {
+  for (int n = 0; n < kMostQueries; ++n) {
     for (int q = n - 2; q >= 0; --q)
       if ((rest - places[q]).squaredNorm() < same * same) {
-        found = founds[q + (kMostLookups - 1 - q) % (n - q)];
+        found = founds[q + (kMostQueries - 1 - q) % (n - q)];
         hint = found.triangle;
         return std::isfinite(found.distance);
       }
     places[n] = rest;
-    ++counters.lookups;
+    ++counters.queries;
     if (!shape.nearest(rest, inward_rest, kSlack * shape.thickness(), far, found, hint)) return false;
     founds[n] = found;
     hint = found.triangle;
-    if (n + 1 == kMostLookups) break;
+    if (n + 1 == kMostQueries) break;
     if (found.distance > far) return false;
     if (isOver(b, found.triangle, p, flipped, nullptr, found)) break;
-    // The surface does not lie where the affine map has it: by so much the point is looked up elsewhere.
+    // The surface does not lie where the affine map has it: the next query is that much elsewhere.
     const Vec3 there = seenFrom(b, found, p, *to_rest);
     if ((there - rest).squaredNorm() < enough * enough) break;
     rest = there;
@@ -205,10 +205,10 @@ bool Contacts::Impl::locate(const ContactParty& b, const SurfaceNow& surface, co
   return std::isfinite(found.distance);
 }
 
-void Contacts::Impl::addContact(Findings& to, const std::vector<ContactParty>& parties, Index a, Index number,
+void Contacts::Impl::addContact(Findings& to, const std::vector<ShapeCollider>& colliders, Index a, Index number,
                                 const ContactSample& s, Index b, Index triangle, const std::array<double, 3>& weights,
                                 bool was_caught, bool flipped) {
-  const ContactParty& of = parties[a];
+  const ShapeCollider& of = colliders[a];
   Contact c;
   c.a = a;
   c.b = b;
@@ -222,7 +222,7 @@ void Contacts::Impl::addContact(Findings& to, const std::vector<ContactParty>& p
   c.share = s.share;
   c.direct = c.point[0] != kNoIndex && c.point[1] != kNoIndex;
   if (b != kNoIndex) {
-    const ContactShape& shape = *parties[b].shape;
+    const ContactShape& shape = *colliders[b].shape;
     for (int k = 0; k < 3; ++k) {
       c.corners[k] = (*shape.rows().particle)[shape.surface().triangles[triangle][k]];
       c.direct = c.direct && c.corners[k] != kNoIndex;
@@ -237,7 +237,7 @@ void Contacts::Impl::addContact(Findings& to, const std::vector<ContactParty>& p
     }
     c.split = static_cast<Index>(to.entries.size());
     if (b != kNoIndex) {
-      const ContactParty& with = parties[b];
+      const ShapeCollider& with = colliders[b];
       const Triangle& corners = with.shape->surface().triangles[triangle];
       Vec3 x[3];
       for (int k = 0; k < 3; ++k) {
@@ -274,9 +274,9 @@ void Contacts::Impl::startAt(Findings& to, const std::vector<Contact>& known, st
   to.cursor = firstKnown(known, end, pair, second);
 }
 
-// A point that was over a triangle and still is, or over one beside it, and near, need not be looked up; now and then
-// it is. `hint` is the triangle in any case.
-bool Contacts::Impl::stillOver(Findings& to, const ContactParty& with, Index a, Index b, Index sample, const Vec3& p,
+// A point that was over a triangle, and still is over it or over one beside it, and near, need not be queried. Now and
+// then it is. `hint` is the triangle in any case.
+bool Contacts::Impl::stillOver(Findings& to, const ShapeCollider& with, Index a, Index b, Index sample, const Vec3& p,
                                Index& hint, ContactShape::Nearest& found, bool& flipped) const {
   const auto mine = std::make_tuple(true, std::min(a, b), std::max(a, b), a > b, sample);
   if (!to.known) return false;
@@ -286,7 +286,7 @@ bool Contacts::Impl::stillOver(Findings& to, const ContactParty& with, Index a, 
   const Contact& before = known[to.cursor];
   if (keyOf(before) != mine || before.caught) return false;
   hint = before.triangle;
-  if ((frames + sample) % kLookAnew == 0) return false;
+  if ((frames + sample) % kQueryAnew == 0) return false;
   flipped = before.flipped;
   for (Index triangle = before.triangle, n = 0; triangle != kNoIndex && n < kMostTriangles; ++n) {
     hint = triangle;
@@ -296,11 +296,11 @@ bool Contacts::Impl::stillOver(Findings& to, const ContactParty& with, Index a, 
   return false;
 }
 
-// The points of one party of a pair in the shape of the other, whose maps these are.
-void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& parties, const Pair& pair,
-                              const ContactMap* maps, bool every_point, LookupPart& part) {
+// The points of one collider of a pair in the shape of the other, whose maps these are.
+void Contacts::Impl::queryPart(Findings& to, const std::vector<ShapeCollider>& colliders, const Pair& pair,
+                               const ContactMap* maps, bool every_point, QueryPart& part) {
   const Index a = part.second ? pair.b : pair.a, b = part.second ? pair.a : pair.b;
-  const ContactParty &of = parties[a], &with = parties[b];
+  const ShapeCollider &of = colliders[a], &with = colliders[b];
   Inside& inside = part.inside;
   const ContactShape& shape = *with.shape;
   if (shape.surface().triangles.empty() || with.map_count == 0) return;
@@ -333,7 +333,7 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
     ContactShape::Nearest found;
     bool flipped = false;
     if (!stillOver(to, with, a, b, s, p, hint, found, flipped)) {
-      if (to.surface.deviation < 0.0) look(with, finders[b], maps, region, to.surface);
+      if (to.surface.deviation < 0.0) measureDeviation(with, finders[b], maps, region, to.surface);
       const auto inward = [&] { return inwardAt(p, samples[s]); };
       if (!locate(with, to.surface, finders[b], maps, p, std::cref(inward), pair.reach, hint, found, flipped,
                   to.counters))
@@ -346,23 +346,23 @@ void Contacts::Impl::lookInto(Findings& to, const std::vector<ContactParty>& par
     if (found.distance < near) ++inside.near;
     if (found.distance > pair.reach || (found.distance > near && !found.above && !every_point)) continue;
     const std::size_t before = to.contacts.size();
-    addContact(to, parties, a, s, samples[s], b, found.triangle, found.weights, false, flipped);
+    addContact(to, colliders, a, s, samples[s], b, found.triangle, found.weights, false, flipped);
     if (to.contacts.size() > before) to.contacts.back().below = found.distance < 0.0;
     if (found.distance < 0.0) to.depths.push_back(-found.distance / std::min(size, of.shape->size()));
   }
 }
 
-void Contacts::Impl::addGround(Findings& to, const std::vector<ContactParty>& parties, Index a, double reach) {
-  const ContactParty& party = parties[a];
-  const std::vector<ContactSample>& samples = party.shape->samples();
+void Contacts::Impl::addGround(Findings& to, const std::vector<ShapeCollider>& colliders, Index a, double reach) {
+  const ShapeCollider& collider = colliders[a];
+  const std::vector<ContactSample>& samples = collider.shape->samples();
   const double below = *scene.ground + reach;
   for (Index s = 0; s < samples.size(); ++s) {
     if (samples[s].share > 0.0) continue;  // between two vertices above a plane nothing is below it
-    const double z = vertexAt(party, samples[s].vertices[0]).z();
+    const double z = vertexAt(collider, samples[s].vertices[0]).z();
     if (!(z < below)) continue;
-    addContact(to, parties, a, s, samples[s], kNoIndex, kNoIndex, {}, false, false);
+    addContact(to, colliders, a, s, samples[s], kNoIndex, kNoIndex, {}, false, false);
     to.contacts.back().below = z < *scene.ground;
-    if (z < *scene.ground) to.depths.push_back((*scene.ground - z) / party.shape->size());
+    if (z < *scene.ground) to.depths.push_back((*scene.ground - z) / collider.shape->size());
   }
 }
 

@@ -1,4 +1,5 @@
-// Islands that take the substeps of a frame by themselves do to the bit what they do when all take each one together.
+// Island batches, which take all substeps of a frame by themselves, do to the bit what they do when all bodies take
+// each substep together.
 #include "support/bodies.h"
 
 namespace meshless {
@@ -56,7 +57,7 @@ Seen look(World& world) {
   return seen;
 }
 
-TEST(Gangs, DoWhatAllDoTogether) {
+TEST(IslandBatches, DoWhatAllDoTogether) {
   WorldSettings settings;
   settings.substeps = 4;
   settings.contact = ContactMethod::kRestShape;
@@ -72,12 +73,12 @@ TEST(Gangs, DoWhatAllDoTogether) {
   pick.max_distance = 0.1;
   ASSERT_TRUE(together.apply(pick).ok());
 
-  std::size_t in_gangs = 0;
+  std::size_t in_island_batches = 0;
   for (int step = 0; step < 240; ++step) {
     for (World* world : {&by_themselves, &together, &on_threads}) world->step();
     const Seen one = look(by_themselves), all = look(together), two = look(on_threads);
-    in_gangs += one.report.gangs > 1 && two.report.gangs > 1;
-    ASSERT_EQ(all.report.gangs, 0u);
+    in_island_batches += one.report.island_batches > 1 && two.report.island_batches > 1;
+    ASSERT_EQ(all.report.island_batches, 0u);
     ASSERT_EQ(one.particles.size(), 64u);
     ASSERT_EQ(one.particles, all.particles) << "step " << step;
     ASSERT_EQ(by_themselves.stateHash(), on_threads.stateHash()) << "step " << step;
@@ -86,7 +87,7 @@ TEST(Gangs, DoWhatAllDoTogether) {
     ASSERT_EQ(one.report.preserve_counters.gradients, all.report.preserve_counters.gradients);
     ASSERT_EQ(one.report.asleep, all.report.asleep);
   }
-  EXPECT_GT(in_gangs, 60u);
+  EXPECT_GT(in_island_batches, 60u);
 }
 
 }  // namespace

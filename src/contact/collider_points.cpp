@@ -1,39 +1,39 @@
-#include "party_points.h"
+#include "collider_points.h"
 
 #include <algorithm>
 
 namespace meshless {
 
-Vec3 sampleAt(const ContactParty& party, const ContactSample& sample) {
-  const Vec3 p = vertexAt(party, sample.vertices[0]);
-  return sample.share > 0.0 ? Vec3(p + sample.share * (vertexAt(party, sample.vertices[1]) - p)) : p;
+Vec3 sampleAt(const ShapeCollider& collider, const ContactSample& sample) {
+  const Vec3 p = vertexAt(collider, sample.vertices[0]);
+  return sample.share > 0.0 ? Vec3(p + sample.share * (vertexAt(collider, sample.vertices[1]) - p)) : p;
 }
 
-Vec3 vertexMotion(const ContactParty& party, Index vertex) {
-  const SurfaceRows& rows = party.shape->rows();
+Vec3 vertexMotion(const ShapeCollider& collider, Index vertex) {
+  const SurfaceRows& rows = collider.shape->rows();
   const Index particle = (*rows.particle)[vertex];
-  if (particle != kNoIndex) return party.positions[particle] - party.previous[particle];
-  const Index r = party.shape->riderOf(vertex);
+  if (particle != kNoIndex) return collider.positions[particle] - collider.previous[particle];
+  const Index r = collider.shape->embeddedOf(vertex);
   Vec3 sum = Vec3::Zero();
   for (Index k = (*rows.offsets)[r]; k < (*rows.offsets)[r + 1]; ++k) {
     const Index i = (*rows.carriers)[k];
-    sum += (*rows.weights)[k] * (party.positions[i] - party.previous[i]);
+    sum += (*rows.weights)[k] * (collider.positions[i] - collider.previous[i]);
   }
   return sum;
 }
 
-Vec3 addRow(const ContactParty& party, Index vertex, double weight, std::vector<ContactEntry>& entries) {
-  const SurfaceRows& rows = party.shape->rows();
+Vec3 addRow(const ShapeCollider& collider, Index vertex, double weight, std::vector<ContactEntry>& entries) {
+  const SurfaceRows& rows = collider.shape->rows();
   const Index particle = (*rows.particle)[vertex];
   if (particle != kNoIndex) {
     entries.push_back({particle, weight});
     return Vec3::Zero();
   }
-  const Index r = party.shape->riderOf(vertex);
-  Vec3 rest = party.surface[vertex];
+  const Index r = collider.shape->embeddedOf(vertex);
+  Vec3 rest = collider.surface[vertex];
   for (Index k = (*rows.offsets)[r]; k < (*rows.offsets)[r + 1]; ++k) {
     const Index i = (*rows.carriers)[k];
-    rest -= (*rows.weights)[k] * party.positions[i];
+    rest -= (*rows.weights)[k] * collider.positions[i];
     entries.push_back({i, weight * (*rows.weights)[k]});
   }
   return weight * rest;

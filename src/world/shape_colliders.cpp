@@ -1,4 +1,4 @@
-#include "contact_parties.h"
+#include "shape_colliders.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 namespace meshless {
 namespace {
 
-constexpr double kLeastRigid = 0.5;  // share of a contact's impulse that moves a body for looks as a whole
+constexpr double kLeastRigid = 0.5;  // of an impulse on an appearance material: share that moves the body as a whole
 constexpr double kFlattest = 1e-6;   // det of a map: below, the rotation stands in
 
 // The affine fit of one cluster at given positions; the rotation that it has where the fit has no rank.
@@ -54,59 +54,59 @@ void fitMaps(const BodyModel& model, const Material& material, const BodyState& 
     fitQuadraticMaps(in, positions, maps, quadratic);
 }
 
-// Two spacings, but of crumbs, whose surface is all nearer to their few particles, no more than what they have: where
-// many of them lie together each would be next to all.
-double riderReachOf(const BodyModel& model) {
+// Two spacings, or less for crumbs, whose whole surface is nearer to their few particles. Otherwise, where many crumbs
+// lie together, each would be next to all.
+double embeddedReachOf(const BodyModel& model) {
   const SurfaceBinding& binding = model.binding;
-  double farthest = 0.0;  // squared, of a rider from its nearest carrier
-  for (Index r = 0; r < binding.riders.size(); ++r) {
+  double farthest = 0.0;  // squared, of an embedded vertex from its nearest carrier
+  for (Index r = 0; r < binding.embedded.size(); ++r) {
     double nearest = std::numeric_limits<double>::infinity();
     for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k)
       nearest = std::min(nearest,
-                         (model.surface.vertices[binding.riders[r]] - model.rest[binding.carriers[k]]).squaredNorm());
+                         (model.surface.vertices[binding.embedded[r]] - model.rest[binding.carriers[k]]).squaredNorm());
     farthest = std::max(farthest, nearest);
   }
   return 2.0 * std::min(std::sqrt(farthest), model.spacing);
 }
 
-ContactParty partyOf(const BodyModel& model, const Material& material, BodyState& state, std::uint64_t key) {
-  ContactParty party;
-  party.key = key;
-  party.mass = model.mass;
-  party.friction = material.friction;
-  party.restitution = material.restitution;
-  party.positions = state.positions.data();
-  party.particles = static_cast<Index>(state.positions.size());
-  party.masses = model.masses.data();
-  return party;
+ShapeCollider shapeColliderOf(const BodyModel& model, const Material& material, BodyState& state, std::uint64_t key) {
+  ShapeCollider collider;
+  collider.key = key;
+  collider.mass = model.mass;
+  collider.friction = material.friction;
+  collider.restitution = material.restitution;
+  collider.positions = state.positions.data();
+  collider.particles = static_cast<Index>(state.positions.size());
+  collider.masses = model.masses.data();
+  return collider;
 }
 
-ContactParty partyOf(WorldObstacle& obstacle, std::uint64_t key) {
-  ContactParty party;
-  party.key = key;
-  party.shape = &obstacle.shape;
-  party.positions = obstacle.def->mesh.vertices.data();
-  party.previous = party.positions;
-  party.masses = obstacle.masses.data();
-  party.inverse_masses = obstacle.inverse_masses.data();
-  party.particles = static_cast<Index>(obstacle.def->mesh.vertices.size());
-  party.maps = obstacle.maps.data();
-  party.map_count = 1;
-  party.friction = obstacle.def->friction;
-  party.bounds = obstacle.bounds;
-  party.moves = false;
-  return party;
+ShapeCollider shapeColliderOf(WorldObstacle& obstacle, std::uint64_t key) {
+  ShapeCollider collider;
+  collider.key = key;
+  collider.shape = &obstacle.shape;
+  collider.positions = obstacle.def->mesh.vertices.data();
+  collider.previous = collider.positions;
+  collider.masses = obstacle.masses.data();
+  collider.inverse_masses = obstacle.inverse_masses.data();
+  collider.particles = static_cast<Index>(obstacle.def->mesh.vertices.size());
+  collider.maps = obstacle.maps.data();
+  collider.map_count = 1;
+  collider.friction = obstacle.def->friction;
+  collider.bounds = obstacle.bounds;
+  collider.moves = false;
+  return collider;
 }
 
-void readMotion(const BodyModel& model, const Material& material, const BodyState& state, double rider_reach,
-                ContactParty& party) {
-  party.rigid_share = model.any_fixed || material.elastic() ? 0.0 : std::max(kLeastRigid, material.alpha);
-  party.bounds = extentOf(state.positions);
+void readMotion(const BodyModel& model, const Material& material, const BodyState& state, double embedded_reach,
+                ShapeCollider& collider) {
+  collider.rigid_share = model.any_fixed || material.elastic() ? 0.0 : std::max(kLeastRigid, material.alpha);
+  collider.bounds = extentOf(state.positions);
   const Box velocities = extentOf(state.velocities);
-  party.velocity = 0.5 * (velocities.min + velocities.max);
-  party.spread = 0.5 * velocities.diagonal();
-  party.bounds.min.array() -= rider_reach;
-  party.bounds.max.array() += rider_reach;
+  collider.velocity = 0.5 * (velocities.min + velocities.max);
+  collider.spread = 0.5 * velocities.diagonal();
+  collider.bounds.min.array() -= embedded_reach;
+  collider.bounds.max.array() += embedded_reach;
 }
 
 }  // namespace meshless

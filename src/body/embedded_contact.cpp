@@ -1,4 +1,4 @@
-#include "meshless_surgery/body/rider_contact.h"
+#include "meshless_surgery/body/embedded_contact.h"
 
 #include "meshless_surgery/body/binding.h"
 
@@ -9,24 +9,24 @@ constexpr int kSweeps = 4;
 
 }  // namespace
 
-std::size_t pushRiders(const BodyModel& model, const Obstacle& obstacle, BodyState& state,
-                       const std::function<void(Index particle, const Vec3& shift)>& moved,
-                       const std::vector<Index>* among) {
+std::size_t pushEmbedded(const BodyModel& model, const Obstacle& obstacle, BodyState& state,
+                         const std::function<void(Index particle, const Vec3& shift)>& moved,
+                         const std::vector<Index>* among) {
   const SurfaceBinding& binding = model.binding;
   Points& x = state.positions;
-  if (among ? among->empty() : binding.riders.empty()) return 0;
+  if (among ? among->empty() : binding.embedded.empty()) return 0;
   fitClusters(matchInput(model, state), x, binding.lever_clusters, state.poses);
   const auto place = [&](Index r) -> Vec3 {
-    return riderPosition(binding, x, state.poses, r) + state.rider_offsets[r];
+    return embeddedPosition(binding, x, state.poses, r) + state.embedded_offsets[r];
   };
   std::vector<Index> hit;
-  const auto look = [&](Index r) {
+  const auto check = [&](Index r) {
     if (!obstacle(place(r)).isZero(0.0)) hit.push_back(r);
   };
   if (among)
-    for (Index r : *among) look(r);
+    for (Index r : *among) check(r);
   else
-    for (Index r = 0; r < binding.riders.size(); ++r) look(r);
+    for (Index r = 0; r < binding.embedded.size(); ++r) check(r);
   if (hit.empty()) return 0;
 
   for (int sweep = 0; sweep < kSweeps; ++sweep)
@@ -48,7 +48,7 @@ std::size_t pushRiders(const BodyModel& model, const Obstacle& obstacle, BodySta
       }
     }
   fitClusters(matchInput(model, state), x, binding.lever_clusters, state.poses);
-  for (Index r : hit) state.rider_offsets[r] += obstacle(place(r));
+  for (Index r : hit) state.embedded_offsets[r] += obstacle(place(r));
   return hit.size();
 }
 

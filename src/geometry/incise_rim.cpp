@@ -43,25 +43,25 @@ class Opener {
  public:
   explicit Opener(const TriangleMesh& mesh) : mesh_(mesh) {}
 
-  Result<Mouth> run(const Blade& blade, double band) {
+  Result<SplitSurface> run(const Blade& blade, double band) {
     placeFrame(blade, band);
     const Status crossed = findCrossings();
     if (!crossed) return crossed.error();
     limitRectangle(blade);
-    if (!(mouth_.frame.low.array() < mouth_.frame.high.array()).all())
+    if (!(surface_.frame.low.array() < surface_.frame.high.array()).all())
       return Error{ErrorCode::kMissed, "the blade meets no tissue: it is beside the surface"};
-    for (const Index v : in_plane_) snap(mouth_.places[v]);
+    for (const Index v : in_plane_) snap(surface_.places[v]);
     for (Crossed& c : crossed_) section(c.down, c.up);
     for (const FlatRim& e : flat_rim_)
       if (e.kind == RimEdge::kCrossed) section(e.from, e.to);
     markWithin();
     splitTriangles();
-    return std::move(mouth_);
+    return std::move(surface_);
   }
 
  private:
   void placeFrame(const Blade& blade, double band) {
-    Frame& f = mouth_.frame;
+    Frame& f = surface_.frame;
     f.origin = blade.origin;
     f.x_axis = blade.x_axis.normalized();
     f.y_axis = (blade.y_axis - f.x_axis.dot(blade.y_axis) * f.x_axis).normalized();
@@ -70,32 +70,32 @@ class Opener {
     const double farthest =
         std::max({box.min.cwiseAbs().maxCoeff(), box.max.cwiseAbs().maxCoeff(), f.origin.cwiseAbs().maxCoeff()});
     f.band = std::max(band * box.diagonal(), 1e-14 * farthest);
-    mouth_.positions = mesh_.vertices;
-    mouth_.mesh_vertices = static_cast<Index>(mesh_.vertices.size());
-    mouth_.places.assign(mesh_.vertices.size(), Vec2::Zero());
+    surface_.positions = mesh_.vertices;
+    surface_.mesh_vertices = static_cast<Index>(mesh_.vertices.size());
+    surface_.places.assign(mesh_.vertices.size(), Vec2::Zero());
   }
 
-  /// The crossing of an edge, from the upper end to the lower whoever asks: lips that lie on each other are crossed at
-  /// the same bits.
+  /// The crossing of an edge, always computed from its upper end to its lower one: wound faces that lie on each other
+  /// are crossed at the same bits.
   Index crossing(Index upper, Index lower) {
     const auto [entry, fresh] = crossing_of_edge_.try_emplace(edgeKey(upper, lower), kNoIndex);
     if (fresh) {
-      entry->second = mouth_.addBetween(upper, lower, heights_[upper] / (heights_[upper] - heights_[lower]));
-      mouth_.places[entry->second] = mouth_.frame.flat(mouth_.positions[entry->second]);
+      entry->second = surface_.addBetween(upper, lower, heights_[upper] / (heights_[upper] - heights_[lower]));
+      surface_.places[entry->second] = surface_.frame.flat(surface_.positions[entry->second]);
       in_plane_.push_back(entry->second);
     }
     return entry->second;
   }
 
   Status findCrossings() {
-    const Frame& f = mouth_.frame;
+    const Frame& f = surface_.frame;
     heights_.resize(mesh_.vertices.size());
     states_.resize(mesh_.vertices.size());
     for (Index v = 0; v < heights_.size(); ++v) {
       heights_[v] = f.normal.dot(mesh_.vertices[v] - f.origin);
       states_[v] = static_cast<signed char>((heights_[v] > f.band) - (heights_[v] < -f.band));
       if (states_[v] != 0) continue;
-      mouth_.places[v] = f.flat(mesh_.vertices[v]);
+      surface_.places[v] = f.flat(mesh_.vertices[v]);
       in_plane_.push_back(v);
     }
     std::vector<FlatEdge> flat_edges;
@@ -119,10 +119,10 @@ class Opener {
     return findFlatRim(std::move(flat_edges));
   }
 
-  /// A triangle that lies in the plane bounds the solid below it where it faces up. Exact on its places, as the lips'
-  /// triangulation is.
+  /// A triangle that lies in the plane bounds the solid below it where it faces up. Exact on its places, as the wound
+  /// faces' triangulation is.
   bool facesUp(const Triangle& v) const {
-    return exact::turn(mouth_.places[v[0]], mouth_.places[v[1]], mouth_.places[v[2]]) > 0;
+    return exact::turn(surface_.places[v[0]], surface_.places[v[1]], surface_.places[v[2]]) > 0;
   }
 
   void addCrossed(Index t, const std::array<int, 3>& s) {
@@ -173,11 +173,11 @@ class Opener {
 
   /// A blade may be much larger than the body. What is cut off lies in the air.
   void limitRectangle(const Blade& blade) {
-    Frame& f = mouth_.frame;
+    Frame& f = surface_.frame;
     Vec2 low = Vec2::Constant(1e300), high = Vec2::Constant(-1e300);
     for (const Index v : in_plane_) {
-      low = low.cwiseMin(mouth_.places[v]);
-      high = high.cwiseMax(mouth_.places[v]);
+      low = low.cwiseMin(surface_.places[v]);
+      high = high.cwiseMax(surface_.places[v]);
     }
     const Vec2 margin = Vec2::Constant(0.05 * (high - low).norm() + 10.0 * f.band);
     f.low = Vec2(0.0, -blade.depth).cwiseMax(low - margin);
@@ -185,7 +185,7 @@ class Opener {
   }
 
   Reach snap(Vec2& p) const {
-    const Frame& f = mouth_.frame;
+    const Frame& f = surface_.frame;
     Reach reach = Reach::kInside;
     for (int k = 0; k < 2; ++k) {
       if (p[k] < f.low[k] - f.band || p[k] > f.high[k] + f.band) return Reach::kOutside;
@@ -202,18 +202,18 @@ class Opener {
     return reach;
   }
 
-  void section(Index from, Index to) { mouth_.section.push_back({mouth_.places[from], mouth_.places[to]}); }
+  void section(Index from, Index to) { surface_.section.push_back({surface_.places[from], surface_.places[to]}); }
 
   /// The part of from -> to within the rectangle; end vertices are made where the border crosses it. False: nothing.
   bool within(Index from, Index to, Index& first, Index& last) {
-    Vec2 a = mouth_.places[from], b = mouth_.places[to];
-    const Frame& f = mouth_.frame;
+    Vec2 a = surface_.places[from], b = surface_.places[to];
+    const Frame& f = surface_.frame;
     const bool a_in = snap(a) != Reach::kOutside, b_in = snap(b) != Reach::kOutside;
     first = from;
     last = to;
     if (a_in && b_in) return true;
-    // The same end, to the last bit, for a lip that lies on this one and runs the other way.
-    const bool swapped = comesFirst(mouth_.positions[to], mouth_.positions[from]);
+    // The same end, to the last bit, for a wound face that lies on this one and runs the other way.
+    const bool swapped = comesFirst(surface_.positions[to], surface_.positions[from]);
     if (swapped) std::swap(a, b);
     double enter = 0.0, leave = 1.0;
     int enter_axis = 0, leave_axis = 0;
@@ -240,11 +240,11 @@ class Opener {
     const Index start = swapped ? to : from, end = swapped ? from : to;
     const bool start_in = swapped ? b_in : a_in, end_in = swapped ? a_in : b_in;
     const auto endVertex = [&](double s, int axis, double at) {
-      const Index made = mouth_.addBetween(start, end, s);
+      const Index made = surface_.addBetween(start, end, s);
       Vec2 place = a + s * (b - a);
       place[axis] = at;
       snap(place);
-      mouth_.places[made] = place;
+      surface_.places[made] = place;
       return made;
     };
     const Index near_end = start_in ? start : endVertex(enter, enter_axis, enter_at);
@@ -256,13 +256,13 @@ class Opener {
 
   void markWithin() {
     std::vector<Index> met;  // triangles
-    used_.assign(mouth_.positions.size(), false);
+    used_.assign(surface_.positions.size(), false);
     for (Crossed& c : crossed_) {
       Index first, last;
       if (!within(c.down, c.up, first, last)) continue;
       c.chord_from = first;
       c.chord_to = last;
-      mouth_.rim.push_back({first, last, RimEdge::kCrossed});
+      surface_.rim.push_back({first, last, RimEdge::kCrossed});
       met.push_back(c.triangle);
       for (const Index v : {first, last})
         if (v < used_.size()) used_[v] = true;
@@ -270,8 +270,8 @@ class Opener {
     for (const FlatRim& e : flat_rim_) {
       Index first, last;
       if (!within(e.from, e.to, first, last)) continue;
-      mouth_.rim.push_back({first, last, e.kind});
-      mouth_.along_edges = true;
+      surface_.rim.push_back({first, last, e.kind});
+      surface_.along_edges = true;
       met.insert(met.end(), e.triangles.begin(), e.triangles.end());
       std::vector<Index> inner;
       if (first != e.from) inner.push_back(first);
@@ -285,27 +285,27 @@ class Opener {
       const Triangle& v = mesh_.triangles[t];
       for (int k = 0; k < 3; ++k) sum += (mesh_.vertices[v[(k + 1) % 3]] - mesh_.vertices[v[k]]).norm();
     }
-    if (!met.empty()) mouth_.spacing = sum / (3.0 * static_cast<double>(met.size()));
+    if (!met.empty()) surface_.spacing = sum / (3.0 * static_cast<double>(met.size()));
     for (const Index t : coplanar_) {
       const Triangle& v = mesh_.triangles[t];
-      const Vec2 middle = (mouth_.places[v[0]] + mouth_.places[v[1]] + mouth_.places[v[2]]) / 3.0;
-      if ((middle.array() > mouth_.frame.low.array()).all() && (middle.array() < mouth_.frame.high.array()).all())
-        mouth_.lies_in_surface = true;
+      const Vec2 middle = (surface_.places[v[0]] + surface_.places[v[1]] + surface_.places[v[2]]) / 3.0;
+      if ((middle.array() > surface_.frame.low.array()).all() && (middle.array() < surface_.frame.high.array()).all())
+        surface_.lies_in_surface = true;
     }
   }
 
   bool present(Index v, bool corner) const { return corner || used_[v]; }
 
   void splitTriangles() {
-    mouth_.triangles = mesh_.triangles;
-    mouth_.patches = mesh_.patches;
-    if (mouth_.patches.empty()) mouth_.patches.assign(mesh_.triangles.size(), kOuterPatch);
+    surface_.triangles = mesh_.triangles;
+    surface_.patches = mesh_.patches;
+    if (surface_.patches.empty()) surface_.patches.assign(mesh_.triangles.size(), kOuterPatch);
     std::vector<Triangle> parts;
     const auto replace = [&](Index t) {
-      mouth_.triangles[t] = parts[0];
+      surface_.triangles[t] = parts[0];
       for (std::size_t p = 1; p < parts.size(); ++p) {
-        mouth_.triangles.push_back(parts[p]);
-        mouth_.patches.push_back(mouth_.patches[t]);
+        surface_.triangles.push_back(parts[p]);
+        surface_.patches.push_back(surface_.patches[t]);
       }
     };
     for (const Crossed& c : crossed_) {
@@ -313,16 +313,16 @@ class Opener {
       splitCrossed(c, parts);
       if (!parts.empty()) replace(c.triangle);
     }
-    if (!inside_edge_.empty()) splitAtEdges(mouth_.triangles, mouth_.patches, inside_edge_);
+    if (!inside_edge_.empty()) splitAtEdges(surface_.triangles, surface_.patches, inside_edge_);
   }
 
   /// A convex polygon of three or four corners.
   void addConvex(const std::array<Index, 4>& v, int count, std::vector<Triangle>& parts) const {
     if (count == 3) return parts.push_back({v[0], v[1], v[2]});
-    const Points& p = mouth_.positions;
+    const Points& p = surface_.positions;
     const double diagonal_02 = (p[v[2]] - p[v[0]]).squaredNorm(), diagonal_13 = (p[v[3]] - p[v[1]]).squaredNorm();
     bool first = diagonal_02 < diagonal_13;
-    // Lips that lie on each other must be split alike.
+    // Wound faces that lie on each other must be split alike.
     if (diagonal_02 == diagonal_13) {
       const Vec3& low_02 = comesFirst(p[v[0]], p[v[2]]) ? p[v[0]] : p[v[2]];
       const Vec3& low_13 = comesFirst(p[v[1]], p[v[3]]) ? p[v[1]] : p[v[3]];
@@ -384,7 +384,7 @@ class Opener {
   }
 
   const TriangleMesh& mesh_;
-  Mouth mouth_;
+  SplitSurface surface_;
   std::vector<double> heights_;
   std::vector<signed char> states_;  // +1 above, -1 below, 0 on the plane
   std::vector<Index> in_plane_;      // vertices
@@ -398,7 +398,7 @@ class Opener {
 
 }  // namespace
 
-Result<Mouth> openMouth(const TriangleMesh& mesh, const Blade& blade, double band) {
+Result<SplitSurface> splitAtBlade(const TriangleMesh& mesh, const Blade& blade, double band) {
   return Opener(mesh).run(blade, band);
 }
 

@@ -89,18 +89,18 @@ class SegmentGrid {
 Error pressed() {
   return Error{
       ErrorCode::kUnsuitableShape,
-      "the surface crosses itself where the blade meets it, or lips of earlier incisions press into each other"};
+      "the surface crosses itself where the blade meets it, or wound faces of earlier incisions press into each other"};
 }
 
-class LipFiller {
+class WoundFiller {
  public:
-  LipFiller(const Mouth& mouth, const InciseOptions& options, bool touched)
-      : mouth_(mouth), frame_(mouth.frame), options_(options) {
-    for (const RimEdge& e : mouth.rim)
-      if (e.kind == RimEdge::kCrossed || touched) rim_.push_back(static_cast<Index>(&e - mouth.rim.data()));
+  WoundFiller(const SplitSurface& surface, const InciseOptions& options, bool touched)
+      : surface_(surface), frame_(surface.frame), options_(options) {
+    for (const RimEdge& e : surface.rim)
+      if (e.kind == RimEdge::kCrossed || touched) rim_.push_back(static_cast<Index>(&e - surface.rim.data()));
   }
 
-  Result<Lips> run() {
+  Result<WoundFaces> run() {
     if (rim_.empty()) {
       if (windingAt(0.5 * (frame_.low + frame_.high)) != 0)
         return Error{ErrorCode::kMissed, "the blade does not reach the surface: it is wholly inside the tissue"};
@@ -124,7 +124,7 @@ class LipFiller {
 
  private:
   Error missed() const {
-    if (mouth_.lies_in_surface)
+    if (surface_.lies_in_surface)
       return Error{ErrorCode::kMissed,
                    "nothing is left to open: the tissue is already open there, or the blade only lies on it"};
     return Error{ErrorCode::kMissed, "the blade meets no tissue"};
@@ -133,7 +133,7 @@ class LipFiller {
   /// Winding number of the whole section around p, counted along +x.
   int windingAt(const Vec2& p) const {
     int winding = 0;
-    for (const auto& [a, b] : mouth_.section) {
+    for (const auto& [a, b] : surface_.section) {
       if ((a.y() > p.y()) == (b.y() > p.y())) continue;
       const double x = a.x() + (p.y() - a.y()) / (b.y() - a.y()) * (b.x() - a.x());
       if (x > p.x()) winding += b.y() > a.y() ? 1 : -1;
@@ -141,25 +141,25 @@ class LipFiller {
     return winding;
   }
 
-  /// Vertices of the rim at the same place are one node, as where lips lie on each other.
+  /// Vertices of the rim at the same place become one node: they are there where wound faces lie on each other.
   void mergeNodes() {
     std::vector<Index> vertices;
     for (const Index r : rim_) {
-      const RimEdge& e = mouth_.rim[r];
+      const RimEdge& e = surface_.rim[r];
       vertices.push_back(e.from);
       vertices.push_back(e.to);
     }
     std::sort(vertices.begin(), vertices.end());
     vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
     for (const double x : {frame_.low.x(), frame_.high.x()})
-      for (const double y : {frame_.low.y(), frame_.high.y()}) lips_.nodes.push_back({Vec2(x, y), kNoIndex});
-    for (const Index v : vertices) lips_.nodes.push_back({mouth_.places[v], v});
+      for (const double y : {frame_.low.y(), frame_.high.y()}) wound_.nodes.push_back({Vec2(x, y), kNoIndex});
+    for (const Index v : vertices) wound_.nodes.push_back({surface_.places[v], v});
 
     const double snap = 1e-3 * frame_.band;
-    std::vector<Index> order(lips_.nodes.size());
+    std::vector<Index> order(wound_.nodes.size());
     for (Index n = 0; n < order.size(); ++n) order[n] = n;
     std::sort(order.begin(), order.end(), [&](Index a, Index b) {
-      const double x = lips_.nodes[a].place.x(), y = lips_.nodes[b].place.x();
+      const double x = wound_.nodes[a].place.x(), y = wound_.nodes[b].place.x();
       return x != y ? x < y : a < b;
     });
     merged_.resize(order.size());
@@ -168,35 +168,35 @@ class LipFiller {
       merged_[n] = n;
       for (std::size_t j = i; j-- > 0;) {
         const Index other = order[j];
-        if (lips_.nodes[n].place.x() - lips_.nodes[other].place.x() > snap) break;
-        if (merged_[other] == other && (lips_.nodes[n].place - lips_.nodes[other].place).norm() <= snap) {
+        if (wound_.nodes[n].place.x() - wound_.nodes[other].place.x() > snap) break;
+        if (merged_[other] == other && (wound_.nodes[n].place - wound_.nodes[other].place).norm() <= snap) {
           merged_[n] = other;
           break;
         }
       }
     }
     for (Index n = 0; n < order.size(); ++n)
-      if (lips_.nodes[n].vertex != kNoIndex) node_of_vertex_.emplace(lips_.nodes[n].vertex, merged_[n]);
+      if (wound_.nodes[n].vertex != kNoIndex) node_of_vertex_.emplace(wound_.nodes[n].vertex, merged_[n]);
     for (Index n = 0; n < order.size(); ++n) {
-      Index& lowest = lips_.nodes[merged_[n]].vertex;
-      lowest = std::min(lowest, lips_.nodes[n].vertex);
+      Index& lowest = wound_.nodes[merged_[n]].vertex;
+      lowest = std::min(lowest, wound_.nodes[n].vertex);
     }
   }
 
   std::array<Index, 2> endsOf(Index rim) const {
-    return {node_of_vertex_.at(mouth_.rim[rim].from), node_of_vertex_.at(mouth_.rim[rim].to)};
+    return {node_of_vertex_.at(surface_.rim[rim].from), node_of_vertex_.at(surface_.rim[rim].to)};
   }
 
   Status placeRim() {
     // What is crossed first: at the same place it goes before what is touched.
-    std::stable_partition(rim_.begin(), rim_.end(), [&](Index r) { return mouth_.rim[r].kind == RimEdge::kCrossed; });
+    std::stable_partition(rim_.begin(), rim_.end(), [&](Index r) { return surface_.rim[r].kind == RimEdge::kCrossed; });
     std::vector<Index> placed;
     for (const Index r : rim_) {
       const auto [a, b] = endsOf(r);
       if (a == b)
         return Error{ErrorCode::kUnsuitableShape,
                      "the surface is finer than " + std::to_string(1e3 * frame_.band) + " mm where the blade meets it"};
-      if (mouth_.rim[r].kind == RimEdge::kCrossed) {
+      if (surface_.rim[r].kind == RimEdge::kCrossed) {
         if (!rim_of_.emplace(directedKey(a, b), r).second) return pressed();
       } else {
         if (rim_of_.count(directedKey(a, b)) + rim_of_.count(directedKey(b, a)) > 0) continue;
@@ -211,8 +211,8 @@ class LipFiller {
 
   Status triangulate() {
     std::vector<Kernel::Point_2> points;
-    points.reserve(lips_.nodes.size());
-    for (const LipNode& n : lips_.nodes) points.emplace_back(n.place.x(), n.place.y());
+    points.reserve(wound_.nodes.size());
+    for (const WoundNode& n : wound_.nodes) points.emplace_back(n.place.x(), n.place.y());
     std::vector<std::size_t> order;
     for (std::size_t n = 0; n < points.size(); ++n)
       if (merged_[n] == n) order.push_back(n);
@@ -250,7 +250,7 @@ class LipFiller {
     return Done{};
   }
 
-  const Vec2& place(Face face, int i) const { return lips_.nodes[face->vertex(i)->info()].place; }
+  const Vec2& place(Face face, int i) const { return wound_.nodes[face->vertex(i)->info()].place; }
 
   /// The rim edge that bounds `face`, if it is solid, at edge i (opposite vertex i); kNoIndex without one.
   Index rimAt(Face face, int i) const {
@@ -260,7 +260,7 @@ class LipFiller {
   }
   int weightAt(Face face, int i) const {
     const Index r = rimAt(face, i);
-    return r != kNoIndex && mouth_.rim[r].kind == RimEdge::kCrossed ? 1 : 0;
+    return r != kNoIndex && surface_.rim[r].kind == RimEdge::kCrossed ? 1 : 0;
   }
 
   /// Winding numbers, and the parts of the solid's section that the rim bounds.
@@ -330,12 +330,12 @@ class LipFiller {
       }
       area += 0.5 * cross(place(face, 1) - place(face, 0), place(face, 2) - place(face, 0));
     }
-    double h = options_.spacing > 0.0 ? options_.spacing : mouth_.spacing;
+    double h = options_.spacing > 0.0 ? options_.spacing : surface_.spacing;
     h = std::max({h, std::sqrt(area / (0.866 * static_cast<double>(std::max<std::size_t>(options_.max_points, 1)))),
                   1e-3 * (high - low).norm()});
 
     SegmentGrid segments(low, high, h);
-    for (const Index r : rim_) segments.add(lips_.nodes[endsOf(r)[0]].place, lips_.nodes[endsOf(r)[1]].place);
+    for (const Index r : rim_) segments.add(wound_.nodes[endsOf(r)[0]].place, wound_.nodes[endsOf(r)[1]].place);
     std::vector<std::pair<Vec2, Face>> points;
     for (const Face face : cdt_.finite_face_handles()) {
       if (!isFilled(face)) continue;
@@ -369,13 +369,13 @@ class LipFiller {
     Face hint;
     for (const auto& [p, face] : points) {
       const Cdt::Vertex_handle made = cdt_.insert(Kernel::Point_2(p.x(), p.y()), hint);
-      made->info() = static_cast<Index>(lips_.nodes.size());
-      lips_.nodes.push_back({p, kNoIndex});
+      made->info() = static_cast<Index>(wound_.nodes.size());
+      wound_.nodes.push_back({p, kNoIndex});
       hint = made->face();
     }
   }
 
-  Result<Lips> extract() {
+  Result<WoundFaces> extract() {
     struct Ordered {
       std::array<Index, 3> nodes;
       Face face;
@@ -394,10 +394,10 @@ class LipFiller {
     for (Index f = 0; f < order.size(); ++f) order[f].face->info().number = f;
     std::unordered_map<Index, Index> component_numbers;
     for (const Ordered& o : order) {
-      LipFace face;
+      WoundTriangle face;
       face.nodes = o.nodes;
-      const auto [entry, fresh] = component_numbers.try_emplace(o.face->info().component, lips_.components);
-      lips_.components += fresh;
+      const auto [entry, fresh] = component_numbers.try_emplace(o.face->info().component, wound_.components);
+      wound_.components += fresh;
       face.component = entry->second;
       for (int k = 0; k < 3; ++k) {
         const int opposite = (o.first + k + 2) % 3;
@@ -406,18 +406,18 @@ class LipFiller {
         const Face other = o.face->neighbor(opposite);
         if (face.rim[k] == kNoIndex && isFilled(other)) face.neighbors[k] = other->info().number;
       }
-      lips_.faces.push_back(face);
+      wound_.triangles.push_back(face);
     }
-    return std::move(lips_);
+    return std::move(wound_);
   }
 
-  const Mouth& mouth_;
+  const SplitSurface& surface_;
   const Frame& frame_;
   const InciseOptions& options_;
-  Lips lips_;
+  WoundFaces wound_;
   std::vector<Index> merged_;
   std::unordered_map<Index, Index> node_of_vertex_;
-  std::vector<Index> rim_;                           // the edges of the mouth's rim that count
+  std::vector<Index> rim_;                           // the edges of the rim that count
   std::unordered_map<std::uint64_t, Index> rim_of_;  // from, to node: solid to the left
   Cdt cdt_;
   Vec2 seed_ = Vec2::Zero();
@@ -428,8 +428,8 @@ class LipFiller {
 
 }  // namespace
 
-Result<Lips> fillLips(const Mouth& mouth, const InciseOptions& options, bool touched) {
-  return LipFiller(mouth, options, touched).run();
+Result<WoundFaces> fillWoundFaces(const SplitSurface& surface, const InciseOptions& options, bool touched) {
+  return WoundFiller(surface, options, touched).run();
 }
 
 }  // namespace incising
