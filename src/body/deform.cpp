@@ -232,11 +232,13 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
   }
   if (material.plastic() && matched)
     counters.plastic_flows += flow(input, material.plasticity, h, state.poses, state.plastic);
+  // Of a body that is held gravity has nothing to move but what deforms.
+  const Vec3 pull = (model.isHeld() ? factor : 1.0) * gravity;
   for (std::size_t i = 0; i < x.size(); ++i) {
     if (model.fixed[i]) {
       v[i].setZero();
     } else {
-      v[i] += model.carried.empty() ? Vec3(h * gravity) : Vec3(h * (1.0 - model.carried[i]) * gravity);
+      v[i] += model.carried.empty() ? Vec3(h * pull) : Vec3(h * (1.0 - model.carried[i]) * pull);
       x[i] += h * v[i];
     }
   }

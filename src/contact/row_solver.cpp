@@ -6,11 +6,12 @@
 namespace meshless {
 namespace {
 
-constexpr double kOutTime = 0.03;        // [s] in which an overlap falls to 1/e: what is removed slowly gains no speed
-constexpr double kOutStiffness = 800.0;  // of it, over the inertia that it moves: impulses end where two can't both be met
-constexpr int kMostSweeps = 4;          // of a substep
-constexpr double kTolerance = 2e-3;     // mean edges: sweeps end where no row was corrected by more
-constexpr double kOutSpeed = 0.5;       // [1/s] mean edges: overlap is removed no faster
+constexpr double kOutTime = 0.03;  // [s] in which an overlap falls to 1/e: what is removed slowly gains no speed
+constexpr double kOutStiffness =
+    800.0;                           // of it, over the inertia that it moves: impulses end where two can't both be met
+constexpr int kMostSweeps = 4;       // of a substep
+constexpr double kTolerance = 2e-3;  // mean edges: sweeps end where no row was corrected by more
+constexpr double kOutSpeed = 0.5;    // [1/s] mean edges: overlap is removed no faster
 
 using Four = double __attribute__((vector_size(32), may_alias));
 
@@ -27,6 +28,7 @@ class Solver {
 
   Solver(std::vector<SolverBody>& bodies, SolverScratch& scratch) : bodies_(bodies), scratch_(scratch) {
     scratch_.active.clear();
+    scratch_.pulls.clear();
     scratch_.levers.clear();
   }
 
@@ -44,12 +46,8 @@ class Solver {
   /// With what groups have moved.
   Vec3 sumNow(const Active& active) const {
     Vec3 total = sum(*active.row, active.entries, active.a, active.b, false);
-    for (Index k = active.levers; k < active.end; ++k) {
-      const Lever& lever = scratch_.levers[k];
-      const GroupMotion& motion = bodies_[k < active.middle ? active.a : active.b].motions[lever.group];
-      total += lever.share * motion.shift + motion.turn.cross(lever.arm);
-    }
-    return total;
+    total += leversMoved(bodies_[active.a], active.levers, active.middle);
+    return active.b == kNoIndex ? total : Vec3(total + leversMoved(bodies_[active.b], active.middle, active.end));
   }
 
   void activate(ContactRow& row, const RowEntry* entries, Index a, Index b, const Vec3& way, double h) {
@@ -60,9 +58,12 @@ class Solver {
     active.b = b;
     active.start = sum(row, entries, a, b, true) + way;  // friction is about the motion relative to what moves
     active.levers = static_cast<Index>(scratch_.levers.size());
-    addLevers(entries, row.begin, row.middle, a);
+    const auto each = [entries](Index begin, Index end, const auto& visit) {
+      for (Index k = begin; k < end; ++k) visit(entries[k].particle, entries[k].coefficient);
+    };
+    addLevers(bodies_[a], [&](const auto& visit) { each(row.begin, row.middle, visit); });
     active.middle = static_cast<Index>(scratch_.levers.size());
-    if (b != kNoIndex) addLevers(entries, row.middle, row.end, b);
+    if (b != kNoIndex) addLevers(bodies_[b], [&](const auto& visit) { each(row.middle, row.end, visit); });
     active.end = static_cast<Index>(scratch_.levers.size());
     double answer = 0.0, farthest = 0.0;  // [1/kg]
     addOwnAnswer(entries, row.begin, row.middle, a, answer, farthest);
@@ -100,13 +101,8 @@ class Solver {
   void push(const Active& active, const Vec3& impulse) {
     pushSide(active.entries, active.row->begin, active.row->middle, bodies_[active.a], impulse);
     if (active.b != kNoIndex) pushSide(active.entries, active.row->middle, active.row->end, bodies_[active.b], impulse);
-    for (Index k = active.levers; k < active.end; ++k) {
-      const Lever& lever = scratch_.levers[k];
-      SolverBody& body = bodies_[k < active.middle ? active.a : active.b];
-      GroupMotion& motion = body.motions[lever.group];
-      motion.shift += body.rigid_share * lever.share * motion.inverse_mass * impulse;
-      motion.turn += body.rigid_share * (motion.inverse_inertia * lever.arm.cross(impulse));
-    }
+    pushLevers(bodies_[active.a], active.levers, active.middle, impulse);
+    if (active.b != kNoIndex) pushLevers(bodies_[active.b], active.middle, active.end, impulse);
   }
 
   /// The last impulse, as far as it presses along the normal of now.
@@ -139,11 +135,53 @@ class Solver {
     return std::abs(press - pressed) / active.mass / bodies_[active.a].edge_length;
   }
 
+  void activate(const SpringRow& spring) {
+    SolverBody& body = bodies_[spring.body];
+    const std::vector<Index>& patch = *spring.patch;
+    const std::vector<double>& weights = *spring.weights;
+    SolverScratch::Pull pull;
+    pull.levers = static_cast<Index>(scratch_.levers.size());
+    addLevers(body, [&](const auto& visit) {
+      for (std::size_t k = 0; k < patch.size(); ++k) visit(patch[k], weights[k]);
+    });
+    pull.end = static_cast<Index>(scratch_.levers.size());
+    double own = 0.0;
+    for (std::size_t k = 0; k < patch.size(); ++k) own += weights[k] * weights[k] * body.now[patch[k]].inverse_mass;
+    pull.answer = (1.0 - body.rigid_share) * own * Mat3::Identity();
+    for (Index k = pull.levers; k < pull.end; ++k) {
+      const Lever& lever = scratch_.levers[k];
+      const GroupMotion& motion = body.motions[lever.group];
+      Mat3 arm;
+      arm << 0.0, -lever.arm.z(), lever.arm.y(), lever.arm.z(), 0.0, -lever.arm.x(), -lever.arm.y(), lever.arm.x(), 0.0;
+      pull.answer += body.rigid_share * (lever.share * lever.share * motion.inverse_mass * Mat3::Identity() +
+                                         arm * motion.inverse_inertia * arm.transpose());
+    }
+    scratch_.pulls.push_back(pull);
+  }
+
+  void visit(SpringRow& spring, const SolverScratch::Pull& pull, double h) {
+    SolverBody& body = bodies_[spring.body];
+    const std::vector<Index>& patch = *spring.patch;
+    const std::vector<double>& weights = *spring.weights;
+    Vec3 stretch = spring.end - leversMoved(body, pull.levers, pull.end);
+    for (std::size_t k = 0; k < patch.size(); ++k) stretch -= weights[k] * at(body.now[patch[k]]);
+    const double stiff = spring.stiffness * h * h;
+    const Vec3 more = (Mat3::Identity() + stiff * pull.answer).inverse() * (stiff * stretch - spring.impulse);
+    spring.impulse += more;
+    const Four way = four(Vec3((1.0 - body.rigid_share) * more));
+    for (std::size_t k = 0; k < patch.size(); ++k) {
+      Slot& slot = body.now[patch[k]];
+      four(slot) += weights[k] * slot.inverse_mass * way;
+    }
+    pushLevers(body, pull.levers, pull.end, more);
+  }
+
   /// What groups have been moved by goes to their particles.
-  void moveGroups() {
+  void moveGroups(const std::vector<SpringRow>& springs) {
     for (const Active& active : scratch_.active)
       for (const Index b : {active.a, active.b})
         if (b != kNoIndex) moveGroups(bodies_[b]);
+    for (const SpringRow& spring : springs) moveGroups(bodies_[spring.body]);
   }
 
  private:
@@ -151,8 +189,7 @@ class Solver {
                     double& farthest) const {
     const SolverBody& body = bodies_[number];
     for (Index k = begin; k < end; ++k) {
-      const double way =
-          (1.0 - body.rigid_share) * entries[k].coefficient * body.now[entries[k].particle].inverse_mass;
+      const double way = (1.0 - body.rigid_share) * entries[k].coefficient * body.now[entries[k].particle].inverse_mass;
       answer += entries[k].coefficient * way;
       farthest = std::max(farthest, std::abs(way));
     }
@@ -167,29 +204,47 @@ class Solver {
     }
   }
 
-  void addLevers(const RowEntry* entries, Index begin, Index end, Index number) {
-    SolverBody& body = bodies_[number];
-    if (!(body.rigid_share > 0.0)) return;
+  /// each: calls what it gets with particles and coefficients.
+  template <class Each>
+  void addLevers(SolverBody& body, const Each& each) {
+    if (body.motions.empty()) return;
     const RigidGroups& groups = *body.groups;
     const std::size_t first = scratch_.levers.size();
-    for (Index k = begin; k < end; ++k) {
-      const RowEntry& entry = entries[k];
-      for (Index n = groups.of_offsets[entry.particle]; n < groups.of_offsets[entry.particle + 1]; ++n) {
+    each([&](Index particle, double coefficient) {
+      for (Index n = groups.of_offsets[particle]; n < groups.of_offsets[particle + 1]; ++n) {
         const Index group = groups.of_groups[n];
         GroupMotion& motion = body.motions[group];
         if (!motion.current) motion = groupAt(groups, group, [&body](Index i) { return at(body.before[i]); });
         std::size_t place = first;
         while (place < scratch_.levers.size() && scratch_.levers[place].group != group) ++place;
         if (place == scratch_.levers.size()) scratch_.levers.push_back({group, 0.0, Vec3::Zero()});
-        const double share = groups.of_weights[n] * entry.coefficient;
+        const double share = groups.of_weights[n] * coefficient;
         scratch_.levers[place].share += share;
-        scratch_.levers[place].arm += share * (at(body.before[entry.particle]) - motion.centre);
+        scratch_.levers[place].arm += share * (at(body.before[particle]) - motion.centre);
       }
+    });
+  }
+
+  Vec3 leversMoved(const SolverBody& body, Index begin, Index end) const {
+    Vec3 total = Vec3::Zero();
+    for (Index k = begin; k < end; ++k) {
+      const Lever& lever = scratch_.levers[k];
+      const GroupMotion& motion = body.motions[lever.group];
+      total += lever.share * motion.shift + motion.turn.cross(lever.arm);
+    }
+    return total;
+  }
+
+  void pushLevers(SolverBody& body, Index begin, Index end, const Vec3& impulse) {
+    for (Index k = begin; k < end; ++k) {
+      const Lever& lever = scratch_.levers[k];
+      GroupMotion& motion = body.motions[lever.group];
+      motion.shift += body.rigid_share * lever.share * motion.inverse_mass * impulse;
+      motion.turn += body.rigid_share * (motion.inverse_inertia * lever.arm.cross(impulse));
     }
   }
 
   static void moveGroups(SolverBody& body) {
-    if (!(body.rigid_share > 0.0)) return;
     for (Index g = 0; g < body.motions.size(); ++g) {
       GroupMotion& motion = body.motions[g];
       if (!motion.current) continue;
@@ -205,25 +260,6 @@ class Solver {
   std::vector<SolverBody>& bodies_;
   SolverScratch& scratch_;
 };
-
-void pull(SpringRow& spring, SolverBody& body, double h) {
-  const std::vector<Index>& patch = *spring.patch;
-  const std::vector<double>& weights = *spring.weights;
-  Vec3 stretch = spring.end;
-  double answer = 0.0;
-  for (std::size_t k = 0; k < patch.size(); ++k) {
-    const Slot& slot = body.now[patch[k]];
-    stretch -= weights[k] * at(slot);
-    answer += weights[k] * weights[k] * slot.inverse_mass;
-  }
-  const double stiff = spring.stiffness * h * h;
-  const Vec3 more = (stiff * stretch - spring.impulse) / (1.0 + stiff * answer);
-  spring.impulse += more;
-  for (std::size_t k = 0; k < patch.size(); ++k) {
-    Slot& slot = body.now[patch[k]];
-    four(slot) += weights[k] * slot.inverse_mass * four(more);
-  }
-}
 
 // Rows act at both ends of what is between them: across it an impulse is a couple. Bodies get it back as a spin.
 void spinBack(SolverBody& body) {
@@ -270,6 +306,7 @@ void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& spri
       solver.activate(row, entries, rows.a, rows.b, way, step.h);
     }
   }
+  for (const SpringRow& spring : springs) solver.activate(spring);
   counters.active += scratch.active.size();
   for (const auto& active : scratch.active) {
     counters.ground += active.row->kind == FeaturePair::Kind::kPlane;
@@ -278,13 +315,14 @@ void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& spri
   for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
     const std::size_t count = scratch.active.size();
     double worst = 0.0;
-    for (SpringRow& spring : springs) pull(spring, bodies[spring.body], step.h);  // contacts have the last word
+    for (std::size_t n = 0; n < springs.size(); ++n)
+      solver.visit(springs[n], scratch.pulls[n], step.h);  // contacts have the last word
     for (std::size_t n = 0; n < count; ++n)
       worst = std::max(worst, solver.visit(scratch.active[sweep % 2 ? count - 1 - n : n]));
     counters.visits += count;
     if (sweep > 0 && !(worst > kTolerance)) break;
   }
-  solver.moveGroups();
+  solver.moveGroups(springs);
   if (free.empty()) return;
   for (const auto& active : scratch.active) {
     const Vec3 couple = active.start.cross(active.row->impulse);

@@ -376,9 +376,9 @@ void SurfaceContacts::fillSlots(const std::vector<Collider>& colliders) {
     body.particles = needed_[c] ? collider.particles : 0;
     body.moves = collider.moves;
     body.edge_length = collider.edge_length;
-    body.groups = collider.groups;
-    body.rigid_share = collider.moves && collider.groups ? collider.rigid_share : 0.0;
-    body.motions.assign(body.rigid_share > 0.0 ? collider.groups->size() : 0, GroupMotion());
+    body.groups = nullptr;
+    body.rigid_share = 0.0;
+    body.motions.clear();
     for (Index i = 0; i < body.particles; ++i) {
       const Vec3& p = collider.positions[i];
       body.now[i] = {p.x(), p.y(), p.z(), collider.moves ? collider.inverse_masses[i] : 0.0};
@@ -395,6 +395,13 @@ void SurfaceContacts::fillSlots(const std::vector<Collider>& colliders) {
     limited.inverse_masses = collider.inverse_masses;
     limited.watched.clear();
   }
+}
+
+void SurfaceContacts::setRigidShare(Index collider, const RigidGroups* groups, double share) {
+  SolverBody& body = solver_bodies_[collider];
+  body.groups = groups;
+  body.rigid_share = share;
+  body.motions.assign(groups && share > 0.0 ? groups->size() : 0, GroupMotion());
 }
 
 // Vertices that are watched, each once; vertex_moved tells them meanwhile.

@@ -15,7 +15,7 @@ namespace meshless {
 namespace {
 
 constexpr std::string_view kMagic = "MLSSTATE";
-constexpr std::uint32_t kVersion = 9;
+constexpr std::uint32_t kVersion = 10;
 constexpr std::uint64_t kMostModels = 1u << 20;
 
 std::uint32_t checksum(std::string_view bytes) {
@@ -63,17 +63,21 @@ bool areTriangles(const TriangleMesh& mesh) {
 template <class Archive>
 void saveBody(Archive& archive, const SavedBody& body, std::uint32_t model) {
   archive(body.id, body.number, body.name, body.material, model, body.state, body.surface_current, body.touched_by_push,
-          body.stiffness_factor, body.bounds, body.asleep, body.still_for, body.sleep_group, body.batch);
+          body.stiffness_factor, body.bounds, body.asleep, body.still_for, body.rest_from, body.sleep_group,
+          body.batch);
 }
 
 SavedBody loadBody(InArchive& archive, const ModelTable& models) {
   SavedBody body;
   std::uint32_t model = 0;
   archive(body.id, body.number, body.name, body.material, model, body.state, body.surface_current, body.touched_by_push,
-          body.stiffness_factor, body.bounds, body.asleep, body.still_for, body.sleep_group, body.batch);
+          body.stiffness_factor, body.bounds, body.asleep, body.still_for, body.rest_from, body.sleep_group,
+          body.batch);
   body.model = models.at(model);
   requireNone(faultOf(*body.model, body.state));
   requireNone(faultOf(*body.model, body.material));
+  require(body.rest_from.empty() || body.rest_from.size() == body.state.positions.size(),
+          "body '" + body.name + "' was elsewhere with other particles");
   return body;
 }
 
@@ -401,7 +405,7 @@ std::shared_ptr<const SavedWorld> World::capture() const {
     const auto batch = batch_of.find(body.get());
     saved->bodies.push_back({body->id, body->number, body->name, body->material, body->model, body->state,
                              body->surface_current, body->touched_by_push, body->stiffness_factor, body->bounds,
-                             body->asleep, body->still_for, body->sleep_group,
+                             body->asleep, body->still_for, body->rest_from, body->sleep_group,
                              w.batches_current && batch != batch_of.end() ? batch->second : kNoIndex});
   }
   saved->generations = w.generations;
@@ -449,6 +453,7 @@ void World::restore(const SavedWorld& saved) {
     body->bounds = from.bounds;
     body->asleep = from.asleep;
     body->still_for = from.still_for;
+    body->rest_from = from.rest_from;
     body->sleep_group = from.sleep_group;
     w.bodies.push_back(std::move(body));
   }
@@ -528,7 +533,7 @@ std::uint64_t World::stateHash() const {
   archive(saved->step, saved->batches_current, saved->batches, saved->used_names, saved->push, saved->scissors);
   for (const SavedBody& body : saved->bodies) {
     archive(body.name, body.material, body.state, body.touched_by_push, body.stiffness_factor, body.bounds, body.asleep,
-            body.still_for, body.sleep_group, body.batch);
+            body.still_for, body.rest_from, body.sleep_group, body.batch);
     archive(known.of(body.model));
   }
   for (Pick pick : saved->picks) {

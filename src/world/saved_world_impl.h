@@ -22,6 +22,7 @@ struct SavedBody {
   Box bounds;
   bool asleep = false;
   double still_for = 0.0;
+  Points rest_from;
   std::uint32_t sleep_group = 0;
   std::uint32_t batch = kNoIndex;  // which of World::Impl::batches it is in
 };

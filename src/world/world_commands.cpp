@@ -104,9 +104,10 @@ Result<Reply> World::Impl::apply(const MovePickCommand& command) {
   if (!command.target.allFinite()) return notFinite("target");
   Pick* pick = findPick(command.pick);
   if (!pick) return noPick(command.pick, picks);
+  const bool there = pick->target == command.target;  // a stream says over and over where it is
   pick->target = command.target;
   pick->locked = false;
-  if (WorldBody* body = find(pick->body)) wake(*body);
+  if (WorldBody* body = find(pick->body); body && !there) wake(*body);
   return Reply(Done{});
 }
 
@@ -114,10 +115,11 @@ Result<Reply> World::Impl::apply(const LockCommand& command) {
   if (command.target && !command.target->allFinite()) return notFinite("target");
   Pick* pick = findPick(command.pick);
   if (!pick) return noPick(command.pick, picks);
+  const bool moved = command.target && *command.target != pick->target;
   if (command.target) pick->target = *command.target;
   pick->locked = true;
   WorldBody* body = find(pick->body);
-  if (body && command.target) wake(*body);
+  if (body && moved) wake(*body);
   say(EventType::kLocked, body ? body->name : "", pick->id, "locked");
   return Reply(Done{});
 }
@@ -161,13 +163,16 @@ Result<Reply> World::Impl::apply(const PushCommand& command) {
     return outOfRange("radius", command.radius, "0 (the default) to 1e6 m");
   if (!(command.speed >= 0.0 && command.speed <= 1e6))
     return outOfRange("speed", command.speed, "0 (at once) to 1e6 m/s");
-  wakeAround();
+  const double radius = command.radius > 0.0 ? command.radius : settings.push_radius;
   const bool from_nowhere = !push.enabled;
-  push.enabled = true;
-  push.radius = command.radius > 0.0 ? command.radius : settings.push_radius;
-  push.target = command.position;
   push.speed = command.speed;
   push.streamed = command.streamed;
+  if (!from_nowhere && radius == push.radius && command.position == push.target && push.position == push.target)
+    return Reply(Done{});
+  wakeAround();
+  push.enabled = true;
+  push.radius = radius;
+  push.target = command.position;
   if (from_nowhere || command.speed == 0.0) push.position = command.position;
   wakeAround();
   return Reply(Done{});

@@ -101,7 +101,6 @@ void World::Impl::findContacts(double h_frame) {
       shape_colliders[b].maps = bodies[b]->maps.data();
       shape_colliders[b].map_count = static_cast<Index>(bodies[b]->maps.size());
     });
-    rememberSlow();
     contacts.make(shape_colliders, h_frame, report.contact_counters, for_each);
     bool woken = false;
     for (Index p : contacts.reached()) {

@@ -71,10 +71,9 @@ struct WorldBody {
   double fastest = 0.0;    // [m/s] likewise: no particle is faster
   Index batch = kNoIndex;  // matched with others of its kind: one of World::Impl::batches
   bool asleep = false;
-  double still_for = 0.0;         // [s]
+  double still_for = 0.0;         // [s] that it has been near rest_from
+  Points rest_from;               // [m]
   std::uint32_t sleep_group = 0;  // those that fell asleep together wake together
-  bool slow = false;              // may fall asleep in this frame: where it was at its start is known
-  Points frame_start;             // [m] likewise
   StepScratch scratch;
 };
 
@@ -308,7 +307,6 @@ struct World::Impl {
   void wake(WorldBody& body);
   void wakeWithin(const Box& box);
   void wakePushed(double h_frame);
-  void rememberSlow();
   void fallAsleep(double h_frame);
   void mendFaults();
   void findWound();
@@ -351,7 +349,6 @@ struct World::Impl {
   void stepIsland(std::size_t island, double h_frame, const ForEach& each);
   /// Who presses on whom: for who sleeps, and who is wound up.
   void listLoaded();
-  bool isNearAnything(Index body) const;
   void liftOutOfGround(WorldBody& body, double h_frame);
   void findLow(WorldBody& body, double h_frame);
   void contactGroundAndPush(WorldBody& body, double h, double h_frame, const Vec3& push_velocity);

@@ -7,10 +7,10 @@
 namespace meshless {
 namespace {
 
-constexpr double kStillFor = 0.5;    // [s]
-constexpr double kStillMean = 0.01;  // [1/s] times the body's size: root mean square of its particles' speeds
-constexpr double kStillMost = 0.02;  // [1/s] likewise, of the fastest
-constexpr double kTrembling = 5.0;   // times that: a body that trembles faster within a frame is not checked
+// A body holds still while it stays within a thousandth of its size for this long, and within a thousandth of the way
+// that it would fall meanwhile: at small loads that is less, and forces that are not in balance show there too.
+constexpr double kStillFor = 0.5;  // [s]
+constexpr double kStillShare = 1e-3;
 
 Index rootOf(std::vector<Index>& root, Index i) {
   while (root[i] != i) {
@@ -22,18 +22,16 @@ Index rootOf(std::vector<Index>& root, Index i) {
 
 double sizeOf(const Box& box) { return (box.max - box.min).maxCoeff(); }
 
-// By where it is a frame later: what trembles from substep to substep and stays where it is does not keep it awake.
-bool isStill(const WorldBody& body, double h_frame) {
-  if (!body.slow) return false;
-  const double size = sizeOf(body.bounds) * h_frame;
-  const double most = kStillMost * size, mean = kStillMean * size;
-  double sum = 0.0;
-  for (std::size_t i = 0; i < body.state.positions.size(); ++i) {
-    const double squared = (body.state.positions[i] - body.frame_start[i]).squaredNorm();
-    if (!(squared <= most * most) && body.model->isTissue(i)) return false;  // nobody sees the far corner of a cell
-    sum += body.model->masses[i] * squared;
-  }
-  return sum <= mean * mean * body.model->mass;
+// What trembles and stays where it is does not keep a body awake.
+bool isWhereItWas(const WorldBody& body, double gravity) {
+  const Points& now = body.state.positions;
+  if (body.rest_from.size() != now.size()) return false;
+  double most = sizeOf(body.bounds);
+  if (gravity > 0.0) most = std::min(most, 0.5 * gravity * kStillFor * kStillFor);
+  most *= kStillShare;
+  for (std::size_t i = 0; i < now.size(); ++i)  // nobody sees the far corner of a cell
+    if (!((now[i] - body.rest_from[i]).squaredNorm() <= most * most) && body.model->isTissue(i)) return false;
+  return true;
 }
 
 }  // namespace
@@ -62,25 +60,6 @@ void World::Impl::listAwake() {
     if (!body->asleep) awake.push_back(body.get());
 }
 
-// Where those are that may fall asleep: something is near them, or holds them, and they are slow.
-void World::Impl::rememberSlow() {
-  if (!settings.sleep) return;
-  for (Index b = 0; b < bodies.size(); ++b) {
-    WorldBody& body = *bodies[b];
-    body.slow = false;
-    if (body.asleep || (!isNearAnything(b) && !body.model->any_fixed && picks.empty())) continue;
-    const double most = kTrembling * kStillMost * sizeOf(body.bounds);
-    body.slow = true;
-    for (std::size_t i = 0; i < body.state.velocities.size() && body.slow; ++i)
-      body.slow = body.state.velocities[i].squaredNorm() <= most * most || !body.model->isTissue(i);
-    if (body.slow) body.frame_start = body.state.positions;
-  }
-}
-
-bool World::Impl::isNearAnything(Index body) const {
-  return contactMethod() == ContactMethod::kSurface ? surface_contacts.needed()[body] : contacts.needed()[body];
-}
-
 void World::Impl::listLoaded() {
   loaded.clear();
   if (contactMethod() == ContactMethod::kRestShape) contacts.loadedPairs(loaded);
@@ -97,7 +76,12 @@ void World::Impl::fallAsleep(double h_frame) {
   if (contactMethod() != ContactMethod::kRestShape && contactMethod() != ContactMethod::kSurface) return;
   bool any = false;
   for (WorldBody* body : awake) {
-    body->still_for = isStill(*body, h_frame) ? body->still_for + h_frame : 0.0;
+    if (isWhereItWas(*body, settings.gravity.norm())) {
+      body->still_for += h_frame;
+    } else {
+      body->still_for = 0.0;
+      body->rest_from = body->state.positions;
+    }
     any = any || body->still_for >= kStillFor;
   }
   if (!any) return;

@@ -111,6 +111,13 @@ void World::Impl::clearForces() {
   for (Pick& pick : picks)
     if (const WorldBody* body = find(pick.body); !body || !body->asleep)  // a body at rest is held as before
       pick.force.setZero();
+  bool pressed = false, moved = false;  // what sleeps under the sphere is pressed as before
+  for (const auto& body : bodies) {
+    if (!body->touched_by_push) continue;
+    pressed = true;
+    moved = moved || !body->asleep;
+  }
+  if (pressed && !moved) return;
   push.force.setZero();
   push.touching = false;
 }
@@ -213,7 +220,8 @@ int World::Impl::chooseSubsteps(double h_frame) {
       text << body->name << " needs " << std::ceil(h_frame * highestFrequencyNow(*body->model, body->state))
            << " substeps for its material; with " << substeps
            << (substeps < settings.max_substeps ? " (the contacts of a heap leave no more)" : " (max_substeps)")
-           << " it has " << 100.0 * factor << " % of its stiffness";
+           << " it deforms " << 1.0 / std::sqrt(factor) << " times as slowly, and contacts and picks deform it "
+           << 1.0 / factor << " times as much";
       say(EventType::kOverBudget, body->name, 0, text.str());
     }
     body->stiffness_factor = factor;

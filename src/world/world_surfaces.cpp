@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numeric>
 #include <sstream>
 
 #include "meshless_surgery/dynamics/extent.h"
@@ -65,9 +66,15 @@ Collider colliderOf(const WorldObstacle& obstacle, std::size_t number) {
 SurfaceModel::SurfaceModel(BodyModelPtr of_model) : model(std::move(of_model)), surface(surfaceOf(*model)) {
   for (std::size_t i = 0; i < model->masses.size(); ++i)
     inverse_masses.push_back(model->fixed[i] ? 0.0 : 1.0 / model->masses[i]);
-  if (!(model->specific_stiffness > 0.0) && !model->any_fixed)
+  if (!(model->specific_stiffness > 0.0) && !model->isHeld()) {
     groups = std::make_unique<RigidGroups>(model->clusters.offsets, model->clusters.members, model->clusters.weights,
                                            model->masses);
+  } else if (!model->isHeld()) {
+    std::vector<Index> all(model->masses.size());
+    std::iota(all.begin(), all.end(), Index{0});
+    groups = std::make_unique<RigidGroups>(std::vector<Index>{0, static_cast<Index>(all.size())}, all,
+                                           std::vector<double>(all.size(), 1.0), model->masses);
+  }
   reach = embeddedReachOf(*model);
 }
 
@@ -97,7 +104,7 @@ void World::Impl::fillCollider(WorldBody& body, double h_frame, Collider& collid
   collider.positions = body.state.positions.data();
   collider.velocities = body.state.velocities.data();
   collider.particles = static_cast<Index>(body.state.positions.size());
-  collider.held = body.model->any_fixed;
+  collider.held = body.model->isHeld();
   if (body.asleep) {
     collider.bounds = body.bounds;
     return;
@@ -153,10 +160,6 @@ void World::Impl::findSurfaceContacts(double h_frame) {
       const SurfaceModel& model = surfaceModel(*bodies[b]);
       colliders[b].surface = &model.surface;
       colliders[b].inverse_masses = model.inverse_masses.data();
-      if (model.groups && !bodies[b]->material.elastic() && !colliders[b].grasped) {
-        colliders[b].groups = model.groups.get();
-        colliders[b].rigid_share = bodies[b]->material.alpha;
-      }
     }
     surface_contacts.findMoved(scene, colliders);
     forNumbers(bodies.size(), [&](std::size_t b) {
@@ -168,7 +171,6 @@ void World::Impl::findSurfaceContacts(double h_frame) {
       refreshSurface(*bodies[b]);
       colliders[b].vertices = bodies[b]->state.surface.data();
     });
-    rememberSlow();
     surface_contacts.find(scene, colliders, report.contact_counters, for_each);
     bool woken = false;
     for (const Index c : surface_contacts.reached()) {
@@ -201,8 +203,8 @@ int World::Impl::substepsOf(const std::vector<WorldBody*>& some, bool may_meet, 
     if (factor < 1.0 && !(body->stiffness_factor < 1.0)) {
       std::ostringstream text;
       text << body->name << " needs " << std::ceil(h_frame * highestFrequencyNow(*body->model, body->state))
-           << " substeps for its material; with " << substeps << " (max_substeps) it has " << 100.0 * factor
-           << " % of its stiffness";
+           << " substeps for its material; with " << substeps << " (max_substeps) it deforms "
+           << 1.0 / std::sqrt(factor) << " times as slowly, to where it would";
       say(EventType::kOverBudget, body->name, 0, text.str());
     }
     body->stiffness_factor = factor;
@@ -234,6 +236,17 @@ void World::Impl::stepSurfaces(double h_frame) {
         work.picks.push_back(&pick);
     }
     report.substeps = std::max(report.substeps, static_cast<std::size_t>(work.substeps));
+    for (std::size_t k = 0; k < work.bodies.size(); ++k) {
+      const WorldBody& body = *work.bodies[k];
+      const Index b = islands[n].bodies[k];
+      // As what deforms answers its own stiffness (see matchAndMove): a body that is slowed, or clusters drawn to
+      // shape.
+      if (!surface_contacts.needed()[b]) continue;
+      if (body.material.elastic())
+        surface_contacts.setRigidShare(b, body.surface_model->groups.get(), 1.0 - body.stiffness_factor);
+      else if (body.surface_model->groups)
+        surface_contacts.setRigidShare(b, body.surface_model->groups.get(), body.material.alpha);
+    }
   }
   if (2 * largest > total) {
     for (std::size_t n = 0; n < islands.size(); ++n) stepIsland(n, h_frame, for_each);

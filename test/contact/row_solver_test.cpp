@@ -32,6 +32,7 @@ struct Clash {
                                 Vec3(random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1)));
         after[n].push_back(p + kH * velocities[n].back());
       }
+      rigid_share = share;
       groups[n] = std::make_unique<RigidGroups>(std::vector<Index>{0, count}, members, weights, masses[n]);
       Collider& c = colliders[static_cast<std::size_t>(n)];
       c.key = static_cast<std::uint64_t>(n + 1);
@@ -44,8 +45,6 @@ struct Clash {
       c.velocities = velocities[n].data();
       c.inverse_masses = inverse[n].data();
       c.particles = count;
-      c.groups = groups[n].get();
-      c.rigid_share = share;
       c.friction = friction;
     }
   }
@@ -62,6 +61,7 @@ struct Clash {
     contacts.findPairs(scene, colliders, counters);
     contacts.findMoved(scene, colliders);
     contacts.find(scene, colliders, counters);
+    for (Index n = 0; n < 2; ++n) contacts.setRigidShare(n, groups[n].get(), rigid_share);
     return counters;
   }
   /// The bodies would be at `after`; where they come to be is written there.
@@ -109,6 +109,7 @@ struct Clash {
   std::array<std::vector<double>, 2> masses, inverse;
   std::array<Points, 2> before, after, velocities, places;
   std::array<std::unique_ptr<RigidGroups>, 2> groups;
+  double rigid_share = 0.0;
   std::vector<Collider> colliders{2};
 };
 
@@ -143,13 +144,61 @@ TEST(RowSolver, WhoIsHeldStaysAndTheOtherIsStopped) {
   Clash clash(0.0, 0.5);
   std::fill(clash.inverse[0].begin(), clash.inverse[0].end(), 0.0);
   clash.colliders[0].held = true;
-  clash.colliders[0].groups = nullptr;
   clash.after[0] = clash.before[0];
   SurfaceContacts contacts;
   EXPECT_GT(solve(clash, contacts).active, 0u);
   EXPECT_TRUE(contacts.islands()[0].free.empty());
   for (std::size_t i = 0; i < clash.before[0].size(); ++i) EXPECT_EQ(clash.after[0][i], clash.before[0][i]);
   for (const Vec3& p : clash.after[1]) EXPECT_GT(p.z(), 0.045);
+}
+
+// A spring on the corner of a body: what does not move the body as a whole moves the corner, by a tenth of its mass'
+// way.
+TEST(RowSolver, ASpringMovesTheBodyAsAWholeAndTheRestByItsShare) {
+  const std::vector<double> masses = {0.1, 0.2, 0.3, 0.4};
+  const Points places = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};
+  const RigidGroups whole({0, 4}, {0, 1, 2, 3}, std::vector<double>(4, 1.0), masses);
+  for (const bool held : {false, true}) {
+    std::vector<Slot> now(4), before(4);
+    for (std::size_t i = 0; i < 4; ++i)
+      now[i] = before[i] = {places[i].x(), places[i].y(), places[i].z(), 1.0 / masses[i]};
+    std::vector<SolverBody> bodies(1);
+    bodies[0].now = now.data();
+    bodies[0].before = before.data();
+    bodies[0].particles = 4;
+    bodies[0].edge_length = 1.0;
+    bodies[0].rigid_share = 0.9;
+    if (!held) {
+      bodies[0].groups = &whole;
+      bodies[0].motions.resize(1);
+    }
+    const std::vector<Index> patch = {1, 3};
+    const std::vector<double> weights = {0.75, 0.25};
+    std::vector<SpringRow> springs(1);
+    springs[0].patch = &patch;
+    springs[0].weights = &weights;
+    springs[0].end = Vec3(0.8, 0.3, 0.2);
+    springs[0].stiffness = 50.0;
+    SolverStep step;
+    step.h = 0.1;
+    SolverScratch scratch;
+    SolverCounters counters;
+    std::vector<SolverRows> none;
+    solveRows(none, springs, bodies, step, {}, scratch, counters);
+    Vec3 impulse = Vec3::Zero(), couple = Vec3::Zero(), mean = Vec3::Zero();
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Vec3 way = Vec3(now[i].x, now[i].y, now[i].z) - places[i];
+      impulse += masses[i] * way;
+      couple += masses[i] * places[i].cross(way);
+      if (held) EXPECT_EQ(i == 1 || i == 3, !way.isZero(0.0));
+    }
+    for (std::size_t k = 0; k < 2; ++k) mean += weights[k] * Vec3(now[patch[k]].x, now[patch[k]].y, now[patch[k]].z);
+    const Vec3 given = springs[0].impulse;
+    EXPECT_LT((given - 50.0 * 0.01 * (springs[0].end - mean)).norm(), 1e-12) << "the force of its stretch";
+    const Vec3 at = 0.75 * places[1] + 0.25 * places[3];
+    EXPECT_LT((impulse - (held ? 0.1 : 1.0) * given).norm(), 1e-12);
+    EXPECT_LT((couple - (held ? 0.1 : 1.0) * at.cross(given)).norm(), 1e-12);
+  }
 }
 
 // A point on what is held, but for a share that is rounding: what is free of it would have to go to the moon.

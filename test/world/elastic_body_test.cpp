@@ -98,7 +98,7 @@ TEST(ElasticBody, SagsTheSameAtEveryStep) {
   EXPECT_NEAR(sagAt(120.0, 40), sag, 0.01 * -sag);
 }
 
-TEST(ElasticBody, TooFewSubstepsSoftenItAndSaySo) {
+TEST(ElasticBody, TooFewSubstepsSlowItAndSaySo) {
   WorldSettings settings;
   settings.ground.reset();
   settings.max_substeps = 2;

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "meshless_surgery/geometry/inside.h"
+#include "meshless_surgery/geometry/measures.h"
 #include "support/bodies.h"
 
 namespace meshless {
@@ -160,7 +161,7 @@ TEST(SurfaceContact, AnEggThatRocksComesToRestAndSleeps) {
   egg.spacing = 0.0125;
   egg.material.youngs_modulus = 1e4;
   add(world, egg, Vec3(0.1, 0.3, 0.0), Vec3(-6.0, 2.0, 0.0));
-  run(world, 5.5);
+  run(world, 6.5);
   const BodySnapshot body = seen(world).bodies[0];
   EXPECT_TRUE(body.asleep) << std::sqrt(2.0 * body.measures.kinetic_energy / body.model->mass) << " m/s";
   EXPECT_GT(body.measures.centre_of_mass.head<2>().norm(), 0.05) << "it has rolled";
@@ -435,6 +436,157 @@ TEST(SurfaceContact, BodiesSpawnedInEachOtherPartSlowly) {
   EXPECT_LT(depthBetween(world), 0.001);
   for (const BodySnapshot& b : seen(world).bodies) EXPECT_NEAR(b.measures.volume, 1e-3, 2e-5);
 }
+
+// A bar that swings for seconds under a small load: at its turning points it is slow and far from its rest.
+TEST(SurfaceContact, ASlowSwingIsNotTakenForRest) {
+  double tip[2];
+  for (const bool sleeps : {false, true}) {
+    WorldSettings settings = surface();
+    settings.ground.reset();
+    settings.gravity = Vec3(0, 0, -0.05);
+    settings.sleep = sleeps;
+    World world(settings);
+    BodyDef bar = block("bar", Vec3::Zero(), Vec3(0.2, 0.05, 0.05));
+    bar.material.youngs_modulus = 5000.0;
+    bar.material.damping = 2.0;
+    bar.fixed.push_back(Box{Vec3(-1, -1, -1), Vec3(-0.09, 1, 1)});
+    add(world, bar);
+    run(world, 15.0);
+    EXPECT_EQ(seen(world).bodies[0].asleep, sleeps);
+    tip[sleeps] = boundsOf(seen(world).bodies[0].surface).min.z() + 0.025;
+  }
+  EXPECT_LT(tip[0], -1e-3);
+  EXPECT_NEAR(tip[1], tip[0], 0.01 * -tip[0]);
+}
+
+TEST(SurfaceContact, WhatSleepsUnderThePushSphereIsPressedAsBeforeAndAPoseThatStaysLeavesItAsleep) {
+  World world(surface());
+  add(world, slab("slab", Vec3(0, 0, 0.0255), 2e4));
+  add(world, block("beside", Vec3(0.5, 0, 0.5)));  // it falls meanwhile
+  PushCommand push;
+  push.radius = 0.03;
+  push.position = Vec3(0.004, 0.003, 0.085);
+  ASSERT_TRUE(world.apply(push).ok());
+  push.position.z() = 0.075;
+  push.speed = 0.1;
+  ASSERT_TRUE(world.apply(push).ok());
+  Vec3 force;
+  for (int n = 0; n < 1200 && !seen(world).bodies[0].asleep; ++n) {
+    force = world.push().force;
+    world.step();
+  }
+  ASSERT_TRUE(seen(world).bodies[0].asleep);
+  ASSERT_GT(force.norm(), 0.1);
+  for (int n = 0; n < 240; ++n) {
+    if (n == 120) add(world, block("late", Vec3(-0.5, 0, 0.3)));
+    ASSERT_TRUE(world.apply(push).ok());
+    world.step();
+    EXPECT_TRUE(seen(world).bodies[0].asleep);
+    EXPECT_TRUE(world.push().touching);
+    EXPECT_LT((world.push().force - force).norm(), 0.02 * force.norm());
+  }
+  push.position.z() = 0.2;
+  ASSERT_TRUE(world.apply(push).ok());
+  run(world, 2.0);
+  EXPECT_EQ(world.push().force.norm(), 0.0);
+  EXPECT_NEAR(boundsOf(seen(world).bodies[0].surface).max.z(), 0.05, 2e-3) << "it comes back";
+}
+
+TEST(SurfaceContact, APickThatIsToldWhereItIsLeavesItsBodyAsleep) {
+  World world(surface());
+  add(world, slab("slab", Vec3(0, 0, 0.0255), 2e4));
+  PickCommand pick;
+  pick.point = Vec3(0, 0, 0.05);
+  MovePickCommand move;
+  move.pick = replyOf<PickReply>(world.apply(pick)).pick;
+  move.target = Vec3(0, 0, 0.053);
+  for (int n = 0; n < 1200 && !seen(world).bodies[0].asleep; ++n) {
+    ASSERT_TRUE(world.apply(move).ok());
+    world.step();
+  }
+  ASSERT_TRUE(seen(world).bodies[0].asleep);
+  const Vec3 force = seen(world).picks[0].force;
+  EXPECT_GT(force.z(), 0.05);
+  ASSERT_TRUE(world.apply(move).ok());
+  run(world, 0.5);
+  EXPECT_TRUE(seen(world).bodies[0].asleep);
+  EXPECT_EQ((seen(world).picks[0].force - force).norm(), 0.0);
+  move.target.z() += 1e-4;
+  ASSERT_TRUE(world.apply(move).ok());
+  EXPECT_FALSE(seen(world).bodies[0].asleep);
+}
+
+// What too few substeps slow comes to rest where enough of them would bring it.
+class SlowedBodies : public ::testing::TestWithParam<const char*> {
+ protected:
+  static BodyDef stiff(BodyDef def, double density = 1000.0) {
+    def.material.youngs_modulus = 4e5;
+    def.material.density = density;
+    def.material.damping = 10.0;
+    return def;
+  }
+
+  // What the scene's name says of it: a length that the material decides on, or a force.
+  static double restingAt(const std::string& scene, int max_substeps, double& factor) {
+    WorldSettings settings = surface();
+    settings.sleep = false;
+    settings.max_substeps = max_substeps;
+    if (scene == "held" || scene == "hung") settings.ground.reset();
+    World world(settings);
+    const bool pressed = scene == "pressed" || scene == "pressed_held";
+    if (scene == "stacked") {
+      add(world, stiff(slab("low", Vec3(0, 0, 0.0255))));
+      add(world, stiff(slab("high", Vec3(0.013, 0.007, 0.0765)), 5000.0));
+    } else if (scene == "held") {
+      BodyDef bar = stiff(block("bar", Vec3::Zero(), Vec3(0.2, 0.05, 0.05)));
+      bar.fixed.push_back(Box{Vec3(-1, -1, -1), Vec3(-0.09, 1, 1)});
+      add(world, bar);
+    } else {
+      BodyDef def = stiff(block("block", Vec3(0, 0, 0.051)), scene == "hung" ? 4000.0 : 1000.0);
+      if (scene == "pressed_held") def.fixed.push_back(Box{Vec3(-1, -1, -1), Vec3(1, 1, 0.02)});
+      add(world, def);
+    }
+    if (scene == "hung") {
+      PickCommand pick;
+      pick.point = Vec3(0, 0, 0.1);
+      pick.stiffness = 5e4;
+      EXPECT_TRUE(world.apply(pick).ok());
+    }
+    if (pressed) {
+      PushCommand push;
+      push.radius = 0.03;
+      push.position = Vec3(0.004, 0.003, 0.14);
+      EXPECT_TRUE(world.apply(push).ok());
+      run(world, 0.1);
+      push.position.z() = 0.125;
+      push.speed = 0.1;
+      EXPECT_TRUE(world.apply(push).ok());
+    }
+    run(world, 8.0);
+    factor = seen(world).bodies[0].stiffness_factor;
+    if (pressed) return world.push().force.z();
+    if (scene == "stacked") return centre(world, 1).z() - 0.0755;
+    const Box box = boundsOf(seen(world).bodies[0].surface);
+    return scene == "held" ? box.min.z() + 0.025 : (box.max - box.min).z() - 0.1;
+  }
+};
+
+TEST_P(SlowedBodies, ComeToRestWhereEnoughSubstepsWouldBringThem) {
+  double factor = 0.0;
+  const double expected = restingAt(GetParam(), 1000, factor);
+  EXPECT_EQ(factor, 1.0);
+  EXPECT_GT(std::abs(expected), 1e-4);
+  const std::string scene = GetParam();
+  const bool meets = scene != "held" && scene != "hung";
+  for (const int most : {meets ? 10 : 6, meets ? 5 : 3}) {
+    const double found = restingAt(GetParam(), most, factor);
+    EXPECT_LT(factor, 0.5);
+    EXPECT_NEAR(found, expected, 0.02 * std::abs(expected)) << most << " substeps, factor " << factor;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, SlowedBodies, ::testing::Values("stacked", "held", "hung", "pressed", "pressed_held"),
+                         [](const auto& info) { return std::string(info.param); });
 
 }  // namespace
 }  // namespace meshless

@@ -43,12 +43,13 @@ struct BodyModel {
   /// Of a body whose cells know how far they are filled (CellFill::kFilled), else null. Cluster c is cell c, corner by
   /// corner.
   std::shared_ptr<const CellLattice> lattice;
-  double cell_mass = 0.0;                     // [kg] of a whole cell of it
-  std::shared_ptr<const ElasticCells> cells;  // of it, where the material is elastic
-  std::vector<ClampPoint> clamp_points;       // of it: where free tissue ends at what is held
-  std::shared_ptr<const Clamp> clamp;         // of them; null where there are none
-  std::vector<double> carried;                // of a corner's weight, by what holds it; empty where nothing does
-  std::vector<bool> tissue;                   // one a corner of it: no ghost; empty where all particles are tissue
+  double cell_mass = 0.0;                             // [kg] of a whole cell of it
+  std::shared_ptr<const ElasticCells> cells;          // of it, where the material is elastic
+  std::vector<ClampPoint> clamp_points;               // of it: where free tissue ends at what is held
+  std::shared_ptr<const Clamp> clamp;                 // of them; null where there are none
+  bool isHeld() const { return any_fixed || clamp; }  // it has no rigid motion of its own
+  std::vector<double> carried;  // of a corner's weight, by what holds it; empty where nothing does
+  std::vector<bool> tissue;     // one a corner of it: no ghost; empty where all particles are tissue
   /// [1/m^2] norm of ElasticRest::spread_inverse: what a cut leaves of a cell can be narrower, so that its stress would
   /// need a shorter step. It resists as a flat cluster does.
   double most_spread_inverse = std::numeric_limits<double>::infinity();

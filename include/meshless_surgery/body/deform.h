@@ -22,7 +22,7 @@ struct StepScratch {
   ClampStep clamp;
   ElasticBatchState elastic;
   std::vector<TouchedParticle> touched;
-  bool lies = false;      // on something that does not move: its spin is damped as what deforms
+  bool lies = false;               // on something that does not move: its spin is damped as what deforms
   Vec3 unreported = Vec3::Zero();  // [kg m/s] of the tool's push that particles do not keep: it does not report that
 };
 
@@ -31,14 +31,17 @@ struct StepScratch {
 /// damping of the motion that deforms and gravity, and moves. Fixed particles stay. beta acts up to 0.95: without any
 /// rigid share energy could grow.
 /// An elastic material instead accelerates by its stress at y = x + v / highestFrequencyNow, whatever h is: a viscosity
-/// that calms the shortest waves and does not change with the step. Where h is more than 1 / highestFrequencyNow, the
-/// stiffness is lowered by stiffnessFactor, so that every step is stable.
+/// that calms the shortest waves and does not change with the step. Where h is more than 1 / highestFrequencyNow, what
+/// deforms is slowed: it has 1 / stiffnessFactor of the inertia, and all that acts on a body moves it as a whole as
+/// ever. So every step is stable, and equilibria are the material's (Olovsson et al. 2005, "Selective mass scaling for
+/// explicit finite element analyses"). What else acts on particles has to do likewise: it moves them by stiffnessFactor
+/// of what their masses say, and a body that is free as a whole by the rest.
 void matchAndMove(const BodyModel& model, const Material& material, const Vec3& gravity, double h, BodyState& state,
                   StepScratch& scratch, MatchCounters& counters);
 
 /// [rad/s] of an elastic body as it is stretched now; 0 for the others.
 double highestFrequencyNow(const BodyModel& model, const BodyState& state);
-/// 0..1: the share of its stiffness that an elastic body has at substeps of h [s]; 1 for the others.
+/// 0..1: mass over inertia of what deforms in an elastic body at substeps of h [s]; 1 for the others.
 double stiffnessFactor(const BodyModel& model, const BodyState& state, double h);
 
 /// v = (x - x_old) / h, after springs and contacts have moved positions. Being pushed out of an obstacle stops a

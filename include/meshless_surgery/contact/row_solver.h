@@ -20,7 +20,7 @@ struct SolverBody {
   Index particles = 0;
   bool moves = true;
   double edge_length = 0.0;             // [m] mean
-  const RigidGroups* groups = nullptr;  // where part of the answer is rigid
+  const RigidGroups* groups = nullptr;  // that part of the answer moves as rigid bodies; null: it moves nothing
   double rigid_share = 0.0;             // 0..1: that part
   std::vector<GroupMotion> motions;     // one a group
   Vec3 leaked = Vec3::Zero();           // [kg m^2] angular momentum times h to be given back
@@ -80,7 +80,12 @@ struct SolverScratch {
     double mass, keep;          // [kg] impulse for a gap that is 1 m short, and what goes of the impulse meanwhile
     double sideways;            // [1/kg] across the normal
   };
+  struct Pull {
+    Mat3 answer;  // [m/(kg m)] of the grasp to an impulse
+    Index levers, end;
+  };
   std::vector<Active> active;
+  std::vector<Pull> pulls;  // one a spring
   std::vector<Lever> levers;
 };
 

@@ -27,8 +27,6 @@ struct Collider {
   const Vec3* velocities = nullptr;         // [m/s]; null: of an obstacle
   const double* inverse_masses = nullptr;   // [1/kg] 0: held
   Index particles = 0;
-  const RigidGroups* groups = nullptr;  // where part of the answer is rigid
-  double rigid_share = 0.0;             // 0..1
   double friction = 0.5;
   double restitution = 0.0;  // 0..1
   PairSearch::Self self = PairSearch::Self::kNo;
@@ -79,6 +77,9 @@ class SurfaceContacts {
   /// Each collider that moves is in one; in the order of their first bodies.
   const std::vector<Island>& islands() const { return islands_; }
 
+  /// Of the answer of a collider to rows and springs in this frame, the part 0..1 that moves `groups` (null: nothing)
+  /// as rigid bodies. None where it is not said.
+  void setRigidShare(Index collider, const RigidGroups* groups, double share);
   /// After the bodies of an island have moved by a substep. previous: [m] at its start, one a particle of each body of
   /// the island. step.warm is set here. first: of the frame.
   void solveIsland(Index island, SolverStep step, bool first, const std::vector<const Vec3*>& previous,

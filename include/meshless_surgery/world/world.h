@@ -21,7 +21,7 @@ struct WorldSettings {
   double ground_friction = 0.5;
   double step_rate = 120.0;  // [Hz] 1..10,000
   int substeps = 1;          // 1..1,000, at the least; an elastic body can need more
-  int max_substeps = 64;     // 1..1,000; beyond it elastic bodies are softer than their material, and it is said
+  int max_substeps = 64;  // 1..1,000; beyond it elastic bodies deform more slowly than their material, and it is said
   ContactMethod contact = ContactMethod::kAuto;
   int threads = 1;                  // 1..64; results do not depend on it to the bit
   bool sleep = true;                // what holds still for half a second costs nothing; with kRestShape and kSurface
@@ -136,7 +136,7 @@ struct BodySnapshot {
   BodyMeasures measures;       // where wanted
   std::size_t tetrahedra = 0;  // 0 until something needs them
   bool asleep = false;
-  double stiffness_factor = 1.0;  // of an elastic material, below 1 where it needs more substeps than it may take
+  double stiffness_factor = 1.0;  // (substeps given / needed)^2 of an elastic material, at most 1
 };
 
 struct WorldSnapshot {
