@@ -30,7 +30,7 @@ struct Clamp {
 
   /// `fixed` corners stay where they were put. A spring of area A weighs as much as kStiff layers of cells,
   /// kStiff A spacing density: softer ones let the body sink, stiffer ones at an angle to the lattice lock its cells,
-  /// which cannot bend along the border (docs/accuracy.md).
+  /// which cannot bend along the border (docs/method.md, Clamps).
   Clamp(const CellLattice& lattice, const std::vector<ClampPoint>& points, const std::vector<bool>& fixed,
         const std::vector<double>& corner_masses, double density);
 
