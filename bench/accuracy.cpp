@@ -11,6 +11,7 @@
 
 #include "laws.h"
 #include "meshless_surgery/base/share_folder.h"
+#include "meshless_surgery/world/world.h"
 #include "plot.h"
 #include "settled_load.h"
 #include "static_load.h"
@@ -123,6 +124,39 @@ bool elasticRows(Table& table, const std::string& folder, const std::vector<doub
   return true;
 }
 
+// The bar under its weight, from soft to stiff and coarse to fine: with the default of max_substeps, which slows what
+// needs more, and with as many as it needs. The run time is that of a frame of 1/120 s.
+bool stiffRows(Table& table, const std::string& folder) {
+  const Result<TruthCase> truth = readTruthCase(folder + "/../calculix/bar_nu45.csv");
+  if (!truth) {
+    std::fprintf(stderr, "%s\n", truth.error().detail.c_str());
+    return false;
+  }
+  for (const double finer : {0.5, 1.0, 2.0})
+    for (const double youngs : {1e3, 1e4, 1e5, 1e6, 1e7}) {
+      std::size_t substeps = 0;
+      for (const int most : {WorldSettings().max_substeps, 1000}) {
+        SettledOptions options;
+        options.finer = finer;
+        options.stiffer = youngs / truth->number("youngs_modulus");
+        options.max_substeps = most;
+        const Result<SettledResult> result = settle(*truth, folder + "/../calculix", options);
+        if (!result) {
+          std::fprintf(stderr, "%s\n", result.error().detail.c_str());
+          return false;
+        }
+        if (result->substeps == substeps) continue;  // the default is enough
+        substeps = result->substeps;
+        table.row("stiff", "bar_nu45 " + std::to_string(result->particles) + " particles",
+                  "max_substeps " + std::to_string(most),
+                  shortNumber(1e-3 * youngs) + " kPa " + std::to_string(substeps) + " substeps " +
+                      shortNumber(result->slower) + " times as slowly" + (result->moving > 3e-4 ? " not at rest" : ""),
+                  result->step_ms, result->error);
+      }
+    }
+  return true;
+}
+
 // Bodies as users have them, through World::step: at the default spacing and finer. The run time is that of a frame.
 // The organ at its own spacings.
 bool settledRows(Table& table, const std::string& folder, const std::string& part, const std::vector<double>& finer) {
@@ -144,7 +178,7 @@ bool settledRows(Table& table, const std::string& folder, const std::string& par
     for (const CellFill cells : {CellFill::kWhole, CellFill::kFilled}) {
       const std::string mode = cells == CellFill::kFilled ? "filled" : "whole";
       const auto add = [&](double times, double spacing) {
-        const Result<SettledResult> result = settle(*truth, entry.folder, cells, times, spacing);
+        const Result<SettledResult> result = settle(*truth, entry.folder, {cells, times, spacing});
         if (!result) {  // a clamp that holds nothing, for one
           table.row("settled", entry.name, mode, "refused", 0.0, 1.0);
           std::fprintf(stderr, "%s: %s\n", entry.name.c_str(), result.error().detail.c_str());
@@ -331,12 +365,13 @@ int main(int argc, char** argv) {
   CLI::App app{"Accuracy of the deformer: accuracy.csv and its plots"};
   std::string out = ".", truth = meshless::shareFolder() + "/bench/truth/data";
   std::string settled;
-  bool quick = false;
+  bool quick = false, stiff = false;
   app.add_option("--out", out, "folder for accuracy.csv and the plots")->check(CLI::ExistingDirectory);
   app.add_option("--truth", truth, "folder of the finite-element truth")->check(CLI::ExistingDirectory);
   app.add_flag("--quick", quick, "coarse bodies and few steps: minutes become seconds");
   CLI::Option* const only =
       app.add_option("--settled", settled, "only bodies as users have them whose name has this in it");
+  app.add_flag("--stiff", stiff, "only a bar from soft to stiff");
   CLI11_PARSE(app, argc, argv);
   Table table;
   table.file.open(out + "/accuracy.csv");
@@ -345,11 +380,13 @@ int main(int argc, char** argv) {
     return 1;
   }
   table.file << "benchmark,case,mode,setting,run_time_ms,error\n";
+  if (stiff) return stiffRows(table, truth) ? 0 : 1;
   if (only->count() > 0) return settledRows(table, truth, settled, {1.0, 1.26, 1.59, 2.0}) ? 0 : 1;
   const std::vector<double> spacings =
       quick ? std::vector<double>{0.0125} : std::vector<double>{0.025, 0.0125, 0.05 / 7.0, 0.00625};
   if (!settledRows(table, truth, "", quick ? std::vector<double>{1.0} : std::vector<double>{1.0, 1.26, 1.59, 2.0}))
     return 1;
+  if (!quick && !stiffRows(table, truth)) return 1;
   if (!elasticRows(table, truth, spacings)) return 1;
   if (!quick && !appearanceRows(table, truth, 0.0125)) return 1;
   lawRows(table, quick ? 500 : 10000,

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/world/world.h"
@@ -59,8 +60,7 @@ SurfaceBinding bindSamples(const BodyModel& model, const Points& places) {
 
 }  // namespace
 
-Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, CellFill cells, double finer,
-                             double spacing) {
+Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, const SettledOptions& options) {
   Result<TriangleMesh> surface = readSurface(folder + "/" + truth.text("surface"));
   if (!surface) return surface.error();
   double largest = 0.0;
@@ -79,31 +79,35 @@ Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, 
     }
   }
   // Damped as the slowest mode of a cantilever asks for: its frequency squared is 1.54 g / sag.
-  const Vec3 gravity = truth.vector("gravity");
-  const double rate = std::sqrt(1.54 * gravity.norm() / largest);
+  const Vec3 gravity = options.stiffer * truth.vector("gravity");
+  double rate = std::sqrt(1.54 * gravity.norm() / largest);
 
   BodyDef def;
   def.name = truth.text("case");
   def.mesh = *surface;
   def.pose = placingOf(truth);
-  def.cells = cells;
+  def.cells = options.cells;
   def.fixed = {heldBy(truth)};
-  def.material.youngs_modulus = truth.number("youngs_modulus");
+  def.material.youngs_modulus = options.stiffer * truth.number("youngs_modulus");
   def.material.poissons_ratio = truth.number("poissons_ratio");
   def.material.density = truth.number("density");
-  def.material.damping = 2.0 * rate;
-  if (!(spacing > 0.0) && finer != 1.0) {
+  def.spacing = options.spacing;
+  if (!(options.spacing > 0.0) && options.finer != 1.0) {
     const Result<PreparedBody> coarse = prepareBody(def);
     if (!coarse) return coarse.error();
-    spacing = coarse->model->spacing / finer;
+    def.spacing = coarse->model->spacing / options.finer;
   }
-  def.spacing = spacing;
   const Pose pose = def.pose;
   Result<PreparedBody> body = prepareBody(std::move(def));
   if (!body) return body.error();
   const BodyModelPtr model = body->model;
 
   WorldSettings settings;
+  settings.max_substeps = options.max_substeps;
+  const double slower =
+      std::max(1.0, highestFrequencyNow(*model, body->state) / settings.step_rate / settings.max_substeps);
+  rate /= slower;
+  body->def.material.damping = 2.0 * rate;
   settings.ground.reset();
   settings.gravity = pose.rotation * gravity;
   settings.contact = ContactMethod::kNone;
@@ -131,7 +135,8 @@ Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, 
       result.moving = std::max(result.moving, (after.particles[i] - before[i]).norm() / largest);
   }
   result.step_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count() / steps;
-  result.share_kept = after.stiffness_factor;
+  result.slower = 1.0 / std::sqrt(after.stiffness_factor);
+  result.substeps = world.snapshot({}).report.substeps;
 
   const Pose rest_frame = restFrame(surface->vertices, model->surface.vertices);
   Points places;

@@ -9,15 +9,23 @@ namespace meshless::bench {
 struct SettledResult {
   double spacing = 0.0;  // [m]
   std::size_t particles = 0;
-  double error = 0.0;  // RMS distance to the truth over its largest displacement; over the surface where it has areas
-  double tip = 0.0;    // displacement over the truth's, where that is largest
-  double share_kept = 1.0;  // of the stiffness
-  double moving = 0.0;      // of the largest displacement, in the last time constant
-  double step_ms = 0.0;     // [ms] of a frame, mean
+  double error = 0.0;   // RMS distance to the truth over its largest displacement; over the surface where it has areas
+  double tip = 0.0;     // displacement over the truth's, where that is largest
+  double slower = 1.0;  // times as slowly as the material it deforms
+  std::size_t substeps = 0;
+  double moving = 0.0;   // of the largest displacement, in the last time constant
+  double step_ms = 0.0;  // [ms] of a frame, mean
 };
 
-/// At the default spacing divided by `finer`, or at `spacing` [m] where that is given. `folder` holds the surface.
-Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, CellFill cells, double finer,
-                             double spacing = 0.0);
+struct SettledOptions {
+  CellFill cells = CellFill::kFilled;
+  double finer = 1.0;    // the default spacing over that of the body
+  double spacing = 0.0;  // [m] 0: by `finer`
+  double stiffer = 1.0;  // Young's modulus and gravity over the truth's: the displacements are the same
+  int max_substeps = 64;
+};
+
+/// `folder` holds the surface.
+Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, const SettledOptions& options);
 
 }  // namespace meshless::bench

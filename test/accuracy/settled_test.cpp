@@ -9,10 +9,10 @@ namespace {
 SettledResult settled(const std::string& name, double finer = 1.0) {
   const Result<TruthCase> truth = readTruthCase(std::string(CALCULIX_FOLDER) + "/" + name + ".csv");
   EXPECT_TRUE(truth.ok()) << (truth.ok() ? "" : truth.error().detail);
-  const Result<SettledResult> result = settle(*truth, CALCULIX_FOLDER, CellFill::kFilled, finer);
+  const Result<SettledResult> result = settle(*truth, CALCULIX_FOLDER, {CellFill::kFilled, finer});
   EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().detail);
   EXPECT_LT(result->moving, 3e-4) << name;
-  EXPECT_EQ(result->share_kept, 1.0) << name;
+  EXPECT_EQ(result->slower, 1.0) << name;
   return *result;
 }
 
