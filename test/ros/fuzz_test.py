@@ -16,7 +16,7 @@ import unittest
 import rospy
 from geometry_msgs.msg import Point, PoseStamped, Quaternion, Vector3
 from meshless_surgery.msg import State
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import JointState, PointCloud2, PointField
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Header
 
@@ -181,6 +181,39 @@ class Fuzzer:
         return SolidPrimitive(type=self.rng.choice([0, 1, 2, 3, 4, 255]),
                               dimensions=[self.number() for _ in range(self.rng.randint(0, 5))])
 
+    def cloud(self):
+        """Points all around a ball, or fields, sizes and bytes that do not belong together."""
+        r = self.rng
+        count = r.choice([0, 1, 3, 50, 400])
+        rows = []
+        for _ in range(count):
+            v = [r.gauss(0, 1) for _ in range(3)]
+            length = math.sqrt(sum(x * x for x in v)) or 1.0
+            rows.append([0.05 * x / length for x in v] if self.sensible or r.random() < 0.9 else [self.number()] * 3)
+        data = b''.join(struct.pack('<3f', *(min(max(x, -3e38), 3e38) for x in row)) for row in rows)
+        fields = [PointField(name, 4 * k, PointField.FLOAT32, 1) for k, name in enumerate('xyz')]
+        cloud = PointCloud2(header=self.header(), height=1, width=count, fields=fields, point_step=12, row_step=12 * count,
+                            data=data, is_dense=True)
+        if self.sensible or r.random() < 0.3:
+            return cloud
+        sizes = [0, 1, 7, 12, count, 12 * count, 65536, 0x7fffffff, 0xffffffff]
+        for name in ('height', 'width', 'point_step', 'row_step'):
+            if r.random() < 0.3:
+                setattr(cloud, name, r.choice(sizes))
+        for field in cloud.fields:
+            if r.random() < 0.2:
+                field.offset = r.choice(sizes)
+            if r.random() < 0.2:
+                field.datatype = r.randint(0, 255)
+            if r.random() < 0.2:
+                field.count = r.choice(sizes)
+            if r.random() < 0.1:
+                field.name = self.string()[:200]
+        cloud.is_bigendian = r.random() < 0.1
+        if r.random() < 0.3:
+            cloud.data = data[:r.randint(0, len(data))]
+        return cloud
+
     def request(self, service):
         """Fields of a call: sensible ones, and others."""
         r = self.rng
@@ -209,6 +242,10 @@ class Fuzzer:
             return dict(name=self.string(), file='' if self.sensible else r.choice(['', self.string(), r.choice(self.files)]),
                         primitive=self.primitive(), pose=self.pose(), scale=r.choice([0.0, 1.0, self.number()]),
                         material='' if self.sensible else r.choice(['', 'soft', self.string()]))
+        if service == 'spawn_cloud':
+            return dict(name=self.string(), cloud=self.cloud(), topic='' if self.sensible else r.choice(['', self.string()]),
+                        timeout=0.001, scale=r.choice([0.0, 1.0, self.number()]), voxel=r.choice([0.0, self.amount()]),
+                        outliers=r.choice([0.0, self.amount()]), material='' if self.sensible else self.string())
         if service in ('remove', 'get_body'):
             fields = dict(name=self.maybe_name())
             if service == 'get_body':

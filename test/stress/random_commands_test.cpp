@@ -53,6 +53,7 @@ Command randomCommand(test::Random& random, int number, std::size_t bodies) {
     }
     case 10: {
       CutCommand command;
+      if (!random.integer(0, 3)) return OpenBladesCommand{static_cast<std::uint32_t>(random.integer(0, 20))};
       if (random.integer(0, 9)) return OpenScissorsCommand{};
       command.blades.x_axis = random.unit();
       command.blades.y_axis = command.blades.x_axis.unitOrthogonal();
