@@ -187,7 +187,7 @@ bool settledRows(Table& table, const std::string& folder, const std::string& par
         const std::string setting = shortNumber(1000.0 * result->spacing) + " mm " + std::to_string(result->particles);
         table.row("settled", entry.name, mode, setting + (result->moving > 3e-4 ? " not at rest" : ""), result->step_ms,
                   result->error);
-        table.row("settled_tip", entry.name, mode, setting, result->step_ms, std::abs(result->tip - 1.0));
+        table.row("settled_tip", entry.name, mode, setting, result->step_ms, result->tip - 1.0);
       };
       if (entry.spacings.empty())
         for (const double times : finer) add(times, 0.0);
