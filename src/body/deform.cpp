@@ -124,12 +124,13 @@ void accelerate(const BodyModel& model, double h, const Points& x, const std::op
 // Damps what deforms and predicts: y = x + h v, but what deforms goes `ahead` instead of h. How long that takes decides
 // on the viscosity, and must not change how a body spins. A body that is held has no rigid motion of its own, and one
 // that lies on something no spin: rolling, tissue is kneaded. Damping
-// comes before the pull: after it, it would weaken the material. Returns the moments of x where it needed them.
-std::optional<MassMoments> dampAndPredict(const BodyModel& model, double h, double ahead, double damping, bool lies,
-                                          const Points& x, Points& v, Points& y) {
-  const double kept = std::exp(-damping * h);
+// comes before the pull: after it, it would weaken the material. quicker: where what deforms is slowed otherwise than
+// before, its energy stays, and so do velocities over the pace. Returns the moments of x where it needed them.
+std::optional<MassMoments> dampAndPredict(const BodyModel& model, double h, double ahead, double damping,
+                                          double quicker, bool lies, const Points& x, Points& v, Points& y) {
+  const double damped = std::exp(-damping * h), kept = quicker * damped;
   y.resize(x.size());
-  if (model.any_fixed || (ahead == h && !(damping > 0.0))) {
+  if (model.any_fixed || (ahead == h && kept == 1.0)) {
     for (std::size_t i = 0; i < x.size(); ++i) {
       v[i] *= kept;
       y[i] = model.fixed[i] ? x[i] : Vec3(x[i] + ahead * v[i]);
@@ -138,7 +139,7 @@ std::optional<MassMoments> dampAndPredict(const BodyModel& model, double h, doub
   }
   const MassMoments moments = momentsOf(model, x);
   const RigidMotion rigid = rigidMotionOf(model, moments, x, v);
-  const double spin_kept = lies ? kept : 1.0;
+  const double spin_kept = lies ? damped : 1.0;
   for (std::size_t i = 0; i < x.size(); ++i) {
     const Vec3 turning = rigid.spin.cross(x[i] - rigid.centre);
     const Vec3 deforming = kept * (v[i] - rigid.velocity - turning), together = rigid.velocity + spin_kept * turning;
@@ -180,9 +181,11 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
   if (material.elastic()) {
     const double fastest = highestFrequencyNow(model, state) * std::sqrt(factor);
     const double ahead = fastest > 0.0 ? 1.0 / fastest : h;
-    moments = dampAndPredict(model, h, ahead, material.damping, scratch.lies, x, v, scratch.predicted);
+    const double pace = std::sqrt(factor), quicker = state.pace > 0.0 ? pace / state.pace : 1.0;
+    state.pace = pace;
+    moments = dampAndPredict(model, h, ahead, material.damping, quicker, scratch.lies, x, v, scratch.predicted);
   } else {
-    moments = dampAndPredict(model, h, viscosityTime(material.alpha, h), material.damping, scratch.lies, x, v,
+    moments = dampAndPredict(model, h, viscosityTime(material.alpha, h), material.damping, 1.0, scratch.lies, x, v,
                              scratch.predicted);
   }
   const Points& y = scratch.predicted;

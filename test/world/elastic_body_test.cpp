@@ -73,6 +73,52 @@ TEST(ElasticBody, FreeInSpaceKeepsItsMomentaAndNeverGainsEnergy) {
   }
 }
 
+// With the inertia that slowing gives to what deforms. It is strained by up to a half, so that its pace changes much.
+TEST(ElasticBody, SlowedItKeepsItsMomentaAndNeverGainsEnergy) {
+  for (const ClusterOptions::Kind kind : {ClusterOptions::Kind::kCells, ClusterOptions::Kind::kAuto})
+    for (const double gain : {2.0, 10.0}) {
+      BodyDef def = softBar();
+      def.clusters.kind = kind;
+      const PreparedBody body = prepared(def);
+      const BodyModel& m = *body.model;
+      BodyState state = body.state;
+      for (std::size_t i = 0; i < m.rest.size(); ++i) {
+        state.positions[i] = m.rest[i].cwiseProduct(Vec3(1.5, 0.8, 0.9));
+        state.velocities[i] = Vec3(1, -2, 0.5) + Vec3(0.2, 0.3, 1.0).cross(m.rest[i]) + Vec3(5.0 * m.rest[i].x(), 0, 0);
+      }
+      StepScratch scratch;
+      MatchCounters counters;
+      const double h = gain / m.highest_frequency;
+      const auto energy = [&] {
+        const RigidMotion rigid = rigidMotionOf(m, state.positions, state.velocities);
+        double together = 0.0, all = 0.0;
+        for (std::size_t i = 0; i < m.rest.size(); ++i) {
+          const Vec3 v = rigid.velocity + rigid.spin.cross(state.positions[i] - rigid.centre);
+          together += 0.5 * m.masses[i] * v.squaredNorm();
+          all += 0.5 * m.masses[i] * state.velocities[i].squaredNorm();
+        }
+        const double elastic = energyOf(m, def.material, state) - all;
+        return together + (all - together) / (state.pace * state.pace) + elastic;
+      };
+      const BodyMeasures before = measureBody(m, state);
+      matchAndMove(m, def.material, Vec3::Zero(), h, state, scratch, counters);
+      const double start = energy();
+      double most = 0.0, slowest = 1.0, quickest = 0.0;
+      for (int step = 0; step < 3000; ++step) {
+        matchAndMove(m, def.material, Vec3::Zero(), h, state, scratch, counters);
+        most = std::max(most, energy());
+        slowest = std::min(slowest, state.pace);
+        quickest = std::max(quickest, state.pace);
+      }
+      EXPECT_LT(most, 1.05 * start) << gain;
+      EXPECT_GT(quickest, 1.1 * slowest);
+      EXPECT_LT(quickest, 0.6);
+      const BodyMeasures after = measureBody(m, state);
+      EXPECT_LT((after.linear_momentum - before.linear_momentum).norm(), 3000e-12 * before.linear_momentum.norm());
+      EXPECT_LT((after.angular_momentum - before.angular_momentum).norm(), 3000e-12 * before.angular_momentum.norm());
+    }
+}
+
 double sagAt(double step_rate, int substeps) {
   WorldSettings settings;
   settings.ground.reset();
