@@ -87,7 +87,8 @@ def scenario(surgeon, play):
     play.check(2 < volume < 0.5e6 * rest.volume, "resected %.1f ml of %.1f ml, cap %.1f cm^2" % (
         volume, 1e6 * rest.volume, 1e4 * cut.cap_area))
     surgeon.live(1.5)
-    play.check(lowest(surgeon.body(lump_side[0]).surface.vertices) > -1e-6, "it lies on the table")
+    least = lowest(surgeon.body(lump_side[0]).surface.vertices)
+    play.check(least > -1e-4, "it lies on the table, its lowest point %.3f mm over it" % (1e3 * least))
     play.say("real-time factor %.2f" % surgeon.state().real_time_factor)
 
 

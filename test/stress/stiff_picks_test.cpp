@@ -74,7 +74,10 @@ TEST_P(StiffPicks, DoNotThrow) {
   // What flies apart then falls, and meets others; more than it had it does not get.
   RecordProperty("dragged", std::to_string(dragged));
   RecordProperty("most", std::to_string(most));
-  if (!stiff_pick.on_ground) EXPECT_LE(most, (kind.elastic ? kMostGainedElastic : 1.1) * dragged + 1e-6);
+  if (stiff_pick.on_ground) return;
+  // What is let go almost at rest may gain more of its own, as what is pulled through others does.
+  const double allowed = kind.elastic ? std::max(kMostGainedElastic * dragged, kMostPulledInContact) : 1.1 * dragged;
+  EXPECT_LE(most, allowed + 1e-6);
 }
 
 struct Held {
