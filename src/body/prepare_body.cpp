@@ -11,6 +11,7 @@
 #include "meshless_surgery/geometry/main_axes.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/nearest.h"
+#include "meshless_surgery/geometry/refine.h"
 #include "meshless_surgery/geometry/sampling.h"
 
 namespace meshless {
@@ -24,6 +25,7 @@ constexpr double kLeastCellFraction = 0.1;         // a sliver of the solid coun
 constexpr double kReach = 1.75;                    // of the spacing: how far neighbours along the body may be
 constexpr std::size_t kMostLinks = 40;             // of the nearest: vertices finer than the spacing have thousands
 constexpr double kLeastMassShare = 0.1;            // of the mean: no particle is so light that contacts throw it
+constexpr double kLongestEdge = 1.5;               // of the spacing: the surface bends as finely as its cells
 
 Error invalid(const std::string& what) { return {ErrorCode::kInvalidArgument, what}; }
 
@@ -363,6 +365,8 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   if (Status holds = checkHeld(def, placed, pose, *model); !holds) return holds.error();
   makeMoments(*model, def.material);
   if (model->lattice) {
+    // What touches a face between its corners dents it there.
+    surface = withShortEdges(std::move(surface), kLongestEdge * model->spacing);
     if (Status bound = bindFilled(def, *model); !bound) return bound.error();
   } else {
     model->binding =

@@ -5,6 +5,7 @@
 #include "cut_pieces.h"
 #include "edge_table.h"
 #include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/refine.h"
 
 namespace meshless {
 namespace cutting {
@@ -231,27 +232,6 @@ Umbrellas umbrellasOf(const Workpiece& work, const Pairing& pairing) {
     umbrellas.vertices[number] = std::min(umbrellas.vertices[number], pairing.ownVertex(c));
   }
   return umbrellas;
-}
-
-/// Replaces a triangle with vertices inside of its edges (kNoIndex: none; k is on the edge from corner k) by smaller
-/// ones.
-void subdivide(const Triangle& t, const std::array<Index, 3>& middles, std::vector<Triangle>& parts) {
-  std::vector<Index> outline;
-  std::size_t first = 0;
-  for (int k = 0; k < 3; ++k) {
-    outline.push_back(t[k]);
-    if (middles[k] == kNoIndex) continue;
-    first = outline.size();
-    outline.push_back(middles[k]);
-  }
-  // A fan from a vertex inside of an edge; with three of them it would leave a flat part, so the corners go first.
-  std::rotate(outline.begin(), outline.begin() + static_cast<std::ptrdiff_t>(first), outline.end());
-  if (outline.size() == 6) {
-    for (const std::size_t k : {1u, 3u, 5u}) parts.push_back({outline[k - 1], outline[k], outline[(k + 1) % 6]});
-    parts.push_back({outline[0], outline[2], outline[4]});
-    return;
-  }
-  for (std::size_t k = 1; k + 1 < outline.size(); ++k) parts.push_back({outline[0], outline[k], outline[k + 1]});
 }
 
 /// Two pairs of triangles may run between the same two vertices, where a surface touches itself along an edge

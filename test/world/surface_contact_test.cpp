@@ -437,6 +437,32 @@ TEST(SurfaceContact, BodiesSpawnedInEachOtherPartSlowly) {
   for (const BodySnapshot& b : seen(world).bodies) EXPECT_NEAR(b.measures.volume, 1e-3, 2e-5);
 }
 
+// Twelve triangles, whose corners the sphere never comes near.
+TEST(SurfaceContact, ABoxOfTwelveTrianglesIsDentedInTheMiddleOfAFace) {
+  double force[2];
+  for (const int parts : {1, 20}) {
+    World world(space());
+    BodyDef def = block("block", Vec3(0, 0, 0.025));
+    def.mesh = boxMesh(Vec3(0.1, 0.1, 0.05), parts, parts, std::max(1, parts / 2));
+    def.spacing = 0.005;
+    def.material.youngs_modulus = 5000.0;
+    def.material.damping = 20.0;
+    def.fixed.push_back(Box{Vec3(-1, -1, -1), Vec3(1, 1, 0)});
+    add(world, def);
+    PushCommand push;
+    push.radius = 0.025;
+    push.position = Vec3(0.0007, 0.0004, 0.076);
+    ASSERT_TRUE(world.apply(push).ok());
+    push.position.z() = 0.072;
+    push.speed = 0.02;
+    ASSERT_TRUE(world.apply(push).ok());
+    run(world, 2.0);
+    force[parts > 1] = world.push().force.z();
+  }
+  EXPECT_NEAR(force[1], 0.218, 0.15 * 0.218) << "by CalculiX";
+  EXPECT_NEAR(force[0], force[1], 0.2 * force[1]);
+}
+
 // A bar that swings for seconds under a small load: at its turning points it is slow and far from its rest.
 TEST(SurfaceContact, ASlowSwingIsNotTakenForRest) {
   double tip[2];
