@@ -7,29 +7,21 @@
 #include <limits>
 
 #include <meshless_surgery/Release.h>
+#include <sensor_msgs/point_cloud2_iterator.h>
 
 namespace meshless {
 namespace {
 
-sensor_msgs::PointField field(const std::string& name, std::uint32_t offset, std::uint8_t type) {
-  sensor_msgs::PointField field;
-  field.name = name;
-  field.offset = offset;
-  field.datatype = type;
-  field.count = 1;
-  return field;
-}
+using sensor_msgs::PointField;
 
-void setSize(sensor_msgs::PointCloud2& cloud, std::size_t points) {
+/// One row, dense, in the machine's own byte order.
+sensor_msgs::PointCloud2 emptyCloud(const std_msgs::Header& header) {
+  sensor_msgs::PointCloud2 cloud;
+  cloud.header = header;
   cloud.height = 1;
-  cloud.width = static_cast<std::uint32_t>(points);
-  cloud.row_step = cloud.width * cloud.point_step;
   cloud.is_dense = true;
-  const std::uint16_t one = 1;
-  std::uint8_t first_byte = 0;
-  std::memcpy(&first_byte, &one, 1);
-  cloud.is_bigendian = first_byte == 0;
-  cloud.data.resize(static_cast<std::size_t>(cloud.row_step));
+  cloud.is_bigendian = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
+  return cloud;
 }
 
 void setXyz(std::uint8_t* to, const Vec3& p) {
@@ -224,16 +216,14 @@ meshless_surgery::Event toEvent(const Event& event, const std_msgs::Header& head
 }
 
 sensor_msgs::PointCloud2 toCloud(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
-  sensor_msgs::PointCloud2 cloud;
-  cloud.header = header;
-  cloud.fields = {field("x", 0, sensor_msgs::PointField::FLOAT32), field("y", 4, sensor_msgs::PointField::FLOAT32),
-                  field("z", 8, sensor_msgs::PointField::FLOAT32), field("body", 12, sensor_msgs::PointField::UINT32),
-                  field("rgb", 16, sensor_msgs::PointField::FLOAT32)};
-  cloud.point_step = 20;
+  sensor_msgs::PointCloud2 cloud = emptyCloud(header);
+  sensor_msgs::PointCloud2Modifier layout(cloud);
+  layout.setPointCloud2Fields(5, "x", 1, PointField::FLOAT32, "y", 1, PointField::FLOAT32, "z", 1, PointField::FLOAT32,
+                              "body", 1, PointField::UINT32, "rgb", 1, PointField::FLOAT32);
   std::size_t points = 0;
   for (const BodySnapshot& body : snapshot.bodies)
     for (Index i = 0; i < body.particles.size(); ++i) points += body.model->isTissue(i);
-  setSize(cloud, points);
+  layout.resize(points);
   std::uint8_t* to = cloud.data.data();
   for (const BodySnapshot& body : snapshot.bodies) {
     const std::uint32_t rgb = packed(body.material.color);
@@ -249,12 +239,10 @@ sensor_msgs::PointCloud2 toCloud(const WorldSnapshot& snapshot, const std_msgs::
 }
 
 sensor_msgs::PointCloud2 toCloud(const Points& points, const std_msgs::Header& header) {
-  sensor_msgs::PointCloud2 cloud;
-  cloud.header = header;
-  cloud.fields = {field("x", 0, sensor_msgs::PointField::FLOAT32), field("y", 4, sensor_msgs::PointField::FLOAT32),
-                  field("z", 8, sensor_msgs::PointField::FLOAT32)};
-  cloud.point_step = 12;
-  setSize(cloud, points.size());
+  sensor_msgs::PointCloud2 cloud = emptyCloud(header);
+  sensor_msgs::PointCloud2Modifier layout(cloud);
+  layout.setPointCloud2Fields(3, "x", 1, PointField::FLOAT32, "y", 1, PointField::FLOAT32, "z", 1, PointField::FLOAT32);
+  layout.resize(points.size());
   std::uint8_t* to = cloud.data.data();
   for (const Vec3& p : points) {
     setXyz(to, p);
