@@ -11,7 +11,7 @@ CHECKOUT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 # How includes begin -> the key of package.xml. '': the compiler's, the system's and our own.
 INCLUDES = (
-    (r'ros/package\.h', 'roslib'), (r'ros/|XmlRpcValue\.h', 'roscpp'), (r'(pluginlib|rviz|diagnostic_updater|tf2|tf2_ros|actionlib)/', None),
+    (r'ros/package\.h', 'roslib'), (r'ros/|XmlRpcValue\.h', 'roscpp'), (r'(pluginlib|rviz|diagnostic_updater|tf2|tf2_eigen|tf2_ros|actionlib)/', None),
     (r'\w+_(msgs|srvs)/', None), (r'(Eigen|unsupported/Eigen)/', 'eigen'), (r'CGAL/', 'libcgal-dev'), (r'pcl/', 'libpcl-all-dev'),
     (r'yaml-cpp/', 'yaml-cpp'), (r'tbb/', 'tbb'), (r'zlib\.h', 'zlib'), (r'nanoflann\.hpp', 'libnanoflann-dev'),
     (r'cereal/', 'libcereal-dev'), (r'CLI/', 'cli11'), (r'(Q[A-Z]\w*|Qt\w*/.*)$', 'qtbase5-dev'), (r'Ogre\w*\.h', 'rviz'),
@@ -37,7 +37,7 @@ DEBIAN = {
     'python3-rospkg-modules': ['python3-rospkg'], 'xvfb': ['xvfb'], 'xdotool': ['xdotool'], 'imagemagick': ['imagemagick'],
     'rosbash': ['rosbash'], 'message_generation': ['ros-message-generation'], 'message_runtime': ['ros-message-runtime'],
     'roscpp': ['libroscpp-dev'], 'roslib': ['libroslib-dev'], 'rostest': ['librostest-dev', 'python3-rostest'],
-    'tf2': ['libtf2-dev'], 'tf2_ros': ['libtf2-ros-dev', 'python3-tf2-ros'], 'diagnostic_updater': ['libdiagnostic-updater-dev'],
+    'tf2': ['libtf2-dev'], 'tf2_eigen': ['libtf2-eigen-dev'], 'tf2_ros': ['libtf2-ros-dev', 'python3-tf2-ros'], 'diagnostic_updater': ['libdiagnostic-updater-dev'],
     'actionlib': ['libactionlib-dev', 'python3-actionlib'],
     'rosgraph_msgs': [], 'genpy': [], 'rosgraph': [], 'rosunit': [], 'tf2_msgs': ['ros-tf2-msgs'],  # come with rospy, rostest
 }

@@ -8,6 +8,7 @@
 
 #include <meshless_surgery/Release.h>
 #include <sensor_msgs/point_cloud2_iterator.h>
+#include <tf2_eigen/tf2_eigen.h>
 
 namespace meshless {
 namespace {
@@ -39,13 +40,7 @@ std::uint32_t packed(const Color& color) {
 
 }  // namespace
 
-geometry_msgs::Point toPoint(const Vec3& v) {
-  geometry_msgs::Point point;
-  point.x = v.x();
-  point.y = v.y();
-  point.z = v.z();
-  return point;
-}
+geometry_msgs::Point toPoint(const Vec3& v) { return tf2::toMsg(v); }
 
 std_msgs::ColorRGBA toColor(const Color& color) {
   std_msgs::ColorRGBA message;
@@ -58,20 +53,10 @@ std_msgs::ColorRGBA toColor(const Color& color) {
 
 geometry_msgs::Vector3 toVector(const Vec3& v) {
   geometry_msgs::Vector3 vector;
-  vector.x = v.x();
-  vector.y = v.y();
-  vector.z = v.z();
-  return vector;
+  return tf2::toMsg(v, vector);
 }
 
-geometry_msgs::Quaternion toQuaternion(const Quat& q) {
-  geometry_msgs::Quaternion quaternion;
-  quaternion.x = q.x();
-  quaternion.y = q.y();
-  quaternion.z = q.z();
-  quaternion.w = q.w();
-  return quaternion;
-}
+geometry_msgs::Quaternion toQuaternion(const Quat& q) { return tf2::toMsg(q); }
 
 geometry_msgs::Pose toPose(const Pose& pose) {
   geometry_msgs::Pose message;
