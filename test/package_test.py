@@ -14,7 +14,7 @@ INCLUDES = (
     (r'ros/package\.h', 'roslib'), (r'ros/|XmlRpcValue\.h', 'roscpp'), (r'(pluginlib|rviz|diagnostic_updater|tf2|tf2_eigen|tf2_ros|actionlib)/', None),
     (r'\w+_(msgs|srvs)/', None), (r'(Eigen|unsupported/Eigen)/', 'eigen'), (r'CGAL/', 'libcgal-dev'), (r'pcl/', 'libpcl-all-dev'),
     (r'yaml-cpp/', 'yaml-cpp'), (r'tbb/', 'tbb'), (r'zlib\.h', 'zlib'), (r'nanoflann\.hpp', 'libnanoflann-dev'),
-    (r'cereal/', 'libcereal-dev'), (r'CLI/', 'cli11'), (r'(Q[A-Z]\w*|Qt\w*/.*)$', 'qtbase5-dev'), (r'Ogre\w*\.h', 'rviz'),
+    (r'cereal/', 'libcereal-dev'), (r'utf8\.h$', 'libpcl-all-dev'), (r'CLI/', 'cli11'), (r'(Q[A-Z]\w*|Qt\w*/.*)$', 'qtbase5-dev'), (r'Ogre\w*\.h', 'rviz'),
     (r'gtest/', 'gtest'), (r'benchmark/', 'libbenchmark-dev'), (r'(BulletSoftBody/|bt\w+\.h)', 'bullet'),
     (r'(sys/\w+|unistd|immintrin|xmmintrin|fcntl|malloc|time|limits|dirent|execinfo|stdio|signal|poll|sched)(\.h)?$', ''),
     (r'meshless_surgery/', ''), (r'[a-z_]+$', ''),
@@ -29,7 +29,7 @@ PROGRAMS = {'rosrun': 'rosbash', 'roslaunch': 'roslaunch', 'rosmaster': 'rosmast
             'rosbag': 'rosbag', 'rosnode': 'rosnode', 'ip': '', 'Xvfb': 'xvfb', 'xdotool': 'xdotool', 'import': 'imagemagick'}
 # Key of package.xml -> Debian's packages, where they have other names than the key of ROS.
 DEBIAN = {
-    'catkin': ['catkin'], 'eigen': ['libeigen3-dev'], 'libcgal-dev': ['libcgal-dev'], 'libpcl-all-dev': ['libpcl-dev'],
+    'catkin': ['catkin'], 'eigen': ['libeigen3-dev'], 'libcgal-dev': ['libcgal-dev'], 'libpcl-all-dev': ['libpcl-dev', 'libutfcpp-dev'],
     'yaml-cpp': ['libyaml-cpp-dev'], 'tbb': ['libtbb-dev'], 'zlib': ['zlib1g-dev'], 'libnanoflann-dev': ['libnanoflann-dev'],
     'libcereal-dev': ['libcereal-dev'], 'cli11': ['libcli11-dev'], 'qtbase5-dev': ['qtbase5-dev'], 'libqt5-widgets': [],
     'gtest': ['libgtest-dev'], 'libbenchmark-dev': ['libbenchmark-dev'], 'bullet': ['libbullet-dev'], 'rviz': ['rviz', 'librviz-dev'],
@@ -44,7 +44,7 @@ DEBIAN = {
 # CMake's package -> the key. Those of catkin have the key's name.
 FOUND = {'Eigen3': 'eigen', 'CGAL': 'libcgal-dev', 'nanoflann': 'libnanoflann-dev', 'yaml-cpp': 'yaml-cpp', 'cereal': 'libcereal-dev',
          'ZLIB': 'zlib', 'PCL': 'libpcl-all-dev', 'TBB': 'tbb', 'CLI11': 'cli11', 'Qt5': 'qtbase5-dev', 'GTest': 'gtest',
-         'benchmark': 'libbenchmark-dev', 'BULLET': 'bullet', 'Threads': '', 'PkgConfig': ''}
+         'benchmark': 'libbenchmark-dev', 'BULLET': 'bullet', 'utf8cpp': 'libpcl-all-dev', 'Threads': '', 'PkgConfig': ''}
 
 
 def read(path):
