@@ -5,6 +5,9 @@ find_package(roslib REQUIRED)
 target_include_directories(${PROJECT_NAME}_ros SYSTEM PRIVATE ${roslib_INCLUDE_DIRS})
 target_link_libraries(${PROJECT_NAME}_ros PRIVATE ${roslib_LIBRARIES})
 
+find_package(utf8cpp REQUIRED)  # headers alone
+target_link_libraries(${PROJECT_NAME}_ros PRIVATE utf8cpp)
+
 target_compile_definitions(${PROJECT_NAME}_ros PRIVATE MESHLESS_SURGERY_VERSION="${${PROJECT_NAME}_VERSION}")
 
 target_include_directories(deformer_node PRIVATE include)

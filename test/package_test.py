@@ -11,10 +11,10 @@ CHECKOUT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 # How includes begin -> the key of package.xml. '': the compiler's, the system's and our own.
 INCLUDES = (
-    (r'ros/package\.h', 'roslib'), (r'ros/|XmlRpcValue\.h', 'roscpp'), (r'(pluginlib|rviz|diagnostic_updater|tf2|tf2_ros|actionlib)/', None),
+    (r'ros/package\.h', 'roslib'), (r'ros/|XmlRpcValue\.h', 'roscpp'), (r'(pluginlib|rviz|diagnostic_updater|tf2|tf2_eigen|tf2_ros|actionlib)/', None),
     (r'\w+_(msgs|srvs)/', None), (r'(Eigen|unsupported/Eigen)/', 'eigen'), (r'CGAL/', 'libcgal-dev'), (r'pcl/', 'libpcl-all-dev'),
     (r'yaml-cpp/', 'yaml-cpp'), (r'tbb/', 'tbb'), (r'zlib\.h', 'zlib'), (r'nanoflann\.hpp', 'libnanoflann-dev'),
-    (r'cereal/', 'libcereal-dev'), (r'CLI/', 'cli11'), (r'(Q[A-Z]\w*|Qt\w*/.*)$', 'qtbase5-dev'), (r'Ogre\w*\.h', 'rviz'),
+    (r'cereal/', 'libcereal-dev'), (r'utf8\.h$', 'libpcl-all-dev'), (r'CLI/', 'cli11'), (r'(Q[A-Z]\w*|Qt\w*/.*)$', 'qtbase5-dev'), (r'Ogre\w*\.h', 'rviz'),
     (r'gtest/', 'gtest'), (r'benchmark/', 'libbenchmark-dev'), (r'(BulletSoftBody/|bt\w+\.h)', 'bullet'),
     (r'(sys/\w+|unistd|immintrin|xmmintrin|fcntl|malloc|time|limits|dirent|execinfo|stdio|signal|poll|sched)(\.h)?$', ''),
     (r'meshless_surgery/', ''), (r'[a-z_]+$', ''),
@@ -29,7 +29,7 @@ PROGRAMS = {'rosrun': 'rosbash', 'roslaunch': 'roslaunch', 'rosmaster': 'rosmast
             'rosbag': 'rosbag', 'rosnode': 'rosnode', 'ip': '', 'Xvfb': 'xvfb', 'xdotool': 'xdotool', 'import': 'imagemagick'}
 # Key of package.xml -> Debian's packages, where they have other names than the key of ROS.
 DEBIAN = {
-    'catkin': ['catkin'], 'eigen': ['libeigen3-dev'], 'libcgal-dev': ['libcgal-dev'], 'libpcl-all-dev': ['libpcl-dev'],
+    'catkin': ['catkin'], 'eigen': ['libeigen3-dev'], 'libcgal-dev': ['libcgal-dev'], 'libpcl-all-dev': ['libpcl-dev', 'libutfcpp-dev'],
     'yaml-cpp': ['libyaml-cpp-dev'], 'tbb': ['libtbb-dev'], 'zlib': ['zlib1g-dev'], 'libnanoflann-dev': ['libnanoflann-dev'],
     'libcereal-dev': ['libcereal-dev'], 'cli11': ['libcli11-dev'], 'qtbase5-dev': ['qtbase5-dev'], 'libqt5-widgets': [],
     'gtest': ['libgtest-dev'], 'libbenchmark-dev': ['libbenchmark-dev'], 'bullet': ['libbullet-dev'], 'rviz': ['rviz', 'librviz-dev'],
@@ -37,14 +37,14 @@ DEBIAN = {
     'python3-rospkg-modules': ['python3-rospkg'], 'xvfb': ['xvfb'], 'xdotool': ['xdotool'], 'imagemagick': ['imagemagick'],
     'rosbash': ['rosbash'], 'message_generation': ['ros-message-generation'], 'message_runtime': ['ros-message-runtime'],
     'roscpp': ['libroscpp-dev'], 'roslib': ['libroslib-dev'], 'rostest': ['librostest-dev', 'python3-rostest'],
-    'tf2': ['libtf2-dev'], 'tf2_ros': ['libtf2-ros-dev', 'python3-tf2-ros'], 'diagnostic_updater': ['libdiagnostic-updater-dev'],
+    'tf2': ['libtf2-dev'], 'tf2_eigen': ['libtf2-eigen-dev'], 'tf2_ros': ['libtf2-ros-dev', 'python3-tf2-ros'], 'diagnostic_updater': ['libdiagnostic-updater-dev'],
     'actionlib': ['libactionlib-dev', 'python3-actionlib'],
     'rosgraph_msgs': [], 'genpy': [], 'rosgraph': [], 'rosunit': [], 'tf2_msgs': ['ros-tf2-msgs'],  # come with rospy, rostest
 }
 # CMake's package -> the key. Those of catkin have the key's name.
 FOUND = {'Eigen3': 'eigen', 'CGAL': 'libcgal-dev', 'nanoflann': 'libnanoflann-dev', 'yaml-cpp': 'yaml-cpp', 'cereal': 'libcereal-dev',
          'ZLIB': 'zlib', 'PCL': 'libpcl-all-dev', 'TBB': 'tbb', 'CLI11': 'cli11', 'Qt5': 'qtbase5-dev', 'GTest': 'gtest',
-         'benchmark': 'libbenchmark-dev', 'BULLET': 'bullet', 'Threads': '', 'PkgConfig': ''}
+         'benchmark': 'libbenchmark-dev', 'BULLET': 'bullet', 'utf8cpp': 'libpcl-all-dev', 'Threads': '', 'PkgConfig': ''}
 
 
 def read(path):

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include <utf8.h>
+
 namespace meshless {
 
 std::string formatNumber(double value) {
@@ -14,41 +16,14 @@ std::string formatNumber(double value) {
   return text;
 }
 
-namespace {
-
-/// Bytes of the UTF-8 character that begins there; 0 where none does: Unicode's table 3-7.
-std::size_t characterAt(const std::string& text, std::size_t at) {
-  const auto byte = [&](std::size_t k) { return at + k < text.size() ? static_cast<unsigned char>(text[at + k]) : 0u; };
-  const unsigned first = byte(0);
-  if (first < 0x80) return 1;
-  std::size_t length = 0;
-  if (first >= 0xc2 && first < 0xe0) length = 2;
-  if (first >= 0xe0 && first < 0xf0) length = 3;
-  if (first >= 0xf0 && first < 0xf5) length = 4;
-  for (std::size_t k = 1; k < length; ++k)
-    if ((byte(k) & 0xc0) != 0x80) return 0;
-  // Neither longer than need be, nor half of a pair, nor beyond U+10FFFF.
-  if ((first == 0xe0 && byte(1) < 0xa0) || (first == 0xed && byte(1) >= 0xa0) || (first == 0xf0 && byte(1) < 0x90) ||
-      (first == 0xf4 && byte(1) >= 0x90))
-    return 0;
-  return length;
-}
-
-}  // namespace
-
 std::string printable(const std::string& text, std::size_t most) {
-  std::string shown;
-  std::size_t at = 0;
-  while (at < text.size()) {
-    const std::size_t length = characterAt(text, at);
-    if (at + std::max<std::size_t>(length, 1) > most) return shown + "...";
-    if (length == 0 || static_cast<unsigned char>(text[at]) < 0x20 || text[at] == 0x7f)
-      shown += '?';
-    else
-      shown.append(text, at, length);
-    at += std::max<std::size_t>(length, 1);
-  }
-  return shown;
+  std::string shown = text.substr(0, most + 3);  // with all of the character in which it is cut
+  for (auto at = shown.begin(); (at = utf8::find_invalid(at, shown.end())) != shown.end();) *at = '?';
+  std::replace_if(
+      shown.begin(), shown.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
+  if (text.size() <= most) return shown;
+  while (most > 0 && (static_cast<unsigned char>(shown[most]) & 0xc0) == 0x80) --most;
+  return shown.substr(0, most) + "...";
 }
 
 void BorderCheck::fault(const std::string& sentence) {

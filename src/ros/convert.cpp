@@ -7,29 +7,22 @@
 #include <limits>
 
 #include <meshless_surgery/Release.h>
+#include <sensor_msgs/point_cloud2_iterator.h>
+#include <tf2_eigen/tf2_eigen.h>
 
 namespace meshless {
 namespace {
 
-sensor_msgs::PointField field(const std::string& name, std::uint32_t offset, std::uint8_t type) {
-  sensor_msgs::PointField field;
-  field.name = name;
-  field.offset = offset;
-  field.datatype = type;
-  field.count = 1;
-  return field;
-}
+using sensor_msgs::PointField;
 
-void setSize(sensor_msgs::PointCloud2& cloud, std::size_t points) {
+/// One row, dense, in the machine's own byte order.
+sensor_msgs::PointCloud2 emptyCloud(const std_msgs::Header& header) {
+  sensor_msgs::PointCloud2 cloud;
+  cloud.header = header;
   cloud.height = 1;
-  cloud.width = static_cast<std::uint32_t>(points);
-  cloud.row_step = cloud.width * cloud.point_step;
   cloud.is_dense = true;
-  const std::uint16_t one = 1;
-  std::uint8_t first_byte = 0;
-  std::memcpy(&first_byte, &one, 1);
-  cloud.is_bigendian = first_byte == 0;
-  cloud.data.resize(static_cast<std::size_t>(cloud.row_step));
+  cloud.is_bigendian = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
+  return cloud;
 }
 
 void setXyz(std::uint8_t* to, const Vec3& p) {
@@ -47,13 +40,7 @@ std::uint32_t packed(const Color& color) {
 
 }  // namespace
 
-geometry_msgs::Point toPoint(const Vec3& v) {
-  geometry_msgs::Point point;
-  point.x = v.x();
-  point.y = v.y();
-  point.z = v.z();
-  return point;
-}
+geometry_msgs::Point toPoint(const Vec3& v) { return tf2::toMsg(v); }
 
 std_msgs::ColorRGBA toColor(const Color& color) {
   std_msgs::ColorRGBA message;
@@ -66,20 +53,10 @@ std_msgs::ColorRGBA toColor(const Color& color) {
 
 geometry_msgs::Vector3 toVector(const Vec3& v) {
   geometry_msgs::Vector3 vector;
-  vector.x = v.x();
-  vector.y = v.y();
-  vector.z = v.z();
-  return vector;
+  return tf2::toMsg(v, vector);
 }
 
-geometry_msgs::Quaternion toQuaternion(const Quat& q) {
-  geometry_msgs::Quaternion quaternion;
-  quaternion.x = q.x();
-  quaternion.y = q.y();
-  quaternion.z = q.z();
-  quaternion.w = q.w();
-  return quaternion;
-}
+geometry_msgs::Quaternion toQuaternion(const Quat& q) { return tf2::toMsg(q); }
 
 geometry_msgs::Pose toPose(const Pose& pose) {
   geometry_msgs::Pose message;
@@ -224,16 +201,14 @@ meshless_surgery::Event toEvent(const Event& event, const std_msgs::Header& head
 }
 
 sensor_msgs::PointCloud2 toCloud(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
-  sensor_msgs::PointCloud2 cloud;
-  cloud.header = header;
-  cloud.fields = {field("x", 0, sensor_msgs::PointField::FLOAT32), field("y", 4, sensor_msgs::PointField::FLOAT32),
-                  field("z", 8, sensor_msgs::PointField::FLOAT32), field("body", 12, sensor_msgs::PointField::UINT32),
-                  field("rgb", 16, sensor_msgs::PointField::FLOAT32)};
-  cloud.point_step = 20;
+  sensor_msgs::PointCloud2 cloud = emptyCloud(header);
+  sensor_msgs::PointCloud2Modifier layout(cloud);
+  layout.setPointCloud2Fields(5, "x", 1, PointField::FLOAT32, "y", 1, PointField::FLOAT32, "z", 1, PointField::FLOAT32,
+                              "body", 1, PointField::UINT32, "rgb", 1, PointField::FLOAT32);
   std::size_t points = 0;
   for (const BodySnapshot& body : snapshot.bodies)
     for (Index i = 0; i < body.particles.size(); ++i) points += body.model->isTissue(i);
-  setSize(cloud, points);
+  layout.resize(points);
   std::uint8_t* to = cloud.data.data();
   for (const BodySnapshot& body : snapshot.bodies) {
     const std::uint32_t rgb = packed(body.material.color);
@@ -249,12 +224,10 @@ sensor_msgs::PointCloud2 toCloud(const WorldSnapshot& snapshot, const std_msgs::
 }
 
 sensor_msgs::PointCloud2 toCloud(const Points& points, const std_msgs::Header& header) {
-  sensor_msgs::PointCloud2 cloud;
-  cloud.header = header;
-  cloud.fields = {field("x", 0, sensor_msgs::PointField::FLOAT32), field("y", 4, sensor_msgs::PointField::FLOAT32),
-                  field("z", 8, sensor_msgs::PointField::FLOAT32)};
-  cloud.point_step = 12;
-  setSize(cloud, points.size());
+  sensor_msgs::PointCloud2 cloud = emptyCloud(header);
+  sensor_msgs::PointCloud2Modifier layout(cloud);
+  layout.setPointCloud2Fields(3, "x", 1, PointField::FLOAT32, "y", 1, PointField::FLOAT32, "z", 1, PointField::FLOAT32);
+  layout.resize(points.size());
   std::uint8_t* to = cloud.data.data();
   for (const Vec3& p : points) {
     setXyz(to, p);

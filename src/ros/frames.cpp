@@ -7,6 +7,7 @@
 #include <ros/init.h>
 #include <tf2/buffer_core.h>
 #include <tf2/exceptions.h>
+#include <tf2_eigen/tf2_eigen.h>
 #include <tf2_ros/transform_listener.h>
 
 #include "meshless_surgery/ros/border_check.h"
@@ -20,11 +21,10 @@ constexpr std::chrono::milliseconds kFirstWait(500);  // static transforms come 
 constexpr std::chrono::milliseconds kPoll(5);
 
 Pose toPose(const geometry_msgs::TransformStamped& transform) {
-  const auto& t = transform.transform.translation;
-  const auto& r = transform.transform.rotation;
   Pose pose;
-  pose.translation = Vec3(t.x, t.y, t.z);
-  pose.rotation = Quat(r.w, r.x, r.y, r.z).normalized();
+  tf2::fromMsg(transform.transform.translation, pose.translation);
+  tf2::fromMsg(transform.transform.rotation, pose.rotation);
+  pose.rotation.normalize();
   return pose;
 }
 

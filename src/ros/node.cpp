@@ -1,11 +1,8 @@
 #include "meshless_surgery/ros/node.h"
 
-#include <dirent.h>
-#include <sys/stat.h>
-
-#include <algorithm>
-#include <climits>
 #include <cstdlib>
+#include <filesystem>
+#include <set>
 
 #include <ros/console.h>
 #include <ros/package.h>
@@ -23,39 +20,22 @@
 namespace meshless {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr char kPackage[] = "meshless_surgery";
-
-bool isFile(const std::string& path) {
-  struct stat info {};
-  return stat(path.c_str(), &info) == 0 && S_ISREG(info.st_mode);
-}
-
-bool isFolder(const std::string& path) {
-  struct stat info {};
-  return stat(path.c_str(), &info) == 0 && S_ISDIR(info.st_mode);
-}
 
 /// With links resolved, as FileAccess compares real paths; unchanged where there is nothing.
 std::string realPath(const std::string& path) {
-  char buffer[PATH_MAX];
-  return realpath(path.c_str(), buffer) != nullptr ? std::string(buffer) : path;
-}
-
-std::string folderOf(const std::string& path) {
-  const std::size_t slash = path.find_last_of('/');
-  return slash == std::string::npos ? "." : path.substr(0, std::max<std::size_t>(slash, 1));
+  std::error_code missing;
+  const fs::path real = fs::canonical(path, missing);
+  return missing ? path : real.string();
 }
 
 std::string scenesIn(const std::string& folder) {
-  std::vector<std::string> names;
-  if (DIR* dir = opendir(folder.c_str())) {
-    while (const dirent* entry = readdir(dir)) {
-      const std::string file = entry->d_name;
-      if (file.size() > 5 && file.substr(file.size() - 5) == ".yaml") names.push_back(file.substr(0, file.size() - 5));
-    }
-    closedir(dir);
-  }
-  std::sort(names.begin(), names.end());
+  std::set<std::string> names;
+  std::error_code failed;
+  for (fs::directory_iterator entry(folder, failed), end; !failed && entry != end; entry.increment(failed))
+    if (entry->path().extension() == ".yaml") names.insert(entry->path().stem().string());
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
   return text;
@@ -79,7 +59,8 @@ Result<std::string> sceneFile(const std::string& scene, const std::string& packa
   } else {
     path = package_folder + "/config/scenes/" + scene + ".yaml";
   }
-  if (!isFile(path)) {
+  std::error_code missing;
+  if (!fs::is_regular_file(path, missing)) {
     return Error{ErrorCode::kUnreadable, "scene is '" + printable(scene) + "', and there is no file " +
                                              printable(path) + "; accepted: a path, or one of " +
                                              scenesIn(package_folder + "/config/scenes")};
@@ -178,12 +159,13 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   const auto file = sceneFile(settings->scene, package_folder);
   if (!file.ok()) return file.error();
   settings->scene = *file;
-  const std::string scene_folder = folderOf(*file);
+  const std::string scene_folder = fs::path(*file).parent_path().string();
 
   FileAccess access;
   access.folders = {realPath(package_folder), scene_folder};
   for (const std::string& folder : settings->data_folders) {
-    if (!isFolder(folder)) {
+    std::error_code missing;
+    if (!fs::is_directory(folder, missing)) {
       return Error{ErrorCode::kUnreadable,
                    "parameter ~data_folders names '" + printable(folder) + "'; accepted: folders that exist"};
     }

@@ -1,10 +1,7 @@
 // Plays scenes that nobody wrote and holds them to laws.
-#include <sys/stat.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <csignal>
-#include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <memory>
@@ -127,8 +124,9 @@ int main(int argc, char** argv) {
   if (const auto first = meshless::makeDriveScene(seed, choices);
       !first && first.error().code != meshless::ErrorCode::kFailed)
     return fail(first.error().detail);
-  if (!out.empty() && ::mkdir(out.c_str(), 0777) != 0 && errno != EEXIST)
-    return fail("cannot make the folder " + out + ": " + std::strerror(errno));
+  std::error_code failed;
+  if (!out.empty()) std::filesystem::create_directory(out, failed);
+  if (failed) return fail("cannot make the folder " + out + ": " + failed.message());
 
   std::vector<std::unique_ptr<DriveReport>> done(count);
   std::mutex mutex;

@@ -1,6 +1,5 @@
 // Nothing for nothing: which stages of a step do work in each of the scenes that are shipped, as they start.
-#include <dirent.h>
-
+#include <filesystem>
 #include <map>
 #include <set>
 
@@ -77,11 +76,8 @@ Work workOf(const std::string& scene) {
 
 std::vector<std::string> shippedScenes() {
   std::vector<std::string> names;
-  if (DIR* dir = opendir((std::string(SOURCE_DIR) + "/config/scenes").c_str())) {
-    while (const dirent* entry = readdir(dir))
-      if (std::string(entry->d_name).find(".yaml") != std::string::npos) names.push_back(entry->d_name);
-    closedir(dir);
-  }
+  for (const auto& entry : std::filesystem::directory_iterator(std::string(SOURCE_DIR) + "/config/scenes"))
+    if (entry.path().extension() == ".yaml") names.push_back(entry.path().filename().string());
   return names;
 }
 
