@@ -11,7 +11,7 @@ constexpr double kSpacing = 0.01;  // [m]
 
 BodyDef bar(bool elastic) {
   const int slices = kCuts + 2;
-  BodyDef def = test::defOf(boxMesh(Vec3(slices * kSlice, 0.03, 0.03), 2 * slices, 2, 2), "bar");
+  BodyDef def = test::defOf(boxMesh(Vec3(slices * kSlice, 0.03, 0.03), 3 * slices, 3, 3), "bar");
   def.spacing = kSpacing;
   if (elastic) {
     def.material.youngs_modulus = 5000.0;
