@@ -224,6 +224,7 @@ Result<Reply> World::Impl::apply(const SetMaterialCommand& command) {
     // Other masses move embedded vertices by a rounding. Whether the surface was read before must make no difference.
     body->surface_current = false;
     body->material = material;
+    body->state.pace = 1.0;  // of another material no velocity is won back
   }
   return Reply(Done{});
 }
