@@ -1,9 +1,12 @@
 #include "meshless_surgery/body/body.h"
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/body/filled_cells.h"
+#include "meshless_surgery/geometry/cell_regions.h"
 #include "meshless_surgery/geometry/measures.h"
 
 namespace meshless {
@@ -67,11 +70,56 @@ BodyModelPtr withMaterial(const BodyModelPtr& model, const Material& before, con
   if (!new_masses && !new_elasticity && !needs_quadratic) return model;
   auto changed = std::make_shared<BodyModel>(*model);
   const double ratio = after.density / before.density;
-  for (double& m : changed->masses) m *= ratio;
-  changed->mass *= ratio;
   changed->cell_mass *= ratio;
+  if (changed->regions.empty()) {
+    for (double& m : changed->masses) m *= ratio;
+    changed->mass *= ratio;
+  } else {
+    for (RegionTissue& region : changed->regions) region = regionTissue(region.material, after);
+    makeParticlesOfCells(*changed);
+    changed->mass = std::accumulate(changed->masses.begin(), changed->masses.end(), 0.0);
+  }
   makeMoments(*changed, after);
   return changed;
+}
+
+RegionTissue regionTissue(const Material& own, const Material& body) {
+  const ElasticParameters parameters = elasticParameters(own.youngs_modulus, own.poissons_ratio, own.density);
+  return {own, own.density / body.density, parameters.mu / body.youngs_modulus, parameters.lambda / body.youngs_modulus,
+          parameters.youngs / body.youngs_modulus};
+}
+
+double heldShare(const BodyModel& model) {
+  double held = 0.0;
+  for (std::size_t i = 0; i < model.masses.size(); ++i) {
+    const double share = model.lattice ? (model.carried.empty() ? 0.0 : model.carried[i]) : model.fixed[i] ? 1.0 : 0.0;
+    held += share * model.masses[i];
+  }
+  return std::min(1.0, held / model.mass);
+}
+
+std::vector<double> regionShares(const BodyModel& model) {
+  std::vector<double> shares(model.regions.size(), 0.0);
+  if (shares.empty()) return shares;
+  double all = 0.0;
+  for (const LatticeCell& cell : model.lattice->cells) {
+    all += cell.mass_share * countSamples(cell.filled);
+    for (const CellRegions::Part& part : model.lattice->regions->at(cell.place))
+      shares[part.region] += cell.mass_share * countSamples(cell.filled & part.samples);
+  }
+  for (double& share : shares) share /= all;
+  return shares;
+}
+
+std::vector<std::uint8_t> surfaceRegions(const BodyModel& model) {
+  std::vector<std::uint8_t> regions;
+  if (model.regions.empty()) return regions;
+  regions.reserve(model.surface.vertices.size());
+  for (const Vec3& v : model.surface.vertices) {
+    const Index region = model.lattice->regions->regionOf(*model.lattice, v);
+    regions.push_back(region == kNoIndex ? 0 : static_cast<std::uint8_t>(region + 1));
+  }
+  return regions;
 }
 
 void updateSurface(const BodyModel& model, BodyState& state) {

@@ -1,5 +1,7 @@
 #include "meshless_surgery/body/body_bytes.h"
 
+#include "meshless_surgery/geometry/cell_regions.h"
+
 namespace meshless {
 
 std::size_t bytesOf(const BodyModel& model) {
@@ -10,6 +12,7 @@ std::size_t bytesOf(const BodyModel& model) {
          bytesOf(clusters.offsets, clusters.members, clusters.weights, clusters.seeds, clusters.radii) +
          bytesOf(model.shape.clusters, model.shape.quadratic) +
          (model.lattice ? bytesOf(model.lattice->cells, model.tissue) : 0) +
+         (model.lattice && model.lattice->regions ? bytesOf(model.lattice->regions->parts(), model.regions) : 0) +
          (model.clamp ? model.clamp->bytes() + bytesOf(model.clamp_points, model.carried) : 0) +
          (model.cells ? bytesOf(model.cells->cells, model.cells->masses) : 0) +
          (model.elastic_batch ? model.elastic_batch->bytes() : 0) +

@@ -468,6 +468,7 @@ class CellCutter {
     auto lattice = std::make_shared<CellLattice>();
     lattice->spacing = before_.spacing;
     lattice->origin = before_.origin;
+    lattice->regions = before_.regions;
     std::vector<Index> cell_of, renumbered(cells().size(), kNoIndex), corner_of;
     for (Index c = 0; c < cells().size(); ++c) {
       if (piece_of_[component_[c]] != static_cast<int>(p)) continue;
@@ -499,6 +500,7 @@ class CellCutter {
     }
     child->lattice = lattice;
     child->cell_mass = model_.cell_mass;
+    child->regions = model_.regions;
     makeParticlesOfCells(*child);
     holdCorners(*child);
     inheritClamp(*child, renumbered);

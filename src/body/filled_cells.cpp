@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "meshless_surgery/geometry/cell_regions.h"
 #include "meshless_surgery/geometry/cut_lattice.h"
 
 namespace meshless {
@@ -11,6 +12,42 @@ namespace {
 
 constexpr double kFarthestCentroid = 0.9;  // [half edges] a fit nearer to a face would need weights near zero
 constexpr int kWellFilled = 16;            // of 64 samples
+
+// What some samples of a cell weigh goes to its corners.
+void addMass(const BodyModel& model, const LatticeCell& cell, SampleSet samples, std::vector<double>& masses) {
+  const auto add = [&](SampleSet part, double density) {
+    if (!part) return;
+    const FilledMoments moments = momentsOf(part);
+    for (Index k = 0; k < 8; ++k)
+      masses[cell.corners[k]] +=
+          density * model.cell_mass * moments.fraction * cell.mass_share * moments.corner_shares[k];
+  };
+  if (model.lattice->regions)
+    for (const CellRegions::Part& part : model.lattice->regions->at(cell.place)) {
+      add(samples & part.samples, model.regions[part.region].density);
+      samples &= ~part.samples;
+    }
+  add(samples, 1.0);
+}
+
+// What resists in a cell is made of.
+ElasticMix mixOf(const BodyModel& model, const LatticeCell& cell) {
+  ElasticMix mix;
+  if (!model.lattice->regions) return mix;
+  SampleSet own = cell.filled & ~cell.held;
+  if (!own) own = cell.filled;
+  const double all = countSamples(own);
+  for (const CellRegions::Part& part : model.lattice->regions->at(cell.place)) {
+    const RegionTissue& tissue = model.regions[part.region];
+    const double share = countSamples(own & part.samples) / all;
+    mix.mu += share * tissue.mu;
+    mix.lambda += share * tissue.lambda;
+    mix.youngs += share * tissue.youngs;
+    own &= ~part.samples;
+  }
+  mix.own = countSamples(own) / all;
+  return mix;
+}
 
 Vec3 centroidOf(const Resistance& resists) {
   return resists.centroid.cwiseMax(-kFarthestCentroid).cwiseMin(kFarthestCentroid);
@@ -41,14 +78,9 @@ void makeParticlesOfCells(BodyModel& model) {
   clusters.offsets.push_back(0);
   std::vector<std::array<Index, 2>> edges;
   for (const LatticeCell& cell : lattice.cells) {
-    const FilledMoments moments = momentsOf(cell.filled);
-    if (const SampleSet still = cell.filled & cell.held) {
-      const FilledMoments of_held = momentsOf(still);
-      for (Index k = 0; k < 8; ++k)
-        held[cell.corners[k]] += model.cell_mass * of_held.fraction * cell.mass_share * of_held.corner_shares[k];
-    }
+    addMass(model, cell, cell.filled & cell.held, held);
+    addMass(model, cell, cell.filled, model.masses);
     for (Index k = 0; k < 8; ++k) {
-      model.masses[cell.corners[k]] += model.cell_mass * moments.fraction * cell.mass_share * moments.corner_shares[k];
       clusters.members.push_back(cell.corners[k]);
       for (Index bit : {1u, 2u, 4u})
         if (!(k & bit)) edges.push_back({cell.corners[k], cell.corners[k | bit]});
@@ -104,7 +136,8 @@ ElasticCells elasticCellsOf(const BodyModel& model) {
     // What a hardly filled cell has of its own does not hold its far corners, and what touches the surface throws them.
     Vec3 variance = resists.variance;
     if (resists.fraction < kWellFilled / 64.0) variance = variance.cwiseMax(Resistance().variance);
-    elastic.cells.push_back({lattice.cells[c].corners, model.shape.clusters[c].mass, centroidOf(resists), variance});
+    elastic.cells.push_back({lattice.cells[c].corners, model.shape.clusters[c].mass, centroidOf(resists), variance,
+                             mixOf(model, lattice.cells[c])});
   }
   return elastic;
 }

@@ -1,13 +1,14 @@
 // From what a user chose to particles, masses, graph, clusters and binding.
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
 #include <iterator>
 #include <limits>
 #include <sstream>
 
 #include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/body/filled_cells.h"
-#include "meshless_surgery/geometry/cell_lattice.h"
+#include "meshless_surgery/geometry/cell_regions.h"
 #include "meshless_surgery/geometry/main_axes.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/nearest.h"
@@ -18,6 +19,7 @@ namespace meshless {
 namespace {
 
 constexpr std::size_t kMaxParticles = 200000;
+constexpr std::size_t kMostRegions = 100;
 constexpr std::size_t kMaxVertexParticles = 6000;  // larger surfaces are embedded, but for a subset at the spacing
 constexpr double kAutoParticles = 2500.0;          // interior particles aimed at where no spacing is given
 constexpr double kAutoCells = 1600.0;              // of a lattice, likewise
@@ -55,6 +57,23 @@ Status validate(const BodyDef& def) {
     text << "clusters.overlap is " << c.overlap << "; accepted: 0 to 1";
     return invalid(text.str());
   }
+  if (def.regions.size() > kMostRegions)
+    return invalid("body '" + def.name + "' has " + std::to_string(def.regions.size()) + " regions; accepted: up to " +
+                   std::to_string(kMostRegions));
+  for (std::size_t r = 0; r < def.regions.size(); ++r) {
+    const Material& material = def.regions[r].material;
+    const std::string which = "body '" + def.name + "': regions[" + std::to_string(r) + "]";
+    if (const Status valid = material.validate(); !valid) return invalid(which + ": " + valid.error().detail);
+    if (!material.elastic())
+      return invalid(which + " is of the appearance material '" + material.name +
+                     "'; accepted: elastic materials, with a youngs_modulus");
+  }
+  if (!def.regions.empty() &&
+      !(def.solid && def.material.elastic() && def.cells == CellFill::kFilled &&
+        (def.clusters.kind == ClusterOptions::Kind::kCells || def.clusters.kind == ClusterOptions::Kind::kAuto)))
+    return invalid("body '" + def.name +
+                   "' has regions; accepted: those of a closed body of an elastic material, with " +
+                   "cells: filled, and clusters: auto or cells");
   return def.material.validate();
 }
 
@@ -190,6 +209,35 @@ HeldHeight heldHeight(const std::vector<HeldRegion>& regions, const Pose& placed
   };
 }
 
+// Every region has tissue, or whoever wrote it is wrong about where the body is.
+Status findRegions(const BodyDef& def, const Pose& placed, const Pose& pose, CellLattice& lattice, BodyModel& model) {
+  if (def.regions.empty()) return Done{};
+  const auto own = [&](const Vec3& rest) {
+    return Vec3(pose.rotation.conjugate() * (placed * rest - pose.translation));
+  };
+  auto found = std::make_shared<CellRegions>(findCellRegions(
+      lattice, def.regions.size(),
+      [&](std::size_t region, const Vec3& rest) { return def.regions[region].region.height(own(rest)); }));
+  std::vector<bool> seen(def.regions.size(), false);
+  for (const LatticeCell& cell : lattice.cells)
+    for (const CellRegions::Part& part : found->at(cell.place))
+      if (part.samples & cell.filled) seen[part.region] = true;
+  for (std::size_t r = 0; r < def.regions.size(); ++r) {
+    model.regions.push_back(regionTissue(def.regions[r].material, def.material));
+    if (seen[r]) continue;
+    Box bounds;
+    for (const Vec3& v : model.surface.vertices) bounds.extend(own(v));
+    std::ostringstream text;
+    text << "body '" << def.name << "': regions[" << r << "], " << def.regions[r].region.text()
+         << ", has no tissue of its own; accepted: what meets the body, which reaches from " << bounds.min.transpose()
+         << " to " << bounds.max.transpose() << " in its own frame, is not covered by later regions, and is wider than "
+         << "a quarter of its spacing of " << model.spacing << " m";
+    return invalid(text.str());
+  }
+  lattice.regions = std::move(found);
+  return Done{};
+}
+
 // The corners of the lattice cells that the solid meets; the whole surface is embedded in them.
 Status makeLatticeParticles(const BodyDef& def, const SolidQuery& solid, const Pose& placed, const Pose& pose,
                             BodyModel& model, std::vector<Index>& vertex_particle) {
@@ -209,6 +257,7 @@ Status makeLatticeParticles(const BodyDef& def, const SolidQuery& solid, const P
     const double unit = std::pow(model.spacing, 3.0) * filled / model.rest_volume;
     for (LatticeCell& cell : lattice->cells) cell.resists.fraction *= unit;
     if (held) model.clamp_points = findClampPoints(*lattice, solid, held);
+    if (const Status found = findRegions(def, placed, pose, *lattice, model); !found) return found;
     model.lattice = std::make_shared<CellLattice>(std::move(*lattice));
     makeParticlesOfCells(model);
     holdCorners(model);
@@ -371,6 +420,19 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   } else {
     model->binding =
         bindSurface(model->rest, model->graph, model->clusters, surface.vertices, std::move(vertex_particle));
+  }
+
+  if (!def.fixed.empty()) {
+    std::ostringstream text;
+    text << std::setprecision(3) << 100.0 * heldShare(*model) << " % of it is held";
+    def.notes.push_back(text.str());
+  }
+  const std::vector<double> shares = regionShares(*model);
+  for (std::size_t r = 0; r < shares.size(); ++r) {
+    std::ostringstream text;
+    text << std::setprecision(3) << 100.0 * shares[r] << " % of it is of " << def.regions[r].material.name << ", in "
+         << def.regions[r].region.text();
+    def.notes.push_back(text.str());
   }
 
   PreparedBody body;

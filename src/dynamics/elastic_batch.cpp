@@ -92,7 +92,8 @@ ElasticBatch::ElasticBatch(const ElasticCells& body) {
   for (Index c = 0; c < body.cells.size(); ++c) {
     const ElasticCell& cell = body.cells[c];
     const bool is_whole = cell.centroid.cwiseAbs().maxCoeff() < kSameBox &&
-                          (cell.variance - Vec3::Constant(1.0 / 3.0)).cwiseAbs().maxCoeff() < kSameBox;
+                          (cell.variance - Vec3::Constant(1.0 / 3.0)).cwiseAbs().maxCoeff() < kSameBox &&
+                          cell.mix.isOwn();
     (is_whole ? whole : partial).push_back(c);
   }
   makeBlocks(whole.size(), partial.size());
@@ -110,7 +111,11 @@ ElasticBatch::ElasticBatch(const ElasticCells& body) {
       for (int axis = 0; axis < 3; ++axis) rows[(elastic_sets::kCentroidRow + axis) * kBlock] = cell.centroid[axis];
       for (int m = 0; m < 4; ++m)
         rows[(elastic_sets::kModeRow + m) * kBlock] =
+            (cell.mix.own + cell.mix.youngs) *
             elastic_law::hourglassStiffness(cell.variance, elastic_law::kHourglassModes[m]) / kHourglass;
+      rows[elastic_sets::kOwnRow * kBlock] = cell.mix.own;
+      rows[elastic_sets::kShearRow * kBlock] = 2.0 * cell.mix.mu;
+      rows[elastic_sets::kPressureRow * kBlock] = cell.mix.lambda;
     }
   };
   add(whole, 0);
@@ -259,6 +264,7 @@ double ElasticBatch::accelerate(const MatchInput& in, const ElasticParameters& m
     block.shear = 2.0 * material.mu / material.density;
     block.pressure = material.lambda / material.density;
     block.hourglass = kHourglass * material.youngs / material.density;
+    block.youngs = material.youngs / material.density;
     block.rotations = state.rotations.data() + index * 4 * kBlock;
     block.forces = state.forces.data() + index * 3 * kCorners * kBlock;
     const elastic_sets::BlockResult result = accelerateBlock(block, set);

@@ -325,12 +325,18 @@ MESHLESS_INLINE Matrix stress(const Block& b, const Matrix& gradient, int i, Pac
   Pack share = all(1.0);
   holdLess(f, norm2, j, slope, share);
   const Pack strain = volumeStrain(j);
-  const Pack pressure = b.pressure * strain;
+  Pack shear = all(b.shear), pressure = all(b.pressure);
+  if (b.cells) {
+    const double* const cell = b.cells + i;
+    const Pack own = get(cell + kOwnRow * kBlock);
+    shear = own * shear + b.youngs * get(cell + kShearRow * kBlock);
+    pressure = own * pressure + b.youngs * get(cell + kPressureRow * kBlock);
+  }
+  pressure *= strain;
   Pack steepness = choose(strain < 0.0, -strain, strain) * (share * squareRoot(norm2));
   for (int row = 0; row < 3; ++row)
     for (int c = 0; c < 3; ++c) steepness += slope.m[row][c] * slope.m[row][c];
   most = steepness > most ? steepness : most;
-  const Pack shear = all(b.shear);
   Matrix p;
   for (int row = 0; row < 3; ++row)
     for (int c = 0; c < 3; ++c) p.m[row][c] = shear * (f.m[row][c] - r.m[row][c]) + pressure * slope.m[row][c];

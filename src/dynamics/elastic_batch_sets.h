@@ -23,7 +23,10 @@ constexpr int kShapeRows = kSoftnessRow + 1;
 // Rows of kBlock values in Block::cells.
 constexpr int kCentroidRow = 0;             // half edges
 constexpr int kModeRow = kCentroidRow + 3;  // stiffness of modes xy, xz, yz, xyz over that of a whole cell
-constexpr int kCellRows = kModeRow + 4;
+constexpr int kOwnRow = kModeRow + 4;       // share of the material of the block
+constexpr int kShearRow = kOwnRow + 1;      // what others add to `shear` over `youngs`, and to `pressure`
+constexpr int kPressureRow = kShearRow + 1;
+constexpr int kCellRows = kPressureRow + 1;
 
 /// Clusters of at most eight members that span space; `shape` is null where all are boxes of one size, their corners in
 /// the order of the bits of x, y, z and of equal mass. `cells`: of cubes that are filled in part, corners in that
@@ -41,6 +44,7 @@ struct Block {
   double shear = 0.0;                        // 2 mu / rho
   double pressure = 0.0;                     // lambda / rho
   double hourglass = 0.0;                    // k E / rho
+  double youngs = 0.0;                       // E / rho
   double* rotations = nullptr;               // [4][kBlock] x y z w, unit
   double* forces = nullptr;                  // [3 * kCorners][kBlock], written
 };

@@ -103,13 +103,14 @@ double elasticAccelerations(const ElasticCells& body, const ElasticParameters& m
     const PlasticShape* const shape = shapeOf(plastic, c);
     const Fit f = fit(body, cell, y, swelling, shape, poses[c], counters);
     double steepness = 3.0;
-    Mat3 by_gradient = elastic_law::stress(material, f.strained, f.rotation, steepness);
+    const ElasticParameters mixed = cell.mix.of(material);
+    Mat3 by_gradient = elastic_law::stress(mixed, f.strained, f.rotation, steepness);
     if (shape) {
       by_gradient *= shape->inverse;
       steepness *= shape->stiffening * shape->stiffening;
     }
     most = std::max(most, steepness);
-    addForces(cell, slopes(body, cell, material, f.coefficients, by_gradient), forces);
+    addForces(cell, slopes(body, cell, mixed, f.coefficients, by_gradient), forces);
   }
   for (std::size_t i = 0; i < forces.size(); ++i) accelerations[i] = -forces[i] / body.masses[i];
   return std::sqrt(most / 3.0);
@@ -123,9 +124,10 @@ double elasticEnergy(const ElasticCells& body, const ElasticParameters& material
     const ElasticCell& cell = body.cells[c];
     const Fit f = fit(body, cell, y, swelling, shapeOf(plastic, c), poses[c], uncounted);
     // By F, not F / swelling: the factor is the derivative's.
-    const double volume = cell.mass / material.density;
-    energy += volume * swelling * elastic_law::energyDensity(material, f.strained, f.rotation);
-    const double stiffness = material.youngs * volume / (body.half_edge * body.half_edge);
+    const ElasticParameters mixed = cell.mix.of(material);
+    const double volume = cell.mass / mixed.density;
+    energy += volume * swelling * elastic_law::energyDensity(mixed, f.strained, f.rotation);
+    const double stiffness = mixed.youngs * volume / (body.half_edge * body.half_edge);
     for (int mode : elastic_law::kHourglassModes)
       energy +=
           0.5 * stiffness * elastic_law::hourglassStiffness(cell.variance, mode) * f.coefficients[mode].squaredNorm();
@@ -140,8 +142,9 @@ double highestFrequency(const ElasticCells& body, const ElasticParameters& mater
     for (const ElasticCell& cell : body.cells) {
       const Coefficients a = coefficientsOf(cell, displacements, Vec3::Zero());
       const Mat3 g = gradientOf(a, body.half_edge);
-      const Mat3 by_gradient = material.mu * (g + g.transpose()) + material.lambda * g.trace() * Mat3::Identity();
-      addForces(cell, slopes(body, cell, material, a, by_gradient), forces);
+      const ElasticParameters mixed = cell.mix.of(material);
+      const Mat3 by_gradient = mixed.mu * (g + g.transpose()) + mixed.lambda * g.trace() * Mat3::Identity();
+      addForces(cell, slopes(body, cell, mixed, a, by_gradient), forces);
     }
     for (std::size_t i = 0; i < forces.size(); ++i) accelerations[i] = -forces[i] / body.masses[i];
   });

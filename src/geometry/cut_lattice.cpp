@@ -205,6 +205,7 @@ class Cutter {
   void makeParts() {
     result_.lattice.spacing = before_.spacing;
     result_.lattice.origin = before_.origin;
+    result_.lattice.regions = before_.regions;
     for (const Family& f : families_) {
       const bool changed = f.inside_cut || f.face_cut;
       const double share = before_.cells[f.parts[0]].mass_share;

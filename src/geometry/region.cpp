@@ -30,6 +30,14 @@ Region Region::sphere(const Vec3& centre, double radius) {
   return region;
 }
 
+Region Region::within(const TriangleMesh& mesh, std::string file) {
+  Region region;
+  region.kind = Kind::kMesh;
+  region.solid = std::make_shared<SolidQuery>(mesh);
+  region.file = std::move(file);
+  return region;
+}
+
 std::string Region::text() const {
   std::ostringstream text;
   switch (kind) {
@@ -42,6 +50,9 @@ std::string Region::text() const {
     case Kind::kSphere:
       text << "the sphere of radius " << radius << " about " << plain(centre);
       break;
+    case Kind::kMesh:
+      text << "the inside of " << file;
+      break;
   }
   return text.str();
 }
@@ -52,6 +63,10 @@ double Region::height(const Vec3& p) const {
       return plane.height(p);
     case Kind::kSphere:
       return (p - centre).norm() - radius;
+    case Kind::kMesh: {
+      const double distance = solid->distance(p);
+      return solid->contains(p) ? -distance : distance;
+    }
     case Kind::kBox:
       break;
   }

@@ -180,7 +180,7 @@ std::vector<HeldRegion> readFixed(YamlSource& source, const YAML::Node& node) {
     if (plane.IsDefined()) read.region = Region::below(readPlane(source, plane));
     if (sphere.IsDefined()) read.region = readSphere(source, sphere);
     if (source.fault) break;
-    regions.push_back(read);
+    regions.push_back(std::move(read));
   }
   return regions;
 }
@@ -278,6 +278,7 @@ class SceneReader {
     }
     readBodyMaterial(map.get("material"), def.material);
     if (const YAML::Node fixed = map.get("fixed"); fixed.IsDefined()) def.fixed = readFixed(source_, fixed);
+    if (const YAML::Node regions = map.get("regions"); regions.IsDefined()) readRegions(regions, scale, def);
     std::vector<Pose> poses{def.pose};
     const YAML::Node copies = map.get("copies");
     if (copies.IsDefined()) poses = readCopies(source_, copies, def.pose);
@@ -377,6 +378,35 @@ class SceneReader {
   static MeshRepair readRepair(YamlMap& map) {
     const int chosen = map.choice("repair", meshRepairNames());
     return chosen < 0 ? MeshRepair::kMend : static_cast<MeshRepair>(chosen);
+  }
+
+  void readRegions(const YAML::Node& node, double scale, BodyDef& def) {
+    const std::string accepted = "{box: {min, max}}, {sphere: {centre, radius}} or {file: PATH}, and material: NAME";
+    if (!node.IsSequence() || node.size() > 100)
+      return source_.fail(node, "regions is " + shown(node), "a list of up to 100 of " + accepted);
+    for (const auto& entry : node) {
+      YamlMap map(source_, entry, "regions");
+      const YAML::Node box = map.get("box"), sphere = map.get("sphere"), file = map.get("file");
+      const YAML::Node material = map.get("material");
+      map.finish();
+      const int shapes = box.IsDefined() + sphere.IsDefined() + file.IsDefined();
+      if (shapes == 0) source_.fail(entry, "an entry of regions has no box, no sphere and no file", accepted);
+      if (shapes > 1) source_.fail(entry, "an entry of regions has several shapes", accepted);
+      if (!material.IsDefined()) source_.fail(entry, "an entry of regions has no material", accepted);
+      if (source_.fault) return;
+      TissueRegion region;
+      readBodyMaterial(material, region.material);
+      if (box.IsDefined()) region.region = readBox(source_, box);
+      if (sphere.IsDefined()) region.region = readSphere(source_, sphere);
+      if (file.IsDefined() && !source_.fault) {
+        BodyDef shape;
+        loadFile(file, scale, MeshRepair::kMend, shape);
+        if (!source_.fault && !shape.solid) source_.fail(file, "the surface of a region is open", "closed surfaces");
+        if (!source_.fault) region.region = Region::within(shape.mesh, shown(file));
+      }
+      if (source_.fault) return;
+      def.regions.push_back(std::move(region));
+    }
   }
 
   void loadFile(const YAML::Node& node, double scale, MeshRepair repair, BodyDef& def) {

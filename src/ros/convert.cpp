@@ -138,6 +138,29 @@ meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatu
   return state;
 }
 
+std::vector<std_msgs::ColorRGBA> regionColors(const BodyModel& model) {
+  std::vector<std_msgs::ColorRGBA> colors;
+  for (const RegionTissue& region : model.regions) colors.push_back(toColor(region.material.inside_color));
+  return colors;
+}
+
+meshless_surgery::BodyInfo toInfo(const std::string& name, const BodyModel& model, const WorldSettings& settings) {
+  meshless_surgery::BodyInfo message;
+  message.name = name;
+  message.particles = static_cast<std::uint32_t>(model.rest.size());
+  message.triangles = static_cast<std::uint32_t>(model.surface.triangles.size());
+  message.clusters = static_cast<std::uint32_t>(model.clusters.size());
+  message.spacing = model.spacing;
+  message.mass = model.mass;
+  message.held = heldShare(model);
+  const double needed = std::max(1.0, std::ceil(model.highest_frequency / settings.step_rate));
+  message.substeps_needed = static_cast<std::uint32_t>(needed);
+  message.stiffness_factor = std::min(1.0, std::pow(std::max(settings.substeps, settings.max_substeps) / needed, 2.0));
+  for (const RegionTissue& region : model.regions) message.region_materials.push_back(region.material.name);
+  message.region_shares = regionShares(model);
+  return message;
+}
+
 meshless_surgery::Info toInfo(const WorldSnapshot& snapshot, const WorldSettings& settings) {
   meshless_surgery::Info info;
   info.step_rate = settings.step_rate;
@@ -145,20 +168,8 @@ meshless_surgery::Info toInfo(const WorldSnapshot& snapshot, const WorldSettings
   info.max_substeps = static_cast<std::uint32_t>(settings.max_substeps);
   info.bodies.reserve(snapshot.bodies.size());
   for (const BodySnapshot& body : snapshot.bodies) {
-    const BodyModel& model = *body.model;
-    meshless_surgery::BodyInfo message;
-    message.name = body.name;
-    message.particles = static_cast<std::uint32_t>(model.rest.size());
-    message.triangles = static_cast<std::uint32_t>(model.surface.triangles.size());
-    message.clusters = static_cast<std::uint32_t>(model.clusters.size());
-    message.spacing = model.spacing;
-    message.mass = model.mass;
-    const auto held = std::count(model.fixed.begin(), model.fixed.end(), true);
-    message.held = model.rest.empty() ? 0.0 : static_cast<double>(held) / static_cast<double>(model.rest.size());
-    message.substeps_needed =
-        static_cast<std::uint32_t>(std::max(1.0, std::ceil(model.highest_frequency / settings.step_rate)));
-    message.stiffness_factor = body.stiffness_factor;
-    info.bodies.push_back(std::move(message));
+    info.bodies.push_back(toInfo(body.name, *body.model, settings));
+    info.bodies.back().stiffness_factor = body.stiffness_factor;
   }
   return info;
 }

@@ -8,6 +8,7 @@
 
 #include "answers.h"
 #include "meshless_surgery/ros/body_loader.h"
+#include "meshless_surgery/ros/convert.h"
 #include "meshless_surgery/ros/frames.h"
 #include "meshless_surgery/ros/runner.h"
 
@@ -192,6 +193,9 @@ struct LongWork : Answers {
     response.particles = static_cast<std::uint32_t>(spawned.particles);
     response.triangles = static_cast<std::uint32_t>(spawned.triangles);
     response.clusters = static_cast<std::uint32_t>(spawned.clusters);
+    // A node that ends just now has added it all the same.
+    (void)runner.look(
+        [&](World& world) { response.info = toInfo(spawned.name, *command.body->model, world.settings()); });
     std::string message = "added " + spawned.name;
     for (const std::string& note : command.body->def.notes) message += "; " + note;
     return accept(response, message);

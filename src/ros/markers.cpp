@@ -72,7 +72,10 @@ void addBody(const BodySnapshot& body, Marker& marker) {
   const TriangleMesh& mesh = body.model->surface;
   marker.color = toColor(body.material.color);
   marker.scale.x = marker.scale.y = marker.scale.z = 1.0;
-  const auto inside = toColor(body.material.inside_color);
+  std::vector<std_msgs::ColorRGBA> inside{toColor(body.material.inside_color)};
+  for (const auto& color : regionColors(*body.model)) inside.push_back(color);
+  std::vector<std::uint8_t> regions = surfaceRegions(*body.model);
+  regions.resize(body.surface.size(), 0);
   // Normals are smooth over the outer surface and over all cut faces, each on their own: the rim between stays sharp.
   Shading shadings[2];
   const bool any_cut = std::any_of(mesh.patches.begin(), mesh.patches.end(), [](auto p) { return p != kOuterPatch; });
@@ -99,7 +102,7 @@ void addBody(const BodySnapshot& body, Marker& marker) {
       const bool smooth = shadings[cut].normals[v].dot(flat) > kSmoothUpTo;
       const double light = smooth ? shadings[cut].lights[v] : lightOn(flat);
       marker.points.push_back(toPoint(body.surface[v]));
-      marker.colors.push_back(shaded(cut ? inside : marker.color, light));
+      marker.colors.push_back(shaded(cut ? inside[regions[v]] : marker.color, light));
     }
   }
 }

@@ -28,6 +28,8 @@ meshless_surgery::BodyTopology toTopology(const BodySnapshot& body) {
     for (const Index v : mesh.triangles[t]) message.triangles.push_back(static_cast<std::uint32_t>(v));
     message.cut.push_back(mesh.patchOf(t) != kOuterPatch ? 1 : 0);
   }
+  message.regions = surfaceRegions(*body.model);
+  message.region_colors = regionColors(*body.model);
   return message;
 }
 

@@ -11,6 +11,7 @@
 
 #include "meshless_surgery/ros/border_check.h"
 #include "meshless_surgery/ros/clock_publisher.h"
+#include "meshless_surgery/ros/convert.h"
 #include "meshless_surgery/ros/force_publisher.h"
 #include "meshless_surgery/ros/publishers.h"
 #include "meshless_surgery/ros/services.h"
@@ -185,7 +186,6 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   std::shared_ptr<const PreparedBody> first;  // of the copies that share its model
   for (BodyDef& def : scene->bodies) {
     const std::string name = def.name;
-    for (const std::string& note : def.notes) ROS_INFO_STREAM("body " << name << ": " << note);
     std::shared_ptr<const PreparedBody> ready;
     if (first && def.copy && def.fixed.empty()) {  // boxes fix what is in them: each copy is then another body
       ready = std::make_shared<PreparedBody>(placedCopy(*first, name, def.pose));
@@ -193,6 +193,11 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
       auto body = prepareBody(std::move(def));
       if (!body.ok()) return Error{body.error().code, *file + ": body " + name + ": " + body.error().detail};
       ready = first = std::make_shared<PreparedBody>(std::move(*body));
+      const auto info = toInfo(name, *ready->model, scene->world);
+      ROS_INFO_STREAM("body " << name << ": " << info.particles << " particles, " << 1000.0 * info.spacing
+                              << " mm apart, " << info.mass << " kg; needs " << info.substeps_needed
+                              << " substeps a step, of up to " << scene->world.max_substeps);
+      for (const std::string& note : ready->def.notes) ROS_INFO_STREAM("body " << name << ": " << note);
     }
     const auto added = world->addSceneBody(ready);
     if (!added.ok()) return Error{added.error().code, *file + ": body " + name + ": " + added.error().detail};

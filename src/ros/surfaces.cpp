@@ -23,6 +23,8 @@ meshless_surgery::Surface toSurface(const BodySnapshot& body, bool strain) {
     for (const Index v : mesh.triangles[t]) message.triangles.push_back(static_cast<std::uint32_t>(v));
     message.cut.push_back(mesh.patchOf(t) != kOuterPatch ? 1 : 0);
   }
+  message.regions = surfaceRegions(*body.model);
+  message.region_colors = regionColors(*body.model);
   if (strain) message.strain = surfaceStrain(mesh.vertices, body.surface, mesh.triangles);
   return message;
 }

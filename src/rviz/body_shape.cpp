@@ -149,8 +149,12 @@ void BodyShape::show(const meshless_surgery::Surface& surface, const BodyLook& l
   if (!whole || surface.triangles.empty()) return;
   findCorners(surface);
   applyLook(surface, look);
+  const bool regional = surface.regions.size() == vertices &&
+                        std::all_of(surface.regions.begin(), surface.regions.end(),
+                                    [&](std::uint8_t region) { return region <= surface.region_colors.size(); });
   const bool strained = look.by_strain && surface.strain.size() == vertices;
-  Ogre::ColourValue colours[2] = {toColour(surface.color), toColour(surface.inside_color)};
+  std::vector<Ogre::ColourValue> colours{toColour(surface.color), toColour(surface.inside_color)};
+  for (const auto& colour : surface.region_colors) colours.push_back(toColour(colour));
   for (Ogre::ColourValue& colour : colours) colour.a *= static_cast<float>(look.opacity);
 
   object_->estimateVertexCount(corners_.size());
@@ -165,7 +169,8 @@ void BodyShape::show(const meshless_surgery::Surface& surface, const BodyLook& l
   for (const Corner& corner : corners_) {
     object_->position(vertexOf(surface, corner.vertex));
     object_->normal(corner.normal);
-    Ogre::ColourValue colour = colours[corner.cut];
+    const std::size_t region = corner.cut && regional ? surface.regions[corner.vertex] : 0;
+    Ogre::ColourValue colour = colours[region > 0 ? 1 + region : corner.cut];
     if (strained) {
       colour = heatColour(surface.strain[corner.vertex] / look.full_strain);
       colour.a = static_cast<float>(look.opacity);

@@ -7,6 +7,7 @@
 #include <zlib.h>
 
 #include "meshless_surgery/body/filled_cells.h"
+#include "meshless_surgery/geometry/cell_regions.h"
 #include "meshless_surgery/geometry/cut_lattice.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "saved_world_impl.h"
@@ -15,7 +16,7 @@ namespace meshless {
 namespace {
 
 constexpr std::string_view kMagic = "MLSSTATE";
-constexpr std::uint32_t kVersion = 10;
+constexpr std::uint32_t kVersion = 11;
 constexpr std::uint64_t kMostModels = 1u << 20;
 
 std::uint32_t checksum(std::string_view bytes) {
@@ -181,6 +182,30 @@ SavedWorldPtr readWorld(InArchive& archive) {
 
 // --- checks
 
+namespace {
+
+// Of a body with a lattice.
+std::string faultOfRegions(const BodyModel& m) {
+  const auto isShare = [](double share) { return share > 0.0 && share < 1e300; };
+  for (const RegionTissue& region : m.regions)
+    if (!isShare(region.density) || !isShare(region.mu) || !(region.lambda == 0.0 || isShare(region.lambda)) ||
+        !isShare(region.youngs) || !region.material.validate())
+      return "a region is of no material";
+  if (!m.lattice->regions) return m.regions.empty() ? "" : "a region has no tissue";
+  const std::vector<CellRegions::Part>& parts = m.lattice->regions->parts();
+  SampleSet taken = kNoSample;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    if (p > 0 && parts[p].place < parts[p - 1].place) return "the regions of a lattice are not in order";
+    if (p == 0 || parts[p].place != parts[p - 1].place) taken = kNoSample;
+    if (!(parts[p].region < m.regions.size()) || (parts[p].samples & taken))
+      return "a sample is in no region or in two";
+    taken |= parts[p].samples;
+  }
+  return "";
+}
+
+}  // namespace
+
 std::string faultOf(const BodyModel& m) {
   const std::size_t particles = m.rest.size(), clusters = m.clusters.size(), vertices = m.surface.vertices.size();
   if (particles == 0) return "a body has no particles";
@@ -224,6 +249,7 @@ std::string faultOf(const BodyModel& m) {
       if (!(cell.resists.fraction > 0.0) || !cell.resists.centroid.allFinite() ||
           !(cell.resists.variance.minCoeff() > 0.0))
         return "a cell resists with nothing";
+    if (std::string fault = faultOfRegions(m); !fault.empty()) return fault;
     double boxes = 1.0;  // tables of all places are made
     for (int k = 0; k < 3; ++k) {
       const auto [low, high] =

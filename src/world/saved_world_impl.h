@@ -4,6 +4,7 @@
 
 #include "meshless_surgery/base/archive.h"
 #include "meshless_surgery/contact/contacts_memory.h"
+#include "meshless_surgery/geometry/cell_regions.h"
 #include "meshless_surgery/world/saved_world.h"
 #include "world_impl.h"
 
@@ -157,21 +158,35 @@ void serialize(A& archive, LatticeCell& v) {
   archive(corners, place, samples, filled, held, resists, parted, mass_share, stiffness_share, bridge);
 }
 template <class A>
+void serialize(A& archive, CellRegions::Part& v) {
+  auto& [place, region, samples] = v;
+  archive(place, region, samples);
+}
+template <class A>
 void serialize(A& archive, CellLattice& v) {
-  auto& [spacing, origin, corners, cells] = v;
-  archive(spacing, origin, corners, cells);
+  auto& [spacing, origin, corners, cells, regions] = v;
+  std::vector<CellRegions::Part> parts;
+  if (regions) parts = regions->parts();
+  archive(spacing, origin, corners, cells, parts);
+  if constexpr (std::is_same_v<A, InArchive>)
+    if (!parts.empty()) regions = std::make_shared<CellRegions>(std::move(parts));
+}
+template <class A>
+void serialize(A& archive, RegionTissue& v) {
+  auto& [material, density, mu, lambda, youngs] = v;
+  archive(material, density, mu, lambda, youngs);
 }
 /// elastic_batch, cells, clamp and tissue are made again by whoever reads, once all is checked; empty until then.
 template <class A>
 void serialize(A& archive, BodyModel& v) {
   auto& [rest, masses, match_masses, fixed, any_fixed, graph, clusters, shape, elastic, elastic_batch, lattice,
-         cell_mass, cells, clamp_points, clamp, carried, tissue, most_spread_inverse, specific_stiffness,
+         cell_mass, regions, cells, clamp_points, clamp, carried, tissue, most_spread_inverse, specific_stiffness,
          poissons_ratio, highest_frequency, surface, binding, solid, incised, spacing, rest_volume, rest_area, mass,
          next_patch] = v;
   (void)elastic_batch, (void)cells, (void)clamp, (void)tissue;
   auto of_cells = lattice ? *lattice : CellLattice();
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
-  archive(of_cells, cell_mass, clamp_points, carried);
+  archive(of_cells, cell_mass, regions, clamp_points, carried);
   archive(rest, masses, match_masses, held, any_fixed, graph, clusters, shape, elastic, most_spread_inverse,
           specific_stiffness, poissons_ratio, highest_frequency, surface, binding, solid, incised, spacing, rest_volume,
           rest_area, mass, next_patch);
@@ -223,7 +238,8 @@ void serialize(A& archive, HeldRegion& v) {
 }
 template <class A>
 void serialize(A& archive, BodyDef& v) {
-  auto& [name, mesh, solid, pose, spacing, clusters, cells, material, fixed, copy, notes] = v;
+  auto& [name, mesh, solid, pose, spacing, clusters, cells, material, fixed, regions, copy, notes] = v;
+  (void)regions;  // the model has them
   archive(name, mesh, solid, pose, spacing, clusters, choice(cells, CellFill::kFilled), material, fixed, copy, notes);
 }
 template <class A>

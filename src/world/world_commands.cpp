@@ -215,6 +215,9 @@ Result<Reply> World::Impl::apply(const SetMaterialCommand& command) {
     Result<Material> changed = command.change(body->material);
     if (!changed) return changed.error();
     if (Status status = changed->validate(); !status) return status.error();
+    if (!body->model->regions.empty() && !changed->elastic())
+      return Error{ErrorCode::kInvalidArgument, "body '" + body->name + "' has regions, and '" + changed->name +
+                                                    "' is an appearance material; accepted: elastic materials"};
     changes.emplace_back(body.get(), std::move(*changed));
   }
   for (auto& [body, material] : changes) {

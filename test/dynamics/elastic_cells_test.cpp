@@ -200,7 +200,8 @@ TEST(ElasticCells, AModeIsAsStiffAsWhatFillsTheCellIsWide) {
 TEST(ElasticCells, AreTheGradientOfTheEnergyAndKeepMomentum) {
   Random random(4);
   for (int trial = 0; trial < 6; ++trial) {
-    const CellBody body = cutCells(2, 2, 1, 10 + trial);
+    CellBody body = cutCells(2, 2, 1, 10 + trial);
+    if (trial % 3 == 2) body = mixed(body, 7);
     const std::vector<PlasticShape> shapes = someShapes(trial % 2 == 0 ? 0 : body.cells.cells.size(), random);
     const double swelling = trial < 3 ? 1.0 : 0.9;
     const Points y = moved(body, random.rotation().toRotationMatrix(), Vec3::Zero(), 0.0012, random);
@@ -348,7 +349,8 @@ TEST(HighestFrequencyOfCells, NoStepOfOneOverItMakesEnergyGrow) {
 // has.
 TEST(ElasticCells, InVectorsAreTheReference) {
   Random random(31);
-  std::vector<CellBody> bodies = {wholeCells(3, 2, 2), cutCells(13, 5, 2, 3)};
+  std::vector<CellBody> bodies = {wholeCells(3, 2, 2), cutCells(13, 5, 2, 3), mixed(wholeCells(5, 3, 2), 1),
+                                  mixed(cutCells(9, 2, 2, 5), 2)};
   for (unsigned n = 1; n <= 17; ++n) bodies.push_back(cutCells(static_cast<int>(n), 1, 1, n));
   for (const CellBody& body : bodies) {
     const ElasticBatch batch(body.cells);

@@ -53,6 +53,23 @@ TEST_F(Scene, HeldRegionsAreBoxesPlanesAndSpheres) {
   EXPECT_FALSE(body.fixed[1].region.contains(Vec3(1, 2, 2.4)));
 }
 
+TEST_F(Scene, RegionsAreBoxesSpheresAndClosedFilesOfAMaterial) {
+  const SceneDef scene = good(
+      "materials:\n  lump: {young: 50000}\n"
+      "bodies:\n  - file: ../cube.obj\n    scale: 2\n    material: {young: 5000}\n    regions:\n"
+      "      - {box: {min: [-1, 0, 0], max: [0, 1, 1]}, material: lump}\n"
+      "      - {sphere: {centre: [0, 0, 0], radius: 0.25}, material: {young: 10000, poissons_ratio: 0.3}}\n"
+      "      - {file: ../cube.obj, material: lump}\n");
+  const std::vector<TissueRegion>& regions = scene.bodies.at(0).regions;
+  ASSERT_EQ(regions.size(), 3u);
+  EXPECT_EQ(regions[0].material.name, "lump");
+  EXPECT_TRUE(regions[0].region.contains(Vec3(-0.9, 0.1, 0.1)));
+  EXPECT_EQ(regions[1].material.youngs_modulus, 10000.0);
+  EXPECT_NEAR(regions[1].region.height(Vec3(0, 0, 0.5)), 0.25, 1e-12);
+  EXPECT_TRUE(regions[2].region.contains(Vec3(0.9, -0.9, 0.9)));  // as large as the body, whose scale it has
+  EXPECT_NEAR(regions[2].region.height(Vec3(0, 0, 1.5)), 0.5, 1e-9);
+}
+
 TEST_F(Scene, EachBodySaysHowFarItsFileIsRepaired) {
   // A cube with a fin.
   std::string fin = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\nv 0.5 -0.5 0\n";
@@ -253,6 +270,16 @@ TEST_F(Scene, FaultsAreNamedWithFileLineValueAndRange) {
       {body + "    material: wood\n", 3, {"unknown material 'wood'", "default"}},
       {body + "    pose: {rpy: [0, 0, 0], xyzw: [0, 0, 0, 1]}\n", 3, {"rpy and xyzw"}},
       {body + "    pose: {xyzw: [0, 0, 0, 0]}\n", 3, {"xyzw has the length 0"}},
+      {body + "    regions: 5\n", 3, {"regions is '5'", "a list of up to 100"}},
+      {body + "    regions: [{material: default}]\n", 3, {"no box, no sphere and no file"}},
+      {body + "    regions: [{sphere: {centre: [0, 0, 0], radius: 1}}]\n", 3, {"has no material"}},
+      {body + "    regions: [{sphere: {centre: [0, 0, 0], radius: 1}, material: wood}]\n",
+       3,
+       {"unknown material 'wood'"}},
+      {body + "    regions: [{sphere: {centre: [0, 0, 0], radius: -1}, material: default}]\n",
+       3,
+       {"radius is -1", "above 0"}},
+      {body + "    regions: [{file: ../none.obj, material: default}]\n", 3, {"none.obj"}},
       {body + "    fixed: [{ball: 1}]\n", 3, {"'ball'", "did you mean 'box'"}},
       {body + "    fixed: [{box: {min: [0, 0, 0]}}]\n", 3, {"no min or no max"}},
       {body + "    fixed: [{box: {min: [0, 0, 1], max: [0, 0, 0]}}]\n", 3, {"min above its max"}},

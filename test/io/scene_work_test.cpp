@@ -94,6 +94,7 @@ TEST(SceneWork, EachShippedSceneDoesWhatItUsesAndNothingElse) {
                                                  {"fish.yaml", bending},
                                                  {"incision.yaml", held},
                                                  {"liver.yaml", on_ground},
+                                                 {"lump.yaml", held},
                                                  {"pile.yaml", piled},
                                                  {"resection.yaml", on_ground},
                                                  {"skin.yaml", held}};

@@ -98,6 +98,9 @@ World filledCells() {
   def.material.plasticity.yield = 0.01;
   def.material.plasticity.creep = 20.0;
   def.material.plasticity.maximum = 1.0;
+  def.regions = {{Region::sphere(Vec3(0.02, 0, 0), 0.03), def.material}};
+  def.regions[0].material.youngs_modulus = 20000.0;
+  def.regions[0].material.density = 1200.0;
   EXPECT_TRUE(world.addSceneBody(test::shared(def)).ok());
   run(world, 10);
   replyOf<PickReply>(world.apply(pickNear(Vec3(0.1, 0.0, 0.1))));

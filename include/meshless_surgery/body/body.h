@@ -26,6 +26,14 @@ struct SurfaceBinding {
   Index bound = 0;                    // embedded vertices whose carriers were searched for; the others have a parent's
 };
 
+/// What a region of a body is made of, and that over the body's own material.
+struct RegionTissue {
+  Material material;  // elastic constants, density and inside_color count
+  double density = 1.0;
+  double mu = 0.0, lambda = 0.0, youngs = 0.0;  // over the Young's modulus of the body's
+};
+RegionTissue regionTissue(const Material& own, const Material& body);
+
 /// Constant while it lives: rest shape, topology, clusters, masses.
 struct BodyModel {
   Points rest;                 // [m] particles
@@ -43,7 +51,8 @@ struct BodyModel {
   /// Of a body whose cells know how far they are filled (CellFill::kFilled), else null. Cluster c is cell c, corner by
   /// corner.
   std::shared_ptr<const CellLattice> lattice;
-  double cell_mass = 0.0;                             // [kg] of a whole cell of it
+  double cell_mass = 0.0;                             // [kg] of a whole cell of it, of the body's own material
+  std::vector<RegionTissue> regions;                  // of lattice->regions
   std::shared_ptr<const ElasticCells> cells;          // of it, where the material is elastic
   std::vector<ClampPoint> clamp_points;               // of it: where free tissue ends at what is held
   std::shared_ptr<const Clamp> clamp;                 // of them; null where there are none
@@ -81,6 +90,12 @@ void makeMoments(BodyModel& model, const Material& material);
 void makeClamp(BodyModel& model);
 /// elastic and elastic_batch from shape, whose clusters beyond most_spread_inverse lose their linear fit.
 void makeElastic(BodyModel& model);
+/// 0..1: share of the mass that is held in place.
+double heldShare(const BodyModel& model);
+/// 0..1: share of the volume that lies in each region.
+std::vector<double> regionShares(const BodyModel& model);
+/// One a vertex of the surface: 0, or the number of the region that it lies in, from 1 on. Empty without regions.
+std::vector<std::uint8_t> surfaceRegions(const BodyModel& model);
 
 using BodyModelPtr = std::shared_ptr<const BodyModel>;
 
@@ -122,7 +137,8 @@ Result<PreparedBody> prepareBody(BodyDef def);
 /// for a body without fixed particles and in the state that prepareBody gave it.
 PreparedBody placedCopy(const PreparedBody& body, std::string name, const Pose& pose);
 
-/// The same rest shape with the masses of another density, and with the moments that the other material needs.
+/// The same rest shape with the masses of another density, and with the moments that the other material needs. Regions
+/// keep theirs; a body that has some stays elastic.
 BodyModelPtr withMaterial(const BodyModelPtr& model, const Material& before, const Material& after);
 
 /// Places state.surface for state.positions; changes nothing else.

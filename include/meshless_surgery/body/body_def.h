@@ -23,6 +23,13 @@ struct HeldRegion {
   HeldRegion(const Region& there, bool world) : region(there), in_world(world) {}
 };
 
+/// Tissue in there, in the body's own frame, is of another material: its elastic constants, density and inside_color
+/// count. Needs an elastic body of filled cells.
+struct TissueRegion {
+  Region region;
+  Material material;
+};
+
 struct BodyDef {
   std::string name;
   TriangleMesh mesh;   // in the body's own frame, already scaled [m]; repaired (geometry/mesh_check.h)
@@ -33,8 +40,9 @@ struct BodyDef {
   CellFill cells = CellFill::kFilled;  // of a lattice: an elastic material, or clusters of cells
   Material material;
   std::vector<HeldRegion> fixed;
-  bool copy = false;               // the same as the body before it in its scene, but for name and pose
-  std::vector<std::string> notes;  // what reading and repairing said
+  std::vector<TissueRegion> regions;  // where several are, the last one counts; up to 100
+  bool copy = false;                  // the same as the body before it in its scene, but for name and pose
+  std::vector<std::string> notes;     // what reading and repairing said
 };
 
 }  // namespace meshless

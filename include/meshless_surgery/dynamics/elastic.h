@@ -15,6 +15,18 @@ struct ElasticParameters {
 /// Needs youngs_modulus > 0 [Pa], -1 < poissons_ratio < 0.5, density > 0 [kg/m^3].
 ElasticParameters elasticParameters(double youngs_modulus, double poissons_ratio, double density);
 
+/// What a cell is made of where it is not, or not all, of the body's material: constants are means by volume.
+struct ElasticMix {
+  double own = 1.0;                             // 0..1, share of the body's material
+  double mu = 0.0, lambda = 0.0, youngs = 0.0;  // what others add to it, over the Young's modulus of the body's
+
+  bool isOwn() const { return own == 1.0 && mu == 0.0 && lambda == 0.0 && youngs == 0.0; }
+  ElasticParameters of(const ElasticParameters& body) const {
+    return {own * body.mu + mu * body.youngs, own * body.lambda + lambda * body.youngs, (own + youngs) * body.youngs,
+            body.density};
+  }
+};
+
 /// Of a cluster's rest shape, in addition to ClusterRest.
 struct ElasticRest {
   Mat3 spread_inverse = Mat3::Zero();  // [1/m^2] (sum m q q^T / M)^-1

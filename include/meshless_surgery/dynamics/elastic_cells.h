@@ -12,9 +12,10 @@ namespace meshless {
 /// al. 2004). Coordinates in a cell go from -1 to 1.
 struct ElasticCell {
   std::array<Index, 8> corners{};             // particles; bits 0, 1, 2 of the position: upper end along x, y, z
-  double mass = 0.0;                          // [kg] of the filled part
+  double mass = 0.0;                          // [kg] of the filled part, were it all of the body's material
   Vec3 centroid = Vec3::Zero();               // of it, within -0.9..0.9
   Vec3 variance = Vec3::Constant(1.0 / 3.0);  // of it about its centroid, > 0; 1/3 is that of a whole cell
+  ElasticMix mix;
 };
 
 struct ElasticCells {
@@ -24,7 +25,7 @@ struct ElasticCells {
 };
 
 /// Acceleration of every particle [m/s^2] at the positions y: less the gradient of elasticEnergy() over its mass. A
-/// cell of volume V = mass / density holds
+/// cell of volume V = mass / density holds, with the constants of its mix,
 ///   V [mu |F - R|^2 + lambda U(J)] + V/2 sum k_m |a_m|^2 / half_edge^2.
 /// F is the trilinear map's gradient at the centroid, R its rotation; U and what bounds it are those of
 /// elasticAccelerations() in elastic.h. a_m are the coefficients of the map's products of two or three coordinates,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 
 #include "meshless_surgery/base/result.h"
 #include "meshless_surgery/geometry/cell_samples.h"
@@ -36,11 +37,14 @@ struct LatticeCell {
   bool isBridge(Index self) const { return bridge == self; }
 };
 
+class CellRegions;
+
 struct CellLattice {
   double spacing = 0.0;        // [m]
   Vec3 origin = Vec3::Zero();  // [m] lower end of the cell 0, 0, 0
   Index corners = 0;           // how many
   std::vector<LatticeCell> cells;
+  std::shared_ptr<const CellRegions> regions;  // which samples lie in which of the body's; null where it has none
 
   /// [m] of a point in a cell, each coordinate of `at` 0..1 inside of it.
   Vec3 restPlace(const LatticeCell& cell, const Vec3& at) const {
