@@ -159,22 +159,21 @@ class CellCutter {
     return std::any_of(p.begin(), p.end(), [&](Index i) { return std::find(q.begin(), q.end(), i) != q.end(); });
   }
 
-  // Samples of a cell that no blade hides from a vertex.
-  SampleSet seen(Index c, const Vec3& q, int side) {
+  // Samples of a cell that no blade hides from a vertex on a side of it, or all on that side of its plane.
+  SampleSet seen(Index c, const Vec3& q, int side, bool of_plane) {
     const LatticeCell& cell = cut_.lattice.cells[c];
-    if (side == 0) return cell.samples;
-    if (gate_.unbounded()) return cell.samples & (side > 0 ? cut_.above[c] : ~cut_.above[c]);
+    if (gate_.unbounded() || of_plane) return cell.samples & (side > 0 ? cut_.above[c] : ~cut_.above[c]);
     const auto placed = [&](const Vec3& at) {
       Vec3 p = Vec3::Zero();
       for (int k = 0; k < 8; ++k)
         p += trilinearWeight(k, at) * state_.positions[before_.cells[cut_.parent_cell[c]].corners[k]];
       return p;
     };
-    if (!cut_.changed[c]) {
-      const Vec3 middle = placed(Vec3::Constant(0.5));
-      return gate_.between(q, side, middle, gate_.side(middle)) ? kNoSample : cell.samples;
-    }
     Points& places = sample_sides_[c];
+    if (!cut_.changed[c]) {
+      if (places.empty()) places.push_back(placed(0.5 * (momentsOf(cell.filled).centroid + Vec3::Ones())));
+      return gate_.between(q, side, places[0], gate_.side(places[0])) ? kNoSample : cell.samples;
+    }
     if (places.empty())
       for (int bit = 0; bit < 64; ++bit) places.push_back(placed(samplePlace(bit)));
     SampleSet open = kNoSample;
@@ -186,20 +185,26 @@ class CellCutter {
     return open;
   }
 
-  // The cell of vertex v of source p, among those of `piece` (any where it is negative).
-  Index cellOf(const CellFinder& finder, std::size_t p, Index v, int piece) {
+  // The cell of vertex v of source p on a side of the blade, or of its whole plane, among those of `piece` (any where it
+  // is negative).
+  Index cellOf(const CellFinder& finder, std::size_t p, Index v, int piece, int side, bool of_plane) {
     const EmbeddedVertex& embedded = embedded_[p][v];
     const auto in_piece = [&](Index c) { return piece < 0 || piece_of_[component_[c]] == piece; };
     const std::vector<Index>& copies = children_[embedded.was];
-    if (copies.size() == 1 && !cut_.changed[copies[0]] && in_piece(copies[0])) return copies[0];
-    const int side = sources_[p].side[v];
     const Vec3& q = sources_[p].mesh.vertices[v];
-    if (side == 0)  // a buried front is embedded in what holds the two sides together
-      for (const Index c : finder.at(cut_.lattice.placeOf(embedded.rest)))
-        if (cells()[c].isBridge(c) && together(cut_.parent_cell[c], embedded.was) && in_piece(c)) return c;
+    // What a blade leaves whole may lie beyond it: a hardly filled cell's vertices follow a neighbour.
+    if (!embedded.made && copies.size() == 1 && !cut_.changed[copies[0]] && in_piece(copies[0]) &&
+        seen(copies[0], q, side, of_plane))
+      return copies[0];
     return finder.carrier(embedded.rest, [&](Index c) {
-      return in_piece(c) && together(cut_.parent_cell[c], embedded.was) ? seen(c, q, side) : kNoSample;
+      return in_piece(c) && together(cut_.parent_cell[c], embedded.was) ? seen(c, q, side, of_plane) : kNoSample;
     });
+  }
+  // A buried front is on both sides.
+  Index cellOf(const CellFinder& finder, std::size_t p, Index v, int piece) {
+    const int side = sources_[p].side[v];
+    const Index c = cellOf(finder, p, v, piece, side == 0 ? 1 : side, side == 0);
+    return side == 0 && c == kNoIndex ? cellOf(finder, p, v, piece, -1, true) : c;
   }
 
   // --- which cells are in which piece
@@ -267,7 +272,9 @@ class CellCutter {
     const CellFinder finder(cut_.lattice);
     std::map<std::pair<std::size_t, Index>, Index> crumbs;
     carriers_.resize(sources_.size());
-    for (std::size_t p = 0; p < sources_.size(); ++p)
+    partners_.resize(sources_.size());
+    for (std::size_t p = 0; p < sources_.size(); ++p) {
+      findFront(p);
       for (Index v = 0; v < embedded_[p].size(); ++v) {
         Index c = cellOf(finder, p, v, static_cast<int>(p));
         if (c == kNoIndex) {
@@ -277,7 +284,80 @@ class CellCutter {
           if (is_new) addCrumb(was, static_cast<int>(p));
         }
         carriers_[p].push_back(c);
+        partners_[p].push_back(partnerOf(finder, p, v, c));
       }
+    }
+  }
+
+  // --- where a wound ends
+
+  // [m] at rest, the edges of the buried front.
+  void findFront(std::size_t p) {
+    front_.clear();
+    if (gate_.unbounded()) return;
+    const std::vector<int>& side = sources_[p].side;
+    for (const Triangle& t : sources_[p].mesh.triangles)
+      for (int k = 0; k < 3; ++k) {
+        const Index a = t[k], b = t[(k + 1) % 3];
+        if (a < b && side[a] == 0 && side[b] == 0) front_.push_back({embedded_[p][a].rest, embedded_[p][b].rest});
+      }
+  }
+
+  // [m] at rest, from a vertex to where the plane of the blade is not cut; infinite where that is far.
+  double toUncut(std::size_t p, Index v, Index own) const {
+    if (sources_[p].side[v] == 0) return 0.0;
+    const Vec3& q = sources_[p].mesh.vertices[v];
+    if (!gate_.isBehind(q)) return cut_.changed[own] ? std::abs(gate_.height(q)) : 1e300;
+    double least = 1e300;
+    const Vec3& rest = embedded_[p][v].rest;
+    for (const auto& [a, b] : front_) {
+      const Vec3 edge = b - a;
+      const double squared = edge.squaredNorm();
+      const double t = squared > 0.0 ? std::clamp((rest - a).dot(edge) / squared, 0.0, 1.0) : 0.0;
+      least = std::min(least, (a + t * edge - rest).norm());
+    }
+    return least;
+  }
+
+  // The lattice opens a wound as far as its cells reach, and not where the blade ended. Within a cell from there a
+  // vertex follows the other side too: half where the wound ends, so that no triangle is torn there.
+  PartnerCell partnerOf(const CellFinder& finder, std::size_t p, Index v, Index own) {
+    if (front_.empty()) return formerPartnerOf(p, v);
+    const double share = 0.5 * (1.0 - toUncut(p, v, own) / before_.spacing);
+    if (!(share > 0.0)) return formerPartnerOf(p, v);
+    const int side = sources_[p].side[v] == 0 ? 1 : sources_[p].side[v];
+    const Index other = cellOf(finder, p, v, static_cast<int>(p), -side, true);
+    return other == kNoIndex || other == own ? formerPartnerOf(p, v) : PartnerCell{other, share};
+  }
+
+  // Of earlier blades.
+  PartnerCell formerPartnerOf(std::size_t p, Index v) {
+    const SurfaceBinding& before = model_.binding;
+    const VertexOrigins& origins = sources_[p].origins;
+    if (before.partners.empty() || origins.insideCap(v)) return {};
+    const VertexOrigin origin = origins[v];
+    PartnerCell former;
+    double most = 0.0;
+    for (int k = 0; k < 4; ++k) {
+      if (origin.parents[k] == kNoIndex) continue;
+      const Index was = before.partners[origin.parents[k]];
+      if (was == kNoIndex) continue;
+      former.share += origin.weights[k] * before.partnered[origin.parents[k]];
+      if (origin.weights[k] <= most) continue;
+      most = origin.weights[k];
+      former.cell = kNoIndex;
+      double least = std::numeric_limits<double>::infinity();
+      for (const Index c : children_[was]) {
+        if (piece_of_[component_[c]] != static_cast<int>(p)) continue;
+        const SampleSet open = seen(c, sources_[p].mesh.vertices[v], sources_[p].side[v], sources_[p].side[v] == 0);
+        const double squared = squaredToSamples(open, before_.placeIn(before_.cells[was], embedded_[p][v].rest));
+        if (squared < least) {
+          least = squared;
+          former.cell = c;
+        }
+      }
+    }
+    return former.cell == kNoIndex ? PartnerCell() : PartnerCell{former.cell, std::clamp(former.share, 0.0, 0.5)};
   }
 
   // A bridge has no mass to give: one of what it joins.
@@ -515,7 +595,10 @@ class CellCutter {
     fitClusters(matchInput(*child, piece.state), piece.state.positions, piece.state.poses);
     std::vector<Index> carriers;
     for (const Index c : carriers_[p]) carriers.push_back(renumbered[c]);
-    child->binding = bindToCells(*lattice, child->surface.vertices, carriers);
+    std::vector<PartnerCell> partners = partners_[p];
+    for (PartnerCell& partner : partners)
+      if (partner.cell != kNoIndex) partner.cell = renumbered[partner.cell];
+    child->binding = bindToCells(*lattice, child->surface.vertices, carriers, partners);
     for (const EmbeddedVertex& embedded : embedded_[p]) {
       ++(embedded.made ? work.bound_embedded : work.kept_embedded);
       work.new_vertices += embedded.made;
@@ -593,7 +676,9 @@ class CellCutter {
   Index sampled_ = 0;                         // cells before crumbs were made
   std::vector<bool> seen_;                    // a vertex is in it
   std::vector<std::vector<Index>> carriers_;  // of each source's vertices
-  std::vector<Index> heir_;                   // of each of the parent's corners
+  std::vector<std::vector<PartnerCell>> partners_;
+  std::vector<std::array<Vec3, 2>> front_;
+  std::vector<Index> heir_;  // of each of the parent's corners
 };
 
 }  // namespace

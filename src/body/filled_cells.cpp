@@ -233,22 +233,38 @@ Index CellFinder::carrier(const Vec3& rest, const Allowed& allowed) const {
   return best;
 }
 
-SurfaceBinding bindToCells(const CellLattice& lattice, const Points& surface_rest, const std::vector<Index>& cell) {
+SurfaceBinding bindToCells(const CellLattice& lattice, const Points& surface_rest, const std::vector<Index>& cell,
+                           const std::vector<PartnerCell>& partners) {
   SurfaceBinding binding;
   binding.particle.assign(surface_rest.size(), kNoIndex);
   binding.offsets.push_back(0);
   for (Index v = 0; v < surface_rest.size(); ++v) {
     binding.embedded.push_back(v);
-    const LatticeCell& carrier = lattice.cells[cell[v]];
-    const Vec3 at = lattice.placeIn(carrier, surface_rest[v]);
-    for (int k = 0; k < 8; ++k) {
-      binding.carriers.push_back(carrier.corners[k]);
-      binding.weights.push_back(trilinearWeight(k, at));
-    }
+    const auto follow = [&](const LatticeCell& carrier, double share) {
+      const Vec3 at = lattice.placeIn(carrier, surface_rest[v]);
+      for (int k = 0; k < 8; ++k) {
+        const auto first = binding.carriers.begin() + binding.offsets.back();
+        const auto known = std::find(first, binding.carriers.end(), carrier.corners[k]);
+        const double weight = share * trilinearWeight(k, at);
+        if (known != binding.carriers.end()) {
+          binding.weights[static_cast<std::size_t>(known - binding.carriers.begin())] += weight;
+          continue;
+        }
+        binding.carriers.push_back(carrier.corners[k]);
+        binding.weights.push_back(weight);
+      }
+    };
+    const PartnerCell partner = partners.empty() ? PartnerCell() : partners[v];
+    follow(lattice.cells[cell[v]], 1.0 - partner.share);
+    if (partner.cell != kNoIndex) follow(lattice.cells[partner.cell], partner.share);
     binding.offsets.push_back(static_cast<Index>(binding.carriers.size()));
   }
   binding.levers.assign(surface_rest.size(), Vec3::Zero());
   binding.turners = cell;
+  for (const PartnerCell& partner : partners) {
+    binding.partners.push_back(partner.cell);
+    binding.partnered.push_back(partner.share);
+  }
   binding.bound = static_cast<Index>(surface_rest.size());
   return binding;
 }

@@ -271,6 +271,11 @@ std::string faultOf(const BodyModel& m) {
     if (!b.levers[r].isZero(0.0) &&
         std::find(b.lever_clusters.begin(), b.lever_clusters.end(), b.turners[r]) == b.lever_clusters.end())
       return "a lever turns with no cluster";
+  if (b.partners.size() != b.partnered.size() || (!b.partners.empty() && b.partners.size() != b.embedded.size()) ||
+      !allBelowOrNone(b.partners, m.lattice ? clusters : 0))
+    return "a body's surface follows cells that are not there";
+  for (const double share : b.partnered)
+    if (!(share >= 0.0 && share <= 1.0)) return "a vertex has a share of a cell that is none";
   // The next cut asks for the cell of a vertex, whether it has a lever or not.
   if (m.lattice && (b.embedded.size() != vertices || !allBelow(b.turners, clusters)))
     return "a body's surface is not embedded in its cells";

@@ -51,7 +51,15 @@ class CellFinder {
 /// [spacing^2] from a place in a cell to the nearest of the samples; infinite where there are none.
 double squaredToSamples(SampleSet samples, const Vec3& at);
 
-/// Every vertex is embedded in its cell: its carriers are the corners, with trilinear weights. `cell`: one a vertex.
-SurfaceBinding bindToCells(const CellLattice& lattice, const Points& surface_rest, const std::vector<Index>& cell);
+/// What a vertex follows beside its own cell: one across a wound, near the wound's end.
+struct PartnerCell {
+  Index cell = kNoIndex;
+  double share = 0.0;  // 0..1
+};
+
+/// Every vertex is embedded in its cell: its carriers are the corners, with trilinear weights. cell: one a vertex;
+/// partners too, or empty.
+SurfaceBinding bindToCells(const CellLattice& lattice, const Points& surface_rest, const std::vector<Index>& cell,
+                           const std::vector<PartnerCell>& partners = {});
 
 }  // namespace meshless
