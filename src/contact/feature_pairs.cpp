@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "meshless_surgery/geometry/nearest_on_triangle.h"
 
@@ -12,7 +13,7 @@ constexpr double kMargin = 0.2;         // of the mean edge
 constexpr double kAhead = 1.2;          // times the way of a frame: what speeds up is met too
 constexpr double kTie = 2e-3;           // of the mean edge: nearer than this two surfaces touch
 constexpr double kTouching = 1e-3;      // of the mean edge: nearer than this only a face that opposes tells the sides
-constexpr double kDeepest = 2.0;        // mean edges: deeper inside nothing is searched for
+constexpr double kDeepestEdges = 1.0;   // mean edges by which ridges overlap: deeper ones are not paired
 constexpr double kDeeper = 1.3;         // times as deep as it was: a vertex inside may have gone on
 constexpr double kLeastOpposed = 0.05;  // cosine by which a direction has to oppose a face of the pushed body
 constexpr double kSameWay = 0.9;        // cosine from which a second direction of a vertex says nothing new
@@ -43,6 +44,9 @@ double opposition(const PairSearch::Side& side, Index v, const Vec3& direction) 
   return most;
 }
 
+/// [m] Half the least width: who is deeper is nearer to the other side.
+double deepestIn(const SurfaceFrame& frame) { return 0.5 * (frame.bounds.max - frame.bounds.min).minCoeff(); }
+
 class VertexSearch {
  public:
   VertexSearch(const PairSearch& search, SearchScratch& scratch)
@@ -52,6 +56,7 @@ class VertexSearch {
         tie_(kTie * search.length),
         touching_(kTouching * search.length),
         margin_(searchMargin(search.length)),
+        deepest_(deepestIn(*search.b.frame)),
         pairs_(scratch.found.pairs),
         sides_(scratch.found.sides),
         watched_(scratch.found.watched),
@@ -64,23 +69,26 @@ class VertexSearch {
     const Vec3& p = a_.frame->vertices[v];
     const Vec3 end = p + search_.h * a_.frame->velocities[v];
     // A vertex inside is searched for as deep as it was, and a little more.
-    const double deepest = kDeepest * search_.length;
-    const double deep = remembered_ ? std::min(deepest, kDeeper * remembered_->depth) : 0.0;
+    const double deep = remembered_ ? std::min(deepest_, kDeeper * remembered_->depth) : 0.0;
     if (isOutOf(b_.frame->bounds, p, end, margin_ + deep)) return false;
     gather(v, p, end, margin_ + deep);
-    if (candidates_.empty() && search_.first) gather(v, p, end, margin_ + deepest);
+    if (candidates_.empty() && mayBeginInside() && windingAround(p) > 0) gather(v, p, end, margin_ + deepest_);
     if (candidates_.empty()) return true;
     const Candidate& best = chooseNearest(v);
     const double distance = signedDistance(best, p);
     made_ = 0;
     if (distance >= -tie_)
       meetOutside(v, p, best);
-    else if (-distance <= deepest && (search_.self == PairSearch::Self::kNo || remembered_))
+    else if (search_.self == PairSearch::Self::kNo || remembered_)
       meetInside(v, p, -distance);
     return true;
   }
 
  private:
+  bool mayBeginInside() const {
+    return search_.first && search_.self == PairSearch::Self::kNo && b_.surface->closed;
+  }
+
   const RememberedSide* recall(Index v) const {
     const RememberedSide* const end = search_.remembered + search_.remembered_count;
     const RememberedSide* const at = std::lower_bound(
@@ -276,7 +284,7 @@ class VertexSearch {
 
   const PairSearch& search_;
   const PairSearch::Side a_, b_;
-  const double tie_, touching_, margin_;
+  const double tie_, touching_, margin_, deepest_;
   std::vector<FeaturePair>& pairs_;
   std::vector<RememberedSide>& sides_;
   std::vector<WatchedFeatures>& watched_;
@@ -318,7 +326,14 @@ bool isInArc(const SurfaceFrame& frame, const ContactEdge& edge, const Vec3& dir
   return direction.dot(middle) >= first.dot(middle) - 1e-9;
 }
 
-// Where they are near enough to meet in the frame.
+/// Whether a way from a ridge leads into the solid.
+bool leadsInside(const SurfaceFrame& frame, const ContactEdge& ridge, const Vec3& way) {
+  return ridge.faces[1] != kNoIndex && frame.face_normals[ridge.faces[0]].dot(way) < 0.0 &&
+         frame.face_normals[ridge.faces[1]].dot(way) < 0.0;
+}
+
+// Where they are near enough to meet in the frame. Ridges that have got hooked into each other, with no vertex inside,
+// must be free to come out.
 void watchEdges(const PairSearch& search, const ContactEdge& of_a, const ContactEdge& of_b,
                 std::vector<WatchedFeatures>& watched) {
   const SurfaceFrame &a = *search.a.frame, &b = *search.b.frame;
@@ -326,6 +341,7 @@ void watchEdges(const PairSearch& search, const ContactEdge& of_a, const Contact
   const PairDistance apart =
       distanceOfPair(2, {a.vertices[va[0]], a.vertices[va[1]], b.vertices[vb[0]], b.vertices[vb[1]]});
   if (apart.distance <= kTouching * search.length) return;
+  if (leadsInside(b, of_b, apart.between) || leadsInside(a, of_a, -apart.between)) return;
   double fastest = 0.0;
   for (const Index v : va)
     for (const Index w : vb) fastest = std::max(fastest, (a.velocities[v] - b.velocities[w]).squaredNorm());
@@ -379,15 +395,19 @@ void findVerticesNear(const PairSearch& search, SearchScratch& scratch) {
   double deepest = 0.0;
   for (std::size_t k = 0; k < search.remembered_count; ++k)
     deepest = std::max(deepest, kDeeper * search.remembered[k].depth);
-  if (search.first) deepest = kDeepest * search.length;
   const ContactSurface& a = *search.a.surface;
+  scratch.vertices.clear();
+  if (search.first) {  // any may begin inside, far from all faces
+    scratch.vertices.resize(a.vertices());
+    std::iota(scratch.vertices.begin(), scratch.vertices.end(), Index{0});
+    return;
+  }
   scratch.near.assign(a.vertices(), 0);
   a.tree.queryTree(search.a.frame->boxes, search.b.surface->tree, search.b.frame->boxes,
-                   searchMargin(search.length) + std::min(deepest, kDeepest * search.length), scratch.query,
+                   searchMargin(search.length) + std::min(deepest, deepestIn(*search.b.frame)), scratch.query,
                    [&](Index face) {
                      for (const Index v : a.triangles[face]) scratch.near[v] = 1;
                    });
-  scratch.vertices.clear();
   for (Index v = 0; v < a.vertices(); ++v)
     if (scratch.near[v]) scratch.vertices.push_back(v);
 }
@@ -404,7 +424,7 @@ std::size_t findVertexFace(const PairSearch& search, SearchScratch& scratch) {
 void findEdgeEdge(const PairSearch& search, FoundFeatures& found) {
   const SurfaceFrame &a = *search.a.frame, &b = *search.b.frame;
   const ContactSurface &sa = *search.a.surface, &sb = *search.b.surface;
-  const double margin = searchMargin(search.length), deepest = 0.5 * kDeepest * search.length;
+  const double margin = searchMargin(search.length), deepest = kDeepestEdges * search.length;
   for (const Index e : a.ridges) {
     const ContactEdge& of_a = sa.edges[e];
     const Vec3 &a0 = a.vertices[of_a.vertices[0]], &a1 = a.vertices[of_a.vertices[1]];

@@ -64,8 +64,10 @@ class Limit {
       WatchedSet& set = *pairs.set;
       if (!again_) set.gone += bodies_[pairs.a].way + bodies_[pairs.b].way;
       for (std::size_t f = 0; f < set.features.size(); ++f)
-        if (again_ ? isMoved(pairs, set.features[f]) : set.gone > set.until[f])
+        if (again_ ? isMoved(pairs, set.features[f]) : set.gone > set.until[f]) {
           if (wouldMeet(pairs, f)) scratch_.meeting.push_back({n, f});
+          if (again_) set.until[f] = set.gone;  // what has been edited is yet to turn with all
+        }
     }
     again_ = true;
     for (const Index b : members_) std::fill(bodies_[b].edited.begin(), bodies_[b].edited.end(), 0);
@@ -232,6 +234,13 @@ Momentum momentumOf(const std::vector<LimitedBody>& bodies, const std::vector<In
   return all;
 }
 
+void moveTogether(std::vector<LimitedBody>& bodies, const std::vector<Index>& members, const Vec3& centre,
+                  const Vec3& shift, const Vec3& turn) {
+  for (const Index b : members)
+    for (Index i = 0; i < bodies[b].particles; ++i)
+      bodies[b].positions[i] += shift + turn.cross(bodies[b].previous[i] - centre);
+}
+
 }  // namespace
 
 std::size_t limitMotion(const std::vector<WatchedPairs>& pairs, std::vector<LimitedBody>& bodies,
@@ -240,8 +249,16 @@ std::size_t limitMotion(const std::vector<WatchedPairs>& pairs, std::vector<Limi
   Limit limit(pairs, bodies, members, scratch);
   const std::size_t met = limit.find();
   if (met == 0) return 0;
+  // What is held stays behind the motion of all together, or it would take energy from that motion to others.
   Momentum before;
-  if (free) before = momentumOf(bodies, members);
+  Vec3 shift = Vec3::Zero(), turn = Vec3::Zero();
+  if (free) {
+    before = momentumOf(bodies, members);
+    shift = before.linear / before.mass;
+    turn = inverseInertia(before.inertia) * before.angular;
+    moveTogether(bodies, members, before.centre, -shift, -turn);
+    for (const Index b : members) bodies[b].place();
+  }
   int pass = 0;
   do {
     if (pass < kPasses)
@@ -252,11 +269,8 @@ std::size_t limitMotion(const std::vector<WatchedPairs>& pairs, std::vector<Limi
   } while (limit.find() > 0);
   if (!free) return met;
   const Momentum after = momentumOf(bodies, members);
-  const Vec3 shift = (before.linear - after.linear) / before.mass;
-  const Vec3 turn = inverseInertia(before.inertia) * (before.angular - after.angular);
-  for (const Index b : members)
-    for (Index i = 0; i < bodies[b].particles; ++i)
-      bodies[b].positions[i] += shift + turn.cross(bodies[b].previous[i] - before.centre);
+  moveTogether(bodies, members, before.centre, shift - after.linear / before.mass,
+               turn - inverseInertia(before.inertia) * after.angular);
   return met;
 }
 

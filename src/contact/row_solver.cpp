@@ -10,7 +10,7 @@ constexpr double kOutTime = 0.03;  // [s] in which an overlap falls to 1/e: what
 constexpr double kOutStiffness =
     800.0;                           // of it, over the inertia that it moves: impulses end where two can't both be met
 constexpr int kMostSweeps = 4;       // of a substep
-constexpr double kTolerance = 2e-3;  // mean edges: sweeps end where no row was corrected by more
+constexpr double kTolerance = 1e-3;  // mean edges: sweeps end where no row was corrected by more
 constexpr double kOutSpeed = 0.5;    // [1/s] mean edges: overlap is removed no faster
 
 using Four = double __attribute__((vector_size(32), may_alias));

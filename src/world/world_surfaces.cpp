@@ -134,6 +134,8 @@ void World::Impl::measureSurface(WorldBody& body) {
   for (const Triangle& t : surface.triangles)
     for (int k = 0; k < 3; ++k, ++count) sum += (surface.vertices[t[k]] - surface.vertices[t[(k + 1) % 3]]).norm();
   body.edge_length = count > 0 ? sum / static_cast<double>(count) : body.model->spacing;
+  // A surface bends no more finely than its cells.
+  if (body.model->lattice) body.edge_length = std::max(body.edge_length, body.model->spacing);
 }
 
 // Rows of the frame. A body that is reached wakes, and then all is found again with its neighbours.

@@ -174,6 +174,10 @@ TEST(FeaturePairs, RidgesThatCrossMeetAlongTheirCommonNormal) {
     EXPECT_NEAR((pairs[0].normal - Vec3::UnitZ()).norm(), 0.0, 1e-9);
     EXPECT_NEAR(pairs[0].gap, gap, 1e-9);
     EXPECT_TRUE(vertexFace(between(high, low)).empty()) << "no vertex is near a face";
+    const bool watched = std::any_of(found.watched.begin(), found.watched.end(), [&](const WatchedFeatures& w) {
+      return w.vertices == pairs[0].vertices;
+    });
+    EXPECT_EQ(watched, gap > 0.0) << "hooked into each other they must be free to part";
   }
 }
 

@@ -52,6 +52,14 @@ struct Two {
       }
     return {linear, angular};
   }
+  /// Of motion beyond a common shift.
+  double energy(const Vec3& shift) const {
+    double sum = 0.0;
+    for (int n = 0; n < 2; ++n)
+      for (std::size_t i = 0; i < previous[n].size(); ++i)
+        sum += (positions[n][i] - previous[n][i] - shift).squaredNorm() / inverse[n][i];
+    return sum;
+  }
   std::array<Points, 2> previous, positions;
   std::array<VertexSupports, 2> supports;
   std::array<std::vector<double>, 2> inverse;
@@ -157,6 +165,31 @@ TEST(MotionLimit, MomentumAndAngularMomentumStayWhereNothingIsHeld) {
     ASSERT_LT((after.second - before.second).norm(), 1e-12 * 20.0);
   }
   EXPECT_GT(limited, 20);
+}
+
+// Also where particles are held: they stay behind what all do together, or some would get energy of that motion.
+TEST(MotionLimit, NoEnergyIsGainedHoweverFastAllMoveTogether) {
+  const TriangleMesh mesh = boxMesh(Vec3(1, 1, 0.1), 6, 6, 1);
+  Points relative[2];
+  for (const bool together : {false, true}) {
+    test::Random random(5);
+    Points above;
+    for (int n = 0; n < 60; ++n)
+      above.push_back(
+          Vec3(random.uniform(-0.45, 0.45), random.uniform(-0.45, 0.45), 0.05 + random.uniform(0.001, 0.01)));
+    Two two(above, mesh.vertices);
+    for (Index v = 0; v < above.size(); ++v)
+      for (const Triangle& t : mesh.triangles) two.watch({v, t[0], t[1], t[2]}, 1);
+    const Vec3 shift = together ? Vec3(0.5, 0.2, 0.3) : Vec3(Vec3::Zero());
+    for (Vec3& p : two.positions[0]) p += shift + Vec3(0, 0, -0.03) + random.vector(0.02);
+    for (Vec3& p : two.positions[1]) p += shift + random.vector(0.005);
+    const double before = two.energy(shift);
+    EXPECT_GT(two.limit(true), 30u);
+    EXPECT_LT(two.energy(shift), before);
+    for (int n = 0; n < 2; ++n)
+      for (const Vec3& p : two.positions[n]) relative[together].push_back(p - shift);
+  }
+  for (std::size_t i = 0; i < relative[0].size(); ++i) EXPECT_LT((relative[1][i] - relative[0][i]).norm(), 1e-9) << i;
 }
 
 TEST(MotionLimit, WhoIsHeldIsNotMovedAndNotPassed) {
