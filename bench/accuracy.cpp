@@ -40,9 +40,10 @@ const char* const kSettled[] = {"bar",
                                 "angle",
                                 "skin_edge",
                                 "skin_rim"};
-// Tools: by the sphere, by a pick, by a blade. `regions` are to follow: ball_above, ball_beside.
-const char* const kPressed[] = {"press_1_nu30", "press_3_nu30", "press_8_nu30",
-                                "press_1_nu45", "press_3_nu45", "press_8_nu45"};
+// By the sphere, a pick, a blade. ball_above and ball_beside need a body of two materials: their rows belong to kPressed.
+const char* const kPressed[] = {"../calculix/press_1_nu30", "../calculix/press_3_nu30", "../calculix/press_8_nu30",
+                                "../calculix/press_1_nu45", "../calculix/press_3_nu45", "../calculix/press_8_nu45",
+                                "block_press_3_nu30",       "block_press_3_nu45"};
 const char* const kPulled[] = {"pull_nu30", "pull_nu45"};
 const char* const kIncised[] = {"half_cut_0", "half_cut_1", "half_cut_2", "half_cut_3", "half_cut_within",
                                 "incision_0", "incision_1", "incision_2", "incision_3"};
@@ -209,8 +210,9 @@ bool settledRows(Table& table, const std::string& folder, const std::string& par
 // Bodies under tools, in a World with its defaults. The run time is that of a frame. `press`, `pull` and `incised` are
 // errors of the shape; with `_force`, `_tip` and `_mouth` the quotient to the truth, less one.
 bool toolRows(Table& table, const std::string& folder, const std::string& part, const std::vector<double>& finer) {
-  const auto add = [&](const char* benchmark, const char* name, const char* other, const auto& load) {
-    const Result<TruthCase> truth = readTruthCase(folder + "/../calculix/" + name + ".csv");
+  const auto add = [&](const char* benchmark, const std::string& file, const char* other, const auto& load) {
+    const Result<TruthCase> truth = readTruthCase(folder + "/" + file + ".csv");
+    const std::string name = file.substr(file.rfind('/') + 1);
     if (!truth) {
       std::fprintf(stderr, "%s\n", truth.error().detail.c_str());
       return false;
@@ -218,7 +220,7 @@ bool toolRows(Table& table, const std::string& folder, const std::string& part, 
     const Result<ToolResult> result = load(*truth);
     if (!result) {
       table.row(benchmark, name, "filled", "refused", 0.0, 1.0);
-      std::fprintf(stderr, "%s: %s\n", name, result.error().detail.c_str());
+      std::fprintf(stderr, "%s: %s\n", name.c_str(), result.error().detail.c_str());
       return true;
     }
     const std::string setting = shortNumber(1000.0 * result->spacing) + " mm " + std::to_string(result->particles) +
@@ -238,12 +240,14 @@ bool toolRows(Table& table, const std::string& folder, const std::string& part, 
   for (const char* name : kPulled)
     for (const double times : finer)
       if (chosen(name))
-        read = add("pull", name, nullptr, [&](const TruthCase& t) { return pull(t, {times, 0.0, 0.0}); }) && read;
+        read = add("pull", std::string("../calculix/") + name, nullptr,
+                   [&](const TruthCase& t) { return pull(t, {times, 0.0, 0.0}); }) &&
+               read;
   for (const char* name : kIncised) {
     if (!chosen(name)) continue;
     const double height = std::string(name).find("incision") == 0 ? 0.04 : 0.05;
     for (const double cells : {8.0, 7.6})  // lattice planes on the faces, and between them
-      read = add("incised", name, "_mouth", [&](const TruthCase& t) {
+      read = add("incised", std::string("../calculix/") + name, "_mouth", [&](const TruthCase& t) {
                return hangIncised(t, folder + "/../calculix", {1.0, height / cells, 0.0});
              }) && read;
   }

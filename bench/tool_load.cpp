@@ -40,6 +40,7 @@ Result<Placed> place(const TruthCase& truth, TriangleMesh mesh, const Vec3& at, 
   def.material.youngs_modulus = truth.number("youngs_modulus");
   def.material.poissons_ratio = truth.number("poissons_ratio");
   def.material.density = truth.number("density");
+  def.material.friction = 0.0;  // the truth's sphere is slippery
   def.spacing = options.spacing;
   if (!(options.spacing > 0.0) && options.finer != 1.0) {
     const Result<PreparedBody> coarse = prepareBody(def);
@@ -127,7 +128,7 @@ Result<ToolResult> press(const TruthCase& truth, const ToolOptions& options) {
   if (const Result<SpawnReply> added = world.addSceneBody(placed->body); !added) return added.error();
 
   const double radius = truth.number("sphere_radius"), depth = truth.number("sphere_depth");
-  const double at = truth.number("sphere_at");
+  const double at = truth.has("sphere_at") ? truth.number("sphere_at") : truth.vector("sphere_center").x();
   PushCommand push;
   push.radius = radius;
   push.position = Vec3(at, 0.0, high.z() + radius + 0.001);
@@ -225,9 +226,11 @@ Result<ToolResult> hangIncised(const TruthCase& truth, const std::string& folder
   for (Index v = 0; v < there.size(); ++v)
     for (Index w = v + 1; w < there.size(); ++w)
       if ((there[v] - there[w]).norm() < 1e-6 && std::abs(there[v].z() - mouth.z()) < 1e-6 &&
-          (there[v] - mouth).norm() < nearest) {
-        nearest = (there[v] - mouth).norm();
-        result.force = (rest.body.surface[v] - rest.body.surface[w]).norm();
+          (there[v] - mouth).norm() < nearest + 1e-6) {
+        const double open = (rest.body.surface[v] - rest.body.surface[w]).norm();
+        // Two of several vertices at one place can be of one lip.
+        result.force = (there[v] - mouth).norm() < nearest - 1e-6 ? open : std::max(result.force, open);
+        nearest = std::min(nearest, (there[v] - mouth).norm());
       }
   result.ratio = result.force / truth.number("mouth_opening");
   return result;

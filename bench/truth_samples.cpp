@@ -29,8 +29,10 @@ std::vector<HeldRegion> heldBy(const TruthCase& truth) {
     held.push_back({Region::below({truth.vector("held_plane_normal" + number).normalized(),
                                    truth.vector("held_plane_point" + number)}),
                     false});
-  if (held.empty())  // of the organ
-    held.push_back({Region::below({Vec3::UnitX(), Vec3(truth.number("fixed_below"), 0.0, 0.0)}), false});
+  if (held.empty()) {  // by the package's own solver
+    const Vec3 axis = truth.text("fixed_axis") == "z" ? Vec3::UnitZ() : Vec3::UnitX();
+    held.push_back({Region::below({axis, Vec3(truth.number("fixed_below") * axis)}), false});
+  }
   return held;
 }
 

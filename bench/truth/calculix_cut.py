@@ -27,11 +27,11 @@ class Cut:
         self.name, self.shape, self.size, self.at, self.depth, self.width = name, shape, size, at, depth, width
         length, wide, high = size
         tip = 0.5 * high - depth
-        x = joined(graded(0, 0.5 * at, 4, 1.3), towards(0.5 * at, at, 5, 1.8), graded(at, 0.5 * (at + length), 5, 1.8),
-                   even(0.5 * (at + length), length, 3))
-        z = joined(towards(-0.5 * high, tip, 4, 1.7), graded(tip, 0.5 * high, 4, 1.7))
+        x = joined(graded(0, 0.5 * at, 4, 1.3), towards(0.5 * at, at, 6, 2), graded(at, 0.5 * (at + length), 6, 2),
+                   even(0.5 * (at + length), length, 2))
+        z = joined(towards(-0.5 * high, tip, 4, 2), graded(tip, 0.5 * high, 4, 2))
         if width:
-            right = joined(towards(0, 0.5 * width, 3, 1.7), graded(0.5 * width, 0.5 * wide, 3, 1.7))
+            right = joined(towards(0, 0.5 * width, 3, 2), graded(0.5 * width, 0.5 * wide, 3, 2))
             y = joined([-v for v in reversed(right)], right)
         else:
             y = even(-0.5 * wide, 0.5 * wide, 4)
