@@ -46,7 +46,7 @@ const char* const kPressed[] = {"../calculix/press_1_nu30", "../calculix/press_3
                                 "block_press_3_nu30",       "block_press_3_nu45"};
 const char* const kPulled[] = {"pull_nu30", "pull_nu45"};
 const char* const kIncised[] = {"half_cut_0", "half_cut_1", "half_cut_2", "half_cut_3", "half_cut_within",
-                                "incision_0", "incision_1", "incision_2", "incision_3"};
+                                "incision_0"};
 
 struct Row {
   std::string benchmark, name, mode, setting;
