@@ -15,6 +15,7 @@
 #include "plot.h"
 #include "settled_load.h"
 #include "static_load.h"
+#include "tool_load.h"
 
 namespace meshless::bench {
 namespace {
@@ -36,7 +37,16 @@ const char* const kSettled[] = {"bar",
                                 "taper",
                                 "tube",
                                 "curved",
-                                "angle"};
+                                "angle",
+                                "skin_edge",
+                                "skin_rim"};
+// By the sphere, a pick, a blade. ball_above and ball_beside need a body of two materials: their rows belong to kPressed.
+const char* const kPressed[] = {"../calculix/press_1_nu30", "../calculix/press_3_nu30", "../calculix/press_8_nu30",
+                                "../calculix/press_1_nu45", "../calculix/press_3_nu45", "../calculix/press_8_nu45",
+                                "block_press_3_nu30",       "block_press_3_nu45"};
+const char* const kPulled[] = {"pull_nu30", "pull_nu45"};
+const char* const kIncised[] = {"half_cut_0", "half_cut_1", "half_cut_2", "half_cut_3", "half_cut_within",
+                                "incision_0"};
 
 struct Row {
   std::string benchmark, name, mode, setting;
@@ -195,6 +205,53 @@ bool settledRows(Table& table, const std::string& folder, const std::string& par
     }
   }
   return true;
+}
+
+// Bodies under tools, in a World with its defaults. The run time is that of a frame. `press`, `pull` and `incised` are
+// errors of the shape; with `_force`, `_tip` and `_mouth` the quotient to the truth, less one.
+bool toolRows(Table& table, const std::string& folder, const std::string& part, const std::vector<double>& finer) {
+  const auto add = [&](const char* benchmark, const std::string& file, const char* other, const auto& load) {
+    const Result<TruthCase> truth = readTruthCase(folder + "/" + file + ".csv");
+    const std::string name = file.substr(file.rfind('/') + 1);
+    if (!truth) {
+      std::fprintf(stderr, "%s\n", truth.error().detail.c_str());
+      return false;
+    }
+    const Result<ToolResult> result = load(*truth);
+    if (!result) {
+      table.row(benchmark, name, "filled", "refused", 0.0, 1.0);
+      std::fprintf(stderr, "%s: %s\n", name.c_str(), result.error().detail.c_str());
+      return true;
+    }
+    const std::string setting = shortNumber(1000.0 * result->spacing) + " mm " + std::to_string(result->particles) +
+                                (result->at_rest ? "" : " not at rest");
+    table.row(benchmark, name, "filled", setting, result->step_ms, result->error);
+    table.row(std::string(benchmark) + "_tip", name, "filled", setting, result->step_ms, result->tip - 1.0);
+    if (other)
+      table.row(std::string(benchmark) + other, name, "filled", setting, result->step_ms, result->ratio - 1.0);
+    return true;
+  };
+  const auto chosen = [&](const char* name) { return std::string(name).find(part) != std::string::npos; };
+  bool read = true;
+  for (const char* name : kPressed)
+    for (const double times : finer)
+      if (chosen(name))
+        read = add("press", name, "_force", [&](const TruthCase& t) { return press(t, {times, 0.0, 0.0}); }) && read;
+  for (const char* name : kPulled)
+    for (const double times : finer)
+      if (chosen(name))
+        read = add("pull", std::string("../calculix/") + name, nullptr,
+                   [&](const TruthCase& t) { return pull(t, {times, 0.0, 0.0}); }) &&
+               read;
+  for (const char* name : kIncised) {
+    if (!chosen(name)) continue;
+    const double height = std::string(name).find("incision") == 0 ? 0.04 : 0.05;
+    for (const double cells : {8.0, 7.6})  // lattice planes on the faces, and between them
+      read = add("incised", std::string("../calculix/") + name, "_mouth", [&](const TruthCase& t) {
+               return hangIncised(t, folder + "/../calculix", {1.0, height / cells, 0.0});
+             }) && read;
+  }
+  return read;
 }
 
 // Appearance materials: one scalar, fitted to the small cantilever; what is left there, and on the other loads, is the
@@ -372,13 +429,15 @@ int main(int argc, char** argv) {
   using namespace meshless::bench;
   CLI::App app{"Accuracy of the deformer: accuracy.csv and its plots"};
   std::string out = ".", truth = meshless::shareFolder() + "/bench/truth/data";
-  std::string settled;
+  std::string settled, tools;
   bool quick = false, stiff = false;
   app.add_option("--out", out, "folder for accuracy.csv and the plots")->check(CLI::ExistingDirectory);
   app.add_option("--truth", truth, "folder of the finite-element truth")->check(CLI::ExistingDirectory);
   app.add_flag("--quick", quick, "coarse bodies and few steps: minutes become seconds");
   CLI::Option* const only =
       app.add_option("--settled", settled, "only bodies as users have them whose name has this in it");
+  CLI::Option* const only_tools =
+      app.add_option("--tools", tools, "only bodies under tools whose case's name has this in it");
   app.add_flag("--stiff", stiff, "only a bar from soft to stiff");
   CLI11_PARSE(app, argc, argv);
   Table table;
@@ -390,9 +449,12 @@ int main(int argc, char** argv) {
   table.file << "benchmark,case,mode,setting,run_time_ms,error\n";
   if (stiff) return stiffRows(table, truth) && plots(table, out) ? 0 : 1;
   if (only->count() > 0) return settledRows(table, truth, settled, {1.0, 1.26, 1.59, 2.0}) ? 0 : 1;
+  if (only_tools->count() > 0) return toolRows(table, truth, tools, {1.0, 1.26, 1.59, 2.0}) ? 0 : 1;
   const std::vector<double> spacings =
       quick ? std::vector<double>{0.0125} : std::vector<double>{0.025, 0.0125, 0.05 / 7.0, 0.00625};
   if (!settledRows(table, truth, "", quick ? std::vector<double>{1.0} : std::vector<double>{1.0, 1.26, 1.59, 2.0}))
+    return 1;
+  if (!toolRows(table, truth, "", quick ? std::vector<double>{1.0} : std::vector<double>{1.0, 1.26, 1.59, 2.0}))
     return 1;
   if (!quick && !stiffRows(table, truth)) return 1;
   if (!elasticRows(table, truth, spacings)) return 1;

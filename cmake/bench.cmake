@@ -17,8 +17,8 @@ function(add_bench_support name)
   target_link_libraries(${name} PUBLIC ${PROJECT_NAME}_world)
 endfunction()
 
-add_bench_support(bench_truth bench/static_load.cpp bench/settled_load.cpp bench/truth_case.cpp
-  bench/truth_surface.cpp bench/laws.cpp)
+add_bench_support(bench_truth bench/static_load.cpp bench/settled_load.cpp bench/tool_load.cpp bench/truth_case.cpp
+  bench/truth_samples.cpp bench/truth_surface.cpp bench/laws.cpp)
 target_compile_definitions(bench_truth PUBLIC TRUTH_FOLDER="${CMAKE_CURRENT_SOURCE_DIR}/bench/truth/data"
   CALCULIX_FOLDER="${CMAKE_CURRENT_SOURCE_DIR}/bench/truth/calculix")
 add_bench_support(bench_pile bench/contact_pile.cpp)

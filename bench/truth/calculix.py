@@ -56,27 +56,59 @@ class Block:
         self.lines, self.place = lines, place
 
 
+def shares(at):
+    """Of the 20 nodes of an element, at a place within -1..1."""
+    result = []
+    for node in CORNERS + EDGES:
+        r = [n - 1 for n in node]
+        value = 1.0
+        for a, b in zip(at, r):
+            value *= 1 + a * b if b else 1 - a * a
+        if 0 not in r:
+            result.append(0.125 * value * (sum(a * b for a, b in zip(at, r)) - 2))
+        else:
+            result.append(0.25 * value)
+    return result
+
+
 class Mesh:
-    def __init__(self, blocks, by):
-        self.places, self.elements, self.numbers = [], [], {}
+    """`apart` says of a place and the middle of an element there whether it has a node of its own: beyond a cut."""
+
+    def __init__(self, blocks, by, apart=lambda p, middle: False):
+        self.places, self.elements, self.numbers, self.lines = [], [], {}, None
         for block in blocks:
             lines = [divided(divided(axis, by), 2) for axis in block.lines]
+            self.lines = lines  # of the last one
             for i in range(0, len(lines[0]) - 2, 2):
                 for j in range(0, len(lines[1]) - 2, 2):
                     for k in range(0, len(lines[2]) - 2, 2):
-                        self.elements.append([
-                            self.node(block.place((lines[0][i + a], lines[1][j + b], lines[2][k + c])))
-                            for a, b, c in CORNERS + EDGES])
+                        middle = block.place((lines[0][i + 1], lines[1][j + 1], lines[2][k + 1]))
+                        places = [block.place((lines[0][i + a], lines[1][j + b], lines[2][k + c]))
+                                  for a, b, c in CORNERS + EDGES]
+                        self.elements.append([self.node(p, apart(p, middle)) for p in places])
 
-    def node(self, place):
+    def node(self, place, apart=False):
         key = tuple(round(x * 1e7) for x in place)
         # What rounds the other way is the same node.
         for near in ((key[0] + a, key[1] + b, key[2] + c) for a in (0, -1, 1) for b in (0, -1, 1) for c in (0, -1, 1)):
-            if near in self.numbers:
-                return self.numbers[near]
-        self.numbers[key] = len(self.places)
+            if (near, apart) in self.numbers:
+                return self.numbers[near, apart]
+        self.numbers[key, apart] = len(self.places)
         self.places.append(place)
         return len(self.places) - 1
+
+    def interpolated(self, field, p):
+        """At a place of a mesh of one block, where its lines lie in space as they are."""
+        number, at = 0, []
+        for axis, x in zip(self.lines, p):
+            count = len(axis) // 2
+            k = 0
+            while k + 1 < count and x > axis[2 * k + 2]:
+                k += 1
+            number = number * count + k
+            at.append(2 * (x - axis[2 * k]) / (axis[2 * k + 2] - axis[2 * k]) - 1)
+        values = [field[n] for n in self.elements[number]]
+        return tuple(sum(s * v[k] for s, v in zip(shares(at), values)) for k in range(3))
 
     def surface(self):
         sides = {}
@@ -95,11 +127,12 @@ class Case:
     def __init__(self, name, shape, blocks, held, gravity=(0, 0, -1), nu=0.3, surface=1, keys=(), by=1):
         self.name, self.shape, self.blocks, self.held = name, shape, blocks, held
         self.gravity, self.nu, self.surface, self.keys, self.by = gravity, nu, surface, dict(keys), by
+        self.apart = lambda p, middle: False
 
 
 def solve(case, by, folder):
     """Displacements for a gravity of 1 m/s^2 and 5 kPa."""
-    mesh = Mesh(case.blocks, by)
+    mesh = Mesh(case.blocks, by, case.apart)
     with open(folder / "case.inp", "w") as out:
         out.write("*NODE, NSET=ALL\n")
         for n, p in enumerate(mesh.places):
@@ -245,6 +278,24 @@ def oblique():
                       "held_plane_normal": "1 %.9g %.9g" % (-slope[0], -slope[1])})
 
 
+def skins():
+    """A sheet of 60 x 60 x 3 mm: held at one edge, and at all of them."""
+    half, thick = 0.03, even(-0.0015, 0.0015, 1)
+    rim = graded(-half, 0, 6, 1.25)
+    both = joined(rim, [-v for v in reversed(rim)])
+    across = even(-half, half, 8)
+    yield Case("skin_edge", "skin_edge", [Block([graded(-half, half, 12, 1.12), across, thick])],
+               lambda p: p[0] <= -half + 1e-9,
+               keys={"held_plane_point": "%g 0 0" % -half, "held_plane_normal": "1 0 0"})
+    keys = {}
+    for k, (x, y) in enumerate(((1, 0), (-1, 0), (0, 1), (0, -1))):
+        number = "_%d" % (k + 1) if k else ""
+        keys["held_plane_point" + number] = "%g %g 0" % (-half * x, -half * y)
+        keys["held_plane_normal" + number] = "%d %d 0" % (x, y)
+    yield Case("skin_rim", "skin_rim", [Block([both, both, thick])],
+               lambda p: max(abs(p[0]), abs(p[1])) >= half - 1e-9, keys=keys)
+
+
 def cases():
     yield bar("bar", "bar", 0.2, 0.05, 0.0)
     yield bar("bar_nu45", "bar", 0.2, 0.05, 0.0, nu=0.45)
@@ -260,6 +311,7 @@ def cases():
     yield tube()
     yield curved()
     yield angle()
+    yield from skins()
 
 
 def main():

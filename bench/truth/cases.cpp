@@ -131,36 +131,48 @@ TruthCase stretch(double factor, double nu) {
   return c;
 }
 
-TruthCase indentation(double nu) {
-  constexpr double kRadius = 0.025, kDepth = 0.0125;  // [m]
+/// `inner` is how much narrower elements are under the sphere.
+TruthCase pressed(const std::string& name, const Material& material, double depth, double inner,
+                  const std::array<std::array<int, 3>, kLevels>& elements) {
+  constexpr double kRadius = 0.025;  // [m]
   TruthCase c;
-  c.name = "block_indent";
+  c.name = name;
   c.body = "block";
   c.load = "sphere";
-  c.material = {1e4, nu};
+  c.material = material;
   c.parameters = {{"box_min", "-0.05 -0.05 0"},
                   {"box_max", "0.05 0.05 0.05"},
                   {"fixed_axis", "z"},
                   {"fixed_below", "0"},
                   {"sphere_radius", number(kRadius)},
-                  {"sphere_depth", number(kDepth)},
-                  {"sphere_center", vector({0.0, 0.0, kBlockHeight + kRadius - kDepth})},
+                  {"sphere_depth", number(depth)},
+                  {"sphere_center", vector({0.0, 0.0, kBlockHeight + kRadius - depth})},
                   {"sphere_contact", "rigid, frictionless, on the face z = 0.05"}};
   c.fixed_axis = 2;
   c.mirrored = {true, true, false};
-  c.elements = {{{4, 4, 4}, {8, 8, 8}, {12, 12, 12}}};
-  c.lines = [](const std::array<int, 3>& n) {
+  c.elements = elements;
+  c.lines = [inner](const std::array<int, 3>& n) {
     // Narrow under the sphere and at the clamped base's outer edge.
-    return Mesh::Lines{gradedLines(0.0, kBlockHalf, n[0], 0.4, 0.1), gradedLines(0.0, kBlockHalf, n[1], 0.4, 0.1),
-                       gradedLines(0.0, kBlockHeight, n[2], 0.2, 0.4)};
+    return Mesh::Lines{gradedLines(0.0, kBlockHalf, n[0], inner, 0.1), gradedLines(0.0, kBlockHalf, n[1], inner, 0.1),
+                       gradedLines(0.0, kBlockHeight, n[2], 0.2, inner)};
   };
   c.prescribed = [](const Vec3&, double) { return Vec3(Vec3::Zero()); };
   c.sphere.radius = kRadius;
   c.sphere.center = {0.0, 0.0, kBlockHeight + kRadius};
-  c.sphere_depth = kDepth;
+  c.sphere_depth = depth;
   c.load_steps = 8;
   c.samples = gridSamples({-kBlockHalf, -kBlockHalf, 0.0}, {9, 9, 5});
   return c;
+}
+
+TruthCase indentation(double nu) {
+  return pressed("block_indent", {1e4, nu}, 0.0125, 0.4, {{{4, 4, 4}, {8, 8, 8}, {12, 12, 12}}});
+}
+
+/// As soft as tissue, and not as deep.
+TruthCase press(double nu, int millimetres) {
+  return pressed("block_press_" + std::to_string(millimetres), {5e3, nu}, 0.001 * millimetres, 0.8,
+                 {{{4, 4, 4}, {6, 6, 6}, {10, 10, 10}}});
 }
 
 TruthCase organ(double nu) {
@@ -207,6 +219,9 @@ std::vector<TruthCase> allCases() {
                                  twist(180.0, nu),
                                  stretch(1.5, nu),
                                  indentation(nu),
+                                 press(nu, 1),
+                                 press(nu, 3),
+                                 press(nu, 8),
                                  organ(nu)};
     for (TruthCase& c : of_nu) {
       c.name += nu == 0.3 ? "_nu30" : "_nu45";

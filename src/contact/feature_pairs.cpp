@@ -521,6 +521,9 @@ void findSphere(const PairSearch& search, const Vec3& centre, double radius, con
     pair.order = static_cast<std::uint8_t>(pair.of_a);
     pair.normal = distance > 0.0 ? Vec3((point - centre) / distance) : Vec3(Vec3::UnitZ());
     pair.gap = distance - radius;
+    double apart = 0.0;  // [m^2] mean square of the corners from the point
+    for (int k = 0; k < pair.of_a; ++k) apart += pair.shares[k] * (a.vertices[pair.vertices[k]] - point).squaredNorm();
+    if (apart < radius * radius) pair.chord = 0.5 * apart / radius * (1.0 - apart / (radius * radius));
     pairs.push_back(pair);
   };
   const FloatBox box = boxAround(centre, centre + way, reach);

@@ -1,11 +1,17 @@
 #include "meshless_surgery/tools/grasp.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <queue>
 
 namespace meshless {
+namespace {
+
+const double kLongestWay = std::sqrt(3.0);  // along the edges of a cubic lattice, over the straight one
+
+}  // namespace
 
 double graspInverseMass(const BodyModel& model, const Pick& pick) {
   double inverse_mass = 0.0;
@@ -28,14 +34,16 @@ void makeGrasp(const BodyModel& model, Index centre, double radius, Pick& pick) 
     const auto [d, i] = queue.top();
     queue.pop();
     if (d > distance[i]) continue;
-    const double s = radius > 0.0 ? d / radius : 0.0;
+    const double straight = (model.rest[i] - model.rest[centre]).norm();
+    const double s = radius > 0.0 ? std::max(straight, d / kLongestWay) / radius : 0.0;
+    if (!(s < 1.0)) continue;
     pick.patch.push_back(i);
     pick.weights.push_back(model.masses[i] * (1.0 - s * s) * (1.0 - s * s));
     total += pick.weights.back();
     for (Index k = model.graph.offsets[i]; k < model.graph.offsets[i + 1]; ++k) {
       const Index j = model.graph.neighbours[k];
       const double there = d + model.graph.lengths[k];
-      if (!(there < radius)) continue;
+      if (!(there < kLongestWay * radius)) continue;
       const auto [it, is_new] = distance.emplace(j, there);
       if (!is_new && !(there < it->second)) continue;
       it->second = there;

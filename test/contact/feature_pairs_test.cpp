@@ -198,5 +198,31 @@ TEST(FeaturePairs, ASphereMeetsEachFeatureOnce) {
   EXPECT_NEAR((pairs[0].normal + Vec3::UnitZ()).norm(), 0.0, 1e-12);
 }
 
+// What lies on a sphere with its corners does not lie in it, however coarse its faces are.
+TEST(FeaturePairs, FacesWhoseCornersLieOnASphereHaveTheirChordToGo) {
+  const double radius = 0.5, top = 0.5;
+  TriangleMesh mesh = boxMesh(Vec3(1, 1, 1), 10, 10, 10);
+  const Vec3 centre(0.02, 0.03, top + radius);
+  for (Vec3& v : mesh.vertices)
+    if (v.z() > top - 1e-9 && (v - centre).head<2>().norm() < 0.3)
+      v.z() = centre.z() - std::sqrt(radius * radius - (v - centre).head<2>().squaredNorm());
+  const Placed block(mesh, Vec3::Zero());
+  PairSearch search = between(block, block);
+  std::vector<FeaturePair> pairs;
+  findSphere(search, centre, radius, Vec3::Zero(), pairs);
+  int flat = 0;
+  for (const FeaturePair& pair : pairs) {
+    if (pair.of_a == 1 || !(pair.gap < -1e-4)) continue;
+    ++flat;
+    EXPECT_NEAR(pair.gap + pair.chord, 0.0, 0.1 * pair.chord);
+  }
+  EXPECT_GT(flat, 0);
+  // A sphere that is smaller than a face is stopped by it as it is.
+  pairs.clear();
+  findSphere(search, Vec3(0.45, 0.44, -0.02 - 0.5), 0.03, Vec3::Zero(), pairs);
+  for (const FeaturePair& pair : pairs) EXPECT_EQ(pair.chord, 0.0) << pair.gap;
+  EXPECT_FALSE(pairs.empty());
+}
+
 }  // namespace
 }  // namespace meshless

@@ -24,6 +24,24 @@ TEST(Grasp, HoldsAPatchAroundItsParticle) {
   EXPECT_EQ(pick.patch.size(), 1u);
 }
 
+// Links of a lattice go along its axes: a way along them is longer than it is, and a grasp as far would be an octahedron.
+TEST(Grasp, IsRoundInALattice) {
+  BodyDef def = test::defOf(boxMesh(Vec3(0.1, 0.1, 0.1), 4, 4, 4));
+  def.material.youngs_modulus = 5000.0;
+  def.spacing = 0.01;
+  const PreparedBody body = prepared(def);
+  const Points& rest = body.model->rest;
+  Index centre = 0;
+  for (Index i = 0; i < rest.size(); ++i)
+    if (rest[i].norm() < rest[centre].norm()) centre = i;
+  const double radius = 0.035;
+  Pick pick;
+  makeGrasp(*body.model, centre, radius, pick);
+  std::size_t within = 0;
+  for (const Vec3& p : rest) within += (p - rest[centre]).norm() < radius * (1.0 - 1e-9);
+  EXPECT_EQ(pick.patch.size(), within);
+}
+
 TEST(PullGrasp, GoesTheImplicitShareOfTheWayAndNeverOvershoots) {
   const PreparedBody body = prepared(test::ball());
   for (double stiffness : {1.0, 1e3, 1e9, 1e12})

@@ -20,6 +20,7 @@ struct FeaturePair {
   std::array<double, 4> shares{};   // of the vertices; add up to 1 for a, to -1 for b
   Vec3 normal = Vec3::UnitZ();      // unit, from b to a
   double gap = 0.0;                 // [m] along it; negative: inside
+  double chord = 0.0;               // [m] of kSphere: how far the point lies in a sphere that goes through its corners
 };
 
 /// The side on which a vertex of a was of b: its normal says where out is once it is inside.
@@ -118,7 +119,9 @@ void findEdgeEdge(const PairSearch& search, FoundFeatures& found);
 /// Vertices of a over the plane z = height.
 void findPlane(const PairSearch& search, double height, std::vector<FeaturePair>& pairs);
 
-/// Features of a next to a sphere that moves by `way` [m] in the frame; a vertex, edge or face comes once.
+/// Features of a next to a sphere that moves by `way` [m] in the frame; a vertex, edge or face comes once. Where the
+/// corners of a face lie on the sphere, the tissue between them does, and the flat face cuts it off: that is its chord.
+/// It is smaller for faces nearly as large as the sphere, and zero for larger ones: those stop it as they are.
 void findSphere(const PairSearch& search, const Vec3& centre, double radius, const Vec3& way,
                 std::vector<FeaturePair>& pairs);
 
