@@ -1,0 +1,118 @@
+// Wounds that are spread: the surface goes with the tissue beneath it, at the rim and where the wound ends.
+#include <algorithm>
+
+#include <gtest/gtest.h>
+#include <Eigen/SVD>
+
+#include "meshless_surgery/base/random.h"
+#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/random_organ.h"
+#include "meshless_surgery/world/world.h"
+#include "support/bodies.h"
+
+namespace meshless {
+namespace {
+
+using Map = Eigen::Matrix<double, 3, 2>;
+
+double largestOf(const Map& map) { return Eigen::JacobiSVD<Map>(map).singularValues()[0]; }
+
+// The gradient of the map of the cell that a vertex follows, there.
+Mat3 tissueAt(const BodySnapshot& body, Index v) {
+  const CellLattice& lattice = *body.model->lattice;
+  const LatticeCell& cell = lattice.cells[body.model->binding.turners[v]];
+  const Vec3 at = lattice.placeIn(cell, body.model->surface.vertices[v]);
+  Mat3 gradient = Mat3::Zero();
+  for (int k = 0; k < 8; ++k) {
+    Vec3 slope;
+    for (int axis = 0; axis < 3; ++axis) {
+      Vec3 along = at;
+      along[axis] = 1.0;
+      slope[axis] = (k >> axis & 1 ? 1.0 : -1.0) / lattice.spacing * trilinearWeight(k | 1 << axis, along);
+    }
+    gradient += body.particles[cell.corners[k]] * slope.transpose();
+  }
+  return gradient;
+}
+
+// Triangles that are stretched more than three times what the tissue beneath them is, but slivers.
+int tornTriangles(const BodySnapshot& body) {
+  const TriangleMesh& mesh = body.model->surface;
+  const double mean = meanEdgeLength(mesh);
+  int torn = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3 &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+    const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+    if ((b - a).cross(c - a).norm() < 0.02 * mean * longest) continue;
+    const Vec3 u = (b - a).normalized(), v = ((c - a) - u * u.dot(c - a)).normalized();
+    Eigen::Matrix2d rest;
+    rest << (b - a).dot(u), (c - a).dot(u), 0.0, (c - a).dot(v);
+    Map now;
+    now << body.surface[t[1]] - body.surface[t[0]], body.surface[t[2]] - body.surface[t[0]];
+    double tissue = 1.0;
+    for (const Index q : t) {
+      Map beneath;
+      beneath << tissueAt(body, q) * u, tissueAt(body, q) * v;
+      tissue = std::max(tissue, largestOf(beneath));
+    }
+    torn += largestOf(now * rest.inverse()) > 3.0 * tissue;
+  }
+  return torn;
+}
+
+// A random organ, incised somewhere and spread by locked picks on both sides of the wound.
+int tornAfterIncision(std::uint64_t seed) {
+  Random random(seed * 7919 + 13);
+  BodyDef def = test::defOf(*randomOrgan(seed, random.whole(0, 2), 0.1, 2000));
+  def.material.youngs_modulus = 5000.0;
+  def.material.poissons_ratio = random.between(0.3, 0.45);
+  def.material.damping = 20.0;
+  def.material.self_contact = SelfContact::kNone;
+  const TriangleMesh mesh = def.mesh;
+  WorldSettings settings = test::weightless();
+  settings.contact = ContactMethod::kNone;
+  World world(settings);
+  EXPECT_TRUE(world.addSceneBody(test::shared(def)).ok());
+  const Triangle& t =
+      mesh.triangles[static_cast<std::size_t>(random.whole(0, static_cast<int>(mesh.triangles.size()) - 1))];
+  const Vec3 &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+  const Vec3 out = (b - a).cross(c - a).normalized(), at = (a + b + c) / 3.0;
+  InciseCommand incise;
+  incise.blade.x_axis = (b - a).normalized();
+  incise.blade.y_axis = out;
+  incise.blade.length = random.between(0.02, 0.06);
+  incise.blade.depth = random.between(0.006, 0.03);
+  incise.blade.origin = at + 0.001 * out - 0.5 * incise.blade.length * incise.blade.x_axis;
+  EXPECT_TRUE(world.apply(incise).ok());
+  const Vec3 across = out.cross(incise.blade.x_axis);
+  for (int k = 0; k < 4; ++k) {
+    const double side = k % 2 ? 1.0 : -1.0;
+    PickCommand pick;
+    pick.point = at + side * random.between(0.003, 0.02) * across +
+                 random.between(-0.5, 0.5) * incise.blade.length * incise.blade.x_axis;
+    pick.max_distance = 0.1;
+    const auto picked = test::replyOf<PickReply>(world.apply(pick));
+    LockCommand lock;
+    lock.pick = picked.pick;
+    lock.target = picked.position + side * random.between(0.003, 0.012) * across + random.inCube(0.004);
+    EXPECT_TRUE(world.apply(lock).ok());
+  }
+  for (int step = 0; step < 100; ++step) world.step();
+  int torn = 0;
+  const WorldSnapshot shot = world.snapshot({true, true, true});
+  for (const BodySnapshot& body : shot.bodies) torn += tornTriangles(body);
+  return torn;
+}
+
+TEST(Wounds, AnIncisionThatIsSpreadTearsNoTriangle) {
+  int torn = 0;
+  for (std::uint64_t seed = 1; seed <= 16; ++seed) {
+    const int here = tornAfterIncision(seed);
+    EXPECT_LE(here, 2) << "seed " << seed;
+    torn += here;
+  }
+  EXPECT_LE(torn, 6);
+}
+
+}  // namespace
+}  // namespace meshless
