@@ -40,13 +40,14 @@ const char* const kSettled[] = {"bar",
                                 "angle",
                                 "skin_edge",
                                 "skin_rim"};
-// By the sphere, a pick, a blade. ball_above and ball_beside need a body of two materials: their rows belong to kPressed.
+// By the sphere, a pick, a blade.
 const char* const kPressed[] = {"../calculix/press_1_nu30", "../calculix/press_3_nu30", "../calculix/press_8_nu30",
                                 "../calculix/press_1_nu45", "../calculix/press_3_nu45", "../calculix/press_8_nu45",
-                                "block_press_3_nu30",       "block_press_3_nu45"};
+                                "../calculix/ball_above",   "../calculix/ball_beside",  "block_press_3_nu30",
+                                "block_press_3_nu45"};
 const char* const kPulled[] = {"pull_nu30", "pull_nu45"};
-const char* const kIncised[] = {"half_cut_0", "half_cut_1", "half_cut_2", "half_cut_3", "half_cut_within",
-                                "incision_0"};
+const char* const kIncised[] = {"half_cut_0", "half_cut_1",      "half_cut_2",
+                                "half_cut_3", "half_cut_within", "incision_0"};
 
 struct Row {
   std::string benchmark, name, mode, setting;
@@ -227,8 +228,7 @@ bool toolRows(Table& table, const std::string& folder, const std::string& part, 
                                 (result->at_rest ? "" : " not at rest");
     table.row(benchmark, name, "filled", setting, result->step_ms, result->error);
     table.row(std::string(benchmark) + "_tip", name, "filled", setting, result->step_ms, result->tip - 1.0);
-    if (other)
-      table.row(std::string(benchmark) + other, name, "filled", setting, result->step_ms, result->ratio - 1.0);
+    if (other) table.row(std::string(benchmark) + other, name, "filled", setting, result->step_ms, result->ratio - 1.0);
     return true;
   };
   const auto chosen = [&](const char* name) { return std::string(name).find(part) != std::string::npos; };
@@ -241,15 +241,19 @@ bool toolRows(Table& table, const std::string& folder, const std::string& part, 
     for (const double times : finer)
       if (chosen(name))
         read = add("pull", std::string("../calculix/") + name, nullptr,
-                   [&](const TruthCase& t) { return pull(t, {times, 0.0, 0.0}); }) &&
+                   [&](const TruthCase& t) {
+                     return pull(t, {times, 0.0, 0.0});
+                   }) &&
                read;
   for (const char* name : kIncised) {
     if (!chosen(name)) continue;
     const double height = std::string(name).find("incision") == 0 ? 0.04 : 0.05;
     for (const double cells : {8.0, 7.6})  // lattice planes on the faces, and between them
-      read = add("incised", std::string("../calculix/") + name, "_mouth", [&](const TruthCase& t) {
-               return hangIncised(t, folder + "/../calculix", {1.0, height / cells, 0.0});
-             }) && read;
+      read = add("incised", std::string("../calculix/") + name, "_mouth",
+                 [&](const TruthCase& t) {
+                   return hangIncised(t, folder + "/../calculix", {1.0, height / cells, 0.0});
+                 }) &&
+             read;
   }
   return read;
 }

@@ -14,8 +14,8 @@
 namespace meshless::bench {
 namespace {
 
-constexpr double kAtRest = 2e-4;     // of the largest displacement, in a time constant
-constexpr int kMostTimes = 80;       // time constants
+constexpr double kAtRest = 2e-4;       // of the largest displacement, in a time constant
+constexpr int kMostTimes = 80;         // time constants
 constexpr double kBlockEdge = 0.0125;  // [m] as a user's model of a block could have it
 
 struct Placed {
@@ -41,6 +41,11 @@ Result<Placed> place(const TruthCase& truth, TriangleMesh mesh, const Vec3& at, 
   def.material.poissons_ratio = truth.number("poissons_ratio");
   def.material.density = truth.number("density");
   def.material.friction = 0.0;  // the truth's sphere is slippery
+  if (truth.has("ball_center")) {
+    TissueRegion ball{Region::sphere(truth.vector("ball_center") - at, truth.number("ball_radius")), def.material};
+    ball.material.youngs_modulus = truth.number("ball_youngs_modulus");
+    def.regions.push_back(ball);
+  }
   def.spacing = options.spacing;
   if (!(options.spacing > 0.0) && options.finer != 1.0) {
     const Result<PreparedBody> coarse = prepareBody(def);
@@ -190,8 +195,8 @@ Result<ToolResult> hangIncised(const TruthCase& truth, const std::string& folder
   settings.contact = ContactMethod::kNone;
   const Vec3 gravity = truth.vector("gravity");
   settings.gravity = gravity;
-  const Result<Placed> placed = place(truth, std::move(*surface), Vec3::Zero(), options,
-                                      std::sqrt(1.54 * gravity.norm() / largest), settings);
+  const Result<Placed> placed =
+      place(truth, std::move(*surface), Vec3::Zero(), options, std::sqrt(1.54 * gravity.norm() / largest), settings);
   if (!placed) return placed.error();
   World world(settings);
   if (const Result<SpawnReply> added = world.addSceneBody(placed->body); !added) return added.error();
@@ -212,10 +217,10 @@ Result<ToolResult> hangIncised(const TruthCase& truth, const std::string& folder
   Points there;
   for (const Vec3& p : at_rest) there.push_back(frame.rotation.conjugate() * (p - frame.translation));
   const auto vertexAt = [&](const Vec3& p) {
-    return static_cast<Index>(std::min_element(there.begin(), there.end(), [&](const Vec3& a, const Vec3& b) {
-                                return (a - p).squaredNorm() < (b - p).squaredNorm();
-                              }) -
-                              there.begin());
+    return static_cast<Index>(
+        std::min_element(there.begin(), there.end(),
+                         [&](const Vec3& a, const Vec3& b) { return (a - p).squaredNorm() < (b - p).squaredNorm(); }) -
+        there.begin());
   };
   Points moved;
   for (const Vec3& p : truth.rest) moved.push_back(rest.body.surface[vertexAt(p)] - p);
