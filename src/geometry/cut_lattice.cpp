@@ -1,6 +1,7 @@
 #include "meshless_surgery/geometry/cut_lattice.h"
 
 #include <algorithm>
+#include <map>
 
 #include "meshless_surgery/geometry/union_find.h"
 
@@ -61,6 +62,9 @@ class Cutter {
     LinkSet parted;
     LinkSet tip{};  // links across the plane, of a family that the blade has met
     bool inside_cut = false, face_cut = false;
+    int face = -1;                                            // axis of the upper face that its bridge holds
+    SampleSet face_links = kNoSample, face_left = kNoSample;  // all there were of it, and those that the blade leaves
+    bool isBridged() const { return parts[0] != whole; }
   };
 
   const LatticeCell& cellOf(const Family& f) const { return before_.cells[f.whole]; }
@@ -109,6 +113,7 @@ class Cutter {
       if (bridge != kNoIndex && bridge != c) continue;
       family_of_[c] = static_cast<Index>(families_.size());
       families_.push_back({c, {}, before_.cells[c].parted});
+      families_.back().face = before_.cells[c].face;
     }
     for (Index c = 0; c < before_.cells.size(); ++c) {
       const Index bridge = before_.cells[c].bridge;
@@ -164,7 +169,9 @@ class Cutter {
       for (int axis = 0; axis < 3; ++axis)
         for (const Index p : families_[f].parts) {
           const LatticeCell& part = before_.cells[p];
-          const Index corner = part.corners[1u << axis];
+          // Across a face that a bridge holds, the bridge alone has the corners.
+          const bool held = families_[f].face == axis;
+          const Index corner = (held ? cellOf(families_[f]) : part).corners[1u << axis];
           for (Index u = uses.offsets[corner]; u < uses.offsets[corner + 1]; ++u) {
             const Index q = uses.cells[u];
             if (before_.cells[q].isBridge(q) || !(near_[p] || near_[q])) continue;
@@ -186,11 +193,18 @@ class Cutter {
         !(lower.tip[0] | lower.tip[1] | lower.tip[2] | upper.tip[0] | upper.tip[1] | upper.tip[2]);
     if (lower.inside_cut && upper.inside_cut) {
       cut = crossing;  // both are parted altogether, and bridged
-    } else if (plane_in_face) {
-      cut = 2 * countSamples(cut) >= countSamples(crossing) ? crossing : kNoSample;
+    } else if (plane_in_face && lower.face < 0 && cut && cut != crossing) {
+      if (lower.isBridged())
+        cut = 2 * countSamples(cut) >= countSamples(crossing) ? crossing : kNoSample;
+      else
+        lower.face = axis;
     }
     if (!cut) return;
     lower.parted[axis] |= cut;
+    if (lower.face == axis) {
+      lower.face_links = faceLinks(a, b, axis);
+      lower.face_left = lower.face_links & ~lower.parted[axis];
+    }
     lower.face_cut = upper.face_cut = true;
   }
 
@@ -211,8 +225,12 @@ class Cutter {
       const double share = before_.cells[f.parts[0]].mass_share;
       SampleSet left = cellOf(f).samples;
       if (!f.inside_cut || !left) {
+        if (f.face >= 0 && f.face_links) {
+          addOverFace(f);
+          continue;
+        }
         const Index first = static_cast<Index>(result_.lattice.cells.size());
-        const Index bridge = f.parts.size() > 1 ? first + static_cast<Index>(f.parts.size()) : kNoIndex;
+        const Index bridge = f.isBridged() ? first + static_cast<Index>(f.parts.size()) : kNoIndex;
         for (const Index p : f.parts) {
           LatticeCell cell = before_.cells[p];
           cell.parted = f.parted;
@@ -235,6 +253,23 @@ class Cutter {
         addWhole(f, whole, altogether, share);
       }
     }
+  }
+
+  // A cell whose upper face the blade has parted as far as it reaches: it and the bridge that holds the rest.
+  void addOverFace(const Family& f) {
+    LatticeCell cell = before_.cells[f.parts[0]];
+    const double share = cell.stiffness_share + (f.isBridged() ? cellOf(f).stiffness_share : 0.0);
+    const double left = static_cast<double>(countSamples(f.face_left)) / countSamples(f.face_links);
+    cell.parted = f.parted;
+    cell.face = left > 0.0 ? f.face : -1;
+    cell.bridge = left > 0.0 ? static_cast<Index>(result_.lattice.cells.size()) + 1 : kNoIndex;
+    cell.stiffness_share = share * (1.0 - left * left);
+    add(cell, f.parts[0], true);
+    if (!(left > 0.0)) return;
+    cell.corners = cellOf(f).corners;
+    cell.mass_share = 0.0;
+    cell.stiffness_share = share * left * left;
+    add(cell, f.whole, true);
   }
 
   // What hangs together of a family: one cell, or its parts across the plane and their bridge.
@@ -261,6 +296,7 @@ class Cutter {
     LatticeCell cell = cellOf(f);
     cell.parted = f.parted;
     cell.bridge = kNoIndex;
+    cell.face = -1;
     const bool one_parent = std::all_of(parents.begin(), parents.end(), [&](Index p) { return p == parents[0]; });
     if (one_parent && cut == 0) {
       cell.corners = before_.cells[parents[0]].corners;
@@ -312,26 +348,49 @@ class Cutter {
     if (axis < 0) return false;
     const bool up = cb.place[axis] > ca.place[axis];
     const LatticeCell &lower = up ? ca : cb, &upper = up ? cb : ca;
-    return faceLinks(lower, upper, axis) & ~lower.parted[axis];
+    return lower.face != axis && (faceLinks(lower, upper, axis) & ~lower.parted[axis]);
   }
 
-  // The part that each corner of a bridge is one of: of those that have the corner that it had, the nearest.
-  std::vector<std::array<Index, 8>> bridgedParts() const {
+  // The corner of a cell that each corner of a bridge is, 8 c + k: of the parts that it joins, or of the cell across
+  // the face that it holds.
+  std::vector<std::array<Index, 8>> bridgedCorners() const {
     const std::vector<LatticeCell>& cells = result_.lattice.cells;
     std::vector<std::vector<Index>> parts(cells.size());
-    for (Index c = 0; c < cells.size(); ++c)
+    std::map<std::array<Index, 2>, std::vector<Index>> users;  // by the corner that it was, and which of the cell's
+    std::vector<bool> wanted(before_.corners, false);
+    for (Index c = 0; c < cells.size(); ++c) {
+      if (cells[c].isBridge(c))
+        for (const Index corner : cells[c].corners) wanted[corner] = true;
       if (cells[c].bridge != kNoIndex && !cells[c].isBridge(c)) parts[cells[c].bridge].push_back(c);
+    }
     std::vector<std::array<Index, 8>> found(cells.size());
+    for (Index c = 0; c < cells.size(); ++c)
+      if (!cells[c].isBridge(c))
+        for (Index k = 0; k < 8; ++k)
+          if (wanted[cells[c].corners[k]]) users[{cells[c].corners[k], k}].push_back(c);
     for (Index c = 0; c < cells.size(); ++c) {
       if (!cells[c].isBridge(c)) continue;
-      for (int k = 0; k < 8; ++k) {
+      for (Index k = 0; k < 8; ++k) {
+        const Index was = cells[c].corners[k];
         std::vector<Index> same;
         for (const Index p : parts[c])
-          if (cells[p].corners[k] == cells[c].corners[k]) same.push_back(p);
-        found[c][k] = partAt(cells, same.empty() ? parts[c] : same, k);
+          if (cells[p].corners[k] == was) same.push_back(p);
+        found[c][k] = 8 * partAt(cells, same.empty() ? parts[c] : same, static_cast<int>(k)) + k;
+        const int axis = cells[c].face;
+        if (axis < 0 || !(k >> axis & 1)) continue;
+        const auto across = users.find({was, k ^ 1u << axis});
+        if (across == users.end()) continue;
+        for (const Index q : across->second)
+          if (isAcross(cells[c], cells[q], axis)) found[c][k] = 8 * q + (k ^ 1u << axis);
       }
     }
     return found;
+  }
+
+  static bool isAcross(const LatticeCell& lower, const LatticeCell& upper, int axis) {
+    std::array<std::int32_t, 3> place = lower.place;
+    ++place[axis];
+    return upper.place == place;
   }
 
   Vec3 middleOf(Index c) const {
@@ -363,7 +422,7 @@ class Cutter {
     std::vector<LatticeCell>& cells = result_.lattice.cells;
     // Corners of the parent that a changed cell has are shared out anew; the others stay as they were.
     std::vector<bool> open(before_.corners, false);
-    const std::vector<std::array<Index, 8>> held_by = bridgedParts();
+    const std::vector<std::array<Index, 8>> held_by = bridgedCorners();
     for (Index c = 0; c < cells.size(); ++c)
       if (result_.changed[c])
         for (const Index corner : cells[c].corners) open[corner] = true;
@@ -393,7 +452,7 @@ class Cutter {
     }
     for (Index c = 0; c < cells.size(); ++c)
       if (cells[c].isBridge(c))
-        for (int k = 0; k < 8; ++k) cells[c].corners[k] = cells[held_by[c][k]].corners[k];
+        for (int k = 0; k < 8; ++k) cells[c].corners[k] = cells[held_by[c][k] / 8].corners[held_by[c][k] % 8];
   }
 
   const CellLattice& before_;

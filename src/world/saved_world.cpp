@@ -237,6 +237,7 @@ std::string faultOf(const BodyModel& m) {
           !std::equal(cell.corners.begin(), cell.corners.end(), m.clusters.members.begin() + 8 * c) || !cell.filled ||
           (cell.bridge != kNoIndex && !(cell.bridge < cells.size() && cells[cell.bridge].bridge == cell.bridge)))
         return "a body's lattice is not that of its clusters";
+      if (cell.face < -1 || cell.face > 2) return "a cell has a face that is none";
       if (!(cell.mass_share >= 0.0 && cell.mass_share <= 1.0) ||
           !(cell.stiffness_share > 0.0 && cell.stiffness_share <= 1.0))
         return "a cell has a share of itself that is none";

@@ -139,7 +139,8 @@ void serialize(A& archive, ElasticRest& v) {
 }
 template <class A>
 void serialize(A& archive, SurfaceBinding& v) {
-  auto& [particle, embedded, offsets, carriers, weights, levers, turners, lever_clusters, partners, partnered, bound] = v;
+  auto& [particle, embedded, offsets, carriers, weights, levers, turners, lever_clusters, partners, partnered, bound] =
+      v;
   archive(particle, embedded, offsets, carriers, weights, levers, turners, lever_clusters, partners, partnered, bound);
 }
 template <class A>
@@ -154,8 +155,8 @@ void serialize(A& archive, ClampPoint& v) {
 }
 template <class A>
 void serialize(A& archive, LatticeCell& v) {
-  auto& [corners, place, samples, filled, held, resists, parted, mass_share, stiffness_share, bridge] = v;
-  archive(corners, place, samples, filled, held, resists, parted, mass_share, stiffness_share, bridge);
+  auto& [corners, place, samples, filled, held, resists, parted, mass_share, stiffness_share, bridge, face] = v;
+  archive(corners, place, samples, filled, held, resists, parted, mass_share, stiffness_share, bridge, face);
 }
 template <class A>
 void serialize(A& archive, CellRegions::Part& v) {

@@ -23,5 +23,18 @@ TEST(Tools, TissueLiesOnTheSphereAndNotUnderItsTangents) {
   }
 }
 
+// On a plane of the lattice the tip went to the nearest corner: deflections of 0.91 to 1.12, mouths of 0.76 to 1.30.
+TEST(Tools, AHalfCutBarOpensAsFarAsTheBladeWentInAPlaneOfTheLatticeToo) {
+  for (const char* name : {"half_cut_1", "half_cut_2", "half_cut_3"}) {
+    const std::string folder = CALCULIX_FOLDER;
+    const Result<TruthCase> truth = readTruthCase(folder + "/" + name + ".csv");
+    ASSERT_TRUE(truth.ok()) << truth.error().detail;
+    const Result<ToolResult> result = hangIncised(*truth, folder, {1.0, 0.05 / 8.0, 0.0});
+    ASSERT_TRUE(result.ok()) << result.error().detail;
+    EXPECT_NEAR(result->tip, 1.0, 0.03) << name;
+    EXPECT_NEAR(result->ratio, 1.0, 0.05) << name;
+  }
+}
+
 }  // namespace
 }  // namespace meshless::bench

@@ -190,6 +190,53 @@ TEST(CutLattice, ATipInACellIsBridgedByWhatIsNotCut) {
   }
 }
 
+TEST(CutLattice, AFaceThatABladeCoversInPartIsBridgedByWhatIsNotCovered) {
+  const CellLattice bar = latticeOf(boxMesh(Vec3(0.2, 0.05, 0.05), 0.0125), 500.0);
+  const Points corners = cornerPlaces(bar);
+  for (const double share : {0.25, 0.5, 0.75}) {  // of the third layer of cells from above
+    const double depth = (2.0 + share) * bar.spacing;
+    const Blade blade{Vec3(0.01, -0.1, 0.025), Vec3::UnitY(), Vec3::UnitZ(), 0.2, depth};  // in a plane of the lattice
+    const CutLattice cut = cutLattice(bar, corners, BladeGate(blade));
+    expectSound(bar, cut);
+    EXPECT_EQ(componentsOf(cut.lattice), 1u);
+    EXPECT_EQ(bridgesOf(cut.lattice), 5u);  // one for each cell across the bar
+    const CornerUses uses = cornerUses(cut.lattice);
+    for (Index c = 0; c < cut.lattice.cells.size(); ++c) {
+      const LatticeCell& cell = cut.lattice.cells[c];
+      if (cell.bridge == kNoIndex) continue;
+      const double held = (1.0 - share) * (1.0 - share);
+      EXPECT_NEAR(cell.stiffness_share, cell.isBridge(c) ? held : 1.0 - held, 1e-12);
+      // The bridge has all of its corners with cells that are none, on both sides of the blade.
+      int with_own = 0, across = 0;
+      for (const Index corner : cell.corners)
+        for (Index u = uses.offsets[corner]; u < uses.offsets[corner + 1]; ++u) {
+          const LatticeCell& other = cut.lattice.cells[uses.cells[u]];
+          if (other.isBridge(uses.cells[u])) continue;
+          with_own += other.place == cell.place;
+          across += other.place[0] == cell.place[0] + 1;
+        }
+      EXPECT_GT(with_own, 0);
+      if (cell.isBridge(c)) EXPECT_GT(across, 3);
+    }
+    // Deeper, and the bridges are further on, whatever else is cut meanwhile; through, and there are none.
+    const Blade elsewhere{Vec3(0.053, -0.1, 0.025), Vec3::UnitY(), Vec3::UnitZ(), 0.2, 0.007};
+    const CutLattice other = cutLattice(cut.lattice, follow(cut, corners), BladeGate(elsewhere));
+    expectSound(cut.lattice, other);
+    const std::size_t more = bridgesOf(other.lattice) - 5u;
+    const Points now = follow(other, follow(cut, corners));
+    Blade deeper = blade;
+    deeper.depth += bar.spacing;
+    const CutLattice second = cutLattice(other.lattice, now, BladeGate(deeper));
+    expectSound(other.lattice, second);
+    EXPECT_EQ(bridgesOf(second.lattice), 5u + more);
+    deeper.depth = 1.0;
+    const CutLattice through = cutLattice(second.lattice, follow(second, now), BladeGate(deeper));
+    expectSound(second.lattice, through);
+    EXPECT_EQ(componentsOf(through.lattice), 2u);
+    EXPECT_EQ(bridgesOf(through.lattice), more);
+  }
+}
+
 TEST(CutLattice, ABladeBesideTheSolidChangesNothing) {
   const CellLattice bar = latticeOf(boxMesh(Vec3(0.2, 0.05, 0.05), 0.0125), 500.0);
   const CutLattice cut = cutLattice(bar, cornerPlaces(bar),

@@ -33,6 +33,9 @@ struct LatticeCell {
   /// all of their samples holds them together with a share of their stiffness. kNoIndex: no bridge; of a bridge:
   /// itself.
   Index bridge = kNoIndex;
+  /// Of a bridge and its part, where a blade ends in the face between a cell and the one above it: the axis of that
+  /// face, whose corners the bridge has from the cell above. -1: the blade ended within the cell, or there is none.
+  std::int8_t face = -1;
 
   bool isBridge(Index self) const { return bridge == self; }
 };
