@@ -38,7 +38,7 @@ def scenario(surgeon, play):
     cut = surgeon.cut(pivot=(-0.2, 0.012, 0.04), reach=(1, 0, 0), normal=(0, 1, 0))
     surgeon.live(1.0)
     shares = [share for body in surgeon.info().bodies for share in body.region_shares]
-    play.check(len(cut.pieces) == 2 and all(share > 0.003 for share in shares),
+    play.check(len(cut.new_bodies) == 2 and all(share > 0.003 for share in shares),
                "cut through the lump, both pieces have a part of it: %s %%"
                % ", ".join("%.1f" % (100 * share) for share in shares))
 
