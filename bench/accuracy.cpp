@@ -43,7 +43,8 @@ const char* const kSettled[] = {"bar",
 // By the sphere, a pick, a blade.
 const char* const kPressed[] = {"../calculix/press_1_nu30", "../calculix/press_3_nu30", "../calculix/press_8_nu30",
                                 "../calculix/press_1_nu45", "../calculix/press_3_nu45", "../calculix/press_8_nu45",
-                                "../calculix/ball_above",   "block_press_3_nu30",       "block_press_3_nu45"};
+                                "../calculix/ball_above_1", "../calculix/ball_above",   "../calculix/ball_beside",
+                                "block_press_3_nu30",       "block_press_3_nu45"};
 const char* const kPulled[] = {"pull_nu30", "pull_nu45"};
 const char* const kIncised[] = {"half_cut_0", "half_cut_1",      "half_cut_2",
                                 "half_cut_3", "half_cut_within", "incision_0"};

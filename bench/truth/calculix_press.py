@@ -200,6 +200,7 @@ def cases():
         for depth in (1, 3, 8):
             yield Press("press_%d_nu%02d" % (depth, 100 * nu), 0.001 * depth, nu)
     yield Press("ball_above", 0.003, 0.3, ball=True)
+    yield Press("ball_above_1", 0.001, 0.3, ball=True)  # strains between sphere and ball are small
     yield Press("ball_beside", 0.003, 0.3, at=0.02, ball=True)
 
 
