@@ -15,8 +15,9 @@ constexpr double kMostDragged = 1.3e5;
 // Elastic bodies, in contact of surfaces, are torn to threads, and overlaps that open then give them energy: 2.7e7 J
 // was seen, and 2.4 times of what they had when they are let go.
 constexpr double kMostDraggedElastic = 6e7, kMostGainedElastic = 5.0;
-// [J] kinetic, of 2 kg that are pulled by 0.57 m within a step: 4.7e3 J. Contact of now adds to it, up to 1.0e4 J.
-constexpr double kMostPulled = 4.7e3, kMostPulledInContact = 1.2e4;
+// [J] kinetic, of 2 kg that are pulled by 0.57 m within a step: 4.7e3 J. Contact of rest shapes adds to it, up to
+// 1.8e4 J with a grasp that is round.
+constexpr double kMostPulled = 4.7e3, kMostPulledInContact = 2.2e4;
 
 struct StiffPick {
   std::string name;
