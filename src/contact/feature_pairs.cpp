@@ -85,9 +85,7 @@ class VertexSearch {
   }
 
  private:
-  bool mayBeginInside() const {
-    return search_.first && search_.self == PairSearch::Self::kNo && b_.surface->closed;
-  }
+  bool mayBeginInside() const { return search_.first && search_.self == PairSearch::Self::kNo && b_.surface->closed; }
 
   const RememberedSide* recall(Index v) const {
     const RememberedSide* const end = search_.remembered + search_.remembered_count;
@@ -217,7 +215,7 @@ class VertexSearch {
       const Vec3 normal = (p - best.point) / best.distance;
       if (mayPush(v, normal)) add(v, best, normal, best.distance);
     }
-    if (made_ > 0) sides_.push_back({v, 0.0, used_[0]});
+    rememberOutside(v, p, best);
     if (!b_.surface->closed) return;
     for (const Candidate& c : candidates_) {
       if (made_ == used_.size()) break;
@@ -230,7 +228,21 @@ class VertexSearch {
     }
   }
 
-  // What touches is held by the face that the vertex opposes most.
+  // Also what no row pushes: should it come to touch, nothing else tells its side.
+  void rememberOutside(Index v, const Vec3& p, const Candidate& best) {
+    if (made_ > 0)
+      sides_.push_back({v, 0.0, used_[0]});
+    else if (best.distance > tie_ && best.distance <= best.reach)
+      sides_.push_back({v, 0.0, (p - best.point) / best.distance});
+    else if (best.distance <= tie_ && remembered_)
+      sides_.push_back({v, 0.0, remembered_->normal});
+  }
+
+  bool wasOutOf(const Vec3& face_normal) const {
+    return remembered_ && !(remembered_->depth > 0.0) && remembered_->normal.dot(face_normal) > kSameWay;
+  }
+
+  // What touches is held by the face that the vertex opposes most, or that it was out of.
   void watch(Index v, const Vec3& p, const Candidate& best) {
     for (const Candidate& c : candidates_) {
       if (c.distance > c.reach) continue;
@@ -238,7 +250,7 @@ class VertexSearch {
       const Vec3& face_normal = b_.frame->face_normals[c.face];
       if (c.distance > touching_)
         watched_.push_back({{v, t[0], t[1], t[2]}, 1, (p - c.point) / c.distance, kLeastLeft * c.distance});
-      else if (&c == &best && mayPush(v, face_normal))
+      else if ((&c == &best && mayPush(v, face_normal)) || wasOutOf(face_normal))
         watched_.push_back({{v, t[0], t[1], t[2]}, 1, face_normal, -touching_});
     }
   }
@@ -421,55 +433,77 @@ std::size_t findVertexFace(const PairSearch& search, SearchScratch& scratch) {
   return queried;
 }
 
-void findEdgeEdge(const PairSearch& search, FoundFeatures& found) {
-  const SurfaceFrame &a = *search.a.frame, &b = *search.b.frame;
-  const ContactSurface &sa = *search.a.surface, &sb = *search.b.surface;
-  const double margin = searchMargin(search.length), deepest = kDeepestEdges * search.length;
-  for (const Index e : a.ridges) {
-    const ContactEdge& of_a = sa.edges[e];
-    const Vec3 &a0 = a.vertices[of_a.vertices[0]], &a1 = a.vertices[of_a.vertices[1]];
-    const Vec3 &v0 = a.velocities[of_a.vertices[0]], &v1 = a.velocities[of_a.vertices[1]];
-    const Vec3 low = a0.cwiseMin(a1).cwiseMin(a0 + search.h * v0).cwiseMin(a1 + search.h * v1);
-    const Vec3 high = a0.cwiseMax(a1).cwiseMax(a0 + search.h * v0).cwiseMax(a1 + search.h * v1);
-    if (isOutOf(b.bounds, low, high, margin)) continue;
-    const auto meet = [&](Index other) {
-      const ContactEdge& of_b = sb.edges[other];
-      watchEdges(search, of_a, of_b, found.watched);
-      const Vec3 &b0 = b.vertices[of_b.vertices[0]], &b1 = b.vertices[of_b.vertices[1]];
-      const Vec3 along_a = a1 - a0, along_b = b1 - b0, between = a0 - b0;
-      Vec3 normal = along_a.cross(along_b);
-      const double sine = normal.norm();
-      if (!(sine > kParallel * along_a.norm() * along_b.norm())) return;
-      normal /= sine;
-      Vec3 outwards = b.face_normals[of_b.faces[0]];
-      if (of_b.faces[1] != kNoIndex) outwards += b.face_normals[of_b.faces[1]];
-      if (normal.dot(outwards) < 0.0) normal = -normal;
-      if (!isInArc(b, of_b, normal) || !isInArc(a, of_a, -normal)) return;
-      // Where they are nearest to each other.
-      const double aa = along_a.squaredNorm(), ab = along_a.dot(along_b), bb = along_b.squaredNorm();
-      const double da = along_a.dot(between), db = along_b.dot(between), det = aa * bb - ab * ab;
-      const double s = (ab * db - bb * da) / det, t = (aa * db - ab * da) / det;
-      if (!(s > kEnd && s < 1.0 - kEnd && t > kEnd && t < 1.0 - kEnd)) return;
-      const double gap = normal.dot(between + s * along_a - t * along_b);
-      const Vec3 velocity =
-          (1.0 - s) * v0 + s * v1 - (1.0 - t) * b.velocities[of_b.vertices[0]] - t * b.velocities[of_b.vertices[1]];
-      if (gap > margin + kAhead * search.h * velocity.norm() || gap < -deepest) return;
-      FeaturePair pair;
-      pair.kind = FeaturePair::Kind::kEdgeEdge;
-      pair.of_a = pair.of_b = 2;
-      pair.features = {e, other};
-      pair.vertices = {of_a.vertices[0], of_a.vertices[1], of_b.vertices[0], of_b.vertices[1]};
-      pair.shares = {1.0 - s, s, t - 1.0, -t};
-      pair.normal = normal;
-      pair.gap = gap;
-      found.pairs.push_back(pair);
-    };
-    FloatBox box = boxAround(low, high, margin);
-    sb.tree.query(b.boxes, box, [&](Index face) {
-      for (const Index other : sb.face_edges[face])
-        if (b.ridge[other] && sb.edges[other].faces[0] == face) meet(other);
+namespace {
+
+/// visit: each edge of a ridge of `of` and what is near of `other`, but valleys.
+template <class Visit>
+void eachEdgeNear(const PairSearch::Side& of, const PairSearch::Side& other, double h, double margin,
+                  const Visit& visit) {
+  const SurfaceFrame& frame = *of.frame;
+  for (const Index e : frame.ridges) {
+    Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
+    for (const Index v : of.surface->edges[e].vertices) {
+      const Vec3 &p = frame.vertices[v], q = p + h * frame.velocities[v];
+      low = low.cwiseMin(p).cwiseMin(q);
+      high = high.cwiseMax(p).cwiseMax(q);
+    }
+    if (isOutOf(other.frame->bounds, low, high, margin)) continue;
+    other.surface->tree.query(other.frame->boxes, boxAround(low, high, margin), [&](Index face) {
+      for (const Index near : other.surface->face_edges[face])
+        if (other.frame->shapes[near] != EdgeShape::kValley && other.surface->edges[near].faces[0] == face)
+          visit(e, near);
     });
   }
+}
+
+/// Where their common normal is between the normals of both.
+void meetRidges(const PairSearch& search, Index e, Index other, FoundFeatures& found) {
+  const SurfaceFrame &a = *search.a.frame, &b = *search.b.frame;
+  const ContactEdge &of_a = search.a.surface->edges[e], &of_b = search.b.surface->edges[other];
+  const Vec3 &a0 = a.vertices[of_a.vertices[0]], &a1 = a.vertices[of_a.vertices[1]];
+  const Vec3 &b0 = b.vertices[of_b.vertices[0]], &b1 = b.vertices[of_b.vertices[1]];
+  const Vec3 along_a = a1 - a0, along_b = b1 - b0, between = a0 - b0;
+  Vec3 normal = along_a.cross(along_b);
+  const double sine = normal.norm();
+  if (!(sine > kParallel * along_a.norm() * along_b.norm())) return;
+  normal /= sine;
+  Vec3 outwards = b.face_normals[of_b.faces[0]];
+  if (of_b.faces[1] != kNoIndex) outwards += b.face_normals[of_b.faces[1]];
+  if (normal.dot(outwards) < 0.0) normal = -normal;
+  if (!isInArc(b, of_b, normal) || !isInArc(a, of_a, -normal)) return;
+  // Where they are nearest to each other.
+  const double aa = along_a.squaredNorm(), ab = along_a.dot(along_b), bb = along_b.squaredNorm();
+  const double da = along_a.dot(between), db = along_b.dot(between), det = aa * bb - ab * ab;
+  const double s = (ab * db - bb * da) / det, t = (aa * db - ab * da) / det;
+  if (!(s > kEnd && s < 1.0 - kEnd && t > kEnd && t < 1.0 - kEnd)) return;
+  const double gap = normal.dot(between + s * along_a - t * along_b);
+  const Vec3 velocity = (1.0 - s) * a.velocities[of_a.vertices[0]] + s * a.velocities[of_a.vertices[1]] -
+                        (1.0 - t) * b.velocities[of_b.vertices[0]] - t * b.velocities[of_b.vertices[1]];
+  if (gap > searchMargin(search.length) + kAhead * search.h * velocity.norm() || gap < -kDeepestEdges * search.length)
+    return;
+  FeaturePair pair;
+  pair.kind = FeaturePair::Kind::kEdgeEdge;
+  pair.of_a = pair.of_b = 2;
+  pair.features = {e, other};
+  pair.vertices = {of_a.vertices[0], of_a.vertices[1], of_b.vertices[0], of_b.vertices[1]};
+  pair.shares = {1.0 - s, s, t - 1.0, -t};
+  pair.normal = normal;
+  pair.gap = gap;
+  found.pairs.push_back(pair);
+}
+
+}  // namespace
+
+void findEdgeEdge(const PairSearch& search, FoundFeatures& found) {
+  const double margin = searchMargin(search.length);
+  const std::vector<ContactEdge>&edges_a = search.a.surface->edges, &edges_b = search.b.surface->edges;
+  eachEdgeNear(search.a, search.b, search.h, margin, [&](Index e, Index near) {
+    watchEdges(search, edges_a[e], edges_b[near], found.watched);
+    if (search.b.frame->shapes[near] == EdgeShape::kRidge) meetRidges(search, e, near, found);
+  });
+  eachEdgeNear(search.b, search.a, search.h, margin, [&](Index e, Index near) {
+    if (search.a.frame->shapes[near] == EdgeShape::kFlat) watchEdges(search, edges_a[near], edges_b[e], found.watched);
+  });
 }
 
 void findPlane(const PairSearch& search, double height, std::vector<FeaturePair>& pairs) {

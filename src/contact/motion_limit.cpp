@@ -62,7 +62,10 @@ class Limit {
       const WatchedPairs& pairs = pairs_[n];
       if (again_ && !bodies_[pairs.a].any_moved && !bodies_[pairs.b].any_moved) continue;
       WatchedSet& set = *pairs.set;
-      if (!again_) set.gone += bodies_[pairs.a].way + bodies_[pairs.b].way;
+      if (!again_) {  // what both go brings them no nearer
+        const LimitedBody &a = bodies_[pairs.a], &b = bodies_[pairs.b];
+        set.gone += (a.mean_way - b.mean_way).norm() + a.spread + b.spread;
+      }
       for (std::size_t f = 0; f < set.features.size(); ++f)
         if (again_ ? isMoved(pairs, set.features[f]) : set.gone > set.until[f]) {
           if (wouldMeet(pairs, f)) scratch_.meeting.push_back({n, f});

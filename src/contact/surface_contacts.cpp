@@ -32,6 +32,12 @@ double restitutionOf(const Collider& a, const Collider* b) {
   return a.obstacle ? b->restitution : std::sqrt(a.restitution * b->restitution);
 }
 
+/// [m] of the search between two of them, b kNoIndex for what has no mesh.
+double marginOf(const std::vector<Collider>& colliders, Index a, Index b) {
+  return searchMargin(b == kNoIndex ? colliders[a].edge_length
+                                    : std::min(colliders[a].edge_length, colliders[b].edge_length));
+}
+
 // Rows ascend by their names where features do.
 const ContactRow* rowOfName(const std::vector<ContactRow>& rows, const ContactRow& like) {
   const auto at = std::lower_bound(rows.begin(), rows.end(), like,
@@ -157,6 +163,8 @@ void SurfaceContacts::findMoved(const SurfaceScene& scene, const std::vector<Col
     if (b) gone += ways[pair->b]->gone - pair->way_b + ways[pair->b]->ahead;
     pair->stale =
         !pair->found || pair->kind == Kind::kSphere || restitutionOf(a, b) > 0.0 || gone > searchMargin(length) - skin;
+    pair->slack = searchMargin(length) - (pair->stale ? 0.0 : gone);
+    pair->off_a = pair->off_b = 0.0;
     if (!pair->stale) continue;
     pair->way_a = ways[pair->a]->gone;
     if (b) pair->way_b = ways[pair->b]->gone;
@@ -169,8 +177,12 @@ void SurfaceContacts::find(const SurfaceScene& scene, const std::vector<Collider
                            const ForEach& for_each) {
   frames_.resize(colliders.size());
   frame_of_.resize(colliders.size(), 0);
+  framed_.assign(colliders.size(), 0);
+  where_.resize(colliders.size());
+  for (std::size_t c = 0; c < colliders.size(); ++c) where_[c] = colliders[c].positions;
   runEach(for_each, colliders.size(), [&](std::size_t c) {
     const Collider& collider = colliders[c];
+    framed_[c] = moved_[c] || (collider.obstacle && frame_of_[c] == collider.key);
     if (!moved_[c] || (collider.obstacle && frame_of_[c] == collider.key)) return;
     frame_of_[c] = collider.obstacle ? collider.key : 0;
     placeFrame(*collider.surface, collider.vertices, collider.moves ? collider.velocities : nullptr, scene.h,
@@ -182,10 +194,10 @@ void SurfaceContacts::find(const SurfaceScene& scene, const std::vector<Collider
   });
   const auto isEdges = [this](std::size_t n) { return pairs_[n]->kind == Kind::kEdgeEdge; };
   runEach(for_each, pairs_.size(), [&](std::size_t n) {
-    if (pairs_[n]->stale && !isEdges(n)) findPair(scene, colliders, *pairs_[n]);
+    if (pairs_[n]->stale && !isEdges(n)) findPair(scene, colliders, scene.h, *pairs_[n]);
   });
   runEach(for_each, pairs_.size(), [&](std::size_t n) {  // these ask which vertices are inside
-    if (pairs_[n]->stale && isEdges(n)) findPair(scene, colliders, *pairs_[n]);
+    if (pairs_[n]->stale && isEdges(n)) findPair(scene, colliders, scene.h, *pairs_[n]);
   });
   for (const Pair* pair : pairs_) {
     counters.contacts += pair->set.rows.size();
@@ -196,7 +208,9 @@ void SurfaceContacts::find(const SurfaceScene& scene, const std::vector<Collider
   joinIslands(colliders);
 }
 
-void SurfaceContacts::findPair(const SurfaceScene& scene, const std::vector<Collider>& colliders, Pair& pair) {
+// h [s]: how long its result is to hold.
+void SurfaceContacts::findPair(const SurfaceScene& scene, const std::vector<Collider>& colliders, double h,
+                               Pair& pair) {
   const Collider& a = colliders[pair.a];
   const Collider& b = colliders[pair.b == kNoIndex ? pair.a : pair.b];
   std::unique_ptr<Scratch> scratch;
@@ -213,7 +227,7 @@ void SurfaceContacts::findPair(const SurfaceScene& scene, const std::vector<Coll
   PairSearch search;
   search.a = {a.surface, &frames_[pair.a]};
   search.b = {b.surface, &frames_[pair.b == kNoIndex ? pair.a : pair.b]};
-  search.h = scene.h;
+  search.h = h;
   search.length = std::min(a.edge_length, b.edge_length);
   if (pair.a == pair.b) search.self = a.self;
   search.remembered = pair.sides.data();
@@ -258,8 +272,8 @@ void SurfaceContacts::makeRows(const SurfaceScene& scene, const std::vector<Coll
   const double friction = std::sqrt(a.friction * other_friction);
   const double restitution = restitutionOf(a, b);
   const double skin = b ? kSkin * std::min(a.edge_length, b->edge_length) : 0.0;
-  RowBody of_a{a.surface, a.positions, frames_[pair.a].vertices.data()}, of_b;
-  if (b) of_b = {b->surface, b->positions, frames_[pair.b].vertices.data()};
+  RowBody of_a{a.surface, where_[pair.a], frames_[pair.a].vertices.data()}, of_b;
+  if (b) of_b = {b->surface, where_[pair.b], frames_[pair.b].vertices.data()};
   const std::vector<ContactRow>& old = scratch.old;
   scratch.old.assign(pair.set.rows.begin(), pair.set.rows.end());
   pair.set.clear();
@@ -313,7 +327,10 @@ void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
   for (Index c = 0; c < count; ++c) root[c] = c;
   const auto moves = [&](Index c) { return c != kNoIndex && colliders[c].moves; };
   for (const Pair* pair : pairs_) {
-    if ((pair->set.rows.empty() && pair->watched.features.empty()) || !moves(pair->a) || !moves(pair->b)) continue;
+    if (!moves(pair->a) || !moves(pair->b)) continue;
+    // Who is fast may be thrown at others within the frame.
+    const bool fast = ways_of_[pair->a]->ahead + ways_of_[pair->b]->ahead > pair->slack;
+    if (!fast && pair->set.rows.empty() && pair->watched.features.empty()) continue;
     const Index a = rootOf(root, pair->a), b = rootOf(root, pair->b);
     root[std::max(a, b)] = std::min(a, b);
   }
@@ -322,6 +339,7 @@ void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
     Island& island = islands_.back();
     island.bodies.clear();
     island.free.clear();
+    island.pairs.clear();
     island.rows.clear();
     island.watched.clear();
     spare_islands_.push_back(std::move(island));
@@ -339,25 +357,37 @@ void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
   }
   std::vector<char>& held = island_held_;
   held.assign(islands_.size(), 0);
-  for (Pair* pair : pairs_) {
-    if (pair->set.rows.empty() && pair->watched.features.empty()) continue;
-    const Index of = moves(pair->a) ? pair->a : moves(pair->b) ? pair->b : kNoIndex;
+  for (Index n = 0; n < pairs_.size(); ++n) {
+    const Pair& pair = *pairs_[n];
+    const Index of = moves(pair.a) ? pair.a : moves(pair.b) ? pair.b : kNoIndex;
     if (of == kNoIndex) continue;
     const Index island = number[rootOf(root, of)];
-    if (!pair->set.rows.empty()) islands_[island].rows.push_back({&pair->set, pair->a, pair->b});
-    held[island] = held[island] || !moves(pair->a) || !moves(pair->b);
-    if (!pair->watched.features.empty())
-      islands_[island].watched.push_back(
-          {&pair->watched, pair->a, pair->b,
-           touchingDistance(std::min(colliders[pair->a].edge_length, colliders[pair->b].edge_length))});
+    if (moves(pair.a) && moves(pair.b) && number[rootOf(root, pair.b)] != island) continue;
+    islands_[island].pairs.push_back(n);
+    if (pair.set.rows.empty() && pair.watched.features.empty()) continue;
+    held[island] = held[island] || !moves(pair.a) || !moves(pair.b);
   }
   for (std::size_t n = 0; n < islands_.size(); ++n) {
     Island& island = islands_[n];
     bool any_held = held[n];
     for (const Index b : island.bodies) any_held = any_held || colliders[b].held;
     if (!any_held) island.free = island.bodies;
+    listOf(island, colliders);
   }
-  listWatched();
+}
+
+void SurfaceContacts::listOf(Island& island, const std::vector<Collider>& colliders) {
+  island.rows.clear();
+  island.watched.clear();
+  for (const Index n : island.pairs) {
+    Pair& pair = *pairs_[n];
+    if (!pair.set.rows.empty()) island.rows.push_back({&pair.set, pair.a, pair.b});
+    if (!pair.watched.features.empty())
+      island.watched.push_back(
+          {&pair.watched, pair.a, pair.b,
+           touchingDistance(std::min(colliders[pair.a].edge_length, colliders[pair.b].edge_length))});
+  }
+  listWatched(island);
 }
 
 void SurfaceContacts::fillSlots(const std::vector<Collider>& colliders) {
@@ -368,6 +398,8 @@ void SurfaceContacts::fillSlots(const std::vector<Collider>& colliders) {
   before_.resize(first_slots_[count]);
   solver_bodies_.resize(count);
   limited_.resize(count);
+  searched_.resize(count);
+  turned_.assign(count, 0);
   for (Index c = 0; c < count; ++c) {
     const Collider& collider = colliders[c];
     SolverBody& body = solver_bodies_[c];
@@ -384,6 +416,12 @@ void SurfaceContacts::fillSlots(const std::vector<Collider>& colliders) {
       body.now[i] = {p.x(), p.y(), p.z(), collider.moves ? collider.inverse_masses[i] : 0.0};
       before_[first_slots_[c] + i] = body.now[i];
     }
+    Way& searched = searched_[c];
+    searched.since = searched.off = searched.was_off = 0.0;
+    if (needed_[c] && collider.moves) {
+      searched.from.assign(collider.positions, collider.positions + collider.particles);
+      searched.speed.assign(collider.velocities, collider.velocities + collider.particles);
+    }
     const auto way = ways_.find(collider.key);
     LimitedBody& limited = limited_[c];
     limited.supports = collider.surface ? &collider.surface->supports : nullptr;
@@ -394,6 +432,9 @@ void SurfaceContacts::fillSlots(const std::vector<Collider>& colliders) {
     limited.moves = collider.moves;
     limited.inverse_masses = collider.inverse_masses;
     limited.watched.clear();
+    limited.mean_way.setZero();
+    limited.spread = 0.0;
+    limited.any_moved = false;
   }
 }
 
@@ -404,32 +445,135 @@ void SurfaceContacts::setRigidShare(Index collider, const RigidGroups* groups, d
   body.motions.assign(groups && share > 0.0 ? groups->size() : 0, GroupMotion());
 }
 
-// Vertices that are watched, each once; vertex_moved tells them meanwhile.
-void SurfaceContacts::listWatched() {
-  for (const Island& island : islands_)
-    for (const WatchedPairs& pairs : island.watched)
-      for (const WatchedFeatures& watched : pairs.set->features)
-        for (std::size_t k = 0; k < 4; ++k) {
-          const Index c = k < watched.of_a ? pairs.a : pairs.b;
-          LimitedBody& body = limited_[c];
-          if (body.watched.empty()) {
-            body.vertices.resize(body.supports->offsets.size() - 1);
-            body.vertex_moved.assign(body.vertices.size(), 0);
-            body.edited.assign(body.particles, 0);
-          }
-          if (std::exchange(body.vertex_moved[watched.vertices[k]], 1)) continue;
-          body.watched.push_back(watched.vertices[k]);
+// Vertices that are watched, each once; vertex_moved tells them meanwhile. What does not move is placed here: several
+// islands may meet it.
+void SurfaceContacts::listWatched(const Island& island) {
+  for (const WatchedPairs& pairs : island.watched) {
+    std::unique_lock<std::mutex> lock(frame_mutex_, std::defer_lock);
+    if (!limited_[pairs.a].moves || !limited_[pairs.b].moves) lock.lock();
+    for (const WatchedFeatures& watched : pairs.set->features)
+      for (std::size_t k = 0; k < 4; ++k) {
+        LimitedBody& body = limited_[k < watched.of_a ? pairs.a : pairs.b];
+        const Index v = watched.vertices[k];
+        if (body.watched.empty()) {
+          body.vertices.resize(body.supports->offsets.size() - 1);
+          body.vertex_moved.assign(body.vertices.size(), 0);
+          body.edited.assign(body.particles, 0);
         }
-  for (LimitedBody& body : limited_)
-    if (!body.moves) body.place();
+        if (std::exchange(body.vertex_moved[v], 1)) continue;
+        body.watched.push_back(v);
+        if (!body.moves) body.vertices[v] = body.vertexAt(v, body.positions);
+      }
+  }
 }
 
-void SurfaceContacts::solveIsland(Index number, SolverStep step, bool first, const std::vector<const Vec3*>& previous,
+// As its vertices are at the start of the substep, for h [s].
+void SurfaceContacts::placeAgain(const std::vector<Collider>& colliders, Index c, double h) {
+  const Collider& collider = colliders[c];
+  const Vec3* const speed = collider.moves ? searched_[c].speed.data() : nullptr;
+  const Points& offsets = ways_.find(collider.key)->second.offsets;
+  Points vertices(collider.surface->vertices());
+  for (Index v = 0; v < vertices.size(); ++v)
+    vertices[v] = collider.surface->supports.sum(v, where_[c]) + (offsets.empty() ? Vec3(Vec3::Zero()) : offsets[v]);
+  placeFrame(*collider.surface, vertices.data(), speed, h, frames_[c]);
+}
+
+// The search of a frame holds for what goes straight on; contacts and stress turn it. Where two bodies are off their
+// ways by the margin together, they are searched for along their new ways; who is hardly off keeps its own.
+bool SurfaceContacts::findAgain(Island& island, const SurfaceScene& scene, const std::vector<Collider>& colliders,
+                                double since, double h, const ForEach& for_each) {
+  const auto moves = [&](Index c) { return c != kNoIndex && colliders[c].moves; };
+  for (const Index b : island.bodies) {
+    turned_[b] = 0;
+    if (!needed_[b]) continue;
+    Way& way = searched_[b];
+    const double along = since + h - way.since;
+    way.away.resize(colliders[b].particles);
+    for (Index i = 0; i < colliders[b].particles; ++i)
+      way.away[i] = limited_[b].positions[i] - way.from[i] - along * way.speed[i];
+    const VertexSupports& supports = colliders[b].surface->supports;
+    double farthest = 0.0;
+    for (Index v = 0; v < colliders[b].surface->vertices(); ++v)
+      farthest = std::max(farthest, supports.sum(v, way.away.data()).squaredNorm());
+    way.was_off = way.off;
+    way.off = std::sqrt(farthest);
+  }
+  const auto offOf = [&](const Pair& pair) {
+    double off = searched_[pair.a].off + pair.off_a;
+    if (pair.b != kNoIndex) off += searched_[pair.b].off + pair.off_b;
+    return off;
+  };
+  bool any = false;
+  for (const Index n : island.pairs) {
+    const Pair& pair = *pairs_[n];
+    if (offOf(pair) <= pair.slack) continue;
+    any = true;
+    const double most = 0.25 * marginOf(colliders, pair.a, pair.b);
+    for (const Index c : {pair.a, pair.b})
+      if (moves(c) && !(searched_[c].off <= most)) turned_[c] = 1;
+  }
+  if (!any) return false;
+  std::vector<Pair*> again;
+  for (const Index n : island.pairs) {
+    Pair& pair = *pairs_[n];
+    const bool turned = turned_[pair.a] || (moves(pair.b) && turned_[pair.b]);
+    if (turned || !(offOf(pair) <= pair.slack)) again.push_back(&pair);
+  }
+  for (std::size_t n = 0; n < island.bodies.size(); ++n) {
+    const Index b = island.bodies[n];
+    where_[b] = limited_[b].previous;
+    if (!turned_[b]) continue;
+    Way& way = searched_[b];
+    way.from.assign(limited_[b].previous, limited_[b].previous + colliders[b].particles);
+    for (Index i = 0; i < colliders[b].particles; ++i)
+      way.speed[i] = (limited_[b].positions[i] - limited_[b].previous[i]) / h;
+    way.since = since;
+    way.off = way.was_off = 0.0;
+  }
+  const double left = scene.h - since;
+  std::vector<Index> places;
+  for (const Pair* pair : again)
+    for (const Index c : {pair->a, pair->b})
+      if (c != kNoIndex) places.push_back(c);
+  std::sort(places.begin(), places.end());
+  places.erase(std::unique(places.begin(), places.end()), places.end());
+  runEach(for_each, places.size(), [&](std::size_t n) {
+    const Index c = places[n];
+    std::unique_lock<std::mutex> lock(frame_mutex_, std::defer_lock);
+    if (!moves(c)) lock.lock();  // other islands meet it too
+    if (!moves(c) && framed_[c]) return;
+    placeAgain(colliders, c, left);
+    framed_[c] = 1;
+  });
+  SurfaceScene now = scene;
+  if (now.sphere) {
+    now.sphere->centre += since / scene.h * scene.sphere->way;
+    now.sphere->way *= left / scene.h;
+  }
+  const auto findAll = [&](bool edges) {
+    runEach(for_each, again.size(), [&](std::size_t n) {
+      Pair& pair = *again[n];
+      if ((pair.kind == Kind::kEdgeEdge) != edges) return;
+      findPair(now, colliders, left, pair);
+      pair.slack = marginOf(colliders, pair.a, pair.b);
+      pair.off_a = searched_[pair.a].was_off;
+      pair.off_b = pair.b == kNoIndex ? 0.0 : searched_[pair.b].was_off;
+    });
+  };
+  findAll(false);
+  findAll(true);
+  for (const Index b : island.bodies) limited_[b].watched.clear();
+  listOf(island, colliders);
+  return true;
+}
+
+void SurfaceContacts::solveIsland(Index island_number, SolverStep step, int number, const SurfaceScene& scene,
+                                  const std::vector<Collider>& colliders, const std::vector<const Vec3*>& previous,
                                   std::vector<SpringRow>& springs, SolverScratch& scratch, LimitScratch& limit_scratch,
-                                  SolverCounters& counters) {
-  Island& island = islands_[number];
-  if (island.rows.empty() && springs.empty() && island.watched.empty()) return;
-  step.warm = first ? step.h * step.h : 1.0;
+                                  SolverCounters& counters, const ForEach& for_each) {
+  Island& island = islands_[island_number];
+  if (island.pairs.empty() && springs.empty()) return;
+  step.warm = number == 0 ? step.h * step.h : 1.0;
   for (std::size_t n = 0; n < island.bodies.size(); ++n) {
     const Index b = island.bodies[n];
     SolverBody& body = solver_bodies_[b];
@@ -452,6 +596,7 @@ void SurfaceContacts::solveIsland(Index number, SolverStep step, bool first, con
     for (Index i = 0; i < body.particles; ++i)
       limited_[b].positions[i] = Vec3(body.now[i].x, body.now[i].y, body.now[i].z);
   }
+  counters.found_again += findAgain(island, scene, colliders, number * step.h, step.h, for_each);
   counters.limited += limitMotion(island.watched, limited_, island.bodies, !island.free.empty(), limit_scratch);
 }
 
@@ -556,18 +701,22 @@ std::size_t SurfaceContacts::bytes() const {
   constexpr std::size_t kNode = 48;  // of a map, with what the allocator keeps of it
   std::size_t sum = broad_phase_.bytes() +
                     bytesOf(boxes_, active_, needed_, moved_, numbers_, ways_of_, pairs_, spare_) +
-                    bytesOf(frames_, frame_of_, reached_, now_, before_, first_slots_, solver_bodies_, limited_) +
+                    bytesOf(frames_, frame_of_, framed_, where_, searched_, turned_, reached_, now_, before_,
+                            first_slots_, solver_bodies_, limited_) +
                     bytesOf(islands_, spare_islands_, root_, island_of_, island_held_);
   for (const SurfaceFrame& frame : frames_) sum += frame.bytes();
+  for (const Way& way : searched_) sum += bytesOf(way.from, way.speed);
   for (const auto& scratch : spare_) sum += sizeof *scratch + scratch->search.bytes() + bytesOf(scratch->old);
   for (const auto& [name, pair] : known_)
     sum += kNode + sizeof name + sizeof(Pair) + bytesOf(pair->set.rows, pair->set.entries, pair->sides) +
            pair->watched.bytes();
   for (const auto& [key, way] : ways_) sum += kNode + sizeof way + bytesOf(way.last, way.offsets);
   for (const SolverBody& body : solver_bodies_) sum += bytesOf(body.motions);
-  for (const LimitedBody& body : limited_) sum += bytesOf(body.watched, body.vertices, body.edited, body.vertex_moved);
+  for (const LimitedBody& body : limited_)
+    sum += bytesOf(body.watched, body.vertices, body.ways, body.edited, body.vertex_moved);
   for (const std::vector<Island>* islands : {&islands_, &spare_islands_})
-    for (const Island& island : *islands) sum += bytesOf(island.bodies, island.free, island.rows, island.watched);
+    for (const Island& island : *islands)
+      sum += bytesOf(island.bodies, island.free, island.pairs, island.rows, island.watched);
   return sum;
 }
 

@@ -11,14 +11,14 @@ Vec3 unitOrZero(const Vec3& v) {
   return length > 0.0 ? Vec3(v / length) : Vec3(Vec3::Zero());
 }
 
-bool isRidge(const ContactSurface& surface, const SurfaceFrame& frame, const ContactEdge& edge) {
-  if (edge.faces[1] == kNoIndex) return true;
+EdgeShape shapeOf(const ContactSurface& surface, const SurfaceFrame& frame, const ContactEdge& edge) {
+  if (edge.faces[1] == kNoIndex) return EdgeShape::kRidge;
   const Vec3& normal = frame.face_normals[edge.faces[0]];
-  if (normal.dot(frame.face_normals[edge.faces[1]]) > kRidgeCosine) return false;
+  if (normal.dot(frame.face_normals[edge.faces[1]]) > kRidgeCosine) return EdgeShape::kFlat;
   double height = 0.0;  // of the second face over the first
   for (const Index v : surface.triangles[edge.faces[1]])
     height += normal.dot(frame.vertices[v] - frame.vertices[edge.vertices[0]]);
-  return height < 0.0;
+  return height < 0.0 ? EdgeShape::kRidge : EdgeShape::kValley;
 }
 
 }  // namespace
@@ -64,11 +64,11 @@ void placeFrame(const ContactSurface& surface, const Vec3* vertices, const Vec3*
     frame.boxes.items[f] = box;
   }
   surface.tree.refit(frame.boxes);
-  frame.ridge.resize(surface.edges.size());
+  frame.shapes.resize(surface.edges.size());
   frame.ridges.clear();
   for (Index e = 0; e < surface.edges.size(); ++e) {
-    frame.ridge[e] = isRidge(surface, frame, surface.edges[e]);
-    if (frame.ridge[e]) frame.ridges.push_back(e);
+    frame.shapes[e] = shapeOf(surface, frame, surface.edges[e]);
+    if (frame.shapes[e] == EdgeShape::kRidge) frame.ridges.push_back(e);
   }
 }
 

@@ -233,6 +233,7 @@ struct World::Impl {
   std::vector<ShapeCollider> shape_colliders;  // one a body, in their order, where contacts are found in rest shapes
   std::map<const BodyModel*, std::weak_ptr<const ContactModel>> contact_models;
   SurfaceContacts surface_contacts;
+  SurfaceScene surface_scene;  // of this step
   std::vector<Collider> colliders;  // bodies in their order, then obstacles
   std::vector<SurfaceWork> surface_work;
   std::vector<char> pushed;

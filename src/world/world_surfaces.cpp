@@ -140,7 +140,8 @@ void World::Impl::measureSurface(WorldBody& body) {
 
 // Rows of the frame. A body that is reached wakes, and then all is found again with its neighbours.
 void World::Impl::findSurfaceContacts(double h_frame) {
-  SurfaceScene scene;
+  SurfaceScene& scene = surface_scene;
+  scene = SurfaceScene();
   scene.ground = settings.ground;
   scene.ground_friction = settings.ground_friction;
   scene.gravity = settings.gravity.norm();
@@ -328,8 +329,8 @@ void World::Impl::stepIsland(std::size_t number, double h_frame, const ForEach& 
     }
     step.sphere_from = push.position + substep * way / substeps;
     step.sphere_to = push.position + (substep + 1) * way / substeps;
-    surface_contacts.solveIsland(static_cast<Index>(number), step, substep == 0, work.previous, work.springs,
-                                 work.solver_scratch, work.limit_scratch, work.solver_counters);
+    surface_contacts.solveIsland(static_cast<Index>(number), step, substep, surface_scene, colliders, work.previous,
+                                 work.springs, work.solver_scratch, work.limit_scratch, work.solver_counters, each);
     for (std::size_t p = 0; p < work.picks.size(); ++p)
       work.picks[p]->force += work.springs[p].impulse / (h * h * substeps);
     if (push.enabled) {

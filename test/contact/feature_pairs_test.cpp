@@ -78,6 +78,33 @@ TEST(FeaturePairs, AVertexInsideGoesOutByTheNearFaceThatItOpposes) {
   EXPECT_NEAR(sides[0].depth, 0.05, 1e-12);
 }
 
+// Turned inside out, its faces oppose nothing: what it touches is held by the side that it was on.
+TEST(FeaturePairs, WhatTouchesInsideOutIsWatchedOnTheSideWhereItWas) {
+  const Placed low(boxMesh(Vec3(1, 1, 1), 4, 4, 4), Vec3::Zero());
+  TriangleMesh inside_out = boxMesh(Vec3(0.4, 0.4, 0.4), 1, 1, 1);
+  for (Vec3& p : inside_out.vertices) p.z() = -p.z();
+  const auto watchedOn = [&](double height, const std::vector<RememberedSide>& known,
+                             std::vector<RememberedSide>& now) {
+    const Placed high(inside_out, Vec3(0.03, 0.02, 0.7 + height));
+    PairSearch search = between(high, low);
+    search.first = false;
+    search.remembered = known.data();
+    search.remembered_count = known.size();
+    SearchScratch scratch;
+    findVerticesNear(search, scratch);
+    findVertexFace(search, scratch);
+    now = scratch.found.sides;
+    std::size_t above = 0;
+    for (const WatchedFeatures& watched : scratch.found.watched) above += watched.normal.z() > 0.999;
+    return above;
+  };
+  std::vector<RememberedSide> sides, later;
+  EXPECT_GE(watchedOn(0.01, {}, sides), 4u);
+  ASSERT_EQ(sides.size(), 4u) << "though no row pushes them";
+  EXPECT_GE(watchedOn(1e-6, sides, later), 4u);
+  EXPECT_EQ(later.size(), 4u) << "for as long as they touch";
+}
+
 // The halves of a cut block lie on each other: each of the twin faces is outside of the other.
 TEST(FeaturePairs, TwinFacesOfACutAreOnTheRightSides) {
   const Placed left(boxMesh(Vec3(1, 1, 1), 4, 4, 4), Vec3(-0.5, 0, 0));
@@ -174,9 +201,8 @@ TEST(FeaturePairs, RidgesThatCrossMeetAlongTheirCommonNormal) {
     EXPECT_NEAR((pairs[0].normal - Vec3::UnitZ()).norm(), 0.0, 1e-9);
     EXPECT_NEAR(pairs[0].gap, gap, 1e-9);
     EXPECT_TRUE(vertexFace(between(high, low)).empty()) << "no vertex is near a face";
-    const bool watched = std::any_of(found.watched.begin(), found.watched.end(), [&](const WatchedFeatures& w) {
-      return w.vertices == pairs[0].vertices;
-    });
+    const bool watched = std::any_of(found.watched.begin(), found.watched.end(),
+                                     [&](const WatchedFeatures& w) { return w.vertices == pairs[0].vertices; });
     EXPECT_EQ(watched, gap > 0.0) << "hooked into each other they must be free to part";
   }
 }

@@ -55,7 +55,6 @@ struct Clash {
       places[n] = before[n];
       colliders[static_cast<std::size_t>(n)].positions = places[n].data();
     }
-    SurfaceScene scene;
     scene.h = kH;
     ContactCounters counters;
     contacts.findPairs(scene, colliders, counters);
@@ -73,8 +72,8 @@ struct Clash {
     SolverCounters counters;
     SolverStep step;
     step.h = kH;
-    contacts.solveIsland(0, step, true, {before[0].data(), before[1].data()}, springs, scratch, limit_scratch,
-                         counters);
+    contacts.solveIsland(0, step, 0, scene, colliders, {before[0].data(), before[1].data()}, springs, scratch,
+                         limit_scratch, counters);
     for (int n = 0; n < 2; ++n) after[n] = places[n];
     return counters;
   }
@@ -110,6 +109,7 @@ struct Clash {
   std::array<Points, 2> before, after, velocities, places;
   std::array<std::unique_ptr<RigidGroups>, 2> groups;
   double rigid_share = 0.0;
+  SurfaceScene scene;
   std::vector<Collider> colliders{2};
 };
 

@@ -25,18 +25,27 @@ struct LimitedBody {
   const double* inverse_masses = nullptr;  // [1/kg] 0: held
   std::vector<Index> watched;              // vertices
   Points vertices;                         // [m] of them now, by their numbers
-  double way = 0.0;                        // [m] that any of them has gone in the substep, at most
+  Points ways;                             // [m] that each of them has gone in the substep
+  Vec3 mean_way = Vec3::Zero();            // [m]
+  double spread = 0.0;                     // [m] by which a way differs from the mean, at most
 
   std::vector<char> edited, vertex_moved;  // one a particle; one a vertex: by what was edited
   bool any_moved = false;                  // any vertex
 
   void place() {
-    double farthest = 0.0;
-    for (const Index v : watched) {
+    ways.resize(watched.size());
+    mean_way.setZero();
+    for (std::size_t n = 0; n < watched.size(); ++n) {
+      const Index v = watched[n];
       vertices[v] = vertexAt(v, positions);
-      if (moves) farthest = std::max(farthest, (vertices[v] - vertexAt(v, previous)).squaredNorm());
+      ways[n] = vertices[v] - vertexAt(v, previous);
+      mean_way += ways[n];
     }
-    way = std::sqrt(farthest);
+    spread = 0.0;
+    if (watched.empty()) return;
+    mean_way /= static_cast<double>(watched.size());
+    for (const Vec3& way : ways) spread = std::max(spread, (way - mean_way).squaredNorm());
+    spread = std::sqrt(spread);
   }
   /// Where a particle was edited.
   void placeEdited() {

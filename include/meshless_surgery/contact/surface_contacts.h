@@ -1,5 +1,6 @@
 // Contact of deformable surfaces in present space (docs/method.md, Contact): finds rows where something has moved,
-// keeps them where nothing has, groups what they join into islands, and solves each island's rows in each substep.
+// keeps them where nothing has, groups what they join into islands, and solves each island's rows in each substep. What
+// is thrown off the way that was searched is searched again within the frame.
 // Knows neither materials nor tools.
 #pragma once
 
@@ -70,7 +71,8 @@ class SurfaceContacts {
 
   struct Island {
     std::vector<Index> bodies;
-    std::vector<Index> free;  // the bodies, where nothing holds any of them
+    std::vector<Index> free;   // the bodies, where nothing holds any of them
+    std::vector<Index> pairs;  // of these bodies, also those that are far apart
     std::vector<SolverRows> rows;
     std::vector<WatchedPairs> watched;
   };
@@ -80,11 +82,12 @@ class SurfaceContacts {
   /// Of the answer of a collider to rows and springs in this frame, the part 0..1 that moves `groups` (null: nothing)
   /// as rigid bodies. None where it is not said.
   void setRigidShare(Index collider, const RigidGroups* groups, double share);
-  /// After the bodies of an island have moved by a substep. previous: [m] at its start, one a particle of each body of
-  /// the island. step.warm is set here. first: of the frame.
-  void solveIsland(Index island, SolverStep step, bool first, const std::vector<const Vec3*>& previous,
+  /// After the bodies of an island have moved by a substep, the number-th of the frame. previous: [m] at its start, one
+  /// a particle of each body of the island. step.warm is set here. scene, colliders: as find() got them.
+  void solveIsland(Index island, SolverStep step, int number, const SurfaceScene& scene,
+                   const std::vector<Collider>& colliders, const std::vector<const Vec3*>& previous,
                    std::vector<SpringRow>& springs, SolverScratch& scratch, LimitScratch& limit_scratch,
-                   SolverCounters& counters);
+                   SolverCounters& counters, const ForEach& for_each = oneAfterAnother);
   /// [kg m] that the push sphere gave the bodies of an island in the last substep.
   Vec3 sphereImpulse(Index island) const;
   /// One a collider: whether the sphere presses on it.
@@ -118,7 +121,17 @@ class SurfaceContacts {
   struct Pair : KeptPair {
     Index a = 0, b = kNoIndex;  // colliders of this frame
     bool stale = true, near = false;
-    std::size_t queried = 0;  // vertices, when it was found last
+    std::size_t queried = 0;          // vertices, when it was found last
+    double slack = 0.0;               // [m] by which both together may be off their ways before something is missed
+    double off_a = 0.0, off_b = 0.0;  // [m] that they were when it was found
+  };
+  /// The way of a collider that was searched: straight on.
+  struct Way {
+    Points from, speed;    // [m], [m/s] of particles
+    Points away;           // [m] of particles from it
+    double since = 0.0;    // [s] in the frame
+    double off = 0.0;      // [m] any vertex from it, at most, at the end of the last substep
+    double was_off = 0.0;  // [m] at its start
   };
   /// Of one thread.
   struct Scratch {
@@ -128,12 +141,16 @@ class SurfaceContacts {
   using PairName = std::tuple<std::uint64_t, std::uint64_t, Kind>;
   Pair& pairOf(Kind kind, const std::vector<Collider>& colliders, Index a, Index b, std::uint64_t key_b);
   Index colliderOf(std::uint64_t key) const;  // kNoIndex: none
-  void findPair(const SurfaceScene& scene, const std::vector<Collider>& colliders, Pair& pair);
+  void findPair(const SurfaceScene& scene, const std::vector<Collider>& colliders, double h, Pair& pair);
+  bool findAgain(Island& island, const SurfaceScene& scene, const std::vector<Collider>& colliders, double since,
+                 double h, const ForEach& for_each);
+  void placeAgain(const std::vector<Collider>& colliders, Index c, double h);
   bool isInside(std::uint64_t key_a, std::uint64_t key_b) const;
   void makeRows(const SurfaceScene& scene, const std::vector<Collider>& colliders, Scratch& scratch, Pair& pair) const;
   void listReached(const SurfaceScene& scene, const std::vector<Collider>& colliders);
   void joinIslands(const std::vector<Collider>& colliders);
-  void listWatched();
+  void listOf(Island& island, const std::vector<Collider>& colliders);
+  void listWatched(const Island& island);
   void fillSlots(const std::vector<Collider>& colliders);
 
   BroadPhase broad_phase_;
@@ -146,7 +163,11 @@ class SurfaceContacts {
   std::vector<Pair*> pairs_;             // of this frame
   std::vector<SurfaceFrame> frames_;     // one a collider; filled where moved_
   std::vector<std::uint64_t> frame_of_;  // key of the obstacle whose frame stays
-  std::mutex spare_mutex_;
+  std::vector<char> framed_;             // one a collider: its frame is of this step
+  std::vector<const Vec3*> where_;       // [m] one a collider: particles as its frame has them
+  std::vector<Way> searched_;            // one a collider
+  std::vector<char> turned_;             // one a collider: is off its way
+  std::mutex spare_mutex_, frame_mutex_;
   std::vector<std::unique_ptr<Scratch>> spare_;
   std::vector<Index> reached_;
   std::vector<std::size_t> first_slots_;  // one a collider
