@@ -51,27 +51,20 @@ namespace {
 class Limit {
  public:
   Limit(const std::vector<WatchedPairs>& pairs, std::vector<LimitedBody>& bodies, const std::vector<Index>& members,
-        LimitScratch& scratch)
-      : pairs_(pairs), bodies_(bodies), members_(members), scratch_(scratch) {}
+        LimitScratch& scratch, const ForEach& for_each)
+      : pairs_(pairs), bodies_(bodies), members_(members), scratch_(scratch), for_each_(for_each) {}
 
   /// Those that would meet: of all that may by how far bodies have gone, and then of what has been edited.
   std::size_t find() {
-    for (const Index b : members_) again_ ? bodies_[b].placeEdited() : bodies_[b].place();
+    runEach(for_each_, members_.size(), [this](std::size_t n) {
+      LimitedBody& body = bodies_[members_[n]];
+      again_ ? body.placeEdited() : body.place();
+    });
+    scratch_.found.resize(std::max(scratch_.found.size(), pairs_.size()));
+    runEach(for_each_, pairs_.size(), [this](std::size_t n) { find(n); });
     scratch_.meeting.clear();
-    for (std::size_t n = 0; n < pairs_.size(); ++n) {
-      const WatchedPairs& pairs = pairs_[n];
-      if (again_ && !bodies_[pairs.a].any_moved && !bodies_[pairs.b].any_moved) continue;
-      WatchedSet& set = *pairs.set;
-      if (!again_) {  // what both go brings them no nearer
-        const LimitedBody &a = bodies_[pairs.a], &b = bodies_[pairs.b];
-        set.gone += (a.mean_way - b.mean_way).norm() + a.spread + b.spread;
-      }
-      for (std::size_t f = 0; f < set.features.size(); ++f)
-        if (again_ ? isMoved(pairs, set.features[f]) : set.gone > set.until[f]) {
-          if (wouldMeet(pairs, f)) scratch_.meeting.push_back({n, f});
-          if (again_) set.until[f] = set.gone;  // what has been edited is yet to turn with all
-        }
-    }
+    for (std::size_t n = 0; n < pairs_.size(); ++n)
+      scratch_.meeting.insert(scratch_.meeting.end(), scratch_.found[n].begin(), scratch_.found[n].end());
     again_ = true;
     for (const Index b : members_) std::fill(bodies_[b].edited.begin(), bodies_[b].edited.end(), 0);
     return scratch_.meeting.size();
@@ -135,6 +128,21 @@ class Limit {
   }
 
  private:
+  void find(std::size_t n) {
+    const WatchedPairs& pairs = pairs_[n];
+    const LimitedBody &a = bodies_[pairs.a], &b = bodies_[pairs.b];
+    std::vector<LimitScratch::Meeting>& found = scratch_.found[n];
+    found.clear();
+    if (again_ && !a.any_moved && !b.any_moved) return;
+    WatchedSet& set = *pairs.set;
+    if (!again_) set.gone += (a.mean_way - b.mean_way).norm() + a.spread + b.spread;  // not what both go alike
+    for (std::size_t f = 0; f < set.features.size(); ++f)
+      if (again_ ? isMoved(pairs, set.features[f]) : set.gone > set.until[f]) {
+        if (wouldMeet(pairs, f)) found.push_back({n, f});
+        if (again_) set.until[f] = set.gone;  // what has been edited is yet to turn with all
+      }
+  }
+
   bool wouldMeet(const WatchedPairs& pairs, std::size_t f) {
     WatchedFeatures& watched = pairs.set->features[f];
     double& until = pairs.set->until[f];
@@ -206,6 +214,7 @@ class Limit {
   std::vector<LimitedBody>& bodies_;
   const std::vector<Index>& members_;
   LimitScratch& scratch_;
+  const ForEach& for_each_;
   bool again_ = false;  // only what has been edited since the last find()
 };
 
@@ -247,9 +256,9 @@ void moveTogether(std::vector<LimitedBody>& bodies, const std::vector<Index>& me
 }  // namespace
 
 std::size_t limitMotion(const std::vector<WatchedPairs>& pairs, std::vector<LimitedBody>& bodies,
-                        const std::vector<Index>& members, bool free, LimitScratch& scratch) {
+                        const std::vector<Index>& members, bool free, LimitScratch& scratch, const ForEach& for_each) {
   if (pairs.empty()) return 0;
-  Limit limit(pairs, bodies, members, scratch);
+  Limit limit(pairs, bodies, members, scratch, for_each);
   const std::size_t met = limit.find();
   if (met == 0) return 0;
   // What is held stays behind the motion of all together, or it would take energy from that motion to others.

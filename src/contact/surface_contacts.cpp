@@ -483,9 +483,10 @@ void SurfaceContacts::placeAgain(const std::vector<Collider>& colliders, Index c
 bool SurfaceContacts::findAgain(Island& island, const SurfaceScene& scene, const std::vector<Collider>& colliders,
                                 double since, double h, const ForEach& for_each) {
   const auto moves = [&](Index c) { return c != kNoIndex && colliders[c].moves; };
-  for (const Index b : island.bodies) {
+  runEach(for_each, island.bodies.size(), [&](std::size_t n) {
+    const Index b = island.bodies[n];
     turned_[b] = 0;
-    if (!needed_[b]) continue;
+    if (!needed_[b]) return;
     Way& way = searched_[b];
     const double along = since + h - way.since;
     way.away.resize(colliders[b].particles);
@@ -497,7 +498,7 @@ bool SurfaceContacts::findAgain(Island& island, const SurfaceScene& scene, const
       farthest = std::max(farthest, supports.sum(v, way.away.data()).squaredNorm());
     way.was_off = way.off;
     way.off = std::sqrt(farthest);
-  }
+  });
   const auto offOf = [&](const Pair& pair) {
     double off = searched_[pair.a].off + pair.off_a;
     if (pair.b != kNoIndex) off += searched_[pair.b].off + pair.off_b;
@@ -574,7 +575,7 @@ void SurfaceContacts::solveIsland(Index island_number, SolverStep step, int numb
   Island& island = islands_[island_number];
   if (island.pairs.empty() && springs.empty()) return;
   step.warm = number == 0 ? step.h * step.h : 1.0;
-  for (std::size_t n = 0; n < island.bodies.size(); ++n) {
+  runEach(for_each, island.bodies.size(), [&](std::size_t n) {
     const Index b = island.bodies[n];
     SolverBody& body = solver_bodies_[b];
     Slot* const before = before_.data() + first_slots_[b];
@@ -588,16 +589,18 @@ void SurfaceContacts::solveIsland(Index island_number, SolverStep step, int numb
       before[i].y = q.y();
       before[i].z = q.z();
     }
-  }
+  });
   static const std::vector<Index> kNone;
   solveRows(island.rows, springs, solver_bodies_, step, springs.empty() ? island.free : kNone, scratch, counters);
-  for (const Index b : island.bodies) {
+  runEach(for_each, island.bodies.size(), [&](std::size_t n) {
+    const Index b = island.bodies[n];
     const SolverBody& body = solver_bodies_[b];
     for (Index i = 0; i < body.particles; ++i)
       limited_[b].positions[i] = Vec3(body.now[i].x, body.now[i].y, body.now[i].z);
-  }
+  });
   counters.found_again += findAgain(island, scene, colliders, number * step.h, step.h, for_each);
-  counters.limited += limitMotion(island.watched, limited_, island.bodies, !island.free.empty(), limit_scratch);
+  counters.limited +=
+      limitMotion(island.watched, limited_, island.bodies, !island.free.empty(), limit_scratch, for_each);
 }
 
 Vec3 SurfaceContacts::sphereImpulse(Index island) const {

@@ -345,6 +345,7 @@ struct World::Impl {
   }
   void findSurfaceContacts(double h_frame);
   Vec3 pushWay(double h_frame) const;  // [m] of the push sphere in a frame
+  std::vector<std::pair<double, std::size_t>> stiffest;  // of an island: less the substeps that a body needs, and which
   int substepsOf(const std::vector<WorldBody*>& some, bool may_meet, double h_frame);
   void stepSurfaces(double h_frame);
   void stepIsland(std::size_t island, double h_frame, const ForEach& each);

@@ -42,7 +42,7 @@ MemoryUse World::memory() const {
     use.contact += obstacle->shape.bytes() + obstacle->surface.bytes();
   }
   use.contact += w.contacts.bytes() + w.surface_contacts.bytes() + bytesOf(w.shape_colliders, w.colliders, w.loaded) +
-                 bytesOf(w.surface_work);
+                 bytesOf(w.surface_work, w.stiffest);
   for (const SurfaceWork& work : w.surface_work)
     use.contact += bytesOf(work.bodies, work.picks, work.previous, work.springs, work.each_counters) +
                    bytesOf(work.solver_scratch.active, work.solver_scratch.levers, work.limit_scratch.meeting,

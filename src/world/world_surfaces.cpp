@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <sstream>
 
@@ -13,7 +14,8 @@
 namespace meshless {
 namespace {
 
-constexpr int kContactSubsteps = 4;  // at least, where something may meet: in longer ones stacks of stiff bodies rock
+constexpr int kContactSubsteps = 4;   // at least, where something may meet: in longer ones stacks of stiff bodies rock
+constexpr double kSlowedMass = 0.05;  // of an island, at most: slivers are slowed, instead of all taking their substeps
 
 // Bodies without a surface meet others by their particles.
 ContactSurface surfaceOf(const BodyModel& model) {
@@ -191,13 +193,26 @@ Vec3 World::Impl::pushWay(double h_frame) const {
   return length > most ? Vec3(way * (most / length)) : way;
 }
 
-/// Substeps that the stiffest body of an island and its contacts need: no body that may meet something goes farther
-/// than an edge in one. What is taken from a body is said once.
+/// Substeps that the stiffest bodies of an island and its contacts need: no body that may meet something goes farther
+/// than an edge in one. Slivers are not asked, but where they are picked. What is taken from a body is said once.
 int World::Impl::substepsOf(const std::vector<WorldBody*>& some, bool may_meet, double h_frame) {
   double needed = may_meet ? std::max(settings.substeps, kContactSubsteps) : settings.substeps;
-  for (const WorldBody* body : some) {
-    needed = std::max(needed, std::ceil(h_frame * highestFrequencyNow(*body->model, body->state)));
-    if (may_meet) needed = std::max(needed, std::ceil(h_frame * body->fastest / body->edge_length));
+  stiffest.clear();
+  double mass = 0.0;
+  for (std::size_t n = 0; n < some.size(); ++n) {
+    const WorldBody& body = *some[n];
+    const double substeps = std::ceil(h_frame * highestFrequencyNow(*body.model, body.state));
+    stiffest.push_back({std::isfinite(substeps) ? -substeps : -std::numeric_limits<double>::infinity(), n});
+    mass += body.model->mass;
+    if (may_meet) needed = std::max(needed, std::ceil(h_frame * body.fastest / body.edge_length));
+  }
+  std::sort(stiffest.begin(), stiffest.end());
+  double slowed = 0.0;  // [kg]
+  for (const auto& [less, n] : stiffest) {
+    slowed += some[n]->model->mass;
+    if (slowed <= kSlowedMass * mass && !isHeld(*some[n])) continue;
+    needed = std::max(needed, -less);
+    break;
   }
   const int most = std::max(settings.substeps, settings.max_substeps);
   const int substeps = needed < most ? static_cast<int>(needed) : most;  // NaN: most
@@ -206,7 +221,8 @@ int World::Impl::substepsOf(const std::vector<WorldBody*>& some, bool may_meet, 
     if (factor < 1.0 && !(body->stiffness_factor < 1.0)) {
       std::ostringstream text;
       text << body->name << " needs " << std::ceil(h_frame * highestFrequencyNow(*body->model, body->state))
-           << " substeps for its material; with " << substeps << " (max_substeps) it deforms "
+           << " substeps for its material; with " << substeps
+           << (substeps < most ? " (as those beside it, which are heavier)" : " (max_substeps)") << " it deforms "
            << 1.0 / std::sqrt(factor) << " times as slowly, to where it would";
       say(EventType::kOverBudget, body->name, 0, text.str());
     }

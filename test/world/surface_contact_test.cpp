@@ -599,6 +599,36 @@ TEST(SurfaceContact, APickThatIsToldWhereItIsLeavesItsBodyAsleep) {
   EXPECT_FALSE(seen(world).bodies[0].asleep);
 }
 
+// A hard crumb on a soft slab: the slab takes the substeps that it needs itself, and the crumb is slowed, which is
+// said. Where a hand holds the crumb its own motion is what counts.
+TEST(SurfaceContact, ASliverDoesNotMakeAllTakeItsSubsteps) {
+  const auto substepsWith = [](bool crumb, bool picked) {
+    World world(surface());
+    add(world, block("slab", Vec3(0, 0, 0.051), Vec3(0.2, 0.2, 0.1)));
+    BodyDef hard = block("crumb", Vec3(0.01, 0.0, 0.118), Vec3::Constant(0.03));
+    hard.material.youngs_modulus = 5e4;
+    if (crumb) add(world, hard);
+    run(world, 0.3);
+    world.takeEvents();
+    if (picked) {
+      PickCommand pick;
+      pick.body = "crumb";
+      pick.point = Vec3(0.01, 0.0, 0.13);
+      EXPECT_TRUE(world.apply(pick).ok());
+    }
+    world.step();
+    if (crumb) {
+      EXPECT_EQ(seen(world).bodies[0].stiffness_factor, 1.0);
+      EXPECT_EQ(seen(world).bodies[1].stiffness_factor < 1.0, !picked);
+      EXPECT_TRUE(test::allFinite(seen(world).bodies[1].particles));
+    }
+    return seen(world).report.substeps;
+  };
+  const std::size_t alone = substepsWith(false, false);
+  EXPECT_LE(substepsWith(true, false), alone + 1);
+  EXPECT_GE(substepsWith(true, true), 2 * alone);
+}
+
 // What too few substeps slow comes to rest where enough of them would bring it.
 class SlowedBodies : public ::testing::TestWithParam<const char*> {
  protected:

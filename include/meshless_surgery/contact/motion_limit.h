@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "meshless_surgery/base/for_each.h"
 #include "meshless_surgery/contact/feature_pairs.h"
 
 namespace meshless {
@@ -86,6 +87,7 @@ struct LimitScratch {
   struct Meeting {
     std::size_t pairs, features;
   };
+  std::vector<std::vector<Meeting>> found;  // one a pair of bodies
   struct Held {
     Index body, particle;
     double share;
@@ -99,6 +101,7 @@ struct LimitScratch {
 /// free: nothing holds them, and what was held back goes to all of them together, so that momentum and angular momentum
 /// stay. Returns how many pairs would have met.
 std::size_t limitMotion(const std::vector<WatchedPairs>& pairs, std::vector<LimitedBody>& bodies,
-                        const std::vector<Index>& members, bool free, LimitScratch& scratch);
+                        const std::vector<Index>& members, bool free, LimitScratch& scratch,
+                        const ForEach& for_each = oneAfterAnother);
 
 }  // namespace meshless
