@@ -15,6 +15,7 @@
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/union_find.h"
 #include "side_by_side.h"
+#include "surface_cells.h"
 
 namespace meshless {
 namespace {
@@ -51,6 +52,12 @@ bool invert(const LatticeCell& cell, const Points& x, const Vec3& q, double size
     at += step_by;
   }
   return false;
+}
+
+bool shareACorner(const std::vector<LatticeCell>& cells, Index a, Index b) {
+  if (a == b) return true;
+  const auto &p = cells[a].corners, &q = cells[b].corners;
+  return std::any_of(p.begin(), p.end(), [&](Index i) { return std::find(q.begin(), q.end(), i) != q.end(); });
 }
 
 class CellCutter {
@@ -153,12 +160,6 @@ class CellCutter {
 
   // --- cells that a vertex may follow
 
-  bool together(Index a, Index b) const {  // in the parent
-    if (a == b) return true;
-    const auto &p = before_.cells[a].corners, &q = before_.cells[b].corners;
-    return std::any_of(p.begin(), p.end(), [&](Index i) { return std::find(q.begin(), q.end(), i) != q.end(); });
-  }
-
   // Samples of a cell that no blade hides from a vertex on a side of it, or all on that side of its plane.
   SampleSet seen(Index c, const Vec3& q, int side, bool of_plane) {
     const LatticeCell& cell = cut_.lattice.cells[c];
@@ -185,8 +186,8 @@ class CellCutter {
     return open;
   }
 
-  // The cell of vertex v of source p on a side of the blade, or of its whole plane, among those of `piece` (any where it
-  // is negative).
+  // The cell of vertex v of source p on a side of the blade, or of its whole plane, among those of `piece` (any where
+  // it is negative).
   Index cellOf(const CellFinder& finder, std::size_t p, Index v, int piece, int side, bool of_plane) {
     const EmbeddedVertex& embedded = embedded_[p][v];
     const auto in_piece = [&](Index c) { return piece < 0 || piece_of_[component_[c]] == piece; };
@@ -197,7 +198,8 @@ class CellCutter {
         seen(copies[0], q, side, of_plane))
       return copies[0];
     return finder.carrier(embedded.rest, [&](Index c) {
-      return in_piece(c) && together(cut_.parent_cell[c], embedded.was) ? seen(c, q, side, of_plane) : kNoSample;
+      return in_piece(c) && shareACorner(before_.cells, cut_.parent_cell[c], embedded.was) ? seen(c, q, side, of_plane)
+                                                                                           : kNoSample;
     });
   }
   // A buried front is on both sides.
@@ -272,92 +274,27 @@ class CellCutter {
     const CellFinder finder(cut_.lattice);
     std::map<std::pair<std::size_t, Index>, Index> crumbs;
     carriers_.resize(sources_.size());
-    partners_.resize(sources_.size());
+    std::vector<TriangleMesh> rest(sources_.size());
+    std::vector<std::vector<bool>> loose(sources_.size());  // made by the blade, or in a cell that it met
     for (std::size_t p = 0; p < sources_.size(); ++p) {
-      findFront(p);
+      rest[p].triangles = sources_[p].mesh.triangles;
       for (Index v = 0; v < embedded_[p].size(); ++v) {
-        Index c = cellOf(finder, p, v, static_cast<int>(p));
-        if (c == kNoIndex) {
-          const Index was = withMass(embedded_[p][v].was);
-          const auto [known, is_new] = crumbs.emplace(std::make_pair(p, was), static_cast<Index>(cells().size()));
-          c = known->second;
-          if (is_new) addCrumb(was, static_cast<int>(p));
-        }
+        const Index c = cellOf(finder, p, v, static_cast<int>(p));
         carriers_[p].push_back(c);
-        partners_[p].push_back(partnerOf(finder, p, v, c));
+        rest[p].vertices.push_back(embedded_[p][v].rest);
+        loose[p].push_back(embedded_[p][v].made || c == kNoIndex || cut_.changed[c]);
       }
     }
-  }
-
-  // --- where a wound ends
-
-  // [m] at rest, the edges of the buried front.
-  void findFront(std::size_t p) {
-    front_.clear();
-    if (gate_.unbounded()) return;
-    const std::vector<int>& side = sources_[p].side;
-    for (const Triangle& t : sources_[p].mesh.triangles)
-      for (int k = 0; k < 3; ++k) {
-        const Index a = t[k], b = t[(k + 1) % 3];
-        if (a < b && side[a] == 0 && side[b] == 0) front_.push_back({embedded_[p][a].rest, embedded_[p][b].rest});
+    inChunks(sources_.size(), 1,
+             [&](std::size_t p, std::size_t) { agreeOnCells(cut_.lattice, rest[p], loose[p], carriers_[p]); });
+    for (std::size_t p = 0; p < sources_.size(); ++p)
+      for (Index v = 0; v < embedded_[p].size(); ++v) {
+        if (carriers_[p][v] != kNoIndex) continue;
+        const Index was = withMass(embedded_[p][v].was);
+        const auto [known, is_new] = crumbs.emplace(std::make_pair(p, was), static_cast<Index>(cells().size()));
+        carriers_[p][v] = known->second;
+        if (is_new) addCrumb(was, static_cast<int>(p));
       }
-  }
-
-  // [m] at rest, from a vertex to where the plane of the blade is not cut; infinite where that is far.
-  double toUncut(std::size_t p, Index v, Index own) const {
-    if (sources_[p].side[v] == 0) return 0.0;
-    const Vec3& q = sources_[p].mesh.vertices[v];
-    if (!gate_.isBehind(q)) return cut_.changed[own] ? std::abs(gate_.height(q)) : 1e300;
-    double least = 1e300;
-    const Vec3& rest = embedded_[p][v].rest;
-    for (const auto& [a, b] : front_) {
-      const Vec3 edge = b - a;
-      const double squared = edge.squaredNorm();
-      const double t = squared > 0.0 ? std::clamp((rest - a).dot(edge) / squared, 0.0, 1.0) : 0.0;
-      least = std::min(least, (a + t * edge - rest).norm());
-    }
-    return least;
-  }
-
-  // The lattice opens a wound as far as its cells reach, and not where the blade ended. Within a cell from there a
-  // vertex follows the other side too: half where the wound ends, so that no triangle is torn there.
-  PartnerCell partnerOf(const CellFinder& finder, std::size_t p, Index v, Index own) {
-    if (front_.empty()) return formerPartnerOf(p, v);
-    const double share = 0.5 * (1.0 - toUncut(p, v, own) / before_.spacing);
-    if (!(share > 0.0)) return formerPartnerOf(p, v);
-    const int side = sources_[p].side[v] == 0 ? 1 : sources_[p].side[v];
-    const Index other = cellOf(finder, p, v, static_cast<int>(p), -side, true);
-    return other == kNoIndex || other == own ? formerPartnerOf(p, v) : PartnerCell{other, share};
-  }
-
-  // Of earlier blades.
-  PartnerCell formerPartnerOf(std::size_t p, Index v) {
-    const SurfaceBinding& before = model_.binding;
-    const VertexOrigins& origins = sources_[p].origins;
-    if (before.partners.empty() || origins.insideCap(v)) return {};
-    const VertexOrigin origin = origins[v];
-    PartnerCell former;
-    double most = 0.0;
-    for (int k = 0; k < 4; ++k) {
-      if (origin.parents[k] == kNoIndex) continue;
-      const Index was = before.partners[origin.parents[k]];
-      if (was == kNoIndex) continue;
-      former.share += origin.weights[k] * before.partnered[origin.parents[k]];
-      if (origin.weights[k] <= most) continue;
-      most = origin.weights[k];
-      former.cell = kNoIndex;
-      double least = std::numeric_limits<double>::infinity();
-      for (const Index c : children_[was]) {
-        if (piece_of_[component_[c]] != static_cast<int>(p)) continue;
-        const SampleSet open = seen(c, sources_[p].mesh.vertices[v], sources_[p].side[v], sources_[p].side[v] == 0);
-        const double squared = squaredToSamples(open, before_.placeIn(before_.cells[was], embedded_[p][v].rest));
-        if (squared < least) {
-          least = squared;
-          former.cell = c;
-        }
-      }
-    }
-    return former.cell == kNoIndex ? PartnerCell() : PartnerCell{former.cell, std::clamp(former.share, 0.0, 0.5)};
   }
 
   // A bridge has no mass to give: one of what it joins.
@@ -408,6 +345,15 @@ class CellCutter {
 
   // --- what the surface holds together and samples do not see
 
+  // By a corner, or by a cell between them.
+  bool heldTogether(const CornerUses& uses, Index a, Index b) {
+    if (shareACorner(cells(), a, b)) return true;
+    for (const Index corner : cells()[a].corners)
+      for (Index u = uses.offsets[corner]; u < uses.offsets[corner + 1]; ++u)
+        if (shareACorner(cells(), uses.cells[u], b)) return true;
+    return false;
+  }
+
   void joinThePieces() {
     // With room for a crumb of every cell and piece.
     UnionFind corners(cut_.lattice.corners + 8 * before_.cells.size() * sources_.size());
@@ -416,11 +362,13 @@ class CellCutter {
         for (const Index j : cells()[b].corners)
           if (cut_.parent_corner[i] == cut_.parent_corner[j]) corners.join(i, j);
     };
+    const CornerUses uses = cornerUses(cut_.lattice);
     for (std::size_t p = 0; p < sources_.size(); ++p)
       for (const Triangle& t : sources_[p].mesh.triangles)
         for (int k = 0; k < 3; ++k) {
           const Index a = carriers_[p][t[k]], b = carriers_[p][t[(k + 1) % 3]];
-          if (component_[a] != component_[b]) joinCells(a, b);
+          if (component_[a] != component_[b] || ((cut_.changed[a] || cut_.changed[b]) && !heldTogether(uses, a, b)))
+            joinCells(a, b);
         }
     // What no vertex is in holds to its neighbours in the piece.
     std::vector<std::vector<Index>> users(before_.corners);
@@ -595,10 +543,8 @@ class CellCutter {
     fitClusters(matchInput(*child, piece.state), piece.state.positions, piece.state.poses);
     std::vector<Index> carriers;
     for (const Index c : carriers_[p]) carriers.push_back(renumbered[c]);
-    std::vector<PartnerCell> partners = partners_[p];
-    for (PartnerCell& partner : partners)
-      if (partner.cell != kNoIndex) partner.cell = renumbered[partner.cell];
-    child->binding = bindToCells(*lattice, child->surface.vertices, carriers, partners);
+    child->binding =
+        bindToCells(*lattice, child->surface.vertices, carriers, easeAcrossTears(*lattice, child->surface, carriers));
     for (const EmbeddedVertex& embedded : embedded_[p]) {
       ++(embedded.made ? work.bound_embedded : work.kept_embedded);
       work.new_vertices += embedded.made;
@@ -676,9 +622,7 @@ class CellCutter {
   Index sampled_ = 0;                         // cells before crumbs were made
   std::vector<bool> seen_;                    // a vertex is in it
   std::vector<std::vector<Index>> carriers_;  // of each source's vertices
-  std::vector<std::vector<PartnerCell>> partners_;
-  std::vector<std::array<Vec3, 2>> front_;
-  std::vector<Index> heir_;  // of each of the parent's corners
+  std::vector<Index> heir_;                   // of each of the parent's corners
 };
 
 }  // namespace

@@ -234,7 +234,7 @@ Index CellFinder::carrier(const Vec3& rest, const Allowed& allowed) const {
 }
 
 SurfaceBinding bindToCells(const CellLattice& lattice, const Points& surface_rest, const std::vector<Index>& cell,
-                           const std::vector<PartnerCell>& partners) {
+                           const std::vector<CellShares>& shares) {
   SurfaceBinding binding;
   binding.particle.assign(surface_rest.size(), kNoIndex);
   binding.offsets.push_back(0);
@@ -254,17 +254,14 @@ SurfaceBinding bindToCells(const CellLattice& lattice, const Points& surface_res
         binding.weights.push_back(weight);
       }
     };
-    const PartnerCell partner = partners.empty() ? PartnerCell() : partners[v];
-    follow(lattice.cells[cell[v]], 1.0 - partner.share);
-    if (partner.cell != kNoIndex) follow(lattice.cells[partner.cell], partner.share);
+    if (shares.empty() || shares[v].empty())
+      follow(lattice.cells[cell[v]], 1.0);
+    else
+      for (const CellShare& s : shares[v]) follow(lattice.cells[s.cell], s.share);
     binding.offsets.push_back(static_cast<Index>(binding.carriers.size()));
   }
   binding.levers.assign(surface_rest.size(), Vec3::Zero());
   binding.turners = cell;
-  for (const PartnerCell& partner : partners) {
-    binding.partners.push_back(partner.cell);
-    binding.partnered.push_back(partner.share);
-  }
   binding.bound = static_cast<Index>(surface_rest.size());
   return binding;
 }

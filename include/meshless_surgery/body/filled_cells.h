@@ -51,15 +51,16 @@ class CellFinder {
 /// [spacing^2] from a place in a cell to the nearest of the samples; infinite where there are none.
 double squaredToSamples(SampleSet samples, const Vec3& at);
 
-/// What a vertex follows beside its own cell: one across a wound, near the wound's end.
-struct PartnerCell {
+/// What a vertex follows: cells, with shares that add up to 1.
+struct CellShare {
   Index cell = kNoIndex;
-  double share = 0.0;  // 0..1
+  double share = 1.0;
 };
+using CellShares = std::vector<CellShare>;
 
-/// Every vertex is embedded in its cell: its carriers are the corners, with trilinear weights. cell: one a vertex;
-/// partners too, or empty.
+/// Every vertex is embedded in its cell: its carriers are the corners, with trilinear weights. cell: one a vertex.
+/// Where it has shares, in several.
 SurfaceBinding bindToCells(const CellLattice& lattice, const Points& surface_rest, const std::vector<Index>& cell,
-                           const std::vector<PartnerCell>& partners = {});
+                           const std::vector<CellShares>& shares = {});
 
 }  // namespace meshless
