@@ -18,7 +18,7 @@ std::size_t bytesOf(const BodyModel& model) {
          (model.elastic_batch ? model.elastic_batch->bytes() : 0) +
          bytesOf(model.surface.vertices, model.surface.triangles, model.surface.patches) +
          bytesOf(binding.particle, binding.embedded, binding.offsets, binding.carriers, binding.weights, binding.levers,
-                 binding.turners, binding.lever_clusters, binding.partners, binding.partnered);
+                 binding.turners, binding.lever_clusters);
 }
 
 std::size_t bytesOf(const BodyState& state) {

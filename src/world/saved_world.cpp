@@ -16,7 +16,7 @@ namespace meshless {
 namespace {
 
 constexpr std::string_view kMagic = "MLSSTATE";
-constexpr std::uint32_t kVersion = 11;
+constexpr std::uint32_t kVersion = 12;
 constexpr std::uint64_t kMostModels = 1u << 20;
 
 std::uint32_t checksum(std::string_view bytes) {
@@ -272,11 +272,6 @@ std::string faultOf(const BodyModel& m) {
     if (!b.levers[r].isZero(0.0) &&
         std::find(b.lever_clusters.begin(), b.lever_clusters.end(), b.turners[r]) == b.lever_clusters.end())
       return "a lever turns with no cluster";
-  if (b.partners.size() != b.partnered.size() || (!b.partners.empty() && b.partners.size() != b.embedded.size()) ||
-      !allBelowOrNone(b.partners, m.lattice ? clusters : 0))
-    return "a body's surface follows cells that are not there";
-  for (const double share : b.partnered)
-    if (!(share >= 0.0 && share <= 1.0)) return "a vertex has a share of a cell that is none";
   // The next cut asks for the cell of a vertex, whether it has a lever or not.
   if (m.lattice && (b.embedded.size() != vertices || !allBelow(b.turners, clusters)))
     return "a body's surface is not embedded in its cells";

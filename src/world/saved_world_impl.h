@@ -139,9 +139,8 @@ void serialize(A& archive, ElasticRest& v) {
 }
 template <class A>
 void serialize(A& archive, SurfaceBinding& v) {
-  auto& [particle, embedded, offsets, carriers, weights, levers, turners, lever_clusters, partners, partnered, bound] =
-      v;
-  archive(particle, embedded, offsets, carriers, weights, levers, turners, lever_clusters, partners, partnered, bound);
+  auto& [particle, embedded, offsets, carriers, weights, levers, turners, lever_clusters, bound] = v;
+  archive(particle, embedded, offsets, carriers, weights, levers, turners, lever_clusters, bound);
 }
 template <class A>
 void serialize(A& archive, Resistance& v) {

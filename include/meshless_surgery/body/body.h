@@ -23,8 +23,6 @@ struct SurfaceBinding {
   Points levers;                      // [m] one each: what the carriers do not span at rest (thin sheets, crumbs)
   std::vector<Index> turners;         // one each: the cluster whose affine fit takes the lever along
   std::vector<Index> lever_clusters;  // ascending: those that take a lever along; their poses are needed with positions
-  std::vector<Index> partners;        // not used any more: cells across a wound; state files have them
-  std::vector<double> partnered;      // not used any more: their shares
   Index bound = 0;                    // embedded vertices whose carriers were searched for; the others have a parent's
 };
 
