@@ -44,6 +44,7 @@ WorldRunner::~WorldRunner() { stop(); }
 
 void WorldRunner::start() {
   started_ = wallSeconds();
+  due_ = clock_.now();
   thread_ = std::thread([this] { loop(); });
 }
 
@@ -202,7 +203,7 @@ Result<std::uint64_t> WorldRunner::setPaused(bool paused) {
   std::uint64_t step = 0;
   const Status done = run(
       [&](World& world) {
-        fresh_pace_ = fresh_pace_ || (paused_ && !paused);
+        if (paused_ && !paused) due_ = clock_.now();
         paused_ = paused;
         step = world.stepCount();
         if (!paused) mended();
@@ -221,7 +222,7 @@ Status WorldRunner::reset() {
         answerCuts();
         giveUp("the world was reset meanwhile");
         mended();
-        fresh_pace_ = true;
+        due_ = clock_.now();
       },
       true);
 }
@@ -233,7 +234,7 @@ Status WorldRunner::restore(std::shared_ptr<const SavedWorld> saved, const Job& 
         answerCuts();
         giveUp("another state was loaded meanwhile");
         mended();
-        fresh_pace_ = true;
+        due_ = clock_.now();
         dt_ = 1.0 / world.settings().step_rate;
         {
           const std::lock_guard<std::mutex> lock(status_mutex_);
@@ -278,7 +279,6 @@ RunnerStatus WorldRunner::status() const {
 }
 
 void WorldRunner::loop() {
-  double due = 0.0;
   while (true) {
     doJobs();
     handOverEvents();
@@ -288,8 +288,8 @@ void WorldRunner::loop() {
     }
     if (!owed_.empty()) {
       stepOnce();
-      due = std::max(due, clock_.now());  // what they took is no backlog
-      if (owed_.empty()) continue;        // the step failed
+      due_ = std::max(due_, clock_.now());  // what they took is no backlog
+      if (owed_.empty()) continue;          // the step failed
       OwedSteps& owed = owed_.front();
       --owed.left;
       if (owed.progress != nullptr) {
@@ -307,25 +307,21 @@ void WorldRunner::loop() {
       jobs_changed_.wait(lock, [this] { return stopping_ || !jobs_.empty(); });
       continue;
     }
-    double now = clock_.now();
-    if (fresh_pace_) due = now;
-    fresh_pace_ = false;
-    if (now < due) {
-      sleepUntil(due);
+    if (clock_.now() < due_) {
+      sleepUntil(due_);
       continue;
     }
     const double before = wallSeconds();
     stepOnce();
     const double took = wallSeconds() - before;
-    due += dt_;
-    now = clock_.now();
-    const double late = now - due - settings_.max_backlog;
+    due_ += dt_;
+    const double late = clock_.now() - due_ - settings_.max_backlog;
     {
       const std::lock_guard<std::mutex> lock(status_mutex_);
       if (took > dt_) ++status_.overruns;
       if (late > 0.0) status_.dropped += late;
     }
-    if (late > 0.0) due += late;
+    if (late > 0.0) due_ += late;
     if (took > dt_ && before - last_over_budget_ > kOverBudgetEvery) {
       last_over_budget_ = before;
       std::ostringstream text;

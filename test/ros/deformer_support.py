@@ -280,6 +280,7 @@ class InStepTestCase(DeformerTestCase):
         return recorder
 
     def pause(self, paused):
+        self.advance()  # so that the node knows the time that the pause ends at
         self.good('pause', data=paused)
         self.runs_since = None if paused else (self.clock.now, self.state().step)
 
@@ -291,7 +292,12 @@ class InStepTestCase(DeformerTestCase):
         if self.runs_since:
             begin, step = self.runs_since
             steps = step + int((self.clock.now - begin) * self.step_rate - 1e-6)
-        return self.states.wait(lambda s: s.header.stamp >= now and s.step >= steps, max(0, self.states.count() - 1))
+        try:
+            return self.states.wait(lambda s: s.header.stamp >= now and s.step >= steps, max(0, self.states.count() - 1))
+        except AssertionError as error:
+            last = self.states.messages[-1]
+            raise AssertionError('%s; the last is of step %d at %s, not of step %d at %s' %
+                                 (error, last.step, last.header.stamp.to_sec(), steps, now.to_sec()))
 
     def pass_time(self, seconds):
         """What was said at each of its moments."""

@@ -61,6 +61,20 @@ TEST(Runner, StepsFollowTheClockAndNotTheWall) {
   EXPECT_EQ(0.0, runner.status().dropped);
 }
 
+TEST(Runner, StepsAreDueFromTheMomentWhenAPauseEnds) {
+  HandClock hand;
+  WorldRunner runner(twoBoxes(), pausedAtStart(), hand.clock);
+  // Time passes after the pause has ended and before the runner looks what is due.
+  runner.setStepSink([&](const World&, double simulated) {
+    if (simulated == 0.0) hand.time = 100.0 + 0.5 / 120.0;
+  });
+  runner.start();
+  ASSERT_TRUE(runner.setPaused(false).ok());
+  waitUntil([&] { return stepCount(runner) == 1; });
+  hand.time = 100.0 + 1.25 / 120.0;
+  waitUntil([&] { return stepCount(runner) == 2; });
+}
+
 TEST(Runner, ABacklogBeyondItsBoundIsDroppedAndCounted) {
   HandClock hand;
   RunnerSettings settings;

@@ -135,7 +135,7 @@ class WorldRunner {
   std::deque<ClosingCut> closing_;
   std::deque<OwedSteps> owed_;
   bool paused_ = false;
-  bool fresh_pace_ = true;  // the next step is due now: at the start, after a pause, after a reset
+  double due_ = 0.0;  // [s] when the next step is; now at the start, after a pause and after a reset
   std::vector<Event> own_events_;
   double last_over_budget_ = -1e300;
 
