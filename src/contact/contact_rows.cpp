@@ -1,6 +1,7 @@
 #include "meshless_surgery/contact/contact_rows.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace meshless {
 namespace {
@@ -24,9 +25,19 @@ void addEntries(const FeaturePair& pair, int from, int to, const ContactSurface&
   }
 }
 
+bool isMostlyHeld(const std::vector<RowEntry>& entries, Index begin, Index end, const double* inverse_masses) {
+  double held = 0.0, all = 0.0;
+  for (Index k = begin; k < end; ++k) {
+    const double share = std::abs(entries[k].coefficient);
+    all += share;
+    if (!(inverse_masses[entries[k].particle] > 0.0)) held += share;
+  }
+  return !(held < 0.5 * all);
+}
+
 }  // namespace
 
-ContactRow& makeRow(const FeaturePair& pair, const RowBody& a, const RowBody& b, bool with_itself, double skin,
+ContactRow* makeRow(const FeaturePair& pair, const RowBody& a, const RowBody& b, bool with_itself, double skin,
                     RowSet& set) {
   ContactRow row;
   row.begin = static_cast<Index>(set.entries.size());
@@ -34,6 +45,11 @@ ContactRow& makeRow(const FeaturePair& pair, const RowBody& a, const RowBody& b,
   row.middle = static_cast<Index>(set.entries.size());
   if (pair.of_b > 0 && !with_itself) addEntries(pair, pair.of_a, pair.of_a + pair.of_b, *b.surface, set.entries);
   row.end = static_cast<Index>(set.entries.size());
+  if (isMostlyHeld(set.entries, row.begin, row.middle, a.inverse_masses) &&
+      (row.middle == row.end || isMostlyHeld(set.entries, row.middle, row.end, b.inverse_masses))) {
+    set.entries.resize(row.begin);
+    return nullptr;
+  }
   Vec3 sum = Vec3::Zero();
   for (Index k = row.begin; k < row.end; ++k)
     sum += set.entries[k].coefficient * (k < row.middle ? a : b).positions[set.entries[k].particle];
@@ -46,7 +62,7 @@ ContactRow& makeRow(const FeaturePair& pair, const RowBody& a, const RowBody& b,
   row.order = pair.order;
   row.features = pair.features;
   set.rows.push_back(row);
-  return set.rows.back();
+  return &set.rows.back();
 }
 
 }  // namespace meshless

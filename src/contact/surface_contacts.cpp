@@ -272,21 +272,22 @@ void SurfaceContacts::makeRows(const SurfaceScene& scene, const std::vector<Coll
   const double friction = std::sqrt(a.friction * other_friction);
   const double restitution = restitutionOf(a, b);
   const double skin = b ? kSkin * std::min(a.edge_length, b->edge_length) : 0.0;
-  RowBody of_a{a.surface, where_[pair.a], frames_[pair.a].vertices.data()}, of_b;
-  if (b) of_b = {b->surface, where_[pair.b], frames_[pair.b].vertices.data()};
+  RowBody of_a{a.surface, where_[pair.a], frames_[pair.a].vertices.data(), a.inverse_masses}, of_b;
+  if (b) of_b = {b->surface, where_[pair.b], frames_[pair.b].vertices.data(), b->inverse_masses};
   const std::vector<ContactRow>& old = scratch.old;
   scratch.old.assign(pair.set.rows.begin(), pair.set.rows.end());
   pair.set.clear();
   for (const FeaturePair& features : scratch.search.found.pairs) {
-    ContactRow& row = makeRow(features, of_a, of_b, pair.a == pair.b, skin, pair.set);
-    row.friction = friction;
+    ContactRow* const row = makeRow(features, of_a, of_b, pair.a == pair.b, skin, pair.set);
+    if (!row) continue;
+    row->friction = friction;
     if (!(restitution > 0.0)) continue;
     double speed = 0.0;  // along the normal
     for (int k = 0; k < features.of_a + features.of_b; ++k)
       speed += features.shares[k] *
                features.normal.dot(frames_[k < features.of_a ? pair.a : pair.b].velocities[features.vertices[k]]);
     // What gravity gives within a frame is no approach.
-    if (-speed > 2.0 * scene.gravity * scene.h) row.bounce = -speed * restitution;
+    if (-speed > 2.0 * scene.gravity * scene.h) row->bounce = -speed * restitution;
   }
   std::sort(pair.set.rows.begin(), pair.set.rows.end(),
             [](const ContactRow& x, const ContactRow& y) { return x.name() < y.name(); });

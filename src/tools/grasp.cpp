@@ -11,6 +11,22 @@ namespace {
 
 const double kLongestWay = std::sqrt(3.0);  // along the edges of a cubic lattice, over the straight one
 
+// Where some of it is fixed the rest would be drawn beyond the end, for the mean to come there.
+void letGoOfFixed(const BodyModel& model, Pick& pick) {
+  double free = 0.0;
+  for (std::size_t k = 0; k < pick.patch.size(); ++k)
+    if (!model.fixed[pick.patch[k]]) free += pick.weights[k];
+  if (!(free > 0.0)) return;
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < pick.patch.size(); ++k) {
+    if (model.fixed[pick.patch[k]]) continue;
+    pick.patch[kept] = pick.patch[k];
+    pick.weights[kept++] = pick.weights[k] / free;
+  }
+  pick.patch.resize(kept);
+  pick.weights.resize(kept);
+}
+
 }  // namespace
 
 double graspInverseMass(const BodyModel& model, const Pick& pick) {
@@ -51,6 +67,7 @@ void makeGrasp(const BodyModel& model, Index centre, double radius, Pick& pick) 
     }
   }
   for (double& w : pick.weights) w /= total;
+  letGoOfFixed(model, pick);
 }
 
 Vec3 graspMean(const Pick& pick, const Points& positions) {

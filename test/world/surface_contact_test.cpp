@@ -3,6 +3,7 @@
 
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/random_organ.h"
 #include "meshless_surgery/geometry/refine.h"
 #include "support/bodies.h"
 #include "support/random.h"
@@ -627,6 +628,46 @@ TEST(SurfaceContact, ASliverDoesNotMakeAllTakeItsSubsteps) {
   const std::size_t alone = substepsWith(false, false);
   EXPECT_LE(substepsWith(true, false), alone + 1);
   EXPECT_GE(substepsWith(true, true), 2 * alone);
+}
+
+// What is held cannot give way, and what is next to it would have to go many times as far in its stead.
+TEST(SurfaceContact, ASphereOnHeldTissueFlingsNothingAway) {
+  for (std::uint64_t seed : {1, 2, 3}) {
+    WorldSettings settings = surface();
+    settings.ground.reset();
+    World world(settings);
+    Result<TriangleMesh> mesh = randomOrgan(seed, 0, 0.06, 1500);
+    ASSERT_TRUE(mesh.ok());
+    const Box box = boundsOf(mesh->vertices);
+    BodyDef def = test::defOf(std::move(*mesh), "organ");
+    def.material.youngs_modulus = 2500.0;
+    def.material.poissons_ratio = 0.45;
+    def.material.damping = 2.0;
+    const double top = box.max.z();
+    def.fixed.push_back(Box{Vec3(-1, -1, top - 0.2 * (top - box.min.z())), Vec3(1, 1, 1)});
+    add(world, def);
+    run(world, 0.5);
+    const Box hung = boundsOf(seen(world).bodies[0].surface);
+    PushCommand push;
+    push.radius = 0.015;
+    push.position = Vec3(0.001, 0.002, top + 0.02);
+    ASSERT_TRUE(world.apply(push).ok());
+    push.position.z() = top;
+    push.speed = 0.2;
+    ASSERT_TRUE(world.apply(push).ok());
+    double farthest = 0.0;
+    for (int n = 0; n < 30; ++n) {
+      world.step();
+      for (const Vec3& p : seen(world).bodies[0].surface)
+        farthest = std::max(farthest, (p - p.cwiseMax(hung.min).cwiseMin(hung.max)).norm());
+    }
+    EXPECT_LT(farthest, 2.0 * push.radius) << seed;
+    push.enable = false;
+    ASSERT_TRUE(world.apply(push).ok());
+    run(world, 3.0);
+    const BodySnapshot after = seen(world).bodies[0];
+    EXPECT_NEAR(after.measures.volume / after.model->rest_volume, 1.0, 0.02) << seed;
+  }
 }
 
 // What too few substeps slow comes to rest where enough of them would bring it.

@@ -38,20 +38,22 @@ struct RowSet {
   }
 };
 
-/// Whether particles can close a gap: none of them then moves by more than 20 times of it. A point can hang on what is
-/// held but for a share of 1e-8, and two points on the same particles; such gaps are left as they are.
+/// Whether particles can close a gap: none of them then moves by more than 20 times of it. Two points can hang on the
+/// same particles but for a share of 1e-8; such gaps are left as they are.
 /// answer: sum of coefficient^2 w, farthest: the largest |coefficient| w [1/kg].
 inline bool canAnswer(double answer, double farthest) { return 20.0 * answer > farthest; }
 
 /// A body for makeRow().
 struct RowBody {
   const ContactSurface* surface = nullptr;
-  const Vec3* positions = nullptr;  // [m] particles now
-  const Vec3* vertices = nullptr;   // [m] as contact sees them
+  const Vec3* positions = nullptr;         // [m] particles now
+  const Vec3* vertices = nullptr;          // [m] as contact sees them
+  const double* inverse_masses = nullptr;  // [1/kg] of particles, 0 where they are held
 };
 
-/// Appends the row of a pair. with_itself: b is the same body as a. skin [m] is taken off the gap.
-ContactRow& makeRow(const FeaturePair& pair, const RowBody& a, const RowBody& b, bool with_itself, double skin,
+/// Appends the row of a pair, or none (null) where both of its points hang mostly on particles that are held: the few
+/// others would go many times as far. with_itself: b is the same body as a. skin [m] is taken off the gap.
+ContactRow* makeRow(const FeaturePair& pair, const RowBody& a, const RowBody& b, bool with_itself, double skin,
                     RowSet& set);
 
 }  // namespace meshless

@@ -7,7 +7,8 @@ namespace meshless {
 
 /// Fills patch and weights with the particles within `radius` [m] of `centre`, shares falling to zero at the radius and
 /// proportional to mass: one particle alone would be pulled out of the tissue as a spike. Distances are straight where
-/// the way along the body is no longer than links of a cubic lattice make it, else that way over sqrt(3).
+/// the way along the body is no longer than links of a cubic lattice make it, else that way over sqrt(3). Fixed
+/// particles are held by nothing else than what fixes them, but where there are no others.
 void makeGrasp(const BodyModel& model, Index centre, double radius, Pick& pick);
 
 /// Weighted mean of the patch [m].
