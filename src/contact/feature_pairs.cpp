@@ -19,6 +19,7 @@ constexpr double kLeastOpposed = 0.05;  // cosine by which a direction has to op
 constexpr double kSameWay = 0.9;        // cosine from which a second direction of a vertex says nothing new
 constexpr double kSelfOpposed = 0.3;    // cosine by which faces of one body oppose each other where they may meet
 constexpr double kParallel = 0.05;      // sine between edges below which they have no common normal
+constexpr double kLongRidge = 1.5;      // mean edges: shorter ridges are held by their ends
 constexpr double kEnd = 0.01;           // of an edge: nearer to its end a vertex meets what is there
 
 using Candidate = NearFace;
@@ -456,8 +457,8 @@ void eachEdgeNear(const PairSearch::Side& of, const PairSearch::Side& other, dou
   }
 }
 
-/// Where their common normal is between the normals of both.
-void meetRidges(const PairSearch& search, Index e, Index other, FoundFeatures& found) {
+/// Where their common normal is between the normals of both; false where it is not.
+bool meetRidges(const PairSearch& search, Index e, Index other, FoundFeatures& found) {
   const SurfaceFrame &a = *search.a.frame, &b = *search.b.frame;
   const ContactEdge &of_a = search.a.surface->edges[e], &of_b = search.b.surface->edges[other];
   const Vec3 &a0 = a.vertices[of_a.vertices[0]], &a1 = a.vertices[of_a.vertices[1]];
@@ -465,22 +466,22 @@ void meetRidges(const PairSearch& search, Index e, Index other, FoundFeatures& f
   const Vec3 along_a = a1 - a0, along_b = b1 - b0, between = a0 - b0;
   Vec3 normal = along_a.cross(along_b);
   const double sine = normal.norm();
-  if (!(sine > kParallel * along_a.norm() * along_b.norm())) return;
+  if (!(sine > kParallel * along_a.norm() * along_b.norm())) return false;
   normal /= sine;
   Vec3 outwards = b.face_normals[of_b.faces[0]];
   if (of_b.faces[1] != kNoIndex) outwards += b.face_normals[of_b.faces[1]];
   if (normal.dot(outwards) < 0.0) normal = -normal;
-  if (!isInArc(b, of_b, normal) || !isInArc(a, of_a, -normal)) return;
+  if (!isInArc(b, of_b, normal) || !isInArc(a, of_a, -normal)) return false;
   // Where they are nearest to each other.
   const double aa = along_a.squaredNorm(), ab = along_a.dot(along_b), bb = along_b.squaredNorm();
   const double da = along_a.dot(between), db = along_b.dot(between), det = aa * bb - ab * ab;
   const double s = (ab * db - bb * da) / det, t = (aa * db - ab * da) / det;
-  if (!(s > kEnd && s < 1.0 - kEnd && t > kEnd && t < 1.0 - kEnd)) return;
+  if (!(s > kEnd && s < 1.0 - kEnd && t > kEnd && t < 1.0 - kEnd)) return false;
   const double gap = normal.dot(between + s * along_a - t * along_b);
   const Vec3 velocity = (1.0 - s) * a.velocities[of_a.vertices[0]] + s * a.velocities[of_a.vertices[1]] -
                         (1.0 - t) * b.velocities[of_b.vertices[0]] - t * b.velocities[of_b.vertices[1]];
   if (gap > searchMargin(search.length) + kAhead * search.h * velocity.norm() || gap < -kDeepestEdges * search.length)
-    return;
+    return false;
   FeaturePair pair;
   pair.kind = FeaturePair::Kind::kEdgeEdge;
   pair.of_a = pair.of_b = 2;
@@ -490,6 +491,51 @@ void meetRidges(const PairSearch& search, Index e, Index other, FoundFeatures& f
   pair.normal = normal;
   pair.gap = gap;
   found.pairs.push_back(pair);
+  return true;
+}
+
+double lengthOf(const PairSearch::Side& side, Index edge) {
+  const std::array<Index, 2>& v = side.surface->edges[edge].vertices;
+  return (side.frame->vertices[v[1]] - side.frame->vertices[v[0]]).norm();
+}
+
+/// A ridge longer than the edges that it lies on: between its ends the tissue has nothing else to lie on. The normal is
+/// that of the flat side. False where they do not meet.
+bool meetLongRidge(const PairSearch& search, bool ridge_of_a, Index ridge, Index flat, FoundFeatures& found) {
+  const PairSearch::Side &long_side = ridge_of_a ? search.a : search.b, &flat_side = ridge_of_a ? search.b : search.a;
+  if (!(lengthOf(long_side, ridge) > kLongRidge * search.length)) return false;
+  const ContactEdge &of_ridge = long_side.surface->edges[ridge], &of_flat = flat_side.surface->edges[flat];
+  const std::array<Index, 2>&v = of_ridge.vertices, &w = of_flat.vertices;
+  const Points &x = long_side.frame->vertices, &y = flat_side.frame->vertices;
+  Vec3 out = flat_side.frame->face_normals[of_flat.faces[0]];
+  if (of_flat.faces[1] != kNoIndex) out = (out + flat_side.frame->face_normals[of_flat.faces[1]]).normalized();
+  const Vec3 along = (x[v[1]] - x[v[0]]).normalized(), towards = -(out - along.dot(out) * along).normalized();
+  if (towards.isZero(0.0) || !isInArc(*long_side.frame, of_ridge, towards)) return false;
+  double s = 0.0, t = 0.0;
+  const Vec3 between = betweenSegments(x[v[0]], x[v[1]], y[w[0]], y[w[1]], s, t);
+  if (!(s > kEnd && s < 1.0 - kEnd && t > kEnd && t < 1.0 - kEnd)) return false;
+  const double gap = out.dot(between), margin = searchMargin(search.length);
+  if ((between - gap * out).norm() > margin + 0.5 * std::abs(gap)) return false;  // beside each other
+  const Points &of_x = long_side.frame->velocities, &of_y = flat_side.frame->velocities;
+  const Vec3 velocity = (1.0 - s) * of_x[v[0]] + s * of_x[v[1]] - (1.0 - t) * of_y[w[0]] - t * of_y[w[1]];
+  if (gap > margin + kAhead * search.h * velocity.norm() || gap < -kDeepestEdges * search.length) return false;
+  FeaturePair pair;
+  pair.kind = FeaturePair::Kind::kEdgeEdge;
+  pair.of_a = pair.of_b = 2;
+  pair.gap = gap;
+  if (ridge_of_a) {
+    pair.features = {ridge, flat};
+    pair.vertices = {v[0], v[1], w[0], w[1]};
+    pair.shares = {1.0 - s, s, t - 1.0, -t};
+    pair.normal = out;
+  } else {
+    pair.features = {flat, ridge};
+    pair.vertices = {w[0], w[1], v[0], v[1]};
+    pair.shares = {1.0 - t, t, s - 1.0, -s};
+    pair.normal = -out;
+  }
+  found.pairs.push_back(pair);
+  return true;
 }
 
 }  // namespace
@@ -499,10 +545,14 @@ void findEdgeEdge(const PairSearch& search, FoundFeatures& found) {
   const std::vector<ContactEdge>&edges_a = search.a.surface->edges, &edges_b = search.b.surface->edges;
   eachEdgeNear(search.a, search.b, search.h, margin, [&](Index e, Index near) {
     watchEdges(search, edges_a[e], edges_b[near], found.watched);
-    if (search.b.frame->shapes[near] == EdgeShape::kRidge) meetRidges(search, e, near, found);
+    const bool ridges = search.b.frame->shapes[near] == EdgeShape::kRidge;
+    if (ridges && meetRidges(search, e, near, found)) return;
+    if (!meetLongRidge(search, true, e, near, found) && ridges) meetLongRidge(search, false, near, e, found);
   });
   eachEdgeNear(search.b, search.a, search.h, margin, [&](Index e, Index near) {
-    if (search.a.frame->shapes[near] == EdgeShape::kFlat) watchEdges(search, edges_a[near], edges_b[e], found.watched);
+    if (search.a.frame->shapes[near] != EdgeShape::kFlat) return;
+    watchEdges(search, edges_a[near], edges_b[e], found.watched);
+    meetLongRidge(search, false, e, near, found);
   });
 }
 

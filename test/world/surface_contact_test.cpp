@@ -630,6 +630,37 @@ TEST(SurfaceContact, ASliverDoesNotMakeAllTakeItsSubsteps) {
   EXPECT_GE(substepsWith(true, true), 2 * alone);
 }
 
+// Walls of twelve triangles: along their upper edges nothing but the edges themselves holds the tissue.
+TEST(SurfaceContact, TissueLiesOnLongEdgesBetweenItsVertices) {
+  for (const double turned : {0.0, 0.2, 0.7}) {
+    World world(surface());
+    std::vector<Vec3> tops;
+    const Mat3 turn = Eigen::AngleAxisd(turned, Vec3::UnitZ()).toRotationMatrix();
+    for (const double y : {-0.03, 0.03}) {
+      ObstacleDef wall;
+      wall.name = y < 0.0 ? "right" : "left";
+      wall.mesh = boxMesh(Vec3(0.4, 0.004, 0.05), 1, 1, 1);
+      for (Vec3& p : wall.mesh.vertices) p = turn * (p + Vec3(0, y, 0.025));
+      ASSERT_TRUE(world.addObstacle(wall).ok());
+      for (const double side : {-0.002, 0.002})
+        for (double x = -0.06; x <= 0.06; x += 1e-3) tops.push_back(turn * Vec3(x, y + side, 0.05));
+    }
+    BodyDef def = block("tissue", Vec3(0, 0, 0.0755), Vec3(0.1, 0.1, 0.05));
+    def.material.youngs_modulus = 5000.0;
+    add(world, def);
+    run(world, 2.0);
+    const BodySnapshot body = seen(world).bodies[0];
+    TriangleMesh mesh = body.model->surface;
+    mesh.vertices = body.surface;
+    const SolidQuery solid(mesh);
+    double deepest = 0.0;
+    for (const Vec3& p : tops)
+      if (solid.contains(p)) deepest = std::max(deepest, solid.distance(p));
+    EXPECT_LT(deepest, 2e-4) << turned;
+    EXPECT_GT(body.measures.centre_of_mass.z(), 0.06) << turned;
+  }
+}
+
 // What is held cannot give way, and what is next to it would have to go many times as far in its stead.
 TEST(SurfaceContact, ASphereOnHeldTissueFlingsNothingAway) {
   for (std::uint64_t seed : {1, 2, 3}) {
