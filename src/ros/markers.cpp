@@ -54,6 +54,15 @@ void addObstacle(const ObstacleDef& obstacle, Marker& marker) {
   }
 }
 
+void addObstacles(const WorldSnapshot& snapshot, const std_msgs::Header& header,
+                  visualization_msgs::MarkerArray& array) {
+  for (std::size_t o = 0; o < snapshot.obstacles.size(); ++o) {
+    Marker surface = newMarker(header, "obstacles", static_cast<int>(o), Marker::TRIANGLE_LIST);
+    addObstacle(*snapshot.obstacles[o], surface);
+    if (!surface.points.empty()) array.markers.push_back(std::move(surface));
+  }
+}
+
 // Unit normals of vertices, and the light on them.
 struct Shading {
   Points normals;
@@ -162,6 +171,13 @@ void MarkerBuilder::addTools(const WorldSnapshot& snapshot, const std_msgs::Head
   }
 }
 
+visualization_msgs::MarkerArray obstacleMarkers(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
+  visualization_msgs::MarkerArray array;
+  array.markers.push_back(deleteAllMarkers(header));
+  addObstacles(snapshot, header, array);
+  return array;
+}
+
 bool MarkerBuilder::deleting() const {
   return std::any_of(shown_.begin(), shown_.end(),
                      [](const auto& s) { return s.second > 0 && s.second < kSaidDeletes; });
@@ -184,11 +200,7 @@ visualization_msgs::MarkerArray MarkerBuilder::build(const WorldSnapshot& snapsh
     addBody(body, surface);
     if (!surface.points.empty()) array.markers.push_back(std::move(surface));
   }
-  for (std::size_t o = 0; o < snapshot.obstacles.size(); ++o) {
-    Marker surface = newMarker(header, "obstacles", static_cast<int>(o), Marker::TRIANGLE_LIST);
-    addObstacle(*snapshot.obstacles[o], surface);
-    if (!surface.points.empty()) array.markers.push_back(std::move(surface));
-  }
+  addObstacles(snapshot, header, array);
   addTools(snapshot, header, array);
 
   std::map<Key, int> now;

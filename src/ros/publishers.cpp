@@ -68,6 +68,7 @@ Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings
   // No latching: what a late listener needs is a full set as of now, and that it gets because it is noticed.
   markers_topic_ = handle.advertise<visualization_msgs::MarkerArray>(
       "markers", 5, [this](const ros::SingleSubscriberPublisher&) { markers_newcomer_ = true; });
+  obstacles_topic_ = handle.advertise<visualization_msgs::MarkerArray>("obstacles", 1, true);
   points_topic_ = handle.advertise<sensor_msgs::PointCloud2>(
       "points", 5, [this](const ros::SingleSubscriberPublisher&) { points_newcomer_ = true; });
   const auto on_surfaces = [this](const ros::SingleSubscriberPublisher&) { surfaces_newcomer_ = true; };
@@ -242,6 +243,10 @@ void Publishers::publishTick(Clock::time_point now) {
   if (info) {
     info_revision_ = revision;
     publishInfo(*snapshot, header);
+    if (snapshot->obstacles != obstacles_) {
+      obstacles_ = snapshot->obstacles;
+      obstacles_topic_.publish(obstacleMarkers(*snapshot, header));
+    }
   }
   if (tools) publishTools(*snapshot, header.stamp);
 }

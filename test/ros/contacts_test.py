@@ -47,6 +47,12 @@ class ContactsTest(DeformerTestCase):
         table = of(markers.wait(lambda a: of(a, 'obstacles')), 'obstacles')[0]
         self.assertEqual(Marker.TRIANGLE_LIST, table.type)
         self.assertAlmostEqual(TABLE_TOP, max(p.z for p in table.points), delta=1e-6)
+        # For displays that show nothing else of the markers, and for whoever comes late.
+        late = self.deformer.recorder('obstacles', MarkerArray)
+        self.addCleanup(late.close)
+        array = late.wait()
+        self.assertEqual(Marker.DELETEALL, array.markers[0].action)
+        self.assertEqual(table.points, of(array, 'obstacles')[0].points)
 
 
 if __name__ == '__main__':

@@ -9,16 +9,19 @@
 
 namespace meshless {
 
+/// DELETEALL, and a TRIANGLE_LIST an obstacle: ns "obstacles", numbered.
+visualization_msgs::MarkerArray obstacleMarkers(const WorldSnapshot& snapshot, const std_msgs::Header& header);
+
 /// Remembers what was shown, so that what is gone gets its DELETE.
 class MarkerBuilder {
  public:
   explicit MarkerBuilder(std::string world_frame) : world_frame_(std::move(world_frame)) {}
 
-  /// Needs a snapshot with surfaces. One TRIANGLE_LIST a body: ns "bodies", id the body's number, a colour for each point:
-  /// the outer colour (which is also the marker's) or for faces of cuts the inside colour, times the light there. No
-  /// triangle without an area. Obstacles in ns "obstacles", numbered. Tools in ns "tools": springs 0, their ends 1, push sphere 2,
-  /// scissors 3. `fresh` (someone new listens) and a reset begin with DELETEALL. A DELETE is said in 30 arrays on end:
-  /// a slow listener may lose one.
+  /// Needs a snapshot with surfaces. One TRIANGLE_LIST a body: ns "bodies", id the body's number, a colour for each
+  /// point: the outer colour (which is also the marker's) or for faces of cuts the inside colour, times the light
+  /// there. No triangle without an area. Obstacles in ns "obstacles", numbered. Tools in ns "tools": springs 0, their
+  /// ends 1, push sphere 2, scissors 3. `fresh` (someone new listens) and a reset begin with DELETEALL. A DELETE is
+  /// said in 30 arrays on end: a slow listener may lose one.
   visualization_msgs::MarkerArray build(const WorldSnapshot& snapshot, const ros::Time& stamp, bool fresh);
   /// A DELETE is still to be said again.
   bool deleting() const;

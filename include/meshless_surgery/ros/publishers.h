@@ -72,7 +72,7 @@ class Publishers {
 
   ros::Publisher topology_topic_, vertices_topic_;
   ros::Publisher clusters_topic_, contacts_topic_, surfaces_topic_, strained_surfaces_topic_;
-  ros::Publisher markers_topic_, points_topic_, state_topic_, events_topic_, info_topic_;
+  ros::Publisher markers_topic_, obstacles_topic_, points_topic_, state_topic_, events_topic_, info_topic_;
   struct ToolTopics {
     ros::Publisher measured, setpoint, state;
     bool there = false;      // as was said last
@@ -93,7 +93,8 @@ class Publishers {
   std::uint64_t clusters_revision_ = 0, clusters_built_ = 0;
   std::uint64_t contacts_revision_ = 0, contacts_built_ = 0;
   std::uint64_t surfaces_revision_ = 0, surfaces_built_ = 0;
-  meshless_surgery::Info info_;  // as it was said last
+  meshless_surgery::Info info_;                                // as it was said last
+  std::vector<std::shared_ptr<const ObstacleDef>> obstacles_;  // likewise
   std::uint64_t info_revision_ = 0;
   Cadence info_due_, markers_due_, points_due_, state_due_, tools_due_, diagnostics_due_;
   std::atomic<bool> markers_newcomer_{false}, points_newcomer_{false};
