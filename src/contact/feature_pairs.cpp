@@ -115,8 +115,10 @@ class VertexSearch {
       c.weights = nearestWeights(p, x[t[0]], x[t[1]], x[t[2]]);
       c.point = c.weights[0] * x[t[0]] + c.weights[1] * x[t[1]] + c.weights[2] * x[t[2]];
       c.distance = (p - c.point).norm();
-      c.reach = kAhead * search_.h *
-                (velocity - (c.weights[0] * u[t[0]] + c.weights[1] * u[t[1]] + c.weights[2] * u[t[2]])).norm();
+      // What goes along the plane across what is between them comes no nearer.
+      const Vec3 way = p - c.point;
+      const double towards = std::max({way.dot(u[t[0]]), way.dot(u[t[1]]), way.dot(u[t[2]])}) - way.dot(velocity);
+      c.reach = c.distance > 0.0 ? kAhead * search_.h * std::max(0.0, towards / c.distance) : 0.0;
       if (c.distance > within + c.reach) return;
       c.reach += margin_;
       c.corners = static_cast<int>((c.weights.array() > 0.0).count());
@@ -355,10 +357,10 @@ void watchEdges(const PairSearch& search, const ContactEdge& of_a, const Contact
       distanceOfPair(2, {a.vertices[va[0]], a.vertices[va[1]], b.vertices[vb[0]], b.vertices[vb[1]]});
   if (apart.distance <= kTouching * search.length) return;
   if (leadsInside(b, of_b, apart.between) || leadsInside(a, of_a, -apart.between)) return;
-  double fastest = 0.0;
-  for (const Index v : va)
-    for (const Index w : vb) fastest = std::max(fastest, (a.velocities[v] - b.velocities[w]).squaredNorm());
-  if (apart.distance > searchMargin(search.length) + kAhead * search.h * std::sqrt(fastest)) return;
+  const auto along = [&apart](const Vec3& velocity) { return apart.between.dot(velocity) / apart.distance; };
+  const double towards = std::max(along(b.velocities[vb[0]]), along(b.velocities[vb[1]])) -
+                         std::min(along(a.velocities[va[0]]), along(a.velocities[va[1]]));
+  if (apart.distance > searchMargin(search.length) + kAhead * search.h * std::max(0.0, towards)) return;
   watched.push_back({{va[0], va[1], vb[0], vb[1]}, 2, apart.between / apart.distance, kLeastLeft * apart.distance});
 }
 
@@ -480,7 +482,8 @@ bool meetRidges(const PairSearch& search, Index e, Index other, FoundFeatures& f
   const double gap = normal.dot(between + s * along_a - t * along_b);
   const Vec3 velocity = (1.0 - s) * a.velocities[of_a.vertices[0]] + s * a.velocities[of_a.vertices[1]] -
                         (1.0 - t) * b.velocities[of_b.vertices[0]] - t * b.velocities[of_b.vertices[1]];
-  if (gap > searchMargin(search.length) + kAhead * search.h * velocity.norm() || gap < -kDeepestEdges * search.length)
+  if (gap > searchMargin(search.length) + kAhead * search.h * std::max(0.0, -normal.dot(velocity)) ||
+      gap < -kDeepestEdges * search.length)
     return false;
   FeaturePair pair;
   pair.kind = FeaturePair::Kind::kEdgeEdge;
@@ -518,7 +521,8 @@ bool meetLongRidge(const PairSearch& search, bool ridge_of_a, Index ridge, Index
   if ((between - gap * out).norm() > margin + 0.5 * std::abs(gap)) return false;  // beside each other
   const Points &of_x = long_side.frame->velocities, &of_y = flat_side.frame->velocities;
   const Vec3 velocity = (1.0 - s) * of_x[v[0]] + s * of_x[v[1]] - (1.0 - t) * of_y[w[0]] - t * of_y[w[1]];
-  if (gap > margin + kAhead * search.h * velocity.norm() || gap < -kDeepestEdges * search.length) return false;
+  if (gap > margin + kAhead * search.h * std::max(0.0, -out.dot(velocity)) || gap < -kDeepestEdges * search.length)
+    return false;
   FeaturePair pair;
   pair.kind = FeaturePair::Kind::kEdgeEdge;
   pair.of_a = pair.of_b = 2;

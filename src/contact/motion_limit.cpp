@@ -70,6 +70,11 @@ class Limit {
     return scratch_.meeting.size();
   }
 
+  /// What has turned with all is near other planes.
+  void checkAll() {
+    for (const WatchedPairs& pairs : pairs_) std::fill(pairs.set->until.begin(), pairs.set->until.end(), -1.0);
+  }
+
   // An impulse along what is between them where they meet, that leaves twice of it.
   void part() {
     for (const LimitScratch::Meeting& meeting : scratch_.meeting) {
@@ -133,14 +138,11 @@ class Limit {
     const LimitedBody &a = bodies_[pairs.a], &b = bodies_[pairs.b];
     std::vector<LimitScratch::Meeting>& found = scratch_.found[n];
     found.clear();
-    if (again_ && !a.any_moved && !b.any_moved) return;
+    if (again_ && !(a.spread + b.spread > 0.0)) return;
     WatchedSet& set = *pairs.set;
-    if (!again_) set.gone += (a.mean_way - b.mean_way).norm() + a.spread + b.spread;  // not what both go alike
+    set.gone += (a.mean_way - b.mean_way).norm() + a.spread + b.spread;  // not what both go alike
     for (std::size_t f = 0; f < set.features.size(); ++f)
-      if (again_ ? isMoved(pairs, set.features[f]) : set.gone > set.until[f]) {
-        if (wouldMeet(pairs, f)) found.push_back({n, f});
-        if (again_) set.until[f] = set.gone;  // what has been edited is yet to turn with all
-      }
+      if (set.gone > set.until[f] && wouldMeet(pairs, f)) found.push_back({n, f});
   }
 
   bool wouldMeet(const WatchedPairs& pairs, std::size_t f) {
@@ -174,12 +176,6 @@ class Limit {
     if (watched.of_a == 1)
       return n.dot(of_a[v[0]]) - std::max({n.dot(of_b[v[1]]), n.dot(of_b[v[2]]), n.dot(of_b[v[3]])});
     return std::min(n.dot(of_a[v[0]]), n.dot(of_a[v[1]])) - std::max(n.dot(of_b[v[2]]), n.dot(of_b[v[3]]));
-  }
-
-  bool isMoved(const WatchedPairs& pairs, const WatchedFeatures& watched) const {
-    for (std::size_t k = 0; k < 4; ++k)
-      if (bodies_[k < watched.of_a ? pairs.a : pairs.b].vertex_moved[watched.vertices[k]]) return true;
-    return false;
   }
 
   static double alongNormal(const WatchedFeatures& watched, const PairDistance& at,
@@ -270,6 +266,7 @@ std::size_t limitMotion(const std::vector<WatchedPairs>& pairs, std::vector<Limi
     turn = inverseInertia(before.inertia) * before.angular;
     moveTogether(bodies, members, before.centre, -shift, -turn);
     for (const Index b : members) bodies[b].place();
+    limit.checkAll();
   }
   int pass = 0;
   do {
@@ -283,6 +280,7 @@ std::size_t limitMotion(const std::vector<WatchedPairs>& pairs, std::vector<Limi
   const Momentum after = momentumOf(bodies, members);
   moveTogether(bodies, members, before.centre, shift - after.linear / before.mass,
                turn - inverseInertia(before.inertia) * after.angular);
+  limit.checkAll();
   return met;
 }
 

@@ -435,7 +435,6 @@ void SurfaceContacts::fillSlots(const std::vector<Collider>& colliders) {
     limited.watched.clear();
     limited.mean_way.setZero();
     limited.spread = 0.0;
-    limited.any_moved = false;
   }
 }
 
@@ -446,8 +445,7 @@ void SurfaceContacts::setRigidShare(Index collider, const RigidGroups* groups, d
   body.motions.assign(groups && share > 0.0 ? groups->size() : 0, GroupMotion());
 }
 
-// Vertices that are watched, each once; vertex_moved tells them meanwhile. What does not move is placed here: several
-// islands may meet it.
+// Vertices that are watched, each once. What does not move is placed here: several islands may meet it.
 void SurfaceContacts::listWatched(const Island& island) {
   for (const WatchedPairs& pairs : island.watched) {
     std::unique_lock<std::mutex> lock(frame_mutex_, std::defer_lock);
@@ -458,10 +456,10 @@ void SurfaceContacts::listWatched(const Island& island) {
         const Index v = watched.vertices[k];
         if (body.watched.empty()) {
           body.vertices.resize(body.supports->offsets.size() - 1);
-          body.vertex_moved.assign(body.vertices.size(), 0);
+          body.is_watched.assign(body.vertices.size(), 0);
           body.edited.assign(body.particles, 0);
         }
-        if (std::exchange(body.vertex_moved[v], 1)) continue;
+        if (std::exchange(body.is_watched[v], 1)) continue;
         body.watched.push_back(v);
         if (!body.moves) body.vertices[v] = body.vertexAt(v, body.positions);
       }
@@ -717,7 +715,7 @@ std::size_t SurfaceContacts::bytes() const {
   for (const auto& [key, way] : ways_) sum += kNode + sizeof way + bytesOf(way.last, way.offsets);
   for (const SolverBody& body : solver_bodies_) sum += bytesOf(body.motions);
   for (const LimitedBody& body : limited_)
-    sum += bytesOf(body.watched, body.vertices, body.ways, body.edited, body.vertex_moved);
+    sum += bytesOf(body.watched, body.vertices, body.ways, body.edited, body.is_watched);
   for (const std::vector<Island>* islands : {&islands_, &spare_islands_})
     for (const Island& island : *islands)
       sum += bytesOf(island.bodies, island.free, island.pairs, island.rows, island.watched);

@@ -201,10 +201,10 @@ int World::Impl::substepsOf(const std::vector<WorldBody*>& some, bool may_meet, 
   double mass = 0.0;
   for (std::size_t n = 0; n < some.size(); ++n) {
     const WorldBody& body = *some[n];
-    const double substeps = std::ceil(h_frame * highestFrequencyNow(*body.model, body.state));
+    double substeps = std::ceil(h_frame * highestFrequencyNow(*body.model, body.state));
+    if (may_meet) substeps = std::max(substeps, std::ceil(h_frame * body.fastest / body.edge_length));
     stiffest.push_back({std::isfinite(substeps) ? -substeps : -std::numeric_limits<double>::infinity(), n});
     mass += body.model->mass;
-    if (may_meet) needed = std::max(needed, std::ceil(h_frame * body.fastest / body.edge_length));
   }
   std::sort(stiffest.begin(), stiffest.end());
   double slowed = 0.0;  // [kg]

@@ -172,7 +172,7 @@ TEST(FeaturePairs, WhoMovesAsideInAFrameIsHeldBackByTheFacesThere) {
     for (Index v = 0; v < count; ++v) body.watched.push_back(v);
     body.vertices.resize(count);
     body.edited.assign(count, 0);
-    body.vertex_moved.assign(count, 0);
+    body.is_watched.assign(count, 0);
     bodies.push_back(std::move(body));
   }
   WatchedSet set;

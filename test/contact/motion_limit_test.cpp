@@ -27,7 +27,7 @@ struct Two {
       for (Index i = 0; i < count; ++i) body.watched.push_back(i);
       body.vertices.resize(count);
       body.edited.assign(count, 0);
-      body.vertex_moved.assign(count, 0);
+      body.is_watched.assign(count, 0);
       bodies.push_back(std::move(body));
     }
   }

@@ -25,13 +25,12 @@ struct LimitedBody {
   bool moves = true;
   const double* inverse_masses = nullptr;  // [1/kg] 0: held
   std::vector<Index> watched;              // vertices
+  std::vector<char> is_watched;            // one a vertex
   Points vertices;                         // [m] of them now, by their numbers
-  Points ways;                             // [m] that each of them has gone in the substep
+  Points ways;                             // [m] that each of them has gone since it was placed last
   Vec3 mean_way = Vec3::Zero();            // [m]
   double spread = 0.0;                     // [m] by which a way differs from the mean, at most
-
-  std::vector<char> edited, vertex_moved;  // one a particle; one a vertex: by what was edited
-  bool any_moved = false;                  // any vertex
+  std::vector<char> edited;                // one a particle
 
   void place() {
     ways.resize(watched.size());
@@ -50,15 +49,19 @@ struct LimitedBody {
   }
   /// Where a particle was edited.
   void placeEdited() {
-    any_moved = std::find(edited.begin(), edited.end(), 1) != edited.end();
-    if (!any_moved) return;
+    mean_way.setZero();
+    spread = 0.0;
+    if (std::find(edited.begin(), edited.end(), 1) == edited.end()) return;
     for (const Index v : watched) {
       bool moved = false;
       for (Index k = supports->offsets[v]; k < supports->offsets[v + 1]; ++k)
         moved |= edited[supports->particles[k]] != 0;
-      vertex_moved[v] = moved;
-      if (moved) vertices[v] = vertexAt(v, positions);
+      if (!moved) continue;
+      const Vec3 before = vertices[v];
+      vertices[v] = vertexAt(v, positions);
+      spread = std::max(spread, (vertices[v] - before).squaredNorm());
     }
+    spread = std::sqrt(spread);
   }
   Vec3 vertexAt(Index v, const Vec3* at) const {
     return offsets ? Vec3(supports->sum(v, at) + offsets[v]) : supports->sum(v, at);
