@@ -13,12 +13,22 @@ constexpr int kMostSweeps = 4;       // of a substep
 constexpr double kTolerance = 1e-3;  // mean edges: sweeps end where no row was corrected by more
 constexpr double kOutSpeed = 0.5;    // [1/s] mean edges: overlap is removed no faster
 
-using Four = double __attribute__((vector_size(32), may_alias));
+// Two registers of any x86-64; what is wider goes through memory where it is not there.
+using Two = double __attribute__((vector_size(16), may_alias));
+struct Four {
+  Two low, high;
+  Four& operator+=(const Four& o) {
+    low += o.low;
+    high += o.high;
+    return *this;
+  }
+  friend Four operator*(double s, const Four& v) { return {s * v.low, s * v.high}; }
+};
 
 const Four& four(const Slot& slot) { return reinterpret_cast<const Four&>(slot); }
 Four& four(Slot& slot) { return reinterpret_cast<Four&>(slot); }
-Vec3 vec3(const Four& v) { return {v[0], v[1], v[2]}; }
-Four four(const Vec3& v) { return Four{v[0], v[1], v[2], 0.0}; }
+Vec3 vec3(const Four& v) { return {v.low[0], v.low[1], v.high[0]}; }
+Four four(const Vec3& v) { return {Two{v[0], v[1]}, Two{v[2], 0.0}}; }
 Vec3 at(const Slot& slot) { return {slot.x, slot.y, slot.z}; }
 
 class Solver {
