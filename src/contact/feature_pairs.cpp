@@ -451,10 +451,15 @@ void eachEdgeNear(const PairSearch::Side& of, const PairSearch::Side& other, dou
       high = high.cwiseMax(p).cwiseMax(q);
     }
     if (isOutOf(other.frame->bounds, low, high, margin)) continue;
-    other.surface->tree.query(other.frame->boxes, boxAround(low, high, margin), [&](Index face) {
-      for (const Index near : other.surface->face_edges[face])
-        if (other.frame->shapes[near] != EdgeShape::kValley && other.surface->edges[near].faces[0] == face)
-          visit(e, near);
+    const FloatBox box = boxAround(low, high, margin);
+    other.surface->tree.query(other.frame->boxes, box, [&](Index face) {
+      for (const Index near : other.surface->face_edges[face]) {
+        const ContactEdge& edge = other.surface->edges[near];
+        if (other.frame->shapes[near] == EdgeShape::kValley || edge.faces[0] != face) continue;
+        FloatBox swept = other.frame->swept[edge.vertices[0]];
+        swept.extend(other.frame->swept[edge.vertices[1]]);
+        if (swept.overlaps(box)) visit(e, near);
+      }
     });
   }
 }
