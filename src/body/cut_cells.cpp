@@ -20,6 +20,7 @@
 namespace meshless {
 namespace {
 
+constexpr double kOneTissue = 4.0;     // [spacing] between what edges join at rest, and more than they are long
 constexpr double kCrumb = 1.0 / 64.0;  // of a cell, for a piece of it that no sample sees
 
 // A vertex of a piece whose new cell is not known yet.
@@ -107,14 +108,21 @@ class CellCutter {
     EmbeddedVertex embedded{Vec3::Zero(), kNoIndex, origins.same(v) == kNoIndex};
     if (origins.insideCap(v)) return insideOf(sources_[p].mesh.vertices[v]);
     const VertexOrigin origin = origins[v];
-    double most = -1.0;
+    int heaviest = 0;
+    for (int k = 1; k < 4; ++k)
+      if (origin.parents[k] != kNoIndex && origin.weights[k] > origin.weights[heaviest]) heaviest = k;
+    const Vec3& nearest = model_.surface.vertices[origin.parents[heaviest]];
+    embedded.was = model_.binding.turners[origin.parents[heaviest]];
+    double all = 0.0;
     for (int k = 0; k < 4; ++k) {
       if (origin.parents[k] == kNoIndex) continue;
-      embedded.rest += origin.weights[k] * model_.surface.vertices[origin.parents[k]];
-      if (origin.weights[k] <= most) continue;
-      most = origin.weights[k];
-      embedded.was = model_.binding.turners[origin.parents[k]];
+      // Where soft tissue lies in itself, edges of different parts of it meet.
+      const Vec3& rest = model_.surface.vertices[origin.parents[k]];
+      if (!((rest - nearest).norm() <= kOneTissue * before_.spacing)) continue;
+      embedded.rest += origin.weights[k] * rest;
+      all += origin.weights[k];
     }
+    if (all != 1.0) embedded.rest /= all;
     if (!embedded.made) embedded.rest = model_.surface.vertices[origin.parents[0]];
     return embedded;
   }

@@ -245,7 +245,7 @@ SurfaceBinding bindToCells(const CellLattice& lattice, const Points& surface_res
       for (int k = 0; k < 8; ++k) {
         const auto first = binding.carriers.begin() + binding.offsets.back();
         const auto known = std::find(first, binding.carriers.end(), carrier.corners[k]);
-        const double weight = share * trilinearWeight(k, at);
+        const double weight = share * extendedWeight(k, at);
         if (known != binding.carriers.end()) {
           binding.weights[static_cast<std::size_t>(known - binding.carriers.begin())] += weight;
           continue;

@@ -78,10 +78,10 @@ class SurfaceEdges {
   Jump jumpOfTwo(const Vec3& rest, const LatticeCell& a, const LatticeCell& b, const std::array<int, 8>& same) const {
     const Vec3 in_a = lattice_.placeIn(a, rest), in_b = lattice_.placeIn(b, rest);
     std::array<double, 8> left;
-    for (int k = 0; k < 8; ++k) left[k] = trilinearWeight(k, in_b);
+    for (int k = 0; k < 8; ++k) left[k] = extendedWeight(k, in_b);
     Jump jump;
     for (int k = 0; k < 8; ++k) {
-      const double weight = trilinearWeight(k, in_a);
+      const double weight = extendedWeight(k, in_a);
       const double other = same[k] < 0 ? 0.0 : std::exchange(left[same[k]], 0.0);
       const double merged = std::abs(weight - other);
       const bool one = same[k] >= 0 && a.corners[k] == b.corners[same[k]];
@@ -125,7 +125,7 @@ class SurfaceEdges {
       const LatticeCell& cell = lattice_.cells[s.cell];
       const Vec3 at = lattice_.placeIn(cell, rest);
       for (int k = 0; k < 8; ++k) {
-        const double weight = sign * s.share * trilinearWeight(k, at);
+        const double weight = sign * s.share * extendedWeight(k, at);
         const auto known = std::find_if(parts_.begin(), parts_.end(),
                                         [&](const Part& part) { return part.corner == cell.corners[k]; });
         if (known != parts_.end())

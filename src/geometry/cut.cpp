@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "cap_apart.h"
 #include "cap_rough.h"
 #include "cut_cap.h"
 #include "cut_parts.h"
@@ -88,6 +89,7 @@ struct Section {
   std::vector<OutlineSegment> outline;
   CapCore core;
   std::vector<CapTriangle> cap;  // all but the core's triangles
+  bool apart = false;            // of parts that overlap
 };
 
 /// Puts the cap on both sides, layer by layer of winding. Returns the area of one side [m^2], in the
@@ -202,15 +204,51 @@ Status checkPieces(const TriangleMesh& mesh, const Box& box, const std::vector<C
   return Done{};
 }
 
-/// The section's cap with points inside, and without where those do not fit.
-CapState fill(Section& section, const std::vector<RimEdge>& rim, const CutOptions& options) {
+/// A cap with points inside, and without where those do not fit.
+CapState fill(const Section& section, const std::vector<OutlineSegment>& outline, const CutOptions& options,
+              CapCore& core, std::vector<CapTriangle>& cap) {
   const std::vector<Vec2>& places = section.nodes.places;
+  core = coreOf(places, outline, section.work.spacing, options.cap_points);
+  const CapState state = triangulateCap(places, outline, core, cap);
+  if (state == CapState::kFilled || core.places.empty()) return state;
+  core = {};
+  return triangulateCap(places, outline, core, cap);
+}
+
+/// A cap for each of the parts that overlap. False where they cannot be told, or one of them overlaps itself.
+bool fillApart(Section& section, const CutOptions& options) {
+  const Index first = static_cast<Index>(section.nodes.places.size());
+  CapCore all;
+  std::vector<CapTriangle> cap;
+  for (const std::vector<OutlineSegment>& outline : curvesApart(section.nodes.places, section.outline)) {
+    CapCore core;
+    std::vector<CapTriangle> part;
+    if (fill(section, outline, options, core, part) != CapState::kFilled) return false;
+    const Index before = static_cast<Index>(all.places.size());
+    for (CapTriangle& t : part) {
+      for (Index& node : t.nodes)
+        if (node >= first) node += before;
+      cap.push_back(t);
+    }
+    all.spacing = std::max(all.spacing, core.spacing);
+    all.places.insert(all.places.end(), core.places.begin(), core.places.end());
+    all.inside.insert(all.inside.end(), core.inside.begin(), core.inside.end());
+    for (const Triangle& t : core.triangles) all.triangles.push_back({t[0] + before, t[1] + before, t[2] + before});
+    for (const auto& [from, to] : core.border) all.border.emplace_back(from + before, to + before);
+    for (const Index of : core.part_of_point) all.part_of_point.push_back(of + all.parts);
+    all.parts += core.parts;
+  }
+  if (cap.empty()) return false;
+  section.core = std::move(all);
+  section.cap = std::move(cap);
+  section.apart = true;
+  return true;
+}
+
+CapState fill(Section& section, const std::vector<RimEdge>& rim, const CutOptions& options) {
   section.outline = outlineOf(section.nodes, rim);
-  section.core = coreOf(places, section.outline, section.work.spacing, options.cap_points);
-  const CapState state = triangulateCap(places, section.outline, section.core, section.cap);
-  if (state == CapState::kFilled || section.core.places.empty()) return state;
-  section.core = {};
-  return triangulateCap(places, section.outline, section.core, section.cap);
+  const CapState state = fill(section, section.outline, options, section.core, section.cap);
+  return state == CapState::kCrossing && fillApart(section, options) ? CapState::kFilled : state;
 }
 
 /// Splits the rim where it meets itself and fills it anew. False where rounding does not let it.
@@ -249,16 +287,17 @@ Result<CutSurface> cutOnce(const TriangleMesh& mesh, const Plane& plane, const B
   if (!split) return split.error();
   const Result<std::vector<RimEdge>> rim = rimOf(*split);
   if (!rim) return rim.error();
-  Section plain{std::move(*split), {}, {}, {}, {}};
+  Section plain{std::move(*split), {}, {}, {}, {}, false};
   plain.nodes = nodesOf(plain.work, *rim);
   const CapState state = fill(plain, *rim, options);
   if (state == CapState::kUnbalanced)
     return Error{ErrorCode::kUnsuitableShape, "the surface is open or not oriented where the plane meets it"};
   const bool filled = state == CapState::kFilled;
-  if (filled && !hasSlivers(plain.nodes.places, plain.core, plain.cap)) return finish(std::move(plain), box, options);
+  if (filled && (plain.apart || !hasSlivers(plain.nodes.places, plain.core, plain.cap)))
+    return finish(std::move(plain), box, options);
 
   // The rim crosses itself, or lies on itself but for rounding.
-  Section resolved{plain.work, plain.nodes, {}, {}, {}};
+  Section resolved{plain.work, plain.nodes, {}, {}, {}, false};
   Result<CutSurface> cut =
       Error{ErrorCode::kUnsuitableShape, "the surface crosses itself where it is cut, and cannot be closed there"};
   if (resolve(*rim, resolved, options)) cut = finish(std::move(resolved), box, options);

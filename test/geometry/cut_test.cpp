@@ -133,7 +133,7 @@ TEST(Cut, SolidsThatTouchComeOutByThemselves) {
   }
 }
 
-TEST(Cut, SolidsThatCrossAreCappedLayerByLayer) {
+TEST(Cut, SolidsThatCrossAreCappedEachByItself) {
   TriangleMesh crossing = sphereMesh(0.1, 0.02);
   shapes::append(crossing, sphereMesh(0.08, 0.02), Vec3(0.07, 0.013, 0.004));
   const double whole = signedVolume(crossing);
@@ -147,6 +147,7 @@ TEST(Cut, SolidsThatCrossAreCappedLayerByLayer) {
     const laws::SectionOracle oracle = laws::sectionOracle(crossing, plane, 0.0);
     EXPECT_NEAR(cut->cap_area, oracle.area, 1e-9 * oracle.area);  // where both are, it counts twice
     EXPECT_NEAR(oracle.volume_above + oracle.volume_below, whole, 1e-12 * whole);
+    EXPECT_EQ(cut->pieces.size(), 4u);  // what overlaps is not joined
   }
 }
 

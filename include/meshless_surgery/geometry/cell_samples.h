@@ -19,7 +19,7 @@ constexpr SampleSet kNoSample = 0, kAllSamples = ~SampleSet{0};
 using LinkSet = std::array<SampleSet, 3>;
 
 constexpr int sampleBit(int x, int y, int z) { return x + kCellSamples * (y + kCellSamples * z); }
-constexpr int kSampleStride[3] = {1, kCellSamples, kCellSamples * kCellSamples};
+constexpr int kSampleStride[3] = {1, kCellSamples, kCellSamples* kCellSamples};
 
 /// Samples whose number along an axis is `n`.
 constexpr SampleSet sampleLayer(int axis, int n) {
@@ -43,11 +43,12 @@ SampleSet connectedPart(SampleSet within, const LinkSet& parted);
 
 /// What a filled part weighs and where, for a cell of edge 2 about the origin.
 struct FilledMoments {
-  double fraction = 0.0;                  // of the cell's volume, 0..1
-  Vec3 centroid = Vec3::Zero();           // half edges from the middle
-  Vec3 variance = Vec3::Zero();           // about the centroid, half edges squared
-  std::array<double, 8> corner_shares{};  // of the mass, adding up to 1: half of it by the trilinear weights of the
-                                          // samples, half in equal parts, so that no corner is too light for its stiffness
+  double fraction = 0.0;         // of the cell's volume, 0..1
+  Vec3 centroid = Vec3::Zero();  // half edges from the middle
+  Vec3 variance = Vec3::Zero();  // about the centroid, half edges squared
+  std::array<double, 8>
+      corner_shares{};  // of the mass, adding up to 1: half of it by the trilinear weights of the
+                        // samples, half in equal parts, so that no corner is too light for its stiffness
 };
 /// Of a set that is not empty. fraction * corner_shares of parts add up to those of the whole.
 FilledMoments momentsOf(SampleSet samples);
@@ -56,6 +57,14 @@ FilledMoments momentsOf(SampleSet samples);
 inline double trilinearWeight(int corner, const Vec3& at) {
   return (corner & 1 ? at.x() : 1.0 - at.x()) * (corner & 2 ? at.y() : 1.0 - at.y()) *
          (corner & 4 ? at.z() : 1.0 - at.z());
+}
+/// The same inside of the cell; outside it goes on from the nearest place in it by the mean slopes of the cell.
+/// Extended trilinear weights grow with the third power of the distance.
+inline double extendedWeight(int corner, const Vec3& at) {
+  const Vec3 inside = at.cwiseMax(0.0).cwiseMin(1.0);
+  double weight = trilinearWeight(corner, inside);
+  for (int axis = 0; axis < 3; ++axis) weight += (corner >> axis & 1 ? 0.25 : -0.25) * (at[axis] - inside[axis]);
+  return weight;
 }
 
 }  // namespace meshless

@@ -1,0 +1,105 @@
+#include "cap_apart.h"
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <numeric>
+
+namespace meshless {
+namespace cutting {
+namespace {
+
+struct Curve {
+  std::vector<OutlineSegment> segments;
+  Vec2 low = Vec2::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  double area = 0.0;  // [m^2] positive where it turns to the left
+  Index inside_of = kNoIndex;
+};
+
+double turn(const Vec2& a, const Vec2& b, const Vec2& c) {
+  return (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x();
+}
+
+class Curves {
+ public:
+  Curves(const std::vector<Vec2>& nodes, const std::vector<OutlineSegment>& segments) : nodes_(nodes) {
+    std::vector<Index> root(nodes.size());
+    std::iota(root.begin(), root.end(), Index{0});
+    const auto rootOf = [&root](Index i) {
+      while (root[i] != i) i = root[i] = root[root[i]];
+      return i;
+    };
+    for (const OutlineSegment& s : segments) root[rootOf(s.from)] = rootOf(s.to);
+    std::map<Index, Index> numbers;
+    for (const OutlineSegment& s : segments) {
+      const auto [at, is_new] = numbers.emplace(rootOf(s.from), static_cast<Index>(curves.size()));
+      if (is_new) curves.emplace_back();
+      Curve& curve = curves[at->second];
+      curve.segments.push_back(s);
+      const Vec2 &a = nodes[s.from], &b = nodes[s.to];
+      curve.low = curve.low.cwiseMin(a).cwiseMin(b);
+      curve.high = curve.high.cwiseMax(a).cwiseMax(b);
+      const Vec2 origin = nodes[curve.segments[0].from];
+      curve.area += 0.5 * s.weight * turn(origin, a, b);
+    }
+  }
+
+  bool cross(const Curve& a, const Curve& b) const {
+    if ((a.low.array() > b.high.array()).any() || (b.low.array() > a.high.array()).any()) return false;
+    for (const OutlineSegment& s : a.segments) {
+      const Vec2 &p = nodes_[s.from], &q = nodes_[s.to];
+      const Vec2 low = p.cwiseMin(q), high = p.cwiseMax(q);
+      if ((low.array() > b.high.array()).any() || (b.low.array() > high.array()).any()) continue;
+      for (const OutlineSegment& t : b.segments) {
+        const Vec2 &u = nodes_[t.from], &v = nodes_[t.to];
+        if (turn(p, q, u) * turn(p, q, v) <= 0.0 && turn(u, v, p) * turn(u, v, q) <= 0.0) return true;
+      }
+    }
+    return false;
+  }
+
+  /// How often the curve goes around p.
+  int windingAround(const Curve& curve, const Vec2& p) const {
+    int winding = 0;
+    for (const OutlineSegment& s : curve.segments) {
+      const Vec2 &a = nodes_[s.from], &b = nodes_[s.to];
+      if (a.y() <= p.y() && b.y() > p.y() && turn(a, b, p) > 0.0) winding += s.weight;
+      if (a.y() > p.y() && b.y() <= p.y() && turn(a, b, p) < 0.0) winding -= s.weight;
+    }
+    return winding;
+  }
+
+  std::vector<Curve> curves;
+
+ private:
+  const std::vector<Vec2>& nodes_;
+};
+
+}  // namespace
+
+std::vector<std::vector<OutlineSegment>> curvesApart(const std::vector<Vec2>& nodes,
+                                                     const std::vector<OutlineSegment>& segments) {
+  Curves all(nodes, segments);
+  std::vector<Curve>& curves = all.curves;
+  for (Curve& hole : curves) {
+    if (hole.area > 0.0) continue;
+    const Vec2& at = nodes[hole.segments[0].from];
+    for (Index n = 0; n < curves.size(); ++n) {
+      const Curve& around = curves[n];
+      if (!(around.area > 0.0) || all.windingAround(around, at) <= 0 || all.cross(hole, around)) continue;
+      if (hole.inside_of == kNoIndex || around.area < curves[hole.inside_of].area) hole.inside_of = n;
+    }
+    if (hole.inside_of == kNoIndex) return {};
+  }
+  std::vector<std::vector<OutlineSegment>> groups;
+  for (Index n = 0; n < curves.size(); ++n) {
+    if (!(curves[n].area > 0.0)) continue;
+    groups.push_back(curves[n].segments);
+    for (const Curve& hole : curves)
+      if (hole.inside_of == n) groups.back().insert(groups.back().end(), hole.segments.begin(), hole.segments.end());
+  }
+  return groups.size() > 1 ? groups : std::vector<std::vector<OutlineSegment>>();
+}
+
+}  // namespace cutting
+}  // namespace meshless

@@ -1,0 +1,16 @@
+// Parts of a solid that overlap where it is cut, each with a cap of its own. Private to geometry's cut_*.cpp.
+#pragma once
+
+#include "cap_core.h"
+
+namespace meshless {
+namespace cutting {
+
+/// The outline's closed curves in groups that are filled alone: each curve that turns to the left, with those in it
+/// that turn to the right. Curves that cross are in different groups: soft tissue lies in itself there, and what only
+/// overlaps must not be joined. Empty where a group cannot be told.
+std::vector<std::vector<OutlineSegment>> curvesApart(const std::vector<Vec2>& nodes,
+                                                     const std::vector<OutlineSegment>& segments);
+
+}  // namespace cutting
+}  // namespace meshless
