@@ -106,28 +106,6 @@ void expectSound(const BodyPiece& piece, const BodyModel& parent, const BodyStat
   EXPECT_GT(piece.model->highest_frequency, 0.5 * parent.highest_frequency);
 }
 
-// A bar that is bent around by more than a turn lies in itself, and a cut through the ring that it is then has an
-// outline that crosses itself. The parts that are joined there are far from each other at rest.
-TEST(CutCells, VerticesStayWithTheirTissueWhereItLiesInItself) {
-  PreparedBody body = prepared(filled(boxMesh(Vec3(0.6, 0.05, 0.05), 48, 4, 4), 0.0125));
-  for (Vec3& p : body.state.positions) {
-    const double angle = p.x() / 0.6 * 2.0 * M_PI * 1.08, radius = 0.09 + p.y() + 0.01 * p.x();
-    p = Vec3(radius * std::sin(angle), -radius * std::cos(angle), p.z());
-  }
-  updateSurface(*body.model, body.state);
-  const Result<CutBody> cut = cutBody(*body.model, body.state, {Vec3(0.01, 0.02, 1.0).normalized(), Vec3::Zero()});
-  ASSERT_TRUE(cut.ok()) << cut.error().detail;
-  for (const BodyPiece& piece : cut->pieces) {
-    const SurfaceBinding& binding = piece.model->binding;
-    const CellLattice& lattice = *piece.model->lattice;
-    for (Index r = 0; r < binding.embedded.size(); ++r) {
-      const Vec3 at = lattice.placeIn(lattice.cells[binding.turners[r]], piece.model->surface.vertices[r]);
-      EXPECT_LT((at - at.cwiseMax(0.0).cwiseMin(1.0)).norm(), 1.7) << "vertex " << r;
-      EXPECT_LT(piece.state.embedded_offsets[r].norm(), 2.0 * lattice.spacing) << "vertex " << r;
-    }
-  }
-}
-
 TEST(CutCells, KeepMassMomentumVolumeAndPlaces) {
   Random random(1);
   for (int round = 0; round < 40; ++round) {

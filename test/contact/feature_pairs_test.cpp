@@ -64,6 +64,24 @@ TEST(FeaturePairs, NothingIsMetBeyondTheMarginAndTheWayOfTheFrame) {
   EXPECT_EQ(vertexFace(between(Placed(boxMesh(Vec3(0.4, 0.4, 0.4), 1, 1, 1), at, Vec3(0, 0, -10)), low)).size(), 4u);
 }
 
+// What parts, or goes along the plane across what is between two features, brings them no nearer.
+TEST(FeaturePairs, PartingAndSlidingAreNoApproach) {
+  const Placed low(boxMesh(Vec3(1, 1, 1), 20, 20, 20), Vec3::Zero());
+  const auto foundOf = [&low](const Vec3& velocity) {
+    const Placed high(boxMesh(Vec3(0.4, 0.4, 0.4), 8, 8, 8), Vec3(0.013, 0.009, 0.705), velocity);
+    const PairSearch search = between(high, low);
+    SearchScratch scratch;
+    findVerticesNear(search, scratch);
+    findVertexFace(search, scratch);
+    findEdgeEdge(search, scratch.found);
+    return std::array<std::size_t, 2>{scratch.found.pairs.size(), scratch.found.watched.size()};
+  };
+  const auto still = foundOf(Vec3::Zero()), apart = foundOf(Vec3(0, 0, 10)), aside = foundOf(Vec3(10, 0, 0));
+  EXPECT_EQ(apart, still);
+  EXPECT_EQ(aside[0], still[0]);
+  EXPECT_GT(foundOf(Vec3(0, 0, -10))[1], still[1]);
+}
+
 TEST(FeaturePairs, AVertexInsideGoesOutByTheNearFaceThatItOpposes) {
   const Placed low(boxMesh(Vec3(1, 1, 1), 4, 4, 4), Vec3::Zero());
   const Placed high(boxMesh(Vec3(0.4, 0.4, 0.4), 1, 1, 1), Vec3(0.03, 0.02, 0.65));

@@ -1,4 +1,5 @@
 // The work of a cut depends on what it meets, not on the cuts before it. Counted, for clocks blur.
+#include "meshless_surgery/geometry/random_organ.h"
 #include "support/bodies.h"
 #include "support/random.h"
 
@@ -117,6 +118,43 @@ TEST(SuccessiveCuts, CapsThroughOldCapsAreNoFinerThanTheSurfaceWas) {
     const double reach = std::sqrt(3.0), radius = std::sqrt(reply.cap_area / M_PI) / kBallSpacing;
     EXPECT_LT(static_cast<double>(particlesOf(world) - particles), 2.0 * reach * M_PI * std::pow(radius + reach, 2))
         << k;
+  }
+}
+
+// A soft organ sinks into itself on the ground. Where its outline in a blade crosses itself, faces of the cut join what
+// is far apart at rest, and the next blade makes vertices on their edges.
+TEST(SuccessiveCuts, VerticesStayWithTheirTissueWhereItLiesInItself) {
+  Result<TriangleMesh> mesh = randomOrgan(15, 0, 0.15, 4100);
+  ASSERT_TRUE(mesh.ok());
+  BodyDef def = test::defOf(std::move(*mesh), "organ");
+  double lowest = 0.0;
+  for (const Vec3& p : def.mesh.vertices) lowest = std::min(lowest, p.z());
+  def.pose.translation.z() = 0.002 - lowest;
+  def.material.youngs_modulus = 3000.0;
+  def.material.poissons_ratio = 0.45;
+  def.material.density = 1060.0;
+  def.material.damping = 4.0;
+  def.material.friction = 0.3;
+  World world{WorldSettings()};
+  ASSERT_TRUE(world.addSceneBody(test::shared(std::move(def))).ok());
+  for (int n = 0; n < 60; ++n) world.step();
+  const Plane planes[] = {{Vec3(0.987, 0.092, -0.131).normalized(), Vec3(0.0411, -0.0022, 0.0222)},
+                          {Vec3(0.124, -0.902, 0.415).normalized(), Vec3(0.0293, -0.0033, 0.0237)}};
+  for (const Plane& plane : planes) {
+    CutCommand cut;
+    cut.blades.x_axis = plane.normal.unitOrthogonal();
+    cut.blades.y_axis = plane.normal.cross(cut.blades.x_axis);
+    cut.blades.origin = plane.point - 10.0 * cut.blades.x_axis;
+    const Result<Reply> reply = world.apply(cut);
+    ASSERT_TRUE(reply.ok()) << reply.error().detail;
+  }
+  for (const BodySnapshot& body : world.snapshot({true, false, true}).bodies) {
+    const SurfaceBinding& binding = body.model->binding;
+    const CellLattice& lattice = *body.model->lattice;
+    for (Index r = 0; r < binding.embedded.size(); ++r) {
+      const Vec3 at = lattice.placeIn(lattice.cells[binding.turners[r]], body.model->surface.vertices[r]);
+      EXPECT_LT((at - at.cwiseMax(0.0).cwiseMin(1.0)).norm(), 1.5) << body.name << ", vertex " << r;
+    }
   }
 }
 
