@@ -125,6 +125,8 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
   options.cap_points = kUsualCapPoints;
   options.roughness = wanted.roughness;
   options.seed = wanted.seed;
+  options.rest = &model.surface.vertices;
+  options.apart = kOneTissue * model.spacing;
   if (model.lattice) return cutFilled(model, state, plane, present, options);
   PieceMaker maker(model, state, options.cap_patch);
   Result<CutSurface> cut = Error();

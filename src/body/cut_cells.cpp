@@ -20,7 +20,6 @@
 namespace meshless {
 namespace {
 
-constexpr double kOneTissue = 4.0;     // [spacing] between what edges join at rest, and more than they are long
 constexpr double kCrumb = 1.0 / 64.0;  // of a cell, for a piece of it that no sample sees
 
 // A vertex of a piece whose new cell is not known yet.

@@ -6,6 +6,10 @@
 
 namespace meshless {
 
+/// [spacing] What is farther apart at rest and meets now are different parts of tissue that lies in itself: edges are
+/// shorter.
+constexpr double kOneTissue = 4.0;
+
 struct CellPieceSource {
   const TriangleMesh& mesh;      // present shape; patches filled
   const VertexOrigins& origins;  // of its vertices

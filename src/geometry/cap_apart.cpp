@@ -20,9 +20,12 @@ double turn(const Vec2& a, const Vec2& b, const Vec2& c) {
   return (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x();
 }
 
+enum class Meeting { kNone, kApart, kJoined };
+
 class Curves {
  public:
-  Curves(const std::vector<Vec2>& nodes, const std::vector<OutlineSegment>& segments) : nodes_(nodes) {
+  Curves(const std::vector<Vec2>& nodes, const std::vector<OutlineSegment>& segments, const Points& rest, double apart)
+      : nodes_(nodes), rest_(rest), apart_(apart) {
     std::vector<Index> root(nodes.size());
     std::iota(root.begin(), root.end(), Index{0});
     const auto rootOf = [&root](Index i) {
@@ -44,18 +47,21 @@ class Curves {
     }
   }
 
-  bool cross(const Curve& a, const Curve& b) const {
-    if ((a.low.array() > b.high.array()).any() || (b.low.array() > a.high.array()).any()) return false;
+  Meeting meet(const Curve& a, const Curve& b) const {
+    Meeting meeting = Meeting::kNone;
+    if ((a.low.array() > b.high.array()).any() || (b.low.array() > a.high.array()).any()) return meeting;
     for (const OutlineSegment& s : a.segments) {
       const Vec2 &p = nodes_[s.from], &q = nodes_[s.to];
       const Vec2 low = p.cwiseMin(q), high = p.cwiseMax(q);
       if ((low.array() > b.high.array()).any() || (b.low.array() > high.array()).any()) continue;
       for (const OutlineSegment& t : b.segments) {
         const Vec2 &u = nodes_[t.from], &v = nodes_[t.to];
-        if (turn(p, q, u) * turn(p, q, v) <= 0.0 && turn(u, v, p) * turn(u, v, q) <= 0.0) return true;
+        if (turn(p, q, u) * turn(p, q, v) > 0.0 || turn(u, v, p) * turn(u, v, q) > 0.0) continue;
+        if (!((rest_[s.from] - rest_[t.from]).norm() > apart_)) return Meeting::kJoined;
+        meeting = Meeting::kApart;
       }
     }
-    return false;
+    return meeting;
   }
 
   /// How often the curve goes around p.
@@ -73,20 +79,27 @@ class Curves {
 
  private:
   const std::vector<Vec2>& nodes_;
+  const Points& rest_;
+  const double apart_;
 };
 
 }  // namespace
 
 std::vector<std::vector<OutlineSegment>> curvesApart(const std::vector<Vec2>& nodes,
-                                                     const std::vector<OutlineSegment>& segments) {
-  Curves all(nodes, segments);
+                                                     const std::vector<OutlineSegment>& segments, const Points& rest,
+                                                     double apart) {
+  Curves all(nodes, segments, rest, apart);
   std::vector<Curve>& curves = all.curves;
+  for (Index a = 0; a < curves.size(); ++a)
+    for (Index b = a + 1; b < curves.size(); ++b)
+      if (all.meet(curves[a], curves[b]) == Meeting::kJoined) return {};
   for (Curve& hole : curves) {
     if (hole.area > 0.0) continue;
     const Vec2& at = nodes[hole.segments[0].from];
     for (Index n = 0; n < curves.size(); ++n) {
       const Curve& around = curves[n];
-      if (!(around.area > 0.0) || all.windingAround(around, at) <= 0 || all.cross(hole, around)) continue;
+      if (!(around.area > 0.0) || all.windingAround(around, at) <= 0 || all.meet(hole, around) != Meeting::kNone)
+        continue;
       if (hole.inside_of == kNoIndex || around.area < curves[hole.inside_of].area) hole.inside_of = n;
     }
     if (hole.inside_of == kNoIndex) return {};

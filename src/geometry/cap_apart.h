@@ -8,9 +8,11 @@ namespace cutting {
 
 /// The outline's closed curves in groups that are filled alone: each curve that turns to the left, with those in it
 /// that turn to the right. Curves that cross are in different groups: soft tissue lies in itself there, and what only
-/// overlaps must not be joined. Empty where a group cannot be told.
+/// overlaps must not be joined. rest: [m] of the nodes. Empty where curves cross that are no farther than `apart` [m]
+/// from each other at rest, where there is one group, and where a group cannot be told.
 std::vector<std::vector<OutlineSegment>> curvesApart(const std::vector<Vec2>& nodes,
-                                                     const std::vector<OutlineSegment>& segments);
+                                                     const std::vector<OutlineSegment>& segments, const Points& rest,
+                                                     double apart);
 
 }  // namespace cutting
 }  // namespace meshless

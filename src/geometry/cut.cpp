@@ -217,10 +217,19 @@ CapState fill(const Section& section, const std::vector<OutlineSegment>& outline
 
 /// A cap for each of the parts that overlap. False where they cannot be told, or one of them overlaps itself.
 bool fillApart(Section& section, const CutOptions& options) {
+  if (!options.rest) return false;
+  Points rest;
+  for (const Index v : section.nodes.lowestVertices()) {
+    rest.push_back(Vec3::Zero());
+    const VertexOrigin origin = section.work.originOf(v);
+    for (int k = 0; k < 4; ++k)
+      if (origin.parents[k] != kNoIndex) rest.back() += origin.weights[k] * (*options.rest)[origin.parents[k]];
+  }
   const Index first = static_cast<Index>(section.nodes.places.size());
   CapCore all;
   std::vector<CapTriangle> cap;
-  for (const std::vector<OutlineSegment>& outline : curvesApart(section.nodes.places, section.outline)) {
+  for (const std::vector<OutlineSegment>& outline :
+       curvesApart(section.nodes.places, section.outline, rest, options.apart)) {
     CapCore core;
     std::vector<CapTriangle> part;
     if (fill(section, outline, options, core, part) != CapState::kFilled) return false;

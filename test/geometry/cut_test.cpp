@@ -133,8 +133,9 @@ TEST(Cut, SolidsThatTouchComeOutByThemselves) {
   }
 }
 
-TEST(Cut, SolidsThatCrossAreCappedEachByItself) {
+TEST(Cut, SolidsThatCrossAreCappedLayerByLayer) {
   TriangleMesh crossing = sphereMesh(0.1, 0.02);
+  const std::size_t one = crossing.vertices.size();
   shapes::append(crossing, sphereMesh(0.08, 0.02), Vec3(0.07, 0.013, 0.004));
   const double whole = signedVolume(crossing);
   std::mt19937 random(3);
@@ -147,7 +148,19 @@ TEST(Cut, SolidsThatCrossAreCappedEachByItself) {
     const laws::SectionOracle oracle = laws::sectionOracle(crossing, plane, 0.0);
     EXPECT_NEAR(cut->cap_area, oracle.area, 1e-9 * oracle.area);  // where both are, it counts twice
     EXPECT_NEAR(oracle.volume_above + oracle.volume_below, whole, 1e-12 * whole);
-    EXPECT_EQ(cut->pieces.size(), 4u);  // what overlaps is not joined
+    // Where they are far from each other at rest, tissue lies in itself: what only overlaps is not joined.
+    Points rest = crossing.vertices;
+    for (std::size_t v = one; v < rest.size(); ++v) rest[v].z() += 1.0;
+    CutOptions apart;
+    apart.rest = &rest;
+    apart.apart = 0.05;
+    const Result<CutSurface> parted = cutByPlane(crossing, plane, apart);
+    ASSERT_TRUE(parted.ok()) << parted.error().detail;
+    EXPECT_TRUE(laws::cutObeysLaws(crossing, plane, apart, parted, false));
+    EXPECT_NEAR(parted->cap_area, oracle.area, 1e-9 * oracle.area);
+    EXPECT_EQ(parted->pieces.size(), 4u);
+    apart.apart = 2.0;
+    EXPECT_EQ(cutByPlane(crossing, plane, apart)->pieces.size(), cut->pieces.size());
   }
 }
 

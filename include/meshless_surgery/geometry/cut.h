@@ -38,6 +38,13 @@ struct CutOptions {
   double roughness = 0.0;
   std::uint32_t seed = 0;
 
+  // Where the vertices are at rest [m], if they are told. Curves of the section's outline that cross now, and are
+  // farther than `apart` [m] from each other at rest, are of different parts of soft tissue that lies in itself: each
+  // is capped by itself, and nothing is joined. Without, and where parts overlap at rest too, caps go over all that
+  // overlaps.
+  const Points* rest = nullptr;
+  double apart = 0.0;
+
   bool check_pieces = false;  // look at every edge and volume of the pieces again, for tests: doubles the time
 };
 
