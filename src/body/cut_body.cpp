@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kNoPiece = -1;
 constexpr double kOnPlane = 0.1;  // [spacing]
+constexpr double kSnap = 0.2;     // [spacing] shorter edges would cost contact much, and cells do not resolve them
 
 // The piece of every particle. Surface particles are where their vertex is; the others take the piece of the nearest
 // one along the body on their side of the plane.
@@ -127,7 +128,11 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
   options.seed = wanted.seed;
   options.rest = &model.surface.vertices;
   options.apart = kOneTissue * model.spacing;
-  if (model.lattice) return cutFilled(model, state, plane, present, options);
+  if (model.lattice) {
+    options.snap = kSnap * model.spacing;
+    return cutFilled(model, state, plane, present, options);
+  }
+  // Surface particles are where their vertices are, so vertices stay.
   PieceMaker maker(model, state, options.cap_patch);
   Result<CutSurface> cut = Error();
   atOnce([&] { cut = cutByPlane(present, plane, options); }, [&] { maker.foresee(plane); });

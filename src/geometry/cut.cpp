@@ -291,8 +291,9 @@ Result<CutSurface> finish(Section section, const Box& box, const CutOptions& opt
   return cut;
 }
 
-Result<CutSurface> cutOnce(const TriangleMesh& mesh, const Plane& plane, const Box& box, const CutOptions& options) {
-  Result<Workpiece> split = splitAtPlane(mesh, plane, options.band, box);
+Result<CutSurface> cutOnce(const TriangleMesh& mesh, const std::vector<SnappedVertex>& snapped, const Plane& plane,
+                           const Box& box, const CutOptions& options) {
+  Result<Workpiece> split = splitAtPlane(mesh, snapped, plane, options.band, box);
   if (!split) return split.error();
   const Result<std::vector<RimEdge>> rim = rimOf(*split);
   if (!rim) return rim.error();
@@ -320,12 +321,18 @@ Result<CutSurface> cutByPlane(const TriangleMesh& mesh, const Plane& plane, cons
   Box box;
   const Status checked = checkInput(mesh, plane, options, box);
   if (!checked) return checked.error();
-  Result<CutSurface> cut = cutOnce(mesh, plane, box, options);
+  if (options.snap > 0.0) {
+    TriangleMesh moved = mesh;
+    const std::vector<SnappedVertex> snapped = snapToPlane(moved, plane, options.snap);
+    Result<CutSurface> cut = cutOnce(moved, snapped, plane, box, options);
+    if (cut) return cut;
+  }
+  Result<CutSurface> cut = cutOnce(mesh, {}, plane, box, options);
   // Vertices used where they are, a little off the plane, can make a sound rim cross itself: a narrower band has fewer.
   CutOptions narrower = options;
   for (int retry = 0; retry < 2 && !cut && cut.error().code == ErrorCode::kUnsuitableShape; ++retry) {
     narrower.band *= 1e-2;
-    Result<CutSurface> again = cutOnce(mesh, plane, box, narrower);
+    Result<CutSurface> again = cutOnce(mesh, {}, plane, box, narrower);
     if (again) return again;
   }
   return cut;

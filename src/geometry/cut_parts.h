@@ -1,6 +1,7 @@
 // What the stages of a cut hand to each other. Private to geometry's cut_*.cpp.
 #pragma once
 
+#include "cut_snap.h"
 #include "meshless_surgery/geometry/cut.h"
 #include "split_edges.h"
 
@@ -43,11 +44,12 @@ struct Untouched {
 /// that the cut makes. From first_inner on they lie inside the cap, off the rim.
 struct Workpiece {
   const TriangleMesh* mesh = nullptr;
-  Vec3 normal, center;              // the plane, its point near the mesh's middle
-  Vec3 axis_u, axis_v;              // orthonormal with the normal, right-handed
-  double spacing = 0.0;             // [m] mean edge length of the triangles that the plane crosses
-  std::vector<signed char> states;  // of the mesh's vertices: +1 above, -1 below, 0 on the plane
-  std::vector<Index> touched;       // the mesh's triangles that are in no part, ascending
+  const std::vector<SnappedVertex>* snapped = nullptr;  // those of its vertices that are not where they were
+  Vec3 normal, center;                                  // the plane, its point near the mesh's middle
+  Vec3 axis_u, axis_v;                                  // orthonormal with the normal, right-handed
+  double spacing = 0.0;                                 // [m] mean edge length of the triangles that the plane crosses
+  std::vector<signed char> states;                      // of the mesh's vertices: +1 above, -1 below, 0 on the plane
+  std::vector<Index> touched;                           // the mesh's triangles that are in no part, ascending
   Untouched untouched;
   Index mesh_vertices = 0, first_inner = kNoIndex;
   Points new_positions;                   // [m] of the vertices from mesh_vertices on
@@ -73,7 +75,8 @@ struct Workpiece {
 
 /// Rebases the plane, takes heights once and puts every triangle, whole or in parts, on its side.
 /// Refuses kMissed where no vertex is above or none below, kUnsuitableShape where the mesh is not closed and oriented.
-Result<Workpiece> splitAtPlane(const TriangleMesh& mesh, const Plane& plane, double relative_band, const Box& box);
+Result<Workpiece> splitAtPlane(const TriangleMesh& mesh, const std::vector<SnappedVertex>& snapped, const Plane& plane,
+                               double relative_band, const Box& box);
 
 /// Union-find over numbers, the lowest of a set its root.
 class Sets {

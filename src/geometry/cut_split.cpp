@@ -147,7 +147,9 @@ void renumberOnPlane(Workpiece& work, std::vector<Triangle>& triangles) {
 
 VertexOrigin Workpiece::originOf(Index vertex) const {
   if (vertex >= mesh_vertices) return new_origins[vertex - mesh_vertices];
-  return VertexOrigin::of(vertex);
+  const auto at = std::lower_bound(snapped->begin(), snapped->end(), vertex,
+                                   [](const SnappedVertex& s, Index v) { return s.vertex < v; });
+  return at != snapped->end() && at->vertex == vertex ? at->origin : VertexOrigin::of(vertex);
 }
 
 Index Workpiece::addVertex(const Vec3& position, const VertexOrigin& origin) {
@@ -165,13 +167,15 @@ Index Workpiece::addBetween(Index a, Index b, double s) {
   return addVertex(position(a) + s * (position(b) - position(a)), origin);
 }
 
-Result<Workpiece> splitAtPlane(const TriangleMesh& mesh, const Plane& plane, double relative_band, const Box& box) {
+Result<Workpiece> splitAtPlane(const TriangleMesh& mesh, const std::vector<SnappedVertex>& snapped, const Plane& plane,
+                               double relative_band, const Box& box) {
   Workpiece work;
   // Never below what rounding makes of a height: crumbs may lie far from the origin.
   const double farthest = box.empty() ? 0.0 : std::max(box.min.cwiseAbs().maxCoeff(), box.max.cwiseAbs().maxCoeff());
   const double band = std::max(relative_band * box.diagonal(), 1e-14 * farthest);
   const Vec3 middle = 0.5 * (box.min + box.max);
   work.mesh = &mesh;
+  work.snapped = &snapped;
   work.normal = plane.normal.normalized();
   // A plane given by a far point would cost digits at every vertex.
   work.center = middle - work.normal.dot(middle - plane.point) * work.normal;

@@ -67,8 +67,9 @@ struct Sums {
 };
 
 void expectSame(const Sums& a, const Sums& b) {
-  EXPECT_NEAR(a.volume, b.volume, 1e-9 * b.volume);
-  EXPECT_NEAR(a.rest_volume, b.rest_volume, 1e-9 * b.rest_volume);
+  // Vertices close to the blade are moved onto it.
+  EXPECT_NEAR(a.volume, b.volume, 5e-4 * b.volume);
+  EXPECT_NEAR(a.rest_volume, b.rest_volume, 5e-4 * b.rest_volume);
   EXPECT_NEAR(a.mass, b.mass, 1e-12 * b.mass);
   EXPECT_LT((a.centre - b.centre).norm(), 1e-12 * b.mass);
   EXPECT_LT((a.linear - b.linear).norm(), 1e-12 * b.mass);

@@ -28,6 +28,11 @@ struct CutOptions {
   double band = 1e-7;           // vertices closer to the plane than this times the bounds' diagonal lie on it
   std::uint32_t cap_patch = 1;  // the patch id of the new faces
 
+  // Vertices that the plane meets within this [m] along one of their edges are moved to where it does, if that leaves
+  // the surface's shape as it is: cuts then make no edges that are shorter. The pieces' volumes add up to that of the
+  // surface with its vertices moved. A cut that fails with it is done without.
+  double snap = 0.0;
+
   // Points inside the cap, at most so many, as far from each other as the vertices of the surface that is cut, or
   // farther where that would be more. None by default: who asks for them must know where to put vertices without
   // parents.
