@@ -220,14 +220,16 @@ struct Momentum {
   Vec3 centre = Vec3::Zero(), linear = Vec3::Zero(), angular = Vec3::Zero();
   Mat3 inertia = Mat3::Zero();
 };
+const Vec3& startOf(const LimitedBody& body, Index i) { return body.from.empty() ? body.previous[i] : body.from[i]; }
+
 Momentum momentumOf(const std::vector<LimitedBody>& bodies, const std::vector<Index>& members) {
   Momentum all;
-  const Vec3& origin = bodies[members.front()].previous[0];
+  const Vec3& origin = startOf(bodies[members.front()], 0);
   Mat3 moment = Mat3::Zero();
   for (const Index b : members)
     for (Index i = 0; i < bodies[b].particles; ++i) {
       const double m = 1.0 / bodies[b].inverse_masses[i];
-      const Vec3 arm = bodies[b].previous[i] - origin, way = m * (bodies[b].positions[i] - bodies[b].previous[i]);
+      const Vec3 arm = startOf(bodies[b], i) - origin, way = m * (bodies[b].positions[i] - startOf(bodies[b], i));
       all.mass += m;
       all.centre += m * arm;
       all.linear += way;
@@ -246,7 +248,7 @@ void moveTogether(std::vector<LimitedBody>& bodies, const std::vector<Index>& me
                   const Vec3& shift, const Vec3& turn) {
   for (const Index b : members)
     for (Index i = 0; i < bodies[b].particles; ++i)
-      bodies[b].positions[i] += shift + turn.cross(bodies[b].previous[i] - centre);
+      bodies[b].positions[i] += shift + turn.cross(startOf(bodies[b], i) - centre);
 }
 
 }  // namespace

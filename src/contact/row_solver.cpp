@@ -6,12 +6,11 @@
 namespace meshless {
 namespace {
 
-constexpr double kOutTime = 0.03;  // [s] in which an overlap falls to 1/e: what is removed slowly gains no speed
-constexpr double kOutStiffness =
-    800.0;                           // of it, over the inertia that it moves: impulses end where two can't both be met
+constexpr double kOutTime = 0.03;    // [s] in which an overlap falls to 1/e
+constexpr double kOutSpeed = 0.5;    // [1/s] mean edges: overlap is removed no faster
+constexpr double kSoft = 0.9;        // of what a row asks for, it gets: rows that want the opposite meet in the middle
 constexpr int kMostSweeps = 4;       // of a substep
 constexpr double kTolerance = 1e-3;  // mean edges: sweeps end where no row was corrected by more
-constexpr double kOutSpeed = 0.5;    // [1/s] mean edges: overlap is removed no faster
 
 // Two registers of any x86-64; what is wider goes through memory where it is not there.
 using Two = double __attribute__((vector_size(16), may_alias));
@@ -55,18 +54,23 @@ class Solver {
 
   /// With what groups have moved.
   Vec3 sumNow(const Active& active) const {
-    Vec3 total = sum(*active.row, active.entries, active.a, active.b, false);
-    total += leversMoved(bodies_[active.a], active.levers, active.middle);
-    return active.b == kNoIndex ? total : Vec3(total + leversMoved(bodies_[active.b], active.middle, active.end));
+    return sum(*active.row, active.entries, active.a, active.b, false) + moved(active);
   }
 
-  void activate(ContactRow& row, const RowEntry* entries, Index a, Index b, const Vec3& way, double h) {
-    Active active;
+  /// By what groups have moved.
+  Vec3 moved(const Active& active) const {
+    Vec3 total = leversMoved(bodies_[active.a], active.levers, active.middle);
+    if (active.b != kNoIndex) total += leversMoved(bodies_[active.b], active.middle, active.end);
+    return total;
+  }
+
+  /// Where its bodies can answer a row. start: [m] of its sum.
+  bool meet(ContactRow& row, const RowEntry* entries, Index a, Index b, const Vec3& start, Active& active) {
     active.row = &row;
     active.entries = entries;
     active.a = a;
     active.b = b;
-    active.start = sum(row, entries, a, b, true) + way;  // friction is about the motion relative to what moves
+    active.start = start;
     active.levers = static_cast<Index>(scratch_.levers.size());
     const auto each = [entries](Index begin, Index end, const auto& visit) {
       for (Index k = begin; k < end; ++k) visit(entries[k].particle, entries[k].coefficient);
@@ -89,28 +93,67 @@ class Solver {
       // Of all directions together: none across answers more.
       active.sideways += straight + body.rigid_share * lever.arm.squaredNorm() * motion.inverse_inertia.trace();
     }
-    if (!canAnswer(answer, farthest)) {
+    active.mass = 1.0 / answer;
+    if (canAnswer(answer, farthest)) return true;
+    scratch_.levers.resize(active.levers);
+    return false;
+  }
+
+  void activate(ContactRow& row, const RowEntry* entries, Index a, Index b, const Vec3& way, double h) {
+    Active active;
+    // Friction is about the motion relative to what moves.
+    if (!meet(row, entries, a, b, sum(row, entries, a, b, true) + way, active)) {
       row.impulse.setZero();
-      scratch_.levers.resize(active.levers);
       return;
     }
     const double gap = row.normal.dot(active.start) + row.constant;
-    active.target = row.bounce * h;
-    active.mass = 1.0 / answer;
-    active.keep = 0.0;
-    if (row.bounce > 0.0) {
-      active.target += gap;
-    } else if (gap < 0.0) {
-      active.target = gap + h * std::min(-gap / kOutTime, kOutSpeed * bodies_[a].edge_length);
-      active.keep = 1.0 / (1.0 + kOutStiffness);
-      active.mass = (1.0 - active.keep) / answer;
-    }
+    active.target = std::min(gap, 0.0);
+    if (row.bounce > 0.0) active.target = gap + row.bounce * h;
     scratch_.active.push_back(active);
   }
 
+  /// Takes a part of what overlaps away, at the start of the substep as at its end: that gives no speed, and where two
+  /// overlaps push against each other nothing builds up.
+  void letOut(ContactRow& row, const RowEntry* entries, Index a, Index b, const Vec3& way, double h) {
+    Active active;
+    const Vec3 start = sum(row, entries, a, b, true);
+    const double gap = row.normal.dot(start + way) + row.constant;
+    if (!(gap < 0.0) || row.bounce > 0.0) return;
+    const double out = h * std::min(-gap / kOutTime, kOutSpeed * bodies_[a].edge_length);
+    if (row.normal.dot(sum(row, entries, a, b, false)) + row.constant >= gap + out) return;  // they part
+    if (!meet(row, entries, a, b, start, active)) return;
+    active.target = row.normal.dot(start) + row.constant + out;
+    active.pressed = 0.0;
+    scratch_.active.push_back(active);
+  }
+
+  bool anyOut() const { return !scratch_.active.empty(); }
+
+  void letOut(bool backwards) {
+    std::vector<Active>& rows = scratch_.active;
+    for (int sweep = 0; sweep < kMostSweeps; ++sweep)
+      for (std::size_t n = 0; n < rows.size(); ++n) {
+        Active& active = rows[(sweep % 2 == 1) != backwards ? rows.size() - 1 - n : n];
+        const ContactRow& row = *active.row;
+        const Vec3 start = sum(row, active.entries, active.a, active.b, true) + moved(active);
+        const double lacking = active.target - row.normal.dot(start) - row.constant, before = active.pressed;
+        active.pressed = std::max(0.0, kSoft * (before + active.mass * lacking));
+        const Vec3 more = (active.pressed - before) * row.normal;
+        push(active, more);
+        pushSide(active.entries, row.begin, row.middle, bodies_[active.a], bodies_[active.a].before, more);
+        if (active.b != kNoIndex)
+          pushSide(active.entries, row.middle, row.end, bodies_[active.b], bodies_[active.b].before, more);
+      }
+    moveGroups(true);
+    rows.clear();
+    scratch_.levers.clear();
+  }
+
   void push(const Active& active, const Vec3& impulse) {
-    pushSide(active.entries, active.row->begin, active.row->middle, bodies_[active.a], impulse);
-    if (active.b != kNoIndex) pushSide(active.entries, active.row->middle, active.row->end, bodies_[active.b], impulse);
+    const SolverBody& a = bodies_[active.a];
+    pushSide(active.entries, active.row->begin, active.row->middle, a, a.now, impulse);
+    if (active.b != kNoIndex)
+      pushSide(active.entries, active.row->middle, active.row->end, bodies_[active.b], bodies_[active.b].now, impulse);
     pushLevers(bodies_[active.a], active.levers, active.middle, impulse);
     if (active.b != kNoIndex) pushLevers(bodies_[active.b], active.middle, active.end, impulse);
   }
@@ -132,7 +175,7 @@ class Solver {
     const double gap = row.normal.dot(now) + row.constant, pressed = row.normal.dot(row.impulse);
     // Nobody who is not dragged goes farther than an edge in a substep: more than that is not asked for at once.
     const double lacking = std::min(active.target - gap, bodies_[active.a].edge_length);
-    const double press = std::max(0.0, pressed + active.mass * lacking - active.keep * pressed);
+    const double press = std::max(0.0, pressed + active.mass * lacking);
     Vec3 slid = now - active.start;
     slid -= row.normal.dot(slid) * row.normal;
     Vec3 across = row.impulse - pressed * row.normal - slid / active.sideways;
@@ -186,12 +229,15 @@ class Solver {
     pushLevers(body, pull.levers, pull.end, more);
   }
 
-  /// What groups have been moved by goes to their particles.
-  void moveGroups(const std::vector<SpringRow>& springs) {
+  /// What groups have been moved by goes to their particles, and to where those were, if wanted.
+  void moveGroups(bool both) {
     for (const Active& active : scratch_.active)
       for (const Index b : {active.a, active.b})
-        if (b != kNoIndex) moveGroups(bodies_[b]);
-    for (const SpringRow& spring : springs) moveGroups(bodies_[spring.body]);
+        if (b != kNoIndex) moveGroups(bodies_[b], both);
+  }
+  void moveGroups(const std::vector<SpringRow>& springs) {
+    moveGroups(false);
+    for (const SpringRow& spring : springs) moveGroups(bodies_[spring.body], false);
   }
 
  private:
@@ -205,11 +251,12 @@ class Solver {
     }
   }
 
-  static void pushSide(const RowEntry* entries, Index begin, Index end, SolverBody& body, const Vec3& impulse) {
+  static void pushSide(const RowEntry* entries, Index begin, Index end, const SolverBody& body, Slot* slots,
+                       const Vec3& impulse) {
     if (!body.moves) return;
     const Four way = four(Vec3((1.0 - body.rigid_share) * impulse));
     for (Index k = begin; k < end; ++k) {
-      Slot& slot = body.now[entries[k].particle];
+      Slot& slot = slots[entries[k].particle];
       four(slot) += entries[k].coefficient * slot.inverse_mass * way;
     }
   }
@@ -254,15 +301,17 @@ class Solver {
     }
   }
 
-  static void moveGroups(SolverBody& body) {
+  static void moveGroups(SolverBody& body, bool both) {
     for (Index g = 0; g < body.motions.size(); ++g) {
       GroupMotion& motion = body.motions[g];
       if (!motion.current) continue;
       motion.current = false;
       for (Index k = body.groups->offsets[g]; k < body.groups->offsets[g + 1]; ++k) {
         const Index i = body.groups->members[k];
-        four(body.now[i]) += four(
+        const Four way = four(
             Vec3(body.groups->weights[k] * (motion.shift + motion.turn.cross(at(body.before[i]) - motion.centre))));
+        four(body.now[i]) += way;
+        if (both) four(body.before[i]) += way;
       }
     }
   }
@@ -270,6 +319,12 @@ class Solver {
   std::vector<SolverBody>& bodies_;
   SolverScratch& scratch_;
 };
+
+/// Of a particle, times h.
+Vec3 angularMomentum(const SolverBody& body, Index i) {
+  const Vec3 from = at(body.before[i]);
+  return from.cross(at(body.now[i]) - from) / body.now[i].inverse_mass;
+}
 
 // Rows act at both ends of what is between them: across it an impulse is a couple. Bodies get it back as a spin.
 void spinBack(SolverBody& body) {
@@ -299,22 +354,36 @@ void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& spri
                const SolverStep& step, const std::vector<Index>& free, SolverScratch& scratch,
                SolverCounters& counters) {
   Solver solver(bodies, scratch);
+  const auto wayOf = [&step](const ContactRow& row) {
+    return row.kind == FeaturePair::Kind::kSphere ? Vec3(step.sphere_to - step.sphere_from) : Vec3(Vec3::Zero());
+  };
   for (const SolverRows& rows : sets) {
     const RowEntry* const entries = rows.set->entries.data();
     for (ContactRow& row : rows.set->rows) {
-      Vec3 way = Vec3::Zero();
       if (row.kind == FeaturePair::Kind::kSphere) {  // its tangent plane goes along and turns
-        way = step.sphere_to - step.sphere_from;
         const Vec3 from = solver.sum(row, entries, rows.a, rows.b, true) - step.sphere_from;
         const double distance = from.norm();
         if (distance > 0.0) row.normal = from / distance;
         row.constant = row.rise - row.normal.dot(step.sphere_to) - step.sphere_radius;
       }
-      if (row.impulse.isZero(0.0) &&
-          row.normal.dot(solver.sum(row, entries, rows.a, rows.b, false)) + row.constant > 0.0)
-        continue;
-      solver.activate(row, entries, rows.a, rows.b, way, step.h);
+      solver.letOut(row, entries, rows.a, rows.b, wayOf(row), step.h);
     }
+  }
+  if (!free.empty() && solver.anyOut()) {  // what is moved sideways takes angular momentum along
+    for (const Index b : free)
+      for (Index i = 0; i < bodies[b].particles; ++i) bodies[b].leaked -= angularMomentum(bodies[b], i);
+    solver.letOut(step.number % 2 == 1);
+    for (const Index b : free)
+      for (Index i = 0; i < bodies[b].particles; ++i) bodies[b].leaked += angularMomentum(bodies[b], i);
+  } else {
+    solver.letOut(step.number % 2 == 1);
+  }
+  for (const SolverRows& rows : sets) {
+    const RowEntry* const entries = rows.set->entries.data();
+    for (ContactRow& row : rows.set->rows)
+      if (!row.impulse.isZero(0.0) ||
+          !(row.normal.dot(solver.sum(row, entries, rows.a, rows.b, false)) + row.constant > 0.0))
+        solver.activate(row, entries, rows.a, rows.b, wayOf(row), step.h);
   }
   for (const SpringRow& spring : springs) solver.activate(spring);
   counters.active += scratch.active.size();

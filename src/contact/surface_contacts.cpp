@@ -568,12 +568,13 @@ bool SurfaceContacts::findAgain(Island& island, const SurfaceScene& scene, const
 }
 
 void SurfaceContacts::solveIsland(Index island_number, SolverStep step, int number, const SurfaceScene& scene,
-                                  const std::vector<Collider>& colliders, const std::vector<const Vec3*>& previous,
+                                  const std::vector<Collider>& colliders, const std::vector<Vec3*>& previous,
                                   std::vector<SpringRow>& springs, SolverScratch& scratch, LimitScratch& limit_scratch,
                                   SolverCounters& counters, const ForEach& for_each) {
   Island& island = islands_[island_number];
   if (island.pairs.empty() && springs.empty()) return;
   step.warm = number == 0 ? step.h * step.h : 1.0;
+  step.number = number;
   runEach(for_each, island.bodies.size(), [&](std::size_t n) {
     const Index b = island.bodies[n];
     SolverBody& body = solver_bodies_[b];
@@ -594,12 +595,21 @@ void SurfaceContacts::solveIsland(Index island_number, SolverStep step, int numb
   runEach(for_each, island.bodies.size(), [&](std::size_t n) {
     const Index b = island.bodies[n];
     const SolverBody& body = solver_bodies_[b];
-    for (Index i = 0; i < body.particles; ++i)
-      limited_[b].positions[i] = Vec3(body.now[i].x, body.now[i].y, body.now[i].z);
+    const auto placeOf = [](const Slot& slot) { return Vec3(slot.x, slot.y, slot.z); };
+    for (Index i = 0; i < body.particles; ++i) limited_[b].positions[i] = placeOf(body.now[i]);
+    limited_[b].from.clear();
+    if (!island.free.empty())
+      for (Index i = 0; i < body.particles; ++i) limited_[b].from.push_back(placeOf(body.before[i]));
   });
   counters.found_again += findAgain(island, scene, colliders, number * step.h, step.h, for_each);
   counters.limited +=
       limitMotion(island.watched, limited_, island.bodies, !island.free.empty(), limit_scratch, for_each);
+  // Only now: the whole way is limited, but what was let out gains no speed.
+  runEach(for_each, island.bodies.size(), [&](std::size_t n) {
+    const SolverBody& body = solver_bodies_[island.bodies[n]];
+    for (Index i = 0; i < body.particles; ++i)
+      previous[n][i] = Vec3(body.before[i].x, body.before[i].y, body.before[i].z);
+  });
 }
 
 Vec3 SurfaceContacts::sphereImpulse(Index island) const {
@@ -715,7 +725,7 @@ std::size_t SurfaceContacts::bytes() const {
   for (const auto& [key, way] : ways_) sum += kNode + sizeof way + bytesOf(way.last, way.offsets);
   for (const SolverBody& body : solver_bodies_) sum += bytesOf(body.motions);
   for (const LimitedBody& body : limited_)
-    sum += bytesOf(body.watched, body.vertices, body.ways, body.edited, body.is_watched);
+    sum += bytesOf(body.from, body.watched, body.vertices, body.ways, body.edited, body.is_watched);
   for (const std::vector<Island>* islands : {&islands_, &spare_islands_})
     for (const Island& island : *islands)
       sum += bytesOf(island.bodies, island.free, island.pairs, island.rows, island.watched);

@@ -114,7 +114,7 @@ struct SurfaceWork {
   std::vector<WorldBody*> bodies;
   std::vector<Pick*> picks;
   int substeps = 1;
-  std::vector<const Vec3*> previous;  // [m] one a body
+  std::vector<Vec3*> previous;  // [m] one a body
   std::vector<SpringRow> springs;     // one a pick
   SolverScratch solver_scratch;
   LimitScratch limit_scratch;

@@ -228,6 +228,48 @@ TEST(RowSolver, AGapThatAlmostAllHeldParticlesLackThrowsNobody) {
   }
 }
 
+// One overlap fades at no speed; where two push against each other nobody moves, and no impulse builds up that would
+// throw who is between them once they part.
+TEST(RowSolver, OverlapsFadeWithoutSpeedAndBuildNothingUp) {
+  for (const bool jammed : {false, true}) {
+    RowSet set;
+    for (int n = 0; n < (jammed ? 2 : 1); ++n) {
+      ContactRow row;
+      row.normal = n == 0 ? Vec3(Vec3::UnitZ()) : Vec3(-Vec3::UnitZ());
+      row.constant = -1e-3;
+      row.begin = static_cast<Index>(n);
+      row.middle = row.end = row.begin + 1;
+      set.entries.push_back({1.0, 0});
+      set.rows.push_back(row);
+    }
+    std::vector<Slot> now(1), before(1);
+    now[0].inverse_mass = before[0].inverse_mass = 1.0;
+    std::vector<SolverBody> bodies(1);
+    bodies[0].now = now.data();
+    bodies[0].before = before.data();
+    bodies[0].particles = 1;
+    bodies[0].edge_length = 0.01;
+    std::vector<SpringRow> springs;
+    SolverStep step;
+    step.h = 1e-3;
+    SolverScratch scratch;
+    SolverCounters counters;
+    double last = 0.0;
+    for (int n = 0; n < 600; ++n) {
+      step.number = n;
+      solveRows({{&set, 0, kNoIndex}}, springs, bodies, step, {}, scratch, counters);
+      EXPECT_EQ(now[0].z, before[0].z);  // no speed
+      for (const ContactRow& row : set.rows) EXPECT_LT(row.impulse.norm(), 1e-12);
+      EXPECT_LE(now[0].z - last, 0.5 * 0.01 * step.h * (1.0 + 1e-12));
+      last = now[0].z;
+    }
+    if (jammed)
+      EXPECT_LT(std::abs(last), 1e-4);
+    else
+      EXPECT_NEAR(last, 1e-3, 1e-5);
+  }
+}
+
 TEST(RowSolver, RowsPressAndNeverPull) {
   for (const double share : {0.0, 0.9}) {
     Clash clash(share, 0.5);

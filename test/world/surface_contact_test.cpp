@@ -766,7 +766,9 @@ TEST_P(SlowedBodies, ComeToRestWhereEnoughSubstepsWouldBringThem) {
   for (const int most : {meets ? 10 : 6, meets ? 5 : 3}) {
     const double found = restingAt(GetParam(), most, factor);
     EXPECT_LT(factor, 0.5);
-    EXPECT_NEAR(found, expected, 0.02 * std::abs(expected)) << most << " substeps, factor " << factor;
+    // In the stack, 3 % are 13 um: how deep rows lie in each other, too, depends a little on the substeps.
+    EXPECT_NEAR(found, expected, (scene == "stacked" ? 0.03 : 0.02) * std::abs(expected))
+        << most << " substeps, factor " << factor;
   }
 }
 

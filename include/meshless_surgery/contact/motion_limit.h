@@ -21,6 +21,7 @@ struct LimitedBody {
   const Vec3* offsets = nullptr;   // [m] of vertices from the sum of their supports; null: none
   Vec3* positions = nullptr;       // [m]
   const Vec3* previous = nullptr;  // [m] at the start of the substep
+  Points from;                     // [m] the same, from where it gets its speed; empty: that is all the same
   Index particles = 0;
   bool moves = true;
   const double* inverse_masses = nullptr;  // [1/kg] 0: held

@@ -15,8 +15,8 @@ struct alignas(32) Slot {
 
 /// A body in a substep; what it points to has to live as long.
 struct SolverBody {
-  Slot* now = nullptr;           // moved
-  const Slot* before = nullptr;  // at the start of the substep
+  Slot* now = nullptr;     // moved
+  Slot* before = nullptr;  // at the start of the substep; moved where overlaps are let out, which gives no speed
   Index particles = 0;
   bool moves = true;
   double edge_length = 0.0;             // [m] mean
@@ -44,6 +44,7 @@ struct SpringRow {
 
 struct SolverStep {
   double h = 0.0;     // [s] of the substep
+  int number = 0;     // of it: those who want the opposite take turns at the last word
   double warm = 1.0;  // what the impulses of the last substep are worth in this one: (h / its h)^2
   Vec3 sphere_from = Vec3::Zero(), sphere_to = Vec3::Zero();  // [m] centre, at the start and the end of the substep
   double sphere_radius = 0.0;                                 // [m]
@@ -79,7 +80,8 @@ struct SolverScratch {
     Index levers, middle, end;  // of a, then of b
     Vec3 start;                 // [m] sum of coefficient x at the start of the substep
     double target;              // [m] gap that is asked for at least
-    double mass, keep;          // [kg] impulse for a gap that is 1 m short, and what goes of the impulse meanwhile
+    double mass;                // [kg] impulse for a gap that is 1 m short
+    double pressed;             // [kg m] what lets an overlap out
     double sideways;            // [1/kg] across the normal
   };
   struct Pull {

@@ -83,9 +83,10 @@ class SurfaceContacts {
   /// as rigid bodies. None where it is not said.
   void setRigidShare(Index collider, const RigidGroups* groups, double share);
   /// After the bodies of an island have moved by a substep, the number-th of the frame. previous: [m] at its start, one
-  /// a particle of each body of the island. step.warm is set here. scene, colliders: as find() got them.
+  /// a particle of each body of the island. step.warm and step.number are set here. scene, colliders: as find() got
+  /// them.
   void solveIsland(Index island, SolverStep step, int number, const SurfaceScene& scene,
-                   const std::vector<Collider>& colliders, const std::vector<const Vec3*>& previous,
+                   const std::vector<Collider>& colliders, const std::vector<Vec3*>& previous,
                    std::vector<SpringRow>& springs, SolverScratch& scratch, LimitScratch& limit_scratch,
                    SolverCounters& counters, const ForEach& for_each = oneAfterAnother);
   /// [kg m] that the push sphere gave the bodies of an island in the last substep.
