@@ -160,6 +160,7 @@ class Limit {
     // A feature that has come to touch is on the side where it was.
     if (!(met.distance > pairs.touching)) {
       watched.least = -pairs.touching;
+      faceEachOther(pairs, watched, met, start);
       const double now = alongNormal(watched, met, end);
       return now < watched.least && now < alongNormal(watched, met, start);
     }
@@ -176,6 +177,20 @@ class Limit {
     if (watched.of_a == 1)
       return n.dot(of_a[v[0]]) - std::max({n.dot(of_b[v[1]]), n.dot(of_b[v[2]]), n.dot(of_b[v[3]])});
     return std::min(n.dot(of_a[v[0]]), n.dot(of_a[v[1]])) - std::max(n.dot(of_b[v[2]]), n.dot(of_b[v[3]]));
+  }
+
+  /// What touches is on one side of the plane of the face, or of both edges: what was between them once may lie along
+  /// it where they met elsewhere.
+  static void faceEachOther(const WatchedPairs& pairs, WatchedFeatures& watched, const PairDistance& at,
+                            const std::array<Vec3, 4>& corners) {
+    if (std::find(at.shares.begin(), at.shares.end(), 0.0) != at.shares.end()) return;  // at an end
+    const bool of_face = watched.of_a == 1;
+    const Vec3 across = of_face ? (corners[2] - corners[1]).cross(corners[3] - corners[1])
+                                : (corners[1] - corners[0]).cross(corners[3] - corners[2]);
+    const double length = across.norm();
+    if (!(length > 0.0)) return;
+    const bool same = (of_face && pairs.closed) || across.dot(watched.normal) >= 0.0;
+    watched.normal = across / (same ? length : -length);
   }
 
   static double alongNormal(const WatchedFeatures& watched, const PairDistance& at,

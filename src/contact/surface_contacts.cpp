@@ -386,7 +386,8 @@ void SurfaceContacts::listOf(Island& island, const std::vector<Collider>& collid
     if (!pair.watched.features.empty())
       island.watched.push_back(
           {&pair.watched, pair.a, pair.b,
-           touchingDistance(std::min(colliders[pair.a].edge_length, colliders[pair.b].edge_length))});
+           touchingDistance(std::min(colliders[pair.a].edge_length, colliders[pair.b].edge_length)),
+           colliders[pair.b].surface->closed});
   }
   listWatched(island);
 }

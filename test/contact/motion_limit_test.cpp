@@ -238,9 +238,31 @@ TEST(MotionLimit, WhatComesToTouchInAFrameIsNotLetThroughInTheNextSubsteps) {
   for (int substep = 0; substep < 8; ++substep) {
     two.positions[0][0].z() -= 0.02;
     limitMotion({{&two.set, 0, 1, 1e-3}}, two.bodies, {0, 1}, false, scratch);
-    if (!(two.positions[0][0].z() > -1e-3))
-      GTEST_SKIP() << "through in substep " << substep << ", to " << two.positions[0][0].z();
+    ASSERT_GT(two.positions[0][0].z(), -1e-3) << "substep " << substep;
     two.previous[0] = two.positions[0];
+  }
+}
+
+// It touches one face, slides along it over the next, and is pressed into that. What touches may be inside a little.
+TEST(MotionLimit, WhatSlidesFromFaceToFaceIsHeldByTheNext) {
+  constexpr double kTouching = 1e-3;
+  for (const double height : {0.5 * kTouching, -0.5 * kTouching}) {
+    SCOPED_TRACE(height);
+    Two two({Vec3(-1.5 * kTouching, 0.3, height)}, {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(-1, 0, 0)});
+    for (double& w : two.inverse[1]) w = 0.0;
+    two.watch({0, 0, 1, 2}, 1);
+    two.watch({0, 0, 2, 3}, 1);
+    two.set.features[1].normal = Vec3::UnitZ();
+    two.set.features[1].least = -kTouching;
+    two.set.start();
+    LimitScratch scratch;
+    for (int substep = 0; substep < 8; ++substep) {
+      two.positions[0][0] += substep == 0 ? Vec3(1.6 * kTouching, 0, 0) : Vec3(0, 0, -0.02);
+      limitMotion({{&two.set, 0, 1, kTouching, true}}, two.bodies, {0, 1}, false, scratch);
+      ASSERT_GT(two.positions[0][0].z(), -kTouching) << "substep " << substep;
+      two.previous[0] = two.positions[0];
+    }
+    EXPECT_GT(two.positions[0][0].x(), 0.0) << "it came over the next";
   }
 }
 

@@ -84,6 +84,7 @@ struct WatchedPairs {
   WatchedSet* set = nullptr;
   Index a = 0, b = 0;
   double touching = 0.0;  // [m] nearer than this nothing tells the sides
+  bool closed = false;    // b: its faces know where out is
 };
 
 /// Scratch of one thread.
