@@ -37,7 +37,6 @@ double deepest(const Seen& seen) {
 }
 
 TEST(SurfacePieces, AnOrganCutTwiceKeepsItsPiecesWholeAndApart) {
-  std::string known;
   for (const std::uint64_t seed : {1, 3}) {  // lobes of 2 fall into each other: self-contact is off by default
     SCOPED_TRACE(seed);
     const Result<TriangleMesh> mesh = randomOrgan(seed, 0, 0.2, 1500);
@@ -66,16 +65,14 @@ TEST(SurfacePieces, AnOrganCutTwiceKeepsItsPiecesWholeAndApart) {
     EXPECT_GE(now.bodies.size(), 3u);
     for (const SeenBody& body : now.bodies) {
       const double ratio = signedVolume(body.surface) / body.rest_volume;
-      EXPECT_GT(ratio, 0.6) << body.name;
+      EXPECT_GT(ratio, 0.85) << body.name;
       EXPECT_LT(ratio, 1.1) << body.name;
-      if (!(ratio > 0.85)) known += body.name + " has " + std::to_string(ratio) + " of its volume; ";
     }
     EXPECT_LT(deepest(now), 0.001);
     EXPECT_FALSE(depthLaw(now).broken()) << depthLaw(now).text;
     EXPECT_FALSE(crossingLaw(now).broken()) << crossingLaw(now).text;
     EXPECT_EQ(now.mended, 0u);
   }
-  if (!known.empty()) GTEST_SKIP() << known;
 }
 
 }  // namespace
