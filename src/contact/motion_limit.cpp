@@ -120,19 +120,22 @@ class Limit {
   void hold(bool all) {
     for (const Index b : members_)
       if (all) {
-        std::copy(bodies_[b].previous, bodies_[b].previous + bodies_[b].particles, bodies_[b].positions);
-        std::fill(bodies_[b].edited.begin(), bodies_[b].edited.end(), 1);
+        for (Index i = 0; i < bodies_[b].particles; ++i) hold(bodies_[b], i);
       }
     for (const LimitScratch::Meeting& meeting : scratch_.meeting) {
       const WatchedPairs& pairs = pairs_[meeting.pairs];
-      eachSupport(pairs, pairs.set->features[meeting.features], [&](Index body, Index particle, std::size_t, double) {
-        bodies_[body].positions[particle] = bodies_[body].previous[particle];
-        bodies_[body].edited[particle] = 1;
-      });
+      eachSupport(pairs, pairs.set->features[meeting.features],
+                  [&](Index body, Index particle, std::size_t, double) { hold(bodies_[body], particle); });
     }
   }
 
  private:
+  static void hold(LimitedBody& body, Index particle) {
+    body.positions[particle] = body.previous[particle];
+    if (!body.from.empty()) body.from[particle] = body.previous[particle];
+    body.edited[particle] = 1;
+  }
+
   void find(std::size_t n) {
     const WatchedPairs& pairs = pairs_[n];
     const LimitedBody &a = bodies_[pairs.a], &b = bodies_[pairs.b];

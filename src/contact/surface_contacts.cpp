@@ -599,17 +599,15 @@ void SurfaceContacts::solveIsland(Index island_number, SolverStep step, int numb
     const auto placeOf = [](const Slot& slot) { return Vec3(slot.x, slot.y, slot.z); };
     for (Index i = 0; i < body.particles; ++i) limited_[b].positions[i] = placeOf(body.now[i]);
     limited_[b].from.clear();
-    if (!island.free.empty())
-      for (Index i = 0; i < body.particles; ++i) limited_[b].from.push_back(placeOf(body.before[i]));
+    for (Index i = 0; i < body.particles; ++i) limited_[b].from.push_back(placeOf(body.before[i]));
   });
   counters.found_again += findAgain(island, scene, colliders, number * step.h, step.h, for_each);
   counters.limited +=
       limitMotion(island.watched, limited_, island.bodies, !island.free.empty(), limit_scratch, for_each);
   // Only now: the whole way is limited, but what was let out gains no speed.
   runEach(for_each, island.bodies.size(), [&](std::size_t n) {
-    const SolverBody& body = solver_bodies_[island.bodies[n]];
-    for (Index i = 0; i < body.particles; ++i)
-      previous[n][i] = Vec3(body.before[i].x, body.before[i].y, body.before[i].z);
+    const Points& from = limited_[island.bodies[n]].from;
+    std::copy(from.begin(), from.end(), previous[n]);
   });
 }
 

@@ -266,5 +266,21 @@ TEST(MotionLimit, WhatSlidesFromFaceToFaceIsHeldByTheNext) {
   }
 }
 
+// A start that was moved with the end, to let something out without speed, counts no more for what stays where it was.
+TEST(MotionLimit, WhatIsHeldHasNoSpeed) {
+  Two two({Vec3(0.2, 0.2, 0.0)},
+          {Vec3(0, 0, -0.1), Vec3(1, 0, -0.1), Vec3(0, 1, -0.1), Vec3(0, 0, 0.1), Vec3(1, 0, 0.1), Vec3(0, 1, 0.1)});
+  for (double& w : two.inverse[1]) w = 0.0;  // they close on it, and it cannot move them
+  for (Vec3& p : two.positions[1]) p.z() = -p.z();
+  two.watch({0, 0, 1, 2}, 1);
+  two.watch({0, 3, 4, 5}, 1);
+  two.positions[0][0].z() = 0.03;
+  for (int n = 0; n < 2; ++n) two.bodies[n].from = two.previous[n];
+  two.bodies[0].from[0].z() = 0.03;
+  EXPECT_EQ(two.limit(), 2u);
+  EXPECT_EQ(two.positions[0][0], two.previous[0][0]);
+  EXPECT_EQ(two.bodies[0].from[0], two.positions[0][0]);
+}
+
 }  // namespace
 }  // namespace meshless
