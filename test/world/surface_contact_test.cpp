@@ -688,7 +688,8 @@ TEST(SurfaceContact, ASphereOnHeldTissueFlingsNothingAway) {
     double farthest = 0.0;
     for (int n = 0; n < 30; ++n) {
       world.step();
-      for (const Vec3& p : seen(world).bodies[0].surface)
+      const WorldSnapshot now = seen(world);
+      for (const Vec3& p : now.bodies[0].surface)
         farthest = std::max(farthest, (p - p.cwiseMax(hung.min).cwiseMin(hung.max)).norm());
     }
     EXPECT_LT(farthest, 2.0 * push.radius) << seed;
