@@ -377,32 +377,12 @@ void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
   }
 }
 
-// A corner that is inside must be free to come out past the vertices that its face is watched with.
-void SurfaceContacts::freeInside(Pair& pair) {
-  const auto other = known_.find({pair.key_b, pair.key_a, Kind::kVertexFace});
-  if (other == known_.end()) return;
-  const std::vector<RememberedSide>& sides = other->second->sides;
-  const auto isInside = [&](Index v) {
-    const auto at = std::lower_bound(sides.begin(), sides.end(), v,
-                                     [](const RememberedSide& side, Index vertex) { return side.vertex < vertex; });
-    return at != sides.end() && at->vertex == v && at->depth > 0.0;
-  };
-  std::vector<WatchedFeatures>& features = pair.watched.features;
-  const auto end = std::remove_if(features.begin(), features.end(), [&](const WatchedFeatures& watched) {
-    return std::any_of(watched.vertices.begin() + 1, watched.vertices.end(), isInside);
-  });
-  if (end == features.end()) return;
-  features.erase(end, features.end());
-  pair.watched.start();
-}
-
 void SurfaceContacts::listOf(Island& island, const std::vector<Collider>& colliders) {
   island.rows.clear();
   island.watched.clear();
   for (const Index n : island.pairs) {
     Pair& pair = *pairs_[n];
     if (!pair.set.rows.empty()) island.rows.push_back({&pair.set, pair.a, pair.b});
-    if (pair.kind == Kind::kVertexFace && pair.a != pair.b) freeInside(pair);
     if (!pair.watched.features.empty())
       island.watched.push_back(
           {&pair.watched, pair.a, pair.b,

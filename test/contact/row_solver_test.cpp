@@ -331,23 +331,6 @@ TEST(SurfaceContacts, RowsThatAreKeptDoTheSameAsRowsFoundAnew) {
   for (std::size_t n = 0; n < kept.size(); ++n) EXPECT_EQ(kept[n].impulse, found[n].impulse);
 }
 
-// A vertex beside a face that leads into its body would hold the face's corner inside.
-TEST(SurfaceContacts, FacesWithACornerInsideAreNotWatched) {
-  Clash clash(0.0, 0.5);
-  clash.stand();
-  Collider& c = clash.colliders[1];
-  c.bounds = Box();
-  for (Vec3& p : clash.before[1]) c.bounds.extend(p += Vec3(0.035, 0.0, -0.03));
-  const auto isInside = [&](Index v) { return (clash.before[1][v].array().abs() < 0.05).all(); };
-  SurfaceContacts contacts;
-  clash.find(contacts);
-  EXPECT_GT(contacts.rows(), 0u);
-  for (const WatchedPairs& pairs : contacts.islands()[0].watched)
-    for (const WatchedFeatures& features : pairs.set->features)
-      for (int k = features.of_a; k < 4 && pairs.a == 0; ++k)
-        EXPECT_FALSE(isInside(features.vertices[k])) << features.vertices[0];
-}
-
 TEST(SurfaceContacts, WhoHasMovedIsFoundAnew) {
   Clash clash(0.4, 0.5);
   clash.stand();

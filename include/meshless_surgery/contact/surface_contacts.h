@@ -150,7 +150,6 @@ class SurfaceContacts {
   void makeRows(const SurfaceScene& scene, const std::vector<Collider>& colliders, Scratch& scratch, Pair& pair) const;
   void listReached(const SurfaceScene& scene, const std::vector<Collider>& colliders);
   void joinIslands(const std::vector<Collider>& colliders);
-  void freeInside(Pair& pair);
   void listOf(Island& island, const std::vector<Collider>& colliders);
   void listWatched(const Island& island);
   void fillSlots(const std::vector<Collider>& colliders);
