@@ -7,13 +7,15 @@ add_test(NAME messages
   COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/test/messages_test.py)
 add_test(NAME package
   COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/test/package_test.py)
+add_test(NAME falls_short
+  COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/test/falls_short_test.py)
 add_test(NAME test_summary
   COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/scripts/lib/test_summary_test.py)
 add_test(NAME loopback_by_default
   COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/scripts/lib/environment_test.py)
 add_test(NAME check_arguments
   COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/scripts/lib/check_test.py)
-set_tests_properties(include_direction messages package test_summary loopback_by_default check_arguments PROPERTIES LABELS scripts)
+set_tests_properties(include_direction messages package falls_short test_summary loopback_by_default check_arguments PROPERTIES LABELS scripts)
 # The headers' own documentation, without a warning.
 add_test(NAME doxygen COMMAND ${CMAKE_COMMAND} -E env DOXYGEN_OUTPUT=${CMAKE_BINARY_DIR}/api
   doxygen ${CMAKE_CURRENT_SOURCE_DIR}/docs/Doxyfile WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
