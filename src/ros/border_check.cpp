@@ -58,10 +58,11 @@ Quat BorderCheck::rotation(const std::string& field, const geometry_msgs::Quater
   number(field + ".z", value.z, -kMaxCoordinate, kMaxCoordinate, "");
   number(field + ".w", value.w, -kMaxCoordinate, kMaxCoordinate, "");
   const Quat rotation(value.w, value.x, value.y, value.z);
+  if (rotation.coeffs().isZero(0.0)) return Quat::Identity();
   const double norm = rotation.norm();
   if (!(norm >= kMinQuaternionNorm && std::isfinite(norm))) {
     fault(field + " has the norm " + formatNumber(norm) + "; accepted: a quaternion x y z w of a norm of at least " +
-          formatNumber(kMinQuaternionNorm) + ", such as 0 0 0 1");
+          formatNumber(kMinQuaternionNorm) + ", such as 0 0 0 1, or all zeros for it");
     return Quat::Identity();
   }
   return rotation.normalized();
@@ -72,16 +73,6 @@ Pose BorderCheck::pose(const std::string& field, const geometry_msgs::Pose& valu
   checked.translation = point(field + ".position", value.position);
   checked.rotation = rotation(field + ".orientation", value.orientation);
   return checked;
-}
-
-Pose BorderCheck::pointPose(const std::string& field, const geometry_msgs::Pose& value) {
-  const auto& q = value.orientation;
-  if (q.x == 0.0 && q.y == 0.0 && q.z == 0.0 && q.w == 0.0) {
-    Pose unturned;
-    unturned.translation = point(field + ".position", value.position);
-    return unturned;
-  }
-  return pose(field, value);
 }
 
 std::string BorderCheck::newName(const std::string& field, const std::string& value) {

@@ -165,7 +165,7 @@ struct Services::Handlers : Answers {
     command.enable = request.enable;
     command.radius = check.number("radius", request.radius, 0.0, kMaxLength, "m");
     command.speed = check.number("speed", request.speed, 0.0, kMaxSpeed, "m/s");
-    const Pose pose = check.pointPose("pose.pose", request.pose.pose);
+    const Pose pose = check.pose("pose.pose", request.pose.pose);
     if (!check.ok()) return refuse(response, "push", check.error());
     if (request.enable) {
       const auto frame = frames.toWorld(request.pose.header);

@@ -67,8 +67,7 @@ void ToolInputs::hearWaiting(Input& input) {
   for (auto next = input.waiting.begin(); next != input.waiting.end();) {
     const geometry_msgs::PoseStamped& message = *next->message;
     BorderCheck check;
-    const Pose local =
-        input.tool == ToolKind::kScissors ? check.pose("pose", message.pose) : check.pointPose("pose", message.pose);
+    const Pose local = check.pose("pose", message.pose);
     const auto frame = check.ok() ? frames_.lookUp(message.header) : Result<Pose>(check.error());
     if (frame.ok()) {
       Pose pose;

@@ -10,6 +10,7 @@ import unittest
 import roslib.packages
 import rospy
 import rosunit
+from genpy.dynamic import generate_dynamic
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
 from meshless_surgery.msg import Event, State
 from meshless_surgery.srv import (Cut, GetBody, Hash, Incise, LoadState, Lock, MovePick, Pick, Probe, Push, Release, Remove,
@@ -24,6 +25,11 @@ TYPES = {
     'cut': Cut, 'open_scissors': Trigger, 'incise': Incise, 'spawn': Spawn, 'spawn_cloud': SpawnCloud, 'remove': Remove, 'set_material': SetMaterial, 'get_body': GetBody,
     'lift_scissors': Trigger, 'undo_cut': Trigger, 'probe': Probe, 'pause': SetBool, 'step': Step, 'reset': Trigger, 'save': SaveState, 'load': LoadState, 'hash': Hash,
 }
+HEADER = '=' * 80 + '\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n'
+# As in crtk_msgs, which is not needed: the topics' types and sums are the same.
+CRTK = generate_dynamic('crtk_msgs/operating_state', 'std_msgs/Header header\nstring state\nbool is_homed\nbool is_busy\n' + HEADER)
+CRTK.update(generate_dynamic('crtk_msgs/StringStamped', 'std_msgs/Header header\nstring string\n' + HEADER))
+OperatingState, StringStamped = CRTK['crtk_msgs/operating_state'], CRTK['crtk_msgs/StringStamped']
 # A bound for things that should have happened long before; no test measures time.
 LONG = 120.0
 
@@ -352,6 +358,9 @@ def run(name, *cases):
     files = [argument[len(flag):] for argument in sys.argv if argument.startswith(flag)]
     if files:
         result = rosunit.create_xml_runner('meshless_surgery', name, files[0]).run(suite)
+        for part, why in result.failures + result.errors:
+            if isinstance(part, unittest.case._SubTest):  # which the runner counts, and does not print
+                print('%s\n%s' % (part, why))
         rosunit.print_unittest_summary(result)
     else:
         result = unittest.TextTestRunner(verbosity=2).run(suite)

@@ -11,12 +11,12 @@ import time
 import rospy
 import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray
-from genpy.dynamic import generate_dynamic
 from geometry_msgs.msg import Point, PoseStamped, Quaternion, TransformStamped, Vector3
 from sensor_msgs.msg import JointState
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from deformer_support import ACROSS_X, LONG, InStepTestCase, pose_stamped, run  # noqa: E402
+from deformer_support import (ACROSS_X, LONG, InStepTestCase, OperatingState, StringStamped,  # noqa: E402
+                              pose_stamped, run)
 
 SPEED = 0.5      # [m/s] tools/pick/max_speed
 SILENCE = 0.5    # [s]
@@ -212,13 +212,6 @@ class StreamsTest(InStepTestCase):
             connections = self.publisher(topic, kind).impl.connections
             self.assertEqual(1, len(connections))
             self.assertNotEqual(0, connections[0].socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY), topic)
-
-
-HEADER = '=' * 80 + '\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n'
-# As in crtk_msgs, which is not needed: the topics' types and sums are the same.
-CRTK = generate_dynamic('crtk_msgs/operating_state', 'std_msgs/Header header\nstring state\nbool is_homed\nbool is_busy\n' + HEADER)
-CRTK.update(generate_dynamic('crtk_msgs/StringStamped', 'std_msgs/Header header\nstring string\n' + HEADER))
-OperatingState, StringStamped = CRTK['crtk_msgs/operating_state'], CRTK['crtk_msgs/StringStamped']
 
 
 class CrtkTest(InStepTestCase):

@@ -23,11 +23,9 @@ class BorderCheck {
   Vec3 point(const std::string& field, const geometry_msgs::Point& value);
   /// A direction: any finite vector, zero too.
   Vec3 direction(const std::string& field, const geometry_msgs::Vector3& value);
-  /// Normalised; a norm below kMinQuaternionNorm is a fault.
+  /// Normalised; all zeros were left out and are the identity. Another norm below kMinQuaternionNorm is a fault.
   Quat rotation(const std::string& field, const geometry_msgs::Quaternion& value);
   Pose pose(const std::string& field, const geometry_msgs::Pose& value);
-  /// For tools that are points: an orientation that was left out (all zero) is the identity.
-  Pose pointPose(const std::string& field, const geometry_msgs::Pose& value);
   /// A name for a new body: letters, digits and _ - . only, at most 100 characters.
   std::string newName(const std::string& field, const std::string& value);
   /// Names of bodies that should exist: at most 100 characters each, none empty.
