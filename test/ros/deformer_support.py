@@ -263,7 +263,7 @@ class InStepTestCase(DeformerTestCase):
     def setUpClass(cls):
         cls.clock = HandClock()
         scene = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'scenes', cls.scene + '.yaml')
-        cls.own = OwnNode(scene=scene, state_rate=1000.0, **cls.parameters)
+        cls.own = OwnNode(**{'scene': scene, 'state_rate': 1000.0, **cls.parameters})
         cls.node = cls.own.name
         cls.own.wait()
 

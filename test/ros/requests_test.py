@@ -6,18 +6,20 @@ import collections
 import glob
 import math
 import os
+import re
 import sys
 import tempfile
 import threading
 import time
 
-import actionlib
 import numpy as np
 import rosgraph
 import roslib.message
 import rospy
 import tf2_ros
 from geometry_msgs.msg import Point, PoseStamped, Quaternion, TransformStamped, Vector3
+from meshless_surgery import Refused, msg
+from meshless_surgery.goals import Goals
 from meshless_surgery.poses import blade_pose, quaternion_of_axes
 from sensor_msgs.msg import JointState, PointCloud2, PointField
 from shape_msgs.msg import SolidPrimitive
@@ -148,6 +150,10 @@ class Frames:
 # --- shapes
 
 
+def within(low, high):
+    return lambda found: isinstance(found, (int, float)) and low < found <= high
+
+
 def box(size=0.1):
     return SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[size] * 3)
 
@@ -158,15 +164,16 @@ def cloud_of(points, head=None):
                        row_step=24 * len(points), data=np.ascontiguousarray(points, dtype=np.float64).tobytes())
 
 
-def ball(points=2000):
+def ball(points=1000):
     """Of 0.05 m about (0.2, 0, 0.5)."""
     out = np.random.default_rng(1).normal(size=(points, 3))
     return 0.05 * out / np.linalg.norm(out, axis=1)[:, None] + (0.2, 0.0, 0.5)
 
 
 def cells(points, edge):
-    """How many of a grid have points."""
-    return len(np.unique(np.floor(np.float32(points) / np.float32(edge)), axis=0))
+    """How many of a grid have points; it may begin anywhere."""
+    count = len(np.unique(np.floor(points / edge), axis=0))
+    return within(0.95 * count, 1.05 * count)
 
 
 def diagonal(points):
@@ -202,7 +209,7 @@ def as_it_should_be(wanted, found):
     return wanted == found
 
 
-Refused = collections.namedtuple('Refused', 'code')
+Refusal = collections.namedtuple('Refusal', 'code')
 
 
 # --- the law of each field: with this value, and left out, something is as it should be
@@ -339,6 +346,10 @@ def points(test, answer):
     return answer.points
 
 
+def strays(test, answer):
+    return int(re.search(r'(\d+) were outliers', answer.message).group(1))
+
+
 def drawn_out(**fields):
     def prepare(test):
         pick = test.pick_left()
@@ -383,10 +394,6 @@ def later(test):
     return dict(topic='/late_camera')
 
 
-def within(low, high):
-    return lambda found: isinstance(found, (int, float)) and low < found <= high
-
-
 LAWS = [
     Law('cut', 'blades', FLAT['blades'], with_middle(), cut_bodies, ['left', 'right'], ['middle']),
     Law('cut', 'length', 0.2, FLAT, cut_bodies, ['left'], ['left', 'right']),
@@ -395,54 +402,53 @@ LAWS = [
     Law('cut', 'roughness', 0.005, FLAT, wound, (within(0.0002, 0.005), 1.0), (0.0, 1.0)),
     Law('cut', 'bodies', ['right'], FLAT, cut_bodies, ['right'], ['left', 'right']),
     Law('incise', 'blade', INTO_RIGHT['blade'], with_middle(length=0.06, depth=0.03), area, 0.06 * 0.03, 0.05 * 0.03),
-    Law('incise', 'length', 0.06, INTO_RIGHT, area, 0.06 * 0.03, Refused(INVALID)),
-    Law('incise', 'depth', 0.03, INTO_RIGHT, area, 0.06 * 0.03, Refused(INVALID)),
+    Law('incise', 'length', 0.06, INTO_RIGHT, area, 0.06 * 0.03, Refusal(INVALID)),
+    Law('incise', 'depth', 0.03, INTO_RIGHT, area, 0.06 * 0.03, Refusal(INVALID)),
     Law('incise', 'bodies', ['right'], dict(INTO_RIGHT, blade=blade_pose((-0.23, 0.0, 0.15), (1, 0, 0), (0, 0, 1)), length=0.46),
         cut_bodies, ['right'], ['left', 'right']),
     Law('pick', 'point', RAY['point'], RAY, body_of, 'left', 'right'),
     Law('pick', 'direction', Vector3(1, 0, 0), dict(point=BESIDE_LEFT, max_distance=0.1), body_of, 'right', 'left'),
     Law('pick', 'body', 'right', dict(point=Point(-1.0, 0.01, 0.1), direction=Vector3(1, 0, 0)), body_of, 'right', 'left'),
-    Law('pick', 'max_distance', 0.15, dict(point=Point(-0.35, 0.01, 0.1)), body_of, 'left', Refused(MISSED)),
+    Law('pick', 'max_distance', 0.15, dict(point=Point(-0.35, 0.01, 0.1)), body_of, 'left', Refusal(MISSED)),
     Law('pick', 'stiffness', 20.0, dict(point=Point(-0.24, 0.01, 0.1)), stiffness, within(15.0, 20.0), within(375.0, 500.0)),
-    Law('move_pick', 'pick_id', held, picked(target=Point(0, 0.1, 0.2)), target, (0.0, 0.1, 0.2), Refused(UNKNOWN)),
+    Law('move_pick', 'pick_id', held, picked(target=Point(0, 0.1, 0.2)), target, (0.0, 0.1, 0.2), Refusal(UNKNOWN)),
     Law('move_pick', 'target', Point(0, 0.1, 0.2), picked(), target, (0.0, 0.1, 0.2), (0.0, 0.0, 0.0)),
-    Law('lock', 'pick_id', held, picked(), locked, [True], Refused(UNKNOWN)),
+    Law('lock', 'pick_id', held, picked(), locked, [True], Refusal(UNKNOWN)),
     Law('lock', 'at_target', True, picked(target=Point(0, 0.1, 0.2)), from_the_grasp, within(0.1, 0.3), 0.0),
     Law('lock', 'target', Point(0, 0.1, 0.2), picked(at_target=True), target, (0.0, 0.1, 0.2), (0.0, 0.0, 0.0)),
-    Law('release', 'pick_id', held, picked(), locked, [], Refused(UNKNOWN)),
+    Law('release', 'pick_id', held, picked(), locked, [], Refusal(UNKNOWN)),
     Law('probe', 'point', RAY['point'], RAY, body_of, 'left', 'right'),
-    Law('probe', 'direction', RAY['direction'], RAY, body_of, 'left', Refused(INVALID)),
+    Law('probe', 'direction', RAY['direction'], RAY, body_of, 'left', Refusal(INVALID)),
     Law('push', 'enable', True, dict(radius=0.05, pose=pose_stamped(-0.28, 0.01, 0.1)), touches_left, True, False),
     Law('push', 'radius', 0.04, dict(enable=True, pose=pose_stamped(-0.28, 0.01, 0.1)), touches_left, True, False),
     Law('push', 'pose', pose_stamped(0.0, 0.0, 1.0), dict(enable=True), sphere, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)),
     Law('push', 'speed', 2.0, sphere_under_way(), sphere, (0.0, 0.0, 1.2), (0.0, 0.0, 2.0)),
-    Law('remove', 'name', 'left', {}, bodies, ['right'], Refused(UNKNOWN)),
-    Law('save', 'file', 'a.state', {}, lambda test, answer: test.call('load', file='a.state').success, True, Refused(INVALID)),
-    Law('load', 'file', 'three.state', saved_at_three, step_now, 3, Refused(INVALID)),
+    Law('remove', 'name', 'left', {}, bodies, ['right'], Refusal(UNKNOWN)),
+    Law('save', 'file', 'a.state', {}, lambda test, answer: test.call('load', file='a.state').success, True, Refusal(INVALID)),
+    Law('load', 'file', 'three.state', saved_at_three, step_now, 3, Refusal(INVALID)),
     Law('set_material', 'body', 'left', dict(yaml='{density: 3000}'), masses, (3.0, 1.0), (3.0, 3.0)),
-    Law('set_material', 'yaml', '{density: 3000}', dict(body='left'), masses, (3.0, 1.0), Refused(INVALID)),
-    Law('get_body', 'name', 'right', {}, lowest_x, 0.15, Refused(UNKNOWN)),
+    Law('set_material', 'yaml', '{density: 3000}', dict(body='left'), masses, (3.0, 1.0), Refusal(INVALID)),
+    Law('get_body', 'name', 'right', {}, lowest_x, 0.15, Refusal(UNKNOWN)),
     Law('get_body', 'rest', True, drawn_out(name='left'), lowest_x, -0.25, within(-0.249, 0.0)),
     Law('spawn', 'name', 'mine', NEW, name_of, 'mine', 'box'),
     Law('spawn', 'file', 'tetrahedron.obj', NEW, volume, 0.1 ** 3 / 6, 0.1 ** 3),
-    Law('spawn', 'primitive', box(), dict(pose=NEW['pose']), volume, 0.1 ** 3, Refused(INVALID)),
+    Law('spawn', 'primitive', box(), dict(pose=NEW['pose']), volume, 0.1 ** 3, Refusal(INVALID)),
     Law('spawn', 'pose', NEW['pose'], dict(primitive=box()), centre, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)),
     Law('spawn', 'scale', 2.0, NEW, volume, 0.2 ** 3, 0.1 ** 3),
     Law('spawn', 'material', 'stiff', NEW, mass, 2.0, 1.0),
     Law('spawn', 'repair', 'wrap', dict(file='dirty.obj', pose=NEW['pose']), triangles, within(100, 1e5), 4),
     Law('spawn_cloud', 'name', 'mine', dict(cloud=cloud_of(ball())), name_of, 'mine', 'cloud'),
-    Law('spawn_cloud', 'cloud', cloud_of(ball()), {}, volume, within(0.95 * BALL, 1.05 * BALL), Refused(INVALID)),
-    Law('spawn_cloud', 'topic', '/camera', published, volume, within(0.95 * BALL, 1.05 * BALL), Refused(INVALID)),
-    Law('spawn_cloud', 'timeout', 0.1, later, volume, Refused(MISSED), within(0.95 * BALL, 1.05 * BALL)),
+    Law('spawn_cloud', 'cloud', cloud_of(ball()), {}, volume, within(0.95 * BALL, 1.05 * BALL), Refusal(INVALID)),
+    Law('spawn_cloud', 'topic', '/camera', published, volume, within(0.95 * BALL, 1.05 * BALL), Refusal(INVALID)),
+    Law('spawn_cloud', 'timeout', 0.1, later, volume, Refusal(MISSED), within(0.95 * BALL, 1.05 * BALL)),
     Law('spawn_cloud', 'scale', 0.001, dict(cloud=cloud_of(1000.0 * ball())), volume, within(0.95 * BALL, 1.05 * BALL),
-        Refused(UNSUITABLE)),
+        Refusal(UNSUITABLE)),
     Law('spawn_cloud', 'voxel', 0.01, dict(cloud=cloud_of(ball()), outliers=100.0), points, cells(ball(), 0.01),
         cells(ball(), diagonal(ball()) / 60)),
-    Law('spawn_cloud', 'outliers', 100.0, dict(cloud=cloud_of(STRAY), voxel=0.003), points, cells(STRAY, 0.003),
-        within(0.9 * cells(STRAY, 0.003), cells(STRAY, 0.003) - 1)),
+    Law('spawn_cloud', 'outliers', 100.0, dict(cloud=cloud_of(STRAY)), strays, 0, within(0, 50)),
     Law('spawn_cloud', 'material', 'stiff', dict(cloud=cloud_of(ball())), mass, within(1.9 * BALL * 1e3, 2.1 * BALL * 1e3),
         within(0.95 * BALL * 1e3, 1.05 * BALL * 1e3)),
-    Law('step', 'steps', 7, {}, step_now, 7, Refused(INVALID)),
+    Law('step', 'steps', 7, {}, step_now, 7, Refusal(INVALID)),
     Law('pause', 'data', True, running(), lambda test, answer: test.state().paused, True, False),
 ]
 
@@ -462,7 +468,7 @@ FRAMED = {
 UNTURNED = {'cut': ('blades', (-0.3, 0.012, 0.093)), 'incise': ('blade', (-0.23, -0.021, 0.1)), 'push': ('pose', (-0.27, 0.013, 0.11)),
             'spawn': ('pose', (0.01, 0.02, 0.3))}
 NEEDS_A_PICK = ('move_pick', 'lock')
-STREAMS = {'pick/servo_cp': pose_stamped(-0.31, 0.05, 0.17, TURNED), 'push/servo_cp': pose_stamped(-0.25, 0.013, 0.11, TURNED),
+STREAMS = {'pick/servo_cp': pose_stamped(-0.31, 0.05, 0.17, TURNED), 'push/servo_cp': pose_stamped(-0.2553, 0.013, 0.11, TURNED),
            'scissors/servo_cp': pose_stamped(-0.3, 0.012, 0.093, TURNED)}
 JAWS = ('scissors/jaw/servo_js', 'scissors/jaw/servo_jp')
 WORLDS = (('', 0.0), ('world', 0.0), ('/world', 0.0))
@@ -473,6 +479,7 @@ class Asked(InStepTestCase):
     """The world stands still where nobody steps it."""
 
     def setUp(self):
+        self.proxies = {}  # a thousand calls need not all look for the node
         super().setUp()
         self.pause(True)
 
@@ -481,6 +488,12 @@ class Asked(InStepTestCase):
             self.pause(True)
         self.good('reset')
         self.events_before = self.events.count()
+
+    def call(self, service, **fields):
+        if service not in self.proxies:
+            rospy.wait_for_service(self.node + '/' + service, LONG)
+            self.proxies[service] = rospy.ServiceProxy(self.node + '/' + service, TYPES[service], persistent=True)
+        return self.proxies[service](**fields)
 
     def ask(self, name, fields):
         """The answer of a service, or the result of an action."""
@@ -491,14 +504,11 @@ class Asked(InStepTestCase):
     def ask_once(self, name, fields):
         if not name.startswith('actions/'):
             return self.call(name, **fields)
-        action = name[len('actions/'):].capitalize()
-        if name not in self.clients:
-            kind = roslib.message.get_message_class('meshless_surgery/%sAction' % action)
-            self.clients[name] = actionlib.SimpleActionClient(self.node + '/' + name, kind)
-            self.assertTrue(self.clients[name].wait_for_server(rospy.Duration(LONG)))
-        goal = roslib.message.get_message_class('meshless_surgery/%sGoal' % action)(**fields)
-        self.clients[name].send_goal_and_wait(goal, rospy.Duration(LONG))
-        return self.clients[name].get_result()
+        action = name[len('actions/'):]
+        try:
+            return self.goals.send(action, fields).result(LONG)
+        except Refused as refused:
+            return getattr(msg, action.capitalize() + 'Result')(message=refused.message, error_code=refused.code)
 
     def ask_while_time_passes(self, name, fields):
         self.begun = self.state().step
@@ -533,16 +543,15 @@ class RequestsTest(Asked):
     @classmethod
     def setUpClass(cls):
         cls.folder = tempfile.TemporaryDirectory()
-        cls.clients = {}
-        cls.parameters = {'session_directory': cls.folder.name, 'tools_rate': 1000.0, 'tools__silence': 0.0,
+        cls.parameters = {'session_directory': cls.folder.name, 'state_rate': 400.0, 'tools_rate': 400.0, 'tools__silence': 0.0,
                           'tools__pick__max_speed': 1000.0, 'tools__scissors__length': 0.25, 'tools__scissors__width': 0.3}
         super().setUpClass()
+        cls.goals = Goals(cls.node, LONG)
         frames = Frames()
-        cls.frames = frames
         end = time.monotonic() + LONG
         # It listens to tf from its first question on.
         while not rospy.ServiceProxy(cls.node + '/probe', TYPES['probe'])(header('tray'), Point(), Vector3(0, 0, 1)).error_code == MISSED:
-            frames.say()
+            frames.say()  # again and again, as it may not have heard
             assert time.monotonic() < end
 
     @classmethod
@@ -584,7 +593,7 @@ class RequestsTest(Asked):
                             fields[law.field] = law.value(self) if callable(law.value) else law.value
                         answer = self.ask(name, fields)
                         code = getattr(answer, 'error_code', 0)
-                        found = law.see(self, answer) if answer.success else Refused(code)
+                        found = law.see(self, answer) if answer.success else Refusal(code)
                         self.assertTrue(as_it_should_be(wanted, found), '%s: %s, not %s' % (answer.message, found, wanted))
 
     def outcome(self, name, frame, stamp, **other):
@@ -598,14 +607,14 @@ class RequestsTest(Asked):
         self.assertTrue(answer.success, answer.message)
         if service == 'pick':
             self.good('move_pick', pick_id=answer.pick_id, target=Point(-0.4, 0.0, 0.1))
-        self.good('step', steps=8)
+        self.good('step', steps=5)
         return leaves(answer), self.snapshot()
 
     def test_requests_are_the_same_in_each_frame(self):
         for service in FRAMED:
             answer, world = self.outcome(service, '', 0.0)
             for name in self.named(service):
-                for frame, stamp in WORLDS[1:] + MOMENTS:
+                for frame, stamp in MOMENTS[:1] if '/' in name else WORLDS[1:] + MOMENTS:
                     with self.subTest(name=name, frame=frame, stamp=stamp):
                         found, found_world = self.outcome(name, frame, stamp)
                         most = 1e-9 if 'tray' in frame else 0.0
@@ -656,14 +665,14 @@ class RequestsTest(Asked):
             self.publisher(tool + '/state_command', StringStamped).publish(StringStamped(string=word))
             states.wait(lambda m, state=state: m.state == state, states.count() - 1)
         self.fresh()
-        if tool == 'pick':
-            self.pick_left()
+        grasp = self.pick_left().position if tool == 'pick' else None
         measured, setpoint = self.record(tool + '/measured_cp', PoseStamped), self.record(tool + '/setpoint_cp', PoseStamped)
         self.publisher(topic).publish(pose)
 
         def there(state):
             last = [m.messages[-1] for m in (measured, setpoint) if m.count()]
-            return len(last) == 2 and not last[0].header.stamp.is_zero() and last[0].pose.position == last[1].pose.position
+            return (len(last) == 2 and not last[0].header.stamp.is_zero() and
+                    last[0].pose.position == last[1].pose.position != grasp)
         self.until(there, topic)
         return leaves([measured.messages[-1].pose, setpoint.messages[-1].pose])
 
@@ -675,7 +684,7 @@ class RequestsTest(Asked):
                     poses = self.place(topic, said_in(frame, stamp, pose))
                     if topic.startswith('scissors'):
                         self.close_the_jaw(JAWS[bool(frame)])
-                    self.good('step', steps=8)
+                    self.good('step', steps=5)
                     found = poses + self.snapshot()
                     wanted = wanted or found
                     self.assert_same(wanted, found)
@@ -690,7 +699,7 @@ class RequestsTest(Asked):
 
 class FollowTest(Asked):
     """A tool that follows a frame which is carried on the tray is where the frame is."""
-    parameters = {'tools_rate': 1000.0, 'tools__silence': 0.0, 'tools__pick__max_speed': 1000.0,
+    parameters = {'tools__silence': 0.0, 'tools__pick__max_speed': 1000.0,
                   'tools__scissors__max_speed': 1000.0, 'tools__push__max_speed': 1000.0,
                   **{'tools__%s__follow_frame' % tool: tool + '_frame' for tool in ('pick', 'push', 'scissors')}}
     ON_THE_TRAY = frame_at(turn((1, 0, 2), 0.8), (0.1, 0.2, -0.3))
