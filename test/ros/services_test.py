@@ -11,7 +11,7 @@ from meshless_surgery.srv import CutResponse, SpawnResponse, StepResponse
 from shape_msgs.msg import SolidPrimitive
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from deformer_support import ACROSS_X, DeformerTestCase, header, pose_stamped, run  # noqa: E402
+from deformer_support import ACROSS_X, DeformerTestCase, pose_stamped, run  # noqa: E402
 
 NAN = float('nan')
 INF = float('inf')
@@ -31,18 +31,6 @@ class PickTest(DeformerTestCase):
         picks = self.state().picks
         self.assertEqual([(answer.pick_id, 'left', False)], [(p.pick_id, p.body, p.locked) for p in picks])
 
-    def test_a_ray_grabs_the_first_surface_that_it_meets(self):
-        answer = self.good('pick', point=Point(-1.0, 0.01, 0.1), direction=Vector3(1, 0, 0))
-        self.assertEqual('left', answer.body)
-        self.assertAlmostEqual(-0.25, answer.position.x, places=6)
-        back = self.good('pick', point=Point(1.0, 0.01, 0.1), direction=Vector3(-2.5, 0, 0))
-        self.assertEqual('right', back.body)
-        self.assertAlmostEqual(0.25, back.position.x, places=6)
-
-    def test_only_the_body_asked_for(self):
-        answer = self.good('pick', point=Point(-1.0, 0.01, 0.1), direction=Vector3(1, 0, 0), body='right')
-        self.assertEqual('right', answer.body)
-
     def test_ids_are_never_used_twice(self):
         ids = []
         for _ in range(5):
@@ -61,14 +49,8 @@ class PickTest(DeformerTestCase):
         self.refused(['max_distance', '-0.1', '0..'], 'pick', point=at, max_distance=-0.1)
         self.refused(['stiffness', '-1', '0..'], 'pick', point=at, stiffness=-1.0)
         self.refused(['no_such_body', 'left', 'right'], 'pick', point=at, body='no_such_body')
-        self.refused(['no_such_frame', 'world'], 'pick', header=header('no_such_frame'), point=at)
         self.refused(['0.01'], 'pick', point=Point(0.0, 0.0, 0.1), max_distance=0.01)
         self.refused([], 'pick', point=Point(0.0, 5.0, 0.1), direction=Vector3(0, 1, 0))
-
-    def test_the_world_frame_may_be_named_or_left_out(self):
-        for frame in ('', 'world', '/world'):
-            answer = self.good('pick', header=header(frame), point=Point(-0.15, 0.0, 0.1))
-            self.assertEqual('left', answer.body)
 
 
 class SpringTest(DeformerTestCase):
@@ -81,17 +63,6 @@ class SpringTest(DeformerTestCase):
         state = self.state()
         self.assertGreater(state.bodies[0].centre_of_mass.x, before + 0.001)
         self.assertAlmostEqual(-0.05, state.picks[0].target.x)
-
-    def test_a_lock_holds_where_it_is_or_at_the_target(self):
-        pick = self.pick_left()
-        self.good('lock', pick_id=pick.pick_id)
-        state = self.state()
-        self.assertTrue(state.picks[0].locked)
-        self.assertAlmostEqual(pick.position.x, state.picks[0].target.x)
-        self.good('lock', pick_id=pick.pick_id, at_target=True, target=Point(-0.1, 0.02, 0.1))
-        state = self.state()
-        self.assertTrue(state.picks[0].locked)
-        self.assertAlmostEqual(0.02, state.picks[0].target.y)
 
     def test_any_number_of_locks_and_taking_one_up_again(self):
         ids = [self.pick_left().pick_id for _ in range(10)]
@@ -116,9 +87,7 @@ class SpringTest(DeformerTestCase):
             self.refused(['0'], service, pick_id=0)
         self.refused(['target.x', 'nan'], 'move_pick', pick_id=pick, target=Point(NAN, 0, 0))
         self.refused(['target.z', 'inf'], 'move_pick', pick_id=pick, target=Point(0, 0, INF))
-        self.refused(['no_such_frame'], 'move_pick', pick_id=pick, header=header('no_such_frame'))
         self.refused(['target.x', 'nan'], 'lock', pick_id=pick, at_target=True, target=Point(NAN, 0, 0))
-        self.refused(['no_such_frame'], 'lock', pick_id=pick, at_target=True, header=header('no_such_frame'))
 
 
 class PushTest(DeformerTestCase):
@@ -131,17 +100,12 @@ class PushTest(DeformerTestCase):
         self.assertGreater(self.state().bodies[0].centre_of_mass.x, before + 0.005)
         self.good('push', enable=False)
 
-    def test_an_orientation_may_be_left_out(self):
-        self.good('push', enable=True, pose=pose_stamped(0.0, 0.0, 1.0, quaternion=(0, 0, 0, 0)))
-
     def test_refusals(self):
         self.refused(['radius', '-0.01', '0..'], 'push', enable=True, radius=-0.01, pose=pose_stamped())
         self.refused(['radius', 'nan'], 'push', enable=True, radius=NAN, pose=pose_stamped())
         self.refused(['speed', '-1'], 'push', enable=True, speed=-1.0, pose=pose_stamped())
         self.refused(['speed', 'inf'], 'push', enable=True, speed=INF, pose=pose_stamped())
         self.refused(['position.x', 'nan'], 'push', enable=True, pose=pose_stamped(NAN))
-        self.refused(['orientation', 'nan'], 'push', enable=True, pose=pose_stamped(quaternion=(0, 0, 0, NAN)))
-        self.refused(['no_such_frame'], 'push', enable=True, pose=pose_stamped(frame='no_such_frame'))
 
 
 class CutTest(DeformerTestCase):
@@ -168,17 +132,6 @@ class CutTest(DeformerTestCase):
         self.assertEqual(['left.1', 'left.2', 'right'], sorted(b.name for b in self.state().bodies))
         self.refused(['left', 'left.1'], 'get_body', name='left')
 
-    def test_only_where_the_blades_reach(self):
-        # Unbounded blades across both boxes; then only those named; then as long as the first box.
-        both = self.good('cut', blades=pose_stamped(-1.0, 0.0, 0.1))
-        self.assertEqual(['left', 'right'], sorted(both.cut_bodies))
-        self.good('reset')
-        one = self.good('cut', blades=pose_stamped(-1.0, 0.0, 0.1), bodies=['right'])
-        self.assertEqual(['right'], one.cut_bodies)
-        self.good('reset')
-        short = self.good('cut', blades=pose_stamped(-0.3, 0.0, 0.1), length=0.2, width=0.3)
-        self.assertEqual(['left'], short.cut_bodies)
-
     def test_pieces_can_be_cut_again_and_springs_follow(self):
         pick = self.pick_left()
         self.good('cut', blades=pose_stamped(-0.2, -1.0, 0.1, ACROSS_X), bodies=['left'])
@@ -187,12 +140,6 @@ class CutTest(DeformerTestCase):
         self.assertEqual(pick.pick_id, self.state().picks[0].pick_id)
         again = self.good('cut', blades=pose_stamped(-1.0, 0.0, 0.1), bodies=[owner])
         self.assertEqual([owner + '.1', owner + '.2'], again.new_bodies)
-
-    def test_a_rough_cut_adds_up_too(self):
-        whole = self.good('get_body', name='left')
-        answer = self.good('cut', blades=pose_stamped(-0.19, -1.0, 0.1, ACROSS_X), roughness=0.005)
-        pieces = [self.good('get_body', name=name) for name in answer.new_bodies]
-        self.assertAlmostEqual(1.0, sum(p.volume for p in pieces) / whole.volume, places=9)
 
     def test_an_incision_opens_and_a_second_one_goes_through(self):
         whole = self.good('get_body', name='left')
@@ -242,7 +189,6 @@ class CutTest(DeformerTestCase):
         self.refused(['no tissue'], 'probe', point=Point(0, 0, 3), direction=Vector3(0, 0, 1))
         self.refused(['direction', '0'], 'probe', point=Point(0, 0, 3))
         self.refused(['point.y', 'nan'], 'probe', point=Point(0, NAN, 3), direction=Vector3(0, 0, 1))
-        self.refused(['no_such_frame'], 'probe', header=header('no_such_frame'), direction=Vector3(0, 0, 1))
 
     def test_blades_that_close_slowly_meet_at_once_while_paused(self):
         answer = self.good('cut', blades=pose_stamped(-1.0, 0.0, 0.1), close_time=50.0)
@@ -257,9 +203,6 @@ class CutTest(DeformerTestCase):
             self.refused([field, '-0.5', '0'], 'cut', blades=blades, **{field: -0.5})
         self.refused(['close_time', '1000', '60'], 'cut', blades=blades, close_time=1000.0)
         self.refused(['position.x', 'nan'], 'cut', blades=pose_stamped(NAN))
-        self.refused(['orientation', 'norm', '0'], 'cut', blades=pose_stamped(quaternion=(0, 0, 0, 0)))
-        self.refused(['orientation', 'nan'], 'cut', blades=pose_stamped(quaternion=(0, NAN, 0, 1)))
-        self.refused(['no_such_frame'], 'cut', blades=pose_stamped(frame='no_such_frame'))
         self.refused(['no_such_body'], 'cut', blades=blades, bodies=['left', 'no_such_body'])
         self.refused(['bodies[0]'], 'cut', blades=blades, bodies=[''])
         self.refused([], 'cut', blades=pose_stamped(0.0, 0.0, 5.0))
@@ -282,12 +225,6 @@ class BodiesTest(DeformerTestCase):
             self.assertLess(abs(body.volume / volumes[kind] - 1.0), 0.05)
             self.good('remove', name=answer.name)
             self.refused([answer.name], 'remove', name=answer.name)
-
-    def test_scale_and_material(self):
-        self.good('spawn', name='big', primitive=box(), scale=2.0, material='stiff', pose=pose_stamped(0, 0, 1))
-        body = self.good('get_body', name='big')
-        self.assertAlmostEqual(8e-3, body.volume, places=9)
-        self.assertAlmostEqual(16.0, body.mass, places=6)
 
     def test_without_a_name_it_gets_one_of_its_own(self):
         names = [self.good('spawn', primitive=box(), pose=pose_stamped(0, 0, 1 + i)).name for i in range(3)]
@@ -336,8 +273,6 @@ class BodiesTest(DeformerTestCase):
         self.refused(['scale', '-1'], 'spawn', name='x', primitive=box(), pose=at, scale=-1.0)
         self.refused(['scale', 'nan'], 'spawn', name='x', primitive=box(), pose=at, scale=NAN)
         self.refused(['no_such_material'], 'spawn', name='x', primitive=box(), pose=at, material='no_such_material')
-        self.refused(['no_such_frame'], 'spawn', name='x', primitive=box(), pose=pose_stamped(frame='no_such_frame'))
-        self.refused(['orientation'], 'spawn', name='x', primitive=box(), pose=pose_stamped(quaternion=(0, 0, 0, 0)))
         self.refused(['missing.obj'], 'spawn', name='x', file='missing.obj', pose=at)
         with tempfile.NamedTemporaryFile(suffix='.obj') as outside:
             outside.write(b'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n')
@@ -366,14 +301,6 @@ class BodiesTest(DeformerTestCase):
         self.assertGreater(now.tetrahedra, 0)
         self.assertGreater(now.clusters, 0)
 
-    def test_set_material(self):
-        self.good('set_material', body='left', yaml='{density: 3000}')
-        self.assertAlmostEqual(3.0, self.good('get_body', name='left').mass, places=6)
-        self.assertAlmostEqual(1.0, self.good('get_body', name='right').mass, places=6)
-        self.good('set_material', yaml='density: 500\nmode: quadratic\nalpha: 0.2')
-        for name in ('left', 'right'):
-            self.assertAlmostEqual(0.5, self.good('get_body', name=name).mass, places=6)
-
     def test_refusals_of_set_material(self):
         self.refused(['no_such_body'], 'set_material', body='no_such_body', yaml='{alpha: 0.5}')
         self.refused(['yaml'], 'set_material', body='left', yaml='')
@@ -385,11 +312,6 @@ class BodiesTest(DeformerTestCase):
 
 
 class TimeTest(DeformerTestCase):
-
-    def test_steps_are_done_exactly(self):
-        self.assertAlmostEqual(1.0 / 120.0, self.good('step', steps=1).sim_time)
-        self.assertAlmostEqual(0.5, self.good('step', steps=59).sim_time)
-        self.assertEqual(60, self.state().step)
 
     def test_refusals_of_step(self):
         self.refused(['steps', '0', '1..100000'], 'step', steps=0)
@@ -445,13 +367,6 @@ class TimeTest(DeformerTestCase):
             ends = [self.good('get_body', name=name) for name in pieces]
             shapes.append([(end.particles.data, end.volume, end.area) for end in ends])
         self.assertEqual(shapes[0], shapes[1])
-
-    def test_blades_close_in_simulated_time(self):
-        self.good('pause', data=False)
-        begun = self.state().step
-        answer = self.good('cut', blades=pose_stamped(-1.0, 0.0, 0.1), close_time=0.5)
-        self.assertEqual(['left', 'right'], sorted(answer.cut_bodies))
-        self.assertGreaterEqual(self.state().step, begun + 60)
 
     def test_incisions_out_of_range(self):
         self.refused(['length', 'nan'], 'incise', blade=pose_stamped(), length=NAN, depth=0.1)

@@ -91,12 +91,6 @@ class SpawnCloudTest(unittest.TestCase):
             middle = np.mean([(p.x, p.y, p.z) for p in body.surface.vertices], axis=0)
             self.assertLess(np.abs(middle - (0.2, 0.0, 0.1)).max(), 0.002)
 
-    def test_units(self):
-        code = SpawnCloudResponse.UNSUITABLE_SHAPE
-        self.refused(code, ['m across', '0.001..10 m', 'scale 0.001 is for'], cloud=cloud_of(1000.0 * ball()))
-        answer = self.node.good('spawn_cloud', name='scaled', cloud=cloud_of(1000.0 * ball()), scale=0.001)
-        self.assertAlmostEqual(BALL, self.node.good('get_body', name=answer.name).volume, delta=0.05 * BALL)
-
     def test_refusals(self):
         code, cloud = SpawnCloudResponse, cloud_of(ball(2000))
         argument = code.INVALID_ARGUMENT

@@ -7,25 +7,14 @@ import threading
 
 import rospy
 import tf2_ros
-from geometry_msgs.msg import Point, PoseStamped, Quaternion, TransformStamped, Vector3, WrenchStamped
+from geometry_msgs.msg import Point, PoseStamped, WrenchStamped
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from deformer_support import (ACROSS_X, LONG, DeformerTestCase, Recorder, header,  # noqa: E402
-                              pose_stamped, run)
+from deformer_support import ACROSS_X, LONG, DeformerTestCase, Recorder, pose_stamped, run  # noqa: E402
 
 NAN = float('nan')
-
-
-def transform(parent, child, x=0.0, y=0.0, z=0.0, quaternion=(0.0, 0.0, 0.0, 1.0)):
-    message = TransformStamped()
-    message.header.stamp = rospy.Time.now()
-    message.header.frame_id = parent
-    message.child_frame_id = child
-    message.transform.translation = Vector3(x, y, z)
-    message.transform.rotation = Quaternion(*quaternion)
-    return message
 
 
 class Stream:
@@ -50,28 +39,6 @@ class Stream:
         self.stop()
         rospy.sleep(0.2)  # what is under way arrives before the next test's reset
         self.publisher.unregister()
-
-
-class Frames:
-    """Says transforms again and again until it is closed."""
-
-    def __init__(self, *transforms):
-        self.transforms = list(transforms)
-        self.broadcaster = tf2_ros.TransformBroadcaster()
-        self.done = threading.Event()
-        self.thread = threading.Thread(target=self._run)
-        self.thread.start()
-
-    def _run(self):
-        while not self.done.wait(0.01):
-            stamp = rospy.Time.now()
-            for message in self.transforms:
-                message.header.stamp = stamp
-            self.broadcaster.sendTransform(self.transforms)
-
-    def close(self):
-        self.done.set()
-        self.thread.join()
 
 
 class StreamTest(DeformerTestCase):
@@ -211,7 +178,7 @@ class StreamTest(DeformerTestCase):
         before = self.picture()
         self.stream('pick/servo_cp', pose_stamped(NAN, 0.0, 0.0))
         self.stream('push/servo_cp', pose_stamped(0.0, float('inf'), 0.0))
-        self.stream('scissors/servo_cp', pose_stamped(quaternion=(0, 0, 0, 0)))
+        self.stream('scissors/servo_cp', pose_stamped(quaternion=(0, 0, 0, NAN)))
         self.stream('scissors/jaw/servo_js', JointState())
         from diagnostic_msgs.msg import DiagnosticArray
         diagnostics = Recorder('/diagnostics', DiagnosticArray)
@@ -243,55 +210,5 @@ class StreamTest(DeformerTestCase):
         self.assertEqual([], late)
 
 
-class InputFrameTest(DeformerTestCase):
-
-    def setUp(self):
-        super().setUp()
-        # A table turned by a quarter about z at x = 0.2: its x axis is the world's y.
-        half = math.sqrt(0.5)
-        self.frames = Frames(transform('world', 'table', x=0.2, z=0.1, quaternion=(0, 0, half, half)))
-
-    def tearDown(self):
-        self.frames.close()
-        super().tearDown()
-
-    def until_known(self, service, **fields):
-        """The first call may come before the frame did."""
-        for _ in range(100):
-            answer = self.call(service, **fields)
-            if answer.success or 'frame' not in answer.message:
-                break
-        self.assertTrue(answer.success, answer.message)
-        return answer
-
-    def test_points_and_directions_are_turned(self):
-        answer = self.until_known('pick', header=header('table'), point=Point(-1.0, 0.01, 0.0), direction=Vector3(1, 0, 0))
-        self.assertEqual('right', answer.body)
-        self.assertAlmostEqual(0.19, answer.position.x, places=6)
-        self.assertAlmostEqual(-0.05, answer.position.y, places=6)
-        self.good('move_pick', header=header('table'), pick_id=answer.pick_id, target=Point(0.0, -0.3, 0.2))
-        target = self.state().picks[0].target
-        for got, wanted in ((target.x, 0.5), (target.y, 0.0), (target.z, 0.3)):
-            self.assertAlmostEqual(wanted, got, places=6)
-        self.good('lock', header=header('/table'), pick_id=answer.pick_id, at_target=True, target=Point(0.1, 0.0, 0.0))
-        self.assertAlmostEqual(0.1, self.state().picks[0].target.y, places=6)
-
-    def test_blades_are_turned(self):
-        # In the table's frame across its y axis: in the world across x.
-        half = math.sqrt(0.5)
-        across_y = (-half, 0.0, 0.0, half)
-        answer = self.until_known('cut', blades=pose_stamped(-1.0, 0.01, 0.0, across_y, frame='table'))
-        self.assertEqual(['right'], answer.cut_bodies)
-        volumes = sorted(self.good('get_body', name=name).volume for name in answer.new_bodies)
-        self.assertAlmostEqual(4e-4, volumes[0], places=8)
-        self.assertAlmostEqual(6e-4, volumes[1], places=8)
-
-    def test_a_frame_and_a_time_that_are_not_known_are_refused(self):
-        self.until_known('pick', header=header('table'), point=Point(0, 0, 0))
-        self.refused(['no_such_frame', 'world'], 'pick', header=header('no_such_frame'), point=Point(0, 0, 0))
-        past = rospy.Time.now() - rospy.Duration(1000)
-        self.refused(['table'], 'pick', header=header('table', past), point=Point(0, 0, 0))
-
-
 if __name__ == '__main__':
-    run('tools', StreamTest, InputFrameTest)
+    run('tools', StreamTest)
