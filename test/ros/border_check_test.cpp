@@ -69,8 +69,8 @@ TEST(BorderCheck, NormalisesQuaternionsAndRefusesThoseWithoutADirection) {
     EXPECT_NEAR(1.0, q.norm(), 1e-12);
     EXPECT_LT((q * Vec3::UnitX() + Vec3::UnitZ()).norm(), 1e-12);
   }
-  for (const auto& bad : {quaternion(0, 0, 0, 1e-7), quaternion(kNan, 0, 0, 1),
-                          quaternion(0, kInf, 0, 1), quaternion(0, 0, -kInf, 1), quaternion(0, 0, 0, kNan)}) {
+  for (const auto& bad : {quaternion(0, 0, 0, 1e-7), quaternion(kNan, 0, 0, 1), quaternion(0, kInf, 0, 1),
+                          quaternion(0, 0, -kInf, 1), quaternion(0, 0, 0, kNan)}) {
     BorderCheck check;
     const Quat q = check.rotation("q", bad);
     EXPECT_FALSE(check.ok());
