@@ -26,7 +26,6 @@ BodyDef brick(const Kind& kind, const std::string& name, const Vec3& at) {
   def.material.density = 1100.0;
   def.material.damping = 5.0;
   def.material.friction = 0.8;
-  def.material.volume.points = {{0.0, 0.3}};
   return def;
 }
 
@@ -99,6 +98,7 @@ TEST(MeasuresLaw, BodiesThatFlySpinAndAreStretchedMeasureAsTheirParticlesDoAndTh
   for (const Kind& kind : kKinds) {
     WorldSettings settings = test::weightless();
     settings.sleep = false;
+    settings.contact = ContactMethod::kNone;
     settings.step_rate = kRate;
     settings.max_substeps = 1;
     World world(settings);
@@ -109,7 +109,6 @@ TEST(MeasuresLaw, BodiesThatFlySpinAndAreStretchedMeasureAsTheirParticlesDoAndTh
         place.x() += 0.1 * (place.x() - 0.1);
       }
     });
-    run(world, 5);
     const auto expectAll = [&](const char* what) {
       const WorldSnapshot before = seen(world);
       world.step();
