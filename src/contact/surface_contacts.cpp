@@ -652,6 +652,8 @@ void SurfaceContacts::points(const std::vector<Collider>& colliders, std::vector
   points.clear();
   for (const Pair* pair : pairs_) {
     if (pair->kind == Kind::kSphere) continue;
+    // The force is that on the body, which may be the second of the two.
+    const double side = pair->b != kNoIndex && colliders[pair->a].obstacle ? -1.0 : 1.0;
     for (const ContactRow& row : pair->set.rows) {
       const double force = row.normal.dot(row.impulse);
       if (!(force > 0.0)) continue;
@@ -661,7 +663,7 @@ void SurfaceContacts::points(const std::vector<Collider>& colliders, std::vector
         at += pair->set.entries[k].coefficient * colliders[pair->a].positions[pair->set.entries[k].particle];
         share += pair->set.entries[k].coefficient;
       }
-      if (share > 0.5) points.push_back({at, row.normal, force});
+      if (share > 0.5) points.push_back({at, side * row.normal, force});
     }
   }
 }

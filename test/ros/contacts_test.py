@@ -41,19 +41,6 @@ class ContactsTest(DeformerTestCase):
         box = state.next(lambda s: s.bodies[0].asleep).bodies[0]
         self.assertAlmostEqual(TABLE_TOP + 0.05, box.centre_of_mass.z, delta=0.008)
 
-    def test_obstacles_are_shown(self):
-        markers = self.deformer.recorder('markers', MarkerArray)
-        self.addCleanup(markers.close)
-        table = of(markers.wait(lambda a: of(a, 'obstacles')), 'obstacles')[0]
-        self.assertEqual(Marker.TRIANGLE_LIST, table.type)
-        self.assertAlmostEqual(TABLE_TOP, max(p.z for p in table.points), delta=1e-6)
-        # For displays that show nothing else of the markers, and for whoever comes late.
-        late = self.deformer.recorder('obstacles', MarkerArray)
-        self.addCleanup(late.close)
-        array = late.wait()
-        self.assertEqual(Marker.DELETEALL, array.markers[0].action)
-        self.assertEqual(table.points, of(array, 'obstacles')[0].points)
-
 
 if __name__ == '__main__':
     run('contacts', ContactsTest)

@@ -185,19 +185,6 @@ TEST(SurfaceContact, SoftBlocksOnEachOtherSleep) {
   EXPECT_EQ(world.snapshot({}).report.asleep, 2u) << speed << " m/s";
 }
 
-// In the last substep before they sleep, forces of the ground are the weight.
-TEST(SurfaceContact, TheGroundCarriesTheWeight) {
-  WorldSettings settings = surface();
-  settings.sleep = false;
-  World world(settings);
-  add(world, block("block", Vec3(0, 0, 0.0505)));
-  run(world, 2.0);
-  const WorldSnapshot shot = seen(world);
-  double force = 0.0;
-  for (const ContactPoint& point : shot.contacts) force += point.force * point.normal.z();
-  EXPECT_NEAR(force, shot.bodies[0].model->mass * kG, 0.01 * shot.bodies[0].model->mass * kG);
-}
-
 class Incline : public testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(SurfaceContact, Incline, testing::Bool(),
                          [](const auto& info) { return info.param ? "OnAnObstacle" : "OnTheGround"; });
