@@ -294,6 +294,8 @@ TEST(Physics, RestitutionGivesBackItsShareOfTheSpeed) {
     SCOPED_TRACE(restitution);
     expectReached("height that is off [m]", {{kLooks, reached}, {kOne, reached}}, bounces(restitution), 1.5);
   }
+  // It falls short of the law below, but is not ignored: then 0.32 m were missing.
+  expectReached("height that is off [m]", {{kLooksOnSurface, 0.17}, {kOneOnSurface, 0.15}}, bounces(0.8), 1.2);
   double elastic = 0.0, looks = 0.0;
   for (const double restitution : {0.0, 0.5, 0.8}) {
     elastic = std::max(elastic, worst("height that is off [m]", kElastic, bounces(restitution)));
@@ -306,27 +308,35 @@ TEST(Physics, RestitutionGivesBackItsShareOfTheSpeed) {
 
 // --- pieces
 
-/// Moves and spins, and is cut at a corner so that a piece has no particle of its own.
+/// Of a body that moves and spins and is cut at its corners, so that some pieces have no particle of their own.
 double lostByCrumbs(const Kind& kind, Random& random) {
-  const PreparedBody body = test::prepared(box("block", kind, Vec3(0.2, 0.1, 0.1), Vec3::Zero(), 0.04));
+  BodyDef def = box("block", kind, Vec3(0.2, 0.1, 0.1), Vec3::Zero(), 0.01);
+  def.spacing = 0.05;
+  const PreparedBody body = test::prepared(def);
   BodyState state = body.state;
   const Vec3 speed = random.vector(2.0) + Vec3::Constant(3.0), spin = random.vector(4.0);
   for (std::size_t i = 0; i < state.velocities.size(); ++i)
     state.velocities[i] = speed + spin.cross(state.positions[i]);
   const Vec3 before = measureBody(*body.model, state).linear_momentum;
-  const Vec3 out = Vec3(random.uniform(0.5, 1.0), random.uniform(0.5, 1.0), random.uniform(0.5, 1.0)).normalized();
-  // Beside the corner, along an edge: no vertex is in there.
-  const Result<CutBody> cut = cutBody(*body.model, state, {out, Vec3(0.1, 0.05, 0.05) - 0.002 * out});
-  EXPECT_TRUE(cut.ok());
-  if (!cut.ok()) return 1.0;
-  Vec3 after = Vec3::Zero();
-  bool crumbs = false;
-  for (const BodyPiece& piece : cut->pieces) {
-    after += measureBody(*piece.model, piece.state).linear_momentum;
-    crumbs = crumbs || piece.model->rest_volume < 1e-3 * body.model->rest_volume;
+  double lost = 0.0;
+  int crumbs = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const auto side = [corner](int axis) { return corner >> axis & 1 ? 1.0 : -1.0; };
+    const Vec3 out(side(0) * random.uniform(0.5, 1.0), side(1) * random.uniform(0.5, 1.0), side(2));
+    const Plane plane{out.normalized(), Vec3(0.1 * side(0), 0.05 * side(1), 0.05 * side(2)) - 0.002 * out};
+    const Result<CutBody> cut = cutBody(*body.model, state, plane);
+    EXPECT_TRUE(cut.ok());
+    if (!cut.ok()) continue;
+    Vec3 after = Vec3::Zero();
+    for (const BodyPiece& piece : cut->pieces) {
+      after += measureBody(*piece.model, piece.state).linear_momentum;
+      const bool own = piece.parent_particles[0] != kNoIndex;
+      crumbs += body.model->lattice ? piece.model->rest_volume < 1e-6 : !own;
+    }
+    lost = std::max(lost, (after - before).norm() / before.norm());
   }
-  EXPECT_TRUE(crumbs);
-  return (after - before).norm() / before.norm();
+  EXPECT_GT(crumbs, 0);
+  return lost;
 }
 
 TEST(Physics, CrumbsKeepTheirMomentum) {
