@@ -308,10 +308,10 @@ TEST(Physics, RestitutionGivesBackItsShareOfTheSpeed) {
 
 // --- pieces
 
-/// Of a body that moves and spins and is cut at its corners, so that some pieces have no particle of their own.
+/// Of a ball that moves and spins and is grazed, so that pieces have no particle of their own.
 double lostByCrumbs(const Kind& kind, Random& random) {
-  BodyDef def = box("block", kind, Vec3(0.2, 0.1, 0.1), Vec3::Zero(), 0.01);
-  def.spacing = 0.05;
+  BodyDef def = box("ball", kind, Vec3::Constant(0.1), Vec3::Zero());
+  def.mesh = sphereMesh(0.1, 0.012);
   const PreparedBody body = test::prepared(def);
   BodyState state = body.state;
   const Vec3 speed = random.vector(2.0) + Vec3::Constant(3.0), spin = random.vector(4.0);
@@ -320,13 +320,11 @@ double lostByCrumbs(const Kind& kind, Random& random) {
   const Vec3 before = measureBody(*body.model, state).linear_momentum;
   double lost = 0.0;
   int crumbs = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const auto side = [corner](int axis) { return corner >> axis & 1 ? 1.0 : -1.0; };
-    const Vec3 out(side(0) * random.uniform(0.5, 1.0), side(1) * random.uniform(0.5, 1.0), side(2));
-    const Plane plane{out.normalized(), Vec3(0.1 * side(0), 0.05 * side(1), 0.05 * side(2)) - 0.002 * out};
-    const Result<CutBody> cut = cutBody(*body.model, state, plane);
+  for (int n = 0; n < 4; ++n) {
+    const Vec3 out = random.unit();
+    const Result<CutBody> cut = cutBody(*body.model, state, {out, 0.099 * out});
     EXPECT_TRUE(cut.ok());
-    if (!cut.ok()) continue;
+    if (!cut.ok()) return 1.0;
     Vec3 after = Vec3::Zero();
     for (const BodyPiece& piece : cut->pieces) {
       after += measureBody(*piece.model, piece.state).linear_momentum;
