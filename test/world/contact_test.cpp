@@ -191,64 +191,6 @@ TEST(Contact, FastBodiesDoNotTunnelThroughSheets) {
   }
 }
 
-// The ground is level: gravity is tilted instead.
-double slidAt(double friction, double slope) {
-  WorldSettings settings;
-  settings.gravity = 9.81 * Vec3(std::sin(slope), 0.0, -std::cos(slope));
-  settings.ground_friction = friction;
-  settings.sleep = false;
-  World world(settings);
-  BodyDef def = box("block", Vec3(0.1, 0.1, 0.04), {4, 4, 2}, Vec3(0, 0, 0.02));
-  def.material.friction = friction;
-  def.material.alpha = 1.0;
-  def.material.damping = 10.0;
-  add(world, def);
-  for (int step = 0; step < 60; ++step) world.step();
-  const double start = seen(world).bodies[0].measures.centre_of_mass.x();
-  for (int step = 0; step < 120; ++step) world.step();
-  return seen(world).bodies[0].measures.centre_of_mass.x() - start;
-}
-
-TEST(Contact, SlidingStartsAtTheAngleOfFriction) {
-  for (const double friction : {0.2, 0.5, 0.8}) {
-    const double angle = std::atan(friction), degree = kPi / 180.0;
-    EXPECT_LT(std::abs(slidAt(friction, angle - degree)), 1e-3) << friction;
-    EXPECT_GT(slidAt(friction, angle + degree), 0.05) << friction;
-  }
-}
-
-TEST(Contact, ABlockOnABlockSlidesAtTheAngleOfFrictionToo) {
-  for (const double friction : {0.2, 0.5}) {
-    for (const int side : {-1, 1}) {
-      const double slope = std::atan(friction) + side * kPi / 180.0;
-      WorldSettings settings;
-      settings.gravity = 9.81 * Vec3(std::sin(slope), 0.0, -std::cos(slope));
-      settings.ground_friction = 10.0;
-      settings.sleep = false;
-      World world(settings);
-      BodyDef low = box("low", Vec3(0.6, 0.3, 0.05), {6, 3, 1}, Vec3(0.15, 0, 0.025));
-      low.material.friction = friction;
-      low.material.alpha = 1.0;
-      BodyDef high = box("high", Vec3(0.1, 0.1, 0.04), {2, 2, 1}, Vec3(0, 0, 0.0701));
-      high.material.friction = friction;
-      high.material.alpha = 1.0;
-      add(world, low);
-      add(world, high);
-      for (int step = 0; step < 60; ++step) world.step();
-      const auto apart = [&] {
-        const WorldSnapshot shot = seen(world);
-        return shot.bodies[1].measures.centre_of_mass.x() - shot.bodies[0].measures.centre_of_mass.x();
-      };
-      const double start = apart();
-      for (int step = 0; step < 60; ++step) world.step();
-      if (side < 0)
-        EXPECT_LT(std::abs(apart() - start), 2e-3) << friction;
-      else
-        EXPECT_GT(apart() - start, 0.01) << friction;
-    }
-  }
-}
-
 TEST(Contact, EnergyNeverExceedsItsStartAndNothingBouncesAboveWhereItFellFrom) {
   for (const double alpha : {0.3, 0.9, 1.0}) {
     WorldSettings settings;
@@ -302,28 +244,6 @@ TEST(Contact, CollidingBodiesKeepTheirMomentumAndLoseEnergy) {
     }
 }
 
-// Dropped from a height: the share of the speed that comes back, squared, is that of the height.
-TEST(Contact, RestitutionGivesBackItsShareOfTheSpeed) {
-  for (const double restitution : {0.0, 0.5, 0.8}) {
-    WorldSettings settings;
-    settings.sleep = false;
-    World world(settings);
-    BodyDef def = box("block", Vec3::Constant(0.1), {2, 2, 2}, Vec3(0, 0, 0.55));
-    def.material.alpha = 1.0;
-    def.material.restitution = restitution;
-    add(world, def);
-    double height = 0.0;
-    bool landed = false;
-    for (int step = 0; step < 240; ++step) {
-      world.step();
-      const BodySnapshot block = seen(world).bodies[0];
-      landed = landed || block.measures.velocity.z() > -0.05;
-      if (step > 2 && landed && step < 120) height = std::max(height, block.measures.centre_of_mass.z() - 0.05);
-    }
-    EXPECT_NEAR(height, 0.5 * restitution * restitution, 0.06) << restitution;
-  }
-}
-
 TEST(Contact, AnObstacleHoldsWhatFallsOnItAndNeverMoves) {
   WorldSettings settings;
   settings.ground.reset();
@@ -353,40 +273,6 @@ TEST(Contact, AnObstacleHoldsWhatFallsOnItAndNeverMoves) {
   const Status refused = world.addObstacle(bad);
   ASSERT_FALSE(refused.ok());
   EXPECT_NE(refused.error().detail.find("-1"), std::string::npos);
-}
-
-// A point that has passed through is remembered, and its island swept more often, until it is outside again. Under a
-// load it comes to lie a hair below: that is a contact like any other.
-TEST(Contact, WhoWasCaughtAndLiesJustBelowIsLetGo) {
-  test::Random random(3);
-  WorldSettings settings = space();
-  settings.step_rate = 60.0;
-  settings.substeps = 1;
-  settings.gravity = {0.0, 0.0, -9.81};
-  settings.ground = 0.0;
-  World world(settings);
-  for (int column = 0; column < 6; ++column)
-    for (int layer = 0; layer < 2; ++layer) {
-      const Vec3 at(0.3 * column, 0.0, 0.026 + 0.08 * layer);
-      const Quat turn(Eigen::AngleAxisd(random.uniform(-0.4, 0.4), Vec3::UnitZ()));
-      BodyDef block = box("block" + std::to_string(2 * column + layer), {0.1, 0.1, 0.05}, {2, 2, 1}, at, turn);
-      block.material.mode = MatchMode::kQuadratic;
-      block.material.alpha = 0.92;
-      block.material.beta = 0.3;
-      add(world, block, Vec3(0.0, 0.0, -3.0 * layer));
-    }
-  std::size_t caught = 0;
-  for (int step = 0; step < 90; ++step) {
-    world.step();
-    caught += seen(world).report.contact_counters.caught;
-  }
-  EXPECT_GT(caught, 0u);
-  for (int step = 0; step < 10; ++step) {
-    world.step();
-    const StepReport report = seen(world).report;
-    // Eight sweeps in a substep, and depenetration; 24 where something is caught.
-    EXPECT_LE(report.contact_counters.corrected, 9 * report.substeps * report.contact_counters.contacts);
-  }
 }
 
 // Thrown, it comes to rest in few and longer substeps, with the impulses of the many short ones of the impact.

@@ -209,7 +209,7 @@ TEST(ElasticBody, IsPickedPushedCutAndComesToRest) {
   for (const BodySnapshot& body : world.snapshot({true, true, true}).bodies) {
     EXPECT_TRUE(test::allFinite(body.particles));
     EXPECT_TRUE(test::allFinite(body.surface));
-    EXPECT_LT(body.measures.velocity.norm(), 5.0);
+    EXPECT_LT(body.measures.velocity.norm(), 0.4);  // [m/s] worst of 20 seeds: 0.098
     mass += body.model->mass;
     TriangleMesh mesh = body.model->surface;
     EXPECT_TRUE(laws::isClosedOriented(mesh));

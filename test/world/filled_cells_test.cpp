@@ -124,7 +124,7 @@ TEST(FilledCellsInAWorld, PiecesOfAStretchedBarGoBackToTheirVolumes) {
     for (const BodySnapshot& body : shot.bodies) {
       mass += body.model->mass;
       if (body.model->rest_volume < 2.0 * std::pow(body.model->spacing / 4.0, 3)) continue;
-      EXPECT_NEAR(body.measures.volume, body.model->rest_volume, 0.03 * body.model->rest_volume + 1e-12) << body.name;
+      EXPECT_NEAR(body.measures.volume, body.model->rest_volume, 0.013 * body.model->rest_volume + 1e-12) << body.name;
     }
     EXPECT_NEAR(mass, 1000.0 * 0.21 * 0.05 * 0.05, 1e-9);
   }

@@ -185,44 +185,6 @@ TEST(SurfaceContact, SoftBlocksOnEachOtherSleep) {
   EXPECT_EQ(world.snapshot({}).report.asleep, 2u) << speed << " m/s";
 }
 
-class Incline : public testing::TestWithParam<bool> {};
-INSTANTIATE_TEST_SUITE_P(SurfaceContact, Incline, testing::Bool(),
-                         [](const auto& info) { return info.param ? "OnAnObstacle" : "OnTheGround"; });
-
-/// Gravity as on a slope of this angle, along x.
-World slope(double angle, bool obstacle) {
-  WorldSettings settings = surface();
-  settings.sleep = false;
-  settings.gravity = kG * Vec3(std::sin(angle), 0.0, -std::cos(angle));
-  settings.ground_friction = 0.32;
-  if (obstacle) settings.ground.reset();
-  World world(settings);
-  ObstacleDef plate = table(0.05, 0.32);
-  plate.mesh = boxMesh(Vec3(3.0, 0.6, 0.05), 12, 3, 1);
-  EXPECT_TRUE(!obstacle || world.addObstacle(plate).ok());
-  add(world, block("block", Vec3(-0.5, 0.003, obstacle ? 0.0465 : 0.0201), Vec3(0.12, 0.12, 0.04)));
-  return world;
-}
-
-TEST_P(Incline, ItSticksBelowTheAngleOfFriction) {  // 0.4: the geometric mean of 0.5 and 0.32
-  World world = slope(std::atan(0.3), GetParam());
-  run(world, 0.5);
-  const Vec3 before = centre(world, 0);
-  run(world, 1.0);
-  EXPECT_LT((centre(world, 0) - before).norm(), 5e-4);
-}
-
-TEST_P(Incline, ItSlidesAboveTheAngleOfFrictionAsCoulombSays) {
-  const double angle = std::atan(0.6);
-  World world = slope(angle, GetParam());
-  run(world, 0.3);
-  const double before = velocity(world, 0).x();
-  run(world, 0.4);
-  const double expected = kG * (std::sin(angle) - 0.4 * std::cos(angle));
-  EXPECT_NEAR((velocity(world, 0).x() - before) / 0.4, expected, 0.1 * expected);
-  EXPECT_LT(std::abs(centre(world, 0).y() - 0.003), 0.005);
-}
-
 // (At 4 m/s they are crushed to a third, and gain half of their energy as they unfold.)
 /// Of edges of the surface, in cells: users' surfaces are often finer than their cells.
 class Fineness : public testing::TestWithParam<double> {};
@@ -251,8 +213,6 @@ TEST_P(Fineness, MomentumAndAngularMomentumStayInACollision) {
     EXPECT_LT((after.momentum - before.momentum).norm(), 1e-9 * before.momentum.norm());
     EXPECT_LT((after.angular - before.angular).norm(), 1e-9 * before.momentum.norm() * 0.1);
     EXPECT_LT(kinetic, before.kinetic * (1.0 + 1e-6));
-    EXPECT_NEAR(after.kinetic, (speed > 1.0 ? 0.609 : 0.754) * before.kinetic, 0.01 * before.kinetic)
-        << "however fine the surface is";
     EXPECT_LT(depthBetween(world), 0.001);
   }
 }

@@ -142,7 +142,7 @@ TEST(World, ABallFallsComesToRestOnTheGroundAndStaysAboveIt) {
     highest_energy = std::max(highest_energy, only(world).measures.kinetic_energy);
   }
   const BodySnapshot ball = only(world);
-  EXPECT_LT(ball.measures.kinetic_energy, 1e-3);
+  EXPECT_LT(ball.measures.kinetic_energy, 1e-4);  // [J] reached: 2e-5
   EXPECT_LT(ball.measures.centre_of_mass.z(), 0.11);
   EXPECT_GT(ball.measures.centre_of_mass.z(), 0.04);
   EXPECT_LE(highest_energy, ball.model->mass * 9.81 * 0.2);
@@ -282,7 +282,7 @@ TEST(World, APickLiftsALockHoldsAndMovingTakesItUpAgain) {
     world.step();
     mean += world.snapshot({}).picks.at(0).force.z() / 600;
   }
-  EXPECT_NEAR(mean, only(world).model->mass * 9.81, 0.05 * only(world).model->mass * 9.81);
+  EXPECT_NEAR(mean, only(world).model->mass * 9.81, 0.01 * only(world).model->mass * 9.81);
   replyOf<Done>(world.apply(MovePickCommand{pick.pick, Vec3(0.3, 0, 0.8)}));
   EXPECT_EQ(world.pickInHand(), pick.pick);
   run(world, 600);
@@ -374,7 +374,7 @@ TEST(World, ACutSeversKeepsMomentumNamesThePiecesAndRetiresTheParent) {
   run(world, 300);
   for (const BodySnapshot& b : world.snapshot({true, true, true}).bodies) {
     EXPECT_TRUE(test::allFinite(b.surface));
-    EXPECT_LT(std::abs(b.measures.volume / b.model->rest_volume - 1.0), 0.4);
+    EXPECT_LT(std::abs(b.measures.volume / b.model->rest_volume - 1.0), 0.15);  // worst of 20 normals: 0.032
   }
 }
 
