@@ -67,7 +67,14 @@ void serialize(A& archive, Pose& v) {
 template <class A>
 void serialize(A& archive, Box& v) {
   auto& [min, max] = v;
-  archive(min, max);
+  if constexpr (std::is_same_v<A, InArchive>) {  // the box of nothing, and one without end, have the largest numbers
+    for (Vec3* corner : {&min, &max}) {
+      archive.take(corner->data(), 3 * sizeof(double));
+      if (corner->hasNaN()) throw ArchiveFault("a box has no corner");
+    }
+  } else {
+    archive(min, max);
+  }
 }
 template <class A>
 void serialize(A& archive, Color& v) {
