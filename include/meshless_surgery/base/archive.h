@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <optional>
 #include <set>
 #include <stdexcept>
@@ -106,7 +107,8 @@ void requireNumbers(const std::array<double, n>* values, std::size_t count) {
 }
 template <int rows, int columns>
 void requireNumbers(const Eigen::Matrix<double, rows, columns>* values, std::size_t count) {
-  if (count > 0) requireNumbers(values->data(), rows * columns * count, rows * columns == 3 ? kMostCoordinate : kMostNumber);
+  if (count > 0) requireNumbers(values->data(), rows * columns * count,
+                                rows * columns == 3 ? kMostCoordinate : kMostNumber);
 }
 
 template <class Out, class T, std::enable_if_t<IsPlain<T>::value, int> = 0>
@@ -205,6 +207,38 @@ void load(InArchive& in, std::vector<T>& values) {
       values.push_back(std::move(value));
     }
   }
+}
+
+/// Numbers that may be infinite: archive(endless(vector)).
+struct Endless {
+  std::vector<double>& values;
+};
+inline Endless endless(std::vector<double>& values) { return {values}; }
+template <class Out>
+void save(ByteOutput<Out>& out, const Endless& endless) {
+  save(out, endless.values);
+}
+inline void load(InArchive& in, Endless& endless) {
+  std::uint64_t size = 0;
+  in.take(&size, sizeof size);
+  in.need(size, sizeof(double));
+  endless.values.resize(size);
+  in.take(endless.values.data(), size * sizeof(double));
+  for (const double value : endless.values)
+    if (value != std::numeric_limits<double>::infinity()) requireNumbers(&value, 1);
+}
+/// One of them.
+struct EndlessNumber {
+  double& value;
+};
+inline EndlessNumber endless(double& value) { return {value}; }
+template <class Out>
+void save(ByteOutput<Out>& out, const EndlessNumber& endless) {
+  save(out, endless.value);
+}
+inline void load(InArchive& in, EndlessNumber& endless) {
+  in.take(&endless.value, sizeof endless.value);
+  if (endless.value != std::numeric_limits<double>::infinity()) requireNumbers(&endless.value, 1);
 }
 
 template <class Out, class T>
