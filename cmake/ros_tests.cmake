@@ -29,8 +29,22 @@ set(full_tests display ending forces fuzz hands network parameters play_block pl
 # however long it takes, or hold the clock themselves.
 set(patient_tests actions client clock contacts forces lab messages_law network parameters publish_clock requests scenes services session spawn_cloud stations streams testing time tools)
 file(GLOB ros_tests RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS test/ros/*.test test/rviz/*.test)
+set(known_tests ${ros_tests})
+list(TRANSFORM known_tests REPLACE ".*/(.*)\\.test$" "\\1")
+foreach(name IN LISTS full_tests patient_tests)
+  if(NOT name IN_LIST known_tests)
+    message(FATAL_ERROR "there is no rostest ${name}")
+  endif()
+endforeach()
 foreach(ros_test IN LISTS ros_tests)
-  add_rostest(${ros_test} DEPENDENCIES deformer_node)
+  # As add_rostest() does it, by a stricter rostest.
+  string(REPLACE "/" "_" results ${ros_test})
+  string(REPLACE ".test" ".xml" results ${results})
+  string(CONCAT strict_rostest "${PYTHON_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/scripts/lib/strict_rostest.py"
+    " --pkgdir=${PROJECT_SOURCE_DIR} --package=${PROJECT_NAME} --results-filename ${results}"
+    " --results-base-dir \"${CATKIN_TEST_RESULTS_DIR}\" ${CMAKE_CURRENT_SOURCE_DIR}/${ros_test}")
+  string(REPLACE "/" "_" test_target ${ros_test})
+  catkin_run_tests_target(rostest ${test_target} rostest-${results} COMMAND ${strict_rostest} DEPENDENCIES deformer_node)
   get_filename_component(test_name ${ros_test} NAME_WE)
   get_filename_component(room ${ros_test} DIRECTORY)
   get_filename_component(room ${room} NAME)

@@ -15,6 +15,11 @@ add_test(NAME loopback_by_default
   COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/scripts/lib/environment_test.py)
 add_test(NAME check_arguments
   COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/scripts/lib/check_test.py)
+if(NOT MESHLESS_SURGERY_CORE_ONLY)
+  add_test(NAME strict_rostest
+    COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/scripts/lib/strict_rostest_test.py)
+  set_tests_properties(strict_rostest PROPERTIES LABELS scripts)
+endif()
 set_tests_properties(include_direction messages package falls_short test_summary loopback_by_default check_arguments PROPERTIES LABELS scripts)
 # The headers' own documentation, without a warning.
 add_test(NAME doxygen COMMAND ${CMAKE_COMMAND} -E env DOXYGEN_OUTPUT=${CMAKE_BINARY_DIR}/api

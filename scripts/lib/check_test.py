@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """scripts/check refuses what it does not know before anything is installed or built, and builds wait for each other."""
 import fcntl
+import fnmatch
 import os
 import subprocess
 import tempfile
@@ -40,6 +41,18 @@ class CheckTest(unittest.TestCase):
         self.assertEqual(0, done.returncode)
         for word in ROOMS + ['scripts', '--full', '--long', '--core']:
             self.assertIn(word, done.stdout)
+
+    def test_what_is_left_out_by_name_is_there(self):
+        with open(os.path.join(CHECKOUT, 'scripts/check'), encoding='utf-8') as script:
+            lines = [line for line in script if line.startswith('sanitizer_leaves_out')]
+        names = [name.strip(" '\n") for line in lines for name in line.split('=', 1)[1].split(':')]
+        names = [name for name in names if name]
+        self.assertGreater(len(names), 5)
+        found = subprocess.run(['grep', '-rhoE', r'TEST(_[FP])?\(\w+, \w+\)', 'test'], cwd=CHECKOUT, check=True,
+                               stdout=subprocess.PIPE, universal_newlines=True).stdout
+        known = set('.'.join(line.split('(')[1].rstrip(')').split(', ')) for line in found.splitlines())
+        for name in names:
+            self.assertTrue(any(fnmatch.fnmatch(test, name) for test in known), name)
 
     def test_a_build_that_another_run_holds_is_waited_for(self):
         script = ('source scripts/lib/common.bash; source scripts/lib/build.bash; configure() { :; }; '

@@ -86,6 +86,8 @@ def allCases(entry):
             detailed += inner
             if case.outcome == 'failed' and all(c.outcome != 'failed' for c in inner):
                 detailed.append(case)
+        elif inner is not None and case.outcome == 'passed':
+            detailed.append(case._replace(outcome='failed', text='it ran no test'))
         else:
             detailed.append(case)
     return detailed

@@ -105,6 +105,11 @@ class TestSummaryTest(unittest.TestCase):
         self.write('rosunit-pick.xml', junit(PASSED))
         self.assertEqual(Counts(1, 1, 0), self.countsOf(Entry('pick', 'Failed', path)))
 
+    def testRostestThatRanNoTest(self):
+        path = self.write('rostest-test_ros_pick.xml', junit('<testcase classname="RosTest" name="testpick"/>'))
+        self.write('rosunit-pick.xml', junit())
+        self.assertEqual(Counts(0, 1, 0), self.countsOf(Entry('pick', 'Passed', path)))
+
 
 if __name__ == '__main__':
     unittest.main()

@@ -101,7 +101,11 @@ int main(int argc, char** argv) {
   app.add_flag("--no-hands", no_hands, "nobody touches anything");
   app.add_option("--materials", materials, "folder of material files; else the shipped ones")
       ->check(CLI::ExistingDirectory);
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;  // --help is no error
+  }
   if (!cells.empty()) choices.cells = cells == "filled" ? meshless::CellFill::kFilled : meshless::CellFill::kWhole;
   options.cuts = !no_cuts && !no_hands;
   options.hands = !no_hands;

@@ -16,7 +16,11 @@ int main(int argc, char** argv) {
   int threads = 1;
   app.add_option("log", file, "the log")->required()->check(CLI::ExistingFile);
   app.add_option("--threads", threads, "1..64; the result does not depend on it")->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;  // --help is no error
+  }
 
   std::ifstream log(file, std::ios::binary);
   const auto report = meshless::replay(log, threads);

@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::uint32_t kVersion = 2;  // of the hashes in it, too
 constexpr std::size_t kRecordHeader = 8, kReadAtOnce = 1 << 20;
+constexpr std::uint64_t kMostSteps = 1000000;  // between records: a node writes one every few seconds
 constexpr std::uint32_t kMostRecord = 0x7fffffffu;
 
 enum class RecordKind : std::uint8_t {
@@ -255,6 +256,9 @@ Result<ReplayReport> replay(std::istream& log, int threads, const std::function<
         return damaged("record " + std::to_string(number) + (started ? " starts again" : " is not the start"));
       if (started && step < world.stepCount())
         return damaged("record " + std::to_string(number) + " goes back to step " + std::to_string(step));
+      if (started && step - world.stepCount() > kMostSteps)
+        return damaged("record " + std::to_string(number) + " is " + std::to_string(step - world.stepCount()) +
+                       " steps after the one before");
       for (; started && world.stepCount() < step; ++report.steps) {
         world.step();
         if (after_step) after_step(world);

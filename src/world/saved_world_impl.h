@@ -67,7 +67,14 @@ void serialize(A& archive, Pose& v) {
 template <class A>
 void serialize(A& archive, Box& v) {
   auto& [min, max] = v;
-  archive(min, max);
+  if constexpr (std::is_same_v<A, InArchive>) {  // the box of nothing, and one without end, have the largest numbers
+    for (Vec3* corner : {&min, &max}) {
+      archive.take(corner->data(), 3 * sizeof(double));
+      if (corner->hasNaN()) throw ArchiveFault("a box has no corner");
+    }
+  } else {
+    archive(min, max);
+  }
 }
 template <class A>
 void serialize(A& archive, Color& v) {
@@ -115,7 +122,7 @@ void serialize(A& archive, ParticleGraph& v) {
 template <class A>
 void serialize(A& archive, ClusterSet& v) {
   auto& [offsets, members, weights, seeds, radii] = v;
-  archive(offsets, members, weights, seeds, radii);
+  archive(offsets, members, weights, seeds, endless(radii));
 }
 template <class A>
 void serialize(A& archive, ClusterRest& v) {
@@ -187,8 +194,8 @@ void serialize(A& archive, BodyModel& v) {
   auto of_cells = lattice ? *lattice : CellLattice();
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
   archive(of_cells, cell_mass, regions, clamp_points, carried);
-  archive(rest, masses, match_masses, held, any_fixed, graph, clusters, shape, elastic, most_spread_inverse,
-          specific_stiffness, poissons_ratio, highest_frequency, surface, binding, solid, incised, spacing, rest_volume,
+  archive(rest, masses, match_masses, held, any_fixed, graph, clusters, shape, elastic,
+          endless(most_spread_inverse), specific_stiffness, poissons_ratio, highest_frequency, surface, binding, solid, incised, spacing, rest_volume,
           rest_area, mass, next_patch);
   if constexpr (std::is_same_v<A, InArchive>) {
     if (!of_cells.cells.empty()) lattice = std::make_shared<CellLattice>(std::move(of_cells));

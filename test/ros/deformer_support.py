@@ -120,6 +120,7 @@ class OwnNode:
     """A deformer_node of this test, with these private parameters; `prefix` goes before its command."""
 
     count = 0
+    signal = 9  # the last that was sent
 
     def __init__(self, prefix=(), **parameters):
         OwnNode.count += 1
@@ -164,16 +165,21 @@ class OwnNode:
 
     def end(self, signal_number=15):
         """Its exit code after that signal."""
+        self.signal = signal_number
         self.process.send_signal(signal_number)
         return self.process.wait(LONG)
 
     def __enter__(self):
         return self.wait()
 
-    def __exit__(self, *unused):
+    def __exit__(self, failure=None, *unused):
+        """A crash counts, at shutdown too. 1 is how it refuses to start."""
         if self.process.poll() is None:
-            self.end(9)
+            self.end(9 if failure else 15)
+        code, output = self.process.poll(), self.output()
         self.log.close()
+        if code not in ((0, 1, -9) if self.signal == 9 else (0, 1)) and not failure:
+            raise AssertionError('the node ended with %s: %s' % (code, output))
 
 
 def law_holds(law, holds):

@@ -19,12 +19,19 @@ inline double share() {
   return percent > 0.0 ? percent / 100.0 : 1.0;
 }
 
+/// Which sample: the next takes the cases beside, so that all have had their turn after 1 / share() of them.
+inline double seed() {
+  const char* text = std::getenv("MESHLESS_SURGERY_SEED");
+  return text ? std::strtod(text, nullptr) : 0.0;
+}
+
 /// The part of a table that share() asks for, spread over all of it.
 template <class T>
 std::vector<T> thinned(const std::vector<T>& all) {
   std::vector<T> some;
+  const double shift = std::fmod(share() * seed(), 1.0);
   for (std::size_t i = 0; i < all.size(); ++i)
-    if (std::floor(share() * static_cast<double>(i + 1)) > std::floor(share() * static_cast<double>(i)))
+    if (std::floor(shift + share() * static_cast<double>(i + 1)) > std::floor(shift + share() * static_cast<double>(i)))
       some.push_back(all[i]);
   return some;
 }

@@ -1,9 +1,14 @@
 #include "meshless_surgery/world/command_log.h"
 
+#include <cstdlib>
+#include <cstring>
 #include <sstream>
+
+#include <zlib.h>
 
 #include "meshless_surgery/world/saved_world.h"
 #include "support/bodies.h"
+#include "support/forged.h"
 #include "support/random.h"
 
 namespace meshless {
@@ -225,6 +230,37 @@ TEST(CommandLog, OtherFilesAndDamagedOnesAreRefused) {
     } else {
       EXPECT_FALSE(report.error().detail.empty());
     }
+  }
+}
+
+// A record with a number that no hand gives, checksum and all. What lies farther off than a second of steps is left out.
+TEST(CommandLog, ForgedAtRandom) {
+  const char* text = std::getenv("MESHLESS_SURGERY_FORGED");
+  const Session s = session();
+  const auto wordAt = [](const std::string& bytes, std::size_t at) {
+    std::uint32_t word = 0;
+    std::memcpy(&word, bytes.data() + at, sizeof word);
+    return word;
+  };
+  std::vector<std::size_t> records;
+  for (std::size_t at = 12; at < s.log.size(); at += 8 + wordAt(s.log, at)) records.push_back(at);
+  ASSERT_GT(records.size(), 20u);
+  for (int seed = 1; seed <= (text ? std::atoi(text) : 20); ++seed) {
+    const test::TimeLimit limit("seed " + std::to_string(seed));
+    test::Random random(static_cast<unsigned>(seed));
+    const std::size_t at = records[static_cast<std::size_t>(random.integer(1, static_cast<int>(records.size()) - 1))];
+    const std::size_t length = wordAt(s.log, at);
+    std::string body = s.log.substr(at + 8, length);
+    test::forgeNumber(random, body, random.integer(0, 9) ? 9 : 1);  // the step now and then
+    std::uint64_t step = 0;
+    std::memcpy(&step, body.data() + 1, sizeof step);
+    if (step > 2000 && step < 2000000) continue;
+    const auto sum = static_cast<std::uint32_t>(
+        crc32_z(crc32_z(0, nullptr, 0), reinterpret_cast<const Bytef*>(body.data()), body.size()));
+    std::string forged = s.log;
+    forged.replace(at + 8, length, body);
+    std::memcpy(&forged[at + 4], &sum, sizeof sum);
+    (void)replayed(forged);
   }
 }
 

@@ -2,7 +2,9 @@
 // size is checked against the bytes that are left before memory is taken, and every fault throws ArchiveFault.
 #pragma once
 
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <optional>
 #include <set>
 #include <stdexcept>
@@ -90,13 +92,34 @@ struct IsPlain<std::array<T, n>> : IsPlain<T> {};
 template <class T, int rows, int columns>
 struct IsPlain<Eigen::Matrix<T, rows, columns>> : std::bool_constant<(rows > 0 && columns > 0 && IsPlain<T>::value)> {};
 
+/// No number of a world is larger: squares and products of a few coordinates stay finite.
+constexpr double kMostNumber = 1e100, kMostCoordinate = 1e20;
+inline void requireNumbers(const double* values, std::size_t count, double most) {
+  for (const double* value = values; value != values + count; ++value)
+    if (!(std::abs(*value) <= most)) throw ArchiveFault("a number is " + std::to_string(*value));
+}
+template <class T>
+void requireNumbers(const T*, std::size_t) {}
+inline void requireNumbers(const double* values, std::size_t count) { requireNumbers(values, count, kMostNumber); }
+template <std::size_t n>
+void requireNumbers(const std::array<double, n>* values, std::size_t count) {
+  if (count > 0) requireNumbers(values->data(), n * count, kMostNumber);
+}
+template <int rows, int columns>
+void requireNumbers(const Eigen::Matrix<double, rows, columns>* values, std::size_t count) {
+  if (count > 0) requireNumbers(values->data(), rows * columns * count,
+                                rows * columns == 3 ? kMostCoordinate : kMostNumber);
+}
+
 template <class Out, class T, std::enable_if_t<IsPlain<T>::value, int> = 0>
 void save(ByteOutput<Out>& out, const T& value) {
   static_cast<Out&>(out).put(&value, sizeof value);
 }
+/// Numbers that are none are refused here, once for all that is read.
 template <class T, std::enable_if_t<IsPlain<T>::value, int> = 0>
 void load(InArchive& in, T& value) {
   in.take(&value, sizeof value);
+  requireNumbers(&value, 1);
 }
 
 // Another byte than 0 or 1 is no bool.
@@ -136,7 +159,10 @@ template <class Out>
 void save(ByteOutput<Out>& out, const Quat& value) {
   static_cast<Out&>(out).put(value.coeffs().data(), 4 * sizeof(double));
 }
-inline void load(InArchive& in, Quat& value) { in.take(value.coeffs().data(), 4 * sizeof(double)); }
+inline void load(InArchive& in, Quat& value) {
+  in.take(value.coeffs().data(), 4 * sizeof(double));
+  requireNumbers(value.coeffs().data(), 4, 2.0);
+}
 
 template <class Out>
 void save(ByteOutput<Out>& out, const std::string& value) {
@@ -171,6 +197,7 @@ void load(InArchive& in, std::vector<T>& values) {
     in.need(size, sizeof(T));
     values.resize(size);
     in.take(values.data(), size * sizeof(T));
+    requireNumbers(values.data(), values.size());
   } else {
     in.need(size, 1);
     // One after another: a size that lies runs out of bytes before it takes much memory.
@@ -180,6 +207,38 @@ void load(InArchive& in, std::vector<T>& values) {
       values.push_back(std::move(value));
     }
   }
+}
+
+/// Numbers that may be infinite: archive(endless(vector)).
+struct Endless {
+  std::vector<double>& values;
+};
+inline Endless endless(std::vector<double>& values) { return {values}; }
+template <class Out>
+void save(ByteOutput<Out>& out, const Endless& endless) {
+  save(out, endless.values);
+}
+inline void load(InArchive& in, Endless& endless) {
+  std::uint64_t size = 0;
+  in.take(&size, sizeof size);
+  in.need(size, sizeof(double));
+  endless.values.resize(size);
+  in.take(endless.values.data(), size * sizeof(double));
+  for (const double value : endless.values)
+    if (value != std::numeric_limits<double>::infinity()) requireNumbers(&value, 1);
+}
+/// One of them.
+struct EndlessNumber {
+  double& value;
+};
+inline EndlessNumber endless(double& value) { return {value}; }
+template <class Out>
+void save(ByteOutput<Out>& out, const EndlessNumber& endless) {
+  save(out, endless.value);
+}
+inline void load(InArchive& in, EndlessNumber& endless) {
+  in.take(&endless.value, sizeof endless.value);
+  if (endless.value != std::numeric_limits<double>::infinity()) requireNumbers(&endless.value, 1);
 }
 
 template <class Out, class T>
