@@ -101,6 +101,8 @@ void ClampStep::factorise(const Clamp& clamp, double share) {
   Matrix system(n, n);
   system.setFromTriplets(entries.begin(), entries.end());
   const Eigen::SimplicialLLT<Matrix, Eigen::Lower> factor(system);
+  order_.clear();
+  if (factor.info() != Eigen::Success) return;  // masses that no double can weigh against each other: nothing is held
   order_.resize(clamp.corners.size());
   masses_.resize(clamp.corners.size());
   for (Eigen::Index i = 0; i < n; ++i) {

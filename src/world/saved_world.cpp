@@ -184,6 +184,9 @@ SavedWorldPtr readWorld(InArchive& archive) {
 
 namespace {
 
+// Of mass or length: its powers and its inverse are numbers.
+bool isQuantity(double value) { return value > 1e-50 && value < 1e50; }
+
 // Of a body with a lattice.
 std::string faultOfRegions(const BodyModel& m) {
   const auto isShare = [](double share) { return share > 0.0 && share < 1e300; };
@@ -212,10 +215,12 @@ std::string faultOf(const BodyModel& m) {
   if (m.masses.size() != particles || m.match_masses.size() != particles || m.fixed.size() != particles)
     return "a body's masses are not those of its particles";
   for (std::size_t i = 0; i < particles; ++i)
-    if (!(m.masses[i] > 0.0) || !(m.match_masses[i] > 0.0)) return "a particle has no mass";
+    if (!isQuantity(m.masses[i]) || !isQuantity(m.match_masses[i])) return "a particle has no mass";
   if (!areRows(m.graph.offsets, particles, m.graph.neighbours.size()) ||
       m.graph.lengths.size() != m.graph.neighbours.size() || !allBelow(m.graph.neighbours, particles))
     return "a body's graph is not that of its particles";
+  if (!std::all_of(m.graph.lengths.begin(), m.graph.lengths.end(), [](double length) { return length >= 0.0; }))
+    return "a body's graph has a length below nothing";
   if (clusters == 0 || !areRows(m.clusters.offsets, clusters, m.clusters.members.size()) ||
       m.clusters.weights.size() != m.clusters.members.size() || !allBelow(m.clusters.members, particles) ||
       m.clusters.seeds.size() != clusters || m.clusters.radii.size() != clusters ||
@@ -229,7 +234,7 @@ std::string faultOf(const BodyModel& m) {
   if (m.lattice) {
     const std::vector<LatticeCell>& cells = m.lattice->cells;
     if (cells.size() != clusters || m.clusters.members.size() != 8 * clusters || m.lattice->corners != particles ||
-        !(m.lattice->spacing > 0.0) || !(m.cell_mass > 0.0))
+        !isQuantity(m.lattice->spacing) || !isQuantity(m.cell_mass))
       return "a body's lattice is not that of its clusters";
     for (Index c = 0; c < cells.size(); ++c) {
       const LatticeCell& cell = cells[c];
