@@ -156,7 +156,11 @@ TEST(CommandLog, AMaterialThatWasRefusedChangesNobodyInAReplay) {
   std::string log;
   world.record([&log](std::string bytes) { log += bytes; });
   SetMaterialCommand refused;
-  refused.change = [](const Material&) { return Result<Material>(Material()); };
+  refused.change = [](const Material&) {
+    Material other;  // an appearance material
+    other.density = 500.0;
+    return Result<Material>(other);
+  };
   const auto reply = world.apply(refused);
   ASSERT_FALSE(reply.ok());
   EXPECT_NE(reply.error().detail.find("regions"), std::string::npos);
