@@ -11,8 +11,8 @@ namespace {
 using Names = std::set<std::string>;
 using Act = std::function<void(World&)>;
 
-constexpr double kEdge = 0.1;    // [m]
-constexpr double kApart = 0.4;   // [m]
+constexpr double kEdge = 0.1;     // [m]
+constexpr double kApart = 0.4;    // [m]
 constexpr double kRadius = 0.03;  // [m] of the sphere
 constexpr PickId kPick = 1;
 
@@ -98,7 +98,7 @@ struct Row {
   Command command;
   Names wake;
   std::vector<Command> before = {};
-  int steps = 1;                     // until it is looked at
+  int steps = 1;  // until it is looked at
   bool refused = false;
   bool rested = false;  // all sleep again after what was before
 };
@@ -174,8 +174,12 @@ std::vector<Row> rows(const Kind& kind, const Vec3& pressed) {
       {"sphere placed elsewhere", sphereAt(Vec3(0, -0.078, 0.06)), both(kTower, kBeneath)},
       {"sphere moved a little", sphereAt(pressed + Vec3(0, 0, 1e-4)), kBeneath},
       {"sphere told where it is", sphereAt(pressed), {}},
-      {"a sphere that a service placed is not lifted by silence", lift(ToolKind::kPush, true), {},
-       {sphereAt(pressed, false)}, 1, true},
+      {"a sphere that a service placed is not lifted by silence",
+       lift(ToolKind::kPush, true),
+       {},
+       {sphereAt(pressed, false)},
+       1,
+       true},
       {"cut", cutAcross("low"), pieces},
       {"cut that misses", cutAcross("alone"), {}, {}, 1, true},
       {"blades that close", cutAcross("low", 1.0), {}, {}, 5},
@@ -186,7 +190,13 @@ std::vector<Row> rows(const Kind& kind, const Vec3& pressed) {
       {"incision", incise, kTower},
       {"undo of a cut", UndoCutCommand{}, kTower, {cutAcross("low")}},
       {"undo of an incision", UndoCutCommand{}, kTower, {incise}},
-      {"undo when all sleep again", UndoCutCommand{}, both(kTower, kHeld), {incise, ReleaseCommand{kPick}}, 1, false, true},
+      {"undo when all sleep again",
+       UndoCutCommand{},
+       both(kTower, kHeld),
+       {incise, ReleaseCommand{kPick}},
+       1,
+       false,
+       true},
       {"undo of nothing", UndoCutCommand{}, {}, {}, 1, true},
       {"material", material("low", 900.0), kTower},
       {"material of all", material("", 900.0), kAll},
