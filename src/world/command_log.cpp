@@ -99,17 +99,12 @@ void load(InArchive& archive, SpawnCommand& v) {
 // Materials are logged as they came out, see record().
 void save(OutArchive&, const SetMaterialCommand&) { assert(false); }
 void load(InArchive&, SetMaterialCommand&) { throw ArchiveFault("a material's change is no command of a log"); }
-
-namespace {
-
-struct MaterialChange {
-  std::string body;
-  Material material;
-};
 template <class A>
 void serialize(A& archive, MaterialChange& v) {
   archive(v.body, v.material);
 }
+
+namespace {
 
 template <std::size_t kind = 0>
 Command readCommand(InArchive& archive, std::uint8_t wanted) {
@@ -181,14 +176,8 @@ void World::recordHash() const {
 void World::Impl::record(const Command& command) const {
   if (!record_sink) return;
   if (const auto* change = std::get_if<SetMaterialCommand>(&command)) {
-    std::vector<MaterialChange> changes;
-    for (const auto& body : bodies) {
-      if (!change->body.empty() && body->name != change->body) continue;
-      const Result<Material> changed = change->change(body->material);
-      if (!changed || !changed->validate()) return;  // it will be refused
-      changes.push_back({body->name, *changed});
-    }
-    emit(record_sink, RecordKind::kMaterials, step, changes);
+    const Result<std::vector<MaterialChange>> changes = changesOf(*change);
+    if (changes) emit(record_sink, RecordKind::kMaterials, step, *changes);
     return;
   }
   std::visit(

@@ -224,6 +224,7 @@ Status World::addObstacle(ObstacleDef obstacle) {
       return Error{ErrorCode::kDuplicateName, "there is an obstacle '" + obstacle.name + "' already"};
   if (Status status = checkObstacle(obstacle); !status) return status.error();
   w.obstacles.push_back(std::make_shared<WorldObstacle>(std::move(obstacle)));
+  w.wakeWithin(w.obstacles.back()->bounds);
   return Done{};
 }
 

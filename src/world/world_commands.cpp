@@ -127,35 +127,41 @@ Result<Reply> World::Impl::apply(const LockCommand& command) {
 Result<Reply> World::Impl::apply(const ReleaseCommand& command) {
   const Pick* pick = findPick(command.pick);
   if (!pick) return noPick(command.pick, picks);
-  WorldBody* body = find(pick->body);
-  if (body) wake(*body);
-  say(EventType::kReleased, body ? body->name : "", command.pick, "released");
-  picks.erase(picks.begin() + (pick - picks.data()));
+  letGo(*pick);
   return Reply(Done{});
 }
 
 Result<Reply> World::Impl::apply(const ClearPicksCommand&) {
-  for (const Pick& pick : picks) {
-    WorldBody* body = find(pick.body);
-    if (body) wake(*body);
-    say(EventType::kReleased, body ? body->name : "", pick.id, "released");
-  }
-  picks.clear();
+  while (!picks.empty()) letGo(picks.front());
   return Reply(Done{});
 }
 
+std::string World::Impl::letGo(const Pick& pick) {
+  WorldBody* body = find(pick.body);
+  if (body) wake(*body);
+  const std::string name = body ? body->name : "";
+  say(EventType::kReleased, name, pick.id, "released");
+  picks.erase(picks.begin() + (&pick - picks.data()));
+  return name;
+}
+
+void World::Impl::wakeAtSphere() {
+  if (!push.enabled) return;
+  Box box;
+  box.extend(push.position.array() - push.radius);
+  box.extend(push.position.array() + push.radius);
+  wakeWithin(box);
+}
+
+void World::Impl::liftSphere() {
+  wakeAtSphere();
+  push = PushSphere();
+  for (auto& body : bodies) body->touched_by_push = false;
+}
+
 Result<Reply> World::Impl::apply(const PushCommand& command) {
-  const auto wakeAround = [this] {
-    if (!push.enabled) return;
-    Box box;
-    box.extend(push.position.array() - push.radius);
-    box.extend(push.position.array() + push.radius);
-    wakeWithin(box);
-  };
   if (!command.enable) {
-    wakeAround();
-    push = PushSphere();
-    for (auto& body : bodies) body->touched_by_push = false;
+    liftSphere();
     return Reply(Done{});
   }
   if (!command.position.allFinite()) return notFinite("position");
@@ -169,12 +175,12 @@ Result<Reply> World::Impl::apply(const PushCommand& command) {
   push.streamed = command.streamed;
   if (!from_nowhere && radius == push.radius && command.position == push.target && push.position == push.target)
     return Reply(Done{});
-  wakeAround();
+  wakeAtSphere();
   push.enabled = true;
   push.radius = radius;
   push.target = command.position;
   if (from_nowhere || command.speed == 0.0) push.position = command.position;
-  wakeAround();
+  wakeAtSphere();
   return Reply(Done{});
 }
 
@@ -185,17 +191,14 @@ Result<Reply> World::Impl::apply(const LiftCommand& command) {
     case ToolKind::kPick: {
       const auto held = std::find_if(picks.rbegin(), picks.rend(), [](const Pick& pick) { return !pick.locked; });
       if (held == picks.rend()) return Error{ErrorCode::kMissed, "no pick is in the hand"};
-      if (const WorldBody* of = find(held->body)) body = of->name;
       id = held->id;
-      say(EventType::kReleased, body, id, "released");
-      picks.erase(std::next(held).base());
+      body = letGo(*held);
       break;
     }
     case ToolKind::kPush:
       if (!push.enabled || (command.streamed_only && !push.streamed))
         return Error{ErrorCode::kMissed, "there is no push sphere to lift"};
-      push = PushSphere();
-      for (auto& touched : bodies) touched->touched_by_push = false;
+      liftSphere();
       break;
     case ToolKind::kScissors:
       if (command.streamed_only && !closing.empty()) return Error{ErrorCode::kMissed, "a service closes the scissors"};
@@ -206,10 +209,8 @@ Result<Reply> World::Impl::apply(const LiftCommand& command) {
   return Reply(Done{});
 }
 
-Result<Reply> World::Impl::apply(const SetMaterialCommand& command) {
-  if (!command.body.empty() && !find(command.body))
-    return Error{ErrorCode::kUnknownName, "there is no body '" + command.body + "'; " + knownBodies()};
-  std::vector<std::pair<WorldBody*, Material>> changes;
+Result<std::vector<MaterialChange>> World::Impl::changesOf(const SetMaterialCommand& command) const {
+  std::vector<MaterialChange> changes;
   for (auto& body : bodies) {
     if (!command.body.empty() && body->name != command.body) continue;
     Result<Material> changed = command.change(body->material);
@@ -218,9 +219,18 @@ Result<Reply> World::Impl::apply(const SetMaterialCommand& command) {
     if (!body->model->regions.empty() && !changed->elastic())
       return Error{ErrorCode::kInvalidArgument, "body '" + body->name + "' has regions, and '" + changed->name +
                                                     "' is an appearance material; accepted: elastic materials"};
-    changes.emplace_back(body.get(), std::move(*changed));
+    changes.push_back({body->name, std::move(*changed)});
   }
-  for (auto& [body, material] : changes) {
+  if (changes.empty() && !command.body.empty())
+    return Error{ErrorCode::kUnknownName, "there is no body '" + command.body + "'; " + knownBodies()};
+  return changes;
+}
+
+Result<Reply> World::Impl::apply(const SetMaterialCommand& command) {
+  const Result<std::vector<MaterialChange>> changes = changesOf(command);
+  if (!changes) return changes.error();
+  for (const auto& [name, material] : *changes) {
+    WorldBody* body = find(name);
     wake(*body);
     batches_current = contacts_current = false;
     body->model = withMaterial(body->model, body->material, material);

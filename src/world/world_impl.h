@@ -30,6 +30,12 @@ struct ContactModel {
   mutable std::array<std::unique_ptr<const SelfContactSet>, 2> self_;
 };
 
+/// Of a body, by its name.
+struct MaterialChange {
+  std::string body;
+  Material material;
+};
+
 /// A surface that never moves, as contact sees it.
 struct WorldObstacle {
   explicit WorldObstacle(ObstacleDef of_def);
@@ -266,6 +272,11 @@ struct World::Impl {
   Result<Reply> apply(const SetMaterialCommand& command);
   Result<Reply> apply(const SpawnCommand& command);
   Result<Reply> apply(const RemoveCommand& command);
+  /// What the command would change, or why it is refused.
+  Result<std::vector<MaterialChange>> changesOf(const SetMaterialCommand& command) const;
+  std::string letGo(const Pick& pick);  // one of picks; the name of its body
+  void wakeAtSphere();
+  void liftSphere();
   CutUndo beforeCut() const;
   void rememberCut(CutUndo before, std::vector<std::string> cut, std::vector<std::string> pieces);
   Status checkCut(const CutCommand& command);

@@ -46,7 +46,25 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
   std::vector<BodyId> gone;
   for (const auto& body : bodies)
     if (contains(before.pieces, body->name) || contains(before.cut, body->name)) gone.push_back(body->id);
-  for (const BodyId& id : gone) retire(id);
+  for (const BodyId& id : gone) {
+    wake(*find(id));
+    retire(id);
+  }
+
+  // The picks of a body, as they are and as they were.
+  const auto holdsAsThen = [&](const WorldBody& body) {
+    std::vector<std::pair<PickId, Vec3>> now, then;
+    for (const Pick& pick : picks)
+      if (pick.body == body.id) now.emplace_back(pick.id, pick.target);
+    for (std::size_t i = 0; i < before.picks.size(); ++i)
+      if (before.pick_bodies[i] == body.name) then.emplace_back(before.picks[i].id, before.picks[i].target);
+    return now == then;
+  };
+  // What pressed then is not what presses now.
+  const auto forgetContacts = [this](const WorldBody& body) {
+    contacts.forget(body.number);
+    surface_contacts.forget(body.number);
+  };
 
   std::size_t place = 0;  // in the order of bodies
   for (CutUndo::Body& was : before.bodies) {
@@ -54,14 +72,18 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
       WorldBody& body = admit(was.name, std::move(was.material), std::move(was.model), std::move(was.state));
       body.number = was.number;  // the same body as before, not a new one
       body.surface_current = was.surface_current;
+      forgetContacts(body);
       std::rotate(bodies.begin() + static_cast<std::ptrdiff_t>(place), bodies.end() - 1, bodies.end());
       ++place;
     } else if (WorldBody* body = find(was.name)) {  // removed since: stays so
-      // The others too are where they were: tissue that has moved into the gap would be inside of what comes back.
-      if (body->state.positions.size() == was.state.positions.size()) {
+      // The others too are where they were: tissue that has moved into the gap would be inside of what comes back. Who
+      // slept all the while, does so on.
+      const bool slept = body->asleep && body->state.positions == was.state.positions;
+      if ((!slept || !holdsAsThen(*body)) && body->state.positions.size() == was.state.positions.size()) {
         body->state = std::move(was.state);
         body->surface_current = was.surface_current;
         body->low_current = false;
+        forgetContacts(*body);
         wake(*body);
       }
       ++place;
@@ -70,8 +92,6 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
 
   contacts_current = false;
   meetings.clear();
-  contacts.clear();  // what pressed then is not what presses now
-  surface_contacts.clear();
 
   picks.clear();
   for (std::size_t i = 0; i < before.picks.size(); ++i) {

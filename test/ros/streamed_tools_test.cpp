@@ -226,6 +226,21 @@ TEST(StreamedTools, TheSphereAppearsPushesAndIsLiftedOff) {
   EXPECT_EQ(bench.said(EventType::kLifted).size(), 1u);
 }
 
+TEST(StreamedTools, WhoSleepsUnderAToolWakesWhenItsStreamFallsSilent) {
+  for (const std::size_t tool : {kPick, kPush}) {
+    ToolBench bench(slowTools());
+    const PickReply picked = bench.pick();
+    if (tool == kPush) ASSERT_TRUE(bench.world->apply(LockCommand{picked.pick, {}}).ok());
+    bench.hands[tool] = still(tool == kPick ? picked.position : Vec3(0.06999, 0, 0));
+    bench.run(1.5);
+    EXPECT_TRUE(bench.world->snapshot({}).bodies[0].asleep) << tool;
+    EXPECT_TRUE(bench.said(EventType::kAwake).empty()) << tool;
+    bench.hands[tool] = {};
+    bench.run(bench.settings.tools_silence + 0.1);
+    EXPECT_FALSE(bench.world->snapshot({}).bodies[0].asleep) << tool;
+  }
+}
+
 TEST(StreamedTools, ASphereThatAServicePlacedStays) {
   ToolBench bench(slowTools());
   bench.hands[kPush] = still(Vec3(0, 0, 1.0));

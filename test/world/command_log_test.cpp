@@ -149,6 +149,33 @@ TEST(CommandLog, ReplaysToTheSameHash) {
   }
 }
 
+// The first body alone would take the material.
+TEST(CommandLog, AMaterialThatWasRefusedChangesNobodyInAReplay) {
+  World world{WorldSettings()};
+  ASSERT_TRUE(world.addSceneBody(test::shared(test::ball())).ok());
+  BodyDef mixed = test::block("mixed", Vec3(0.4, 0, 0.2));
+  mixed.spacing = 0.05;
+  mixed.material.youngs_modulus = 1e4;
+  mixed.regions = {{Region::sphere(Vec3(0.05, 0, 0), 0.04), mixed.material}};
+  ASSERT_TRUE(world.addSceneBody(test::shared(mixed)).ok());
+  std::string log;
+  world.record([&log](std::string bytes) { log += bytes; });
+  SetMaterialCommand refused;
+  refused.change = [](const Material&) {
+    Material other;  // an appearance material
+    other.density = 500.0;
+    return Result<Material>(other);
+  };
+  const auto reply = world.apply(refused);
+  ASSERT_FALSE(reply.ok());
+  EXPECT_NE(reply.error().detail.find("regions"), std::string::npos);
+  run(world, 5);
+  world.record(nullptr);
+  const auto report = replayed(log);
+  ASSERT_TRUE(report.ok());
+  EXPECT_FALSE(report->difference.has_value());
+}
+
 TEST(CommandLog, TheLogDoesNotChangeTheWorldAndIsTheSameAgain) {
   const Session once = session(), again = session(true, 2);
   EXPECT_EQ(once.hash, again.hash);

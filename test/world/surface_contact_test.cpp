@@ -522,30 +522,6 @@ TEST(SurfaceContact, WhatSleepsUnderThePushSphereIsPressedAsBeforeAndAPoseThatSt
   EXPECT_NEAR(boundsOf(seen(world).bodies[0].surface).max.z(), 0.05, 2e-3) << "it comes back";
 }
 
-TEST(SurfaceContact, APickThatIsToldWhereItIsLeavesItsBodyAsleep) {
-  World world(surface());
-  add(world, slab("slab", Vec3(0, 0, 0.0255), 2e4));
-  PickCommand pick;
-  pick.point = Vec3(0, 0, 0.05);
-  MovePickCommand move;
-  move.pick = replyOf<PickReply>(world.apply(pick)).pick;
-  move.target = Vec3(0, 0, 0.053);
-  for (int n = 0; n < 1200 && !seen(world).bodies[0].asleep; ++n) {
-    ASSERT_TRUE(world.apply(move).ok());
-    world.step();
-  }
-  ASSERT_TRUE(seen(world).bodies[0].asleep);
-  const Vec3 force = seen(world).picks[0].force;
-  EXPECT_GT(force.z(), 0.05);
-  ASSERT_TRUE(world.apply(move).ok());
-  run(world, 0.5);
-  EXPECT_TRUE(seen(world).bodies[0].asleep);
-  EXPECT_EQ((seen(world).picks[0].force - force).norm(), 0.0);
-  move.target.z() += 1e-4;
-  ASSERT_TRUE(world.apply(move).ok());
-  EXPECT_FALSE(seen(world).bodies[0].asleep);
-}
-
 // A hard crumb on a soft slab: the slab takes the substeps that it needs itself, and the crumb is slowed, which is
 // said. Where a hand holds the crumb its own motion is what counts.
 TEST(SurfaceContact, ASliverDoesNotMakeAllTakeItsSubsteps) {

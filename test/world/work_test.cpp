@@ -353,43 +353,6 @@ TEST(Sleep, ATowerThatTremblesWithinItsFramesSleeps) {
   EXPECT_EQ(reportOf(world).asleep, 4u);
 }
 
-/// Does something to tower 1 of three, steps once, and expects that tower and no other awake.
-void expectWakes(const std::string& what, const std::function<void(World&)>& act, const Names& expected) {
-  World world = sleepingTowers(3);
-  act(world);
-  world.step();
-  EXPECT_EQ(awakeBodies(world), expected) << what;
-}
-
-TEST(Sleep, APickWakesItsIslandAndNoOther) {
-  expectWakes("pick",
-              [](World& world) {
-                PickCommand pick;
-                pick.body = "high1";
-                pick.point = Vec3(0.5, 0.0, 2.0 * kCube);
-                replyOf<PickReply>(world.apply(pick));
-              },
-              {"low1", "high1"});
-}
-
-TEST(Sleep, AMovedPickAndItsReleaseWakeIt) {
-  for (const bool release : {false, true}) {
-    World world = sleepingTowers(2);
-    PickCommand pick;
-    pick.body = "low1";
-    pick.point = Vec3(0.5, 0.05, 0.05);
-    const PickReply picked = replyOf<PickReply>(world.apply(pick));
-    for (int step = 0; step < 1200 && reportOf(world).asleep < 4u; ++step) world.step();
-    ASSERT_EQ(reportOf(world).asleep, 4u) << "a pick that holds still lets its body sleep";
-    if (release)
-      replyOf<Done>(world.apply(ReleaseCommand{picked.pick}));
-    else
-      replyOf<Done>(world.apply(MovePickCommand{picked.pick, picked.position + Vec3(0, 0.02, 0)}));
-    world.step();
-    EXPECT_EQ(awakeBodies(world), (Names{"low1", "high1"})) << release;
-  }
-}
-
 // The spring of a sleeper keeps its force, and moves nothing.
 TEST(Sleep, ABodyThatSleepsOnAStretchedSpringMovesByNoBitAndTheSpringKeepsItsForce) {
   WorldSettings settings;
@@ -419,35 +382,7 @@ TEST(Sleep, ABodyThatSleepsOnAStretchedSpringMovesByNoBitAndTheSpringKeepsItsFor
   EXPECT_NEAR(world.snapshot({}).picks[0].force.norm(), force, 0.05 * force);
 }
 
-TEST(Sleep, AMaterialWakesItsIslandAndNoOther) {
-  expectWakes("material",
-              [](World& world) {
-                SetMaterialCommand set;
-                set.body = "low1";
-                set.change = [](const Material& m) {
-                  Material changed = m;
-                  changed.alpha = 0.5;
-                  return Result<Material>(changed);
-                };
-                replyOf<Done>(world.apply(set));
-              },
-              {"low1", "high1"});
-}
-
-TEST(Sleep, ARemovalWakesWhoLeanedOnIt) {
-  expectWakes("removal", [](World& world) { replyOf<Done>(world.apply(RemoveCommand{"low1"})); }, {"high1"});
-}
-
-TEST(Sleep, APushedSphereWakesWhoItReachesInTheSameStep) {
-  expectWakes("push",
-              [](World& world) {
-                PushCommand push;
-                push.radius = 0.03;
-                push.position = Vec3(0.5, -0.075, 0.06);
-                replyOf<Done>(world.apply(push));
-              },
-              {"low1", "high1"});
-  // On its way: asleep until it is there.
+TEST(Sleep, ASphereOnItsWayWakesWhoItReachesInTheSameStep) {
   World world = sleepingTowers(2);
   PushCommand push;
   push.radius = 0.03;
@@ -467,59 +402,6 @@ TEST(Sleep, APushedSphereWakesWhoItReachesInTheSameStep) {
       EXPECT_EQ(awakeBodies(world), Names());
   }
   EXPECT_TRUE(touched);
-}
-
-TEST(Sleep, ACutWakesItsIslandAndNoOther) {
-  World world = sleepingTowers(3);
-  CutCommand cut;
-  cut.blades.x_axis = Vec3::UnitY();
-  cut.blades.y_axis = Vec3::UnitZ();
-  cut.blades.origin = Vec3(0.51, -1.0, 0.5 * kCube);
-  cut.bodies = {"low1"};
-  const CutReply reply = replyOf<CutReply>(world.apply(cut));
-  ASSERT_EQ(reply.new_bodies.size(), 2u);
-  world.step();
-  Names expected{"high1"};
-  expected.insert(expected.end(), reply.new_bodies.begin(), reply.new_bodies.end());
-  EXPECT_EQ(awakeBodies(world), expected);
-}
-
-TEST(Sleep, AnIncisionWakesItsIslandAndNoOther) {
-  World world = sleepingTowers(3);
-  InciseCommand incise;
-  incise.blade.origin = Vec3(0.49, -0.03, 2.02 * kCube);
-  incise.blade.x_axis = Vec3::UnitY();
-  incise.blade.y_axis = Vec3::UnitZ();
-  incise.blade.length = 0.06;
-  incise.blade.depth = 0.03;
-  incise.bodies = {"high1"};
-  const InciseReply reply = replyOf<InciseReply>(world.apply(incise));
-  ASSERT_EQ(reply.cut_bodies.size(), 1u);
-  world.step();
-  const Names awake = awakeBodies(world);
-  EXPECT_EQ(awake.size(), 2u);
-  for (const std::string& name : awake) EXPECT_NE(name.find('1'), std::string::npos) << name;
-}
-
-TEST(Sleep, ABodyThatFallsOnItWakesAnIslandAsItArrives) {
-  World world = sleepingTowers(2);
-  replyOf<SpawnReply>(world.apply(SpawnCommand{test::shared(cube("stone", Vec3(0.5, 0.0, 3.5 * kCube)))}));
-  bool woken = false;
-  for (int step = 0; step < 120 && !woken; ++step) {
-    world.step();
-    const Names awake = awakeBodies(world);
-    woken = awake.size() > 1;
-    if (woken) EXPECT_EQ(awake, (Names{"low1", "high1", "stone"}));
-    const std::vector<Points> now = particlesOf(world);
-    double low = 1.0, top = 0.0;
-    for (const Vec3& p : now[4]) low = std::min(low, p.z());
-    for (const Vec3& p : now[3]) top = std::max(top, p.z());
-    if (!woken) {
-      EXPECT_GT(low, top - 1e-3 * kCube);
-      EXPECT_EQ(awake, Names{"stone"});
-    }
-  }
-  EXPECT_TRUE(woken);
 }
 
 TEST(Sleep, WakingMovesNothingVisibly) {

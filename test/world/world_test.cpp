@@ -673,14 +673,16 @@ TEST(World, InspectGivesRestAndPresentShape) {
 }
 
 TEST(World, TheRestShapeIsWhereTheBodyWasPut) {
-  for (const bool elastic : {false, true}) {
+  for (const auto& [elastic, copied] : {std::pair(false, false), {false, true}, {true, false}, {true, true}}) {
     BodyDef def = test::defOf(boxMesh(Vec3(0.1, 0.06, 0.04), 4, 3, 2), "bar");
     if (elastic) def.material.youngs_modulus = 5e3;
+    PreparedBody body = test::prepared(def);
     def.pose = {Quat(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized())), Vec3(0.3, -0.2, 0.5)};
     Points put;
     for (const Vec3& v : def.mesh.vertices) put.push_back(def.pose * v);
     World world{WorldSettings()};
-    ASSERT_TRUE(world.addSceneBody(test::shared(def)).ok());
+    body = copied ? placedCopy(body, "bar", def.pose) : test::prepared(def);
+    ASSERT_TRUE(world.addSceneBody(std::make_shared<const PreparedBody>(std::move(body))).ok());
     for (int cut = 0; cut < 2; ++cut) {
       run(world, 30);
       for (const BodySnapshot& body : world.snapshot({}).bodies) {
@@ -688,7 +690,7 @@ TEST(World, TheRestShapeIsWhereTheBodyWasPut) {
         std::size_t found = 0;
         for (const Vec3& p : rest.surface)
           found += std::any_of(put.begin(), put.end(), [&](const Vec3& q) { return (p - q).norm() < 1e-12; });
-        EXPECT_GE(found, cut ? put.size() / 4 : put.size()) << body.name << ", elastic " << elastic;
+        EXPECT_GE(found, cut ? put.size() / 4 : put.size()) << body.name << ", elastic " << elastic << ", copy " << copied;
         Box of_particles, of_surface;
         for (const Vec3& p : rest.particles) of_particles.extend(p);
         for (const Vec3& p : rest.surface) of_surface.extend(p);
