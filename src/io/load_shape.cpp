@@ -3,7 +3,7 @@
 #include <sstream>
 
 #include "meshless_surgery/geometry/surface_from_points.h"
-#include "meshless_surgery/io/files.h"
+#include "meshless_surgery/io/cloud_shape.h"
 
 namespace meshless {
 
@@ -20,12 +20,15 @@ Result<LoadedShape> loadShape(const std::string& real_path, double scale, MeshRe
   TriangleMesh mesh = std::move(*read);
   for (Vec3& p : mesh.vertices) p *= scale;
   if (mesh.triangles.empty()) {
+    std::vector<std::string> strays;
+    mesh.vertices = withoutStrays(mesh.vertices, strays);
     Result<SurfaceFromPoints> surface = surfaceFromPoints(mesh.vertices);
     if (!surface) return Error{surface.error().code, "'" + name + "': " + surface.error().detail};
     std::ostringstream note;
     note << name << " is a cloud of " << mesh.vertices.size() << " points; surface by " << surface->method
          << ", points from it at most " << surface->max_distance << " m, on average " << surface->mean_distance << " m";
     shape.notes.push_back(note.str());
+    for (const std::string& stray : strays) shape.notes.push_back(name + ": " + stray);
     mesh = std::move(surface->mesh);
   }
   Result<RepairedMesh> repaired = repairMesh(mesh, repair);

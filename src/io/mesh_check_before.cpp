@@ -217,7 +217,164 @@ Result<PromisedCounts> checkStl(const std::string& name, std::string_view text) 
   return PromisedCounts{};
 }
 
+/// Whether an OBJ line ends in a backslash.
+bool continues(std::string_view line) {
+  while (!line.empty() && isBlank(line.back())) line.remove_suffix(1);
+  return !line.empty() && line.back() == '\\';
+}
+
+/// The words of the next line of an OFF file that has any, without its comment; empty at the end.
+std::vector<std::string> offWords(std::string_view& text, std::size_t& line_number) {
+  std::vector<std::string> words;
+  for (std::string_view line; words.empty() && nextLine(text, line);) {
+    ++line_number;
+    words = wordsOf(line.substr(0, std::min(line.find('#'), kMaxLine)));
+  }
+  return words;
+}
+
+struct PlyProperty {
+  std::size_t bytes = 0, size_bytes = 0;  // of a number; of a list's size, 0 where it is no list
+  bool signed_size = false;
+};
+
+/// Where `count` items of such properties end that begin at `at`; nothing where the data ends first.
+std::optional<std::size_t> endOfItems(std::string_view data, std::size_t at, double count,
+                                      const std::vector<PlyProperty>& properties, bool big_endian) {
+  std::size_t fixed = 0;
+  bool has_list = false;
+  for (const PlyProperty& property : properties) {
+    fixed += property.bytes;
+    has_list = has_list || property.size_bytes > 0;
+  }
+  if (!has_list) {
+    const double end = static_cast<double>(at) + count * static_cast<double>(fixed);
+    if (!(end <= static_cast<double>(data.size()))) return std::nullopt;
+    return static_cast<std::size_t>(end);
+  }
+  for (double k = 0.0; k < count; ++k)
+    for (const PlyProperty& property : properties) {
+      double items = 1.0;
+      if (property.size_bytes > 0) {
+        if (property.size_bytes > data.size() - at) return std::nullopt;
+        items = listSize(data.data() + at, property.size_bytes, property.signed_size, big_endian);
+        at += property.size_bytes;
+      }
+      if (!(items >= 0.0 && items * static_cast<double>(property.bytes) <= static_cast<double>(data.size() - at)))
+        return std::nullopt;
+      at += static_cast<std::size_t>(items) * property.bytes;
+    }
+  return at;
+}
+
 }  // namespace
+
+Result<std::string> withoutOtherElements(const std::string& name, std::string_view text) {
+  struct Element {
+    double count;
+    bool other;
+    std::vector<PlyProperty> properties;
+  };
+  std::vector<Element> elements;
+  std::string plain, format;
+  bool ended = false, has_others = false;
+  std::string_view head = headOf(text);
+  const std::size_t head_size = head.size();
+  for (std::string_view line; !ended && nextLine(head, line);) {
+    const std::vector<std::string> w = wordsOf(line);
+    const std::string word = w.empty() ? "" : w[0];
+    if (word == "format" && w.size() > 1) format = w[1];
+    ended = word == "end_header";
+    if (word == "element") {
+      const double count = w.size() == 3 ? countOf(w[2]) : std::nan("");
+      if (!(count <= static_cast<double>(text.size()))) return std::string();
+      // Strips are triangles: what has them is refused, and not read as a cloud.
+      const bool other = w[1] != "vertex" && w[1] != "face" && w[1] != "camera" && w[1] != "tristrips";
+      elements.push_back({count, other, {}});
+      has_others = has_others || other;
+    } else if (word == "property") {
+      const bool list = w.size() == 5 && w[1] == "list";
+      PlyProperty property;
+      property.bytes = list ? plyBytes(w[3]) : w.size() == 3 ? plyBytes(w[1]) : 0;
+      if (list) {
+        property.size_bytes = isWhole(w[2]) ? plyBytes(w[2]) : 0;
+        property.signed_size = w[2][0] != 'u';
+      }
+      if (elements.empty() || property.bytes == 0 || (list && property.size_bytes == 0)) return std::string();
+      elements.back().properties.push_back(property);
+    }
+    if ((word != "element" && word != "property") || elements.empty() || !elements.back().other)
+      plain.append(line) += '\n';
+  }
+  if (!ended || !has_others) return std::string();
+  const std::string_view data = text.substr(head_size - head.size());
+  std::size_t at = 0;
+  for (const Element& element : elements) {
+    std::optional<std::size_t> end;
+    if (format == "ascii") {
+      std::string_view rest = data.substr(at), line;
+      double lines = 0.0;
+      while (lines < element.count && nextLine(rest, line)) ++lines;
+      if (lines == element.count) end = data.size() - rest.size();
+    } else {
+      end = endOfItems(data, at, element.count, element.properties, format == "binary_big_endian");
+    }
+    if (!end) return unreadable(name, "is truncated or damaged in its data");
+    if (!element.other) plain.append(data.substr(at, *end - at));
+    at = *end;
+  }
+  return plain;
+}
+
+Result<std::string> plainOff(const std::string& name, std::string_view text, PromisedCounts& promised) {
+  if (const std::string fault = notText(text); !fault.empty()) return unreadable(name, fault);
+  std::size_t line_number = 0;
+  const auto bad = [&](const std::string& what) {
+    return unreadable(name, "line " + std::to_string(line_number) + ": " + what);
+  };
+  std::vector<std::string> w = offWords(text, line_number);
+  if (!w.empty() && w[0].size() >= 3 && w[0].compare(w[0].size() - 3, 3, "OFF") == 0) {
+    const std::string kind = w[0].substr(0, w[0].size() - 3);
+    for (const char* known : {"", "C", "N", "CN", "ST", "STC", "STN", "STCN"})
+      if (kind == known) w[0].clear();
+    if (!w[0].empty() || (w.size() > 1 && w[1] == "BINARY"))
+      return bad("'" + printable(w[0].empty() ? "OFF BINARY" : w[0]) + "'; accepted: OFF, COFF, NOFF, in text");
+    w.erase(w.begin());
+    if (w.empty()) w = offWords(text, line_number);
+  }
+  const double points = w.size() >= 2 ? countOf(w[0]) : std::nan(""),
+               faces = w.size() >= 2 ? countOf(w[1]) : std::nan("");
+  if (std::isnan(points) || std::isnan(faces))
+    return bad("is no OFF file, or truncated: no numbers of points and faces");
+  if (Status status = checkCounts(name, points, faces, 0.0); !status) return status.error();
+  promised.points = static_cast<std::size_t>(points);
+  std::string plain;
+  for (double k = 0.0; k < points; ++k) {
+    w = offWords(text, line_number);
+    if (w.empty()) return bad("is truncated in its points");
+    if (w.size() < 3) return bad("a point needs three numbers, it has " + std::to_string(w.size()));
+    for (std::size_t c = 0; c < 3; ++c)
+      if (!numberOf(w[c])) return bad("'" + printable(w[c]) + "' is no number");
+    plain += "v " + w[0] + " " + w[1] + " " + w[2] + "\n";
+  }
+  for (double k = 0.0; k < faces; ++k) {
+    w = offWords(text, line_number);
+    if (w.empty()) return bad("is truncated in its faces");
+    const double corners = countOf(w[0]);
+    if (!(corners <= static_cast<double>(w.size() - 1))) return bad("a face has fewer corners than it says");
+    if (corners > static_cast<double>(kMaxPolygon)) return bad("a face has more than 1000 corners");
+    if (corners < 3.0) continue;  // a point or an edge
+    plain += "f";
+    for (std::size_t c = 1; static_cast<double>(c) <= corners; ++c) {
+      const double corner = countOf(w[c]);
+      if (std::isnan(corner)) return bad("'" + printable(w[c]) + "' is no number of a point");
+      // One that names no point becomes 0, for the check of the mesh to name.
+      plain += " " + (corner < points ? std::to_string(static_cast<std::size_t>(corner) + 1) : std::string("0"));
+    }
+    plain += "\n";
+  }
+  return plainObj(name, plain);
+}
 
 Status checkCounts(const std::string& name, double points, double faces, double corners) {
   if (!(points >= 1.0)) return Error{ErrorCode::kUnsuitableShape, "'" + name + "' has no points"};
@@ -240,7 +397,8 @@ Result<MeshFormat> meshFormatOf(const std::string& name) {
   if (ending == ".obj") return MeshFormat::kObj;
   if (ending == ".stl") return MeshFormat::kStl;
   if (ending == ".vtk") return MeshFormat::kVtk;
-  return unreadable(name, "is of an unknown kind; accepted endings: .pcd, .ply, .obj, .stl, .vtk");
+  if (ending == ".off") return MeshFormat::kOff;
+  return unreadable(name, "is of an unknown kind; accepted endings: .pcd, .ply, .obj, .stl, .vtk, .off");
 }
 
 Result<PromisedCounts> checkBeforeReading(const std::string& name, std::string_view text, MeshFormat format) {
@@ -253,6 +411,7 @@ Result<PromisedCounts> checkBeforeReading(const std::string& name, std::string_v
     case MeshFormat::kPcd:  // for these, what makes them plain looks at every number
     case MeshFormat::kVtk:
     case MeshFormat::kObj:
+    case MeshFormat::kOff:
       break;
   }
   return PromisedCounts{};
@@ -269,11 +428,24 @@ Result<std::string> plainObj(const std::string& name, std::string_view text) {
   const auto bad = [&](const std::string& what) {
     return unreadable(name, "line " + std::to_string(line_number) + ": " + what);
   };
+  std::string joined;
   for (std::string_view line; nextLine(text, line);) {
     ++line_number;
     if (line.size() > kMaxLine) return bad("is longer than 65536 characters");
     const std::size_t first = line.find_first_not_of(" \t");
     if (first == std::string_view::npos || (line[first] != 'v' && line[first] != 'f')) continue;
+    if (continues(line)) {  // only here: a comment may end in the path of a folder
+      joined.clear();
+      bool more = true;
+      while (more && continues(line) && joined.size() <= kMaxLine) {
+        joined.append(line.substr(0, line.rfind('\\'))) += ' ';
+        more = nextLine(text, line);
+        line_number += more;
+      }
+      if (more) joined.append(line.substr(0, kMaxLine + 1));
+      if (joined.size() > kMaxLine) return bad("is longer than 65536 characters");
+      line = joined;
+    }
     const std::vector<std::string> w = wordsOf(line);
     if (w[0] == "v") {
       if (w.size() < 4) return bad("a vertex needs three numbers, it has " + std::to_string(w.size() - 1));

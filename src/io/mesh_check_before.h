@@ -2,7 +2,8 @@
 // for them), and the one for OBJ writes past its array where there are more normals than vertices and opens the
 // material files that are named; VTK's follows damaged cells out of its arrays, and PCD's damaged headers. So counts
 // are held against the file's size first, and PCD, OBJ and VTK are handed over rewritten, as their points and faces
-// alone. Everything works on the bytes that were read once: `name` is for messages.
+// alone; OFF, which PCL does not know, as OBJ. Everything works on the bytes that were read once: `name` is for
+// messages.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +21,7 @@ constexpr std::size_t kMaxPoints = 2000000;
 constexpr std::size_t kMaxFaces = 8000000;     // a closed surface has twice as many triangles as points
 constexpr std::size_t kMaxCorners = 32000000;  // of all faces together
 
-enum class MeshFormat { kPcd, kPly, kObj, kStl, kVtk };
+enum class MeshFormat { kPcd, kPly, kObj, kStl, kVtk, kOff };
 
 /// By the file's ending, in any case.
 Result<MeshFormat> meshFormatOf(const std::string& name);
@@ -40,12 +41,19 @@ Result<PromisedCounts> checkBeforeReading(const std::string& name, std::string_v
 /// header. `promised` gets their number.
 Result<std::string> plainPcd(const std::string& name, std::string_view text, PromisedCounts& promised);
 
-/// The points and polygons of a legacy VTK file (versions up to 5.1, POLYDATA) as a binary one of version 3.0 that
-/// holds nothing else. `promised` gets what it holds.
+/// A PLY file without the elements that are not its shape, such as edges; empty where it has none, or where
+/// checkBeforeReading is to say what is wrong with its header.
+Result<std::string> withoutOtherElements(const std::string& name, std::string_view text);
+
+/// The points, polygons and triangle strips of a legacy VTK file (versions up to 5.1, POLYDATA) as a binary one of
+/// version 3.0 that holds nothing else. `promised` gets what it holds.
 Result<std::string> plainVtk(const std::string& name, std::string_view text, PromisedCounts& promised);
 
 /// The lines of an OBJ file that make its shape: "v x y z" and "f a b c ...", texture and normal numbers left out.
 Result<std::string> plainObj(const std::string& name, std::string_view text);
+
+/// An OFF file as OBJ: normals, colours and texture coordinates are left out. `promised` gets the number of points.
+Result<std::string> plainOff(const std::string& name, std::string_view text, PromisedCounts& promised);
 
 /// Refuses none and more than 2,000,000, more than 8,000,000 faces and 32,000,000 corners.
 Status checkCounts(const std::string& name, double points, double faces, double corners);

@@ -138,6 +138,7 @@ bool readWithPcl(const std::string& path, MeshFormat format, pcl::PolygonMesh& m
     case MeshFormat::kPly:
       return pcl::io::loadPLYFile(path, mesh) == 0;
     case MeshFormat::kObj:
+    case MeshFormat::kOff:  // rewritten as OBJ
       return pcl::io::loadOBJFile(path, mesh) == 0;
     // These two return the number of polygons, 0 for a cloud and for a failure.
     case MeshFormat::kStl:
@@ -182,13 +183,21 @@ Result<MemoryFile> fileForPcl(const std::string& real_path, const std::string& n
                               PromisedCounts& promised) {
   const Result<FileBytes> read = readFile(real_path, kMaxMeshBytes);
   if (!read) return Error{read.error().code, "'" + name + "' " + read.error().detail};
-  const std::string_view text = read->text();
+  std::string_view text = read->text();
+  std::string rewritten;
+  if (format == MeshFormat::kPly) {
+    Result<std::string> shape_alone = withoutOtherElements(name, text);
+    if (!shape_alone) return shape_alone.error();
+    rewritten = std::move(*shape_alone);
+    if (!rewritten.empty()) text = rewritten;
+  }
   const Result<PromisedCounts> checked = checkBeforeReading(name, text, format);
   if (!checked) return checked.error();
   promised = *checked;
   if (format == MeshFormat::kPly || format == MeshFormat::kStl)
     return MemoryFile(text.substr(0, promised.bytes.value_or(text.size())));
   const Result<std::string> plain = format == MeshFormat::kObj   ? plainObj(name, text)
+                                    : format == MeshFormat::kOff ? plainOff(name, text, promised)
                                     : format == MeshFormat::kVtk ? plainVtk(name, text, promised)
                                                                  : plainPcd(name, text, promised);
   if (!plain) return plain.error();

@@ -119,6 +119,17 @@ double checkCells(const std::vector<std::int32_t>& cells, std::size_t points) {
   return found;
 }
 
+/// Every second triangle of a strip has its first two corners swapped, so that all face one way.
+std::vector<std::int32_t> trianglesOfStrips(const std::vector<std::int32_t>& strips) {
+  std::vector<std::int32_t> cells;
+  for (std::size_t at = 0; at < strips.size(); at += 1 + static_cast<std::size_t>(strips[at]))
+    for (std::size_t k = 0; k + 2 < static_cast<std::size_t>(strips[at]); ++k) {
+      const std::int32_t* corner = &strips[at + 1 + k];
+      cells.insert(cells.end(), {3, corner[k % 2], corner[1 - k % 2], corner[2]});
+    }
+  return cells;
+}
+
 }  // namespace
 
 Result<std::string> plainVtk(const std::string& name, std::string_view whole, PromisedCounts& promised) {
@@ -145,7 +156,7 @@ Result<std::string> plainVtk(const std::string& name, std::string_view whole, Pr
     return unreadable("is not a DATASET POLYDATA, or truncated; accepted: POLYDATA");
 
   std::vector<double> points;
-  std::vector<std::int32_t> cells;
+  std::vector<std::int32_t> cells, strips;
   double polygons = 0.0;
   bool has_points = false;
   while (!(words = text.words()).empty()) {
@@ -156,7 +167,8 @@ Result<std::string> plainVtk(const std::string& name, std::string_view whole, Pr
       if (!text.numbers(binary, words.size() == 3 ? words[2] : "", 3.0 * n, points))
         return unreadable("is truncated or damaged in its POINTS (float or double)");
       has_points = true;
-    } else if (words[0] == "polygons" || words[0] == "lines" || words[0] == "vertices") {
+    } else if (words[0] == "polygons" || words[0] == "triangle_strips" || words[0] == "lines" ||
+               words[0] == "vertices") {
       std::vector<std::int32_t> read;
       const double n = words.size() == 3 ? countOf(words[1]) : std::nan("");
       const double size = words.size() == 3 ? countOf(words[2]) : std::nan("");
@@ -165,19 +177,25 @@ Result<std::string> plainVtk(const std::string& name, std::string_view whole, Pr
         return checkCounts(name, 1.0, n, corners).error();
       if (!has_points || !readCells(text, binary, offsets, n, size, read))
         return unreadable("is truncated or damaged in its " + words[0]);
-      if (words[0] != "polygons") continue;
-      polygons = checkCells(read, points.size() / 3);
-      if (polygons < 0.0 || polygons != (offsets ? std::max(0.0, n - 1.0) : n))
-        return unreadable(
-            "has damaged polygons: their sizes and corners do not fit their number and that of the points");
-      cells = std::move(read);
-    } else if (words[0] == "triangle_strips") {
-      return unreadable("has TRIANGLE_STRIPS; accepted: POLYGONS");
+      if (words[0] == "lines" || words[0] == "vertices") continue;
+      const double found = checkCells(read, points.size() / 3);
+      if (found < 0.0 || found != (offsets ? std::max(0.0, n - 1.0) : n))
+        return unreadable("has damaged " + words[0] +
+                          ": their sizes and corners do not fit their number and that of the points");
+      if (words[0] == "polygons") {
+        cells = std::move(read);
+        polygons = found;
+      } else {
+        strips = trianglesOfStrips(read);
+      }
     }
   }
   if (!has_points) return unreadable("has no POINTS, or is truncated");
   if (points.empty()) return Error{ErrorCode::kUnsuitableShape, "'" + name + "' has no points"};
 
+  cells.insert(cells.end(), strips.begin(), strips.end());
+  polygons += static_cast<double>(strips.size() / 4);
+  if (Status status = checkCounts(name, 1.0, polygons, 0.0); !status) return status.error();
   promised.points = points.size() / 3;
   promised.faces = static_cast<std::size_t>(polygons);
   std::string plain = "# vtk DataFile Version 3.0\nplain\nBINARY\nDATASET POLYDATA\nPOINTS " +

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <sstream>
 
+#include "io/temporary_folder.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/primitives.h"
 
@@ -53,6 +55,59 @@ TEST(CloudShape, TheGridIsChosenFromTheCloud) {
   const auto made = shapeOfCloud(seen(60000, 0), {});
   ASSERT_TRUE(made.ok()) << made.error().detail;
   EXPECT_NEAR(signedVolume(made->shape.mesh), kVolume, 0.03 * kVolume);
+}
+
+TEST(CloudShape, StraysChangeNeitherGridNorExtentAndAreCounted) {
+  const Points body = seen(20000, 0);
+  const auto alone = shapeOfCloud(body, {});
+  ASSERT_TRUE(alone.ok()) << alone.error().detail;
+  const Box bounds = boundsOf(alone->shape.mesh.vertices);
+  std::mt19937 random(2);
+  std::normal_distribution<double> normal;
+  const auto direction = [&] { return Vec3(normal(random), normal(random), normal(random)).normalized(); };
+  for (const std::size_t count : {1, 3, 40})
+    for (const bool clump : {false, true})
+      for (const double away : {0.03, 0.3, 1.0, 1e9}) {
+        Points cloud = body;
+        const Vec3 side = direction();
+        for (std::size_t k = 0; k < count; ++k)
+          cloud.push_back(clump ? Vec3((0.1 + away) * side + 0.002 * direction()) : Vec3((0.1 + away) * direction()));
+        std::ostringstream what;
+        what << count << (clump ? " in a clump, " : " spread, ") << away << " m away";
+        const auto made = shapeOfCloud(cloud, {});
+        ASSERT_TRUE(made.ok()) << what.str() << ": " << made.error().detail;
+        const Box box = boundsOf(made->shape.mesh.vertices);
+        EXPECT_NEAR(box.diagonal(), bounds.diagonal(), 0.03 * bounds.diagonal()) << what.str();
+        const double points = static_cast<double>(alone->points);  // as many as the spacing lets in
+        EXPECT_NEAR(static_cast<double>(made->points), points, 0.03 * points) << what.str();
+        EXPECT_NE(made->shape.notes.at(1).find(std::to_string(count) + " stray points were dropped"), std::string::npos)
+            << what.str() << ": " << made->shape.notes[1];
+      }
+}
+
+TEST(CloudShape, StraysOfACloudFromAFileAreDroppedToo) {
+  const TemporaryFolder folder;
+  TriangleMesh cloud = sphereMesh(0.1, 0.02);
+  cloud.triangles.clear();
+  cloud.vertices.emplace_back(0.5, 0.0, 0.0);
+  ASSERT_TRUE(writeObj(folder.file("cloud.obj"), cloud, "").ok());
+  const auto loaded = loadShape(folder.file("cloud.obj"), 1.0);
+  ASSERT_TRUE(loaded.ok()) << loaded.error().detail;
+  EXPECT_LT(boundsOf(loaded->mesh.vertices).max.x(), 0.101);
+  EXPECT_NE(loaded->notes.at(1).find("1 stray points were dropped"), std::string::npos) << loaded->notes[1];
+}
+
+TEST(CloudShape, TwoPartsAreKeptAndSaid) {
+  Points cloud = seen(20000, 0);
+  for (const Vec3& p : seen(3000, 0)) cloud.push_back(Vec3(0.3, 0.0, 0.0) + 0.4 * p);
+  std::vector<std::string> notes;
+  EXPECT_EQ(withoutStrays(cloud, notes).size(), cloud.size());
+  const auto made = shapeOfCloud(cloud, {});
+  ASSERT_TRUE(made.ok()) << made.error().detail;
+  EXPECT_NEAR(boundsOf(made->shape.mesh.vertices).max.x(), 0.34, 0.01);
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_NE(notes[0].find("the cloud has 2 parts"), std::string::npos) << notes[0];
+  EXPECT_EQ(made->shape.notes.at(1), notes[0]);
 }
 
 TEST(CloudShape, OtherUnitsAndOddValuesAreRefused) {

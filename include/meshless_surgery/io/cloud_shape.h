@@ -15,7 +15,13 @@ struct CloudShape {
   std::size_t points = 0;  // that were left
 };
 
-/// Points that are not finite are dropped, then those that PCL's voxel grid joins, then those whose mean distance to
+/// Without the groups of points that lie apart from the others and have fewer than 5 % of the points of the largest
+/// group. How far apart is taken from the cloud: 1.5 times the distance to the 16th neighbour that three quarters of
+/// the points stay below. Larger groups are kept. `notes` get how many were dropped, and how many groups there are.
+Points withoutStrays(const Points& cloud, std::vector<std::string>& notes);
+
+/// Points that are not finite are dropped, then strays (withoutStrays), so that they do not choose the grid, then those
+/// that PCL's voxel grid joins, then those whose mean distance to
 /// 16 neighbours is above that of all by more standard deviations than `outliers` (PCL, StatisticalOutlierRemoval).
 /// surfaceFromPoints closes the rest. Refuses kUnsuitableShape: a diagonal that is not 1 mm to 10 m, which are other
 /// units than metres; more than 2,000,000 points, or more than 50,000 after the grid; what surfaceFromPoints refuses.
