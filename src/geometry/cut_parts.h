@@ -47,9 +47,9 @@ struct Workpiece {
   const std::vector<SnappedVertex>* snapped = nullptr;  // those of its vertices that are not where they were
   Vec3 normal, center;                                  // the plane, its point near the mesh's middle
   Vec3 axis_u, axis_v;                                  // orthonormal with the normal, right-handed
-  double spacing = 0.0;                                 // [m] mean edge length of the triangles that the plane crosses
-  std::vector<signed char> states;                      // of the mesh's vertices: +1 above, -1 below, 0 on the plane
-  std::vector<Index> touched;                           // the mesh's triangles that are in no part, ascending
+  double spacing = 0.0;             // [m] mean edge length of the triangles that the plane crosses or touches
+  std::vector<signed char> states;  // of the mesh's vertices: +1 above, -1 below, 0 on the plane
+  std::vector<Index> touched;       // the mesh's triangles that are in no part, ascending
   Untouched untouched;
   Index mesh_vertices = 0, first_inner = kNoIndex;
   Points new_positions;                   // [m] of the vertices from mesh_vertices on

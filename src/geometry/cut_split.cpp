@@ -203,7 +203,6 @@ Result<Workpiece> splitAtPlane(const TriangleMesh& mesh, const std::vector<Snapp
   renumberOnPlane(work, touched);
   EdgeVertices edge_vertices(work, touched.size());  // two at most a triangle, each shared by two
   double length = 0.0;
-  std::size_t crossed = 0;
   for (std::size_t i = 0; i < touched.size(); ++i) {
     const Triangle& triangle = touched[i];
     const std::uint32_t patch = mesh.patchOf(work.touched[i]);
@@ -212,12 +211,11 @@ Result<Workpiece> splitAtPlane(const TriangleMesh& mesh, const std::vector<Snapp
     const bool above = s[0] > 0 || s[1] > 0 || s[2] > 0, below = s[0] < 0 || s[1] < 0 || s[2] < 0;
     any_above |= above;
     any_below |= below;
+    for (int k = 0; k < 3; ++k) length += (work.position(triangle[(k + 1) % 3]) - work.position(triangle[k])).norm();
     if (!above || !below) {
       work.sides[above ? kUpper : below ? kLower : sideOfCoplanar(work, triangle)].add(triangle, patch);
       continue;
     }
-    ++crossed;
-    for (int k = 0; k < 3; ++k) length += (work.position(triangle[(k + 1) % 3]) - work.position(triangle[k])).norm();
     std::array<std::array<Index, 4>, 2> polygons;
     std::array<int, 2> counts{0, 0};
     for (int k = 0; k < 3; ++k) {
@@ -234,7 +232,7 @@ Result<Workpiece> splitAtPlane(const TriangleMesh& mesh, const std::vector<Snapp
     return Error{ErrorCode::kMissed, std::string("the plane misses the surface: nothing of it is ") +
                                          (any_above ? "below" : "above") + " the plane by more than " +
                                          std::to_string(1e3 * band) + " mm"};
-  if (crossed > 0) work.spacing = length / (3.0 * static_cast<double>(crossed));
+  if (!touched.empty()) work.spacing = length / (3.0 * static_cast<double>(touched.size()));
   return work;
 }
 

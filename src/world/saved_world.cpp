@@ -273,6 +273,13 @@ std::string faultOf(const BodyModel& m) {
       !allBelow(b.carriers, particles) || b.levers.size() != b.embedded.size() ||
       b.turners.size() != b.embedded.size() || !allBelow(b.lever_clusters, clusters))
     return "a body's surface is not bound to its particles";
+  std::size_t next_embedded = 0;
+  for (Index v = 0; v < vertices; ++v) {
+    const bool embedded = next_embedded < b.embedded.size() && b.embedded[next_embedded] == v;
+    if (embedded != (b.particle[v] == kNoIndex)) return "a vertex of a body is neither a particle nor embedded";
+    next_embedded += embedded;
+  }
+  if (next_embedded != b.embedded.size()) return "a vertex of a body is embedded twice";
   for (std::size_t r = 0; r < b.embedded.size(); ++r)
     if (!b.levers[r].isZero(0.0) &&
         std::find(b.lever_clusters.begin(), b.lever_clusters.end(), b.turners[r]) == b.lever_clusters.end())

@@ -171,6 +171,27 @@ TEST(CutCap, TrianglesAreWellShaped) {
   EXPECT_GE(wanted, 0.9 * static_cast<double>(lengths.size()));
 }
 
+// Through vertices of the mesh, where no triangle is crossed, or between them.
+TEST(CutCap, IsAsFineThroughVerticesAsBesideThem) {
+  const TriangleMesh box = boxMesh(Vec3(0.2, 0.1, 0.1), 0.02);
+  CutOptions options;
+  options.cap_points = 20000;
+  const auto triangles = [&](double x, double snap) {
+    options.snap = snap;
+    const auto cut = cutByPlane(box, {Vec3::UnitX(), Vec3(x, 0, 0)}, options);
+    EXPECT_TRUE(cut.ok());
+    std::size_t in_cap = 0;
+    for (const Triangle& t : cut->pieces[0].mesh.triangles)
+      in_cap += std::all_of(t.begin(), t.end(),
+                            [&](Index v) { return std::abs(cut->pieces[0].mesh.vertices[v].x() - x) < 1e-9; });
+    return in_cap;
+  };
+  const auto beside = static_cast<double>(triangles(-0.011, 0.0));
+  EXPECT_GT(beside, 50.0);
+  for (const double snap : {0.0, 0.004})
+    for (const double x : {-0.02, -0.0189}) EXPECT_NEAR(static_cast<double>(triangles(x, snap)), beside, 0.5 * beside);
+}
+
 TEST(CutCap, TheBudgetHolds) {
   const TriangleMesh mesh = sphereMesh(0.1, 0.004);
   const Plane plane = {Vec3(0.2, 0.3, 0.9).normalized(), Vec3(0.001, 0.002, 0.003)};

@@ -352,7 +352,7 @@ double roughnessOf(const Kind& kind, Random& random, double roughness) {
   CutCommand cut;
   cut.roughness = roughness;
   cut.blades.x_axis = Vec3::UnitY();
-  cut.blades.y_axis = Vec3(random.uniform(0.1, 0.3), 0.0, 1.0).normalized();
+  cut.blades.y_axis = Vec3(random.uniform(-0.1, 0.3), 0.0, 1.0).normalized();
   cut.blades.origin = Vec3(random.uniform(-0.03, 0.03), -1.0, 0.0);
   EXPECT_EQ(replyOf<CutReply>(world.apply(cut)).new_bodies.size(), 2u);
   const Vec3 normal = cut.blades.x_axis.cross(cut.blades.y_axis);

@@ -463,18 +463,21 @@ TEST(DamagedState, ThatClaimsMoreThanItHas) {
   }
 }
 
-// Somebody forged it, checksum and all, with numbers that no world has: refused, or a world that steps within seconds of
-// the processor. Places are chosen where a number lies.
+// Somebody forged it, checksum and all, with numbers that no world has: refused, or a world that steps within seconds
+// of the processor. Places are chosen where a number lies.
 TEST(DamagedState, ForgedAtRandom) {
   const char* text = std::getenv("MESHLESS_SURGERY_FORGED");
   const int seeds = text ? std::atoi(text) : 20;
   ASSERT_GT(seeds, 0);
   int refused = 0, read = 0;
+  int scene = 0;
   for (World (*make)() : {elasticCut, filledCells, filledCellsCut, everyTool, plastic}) {
+    ++scene;
     const std::string bytes = encode(*make().capture());
     for (int seed = 1; seed <= seeds; ++seed)
       for (int i = 0; i < 3; ++i) {
-        const test::TimeLimit limit("seed " + std::to_string(seed) + ", file " + std::to_string(i));
+        const test::TimeLimit limit("scene " + std::to_string(scene) + ", seed " + std::to_string(seed) + ", file " +
+                                    std::to_string(i));
         test::Random random(static_cast<unsigned>(3 * seed + i));
         std::string forged = bytes;
         for (int changes = random.integer(1, 3); changes > 0; --changes)
