@@ -38,9 +38,10 @@ TEST(MatchAndMove, KeepsLinearAndAngularMomentumOfATumblingBody) {
       }
       const BodyMeasures after = measureBody(*body.model, body.state);
       const double p = before.linear_momentum.norm(), l = before.angular_momentum.norm();
-      EXPECT_LT((after.linear_momentum - before.linear_momentum).norm(), 1e-10 * p);
-      EXPECT_LT((after.angular_momentum - before.angular_momentum).norm(), 1e-9 * l);
-      EXPECT_LE(after.kinetic_energy, before.kinetic_energy * (1.0 + 1e-9));
+      // 2.5e-12, 2.3e-13 and 0.987 by the worst of 20 seeds
+      EXPECT_LT((after.linear_momentum - before.linear_momentum).norm(), 1e-11 * p);
+      EXPECT_LT((after.angular_momentum - before.angular_momentum).norm(), 1e-12 * l);
+      EXPECT_LE(after.kinetic_energy, before.kinetic_energy);
     }
 }
 

@@ -106,8 +106,9 @@ TEST(FilledCells, AFreeBodyKeepsItsMomentum) {
     double scale = 0.0, extent = boundsOf(body.model->rest).diagonal();
     for (std::size_t i = 0; i < body.model->masses.size(); ++i)
       scale += body.model->masses[i] * body.state.velocities[i].norm();
-    EXPECT_LT((after.linear_momentum - before.linear_momentum).norm(), 1e-12 * scale);
-    EXPECT_LT((after.angular_momentum - before.angular_momentum).norm(), 1e-12 * scale * extent);
+    // 2.8e-14 and 5.8e-16 by the worst of 20 seeds
+    EXPECT_LT((after.linear_momentum - before.linear_momentum).norm(), 1.4e-13 * scale);
+    EXPECT_LT((after.angular_momentum - before.angular_momentum).norm(), 3e-15 * scale * extent);
     EXPECT_LE(after.kinetic_energy, before.kinetic_energy);
   }
 }

@@ -119,7 +119,7 @@ TEST(Regions, StayTheirOwnThroughCuts) {
   }
   EXPECT_TRUE(coloured);
   EXPECT_NEAR(mass, body.model->mass, 1e-12 * mass);
-  EXPECT_NEAR(sum, energy, 0.01 * energy);
+  EXPECT_NEAR(sum, energy, 4e-14 * energy);  // 7.6e-15
   EXPECT_NEAR(stiff, 4.0 / 3.0 * M_PI * std::pow(0.03, 3.0), 3e-6);
 }
 

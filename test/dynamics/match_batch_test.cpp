@@ -368,8 +368,9 @@ TEST(BodyBatch, KeepsMomentum) {
       for (std::size_t i = 0; i < bodies.size(); ++i) {
         Plain after = bodies[i];
         read(batch, i, after);
-        EXPECT_LE((after.momentum() - bodies[i].momentum()).norm(), 1e-8 * kSteps * bodies[i].movement());
-        EXPECT_LE((after.angularMomentum() - bodies[i].angularMomentum()).norm(), 3e-8 * kSteps * bodies[i].turning());
+        // 6.5e-10 and 4.8e-10 by the worst of 96 bodies
+        EXPECT_LE((after.momentum() - bodies[i].momentum()).norm(), 4e-9 * kSteps * bodies[i].movement());
+        EXPECT_LE((after.angularMomentum() - bodies[i].angularMomentum()).norm(), 2e-9 * kSteps * bodies[i].turning());
       }
     }
 }
@@ -609,8 +610,9 @@ TEST(OverlapBatch, KeepsMomentumAndItsFrame) {
       for (int n = 0; n < kSteps; ++n) batch.step(step, counters);
       Plain after = body;
       read(batch, after);
-      EXPECT_LE((after.momentum() - body.momentum()).norm(), 1e-8 * kSteps * body.movement());
-      EXPECT_LE((after.angularMomentum() - body.angularMomentum()).norm(), 3e-8 * kSteps * body.turning());
+      // 9.2e-10 and 2.6e-10
+      EXPECT_LE((after.momentum() - body.momentum()).norm(), 4e-9 * kSteps * body.movement());
+      EXPECT_LE((after.angularMomentum() - body.angularMomentum()).norm(), 2e-9 * kSteps * body.turning());
       // The centre of mass goes its way.
       const Vec3 way = body.centre() + kSteps * step.h * body.momentum() / body.model.mass;
       EXPECT_LE((after.centre() - way).norm(), 1e-5 * (way - body.centre()).norm());
