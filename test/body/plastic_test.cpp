@@ -146,7 +146,7 @@ TEST(Flow, KeepsAShapeAfterRelease) {
       EXPECT_NEAR(back, left, 4e-5) << elastic << toString(mode);  // 8.2e-6
       updateSurface(*body.model, body.state);
       const double volume = measureBody(*body.model, body.state).volume / body.model->rest_volume;
-      EXPECT_NEAR(volume, 1.0, 3e-13);  // 6.4e-14
+      EXPECT_NEAR(volume, 1.0, 3e-13);                                        // 6.4e-14
       EXPECT_LT(measureBody(*body.model, body.state).kinetic_energy, 1e-22);  // [J] rounding: 1.3e-26
     }
 }
