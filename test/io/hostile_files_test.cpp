@@ -199,7 +199,7 @@ TEST_F(Swapped, AScenesFileForAPipe) {
 
 // --- files that are large
 
-constexpr int kLarge = 48;  // [MiB] more than the slack below, so that a second copy is seen
+constexpr int kLarge = 24;  // [MiB] more than the slack below, so that a second copy is seen
 
 struct Cost {
   bool refused = false;
@@ -246,7 +246,7 @@ void expectCheap(const Cost& cost, double mebibytes_of_file, const std::string& 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   const double slack = 1e9;  // memory beside the memory
 #else
-  const double slack = 40.0;
+  const double slack = 16.0;
 #endif
   // Processor time: it grows with the size, and this much takes less than half a second.
   EXPECT_LT(cost.seconds, 10.0) << what << ": " << cost.detail;
