@@ -98,10 +98,7 @@ class Run {
     const std::uint64_t stride = static_cast<std::uint64_t>(std::max(1.0, std::round(rate / kLooksASecond)));
     const std::uint64_t second = static_cast<std::uint64_t>(std::round(rate));
     if (world_.stepCount() % stride == 0) glance(alone_now, static_cast<double>(stride) / rate);
-    if (world_.stepCount() % second == 0) {
-      if (options_.record) world_.recordHash();
-      look(see(world_, true));
-    }
+    if (world_.stepCount() % second == 0) look(see(world_, true));
     (void)world_.takeEvents();
   }
 

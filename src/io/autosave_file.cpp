@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <sstream>
 #include <thread>
 
@@ -60,6 +61,7 @@ AutosaveFile::Note AutosaveFile::parse(const std::string& text) {
   Note note;
   std::istringstream in(text);
   if (!(in >> note.process >> note.times_taken_up >> note.file.inode >> note.file.changed)) note.times_taken_up = 0;
+  note.times_taken_up = std::max(0, note.times_taken_up);  // else a state that kills would be taken up for ever
   return note;
 }
 

@@ -20,6 +20,7 @@ constexpr std::uint64_t kMaxMeshBytes = 512ull << 20;
 constexpr std::size_t kMaxPoints = 2000000;
 constexpr std::size_t kMaxFaces = 8000000;     // a closed surface has twice as many triangles as points
 constexpr std::size_t kMaxCorners = 32000000;  // of all faces together
+constexpr std::size_t kMaxPolygon = 1000;      // corners of one face
 
 enum class MeshFormat { kPcd, kPly, kObj, kStl, kVtk, kOff };
 
@@ -40,6 +41,9 @@ Result<PromisedCounts> checkBeforeReading(const std::string& name, std::string_v
 /// The points of a PCD file as a binary one with x, y and z alone; a compressed one keeps its fields and gets a checked
 /// header. `promised` gets their number.
 Result<std::string> plainPcd(const std::string& name, std::string_view text, PromisedCounts& promised);
+
+/// For PLY, what checkBeforeReading finds.
+Result<PromisedCounts> checkPly(const std::string& name, std::string_view text);
 
 /// A PLY file without the elements that are not its shape, such as edges; empty where it has none, or where
 /// checkBeforeReading is to say what is wrong with its header.

@@ -77,6 +77,14 @@ inline double countOf(const std::string& word) {
   return std::strtod(word.c_str(), nullptr);
 }
 
+/// The start of it, for a message.
+inline std::string printable(std::string text) {
+  text = text.substr(0, 60);
+  for (char& c : text)
+    if (!std::isprint(static_cast<unsigned char>(c))) c = '?';
+  return text;
+}
+
 inline std::string lowerCase(std::string_view text) {
   std::string low(text);
   for (char& c : low) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));

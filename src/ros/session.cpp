@@ -12,7 +12,6 @@
 namespace meshless {
 namespace {
 
-constexpr double kCheckEvery = 1.0;                            // [s] simulated between two hashes in the log
 constexpr std::chrono::milliseconds kSaveAfterChange{500};     // while time stands still
 constexpr std::chrono::milliseconds kWriteEvery{200};          // so much of the log is lost when the node is killed
 constexpr std::size_t kWriteAtOnce = 1 << 20;                  // bytes
@@ -125,13 +124,6 @@ Result<Session::Loaded> Session::load(WorldRunner& runner, const std::string& na
 }
 
 void Session::changed(const World& world, double dt) {
-  if (log_file_ >= 0) {
-    since_check_ += dt;
-    if (since_check_ >= kCheckEvery) {
-      since_check_ = 0.0;
-      world.recordHash();
-    }
-  }
   if (!(settings_.autosave_period > 0.0)) return;
   since_save_ += dt;
   // Half a step early: so much is lost at most, whatever rounding does.

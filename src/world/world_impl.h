@@ -304,6 +304,7 @@ struct World::Impl {
   void stepTogether(int substeps, double h_frame);
   void stepWithSurfaces(double h_frame);
   void clearForces();
+  void takeStep();
   void finishStep(double h_frame);
   void matchBatches(double h);
   void matchAlone(WorldBody& body, double h, MatchCounters& counters) const;

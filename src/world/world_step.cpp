@@ -43,7 +43,14 @@ Box sweptBounds(const WorldBody& body, double h) {
 }  // namespace
 
 void World::step() {
-  Impl& w = *impl_;
+  impl_->takeStep();
+  // So that a replay never goes far without a record (command_log.cpp).
+  const auto second = static_cast<std::uint64_t>(std::ceil(impl_->settings.step_rate));
+  if (impl_->step % second == 0) recordHash();
+}
+
+void World::Impl::takeStep() {
+  Impl& w = *this;
   w.report = StepReport();
   {
     const Stopwatch total(w.report.total);

@@ -9,12 +9,15 @@
 #include <atomic>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <set>
+#include <sstream>
 #include <thread>
 
 #include "io/temporary_folder.h"
 #include "meshless_surgery/world/world.h"
 #include "support/bodies.h"
+#include "support/forged.h"
 
 namespace meshless {
 namespace {
@@ -194,7 +197,7 @@ TEST_F(AutosaveFileTest, AFolderThatWasClearedIsTakenAgain) {
   ASSERT_TRUE(first.write(states_[0]).ok());
   AutosaveFile second = file();
   EXPECT_EQ(-1, claimed(second));
-  EXPECT_NE("", said_);
+  EXPECT_NE(std::string::npos, said_.find("process " + std::to_string(::getpid()))) << said_;
   fs::remove(temporary_.path() + "/.autosave_a.state.lock");
   AutosaveFile third = file();
   EXPECT_EQ(0, claimed(third));
@@ -233,6 +236,53 @@ TEST_F(AutosaveFileTest, AStateThatKillsIsNotTakenUpForEver) {
   EXPECT_EQ(-1, die());
   EXPECT_NE(std::string::npos, said_.find("taken up 3 times")) << said_;
   EXPECT_EQ(states_[1], *folder_.read("autosave_a.state.before", kMostStateBytes));
+}
+
+// Whatever the note beside it says: a state is taken up three times at the most, then kept aside, and work goes on.
+TEST_F(AutosaveFileTest, ForgedNotes) {
+  const std::string lock = temporary_.path() + "/.autosave_a.state.lock";
+  const std::vector<std::string> numbers = {"-1",  "-2147483648", "2147483647",           "4294967296", "2", "3",
+                                            "nan", "1e9",         "99999999999999999999", "0x7",        "",  "3 3"};
+  int taken_up = 0, refused = 0;
+  for (int seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const test::TimeLimit limit("seed " + std::to_string(seed));
+    test::Random random(static_cast<unsigned>(seed));
+    leave(states_[0]);
+    {
+      AutosaveFile dying = file();
+      EXPECT_EQ(0, claimed(dying));
+      dying.keep();  // now the note names the file
+    }
+    std::string note;
+    std::getline(std::ifstream(lock), note);
+    std::istringstream in(note);
+    std::vector<std::string> words;
+    for (std::string word; in >> word;) words.push_back(word);
+    ASSERT_EQ(4u, words.size()) << note;
+    const int word = seed % 2 ? 1 : random.integer(0, 3);  // mostly the count
+    words[static_cast<std::size_t>(word)] = numbers[static_cast<std::size_t>(seed / 2) % numbers.size()];
+    note = words[0] + " " + words[1] + " " + words[2] + " " + words[3] + "\n";
+    if (seed % 5 == 0) test::forgeNumber(random, note, 0);
+    if (seed % 7 == 0) note.resize(static_cast<std::size_t>(random.integer(0, 300)), '\xff');
+    std::ofstream(lock, std::ios::binary | std::ios::trunc) << note;
+    for (int death = 0; death < 4 && folder_.has("autosave_a.state"); ++death) {
+      AutosaveFile dying = file();
+      const int state = claimed(dying);
+      dying.keep();
+      EXPECT_TRUE(state == 0 ? said_.empty() : said_.find("taken up") != std::string::npos) << said_;
+      ++(state == 0 ? taken_up : refused);
+    }
+    ASSERT_FALSE(folder_.has("autosave_a.state")) << note;
+    EXPECT_EQ(states_[0], *folder_.read("autosave_a.state.before", kMostStateBytes));
+    leave(states_[1]);
+    AutosaveFile next = file();
+    EXPECT_EQ(1, claimed(next));
+    next.remove();
+    for (const std::string& name : files()) fs::remove(temporary_.path() + "/" + name);
+  }
+  EXPECT_GT(taken_up, 20);
+  EXPECT_EQ(20, refused);
 }
 
 TEST_F(AutosaveFileTest, WhoDoesNotComeToStartDoesNotCount) {

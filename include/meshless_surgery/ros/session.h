@@ -65,8 +65,7 @@ class Session {
   WorldRunner* runner_ = nullptr;
 
   // autosaves: copied by the runner, written by a thread of their own
-  double since_save_ = 0.0;   // [s] simulated
-  double since_check_ = 0.0;  // [s] simulated, since the last hash in the log
+  double since_save_ = 0.0;  // [s] simulated
   std::mutex save_mutex_;
   std::condition_variable save_wanted_;
   SavedWorldPtr to_save_;

@@ -218,11 +218,11 @@ class World {
   void restore(const SavedWorld& saved);
 
   /// From now on hands the bytes of a log (world/command_log.h) to the sink, piece by piece: the present state first,
-  /// then every command before it is done. Bodies and obstacles of the scene are to be added before. An empty sink ends
-  /// it.
+  /// then every command before it is done, and the hash every second of simulated time, for a replay to compare. Bodies
+  /// and obstacles of the scene are to be added before. An empty sink ends it.
   using RecordSink = std::function<void(std::string bytes)>;
   void record(RecordSink sink);
-  /// Puts the present hash into the log, for a replay to compare.
+  /// Puts the present hash into the log.
   void recordHash() const;
 
   // tracked tools

@@ -1,0 +1,75 @@
+#include <cmath>
+#include <vector>
+
+#include "mesh_check_before.h"
+#include "text_words.h"
+
+namespace meshless {
+namespace {
+
+/// The words of the next line of an OFF file that has any, without its comment; empty at the end.
+std::vector<std::string> offWords(std::string_view& text, std::size_t& line_number) {
+  std::vector<std::string> words;
+  for (std::string_view line; words.empty() && nextLine(text, line);) {
+    ++line_number;
+    words = wordsOf(line.substr(0, std::min(line.find('#'), kMaxLine)));
+  }
+  return words;
+}
+
+}  // namespace
+
+Result<std::string> plainOff(const std::string& name, std::string_view text, PromisedCounts& promised) {
+  const auto unreadable = [&](const std::string& what) {
+    return Error{ErrorCode::kUnreadable, "'" + name + "' " + what};
+  };
+  if (const std::string fault = notText(text); !fault.empty()) return unreadable(fault);
+  std::size_t line_number = 0;
+  const auto bad = [&](const std::string& what) {
+    return unreadable("line " + std::to_string(line_number) + ": " + what);
+  };
+  std::vector<std::string> w = offWords(text, line_number);
+  if (!w.empty() && w[0].size() >= 3 && w[0].compare(w[0].size() - 3, 3, "OFF") == 0) {
+    const std::string kind = w[0].substr(0, w[0].size() - 3);
+    for (const char* known : {"", "C", "N", "CN", "ST", "STC", "STN", "STCN"})
+      if (kind == known) w[0].clear();
+    if (!w[0].empty() || (w.size() > 1 && w[1] == "BINARY"))
+      return bad("'" + printable(w[0].empty() ? "OFF BINARY" : w[0]) + "'; accepted: OFF, COFF, NOFF, in text");
+    w.erase(w.begin());
+    if (w.empty()) w = offWords(text, line_number);
+  }
+  const double points = w.size() >= 2 ? countOf(w[0]) : std::nan(""),
+               faces = w.size() >= 2 ? countOf(w[1]) : std::nan("");
+  if (std::isnan(points) || std::isnan(faces))
+    return bad("is no OFF file, or truncated: no numbers of points and faces");
+  if (Status status = checkCounts(name, points, faces, 0.0); !status) return status.error();
+  promised.points = static_cast<std::size_t>(points);
+  std::string plain;
+  for (double k = 0.0; k < points; ++k) {
+    w = offWords(text, line_number);
+    if (w.empty()) return bad("is truncated in its points");
+    if (w.size() < 3) return bad("a point needs three numbers, it has " + std::to_string(w.size()));
+    for (std::size_t c = 0; c < 3; ++c)
+      if (!numberOf(w[c])) return bad("'" + printable(w[c]) + "' is no number");
+    plain += "v " + w[0] + " " + w[1] + " " + w[2] + "\n";
+  }
+  for (double k = 0.0; k < faces; ++k) {
+    w = offWords(text, line_number);
+    if (w.empty()) return bad("is truncated in its faces");
+    const double corners = countOf(w[0]);
+    if (!(corners <= static_cast<double>(w.size() - 1))) return bad("a face has fewer corners than it says");
+    if (corners > static_cast<double>(kMaxPolygon)) return bad("a face has more than 1000 corners");
+    if (corners < 3.0) continue;  // a point or an edge
+    plain += "f";
+    for (std::size_t c = 1; static_cast<double>(c) <= corners; ++c) {
+      const double corner = countOf(w[c]);
+      if (std::isnan(corner)) return bad("'" + printable(w[c]) + "' is no number of a point");
+      // One that names no point becomes 0, for the check of the mesh to name.
+      plain += " " + (corner < points ? std::to_string(static_cast<std::size_t>(corner) + 1) : std::string("0"));
+    }
+    plain += "\n";
+  }
+  return plainObj(name, plain);
+}
+
+}  // namespace meshless
