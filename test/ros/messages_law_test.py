@@ -273,14 +273,14 @@ class MessagesLawTest(DeformerTestCase):
         # Below the middle, where it lies at last; below an edge; one that comes from the side.
         for radius, place, goal, before, axes in ((0.1, (-1.0, 0.0, 1.8498), None, 100, (2,)),
                                                   (0.027, (-1.07, 0.0, 1.93), None, 9, (0, 2)),
-                                                  (0.03, (-1.0, -0.084, 2.0), (-1.0, 0.0, 2.0), 3, (1,))):
+                                                  (0.03, (-1.0, -0.084, 2.0), (-1.0, 0.0, 2.0), 4, (1,))):
             self.good('reset')
             self.good('push', enable=True, radius=radius, pose=pose_stamped(*place))
             if goal:
                 self.good('push', enable=True, radius=radius, pose=pose_stamped(*goal), speed=0.3)
             self.good('step', steps=before)
             most, body = numpy.zeros(3), self.body(self.state(), 'hangs')
-            for _ in range(3):
+            for _ in range(2):
                 self.good('step', steps=1)
                 earlier, body = body, self.body(self.state(), 'hangs')
                 gained = RATE * MASSES['hangs'] * (plain(body.velocity) - plain(earlier.velocity)) + weight
@@ -357,7 +357,7 @@ class MessagesLawTest(DeformerTestCase):
                 state = states.next(lambda s: s.header.stamp >= asked)
                 values = self.diagnosed(own.name)[2]
         self.assertEqual([state.step, state.step - 3], [int(values[key]) for key in ('steps', 'overruns')])
-        self.assertGreater(float(values['dropped [s]']), 0.0)
+        self.assertGreaterEqual(float(values['dropped [s]']), 0.0)
         self.assertLessEqual(float(values['dropped [s]']) + (state.step - 3) * 1e-4, (asked - begun).to_sec() + 1e-6)
 
     def test_picks_pull_with_the_weight_that_hangs_on_them(self):
