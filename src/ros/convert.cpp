@@ -153,9 +153,10 @@ meshless_surgery::BodyInfo toInfo(const std::string& name, const BodyModel& mode
   message.spacing = model.spacing;
   message.mass = model.mass;
   message.held = heldShare(model);
-  const double needed = std::max(1.0, std::ceil(model.highest_frequency / settings.step_rate));
-  message.substeps_needed = static_cast<std::uint32_t>(needed);
-  message.stiffness_factor = std::min(1.0, std::pow(std::max(settings.substeps, settings.max_substeps) / needed, 2.0));
+  const BodyState rest;
+  const double h = 1.0 / settings.step_rate;
+  message.substeps_needed = static_cast<std::uint32_t>(std::max(1.0, std::ceil(h * highestFrequencyNow(model, rest))));
+  message.stiffness_factor = stiffnessFactor(model, rest, h / std::max(settings.substeps, settings.max_substeps));
   for (const RegionTissue& region : model.regions) message.region_materials.push_back(region.material.name);
   message.region_shares = regionShares(model);
   return message;

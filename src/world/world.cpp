@@ -257,6 +257,7 @@ WorldSnapshot World::snapshot(const SnapshotWants& wants) {
   shot.step = w.step;
   shot.sim_time = simTime();
   shot.run = w.run;
+  const double shortest = 1.0 / w.settings.step_rate / std::max(w.settings.substeps, w.settings.max_substeps);  // [s]
   for (auto& body : w.bodies) {
     BodySnapshot b;
     b.id = body->id;
@@ -268,7 +269,8 @@ WorldSnapshot World::snapshot(const SnapshotWants& wants) {
     if (wants.surfaces) b.surface = body->state.surface;
     if (wants.particles) b.particles = body->state.positions;
     if (wants.measures) b.measures = measureBody(*body->model, body->state);
-    b.stiffness_factor = body->stiffness_factor;
+    // Of its last step, or of one that is still to come.
+    b.stiffness_factor = std::min(body->stiffness_factor, stiffnessFactor(*body->model, body->state, shortest));
     b.asleep = body->asleep;
     b.tetrahedra = body->mesh ? body->mesh->tetrahedra.size() : 0;
     shot.bodies.push_back(std::move(b));
