@@ -194,8 +194,8 @@ void serialize(A& archive, BodyModel& v) {
   auto of_cells = lattice ? *lattice : CellLattice();
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
   archive(of_cells, cell_mass, regions, clamp_points, carried);
-  archive(rest, masses, match_masses, held, any_fixed, graph, clusters, shape, elastic,
-          endless(most_spread_inverse), specific_stiffness, poissons_ratio, highest_frequency, surface, binding, solid, incised, spacing, rest_volume,
+  archive(rest, masses, match_masses, held, any_fixed, graph, clusters, shape, elastic, endless(most_spread_inverse),
+          specific_stiffness, poissons_ratio, highest_frequency, surface, binding, solid, incised, spacing, rest_volume,
           rest_area, mass, next_patch);
   if constexpr (std::is_same_v<A, InArchive>) {
     if (!of_cells.cells.empty()) lattice = std::make_shared<CellLattice>(std::move(of_cells));

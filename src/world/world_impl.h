@@ -120,8 +120,8 @@ struct SurfaceWork {
   std::vector<WorldBody*> bodies;
   std::vector<Pick*> picks;
   int substeps = 1;
-  std::vector<Vec3*> previous;  // [m] one a body
-  std::vector<SpringRow> springs;     // one a pick
+  std::vector<Vec3*> previous;     // [m] one a body
+  std::vector<SpringRow> springs;  // one a pick
   SolverScratch solver_scratch;
   LimitScratch limit_scratch;
   std::vector<MatchCounters> each_counters;
@@ -239,7 +239,7 @@ struct World::Impl {
   std::vector<ShapeCollider> shape_colliders;  // one a body, in their order, where contacts are found in rest shapes
   std::map<const BodyModel*, std::weak_ptr<const ContactModel>> contact_models;
   SurfaceContacts surface_contacts;
-  SurfaceScene surface_scene;  // of this step
+  SurfaceScene surface_scene;       // of this step
   std::vector<Collider> colliders;  // bodies in their order, then obstacles
   std::vector<SurfaceWork> surface_work;
   std::vector<char> pushed;
@@ -356,7 +356,7 @@ struct World::Impl {
     return any_elastic ? ContactMethod::kSurface : ContactMethod::kRestShape;
   }
   void findSurfaceContacts(double h_frame);
-  Vec3 pushWay(double h_frame) const;  // [m] of the push sphere in a frame
+  Vec3 pushWay(double h_frame) const;                    // [m] of the push sphere in a frame
   std::vector<std::pair<double, std::size_t>> stiffest;  // of an island: less the substeps that a body needs, and which
   int substepsOf(const std::vector<WorldBody*>& some, bool may_meet, double h_frame);
   void stepSurfaces(double h_frame);

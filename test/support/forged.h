@@ -16,8 +16,18 @@ namespace meshless::test {
 /// A number from `first` on becomes a bad one: of 8 bytes where a plausible double lies, of 4 anywhere.
 inline void forgeNumber(Random& random, std::string& bytes, std::size_t first) {
   using Limits = std::numeric_limits<double>;
-  static const std::vector<double> doubles = {Limits::infinity(), -Limits::infinity(), Limits::quiet_NaN(), 1e200, -1e200,
-                                              1e30, 1e19, -1e10, Limits::denorm_min(), -1.0, 0.0, 2147483648.0};
+  static const std::vector<double> doubles = {Limits::infinity(),
+                                              -Limits::infinity(),
+                                              Limits::quiet_NaN(),
+                                              1e200,
+                                              -1e200,
+                                              1e30,
+                                              1e19,
+                                              -1e10,
+                                              Limits::denorm_min(),
+                                              -1.0,
+                                              0.0,
+                                              2147483648.0};
   static const std::vector<std::uint32_t> words = {0u, 1u, 1000u, 0x7fffffffu, 0x80000000u, 0xffffffffu, 0x7ff00000u};
   const bool wide = random.integer(0, 3) > 0;
   const std::size_t size = wide ? 8 : 4;
@@ -30,7 +40,8 @@ inline void forgeNumber(Random& random, std::string& bytes, std::size_t first) {
     if (!wide || (std::abs(there) > 1e-7 && std::abs(there) < 1e7)) break;
   }
   if (wide)
-    std::memcpy(&bytes[at], &doubles[static_cast<std::size_t>(random.integer(0, static_cast<int>(doubles.size()) - 1))], 8);
+    std::memcpy(&bytes[at], &doubles[static_cast<std::size_t>(random.integer(0, static_cast<int>(doubles.size()) - 1))],
+                8);
   else
     std::memcpy(&bytes[at], &words[static_cast<std::size_t>(random.integer(0, static_cast<int>(words.size()) - 1))], 4);
 }

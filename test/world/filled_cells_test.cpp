@@ -92,8 +92,8 @@ TEST(FilledCellsInAWorld, ACutAtRestMovesNothing) {
       EXPECT_LT((after.bodies[b].surface[v] - before.bodies[b].surface[v]).norm(), 1e-9);
 }
 
-// A stretched bar is cut again and again; what is let go comes back to its volume, and no piece turns inside out. Crumbs
-// of less than two samples follow cells that are hardly theirs.
+// A stretched bar is cut again and again; what is let go comes back to its volume, and no piece turns inside out.
+// Crumbs of less than two samples follow cells that are hardly theirs.
 TEST(FilledCellsInAWorld, PiecesOfAStretchedBarGoBackToTheirVolumes) {
   test::Random random(4);
   for (int round = 0; round < 4; ++round) {

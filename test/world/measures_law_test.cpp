@@ -29,7 +29,8 @@ BodyDef brick(const Kind& kind, const std::string& name, const Vec3& at) {
   return def;
 }
 
-void add(World& world, const BodyDef& def, const std::function<void(PreparedBody&)>& change = [](PreparedBody&) {}) {
+void add(
+    World& world, const BodyDef& def, const std::function<void(PreparedBody&)>& change = [](PreparedBody&) {}) {
   PreparedBody body = test::prepared(def);
   change(body);
   const auto reply = world.addSceneBody(std::make_shared<const PreparedBody>(std::move(body)));

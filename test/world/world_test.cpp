@@ -690,7 +690,8 @@ TEST(World, TheRestShapeIsWhereTheBodyWasPut) {
         std::size_t found = 0;
         for (const Vec3& p : rest.surface)
           found += std::any_of(put.begin(), put.end(), [&](const Vec3& q) { return (p - q).norm() < 1e-12; });
-        EXPECT_GE(found, cut ? put.size() / 4 : put.size()) << body.name << ", elastic " << elastic << ", copy " << copied;
+        EXPECT_GE(found, cut ? put.size() / 4 : put.size())
+            << body.name << ", elastic " << elastic << ", copy " << copied;
         Box of_particles, of_surface;
         for (const Vec3& p : rest.particles) of_particles.extend(p);
         for (const Vec3& p : rest.surface) of_surface.extend(p);

@@ -107,8 +107,8 @@ void requireNumbers(const std::array<double, n>* values, std::size_t count) {
 }
 template <int rows, int columns>
 void requireNumbers(const Eigen::Matrix<double, rows, columns>* values, std::size_t count) {
-  if (count > 0) requireNumbers(values->data(), rows * columns * count,
-                                rows * columns == 3 ? kMostCoordinate : kMostNumber);
+  if (count > 0)
+    requireNumbers(values->data(), rows * columns * count, rows * columns == 3 ? kMostCoordinate : kMostNumber);
 }
 
 template <class Out, class T, std::enable_if_t<IsPlain<T>::value, int> = 0>

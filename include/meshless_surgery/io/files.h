@@ -19,8 +19,8 @@ struct FileAccess {
   Result<std::string> resolve(const std::string& path, const std::string& base_folder) const;
 };
 
-/// Through PCL: PCD, PLY, OBJ, STL, VTK, OFF by the file's ending. Polygons are split into triangles. A file without faces
-/// is a cloud: mesh.triangles is empty. `real_path` has no links in it, as FileAccess::resolve gives it. Refuses
+/// Through PCL: PCD, PLY, OBJ, STL, VTK, OFF by the file's ending. Polygons are split into triangles. A file without
+/// faces is a cloud: mesh.triangles is empty. `real_path` has no links in it, as FileAccess::resolve gives it. Refuses
 /// kUnreadable (missing, replaced meanwhile, truncated, unknown ending, more than 512 MiB) and kUnsuitableShape (no
 /// points, more than 2,000,000 points, 8,000,000 faces or 32,000,000 corners of them). Non-finite points are left to
 /// repairMesh to name, for surfaces; in clouds they are dropped.
