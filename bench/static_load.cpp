@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/body/cell_blend.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/primitives.h"
@@ -228,7 +229,7 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
     std::vector<Index> cells;
     for (const Vec3& p : truth.rest) {
       places.push_back(placed.rotation.conjugate() * (p - placed.translation));
-      cells.push_back(finder.carrier(places.back()));
+      cells.push_back(finder.nearest(places.back()));
     }
     samples = bindToCells(*model.lattice, places, cells);
   } else {

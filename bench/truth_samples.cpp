@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/body/cell_blend.h"
 #include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/body/filled_cells.h"
 
@@ -16,7 +17,7 @@ SurfaceBinding bindSamples(const BodyModel& model, const Points& places) {
     return bindSurface(model.rest, model.graph, model.clusters, places, std::vector<Index>(places.size(), kNoIndex));
   const CellFinder finder(*model.lattice);
   std::vector<Index> cells;
-  for (const Vec3& p : places) cells.push_back(finder.carrier(p));
+  for (const Vec3& p : places) cells.push_back(finder.nearest(p));
   return bindToCells(*model.lattice, places, cells);
 }
 

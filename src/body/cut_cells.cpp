@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <queue>
 #include <sstream>
 #include <tuple>
 #include <utility>
@@ -10,16 +11,17 @@
 #include <Eigen/Dense>
 
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/body/cell_blend.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/cut_lattice.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/union_find.h"
 #include "side_by_side.h"
-#include "surface_cells.h"
 
 namespace meshless {
 namespace {
 
+constexpr double kBeneath = 1e-3;      // [spacing]
 constexpr double kCrumb = 1.0 / 64.0;  // of a cell, for a piece of it that no sample sees
 
 // A vertex of a piece whose new cell is not known yet.
@@ -70,8 +72,7 @@ class CellCutter {
         sources_(sources),
         before_(*model.lattice),
         cut_(cutLattice(before_, state.positions, gate)),
-        children_(before_.cells.size()),
-        sample_sides_(cut_.lattice.cells.size()) {
+        children_(before_.cells.size()) {
     for (Index c = 0; c < cells().size(); ++c) children_[cut_.parent_cell[c]].push_back(c);
   }
 
@@ -86,6 +87,13 @@ class CellCutter {
              << " that lies in none of its cells";
         return Error{ErrorCode::kUnsuitableShape, text.str()};
       }
+    for (std::size_t p = 0; p < sources_.size(); ++p) {
+      TriangleMesh rest;
+      rest.triangles = sources_[p].mesh.triangles;
+      for (const EmbeddedVertex& embedded : embedded_[p]) rest.vertices.push_back(embedded.rest);
+      normals_.push_back(vertexNormals(rest));
+      solids_.emplace_back(rest);
+    }
     choosePieces();
     sampled_ = static_cast<Index>(cells().size());
     bind();
@@ -167,53 +175,39 @@ class CellCutter {
 
   // --- cells that a vertex may follow
 
-  // Samples of a cell that no blade hides from a vertex on a side of it, or all on that side of its plane.
-  SampleSet seen(Index c, const Vec3& q, int side, bool of_plane) {
-    const LatticeCell& cell = cut_.lattice.cells[c];
-    if (gate_.unbounded() || of_plane) return cell.samples & (side > 0 ? cut_.above[c] : ~cut_.above[c]);
-    const auto placed = [&](const Vec3& at) {
-      Vec3 p = Vec3::Zero();
-      for (int k = 0; k < 8; ++k)
-        p += trilinearWeight(k, at) * state_.positions[before_.cells[cut_.parent_cell[c]].corners[k]];
-      return p;
-    };
-    Points& places = sample_sides_[c];
-    if (!cut_.changed[c]) {
-      if (places.empty()) places.push_back(placed(0.5 * (momentsOf(cell.filled).centroid + Vec3::Ones())));
-      return gate_.between(q, side, places[0], gate_.side(places[0])) ? kNoSample : cell.samples;
-    }
-    if (places.empty())
-      for (int bit = 0; bit < 64; ++bit) places.push_back(placed(samplePlace(bit)));
-    SampleSet open = kNoSample;
-    for (SampleSet left = cell.samples; left; left &= left - 1) {
-      const int bit = lowestSample(left);
-      if (!gate_.between(q, side, places[static_cast<std::size_t>(bit)], cut_.above[c] >> bit & 1 ? 1 : -1))
-        open |= SampleSet{1} << bit;
-    }
-    return open;
-  }
-
-  // The cell of vertex v of source p on a side of the blade, or of its whole plane, among those of `piece` (any where
-  // it is negative).
-  Index cellOf(const CellFinder& finder, std::size_t p, Index v, int piece, int side, bool of_plane) {
+  // The cell of vertex v of source p among those of `piece` (any where it is negative): that of the nearest sample
+  // which the surface does not hide from the tissue beneath the vertex.
+  Index cellOf(const CellFinder& finder, std::size_t p, Index v, int piece) {
     const EmbeddedVertex& embedded = embedded_[p][v];
     const auto in_piece = [&](Index c) { return piece < 0 || piece_of_[component_[c]] == piece; };
     const std::vector<Index>& copies = children_[embedded.was];
-    const Vec3& q = sources_[p].mesh.vertices[v];
-    // What a blade leaves whole may lie beyond it: a hardly filled cell's vertices follow a neighbour.
-    if (!embedded.made && copies.size() == 1 && !cut_.changed[copies[0]] && in_piece(copies[0]) &&
-        seen(copies[0], q, side, of_plane))
-      return copies[0];
-    return finder.carrier(embedded.rest, [&](Index c) {
-      return in_piece(c) && shareACorner(before_.cells, cut_.parent_cell[c], embedded.was) ? seen(c, q, side, of_plane)
-                                                                                           : kNoSample;
-    });
-  }
-  // A buried front is on both sides.
-  Index cellOf(const CellFinder& finder, std::size_t p, Index v, int piece) {
-    const int side = sources_[p].side[v];
-    const Index c = cellOf(finder, p, v, piece, side == 0 ? 1 : side, side == 0);
-    return side == 0 && c == kNoIndex ? cellOf(finder, p, v, piece, -1, true) : c;
+    if (!embedded.made && copies.size() == 1 && !cut_.changed[copies[0]] && in_piece(copies[0])) return copies[0];
+    const Vec3 beneath = embedded.rest - kBeneath * before_.spacing * normals_[p][v];
+    struct Sample {
+      double squared;
+      Index cell;
+      Vec3 place;
+    };
+    std::vector<Sample> near;
+    const std::array<std::int32_t, 3> own = before_.placeOf(embedded.rest);
+    for (std::int32_t z = -1; z <= 1; ++z)
+      for (std::int32_t y = -1; y <= 1; ++y)
+        for (std::int32_t x = -1; x <= 1; ++x)
+          for (const Index c : finder.at({own[0] + x, own[1] + y, own[2] + z})) {
+            const LatticeCell& cell = cells()[c];
+            if (cell.isBridge(c) || !in_piece(c)) continue;
+            for (SampleSet left = cell.samples; left; left &= left - 1) {
+              const Vec3 place = before_.restPlace(cell, samplePlace(lowestSample(left)));
+              near.push_back({(place - beneath).squaredNorm(), c, place});
+            }
+          }
+    const auto farther = [](const Sample& a, const Sample& b) { return a.squared > b.squared; };
+    std::make_heap(near.begin(), near.end(), farther);
+    for (; !near.empty(); near.pop_back()) {
+      std::pop_heap(near.begin(), near.end(), farther);
+      if (!solids_[p].crosses(beneath, near.back().place)) return near.back().cell;
+    }
+    return kNoIndex;
   }
 
   // --- which cells are in which piece
@@ -275,33 +269,50 @@ class CellCutter {
     for (int& piece : piece_of_) piece = std::max(piece, 0);
   }
 
-  // --- the surface; what has no cell gets crumbs
+  // --- the surface; a piece that has no samples gets crumbs
 
   void bind() {
     const CellFinder finder(cut_.lattice);
-    std::map<std::pair<std::size_t, Index>, Index> crumbs;
     carriers_.resize(sources_.size());
-    std::vector<TriangleMesh> rest(sources_.size());
-    std::vector<std::vector<bool>> loose(sources_.size());  // made by the blade, or in a cell that it met
     for (std::size_t p = 0; p < sources_.size(); ++p) {
-      rest[p].triangles = sources_[p].mesh.triangles;
-      for (Index v = 0; v < embedded_[p].size(); ++v) {
-        const Index c = cellOf(finder, p, v, static_cast<int>(p));
-        carriers_[p].push_back(c);
-        rest[p].vertices.push_back(embedded_[p][v].rest);
-        loose[p].push_back(embedded_[p][v].made || c == kNoIndex || cut_.changed[c]);
-      }
-    }
-    inChunks(sources_.size(), 1,
-             [&](std::size_t p, std::size_t) { agreeOnCells(cut_.lattice, rest[p], loose[p], carriers_[p]); });
-    for (std::size_t p = 0; p < sources_.size(); ++p)
+      for (Index v = 0; v < embedded_[p].size(); ++v) carriers_[p].push_back(cellOf(finder, p, v, static_cast<int>(p)));
+      takeFromTheNearest(p);
+      std::map<Index, Index> crumbs;
       for (Index v = 0; v < embedded_[p].size(); ++v) {
         if (carriers_[p][v] != kNoIndex) continue;
         const Index was = withMass(embedded_[p][v].was);
-        const auto [known, is_new] = crumbs.emplace(std::make_pair(p, was), static_cast<Index>(cells().size()));
+        const auto [known, is_new] = crumbs.emplace(was, static_cast<Index>(cells().size()));
         carriers_[p][v] = known->second;
         if (is_new) addCrumb(was, static_cast<int>(p));
       }
+    }
+  }
+
+  // What no sample is near is of the cell of the vertex that is nearest along the surface, if that is within half a
+  // cell.
+  void takeFromTheNearest(std::size_t p) {
+    std::vector<Index>& cell = carriers_[p];
+    if (std::find(cell.begin(), cell.end(), kNoIndex) == cell.end()) return;
+    std::vector<std::vector<Index>> around(cell.size());
+    for (const Triangle& t : sources_[p].mesh.triangles)
+      for (int k = 0; k < 3; ++k) around[t[k]].push_back(t[(k + 1) % 3]);
+    using Entry = std::pair<double, Index>;
+    std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
+    std::vector<double> away(cell.size(), std::numeric_limits<double>::infinity());
+    for (Index v = 0; v < cell.size(); ++v)
+      if (cell[v] != kNoIndex) queue.push({away[v] = 0.0, v});
+    while (!queue.empty()) {
+      const auto [here, v] = queue.top();
+      queue.pop();
+      if (here > away[v]) continue;
+      for (const Index u : around[v]) {
+        const double there = here + (embedded_[p][u].rest - embedded_[p][v].rest).norm();
+        if (!(there < away[u]) || there > 0.25 * before_.spacing) continue;
+        away[u] = there;
+        cell[u] = cell[v];
+        queue.push({there, u});
+      }
+    }
   }
 
   // A bridge has no mass to give: one of what it joins.
@@ -346,20 +357,10 @@ class CellCutter {
     cut_.parent_cell.push_back(was);
     cut_.above.push_back(kNoSample);
     cut_.changed.push_back(true);
-    sample_sides_.emplace_back();
     return static_cast<Index>(cells().size()) - 1;
   }
 
   // --- what the surface holds together and samples do not see
-
-  // By a corner, or by a cell between them.
-  bool heldTogether(const CornerUses& uses, Index a, Index b) {
-    if (shareACorner(cells(), a, b)) return true;
-    for (const Index corner : cells()[a].corners)
-      for (Index u = uses.offsets[corner]; u < uses.offsets[corner + 1]; ++u)
-        if (shareACorner(cells(), uses.cells[u], b)) return true;
-    return false;
-  }
 
   void joinThePieces() {
     // With room for a crumb of every cell and piece.
@@ -369,13 +370,11 @@ class CellCutter {
         for (const Index j : cells()[b].corners)
           if (cut_.parent_corner[i] == cut_.parent_corner[j]) corners.join(i, j);
     };
-    const CornerUses uses = cornerUses(cut_.lattice);
     for (std::size_t p = 0; p < sources_.size(); ++p)
       for (const Triangle& t : sources_[p].mesh.triangles)
         for (int k = 0; k < 3; ++k) {
           const Index a = carriers_[p][t[k]], b = carriers_[p][t[(k + 1) % 3]];
-          if (component_[a] != component_[b] || ((cut_.changed[a] || cut_.changed[b]) && !heldTogether(uses, a, b)))
-            joinCells(a, b);
+          if (component_[a] != component_[b]) joinCells(a, b);
         }
     // What no vertex is in holds to its neighbours in the piece.
     std::vector<std::vector<Index>> users(before_.corners);
@@ -550,8 +549,7 @@ class CellCutter {
     fitClusters(matchInput(*child, piece.state), piece.state.positions, piece.state.poses);
     std::vector<Index> carriers;
     for (const Index c : carriers_[p]) carriers.push_back(renumbered[c]);
-    child->binding =
-        bindToCells(*lattice, child->surface.vertices, carriers, easeAcrossTears(*lattice, child->surface, carriers));
+    child->binding = bindToCells(*lattice, child->surface.vertices, carriers);
     for (const EmbeddedVertex& embedded : embedded_[p]) {
       ++(embedded.made ? work.bound_embedded : work.kept_embedded);
       work.new_vertices += embedded.made;
@@ -620,8 +618,9 @@ class CellCutter {
   const CellLattice& before_;
   CutLattice cut_;
   std::vector<std::vector<Index>> children_;           // of each of the parent's cells
-  std::vector<Points> sample_sides_;                   // present places of a cell's samples, once asked for
   std::vector<std::vector<EmbeddedVertex>> embedded_;  // of each source
+  std::vector<Points> normals_;                        // of their vertices, at rest
+  std::vector<SolidQuery> solids_;                     // at rest
   std::map<std::array<double, 3>, EmbeddedVertex> inside_;
   std::vector<std::pair<Box, Index>> boxes_;  // present, of the parent's cells near the blade's plane
   std::vector<Index> component_;              // of each cell

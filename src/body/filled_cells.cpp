@@ -96,15 +96,18 @@ void makeParticlesOfCells(BodyModel& model) {
   model.graph = makeGraph(model.rest, std::move(edges));
 }
 
-void holdCorners(BodyModel& model) {
-  std::vector<bool> moves(model.lattice->corners, false);
-  for (const LatticeCell& cell : model.lattice->cells)
+std::vector<bool> movingCorners(const CellLattice& lattice) {
+  std::vector<bool> moves(lattice.corners, false);
+  for (const LatticeCell& cell : lattice.cells)
     if ((cell.samples ? cell.samples : cell.filled) & ~cell.held)
       for (const Index corner : cell.corners) moves[corner] = true;
-  model.fixed.assign(model.lattice->corners, false);
-  model.any_fixed = false;
-  for (Index i = 0; i < model.lattice->corners; ++i)
-    if (!moves[i]) model.fixed[i] = model.any_fixed = true;
+  return moves;
+}
+
+void holdCorners(BodyModel& model) {
+  model.fixed = movingCorners(*model.lattice);
+  model.fixed.flip();
+  model.any_fixed = std::find(model.fixed.begin(), model.fixed.end(), true) != model.fixed.end();
 }
 
 void weighCells(BodyModel& model, bool elastic) {
@@ -205,65 +208,6 @@ Index CellFinder::nearest(const Vec3& rest, const Allowed& allowed) const {
     if (best != kNoIndex && least <= static_cast<double>(reach) * reach + 0.02) break;
   }
   return best;
-}
-
-Index CellFinder::carrier(const Vec3& rest, const Allowed& allowed) const {
-  const Index own = nearest(rest, allowed);
-  if (own == kNoIndex) return own;
-  const LatticeCell& cell = lattice_.cells[own];
-  if (countSamples(cell.samples) >= kWellFilled) return own;
-  Index best = own;
-  double least = std::numeric_limits<double>::infinity();
-  for (int axis = 0; axis < 3; ++axis)
-    for (const int step : {-1, 1}) {
-      std::array<std::int32_t, 3> place = cell.place;
-      place[axis] += step;
-      for (const Index c : at(place)) {
-        const LatticeCell& other = lattice_.cells[c];
-        if (other.isBridge(c) || countSamples(other.samples) < kWellFilled) continue;
-        const LatticeCell &lower = step > 0 ? cell : other, &upper = step > 0 ? other : cell;
-        if (!(faceLinks(lower, upper, axis) & ~lower.parted[axis])) continue;
-        const double squared = squaredToSamples(allowed ? allowed(c) : other.samples, lattice_.placeIn(other, rest));
-        if (squared < least) {
-          least = squared;
-          best = c;
-        }
-      }
-    }
-  return best;
-}
-
-SurfaceBinding bindToCells(const CellLattice& lattice, const Points& surface_rest, const std::vector<Index>& cell,
-                           const std::vector<CellShares>& shares) {
-  SurfaceBinding binding;
-  binding.particle.assign(surface_rest.size(), kNoIndex);
-  binding.offsets.push_back(0);
-  for (Index v = 0; v < surface_rest.size(); ++v) {
-    binding.embedded.push_back(v);
-    const auto follow = [&](const LatticeCell& carrier, double share) {
-      const Vec3 at = lattice.placeIn(carrier, surface_rest[v]);
-      for (int k = 0; k < 8; ++k) {
-        const auto first = binding.carriers.begin() + binding.offsets.back();
-        const auto known = std::find(first, binding.carriers.end(), carrier.corners[k]);
-        const double weight = share * extendedWeight(k, at);
-        if (known != binding.carriers.end()) {
-          binding.weights[static_cast<std::size_t>(known - binding.carriers.begin())] += weight;
-          continue;
-        }
-        binding.carriers.push_back(carrier.corners[k]);
-        binding.weights.push_back(weight);
-      }
-    };
-    if (shares.empty() || shares[v].empty())
-      follow(lattice.cells[cell[v]], 1.0);
-    else
-      for (const CellShare& s : shares[v]) follow(lattice.cells[s.cell], s.share);
-    binding.offsets.push_back(static_cast<Index>(binding.carriers.size()));
-  }
-  binding.levers.assign(surface_rest.size(), Vec3::Zero());
-  binding.turners = cell;
-  binding.bound = static_cast<Index>(surface_rest.size());
-  return binding;
 }
 
 }  // namespace meshless

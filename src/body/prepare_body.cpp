@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/body/cell_blend.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/cell_regions.h"
 #include "meshless_surgery/geometry/main_axes.h"
@@ -335,7 +336,7 @@ Status bindFilled(const BodyDef& def, BodyModel& model) {
   const CellFinder finder(*model.lattice);
   std::vector<Index> cells;
   for (const Vec3& v : model.surface.vertices) {
-    cells.push_back(finder.carrier(v));
+    cells.push_back(finder.nearest(v));
     if (cells.back() == kNoIndex) {
       std::ostringstream text;
       text << "body '" << def.name << "' has a vertex at " << v.transpose() << " more than two cells of "

@@ -51,4 +51,16 @@ double meanEdgeLength(const TriangleMesh& mesh) {
   return sum / (3.0 * static_cast<double>(mesh.triangles.size()));
 }
 
+Points vertexNormals(const TriangleMesh& mesh) {
+  Points normals(mesh.vertices.size(), Vec3::Zero());
+  for (const Triangle& t : mesh.triangles)
+    for (int k = 0; k < 3; ++k) {
+      const Vec3& at = mesh.vertices[t[k]];
+      const Vec3 u = mesh.vertices[t[(k + 1) % 3]] - at, v = mesh.vertices[t[(k + 2) % 3]] - at, across = u.cross(v);
+      normals[t[k]] += std::atan2(across.norm(), u.dot(v)) * across.stableNormalized();
+    }
+  for (Vec3& normal : normals) normal.stableNormalize();
+  return normals;
+}
+
 }  // namespace meshless

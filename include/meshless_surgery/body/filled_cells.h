@@ -13,6 +13,9 @@ namespace meshless {
 /// clusters are made by weighCells().
 void makeParticlesOfCells(BodyModel& model);
 
+/// One a corner: false where all of the tissue around it is held.
+std::vector<bool> movingCorners(const CellLattice& lattice);
+
 /// fixed and any_fixed: corners stay where all of the tissue around them is held.
 void holdCorners(BodyModel& model);
 
@@ -35,10 +38,6 @@ class CellFinder {
 
   /// Of the allowed cells that have samples and are no bridges; kNoIndex where none is within two cells of it.
   Index nearest(const Vec3& rest, const Allowed& allowed = nullptr) const;
-  /// The cell that a vertex follows there: nearest(), or where that is hardly filled a neighbour that it is linked to
-  /// and that is filled well: a hardly filled cell is soft for what presses on it (aggregated finite elements: Badia et
-  /// al. 2018).
-  Index carrier(const Vec3& rest, const Allowed& allowed = nullptr) const;
   /// Cells at a place of the lattice; bridges too.
   const std::vector<Index>& at(const std::array<std::int32_t, 3>& place) const;
 
@@ -50,17 +49,5 @@ class CellFinder {
 
 /// [spacing^2] from a place in a cell to the nearest of the samples; infinite where there are none.
 double squaredToSamples(SampleSet samples, const Vec3& at);
-
-/// What a vertex follows: cells, with shares that add up to 1.
-struct CellShare {
-  Index cell = kNoIndex;
-  double share = 1.0;
-};
-using CellShares = std::vector<CellShare>;
-
-/// Every vertex is embedded in its cell: its carriers are the corners, with trilinear weights. cell: one a vertex.
-/// Where it has shares, in several.
-SurfaceBinding bindToCells(const CellLattice& lattice, const Points& surface_rest, const std::vector<Index>& cell,
-                           const std::vector<CellShares>& shares = {});
 
 }  // namespace meshless

@@ -20,4 +20,8 @@ inline double surfaceArea(const TriangleMesh& mesh) { return surfaceArea(mesh.ve
 inline double signedVolume(const TriangleMesh& mesh) { return signedVolume(mesh.vertices, mesh.triangles); }
 inline Vec3 solidCentroid(const TriangleMesh& mesh) { return solidCentroid(mesh.vertices, mesh.triangles); }
 
+/// Outward unit normals of vertices, by the angles of the faces there (Baerentzen and Aanaes 2005); zero where they
+/// cancel.
+Points vertexNormals(const TriangleMesh& mesh);
+
 }  // namespace meshless

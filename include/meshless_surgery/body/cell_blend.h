@@ -1,0 +1,19 @@
+// How a place in the tissue follows the cells around it.
+#pragma once
+
+#include "meshless_surgery/body/body.h"
+#include "meshless_surgery/geometry/cell_lattice.h"
+
+namespace meshless {
+
+/// Binds places to the cells around them: every one is embedded and follows the blend of the cells' affine maps,
+///   u(X) = sum_c w_c [x_c + F_c (X - X_c)] / sum_c w_c,   w_c = (1 - d_c^2 / r^2)^2 * what fills c
+/// with x_c and F_c place and gradient of a cell at the centroid X_c of what fills it. d_c is the way from X to X_c in
+/// spacings. Where tissue is in the way of nothing, that is the distance. Where a wound or a gap lies between, it is
+/// longer by the detour through the tissue, so that cells beyond it fade around its front and are gone where there is
+/// no way (Belytschko et al. 1996; Organ et al. 1996). Affine motion is followed exactly, weights add up to 1.
+///
+/// rest: [m]; cell: of each, the copy of a cell whose tissue it belongs to (CellFinder). It is kept in `turners`.
+SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const std::vector<Index>& cell);
+
+}  // namespace meshless
