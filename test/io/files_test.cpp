@@ -403,6 +403,18 @@ TEST(ReadMeshFile, PcdWithOtherFieldsBetween) {
   }
 }
 
+TEST(ReadMeshFile, PcdHeadersWhoseLinesDoNotAgreeAreRefused) {
+  const TemporaryFolder folder;
+  const std::string good = pcdText(thing().vertices, true);
+  for (const std::string line : {"FIELDS x y z\n", "SIZE 4 4 4\n", "TYPE F F F\n", "COUNT 1 1 1\n"})
+    for (const std::string& to : {line.substr(0, line.size() - 3) + "\n", std::string()}) {
+      if (to.empty() && line[0] == 'C') continue;  // 1 each, where it is left out
+      const Result<TriangleMesh> read = readMeshFile(folder.write("a.pcd", replaced(good, line, to)));
+      ASSERT_FALSE(read.ok()) << line << to;
+      EXPECT_TRUE(says(read.error(), "FIELDS, SIZE, TYPE and COUNT of different lengths")) << to << read.error().detail;
+    }
+}
+
 TEST(ReadMeshFile, ObjInEveryStyle) {
   const TemporaryFolder folder;
   const std::string text =
