@@ -14,6 +14,7 @@
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/mesh_check.h"
 #include "meshless_surgery/geometry/primitives.h"
+#include "support/random.h"
 
 namespace meshless {
 namespace {
@@ -319,6 +320,28 @@ TEST(ReadMeshFile, PolygonsBecomeTriangles) {
   EXPECT_EQ(read->triangles.size(), 20u);
   EXPECT_NEAR(signedVolume(*read), 3.0, 1e-6);
   EXPECT_NEAR(surfaceArea(*read), 2 * 3.0 + 8.0, 1e-6);
+}
+
+// Whatever corner it is numbered from.
+TEST(ReadMeshFile, APolygonWithACornerThatSeesTheOthersKeepsItsArea) {
+  const TemporaryFolder folder;
+  test::Random random(3);
+  for (int trial = 0; trial < 20; ++trial) {
+    const int n = random.integer(5, 12), first = random.integer(0, n - 1);
+    Points corners{Vec3::Zero()};
+    for (int k = 1; k < n; ++k) {
+      const double angle = 2.8 * k / n, radius = random.uniform(0.2, 1.0);
+      corners.push_back(radius * Vec3(std::cos(angle), std::sin(angle), 0.0));
+    }
+    double area = 0.0;
+    for (int k = 1; k + 1 < n; ++k) area += 0.5 * corners[k].cross(corners[k + 1]).z();
+    std::string text, face = "f";
+    for (const Vec3& p : corners) text += "v " + number(p.x()) + " " + number(p.y()) + " 0\n";
+    for (int k = 0; k < n; ++k) face += " " + std::to_string((first + k) % n + 1);
+    const Result<TriangleMesh> read = readMeshFile(folder.write("polygon.obj", text + face + "\n"));
+    ASSERT_TRUE(read.ok()) << read.error().detail;
+    EXPECT_NEAR(surfaceArea(*read), area, 1e-6) << text << face;
+  }
 }
 
 TEST(ReadMeshFile, VtkOfVersionFive) {

@@ -109,9 +109,11 @@ TEST(World, RefusedCommandsSayWhyAndChangeNothing) {
   cut = cutThrough(Vec3(0, 0, 0.2), Vec3::UnitZ());
   cut.blades.length = -1;
   bad.emplace_back(cut, "length");
-  cut = cutThrough(Vec3(0, 0, 0.2), Vec3::UnitZ());
-  cut.close_time = kNan;
-  bad.emplace_back(cut, "close_time");
+  for (const double close_time : {kNan, -1.0, 3601.0}) {
+    cut = cutThrough(Vec3(0, 0, 0.2), Vec3::UnitZ());
+    cut.close_time = close_time;
+    bad.emplace_back(cut, "close_time");
+  }
   cut = cutThrough(Vec3(0, 0, 0.2), Vec3::UnitZ());
   cut.roughness = -0.01;
   bad.emplace_back(cut, "roughness");
@@ -697,6 +699,11 @@ TEST(World, InspectGivesRestAndPresentShape) {
   EXPECT_NEAR(rest.measures.volume, rest.model->rest_volume, 1e-15);
   EXPECT_NE(now.surface[0], rest.surface[0]);
   EXPECT_GT(now.tetrahedra, 0u);
+  BodyDef shell = test::ball("shell", Vec3(1, 0, 0.2));
+  shell.mesh.triangles.resize(shell.mesh.triangles.size() - 40);
+  shell.solid = false;
+  ASSERT_TRUE(world.addSceneBody(test::shared(shell)).ok());
+  EXPECT_EQ(world.inspect("shell", false)->tetrahedra, 0u);
 }
 
 TEST(World, TheRestShapeIsWhereTheBodyWasPut) {
