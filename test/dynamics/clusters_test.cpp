@@ -155,6 +155,17 @@ TEST(SplitClusters, KeepsTheUntouchedAndCoversThePiece) {
     same += before.count(members) ? 1 : 0;
   }
   EXPECT_GE(same, piece.kept);
+  // One that is cut grows again around its old seed, where most of it and the seed are left.
+  const std::set<Index> seeds(piece.clusters.seeds.begin(), piece.clusters.seeds.end());
+  for (Index c = 0; c < whole.size(); ++c) {
+    const auto at = std::lower_bound(left.begin(), left.end(), whole.seeds[c]);
+    if (at == left.end() || *at != whole.seeds[c]) continue;
+    const auto stays =
+        std::count_if(whole.members.begin() + whole.offsets[c], whole.members.begin() + whole.offsets[c + 1],
+                      [&](Index i) { return std::binary_search(left.begin(), left.end(), i); });
+    if (2 * stays > whole.offsets[c + 1] - whole.offsets[c])
+      EXPECT_TRUE(seeds.count(static_cast<Index>(at - left.begin()))) << c;
+  }
 }
 
 TEST(SplitClusters, SplittingAgainAndAgainDoesNotBreedClusters) {

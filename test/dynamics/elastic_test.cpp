@@ -70,6 +70,7 @@ TEST(ElasticAccelerations, ABodyThatMovesRigidlyIsAtEase) {
     for (const Vec3& p : l.rest) y.push_back(turn * p + shift);
     // Accelerations of the material are of the order of E / (rho d) = 500 m/s^2.
     for (const Vec3& a : accelerations(l, kSoft, y)) EXPECT_LT(a.norm(), 1e-8);
+    for (const ClusterPose& pose : l.poses) EXPECT_LT(pose.rotation.angularDistance(turn), 1e-6);
   }
 }
 
@@ -132,8 +133,8 @@ TEST(ElasticAccelerations, CrushedTornAndFlatBodiesStayFinite) {
   for (const Vec3& a : accelerations(l, kSoft, Points(l.rest.size(), Vec3::Zero()))) EXPECT_TRUE(a.allFinite());
 }
 
-// Drawn out, torn and crushed cells pull by the gradient of the energy too, and need at most five times the substeps: an
-// estimate that grew with the stretch, and a pressure that did, threw bodies apart that were drawn out tenfold.
+// Drawn out, torn and crushed cells pull by the gradient of the energy too, and need at most five times the substeps:
+// an estimate that grew with the stretch, and a pressure that did, threw bodies apart that were drawn out tenfold.
 TEST(ElasticAccelerations, FarFromRestAreTheGradientToo) {
   Lattice l = lattice(1, 1, 1, 0.01, 1000.0);
   test::Random random(9);

@@ -14,6 +14,7 @@
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/mesh_check.h"
 #include "meshless_surgery/geometry/primitives.h"
+#include "support/random.h"
 
 namespace meshless {
 namespace {
@@ -321,6 +322,28 @@ TEST(ReadMeshFile, PolygonsBecomeTriangles) {
   EXPECT_NEAR(surfaceArea(*read), 2 * 3.0 + 8.0, 1e-6);
 }
 
+// Whatever corner it is numbered from.
+TEST(ReadMeshFile, APolygonWithACornerThatSeesTheOthersKeepsItsArea) {
+  const TemporaryFolder folder;
+  test::Random random(3);
+  for (int trial = 0; trial < 20; ++trial) {
+    const int n = random.integer(5, 12), first = random.integer(0, n - 1);
+    Points corners{Vec3::Zero()};
+    for (int k = 1; k < n; ++k) {
+      const double angle = 2.8 * k / n, radius = random.uniform(0.2, 1.0);
+      corners.push_back(radius * Vec3(std::cos(angle), std::sin(angle), 0.0));
+    }
+    double area = 0.0;
+    for (int k = 1; k + 1 < n; ++k) area += 0.5 * corners[k].cross(corners[k + 1]).z();
+    std::string text, face = "f";
+    for (const Vec3& p : corners) text += "v " + number(p.x()) + " " + number(p.y()) + " 0\n";
+    for (int k = 0; k < n; ++k) face += " " + std::to_string((first + k) % n + 1);
+    const Result<TriangleMesh> read = readMeshFile(folder.write("polygon.obj", text + face + "\n"));
+    ASSERT_TRUE(read.ok()) << read.error().detail;
+    EXPECT_NEAR(surfaceArea(*read), area, 1e-6) << text << face;
+  }
+}
+
 TEST(ReadMeshFile, VtkOfVersionFive) {
   const TemporaryFolder folder;
   const std::string head =
@@ -401,6 +424,18 @@ TEST(ReadMeshFile, PcdWithOtherFieldsBetween) {
     EXPECT_EQ(read->vertices[0], Vec3(1, 2, 3));
     EXPECT_EQ(read->vertices[1], Vec3(4, 5, 6));
   }
+}
+
+TEST(ReadMeshFile, PcdHeadersWhoseLinesDoNotAgreeAreRefused) {
+  const TemporaryFolder folder;
+  const std::string good = pcdText(thing().vertices, true);
+  for (const std::string line : {"FIELDS x y z\n", "SIZE 4 4 4\n", "TYPE F F F\n", "COUNT 1 1 1\n"})
+    for (const std::string& to : {line.substr(0, line.size() - 3) + "\n", std::string()}) {
+      if (to.empty() && line[0] == 'C') continue;  // 1 each, where it is left out
+      const Result<TriangleMesh> read = readMeshFile(folder.write("a.pcd", replaced(good, line, to)));
+      ASSERT_FALSE(read.ok()) << line << to;
+      EXPECT_TRUE(says(read.error(), "FIELDS, SIZE, TYPE and COUNT of different lengths")) << to << read.error().detail;
+    }
 }
 
 TEST(ReadMeshFile, ObjInEveryStyle) {

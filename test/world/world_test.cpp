@@ -109,9 +109,11 @@ TEST(World, RefusedCommandsSayWhyAndChangeNothing) {
   cut = cutThrough(Vec3(0, 0, 0.2), Vec3::UnitZ());
   cut.blades.length = -1;
   bad.emplace_back(cut, "length");
-  cut = cutThrough(Vec3(0, 0, 0.2), Vec3::UnitZ());
-  cut.close_time = kNan;
-  bad.emplace_back(cut, "close_time");
+  for (const double close_time : {kNan, -1.0, 3601.0}) {
+    cut = cutThrough(Vec3(0, 0, 0.2), Vec3::UnitZ());
+    cut.close_time = close_time;
+    bad.emplace_back(cut, "close_time");
+  }
   cut = cutThrough(Vec3(0, 0, 0.2), Vec3::UnitZ());
   cut.roughness = -0.01;
   bad.emplace_back(cut, "roughness");
@@ -654,6 +656,33 @@ TEST(World, SetMaterialChangesOneOrAll) {
   EXPECT_GT(world.snapshot({}).report.match_counters.quadratic_moments, 0u);
 }
 
+// In mid swing, with nothing to touch.
+TEST(World, AMaterialSetToWhatItWasChangesNothing) {
+  for (const double youngs_modulus : {0.0, 2e3}) {
+    BodyDef def = test::block();
+    def.material.youngs_modulus = youngs_modulus;
+    std::vector<Points> ends;
+    for (const bool set : {false, true}) {
+      World world(test::weightless());
+      ASSERT_TRUE(world.addSceneBody(test::shared(def)).ok());
+      const PickReply pick = replyOf<PickReply>(world.apply(pickNear(Vec3(0.1, 0, 0.2))));
+      replyOf<Done>(world.apply(MovePickCommand{pick.pick, Vec3(0.15, 0, 0.23)}));
+      run(world, 5);
+      replyOf<Done>(world.apply(ReleaseCommand{pick.pick}));
+      const Points before = only(world).particles;
+      if (set)
+        replyOf<Done>(world.apply(SetMaterialCommand{"", [](const Material& m) { return Result<Material>(m); }}));
+      run(world, 5);
+      ends.push_back(only(world).particles);
+      double moved = 0.0;
+      for (std::size_t i = 0; i < before.size(); ++i) moved = std::max(moved, (ends.back()[i] - before[i]).norm());
+      EXPECT_GT(moved, 1e-3);
+    }
+    for (std::size_t i = 0; i < ends[0].size(); ++i)
+      ASSERT_LT((ends[1][i] - ends[0][i]).norm(), 1e-9) << youngs_modulus;
+  }
+}
+
 TEST(World, RemovingABodyLetsItsSpringsGo) {
   World world = ballWorld();
   replyOf<PickReply>(world.apply(pickNear(Vec3(0, 0, 0.3))));
@@ -670,6 +699,11 @@ TEST(World, InspectGivesRestAndPresentShape) {
   EXPECT_NEAR(rest.measures.volume, rest.model->rest_volume, 1e-15);
   EXPECT_NE(now.surface[0], rest.surface[0]);
   EXPECT_GT(now.tetrahedra, 0u);
+  BodyDef shell = test::ball("shell", Vec3(1, 0, 0.2));
+  shell.mesh.triangles.resize(shell.mesh.triangles.size() - 40);
+  shell.solid = false;
+  ASSERT_TRUE(world.addSceneBody(test::shared(shell)).ok());
+  EXPECT_EQ(world.inspect("shell", false)->tetrahedra, 0u);
 }
 
 TEST(World, TheRestShapeIsWhereTheBodyWasPut) {
