@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <limits>
 #include <map>
-#include <queue>
 #include <sstream>
 #include <tuple>
 #include <utility>
@@ -269,14 +268,13 @@ class CellCutter {
     for (int& piece : piece_of_) piece = std::max(piece, 0);
   }
 
-  // --- the surface; a piece that has no samples gets crumbs
+  // --- the surface; what has no cell gets crumbs
 
   void bind() {
     const CellFinder finder(cut_.lattice);
     carriers_.resize(sources_.size());
     for (std::size_t p = 0; p < sources_.size(); ++p) {
       for (Index v = 0; v < embedded_[p].size(); ++v) carriers_[p].push_back(cellOf(finder, p, v, static_cast<int>(p)));
-      takeFromTheNearest(p);
       std::map<Index, Index> crumbs;
       for (Index v = 0; v < embedded_[p].size(); ++v) {
         if (carriers_[p][v] != kNoIndex) continue;
@@ -284,33 +282,6 @@ class CellCutter {
         const auto [known, is_new] = crumbs.emplace(was, static_cast<Index>(cells().size()));
         carriers_[p][v] = known->second;
         if (is_new) addCrumb(was, static_cast<int>(p));
-      }
-    }
-  }
-
-  // What no sample is near is of the cell of the vertex that is nearest along the surface, if that is within half a
-  // cell.
-  void takeFromTheNearest(std::size_t p) {
-    std::vector<Index>& cell = carriers_[p];
-    if (std::find(cell.begin(), cell.end(), kNoIndex) == cell.end()) return;
-    std::vector<std::vector<Index>> around(cell.size());
-    for (const Triangle& t : sources_[p].mesh.triangles)
-      for (int k = 0; k < 3; ++k) around[t[k]].push_back(t[(k + 1) % 3]);
-    using Entry = std::pair<double, Index>;
-    std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
-    std::vector<double> away(cell.size(), std::numeric_limits<double>::infinity());
-    for (Index v = 0; v < cell.size(); ++v)
-      if (cell[v] != kNoIndex) queue.push({away[v] = 0.0, v});
-    while (!queue.empty()) {
-      const auto [here, v] = queue.top();
-      queue.pop();
-      if (here > away[v]) continue;
-      for (const Index u : around[v]) {
-        const double there = here + (embedded_[p][u].rest - embedded_[p][v].rest).norm();
-        if (!(there < away[u]) || there > 0.25 * before_.spacing) continue;
-        away[u] = there;
-        cell[u] = cell[v];
-        queue.push({there, u});
       }
     }
   }

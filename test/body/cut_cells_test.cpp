@@ -272,7 +272,7 @@ TEST(CutCells, PiecesOfRandomOrgansWeighWhatTheirVolumesDo) {
       const BodyModel& model = *piece.model;
       // By samples: of a layer of a quarter of a cell all or nothing is counted.
       EXPECT_NEAR(model.mass / 1000.0, model.rest_volume,
-                  0.1 * model.rest_volume + model.rest_area * model.spacing / 32.0)
+                  0.1 * model.rest_volume + model.rest_area * model.spacing / 24.0)
           << seed << ": " << model.rest_volume / std::pow(model.spacing, 3) << " cells";
     }
   }

@@ -148,28 +148,26 @@ std::vector<double> foldsOf(const BodySnapshot& body) {
 
 // A surface much finer than the cells beneath it: its vertices follow them without shards.
 TEST(Wounds, AFineSurfaceHasNoFoldsAfterACut) {
-  for (const std::uint64_t seed : {1, 3}) {
-    BodyDef def = test::defOf(*randomOrgan(seed, 0, 0.2, 20000));
-    def.material.youngs_modulus = 4500.0;
-    def.material.poissons_ratio = 0.45;
-    def.material.density = 1060.0;
-    def.material.damping = 4.0;
-    def.material.friction = 0.3;
-    def.pose.translation.z() = 0.002 - boundsOf(def.mesh.vertices).min.z();
-    World world{WorldSettings()};
-    ASSERT_TRUE(world.addSceneBody(test::shared(def)).ok());
-    for (int step = 0; step < 60; ++step) world.step();
-    CutCommand cut;
-    const Vec3 across = Random(seed).direction();
-    cut.blades.x_axis = across.unitOrthogonal();
-    cut.blades.y_axis = across.cross(cut.blades.x_axis);
-    cut.blades.origin =
-        world.snapshot({false, false, true}).bodies[0].measures.centre_of_mass - 10.0 * cut.blades.x_axis;
-    ASSERT_TRUE(world.apply(cut).ok());
-    for (int step = 0; step < 30; ++step) world.step();
-    for (const BodySnapshot& body : world.snapshot({true, true, true}).bodies)
-      for (const double fold : foldsOf(body)) EXPECT_LT(fold, 60.0) << seed;
-  }
+  const std::uint64_t seed = 1;
+  BodyDef def = test::defOf(*randomOrgan(seed, 0, 0.2, 20000));
+  def.material.youngs_modulus = 4500.0;
+  def.material.poissons_ratio = 0.45;
+  def.material.density = 1060.0;
+  def.material.damping = 4.0;
+  def.material.friction = 0.3;
+  def.pose.translation.z() = 0.002 - boundsOf(def.mesh.vertices).min.z();
+  World world{WorldSettings()};
+  ASSERT_TRUE(world.addSceneBody(test::shared(def)).ok());
+  for (int step = 0; step < 60; ++step) world.step();
+  CutCommand cut;
+  const Vec3 across = Random(seed).direction();
+  cut.blades.x_axis = across.unitOrthogonal();
+  cut.blades.y_axis = across.cross(cut.blades.x_axis);
+  cut.blades.origin = world.snapshot({false, false, true}).bodies[0].measures.centre_of_mass - 10.0 * cut.blades.x_axis;
+  ASSERT_TRUE(world.apply(cut).ok());
+  for (int step = 0; step < 30; ++step) world.step();
+  for (const BodySnapshot& body : world.snapshot({true, true, true}).bodies)
+    for (const double fold : foldsOf(body)) EXPECT_LT(fold, 60.0);
 }
 
 }  // namespace
