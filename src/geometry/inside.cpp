@@ -238,7 +238,11 @@ bool SolidQuery::crosses(const Vec3& a, const Vec3& b) const {
 }
 
 double SolidQuery::distance(const Vec3& p) const {
-  if (data_->nodes.empty()) return kInfinity;
+  return data_->nodes.empty() ? kInfinity : (nearest(p) - p).norm();
+}
+
+Vec3 SolidQuery::nearest(const Vec3& p) const {
+  if (data_->nodes.empty()) return p;
   // Depth first, the nearer child first.
   struct Entry {
     Index node;
@@ -247,13 +251,19 @@ double SolidQuery::distance(const Vec3& p) const {
   Entry stack[64];
   int depth = 0;
   double best = kInfinity;
+  Vec3 place = p;
   stack[depth++] = {0, squaredDistance(p, data_->bounds)};
   while (depth > 0) {
     const Entry entry = stack[--depth];
     if (entry.squared >= best) continue;
     const Node& node = data_->nodes[entry.node];
-    for (Index k = 0; k < node.count; ++k)
-      best = std::min(best, (onTriangle(p, data_->triangles[node.first + k]) - p).squaredNorm());
+    for (Index k = 0; k < node.count; ++k) {
+      const Vec3 there = onTriangle(p, data_->triangles[node.first + k]);
+      const double squared = (there - p).squaredNorm();
+      if (!(squared < best)) continue;
+      best = squared;
+      place = there;
+    }
     if (node.count > 0) continue;
     Entry left = {entry.node + 1, squaredDistance(p, data_->nodes[entry.node + 1].box)};
     Entry right = {node.right, squaredDistance(p, data_->nodes[node.right].box)};
@@ -261,7 +271,7 @@ double SolidQuery::distance(const Vec3& p) const {
     stack[depth++] = left;
     stack[depth++] = right;
   }
-  return std::sqrt(best);
+  return place;
 }
 
 }  // namespace meshless

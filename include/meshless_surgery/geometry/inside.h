@@ -24,6 +24,8 @@ class SolidQuery {
   bool crosses(const Vec3& a, const Vec3& b) const;
   /// Distance to the surface [m], unsigned.
   double distance(const Vec3& p) const;
+  /// The place on it that is nearest to p; p where there is none.
+  Vec3 nearest(const Vec3& p) const;
 
  private:
   struct Data;
