@@ -4,6 +4,15 @@
 
 namespace meshless {
 
+namespace {
+std::size_t bytesOf(const CollisionSurface& collision) {
+  const SurfaceBinding& binding = collision.binding;
+  return sizeof collision + meshless::bytesOf(collision.mesh.vertices, collision.mesh.triangles, binding.particle,
+                                              binding.embedded, binding.offsets, binding.carriers, binding.weights,
+                                              binding.levers, binding.turners, binding.lever_clusters);
+}
+}  // namespace
+
 std::size_t bytesOf(const BodyModel& model) {
   const ClusterSet& clusters = model.clusters;
   const SurfaceBinding& binding = model.binding;
@@ -17,6 +26,7 @@ std::size_t bytesOf(const BodyModel& model) {
          (model.cells ? bytesOf(model.cells->cells, model.cells->masses) : 0) +
          (model.elastic_batch ? model.elastic_batch->bytes() : 0) +
          bytesOf(model.surface.vertices, model.surface.triangles, model.surface.patches) +
+         (model.collision ? bytesOf(*model.collision) : 0) +
          bytesOf(binding.particle, binding.embedded, binding.offsets, binding.carriers, binding.weights, binding.levers,
                  binding.turners, binding.lever_clusters);
 }

@@ -10,6 +10,7 @@
 #include "meshless_surgery/body/cell_blend.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/cell_regions.h"
+#include "meshless_surgery/geometry/even_surface.h"
 #include "meshless_surgery/geometry/main_axes.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/nearest.h"
@@ -28,7 +29,9 @@ constexpr double kLeastCellFraction = 0.1;         // a sliver of the solid coun
 constexpr double kReach = 1.75;                    // of the spacing: how far neighbours along the body may be
 constexpr std::size_t kMostLinks = 40;             // of the nearest: vertices finer than the spacing have thousands
 constexpr double kLeastMassShare = 0.1;            // of the mean: no particle is so light that contacts throw it
-constexpr double kLongestEdge = 1.5;               // of the spacing: the surface bends as finely as its cells
+constexpr double kCollisionEdge = 0.8;             // of the spacing
+constexpr std::size_t kMostCollisionTriangles = 200000;
+constexpr double kLongestEdge = 1.5;  // of the spacing: the surface bends as finely as its cells
 
 Error invalid(const std::string& what) { return {ErrorCode::kInvalidArgument, what}; }
 
@@ -44,6 +47,13 @@ Status validate(const BodyDef& def) {
   if (!finite(def.pose.translation) || !def.pose.rotation.coeffs().allFinite() ||
       !(std::abs(def.pose.rotation.norm() - 1.0) < 1e-3))
     return invalid("pose of body '" + def.name + "' is not finite or its quaternion is not of unit length");
+  if (def.collision.kind == CollisionChoice::Kind::kEdge &&
+      !(def.collision.edge > 0.0 && def.collision.edge <= 1000.0)) {
+    std::ostringstream text;
+    text << "collision of body '" << def.name << "' is " << def.collision.edge
+         << "; accepted: auto, visual, or an edge length above 0 to 1000 m";
+    return invalid(text.str());
+  }
   const ClusterOptions& c = def.clusters;
   long cells = 1;
   for (int n : c.grid) {
@@ -348,6 +358,34 @@ Status bindFilled(const BodyDef& def, BodyModel& model) {
   return Done{};
 }
 
+// The surface for contact, where it is to be another than the visual one; a note where it cannot be made.
+Status makeCollision(BodyDef& def, BodyModel& model) {
+  const bool asked = def.collision.kind == CollisionChoice::Kind::kEdge;
+  if (def.collision.kind == CollisionChoice::Kind::kVisual) return Done{};
+  const double edge = asked ? def.collision.edge : kCollisionEdge * model.spacing;
+  if (!asked && meanEdgeLength(model.surface) >= edge) return Done{};
+  Result<EvenSurface> even = evenSurface(model.surface, edge, kMostCollisionTriangles);
+  if (!even) {
+    if (asked && even.error().code == ErrorCode::kInvalidArgument)
+      return invalid("collision of body '" + def.name + "': " + even.error().detail);
+    def.notes.push_back("contact takes the visual surface: " + even.error().detail);
+    return Done{};
+  }
+  auto collision = std::make_shared<CollisionSurface>();
+  collision->mesh = std::move(even->mesh);
+  collision->distance = even->distance;
+  const CellFinder finder(*model.lattice);
+  std::vector<Index> cells;
+  for (const Vec3& v : collision->mesh.vertices) cells.push_back(finder.carrier(v));
+  if (std::find(cells.begin(), cells.end(), kNoIndex) != cells.end()) {
+    def.notes.push_back("contact takes the visual surface: even triangles of it are too far from its cells");
+    return Done{};
+  }
+  collision->binding = bindToCells(*model.lattice, collision->mesh.vertices, cells);
+  model.collision = std::move(collision);
+  return Done{};
+}
+
 }  // namespace
 
 Result<PreparedBody> prepareBody(BodyDef def) {
@@ -418,6 +456,7 @@ Result<PreparedBody> prepareBody(BodyDef def) {
     // What touches a face between its corners dents it there.
     surface = withShortEdges(std::move(surface), kLongestEdge * model->spacing);
     if (Status bound = bindFilled(def, *model); !bound) return bound.error();
+    if (Status made = makeCollision(def, *model); !made) return made.error();
   } else {
     model->binding =
         bindSurface(model->rest, model->graph, model->clusters, surface.vertices, std::move(vertex_particle));

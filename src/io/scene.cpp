@@ -227,6 +227,17 @@ std::vector<Pose> readCopies(YamlSource& source, const YAML::Node& node, const P
   return poses;
 }
 
+CollisionChoice readCollision(YamlSource& source, const YAML::Node& node) {
+  CollisionChoice choice;
+  if (node.IsScalar() && node.Scalar() == "auto") return choice;
+  choice.kind = CollisionChoice::Kind::kEdge;
+  if (node.IsScalar() && node.Scalar() == "visual")
+    choice.kind = CollisionChoice::Kind::kVisual;
+  else
+    readNumber(source, node, "collision", lengths(0.0, true), choice.edge);
+  return choice;
+}
+
 class SceneReader {
  public:
   SceneReader(YamlSource& source, std::string folder, const FileAccess& access, SceneDef& scene)
@@ -276,6 +287,8 @@ class SceneReader {
       else
         source_.fail(cells, "cells is " + shown(cells), "whole, filled");
     }
+    if (const YAML::Node collision = map.get("collision"); collision.IsDefined())
+      def.collision = readCollision(source_, collision);
     readBodyMaterial(map.get("material"), def.material);
     if (const YAML::Node fixed = map.get("fixed"); fixed.IsDefined()) def.fixed = readFixed(source_, fixed);
     if (const YAML::Node regions = map.get("regions"); regions.IsDefined()) readRegions(regions, scale, def);

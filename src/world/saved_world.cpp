@@ -16,7 +16,7 @@ namespace meshless {
 namespace {
 
 constexpr std::string_view kMagic = "MLSSTATE";
-constexpr std::uint32_t kVersion = 12;
+constexpr std::uint32_t kVersion = 13;
 constexpr std::uint64_t kMostModels = 1u << 20;
 
 std::uint32_t checksum(std::string_view bytes) {
@@ -167,7 +167,10 @@ SavedWorldPtr readWorld(InArchive& archive) {
   requireNone(world->contacts.fault(known));
   std::map<std::uint64_t, SurfaceMemory::Known> colliders;
   for (const SavedBody& body : world->bodies) {
-    const std::size_t particles = body.model->rest.size(), vertices = body.model->surface.vertices.size();
+    const BodyModel& model = *body.model;
+    const std::size_t particles = model.rest.size();
+    const std::size_t vertices =
+        model.collision ? model.collision->mesh.vertices.size() : model.surface.vertices.size();
     colliders[body.number] = {particles, vertices > 0 ? vertices : particles};
   }
   for (std::size_t i = 0; i < world->obstacles.size(); ++i) {
@@ -186,6 +189,28 @@ namespace {
 
 // Of mass or length: its powers and its inverse are numbers.
 bool isQuantity(double value) { return value > 1e-50 && value < 1e50; }
+
+// Of a surface of so many vertices, bound to a body's particles and clusters.
+std::string faultOf(const SurfaceBinding& b, std::size_t vertices, std::size_t particles, std::size_t clusters) {
+  if (b.particle.size() != vertices || !allBelowOrNone(b.particle, particles) || !allBelow(b.embedded, vertices) ||
+      !std::is_sorted(b.embedded.begin(), b.embedded.end()) ||
+      !areRows(b.offsets, b.embedded.size(), b.carriers.size()) || b.weights.size() != b.carriers.size() ||
+      !allBelow(b.carriers, particles) || b.levers.size() != b.embedded.size() ||
+      b.turners.size() != b.embedded.size() || !allBelow(b.lever_clusters, clusters))
+    return "a body's surface is not bound to its particles";
+  std::size_t next_embedded = 0;
+  for (Index v = 0; v < vertices; ++v) {
+    const bool embedded = next_embedded < b.embedded.size() && b.embedded[next_embedded] == v;
+    if (embedded != (b.particle[v] == kNoIndex)) return "a vertex of a body is neither a particle nor embedded";
+    next_embedded += embedded;
+  }
+  if (next_embedded != b.embedded.size()) return "a vertex of a body is embedded twice";
+  for (std::size_t r = 0; r < b.embedded.size(); ++r)
+    if (!b.levers[r].isZero(0.0) &&
+        std::find(b.lever_clusters.begin(), b.lever_clusters.end(), b.turners[r]) == b.lever_clusters.end())
+      return "a lever turns with no cluster";
+  return "";
+}
 
 // Of a body with a lattice.
 std::string faultOfRegions(const BodyModel& m) {
@@ -267,23 +292,14 @@ std::string faultOf(const BodyModel& m) {
   }
   if (!areTriangles(m.surface)) return "a body's triangles are not those of its vertices";
   const SurfaceBinding& b = m.binding;
-  if (b.particle.size() != vertices || !allBelowOrNone(b.particle, particles) || !allBelow(b.embedded, vertices) ||
-      !std::is_sorted(b.embedded.begin(), b.embedded.end()) ||
-      !areRows(b.offsets, b.embedded.size(), b.carriers.size()) || b.weights.size() != b.carriers.size() ||
-      !allBelow(b.carriers, particles) || b.levers.size() != b.embedded.size() ||
-      b.turners.size() != b.embedded.size() || !allBelow(b.lever_clusters, clusters))
-    return "a body's surface is not bound to its particles";
-  std::size_t next_embedded = 0;
-  for (Index v = 0; v < vertices; ++v) {
-    const bool embedded = next_embedded < b.embedded.size() && b.embedded[next_embedded] == v;
-    if (embedded != (b.particle[v] == kNoIndex)) return "a vertex of a body is neither a particle nor embedded";
-    next_embedded += embedded;
+  if (std::string fault = faultOf(b, vertices, particles, clusters); !fault.empty()) return fault;
+  if (m.collision) {
+    const CollisionSurface& c = *m.collision;
+    if (!areTriangles(c.mesh) || c.mesh.triangles.empty() || !(c.distance >= 0.0 && c.distance < 1e50))
+      return "a body's surface for contact has no triangles of its vertices";
+    if (std::string fault = faultOf(c.binding, c.mesh.vertices.size(), particles, clusters); !fault.empty())
+      return "for contact, " + fault;
   }
-  if (next_embedded != b.embedded.size()) return "a vertex of a body is embedded twice";
-  for (std::size_t r = 0; r < b.embedded.size(); ++r)
-    if (!b.levers[r].isZero(0.0) &&
-        std::find(b.lever_clusters.begin(), b.lever_clusters.end(), b.turners[r]) == b.lever_clusters.end())
-      return "a lever turns with no cluster";
   // The next cut asks for the cell of a vertex, whether it has a lever or not.
   if (m.lattice && (b.embedded.size() != vertices || !allBelow(b.turners, clusters)))
     return "a body's surface is not embedded in its cells";

@@ -183,21 +183,28 @@ void serialize(A& archive, RegionTissue& v) {
   auto& [material, density, mu, lambda, youngs] = v;
   archive(material, density, mu, lambda, youngs);
 }
+template <class A>
+void serialize(A& archive, CollisionSurface& v) {
+  auto& [mesh, binding, distance] = v;
+  archive(mesh, binding, distance);
+}
 /// elastic_batch, cells, clamp and tissue are made again by whoever reads, once all is checked; empty until then.
 template <class A>
 void serialize(A& archive, BodyModel& v) {
   auto& [rest, masses, match_masses, fixed, any_fixed, graph, clusters, shape, elastic, elastic_batch, lattice,
          cell_mass, regions, cells, clamp_points, clamp, carried, tissue, most_spread_inverse, specific_stiffness,
-         poissons_ratio, highest_frequency, surface, binding, solid, incised, spacing, rest_volume, rest_area, mass,
-         next_patch] = v;
+         poissons_ratio, highest_frequency, surface, binding, collision, solid, incised, spacing, rest_volume,
+         rest_area, mass, next_patch] = v;
   (void)elastic_batch, (void)cells, (void)clamp, (void)tissue;
+  auto of_contact = collision ? *collision : CollisionSurface();
   auto of_cells = lattice ? *lattice : CellLattice();
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
   archive(of_cells, cell_mass, regions, clamp_points, carried);
   archive(rest, masses, match_masses, held, any_fixed, graph, clusters, shape, elastic, endless(most_spread_inverse),
-          specific_stiffness, poissons_ratio, highest_frequency, surface, binding, solid, incised, spacing, rest_volume,
-          rest_area, mass, next_patch);
+          specific_stiffness, poissons_ratio, highest_frequency, surface, binding, of_contact, solid, incised, spacing,
+          rest_volume, rest_area, mass, next_patch);
   if constexpr (std::is_same_v<A, InArchive>) {
+    if (!of_contact.mesh.vertices.empty()) collision = std::make_shared<CollisionSurface>(std::move(of_contact));
     if (!of_cells.cells.empty()) lattice = std::make_shared<CellLattice>(std::move(of_cells));
     fixed.clear();
     for (const std::uint8_t h : held) fixed.push_back(h != 0);
@@ -244,10 +251,15 @@ void serialize(A& archive, HeldRegion& v) {
   archive(v.region, v.in_world);
 }
 template <class A>
+void serialize(A& archive, CollisionChoice& v) {
+  archive(choice(v.kind, CollisionChoice::Kind::kEdge), v.edge);
+}
+template <class A>
 void serialize(A& archive, BodyDef& v) {
-  auto& [name, mesh, solid, pose, spacing, clusters, cells, material, fixed, regions, copy, notes] = v;
+  auto& [name, mesh, solid, pose, spacing, clusters, cells, collision, material, fixed, regions, copy, notes] = v;
   (void)regions;  // the model has them
-  archive(name, mesh, solid, pose, spacing, clusters, choice(cells, CellFill::kFilled), material, fixed, copy, notes);
+  archive(name, mesh, solid, pose, spacing, clusters, choice(cells, CellFill::kFilled), collision, material, fixed,
+          copy, notes);
 }
 template <class A>
 void serialize(A& archive, ObstacleDef& v) {

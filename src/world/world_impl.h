@@ -60,10 +60,11 @@ struct WorldBody {
   std::shared_ptr<const ContactModel> contact;                             // likewise, of the present model
   std::shared_future<std::shared_ptr<const ContactModel>> coming_contact;  // being made by another thread
   std::shared_ptr<const SurfaceModel> surface_model;                       // made when something first comes near
-  BodyModelPtr measured;                                                   // the model that these two are of
-  double edge_length = 0.0;                                                // [m] mean, of the surface
-  double surface_reach = 0.0;                // [m] how far the surface is beyond the particles, at most
-  std::vector<ContactMap> maps;              // of this frame, where it can touch another body
+  Points collision;              // [m] vertices of model->collision, of the last frame in which contact needed them
+  BodyModelPtr measured;         // the model that these two are of
+  double edge_length = 0.0;      // [m] mean, of the surface
+  double surface_reach = 0.0;    // [m] how far the surface is beyond the particles, at most
+  std::vector<ContactMap> maps;  // of this frame, where it can touch another body
   std::vector<QuadraticMap> quadratic_maps;  // likewise, where its mode is quadratic; maps point into it
   bool touched_by_push = false;
   bool low_current = false;          // in this frame

@@ -20,7 +20,7 @@ MemoryUse World::memory() const {
     use.particles += body->state.positions.size();
     if (first(body->model.get())) use.models += bytesOf(*body->model);
     use.states += sizeof *body + bytesOf(body->state) + bytesOf(body->scratch) + bytesOf(body->rest_from);
-    use.contact += bytesOf(body->maps, body->quadratic_maps, body->low_particles, body->low_embedded);
+    use.contact += bytesOf(body->collision, body->maps, body->quadratic_maps, body->low_particles, body->low_embedded);
     if (first(body->contact.get())) use.contact += body->contact->bytes();
     if (first(body->surface_model.get())) use.contact += body->surface_model->bytes();
     if (first(body->mesh.get()))

@@ -20,8 +20,9 @@ constexpr double kSlowedMass = 0.05;  // of an island, at most: slivers are slow
 // Bodies without a surface meet others by their particles.
 ContactSurface surfaceOf(const BodyModel& model) {
   if (model.surface.vertices.empty()) return {TriangleMesh(), ownSupports(static_cast<Index>(model.rest.size()))};
-  const SurfaceBinding& binding = model.binding;
-  const Index count = static_cast<Index>(model.surface.vertices.size());
+  const SurfaceBinding& binding = model.collision ? model.collision->binding : model.binding;
+  const TriangleMesh& mesh = model.collision ? model.collision->mesh : model.surface;
+  const Index count = static_cast<Index>(mesh.vertices.size());
   VertexSupports supports;
   std::vector<Index> embedded(count, kNoIndex);
   for (Index r = 0; r < binding.embedded.size(); ++r) embedded[binding.embedded[r]] = r;
@@ -38,7 +39,12 @@ ContactSurface surfaceOf(const BodyModel& model) {
     }
     supports.offsets.push_back(static_cast<Index>(supports.particles.size()));
   }
-  return {model.surface, std::move(supports)};
+  return {mesh, std::move(supports)};
+}
+
+// [m] of what meets others beyond the bounds of the particles, at most.
+double contactReachOf(const BodyModel& model) {
+  return embeddedReachOf(model) + (model.collision ? model.collision->distance : 0.0);
 }
 
 double secondsSince(std::chrono::steady_clock::time_point& last) {
@@ -77,7 +83,7 @@ SurfaceModel::SurfaceModel(BodyModelPtr of_model) : model(std::move(of_model)), 
     groups = std::make_unique<RigidGroups>(std::vector<Index>{0, static_cast<Index>(all.size())}, all,
                                            std::vector<double>(all.size(), 1.0), model->masses);
   }
-  reach = embeddedReachOf(*model);
+  reach = contactReachOf(*model);
 }
 
 std::size_t SurfaceModel::bytes() const {
@@ -129,10 +135,10 @@ void World::Impl::fillCollider(WorldBody& body, double h_frame, Collider& collid
 void World::Impl::measureSurface(WorldBody& body) {
   if (body.measured == body.model) return;
   body.measured = body.model;
-  body.surface_reach = embeddedReachOf(*body.model);
+  body.surface_reach = contactReachOf(*body.model);
   double sum = 0.0;
   std::size_t count = 0;
-  const TriangleMesh& surface = body.model->surface;
+  const TriangleMesh& surface = body.model->collision ? body.model->collision->mesh : body.model->surface;
   for (const Triangle& t : surface.triangles)
     for (int k = 0; k < 3; ++k, ++count) sum += (surface.vertices[t[k]] - surface.vertices[t[(k + 1) % 3]]).norm();
   body.edge_length = count > 0 ? sum / static_cast<double>(count) : body.model->spacing;
@@ -173,8 +179,16 @@ void World::Impl::findSurfaceContacts(double h_frame) {
         colliders[b].vertices = bodies[b]->state.positions.data();
         return;
       }
-      refreshSurface(*bodies[b]);
-      colliders[b].vertices = bodies[b]->state.surface.data();
+      if (!bodies[b]->model->collision) {
+        refreshSurface(*bodies[b]);
+        colliders[b].vertices = bodies[b]->state.surface.data();
+        return;
+      }
+      const ContactSurface& surface = *colliders[b].surface;
+      Points& places = bodies[b]->collision;
+      places.resize(surface.vertices());
+      for (Index v = 0; v < places.size(); ++v) places[v] = surface.supports.sum(v, bodies[b]->state.positions.data());
+      colliders[b].vertices = places.data();
     });
     surface_contacts.find(scene, colliders, report.contact_counters, for_each);
     bool woken = false;

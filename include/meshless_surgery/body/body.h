@@ -34,6 +34,13 @@ struct RegionTissue {
 };
 RegionTissue regionTissue(const Material& own, const Material& body);
 
+/// What contact takes for the surface.
+struct CollisionSurface {
+  TriangleMesh mesh;  // rest positions of the vertices [m]
+  SurfaceBinding binding;
+  double distance = 0.0;  // [m] from the visual surface, at most
+};
+
 /// Constant while it lives: rest shape, topology, clusters, masses.
 struct BodyModel {
   Points rest;                 // [m] particles
@@ -67,6 +74,7 @@ struct BodyModel {
   double highest_frequency = 0.0;   // [rad/s] of an elastic material: a substep takes at most 1 / highest_frequency
   TriangleMesh surface;             // rest positions of the vertices [m]
   SurfaceBinding binding;
+  std::shared_ptr<const CollisionSurface> collision;  // null: contact takes the visual surface
   bool solid = true;
   bool incised = false;          // it has wound faces, which can press on each other
   double spacing = 0.0;          // [m] between interior particles

@@ -30,6 +30,14 @@ struct TissueRegion {
   Material material;
 };
 
+/// What contact takes for the surface of a body of filled cells: a surface of even triangles where the visual one is
+/// finer than that (kAuto), the visual one, or even triangles of an edge [m]. Other bodies have the visual one.
+struct CollisionChoice {
+  enum class Kind { kAuto, kVisual, kEdge };
+  Kind kind = Kind::kAuto;
+  double edge = 0.0;
+};
+
 struct BodyDef {
   std::string name;
   TriangleMesh mesh;   // in the body's own frame, already scaled [m]; repaired (geometry/mesh_check.h)
@@ -38,6 +46,7 @@ struct BodyDef {
   double spacing = 0;  // [m] between interior particles; 0: chosen from the surface
   ClusterOptions clusters;
   CellFill cells = CellFill::kFilled;  // of a lattice: an elastic material, or clusters of cells
+  CollisionChoice collision;
   Material material;
   std::vector<HeldRegion> fixed;
   std::vector<TissueRegion> regions;  // where several are, the last one counts; up to 100
