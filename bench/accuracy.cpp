@@ -186,24 +186,21 @@ bool settledRows(Table& table, const std::string& folder, const std::string& par
       std::fprintf(stderr, "%s\n", truth.error().detail.c_str());
       return false;
     }
-    for (const CellFill cells : {CellFill::kWhole, CellFill::kFilled}) {
-      const std::string mode = cells == CellFill::kFilled ? "filled" : "whole";
-      const auto add = [&](double times, double spacing) {
-        const Result<SettledResult> result = settle(*truth, entry.folder, {cells, times, spacing});
-        if (!result) {  // a clamp that holds nothing, for one
-          table.row("settled", entry.name, mode, "refused", 0.0, 1.0);
-          std::fprintf(stderr, "%s: %s\n", entry.name.c_str(), result.error().detail.c_str());
-          return;
-        }
-        const std::string setting = shortNumber(1000.0 * result->spacing) + " mm " + std::to_string(result->particles);
-        table.row("settled", entry.name, mode, setting + (result->moving > 3e-4 ? " not at rest" : ""), result->step_ms,
-                  result->error);
-        table.row("settled_tip", entry.name, mode, setting, result->step_ms, result->tip - 1.0);
-      };
-      if (entry.spacings.empty())
-        for (const double times : finer) add(times, 0.0);
-      for (const double spacing : entry.spacings) add(1.0, spacing);
-    }
+    const auto add = [&](double times, double spacing) {
+      const Result<SettledResult> result = settle(*truth, entry.folder, {times, spacing});
+      if (!result) {  // a clamp that holds nothing, for one
+        table.row("settled", entry.name, "filled", "refused", 0.0, 1.0);
+        std::fprintf(stderr, "%s: %s\n", entry.name.c_str(), result.error().detail.c_str());
+        return;
+      }
+      const std::string setting = shortNumber(1000.0 * result->spacing) + " mm " + std::to_string(result->particles);
+      table.row("settled", entry.name, "filled", setting + (result->moving > 3e-4 ? " not at rest" : ""),
+                result->step_ms, result->error);
+      table.row("settled_tip", entry.name, "filled", setting, result->step_ms, result->tip - 1.0);
+    };
+    if (entry.spacings.empty())
+      for (const double times : finer) add(times, 0.0);
+    for (const double spacing : entry.spacings) add(1.0, spacing);
   }
   return true;
 }

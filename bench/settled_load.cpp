@@ -37,7 +37,6 @@ Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, 
   def.name = truth.text("case");
   def.mesh = *surface;
   def.pose = placingOf(truth);
-  def.cells = options.cells;
   def.fixed = heldBy(truth);
   def.material.youngs_modulus = options.stiffer * truth.number("youngs_modulus");
   def.material.poissons_ratio = truth.number("poissons_ratio");

@@ -18,7 +18,6 @@ struct SettledResult {
 };
 
 struct SettledOptions {
-  CellFill cells = CellFill::kFilled;
   double finer = 1.0;    // the default spacing over that of the body
   double spacing = 0.0;  // [m] 0: by `finer`
   double stiffer = 1.0;  // Young's modulus and gravity over the truth's: the displacements are the same

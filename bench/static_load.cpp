@@ -127,7 +127,6 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
       truth.has("surface") ? alignedSpacing(def.mesh, truth.number("fixed_below"), settings.spacing) : settings.spacing;
   def.spacing = spacing;
   def.clusters = settings.clusters;
-  def.cells = settings.cells;
   def.material = settings.material;
   def.material.density = truth.number("density");
   if (def.material.elastic()) {

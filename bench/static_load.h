@@ -7,9 +7,8 @@
 namespace meshless::bench {
 
 struct StaticSettings {
-  double spacing = 0.0125;  // [m] between particles
-  ClusterOptions clusters;  // cells, unless another kind is tried
-  CellFill cells = CellFill::kWhole;
+  double spacing = 0.0125;       // [m] between particles
+  ClusterOptions clusters;       // cells, unless another kind is tried
   Material material;             // elastic: E, nu and density are taken from the case; else as it is
   double appearance_rate = 0.0;  // [rad/s] of an appearance material: accelerations are appearance_rate^2 (goal - x)
   int max_steps = 60000;

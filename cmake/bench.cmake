@@ -31,6 +31,8 @@ endif()
 
 add_bench(accuracy bench/accuracy.cpp bench/plot.cpp)
 target_link_libraries(accuracy bench_truth CLI11::CLI11)
+add_bench(surfaces bench/surfaces.cpp)
+target_link_libraries(surfaces ${PROJECT_NAME}_drive CLI11::CLI11)
 if(benchmark_FOUND)
   add_bench(bench_rotation bench/bench_rotation.cpp)
   target_link_libraries(bench_rotation benchmark::benchmark)

@@ -351,4 +351,13 @@ SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const
   return binding;
 }
 
+Points collisionPlaces(const BodyModel& model, const Points& positions) {
+  const SurfaceBinding& binding = model.collision->binding;
+  Points places(model.collision->mesh.vertices.size(), Vec3::Zero());
+  for (Index r = 0; r < binding.embedded.size(); ++r)
+    for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k)
+      places[binding.embedded[r]] += binding.weights[k] * positions[binding.carriers[k]];
+  return places;
+}
+
 }  // namespace meshless

@@ -99,13 +99,21 @@ Result<CutBody> cutFilled(const BodyModel& model, const BodyState& state, const 
                           const TriangleMesh& present, const CutOptions& options) {
   const Result<CutSurface> cut = cutByPlane(present, plane, options);
   if (!cut) return cut.error();
-  std::vector<CellPieceSource> sources;
-  for (const CutPiece& piece : cut->pieces)
-    sources.push_back({piece.mesh, piece.origins, std::vector<int>(piece.mesh.vertices.size(), piece.side)});
+  const TriangleMesh for_contact = presentCollision(model, state);
+  Result<CutSurface> cut_contact = Error();
+  if (model.collision) {
+    CutOptions likewise = options;
+    likewise.rest = &model.collision->mesh.vertices;
+    cut_contact = cutByPlane(for_contact, plane, likewise);
+  }
+  std::vector<CellPieceSource> sources, collision;
+  for (const CutPiece& piece : cut->pieces) sources.push_back({piece.mesh, piece.origins});
+  if (cut_contact)
+    for (const CutPiece& piece : cut_contact->pieces) collision.push_back({piece.mesh, piece.origins});
   CutBody result;
   result.cap_area = cut->cap_area;
   Result<std::vector<BodyPiece>> pieces =
-      cutCells(model, state, BladeGate(plane), sources, options.cap_patch, result.work);
+      cutCells(model, state, BladeGate(plane), sources, collision, options.cap_patch, result.work);
   if (!pieces) return pieces.error();
   result.pieces = std::move(*pieces);
   return result;

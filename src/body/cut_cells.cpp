@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <optional>
 #include <sstream>
 #include <tuple>
 #include <utility>
@@ -23,7 +24,7 @@ namespace {
 constexpr double kBeneath = 1e-3;      // [spacing]
 constexpr double kCrumb = 1.0 / 64.0;  // of a cell, for a piece of it that no sample sees
 
-// A vertex of a piece whose new cell is not known yet.
+// A vertex of a piece, or of its surface for contact, whose new cell is not known yet.
 struct EmbeddedVertex {
   Vec3 rest;  // [m]
   Index was;  // the parent's cell that it followed
@@ -55,6 +56,12 @@ bool invert(const LatticeCell& cell, const Points& x, const Vec3& q, double size
   return false;
 }
 
+// The surface for contact of a piece, at rest.
+struct PieceCollision {
+  TriangleMesh mesh;         // [m]
+  std::vector<Index> cells;  // of each vertex; kNoIndex where none of the piece's is near it
+};
+
 bool shareACorner(const std::vector<LatticeCell>& cells, Index a, Index b) {
   if (a == b) return true;
   const auto &p = cells[a].corners, &q = cells[b].corners;
@@ -64,11 +71,12 @@ bool shareACorner(const std::vector<LatticeCell>& cells, Index a, Index b) {
 class CellCutter {
  public:
   CellCutter(const BodyModel& model, const BodyState& state, const BladeGate& gate,
-             const std::vector<CellPieceSource>& sources)
+             const std::vector<CellPieceSource>& sources, const std::vector<CellPieceSource>& collision)
       : model_(model),
         state_(state),
         gate_(gate),
         sources_(sources),
+        collision_(collision),
         before_(*model.lattice),
         cut_(cutLattice(before_, state.positions, gate)),
         children_(before_.cells.size()) {
@@ -76,24 +84,18 @@ class CellCutter {
   }
 
   Result<std::vector<BodyPiece>> run(std::uint32_t new_patch, CutWork& work) {
-    embedded_.resize(sources_.size());
-    for (std::size_t p = 0; p < sources_.size(); ++p)
-      for (Index v = 0; v < sources_[p].origins.size(); ++v) {
-        embedded_[p].push_back(embeddedOf(p, v));
-        if (embedded_[p].back().was != kNoIndex) continue;
-        std::ostringstream text;
-        text << "the blade made a point at " << sources_[p].mesh.vertices[v].transpose()
-             << " that lies in none of its cells";
-        return Error{ErrorCode::kUnsuitableShape, text.str()};
-      }
-    for (std::size_t p = 0; p < sources_.size(); ++p) {
-      TriangleMesh rest;
-      rest.triangles = sources_[p].mesh.triangles;
-      for (const EmbeddedVertex& embedded : embedded_[p]) rest.vertices.push_back(embedded.rest);
-      normals_.push_back(vertexNormals(rest));
-      solids_.emplace_back(rest);
+    for (const CellPieceSource& source : sources_) {
+      surfaces_.push_back(surfaceOf(source, model_.surface.vertices, model_.binding));
+      const auto& embedded = surfaces_.back().embedded;
+      const auto lost = std::find_if(embedded.begin(), embedded.end(), [](const auto& e) { return e.was == kNoIndex; });
+      if (lost == embedded.end()) continue;
+      std::ostringstream text;
+      text << "the blade made a point at " << source.mesh.vertices[lost - embedded.begin()].transpose()
+           << " that lies in none of its cells";
+      return Error{ErrorCode::kUnsuitableShape, text.str()};
     }
     choosePieces();
+    bindCollision();
     sampled_ = static_cast<Index>(cells().size());
     bind();
     joinThePieces();
@@ -109,27 +111,48 @@ class CellCutter {
 
   // --- where vertices come from
 
-  EmbeddedVertex embeddedOf(std::size_t p, Index v) {
-    const VertexOrigins& origins = sources_[p].origins;
+  // What is known at rest of the surface of a source.
+  struct RestSurface {
+    std::vector<EmbeddedVertex> embedded;
+    TriangleMesh mesh;  // [m]
+    Points normals;
+    std::optional<SolidQuery> solid;
+  };
+
+  RestSurface surfaceOf(const CellPieceSource& source, const Points& parent_rest, const SurfaceBinding& parent) {
+    RestSurface surface;
+    for (Index v = 0; v < source.origins.size(); ++v) {
+      surface.embedded.push_back(embeddedOf(source, v, parent_rest, parent));
+      surface.mesh.vertices.push_back(surface.embedded.back().rest);
+    }
+    surface.mesh.triangles = source.mesh.triangles;
+    surface.normals = vertexNormals(surface.mesh);
+    surface.solid.emplace(surface.mesh);
+    return surface;
+  }
+
+  EmbeddedVertex embeddedOf(const CellPieceSource& source, Index v, const Points& parent_rest,
+                            const SurfaceBinding& parent) {
+    const VertexOrigins& origins = source.origins;
     EmbeddedVertex embedded{Vec3::Zero(), kNoIndex, origins.same(v) == kNoIndex};
-    if (origins.insideCap(v)) return insideOf(sources_[p].mesh.vertices[v]);
+    if (origins.insideCap(v)) return insideOf(source.mesh.vertices[v]);
     const VertexOrigin origin = origins[v];
     int heaviest = 0;
     for (int k = 1; k < 4; ++k)
       if (origin.parents[k] != kNoIndex && origin.weights[k] > origin.weights[heaviest]) heaviest = k;
-    const Vec3& nearest = model_.surface.vertices[origin.parents[heaviest]];
-    embedded.was = model_.binding.turners[origin.parents[heaviest]];
+    const Vec3& nearest = parent_rest[origin.parents[heaviest]];
+    embedded.was = parent.turners[origin.parents[heaviest]];
     double all = 0.0;
     for (int k = 0; k < 4; ++k) {
       if (origin.parents[k] == kNoIndex) continue;
       // Where soft tissue lies in itself, edges of different parts of it meet.
-      const Vec3& rest = model_.surface.vertices[origin.parents[k]];
+      const Vec3& rest = parent_rest[origin.parents[k]];
       if (!((rest - nearest).norm() <= kOneTissue * before_.spacing)) continue;
       embedded.rest += origin.weights[k] * rest;
       all += origin.weights[k];
     }
     if (all != 1.0) embedded.rest /= all;
-    if (!embedded.made) embedded.rest = model_.surface.vertices[origin.parents[0]];
+    if (!embedded.made) embedded.rest = parent_rest[origin.parents[0]];
     return embedded;
   }
 
@@ -174,14 +197,14 @@ class CellCutter {
 
   // --- cells that a vertex may follow
 
-  // The cell of vertex v of source p among those of `piece` (any where it is negative): that of the nearest sample
+  // The cell of vertex v of a surface among those of `piece` (any where it is negative): that of the nearest sample
   // which the surface does not hide from the tissue beneath the vertex.
-  Index cellOf(const CellFinder& finder, std::size_t p, Index v, int piece) {
-    const EmbeddedVertex& embedded = embedded_[p][v];
+  Index cellOf(const CellFinder& finder, const RestSurface& surface, Index v, int piece) {
+    const EmbeddedVertex& embedded = surface.embedded[v];
     const auto in_piece = [&](Index c) { return piece < 0 || piece_of_[component_[c]] == piece; };
     const std::vector<Index>& copies = children_[embedded.was];
     if (!embedded.made && copies.size() == 1 && !cut_.changed[copies[0]] && in_piece(copies[0])) return copies[0];
-    const Vec3 beneath = embedded.rest - kBeneath * before_.spacing * normals_[p][v];
+    const Vec3 beneath = embedded.rest - kBeneath * before_.spacing * surface.normals[v];
     struct Sample {
       double squared;
       Index cell;
@@ -204,7 +227,7 @@ class CellCutter {
     std::make_heap(near.begin(), near.end(), farther);
     for (; !near.empty(); near.pop_back()) {
       std::pop_heap(near.begin(), near.end(), farther);
-      if (!solids_[p].crosses(beneath, near.back().place)) return near.back().cell;
+      if (!surface.solid->crosses(beneath, near.back().place)) return near.back().cell;
     }
     return kNoIndex;
   }
@@ -224,9 +247,9 @@ class CellCutter {
     std::vector<std::map<int, int>> votes(names.size());
     const CellFinder finder(cut_.lattice);
     for (std::size_t p = 0; p < sources_.size(); ++p)
-      for (Index v = 0; v < embedded_[p].size(); ++v) {
-        if (embedded_[p][v].made) continue;
-        const Index c = cellOf(finder, p, v, -1);
+      for (Index v = 0; v < surfaces_[p].embedded.size(); ++v) {
+        if (surfaces_[p].embedded[v].made) continue;
+        const Index c = cellOf(finder, surfaces_[p], v, -1);
         if (c != kNoIndex) ++votes[component_[c]][static_cast<int>(p)];
       }
     for (Index n = 0; n < names.size(); ++n) {
@@ -274,14 +297,41 @@ class CellCutter {
     const CellFinder finder(cut_.lattice);
     carriers_.resize(sources_.size());
     for (std::size_t p = 0; p < sources_.size(); ++p) {
-      for (Index v = 0; v < embedded_[p].size(); ++v) carriers_[p].push_back(cellOf(finder, p, v, static_cast<int>(p)));
+      const std::vector<EmbeddedVertex>& embedded = surfaces_[p].embedded;
+      for (Index v = 0; v < embedded.size(); ++v)
+        carriers_[p].push_back(cellOf(finder, surfaces_[p], v, static_cast<int>(p)));
       std::map<Index, Index> crumbs;
-      for (Index v = 0; v < embedded_[p].size(); ++v) {
+      for (Index v = 0; v < embedded.size(); ++v) {
         if (carriers_[p][v] != kNoIndex) continue;
-        const Index was = withMass(embedded_[p][v].was);
+        const Index was = withMass(embedded[v].was);
         const auto [known, is_new] = crumbs.emplace(was, static_cast<Index>(cells().size()));
         carriers_[p][v] = known->second;
         if (is_new) addCrumb(was, static_cast<int>(p));
+      }
+    }
+  }
+
+  // Which piece each part of the surface for contact is of, and the cells of its vertices there.
+  void bindCollision() {
+    if (collision_.empty()) return;
+    const CellFinder finder(cut_.lattice);
+    collisions_.resize(sources_.size());
+    for (const CellPieceSource& source : collision_) {
+      const RestSurface surface = surfaceOf(source, model_.collision->mesh.vertices, model_.collision->binding);
+      std::vector<Index> votes(sources_.size(), 0);
+      for (Index v = 0; v < surface.embedded.size(); ++v)
+        if (surface.embedded[v].was == kNoIndex)
+          return collisions_.clear();
+        else if (const Index c = surface.embedded[v].made ? kNoIndex : cellOf(finder, surface, v, -1); c != kNoIndex)
+          ++votes[static_cast<std::size_t>(piece_of_[component_[c]])];
+      const std::size_t p = static_cast<std::size_t>(std::max_element(votes.begin(), votes.end()) - votes.begin());
+      PieceCollision& piece = collisions_[p];
+      const Index first = static_cast<Index>(piece.mesh.vertices.size());
+      for (const Triangle& t : surface.mesh.triangles)
+        piece.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+      for (Index v = 0; v < surface.embedded.size(); ++v) {
+        piece.mesh.vertices.push_back(surface.mesh.vertices[v]);
+        piece.cells.push_back(cellOf(finder, surface, v, static_cast<int>(p)));
       }
     }
   }
@@ -466,7 +516,7 @@ class CellCutter {
     child->incised = model_.incised || !gate_.unbounded();
     child->surface.triangles = from.mesh.triangles;
     child->surface.patches = from.mesh.patches;
-    for (const EmbeddedVertex& embedded : embedded_[p]) child->surface.vertices.push_back(embedded.rest);
+    child->surface.vertices = surfaces_[p].mesh.vertices;
     child->rest_volume = signedVolume(child->surface);
     child->rest_area = surfaceArea(child->surface);
 
@@ -521,7 +571,8 @@ class CellCutter {
     std::vector<Index> carriers;
     for (const Index c : carriers_[p]) carriers.push_back(renumbered[c]);
     child->binding = bindToCells(*lattice, child->surface.vertices, carriers);
-    for (const EmbeddedVertex& embedded : embedded_[p]) {
+    if (!collisions_.empty()) child->collision = collisionOf(collisions_[p], *lattice, renumbered);
+    for (const EmbeddedVertex& embedded : surfaces_[p].embedded) {
       ++(embedded.made ? work.bound_embedded : work.kept_embedded);
       work.new_vertices += embedded.made;
     }
@@ -536,6 +587,18 @@ class CellCutter {
           from.mesh.vertices[r] - embeddedPosition(child->binding, piece.state.positions, piece.state.poses, r));
     piece.model = std::move(child);
     return piece;
+  }
+
+  std::shared_ptr<const CollisionSurface> collisionOf(const PieceCollision& from, const CellLattice& lattice,
+                                                      const std::vector<Index>& renumbered) const {
+    if (from.cells.empty()) return nullptr;
+    std::vector<Index> cells;
+    for (const Index c : from.cells) {
+      if (c == kNoIndex) return nullptr;
+      cells.push_back(renumbered[c]);
+    }
+    return std::make_shared<CollisionSurface>(
+        CollisionSurface{from.mesh, bindToCells(lattice, from.mesh.vertices, cells), model_.collision->distance});
   }
 
   // What is held stays held, by the copy of its cell with the nearest tissue on its side of the blade.
@@ -585,13 +648,12 @@ class CellCutter {
   const BodyModel& model_;
   const BodyState& state_;
   const BladeGate& gate_;
-  const std::vector<CellPieceSource>& sources_;
+  const std::vector<CellPieceSource>&sources_, &collision_;
   const CellLattice& before_;
   CutLattice cut_;
-  std::vector<std::vector<Index>> children_;           // of each of the parent's cells
-  std::vector<std::vector<EmbeddedVertex>> embedded_;  // of each source
-  std::vector<Points> normals_;                        // of their vertices, at rest
-  std::vector<SolidQuery> solids_;                     // at rest
+  std::vector<std::vector<Index>> children_;  // of each of the parent's cells
+  std::vector<RestSurface> surfaces_;         // of each source
+  std::vector<PieceCollision> collisions_;    // of each source, or none
   std::map<std::array<double, 3>, EmbeddedVertex> inside_;
   std::vector<std::pair<Box, Index>> boxes_;  // present, of the parent's cells near the blade's plane
   std::vector<Index> component_;              // of each cell
@@ -605,9 +667,19 @@ class CellCutter {
 }  // namespace
 
 Result<std::vector<BodyPiece>> cutCells(const BodyModel& model, const BodyState& state, const BladeGate& gate,
-                                        const std::vector<CellPieceSource>& sources, std::uint32_t new_patch,
+                                        const std::vector<CellPieceSource>& sources,
+                                        const std::vector<CellPieceSource>& collision, std::uint32_t new_patch,
                                         CutWork& work) {
-  return CellCutter(model, state, gate, sources).run(new_patch, work);
+  return CellCutter(model, state, gate, sources, collision).run(new_patch, work);
+}
+
+TriangleMesh presentCollision(const BodyModel& model, const BodyState& state) {
+  TriangleMesh present;
+  if (!model.collision) return present;
+  present.vertices = collisionPlaces(model, state.positions);
+  present.triangles = model.collision->mesh.triangles;
+  present.patches.assign(present.triangles.size(), kOuterPatch);
+  return present;
 }
 
 }  // namespace meshless

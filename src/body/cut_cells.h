@@ -13,15 +13,22 @@ constexpr double kOneTissue = 4.0;
 struct CellPieceSource {
   const TriangleMesh& mesh;      // present shape; patches filled
   const VertexOrigins& origins;  // of its vertices
-  std::vector<int> side;         // one a vertex: of the blade, +1 or -1; 0 where both sides have it (a buried front)
 };
 
 /// One piece a source, in their order. Particles of the parent go on in one piece each, where their tissue is, and come
 /// first, in their order; copies follow (BodyPiece::parent_particles has kNoIndex for them). Positions and velocities
 /// of copies are those of what they are copies of, and masses add up corner by corner: mass and momentum stay. Refuses
 /// (kUnsuitableShape) where a point that the blade made lies in none of the cells.
+///
+/// collision: what the same blade made of the body's surface for contact, in any order. Each goes to the piece that
+/// most of its vertices are in. A piece that gets none, or one that is not all in its cells, meets others by what is
+/// seen.
 Result<std::vector<BodyPiece>> cutCells(const BodyModel& model, const BodyState& state, const BladeGate& gate,
-                                        const std::vector<CellPieceSource>& sources, std::uint32_t new_patch,
+                                        const std::vector<CellPieceSource>& sources,
+                                        const std::vector<CellPieceSource>& collision, std::uint32_t new_patch,
                                         CutWork& work);
+
+/// The surface for contact in its present shape [m]; empty where the body has none of its own.
+TriangleMesh presentCollision(const BodyModel& model, const BodyState& state);
 
 }  // namespace meshless

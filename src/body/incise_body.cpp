@@ -162,13 +162,16 @@ Result<IncisedBody> inciseFilled(const BodyModel& model, const BodyState& state,
                                  const TriangleMesh& present, const InciseOptions& options) {
   const Result<Incision> incision = incise(present, blade, options);
   if (!incision) return incision.error();
-  const Gate gate(blade, model.spacing);
-  std::vector<CellPieceSource> sources;
-  for (const IncisedPiece& piece : incision->pieces)
-    sources.push_back({piece.mesh, piece.origins, sidesOf(piece, gate)});
+  const Result<Incision> contact_incision =
+      model.collision ? incise(presentCollision(model, state), blade, options) : Error();
+  std::vector<CellPieceSource> sources, collision;
+  for (const IncisedPiece& piece : incision->pieces) sources.push_back({piece.mesh, piece.origins});
+  if (contact_incision)
+    for (const IncisedPiece& piece : contact_incision->pieces) collision.push_back({piece.mesh, piece.origins});
   IncisedBody result;
   result.opened_area = incision->opened_area;
-  Result<std::vector<BodyPiece>> pieces = cutCells(model, state, BladeGate(blade), sources, options.patch, result.work);
+  Result<std::vector<BodyPiece>> pieces =
+      cutCells(model, state, BladeGate(blade), sources, collision, options.patch, result.work);
   if (!pieces) return pieces.error();
   result.pieces = std::move(*pieces);
   return result;

@@ -25,7 +25,6 @@ constexpr std::size_t kMostRegions = 100;
 constexpr std::size_t kMaxVertexParticles = 6000;  // larger surfaces are embedded, but for a subset at the spacing
 constexpr double kAutoParticles = 2500.0;          // interior particles aimed at where no spacing is given
 constexpr double kAutoCells = 1600.0;              // of a lattice, likewise
-constexpr double kLeastCellFraction = 0.1;         // a sliver of the solid counts as so much of its cell
 constexpr double kReach = 1.75;                    // of the spacing: how far neighbours along the body may be
 constexpr std::size_t kMostLinks = 40;             // of the nearest: vertices finer than the spacing have thousands
 constexpr double kLeastMassShare = 0.1;            // of the mean: no particle is so light that contacts throw it
@@ -80,11 +79,11 @@ Status validate(const BodyDef& def) {
                      "'; accepted: elastic materials, with a youngs_modulus");
   }
   if (!def.regions.empty() &&
-      !(def.solid && def.material.elastic() && def.cells == CellFill::kFilled &&
+      !(def.solid && def.material.elastic() &&
         (def.clusters.kind == ClusterOptions::Kind::kCells || def.clusters.kind == ClusterOptions::Kind::kAuto)))
     return invalid("body '" + def.name +
                    "' has regions; accepted: those of a closed body of an elastic material, with " +
-                   "cells: filled, and clusters: auto or cells");
+                   "clusters: auto or cells");
   return def.material.validate();
 }
 
@@ -258,45 +257,19 @@ Status makeLatticeParticles(const BodyDef& def, const SolidQuery& solid, const P
     return invalid("body '" + def.name + "' has " + std::to_string(lattice->corners) + " particles; accepted: up to " +
                    std::to_string(kMaxParticles));
   vertex_particle.assign(model.surface.vertices.size(), kNoIndex);
-  if (def.cells == CellFill::kFilled) {
-    double filled = 0.0;
-    for (const LatticeCell& cell : lattice->cells) filled += momentsOf(cell.filled).fraction;
-    model.cell_mass = def.material.density * model.rest_volume / filled;
-    const HeldHeight held = heldHeight(def.fixed, placed, pose);
-    findResistance(solid, held, *lattice);
-    // In units of what a cell of that mass resists with.
-    const double unit = std::pow(model.spacing, 3.0) * filled / model.rest_volume;
-    for (LatticeCell& cell : lattice->cells) cell.resists.fraction *= unit;
-    if (held) model.clamp_points = findClampPoints(*lattice, solid, held);
-    if (const Status found = findRegions(def, placed, pose, *lattice, model); !found) return found;
-    model.lattice = std::make_shared<CellLattice>(std::move(*lattice));
-    makeParticlesOfCells(model);
-    holdCorners(model);
-    return Done{};
-  }
-  model.rest = cornerPlaces(*lattice);
-  std::vector<double> fractions;
   double filled = 0.0;
-  for (const LatticeCell& cell : lattice->cells) {
-    fractions.push_back(std::max(momentsOf(cell.filled).fraction, kLeastCellFraction));
-    filled += fractions.back();
-  }
-  std::vector<std::array<Index, 8>> cells;
-  std::vector<double> cell_masses;
-  std::vector<std::array<Index, 2>> edges;
-  model.masses.assign(model.rest.size(), 0.0);
-  for (std::size_t c = 0; c < lattice->cells.size(); ++c) {
-    const LatticeCell& cell = lattice->cells[c];
-    cells.push_back(cell.corners);
-    cell_masses.push_back(def.material.density * model.rest_volume * fractions[c] / filled);
-    for (Index k = 0; k < 8; ++k) {
-      model.masses[cell.corners[k]] += cell_masses.back() / 8.0;
-      for (Index bit : {1u, 2u, 4u})
-        if (!(k & bit)) edges.push_back({cell.corners[k], cell.corners[k | bit]});
-    }
-  }
-  model.graph = makeGraph(model.rest, std::move(edges));
-  model.clusters = clustersOfCells(cells, cell_masses, model.masses, 1.01 * std::sqrt(3.0) * model.spacing);
+  for (const LatticeCell& cell : lattice->cells) filled += momentsOf(cell.filled).fraction;
+  model.cell_mass = def.material.density * model.rest_volume / filled;
+  const HeldHeight held = heldHeight(def.fixed, placed, pose);
+  findResistance(solid, held, *lattice);
+  // In units of what a cell of that mass resists with.
+  const double unit = std::pow(model.spacing, 3.0) * filled / model.rest_volume;
+  for (LatticeCell& cell : lattice->cells) cell.resists.fraction *= unit;
+  if (held) model.clamp_points = findClampPoints(*lattice, solid, held);
+  if (const Status found = findRegions(def, placed, pose, *lattice, model); !found) return found;
+  model.lattice = std::make_shared<CellLattice>(std::move(*lattice));
+  makeParticlesOfCells(model);
+  holdCorners(model);
   return Done{};
 }
 
@@ -368,7 +341,7 @@ Status makeCollision(BodyDef& def, BodyModel& model) {
   if (!even) {
     if (asked && even.error().code == ErrorCode::kInvalidArgument)
       return invalid("collision of body '" + def.name + "': " + even.error().detail);
-    def.notes.push_back("contact takes the visual surface: " + even.error().detail);
+    def.warnings.push_back("contact takes the visual surface: " + even.error().detail);
     return Done{};
   }
   auto collision = std::make_shared<CollisionSurface>();
@@ -376,9 +349,9 @@ Status makeCollision(BodyDef& def, BodyModel& model) {
   collision->distance = even->distance;
   const CellFinder finder(*model.lattice);
   std::vector<Index> cells;
-  for (const Vec3& v : collision->mesh.vertices) cells.push_back(finder.carrier(v));
+  for (const Vec3& v : collision->mesh.vertices) cells.push_back(finder.nearest(v));
   if (std::find(cells.begin(), cells.end(), kNoIndex) != cells.end()) {
-    def.notes.push_back("contact takes the visual surface: even triangles of it are too far from its cells");
+    def.warnings.push_back("contact takes the visual surface: even triangles of it are too far from its cells");
     return Done{};
   }
   collision->binding = bindToCells(*model.lattice, collision->mesh.vertices, cells);
@@ -399,7 +372,7 @@ Result<PreparedBody> prepareBody(BodyDef def) {
                                    (def.clusters.kind == ClusterOptions::Kind::kAuto && def.material.elastic()));
   // A lattice lies along the body's own axes, so that turning the body turns all that is made of it.
   Pose placed;
-  if (cells && def.cells == CellFill::kFilled) {
+  if (cells) {
     const Mat3 axes = mainAxes(surface);
     for (Vec3& v : surface.vertices) v = axes.transpose() * v;
     placed = {pose.rotation * Quat(axes), pose.translation};
@@ -458,6 +431,8 @@ Result<PreparedBody> prepareBody(BodyDef def) {
     if (Status bound = bindFilled(def, *model); !bound) return bound.error();
     if (Status made = makeCollision(def, *model); !made) return made.error();
   } else {
+    if (def.collision.kind == CollisionChoice::Kind::kEdge)
+      def.warnings.push_back("contact takes the visual surface: collision is of bodies of cells");
     model->binding =
         bindSurface(model->rest, model->graph, model->clusters, surface.vertices, std::move(vertex_particle));
   }

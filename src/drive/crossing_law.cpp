@@ -65,7 +65,7 @@ std::size_t crossings(const Surface& a, const Surface& b) {
 Finding crossingLaw(const Seen& seen) {
   std::vector<Surface> surfaces;
   for (const SeenBody& body : seen.bodies)
-    surfaces.push_back({&body.name, &body.surface, boundsOf(body.surface.vertices), body.diagonal});
+    surfaces.push_back({&body.name, &body.met(), boundsOf(body.met().vertices), body.diagonal});
   const std::size_t bodies = surfaces.size();
   for (const auto& obstacle : seen.obstacles) {
     const Box bounds = boundsOf(obstacle->mesh.vertices);

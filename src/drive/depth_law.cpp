@@ -38,7 +38,7 @@ Finding depthLaw(const Seen& seen) {
   Finding worst;
   std::vector<Solid> solids;
   for (const SeenBody& body : seen.bodies)
-    solids.push_back({&body.name, &body.surface, boundsOf(body.surface.vertices), body.diagonal, nullptr});
+    solids.push_back({&body.name, &body.met(), boundsOf(body.met().vertices), body.diagonal, nullptr});
   const std::size_t bodies = solids.size();
   for (const auto& obstacle : seen.obstacles) {
     const Box bounds = boundsOf(obstacle->mesh.vertices);

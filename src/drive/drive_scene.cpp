@@ -249,7 +249,6 @@ Result<DriveScene> makeDriveScene(std::uint64_t seed, const DriveChoices& choice
     organ.def.mesh = std::move(shape->mesh);
     organ.def.pose.rotation = shapes.rotation();
     organ.def.material = makeMaterial(matter, choices, largestEdge(organ.def.mesh));
-    if (choices.cells && organ.def.material.elastic()) organ.def.cells = *choices.cells;
     for (const Vec3& p : organ.def.mesh.vertices) organ.bounds.extend(organ.def.pose.rotation * p);
     scene.organs.push_back(shape->words);
     organs.push_back(std::move(organ));

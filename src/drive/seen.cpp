@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/geometry/measures.h"
 
 namespace meshless {
@@ -46,7 +47,11 @@ Seen see(World& world, bool surfaces) {
     if (surfaces) {
       body.surface.vertices = std::move(from.surface);
       body.surface.triangles = from.model->surface.triangles;
+      if (from.model->collision)
+        body.collision = {collisionPlaces(*from.model, from.particles), from.model->collision->mesh.triangles, {}};
       body.rest = from.model->surface.vertices;
+      body.model = from.model;
+      body.particles = std::move(from.particles);
     }
     seen.bodies.push_back(std::move(body));
   }

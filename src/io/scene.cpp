@@ -282,10 +282,10 @@ class SceneReader {
     if (const YAML::Node clusters = map.get("clusters"); clusters.IsDefined())
       def.clusters = readClusters(source_, clusters);
     if (const YAML::Node cells = map.get("cells"); cells.IsDefined()) {
-      if (cells.IsScalar() && (cells.Scalar() == "whole" || cells.Scalar() == "filled"))
-        def.cells = cells.Scalar() == "filled" ? CellFill::kFilled : CellFill::kWhole;
-      else
-        source_.fail(cells, "cells is " + shown(cells), "whole, filled");
+      if (cells.IsScalar() && cells.Scalar() == "whole")
+        def.warnings.push_back("cells: whole is no more and means filled");
+      else if (!cells.IsScalar() || cells.Scalar() != "filled")
+        source_.fail(cells, "cells is " + shown(cells), "filled");
     }
     if (const YAML::Node collision = map.get("collision"); collision.IsDefined())
       def.collision = readCollision(source_, collision);

@@ -149,6 +149,9 @@ meshless_surgery::BodyInfo toInfo(const std::string& name, const BodyModel& mode
   message.name = name;
   message.particles = static_cast<std::uint32_t>(model.rest.size());
   message.triangles = static_cast<std::uint32_t>(model.surface.triangles.size());
+  message.collision_triangles =
+      model.collision ? static_cast<std::uint32_t>(model.collision->mesh.triangles.size()) : message.triangles;
+  message.collision_distance = model.collision ? model.collision->distance : 0.0;
   message.clusters = static_cast<std::uint32_t>(model.clusters.size());
   message.spacing = model.spacing;
   message.mass = model.mass;

@@ -198,6 +198,7 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
                               << " mm apart, " << info.mass << " kg; needs " << info.substeps_needed
                               << " substeps a step, of up to " << scene->world.max_substeps);
       for (const std::string& note : ready->def.notes) ROS_INFO_STREAM("body " << name << ": " << note);
+      for (const std::string& warning : ready->def.warnings) ROS_WARN_STREAM("body " << name << ": " << warning);
     }
     const auto added = world->addSceneBody(ready);
     if (!added.ok()) return Error{added.error().code, *file + ": body " + name + ": " + added.error().detail};

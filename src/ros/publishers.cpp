@@ -8,6 +8,7 @@
 
 #include "meshless_surgery/ros/border_check.h"
 #include "meshless_surgery/ros/cluster_markers.h"
+#include "meshless_surgery/ros/collision_markers.h"
 #include "meshless_surgery/ros/contact_markers.h"
 #include "meshless_surgery/ros/convert.h"
 #include "meshless_surgery/ros/crtk_messages.h"
@@ -76,6 +77,8 @@ Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings
   strained_surfaces_topic_ = handle.advertise<meshless_surgery::Surfaces>("strained_surfaces", 2, on_surfaces);
   clusters_topic_ = handle.advertise<visualization_msgs::MarkerArray>(
       "clusters", 2, [this](const ros::SingleSubscriberPublisher&) { clusters_newcomer_ = true; });
+  collision_topic_ = handle.advertise<visualization_msgs::MarkerArray>(
+      "collision_surfaces", 2, [this](const ros::SingleSubscriberPublisher&) { collision_newcomer_ = true; });
   contacts_topic_ = handle.advertise<visualization_msgs::MarkerArray>(
       "contacts", 2, [this](const ros::SingleSubscriberPublisher&) { contacts_newcomer_ = true; });
   topology_topic_ = handle.advertise<meshless_surgery::Topology>("topology", 2, true);
@@ -96,7 +99,7 @@ Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings
   updater_.add("simulation", this, &Publishers::diagnose);
 
   markers_due_.period = periodOf(settings_.markers_rate);
-  clusters_due_.period = periodOf(kClustersRate);
+  clusters_due_.period = collision_due_.period = periodOf(kClustersRate);
   contacts_due_.period = periodOf(kContactsRate);
   surfaces_due_.period = periodOf(settings_.surfaces_rate);
   vertices_due_.period = periodOf(settings_.vertices_rate);
@@ -112,8 +115,9 @@ Publishers::~Publishers() { stop(); }
 
 void Publishers::start() {
   const auto now = Clock::now();
-  for (Cadence* cadence : {&info_due_, &vertices_due_, &complete_due_, &markers_due_, &surfaces_due_, &clusters_due_,
-                           &contacts_due_, &points_due_, &state_due_, &tools_due_, &diagnostics_due_}) {
+  for (Cadence* cadence :
+       {&info_due_, &vertices_due_, &complete_due_, &markers_due_, &surfaces_due_, &clusters_due_, &collision_due_,
+        &contacts_due_, &points_due_, &state_due_, &tools_due_, &diagnostics_due_}) {
     cadence->next = now;
   }
   thread_ = std::thread([this] { loop(); });
@@ -144,9 +148,9 @@ void Publishers::loop() {
   while (true) {
     publishEvents();
     publishTick(Clock::now());
-    const auto next =
-        std::min({info_due_.next, vertices_due_.next, markers_due_.next, surfaces_due_.next, clusters_due_.next,
-                  contacts_due_.next, points_due_.next, state_due_.next, tools_due_.next, diagnostics_due_.next});
+    const auto next = std::min({info_due_.next, vertices_due_.next, markers_due_.next, surfaces_due_.next,
+                                clusters_due_.next, collision_due_.next, contacts_due_.next, points_due_.next,
+                                state_due_.next, tools_due_.next, diagnostics_due_.next});
     std::unique_lock<std::mutex> lock(mutex_);
     changed_.wait_until(lock, next, [this] { return stopping_ || !events_.empty(); });
     if (stopping_) return;
@@ -187,16 +191,20 @@ void Publishers::publishTick(Clock::time_point now) {
   surfaces = surfaces && (surfaces_newcomer_.exchange(false) || revision != surfaces_revision_);
   bool clusters = clusters_due_.due(now) && clusters_topic_.getNumSubscribers() > 0;
   clusters = clusters && (clusters_newcomer_.exchange(false) || revision != clusters_revision_);
+  bool collision = collision_due_.due(now) && collision_topic_.getNumSubscribers() > 0;
+  collision = collision && (collision_newcomer_.exchange(false) || revision != collision_revision_);
   bool contacts = contacts_due_.due(now) && contacts_topic_.getNumSubscribers() > 0;
   contacts = contacts && (contacts_newcomer_.exchange(false) || revision != contacts_revision_);
   const bool state = state_due_.due(now) && state_topic_.getNumSubscribers() > 0;
   const bool tools = tools_due_.due(now);
   const bool info = info_due_.due(now) && (revision != info_revision_ || info_.version.empty());
-  if (!info && !vertices && !markers && !surfaces && !clusters && !contacts && !points && !state && !tools) return;
+  if (!info && !vertices && !markers && !surfaces && !clusters && !collision && !contacts && !points && !state &&
+      !tools)
+    return;
 
   SnapshotWants wants;
   wants.surfaces = markers || surfaces || vertices;
-  wants.particles = points || clusters;
+  wants.particles = points || clusters || collision;
   wants.measures = state;
   wants.contacts = contacts;
   // The stamp comes first: who sees one later than an answer sees what was answered.
@@ -225,6 +233,11 @@ void Publishers::publishTick(Clock::time_point now) {
     ++clusters_built_;
     clusters_revision_ = revision;
     clusters_topic_.publish(clusterMarkers(*snapshot, header));
+  }
+  if (collision) {
+    ++collision_built_;
+    collision_revision_ = revision;
+    collision_topic_.publish(collisionMarkers(*snapshot, header));
   }
   if (contacts) {
     ++contacts_built_;
@@ -406,6 +419,7 @@ void Publishers::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   status.add("surfaces built", surfaces_built_);
   status.add("vertices built", vertices_built_);
   status.add("clusters built", clusters_built_);
+  status.add("collision surfaces built", collision_built_);
   status.add("contacts built", contacts_built_);
   status.add("point clouds built", points_built_);
   status.add("states built", states_built_);

@@ -74,7 +74,7 @@ int main(int argc, char** argv) {
       "what. Exit status: 0 where every seed holds, 1 where one does not, 2 where it could not begin.");
   std::uint64_t seed = 1, count = 1;
   int jobs = 1;
-  std::string out, contact, cells, materials;
+  std::string out, contact, materials;
   meshless::DriveChoices choices;
   meshless::DriveOptions options;
   bool no_cuts = false, no_hands = false;
@@ -91,9 +91,8 @@ int main(int argc, char** argv) {
   app.add_option("--budget", options.budget, "[s] of processor time for a scene; then it did not finish")
       ->check(CLI::Range(1.0, 1e6))
       ->capture_default_str();
-  app.add_option("--contact", contact, "the method of contact: none, textbook, rest_shape, surface, auto; else the default");
-  app.add_option("--cells", cells, "of elastic bodies: whole or filled; else the default")
-      ->check(CLI::IsMember({"whole", "filled"}));
+  app.add_option("--contact", contact,
+                 "the method of contact: none, textbook, rest_shape, surface, auto; else the default");
   app.add_option("--material", choices.material, "elastic, looks, or a name in config/materials alone");
   app.add_option("--support", choices.support, "ground, tray, bowl, hung or stack alone");
   app.add_option("--organs", choices.most_organs, "at most so many bodies, 1 to 3")->capture_default_str();
@@ -106,7 +105,6 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : 2;  // --help is no error
   }
-  if (!cells.empty()) choices.cells = cells == "filled" ? meshless::CellFill::kFilled : meshless::CellFill::kWhole;
   options.cuts = !no_cuts && !no_hands;
   options.hands = !no_hands;
   options.record = !out.empty();

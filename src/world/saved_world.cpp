@@ -272,6 +272,11 @@ std::string faultOf(const BodyModel& m) {
           !(cell.stiffness_share > 0.0 && cell.stiffness_share <= 1.0))
         return "a cell has a share of itself that is none";
     }
+    for (const LatticeCell& cell : cells)
+      for (int k = 0; k < 8; ++k)
+        if (!((m.rest[cell.corners[k]] - m.lattice->restPlace(cell, Vec3(k & 1, k >> 1 & 1, k >> 2 & 1))).norm() <=
+              1e-6 * m.lattice->spacing))
+          return "a body's particles do not rest at the corners of its cells";
     if (!m.carried.empty() && m.carried.size() != particles) return "what is carried is not a body's particles";
     for (const ClampPoint& point : m.clamp_points)
       if (!(point.cell < cells.size()) || !point.at.allFinite() || !(point.area > 0.0 && point.area < 1e12))
@@ -299,6 +304,8 @@ std::string faultOf(const BodyModel& m) {
       return "a body's surface for contact has no triangles of its vertices";
     if (std::string fault = faultOf(c.binding, c.mesh.vertices.size(), particles, clusters); !fault.empty())
       return "for contact, " + fault;
+    if (!m.lattice || c.binding.embedded.size() != c.mesh.vertices.size() || !allBelow(c.binding.turners, clusters))
+      return "a body's surface for contact is not embedded in its cells";
   }
   // The next cut asks for the cell of a vertex, whether it has a lever or not.
   if (m.lattice && (b.embedded.size() != vertices || !allBelow(b.turners, clusters)))

@@ -256,10 +256,9 @@ void serialize(A& archive, CollisionChoice& v) {
 }
 template <class A>
 void serialize(A& archive, BodyDef& v) {
-  auto& [name, mesh, solid, pose, spacing, clusters, cells, collision, material, fixed, regions, copy, notes] = v;
+  auto& [name, mesh, solid, pose, spacing, clusters, collision, material, fixed, regions, copy, notes, warnings] = v;
   (void)regions;  // the model has them
-  archive(name, mesh, solid, pose, spacing, clusters, choice(cells, CellFill::kFilled), collision, material, fixed,
-          copy, notes);
+  archive(name, mesh, solid, pose, spacing, clusters, collision, material, fixed, copy, notes, warnings);
 }
 template <class A>
 void serialize(A& archive, ObstacleDef& v) {

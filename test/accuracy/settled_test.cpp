@@ -9,7 +9,7 @@ namespace {
 SettledResult settled(const std::string& name, double finer = 1.0) {
   const Result<TruthCase> truth = readTruthCase(std::string(CALCULIX_FOLDER) + "/" + name + ".csv");
   EXPECT_TRUE(truth.ok()) << (truth.ok() ? "" : truth.error().detail);
-  const Result<SettledResult> result = settle(*truth, CALCULIX_FOLDER, {CellFill::kFilled, finer});
+  const Result<SettledResult> result = settle(*truth, CALCULIX_FOLDER, {finer});
   EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().detail);
   EXPECT_LT(result->moving, 3e-4) << name;
   EXPECT_EQ(result->slower, 1.0) << name;

@@ -16,11 +16,10 @@ TruthCase truthOf(const std::string& name) {
   return *truth;
 }
 
-StaticResult solved(const std::string& name, double spacing, CellFill cells = CellFill::kWhole) {
+StaticResult solved(const std::string& name, double spacing) {
   const TruthCase truth = truthOf(name);
   StaticSettings settings;
   settings.spacing = spacing;
-  settings.cells = cells;
   settings.material.youngs_modulus = 1.0;
   const Result<StaticResult> result = solveStatic(truth, kFolder, settings);
   EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().detail);
@@ -80,10 +79,10 @@ TEST(AgainstFiniteElements, TheHangingOrganWithin5Percent) {
 
 // Cells that the surface crosses are as stiff as what fills them.
 TEST(AgainstFiniteElements, TheHangingOrganOfFilledCellsWithin2PercentAt1181Particles) {
-  const StaticResult soft = solved("organ_hang_nu30", 0.0104, CellFill::kFilled);
+  const StaticResult soft = solved("organ_hang_nu30", 0.0104);
   EXPECT_EQ(soft.particles, 1181u);
   EXPECT_LT(soft.error, 0.012);
-  EXPECT_LT(solved("organ_hang_nu45", 0.0104, CellFill::kFilled).error, 0.018);
+  EXPECT_LT(solved("organ_hang_nu45", 0.0104).error, 0.018);
 }
 
 TEST(AgainstFiniteElements, HalfTheSpacingIsNearer) {

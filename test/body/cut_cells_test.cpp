@@ -25,7 +25,6 @@ using test::Random;
 BodyDef filled(const TriangleMesh& mesh, double spacing, bool elastic = true) {
   BodyDef def = test::defOf(mesh);
   def.spacing = spacing;
-  def.cells = CellFill::kFilled;
   def.clusters.kind = ClusterOptions::Kind::kCells;
   def.material.youngs_modulus = elastic ? 5e3 : 0.0;
   def.material.poissons_ratio = 0.4;

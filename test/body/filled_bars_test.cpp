@@ -73,7 +73,6 @@ double softness(const BodyModel& model, double height) {
 BodyDef bar() {
   BodyDef def = test::defOf(boxMesh(Vec3(kLength, kWidth, kHeight), 24, 2, 8));
   def.spacing = kCell;
-  def.cells = CellFill::kFilled;
   def.material.youngs_modulus = kYoungs;
   def.material.poissons_ratio = 0.0;
   def.material.density = kDensity;

@@ -23,7 +23,6 @@ BodyDef defOf(const TriangleMesh& mesh, double spacing, bool elastic = true) {
   def.name = "body";
   def.mesh = mesh;
   def.spacing = spacing;
-  def.cells = CellFill::kFilled;
   def.clusters.kind = ClusterOptions::Kind::kCells;
   def.material.youngs_modulus = elastic ? 5e3 : 0.0;
   def.material.poissons_ratio = 0.4;
@@ -144,20 +143,6 @@ TEST(FilledCells, AClampHoldsTissueAlone) {
   EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
   EXPECT_NE(refused.error().detail.find("fixed[0], the box from -1 0.0145 -1 to 1 1 1"), std::string::npos)
       << refused.error().detail;
-}
-
-TEST(FilledCells, AreOfALatticeAlone) {
-  BodyDef def = defOf(sphereMesh(0.03, 0.01), 0.011, false);
-  def.clusters.kind = ClusterOptions::Kind::kAuto;
-  ASSERT_EQ(def.cells, CellFill::kFilled);
-  const PreparedBody body = *prepareBody(def);
-  def.cells = CellFill::kWhole;
-  const PreparedBody whole = *prepareBody(def);
-  EXPECT_FALSE(body.model->lattice);
-  EXPECT_EQ(body.model->rest, whole.model->rest);
-  EXPECT_EQ(body.model->masses, whole.model->masses);
-  EXPECT_EQ(body.model->clusters.members, whole.model->clusters.members);
-  EXPECT_EQ(body.state.surface, whole.state.surface);
 }
 
 }  // namespace

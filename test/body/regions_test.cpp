@@ -162,9 +162,6 @@ TEST(Regions, WhatCannotBeIsRefusedWithItsReason) {
   says(reason(block({{ball, Material()}})), "appearance material 'default'");
   says(reason(block({{ball, tissue("light", 1e3, 0.3, -1.0)}})), "regions[0]: density is -1");
   says(reason(block(std::vector<TissueRegion>(101, {ball, kStiff}))), "101 regions; accepted: up to 100");
-  BodyDef whole = block({{ball, kStiff}});
-  whole.cells = CellFill::kWhole;
-  says(reason(whole), "cells: filled");
   BodyDef looks = block({{ball, kStiff}});
   looks.material = Material();
   says(reason(looks), "accepted: those of a closed body of an elastic material");

@@ -43,7 +43,6 @@ TEST(SurfacePieces, AnOrganCutTwiceKeepsItsPiecesWholeAndApart) {
     ASSERT_TRUE(mesh.ok());
     BodyDef def = test::defOf(*mesh, "organ");
     def.pose.translation.z() = -boundsOf(mesh->vertices).min.z() + 0.002;
-    def.cells = CellFill::kFilled;
     def.material.youngs_modulus = 4500.0;
     def.material.poissons_ratio = 0.45;
     def.material.density = 1060.0;

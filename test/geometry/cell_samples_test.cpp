@@ -35,27 +35,6 @@ TEST(CellSamples, MomentsOfASlabAreThoseOfABox) {
   }
 }
 
-TEST(CellSamples, ExtendedWeightsAreTrilinearInsideAndGrowWithTheDistanceOutside) {
-  test::Random random(7);
-  for (int round = 0; round < 200; ++round) {
-    const Vec3 inside = Vec3::Constant(0.5) + random.vector(0.25), outside = Vec3::Constant(0.5) + random.vector(6.0);
-    double sum = 0.0, sum_of_sizes = 0.0;
-    Vec3 place = Vec3::Zero();
-    for (int k = 0; k < 8; ++k) {
-      if (((inside - Vec3::Constant(0.5)).array().abs() <= 0.5).all())
-        EXPECT_EQ(extendedWeight(k, inside), trilinearWeight(k, inside));
-      const double weight = extendedWeight(k, outside);
-      sum += weight;
-      sum_of_sizes += std::abs(weight);
-      place += weight * Vec3(k & 1, k >> 1 & 1, k >> 2 & 1);
-    }
-    EXPECT_NEAR(sum, 1.0, 1e-12);
-    EXPECT_LT((place - outside).norm(), 1e-12);  // what is linear stays so
-    const double beyond = (outside - outside.cwiseMax(0.0).cwiseMin(1.0)).lpNorm<1>();
-    EXPECT_LE(sum_of_sizes, 1.0 + 2.0 * beyond + 1e-12);
-  }
-}
-
 TEST(CellSamples, WhatPartsWeighAtEachCornerAddsUpToTheWhole) {
   test::Random random(1);
   for (int n = 0; n < 200; ++n) {

@@ -75,7 +75,6 @@ TEST_F(Scene, DefaultsForEverythingButBodies) {
   EXPECT_TRUE(body.solid);
   EXPECT_EQ(body.spacing, 0.0);
   EXPECT_EQ(body.clusters.kind, ClusterOptions::Kind::kAuto);
-  EXPECT_EQ(body.cells, CellFill::kFilled);
   EXPECT_EQ(body.material.name, "default");
   EXPECT_TRUE(body.fixed.empty());
   EXPECT_NEAR(signedVolume(body.mesh), 1.0, 1e-6);
@@ -153,7 +152,7 @@ TEST_F(Scene, FaultsAreNamedWithFileLineValueAndRange) {
       {"bodies:\n  - {file: ../cube.obj, primitive: {sphere: 1}}\n", 2, {"file and primitive"}},
       {body + "    scale: 0\n", 3, {"scale is 0", "above 0"}},
       {body + "    spacing: -0.1\n", 3, {"spacing is -0.1"}},
-      {body + "    cells: half\n", 3, {"cells is 'half'", "whole, filled"}},
+      {body + "    cells: half\n", 3, {"cells is 'half'", "filled"}},
       {body + "    repair: weld\n", 3, {"repair is 'weld'", "none, mend, wrap"}},
       {body + "    clusters: many\n", 3, {"clusters is 'many'", "auto, one"}},
       {body + "    clusters: {grid: [0, 1, 1]}\n", 3, {"grid[0] is '0'", "1 to"}},

@@ -202,13 +202,15 @@ class MessagesLawTest(DeformerTestCase):
         self.assertEqual(list(SIZES), [b.name for b in info.bodies])
         held.add((info._type, 'bodies'))
         clusters = self.fresh('clusters', MarkerArray)
+        edges = {m.id: len(m.points) // 2 for m in of(self.fresh('collision_surfaces', MarkerArray), 'collision')}
+        self.assertEqual(1, len(edges), 'one surface is finer than its cells')
         needed, state = {}, self.state()
         self.assertEqual(0, state.step, 'known before the first step')
         for body, marker in zip(info.bodies, of(clusters, 'centres')):
             answer = self.good('get_body', name=body.name)
             needed[body.name] = body.substeps_needed
             self.says(body, name=body.name, particles=len(xyz(answer.particles)), triangles=len(answer.surface.triangles),
-                      clusters=len(marker.points), mass=(MASSES[body.name], 1e-9), spacing=(SPACINGS[body.name], 1e-9))
+                      collision_triangles=2 * edges.get(marker.id, 0) // 3 or len(answer.surface.triangles), clusters=len(marker.points), mass=(MASSES[body.name], 1e-9), spacing=(SPACINGS[body.name], 1e-9))
             self.says(body, held=(1.0 / 4.0 if body.name in ('sags', 'full') else 0.0, 1e-6), stiffness_factor=self.factor(body.name),
                       region_materials=['lump'] if body.name == 'sags' else [])
             self.holds(body, 'region_shares', [1.0 / 6.0] if body.name == 'sags' else [], 0.01)
@@ -220,6 +222,28 @@ class MessagesLawTest(DeformerTestCase):
         self.assertEqual(1, needed['falls'])
         self.assertLess(sum(self.factor('stiff')), 0.5, 'a trivial factor shows nothing')
         held.add(('meshless_surgery/BodyInfo', 'substeps_needed'))
+
+    def test_the_collision_surface_is_as_near_to_the_visual_one_as_is_said(self):
+        with tempfile.NamedTemporaryFile('w', suffix='.yaml') as scene:
+            scene.write('bodies: [{name: ball, primitive: {sphere: 0.05}, edge: 0.004, spacing: 0.02, pose: {position: [0, 0, 1]}, material: {youngs_modulus: 5000}}]')
+            scene.flush()
+            with OwnNode(scene=scene.name, paused=True) as own:
+                own.wait()
+                infos, surfaces = own.deformer.recorder('info', Info), own.deformer.recorder('collision_surfaces', MarkerArray)
+                body, = infos.wait().bodies
+                marker, = of(surfaces.wait(lambda a: of(a, 'collision')), 'collision')
+                infos.close()
+                surfaces.close()
+        ends = plain(marker.points)
+        radii = numpy.linalg.norm(ends - [0, 0, 1], axis=1)
+        print('a ball of 50 mm: %d triangles in place of %d, %.3f mm from it' % (body.collision_triangles, body.triangles, 1e3 * body.collision_distance))
+        self.assertEqual(len(ends) // 2, 3 * body.collision_triangles // 2)
+        self.assertLess(body.collision_triangles, body.triangles // 4)
+        # Corners are outside of it, where the visual surface is within 0.1 mm of the ball.
+        self.assertLess(numpy.abs(radii - 0.05).max(), body.collision_distance + 1e-4)
+        self.assertLess(body.collision_distance, 0.1 * 0.02)
+        self.assertGreater(body.collision_distance, 0.3 * numpy.abs(radii - 0.05).max())
+        held.add((body._type, 'collision_distance'))
 
     def carried(self):
         """What the contacts below carry after a while [N]."""

@@ -21,9 +21,8 @@ BodyDef cubeOf(const Kind& kind) {
   def.spacing = kEdge;
   def.material = materialOf(kind);
   def.clusters.kind = ClusterOptions::Kind::kOne;
-  def.cells = CellFill::kWhole;  // of filled ones every piece has all corners
   if (kind.many_clusters) {
-    def.clusters.kind = kind.elastic ? ClusterOptions::Kind::kCells : ClusterOptions::Kind::kGrid;
+    def.clusters.kind = ClusterOptions::Kind::kGrid;  // of cells every piece has all corners
     def.clusters.grid = {2, 2, 2};
   }
   return def;
@@ -101,7 +100,7 @@ TEST_P(Pieces, DraggedAndLetGoGoBack) {
 
 TEST_P(Pieces, FallAndComeToRest) {
   WorldSettings settings;
-  settings.contact = ContactMethod::kRestShape;  // whole cells in contact of surfaces do not come to rest
+  settings.contact = ContactMethod::kRestShape;
   settings.ground = -2.0 * kEdge;
   Twins twins(settings);
   spawnAndCut(twins);

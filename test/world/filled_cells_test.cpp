@@ -22,7 +22,6 @@ WorldSettings apart() {
 BodyDef soft(const TriangleMesh& mesh, double spacing) {
   BodyDef def = test::defOf(mesh, "tissue");
   def.spacing = spacing;
-  def.cells = CellFill::kFilled;
   def.material.youngs_modulus = 5e3;
   def.material.poissons_ratio = 0.4;
   def.material.density = 1000.0;

@@ -90,7 +90,6 @@ World filledCells() {
   World world{settings};
   BodyDef def = test::block("block", Vec3(0, 0, 0.06));
   def.spacing = 0.027;
-  def.cells = CellFill::kFilled;
   def.material.youngs_modulus = 5000.0;
   def.material.density = 1000.0;
   EXPECT_TRUE(world.addSceneBody(test::shared(def)).ok());
@@ -135,6 +134,7 @@ World elasticCut() {
   def.spacing = 0.025;
   def.material.youngs_modulus = 5000.0;
   def.material.density = 1000.0;
+  def.collision = {CollisionChoice::Kind::kEdge, 0.03};
   def.fixed = {{Vec3(-1, -1, -1), Vec3(-0.08, 1, 1)}};
   EXPECT_TRUE(world.addSceneBody(test::shared(def)).ok());
   run(world, 10);
@@ -451,7 +451,7 @@ TEST(DamagedState, OfAnotherKindOrVersion) {
   expectRefused("solid ball\nfacet normal 0 0 1\n", "MLSSTATE");
   std::string bytes = bytesOf(ballThatFalls());
   bytes[8] = 9;
-  expectRefused(bytes, "version 9; accepted: 12");
+  expectRefused(bytes, "version 9; accepted: 13");
 }
 
 // The text at the start is of a length that is known to lie where it lies.

@@ -34,7 +34,6 @@ BodyDef block(const std::string& name, const Vec3& at, const Vec3& size = Vec3::
   BodyDef def = test::defOf(withShortEdges(mesh, longest * cell), name);
   def.pose.translation = at;
   def.spacing = cell;
-  def.cells = CellFill::kFilled;
   def.material.youngs_modulus = 2e4;
   def.material.poissons_ratio = 0.4;
   def.material.density = 1000.0;

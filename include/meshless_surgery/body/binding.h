@@ -44,4 +44,7 @@ inline Vec3 embeddedPosition(const SurfaceBinding& binding, const Points& positi
   return sum;
 }
 
+/// Where contact takes the vertices of model.collision to be, which must be there [m].
+Points collisionPlaces(const BodyModel& model, const Points& positions);
+
 }  // namespace meshless

@@ -8,10 +8,6 @@
 
 namespace meshless {
 
-/// What a lattice knows of its cells: nothing, so that each counts as whole but for its mass; or how far each is
-/// filled.
-enum class CellFill { kWhole, kFilled };
-
 /// Tissue in there is held in place.
 struct HeldRegion {
   Region region;
@@ -30,7 +26,7 @@ struct TissueRegion {
   Material material;
 };
 
-/// What contact takes for the surface of a body of filled cells: a surface of even triangles where the visual one is
+/// What contact takes for the surface of a body of cells: a surface of even triangles where the visual one is
 /// finer than that (kAuto), the visual one, or even triangles of an edge [m]. Other bodies have the visual one.
 struct CollisionChoice {
   enum class Kind { kAuto, kVisual, kEdge };
@@ -45,13 +41,13 @@ struct BodyDef {
   Pose pose;           // body's frame in the world
   double spacing = 0;  // [m] between interior particles; 0: chosen from the surface
   ClusterOptions clusters;
-  CellFill cells = CellFill::kFilled;  // of a lattice: an elastic material, or clusters of cells
   CollisionChoice collision;
   Material material;
   std::vector<HeldRegion> fixed;
   std::vector<TissueRegion> regions;  // where several are, the last one counts; up to 100
   bool copy = false;                  // the same as the body before it in its scene, but for name and pose
   std::vector<std::string> notes;     // what reading and repairing said
+  std::vector<std::string> warnings;  // likewise, of what is not as was asked
 };
 
 }  // namespace meshless

@@ -11,7 +11,6 @@ struct DriveChoices {
   std::string material;                     // "elastic", "looks", or a name in `shipped`; empty: any
   std::string support;                      // one of kSupports; empty: any
   std::optional<ContactMethod> contact;     // none: the world's default
-  std::optional<CellFill> cells;        // of elastic bodies; none: the default of a body
   int most_organs = 3;                      // 1..3
 };
 

@@ -1,4 +1,4 @@
-// A surface that was flat does not fold over.
+// A surface that was flat does not fold over, but where the tissue beneath it does.
 #pragma once
 
 #include "meshless_surgery/drive/finding.h"
@@ -6,9 +6,18 @@
 
 namespace meshless {
 
-/// Two triangles that share an edge, turned against each other by less than 60 degrees at rest, are not turned by more
-/// than 135 now. Slivers (at rest or now flatter than a fiftieth of the mean edge of the body at rest) have no normal
-/// to speak of, and are not looked at.
+struct Folds {
+  std::size_t of_surface = 0;  // edges that nothing beneath explains
+  std::size_t of_tissue = 0;   // edges where the cells that an end follows are stretched or pressed more than twofold,
+                              // or turned by more than 60 degrees from one to the next
+};
+
+/// Edges whose two triangles are turned against each other by less than 30 degrees at rest, and by more than 60 now.
+/// Slivers (at rest or now flatter than a fiftieth of the mean edge of the body at rest) have no normal to speak of,
+/// and are not looked at. Tissue is known of bodies of cells alone (`model`, `particles`).
+Folds foldsOf(const SeenBody& body);
+
+/// There are none that nothing beneath explains.
 Finding foldLaw(const Seen& seen);
 
 }  // namespace meshless

@@ -7,8 +7,11 @@ namespace meshless {
 
 struct SeenBody {
   std::string name;
-  TriangleMesh surface;  // [m] present, world frame; empty where it was not wanted
-  Points rest;           // [m] of the same vertices
+  TriangleMesh surface;                   // [m] present, world frame; empty where it was not wanted
+  Points rest;                            // [m] of the same vertices
+  std::optional<TriangleMesh> collision;  // [m] likewise: what contact takes for it, where that is another
+  BodyModelPtr model;                     // with surfaces
+  Points particles;                       // [m] likewise
   bool particles_finite = true;
   bool elastic = false;  // an elastic material
   bool handled = false;  // a pick, a lock or the push sphere is on it
@@ -22,6 +25,7 @@ struct SeenBody {
   Vec3 angular_momentum = Vec3::Zero();  // [kg m^2/s] about the centre of mass
   double diagonal = 0.0;                 // [m] of the bounds at rest
 
+  const TriangleMesh& met() const { return collision ? *collision : surface; }
   double speed() const { return mass > 0.0 ? std::sqrt(2.0 * kinetic_energy / mass) : 0.0; }  // [m/s] root mean square
 };
 

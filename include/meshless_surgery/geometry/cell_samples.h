@@ -58,13 +58,5 @@ inline double trilinearWeight(int corner, const Vec3& at) {
   return (corner & 1 ? at.x() : 1.0 - at.x()) * (corner & 2 ? at.y() : 1.0 - at.y()) *
          (corner & 4 ? at.z() : 1.0 - at.z());
 }
-/// The same inside of the cell; outside it goes on from the nearest place in it by the mean slopes of the cell.
-/// Extended trilinear weights grow with the third power of the distance.
-inline double extendedWeight(int corner, const Vec3& at) {
-  const Vec3 inside = at.cwiseMax(0.0).cwiseMin(1.0);
-  double weight = trilinearWeight(corner, inside);
-  for (int axis = 0; axis < 3; ++axis) weight += (corner >> axis & 1 ? 0.25 : -0.25) * (at[axis] - inside[axis]);
-  return weight;
-}
 
 }  // namespace meshless
