@@ -158,7 +158,7 @@ class Blender {
     choose(rest, reach);
     if (of_.held[cell])  // what is held with all around it stays
       candidates_.assign(1, {cell, kMiddle, to_own});
-    else if (!isOpen(own.place))
+    else if (reach > kReach || !isOpen(own.place))
       findDetours({kMiddle, nearestSample(samplesOf(own), at)}, cell, reach);
     double all = 0.0;
     for (const Candidate& c : candidates_) {
@@ -210,7 +210,7 @@ class Blender {
       }
   }
 
-  /// Nothing that is in reach of a place is parted or lies apart.
+  /// Nothing that is in kReach of a place is parted or lies apart.
   bool isOpen(const std::array<std::int32_t, 3>& place) {
     char& known = open_[of_.grid.numberOf(of_.grid.indexOf(place))];
     if (known == kUnknown) known = lookForGaps() ? kNotOpen : kOpen;
@@ -219,26 +219,35 @@ class Blender {
   bool lookForGaps() const {
     std::array<bool, kPlaces> reached{};
     std::array<int, kPlaces> queue;
-    int count = 0, filled = 0;
+    int count = 0, filled = 0, found = 0;
     const auto visit = [&](int p) {
       if (reached[static_cast<std::size_t>(p)]) return;
       reached[static_cast<std::size_t>(p)] = true;
       queue[static_cast<std::size_t>(count++)] = p;
     };
-    for (const Tissue* tissue : window_) {
-      if (tissue->severed) return true;
-      filled += tissue->present != kNoSample;
+    for (int p = 0; p < kPlaces; ++p) {
+      if (!isInReach(p)) continue;
+      const Tissue& tissue = *window_[static_cast<std::size_t>(p)];
+      if (tissue.severed) return true;
+      filled += tissue.present != kNoSample;
     }
     visit(kMiddle);
     for (int n = 0; n < count; ++n) {
       const int p = queue[static_cast<std::size_t>(n)];
+      found += isInReach(p);
       for (int axis = 0; axis < 3; ++axis) {
         const int along = p / kStride[axis] % kWide;
         if (along + 1 < kWide && window_[static_cast<std::size_t>(p)]->joined[axis]) visit(p + kStride[axis]);
         if (along > 0 && window_[static_cast<std::size_t>(p - kStride[axis])]->joined[axis]) visit(p - kStride[axis]);
       }
     }
-    return count < filled;
+    return found < filled;
+  }
+  // Where two axes are two places off, all is farther than kReach.
+  static bool isInReach(int p) {
+    int far = 0;
+    for (const int stride : kStride) far += std::abs(p / stride % kWide - kAround) == kAround;
+    return far < 2;
   }
 
   /// How much longer the ways from a sample to the cells are, from sample to sample by links, than without gaps.
@@ -379,6 +388,11 @@ SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const
   SurfaceBinding binding;
   binding.particle.assign(rest.size(), kNoIndex);
   binding.offsets.push_back(0);
+  std::size_t carriers = 0;
+  for (const SurfaceBinding& part : parts) carriers += part.carriers.size();
+  binding.offsets.reserve(rest.size() + 1);
+  binding.carriers.reserve(carriers);
+  binding.weights.reserve(carriers);
   for (const SurfaceBinding& part : parts) {
     const Index first = static_cast<Index>(binding.carriers.size());
     for (const Index offset : part.offsets) binding.offsets.push_back(first + offset);

@@ -23,6 +23,7 @@ namespace {
 
 constexpr double kBeneath = 1e-3;      // [spacing]
 constexpr double kCrumb = 1.0 / 64.0;  // of a cell, for a piece of it that no sample sees
+constexpr std::size_t kChunk = 256;    // vertices
 
 // A vertex of a piece, or of its surface for contact, whose new cell is not known yet.
 struct EmbeddedVertex {
@@ -79,6 +80,7 @@ class CellCutter {
         collision_(collision),
         before_(*model.lattice),
         cut_(cutLattice(before_, state.positions, gate)),
+        finder_(cut_.lattice),
         children_(before_.cells.size()) {
     for (Index c = 0; c < cells().size(); ++c) children_[cut_.parent_cell[c]].push_back(c);
   }
@@ -94,6 +96,7 @@ class CellCutter {
            << " that lies in none of its cells";
       return Error{ErrorCode::kUnsuitableShape, text.str()};
     }
+    for (RestSurface& surface : surfaces_) findCells(surface);
     choosePieces();
     bindCollision();
     sampled_ = static_cast<Index>(cells().size());
@@ -117,6 +120,7 @@ class CellCutter {
     TriangleMesh mesh;  // [m]
     Points normals;
     std::optional<SolidQuery> solid;
+    std::vector<Index> cells;  // of each vertex: cellOf() in any piece
   };
 
   RestSurface surfaceOf(const CellPieceSource& source, const Points& parent_rest, const SurfaceBinding& parent) {
@@ -199,37 +203,56 @@ class CellCutter {
 
   // The cell of vertex v of a surface among those of `piece` (any where it is negative): that of the nearest sample
   // which the surface does not hide from the tissue beneath the vertex.
-  Index cellOf(const CellFinder& finder, const RestSurface& surface, Index v, int piece) {
+  Index cellOf(const RestSurface& surface, Index v, int piece) const {
     const EmbeddedVertex& embedded = surface.embedded[v];
     const auto in_piece = [&](Index c) { return piece < 0 || piece_of_[component_[c]] == piece; };
+    if (piece >= 0 && surface.cells[v] != kNoIndex && in_piece(surface.cells[v])) return surface.cells[v];
     const std::vector<Index>& copies = children_[embedded.was];
     if (!embedded.made && copies.size() == 1 && !cut_.changed[copies[0]] && in_piece(copies[0])) return copies[0];
     const Vec3 beneath = embedded.rest - kBeneath * before_.spacing * surface.normals[v];
-    struct Sample {
-      double squared;
-      Index cell;
-      Vec3 place;
-    };
-    std::vector<Sample> near;
+    std::vector<std::pair<double, Index>> boxes;  // [spacing^2] from cells to the vertex
     const std::array<std::int32_t, 3> own = before_.placeOf(embedded.rest);
     for (std::int32_t z = -1; z <= 1; ++z)
       for (std::int32_t y = -1; y <= 1; ++y)
         for (std::int32_t x = -1; x <= 1; ++x)
-          for (const Index c : finder.at({own[0] + x, own[1] + y, own[2] + z})) {
-            const LatticeCell& cell = cells()[c];
+          for (const Index c : finder_.at({own[0] + x, own[1] + y, own[2] + z})) {
+            const LatticeCell& cell = cut_.lattice.cells[c];
             if (cell.isBridge(c) || !in_piece(c)) continue;
-            for (SampleSet left = cell.samples; left; left &= left - 1) {
-              const Vec3 place = before_.restPlace(cell, samplePlace(lowestSample(left)));
-              near.push_back({(place - beneath).squaredNorm(), c, place});
-            }
+            const Vec3 within = before_.placeIn(cell, beneath);
+            boxes.emplace_back((within - within.cwiseMax(0.0).cwiseMin(1.0)).squaredNorm(), c);
           }
-    const auto farther = [](const Sample& a, const Sample& b) { return a.squared > b.squared; };
-    std::make_heap(near.begin(), near.end(), farther);
-    for (; !near.empty(); near.pop_back()) {
-      std::pop_heap(near.begin(), near.end(), farther);
-      if (!surface.solid->crosses(beneath, near.back().place)) return near.back().cell;
+    std::sort(boxes.begin(), boxes.end());
+    // Samples, nearest first; a cell's are looked at once none of the others is nearer than it is.
+    struct Sample {
+      double squared;
+      Index cell;
+      int bit;
+      bool operator<(const Sample& other) const { return squared < other.squared; }
+    };
+    std::vector<Sample> near;
+    for (auto next = boxes.begin();;) {
+      const auto nearest = std::min_element(near.begin(), near.end());
+      if (next != boxes.end() && (near.empty() || next->first <= nearest->squared)) {
+        const LatticeCell& cell = cut_.lattice.cells[next->second];
+        const Vec3 within = before_.placeIn(cell, beneath);
+        for (SampleSet left = cell.samples; left; left &= left - 1)
+          near.push_back({(samplePlace(lowestSample(left)) - within).squaredNorm(), next->second, lowestSample(left)});
+        ++next;
+        continue;
+      }
+      if (near.empty()) return kNoIndex;
+      const LatticeCell& cell = cut_.lattice.cells[nearest->cell];
+      if (!surface.solid->crosses(beneath, before_.restPlace(cell, samplePlace(nearest->bit)))) return nearest->cell;
+      *nearest = near.back();
+      near.pop_back();
     }
-    return kNoIndex;
+  }
+
+  void findCells(RestSurface& surface) const {
+    surface.cells.resize(surface.embedded.size());
+    inChunks(surface.cells.size(), kChunk, [&](std::size_t from, std::size_t to) {
+      for (std::size_t v = from; v < to; ++v) surface.cells[v] = cellOf(surface, static_cast<Index>(v), -1);
+    });
   }
 
   // --- which cells are in which piece
@@ -245,13 +268,10 @@ class CellCutter {
     piece_of_.assign(names.size(), sources_.size() == 1 ? 0 : -1);
     seen_.assign(names.size(), false);
     std::vector<std::map<int, int>> votes(names.size());
-    const CellFinder finder(cut_.lattice);
     for (std::size_t p = 0; p < sources_.size(); ++p)
-      for (Index v = 0; v < surfaces_[p].embedded.size(); ++v) {
-        if (surfaces_[p].embedded[v].made) continue;
-        const Index c = cellOf(finder, surfaces_[p], v, -1);
-        if (c != kNoIndex) ++votes[component_[c]][static_cast<int>(p)];
-      }
+      for (Index v = 0; v < surfaces_[p].embedded.size(); ++v)
+        if (const Index c = surfaces_[p].cells[v]; c != kNoIndex && !surfaces_[p].embedded[v].made)
+          ++votes[component_[c]][static_cast<int>(p)];
     for (Index n = 0; n < names.size(); ++n) {
       seen_[n] = !votes[n].empty();
       int most = 0;
@@ -294,12 +314,10 @@ class CellCutter {
   // --- the surface; what has no cell gets crumbs
 
   void bind() {
-    const CellFinder finder(cut_.lattice);
     carriers_.resize(sources_.size());
     for (std::size_t p = 0; p < sources_.size(); ++p) {
       const std::vector<EmbeddedVertex>& embedded = surfaces_[p].embedded;
-      for (Index v = 0; v < embedded.size(); ++v)
-        carriers_[p].push_back(cellOf(finder, surfaces_[p], v, static_cast<int>(p)));
+      for (Index v = 0; v < embedded.size(); ++v) carriers_[p].push_back(cellOf(surfaces_[p], v, static_cast<int>(p)));
       std::map<Index, Index> crumbs;
       for (Index v = 0; v < embedded.size(); ++v) {
         if (carriers_[p][v] != kNoIndex) continue;
@@ -314,15 +332,16 @@ class CellCutter {
   // Which piece each part of the surface for contact is of, and the cells of its vertices there.
   void bindCollision() {
     if (collision_.empty()) return;
-    const CellFinder finder(cut_.lattice);
     collisions_.resize(sources_.size());
     for (const CellPieceSource& source : collision_) {
-      const RestSurface surface = surfaceOf(source, model_.collision->mesh.vertices, model_.collision->binding);
+      RestSurface surface = surfaceOf(source, model_.collision->mesh.vertices, model_.collision->binding);
+      if (std::any_of(surface.embedded.begin(), surface.embedded.end(),
+                      [](const auto& e) { return e.was == kNoIndex; }))
+        return collisions_.clear();
+      findCells(surface);
       std::vector<Index> votes(sources_.size(), 0);
       for (Index v = 0; v < surface.embedded.size(); ++v)
-        if (surface.embedded[v].was == kNoIndex)
-          return collisions_.clear();
-        else if (const Index c = surface.embedded[v].made ? kNoIndex : cellOf(finder, surface, v, -1); c != kNoIndex)
+        if (const Index c = surface.cells[v]; c != kNoIndex && !surface.embedded[v].made)
           ++votes[static_cast<std::size_t>(piece_of_[component_[c]])];
       const std::size_t p = static_cast<std::size_t>(std::max_element(votes.begin(), votes.end()) - votes.begin());
       PieceCollision& piece = collisions_[p];
@@ -331,7 +350,7 @@ class CellCutter {
         piece.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
       for (Index v = 0; v < surface.embedded.size(); ++v) {
         piece.mesh.vertices.push_back(surface.mesh.vertices[v]);
-        piece.cells.push_back(cellOf(finder, surface, v, static_cast<int>(p)));
+        piece.cells.push_back(cellOf(surface, v, static_cast<int>(p)));
       }
     }
   }
@@ -651,6 +670,7 @@ class CellCutter {
   const std::vector<CellPieceSource>&sources_, &collision_;
   const CellLattice& before_;
   CutLattice cut_;
+  const CellFinder finder_;                   // knows no crumbs
   std::vector<std::vector<Index>> children_;  // of each of the parent's cells
   std::vector<RestSurface> surfaces_;         // of each source
   std::vector<PieceCollision> collisions_;    // of each source, or none

@@ -14,9 +14,8 @@ FilledMoments computedMoments(SampleSet samples);
 }  // namespace
 
 Vec3 samplePlace(int bit) {
-  return (Vec3(bit % kCellSamples, bit / kCellSamples % kCellSamples, bit / (kCellSamples * kCellSamples)) +
-          Vec3::Constant(0.5)) /
-         kCellSamples;
+  static_assert(kCellSamples == 4);
+  return Vec3((bit & 3) + 0.5, (bit >> 2 & 3) + 0.5, (bit >> 4) + 0.5) / kCellSamples;
 }
 
 SampleSet connectedPart(SampleSet within, const LinkSet& parted) {
@@ -53,7 +52,8 @@ FilledMoments computedMoments(SampleSet samples) {
     }
     m.centroid[axis] = sum / count;
     // A sample is a little box itself.
-    m.variance[axis] = squared / count - m.centroid[axis] * m.centroid[axis] + 1.0 / (3.0 * kCellSamples * kCellSamples);
+    m.variance[axis] =
+        squared / count - m.centroid[axis] * m.centroid[axis] + 1.0 / (3.0 * kCellSamples * kCellSamples);
   }
   for (SampleSet left = samples; left; left &= left - 1) {
     const Vec3 at = samplePlace(lowestSample(left));
