@@ -96,7 +96,8 @@ CutWork& CutWork::operator+=(const CutWork& other) {
 namespace {
 
 Result<CutBody> cutFilled(const BodyModel& model, const BodyState& state, const Plane& plane,
-                          const TriangleMesh& present, const CutOptions& options) {
+                          const TriangleMesh& present, const CutOptions& options,
+                          const std::vector<TissuePlace>& places) {
   const Result<CutSurface> cut = cutByPlane(present, plane, options);
   if (!cut) return cut.error();
   const TriangleMesh for_contact = presentCollision(model, state);
@@ -113,7 +114,7 @@ Result<CutBody> cutFilled(const BodyModel& model, const BodyState& state, const 
   CutBody result;
   result.cap_area = cut->cap_area;
   Result<std::vector<BodyPiece>> pieces =
-      cutCells(model, state, BladeGate(plane), sources, collision, options.cap_patch, result.work);
+      cutCells(model, state, BladeGate(plane), sources, collision, places, options.cap_patch, result.work);
   if (!pieces) return pieces.error();
   result.pieces = std::move(*pieces);
   return result;
@@ -138,7 +139,7 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
   options.apart = kOneTissue * model.spacing;
   if (model.lattice) {
     options.snap = kSnap * model.spacing;
-    return cutFilled(model, state, plane, present, options);
+    return cutFilled(model, state, plane, present, options, wanted.places);
   }
   // Surface particles are where their vertices are, so vertices stay.
   PieceMaker maker(model, state, options.cap_patch);

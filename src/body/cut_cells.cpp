@@ -85,7 +85,7 @@ class CellCutter {
     for (Index c = 0; c < cells().size(); ++c) children_[cut_.parent_cell[c]].push_back(c);
   }
 
-  Result<std::vector<BodyPiece>> run(std::uint32_t new_patch, CutWork& work) {
+  Result<std::vector<BodyPiece>> run(const std::vector<TissuePlace>& places, std::uint32_t new_patch, CutWork& work) {
     for (const CellPieceSource& source : sources_) {
       surfaces_.push_back(surfaceOf(source, model_.surface.vertices, model_.binding));
       const auto& embedded = surfaces_.back().embedded;
@@ -104,7 +104,7 @@ class CellCutter {
     joinThePieces();
     std::vector<BodyPiece> pieces(sources_.size());
     std::vector<CutWork> works(sources_.size());
-    inChunks(sources_.size(), 1, [&](std::size_t p, std::size_t) { pieces[p] = make(p, new_patch, works[p]); });
+    inChunks(sources_.size(), 1, [&](std::size_t p, std::size_t) { pieces[p] = make(p, places, new_patch, works[p]); });
     for (const CutWork& done : works) work += done;
     return pieces;
   }
@@ -351,6 +351,10 @@ class CellCutter {
       for (Index v = 0; v < surface.embedded.size(); ++v) {
         piece.mesh.vertices.push_back(surface.mesh.vertices[v]);
         piece.cells.push_back(cellOf(surface, v, static_cast<int>(p)));
+        if (piece.cells.back() == kNoIndex)  // in a rim that is thinner than samples see
+          piece.cells.back() = finder_.nearest(surface.mesh.vertices[v], [&](Index c) {
+            return piece_of_[component_[c]] == static_cast<int>(p) ? cut_.lattice.cells[c].samples : kNoSample;
+          });
       }
     }
   }
@@ -525,7 +529,7 @@ class CellCutter {
 
   // --- bodies
 
-  BodyPiece make(std::size_t p, std::uint32_t new_patch, CutWork& work) {
+  BodyPiece make(std::size_t p, const std::vector<TissuePlace>& places, std::uint32_t new_patch, CutWork& work) {
     const CellPieceSource& from = sources_[p];
     BodyPiece piece;
     auto child = std::make_shared<BodyModel>();
@@ -569,8 +573,13 @@ class CellCutter {
     for (const Index i : corner_of) {
       const Index parent = cut_.parent_corner[i];
       piece.parent_particles.push_back(heir_[parent] == i ? parent : kNoIndex);
+      piece.copied_from.push_back(parent);
       piece.state.positions.push_back(state_.positions[parent]);
       piece.state.velocities.push_back(state_.velocities[parent]);
+    }
+    for (const TissuePlace& place : places) {
+      const Index c = heirNear(place);
+      piece.places.push_back({c != kNoIndex ? renumbered[c] : kNoIndex, place.at});
     }
     child->lattice = lattice;
     child->cell_mass = model_.cell_mass;
@@ -620,24 +629,59 @@ class CellCutter {
         CollisionSurface{from.mesh, bindToCells(lattice, from.mesh.vertices, cells), model_.collision->distance});
   }
 
-  // What is held stays held, by the copy of its cell with the nearest tissue on its side of the blade.
+  // The copy of its cell with the nearest tissue on its side of the blade; kNoIndex: there is none.
+  Index heirOf(const TissuePlace& place) const {
+    if (place.cell == kNoIndex) return kNoIndex;
+    const bool above = gate_.height(presentPlace(place)) >= 0.0;
+    Index best = kNoIndex;
+    double least = std::numeric_limits<double>::infinity();
+    for (const Index c : children_[place.cell]) {
+      if (cut_.lattice.cells[c].isBridge(c)) continue;
+      const SampleSet side = !cut_.changed[c] ? kAllSamples : above ? cut_.above[c] : ~cut_.above[c];
+      const double squared = squaredToSamples(cut_.lattice.cells[c].samples & side, place.at);
+      if (squared < least) {
+        least = squared;
+        best = c;
+      }
+    }
+    return best;
+  }
+
+  // That, or else the cell with the nearest tissue on the place's side of the blade: at a rim its own may have none.
+  Index heirNear(const TissuePlace& place) const {
+    if (const Index own = heirOf(place); own != kNoIndex || place.cell == kNoIndex) return own;
+    const LatticeCell& was = before_.cells[place.cell];
+    const bool above = gate_.height(presentPlace(place)) >= 0.0;
+    Index best = kNoIndex;
+    double least = std::numeric_limits<double>::infinity();
+    const Vec3 rest = before_.restPlace(was, place.at);
+    for (Index c = 0; c < sampled_; ++c) {
+      const LatticeCell& cell = cut_.lattice.cells[c];
+      if (cell.isBridge(c)) continue;
+      const Vec3 at = before_.placeIn(cell, rest);
+      if ((at.array() < -1.0).any() || (at.array() > 2.0).any()) continue;
+      for (SampleSet left = cell.samples; left; left &= left - 1) {
+        const Vec3 sample = samplePlace(lowestSample(left));
+        const double squared = (sample - at).squaredNorm();
+        if (!(squared < least) || (gate_.height(presentPlace({cut_.parent_cell[c], sample})) >= 0.0) != above) continue;
+        least = squared;
+        best = c;
+      }
+    }
+    return best;
+  }
+
+  Vec3 presentPlace(const TissuePlace& place) const {
+    Vec3 now = Vec3::Zero();
+    for (int k = 0; k < 8; ++k)
+      now += trilinearWeight(k, place.at) * state_.positions[before_.cells[place.cell].corners[k]];
+    return now;
+  }
+
+  // What is held stays held.
   void inheritClamp(BodyModel& child, const std::vector<Index>& renumbered) const {
     for (ClampPoint point : model_.clamp_points) {
-      Vec3 now = Vec3::Zero();
-      for (int k = 0; k < 8; ++k)
-        now += trilinearWeight(k, point.at) * state_.positions[before_.cells[point.cell].corners[k]];
-      const bool above = gate_.height(now) >= 0.0;
-      Index best = kNoIndex;
-      double least = std::numeric_limits<double>::infinity();
-      for (const Index c : children_[point.cell]) {
-        if (cut_.lattice.cells[c].isBridge(c)) continue;
-        const SampleSet side = !cut_.changed[c] ? kAllSamples : above ? cut_.above[c] : ~cut_.above[c];
-        const double squared = squaredToSamples(cut_.lattice.cells[c].samples & side, point.at);
-        if (squared < least) {
-          least = squared;
-          best = c;
-        }
-      }
+      const Index best = heirOf({point.cell, point.at});
       if (best == kNoIndex || renumbered[best] == kNoIndex) continue;
       point.cell = renumbered[best];
       child.clamp_points.push_back(point);
@@ -688,9 +732,10 @@ class CellCutter {
 
 Result<std::vector<BodyPiece>> cutCells(const BodyModel& model, const BodyState& state, const BladeGate& gate,
                                         const std::vector<CellPieceSource>& sources,
-                                        const std::vector<CellPieceSource>& collision, std::uint32_t new_patch,
+                                        const std::vector<CellPieceSource>& collision,
+                                        const std::vector<TissuePlace>& places, std::uint32_t new_patch,
                                         CutWork& work) {
-  return CellCutter(model, state, gate, sources, collision).run(new_patch, work);
+  return CellCutter(model, state, gate, sources, collision).run(places, new_patch, work);
 }
 
 TriangleMesh presentCollision(const BodyModel& model, const BodyState& state) {

@@ -23,10 +23,12 @@ struct CellPieceSource {
 /// collision: what the same blade made of the body's surface for contact, in any order. Each goes to the piece that
 /// most of its vertices are in. A piece that gets none, or one that is not all in its cells, meets others by what is
 /// seen.
+///
+/// places: each goes on in the copy of its cell with the nearest tissue on its side of the blade, if there is any.
 Result<std::vector<BodyPiece>> cutCells(const BodyModel& model, const BodyState& state, const BladeGate& gate,
                                         const std::vector<CellPieceSource>& sources,
-                                        const std::vector<CellPieceSource>& collision, std::uint32_t new_patch,
-                                        CutWork& work);
+                                        const std::vector<CellPieceSource>& collision,
+                                        const std::vector<TissuePlace>& places, std::uint32_t new_patch, CutWork& work);
 
 /// The surface for contact in its present shape [m]; empty where the body has none of its own.
 TriangleMesh presentCollision(const BodyModel& model, const BodyState& state);

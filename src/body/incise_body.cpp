@@ -159,7 +159,8 @@ std::vector<std::size_t> assignParticles(const std::vector<IncisedPiece>& pieces
 namespace {
 
 Result<IncisedBody> inciseFilled(const BodyModel& model, const BodyState& state, const Blade& blade,
-                                 const TriangleMesh& present, const InciseOptions& options) {
+                                 const TriangleMesh& present, const InciseOptions& options,
+                                 const std::vector<TissuePlace>& places) {
   const Result<Incision> incision = incise(present, blade, options);
   if (!incision) return incision.error();
   const Result<Incision> contact_incision =
@@ -171,7 +172,7 @@ Result<IncisedBody> inciseFilled(const BodyModel& model, const BodyState& state,
   IncisedBody result;
   result.opened_area = incision->opened_area;
   Result<std::vector<BodyPiece>> pieces =
-      cutCells(model, state, BladeGate(blade), sources, collision, options.patch, result.work);
+      cutCells(model, state, BladeGate(blade), sources, collision, places, options.patch, result.work);
   if (!pieces) return pieces.error();
   result.pieces = std::move(*pieces);
   return result;
@@ -179,7 +180,8 @@ Result<IncisedBody> inciseFilled(const BodyModel& model, const BodyState& state,
 
 }  // namespace
 
-Result<IncisedBody> inciseBody(const BodyModel& model, const BodyState& state, const Blade& blade) {
+Result<IncisedBody> inciseBody(const BodyModel& model, const BodyState& state, const Blade& blade,
+                               const std::vector<TissuePlace>& places) {
   if (!model.solid) return Error{ErrorCode::kUnsuitableShape, "its surface is open, so it has no inside to be opened"};
   TriangleMesh present;
   present.vertices = state.surface;
@@ -187,7 +189,7 @@ Result<IncisedBody> inciseBody(const BodyModel& model, const BodyState& state, c
   present.patches = model.surface.patches;
   InciseOptions options;
   options.patch = model.next_patch;
-  if (model.lattice) return inciseFilled(model, state, blade, present, options);
+  if (model.lattice) return inciseFilled(model, state, blade, present, options, places);
   PieceMaker maker(model, state, options.patch);
   Result<Incision> incision = Error();
   atOnce([&] { incision = incise(present, blade, options); }, [&] { maker.foresee(blade); });

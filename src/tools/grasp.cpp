@@ -6,6 +6,8 @@
 #include <map>
 #include <queue>
 
+#include "meshless_surgery/body/filled_cells.h"
+
 namespace meshless {
 namespace {
 
@@ -68,6 +70,24 @@ void makeGrasp(const BodyModel& model, Index centre, double radius, Pick& pick) 
   }
   for (double& w : pick.weights) w /= total;
   letGoOfFixed(model, pick);
+}
+
+TissuePlace placeOf(const BodyModel& model, Index particle) {
+  TissuePlace place;
+  if (!model.lattice) return place;
+  const Vec3& rest = model.rest[particle];
+  double least = std::numeric_limits<double>::infinity();
+  for (Index c = 0; c < model.lattice->cells.size(); ++c) {
+    const LatticeCell& cell = model.lattice->cells[c];
+    if (cell.isBridge(c) || std::find(cell.corners.begin(), cell.corners.end(), particle) == cell.corners.end())
+      continue;
+    const Vec3 at = model.lattice->placeIn(cell, rest);
+    const double squared = squaredToSamples(cell.samples, at);
+    if (!(squared < least)) continue;
+    least = squared;
+    place = {c, at};
+  }
+  return place;
 }
 
 Vec3 graspMean(const Pick& pick, const Points& positions) {

@@ -124,8 +124,11 @@ void checkTools(const SavedWorld& world) {
     require(!pick.patch.empty() && pick.patch.size() == pick.weights.size(), "a pick holds nothing");
     for (const SavedBody& body : world.bodies)
       if (body.id == pick.body)
-        require(pick.particle < body.model->rest.size() && allBelow(pick.patch, body.model->rest.size()),
-                "a pick holds a particle that is not there");
+        require(pick.particle < body.model->rest.size() && allBelow(pick.patch, body.model->rest.size()) &&
+                    pick.place.at.allFinite() &&
+                    (pick.place.cell == kNoIndex ||
+                     (body.model->lattice && pick.place.cell < body.model->lattice->cells.size())),
+                "a pick holds what is not there");
   }
   for (const ClosingCut& cut : world.closing) require(cut.done_at > cut.started_at, "blades close in no time");
 }

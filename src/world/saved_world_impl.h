@@ -280,8 +280,9 @@ void serialize(A& archive, Blade& v) {
 }
 template <class A>
 void serialize(A& archive, Pick& v) {
-  auto& [id, body, particle, patch, weights, offset, target, reached, locked, stiffness, position, force] = v;
-  archive(id, body, particle, patch, weights, offset, target, reached, locked, stiffness, position, force);
+  auto& [id, body, particle, place, patch, weights, offset, target, reached, locked, stiffness, position, force] = v;
+  archive(id, body, particle, place.cell, place.at, patch, weights, offset, target, reached, locked, stiffness,
+          position, force);
 }
 template <class A>
 void serialize(A& archive, PushSphere& v) {

@@ -8,13 +8,31 @@
 namespace meshless {
 namespace {
 
-constexpr double kGraspSpacings = 4.0;  // radius of a grasp in particle spacings where the scene sets none
-
 struct Grabbed {
   WorldBody* body = nullptr;
   Index particle = 0;
   Vec3 point = Vec3::Zero();
+  TissuePlace place;
 };
+
+// What is at `point` of a triangle now: in the cell of the nearest corner.
+TissuePlace placeAt(const WorldBody& body, Index triangle, const Vec3& point) {
+  if (!body.model->lattice) return {};
+  const Triangle& t = body.model->surface.triangles[triangle];
+  const Points &now = body.state.surface, &rest = body.model->surface.vertices;
+  const Vec3 normal = (now[t[1]] - now[t[0]]).cross(now[t[2]] - now[t[0]]);
+  Vec3 sum = Vec3::Zero();
+  double all = 0.0;
+  Index nearest = t[0];
+  for (int k = 0; k < 3; ++k) {
+    const double area = std::max(0.0, normal.dot((now[t[(k + 1) % 3]] - point).cross(now[t[(k + 2) % 3]] - point)));
+    sum += area * rest[t[k]];
+    all += area;
+    if ((now[t[k]] - point).squaredNorm() < (now[nearest] - point).squaredNorm()) nearest = t[k];
+  }
+  const Index cell = body.model->binding.turners[nearest];
+  return {cell, body.model->lattice->placeIn(body.model->lattice->cells[cell], all > 0.0 ? sum / all : rest[nearest])};
+}
 
 double distanceToRay(const Vec3& p, const Vec3& origin, const Vec3& unit) {
   const double along = std::max(0.0, unit.dot(p - origin));
@@ -55,12 +73,22 @@ Result<Reply> World::Impl::apply(const PickCommand& command) {
       nearest = hit.distance;
       grabbed.body = body.get();
       grabbed.point = hit.point;
+      grabbed.place = placeAt(*body, hit.triangle, hit.point);
     }
     if (grabbed.body) {
       const Points& p = grabbed.body->state.positions;
+      const BodyModel& model = *grabbed.body->model;
       double closest = std::numeric_limits<double>::infinity();
-      for (Index i = 0; i < p.size(); ++i) {
-        if (!grabbed.body->model->isTissue(i) || !((p[i] - grabbed.point).squaredNorm() < closest)) continue;
+      // Beside a wound the nearest particle may be of the other lip: of cells, one of the tissue that was hit.
+      if (grabbed.place.cell != kNoIndex)
+        for (const Index i : model.lattice->cells[grabbed.place.cell].corners)
+          if (model.isTissue(i) && (p[i] - grabbed.point).squaredNorm() < closest) {
+            closest = (p[i] - grabbed.point).squaredNorm();
+            grabbed.particle = i;
+          }
+      const bool found = std::isfinite(closest);
+      for (Index i = 0; i < p.size() && !found; ++i) {
+        if (!model.isTissue(i) || !((p[i] - grabbed.point).squaredNorm() < closest)) continue;
         closest = (p[i] - grabbed.point).squaredNorm();
         grabbed.particle = i;
       }
@@ -77,7 +105,7 @@ Result<Reply> World::Impl::apply(const PickCommand& command) {
         const double d = ray ? distanceToRay(p[i], command.point, unit) : (p[i] - command.point).norm();
         if (!(d < nearest)) continue;
         nearest = d;
-        grabbed = {body.get(), i, p[i]};
+        grabbed = {body.get(), i, p[i], {}};
       }
     }
     if (!(nearest <= reach))
@@ -90,8 +118,8 @@ Result<Reply> World::Impl::apply(const PickCommand& command) {
   pick.id = next_pick++;
   pick.body = grabbed.body->id;
   pick.stiffness = command.stiffness > 0.0 ? command.stiffness : settings.pick_stiffness;
-  makeGrasp(*grabbed.body->model, grabbed.particle,
-            settings.pick_radius > 0.0 ? settings.pick_radius : kGraspSpacings * grabbed.body->model->spacing, pick);
+  makeGrasp(*grabbed.body->model, grabbed.particle, graspRadius(*grabbed.body->model), pick);
+  pick.place = ray && grabbed.place.cell != kNoIndex ? grabbed.place : placeOf(*grabbed.body->model, grabbed.particle);
   pick.target = pick.reached = pick.position = grabbed.point;
   pick.offset = grabbed.point - graspMean(pick, grabbed.body->state.positions);
   picks.push_back(pick);

@@ -10,7 +10,8 @@
 namespace meshless {
 namespace {
 
-constexpr double kOpenAngle = 0.5;  // [rad] of blades that a service closes
+constexpr double kGraspSpacings = 4.0;  // radius of a grasp in particle spacings where the scene sets none
+constexpr double kOpenAngle = 0.5;      // [rad] of blades that a service closes
 
 struct Severed {
   BodyId parent;
@@ -147,7 +148,8 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
     present.triangles = body->model->surface.triangles;
     if (!bladesMeet(present, command.blades)) continue;
     Result<CutBody> cut =
-        cutBody(*body->model, body->state, plane, {command.roughness, static_cast<std::uint32_t>(next_ticket + step)});
+        cutBody(*body->model, body->state, plane,
+                {command.roughness, static_cast<std::uint32_t>(next_ticket + step), picked(body->id)});
     if (cut) {
       easeRelease(*body->model, body->state, body->material, substepNow(), heldBySprings(*body), cut->pieces);
       severed.push_back({body->id, std::move(*cut)});
@@ -210,34 +212,57 @@ std::vector<std::string> World::Impl::replaceByPieces(const BodyId& parent_id, s
   const bool touched = parent.touched_by_push;
   std::vector<std::string> names;
   std::vector<BodyId> children;
-  std::vector<std::vector<Index>> parent_particles;
+  std::vector<Descent> descents;
   int number = 0;
   for (BodyPiece& piece : pieces) {
     std::string name;
     do name = parent_name + "." + std::to_string(++number);
     while (used_names.count(name));
+    descents.push_back(descentOf(piece));
     WorldBody& child = admit(name, material, std::move(piece.model), std::move(piece.state));
     child.touched_by_push = touched;
     if (pieces.size() > 1) foreseeContact(child);
-    children.push_back(child.id);
-    parent_particles.push_back(std::move(piece.parent_particles));
+    children.push_back(descents.back().child = child.id);
     names.push_back(name);
   }
   foreseeMeeting(parent_id, children);
-  followPieces(parent_id, children, parent_particles);
+  followPieces(parent_id, find(parent_id)->state.positions, descents);
   retire(parent_id);
   return names;
 }
 
-void World::Impl::followPieces(const BodyId& parent, const std::vector<BodyId>& children,
-                               const std::vector<std::vector<Index>>& parent_particles) {
+double World::Impl::graspRadius(const BodyModel& model) const {
+  return settings.pick_radius > 0.0 ? settings.pick_radius : kGraspSpacings * model.spacing;
+}
+
+std::vector<TissuePlace> World::Impl::picked(const BodyId& body) const {
+  std::vector<TissuePlace> places;
+  for (const Pick& pick : picks)
+    if (pick.body == body) places.push_back(pick.place);
+  return places;
+}
+
+World::Impl::Descent World::Impl::descentOf(BodyPiece& piece) {
+  return {BodyId(), std::move(piece.parent_particles), std::move(piece.copied_from), std::move(piece.places)};
+}
+
+void World::Impl::followPieces(const BodyId& parent, const Points& before, const std::vector<Descent>& pieces) {
+  std::size_t asked = 0;  // in the order of picked()
   for (Pick& pick : picks) {
     if (pick.body != parent) continue;
+    const std::size_t n = asked++;
+    const auto holds = [&](const Descent& piece) {
+      return n < piece.places.size() && piece.places[n].cell != kNoIndex;
+    };
+    if (const auto holder = std::find_if(pieces.begin(), pieces.end(), holds); holder != pieces.end()) {
+      followTissue(pick, before, *holder, holder->places[n]);
+      continue;
+    }
     Pick followed = pick;
-    for (std::size_t c = 0; c < children.size(); ++c) {
+    for (const Descent& piece : pieces) {
       const auto find_particle = [&](Index old) {
-        const auto it = std::find(parent_particles[c].begin(), parent_particles[c].end(), old);
-        return it == parent_particles[c].end() ? kNoIndex : static_cast<Index>(it - parent_particles[c].begin());
+        const auto it = std::find(piece.parent_particles.begin(), piece.parent_particles.end(), old);
+        return it == piece.parent_particles.end() ? kNoIndex : static_cast<Index>(it - piece.parent_particles.begin());
       };
       const Index centre = find_particle(pick.particle);
       // What is left of the patch, and what its weights were.
@@ -259,18 +284,35 @@ void World::Impl::followPieces(const BodyId& parent, const std::vector<BodyId>& 
           lost[k] -= weights[k];
         }
       }
-      easePull(*find(children[c]), patch, lost, pick.force, centre != kNoIndex);
+      easePull(*find(piece.child), patch, lost, pick.force, centre != kNoIndex);
       if (centre == kNoIndex) continue;
-      followed.body = children[c];
+      followed.body = piece.child;
       followed.particle = centre;
       followed.patch = std::move(patch);
       followed.weights = std::move(weights);
       // The grabbed point is where it was; only the patch around it is smaller now.
-      followed.offset = pick.offset + graspMean(pick, find(parent)->state.positions) -
-                        graspMean(followed, find(children[c])->state.positions);
+      followed.offset = pick.offset + graspMean(pick, before) - graspMean(followed, find(piece.child)->state.positions);
     }
     pick = std::move(followed);
   }
+}
+
+// By the copy of the particle that was grabbed, or else by the corner nearest to the place, of the cell that has it.
+void World::Impl::followTissue(Pick& pick, const Points& before, const Descent& piece, const TissuePlace& place) {
+  WorldBody& child = *find(piece.child);
+  const LatticeCell& cell = child.model->lattice->cells[place.cell];
+  Index centre = cell.corners[0];
+  for (int k = 0, nearest = 0; k < 8; ++k) {
+    if (trilinearWeight(k, place.at) > trilinearWeight(nearest, place.at)) centre = cell.corners[nearest = k];
+    if (piece.copied_from[cell.corners[k]] != pick.particle) continue;
+    centre = cell.corners[k];
+    break;
+  }
+  const Vec3 grabbed = pick.offset + graspMean(pick, before);
+  makeGrasp(*child.model, centre, graspRadius(*child.model), pick);
+  pick.body = child.id;
+  pick.place = place;
+  pick.offset = grabbed - graspMean(pick, child.state.positions);
 }
 
 // The pull goes over from the whole patch to what is left of it as what else was cut is let go; the rest of the patch

@@ -285,12 +285,22 @@ struct World::Impl {
   /// Refuses what would leave more pieces than kMostPieces; `gone` of those there are go, `come` are made.
   Status checkPieces(std::size_t gone, std::size_t come) const;
   std::vector<Index> heldBySprings(const WorldBody& body) const;  // particles in the middle of a grasp
+  double graspRadius(const BodyModel& model) const;               // [m]
+  std::vector<TissuePlace> picked(const BodyId& body) const;      // places of its picks, in their order
   /// Retires a body and admits its pieces in its place; their names.
   std::vector<std::string> replaceByPieces(const BodyId& parent, std::vector<BodyPiece> pieces);
   void easePull(WorldBody& body, const std::vector<Index>& patch, const std::vector<double>& lost, const Vec3& force,
                 bool held);
-  void followPieces(const BodyId& parent, const std::vector<BodyId>& children,
-                    const std::vector<std::vector<Index>>& parent_particles);
+  /// What becomes of a piece's particles and of places that were asked for, once the piece is a body.
+  struct Descent {
+    BodyId child;
+    std::vector<Index> parent_particles, copied_from;
+    std::vector<TissuePlace> places;
+  };
+  static Descent descentOf(BodyPiece& piece);
+  /// Picks of a body go where the tissue goes that they hold; `before` [m]: of its particles.
+  void followPieces(const BodyId& parent, const Points& before, const std::vector<Descent>& pieces);
+  void followTissue(Pick& pick, const Points& before, const Descent& piece, const TissuePlace& place);
 
   // the log of commands, where there is one
   void record(const Command& command) const;

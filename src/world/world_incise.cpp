@@ -48,7 +48,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
     Box bounds;
     for (const Vec3& p : body->state.surface) bounds.extend(p);
     if (!bounds.overlaps(reach)) continue;
-    Result<IncisedBody> opened = inciseBody(*body->model, body->state, command.blade);
+    Result<IncisedBody> opened = inciseBody(*body->model, body->state, command.blade, picked(body->id));
     if (opened) {
       easeRelease(*body->model, body->state, body->material, substepNow(), heldBySprings(*body), opened->pieces);
       all.push_back({body->id, std::move(*opened)});
@@ -83,8 +83,12 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
     reply.work += opened.body.work;
     if (opened.body.pieces.size() == 1) {
       wake(body);
+      const Points positions = body.state.positions;
+      Descent descent = descentOf(opened.body.pieces[0]);
+      descent.child = body.id;
       body.model = std::move(opened.body.pieces[0].model);
       body.state = std::move(opened.body.pieces[0].state);
+      if (body.model->lattice) followPieces(body.id, positions, {descent});
       body.mesh.reset();
       body.surface_current = true;
       contacts.forget(body.number);

@@ -1,9 +1,11 @@
 // Bodies of filled cells in a world: picks, cuts and what is left of them.
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/organs.h"
+#include "meshless_surgery/tools/grasp.h"
 #include "meshless_surgery/world/world.h"
 #include "support/bodies.h"
 #include "support/random.h"
@@ -49,6 +51,46 @@ World bar() {
   World world{apart()};
   EXPECT_TRUE(world.addSceneBody(test::shared(soft(boxMesh(Vec3(0.21, 0.05, 0.05), 0.01), 0.03))).ok());
   return world;
+}
+
+// Within 5 mm of the blade, in cells of 12 mm: what is picked on a side of it goes with the piece on that side.
+TEST(FilledCellsInAWorld, PicksNearABladeStayOnTheirSide) {
+  test::Random random(17);
+  int picks = 0, wrong = 0;
+  for (int round = 0; round < 12; ++round) {
+    World world{apart()};
+    const TriangleMesh mesh = round % 3 == 0   ? boxMesh(Vec3(0.16, 0.12, 0.1), 0.008)
+                              : round % 3 == 1 ? sphereMesh(0.08, 0.007)
+                                               : liverMesh();
+    ASSERT_TRUE(world.addSceneBody(test::shared(soft(mesh, 0.0125))).ok());
+    const Plane plane{random.vector(1.0).normalized(), solidCentroid(mesh) + random.vector(0.01)};
+    const Points surface = world.snapshot({true, false, false}).bodies[0].surface;
+    std::map<PickId, double> height;
+    for (int k = 0; k < 2000 && height.size() < 90; ++k) {
+      const Vec3& p = surface[static_cast<std::size_t>(random.integer(0, static_cast<int>(surface.size()) - 1))];
+      if (std::abs(plane.height(p)) > 0.005) continue;
+      PickCommand pick;
+      pick.direction = solidCentroid(mesh) - p;
+      pick.point = p - 0.5 * pick.direction;
+      const PickReply reply = replyOf<PickReply>(world.apply(pick));
+      if (const double there = plane.height(reply.position); std::abs(there) > 1e-4) height[reply.pick] = there;
+    }
+    ASSERT_TRUE(world.apply(cutThrough(plane.point, plane.normal)).ok());
+    const WorldSnapshot shot = world.snapshot({true, true, true});
+    for (const Pick& pick : shot.picks) {
+      if (!height.count(pick.id)) continue;
+      for (const BodySnapshot& body : shot.bodies) {
+        if (body.name != shot.pick_bodies.at(pick.id)) continue;
+        double side = 0.0;
+        for (const Vec3& p : body.surface) side += plane.height(p);
+        ++picks;
+        wrong += side * height.at(pick.id) < 0.0;
+        EXPECT_LT((graspMean(pick, body.particles) + pick.offset - pick.position).norm(), 1e-9) << "nothing jumps";
+      }
+    }
+  }
+  EXPECT_GT(picks, 900);
+  EXPECT_EQ(wrong, 0) << "of " << picks;
 }
 
 TEST(FilledCellsInAWorld, PicksGrabTissueAndFollowIt) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "meshless_surgery/body/body.h"
+#include "meshless_surgery/body/tissue_place.h"
 #include "meshless_surgery/geometry/cut.h"
 
 namespace meshless {
@@ -10,6 +11,9 @@ struct BodyPiece {
   BodyModelPtr model;
   BodyState state;
   std::vector<Index> parent_particles;  // one a particle of the piece: its index in the parent, or kNoIndex if new
+  // Of a body of cells:
+  std::vector<Index> copied_from;   // one a particle of the piece: the parent's of which it is a copy, or that it is
+  std::vector<TissuePlace> places;  // one a place that was asked for: where it is now; nowhere if in another piece
 };
 
 /// What a blade had to make of a body, over all pieces: its work, in counts that no clock blurs.
@@ -31,8 +35,9 @@ struct CutBody {
 };
 
 struct CutBodyOptions {
-  double roughness = 0.0;  // [m] amplitude of the fractal displacement of the cut; 0: clean
-  std::uint32_t seed = 0;  // of it
+  double roughness = 0.0;           // [m] amplitude of the fractal displacement of the cut; 0: clean
+  std::uint32_t seed = 0;           // of it
+  std::vector<TissuePlace> places;  // to be followed, in a body of cells
 };
 
 /// The plane is in the world frame and meets the present shape. Rest positions, positions and velocities of new

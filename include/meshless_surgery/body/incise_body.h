@@ -15,7 +15,9 @@ struct IncisedBody {
 
 /// The blade is in the world frame and meets the present shape. Links between particles that pass through the blade are
 /// cut. Clusters that it parts grow again along the links that are left. Vertices of a wound face follow only particles
-/// on its side. Positions, velocities and masses stay. Refuses as incise() does, and a body that is no solid.
-Result<IncisedBody> inciseBody(const BodyModel& model, const BodyState& state, const Blade& blade);
+/// on its side. Positions, velocities and masses stay. Refuses as incise() does, and a body that is no solid. places:
+/// to be followed, in a body of cells.
+Result<IncisedBody> inciseBody(const BodyModel& model, const BodyState& state, const Blade& blade,
+                               const std::vector<TissuePlace>& places = {});
 
 }  // namespace meshless

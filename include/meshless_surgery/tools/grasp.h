@@ -11,6 +11,9 @@ namespace meshless {
 /// particles are held by nothing else than what fixes them, but where there are no others.
 void makeGrasp(const BodyModel& model, Index centre, double radius, Pick& pick);
 
+/// Where a particle of a body of cells is: in that of its cells whose tissue is nearest. Nowhere in other bodies.
+TissuePlace placeOf(const BodyModel& model, Index particle);
+
 /// Weighted mean of the patch [m].
 Vec3 graspMean(const Pick& pick, const Points& positions);
 

@@ -1,6 +1,7 @@
 // The hands in the tissue: springs, the push sphere and the scissors. Their state only; World moves them.
 #pragma once
 
+#include "meshless_surgery/body/tissue_place.h"
 #include "meshless_surgery/tools/command.h"
 
 namespace meshless {
@@ -11,6 +12,7 @@ struct Pick {
   PickId id = 0;
   BodyId body;
   Index particle = 0;           // where the tissue was grabbed
+  TissuePlace place;            // likewise, of a body of cells
   std::vector<Index> patch;     // particles that the grasp holds, the first is `particle`
   std::vector<double> weights;  // add up to 1
   Vec3 offset = Vec3::Zero();   // [m] grabbed point minus the patch's mean, kept so that nothing jumps
