@@ -398,7 +398,6 @@ void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& spri
       solver.visit(springs[n], scratch.pulls[n], step.h);  // contacts have the last word
     for (std::size_t n = 0; n < count; ++n)
       worst = std::max(worst, solver.visit(scratch.active[sweep % 2 ? count - 1 - n : n]));
-    counters.visits += count;
     if (sweep > 0 && !(worst > kTolerance)) break;
   }
   solver.moveGroups(springs);

@@ -53,14 +53,12 @@ struct SolverStep {
 struct SolverCounters {
   std::size_t active = 0;       // rows that could carry load
   std::size_t ground = 0;       // of them, those of the ground
-  std::size_t visits = 0;       // of rows
   std::size_t limited = 0;      // watched pairs that would have met
   std::size_t found_again = 0;  // searches within the frame
 
   void operator+=(const SolverCounters& o) {
     active += o.active;
     ground += o.ground;
-    visits += o.visits;
     limited += o.limited;
     found_again += o.found_again;
   }
