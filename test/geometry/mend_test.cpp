@@ -94,6 +94,22 @@ TEST(Mend, ALargeHoleIsFilled) {
   }
 }
 
+// The time that a patch takes grows with the square of its rim.
+TEST(Mend, AHoleOfThousandsOfEdgesIsLeftOpen) {
+  for (const Index edges : {100u, 3001u}) {
+    TriangleMesh cone;  // open at its base, which has an eighth of the area
+    for (Index k = 0; k < edges; ++k) {
+      const double angle = 2.0 * M_PI * k / edges;
+      cone.vertices.emplace_back(std::cos(angle), std::sin(angle), 0.0);
+      cone.triangles.push_back({k, edges, (k + 1) % edges});
+    }
+    cone.vertices.emplace_back(0.0, 0.0, -8.0);
+    const auto mended = repairMesh(cone, MeshRepair::kMend);
+    ASSERT_TRUE(mended.ok());
+    EXPECT_EQ(mended->solid, edges == 100u) << edges << ": " << notesOf(*mended);
+  }
+}
+
 TEST(Mend, AnOpenHalfStaysAShell) {
   const TriangleMesh half = openAbove(0.01);
   const auto plain = repairMesh(half);
