@@ -55,12 +55,6 @@ bool invert(const LatticeCell& cell, const Points& x, const Vec3& q, double size
   return false;
 }
 
-bool shareACorner(const std::vector<LatticeCell>& cells, Index a, Index b) {
-  if (a == b) return true;
-  const auto &p = cells[a].corners, &q = cells[b].corners;
-  return std::any_of(p.begin(), p.end(), [&](Index i) { return std::find(q.begin(), q.end(), i) != q.end(); });
-}
-
 class CellCutter {
  public:
   CellCutter(const BodyModel& model, const BodyState& state, const BladeGate& gate,
