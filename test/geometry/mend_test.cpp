@@ -97,14 +97,20 @@ TEST(Mend, ALargeHoleIsFilled) {
 // The time that a patch takes grows with the square of its rim.
 TEST(Mend, AHoleOfThousandsOfEdgesIsLeftOpen) {
   for (const Index edges : {100u, 3001u}) {
-    TriangleMesh cone;  // open at its base, which has an eighth of the area
+    TriangleMesh cup;  // with a ninth of its area open
+    for (const double z : {0.0, -4.0})
+      for (Index k = 0; k < edges; ++k)
+        cup.vertices.emplace_back(std::cos(2.0 * M_PI * k / edges), std::sin(2.0 * M_PI * k / edges), z);
     for (Index k = 0; k < edges; ++k) {
-      const double angle = 2.0 * M_PI * k / edges;
-      cone.vertices.emplace_back(std::cos(angle), std::sin(angle), 0.0);
-      cone.triangles.push_back({k, edges, (k + 1) % edges});
+      const Index next = (k + 1) % edges;
+      cup.triangles.push_back({k, edges + k, next});
+      cup.triangles.push_back({next, edges + k, edges + next});
     }
-    cone.vertices.emplace_back(0.0, 0.0, -8.0);
-    const auto mended = repairMesh(cone, MeshRepair::kMend);
+    for (Index low = edges, high = 2 * edges - 1; low + 1 < high; ++low, --high) {
+      cup.triangles.push_back({low, high, low + 1});
+      if (low + 2 < high) cup.triangles.push_back({low + 1, high, high - 1});
+    }
+    const auto mended = repairMesh(cup, MeshRepair::kMend);
     ASSERT_TRUE(mended.ok());
     EXPECT_EQ(mended->solid, edges == 100u) << edges << ": " << notesOf(*mended);
   }
