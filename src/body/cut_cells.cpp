@@ -63,12 +63,6 @@ struct PieceCollision {
   std::vector<Index> cells;  // of each vertex; kNoIndex where none of the piece's is near it
 };
 
-bool shareACorner(const std::vector<LatticeCell>& cells, Index a, Index b) {
-  if (a == b) return true;
-  const auto &p = cells[a].corners, &q = cells[b].corners;
-  return std::any_of(p.begin(), p.end(), [&](Index i) { return std::find(q.begin(), q.end(), i) != q.end(); });
-}
-
 class CellCutter {
  public:
   CellCutter(const BodyModel& model, const BodyState& state, const BladeGate& gate,

@@ -129,11 +129,11 @@ Pieces piecesOf(const TriangleMesh& mesh) {
 
 /// Nothing where there is none.
 std::vector<Triangle> patchOf(const TriangleMesh& mesh, const std::vector<Index>& rim) {
-  if (rim.size() < 3 || rim.size() > kLongestRim) return {};
+  if (rim.size() > kLongestRim) return {};
   std::vector<Kernel::Point_3> line;
   for (const Index v : rim) line.emplace_back(mesh.vertices[v].x(), mesh.vertices[v].y(), mesh.vertices[v].z());
   std::vector<CGAL::Triple<int, int, int>> found;
-  pmp::triangulate_hole_polyline(line, std::back_inserter(found), CGAL::parameters::use_delaunay_triangulation(true));
+  pmp::triangulate_hole_polyline(line, std::back_inserter(found), CGAL::parameters::do_not_use_cubic_algorithm(true));
   std::vector<Triangle> patch;
   for (const auto& t : found) patch.push_back({rim[t.first], rim[t.second], rim[t.third]});
   return patch;

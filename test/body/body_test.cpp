@@ -15,27 +15,29 @@ using test::prepared;
 
 TEST(PrepareBody, KeepsTheSurfaceAndSharesTheMassForEveryShape) {
   for (const shapes::Shape& shape : shapes::allShapes()) {
-    SCOPED_TRACE(shape.name);
-    BodyDef def = defOf(shape.mesh);
-    const double size = boundsOf(shape.mesh.vertices).diagonal();
-    def.spacing = size / 12.0;
-    const PreparedBody body = prepared(def);
-    const BodyModel& m = *body.model;
-    EXPECT_EQ(m.surface.triangles.size(), shape.mesh.triangles.size());
-    EXPECT_NEAR(m.rest_volume, signedVolume(shape.mesh), 1e-12 * size * size * size);
-    EXPECT_NEAR(m.mass, def.material.density * m.rest_volume, 1e-9 * m.mass);
-    double sum = 0.0;
-    for (double mass : m.masses) {
-      EXPECT_GT(mass, 0.0);
-      sum += mass;
+    for (const double spacings : {5.0, 12.0}) {
+      SCOPED_TRACE(shape.name + ", " + std::to_string(spacings) + " spacings");
+      BodyDef def = defOf(shape.mesh);
+      const double size = boundsOf(shape.mesh.vertices).diagonal();
+      def.spacing = size / spacings;
+      const PreparedBody body = prepared(def);
+      const BodyModel& m = *body.model;
+      EXPECT_EQ(m.surface.triangles.size(), shape.mesh.triangles.size());
+      EXPECT_NEAR(m.rest_volume, signedVolume(shape.mesh), 1e-12 * size * size * size);
+      EXPECT_NEAR(m.mass, def.material.density * m.rest_volume, 1e-9 * m.mass);
+      double sum = 0.0;
+      for (double mass : m.masses) {
+        EXPECT_GT(mass, 0.0);
+        sum += mass;
+      }
+      EXPECT_NEAR(sum, m.mass, 1e-12 * m.mass);
+      EXPECT_EQ(m.graph.size(), m.rest.size());
+      for (Index i = 0; i < m.graph.size() && m.rest.size() > 1; ++i)
+        EXPECT_LT(m.graph.offsets[i], m.graph.offsets[i + 1]) << "particle " << i << " holds to nothing";
+      ASSERT_EQ(body.state.surface.size(), shape.mesh.vertices.size());
+      for (std::size_t v = 0; v < shape.mesh.vertices.size(); ++v)
+        EXPECT_LT((body.state.surface[v] - shape.mesh.vertices[v]).norm(), 1e-12 * size);
     }
-    EXPECT_NEAR(sum, m.mass, 1e-12 * m.mass);
-    EXPECT_EQ(m.graph.size(), m.rest.size());
-    for (Index i = 0; i < m.graph.size() && m.rest.size() > 1; ++i)
-      EXPECT_LT(m.graph.offsets[i], m.graph.offsets[i + 1]) << "particle " << i << " holds to nothing";
-    ASSERT_EQ(body.state.surface.size(), shape.mesh.vertices.size());
-    for (std::size_t v = 0; v < shape.mesh.vertices.size(); ++v)
-      EXPECT_LT((body.state.surface[v] - shape.mesh.vertices[v]).norm(), 1e-12 * size);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "meshless_surgery/geometry/cut.h"
+#include "meshless_surgery/geometry/mesh_check.h"
 #include "support/cut_cases.h"
 #include "support/mesh_laws.h"
 
@@ -283,6 +284,28 @@ TEST(CutCap, RoughnessIsSeededBoundedAndZeroAtTheRim) {
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
   EXPECT_NE(refused.error().detail.find("-1"), std::string::npos);
+}
+
+// A little below what is outermost along an axis, so that the noise would leave the solid.
+TEST(CutCap, RoughnessStaysWithinTheSolid) {
+  CutOptions options = filled();
+  for (const shapes::Shape& shape : shapes::allShapes()) {
+    SCOPED_TRACE(shape.name);
+    const double size = boundsOf(shape.mesh.vertices).diagonal();
+    for (const Vec3& up : {Vec3(Vec3::UnitX()), Vec3(Vec3::UnitY()), Vec3(-Vec3::UnitZ())}) {
+      double top = -1e300;
+      for (const Vec3& p : shape.mesh.vertices) top = std::max(top, up.dot(p));
+      for (const double below : {0.004, 0.04}) {
+        options.roughness = 5.0 * below * size;
+        const Plane plane = {up, (top - below * size) * up};
+        const Result<CutSurface> cut = cutByPlane(shape.mesh, plane, options);
+        ASSERT_TRUE(laws::cutObeysLaws(shape.mesh, plane, options, cut));
+        if (!cut) continue;
+        for (const CutPiece& piece : cut->pieces)
+          EXPECT_EQ(inspectMesh(piece.mesh).self_intersections, 0u) << "along " << up.transpose() << ", " << below;
+      }
+    }
+  }
 }
 
 TEST(CutCap, InnerVerticesLieInThePlaneWithoutParents) {

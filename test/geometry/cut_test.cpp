@@ -122,14 +122,25 @@ TEST(Cut, FacesInThePlaneGoByTheirOrientation) {
 }
 
 TEST(Cut, SolidsThatTouchComeOutByThemselves) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
   for (const shapes::Shape& shape : shapes::touchingShapes()) {
     SCOPED_TRACE(shape.name);
-    const Plane plane = {Vec3(0.1, 0.2, 1.0).normalized(), Vec3(0.5, 0.4, 0.3)};
-    const Result<CutSurface> cut = cutByPlane(shape.mesh, plane);
-    ASSERT_TRUE(cut.ok()) << cut.error().detail;
-    EXPECT_TRUE(laws::cutObeysLaws(shape.mesh, plane, {}, cut, false));
-    for (const CutPiece& piece : cut->pieces)
-      EXPECT_EQ(boundsOf(piece.mesh.vertices).max.x() > 0.5 + 1e-9, boundsOf(piece.mesh.vertices).min.x() > 0.5 - 1e-9);
+    for (int round = 0; round < 100; ++round) {
+      Pose pose, back;  // turned they touch but for rounding
+      if (round > 0) pose.rotation = Quat(1.0, normal(random), normal(random), normal(random)).normalized();
+      back.rotation = pose.rotation.conjugate();
+      const TriangleMesh mesh = shapes::moved(shape.mesh, pose);
+      const Vec3 up = Vec3(0.2 * normal(random), 0.2 * normal(random), 1.0).normalized();
+      const Plane plane = {pose.rotation * up, pose * Vec3(0.5, 0.4, 0.3)};
+      const Result<CutSurface> cut = cutByPlane(mesh, plane);
+      ASSERT_TRUE(cut.ok()) << cut.error().detail;
+      EXPECT_TRUE(laws::cutObeysLaws(mesh, plane, {}, cut, false));
+      for (const CutPiece& piece : cut->pieces) {
+        const Box box = boundsOf(shapes::moved(piece.mesh, back).vertices);
+        EXPECT_EQ(box.max.x() > 0.5 + 1e-9, box.min.x() > 0.5 - 1e-9) << "round " << round;
+      }
+    }
   }
 }
 

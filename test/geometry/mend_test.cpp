@@ -94,6 +94,28 @@ TEST(Mend, ALargeHoleIsFilled) {
   }
 }
 
+// The time that a patch takes grows with the square of its rim.
+TEST(Mend, AHoleOfThousandsOfEdgesIsLeftOpen) {
+  for (const Index edges : {100u, 3001u}) {
+    TriangleMesh cup;  // with a ninth of its area open
+    for (const double z : {0.0, -4.0})
+      for (Index k = 0; k < edges; ++k)
+        cup.vertices.emplace_back(std::cos(2.0 * M_PI * k / edges), std::sin(2.0 * M_PI * k / edges), z);
+    for (Index k = 0; k < edges; ++k) {
+      const Index next = (k + 1) % edges;
+      cup.triangles.push_back({k, edges + k, next});
+      cup.triangles.push_back({next, edges + k, edges + next});
+    }
+    for (Index low = edges, high = 2 * edges - 1; low + 1 < high; ++low, --high) {
+      cup.triangles.push_back({low, high, low + 1});
+      if (low + 2 < high) cup.triangles.push_back({low + 1, high, high - 1});
+    }
+    const auto mended = repairMesh(cup, MeshRepair::kMend);
+    ASSERT_TRUE(mended.ok());
+    EXPECT_EQ(mended->solid, edges == 100u) << edges << ": " << notesOf(*mended);
+  }
+}
+
 TEST(Mend, AnOpenHalfStaysAShell) {
   const TriangleMesh half = openAbove(0.01);
   const auto plain = repairMesh(half);
