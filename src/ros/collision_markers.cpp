@@ -1,8 +1,8 @@
 #include "meshless_surgery/ros/collision_markers.h"
 
-#include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/ros/convert.h"
 #include "meshless_surgery/ros/marker.h"
+#include "meshless_surgery/world/collision_shape.h"
 
 namespace meshless {
 namespace {
@@ -22,7 +22,7 @@ visualization_msgs::MarkerArray collisionMarkers(const WorldSnapshot& snapshot, 
     edges.scale.x = kLine * body.model->spacing;
     edges.color.r = edges.color.g = 1.0f;
     edges.color.a = 1.0f;
-    const Points places = collisionPlaces(*body.model, body.particles);
+    const Points places = collisionShape(body);
     for (const Triangle& t : body.model->collision->mesh.triangles)
       for (int k = 0; k < 3; ++k) {
         const Index a = t[k], b = t[(k + 1) % 3];
