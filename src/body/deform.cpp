@@ -251,19 +251,10 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
   }
 }
 
-void velocitiesFromPositions(const BodyModel& model, double h, BodyState& state, StepScratch& scratch) {
-  scratch.unreported.setZero();
+void velocitiesFromPositions(double h, BodyState& state, const StepScratch& scratch) {
   const double rate = 1.0 / h;
-  for (std::size_t i = 0; i < model.rest.size(); ++i)
+  for (std::size_t i = 0; i < state.positions.size(); ++i)
     state.velocities[i] = rate * (state.positions[i] - scratch.previous[i]);
-  for (const TouchedParticle& t : scratch.touched) {
-    Vec3& v = state.velocities[t.particle];
-    const double before = t.normal.dot(scratch.before_contact[t.particle] - scratch.previous[t.particle]) / h;
-    const double excess = t.normal.dot(v) - std::max(before, t.obstacle_speed);
-    if (!(excess > 0.0)) continue;
-    v -= excess * t.normal;
-    if (t.by_tool) scratch.unreported += model.masses[t.particle] * excess * t.normal;
-  }
 }
 
 }  // namespace meshless

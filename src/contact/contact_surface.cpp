@@ -9,7 +9,6 @@ namespace {
 struct HalfEdge {
   std::array<Index, 2> ends;  // ascending
   Index face;
-  int corner;
 
   bool operator<(const HalfEdge& o) const { return ends != o.ends ? ends < o.ends : face < o.face; }
 };
@@ -20,7 +19,7 @@ std::vector<HalfEdge> halfEdgesOf(const std::vector<Triangle>& triangles) {
   for (Index f = 0; f < triangles.size(); ++f)
     for (int k = 0; k < 3; ++k) {
       const auto [a, b] = std::minmax(triangles[f][k], triangles[f][(k + 1) % 3]);
-      half.push_back({{a, b}, f, k});
+      half.push_back({{a, b}, f});
     }
   std::sort(half.begin(), half.end());
   return half;
@@ -44,15 +43,14 @@ ContactSurface::ContactSurface(const TriangleMesh& rest, VertexSupports vertex_s
     for (Index k = supports.offsets[v]; k < supports.offsets[v + 1]; ++k) sum += std::abs(supports.weights[k]);
     supports.most_weight = std::max(supports.most_weight, sum);
   }
-  face_edges.resize(triangles.size());
   for (const HalfEdge& half : halfEdgesOf(triangles)) {
     if (edges.empty() || edges.back().vertices != half.ends) {
-      edges.push_back({half.ends, {half.face, kNoIndex}});
-      edge_length += (rest.vertices[half.ends[0]] - rest.vertices[half.ends[1]]).norm();
+      const double length = (rest.vertices[half.ends[0]] - rest.vertices[half.ends[1]]).norm();
+      edges.push_back({half.ends, {half.face, kNoIndex}, length});
+      edge_length += length;
     } else if (edges.back().faces[1] == kNoIndex) {
       edges.back().faces[1] = half.face;
     }
-    face_edges[half.face][half.corner] = static_cast<Index>(edges.size() - 1);
   }
   if (!edges.empty()) edge_length /= static_cast<double>(edges.size());
   for (const ContactEdge& edge : edges) closed = closed && edge.faces[1] != kNoIndex;
@@ -81,7 +79,7 @@ ContactSurface::ContactSurface(const TriangleMesh& rest, VertexSupports vertex_s
 
 std::size_t ContactSurface::bytes() const {
   return sizeof *this +
-         bytesOf(triangles, edges, face_edges, face_offsets, faces, cut_faces, cut_vertices, supports.offsets,
+         bytesOf(triangles, edges, face_offsets, faces, cut_faces, cut_vertices, supports.offsets,
                  supports.particles, supports.weights) +
          tree.bytes();
 }

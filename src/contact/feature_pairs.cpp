@@ -12,15 +12,11 @@ namespace {
 constexpr double kMargin = 0.2;         // of the mean edge
 constexpr double kAhead = 1.2;          // times the way of a frame: what speeds up is met too
 constexpr double kTie = 2e-3;           // of the mean edge: nearer than this two surfaces touch
-constexpr double kTouching = 1e-3;      // of the mean edge: nearer than this only a face that opposes tells the sides
-constexpr double kDeepestEdges = 1.0;   // mean edges by which ridges overlap: deeper ones are not paired
 constexpr double kDeeper = 1.3;         // times as deep as it was: a vertex inside may have gone on
 constexpr double kLeastOpposed = 0.05;  // cosine by which a direction has to oppose a face of the pushed body
 constexpr double kSameWay = 0.9;        // cosine from which a second direction of a vertex says nothing new
+constexpr double kMostRidgePoints = 1e6;
 constexpr double kSelfOpposed = 0.3;    // cosine by which faces of one body oppose each other where they may meet
-constexpr double kParallel = 0.05;      // sine between edges below which they have no common normal
-constexpr double kLongRidge = 1.5;      // mean edges: shorter ridges are held by their ends
-constexpr double kEnd = 0.01;           // of an edge: nearer to its end a vertex meets what is there
 
 using Candidate = NearFace;
 
@@ -36,52 +32,89 @@ bool isOutOf(const Box& bounds, const Vec3& p, const Vec3& q, double by) {
          ((p.cwiseMax(q).array() + by) < bounds.min.array()).any();
 }
 
-/// Cosine by which a direction opposes the vertex: the most of its own normal and those of its faces.
-double opposition(const PairSearch::Side& side, Index v, const Vec3& direction) {
-  double most = -direction.dot(side.frame->vertex_normals[v]);
+/// A point of a surface that is searched for in another: a vertex, or on a ridge.
+struct SurfacePoint {
+  std::array<Index, 2> vertices{kNoIndex, kNoIndex};  // the second of a ridge
+  double share = 1.0;                                 // of the first
+  std::array<Index, 2> name{kNoIndex, kNoIndex};
+  const Index* faces = nullptr;  // around it
+  std::size_t face_count = 0;
+  Vec3 place, velocity, normal;
+
+  bool isVertex() const { return vertices[1] == kNoIndex; }
+};
+
+SurfacePoint vertexOf(const PairSearch::Side& side, Index v) {
   const ContactSurface& s = *side.surface;
-  for (Index k = s.face_offsets[v]; k < s.face_offsets[v + 1]; ++k)
-    most = std::max(most, -direction.dot(side.frame->face_normals[s.faces[k]]));
+  SurfacePoint point;
+  point.vertices[0] = point.name[0] = v;
+  point.faces = s.faces.data() + s.face_offsets[v];
+  point.face_count = s.face_offsets[v + 1] - s.face_offsets[v];
+  point.place = side.frame->vertices[v];
+  point.velocity = side.frame->velocities[v];
+  point.normal = side.frame->vertex_normals[v];
+  return point;
+}
+
+/// The number-th of so many between the ends of a ridge.
+SurfacePoint ridgePoint(const PairSearch::Side& side, Index e, Index number, Index count) {
+  const ContactEdge& edge = side.surface->edges[e];
+  const SurfaceFrame& frame = *side.frame;
+  SurfacePoint point;
+  point.vertices = edge.vertices;
+  point.share = 1.0 - (number + 1.0) / (count + 1.0);
+  point.name = {e, number};
+  point.faces = edge.faces.data();
+  point.face_count = edge.faces[1] == kNoIndex ? 1 : 2;
+  const auto mean = [&](const Points& of) {
+    return Vec3(point.share * of[edge.vertices[0]] + (1.0 - point.share) * of[edge.vertices[1]]);
+  };
+  point.place = mean(frame.vertices);
+  point.velocity = mean(frame.velocities);
+  point.normal = frame.face_normals[edge.faces[0]];
+  if (point.face_count == 2) point.normal = (point.normal + frame.face_normals[edge.faces[1]]).normalized();
+  return point;
+}
+
+/// Cosine by which a direction opposes the point: the most of its own normal and those of its faces.
+double opposition(const SurfaceFrame& frame, const SurfacePoint& point, const Vec3& direction) {
+  double most = -direction.dot(point.normal);
+  for (std::size_t k = 0; k < point.face_count; ++k)
+    most = std::max(most, -direction.dot(frame.face_normals[point.faces[k]]));
   return most;
 }
 
-/// [m] Half the least width: who is deeper is nearer to the other side.
-double deepestIn(const SurfaceFrame& frame) { return 0.5 * (frame.bounds.max - frame.bounds.min).minCoeff(); }
-
-class VertexSearch {
+class PointSearch {
  public:
-  VertexSearch(const PairSearch& search, SearchScratch& scratch)
+  PointSearch(const PairSearch& search, SearchScratch& scratch)
       : search_(search),
         a_(search.a),
         b_(search.b),
         tie_(kTie * search.length),
-        touching_(kTouching * search.length),
         margin_(searchMargin(search.length)),
-        deepest_(deepestIn(*search.b.frame)),
         pairs_(scratch.found.pairs),
         sides_(scratch.found.sides),
-        watched_(scratch.found.watched),
         candidates_(scratch.faces) {}
 
-  /// False where the vertex is out of the other's bounds.
-  bool find(Index v) {
-    if (search_.self == PairSearch::Self::kCuts && !a_.surface->cut_vertices[v]) return false;
-    remembered_ = recall(v);
-    const Vec3& p = a_.frame->vertices[v];
-    const Vec3 end = p + search_.h * a_.frame->velocities[v];
+  /// False where the point is out of the other's bounds.
+  bool find(const SurfacePoint& point) {
+    const bool within = search_.self == PairSearch::Self::kCuts;
+    if (within && !a_.surface->cut_vertices[point.vertices[0]]) return false;
+    remembered_ = point.isVertex() ? recall(point.vertices[0]) : nullptr;
+    const Vec3& p = point.place;
     // A vertex inside is searched for as deep as it was, and a little more.
-    const double deep = remembered_ ? std::min(deepest_, kDeeper * remembered_->depth) : 0.0;
-    if (isOutOf(b_.frame->bounds, p, end, margin_ + deep)) return false;
-    gather(v, p, end, margin_ + deep);
-    if (candidates_.empty() && mayBeginInside() && windingAround(p) > 0) gather(v, p, end, margin_ + deepest_);
+    const double near = margin_ + (remembered_ ? kDeeper * remembered_->depth : 0.0);
+    if (isOutOf(b_.frame->bounds, p, p + search_.h * point.velocity, near)) return false;
+    gather(point, near);
+    if (candidates_.empty() && mayBeginInside() && windingAround(p) > 0) gather(point, b_.frame->bounds.diagonal());
     if (candidates_.empty()) return true;
-    const Candidate& best = chooseNearest(v);
+    const Candidate& best = chooseNearest(point);
     const double distance = signedDistance(best, p);
     made_ = 0;
     if (distance >= -tie_)
-      meetOutside(v, p, best);
+      meetOutside(point, best);
     else if (search_.self == PairSearch::Self::kNo || remembered_)
-      meetInside(v, p, -distance);
+      meetInside(point, -distance);
     return true;
   }
 
@@ -95,19 +128,20 @@ class VertexSearch {
     return at != end && at->vertex == v ? at : nullptr;
   }
 
-  bool mayMeet(Index v, Index face) const {
+  bool mayMeet(const SurfacePoint& point, Index face) const {
     if (search_.self == PairSearch::Self::kNo) return true;
     if (search_.self == PairSearch::Self::kCuts && !b_.surface->cut_faces[face]) return false;
     for (const Index corner : b_.surface->triangles[face])
-      if (corner == v) return false;
-    return b_.frame->face_normals[face].dot(a_.frame->vertex_normals[v]) < -kSelfOpposed;
+      if (corner == point.vertices[0]) return false;
+    return b_.frame->face_normals[face].dot(point.normal) < -kSelfOpposed;
   }
 
-  void gather(Index v, const Vec3& p, const Vec3& end, double within) {
+  void gather(const SurfacePoint& point, double within) {
     candidates_.clear();
-    const Vec3& velocity = a_.frame->velocities[v];
+    const Vec3 &p = point.place, &velocity = point.velocity;
+    const Vec3 end = p + search_.h * velocity;
     b_.surface->tree.query(b_.frame->boxes, boxAround(p, end, within), [&](Index face) {
-      if (!mayMeet(v, face)) return;
+      if (!mayMeet(point, face)) return;
       const Triangle& t = b_.surface->triangles[face];
       const Points &x = b_.frame->vertices, &u = b_.frame->velocities;
       Candidate c;
@@ -126,7 +160,7 @@ class VertexSearch {
     });
   }
 
-  const Candidate& chooseNearest(Index v) const {
+  const Candidate& chooseNearest(const SurfacePoint& point) const {
     const auto first = std::min_element(candidates_.begin(), candidates_.end(),
                                         [](const Candidate& x, const Candidate& y) { return x.distance < y.distance; });
     if (first->distance > tie_) return *first;  // signs hold at the nearest point alone
@@ -134,7 +168,8 @@ class VertexSearch {
     double most = -3.0;
     for (const Candidate& c : candidates_) {
       if (c.distance > tie_) continue;
-      const double opposed = opposition(a_, v, b_.frame->face_normals[c.face]) + (c.corners == 3 ? 1e-6 : 0.0);
+      const double opposed =
+          opposition(*a_.frame, point, b_.frame->face_normals[c.face]) + (c.corners == 3 ? 1e-6 : 0.0);
       if (!(opposed > most)) continue;
       most = opposed;
       best = &c;
@@ -201,33 +236,34 @@ class VertexSearch {
     return lengths > 0.0 ? std::acos(std::clamp(to.dot(other) / lengths, -1.0, 1.0)) : 0.0;
   }
 
-  bool mayPush(Index v, const Vec3& normal) const {
-    return !b_.surface->closed || !a_.surface->closed || opposition(a_, v, normal) > kLeastOpposed;
+  bool mayPush(const SurfacePoint& point, const Vec3& normal) const {
+    return !b_.surface->closed || !a_.surface->closed || opposition(*a_.frame, point, normal) > kLeastOpposed ||
+           (remembered_ && remembered_->normal.dot(normal) > kSameWay);  // turned inside out, but on the side it was
   }
 
-  void meetOutside(Index v, const Vec3& p, const Candidate& best) {
-    watch(v, p, best);
+  void meetOutside(const SurfacePoint& point, const Candidate& best) {
+    const Vec3& p = point.place;
     const Vec3& face_normal = b_.frame->face_normals[best.face];
     if (best.distance <= tie_) {
       Vec3 normal = face_normal;
       if (!b_.surface->closed && remembered_ && remembered_->normal.dot(normal) < 0.0) normal = -normal;
-      if (mayPush(v, normal)) {
-        add(v, best, normal, normal.dot(p - best.point));
+      if (mayPush(point, normal)) {
+        add(point, best, normal, normal.dot(p - best.point));
       }
     } else if (best.distance <= best.reach) {
       const Vec3 normal = (p - best.point) / best.distance;
-      if (mayPush(v, normal)) add(v, best, normal, best.distance);
+      if (mayPush(point, normal)) add(point, best, normal, best.distance);
     }
-    rememberOutside(v, p, best);
+    if (point.isVertex()) rememberOutside(point.vertices[0], p, best);
     if (!b_.surface->closed) return;
     for (const Candidate& c : candidates_) {
       if (made_ == used_.size()) break;
       if (&c == &best || c.corners != 3 || c.distance > c.reach) continue;
       const Vec3& normal = b_.frame->face_normals[c.face];
-      if (normal.dot(p - c.point) < 0.0 || !mayPush(v, normal)) continue;
+      if (normal.dot(p - c.point) < 0.0 || !mayPush(point, normal)) continue;
       if (std::any_of(used_.begin(), used_.begin() + made_, [&](const Vec3& u) { return u.dot(normal) > kSameWay; }))
         continue;
-      add(v, c, normal, c.distance);
+      add(point, c, normal, c.distance);
     }
   }
 
@@ -241,36 +277,20 @@ class VertexSearch {
       sides_.push_back({v, 0.0, remembered_->normal});
   }
 
-  bool wasOutOf(const Vec3& face_normal) const {
-    return remembered_ && !(remembered_->depth > 0.0) && remembered_->normal.dot(face_normal) > kSameWay;
-  }
-
-  // What touches is held by the face that the vertex opposes most, or that it was out of.
-  void watch(Index v, const Vec3& p, const Candidate& best) {
-    for (const Candidate& c : candidates_) {
-      if (c.distance > c.reach) continue;
-      const Triangle& t = b_.surface->triangles[c.face];
-      const Vec3& face_normal = b_.frame->face_normals[c.face];
-      if (c.distance > touching_)
-        watched_.push_back({{v, t[0], t[1], t[2]}, 1, (p - c.point) / c.distance, kLeastLeft * c.distance});
-      else if ((&c == &best && mayPush(v, face_normal)) || wasOutOf(face_normal))
-        watched_.push_back({{v, t[0], t[1], t[2]}, 1, face_normal, -touching_});
-    }
-  }
-
   // Out by the face that is near, that the vertex opposes, and on whose side it was.
-  void meetInside(Index v, const Vec3& p, double depth) {
+  void meetInside(const SurfacePoint& point, double depth) {
+    const Vec3& p = point.place;
     const Candidate* out = nullptr;
     double least = std::numeric_limits<double>::infinity(), gap = 0.0;
     for (const Candidate& c : candidates_) {
       const Vec3& normal = b_.frame->face_normals[c.face];
       const double height = normal.dot(p - c.point);
       if (height > 0.0 || (c.corners != 3 && -height < 0.5 * c.distance)) continue;
-      const double opposed = b_.surface->closed ? opposition(a_, v, normal) : 1.0;
-      if (!(opposed > kLeastOpposed)) continue;
-      double cost = c.distance / (opposed * opposed);
+      const double opposed = b_.surface->closed ? opposition(*a_.frame, point, normal) : 1.0;
+      const double same = remembered_ ? normal.dot(remembered_->normal) : 0.0;
+      if (!(opposed > kLeastOpposed || same > kSameWay)) continue;
+      double cost = c.distance / std::max(kLeastOpposed, opposed * opposed);
       if (remembered_) {
-        const double same = normal.dot(remembered_->normal);
         cost /= kLeastOpposed + std::max(0.0, same) * same;
       }
       if (!(cost < least)) continue;
@@ -280,17 +300,23 @@ class VertexSearch {
     }
     if (!out) return;
     const Vec3& normal = b_.frame->face_normals[out->face];
-    add(v, *out, normal, gap);
-    sides_.push_back({v, depth, normal});
+    add(point, *out, normal, gap);
+    if (point.isVertex()) sides_.push_back({point.vertices[0], depth, normal});
   }
 
-  void add(Index v, const Candidate& c, const Vec3& normal, double gap) {
-    const Triangle& t = b_.surface->triangles[c.face];
+  void add(const SurfacePoint& point, const Candidate& c, const Vec3& normal, double gap) {
     FeaturePair pair;
     pair.order = static_cast<std::uint8_t>(made_);
-    pair.features = {v, kNoIndex};
-    pair.vertices = {v, t[0], t[1], t[2]};
-    pair.shares = {1.0, -c.weights[0], -c.weights[1], -c.weights[2]};
+    pair.features = point.name;
+    pair.of_a = point.isVertex() ? 1 : 2;
+    pair.vertices[0] = point.vertices[0];
+    pair.vertices[1] = point.vertices[1];
+    pair.shares[0] = point.share;
+    pair.shares[1] = 1.0 - point.share;
+    for (int k = 0; k < 3; ++k) {
+      pair.vertices[pair.of_a + k] = b_.surface->triangles[c.face][k];
+      pair.shares[pair.of_a + k] = -c.weights[k];
+    }
     pair.normal = normal;
     pair.gap = gap;
     pairs_.push_back(pair);
@@ -299,70 +325,14 @@ class VertexSearch {
 
   const PairSearch& search_;
   const PairSearch::Side a_, b_;
-  const double tie_, touching_, margin_, deepest_;
+  const double tie_, margin_;
   std::vector<FeaturePair>& pairs_;
   std::vector<RememberedSide>& sides_;
-  std::vector<WatchedFeatures>& watched_;
   std::vector<Candidate>& candidates_;
   const RememberedSide* remembered_ = nullptr;
   std::size_t made_ = 0;
   std::array<Vec3, 3> used_;
 };
-
-// Ericson 2005, Real-Time Collision Detection, sec. 5.1.9.
-Vec3 betweenSegments(const Vec3& p, const Vec3& p_end, const Vec3& q, const Vec3& q_end, double& s, double& t) {
-  const Vec3 u = p_end - p, v = q_end - q, w = p - q;
-  const double a = u.squaredNorm(), e = v.squaredNorm(), f = v.dot(w);
-  s = t = 0.0;
-  if (a > 0.0 && e > 0.0) {
-    const double b = u.dot(v), c = u.dot(w), det = a * e - b * b;
-    s = det > 0.0 ? std::clamp((b * f - c * e) / det, 0.0, 1.0) : 0.0;
-    t = (b * s + f) / e;
-    if (t < 0.0) {
-      t = 0.0;
-      s = std::clamp(-c / a, 0.0, 1.0);
-    } else if (t > 1.0) {
-      t = 1.0;
-      s = std::clamp((b - c) / a, 0.0, 1.0);
-    }
-  } else if (a > 0.0) {
-    s = std::clamp(-u.dot(w) / a, 0.0, 1.0);
-  } else if (e > 0.0) {
-    t = std::clamp(f / e, 0.0, 1.0);
-  }
-  return w + s * u - t * v;
-}
-
-// Both of the arc's ends are as far from its middle: inside is who is nearer.
-bool isInArc(const SurfaceFrame& frame, const ContactEdge& edge, const Vec3& direction) {
-  const Vec3& first = frame.face_normals[edge.faces[0]];
-  if (edge.faces[1] == kNoIndex) return true;
-  const Vec3 middle = (first + frame.face_normals[edge.faces[1]]).normalized();
-  return direction.dot(middle) >= first.dot(middle) - 1e-9;
-}
-
-/// Whether a way from a ridge leads into the solid.
-bool leadsInside(const SurfaceFrame& frame, const ContactEdge& ridge, const Vec3& way) {
-  return ridge.faces[1] != kNoIndex && frame.face_normals[ridge.faces[0]].dot(way) < 0.0 &&
-         frame.face_normals[ridge.faces[1]].dot(way) < 0.0;
-}
-
-// Where they are near enough to meet in the frame. Ridges that have got hooked into each other, with no vertex inside,
-// must be free to come out.
-void watchEdges(const PairSearch& search, const ContactEdge& of_a, const ContactEdge& of_b,
-                std::vector<WatchedFeatures>& watched) {
-  const SurfaceFrame &a = *search.a.frame, &b = *search.b.frame;
-  const std::array<Index, 2>&va = of_a.vertices, &vb = of_b.vertices;
-  const PairDistance apart =
-      distanceOfPair(2, {a.vertices[va[0]], a.vertices[va[1]], b.vertices[vb[0]], b.vertices[vb[1]]});
-  if (apart.distance <= kTouching * search.length) return;
-  if (leadsInside(b, of_b, apart.between) || leadsInside(a, of_a, -apart.between)) return;
-  const auto along = [&apart](const Vec3& velocity) { return apart.between.dot(velocity) / apart.distance; };
-  const double towards = std::max(along(b.velocities[vb[0]]), along(b.velocities[vb[1]])) -
-                         std::min(along(a.velocities[va[0]]), along(a.velocities[va[1]]));
-  if (apart.distance > searchMargin(search.length) + kAhead * search.h * std::max(0.0, towards)) return;
-  watched.push_back({{va[0], va[1], vb[0], vb[1]}, 2, apart.between / apart.distance, kLeastLeft * apart.distance});
-}
 
 // Who is inside as a whole goes out by one face, the nearest to any of its vertices: each by a face of its own, they
 // would go to all sides.
@@ -379,7 +349,7 @@ void leadOut(const PairSearch& search, FoundFeatures& found) {
   for (std::size_t n = 0; n < found.pairs.size(); ++n) {
     FeaturePair& pair = found.pairs[n];
     const Index v = pair.vertices[0];
-    pair.vertices = {v, by.vertices[1], by.vertices[2], by.vertices[3]};
+    pair.vertices = {v, by.vertices[1], by.vertices[2], by.vertices[3], kNoIndex};
     pair.shares = by.shares;
     pair.normal = found.sides[n].normal = by.normal;
     pair.gap = by.normal.dot(search.a.frame->vertices[v] - at);
@@ -388,23 +358,7 @@ void leadOut(const PairSearch& search, FoundFeatures& found) {
 
 }  // namespace
 
-PairDistance distanceOfPair(int of_a, const std::array<Vec3, 4>& corners) {
-  PairDistance nearest;
-  if (of_a == 1) {
-    const Vec3 weights = nearestWeights(corners[0], corners[1], corners[2], corners[3]);
-    nearest.shares = {1.0, -weights[0], -weights[1], -weights[2]};
-    nearest.between = corners[0] - weights[0] * corners[1] - weights[1] * corners[2] - weights[2] * corners[3];
-  } else {
-    double s = 0.0, t = 0.0;
-    nearest.between = betweenSegments(corners[0], corners[1], corners[2], corners[3], s, t);
-    nearest.shares = {1.0 - s, s, t - 1.0, -t};
-  }
-  nearest.distance = nearest.between.norm();
-  return nearest;
-}
-
 double searchMargin(double edge_length) { return kMargin * edge_length; }
-double touchingDistance(double edge_length) { return kTouching * edge_length; }
 
 void findVerticesNear(const PairSearch& search, SearchScratch& scratch) {
   double deepest = 0.0;
@@ -419,7 +373,7 @@ void findVerticesNear(const PairSearch& search, SearchScratch& scratch) {
   }
   scratch.near.assign(a.vertices(), 0);
   a.tree.queryTree(search.a.frame->boxes, search.b.surface->tree, search.b.frame->boxes,
-                   searchMargin(search.length) + std::min(deepest, deepestIn(*search.b.frame)), scratch.query,
+                   searchMargin(search.length) + deepest, scratch.query,
                    [&](Index face) {
                      for (const Index v : a.triangles[face]) scratch.near[v] = 1;
                    });
@@ -427,142 +381,62 @@ void findVerticesNear(const PairSearch& search, SearchScratch& scratch) {
     if (scratch.near[v]) scratch.vertices.push_back(v);
 }
 
-std::size_t findVertexFace(const PairSearch& search, SearchScratch& scratch) {
-  VertexSearch each(search, scratch);
-  std::size_t queried = 0;
-  for (const Index v : scratch.vertices) queried += each.find(v);
-  if (search.self == PairSearch::Self::kNo && scratch.vertices.size() == search.a.surface->vertices())
-    leadOut(search, scratch.found);
-  return queried;
-}
-
 namespace {
 
-/// visit: each edge of a ridge of `of` and what is near of `other`, but valleys.
-template <class Visit>
-void eachEdgeNear(const PairSearch::Side& of, const PairSearch::Side& other, double h, double margin,
-                  const Visit& visit) {
-  const SurfaceFrame& frame = *of.frame;
-  for (const Index e : frame.ridges) {
-    Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
-    for (const Index v : of.surface->edges[e].vertices) {
-      const Vec3 &p = frame.vertices[v], q = p + h * frame.velocities[v];
-      low = low.cwiseMin(p).cwiseMin(q);
-      high = high.cwiseMax(p).cwiseMax(q);
+/// The part of a way from p to q that is in a box, from .. to of 0 .. 1.
+bool clip(const Box& box, const Vec3& p, const Vec3& q, double& from, double& to) {
+  from = 0.0;
+  to = 1.0;
+  for (int k = 0; k < 3; ++k) {
+    const double way = q[k] - p[k];
+    if (way == 0.0) {
+      if (p[k] < box.min[k] || p[k] > box.max[k]) return false;
+      continue;
     }
-    if (isOutOf(other.frame->bounds, low, high, margin)) continue;
-    const FloatBox box = boxAround(low, high, margin);
-    other.surface->tree.query(other.frame->boxes, box, [&](Index face) {
-      for (const Index near : other.surface->face_edges[face]) {
-        const ContactEdge& edge = other.surface->edges[near];
-        if (other.frame->shapes[near] == EdgeShape::kValley || edge.faces[0] != face) continue;
-        FloatBox swept = other.frame->swept[edge.vertices[0]];
-        swept.extend(other.frame->swept[edge.vertices[1]]);
-        if (swept.overlaps(box)) visit(e, near);
-      }
-    });
+    double enter = (box.min[k] - p[k]) / way, leave = (box.max[k] - p[k]) / way;
+    if (enter > leave) std::swap(enter, leave);
+    from = std::max(from, enter);
+    to = std::min(to, leave);
   }
+  return from <= to;
 }
 
-/// Where their common normal is between the normals of both; false where it is not.
-bool meetRidges(const PairSearch& search, Index e, Index other, FoundFeatures& found) {
-  const SurfaceFrame &a = *search.a.frame, &b = *search.b.frame;
-  const ContactEdge &of_a = search.a.surface->edges[e], &of_b = search.b.surface->edges[other];
-  const Vec3 &a0 = a.vertices[of_a.vertices[0]], &a1 = a.vertices[of_a.vertices[1]];
-  const Vec3 &b0 = b.vertices[of_b.vertices[0]], &b1 = b.vertices[of_b.vertices[1]];
-  const Vec3 along_a = a1 - a0, along_b = b1 - b0, between = a0 - b0;
-  Vec3 normal = along_a.cross(along_b);
-  const double sine = normal.norm();
-  if (!(sine > kParallel * along_a.norm() * along_b.norm())) return false;
-  normal /= sine;
-  Vec3 outwards = b.face_normals[of_b.faces[0]];
-  if (of_b.faces[1] != kNoIndex) outwards += b.face_normals[of_b.faces[1]];
-  if (normal.dot(outwards) < 0.0) normal = -normal;
-  if (!isInArc(b, of_b, normal) || !isInArc(a, of_a, -normal)) return false;
-  // Where they are nearest to each other.
-  const double aa = along_a.squaredNorm(), ab = along_a.dot(along_b), bb = along_b.squaredNorm();
-  const double da = along_a.dot(between), db = along_b.dot(between), det = aa * bb - ab * ab;
-  const double s = (ab * db - bb * da) / det, t = (aa * db - ab * da) / det;
-  if (!(s > kEnd && s < 1.0 - kEnd && t > kEnd && t < 1.0 - kEnd)) return false;
-  const double gap = normal.dot(between + s * along_a - t * along_b);
-  const Vec3 velocity = (1.0 - s) * a.velocities[of_a.vertices[0]] + s * a.velocities[of_a.vertices[1]] -
-                        (1.0 - t) * b.velocities[of_b.vertices[0]] - t * b.velocities[of_b.vertices[1]];
-  if (gap > searchMargin(search.length) + kAhead * search.h * std::max(0.0, -normal.dot(velocity)) ||
-      gap < -kDeepestEdges * search.length)
-    return false;
-  FeaturePair pair;
-  pair.kind = FeaturePair::Kind::kEdgeEdge;
-  pair.of_a = pair.of_b = 2;
-  pair.features = {e, other};
-  pair.vertices = {of_a.vertices[0], of_a.vertices[1], of_b.vertices[0], of_b.vertices[1]};
-  pair.shares = {1.0 - s, s, t - 1.0, -t};
-  pair.normal = normal;
-  pair.gap = gap;
-  found.pairs.push_back(pair);
-  return true;
-}
-
-double lengthOf(const PairSearch::Side& side, Index edge) {
-  const std::array<Index, 2>& v = side.surface->edges[edge].vertices;
-  return (side.frame->vertices[v[1]] - side.frame->vertices[v[0]]).norm();
-}
-
-/// A ridge longer than the edges that it lies on: between its ends the tissue has nothing else to lie on. The normal is
-/// that of the flat side. False where they do not meet.
-bool meetLongRidge(const PairSearch& search, bool ridge_of_a, Index ridge, Index flat, FoundFeatures& found) {
-  const PairSearch::Side &long_side = ridge_of_a ? search.a : search.b, &flat_side = ridge_of_a ? search.b : search.a;
-  if (!(lengthOf(long_side, ridge) > kLongRidge * search.length)) return false;
-  const ContactEdge &of_ridge = long_side.surface->edges[ridge], &of_flat = flat_side.surface->edges[flat];
-  const std::array<Index, 2>&v = of_ridge.vertices, &w = of_flat.vertices;
-  const Points &x = long_side.frame->vertices, &y = flat_side.frame->vertices;
-  Vec3 out = flat_side.frame->face_normals[of_flat.faces[0]];
-  if (of_flat.faces[1] != kNoIndex) out = (out + flat_side.frame->face_normals[of_flat.faces[1]]).normalized();
-  const Vec3 along = (x[v[1]] - x[v[0]]).normalized(), towards = -(out - along.dot(out) * along).normalized();
-  if (towards.isZero(0.0) || !isInArc(*long_side.frame, of_ridge, towards)) return false;
-  double s = 0.0, t = 0.0;
-  const Vec3 between = betweenSegments(x[v[0]], x[v[1]], y[w[0]], y[w[1]], s, t);
-  if (!(s > kEnd && s < 1.0 - kEnd && t > kEnd && t < 1.0 - kEnd)) return false;
-  const double gap = out.dot(between), margin = searchMargin(search.length);
-  if ((between - gap * out).norm() > margin + 0.5 * std::abs(gap)) return false;  // beside each other
-  const Points &of_x = long_side.frame->velocities, &of_y = flat_side.frame->velocities;
-  const Vec3 velocity = (1.0 - s) * of_x[v[0]] + s * of_x[v[1]] - (1.0 - t) * of_y[w[0]] - t * of_y[w[1]];
-  if (gap > margin + kAhead * search.h * std::max(0.0, -out.dot(velocity)) || gap < -kDeepestEdges * search.length)
-    return false;
-  FeaturePair pair;
-  pair.kind = FeaturePair::Kind::kEdgeEdge;
-  pair.of_a = pair.of_b = 2;
-  pair.gap = gap;
-  if (ridge_of_a) {
-    pair.features = {ridge, flat};
-    pair.vertices = {v[0], v[1], w[0], w[1]};
-    pair.shares = {1.0 - s, s, t - 1.0, -t};
-    pair.normal = out;
-  } else {
-    pair.features = {flat, ridge};
-    pair.vertices = {w[0], w[1], v[0], v[1]};
-    pair.shares = {1.0 - t, t, s - 1.0, -s};
-    pair.normal = -out;
+/// Between the ends of a long ridge nothing but points on it meets what it crosses.
+template <class Visit>
+void eachRidgePoint(const PairSearch& search, const SearchScratch& scratch, const Visit& visit) {
+  const SurfaceFrame& frame = *search.a.frame;
+  Box reach = search.b.frame->bounds;  // swept
+  const double by = searchMargin(search.length);
+  reach.min.array() -= by;
+  reach.max.array() += by;
+  for (const Index e : frame.ridges) {
+    const ContactEdge& edge = search.a.surface->edges[e];
+    const Index count = static_cast<Index>(std::min(edge.length / search.spacing + 1e-6, kMostRidgePoints));
+    if (count == 0) continue;
+    if (!search.first && !(scratch.near[edge.vertices[0]] && scratch.near[edge.vertices[1]])) continue;
+    Box around = reach;
+    for (const Index v : edge.vertices) {  // as far as its ends go
+      const Vec3 way = search.h * frame.velocities[v];
+      around.min = around.min.cwiseMin(reach.min - way);
+      around.max = around.max.cwiseMax(reach.max - way);
+    }
+    double from, to;
+    if (!clip(around, frame.vertices[edge.vertices[0]], frame.vertices[edge.vertices[1]], from, to)) continue;
+    const Index first = static_cast<Index>(std::max(0.0, std::ceil(from * (count + 1.0)) - 1.0));
+    for (Index n = first; n < count && n + 1.0 <= to * (count + 1.0); ++n) visit(ridgePoint(search.a, e, n, count));
   }
-  found.pairs.push_back(pair);
-  return true;
 }
 
 }  // namespace
 
-void findEdgeEdge(const PairSearch& search, FoundFeatures& found) {
-  const double margin = searchMargin(search.length);
-  const std::vector<ContactEdge>&edges_a = search.a.surface->edges, &edges_b = search.b.surface->edges;
-  eachEdgeNear(search.a, search.b, search.h, margin, [&](Index e, Index near) {
-    watchEdges(search, edges_a[e], edges_b[near], found.watched);
-    const bool ridges = search.b.frame->shapes[near] == EdgeShape::kRidge;
-    if (ridges && meetRidges(search, e, near, found)) return;
-    if (!meetLongRidge(search, true, e, near, found) && ridges) meetLongRidge(search, false, near, e, found);
-  });
-  eachEdgeNear(search.b, search.a, search.h, margin, [&](Index e, Index near) {
-    if (search.a.frame->shapes[near] != EdgeShape::kFlat) return;
-    watchEdges(search, edges_a[near], edges_b[e], found.watched);
-    meetLongRidge(search, false, e, near, found);
-  });
+std::size_t findVertexFace(const PairSearch& search, SearchScratch& scratch) {
+  PointSearch each(search, scratch);
+  std::size_t queried = 0;
+  for (const Index v : scratch.vertices) queried += each.find(vertexOf(search.a, v));
+  if (search.self != PairSearch::Self::kNo) return queried;
+  if (scratch.vertices.size() == search.a.surface->vertices()) leadOut(search, scratch.found);
+  eachRidgePoint(search, scratch, [&](const SurfacePoint& point) { queried += each.find(point); });
+  return queried;
 }
 
 void findPlane(const PairSearch& search, double height, std::vector<FeaturePair>& pairs) {
@@ -575,8 +449,9 @@ void findPlane(const PairSearch& search, double height, std::vector<FeaturePair>
     pair.kind = FeaturePair::Kind::kPlane;
     pair.of_b = 0;
     pair.features = {v, kNoIndex};
-    pair.vertices = {v, kNoIndex, kNoIndex, kNoIndex};
-    pair.shares = {1.0, 0.0, 0.0, 0.0};
+    pair.vertices.fill(kNoIndex);
+    pair.vertices[0] = v;
+    pair.shares[0] = 1.0;
     pair.gap = gap;
     pairs.push_back(pair);
   }

@@ -6,11 +6,9 @@
 namespace meshless {
 namespace {
 
-constexpr double kOutTime = 0.03;    // [s] in which an overlap falls to 1/e
-constexpr double kOutSpeed = 0.5;    // [1/s] mean edges: overlap is removed no faster
-constexpr double kSoft = 0.9;        // of what a row asks for, it gets: rows that want the opposite meet in the middle
-constexpr int kMostSweeps = 4;       // of a substep
-constexpr double kTolerance = 1e-3;  // mean edges: sweeps end where no row was corrected by more
+constexpr double kOutTime = 0.03;  // [s] in which an overlap falls to 1/e
+constexpr double kOutSpeed = 0.5;  // [1/s] mean edges: overlap is removed no faster
+constexpr double kSlop = 0.01;     // mean edges of overlap that stay: stacks that are lifted out of it sway
 
 // Two registers of any x86-64; what is wider goes through memory where it is not there.
 using Two = double __attribute__((vector_size(16), may_alias));
@@ -99,7 +97,7 @@ class Solver {
     return false;
   }
 
-  void activate(ContactRow& row, const RowEntry* entries, Index a, Index b, const Vec3& way, double h) {
+  void activate(ContactRow& row, const RowEntry* entries, Index a, Index b, const Vec3& way, const SolverStep& step) {
     Active active;
     // Friction is about the motion relative to what moves.
     if (!meet(row, entries, a, b, sum(row, entries, a, b, true) + way, active)) {
@@ -108,44 +106,39 @@ class Solver {
     }
     const double gap = row.normal.dot(active.start) + row.constant;
     active.target = std::min(gap, 0.0);
-    if (row.bounce > 0.0) active.target = gap + row.bounce * h;
+    const double approach = gap - row.normal.dot(sum(row, entries, a, b, false)) - row.constant;  // [m] in the substep
+    if (row.restitution > 0.0 && approach > std::max(gap, step.h * step.slow))
+      active.target = gap + row.restitution * approach;
     scratch_.active.push_back(active);
   }
 
-  /// Takes a part of what overlaps away, at the start of the substep as at its end: that gives no speed, and where two
-  /// overlaps push against each other nothing builds up.
-  void letOut(ContactRow& row, const RowEntry* entries, Index a, Index b, const Vec3& way, double h) {
-    Active active;
+  /// Takes a part of what overlaps away, at the start of the substep as at its end: that gives no speed. once: [s] since
+  /// it was done last.
+  void letOut(ContactRow& row, const RowEntry* entries, Index a, Index b, const Vec3& way, double once) {
     const Vec3 start = sum(row, entries, a, b, true);
-    const double gap = row.normal.dot(start + way) + row.constant;
-    if (!(gap < 0.0) || row.bounce > 0.0) return;
-    const double out = h * std::min(-gap / kOutTime, kOutSpeed * bodies_[a].edge_length);
-    if (row.normal.dot(sum(row, entries, a, b, false)) + row.constant >= gap + out) return;  // they part
-    if (!meet(row, entries, a, b, start, active)) return;
-    active.target = row.normal.dot(start) + row.constant + out;
-    active.pressed = 0.0;
+    const double edge = edgeOf(a, b), deep = -kSlop * edge - row.normal.dot(start + way) - row.constant;
+    Active active;
+    if (!(deep > 0.0) || !meet(row, entries, a, b, start, active)) return;
+    active.target = row.normal.dot(start) + row.constant + once * std::min(deep / kOutTime, kOutSpeed * edge);
     scratch_.active.push_back(active);
   }
 
   bool anyOut() const { return !scratch_.active.empty(); }
 
-  void letOut(bool backwards) {
-    std::vector<Active>& rows = scratch_.active;
-    for (int sweep = 0; sweep < kMostSweeps; ++sweep)
-      for (std::size_t n = 0; n < rows.size(); ++n) {
-        Active& active = rows[(sweep % 2 == 1) != backwards ? rows.size() - 1 - n : n];
-        const ContactRow& row = *active.row;
-        const Vec3 start = sum(row, active.entries, active.a, active.b, true) + moved(active);
-        const double lacking = active.target - row.normal.dot(start) - row.constant, before = active.pressed;
-        active.pressed = std::max(0.0, kSoft * (before + active.mass * lacking));
-        const Vec3 more = (active.pressed - before) * row.normal;
-        push(active, more);
-        pushSide(active.entries, row.begin, row.middle, bodies_[active.a], bodies_[active.a].before, more);
-        if (active.b != kNoIndex)
-          pushSide(active.entries, row.middle, row.end, bodies_[active.b], bodies_[active.b].before, more);
-      }
+  void letOut() {
+    for (const Active& active : scratch_.active) {
+      const ContactRow& row = *active.row;
+      const Vec3 start = sum(row, active.entries, active.a, active.b, true) + moved(active);
+      const double lacking = active.target - row.normal.dot(start) - row.constant;
+      if (!(lacking > 0.0)) continue;
+      const Vec3 more = active.mass * lacking * row.normal;
+      push(active, more);
+      pushSide(active.entries, row.begin, row.middle, bodies_[active.a], bodies_[active.a].before, more);
+      if (active.b != kNoIndex)
+        pushSide(active.entries, row.middle, row.end, bodies_[active.b], bodies_[active.b].before, more);
+    }
     moveGroups(true);
-    rows.clear();
+    scratch_.active.clear();
     scratch_.levers.clear();
   }
 
@@ -161,31 +154,33 @@ class Solver {
   /// The last impulse, as far as it presses along the normal of now.
   void warmStart(const Active& active, double share) {
     ContactRow& row = *active.row;
-    if (row.bounce > 0.0 || !(row.normal.dot(row.impulse) > 0.0))
+    if (active.target > 0.0 || !(row.normal.dot(row.impulse) > 0.0))
       row.impulse.setZero();
     else
       row.impulse *= share;
     if (!row.impulse.isZero(0.0)) push(active, row.impulse);
   }
 
-  /// Returns by how much the gap was corrected, in mean edges.
-  double visit(const Active& active) {
+  /// rubs: with friction, which is about what all rows have pressed before.
+  void visit(const Active& active, bool rubs) {
     ContactRow& row = *active.row;
     const Vec3 now = sumNow(active);
     const double gap = row.normal.dot(now) + row.constant, pressed = row.normal.dot(row.impulse);
     // Nobody who is not dragged goes farther than an edge in a substep: more than that is not asked for at once.
-    const double lacking = std::min(active.target - gap, bodies_[active.a].edge_length);
+    const double lacking = std::min(active.target - gap, edgeOf(active.a, active.b));
     const double press = std::max(0.0, pressed + active.mass * lacking);
-    Vec3 slid = now - active.start;
-    slid -= row.normal.dot(slid) * row.normal;
-    Vec3 across = row.impulse - pressed * row.normal - slid / active.sideways;
-    const double most = row.friction * press, squared = across.squaredNorm();
-    if (squared > most * most) across *= most / std::sqrt(squared);
+    Vec3 across = row.impulse - pressed * row.normal;
+    if (rubs) {
+      Vec3 slid = now - active.start;
+      slid -= row.normal.dot(slid) * row.normal;
+      across -= slid / active.sideways;
+      const double most = row.friction * press, squared = across.squaredNorm();
+      if (squared > most * most) across *= most / std::sqrt(squared);
+    }
     const Vec3 impulse = press * row.normal + across;
     const Vec3 more = impulse - row.impulse;
     row.impulse = impulse;
     if (!more.isZero(0.0)) push(active, more);
-    return std::abs(press - pressed) / active.mass / bodies_[active.a].edge_length;
   }
 
   void activate(const SpringRow& spring) {
@@ -241,6 +236,10 @@ class Solver {
   }
 
  private:
+  double edgeOf(Index a, Index b) const {
+    return b == kNoIndex ? bodies_[a].edge_length : std::min(bodies_[a].edge_length, bodies_[b].edge_length);
+  }
+
   void addOwnAnswer(const RowEntry* entries, Index begin, Index end, Index number, double& answer,
                     double& farthest) const {
     const SolverBody& body = bodies_[number];
@@ -366,24 +365,22 @@ void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& spri
         if (distance > 0.0) row.normal = from / distance;
         row.constant = row.rise - row.normal.dot(step.sphere_to) - step.sphere_radius;
       }
-      solver.letOut(row, entries, rows.a, rows.b, wayOf(row), step.h);
+      if (step.number == 0) solver.letOut(row, entries, rows.a, rows.b, wayOf(row), step.frame);
     }
   }
-  if (!free.empty() && solver.anyOut()) {  // what is moved sideways takes angular momentum along
+  if (solver.anyOut()) {  // what is moved sideways takes angular momentum along
     for (const Index b : free)
       for (Index i = 0; i < bodies[b].particles; ++i) bodies[b].leaked -= angularMomentum(bodies[b], i);
-    solver.letOut(step.number % 2 == 1);
+    solver.letOut();
     for (const Index b : free)
       for (Index i = 0; i < bodies[b].particles; ++i) bodies[b].leaked += angularMomentum(bodies[b], i);
-  } else {
-    solver.letOut(step.number % 2 == 1);
   }
   for (const SolverRows& rows : sets) {
     const RowEntry* const entries = rows.set->entries.data();
     for (ContactRow& row : rows.set->rows)
       if (!row.impulse.isZero(0.0) ||
           !(row.normal.dot(solver.sum(row, entries, rows.a, rows.b, false)) + row.constant > 0.0))
-        solver.activate(row, entries, rows.a, rows.b, wayOf(row), step.h);
+        solver.activate(row, entries, rows.a, rows.b, wayOf(row), step);
   }
   for (const SpringRow& spring : springs) solver.activate(spring);
   counters.active += scratch.active.size();
@@ -391,15 +388,11 @@ void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& spri
     counters.ground += active.row->kind == FeaturePair::Kind::kPlane;
     solver.warmStart(active, step.warm);
   }
-  for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
-    const std::size_t count = scratch.active.size();
-    double worst = 0.0;
-    for (std::size_t n = 0; n < springs.size(); ++n)
-      solver.visit(springs[n], scratch.pulls[n], step.h);  // contacts have the last word
-    for (std::size_t n = 0; n < count; ++n)
-      worst = std::max(worst, solver.visit(scratch.active[sweep % 2 ? count - 1 - n : n]));
-    if (sweep > 0 && !(worst > kTolerance)) break;
-  }
+  // Contacts have the last word. Always in the same order: in turns, what the last impulses leave over changes from
+  // substep to substep, and stacks of stiff bodies sway. All press before any rubs: who lands flat is not kicked aside.
+  for (std::size_t n = 0; n < springs.size(); ++n) solver.visit(springs[n], scratch.pulls[n], step.h);
+  for (const bool rubs : {false, true})
+    for (const auto& active : scratch.active) solver.visit(active, rubs);
   solver.moveGroups(springs);
   if (free.empty()) return;
   for (const auto& active : scratch.active) {

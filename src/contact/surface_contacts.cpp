@@ -7,7 +7,7 @@
 namespace meshless {
 namespace {
 
-constexpr double kSkin = 0.05;                           // of the mean edge: surfaces rest so far above each other
+constexpr double kSkin = 0.01;                           // of the mean edge: surfaces rest so far above each other
 constexpr double kAhead = 1.2;                           // times the way of a frame: what speeds up is met too
 constexpr std::uint64_t kGroundKey = ~std::uint64_t{0};  // beyond those of bodies and obstacles
 constexpr std::uint64_t kSphereKey = kGroundKey - 1;
@@ -30,12 +30,6 @@ Box grown(const Box& box, double by) {
 double restitutionOf(const Collider& a, const Collider* b) {
   if (!b || b->obstacle) return a.restitution;
   return a.obstacle ? b->restitution : std::sqrt(a.restitution * b->restitution);
-}
-
-/// [m] of the search between two of them, b kNoIndex for what has no mesh.
-double marginOf(const std::vector<Collider>& colliders, Index a, Index b) {
-  return searchMargin(b == kNoIndex ? colliders[a].edge_length
-                                    : std::min(colliders[a].edge_length, colliders[b].edge_length));
 }
 
 // Rows ascend by their names where features do.
@@ -88,15 +82,17 @@ void SurfaceContacts::findPairs(const SurfaceScene& scene, const std::vector<Col
     if (!collider.moves) continue;
     if (scene.ground && boxes_[c].min.z() <= *scene.ground) pairOf(Kind::kGround, colliders, c, kNoIndex, kGroundKey);
     if (sphere && boxes_[c].overlaps(*sphere)) pairOf(Kind::kSphere, colliders, c, kNoIndex, kSphereKey);
-    if (collider.self != PairSearch::Self::kNo) pairOf(Kind::kVertexFace, colliders, c, c, collider.key);
+    if (scene.surfaces && collider.self != PairSearch::Self::kNo) pairOf(Kind::kVertexFace, colliders, c, c, collider.key);
   }
   std::sort(numbers_.begin(), numbers_.end());
+  for (const SurfaceScene::Given& given : scene.given)
+    pairOf(Kind::kGiven, colliders, given.a, given.b, colliders[given.b].key).set = given.set;
+  if (!scene.surfaces) std::fill(active_.begin(), active_.end(), 0);
   for (const auto& [a, b] : broad_phase_.find(boxes_, active_)) {
     if (colliders[a].obstacle && colliders[b].obstacle) continue;
     ++counters.pairs;
     pairOf(Kind::kVertexFace, colliders, a, b, colliders[b].key);
     pairOf(Kind::kVertexFace, colliders, b, a, colliders[a].key);
-    pairOf(Kind::kEdgeEdge, colliders, a, b, colliders[b].key);
   }
   counters.bounds_tested += broad_phase_.tested();
   for (const Pair* pair : pairs_) {
@@ -161,10 +157,8 @@ void SurfaceContacts::findMoved(const SurfaceScene& scene, const std::vector<Col
     const double skin = b ? kSkin * std::min(a.edge_length, b->edge_length) : 0.0;
     double gone = ways[pair->a]->gone - pair->way_a + ways[pair->a]->ahead;
     if (b) gone += ways[pair->b]->gone - pair->way_b + ways[pair->b]->ahead;
-    pair->stale =
-        !pair->found || pair->kind == Kind::kSphere || restitutionOf(a, b) > 0.0 || gone > searchMargin(length) - skin;
-    pair->slack = searchMargin(length) - (pair->stale ? 0.0 : gone);
-    pair->off_a = pair->off_b = 0.0;
+    pair->stale = !pair->found || pair->kind == Kind::kSphere || gone > searchMargin(length) - skin;
+    pair->stale = pair->stale && pair->kind != Kind::kGiven;
     if (!pair->stale) continue;
     pair->way_a = ways[pair->a]->gone;
     if (b) pair->way_b = ways[pair->b]->gone;
@@ -177,12 +171,8 @@ void SurfaceContacts::find(const SurfaceScene& scene, const std::vector<Collider
                            const ForEach& for_each) {
   frames_.resize(colliders.size());
   frame_of_.resize(colliders.size(), 0);
-  framed_.assign(colliders.size(), 0);
-  where_.resize(colliders.size());
-  for (std::size_t c = 0; c < colliders.size(); ++c) where_[c] = colliders[c].positions;
   runEach(for_each, colliders.size(), [&](std::size_t c) {
     const Collider& collider = colliders[c];
-    framed_[c] = moved_[c] || (collider.obstacle && frame_of_[c] == collider.key);
     if (!moved_[c] || (collider.obstacle && frame_of_[c] == collider.key)) return;
     frame_of_[c] = collider.obstacle ? collider.key : 0;
     placeFrame(*collider.surface, collider.vertices, collider.moves ? collider.velocities : nullptr, scene.h,
@@ -192,12 +182,8 @@ void SurfaceContacts::find(const SurfaceScene& scene, const std::vector<Collider
     for (Index v = 0; v < offsets.size(); ++v)
       offsets[v] = frames_[c].vertices[v] - collider.surface->supports.sum(v, collider.positions);
   });
-  const auto isEdges = [this](std::size_t n) { return pairs_[n]->kind == Kind::kEdgeEdge; };
   runEach(for_each, pairs_.size(), [&](std::size_t n) {
-    if (pairs_[n]->stale && !isEdges(n)) findPair(scene, colliders, scene.h, *pairs_[n]);
-  });
-  runEach(for_each, pairs_.size(), [&](std::size_t n) {  // these ask which vertices are inside
-    if (pairs_[n]->stale && isEdges(n)) findPair(scene, colliders, scene.h, *pairs_[n]);
+    if (pairs_[n]->stale) findPair(scene, colliders, *pairs_[n]);
   });
   for (const Pair* pair : pairs_) {
     counters.contacts += pair->set.rows.size();
@@ -208,9 +194,7 @@ void SurfaceContacts::find(const SurfaceScene& scene, const std::vector<Collider
   joinIslands(colliders);
 }
 
-// h [s]: how long its result is to hold.
-void SurfaceContacts::findPair(const SurfaceScene& scene, const std::vector<Collider>& colliders, double h,
-                               Pair& pair) {
+void SurfaceContacts::findPair(const SurfaceScene& scene, const std::vector<Collider>& colliders, Pair& pair) {
   const Collider& a = colliders[pair.a];
   const Collider& b = colliders[pair.b == kNoIndex ? pair.a : pair.b];
   std::unique_ptr<Scratch> scratch;
@@ -227,8 +211,9 @@ void SurfaceContacts::findPair(const SurfaceScene& scene, const std::vector<Coll
   PairSearch search;
   search.a = {a.surface, &frames_[pair.a]};
   search.b = {b.surface, &frames_[pair.b == kNoIndex ? pair.a : pair.b]};
-  search.h = h;
+  search.h = scene.h;
   search.length = std::min(a.edge_length, b.edge_length);
+  search.spacing = std::min(a.spacing, b.spacing);
   if (pair.a == pair.b) search.self = a.self;
   search.remembered = pair.sides.data();
   search.remembered_count = pair.sides.size();
@@ -240,10 +225,7 @@ void SurfaceContacts::findPair(const SurfaceScene& scene, const std::vector<Coll
     case Kind::kSphere:
       findSphere(search, scene.sphere->centre, scene.sphere->radius, scene.sphere->way, found.pairs);
       break;
-    case Kind::kEdgeEdge:
-      findEdgeEdge(search, found);
-      // What is inside must be free to come out.
-      if (isInside(pair.key_a, pair.key_b) || isInside(pair.key_b, pair.key_a)) found.watched.clear();
+    case Kind::kGiven:
       break;
     case Kind::kVertexFace:
       findVerticesNear(search, scratch->search);
@@ -251,17 +233,9 @@ void SurfaceContacts::findPair(const SurfaceScene& scene, const std::vector<Coll
   }
   makeRows(scene, colliders, *scratch, pair);
   pair.sides.assign(found.sides.begin(), found.sides.end());
-  pair.watched.features.assign(found.watched.begin(), found.watched.end());
-  pair.watched.start();
   pair.found = true;
   const std::lock_guard<std::mutex> lock(spare_mutex_);
   spare_.push_back(std::move(scratch));
-}
-
-bool SurfaceContacts::isInside(std::uint64_t key_a, std::uint64_t key_b) const {
-  const auto pair = known_.find({key_a, key_b, Kind::kVertexFace});
-  return pair != known_.end() && std::any_of(pair->second->sides.begin(), pair->second->sides.end(),
-                                             [](const RememberedSide& side) { return side.depth > 0.0; });
 }
 
 void SurfaceContacts::makeRows(const SurfaceScene& scene, const std::vector<Collider>& colliders, Scratch& scratch,
@@ -272,8 +246,8 @@ void SurfaceContacts::makeRows(const SurfaceScene& scene, const std::vector<Coll
   const double friction = std::sqrt(a.friction * other_friction);
   const double restitution = restitutionOf(a, b);
   const double skin = b ? kSkin * std::min(a.edge_length, b->edge_length) : 0.0;
-  RowBody of_a{a.surface, where_[pair.a], frames_[pair.a].vertices.data(), a.inverse_masses}, of_b;
-  if (b) of_b = {b->surface, where_[pair.b], frames_[pair.b].vertices.data(), b->inverse_masses};
+  RowBody of_a{a.surface, a.positions, frames_[pair.a].vertices.data(), a.inverse_masses}, of_b;
+  if (b) of_b = {b->surface, b->positions, frames_[pair.b].vertices.data(), b->inverse_masses};
   const std::vector<ContactRow>& old = scratch.old;
   scratch.old.assign(pair.set.rows.begin(), pair.set.rows.end());
   pair.set.clear();
@@ -281,13 +255,7 @@ void SurfaceContacts::makeRows(const SurfaceScene& scene, const std::vector<Coll
     ContactRow* const row = makeRow(features, of_a, of_b, pair.a == pair.b, skin, pair.set);
     if (!row) continue;
     row->friction = friction;
-    if (!(restitution > 0.0)) continue;
-    double speed = 0.0;  // along the normal
-    for (int k = 0; k < features.of_a + features.of_b; ++k)
-      speed += features.shares[k] *
-               features.normal.dot(frames_[k < features.of_a ? pair.a : pair.b].velocities[features.vertices[k]]);
-    // What gravity gives within a frame is no approach.
-    if (-speed > 2.0 * scene.gravity * scene.h) row->bounce = -speed * restitution;
+    row->restitution = restitution;
   }
   std::sort(pair.set.rows.begin(), pair.set.rows.end(),
             [](const ContactRow& x, const ContactRow& y) { return x.name() < y.name(); });
@@ -329,9 +297,7 @@ void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
   const auto moves = [&](Index c) { return c != kNoIndex && colliders[c].moves; };
   for (const Pair* pair : pairs_) {
     if (!moves(pair->a) || !moves(pair->b)) continue;
-    // Who is fast may be thrown at others within the frame.
-    const bool fast = ways_of_[pair->a]->ahead + ways_of_[pair->b]->ahead > pair->slack;
-    if (!fast && pair->set.rows.empty() && pair->watched.features.empty()) continue;
+    if (pair->set.rows.empty()) continue;
     const Index a = rootOf(root, pair->a), b = rootOf(root, pair->b);
     root[std::max(a, b)] = std::min(a, b);
   }
@@ -340,9 +306,7 @@ void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
     Island& island = islands_.back();
     island.bodies.clear();
     island.free.clear();
-    island.pairs.clear();
     island.rows.clear();
-    island.watched.clear();
     spare_islands_.push_back(std::move(island));
   }
   for (Index c = 0; c < count; ++c) {
@@ -358,38 +322,19 @@ void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
   }
   std::vector<char>& held = island_held_;
   held.assign(islands_.size(), 0);
-  for (Index n = 0; n < pairs_.size(); ++n) {
-    const Pair& pair = *pairs_[n];
-    const Index of = moves(pair.a) ? pair.a : moves(pair.b) ? pair.b : kNoIndex;
-    if (of == kNoIndex) continue;
+  for (Pair* pair : pairs_) {
+    const Index of = moves(pair->a) ? pair->a : pair->b;
+    if (pair->set.rows.empty() || !moves(of)) continue;
     const Index island = number[rootOf(root, of)];
-    if (moves(pair.a) && moves(pair.b) && number[rootOf(root, pair.b)] != island) continue;
-    islands_[island].pairs.push_back(n);
-    if (pair.set.rows.empty() && pair.watched.features.empty()) continue;
-    held[island] = held[island] || !moves(pair.a) || !moves(pair.b);
+    islands_[island].rows.push_back({&pair->set, pair->a, pair->b});
+    held[island] = held[island] || !moves(pair->a) || !moves(pair->b);
   }
   for (std::size_t n = 0; n < islands_.size(); ++n) {
     Island& island = islands_[n];
     bool any_held = held[n];
     for (const Index b : island.bodies) any_held = any_held || colliders[b].held;
     if (!any_held) island.free = island.bodies;
-    listOf(island, colliders);
   }
-}
-
-void SurfaceContacts::listOf(Island& island, const std::vector<Collider>& colliders) {
-  island.rows.clear();
-  island.watched.clear();
-  for (const Index n : island.pairs) {
-    Pair& pair = *pairs_[n];
-    if (!pair.set.rows.empty()) island.rows.push_back({&pair.set, pair.a, pair.b});
-    if (!pair.watched.features.empty())
-      island.watched.push_back(
-          {&pair.watched, pair.a, pair.b,
-           touchingDistance(std::min(colliders[pair.a].edge_length, colliders[pair.b].edge_length)),
-           colliders[pair.b].surface->closed});
-  }
-  listWatched(island);
 }
 
 void SurfaceContacts::fillSlots(const std::vector<Collider>& colliders) {
@@ -399,9 +344,6 @@ void SurfaceContacts::fillSlots(const std::vector<Collider>& colliders) {
   now_.resize(first_slots_[count]);
   before_.resize(first_slots_[count]);
   solver_bodies_.resize(count);
-  limited_.resize(count);
-  searched_.resize(count);
-  turned_.assign(count, 0);
   for (Index c = 0; c < count; ++c) {
     const Collider& collider = colliders[c];
     SolverBody& body = solver_bodies_[c];
@@ -409,7 +351,7 @@ void SurfaceContacts::fillSlots(const std::vector<Collider>& colliders) {
     body.before = before_.data() + first_slots_[c];
     body.particles = needed_[c] ? collider.particles : 0;
     body.moves = collider.moves;
-    body.edge_length = collider.edge_length;
+    body.edge_length = collider.moves ? collider.edge_length : std::numeric_limits<double>::infinity();
     body.groups = nullptr;
     body.rigid_share = 0.0;
     body.motions.clear();
@@ -418,24 +360,6 @@ void SurfaceContacts::fillSlots(const std::vector<Collider>& colliders) {
       body.now[i] = {p.x(), p.y(), p.z(), collider.moves ? collider.inverse_masses[i] : 0.0};
       before_[first_slots_[c] + i] = body.now[i];
     }
-    Way& searched = searched_[c];
-    searched.since = searched.off = searched.was_off = 0.0;
-    if (needed_[c] && collider.moves) {
-      searched.from.assign(collider.positions, collider.positions + collider.particles);
-      searched.speed.assign(collider.velocities, collider.velocities + collider.particles);
-    }
-    const auto way = ways_.find(collider.key);
-    LimitedBody& limited = limited_[c];
-    limited.supports = collider.surface ? &collider.surface->supports : nullptr;
-    limited.offsets = way == ways_.end() || way->second.offsets.empty() ? nullptr : way->second.offsets.data();
-    limited.positions = collider.positions;
-    limited.previous = collider.positions;
-    limited.particles = collider.particles;
-    limited.moves = collider.moves;
-    limited.inverse_masses = collider.inverse_masses;
-    limited.watched.clear();
-    limited.mean_way.setZero();
-    limited.spread = 0.0;
   }
 }
 
@@ -446,168 +370,37 @@ void SurfaceContacts::setRigidShare(Index collider, const RigidGroups* groups, d
   body.motions.assign(groups && share > 0.0 ? groups->size() : 0, GroupMotion());
 }
 
-// Vertices that are watched, each once. What does not move is placed here: several islands may meet it.
-void SurfaceContacts::listWatched(const Island& island) {
-  for (const WatchedPairs& pairs : island.watched) {
-    std::unique_lock<std::mutex> lock(frame_mutex_, std::defer_lock);
-    if (!limited_[pairs.a].moves || !limited_[pairs.b].moves) lock.lock();
-    for (const WatchedFeatures& watched : pairs.set->features)
-      for (std::size_t k = 0; k < 4; ++k) {
-        LimitedBody& body = limited_[k < watched.of_a ? pairs.a : pairs.b];
-        const Index v = watched.vertices[k];
-        if (body.watched.empty()) {
-          body.vertices.resize(body.supports->offsets.size() - 1);
-          body.is_watched.assign(body.vertices.size(), 0);
-          body.edited.assign(body.particles, 0);
-        }
-        if (std::exchange(body.is_watched[v], 1)) continue;
-        body.watched.push_back(v);
-        if (!body.moves) body.vertices[v] = body.vertexAt(v, body.positions);
-      }
-  }
-}
-
-// As its vertices are at the start of the substep, for h [s].
-void SurfaceContacts::placeAgain(const std::vector<Collider>& colliders, Index c, double h) {
-  const Collider& collider = colliders[c];
-  const Vec3* const speed = collider.moves ? searched_[c].speed.data() : nullptr;
-  const Points& offsets = ways_.find(collider.key)->second.offsets;
-  Points vertices(collider.surface->vertices());
-  for (Index v = 0; v < vertices.size(); ++v)
-    vertices[v] = collider.surface->supports.sum(v, where_[c]) + (offsets.empty() ? Vec3(Vec3::Zero()) : offsets[v]);
-  placeFrame(*collider.surface, vertices.data(), speed, h, frames_[c]);
-}
-
-// The search of a frame holds for what goes straight on; contacts and stress turn it. Where two bodies are off their
-// ways by the margin together, they are searched for along their new ways; who is hardly off keeps its own.
-bool SurfaceContacts::findAgain(Island& island, const SurfaceScene& scene, const std::vector<Collider>& colliders,
-                                double since, double h, const ForEach& for_each) {
-  const auto moves = [&](Index c) { return c != kNoIndex && colliders[c].moves; };
-  runEach(for_each, island.bodies.size(), [&](std::size_t n) {
-    const Index b = island.bodies[n];
-    turned_[b] = 0;
-    if (!needed_[b]) return;
-    Way& way = searched_[b];
-    const double along = since + h - way.since;
-    way.away.resize(colliders[b].particles);
-    for (Index i = 0; i < colliders[b].particles; ++i)
-      way.away[i] = limited_[b].positions[i] - way.from[i] - along * way.speed[i];
-    const VertexSupports& supports = colliders[b].surface->supports;
-    double farthest = 0.0;
-    for (Index v = 0; v < colliders[b].surface->vertices(); ++v)
-      farthest = std::max(farthest, supports.sum(v, way.away.data()).squaredNorm());
-    way.was_off = way.off;
-    way.off = std::sqrt(farthest);
-  });
-  const auto offOf = [&](const Pair& pair) {
-    double off = searched_[pair.a].off + pair.off_a;
-    if (pair.b != kNoIndex) off += searched_[pair.b].off + pair.off_b;
-    return off;
-  };
-  bool any = false;
-  for (const Index n : island.pairs) {
-    const Pair& pair = *pairs_[n];
-    if (offOf(pair) <= pair.slack) continue;
-    any = true;
-    const double most = 0.25 * marginOf(colliders, pair.a, pair.b);
-    for (const Index c : {pair.a, pair.b})
-      if (moves(c) && !(searched_[c].off <= most)) turned_[c] = 1;
-  }
-  if (!any) return false;
-  std::vector<Pair*> again;
-  for (const Index n : island.pairs) {
-    Pair& pair = *pairs_[n];
-    const bool turned = turned_[pair.a] || (moves(pair.b) && turned_[pair.b]);
-    if (turned || !(offOf(pair) <= pair.slack)) again.push_back(&pair);
-  }
-  for (std::size_t n = 0; n < island.bodies.size(); ++n) {
-    const Index b = island.bodies[n];
-    where_[b] = limited_[b].previous;
-    if (!turned_[b]) continue;
-    Way& way = searched_[b];
-    way.from.assign(limited_[b].previous, limited_[b].previous + colliders[b].particles);
-    for (Index i = 0; i < colliders[b].particles; ++i)
-      way.speed[i] = (limited_[b].positions[i] - limited_[b].previous[i]) / h;
-    way.since = since;
-    way.off = way.was_off = 0.0;
-  }
-  const double left = scene.h - since;
-  std::vector<Index> places;
-  for (const Pair* pair : again)
-    for (const Index c : {pair->a, pair->b})
-      if (c != kNoIndex) places.push_back(c);
-  std::sort(places.begin(), places.end());
-  places.erase(std::unique(places.begin(), places.end()), places.end());
-  runEach(for_each, places.size(), [&](std::size_t n) {
-    const Index c = places[n];
-    std::unique_lock<std::mutex> lock(frame_mutex_, std::defer_lock);
-    if (!moves(c)) lock.lock();  // other islands meet it too
-    if (!moves(c) && framed_[c]) return;
-    placeAgain(colliders, c, left);
-    framed_[c] = 1;
-  });
-  SurfaceScene now = scene;
-  if (now.sphere) {
-    now.sphere->centre += since / scene.h * scene.sphere->way;
-    now.sphere->way *= left / scene.h;
-  }
-  const auto findAll = [&](bool edges) {
-    runEach(for_each, again.size(), [&](std::size_t n) {
-      Pair& pair = *again[n];
-      if ((pair.kind == Kind::kEdgeEdge) != edges) return;
-      findPair(now, colliders, left, pair);
-      pair.slack = marginOf(colliders, pair.a, pair.b);
-      pair.off_a = searched_[pair.a].was_off;
-      pair.off_b = pair.b == kNoIndex ? 0.0 : searched_[pair.b].was_off;
-    });
-  };
-  findAll(false);
-  findAll(true);
-  for (const Index b : island.bodies) limited_[b].watched.clear();
-  listOf(island, colliders);
-  return true;
-}
-
-void SurfaceContacts::solveIsland(Index island_number, SolverStep step, int number, const SurfaceScene& scene,
+void SurfaceContacts::solveIsland(Index island_number, SolverStep step, int number,
                                   const std::vector<Collider>& colliders, const std::vector<Vec3*>& previous,
-                                  std::vector<SpringRow>& springs, SolverScratch& scratch, LimitScratch& limit_scratch,
-                                  SolverCounters& counters, const ForEach& for_each) {
+                                  std::vector<SpringRow>& springs, SolverScratch& scratch, SolverCounters& counters,
+                                  const ForEach& for_each) {
   Island& island = islands_[island_number];
-  if (island.pairs.empty() && springs.empty()) return;
+  if (island.rows.empty() && springs.empty()) return;
   step.warm = number == 0 ? step.h * step.h : 1.0;
   step.number = number;
+  const auto put = [](const Vec3& from, Slot& to) {
+    to.x = from.x();
+    to.y = from.y();
+    to.z = from.z();
+  };
   runEach(for_each, island.bodies.size(), [&](std::size_t n) {
-    const Index b = island.bodies[n];
-    SolverBody& body = solver_bodies_[b];
-    Slot* const before = before_.data() + first_slots_[b];
-    limited_[b].previous = previous[n];
+    const SolverBody& body = solver_bodies_[island.bodies[n]];
+    const Vec3* const positions = colliders[island.bodies[n]].positions;
     for (Index i = 0; i < body.particles; ++i) {
-      const Vec3 &p = limited_[b].positions[i], &q = previous[n][i];
-      body.now[i].x = p.x();
-      body.now[i].y = p.y();
-      body.now[i].z = p.z();
-      before[i].x = q.x();
-      before[i].y = q.y();
-      before[i].z = q.z();
+      put(positions[i], body.now[i]);
+      put(previous[n][i], body.before[i]);
     }
   });
   static const std::vector<Index> kNone;
   solveRows(island.rows, springs, solver_bodies_, step, springs.empty() ? island.free : kNone, scratch, counters);
   runEach(for_each, island.bodies.size(), [&](std::size_t n) {
-    const Index b = island.bodies[n];
-    const SolverBody& body = solver_bodies_[b];
+    const SolverBody& body = solver_bodies_[island.bodies[n]];
+    Vec3* const positions = colliders[island.bodies[n]].positions;
     const auto placeOf = [](const Slot& slot) { return Vec3(slot.x, slot.y, slot.z); };
-    for (Index i = 0; i < body.particles; ++i) limited_[b].positions[i] = placeOf(body.now[i]);
-    limited_[b].from.clear();
-    for (Index i = 0; i < body.particles; ++i) limited_[b].from.push_back(placeOf(body.before[i]));
-  });
-  counters.found_again += findAgain(island, scene, colliders, number * step.h, step.h, for_each);
-  counters.limited +=
-      limitMotion(island.watched, limited_, island.bodies, !island.free.empty(), limit_scratch, for_each);
-  // Only now: the whole way is limited, but what was let out gains no speed.
-  runEach(for_each, island.bodies.size(), [&](std::size_t n) {
-    const Points& from = limited_[island.bodies[n]].from;
-    std::copy(from.begin(), from.end(), previous[n]);
+    for (Index i = 0; i < body.particles; ++i) {
+      positions[i] = placeOf(body.now[i]);
+      previous[n][i] = placeOf(body.before[i]);
+    }
   });
 }
 
@@ -714,22 +507,17 @@ std::size_t SurfaceContacts::bytes() const {
   constexpr std::size_t kNode = 48;  // of a map, with what the allocator keeps of it
   std::size_t sum = broad_phase_.bytes() +
                     bytesOf(boxes_, active_, needed_, moved_, numbers_, ways_of_, pairs_, spare_) +
-                    bytesOf(frames_, frame_of_, framed_, where_, searched_, turned_, reached_, now_, before_,
-                            first_slots_, solver_bodies_, limited_) +
+                    bytesOf(frames_, frame_of_, reached_, now_, before_, first_slots_, solver_bodies_) +
                     bytesOf(islands_, spare_islands_, root_, island_of_, island_held_);
   for (const SurfaceFrame& frame : frames_) sum += frame.bytes();
-  for (const Way& way : searched_) sum += bytesOf(way.from, way.speed);
   for (const auto& scratch : spare_) sum += sizeof *scratch + scratch->search.bytes() + bytesOf(scratch->old);
   for (const auto& [name, pair] : known_)
-    sum += kNode + sizeof name + sizeof(Pair) + bytesOf(pair->set.rows, pair->set.entries, pair->sides) +
-           pair->watched.bytes();
+    sum += kNode + sizeof name + sizeof(Pair) + bytesOf(pair->set.rows, pair->set.entries, pair->sides);
   for (const auto& [key, way] : ways_) sum += kNode + sizeof way + bytesOf(way.last, way.offsets);
   for (const SolverBody& body : solver_bodies_) sum += bytesOf(body.motions);
-  for (const LimitedBody& body : limited_)
-    sum += bytesOf(body.from, body.watched, body.vertices, body.ways, body.edited, body.is_watched);
   for (const std::vector<Island>* islands : {&islands_, &spare_islands_})
     for (const Island& island : *islands)
-      sum += bytesOf(island.bodies, island.free, island.pairs, island.rows, island.watched);
+      sum += bytesOf(island.bodies, island.free, island.rows);
   return sum;
 }
 

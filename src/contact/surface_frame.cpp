@@ -3,22 +3,21 @@
 namespace meshless {
 namespace {
 
-constexpr double kRidgeCosine =
-    0.98;  // of the angle by which faces turn at a ridge: flatter ones bend less than the skin
+constexpr double kRidgeCosine = 0.98;  // by which faces turn at a ridge: what is flatter bends less than the skin
 
 Vec3 unitOrZero(const Vec3& v) {
   const double length = v.norm();
   return length > 0.0 ? Vec3(v / length) : Vec3(Vec3::Zero());
 }
 
-EdgeShape shapeOf(const ContactSurface& surface, const SurfaceFrame& frame, const ContactEdge& edge) {
-  if (edge.faces[1] == kNoIndex) return EdgeShape::kRidge;
+bool isRidge(const ContactSurface& surface, const SurfaceFrame& frame, const ContactEdge& edge) {
+  if (edge.faces[1] == kNoIndex) return true;
   const Vec3& normal = frame.face_normals[edge.faces[0]];
-  if (normal.dot(frame.face_normals[edge.faces[1]]) > kRidgeCosine) return EdgeShape::kFlat;
+  if (normal.dot(frame.face_normals[edge.faces[1]]) > kRidgeCosine) return false;
   double height = 0.0;  // of the second face over the first
   for (const Index v : surface.triangles[edge.faces[1]])
     height += normal.dot(frame.vertices[v] - frame.vertices[edge.vertices[0]]);
-  return height < 0.0 ? EdgeShape::kRidge : EdgeShape::kValley;
+  return height < 0.0;
 }
 
 }  // namespace
@@ -64,12 +63,9 @@ void placeFrame(const ContactSurface& surface, const Vec3* vertices, const Vec3*
     frame.boxes.items[f] = box;
   }
   surface.tree.refit(frame.boxes);
-  frame.shapes.resize(surface.edges.size());
   frame.ridges.clear();
-  for (Index e = 0; e < surface.edges.size(); ++e) {
-    frame.shapes[e] = shapeOf(surface, frame, surface.edges[e]);
-    if (frame.shapes[e] == EdgeShape::kRidge) frame.ridges.push_back(e);
-  }
+  for (Index e = 0; e < surface.edges.size(); ++e)
+    if (isRidge(surface, frame, surface.edges[e])) frame.ridges.push_back(e);
 }
 
 }  // namespace meshless

@@ -8,7 +8,7 @@ namespace {
 bool isUnit(const Vec3& v) { return std::abs(v.squaredNorm() - 1.0) < 1e-3; }
 
 std::string faultOf(const KeptPair& pair, const SurfaceMemory::Known& a, const SurfaceMemory::Known& b) {
-  if (pair.kind > KeptPair::Kind::kSphere) return "a pair of contact is of no kind that there is";
+  if (pair.kind > KeptPair::Kind::kGiven) return "a pair of contact is of no kind that there is";
   const RowSet& set = pair.set;
   const bool with_itself = pair.key_a == pair.key_b;
   for (const ContactRow& row : set.rows) {
@@ -20,19 +20,12 @@ std::string faultOf(const KeptPair& pair, const SurfaceMemory::Known& a, const S
           !std::isfinite(set.entries[k].coefficient))
         return "a contact names a particle that is not there";
     if (!isUnit(row.normal) || !row.impulse.allFinite() || !std::isfinite(row.constant) || !std::isfinite(row.rise) ||
-        !(row.friction >= 0.0) || !(row.bounce >= 0.0))
+        !(row.friction >= 0.0) || !(row.restitution >= 0.0))
       return "a contact is not finite";
   }
   for (const RememberedSide& side : pair.sides)
     if (side.vertex >= a.vertices || !isUnit(side.normal) || !(side.depth >= 0.0))
       return "contact remembers the side of a vertex that is not there";
-  if (pair.watched.until.size() != pair.watched.features.size()) return "contact watches features that are not there";
-  for (const WatchedFeatures& watched : pair.watched.features) {
-    if (watched.of_a < 1 || watched.of_a > 2) return "contact watches features of no kind that there is";
-    for (std::size_t k = 0; k < 4; ++k)
-      if (watched.vertices[k] >= (k < watched.of_a ? a : b).vertices)
-        return "contact watches a vertex that is not there";
-  }
   return {};
 }
 

@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "cell_table.h"
-#include "meshless_surgery/contact/sphere_and_ground.h"
 #include "penetration_depth.h"
 
 namespace meshless {
@@ -227,41 +226,26 @@ std::vector<Penetration> findPenetrations(const std::vector<ContactBody>& bodies
   return found;
 }
 
-void resolvePenetrations(const std::vector<Penetration>& penetrations, std::vector<ContactBody>& bodies,
-                         double max_correction, ContactCounters& counters) {
-  for (const Penetration& contact : penetrations) {
-    ContactBody &a = bodies[contact.body_a], &b = bodies[contact.body_b];
-    const Tetrahedron& corners = b.mesh->tetrahedra[contact.tetrahedron];
-    Vec3& p = (*a.positions)[contact.particle];
-    const double particle_mobility = (*a.inverse_masses)[contact.particle];
-    Vec3 partner = Vec3::Zero();  // the point of b that the particle was in
-    double mobility = particle_mobility;
-    for (int k = 0; k < 4; ++k) {
-      partner += contact.weights[k] * (*b.positions)[corners[k]];
-      mobility += contact.weights[k] * contact.weights[k] * (*b.inverse_masses)[corners[k]];
-    }
-    if (!(mobility > 0.0)) continue;
-    // The two points were one when the contact was found: what they have moved apart since is done already.
-    const double left = contact.depth - contact.direction.dot(p - partner);
-    const double correction = std::min(left, max_correction);
-    if (!(correction > 0.0) || !std::isfinite(correction)) continue;
-
-    Vec3 shift = correction * contact.direction;
-    if (a.previous && b.previous) {
-      Vec3 partner_before = Vec3::Zero();
-      for (int k = 0; k < 4; ++k) partner_before += contact.weights[k] * (*b.previous)[corners[k]];
-      const Vec3 motion = (p - (*a.previous)[contact.particle]) - (partner - partner_before);
-      const double friction = std::sqrt(std::max(0.0, a.friction) * std::max(0.0, b.friction));
-      shift += frictionCorrection(motion, contact.direction, correction, friction);
-    }
-    if (!shift.allFinite()) continue;
-    // Equal and opposite: the sum of mass times displacement stays zero.
-    const Vec3 impulse = shift / mobility;
-    p += particle_mobility * impulse;
-    for (int k = 0; k < 4; ++k)
-      (*b.positions)[corners[k]] -= (*b.inverse_masses)[corners[k]] * contact.weights[k] * impulse;
-    ++counters.corrected;
+void addRow(const Penetration& penetration, const std::vector<ContactBody>& bodies, double friction, RowSet& set) {
+  if (!(penetration.depth > 0.0) || !penetration.direction.allFinite()) return;
+  const ContactBody &a = bodies[penetration.body_a], &b = bodies[penetration.body_b];
+  const Tetrahedron& corners = b.mesh->tetrahedra[penetration.tetrahedron];
+  ContactRow row;
+  row.features = {penetration.particle, penetration.tetrahedron};
+  row.normal = penetration.direction;
+  row.friction = friction;
+  row.begin = static_cast<Index>(set.entries.size());
+  set.entries.push_back({1.0, penetration.particle});
+  row.middle = row.begin + 1;
+  Vec3 sum = (*a.positions)[penetration.particle];
+  for (int k = 0; k < 4; ++k) {
+    set.entries.push_back({-penetration.weights[k], corners[k]});
+    sum -= penetration.weights[k] * (*b.positions)[corners[k]];
   }
+  row.end = static_cast<Index>(set.entries.size());
+  row.gap = -penetration.depth;
+  row.constant = row.gap - row.normal.dot(sum);
+  set.rows.push_back(row);
 }
 
 }  // namespace meshless

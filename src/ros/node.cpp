@@ -182,6 +182,7 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   auto world = std::make_unique<World>(scene->world);
   std::size_t particles = 0;
   std::size_t clusters = 0;
+  for (const std::string& warning : scene->warnings) ROS_WARN_STREAM(warning);
   const std::size_t bodies = scene->bodies.size();
   std::shared_ptr<const PreparedBody> first;  // of the copies that share its model
   for (BodyDef& def : scene->bodies) {

@@ -16,7 +16,7 @@ namespace meshless {
 namespace {
 
 constexpr std::string_view kMagic = "MLSSTATE";
-constexpr std::uint32_t kVersion = 13;
+constexpr std::uint32_t kVersion = 14;
 constexpr std::uint64_t kMostModels = 1u << 20;
 
 std::uint32_t checksum(std::string_view bytes) {
@@ -87,7 +87,7 @@ template <class Archive, class World>
 void rest(Archive& archive, World& world) {
   archive(world.step, world.batches_current, world.batches, world.generations, world.free_slots, world.next_number,
           world.used_names, world.picks, world.next_pick, world.push, world.scissors, world.closing, world.next_ticket,
-          world.next_sleep_group, world.contacts, world.surface_contacts);
+          world.next_sleep_group, world.surface_contacts);
 }
 
 void checkSlots(const SavedWorld& world) {
@@ -158,16 +158,11 @@ SavedWorldPtr readWorld(InArchive& archive) {
     world->obstacles.push_back(std::make_shared<const ObstacleDef>(std::move(obstacle)));
   }
   rest(archive, *world);
-  archive(world->tetrahedralizations, world->last_substep);
+  archive(world->tetrahedralizations);
   require(archive.left() == 0, std::to_string(archive.left()) + " bytes are left over");
   checkSlots(*world);
   checkBatches(*world);
   checkTools(*world);
-  std::map<std::uint64_t, ContactsMemory::KnownCollider> known;
-  for (const SavedBody& body : world->bodies) known[body.number].triangles = body.model->surface.triangles.size();
-  for (std::size_t i = 0; i < world->obstacles.size(); ++i)
-    known[kObstacleKey + i].triangles = world->obstacles[i]->mesh.triangles.size();
-  requireNone(world->contacts.fault(known));
   std::map<std::uint64_t, SurfaceMemory::Known> colliders;
   for (const SavedBody& body : world->bodies) {
     const BodyModel& model = *body.model;
@@ -410,7 +405,7 @@ std::string encode(const SavedWorld& world, const std::string& origin) {
   archive(static_cast<std::uint64_t>(world.obstacles.size()));
   for (const auto& obstacle : world.obstacles) archive(*obstacle);
   rest(archive, world);
-  archive(world.tetrahedralizations, world.last_substep);
+  archive(world.tetrahedralizations);
 
   std::string header;
   OutArchive head(header);
@@ -487,8 +482,6 @@ std::shared_ptr<const SavedWorld> World::capture() const {
   saved->next_ticket = w.next_ticket;
   saved->tetrahedralizations = w.tetrahedralizations;
   saved->next_sleep_group = w.next_sleep_group;
-  saved->last_substep = w.last_substep;
-  saved->contacts = w.contacts.memory();
   saved->surface_contacts = w.surface_contacts.memory();
   return saved;
 }
@@ -503,7 +496,6 @@ void World::restore(const SavedWorld& saved) {
     w.finished.emplace(c.ticket, Error{ErrorCode::kFailed, "another state was loaded before the blades met"});
   w.batches.clear();
   w.bodies.clear();
-  w.contact_models.clear();
   for (const SavedBody& from : saved.bodies) {
     auto body = std::make_unique<WorldBody>();
     body->id = from.id;
@@ -543,16 +535,12 @@ void World::restore(const SavedWorld& saved) {
   w.next_ticket = saved.next_ticket;
   w.tetrahedralizations = saved.tetrahedralizations;
   w.next_sleep_group = saved.next_sleep_group;
-  w.last_substep = saved.last_substep;
   w.step = saved.step;
   w.undo.clear();
   w.report = StepReport();
   w.awake.clear();
   w.loaded.clear();
-  w.shape_colliders.clear();
   w.contacts_current = false;
-  w.meetings.clear();
-  w.contacts.recall(saved.contacts);
   w.surface_contacts.recall(saved.surface_contacts);
   ++w.run;
   w.say(EventType::kLoaded, "", 0, "a saved state was loaded");
@@ -611,7 +599,7 @@ std::uint64_t World::stateHash() const {
     cut.ticket = 0;
     archive(cut);
   }
-  archive(saved->next_sleep_group, saved->contacts, surfaces);
+  archive(saved->next_sleep_group, surfaces);
   return archive.hash();
 }
 

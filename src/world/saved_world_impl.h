@@ -3,7 +3,6 @@
 #pragma once
 
 #include "meshless_surgery/base/archive.h"
-#include "meshless_surgery/contact/contacts_memory.h"
 #include "meshless_surgery/geometry/cell_regions.h"
 #include "meshless_surgery/world/saved_world.h"
 #include "world_impl.h"
@@ -47,8 +46,6 @@ struct SavedWorld {
   std::uint32_t next_ticket = 1;
   std::uint64_t tetrahedralizations = 0;
   std::uint32_t next_sleep_group = 1;
-  double last_substep = 0.0;
-  ContactsMemory contacts;
   SurfaceMemory surface_contacts;
 };
 
@@ -108,7 +105,7 @@ template <class A>
 void serialize(A& archive, WorldSettings& v) {
   auto& [gravity, ground, ground_friction, step_rate, substeps, max_substeps, contact, threads, sleep,
          pick_max_distance, pick_stiffness, pick_radius, push_radius] = v;
-  archive(gravity, ground, ground_friction, step_rate, substeps, max_substeps, choice(contact, ContactMethod::kAuto),
+  archive(gravity, ground, ground_friction, step_rate, substeps, max_substeps, choice(contact, ContactMethod::kSurface),
           threads, sleep, pick_max_distance, pick_stiffness, pick_radius, push_radius);
 }
 

@@ -237,8 +237,6 @@ void World::reset() {
   while (!w.bodies.empty()) w.retire(w.bodies.back()->id);
   w.used_names.clear();
   w.picks.clear();
-  w.meetings.clear();
-  w.contacts.clear();
   w.surface_contacts.clear();
   w.next_sleep_group = 1;
   w.undo.clear();
@@ -276,15 +274,10 @@ WorldSnapshot World::snapshot(const SnapshotWants& wants) {
     shot.bodies.push_back(std::move(b));
   }
   for (const auto& obstacle : w.obstacles) shot.obstacles.push_back(obstacle->def);
-  if (wants.contacts && w.contacts_current && w.contactMethod() == ContactMethod::kSurface) {
+  if (wants.contacts && w.contacts_current) {
     std::vector<SurfaceContacts::Point> points;
     w.surface_contacts.points(w.colliders, points);
     for (const SurfaceContacts::Point& p : points) shot.contacts.push_back({p.position, p.normal, p.force});
-  } else if (wants.contacts && w.contacts_current) {
-    std::vector<Contacts::Point> points;
-    w.contacts.points(w.shape_colliders, points);
-    for (const Contacts::Point& p : points)
-      shot.contacts.push_back({p.position, p.normal, p.impulse / (w.last_substep * w.last_substep)});
   }
   shot.picks = w.picks;
   for (const Pick& pick : w.picks)

@@ -8,6 +8,7 @@
 namespace meshless {
 namespace {
 
+constexpr std::size_t kLanes = 64;           // side by side
 constexpr std::size_t kLeastBodies = 32;     // fewer are not worth going there and back
 constexpr std::size_t kMostParticles = 256;  // larger ones fill the lanes by themselves
 constexpr double kMostUneven = 1e4;  // longest over shortest axis of the rest shape, squared: float fits no more
@@ -37,15 +38,11 @@ bool alike(const WorldBody& a, const WorldBody& b) {
 }  // namespace
 
 // What is drawn out or thrown apart without measure is left to double: rounding to float would make it spin, and it
-// would never be whole again. With contact bounds and spread are those of the frame's start, else they are found here.
-bool fitsFloat(WorldBody& body, bool bounds_known, double h) {
-  if (!bounds_known) {
-    body.bounds = extentOf(body.state.positions);
-    const Box velocities = extentOf(body.state.velocities);
-    body.spread = 0.5 * velocities.diagonal();
-  }
+// would never be whole again.
+bool fitsFloat(const WorldBody& body, double h) {
   const double most = kFarthest * body.model->shape.clusters[0].radius;
-  return body.bounds.diagonal() <= most && h * body.spread <= most;
+  return extentOf(body.state.positions).diagonal() <= most &&
+         0.5 * h * extentOf(body.state.velocities).diagonal() <= most;
 }
 
 void World::Impl::groupBatches() {
@@ -71,39 +68,48 @@ void World::Impl::groupBatches() {
 }
 
 void World::Impl::addBatch(std::vector<WorldBody*> group) {
-  std::vector<MatchInput> inputs;
-  for (WorldBody* body : group) {
-    inputs.push_back(matchInput(*body->model, body->state));
-    body->batch = static_cast<Index>(batches.size());
-  }
+  for (WorldBody* body : group) body->batch = static_cast<Index>(batches.size());
   WorldBatch batch;
-  batch.batch = std::make_unique<BodyBatch>(inputs, group.front()->material.mode == MatchMode::kQuadratic);
-  batch.states.resize(group.size());
   batch.bodies = std::move(group);
   batches.push_back(std::move(batch));
 }
 
-void World::Impl::matchBatches(double h) {
-  const bool bounds_known = contactMethod() == ContactMethod::kRestShape;
-  for (WorldBatch& batch : batches) {
-    const std::size_t count = batch.bodies.size();
-    forNumbers(count, [&](std::size_t i) {
-      WorldBody& body = *batch.bodies[i];
-      batch.states[i] = {body.state.positions.data(), body.state.velocities.data(), &body.state.poses[0].rotation,
-                         !body.asleep && fitsFloat(body, bounds_known, h)};
-      if (batch.states[i].moves) body.scratch.previous = body.state.positions;
-    });
-    bool any = false;
-    for (std::size_t i = 0; i < count; ++i) {
-      WorldBody& body = *batch.bodies[i];
-      any = any || batch.states[i].moves;
-      if (!batch.states[i].moves && !body.asleep)
-        matchAndMove(*body.model, body.material, settings.gravity, h, body.state, body.scratch, report.match_counters);
+// Lanes of the last islands. No more are made in all than there are threads.
+std::unique_ptr<BatchLanes> World::Impl::borrowLanes(WorldBatch& batch) {
+  {
+    const std::lock_guard<std::mutex> lock(lanes_mutex);
+    if (!batch.spare.empty()) {
+      std::unique_ptr<BatchLanes> lanes = std::move(batch.spare.back());
+      batch.spare.pop_back();
+      return lanes;
     }
-    if (!any) continue;
-    batch.step = batchStep(batch.bodies.front()->material, h);
-    batch.step.gravity = settings.gravity;
-    batch.batch->stepInPlace(batch.states, batch.step, report.match_counters, for_each);
+  }
+  const WorldBody& any = *batch.bodies.front();
+  const MatchInput input = matchInput(*any.model, any.state);
+  const bool quadratic = any.material.mode == MatchMode::kQuadratic;
+  return std::make_unique<BatchLanes>(BatchLanes{BodyBatch(std::vector<MatchInput>(kLanes, input), quadratic),
+                                                 std::vector<const BodyModel*>(kLanes, any.model.get()),
+                                                 {}});
+}
+
+void World::Impl::giveBackLanes(WorldBatch& batch, std::unique_ptr<BatchLanes> lanes) {
+  const std::lock_guard<std::mutex> lock(lanes_mutex);
+  batch.spare.push_back(std::move(lanes));
+}
+
+void BatchLanes::step(const std::vector<WorldBody*>& some, const BatchStep& step, MatchCounters& counters) {
+  for (std::size_t first = 0; first < some.size(); first += models.size()) {
+    states.resize(std::min(models.size(), some.size() - first));
+    for (std::size_t i = 0; i < states.size(); ++i) {
+      WorldBody& body = *some[first + i];
+      if (models[i] != body.model.get()) {
+        models[i] = body.model.get();
+        batch.refit(i, matchInput(*body.model, body.state));
+      }
+      body.scratch.previous = body.state.positions;
+      states[i] = {body.state.positions.data(), body.state.velocities.data(), &body.state.poses[0].rotation, true};
+    }
+    batch.stepInPlace(states, step, counters);
   }
 }
 

@@ -211,7 +211,6 @@ std::vector<std::string> World::Impl::replaceByPieces(const BodyId& parent_id, s
   const Material material = parent.material;
   const bool touched = parent.touched_by_push;
   std::vector<std::string> names;
-  std::vector<BodyId> children;
   std::vector<Descent> descents;
   int number = 0;
   for (BodyPiece& piece : pieces) {
@@ -221,11 +220,9 @@ std::vector<std::string> World::Impl::replaceByPieces(const BodyId& parent_id, s
     descents.push_back(descentOf(piece));
     WorldBody& child = admit(name, material, std::move(piece.model), std::move(piece.state));
     child.touched_by_push = touched;
-    if (pieces.size() > 1) foreseeContact(child);
-    children.push_back(descents.back().child = child.id);
+    descents.back().child = child.id;
     names.push_back(name);
   }
-  foreseeMeeting(parent_id, children);
   followPieces(parent_id, find(parent_id)->state.positions, descents);
   retire(parent_id);
   return names;

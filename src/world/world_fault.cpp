@@ -55,7 +55,6 @@ void World::Impl::mendFaults() {
         "the coordinates of " + body->name + " were not finite any more; it starts anew from rest");
   }
   if (!any) return;
-  contacts.clear();
   surface_contacts.clear();
   contacts_current = false;
   batches_current = false;

@@ -1,7 +1,6 @@
 // What the world holds; shared by the files that implement it.
 #pragma once
 
-#include <future>
 #include <map>
 #include <mutex>
 #include <set>
@@ -16,20 +15,6 @@
 
 namespace meshless {
 
-/// What contact needs of a model; bodies of one model share it.
-struct ContactModel {
-  ContactModel(BodyModelPtr of_model);
-  BodyModelPtr model;
-  ContactShape shape;
-  std::vector<double> inverse_masses;  // [1/kg] 0 where fixed
-  /// Made when first asked for, by one thread.
-  const SelfContactSet& self(bool cuts_alone) const;
-  std::size_t bytes() const;  // that it holds, without the model
-
- private:
-  mutable std::array<std::unique_ptr<const SelfContactSet>, 2> self_;
-};
-
 /// Of a body, by its name.
 struct MaterialChange {
   std::string body;
@@ -40,10 +25,7 @@ struct MaterialChange {
 struct WorldObstacle {
   explicit WorldObstacle(ObstacleDef of_def);
   std::shared_ptr<ObstacleDef> def;
-  std::vector<Index> own;  // every vertex is a particle of its own
-  std::vector<double> masses, inverse_masses;
-  std::vector<ContactMap> maps;
-  ContactShape shape;
+  std::vector<double> inverse_masses;  // [1/kg] 0, one a vertex
   ContactSurface surface;
   Box bounds;
 };
@@ -57,24 +39,14 @@ struct WorldBody {
   BodyState state;
   bool surface_current = true;                                             // state.surface fits state.positions
   std::shared_ptr<const ContactMesh> mesh;                                 // made when something first comes near
-  std::shared_ptr<const ContactModel> contact;                             // likewise, of the present model
-  std::shared_future<std::shared_ptr<const ContactModel>> coming_contact;  // being made by another thread
   std::shared_ptr<const SurfaceModel> surface_model;                       // made when something first comes near
   Points collision;              // [m] vertices of model->collision, of the last frame in which contact needed them
   BodyModelPtr measured;         // the model that these two are of
   double edge_length = 0.0;      // [m] mean, of the surface
   double surface_reach = 0.0;    // [m] how far the surface is beyond the particles, at most
-  std::vector<ContactMap> maps;  // of this frame, where it can touch another body
-  std::vector<QuadraticMap> quadratic_maps;  // likewise, where its mode is quadratic; maps point into it
   bool touched_by_push = false;
-  bool low_current = false;          // in this frame
-  std::vector<Index> low_particles;  // that can meet the ground
-  std::vector<Index> low_embedded;
-  BodyModelPtr reach_of;        // the model that embedded_reach is of
-  double embedded_reach = 0.0;  // [m] of embedded vertices beyond the bounds of the particles, at most
   double stiffness_factor = 1.0;
   Box bounds;              // [m] of particles and surface, at the start of the last frame in which it was awake
-  double spread = 0.0;     // [m/s] likewise: by how much velocities differ
   double fastest = 0.0;    // [m/s] likewise: no particle is faster
   Index batch = kNoIndex;  // matched with others of its kind: one of World::Impl::batches
   bool asleep = false;
@@ -97,34 +69,26 @@ struct BatchLanes {
 /// Bodies that are matched side by side.
 struct WorldBatch {
   std::vector<WorldBody*> bodies;
-  std::vector<BatchBody> states;
-  std::unique_ptr<BodyBatch> batch;
-  BatchStep step;                                  // of this frame's substeps
-  std::vector<std::unique_ptr<BatchLanes>> spare;  // that no island batch has borrowed
+  std::vector<std::unique_ptr<BatchLanes>> spare;  // that no thread has borrowed
 };
 
-/// Some islands that one thread takes through all substeps of a frame, and their work in it.
-struct IslandBatch {
-  Index first_island = 0, end_island = 0;
+/// Islands of contact that take the same substeps, one after another on one thread, and what they did in a frame.
+struct SurfaceWork {
+  struct Member {
+    Index island = 0;                // of the contacts
+    std::size_t begin = 0, end = 0;  // of bodies
+    std::vector<Vec3*> previous;     // [m] one a body
+    std::vector<Pick*> picks;
+    std::vector<SpringRow> springs;  // one a pick
+  };
+  std::vector<Member> members;
+  std::size_t member_count = 0;  // of them in use
   std::vector<WorldBody*> bodies, alone;              // all of them, and those matched one by one
   std::vector<std::vector<WorldBody*>> side_by_side;  // the others, by batches
   std::vector<std::unique_ptr<BatchLanes>> lanes;     // one a batch, borrowed
   std::size_t particles = 0;
-  MatchCounters match_counters;
-  PreserveCounters preserve_counters;
-  std::size_t corrected = 0, ground_contacts = 0;
-  double match = 0.0, contact = 0.0;  // [s]
-};
-
-/// An island of contact and what it did in a frame.
-struct SurfaceWork {
-  std::vector<WorldBody*> bodies;
-  std::vector<Pick*> picks;
   int substeps = 1;
-  std::vector<Vec3*> previous;     // [m] one a body
-  std::vector<SpringRow> springs;  // one a pick
   SolverScratch solver_scratch;
-  LimitScratch limit_scratch;
   std::vector<MatchCounters> each_counters;
   MatchCounters match_counters;
   PreserveCounters preserve_counters;
@@ -166,9 +130,8 @@ struct CutUndo {
   std::vector<std::string> pieces;       // what they came apart into
 };
 
-/// What is drawn out or thrown apart without measure is matched in double. bounds_known: body.bounds and spread are of
-/// this frame, else they are found.
-bool fitsFloat(WorldBody& body, bool bounds_known, double h);
+/// What is drawn out or thrown apart without measure is matched in double.
+bool fitsFloat(const WorldBody& body, double h);
 
 /// Hashes of what is shared and does not change, models and obstacles: taken once.
 class ContentHashes {
@@ -208,8 +171,6 @@ struct World::Impl {
   std::vector<std::shared_ptr<const PreparedBody>> scene;
   std::vector<std::shared_ptr<WorldObstacle>> obstacles;
   std::vector<Pick> picks;
-  std::vector<Vec3> pulls;    // [N] one a pick, of this substep
-  std::vector<Vec3> grasped;  // [m] one a pick: in rememberGrasps()
   PickId next_pick = 1;
   PushSphere push;
   Scissors scissors;
@@ -227,22 +188,14 @@ struct World::Impl {
   std::vector<WorldBatch> batches;
   bool batches_current = false;  // false: bodies or materials have changed
   std::mutex lanes_mutex;        // of the batches' spare lanes
-  std::vector<IslandBatch> island_batches;
-  std::size_t island_batch_count = 0;  // of them in use
-  std::vector<char> in_island;         // one a body: in formIslandBatches()
-  struct Met;
-  struct Meeting;
-  Contacts contacts;
-  std::vector<std::future<std::shared_ptr<const Contacts>>> meetings;  // of fresh pieces, being found by other threads
-  std::vector<LoadedPair> loaded;
-  bool contacts_current = false;               // bodies are those of the last step
-  double last_substep = 0.0;                   // [s]
-  std::vector<ShapeCollider> shape_colliders;  // one a body, in their order, where contacts are found in rest shapes
-  std::map<const BodyModel*, std::weak_ptr<const ContactModel>> contact_models;
+  std::vector<LoadedSurfaces> loaded;
+  bool contacts_current = false;  // bodies are those of the last step
   SurfaceContacts surface_contacts;
   SurfaceScene surface_scene;       // of this step
   std::vector<Collider> colliders;  // bodies in their order, then obstacles
   std::vector<SurfaceWork> surface_work;
+  std::size_t work_count = 0;  // of it in use
+  std::vector<WorldBody*> members;  // of an island: in stepSurfaces()
   std::vector<char> pushed;
   RecordSink record_sink;
 
@@ -312,21 +265,13 @@ struct World::Impl {
   void listAwake();
   void groupBatches();
   void addBatch(std::vector<WorldBody*> group);
-  void stepTogether(int substeps, double h_frame);
-  void stepWithSurfaces(double h_frame);
   void clearForces();
   void takeStep();
   void finishStep(double h_frame);
-  void matchBatches(double h);
   void matchAlone(WorldBody& body, double h, MatchCounters& counters) const;
   std::unique_ptr<BatchLanes> borrowLanes(WorldBatch& batch);
-  void finishSubstep(double h);
-  void keepSize(WorldBody& body, PreserveCounters& counters) const;
-  /// False where all bodies have to take each substep together.
-  bool formIslandBatches(double h);
-  void addToIslandBatch(IslandBatch& island_batch, WorldBody& body, double h);
-  void stepInIslandBatches(int substeps, double h);
-  void stepIslandBatch(IslandBatch& island_batch, int substeps, double h);
+  void giveBackLanes(WorldBatch& batch, std::unique_ptr<BatchLanes> lanes);
+  void keepSizes(SurfaceWork& work);
   /// The body and all that fell asleep with it.
   void wake(WorldBody& body);
   void wakeWithin(const Box& box);
@@ -336,47 +281,25 @@ struct World::Impl {
   void findWound();
   void closeBlades();
   void showBlades(const ClosingCut& cut);
-  std::vector<WorldBody*> bodiesInContact(double h);
-  int substepsNeeded(double h_frame) const;
-  double substepNow() const;  // [s]
-  int chooseSubsteps(double h_frame);
-  void movePush(double h, double h_frame);
-  void pullSprings(int substep, int substeps, double h_frame, bool again = false);
-  /// What is done to tissue between these two, without a velocity, its springs follow evenly over a step.
+  double substepNow() const;                 // [s]
   bool isHeld(const WorldBody& body) const;  // by a pick
-  void rememberGrasps();
-  void followGrasps();
-  void contactBodies(const std::vector<WorldBody*>& near, double h, int stride);
-  const ContactModel& contactModel(WorldBody& body);
-  /// Begins to make it where it will be needed and takes long.
-  void foreseeContact(WorldBody& body);
-  void foreseeMeeting(const BodyId& parent, const std::vector<BodyId>& pieces);
-  void expectMeetings();
-  void findContacts(double h_frame);
-  void fillShapeColliders();
-  void fillShapeCollider(WorldBody& body, ShapeCollider& collider);
-  static double embeddedReach(WorldBody& body);
-  void equipShapeCollider(WorldBody& body, ShapeCollider& collider);
-  void solveContacts(double h);
+  /// Pairs of contact: textbook, as rows.
+  void findTextbook(double h);
   const SurfaceModel& surfaceModel(WorldBody& body);
   static void measureSurface(WorldBody& body);
   static void fillCollider(WorldBody& body, double h_frame, Collider& collider);
-  bool any_elastic = false;  // as the last step began
-  ContactMethod contactMethod() const {
-    if (settings.contact != ContactMethod::kAuto) return settings.contact;
-    return any_elastic ? ContactMethod::kSurface : ContactMethod::kRestShape;
-  }
-  void findSurfaceContacts(double h_frame);
+  void findNear(double h);
+  int searchesOf(double h_frame);
+  void findSurfaceContacts(double h);
   Vec3 pushWay(double h_frame) const;                    // [m] of the push sphere in a frame
   std::vector<std::pair<double, std::size_t>> stiffest;  // of an island: less the substeps that a body needs, and which
-  int substepsOf(const std::vector<WorldBody*>& some, bool may_meet, double h_frame);
-  void stepSurfaces(double h_frame);
-  void stepIsland(std::size_t island, double h_frame, const ForEach& each);
+  int substepsOf(const std::vector<WorldBody*>& some, bool may_meet, double h, int parts);
+  /// One of so many parts of a frame, h [s] each; parts_left: with it.
+  void stepSurfaces(double h, int parts, int parts_left);
+  void addWork(Index island, int substeps);
+  void stepWork(SurfaceWork& work, double h, int parts, int parts_left, const ForEach& each);
   /// Who presses on whom: for who sleeps, and who is wound up.
   void listLoaded();
-  void liftOutOfGround(WorldBody& body, double h_frame);
-  void findLow(WorldBody& body, double h_frame);
-  void contactGroundAndPush(WorldBody& body, double h, double h_frame, const Vec3& push_velocity);
   void fadeEmbeddedOffsets(WorldBody& body, double h);
 };
 

@@ -91,9 +91,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
       if (body.model->lattice) followPieces(body.id, positions, {descent});
       body.mesh.reset();
       body.surface_current = true;
-      contacts.forget(body.number);
       surface_contacts.forget(body.number);
-      if (body.contact || body.material.self_contact != SelfContact::kNone) foreseeContact(body);
       batches_current = contacts_current = false;  // they are of the old model
       say(EventType::kIncised, name, 0, "opened");
     } else {

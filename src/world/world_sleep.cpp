@@ -61,19 +61,13 @@ void World::Impl::listAwake() {
 }
 
 void World::Impl::listLoaded() {
-  loaded.clear();
-  if (contactMethod() == ContactMethod::kRestShape) contacts.loadedPairs(loaded);
-  if (contactMethod() != ContactMethod::kSurface) return;
-  std::vector<LoadedSurfaces> pairs;
-  surface_contacts.loadedSurfaces(pairs);
-  for (const LoadedSurfaces& pair : pairs) loaded.push_back({pair.a, pair.b});
+  surface_contacts.loadedSurfaces(loaded);
 }
 
 // An island sleeps where all of it has held still long enough and something holds it: without that, what drifts slowly
 // through space would stop.
 void World::Impl::fallAsleep(double h_frame) {
   if (!settings.sleep || awake.empty()) return;
-  if (contactMethod() != ContactMethod::kRestShape && contactMethod() != ContactMethod::kSurface) return;
   bool any = false;
   for (WorldBody* body : awake) {
     if (isWhereItWas(*body, settings.gravity.norm())) {
@@ -93,7 +87,7 @@ void World::Impl::fallAsleep(double h_frame) {
     held[b] = bodies[b]->model->any_fixed;
   }
   listLoaded();
-  for (const LoadedPair& pair : loaded) {
+  for (const LoadedSurfaces& pair : loaded) {
     if (pair.a >= bodies.size()) continue;
     if (pair.b >= bodies.size()) {  // the ground, or an obstacle
       held[pair.a] = 1;

@@ -6,15 +6,18 @@
 #include <numeric>
 #include <sstream>
 
+#include "meshless_surgery/body/preserve.h"
 #include "meshless_surgery/dynamics/extent.h"
 #include "meshless_surgery/tools/grasp.h"
-#include "shape_colliders.h"
 #include "world_impl.h"
 
 namespace meshless {
 namespace {
 
 constexpr int kContactSubsteps = 4;   // at least, where something may meet: in longer ones stacks of stiff bodies rock
+constexpr double kFarthest = 1.0;    // edges, between two searches
+constexpr double kMostSearches = 64;    // of a frame
+constexpr std::size_t kWorkParticles = 512;  // of small islands together: what they read stays in the cache
 constexpr double kSlowedMass = 0.05;  // of an island, at most: slivers are slowed, instead of all taking their substeps
 
 // Bodies without a surface meet others by their particles.
@@ -40,6 +43,21 @@ ContactSurface surfaceOf(const BodyModel& model) {
     supports.offsets.push_back(static_cast<Index>(supports.particles.size()));
   }
   return {mesh, std::move(supports)};
+}
+
+// [m] how far embedded vertices may be beyond the bounds of the particles. Two spacings, or less for crumbs, whose whole
+// surface is nearer to their few particles. Otherwise, where many crumbs lie together, each would be next to all.
+double embeddedReachOf(const BodyModel& model) {
+  const SurfaceBinding& binding = model.binding;
+  double farthest = 0.0;  // squared, of an embedded vertex from its nearest carrier
+  for (Index r = 0; r < binding.embedded.size(); ++r) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k)
+      nearest = std::min(nearest,
+                         (model.surface.vertices[binding.embedded[r]] - model.rest[binding.carriers[k]]).squaredNorm());
+    farthest = std::max(farthest, nearest);
+  }
+  return 2.0 * std::min(std::sqrt(farthest), model.spacing);
 }
 
 // [m] of what meets others beyond the bounds of the particles, at most.
@@ -70,6 +88,13 @@ Collider colliderOf(const WorldObstacle& obstacle, std::size_t number) {
 }
 
 }  // namespace
+
+WorldObstacle::WorldObstacle(ObstacleDef of_def)
+    : def(std::make_shared<ObstacleDef>(std::move(of_def))),
+      inverse_masses(def->mesh.vertices.size(), 0.0),
+      surface(def->mesh, ownSupports(static_cast<Index>(def->mesh.vertices.size()))) {
+  for (const Vec3& p : def->mesh.vertices) bounds.extend(p);
+}
 
 SurfaceModel::SurfaceModel(BodyModelPtr of_model) : model(std::move(of_model)), surface(surfaceOf(*model)) {
   for (std::size_t i = 0; i < model->masses.size(); ++i)
@@ -109,6 +134,7 @@ void World::Impl::fillCollider(WorldBody& body, double h_frame, Collider& collid
   collider.friction = body.material.friction;
   collider.restitution = body.material.restitution;
   collider.edge_length = body.edge_length;
+  collider.spacing = body.model->spacing;
   collider.positions = body.state.positions.data();
   collider.velocities = body.state.velocities.data();
   collider.particles = static_cast<Index>(body.state.positions.size());
@@ -146,26 +172,90 @@ void World::Impl::measureSurface(WorldBody& body) {
   if (body.model->lattice) body.edge_length = std::max(body.edge_length, body.model->spacing);
 }
 
-// Rows of the frame. A body that is reached wakes, and then all is found again with its neighbours.
-void World::Impl::findSurfaceContacts(double h_frame) {
+void World::Impl::findNear(double h) {
   SurfaceScene& scene = surface_scene;
   scene = SurfaceScene();
   scene.ground = settings.ground;
   scene.ground_friction = settings.ground_friction;
   scene.gravity = settings.gravity.norm();
-  scene.h = h_frame;
-  if (push.enabled) scene.sphere = SurfaceScene::Sphere{push.position, pushWay(h_frame), push.radius};
-  for (;;) {
-    colliders.resize(bodies.size() + obstacles.size());
-    forNumbers(bodies.size(), [&](std::size_t b) {
-      measureSurface(*bodies[b]);
-      fillCollider(*bodies[b], h_frame, colliders[b]);
+  scene.h = h;
+  if (push.enabled) scene.sphere = SurfaceScene::Sphere{push.position, pushWay(h), push.radius};
+  colliders.resize(bodies.size() + obstacles.size());
+  forNumbers(bodies.size(), [&](std::size_t b) {
+    measureSurface(*bodies[b]);
+    fillCollider(*bodies[b], h, colliders[b]);
+  });
+  for (std::size_t o = 0; o < obstacles.size(); ++o) colliders[bodies.size() + o] = colliderOf(*obstacles[o], o);
+  for (const Pick& pick : picks)
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+      if (bodies[b]->id == pick.body) colliders[b].grasped = true;
+  scene.surfaces = settings.contact == ContactMethod::kSurface;
+  if (settings.contact == ContactMethod::kTextbook) findTextbook(h);
+  surface_contacts.findPairs(scene, colliders, report.contact_counters);
+}
+
+void World::Impl::findTextbook(double h) {
+  std::vector<Box> boxes;
+  std::vector<char> active;
+  for (const auto& body : bodies) {
+    boxes.push_back(extentOf(body->state.positions));
+    for (std::size_t i = 0; i < body->state.positions.size(); ++i)
+      boxes.back().extend(body->state.positions[i] + h * body->state.velocities[i]);
+    active.push_back(!body->asleep);
+  }
+  BroadPhase near;
+  std::vector<ContactBody> views(bodies.size());
+  for (const auto& [a, b] : near.find(boxes, active))
+    for (const Index n : {a, b}) {
+      needContactMesh(*bodies[n]);
+      views[n].mesh = bodies[n]->mesh.get();
+      views[n].positions = &bodies[n]->state.positions;
+      views[n].bounds = extentOf(bodies[n]->state.positions);
+    }
+  for (const Penetration& penetration : findPenetrations(views, report.contact_counters)) {
+    std::vector<SurfaceScene::Given>& given = surface_scene.given;
+    const auto pair = std::find_if(given.begin(), given.end(), [&](const SurfaceScene::Given& g) {
+      return g.a == penetration.body_a && g.b == penetration.body_b;
     });
-    for (std::size_t o = 0; o < obstacles.size(); ++o) colliders[bodies.size() + o] = colliderOf(*obstacles[o], o);
-    for (const Pick& pick : picks)
-      for (std::size_t b = 0; b < bodies.size(); ++b)
-        if (bodies[b]->id == pick.body) colliders[b].grasped = true;
-    surface_contacts.findPairs(scene, colliders, report.contact_counters);
+    SurfaceScene::Given& of = pair != given.end() ? *pair : given.emplace_back();
+    of.a = penetration.body_a;
+    of.b = penetration.body_b;
+    const double friction = bodies[of.a]->material.friction * bodies[of.b]->material.friction;
+    addRow(penetration, views, std::sqrt(friction), of.set);
+  }
+}
+
+/// A search finds what meets on straight ways. Between two of them nobody who may meet something goes farther than
+/// kFarthest, so that who is thrown off its way is found by the next.
+int World::Impl::searchesOf(double h_frame) {
+  const auto edges = [h_frame](const WorldBody& body, double fastest) {
+    return h_frame * std::sqrt(fastest) / body.edge_length;
+  };
+  const bool any = std::any_of(awake.begin(), awake.end(), [&](WorldBody* body) {
+    measureSurface(*body);
+    double fastest = 0.0;
+    for (const Vec3& v : body->state.velocities) fastest = std::max(fastest, v.squaredNorm());
+    return edges(*body, fastest) > kFarthest;
+  });
+  if (!any) return 1;
+  findNear(h_frame);
+  double most = kFarthest;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    if (!surface_contacts.needed()[b] || bodies[b]->asleep) continue;
+    const VertexSupports& supports = surfaceModel(*bodies[b]).surface.supports;
+    double fastest = 0.0;
+    for (Index v = 0; v + 1 < supports.offsets.size(); ++v)
+      fastest = std::max(fastest, supports.sum(v, bodies[b]->state.velocities.data()).squaredNorm());
+    most = std::max(most, edges(*bodies[b], fastest));
+  }
+  return static_cast<int>(std::min(std::ceil(most / kFarthest), kMostSearches));
+}
+
+// Rows of a search. A body that is reached wakes, and then all is found again with its neighbours.
+void World::Impl::findSurfaceContacts(double h) {
+  SurfaceScene& scene = surface_scene;
+  for (;;) {
+    findNear(h);
     for (std::size_t b = 0; b < bodies.size(); ++b) {
       if (!surface_contacts.needed()[b]) continue;
       const SurfaceModel& model = surfaceModel(*bodies[b]);
@@ -207,16 +297,16 @@ Vec3 World::Impl::pushWay(double h_frame) const {
   return length > most ? Vec3(way * (most / length)) : way;
 }
 
-/// Substeps that the stiffest bodies of an island and its contacts need: no body that may meet something goes farther
-/// than an edge in one. Slivers are not asked, but where they are picked. What is taken from a body is said once.
-int World::Impl::substepsOf(const std::vector<WorldBody*>& some, bool may_meet, double h_frame) {
+/// Substeps of one of so many parts of a frame that the stiffest bodies of an island and its contacts need. Slivers are
+/// not asked, but where they are picked. What is taken from a body is said once.
+int World::Impl::substepsOf(const std::vector<WorldBody*>& some, bool may_meet, double h_frame, int parts) {
   double needed = may_meet ? std::max(settings.substeps, kContactSubsteps) : settings.substeps;
+  needed = std::ceil(needed / parts);
   stiffest.clear();
   double mass = 0.0;
   for (std::size_t n = 0; n < some.size(); ++n) {
     const WorldBody& body = *some[n];
-    double substeps = std::ceil(h_frame * highestFrequencyNow(*body.model, body.state));
-    if (may_meet) substeps = std::max(substeps, std::ceil(h_frame * body.fastest / body.edge_length));
+    const double substeps = std::ceil(h_frame * highestFrequencyNow(*body.model, body.state));
     stiffest.push_back({std::isfinite(substeps) ? -substeps : -std::numeric_limits<double>::infinity(), n});
     mass += body.model->mass;
   }
@@ -228,7 +318,7 @@ int World::Impl::substepsOf(const std::vector<WorldBody*>& some, bool may_meet, 
     needed = std::max(needed, -less);
     break;
   }
-  const int most = std::max(settings.substeps, settings.max_substeps);
+  const int most = (std::max(settings.substeps, settings.max_substeps) + parts - 1) / parts;
   const int substeps = needed < most ? static_cast<int>(needed) : most;  // NaN: most
   for (WorldBody* body : some) {
     const double factor = stiffnessFactor(*body->model, body->state, h_frame / substeps);
@@ -245,33 +335,20 @@ int World::Impl::substepsOf(const std::vector<WorldBody*>& some, bool may_meet, 
   return substeps;
 }
 
-// Islands know nothing of each other within a frame: each takes the substeps that it needs. Where one has most of the
-// particles its bodies are shared out over threads, else the islands are.
-void World::Impl::stepSurfaces(double h_frame) {
+// Islands know nothing of each other within a frame: each takes the substeps that it needs, small ones of the same
+// several at a time. Where one has most of the particles its bodies are shared out over threads, else the islands are.
+void World::Impl::stepSurfaces(double h_frame, int parts, int parts_left) {
   const auto& islands = surface_contacts.islands();
-  surface_work.resize(islands.size());
-  std::size_t largest = 0, total = 0;
-  for (std::size_t n = 0; n < islands.size(); ++n) {
-    SurfaceWork& work = surface_work[n];
-    work.bodies.clear();
-    std::size_t particles = 0;
+  work_count = 0;
+  std::vector<WorldBody*>& some = members;
+  for (Index n = 0; n < islands.size(); ++n) {
+    some.clear();
+    for (const Index b : islands[n].bodies) some.push_back(bodies[b].get());
+    const int substeps = substepsOf(some, !islands[n].rows.empty(), h_frame, parts);
+    addWork(n, substeps);
+    report.substeps = std::max(report.substeps, static_cast<std::size_t>(substeps * parts));
     for (const Index b : islands[n].bodies) {
-      work.bodies.push_back(bodies[b].get());
-      particles += bodies[b]->state.positions.size();
-    }
-    total += particles;
-    largest = std::max(largest, particles);
-    work.substeps = substepsOf(work.bodies, !islands[n].rows.empty() || !islands[n].watched.empty(), h_frame);
-    work.picks.clear();
-    for (Pick& pick : picks) {
-      const WorldBody* const body = find(pick.body);
-      if (body && std::find(work.bodies.begin(), work.bodies.end(), body) != work.bodies.end())
-        work.picks.push_back(&pick);
-    }
-    report.substeps = std::max(report.substeps, static_cast<std::size_t>(work.substeps));
-    for (std::size_t k = 0; k < work.bodies.size(); ++k) {
-      const WorldBody& body = *work.bodies[k];
-      const Index b = islands[n].bodies[k];
+      const WorldBody& body = *bodies[b];
       // As what deforms answers its own stiffness (see matchAndMove): a body that is slowed, or clusters drawn to
       // shape.
       if (!surface_contacts.needed()[b]) continue;
@@ -281,12 +358,20 @@ void World::Impl::stepSurfaces(double h_frame) {
         surface_contacts.setRigidShare(b, body.surface_model->groups.get(), body.material.alpha);
     }
   }
-  if (2 * largest > total) {
-    for (std::size_t n = 0; n < islands.size(); ++n) stepIsland(n, h_frame, for_each);
-  } else {
-    runEach(for_each, islands.size(), [&](std::size_t n) { stepIsland(n, h_frame, oneAfterAnother); });
+  std::size_t largest = 0, total = 0;
+  for (std::size_t n = 0; n < work_count; ++n) {
+    const SurfaceWork& work = surface_work[n];
+    total += work.particles;
+    largest = std::max(largest, work.particles);
   }
-  for (const SurfaceWork& work : surface_work) {
+  if (2 * largest > total) {
+    for (std::size_t n = 0; n < work_count; ++n) stepWork(surface_work[n], h_frame, parts, parts_left, for_each);
+  } else {
+    runEach(for_each, work_count,
+            [&](std::size_t n) { stepWork(surface_work[n], h_frame, parts, parts_left, oneAfterAnother); });
+  }
+  for (std::size_t n = 0; n < work_count; ++n) {
+    const SurfaceWork& work = surface_work[n];
     report.match_counters += work.match_counters;
     report.preserve_counters += work.preserve_counters;
     report.contact_counters.corrected += work.solver_counters.active;
@@ -309,9 +394,65 @@ void World::Impl::stepSurfaces(double h_frame) {
   }
 }
 
-void World::Impl::stepIsland(std::size_t number, double h_frame, const ForEach& each) {
-  SurfaceWork& work = surface_work[number];
-  const std::vector<WorldBody*>& some = work.bodies;
+void World::Impl::addWork(Index island, int substeps) {
+  SurfaceWork* work = nullptr;
+  for (std::size_t n = work_count; n-- > 0 && !work;)
+    if (surface_work[n].substeps == substeps && surface_work[n].particles < kWorkParticles) work = &surface_work[n];
+  if (!work) {
+    if (work_count == surface_work.size()) surface_work.emplace_back();
+    work = &surface_work[work_count++];
+    work->member_count = 0;
+    work->bodies.clear();
+    work->alone.clear();
+    work->side_by_side.resize(batches.size());
+    for (std::vector<WorldBody*>& some : work->side_by_side) some.clear();
+    work->lanes.resize(batches.size());
+    work->particles = 0;
+    work->substeps = substeps;
+  }
+  if (work->member_count == work->members.size()) work->members.emplace_back();
+  SurfaceWork::Member& member = work->members[work->member_count++];
+  member.island = island;
+  member.begin = work->bodies.size();
+  member.picks.clear();
+  member.springs.clear();
+  const std::vector<Index>& of_island = surface_contacts.islands()[island].bodies;
+  for (const Index b : of_island) {
+    work->bodies.push_back(bodies[b].get());
+    work->particles += bodies[b]->state.positions.size();
+  }
+  member.end = work->bodies.size();
+  for (Pick& pick : picks)
+    for (const Index b : of_island) {
+      if (bodies[b]->id != pick.body) continue;
+      member.picks.push_back(&pick);
+      SpringRow spring;
+      spring.body = b;
+      spring.patch = &pick.patch;
+      spring.weights = &pick.weights;
+      spring.stiffness = pick.stiffness;
+      member.springs.push_back(spring);
+    }
+}
+
+void World::Impl::keepSizes(SurfaceWork& work) {
+  const auto keeps = [](const WorldBody& body) {
+    return !body.material.volume.points.empty() || !body.material.area.points.empty() || body.state.swelling != 1.0;
+  };
+  for (WorldBody* body : work.bodies) {
+    body->surface_current = false;
+    body->scratch.touched.clear();
+  }
+  if (std::none_of(work.bodies.begin(), work.bodies.end(), [&](const WorldBody* body) { return keeps(*body); })) return;
+  for (std::size_t n = 0; n < work.member_count; ++n)
+    surface_contacts.eachPressed(work.members[n].island, [&](Index b, Index particle, const Vec3& normal) {
+      if (b < bodies.size() && !bodies[b]->asleep && keeps(*bodies[b])) bodies[b]->scratch.touched.push_back({particle, normal});
+    });
+  for (WorldBody* body : work.bodies)
+    if (keeps(*body)) preserve(*body->model, body->material, body->state, body->scratch, work.preserve_counters);
+}
+
+void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int parts_left, const ForEach& each) {
   const int substeps = work.substeps;
   const double h = h_frame / substeps;
   work.match_counters = MatchCounters();
@@ -320,62 +461,74 @@ void World::Impl::stepIsland(std::size_t number, double h_frame, const ForEach& 
   work.match = work.contact = 0.0;
   work.push_force.setZero();
   work.touched = false;
-  work.each_counters.resize(some.size());
-  work.previous.resize(some.size());
-  work.springs.clear();
-  for (const Pick* pick : work.picks) {
-    SpringRow spring;
-    const WorldBody* const body = find(pick->body);
-    spring.body = surface_contacts.islands()[number].bodies[std::find(some.begin(), some.end(), body) - some.begin()];
-    spring.patch = &pick->patch;
-    spring.weights = &pick->weights;
-    spring.stiffness = pick->stiffness;
-    work.springs.push_back(spring);
+  for (std::size_t n = 0; n < work.member_count; ++n) {
+    SurfaceWork::Member& member = work.members[n];
+    const SurfaceContacts::Island& island = surface_contacts.islands()[member.island];
+    member.previous.resize(member.end - member.begin);
+    for (std::size_t b = member.begin; b < member.end; ++b) {
+      WorldBody& body = *work.bodies[b];
+      body.scratch.lies = island.free.empty() && !island.rows.empty();
+      if (body.batch != kNoIndex && fitsFloat(body, h))
+        work.side_by_side[body.batch].push_back(&body);
+      else
+        work.alone.push_back(&body);
+    }
   }
-  const bool held = surface_contacts.islands()[number].free.empty() && !surface_contacts.islands()[number].rows.empty();
-  for (WorldBody* body : some) {
-    body->scratch.touched.clear();
-    body->scratch.lies = held;
-  }
+  work.each_counters.resize(work.alone.size());
+  for (std::size_t n = 0; n < batches.size(); ++n)
+    if (!work.side_by_side[n].empty()) work.lanes[n] = borrowLanes(batches[n]);
   const Vec3 way = push.enabled ? pushWay(h_frame) : Vec3(Vec3::Zero());
   SolverStep step;
   step.h = h;
+  step.frame = h_frame;
+  step.slow = 2.0 * surface_scene.gravity * h_frame;  // what gravity gives within a frame is no approach
   step.sphere_radius = push.radius;
   auto last = std::chrono::steady_clock::now();
   for (int substep = 0; substep < substeps; ++substep) {
-    runEach(each, some.size(), [&](std::size_t b) {
+    for (std::size_t n = 0; n < batches.size(); ++n) {
+      if (!work.lanes[n]) continue;
+      BatchStep batch_step = batchStep(batches[n].bodies.front()->material, h);
+      batch_step.gravity = settings.gravity;
+      work.lanes[n]->step(work.side_by_side[n], batch_step, work.match_counters);
+    }
+    runEach(each, work.alone.size(), [&](std::size_t b) {
       work.each_counters[b] = MatchCounters();
-      matchAlone(*some[b], h, work.each_counters[b]);
-      work.previous[b] = some[b]->scratch.previous.data();
+      matchAlone(*work.alone[b], h, work.each_counters[b]);
     });
     for (const MatchCounters& counters : work.each_counters) work.match_counters += counters;
     work.match += secondsSince(last);
-    // A target that jumps is followed evenly over the frame.
-    const int left = substeps - substep - 1;
-    for (std::size_t p = 0; p < work.picks.size(); ++p) {
-      const Pick& pick = *work.picks[p];
-      work.springs[p].end = pick.target - left * (pick.target - pick.reached) / substeps - pick.offset;
-      work.springs[p].impulse.setZero();
-    }
     step.sphere_from = push.position + substep * way / substeps;
     step.sphere_to = push.position + (substep + 1) * way / substeps;
-    surface_contacts.solveIsland(static_cast<Index>(number), step, substep, surface_scene, colliders, work.previous,
-                                 work.springs, work.solver_scratch, work.limit_scratch, work.solver_counters, each);
-    for (std::size_t p = 0; p < work.picks.size(); ++p)
-      work.picks[p]->force += work.springs[p].impulse / (h * h * substeps);
-    if (push.enabled) {
-      const Vec3 impulse = surface_contacts.sphereImpulse(static_cast<Index>(number));
-      work.push_force += impulse / (h * h * substeps);
-      work.touched = work.touched || !impulse.isZero(0.0);
+    for (std::size_t n = 0; n < work.member_count; ++n) {
+      SurfaceWork::Member& member = work.members[n];
+      for (std::size_t b = member.begin; b < member.end; ++b)
+        member.previous[b - member.begin] = work.bodies[b]->scratch.previous.data();
+      for (std::size_t p = 0; p < member.picks.size(); ++p) {
+        const Pick& pick = *member.picks[p];
+        const Vec3 there = (pick.target - pick.reached) / parts_left;
+        member.springs[p].end = pick.reached + (substep + 1) * there / substeps - pick.offset;
+        member.springs[p].impulse.setZero();
+      }
+      surface_contacts.solveIsland(member.island, step, substep, colliders, member.previous, member.springs,
+                                   work.solver_scratch, work.solver_counters, each);
+      for (std::size_t p = 0; p < member.picks.size(); ++p)
+        member.picks[p]->force += member.springs[p].impulse / (h * h * substeps * parts);
+      if (push.enabled) {
+        const Vec3 impulse = surface_contacts.sphereImpulse(member.island);
+        work.push_force += impulse / (h * h * substeps * parts);
+        work.touched = work.touched || !impulse.isZero(0.0);
+      }
     }
     work.contact += secondsSince(last);
-    for (WorldBody* body : some) keepSize(*body, work.preserve_counters);
-    runEach(each, some.size(),
-            [&](std::size_t b) { velocitiesFromPositions(*some[b]->model, h, some[b]->state, some[b]->scratch); });
+    keepSizes(work);
+    runEach(each, work.bodies.size(),
+            [&](std::size_t b) { velocitiesFromPositions(h, work.bodies[b]->state, work.bodies[b]->scratch); });
     work.match += secondsSince(last);
   }
-  surface_contacts.finishIsland(static_cast<Index>(number), h);
-  for (WorldBody* body : some) fadeEmbeddedOffsets(*body, h_frame);
+  for (std::size_t n = 0; n < work.member_count; ++n) surface_contacts.finishIsland(work.members[n].island, h);
+  for (WorldBody* body : work.bodies) fadeEmbeddedOffsets(*body, h_frame);
+  for (std::size_t n = 0; n < batches.size(); ++n)
+    if (work.lanes[n]) giveBackLanes(batches[n], std::move(work.lanes[n]));
 }
 
 }  // namespace meshless

@@ -62,7 +62,6 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
   };
   // What pressed then is not what presses now.
   const auto forgetContacts = [this](const WorldBody& body) {
-    contacts.forget(body.number);
     surface_contacts.forget(body.number);
   };
 
@@ -82,7 +81,6 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
       if ((!slept || !holdsAsThen(*body)) && body->state.positions.size() == was.state.positions.size()) {
         body->state = std::move(was.state);
         body->surface_current = was.surface_current;
-        body->low_current = false;
         forgetContacts(*body);
         wake(*body);
       }
@@ -91,7 +89,6 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
   }
 
   contacts_current = false;
-  meetings.clear();
 
   picks.clear();
   for (std::size_t i = 0; i < before.picks.size(); ++i) {

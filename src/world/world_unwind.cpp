@@ -10,18 +10,17 @@ namespace meshless {
 // What holds a body may hold it folded: then that is its shape. The ground, others, obstacles, picks and the push
 // sphere.
 void World::Impl::findWound() {
-  if (contactMethod() == ContactMethod::kTextbook) return;  // it does not know who presses on whom
   for (WorldBody* body : awake)
     if (body->state.unwinding || isWoundUp(*body->model, body->material, body->state)) wound.push_back(body);
   if (wound.empty()) return;
   listLoaded();
   for (WorldBody* body : wound) {
     const auto is = [&](Index b) { return b < bodies.size() && bodies[b].get() == body; };
-    const bool touched = std::any_of(loaded.begin(), loaded.end(), [&](const LoadedPair& pair) {
+    const bool touched = std::any_of(loaded.begin(), loaded.end(), [&](const LoadedSurfaces& pair) {
       return pair.a != pair.b && (is(pair.a) || is(pair.b));
     });
     const bool picked = std::any_of(picks.begin(), picks.end(), [&](const Pick& p) { return p.body == body->id; });
-    const bool free = !touched && !picked && body->scratch.touched.empty() && !body->touched_by_push;
+    const bool free = !touched && !picked && !body->touched_by_push;
     // Another material may have come with what does not suit.
     body->state.unwinding = free && !body->material.plastic() && body->state.eased.empty();
     report.unwinding += body->state.unwinding;

@@ -5,25 +5,21 @@
 
 namespace meshless {
 
-/// A particle that ground or sphere pushed in this substep, and how fast it may leave.
+/// A particle of what presses on something, and which way is out of that.
 struct TouchedParticle {
   Index particle = 0;
-  Vec3 normal = Vec3::UnitZ();  // unit, away from the obstacle
-  double obstacle_speed = 0.0;  // [m/s] of the obstacle along the normal
-  bool by_tool = false;         // by the push sphere, which reports the force
+  Vec3 normal = Vec3::UnitZ();
 };
 
 /// Arrays that a body's substep needs and nothing outlives; kept between steps so that stepping allocates nothing.
 struct StepScratch {
   Points previous;        // [m] positions at the start of the substep
-  Points before_contact;  // [m] positions when contacts began; filled where something can touch
   Points predicted;
   Points goals;
   ClampStep clamp;
   ElasticBatchState elastic;
-  std::vector<TouchedParticle> touched;
+  std::vector<TouchedParticle> touched;  // of a body that preserves its size
   bool lies = false;               // on something that does not move: its spin is damped as what deforms
-  Vec3 unreported = Vec3::Zero();  // [kg m/s] of the tool's push that particles do not keep: it does not report that
 };
 
 /// Reads positions and velocities; writes positions, velocities, poses and scratch.previous: matches at y = x + h v,
@@ -44,10 +40,8 @@ double highestFrequencyNow(const BodyModel& model, const BodyState& state);
 /// 0..1: mass over inertia of what deforms in an elastic body at substeps of h [s]; 1 for the others.
 double stiffnessFactor(const BodyModel& model, const BodyState& state, double h);
 
-/// v = (x - x_old) / h, after springs and contacts have moved positions. Being pushed out of an obstacle stops a
-/// particle or takes it along, and never throws it: along the normal it keeps at most the speed that it had before the
-/// contact, or the obstacle's. What those lose so that a tool touched is added to scratch.unreported.
-void velocitiesFromPositions(const BodyModel& model, double h, BodyState& state, StepScratch& scratch);
+/// v = (x - x_old) / h, after springs and contacts have moved positions.
+void velocitiesFromPositions(double h, BodyState& state, const StepScratch& scratch);
 
 /// [m/s] angular velocity times lever of a body that turns as its particles do on the whole; 0 where it has no extent.
 struct RigidMotion {

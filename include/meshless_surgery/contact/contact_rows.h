@@ -17,7 +17,7 @@ struct ContactRow {
   double gap = 0.0;             // [m] when it was made, beyond the skin
   double rise = 0.0;            // [m] of it, by which the point of a is over the sum of its particles
   double friction = 0.0;        // Coulomb
-  double bounce = 0.0;          // [m/s] with which they are to part in this frame; 0: they need not
+  double restitution = 0.0;     // 0..1
   Vec3 impulse = Vec3::Zero();  // [kg m] mass times displacement on a in a substep; between frames the force [N]
   Index begin = 0, middle = 0, end = 0;
   FeaturePair::Kind kind = FeaturePair::Kind::kVertexFace;

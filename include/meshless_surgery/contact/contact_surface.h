@@ -25,6 +25,7 @@ VertexSupports ownSupports(Index vertices);
 struct ContactEdge {
   std::array<Index, 2> vertices{};
   std::array<Index, 2> faces{};  // the second is kNoIndex at a border
+  double length = 0.0;           // [m] at rest
 };
 
 struct ContactSurface {
@@ -32,7 +33,6 @@ struct ContactSurface {
 
   std::vector<Triangle> triangles;
   std::vector<ContactEdge> edges;
-  std::vector<std::array<Index, 3>> face_edges;  // of edges; the k-th is that of corners k and k + 1
   std::vector<Index> face_offsets, faces;        // around each vertex, compressed rows
   std::vector<char> cut_faces, cut_vertices;     // 1: of a patch that a cut has made
   VertexSupports supports;

@@ -12,13 +12,11 @@ struct ContactMesh {
   std::vector<std::array<Index, 2>> edges;    // of the tetrahedra, lower index first, sorted
 };
 
-/// Views; whoever fills it keeps the arrays alive. positions are read and corrected.
+/// Views; whoever fills it keeps the arrays alive. positions are read.
 struct ContactBody {
   const ContactMesh* mesh = nullptr;
-  Points* positions = nullptr;                        // [m]
-  const Points* previous = nullptr;                   // [m] at the start of the substep, for friction
+  const Points* positions = nullptr;                        // [m]
   const std::vector<double>* inverse_masses = nullptr;  // [1/kg]; 0: held
-  double friction = 0.5;
   Box bounds;  // of positions, swept over the substep
 };
 
@@ -30,12 +28,9 @@ struct ContactCounters {
   std::size_t penetrating = 0;  // particles found inside
   std::size_t corrected = 0;    // contacts that moved something
   std::size_t bounds_tested = 0;   // boxes compared by the broad phase
-  std::size_t queries = 0;         // of the narrow phase by the step itself: points in shapes, vertices near surfaces
+  std::size_t queries = 0;         // of the narrow phase: points near surfaces
   std::size_t contacts = 0;        // made
-  std::size_t traced = 0;          // paths of fast points followed through rest shapes
-  std::size_t caught = 0;          // of them, those that would have passed through
   std::size_t self_points = 0;     // queried for contact of a body with itself
-  std::size_t expelled = 0;        // pairs of which one is inside the other
 };
 
 }  // namespace meshless

@@ -8,16 +8,15 @@
 
 namespace meshless {
 
-/// A point of surface a (a vertex, or on an edge) near a point of surface b (on a face, or on an edge) or of what has
-/// no surface.
+/// A point of surface a (a vertex, or on a ridge) near a point of a face of surface b, or of what has no surface.
 struct FeaturePair {
-  enum class Kind : std::uint8_t { kVertexFace, kEdgeEdge, kPlane, kSphere };
+  enum class Kind : std::uint8_t { kVertexFace, kPlane, kSphere };
   Kind kind = Kind::kVertexFace;
   std::uint8_t order = 0;           // among those of one vertex
   std::uint8_t of_a = 1, of_b = 3;  // how many of the vertices are of a, then of b
-  std::array<Index, 2> features{};  // names it in the next frame: a vertex and kNoIndex, or two edges
-  std::array<Index, 4> vertices{};  // first those of a
-  std::array<double, 4> shares{};   // of the vertices; add up to 1 for a, to -1 for b
+  std::array<Index, 2> features{};  // names it in the next frame: a vertex and kNoIndex, or a ridge and a number
+  std::array<Index, 5> vertices{};  // first those of a
+  std::array<double, 5> shares{};   // of the vertices; add up to 1 for a, to -1 for b
   Vec3 normal = Vec3::UnitZ();      // unit, from b to a
   double gap = 0.0;                 // [m] along it; negative: inside
   double chord = 0.0;               // [m] of kSphere: how far the point lies in a sphere that goes through its corners
@@ -30,29 +29,10 @@ struct RememberedSide {
   Vec3 normal = Vec3::UnitZ();
 };
 
-/// Features that are apart and near enough to meet in the frame: a vertex and a face, or two edges. A plane between
-/// them shows that they stay so.
-struct WatchedFeatures {
-  std::array<Index, 4> vertices{};                         // first those of a
-  std::uint8_t of_a = 1;                                   // 1 or 2
-  Vec3 normal = Vec3::Zero();                              // unit, from b to a
-  double least = std::numeric_limits<double>::infinity();  // [m] along it, by which they are to stay apart; below 0:
-                                                           // they touch, and this is how far they may come
-};
-
-struct PairDistance {
-  Vec3 between = Vec3::Zero();     // [m] of the nearest points, from b to a
-  double distance = 0.0;           // [m]
-  std::array<double, 4> shares{};  // of the corners in it: 1 in all for a, -1 for b
-};
-/// The nearest points of a vertex and a face (of_a = 1), or of two edges (of_a = 2); corners of a first.
-PairDistance distanceOfPair(int of_a, const std::array<Vec3, 4>& corners);
-
 /// What is found, one after another.
 struct FoundFeatures {
   std::vector<FeaturePair> pairs;
   std::vector<RememberedSide> sides;  // to be remembered
-  std::vector<WatchedFeatures> watched;
 };
 
 /// A face near a vertex.
@@ -74,10 +54,9 @@ struct SearchScratch {
   void clear() {
     found.pairs.clear();
     found.sides.clear();
-    found.watched.clear();
   }
   std::size_t bytes() const {
-    return bytesOf(found.pairs, found.sides, found.watched, vertices, faces, near) + query.bytes();
+    return bytesOf(found.pairs, found.sides, vertices, faces, near) + query.bytes();
   }
 };
 
@@ -89,32 +68,24 @@ struct PairSearch {
   Side a, b;
   double h = 0.0;       // [s] of the frame
   double length = 0.0;  // [m] the shorter mean edge of the two
+  double spacing = std::numeric_limits<double>::infinity();  // [m] of points on long ridges of a
   bool first = true;    // nothing is remembered: search for what is inside
   enum class Self { kNo, kCuts, kAll } self = Self::kNo;
   const RememberedSide* remembered = nullptr;  // ascending by vertex
   std::size_t remembered_count = 0;
 };
 
-/// Of the distance of two features, at the least left after a substep.
-constexpr double kLeastLeft = 0.1;
-
 /// [m] The margin of a search at rest, beside what is swept, of surfaces with such a mean edge.
 double searchMargin(double edge_length);
-/// [m] features that are nearer touch: only a face that opposes tells the sides.
-double touchingDistance(double edge_length);
 
 /// Vertices of a, ascending, that are near enough to b to be queried, to scratch.vertices.
 void findVerticesNear(const PairSearch& search, SearchScratch& scratch);
 
-/// scratch.vertices of a against the faces of b, to scratch.found: up to three pairs each, of different directions, the
-/// nearest first. Signs by pseudonormals (Baerentzen and Aanaes 2005); where several faces are equally near, the vertex
+/// scratch.vertices of a, and points on its long ridges, against the faces of b, to scratch.found: up to three pairs
+/// each, of different directions, the nearest first. Signs by pseudonormals (Baerentzen and Aanaes 2005); where several faces are equally near, the vertex
 /// is on the side of the one that its own faces oppose most, so that the twin faces of a fresh cut are on the right
 /// sides. Directions that the vertex's faces do not oppose are left out. Returns the vertices that were queried.
 std::size_t findVertexFace(const PairSearch& search, SearchScratch& scratch);
-
-/// Ridges against ridges, where their common normal is between the normals of both (the Gauss map): the sign needs no
-/// memory.
-void findEdgeEdge(const PairSearch& search, FoundFeatures& found);
 
 /// Vertices of a over the plane z = height.
 void findPlane(const PairSearch& search, double height, std::vector<FeaturePair>& pairs);

@@ -1,6 +1,6 @@
-// Gauss-Seidel on rows in small steps: displacements of a substep that keep every gap open, with friction. A gap that
-// is open closes at most; an overlap gets no deeper and fades, at a bounded speed (Macklin et al. 2019, "Small steps in
-// physics simulation"). Conserves linear and, in bodies that nothing holds, angular momentum.
+// One sweep of Gauss-Seidel over rows in each of many small steps: displacements that keep every gap open, with friction.
+// A gap that is open closes at most; an overlap gets no deeper, and is let out at a bounded speed, once a frame (Macklin
+// et al. 2019, "Small steps in physics simulation"). Conserves linear and, in bodies that nothing holds, angular momentum.
 #pragma once
 
 #include "meshless_surgery/contact/contact_rows.h"
@@ -19,7 +19,7 @@ struct SolverBody {
   Slot* before = nullptr;  // at the start of the substep; moved where overlaps are let out, which gives no speed
   Index particles = 0;
   bool moves = true;
-  double edge_length = 0.0;             // [m] mean
+  double edge_length = 0.0;             // [m] mean; infinite where it does not move
   const RigidGroups* groups = nullptr;  // that part of the answer moves as rigid bodies; null: it moves nothing
   double rigid_share = 0.0;             // 0..1: that part
   std::vector<GroupMotion> motions;     // one a group
@@ -44,6 +44,8 @@ struct SpringRow {
 
 struct SolverStep {
   double h = 0.0;     // [s] of the substep
+  double frame = 0.0;  // [s] of the frame, in whose first substep old overlap is let out
+  double slow = 0.0;   // [m/s] at which nothing bounces
   int number = 0;     // of it: those who want the opposite take turns at the last word
   double warm = 1.0;  // what the impulses of the last substep are worth in this one: (h / its h)^2
   Vec3 sphere_from = Vec3::Zero(), sphere_to = Vec3::Zero();  // [m] centre, at the start and the end of the substep
@@ -51,16 +53,12 @@ struct SolverStep {
 };
 
 struct SolverCounters {
-  std::size_t active = 0;       // rows that could carry load
-  std::size_t ground = 0;       // of them, those of the ground
-  std::size_t limited = 0;      // watched pairs that would have met
-  std::size_t found_again = 0;  // searches within the frame
+  std::size_t active = 0;  // rows that could carry load
+  std::size_t ground = 0;  // of them, those of the ground
 
   void operator+=(const SolverCounters& o) {
     active += o.active;
     ground += o.ground;
-    limited += o.limited;
-    found_again += o.found_again;
   }
 };
 
@@ -79,7 +77,6 @@ struct SolverScratch {
     Vec3 start;                 // [m] sum of coefficient x at the start of the substep
     double target;              // [m] gap that is asked for at least
     double mass;                // [kg] impulse for a gap that is 1 m short
-    double pressed;             // [kg m] what lets an overlap out
     double sideways;            // [1/kg] across the normal
   };
   struct Pull {

@@ -1,6 +1,5 @@
 // Contact of deformable surfaces in present space (docs/method.md, Contact): finds rows where something has moved,
-// keeps them where nothing has, groups what they join into islands, and solves each island's rows in each substep. What
-// is thrown off the way that was searched is searched again within the frame.
+// keeps them where nothing has, groups what they join into islands, and solves each island's rows in each substep.
 // Knows neither materials nor tools.
 #pragma once
 
@@ -22,6 +21,7 @@ struct Collider {
   std::uint64_t key = 0;                    // of the body for as long as it lives
   Box bounds;                               // [m] swept in the frame; empty: it meets nothing
   double edge_length = 0.0;                 // [m] mean
+  double spacing = std::numeric_limits<double>::infinity();  // [m] of its particles: points on ridges are as near
   const ContactSurface* surface = nullptr;  // filled, with what follows, for those that needed() says
   const Vec3* vertices = nullptr;           // [m] now, one a vertex of the surface; for those that moved() says
   Vec3* positions = nullptr;                // [m] one a particle
@@ -47,6 +47,12 @@ struct SurfaceScene {
   };
   std::optional<Sphere> sphere;
   double h = 0.0;  // [s] of the frame
+  bool surfaces = true;  // bodies meet each other and obstacles by their surfaces; false: in the given rows alone
+  struct Given {
+    Index a = 0, b = 0;  // colliders
+    RowSet set;
+  };
+  std::vector<Given> given;
 };
 
 /// Two bodies that press on each other; b is kNoIndex for the ground, or the number of an obstacle.
@@ -72,9 +78,7 @@ class SurfaceContacts {
   struct Island {
     std::vector<Index> bodies;
     std::vector<Index> free;   // the bodies, where nothing holds any of them
-    std::vector<Index> pairs;  // of these bodies, also those that are far apart
     std::vector<SolverRows> rows;
-    std::vector<WatchedPairs> watched;
   };
   /// Each collider that moves is in one; in the order of their first bodies.
   const std::vector<Island>& islands() const { return islands_; }
@@ -83,14 +87,22 @@ class SurfaceContacts {
   /// as rigid bodies. None where it is not said.
   void setRigidShare(Index collider, const RigidGroups* groups, double share);
   /// After the bodies of an island have moved by a substep, the number-th of the frame. previous: [m] at its start, one
-  /// a particle of each body of the island. step.warm and step.number are set here. scene, colliders: as find() got
-  /// them.
-  void solveIsland(Index island, SolverStep step, int number, const SurfaceScene& scene,
-                   const std::vector<Collider>& colliders, const std::vector<Vec3*>& previous,
-                   std::vector<SpringRow>& springs, SolverScratch& scratch, LimitScratch& limit_scratch,
+  /// a particle of each body of the island. step.warm and step.number are set here. colliders: as find() got them.
+  void solveIsland(Index island, SolverStep step, int number, const std::vector<Collider>& colliders,
+                   const std::vector<Vec3*>& previous, std::vector<SpringRow>& springs, SolverScratch& scratch,
                    SolverCounters& counters, const ForEach& for_each = oneAfterAnother);
   /// [kg m] that the push sphere gave the bodies of an island in the last substep.
   Vec3 sphereImpulse(Index island) const;
+  /// visit(collider, particle, unit normal out of what it presses on): of rows of an island that press.
+  template <class Visit>
+  void eachPressed(Index island, const Visit& visit) const {
+    for (const SolverRows& rows : islands_[island].rows)
+      for (const ContactRow& row : rows.set->rows) {
+        if (!(row.normal.dot(row.impulse) > 0.0)) continue;
+        for (Index k = row.begin; k < row.middle; ++k) visit(rows.a, rows.set->entries[k].particle, row.normal);
+        for (Index k = row.middle; k < row.end; ++k) visit(rows.b, rows.set->entries[k].particle, Vec3(-row.normal));
+      }
+  }
   /// One a collider: whether the sphere presses on it.
   void pushedBySphere(std::vector<char>& pushed) const;
   /// Impulses of the last substep of h [s] become forces.
@@ -122,17 +134,7 @@ class SurfaceContacts {
   struct Pair : KeptPair {
     Index a = 0, b = kNoIndex;  // colliders of this frame
     bool stale = true, near = false;
-    std::size_t queried = 0;          // vertices, when it was found last
-    double slack = 0.0;               // [m] by which both together may be off their ways before something is missed
-    double off_a = 0.0, off_b = 0.0;  // [m] that they were when it was found
-  };
-  /// The way of a collider that was searched: straight on.
-  struct Way {
-    Points from, speed;    // [m], [m/s] of particles
-    Points away;           // [m] of particles from it
-    double since = 0.0;    // [s] in the frame
-    double off = 0.0;      // [m] any vertex from it, at most, at the end of the last substep
-    double was_off = 0.0;  // [m] at its start
+    std::size_t queried = 0;  // points, when it was found last
   };
   /// Of one thread.
   struct Scratch {
@@ -142,16 +144,10 @@ class SurfaceContacts {
   using PairName = std::tuple<std::uint64_t, std::uint64_t, Kind>;
   Pair& pairOf(Kind kind, const std::vector<Collider>& colliders, Index a, Index b, std::uint64_t key_b);
   Index colliderOf(std::uint64_t key) const;  // kNoIndex: none
-  void findPair(const SurfaceScene& scene, const std::vector<Collider>& colliders, double h, Pair& pair);
-  bool findAgain(Island& island, const SurfaceScene& scene, const std::vector<Collider>& colliders, double since,
-                 double h, const ForEach& for_each);
-  void placeAgain(const std::vector<Collider>& colliders, Index c, double h);
-  bool isInside(std::uint64_t key_a, std::uint64_t key_b) const;
+  void findPair(const SurfaceScene& scene, const std::vector<Collider>& colliders, Pair& pair);
   void makeRows(const SurfaceScene& scene, const std::vector<Collider>& colliders, Scratch& scratch, Pair& pair) const;
   void listReached(const SurfaceScene& scene, const std::vector<Collider>& colliders);
   void joinIslands(const std::vector<Collider>& colliders);
-  void listOf(Island& island, const std::vector<Collider>& colliders);
-  void listWatched(const Island& island);
   void fillSlots(const std::vector<Collider>& colliders);
 
   BroadPhase broad_phase_;
@@ -164,17 +160,12 @@ class SurfaceContacts {
   std::vector<Pair*> pairs_;             // of this frame
   std::vector<SurfaceFrame> frames_;     // one a collider; filled where moved_
   std::vector<std::uint64_t> frame_of_;  // key of the obstacle whose frame stays
-  std::vector<char> framed_;             // one a collider: its frame is of this step
-  std::vector<const Vec3*> where_;       // [m] one a collider: particles as its frame has them
-  std::vector<Way> searched_;            // one a collider
-  std::vector<char> turned_;             // one a collider: is off its way
-  std::mutex spare_mutex_, frame_mutex_;
+  std::mutex spare_mutex_;
   std::vector<std::unique_ptr<Scratch>> spare_;
   std::vector<Index> reached_;
   std::vector<std::size_t> first_slots_;  // one a collider
   std::vector<Slot> now_, before_;
   std::vector<SolverBody> solver_bodies_;
-  std::vector<LimitedBody> limited_;
   std::vector<Island> islands_, spare_islands_;
   std::vector<Index> root_, island_of_;  // one a collider
   std::vector<char> island_held_;

@@ -5,22 +5,18 @@
 
 namespace meshless {
 
-/// A ridge is convex, and a valley concave, by more than kRidge.
-enum class EdgeShape : std::uint8_t { kRidge, kFlat, kValley };
-
 struct SurfaceFrame {
   Points vertices;                // [m]
   Points velocities;              // [m/s] of the vertices
   Points face_normals;            // unit; zero where a face has no area
   Points vertex_normals;          // unit, of the areas around; zero without
   TreeBoxes boxes;                // of faces, swept by their velocities in the frame
-  std::vector<EdgeShape> shapes;  // one an edge
-  std::vector<Index> ridges;
+  std::vector<Index> ridges;      // edges that are convex by more than kRidgeCosine, and borders
   Box bounds;                   // swept
   std::vector<FloatBox> swept;  // of vertices
 
   std::size_t bytes() const {
-    return bytesOf(vertices, velocities, face_normals, vertex_normals, shapes, ridges, swept) + boxes.bytes();
+    return bytesOf(vertices, velocities, face_normals, vertex_normals, ridges, swept) + boxes.bytes();
   }
 };
 

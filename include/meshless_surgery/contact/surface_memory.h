@@ -5,20 +5,18 @@
 
 #include "meshless_surgery/base/archive.h"
 #include "meshless_surgery/contact/contact_rows.h"
-#include "meshless_surgery/contact/motion_limit.h"
 
 namespace meshless {
 
-/// What is between two colliders: vertices, or edges, of the first against the second.
+/// What is between two colliders: points of the first against faces of the second.
 struct KeptPair {
-  enum class Kind : std::uint8_t { kVertexFace, kEdgeEdge, kGround, kSphere };
+  enum class Kind : std::uint8_t { kVertexFace, kGround, kSphere, kGiven };
   Kind kind = Kind::kVertexFace;
   std::uint64_t key_a = 0, key_b = 0;  // of the colliders; key_b beyond all of theirs: of the ground or the sphere
   bool found = false;                  // once at least
   double way_a = 0.0, way_b = 0.0;     // [m] that they had gone when it was found
   RowSet set;
   std::vector<RememberedSide> sides;  // ascending by vertex
-  WatchedSet watched;
 };
 
 /// How far a collider has gone since it was first near something.
@@ -48,8 +46,8 @@ void serialize(A& archive, RowEntry& v) {
 }
 template <class A>
 void serialize(A& archive, ContactRow& v) {
-  auto& [normal, constant, gap, rise, friction, bounce, impulse, begin, middle, end, kind, order, features] = v;
-  archive(normal, constant, gap, rise, friction, bounce, impulse, begin, middle, end, kind, order, features);
+  auto& [normal, constant, gap, rise, friction, restitution, impulse, begin, middle, end, kind, order, features] = v;
+  archive(normal, constant, gap, rise, friction, restitution, impulse, begin, middle, end, kind, order, features);
 }
 template <class A>
 void serialize(A& archive, RowSet& v) {
@@ -62,19 +60,9 @@ void serialize(A& archive, RememberedSide& v) {
   archive(vertex, depth, normal);
 }
 template <class A>
-void serialize(A& archive, WatchedFeatures& v) {
-  auto& [vertices, of_a, normal, least] = v;
-  archive(vertices, of_a, normal, least);
-}
-template <class A>
-void serialize(A& archive, WatchedSet& v) {
-  auto& [features, until, gone] = v;
-  archive(features, until, gone);
-}
-template <class A>
 void serialize(A& archive, KeptPair& v) {
-  auto& [kind, key_a, key_b, found, way_a, way_b, set, sides, watched] = v;
-  archive(kind, key_a, key_b, found, way_a, way_b, set, sides, watched);
+  auto& [kind, key_a, key_b, found, way_a, way_b, set, sides] = v;
+  archive(kind, key_a, key_b, found, way_a, way_b, set, sides);
 }
 template <class A>
 void serialize(A& archive, KeptWay& v) {

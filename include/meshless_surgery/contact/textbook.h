@@ -1,8 +1,9 @@
 // The paper's contact: particles against tetrahedra through a spatial hash (Teschner et al. 2003), consistent
-// penetration depth and direction (Heidelberger et al. 2004), and a projection that keeps momentum. A scene chooses it
-// as `contact: textbook`.
+// penetration depth and direction (Heidelberger et al. 2004). What it finds goes to the solver of rows. A scene chooses
+// it as `contact: textbook`.
 #pragma once
 
+#include "meshless_surgery/contact/contact_rows.h"
 #include "meshless_surgery/contact/deformable.h"
 
 namespace meshless {
@@ -19,10 +20,7 @@ struct Penetration {
 /// Finds every penetration between different bodies whose bounds overlap; ordered by body and particle.
 std::vector<Penetration> findPenetrations(const std::vector<ContactBody>& bodies, ContactCounters& counters);
 
-/// Moves particle and tetrahedron apart along the direction until the depth is gone, at most max_correction [m] for one
-/// contact; shares the motion by inverse mass, so that the impulses are equal and opposite; then friction on the
-/// motion of this substep within Coulomb's cone.
-void resolvePenetrations(const std::vector<Penetration>& penetrations, std::vector<ContactBody>& bodies,
-                         double max_correction, ContactCounters& counters);
+/// Appends the row of a penetration: the particle of a against the point of b in which it is.
+void addRow(const Penetration& penetration, const std::vector<ContactBody>& bodies, double friction, RowSet& set);
 
 }  // namespace meshless

@@ -6,14 +6,15 @@
 #include <set>
 
 #include "meshless_surgery/body/preserve.h"
-#include "meshless_surgery/contact/contacts.h"
+#include "meshless_surgery/contact/deformable.h"
 #include "meshless_surgery/tools/tools.h"
 
 namespace meshless {
 
-/// kRestShape: contact/contacts.h. kSurface: contact/surface_contacts.h. kAuto: kSurface as soon as a body is elastic,
-/// else kRestShape. kTextbook: the paper's, contact/textbook.h, for comparison.
-enum class ContactMethod { kNone, kTextbook, kRestShape, kSurface, kAuto };
+/// What bodies meet: the ground and the push sphere always; kSurface: each other and obstacles, by their surfaces
+/// (contact/surface_contacts.h); kTextbook: each other, in pairs that are found as the paper does (contact/textbook.h),
+/// for comparison.
+enum class ContactMethod { kNone, kTextbook, kSurface };
 
 struct WorldSettings {
   Vec3 gravity{0.0, 0.0, -9.81};       // [m/s^2]
@@ -22,9 +23,9 @@ struct WorldSettings {
   double step_rate = 120.0;  // [Hz] 1..10,000
   int substeps = 1;          // 1..1,000, at the least; an elastic body can need more
   int max_substeps = 64;  // 1..1,000; beyond it elastic bodies deform more slowly than their material, and it is said
-  ContactMethod contact = ContactMethod::kAuto;
+  ContactMethod contact = ContactMethod::kSurface;
   int threads = 1;                  // 1..64; results do not depend on it to the bit
-  bool sleep = true;                // what holds still for half a second costs nothing; with kRestShape and kSurface
+  bool sleep = true;                // what holds still for half a second costs nothing
   double pick_max_distance = 0.05;  // [m]
   double pick_stiffness = 500.0;    // [N/m]
   double pick_radius = 0.0;         // [m] of the grasp along the body; 0: four particle spacings
@@ -48,6 +49,7 @@ struct SceneDef {
   std::map<std::string, Material> materials;
   std::vector<BodyDef> bodies;
   std::vector<ObstacleDef> obstacles;
+  std::vector<std::string> warnings;  // of keys that mean something else now
 };
 
 enum class EventType {
@@ -86,12 +88,11 @@ struct StepReport {
   std::size_t asleep = 0;  // of them
   std::size_t woken = 0;
   std::size_t substeps = 0;
-  std::size_t island_batches = 0;  // that took the substeps each by itself; 0: all bodies took each substep together
   MatchCounters match_counters;
   ContactCounters contact_counters;
   PreserveCounters preserve_counters;
   std::size_t tetrahedralizations = 0;  // since the start
-  std::size_t contact_shapes = 0;       // rest shapes prepared for contact in this step
+  std::size_t contact_shapes = 0;       // surfaces prepared for contact in this step
   std::size_t ground_contacts = 0;
   std::size_t push_contacts = 0;
   std::size_t mended = 0;     // bodies whose coordinates were not finite, and that start anew from rest
@@ -102,7 +103,7 @@ struct StepReport {
 struct MemoryUse {
   std::size_t models = 0;   // rest shapes, clusters, surfaces and their binding
   std::size_t states = 0;   // positions, velocities, poses, and what a step needs beside them
-  std::size_t contact = 0;  // rest shapes as contact sees them, contacts and their solver
+  std::size_t contact = 0;  // surfaces as contact sees them, rows and their solver
   std::size_t kept = 0;     // for reset and undo
   std::size_t particles = 0;
 
@@ -115,7 +116,7 @@ struct SnapshotWants {
   bool surfaces = false;
   bool particles = false;
   bool measures = false;
-  bool contacts = false;  // of the last step, with kRestShape and kSurface; none after a change of bodies
+  bool contacts = false;  // of the last step; none after a change of bodies
 };
 
 /// A point of a body's surface that carries load.
@@ -191,7 +192,7 @@ class World {
   /// Like SpawnCommand, and brought back by reset.
   Result<SpawnReply> addSceneBody(std::shared_ptr<const PreparedBody> body);
 
-  /// Stays for good. Bodies meet it with ContactMethod::kRestShape and kSurface (so with kAuto too), and with no other
+  /// Stays for good. Bodies meet it with ContactMethod::kSurface alone.
   /// method. Refuses an empty or open surface, a friction outside of 0..10, and a name in use.
   Status addObstacle(ObstacleDef obstacle);
 
