@@ -15,6 +15,7 @@ constexpr double kTie = 2e-3;           // of the mean edge: nearer than this tw
 constexpr double kDeeper = 1.3;         // times as deep as it was: a vertex inside may have gone on
 constexpr double kLeastOpposed = 0.05;  // cosine by which a direction has to oppose a face of the pushed body
 constexpr double kSameWay = 0.9;        // cosine from which a second direction of a vertex says nothing new
+constexpr double kFlat = 0.3;            // sine by which neighbours may be farther out than what sticks out
 constexpr double kMostRidgePoints = 1e6;
 constexpr double kSelfOpposed = 0.3;    // cosine by which faces of one body oppose each other where they may meet
 
@@ -82,6 +83,16 @@ double opposition(const SurfaceFrame& frame, const SurfacePoint& point, const Ve
   for (std::size_t k = 0; k < point.face_count; ++k)
     most = std::max(most, -direction.dot(frame.face_normals[point.faces[k]]));
   return most;
+}
+
+/// Whether a point sticks out along a direction, as against its neighbours: what comes from there meets it and not them.
+bool sticksOut(const PairSearch::Side& side, const SurfacePoint& point, const Vec3& direction) {
+  for (std::size_t k = 0; k < point.face_count; ++k)
+    for (const Index v : side.surface->triangles[point.faces[k]]) {
+      const Vec3 way = side.frame->vertices[v] - point.place;
+      if (way.dot(direction) > kFlat * way.norm()) return false;
+    }
+  return true;
 }
 
 class PointSearch {
@@ -252,7 +263,8 @@ class PointSearch {
       }
     } else if (best.distance <= best.reach) {
       const Vec3 normal = (p - best.point) / best.distance;
-      if (mayPush(point, normal)) add(point, best, normal, best.distance);
+      if (mayPush(point, normal) && (best.corners == 3 || sticksOut(a_, point, -normal)))
+        add(point, best, normal, best.distance);
     }
     if (point.isVertex()) rememberOutside(point.vertices[0], p, best);
     if (!b_.surface->closed) return;

@@ -8,6 +8,7 @@ namespace {
 
 constexpr double kOutTime = 0.03;  // [s] in which an overlap falls to 1/e
 constexpr double kOutSpeed = 0.5;  // [1/s] mean edges: overlap is removed no faster
+constexpr int kSweeps = 4;         // fewer kick aside what lands flat, and let it creep on a slope
 constexpr double kSlop = 0.01;     // mean edges of overlap that stay: stacks that are lifted out of it sway
 
 // Two registers of any x86-64; what is wider goes through memory where it is not there.
@@ -161,22 +162,18 @@ class Solver {
     if (!row.impulse.isZero(0.0)) push(active, row.impulse);
   }
 
-  /// rubs: with friction, which is about what all rows have pressed before.
-  void visit(const Active& active, bool rubs) {
+  void visit(const Active& active) {
     ContactRow& row = *active.row;
     const Vec3 now = sumNow(active);
     const double gap = row.normal.dot(now) + row.constant, pressed = row.normal.dot(row.impulse);
     // Nobody who is not dragged goes farther than an edge in a substep: more than that is not asked for at once.
     const double lacking = std::min(active.target - gap, edgeOf(active.a, active.b));
     const double press = std::max(0.0, pressed + active.mass * lacking);
-    Vec3 across = row.impulse - pressed * row.normal;
-    if (rubs) {
-      Vec3 slid = now - active.start;
-      slid -= row.normal.dot(slid) * row.normal;
-      across -= slid / active.sideways;
-      const double most = row.friction * press, squared = across.squaredNorm();
-      if (squared > most * most) across *= most / std::sqrt(squared);
-    }
+    Vec3 slid = now - active.start;
+    slid -= row.normal.dot(slid) * row.normal;
+    Vec3 across = row.impulse - pressed * row.normal - slid / active.sideways;
+    const double most = row.friction * press, squared = across.squaredNorm();
+    if (squared > most * most) across *= most / std::sqrt(squared);
     const Vec3 impulse = press * row.normal + across;
     const Vec3 more = impulse - row.impulse;
     row.impulse = impulse;
@@ -389,10 +386,11 @@ void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& spri
     solver.warmStart(active, step.warm);
   }
   // Contacts have the last word. Always in the same order: in turns, what the last impulses leave over changes from
-  // substep to substep, and stacks of stiff bodies sway. All press before any rubs: who lands flat is not kicked aside.
-  for (std::size_t n = 0; n < springs.size(); ++n) solver.visit(springs[n], scratch.pulls[n], step.h);
-  for (const bool rubs : {false, true})
-    for (const auto& active : scratch.active) solver.visit(active, rubs);
+  // substep to substep, and stacks of stiff bodies sway.
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    for (std::size_t n = 0; n < springs.size(); ++n) solver.visit(springs[n], scratch.pulls[n], step.h);
+    for (const auto& active : scratch.active) solver.visit(active);
+  }
   solver.moveGroups(springs);
   if (free.empty()) return;
   for (const auto& active : scratch.active) {

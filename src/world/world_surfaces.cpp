@@ -15,7 +15,7 @@ namespace meshless {
 namespace {
 
 constexpr int kContactSubsteps = 4;   // at least, where something may meet: in longer ones stacks of stiff bodies rock
-constexpr double kFarthest = 1.0;    // edges, between two searches
+constexpr double kFarthest = 0.5;    // edges, between two searches
 constexpr double kMostSearches = 64;    // of a frame
 constexpr std::size_t kWorkParticles = 512;  // of small islands together: what they read stays in the cache
 constexpr double kSlowedMass = 0.05;  // of an island, at most: slivers are slowed, instead of all taking their substeps

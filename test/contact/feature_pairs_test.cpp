@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
 
-#include "meshless_surgery/contact/motion_limit.h"
 #include "meshless_surgery/geometry/primitives.h"
 
 namespace meshless {
@@ -68,18 +68,17 @@ TEST(FeaturePairs, NothingIsMetBeyondTheMarginAndTheWayOfTheFrame) {
 TEST(FeaturePairs, PartingAndSlidingAreNoApproach) {
   const Placed low(boxMesh(Vec3(1, 1, 1), 20, 20, 20), Vec3::Zero());
   const auto foundOf = [&low](const Vec3& velocity) {
-    const Placed high(boxMesh(Vec3(0.4, 0.4, 0.4), 8, 8, 8), Vec3(0.013, 0.009, 0.705), velocity);
+    const Placed high(boxMesh(Vec3(0.4, 0.4, 0.4), 8, 8, 8), Vec3(0.013, 0.009, 0.76), velocity);
     const PairSearch search = between(high, low);
     SearchScratch scratch;
     findVerticesNear(search, scratch);
     findVertexFace(search, scratch);
-    findEdgeEdge(search, scratch.found);
-    return std::array<std::size_t, 2>{scratch.found.pairs.size(), scratch.found.watched.size()};
+    return scratch.found.pairs.size();
   };
-  const auto still = foundOf(Vec3::Zero()), apart = foundOf(Vec3(0, 0, 10)), aside = foundOf(Vec3(10, 0, 0));
-  EXPECT_EQ(apart, still);
-  EXPECT_EQ(aside[0], still[0]);
-  EXPECT_GT(foundOf(Vec3(0, 0, -10))[1], still[1]);
+  const auto still = foundOf(Vec3::Zero());
+  EXPECT_EQ(foundOf(Vec3(0, 0, 10)), still);
+  EXPECT_EQ(foundOf(Vec3(10, 0, 0)), still);
+  EXPECT_GT(foundOf(Vec3(0, 0, -10)), still);
 }
 
 TEST(FeaturePairs, AVertexInsideGoesOutByTheNearFaceThatItOpposes) {
@@ -97,12 +96,11 @@ TEST(FeaturePairs, AVertexInsideGoesOutByTheNearFaceThatItOpposes) {
 }
 
 // Turned inside out, its faces oppose nothing: what it touches is held by the side that it was on.
-TEST(FeaturePairs, WhatTouchesInsideOutIsWatchedOnTheSideWhereItWas) {
+TEST(FeaturePairs, WhatTouchesInsideOutIsHeldOnTheSideWhereItWas) {
   const Placed low(boxMesh(Vec3(1, 1, 1), 4, 4, 4), Vec3::Zero());
   TriangleMesh inside_out = boxMesh(Vec3(0.4, 0.4, 0.4), 1, 1, 1);
   for (Vec3& p : inside_out.vertices) p.z() = -p.z();
-  const auto watchedOn = [&](double height, const std::vector<RememberedSide>& known,
-                             std::vector<RememberedSide>& now) {
+  const auto heldAt = [&](double height, const std::vector<RememberedSide>& known, std::vector<RememberedSide>& now) {
     const Placed high(inside_out, Vec3(0.03, 0.02, 0.7 + height));
     PairSearch search = between(high, low);
     search.first = false;
@@ -113,14 +111,16 @@ TEST(FeaturePairs, WhatTouchesInsideOutIsWatchedOnTheSideWhereItWas) {
     findVertexFace(search, scratch);
     now = scratch.found.sides;
     std::size_t above = 0;
-    for (const WatchedFeatures& watched : scratch.found.watched) above += watched.normal.z() > 0.999;
+    for (const FeaturePair& pair : scratch.found.pairs) above += pair.normal.z() > 0.999;
     return above;
   };
   std::vector<RememberedSide> sides, later;
-  EXPECT_GE(watchedOn(0.01, {}, sides), 4u);
+  EXPECT_EQ(heldAt(0.01, {}, sides), 0u);
   ASSERT_EQ(sides.size(), 4u) << "though no row pushes them";
-  EXPECT_GE(watchedOn(1e-6, sides, later), 4u);
-  EXPECT_EQ(later.size(), 4u) << "for as long as they touch";
+  for (const double height : {0.01, 1e-6, -0.01}) {
+    EXPECT_GE(heldAt(height, sides, later), 4u) << height;
+    EXPECT_EQ(later.size(), 4u) << "for as long as they touch";
+  }
 }
 
 // The halves of a cut block lie on each other: each of the twin faces is outside of the other.
@@ -160,68 +160,30 @@ TEST(FeaturePairs, WhoIsOutsideBesideAFoldedSpikeIsNotTakenForOneInside) {
   for (const RememberedSide& side : sides) EXPECT_EQ(side.depth, 0.0);
 }
 
-// Down and so far aside that it comes out over another face than the nearest: that one is watched too.
-TEST(FeaturePairs, WhoMovesAsideInAFrameIsHeldBackByTheFacesThere) {
-  const Vec3 way(0.4, 0.1, -0.2);
-  const Placed low(boxMesh(Vec3(1, 1, 1), 4, 4, 4), Vec3::Zero(), Vec3::Zero(), 1.0);
-  const Placed high(boxMesh(Vec3(0.1, 0.1, 0.1), 1, 1, 1), Vec3(-0.13, -0.13, 0.6), way, 1.0);
+// A bar lies across another: between their ends nothing but points on their ridges meets the other's faces.
+TEST(FeaturePairs, LongRidgesMeetByPointsOneSpacingApart) {
+  const Placed low(boxMesh(Vec3(2, 0.2, 0.2), 1, 1, 1), Vec3::Zero());
+  const Placed high(boxMesh(Vec3(0.2, 2, 0.2), 1, 1, 1), Vec3(0.013, 0.02, 0.21));
   PairSearch search = between(high, low);
-  search.h = 1.0;
-  SearchScratch search_scratch;
-  findVerticesNear(search, search_scratch);
-  findVertexFace(search, search_scratch);
-  const FoundFeatures& found = search_scratch.found;
-  ASSERT_FALSE(found.watched.empty());
-  Points moved = high.frame.vertices;
-  for (Vec3& p : moved) p += way;
-  const Placed* const placed[2] = {&high, &low};
-  Points low_at = low.frame.vertices;
-  const std::vector<double> inverse[2] = {std::vector<double>(moved.size(), 1.0),
-                                          std::vector<double>(low_at.size(), 0.0)};
-  std::vector<LimitedBody> bodies;
-  for (int n = 0; n < 2; ++n) {
-    LimitedBody body;
-    const Index count = placed[n]->surface.vertices();
-    body.supports = &placed[n]->surface.supports;
-    body.positions = n == 0 ? moved.data() : low_at.data();
-    body.previous = placed[n]->frame.vertices.data();
-    body.particles = count;
-    body.inverse_masses = inverse[n].data();
-    for (Index v = 0; v < count; ++v) body.watched.push_back(v);
-    body.vertices.resize(count);
-    body.edited.assign(count, 0);
-    body.is_watched.assign(count, 0);
-    bodies.push_back(std::move(body));
-  }
-  WatchedSet set;
-  set.features = found.watched;
-  set.start();
-  LimitScratch scratch;
-  limitMotion({{&set, 0, 1, 1e-9}}, bodies, {0, 1}, false, scratch);
-  double lowest = 1.0;
-  for (const Vec3& p : moved) lowest = std::min(lowest, p.z());
-  EXPECT_GT(lowest, 0.5);
-}
-
-TEST(FeaturePairs, RidgesThatCrossMeetAlongTheirCommonNormal) {
-  const double half = std::sqrt(0.5);
-  TriangleMesh bar = boxMesh(Vec3(2, 1, 1), 1, 1, 1);
-  TriangleMesh turned = bar;
-  for (Vec3& p : turned.vertices) p = Vec3(p.x(), half * (p.y() - p.z()), half * (p.y() + p.z()));  // on an edge
-  TriangleMesh across = turned;
-  for (Vec3& p : across.vertices) p = Vec3(-p.y(), p.x(), p.z());
-  for (const double gap : {0.02, -0.02}) {
-    const Placed low(turned, Vec3::Zero()), high(across, Vec3(0.05, 0.03, 2.0 * half + gap));
-    FoundFeatures found;
-    findEdgeEdge(between(high, low), found);
-    const std::vector<FeaturePair>& pairs = found.pairs;
-    ASSERT_EQ(pairs.size(), 1u);
-    EXPECT_NEAR((pairs[0].normal - Vec3::UnitZ()).norm(), 0.0, 1e-9);
-    EXPECT_NEAR(pairs[0].gap, gap, 1e-9);
-    EXPECT_TRUE(vertexFace(between(high, low)).empty()) << "no vertex is near a face";
-    const bool watched = std::any_of(found.watched.begin(), found.watched.end(),
-                                     [&](const WatchedFeatures& w) { return w.vertices == pairs[0].vertices; });
-    EXPECT_EQ(watched, gap > 0.0) << "hooked into each other they must be free to part";
+  EXPECT_TRUE(vertexFace(search).empty()) << "without a spacing";
+  for (const double spacing : {0.15, 0.05}) {
+    search.spacing = spacing;
+    const std::vector<FeaturePair> pairs = vertexFace(search);
+    std::size_t down = 0;
+    std::set<std::array<Index, 2>> names;
+    for (const FeaturePair& pair : pairs) {
+      ASSERT_EQ(pair.of_a, 2);
+      if (pair.normal.z() < 0.99) continue;
+      ++down;
+      names.insert(pair.features);
+      EXPECT_NEAR(pair.gap, 0.01, 1e-12);
+      Vec3 between = Vec3::Zero();
+      for (int k = 0; k < 5; ++k)
+        between += pair.shares[k] * (k < 2 ? high : low).frame.vertices[pair.vertices[k]];
+      EXPECT_NEAR((between - Vec3(0, 0, 0.01)).norm(), 0.0, 1e-12);
+    }
+    EXPECT_EQ(names.size(), down) << "each has a name of its own";
+    EXPECT_NEAR(static_cast<double>(down), 2.0 * 0.2 / spacing, 2.0) << "two ridges cross a width of 0.2";
   }
 }
 

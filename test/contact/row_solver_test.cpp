@@ -68,12 +68,10 @@ struct Clash {
     for (int n = 0; n < 2; ++n) std::copy(after[n].begin(), after[n].end(), places[n].begin());
     std::vector<SpringRow> springs;
     SolverScratch scratch;
-    LimitScratch limit_scratch;
     SolverCounters counters;
     SolverStep step;
     step.h = kH;
-    contacts.solveIsland(0, step, 0, scene, colliders, {before[0].data(), before[1].data()}, springs, scratch,
-                         limit_scratch, counters);
+    contacts.solveIsland(0, step, 0, colliders, {before[0].data(), before[1].data()}, springs, scratch, counters);
     for (int n = 0; n < 2; ++n) after[n] = places[n];
     return counters;
   }
@@ -228,8 +226,8 @@ TEST(RowSolver, AGapThatAlmostAllHeldParticlesLackThrowsNobody) {
   }
 }
 
-// One overlap fades at no speed; where two push against each other nobody moves, and no impulse builds up that would
-// throw who is between them once they part.
+// One overlap fades at no speed; where two push against each other nobody goes beyond either, and no impulse builds up
+// that would throw who is between them once they part.
 TEST(RowSolver, OverlapsFadeWithoutSpeedAndBuildNothingUp) {
   for (const bool jammed : {false, true}) {
     RowSet set;
@@ -251,12 +249,11 @@ TEST(RowSolver, OverlapsFadeWithoutSpeedAndBuildNothingUp) {
     bodies[0].edge_length = 0.01;
     std::vector<SpringRow> springs;
     SolverStep step;
-    step.h = 1e-3;
+    step.h = step.frame = 1e-3;
     SolverScratch scratch;
     SolverCounters counters;
     double last = 0.0;
     for (int n = 0; n < 600; ++n) {
-      step.number = n;
       solveRows({{&set, 0, kNoIndex}}, springs, bodies, step, {}, scratch, counters);
       EXPECT_EQ(now[0].z, before[0].z);  // no speed
       for (const ContactRow& row : set.rows) EXPECT_LT(row.impulse.norm(), 1e-12);
@@ -264,9 +261,9 @@ TEST(RowSolver, OverlapsFadeWithoutSpeedAndBuildNothingUp) {
       last = now[0].z;
     }
     if (jammed)
-      EXPECT_LT(std::abs(last), 1e-4);
+      EXPECT_LE(std::abs(last), 1e-3);
     else
-      EXPECT_NEAR(last, 1e-3, 1e-5);
+      EXPECT_NEAR(last, 1e-3, 0.011 * 0.01) << "but for the slop, and no farther";
   }
 }
 

@@ -28,11 +28,10 @@ ContactMesh meshOf(std::vector<Tetrahedron> tetrahedra) {
 /// Owns what a ContactBody views.
 struct Body {
   ContactMesh mesh;
-  Points positions, previous;
+  Points positions;
   std::vector<double> inverse_masses;
 
   void finish(double mass) {
-    previous = positions;
     inverse_masses.assign(positions.size(), 1.0 / mass);
   }
 };
@@ -83,7 +82,6 @@ Body ball(double radius, int inner, unsigned seed, double mass = 1.0) {
 
 void move(Body& body, const Pose& pose, double scale = 1.0) {
   for (Vec3& p : body.positions) p = pose * (scale * p);
-  body.previous = body.positions;
 }
 
 std::vector<ContactBody> views(std::vector<Body>& bodies) {
@@ -92,7 +90,6 @@ std::vector<ContactBody> views(std::vector<Body>& bodies) {
     ContactBody view;
     view.mesh = &body.mesh;
     view.positions = &body.positions;
-    view.previous = &body.previous;
     view.inverse_masses = &body.inverse_masses;
     view.bounds = boundsOf(body.positions);
     all.push_back(view);
@@ -365,10 +362,9 @@ TEST(Penetrations, DoNotMindFlatInvertedAndHugeTetrahedra) {
         const std::vector<Penetration> found = findPenetrations(all, counters);
         EXPECT_TRUE(sane(found));
         for (const Penetration& p : found) EXPECT_FALSE(p.body_a == body && p.particle == particle);
-        resolvePenetrations(found, all, 1.0, counters);
-        for (std::size_t k = 0; k < bodies.size(); ++k)
-          for (std::size_t i = 0; i < bodies[k].positions.size(); ++i)
-            EXPECT_TRUE((k == body && i == particle) || bodies[k].positions[i].allFinite());
+        RowSet set;
+        for (const Penetration& p : found) addRow(p, all, 0.5, set);
+        for (const ContactRow& row : set.rows) EXPECT_TRUE(row.normal.allFinite() && std::isfinite(row.constant));
       }
   }
 }
@@ -385,165 +381,47 @@ TEST(Penetrations, NothingToQueryIsFine) {
   EXPECT_EQ(counters.tested, 0u);
 }
 
-// --- response
+// --- rows
 
-struct Momentum {
-  Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
-};
-/// Of the displacement from `before`, about the origin [kg m], [kg m^2].
-Momentum momentumOf(const std::vector<Body>& before, const std::vector<Body>& after) {
-  Momentum sum;
-  for (std::size_t k = 0; k < before.size(); ++k)
-    for (std::size_t i = 0; i < before[k].positions.size(); ++i) {
-      const Vec3 step = (after[k].positions[i] - before[k].positions[i]) / before[k].inverse_masses[i];
-      sum.linear += step;
-      sum.angular += before[k].positions[i].cross(step);
-    }
-  return sum;
-}
-double motionOf(const std::vector<Body>& before, const std::vector<Body>& after) {
-  double sum = 0.0;
-  for (std::size_t k = 0; k < before.size(); ++k)
-    for (std::size_t i = 0; i < before[k].positions.size(); ++i)
-      sum += (after[k].positions[i] - before[k].positions[i]).norm() / before[k].inverse_masses[i];
-  return sum;
-}
-
-std::vector<Body> turnedPair(double mass_ratio) {
-  std::vector<Body> bodies{lattice(Vec3(0.1, 0.1, 0.1), 3, 0.01), ball(0.07, 30, 3, 0.01 * mass_ratio)};
+// A row presses the two apart along the direction of the penetration, by its depth, with impulses that are equal and
+// opposite.
+TEST(TextbookRows, PressTheParticleAndTheTetrahedronApart) {
+  std::vector<Body> bodies{lattice(Vec3(0.1, 0.1, 0.1), 3, 0.01), ball(0.07, 30, 3, 0.02)};
   move(bodies[1], {Quat(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized())), Vec3(0.03, 0.02, 0.09)});
-  for (std::size_t k = 0; k < bodies[1].positions.size(); ++k)  // it came from above, sliding
-    bodies[1].previous[k] += Vec3(-0.004, 0.002, 0.003);
-  return bodies;
-}
-
-TEST(Response, KeepsLinearMomentumExactly) {
-  for (const double ratio : {1e-3, 1.0, 50.0}) {
-    const std::vector<Body> before = turnedPair(ratio);
-    std::vector<Body> bodies = before;
-    std::vector<ContactBody> all = views(bodies);
-    ContactCounters counters;
-    const std::vector<Penetration> found = findPenetrations(all, counters);
-    ASSERT_GT(found.size(), 5u);
-    resolvePenetrations(found, all, 1.0, counters);
-    const double motion = motionOf(before, bodies);
-    ASSERT_GT(motion, 0.0);
-    EXPECT_LT(momentumOf(before, bodies).linear.norm(), 1e-13 * motion);
-  }
-}
-
-TEST(Response, OneContactExertsNoTorque) {
-  const std::vector<Body> before = turnedPair(3.0);
-  std::vector<Body> bodies = before;
+  const std::vector<ContactBody> all = views(bodies);
   ContactCounters counters;
-  for (const Penetration& one : find(bodies)) {
-    bodies = before;
-    std::vector<ContactBody> all = views(bodies);
-    resolvePenetrations({one}, all, 1.0, counters);
-    const double motion = motionOf(before, bodies);
-    if (one.depth == 0.0) continue;
-    ASSERT_GT(motion, 0.0);
-    EXPECT_LT(momentumOf(before, bodies).angular.norm(), 1e-12 * motion * 0.1);
-  }
-}
-
-TEST(Response, ManyContactsExertLittleTorque) {
-  const std::vector<Body> before = turnedPair(1.0);
-  std::vector<Body> bodies = before;
-  std::vector<ContactBody> all = views(bodies);
-  ContactCounters counters;
-  resolvePenetrations(findPenetrations(all, counters), all, 1.0, counters);
-  // Later contacts act on what earlier ones moved sideways: no more than depth times impulse.
-  EXPECT_LT(momentumOf(before, bodies).angular.norm(), 0.02 * 0.1 * motionOf(before, bodies));
-}
-
-TEST(Response, PartsWhatOverlaps) {
-  for (const double ratio : {0.01, 1.0, 100.0}) {
-    std::vector<Body> bodies = sunkCube(0.01, 3, ratio);
-    ContactCounters counters;
-    double deepest = 1.0;
-    for (int round = 0; round < 60; ++round) {
-      std::vector<ContactBody> all = views(bodies);
-      const std::vector<Penetration> found = findPenetrations(all, counters);
-      deepest = 0.0;
-      for (const Penetration& p : found) deepest = std::max(deepest, p.depth);
-      resolvePenetrations(found, all, 1.0, counters);
+  const std::vector<Penetration> found = findPenetrations(all, counters);
+  ASSERT_GT(found.size(), 5u);
+  RowSet set;
+  for (const Penetration& penetration : found) addRow(penetration, all, 0.3, set);
+  ASSERT_EQ(set.rows.size(), found.size());
+  for (std::size_t n = 0; n < found.size(); ++n) {
+    const ContactRow& row = set.rows[n];
+    double gap = row.constant, all_of_a = 0.0, all_of_b = 0.0;
+    for (Index k = row.begin; k < row.end; ++k) {
+      const bool of_a = k < row.middle;
+      const RowEntry& entry = set.entries[k];
+      const Body& body = bodies[of_a ? found[n].body_a : found[n].body_b];
+      gap += entry.coefficient * row.normal.dot(body.positions[entry.particle]);
+      (of_a ? all_of_a : all_of_b) += entry.coefficient;
     }
-    EXPECT_LT(deepest, 1e-4) << "mass ratio " << ratio;
-    EXPECT_GT(counters.corrected, 0u);
+    EXPECT_NEAR(gap, -found[n].depth, 1e-12);
+    EXPECT_NEAR(all_of_a, 1.0, 1e-12);
+    EXPECT_NEAR(all_of_b, -1.0, 1e-9);
+    EXPECT_EQ(row.normal, found[n].direction);
+    EXPECT_EQ(row.friction, 0.3);
   }
 }
 
-TEST(Response, HeldParticlesStay) {
-  std::vector<Body> bodies = sunkCube(0.01, 3);
-  bodies[1].inverse_masses.assign(bodies[1].positions.size(), 0.0);
-  const Points held = bodies[1].positions;
-  std::vector<ContactBody> all = views(bodies);
-  ContactCounters counters;
-  std::vector<Penetration> found = findPenetrations(all, counters);
-  resolvePenetrations(found, all, 1.0, counters);
-  for (std::size_t k = 0; k < held.size(); ++k) EXPECT_EQ(bodies[1].positions[k], held[k]);
-  for (const Vec3& p : bodies[0].positions) EXPECT_GT(p.z(), -1e-9);
-  // Both held: nothing moves, nothing is counted.
-  bodies = sunkCube(0.01, 3);
-  for (Body& body : bodies) body.inverse_masses.assign(body.positions.size(), 0.0);
-  all = views(bodies);
-  ContactCounters none;
-  found = findPenetrations(all, none);
-  ASSERT_FALSE(found.empty());
-  resolvePenetrations(found, all, 1.0, none);
-  EXPECT_EQ(none.corrected, 0u);
-}
-
-TEST(Response, MovesNoFurtherThanAllowed) {
-  for (const double limit : {0.0, 0.001, 0.004}) {
-    std::vector<Body> bodies = sunkCube(0.01, 1, 1.0, 1);  // none of the slab's particles is in the cube
-    bodies[1].inverse_masses.assign(bodies[1].positions.size(), 0.0);
-    const Points before = bodies[0].positions;
-    std::vector<ContactBody> all = views(bodies);
-    ContactCounters counters;
-    resolvePenetrations(findPenetrations(all, counters), all, limit, counters);
-    double furthest = 0.0;
-    for (std::size_t k = 0; k < before.size(); ++k)
-      furthest = std::max(furthest, (bodies[0].positions[k] - before[k]).norm());
-    EXPECT_NEAR(furthest, limit, 1e-12);
-  }
-}
-
-TEST(Response, FrictionHoldsWithinItsCone) {
-  for (const double friction : {0.0, 0.3, 5.0}) {
-    const double depth = 0.01, slide = 0.008;
-    std::vector<Body> bodies = sunkCube(depth, 1, 1.0, 1);
-    bodies[1].inverse_masses.assign(bodies[1].positions.size(), 0.0);
-    for (Vec3& p : bodies[0].previous) p += Vec3(-slide, 0, depth);
-    const Points before = bodies[0].positions;
-    std::vector<ContactBody> all = views(bodies);
-    for (ContactBody& body : all) body.friction = friction;
-    ContactCounters counters;
-    const std::vector<Penetration> found = findPenetrations(all, counters);
-    resolvePenetrations(found, all, 1.0, counters);
-    ASSERT_EQ(found.size(), 4u);
-    for (const Penetration& p : found) {
-      const Vec3 step = bodies[0].positions[p.particle] - before[p.particle];
-      EXPECT_NEAR(step.z(), depth, 1e-9);
-      EXPECT_NEAR(step.x(), -std::min(slide, friction * depth), 1e-9);
-      EXPECT_NEAR(step.y(), 0.0, 1e-12);
-    }
-  }
-}
-
-TEST(Response, ABodyInsideAnotherComesOut) {
-  std::vector<Body> bodies{lattice(Vec3(0.02, 0.02, 0.02), 1, 0.001), lattice(Vec3(0.2, 0.2, 0.2), 2, 1.0)};
-  move(bodies[0], {Quat(Eigen::AngleAxisd(0.3, Vec3::UnitX())), Vec3(0.03, 0.01, 0.07)});
-  ContactCounters counters;
-  for (int round = 0; round < 40; ++round) {
-    std::vector<ContactBody> all = views(bodies);
-    const std::vector<Penetration> found = findPenetrations(all, counters);
-    resolvePenetrations(found, all, 0.005, counters);
-  }
-  double lowest = 1.0;
-  for (const Vec3& p : bodies[0].positions) lowest = std::min(lowest, p.z());
-  EXPECT_GT(lowest, 0.098);
+// What has no way out is left alone.
+TEST(TextbookRows, AreNotMadeWithoutADirection) {
+  std::vector<Body> bodies{lattice(Vec3(0.1, 0.1, 0.1), 1, 0.01), lattice(Vec3(0.1, 0.1, 0.1), 1, 0.01)};
+  const std::vector<ContactBody> all = views(bodies);
+  Penetration lost;
+  lost.body_b = 1;
+  RowSet set;
+  addRow(lost, all, 0.3, set);
+  EXPECT_TRUE(set.rows.empty());
 }
 
 }  // namespace

@@ -67,7 +67,7 @@ TEST_F(Scene, DefaultsForEverythingButBodies) {
   EXPECT_EQ(scene.world.step_rate, defaults.step_rate);
   EXPECT_EQ(scene.world.substeps, defaults.substeps);
   EXPECT_EQ(scene.world.contact, defaults.contact);
-  EXPECT_EQ(scene.world.contact, ContactMethod::kAuto);
+  EXPECT_EQ(scene.world.contact, ContactMethod::kSurface);
   EXPECT_TRUE(scene.world.sleep);
   ASSERT_EQ(scene.bodies.size(), 1u);
   const BodyDef& body = scene.bodies[0];

@@ -28,11 +28,9 @@ struct Kind {
   MatchMode mode = MatchMode::kLinear;
 };
 using Clusters = ClusterOptions::Kind;
-const Kind kElastic{"Elastic", 1e5, Clusters::kAuto, ContactMethod::kAuto};
-const Kind kLooks{"Looks", 0.0, Clusters::kGrid, ContactMethod::kAuto};
-const Kind kOne{"OneCluster", 0.0, Clusters::kOne, ContactMethod::kAuto};
-const Kind kLooksOnSurface{"LooksOnSurface", 0.0, Clusters::kGrid, ContactMethod::kSurface};
-const Kind kOneOnSurface{"OneClusterOnSurface", 0.0, Clusters::kOne, ContactMethod::kSurface};
+const Kind kElastic{"Elastic", 1e5, Clusters::kAuto, ContactMethod::kSurface};
+const Kind kLooks{"Looks", 0.0, Clusters::kGrid, ContactMethod::kSurface};
+const Kind kOne{"OneCluster", 0.0, Clusters::kOne, ContactMethod::kSurface};
 
 constexpr double kRounding = 1e-9;
 struct Figure {
@@ -127,13 +125,13 @@ Lying lying(const Kind& kind, Random& random) {
 
 TEST(Physics, TheGroundCarriesTheWeight) {
   expectReached("weight",
-                {{kElastic, 0.0}, {kLooks, 0.0}, {kOne, 0.0}, {kLooksOnSurface, 7.2e-9}, {kOneOnSurface, 0.0}},
+                {{kElastic, 0.0}, {kLooks, 0.0}, {kOne, 1.2e-10}},
                 [](auto&... a) { return lying(a...).weight; });
 }
 
 TEST(Physics, WhatLiesIsAtRest) {
   expectReached("speed [m/s]",
-                {{kElastic, 0.0}, {kLooks, 0.0}, {kOne, 0.0}, {kLooksOnSurface, 2.2e-8}, {kOneOnSurface, 0.0}},
+                {{kElastic, 0.0}, {kLooks, 0.0}, {kOne, 1.2e-8}},
                 [](auto&... a) { return lying(a...).speed; });
 }
 
@@ -197,15 +195,15 @@ TEST(Physics, SlidingStartsAndGoesAsCoulombSays) {
     std::vector<Figure> sliding, sticking;
   } cases[] = {
       {Below::kGround,
-       {{kElastic, 4e-5}, {kLooks, 2.2e-6}, {kOne, 1.8e-6}, {kLooksOnSurface, 2.5e-5}, {kOneOnSurface, 4e-7}},
-       {{kElastic, 7.3e-9}, {kLooks, 5e-9}, {kOne, 0.0}, {kLooksOnSurface, 3.2e-6}, {kOneOnSurface, 4.3e-9}}},
+       {{kElastic, 1.9e-4}, {kLooks, 2e-7}, {kOne, 1.3e-7}},
+       {{kElastic, 3.4e-9}, {kLooks, 0.0}, {kOne, 1.5e-8}}},
       {Below::kObstacle,
-       {{kElastic, 3.4e-5}, {kLooks, 1.3e-6}, {kOne, 1.3e-6}, {kLooksOnSurface, 1.4e-4}, {kOneOnSurface, 1.2e-5}},
-       {{kElastic, 4.5e-7}, {kLooks, 0.0}, {kOne, 0.0}, {kLooksOnSurface, 1.2e-5}, {kOneOnSurface, 1.1e-6}}},
+       {{kElastic, 1.1e-4}, {kLooks, 4e-8}, {kOne, 4.3e-10}},
+       {{kElastic, 1.9e-8}, {kLooks, 0.0}, {kOne, 0.0}}},
       {Below::kBody,
-       {{kElastic, 0.0035}, {kLooks, 0.035}, {kOne, 0.035}, {kLooksOnSurface, 0.0029}, {kOneOnSurface, 0.0013}},
-       {{kElastic, 9.5e-6}, {kLooks, 4.1e-4}, {kOne, 4.1e-4}, {kLooksOnSurface, 3.5e-5}, {kOneOnSurface, 2.8e-6}}},
-      {Below::kFineBody, {}, {{kElastic, 1.5e-6}, {kLooksOnSurface, 4.2e-5}, {kOneOnSurface, 1.6e-5}}},
+       {{kElastic, 0.0027}, {kLooks, 0.0019}, {kOne, 0.0012}},
+       {{kElastic, 8.9e-8}, {kLooks, 2.4e-8}, {kOne, 1.1e-8}}},
+      {Below::kFineBody, {}, {{kElastic, 8.4e-8}, {kLooks, 0.0}, {kOne, 0.0}}},
   };
   for (const auto& here : cases) {
     SCOPED_TRACE(static_cast<int>(here.below));
@@ -218,14 +216,14 @@ TEST(Physics, SlidingStartsAndGoesAsCoulombSays) {
 TEST(Physics, SlidingDoesNotSeeEdgesWithinAPlane) {
   const auto most = [](const char* law, Below below) {
     double most = 0.0;
-    for (const Kind& kind : {kElastic, kLooksOnSurface, kOneOnSurface})
+    for (const Kind& kind : {kElastic, kLooks, kOne})
       most = std::max(most, worst(law, kind, slides(below, 1.3)));
     return most;
   };
   const double obstacle = most("over edges", Below::kFineObstacle);
   const double body = most("over edges of a body", Below::kFineBody);
-  EXPECT_TRUE(test::lawHolds("sliding over edges within a plane", obstacle < 0.05)) << obstacle;
-  EXPECT_TRUE(test::lawHolds("sliding over edges within a plane of a body", body < 0.05)) << body;
+  EXPECT_LT(obstacle, 0.02);
+  EXPECT_LT(body, 0.02);
 }
 
 /// The force along the surface over that into it, of a sphere that slides on held tissue.
@@ -262,7 +260,7 @@ double dragOf(const Kind& kind, Random& random, double friction) {
 
 TEST(Physics, TheSphereDragsTissueAsCoulombSays) {
   expectReached(
-      "drag that is off", {{kElastic, 0.1}, {kLooksOnSurface, 0.1}},
+      "drag that is off", {{kElastic, 0.1}, {kLooks, 0.1}},
       [](const Kind& kind, Random& random) {
         const double friction = random.uniform(0.2, 0.5);
         Random again = random;
@@ -298,21 +296,15 @@ auto bounces(double restitution) {
 }
 
 TEST(Physics, RestitutionGivesBackItsShareOfTheSpeed) {
-  const std::pair<double, double> cases[] = {{0.0, 0.0071}, {0.5, 0.028}, {0.8, 0.028}, {1.0, 0.055}};
+  const std::pair<double, double> cases[] = {{0.0, 0.0003}, {0.5, 0.014}, {0.8, 0.022}, {1.0, 0.03}};
   for (const auto& [restitution, reached] : cases) {
     SCOPED_TRACE(restitution);
     expectReached("height that is off [m]", {{kLooks, reached}, {kOne, reached}}, bounces(restitution), 1.5);
   }
-  // It falls short of the law below, but is not ignored: then 0.32 m were missing.
-  expectReached("height that is off [m]", {{kLooksOnSurface, 0.17}, {kOneOnSurface, 0.15}}, bounces(0.8), 1.2);
-  double elastic = 0.0, looks = 0.0;
-  for (const double restitution : {0.0, 0.5, 0.8}) {
+  double elastic = 0.0;
+  for (const double restitution : {0.0, 0.5, 0.8})
     elastic = std::max(elastic, worst("height that is off [m]", kElastic, bounces(restitution)));
-    for (const Kind& kind : {kLooksOnSurface, kOneOnSurface})
-      looks = std::max(looks, worst("height that is off [m]", kind, bounces(restitution)));
-  }
   EXPECT_TRUE(test::lawHolds("restitution of elastic bodies", elastic < 0.1)) << elastic;
-  EXPECT_TRUE(test::lawHolds("restitution of stiff bodies with surface contact", looks < 0.06)) << looks;
 }
 
 // --- pieces
@@ -394,9 +386,8 @@ void step(const BodyModel& model, const Material& material, BodyState& state, bo
   PreserveCounters preserved;
   const double h = 1.0 / std::max(120.0, 2.0 * highestFrequencyNow(model, state));
   matchAndMove(model, material, Vec3::Zero(), h, state, scratch, matched);
-  scratch.before_contact = state.positions;
   if (keeps) preserve(model, material, state, scratch, preserved);
-  velocitiesFromPositions(model, h, state, scratch);
+  velocitiesFromPositions(h, state, scratch);
   updateSurface(model, state);
 }
 

@@ -1,5 +1,4 @@
 // A body that meets itself: wound faces of an incision, and a strip that is folded over.
-#include "meshless_surgery/contact/contacts.h"
 #include "support/bodies.h"
 
 namespace meshless {
@@ -160,83 +159,6 @@ int foldedInto(SelfContact self_contact) {
 TEST(SelfContact, AStripIsFoldedOntoItselfNotIntoItself) {
   EXPECT_GT(foldedInto(SelfContact::kNone), 10) << "else nothing presses";
   EXPECT_LE(foldedInto(SelfContact::kAll), 1);
-}
-
-/// A wedge with its ridge along x at the height of `at`, which opens upwards (up = 1) or downwards.
-void addWedge(TriangleMesh& mesh, const Vec3& at, bool along_x, double up) {
-  const Index v = static_cast<Index>(mesh.vertices.size());
-  for (const double side : {-1.0, 1.0}) {
-    const Vec3 end = along_x ? Vec3(0.05 * side, 0, 0) : Vec3(0, 0.05 * side, 0);
-    const Vec3 out = along_x ? Vec3(0, 0.04, 0.03 * up) : Vec3(0.04, 0, 0.03 * up);
-    const Vec3 in = along_x ? Vec3(0, -0.04, 0.03 * up) : Vec3(-0.04, 0, 0.03 * up);
-    for (const Vec3& p : {Vec3(at + end), Vec3(at + end + out), Vec3(at + end + in)}) mesh.vertices.push_back(p);
-  }
-  std::vector<Triangle> triangles{{v, v + 1, v + 2},     {v + 3, v + 5, v + 4}, {v, v + 3, v + 4},
-                                  {v, v + 4, v + 1},     {v, v + 2, v + 5},     {v, v + 5, v + 3},
-                                  {v + 1, v + 4, v + 5}, {v + 1, v + 5, v + 2}};
-  const Vec3 middle = at + Vec3(0, 0, 0.02 * up);
-  const Vec3 &a = mesh.vertices[v], &b = mesh.vertices[v + 3], &c = mesh.vertices[v + 4];
-  const bool inwards = (b - a).cross(c - a).dot(a - middle) < 0.0;
-  for (Triangle t : triangles) {
-    if (inwards) std::swap(t[1], t[2]);
-    mesh.triangles.push_back(t);
-  }
-}
-
-// Two wedges of one surface, far from each other at rest; now their ridges cross, and no vertex is over a face.
-TEST(SelfContact, RidgesThatCrossArePressedApartByEqualAndOppositeImpulses) {
-  TriangleMesh rest;
-  addWedge(rest, Vec3(0, 0, 1.0), true, 1.0);
-  addWedge(rest, Vec3(0, 0, -1.0), false, -1.0);
-  std::vector<Index> particle;
-  for (Index v = 0; v < rest.vertices.size(); ++v) particle.push_back(v);
-  const ContactShape shape(rest, {&particle, nullptr, nullptr, nullptr, nullptr}, 0.05);
-  SelfContactSet set = selfContactSet(shape, false, 0.02);
-  EXPECT_EQ(set.ridges.size(), 18u) << "every edge of a wedge, without the diagonals of its sides";
-  const std::vector<double> masses(rest.vertices.size(), 0.1), inverse(rest.vertices.size(), 10.0);
-  for (const double gap : {0.001, -0.004, -0.012}) {
-    SCOPED_TRACE(gap);
-    Points before = rest.vertices, now = rest.vertices;
-    for (Index v = 0; v < before.size(); ++v) {
-      before[v].z() += v < 6 ? -1.0 + 0.0005 : 1.0;
-      now[v].z() += v < 6 ? -1.0 + gap : 1.0;
-    }
-    Points positions = before;
-    ContactMap map;
-    ShapeCollider collider;
-    collider.key = 1;
-    collider.shape = &shape;
-    collider.positions = positions.data();
-    collider.previous = before.data();
-    collider.masses = masses.data();
-    collider.inverse_masses = inverse.data();
-    collider.particles = static_cast<Index>(positions.size());
-    collider.maps = &map;
-    collider.map_count = 1;
-    collider.mass = 1.2;
-    collider.friction = 0.0;
-    collider.meets_itself = true;
-    collider.self = &set;
-    for (const Vec3& p : before) collider.bounds.extend(p);
-    collider.velocity = Vec3(0, 0, -0.5);
-    collider.spread = 1.0;
-    const std::vector<ShapeCollider> colliders{collider};
-    Contacts contacts;
-    ContactCounters counters;
-    contacts.findPairs({}, colliders, 1.0 / 120.0, counters);
-    contacts.make(colliders, 1.0 / 120.0, counters);
-    EXPECT_EQ(counters.contacts, 1u);
-    contacts.begin(colliders, 1.0 / 120.0);
-    positions = now;
-    contacts.solve(
-        colliders, 1.0 / 120.0, [](Index, std::vector<ContactMap>&) {}, counters);
-    const double above = 0.5 * (positions[0].z() + positions[3].z()),
-                 below = 0.5 * (positions[6].z() + positions[9].z());
-    EXPECT_NEAR(above - below, std::max(gap, 0.0), 1e-9);
-    Vec3 sum = Vec3::Zero();
-    for (Index v = 0; v < positions.size(); ++v) sum += positions[v] - now[v];
-    EXPECT_LT(sum.norm(), 1e-12);
-  }
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ BodyDef cube(const Kind& kind, const std::string& name, const Vec3& at) {
   def.spacing = 0.5 * kEdge;
   def.clusters.kind = kind.clusters;
   def.clusters.grid = {{2, 2, 2}};
-  def.material.alpha = 0.9;
+  def.material.alpha = 0.99;
   def.material.damping = 20.0;
   if (kind.youngs_modulus > 0.0) {
     def.material.youngs_modulus = kind.youngs_modulus;
