@@ -22,7 +22,8 @@ Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, 
   std::size_t tip = 0;
   const double largest = largestOf(truth, tip);
   std::vector<double> areas;
-  if (truth.rest.size() == surface->vertices.size()) {  // the samples are its vertices
+  const bool of_surface = truth.rest.size() == surface->vertices.size();  // the samples are its vertices
+  if (of_surface) {
     areas.assign(truth.rest.size(), 0.0);
     for (const Triangle& t : surface->triangles) {
       const Vec3 &a = surface->vertices[t[0]], &b = surface->vertices[t[1]], &c = surface->vertices[t[2]];
@@ -70,7 +71,7 @@ Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, 
   result.spacing = model->spacing;
   result.particles = model->rest.size();
   SnapshotWants wants;
-  wants.particles = true;
+  wants.particles = wants.surfaces = true;
   const int between = static_cast<int>(std::ceil(settings.step_rate / rate));  // steps in a time constant
   BodySnapshot after = world.snapshot(wants).bodies[0];
   const auto start = std::chrono::steady_clock::now();
@@ -88,8 +89,15 @@ Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, 
   result.slower = 1.0 / std::sqrt(after.stiffness_factor);
   result.substeps = world.snapshot({}).report.substeps;
 
-  const Points moved = movedSamples(truth, *model, surface->vertices, pose, after.particles);
+  Points moved;
+  if (of_surface)  // as a viewer gets them
+    for (std::size_t v = 0; v < truth.rest.size(); ++v)
+      moved.push_back(pose.rotation.conjugate() * (after.surface[v] - pose.translation) - truth.rest[v]);
+  else
+    moved = movedSamples(truth, *model, surface->vertices, pose, after.particles);
   result.error = distanceTo(truth, moved, areas);
+  for (std::size_t s = 0; s < moved.size(); ++s)
+    result.farthest = std::max(result.farthest, (moved[s] - truth.displacement[s]).norm() / largest);
   result.tip = moved[tip].dot(truth.displacement[tip]) / (largest * largest);
   return result;
 }

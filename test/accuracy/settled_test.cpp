@@ -23,6 +23,9 @@ TEST(Settled, BodiesOfFilledCellsWithin2PercentAtTheDefaults) {
     EXPECT_LT(settled(name).error, 0.02) << name;
 }
 
+// What is seen of a bent bar: vertices at half the particles' distance, and no particle is one of them.
+TEST(Settled, TheWholeSurfaceOfABentBarWithin1Percent) { EXPECT_LT(settled("bar_fine").farthest, 0.01); }
+
 // A spacing that divides neither the body nor the way to its clamp is as good as any.
 TEST(Settled, FinerIsNotWorse) {
   for (const double finer : {1.1, 1.26}) EXPECT_LT(settled("bar_awkward_260", finer).error, 0.005) << finer;
