@@ -199,6 +199,8 @@ bool settledRows(Table& table, const std::string& folder, const std::string& par
                 result->step_ms, result->error);
       table.row("settled_tip", entry.name, "filled", setting, result->step_ms, result->tip - 1.0);
       table.row("settled_farthest", entry.name, "filled", setting, result->step_ms, result->farthest);
+      if (result->slope > 0.0)
+        table.row("settled_slope", entry.name, "filled", setting, result->step_ms, result->slope);
     };
     if (entry.spacings.empty())
       for (const double times : finer) add(times, 0.0);

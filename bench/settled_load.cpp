@@ -14,6 +14,20 @@ namespace {
 constexpr double kAtRest = 2e-4;  // of the largest displacement, in a time constant: then it is at rest
 constexpr int kMostTimes = 60;    // time constants
 
+// What edges turn and stretch by: creases show here, however near to its place each vertex is.
+double slopeError(const std::vector<Triangle>& triangles, const TruthCase& truth, const Points& moved) {
+  double wrong = 0.0, all = 0.0;
+  for (const Triangle& t : triangles)
+    for (int k = 0; k < 3; ++k) {
+      const Index a = t[k], b = t[(k + 1) % 3];
+      const double length = (truth.rest[b] - truth.rest[a]).norm();
+      const Vec3 apart = truth.displacement[b] - truth.displacement[a];
+      wrong += (moved[b] - moved[a] - apart).squaredNorm() / (length * length);
+      all += apart.squaredNorm() / (length * length);
+    }
+  return std::sqrt(wrong / all);
+}
+
 }  // namespace
 
 Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, const SettledOptions& options) {
@@ -90,11 +104,13 @@ Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, 
   result.substeps = world.snapshot({}).report.substeps;
 
   Points moved;
-  if (of_surface)  // as a viewer gets them
+  if (of_surface) {  // as a viewer gets them
     for (std::size_t v = 0; v < truth.rest.size(); ++v)
       moved.push_back(pose.rotation.conjugate() * (after.surface[v] - pose.translation) - truth.rest[v]);
-  else
+    result.slope = slopeError(surface->triangles, truth, moved);
+  } else {
     moved = movedSamples(truth, *model, surface->vertices, pose, after.particles);
+  }
   result.error = distanceTo(truth, moved, areas);
   for (std::size_t s = 0; s < moved.size(); ++s)
     result.farthest = std::max(result.farthest, (moved[s] - truth.displacement[s]).norm() / largest);

@@ -11,6 +11,7 @@ struct SettledResult {
   std::size_t particles = 0;
   double error = 0.0;  // RMS distance to the truth over its largest displacement; over the surface where it has areas
   double farthest = 0.0;  // largest distance to the truth, over the same
+  double slope = 0.0;     // RMS error of what edges turn and stretch by, over the truth's RMS; 0 without a surface
   double tip = 0.0;       // displacement over the truth's, where that is largest
   double slower = 1.0;    // times as slowly as the material it deforms
   std::size_t substeps = 0;
