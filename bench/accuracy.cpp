@@ -26,6 +26,7 @@ const char* const kLoads[] = {"bar_cantilever_small", "bar_cantilever_large", "b
 const char* const kRatios[] = {"nu30", "nu45"};
 // Made by bench/truth/calculix.py.
 const char* const kSettled[] = {"bar",
+                                "bar_fine",
                                 "bar_nu45",
                                 "bar_nu49",
                                 "bar_turned",
@@ -197,6 +198,9 @@ bool settledRows(Table& table, const std::string& folder, const std::string& par
       table.row("settled", entry.name, "filled", setting + (result->moving > 3e-4 ? " not at rest" : ""),
                 result->step_ms, result->error);
       table.row("settled_tip", entry.name, "filled", setting, result->step_ms, result->tip - 1.0);
+      table.row("settled_farthest", entry.name, "filled", setting, result->step_ms, result->farthest);
+      if (result->slope > 0.0)
+        table.row("settled_slope", entry.name, "filled", setting, result->step_ms, result->slope);
     };
     if (entry.spacings.empty())
       for (const double times : finer) add(times, 0.0);

@@ -13,7 +13,7 @@ bool draw(const Plot& plot, const std::string& path) {
     std::ofstream file(script);
     file << "set terminal pngcairo size 1200,720\nset output '" << path << "'\nset logscale xy\nset grid\n"
          << "set format y '10^{%L}'\nset key outside right font ',9' noenhanced\nset title \"" << plot.title
-         << "\"\nset xlabel '" << plot.x << "'\nset ylabel '" << plot.y << "'\n";
+         << "\"\nset xlabel \"" << plot.x << "\"\nset ylabel \"" << plot.y << "\"\n";
     int number = 0;
     std::string command;
     for (const auto& [name, unsorted] : plot.series) {

@@ -14,6 +14,22 @@ namespace {
 constexpr double kAtRest = 2e-4;  // of the largest displacement, in a time constant: then it is at rest
 constexpr int kMostTimes = 60;    // time constants
 
+// What edges turn and stretch by: creases show here, however near to its place each vertex is. Edges from what is held
+// are left out: strain is singular at the border of a clamp.
+double slopeError(const std::vector<Triangle>& triangles, const TruthCase& truth, const Points& moved) {
+  double wrong = 0.0, all = 0.0;
+  for (const Triangle& t : triangles)
+    for (int k = 0; k < 3; ++k) {
+      const Index a = t[k], b = t[(k + 1) % 3];
+      const double length = (truth.rest[b] - truth.rest[a]).norm();
+      if (truth.displacement[a].isZero() || truth.displacement[b].isZero()) continue;
+      const Vec3 apart = truth.displacement[b] - truth.displacement[a];
+      wrong += (moved[b] - moved[a] - apart).squaredNorm() / (length * length);
+      all += apart.squaredNorm() / (length * length);
+    }
+  return std::sqrt(wrong / all);
+}
+
 }  // namespace
 
 Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, const SettledOptions& options) {
@@ -22,7 +38,8 @@ Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, 
   std::size_t tip = 0;
   const double largest = largestOf(truth, tip);
   std::vector<double> areas;
-  if (truth.rest.size() == surface->vertices.size()) {  // the samples are its vertices
+  const bool of_surface = truth.rest.size() == surface->vertices.size();  // the samples are its vertices
+  if (of_surface) {
     areas.assign(truth.rest.size(), 0.0);
     for (const Triangle& t : surface->triangles) {
       const Vec3 &a = surface->vertices[t[0]], &b = surface->vertices[t[1]], &c = surface->vertices[t[2]];
@@ -70,7 +87,7 @@ Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, 
   result.spacing = model->spacing;
   result.particles = model->rest.size();
   SnapshotWants wants;
-  wants.particles = true;
+  wants.particles = wants.surfaces = true;
   const int between = static_cast<int>(std::ceil(settings.step_rate / rate));  // steps in a time constant
   BodySnapshot after = world.snapshot(wants).bodies[0];
   const auto start = std::chrono::steady_clock::now();
@@ -88,8 +105,17 @@ Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, 
   result.slower = 1.0 / std::sqrt(after.stiffness_factor);
   result.substeps = world.snapshot({}).report.substeps;
 
-  const Points moved = movedSamples(truth, *model, surface->vertices, pose, after.particles);
+  Points moved;
+  if (of_surface) {  // as a viewer gets them
+    for (std::size_t v = 0; v < truth.rest.size(); ++v)
+      moved.push_back(pose.rotation.conjugate() * (after.surface[v] - pose.translation) - truth.rest[v]);
+    result.slope = slopeError(surface->triangles, truth, moved);
+  } else {
+    moved = movedSamples(truth, *model, surface->vertices, pose, after.particles);
+  }
   result.error = distanceTo(truth, moved, areas);
+  for (std::size_t s = 0; s < moved.size(); ++s)
+    result.farthest = std::max(result.farthest, (moved[s] - truth.displacement[s]).norm() / largest);
   result.tip = moved[tip].dot(truth.displacement[tip]) / (largest * largest);
   return result;
 }

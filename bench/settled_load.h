@@ -9,9 +9,11 @@ namespace meshless::bench {
 struct SettledResult {
   double spacing = 0.0;  // [m]
   std::size_t particles = 0;
-  double error = 0.0;   // RMS distance to the truth over its largest displacement; over the surface where it has areas
-  double tip = 0.0;     // displacement over the truth's, where that is largest
-  double slower = 1.0;  // times as slowly as the material it deforms
+  double error = 0.0;  // RMS distance to the truth over its largest displacement; over the surface where it has areas
+  double farthest = 0.0;  // largest distance to the truth, over the same
+  double slope = 0.0;     // RMS error of what edges turn and stretch by, over the truth's RMS; 0 without a surface
+  double tip = 0.0;       // displacement over the truth's, where that is largest
+  double slower = 1.0;    // times as slowly as the material it deforms
   std::size_t substeps = 0;
   double moving = 0.0;   // of the largest displacement, in the last time constant
   double step_ms = 0.0;  // [ms] of a frame, mean

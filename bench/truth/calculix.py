@@ -298,6 +298,7 @@ def skins():
 
 def cases():
     yield bar("bar", "bar", 0.2, 0.05, 0.0)
+    yield bar("bar_fine", "bar_fine", 0.2, 0.05, 0.0, surface=4, by=2)
     yield bar("bar_nu45", "bar", 0.2, 0.05, 0.0, nu=0.45)
     yield bar("bar_nu49", "bar", 0.2, 0.05, 0.0, nu=0.49)
     rpy = (30, 20, 0)

@@ -23,6 +23,13 @@ TEST(Settled, BodiesOfFilledCellsWithin2PercentAtTheDefaults) {
     EXPECT_LT(settled(name).error, 0.02) << name;
 }
 
+// What is seen of a bent bar, in triangles of half a spacing: its vertices, and what edges between them turn by.
+TEST(Settled, TheSurfaceOfABentBarWithin1PercentAndSmooth) {
+  const SettledResult result = settled("bar_fine");
+  EXPECT_LT(result.farthest, 0.01);
+  EXPECT_LT(result.slope, 0.02);
+}
+
 // A spacing that divides neither the body nor the way to its clamp is as good as any.
 TEST(Settled, FinerIsNotWorse) {
   for (const double finer : {1.1, 1.26}) EXPECT_LT(settled("bar_awkward_260", finer).error, 0.005) << finer;
