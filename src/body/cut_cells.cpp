@@ -27,9 +27,9 @@ constexpr std::size_t kChunk = 256;    // vertices
 
 // A vertex of a piece, or of its surface for contact, whose new cell is not known yet.
 struct EmbeddedVertex {
-  Vec3 rest;  // [m]
-  Index was;  // the parent's cell that it followed
-  bool made;  // by this blade
+  Vec3 rest;           // [m]
+  Index was;           // the parent's cell that it followed
+  bool made;           // by this blade
   bool above = false;  // on the side of its normal, of a vertex that it did not make
 };
 
