@@ -27,9 +27,10 @@ constexpr std::size_t kChunk = 256;    // vertices
 
 // A vertex of a piece, or of its surface for contact, whose new cell is not known yet.
 struct EmbeddedVertex {
-  Vec3 rest;  // [m]
-  Index was;  // the parent's cell that it followed
-  bool made;  // by this blade
+  Vec3 rest;           // [m]
+  Index was;           // the parent's cell that it followed
+  bool made;           // by this blade
+  bool above = false;  // on the side of its normal, of a vertex that it did not make
 };
 
 // The place in a cell that is at q; false where Newton's method finds none near it.
@@ -132,7 +133,8 @@ class CellCutter {
   EmbeddedVertex embeddedOf(const CellPieceSource& source, Index v, const Points& parent_rest,
                             const SurfaceBinding& parent) {
     const VertexOrigins& origins = source.origins;
-    EmbeddedVertex embedded{Vec3::Zero(), kNoIndex, origins.same(v) == kNoIndex};
+    EmbeddedVertex embedded{Vec3::Zero(), kNoIndex, origins.same(v) == kNoIndex,
+                            gate_.height(source.mesh.vertices[v]) >= 0.0};
     if (origins.insideCap(v)) return insideOf(source.mesh.vertices[v]);
     const VertexOrigin origin = origins[v];
     int heaviest = 0;
@@ -202,7 +204,11 @@ class CellCutter {
     const auto in_piece = [&](Index c) { return piece < 0 || piece_of_[component_[c]] == piece; };
     if (piece >= 0 && surface.cells[v] != kNoIndex && in_piece(surface.cells[v])) return surface.cells[v];
     const std::vector<Index>& copies = children_[embedded.was];
-    if (!embedded.made && copies.size() == 1 && !cut_.changed[copies[0]] && in_piece(copies[0])) return copies[0];
+    // A blade may leave a cell whole and part a vertex from it.
+    if (!embedded.made && copies.size() == 1 && !cut_.changed[copies[0]] && in_piece(copies[0])) {
+      const SampleSet above = cut_.above[copies[0]];
+      if (!(cut_.lattice.cells[copies[0]].samples & (embedded.above ? ~above : above))) return copies[0];
+    }
     const Vec3 beneath = embedded.rest - kBeneath * before_.spacing * surface.normals[v];
     std::vector<std::pair<double, Index>> boxes;  // [spacing^2] from cells to the vertex
     const std::array<std::int32_t, 3> own = before_.placeOf(embedded.rest);
