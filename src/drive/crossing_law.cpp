@@ -24,28 +24,20 @@ Box boxOf(const Vec3& p, const Vec3& q) {
   return box;
 }
 
-/// The segment goes through the triangle, and both ends are farther than `margin` from its plane.
-bool goesThrough(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c, double margin) {
-  const Vec3 normal = (b - a).cross(c - a).normalized();
-  const double at_p = normal.dot(p - a), at_q = normal.dot(q - a);
-  if (!(std::min(at_p, at_q) < -margin && std::max(at_p, at_q) > margin)) return false;
-  const Vec3 pa = a - p, pb = b - p, pc = c - p, d = q - p;
-  const double ab = d.dot(pa.cross(pb)), bc = d.dot(pb.cross(pc)), ca = d.dot(pc.cross(pa));
-  return (ab >= 0.0 && bc >= 0.0 && ca >= 0.0) || (ab <= 0.0 && bc <= 0.0 && ca <= 0.0);
-}
+constexpr int kPlaces = 16;  // along an edge
 
-bool goesThrough(const Vec3& p, const Vec3& q, const TriangleMesh& mesh, double margin) {
-  const Box box = boxOf(p, q);
-  return std::any_of(mesh.triangles.begin(), mesh.triangles.end(), [&](const Triangle& t) {
-    const Vec3 &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
-    Box face = boxOf(a, b);
-    face.extend(c);
-    return face.overlaps(box) && goesThrough(p, q, a, b, c, margin);
-  });
+/// How deep any of the places between two ends is inside [m].
+double depthOf(const Vec3& p, const Vec3& q, const SolidQuery& solid) {
+  double deepest = 0.0;
+  for (int n = 1; n < kPlaces; ++n) {
+    const Vec3 at = p + (q - p) * n / kPlaces;
+    if (solid.contains(at)) deepest = std::max(deepest, solid.distance(at));
+  }
+  return deepest;
 }
 
 std::size_t crossings(const Surface& a, const Surface& b) {
-  const double margin = 0.1 * allowedDepth(std::min(a.diagonal, b.diagonal));
+  const double allowed = allowedDepth(std::min(a.diagonal, b.diagonal));
   std::vector<std::array<Index, 2>> edges;
   for (const Triangle& t : a.mesh->triangles)
     for (int k = 0; k < 3; ++k) {
@@ -56,7 +48,7 @@ std::size_t crossings(const Surface& a, const Surface& b) {
   const SolidQuery query(*b.mesh);
   return static_cast<std::size_t>(std::count_if(edges.begin(), edges.end(), [&](const std::array<Index, 2>& edge) {
     const Vec3 &p = a.mesh->vertices[edge[0]], &q = a.mesh->vertices[edge[1]];
-    return query.crosses(p, q) && goesThrough(p, q, *b.mesh, margin);
+    return query.crosses(p, q) && depthOf(p, q, query) > allowed;
   }));
 }
 

@@ -1,14 +1,15 @@
 // Rest: islands of bodies that hold still sleep, and cost nothing until something reaches them.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "world_impl.h"
 
 namespace meshless {
 namespace {
 
-// A body holds still while it stays within a thousandth of its size for this long, and within a thousandth of the way
-// that it would fall meanwhile: at small loads that is less, and forces that are not in balance show there too.
+// A body holds still while it stays within a thousandth of its island's size for this long, and within a thousandth of
+// the way that it would fall meanwhile: at small loads that is less, and forces that are not in balance show there too.
 constexpr double kStillFor = 0.5;  // [s]
 constexpr double kStillShare = 1e-3;
 
@@ -22,16 +23,20 @@ Index rootOf(std::vector<Index>& root, Index i) {
 
 double sizeOf(const Box& box) { return (box.max - box.min).maxCoeff(); }
 
-// What trembles and stays where it is does not keep a body awake.
-bool isWhereItWas(const WorldBody& body, double gravity) {
+/// [m] by which any of its tissue is away from where it rested; nobody sees the far corner of a cell.
+double wayFromRest(const WorldBody& body) {
   const Points& now = body.state.positions;
-  if (body.rest_from.size() != now.size()) return false;
-  double most = sizeOf(body.bounds);
-  if (gravity > 0.0) most = std::min(most, 0.5 * gravity * kStillFor * kStillFor);
-  most *= kStillShare;
-  for (std::size_t i = 0; i < now.size(); ++i)  // nobody sees the far corner of a cell
-    if (!((now[i] - body.rest_from[i]).squaredNorm() <= most * most) && body.model->isTissue(i)) return false;
-  return true;
+  if (body.rest_from.size() != now.size()) return std::numeric_limits<double>::infinity();
+  double most = 0.0;
+  for (std::size_t i = 0; i < now.size(); ++i)
+    if (const double way = (now[i] - body.rest_from[i]).squaredNorm(); !(way <= most) && body.model->isTissue(i))
+      most = way;
+  return std::sqrt(most);
+}
+
+/// Less than a cell of tissue: it rocks on a point, and whoever sleeps on it does not mind.
+bool isCrumb(const WorldBody& body) {
+  return body.model->mass < body.material.density * std::pow(body.model->spacing, 3);
 }
 
 }  // namespace
@@ -68,20 +73,8 @@ void World::Impl::listLoaded() {
 // through space would stop.
 void World::Impl::fallAsleep(double h_frame) {
   if (!settings.sleep || awake.empty()) return;
-  bool any = false;
-  for (WorldBody* body : awake) {
-    if (isWhereItWas(*body, settings.gravity.norm())) {
-      body->still_for += h_frame;
-    } else {
-      body->still_for = 0.0;
-      body->rest_from = body->state.positions;
-    }
-    any = any || body->still_for >= kStillFor;
-  }
-  if (!any) return;
-
   std::vector<Index> root(bodies.size());
-  std::vector<char> held(bodies.size(), 0), ready(bodies.size(), 1);
+  std::vector<char> held(bodies.size(), 0), ready(bodies.size(), 1), whole(bodies.size(), 0);
   for (Index b = 0; b < bodies.size(); ++b) {
     root[b] = b;
     held[b] = bodies[b]->model->any_fixed;
@@ -99,10 +92,27 @@ void World::Impl::fallAsleep(double h_frame) {
   for (const Pick& pick : picks)
     for (Index b = 0; b < bodies.size(); ++b)
       if (bodies[b]->id == pick.body) held[b] = 1;
+  std::vector<double> size(bodies.size(), 0.0);  // [m] of an island's largest
   for (Index b = 0; b < bodies.size(); ++b) {
     const Index r = rootOf(root, b);
     held[r] |= held[b];
-    if (!bodies[b]->asleep && !(bodies[b]->still_for >= kStillFor)) ready[r] = 0;
+    whole[r] |= !isCrumb(*bodies[b]);
+    size[r] = std::max(size[r], sizeOf(bodies[b]->bounds));
+  }
+  const double gravity = settings.gravity.norm();
+  for (Index b = 0; b < bodies.size(); ++b) {
+    WorldBody& body = *bodies[b];
+    if (body.asleep) continue;
+    const Index r = rootOf(root, b);
+    double most = size[r];
+    if (gravity > 0.0) most = std::min(most, 0.5 * gravity * kStillFor * kStillFor);
+    if (wayFromRest(body) <= kStillShare * most) {
+      body.still_for += h_frame;
+    } else {
+      body.still_for = 0.0;
+      body.rest_from = body.state.positions;
+    }
+    if (!(body.still_for >= kStillFor) && !(whole[r] && isCrumb(body))) ready[r] = 0;
   }
   std::vector<std::uint32_t> group(bodies.size(), 0);
   for (Index b = 0; b < bodies.size(); ++b) {
