@@ -325,8 +325,7 @@ void lawRows(Table& table, int steps, const std::vector<double>& rates) {
   const std::string drift_setting = std::to_string(steps) + " steps";
   for (const Kind& kind : kinds()) {
     for (bool in_float : {false, true}) {
-      // Overlapping clusters in float take quadratic as linear, and elastic bodies are double alone.
-      if (kind.elastic ? in_float : in_float && kind.mode == MatchMode::kQuadratic && kind.clusters > 1) continue;
+      if (in_float && !runsInFloat(kind)) continue;
       const std::string precision = in_float ? "float" : "double";
       if (!kind.elastic)
         for (double scale : {1e-6, 1.0, 1e6})

@@ -10,7 +10,7 @@ struct PileOptions {
   double size = 1.0;  // [m] edge of a cube; gaps, heights and jitter scale with it
   double alpha = 0.9;
   int substeps = 4;
-  ContactMethod contact = ContactMethod::kRestShape;
+  ContactMethod contact = ContactMethod::kSurface;
   bool sleeping = false;
   int threads = 1;
   bool turned = true;     // by a random yaw

@@ -80,7 +80,7 @@ void simulate(const BodyModel& model, const Material& material, const Vec3& grav
     for (int k = 0; k < substeps; ++k) {
       matchAndMove(model, material, gravity, h / substeps, state, scratch, counters);
       // What clamps have taken back is no velocity.
-      if (model.clamp) velocitiesFromPositions(model, h / substeps, state, scratch);
+      if (model.clamp) velocitiesFromPositions(h / substeps, state, scratch);
     }
     watch(step * h);
   }
@@ -121,23 +121,14 @@ Points steppedToGoals(const BodyModel& model, const Material& material, const Po
   BatchStep step = batchStep(material, 1.0 / 60.0);
   step.gain = 1.0;
   step.gravity.setZero();
-  step.ground.reset();
   MatchCounters counters;
   const Points still(y.size(), Vec3::Zero());
+  BodyBatch batch({matchInput(model)}, material.mode == MatchMode::kQuadratic);
+  batch.setState(0, y, still, Quat::Identity());
+  batch.step(step, counters);
   Points x, v;
-  if (model.clusters.size() == 1) {
-    BodyBatch batch({matchInput(model)}, material.mode == MatchMode::kQuadratic);
-    batch.setState(0, y, still, Quat::Identity());
-    batch.step(step, counters);
-    Quat rotation;
-    batch.getState(0, x, v, rotation);
-  } else {
-    OverlapBatch batch(matchInput(model));
-    std::vector<Quat> rotations(model.clusters.size(), Quat::Identity());
-    batch.setState(y, still, rotations);
-    batch.step(step, counters);
-    batch.getState(x, v, rotations);
-  }
+  Quat rotation;
+  batch.getState(0, x, v, rotation);
   return x;
 }
 
@@ -251,6 +242,8 @@ BodyDef block(const Kind& kind, bool held) {
 
 }  // namespace
 
+bool runsInFloat(const Kind& kind) { return !kind.elastic && kind.clusters == 1; }
+
 std::vector<Kind> kinds() {
   return {{"rigid/one", false, MatchMode::kRigid, 1},         {"rigid/many", false, MatchMode::kRigid, 9},
           {"linear/one", false, MatchMode::kLinear, 1},       {"linear/many", false, MatchMode::kLinear, 9},
@@ -318,18 +311,10 @@ Drift momentumDrift(const Kind& kind, bool in_float, int steps) {
     BatchStep step = batchStep(material, 1.0 / 120.0);
     step.gravity.setZero();
     MatchCounters counters;
-    if (kind.clusters == 1) {
-      BodyBatch batch({matchInput(model)}, kind.mode == MatchMode::kQuadratic);
-      batch.setState(0, state.positions, state.velocities, Quat::Identity());
-      for (int k = 0; k < steps; ++k) batch.step(step, counters);
-      batch.getState(0, state.positions, state.velocities, state.poses[0].rotation);
-    } else {
-      OverlapBatch batch(matchInput(model));
-      std::vector<Quat> rotations(model.clusters.size(), Quat::Identity());
-      batch.setState(state.positions, state.velocities, rotations);
-      for (int k = 0; k < steps; ++k) batch.step(step, counters);
-      batch.getState(state.positions, state.velocities, rotations);
-    }
+    BodyBatch batch({matchInput(model)}, kind.mode == MatchMode::kQuadratic);
+    batch.setState(0, state.positions, state.velocities, Quat::Identity());
+    for (int k = 0; k < steps; ++k) batch.step(step, counters);
+    batch.getState(0, state.positions, state.velocities, state.poses[0].rotation);
     most = std::max(most, energy());
   }
   Drift result;
@@ -427,16 +412,15 @@ Squeezed squeeze(const Material& material) {
     const double half = 0.05 * (1.0 - 0.4 * std::min(1.0, step / 120.0));
     matchAndMove(m, material, Vec3::Zero(), h, state, scratch, counted);
     scratch.touched.clear();
-    scratch.before_contact = state.positions;
     for (Index i = 0; i < m.rest.size(); ++i) {
       double& z = state.positions[i].z();
       if (std::abs(z) <= half) continue;
       const double side = z > 0 ? 1.0 : -1.0;
       z = side * half;
-      scratch.touched.push_back({i, Vec3(0, 0, -side), 0.0});
+      scratch.touched.push_back({i, Vec3(0, 0, -side)});
     }
     preserve(m, material, state, scratch, counters);
-    velocitiesFromPositions(m, h, state, scratch);
+    velocitiesFromPositions(h, state, scratch);
   }
   updateSurface(m, state);
   Squeezed result{signedVolume(state.surface, m.surface.triangles) / m.rest_volume,

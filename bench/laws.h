@@ -17,11 +17,12 @@ struct Kind {
   int clusters = 1;                     // 1, or many
 };
 std::vector<Kind> kinds();
+/// What dynamics/match_batch.h holds: in_float below is for these alone.
+bool runsInFloat(const Kind& kind);
 
 /// How far the goals (beta = 1) are from a field that the mode can represent, relative to the body's size: a random
 /// affine field of unit volume (linear) or a random quadratic one; turned, scaled, and `far` [m] from the origin. In
-/// float by the batches (one cluster, or overlapping ones in the linear mode), where beta acts up to 0.95 and the error
-/// is that of what the goal should be.
+/// float by the batch, where beta acts up to 0.95 and the error is that of what the goal should be.
 double patchError(const Kind& kind, bool in_float, double scale, double far);
 
 struct Drift {

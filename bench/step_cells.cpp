@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include "meshless_surgery/contact/sphere_and_ground.h"
 #include "step_rows.h"
 
 namespace meshless::bench {
@@ -62,7 +61,7 @@ Mat3 inverseInertia(double mass, const Vec3& centre, Mat3 moment) {
   return (moment.trace() * Mat3::Identity() - moment).inverse();
 }
 
-// The laws of matchAndMove() and of the ground, with every pass over the particles in chunks for threads.
+// The laws of matchAndMove(), with every pass over the particles in chunks for threads.
 class CellsLoop {
  public:
   explicit CellsLoop(const Plain& body) : body_(body) { putBack(body); }
@@ -112,21 +111,8 @@ class CellsLoop {
     for (const Sums& sum : sums_) leaked += sum.leaked;
     const Vec3 restore = inverse * leaked;
     forChunks(for_each, [&](std::size_t, std::size_t i) {
-      const Vec3 r = x[i] - origin - centre, old = x[i];
-      const Vec3 gained = s.h * (accelerations_[i] + s.gravity);
-      Vec3 w = v[i] + gained - restore.cross(r);
-      Vec3 to = old + s.h * w;
-      const Projection out = projectOutOfGround(to, *s.ground);
-      if (out.inside) {
-        const double before = out.normal.dot(to - old) / s.h;
-        to += out.depth * out.normal;
-        to += frictionCorrection(to - old, out.normal, out.depth, s.friction);
-        w = (to - old) / s.h;
-        const double excess = out.normal.dot(w) - std::max(before, 0.0);
-        if (excess > 0.0) w -= excess * out.normal;
-      }
-      x[i] = to;
-      v[i] = w;
+      v[i] += s.h * (accelerations_[i] + s.gravity) - restore.cross(x[i] - origin - centre);
+      x[i] += s.h * v[i];
     });
   }
 
@@ -244,7 +230,7 @@ void plainElasticStep(Plain& body, const Material& material, const BatchStep& s)
     v[i] = model.fixed[i] ? Vec3(Vec3::Zero()) : Vec3(v[i] + s.h * s.gravity);
     x[i] += s.h * v[i];
   }
-  body.land(s);
+  velocitiesFromPositions(s.h, body.state, body.scratch);
 }
 
 void registerCells() {

@@ -104,7 +104,6 @@ void runPlainLiver(benchmark::State& state, const std::shared_ptr<const Prepared
   double substeps = 0.0, frames = 0.0;
   const auto frame = [&](std::size_t count) {
     BatchStep step = stepOf(material);
-    step.ground = -1e3;
     step.h = 1.0 / kFrameRate / static_cast<double>(count);
     for (std::size_t n = 0; n < count; ++n) plainElasticStep(body, material, step);
     substeps += static_cast<double>(count);

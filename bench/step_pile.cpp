@@ -118,8 +118,7 @@ void runPlainPile(benchmark::State& state, const Pile& pile, MatchMode mode) {
 }
 
 #ifdef HAVE_BULLET
-// Without the ground, whose contacts cost Bullet far more than its matching, it is at its best.
-void runBullet(benchmark::State& state, const Pile& pile, bool with_ground) {
+void runBullet(benchmark::State& state, const Pile& pile) {
   btSoftBodyRigidBodyCollisionConfiguration configuration;
   btCollisionDispatcher dispatcher(&configuration);
   btDbvtBroadphase broadphase;
@@ -129,9 +128,6 @@ void runBullet(benchmark::State& state, const Pile& pile, bool with_ground) {
   world.getWorldInfo().m_gravity = btVector3(0, 0, -9.81f);
   world.getWorldInfo().air_density = 0;
   world.getWorldInfo().m_sparsesdf.Initialize();
-  btStaticPlaneShape plane(btVector3(0, 0, 1), 0);
-  btRigidBody ground(btRigidBody::btRigidBodyConstructionInfo(0, nullptr, &plane));
-  if (with_ground) world.addRigidBody(&ground, 2, 1);
   std::vector<std::unique_ptr<btSoftBody>> bodies;
   const auto at = [](const Vec3& p) { return btVector3(btScalar(p.x()), btScalar(p.y()), btScalar(p.z())); };
   const auto putBack = [&](std::size_t i) {
@@ -152,9 +148,9 @@ void runBullet(benchmark::State& state, const Pile& pile, bool with_ground) {
     bodies.push_back(std::make_unique<btSoftBody>(&world.getWorldInfo(), int(rest.size()), rest.data(), masses.data()));
     btSoftBody& body = *bodies.back();
     body.m_cfg.kMT = 0.5f;
-    body.m_cfg.collisions = with_ground ? btSoftBody::fCollision::SDF_RS : 0;
+    body.m_cfg.collisions = 0;
     body.setPose(false, true);
-    world.addSoftBody(&body, 1, 2);  // meets the ground alone
+    world.addSoftBody(&body, 1, 2);  // meets nobody
     putBack(bodies.size() - 1);
   }
   int steps = 0;
@@ -167,7 +163,6 @@ void runBullet(benchmark::State& state, const Pile& pile, bool with_ground) {
     }
   }
   for (auto& body : bodies) world.removeSoftBody(body.get());
-  if (with_ground) world.removeRigidBody(&ground);
 }
 #endif
 
@@ -190,8 +185,7 @@ void registerPile() {
                                             [=](benchmark::State& s) { runPile(s, *pile, mode, set, false); }));
   }
 #ifdef HAVE_BULLET
-  settle(benchmark::RegisterBenchmark("bullet/pose", [=](benchmark::State& s) { runBullet(s, *pile, false); }));
-  settle(benchmark::RegisterBenchmark("bullet/pose_ground", [=](benchmark::State& s) { runBullet(s, *pile, true); }));
+  settle(benchmark::RegisterBenchmark("bullet/pose", [=](benchmark::State& s) { runBullet(s, *pile); }));
 #endif
 }
 

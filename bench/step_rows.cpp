@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "meshless_surgery/contact/sphere_and_ground.h"
-
 namespace meshless::bench {
 
 double uniform(Engine& engine, double low, double high) {
@@ -76,22 +74,7 @@ void Plain::finish() {
 
 void Plain::step(const Material& material, const BatchStep& s) {
   matchAndMove(model, material, s.gravity, s.h, state, scratch, counters);
-  land(s);
-}
-
-void Plain::land(const BatchStep& s) {
-  scratch.touched.clear();
-  scratch.before_contact = state.positions;
-  for (Index i = 0; i < model.rest.size(); ++i) {
-    if (model.fixed[i]) continue;
-    Vec3& x = state.positions[i];
-    const Projection out = projectOutOfGround(x, *s.ground);
-    if (!out.inside) continue;
-    x += out.depth * out.normal;
-    x += frictionCorrection(x - scratch.previous[i], out.normal, out.depth, s.friction);
-    scratch.touched.push_back({i, out.normal, 0.0});
-  }
-  velocitiesFromPositions(model, s.h, state, scratch);
+  velocitiesFromPositions(s.h, state, scratch);
 }
 
 void addLattice(int n, BodyModel& model) {
@@ -123,11 +106,7 @@ Material appearanceOf(MatchMode mode) {
   material.damping = 0.5;
   return material;
 }
-BatchStep stepOf(const Material& material) {
-  BatchStep step = batchStep(material, kStep);
-  step.ground = 0.0;
-  return step;
-}
+BatchStep stepOf(const Material& material) { return batchStep(material, kStep); }
 
 double farthest(const Points& a, const Points& b) {
   double largest = 0.0;

@@ -19,7 +19,7 @@ namespace meshless::bench {
 
 constexpr double kSpacing = 0.02;  // [m]
 constexpr double kStep = 1.0 / 120.0;
-constexpr int kRestart = 120;  // steps: the bodies fall, land and come to rest, over and over
+constexpr int kRestart = 120;  // steps: the bodies fall, turn and calm down, over and over
 
 using Engine = std::mt19937;
 double uniform(Engine& engine, double low, double high);
@@ -65,8 +65,6 @@ struct Plain {
 
   void finish();
   void step(const Material& material, const BatchStep& s);
-  // Out of the ground, and velocities from positions.
-  void land(const BatchStep& s);
 };
 
 void addLattice(int n, BodyModel& model);
@@ -76,7 +74,7 @@ void throwIn(Plain& body, Engine& engine, double height, double spin);
 Material appearanceOf(MatchMode mode);
 BatchStep stepOf(const Material& material);
 
-// The substep of matchAndMove() for an elastic material on elasticAccelerations(), and land().
+// The substep of matchAndMove() for an elastic material on elasticAccelerations(), and velocities from positions.
 void plainElasticStep(Plain& body, const Material& material, const BatchStep& s);
 
 double farthest(const Points& a, const Points& b);  // NaN where one is
@@ -84,7 +82,6 @@ double farthest(const Points& a, const Points& b);  // NaN where one is
 void settle(benchmark::internal::Benchmark* b);
 
 void registerPile();
-void registerLattice();
 void registerCells();
 void registerLiver();
 void registerWorld();

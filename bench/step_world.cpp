@@ -99,7 +99,7 @@ void runBlocks(benchmark::State& state, const std::shared_ptr<const PreparedBody
       } else {
         matchAndMove(model, material, settings.gravity, h, bare[0].state, bare[0].scratch, counters);
       }
-      for (Bare& body : bare) velocitiesFromPositions(model, h, body.state, body.scratch);
+      for (Bare& body : bare) velocitiesFromPositions(h, body.state, body.scratch);
     }
   };
   const auto step = [&] { world.step(); };

@@ -36,8 +36,8 @@ target_link_libraries(surfaces ${PROJECT_NAME}_drive CLI11::CLI11)
 if(benchmark_FOUND)
   add_bench(bench_rotation bench/bench_rotation.cpp)
   target_link_libraries(bench_rotation benchmark::benchmark)
-  add_bench(bench_step bench/bench_step.cpp bench/step_rows.cpp bench/step_pile.cpp bench/step_lattice.cpp
-    bench/step_cells.cpp bench/step_liver.cpp bench/step_world.cpp)
+  add_bench(bench_step bench/bench_step.cpp bench/step_rows.cpp bench/step_pile.cpp bench/step_cells.cpp
+    bench/step_liver.cpp bench/step_world.cpp)
   target_link_libraries(bench_step benchmark::benchmark)
   add_bench(bench_cut bench/bench_cut.cpp)
   target_link_libraries(bench_cut bench_clip benchmark::benchmark)

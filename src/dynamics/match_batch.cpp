@@ -1,11 +1,20 @@
 #include "meshless_surgery/dynamics/match_batch.h"
 
+#include <algorithm>
 #include <cassert>
+#include <cmath>
+#include <cstdint>
+#include <new>
+#include <vector>
 
 #include <Eigen/Eigenvalues>
 
-#include "match_batch_common.h"
+#include "match_batch_sets.h"
 #include "meshless_surgery/base/bytes.h"
+
+#if MESHLESS_ROTATION_X86
+#include <xmmintrin.h>
+#endif
 
 namespace meshless {
 
@@ -14,22 +23,49 @@ namespace match_sets {
 constexpr double kNoExtent = 1e-6;  // of the inertia's trace: float moments are not known better
 
 const Entries& entriesOf(InstructionSet set) {
-#define MESHLESS_MATCH_TABLE(name)                                                                        \
-  {                                                                                                       \
-    name::measureBodies, name::gatherBodies, name::moveBodies, name::sumParticles, name::spreadParticles, \
-        name::sumLayer, name::gatherClusters, name::mapClusters, name::pullParticles, name::moveParticles \
-  }
-  static const Entries baseline_entries = MESHLESS_MATCH_TABLE(baseline);
+  static const Entries baseline_entries = {baseline::measureBodies, baseline::gatherBodies, baseline::moveBodies};
 #if MESHLESS_ROTATION_X86
-  static const Entries avx2_entries = MESHLESS_MATCH_TABLE(avx2);
-  static const Entries avx512_entries = MESHLESS_MATCH_TABLE(avx512);
+  static const Entries avx2_entries = {avx2::measureBodies, avx2::gatherBodies, avx2::moveBodies};
+  static const Entries avx512_entries = {avx512::measureBodies, avx512::gatherBodies, avx512::moveBodies};
   if (set == InstructionSet::kAvx512 && instructionSetAvailable(set)) return avx512_entries;
   if (set == InstructionSet::kAvx2 && instructionSetAvailable(set)) return avx2_entries;
 #endif
   (void)set;
   return baseline_entries;
-#undef MESHLESS_MATCH_TABLE
 }
+
+namespace {
+
+// Numbers at the start of a cache line.
+template <class T>
+struct AlignedAllocator {
+  using value_type = T;
+  AlignedAllocator() = default;
+  template <class U>
+  AlignedAllocator(const AlignedAllocator<U>&) {}
+  T* allocate(std::size_t n) { return static_cast<T*>(::operator new(n * sizeof(T), std::align_val_t(64))); }
+  void deallocate(T* p, std::size_t) { ::operator delete(p, std::align_val_t(64)); }
+  bool operator==(const AlignedAllocator&) const { return true; }
+  bool operator!=(const AlignedAllocator&) const { return false; }
+};
+using Floats = std::vector<float, AlignedAllocator<float>>;
+
+// Denormal numbers, which motion that dies out ends in, cost a hundred times the others: they count as 0 meanwhile.
+class FlushDenormals {
+ public:
+#if MESHLESS_ROTATION_X86
+  FlushDenormals() : before_(_mm_getcsr()) { _mm_setcsr(before_ | 0x8040); }
+  ~FlushDenormals() { _mm_setcsr(before_); }
+
+ private:
+  unsigned before_;
+#else
+  FlushDenormals() {}
+#endif
+};
+
+// True where nothing has flowed: the batch knows no other rest shape.
+bool isUnplastic(const MatchInput& body) { return !body.plastic || body.plastic->empty(); }
 
 StepNumbers numbersOf(const BatchStep& step) {
   StepNumbers n;
@@ -39,12 +75,11 @@ StepNumbers numbersOf(const BatchStep& step) {
   n.beta = step.mode == MatchMode::kRigid ? 0.0f : static_cast<float>(actingBeta(step.beta, step.h));
   n.lost = step.damping > 0.0 ? static_cast<float>(1.0 - std::exp(-step.damping * step.h)) : 0.0f;
   for (int k = 0; k < 3; ++k) n.gravity[k] = static_cast<float>(step.gravity[k]);
-  n.friction = static_cast<float>(step.friction);
-  n.ground = step.ground.has_value();
   n.quadratic = step.mode == MatchMode::kQuadratic && n.beta > 0.0f;
   return n;
 }
 
+// Inverse of a symmetric matrix of trace 1 but for directions without extent.
 Mat3 inverseWithoutNull(const Mat3& matrix) {
   if (!matrix.allFinite()) return Mat3::Zero();
   const Eigen::SelfAdjointEigenSolver<Mat3> solver(matrix);
@@ -55,6 +90,7 @@ Mat3 inverseWithoutNull(const Mat3& matrix) {
   return inverse;
 }
 
+// Flags of the rotations into counters.
 void count(const std::uint8_t* flags, std::size_t size, MatchCounters& counters) {
   counters.clusters += size;
   counters.rotations += size;
@@ -63,8 +99,6 @@ void count(const std::uint8_t* flags, std::size_t size, MatchCounters& counters)
     if (!(flags[i] & kRotationUnique)) ++counters.rank_fallbacks;
   }
 }
-
-namespace {
 
 void pseudoInverse(const float m[6], float inverse[6]) {
   Mat3 matrix;
@@ -87,7 +121,6 @@ BatchStep batchStep(const Material& material, double h) {
   step.gain = stiffnessGain(material.alpha, h);
   step.beta = material.beta;
   step.damping = material.damping;
-  step.friction = material.friction;
   return step;
 }
 
@@ -297,9 +330,6 @@ void BodyBatch::stepChunks(const BatchStep& step, const BatchBody* in_place, std
       for (std::size_t i = 0; i < size; ++i) b.load(first + i, in_place[std::min(first + i, count - 1)]);
       entries.measureBodies(view, first_block, blocks);
     }
-    if (step.ground)
-      for (std::size_t i = 0; i < size; ++i)
-        b.constant(first + i, kGround) = static_cast<float>(*step.ground - b.origins[first + i].z());
     entries.gatherBodies(view, numbers, first_block, blocks, scratch);
     RotationBatch<float> rotations;
     rotations.count = size;

@@ -4,7 +4,6 @@
 
 #if MESHLESS_ROTATION_X86
 #pragma GCC target("avx2,fma")
-#include <immintrin.h>
 
 #define MESHLESS_MATCH_SET avx2
 #define MESHLESS_MATCH_BYTES 32

@@ -4,7 +4,6 @@
 
 #if MESHLESS_ROTATION_X86
 #pragma GCC target("avx512f,avx512dq,avx512vl,avx512bw,fma,prefer-vector-width=512")
-#include <immintrin.h>
 
 #define MESHLESS_MATCH_SET avx512
 #define MESHLESS_MATCH_BYTES 64

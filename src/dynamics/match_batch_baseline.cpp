@@ -1,10 +1,6 @@
 // Steps of many bodies, in whatever the compiler may use everywhere.
 #include "match_batch_sets.h"
 
-#if MESHLESS_ROTATION_X86
-#include <immintrin.h>
-#endif
-
 #define MESHLESS_MATCH_SET baseline
 #define MESHLESS_MATCH_BYTES 16
 #include "match_batch_kernel.h"

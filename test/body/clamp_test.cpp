@@ -29,7 +29,7 @@ BodyState stepped(const PreparedBody& body, const Vec3& gravity, int steps) {
   const double h = 0.5 / body.model->highest_frequency;
   for (int n = 0; n < steps; ++n) {
     matchAndMove(*body.model, body.def.material, gravity, h, state, scratch, counters);
-    velocitiesFromPositions(*body.model, h, state, scratch);
+    velocitiesFromPositions(h, state, scratch);
   }
   updateSurface(*body.model, state);
   return state;

@@ -206,7 +206,7 @@ TEST(CutBody, AHundredCutsToCrumbsKeepMassVolumeAndParticles) {
     BodyState moving = state;
     for (int step = 0; step < 30; ++step) {
       matchAndMove(*model, whole.def.material, Vec3(0, 0, -9.81), 1.0 / 120, moving, scratch, counters);
-      velocitiesFromPositions(*model, 1.0 / 120, moving, scratch);
+      velocitiesFromPositions(1.0 / 120, moving, scratch);
     }
     updateSurface(*model, moving);
     EXPECT_TRUE(test::allFinite(moving.surface));

@@ -89,7 +89,7 @@ double opening(const PreparedBody& start, bool clusters_kept) {
         body.state.velocities[i].y() += h * (side ? force : -force) / pulled[side];
       }
     matchAndMove(m, body.def.material, Vec3::Zero(), h, body.state, scratch, counters);
-    velocitiesFromPositions(m, h, body.state, scratch);
+    velocitiesFromPositions(h, body.state, scratch);
   }
   updateSurface(m, body.state);
   // Between what is right and left of the wound's middle, at the top.

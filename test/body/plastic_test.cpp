@@ -50,7 +50,7 @@ void run(PreparedBody& body, int steps, double h) {
   MatchCounters counters;
   for (int step = 0; step < steps; ++step) {
     matchAndMove(*body.model, body.def.material, Vec3::Zero(), h, body.state, scratch, counters);
-    velocitiesFromPositions(*body.model, h, body.state, scratch);
+    velocitiesFromPositions(h, body.state, scratch);
   }
 }
 

@@ -3,11 +3,11 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
 
 #include <gtest/gtest.h>
 
 #include "meshless_surgery/body/deform.h"
-#include "meshless_surgery/contact/sphere_and_ground.h"
 #include "support/random.h"
 
 namespace meshless {
@@ -31,6 +31,7 @@ struct Plain {
   BodyState state;
   StepScratch scratch;
   MatchCounters counters;
+  std::optional<double> ground;  // [m]
 
   MatchInput input() const { return matchInput(model); }
 
@@ -47,18 +48,13 @@ struct Plain {
 
   void step(const Material& material, const BatchStep& s) {
     matchAndMove(model, material, s.gravity, s.h, state, scratch, counters);
-    scratch.touched.clear();
-    scratch.before_contact = state.positions;
-    if (s.ground)
-      for (Index i = 0; i < model.rest.size(); ++i) {
-        Vec3& x = state.positions[i];
-        const Projection out = projectOutOfGround(x, *s.ground);
-        if (!out.inside) continue;
-        x += out.depth * out.normal;
-        x += frictionCorrection(x - scratch.previous[i], out.normal, out.depth, s.friction);
-        scratch.touched.push_back({i, out.normal, 0.0});
-      }
-    velocitiesFromPositions(model, s.h, state, scratch);
+    land(s.h);
+  }
+  // Out of the ground, as others change a state between steps.
+  void land(double h) {
+    if (ground)
+      for (Vec3& x : state.positions) x.z() = std::max(x.z(), *ground);
+    velocitiesFromPositions(h, state, scratch);
   }
 
   Vec3 centre() const { return rigidMotionOf(model, state.positions, state.velocities).centre; }
@@ -121,31 +117,6 @@ void disturb(Plain& body, Random& random, double scale = 1.0, double strain = 0.
   }
 }
 
-// Every cluster a particle's neighbourhood of a lattice; equal shares or random ones.
-Plain makeOverlap(Random& random, int n, int width, bool equal) {
-  Plain body;
-  addLattice(n, n, n, kSpacing, 0.05, Vec3(0, 0, 0.05), random, body.model);
-  ClusterSet& set = body.model.clusters;
-  std::vector<double> total(body.model.rest.size(), 0.0);
-  set.offsets = {0};
-  for (int z = 0; z < n; ++z)
-    for (int y = 0; y < n; ++y)
-      for (int x = 0; x < n; ++x) {
-        for (int c = std::max(0, z - width); c <= std::min(n - 1, z + width); ++c)
-          for (int b = std::max(0, y - width); b <= std::min(n - 1, y + width); ++b)
-            for (int a = std::max(0, x - width); a <= std::min(n - 1, x + width); ++a) {
-              const Index i = static_cast<Index>((c * n + b) * n + a);
-              set.members.push_back(i);
-              set.weights.push_back(equal ? 1.0 : random.uniform(0.5, 1.5));
-              total[i] += set.weights.back();
-            }
-        set.offsets.push_back(static_cast<Index>(set.members.size()));
-      }
-  for (std::size_t k = 0; k < set.members.size(); ++k) set.weights[k] /= total[set.members[k]];
-  body.finish();
-  return body;
-}
-
 Material appearance(MatchMode mode, double damping) {
   Material m;
   m.mode = mode;
@@ -166,18 +137,6 @@ BodyBatch batchOf(const std::vector<Plain>& bodies) {
 
 void read(const BodyBatch& batch, std::size_t i, Plain& to) {
   batch.getState(i, to.state.positions, to.state.velocities, to.state.poses[0].rotation);
-}
-void read(const OverlapBatch& batch, Plain& to) {
-  std::vector<Quat> rotations;
-  batch.getState(to.state.positions, to.state.velocities, rotations);
-  for (std::size_t c = 0; c < rotations.size(); ++c) to.state.poses[c].rotation = rotations[c];
-}
-OverlapBatch overlapOf(const Plain& body) {
-  OverlapBatch batch(body.input());
-  std::vector<Quat> rotations;
-  for (const ClusterPose& p : body.state.poses) rotations.push_back(p.rotation);
-  batch.setState(body.state.positions, body.state.velocities, rotations);
-  return batch;
 }
 
 double largestDistance(const Points& a, const Points& b) {
@@ -323,30 +282,35 @@ TEST(BodyBatch, StaysWithTheReferenceOnTheGround) {
       for (int i = 0; i < 20; ++i) {
         bodies.push_back(makeBody(random, 3, 3, 3));
         disturb(bodies.back(), random, 1.0, 0.02);
+        bodies.back().ground = 0.0;
       }
       const Material material = appearance(mode, 1.0);
       BatchStep step = batchStep(material, 1.0 / 120.0);
-      step.ground = 0.0;
       step.set = set;
+      std::vector<Plain> found = bodies;
+      std::vector<BatchBody> states;
+      for (Plain& body : found)
+        states.push_back({body.state.positions.data(), body.state.velocities.data(), &body.state.poses[0].rotation});
       BodyBatch batch = batchOf(bodies);
       MatchCounters counters;
-      // A particle that touches one step sooner by rounding lets bodies part: one step and the end state are compared.
+      std::size_t lifted = 0;
+      // A particle that touches one step sooner by rounding lets bodies part: each step goes from the same state.
       for (int n = 0; n < 100; ++n) {
-        batch.step(step, counters);
+        for (std::size_t i = 0; i < bodies.size(); ++i) {
+          found[i].scratch.previous = found[i].state.positions;
+          bodies[i].state = found[i].state;
+          bodies[i].step(material, step);
+        }
+        batch.stepInPlace(states, step, counters);
         double largest = 0.0;
         for (std::size_t i = 0; i < bodies.size(); ++i) {
-          bodies[i].step(material, step);
-          Plain found = bodies[i];
-          read(batch, i, found);
-          largest = std::max(largest, largestDistance(found.state.positions, bodies[i].state.positions));
-          for (const Vec3& x : found.state.positions) ASSERT_GE(x.z(), -1e-8);
-          // From here on both go from the same state.
-          bodies[i].state.positions = found.state.positions;
-          bodies[i].state.velocities = found.state.velocities;
-          bodies[i].state.poses[0].rotation = found.state.poses[0].rotation.normalized();
+          for (const Vec3& x : found[i].state.positions) lifted += x.z() < 0.0;
+          found[i].land(step.h);
+          largest = std::max(largest, largestDistance(found[i].state.positions, bodies[i].state.positions));
         }
         ASSERT_LE(largest, 1e-6 * 2.0 * kSpacing) << toString(mode) << " step " << n;
       }
+      EXPECT_GT(lifted, 1000u);
     }
 }
 
@@ -385,7 +349,6 @@ TEST(BodyBatch, BodiesDoNotDependOnPlaceNeighboursOrOrder) {
   for (InstructionSet set : sets())
     for (MatchMode mode : kModes) {
       BatchStep step = batchStep(appearance(mode, 1.0), 1.0 / 120.0);
-      step.ground = 0.03;
       step.set = set;
       std::vector<Plain> spoiled = bodies;
       for (int i : {0, 17, 40}) spoiled[i].state.positions[3].x() = std::numeric_limits<double>::quiet_NaN();
@@ -482,190 +445,6 @@ TEST(BodyBatch, FallsBackWhereTheRankIsMissing) {
           << toString(mode) << " " << i;
     }
   }
-}
-
-TEST(OverlapBatch, GoalsAreTheReferences) {
-  for (bool equal : {true, false})
-    for (MatchMode mode : {MatchMode::kRigid, MatchMode::kLinear})
-      for (double strain : {0.0, 0.03, 0.3}) {
-        Random random(13);
-        Plain body = makeOverlap(random, 9, 1, equal);
-        disturb(body, random, 1.0, strain);
-        for (Vec3& x : body.state.positions) x += Vec3(100.0, -50.0, 3.0);
-        OverlapBatch batch(body.input());
-        std::vector<ClusterPose> poses = body.state.poses;
-        Points goals, expected;
-        MatchCounters counters;
-        batch.match(body.state.positions, mode, 0.7, poses, goals, counters);
-        matchShapes(body.input(), body.state.positions, mode, 0.7, body.state.poses, expected, counters);
-        EXPECT_LE(largestDistance(goals, expected), (strain < 0.1 ? 2e-7 : 1e-6) * 8.0 * kSpacing) << strain;
-        for (std::size_t c = 0; c < poses.size(); ++c) {
-          ASSERT_LE((poses[c].centre - body.state.poses[c].centre).norm(), 1e-6 * kSpacing);
-          ASSERT_LE(poses[c].rotation.angularDistance(body.state.poses[c].rotation), 1e-5);
-          ASSERT_LE((poses[c].deformation - body.state.poses[c].deformation).norm(), 2e-5);
-        }
-      }
-}
-
-TEST(OverlapBatch, StepsAsTheReference) {
-  for (InstructionSet set : sets())
-    for (bool equal : {true, false})
-      for (MatchMode mode : {MatchMode::kRigid, MatchMode::kLinear}) {
-        Random random(17);
-        Plain body = makeOverlap(random, 7, equal ? 1 : 2, equal);
-        disturb(body, random);
-        const Material material = appearance(mode, 1.0);
-        BatchStep step = batchStep(material, 1.0 / 120.0);
-        step.set = set;
-        OverlapBatch batch = overlapOf(body);
-        MatchCounters counters;
-        for (int n = 0; n < 100; ++n) {
-          batch.step(step, counters);
-          body.step(material, step);
-          if (n != 0 && n != 99) continue;
-          Plain found = body;
-          read(batch, found);
-          EXPECT_LE(largestDistance(found.state.positions, body.state.positions),
-                    n == 0 ? 1e-7 * 6.0 * kSpacing : 5e-6 * 6.0 * kSpacing + kOfFall * fallen(step, 100));
-        }
-        EXPECT_EQ(counters.rotations, 100u * body.model.clusters.size());
-      }
-}
-
-TEST(OverlapBatch, StaysWithTheReferenceOnTheGround) {
-  Random random(19);
-  Plain body = makeOverlap(random, 6, 1, true);
-  disturb(body, random, 1.0, 0.02);
-  double lowest = 1.0;
-  for (const Vec3& x : body.state.positions) lowest = std::min(lowest, x.z());
-  const Material material = appearance(MatchMode::kLinear, 1.0);
-  BatchStep step = batchStep(material, 1.0 / 120.0);
-  step.ground = lowest - 0.01;
-  MatchCounters counters;
-  OverlapBatch batch = overlapOf(body);
-  for (int n = 0; n < 150; ++n) {
-    batch.step(step, counters);
-    body.step(material, step);
-    Plain found = body;
-    read(batch, found);
-    ASSERT_LE(largestDistance(found.state.positions, body.state.positions), 1e-6 * 6.0 * kSpacing) << n;
-    body.state.positions = found.state.positions;
-    body.state.velocities = found.state.velocities;
-    for (std::size_t c = 0; c < body.state.poses.size(); ++c)
-      body.state.poses[c].rotation = found.state.poses[c].rotation;
-  }
-}
-
-TEST(OverlapBatch, FollowsTheReferenceAtAnyStep) {
-  for (double rate : {30.0, 60.0, 240.0, 2000.0})
-    for (double damping : {0.0, 300.0}) {
-      Random random(43);
-      Plain body = makeOverlap(random, 5, 1, false);
-      disturb(body, random);
-      const Material material = appearance(MatchMode::kLinear, damping);
-      const BatchStep step = batchStep(material, 1.0 / rate);
-      OverlapBatch batch = overlapOf(body);
-      MatchCounters counters;
-      for (int n = 0; n < 20; ++n) {
-        batch.step(step, counters);
-        body.step(material, step);
-      }
-      Plain found = body;
-      read(batch, found);
-      EXPECT_LE(largestDistance(found.state.positions, body.state.positions),
-                1e-6 * 4.0 * kSpacing + kOfFall * fallen(step, 20))
-          << rate << " " << damping;
-      EXPECT_LE(largestDistance(found.state.velocities, body.state.velocities),
-                1e-5 + kOfFall * 20.0 * step.h * step.gravity.norm())
-          << rate << " " << damping;
-    }
-}
-
-TEST(OverlapBatch, DampingLeavesTheRigidMotion) {
-  Random random(47);
-  Plain body = makeOverlap(random, 5, 1, true);
-  disturb(body, random);
-  expectRigidAfterDamping(body, [&](const BatchStep& step) {
-    OverlapBatch batch = overlapOf(body);
-    MatchCounters counters;
-    batch.step(step, counters);
-    EXPECT_EQ(counters.rotations, 0u);  // nothing pulls
-    Plain after = body;
-    read(batch, after);
-    return after;
-  });
-}
-
-TEST(OverlapBatch, KeepsMomentumAndItsFrame) {
-  for (MatchMode mode : {MatchMode::kRigid, MatchMode::kLinear})
-    for (double damping : {0.0, 20.0}) {
-      Random random(23);
-      Plain body = makeOverlap(random, 6, 1, false);
-      disturb(body, random);
-      BatchStep step = batchStep(appearance(mode, damping), 1.0 / 120.0);
-      step.gravity.setZero();
-      OverlapBatch batch = overlapOf(body);
-      MatchCounters counters;
-      constexpr int kSteps = 1000;
-      for (int n = 0; n < kSteps; ++n) batch.step(step, counters);
-      Plain after = body;
-      read(batch, after);
-      // 9.2e-10 and 2.6e-10
-      EXPECT_LE((after.momentum() - body.momentum()).norm(), 4e-9 * kSteps * body.movement());
-      EXPECT_LE((after.angularMomentum() - body.angularMomentum()).norm(), 2e-9 * kSteps * body.turning());
-      // The centre of mass goes its way.
-      const Vec3 way = body.centre() + kSteps * step.h * body.momentum() / body.model.mass;
-      EXPECT_LE((after.centre() - way).norm(), 1e-5 * (way - body.centre()).norm());
-    }
-}
-
-TEST(OverlapBatch, OrderOfTheChunksDoesNotMatter) {
-  Random random(29);
-  Plain body = makeOverlap(random, 8, 1, true);
-  disturb(body, random);
-  const BatchStep step = batchStep(appearance(MatchMode::kLinear, 1.0), 1.0 / 120.0);
-  OverlapBatch one = overlapOf(body), other = overlapOf(body);
-  MatchCounters counters;
-  for (int n = 0; n < 30; ++n) {
-    one.step(step, counters);
-    other.step(step, counters, [](std::size_t count, const std::function<void(std::size_t)>& work) {
-      for (std::size_t i = count; i > 0; --i) work(i - 1);
-    });
-  }
-  Plain a = body, b = body;
-  read(one, a);
-  read(other, b);
-  EXPECT_EQ(largestDistance(a.state.positions, b.state.positions), 0.0);
-  EXPECT_EQ(largestDistance(a.state.velocities, b.state.velocities), 0.0);
-}
-
-// What was in the batch before, finite or not, leaves no trace in what is put into it.
-TEST(OverlapBatch, HistoryLeavesNoTrace) {
-  Random random(31);
-  const Plain rest = makeOverlap(random, 5, 1, true);  // 125 particles: the arrays are padded
-  Plain body = rest;
-  disturb(body, random);
-  const BatchStep step = batchStep(appearance(MatchMode::kLinear, 1.0), 1.0 / 120.0);
-  MatchCounters counters;
-  OverlapBatch fresh = overlapOf(body), used = overlapOf(rest);
-  Plain spoiled = rest;
-  spoiled.state.velocities[3].x() = std::numeric_limits<double>::infinity();
-  std::vector<Quat> rotations(rest.model.clusters.size(), Quat::Identity());
-  for (const Plain* before : {&rest, static_cast<const Plain*>(&spoiled)}) {
-    used.setState(before->state.positions, before->state.velocities, rotations);
-    for (int n = 0; n < 5; ++n) used.step(step, counters);
-  }
-  for (std::size_t c = 0; c < rotations.size(); ++c) rotations[c] = body.state.poses[c].rotation;
-  used.setState(body.state.positions, body.state.velocities, rotations);
-  for (int n = 0; n < 30; ++n) {
-    fresh.step(step, counters);
-    used.step(step, counters);
-  }
-  Plain a = body, b = body;
-  read(fresh, a);
-  read(used, b);
-  EXPECT_EQ(largestDistance(a.state.positions, b.state.positions), 0.0);
-  EXPECT_EQ(largestDistance(a.state.velocities, b.state.velocities), 0.0);
 }
 
 }  // namespace

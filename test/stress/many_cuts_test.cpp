@@ -155,7 +155,7 @@ TEST(ManyCuts, AThousandShortIncisionsOfASlab) {
 
 // What lies against itself by thousands of slivers takes its time.
 TEST(ManyCuts, SixtyIncisionsOfABodyThatMeetsItself) {
-  inciseOneBody(std::max(20, static_cast<int>(60.0 * std::min(1.0, share()))), ContactMethod::kRestShape);
+  inciseOneBody(std::max(20, static_cast<int>(60.0 * std::min(1.0, share()))), ContactMethod::kSurface);
 }
 
 }  // namespace

@@ -100,7 +100,6 @@ TEST_P(Pieces, DraggedAndLetGoGoBack) {
 
 TEST_P(Pieces, FallAndComeToRest) {
   WorldSettings settings;
-  settings.contact = ContactMethod::kRestShape;
   settings.ground = -2.0 * kEdge;
   Twins twins(settings);
   spawnAndCut(twins);

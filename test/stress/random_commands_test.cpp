@@ -145,7 +145,7 @@ void surviveWithoutContact(const Blocks& scene, int run, int steps) {
   survive(scene, run, steps, ContactMethod::kNone, 6, 1000000);
 }
 void surviveWithContact(const Blocks& scene, int run, int steps) {
-  survive(scene, run, steps, ContactMethod::kRestShape, 3, 4000);
+  survive(scene, run, steps, ContactMethod::kSurface, 3, 4000);
 }
 
 Blocks everyKind() { return blocksOf(kindsAlone(), Vec3(-0.375, -0.1, 0.05), 0.2); }

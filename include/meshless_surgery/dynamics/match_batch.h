@@ -1,11 +1,10 @@
-// Complete substeps of shape matching in float, vectorised for the widest instructions that the machine has: many
-// bodies of one cluster each, and a body of many overlapping clusters. The same laws as matchAndMove() (body/deform.h),
-// which stays the reference; for free bodies with an appearance material that does not flow, above ground at most.
+// Complete substeps of shape matching in float, vectorised for the widest instructions that the machine has, of many
+// bodies of one cluster each. The same laws as matchAndMove() (body/deform.h), which stays the reference; for free
+// bodies with an appearance material that does not flow.
 #pragma once
 
 #include <limits>
 #include <memory>
-#include <optional>
 
 #include "meshless_surgery/base/for_each.h"
 #include "meshless_surgery/dynamics/rotation_batch.h"
@@ -22,8 +21,6 @@ struct BatchStep {
   double beta = 0.2;     // 0..1, see actingBeta()
   double damping = 0.0;  // [1/s]
   Vec3 gravity = Vec3(0.0, 0.0, -9.81);
-  std::optional<double> ground;  // [m] height
-  double friction = 0.5;         // Coulomb, between ground and body
   InstructionSet set = widestInstructionSet();
 };
 BatchStep batchStep(const Material& material, double h);
@@ -61,7 +58,7 @@ class BodyBatch {
   void setState(std::size_t body, const Points& positions, const Points& velocities, const Quat& rotation);
   void getState(std::size_t body, Points& positions, Points& velocities, Quat& rotation) const;
 
-  /// Damps, predicts, matches, restores angular momentum, adds gravity, moves and keeps above ground.
+  /// Damps, predicts, matches, restores angular momentum, adds gravity and moves.
   void step(const BatchStep& step, MatchCounters& counters, const ForEach& for_each = oneAfterAnother);
   /// The same for states that others change between steps: read from where they are, and written back. Of the first
   /// bodies.size() bodies, which may be fewer than size().
@@ -72,34 +69,6 @@ class BodyBatch {
   void stepChunks(const BatchStep& step, const BatchBody* in_place, std::size_t count, MatchCounters& counters,
                   const ForEach& for_each);
 
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
-};
-
-/// One body of overlapping clusters, in the rigid and linear mode (quadratic is taken as linear). A particle's
-/// 12 numbers m y (x0, 1)^T are formed once and summed by each of its clusters, a cluster's affine map is formed once
-/// and summed by each of its particles, so that a pair costs two sums of 12 numbers. All is kept as displacement from
-/// the rest shape in a frame that moves and turns with the body: what float loses is relative to the displacement.
-class OverlapBatch {
- public:
-  /// Of clusters that have not flowed (no plastic shapes).
-  explicit OverlapBatch(const MatchInput& body);
-  ~OverlapBatch();
-  OverlapBatch(OverlapBatch&&) noexcept;
-  OverlapBatch& operator=(OverlapBatch&&) noexcept;
-
-  /// rotations: one a cluster.
-  void setState(const Points& positions, const Points& velocities, const std::vector<Quat>& rotations);
-  void getState(Points& positions, Points& velocities, std::vector<Quat>& rotations) const;
-
-  void step(const BatchStep& step, MatchCounters& counters, const ForEach& for_each = oneAfterAnother);
-
-  /// As matchShapes(), but for rounding to float relative to the displacement. Takes the place of the state: either
-  /// this or step() is used on an object.
-  void match(const Points& y, MatchMode mode, double beta, std::vector<ClusterPose>& poses, Points& goals,
-             MatchCounters& counters, const ForEach& for_each = oneAfterAnother);
-
- private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
