@@ -38,8 +38,7 @@ std::size_t bytesOf(const BodyState& state) {
 
 std::size_t bytesOf(const StepScratch& scratch) {
   const ElasticBatchState& elastic = scratch.elastic;
-  return scratch.clamp.bytes() +
-         bytesOf(scratch.previous, scratch.predicted, scratch.goals, scratch.touched) +
+  return scratch.clamp.bytes() + bytesOf(scratch.previous, scratch.predicted, scratch.goals, scratch.touched) +
          bytesOf(elastic.rotations, elastic.others, elastic.forces, elastic.largest, elastic.cold);
 }
 

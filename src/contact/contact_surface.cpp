@@ -79,8 +79,8 @@ ContactSurface::ContactSurface(const TriangleMesh& rest, VertexSupports vertex_s
 
 std::size_t ContactSurface::bytes() const {
   return sizeof *this +
-         bytesOf(triangles, edges, face_offsets, faces, cut_faces, cut_vertices, supports.offsets,
-                 supports.particles, supports.weights) +
+         bytesOf(triangles, edges, face_offsets, faces, cut_faces, cut_vertices, supports.offsets, supports.particles,
+                 supports.weights) +
          tree.bytes();
 }
 

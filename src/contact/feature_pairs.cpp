@@ -15,9 +15,9 @@ constexpr double kTie = 2e-3;           // of the mean edge: nearer than this tw
 constexpr double kDeeper = 1.3;         // times as deep as it was: a vertex inside may have gone on
 constexpr double kLeastOpposed = 0.05;  // cosine by which a direction has to oppose a face of the pushed body
 constexpr double kSameWay = 0.9;        // cosine from which a second direction of a vertex says nothing new
-constexpr double kFlat = 0.3;            // sine by which neighbours may be farther out than what sticks out
+constexpr double kFlat = 0.3;           // sine by which neighbours may be farther out than what sticks out
 constexpr double kMostRidgePoints = 1e6;
-constexpr double kSelfOpposed = 0.3;    // cosine by which faces of one body oppose each other where they may meet
+constexpr double kSelfOpposed = 0.3;  // cosine by which faces of one body oppose each other where they may meet
 
 using Candidate = NearFace;
 
@@ -85,7 +85,8 @@ double opposition(const SurfaceFrame& frame, const SurfacePoint& point, const Ve
   return most;
 }
 
-/// Whether a point sticks out along a direction, as against its neighbours: what comes from there meets it and not them.
+/// Whether a point sticks out along a direction, as against its neighbours: what comes from there meets it and not
+/// them.
 bool sticksOut(const PairSearch::Side& side, const SurfacePoint& point, const Vec3& direction) {
   for (std::size_t k = 0; k < point.face_count; ++k)
     for (const Index v : side.surface->triangles[point.faces[k]]) {
@@ -385,8 +386,7 @@ void findVerticesNear(const PairSearch& search, SearchScratch& scratch) {
   }
   scratch.near.assign(a.vertices(), 0);
   a.tree.queryTree(search.a.frame->boxes, search.b.surface->tree, search.b.frame->boxes,
-                   searchMargin(search.length) + deepest, scratch.query,
-                   [&](Index face) {
+                   searchMargin(search.length) + deepest, scratch.query, [&](Index face) {
                      for (const Index v : a.triangles[face]) scratch.near[v] = 1;
                    });
   for (Index v = 0; v < a.vertices(); ++v)

@@ -113,8 +113,8 @@ class Solver {
     scratch_.active.push_back(active);
   }
 
-  /// Takes a part of what overlaps away, at the start of the substep as at its end: that gives no speed. once: [s] since
-  /// it was done last.
+  /// Takes a part of what overlaps away, at the start of the substep as at its end: that gives no speed. once: [s]
+  /// since it was done last.
   void letOut(ContactRow& row, const RowEntry* entries, Index a, Index b, const Vec3& way, double once) {
     const Vec3 start = sum(row, entries, a, b, true);
     const double edge = edgeOf(a, b), deep = -kSlop * edge - row.normal.dot(start + way) - row.constant;

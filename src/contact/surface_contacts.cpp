@@ -12,14 +12,6 @@ constexpr double kAhead = 1.2;                           // times the way of a f
 constexpr std::uint64_t kGroundKey = ~std::uint64_t{0};  // beyond those of bodies and obstacles
 constexpr std::uint64_t kSphereKey = kGroundKey - 1;
 
-Index rootOf(std::vector<Index>& root, Index i) {
-  while (root[i] != i) {
-    root[i] = root[root[i]];
-    i = root[i];
-  }
-  return i;
-}
-
 Box grown(const Box& box, double by) {
   Box larger = box;
   larger.min.array() -= by;
@@ -82,7 +74,8 @@ void SurfaceContacts::findPairs(const SurfaceScene& scene, const std::vector<Col
     if (!collider.moves) continue;
     if (scene.ground && boxes_[c].min.z() <= *scene.ground) pairOf(Kind::kGround, colliders, c, kNoIndex, kGroundKey);
     if (sphere && boxes_[c].overlaps(*sphere)) pairOf(Kind::kSphere, colliders, c, kNoIndex, kSphereKey);
-    if (scene.surfaces && collider.self != PairSearch::Self::kNo) pairOf(Kind::kVertexFace, colliders, c, c, collider.key);
+    if (scene.surfaces && collider.self != PairSearch::Self::kNo)
+      pairOf(Kind::kVertexFace, colliders, c, c, collider.key);
   }
   std::sort(numbers_.begin(), numbers_.end());
   for (const SurfaceScene::Given& given : scene.given)
@@ -290,16 +283,14 @@ void SurfaceContacts::listReached(const SurfaceScene& scene, const std::vector<C
 void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
   const Index count = static_cast<Index>(colliders.size());
   fillSlots(colliders);
-  std::vector<Index>&root = root_, &number = island_of_;
-  root.resize(count);
+  std::vector<Index>& number = island_of_;
+  joined_.reset(count);
   number.assign(count, kNoIndex);
-  for (Index c = 0; c < count; ++c) root[c] = c;
   const auto moves = [&](Index c) { return c != kNoIndex && colliders[c].moves; };
   for (const Pair* pair : pairs_) {
     if (!moves(pair->a) || !moves(pair->b)) continue;
     if (pair->set.rows.empty()) continue;
-    const Index a = rootOf(root, pair->a), b = rootOf(root, pair->b);
-    root[std::max(a, b)] = std::min(a, b);
+    joined_.join(pair->a, pair->b);
   }
   // The first gets back what it had.
   for (; !islands_.empty(); islands_.pop_back()) {
@@ -311,7 +302,7 @@ void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
   }
   for (Index c = 0; c < count; ++c) {
     if (!moves(c)) continue;
-    Index& island = number[rootOf(root, c)];
+    Index& island = number[joined_.find(c)];
     if (island == kNoIndex) {
       island = static_cast<Index>(islands_.size());
       if (spare_islands_.empty()) spare_islands_.emplace_back();
@@ -325,7 +316,7 @@ void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
   for (Pair* pair : pairs_) {
     const Index of = moves(pair->a) ? pair->a : pair->b;
     if (pair->set.rows.empty() || !moves(of)) continue;
-    const Index island = number[rootOf(root, of)];
+    const Index island = number[joined_.find(of)];
     islands_[island].rows.push_back({&pair->set, pair->a, pair->b});
     held[island] = held[island] || !moves(pair->a) || !moves(pair->b);
   }
@@ -508,7 +499,7 @@ std::size_t SurfaceContacts::bytes() const {
   std::size_t sum = broad_phase_.bytes() +
                     bytesOf(boxes_, active_, needed_, moved_, numbers_, ways_of_, pairs_, spare_) +
                     bytesOf(frames_, frame_of_, reached_, now_, before_, first_slots_, solver_bodies_) +
-                    bytesOf(islands_, spare_islands_, root_, island_of_, island_held_);
+                    bytesOf(islands_, spare_islands_, island_of_, island_held_) + joined_.bytes();
   for (const SurfaceFrame& frame : frames_) sum += frame.bytes();
   for (const auto& scratch : spare_) sum += sizeof *scratch + scratch->search.bytes() + bytesOf(scratch->old);
   for (const auto& [name, pair] : known_)
@@ -516,8 +507,7 @@ std::size_t SurfaceContacts::bytes() const {
   for (const auto& [key, way] : ways_) sum += kNode + sizeof way + bytesOf(way.last, way.offsets);
   for (const SolverBody& body : solver_bodies_) sum += bytesOf(body.motions);
   for (const std::vector<Island>* islands : {&islands_, &spare_islands_})
-    for (const Island& island : *islands)
-      sum += bytesOf(island.bodies, island.free, island.rows);
+    for (const Island& island : *islands) sum += bytesOf(island.bodies, island.free, island.rows);
   return sum;
 }
 

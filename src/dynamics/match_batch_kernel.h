@@ -282,8 +282,7 @@ MESHLESS_INLINE void goalMap(const BodiesView& view, const StepNumbers& step, co
         if (a != b) out[b] += m * row[a];
       }
     for (int k = 0; k < 3; ++k)
-      map[3 * r + k] =
-          choose(has, share * out[k], fitted * fit[3 * r + k]) + rigid * get(s.rotation[3 * r + k] + slot);
+      map[3 * r + k] = choose(has, share * out[k], fitted * fit[3 * r + k]) + rigid * get(s.rotation[3 * r + k] + slot);
     for (int k = 0; k < 6; ++k) bend[6 * r + k] = quadratic_share * out[3 + k];
   }
 }

@@ -20,8 +20,7 @@ constexpr std::size_t kMaxObstacles = 100;
 
 NumberRange lengths(double from = -kMaxLength, bool open = false) { return {from, kMaxLength, open, "m"}; }
 
-void readWorld(YamlSource& source, const YAML::Node& node, WorldSettings& world,
-               std::vector<std::string>& warnings) {
+void readWorld(YamlSource& source, const YAML::Node& node, WorldSettings& world, std::vector<std::string>& warnings) {
   YamlMap map(source, node, "world");
   map.vector("gravity", {-1000.0, 1000.0, false, "m/s^2"}, world.gravity);
   const YAML::Node ground = map.get("ground");
@@ -42,7 +41,8 @@ void readWorld(YamlSource& source, const YAML::Node& node, WorldSettings& world,
   const int contact = map.choice("contact", {"none", "textbook", "rest_shape", "surface", "auto"});
   if (contact >= 0) world.contact = contact < 2 ? static_cast<ContactMethod>(contact) : ContactMethod::kSurface;
   if (contact == 2 || contact == 4)
-    warnings.push_back("contact: " + std::string(contact == 2 ? "rest_shape" : "auto") + " is no more and means surface");
+    warnings.push_back("contact: " + std::string(contact == 2 ? "rest_shape" : "auto") +
+                       " is no more and means surface");
   if (const int sleep = map.choice("sleep", {"false", "true"}); sleep >= 0) world.sleep = sleep == 1;
   if (const YAML::Node pick = map.get("pick"); pick.IsDefined()) {
     YamlMap keys(source, pick, "pick");
@@ -248,7 +248,7 @@ class SceneReader {
 
   void read(const YAML::Node& root) {
     YamlMap map(source_, root, "the scene");
-    if (const YAML::Node world = map.get("world"); world.IsDefined()) 
+    if (const YAML::Node world = map.get("world"); world.IsDefined())
       readWorld(source_, world, scene_.world, scene_.warnings);
     if (const YAML::Node materials = map.get("materials"); materials.IsDefined())
       readMaterialMap(source_, materials, scene_.materials);

@@ -24,9 +24,8 @@ using meshless::DriveReport;
 
 constexpr std::size_t kLogs = 10;
 
-const std::map<std::string, ContactMethod> kContacts{{"none", ContactMethod::kNone},
-                                                     {"textbook", ContactMethod::kTextbook},
-                                                     {"surface", ContactMethod::kSurface}};
+const std::map<std::string, ContactMethod> kContacts{
+    {"none", ContactMethod::kNone}, {"textbook", ContactMethod::kTextbook}, {"surface", ContactMethod::kSurface}};
 
 std::string shippedMaterials() {
 #ifdef MATERIALS_FOLDER
@@ -89,8 +88,7 @@ int main(int argc, char** argv) {
   app.add_option("--budget", options.budget, "[s] of processor time for a scene; then it did not finish")
       ->check(CLI::Range(1.0, 1e6))
       ->capture_default_str();
-  app.add_option("--contact", contact,
-                 "the method of contact: none, textbook, surface; else the default");
+  app.add_option("--contact", contact, "the method of contact: none, textbook, surface; else the default");
   app.add_option("--material", choices.material, "elastic, looks, or a name in config/materials alone");
   app.add_option("--support", choices.support, "ground, tray, bowl, hung or stack alone");
   app.add_option("--organs", choices.most_organs, "at most so many bodies, 1 to 3")->capture_default_str();
@@ -113,8 +111,7 @@ int main(int argc, char** argv) {
   };
   if (!contact.empty()) {
     const auto found = kContacts.find(contact);
-    if (found == kContacts.end())
-      return fail("contact is '" + contact + "'; accepted: none, textbook, surface");
+    if (found == kContacts.end()) return fail("contact is '" + contact + "'; accepted: none, textbook, surface");
     choices.contact = found->second;
   }
   auto shipped = meshless::readMaterials(materials.empty() ? shippedMaterials() : materials);

@@ -37,13 +37,13 @@ struct WorldBody {
   Material material;
   BodyModelPtr model;
   BodyState state;
-  bool surface_current = true;                                             // state.surface fits state.positions
-  std::shared_ptr<const ContactMesh> mesh;                                 // made when something first comes near
-  std::shared_ptr<const SurfaceModel> surface_model;                       // made when something first comes near
-  Points collision;              // [m] vertices of model->collision, of the last frame in which contact needed them
-  BodyModelPtr measured;         // the model that these two are of
-  double edge_length = 0.0;      // [m] mean, of the surface
-  double surface_reach = 0.0;    // [m] how far the surface is beyond the particles, at most
+  bool surface_current = true;                        // state.surface fits state.positions
+  std::shared_ptr<const ContactMesh> mesh;            // made when something first comes near
+  std::shared_ptr<const SurfaceModel> surface_model;  // made when something first comes near
+  Points collision;            // [m] vertices of model->collision, of the last frame in which contact needed them
+  BodyModelPtr measured;       // the model that these two are of
+  double edge_length = 0.0;    // [m] mean, of the surface
+  double surface_reach = 0.0;  // [m] how far the surface is beyond the particles, at most
   bool touched_by_push = false;
   double stiffness_factor = 1.0;
   Box bounds;              // [m] of particles and surface, at the start of the last frame in which it was awake
@@ -82,7 +82,7 @@ struct SurfaceWork {
     std::vector<SpringRow> springs;  // one a pick
   };
   std::vector<Member> members;
-  std::size_t member_count = 0;  // of them in use
+  std::size_t member_count = 0;                       // of them in use
   std::vector<WorldBody*> bodies, alone;              // all of them, and those matched one by one
   std::vector<std::vector<WorldBody*>> side_by_side;  // the others, by batches
   std::vector<std::unique_ptr<BatchLanes>> lanes;     // one a batch, borrowed
@@ -185,6 +185,13 @@ struct World::Impl {
   std::vector<char> faulty;       // one each: its coordinates are no numbers
   std::vector<WorldBody*> wound;  // in findWound()
   std::uint32_t next_sleep_group = 1;
+  struct Sleepers {  // in fallAsleep(), one a body
+    UnionFind joined;
+    std::vector<char> held, ready, whole;  // of an island's root
+    std::vector<double> size;              // [m] of an island's largest
+    std::vector<std::uint32_t> group;
+  };
+  Sleepers sleepers;
   std::vector<WorldBatch> batches;
   bool batches_current = false;  // false: bodies or materials have changed
   std::mutex lanes_mutex;        // of the batches' spare lanes
@@ -194,7 +201,7 @@ struct World::Impl {
   SurfaceScene surface_scene;       // of this step
   std::vector<Collider> colliders;  // bodies in their order, then obstacles
   std::vector<SurfaceWork> surface_work;
-  std::size_t work_count = 0;  // of it in use
+  std::size_t work_count = 0;       // of it in use
   std::vector<WorldBody*> members;  // of an island: in stepSurfaces()
   std::vector<char> pushed;
   RecordSink record_sink;

@@ -24,8 +24,8 @@ MemoryUse World::memory() const {
       use.states += sizeof *lanes + lanes->batch.bytes() + bytesOf(lanes->models, lanes->states);
   }
   for (const auto& obstacle : w.obstacles) {
-    use.models += bytesOf(obstacle->def->mesh.vertices, obstacle->def->mesh.triangles) +
-                  bytesOf(obstacle->inverse_masses);
+    use.models +=
+        bytesOf(obstacle->def->mesh.vertices, obstacle->def->mesh.triangles) + bytesOf(obstacle->inverse_masses);
     use.contact += obstacle->surface.bytes();
   }
   use.contact += w.surface_contacts.bytes() + bytesOf(w.colliders, w.loaded, w.surface_work, w.stiffest, w.members);

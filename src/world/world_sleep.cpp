@@ -13,14 +13,6 @@ namespace {
 constexpr double kStillFor = 0.5;  // [s]
 constexpr double kStillShare = 1e-3;
 
-Index rootOf(std::vector<Index>& root, Index i) {
-  while (root[i] != i) {
-    root[i] = root[root[i]];
-    i = root[i];
-  }
-  return i;
-}
-
 double sizeOf(const Box& box) { return (box.max - box.min).maxCoeff(); }
 
 /// [m] by which any of its tissue is away from where it rested; nobody sees the far corner of a cell.
@@ -65,36 +57,32 @@ void World::Impl::listAwake() {
     if (!body->asleep) awake.push_back(body.get());
 }
 
-void World::Impl::listLoaded() {
-  surface_contacts.loadedSurfaces(loaded);
-}
+void World::Impl::listLoaded() { surface_contacts.loadedSurfaces(loaded); }
 
 // An island sleeps where all of it has held still long enough and something holds it: without that, what drifts slowly
 // through space would stop.
 void World::Impl::fallAsleep(double h_frame) {
   if (!settings.sleep || awake.empty()) return;
-  std::vector<Index> root(bodies.size());
-  std::vector<char> held(bodies.size(), 0), ready(bodies.size(), 1), whole(bodies.size(), 0);
-  for (Index b = 0; b < bodies.size(); ++b) {
-    root[b] = b;
-    held[b] = bodies[b]->model->any_fixed;
-  }
+  auto& [joined, held, ready, whole, size, group] = sleepers;
+  joined.reset(bodies.size());
+  held.assign(bodies.size(), 0);
+  ready.assign(bodies.size(), 1);
+  whole.assign(bodies.size(), 0);
+  for (Index b = 0; b < bodies.size(); ++b) held[b] = bodies[b]->model->any_fixed;
   listLoaded();
   for (const LoadedSurfaces& pair : loaded) {
     if (pair.a >= bodies.size()) continue;
-    if (pair.b >= bodies.size()) {  // the ground, or an obstacle
+    if (pair.b >= bodies.size())  // the ground, or an obstacle
       held[pair.a] = 1;
-    } else {
-      const Index a = rootOf(root, pair.a), b = rootOf(root, pair.b);
-      root[std::max(a, b)] = std::min(a, b);
-    }
+    else
+      joined.join(pair.a, pair.b);
   }
   for (const Pick& pick : picks)
     for (Index b = 0; b < bodies.size(); ++b)
       if (bodies[b]->id == pick.body) held[b] = 1;
-  std::vector<double> size(bodies.size(), 0.0);  // [m] of an island's largest
+  size.assign(bodies.size(), 0.0);
   for (Index b = 0; b < bodies.size(); ++b) {
-    const Index r = rootOf(root, b);
+    const Index r = joined.find(b);
     held[r] |= held[b];
     whole[r] |= !isCrumb(*bodies[b]);
     size[r] = std::max(size[r], sizeOf(bodies[b]->bounds));
@@ -103,7 +91,7 @@ void World::Impl::fallAsleep(double h_frame) {
   for (Index b = 0; b < bodies.size(); ++b) {
     WorldBody& body = *bodies[b];
     if (body.asleep) continue;
-    const Index r = rootOf(root, b);
+    const Index r = joined.find(b);
     double most = size[r];
     if (gravity > 0.0) most = std::min(most, 0.5 * gravity * kStillFor * kStillFor);
     if (wayFromRest(body) <= kStillShare * most) {
@@ -114,9 +102,9 @@ void World::Impl::fallAsleep(double h_frame) {
     }
     if (!(body.still_for >= kStillFor) && !(whole[r] && isCrumb(body))) ready[r] = 0;
   }
-  std::vector<std::uint32_t> group(bodies.size(), 0);
+  group.assign(bodies.size(), 0);
   for (Index b = 0; b < bodies.size(); ++b) {
-    const Index r = rootOf(root, b);
+    const Index r = joined.find(b);
     WorldBody& body = *bodies[b];
     if (body.asleep || !ready[r] || !held[r]) continue;
     if (!group[r]) group[r] = next_sleep_group++;

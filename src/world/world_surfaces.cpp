@@ -15,8 +15,8 @@ namespace meshless {
 namespace {
 
 constexpr int kContactSubsteps = 4;   // at least, where something may meet: in longer ones stacks of stiff bodies rock
-constexpr double kFarthest = 0.5;    // edges, between two searches
-constexpr double kMostSearches = 64;    // of a frame
+constexpr double kFarthest = 0.5;     // edges, between two searches
+constexpr double kMostSearches = 64;  // of a frame
 constexpr std::size_t kWorkParticles = 512;  // of small islands together: what they read stays in the cache
 constexpr double kSlowedMass = 0.05;  // of an island, at most: slivers are slowed, instead of all taking their substeps
 
@@ -45,8 +45,8 @@ ContactSurface surfaceOf(const BodyModel& model) {
   return {mesh, std::move(supports)};
 }
 
-// [m] how far embedded vertices may be beyond the bounds of the particles. Two spacings, or less for crumbs, whose whole
-// surface is nearer to their few particles. Otherwise, where many crumbs lie together, each would be next to all.
+// [m] how far embedded vertices may be beyond the bounds of the particles. Two spacings, or less for crumbs, whose
+// whole surface is nearer to their few particles. Otherwise, where many crumbs lie together, each would be next to all.
 double embeddedReachOf(const BodyModel& model) {
   const SurfaceBinding& binding = model.binding;
   double farthest = 0.0;  // squared, of an embedded vertex from its nearest carrier
@@ -446,7 +446,8 @@ void World::Impl::keepSizes(SurfaceWork& work) {
   if (std::none_of(work.bodies.begin(), work.bodies.end(), [&](const WorldBody* body) { return keeps(*body); })) return;
   for (std::size_t n = 0; n < work.member_count; ++n)
     surface_contacts.eachPressed(work.members[n].island, [&](Index b, Index particle, const Vec3& normal) {
-      if (b < bodies.size() && !bodies[b]->asleep && keeps(*bodies[b])) bodies[b]->scratch.touched.push_back({particle, normal});
+      if (b < bodies.size() && !bodies[b]->asleep && keeps(*bodies[b]))
+        bodies[b]->scratch.touched.push_back({particle, normal});
     });
   for (WorldBody* body : work.bodies)
     if (keeps(*body)) preserve(*body->model, body->material, body->state, body->scratch, work.preserve_counters);

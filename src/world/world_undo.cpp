@@ -61,9 +61,7 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
     return now == then;
   };
   // What pressed then is not what presses now.
-  const auto forgetContacts = [this](const WorldBody& body) {
-    surface_contacts.forget(body.number);
-  };
+  const auto forgetContacts = [this](const WorldBody& body) { surface_contacts.forget(body.number); };
 
   std::size_t place = 0;  // in the order of bodies
   for (CutUndo::Body& was : before.bodies) {

@@ -178,8 +178,7 @@ TEST(FeaturePairs, LongRidgesMeetByPointsOneSpacingApart) {
       names.insert(pair.features);
       EXPECT_NEAR(pair.gap, 0.01, 1e-12);
       Vec3 between = Vec3::Zero();
-      for (int k = 0; k < 5; ++k)
-        between += pair.shares[k] * (k < 2 ? high : low).frame.vertices[pair.vertices[k]];
+      for (int k = 0; k < 5; ++k) between += pair.shares[k] * (k < 2 ? high : low).frame.vertices[pair.vertices[k]];
       EXPECT_NEAR((between - Vec3(0, 0, 0.01)).norm(), 0.0, 1e-12);
     }
     EXPECT_EQ(names.size(), down) << "each has a name of its own";

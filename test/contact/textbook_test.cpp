@@ -31,9 +31,7 @@ struct Body {
   Points positions;
   std::vector<double> inverse_masses;
 
-  void finish(double mass) {
-    inverse_masses.assign(positions.size(), 1.0 / mass);
-  }
+  void finish(double mass) { inverse_masses.assign(positions.size(), 1.0 / mass); }
 };
 
 /// A lattice of n^3 cells, each of Kuhn's six tetrahedra, centred at the origin.

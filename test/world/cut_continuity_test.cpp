@@ -41,7 +41,7 @@ Rest splitMotion(const Points& at, const Points& moves) {
 
 constexpr double kRate = 1440.0;    // [1/s] of elastic worlds
 constexpr double kSpacing = 0.012;  // [m]
-constexpr double kSeen = 0.15;       // of it
+constexpr double kSeen = 0.15;      // of it
 
 struct Scenario {
   const char* name;

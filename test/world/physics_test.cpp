@@ -124,14 +124,12 @@ Lying lying(const Kind& kind, Random& random) {
 }
 
 TEST(Physics, TheGroundCarriesTheWeight) {
-  expectReached("weight",
-                {{kElastic, 0.0}, {kLooks, 0.0}, {kOne, 1.2e-10}},
+  expectReached("weight", {{kElastic, 0.0}, {kLooks, 0.0}, {kOne, 1.2e-10}},
                 [](auto&... a) { return lying(a...).weight; });
 }
 
 TEST(Physics, WhatLiesIsAtRest) {
-  expectReached("speed [m/s]",
-                {{kElastic, 0.0}, {kLooks, 0.0}, {kOne, 1.2e-8}},
+  expectReached("speed [m/s]", {{kElastic, 0.0}, {kLooks, 0.0}, {kOne, 1.2e-8}},
                 [](auto&... a) { return lying(a...).speed; });
 }
 
@@ -216,8 +214,7 @@ TEST(Physics, SlidingStartsAndGoesAsCoulombSays) {
 TEST(Physics, SlidingDoesNotSeeEdgesWithinAPlane) {
   const auto most = [](const char* law, Below below) {
     double most = 0.0;
-    for (const Kind& kind : {kElastic, kLooks, kOne})
-      most = std::max(most, worst(law, kind, slides(below, 1.3)));
+    for (const Kind& kind : {kElastic, kLooks, kOne}) most = std::max(most, worst(law, kind, slides(below, 1.3)));
     return most;
   };
   const double obstacle = most("over edges", Below::kFineObstacle);

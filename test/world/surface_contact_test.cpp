@@ -232,7 +232,7 @@ double lowestOfThrown(double speed, double thickness, double youngs_modulus) {
   return z;
 }
 
-// Whatever the speed, on what is thinner than the way of a step.
+// On what is thinner than the way of a step.
 TEST(SurfaceContact, AThrownBlockDoesNotGoThroughAThinPlate) {
   for (const double speed : {2.0, 8.0}) EXPECT_GT(lowestOfThrown(speed, 0.004, 2e4), 0.0) << speed;
   for (const double speed : {8.0, 20.0}) EXPECT_GT(lowestOfThrown(speed, 0.004, 2e5), 0.0) << speed;

@@ -13,13 +13,13 @@ struct TouchedParticle {
 
 /// Arrays that a body's substep needs and nothing outlives; kept between steps so that stepping allocates nothing.
 struct StepScratch {
-  Points previous;        // [m] positions at the start of the substep
+  Points previous;  // [m] positions at the start of the substep
   Points predicted;
   Points goals;
   ClampStep clamp;
   ElasticBatchState elastic;
   std::vector<TouchedParticle> touched;  // of a body that preserves its size
-  bool lies = false;               // on something that does not move: its spin is damped as what deforms
+  bool lies = false;                     // on something that does not move: its spin is damped as what deforms
 };
 
 /// Reads positions and velocities; writes positions, velocities, poses and scratch.previous: matches at y = x + h v,

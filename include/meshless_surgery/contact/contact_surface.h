@@ -33,8 +33,8 @@ struct ContactSurface {
 
   std::vector<Triangle> triangles;
   std::vector<ContactEdge> edges;
-  std::vector<Index> face_offsets, faces;        // around each vertex, compressed rows
-  std::vector<char> cut_faces, cut_vertices;     // 1: of a patch that a cut has made
+  std::vector<Index> face_offsets, faces;     // around each vertex, compressed rows
+  std::vector<char> cut_faces, cut_vertices;  // 1: of a patch that a cut has made
   VertexSupports supports;
   BoxTree tree;  // over faces
   bool closed = true;

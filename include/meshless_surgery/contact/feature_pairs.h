@@ -55,9 +55,7 @@ struct SearchScratch {
     found.pairs.clear();
     found.sides.clear();
   }
-  std::size_t bytes() const {
-    return bytesOf(found.pairs, found.sides, vertices, faces, near) + query.bytes();
-  }
+  std::size_t bytes() const { return bytesOf(found.pairs, found.sides, vertices, faces, near) + query.bytes(); }
 };
 
 struct PairSearch {
@@ -66,10 +64,10 @@ struct PairSearch {
     const SurfaceFrame* frame = nullptr;
   };
   Side a, b;
-  double h = 0.0;       // [s] of the frame
-  double length = 0.0;  // [m] the shorter mean edge of the two
+  double h = 0.0;                                            // [s] of the frame
+  double length = 0.0;                                       // [m] the shorter mean edge of the two
   double spacing = std::numeric_limits<double>::infinity();  // [m] of points on long ridges of a
-  bool first = true;    // nothing is remembered: search for what is inside
+  bool first = true;                                         // nothing is remembered: search for what is inside
   enum class Self { kNo, kCuts, kAll } self = Self::kNo;
   const RememberedSide* remembered = nullptr;  // ascending by vertex
   std::size_t remembered_count = 0;
@@ -82,9 +80,10 @@ double searchMargin(double edge_length);
 void findVerticesNear(const PairSearch& search, SearchScratch& scratch);
 
 /// scratch.vertices of a, and points on its long ridges, against the faces of b, to scratch.found: up to three pairs
-/// each, of different directions, the nearest first. Signs by pseudonormals (Baerentzen and Aanaes 2005); where several faces are equally near, the vertex
-/// is on the side of the one that its own faces oppose most, so that the twin faces of a fresh cut are on the right
-/// sides. Directions that the vertex's faces do not oppose are left out. Returns the vertices that were queried.
+/// each, of different directions, the nearest first. Signs by pseudonormals (Baerentzen and Aanaes 2005); where several
+/// faces are equally near, the vertex is on the side of the one that its own faces oppose most, so that the twin faces
+/// of a fresh cut are on the right sides. Directions that the vertex's faces do not oppose are left out. Returns the
+/// vertices that were queried.
 std::size_t findVertexFace(const PairSearch& search, SearchScratch& scratch);
 
 /// Vertices of a over the plane z = height.

@@ -1,6 +1,7 @@
 // A few sweeps of Gauss-Seidel over rows in each of many small steps: displacements that keep every gap open, with
-// friction. A gap that is open closes at most; an overlap gets no deeper, and is let out at a bounded speed, once a frame (Macklin
-// et al. 2019, "Small steps in physics simulation"). Conserves linear and, in bodies that nothing holds, angular momentum.
+// friction. A gap that is open closes at most; an overlap gets no deeper, and is let out at a bounded speed, once a
+// frame (Macklin et al. 2019, "Small steps in physics simulation"). Conserves linear and, in bodies that nothing holds,
+// angular momentum.
 #pragma once
 
 #include "meshless_surgery/contact/contact_rows.h"
@@ -43,11 +44,11 @@ struct SpringRow {
 };
 
 struct SolverStep {
-  double h = 0.0;     // [s] of the substep
+  double h = 0.0;      // [s] of the substep
   double frame = 0.0;  // [s] of the frame, in whose first substep old overlap is let out
   double slow = 0.0;   // [m/s] at which nothing bounces
-  int number = 0;     // of it: those who want the opposite take turns at the last word
-  double warm = 1.0;  // what the impulses of the last substep are worth in this one: (h / its h)^2
+  int number = 0;      // of it in the search
+  double warm = 1.0;   // what the impulses of the last substep are worth in this one: (h / its h)^2
   Vec3 sphere_from = Vec3::Zero(), sphere_to = Vec3::Zero();  // [m] centre, at the start and the end of the substep
   double sphere_radius = 0.0;                                 // [m]
 };

@@ -13,20 +13,21 @@
 #include "meshless_surgery/contact/deformable.h"
 #include "meshless_surgery/contact/row_solver.h"
 #include "meshless_surgery/contact/surface_memory.h"
+#include "meshless_surgery/geometry/union_find.h"
 
 namespace meshless {
 
 /// A body or an obstacle as contact sees it in a frame. Whoever fills it keeps what it points to alive.
 struct Collider {
-  std::uint64_t key = 0;                    // of the body for as long as it lives
-  Box bounds;                               // [m] swept in the frame; empty: it meets nothing
-  double edge_length = 0.0;                 // [m] mean
+  std::uint64_t key = 0;                                     // of the body for as long as it lives
+  Box bounds;                                                // [m] swept in the frame; empty: it meets nothing
+  double edge_length = 0.0;                                  // [m] mean
   double spacing = std::numeric_limits<double>::infinity();  // [m] of its particles: points on ridges are as near
-  const ContactSurface* surface = nullptr;  // filled, with what follows, for those that needed() says
-  const Vec3* vertices = nullptr;           // [m] now, one a vertex of the surface; for those that moved() says
-  Vec3* positions = nullptr;                // [m] one a particle
-  const Vec3* velocities = nullptr;         // [m/s]; null: of an obstacle
-  const double* inverse_masses = nullptr;   // [1/kg] 0: held
+  const ContactSurface* surface = nullptr;                   // filled, with what follows, for those that needed() says
+  const Vec3* vertices = nullptr;          // [m] now, one a vertex of the surface; for those that moved() says
+  Vec3* positions = nullptr;               // [m] one a particle
+  const Vec3* velocities = nullptr;        // [m/s]; null: of an obstacle
+  const double* inverse_masses = nullptr;  // [1/kg] 0: held
   Index particles = 0;
   double friction = 0.5;
   double restitution = 0.0;  // 0..1
@@ -46,7 +47,7 @@ struct SurfaceScene {
     double radius = 0.0;                             // [m]
   };
   std::optional<Sphere> sphere;
-  double h = 0.0;  // [s] of the frame
+  double h = 0.0;        // [s] of the frame
   bool surfaces = true;  // bodies meet each other and obstacles by their surfaces; false: in the given rows alone
   struct Given {
     Index a = 0, b = 0;  // colliders
@@ -77,7 +78,7 @@ class SurfaceContacts {
 
   struct Island {
     std::vector<Index> bodies;
-    std::vector<Index> free;   // the bodies, where nothing holds any of them
+    std::vector<Index> free;  // the bodies, where nothing holds any of them
     std::vector<SolverRows> rows;
   };
   /// Each collider that moves is in one; in the order of their first bodies.
@@ -167,7 +168,8 @@ class SurfaceContacts {
   std::vector<Slot> now_, before_;
   std::vector<SolverBody> solver_bodies_;
   std::vector<Island> islands_, spare_islands_;
-  std::vector<Index> root_, island_of_;  // one a collider
+  UnionFind joined_;
+  std::vector<Index> island_of_;  // one a collider
   std::vector<char> island_held_;
 };
 

@@ -6,12 +6,12 @@
 namespace meshless {
 
 struct SurfaceFrame {
-  Points vertices;                // [m]
-  Points velocities;              // [m/s] of the vertices
-  Points face_normals;            // unit; zero where a face has no area
-  Points vertex_normals;          // unit, of the areas around; zero without
-  TreeBoxes boxes;                // of faces, swept by their velocities in the frame
-  std::vector<Index> ridges;      // edges that are convex by more than kRidgeCosine, and borders
+  Points vertices;              // [m]
+  Points velocities;            // [m/s] of the vertices
+  Points face_normals;          // unit; zero where a face has no area
+  Points vertex_normals;        // unit, of the areas around; zero without
+  TreeBoxes boxes;              // of faces, swept by their velocities in the frame
+  std::vector<Index> ridges;    // edges that are convex by more than kRidgeCosine, and borders
   Box bounds;                   // swept
   std::vector<FloatBox> swept;  // of vertices
 

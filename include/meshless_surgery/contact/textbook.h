@@ -12,9 +12,9 @@ namespace meshless {
 struct Penetration {
   Index body_a = 0, particle = 0;
   Index body_b = 0, tetrahedron = 0;
-  std::array<double, 4> weights{};    // barycentric in the tetrahedron
-  double depth = 0.0;                 // [m] >= 0
-  Vec3 direction = Vec3::Zero();      // unit: where the particle must go to get out
+  std::array<double, 4> weights{};  // barycentric in the tetrahedron
+  double depth = 0.0;               // [m] >= 0
+  Vec3 direction = Vec3::Zero();    // unit: where the particle must go to get out
 };
 
 /// Finds every penetration between different bodies whose bounds overlap; ordered by body and particle.

@@ -10,7 +10,12 @@ namespace meshless {
 
 class UnionFind {
  public:
-  explicit UnionFind(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), Index{0}); }
+  explicit UnionFind(std::size_t n = 0) { reset(n); }
+  /// All by themselves again.
+  void reset(std::size_t n) {
+    parent_.resize(n);
+    std::iota(parent_.begin(), parent_.end(), Index{0});
+  }
   Index find(Index i) {
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
     return i;
@@ -22,6 +27,8 @@ class UnionFind {
     if (a < b) parent_[b] = a;
     if (b < a) parent_[a] = b;
   }
+
+  std::size_t bytes() const { return parent_.capacity() * sizeof(Index); }
 
  private:
   std::vector<Index> parent_;
