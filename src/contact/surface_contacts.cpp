@@ -89,8 +89,8 @@ void SurfaceContacts::findPairs(const SurfaceScene& scene, const std::vector<Col
   }
   counters.bounds_tested += broad_phase_.tested();
   for (const Pair* pair : pairs_) {
-    needed_[pair->a] = 1;
-    if (pair->b != kNoIndex) needed_[pair->b] = 1;
+    needed_[pair->a] = kNear;
+    if (pair->b != kNoIndex) needed_[pair->b] = kNear;
   }
   // Between those that sleep all stays as it was; what is apart is forgotten.
   const auto stays = [&](std::uint64_t key) {

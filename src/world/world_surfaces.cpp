@@ -241,7 +241,7 @@ int World::Impl::searchesOf(double h_frame) {
   findNear(h_frame);
   double most = kFarthest;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
-    if (!surface_contacts.needed()[b] || bodies[b]->asleep) continue;
+    if (surface_contacts.needed()[b] != SurfaceContacts::kNear || bodies[b]->asleep) continue;
     const VertexSupports& supports = surfaceModel(*bodies[b]).surface.supports;
     double fastest = 0.0;
     for (Index v = 0; v + 1 < supports.offsets.size(); ++v)

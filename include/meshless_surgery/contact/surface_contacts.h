@@ -65,7 +65,8 @@ class SurfaceContacts {
  public:
   /// Which pairs can touch: sets needed(). Once a frame, and again where some have woken.
   void findPairs(const SurfaceScene& scene, const std::vector<Collider>& colliders, ContactCounters& counters);
-  /// One a collider: 1 where something is near.
+  /// One a collider: kNear where something is near, 1 where a spring alone needs it.
+  static constexpr char kNear = 2;
   const std::vector<char>& needed() const { return needed_; }
   /// Whose rows are to be found anew, since somebody has moved: sets moved().
   void findMoved(const SurfaceScene& scene, const std::vector<Collider>& colliders);
