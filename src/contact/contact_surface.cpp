@@ -35,8 +35,8 @@ VertexSupports ownSupports(Index vertices) {
   return supports;
 }
 
-ContactSurface::ContactSurface(const TriangleMesh& rest, VertexSupports vertex_supports)
-    : triangles(rest.triangles), supports(std::move(vertex_supports)) {
+ContactSurface::ContactSurface(const TriangleMesh& mesh, VertexSupports vertex_supports)
+    : rest(mesh.vertices), triangles(mesh.triangles), supports(std::move(vertex_supports)) {
   const Index count = static_cast<Index>(supports.offsets.size() - 1);
   for (Index v = 0; v < count; ++v) {
     double sum = 0.0;
@@ -45,7 +45,7 @@ ContactSurface::ContactSurface(const TriangleMesh& rest, VertexSupports vertex_s
   }
   for (const HalfEdge& half : halfEdgesOf(triangles)) {
     if (edges.empty() || edges.back().vertices != half.ends) {
-      const double length = (rest.vertices[half.ends[0]] - rest.vertices[half.ends[1]]).norm();
+      const double length = (rest[half.ends[0]] - rest[half.ends[1]]).norm();
       edges.push_back({half.ends, {half.face, kNoIndex}, length});
       edge_length += length;
     } else if (edges.back().faces[1] == kNoIndex) {
@@ -69,18 +69,18 @@ ContactSurface::ContactSurface(const TriangleMesh& rest, VertexSupports vertex_s
   Points centres;
   for (Index f = 0; f < triangles.size(); ++f) {
     const Triangle& t = triangles[f];
-    cut_faces[f] = rest.patchOf(f) != kOuterPatch;
+    cut_faces[f] = mesh.patchOf(f) != kOuterPatch;
     if (cut_faces[f])
       for (Index v : t) cut_vertices[v] = 1;
-    centres.push_back((rest.vertices[t[0]] + rest.vertices[t[1]] + rest.vertices[t[2]]) / 3.0);
+    centres.push_back((rest[t[0]] + rest[t[1]] + rest[t[2]]) / 3.0);
   }
   tree = BoxTree(centres);
 }
 
 std::size_t ContactSurface::bytes() const {
   return sizeof *this +
-         bytesOf(triangles, edges, face_offsets, faces, cut_faces, cut_vertices, supports.offsets, supports.particles,
-                 supports.weights) +
+         bytesOf(rest, triangles, edges, face_offsets, faces, cut_faces, cut_vertices, supports.offsets,
+                 supports.particles, supports.weights) +
          tree.bytes();
 }
 

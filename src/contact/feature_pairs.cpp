@@ -145,7 +145,18 @@ class PointSearch {
     if (search_.self == PairSearch::Self::kCuts && !b_.surface->cut_faces[face]) return false;
     for (const Index corner : b_.surface->triangles[face])
       if (corner == point.vertices[0]) return false;
-    return b_.frame->face_normals[face].dot(point.normal) < -kSelfOpposed;
+    return b_.frame->face_normals[face].dot(point.normal) < -kSelfOpposed && !hasTissueBetween(point, face);
+  }
+
+  // Who is behind a face at rest, and near it, comes before it only where the tissue between is turned inside out.
+  bool hasTissueBetween(const SurfacePoint& point, Index face) const {
+    const Triangle& t = b_.surface->triangles[face];
+    const Points& x = b_.surface->rest;
+    const Vec3& p = a_.surface->rest[point.vertices[0]];
+    const Vec3 weights = nearestWeights(p, x[t[0]], x[t[1]], x[t[2]]);
+    const Vec3 way = p - (weights[0] * x[t[0]] + weights[1] * x[t[1]] + weights[2] * x[t[2]]);
+    const Vec3 normal = (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]);
+    return way.norm() < search_.length && way.dot(normal) < -tie_ * normal.norm();
   }
 
   void gather(const SurfacePoint& point, double within) {
@@ -379,16 +390,22 @@ void findVerticesNear(const PairSearch& search, SearchScratch& scratch) {
     deepest = std::max(deepest, kDeeper * search.remembered[k].depth);
   const ContactSurface& a = *search.a.surface;
   scratch.vertices.clear();
-  if (search.first) {  // any may begin inside, far from all faces
+  if (search.first && search.self == PairSearch::Self::kNo) {  // any may begin inside, far from all faces
     scratch.vertices.resize(a.vertices());
     std::iota(scratch.vertices.begin(), scratch.vertices.end(), Index{0});
     return;
   }
   scratch.near.assign(a.vertices(), 0);
-  a.tree.queryTree(search.a.frame->boxes, search.b.surface->tree, search.b.frame->boxes,
-                   searchMargin(search.length) + deepest, scratch.query, [&](Index face) {
-                     for (const Index v : a.triangles[face]) scratch.near[v] = 1;
-                   });
+  a.tree.queryTree(
+      search.a.frame->boxes, search.b.surface->tree, search.b.frame->boxes, searchMargin(search.length) + deepest,
+      scratch.query,
+      [&](Index mine, Index theirs) {
+        return search.self == PairSearch::Self::kNo ||
+               search.a.frame->normals.nodes[mine].leastDot(search.b.frame->normals.nodes[theirs]) < -kSelfOpposed;
+      },
+      [&](Index face) {
+        for (const Index v : a.triangles[face]) scratch.near[v] = 1;
+      });
   for (Index v = 0; v < a.vertices(); ++v)
     if (scratch.near[v]) scratch.vertices.push_back(v);
 }

@@ -89,8 +89,9 @@ void SurfaceContacts::findPairs(const SurfaceScene& scene, const std::vector<Col
   }
   counters.bounds_tested += broad_phase_.tested();
   for (const Pair* pair : pairs_) {
-    needed_[pair->a] = kNear;
-    if (pair->b != kNoIndex) needed_[pair->b] = kNear;
+    const char by = pair->a == pair->b ? 1 : kNear;
+    needed_[pair->a] = std::max(needed_[pair->a], by);
+    if (pair->b != kNoIndex) needed_[pair->b] = std::max(needed_[pair->b], by);
   }
   // Between those that sleep all stays as it was; what is apart is forgotten.
   const auto stays = [&](std::uint64_t key) {
@@ -133,14 +134,19 @@ void SurfaceContacts::findMoved(const SurfaceScene& scene, const std::vector<Col
     const bool known = way.last.size() == vertices;
     way.last.resize(vertices, Vec3::Zero());
     double farthest = 0.0, fastest = 0.0;
+    Box ways_gone;
     for (Index v = 0; v < vertices && collider.moves; ++v) {
       const Vec3 place = supports.sum(v, collider.positions);
-      farthest = std::max(farthest, (place - way.last[v]).squaredNorm());
-      fastest = std::max(fastest, supports.sum(v, collider.velocities).squaredNorm());
+      const Vec3 gone = place - way.last[v];
+      farthest = std::max(farthest, gone.squaredNorm());
+      if (needed_[c] == kNear) fastest = std::max(fastest, supports.sum(v, collider.velocities).squaredNorm());
+      ways_gone.extend(gone);
       way.last[v] = place;
     }
     way.ahead = kAhead * scene.h * std::sqrt(fastest);
-    if (known) way.gone += std::sqrt(farthest);
+    if (!known || !collider.moves) continue;
+    way.gone += std::sqrt(farthest);
+    way.bent += ways_gone.diagonal();
   }
   moved_.assign(count, 0);
   for (Pair* pair : pairs_) {
@@ -148,13 +154,15 @@ void SurfaceContacts::findMoved(const SurfaceScene& scene, const std::vector<Col
     const Collider* const b = pair->b == kNoIndex ? nullptr : &colliders[pair->b];
     const double length = b ? std::min(a.edge_length, b->edge_length) : a.edge_length;
     const double skin = b ? kSkin * std::min(a.edge_length, b->edge_length) : 0.0;
-    double gone = ways[pair->a]->gone - pair->way_a + ways[pair->a]->ahead;
-    if (b) gone += ways[pair->b]->gone - pair->way_b + ways[pair->b]->ahead;
+    const KeptWay &way_a = *ways[pair->a], *const way_b = b ? ways[pair->b] : nullptr;
+    double gone = way_a.gone - pair->way_a + way_a.ahead;
+    if (b) gone += way_b->gone - pair->way_b + way_b->ahead;
+    if (pair->a == pair->b) gone = way_a.bent - pair->way_a + kAhead * scene.h * a.bends;
     pair->stale = !pair->found || pair->kind == Kind::kSphere || gone > searchMargin(length) - skin;
     pair->stale = pair->stale && pair->kind != Kind::kGiven;
     if (!pair->stale) continue;
-    pair->way_a = ways[pair->a]->gone;
-    if (b) pair->way_b = ways[pair->b]->gone;
+    pair->way_a = pair->a == pair->b ? way_a.bent : way_a.gone;
+    if (b) pair->way_b = way_b->gone;
     moved_[pair->a] = 1;
     if (b) moved_[pair->b] = 1;
   }
@@ -221,6 +229,7 @@ void SurfaceContacts::findPair(const SurfaceScene& scene, const std::vector<Coll
     case Kind::kGiven:
       break;
     case Kind::kVertexFace:
+      if (pair.a == pair.b) placeNormalBoxes(*a.surface, frames_[pair.a]);
       findVerticesNear(search, scratch->search);
       pair.queried = findVertexFace(search, scratch->search);
   }

@@ -68,4 +68,17 @@ void placeFrame(const ContactSurface& surface, const Vec3* vertices, const Vec3*
     if (isRidge(surface, frame, surface.edges[e])) frame.ridges.push_back(e);
 }
 
+void placeNormalBoxes(const ContactSurface& surface, SurfaceFrame& frame) {
+  frame.normals.items.resize(surface.triangles.size());
+  for (Index f = 0; f < surface.triangles.size(); ++f) {
+    Box box{frame.face_normals[f], frame.face_normals[f]};
+    for (const Index v : surface.triangles[f]) box.extend(frame.vertex_normals[v]);
+    for (int k = 0; k < 3; ++k) {
+      frame.normals.items[f].min[k] = static_cast<float>(box.min[k]);
+      frame.normals.items[f].max[k] = static_cast<float>(box.max[k]);
+    }
+  }
+  surface.tree.refit(frame.normals);
+}
+
 }  // namespace meshless

@@ -145,8 +145,13 @@ void World::Impl::fillCollider(WorldBody& body, double h_frame, Collider& collid
   }
   body.bounds = extentOf(body.state.positions);
   double fastest = 0.0;
-  for (const Vec3& v : body.state.velocities) fastest = std::max(fastest, v.squaredNorm());
+  Box velocities;
+  for (const Vec3& v : body.state.velocities) {
+    fastest = std::max(fastest, v.squaredNorm());
+    velocities.extend(v);
+  }
   body.fastest = std::sqrt(fastest);
+  collider.bends = velocities.diagonal();
   const Vec3 by = Vec3::Constant(body.surface_reach + h_frame * body.fastest);
   body.bounds.min -= by;
   body.bounds.max += by;

@@ -18,6 +18,7 @@ struct Placed {
     for (Vec3& p : mesh.vertices) p += at;
     const Points velocities(mesh.vertices.size(), velocity);
     placeFrame(surface, mesh.vertices.data(), velocities.data(), h, frame);
+    placeNormalBoxes(surface, frame);
   }
   TriangleMesh mesh;
   ContactSurface surface;
@@ -191,6 +192,37 @@ TEST(FeaturePairs, AThinSlabDoesNotMeetItsOwnOtherSide) {
   PairSearch search = between(slab, slab);
   search.self = PairSearch::Self::kAll;
   EXPECT_TRUE(vertexFace(search).empty());
+}
+
+// Rows there would keep it so.
+TEST(FeaturePairs, ASlabThatIsTurnedInsideOutDoesNotMeetItself) {
+  Placed slab(boxMesh(Vec3(1, 1, 0.01), 8, 8, 1), Vec3::Zero());
+  Points inverted = slab.mesh.vertices;
+  for (Vec3& p : inverted) p.z() = -p.z();
+  const Points still(inverted.size(), Vec3::Zero());
+  placeFrame(slab.surface, inverted.data(), still.data(), 0.01, slab.frame);
+  placeNormalBoxes(slab.surface, slab.frame);
+  PairSearch search = between(slab, slab);
+  search.self = PairSearch::Self::kAll;
+  EXPECT_TRUE(vertexFace(search).empty());
+}
+
+// Two flaps of one surface, one over the other: each vertex that is near enough meets the other flap.
+TEST(FeaturePairs, ASurfaceMeetsItselfWhereItsFlapsFaceEachOther) {
+  TriangleMesh flaps = boxMesh(Vec3(1, 1, 0.1), 8, 8, 1);
+  const TriangleMesh upper = boxMesh(Vec3(1, 1, 0.1), 8, 8, 1);
+  const Index lower = static_cast<Index>(flaps.vertices.size());
+  for (const Vec3& p : upper.vertices) flaps.vertices.push_back(p + Vec3(0.03, 0.02, 0.11));
+  for (const Triangle& t : upper.triangles) flaps.triangles.push_back({t[0] + lower, t[1] + lower, t[2] + lower});
+  const Placed both(flaps, Vec3::Zero());
+  PairSearch search = between(both, both);
+  search.self = PairSearch::Self::kAll;
+  const std::vector<FeaturePair> pairs = vertexFace(search);
+  EXPECT_GT(pairs.size(), 100u) << "of 2 x 81 vertices";
+  for (const FeaturePair& pair : pairs) {
+    EXPECT_NEAR(pair.gap, 0.01, 1e-12);
+    EXPECT_NE(pair.vertices[0] < lower, pair.vertices[1] < lower);
+  }
 }
 
 TEST(FeaturePairs, ASphereMeetsEachFeatureOnce) {

@@ -249,27 +249,33 @@ TEST(FoldLaw, LetsTissueBend) {
   EXPECT_FALSE(foldLaw(seen).broken()) << foldLaw(seen).text;
 }
 
-// A slab of cells that is creased along x = 0: its surface is, too, and nothing else is.
+// A slab that is creased along x = 0: its surface is, too, and nothing else is.
 TEST(FoldLaw, LetsTheSurfaceFoldWhereTheTissueDoes) {
-  BodyDef def = test::defOf(boxMesh(Vec3(0.2, 0.1, 0.03), 0.005), "slab");
-  def.material.youngs_modulus = 1e4;
-  def.spacing = 0.01;
-  const PreparedBody body = test::prepared(def);
-  Seen seen;
-  seen.bodies.push_back(bodyOf("slab", body.model->surface));
-  SeenBody& slab = seen.bodies[0];
-  slab.model = body.model;
-  const auto creased = [](Points points) {
-    for (Vec3& p : points) p = p.x() > 0.0 ? Vec3(-0.3 * p.x(), p.y(), p.z() + 0.95 * p.x()) : p;
-    return points;
-  };
-  slab.particles = body.state.positions;
-  slab.surface.vertices = creased(body.state.surface);
-  slab.rest = body.state.surface;
-  EXPECT_GT(foldsOf(slab).of_surface, 10u) << "flat tissue explains nothing";
-  slab.particles = creased(body.state.positions);
-  EXPECT_EQ(foldsOf(slab).of_surface, 0u);
-  EXPECT_GT(foldsOf(slab).of_tissue, 10u);
+  for (const bool elastic : {true, false}) {
+    SCOPED_TRACE(elastic ? "cells" : "clusters");
+    BodyDef def = test::defOf(boxMesh(Vec3(0.2, 0.1, 0.03), 0.005), "slab");
+    if (elastic)
+      def.material.youngs_modulus = 1e4;
+    else
+      def.clusters.kind = ClusterOptions::Kind::kGrid;
+    def.spacing = 0.01;
+    const PreparedBody body = test::prepared(def);
+    Seen seen;
+    seen.bodies.push_back(bodyOf("slab", body.model->surface));
+    SeenBody& slab = seen.bodies[0];
+    slab.model = body.model;
+    const auto creased = [](Points points) {
+      for (Vec3& p : points) p = p.x() > 0.0 ? Vec3(-0.3 * p.x(), p.y(), p.z() + 0.95 * p.x()) : p;
+      return points;
+    };
+    slab.particles = body.state.positions;
+    slab.surface.vertices = creased(body.state.surface);
+    slab.rest = body.state.surface;
+    EXPECT_GT(foldsOf(slab).of_surface, 10u) << "flat tissue explains nothing";
+    slab.particles = creased(body.state.positions);
+    EXPECT_EQ(foldsOf(slab).of_surface, 0u);
+    EXPECT_GT(foldsOf(slab).of_tissue, 10u);
+  }
 }
 
 /// Looks twelve times a second at a piece of which `speed` and `height` tell.

@@ -1,6 +1,7 @@
 // A tree of boxes over the faces of a surface: its topology is made once, its boxes anew in every frame.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -31,6 +32,13 @@ struct FloatBox {
     for (int k = 0; k < 3; ++k)
       if (static_cast<double>(min[k]) - by > o.max[k] || static_cast<double>(o.min[k]) - by > max[k]) return false;
     return true;
+  }
+  /// The least dot product of a point in this box and one in the other.
+  float leastDot(const FloatBox& o) const {
+    float sum = 0.0f;
+    for (int k = 0; k < 3; ++k)
+      sum += std::min({min[k] * o.min[k], min[k] * o.max[k], max[k] * o.min[k], max[k] * o.max[k]});
+    return sum;
   }
   /// The sum of its three edges.
   float edgeSum() const { return (max[0] - min[0]) + (max[1] - min[1]) + (max[2] - min[2]); }
@@ -83,9 +91,10 @@ class BoxTree {
   }
 
   /// visit(item) for each in a leaf that is nearer than `by` [m] to a leaf of another tree; an item may come again.
-  template <class Visit>
+  /// may_meet(node, other's node) leaves out what is below both.
+  template <class MayMeet, class Visit>
   void queryTree(const TreeBoxes& boxes, const BoxTree& other, const TreeBoxes& other_boxes, double by,
-                 TreeQuery& query, const Visit& visit) const {
+                 TreeQuery& query, const MayMeet& may_meet, const Visit& visit) const {
     if (nodes_.empty() || other.nodes_.empty()) return;
     auto& [stack, seen] = query;
     stack.assign(1, {0, 0});
@@ -94,7 +103,7 @@ class BoxTree {
       const auto [mine, theirs] = stack.back();
       stack.pop_back();
       const Node &a = nodes_[mine], &b = other.nodes_[theirs];
-      if (seen[mine] || !boxes.nodes[mine].isNear(other_boxes.nodes[theirs], by)) continue;
+      if (seen[mine] || !boxes.nodes[mine].isNear(other_boxes.nodes[theirs], by) || !may_meet(mine, theirs)) continue;
       if (a.count > 0 && b.count > 0) {
         seen[mine] = 1;
         for (Index k = a.first; k < a.first + a.count; ++k) visit(items_[k]);

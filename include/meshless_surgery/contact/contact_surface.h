@@ -29,8 +29,9 @@ struct ContactEdge {
 };
 
 struct ContactSurface {
-  ContactSurface(const TriangleMesh& rest, VertexSupports vertex_supports);
+  ContactSurface(const TriangleMesh& mesh, VertexSupports vertex_supports);
 
+  Points rest;  // [m] vertices
   std::vector<Triangle> triangles;
   std::vector<ContactEdge> edges;
   std::vector<Index> face_offsets, faces;     // around each vertex, compressed rows

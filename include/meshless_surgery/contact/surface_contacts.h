@@ -32,6 +32,7 @@ struct Collider {
   double friction = 0.5;
   double restitution = 0.0;  // 0..1
   PairSearch::Self self = PairSearch::Self::kNo;
+  double bends = 0.0;     // [m/s] most by which two of its particles differ
   bool obstacle = false;  // friction and position alone
   bool moves = true;      // false: asleep, or an obstacle; its arrays are not written
   bool held = false;      // some of its particles are
@@ -65,7 +66,7 @@ class SurfaceContacts {
  public:
   /// Which pairs can touch: sets needed(). Once a frame, and again where some have woken.
   void findPairs(const SurfaceScene& scene, const std::vector<Collider>& colliders, ContactCounters& counters);
-  /// One a collider: kNear where something is near, 1 where a spring alone needs it.
+  /// One a collider: kNear where something is near, 1 where a spring or the body itself alone needs it.
   static constexpr char kNear = 2;
   const std::vector<char>& needed() const { return needed_; }
   /// Whose rows are to be found anew, since somebody has moved: sets moved().

@@ -26,6 +26,7 @@ struct KeptWay {
   Points offsets;      // [m] of vertices from these sums, when its frame was placed last
   double gone = 0.0;   // [m] sum of the farthest way of any vertex in each frame
   double ahead = 0.0;  // [m] in this frame, as fast as it is
+  double bent = 0.0;   // [m] as gone, of two of its vertices as against each other
 };
 
 struct SurfaceMemory {
@@ -66,8 +67,8 @@ void serialize(A& archive, KeptPair& v) {
 }
 template <class A>
 void serialize(A& archive, KeptWay& v) {
-  auto& [key, last, offsets, gone, ahead] = v;
-  archive(key, last, offsets, gone, ahead);
+  auto& [key, last, offsets, gone, ahead, bent] = v;
+  archive(key, last, offsets, gone, ahead, bent);
 }
 template <class A>
 void serialize(A& archive, SurfaceMemory& v) {

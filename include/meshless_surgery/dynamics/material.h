@@ -44,15 +44,15 @@ struct Material {
   double youngs_modulus = 0.0;   // [Pa] 0: an appearance material
   double poissons_ratio = 0.45;  // 0..0.49
   MatchMode mode = MatchMode::kLinear;
-  double alpha = 0.9;                                   // 0..1, fraction of the way to the goal in 1/60 s
-  double beta = 0.2;                                    // 0..1, share of the fitted linear or quadratic map in the goal
-  double density = 1000.0;                              // [kg/m^3] > 0
-  double damping = 1.0;                                 // [1/s] >= 0, decay rate of the motion that deforms
-  double friction = 0.5;                                // 0..10, Coulomb
-  double restitution = 0.0;                             // 0..1, share of the approach that a contact gives back
-  SelfContact self_contact = SelfContact::kWoundFaces;  // never of a body that cannot bend
-  ResponseCurve volume;                                 // of the solid's volume
-  ResponseCurve area;                                   // of the surface
+  double alpha = 0.9;                            // 0..1, fraction of the way to the goal in 1/60 s
+  double beta = 0.2;                             // 0..1, share of the fitted linear or quadratic map in the goal
+  double density = 1000.0;                       // [kg/m^3] > 0
+  double damping = 1.0;                          // [1/s] >= 0, decay rate of the motion that deforms
+  double friction = 0.5;                         // 0..10, Coulomb
+  double restitution = 0.0;                      // 0..1, share of the approach that a contact gives back
+  SelfContact self_contact = SelfContact::kAll;  // never of a body that cannot bend
+  ResponseCurve volume;                          // of the solid's volume
+  ResponseCurve area;                            // of the surface
   Plasticity plasticity;
   Color color{0.62f, 0.22f, 0.18f, 1.0f};         // of the outer surface
   Color inside_color{0.85f, 0.45f, 0.40f, 1.0f};  // of cut faces
