@@ -20,7 +20,8 @@
 namespace meshless {
 namespace {
 
-constexpr double kAlone = 5.0;  // [s]
+constexpr double kShortest = 5.0, kLongest = 20.0;  // [s] alone
+constexpr double kDecays = 20.0;  // so many times the energy of what damps least falls to 1/e until then
 constexpr int kLooksASecond = 12;
 
 double wallSeconds() {
@@ -45,6 +46,7 @@ class Run {
 
   Status setUp(const DriveScene& scene) {
     for (const BodyDef& def : scene.def.bodies) {
+      alone_for_ = std::clamp(kDecays / def.material.damping, alone_for_, kLongest);
       Result<PreparedBody> body = prepareBody(def);
       if (!body) return body.error();
       const auto added = world_.addSceneBody(std::make_shared<const PreparedBody>(std::move(*body)));
@@ -65,7 +67,7 @@ class Run {
     while (options_.hands && withinBudget() && hand_.act(world_)) step(false);
     report_.hand = hand_.counts();
     const double alone_from = world_.simTime();
-    while (withinBudget() && world_.simTime() < alone_from + kAlone - 1e-9) step(true);
+    while (withinBudget() && world_.simTime() < alone_from + alone_for_ - 1e-9) step(true);
     report_.finished = withinBudget();
     report_.simulated = world_.simTime();
     report_.pieces = world_.bodyCount();
@@ -167,6 +169,7 @@ class Run {
   std::vector<PieceVolume> volumes_;
   std::optional<Seen> falling_;  // since then, freely
   std::vector<AloneLook> alone_;
+  double alone_for_ = kShortest;  // [s]
 };
 
 std::vector<PieceVolume> ofAppearance(std::vector<PieceVolume> pieces) {

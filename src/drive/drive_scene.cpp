@@ -68,8 +68,9 @@ Shape primitive(Random& random, double size, double triangles) {
   return shape;
 }
 
-Result<Shape> makeShape(Random& random) {
-  const double size = random.logBetween(kSmallest, kLargest), triangles = random.logBetween(kFewest, kMost);
+Result<Shape> makeShape(Random& random, double most_triangles) {
+  const double size = random.logBetween(kSmallest, kLargest),
+               triangles = std::min(random.logBetween(kFewest, kMost), most_triangles);
   const double kind = random.between(0.0, 1.0);
   Shape shape;
   if (kind < 0.6) {
@@ -77,7 +78,7 @@ Result<Shape> makeShape(Random& random) {
     const std::uint64_t seed = random.bits();
     Result<TriangleMesh> mesh = randomOrgan(seed, genus, size, static_cast<std::size_t>(triangles));
     // Some take more than they were asked for, to show their rings.
-    for (double fewer = 0.7; mesh && mesh->triangles.size() > static_cast<std::size_t>(kMost); fewer *= 0.7)
+    for (double fewer = 0.7; mesh && mesh->triangles.size() > static_cast<std::size_t>(most_triangles); fewer *= 0.7)
       mesh = randomOrgan(seed, genus, size, static_cast<std::size_t>(fewer * triangles));
     if (!mesh) return mesh.error();
     shape = {std::move(*mesh), words("organ of genus ", genus)};
@@ -212,6 +213,9 @@ void placeOrgans(std::vector<Organ>& organs, Random& random, DriveScene& scene) 
 Status check(const DriveChoices& choices) {
   if (!(choices.most_organs >= 1 && choices.most_organs <= 3))
     return Error{ErrorCode::kInvalidArgument, words("most_organs is ", choices.most_organs, "; accepted: 1 to 3")};
+  if (!(choices.most_triangles >= kFewest && choices.most_triangles <= kMost))
+    return Error{ErrorCode::kInvalidArgument,
+                 words("most_triangles is ", choices.most_triangles, "; accepted: ", kFewest, " to ", kMost)};
   if (!choices.support.empty() && std::find(kSupports.begin(), kSupports.end(), choices.support) == kSupports.end()) {
     std::string accepted;
     for (const char* name : kSupports) accepted += (accepted.empty() ? "" : ", ") + std::string(name);
@@ -242,7 +246,7 @@ Result<DriveScene> makeDriveScene(std::uint64_t seed, const DriveChoices& choice
   std::vector<Organ> organs;
   for (std::uint64_t k = 0; k < static_cast<std::uint64_t>(count); ++k) {
     Random shapes(seed, kShape + k), matter(seed, kMatter + k);
-    Result<Shape> shape = makeShape(shapes);
+    Result<Shape> shape = makeShape(shapes, choices.most_triangles);
     if (!shape) return shape.error();
     Organ organ;
     organ.def.name = "organ_" + std::to_string(k + 1);

@@ -19,6 +19,7 @@ constexpr double kFlat = 0.866;   // cosine of 30 degrees
 constexpr double kFolded = 0.5;   // of 60
 constexpr double kSliver = 0.02;  // of the mean edge
 constexpr double kStretched = 2.0;
+constexpr double kFolds = 1e-3;       // of all edges
 constexpr double kFlatTissue = 0.01;  // of the largest moment of particles around one: less is a sheet
 
 struct Side {
@@ -208,20 +209,22 @@ Folds foldsOf(const SeenBody& body) {
 }
 
 Finding foldLaw(const Seen& seen) {
-  std::size_t sum = 0, of_tissue = 0, most = 0;
+  std::size_t sum = 0, of_tissue = 0, most = 0, edges = 0;
   std::string where;
   for (const SeenBody& body : seen.bodies) {
     const Folds folds = foldsOf(body);
     sum += folds.of_surface;
     of_tissue += folds.of_tissue;
+    edges += 3 * body.surface.triangles.size() / 2;
     if (folds.of_surface <= most) continue;
     most = folds.of_surface;
     where = body.name;
   }
   Finding worst;
   if (sum > 0)
-    worst.take(1.0 + static_cast<double>(sum),
-               words(sum, " edges are folded over, most of ", where, ", and ", of_tissue, " with the tissue"));
+    worst.take(
+        static_cast<double>(sum) / (kFolds * static_cast<double>(edges)),
+        words(sum, " of ", edges, " edges are folded over, most of ", where, ", and ", of_tissue, " with the tissue"));
   return worst;
 }
 

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "meshless_surgery/drive/drive_table.h"
+#include "meshless_surgery/drive/known_breaks.h"
 #include "meshless_surgery/io/scene.h"
 #include "meshless_surgery/world/command_log.h"
 #include "seen_support.h"
@@ -50,18 +51,11 @@ TEST(Drive, ASoundSceneHolds) {
 }
 
 TEST(Drive, FindsASceneThatNeverRests) {
-  // Hung by one end, soft, without damping: it swings for long.
-  BodyDef def = boxBody(0.3);
-  def.material.youngs_modulus = 20000.0;
-  def.material.damping = 0.0;
-  def.spacing = 0.02;
-  Box held;
-  held.min = Vec3(-1, -1, -1);
-  held.max = Vec3(-0.035, 1, 1);
-  def.fixed.push_back(held);
+  DriveScene scene = sceneOf(boxBody(0.3));
+  scene.def.world.ground.reset();  // it falls for ever
   DriveOptions options;
   options.hands = false;
-  const DriveReport report = drive(sceneOf(def), options);
+  const DriveReport report = drive(scene, options);
   EXPECT_TRUE(of(report, Law::kRest).broken()) << of(report, Law::kRest).text;
   EXPECT_TRUE(of(report, Law::kAsleep).broken());
   EXPECT_FALSE(report.holds());
@@ -212,8 +206,46 @@ TEST(DriveScenes, AreNarrowedAndRefuseWhatIsNotThere) {
   ASSERT_FALSE(refused.ok());
   EXPECT_NE(refused.error().detail.find("ground"), std::string::npos);
   choices.support = "";
+  choices.most_triangles = 400.0;
+  refused = makeDriveScene(1, choices);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.error().detail.find("400; accepted: 500 to 3e+04"), std::string::npos) << refused.error().detail;
+  choices.most_triangles = 30000.0;
   choices.most_organs = 4;
   EXPECT_FALSE(makeDriveScene(1, choices).ok());
+}
+
+Result<std::vector<KnownBreak>> knownOf(const std::string& text) {
+  std::istringstream in(text);
+  return readKnownBreaks(in);
+}
+
+TEST(KnownBreaks, AreExpectedAndNoOthers) {
+  std::vector<DriveReport> reports(3);
+  for (std::size_t k = 0; k < reports.size(); ++k) {
+    reports[k].seed = k + 1;
+    reports[k].finished = k != 1;
+  }
+  reports[0].findings[static_cast<std::size_t>(Law::kDepth)].take(3.0, "2 s: deep");
+  const auto known = knownOf("# seed | law | why\n\n1 | depth | a crumb below a blade\n");
+  ASSERT_TRUE(known.ok());
+  EXPECT_TRUE(unlikeKnown(reports, *known).empty()) << "what did not finish is no break";
+  EXPECT_EQ(unlikeKnown(reports, {}).at(0), "seed 1 breaks depth: 2 s: deep");
+  const auto other = knownOf("1 | depth | a\n 3 | rest | it swings");
+  ASSERT_TRUE(other.ok());
+  EXPECT_EQ(unlikeKnown(reports, *other).at(0), "seed 3 holds rest: take it off the list");
+  reports[1].refused = "no shape";
+  EXPECT_EQ(unlikeKnown(reports, *known).at(0), "seed 2 was refused: no shape");
+}
+
+TEST(KnownBreaks, AreFewAndSaidInFull) {
+  for (const char* text : {"1 | depth", "x | depth | why", "1 | deep | why", "1 | depth |  ", "| depth | why",
+                           "1 | depth | a\n2 | depth | a\n3 | depth | a\n4 | depth | a"}) {
+    const auto known = knownOf(text);
+    ASSERT_FALSE(known.ok()) << text;
+    EXPECT_NE(known.error().detail.find("line "), std::string::npos) << known.error().detail;
+  }
+  EXPECT_NE(knownOf("7 | deep | why").error().detail.find("crossings"), std::string::npos);
 }
 
 TEST(DriveTable, SaysWhoIsWorstAndWhatBreaksWhere) {

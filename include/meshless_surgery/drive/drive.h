@@ -41,7 +41,8 @@ struct DriveReport {
   double badness() const;
 };
 
-/// Half a second to settle, the hand, then five seconds alone. Laws are checked after every simulated second and at the
+/// Half a second to settle, the hand, then alone for five seconds, and longer, up to twenty, where
+/// something damps slowly. Laws are checked after every simulated second and at the
 /// end; masses, momenta and energies twelve times a second and around each cut. Where the volume of an appearance
 /// material leaves the band of elastic ones, the scene is played again without cuts, for a band of its own. Its volume
 /// is not judged where the scene did not finish or is not cut.

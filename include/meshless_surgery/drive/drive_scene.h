@@ -12,6 +12,7 @@ struct DriveChoices {
   std::string support;                      // one of kSupports; empty: any
   std::optional<ContactMethod> contact;     // none: the world's default
   int most_organs = 3;                      // 1..3
+  double most_triangles = 30000.0;          // 500..30000 of a body; shipped shapes have what they have
 };
 
 constexpr std::array<const char*, 5> kSupports{"ground", "tray", "bowl", "hung", "stack"};

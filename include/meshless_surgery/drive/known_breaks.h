@@ -1,0 +1,26 @@
+// Scenes that are known to break a law, so that all others may be asked to hold.
+#pragma once
+
+#include <iosfwd>
+
+#include "meshless_surgery/drive/drive.h"
+
+namespace meshless {
+
+struct KnownBreak {
+  std::uint64_t seed = 0;
+  Law law = Law::kFinite;
+  std::string reason;
+};
+
+constexpr std::size_t kMostKnownBreaks = 3;
+
+/// Lines "SEED | LAW | REASON"; empty ones and those that begin with # are left out. Refuses (kInvalidArgument) another
+/// form, a law that is not there, no reason, and more than kMostKnownBreaks lines.
+Result<std::vector<KnownBreak>> readKnownBreaks(std::istream& in);
+
+/// What is not as it is known: a law that breaks and is not listed, one that is listed and holds, a scene that was
+/// refused. Scenes that did not finish are held to what they did. A sentence each; none: all is as known.
+std::vector<std::string> unlikeKnown(const std::vector<DriveReport>& reports, const std::vector<KnownBreak>& known);
+
+}  // namespace meshless

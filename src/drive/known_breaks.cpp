@@ -1,0 +1,67 @@
+#include "meshless_surgery/drive/known_breaks.h"
+
+#include <algorithm>
+#include <istream>
+
+#include "words.h"
+
+namespace meshless {
+namespace {
+
+Error malformed(std::size_t line, const std::string& why) {
+  return Error{ErrorCode::kInvalidArgument, words("line ", line, ": ", why)};
+}
+
+std::string trimmed(const std::string& text) {
+  const std::size_t begin = text.find_first_not_of(" \t");
+  return begin == std::string::npos ? "" : text.substr(begin, text.find_last_not_of(" \t\r") + 1 - begin);
+}
+
+}  // namespace
+
+Result<std::vector<KnownBreak>> readKnownBreaks(std::istream& in) {
+  std::vector<KnownBreak> known;
+  std::string text;
+  for (std::size_t line = 1; std::getline(in, text); ++line) {
+    text = trimmed(text);
+    if (text.empty() || text[0] == '#') continue;
+    std::array<std::string, 3> parts;
+    std::istringstream fields(text);
+    for (std::string& part : parts) {
+      std::getline(fields, part, '|');
+      part = trimmed(part);
+      if (part.empty()) return malformed(line, "'" + text + "'; accepted: SEED | LAW | REASON");
+    }
+    if (parts[0].find_first_not_of("0123456789") != std::string::npos)
+      return malformed(line, "seed is '" + parts[0] + "'; accepted: a whole number");
+    const auto law = std::find(kLawNames.begin(), kLawNames.end(), parts[1]);
+    if (law == kLawNames.end()) {
+      std::string accepted;
+      for (const char* name : kLawNames) accepted += (accepted.empty() ? "" : ", ") + std::string(name);
+      return malformed(line, "law is '" + parts[1] + "'; accepted: " + accepted);
+    }
+    if (known.size() == kMostKnownBreaks) return malformed(line, words("more than ", kMostKnownBreaks, " are known"));
+    known.push_back({std::stoull(parts[0]), static_cast<Law>(law - kLawNames.begin()), parts[2]});
+  }
+  return known;
+}
+
+std::vector<std::string> unlikeKnown(const std::vector<DriveReport>& reports, const std::vector<KnownBreak>& known) {
+  std::vector<std::string> said;
+  for (const DriveReport& report : reports) {
+    if (!report.refused.empty()) said.push_back(words("seed ", report.seed, " was refused: ", report.refused));
+    for (std::size_t n = 0; n < kLaws; ++n) {
+      const Finding& finding = report.findings[n];
+      const bool listed = std::any_of(known.begin(), known.end(), [&](const KnownBreak& one) {
+        return one.seed == report.seed && one.law == static_cast<Law>(n);
+      });
+      if (finding.broken() && !listed)
+        said.push_back(words("seed ", report.seed, " breaks ", kLawNames[n], ": ", finding.text));
+      if (!finding.broken() && listed && report.finished)
+        said.push_back(words("seed ", report.seed, " holds ", kLawNames[n], ": take it off the list"));
+    }
+  }
+  return said;
+}
+
+}  // namespace meshless
