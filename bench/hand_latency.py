@@ -2,7 +2,7 @@
 """How long a hand waits: a client moves the spring in hand by 2 cm at any time between two steps, and waits for the
 first message that shows it; and how evenly measured_cf comes. Needs a running node with a body, such as
 
-    rosrun meshless_surgery deformer_node __name:=deformer _scene:=liver
+    rosrun meshless_surgery deformer_node __name:=deformer _scene:=liver_looks
     bench/hand_latency.py --moves 300
 """
 import argparse

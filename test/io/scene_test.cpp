@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "io/temporary_folder.h"
 #include "meshless_surgery/geometry/inside.h"
@@ -421,6 +422,17 @@ TEST_F(Shipped, ScenesLoadAsClosedBodiesAboveTheGround) {
       for (const Vec3& p : body.mesh.vertices) EXPECT_GE((body.pose * p).z(), def.world.ground.value_or(-1.0));
     }
   }
+}
+
+TEST_F(Shipped, TheLiverIsElasticUnderBothItsNamesAndTheOtherForLooks) {
+  const SceneDef liver = scene("liver"), looks = scene("liver_looks");
+  ASSERT_EQ(liver.bodies.size(), 1u);
+  ASSERT_EQ(looks.bodies.size(), 1u);
+  EXPECT_TRUE(liver.bodies[0].material.elastic());
+  EXPECT_FALSE(looks.bodies[0].material.elastic());
+  EXPECT_EQ(liver.bodies[0].mesh.vertices, looks.bodies[0].mesh.vertices);
+  EXPECT_EQ(std::filesystem::canonical(package + "/config/scenes/elastic_liver.yaml"),
+            std::filesystem::canonical(package + "/config/scenes/liver.yaml"));
 }
 
 TEST_F(Shipped, FixedRegionsHoldAPartOfTheBody) {

@@ -74,7 +74,8 @@ Work workOf(const std::string& scene) {
 std::vector<std::string> shippedScenes() {
   std::vector<std::string> names;
   for (const auto& entry : std::filesystem::directory_iterator(std::string(SOURCE_DIR) + "/config/scenes"))
-    if (entry.path().extension() == ".yaml") names.push_back(entry.path().filename().string());
+    if (entry.path().extension() == ".yaml" && !entry.is_symlink())  // a link is another name of the same
+      names.push_back(entry.path().filename().string());
   return names;
 }
 
@@ -87,10 +88,10 @@ TEST(SceneWork, EachShippedSceneDoesWhatItUsesAndNothingElse) {
   Names piled = bending_on_ground;
   piled.insert({"bounds tested", "pairs", "queries"});
   const std::map<std::string, Names> expected = {{"block.yaml", bending_on_ground},
-                                                 {"elastic_liver.yaml", on_ground},
                                                  {"fish.yaml", bending},
                                                  {"incision.yaml", held},
                                                  {"liver.yaml", on_ground},
+                                                 {"liver_looks.yaml", on_ground},
                                                  {"lump.yaml", held},
                                                  {"pile.yaml", piled},
                                                  {"resection.yaml", on_ground},
