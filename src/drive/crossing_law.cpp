@@ -10,6 +10,8 @@
 namespace meshless {
 namespace {
 
+constexpr double kCrossed = 1e-3;  // of all edges
+
 struct Surface {
   const std::string* name;
   const TriangleMesh* mesh;
@@ -63,8 +65,9 @@ Finding crossingLaw(const Seen& seen) {
     const Box bounds = boundsOf(obstacle->mesh.vertices);
     surfaces.push_back({&obstacle->name, &obstacle->mesh, bounds, bounds.diagonal()});
   }
-  std::size_t sum = 0, most = 0;
+  std::size_t sum = 0, most = 0, edges = 0;
   std::string where;
+  for (std::size_t a = 0; a < bodies; ++a) edges += 3 * surfaces[a].mesh->triangles.size() / 2;
   for (std::size_t a = 0; a < bodies; ++a)
     for (std::size_t b = a + 1; b < surfaces.size(); ++b) {
       if (!surfaces[a].bounds.overlaps(surfaces[b].bounds)) continue;
@@ -75,7 +78,9 @@ Finding crossingLaw(const Seen& seen) {
       where = *surfaces[a].name + " and " + *surfaces[b].name;
     }
   Finding worst;
-  if (sum > 0) worst.take(1.0 + static_cast<double>(sum), words(sum, " edges go through faces, most of ", where));
+  if (sum > 0)
+    worst.take(static_cast<double>(sum) / (kCrossed * static_cast<double>(edges)),
+               words(sum, " of ", edges, " edges go through faces, most of ", where));
   return worst;
 }
 

@@ -19,7 +19,7 @@ constexpr double kFlat = 0.866;   // cosine of 30 degrees
 constexpr double kFolded = 0.5;   // of 60
 constexpr double kSliver = 0.02;  // of the mean edge
 constexpr double kStretched = 2.0;
-constexpr double kFolds = 1e-3;       // of all edges
+constexpr double kFolds = 2e-3;       // of all edges
 constexpr double kFlatTissue = 0.01;  // of the largest moment of particles around one: less is a sheet
 
 struct Side {

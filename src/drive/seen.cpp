@@ -32,6 +32,8 @@ Seen see(World& world, bool surfaces) {
     SeenBody body;
     body.name = from.name;
     body.elastic = from.material.elastic();
+    if (body.elastic)
+      body.compressibility = 3.0 * (1.0 - 2.0 * from.material.poissons_ratio) / from.material.youngs_modulus;
     body.handled = isHandled(shot, from);
     body.fixed = from.model->any_fixed;
     body.asleep = from.asleep;

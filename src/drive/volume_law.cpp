@@ -12,7 +12,8 @@ std::vector<PieceVolume> volumesOf(const Seen& seen) {
   std::vector<PieceVolume> pieces;
   for (const SeenBody& body : seen.bodies)
     if (!body.handled && body.rest_volume > 0.0 && !body.surface.empty())
-      pieces.push_back({seen.time, body.name, body.elastic, signedVolume(body.surface) / body.rest_volume});
+      pieces.push_back({seen.time, body.name, body.elastic, signedVolume(body.surface) / body.rest_volume,
+                        body.mass / body.rest_volume * seen.gravity.norm() * body.diagonal * body.compressibility});
   return pieces;
 }
 
@@ -22,6 +23,7 @@ Finding volumeLaw(const std::vector<PieceVolume>& pieces, const VolumeBands& ban
     VolumeBand band;
     const auto found = bands.find(rootOf(piece.name));
     if (!piece.elastic && found != bands.end()) band = found->second;
+    band.low -= piece.pressed;
     worst.take(piece.ratio < 1.0 ? (1.0 - piece.ratio) / (1.0 - band.low) : (piece.ratio - 1.0) / (band.high - 1.0),
                words(piece.time, " s: ", piece.name, " has ", piece.ratio, " of its volume (", band.low, " to ",
                      band.high, ")"));

@@ -6,9 +6,9 @@
 
 namespace meshless {
 
-/// Of the surfaces that contact takes: no edge of a body goes through the surface of another one or of an obstacle and
-/// reaches deeper between its ends than a vertex may (depth_law.h), and none of an obstacle into a body. Each edge
-/// counts once for each body that it goes through.
+/// Of the surfaces that contact takes: at most a thousandth of all edges of bodies go through the surface of another
+/// one or of an obstacle and reach deeper between their ends than a vertex may (depth_law.h), those of obstacles into
+/// bodies included. Each edge counts once for each body that it goes through.
 Finding crossingLaw(const Seen& seen);
 
 }  // namespace meshless

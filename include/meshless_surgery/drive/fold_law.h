@@ -17,7 +17,7 @@ struct Folds {
 /// and are not looked at. Tissue is known where `model` and `particles` are there.
 Folds foldsOf(const SeenBody& body);
 
-/// At most a thousandth of all edges are folds that nothing beneath explains.
+/// At most two thousandths of all edges are folds that nothing beneath explains.
 Finding foldLaw(const Seen& seen);
 
 }  // namespace meshless

@@ -13,9 +13,10 @@ struct SeenBody {
   BodyModelPtr model;                     // with surfaces
   Points particles;                       // [m] likewise
   bool particles_finite = true;
-  bool elastic = false;  // an elastic material
-  bool handled = false;  // a pick, a lock or the push sphere is on it
-  bool fixed = false;    // some of it is held in place
+  bool elastic = false;          // an elastic material
+  double compressibility = 0.0;  // [1/Pa] of an elastic material: 3 (1 - 2 nu) / E
+  bool handled = false;          // a pick, a lock or the push sphere is on it
+  bool fixed = false;            // some of it is held in place
   bool asleep = false;
   double mass = 0.0;                     // [kg]
   double rest_volume = 0.0;              // [m^3]
