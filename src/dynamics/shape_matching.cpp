@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kLinearRankRatio = 1e-8;     // of the moment's eigenvalues, smallest to largest
 constexpr double kQuadraticRankRatio = 1e-7;  // of the basis in units of the cluster's size
+constexpr double kSpannedRatio = 0.03;        // of the moment's eigenvalues: what is flatter tells no stretch across it
 constexpr int kVolumeSteps = 4;               // of Newton, towards determinant 1
 constexpr double kLeastSlope = 1e-3;          // of the first step's
 constexpr double kFullBetaDeterminant = 0.1;  // below it the fitted map fades out, at 0 only the rotation is left
@@ -201,7 +202,19 @@ void matchShapes(const MatchInput& in, const Points& y, MatchMode mode, double b
 void fitClusters(const MatchInput& in, const Points& positions, const std::vector<Index>& which,
                  std::vector<ClusterPose>& poses) {
   MatchCounters uncounted;
-  for (Index c : which) fitCluster(in, c, positions, true, poses[c], uncounted);
+  for (Index c : which) {
+    ClusterPose& pose = poses[c];
+    fitCluster(in, c, positions, true, pose, uncounted);
+    if (!in.shape.clusters[c].linear_rank) continue;
+    const PlasticShape* const plastic = in.plasticShapeOf(c);
+    const Mat3 turn = pose.rotation.toRotationMatrix() * (plastic ? plastic->stretch : Mat3(Mat3::Identity()));
+    const Eigen::SelfAdjointEigenSolver<Mat3> inverse(in.shape.clusters[c].moment_inverse);  // the widest first
+    for (int axis = 1; axis < 3; ++axis) {
+      if (inverse.eigenvalues()[0] > kSpannedRatio * inverse.eigenvalues()[axis]) continue;
+      const Vec3 across = inverse.eigenvectors().col(axis);
+      pose.deformation += (turn - pose.deformation) * across * across.transpose();
+    }
+  }
 }
 
 void fitClusters(const MatchInput& in, const Points& positions, std::vector<ClusterPose>& poses) {

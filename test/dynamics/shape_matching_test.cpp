@@ -168,6 +168,25 @@ TEST(MatchShapes, ThePullHasNeitherForceNorTorque) {
     }
 }
 
+// What lies beside a crumb's points would be carried far away by a map that takes their noise for a stretch.
+TEST(FitClusters, PointsThatAreNearlyFlatOrALineTellNoStretchAcross) {
+  Random random(11);
+  const std::vector<Vec3> widths = {Vec3(1, 1, 1e-1), Vec3(1, 0.5, 1e-2), Vec3(1, 1, 1e-3), Vec3(1, 0.1, 1e-3),
+                                    Vec3(1, 1e-2, 1e-2)};
+  for (const Vec3& width : widths)
+    for (Index n : {4u, 7u, 30u}) {
+      const Cloud cloud = randomCloud(random, n, 1, width);
+      const Mat3 turn = random.rotation().toRotationMatrix();
+      Points y;
+      for (const Vec3& p : cloud.rest) y.push_back(turn * p + random.vector(0.01));
+      std::vector<ClusterPose> poses(1);
+      fitClusters(cloud.input(), y, {0}, poses);
+      const Vec3 stretches = poses[0].deformation.jacobiSvd().singularValues();
+      EXPECT_LT(stretches[0], 1.3) << width.transpose() << ", " << n;
+      EXPECT_GT(stretches[2], 0.7) << width.transpose() << ", " << n;
+    }
+}
+
 TEST(MatchShapes, DeficientRankFallsBackAndCounts) {
   Random random(4);
   MatchCounters counters;
