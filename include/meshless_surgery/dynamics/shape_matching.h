@@ -79,8 +79,10 @@ struct MatchInput {
 void matchShapes(const MatchInput& input, const Points& y, MatchMode mode, double beta, std::vector<ClusterPose>& poses,
                  Points& goals, MatchCounters& counters, double swelling = 1.0, bool deformations = false);
 
-/// poses for given positions, without goals: after positions were set by hand. The second: of some clusters alone.
+/// poses for given positions, without goals: after positions were set by hand.
 void fitClusters(const MatchInput& input, const Points& positions, std::vector<ClusterPose>& poses);
+/// Of some clusters, for what lies beside their points: directions that they hardly span turn with the cluster, since
+/// the points' noise would stretch them without bounds.
 void fitClusters(const MatchInput& input, const Points& positions, const std::vector<Index>& which,
                  std::vector<ClusterPose>& poses);
 
