@@ -1,4 +1,4 @@
-// A tree of boxes over the faces of a surface: its topology is made once, its boxes anew in every frame.
+// A tree of boxes over faces, bodies or others: its topology is made once, its boxes anew whenever they have moved.
 #pragma once
 
 #include <cmath>
@@ -56,7 +56,8 @@ struct TreeQuery {
 class BoxTree {
  public:
   BoxTree() = default;
-  explicit BoxTree(const Points& centres);  // one an item [m]
+  explicit BoxTree(const Points& centres) { build(centres); }
+  void build(const Points& centres);  // one an item [m]
 
   /// Fills boxes.nodes from boxes.items.
   void refit(TreeBoxes& boxes) const;
