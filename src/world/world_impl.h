@@ -193,10 +193,10 @@ struct World::Impl {
   };
   Sleepers sleepers;
   std::vector<WorldBatch> batches;
-  bool batches_current = false;  // false: bodies or materials have changed
-  std::mutex lanes_mutex;        // of the batches' spare lanes
-  std::vector<LoadedSurfaces> loaded;
-  bool contacts_current = false;  // bodies are those of the last step
+  bool batches_current = false;                 // false: bodies or materials have changed
+  std::mutex lanes_mutex;                       // of the batches' spare lanes
+  std::vector<std::pair<Index, Index>> loaded;  // in listLoaded()
+  bool contacts_current = false;                // bodies are those of the last step
   SurfaceContacts surface_contacts;
   SurfaceScene surface_scene;       // of this step
   std::vector<Collider> colliders;  // bodies in their order, then obstacles

@@ -457,7 +457,7 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
     member.previous.resize(member.end - member.begin);
     for (std::size_t b = member.begin; b < member.end; ++b) {
       WorldBody& body = *work.bodies[b];
-      body.scratch.lies = island.free.empty() && !island.rows.empty();
+      body.scratch.lies = island.held && !island.rows.empty();
       if (body.batch != kNoIndex && fitsFloat(body, h))
         work.side_by_side[body.batch].push_back(&body);
       else

@@ -50,7 +50,6 @@ struct TreeBoxes {
 struct TreeQuery {
   std::vector<std::array<Index, 2>> stack;
   std::vector<char> seen;
-  std::size_t bytes() const { return bytesOf(stack, seen); }
 };
 
 class BoxTree {

@@ -22,10 +22,8 @@ struct KeptPair {
 /// How far a collider has gone since it was first near something.
 struct KeptWay {
   std::uint64_t key = 0;
-  Points last;         // [m] sums of the supports of vertices
-  Points offsets;      // [m] of vertices from these sums, when its frame was placed last
-  double gone = 0.0;   // [m] sum of the farthest way of any vertex in each frame
-  double ahead = 0.0;  // [m] in this frame, as fast as it is
+  Points last;        // [m] sums of the supports of vertices
+  double gone = 0.0;  // [m] sum of the farthest way of any vertex in each frame
 };
 
 struct SurfaceMemory {
@@ -46,8 +44,8 @@ void serialize(A& archive, RowEntry& v) {
 }
 template <class A>
 void serialize(A& archive, ContactRow& v) {
-  auto& [normal, constant, gap, rise, friction, restitution, impulse, begin, middle, end, kind, order, features] = v;
-  archive(normal, constant, gap, rise, friction, restitution, impulse, begin, middle, end, kind, order, features);
+  auto& [normal, constant, rise, friction, restitution, impulse, begin, middle, end, kind, order, features] = v;
+  archive(normal, constant, rise, friction, restitution, impulse, begin, middle, end, kind, order, features);
 }
 template <class A>
 void serialize(A& archive, RowSet& v) {
@@ -66,8 +64,8 @@ void serialize(A& archive, KeptPair& v) {
 }
 template <class A>
 void serialize(A& archive, KeptWay& v) {
-  auto& [key, last, offsets, gone, ahead] = v;
-  archive(key, last, offsets, gone, ahead);
+  auto& [key, last, gone] = v;
+  archive(key, last, gone);
 }
 template <class A>
 void serialize(A& archive, SurfaceMemory& v) {
