@@ -249,8 +249,6 @@ struct World::Impl {
   std::vector<TissuePlace> picked(const BodyId& body) const;      // places of its picks, in their order
   /// Retires a body and admits its pieces in its place; their names.
   std::vector<std::string> replaceByPieces(const BodyId& parent, std::vector<BodyPiece> pieces);
-  void easePull(WorldBody& body, const std::vector<Index>& patch, const std::vector<double>& lost, const Vec3& force,
-                bool held);
   /// What becomes of a piece's particles and of places that were asked for, once the piece is a body.
   struct Descent {
     BodyId child;
