@@ -8,9 +8,7 @@
 namespace meshless {
 namespace {
 
-constexpr double kAhead = 1.2;  // times the way of a frame: what speeds up is met too
 constexpr double kTie = 2e-3;           // of the mean edge: nearer than this two surfaces touch
-constexpr double kDeeper = 1.3;         // times as deep as it was: a vertex inside may have gone on
 constexpr double kLeastOpposed = 0.05;  // cosine by which a direction has to oppose a face of the pushed body
 constexpr double kSameWay = 0.9;        // cosine from which a second direction of a vertex says nothing new
 constexpr double kFlat = 0.3;           // sine by which neighbours may be farther out than what sticks out
@@ -104,8 +102,7 @@ class PointSearch {
     if (within && !a_.surface->cut_vertices[point.vertices[0]]) return;
     remembered_ = point.isVertex() ? recall(point.vertices[0]) : nullptr;
     const Vec3& p = point.place;
-    // A vertex inside is searched for as deep as it was, and a little more.
-    const double near = margin_ + (remembered_ ? kDeeper * remembered_->depth : 0.0);
+    const double near = margin_ + (remembered_ ? remembered_->depth : 0.0);
     ++queried_;
     gather(point, near);
     if (candidates_.empty() && mayBeginInside(p) && windingAround(p) > 0) gather(point, b_.frame->bounds.diagonal());
@@ -156,7 +153,7 @@ class PointSearch {
       // What goes along the plane across what is between them comes no nearer.
       const Vec3 way = p - c.point;
       const double towards = std::max({way.dot(u[t[0]]), way.dot(u[t[1]]), way.dot(u[t[2]])}) - way.dot(velocity);
-      c.reach = c.distance > 0.0 ? kAhead * search_.h * std::max(0.0, towards / c.distance) : 0.0;
+      c.reach = c.distance > 0.0 ? search_.h * std::max(0.0, towards / c.distance) : 0.0;
       if (c.distance > within + c.reach) return;
       c.reach += margin_;
       c.corners = static_cast<int>((c.weights.array() > 0.0).count());
@@ -367,8 +364,7 @@ void findVerticesNear(const PairSearch& search, SearchScratch& scratch) {
   scratch.near.assign(a.vertices(), search.first);  // any may begin inside, far from all faces
   if (search.first) return;
   double deepest = 0.0;
-  for (std::size_t k = 0; k < search.remembered_count; ++k)
-    deepest = std::max(deepest, kDeeper * search.remembered[k].depth);
+  for (std::size_t k = 0; k < search.remembered_count; ++k) deepest = std::max(deepest, search.remembered[k].depth);
   a.tree.queryTree(search.a.frame->boxes, search.b.surface->tree, search.b.frame->boxes,
                    searchMargin(search.length) + deepest, scratch.query, [&](Index face) {
                      for (const Index v : a.triangles[face]) scratch.near[v] = 1;
@@ -437,7 +433,7 @@ void findPlane(const PairSearch& search, double height, std::vector<FeaturePair>
   const double margin = searchMargin(search.length);
   for (Index v = 0; v < a.vertices.size(); ++v) {
     const double gap = a.vertices[v].z() - height;
-    if (gap > margin + kAhead * search.h * std::max(0.0, -a.velocities[v].z())) continue;
+    if (gap > margin + search.h * std::max(0.0, -a.velocities[v].z())) continue;
     FeaturePair pair;
     pair.kind = FeaturePair::Kind::kPlane;
     pair.of_b = 0;
@@ -477,7 +473,7 @@ void findSphere(const PairSearch& search, const Vec3& centre, double radius, con
       velocity += pair.shares[k] * a.velocities[pair.vertices[k]];
     }
     const double distance = (point - centre).norm();
-    if (distance > reach + kAhead * (search.h * velocity - way).norm()) return;
+    if (distance > reach + (search.h * velocity - way).norm()) return;
     pair.features = {pair.vertices[0], pair.vertices[1]};
     pair.order = static_cast<std::uint8_t>(pair.of_a);
     pair.normal = distance > 0.0 ? Vec3((point - centre) / distance) : Vec3(Vec3::UnitZ());

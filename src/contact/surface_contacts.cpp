@@ -7,7 +7,6 @@
 namespace meshless {
 namespace {
 
-constexpr double kAhead = 1.2;  // times the way of a frame: what speeds up is met too
 constexpr double kSkin = 0.01;                           // of the mean edge: surfaces rest so far above each other
 constexpr std::uint64_t kGroundKey = ~std::uint64_t{0};  // beyond those of bodies and obstacles
 constexpr std::uint64_t kSphereKey = kGroundKey - 1;
@@ -135,7 +134,7 @@ void SurfaceContacts::findMoved(const SurfaceScene& scene, const std::vector<Col
       fastest = std::max(fastest, supports.sum(v, collider.velocities).squaredNorm());
       way.last[v] = place;
     }
-    ahead_[c] = kAhead * scene.h * std::sqrt(fastest);
+    ahead_[c] = scene.h * std::sqrt(fastest);
     if (known) way.gone += std::sqrt(farthest);
     gone_[c] = way.gone;
   }
