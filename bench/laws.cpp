@@ -122,13 +122,10 @@ Points steppedToGoals(const BodyModel& model, const Material& material, const Po
   step.gain = 1.0;
   step.gravity.setZero();
   MatchCounters counters;
-  const Points still(y.size(), Vec3::Zero());
   BodyBatch batch({matchInput(model)}, material.mode == MatchMode::kQuadratic);
-  batch.setState(0, y, still, Quat::Identity());
-  batch.step(step, counters);
-  Points x, v;
-  Quat rotation;
-  batch.getState(0, x, v, rotation);
+  Points x = y, v(y.size(), Vec3::Zero());
+  Quat rotation = Quat::Identity();
+  batch.step({{x.data(), v.data(), &rotation}}, step, counters);
   return x;
 }
 
@@ -312,9 +309,9 @@ Drift momentumDrift(const Kind& kind, bool in_float, int steps) {
     step.gravity.setZero();
     MatchCounters counters;
     BodyBatch batch({matchInput(model)}, kind.mode == MatchMode::kQuadratic);
-    batch.setState(0, state.positions, state.velocities, Quat::Identity());
-    for (int k = 0; k < steps; ++k) batch.step(step, counters);
-    batch.getState(0, state.positions, state.velocities, state.poses[0].rotation);
+    state.poses[0].rotation = Quat::Identity();
+    const BatchBody body{state.positions.data(), state.velocities.data(), &state.poses[0].rotation};
+    for (int k = 0; k < steps; ++k) batch.step({body}, step, counters);
     most = std::max(most, energy());
   }
   Drift result;

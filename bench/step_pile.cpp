@@ -17,12 +17,18 @@ constexpr int kBodies = 1000;
 const char* const kModeNames[] = {"rigid", "linear", "quadratic"};
 
 struct Pile {
-  std::vector<Plain> bodies;
+  std::vector<Plain> bodies;  // as they start
+  std::vector<BodyState> now;
   std::unique_ptr<BodyBatch> batch;
+  std::vector<BatchBody> states;  // views of now
 
   void putBack() {
-    for (std::size_t i = 0; i < bodies.size(); ++i)
-      batch->setState(i, bodies[i].state.positions, bodies[i].state.velocities, bodies[i].state.poses[0].rotation);
+    now.resize(bodies.size());
+    states.clear();
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      now[i] = bodies[i].state;
+      states.push_back({now[i].positions.data(), now[i].velocities.data(), &now[i].poses[0].rotation});
+    }
   }
 };
 
@@ -53,11 +59,9 @@ int sameOnOneThread(Pile& pile, const BatchStep& step, const ForEach& for_each) 
   for (const ForEach& how : {for_each, ForEach(oneAfterAnother)}) {
     MatchCounters counters;
     pile.putBack();
-    for (int n = 0; n < kRestart / 2; ++n) pile.batch->step(step, counters, how);
+    for (int n = 0; n < kRestart / 2; ++n) pile.batch->step(pile.states, step, counters, how);
     for (std::size_t i = 0, at = 0; i < pile.bodies.size(); ++i, at += 2) {
-      Points positions, velocities;
-      Quat rotation;
-      pile.batch->getState(i, positions, velocities, rotation);
+      const Points &positions = pile.now[i].positions, &velocities = pile.now[i].velocities;
       if (first.size() < 2 * pile.bodies.size()) {
         first.push_back(positions);
         first.push_back(velocities);
@@ -79,7 +83,7 @@ void runPile(benchmark::State& state, Pile& pile, MatchMode mode, InstructionSet
   pile.putBack();
   int steps = 0;
   for (auto _ : state) {
-    pile.batch->step(step, counters, for_each);
+    pile.batch->step(pile.states, step, counters, for_each);
     if (++steps % kRestart == 0) {
       state.PauseTiming();
       pile.putBack();
@@ -89,14 +93,11 @@ void runPile(benchmark::State& state, Pile& pile, MatchMode mode, InstructionSet
   if (two_threads) state.counters["same"] = sameOnOneThread(pile, step, for_each);
   double error = 0.0;
   pile.putBack();
-  pile.batch->step(step, counters, for_each);
+  pile.batch->step(pile.states, step, counters, for_each);
   for (std::size_t i = 0; i < pile.bodies.size(); ++i) {
     Plain expected = pile.bodies[i];
-    Points positions, velocities;
-    Quat rotation;
     expected.step(material, step);
-    pile.batch->getState(i, positions, velocities, rotation);
-    error = std::max(error, farthest(positions, expected.state.positions) / (2.0 * kSpacing));
+    error = std::max(error, farthest(pile.now[i].positions, expected.state.positions) / (2.0 * kSpacing));
   }
   state.counters["error"] = error;
   state.counters["cold"] = static_cast<double>(counters.cold_rotations) / static_cast<double>(counters.rotations);

@@ -85,7 +85,7 @@ void runBlocks(benchmark::State& state, const std::shared_ptr<const PreparedBody
   std::vector<BatchBody> views;
   for (Bare& body : bare) {
     inputs.push_back(matchInput(model));
-    views.push_back({body.state.positions.data(), body.state.velocities.data(), &body.state.poses[0].rotation, true});
+    views.push_back({body.state.positions.data(), body.state.velocities.data(), &body.state.poses[0].rotation});
   }
   std::unique_ptr<BodyBatch> batch;
   if (bodies > 1) batch = std::make_unique<BodyBatch>(inputs, false);
@@ -95,7 +95,7 @@ void runBlocks(benchmark::State& state, const std::shared_ptr<const PreparedBody
     for (int n = 0; n < substeps; ++n) {
       if (batch) {
         for (Bare& body : bare) body.scratch.previous = body.state.positions;
-        batch->stepInPlace(views, batch_step, counters);
+        batch->step(views, batch_step, counters);
       } else {
         matchAndMove(model, material, settings.gravity, h, bare[0].state, bare[0].scratch, counters);
       }

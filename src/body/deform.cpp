@@ -151,26 +151,6 @@ std::optional<MassMoments> dampAndPredict(const BodyModel& model, double h, doub
 
 }  // namespace
 
-namespace {
-
-// What is eased fades, and turns with a body that moves freely: across the cut of one that is held it stays equal and
-// opposite.
-void fadeEased(const BodyModel& model, double h, BodyState& state) {
-  state.eased_for += h;
-  if (!(easedShare(state.eased_for) > 0.0)) {
-    state.eased.clear();
-    return;
-  }
-  if (state.eased_whole) return;
-  const Vec3 spin = rigidMotionOf(model, state.positions, state.velocities).spin;
-  const double angle = h * spin.norm();
-  if (!(angle > 0.0)) return;
-  const Mat3 turn = Eigen::AngleAxisd(angle, spin.normalized()).toRotationMatrix();
-  for (Vec3& a : state.eased) a = turn * a;
-}
-
-}  // namespace
-
 void matchAndMove(const BodyModel& model, const Material& material, const Vec3& gravity, double h, BodyState& state,
                   StepScratch& scratch, MatchCounters& counters) {
   Points& x = state.positions;
@@ -231,7 +211,8 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
   if (!state.eased.empty()) {
     if (state.eased_whole)
       for (std::size_t i = 0; i < v.size(); ++i) v[i] += h * share * state.eased[i];
-    fadeEased(model, h, state);
+    state.eased_for += h;
+    if (!(easedShare(state.eased_for) > 0.0)) state.eased.clear();
   }
   if (material.plastic() && matched)
     counters.plastic_flows += flow(input, material.plasticity, h, state.poses, state.plastic);

@@ -9,7 +9,9 @@ constexpr Index kLeaf = 4;  // items at most
 
 }  // namespace
 
-BoxTree::BoxTree(const Points& centres) {
+void BoxTree::build(const Points& centres) {
+  nodes_.clear();
+  items_.clear();
   const Index count = static_cast<Index>(centres.size());
   if (count == 0) return;
   for (Index i = 0; i < count; ++i) items_.push_back(i);

@@ -37,8 +37,8 @@ bool isMostlyHeld(const std::vector<RowEntry>& entries, Index begin, Index end, 
 
 }  // namespace
 
-ContactRow* makeRow(const FeaturePair& pair, const RowBody& a, const RowBody& b, bool with_itself, double skin,
-                    RowSet& set) {
+ContactRow* makeRow(const FeaturePair& pair, const RowBody& a, const RowBody& b, double skin, RowSet& set) {
+  const bool with_itself = a.positions == b.positions;
   ContactRow row;
   row.begin = static_cast<Index>(set.entries.size());
   addEntries(pair, 0, with_itself ? pair.of_a + pair.of_b : pair.of_a, *a.surface, set.entries);
@@ -56,8 +56,7 @@ ContactRow* makeRow(const FeaturePair& pair, const RowBody& a, const RowBody& b,
   row.normal = pair.normal;
   row.rise = pair.chord - skin - pair.normal.dot(sum);
   for (int n = 0; n < pair.of_a; ++n) row.rise += pair.shares[n] * pair.normal.dot(a.vertices[pair.vertices[n]]);
-  row.gap = pair.gap + pair.chord - skin;
-  row.constant = row.gap - pair.normal.dot(sum);
+  row.constant = pair.gap + pair.chord - skin - pair.normal.dot(sum);
   row.kind = pair.kind;
   row.order = pair.order;
   row.features = pair.features;

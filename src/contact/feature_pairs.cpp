@@ -2,35 +2,24 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "meshless_surgery/geometry/nearest_on_triangle.h"
 
 namespace meshless {
 namespace {
 
-constexpr double kMargin = 0.2;         // of the mean edge
-constexpr double kAhead = 1.2;          // times the way of a frame: what speeds up is met too
 constexpr double kTie = 2e-3;           // of the mean edge: nearer than this two surfaces touch
-constexpr double kDeeper = 1.3;         // times as deep as it was: a vertex inside may have gone on
 constexpr double kLeastOpposed = 0.05;  // cosine by which a direction has to oppose a face of the pushed body
 constexpr double kSameWay = 0.9;        // cosine from which a second direction of a vertex says nothing new
 constexpr double kFlat = 0.3;           // sine by which neighbours may be farther out than what sticks out
 constexpr double kMostRidgePoints = 1e6;
 constexpr double kSelfOpposed = 0.3;  // cosine by which faces of one body oppose each other where they may meet
 
-using Candidate = NearFace;
-
 FloatBox boxAround(const Vec3& p, const Vec3& q, double by) {
   FloatBox box;
   box.extend(p.cwiseMin(q) - Vec3::Constant(by));
   box.extend(p.cwiseMax(q) + Vec3::Constant(by));
   return box;
-}
-
-bool isOutOf(const Box& bounds, const Vec3& p, const Vec3& q, double by) {
-  return ((p.cwiseMin(q).array() - by) > bounds.max.array()).any() ||
-         ((p.cwiseMax(q).array() + by) < bounds.min.array()).any();
 }
 
 /// A point of a surface that is searched for in another: a vertex, or on a ridge.
@@ -104,34 +93,34 @@ class PointSearch {
         b_(search.b),
         tie_(kTie * search.length),
         margin_(searchMargin(search.length)),
-        pairs_(scratch.found.pairs),
-        sides_(scratch.found.sides),
+        pairs_(scratch.pairs),
+        sides_(scratch.sides),
         candidates_(scratch.faces) {}
 
-  /// False where the point is out of the other's bounds.
-  bool find(const SurfacePoint& point) {
+  void find(const SurfacePoint& point) {
     const bool within = search_.self == PairSearch::Self::kCuts;
-    if (within && !a_.surface->cut_vertices[point.vertices[0]]) return false;
+    if (within && !a_.surface->cut_vertices[point.vertices[0]]) return;
     remembered_ = point.isVertex() ? recall(point.vertices[0]) : nullptr;
     const Vec3& p = point.place;
-    // A vertex inside is searched for as deep as it was, and a little more.
-    const double near = margin_ + (remembered_ ? kDeeper * remembered_->depth : 0.0);
-    if (isOutOf(b_.frame->bounds, p, p + search_.h * point.velocity, near)) return false;
+    const double near = margin_ + (remembered_ ? remembered_->depth : 0.0);
+    ++queried_;
     gather(point, near);
-    if (candidates_.empty() && mayBeginInside() && windingAround(p) > 0) gather(point, b_.frame->bounds.diagonal());
-    if (candidates_.empty()) return true;
-    const Candidate& best = chooseNearest(point);
+    if (candidates_.empty() && mayBeginInside(p) && windingAround(p) > 0) gather(point, b_.frame->bounds.diagonal());
+    if (candidates_.empty()) return;
+    const NearFace& best = chooseNearest(point);
     const double distance = signedDistance(best, p);
     made_ = 0;
     if (distance >= -tie_)
       meetOutside(point, best);
     else if (search_.self == PairSearch::Self::kNo || remembered_)
       meetInside(point, -distance);
-    return true;
   }
+  std::size_t queried() const { return queried_; }
 
  private:
-  bool mayBeginInside() const { return search_.first && search_.self == PairSearch::Self::kNo && b_.surface->closed; }
+  bool mayBeginInside(const Vec3& p) const {
+    return search_.first && search_.self == PairSearch::Self::kNo && b_.surface->closed && b_.frame->bounds.contains(p);
+  }
 
   const RememberedSide* recall(Index v) const {
     const RememberedSide* const end = search_.remembered + search_.remembered_count;
@@ -167,7 +156,7 @@ class PointSearch {
       if (!mayMeet(point, face)) return;
       const Triangle& t = b_.surface->triangles[face];
       const Points &x = b_.frame->vertices, &u = b_.frame->velocities;
-      Candidate c;
+      NearFace c;
       c.face = face;
       c.weights = nearestWeights(p, x[t[0]], x[t[1]], x[t[2]]);
       c.point = c.weights[0] * x[t[0]] + c.weights[1] * x[t[1]] + c.weights[2] * x[t[2]];
@@ -175,7 +164,7 @@ class PointSearch {
       // What goes along the plane across what is between them comes no nearer.
       const Vec3 way = p - c.point;
       const double towards = std::max({way.dot(u[t[0]]), way.dot(u[t[1]]), way.dot(u[t[2]])}) - way.dot(velocity);
-      c.reach = c.distance > 0.0 ? kAhead * search_.h * std::max(0.0, towards / c.distance) : 0.0;
+      c.reach = c.distance > 0.0 ? search_.h * std::max(0.0, towards / c.distance) : 0.0;
       if (c.distance > within + c.reach) return;
       c.reach += margin_;
       c.corners = static_cast<int>((c.weights.array() > 0.0).count());
@@ -183,13 +172,13 @@ class PointSearch {
     });
   }
 
-  const Candidate& chooseNearest(const SurfacePoint& point) const {
+  const NearFace& chooseNearest(const SurfacePoint& point) const {
     const auto first = std::min_element(candidates_.begin(), candidates_.end(),
-                                        [](const Candidate& x, const Candidate& y) { return x.distance < y.distance; });
+                                        [](const NearFace& x, const NearFace& y) { return x.distance < y.distance; });
     if (first->distance > tie_) return *first;  // signs hold at the nearest point alone
-    const Candidate* best = nullptr;
+    const NearFace* best = nullptr;
     double most = -3.0;
-    for (const Candidate& c : candidates_) {
+    for (const NearFace& c : candidates_) {
       if (c.distance > tie_) continue;
       const double opposed =
           opposition(*a_.frame, point, b_.frame->face_normals[c.face]) + (c.corners == 3 ? 1e-6 : 0.0);
@@ -200,13 +189,13 @@ class PointSearch {
     return best ? *best : candidates_.front();
   }
 
-  double signedDistance(const Candidate& best, const Vec3& p) const {
+  double signedDistance(const NearFace& best, const Vec3& p) const {
     const Vec3 way = p - best.point;
     if (best.distance <= tie_) return b_.frame->face_normals[best.face].dot(way);
     // A sheet has no inside: it is where it was.
     if (!b_.surface->closed) return remembered_ && remembered_->normal.dot(way) < 0.0 ? -best.distance : best.distance;
     Vec3 pseudonormal = Vec3::Zero();
-    for (const Candidate& c : candidates_) {
+    for (const NearFace& c : candidates_) {
       if (!((c.point - best.point).squaredNorm() <= 1e-18 * search_.length * search_.length)) continue;
       pseudonormal += angleAt(c) * b_.frame->face_normals[c.face];
     }
@@ -249,7 +238,7 @@ class PointSearch {
   }
 
   /// Of the face at a vertex; 1 elsewhere, where both sides count alike.
-  double angleAt(const Candidate& c) const {
+  double angleAt(const NearFace& c) const {
     if (c.corners != 1) return 1.0;
     const Triangle& t = b_.surface->triangles[c.face];
     const int k = c.weights[0] > 0.0 ? 0 : c.weights[1] > 0.0 ? 1 : 2;
@@ -264,7 +253,7 @@ class PointSearch {
            (remembered_ && remembered_->normal.dot(normal) > kSameWay);  // turned inside out, but on the side it was
   }
 
-  void meetOutside(const SurfacePoint& point, const Candidate& best) {
+  void meetOutside(const SurfacePoint& point, const NearFace& best) {
     const Vec3& p = point.place;
     const Vec3& face_normal = b_.frame->face_normals[best.face];
     if (best.distance <= tie_) {
@@ -280,7 +269,7 @@ class PointSearch {
     }
     if (point.isVertex()) rememberOutside(point.vertices[0], p, best);
     if (!b_.surface->closed) return;
-    for (const Candidate& c : candidates_) {
+    for (const NearFace& c : candidates_) {
       if (made_ == used_.size()) break;
       if (&c == &best || c.corners != 3 || c.distance > c.reach) continue;
       const Vec3& normal = b_.frame->face_normals[c.face];
@@ -292,7 +281,7 @@ class PointSearch {
   }
 
   // Also what no row pushes: should it come to touch, nothing else tells its side.
-  void rememberOutside(Index v, const Vec3& p, const Candidate& best) {
+  void rememberOutside(Index v, const Vec3& p, const NearFace& best) {
     if (made_ > 0)
       sides_.push_back({v, 0.0, used_[0]});
     else if (best.distance > tie_ && best.distance <= best.reach)
@@ -304,9 +293,9 @@ class PointSearch {
   // Out by the face that is near, that the vertex opposes, and on whose side it was.
   void meetInside(const SurfacePoint& point, double depth) {
     const Vec3& p = point.place;
-    const Candidate* out = nullptr;
+    const NearFace* out = nullptr;
     double least = std::numeric_limits<double>::infinity(), gap = 0.0;
-    for (const Candidate& c : candidates_) {
+    for (const NearFace& c : candidates_) {
       const Vec3& normal = b_.frame->face_normals[c.face];
       const double height = normal.dot(p - c.point);
       if (height > 0.0 || (c.corners != 3 && -height < 0.5 * c.distance)) continue;
@@ -328,7 +317,7 @@ class PointSearch {
     if (point.isVertex()) sides_.push_back({point.vertices[0], depth, normal});
   }
 
-  void add(const SurfacePoint& point, const Candidate& c, const Vec3& normal, double gap) {
+  void add(const SurfacePoint& point, const NearFace& c, const Vec3& normal, double gap) {
     FeaturePair pair;
     pair.order = static_cast<std::uint8_t>(made_);
     pair.features = point.name;
@@ -352,15 +341,15 @@ class PointSearch {
   const double tie_, margin_;
   std::vector<FeaturePair>& pairs_;
   std::vector<RememberedSide>& sides_;
-  std::vector<Candidate>& candidates_;
+  std::vector<NearFace>& candidates_;
   const RememberedSide* remembered_ = nullptr;
-  std::size_t made_ = 0;
+  std::size_t made_ = 0, queried_ = 0;
   std::array<Vec3, 3> used_;
 };
 
 // Who is inside as a whole goes out by one face, the nearest to any of its vertices: each by a face of its own, they
 // would go to all sides.
-void leadOut(const PairSearch& search, FoundFeatures& found) {
+void leadOut(const PairSearch& search, SearchScratch& found) {
   if (found.sides.size() != search.a.surface->vertices() || found.pairs.size() != found.sides.size()) return;
   std::size_t nearest = 0;
   for (std::size_t n = 0; n < found.sides.size(); ++n) {
@@ -380,37 +369,24 @@ void leadOut(const PairSearch& search, FoundFeatures& found) {
   }
 }
 
-}  // namespace
-
-double searchMargin(double edge_length) { return kMargin * edge_length; }
-
+/// Which vertices of a are near enough to b to be queried, to scratch.near.
 void findVerticesNear(const PairSearch& search, SearchScratch& scratch) {
-  double deepest = 0.0;
-  for (std::size_t k = 0; k < search.remembered_count; ++k)
-    deepest = std::max(deepest, kDeeper * search.remembered[k].depth);
   const ContactSurface& a = *search.a.surface;
-  scratch.vertices.clear();
-  if (search.first && search.self == PairSearch::Self::kNo) {  // any may begin inside, far from all faces
-    scratch.vertices.resize(a.vertices());
-    std::iota(scratch.vertices.begin(), scratch.vertices.end(), Index{0});
-    return;
-  }
-  scratch.near.assign(a.vertices(), 0);
-  a.tree.queryTree(
-      search.a.frame->boxes, search.b.surface->tree, search.b.frame->boxes, searchMargin(search.length) + deepest,
-      scratch.query,
-      [&](Index mine, Index theirs) {
-        return search.self == PairSearch::Self::kNo ||
-               search.a.frame->normals.nodes[mine].leastDot(search.b.frame->normals.nodes[theirs]) < -kSelfOpposed;
-      },
-      [&](Index face) {
-        for (const Index v : a.triangles[face]) scratch.near[v] = 1;
-      });
-  for (Index v = 0; v < a.vertices(); ++v)
-    if (scratch.near[v]) scratch.vertices.push_back(v);
+  // Any may begin inside another, far from all faces.
+  const bool all = search.first && search.self == PairSearch::Self::kNo;
+  scratch.near.assign(a.vertices(), all);
+  if (all) return;
+  double deepest = 0.0;
+  for (std::size_t k = 0; k < search.remembered_count; ++k) deepest = std::max(deepest, search.remembered[k].depth);
+  const auto mayMeet = [&](Index mine, Index theirs) {
+    return search.self == PairSearch::Self::kNo ||
+           search.a.frame->normals.nodes[mine].leastDot(search.b.frame->normals.nodes[theirs]) < -kSelfOpposed;
+  };
+  a.tree.queryTree(search.a.frame->boxes, search.b.surface->tree, search.b.frame->boxes,
+                   searchMargin(search.length) + deepest, scratch.query, mayMeet, [&](Index face) {
+                     for (const Index v : a.triangles[face]) scratch.near[v] = 1;
+                   });
 }
-
-namespace {
 
 /// The part of a way from p to q that is in a box, from .. to of 0 .. 1.
 bool clip(const Box& box, const Vec3& p, const Vec3& q, double& from, double& to) {
@@ -442,7 +418,7 @@ void eachRidgePoint(const PairSearch& search, const SearchScratch& scratch, cons
     const ContactEdge& edge = search.a.surface->edges[e];
     const Index count = static_cast<Index>(std::min(edge.length / search.spacing + 1e-6, kMostRidgePoints));
     if (count == 0) continue;
-    if (!search.first && !(scratch.near[edge.vertices[0]] && scratch.near[edge.vertices[1]])) continue;
+    if (!scratch.near[edge.vertices[0]] || !scratch.near[edge.vertices[1]]) continue;
     Box around = reach;
     for (const Index v : edge.vertices) {  // as far as its ends go
       const Vec3 way = search.h * frame.velocities[v];
@@ -459,13 +435,14 @@ void eachRidgePoint(const PairSearch& search, const SearchScratch& scratch, cons
 }  // namespace
 
 std::size_t findVertexFace(const PairSearch& search, SearchScratch& scratch) {
+  findVerticesNear(search, scratch);
   PointSearch each(search, scratch);
-  std::size_t queried = 0;
-  for (const Index v : scratch.vertices) queried += each.find(vertexOf(search.a, v));
-  if (search.self != PairSearch::Self::kNo) return queried;
-  if (scratch.vertices.size() == search.a.surface->vertices()) leadOut(search, scratch.found);
-  eachRidgePoint(search, scratch, [&](const SurfacePoint& point) { queried += each.find(point); });
-  return queried;
+  for (Index v = 0; v < scratch.near.size(); ++v)
+    if (scratch.near[v]) each.find(vertexOf(search.a, v));
+  if (search.self != PairSearch::Self::kNo) return each.queried();
+  leadOut(search, scratch);
+  eachRidgePoint(search, scratch, [&](const SurfacePoint& point) { each.find(point); });
+  return each.queried();
 }
 
 void findPlane(const PairSearch& search, double height, std::vector<FeaturePair>& pairs) {
@@ -473,7 +450,7 @@ void findPlane(const PairSearch& search, double height, std::vector<FeaturePair>
   const double margin = searchMargin(search.length);
   for (Index v = 0; v < a.vertices.size(); ++v) {
     const double gap = a.vertices[v].z() - height;
-    if (gap > margin + kAhead * search.h * std::max(0.0, -a.velocities[v].z())) continue;
+    if (gap > margin + search.h * std::max(0.0, -a.velocities[v].z())) continue;
     FeaturePair pair;
     pair.kind = FeaturePair::Kind::kPlane;
     pair.of_b = 0;
@@ -513,7 +490,7 @@ void findSphere(const PairSearch& search, const Vec3& centre, double radius, con
       velocity += pair.shares[k] * a.velocities[pair.vertices[k]];
     }
     const double distance = (point - centre).norm();
-    if (distance > reach + kAhead * (search.h * velocity - way).norm()) return;
+    if (distance > reach + (search.h * velocity - way).norm()) return;
     pair.features = {pair.vertices[0], pair.vertices[1]};
     pair.order = static_cast<std::uint8_t>(pair.of_a);
     pair.normal = distance > 0.0 ? Vec3((point - centre) / distance) : Vec3(Vec3::UnitZ());

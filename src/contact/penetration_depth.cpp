@@ -3,16 +3,15 @@
 #include <algorithm>
 #include <limits>
 
+#include "meshless_surgery/base/compressed_rows.h"
+#include "meshless_surgery/contact/box_tree.h"
 #include "meshless_surgery/geometry/nearest_on_triangle.h"
-
-#include "cell_table.h"
 
 namespace meshless {
 namespace {
 
-constexpr std::int64_t kMaxCellsOfBox = 1000;  // beyond it, testing every face is cheaper than testing the cells
-constexpr double kOnEdge = 1e-9;               // barycentric slack, so that no ray slips through between two faces
-constexpr double kNear = 1e-12;                // of an edge's length: at the crossing itself
+constexpr double kOnEdge = 1e-9;  // barycentric slack, so that no ray slips through between two faces
+constexpr double kNear = 1e-12;   // of an edge's length: at the crossing itself
 
 struct BorderEdge {
   Index inside, outside;  // particles of a
@@ -45,12 +44,6 @@ void meetFace(const Points& positions, const Triangle& face, Index number, const
   best = {along, number, normal.normalized()};
 }
 
-Box boundsOfFace(const Points& positions, const Triangle& face) {
-  Box box;
-  for (Index k : face) box.extend(positions[k]);
-  return box;
-}
-
 bool finite(const Points& positions, const Triangle& face) {
   return positions[face[0]].allFinite() && positions[face[1]].allFinite() && positions[face[2]].allFinite();
 }
@@ -59,44 +52,32 @@ bool finite(const Points& positions, const Triangle& face) {
 std::vector<Crossing> meetBoundary(const Points& a, const std::vector<BorderEdge>& edges, const ContactBody& b) {
   std::vector<Crossing> crossings(edges.size());
   if (edges.empty()) return crossings;
-  Box region;
   double length = 0.0;
-  for (const BorderEdge& edge : edges) {
-    region.extend(a[edge.inside]);
-    region.extend(a[edge.outside]);
-    length += (a[edge.inside] - a[edge.outside]).norm();
-  }
+  for (const BorderEdge& edge : edges) length += (a[edge.inside] - a[edge.outside]).norm();
   length /= static_cast<double>(edges.size());
   if (!(length > 0.0)) return crossings;
-
   // Rounding must not part a face from an edge that ends on it.
   const Vec3 margin = Vec3::Constant(1e-9 * length);
-  region.min -= margin;
-  region.max += margin;
-  static thread_local CellTable table;
-  std::vector<Index> near;
-  for (Index f = 0; f < b.mesh->faces.size(); ++f)
-    if (finite(*b.positions, b.mesh->faces[f]) && boundsOfFace(*b.positions, b.mesh->faces[f]).overlaps(region))
-      near.push_back(f);
-  table.start(region, length, near.size());
-  for (Index f : near) {
-    Box box = boundsOfFace(*b.positions, b.mesh->faces[f]);
-    box.min -= margin;
-    box.max += margin;
-    table.insert(box, f, kMaxCellsOfBox);
+  const std::vector<Triangle>& faces = b.mesh->faces;
+  Points centres;
+  TreeBoxes boxes;
+  boxes.items.resize(faces.size());
+  for (Index f = 0; f < faces.size(); ++f) {
+    const bool there = finite(*b.positions, faces[f]);
+    centres.push_back(there ? (*b.positions)[faces[f][0]] : Vec3(Vec3::Zero()));
+    for (int k = 0; k < 3 && there; ++k) {
+      boxes.items[f].extend((*b.positions)[faces[f][k]] - margin);
+      boxes.items[f].extend((*b.positions)[faces[f][k]] + margin);
+    }
   }
+  const BoxTree tree(centres);
+  tree.refit(boxes);
   for (std::size_t e = 0; e < edges.size(); ++e) {
     const Vec3 &p = a[edges[e].inside], &q = a[edges[e].outside];
-    const auto meet = [&](Index f) { meetFace(*b.positions, b.mesh->faces[f], f, p, q, crossings[e]); };
-    Box box;
+    FloatBox box;
     box.extend(p);
     box.extend(q);
-    const CellRange range = table.cellsOf(box);
-    if (range.count() > kMaxCellsOfBox) {
-      for (Index f : near) meet(f);
-    } else {
-      table.forEach(range, meet);
-    }
+    tree.query(boxes, box, [&](Index f) { meetFace(*b.positions, faces[f], f, p, q, crossings[e]); });
   }
   return crossings;
 }
@@ -127,25 +108,6 @@ NearestFace nearestFace(const Points& a, const Penetration* first, const std::ve
     }
   }
   return best;
-}
-
-/// Penetrating particles of a that are joined by edges, as compressed rows.
-struct InnerGraph {
-  std::vector<Index> offsets, neighbours;
-};
-InnerGraph makeInnerGraph(std::size_t size, const std::vector<std::array<Index, 2>>& edges) {
-  InnerGraph graph;
-  graph.offsets.assign(size + 1, 0);
-  for (const auto& edge : edges)
-    for (Index end : edge) ++graph.offsets[end + 1];
-  for (std::size_t k = 0; k < size; ++k) graph.offsets[k + 1] += graph.offsets[k];
-  graph.neighbours.resize(2 * edges.size());
-  std::vector<Index> next(graph.offsets.begin(), graph.offsets.end() - 1);
-  for (const auto& edge : edges) {
-    graph.neighbours[next[edge[0]]++] = edge[1];
-    graph.neighbours[next[edge[1]]++] = edge[0];
-  }
-  return graph;
 }
 
 /// Depth and direction of a particle gathered from crossings or neighbours.
@@ -220,21 +182,28 @@ void computePenetrationDepths(const std::vector<ContactBody>& bodies, Penetratio
     }
 
   // Inner particles, layer by layer.
-  const InnerGraph graph = makeInnerGraph(size, inner);
+  std::vector<Index> offsets, neighbours;
+  const auto each = [&inner](const auto& visit) {
+    for (const auto& [u, v] : inner) {
+      visit(u, v);
+      visit(v, u);
+    }
+  };
+  compressRows(size, each, offsets, neighbours);
   const auto propagate = [&] {
     while (!layer.empty()) {
       std::vector<Index> next;
       for (Index k : layer)
-        for (Index n = graph.offsets[k]; n < graph.offsets[k + 1]; ++n)
-          if (!done[graph.neighbours[n]]) next.push_back(graph.neighbours[n]);
+        for (Index n = offsets[k]; n < offsets[k + 1]; ++n)
+          if (!done[neighbours[n]]) next.push_back(neighbours[n]);
       std::sort(next.begin(), next.end());
       next.erase(std::unique(next.begin(), next.end()), next.end());
       std::vector<Index> given;
       for (Index k : next) {
         Gathered sum;
         const Vec3& p = positions[first[k].particle];
-        for (Index n = graph.offsets[k]; n < graph.offsets[k + 1]; ++n) {
-          const Index j = graph.neighbours[n];
+        for (Index n = offsets[k]; n < offsets[k + 1]; ++n) {
+          const Index j = neighbours[n];
           if (!done[j]) continue;
           const Vec3 way = positions[first[j].particle] - p;
           const double squared = way.squaredNorm();
@@ -255,8 +224,8 @@ void computePenetrationDepths(const std::vector<ContactBody>& bodies, Penetratio
     std::vector<Index> group{start};
     seen[start] = true;
     for (std::size_t at = 0; at < group.size(); ++at)
-      for (Index n = graph.offsets[group[at]]; n < graph.offsets[group[at] + 1]; ++n) {
-        const Index j = graph.neighbours[n];
+      for (Index n = offsets[group[at]]; n < offsets[group[at] + 1]; ++n) {
+        const Index j = neighbours[n];
         if (done[j] || seen[j]) continue;
         seen[j] = true;
         group.push_back(j);

@@ -27,7 +27,6 @@ const Four& four(const Slot& slot) { return reinterpret_cast<const Four&>(slot);
 Four& four(Slot& slot) { return reinterpret_cast<Four&>(slot); }
 Vec3 vec3(const Four& v) { return {v.low[0], v.low[1], v.high[0]}; }
 Four four(const Vec3& v) { return {Two{v[0], v[1]}, Two{v[2], 0.0}}; }
-Vec3 at(const Slot& slot) { return {slot.x, slot.y, slot.z}; }
 
 class Solver {
  public:
@@ -40,51 +39,47 @@ class Solver {
     scratch_.levers.clear();
   }
 
-  Vec3 sum(const ContactRow& row, const RowEntry* entries, Index a, Index b, bool before) const {
+  /// [m] of coefficient x, at the start of the substep or now.
+  Vec3 sum(const Active& of, bool before) const {
     Four total{};
-    const Slot* const of_a = before ? bodies_[a].before : bodies_[a].now;
-    for (Index k = row.begin; k < row.middle; ++k) total += entries[k].coefficient * four(of_a[entries[k].particle]);
-    if (b != kNoIndex) {
-      const Slot* const of_b = before ? bodies_[b].before : bodies_[b].now;
-      for (Index k = row.middle; k < row.end; ++k) total += entries[k].coefficient * four(of_b[entries[k].particle]);
-    }
+    const auto each = [&](const SolverBody& body, Index begin, Index end) {
+      const Slot* const slots = before ? body.before : body.now;
+      for (Index k = begin; k < end; ++k) total += of.entries[k].coefficient * four(slots[of.entries[k].particle]);
+    };
+    each(bodies_[of.a], of.row->begin, of.row->middle);
+    each(bodies_[of.b], of.row->middle, of.row->end);
     return vec3(total);
   }
 
-  /// With what groups have moved.
-  Vec3 sumNow(const Active& active) const {
-    return sum(*active.row, active.entries, active.a, active.b, false) + moved(active);
-  }
-
-  /// By what groups have moved.
+  /// [m] by what groups have moved.
   Vec3 moved(const Active& active) const {
-    Vec3 total = leversMoved(bodies_[active.a], active.levers, active.middle);
-    if (active.b != kNoIndex) total += leversMoved(bodies_[active.b], active.middle, active.end);
-    return total;
+    return leversMoved(bodies_[active.a], active.levers, active.middle) +
+           leversMoved(bodies_[active.b], active.middle, active.end);
   }
 
-  /// Where its bodies can answer a row. start: [m] of its sum.
-  bool meet(ContactRow& row, const RowEntry* entries, Index a, Index b, const Vec3& start, Active& active) {
-    active.row = &row;
-    active.entries = entries;
-    active.a = a;
-    active.b = b;
-    active.start = start;
+  /// Whether its bodies can answer a row.
+  bool meet(Active& active) {
+    const ContactRow& row = *active.row;
+    const RowEntry* const entries = active.entries;
     active.levers = static_cast<Index>(scratch_.levers.size());
     const auto each = [entries](Index begin, Index end, const auto& visit) {
       for (Index k = begin; k < end; ++k) visit(entries[k].particle, entries[k].coefficient);
     };
-    addLevers(bodies_[a], [&](const auto& visit) { each(row.begin, row.middle, visit); });
+    addLevers(bodies_[active.a], [&](const auto& visit) { each(row.begin, row.middle, visit); });
     active.middle = static_cast<Index>(scratch_.levers.size());
-    if (b != kNoIndex) addLevers(bodies_[b], [&](const auto& visit) { each(row.middle, row.end, visit); });
+    addLevers(bodies_[active.b], [&](const auto& visit) { each(row.middle, row.end, visit); });
     active.end = static_cast<Index>(scratch_.levers.size());
     double answer = 0.0, farthest = 0.0;  // [1/kg]
-    addOwnAnswer(entries, row.begin, row.middle, a, answer, farthest);
-    if (b != kNoIndex) addOwnAnswer(entries, row.middle, row.end, b, answer, farthest);
+    for (Index k = row.begin; k < row.end; ++k) {
+      const SolverBody& body = bodies_[k < row.middle ? active.a : active.b];
+      const double way = (1.0 - body.rigid_share) * entries[k].coefficient * body.now[entries[k].particle].inverse_mass;
+      answer += entries[k].coefficient * way;
+      farthest = std::max(farthest, std::abs(way));
+    }
     active.sideways = answer;
     for (Index k = active.levers; k < active.end; ++k) {
       const Lever& lever = scratch_.levers[k];
-      const SolverBody& body = bodies_[k < active.middle ? a : b];
+      const SolverBody& body = bodies_[k < active.middle ? active.a : active.b];
       const GroupMotion& motion = body.motions[lever.group];
       const double straight = body.rigid_share * lever.share * lever.share * motion.inverse_mass;
       const Vec3 about = lever.arm.cross(row.normal);
@@ -98,16 +93,16 @@ class Solver {
     return false;
   }
 
-  void activate(ContactRow& row, const RowEntry* entries, Index a, Index b, const Vec3& way, const SolverStep& step) {
-    Active active;
-    // Friction is about the motion relative to what moves.
-    if (!meet(row, entries, a, b, sum(row, entries, a, b, true) + way, active)) {
+  void activate(Active active, const Vec3& way, const SolverStep& step) {
+    ContactRow& row = *active.row;
+    active.start = sum(active, true) + way;  // friction is about the motion relative to what moves
+    if (!meet(active)) {
       row.impulse.setZero();
       return;
     }
     const double gap = row.normal.dot(active.start) + row.constant;
     active.target = std::min(gap, 0.0);
-    const double approach = gap - row.normal.dot(sum(row, entries, a, b, false)) - row.constant;  // [m] in the substep
+    const double approach = gap - row.normal.dot(sum(active, false)) - row.constant;  // [m] in the substep
     if (row.restitution > 0.0 && approach > std::max(gap, step.h * step.slow))
       active.target = gap + row.restitution * approach;
     scratch_.active.push_back(active);
@@ -115,12 +110,12 @@ class Solver {
 
   /// Takes a part of what overlaps away, at the start of the substep as at its end: that gives no speed. once: [s]
   /// since it was done last.
-  void letOut(ContactRow& row, const RowEntry* entries, Index a, Index b, const Vec3& way, double once) {
-    const Vec3 start = sum(row, entries, a, b, true);
-    const double edge = edgeOf(a, b), deep = -kSlop * edge - row.normal.dot(start + way) - row.constant;
-    Active active;
-    if (!(deep > 0.0) || !meet(row, entries, a, b, start, active)) return;
-    active.target = row.normal.dot(start) + row.constant + once * std::min(deep / kOutTime, kOutSpeed * edge);
+  void letOut(Active active, const Vec3& way, double once) {
+    const ContactRow& row = *active.row;
+    active.start = sum(active, true);
+    const double edge = edgeOf(active), deep = -kSlop * edge - row.normal.dot(active.start + way) - row.constant;
+    if (!(deep > 0.0) || !meet(active)) return;
+    active.target = row.normal.dot(active.start) + row.constant + once * std::min(deep / kOutTime, kOutSpeed * edge);
     scratch_.active.push_back(active);
   }
 
@@ -129,14 +124,11 @@ class Solver {
   void letOut() {
     for (const Active& active : scratch_.active) {
       const ContactRow& row = *active.row;
-      const Vec3 start = sum(row, active.entries, active.a, active.b, true) + moved(active);
-      const double lacking = active.target - row.normal.dot(start) - row.constant;
+      const double lacking = active.target - row.normal.dot(sum(active, true) + moved(active)) - row.constant;
       if (!(lacking > 0.0)) continue;
       const Vec3 more = active.mass * lacking * row.normal;
       push(active, more);
-      pushSide(active.entries, row.begin, row.middle, bodies_[active.a], bodies_[active.a].before, more);
-      if (active.b != kNoIndex)
-        pushSide(active.entries, row.middle, row.end, bodies_[active.b], bodies_[active.b].before, more);
+      pushParticles(active, more, &SolverBody::before);
     }
     moveGroups(true);
     scratch_.active.clear();
@@ -144,12 +136,9 @@ class Solver {
   }
 
   void push(const Active& active, const Vec3& impulse) {
-    const SolverBody& a = bodies_[active.a];
-    pushSide(active.entries, active.row->begin, active.row->middle, a, a.now, impulse);
-    if (active.b != kNoIndex)
-      pushSide(active.entries, active.row->middle, active.row->end, bodies_[active.b], bodies_[active.b].now, impulse);
+    pushParticles(active, impulse, &SolverBody::now);
     pushLevers(bodies_[active.a], active.levers, active.middle, impulse);
-    if (active.b != kNoIndex) pushLevers(bodies_[active.b], active.middle, active.end, impulse);
+    pushLevers(bodies_[active.b], active.middle, active.end, impulse);
   }
 
   /// The last impulse, as far as it presses along the normal of now.
@@ -164,10 +153,10 @@ class Solver {
 
   void visit(const Active& active) {
     ContactRow& row = *active.row;
-    const Vec3 now = sumNow(active);
+    const Vec3 now = sum(active, false) + moved(active);
     const double gap = row.normal.dot(now) + row.constant, pressed = row.normal.dot(row.impulse);
     // Nobody who is not dragged goes farther than an edge in a substep: more than that is not asked for at once.
-    const double lacking = std::min(active.target - gap, edgeOf(active.a, active.b));
+    const double lacking = std::min(active.target - gap, edgeOf(active));
     const double press = std::max(0.0, pressed + active.mass * lacking);
     Vec3 slid = now - active.start;
     slid -= row.normal.dot(slid) * row.normal;
@@ -209,7 +198,7 @@ class Solver {
     const std::vector<Index>& patch = *spring.patch;
     const std::vector<double>& weights = *spring.weights;
     Vec3 stretch = spring.end - leversMoved(body, pull.levers, pull.end);
-    for (std::size_t k = 0; k < patch.size(); ++k) stretch -= weights[k] * at(body.now[patch[k]]);
+    for (std::size_t k = 0; k < patch.size(); ++k) stretch -= weights[k] * body.now[patch[k]].place();
     const double stiff = spring.stiffness * h * h;
     const Vec3 more = (Mat3::Identity() + stiff * pull.answer).inverse() * (stiff * stretch - spring.impulse);
     spring.impulse += more;
@@ -224,8 +213,7 @@ class Solver {
   /// What groups have been moved by goes to their particles, and to where those were, if wanted.
   void moveGroups(bool both) {
     for (const Active& active : scratch_.active)
-      for (const Index b : {active.a, active.b})
-        if (b != kNoIndex) moveGroups(bodies_[b], both);
+      for (const Index b : {active.a, active.b}) moveGroups(bodies_[b], both);
   }
   void moveGroups(const std::vector<SpringRow>& springs) {
     moveGroups(false);
@@ -233,28 +221,20 @@ class Solver {
   }
 
  private:
-  double edgeOf(Index a, Index b) const {
-    return b == kNoIndex ? bodies_[a].edge_length : std::min(bodies_[a].edge_length, bodies_[b].edge_length);
-  }
+  double edgeOf(const Active& of) const { return std::min(bodies_[of.a].edge_length, bodies_[of.b].edge_length); }
 
-  void addOwnAnswer(const RowEntry* entries, Index begin, Index end, Index number, double& answer,
-                    double& farthest) const {
-    const SolverBody& body = bodies_[number];
-    for (Index k = begin; k < end; ++k) {
-      const double way = (1.0 - body.rigid_share) * entries[k].coefficient * body.now[entries[k].particle].inverse_mass;
-      answer += entries[k].coefficient * way;
-      farthest = std::max(farthest, std::abs(way));
-    }
-  }
-
-  static void pushSide(const RowEntry* entries, Index begin, Index end, const SolverBody& body, Slot* slots,
-                       const Vec3& impulse) {
-    if (!body.moves) return;
-    const Four way = four(Vec3((1.0 - body.rigid_share) * impulse));
-    for (Index k = begin; k < end; ++k) {
-      Slot& slot = slots[entries[k].particle];
-      four(slot) += entries[k].coefficient * slot.inverse_mass * way;
-    }
+  void pushParticles(const Active& active, const Vec3& impulse, Slot* SolverBody::*slots) {
+    const ContactRow& row = *active.row;
+    const auto each = [&](const SolverBody& body, Index begin, Index end) {
+      if (!body.moves) return;
+      const Four way = four(Vec3((1.0 - body.rigid_share) * impulse));
+      for (Index k = begin; k < end; ++k) {
+        Slot& slot = (body.*slots)[active.entries[k].particle];
+        four(slot) += active.entries[k].coefficient * slot.inverse_mass * way;
+      }
+    };
+    each(bodies_[active.a], row.begin, row.middle);
+    each(bodies_[active.b], row.middle, row.end);
   }
 
   /// each: calls what it gets with particles and coefficients.
@@ -265,15 +245,15 @@ class Solver {
     const std::size_t first = scratch_.levers.size();
     each([&](Index particle, double coefficient) {
       for (Index n = groups.of_offsets[particle]; n < groups.of_offsets[particle + 1]; ++n) {
-        const Index group = groups.of_groups[n];
+        const Index member = groups.of_members[n], group = groups.groups[member];
         GroupMotion& motion = body.motions[group];
-        if (!motion.current) motion = groupAt(groups, group, [&body](Index i) { return at(body.before[i]); });
+        if (!motion.current) motion = groupAt(groups, group, [&body](Index i) { return body.before[i].place(); });
         std::size_t place = first;
         while (place < scratch_.levers.size() && scratch_.levers[place].group != group) ++place;
         if (place == scratch_.levers.size()) scratch_.levers.push_back({group, 0.0, Vec3::Zero()});
-        const double share = groups.of_weights[n] * coefficient;
+        const double share = groups.weights[member] * coefficient;
         scratch_.levers[place].share += share;
-        scratch_.levers[place].arm += share * (at(body.before[particle]) - motion.centre);
+        scratch_.levers[place].arm += share * (body.before[particle].place() - motion.centre);
       }
     });
   }
@@ -305,7 +285,7 @@ class Solver {
       for (Index k = body.groups->offsets[g]; k < body.groups->offsets[g + 1]; ++k) {
         const Index i = body.groups->members[k];
         const Four way = four(
-            Vec3(body.groups->weights[k] * (motion.shift + motion.turn.cross(at(body.before[i]) - motion.centre))));
+            Vec3(body.groups->weights[k] * (motion.shift + motion.turn.cross(body.before[i].place() - motion.centre))));
         four(body.now[i]) += way;
         if (both) four(body.before[i]) += way;
       }
@@ -318,29 +298,18 @@ class Solver {
 
 /// Of a particle, times h.
 Vec3 angularMomentum(const SolverBody& body, Index i) {
-  const Vec3 from = at(body.before[i]);
-  return from.cross(at(body.now[i]) - from) / body.now[i].inverse_mass;
+  const Vec3 from = body.before[i].place();
+  return from.cross(body.now[i].place() - from) / body.now[i].inverse_mass;
 }
 
 // Rows act at both ends of what is between them: across it an impulse is a couple. Bodies get it back as a spin.
 void spinBack(SolverBody& body) {
   if (body.leaked.isZero(0.0)) return;
-  double mass = 0.0;
-  Vec3 sum = Vec3::Zero();
-  Mat3 moment = Mat3::Zero();
-  const Vec3 origin = at(body.before[0]);
-  for (Index i = 0; i < body.particles; ++i) {
-    const double m = 1.0 / body.now[i].inverse_mass;
-    const Vec3 arm = at(body.before[i]) - origin;
-    mass += m;
-    sum += m * arm;
-    moment += m * arm * arm.transpose();
-  }
-  const Vec3 mean = sum / mass;
-  moment -= mass * mean * mean.transpose();
-  const Vec3 turn = inverseInertia(moment.trace() * Mat3::Identity() - moment) * -body.leaked;
+  MassMoments moments(body.before[0].place());
+  for (Index i = 0; i < body.particles; ++i) moments.add(1.0 / body.now[i].inverse_mass, body.before[i].place());
+  const Vec3 turn = moments.inverseInertia() * -body.leaked;
   for (Index i = 0; i < body.particles; ++i)
-    four(body.now[i]) += four(Vec3(turn.cross(at(body.before[i]) - origin - mean)));
+    four(body.now[i]) += four(Vec3(turn.cross(moments.fromCentre(body.before[i].place()))));
   body.leaked.setZero();
 }
 
@@ -353,18 +322,25 @@ void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& spri
   const auto wayOf = [&step](const ContactRow& row) {
     return row.kind == FeaturePair::Kind::kSphere ? Vec3(step.sphere_to - step.sphere_from) : Vec3(Vec3::Zero());
   };
-  for (const SolverRows& rows : sets) {
-    const RowEntry* const entries = rows.set->entries.data();
+  const auto activeOf = [](const SolverRows& rows, ContactRow& row) {
+    SolverScratch::Active active;
+    active.row = &row;
+    active.entries = rows.set->entries.data();
+    active.a = rows.a;
+    active.b = rows.b == kNoIndex ? rows.a : rows.b;  // of which it has no entries
+    return active;
+  };
+  for (const SolverRows& rows : sets)
     for (ContactRow& row : rows.set->rows) {
+      const SolverScratch::Active active = activeOf(rows, row);
       if (row.kind == FeaturePair::Kind::kSphere) {  // its tangent plane goes along and turns
-        const Vec3 from = solver.sum(row, entries, rows.a, rows.b, true) - step.sphere_from;
+        const Vec3 from = solver.sum(active, true) - step.sphere_from;
         const double distance = from.norm();
         if (distance > 0.0) row.normal = from / distance;
         row.constant = row.rise - row.normal.dot(step.sphere_to) - step.sphere_radius;
       }
-      if (step.number == 0) solver.letOut(row, entries, rows.a, rows.b, wayOf(row), step.frame);
+      if (step.number == 0) solver.letOut(active, wayOf(row), step.frame);
     }
-  }
   if (solver.anyOut()) {  // what is moved sideways takes angular momentum along
     for (const Index b : free)
       for (Index i = 0; i < bodies[b].particles; ++i) bodies[b].leaked -= angularMomentum(bodies[b], i);
@@ -372,13 +348,11 @@ void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& spri
     for (const Index b : free)
       for (Index i = 0; i < bodies[b].particles; ++i) bodies[b].leaked += angularMomentum(bodies[b], i);
   }
-  for (const SolverRows& rows : sets) {
-    const RowEntry* const entries = rows.set->entries.data();
+  for (const SolverRows& rows : sets)
     for (ContactRow& row : rows.set->rows)
-      if (!row.impulse.isZero(0.0) ||
-          !(row.normal.dot(solver.sum(row, entries, rows.a, rows.b, false)) + row.constant > 0.0))
-        solver.activate(row, entries, rows.a, rows.b, wayOf(row), step);
-  }
+      if (const SolverScratch::Active active = activeOf(rows, row);
+          !row.impulse.isZero(0.0) || !(row.normal.dot(solver.sum(active, false)) + row.constant > 0.0))
+        solver.activate(active, wayOf(row), step);
   for (const SpringRow& spring : springs) solver.activate(spring);
   counters.active += scratch.active.size();
   for (const auto& active : scratch.active) {
@@ -396,7 +370,7 @@ void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& spri
   for (const auto& active : scratch.active) {
     const Vec3 couple = active.start.cross(active.row->impulse);
     bodies[active.a].leaked += 0.5 * couple;
-    bodies[active.b == kNoIndex ? active.a : active.b].leaked += 0.5 * couple;
+    bodies[active.b].leaked += 0.5 * couple;
   }
   for (const Index b : free) spinBack(bodies[b]);
 }

@@ -8,7 +8,6 @@ namespace meshless {
 namespace {
 
 constexpr double kSkin = 0.01;                           // of the mean edge: surfaces rest so far above each other
-constexpr double kAhead = 1.2;                           // times the way of a frame: what speeds up is met too
 constexpr std::uint64_t kGroundKey = ~std::uint64_t{0};  // beyond those of bodies and obstacles
 constexpr std::uint64_t kSphereKey = kGroundKey - 1;
 
@@ -118,17 +117,14 @@ void SurfaceContacts::findMoved(const SurfaceScene& scene, const std::vector<Col
     const bool near = c != kNoIndex && (needed_[c] || !colliders[c].moves);  // a sleeping collider's rows count from it
     at = near ? std::next(at) : ways_.erase(at);
   }
-  std::vector<KeptWay*>& ways = ways_of_;
-  ways.assign(count, nullptr);
-  for (Index c = 0; c < count; ++c)
-    if (needed_[c]) {
-      ways[c] = &ways_[colliders[c].key];
-      ways[c]->key = colliders[c].key;
-    }
+  gone_.assign(count, 0.0);
+  bent_.assign(count, 0.0);
+  ahead_.assign(count, 0.0);
   for (Index c = 0; c < count; ++c) {
-    if (!ways[c] || colliders[c].obstacle) continue;
-    KeptWay& way = *ways[c];
     const Collider& collider = colliders[c];
+    if (!needed_[c] || collider.obstacle) continue;
+    KeptWay& way = ways_[collider.key];
+    way.key = collider.key;
     const VertexSupports& supports = collider.surface->supports;
     const Index vertices = collider.surface->vertices();
     const bool known = way.last.size() == vertices;
@@ -143,26 +139,29 @@ void SurfaceContacts::findMoved(const SurfaceScene& scene, const std::vector<Col
       ways_gone.extend(gone);
       way.last[v] = place;
     }
-    way.ahead = kAhead * scene.h * std::sqrt(fastest);
-    if (!known || !collider.moves) continue;
-    way.gone += std::sqrt(farthest);
-    way.bent += ways_gone.diagonal();
+    ahead_[c] = scene.h * std::sqrt(fastest);
+    if (known && collider.moves) {
+      way.gone += std::sqrt(farthest);
+      way.bent += ways_gone.diagonal();
+    }
+    gone_[c] = way.gone;
+    bent_[c] = way.bent;
   }
   moved_.assign(count, 0);
   for (Pair* pair : pairs_) {
     const Collider& a = colliders[pair->a];
     const Collider* const b = pair->b == kNoIndex ? nullptr : &colliders[pair->b];
     const double length = b ? std::min(a.edge_length, b->edge_length) : a.edge_length;
-    const double skin = b ? kSkin * std::min(a.edge_length, b->edge_length) : 0.0;
-    const KeptWay &way_a = *ways[pair->a], *const way_b = b ? ways[pair->b] : nullptr;
-    double gone = way_a.gone - pair->way_a + way_a.ahead;
-    if (b) gone += way_b->gone - pair->way_b + way_b->ahead;
-    if (pair->a == pair->b) gone = way_a.bent - pair->way_a + kAhead * scene.h * a.bends;
+    const double skin = b ? kSkin * length : 0.0;
+    const bool self = pair->a == pair->b;
+    const double way_a = self ? bent_[pair->a] : gone_[pair->a];
+    double gone = way_a - pair->way_a + (self ? scene.h * a.bends : ahead_[pair->a]);
+    if (b && !self) gone += gone_[pair->b] - pair->way_b + ahead_[pair->b];
     pair->stale = !pair->found || pair->kind == Kind::kSphere || gone > searchMargin(length) - skin;
     pair->stale = pair->stale && pair->kind != Kind::kGiven;
     if (!pair->stale) continue;
-    pair->way_a = pair->a == pair->b ? way_a.bent : way_a.gone;
-    if (b) pair->way_b = way_b->gone;
+    pair->way_a = way_a;
+    if (b) pair->way_b = gone_[pair->b];
     moved_[pair->a] = 1;
     if (b) moved_[pair->b] = 1;
   }
@@ -178,10 +177,6 @@ void SurfaceContacts::find(const SurfaceScene& scene, const std::vector<Collider
     frame_of_[c] = collider.obstacle ? collider.key : 0;
     placeFrame(*collider.surface, collider.vertices, collider.moves ? collider.velocities : nullptr, scene.h,
                frames_[c]);
-    Points& offsets = ways_.find(collider.key)->second.offsets;
-    offsets.resize(collider.surface->vertices());
-    for (Index v = 0; v < offsets.size(); ++v)
-      offsets[v] = frames_[c].vertices[v] - collider.surface->supports.sum(v, collider.positions);
   });
   runEach(for_each, pairs_.size(), [&](std::size_t n) {
     if (pairs_[n]->stale) findPair(scene, colliders, *pairs_[n]);
@@ -198,17 +193,9 @@ void SurfaceContacts::find(const SurfaceScene& scene, const std::vector<Collider
 void SurfaceContacts::findPair(const SurfaceScene& scene, const std::vector<Collider>& colliders, Pair& pair) {
   const Collider& a = colliders[pair.a];
   const Collider& b = colliders[pair.b == kNoIndex ? pair.a : pair.b];
-  std::unique_ptr<Scratch> scratch;
-  {
-    const std::lock_guard<std::mutex> lock(spare_mutex_);
-    if (!spare_.empty()) {
-      scratch = std::move(spare_.back());
-      spare_.pop_back();
-    }
-  }
-  if (!scratch) scratch = std::make_unique<Scratch>();
-  FoundFeatures& found = scratch->search.found;
-  scratch->search.clear();
+  static thread_local SearchScratch scratch;
+  scratch.pairs.clear();
+  scratch.sides.clear();
   PairSearch search;
   search.a = {a.surface, &frames_[pair.a]};
   search.b = {b.surface, &frames_[pair.b == kNoIndex ? pair.a : pair.b]};
@@ -221,27 +208,24 @@ void SurfaceContacts::findPair(const SurfaceScene& scene, const std::vector<Coll
   search.first = !pair.found;
   switch (pair.kind) {
     case Kind::kGround:
-      findPlane(search, *scene.ground, found.pairs);
+      findPlane(search, *scene.ground, scratch.pairs);
       break;
     case Kind::kSphere:
-      findSphere(search, scene.sphere->centre, scene.sphere->radius, scene.sphere->way, found.pairs);
+      findSphere(search, scene.sphere->centre, scene.sphere->radius, scene.sphere->way, scratch.pairs);
       break;
     case Kind::kGiven:
       break;
     case Kind::kVertexFace:
       if (pair.a == pair.b) placeNormalBoxes(*a.surface, frames_[pair.a]);
-      findVerticesNear(search, scratch->search);
-      pair.queried = findVertexFace(search, scratch->search);
+      pair.queried = findVertexFace(search, scratch);
   }
-  makeRows(scene, colliders, *scratch, pair);
-  pair.sides.assign(found.sides.begin(), found.sides.end());
+  makeRows(scene, colliders, scratch.pairs, pair);
+  pair.sides.assign(scratch.sides.begin(), scratch.sides.end());
   pair.found = true;
-  const std::lock_guard<std::mutex> lock(spare_mutex_);
-  spare_.push_back(std::move(scratch));
 }
 
-void SurfaceContacts::makeRows(const SurfaceScene& scene, const std::vector<Collider>& colliders, Scratch& scratch,
-                               Pair& pair) const {
+void SurfaceContacts::makeRows(const SurfaceScene& scene, const std::vector<Collider>& colliders,
+                               const std::vector<FeaturePair>& found, Pair& pair) const {
   const Collider& a = colliders[pair.a];
   const Collider* const b = pair.b == kNoIndex ? nullptr : &colliders[pair.b];
   const double other_friction = b ? b->friction : pair.kind == Kind::kGround ? scene.ground_friction : a.friction;
@@ -250,11 +234,11 @@ void SurfaceContacts::makeRows(const SurfaceScene& scene, const std::vector<Coll
   const double skin = b ? kSkin * std::min(a.edge_length, b->edge_length) : 0.0;
   RowBody of_a{a.surface, a.positions, frames_[pair.a].vertices.data(), a.inverse_masses}, of_b;
   if (b) of_b = {b->surface, b->positions, frames_[pair.b].vertices.data(), b->inverse_masses};
-  const std::vector<ContactRow>& old = scratch.old;
-  scratch.old.assign(pair.set.rows.begin(), pair.set.rows.end());
+  static thread_local std::vector<ContactRow> old;
+  old.assign(pair.set.rows.begin(), pair.set.rows.end());
   pair.set.clear();
-  for (const FeaturePair& features : scratch.search.found.pairs) {
-    ContactRow* const row = makeRow(features, of_a, of_b, pair.a == pair.b, skin, pair.set);
+  for (const FeaturePair& features : found) {
+    ContactRow* const row = makeRow(features, of_a, of_b, skin, pair.set);
     if (!row) continue;
     row->friction = friction;
     row->restitution = restitution;
@@ -292,26 +276,22 @@ void SurfaceContacts::listReached(const SurfaceScene& scene, const std::vector<C
 void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
   const Index count = static_cast<Index>(colliders.size());
   fillSlots(colliders);
-  std::vector<Index>& number = island_of_;
   joined_.reset(count);
-  number.assign(count, kNoIndex);
+  island_of_.assign(count, kNoIndex);
   const auto moves = [&](Index c) { return c != kNoIndex && colliders[c].moves; };
-  for (const Pair* pair : pairs_) {
-    if (!moves(pair->a) || !moves(pair->b)) continue;
-    if (pair->set.rows.empty()) continue;
-    joined_.join(pair->a, pair->b);
-  }
+  for (const Pair* pair : pairs_)
+    if (moves(pair->a) && moves(pair->b) && !pair->set.rows.empty()) joined_.join(pair->a, pair->b);
   // The first gets back what it had.
   for (; !islands_.empty(); islands_.pop_back()) {
     Island& island = islands_.back();
     island.bodies.clear();
-    island.free.clear();
     island.rows.clear();
+    island.held = false;
     spare_islands_.push_back(std::move(island));
   }
   for (Index c = 0; c < count; ++c) {
     if (!moves(c)) continue;
-    Index& island = number[joined_.find(c)];
+    Index& island = island_of_[joined_.find(c)];
     if (island == kNoIndex) {
       island = static_cast<Index>(islands_.size());
       if (spare_islands_.empty()) spare_islands_.emplace_back();
@@ -319,21 +299,14 @@ void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
       spare_islands_.pop_back();
     }
     islands_[island].bodies.push_back(c);
+    islands_[island].held = islands_[island].held || colliders[c].held;
   }
-  std::vector<char>& held = island_held_;
-  held.assign(islands_.size(), 0);
   for (Pair* pair : pairs_) {
     const Index of = moves(pair->a) ? pair->a : pair->b;
     if (pair->set.rows.empty() || !moves(of)) continue;
-    const Index island = number[joined_.find(of)];
-    islands_[island].rows.push_back({&pair->set, pair->a, pair->b});
-    held[island] = held[island] || !moves(pair->a) || !moves(pair->b);
-  }
-  for (std::size_t n = 0; n < islands_.size(); ++n) {
-    Island& island = islands_[n];
-    bool any_held = held[n];
-    for (const Index b : island.bodies) any_held = any_held || colliders[b].held;
-    if (!any_held) island.free = island.bodies;
+    Island& island = islands_[island_of_[joined_.find(of)]];
+    island.rows.push_back({&pair->set, pair->a, pair->b});
+    island.held = island.held || !moves(pair->a) || !moves(pair->b);
   }
 }
 
@@ -378,28 +351,23 @@ void SurfaceContacts::solveIsland(Index island_number, SolverStep step, int numb
   if (island.rows.empty() && springs.empty()) return;
   step.warm = number == 0 ? step.h * step.h : 1.0;
   step.number = number;
-  const auto put = [](const Vec3& from, Slot& to) {
-    to.x = from.x();
-    to.y = from.y();
-    to.z = from.z();
-  };
   runEach(for_each, island.bodies.size(), [&](std::size_t n) {
     const SolverBody& body = solver_bodies_[island.bodies[n]];
     const Vec3* const positions = colliders[island.bodies[n]].positions;
     for (Index i = 0; i < body.particles; ++i) {
-      put(positions[i], body.now[i]);
-      put(previous[n][i], body.before[i]);
+      body.now[i].put(positions[i]);
+      body.before[i].put(previous[n][i]);
     }
   });
   static const std::vector<Index> kNone;
-  solveRows(island.rows, springs, solver_bodies_, step, springs.empty() ? island.free : kNone, scratch, counters);
+  solveRows(island.rows, springs, solver_bodies_, step, springs.empty() && !island.held ? island.bodies : kNone,
+            scratch, counters);
   runEach(for_each, island.bodies.size(), [&](std::size_t n) {
     const SolverBody& body = solver_bodies_[island.bodies[n]];
     Vec3* const positions = colliders[island.bodies[n]].positions;
-    const auto placeOf = [](const Slot& slot) { return Vec3(slot.x, slot.y, slot.z); };
     for (Index i = 0; i < body.particles; ++i) {
-      positions[i] = placeOf(body.now[i]);
-      previous[n][i] = placeOf(body.before[i]);
+      positions[i] = body.now[i].place();
+      previous[n][i] = body.before[i].place();
     }
   });
 }
@@ -424,21 +392,16 @@ void SurfaceContacts::finishIsland(Index island, double h) {
     for (ContactRow& row : rows.set->rows) row.impulse /= h * h;
 }
 
-void SurfaceContacts::loadedSurfaces(std::vector<LoadedSurfaces>& pairs) const {
+void SurfaceContacts::loadedSurfaces(std::vector<std::pair<Index, Index>>& pairs) const {
   pairs.clear();
   for (const Pair* pair : pairs_) {
     if (pair->kind == Kind::kSphere) continue;
     if (std::any_of(pair->set.rows.begin(), pair->set.rows.end(),
                     [](const ContactRow& row) { return !row.impulse.isZero(0.0); }))
-      pairs.push_back({std::min(pair->a, pair->b), std::max(pair->a, pair->b)});
+      pairs.push_back(std::minmax(pair->a, pair->b));
   }
-  const auto less = [](const LoadedSurfaces& x, const LoadedSurfaces& y) {
-    return std::tie(x.a, x.b) < std::tie(y.a, y.b);
-  };
-  std::sort(pairs.begin(), pairs.end(), less);
-  pairs.erase(std::unique(pairs.begin(), pairs.end(),
-                          [](const LoadedSurfaces& x, const LoadedSurfaces& y) { return x.a == y.a && x.b == y.b; }),
-              pairs.end());
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
 }
 
 void SurfaceContacts::points(const std::vector<Collider>& colliders, std::vector<Point>& points) const {
@@ -459,12 +422,6 @@ void SurfaceContacts::points(const std::vector<Collider>& colliders, std::vector
       if (share > 0.5) points.push_back({at, side * row.normal, force});
     }
   }
-}
-
-std::size_t SurfaceContacts::rows() const {
-  std::size_t sum = 0;
-  for (const Pair* pair : pairs_) sum += pair->set.rows.size();
-  return sum;
 }
 
 SurfaceMemory SurfaceContacts::memory() const {
@@ -506,17 +463,16 @@ void SurfaceContacts::forget(std::uint64_t key) {
 std::size_t SurfaceContacts::bytes() const {
   constexpr std::size_t kNode = 48;  // of a map, with what the allocator keeps of it
   std::size_t sum = broad_phase_.bytes() +
-                    bytesOf(boxes_, active_, needed_, moved_, numbers_, ways_of_, pairs_, spare_) +
+                    bytesOf(boxes_, active_, needed_, moved_, numbers_, gone_, bent_, ahead_, pairs_) +
                     bytesOf(frames_, frame_of_, reached_, now_, before_, first_slots_, solver_bodies_) +
-                    bytesOf(islands_, spare_islands_, island_of_, island_held_) + joined_.bytes();
+                    bytesOf(islands_, spare_islands_, island_of_) + joined_.bytes();
   for (const SurfaceFrame& frame : frames_) sum += frame.bytes();
-  for (const auto& scratch : spare_) sum += sizeof *scratch + scratch->search.bytes() + bytesOf(scratch->old);
   for (const auto& [name, pair] : known_)
     sum += kNode + sizeof name + sizeof(Pair) + bytesOf(pair->set.rows, pair->set.entries, pair->sides);
-  for (const auto& [key, way] : ways_) sum += kNode + sizeof way + bytesOf(way.last, way.offsets);
+  for (const auto& [key, way] : ways_) sum += kNode + sizeof way + bytesOf(way.last);
   for (const SolverBody& body : solver_bodies_) sum += bytesOf(body.motions);
   for (const std::vector<Island>* islands : {&islands_, &spare_islands_})
-    for (const Island& island : *islands) sum += bytesOf(island.bodies, island.free, island.rows);
+    for (const Island& island : *islands) sum += bytesOf(island.bodies, island.rows);
   return sum;
 }
 

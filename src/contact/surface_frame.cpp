@@ -20,10 +20,6 @@ bool isRidge(const ContactSurface& surface, const SurfaceFrame& frame, const Con
   return height < 0.0;
 }
 
-}  // namespace
-
-namespace {
-
 void placeNormals(const ContactSurface& surface, SurfaceFrame& frame) {
   frame.face_normals.resize(surface.triangles.size());
   frame.vertex_normals.assign(frame.vertices.size(), Vec3::Zero());

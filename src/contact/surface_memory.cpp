@@ -39,12 +39,6 @@ std::string SurfaceMemory::fault(const std::map<std::uint64_t, Known>& colliders
     if (a == colliders.end() || (!alone && b == colliders.end())) continue;
     if (const std::string fault = faultOf(pair, a->second, alone ? Known() : b->second); !fault.empty()) return fault;
   }
-  for (const KeptWay& way : ways) {
-    const auto known = colliders.find(way.key);
-    if (known == colliders.end()) continue;
-    if (!way.offsets.empty() && way.offsets.size() != known->second.vertices)
-      return "contact knows the places of vertices that are not there";
-  }
   return {};
 }
 

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <utility>
 
-#include "cell_table.h"
+#include "meshless_surgery/contact/broad_phase.h"
+
 #include "penetration_depth.h"
 
 namespace meshless {
@@ -12,174 +13,89 @@ namespace {
 
 constexpr double kFlat = 1e-10;    // a tetrahedron whose volume is below this times its cubed size holds nothing
 constexpr double kOnFace = 1e-10;  // barycentric slack, so that no particle is lost between two tetrahedra
-constexpr std::int64_t kMaxCellsOfTetrahedron = 512;
 
-bool canContain(const ContactBody& body) { return body.mesh && !body.mesh->tetrahedra.empty(); }
-
-Box intersection(const Box& a, const Box& b) { return {a.min.cwiseMax(b.min), a.max.cwiseMin(b.max)}; }
-
-/// Pairs with overlapping bounds, swept along x: {lower, higher} body, sorted.
-std::vector<std::array<Index, 2>> overlappingPairs(const std::vector<ContactBody>& bodies) {
-  std::vector<Index> order;
-  for (Index k = 0; k < bodies.size(); ++k)
-    if (!bodies[k].bounds.empty() && bodies[k].positions) order.push_back(k);  // bounds with NaN are empty
-  std::sort(order.begin(), order.end(), [&](Index a, Index b) {
-    const double x = bodies[a].bounds.min.x(), y = bodies[b].bounds.min.x();
-    return x != y ? x < y : a < b;
-  });
-  std::vector<std::array<Index, 2>> pairs;
-  for (std::size_t i = 0; i < order.size(); ++i)
-    for (std::size_t j = i + 1; j < order.size(); ++j) {
-      const Box &first = bodies[order[i]].bounds, &second = bodies[order[j]].bounds;
-      if (second.min.x() > first.max.x()) break;
-      if (first.overlaps(second)) pairs.push_back({std::min(order[i], order[j]), std::max(order[i], order[j])});
-    }
-  std::sort(pairs.begin(), pairs.end());
-  return pairs;
-}
-
-struct HashedParticle {
-  Index body, particle;
-};
-
-/// The tetrahedra of bodies that have a partner, against the particles that lie in the bounds of a partner.
-class ParticleSearch {
+/// The tetrahedra of a body, for the particles of others that may be inside.
+class Container {
  public:
-  ParticleSearch(const std::vector<ContactBody>& bodies, const std::vector<std::array<Index, 2>>& pairs,
-                 ContactCounters& counters)
-      : bodies_(bodies), counters_(counters), partners_(bodies.size()) {
-    visitors_.resize(bodies.size());
-    for (const auto& pair : pairs) {
-      for (int side = 0; side < 2; ++side) {
-        if (!canContain(bodies[pair[side]])) continue;
-        partners_[pair[1 - side]].push_back(pair[side]);
-        visitors_[pair[side]].push_back(pair[1 - side]);
-      }
+  Container(const std::vector<ContactBody>& bodies, Index b) : bodies_(bodies), b_(b) {
+    const Points& x = *bodies[b].positions;
+    Points centres;
+    for (const Tetrahedron& t : bodies[b].mesh->tetrahedra) {
+      FloatBox& box = boxes_.items.emplace_back();
+      Box bounds;
+      for (const Index corner : t) bounds.extend(x[corner]);
+      const bool finite =
+          std::all_of(t.begin(), t.end(), [&](Index corner) { return x[corner].allFinite(); }) && canHold(t, bounds);
+      centres.push_back(finite ? Vec3(0.5 * (bounds.min + bounds.max)) : Vec3(Vec3::Zero()));
+      if (!finite) continue;
+      box.extend(bounds.min);
+      box.extend(bounds.max);
     }
-    is_visitor_.assign(bodies.size(), false);
-    collectParticles();
-    if (particles_.empty()) return;
-    const double edge = meanEdge();
-    if (!(edge > 0.0) || !std::isfinite(edge)) return;
-    static thread_local CellTable table;
-    table.start(region_, edge, particles_.size());
-    for (Index k = 0; k < particles_.size(); ++k) table.insert(table.cellOf(at(particles_[k])), k);
-    counters_.hashed += particles_.size();
-    for (Index b = 0; b < bodies_.size(); ++b)
-      if (!visitors_[b].empty()) searchBody(b, table);
+    tree_.build(centres);
+    tree_.refit(boxes_);
   }
 
-  std::vector<Penetration> takeFound() {
-    // A particle may lie on a face between two tetrahedra, or in a fold: it keeps the first.
-    std::sort(found_.begin(), found_.end(), [](const Penetration& p, const Penetration& q) {
-      return std::array<Index, 4>{p.body_a, p.body_b, p.particle, p.tetrahedron} <
-             std::array<Index, 4>{q.body_a, q.body_b, q.particle, q.tetrahedron};
-    });
-    found_.erase(std::unique(found_.begin(), found_.end(),
-                             [](const Penetration& p, const Penetration& q) {
-                               return p.body_a == q.body_a && p.body_b == q.body_b && p.particle == q.particle;
-                             }),
-                 found_.end());
-    return std::move(found_);
+  /// Appends the particles of a that are inside. One may lie on a face between two tetrahedra, or in a fold: it has the
+  /// first.
+  void find(Index a, std::size_t& tested, std::vector<Penetration>& found) {
+    const Points& positions = *bodies_[a].positions;
+    for (Index k = 0; k < positions.size(); ++k) {
+      const Vec3& p = positions[k];
+      if (!bodies_[a].bounds.contains(p) || !bodies_[b_].bounds.contains(p)) continue;
+      FloatBox box;
+      box.extend(p);
+      Penetration inside;
+      inside.tetrahedron = kNoIndex;
+      tree_.query(boxes_, box, [&](Index t) {
+        ++tested;
+        if (t < inside.tetrahedron && holds(t, p, inside.weights)) inside.tetrahedron = t;
+      });
+      if (inside.tetrahedron == kNoIndex) continue;
+      inside.body_a = a;
+      inside.particle = k;
+      inside.body_b = b_;
+      found.push_back(inside);
+    }
   }
 
  private:
-  const Vec3& at(const HashedParticle& p) const { return (*bodies_[p.body].positions)[p.particle]; }
-
-  void collectParticles() {
-    for (Index a = 0; a < bodies_.size(); ++a) {
-      if (partners_[a].empty()) continue;
-      std::vector<Box> overlaps;
-      for (Index b : partners_[a]) overlaps.push_back(intersection(bodies_[a].bounds, bodies_[b].bounds));
-      const Points& positions = *bodies_[a].positions;
-      for (Index k = 0; k < positions.size(); ++k) {
-        const Vec3& p = positions[k];
-        if (std::none_of(overlaps.begin(), overlaps.end(), [&](const Box& box) { return box.contains(p); })) continue;
-        particles_.push_back({a, k});
-        region_.extend(p);
-      }
-    }
+  Mat3 edgesOf(const Tetrahedron& t) const {
+    const Points& x = *bodies_[b_].positions;
+    Mat3 edges;
+    for (int k = 0; k < 3; ++k) edges.col(k) = x[t[k + 1]] - x[t[0]];
+    return edges;
   }
 
-  /// Mean edge [m] of the tetrahedra that may contain something: the best cell size by Teschner et al.
-  double meanEdge() const {
-    double sum = 0.0;
-    std::size_t count = 0;
-    for (Index b = 0; b < bodies_.size(); ++b) {
-      if (visitors_[b].empty()) continue;
-      for (const Tetrahedron& t : bodies_[b].mesh->tetrahedra) {
-        const Points& x = *bodies_[b].positions;
-        const double length = (x[t[0]] - x[t[1]]).norm() + (x[t[2]] - x[t[3]]).norm();
-        if (!std::isfinite(length)) continue;
-        sum += length;
-        count += 2;
-      }
-    }
-    return count ? sum / static_cast<double>(count) : 0.0;
+  bool canHold(const Tetrahedron& t, const Box& bounds) const {
+    const double size = bounds.diagonal();
+    return std::abs(edgesOf(t).determinant()) > kFlat * size * size * size;
   }
 
-  void searchBody(Index b, const CellTable& table) {
-    const std::vector<Tetrahedron>& tetrahedra = bodies_[b].mesh->tetrahedra;
-    const Points& x = *bodies_[b].positions;
-    for (Index a : visitors_[b]) is_visitor_[a] = true;
-    const Box reach = intersection(region_, bodies_[b].bounds);
-    for (Index t = 0; t < tetrahedra.size(); ++t) {
-      Box box;
-      bool finite = true;
-      for (Index corner : tetrahedra[t]) {
-        finite = finite && x[corner].allFinite();
-        box.extend(x[corner]);
-      }
-      if (!finite || !box.overlaps(reach)) continue;
-      const double size = box.diagonal();
-      Mat3 edges;
-      for (int k = 0; k < 3; ++k) edges.col(k) = x[tetrahedra[t][k + 1]] - x[tetrahedra[t][0]];
-      if (!(std::abs(edges.determinant()) > kFlat * size * size * size)) continue;
-      const Mat3 inverse = edges.inverse();
-      const auto test = [&](Index k) {
-        const HashedParticle& particle = particles_[k];
-        if (!is_visitor_[particle.body] || !box.contains(at(particle))) return;
-        ++counters_.tested;
-        testParticle(particle, b, t, inverse);
-      };
-      const CellRange range = table.cellsOf(box);
-      // A tetrahedron torn out of all measure covers any number of cells: the particles are fewer.
-      if (range.count() > kMaxCellsOfTetrahedron)
-        for (Index k = 0; k < particles_.size(); ++k) test(k);
-      else
-        table.forEach(range, test);
-    }
-    for (Index a : visitors_[b]) is_visitor_[a] = false;
-  }
-
-  void testParticle(const HashedParticle& particle, Index b, Index t, const Mat3& inverse) {
-    const Tetrahedron& corners = bodies_[b].mesh->tetrahedra[t];
-    const Vec3 w = inverse * (at(particle) - (*bodies_[b].positions)[corners[0]]);
-    const std::array<double, 4> weights{1.0 - w.sum(), w[0], w[1], w[2]};
-    for (double weight : weights)
-      if (!(weight >= -kOnFace)) return;
-    if (*std::min_element(weights.begin(), weights.end()) <= kOnFace && liesOnBoundary(b, corners, weights)) return;
-    Penetration found;
-    found.body_a = particle.body;
-    found.particle = particle.particle;
-    found.body_b = b;
-    found.tetrahedron = t;
-    found.weights = weights;
-    found_.push_back(found);
+  /// Writes weights where it is.
+  bool holds(Index t, const Vec3& p, std::array<double, 4>& weights) {
+    const Tetrahedron& corners = bodies_[b_].mesh->tetrahedra[t];
+    Box box;
+    for (const Index corner : corners) box.extend((*bodies_[b_].positions)[corner]);
+    if (!box.contains(p)) return false;
+    const Vec3 w = edgesOf(corners).inverse() * (p - (*bodies_[b_].positions)[corners[0]]);
+    const std::array<double, 4> all{1.0 - w.sum(), w[0], w[1], w[2]};
+    for (const double weight : all)
+      if (!(weight >= -kOnFace)) return false;
+    if (*std::min_element(all.begin(), all.end()) <= kOnFace && liesOnBoundary(corners, all)) return false;
+    weights = all;
+    return true;
   }
 
   /// True where the face, edge or vertex of the tetrahedron that the weights name is one of the boundary: the particle
   /// touches the body and is not inside.
-  bool liesOnBoundary(Index b, const Tetrahedron& corners, const std::array<double, 4>& weights) {
+  bool liesOnBoundary(const Tetrahedron& corners, const std::array<double, 4>& weights) {
     Triangle simplex{kNoIndex, kNoIndex, kNoIndex};
     int size = 0;
     for (int k = 0; k < 4 && size < 3; ++k)
       if (weights[k] > kOnFace) simplex[size++] = corners[k];
     std::sort(simplex.begin(), simplex.end());
-    if (boundary_body_ != b) {
-      boundary_body_ = b;
-      boundary_.clear();
-      for (Triangle face : bodies_[b].mesh->faces) {
+    if (boundary_.empty()) {
+      for (Triangle face : bodies_[b_].mesh->faces) {
         std::sort(face.begin(), face.end());
         boundary_.push_back(face);
         for (int k = 0; k < 3; ++k) {
@@ -193,24 +109,30 @@ class ParticleSearch {
   }
 
   const std::vector<ContactBody>& bodies_;
-  ContactCounters& counters_;
-  std::vector<std::vector<Index>> partners_;  // bodies that may contain this one's particles
-  std::vector<std::vector<Index>> visitors_;  // bodies whose particles this one may contain
-  std::vector<bool> is_visitor_;              // of the body that is searched
-  std::vector<HashedParticle> particles_;
-  Box region_;  // of the hashed particles
-  Index boundary_body_ = kNoIndex;
-  std::vector<Triangle> boundary_;  // faces, edges and vertices of boundary_body_, sorted; unused slots kNoIndex
-  std::vector<Penetration> found_;
+  const Index b_;
+  BoxTree tree_;
+  TreeBoxes boxes_;
+  std::vector<Triangle> boundary_;  // its faces, edges and vertices, sorted; unused slots kNoIndex. Made when needed
 };
 
 }  // namespace
 
 std::vector<Penetration> findPenetrations(const std::vector<ContactBody>& bodies, ContactCounters& counters) {
-  const std::vector<std::array<Index, 2>> pairs = overlappingPairs(bodies);
-  counters.pairs += pairs.size();
-  if (pairs.empty()) return {};
-  std::vector<Penetration> found = ParticleSearch(bodies, pairs, counters).takeFound();
+  std::vector<Box> boxes;
+  for (const ContactBody& body : bodies) boxes.push_back(body.positions ? body.bounds : Box());
+  BroadPhase broad;
+  std::vector<std::vector<Index>> visitors(bodies.size());  // bodies whose particles one may contain, ascending
+  for (const auto& [a, b] : broad.find(boxes, std::vector<char>(bodies.size(), 1))) {
+    ++counters.pairs;
+    for (const auto& [visitor, of] : {std::pair(a, b), std::pair(b, a)})
+      if (bodies[of].mesh && !bodies[of].mesh->tetrahedra.empty()) visitors[of].push_back(visitor);
+  }
+  std::vector<Penetration> found;
+  for (Index b = 0; b < bodies.size(); ++b) {
+    if (visitors[b].empty()) continue;
+    Container container(bodies, b);
+    for (const Index a : visitors[b]) container.find(a, counters.tested, found);
+  }
   counters.penetrating += found.size();
   for (std::size_t first = 0; first < found.size();) {
     std::size_t last = first + 1;
@@ -243,8 +165,7 @@ void addRow(const Penetration& penetration, const std::vector<ContactBody>& bodi
     sum -= penetration.weights[k] * (*b.positions)[corners[k]];
   }
   row.end = static_cast<Index>(set.entries.size());
-  row.gap = -penetration.depth;
-  row.constant = row.gap - row.normal.dot(sum);
+  row.constant = -penetration.depth - row.normal.dot(sum);
   set.rows.push_back(row);
 }
 

@@ -6,6 +6,7 @@
 #include "elastic_batch_sets.h"
 #include "elastic_law.h"
 #include "meshless_surgery/base/bytes.h"
+#include "meshless_surgery/base/compressed_rows.h"
 
 namespace meshless {
 namespace {
@@ -142,17 +143,11 @@ void ElasticBatch::findForces(std::size_t particles, const std::function<Index(I
       if (clusters_[lane] == kNoIndex) continue;
       const std::size_t block = lane / kBlock, i = lane % kBlock;
       for (Index k = 0; k < members(clusters_[lane]); ++k)
-        visit(particles_[(block * kCorners + k) * kBlock + i], (block * kCorners + k) * 3 * kBlock + i);
+        visit(particles_[(block * kCorners + k) * kBlock + i],
+              static_cast<Index>((block * kCorners + k) * 3 * kBlock + i));
     }
   };
-  force_offsets_.assign(particles + 1, 0);
-  forEachPlace([&](std::uint32_t particle, std::size_t) { ++force_offsets_[particle + 1]; });
-  for (std::size_t i = 0; i < particles; ++i) force_offsets_[i + 1] += force_offsets_[i];
-  force_places_.resize(force_offsets_.back());
-  std::vector<std::uint32_t> next(force_offsets_.begin(), force_offsets_.end() - 1);
-  forEachPlace([&](std::uint32_t particle, std::size_t place) {
-    force_places_[next[particle]++] = static_cast<std::uint32_t>(place);
-  });
+  compressRows(particles, forEachPlace, force_offsets_, force_places_);
   for (double m : masses) inverse_masses_.push_back(1.0 / m);
 }
 

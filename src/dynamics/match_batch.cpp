@@ -161,19 +161,6 @@ struct BodyBatch::Impl {
     }
   }
 
-  void set(std::size_t body, const Points& positions, const Points& velocities, const Quat& rotation) {
-    Vec3 centre = Vec3::Zero();
-    for (std::size_t i = 0; i < particles; ++i) centre += double(field(body, i, kMass)) * (positions[i] - positions[0]);
-    origins[body] = positions[0] + centre;
-    for (std::size_t i = 0; i < particles; ++i)
-      for (int k = 0; k < 3; ++k) {
-        field(body, i, kX + k) = static_cast<float>(positions[i][k] - origins[body][k]);
-        field(body, i, kVx + k) = static_cast<float>(velocities[i][k]);
-      }
-    for (int k = 0; k < 4; ++k) quaternions[k * padded + body] = static_cast<float>(rotation.coeffs()[k]);
-    findMotion(body);
-  }
-
   // The first particle is origin enough: the body is around it.
   void load(std::size_t body, const BatchBody& from) {
     const Vec3 origin = from.positions[0];
@@ -199,36 +186,6 @@ struct BodyBatch::Impl {
     for (int k = 0; k < 4; ++k) rotation.coeffs()[k] = quaternions[k * padded + body];
     *to.rotation = rotation.normalized();
   }
-
-  // As every step leaves it for the next.
-  void findMotion(std::size_t body) {
-    const auto at = [&](std::size_t i, int f) {
-      return Vec3(field(body, i, f), field(body, i, f + 1), field(body, i, f + 2));
-    };
-    Vec3 centre = Vec3::Zero(), velocity = Vec3::Zero(), momentum = Vec3::Zero();
-    Mat3 moment = Mat3::Zero();
-    double total = 0.0;  // 1 but for rounding
-    for (std::size_t i = 0; i < particles; ++i) {
-      const double m = field(body, i, kMass);
-      total += m, centre += m * at(i, kX), velocity += m * at(i, kVx);
-    }
-    centre /= total, velocity /= total;
-    for (std::size_t i = 0; i < particles; ++i) {
-      const double m = field(body, i, kMass);
-      const Vec3 r = at(i, kX) - centre;
-      moment += m * r * r.transpose();
-      momentum += m * r.cross(at(i, kVx) - velocity);
-    }
-    const double trace = 2.0 * moment.trace();
-    Mat3 inverse = Mat3::Zero();
-    if (trace > 0.0) inverse = inverseWithoutNull(0.5 * Mat3::Identity() - moment / trace) / trace;
-    const Vec3 spin = inverse * momentum;
-    float* const to = &motion[body / kBlock * kMotionFields * kBlock + body % kBlock];
-    const double numbers[kMotionFields] = {centre[0],     centre[1],     centre[2],     velocity[0],   velocity[1],
-                                           velocity[2],   spin[0],       spin[1],       spin[2],       inverse(0, 0),
-                                           inverse(1, 1), inverse(2, 2), inverse(0, 1), inverse(1, 2), inverse(2, 0)};
-    for (int k = 0; k < kMotionFields; ++k) to[k * kBlock] = static_cast<float>(numbers[k]);
-  }
 };
 
 bool BodyBatch::holds(const MatchInput& body) {
@@ -253,59 +210,31 @@ BodyBatch::BodyBatch(const std::vector<MatchInput>& bodies, bool quadratic) : im
   b.quaternions.assign(4 * b.padded, 0.0f);
   b.flags.assign(b.padded, 0);
   b.origins.assign(b.padded, Vec3::Zero());
-  const Points still(b.particles, Vec3::Zero());
   for (std::size_t i = 0; i < b.padded; ++i) {  // the first body stands in for those that are none
     const MatchInput& in = bodies[i < b.size ? i : 0];
     assert(holds(in) && in.rest.size() == b.particles);
     b.prepare(i, in);
-    b.set(i, in.rest, still, Quat::Identity());
   }
 }
 
 BodyBatch::~BodyBatch() = default;
 BodyBatch::BodyBatch(BodyBatch&&) noexcept = default;
 BodyBatch& BodyBatch::operator=(BodyBatch&&) noexcept = default;
-std::size_t BodyBatch::size() const { return impl_->size; }
 std::size_t BodyBatch::bytes() const {
   const Impl& w = *impl_;
   return sizeof w + bytesOf(w.fields, w.constants, w.motion, w.quadratic, w.quaternions, w.flags, w.origins);
 }
-std::size_t BodyBatch::particles() const { return impl_->particles; }
 
 void BodyBatch::refit(std::size_t body, const MatchInput& in) {
   assert(holds(in) && in.rest.size() == impl_->particles);
   impl_->prepare(body, in);
 }
 
-void BodyBatch::setState(std::size_t body, const Points& positions, const Points& velocities, const Quat& rotation) {
-  impl_->set(body, positions, velocities, rotation);
-}
-
-void BodyBatch::getState(std::size_t body, Points& positions, Points& velocities, Quat& rotation) const {
+void BodyBatch::step(const std::vector<BatchBody>& states, const BatchStep& step, MatchCounters& counters,
+                     const ForEach& for_each) {
   Impl& b = *impl_;
-  positions.resize(b.particles);
-  velocities.resize(b.particles);
-  for (std::size_t i = 0; i < b.particles; ++i)
-    for (int k = 0; k < 3; ++k) {
-      positions[i][k] = b.origins[body][k] + b.field(body, i, kX + k);
-      velocities[i][k] = b.field(body, i, kVx + k);
-    }
-  for (int k = 0; k < 4; ++k) rotation.coeffs()[k] = b.quaternions[k * b.padded + body];
-}
-
-void BodyBatch::step(const BatchStep& step, MatchCounters& counters, const ForEach& for_each) {
-  stepChunks(step, nullptr, impl_->size, counters, for_each);
-}
-
-void BodyBatch::stepInPlace(const std::vector<BatchBody>& bodies, const BatchStep& step, MatchCounters& counters,
-                            const ForEach& for_each) {
-  assert(bodies.size() <= impl_->size);
-  stepChunks(step, bodies.data(), bodies.size(), counters, for_each);
-}
-
-void BodyBatch::stepChunks(const BatchStep& step, const BatchBody* in_place, std::size_t count, MatchCounters& counters,
-                           const ForEach& for_each) {
-  Impl& b = *impl_;
+  const std::size_t count = states.size();
+  assert(count <= b.size);
   if (count == 0) return;
   const std::size_t padded = (count + kBlock - 1) / kBlock * kBlock;
   assert(step.mode != MatchMode::kQuadratic || b.has_quadratic);
@@ -323,13 +252,8 @@ void BodyBatch::stepChunks(const BatchStep& step, const BatchBody* in_place, std
     BodiesScratch scratch;
     const std::size_t first = chunk * kChunk, size = std::min<std::size_t>(kChunk, padded - first);
     const int first_block = static_cast<int>(first / kBlock), blocks = static_cast<int>(size / kBlock);
-    if (in_place) {
-      bool any = false;
-      for (std::size_t i = first; i < std::min(first + size, count); ++i) any = any || in_place[i].moves;
-      if (!any) return;
-      for (std::size_t i = 0; i < size; ++i) b.load(first + i, in_place[std::min(first + i, count - 1)]);
-      entries.measureBodies(view, first_block, blocks);
-    }
+    for (std::size_t i = 0; i < size; ++i) b.load(first + i, states[std::min(first + i, count - 1)]);
+    entries.measureBodies(view, first_block, blocks);
     entries.gatherBodies(view, numbers, first_block, blocks, scratch);
     RotationBatch<float> rotations;
     rotations.count = size;
@@ -344,22 +268,11 @@ void BodyBatch::stepChunks(const BatchStep& step, const BatchBody* in_place, std
     entries.moveBodies(view, numbers, first_block, blocks, scratch);
     for (int k = 0; k < 3; ++k)
       for (std::size_t i = 0; i < size; ++i) b.origins[first + i][k] += scratch.shift[k][i];
-    if (in_place)
-      for (std::size_t i = first; i < std::min(first + size, count); ++i)
-        if (in_place[i].moves) b.store(i, in_place[i]);
+    for (std::size_t i = first; i < std::min(first + size, count); ++i) b.store(i, states[i]);
   });
-  if (!in_place) {
-    match_sets::count(b.flags.data(), b.size, counters);
-    if (numbers.beta > 0.0f) counters.linear_fits += b.size;
-    if (numbers.quadratic) counters.quadratic_moments += b.size;
-    return;
-  }
-  for (std::size_t i = 0; i < count; ++i)
-    if (in_place[i].moves) {
-      match_sets::count(&b.flags[i], 1, counters);
-      counters.linear_fits += numbers.beta > 0.0f;
-      counters.quadratic_moments += numbers.quadratic;
-    }
+  match_sets::count(b.flags.data(), count, counters);
+  if (numbers.beta > 0.0f) counters.linear_fits += count;
+  if (numbers.quadratic) counters.quadratic_moments += count;
 }
 
 }  // namespace meshless

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "meshless_surgery/base/compressed_rows.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/union_find.h"
 
@@ -30,14 +31,11 @@ Points cornerPlaces(const CellLattice& lattice) {
 
 CornerUses cornerUses(const CellLattice& lattice) {
   CornerUses uses;
-  uses.offsets.assign(lattice.corners + 1, 0);
-  for (const LatticeCell& cell : lattice.cells)
-    for (const Index corner : cell.corners) ++uses.offsets[corner + 1];
-  for (Index i = 0; i < lattice.corners; ++i) uses.offsets[i + 1] += uses.offsets[i];
-  uses.cells.resize(uses.offsets.back());
-  std::vector<Index> next(uses.offsets.begin(), uses.offsets.end() - 1);
-  for (Index c = 0; c < lattice.cells.size(); ++c)
-    for (const Index corner : lattice.cells[c].corners) uses.cells[next[corner]++] = c;
+  const auto each = [&](const auto& visit) {
+    for (Index c = 0; c < lattice.cells.size(); ++c)
+      for (const Index corner : lattice.cells[c].corners) visit(corner, c);
+  };
+  compressRows(lattice.corners, each, uses.offsets, uses.cells);
   return uses;
 }
 

@@ -11,6 +11,7 @@
 #include "cut_parts.h"
 #include "cut_pieces.h"
 #include "cut_rim.h"
+#include "edge_balance.h"
 #include "meshless_surgery/geometry/measures.h"
 
 namespace meshless {
@@ -181,18 +182,11 @@ Status checkVolumes(const Workpiece& work, const std::vector<Shell>& shells, con
 Status checkPieces(const TriangleMesh& mesh, const Box& box, const std::vector<CutPiece>& pieces) {
   double sum = 0.0, magnitude = 0.0;
   for (const CutPiece& piece : pieces) {
-    // Every directed edge adds a number that its opposite takes away again: nothing is left of a closed surface.
     std::uint64_t balance = 0;
     for (const Triangle& t : piece.mesh.triangles) {
-      for (int k = 0; k < 3; ++k) {
-        const std::uint64_t a = t[k], b = t[(k + 1) % 3];
-        std::uint64_t mixed = ((std::min(a, b) << 32) | std::max(a, b)) + 0x9e3779b97f4a7c15u;
-        mixed = (mixed ^ (mixed >> 30)) * 0xbf58476d1ce4e5b9u;
-        mixed = (mixed ^ (mixed >> 27)) * 0x94d049bb133111ebu;
-        mixed ^= mixed >> 31;
-        balance += a < b ? mixed : ~mixed + 1u;
-        if (a == b) return Error{ErrorCode::kUnsuitableShape, "the cut would leave a triangle without area"};
-      }
+      balance += edgeBalance(t);
+      if (namesAVertexTwice(t))
+        return Error{ErrorCode::kUnsuitableShape, "the cut would leave a triangle without area"};
     }
     if (balance != 0) return Error{ErrorCode::kUnsuitableShape, "a piece of the cut would be open"};
     const double volume = signedVolume(piece.mesh);

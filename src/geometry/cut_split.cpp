@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "cut_parts.h"
+#include "edge_balance.h"
 #include "edge_table.h"
 #include "exact.h"
 #include "meshless_surgery/geometry/measures.h"
@@ -57,18 +58,6 @@ Side sideOfCoplanar(const Workpiece& work, const Triangle& t) {
   return exact::turn(work.flat(t[0]), work.flat(t[1]), work.flat(t[2])) > 0 ? kLower : kUpper;
 }
 
-std::uint64_t scatter(Index vertex) {
-  const std::uint64_t x = (vertex + std::uint64_t{1}) * 0x9e3779b97f4a7c15u;
-  return x ^ (x >> 32);
-}
-
-/// Every directed edge a -> b counts r_a r_b (r_b - r_a) with scattered numbers r, which its opposite takes away again:
-/// nothing is left of a closed surface. A triangle's three edges together are a product.
-std::uint64_t balanceOf(const Triangle& t) {
-  const std::uint64_t a = scatter(t[0]), b = scatter(t[1]), c = scatter(t[2]);
-  return (b - a) * (c - a) * (c - b);
-}
-
 /// Sorts the mesh's triangles into untouched and touched ones. False where it is not closed and oriented.
 Status sortTriangles(Workpiece& work) {
   const TriangleMesh& mesh = *work.mesh;
@@ -78,14 +67,14 @@ Status sortTriangles(Workpiece& work) {
   Sets sets(mesh.vertices.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const Triangle triangle = mesh.triangles[t];
-    const std::uint64_t share = balanceOf(triangle);
+    const std::uint64_t share = edgeBalance(triangle);
     balance += share;
     const int state = states[triangle[0]];
     if (state == 0 || state != states[triangle[1]] || state != states[triangle[2]]) {
       work.touched.push_back(static_cast<Index>(t));
       continue;
     }
-    if (share == 0 && (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0]))
+    if (share == 0 && namesAVertexTwice(triangle))
       return Error{ErrorCode::kUnsuitableShape, "the surface has a triangle that names a vertex twice"};
     ++untouched[state > 0 ? kUpper : kLower];
     sets.unite(triangle);

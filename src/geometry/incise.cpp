@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "edge_balance.h"
 #include "incise_parts.h"
 #include "meshless_surgery/geometry/measures.h"
 
@@ -53,25 +54,17 @@ Status checkMesh(const TriangleMesh& mesh) {
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
     if (!mesh.vertices[v].allFinite())
       return Error{ErrorCode::kUnsuitableShape, "vertex " + std::to_string(v) + " of the surface is not finite"};
-  // Every directed edge adds a number that its opposite takes away again: nothing is left of a closed surface.
   std::uint64_t balance = 0;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const Triangle& triangle = mesh.triangles[t];
-    for (int k = 0; k < 3; ++k) {
-      const std::uint64_t a = triangle[k], b = triangle[(k + 1) % 3];
-      if (a >= mesh.vertices.size())
+    for (const Index v : triangle)
+      if (v >= mesh.vertices.size())
         return Error{ErrorCode::kUnsuitableShape, "triangle " + std::to_string(t) + " names vertex " +
-                                                      std::to_string(a) + " of " +
+                                                      std::to_string(v) + " of " +
                                                       std::to_string(mesh.vertices.size())};
-      if (a == b)
-        return Error{ErrorCode::kUnsuitableShape,
-                     "triangle " + std::to_string(t) + " has vertex " + std::to_string(a) + " twice"};
-      std::uint64_t mixed = ((std::min(a, b) << 32) | std::max(a, b)) + 0x9e3779b97f4a7c15u;
-      mixed = (mixed ^ (mixed >> 30)) * 0xbf58476d1ce4e5b9u;
-      mixed = (mixed ^ (mixed >> 27)) * 0x94d049bb133111ebu;
-      mixed ^= mixed >> 31;
-      balance += a < b ? mixed : ~mixed + 1u;
-    }
+    if (namesAVertexTwice(triangle))
+      return Error{ErrorCode::kUnsuitableShape, "triangle " + std::to_string(t) + " has a vertex twice"};
+    balance += edgeBalance(triangle);
   }
   if (balance != 0)
     return Error{

@@ -101,18 +101,6 @@ double graspStiffness(const BodyModel& model, const Pick& pick, double h) {
   return pick.stiffness / (1.0 + pick.stiffness * h * h * graspInverseMass(model, pick));
 }
 
-Vec3 pullGrasp(const BodyModel& model, const Pick& pick, const Vec3& end, double h, Points& positions,
-               const Vec3& given) {
-  const Vec3 stretch = end - pick.offset - graspMean(pick, positions);
-  const double stiff = pick.stiffness * h * h;
-  const Vec3 lambda = (stiff * stretch - h * h * given) / (1.0 + stiff * graspInverseMass(model, pick));
-  for (std::size_t k = 0; k < pick.patch.size(); ++k) {
-    const Index i = pick.patch[k];
-    if (!model.fixed[i]) positions[i] += lambda * (pick.weights[k] / model.masses[i]);
-  }
-  return lambda / (h * h);
-}
-
 RayHit castRay(const Points& vertices, const std::vector<Triangle>& triangles, const Vec3& origin,
                const Vec3& direction) {
   RayHit best;

@@ -12,7 +12,6 @@ struct SurfaceModel {
   ContactSurface surface;
   std::vector<double> inverse_masses;         // [1/kg] 0 where fixed
   std::unique_ptr<const RigidGroups> groups;  // its clusters, of an elastic body all of it; none where it is held
-  double reach = 0.0;                         // [m] of embedded vertices beyond the bounds of the particles, at most
   std::size_t bytes() const;                  // without the model
 };
 

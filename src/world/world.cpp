@@ -330,11 +330,6 @@ void World::hideScissors() {
   impl_->recordScissors();
 }
 
-PickId World::pickInHand() const {
-  const auto held = heldPick();
-  return held ? held->id : 0;
-}
-
 std::optional<Pick> World::heldPick() const {
   for (auto it = impl_->picks.rbegin(); it != impl_->picks.rend(); ++it)
     if (!it->locked) return *it;

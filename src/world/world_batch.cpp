@@ -107,9 +107,9 @@ void BatchLanes::step(const std::vector<WorldBody*>& some, const BatchStep& step
         batch.refit(i, matchInput(*body.model, body.state));
       }
       body.scratch.previous = body.state.positions;
-      states[i] = {body.state.positions.data(), body.state.velocities.data(), &body.state.poses[0].rotation, true};
+      states[i] = {body.state.positions.data(), body.state.velocities.data(), &body.state.poses[0].rotation};
     }
-    batch.stepInPlace(states, step, counters);
+    batch.step(states, step, counters);
   }
 }
 

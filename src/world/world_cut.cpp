@@ -262,9 +262,9 @@ void World::Impl::followPieces(const BodyId& parent, const Points& before, const
         return it == piece.parent_particles.end() ? kNoIndex : static_cast<Index>(it - piece.parent_particles.begin());
       };
       const Index centre = find_particle(pick.particle);
-      // What is left of the patch, and what its weights were.
-      std::vector<Index> patch;
-      std::vector<double> weights, lost;
+      if (centre == kNoIndex) continue;
+      std::vector<Index> patch;  // what is left of it
+      std::vector<double> weights;
       double total = 0.0;
       for (std::size_t k = 0; k < pick.patch.size(); ++k) {
         const Index now = find_particle(pick.patch[k]);
@@ -274,15 +274,7 @@ void World::Impl::followPieces(const BodyId& parent, const Points& before, const
         total += pick.weights[k];
       }
       if (patch.empty()) continue;
-      lost = weights;
-      if (centre != kNoIndex) {
-        for (std::size_t k = 0; k < weights.size(); ++k) {
-          weights[k] /= total;
-          lost[k] -= weights[k];
-        }
-      }
-      easePull(*find(piece.child), patch, lost, pick.force, centre != kNoIndex);
-      if (centre == kNoIndex) continue;
+      for (double& weight : weights) weight /= total;
       followed.body = piece.child;
       followed.particle = centre;
       followed.patch = std::move(patch);
@@ -310,27 +302,6 @@ void World::Impl::followTissue(Pick& pick, const Points& before, const Descent& 
   pick.body = child.id;
   pick.place = place;
   pick.offset = grabbed - graspMean(pick, child.state.positions);
-}
-
-// The pull goes over from the whole patch to what is left of it as what else was cut is let go; the rest of the patch
-// loses it as slowly. Of a piece that moves freely the pull as a whole ends at once.
-void World::Impl::easePull(WorldBody& body, const std::vector<Index>& patch, const std::vector<double>& lost,
-                           const Vec3& force, bool held) {
-  const BodyModel& model = *body.model;
-  Points pull(model.rest.size(), Vec3::Zero());
-  for (std::size_t k = 0; k < patch.size(); ++k)
-    if (!model.fixed[patch[k]]) pull[patch[k]] = lost[k] / model.masses[patch[k]] * force;
-  if (body.state.eased.empty()) {
-    body.state.eased.assign(model.rest.size(), Vec3::Zero());
-    body.state.eased_for = 0.0;
-    body.state.eased_whole = held || model.any_fixed;
-  }
-  if (!body.state.eased_whole) {
-    const RigidMotion whole = rigidMotionOf(model, body.state.positions, pull);
-    for (std::size_t i = 0; i < pull.size(); ++i)
-      pull[i] -= whole.velocity + whole.spin.cross(body.state.positions[i] - whole.centre);
-  }
-  for (std::size_t i = 0; i < pull.size(); ++i) body.state.eased[i] += pull[i];
 }
 
 }  // namespace meshless

@@ -193,10 +193,10 @@ struct World::Impl {
   };
   Sleepers sleepers;
   std::vector<WorldBatch> batches;
-  bool batches_current = false;  // false: bodies or materials have changed
-  std::mutex lanes_mutex;        // of the batches' spare lanes
-  std::vector<LoadedSurfaces> loaded;
-  bool contacts_current = false;  // bodies are those of the last step
+  bool batches_current = false;                 // false: bodies or materials have changed
+  std::mutex lanes_mutex;                       // of the batches' spare lanes
+  std::vector<std::pair<Index, Index>> loaded;  // in listLoaded()
+  bool contacts_current = false;                // bodies are those of the last step
   SurfaceContacts surface_contacts;
   SurfaceScene surface_scene;       // of this step
   std::vector<Collider> colliders;  // bodies in their order, then obstacles
@@ -249,8 +249,6 @@ struct World::Impl {
   std::vector<TissuePlace> picked(const BodyId& body) const;      // places of its picks, in their order
   /// Retires a body and admits its pieces in its place; their names.
   std::vector<std::string> replaceByPieces(const BodyId& parent, std::vector<BodyPiece> pieces);
-  void easePull(WorldBody& body, const std::vector<Index>& patch, const std::vector<double>& lost, const Vec3& force,
-                bool held);
   /// What becomes of a piece's particles and of places that were asked for, once the piece is a body.
   struct Descent {
     BodyId child;

@@ -70,12 +70,12 @@ void World::Impl::fallAsleep(double h_frame) {
   whole.assign(bodies.size(), 0);
   for (Index b = 0; b < bodies.size(); ++b) held[b] = bodies[b]->model->any_fixed;
   listLoaded();
-  for (const LoadedSurfaces& pair : loaded) {
-    if (pair.a >= bodies.size()) continue;
-    if (pair.b >= bodies.size())  // the ground, or an obstacle
-      held[pair.a] = 1;
+  for (const auto& [a, b] : loaded) {
+    if (a >= bodies.size()) continue;
+    if (b >= bodies.size())  // the ground, or an obstacle
+      held[a] = 1;
     else
-      joined.join(pair.a, pair.b);
+      joined.join(a, b);
   }
   for (const Pick& pick : picks)
     for (Index b = 0; b < bodies.size(); ++b)

@@ -41,12 +41,18 @@ void World::Impl::takeStep() {
   listAwake();
   groupBatches();
   clearForces();
-  const int parts = awake.empty() ? 1 : searchesOf(h_frame);
+  int parts = 1;
+  if (!awake.empty()) {
+    const Stopwatch contact(report.contact);
+    findNear(h_frame);
+    parts = searchesOf(h_frame);
+  }
   const double h = h_frame / parts;
   for (int part = 0; part < parts; ++part) {
     if (!awake.empty()) {
       {
         const Stopwatch contact(report.contact);
+        if (parts > 1) findNear(h);
         findSurfaceContacts(h);
       }
       stepSurfaces(h, parts, parts - part);

@@ -8,6 +8,7 @@
 
 #include "meshless_surgery/body/preserve.h"
 #include "meshless_surgery/dynamics/extent.h"
+#include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
 
@@ -108,7 +109,6 @@ SurfaceModel::SurfaceModel(BodyModelPtr of_model) : model(std::move(of_model)), 
     groups = std::make_unique<RigidGroups>(std::vector<Index>{0, static_cast<Index>(all.size())}, all,
                                            std::vector<double>(all.size(), 1.0), model->masses);
   }
-  reach = contactReachOf(*model);
 }
 
 std::size_t SurfaceModel::bytes() const {
@@ -167,12 +167,8 @@ void World::Impl::measureSurface(WorldBody& body) {
   if (body.measured == body.model) return;
   body.measured = body.model;
   body.surface_reach = contactReachOf(*body.model);
-  double sum = 0.0;
-  std::size_t count = 0;
   const TriangleMesh& surface = body.model->collision ? body.model->collision->mesh : body.model->surface;
-  for (const Triangle& t : surface.triangles)
-    for (int k = 0; k < 3; ++k, ++count) sum += (surface.vertices[t[k]] - surface.vertices[t[(k + 1) % 3]]).norm();
-  body.edge_length = count > 0 ? sum / static_cast<double>(count) : body.model->spacing;
+  body.edge_length = surface.triangles.empty() ? body.model->spacing : meanEdgeLength(surface);
   // A surface bends no more finely than its cells.
   if (body.model->lattice) body.edge_length = std::max(body.edge_length, body.model->spacing);
 }
@@ -230,37 +226,29 @@ void World::Impl::findTextbook(double h) {
   }
 }
 
-/// A search finds what meets on straight ways. Between two of them nobody who may meet something goes farther than
-/// kFarthest, so that who is thrown off its way is found by the next.
+/// A search finds what meets on straight ways. Between two of them nobody who may meet something, as findNear() says,
+/// goes farther than kFarthest, so that who is thrown off its way is found by the next.
 int World::Impl::searchesOf(double h_frame) {
-  const auto edges = [h_frame](const WorldBody& body, double fastest) {
-    return h_frame * std::sqrt(fastest) / body.edge_length;
-  };
-  const bool any = std::any_of(awake.begin(), awake.end(), [&](WorldBody* body) {
-    measureSurface(*body);
-    double fastest = 0.0;
-    for (const Vec3& v : body->state.velocities) fastest = std::max(fastest, v.squaredNorm());
-    return edges(*body, fastest) > kFarthest;
-  });
-  if (!any) return 1;
-  findNear(h_frame);
+  const auto edges = [h_frame](const WorldBody& body, double fastest) { return h_frame * fastest / body.edge_length; };
+  if (std::none_of(awake.begin(), awake.end(), [&](WorldBody* b) { return edges(*b, b->fastest) > kFarthest; }))
+    return 1;
   double most = kFarthest;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
-    if (surface_contacts.needed()[b] != SurfaceContacts::kNear || bodies[b]->asleep) continue;
-    const VertexSupports& supports = surfaceModel(*bodies[b]).surface.supports;
+    WorldBody& body = *bodies[b];
+    if (surface_contacts.needed()[b] != SurfaceContacts::kNear || body.asleep) continue;
+    const VertexSupports& supports = surfaceModel(body).surface.supports;
     double fastest = 0.0;
     for (Index v = 0; v + 1 < supports.offsets.size(); ++v)
-      fastest = std::max(fastest, supports.sum(v, bodies[b]->state.velocities.data()).squaredNorm());
-    most = std::max(most, edges(*bodies[b], fastest));
+      fastest = std::max(fastest, supports.sum(v, body.state.velocities.data()).squaredNorm());
+    most = std::max(most, edges(body, std::sqrt(fastest)));
   }
   return static_cast<int>(std::min(std::ceil(most / kFarthest), kMostSearches));
 }
 
-// Rows of a search. A body that is reached wakes, and then all is found again with its neighbours.
+// Rows of those that are near. A body that is reached wakes, and then all is found again with its neighbours.
 void World::Impl::findSurfaceContacts(double h) {
   SurfaceScene& scene = surface_scene;
   for (;;) {
-    findNear(h);
     for (std::size_t b = 0; b < bodies.size(); ++b) {
       if (!surface_contacts.needed()[b]) continue;
       const SurfaceModel& model = surfaceModel(*bodies[b]);
@@ -293,6 +281,7 @@ void World::Impl::findSurfaceContacts(double h) {
     }
     if (!woken) return;
     listAwake();
+    findNear(h);
   }
 }
 
@@ -473,7 +462,7 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
     member.previous.resize(member.end - member.begin);
     for (std::size_t b = member.begin; b < member.end; ++b) {
       WorldBody& body = *work.bodies[b];
-      body.scratch.lies = island.free.empty() && !island.rows.empty();
+      body.scratch.lies = island.held && !island.rows.empty();
       if (body.batch != kNoIndex && fitsFloat(body, h))
         work.side_by_side[body.batch].push_back(&body);
       else

@@ -16,8 +16,8 @@ void World::Impl::findWound() {
   listLoaded();
   for (WorldBody* body : wound) {
     const auto is = [&](Index b) { return b < bodies.size() && bodies[b].get() == body; };
-    const bool touched = std::any_of(loaded.begin(), loaded.end(), [&](const LoadedSurfaces& pair) {
-      return pair.a != pair.b && (is(pair.a) || is(pair.b));
+    const bool touched = std::any_of(loaded.begin(), loaded.end(), [&](const auto& pair) {
+      return pair.first != pair.second && (is(pair.first) || is(pair.second));
     });
     const bool picked = std::any_of(picks.begin(), picks.end(), [&](const Pick& p) { return p.body == body->id; });
     const bool free = !touched && !picked && !body->touched_by_push;

@@ -36,11 +36,9 @@ PairSearch between(const Placed& a, const Placed& b) {
 
 std::vector<FeaturePair> vertexFace(const PairSearch& search, std::vector<RememberedSide>* sides = nullptr) {
   SearchScratch scratch;
-  findVerticesNear(search, scratch);
   findVertexFace(search, scratch);
-  const FoundFeatures& found = scratch.found;
-  if (sides) *sides = found.sides;
-  return found.pairs;
+  if (sides) *sides = scratch.sides;
+  return scratch.pairs;
 }
 
 TEST(FeaturePairs, AVertexAboveAFaceMeetsItWithTheGapBetweenThem) {
@@ -72,9 +70,8 @@ TEST(FeaturePairs, PartingAndSlidingAreNoApproach) {
     const Placed high(boxMesh(Vec3(0.4, 0.4, 0.4), 8, 8, 8), Vec3(0.013, 0.009, 0.76), velocity);
     const PairSearch search = between(high, low);
     SearchScratch scratch;
-    findVerticesNear(search, scratch);
     findVertexFace(search, scratch);
-    return scratch.found.pairs.size();
+    return scratch.pairs.size();
   };
   const auto still = foundOf(Vec3::Zero());
   EXPECT_EQ(foundOf(Vec3(0, 0, 10)), still);
@@ -108,11 +105,10 @@ TEST(FeaturePairs, WhatTouchesInsideOutIsHeldOnTheSideWhereItWas) {
     search.remembered = known.data();
     search.remembered_count = known.size();
     SearchScratch scratch;
-    findVerticesNear(search, scratch);
     findVertexFace(search, scratch);
-    now = scratch.found.sides;
+    now = scratch.sides;
     std::size_t above = 0;
-    for (const FeaturePair& pair : scratch.found.pairs) above += pair.normal.z() > 0.999;
+    for (const FeaturePair& pair : scratch.pairs) above += pair.normal.z() > 0.999;
     return above;
   };
   std::vector<RememberedSide> sides, later;

@@ -29,13 +29,10 @@ ContactMesh meshOf(std::vector<Tetrahedron> tetrahedra) {
 struct Body {
   ContactMesh mesh;
   Points positions;
-  std::vector<double> inverse_masses;
-
-  void finish(double mass) { inverse_masses.assign(positions.size(), 1.0 / mass); }
 };
 
 /// A lattice of n^3 cells, each of Kuhn's six tetrahedra, centred at the origin.
-Body lattice(const Vec3& size, int n, double mass = 1.0) {
+Body lattice(const Vec3& size, int n) {
   Body body;
   const auto at = [&](int i, int j, int k) { return static_cast<Index>((i * (n + 1) + j) * (n + 1) + k); };
   for (int i = 0; i <= n; ++i)
@@ -57,12 +54,11 @@ Body lattice(const Vec3& size, int n, double mass = 1.0) {
           tetrahedra.push_back(t);
         }
   body.mesh = meshOf(std::move(tetrahedra));
-  body.finish(mass);
   return body;
 }
 
 /// A ball of random points inside and an icosphere around them.
-Body ball(double radius, int inner, unsigned seed, double mass = 1.0) {
+Body ball(double radius, int inner, unsigned seed) {
   Body body;
   body.positions = sphereMesh(radius, 0.5 * radius).vertices;
   std::mt19937 random(seed);
@@ -74,7 +70,6 @@ Body ball(double radius, int inner, unsigned seed, double mass = 1.0) {
     --inner;
   }
   body.mesh = meshOf(tetrahedralizeHull(body.positions));
-  body.finish(mass);
   return body;
 }
 
@@ -88,7 +83,6 @@ std::vector<ContactBody> views(std::vector<Body>& bodies) {
     ContactBody view;
     view.mesh = &body.mesh;
     view.positions = &body.positions;
-    view.inverse_masses = &body.inverse_masses;
     view.bounds = boundsOf(body.positions);
     all.push_back(view);
   }
@@ -110,9 +104,8 @@ bool sane(const std::vector<Penetration>& found) {
 }
 
 /// A small cube of edge 0.06 above a wide slab with its top at z = 0, sunk into it by `depth`.
-std::vector<Body> sunkCube(double depth, int cells, double mass_ratio = 1.0, int slab_cells = 2) {
-  std::vector<Body> bodies{lattice(Vec3(0.06, 0.06, 0.06), cells, 0.01),
-                           lattice(Vec3(0.2, 0.2, 0.1), slab_cells, 0.01 * mass_ratio)};
+std::vector<Body> sunkCube(double depth, int cells, int slab_cells = 2) {
+  std::vector<Body> bodies{lattice(Vec3(0.06, 0.06, 0.06), cells), lattice(Vec3(0.2, 0.2, 0.1), slab_cells)};
   move(bodies[0], {Quat::Identity(), Vec3(0.013, 0.017, 0.03 - depth)});
   move(bodies[1], {Quat::Identity(), Vec3(0, 0, -0.05)});
   return bodies;
@@ -149,7 +142,6 @@ TEST(Penetrations, LeaveABallAlongItsRadius) {
   round.positions = sphereMesh(radius, 0.01).vertices;
   round.positions.push_back(Vec3::Zero());
   round.mesh = meshOf(tetrahedralizeHull(round.positions));
-  round.finish(1.0);
   for (int k = 0; k < 50; ++k) {
     const Vec3 outwards = Vec3(any(random), any(random), any(random)).normalized();
     std::vector<Body> bodies{lattice(Vec3(0.05, 0.05, 0.05), 1), round};
@@ -248,7 +240,7 @@ TEST(Penetrations, AreOrderedAndTheSameEveryTime) {
     EXPECT_LT((std::array<Index, 3>{first[k - 1].body_a, first[k - 1].particle, first[k - 1].body_b}),
               (std::array<Index, 3>{first[k].body_a, first[k].particle, first[k].body_b}));
   for (int round = 0; round < 3; ++round) {
-    std::vector<Body> others{ball(1.0, 50, round), ball(1.0, 50, round + 9)};  // leaves other traces in the tables
+    std::vector<Body> others{ball(1.0, 50, round), ball(1.0, 50, round + 9)};  // others in between
     find(others);
     const std::vector<Penetration> again = find(bodies);
     ASSERT_EQ(again.size(), first.size());
@@ -270,7 +262,6 @@ TEST(Penetrations, NoneAndNoWorkWithoutOverlap) {
   ContactCounters counters;
   EXPECT_TRUE(find(bodies, &counters).empty());
   EXPECT_EQ(counters.pairs, 0u);
-  EXPECT_EQ(counters.hashed, 0u);
   EXPECT_EQ(counters.tested, 0u);
   EXPECT_EQ(counters.penetrating, 0u);
   EXPECT_EQ(counters.corrected, 0u);
@@ -282,7 +273,7 @@ TEST(Penetrations, TouchingIsNotPenetrating) {
   ContactCounters counters;
   EXPECT_TRUE(find(bodies, &counters).empty());
   EXPECT_EQ(counters.pairs, 1u);
-  EXPECT_GT(counters.hashed, 0u);
+  EXPECT_GT(counters.tested, 0u);
 }
 
 TEST(Penetrations, OverlappingBoundsAloneAreNone) {
@@ -384,7 +375,7 @@ TEST(Penetrations, NothingToQueryIsFine) {
 // A row presses the two apart along the direction of the penetration, by its depth, with impulses that are equal and
 // opposite.
 TEST(TextbookRows, PressTheParticleAndTheTetrahedronApart) {
-  std::vector<Body> bodies{lattice(Vec3(0.1, 0.1, 0.1), 3, 0.01), ball(0.07, 30, 3, 0.02)};
+  std::vector<Body> bodies{lattice(Vec3(0.1, 0.1, 0.1), 3), ball(0.07, 30, 3)};
   move(bodies[1], {Quat(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized())), Vec3(0.03, 0.02, 0.09)});
   const std::vector<ContactBody> all = views(bodies);
   ContactCounters counters;
@@ -413,7 +404,7 @@ TEST(TextbookRows, PressTheParticleAndTheTetrahedronApart) {
 
 // What has no way out is left alone.
 TEST(TextbookRows, AreNotMadeWithoutADirection) {
-  std::vector<Body> bodies{lattice(Vec3(0.1, 0.1, 0.1), 1, 0.01), lattice(Vec3(0.1, 0.1, 0.1), 1, 0.01)};
+  std::vector<Body> bodies{lattice(Vec3(0.1, 0.1, 0.1), 1), lattice(Vec3(0.1, 0.1, 0.1), 1)};
   const std::vector<ContactBody> all = views(bodies);
   Penetration lost;
   lost.body_b = 1;

@@ -126,17 +126,27 @@ Material appearance(MatchMode mode, double damping) {
   return m;
 }
 
-BodyBatch batchOf(const std::vector<Plain>& bodies) {
-  std::vector<MatchInput> inputs;
-  for (const Plain& b : bodies) inputs.push_back(b.input());
-  BodyBatch batch(inputs, true);
-  for (std::size_t i = 0; i < bodies.size(); ++i)
-    batch.setState(i, bodies[i].state.positions, bodies[i].state.velocities, bodies[i].state.poses[0].rotation);
-  return batch;
+std::vector<BatchBody> statesOf(std::vector<Plain>& of, std::size_t first, std::size_t count) {
+  std::vector<BatchBody> states;
+  for (std::size_t i = first; i < first + count; ++i)
+    states.push_back({of[i].state.positions.data(), of[i].state.velocities.data(), &of[i].state.poses[0].rotation});
+  return states;
 }
 
-void read(const BodyBatch& batch, std::size_t i, Plain& to) {
-  batch.getState(i, to.state.positions, to.state.velocities, to.state.poses[0].rotation);
+/// Bodies of their own, side by side.
+struct Lanes {
+  std::vector<Plain> bodies;
+  BodyBatch batch;
+
+  void step(const BatchStep& step, MatchCounters& counters, const ForEach& for_each = oneAfterAnother) {
+    batch.step(statesOf(bodies, 0, bodies.size()), step, counters, for_each);
+  }
+};
+
+Lanes batchOf(const std::vector<Plain>& bodies) {
+  std::vector<MatchInput> inputs;
+  for (const Plain& b : bodies) inputs.push_back(b.input());
+  return {bodies, BodyBatch(inputs, true)};
 }
 
 double largestDistance(const Points& a, const Points& b) {
@@ -182,7 +192,7 @@ TEST(BodyBatch, FollowsTheReferenceAtAnyStep) {
         }
         const Material material = appearance(mode, damping);
         const BatchStep step = batchStep(material, 1.0 / rate);
-        BodyBatch batch = batchOf(bodies);
+        Lanes batch = batchOf(bodies);
         MatchCounters counters;
         double far = 0.0, fast = 0.0;
         for (int n = 0; n < 20; ++n) {
@@ -190,8 +200,7 @@ TEST(BodyBatch, FollowsTheReferenceAtAnyStep) {
           for (Plain& body : bodies) body.step(material, step);
         }
         for (std::size_t i = 0; i < bodies.size(); ++i) {
-          Plain found = bodies[i];
-          read(batch, i, found);
+          const Plain& found = batch.bodies[i];
           far = std::max(far, largestDistance(found.state.positions, bodies[i].state.positions));
           fast = std::max(fast, largestDistance(found.state.velocities, bodies[i].state.velocities));
         }
@@ -227,12 +236,10 @@ TEST(BodyBatch, DampingLeavesTheRigidMotion) {
   }
   for (std::size_t i = 0; i < bodies.size(); ++i)
     expectRigidAfterDamping(bodies[i], [&](const BatchStep& step) {
-      BodyBatch batch = batchOf(bodies);
+      Lanes batch = batchOf(bodies);
       MatchCounters counters;
       batch.step(step, counters);
-      Plain after = bodies[i];
-      read(batch, i, after);
-      return after;
+      return batch.bodies[i];
     });
 }
 
@@ -250,7 +257,7 @@ TEST(BodyBatch, StepsAsTheReferenceInFreeFlight) {
         BatchStep step = batchStep(material, 1.0 / 120.0);
         step.gravity *= scale;
         step.set = set;
-        BodyBatch batch = batchOf(bodies);
+        Lanes batch = batchOf(bodies);
         MatchCounters counters;
         double first = 0.0, last = 0.0, fast = 0.0;
         for (int n = 0; n < 100; ++n) {
@@ -258,8 +265,7 @@ TEST(BodyBatch, StepsAsTheReferenceInFreeFlight) {
           for (std::size_t i = 0; i < bodies.size(); ++i) {
             bodies[i].step(material, step);
             if (n != 0 && n != 99) continue;
-            Plain found = bodies[i];
-            read(batch, i, found);
+            const Plain& found = batch.bodies[i];
             double& largest = n == 0 ? first : last;
             largest = std::max(largest, largestDistance(found.state.positions, bodies[i].state.positions));
             if (n == 99) fast = std::max(fast, largestDistance(found.state.velocities, bodies[i].state.velocities));
@@ -287,11 +293,8 @@ TEST(BodyBatch, StaysWithTheReferenceOnTheGround) {
       const Material material = appearance(mode, 1.0);
       BatchStep step = batchStep(material, 1.0 / 120.0);
       step.set = set;
-      std::vector<Plain> found = bodies;
-      std::vector<BatchBody> states;
-      for (Plain& body : found)
-        states.push_back({body.state.positions.data(), body.state.velocities.data(), &body.state.poses[0].rotation});
-      BodyBatch batch = batchOf(bodies);
+      Lanes batch = batchOf(bodies);
+      std::vector<Plain>& found = batch.bodies;
       MatchCounters counters;
       std::size_t lifted = 0;
       // A particle that touches one step sooner by rounding lets bodies part: each step goes from the same state.
@@ -301,7 +304,7 @@ TEST(BodyBatch, StaysWithTheReferenceOnTheGround) {
           bodies[i].state = found[i].state;
           bodies[i].step(material, step);
         }
-        batch.stepInPlace(states, step, counters);
+        batch.step(step, counters);
         double largest = 0.0;
         for (std::size_t i = 0; i < bodies.size(); ++i) {
           for (const Vec3& x : found[i].state.positions) lifted += x.z() < 0.0;
@@ -325,13 +328,12 @@ TEST(BodyBatch, KeepsMomentum) {
       }
       BatchStep step = batchStep(appearance(mode, damping), 1.0 / 120.0);
       step.gravity.setZero();
-      BodyBatch batch = batchOf(bodies);
+      Lanes batch = batchOf(bodies);
       MatchCounters counters;
       constexpr int kSteps = 1000;
       for (int n = 0; n < kSteps; ++n) batch.step(step, counters);
       for (std::size_t i = 0; i < bodies.size(); ++i) {
-        Plain after = bodies[i];
-        read(batch, i, after);
+        const Plain& after = batch.bodies[i];
         // 6.5e-10 and 4.8e-10 by the worst of 96 bodies
         EXPECT_LE((after.momentum() - bodies[i].momentum()).norm(), 4e-9 * kSteps * bodies[i].movement());
         EXPECT_LE((after.angularMomentum() - bodies[i].angularMomentum()).norm(), 2e-9 * kSteps * bodies[i].turning());
@@ -354,7 +356,7 @@ TEST(BodyBatch, BodiesDoNotDependOnPlaceNeighboursOrOrder) {
       for (int i : {0, 17, 40}) spoiled[i].state.positions[3].x() = std::numeric_limits<double>::quiet_NaN();
       for (int i : {5, 70}) spoiled[i].state.velocities[3].x() = std::numeric_limits<double>::infinity();
       const std::vector<Plain> few(bodies.begin() + 130, bodies.begin() + 143);
-      BodyBatch all = batchOf(bodies), with_nan = batchOf(spoiled), part = batchOf(few);
+      Lanes all = batchOf(bodies), with_nan = batchOf(spoiled), part = batchOf(few);
       MatchCounters counters;
       for (int n = 0; n < 50; ++n) {
         all.step(step, counters);
@@ -365,14 +367,11 @@ TEST(BodyBatch, BodiesDoNotDependOnPlaceNeighboursOrOrder) {
       }
       for (std::size_t i = 0; i < bodies.size(); ++i) {
         if (i == 0 || i == 17 || i == 40 || i == 5 || i == 70) continue;
-        Plain a = bodies[i], b = bodies[i];
-        read(all, i, a);
-        read(with_nan, i, b);
+        const Plain &a = all.bodies[i], &b = with_nan.bodies[i];
         ASSERT_EQ(largestDistance(a.state.positions, b.state.positions), 0.0) << i;
         ASSERT_EQ(largestDistance(a.state.velocities, b.state.velocities), 0.0) << i;
         if (i < 130 || i >= 143) continue;
-        read(part, i - 130, b);
-        ASSERT_EQ(largestDistance(a.state.positions, b.state.positions), 0.0) << i;
+        ASSERT_EQ(largestDistance(a.state.positions, part.bodies[i - 130].state.positions), 0.0) << i;
       }
     }
 }
@@ -387,23 +386,18 @@ TEST(BodyBatch, BodiesMayTakeTheWrongPlaces) {
   }
   for (MatchMode mode : kModes) {
     const BatchStep step = batchStep(appearance(mode, 1.0), 1.0 / 120.0);
-    const auto statesOf = [](std::vector<Plain>& of, std::size_t first, std::size_t count) {
-      std::vector<BatchBody> states;
-      for (std::size_t i = first; i < first + count; ++i)
-        states.push_back({of[i].state.positions.data(), of[i].state.velocities.data(), &of[i].state.poses[0].rotation});
-      return states;
-    };
-    std::vector<Plain> own = bodies, others = bodies;
-    BodyBatch batch = batchOf(own);
+    std::vector<Plain> others = bodies;
+    Lanes batch = batchOf(bodies);
+    const std::vector<Plain>& own = batch.bodies;
     std::vector<MatchInput> narrow(20, bodies[39].input());
     BodyBatch places(narrow, true);
     MatchCounters all, some;
     for (int n = 0; n < 20; ++n) {
-      batch.stepInPlace(statesOf(own, 0, 40), step, all);
+      batch.step(step, all);
       for (std::size_t first = 0; first < 40; first += 13) {
         const std::size_t count = std::min<std::size_t>(13, 40 - first);
         for (std::size_t i = 0; i < count; ++i) places.refit(i, bodies[first + i].input());
-        places.stepInPlace(statesOf(others, first, count), step, some);
+        places.step(statesOf(others, first, count), step, some);
       }
     }
     for (std::size_t i = 0; i < 40; ++i) {
@@ -431,15 +425,14 @@ TEST(BodyBatch, FallsBackWhereTheRankIsMissing) {
     }
     const Material material = appearance(mode, 1.0);
     const BatchStep step = batchStep(material, 1.0 / 120.0);
-    BodyBatch batch = batchOf(bodies);
+    Lanes batch = batchOf(bodies);
     MatchCounters counters;
     for (int n = 0; n < 20; ++n) {
       batch.step(step, counters);
       for (Plain& body : bodies) body.step(material, step);
     }
     for (std::size_t i = 0; i < bodies.size(); ++i) {
-      Plain found = bodies[i];
-      read(batch, i, found);
+      const Plain& found = batch.bodies[i];
       // A line's spin about itself is known to no precision.
       EXPECT_LE(largestDistance(found.state.positions, bodies[i].state.positions), 1e-4 * kSpacing)
           << toString(mode) << " " << i;

@@ -33,7 +33,6 @@ void add(Work& work, const StepReport& r) {
                                                        {"contact shapes", r.contact_shapes},
                                                        {"self points", c.self_points},
                                                        {"push contacts", r.push_contacts},
-                                                       {"hashed", c.hashed},
                                                        {"tetrahedra tests", c.tested},
                                                        {"tetrahedralizations", r.tetrahedralizations},
                                                        {"mended", r.mended}};

@@ -71,48 +71,6 @@ TEST(Grasp, LeavesFixedTissueToWhatFixesIt) {
   for (const Index i : pick.patch) EXPECT_TRUE(model.fixed[i]);
 }
 
-TEST(PullGrasp, GoesTheImplicitShareOfTheWayAndNeverOvershoots) {
-  const PreparedBody body = prepared(test::ball());
-  for (double stiffness : {1.0, 1e3, 1e9, 1e12})
-    for (double h : {1e-5, 1.0 / 120, 1.0}) {
-      Pick pick;
-      makeGrasp(*body.model, 0, 0.06, pick);
-      pick.stiffness = stiffness;
-      Points positions = body.state.positions;
-      const Vec3 start = graspMean(pick, positions);
-      pick.target = start + Vec3(0.5, 0, 0);
-      const Vec3 force = pullGrasp(*body.model, pick, pick.target, h, positions);
-      const double way = (graspMean(pick, positions) - start).x() / 0.5;
-      double inverse_mass = 0.0;
-      for (std::size_t k = 0; k < pick.patch.size(); ++k)
-        inverse_mass += pick.weights[k] * pick.weights[k] / body.model->masses[pick.patch[k]];
-      const double stiff = stiffness * h * h * inverse_mass;
-      EXPECT_NEAR(way, stiff / (1.0 + stiff), 1e-9);
-      EXPECT_LE(way, 1.0 + 1e-12);
-      // The force is what the tissue got.
-      Vec3 given = Vec3::Zero();
-      for (std::size_t i = 0; i < positions.size(); ++i)
-        given += body.model->masses[i] * (positions[i] - body.state.positions[i]);
-      EXPECT_LT((given - force * h * h).norm(), 1e-9 * (1e-12 + given.norm()) + 1e-15);
-    }
-}
-
-TEST(PullGrasp, FixedTissueDoesNotMove) {
-  BodyDef def = test::ball();
-  Box everything;
-  everything.extend(Vec3(-9, -9, -9));
-  everything.extend(Vec3(9, 9, 9));
-  def.fixed.push_back(everything);
-  const PreparedBody body = prepared(def);
-  Pick pick;
-  makeGrasp(*body.model, 0, 0.06, pick);
-  pick.stiffness = 100;
-  Points positions = body.state.positions;
-  pick.target = graspMean(pick, positions) + Vec3(0.1, 0, 0);
-  EXPECT_NEAR(pullGrasp(*body.model, pick, pick.target, 1.0 / 120, positions).x(), 10.0, 1e-6);
-  EXPECT_EQ(positions, body.state.positions);
-}
-
 TEST(CastRay, HitsTheNearSideOfASphereAndMissesBesideIt) {
   const TriangleMesh sphere = sphereMesh(1.0, 0.05);
   const RayHit hit = castRay(sphere.vertices, sphere.triangles, Vec3(0.1, 0.2, 5), Vec3(0, 0, -2));

@@ -90,7 +90,6 @@ std::vector<Points> particlesOf(World& world) {
 
 void expectNoContactWork(const ContactCounters& c) {
   EXPECT_EQ(c.pairs, 0u);
-  EXPECT_EQ(c.hashed, 0u);
   EXPECT_EQ(c.tested, 0u);
   EXPECT_EQ(c.penetrating, 0u);
   EXPECT_EQ(c.corrected, 0u);

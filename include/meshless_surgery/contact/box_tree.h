@@ -1,4 +1,4 @@
-// A tree of boxes over the faces of a surface: its topology is made once, its boxes anew in every frame.
+// A tree of boxes over faces, bodies or others: its topology is made once, its boxes anew whenever they have moved.
 #pragma once
 
 #include <algorithm>
@@ -58,13 +58,13 @@ struct TreeBoxes {
 struct TreeQuery {
   std::vector<std::array<Index, 2>> stack;
   std::vector<char> seen;
-  std::size_t bytes() const { return bytesOf(stack, seen); }
 };
 
 class BoxTree {
  public:
   BoxTree() = default;
-  explicit BoxTree(const Points& centres);  // one an item [m]
+  explicit BoxTree(const Points& centres) { build(centres); }
+  void build(const Points& centres);  // one an item [m]
 
   /// Fills boxes.nodes from boxes.items.
   void refit(TreeBoxes& boxes) const;

@@ -14,7 +14,6 @@ struct RowEntry {
 struct ContactRow {
   Vec3 normal = Vec3::UnitZ();  // unit, from b to a
   double constant = 0.0;        // [m]
-  double gap = 0.0;             // [m] when it was made, beyond the skin
   double rise = 0.0;            // [m] of it, by which the point of a is over the sum of its particles
   double friction = 0.0;        // Coulomb
   double restitution = 0.0;     // 0..1
@@ -52,8 +51,7 @@ struct RowBody {
 };
 
 /// Appends the row of a pair, or none (null) where both of its points hang mostly on particles that are held: the few
-/// others would go many times as far. with_itself: b is the same body as a. skin [m] is taken off the gap.
-ContactRow* makeRow(const FeaturePair& pair, const RowBody& a, const RowBody& b, bool with_itself, double skin,
-                    RowSet& set);
+/// others would go many times as far. skin [m] is taken off the gap.
+ContactRow* makeRow(const FeaturePair& pair, const RowBody& a, const RowBody& b, double skin, RowSet& set);
 
 }  // namespace meshless

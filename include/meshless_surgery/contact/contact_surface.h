@@ -11,7 +11,6 @@ namespace meshless {
 struct VertexSupports {
   std::vector<Index> offsets, particles;
   std::vector<double> weights;
-  double most_weight = 1.0;  // sum of magnitudes of a vertex, the largest
 
   Vec3 sum(Index v, const Vec3* values) const {
     Vec3 sum = Vec3::Zero();

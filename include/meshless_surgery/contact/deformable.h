@@ -12,18 +12,16 @@ struct ContactMesh {
   std::vector<std::array<Index, 2>> edges;  // of the tetrahedra, lower index first, sorted
 };
 
-/// Views; whoever fills it keeps the arrays alive. positions are read.
+/// Views; whoever fills it keeps the arrays alive.
 struct ContactBody {
   const ContactMesh* mesh = nullptr;
-  const Points* positions = nullptr;                    // [m]
-  const std::vector<double>* inverse_masses = nullptr;  // [1/kg]; 0: held
-  Box bounds;                                           // of positions, swept over the substep
+  const Points* positions = nullptr;  // [m]
+  Box bounds;                         // of positions
 };
 
 /// Work counted, so that tests can hold what a scene does not need at zero.
 struct ContactCounters {
   std::size_t pairs = 0;          // pairs of bodies with overlapping bounds
-  std::size_t hashed = 0;         // particles put into the spatial hash
   std::size_t tested = 0;         // particle-in-tetrahedron tests
   std::size_t penetrating = 0;    // particles found inside
   std::size_t corrected = 0;      // contacts that moved something

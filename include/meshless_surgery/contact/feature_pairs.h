@@ -29,12 +29,6 @@ struct RememberedSide {
   Vec3 normal = Vec3::UnitZ();
 };
 
-/// What is found, one after another.
-struct FoundFeatures {
-  std::vector<FeaturePair> pairs;
-  std::vector<RememberedSide> sides;  // to be remembered
-};
-
 /// A face near a vertex.
 struct NearFace {
   Index face = 0;
@@ -43,19 +37,13 @@ struct NearFace {
   int corners = 0;  // of the face that the nearest point lies between: 1 at a vertex, 2 on an edge, 3 inside
 };
 
-/// Scratch of one search after another.
+/// What a search finds, and its scratch.
 struct SearchScratch {
-  FoundFeatures found;
-  std::vector<Index> vertices;  // near the other
-  std::vector<NearFace> faces;  // of one vertex
-  std::vector<char> near;       // one a vertex
+  std::vector<FeaturePair> pairs;
+  std::vector<RememberedSide> sides;  // to be remembered
+  std::vector<NearFace> faces;        // of one vertex
+  std::vector<char> near;             // one a vertex: near the other
   TreeQuery query;
-
-  void clear() {
-    found.pairs.clear();
-    found.sides.clear();
-  }
-  std::size_t bytes() const { return bytesOf(found.pairs, found.sides, vertices, faces, near) + query.bytes(); }
 };
 
 struct PairSearch {
@@ -74,16 +62,13 @@ struct PairSearch {
 };
 
 /// [m] The margin of a search at rest, beside what is swept, of surfaces with such a mean edge.
-double searchMargin(double edge_length);
+inline double searchMargin(double edge_length) { return 0.2 * edge_length; }
 
-/// Vertices of a, ascending, that are near enough to b to be queried, to scratch.vertices.
-void findVerticesNear(const PairSearch& search, SearchScratch& scratch);
-
-/// scratch.vertices of a, and points on its long ridges, against the faces of b, to scratch.found: up to three pairs
-/// each, of different directions, the nearest first. Signs by pseudonormals (Baerentzen and Aanaes 2005); where several
-/// faces are equally near, the vertex is on the side of the one that its own faces oppose most, so that the twin faces
-/// of a fresh cut are on the right sides. Directions that the vertex's faces do not oppose are left out. Returns the
-/// vertices that were queried.
+/// Vertices of a, and points on its long ridges, against the faces of b: up to three pairs each, of different
+/// directions, the nearest first. Signs by pseudonormals (Baerentzen and Aanaes 2005); where several faces are equally
+/// near, the vertex is on the side of the one that its own faces oppose most, so that the twin faces of a fresh cut are
+/// on the right sides. Directions that the vertex's faces do not oppose are left out. Returns the vertices that were
+/// queried.
 std::size_t findVertexFace(const PairSearch& search, SearchScratch& scratch);
 
 /// Vertices of a over the plane z = height.

@@ -17,13 +17,13 @@ struct RigidGroups {
 
   std::vector<Index> offsets, members;
   std::vector<double> weights;
-  std::vector<double> masses;                // [kg] of particles
-  std::vector<Index> of_offsets, of_groups;  // the groups of each particle, compressed rows
-  std::vector<double> of_weights;
+  std::vector<double> masses;                 // [kg] of particles
+  std::vector<Index> groups;                  // of members
+  std::vector<Index> of_offsets, of_members;  // of each particle: which members it is, compressed rows
 
   Index size() const { return static_cast<Index>(offsets.size() - 1); }
   std::size_t bytes() const {
-    return sizeof *this + bytesOf(offsets, members, weights, masses, of_offsets, of_groups, of_weights);
+    return sizeof *this + bytesOf(offsets, members, weights, masses, groups, of_offsets, of_members);
   }
 };
 
@@ -40,7 +40,27 @@ struct GroupMotion {
 /// Centre and inertia for positions [m], without motion yet.
 GroupMotion groupAt(const RigidGroups& groups, Index group, const std::function<Vec3(Index particle)>& position);
 
-/// Inverse of an inertia; directions below 1e-12 of the largest stay 0.
-Mat3 inverseInertia(const Mat3& inertia);
+/// Mass, centre and inertia of points, added up about one of them.
+class MassMoments {
+ public:
+  explicit MassMoments(const Vec3& about) : about_(about) {}
+  void add(double mass, const Vec3& place) {
+    const Vec3 arm = place - about_;
+    mass_ += mass;
+    sum_ += mass * arm;
+    moment_ += mass * arm * arm.transpose();
+  }
+  double mass() const { return mass_; }
+  Vec3 centre() const { return about_ + sum_ / mass_; }
+  Vec3 fromCentre(const Vec3& place) const { return place - about_ - sum_ / mass_; }
+  /// Of the inertia about the centre; directions below 1e-12 of the largest stay 0.
+  Mat3 inverseInertia() const;
+
+ private:
+  const Vec3 about_;            // [m]
+  double mass_ = 0.0;           // [kg]
+  Vec3 sum_ = Vec3::Zero();     // [kg m]
+  Mat3 moment_ = Mat3::Zero();  // [kg m^2]
+};
 
 }  // namespace meshless

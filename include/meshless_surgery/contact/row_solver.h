@@ -12,6 +12,9 @@ namespace meshless {
 /// A particle: where it is [m], and its inverse mass [1/kg], 0 where it is held.
 struct alignas(32) Slot {
   double x = 0.0, y = 0.0, z = 0.0, inverse_mass = 0.0;
+
+  Vec3 place() const { return {x, y, z}; }
+  void put(const Vec3& at) { x = at.x(), y = at.y(), z = at.z(); }
 };
 
 /// A body in a substep; what it points to has to live as long.
@@ -56,11 +59,6 @@ struct SolverStep {
 struct SolverCounters {
   std::size_t active = 0;  // rows that could carry load
   std::size_t ground = 0;  // of them, those of the ground
-
-  void operator+=(const SolverCounters& o) {
-    active += o.active;
-    ground += o.ground;
-  }
 };
 
 /// Scratch of one thread.
@@ -73,7 +71,7 @@ struct SolverScratch {
   struct Active {
     ContactRow* row;
     const RowEntry* entries;
-    Index a, b;                 // bodies
+    Index a, b;                 // bodies; the same where there is one
     Index levers, middle, end;  // of a, then of b
     Vec3 start;                 // [m] sum of coefficient x at the start of the substep
     double target;              // [m] gap that is asked for at least

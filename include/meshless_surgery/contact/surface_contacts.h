@@ -5,7 +5,6 @@
 
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 
 #include "meshless_surgery/base/for_each.h"
@@ -57,11 +56,6 @@ struct SurfaceScene {
   std::vector<Given> given;
 };
 
-/// Two bodies that press on each other; b is kNoIndex for the ground, or the number of an obstacle.
-struct LoadedSurfaces {
-  Index a = 0, b = kNoIndex;
-};
-
 class SurfaceContacts {
  public:
   /// Which pairs can touch: sets needed(). Once a frame, and again where some have woken.
@@ -80,8 +74,8 @@ class SurfaceContacts {
 
   struct Island {
     std::vector<Index> bodies;
-    std::vector<Index> free;  // the bodies, where nothing holds any of them
     std::vector<SolverRows> rows;
+    bool held = false;  // some of it, or by others
   };
   /// Each collider that moves is in one; in the order of their first bodies.
   const std::vector<Island>& islands() const { return islands_; }
@@ -111,19 +105,13 @@ class SurfaceContacts {
   /// Impulses of the last substep of h [s] become forces.
   void finishIsland(Index island, double h);
 
-  void loadedSurfaces(std::vector<LoadedSurfaces>& pairs) const;
+  /// Pairs that press on each other, the lower number first; the second is kNoIndex for the ground.
+  void loadedSurfaces(std::vector<std::pair<Index, Index>>& pairs) const;
   struct Point {
     Vec3 position, normal;
     double force;  // [N]
   };
   void points(const std::vector<Collider>& colliders, std::vector<Point>& points) const;
-  /// Rows of the frame, for tests and reports.
-  std::size_t rows() const;
-  template <class Visit>
-  void eachRow(const Visit& visit) const {
-    for (const Pair* pair : pairs_)
-      for (const ContactRow& row : pair->set.rows) visit(row, pair->a, pair->b);
-  }
 
   SurfaceMemory memory() const;
   void recall(const SurfaceMemory& memory);
@@ -139,16 +127,12 @@ class SurfaceContacts {
     bool stale = true, near = false;
     std::size_t queried = 0;  // points, when it was found last
   };
-  /// Of one thread.
-  struct Scratch {
-    SearchScratch search;
-    std::vector<ContactRow> old;
-  };
   using PairName = std::tuple<std::uint64_t, std::uint64_t, Kind>;
   Pair& pairOf(Kind kind, const std::vector<Collider>& colliders, Index a, Index b, std::uint64_t key_b);
   Index colliderOf(std::uint64_t key) const;  // kNoIndex: none
   void findPair(const SurfaceScene& scene, const std::vector<Collider>& colliders, Pair& pair);
-  void makeRows(const SurfaceScene& scene, const std::vector<Collider>& colliders, Scratch& scratch, Pair& pair) const;
+  void makeRows(const SurfaceScene& scene, const std::vector<Collider>& colliders,
+                const std::vector<FeaturePair>& found, Pair& pair) const;
   void listReached(const SurfaceScene& scene, const std::vector<Collider>& colliders);
   void joinIslands(const std::vector<Collider>& colliders);
   void fillSlots(const std::vector<Collider>& colliders);
@@ -159,12 +143,11 @@ class SurfaceContacts {
   std::vector<std::pair<std::uint64_t, Index>> numbers_;  // of colliders by their keys, ascending
   std::map<PairName, std::unique_ptr<Pair>> known_;
   std::map<std::uint64_t, KeptWay> ways_;
-  std::vector<KeptWay*> ways_of_;        // one a collider; null where nothing is near
+  // [m] one a collider: its way, that of its vertices as against each other, and how far it may go in this frame
+  std::vector<double> gone_, bent_, ahead_;
   std::vector<Pair*> pairs_;             // of this frame
   std::vector<SurfaceFrame> frames_;     // one a collider; filled where moved_
   std::vector<std::uint64_t> frame_of_;  // key of the obstacle whose frame stays
-  std::mutex spare_mutex_;
-  std::vector<std::unique_ptr<Scratch>> spare_;
   std::vector<Index> reached_;
   std::vector<std::size_t> first_slots_;  // one a collider
   std::vector<Slot> now_, before_;
@@ -172,7 +155,6 @@ class SurfaceContacts {
   std::vector<Island> islands_, spare_islands_;
   UnionFind joined_;
   std::vector<Index> island_of_;  // one a collider
-  std::vector<char> island_held_;
 };
 
 }  // namespace meshless

@@ -22,11 +22,9 @@ struct KeptPair {
 /// How far a collider has gone since it was first near something.
 struct KeptWay {
   std::uint64_t key = 0;
-  Points last;         // [m] sums of the supports of vertices
-  Points offsets;      // [m] of vertices from these sums, when its frame was placed last
-  double gone = 0.0;   // [m] sum of the farthest way of any vertex in each frame
-  double ahead = 0.0;  // [m] in this frame, as fast as it is
-  double bent = 0.0;   // [m] as gone, of two of its vertices as against each other
+  Points last;        // [m] sums of the supports of vertices
+  double gone = 0.0;  // [m] sum of the farthest way of any vertex in each frame
+  double bent = 0.0;  // [m] the same of two of its vertices as against each other
 };
 
 struct SurfaceMemory {
@@ -47,8 +45,8 @@ void serialize(A& archive, RowEntry& v) {
 }
 template <class A>
 void serialize(A& archive, ContactRow& v) {
-  auto& [normal, constant, gap, rise, friction, restitution, impulse, begin, middle, end, kind, order, features] = v;
-  archive(normal, constant, gap, rise, friction, restitution, impulse, begin, middle, end, kind, order, features);
+  auto& [normal, constant, rise, friction, restitution, impulse, begin, middle, end, kind, order, features] = v;
+  archive(normal, constant, rise, friction, restitution, impulse, begin, middle, end, kind, order, features);
 }
 template <class A>
 void serialize(A& archive, RowSet& v) {
@@ -67,8 +65,8 @@ void serialize(A& archive, KeptPair& v) {
 }
 template <class A>
 void serialize(A& archive, KeptWay& v) {
-  auto& [key, last, offsets, gone, ahead, bent] = v;
-  archive(key, last, offsets, gone, ahead, bent);
+  auto& [key, last, gone, bent] = v;
+  archive(key, last, gone, bent);
 }
 template <class A>
 void serialize(A& archive, SurfaceMemory& v) {

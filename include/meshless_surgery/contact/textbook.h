@@ -1,6 +1,6 @@
-// The paper's contact: particles against tetrahedra through a spatial hash (Teschner et al. 2003), consistent
-// penetration depth and direction (Heidelberger et al. 2004). What it finds goes to the solver of rows. A scene chooses
-// it as `contact: textbook`.
+// The paper's contact: particles against tetrahedra (Teschner et al. 2003, who find them by a spatial hash; here it is
+// the tree of boxes that all contact has), consistent penetration depth and direction (Heidelberger et al. 2004). What
+// it finds goes to the solver of rows. A scene chooses it as `contact: textbook`.
 #pragma once
 
 #include "meshless_surgery/contact/contact_rows.h"

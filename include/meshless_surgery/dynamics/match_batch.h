@@ -25,12 +25,11 @@ struct BatchStep {
 };
 BatchStep batchStep(const Material& material, double h);
 
-/// Where a body of a batch has its state, particle by particle; who does not move is read and left alone.
+/// Where a body of a batch has its state, particle by particle.
 struct BatchBody {
   Vec3* positions = nullptr;   // [m]
   Vec3* velocities = nullptr;  // [m/s]
   Quat* rotation = nullptr;
-  bool moves = true;
 };
 
 /// Bodies of equally many particles, each in one cluster with all of its particles. Masses and rest shapes may differ.
@@ -42,33 +41,23 @@ class BodyBatch {
   /// flowed (no plastic shape).
   static bool holds(const MatchInput& body);
 
-  /// quadratic: a step may ask for the quadratic mode; the shapes have had addQuadraticRest(). All bodies start at rest
-  /// in their rest shape.
+  /// quadratic: a step may ask for the quadratic mode; the shapes have had addQuadraticRest().
   BodyBatch(const std::vector<MatchInput>& bodies, bool quadratic);
   ~BodyBatch();
   BodyBatch(BodyBatch&&) noexcept;
   BodyBatch& operator=(BodyBatch&&) noexcept;
 
-  std::size_t size() const;
-  std::size_t particles() const;  // of a body
-  std::size_t bytes() const;      // that it holds
+  std::size_t bytes() const;  // that it holds
 
   /// Another body's rest shape and masses in the place of this one's. Of as many particles, that it holds().
   void refit(std::size_t body, const MatchInput& in);
-  void setState(std::size_t body, const Points& positions, const Points& velocities, const Quat& rotation);
-  void getState(std::size_t body, Points& positions, Points& velocities, Quat& rotation) const;
 
-  /// Damps, predicts, matches, restores angular momentum, adds gravity and moves.
-  void step(const BatchStep& step, MatchCounters& counters, const ForEach& for_each = oneAfterAnother);
-  /// The same for states that others change between steps: read from where they are, and written back. Of the first
-  /// bodies.size() bodies, which may be fewer than size().
-  void stepInPlace(const std::vector<BatchBody>& bodies, const BatchStep& step, MatchCounters& counters,
-                   const ForEach& for_each = oneAfterAnother);
+  /// Damps, predicts, matches, restores angular momentum, adds gravity and moves: the first states.size() bodies, which
+  /// may be fewer than all.
+  void step(const std::vector<BatchBody>& states, const BatchStep& step, MatchCounters& counters,
+            const ForEach& for_each = oneAfterAnother);
 
  private:
-  void stepChunks(const BatchStep& step, const BatchBody* in_place, std::size_t count, MatchCounters& counters,
-                  const ForEach& for_each);
-
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

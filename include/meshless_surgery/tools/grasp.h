@@ -17,18 +17,11 @@ TissuePlace placeOf(const BodyModel& model, Index particle);
 /// Weighted mean of the patch [m].
 Vec3 graspMean(const Pick& pick, const Points& positions);
 
-/// Moves the patch implicitly towards the free end at `end` [m]: its mean goes k h^2 K / (1 + k h^2 K) of the way, K
-/// its inverse mass. Fixed particles stay. Any stiffness and step are stable. Returns the force on the tissue [N].
-/// given [N]: what it has pulled with in this step of h already. Then it answers what others have moved since, and
-/// returns by how much its force has changed: nothing where they have not.
-Vec3 pullGrasp(const BodyModel& model, const Pick& pick, const Vec3& end, double h, Points& positions,
-               const Vec3& given = Vec3::Zero());
-
 /// Of the mean of what the grasp holds [1/kg]; 0 where all of it is fixed.
 double graspInverseMass(const BodyModel& model, const Pick& pick);
 
-/// The stiffness [N/m] with which the grasp answers within `h` [s], as pullGrasp does it: the spring's own where the
-/// patch is heavy or fixed, less where it gives way.
+/// The stiffness [N/m] with which the grasp answers within `h` [s], as an implicit spring does: its own where the patch
+/// is heavy or fixed, less where it gives way.
 double graspStiffness(const BodyModel& model, const Pick& pick, double h);
 
 /// First hit of a ray with a surface; direction need not be unit length.

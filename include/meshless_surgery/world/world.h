@@ -229,9 +229,8 @@ class World {
   // tracked tools
   void setScissors(const ScissorBlades& blades, double angle);  // shown from now on
   void hideScissors();
-  /// The pick that a stream moves: the newest one that is not locked; 0 if none.
-  PickId pickInHand() const;
-  std::optional<Pick> heldPick() const;  // the same, as it is
+  /// The pick that a stream moves: the newest one that is not locked.
+  std::optional<Pick> heldPick() const;
   /// With how many N/m it answers a move of its free end within a step; 0 without one.
   double heldStiffness() const;
   const PushSphere& push() const;
