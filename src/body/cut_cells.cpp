@@ -609,6 +609,7 @@ class CellCutter {
     piece.state.stretch = state_.stretch;
     piece.state.swelling = state_.swelling;
     piece.state.pace = state_.pace;
+    piece.state.stiffened = state_.stiffened;
     piece.state.placed = state_.placed;
     for (Index r = 0; r < child->binding.embedded.size(); ++r)
       piece.state.embedded_offsets.push_back(

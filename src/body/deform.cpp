@@ -12,6 +12,10 @@
 namespace meshless {
 namespace {
 
+// [1/s] Tissue that was made stiffer becomes so by a factor of e in a tenth of a second, at most: what gives way under
+// its weight by up to g / rate^2, a decimetre, rises without a leap.
+constexpr double kStiffening = 10.0;
+
 // How hard a body is to turn about a point. Axis by axis: as one matrix, of a body drawn out to a line, the rounding of
 // the axis that turns easily would be a torque about the others.
 class Inertia {
@@ -158,15 +162,19 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
   scratch.previous = x;
   const double factor = stiffnessFactor(model, state, h);
   std::optional<MassMoments> moments;
+  const double stiffened = state.stiffened;
+  // What vibrates is given at most this share of its energy by becoming stiffer.
+  const double damping = material.damping + (stiffened < 1.0 ? kStiffening : 0.0);
+  state.stiffened = std::min(1.0, stiffened * std::exp(kStiffening * h));
   if (material.elastic()) {
-    const double fastest = highestFrequencyNow(model, state) * std::sqrt(factor);
+    const double fastest = highestFrequencyNow(model, state) * std::sqrt(factor * stiffened);
     const double ahead = fastest > 0.0 ? 1.0 / fastest : h;
     const double pace = std::sqrt(factor), quicker = state.pace > 0.0 ? pace / state.pace : 1.0;
     state.pace = pace;
-    moments = dampAndPredict(model, h, ahead, material.damping, quicker, scratch.lies, x, v, scratch.predicted);
+    moments = dampAndPredict(model, h, ahead, damping, quicker, scratch.lies, x, v, scratch.predicted);
   } else {
-    moments = dampAndPredict(model, h, viscosityTime(material.alpha, h), material.damping, 1.0, scratch.lies, x, v,
-                             scratch.predicted);
+    moments =
+        dampAndPredict(model, h, viscosityTime(material.alpha, h), damping, 1.0, scratch.lies, x, v, scratch.predicted);
   }
   const Points& y = scratch.predicted;
   const MatchInput input = matchInput(model, state);
@@ -177,7 +185,7 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
 
   if (material.elastic()) {
     const ElasticParameters parameters =
-        elasticParameters(factor * material.youngs_modulus, material.poissons_ratio, material.density);
+        elasticParameters(factor * stiffened * material.youngs_modulus, material.poissons_ratio, material.density);
     if (material.plastic() || !state.plastic.empty()) {
       state.stretch = model.cells ? elasticAccelerations(*model.cells, parameters, y, state.poses, scratch.goals,
                                                          counters, state.swelling, &state.plastic)
@@ -195,7 +203,7 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
     else
       accelerate(model, h, x, moments, v,
                  [&](std::size_t i) -> Vec3 { return accelerations[i] + share * state.eased[i]; });
-  } else if (const double gain = stiffnessGain(material.alpha, h); gain > 0.0) {
+  } else if (const double gain = stiffened * stiffnessGain(material.alpha, h); gain > 0.0) {
     matchShapes(input, y, material.mode, actingBeta(material.beta, h), state.poses, scratch.goals, counters,
                 state.swelling, material.plastic());
     const Points& goals = scratch.goals;

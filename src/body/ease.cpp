@@ -9,7 +9,9 @@
 namespace meshless {
 namespace {
 
-constexpr double kNothing = 1e-9;  // of the spacing that a particle would move in a substep: not worth easing
+constexpr double kNothing = 1e-9;     // of the spacing that a particle would move in a substep: not worth easing
+constexpr double kLeastShare = 1e-5;  // of its stiffness that a body has, whatever it was before
+constexpr double kAtOnce = 0.99;      // so much of it may come at once
 
 // [m/s^2] of every particle by what the body does to itself.
 Points ownAccelerations(const BodyModel& model, BodyState state, const Material& material, double h) {
@@ -61,6 +63,29 @@ void easeRelease(const BodyModel& parent, const BodyState& before, const Materia
     piece.state.eased_for = 0.0;
     piece.state.eased_whole = is_held;
   }
+}
+
+double stiffenedBy(const BodyModel& before, const Material& old, const BodyModel& model, const Material& material,
+                   double h, const BodyState& state) {
+  BodyState still = state;
+  for (Vec3& v : still.velocities) v.setZero();
+  still.eased.clear();
+  const auto pulls = [&](const BodyModel& of, const Material& made_of) {  // where nothing is slowed
+    const double fastest = highestFrequencyNow(of, still);
+    return ownAccelerations(of, still, made_of, fastest > 0.0 ? std::min(h, 1.0 / fastest) : h);
+  };
+  const Points then = pulls(before, old);
+  still.stiffened = 1.0;
+  const Points now = pulls(model, material);
+  double common = 0.0, squared = 0.0, most = 0.0;
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    if (model.fixed[i]) continue;
+    common += model.masses[i] * now[i].dot(then[i]);
+    squared += model.masses[i] * now[i].squaredNorm();
+    most = std::max(most, now[i].norm());
+  }
+  if (!(h * h * most > kNothing * model.spacing) || common > kAtOnce * squared) return 1.0;
+  return std::max(kLeastShare, common / squared);
 }
 
 double easedShare(double eased_for) {

@@ -207,6 +207,7 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, RestShape rest, const std
   piece.state.stretch = state_.stretch;
   piece.state.swelling = state_.swelling;
   piece.state.pace = state_.pace;
+  piece.state.stiffened = state_.stiffened;
   piece.state.placed = state_.placed;
   piece.state.embedded_offsets.resize(child->binding.embedded.size());
   inChunks(piece.state.embedded_offsets.size(), kChunk, [&](std::size_t begin, std::size_t end) {

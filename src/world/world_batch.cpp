@@ -38,10 +38,10 @@ bool alike(const WorldBody& a, const WorldBody& b) {
 }  // namespace
 
 // What is drawn out or thrown apart without measure is left to double: rounding to float would make it spin, and it
-// would never be whole again.
+// would never be whole again. What becomes stiffer is of another stiffness in every substep.
 bool fitsFloat(const WorldBody& body, double h) {
   const double most = kFarthest * body.model->shape.clusters[0].radius;
-  return extentOf(body.state.positions).diagonal() <= most &&
+  return body.state.stiffened == 1.0 && extentOf(body.state.positions).diagonal() <= most &&
          0.5 * h * extentOf(body.state.velocities).diagonal() <= most;
 }
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "meshless_surgery/body/ease.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
 
@@ -261,7 +262,10 @@ Result<Reply> World::Impl::apply(const SetMaterialCommand& command) {
     WorldBody* body = find(name);
     wake(*body);
     batches_current = contacts_current = false;
-    body->model = withMaterial(body->model, body->material, material);
+    const BodyModelPtr before = body->model;
+    body->model = withMaterial(before, body->material, material);
+    const double h = body->state.substep > 0.0 ? body->state.substep : substepNow();
+    body->state.stiffened = stiffenedBy(*before, body->material, *body->model, material, h, body->state);
     // Other masses move embedded vertices by a rounding. Whether the surface was read before must make no difference.
     body->surface_current = false;
     body->material = material;

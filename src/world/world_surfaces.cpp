@@ -349,7 +349,7 @@ void World::Impl::stepSurfaces(double h_frame, int parts, int parts_left) {
       if (body.material.elastic())
         surface_contacts.setRigidShare(b, body.surface_model->groups.get(), 1.0 - body.stiffness_factor);
       else if (body.surface_model->groups)
-        surface_contacts.setRigidShare(b, body.surface_model->groups.get(), body.material.alpha);
+        surface_contacts.setRigidShare(b, body.surface_model->groups.get(), body.state.stiffened * body.material.alpha);
     }
   }
   std::size_t largest = 0, total = 0;
@@ -462,6 +462,7 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
     member.previous.resize(member.end - member.begin);
     for (std::size_t b = member.begin; b < member.end; ++b) {
       WorldBody& body = *work.bodies[b];
+        body.state.substep = h;
       body.scratch.lies = island.held && !island.rows.empty();
       if (body.batch != kNoIndex && fitsFloat(body, h))
         work.side_by_side[body.batch].push_back(&body);

@@ -116,6 +116,8 @@ struct BodyState {
   double swelling = 1.0;              // of goals, or of the size without stress, where the volume is held
   double stretch = 1.0;               // of an elastic body: by how much its highest frequency has grown since rest
   double pace = 1.0;                  // root of the stiffnessFactor that its velocities are of
+  double stiffened = 1.0;             // share of its material's stiffness that it has; see ease.h
+  double substep = 0.0;               // [s] the last one; 0 before the first
   std::vector<PlasticShape> plastic;  // one a cluster once something has flowed; empty before
   // [m] One for each embedded vertex: from where its carriers have it to where it is. A cut makes it, and it fades.
   Points embedded_offsets;

@@ -1,4 +1,4 @@
-// A cut takes forces away at once. Inside the pieces they are released little by little, as tissue parts.
+// A cut takes forces away at once, and another material has others. What has changed comes little by little.
 #pragma once
 
 #include "meshless_surgery/body/cut_body.h"
@@ -13,8 +13,14 @@ constexpr double kEaseTime = 0.15;
 /// the cut are released at once, as a rigid acceleration: what is eased has neither, so that its momentum is its own
 /// alone and nothing throws it. Of one that has fixed particles, or one of the parent's particles in `held`, they are
 /// eased too.
-void easeRelease(const BodyModel& parent, const BodyState& before, const Material& material, double h, const std::vector<Index>& held,
-                 std::vector<BodyPiece>& pieces);
+void easeRelease(const BodyModel& parent, const BodyState& before, const Material& material, double h,
+                 const std::vector<Index>& held, std::vector<BodyPiece>& pieces);
+
+/// For BodyState::stiffened, once a body that was `before` of the `old` material is `model` of another one: the share
+/// of its stiffness with which it pulls as hard as until now, at most 1. All of it at once would give strained tissue
+/// energy. h: the last substep [s].
+double stiffenedBy(const BodyModel& before, const Material& old, const BodyModel& model, const Material& material,
+                   double h, const BodyState& state);
 
 /// 1 at once after the cut, falling slowly at first, 0 after kEaseTime.
 double easedShare(double eased_for);
