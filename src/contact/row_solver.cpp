@@ -221,6 +221,10 @@ class Solver {
     pushLevers(body, pull.levers, pull.end, more);
   }
 
+  double edgeOf(Index a, Index b) const {
+    return b == kNoIndex ? bodies_[a].edge_length : std::min(bodies_[a].edge_length, bodies_[b].edge_length);
+  }
+
   /// What groups have been moved by goes to their particles, and to where those were, if wanted.
   void moveGroups(bool both) {
     for (const Active& active : scratch_.active)
@@ -233,10 +237,6 @@ class Solver {
   }
 
  private:
-  double edgeOf(Index a, Index b) const {
-    return b == kNoIndex ? bodies_[a].edge_length : std::min(bodies_[a].edge_length, bodies_[b].edge_length);
-  }
-
   void addOwnAnswer(const RowEntry* entries, Index begin, Index end, Index number, double& answer,
                     double& farthest) const {
     const SolverBody& body = bodies_[number];
@@ -394,6 +394,7 @@ void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& spri
   solver.moveGroups(springs);
   if (free.empty()) return;
   for (const auto& active : scratch.active) {
+    if (active.start.norm() > solver.edgeOf(active.a, active.b)) continue;  // of who is deep inside it would throw it
     const Vec3 couple = active.start.cross(active.row->impulse);
     bodies[active.a].leaked += 0.5 * couple;
     bodies[active.b == kNoIndex ? active.a : active.b].leaked += 0.5 * couple;
