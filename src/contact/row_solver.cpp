@@ -210,6 +210,8 @@ class Solver {
     pushLevers(body, pull.levers, pull.end, more);
   }
 
+  double edgeOf(const Active& of) const { return std::min(bodies_[of.a].edge_length, bodies_[of.b].edge_length); }
+
   /// What groups have been moved by goes to their particles, and to where those were, if wanted.
   void moveGroups(bool both) {
     for (const Active& active : scratch_.active)
@@ -221,8 +223,6 @@ class Solver {
   }
 
  private:
-  double edgeOf(const Active& of) const { return std::min(bodies_[of.a].edge_length, bodies_[of.b].edge_length); }
-
   void pushParticles(const Active& active, const Vec3& impulse, Slot* SolverBody::*slots) {
     const ContactRow& row = *active.row;
     const auto each = [&](const SolverBody& body, Index begin, Index end) {
@@ -368,6 +368,7 @@ void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& spri
   solver.moveGroups(springs);
   if (free.empty()) return;
   for (const auto& active : scratch.active) {
+    if (active.start.norm() > solver.edgeOf(active)) continue;  // of who is deep inside it would throw it
     const Vec3 couple = active.start.cross(active.row->impulse);
     bodies[active.a].leaked += 0.5 * couple;
     bodies[active.b].leaked += 0.5 * couple;

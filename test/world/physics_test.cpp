@@ -207,6 +207,10 @@ TEST(Physics, SlidingStartsAndGoesAsCoulombSays) {
     SCOPED_TRACE(static_cast<int>(here.below));
     expectReached("share that is off", here.sliding, slides(here.below, 1.3));
     expectReached("way of what sticks [m]", here.sticking, slides(here.below, 0.9));
+    for (const Figure& figure : here.sticking) {
+      EXPECT_LT(worst("way 2 % below [m]", figure.kind, slides(here.below, 0.98)), 1e-4) << figure.kind;
+      EXPECT_LT(worst("share that is off 2 % above", figure.kind, slides(here.below, 1.02)), 0.5) << figure.kind;
+    }
   }
 }
 
@@ -293,7 +297,7 @@ auto bounces(double restitution) {
 }
 
 TEST(Physics, RestitutionGivesBackItsShareOfTheSpeed) {
-  const std::pair<double, double> cases[] = {{0.0, 0.0003}, {0.5, 0.014}, {0.8, 0.022}, {1.0, 0.03}};
+  const std::pair<double, double> cases[] = {{0.0, 0.0003}, {0.5, 0.014}, {0.8, 0.022}, {0.9, 0.03}, {1.0, 0.03}};
   for (const auto& [restitution, reached] : cases) {
     SCOPED_TRACE(restitution);
     expectReached("height that is off [m]", {{kLooks, reached}, {kOne, reached}}, bounces(restitution), 1.5);
