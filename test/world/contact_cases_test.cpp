@@ -1,7 +1,7 @@
 // Cases of contact with a right answer: a pressed ball, a stack, a tray's edge, jaws, a bowl, a bladder, bodies inside.
 #include <cmath>
 
-#include "drive/supports.h"
+#include "../../src/drive/supports.h"
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/random_organ.h"
