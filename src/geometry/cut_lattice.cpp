@@ -148,13 +148,9 @@ class Cutter {
 
   void cutInside() {
     for (Family& f : families_) {
+      if (std::none_of(f.parts.begin(), f.parts.end(), [&](Index p) { return near_[p]; })) continue;
       const LatticeCell& cell = cellOf(f);
       const SampleSet above = aboveOf(f);
-      // Through an open wound the plane meets neither side of it.
-      if (const SampleSet there = above & cell.samples;
-          (there == kNoSample || there == cell.samples) &&
-          std::none_of(f.parts.begin(), f.parts.end(), [&](Index p) { return near_[p]; }))
-        continue;
       for (int axis = 0; axis < 3; ++axis) {
         const int stride = kSampleStride[axis];
         const SampleSet crossing =
@@ -178,7 +174,7 @@ class Cutter {
           const Index corner = (held ? cellOf(families_[f]) : part).corners[1u << axis];
           for (Index u = uses.offsets[corner]; u < uses.offsets[corner + 1]; ++u) {
             const Index q = uses.cells[u];
-            if (before_.cells[q].isBridge(q) || (!(near_[p] || near_[q]) && above_[p] == above_[q])) continue;
+            if (before_.cells[q].isBridge(q) || !(near_[p] || near_[q])) continue;
             bool next = true;
             for (int k = 0; k < 3; ++k) next = next && before_.cells[q].place[k] == part.place[k] + (k == axis);
             if (next) cutFace(families_[f], p, families_[family_of_[q]], q, axis);
@@ -384,8 +380,14 @@ class Cutter {
         if (axis < 0 || !(k >> axis & 1)) continue;
         const auto across = users.find({was, k ^ 1u << axis});
         if (across == users.end()) continue;
-        for (const Index q : across->second)
-          if (isAcross(cells[c], cells[q], axis)) found[c][k] = 8 * q + (k ^ 1u << axis);
+        int most = -1;  // links that hold; a blade leaves a copy of that cell on either side
+        for (const Index q : across->second) {
+          if (!isAcross(cells[c], cells[q], axis)) continue;
+          const int holds = countSamples(faceLinks(cells[c], cells[q], axis) & ~cells[c].parted[axis]);
+          if (holds <= most) continue;
+          most = holds;
+          found[c][k] = 8 * q + (k ^ 1u << axis);
+        }
       }
     }
     return found;
