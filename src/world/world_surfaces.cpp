@@ -157,7 +157,7 @@ void World::Impl::fillCollider(WorldBody& body, double h_frame, Collider& collid
   body.bounds.max += by;
   collider.bounds = body.bounds;
   const SelfContact wanted = body.material.self_contact;
-  if (!body.material.bends() || wanted == SelfContact::kNone) return;
+  if (!body.material.bends() || body.model->clusters.size() == 1 || wanted == SelfContact::kNone) return;
   if (wanted == SelfContact::kAll) collider.self = PairSearch::Self::kAll;
   if (wanted == SelfContact::kWoundFaces && body.model->incised) collider.self = PairSearch::Self::kCuts;
 }

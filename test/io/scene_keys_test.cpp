@@ -214,7 +214,7 @@ std::vector<Row> rows() {
       {"material", "self_contact: none", "self_contact: all", READ(s.material.self_contact == SelfContact::kNone), "1"},
       {"material", "self_contact: lips", "self_contact: all", READ(s.material.self_contact == SelfContact::kWoundFaces),
        "1"},
-      {"material", "self_contact: all", "", READ(s.material.self_contact == SelfContact::kAll), "1"},
+      {"material", "self_contact: all", "self_contact: none", READ(s.material.self_contact == SelfContact::kAll), "1"},
       {"material", "volume: [[0, 0.1], [0.2, 1]]", "", READ(curve(s.material.volume)), "0.55"},
       {"material", "area: 0.5", "", READ(curve(s.material.area)), "0.5"},
       {"material", "plasticity: {creep: 3}", "", MATERIAL(plasticity.creep), "3"},
