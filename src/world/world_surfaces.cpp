@@ -169,8 +169,8 @@ void World::Impl::measureSurface(WorldBody& body) {
   body.surface_reach = contactReachOf(*body.model);
   const TriangleMesh& surface = body.model->collision ? body.model->collision->mesh : body.model->surface;
   body.edge_length = surface.triangles.empty() ? body.model->spacing : meanEdgeLength(surface);
-  // A surface bends no more finely than its cells.
-  if (body.model->lattice) body.edge_length = std::max(body.edge_length, body.model->spacing);
+  // A surface bends no more finely than its particles.
+  body.edge_length = std::max(body.edge_length, body.model->spacing);
 }
 
 void World::Impl::findNear(double h) {
