@@ -133,7 +133,7 @@ void updateSurface(const BodyModel& model, BodyState& state) {
   }
   for (Index r = 0; r < model.binding.embedded.size(); ++r)
     state.surface[model.binding.embedded[r]] =
-        embeddedPosition(model.binding, state.positions, poses, r) + state.embedded_offsets[r];
+        embeddedPosition(model.binding, state.positions, poses, r);
 }
 
 BodyMeasures measureBody(const BodyModel& model, const BodyState& state) {

@@ -32,8 +32,7 @@ std::size_t bytesOf(const BodyModel& model) {
 }
 
 std::size_t bytesOf(const BodyState& state) {
-  return bytesOf(state.positions, state.velocities, state.poses, state.surface, state.plastic, state.embedded_offsets,
-                 state.eased);
+  return bytesOf(state.positions, state.velocities, state.poses, state.surface, state.plastic, state.eased);
 }
 
 std::size_t bytesOf(const StepScratch& scratch) {

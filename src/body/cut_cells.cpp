@@ -605,15 +605,12 @@ class CellCutter {
       work.new_vertices += embedded.made;
     }
     for (const std::uint32_t patch : from.mesh.patches) work.new_triangles += patch == new_patch;
-    piece.state.surface = from.mesh.vertices;
     piece.state.stretch = state_.stretch;
     piece.state.swelling = state_.swelling;
     piece.state.pace = state_.pace;
     piece.state.stiffened = state_.stiffened;
     piece.state.placed = state_.placed;
-    for (Index r = 0; r < child->binding.embedded.size(); ++r)
-      piece.state.embedded_offsets.push_back(
-          from.mesh.vertices[r] - embeddedPosition(child->binding, piece.state.positions, piece.state.poses, r));
+    updateSurface(*child, piece.state);
     piece.model = std::move(child);
     return piece;
   }

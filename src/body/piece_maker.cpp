@@ -17,7 +17,6 @@
 namespace meshless {
 namespace {
 
-constexpr std::size_t kChunk = 512;  // embedded vertices
 
 template <class Get>
 Vec3 interpolate(const VertexOrigin& origin, const Get& get) {
@@ -203,19 +202,12 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, RestShape rest, const std
   work.bound_embedded = child->binding.bound;
   work.kept_embedded = child->binding.embedded.size() - child->binding.bound;
   for (std::uint32_t patch : from.mesh.patches) work.new_triangles += patch == new_patch_;
-  piece.state.surface = from.mesh.vertices;
   piece.state.stretch = state_.stretch;
   piece.state.swelling = state_.swelling;
   piece.state.pace = state_.pace;
   piece.state.stiffened = state_.stiffened;
   piece.state.placed = state_.placed;
-  piece.state.embedded_offsets.resize(child->binding.embedded.size());
-  inChunks(piece.state.embedded_offsets.size(), kChunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t r = begin; r < end; ++r)
-      piece.state.embedded_offsets[r] =
-          from.mesh.vertices[child->binding.embedded[r]] -
-          embeddedPosition(child->binding, piece.state.positions, piece.state.poses, static_cast<Index>(r));
-  });
+  updateSurface(*child, piece.state);
   piece.model = std::move(child);
   return piece;
 }

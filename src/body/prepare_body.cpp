@@ -24,11 +24,16 @@ constexpr std::size_t kMaxParticles = 200000;
 constexpr std::size_t kMostRegions = 100;
 constexpr std::size_t kMaxVertexParticles = 6000;  // larger surfaces are embedded, but for a subset at the spacing
 constexpr double kAutoParticles = 2500.0;          // interior particles aimed at where no spacing is given
-constexpr double kAutoCells = 1600.0;              // of a lattice, likewise
-constexpr double kReach = 1.75;                    // of the spacing: how far neighbours along the body may be
-constexpr std::size_t kMostLinks = 40;             // of the nearest: vertices finer than the spacing have thousands
-constexpr double kLeastMassShare = 0.1;            // of the mean: no particle is so light that contacts throw it
-constexpr double kCollisionEdge = 0.8;             // of the spacing
+constexpr double kAutoCells = 1600.0;              // of a lattice, likewise, at most
+// [1/s] Of an elastic body: its cells times how often a pressure wave crosses one in a second. A cell takes about two
+// substeps for each crossing, and each of them a tenth of a microsecond: a twentieth of one thread's time.
+constexpr double kCrossings = 4e5;
+constexpr double kThinnest = 0.75;       // of a body's mean thickness: its cells are no wider
+constexpr double kResolutionStep = 1.5;  // of the spacing, from one resolution to the next
+constexpr double kReach = 1.75;          // of the spacing: how far neighbours along the body may be
+constexpr std::size_t kMostLinks = 40;   // of the nearest: vertices finer than the spacing have thousands
+constexpr double kLeastMassShare = 0.1;  // of the mean: no particle is so light that contacts throw it
+constexpr double kCollisionEdge = 0.8;   // of the spacing
 constexpr std::size_t kMostCollisionTriangles = 200000;
 constexpr double kLongestEdge = 1.5;  // of the spacing: the surface bends as finely as its cells
 
@@ -85,6 +90,24 @@ Status validate(const BodyDef& def) {
                    "' has regions; accepted: those of a closed body of an elastic material, with " +
                    "clusters: auto or cells");
   return def.material.validate();
+}
+
+// [m/s]
+double pressureWaveSpeed(const Material& material) {
+  const ElasticParameters p = elasticParameters(material.youngs_modulus, material.poissons_ratio, material.density);
+  return std::sqrt((p.lambda + 2.0 * p.mu) / p.density);
+}
+
+// [m] Of an elastic body by what a simulated second of it costs, but finer where it is thin and kAutoCells allow it.
+double chooseSpacing(const BodyDef& def, bool cells, double edge, double volume, double area) {
+  double spacing = cells ? std::cbrt(volume / kAutoCells) : std::max(1.2 * edge, std::cbrt(volume / kAutoParticles));
+  if (cells && def.material.elastic()) {
+    double speed = pressureWaveSpeed(def.material);
+    for (const TissueRegion& region : def.regions) speed = std::max(speed, pressureWaveSpeed(region.material));
+    const double affordable = std::pow(volume * speed / kCrossings, 0.25), thickness = 2.0 * volume / area;
+    spacing = std::max(spacing, std::min(affordable, kThinnest * thickness));
+  }
+  return spacing * std::pow(kResolutionStep, 1 - static_cast<int>(def.resolution));
 }
 
 // Vertices that become particles: all, or for fine surfaces a subset about `spacing` apart.
@@ -398,13 +421,8 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   model->rest_volume = volume;
   model->rest_area = surfaceArea(surface);
   model->spacing = def.spacing;
-  if (!(model->spacing > 0.0)) {
-    if (!def.solid)
-      model->spacing = edge;
-    else
-      model->spacing =
-          cells ? std::cbrt(volume / kAutoCells) : std::max(1.2 * edge, std::cbrt(volume / kAutoParticles));
-  }
+  if (!(model->spacing > 0.0))
+    model->spacing = def.solid ? chooseSpacing(def, cells, edge, volume, model->rest_area) : edge;
   if (def.solid && volume / std::pow(model->spacing, 3.0) > static_cast<double>(kMaxParticles)) {
     std::ostringstream text;
     text << "spacing " << model->spacing << " m would give body '" << def.name << "' about "
@@ -456,7 +474,6 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   body.state.velocities.assign(model->rest.size(), Vec3::Zero());
   body.state.poses.resize(model->clusters.size());
   for (ClusterPose& cluster : body.state.poses) cluster.rotation = placed.rotation;
-  body.state.embedded_offsets.assign(model->binding.embedded.size(), Vec3::Zero());
   updateSurface(*model, body.state);
   body.def = std::move(def);
   body.model = std::move(model);

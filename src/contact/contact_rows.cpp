@@ -6,6 +6,10 @@
 namespace meshless {
 namespace {
 
+// Of the tissue at a place, what is held, from which on it does not give way: pressed all the same, the rest of it
+// would have to go many times as far in its stead.
+constexpr double kHeld = 0.1;
+
 // Of one body, merged: vertices share particles.
 void addEntries(const FeaturePair& pair, int from, int to, const ContactSurface& surface,
                 std::vector<RowEntry>& entries) {
@@ -25,14 +29,15 @@ void addEntries(const FeaturePair& pair, int from, int to, const ContactSurface&
   }
 }
 
-bool isMostlyHeld(const std::vector<RowEntry>& entries, Index begin, Index end, const double* inverse_masses) {
+bool isHeld(const std::vector<RowEntry>& entries, Index begin, Index end, const RowBody& body) {
   double held = 0.0, all = 0.0;
   for (Index k = begin; k < end; ++k) {
     const double share = std::abs(entries[k].coefficient);
     all += share;
-    if (!(inverse_masses[entries[k].particle] > 0.0)) held += share;
+    const Index i = entries[k].particle;
+    held += share * (body.inverse_masses[i] > 0.0 ? (body.carried ? body.carried[i] : 0.0) : 1.0);
   }
-  return !(held < 0.5 * all);
+  return !(held < kHeld * all);
 }
 
 }  // namespace
@@ -45,8 +50,8 @@ ContactRow* makeRow(const FeaturePair& pair, const RowBody& a, const RowBody& b,
   row.middle = static_cast<Index>(set.entries.size());
   if (pair.of_b > 0 && !with_itself) addEntries(pair, pair.of_a, pair.of_a + pair.of_b, *b.surface, set.entries);
   row.end = static_cast<Index>(set.entries.size());
-  if (isMostlyHeld(set.entries, row.begin, row.middle, a.inverse_masses) &&
-      (row.middle == row.end || isMostlyHeld(set.entries, row.middle, row.end, b.inverse_masses))) {
+  if (isHeld(set.entries, row.begin, row.middle, a) &&
+      (row.middle == row.end || isHeld(set.entries, row.middle, row.end, b))) {
     set.entries.resize(row.begin);
     return nullptr;
   }

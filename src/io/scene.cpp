@@ -280,6 +280,10 @@ class SceneReader {
     double scale = 1.0, edge = 0.0;
     map.number("scale", {0.0, 1e6, true}, scale);
     map.number("spacing", lengths(0.0, true), def.spacing);
+    if (const int chosen = map.choice("resolution", {"coarse", "medium", "fine"}); chosen >= 0)
+      def.resolution = static_cast<Resolution>(chosen);
+    if (map.has("spacing") && map.has("resolution"))
+      source_.fail(map.get("resolution"), "a body has spacing and resolution", "one of them");
     map.number("edge", lengths(0.0, true), edge);
     const MeshRepair repair = readRepair(map);
     if (const YAML::Node pose = map.get("pose"); pose.IsDefined()) def.pose = readPose(source_, pose);

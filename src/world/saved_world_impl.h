@@ -222,12 +222,12 @@ void serialize(A& archive, PlasticShape& v) {
 }
 template <class A>
 void serialize(A& archive, BodyState& v) {
-  auto& [positions, velocities, poses, surface, swelling, stretch, pace, stiffened, substep, plastic, embedded_offsets,
-         eased, eased_for, eased_whole, unwinding, placed] = v;
+  auto& [positions, velocities, poses, surface, swelling, stretch, pace, stiffened, substep, plastic, eased, eased_for,
+         eased_whole, unwinding, placed] = v;
   // Whether the surface is up to date depends on when it was read. The fields that follow do not.
   if constexpr (!std::is_same_v<A, HashArchive>) archive(surface);
-  archive(positions, velocities, poses, swelling, stretch, pace, stiffened, substep, plastic, embedded_offsets, eased,
-          eased_for, eased_whole, unwinding, placed);
+  archive(positions, velocities, poses, swelling, stretch, pace, stiffened, substep, plastic, eased, eased_for,
+          eased_whole, unwinding, placed);
 }
 template <class A>
 void serialize(A& archive, ClusterOptions& v) {
@@ -253,9 +253,11 @@ void serialize(A& archive, CollisionChoice& v) {
 }
 template <class A>
 void serialize(A& archive, BodyDef& v) {
-  auto& [name, mesh, solid, pose, spacing, clusters, collision, material, fixed, regions, copy, notes, warnings] = v;
+  auto& [name, mesh, solid, pose, spacing, resolution, clusters, collision, material, fixed, regions, copy, notes,
+         warnings] = v;
   (void)regions;  // the model has them
-  archive(name, mesh, solid, pose, spacing, clusters, collision, material, fixed, copy, notes, warnings);
+  archive(name, mesh, solid, pose, spacing, choice(resolution, Resolution::kFine), clusters, collision, material, fixed,
+          copy, notes, warnings);
 }
 template <class A>
 void serialize(A& archive, ObstacleDef& v) {

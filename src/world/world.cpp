@@ -127,6 +127,7 @@ WorldBody& World::Impl::admit(std::string name, Material material, BodyModelPtr 
   body->material = std::move(material);
   body->model = std::move(model);
   body->state = std::move(state);
+  body->bounds = boundsOf(body->state.surface);
   bodies.push_back(std::move(body));
   batches_current = contacts_current = false;
   return *bodies.back();
@@ -150,6 +151,7 @@ Result<SpawnReply> World::Impl::spawn(const PreparedBody& body) {
   if (used_names.count(name))
     return Error{ErrorCode::kDuplicateName,
                  "the name '" + name + "' is in use or was retired in this run; " + knownBodies()};
+  if (Status apart = liesApart(body); !apart) return apart.error();
   WorldBody& admitted = admit(name, body.def.material, body.model, body.state);
   say(EventType::kSpawned, name, 0, "spawned " + name);
   return SpawnReply{admitted.id, name, admitted.model->rest.size(), admitted.model->surface.triangles.size(),
@@ -223,7 +225,9 @@ Status World::addObstacle(ObstacleDef obstacle) {
     if (other->def->name == obstacle.name)
       return Error{ErrorCode::kDuplicateName, "there is an obstacle '" + obstacle.name + "' already"};
   if (Status status = checkObstacle(obstacle); !status) return status.error();
-  w.obstacles.push_back(std::make_shared<WorldObstacle>(std::move(obstacle)));
+  auto made = std::make_shared<WorldObstacle>(std::move(obstacle));
+  if (Status apart = w.liesApart(*made); !apart) return apart.error();
+  w.obstacles.push_back(std::move(made));
   w.wakeWithin(w.obstacles.back()->bounds);
   return Done{};
 }

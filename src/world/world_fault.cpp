@@ -29,7 +29,6 @@ void restAnew(WorldBody& body) {
   for (std::size_t v = 0; v < state.surface.size(); ++v) state.surface[v] = placed * model.surface.vertices[v] + shift;
   state.swelling = state.stretch = state.pace = state.stiffened = 1.0;
   state.plastic.clear();
-  state.embedded_offsets.assign(state.embedded_offsets.size(), Vec3::Zero());
   state.eased.clear();
   state.eased_for = 0.0;
   state.unwinding = false;

@@ -213,7 +213,7 @@ struct World::Impl {
   WorldBody& admit(std::string name, Material material, BodyModelPtr model, BodyState state);
   void retire(const BodyId& id);
   Result<SpawnReply> spawn(const PreparedBody& body);
-  void refreshSurface(WorldBody& body);
+  static void refreshSurface(WorldBody& body);
   void needContactMesh(WorldBody& body);
   std::string knownBodies() const;
 
@@ -305,7 +305,11 @@ struct World::Impl {
   void stepWork(SurfaceWork& work, double h, int parts, int parts_left, const ForEach& each);
   /// Who presses on whom: for who sleeps, and who is wound up.
   void listLoaded();
-  void fadeEmbeddedOffsets(WorldBody& body, double h);
+  /// Else it or what is there lies wholly inside the other: refused (kInvalidArgument).
+  Status liesApart(const PreparedBody& body);
+  Status liesApart(const WorldObstacle& obstacle);
+  template <class Check>
+  Status eachAround(const Box& box, const Check& check);
 };
 
 /// Bodies that cuts have made or opened, at most: a blade through all of a heap of crumbs would double it, and each of

@@ -10,9 +10,6 @@
 namespace meshless {
 namespace {
 
-constexpr double kEmbeddedFade = 0.25;  // [s] in which offsets of embedded vertices fall to 1/e
-constexpr double kOffsetGone = 1e-7;    // of the spacing: then it is dropped
-
 class Stopwatch {
  public:
   explicit Stopwatch(double& seconds) : seconds_(seconds), start_(std::chrono::steady_clock::now()) {}
@@ -125,15 +122,6 @@ void World::Impl::wakePushed(double h_frame) {
   way.min.array() -= push.radius;
   way.max.array() += push.radius;
   wakeWithin(way);
-}
-
-void World::Impl::fadeEmbeddedOffsets(WorldBody& body, double h) {
-  const double left = std::exp(-h / kEmbeddedFade);
-  const double gone = kOffsetGone * body.model->spacing;
-  for (Vec3& offset : body.state.embedded_offsets) {
-    offset *= left;
-    if (offset.squaredNorm() < gone * gone) offset.setZero();
-  }
 }
 
 }  // namespace meshless

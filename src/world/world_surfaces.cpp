@@ -254,6 +254,7 @@ void World::Impl::findSurfaceContacts(double h) {
       const SurfaceModel& model = surfaceModel(*bodies[b]);
       colliders[b].surface = &model.surface;
       colliders[b].inverse_masses = model.inverse_masses.data();
+      if (!model.model->carried.empty()) colliders[b].carried = model.model->carried.data();
     }
     surface_contacts.findMoved(scene, colliders);
     forNumbers(bodies.size(), [&](std::size_t b) {
@@ -522,7 +523,6 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
     work.match += secondsSince(last);
   }
   for (std::size_t n = 0; n < work.member_count; ++n) surface_contacts.finishIsland(work.members[n].island, h);
-  for (WorldBody* body : work.bodies) fadeEmbeddedOffsets(*body, h_frame);
   for (std::size_t n = 0; n < batches.size(); ++n)
     if (work.lanes[n]) giveBackLanes(batches[n], std::move(work.lanes[n]));
 }

@@ -2,9 +2,9 @@
 
 #include <limits>
 
+#include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/body/deform.h"
 #include "support/bodies.h"
 
 namespace meshless {
@@ -101,6 +101,42 @@ TEST(PrepareBody, AnOpenSurfaceIsAShellWithoutAVolume) {
   EXPECT_EQ(body.model->rest_volume, 0.0);
   EXPECT_GT(body.model->mass, 0.0);
   EXPECT_LE(body.model->rest.size(), body.model->surface.vertices.size());
+}
+
+// Cells times the highest frequency [rad/s] is what a simulated second takes: at most twice as much for one organ as
+// for another, of whatever size and stiffness. What is thin has cells no wider than it is thick, unless that takes very
+// many. The next resolution takes five times as much.
+TEST(PrepareBody, OrgansOfAnySizeAndStiffnessCostTheSameByDefault) {
+  const auto made = [](const TriangleMesh& mesh, double youngs_modulus, Resolution resolution) {
+    BodyDef def = defOf(mesh);
+    def.material.youngs_modulus = youngs_modulus;
+    def.material.poissons_ratio = 0.45;
+    def.resolution = resolution;
+    return prepared(def);
+  };
+  const auto cost = [](const PreparedBody& body) {
+    return static_cast<double>(body.model->cells->cells.size()) * body.model->highest_frequency;
+  };
+  double least = 1e300, most = 0.0;
+  for (const double radius : {0.01, 0.03, 0.1})
+    for (const double youngs_modulus : {2e3, 2e4}) {
+      const TriangleMesh ball = sphereMesh(radius, 0.2 * radius);
+      const PreparedBody medium = made(ball, youngs_modulus, Resolution::kMedium);
+      least = std::min(least, cost(medium));
+      most = std::max(most, cost(medium));
+      const PreparedBody fine = made(ball, youngs_modulus, Resolution::kFine);
+      EXPECT_NEAR(medium.model->spacing / fine.model->spacing, 1.5, 1e-9);
+      EXPECT_NEAR(made(ball, youngs_modulus, Resolution::kCoarse).model->spacing / medium.model->spacing, 1.5, 1e-9);
+      EXPECT_NEAR(cost(fine) / cost(medium), 5.0, 1.5) << radius << " " << youngs_modulus;
+    }
+  EXPECT_LT(most, 2.0 * least);
+  EXPECT_LT(most, 2e6) << "a tenth of a thread: two substeps of a tenth of a microsecond in each 2.2 radians";
+  for (const double thickness : {0.02, 0.01, 0.006}) {
+    const PreparedBody plate = made(boxMesh(Vec3(0.1, 0.1, thickness), 0.01), 1e5, Resolution::kMedium);
+    EXPECT_LT(plate.model->spacing, thickness);
+  }
+  const PreparedBody foil = made(boxMesh(Vec3(0.1, 0.1, 0.0005), 0.01), 1e4, Resolution::kMedium);
+  EXPECT_LT(foil.model->cells->cells.size(), 6400u) << "half a millimetre everywhere would take 40,000";
 }
 
 TEST(PrepareBody, RefusesBadChoicesByName) {

@@ -153,6 +153,8 @@ TEST_F(Scene, FaultsAreNamedWithFileLineValueAndRange) {
       {"bodies:\n  - {file: ../cube.obj, primitive: {sphere: 1}}\n", 2, {"file and primitive"}},
       {body + "    scale: 0\n", 3, {"scale is 0", "above 0"}},
       {body + "    spacing: -0.1\n", 3, {"spacing is -0.1"}},
+      {body + "    resolution: high\n", 3, {"resolution", "high", "coarse, medium, fine"}},
+      {body + "    spacing: 0.1\n    resolution: fine\n", 4, {"spacing and resolution", "one of them"}},
       {body + "    cells: half\n", 3, {"cells is 'half'", "filled"}},
       {body + "    repair: weld\n", 3, {"repair is 'weld'", "none, mend, wrap"}},
       {body + "    clusters: many\n", 3, {"clusters is 'many'", "auto, one"}},

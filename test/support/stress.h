@@ -311,7 +311,6 @@ inline Twins stoppedAsAWhole(Twins& twins, const WorldSettings& settings, double
     for (std::size_t i = 0; i < now.particles.size(); ++i)
       body.state.velocities[i] -= together.velocity + together.spin.cross(now.particles[i] - together.centre);
     body.state.poses.resize(body.model->clusters.size());
-    body.state.embedded_offsets.assign(body.model->binding.embedded.size(), Vec3::Zero());
     updateSurface(*body.model, body.state);
     calm.spawn(std::make_shared<const PreparedBody>(std::move(body)));
   }

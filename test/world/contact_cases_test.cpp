@@ -216,14 +216,15 @@ TEST(ContactCases, ACollapsedBladderIsCut) {
     EXPECT_GE(replyOf<CutReply>(world.apply(cut)).new_bodies.size(), 2u);
     double volume = 0.0;
     for (const BodySnapshot& piece : seen(world).bodies) volume += piece.measures.volume;
-    EXPECT_NEAR(volume, whole.measures.volume, 1e-3 * whole.measures.volume);
+    // Folded cells let go of what a blade has parted: the surface follows those of its own side from then on.
+    EXPECT_NEAR(volume, whole.measures.volume, 1e-2 * whole.measures.volume);
     run(world, 0.5);
     for (const BodySnapshot& piece : seen(world).bodies) EXPECT_LT(speed(piece), 0.5);
   }
 }
 
-// Bodies of any shape, spawned inside of others and of obstacles, are not thrown out; who is half inside what is convex
-// comes out.
+// Bodies of any shape, spawned inside of others and of obstacles, are refused where they are wholly inside. Others are
+// not thrown out; who is half inside what is convex comes out.
 TEST(ContactCases, WhoIsSpawnedInsideIsLetOutSlowly) {
   const std::vector<shapes::Shape> hosts = {{"box of 12", boxMesh(Vec3::Constant(0.2), 1, 1, 1)},
                                             {"hollow", shapes::moved(shapes::hollowSphere(), Pose(), 1.5)},
@@ -231,8 +232,9 @@ TEST(ContactCases, WhoIsSpawnedInsideIsLetOutSlowly) {
                                             {"plate", boxMesh(Vec3(0.3, 0.3, 0.005), 3, 3, 1)}};
   const std::vector<shapes::Shape> guests = {{"torus", torusMesh(0.035, 0.014, 0.012)},
                                              {"hollow", shapes::moved(shapes::hollowSphere(), Pose(), 0.5)}};
-  const auto inside = [](const shapes::Shape& host, const shapes::Shape& guest, const Material& material, bool obstacle,
-                         bool half) {
+  int refused = 0;
+  const auto inside = [&](const shapes::Shape& host, const shapes::Shape& guest, const Material& material,
+                          bool obstacle, bool half) {
     SCOPED_TRACE(guest.name + (half ? " half in " : " in ") + (obstacle ? "obstacle " : "body ") + host.name +
                  (material.elastic() ? ", elastic" : ", alpha " + std::to_string(material.alpha)));
     World world(test::weightless());
@@ -243,7 +245,13 @@ TEST(ContactCases, WhoIsSpawnedInsideIsLetOutSlowly) {
     BodyDef def =
         bodyOf(guest.mesh, material, 0.025, half ? Vec3(0.083, 0.011, 0.007) : Vec3(0.004, 0.003, -0.002), "guest");
     def.pose.rotation = Quat(Eigen::AngleAxisd(0.4, Vec3(1, 2, 3).normalized()));
-    add(world, def);
+    const PreparedBody prepared = test::prepared(def);
+    const SolidQuery solid(host.mesh);
+    const bool wholly = std::all_of(prepared.state.surface.begin(), prepared.state.surface.end(),
+                                    [&](const Vec3& p) { return solid.contains(p); });
+    ASSERT_EQ(world.addSceneBody(std::make_shared<const PreparedBody>(prepared)).ok(), !wholly);
+    refused += wholly;
+    if (wholly) return;
     const bool comes_out = half && host.mesh.vertices.size() == 8;
     const double before = comes_out ? deepest(world) : 0.0;
     double fastest = 0.0;
@@ -261,6 +269,7 @@ TEST(ContactCases, WhoIsSpawnedInsideIsLetOutSlowly) {
         for (const bool obstacle : {true, false})
           for (const bool half : {false, true})
             if (obstacle || host.name != "plate") inside(host, guest, material, obstacle, half);
+  EXPECT_EQ(refused, 8) << "both guests in the middle of the box";
 }
 
 }  // namespace

@@ -76,11 +76,12 @@ std::pair<std::size_t, double> inside(const BodySnapshot& a, const BodySnapshot&
   return found;
 }
 
+// All but a corner of it is inside.
 TEST(Contact, ABodySpawnedInsideAnotherIsDepenetratedSlowlyAndMomentumStays) {
   for (const double size : {0.01, 1.0, 20.0}) {
     World world(space());
     add(world, box("large", Vec3::Constant(size), {4, 4, 4}, Vec3::Zero()), Vec3(0.1, 0.0, 0.0) * size);
-    add(world, box("small", Vec3::Constant(0.3 * size), {2, 2, 2}, Vec3(0.05, 0.1, -0.02) * size));
+    add(world, box("small", Vec3::Constant(0.3 * size), {2, 2, 2}, Vec3(0.36, 0.1, -0.02) * size));
     const Vec3 before = momentum(world);
     const double scale = seen(world).bodies[0].model->mass * size;
     Vec3 last = seen(world).bodies[1].measures.centre_of_mass - seen(world).bodies[0].measures.centre_of_mass;
@@ -273,6 +274,50 @@ TEST(Contact, AnObstacleHoldsWhatFallsOnItAndNeverMoves) {
   const Status refused = world.addObstacle(bad);
   ASSERT_FALSE(refused.ok());
   EXPECT_NE(refused.error().detail.find("-1"), std::string::npos);
+}
+
+// Contact knows no way out: the small one in the large one, in either order, and either of them an obstacle. What
+// stands out by a little may start there, and so may what lies in a cavity.
+TEST(Contact, NobodyStartsWhollyInsideAnother) {
+  const auto obstacle = [](const std::string& name, TriangleMesh mesh) {
+    ObstacleDef def;
+    def.name = name;
+    def.mesh = std::move(mesh);
+    return def;
+  };
+  const TriangleMesh small = boxMesh(Vec3::Constant(0.05), 1, 1, 1), large = boxMesh(Vec3::Constant(0.2), 2, 2, 2);
+  TriangleMesh hollow = boxMesh(Vec3::Constant(0.3), 1, 1, 1);
+  shapes::append(hollow, shapes::turnedInsideOut(boxMesh(Vec3::Constant(0.25), 1, 1, 1)));
+  for (const double aside : {0.0, 0.074, 0.076}) {
+    const bool inside = aside < 0.075;
+    const auto body = [&](const TriangleMesh& mesh, const std::string& name) {
+      BodyDef def = test::defOf(mesh, name);
+      def.pose.translation = name == "small" ? Vec3(aside, 0.0, 0.0) : Vec3::Zero();
+      return std::make_shared<const PreparedBody>(test::prepared(def));
+    };
+    for (const bool small_first : {true, false}) {
+      World world(space());
+      ASSERT_TRUE(world.addSceneBody(small_first ? body(small, "small") : body(large, "large")).ok());
+      const Result<SpawnReply> second = world.addSceneBody(small_first ? body(large, "large") : body(small, "small"));
+      EXPECT_EQ(second.ok(), !inside) << aside << small_first;
+      if (!second.ok())
+        EXPECT_NE(second.error().detail.find("body 'small' lies wholly inside body 'large'"), std::string::npos)
+            << second.error().detail;
+      EXPECT_EQ(world.bodyCount(), inside ? 1u : 2u);
+    }
+    World first(space()), then(space()), around(space());
+    ASSERT_TRUE(first.addObstacle(obstacle("rock", large)).ok());
+    EXPECT_EQ(first.addSceneBody(body(small, "small")).ok(), !inside);
+    ASSERT_TRUE(then.addSceneBody(body(small, "small")).ok());
+    EXPECT_EQ(then.addObstacle(obstacle("rock", large)).ok(), !inside);
+    ASSERT_TRUE(around.addObstacle(obstacle("shell", hollow)).ok());
+    EXPECT_TRUE(around.addSceneBody(body(small, "small")).ok());
+    WorldSettings none = space();
+    none.contact = ContactMethod::kNone;
+    World unmet(none);
+    ASSERT_TRUE(unmet.addSceneBody(body(large, "large")).ok());
+    EXPECT_TRUE(unmet.addSceneBody(body(small, "small")).ok());
+  }
 }
 
 // Thrown, it comes to rest in few and longer substeps, with the impulses of the many short ones of the impact.

@@ -585,7 +585,9 @@ TEST(SurfaceContact, TissueLiesOnLongEdgesBetweenItsVertices) {
 
 // What is held cannot give way, and what is next to it would have to go many times as far in its stead.
 TEST(SurfaceContact, ASphereOnHeldTissueFlingsNothingAway) {
-  for (std::uint64_t seed : {1, 2, 3}) {
+  for (const auto& [seed, spacing] : std::vector<std::pair<std::uint64_t, double>>{
+           {1, 0.0}, {2, 0.0}, {3, 0.0}, {1, 0.006}, {2, 0.0055}, {2, 0.008}, {3, 0.0035}, {1, 0.009}}) {
+    SCOPED_TRACE(std::to_string(seed) + ", spacing " + std::to_string(spacing));
     WorldSettings settings = surface();
     settings.ground.reset();
     World world(settings);
@@ -596,6 +598,7 @@ TEST(SurfaceContact, ASphereOnHeldTissueFlingsNothingAway) {
     def.material.youngs_modulus = 2500.0;
     def.material.poissons_ratio = 0.45;
     def.material.damping = 2.0;
+    def.spacing = spacing;
     const double top = box.max.z();
     def.fixed.push_back(Box{Vec3(-1, -1, top - 0.2 * (top - box.min.z())), Vec3(1, 1, 1)});
     add(world, def);

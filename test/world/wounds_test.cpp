@@ -64,13 +64,14 @@ int tornTriangles(const BodySnapshot& body) {
 
 // A random organ, incised somewhere and spread by locked picks on both sides of the wound. A second incision crosses
 // the first where one is asked for.
-int tornAfterIncision(std::uint64_t seed, bool crossing) {
+int tornAfterIncision(std::uint64_t seed, bool crossing, Resolution resolution) {
   Random random(seed * 7919 + 13);
   BodyDef def = test::defOf(*randomOrgan(seed, random.whole(0, 2), 0.1, 2000));
   def.material.youngs_modulus = 5000.0;
   def.material.poissons_ratio = random.between(0.3, 0.45);
   def.material.damping = 20.0;
   def.material.self_contact = SelfContact::kNone;
+  def.resolution = resolution;
   const TriangleMesh mesh = def.mesh;
   WorldSettings settings = test::weightless();
   settings.contact = ContactMethod::kNone;
@@ -111,19 +112,26 @@ int tornAfterIncision(std::uint64_t seed, bool crossing) {
   return torn;
 }
 
-void expectHardlyTorn(bool crossing, int in_one, int in_all) {
+void expectHardlyTorn(bool crossing, Resolution resolution, int in_one, int in_all) {
   int torn = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    const int here = tornAfterIncision(seed, crossing);
+    const int here = tornAfterIncision(seed, crossing, resolution);
     EXPECT_LE(here, in_one) << "seed " << seed;
     torn += here;
   }
   EXPECT_LE(torn, in_all);
 }
 
-TEST(Wounds, AnIncisionThatIsSpreadTearsHardlyATriangle) { expectHardlyTorn(false, 2, 4); }
+// Wounds of 6 to 30 mm in cells of about 7, and of 5 mm.
+TEST(Wounds, AnIncisionThatIsSpreadTearsHardlyATriangle) {
+  expectHardlyTorn(false, Resolution::kMedium, 6, 24);
+  expectHardlyTorn(false, Resolution::kFine, 3, 8);
+}
 
-TEST(Wounds, CrossingIncisionsThatAreSpreadTearFewTriangles) { expectHardlyTorn(true, 6, 20); }
+TEST(Wounds, CrossingIncisionsThatAreSpreadTearFewTriangles) {
+  expectHardlyTorn(true, Resolution::kMedium, 8, 40);
+  expectHardlyTorn(true, Resolution::kFine, 6, 20);
+}
 
 // [degrees] between the faces of each edge that is flat at rest, but for 30.
 std::vector<double> foldsOf(const BodySnapshot& body) {

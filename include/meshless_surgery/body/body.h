@@ -119,8 +119,6 @@ struct BodyState {
   double stiffened = 1.0;             // share of its material's stiffness that it has; see ease.h
   double substep = 0.0;               // [s] the last one; 0 before the first
   std::vector<PlasticShape> plastic;  // one a cluster once something has flowed; empty before
-  // [m] One for each embedded vertex: from where its carriers have it to where it is. A cut makes it, and it fades.
-  Points embedded_offsets;
   Points eased;            // [m/s^2] one a particle where a cut lets go of it little by little, else empty; see ease.h
   double eased_for = 0.0;  // [s] since that cut
   bool eased_whole = false;  // what is eased may have a force and a torque
