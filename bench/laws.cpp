@@ -76,7 +76,7 @@ void simulate(const BodyModel& model, const Material& material, const Vec3& grav
   MatchCounters counters;
   const auto steps = static_cast<int>(std::lround(seconds / h));
   for (int step = 1; step <= steps; ++step) {
-    const int substeps = std::max(1, static_cast<int>(std::ceil(h * highestFrequencyNow(model, state))));
+    const int substeps = static_cast<int>(substepsNeeded(model, state, h));
     for (int k = 0; k < substeps; ++k) {
       matchAndMove(model, material, gravity, h / substeps, state, scratch, counters);
       // What clamps have taken back is no velocity.

@@ -72,7 +72,7 @@ Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, 
   WorldSettings settings;
   settings.max_substeps = options.max_substeps;
   const double slower =
-      std::max(1.0, highestFrequencyNow(*model, body->state) / settings.step_rate / settings.max_substeps);
+      1.0 / std::sqrt(stiffnessFactor(*model, body->state, 1.0 / settings.step_rate / settings.max_substeps));
   rate /= slower;
   body->def.material.damping = 2.0 * rate;
   settings.ground.reset();

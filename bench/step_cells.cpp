@@ -52,7 +52,7 @@ std::shared_ptr<const Plain> makeCells() {
 
 BatchStep elasticStep(const Plain& body) {
   BatchStep step = stepOf(softTissue());
-  step.h = 0.9 / highestFrequencyNow(body.model, body.state);
+  step.h = 0.9 * longestSubstep(body.model, body.state);
   return step;
 }
 
@@ -76,7 +76,7 @@ class CellsLoop {
     const BodyModel& model = body_.model;
     Points &x = body_.state.positions, &v = body_.state.velocities;
     const double factor = stiffnessFactor(model, body_.state, s.h);
-    const double ahead = 1.0 / (highestFrequencyNow(model, body_.state) * std::sqrt(factor));
+    const double ahead = viscosityTime(model, body_.state, s.h);
     predicted_.resize(x.size());
     sums_.resize((x.size() + kChunk - 1) / kChunk);
     const Vec3 origin = x[0];
@@ -209,7 +209,7 @@ void plainElasticStep(Plain& body, const Material& material, const BatchStep& s)
   y = x;
   const double kept = std::exp(-s.damping * s.h);
   const double factor = stiffnessFactor(model, body.state, s.h);
-  const double ahead = 1.0 / (highestFrequencyNow(model, body.state) * std::sqrt(factor));
+  const double ahead = viscosityTime(model, body.state, s.h);
   RigidMotion rigid;  // none of its own where the body is held
   if (!model.any_fixed) rigid = rigidMotionOf(model, x, v);
   for (std::size_t i = 0; i < x.size(); ++i) {

@@ -56,7 +56,7 @@ Result<Placed> place(const TruthCase& truth, TriangleMesh mesh, const Vec3& at, 
   if (!body) return body.error();
   placed.model = body->model;
   const double slower =
-      std::max(1.0, highestFrequencyNow(*placed.model, body->state) / settings.step_rate / settings.max_substeps);
+      1.0 / std::sqrt(stiffnessFactor(*placed.model, body->state, 1.0 / settings.step_rate / settings.max_substeps));
   placed.rate = rate / slower;
   body->def.material.damping = 2.0 * placed.rate;
   placed.body = std::make_shared<const PreparedBody>(std::move(*body));

@@ -16,6 +16,14 @@ namespace {
 // its weight by up to g / rate^2, a decimetre, rises without a leap.
 constexpr double kStiffening = 10.0;
 
+// Substep times highest frequency, a, and the lag of the viscosity in units of the substep, both where the substep is
+// the longest. A mode is stable while a^2 (1 + 2 lag) < 4; of that, 1.4 and a quarter take 2.9. Without the margin: the
+// frequency was found from below, and the stretch is that of the last substep. The shortest waves are halved within two
+// substeps; a longer lag costs substeps, a shorter one leaves them ringing.
+constexpr double kMostGain = 1.4;
+constexpr double kMargin = 1.1;
+constexpr double kLag = 0.25;
+
 // How hard a body is to turn about a point. Axis by axis: as one matrix, of a body drawn out to a line, the rounding of
 // the axis that turns easily would be a torque about the others.
 class Inertia {
@@ -91,14 +99,23 @@ Vec3 spinWith(const BodyModel& model, const Points& positions, const Vec3& centr
   return Inertia(model, positions, centre).spinFor(momentum);
 }
 
-double highestFrequencyNow(const BodyModel& model, const BodyState& state) {
-  constexpr double kMargin = 1.1;  // the frequency was found from below, and the stretch is that of the last substep
-  return kMargin * state.stretch * model.highest_frequency;
+double longestSubstep(const BodyModel& model, const BodyState& state) {
+  return kMostGain / (kMargin * state.stretch * model.highest_frequency);
+}
+
+double substepsNeeded(const BodyModel& model, const BodyState& state, double time) {
+  const double needed = std::ceil(time / longestSubstep(model, state));
+  return needed < 1.0 ? 1.0 : needed;
 }
 
 double stiffnessFactor(const BodyModel& model, const BodyState& state, double h) {
-  const double gain = h * highestFrequencyNow(model, state);
-  return gain > 1.0 ? 1.0 / (gain * gain) : 1.0;
+  const double share = longestSubstep(model, state) / h;
+  return share < 1.0 ? share * share : 1.0;
+}
+
+double viscosityTime(const BodyModel& model, const BodyState& state, double h) {
+  const double longest = std::max(h, longestSubstep(model, state));
+  return std::isfinite(longest) ? kLag * longest / std::sqrt(state.stiffened) : h;
 }
 
 namespace {
@@ -161,21 +178,19 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
   Points& v = state.velocities;
   scratch.previous = x;
   const double factor = stiffnessFactor(model, state, h);
-  std::optional<MassMoments> moments;
   const double stiffened = state.stiffened;
-  // What vibrates is given at most this share of its energy by becoming stiffer.
-  const double damping = material.damping + (stiffened < 1.0 ? kStiffening : 0.0);
+  const double ahead = material.elastic() ? viscosityTime(model, state, h) : viscosityTime(material.alpha, h);
+  // What vibrates is given at most half of that share of its energy by becoming stiffer.
+  const double damping = material.damping + (stiffened < 1.0 ? 2.0 * kStiffening : 0.0);
   state.stiffened = std::min(1.0, stiffened * std::exp(kStiffening * h));
+  double quicker = 1.0;
   if (material.elastic()) {
-    const double fastest = highestFrequencyNow(model, state) * std::sqrt(factor * stiffened);
-    const double ahead = fastest > 0.0 ? 1.0 / fastest : h;
-    const double pace = std::sqrt(factor), quicker = state.pace > 0.0 ? pace / state.pace : 1.0;
+    const double pace = std::sqrt(factor);
+    if (state.pace > 0.0) quicker = pace / state.pace;
     state.pace = pace;
-    moments = dampAndPredict(model, h, ahead, damping, quicker, scratch.lies, x, v, scratch.predicted);
-  } else {
-    moments =
-        dampAndPredict(model, h, viscosityTime(material.alpha, h), damping, 1.0, scratch.lies, x, v, scratch.predicted);
   }
+  const std::optional<MassMoments> moments =
+      dampAndPredict(model, h, ahead, damping, quicker, scratch.lies, x, v, scratch.predicted);
   const Points& y = scratch.predicted;
   const MatchInput input = matchInput(model, state);
   bool matched = true;
@@ -235,8 +250,8 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
     }
   }
   if (model.clamp) {
-    const double fastest = highestFrequencyNow(model, state), share = fastest > 0.0 ? h * fastest * h * fastest : 1.0;
-    scratch.clamp.hold(model.clamp, share, model.rest, state.placed, x);
+    const double share = h / longestSubstep(model, state);
+    scratch.clamp.hold(model.clamp, share > 0.0 ? share * share : 1.0, model.rest, state.placed, x);
   }
 }
 

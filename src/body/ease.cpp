@@ -71,8 +71,7 @@ double stiffenedBy(const BodyModel& before, const Material& old, const BodyModel
   for (Vec3& v : still.velocities) v.setZero();
   still.eased.clear();
   const auto pulls = [&](const BodyModel& of, const Material& made_of) {  // where nothing is slowed
-    const double fastest = highestFrequencyNow(of, still);
-    return ownAccelerations(of, still, made_of, fastest > 0.0 ? std::min(h, 1.0 / fastest) : h);
+    return ownAccelerations(of, still, made_of, std::min(h, longestSubstep(of, still)));
   };
   const Points then = pulls(before, old);
   still.stiffened = 1.0;

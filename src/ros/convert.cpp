@@ -158,7 +158,7 @@ meshless_surgery::BodyInfo toInfo(const std::string& name, const BodyModel& mode
   message.held = heldShare(model);
   const BodyState rest;
   const double h = 1.0 / settings.step_rate;
-  message.substeps_needed = static_cast<std::uint32_t>(std::max(1.0, std::ceil(h * highestFrequencyNow(model, rest))));
+  message.substeps_needed = static_cast<std::uint32_t>(substepsNeeded(model, rest, h));
   message.stiffness_factor = stiffnessFactor(model, rest, h / std::max(settings.substeps, settings.max_substeps));
   for (const RegionTissue& region : model.regions) message.region_materials.push_back(region.material.name);
   message.region_shares = regionShares(model);

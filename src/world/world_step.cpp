@@ -102,7 +102,7 @@ double World::Impl::substepNow() const {
   const double h_frame = 1.0 / settings.step_rate;
   double needed = settings.substeps;
   for (const auto& body : bodies)  // not `awake`: a cut asks between steps
-    if (!body->asleep) needed = std::max(needed, std::ceil(h_frame * highestFrequencyNow(*body->model, body->state)));
+    if (!body->asleep) needed = std::max(needed, substepsNeeded(*body->model, body->state, h_frame));
   const int most = std::max(settings.substeps, settings.max_substeps);
   return h_frame / (needed < most ? needed : most);  // NaN: most
 }

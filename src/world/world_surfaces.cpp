@@ -301,7 +301,7 @@ int World::Impl::substepsOf(const std::vector<WorldBody*>& some, bool may_meet, 
   double mass = 0.0;
   for (std::size_t n = 0; n < some.size(); ++n) {
     const WorldBody& body = *some[n];
-    const double substeps = std::ceil(h_frame * highestFrequencyNow(*body.model, body.state));
+    const double substeps = substepsNeeded(*body.model, body.state, h_frame);
     stiffest.push_back({std::isfinite(substeps) ? -substeps : -std::numeric_limits<double>::infinity(), n});
     mass += body.model->mass;
   }
@@ -319,7 +319,7 @@ int World::Impl::substepsOf(const std::vector<WorldBody*>& some, bool may_meet, 
     const double factor = stiffnessFactor(*body->model, body->state, h_frame / substeps);
     if (factor < 1.0 && !(body->stiffness_factor < 1.0)) {
       std::ostringstream text;
-      text << body->name << " needs " << std::ceil(h_frame * highestFrequencyNow(*body->model, body->state))
+      text << body->name << " needs " << substepsNeeded(*body->model, body->state, h_frame)
            << " substeps for its material; with " << substeps
            << (substeps < most ? " (as those beside it, which are heavier)" : " (max_substeps)") << " it deforms "
            << 1.0 / std::sqrt(factor) << " times as slowly, to where it would";
@@ -463,7 +463,7 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
     member.previous.resize(member.end - member.begin);
     for (std::size_t b = member.begin; b < member.end; ++b) {
       WorldBody& body = *work.bodies[b];
-        body.state.substep = h;
+      body.state.substep = h;
       body.scratch.lies = island.held && !island.rows.empty();
       if (body.batch != kNoIndex && fitsFloat(body, h))
         work.side_by_side[body.batch].push_back(&body);

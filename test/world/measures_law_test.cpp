@@ -168,7 +168,7 @@ TEST(ContactPointLaw, ForcesAlongNormalsThatPointOutOfTheSupportCarryTheWeight) 
       low.pose.rotation = turn;
       add(world, low);
       if (support == Support::kBody) add(world, brick(kind, "high", Vec3(0.005, 0.003, 0.0765)));
-      run(world, 360);
+      run(world, 720);
       const WorldSnapshot shot = seen(world);
       Load below, between;
       for (const ContactPoint& point : shot.contacts) {

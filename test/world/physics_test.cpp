@@ -175,7 +175,7 @@ double slid(const Kind& kind, Random& random, Below below, double steep) {
   def.material.friction = mu / share;
   def.material.damping = 20.0;
   add(world, def);
-  run(world, 0.3);
+  run(world, 0.6);
   const Vec3 before = centre(world), fast = velocity(world);
   run(world, 0.4);
   if (steep < 1.0) return (centre(world) - before).norm();
@@ -385,7 +385,7 @@ void step(const BodyModel& model, const Material& material, BodyState& state, bo
   StepScratch scratch;
   MatchCounters matched;
   PreserveCounters preserved;
-  const double h = 1.0 / std::max(120.0, 2.0 * highestFrequencyNow(model, state));
+  const double h = std::min(1.0 / 120.0, 0.4 * longestSubstep(model, state));
   matchAndMove(model, material, Vec3::Zero(), h, state, scratch, matched);
   if (keeps) preserve(model, material, state, scratch, preserved);
   velocitiesFromPositions(h, state, scratch);

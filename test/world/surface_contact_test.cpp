@@ -689,7 +689,7 @@ TEST_P(SlowedBodies, ComeToRestWhereEnoughSubstepsWouldBringThem) {
   EXPECT_GT(std::abs(expected), 1e-4);
   const std::string scene = GetParam();
   const bool meets = scene != "held" && scene != "hung";
-  for (const int most : {meets ? 10 : 6, meets ? 5 : 3}) {
+  for (const int most : {meets ? 8 : 4, meets ? 4 : 2}) {
     const double found = restingAt(GetParam(), most, factor);
     EXPECT_LT(factor, 0.5);
     // In the stack, 15 % are 0.1 mm: how deep rows lie in each other, up to the slop, depends on the substeps.

@@ -26,19 +26,23 @@ struct StepScratch {
 /// adds the pull, restores the angular momentum that evaluating at y would leak (not where particles are fixed), adds
 /// damping of the motion that deforms and gravity, and moves. Fixed particles stay. beta acts up to 0.95: without any
 /// rigid share energy could grow.
-/// An elastic material instead accelerates by its stress at y = x + v / highestFrequencyNow, whatever h is: a viscosity
-/// that calms the shortest waves and does not change with the step. Where h is more than 1 / highestFrequencyNow, what
-/// deforms is slowed: it has 1 / stiffnessFactor of the inertia, and all that acts on a body moves it as a whole as
+/// An elastic material instead accelerates by its stress at y = x + v viscosityTime, whatever h is: a viscosity that
+/// calms the shortest waves and does not change with the step. Where h is more than longestSubstep, what deforms is
+/// slowed: it has 1 / stiffnessFactor of the inertia, and all that acts on a body moves it as a whole as
 /// ever. So every step is stable, and equilibria are the material's (Olovsson et al. 2005, "Selective mass scaling for
 /// explicit finite element analyses"). What else acts on particles has to do likewise: it moves them by stiffnessFactor
 /// of what their masses say, and a body that is free as a whole by the rest.
 void matchAndMove(const BodyModel& model, const Material& material, const Vec3& gravity, double h, BodyState& state,
                   StepScratch& scratch, MatchCounters& counters);
 
-/// [rad/s] of an elastic body as it is stretched now; 0 for the others.
-double highestFrequencyNow(const BodyModel& model, const BodyState& state);
+/// [s] in which an elastic body, as it is stretched now, deforms as fast as its material; infinity for the others.
+double longestSubstep(const BodyModel& model, const BodyState& state);
+/// How many of them, at least one, take that time [s].
+double substepsNeeded(const BodyModel& model, const BodyState& state, double time);
 /// 0..1: mass over inertia of what deforms in an elastic body at substeps of h [s]; 1 for the others.
 double stiffnessFactor(const BodyModel& model, const BodyState& state, double h);
+/// [s] by which the stress of an elastic body is ahead in substeps of h [s].
+double viscosityTime(const BodyModel& model, const BodyState& state, double h);
 
 /// v = (x - x_old) / h, after springs and contacts have moved positions.
 void velocitiesFromPositions(double h, BodyState& state, const StepScratch& scratch);
