@@ -196,6 +196,15 @@ void runPieces(benchmark::State& state, const Pieces& of) {
   }
 }
 
+void runOrgans(benchmark::State& state, bool cut, int threads) {
+  for (auto _ : state) {
+    std::vector<double> times;
+    for (int run = 0; run < 3; ++run) times.push_back(timeOrgans(cut, threads));
+    if (median(times) < 0.0) return state.SkipWithError("refused");
+    state.SetIterationTime(median(times));
+  }
+}
+
 void add(const std::string& name, const std::function<void(benchmark::State&)>& run) {
   benchmark::RegisterBenchmark(name.c_str(), run)->Unit(benchmark::kMillisecond)->UseManualTime()->Iterations(1);
 }
@@ -249,6 +258,8 @@ void registerRows() {
     return of_organ;
   };
   const std::tuple<const char*, Pieces> organs[] = {{"elastic_liver/4", {1, 0, 4, material(4500.0, 0.3), 1}},
+                                                    {"elastic_liver/4/20k", {1, 0, 4, material(4500.0, 0.3), 1, 20000}},
+                                                    {"elastic_liver/4/60k", {1, 0, 4, material(4500.0, 0.3), 1, 60000}},
                                                     {"elastic_liver/6", {2, 0, 6, material(4500.0, 0.3), 1}},
                                                     {"elastic_kidney/3", {3, 2, 3, material(5000.0, 0.3), 1}},
                                                     {"elastic_muscle/1", {4, 0, 1, material(11100.0, 0.4), 1}},
@@ -260,6 +271,10 @@ void registerRows() {
       add(std::string("pieces/organ/") + name + "/" + std::to_string(threads) + "threads",
           [=](benchmark::State& s) { runPieces(s, on_threads); });
     }
+  for (const bool cut : {false, true})
+    for (const int threads : {1, 2})
+      add(std::string("organs5/") + (cut ? "cut/" : "uncut/") + std::to_string(threads) + "threads",
+          [=](benchmark::State& s) { runOrgans(s, cut, threads); });
   for (const int bodies : {10, 30, 100, 300, 1000, 3000, 10000})
     addPile("sweep/" + std::to_string(bodies), "sweep", of(bodies), bodies == 10000);
 #ifdef HAVE_BULLET

@@ -7,6 +7,9 @@
 #include <random>
 
 #include "meshless_surgery/body/body.h"
+#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/organs.h"
+#include "meshless_surgery/geometry/primitives.h"
 #include "meshless_surgery/geometry/random_organ.h"
 #include "meshless_surgery/world/world.h"
 
@@ -42,7 +45,7 @@ PiecesTimes timePieces(const Pieces& of) {
   PiecesTimes times;
   BodyDef def;
   def.name = "organ";
-  Result<TriangleMesh> mesh = randomOrgan(of.seed, of.genus, 0.2, 4120);
+  Result<TriangleMesh> mesh = randomOrgan(of.seed, of.genus, 0.2, of.triangles);
   if (!mesh) return times;
   Box box;
   for (const Vec3& p : mesh->vertices) box.extend(p);
@@ -80,6 +83,42 @@ PiecesTimes timePieces(const Pieces& of) {
   times.pieces = shot.bodies.size();
   times.asleep = shot.report.asleep;
   return times;
+}
+
+double timeOrgans(bool cut, int threads) {
+  WorldSettings settings;
+  settings.threads = threads;
+  World world(settings);
+  const TriangleMesh meshes[] = {liverMesh(), kidneyMesh(1), kidneyMesh(2), sphereMesh(0.022, 0.004),
+                                 boxMesh(Vec3::Constant(0.09), 0.01)};
+  double x = 0.0;
+  for (const TriangleMesh& mesh : meshes) {
+    const Box box = boundsOf(mesh.vertices);
+    BodyDef def;
+    def.name = "organ_" + std::to_string(world.bodyCount());
+    def.mesh = mesh;
+    def.material.youngs_modulus = world.bodyCount() == 0 ? 4500.0 : 5000.0;
+    def.material.poissons_ratio = 0.45;
+    def.material.density = 1060.0;
+    def.material.damping = 10.0;
+    def.material.friction = 0.3;
+    def.pose.translation = Vec3(x - box.min.x(), 0.0, 0.002 - box.min.z());
+    x += box.max.x() - box.min.x() + 0.02;
+    Result<PreparedBody> body = prepareBody(std::move(def));
+    if (!body || !world.addSceneBody(std::make_shared<const PreparedBody>(std::move(*body))).ok()) return -1.0;
+  }
+  const int second = static_cast<int>(settings.step_rate);
+  (void)secondsOf(world, second);
+  if (!cut) return secondsOf(world, second);
+  for (const BodySnapshot& body : world.snapshot({false, false, true}).bodies) {
+    CutCommand command;
+    command.bodies = {body.name};
+    command.blades.x_axis = Vec3(0.3, 1.0, 0.2).normalized();
+    command.blades.y_axis = command.blades.x_axis.cross(Vec3(1.0, 0.2, 0.1)).normalized();
+    command.blades.origin = body.measures.centre_of_mass - 0.5 * command.blades.x_axis;
+    if (!world.apply(command).ok()) return -1.0;
+  }
+  return secondsOf(world, second);
 }
 
 }  // namespace meshless::bench
