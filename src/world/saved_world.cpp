@@ -16,7 +16,7 @@ namespace meshless {
 namespace {
 
 constexpr std::string_view kMagic = "MLSSTATE";
-constexpr std::uint32_t kVersion = 15;
+constexpr std::uint32_t kVersion = 16;
 constexpr std::uint64_t kMostModels = 1u << 20;
 
 std::uint32_t checksum(std::string_view bytes) {
