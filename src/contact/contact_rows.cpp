@@ -13,18 +13,21 @@ constexpr double kHeld = 0.1;
 // Of one body, merged: vertices share particles.
 void addEntries(const FeaturePair& pair, int from, int to, const ContactSurface& surface,
                 std::vector<RowEntry>& entries) {
+  static thread_local std::vector<Index> places;  // in entries, one a particle; of others where it is not there yet
   const std::size_t begin = entries.size();
   const VertexSupports& supports = surface.supports;
   for (int n = from; n < to; ++n) {
     if (pair.shares[n] == 0.0) continue;
     for (Index k = supports.offsets[pair.vertices[n]]; k < supports.offsets[pair.vertices[n] + 1]; ++k) {
       const double coefficient = pair.shares[n] * supports.weights[k];
-      std::size_t at = begin;
-      while (at < entries.size() && entries[at].particle != supports.particles[k]) ++at;
-      if (at == entries.size())
-        entries.push_back({coefficient, supports.particles[k]});
-      else
-        entries[at].coefficient += coefficient;
+      const Index particle = supports.particles[k];
+      if (places.size() <= particle) places.resize(particle + 1, 0);
+      Index& at = places[particle];
+      if (at < begin || at >= entries.size() || entries[at].particle != particle) {
+        at = static_cast<Index>(entries.size());
+        entries.push_back({0.0, particle});
+      }
+      entries[at].coefficient += coefficient;
     }
   }
 }

@@ -36,14 +36,11 @@ struct SurfacePoint {
 
 SurfacePoint vertexOf(const PairSearch::Side& side, Index v) {
   const ContactSurface& s = *side.surface;
-  SurfacePoint point;
-  point.vertices[0] = point.name[0] = v;
-  point.faces = s.faces.data() + s.face_offsets[v];
-  point.face_count = s.face_offsets[v + 1] - s.face_offsets[v];
-  point.place = side.frame->vertices[v];
-  point.velocity = side.frame->velocities[v];
-  point.normal = side.frame->vertex_normals[v];
-  return point;
+  const SurfaceFrame& frame = *side.frame;
+  const Index begin = s.face_offsets[v], faces = s.face_offsets[v + 1] - begin;
+  return {
+      {v, kNoIndex},          1.0, {v, kNoIndex}, s.faces.data() + begin, faces, frame.vertices[v], frame.velocities[v],
+      frame.vertex_normals[v]};
 }
 
 /// The number-th of so many between the ends of a ridge.
@@ -53,7 +50,7 @@ SurfacePoint ridgePoint(const PairSearch::Side& side, Index e, Index number, Ind
   SurfacePoint point;
   point.vertices = edge.vertices;
   point.share = 1.0 - (number + 1.0) / (count + 1.0);
-  point.name = {e, number};
+  point.name = {side.surface->vertices() + e, number};  // after all vertices
   point.faces = edge.faces.data();
   point.face_count = edge.faces[1] == kNoIndex ? 1 : 2;
   const auto mean = [&](const Points& of) {
@@ -74,8 +71,7 @@ double opposition(const SurfaceFrame& frame, const SurfacePoint& point, const Ve
   return most;
 }
 
-/// Whether a point sticks out along a direction, as against its neighbours: what comes from there meets it and not
-/// them.
+/// Whether a point sticks out along a direction: what comes from there meets it and not its neighbours.
 bool sticksOut(const PairSearch::Side& side, const SurfacePoint& point, const Vec3& direction) {
   for (std::size_t k = 0; k < point.face_count; ++k)
     for (const Index v : side.surface->triangles[point.faces[k]]) {
@@ -83,6 +79,15 @@ bool sticksOut(const PairSearch::Side& side, const SurfacePoint& point, const Ve
       if (way.dot(direction) > kFlat * way.norm()) return false;
     }
   return true;
+}
+
+/// The part of a way from p to q that is in a box, from .. to of 0 .. 1.
+bool clip(const Box& box, const Vec3& p, const Vec3& q, double& from, double& to) {
+  const Eigen::Array3d way = (q - p).array() + 1e-300;  // never 0
+  const Eigen::Array3d low = (box.min - p).array() / way, high = (box.max - p).array() / way;
+  from = std::max(0.0, low.min(high).maxCoeff());
+  to = std::min(1.0, low.max(high).minCoeff());
+  return from <= to;
 }
 
 class PointSearch {
@@ -95,16 +100,65 @@ class PointSearch {
         margin_(searchMargin(search.length)),
         pairs_(scratch.pairs),
         sides_(scratch.sides),
+        scratch_(scratch),
         candidates_(scratch.faces) {}
 
-  void find(const SurfacePoint& point) {
-    const bool within = search_.self == PairSearch::Self::kCuts;
-    if (within && !a_.surface->cut_vertices[point.vertices[0]]) return;
-    remembered_ = point.isVertex() ? recall(point.vertices[0]) : nullptr;
+  /// Of the vertices of a, each with the faces that it may meet.
+  void findVertices() {
+    const RememberedSide* side = search_.remembered;
+    const RememberedSide* const end = side + search_.remembered_count;
+    for (Index v = 0; v < scratch_.first.size(); ++v) {
+      while (side != end && side->vertex < v) ++side;
+      remembered_ = side != end && side->vertex == v ? side : nullptr;
+      const bool inside = remembered_ && remembered_->depth > 0.0;
+      if (scratch_.first[v] == kNoIndex && !inside && !mayBeginInside(a_.frame->vertices[v])) continue;
+      if (search_.self == PairSearch::Self::kCuts && !a_.surface->cut_vertices[v]) continue;
+      const SurfacePoint point = vertexOf(a_, v);
+      candidates_.clear();
+      if (inside)
+        gather(point, margin_ + remembered_->depth);
+      else
+        for (Index k = scratch_.first[v]; k != kNoIndex; k = scratch_.met[k].next)
+          consider(point, scratch_.met[k].face, margin_);
+      meet(point);
+    }
+    remembered_ = nullptr;
+  }
+
+  /// Between the ends of a long ridge nothing but points on it meets what it crosses.
+  void findRidgePoints() {
+    const SurfaceFrame& frame = *a_.frame;
+    const Vec3 margin = Vec3::Constant(margin_);
+    for (Index e = 0; e < a_.surface->edges.size(); ++e) {
+      const ContactEdge& edge = a_.surface->edges[e];
+      const Index count = static_cast<Index>(std::min(edge.length / search_.spacing + 1e-6, kMostRidgePoints));
+      if (count == 0) break;                                                     // so are all that come after it
+      Box around{b_.frame->bounds.min - margin, b_.frame->bounds.max + margin};  // swept, and as far as the ends go
+      for (const Index v : edge.vertices) {
+        const Vec3 way = search_.h * frame.velocities[v];
+        around.min = around.min.cwiseMin(b_.frame->bounds.min - margin - way);
+        around.max = around.max.cwiseMax(b_.frame->bounds.max + margin - way);
+      }
+      double from, to;
+      if (!clip(around, frame.vertices[edge.vertices[0]], frame.vertices[edge.vertices[1]], from, to)) continue;
+      if (!isRidge(*a_.surface, frame, edge)) continue;
+      const Index first = static_cast<Index>(std::max(0.0, std::ceil(from * (count + 1.0)) - 1.0));
+      for (Index n = first; n < count && n + 1.0 <= to * (count + 1.0); ++n) {
+        const SurfacePoint point = ridgePoint(a_, e, n, count);
+        candidates_.clear();
+        gather(point, margin_);
+        meet(point);
+      }
+    }
+  }
+
+  std::size_t queried() const { return queried_; }
+
+ private:
+  /// The point and its candidates.
+  void meet(const SurfacePoint& point) {
     const Vec3& p = point.place;
-    const double near = margin_ + (remembered_ ? remembered_->depth : 0.0);
     ++queried_;
-    gather(point, near);
     if (candidates_.empty() && mayBeginInside(p) && windingAround(p) > 0) gather(point, b_.frame->bounds.diagonal());
     if (candidates_.empty()) return;
     const NearFace& best = chooseNearest(point);
@@ -115,18 +169,9 @@ class PointSearch {
     else if (search_.self == PairSearch::Self::kNo || remembered_)
       meetInside(point, -distance);
   }
-  std::size_t queried() const { return queried_; }
 
- private:
   bool mayBeginInside(const Vec3& p) const {
     return search_.first && search_.self == PairSearch::Self::kNo && b_.surface->closed && b_.frame->bounds.contains(p);
-  }
-
-  const RememberedSide* recall(Index v) const {
-    const RememberedSide* const end = search_.remembered + search_.remembered_count;
-    const RememberedSide* const at = std::lower_bound(
-        search_.remembered, end, v, [](const RememberedSide& side, Index vertex) { return side.vertex < vertex; });
-    return at != end && at->vertex == v ? at : nullptr;
   }
 
   bool mayMeet(const SurfacePoint& point, Index face) const {
@@ -149,27 +194,28 @@ class PointSearch {
   }
 
   void gather(const SurfacePoint& point, double within) {
-    candidates_.clear();
-    const Vec3 &p = point.place, &velocity = point.velocity;
-    const Vec3 end = p + search_.h * velocity;
-    b_.surface->tree.query(b_.frame->boxes, boxAround(p, end, within), [&](Index face) {
-      if (!mayMeet(point, face)) return;
-      const Triangle& t = b_.surface->triangles[face];
-      const Points &x = b_.frame->vertices, &u = b_.frame->velocities;
-      NearFace c;
-      c.face = face;
-      c.weights = nearestWeights(p, x[t[0]], x[t[1]], x[t[2]]);
-      c.point = c.weights[0] * x[t[0]] + c.weights[1] * x[t[1]] + c.weights[2] * x[t[2]];
-      c.distance = (p - c.point).norm();
-      // What goes along the plane across what is between them comes no nearer.
-      const Vec3 way = p - c.point;
-      const double towards = std::max({way.dot(u[t[0]]), way.dot(u[t[1]]), way.dot(u[t[2]])}) - way.dot(velocity);
-      c.reach = c.distance > 0.0 ? search_.h * std::max(0.0, towards / c.distance) : 0.0;
-      if (c.distance > within + c.reach) return;
-      c.reach += margin_;
-      c.corners = static_cast<int>((c.weights.array() > 0.0).count());
-      candidates_.push_back(c);
-    });
+    const FloatBox box = boxAround(point.place, point.place + search_.h * point.velocity, within);
+    b_.surface->tree.query(b_.frame->faces, box, [&](Index face) { consider(point, face, within); });
+  }
+
+  void consider(const SurfacePoint& point, Index face, double within) {
+    if (!mayMeet(point, face)) return;
+    const Vec3& p = point.place;
+    const Triangle& t = b_.surface->triangles[face];
+    const Points &x = b_.frame->vertices, &u = b_.frame->velocities;
+    NearFace c;
+    c.face = face;
+    c.weights = nearestWeights(p, x[t[0]], x[t[1]], x[t[2]]);
+    c.point = c.weights[0] * x[t[0]] + c.weights[1] * x[t[1]] + c.weights[2] * x[t[2]];
+    // What goes along the plane across what is between them comes no nearer.
+    const Vec3 way = p - c.point;
+    c.distance = way.norm();
+    const double towards = std::max({way.dot(u[t[0]]), way.dot(u[t[1]]), way.dot(u[t[2]])}) - way.dot(point.velocity);
+    c.reach = c.distance > 0.0 ? search_.h * std::max(0.0, towards / c.distance) : 0.0;
+    if (c.distance > within + c.reach) return;
+    c.reach += margin_;
+    c.corners = static_cast<int>((c.weights.array() > 0.0).count());
+    candidates_.push_back(c);
   }
 
   const NearFace& chooseNearest(const SurfacePoint& point) const {
@@ -210,7 +256,7 @@ class PointSearch {
     Vec3 far = p;
     far.x() = std::max(p.x(), b_.frame->bounds.max.x()) + search_.length;
     int winding = 0;
-    b_.surface->tree.query(b_.frame->boxes, boxAround(p, far, 0.0), [&](Index face) {
+    b_.surface->tree.query(b_.frame->faces, boxAround(p, far, 0.0), [&](Index face) {
       const Triangle& t = b_.surface->triangles[face];
       std::array<Vec3, 3> corner;
       for (int k = 0; k < 3; ++k) corner[k] = b_.frame->vertices[t[k]] - p;
@@ -255,13 +301,10 @@ class PointSearch {
 
   void meetOutside(const SurfacePoint& point, const NearFace& best) {
     const Vec3& p = point.place;
-    const Vec3& face_normal = b_.frame->face_normals[best.face];
     if (best.distance <= tie_) {
-      Vec3 normal = face_normal;
+      Vec3 normal = b_.frame->face_normals[best.face];
       if (!b_.surface->closed && remembered_ && remembered_->normal.dot(normal) < 0.0) normal = -normal;
-      if (mayPush(point, normal)) {
-        add(point, best, normal, normal.dot(p - best.point));
-      }
+      if (mayPush(point, normal)) add(point, best, normal, normal.dot(p - best.point));
     } else if (best.distance <= best.reach) {
       const Vec3 normal = (p - best.point) / best.distance;
       if (mayPush(point, normal) && (best.corners == 3 || sticksOut(a_, point, -normal)))
@@ -303,9 +346,7 @@ class PointSearch {
       const double same = remembered_ ? normal.dot(remembered_->normal) : 0.0;
       if (!(opposed > kLeastOpposed || same > kSameWay)) continue;
       double cost = c.distance / std::max(kLeastOpposed, opposed * opposed);
-      if (remembered_) {
-        cost /= kLeastOpposed + std::max(0.0, same) * same;
-      }
+      if (remembered_) cost /= kLeastOpposed + std::max(0.0, same) * same;
       if (!(cost < least)) continue;
       least = cost;
       out = &c;
@@ -341,6 +382,7 @@ class PointSearch {
   const double tie_, margin_;
   std::vector<FeaturePair>& pairs_;
   std::vector<RememberedSide>& sides_;
+  const SearchScratch& scratch_;
   std::vector<NearFace>& candidates_;
   const RememberedSide* remembered_ = nullptr;
   std::size_t made_ = 0, queried_ = 0;
@@ -369,79 +411,32 @@ void leadOut(const PairSearch& search, SearchScratch& found) {
   }
 }
 
-/// Which vertices of a are near enough to b to be queried, to scratch.near.
-void findVerticesNear(const PairSearch& search, SearchScratch& scratch) {
-  const ContactSurface& a = *search.a.surface;
-  // Any may begin inside another, far from all faces.
-  const bool all = search.first && search.self == PairSearch::Self::kNo;
-  scratch.near.assign(a.vertices(), all);
-  if (all) return;
-  double deepest = 0.0;
-  for (std::size_t k = 0; k < search.remembered_count; ++k) deepest = std::max(deepest, search.remembered[k].depth);
+/// Which faces of b vertices of a may meet.
+void findNear(const PairSearch& search, SearchScratch& scratch) {
+  scratch.met.clear();
+  scratch.first.assign(search.a.surface->vertices(), kNoIndex);
+  const SurfaceFrame &a = *search.a.frame, &b = *search.b.frame;
   const auto mayMeet = [&](Index mine, Index theirs) {
     return search.self == PairSearch::Self::kNo ||
-           search.a.frame->normals.nodes[mine].leastDot(search.b.frame->normals.nodes[theirs]) < -kSelfOpposed;
+           a.point_turns.nodes[mine].leastDot(b.face_turns.nodes[theirs]) < -kSelfOpposed;
   };
-  a.tree.queryTree(search.a.frame->boxes, search.b.surface->tree, search.b.frame->boxes,
-                   searchMargin(search.length) + deepest, scratch.query, mayMeet, [&](Index face) {
-                     for (const Index v : a.triangles[face]) scratch.near[v] = 1;
-                   });
-}
-
-/// The part of a way from p to q that is in a box, from .. to of 0 .. 1.
-bool clip(const Box& box, const Vec3& p, const Vec3& q, double& from, double& to) {
-  from = 0.0;
-  to = 1.0;
-  for (int k = 0; k < 3; ++k) {
-    const double way = q[k] - p[k];
-    if (way == 0.0) {
-      if (p[k] < box.min[k] || p[k] > box.max[k]) return false;
-      continue;
-    }
-    double enter = (box.min[k] - p[k]) / way, leave = (box.max[k] - p[k]) / way;
-    if (enter > leave) std::swap(enter, leave);
-    from = std::max(from, enter);
-    to = std::min(to, leave);
-  }
-  return from <= to;
-}
-
-/// Between the ends of a long ridge nothing but points on it meets what it crosses.
-template <class Visit>
-void eachRidgePoint(const PairSearch& search, const SearchScratch& scratch, const Visit& visit) {
-  const SurfaceFrame& frame = *search.a.frame;
-  Box reach = search.b.frame->bounds;  // swept
-  const double by = searchMargin(search.length);
-  reach.min.array() -= by;
-  reach.max.array() += by;
-  for (const Index e : frame.ridges) {
-    const ContactEdge& edge = search.a.surface->edges[e];
-    const Index count = static_cast<Index>(std::min(edge.length / search.spacing + 1e-6, kMostRidgePoints));
-    if (count == 0) continue;
-    if (!scratch.near[edge.vertices[0]] || !scratch.near[edge.vertices[1]]) continue;
-    Box around = reach;
-    for (const Index v : edge.vertices) {  // as far as its ends go
-      const Vec3 way = search.h * frame.velocities[v];
-      around.min = around.min.cwiseMin(reach.min - way);
-      around.max = around.max.cwiseMax(reach.max - way);
-    }
-    double from, to;
-    if (!clip(around, frame.vertices[edge.vertices[0]], frame.vertices[edge.vertices[1]], from, to)) continue;
-    const Index first = static_cast<Index>(std::max(0.0, std::ceil(from * (count + 1.0)) - 1.0));
-    for (Index n = first; n < count && n + 1.0 <= to * (count + 1.0); ++n) visit(ridgePoint(search.a, e, n, count));
-  }
+  const float by = static_cast<float>(searchMargin(search.length));
+  search.a.surface->vertex_tree.queryTree(a.points, search.b.surface->tree, b.faces, by, scratch.stack, mayMeet,
+                                          [&](Index v, Index face) {
+                                            scratch.met.push_back({face, scratch.first[v]});
+                                            scratch.first[v] = static_cast<Index>(scratch.met.size() - 1);
+                                          });
 }
 
 }  // namespace
 
 std::size_t findVertexFace(const PairSearch& search, SearchScratch& scratch) {
-  findVerticesNear(search, scratch);
+  findNear(search, scratch);
   PointSearch each(search, scratch);
-  for (Index v = 0; v < scratch.near.size(); ++v)
-    if (scratch.near[v]) each.find(vertexOf(search.a, v));
+  each.findVertices();
   if (search.self != PairSearch::Self::kNo) return each.queried();
   leadOut(search, scratch);
-  eachRidgePoint(search, scratch, [&](const SurfacePoint& point) { each.find(point); });
+  each.findRidgePoints();
   return each.queried();
 }
 
@@ -492,7 +487,7 @@ void findSphere(const PairSearch& search, const Vec3& centre, double radius, con
     const double distance = (point - centre).norm();
     if (distance > reach + (search.h * velocity - way).norm()) return;
     pair.features = {pair.vertices[0], pair.vertices[1]};
-    pair.order = static_cast<std::uint8_t>(pair.of_a);
+    pair.order = static_cast<std::uint8_t>(3 - pair.of_a);  // names ascend as vertices do
     pair.normal = distance > 0.0 ? Vec3((point - centre) / distance) : Vec3(Vec3::UnitZ());
     pair.gap = distance - radius;
     double apart = 0.0;  // [m^2] mean square of the corners from the point
@@ -501,7 +496,7 @@ void findSphere(const PairSearch& search, const Vec3& centre, double radius, con
     pairs.push_back(pair);
   };
   const FloatBox box = boxAround(centre, centre + way, reach);
-  surface.tree.query(a.boxes, box, [&](Index face) {
+  surface.tree.query(a.faces, box, [&](Index face) {
     const Triangle& t = surface.triangles[face];
     meet(t, nearestWeights(centre, a.vertices[t[0]], a.vertices[t[1]], a.vertices[t[2]]));
     for (int k = 0; k < 3; ++k) meet({t[k], t[(k + 1) % 3], t[(k + 2) % 3]}, Vec3::UnitX());

@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Eigenvalues>
+
+#include "meshless_surgery/base/compressed_rows.h"
+
 namespace meshless {
 namespace {
 
@@ -11,22 +15,56 @@ constexpr double kOutSpeed = 0.5;  // [1/s] mean edges: overlap is removed no fa
 constexpr int kSweeps = 4;         // fewer kick aside what lands flat, and let it creep on a slope
 constexpr double kSlop = 0.01;     // mean edges of overlap that stay: stacks that are lifted out of it sway
 
-// Two registers of any x86-64; what is wider goes through memory where it is not there.
-using Two = double __attribute__((vector_size(16), may_alias));
-struct Four {
-  Two low, high;
-  Four& operator+=(const Four& o) {
-    low += o.low;
-    high += o.high;
-    return *this;
-  }
-  friend Four operator*(double s, const Four& v) { return {s * v.low, s * v.high}; }
-};
+#pragma GCC diagnostic ignored "-Wpsabi"  // all of it is inlined
+using Four = double __attribute__((vector_size(32), may_alias));
 
 const Four& four(const Slot& slot) { return reinterpret_cast<const Four&>(slot); }
 Four& four(Slot& slot) { return reinterpret_cast<Four&>(slot); }
-Vec3 vec3(const Four& v) { return {v.low[0], v.low[1], v.high[0]}; }
-Four four(const Vec3& v) { return {Two{v[0], v[1]}, Two{v[2], 0.0}}; }
+Vec3 vec3(const Four& v) { return {v[0], v[1], v[2]}; }
+Four four(const Vec3& v) { return Four{v[0], v[1], v[2], 0.0}; }
+
+// In two halves, so that one need not wait for the other.
+[[gnu::always_inline]] inline Four sumOf(const RowEntry* at, const RowEntry* end, const Slot* slots) {
+  Four even{}, odd{};
+  for (; at + 1 < end; at += 2) {
+    even += at[0].coefficient * four(slots[at[0].particle]);
+    odd += at[1].coefficient * four(slots[at[1].particle]);
+  }
+  if (at < end) even += at->coefficient * four(slots[at->particle]);
+  return even + odd;
+}
+
+/// Mass, centre and inertia of points, added up about one of them.
+struct MassMoments {
+  Vec3 about;                  // [m]
+  double mass = 0.0;           // [kg]
+  Vec3 sum = Vec3::Zero();     // [kg m]
+  Mat3 moment = Mat3::Zero();  // [kg m^2]
+
+  void add(double of_mass, const Vec3& place) {
+    const Vec3 arm = place - about;
+    mass += of_mass;
+    sum += of_mass * arm;
+    moment += of_mass * arm * arm.transpose();
+  }
+  Vec3 centre() const { return about + sum / mass; }
+  /// Of the inertia about the centre; directions below 1e-12 of the largest stay 0.
+  Mat3 inverseInertia() const {
+    const Vec3 mean = sum / mass;
+    const Mat3 spread = moment - mass * mean * mean.transpose();
+    const Mat3 inertia = spread.trace() * Mat3::Identity() - spread;
+    const double scale = inertia.trace();
+    if (!(scale > 0.0)) return Mat3::Zero();
+    if (inertia.determinant() > 1e-9 * scale * scale * scale) return inertia.inverse();
+    const Eigen::SelfAdjointEigenSolver<Mat3> solver(inertia / scale);
+    Mat3 inverse = Mat3::Zero();
+    for (int k = 0; k < 3; ++k)
+      if (solver.eigenvalues()[k] > 1e-12)
+        inverse +=
+            solver.eigenvectors().col(k) * solver.eigenvectors().col(k).transpose() / (solver.eigenvalues()[k] * scale);
+    return inverse;
+  }
+};
 
 class Solver {
  public:
@@ -41,14 +79,10 @@ class Solver {
 
   /// [m] of coefficient x, at the start of the substep or now.
   Vec3 sum(const Active& of, bool before) const {
-    Four total{};
-    const auto each = [&](const SolverBody& body, Index begin, Index end) {
-      const Slot* const slots = before ? body.before : body.now;
-      for (Index k = begin; k < end; ++k) total += of.entries[k].coefficient * four(slots[of.entries[k].particle]);
-    };
-    each(bodies_[of.a], of.row->begin, of.row->middle);
-    each(bodies_[of.b], of.row->middle, of.row->end);
-    return vec3(total);
+    const SolverBody &a = bodies_[of.a], &b = bodies_[of.b];
+    const RowEntry *const entries = of.entries, *const middle = entries + of.row->middle;
+    return vec3(sumOf(entries + of.row->begin, middle, before ? a.before : a.now) +
+                sumOf(middle, entries + of.row->end, before ? b.before : b.now));
   }
 
   /// [m] by what groups have moved.
@@ -61,33 +95,37 @@ class Solver {
   bool meet(Active& active) {
     const ContactRow& row = *active.row;
     const RowEntry* const entries = active.entries;
-    active.levers = static_cast<Index>(scratch_.levers.size());
-    const auto each = [entries](Index begin, Index end, const auto& visit) {
-      for (Index k = begin; k < end; ++k) visit(entries[k].particle, entries[k].coefficient);
-    };
-    addLevers(bodies_[active.a], [&](const auto& visit) { each(row.begin, row.middle, visit); });
-    active.middle = static_cast<Index>(scratch_.levers.size());
-    addLevers(bodies_[active.b], [&](const auto& visit) { each(row.middle, row.end, visit); });
-    active.end = static_cast<Index>(scratch_.levers.size());
     double answer = 0.0, farthest = 0.0;  // [1/kg]
-    for (Index k = row.begin; k < row.end; ++k) {
-      const SolverBody& body = bodies_[k < row.middle ? active.a : active.b];
-      const double way = (1.0 - body.rigid_share) * entries[k].coefficient * body.now[entries[k].particle].inverse_mass;
-      answer += entries[k].coefficient * way;
-      farthest = std::max(farthest, std::abs(way));
-    }
-    active.sideways = answer;
+    const auto add = [&](SolverBody& body, Index begin, Index end) {
+      addLevers(body, [&](const auto& visit) {
+        for (Index k = begin; k < end; ++k) visit(entries[k].particle, entries[k].coefficient);
+      });
+      double own = 0.0, most = 0.0;
+      for (Index k = begin; k < end; ++k) {
+        const double way = entries[k].coefficient * body.now[entries[k].particle].inverse_mass;
+        own += entries[k].coefficient * way;
+        most = std::max(most, std::abs(way));
+      }
+      answer += (1.0 - body.rigid_share) * own;
+      farthest = std::max(farthest, (1.0 - body.rigid_share) * most);
+      return static_cast<Index>(scratch_.levers.size());
+    };
+    active.levers = static_cast<Index>(scratch_.levers.size());
+    active.middle = add(bodies_[active.a], row.begin, row.middle);
+    active.end = add(bodies_[active.b], row.middle, row.end);
+    double across = answer;
     for (Index k = active.levers; k < active.end; ++k) {
       const Lever& lever = scratch_.levers[k];
       const SolverBody& body = bodies_[k < active.middle ? active.a : active.b];
       const GroupMotion& motion = body.motions[lever.group];
-      const double straight = body.rigid_share * lever.share * lever.share * motion.inverse_mass;
+      const double straight = lever.share * lever.share * motion.inverse_mass;
       const Vec3 about = lever.arm.cross(row.normal);
-      answer += straight + body.rigid_share * about.dot(motion.inverse_inertia * about);
+      answer += straight + about.dot(motion.inverse_inertia * about);
       // Of all directions together: none across answers more.
-      active.sideways += straight + body.rigid_share * lever.arm.squaredNorm() * motion.inverse_inertia.trace();
+      across += straight + lever.arm.squaredNorm() * motion.inverse_inertia.trace();
     }
     active.mass = 1.0 / answer;
+    active.sideways = 1.0 / across;
     if (canAnswer(answer, farthest)) return true;
     scratch_.levers.resize(active.levers);
     return false;
@@ -119,9 +157,7 @@ class Solver {
     scratch_.active.push_back(active);
   }
 
-  bool anyOut() const { return !scratch_.active.empty(); }
-
-  void letOut() {
+  void letOut(const std::vector<SolverRows>& sets) {
     for (const Active& active : scratch_.active) {
       const ContactRow& row = *active.row;
       const double lacking = active.target - row.normal.dot(sum(active, true) + moved(active)) - row.constant;
@@ -130,7 +166,7 @@ class Solver {
       push(active, more);
       pushParticles(active, more, &SolverBody::before);
     }
-    moveGroups(true);
+    moveGroups(sets, true);
     scratch_.active.clear();
     scratch_.levers.clear();
   }
@@ -158,12 +194,15 @@ class Solver {
     // Nobody who is not dragged goes farther than an edge in a substep: more than that is not asked for at once.
     const double lacking = std::min(active.target - gap, edgeOf(active));
     const double press = std::max(0.0, pressed + active.mass * lacking);
-    Vec3 slid = now - active.start;
-    slid -= row.normal.dot(slid) * row.normal;
-    Vec3 across = row.impulse - pressed * row.normal - slid / active.sideways;
-    const double most = row.friction * press, squared = across.squaredNorm();
-    if (squared > most * most) across *= most / std::sqrt(squared);
-    const Vec3 impulse = press * row.normal + across;
+    Vec3 impulse = Vec3::Zero();
+    if (press > 0.0) {
+      Vec3 slid = now - active.start;
+      slid -= row.normal.dot(slid) * row.normal;
+      Vec3 across = row.impulse - pressed * row.normal - active.sideways * slid;
+      const double most = row.friction * press, squared = across.squaredNorm();
+      if (squared > most * most) across *= most / std::sqrt(squared);
+      impulse = press * row.normal + across;
+    }
     const Vec3 more = impulse - row.impulse;
     row.impulse = impulse;
     if (!more.isZero(0.0)) push(active, more);
@@ -187,8 +226,8 @@ class Solver {
       const GroupMotion& motion = body.motions[lever.group];
       Mat3 arm;
       arm << 0.0, -lever.arm.z(), lever.arm.y(), lever.arm.z(), 0.0, -lever.arm.x(), -lever.arm.y(), lever.arm.x(), 0.0;
-      pull.answer += body.rigid_share * (lever.share * lever.share * motion.inverse_mass * Mat3::Identity() +
-                                         arm * motion.inverse_inertia * arm.transpose());
+      pull.answer += lever.share * lever.share * motion.inverse_mass * Mat3::Identity() +
+                     arm * motion.inverse_inertia * arm.transpose();
     }
     scratch_.pulls.push_back(pull);
   }
@@ -212,14 +251,25 @@ class Solver {
 
   double edgeOf(const Active& of) const { return std::min(bodies_[of.a].edge_length, bodies_[of.b].edge_length); }
 
-  /// What groups have been moved by goes to their particles, and to where those were, if wanted.
-  void moveGroups(bool both) {
-    for (const Active& active : scratch_.active)
-      for (const Index b : {active.a, active.b}) moveGroups(bodies_[b], both);
+  /// What groups of a body have been moved by goes to their particles, and to where those were, if wanted.
+  static void moveGroups(SolverBody& body, bool both) {
+    for (Index g = 0; g < body.motions.size(); ++g) {
+      GroupMotion& motion = body.motions[g];
+      if (!motion.current) continue;
+      motion.current = false;
+      for (Index k = body.groups->offsets[g]; k < body.groups->offsets[g + 1]; ++k) {
+        const Index i = body.groups->members[k];
+        const Four way = four(
+            Vec3(body.groups->weights[k] * (motion.shift + motion.turn.cross(body.before[i].place() - motion.centre))));
+        four(body.now[i]) += way;
+        if (both) four(body.before[i]) += way;
+      }
+    }
   }
-  void moveGroups(const std::vector<SpringRow>& springs) {
-    moveGroups(false);
-    for (const SpringRow& spring : springs) moveGroups(bodies_[spring.body], false);
+  void moveGroups(const std::vector<SolverRows>& sets, bool both) {
+    for (const SolverRows& rows : sets)
+      for (const Index b : {rows.a, rows.b})
+        if (b != kNoIndex) moveGroups(bodies_[b], both);
   }
 
  private:
@@ -237,6 +287,21 @@ class Solver {
     each(bodies_[active.b], row.middle, row.end);
   }
 
+  static GroupMotion groupAt(const SolverBody& body, Index group) {
+    const RigidGroups& groups = *body.groups;
+    MassMoments moments{body.before[groups.members[groups.offsets[group]]].place()};
+    for (Index k = groups.offsets[group]; k < groups.offsets[group + 1]; ++k) {
+      const Index i = groups.members[k];
+      moments.add(groups.weights[k] * groups.masses[i], body.before[i].place());
+    }
+    GroupMotion motion;
+    motion.current = true;
+    motion.inverse_mass = body.rigid_share / moments.mass;
+    motion.centre = moments.centre();
+    motion.inverse_inertia = body.rigid_share * moments.inverseInertia();
+    return motion;
+  }
+
   /// each: calls what it gets with particles and coefficients.
   template <class Each>
   void addLevers(SolverBody& body, const Each& each) {
@@ -247,7 +312,7 @@ class Solver {
       for (Index n = groups.of_offsets[particle]; n < groups.of_offsets[particle + 1]; ++n) {
         const Index member = groups.of_members[n], group = groups.groups[member];
         GroupMotion& motion = body.motions[group];
-        if (!motion.current) motion = groupAt(groups, group, [&body](Index i) { return body.before[i].place(); });
+        if (!motion.current) motion = groupAt(body, group);
         std::size_t place = first;
         while (place < scratch_.levers.size() && scratch_.levers[place].group != group) ++place;
         if (place == scratch_.levers.size()) scratch_.levers.push_back({group, 0.0, Vec3::Zero()});
@@ -272,23 +337,8 @@ class Solver {
     for (Index k = begin; k < end; ++k) {
       const Lever& lever = scratch_.levers[k];
       GroupMotion& motion = body.motions[lever.group];
-      motion.shift += body.rigid_share * lever.share * motion.inverse_mass * impulse;
-      motion.turn += body.rigid_share * (motion.inverse_inertia * lever.arm.cross(impulse));
-    }
-  }
-
-  static void moveGroups(SolverBody& body, bool both) {
-    for (Index g = 0; g < body.motions.size(); ++g) {
-      GroupMotion& motion = body.motions[g];
-      if (!motion.current) continue;
-      motion.current = false;
-      for (Index k = body.groups->offsets[g]; k < body.groups->offsets[g + 1]; ++k) {
-        const Index i = body.groups->members[k];
-        const Four way = four(
-            Vec3(body.groups->weights[k] * (motion.shift + motion.turn.cross(body.before[i].place() - motion.centre))));
-        four(body.now[i]) += way;
-        if (both) four(body.before[i]) += way;
-      }
+      motion.shift += lever.share * motion.inverse_mass * impulse;
+      motion.turn += motion.inverse_inertia * lever.arm.cross(impulse);
     }
   }
 
@@ -296,28 +346,25 @@ class Solver {
   SolverScratch& scratch_;
 };
 
-/// Of a particle, times h.
-Vec3 angularMomentum(const SolverBody& body, Index i) {
-  const Vec3 from = body.before[i].place();
-  return from.cross(body.now[i].place() - from) / body.now[i].inverse_mass;
+void leak(SolverBody& body, double sign) {
+  for (const Slot *now = body.now, *before = body.before; now != body.now + body.particles; ++now, ++before)
+    body.leaked += sign / now->inverse_mass * before->place().cross(now->place() - before->place());
 }
 
 // Rows act at both ends of what is between them: across it an impulse is a couple. Bodies get it back as a spin.
 void spinBack(SolverBody& body) {
   if (body.leaked.isZero(0.0)) return;
-  MassMoments moments(body.before[0].place());
+  MassMoments moments{body.before[0].place()};
   for (Index i = 0; i < body.particles; ++i) moments.add(1.0 / body.now[i].inverse_mass, body.before[i].place());
   const Vec3 turn = moments.inverseInertia() * -body.leaked;
   for (Index i = 0; i < body.particles; ++i)
-    four(body.now[i]) += four(Vec3(turn.cross(moments.fromCentre(body.before[i].place()))));
+    four(body.now[i]) += four(Vec3(turn.cross(body.before[i].place() - moments.centre())));
   body.leaked.setZero();
 }
 
-}  // namespace
-
-void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& springs, std::vector<SolverBody>& bodies,
-               const SolverStep& step, const std::vector<Index>& free, SolverScratch& scratch,
-               SolverCounters& counters) {
+inline void solve(const std::vector<SolverRows>& sets, std::vector<SpringRow>& springs, std::vector<SolverBody>& bodies,
+                  const SolverStep& step, const std::vector<Index>& free, SolverScratch& scratch,
+                  SolverCounters& counters) {
   Solver solver(bodies, scratch);
   const auto wayOf = [&step](const ContactRow& row) {
     return row.kind == FeaturePair::Kind::kSphere ? Vec3(step.sphere_to - step.sphere_from) : Vec3(Vec3::Zero());
@@ -341,12 +388,10 @@ void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& spri
       }
       if (step.number == 0) solver.letOut(active, wayOf(row), step.frame);
     }
-  if (solver.anyOut()) {  // what is moved sideways takes angular momentum along
-    for (const Index b : free)
-      for (Index i = 0; i < bodies[b].particles; ++i) bodies[b].leaked -= angularMomentum(bodies[b], i);
-    solver.letOut();
-    for (const Index b : free)
-      for (Index i = 0; i < bodies[b].particles; ++i) bodies[b].leaked += angularMomentum(bodies[b], i);
+  if (!scratch.active.empty()) {  // what is moved sideways takes angular momentum along
+    for (const Index b : free) leak(bodies[b], -1.0);
+    solver.letOut(sets);
+    for (const Index b : free) leak(bodies[b], 1.0);
   }
   for (const SolverRows& rows : sets)
     for (ContactRow& row : rows.set->rows)
@@ -365,7 +410,8 @@ void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& spri
     for (std::size_t n = 0; n < springs.size(); ++n) solver.visit(springs[n], scratch.pulls[n], step.h);
     for (const auto& active : scratch.active) solver.visit(active);
   }
-  solver.moveGroups(springs);
+  solver.moveGroups(sets, false);
+  for (const SpringRow& spring : springs) Solver::moveGroups(bodies[spring.body], false);
   if (free.empty()) return;
   for (const auto& active : scratch.active) {
     if (active.start.norm() > solver.edgeOf(active)) continue;  // of who is deep inside it would throw it
@@ -374,6 +420,35 @@ void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& spri
     bodies[active.b].leaked += 0.5 * couple;
   }
   for (const Index b : free) spinBack(bodies[b]);
+}
+
+#ifdef __x86_64__
+// To the bit as the other: nothing is fused.
+template <class... All>
+__attribute__((target("avx2"), flatten)) void solveWide(All&... all) {
+  solve(all...);
+}
+#endif
+
+}  // namespace
+
+RigidGroups::RigidGroups(const std::vector<Index>& group_offsets, const std::vector<Index>& group_members,
+                         const std::vector<double>& group_weights, const std::vector<double>& particle_masses)
+    : offsets(group_offsets), members(group_members), weights(group_weights), masses(particle_masses) {
+  for (Index g = 0; g < size(); ++g) groups.insert(groups.end(), offsets[g + 1] - offsets[g], g);
+  const auto each = [this](const auto& visit) {
+    for (Index k = 0; k < members.size(); ++k) visit(members[k], k);
+  };
+  compressRows(masses.size(), each, of_offsets, of_members);
+}
+
+void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& springs, std::vector<SolverBody>& bodies,
+               const SolverStep& step, const std::vector<Index>& free, SolverScratch& scratch,
+               SolverCounters& counters) {
+#ifdef __x86_64__
+  if (__builtin_cpu_supports("avx2")) return solveWide(sets, springs, bodies, step, free, scratch, counters);
+#endif
+  solve(sets, springs, bodies, step, free, scratch, counters);
 }
 
 }  // namespace meshless

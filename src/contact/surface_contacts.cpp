@@ -23,7 +23,13 @@ double restitutionOf(const Collider& a, const Collider* b) {
   return a.obstacle ? b->restitution : std::sqrt(a.restitution * b->restitution);
 }
 
-// Rows ascend by their names where features do.
+WayBox sinceOf(const WayBox& gone, const WayBox& then, const WayBox& ahead) {
+  return {gone.least - then.least + ahead.least, gone.most - then.most + ahead.most};
+}
+
+double farthestOf(const WayBox& way) { return way.least.cwiseAbs().cwiseMax(way.most.cwiseAbs()).norm(); }
+
+// Rows ascend by their names, as features do.
 const ContactRow* rowOfName(const std::vector<ContactRow>& rows, const ContactRow& like) {
   const auto at = std::lower_bound(rows.begin(), rows.end(), like,
                                    [](const ContactRow& x, const ContactRow& y) { return x.name() < y.name(); });
@@ -55,12 +61,11 @@ void SurfaceContacts::findPairs(const SurfaceScene& scene, const std::vector<Col
   active_.assign(count, 0);
   needed_.assign(count, 0);
   pairs_.clear();
-  std::optional<Box> sphere;
+  Box sphere;  // empty: none
   if (scene.sphere) {
-    sphere.emplace();
-    sphere->extend(scene.sphere->centre);
-    sphere->extend(scene.sphere->centre + scene.sphere->way);
-    *sphere = grown(*sphere, scene.sphere->radius);
+    sphere.extend(scene.sphere->centre);
+    sphere.extend(scene.sphere->centre + scene.sphere->way);
+    sphere = grown(sphere, scene.sphere->radius);
   }
   numbers_.clear();
   for (Index c = 0; c < count; ++c) {
@@ -72,7 +77,7 @@ void SurfaceContacts::findPairs(const SurfaceScene& scene, const std::vector<Col
     boxes_[c] = grown(collider.bounds, searchMargin(collider.edge_length));
     if (!collider.moves) continue;
     if (scene.ground && boxes_[c].min.z() <= *scene.ground) pairOf(Kind::kGround, colliders, c, kNoIndex, kGroundKey);
-    if (sphere && boxes_[c].overlaps(*sphere)) pairOf(Kind::kSphere, colliders, c, kNoIndex, kSphereKey);
+    if (boxes_[c].overlaps(sphere)) pairOf(Kind::kSphere, colliders, c, kNoIndex, kSphereKey);
     if (scene.surfaces && collider.self != PairSearch::Self::kNo)
       pairOf(Kind::kVertexFace, colliders, c, c, collider.key);
   }
@@ -117,9 +122,9 @@ void SurfaceContacts::findMoved(const SurfaceScene& scene, const std::vector<Col
     const bool near = c != kNoIndex && (needed_[c] || !colliders[c].moves);  // a sleeping collider's rows count from it
     at = near ? std::next(at) : ways_.erase(at);
   }
-  gone_.assign(count, 0.0);
-  bent_.assign(count, 0.0);
-  ahead_.assign(count, 0.0);
+  gone_.assign(count, WayBox());
+  ahead_.assign(count, WayBox());
+  velocities_.resize(count);
   for (Index c = 0; c < count; ++c) {
     const Collider& collider = colliders[c];
     if (!needed_[c] || collider.obstacle) continue;
@@ -129,23 +134,18 @@ void SurfaceContacts::findMoved(const SurfaceScene& scene, const std::vector<Col
     const Index vertices = collider.surface->vertices();
     const bool known = way.last.size() == vertices;
     way.last.resize(vertices, Vec3::Zero());
-    double farthest = 0.0, fastest = 0.0;
-    Box ways_gone;
-    for (Index v = 0; v < vertices && collider.moves; ++v) {
+    velocities_[c].assign(vertices, Vec3::Zero());
+    Box gone, velocities;
+    for (Index v = 0; v < vertices && (collider.moves || !known); ++v) {
       const Vec3 place = supports.sum(v, collider.positions);
-      const Vec3 gone = place - way.last[v];
-      farthest = std::max(farthest, gone.squaredNorm());
-      if (needed_[c] == kNear) fastest = std::max(fastest, supports.sum(v, collider.velocities).squaredNorm());
-      ways_gone.extend(gone);
+      if (collider.moves) velocities_[c][v] = supports.sum(v, collider.velocities);
+      gone.extend(place - way.last[v]);
+      velocities.extend(velocities_[c][v]);
       way.last[v] = place;
     }
-    ahead_[c] = scene.h * std::sqrt(fastest);
-    if (known && collider.moves) {
-      way.gone += std::sqrt(farthest);
-      way.bent += ways_gone.diagonal();
-    }
+    if (!velocities.empty()) ahead_[c] = {scene.h * velocities.min, scene.h * velocities.max};
+    if (known && !gone.empty()) way.gone = {way.gone.least + gone.min, way.gone.most + gone.max};
     gone_[c] = way.gone;
-    bent_[c] = way.bent;
   }
   moved_.assign(count, 0);
   for (Pair* pair : pairs_) {
@@ -153,14 +153,13 @@ void SurfaceContacts::findMoved(const SurfaceScene& scene, const std::vector<Col
     const Collider* const b = pair->b == kNoIndex ? nullptr : &colliders[pair->b];
     const double length = b ? std::min(a.edge_length, b->edge_length) : a.edge_length;
     const double skin = b ? kSkin * length : 0.0;
-    const bool self = pair->a == pair->b;
-    const double way_a = self ? bent_[pair->a] : gone_[pair->a];
-    double gone = way_a - pair->way_a + (self ? scene.h * a.bends : ahead_[pair->a]);
-    if (b && !self) gone += gone_[pair->b] - pair->way_b + ahead_[pair->b];
-    pair->stale = !pair->found || pair->kind == Kind::kSphere || gone > searchMargin(length) - skin;
+    const WayBox by_a = sinceOf(gone_[pair->a], pair->way_a, ahead_[pair->a]);
+    double gone = pair->a == pair->b ? (by_a.most - by_a.least).norm() : b ? farthestOf(by_a) : -by_a.least.z();
+    if (b && pair->a != pair->b) gone += farthestOf(sinceOf(gone_[pair->b], pair->way_b, ahead_[pair->b]));
+    pair->stale = !pair->found || pair->kind == Kind::kSphere || !(gone <= searchMargin(length) - skin);
     pair->stale = pair->stale && pair->kind != Kind::kGiven;
     if (!pair->stale) continue;
-    pair->way_a = way_a;
+    pair->way_a = gone_[pair->a];
     if (b) pair->way_b = gone_[pair->b];
     moved_[pair->a] = 1;
     if (b) moved_[pair->b] = 1;
@@ -175,8 +174,8 @@ void SurfaceContacts::find(const SurfaceScene& scene, const std::vector<Collider
     const Collider& collider = colliders[c];
     if (!moved_[c] || (collider.obstacle && frame_of_[c] == collider.key)) return;
     frame_of_[c] = collider.obstacle ? collider.key : 0;
-    placeFrame(*collider.surface, collider.vertices, collider.moves ? collider.velocities : nullptr, scene.h,
-               frames_[c]);
+    const Vec3* const vertices = collider.vertices ? collider.vertices : ways_.find(collider.key)->second.last.data();
+    placeFrame(*collider.surface, vertices, collider.moves ? velocities_[c].data() : nullptr, scene.h, frames_[c]);
   });
   runEach(for_each, pairs_.size(), [&](std::size_t n) {
     if (pairs_[n]->stale) findPair(scene, colliders, *pairs_[n]);
@@ -235,18 +234,15 @@ void SurfaceContacts::makeRows(const SurfaceScene& scene, const std::vector<Coll
   RowBody of_a{a.surface, a.positions, frames_[pair.a].vertices.data(), a.inverse_masses, a.carried}, of_b;
   if (b) of_b = {b->surface, b->positions, frames_[pair.b].vertices.data(), b->inverse_masses, b->carried};
   static thread_local std::vector<ContactRow> old;
-  old.assign(pair.set.rows.begin(), pair.set.rows.end());
+  old.swap(pair.set.rows);
   pair.set.clear();
   for (const FeaturePair& features : found) {
     ContactRow* const row = makeRow(features, of_a, of_b, skin, pair.set);
     if (!row) continue;
     row->friction = friction;
     row->restitution = restitution;
+    if (const ContactRow* before = rowOfName(old, *row)) row->impulse = before->impulse;
   }
-  std::sort(pair.set.rows.begin(), pair.set.rows.end(),
-            [](const ContactRow& x, const ContactRow& y) { return x.name() < y.name(); });
-  for (ContactRow& row : pair.set.rows)
-    if (const ContactRow* before = rowOfName(old, row)) row.impulse = before->impulse;
 }
 
 void SurfaceContacts::listReached(const SurfaceScene& scene, const std::vector<Collider>& colliders) {
@@ -281,26 +277,21 @@ void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
   const auto moves = [&](Index c) { return c != kNoIndex && colliders[c].moves; };
   for (const Pair* pair : pairs_)
     if (moves(pair->a) && moves(pair->b) && !pair->set.rows.empty()) joined_.join(pair->a, pair->b);
-  // The first gets back what it had.
-  for (; !islands_.empty(); islands_.pop_back()) {
-    Island& island = islands_.back();
-    island.bodies.clear();
-    island.rows.clear();
-    island.held = false;
-    spare_islands_.push_back(std::move(island));
-  }
+  Index islands = 0;
   for (Index c = 0; c < count; ++c) {
     if (!moves(c)) continue;
     Index& island = island_of_[joined_.find(c)];
     if (island == kNoIndex) {
-      island = static_cast<Index>(islands_.size());
-      if (spare_islands_.empty()) spare_islands_.emplace_back();
-      islands_.push_back(std::move(spare_islands_.back()));
-      spare_islands_.pop_back();
+      island = islands++;
+      if (island == islands_.size()) islands_.emplace_back();
+      islands_[island].bodies.clear();
+      islands_[island].rows.clear();
+      islands_[island].held = false;
     }
     islands_[island].bodies.push_back(c);
     islands_[island].held = islands_[island].held || colliders[c].held;
   }
+  islands_.resize(islands);
   for (Pair* pair : pairs_) {
     const Index of = moves(pair->a) ? pair->a : pair->b;
     if (pair->set.rows.empty() || !moves(of)) continue;
@@ -462,17 +453,16 @@ void SurfaceContacts::forget(std::uint64_t key) {
 
 std::size_t SurfaceContacts::bytes() const {
   constexpr std::size_t kNode = 48;  // of a map, with what the allocator keeps of it
-  std::size_t sum = broad_phase_.bytes() +
-                    bytesOf(boxes_, active_, needed_, moved_, numbers_, gone_, bent_, ahead_, pairs_) +
+  std::size_t sum = broad_phase_.bytes() + bytesOf(boxes_, active_, needed_, moved_, numbers_, gone_, ahead_, pairs_) +
                     bytesOf(frames_, frame_of_, reached_, now_, before_, first_slots_, solver_bodies_) +
-                    bytesOf(islands_, spare_islands_, island_of_) + joined_.bytes();
+                    bytesOf(islands_, island_of_) + joined_.bytes();
   for (const SurfaceFrame& frame : frames_) sum += frame.bytes();
   for (const auto& [name, pair] : known_)
     sum += kNode + sizeof name + sizeof(Pair) + bytesOf(pair->set.rows, pair->set.entries, pair->sides);
   for (const auto& [key, way] : ways_) sum += kNode + sizeof way + bytesOf(way.last);
   for (const SolverBody& body : solver_bodies_) sum += bytesOf(body.motions);
-  for (const std::vector<Island>* islands : {&islands_, &spare_islands_})
-    for (const Island& island : *islands) sum += bytesOf(island.bodies, island.rows);
+  for (const Points& velocities : velocities_) sum += bytesOf(velocities);
+  for (const Island& island : islands_) sum += bytesOf(island.bodies, island.rows);
   return sum;
 }
 

@@ -40,7 +40,6 @@ struct WorldBody {
   bool surface_current = true;                        // state.surface fits state.positions
   std::shared_ptr<const ContactMesh> mesh;            // made when something first comes near
   std::shared_ptr<const SurfaceModel> surface_model;  // made when something first comes near
-  Points collision;            // [m] vertices of model->collision, of the last frame in which contact needed them
   BodyModelPtr measured;       // the model that these two are of
   double edge_length = 0.0;    // [m] mean, of the surface
   double surface_reach = 0.0;  // [m] how far the surface is beyond the particles, at most

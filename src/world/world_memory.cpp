@@ -13,7 +13,6 @@ MemoryUse World::memory() const {
     use.particles += body->state.positions.size();
     if (first(body->model.get())) use.models += bytesOf(*body->model);
     use.states += sizeof *body + bytesOf(body->state) + bytesOf(body->scratch) + bytesOf(body->rest_from);
-    use.contact += bytesOf(body->collision);
     if (first(body->surface_model.get())) use.contact += body->surface_model->bytes();
     if (first(body->mesh.get()))
       use.contact += sizeof *body->mesh + bytesOf(body->mesh->tetrahedra, body->mesh->faces, body->mesh->edges);

@@ -145,13 +145,8 @@ void World::Impl::fillCollider(WorldBody& body, double h_frame, Collider& collid
   }
   body.bounds = extentOf(body.state.positions);
   double fastest = 0.0;
-  Box velocities;
-  for (const Vec3& v : body.state.velocities) {
-    fastest = std::max(fastest, v.squaredNorm());
-    velocities.extend(v);
-  }
+  for (const Vec3& v : body.state.velocities) fastest = std::max(fastest, v.squaredNorm());
   body.fastest = std::sqrt(fastest);
-  collider.bends = velocities.diagonal();
   const Vec3 by = Vec3::Constant(body.surface_reach + h_frame * body.fastest);
   body.bounds.min -= by;
   body.bounds.max += by;
@@ -259,20 +254,9 @@ void World::Impl::findSurfaceContacts(double h) {
     surface_contacts.findMoved(scene, colliders);
     forNumbers(bodies.size(), [&](std::size_t b) {
       if (!surface_contacts.moved()[b]) return;
-      if (bodies[b]->model->surface.vertices.empty()) {
-        colliders[b].vertices = bodies[b]->state.positions.data();
-        return;
-      }
-      if (!bodies[b]->model->collision) {
-        refreshSurface(*bodies[b]);
-        colliders[b].vertices = bodies[b]->state.surface.data();
-        return;
-      }
-      const ContactSurface& surface = *colliders[b].surface;
-      Points& places = bodies[b]->collision;
-      places.resize(surface.vertices());
-      for (Index v = 0; v < places.size(); ++v) places[v] = surface.supports.sum(v, bodies[b]->state.positions.data());
-      colliders[b].vertices = places.data();
+      if (bodies[b]->model->surface.vertices.empty() || bodies[b]->model->collision) return;
+      refreshSurface(*bodies[b]);
+      colliders[b].vertices = bodies[b]->state.surface.data();
     });
     surface_contacts.find(scene, colliders, report.contact_counters, for_each);
     bool woken = false;

@@ -12,52 +12,40 @@ namespace meshless {
 
 /// In float, rounded outwards. Empty while min > max; overlaps nothing then.
 struct FloatBox {
+  using Four = float __attribute__((vector_size(16)));  // the last is 0
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  std::array<float, 3> min{{kInfinity, kInfinity, kInfinity}}, max{{-kInfinity, -kInfinity, -kInfinity}};
+  Four min{kInfinity, kInfinity, kInfinity, 0.0f}, max{-kInfinity, -kInfinity, -kInfinity, 0.0f};
 
+  static Four lesser(const Four& x, const Four& y) { return x < y ? x : y; }
+  static Four greater(const Four& x, const Four& y) { return x > y ? x : y; }
   void extend(const Vec3& p) {
-    for (int k = 0; k < 3; ++k) {
-      const float near = static_cast<float>(p[k]);
-      min[k] = std::min(min[k], near > p[k] ? std::nextafter(near, -kInfinity) : near);
-      max[k] = std::max(max[k], near < p[k] ? std::nextafter(near, kInfinity) : near);
-    }
+    const Four near{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2]), 0.0f};
+    const Four rounding = std::numeric_limits<float>::epsilon() * greater(near, -near);
+    min = lesser(near - rounding, min);
+    max = greater(near + rounding, max);
   }
   void extend(const FloatBox& o) {
-    for (int k = 0; k < 3; ++k) {
-      min[k] = std::min(min[k], o.min[k]);
-      max[k] = std::max(max[k], o.max[k]);
-    }
+    min = lesser(o.min, min);
+    max = greater(o.max, max);
   }
-  bool isNear(const FloatBox& o, double by) const {
-    for (int k = 0; k < 3; ++k)
-      if (static_cast<double>(min[k]) - by > o.max[k] || static_cast<double>(o.min[k]) - by > max[k]) return false;
-    return true;
+  /// Or is nearer than `by` [m] along each axis. Without branches: which axis parts two boxes cannot be foretold.
+  bool overlaps(const FloatBox& o, float by = 0.0f) const {
+    const auto does = (min - by <= o.max) & (o.min - by <= max);
+    return (does[0] & does[1] & does[2]) != 0;
   }
   /// The least dot product of a point in this box and one in the other.
   float leastDot(const FloatBox& o) const {
-    float sum = 0.0f;
-    for (int k = 0; k < 3; ++k)
-      sum += std::min({min[k] * o.min[k], min[k] * o.max[k], max[k] * o.min[k], max[k] * o.max[k]});
-    return sum;
+    const Four least = lesser(lesser(min * o.min, min * o.max), lesser(max * o.min, max * o.max));
+    return least[0] + least[1] + least[2];
   }
   /// The sum of its three edges.
   float edgeSum() const { return (max[0] - min[0]) + (max[1] - min[1]) + (max[2] - min[2]); }
-  bool overlaps(const FloatBox& o) const {
-    return min[0] <= o.max[0] && o.min[0] <= max[0] && min[1] <= o.max[1] && o.min[1] <= max[1] && min[2] <= o.max[2] &&
-           o.min[2] <= max[2];
-  }
 };
 
 /// Boxes of a frame.
 struct TreeBoxes {
   std::vector<FloatBox> items, nodes;
   std::size_t bytes() const { return bytesOf(items, nodes); }
-};
-
-/// Scratch of BoxTree::queryTree().
-struct TreeQuery {
-  std::vector<std::array<Index, 2>> stack;
-  std::vector<char> seen;
 };
 
 class BoxTree {
@@ -90,23 +78,25 @@ class BoxTree {
     }
   }
 
-  /// visit(item) for each in a leaf that is nearer than `by` [m] to a leaf of another tree; an item may come again.
-  /// may_meet(node, other's node) leaves out what is below both.
+  /// visit(item, other's item) for each two whose boxes are nearer than `by` [m], in an order that depends on the
+  /// topologies alone. may_meet(node, other's node) leaves out what is below both.
   template <class MayMeet, class Visit>
-  void queryTree(const TreeBoxes& boxes, const BoxTree& other, const TreeBoxes& other_boxes, double by,
-                 TreeQuery& query, const MayMeet& may_meet, const Visit& visit) const {
-    if (nodes_.empty() || other.nodes_.empty()) return;
-    auto& [stack, seen] = query;
-    stack.assign(1, {0, 0});
-    seen.assign(nodes_.size(), 0);
+  void queryTree(const TreeBoxes& boxes, const BoxTree& other, const TreeBoxes& other_boxes, float by,
+                 std::vector<std::array<Index, 2>>& stack, const MayMeet& may_meet, const Visit& visit) const {
+    stack.clear();
+    if (!nodes_.empty() && !other.nodes_.empty()) stack.push_back({0, 0});
     while (!stack.empty()) {
       const auto [mine, theirs] = stack.back();
       stack.pop_back();
+      if (!boxes.nodes[mine].overlaps(other_boxes.nodes[theirs], by) || !may_meet(mine, theirs)) continue;
       const Node &a = nodes_[mine], &b = other.nodes_[theirs];
-      if (seen[mine] || !boxes.nodes[mine].isNear(other_boxes.nodes[theirs], by) || !may_meet(mine, theirs)) continue;
       if (a.count > 0 && b.count > 0) {
-        seen[mine] = 1;
-        for (Index k = a.first; k < a.first + a.count; ++k) visit(items_[k]);
+        for (Index i = a.first; i < a.first + a.count; ++i) {
+          if (!boxes.items[items_[i]].overlaps(other_boxes.nodes[theirs], by)) continue;
+          for (Index j = b.first; j < b.first + b.count; ++j)
+            if (boxes.items[items_[i]].overlaps(other_boxes.items[other.items_[j]], by))
+              visit(items_[i], other.items_[j]);
+        }
       } else if (b.count == 0 && (a.count > 0 || boxes.nodes[mine].edgeSum() < other_boxes.nodes[theirs].edgeSum())) {
         stack.push_back({mine, b.first});
         stack.push_back({mine, b.first + 1});

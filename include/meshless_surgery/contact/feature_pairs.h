@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "meshless_surgery/contact/surface_frame.h"
+#include "meshless_surgery/contact/contact_surface.h"
 
 namespace meshless {
 
@@ -14,7 +14,8 @@ struct FeaturePair {
   Kind kind = Kind::kVertexFace;
   std::uint8_t order = 0;           // among those of one vertex
   std::uint8_t of_a = 1, of_b = 3;  // how many of the vertices are of a, then of b
-  std::array<Index, 2> features{};  // names it in the next frame: a vertex and kNoIndex, or a ridge and a number
+  std::array<Index, 2>
+      features{};  // names it in the next frame: a vertex and kNoIndex, or a ridge, counted on, and a number
   std::array<Index, 5> vertices{};  // first those of a
   std::array<double, 5> shares{};   // of the vertices; add up to 1 for a, to -1 for b
   Vec3 normal = Vec3::UnitZ();      // unit, from b to a
@@ -42,8 +43,12 @@ struct SearchScratch {
   std::vector<FeaturePair> pairs;
   std::vector<RememberedSide> sides;  // to be remembered
   std::vector<NearFace> faces;        // of one vertex
-  std::vector<char> near;             // one a vertex: near the other
-  TreeQuery query;
+  struct Met {
+    Index face, next;  // in the list, of the same vertex
+  };
+  std::vector<Met> met;      // faces that vertices may meet
+  std::vector<Index> first;  // one a vertex: of met; kNoIndex: none
+  std::vector<std::array<Index, 2>> stack;
 };
 
 struct PairSearch {

@@ -5,9 +5,38 @@
 #pragma once
 
 #include "meshless_surgery/contact/contact_rows.h"
-#include "meshless_surgery/contact/rigid_groups.h"
 
 namespace meshless {
+
+/// Groups of particles that answer a contact partly as rigid bodies: the clusters of an appearance material, which
+/// pulls them back to rigid shapes within a frame.
+struct RigidGroups {
+  /// Compressed rows of members with weights that add up to 1 over the groups of a particle; masses [kg] > 0 of
+  /// particles.
+  RigidGroups(const std::vector<Index>& group_offsets, const std::vector<Index>& group_members,
+              const std::vector<double>& group_weights, const std::vector<double>& particle_masses);
+
+  std::vector<Index> offsets, members;
+  std::vector<double> weights;
+  std::vector<double> masses;                 // [kg] of particles
+  std::vector<Index> groups;                  // of members
+  std::vector<Index> of_offsets, of_members;  // of each particle: which members it is, compressed rows
+
+  Index size() const { return static_cast<Index>(offsets.size() - 1); }
+  std::size_t bytes() const {
+    return sizeof *this + bytesOf(offsets, members, weights, masses, groups, of_offsets, of_members);
+  }
+};
+
+/// How a group has been moved in a substep, about its centre at the substep's start.
+struct GroupMotion {
+  bool current = false;                 // mass, centre and inverse_inertia are of this substep
+  double inverse_mass = 0.0;            // [1/kg] times the rigid share, as inverse_inertia
+  Vec3 centre = Vec3::Zero();           // [m]
+  Mat3 inverse_inertia = Mat3::Zero();  // [1/(kg m^2)]; no turn about an axis with nothing beside it
+  Vec3 shift = Vec3::Zero();            // [m]
+  Vec3 turn = Vec3::Zero();             // [rad]
+};
 
 /// A particle: where it is [m], and its inverse mass [1/kg], 0 where it is held.
 struct alignas(32) Slot {
@@ -76,7 +105,7 @@ struct SolverScratch {
     Vec3 start;                 // [m] sum of coefficient x at the start of the substep
     double target;              // [m] gap that is asked for at least
     double mass;                // [kg] impulse for a gap that is 1 m short
-    double sideways;            // [1/kg] across the normal
+    double sideways;            // [kg] the same across the normal, for a slide of 1 m
   };
   struct Pull {
     Mat3 answer;  // [m/(kg m)] of the grasp to an impulse

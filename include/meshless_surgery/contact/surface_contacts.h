@@ -23,7 +23,8 @@ struct Collider {
   double edge_length = 0.0;                                  // [m] mean
   double spacing = std::numeric_limits<double>::infinity();  // [m] of its particles: points on ridges are as near
   const ContactSurface* surface = nullptr;                   // filled, with what follows, for those that needed() says
-  const Vec3* vertices = nullptr;          // [m] now, one a vertex of the surface; for those that moved() says
+  // [m] now, one a vertex of the surface, for those that moved() says; null: they are where their supports put them
+  const Vec3* vertices = nullptr;
   Vec3* positions = nullptr;               // [m] one a particle
   const Vec3* velocities = nullptr;        // [m/s]; null: of an obstacle
   const double* inverse_masses = nullptr;  // [1/kg] 0: held
@@ -32,7 +33,6 @@ struct Collider {
   double friction = 0.5;
   double restitution = 0.0;  // 0..1
   PairSearch::Self self = PairSearch::Self::kNo;
-  double bends = 0.0;     // [m/s] most by which two of its particles differ
   bool obstacle = false;  // friction and position alone
   bool moves = true;      // false: asleep, or an obstacle; its arrays are not written
   bool held = false;      // some of its particles are
@@ -144,8 +144,8 @@ class SurfaceContacts {
   std::vector<std::pair<std::uint64_t, Index>> numbers_;  // of colliders by their keys, ascending
   std::map<PairName, std::unique_ptr<Pair>> known_;
   std::map<std::uint64_t, KeptWay> ways_;
-  // [m] one a collider: its way, that of its vertices as against each other, and how far it may go in this frame
-  std::vector<double> gone_, bent_, ahead_;
+  std::vector<WayBox> gone_, ahead_;     // one a collider: its way, and what it goes in this frame
+  std::vector<Points> velocities_;       // [m/s] one a collider, of its vertices
   std::vector<Pair*> pairs_;             // of this frame
   std::vector<SurfaceFrame> frames_;     // one a collider; filled where moved_
   std::vector<std::uint64_t> frame_of_;  // key of the obstacle whose frame stays
@@ -153,7 +153,7 @@ class SurfaceContacts {
   std::vector<std::size_t> first_slots_;  // one a collider
   std::vector<Slot> now_, before_;
   std::vector<SolverBody> solver_bodies_;
-  std::vector<Island> islands_, spare_islands_;
+  std::vector<Island> islands_;
   UnionFind joined_;
   std::vector<Index> island_of_;  // one a collider
 };

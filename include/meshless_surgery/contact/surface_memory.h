@@ -8,13 +8,18 @@
 
 namespace meshless {
 
+/// [m] Least and most, along each axis, of what the vertices of a collider have gone.
+struct WayBox {
+  Vec3 least = Vec3::Zero(), most = Vec3::Zero();
+};
+
 /// What is between two colliders: points of the first against faces of the second.
 struct KeptPair {
   enum class Kind : std::uint8_t { kVertexFace, kGround, kSphere, kGiven };
   Kind kind = Kind::kVertexFace;
   std::uint64_t key_a = 0, key_b = 0;  // of the colliders; key_b beyond all of theirs: of the ground or the sphere
   bool found = false;                  // once at least
-  double way_a = 0.0, way_b = 0.0;     // [m] that they had gone when it was found
+  WayBox way_a, way_b;                 // that they had gone when it was found
   RowSet set;
   std::vector<RememberedSide> sides;  // ascending by vertex
 };
@@ -22,9 +27,8 @@ struct KeptPair {
 /// How far a collider has gone since it was first near something.
 struct KeptWay {
   std::uint64_t key = 0;
-  Points last;        // [m] sums of the supports of vertices
-  double gone = 0.0;  // [m] sum of the farthest way of any vertex in each frame
-  double bent = 0.0;  // [m] the same of two of its vertices as against each other
+  Points last;  // [m] sums of the supports of vertices
+  WayBox gone;  // sum of those of the frames
 };
 
 struct SurfaceMemory {
@@ -59,14 +63,18 @@ void serialize(A& archive, RememberedSide& v) {
   archive(vertex, depth, normal);
 }
 template <class A>
+void serialize(A& archive, WayBox& v) {
+  archive(v.least, v.most);
+}
+template <class A>
 void serialize(A& archive, KeptPair& v) {
   auto& [kind, key_a, key_b, found, way_a, way_b, set, sides] = v;
   archive(kind, key_a, key_b, found, way_a, way_b, set, sides);
 }
 template <class A>
 void serialize(A& archive, KeptWay& v) {
-  auto& [key, last, gone, bent] = v;
-  archive(key, last, gone, bent);
+  auto& [key, last, gone] = v;
+  archive(key, last, gone);
 }
 template <class A>
 void serialize(A& archive, SurfaceMemory& v) {
