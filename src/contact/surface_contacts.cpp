@@ -138,7 +138,12 @@ void SurfaceContacts::findMoved(const SurfaceScene& scene, const std::vector<Col
     Box gone, velocities;
     for (Index v = 0; v < vertices && (collider.moves || !known); ++v) {
       const Vec3 place = supports.sum(v, collider.positions);
-      if (collider.moves) velocities_[c][v] = supports.sum(v, collider.velocities);
+      if (collider.moves) {
+        Vec3& velocity = velocities_[c][v] = supports.sum(v, collider.velocities);
+        // Who goes farther than an edge between two searches passes what is thin as it is.
+        const double edges = scene.h * velocity.norm() / collider.edge_length;
+        if (edges > 1.0) velocity /= edges;
+      }
       gone.extend(place - way.last[v]);
       velocities.extend(velocities_[c][v]);
       way.last[v] = place;
