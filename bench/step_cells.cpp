@@ -99,7 +99,7 @@ class CellsLoop {
     forChunks(for_each, [&](std::size_t, std::size_t i) {
       const Vec3 together = velocity + spin.cross(x[i] - origin - centre), deforming = kept * (v[i] - together);
       v[i] = together + deforming;
-      predicted_[i] = x[i] + s.h * together + ahead * deforming;
+      predicted_[i] = x[i] + ahead * v[i];
     });
     body_.state.stretch =
         model.elastic_batch->accelerate(matchInput(model), parametersOf(softTissue(), factor), predicted_, scratch_,
@@ -216,7 +216,7 @@ void plainElasticStep(Plain& body, const Material& material, const BatchStep& s)
     const Vec3 together = rigid.velocity + rigid.spin.cross(x[i] - rigid.centre);
     const Vec3 deforming = kept * (v[i] - together);
     v[i] = together + deforming;
-    if (!model.fixed[i]) y[i] += s.h * together + ahead * deforming;
+    if (!model.fixed[i]) y[i] += ahead * v[i];
   }
   Points& accelerations = body.scratch.goals;
   body.state.stretch = elasticAccelerations(matchInput(model), model.elastic, parametersOf(material, factor), y,

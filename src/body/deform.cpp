@@ -24,31 +24,42 @@ constexpr double kMostGain = 1.4;
 constexpr double kMargin = 1.1;
 constexpr double kLag = 0.25;
 
-// How hard a body is to turn about a point. Axis by axis: as one matrix, of a body drawn out to a line, the rounding of
-// the axis that turns easily would be a torque about the others.
-class Inertia {
+// A body as a whole: how it moves, and how hard it is to turn about its centre. Axis by axis: as one matrix, of a body
+// drawn out to a line, the rounding of the axis that turns easily would be a torque about the others.
+class Whole {
  public:
-  Inertia(const BodyModel& model, const Points& positions, const Vec3& centre) {
-    // Sums of their own instead of a matrix: four times as fast.
-    double xx = 0.0, yy = 0.0, zz = 0.0, xy = 0.0, xz = 0.0, yz = 0.0;
+  Whole() = default;  // of a body that is held: it has no motion of its own
+  Whole(const BodyModel& model, const Points& positions, const Points& velocities) {
+    // From the first particle, so that little cancels; numbers of their own instead of matrices: four times as fast.
+    const Vec3 origin = positions[0], drift = velocities[0];
+    double x = 0.0, y = 0.0, z = 0.0, xx = 0.0, yy = 0.0, zz = 0.0, xy = 0.0, xz = 0.0, yz = 0.0;
+    double vx = 0.0, vy = 0.0, vz = 0.0, lx = 0.0, ly = 0.0, lz = 0.0;
     for (std::size_t i = 0; i < positions.size(); ++i) {
-      const Vec3 r = positions[i] - centre;
-      const double x = model.masses[i] * r.x(), y = model.masses[i] * r.y(), z = model.masses[i] * r.z();
-      xx += x * r.x();
-      yy += y * r.y();
-      zz += z * r.z();
-      xy += x * r.y();
-      xz += x * r.z();
-      yz += y * r.z();
+      const double m = model.masses[i];
+      const double rx = positions[i].x() - origin.x(), ry = positions[i].y() - origin.y();
+      const double rz = positions[i].z() - origin.z();
+      const double px = m * (velocities[i].x() - drift.x()), py = m * (velocities[i].y() - drift.y());
+      const double pz = m * (velocities[i].z() - drift.z());
+      const double mx = m * rx, my = m * ry, mz = m * rz;
+      x += mx, y += my, z += mz;
+      xx += mx * rx, yy += my * ry, zz += mz * rz, xy += mx * ry, xz += mx * rz, yz += my * rz;
+      vx += px, vy += py, vz += pz;
+      lx += ry * pz - rz * py, ly += rz * px - rx * pz, lz += rx * py - ry * px;
     }
-    const double scale = 2.0 * (xx + yy + zz);
+    const Vec3 centre = Vec3(x, y, z) / model.mass, velocity = Vec3(vx, vy, vz) / model.mass;
+    rigid.centre = origin + centre;
+    rigid.velocity = drift + velocity;
+    rigid.angular_momentum = Vec3(lx, ly, lz) - model.mass * centre.cross(velocity);
+    Mat3 moment;
+    moment << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+    moment -= model.mass * centre * centre.transpose();
+    const double scale = 2.0 * moment.trace();
     if (!(scale > 0.0)) return;
-    Mat3 inertia;
-    inertia << yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy;
-    const Eigen::SelfAdjointEigenSolver<Mat3> solver(inertia / scale);
+    const Eigen::SelfAdjointEigenSolver<Mat3> solver((0.5 * scale * Mat3::Identity() - moment) / scale);
     axes_ = solver.eigenvectors();
     for (int k = 0; k < 3; ++k)
       if (solver.eigenvalues()[k] > 1e-12) inverse_[k] = 1.0 / (solver.eigenvalues()[k] * scale);
+    rigid.spin = spinFor(rigid.angular_momentum);
   }
 
   // The spin that carries the angular momentum, the least one where the points are collinear or fewer.
@@ -58,45 +69,40 @@ class Inertia {
     return spin;
   }
 
+  RigidMotion rigid;
+
  private:
   Mat3 axes_ = Mat3::Identity();
   Vec3 inverse_ = Vec3::Zero();  // [1/(kg m^2)], 0 where nothing turns
 };
 
-struct MassMoments {
-  Vec3 centre;  // [m]
-  Inertia inertia;
-};
-
-MassMoments momentsOf(const BodyModel& model, const Points& positions) {
-  Vec3 sum = Vec3::Zero();
-  for (std::size_t i = 0; i < positions.size(); ++i) sum += model.masses[i] * (positions[i] - positions[0]);
-  const Vec3 centre = positions[0] + sum / model.mass;
-  return {centre, Inertia(model, positions, centre)};
+Vec3 torqueOf(const BodyModel& model, const Points& positions, const Vec3& centre, const Points& pull) {
+  double x = 0.0, y = 0.0, z = 0.0;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const double rx = positions[i].x() - centre.x(), ry = positions[i].y() - centre.y();
+    const double rz = positions[i].z() - centre.z();
+    const double fx = model.masses[i] * pull[i].x(), fy = model.masses[i] * pull[i].y();
+    const double fz = model.masses[i] * pull[i].z();
+    x += ry * fz - rz * fy, y += rz * fx - rx * fz, z += rx * fy - ry * fx;
+  }
+  return Vec3(x, y, z);
 }
 
-RigidMotion rigidMotionOf(const BodyModel& model, const MassMoments& moments, const Points& positions,
-                          const Points& velocities) {
-  RigidMotion motion;
-  motion.centre = moments.centre;
-  for (std::size_t i = 0; i < positions.size(); ++i) motion.velocity += model.masses[i] * velocities[i];
-  motion.velocity /= model.mass;
-  Vec3 momentum = Vec3::Zero();
-  for (std::size_t i = 0; i < positions.size(); ++i)
-    momentum += model.masses[i] * (positions[i] - motion.centre).cross(velocities[i] - motion.velocity);
-  motion.angular_momentum = momentum;
-  motion.spin = moments.inertia.spinFor(momentum);
-  return motion;
+// r times it is spin cross r.
+Mat3 turning(const Vec3& spin) {
+  Mat3 by;
+  by << 0.0, -spin.z(), spin.y(), spin.z(), 0.0, -spin.x(), -spin.y(), spin.x(), 0.0;
+  return by;
 }
 
 }  // namespace
 
 RigidMotion rigidMotionOf(const BodyModel& model, const Points& positions, const Points& velocities) {
-  return rigidMotionOf(model, momentsOf(model, positions), positions, velocities);
+  return Whole(model, positions, velocities).rigid;
 }
 
-Vec3 spinWith(const BodyModel& model, const Points& positions, const Vec3& centre, const Vec3& momentum) {
-  return Inertia(model, positions, centre).spinFor(momentum);
+Vec3 spinWith(const BodyModel& model, const Points& positions, const Vec3& momentum) {
+  return Whole(model, positions, positions).spinFor(momentum);
 }
 
 double longestSubstep(const BodyModel& model, const BodyState& state) {
@@ -118,140 +124,110 @@ double viscosityTime(const BodyModel& model, const BodyState& state, double h) {
   return std::isfinite(longest) ? kLag * longest / std::sqrt(state.stiffened) : h;
 }
 
-namespace {
-
-// Particle velocities after what the material does, by accelerations taken at y; x is where momentum is counted.
-// `known`: moments of x, where they are known.
-template <class Acceleration>
-void accelerate(const BodyModel& model, double h, const Points& x, const std::optional<MassMoments>& known, Points& v,
-                const Acceleration& at) {
-  if (model.any_fixed) {
-    for (std::size_t i = 0; i < v.size(); ++i) v[i] += h * at(i);
-    return;
-  }
-  // The pull is free of torque about y, but it acts on x: the difference is given back as a spin of the body.
-  Vec3 leaked = Vec3::Zero();
-  const MassMoments moments = known ? *known : momentsOf(model, x);
-  const Vec3 centre = moments.centre;
-  for (std::size_t i = 0; i < v.size(); ++i) {
-    const Vec3 dv = h * at(i);
-    v[i] += dv;
-    leaked += model.masses[i] * (x[i] - centre).cross(dv);
-  }
-  const Vec3 spin = moments.inertia.spinFor(leaked);
-  for (std::size_t i = 0; i < v.size(); ++i) v[i] -= spin.cross(x[i] - centre);
-}
-
-// Damps what deforms and predicts: y = x + h v, but what deforms goes `ahead` instead of h. How long that takes decides
-// on the viscosity, and must not change how a body spins. A body that is held has no rigid motion of its own, and one
-// that lies on something no spin: rolling, tissue is kneaded. Damping
-// comes before the pull: after it, it would weaken the material. quicker: where what deforms is slowed otherwise than
-// before, its energy stays, and so do velocities over the pace. Returns the moments of x where it needed them.
-std::optional<MassMoments> dampAndPredict(const BodyModel& model, double h, double ahead, double damping,
-                                          double quicker, bool lies, const Points& x, Points& v, Points& y) {
-  const double damped = std::exp(-damping * h), kept = quicker * damped;
-  y.resize(x.size());
-  if (model.any_fixed || (ahead == h && kept == 1.0)) {
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      v[i] *= kept;
-      y[i] = model.fixed[i] ? x[i] : Vec3(x[i] + ahead * v[i]);
-    }
-    return std::nullopt;
-  }
-  const MassMoments moments = momentsOf(model, x);
-  const RigidMotion rigid = rigidMotionOf(model, moments, x, v);
-  const double spin_kept = lies ? damped : 1.0;
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    const Vec3 turning = rigid.spin.cross(x[i] - rigid.centre);
-    const Vec3 deforming = kept * (v[i] - rigid.velocity - turning), together = rigid.velocity + spin_kept * turning;
-    v[i] = together + deforming;
-    y[i] = x[i] + h * together + ahead * deforming;
-  }
-  return moments;
-}
-
-}  // namespace
-
 void matchAndMove(const BodyModel& model, const Material& material, const Vec3& gravity, double h, BodyState& state,
                   StepScratch& scratch, MatchCounters& counters) {
   Points& x = state.positions;
   Points& v = state.velocities;
-  scratch.previous = x;
+  const std::size_t n = x.size();
   const double factor = stiffnessFactor(model, state, h);
   const double stiffened = state.stiffened;
   const double ahead = material.elastic() ? viscosityTime(model, state, h) : viscosityTime(material.alpha, h);
   // What vibrates is given at most half of that share of its energy by becoming stiffer.
-  const double damping = material.damping + (stiffened < 1.0 ? 2.0 * kStiffening : 0.0);
+  const double damped = std::exp(-h * (material.damping + (stiffened < 1.0 ? 2.0 * kStiffening : 0.0)));
   state.stiffened = std::min(1.0, stiffened * std::exp(kStiffening * h));
-  double quicker = 1.0;
+  double kept = damped;
   if (material.elastic()) {
+    // Where what deforms is slowed otherwise than before, its energy stays, and so do velocities over the pace.
     const double pace = std::sqrt(factor);
-    if (state.pace > 0.0) quicker = pace / state.pace;
+    if (state.pace > 0.0) kept *= pace / state.pace;
     state.pace = pace;
   }
-  const std::optional<MassMoments> moments =
-      dampAndPredict(model, h, ahead, damping, quicker, scratch.lies, x, v, scratch.predicted);
-  const Points& y = scratch.predicted;
-  const MatchInput input = matchInput(model, state);
-  bool matched = true;
-  // What has no force and no torque goes through accelerate(), which keeps it so.
-  const bool eased = !state.eased.empty() && !state.eased_whole;
-  const double share = easedShare(state.eased_for);
 
+  // Damping comes before the pull: after it, it would weaken the material. A body that is held has no rigid motion of
+  // its own, and one that lies on something no spin: rolling, tissue is kneaded.
+  const Whole whole = model.any_fixed ? Whole() : Whole(model, x, v);
+  const RigidMotion& rigid = whole.rigid;
+  const double spin_kept = scratch.lies ? damped : 1.0;
+  const Mat3 turn = turning(rigid.spin);
+  const Mat3 undamped = (spin_kept - kept) * turn;
+  const Vec3 drift = (1.0 - kept) * rigid.velocity;
+  Points& y = scratch.predicted;
+  y.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec3 kept_v = kept * v[i] + drift + undamped * (x[i] - rigid.centre);
+    v[i] = kept_v;
+    y[i] = x[i] + ahead * kept_v;
+  }
+  // How far ahead what deforms is decides on the viscosity, and must not change how a body spins.
+  if (!material.elastic())
+    for (std::size_t i = 0; i < n; ++i)
+      y[i] += (h - ahead) * (rigid.velocity + spin_kept * (turn * (x[i] - rigid.centre)));
+
+  const MatchInput input = matchInput(model, state);
+  Points& pull = scratch.goals;  // [m/s^2]
+  const double gain = material.elastic() ? 0.0 : stiffened * stiffnessGain(material.alpha, h);
   if (material.elastic()) {
     const ElasticParameters parameters =
         elasticParameters(factor * stiffened * material.youngs_modulus, material.poissons_ratio, material.density);
     if (material.plastic() || !state.plastic.empty()) {
-      state.stretch = model.cells ? elasticAccelerations(*model.cells, parameters, y, state.poses, scratch.goals,
-                                                         counters, state.swelling, &state.plastic)
-                                  : elasticAccelerations(input, model.elastic, parameters, y, state.poses,
-                                                         scratch.goals, counters, state.swelling);
+      state.stretch = model.cells ? elasticAccelerations(*model.cells, parameters, y, state.poses, pull, counters,
+                                                         state.swelling, &state.plastic)
+                                  : elasticAccelerations(input, model.elastic, parameters, y, state.poses, pull,
+                                                         counters, state.swelling);
     } else {
-      model.elastic_batch->setRotations(state.poses, scratch.elastic);
-      state.stretch = model.elastic_batch->accelerate(input, parameters, y, scratch.elastic, scratch.goals, counters,
-                                                      state.swelling);
-      model.elastic_batch->getRotations(scratch.elastic, state.poses);
+      if (!scratch.under_way) model.elastic_batch->setRotations(state.poses, scratch.elastic);
+      state.stretch =
+          model.elastic_batch->accelerate(input, parameters, y, scratch.elastic, pull, counters, state.swelling);
+      if (scratch.last) model.elastic_batch->getRotations(scratch.elastic, state.poses);
     }
-    const Points& accelerations = scratch.goals;
-    if (!eased)
-      accelerate(model, h, x, moments, v, [&](std::size_t i) -> const Vec3& { return accelerations[i]; });
-    else
-      accelerate(model, h, x, moments, v,
-                 [&](std::size_t i) -> Vec3 { return accelerations[i] + share * state.eased[i]; });
-  } else if (const double gain = stiffened * stiffnessGain(material.alpha, h); gain > 0.0) {
-    matchShapes(input, y, material.mode, actingBeta(material.beta, h), state.poses, scratch.goals, counters,
-                state.swelling, material.plastic());
-    const Points& goals = scratch.goals;
-    const double pull = gain / (h * h);
-    if (!eased)
-      accelerate(model, h, x, moments, v, [&](std::size_t i) -> Vec3 { return pull * (goals[i] - y[i]); });
-    else
-      accelerate(model, h, x, moments, v,
-                 [&](std::size_t i) -> Vec3 { return pull * (goals[i] - y[i]) + share * state.eased[i]; });
+  } else if (gain > 0.0) {
+    matchShapes(input, y, material.mode, actingBeta(material.beta, h), state.poses, pull, counters, state.swelling,
+                material.plastic());
+    for (std::size_t i = 0; i < n; ++i) pull[i] = gain / (h * h) * (pull[i] - y[i]);
   } else {
-    matched = false;
+    pull.assign(n, Vec3::Zero());
   }
+  const double share = easedShare(state.eased_for);
+  const auto ease = [&] {
+    for (std::size_t i = 0; i < state.eased.size(); ++i) pull[i] += share * state.eased[i];
+  };
+  if (!state.eased_whole) ease();
+  // The pull is free of torque about y, but it acts on x: what it turns the body by is taken back.
+  Mat3 leaked = Mat3::Zero();
+  if (!model.any_fixed) leaked = h * turning(whole.spinFor(torqueOf(model, x, rigid.centre, pull)));
+  if (state.eased_whole) ease();
   if (!state.eased.empty()) {
-    if (state.eased_whole)
-      for (std::size_t i = 0; i < v.size(); ++i) v[i] += h * share * state.eased[i];
     state.eased_for += h;
     if (!(easedShare(state.eased_for) > 0.0)) state.eased.clear();
   }
-  if (material.plastic() && matched)
+  if (material.plastic() && (material.elastic() || gain > 0.0))
     counters.plastic_flows += flow(input, material.plasticity, h, state.poses, state.plastic);
+
   // Of a body that is held gravity has nothing to move but what deforms.
-  const Vec3 pull = (model.isHeld() ? factor : 1.0) * gravity;
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    if (model.fixed[i]) {
-      v[i].setZero();
-    } else {
-      v[i] += model.carried.empty() ? Vec3(h * pull) : Vec3(h * (1.0 - model.carried[i]) * pull);
-      x[i] += h * v[i];
-    }
+  const Vec3 weight = (model.isHeld() ? factor : 1.0) * gravity;
+  scratch.under_way = !scratch.last;
+  scratch.previous.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec3 at = x[i], faster = v[i] + h * (pull[i] + weight) - leaked * (at - rigid.centre);
+    scratch.previous[i] = at;
+    v[i] = faster;
+    x[i] = at + h * faster;
   }
+  if (!model.carried.empty())
+    for (std::size_t i = 0; i < n; ++i) {
+      const Vec3 carried = h * model.carried[i] * weight;
+      v[i] -= carried;
+      x[i] -= h * carried;
+    }
+  if (model.any_fixed)
+    for (std::size_t i = 0; i < n; ++i) {
+      if (!model.fixed[i]) continue;
+      v[i].setZero();
+      x[i] = scratch.previous[i];
+    }
   if (model.clamp) {
-    const double share = h / longestSubstep(model, state);
-    scratch.clamp.hold(model.clamp, share > 0.0 ? share * share : 1.0, model.rest, state.placed, x);
+    const double part = h / longestSubstep(model, state);
+    scratch.clamp.hold(model.clamp, part > 0.0 ? part * part : 1.0, model.rest, state.placed, x);
   }
 }
 

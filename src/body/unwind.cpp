@@ -88,7 +88,7 @@ void unwind(const BodyModel& model, const Vec3& gravity, double h, BodyState& st
   }
   // The momentum that it had, in the shape that it has now.
   scratch.previous = x;
-  const Vec3 spin = spinWith(model, x, before.centre, before.angular_momentum);
+  const Vec3 spin = spinWith(model, x, before.angular_momentum);
   for (std::size_t i = 0; i < x.size(); ++i) {
     v[i] = before.velocity + spin.cross(x[i] - before.centre) + h * gravity;
     x[i] += h * v[i];

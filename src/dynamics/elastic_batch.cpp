@@ -227,7 +227,8 @@ void ElasticBatch::sumForces(std::size_t first, std::size_t last, const double* 
       y += f[kBlock];
       z += f[2 * kBlock];
     }
-    accelerations[i] -= inverse_masses_[i] * Vec3(x, y, z);
+    const Vec3 mine = inverse_masses_[i] * Vec3(x, y, z);
+    accelerations[i] = other_clusters_.empty() ? Vec3(-mine) : Vec3(accelerations[i] - mine);
   }
 }
 
@@ -236,7 +237,7 @@ double ElasticBatch::accelerate(const MatchInput& in, const ElasticParameters& m
                                 double swelling, InstructionSet set, const ForEach& for_each) const {
   double stretch = 1.0;
   if (other_clusters_.empty())
-    accelerations.assign(y.size(), Vec3::Zero());
+    accelerations.resize(y.size());
   else
     stretch = elasticAccelerations({in.rest, in.masses, others_, other_shape_}, other_elastic_, material, y,
                                    state.others, accelerations, counters, swelling);

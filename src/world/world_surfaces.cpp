@@ -474,6 +474,7 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
     }
     runEach(each, work.alone.size(), [&](std::size_t b) {
       work.each_counters[b] = MatchCounters();
+      work.alone[b]->scratch.last = substep + 1 == substeps;
       matchAlone(*work.alone[b], h, work.each_counters[b]);
     });
     for (const MatchCounters& counters : work.each_counters) work.match_counters += counters;

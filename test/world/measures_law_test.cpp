@@ -168,10 +168,18 @@ TEST(ContactPointLaw, ForcesAlongNormalsThatPointOutOfTheSupportCarryTheWeight) 
       low.pose.rotation = turn;
       add(world, low);
       if (support == Support::kBody) add(world, brick(kind, "high", Vec3(0.005, 0.003, 0.0765)));
-      run(world, 720);
+      run(world, 360);
+      // In the mean: what is soft still trembles, by two thousandths of its weight where it lies on what is soft.
+      constexpr int kSteps = 60;
+      std::vector<ContactPoint> contacts;
+      for (int step = 0; step < kSteps; ++step) {
+        run(world, 1);
+        const WorldSnapshot now = seen(world);
+        contacts.insert(contacts.end(), now.contacts.begin(), now.contacts.end());
+      }
       const WorldSnapshot shot = seen(world);
       Load below, between;
-      for (const ContactPoint& point : shot.contacts) {
+      for (const ContactPoint& point : contacts) {
         EXPECT_NEAR(point.normal.norm(), 1.0, 1e-9) << what;
         EXPECT_GT(point.force, 0.0) << what;
         const double height = (point.position - floor).dot(up);
@@ -180,13 +188,13 @@ TEST(ContactPointLaw, ForcesAlongNormalsThatPointOutOfTheSupportCarryTheWeight) 
         Load& load = is_below ? below : between;
         if (is_below) EXPECT_GT(point.normal.dot(up), 0.999) << what;
         if (!is_below) EXPECT_NEAR(height, 0.05, 0.01) << what;
-        load.force += (!is_below && point.normal.dot(up) < 0.0 ? -1.0 : 1.0) * point.force * point.normal;
+        load.force += (!is_below && point.normal.dot(up) < 0.0 ? -1.0 : 1.0) * point.force / kSteps * point.normal;
         ++load.points;
       }
       double mass = 0.0;
       for (const BodySnapshot& body : shot.bodies) mass += body.model->mass;
       const double weight = mass * kG * up.z();
-      EXPECT_GE(below.points, 3) << what;
+      EXPECT_GE(below.points, 3 * kSteps) << what;
       EXPECT_NEAR(below.force.dot(up) / weight, 1.0, 1e-3) << what;
       printf("%s: %d points carry %.6f of the weight", what.c_str(), below.points, below.force.dot(up) / weight);
       if (support == Support::kBody) {

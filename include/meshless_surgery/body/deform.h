@@ -19,7 +19,11 @@ struct StepScratch {
   ClampStep clamp;
   ElasticBatchState elastic;
   std::vector<TouchedParticle> touched;  // of a body that preserves its size
-  bool lies = false;                     // on something that does not move: its spin is damped as what deforms
+  /// Of a row of substeps in which nobody else reads or writes poses: whether this is the last one, and then they are
+  /// written. Until then rotations stay in `elastic`.
+  bool last = true;
+  bool under_way = false;
+  bool lies = false;  // on something that does not move: its spin is damped as what deforms
 };
 
 /// Reads positions and velocities; writes positions, velocities, poses and scratch.previous: matches at y = x + h v,
@@ -55,7 +59,7 @@ struct RigidMotion {
   Vec3 angular_momentum = Vec3::Zero();  // [kg m^2/s] about the centre
 };
 RigidMotion rigidMotionOf(const BodyModel& model, const Points& positions, const Points& velocities);
-/// [rad/s] with which the particles, turning together about `centre`, have an angular momentum [kg m^2/s].
-Vec3 spinWith(const BodyModel& model, const Points& positions, const Vec3& centre, const Vec3& momentum);
+/// [rad/s] with which the particles, turning together about their centre, have an angular momentum [kg m^2/s].
+Vec3 spinWith(const BodyModel& model, const Points& positions, const Vec3& momentum);
 
 }  // namespace meshless
