@@ -56,7 +56,6 @@ std::shared_ptr<const PreparedBody> makeBall(bool elastic, bool surface) {
   model.solid = false;
   without.model = std::make_shared<BodyModel>(std::move(model));
   without.state.surface.clear();
-  without.state.embedded_offsets.clear();
   return std::make_shared<PreparedBody>(std::move(without));
 }
 

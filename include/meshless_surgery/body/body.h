@@ -71,7 +71,7 @@ struct BodyModel {
   double most_spread_inverse = std::numeric_limits<double>::infinity();
   double specific_stiffness = 0.0;  // [m^2/s^2] Young's modulus over density; 0 of an appearance material
   double poissons_ratio = 0.0;      // of an elastic material
-  double highest_frequency = 0.0;   // [rad/s] of an elastic material: a substep takes at most 1 / highest_frequency
+  double highest_frequency = 0.0;   // [rad/s] of an elastic material: see longestSubstep()
   TriangleMesh surface;             // rest positions of the vertices [m]
   SurfaceBinding binding;
   std::shared_ptr<const CollisionSurface> collision;  // null: contact takes the visual surface
