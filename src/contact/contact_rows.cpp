@@ -6,9 +6,9 @@
 namespace meshless {
 namespace {
 
-// Of the tissue at a place, what is held, from which on it does not give way: pressed all the same, the rest of it
-// would have to go many times as far in its stead.
-constexpr double kHeld = 0.1;
+// Of the tissue at both places together, what is free: with less, one does not give way to the other. Pressed all the
+// same, what is free of it would have to go many times as far in its stead.
+constexpr double kFree = 0.9;
 
 // Of one body, merged: vertices share particles.
 void addEntries(const FeaturePair& pair, int from, int to, const ContactSurface& surface,
@@ -32,7 +32,8 @@ void addEntries(const FeaturePair& pair, int from, int to, const ContactSurface&
   }
 }
 
-bool isHeld(const std::vector<RowEntry>& entries, Index begin, Index end, const RowBody& body) {
+/// Of the tissue at a body's places, 0..1.
+double freeShare(const std::vector<RowEntry>& entries, Index begin, Index end, const RowBody& body) {
   double held = 0.0, all = 0.0;
   for (Index k = begin; k < end; ++k) {
     const double share = std::abs(entries[k].coefficient);
@@ -40,7 +41,7 @@ bool isHeld(const std::vector<RowEntry>& entries, Index begin, Index end, const 
     const Index i = entries[k].particle;
     held += share * (body.inverse_masses[i] > 0.0 ? (body.carried ? body.carried[i] : 0.0) : 1.0);
   }
-  return !(held < kHeld * all);
+  return all > 0.0 ? 1.0 - held / all : 0.0;
 }
 
 }  // namespace
@@ -53,8 +54,9 @@ ContactRow* makeRow(const FeaturePair& pair, const RowBody& a, const RowBody& b,
   row.middle = static_cast<Index>(set.entries.size());
   if (pair.of_b > 0 && !with_itself) addEntries(pair, pair.of_a, pair.of_a + pair.of_b, *b.surface, set.entries);
   row.end = static_cast<Index>(set.entries.size());
-  if (isHeld(set.entries, row.begin, row.middle, a) &&
-      (row.middle == row.end || isHeld(set.entries, row.middle, row.end, b))) {
+  const double free_a = freeShare(set.entries, row.begin, row.middle, a);
+  const double free_b = with_itself ? free_a : freeShare(set.entries, row.middle, row.end, b);
+  if (!(free_a + free_b > kFree)) {
     set.entries.resize(row.begin);
     return nullptr;
   }

@@ -18,7 +18,7 @@ ToolResult pressed(const std::string& name, double finer) {
 TEST(Tools, TissueLiesOnTheSphereAndNotUnderItsTangents) {
   for (const double finer : {1.0, 1.26}) {
     const ToolResult result = pressed("press_3_nu30", finer);
-    EXPECT_NEAR(result.tip, 1.0, 0.02) << finer;
+    EXPECT_NEAR(result.tip, 1.0, 0.03) << finer;
     EXPECT_NEAR(result.ratio, 1.0, 0.12) << finer;
   }
 }

@@ -21,7 +21,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from deformer_support import ACROSS_X, DeformerTestCase, OwnNode, pose_stamped, run  # noqa: E402
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-RATE, SUBSTEPS, MAX_SUBSTEPS, G, TILT = 240.0, 2, 4, 9.81, 0.2
+RATE, SUBSTEPS, MAX_SUBSTEPS, G, TILT = 240.0, 2, 3, 9.81, 0.2
 LOOKS, LOOKS_INSIDE, LUMP_INSIDE = (0.25, 0.5, 0.75, 1.0), (0.75, 0.5, 0.25, 1.0), (0.5, 0.25, 0.75, 1.0)
 SIZES = {'flat': (0.12, 0.1, 0.05), 'leans': (0.1, 0.08, 0.04), 'falls': (0.12, 0.1, 0.05), 'hangs': (0.1, 0.1, 0.1),
          'sags': (0.12, 0.08, 0.04), 'stiff': (0.12, 0.08, 0.04),
@@ -365,7 +365,7 @@ class MessagesLawTest(DeformerTestCase):
 
     def test_each_step_that_takes_longer_than_it_is_long_is_counted(self):
         with open(os.path.join(HERE, 'scenes', 'messages.yaml')) as scene:
-            text = scene.read().replace('step_rate: 240, substeps: 2, max_substeps: 4', 'step_rate: 10000, substeps: 50')
+            text = scene.read().replace('step_rate: 240, substeps: 2, max_substeps: 3', 'step_rate: 10000, substeps: 50')
         with tempfile.NamedTemporaryFile('w', suffix='.yaml') as scene:
             scene.write(text)
             scene.flush()
