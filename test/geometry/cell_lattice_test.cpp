@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
 #include <set>
 
 #include "meshless_surgery/geometry/measures.h"
@@ -38,6 +39,23 @@ std::size_t reachable(const CellLattice& lattice) {
     }
   }
   return found.size();
+}
+
+// Samples see sharp tips and thin edges in places.
+TEST(DivideIntoCells, TissueWithSharpTipsIsOnePart) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> any;
+  for (int n = 0; n < 30; ++n) {
+    const Quat turn = Quat(any(random), any(random), any(random), any(random)).normalized();
+    TriangleMesh mesh = sphereMesh(1.0, 10.0);
+    for (Vec3& p : mesh.vertices) p = turn * p.cwiseProduct(Vec3(0.1, 0.03, 0.01));
+    for (const double cells : {100.0, 1000.0}) {
+      SCOPED_TRACE("turned at random for the " + std::to_string(n) + "th time, " + std::to_string(cells) + " cells");
+      const Result<CellLattice> lattice = divided(mesh, std::cbrt(signedVolume(mesh) / cells));
+      ASSERT_TRUE(lattice.ok());
+      EXPECT_EQ(reachable(*lattice), lattice->cells.size());
+    }
+  }
 }
 
 TEST(DivideIntoCells, ABoxOfWholeCellsIsFilledExactly) {
