@@ -95,6 +95,14 @@ Mat3 turning(const Vec3& spin) {
   return by;
 }
 
+// [m/s] of the velocity, what is rolling about a place. No more than there is: who slides as well does not gain from
+// it.
+Vec3 rollingOf(const RigidMotion& rigid, const Vec3& about) {
+  const Vec3 rolling = rigid.spin.cross(rigid.centre - about);
+  const double squared = rolling.squaredNorm();
+  return squared > 0.0 ? Vec3(std::clamp(rigid.velocity.dot(rolling) / squared, 0.0, 1.0) * rolling) : rolling;
+}
+
 }  // namespace
 
 RigidMotion rigidMotionOf(const BodyModel& model, const Points& positions, const Points& velocities) {
@@ -144,13 +152,14 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
   }
 
   // Damping comes before the pull: after it, it would weaken the material. A body that is held has no rigid motion of
-  // its own, and one that lies on something no spin: rolling, tissue is kneaded.
+  // its own. One that lies on something kneads its tissue where it rolls or rocks: about that place.
   const Whole whole = model.any_fixed ? Whole() : Whole(model, x, v);
-  const RigidMotion& rigid = whole.rigid;
-  const double spin_kept = scratch.lies ? damped : 1.0;
+  RigidMotion rigid = whole.rigid;
+  const double spin_kept = scratch.load > 0.0 ? damped : 1.0;
   const Mat3 turn = turning(rigid.spin);
+  if (scratch.load > 0.0) rigid.velocity -= (1.0 - spin_kept) * rollingOf(rigid, scratch.load_at);
   const Mat3 undamped = (spin_kept - kept) * turn;
-  const Vec3 drift = (1.0 - kept) * rigid.velocity;
+  const Vec3 drift = rigid.velocity - kept * whole.rigid.velocity;
   Points& y = scratch.predicted;
   y.resize(n);
   for (std::size_t i = 0; i < n; ++i) {

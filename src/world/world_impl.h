@@ -275,6 +275,7 @@ struct World::Impl {
   void matchAlone(WorldBody& body, double h, MatchCounters& counters) const;
   std::unique_ptr<BatchLanes> borrowLanes(WorldBatch& batch);
   void giveBackLanes(WorldBatch& batch, std::unique_ptr<BatchLanes> lanes);
+  void findLoads(const SurfaceWork& work);
   void keepSizes(SurfaceWork& work);
   /// The body and all that fell asleep with it.
   void wake(WorldBody& body);

@@ -424,12 +424,27 @@ void World::Impl::keepSizes(SurfaceWork& work) {
   }
   if (std::none_of(work.bodies.begin(), work.bodies.end(), [&](const WorldBody* body) { return keeps(*body); })) return;
   for (std::size_t n = 0; n < work.member_count; ++n)
-    surface_contacts.eachPressed(work.members[n].island, [&](Index b, Index particle, const Vec3& normal) {
-      if (b < bodies.size() && !bodies[b]->asleep && keeps(*bodies[b]))
-        bodies[b]->scratch.touched.push_back({particle, normal});
-    });
+    surface_contacts.eachPressed(work.members[n].island,
+                                 [&](Index b, const RowEntry& entry, const Vec3& normal, double) {
+                                   if (b < bodies.size() && !bodies[b]->asleep && keeps(*bodies[b]))
+                                     bodies[b]->scratch.touched.push_back({entry.particle, normal});
+                                 });
   for (WorldBody* body : work.bodies)
     if (keeps(*body)) preserve(*body->model, body->material, body->state, body->scratch, work.preserve_counters);
+}
+
+void World::Impl::findLoads(const SurfaceWork& work) {
+  for (std::size_t n = 0; n < work.member_count; ++n) {
+    if (!surface_contacts.islands()[work.members[n].island].held) continue;
+    surface_contacts.eachPressed(work.members[n].island, [&](Index b, const RowEntry& entry, const Vec3&, double load) {
+      if (b >= bodies.size() || bodies[b]->asleep) return;
+      const double share = load * std::abs(entry.coefficient);
+      bodies[b]->scratch.load += share;
+      bodies[b]->scratch.load_at += share * bodies[b]->state.positions[entry.particle];
+    });
+  }
+  for (WorldBody* body : work.bodies)
+    if (body->scratch.load > 0.0) body->scratch.load_at /= body->scratch.load;
 }
 
 void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int parts_left, const ForEach& each) {
@@ -448,13 +463,15 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
     for (std::size_t b = member.begin; b < member.end; ++b) {
       WorldBody& body = *work.bodies[b];
       body.state.substep = h;
-      body.scratch.lies = island.held && !island.rows.empty();
+      body.scratch.load = 0.0;
+      body.scratch.load_at.setZero();
       if (body.batch != kNoIndex && fitsFloat(body, h))
         work.side_by_side[body.batch].push_back(&body);
       else
         work.alone.push_back(&body);
     }
   }
+  findLoads(work);
   work.each_counters.resize(work.alone.size());
   for (std::size_t n = 0; n < batches.size(); ++n)
     if (!work.side_by_side[n].empty()) work.lanes[n] = borrowLanes(batches[n]);

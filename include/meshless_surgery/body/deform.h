@@ -23,7 +23,8 @@ struct StepScratch {
   /// written. Until then rotations stay in `elastic`.
   bool last = true;
   bool under_way = false;
-  bool lies = false;  // on something that does not move: its spin is damped as what deforms
+  double load = 0.0;             // [N] that presses a body which lies on what does not move
+  Vec3 load_at = Vec3::Zero();   // [m] the middle of it
 };
 
 /// Reads positions and velocities; writes positions, velocities, poses and scratch.previous: matches at y = x + h v,
