@@ -170,6 +170,27 @@ TEST(SurfaceContact, AnEggThatRocksComesToRestAndSleeps) {
   EXPECT_GT(body.measures.centre_of_mass.head<2>().norm(), 0.05) << "it has rolled";
 }
 
+// Rolling kneads tissue: what rolls on the ground is damped as what deforms.
+TEST(SurfaceContact, ABallRollsOutAsFastAsItsTissueIsDamped) {
+  for (const double damping : {0.5, 2.0}) {
+    SCOPED_TRACE(damping);
+    World world(surface());
+    BodyDef ball = block("ball", Vec3(0, 0, 0.0501));
+    ball.mesh = sphereMesh(0.05, 0.012);
+    ball.spacing = 0.0125;
+    ball.material.youngs_modulus = 5e4;
+    ball.material.damping = damping;
+    ball.material.friction = 0.9;
+    add(world, ball, Vec3(0.5, 0, 0), Vec3(0, 10.0, 0));
+    const auto speed = [&] { return seen(world).bodies[0].measures.velocity.norm(); };
+    run(world, 0.2);
+    const double before = speed();
+    run(world, 1.0 / damping);
+    EXPECT_GT(before, 0.25);
+    EXPECT_NEAR(std::log(before / speed()), 1.0, 0.35);
+  }
+}
+
 // As on each other above, with a material five times as soft.
 TEST(SurfaceContact, SoftBlocksOnEachOtherSleep) {
   World world(surface());

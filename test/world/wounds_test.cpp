@@ -154,9 +154,8 @@ std::vector<double> foldsOf(const BodySnapshot& body) {
   return folds;
 }
 
-// A surface much finer than the cells beneath it follows them without shards. 8 of 40,000 edges, at a rim that the
-// weight of the organ crushes; where each vertex followed one cell, 56.
-TEST(Wounds, AFineSurfaceHasHardlyAFoldAfterACut) {
+// Over 60 degrees, half a second after the cut.
+int foldsAfterACut(int moment) {
   BodyDef def = test::defOf(*randomOrgan(1, 0, 0.2, 20000));
   def.material.self_contact = SelfContact::kNone;  // a rim that folds over would stay so
   def.material.youngs_modulus = 4500.0;
@@ -166,19 +165,28 @@ TEST(Wounds, AFineSurfaceHasHardlyAFoldAfterACut) {
   def.material.friction = 0.3;
   def.pose.translation.z() = 0.002 - boundsOf(def.mesh.vertices).min.z();
   World world{WorldSettings()};
-  ASSERT_TRUE(world.addSceneBody(test::shared(def)).ok());
-  for (int step = 0; step < 60; ++step) world.step();
+  EXPECT_TRUE(world.addSceneBody(test::shared(def)).ok());
+  for (int step = 0; step < moment; ++step) world.step();
   CutCommand cut;
   const Vec3 across = Vec3(-0.387, -0.039, 0.687).normalized();
   cut.blades.x_axis = across.unitOrthogonal();
   cut.blades.y_axis = across.cross(cut.blades.x_axis);
   cut.blades.origin = world.snapshot({false, false, true}).bodies[0].measures.centre_of_mass - 10.0 * cut.blades.x_axis;
-  ASSERT_TRUE(world.apply(cut).ok());
+  EXPECT_TRUE(world.apply(cut).ok());
   for (int step = 0; step < 60; ++step) world.step();
   int folds = 0;
   for (const BodySnapshot& body : world.snapshot({true, true, true}).bodies)
     for (const double fold : foldsOf(body)) folds += fold > 60.0;
-  EXPECT_LE(folds, 16);
+  return folds;
+}
+
+// A surface much finer than the cells beneath it follows them without shards. About 13 of 40,000 edges, at a rim that
+// the weight of the organ crushes, as the moment of the cut has it; where each vertex followed one cell, 56.
+TEST(Wounds, AFineSurfaceHasHardlyAFoldAfterACut) {
+  int folds = 0;
+  const std::vector<int> moments = {40, 60, 80};  // [steps] of the cut
+  for (const int moment : moments) folds += foldsAfterACut(moment);
+  EXPECT_LE(folds, 25 * static_cast<int>(moments.size()));
 }
 
 }  // namespace
