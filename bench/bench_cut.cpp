@@ -101,6 +101,7 @@ struct Whole {
   bool elastic;
   ContactMethod contact;
   bool incise;
+  double triangles = 1.15e4;
 };
 
 Command commandOf(const Whole& whole) {
@@ -124,7 +125,7 @@ Command commandOf(const Whole& whole) {
 void wholeRow(benchmark::State& state, const Whole& whole) {
   BodyDef def;
   def.name = "ball";
-  def.mesh = ball(1.15e4);
+  def.mesh = ball(whole.triangles);
   def.spacing = 0.0155;
   if (whole.elastic) def.material.youngs_modulus = 5e3;
   const auto body = std::make_shared<const PreparedBody>(*prepareBody(std::move(def)));
@@ -220,7 +221,9 @@ void registerRows() {
   for (const Whole& whole : {Whole{"whole/10k", true, ContactMethod::kNone, false},
                              Whole{"whole/10k/looks", false, ContactMethod::kNone, false},
                              Whole{"whole/10k/textbook", true, ContactMethod::kTextbook, false},
-                             Whole{"incision/10k", true, ContactMethod::kNone, true}})
+                             Whole{"incision/10k", true, ContactMethod::kNone, true},
+                             Whole{"whole/60k", true, ContactMethod::kNone, false, 6.5e4},
+                             Whole{"incision/60k", true, ContactMethod::kNone, true, 6.5e4}})
     benchmark::RegisterBenchmark(whole.name, [whole](benchmark::State& state) { wholeRow(state, whole); })
         ->Unit(benchmark::kMillisecond)
         ->UseRealTime()
