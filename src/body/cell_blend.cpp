@@ -1,6 +1,7 @@
 #include "meshless_surgery/body/cell_blend.h"
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
 #include <numeric>
 #include <unordered_map>
@@ -15,6 +16,7 @@ namespace meshless {
 namespace {
 
 constexpr double kReach = 1.2;           // [spacing] cells farther than this do not count
+constexpr double kBeyond = 1.0 + 1e-9;   // of the reach: out of it, whatever rounding does
 constexpr int kAround = 2;               // places on each side of a vertex's own: kReach, rounded up
 constexpr std::size_t kChunk = 16;       // cells
 constexpr std::size_t kMostWays = 1000;  // kept at a time: 12 kB each
@@ -42,19 +44,6 @@ struct Tissue {
 // A crumb has those of the cell that it came from.
 SampleSet samplesOf(const LatticeCell& cell) { return cell.samples ? cell.samples : cell.filled; }
 
-int nearestSample(SampleSet samples, const Vec3& at) {
-  int on[3];
-  for (int k = 0; k < 3; ++k)
-    on[k] = std::clamp(static_cast<int>(std::ceil(kCellSamples * at[k])) - 1, 0, kCellSamples - 1);
-  if (const int bit = sampleBit(on[0], on[1], on[2]); samples >> bit & 1) return bit;
-  int best = lowestSample(samples);
-  for (SampleSet left = samples; left; left &= left - 1)
-    if (const int bit = lowestSample(left);
-        (samplePlace(bit) - at).squaredNorm() < (samplePlace(best) - at).squaredNorm())
-      best = bit;
-  return best;
-}
-
 // The tissue of a lattice by places, with empty ones all around.
 class TissueGrid {
  public:
@@ -71,6 +60,9 @@ class TissueGrid {
       stride_[k] = count;
       count *= static_cast<std::size_t>(upper[k] + kAround + 1 - lower_[k]);
     }
+    for (std::size_t p = 0; p < offsets_.size(); ++p)
+      for (int axis = 0; axis < 3; ++axis)
+        offsets_[p] += stride_[axis] * static_cast<std::size_t>(static_cast<int>(p) / kStride[axis] % kWide - kAround);
     number_.assign(count, 0);
     all_.resize(1);  // the first is that of empty places
     for (Index c = 0; c < lattice.cells.size(); ++c) {
@@ -107,12 +99,7 @@ class TissueGrid {
   }
   /// What is around a place that has cells.
   void window(std::size_t middle, std::array<const Tissue*, kPlaces>& places) const {
-    for (int p = 0; p < kPlaces; ++p) {
-      std::size_t index = middle;
-      for (int axis = 0; axis < 3; ++axis)
-        index += stride_[axis] * static_cast<std::size_t>(p / kStride[axis] % kWide - kAround);
-      places[static_cast<std::size_t>(p)] = &all_[number_[index]];
-    }
+    for (std::size_t p = 0; p < places.size(); ++p) places[p] = &all_[number_[middle + offsets_[p]]];
   }
   Index numberOf(std::size_t index) const { return number_[index]; }
   std::size_t count() const { return all_.size(); }
@@ -124,6 +111,7 @@ class TissueGrid {
 
   std::array<std::int32_t, 3> lower_{};
   std::array<std::size_t, 3> stride_{};
+  std::array<std::size_t, kPlaces> offsets_{};  // of the places of a window
   std::vector<Index> number_;
   std::vector<Tissue> all_;
 };
@@ -223,15 +211,17 @@ class Blender {
     const LatticeCell& own = of_.lattice.cells[cell];
     of_.grid.window(of_.grid.indexOf(own.place), window_);
     choose(cell, from, to, rest);
+    const double spacing = of_.lattice.spacing;
     for (; from != to; ++from) {
       const Vec3& p = rest[*from];
-      const double to_own = awayFrom(cell, p), reach = reachOf(to_own);
+      const double to_own = awayFrom(cell, p), reach = reachOf(to_own), far = kBeyond * spacing * reach;
       // What is held with all around it stays.
       const bool held = of_.held[cell], direct = held || (!(reach > kReach) && isOpen(own.place));
       const int bit = direct ? 0 : nearestSample(samplesOf(own), of_.lattice.placeIn(own, p));
       double all = 0.0;
       for (const Candidate& c : candidates_) {
         if (held && c.cell != cell) continue;
+        if ((p - c.centroid).squaredNorm() > far * far) continue;
         const double away = awayFrom(c.cell, p);
         if (!(away < reach)) continue;
         const double detour = direct || c.cell == cell ? 0.0 : detourTo(c, own, bit, away, reach);
@@ -263,6 +253,7 @@ class Blender {
  private:
   enum Openness : char { kUnknown, kOpen, kNotOpen };
   struct Candidate {
+    Vec3 centroid;
     Index cell;
     int place;                     // in the window
     std::array<Index, 8> corners;  // in corners_
@@ -282,14 +273,14 @@ class Blender {
       bounds.extend(rest[*v]);
       reach = std::max(reach, reachOf(awayFrom(cell, rest[*v])));
     }
+    const double far = kBeyond * of_.lattice.spacing * reach;
     candidates_.clear();
     corners_.clear();
     for (int p = 0; p < kPlaces; ++p)
       for (const Index c : window_[static_cast<std::size_t>(p)]->cells) {
         const Vec3& centroid = of_.maps[c].centroid;
-        const Vec3 nearest = centroid.cwiseMax(bounds.min).cwiseMin(bounds.max);
-        if (!(awayFrom(c, nearest) <= reach)) continue;
-        candidates_.push_back({c, p, of_.lattice.cells[c].corners});
+        if ((centroid.cwiseMax(bounds.min).cwiseMin(bounds.max) - centroid).squaredNorm() > far * far) continue;
+        candidates_.push_back({centroid, c, p, of_.lattice.cells[c].corners});
         for (const Index corner : candidates_.back().corners) {
           if (number_[corner] == kNoIndex) corners_.push_back(corner);
           number_[corner] = 0;
@@ -311,31 +302,27 @@ class Blender {
     return known == kOpen;
   }
   bool lookForGaps() const {
-    std::array<bool, kPlaces> reached{};
-    std::array<int, kPlaces> queue;
-    int count = 0, filled = 0, found = 0;
-    const auto visit = [&](int p) {
-      if (reached[static_cast<std::size_t>(p)]) return;
-      reached[static_cast<std::size_t>(p)] = true;
-      queue[static_cast<std::size_t>(count++)] = p;
-    };
-    for (int p = 0; p < kPlaces; ++p) {
-      if (!isInReach(p)) continue;
-      const Tissue& tissue = *window_[static_cast<std::size_t>(p)];
-      if (tissue.severed) return true;
-      filled += tissue.present != kNoSample;
+    using PlaceSet = std::bitset<kPlaces>;
+    PlaceSet filled, reached, joined[3];  // along each axis, to the next place
+    for (std::size_t p = 0; p < kPlaces; ++p) {
+      const Tissue& tissue = *window_[p];
+      if (!tissue.present) continue;
+      if (isInReach(static_cast<int>(p))) {
+        if (tissue.severed) return true;
+        filled.set(p);
+      }
+      for (int axis = 0; axis < 3; ++axis)
+        joined[axis][p] = tissue.joined[axis] && static_cast<int>(p) / kStride[axis] % kWide + 1 < kWide;
     }
-    visit(kMiddle);
-    for (int n = 0; n < count; ++n) {
-      const int p = queue[static_cast<std::size_t>(n)];
-      found += isInReach(p);
+    reached.set(kMiddle);
+    for (PlaceSet before; before != reached;) {
+      before = reached;
       for (int axis = 0; axis < 3; ++axis) {
-        const int along = p / kStride[axis] % kWide;
-        if (along + 1 < kWide && window_[static_cast<std::size_t>(p)]->joined[axis]) visit(p + kStride[axis]);
-        if (along > 0 && window_[static_cast<std::size_t>(p - kStride[axis])]->joined[axis]) visit(p - kStride[axis]);
+        const auto stride = static_cast<std::size_t>(kStride[axis]);
+        reached |= (reached & joined[axis]) << stride | (reached >> stride & joined[axis]);
       }
     }
-    return found < filled;
+    return (filled & ~reached).any();
   }
   // Where two axes are two places off, all is farther than kReach.
   static bool isInReach(int p) {

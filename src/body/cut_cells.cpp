@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <limits>
 #include <map>
-#include <optional>
 #include <sstream>
 #include <tuple>
 #include <utility>
@@ -84,14 +83,20 @@ class CellCutter {
     for (const CellPieceSource& source : sources_) {
       surfaces_.push_back(surfaceOf(source, model_.surface.vertices, model_.binding));
       const auto& embedded = surfaces_.back().embedded;
-      const auto lost = std::find_if(embedded.begin(), embedded.end(), [](const auto& e) { return e.was == kNoIndex; });
+      const auto lost = lostOf(surfaces_.back());
       if (lost == embedded.end()) continue;
       std::ostringstream text;
       text << "the blade made a point at " << source.mesh.vertices[lost - embedded.begin()].transpose()
            << " that lies in none of its cells";
       return Error{ErrorCode::kUnsuitableShape, text.str()};
     }
-    for (RestSurface& surface : surfaces_) findCells(surface);
+    for (const CellPieceSource& source : collision_) {
+      surfaces_.push_back(surfaceOf(source, model_.collision->mesh.vertices, model_.collision->binding));
+      if (lostOf(surfaces_.back()) == surfaces_.back().embedded.end()) continue;
+      surfaces_.resize(sources_.size());
+      break;
+    }
+    inChunks(surfaces_.size(), 1, [&](std::size_t s, std::size_t) { surfaces_[s].cells = cellsOf(surfaces_[s], -1); });
     choosePieces();
     bindCollision();
     sampled_ = static_cast<Index>(cells().size());
@@ -112,22 +117,24 @@ class CellCutter {
   // What is known at rest of the surface of a source.
   struct RestSurface {
     std::vector<EmbeddedVertex> embedded;
-    TriangleMesh mesh;  // [m]
-    Points normals;
-    std::optional<SolidQuery> solid;
-    std::vector<Index> cells;  // of each vertex: cellOf() in any piece
+    TriangleMesh mesh;         // [m]
+    std::vector<Index> cells;  // of each vertex, in any piece
   };
 
   RestSurface surfaceOf(const CellPieceSource& source, const Points& parent_rest, const SurfaceBinding& parent) {
     RestSurface surface;
+    surface.embedded.reserve(source.origins.size());
+    surface.mesh.vertices.reserve(source.origins.size());
     for (Index v = 0; v < source.origins.size(); ++v) {
       surface.embedded.push_back(embeddedOf(source, v, parent_rest, parent));
       surface.mesh.vertices.push_back(surface.embedded.back().rest);
     }
     surface.mesh.triangles = source.mesh.triangles;
-    surface.normals = vertexNormals(surface.mesh);
-    surface.solid.emplace(surface.mesh);
     return surface;
+  }
+  static std::vector<EmbeddedVertex>::const_iterator lostOf(const RestSurface& surface) {
+    return std::find_if(surface.embedded.begin(), surface.embedded.end(),
+                        [](const EmbeddedVertex& e) { return e.was == kNoIndex; });
   }
 
   EmbeddedVertex embeddedOf(const CellPieceSource& source, Index v, const Points& parent_rest,
@@ -197,62 +204,128 @@ class CellCutter {
 
   // --- cells that a vertex may follow
 
-  // The cell of vertex v of a surface among those of `piece` (any where it is negative): that of the nearest sample
-  // which the surface does not hide from the tissue beneath the vertex.
-  Index cellOf(const RestSurface& surface, Index v, int piece) const {
-    const EmbeddedVertex& embedded = surface.embedded[v];
-    const auto in_piece = [&](Index c) { return piece < 0 || piece_of_[component_[c]] == piece; };
-    if (piece >= 0 && surface.cells[v] != kNoIndex && in_piece(surface.cells[v])) return surface.cells[v];
-    const std::vector<Index>& copies = children_[embedded.was];
-    // A blade may leave a cell whole and part a vertex from it.
-    if (!embedded.made && copies.size() == 1 && !cut_.changed[copies[0]] && in_piece(copies[0])) {
-      const SampleSet above = cut_.above[copies[0]];
-      if (!(cut_.lattice.cells[copies[0]].samples & (embedded.above ? ~above : above))) return copies[0];
+  // The cells of the vertices of a surface among those of `piece` (any where it is negative).
+  std::vector<Index> cellsOf(const RestSurface& surface, int piece) const {
+    std::vector<Index> cells = surface.cells, open;
+    cells.resize(surface.embedded.size(), kNoIndex);
+    for (Index v = 0; v < cells.size(); ++v) {
+      if (piece < 0) cells[v] = cellAsBefore(surface.embedded[v]);
+      if (piece < 0 ? cells[v] != kNoIndex : cells[v] == kNoIndex || piece_of_[component_[cells[v]]] == piece) continue;
+      open.push_back(v);
     }
-    const Vec3 beneath = embedded.rest - kBeneath * before_.spacing * surface.normals[v];
-    std::vector<std::pair<double, Index>> boxes;  // [spacing^2] from cells to the vertex
-    const std::array<std::int32_t, 3> own = before_.placeOf(embedded.rest);
+    if (open.empty()) return cells;
+    const TriangleMesh around = trianglesAround(surface, open);
+    const Points normals = vertexNormals(around);
+    const SolidQuery solid(around);
+    inChunks(open.size(), kChunk, [&](std::size_t from, std::size_t to) {
+      for (std::size_t n = from; n < to; ++n)
+        cells[open[n]] = nearestCell(surface.embedded[open[n]].rest, normals[open[n]], solid, piece);
+    });
+    return cells;
+  }
+
+  // A blade may leave a cell whole and part a vertex from it.
+  Index cellAsBefore(const EmbeddedVertex& embedded) const {
+    const std::vector<Index>& copies = children_[embedded.was];
+    if (embedded.made || copies.size() != 1 || cut_.changed[copies[0]]) return kNoIndex;
+    const SampleSet above = cut_.above[copies[0]];
+    return cut_.lattice.cells[copies[0]].samples & (embedded.above ? ~above : above) ? kNoIndex : copies[0];
+  }
+
+  // The triangles that reach into a place of the lattice that is next to a vertex's: no others are asked for.
+  TriangleMesh trianglesAround(const RestSurface& surface, const std::vector<Index>& vertices) const {
+    std::vector<std::array<std::int32_t, 3>> places;
+    places.reserve(surface.mesh.vertices.size());
+    for (const Vec3& p : surface.mesh.vertices) places.push_back(before_.placeOf(p));
+    std::array<std::int32_t, 3> lower = places[0], size = places[0];
+    for (const auto& place : places)
+      for (int k = 0; k < 3; ++k) {
+        lower[k] = std::min(lower[k], place[k]);
+        size[k] = std::max(size[k], place[k]);
+      }
+    for (int k = 0; k < 3; ++k) size[k] += 3 - lower[k]--;  // and one more all around
+    const auto indexOf = [&](std::int32_t x, std::int32_t y, std::int32_t z) {
+      return static_cast<std::size_t>(x - lower[0]) +
+             static_cast<std::size_t>(size[0]) *
+                 (static_cast<std::size_t>(y - lower[1]) +
+                  static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(z - lower[2]));
+    };
+    enum Mark : char { kFar, kNear, kSeen };
+    std::vector<char> marks(
+        static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(size[2]),
+        kFar);
+    for (const Index v : vertices) {
+      const auto& own = places[v];
+      if (marks[indexOf(own[0], own[1], own[2])] == kSeen) continue;
+      for (std::int32_t z = -1; z <= 1; ++z)
+        for (std::int32_t y = -1; y <= 1; ++y)
+          for (std::int32_t x = -1; x <= 1; ++x) {
+            char& mark = marks[indexOf(own[0] + x, own[1] + y, own[2] + z)];
+            mark = std::max<char>(mark, kNear);
+          }
+      marks[indexOf(own[0], own[1], own[2])] = kSeen;
+    }
+    TriangleMesh around;
+    around.vertices = surface.mesh.vertices;
+    for (const Triangle& t : surface.mesh.triangles) {
+      std::array<std::int32_t, 3> from = places[t[0]], to = from;
+      for (const Index v : t)
+        for (int k = 0; k < 3; ++k) {
+          from[k] = std::min(from[k], places[v][k]);
+          to[k] = std::max(to[k], places[v][k]);
+        }
+      bool near = false;
+      for (std::int32_t z = from[2]; z <= to[2] && !near; ++z)
+        for (std::int32_t y = from[1]; y <= to[1] && !near; ++y)
+          for (std::int32_t x = from[0]; x <= to[0] && !near; ++x) near = marks[indexOf(x, y, z)] != kFar;
+      if (near) around.triangles.push_back(t);
+    }
+    return around;
+  }
+
+  // That of the nearest sample which the surface does not hide from the tissue beneath the vertex.
+  Index nearestCell(const Vec3& rest, const Vec3& normal, const SolidQuery& solid, int piece) const {
+    // A cell by its nearest sample that is left, or at first by its box.
+    struct Near {
+      double squared, box;  // [spacing^2]
+      Index cell;
+      SampleSet left;
+      int bit = -1;  // not looked for yet
+      bool operator<(const Near& other) const {
+        return std::tie(squared, box, cell) < std::tie(other.squared, other.box, other.cell);
+      }
+    };
+    const Vec3 beneath = rest - kBeneath * before_.spacing * normal;
+    const std::array<std::int32_t, 3> own = before_.placeOf(rest);
+    std::vector<Near> near;
+    near.reserve(64);
     for (std::int32_t z = -1; z <= 1; ++z)
       for (std::int32_t y = -1; y <= 1; ++y)
         for (std::int32_t x = -1; x <= 1; ++x)
           for (const Index c : finder_.at({own[0] + x, own[1] + y, own[2] + z})) {
             const LatticeCell& cell = cut_.lattice.cells[c];
-            if (cell.isBridge(c) || !in_piece(c)) continue;
+            if (cell.isBridge(c) || (piece >= 0 && piece_of_[component_[c]] != piece)) continue;
             const Vec3 within = before_.placeIn(cell, beneath);
-            boxes.emplace_back((within - within.cwiseMax(0.0).cwiseMin(1.0)).squaredNorm(), c);
+            const double box = (within - within.cwiseMax(0.0).cwiseMin(1.0)).squaredNorm();
+            near.push_back({box, box, c, cell.samples});
           }
-    std::sort(boxes.begin(), boxes.end());
-    // Samples, nearest first; a cell's are looked at once none of the others is nearer than it is.
-    struct Sample {
-      double squared;
-      Index cell;
-      int bit;
-      bool operator<(const Sample& other) const { return squared < other.squared; }
-    };
-    std::vector<Sample> near;
-    for (auto next = boxes.begin();;) {
-      const auto nearest = std::min_element(near.begin(), near.end());
-      if (next != boxes.end() && (near.empty() || next->first <= nearest->squared)) {
-        const LatticeCell& cell = cut_.lattice.cells[next->second];
-        const Vec3 within = before_.placeIn(cell, beneath);
-        for (SampleSet left = cell.samples; left; left &= left - 1)
-          near.push_back({(samplePlace(lowestSample(left)) - within).squaredNorm(), next->second, lowestSample(left)});
-        ++next;
-        continue;
+    while (!near.empty()) {
+      Near& next = *std::min_element(near.begin(), near.end());
+      const LatticeCell& cell = cut_.lattice.cells[next.cell];
+      if (next.bit >= 0) {
+        if (!solid.crosses(beneath, before_.restPlace(cell, samplePlace(next.bit)))) return next.cell;
+        next.left &= ~(SampleSet{1} << next.bit);
       }
-      if (near.empty()) return kNoIndex;
-      const LatticeCell& cell = cut_.lattice.cells[nearest->cell];
-      if (!surface.solid->crosses(beneath, before_.restPlace(cell, samplePlace(nearest->bit)))) return nearest->cell;
-      *nearest = near.back();
-      near.pop_back();
+      if (next.left) {
+        const Vec3 within = before_.placeIn(cell, beneath);
+        next.bit = nearestSample(next.left, within);
+        next.squared = (samplePlace(next.bit) - within).squaredNorm();
+      } else {
+        next = near.back();
+        near.pop_back();
+      }
     }
-  }
-
-  void findCells(RestSurface& surface) const {
-    surface.cells.resize(surface.embedded.size());
-    inChunks(surface.cells.size(), kChunk, [&](std::size_t from, std::size_t to) {
-      for (std::size_t v = from; v < to; ++v) surface.cells[v] = cellOf(surface, static_cast<Index>(v), -1);
-    });
+    return kNoIndex;
   }
 
   // --- which cells are in which piece
@@ -317,7 +390,7 @@ class CellCutter {
     carriers_.resize(sources_.size());
     for (std::size_t p = 0; p < sources_.size(); ++p) {
       const std::vector<EmbeddedVertex>& embedded = surfaces_[p].embedded;
-      for (Index v = 0; v < embedded.size(); ++v) carriers_[p].push_back(cellOf(surfaces_[p], v, static_cast<int>(p)));
+      carriers_[p] = cellsOf(surfaces_[p], static_cast<int>(p));
       std::map<Index, Index> crumbs;
       for (Index v = 0; v < embedded.size(); ++v) {
         if (carriers_[p][v] != kNoIndex) continue;
@@ -331,14 +404,10 @@ class CellCutter {
 
   // Which piece each part of the surface for contact is of, and the cells of its vertices there.
   void bindCollision() {
-    if (collision_.empty()) return;
+    if (surfaces_.size() == sources_.size()) return;
     collisions_.resize(sources_.size());
-    for (const CellPieceSource& source : collision_) {
-      RestSurface surface = surfaceOf(source, model_.collision->mesh.vertices, model_.collision->binding);
-      if (std::any_of(surface.embedded.begin(), surface.embedded.end(),
-                      [](const auto& e) { return e.was == kNoIndex; }))
-        return collisions_.clear();
-      findCells(surface);
+    for (std::size_t s = sources_.size(); s < surfaces_.size(); ++s) {
+      const RestSurface& surface = surfaces_[s];
       std::vector<Index> votes(sources_.size(), 0);
       for (Index v = 0; v < surface.embedded.size(); ++v)
         if (const Index c = surface.cells[v]; c != kNoIndex && !surface.embedded[v].made)
@@ -348,14 +417,14 @@ class CellCutter {
       const Index first = static_cast<Index>(piece.mesh.vertices.size());
       for (const Triangle& t : surface.mesh.triangles)
         piece.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-      for (Index v = 0; v < surface.embedded.size(); ++v) {
-        piece.mesh.vertices.push_back(surface.mesh.vertices[v]);
-        piece.cells.push_back(cellOf(surface, v, static_cast<int>(p)));
-        if (piece.cells.back() == kNoIndex)  // in a rim that is thinner than samples see
-          piece.cells.back() = finder_.nearest(surface.mesh.vertices[v], [&](Index c) {
+      piece.mesh.vertices.insert(piece.mesh.vertices.end(), surface.mesh.vertices.begin(), surface.mesh.vertices.end());
+      std::vector<Index> cells = cellsOf(surface, static_cast<int>(p));
+      for (Index v = 0; v < cells.size(); ++v)
+        if (cells[v] == kNoIndex)  // in a rim that is thinner than samples see
+          cells[v] = finder_.nearest(surface.mesh.vertices[v], [&](Index c) {
             return piece_of_[component_[c]] == static_cast<int>(p) ? cut_.lattice.cells[c].samples : kNoSample;
           });
-      }
+      piece.cells.insert(piece.cells.end(), cells.begin(), cells.end());
     }
   }
 
@@ -714,7 +783,7 @@ class CellCutter {
   CutLattice cut_;
   const CellFinder finder_;                   // knows no crumbs
   std::vector<std::vector<Index>> children_;  // of each of the parent's cells
-  std::vector<RestSurface> surfaces_;         // of each source
+  std::vector<RestSurface> surfaces_;         // of each source, and then of those for contact, if they are in its cells
   std::vector<PieceCollision> collisions_;    // of each source, or none
   std::map<std::array<double, 3>, EmbeddedVertex> inside_;
   std::vector<std::pair<Box, Index>> boxes_;  // present, of the parent's cells near the blade's plane

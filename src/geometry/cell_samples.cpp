@@ -1,5 +1,8 @@
 #include "meshless_surgery/geometry/cell_samples.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace meshless {
 namespace {
 
@@ -13,9 +16,20 @@ FilledMoments computedMoments(SampleSet samples);
 
 }  // namespace
 
-Vec3 samplePlace(int bit) {
-  static_assert(kCellSamples == 4);
-  return Vec3((bit & 3) + 0.5, (bit >> 2 & 3) + 0.5, (bit >> 4) + 0.5) / kCellSamples;
+int nearestSample(SampleSet samples, const Vec3& at) {
+  int on[3];
+  for (int k = 0; k < 3; ++k)
+    on[k] = std::clamp(static_cast<int>(std::ceil(kCellSamples * at[k])) - 1, 0, kCellSamples - 1);
+  if (const int bit = sampleBit(on[0], on[1], on[2]); samples >> bit & 1) return bit;
+  int best = lowestSample(samples);
+  double least = (samplePlace(best) - at).squaredNorm();
+  for (SampleSet left = samples & (samples - 1); left; left &= left - 1) {
+    const double squared = (samplePlace(lowestSample(left)) - at).squaredNorm();
+    if (!(squared < least)) continue;
+    least = squared;
+    best = lowestSample(left);
+  }
+  return best;
 }
 
 SampleSet connectedPart(SampleSet within, const LinkSet& parted) {
