@@ -397,14 +397,16 @@ std::vector<bool> heldCells(const CellLattice& lattice) {
 
 }  // namespace
 
-SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const std::vector<Index>& cell) {
+SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const std::vector<Index>& cell,
+                           const KeptRows& kept) {
   Blender::Lattice of{lattice, TissueGrid(lattice), mapsOf(lattice), {}, heldCells(lattice)};
   of.parts.resize(lattice.cells.size());
   for (Index c = 0; c < lattice.cells.size(); ++c)
     if (const Index bridge = lattice.cells[c].bridge; bridge != kNoIndex && bridge != c) of.parts[bridge].push_back(c);
   std::vector<Index> offsets, vertices;  // of each cell
   const auto each = [&](const auto& visit) {
-    for (Index v = 0; v < rest.size(); ++v) visit(cell[v], v);
+    for (Index v = 0; v < rest.size(); ++v)
+      if (!kept.parent || kept.vertex[v] == kNoIndex) visit(cell[v], v);
   };
   compressRows(lattice.cells.size(), each, offsets, vertices);
   std::vector<Blender::Rows> parts((lattice.cells.size() + kChunk - 1) / kChunk);
@@ -422,6 +424,12 @@ SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const
   const Index* next = vertices.data();
   for (const Blender::Rows& part : parts)
     for (const Index length : part.lengths) binding.offsets[*next++ + 1] = length;
+  const auto each_kept = [&](const auto& visit) {
+    for (Index v = 0; kept.parent && v < rest.size(); ++v)
+      if (const Index was = kept.vertex[v]; was != kNoIndex)
+        visit(v, kept.parent->offsets[was], kept.parent->offsets[was + 1]);
+  };
+  each_kept([&](Index v, Index from, Index to) { binding.offsets[v + 1] = to - from; });
   std::partial_sum(binding.offsets.begin(), binding.offsets.end(), binding.offsets.begin());
   binding.carriers.resize(binding.offsets.back());
   binding.weights.resize(binding.offsets.back());
@@ -435,6 +443,11 @@ SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const
       at += length;
     }
   }
+  each_kept([&](Index v, Index from, Index to) {
+    std::copy(&kept.parent->weights[from], &kept.parent->weights[to], &binding.weights[binding.offsets[v]]);
+    for (Index k = from; k < to; ++k)
+      binding.carriers[binding.offsets[v] + k - from] = kept.particle[kept.parent->carriers[k]];
+  });
   for (Index v = 0; v < rest.size(); ++v) binding.embedded.push_back(v);
   binding.levers.assign(rest.size(), Vec3::Zero());
   binding.turners = cell;

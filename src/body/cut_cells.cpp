@@ -5,6 +5,7 @@
 #include <map>
 #include <sstream>
 #include <tuple>
+#include <unordered_map>
 #include <utility>
 
 #include <Eigen/Dense>
@@ -15,6 +16,7 @@
 #include "meshless_surgery/geometry/cut_lattice.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/union_find.h"
+#include "place_set.h"
 #include "side_by_side.h"
 
 namespace meshless {
@@ -23,13 +25,16 @@ namespace {
 constexpr double kBeneath = 1e-3;      // [spacing]
 constexpr double kCrumb = 1.0 / 64.0;  // of a cell, for a piece of it that no sample sees
 constexpr std::size_t kChunk = 256;    // vertices
+constexpr int kLooks = 3;              // places that a vertex's row depends on, on each side of its own
 
 // A vertex of a piece, or of its surface for contact, whose new cell is not known yet.
 struct EmbeddedVertex {
-  Vec3 rest;           // [m]
-  Index was;           // the parent's cell that it followed
-  bool made;           // by this blade
-  bool above = false;  // on the side of its normal, of a vertex that it did not make
+  Vec3 rest = Vec3::Zero();  // [m]
+  Index was = kNoIndex;      // the parent's cell that it followed
+  Index same = kNoIndex;     // the parent's vertex that it is; kNoIndex: this blade made it
+  bool above = false;        // on the side of its normal, of a vertex that it did not make
+
+  bool made() const { return same == kNoIndex; }
 };
 
 // The place in a cell that is at q; false where Newton's method finds none near it.
@@ -61,6 +66,15 @@ bool invert(const LatticeCell& cell, const Points& x, const Vec3& q, double size
 struct PieceCollision {
   TriangleMesh mesh;         // [m]
   std::vector<Index> cells;  // of each vertex; kNoIndex where none of the piece's is near it
+  std::vector<Index> same;   // the parent's vertex that each is; kNoIndex: the blade made it
+};
+
+struct HashOfPlace {
+  std::size_t operator()(const Vec3& p) const {
+    std::size_t hash = 0;
+    for (int k = 0; k < 3; ++k) hash = 31 * hash + std::hash<double>()(p[k]);
+    return hash;
+  }
 };
 
 class CellCutter {
@@ -80,21 +94,25 @@ class CellCutter {
   }
 
   Result<std::vector<BodyPiece>> run(const std::vector<TissuePlace>& places, std::uint32_t new_patch, CutWork& work) {
-    for (const CellPieceSource& source : sources_) {
-      surfaces_.push_back(surfaceOf(source, model_.surface.vertices, model_.binding));
-      const auto& embedded = surfaces_.back().embedded;
-      const auto lost = lostOf(surfaces_.back());
+    findInside();
+    surfaces_.resize(sources_.size() + collision_.size());
+    inChunks(surfaces_.size(), 1, [&](std::size_t s, std::size_t) {
+      surfaces_[s] = s < sources_.size() ? surfaceOf(sources_[s], model_.surface.vertices, model_.binding)
+                                         : surfaceOf(collision_[s - sources_.size()], model_.collision->mesh.vertices,
+                                                     model_.collision->binding);
+    });
+    for (std::size_t s = 0; s < surfaces_.size(); ++s) {
+      const auto& embedded = surfaces_[s].embedded;
+      const auto lost = std::find_if(embedded.begin(), embedded.end(), [](const auto& e) { return e.was == kNoIndex; });
       if (lost == embedded.end()) continue;
+      if (s >= sources_.size()) {
+        surfaces_.resize(sources_.size());
+        break;
+      }
       std::ostringstream text;
-      text << "the blade made a point at " << source.mesh.vertices[lost - embedded.begin()].transpose()
+      text << "the blade made a point at " << sources_[s].mesh.vertices[lost - embedded.begin()].transpose()
            << " that lies in none of its cells";
       return Error{ErrorCode::kUnsuitableShape, text.str()};
-    }
-    for (const CellPieceSource& source : collision_) {
-      surfaces_.push_back(surfaceOf(source, model_.collision->mesh.vertices, model_.collision->binding));
-      if (lostOf(surfaces_.back()) == surfaces_.back().embedded.end()) continue;
-      surfaces_.resize(sources_.size());
-      break;
     }
     inChunks(surfaces_.size(), 1, [&](std::size_t s, std::size_t) { surfaces_[s].cells = cellsOf(surfaces_[s], -1); });
     choosePieces();
@@ -121,7 +139,7 @@ class CellCutter {
     std::vector<Index> cells;  // of each vertex, in any piece
   };
 
-  RestSurface surfaceOf(const CellPieceSource& source, const Points& parent_rest, const SurfaceBinding& parent) {
+  RestSurface surfaceOf(const CellPieceSource& source, const Points& parent_rest, const SurfaceBinding& parent) const {
     RestSurface surface;
     surface.embedded.reserve(source.origins.size());
     surface.mesh.vertices.reserve(source.origins.size());
@@ -132,17 +150,12 @@ class CellCutter {
     surface.mesh.triangles = source.mesh.triangles;
     return surface;
   }
-  static std::vector<EmbeddedVertex>::const_iterator lostOf(const RestSurface& surface) {
-    return std::find_if(surface.embedded.begin(), surface.embedded.end(),
-                        [](const EmbeddedVertex& e) { return e.was == kNoIndex; });
-  }
 
   EmbeddedVertex embeddedOf(const CellPieceSource& source, Index v, const Points& parent_rest,
-                            const SurfaceBinding& parent) {
+                            const SurfaceBinding& parent) const {
     const VertexOrigins& origins = source.origins;
-    EmbeddedVertex embedded{Vec3::Zero(), kNoIndex, origins.same(v) == kNoIndex,
-                            gate_.height(source.mesh.vertices[v]) >= 0.0};
-    if (origins.insideCap(v)) return insideOf(source.mesh.vertices[v]);
+    EmbeddedVertex embedded{Vec3::Zero(), kNoIndex, origins.same(v), gate_.height(source.mesh.vertices[v]) >= 0.0};
+    if (origins.insideCap(v)) return inside_.at(source.mesh.vertices[v]);
     const VertexOrigin origin = origins[v];
     int heaviest = 0;
     for (int k = 1; k < 4; ++k)
@@ -159,32 +172,42 @@ class CellCutter {
       all += origin.weights[k];
     }
     if (all != 1.0) embedded.rest /= all;
-    if (!embedded.made) embedded.rest = parent_rest[origin.parents[0]];
+    if (!embedded.made()) embedded.rest = parent_rest[origin.parents[0]];
     return embedded;
   }
 
-  // By the inverse of the map of the cell whose samples are nearest. Both sides of a cut get the same place.
-  EmbeddedVertex insideOf(const Vec3& q) {
-    const auto [known, is_new] =
-        inside_.emplace(std::array<double, 3>{q.x(), q.y(), q.z()}, EmbeddedVertex{q, kNoIndex, true});
-    if (!is_new) return known->second;
-    if (boxes_.empty())
-      for (Index c = 0; c < before_.cells.size(); ++c) {
-        if (before_.cells[c].isBridge(c)) continue;
-        boxes_.emplace_back(Box(), c);
-        for (const Index corner : before_.cells[c].corners) boxes_.back().first.extend(state_.positions[corner]);
-        const Box& box = boxes_.back().first;
-        double low = gate_.height(state_.positions[before_.cells[c].corners[0]]), high = low;
-        for (const Index corner : before_.cells[c].corners) {
-          low = std::min(low, gate_.height(state_.positions[corner]));
-          high = std::max(high, gate_.height(state_.positions[corner]));
-        }
-        const double wide = 0.5 * (box.max - box.min).norm();
-        if (low > wide || high < -wide) boxes_.pop_back();
+  // Vertices inside the caps. Both sides of a cut get the same place.
+  void findInside() {
+    for (const auto* sources : {&sources_, &collision_})
+      for (const CellPieceSource& source : *sources)
+        for (Index v = 0; v < source.origins.size(); ++v)
+          if (source.origins.insideCap(v)) inside_.emplace(source.mesh.vertices[v], EmbeddedVertex());
+    if (inside_.empty()) return;
+    std::vector<std::pair<Box, Index>> boxes;  // present, of the parent's cells near the blade's plane
+    for (Index c = 0; c < before_.cells.size(); ++c) {
+      if (before_.cells[c].isBridge(c)) continue;
+      Box box;
+      Box heights;  // along x
+      for (const Index corner : before_.cells[c].corners) {
+        box.extend(state_.positions[corner]);
+        heights.extend(Vec3(gate_.height(state_.positions[corner]), 0.0, 0.0));
       }
+      const double wide = 0.5 * (box.max - box.min).norm();
+      if (heights.min.x() <= wide && heights.max.x() >= -wide) boxes.emplace_back(box, c);
+    }
+    std::vector<std::pair<const Vec3, EmbeddedVertex>*> all;
+    for (auto& entry : inside_) all.push_back(&entry);
+    inChunks(all.size(), kChunk, [&](std::size_t from, std::size_t to) {
+      for (std::size_t n = from; n < to; ++n) all[n]->second = insideOf(all[n]->first, boxes);
+    });
+  }
+
+  // By the inverse of the map of the cell whose samples are nearest.
+  EmbeddedVertex insideOf(const Vec3& q, const std::vector<std::pair<Box, Index>>& boxes) const {
+    EmbeddedVertex found{q, kNoIndex};
     for (const double margin : {0.01, 0.5, 2.0}) {
       double least = 1e300;
-      for (const auto& [box, c] : boxes_) {
+      for (const auto& [box, c] : boxes) {
         const Vec3 wider = margin * (box.max - box.min);
         if (((q - box.min + wider).array() < 0.0).any() || ((box.max + wider - q).array() < 0.0).any()) continue;
         Vec3 at;
@@ -195,11 +218,11 @@ class CellCutter {
         const double distance = outside + std::max(0.0, std::sqrt(squaredToSamples(samples, at)) - 0.22);
         if (!(distance < least)) continue;
         least = distance;
-        known->second = {before_.restPlace(before_.cells[c], at), c, true};
+        found = {before_.restPlace(before_.cells[c], at), c};
       }
       if (least < 0.5) break;
     }
-    return known->second;
+    return found;
   }
 
   // --- cells that a vertex may follow
@@ -227,58 +250,33 @@ class CellCutter {
   // A blade may leave a cell whole and part a vertex from it.
   Index cellAsBefore(const EmbeddedVertex& embedded) const {
     const std::vector<Index>& copies = children_[embedded.was];
-    if (embedded.made || copies.size() != 1 || cut_.changed[copies[0]]) return kNoIndex;
+    if (embedded.made() || copies.size() != 1 || cut_.changed[copies[0]]) return kNoIndex;
     const SampleSet above = cut_.above[copies[0]];
     return cut_.lattice.cells[copies[0]].samples & (embedded.above ? ~above : above) ? kNoIndex : copies[0];
   }
 
   // The triangles that reach into a place of the lattice that is next to a vertex's: no others are asked for.
   TriangleMesh trianglesAround(const RestSurface& surface, const std::vector<Index>& vertices) const {
-    std::vector<std::array<std::int32_t, 3>> places;
+    std::vector<PlaceSet::Place> places;
     places.reserve(surface.mesh.vertices.size());
     for (const Vec3& p : surface.mesh.vertices) places.push_back(before_.placeOf(p));
-    std::array<std::int32_t, 3> lower = places[0], size = places[0];
-    for (const auto& place : places)
-      for (int k = 0; k < 3; ++k) {
-        lower[k] = std::min(lower[k], place[k]);
-        size[k] = std::max(size[k], place[k]);
-      }
-    for (int k = 0; k < 3; ++k) size[k] += 3 - lower[k]--;  // and one more all around
-    const auto indexOf = [&](std::int32_t x, std::int32_t y, std::int32_t z) {
-      return static_cast<std::size_t>(x - lower[0]) +
-             static_cast<std::size_t>(size[0]) *
-                 (static_cast<std::size_t>(y - lower[1]) +
-                  static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(z - lower[2]));
-    };
-    enum Mark : char { kFar, kNear, kSeen };
-    std::vector<char> marks(
-        static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(size[2]),
-        kFar);
-    for (const Index v : vertices) {
-      const auto& own = places[v];
-      if (marks[indexOf(own[0], own[1], own[2])] == kSeen) continue;
-      for (std::int32_t z = -1; z <= 1; ++z)
-        for (std::int32_t y = -1; y <= 1; ++y)
-          for (std::int32_t x = -1; x <= 1; ++x) {
-            char& mark = marks[indexOf(own[0] + x, own[1] + y, own[2] + z)];
-            mark = std::max<char>(mark, kNear);
-          }
-      marks[indexOf(own[0], own[1], own[2])] = kSeen;
-    }
+    PlaceSet near(places, 1);
+    for (const Index v : vertices) near.at(places[v]) = true;
+    near.widen(1);
     TriangleMesh around;
     around.vertices = surface.mesh.vertices;
     for (const Triangle& t : surface.mesh.triangles) {
-      std::array<std::int32_t, 3> from = places[t[0]], to = from;
+      PlaceSet::Place from = places[t[0]], to = from;
       for (const Index v : t)
         for (int k = 0; k < 3; ++k) {
           from[k] = std::min(from[k], places[v][k]);
           to[k] = std::max(to[k], places[v][k]);
         }
-      bool near = false;
-      for (std::int32_t z = from[2]; z <= to[2] && !near; ++z)
-        for (std::int32_t y = from[1]; y <= to[1] && !near; ++y)
-          for (std::int32_t x = from[0]; x <= to[0] && !near; ++x) near = marks[indexOf(x, y, z)] != kFar;
-      if (near) around.triangles.push_back(t);
+      bool reaches = false;
+      for (std::int32_t z = from[2]; z <= to[2]; ++z)
+        for (std::int32_t y = from[1]; y <= to[1]; ++y)
+          for (std::int32_t x = from[0]; x <= to[0]; ++x) reaches = reaches || near.has({x, y, z});
+      if (reaches) around.triangles.push_back(t);
     }
     return around;
   }
@@ -343,7 +341,7 @@ class CellCutter {
     std::vector<std::map<int, int>> votes(names.size());
     for (std::size_t p = 0; p < sources_.size(); ++p)
       for (Index v = 0; v < surfaces_[p].embedded.size(); ++v)
-        if (const Index c = surfaces_[p].cells[v]; c != kNoIndex && !surfaces_[p].embedded[v].made)
+        if (const Index c = surfaces_[p].cells[v]; c != kNoIndex && !surfaces_[p].embedded[v].made())
           ++votes[component_[c]][static_cast<int>(p)];
     for (Index n = 0; n < names.size(); ++n) {
       seen_[n] = !votes[n].empty();
@@ -410,7 +408,7 @@ class CellCutter {
       const RestSurface& surface = surfaces_[s];
       std::vector<Index> votes(sources_.size(), 0);
       for (Index v = 0; v < surface.embedded.size(); ++v)
-        if (const Index c = surface.cells[v]; c != kNoIndex && !surface.embedded[v].made)
+        if (const Index c = surface.cells[v]; c != kNoIndex && !surface.embedded[v].made())
           ++votes[static_cast<std::size_t>(piece_of_[component_[c]])];
       const std::size_t p = static_cast<std::size_t>(std::max_element(votes.begin(), votes.end()) - votes.begin());
       PieceCollision& piece = collisions_[p];
@@ -425,6 +423,7 @@ class CellCutter {
             return piece_of_[component_[c]] == static_cast<int>(p) ? cut_.lattice.cells[c].samples : kNoSample;
           });
       piece.cells.insert(piece.cells.end(), cells.begin(), cells.end());
+      for (const EmbeddedVertex& embedded : surface.embedded) piece.same.push_back(embedded.same);
     }
   }
 
@@ -667,11 +666,16 @@ class CellCutter {
     fitClusters(matchInput(*child, piece.state), piece.state.positions, piece.state.poses);
     std::vector<Index> carriers;
     for (const Index c : carriers_[p]) carriers.push_back(renumbered[c]);
-    child->binding = bindToCells(*lattice, child->surface.vertices, carriers);
-    if (!collisions_.empty()) child->collision = collisionOf(collisions_[p], *lattice, renumbered);
+    const std::vector<bool> untouched = untouchedCells(static_cast<int>(p));
+    std::vector<Index> kept, particle(before_.corners, kNoIndex);
+    for (Index i = 0; i < corner_of.size(); ++i) particle[piece.copied_from[i]] = i;
+    for (Index v = 0; v < carriers.size(); ++v)
+      kept.push_back(keptRow(model_.binding, surfaces_[p].embedded[v].same, carriers_[p][v], untouched));
+    child->binding = bindToCells(*lattice, child->surface.vertices, carriers, {&model_.binding, kept, particle});
+    if (!collisions_.empty()) child->collision = collisionOf(collisions_[p], *lattice, renumbered, untouched, particle);
     for (const EmbeddedVertex& embedded : surfaces_[p].embedded) {
-      ++(embedded.made ? work.bound_embedded : work.kept_embedded);
-      work.new_vertices += embedded.made;
+      ++(embedded.made() ? work.bound_embedded : work.kept_embedded);
+      work.new_vertices += embedded.made();
     }
     for (const std::uint32_t patch : from.mesh.patches) work.new_triangles += patch == new_patch;
     piece.state.stretch = state_.stretch;
@@ -685,15 +689,46 @@ class CellCutter {
   }
 
   std::shared_ptr<const CollisionSurface> collisionOf(const PieceCollision& from, const CellLattice& lattice,
-                                                      const std::vector<Index>& renumbered) const {
+                                                      const std::vector<Index>& renumbered,
+                                                      const std::vector<bool>& untouched,
+                                                      const std::vector<Index>& particle) const {
     if (from.cells.empty()) return nullptr;
-    std::vector<Index> cells;
-    for (const Index c : from.cells) {
-      if (c == kNoIndex) return nullptr;
-      cells.push_back(renumbered[c]);
+    std::vector<Index> cells, kept;
+    for (std::size_t v = 0; v < from.cells.size(); ++v) {
+      if (from.cells[v] == kNoIndex) return nullptr;
+      cells.push_back(renumbered[from.cells[v]]);
+      kept.push_back(keptRow(model_.collision->binding, from.same[v], from.cells[v], untouched));
     }
-    return std::make_shared<CollisionSurface>(
-        CollisionSurface{from.mesh, bindToCells(lattice, from.mesh.vertices, cells), model_.collision->distance});
+    return std::make_shared<CollisionSurface>(CollisionSurface{
+        from.mesh, bindToCells(lattice, from.mesh.vertices, cells, {&model_.collision->binding, kept, particle}),
+        model_.collision->distance});
+  }
+
+  // The parent's vertex whose row one that is the same now and in a cell has too; kNoIndex: it is to be made.
+  Index keptRow(const SurfaceBinding& parent, Index same, Index cell, const std::vector<bool>& untouched) const {
+    const Index was = cut_.parent_cell[cell];
+    return same != kNoIndex && parent.turners[same] == was && untouched[was] ? same : kNoIndex;
+  }
+
+  // The parent's cells around which, as far as a vertex of theirs looks, all tissue is in the piece as it was.
+  std::vector<bool> untouchedCells(int piece) const {
+    std::vector<int> copies(before_.corners, 0);
+    for (const Index corner : cut_.parent_corner) ++copies[corner];
+    std::vector<PlaceSet::Place> places;
+    for (const LatticeCell& cell : before_.cells) places.push_back(cell.place);
+    PlaceSet touched(places, kLooks);
+    for (Index c = 0; c < before_.cells.size(); ++c) {
+      const auto& corners = before_.cells[c].corners;
+      if (children_[c].size() != 1 || cut_.changed[children_[c][0]] ||
+          piece_of_[component_[children_[c][0]]] != piece ||
+          std::any_of(corners.begin(), corners.end(), [&](Index corner) { return copies[corner] != 1; }))
+        touched.at(places[c]) = true;
+    }
+    for (Index c = sampled_; c < cut_.lattice.cells.size(); ++c) touched.at(cut_.lattice.cells[c].place) = true;
+    touched.widen(kLooks);
+    std::vector<bool> untouched;
+    for (const auto& place : places) untouched.push_back(!touched.has(place));
+    return untouched;
   }
 
   // The copy of its cell with the nearest tissue on its side of the blade; kNoIndex: there is none.
@@ -785,8 +820,7 @@ class CellCutter {
   std::vector<std::vector<Index>> children_;  // of each of the parent's cells
   std::vector<RestSurface> surfaces_;         // of each source, and then of those for contact, if they are in its cells
   std::vector<PieceCollision> collisions_;    // of each source, or none
-  std::map<std::array<double, 3>, EmbeddedVertex> inside_;
-  std::vector<std::pair<Box, Index>> boxes_;  // present, of the parent's cells near the blade's plane
+  std::unordered_map<Vec3, EmbeddedVertex, HashOfPlace> inside_;
   std::vector<Index> component_;              // of each cell
   std::vector<int> piece_of_;                 // of each component
   Index sampled_ = 0;                         // cells before crumbs were made
