@@ -23,6 +23,25 @@ constexpr std::size_t kMostWays = 1000;  // kept at a time: 12 kB each
 constexpr int kWide = 2 * kAround + 1, kPlaces = kWide * kWide * kWide, kMiddle = kPlaces / 2;
 constexpr int kStride[3] = {1, kWide, kWide* kWide};
 
+// Places of the window around a vertex's own.
+using Window = std::bitset<kPlaces>;
+template <class Is>
+Window placesThat(const Is& is) {
+  Window places;
+  for (int p = 0; p < kPlaces; ++p) places[static_cast<std::size_t>(p)] = is(p);
+  return places;
+}
+// Where two axes are two places off, all is farther than kReach.
+const Window kInReach = placesThat([](int p) {
+  int far = 0;
+  for (const int stride : kStride) far += std::abs(p / stride % kWide - kAround) == kAround;
+  return far < 2;
+});
+// Those with a next one along an axis.
+const Window kNotLast[3] = {placesThat([](int p) { return p % kWide + 1 < kWide; }),
+                            placesThat([](int p) { return p / kStride[1] % kWide + 1 < kWide; }),
+                            placesThat([](int p) { return p / kStride[2] % kWide + 1 < kWide; })};
+
 // The affine map of a cell at the centroid of what fills it.
 struct CellMap {
   Vec3 centroid = Vec3::Zero();          // [m] at rest
@@ -302,20 +321,20 @@ class Blender {
     return known == kOpen;
   }
   bool lookForGaps() const {
-    using PlaceSet = std::bitset<kPlaces>;
-    PlaceSet filled, reached, joined[3];  // along each axis, to the next place
+    Window filled, reached, joined[3];  // along each axis, to the next place
     for (std::size_t p = 0; p < kPlaces; ++p) {
       const Tissue& tissue = *window_[p];
       if (!tissue.present) continue;
-      if (isInReach(static_cast<int>(p))) {
+      if (kInReach[p]) {
         if (tissue.severed) return true;
         filled.set(p);
       }
       for (int axis = 0; axis < 3; ++axis)
-        joined[axis][p] = tissue.joined[axis] && static_cast<int>(p) / kStride[axis] % kWide + 1 < kWide;
+        if (tissue.joined[axis]) joined[axis].set(p);
     }
+    for (int axis = 0; axis < 3; ++axis) joined[axis] &= kNotLast[axis];
     reached.set(kMiddle);
-    for (PlaceSet before; before != reached;) {
+    for (Window before; before != reached;) {
       before = reached;
       for (int axis = 0; axis < 3; ++axis) {
         const auto stride = static_cast<std::size_t>(kStride[axis]);
@@ -323,12 +342,6 @@ class Blender {
       }
     }
     return (filled & ~reached).any();
-  }
-  // Where two axes are two places off, all is farther than kReach.
-  static bool isInReach(int p) {
-    int far = 0;
-    for (const int stride : kStride) far += std::abs(p / stride % kWide - kAround) == kAround;
-    return far < 2;
   }
 
   /// [spacing] How much longer the way from a sample of `own` to a cell is, from sample to sample by links, than
@@ -404,9 +417,17 @@ SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const
   for (Index c = 0; c < lattice.cells.size(); ++c)
     if (const Index bridge = lattice.cells[c].bridge; bridge != kNoIndex && bridge != c) of.parts[bridge].push_back(c);
   std::vector<Index> offsets, vertices;  // of each cell
+  const auto isKept = [&](Index v) {
+    const Index was = kept.parent ? kept.vertex[v] : kNoIndex;
+    return was != kNoIndex && std::all_of(&kept.parent->carriers[kept.parent->offsets[was]],
+                                          &kept.parent->carriers[kept.parent->offsets[was + 1]],
+                                          [&](Index carrier) { return kept.particle[carrier] != kNoIndex; });
+  };
+  std::vector<bool> is_kept;
+  for (Index v = 0; v < rest.size(); ++v) is_kept.push_back(isKept(v));
   const auto each = [&](const auto& visit) {
     for (Index v = 0; v < rest.size(); ++v)
-      if (!kept.parent || kept.vertex[v] == kNoIndex) visit(cell[v], v);
+      if (!is_kept[v]) visit(cell[v], v);
   };
   compressRows(lattice.cells.size(), each, offsets, vertices);
   std::vector<Blender::Rows> parts((lattice.cells.size() + kChunk - 1) / kChunk);
@@ -425,9 +446,8 @@ SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const
   for (const Blender::Rows& part : parts)
     for (const Index length : part.lengths) binding.offsets[*next++ + 1] = length;
   const auto each_kept = [&](const auto& visit) {
-    for (Index v = 0; kept.parent && v < rest.size(); ++v)
-      if (const Index was = kept.vertex[v]; was != kNoIndex)
-        visit(v, kept.parent->offsets[was], kept.parent->offsets[was + 1]);
+    for (Index v = 0; v < rest.size(); ++v)
+      if (is_kept[v]) visit(v, kept.parent->offsets[kept.vertex[v]], kept.parent->offsets[kept.vertex[v] + 1]);
   };
   each_kept([&](Index v, Index from, Index to) { binding.offsets[v + 1] = to - from; });
   std::partial_sum(binding.offsets.begin(), binding.offsets.end(), binding.offsets.begin());

@@ -25,7 +25,6 @@ namespace {
 constexpr double kBeneath = 1e-3;      // [spacing]
 constexpr double kCrumb = 1.0 / 64.0;  // of a cell, for a piece of it that no sample sees
 constexpr std::size_t kChunk = 256;    // vertices
-constexpr int kLooks = 3;              // places that a vertex's row depends on, on each side of its own
 
 // A vertex of a piece, or of its surface for contact, whose new cell is not known yet.
 struct EmbeddedVertex {
@@ -176,6 +175,14 @@ class CellCutter {
     return embedded;
   }
 
+  // Bounds of a cell as it is now.
+  struct PresentBox {
+    Box box;
+    Vec3 middle;
+    double wide;  // [m] from the middle to a corner
+    Index cell;
+  };
+
   // Vertices inside the caps. Both sides of a cut get the same place.
   void findInside() {
     for (const auto* sources : {&sources_, &collision_})
@@ -183,7 +190,7 @@ class CellCutter {
         for (Index v = 0; v < source.origins.size(); ++v)
           if (source.origins.insideCap(v)) inside_.emplace(source.mesh.vertices[v], EmbeddedVertex());
     if (inside_.empty()) return;
-    std::vector<std::pair<Box, Index>> boxes;  // present, of the parent's cells near the blade's plane
+    std::vector<PresentBox> boxes;  // of the parent's cells near the blade's plane
     for (Index c = 0; c < before_.cells.size(); ++c) {
       if (before_.cells[c].isBridge(c)) continue;
       Box box;
@@ -193,7 +200,8 @@ class CellCutter {
         heights.extend(Vec3(gate_.height(state_.positions[corner]), 0.0, 0.0));
       }
       const double wide = 0.5 * (box.max - box.min).norm();
-      if (heights.min.x() <= wide && heights.max.x() >= -wide) boxes.emplace_back(box, c);
+      if (heights.min.x() <= wide && heights.max.x() >= -wide)
+        boxes.push_back({box, 0.5 * (box.min + box.max), wide, c});
     }
     std::vector<std::pair<const Vec3, EmbeddedVertex>*> all;
     for (auto& entry : inside_) all.push_back(&entry);
@@ -203,11 +211,12 @@ class CellCutter {
   }
 
   // By the inverse of the map of the cell whose samples are nearest.
-  EmbeddedVertex insideOf(const Vec3& q, const std::vector<std::pair<Box, Index>>& boxes) const {
+  EmbeddedVertex insideOf(const Vec3& q, const std::vector<PresentBox>& boxes) const {
     EmbeddedVertex found{q, kNoIndex};
     for (const double margin : {0.01, 0.5, 2.0}) {
       double least = 1e300;
-      for (const auto& [box, c] : boxes) {
+      for (const auto& [box, middle, wide, c] : boxes) {
+        if ((q - middle).norm() > (1.01 + 2.0 * margin) * wide) continue;
         const Vec3 wider = margin * (box.max - box.min);
         if (((q - box.min + wider).array() < 0.0).any() || ((box.max + wider - q).array() < 0.0).any()) continue;
         Vec3 at;
@@ -262,7 +271,7 @@ class CellCutter {
     for (const Vec3& p : surface.mesh.vertices) places.push_back(before_.placeOf(p));
     PlaceSet near(places, 1);
     for (const Index v : vertices) near.at(places[v]) = true;
-    near.widen(1);
+    near.widen(true);
     TriangleMesh around;
     around.vertices = surface.mesh.vertices;
     for (const Triangle& t : surface.mesh.triangles) {
@@ -295,6 +304,10 @@ class CellCutter {
     };
     const Vec3 beneath = rest - kBeneath * before_.spacing * normal;
     const std::array<std::int32_t, 3> own = before_.placeOf(rest);
+    const Vec3 place = (beneath - before_.origin) / before_.spacing;
+    const auto placeIn = [&](const LatticeCell& cell) {  // as CellLattice's
+      return Vec3(place - Vec3(cell.place[0], cell.place[1], cell.place[2]));
+    };
     std::vector<Near> near;
     near.reserve(64);
     for (std::int32_t z = -1; z <= 1; ++z)
@@ -303,7 +316,7 @@ class CellCutter {
           for (const Index c : finder_.at({own[0] + x, own[1] + y, own[2] + z})) {
             const LatticeCell& cell = cut_.lattice.cells[c];
             if (cell.isBridge(c) || (piece >= 0 && piece_of_[component_[c]] != piece)) continue;
-            const Vec3 within = before_.placeIn(cell, beneath);
+            const Vec3 within = placeIn(cell);
             const double box = (within - within.cwiseMax(0.0).cwiseMin(1.0)).squaredNorm();
             near.push_back({box, box, c, cell.samples});
           }
@@ -315,7 +328,7 @@ class CellCutter {
         next.left &= ~(SampleSet{1} << next.bit);
       }
       if (next.left) {
-        const Vec3 within = before_.placeIn(cell, beneath);
+        const Vec3 within = placeIn(cell);
         next.bit = nearestSample(next.left, within);
         next.squared = (samplePlace(next.bit) - within).squaredNorm();
       } else {
@@ -668,7 +681,10 @@ class CellCutter {
     for (const Index c : carriers_[p]) carriers.push_back(renumbered[c]);
     const std::vector<bool> untouched = untouchedCells(static_cast<int>(p));
     std::vector<Index> kept, particle(before_.corners, kNoIndex);
-    for (Index i = 0; i < corner_of.size(); ++i) particle[piece.copied_from[i]] = i;
+    for (Index i = 0; i < corner_of.size() && piece.parent_particles[i] != kNoIndex; ++i)
+      particle[piece.parent_particles[i]] = i;
+    for (Index i = 0; i < corner_of.size(); ++i)  // which copy is not said
+      if (piece.parent_particles[i] == kNoIndex) particle[piece.copied_from[i]] = kNoIndex;
     for (Index v = 0; v < carriers.size(); ++v)
       kept.push_back(keptRow(model_.binding, surfaces_[p].embedded[v].same, carriers_[p][v], untouched));
     child->binding = bindToCells(*lattice, child->surface.vertices, carriers, {&model_.binding, kept, particle});
@@ -710,22 +726,19 @@ class CellCutter {
     return same != kNoIndex && parent.turners[same] == was && untouched[was] ? same : kNoIndex;
   }
 
-  // The parent's cells around which, as far as a vertex of theirs looks, all tissue is in the piece as it was.
+  // The parent's cells around which, as far as bindToCells() looks from them, all tissue is in the piece as it was.
   std::vector<bool> untouchedCells(int piece) const {
-    std::vector<int> copies(before_.corners, 0);
-    for (const Index corner : cut_.parent_corner) ++copies[corner];
     std::vector<PlaceSet::Place> places;
     for (const LatticeCell& cell : before_.cells) places.push_back(cell.place);
-    PlaceSet touched(places, kLooks);
+    PlaceSet touched(places, 2);
     for (Index c = 0; c < before_.cells.size(); ++c) {
-      const auto& corners = before_.cells[c].corners;
-      if (children_[c].size() != 1 || cut_.changed[children_[c][0]] ||
-          piece_of_[component_[children_[c][0]]] != piece ||
-          std::any_of(corners.begin(), corners.end(), [&](Index corner) { return copies[corner] != 1; }))
+      const std::vector<Index>& copies = children_[c];
+      if (copies.size() != 1 || cut_.changed[copies[0]] || piece_of_[component_[copies[0]]] != piece)
         touched.at(places[c]) = true;
     }
     for (Index c = sampled_; c < cut_.lattice.cells.size(); ++c) touched.at(cut_.lattice.cells[c].place) = true;
-    touched.widen(kLooks);
+    touched.widen(true);
+    touched.widen(false);
     std::vector<bool> untouched;
     for (const auto& place : places) untouched.push_back(!touched.has(place));
     return untouched;

@@ -35,13 +35,14 @@ class PlaceSet {
   char& at(const Place& place) { return has_[indexOf(place)]; }
   bool has(const Place& place) const { return has_[indexOf(place)]; }
 
-  /// By all places up to so many beyond, along each axis; no more than the margin.
-  void widen(std::size_t by) {
+  /// By the places around each one: those next to it along an axis or, with `corners`, all 26. No farther than the
+  /// margin.
+  void widen(bool corners) {
+    std::vector<char> before = has_;
     for (const std::size_t stride : stride_) {
-      const std::vector<char> before = has_;
+      if (corners) before = has_;
       for (std::size_t i = 0; i < before.size(); ++i)
-        if (before[i])
-          for (std::size_t n = 1; n <= by; ++n) has_[i + n * stride] = has_[i - n * stride] = true;
+        if (before[i]) has_[i + stride] = has_[i - stride] = true;
     }
   }
 

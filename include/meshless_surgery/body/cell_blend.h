@@ -6,8 +6,8 @@
 
 namespace meshless {
 
-/// Which rows of a parent's binding a piece's vertices keep, where all tissue within three places of their cells is as
-/// it was.
+/// Which vertices of a piece keep the rows that they had in its parent: what is around them is as it was, up to two
+/// places along an axis. Those that followed a particle that the piece has not, or has copies of, get new ones.
 struct KeptRows {
   const SurfaceBinding* parent = nullptr;  // null: none
   std::vector<Index> vertex{};             // of each, the parent's; kNoIndex: its row is made
