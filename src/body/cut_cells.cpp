@@ -179,7 +179,7 @@ class CellCutter {
   struct PresentBox {
     Box box;
     Vec3 middle;
-    double wide;  // [m] from the middle to a corner
+    double squared;  // [m^2] from the middle to a corner
     Index cell;
   };
 
@@ -201,7 +201,7 @@ class CellCutter {
       }
       const double wide = 0.5 * (box.max - box.min).norm();
       if (heights.min.x() <= wide && heights.max.x() >= -wide)
-        boxes.push_back({box, 0.5 * (box.min + box.max), wide, c});
+        boxes.push_back({box, 0.5 * (box.min + box.max), wide * wide, c});
     }
     std::vector<std::pair<const Vec3, EmbeddedVertex>*> all;
     for (auto& entry : inside_) all.push_back(&entry);
@@ -215,8 +215,9 @@ class CellCutter {
     EmbeddedVertex found{q, kNoIndex};
     for (const double margin : {0.01, 0.5, 2.0}) {
       double least = 1e300;
-      for (const auto& [box, middle, wide, c] : boxes) {
-        if ((q - middle).norm() > (1.01 + 2.0 * margin) * wide) continue;
+      const double widened = std::pow(1.01 + 2.0 * margin, 2);
+      for (const auto& [box, middle, squared, c] : boxes) {
+        if ((q - middle).squaredNorm() > widened * squared) continue;
         const Vec3 wider = margin * (box.max - box.min);
         if (((q - box.min + wider).array() < 0.0).any() || ((box.max + wider - q).array() < 0.0).any()) continue;
         Vec3 at;
@@ -665,30 +666,20 @@ class CellCutter {
     child->lattice = lattice;
     child->cell_mass = model_.cell_mass;
     child->regions = model_.regions;
-    makeParticlesOfCells(*child);
-    holdCorners(*child);
-    inheritClamp(*child, renumbered);
-    for (const double m : child->masses) child->mass += m;
-    inheritMoments(*child, corner_of);
-
-    for (const Index c : cell_of) {
-      piece.state.poses.push_back(state_.poses[cut_.parent_cell[c]]);
-      if (!state_.plastic.empty()) piece.state.plastic.push_back(state_.plastic[cut_.parent_cell[c]]);
-      ++(cut_.changed[c] ? work.rebuilt_clusters : work.kept_clusters);
-    }
-    fitClusters(matchInput(*child, piece.state), piece.state.positions, piece.state.poses);
-    std::vector<Index> carriers;
-    for (const Index c : carriers_[p]) carriers.push_back(renumbered[c]);
-    const std::vector<bool> untouched = untouchedCells(static_cast<int>(p));
-    std::vector<Index> kept, particle(before_.corners, kNoIndex);
-    for (Index i = 0; i < corner_of.size() && piece.parent_particles[i] != kNoIndex; ++i)
-      particle[piece.parent_particles[i]] = i;
-    for (Index i = 0; i < corner_of.size(); ++i)  // which copy is not said
-      if (piece.parent_particles[i] == kNoIndex) particle[piece.copied_from[i]] = kNoIndex;
-    for (Index v = 0; v < carriers.size(); ++v)
-      kept.push_back(keptRow(model_.binding, surfaces_[p].embedded[v].same, carriers_[p][v], untouched));
-    child->binding = bindToCells(*lattice, child->surface.vertices, carriers, {&model_.binding, kept, particle});
-    if (!collisions_.empty()) child->collision = collisionOf(collisions_[p], *lattice, renumbered, untouched, particle);
+    atOnce([&] { bindPiece(p, piece, renumbered, *child); },
+           [&] {
+             makeParticlesOfCells(*child);
+             holdCorners(*child);
+             inheritClamp(*child, renumbered);
+             for (const double m : child->masses) child->mass += m;
+             inheritMoments(*child, corner_of);
+             for (const Index c : cell_of) {
+               piece.state.poses.push_back(state_.poses[cut_.parent_cell[c]]);
+               if (!state_.plastic.empty()) piece.state.plastic.push_back(state_.plastic[cut_.parent_cell[c]]);
+               ++(cut_.changed[c] ? work.rebuilt_clusters : work.kept_clusters);
+             }
+             fitClusters(matchInput(*child, piece.state), piece.state.positions, piece.state.poses);
+           });
     for (const EmbeddedVertex& embedded : surfaces_[p].embedded) {
       ++(embedded.made() ? work.bound_embedded : work.kept_embedded);
       work.new_vertices += embedded.made();
@@ -704,19 +695,30 @@ class CellCutter {
     return piece;
   }
 
-  std::shared_ptr<const CollisionSurface> collisionOf(const PieceCollision& from, const CellLattice& lattice,
-                                                      const std::vector<Index>& renumbered,
-                                                      const std::vector<bool>& untouched,
-                                                      const std::vector<Index>& particle) const {
-    if (from.cells.empty()) return nullptr;
-    std::vector<Index> cells, kept;
-    for (std::size_t v = 0; v < from.cells.size(); ++v) {
-      if (from.cells[v] == kNoIndex) return nullptr;
-      cells.push_back(renumbered[from.cells[v]]);
-      kept.push_back(keptRow(model_.collision->binding, from.same[v], from.cells[v], untouched));
-    }
-    return std::make_shared<CollisionSurface>(CollisionSurface{
-        from.mesh, bindToCells(lattice, from.mesh.vertices, cells, {&model_.collision->binding, kept, particle}),
+  // What is seen and what meets contact, to the cells of the piece.
+  void bindPiece(std::size_t p, const BodyPiece& piece, const std::vector<Index>& renumbered, BodyModel& child) const {
+    const std::vector<bool> untouched = untouchedCells(static_cast<int>(p));
+    std::vector<Index> particle(before_.corners, kNoIndex);
+    for (Index i = 0; i < piece.parent_particles.size(); ++i)  // heirs come first: which of several copies is not said
+      particle[piece.copied_from[i]] = piece.parent_particles[i] != kNoIndex ? i : kNoIndex;
+    const auto bind = [&](const SurfaceBinding& parent, const Points& rest, const std::vector<Index>& cells,
+                          const auto& sameAs) {
+      KeptRows kept{&parent, {}, particle};
+      std::vector<Index> numbers;
+      for (Index v = 0; v < cells.size(); ++v) {
+        kept.vertex.push_back(keptRow(parent, sameAs(v), cells[v], untouched));
+        numbers.push_back(renumbered[cells[v]]);
+      }
+      return bindToCells(*child.lattice, rest, numbers, kept);
+    };
+    child.binding = bind(model_.binding, child.surface.vertices, carriers_[p],
+                         [&](Index v) { return surfaces_[p].embedded[v].same; });
+    if (collisions_.empty() || collisions_[p].cells.empty()) return;
+    const PieceCollision& from = collisions_[p];
+    if (std::find(from.cells.begin(), from.cells.end(), kNoIndex) != from.cells.end()) return;
+    child.collision = std::make_shared<CollisionSurface>(CollisionSurface{
+        from.mesh,
+        bind(model_.collision->binding, from.mesh.vertices, from.cells, [&](Index v) { return from.same[v]; }),
         model_.collision->distance});
   }
 

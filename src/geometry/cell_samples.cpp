@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace meshless {
 namespace {
@@ -69,10 +70,14 @@ FilledMoments computedMoments(SampleSet samples) {
     m.variance[axis] =
         squared / count - m.centroid[axis] * m.centroid[axis] + 1.0 / (3.0 * kCellSamples * kCellSamples);
   }
-  for (SampleSet left = samples; left; left &= left - 1) {
-    const Vec3 at = samplePlace(lowestSample(left));
-    for (int k = 0; k < 8; ++k) m.corner_shares[k] += trilinearWeight(k, at);
-  }
+  static const std::vector<std::array<double, 8>> kWeights = [] {
+    std::vector<std::array<double, 8>> weights(64);
+    for (int bit = 0; bit < 64; ++bit)
+      for (int k = 0; k < 8; ++k) weights[bit][k] = trilinearWeight(k, samplePlace(bit));
+    return weights;
+  }();
+  for (SampleSet left = samples; left; left &= left - 1)
+    for (int k = 0; k < 8; ++k) m.corner_shares[k] += kWeights[lowestSample(left)][k];
   for (double& share : m.corner_shares) share = (1.0 - kEqualShare) * share / count + kEqualShare / 8.0;
   return m;
 }

@@ -65,7 +65,9 @@ bool rayMeetsBox(const Vec3& p, const Vec3& inverse, const Box& box) {
   return near <= far * (1.0 + 1e-12);
 }
 
-bool segmentMeetsBox(const Vec3& middle, const Vec3& half, const Vec3& abs_half, const Box& box) {
+bool segmentMeetsBox(const Vec3& middle, const Vec3& half, const Vec3& abs_half, const Box& bounds, const Box& box) {
+  for (int k = 0; k < 3; ++k)
+    if (box.min[k] > bounds.max[k] || box.max[k] < bounds.min[k]) return false;
   const Vec3 centre = middle - 0.5 * (box.min + box.max);
   const Vec3 extent = 0.5 * (box.max - box.min);
   const double slack = 1e-12 * (extent.sum() + abs_half.sum());
@@ -81,8 +83,9 @@ bool segmentMeetsBox(const Vec3& middle, const Vec3& half, const Vec3& abs_half,
 /// Strictly through the triangle's plane by more than `flat`, inside the triangle or on its rim.
 bool segmentMeetsTriangle(const Vec3& p, const Vec3& q, const Corners& t, double flat) {
   const Vec3 normal = (t.b - t.a).cross(t.c - t.a);
-  const double limit = flat * normal.norm();
   const double at_p = normal.dot(p - t.a), at_q = normal.dot(q - t.a);
+  if (at_p * at_q > 0.0) return false;  // as most are
+  const double limit = flat * normal.norm();
   if (!(std::min(at_p, at_q) < -limit && std::max(at_p, at_q) > limit)) return false;
   const Vec3 pa = t.a - p, pb = t.b - p, pc = t.c - p, d = q - p;
   const double ab = d.dot(pa.cross(pb)), bc = d.dot(pb.cross(pc)), ca = d.dot(pc.cross(pa));
@@ -243,7 +246,9 @@ bool SolidQuery::crosses(const Vec3& a, const Vec3& b) const {
   constexpr double kShortening = 1e-6;
   const Vec3 p = a + kShortening * (b - a), q = b - kShortening * (b - a);
   const Vec3 middle = 0.5 * (p + q), half = 0.5 * (q - p), abs_half = half.cwiseAbs();
-  return data_->visit([&](const Box& box) { return segmentMeetsBox(middle, half, abs_half, box); },
+  Box bounds;
+  for (const Vec3& end : {p, q}) bounds.extend(end);
+  return data_->visit([&](const Box& box) { return segmentMeetsBox(middle, half, abs_half, bounds, box); },
                       [&](const Corners& t) { return segmentMeetsTriangle(p, q, t, data_->flat); });
 }
 
