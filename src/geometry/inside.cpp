@@ -127,7 +127,7 @@ struct SolidQuery::Data {
     Box bounds;
     for (std::size_t k = begin; k < end; ++k) bounds.extend(centres[k].thrice);
     int axis = 0;
-    (bounds.max - bounds.min).maxCoeff(&axis);
+    (bounds.max / 3.0 - bounds.min / 3.0).maxCoeff(&axis);
     const auto middle = centres.begin() + static_cast<std::ptrdiff_t>(begin + (end - begin) / 2);
     std::nth_element(centres.begin() + static_cast<std::ptrdiff_t>(begin), middle,
                      centres.begin() + static_cast<std::ptrdiff_t>(end), [axis](const Centre& a, const Centre& b) {
