@@ -732,15 +732,14 @@ class CellCutter {
   std::vector<bool> untouchedCells(int piece) const {
     std::vector<PlaceSet::Place> places;
     for (const LatticeCell& cell : before_.cells) places.push_back(cell.place);
-    PlaceSet touched(places, 2);
+    PlaceSet touched(places, 3);
     for (Index c = 0; c < before_.cells.size(); ++c) {
       const std::vector<Index>& copies = children_[c];
       if (copies.size() != 1 || cut_.changed[copies[0]] || piece_of_[component_[copies[0]]] != piece)
         touched.at(places[c]) = true;
     }
     for (Index c = sampled_; c < cut_.lattice.cells.size(); ++c) touched.at(cut_.lattice.cells[c].place) = true;
-    touched.widen(true);
-    touched.widen(false);
+    for (const bool corners : {true, true, false}) touched.widen(corners);  // two places, and what these join
     std::vector<bool> untouched;
     for (const auto& place : places) untouched.push_back(!touched.has(place));
     return untouched;

@@ -6,8 +6,9 @@
 
 namespace meshless {
 
-/// Which vertices of a piece keep the rows that they had in its parent: what is around them is as it was, up to two
-/// places along an axis. Those that followed a particle that the piece has not, or has copies of, get new ones.
+/// Which vertices of a piece keep the rows that they had in its parent: all that is two places around theirs, and what
+/// joins it to more, is as it was. Those that followed a particle that the piece has not, or has copies of, get new
+/// ones.
 struct KeptRows {
   const SurfaceBinding* parent = nullptr;  // null: none
   std::vector<Index> vertex{};             // of each, the parent's; kNoIndex: its row is made
