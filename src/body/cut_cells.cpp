@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <optional>
 #include <sstream>
 #include <tuple>
 #include <unordered_map>
@@ -248,11 +249,12 @@ class CellCutter {
     }
     if (open.empty()) return cells;
     const TriangleMesh around = trianglesAround(surface, open);
-    const Points normals = vertexNormals(around);
-    const SolidQuery solid(around);
+    Points normals;
+    std::optional<SolidQuery> solid;
+    atOnce([&] { solid.emplace(around); }, [&] { normals = vertexNormals(around); });
     inChunks(open.size(), kChunk, [&](std::size_t from, std::size_t to) {
       for (std::size_t n = from; n < to; ++n)
-        cells[open[n]] = nearestCell(surface.embedded[open[n]].rest, normals[open[n]], solid, piece);
+        cells[open[n]] = nearestCell(surface.embedded[open[n]].rest, normals[open[n]], *solid, piece);
     });
     return cells;
   }
