@@ -2,8 +2,8 @@
 // sphere/50k is a ball of some 50,000 triangles cut through its middle, with points inside the cap; sphere/50k/plain
 // without; cgal_clip/sphere/50k is CGAL's, without copying the mesh for it. A row fails where the volumes do not add
 // up. whole/10k is the command until the pieces have made a step, incision/10k half an incision through the same ball
-// until it is answered. successive/100: cuts without others before them, and the last ten of a hundred, of equal work;
-// `grown` is how many particles more there are than at the start.
+// until it is answered; whole/60k and incision/60k are of a finer one. successive/100: cuts without others before them,
+// and the last ten of a hundred, of equal work; `grown` is how many particles more there are than at the start.
 // Counters: `triangles` of the mesh, `pieces`, `cap_triangles` of both sides. The process keeps the memory that it once
 // had, for all rows: to get it from the system page by page can take as long as the cut. Of the repetitions, the median
 // counts.
