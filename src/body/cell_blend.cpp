@@ -419,8 +419,8 @@ SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const
   std::vector<Index> offsets, vertices;  // of each cell
   const auto isKept = [&](Index v) {
     const Index was = kept.parent ? kept.vertex[v] : kNoIndex;
-    return was != kNoIndex && std::all_of(&kept.parent->carriers[kept.parent->offsets[was]],
-                                          &kept.parent->carriers[kept.parent->offsets[was + 1]],
+    return was != kNoIndex && std::all_of(kept.parent->carriers.data() + kept.parent->offsets[was],
+                                          kept.parent->carriers.data() + kept.parent->offsets[was + 1],
                                           [&](Index carrier) { return kept.particle[carrier] != kNoIndex; });
   };
   std::vector<bool> is_kept;
@@ -436,7 +436,7 @@ SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const
     Blender& blender = blenders.local();
     for (std::size_t c = from; c < to; ++c)
       if (offsets[c] < offsets[c + 1])
-        blender.follow(static_cast<Index>(c), &vertices[offsets[c]], &vertices[offsets[c + 1]], rest,
+        blender.follow(static_cast<Index>(c), vertices.data() + offsets[c], vertices.data() + offsets[c + 1], rest,
                        parts[from / kChunk]);
   });
   SurfaceBinding binding;
@@ -458,13 +458,14 @@ SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const
     Index at = 0;
     for (const Index length : part.lengths) {
       const Index to = binding.offsets[*next++];
-      std::copy_n(&part.carriers[at], length, &binding.carriers[to]);
-      std::copy_n(&part.weights[at], length, &binding.weights[to]);
+      std::copy_n(part.carriers.data() + at, length, binding.carriers.data() + to);
+      std::copy_n(part.weights.data() + at, length, binding.weights.data() + to);
       at += length;
     }
   }
   each_kept([&](Index v, Index from, Index to) {
-    std::copy(&kept.parent->weights[from], &kept.parent->weights[to], &binding.weights[binding.offsets[v]]);
+    std::copy(kept.parent->weights.data() + from, kept.parent->weights.data() + to,
+              binding.weights.data() + binding.offsets[v]);
     for (Index k = from; k < to; ++k)
       binding.carriers[binding.offsets[v] + k - from] = kept.particle[kept.parent->carriers[k]];
   });
