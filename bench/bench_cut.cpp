@@ -2,8 +2,8 @@
 // sphere/50k is a ball of some 50,000 triangles cut through its middle, with points inside the cap; sphere/50k/plain
 // without; cgal_clip/sphere/50k is CGAL's, without copying the mesh for it. A row fails where the volumes do not add
 // up. whole/10k is the command until the pieces have made a step, incision/10k half an incision through the same ball
-// until it is answered. successive/100: cuts without others before them, and the last ten of a hundred, of equal work;
-// `grown` is how many particles more there are than at the start.
+// until it is answered; whole/60k and incision/60k are of a finer one. successive/100: cuts without others before them,
+// and the last ten of a hundred, of equal work; `grown` is how many particles more there are than at the start.
 // Counters: `triangles` of the mesh, `pieces`, `cap_triangles` of both sides. The process keeps the memory that it once
 // had, for all rows: to get it from the system page by page can take as long as the cut. Of the repetitions, the median
 // counts.
@@ -101,6 +101,7 @@ struct Whole {
   bool elastic;
   ContactMethod contact;
   bool incise;
+  double triangles = 1.15e4;
 };
 
 Command commandOf(const Whole& whole) {
@@ -124,7 +125,7 @@ Command commandOf(const Whole& whole) {
 void wholeRow(benchmark::State& state, const Whole& whole) {
   BodyDef def;
   def.name = "ball";
-  def.mesh = ball(1.15e4);
+  def.mesh = ball(whole.triangles);
   def.spacing = 0.0155;
   if (whole.elastic) def.material.youngs_modulus = 5e3;
   const auto body = std::make_shared<const PreparedBody>(*prepareBody(std::move(def)));
@@ -220,7 +221,9 @@ void registerRows() {
   for (const Whole& whole : {Whole{"whole/10k", true, ContactMethod::kNone, false},
                              Whole{"whole/10k/looks", false, ContactMethod::kNone, false},
                              Whole{"whole/10k/textbook", true, ContactMethod::kTextbook, false},
-                             Whole{"incision/10k", true, ContactMethod::kNone, true}})
+                             Whole{"incision/10k", true, ContactMethod::kNone, true},
+                             Whole{"whole/60k", true, ContactMethod::kNone, false, 6.5e4},
+                             Whole{"incision/60k", true, ContactMethod::kNone, true, 6.5e4}})
     benchmark::RegisterBenchmark(whole.name, [whole](benchmark::State& state) { wholeRow(state, whole); })
         ->Unit(benchmark::kMillisecond)
         ->UseRealTime()

@@ -1,28 +1,54 @@
 #include "meshless_surgery/body/cell_blend.h"
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
+#include <numeric>
+#include <unordered_map>
 
 #include <tbb/enumerable_thread_specific.h>
 
+#include "meshless_surgery/base/compressed_rows.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "side_by_side.h"
 
 namespace meshless {
 namespace {
 
-constexpr double kReach = 1.2;       // [spacing] cells farther than this do not count
-constexpr int kAround = 2;           // places on each side of a vertex's own: kReach, rounded up
-constexpr std::size_t kChunk = 256;  // vertices
+constexpr double kReach = 1.2;           // [spacing] cells farther than this do not count
+constexpr double kBeyond = 1.0 + 1e-9;   // of the reach: out of it, whatever rounding does
+constexpr int kAround = 2;               // places on each side of a vertex's own: kReach, rounded up
+constexpr std::size_t kChunk = 16;       // cells
+constexpr std::size_t kMostWays = 1000;  // kept at a time: 12 kB each
 constexpr int kWide = 2 * kAround + 1, kPlaces = kWide * kWide * kWide, kMiddle = kPlaces / 2;
 constexpr int kStride[3] = {1, kWide, kWide* kWide};
 
+// Places of the window around a vertex's own.
+using Window = std::bitset<kPlaces>;
+template <class Is>
+Window placesThat(const Is& is) {
+  Window places;
+  for (int p = 0; p < kPlaces; ++p) places[static_cast<std::size_t>(p)] = is(p);
+  return places;
+}
+// Where two axes are two places off, all is farther than kReach.
+const Window kInReach = placesThat([](int p) {
+  int far = 0;
+  for (const int stride : kStride) far += std::abs(p / stride % kWide - kAround) == kAround;
+  return far < 2;
+});
+// Those with a next one along an axis.
+const Window kNotLast[3] = {placesThat([](int p) { return p % kWide + 1 < kWide; }),
+                            placesThat([](int p) { return p / kStride[1] % kWide + 1 < kWide; }),
+                            placesThat([](int p) { return p / kStride[2] % kWide + 1 < kWide; })};
+
 // The affine map of a cell at the centroid of what fills it.
 struct CellMap {
-  Vec3 centroid = Vec3::Zero();  // [m] at rest
-  std::array<double, 8> at{};    // weights of the corners there
-  std::array<Vec3, 8> slope{};   // [1/m] their gradients
-  double filled = 0.0;           // of a cell
+  Vec3 centroid = Vec3::Zero();          // [m] at rest
+  Eigen::Array<double, 8, 1> at;         // weights of the corners there
+  Eigen::Array<double, 8, 1> slopes[3];  // [1/m] their gradients
+  double filled = 0.0;                   // of a cell
+  int middle = 0;                        // its sample that is nearest to the centroid
 };
 
 // All samples at a place, of whatever cell, and the links of them that are gone.
@@ -36,30 +62,6 @@ struct Tissue {
 
 // A crumb has those of the cell that it came from.
 SampleSet samplesOf(const LatticeCell& cell) { return cell.samples ? cell.samples : cell.filled; }
-
-// A sample in the window of places around a vertex.
-struct Sample {
-  int place = 0, bit = 0;
-};
-int stepsBetween(const Sample& a, const Sample& b) {
-  int steps = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto at = [axis](const Sample& s) {
-      return kCellSamples * (s.place / kStride[axis] % kWide) + s.bit / kSampleStride[axis] % kCellSamples;
-    };
-    steps += std::abs(at(a) - at(b));
-  }
-  return steps;
-}
-
-int nearestSample(SampleSet samples, const Vec3& at) {
-  int best = lowestSample(samples);
-  for (SampleSet left = samples; left; left &= left - 1)
-    if (const int bit = lowestSample(left);
-        (samplePlace(bit) - at).squaredNorm() < (samplePlace(best) - at).squaredNorm())
-      best = bit;
-  return best;
-}
 
 // The tissue of a lattice by places, with empty ones all around.
 class TissueGrid {
@@ -77,6 +79,9 @@ class TissueGrid {
       stride_[k] = count;
       count *= static_cast<std::size_t>(upper[k] + kAround + 1 - lower_[k]);
     }
+    for (std::size_t p = 0; p < offsets_.size(); ++p)
+      for (int axis = 0; axis < 3; ++axis)
+        offsets_[p] += stride_[axis] * static_cast<std::size_t>(static_cast<int>(p) / kStride[axis] % kWide - kAround);
     number_.assign(count, 0);
     all_.resize(1);  // the first is that of empty places
     for (Index c = 0; c < lattice.cells.size(); ++c) {
@@ -113,12 +118,7 @@ class TissueGrid {
   }
   /// What is around a place that has cells.
   void window(std::size_t middle, std::array<const Tissue*, kPlaces>& places) const {
-    for (int p = 0; p < kPlaces; ++p) {
-      std::size_t index = middle;
-      for (int axis = 0; axis < 3; ++axis)
-        index += stride_[axis] * static_cast<std::size_t>(p / kStride[axis] % kWide - kAround);
-      places[static_cast<std::size_t>(p)] = &all_[number_[index]];
-    }
+    for (std::size_t p = 0; p < places.size(); ++p) places[p] = &all_[number_[middle + offsets_[p]]];
   }
   Index numberOf(std::size_t index) const { return number_[index]; }
   std::size_t count() const { return all_.size(); }
@@ -130,8 +130,81 @@ class TissueGrid {
 
   std::array<std::int32_t, 3> lower_{};
   std::array<std::size_t, 3> stride_{};
+  std::array<std::size_t, kPlaces> offsets_{};  // of the places of a window
   std::vector<Index> number_;
   std::vector<Tissue> all_;
+};
+
+// The ways by links from a sample to others in the window of places around it, as far as somebody asked.
+class Ways {
+ public:
+  Ways(const TissueGrid& grid, const LatticeCell& cell, int bit) {
+    grid.window(grid.indexOf(cell.place), window_);
+    steps_.fill(kUnknown);
+    enter(kMiddle, SampleSet{1} << bit);
+    arrive();
+  }
+
+  /// kUnknown where there is no way of at most so many steps.
+  int stepsTo(int place, int bit, int most) {
+    const std::uint8_t& steps = steps_[static_cast<std::size_t>(64 * place + bit)];
+    while (steps == kUnknown && made_ < std::min(most, kUnknown - 1)) {
+      ++made_;
+      goOn();
+      arrive();
+    }
+    return steps;
+  }
+
+  static constexpr std::uint8_t kUnknown = 255;
+
+ private:
+  void enter(int p, SampleSet samples) {
+    const std::size_t i = static_cast<std::size_t>(p);
+    samples &= window_[i]->present & ~passed_[i];
+    if (!samples) return;
+    if (!passed_[i]) flooded_.push_back(p);
+    passed_[i] |= samples;
+    next_[i] |= samples;
+  }
+
+  void goOn() {
+    const std::size_t places = flooded_.size();
+    for (std::size_t n = 0; n < places; ++n) {
+      const int p = flooded_[n];
+      const SampleSet edge = edge_[static_cast<std::size_t>(p)];
+      if (!edge) continue;
+      const LinkSet& parted = window_[static_cast<std::size_t>(p)]->parted;
+      SampleSet within = kNoSample;
+      for (int axis = 0; axis < 3; ++axis) {
+        const int stride = kSampleStride[axis], along = p / kStride[axis] % kWide;
+        const SampleSet linked = edge & ~parted[axis];
+        within |= (linked & ~kUpperLayer[axis]) << stride | ((edge & ~kLowerLayer[axis]) >> stride & ~parted[axis]);
+        if (const SampleSet up = linked & kUpperLayer[axis]; up && along + 1 < kWide)
+          enter(p + kStride[axis], up >> (kCellSamples - 1) * stride);
+        if (const SampleSet down = edge & kLowerLayer[axis]; down && along > 0)
+          enter(p - kStride[axis], down << (kCellSamples - 1) * stride &
+                                       ~window_[static_cast<std::size_t>(p - kStride[axis])]->parted[axis]);
+      }
+      enter(p, within);
+    }
+  }
+
+  void arrive() {
+    for (const int p : flooded_) {
+      const std::size_t i = static_cast<std::size_t>(p);
+      edge_[i] = next_[i];
+      next_[i] = kNoSample;
+      for (SampleSet left = edge_[i]; left; left &= left - 1)
+        steps_[64 * i + static_cast<std::size_t>(lowestSample(left))] = static_cast<std::uint8_t>(made_);
+    }
+  }
+
+  std::array<const Tissue*, kPlaces> window_{};
+  std::array<std::uint8_t, 64 * kPlaces> steps_;  // to each sample
+  std::array<SampleSet, kPlaces> passed_{}, edge_{}, next_{};
+  std::vector<int> flooded_;  // places of the window
+  int made_ = 0;              // steps
 };
 
 // Rows of vertices, one after the other.
@@ -144,70 +217,101 @@ class Blender {
     std::vector<std::vector<Index>> parts;  // of a bridge: what it joins
     std::vector<bool> held;                 // no corner of a cell can move
   };
+  struct Rows {
+    std::vector<Index> lengths, carriers;
+    std::vector<double> weights;
+  };
 
   explicit Blender(const Lattice& of)
-      : of_(of), open_(of.grid.count(), kUnknown), sum_(of.lattice.corners, 0.0), seen_(of.lattice.corners, false) {}
+      : of_(of), open_(of.grid.count(), kUnknown), number_(of.lattice.corners, kNoIndex) {}
 
-  /// Appends the row of a vertex of the tissue of `cell`.
-  void follow(const Vec3& rest, Index cell, SurfaceBinding& part) {
+  /// Appends the rows of the vertices [from, to) of the tissue of `cell`.
+  void follow(Index cell, const Index* from, const Index* to, const Points& rest, Rows& rows) {
     const LatticeCell& own = of_.lattice.cells[cell];
-    const Vec3 at = of_.lattice.placeIn(own, rest);
-    const double to_own = (rest - of_.maps[cell].centroid).norm() / of_.lattice.spacing;
-    const double reach = std::max(kReach, std::sqrt(2.0) * to_own);  // its own cell always counts
-    lookAround(own);
-    choose(rest, reach);
-    if (of_.held[cell])  // what is held with all around it stays
-      candidates_.assign(1, {cell, kMiddle, to_own});
-    else if (reach > kReach || !isOpen(own.place))
-      findDetours({kMiddle, nearestSample(samplesOf(own), at)}, cell, reach);
-    double all = 0.0;
-    for (const Candidate& c : candidates_) {
-      const double near = 1.0 - std::pow((c.away + c.detour) / reach, 2);
-      if (!(near > 0.0)) continue;
-      const CellMap& map = of_.maps[c.cell];
-      const double weight = near * near * map.filled;
-      all += weight;
-      for (int k = 0; k < 8; ++k) {
-        const Index corner = of_.lattice.cells[c.cell].corners[k];
-        if (!seen_[corner]) touched_.push_back(corner);
-        seen_[corner] = true;
-        sum_[corner] += weight * (map.at[k] + map.slope[k].dot(rest - map.centroid));
+    of_.grid.window(of_.grid.indexOf(own.place), window_);
+    choose(cell, from, to, rest);
+    const double spacing = of_.lattice.spacing;
+    for (; from != to; ++from) {
+      const Vec3& p = rest[*from];
+      const double to_own = awayFrom(cell, p), reach = reachOf(to_own), far = kBeyond * spacing * reach;
+      // What is held with all around it stays.
+      const bool held = of_.held[cell], direct = held || (!(reach > kReach) && isOpen(own.place));
+      const int bit = direct ? 0 : nearestSample(samplesOf(own), of_.lattice.placeIn(own, p));
+      double all = 0.0;
+      for (const Candidate& c : candidates_) {
+        if (held && c.cell != cell) continue;
+        if ((p - c.centroid).squaredNorm() > far * far) continue;
+        const double away = awayFrom(c.cell, p);
+        if (!(away < reach)) continue;
+        const double detour = direct || c.cell == cell ? 0.0 : detourTo(c, own, bit, away, reach);
+        const double near = 1.0 - std::pow((away + detour) / reach, 2);
+        if (!(near > 0.0)) continue;
+        const CellMap& map = of_.maps[c.cell];
+        const Vec3 d = p - map.centroid;
+        const double weight = near * near * map.filled;
+        all += weight;
+        const Eigen::Array<double, 8, 1> share =
+            weight * (map.at + ((map.slopes[0] * d.x() + map.slopes[1] * d.y()) + map.slopes[2] * d.z()));
+        for (int k = 0; k < 8; ++k) {
+          sum_[c.corners[k]] += share[k];
+          seen_[c.corners[k]] = true;
+        }
       }
+      const std::size_t before = rows.carriers.size();
+      for (std::size_t i = 0; i < corners_.size(); ++i) {
+        if (!seen_[i]) continue;
+        rows.carriers.push_back(corners_[i]);
+        rows.weights.push_back(sum_[i] / all);
+        sum_[i] = 0.0;
+        seen_[i] = false;
+      }
+      rows.lengths.push_back(static_cast<Index>(rows.carriers.size() - before));
     }
-    std::sort(touched_.begin(), touched_.end());
-    for (const Index corner : touched_) {
-      part.carriers.push_back(corner);
-      part.weights.push_back(sum_[corner] / all);
-      sum_[corner] = 0.0;
-      seen_[corner] = false;
-    }
-    touched_.clear();
-    part.offsets.push_back(static_cast<Index>(part.carriers.size()));
   }
 
  private:
   enum Openness : char { kUnknown, kOpen, kNotOpen };
   struct Candidate {
+    Vec3 centroid;
     Index cell;
-    int place;            // in the window
-    double away;          // [spacing] straight
-    double detour = 0.0;  // [spacing] that tissue makes of it
+    int place;                     // in the window
+    std::array<Index, 8> corners;  // in corners_
   };
 
-  void lookAround(const LatticeCell& own) {
-    const std::size_t index = of_.grid.indexOf(own.place);
-    if (index == around_) return;
-    around_ = index;
-    of_.grid.window(index, window_);
+  double awayFrom(Index cell, const Vec3& p) const {  // [spacing]
+    return (p - of_.maps[cell].centroid).norm() / of_.lattice.spacing;
   }
+  // Its own cell always counts.
+  static double reachOf(double to_own) { return std::max(kReach, std::sqrt(2.0) * to_own); }
 
-  void choose(const Vec3& rest, double reach) {
+  /// The cells that any of the vertices may follow, and their corners.
+  void choose(Index cell, const Index* from, const Index* to, const Points& rest) {
+    Box bounds;
+    double reach = 0.0;
+    for (const Index* v = from; v != to; ++v) {
+      bounds.extend(rest[*v]);
+      reach = std::max(reach, reachOf(awayFrom(cell, rest[*v])));
+    }
+    const double far = kBeyond * of_.lattice.spacing * reach;
     candidates_.clear();
+    corners_.clear();
     for (int p = 0; p < kPlaces; ++p)
       for (const Index c : window_[static_cast<std::size_t>(p)]->cells) {
-        const double away = (rest - of_.maps[c].centroid).norm() / of_.lattice.spacing;
-        if (away < reach) candidates_.push_back({c, p, away});
+        const Vec3& centroid = of_.maps[c].centroid;
+        if ((centroid.cwiseMax(bounds.min).cwiseMin(bounds.max) - centroid).squaredNorm() > far * far) continue;
+        candidates_.push_back({centroid, c, p, of_.lattice.cells[c].corners});
+        for (const Index corner : candidates_.back().corners) {
+          if (number_[corner] == kNoIndex) corners_.push_back(corner);
+          number_[corner] = 0;
+        }
       }
+    std::sort(corners_.begin(), corners_.end());
+    for (Index i = 0; i < corners_.size(); ++i) number_[corners_[i]] = i;
+    for (Candidate& c : candidates_)
+      for (Index& corner : c.corners) corner = number_[corner];
+    for (const Index corner : corners_) number_[corner] = kNoIndex;
+    sum_.assign(corners_.size(), 0.0);
+    seen_.assign(corners_.size(), false);
   }
 
   /// Nothing that is in kReach of a place is parted or lies apart.
@@ -217,130 +321,61 @@ class Blender {
     return known == kOpen;
   }
   bool lookForGaps() const {
-    std::array<bool, kPlaces> reached{};
-    std::array<int, kPlaces> queue;
-    int count = 0, filled = 0, found = 0;
-    const auto visit = [&](int p) {
-      if (reached[static_cast<std::size_t>(p)]) return;
-      reached[static_cast<std::size_t>(p)] = true;
-      queue[static_cast<std::size_t>(count++)] = p;
-    };
-    for (int p = 0; p < kPlaces; ++p) {
-      if (!isInReach(p)) continue;
-      const Tissue& tissue = *window_[static_cast<std::size_t>(p)];
-      if (tissue.severed) return true;
-      filled += tissue.present != kNoSample;
+    Window filled, reached, joined[3];  // along each axis, to the next place
+    for (std::size_t p = 0; p < kPlaces; ++p) {
+      const Tissue& tissue = *window_[p];
+      if (!tissue.present) continue;
+      if (kInReach[p]) {
+        if (tissue.severed) return true;
+        filled.set(p);
+      }
+      for (int axis = 0; axis < 3; ++axis)
+        if (tissue.joined[axis]) joined[axis].set(p);
     }
-    visit(kMiddle);
-    for (int n = 0; n < count; ++n) {
-      const int p = queue[static_cast<std::size_t>(n)];
-      found += isInReach(p);
+    for (int axis = 0; axis < 3; ++axis) joined[axis] &= kNotLast[axis];
+    reached.set(kMiddle);
+    for (Window before; before != reached;) {
+      before = reached;
       for (int axis = 0; axis < 3; ++axis) {
-        const int along = p / kStride[axis] % kWide;
-        if (along + 1 < kWide && window_[static_cast<std::size_t>(p)]->joined[axis]) visit(p + kStride[axis]);
-        if (along > 0 && window_[static_cast<std::size_t>(p - kStride[axis])]->joined[axis]) visit(p - kStride[axis]);
+        const auto stride = static_cast<std::size_t>(kStride[axis]);
+        reached |= (reached & joined[axis]) << stride | (reached >> stride & joined[axis]);
       }
     }
-    return found < filled;
-  }
-  // Where two axes are two places off, all is farther than kReach.
-  static bool isInReach(int p) {
-    int far = 0;
-    for (const int stride : kStride) far += std::abs(p / stride % kWide - kAround) == kAround;
-    return far < 2;
+    return (filled & ~reached).any();
   }
 
-  /// How much longer the ways from a sample to the cells are, from sample to sample by links, than without gaps.
-  void findDetours(const Sample& from, Index own, double reach) {
-    targets_.clear();
-    int most = 0;
-    for (Index n = 0; n < candidates_.size(); ++n) addTargets(n);
-    for (const Target& t : targets_)
-      most = std::max(most, stepsBetween(from, t.sample) +
-                                static_cast<int>(kCellSamples * (reach - candidates_[t.candidate].away)));
-    flood(from, most);
-    for (const Target& t : targets_) {
-      Candidate& c = candidates_[t.candidate];
-      if (c.cell == own) continue;
-      const double detour = t.steps < 0 ? reach : (t.steps - stepsBetween(from, t.sample)) / double{kCellSamples};
-      c.detour = std::max(c.detour, detour);  // a bridge is as far as the farther of what it joins
-    }
+  /// [spacing] How much longer the way from a sample of `own` to a cell is, from sample to sample by links, than
+  /// without gaps; the reach where there is none.
+  double detourTo(const Candidate& c, const LatticeCell& own, int bit, double away, double reach) {
+    if (!of_.lattice.cells[c.cell].isBridge(c.cell)) return detourTo(c.cell, c.place, own, bit, away, reach);
+    double most = 0.0;  // a bridge is as far as the farther of what it joins
+    for (const Index part : of_.parts[c.cell]) most = std::max(most, detourTo(part, c.place, own, bit, away, reach));
+    return most;
   }
-
-  struct Target {
-    Index candidate;
-    Sample sample;
-    int steps = -1;
-  };
-  void addTargets(Index number) {
-    const Candidate& c = candidates_[number];
-    const LatticeCell& cell = of_.lattice.cells[c.cell];
-    const auto add = [&](Index of) {
-      const LatticeCell& part = of_.lattice.cells[of];
-      const int bit = nearestSample(samplesOf(part), of_.lattice.placeIn(part, of_.maps[of].centroid));
-      targets_.push_back({number, {c.place, bit}});
-    };
-    if (!cell.isBridge(c.cell)) return add(c.cell);
-    for (const Index part : of_.parts[c.cell]) add(part);
-  }
-
-  void flood(const Sample& from, int most) {
-    for (const int p : flooded_) passed_[static_cast<std::size_t>(p)] = edge_[static_cast<std::size_t>(p)] = kNoSample;
-    flooded_.clear();
-    std::size_t missing = targets_.size();
-    const auto enter = [&](int p, SampleSet samples, std::array<SampleSet, kPlaces>& next) {
-      const std::size_t i = static_cast<std::size_t>(p);
-      samples &= window_[i]->present & ~passed_[i];
-      if (!samples) return;
-      if (!passed_[i]) flooded_.push_back(p);
-      passed_[i] |= samples;
-      next[i] |= samples;
-    };
-    enter(from.place, SampleSet{1} << from.bit, edge_);
-    for (int steps = 0; steps <= most && missing; ++steps) {
-      for (Target& t : targets_)
-        if (t.steps < 0 && edge_[static_cast<std::size_t>(t.sample.place)] >> t.sample.bit & 1) {
-          t.steps = steps;
-          --missing;
-        }
-      const std::size_t places = flooded_.size();
-      for (std::size_t n = 0; n < places; ++n) {
-        const int p = flooded_[n];
-        const std::size_t i = static_cast<std::size_t>(p);
-        const SampleSet edge = edge_[i];
-        if (!edge) continue;
-        for (int axis = 0; axis < 3; ++axis) {
-          const int stride = kSampleStride[axis], along = p / kStride[axis] % kWide;
-          const SampleSet linked = edge & ~window_[i]->parted[axis];
-          enter(p, (linked & ~kUpperLayer[axis]) << stride, next_);
-          enter(p, (edge & ~kLowerLayer[axis]) >> stride & ~window_[i]->parted[axis], next_);
-          if (along + 1 < kWide)
-            enter(p + kStride[axis], (linked & kUpperLayer[axis]) >> (kCellSamples - 1) * stride, next_);
-          if (along > 0)
-            enter(p - kStride[axis],
-                  (edge & kLowerLayer[axis]) << (kCellSamples - 1) * stride &
-                      ~window_[static_cast<std::size_t>(p - kStride[axis])]->parted[axis],
-                  next_);
-        }
-      }
-      for (const int p : flooded_) {
-        edge_[static_cast<std::size_t>(p)] = next_[static_cast<std::size_t>(p)];
-        next_[static_cast<std::size_t>(p)] = kNoSample;
-      }
-    }
+  double detourTo(Index cell, int place, const LatticeCell& own, int bit, double away, double reach) {
+    const LatticeCell& there = of_.lattice.cells[cell];
+    const int middle = of_.maps[cell].middle;
+    int straight = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      straight += std::abs(kCellSamples * (there.place[axis] - own.place[axis]) +
+                           middle / kSampleStride[axis] % kCellSamples - bit / kSampleStride[axis] % kCellSamples);
+    if (ways_.size() > kMostWays) ways_.clear();
+    Ways& ways = ways_.try_emplace(cell, of_.grid, there, middle).first->second;
+    // From the cell a vertex's place is where the cell's is from the vertex's, turned round.
+    const int steps =
+        ways.stepsTo(kPlaces - 1 - place, bit, straight + static_cast<int>(kCellSamples * (reach - away)));
+    return steps == Ways::kUnknown ? reach : (steps - straight) / double{kCellSamples};
   }
 
   const Lattice& of_;
   std::vector<char> open_;  // of each place's tissue
-  std::size_t around_ = ~std::size_t{0};
   std::array<const Tissue*, kPlaces> window_{};
   std::vector<Candidate> candidates_;
-  std::vector<Target> targets_;
-  std::vector<int> flooded_;  // places of the window
-  std::array<SampleSet, kPlaces> passed_{}, edge_{}, next_{};
-  std::vector<double> sum_;  // of each corner
-  std::vector<bool> seen_;
-  std::vector<Index> touched_;
+  std::vector<Index> corners_;  // of the candidates, ascending
+  std::vector<double> sum_;     // of each of them
+  std::vector<char> seen_;
+  std::vector<Index> number_;  // of each corner of the lattice
+  std::unordered_map<Index, Ways> ways_;
 };
 
 std::vector<CellMap> mapsOf(const CellLattice& lattice) {
@@ -352,12 +387,13 @@ std::vector<CellMap> mapsOf(const CellLattice& lattice) {
     CellMap& map = maps.emplace_back();
     map.centroid = lattice.restPlace(cell, at);
     map.filled = cell.stiffness_share * moments.fraction;
+    map.middle = nearestSample(samplesOf(cell), lattice.placeIn(cell, map.centroid));
     for (int k = 0; k < 8; ++k) {
       map.at[k] = trilinearWeight(k, at);
       for (int axis = 0; axis < 3; ++axis) {
         Vec3 end = at;
         end[axis] = 1.0;
-        map.slope[k][axis] = (k >> axis & 1 ? 1.0 : -1.0) * trilinearWeight(k | 1 << axis, end) / lattice.spacing;
+        map.slopes[axis][k] = (k >> axis & 1 ? 1.0 : -1.0) * trilinearWeight(k | 1 << axis, end) / lattice.spacing;
       }
     }
   }
@@ -374,31 +410,65 @@ std::vector<bool> heldCells(const CellLattice& lattice) {
 
 }  // namespace
 
-SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const std::vector<Index>& cell) {
+SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const std::vector<Index>& cell,
+                           const KeptRows& kept) {
   Blender::Lattice of{lattice, TissueGrid(lattice), mapsOf(lattice), {}, heldCells(lattice)};
   of.parts.resize(lattice.cells.size());
   for (Index c = 0; c < lattice.cells.size(); ++c)
     if (const Index bridge = lattice.cells[c].bridge; bridge != kNoIndex && bridge != c) of.parts[bridge].push_back(c);
-  std::vector<SurfaceBinding> parts((rest.size() + kChunk - 1) / kChunk);
+  std::vector<Index> offsets, vertices;  // of each cell
+  const auto isKept = [&](Index v) {
+    const Index was = kept.parent ? kept.vertex[v] : kNoIndex;
+    return was != kNoIndex && std::all_of(kept.parent->carriers.data() + kept.parent->offsets[was],
+                                          kept.parent->carriers.data() + kept.parent->offsets[was + 1],
+                                          [&](Index carrier) { return kept.particle[carrier] != kNoIndex; });
+  };
+  std::vector<bool> is_kept;
+  for (Index v = 0; v < rest.size(); ++v) is_kept.push_back(isKept(v));
+  const auto each = [&](const auto& visit) {
+    for (Index v = 0; v < rest.size(); ++v)
+      if (!is_kept[v]) visit(cell[v], v);
+  };
+  compressRows(lattice.cells.size(), each, offsets, vertices);
+  std::vector<Blender::Rows> parts((lattice.cells.size() + kChunk - 1) / kChunk);
   tbb::enumerable_thread_specific<Blender> blenders([&] { return Blender(of); });
-  inChunks(rest.size(), kChunk, [&](std::size_t from, std::size_t to) {
+  inChunks(lattice.cells.size(), kChunk, [&](std::size_t from, std::size_t to) {
     Blender& blender = blenders.local();
-    for (std::size_t v = from; v < to; ++v) blender.follow(rest[v], cell[v], parts[from / kChunk]);
+    for (std::size_t c = from; c < to; ++c)
+      if (offsets[c] < offsets[c + 1])
+        blender.follow(static_cast<Index>(c), vertices.data() + offsets[c], vertices.data() + offsets[c + 1], rest,
+                       parts[from / kChunk]);
   });
   SurfaceBinding binding;
   binding.particle.assign(rest.size(), kNoIndex);
-  binding.offsets.push_back(0);
-  std::size_t carriers = 0;
-  for (const SurfaceBinding& part : parts) carriers += part.carriers.size();
-  binding.offsets.reserve(rest.size() + 1);
-  binding.carriers.reserve(carriers);
-  binding.weights.reserve(carriers);
-  for (const SurfaceBinding& part : parts) {
-    const Index first = static_cast<Index>(binding.carriers.size());
-    for (const Index offset : part.offsets) binding.offsets.push_back(first + offset);
-    binding.carriers.insert(binding.carriers.end(), part.carriers.begin(), part.carriers.end());
-    binding.weights.insert(binding.weights.end(), part.weights.begin(), part.weights.end());
+  binding.offsets.assign(rest.size() + 1, 0);
+  const Index* next = vertices.data();
+  for (const Blender::Rows& part : parts)
+    for (const Index length : part.lengths) binding.offsets[*next++ + 1] = length;
+  const auto each_kept = [&](const auto& visit) {
+    for (Index v = 0; v < rest.size(); ++v)
+      if (is_kept[v]) visit(v, kept.parent->offsets[kept.vertex[v]], kept.parent->offsets[kept.vertex[v] + 1]);
+  };
+  each_kept([&](Index v, Index from, Index to) { binding.offsets[v + 1] = to - from; });
+  std::partial_sum(binding.offsets.begin(), binding.offsets.end(), binding.offsets.begin());
+  binding.carriers.resize(binding.offsets.back());
+  binding.weights.resize(binding.offsets.back());
+  next = vertices.data();
+  for (const Blender::Rows& part : parts) {
+    Index at = 0;
+    for (const Index length : part.lengths) {
+      const Index to = binding.offsets[*next++];
+      std::copy_n(part.carriers.data() + at, length, binding.carriers.data() + to);
+      std::copy_n(part.weights.data() + at, length, binding.weights.data() + to);
+      at += length;
+    }
   }
+  each_kept([&](Index v, Index from, Index to) {
+    std::copy(kept.parent->weights.data() + from, kept.parent->weights.data() + to,
+              binding.weights.data() + binding.offsets[v]);
+    for (Index k = from; k < to; ++k)
+      binding.carriers[binding.offsets[v] + k - from] = kept.particle[kept.parent->carriers[k]];
+  });
   for (Index v = 0; v < rest.size(); ++v) binding.embedded.push_back(v);
   binding.levers.assign(rest.size(), Vec3::Zero());
   binding.turners = cell;

@@ -98,15 +98,16 @@ namespace {
 Result<CutBody> cutFilled(const BodyModel& model, const BodyState& state, const Plane& plane,
                           const TriangleMesh& present, const CutOptions& options,
                           const std::vector<TissuePlace>& places) {
-  const Result<CutSurface> cut = cutByPlane(present, plane, options);
-  if (!cut) return cut.error();
+  Result<CutSurface> cut = Error(), cut_contact = Error();
   const TriangleMesh for_contact = presentCollision(model, state);
-  Result<CutSurface> cut_contact = Error();
-  if (model.collision) {
-    CutOptions likewise = options;
-    likewise.rest = &model.collision->mesh.vertices;
-    cut_contact = cutByPlane(for_contact, plane, likewise);
-  }
+  atOnce([&] { cut = cutByPlane(present, plane, options); },
+         [&] {
+           if (!model.collision) return;
+           CutOptions likewise = options;
+           likewise.rest = &model.collision->mesh.vertices;
+           cut_contact = cutByPlane(for_contact, plane, likewise);
+         });
+  if (!cut) return cut.error();
   std::vector<CellPieceSource> sources, collision;
   for (const CutPiece& piece : cut->pieces) sources.push_back({piece.mesh, piece.origins});
   if (cut_contact)

@@ -6,6 +6,7 @@
 #include <optional>
 #include <sstream>
 #include <tuple>
+#include <unordered_map>
 #include <utility>
 
 #include <Eigen/Dense>
@@ -16,6 +17,7 @@
 #include "meshless_surgery/geometry/cut_lattice.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/union_find.h"
+#include "place_set.h"
 #include "side_by_side.h"
 
 namespace meshless {
@@ -27,10 +29,12 @@ constexpr std::size_t kChunk = 256;    // vertices
 
 // A vertex of a piece, or of its surface for contact, whose new cell is not known yet.
 struct EmbeddedVertex {
-  Vec3 rest;           // [m]
-  Index was;           // the parent's cell that it followed
-  bool made;           // by this blade
-  bool above = false;  // on the side of its normal, of a vertex that it did not make
+  Vec3 rest = Vec3::Zero();  // [m]
+  Index was = kNoIndex;      // the parent's cell that it followed
+  Index same = kNoIndex;     // the parent's vertex that it is; kNoIndex: this blade made it
+  bool above = false;        // on the side of its normal, of a vertex that it did not make
+
+  bool made() const { return same == kNoIndex; }
 };
 
 // The place in a cell that is at q; false where Newton's method finds none near it.
@@ -62,6 +66,15 @@ bool invert(const LatticeCell& cell, const Points& x, const Vec3& q, double size
 struct PieceCollision {
   TriangleMesh mesh;         // [m]
   std::vector<Index> cells;  // of each vertex; kNoIndex where none of the piece's is near it
+  std::vector<Index> same;   // the parent's vertex that each is; kNoIndex: the blade made it
+};
+
+struct HashOfPlace {
+  std::size_t operator()(const Vec3& p) const {
+    std::size_t hash = 0;
+    for (int k = 0; k < 3; ++k) hash = 31 * hash + std::hash<double>()(p[k]);
+    return hash;
+  }
 };
 
 class CellCutter {
@@ -81,17 +94,27 @@ class CellCutter {
   }
 
   Result<std::vector<BodyPiece>> run(const std::vector<TissuePlace>& places, std::uint32_t new_patch, CutWork& work) {
-    for (const CellPieceSource& source : sources_) {
-      surfaces_.push_back(surfaceOf(source, model_.surface.vertices, model_.binding));
-      const auto& embedded = surfaces_.back().embedded;
+    findInside();
+    surfaces_.resize(sources_.size() + collision_.size());
+    inChunks(surfaces_.size(), 1, [&](std::size_t s, std::size_t) {
+      surfaces_[s] = s < sources_.size() ? surfaceOf(sources_[s], model_.surface.vertices, model_.binding)
+                                         : surfaceOf(collision_[s - sources_.size()], model_.collision->mesh.vertices,
+                                                     model_.collision->binding);
+    });
+    for (std::size_t s = 0; s < surfaces_.size(); ++s) {
+      const auto& embedded = surfaces_[s].embedded;
       const auto lost = std::find_if(embedded.begin(), embedded.end(), [](const auto& e) { return e.was == kNoIndex; });
       if (lost == embedded.end()) continue;
+      if (s >= sources_.size()) {
+        surfaces_.resize(sources_.size());
+        break;
+      }
       std::ostringstream text;
-      text << "the blade made a point at " << source.mesh.vertices[lost - embedded.begin()].transpose()
+      text << "the blade made a point at " << sources_[s].mesh.vertices[lost - embedded.begin()].transpose()
            << " that lies in none of its cells";
       return Error{ErrorCode::kUnsuitableShape, text.str()};
     }
-    for (RestSurface& surface : surfaces_) findCells(surface);
+    inChunks(surfaces_.size(), 1, [&](std::size_t s, std::size_t) { surfaces_[s].cells = cellsOf(surfaces_[s], -1); });
     choosePieces();
     bindCollision();
     sampled_ = static_cast<Index>(cells().size());
@@ -112,30 +135,27 @@ class CellCutter {
   // What is known at rest of the surface of a source.
   struct RestSurface {
     std::vector<EmbeddedVertex> embedded;
-    TriangleMesh mesh;  // [m]
-    Points normals;
-    std::optional<SolidQuery> solid;
-    std::vector<Index> cells;  // of each vertex: cellOf() in any piece
+    TriangleMesh mesh;         // [m]
+    std::vector<Index> cells;  // of each vertex, in any piece
   };
 
-  RestSurface surfaceOf(const CellPieceSource& source, const Points& parent_rest, const SurfaceBinding& parent) {
+  RestSurface surfaceOf(const CellPieceSource& source, const Points& parent_rest, const SurfaceBinding& parent) const {
     RestSurface surface;
+    surface.embedded.reserve(source.origins.size());
+    surface.mesh.vertices.reserve(source.origins.size());
     for (Index v = 0; v < source.origins.size(); ++v) {
       surface.embedded.push_back(embeddedOf(source, v, parent_rest, parent));
       surface.mesh.vertices.push_back(surface.embedded.back().rest);
     }
     surface.mesh.triangles = source.mesh.triangles;
-    surface.normals = vertexNormals(surface.mesh);
-    surface.solid.emplace(surface.mesh);
     return surface;
   }
 
   EmbeddedVertex embeddedOf(const CellPieceSource& source, Index v, const Points& parent_rest,
-                            const SurfaceBinding& parent) {
+                            const SurfaceBinding& parent) const {
     const VertexOrigins& origins = source.origins;
-    EmbeddedVertex embedded{Vec3::Zero(), kNoIndex, origins.same(v) == kNoIndex,
-                            gate_.height(source.mesh.vertices[v]) >= 0.0};
-    if (origins.insideCap(v)) return insideOf(source.mesh.vertices[v]);
+    EmbeddedVertex embedded{Vec3::Zero(), kNoIndex, origins.same(v), gate_.height(source.mesh.vertices[v]) >= 0.0};
+    if (origins.insideCap(v)) return inside_.at(source.mesh.vertices[v]);
     const VertexOrigin origin = origins[v];
     int heaviest = 0;
     for (int k = 1; k < 4; ++k)
@@ -152,32 +172,53 @@ class CellCutter {
       all += origin.weights[k];
     }
     if (all != 1.0) embedded.rest /= all;
-    if (!embedded.made) embedded.rest = parent_rest[origin.parents[0]];
+    if (!embedded.made()) embedded.rest = parent_rest[origin.parents[0]];
     return embedded;
   }
 
-  // By the inverse of the map of the cell whose samples are nearest. Both sides of a cut get the same place.
-  EmbeddedVertex insideOf(const Vec3& q) {
-    const auto [known, is_new] =
-        inside_.emplace(std::array<double, 3>{q.x(), q.y(), q.z()}, EmbeddedVertex{q, kNoIndex, true});
-    if (!is_new) return known->second;
-    if (boxes_.empty())
-      for (Index c = 0; c < before_.cells.size(); ++c) {
-        if (before_.cells[c].isBridge(c)) continue;
-        boxes_.emplace_back(Box(), c);
-        for (const Index corner : before_.cells[c].corners) boxes_.back().first.extend(state_.positions[corner]);
-        const Box& box = boxes_.back().first;
-        double low = gate_.height(state_.positions[before_.cells[c].corners[0]]), high = low;
-        for (const Index corner : before_.cells[c].corners) {
-          low = std::min(low, gate_.height(state_.positions[corner]));
-          high = std::max(high, gate_.height(state_.positions[corner]));
-        }
-        const double wide = 0.5 * (box.max - box.min).norm();
-        if (low > wide || high < -wide) boxes_.pop_back();
+  // Bounds of a cell as it is now.
+  struct PresentBox {
+    Box box;
+    Vec3 middle;
+    double squared;  // [m^2] from the middle to a corner
+    Index cell;
+  };
+
+  // Vertices inside the caps. Both sides of a cut get the same place.
+  void findInside() {
+    for (const auto* sources : {&sources_, &collision_})
+      for (const CellPieceSource& source : *sources)
+        for (Index v = 0; v < source.origins.size(); ++v)
+          if (source.origins.insideCap(v)) inside_.emplace(source.mesh.vertices[v], EmbeddedVertex());
+    if (inside_.empty()) return;
+    std::vector<PresentBox> boxes;  // of the parent's cells near the blade's plane
+    for (Index c = 0; c < before_.cells.size(); ++c) {
+      if (before_.cells[c].isBridge(c)) continue;
+      Box box;
+      Box heights;  // along x
+      for (const Index corner : before_.cells[c].corners) {
+        box.extend(state_.positions[corner]);
+        heights.extend(Vec3(gate_.height(state_.positions[corner]), 0.0, 0.0));
       }
+      const double wide = 0.5 * (box.max - box.min).norm();
+      if (heights.min.x() <= wide && heights.max.x() >= -wide)
+        boxes.push_back({box, 0.5 * (box.min + box.max), wide * wide, c});
+    }
+    std::vector<std::pair<const Vec3, EmbeddedVertex>*> all;
+    for (auto& entry : inside_) all.push_back(&entry);
+    inChunks(all.size(), kChunk, [&](std::size_t from, std::size_t to) {
+      for (std::size_t n = from; n < to; ++n) all[n]->second = insideOf(all[n]->first, boxes);
+    });
+  }
+
+  // By the inverse of the map of the cell whose samples are nearest.
+  EmbeddedVertex insideOf(const Vec3& q, const std::vector<PresentBox>& boxes) const {
+    EmbeddedVertex found{q, kNoIndex};
     for (const double margin : {0.01, 0.5, 2.0}) {
       double least = 1e300;
-      for (const auto& [box, c] : boxes_) {
+      const double widened = std::pow(1.01 + 2.0 * margin, 2);
+      for (const auto& [box, middle, squared, c] : boxes) {
+        if ((q - middle).squaredNorm() > widened * squared) continue;
         const Vec3 wider = margin * (box.max - box.min);
         if (((q - box.min + wider).array() < 0.0).any() || ((box.max + wider - q).array() < 0.0).any()) continue;
         Vec3 at;
@@ -188,71 +229,117 @@ class CellCutter {
         const double distance = outside + std::max(0.0, std::sqrt(squaredToSamples(samples, at)) - 0.22);
         if (!(distance < least)) continue;
         least = distance;
-        known->second = {before_.restPlace(before_.cells[c], at), c, true};
+        found = {before_.restPlace(before_.cells[c], at), c};
       }
       if (least < 0.5) break;
     }
-    return known->second;
+    return found;
   }
 
   // --- cells that a vertex may follow
 
-  // The cell of vertex v of a surface among those of `piece` (any where it is negative): that of the nearest sample
-  // which the surface does not hide from the tissue beneath the vertex.
-  Index cellOf(const RestSurface& surface, Index v, int piece) const {
-    const EmbeddedVertex& embedded = surface.embedded[v];
-    const auto in_piece = [&](Index c) { return piece < 0 || piece_of_[component_[c]] == piece; };
-    if (piece >= 0 && surface.cells[v] != kNoIndex && in_piece(surface.cells[v])) return surface.cells[v];
-    const std::vector<Index>& copies = children_[embedded.was];
-    // A blade may leave a cell whole and part a vertex from it.
-    if (!embedded.made && copies.size() == 1 && !cut_.changed[copies[0]] && in_piece(copies[0])) {
-      const SampleSet above = cut_.above[copies[0]];
-      if (!(cut_.lattice.cells[copies[0]].samples & (embedded.above ? ~above : above))) return copies[0];
+  // The cells of the vertices of a surface among those of `piece` (any where it is negative).
+  std::vector<Index> cellsOf(const RestSurface& surface, int piece) const {
+    std::vector<Index> cells = surface.cells, open;
+    cells.resize(surface.embedded.size(), kNoIndex);
+    for (Index v = 0; v < cells.size(); ++v) {
+      if (piece < 0) cells[v] = cellAsBefore(surface.embedded[v]);
+      if (piece < 0 ? cells[v] != kNoIndex : cells[v] == kNoIndex || piece_of_[component_[cells[v]]] == piece) continue;
+      open.push_back(v);
     }
-    const Vec3 beneath = embedded.rest - kBeneath * before_.spacing * surface.normals[v];
-    std::vector<std::pair<double, Index>> boxes;  // [spacing^2] from cells to the vertex
-    const std::array<std::int32_t, 3> own = before_.placeOf(embedded.rest);
+    if (open.empty()) return cells;
+    const TriangleMesh around = trianglesAround(surface, open);
+    Points normals;
+    std::optional<SolidQuery> solid;
+    atOnce([&] { solid.emplace(around); }, [&] { normals = vertexNormals(around); });
+    inChunks(open.size(), kChunk, [&](std::size_t from, std::size_t to) {
+      for (std::size_t n = from; n < to; ++n)
+        cells[open[n]] = nearestCell(surface.embedded[open[n]].rest, normals[open[n]], *solid, piece);
+    });
+    return cells;
+  }
+
+  // A blade may leave a cell whole and part a vertex from it.
+  Index cellAsBefore(const EmbeddedVertex& embedded) const {
+    const std::vector<Index>& copies = children_[embedded.was];
+    if (embedded.made() || copies.size() != 1 || cut_.changed[copies[0]]) return kNoIndex;
+    const SampleSet above = cut_.above[copies[0]];
+    return cut_.lattice.cells[copies[0]].samples & (embedded.above ? ~above : above) ? kNoIndex : copies[0];
+  }
+
+  // The triangles that reach into a place of the lattice that is next to a vertex's: no others are asked for.
+  TriangleMesh trianglesAround(const RestSurface& surface, const std::vector<Index>& vertices) const {
+    std::vector<PlaceSet::Place> places;
+    places.reserve(surface.mesh.vertices.size());
+    for (const Vec3& p : surface.mesh.vertices) places.push_back(before_.placeOf(p));
+    PlaceSet near(places, 1);
+    for (const Index v : vertices) near.at(places[v]) = true;
+    near.widen(true);
+    TriangleMesh around;
+    around.vertices = surface.mesh.vertices;
+    for (const Triangle& t : surface.mesh.triangles) {
+      PlaceSet::Place from = places[t[0]], to = from;
+      for (const Index v : t)
+        for (int k = 0; k < 3; ++k) {
+          from[k] = std::min(from[k], places[v][k]);
+          to[k] = std::max(to[k], places[v][k]);
+        }
+      bool reaches = false;
+      for (std::int32_t z = from[2]; z <= to[2]; ++z)
+        for (std::int32_t y = from[1]; y <= to[1]; ++y)
+          for (std::int32_t x = from[0]; x <= to[0]; ++x) reaches = reaches || near.has({x, y, z});
+      if (reaches) around.triangles.push_back(t);
+    }
+    return around;
+  }
+
+  // That of the nearest sample which the surface does not hide from the tissue beneath the vertex.
+  Index nearestCell(const Vec3& rest, const Vec3& normal, const SolidQuery& solid, int piece) const {
+    // A cell by its nearest sample that is left, or at first by its box.
+    struct Near {
+      double squared, box;  // [spacing^2]
+      Index cell;
+      SampleSet left;
+      int bit = -1;  // not looked for yet
+      bool operator<(const Near& other) const {
+        return std::tie(squared, box, cell) < std::tie(other.squared, other.box, other.cell);
+      }
+    };
+    const Vec3 beneath = rest - kBeneath * before_.spacing * normal;
+    const std::array<std::int32_t, 3> own = before_.placeOf(rest);
+    const Vec3 place = (beneath - before_.origin) / before_.spacing;
+    const auto placeIn = [&](const LatticeCell& cell) {  // as CellLattice's
+      return Vec3(place - Vec3(cell.place[0], cell.place[1], cell.place[2]));
+    };
+    std::vector<Near> near;
+    near.reserve(64);
     for (std::int32_t z = -1; z <= 1; ++z)
       for (std::int32_t y = -1; y <= 1; ++y)
         for (std::int32_t x = -1; x <= 1; ++x)
           for (const Index c : finder_.at({own[0] + x, own[1] + y, own[2] + z})) {
             const LatticeCell& cell = cut_.lattice.cells[c];
-            if (cell.isBridge(c) || !in_piece(c)) continue;
-            const Vec3 within = before_.placeIn(cell, beneath);
-            boxes.emplace_back((within - within.cwiseMax(0.0).cwiseMin(1.0)).squaredNorm(), c);
+            if (cell.isBridge(c) || (piece >= 0 && piece_of_[component_[c]] != piece)) continue;
+            const Vec3 within = placeIn(cell);
+            const double box = (within - within.cwiseMax(0.0).cwiseMin(1.0)).squaredNorm();
+            near.push_back({box, box, c, cell.samples});
           }
-    std::sort(boxes.begin(), boxes.end());
-    // Samples, nearest first; a cell's are looked at once none of the others is nearer than it is.
-    struct Sample {
-      double squared;
-      Index cell;
-      int bit;
-      bool operator<(const Sample& other) const { return squared < other.squared; }
-    };
-    std::vector<Sample> near;
-    for (auto next = boxes.begin();;) {
-      const auto nearest = std::min_element(near.begin(), near.end());
-      if (next != boxes.end() && (near.empty() || next->first <= nearest->squared)) {
-        const LatticeCell& cell = cut_.lattice.cells[next->second];
-        const Vec3 within = before_.placeIn(cell, beneath);
-        for (SampleSet left = cell.samples; left; left &= left - 1)
-          near.push_back({(samplePlace(lowestSample(left)) - within).squaredNorm(), next->second, lowestSample(left)});
-        ++next;
-        continue;
+    while (!near.empty()) {
+      Near& next = *std::min_element(near.begin(), near.end());
+      const LatticeCell& cell = cut_.lattice.cells[next.cell];
+      if (next.bit >= 0) {
+        if (!solid.crosses(beneath, before_.restPlace(cell, samplePlace(next.bit)))) return next.cell;
+        next.left &= ~(SampleSet{1} << next.bit);
       }
-      if (near.empty()) return kNoIndex;
-      const LatticeCell& cell = cut_.lattice.cells[nearest->cell];
-      if (!surface.solid->crosses(beneath, before_.restPlace(cell, samplePlace(nearest->bit)))) return nearest->cell;
-      *nearest = near.back();
-      near.pop_back();
+      if (next.left) {
+        const Vec3 within = placeIn(cell);
+        next.bit = nearestSample(next.left, within);
+        next.squared = (samplePlace(next.bit) - within).squaredNorm();
+      } else {
+        next = near.back();
+        near.pop_back();
+      }
     }
-  }
-
-  void findCells(RestSurface& surface) const {
-    surface.cells.resize(surface.embedded.size());
-    inChunks(surface.cells.size(), kChunk, [&](std::size_t from, std::size_t to) {
-      for (std::size_t v = from; v < to; ++v) surface.cells[v] = cellOf(surface, static_cast<Index>(v), -1);
-    });
+    return kNoIndex;
   }
 
   // --- which cells are in which piece
@@ -270,7 +357,7 @@ class CellCutter {
     std::vector<std::map<int, int>> votes(names.size());
     for (std::size_t p = 0; p < sources_.size(); ++p)
       for (Index v = 0; v < surfaces_[p].embedded.size(); ++v)
-        if (const Index c = surfaces_[p].cells[v]; c != kNoIndex && !surfaces_[p].embedded[v].made)
+        if (const Index c = surfaces_[p].cells[v]; c != kNoIndex && !surfaces_[p].embedded[v].made())
           ++votes[component_[c]][static_cast<int>(p)];
     for (Index n = 0; n < names.size(); ++n) {
       seen_[n] = !votes[n].empty();
@@ -317,7 +404,7 @@ class CellCutter {
     carriers_.resize(sources_.size());
     for (std::size_t p = 0; p < sources_.size(); ++p) {
       const std::vector<EmbeddedVertex>& embedded = surfaces_[p].embedded;
-      for (Index v = 0; v < embedded.size(); ++v) carriers_[p].push_back(cellOf(surfaces_[p], v, static_cast<int>(p)));
+      carriers_[p] = cellsOf(surfaces_[p], static_cast<int>(p));
       std::map<Index, Index> crumbs;
       for (Index v = 0; v < embedded.size(); ++v) {
         if (carriers_[p][v] != kNoIndex) continue;
@@ -331,31 +418,28 @@ class CellCutter {
 
   // Which piece each part of the surface for contact is of, and the cells of its vertices there.
   void bindCollision() {
-    if (collision_.empty()) return;
+    if (surfaces_.size() == sources_.size()) return;
     collisions_.resize(sources_.size());
-    for (const CellPieceSource& source : collision_) {
-      RestSurface surface = surfaceOf(source, model_.collision->mesh.vertices, model_.collision->binding);
-      if (std::any_of(surface.embedded.begin(), surface.embedded.end(),
-                      [](const auto& e) { return e.was == kNoIndex; }))
-        return collisions_.clear();
-      findCells(surface);
+    for (std::size_t s = sources_.size(); s < surfaces_.size(); ++s) {
+      const RestSurface& surface = surfaces_[s];
       std::vector<Index> votes(sources_.size(), 0);
       for (Index v = 0; v < surface.embedded.size(); ++v)
-        if (const Index c = surface.cells[v]; c != kNoIndex && !surface.embedded[v].made)
+        if (const Index c = surface.cells[v]; c != kNoIndex && !surface.embedded[v].made())
           ++votes[static_cast<std::size_t>(piece_of_[component_[c]])];
       const std::size_t p = static_cast<std::size_t>(std::max_element(votes.begin(), votes.end()) - votes.begin());
       PieceCollision& piece = collisions_[p];
       const Index first = static_cast<Index>(piece.mesh.vertices.size());
       for (const Triangle& t : surface.mesh.triangles)
         piece.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-      for (Index v = 0; v < surface.embedded.size(); ++v) {
-        piece.mesh.vertices.push_back(surface.mesh.vertices[v]);
-        piece.cells.push_back(cellOf(surface, v, static_cast<int>(p)));
-        if (piece.cells.back() == kNoIndex)  // in a rim that is thinner than samples see
-          piece.cells.back() = finder_.nearest(surface.mesh.vertices[v], [&](Index c) {
+      piece.mesh.vertices.insert(piece.mesh.vertices.end(), surface.mesh.vertices.begin(), surface.mesh.vertices.end());
+      std::vector<Index> cells = cellsOf(surface, static_cast<int>(p));
+      for (Index v = 0; v < cells.size(); ++v)
+        if (cells[v] == kNoIndex)  // in a rim that is thinner than samples see
+          cells[v] = finder_.nearest(surface.mesh.vertices[v], [&](Index c) {
             return piece_of_[component_[c]] == static_cast<int>(p) ? cut_.lattice.cells[c].samples : kNoSample;
           });
-      }
+      piece.cells.insert(piece.cells.end(), cells.begin(), cells.end());
+      for (const EmbeddedVertex& embedded : surface.embedded) piece.same.push_back(embedded.same);
     }
   }
 
@@ -584,25 +668,23 @@ class CellCutter {
     child->lattice = lattice;
     child->cell_mass = model_.cell_mass;
     child->regions = model_.regions;
-    makeParticlesOfCells(*child);
-    holdCorners(*child);
-    inheritClamp(*child, renumbered);
-    for (const double m : child->masses) child->mass += m;
-    inheritMoments(*child, corner_of);
-
-    for (const Index c : cell_of) {
-      piece.state.poses.push_back(state_.poses[cut_.parent_cell[c]]);
-      if (!state_.plastic.empty()) piece.state.plastic.push_back(state_.plastic[cut_.parent_cell[c]]);
-      ++(cut_.changed[c] ? work.rebuilt_clusters : work.kept_clusters);
-    }
-    fitClusters(matchInput(*child, piece.state), piece.state.positions, piece.state.poses);
-    std::vector<Index> carriers;
-    for (const Index c : carriers_[p]) carriers.push_back(renumbered[c]);
-    child->binding = bindToCells(*lattice, child->surface.vertices, carriers);
-    if (!collisions_.empty()) child->collision = collisionOf(collisions_[p], *lattice, renumbered);
+    atOnce([&] { bindPiece(p, piece, renumbered, *child); },
+           [&] {
+             makeParticlesOfCells(*child);
+             holdCorners(*child);
+             inheritClamp(*child, renumbered);
+             for (const double m : child->masses) child->mass += m;
+             inheritMoments(*child, corner_of);
+             for (const Index c : cell_of) {
+               piece.state.poses.push_back(state_.poses[cut_.parent_cell[c]]);
+               if (!state_.plastic.empty()) piece.state.plastic.push_back(state_.plastic[cut_.parent_cell[c]]);
+               ++(cut_.changed[c] ? work.rebuilt_clusters : work.kept_clusters);
+             }
+             fitClusters(matchInput(*child, piece.state), piece.state.positions, piece.state.poses);
+           });
     for (const EmbeddedVertex& embedded : surfaces_[p].embedded) {
-      ++(embedded.made ? work.bound_embedded : work.kept_embedded);
-      work.new_vertices += embedded.made;
+      ++(embedded.made() ? work.bound_embedded : work.kept_embedded);
+      work.new_vertices += embedded.made();
     }
     for (const std::uint32_t patch : from.mesh.patches) work.new_triangles += patch == new_patch;
     piece.state.stretch = state_.stretch;
@@ -615,16 +697,54 @@ class CellCutter {
     return piece;
   }
 
-  std::shared_ptr<const CollisionSurface> collisionOf(const PieceCollision& from, const CellLattice& lattice,
-                                                      const std::vector<Index>& renumbered) const {
-    if (from.cells.empty()) return nullptr;
-    std::vector<Index> cells;
-    for (const Index c : from.cells) {
-      if (c == kNoIndex) return nullptr;
-      cells.push_back(renumbered[c]);
+  // What is seen and what meets contact, to the cells of the piece.
+  void bindPiece(std::size_t p, const BodyPiece& piece, const std::vector<Index>& renumbered, BodyModel& child) const {
+    const std::vector<bool> untouched = untouchedCells(static_cast<int>(p));
+    std::vector<Index> particle(before_.corners, kNoIndex);
+    for (Index i = 0; i < piece.parent_particles.size(); ++i)  // heirs come first: which of several copies is not said
+      particle[piece.copied_from[i]] = piece.parent_particles[i] != kNoIndex ? i : kNoIndex;
+    const auto bind = [&](const SurfaceBinding& parent, const Points& rest, const std::vector<Index>& cells,
+                          const auto& sameAs) {
+      KeptRows kept{&parent, {}, particle};
+      std::vector<Index> numbers;
+      for (Index v = 0; v < cells.size(); ++v) {
+        kept.vertex.push_back(keptRow(parent, sameAs(v), cells[v], untouched));
+        numbers.push_back(renumbered[cells[v]]);
+      }
+      return bindToCells(*child.lattice, rest, numbers, kept);
+    };
+    child.binding = bind(model_.binding, child.surface.vertices, carriers_[p],
+                         [&](Index v) { return surfaces_[p].embedded[v].same; });
+    if (collisions_.empty() || collisions_[p].cells.empty()) return;
+    const PieceCollision& from = collisions_[p];
+    if (std::find(from.cells.begin(), from.cells.end(), kNoIndex) != from.cells.end()) return;
+    child.collision = std::make_shared<CollisionSurface>(CollisionSurface{
+        from.mesh,
+        bind(model_.collision->binding, from.mesh.vertices, from.cells, [&](Index v) { return from.same[v]; }),
+        model_.collision->distance});
+  }
+
+  // The parent's vertex whose row one that is the same now and in a cell has too; kNoIndex: it is to be made.
+  Index keptRow(const SurfaceBinding& parent, Index same, Index cell, const std::vector<bool>& untouched) const {
+    const Index was = cut_.parent_cell[cell];
+    return same != kNoIndex && parent.turners[same] == was && untouched[was] ? same : kNoIndex;
+  }
+
+  // The parent's cells around which, as far as bindToCells() looks from them, all tissue is in the piece as it was.
+  std::vector<bool> untouchedCells(int piece) const {
+    std::vector<PlaceSet::Place> places;
+    for (const LatticeCell& cell : before_.cells) places.push_back(cell.place);
+    PlaceSet touched(places, 3);
+    for (Index c = 0; c < before_.cells.size(); ++c) {
+      const std::vector<Index>& copies = children_[c];
+      if (copies.size() != 1 || cut_.changed[copies[0]] || piece_of_[component_[copies[0]]] != piece)
+        touched.at(places[c]) = true;
     }
-    return std::make_shared<CollisionSurface>(
-        CollisionSurface{from.mesh, bindToCells(lattice, from.mesh.vertices, cells), model_.collision->distance});
+    for (Index c = sampled_; c < cut_.lattice.cells.size(); ++c) touched.at(cut_.lattice.cells[c].place) = true;
+    for (const bool corners : {true, true, false}) touched.widen(corners);  // two places, and what these join
+    std::vector<bool> untouched;
+    for (const auto& place : places) untouched.push_back(!touched.has(place));
+    return untouched;
   }
 
   // The copy of its cell with the nearest tissue on its side of the blade; kNoIndex: there is none.
@@ -714,10 +834,9 @@ class CellCutter {
   CutLattice cut_;
   const CellFinder finder_;                   // knows no crumbs
   std::vector<std::vector<Index>> children_;  // of each of the parent's cells
-  std::vector<RestSurface> surfaces_;         // of each source
+  std::vector<RestSurface> surfaces_;         // of each source, and then of those for contact, if they are in its cells
   std::vector<PieceCollision> collisions_;    // of each source, or none
-  std::map<std::array<double, 3>, EmbeddedVertex> inside_;
-  std::vector<std::pair<Box, Index>> boxes_;  // present, of the parent's cells near the blade's plane
+  std::unordered_map<Vec3, EmbeddedVertex, HashOfPlace> inside_;
   std::vector<Index> component_;              // of each cell
   std::vector<int> piece_of_;                 // of each component
   Index sampled_ = 0;                         // cells before crumbs were made

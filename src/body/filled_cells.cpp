@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "meshless_surgery/base/compressed_rows.h"
 #include "meshless_surgery/geometry/cell_regions.h"
 #include "meshless_surgery/geometry/cut_lattice.h"
 
@@ -49,6 +50,30 @@ ElasticMix mixOf(const BodyModel& model, const LatticeCell& cell) {
   return mix;
 }
 
+// Links along the edges of cells: makeGraph() of them, found corner by corner.
+ParticleGraph alongEdges(const CellLattice& lattice, const Points& rest) {
+  std::vector<Index> offsets, ends;
+  const auto each = [&](const auto& visit) {
+    for (const LatticeCell& cell : lattice.cells)
+      for (Index k = 0; k < 8; ++k)
+        for (const Index bit : {1u, 2u, 4u}) visit(cell.corners[k], cell.corners[k ^ bit]);
+  };
+  compressRows(lattice.corners, each, offsets, ends);
+  ParticleGraph graph;
+  graph.offsets.push_back(0);
+  for (Index i = 0; i < lattice.corners; ++i) {
+    const auto row = ends.begin() + offsets[i], end = ends.begin() + offsets[i + 1];
+    std::sort(row, end);
+    for (auto j = row; j != end; ++j)
+      if (*j != i && (j == row || *j != *(j - 1))) {
+        graph.neighbours.push_back(*j);
+        graph.lengths.push_back((rest[i] - rest[*j]).norm());
+      }
+    graph.offsets.push_back(static_cast<Index>(graph.neighbours.size()));
+  }
+  return graph;
+}
+
 Vec3 centroidOf(const Resistance& resists) {
   return resists.centroid.cwiseMax(-kFarthestCentroid).cwiseMin(kFarthestCentroid);
 }
@@ -56,15 +81,8 @@ Vec3 centroidOf(const Resistance& resists) {
 }  // namespace
 
 double squaredToSamples(SampleSet samples, const Vec3& at) {
-  const int nearest[3] = {std::clamp(static_cast<int>(std::floor(4.0 * at.x())), 0, 3),
-                          std::clamp(static_cast<int>(std::floor(4.0 * at.y())), 0, 3),
-                          std::clamp(static_cast<int>(std::floor(4.0 * at.z())), 0, 3)};
-  const int bit = sampleBit(nearest[0], nearest[1], nearest[2]);
-  if (samples >> bit & 1) return (samplePlace(bit) - at).squaredNorm();
-  double least = std::numeric_limits<double>::infinity();
-  for (SampleSet left = samples; left; left &= left - 1)
-    least = std::min(least, (samplePlace(lowestSample(left)) - at).squaredNorm());
-  return least;
+  if (!samples) return std::numeric_limits<double>::infinity();
+  return (samplePlace(nearestSample(samples, at)) - at).squaredNorm();
 }
 
 void makeParticlesOfCells(BodyModel& model) {
@@ -76,15 +94,10 @@ void makeParticlesOfCells(BodyModel& model) {
   ClusterSet& clusters = model.clusters;
   clusters = ClusterSet();
   clusters.offsets.push_back(0);
-  std::vector<std::array<Index, 2>> edges;
   for (const LatticeCell& cell : lattice.cells) {
     addMass(model, cell, cell.filled & cell.held, held);
     addMass(model, cell, cell.filled, model.masses);
-    for (Index k = 0; k < 8; ++k) {
-      clusters.members.push_back(cell.corners[k]);
-      for (Index bit : {1u, 2u, 4u})
-        if (!(k & bit)) edges.push_back({cell.corners[k], cell.corners[k | bit]});
-    }
+    clusters.members.insert(clusters.members.end(), cell.corners.begin(), cell.corners.end());
     clusters.offsets.push_back(static_cast<Index>(clusters.members.size()));
     clusters.seeds.push_back(cell.corners[0]);
     clusters.radii.push_back(1.01 * std::sqrt(3.0) * lattice.spacing);
@@ -93,7 +106,7 @@ void makeParticlesOfCells(BodyModel& model) {
   model.carried.clear();
   if (std::any_of(held.begin(), held.end(), [](double mass) { return mass > 0.0; }))
     for (Index i = 0; i < lattice.corners; ++i) model.carried.push_back(std::min(1.0, held[i] / model.masses[i]));
-  model.graph = makeGraph(model.rest, std::move(edges));
+  model.graph = alongEdges(lattice, model.rest);
 }
 
 std::vector<bool> movingCorners(const CellLattice& lattice) {

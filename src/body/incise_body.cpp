@@ -161,10 +161,12 @@ namespace {
 Result<IncisedBody> inciseFilled(const BodyModel& model, const BodyState& state, const Blade& blade,
                                  const TriangleMesh& present, const InciseOptions& options,
                                  const std::vector<TissuePlace>& places) {
-  const Result<Incision> incision = incise(present, blade, options);
+  Result<Incision> incision = Error(), contact_incision = Error();
+  atOnce([&] { incision = incise(present, blade, options); },
+         [&] {
+           if (model.collision) contact_incision = incise(presentCollision(model, state), blade, options);
+         });
   if (!incision) return incision.error();
-  const Result<Incision> contact_incision =
-      model.collision ? incise(presentCollision(model, state), blade, options) : Error();
   std::vector<CellPieceSource> sources, collision;
   for (const IncisedPiece& piece : incision->pieces) sources.push_back({piece.mesh, piece.origins});
   if (contact_incision)

@@ -1,5 +1,9 @@
 #include "meshless_surgery/geometry/cell_samples.h"
 
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
 namespace meshless {
 namespace {
 
@@ -13,9 +17,20 @@ FilledMoments computedMoments(SampleSet samples);
 
 }  // namespace
 
-Vec3 samplePlace(int bit) {
-  static_assert(kCellSamples == 4);
-  return Vec3((bit & 3) + 0.5, (bit >> 2 & 3) + 0.5, (bit >> 4) + 0.5) / kCellSamples;
+int nearestSample(SampleSet samples, const Vec3& at) {
+  int on[3];
+  for (int k = 0; k < 3; ++k)
+    on[k] = std::clamp(static_cast<int>(std::ceil(kCellSamples * at[k])) - 1, 0, kCellSamples - 1);
+  if (const int bit = sampleBit(on[0], on[1], on[2]); samples >> bit & 1) return bit;
+  int best = lowestSample(samples);
+  double least = (samplePlace(best) - at).squaredNorm();
+  for (SampleSet left = samples & (samples - 1); left; left &= left - 1) {
+    const double squared = (samplePlace(lowestSample(left)) - at).squaredNorm();
+    if (!(squared < least)) continue;
+    least = squared;
+    best = lowestSample(left);
+  }
+  return best;
 }
 
 SampleSet connectedPart(SampleSet within, const LinkSet& parted) {
@@ -55,10 +70,14 @@ FilledMoments computedMoments(SampleSet samples) {
     m.variance[axis] =
         squared / count - m.centroid[axis] * m.centroid[axis] + 1.0 / (3.0 * kCellSamples * kCellSamples);
   }
-  for (SampleSet left = samples; left; left &= left - 1) {
-    const Vec3 at = samplePlace(lowestSample(left));
-    for (int k = 0; k < 8; ++k) m.corner_shares[k] += trilinearWeight(k, at);
-  }
+  static const std::vector<std::array<double, 8>> kWeights = [] {
+    std::vector<std::array<double, 8>> weights(64);
+    for (int bit = 0; bit < 64; ++bit)
+      for (int k = 0; k < 8; ++k) weights[bit][k] = trilinearWeight(k, samplePlace(bit));
+    return weights;
+  }();
+  for (SampleSet left = samples; left; left &= left - 1)
+    for (int k = 0; k < 8; ++k) m.corner_shares[k] += kWeights[lowestSample(left)][k];
   for (double& share : m.corner_shares) share = (1.0 - kEqualShare) * share / count + kEqualShare / 8.0;
   return m;
 }

@@ -412,16 +412,29 @@ class Cutter {
   // between them parts them there.
   void openBetweenSides(std::vector<bool>& open) const {
     const std::vector<LatticeCell>& cells = result_.lattice.cells;
-    std::vector<std::array<std::vector<Index>, 2>> on(before_.corners);
-    for (Index c = 0; c < cells.size(); ++c)
-      if (!cells[c].isBridge(c))
-        for (const Index corner : cells[c].corners)
-          if (!open[corner]) on[corner][sideOf(c) > 0].push_back(c);
-    for (Index corner = 0; corner < before_.corners; ++corner)
-      for (const Index a : on[corner][0])
-        for (const Index b : on[corner][1])
-          if (!open[corner] && (gate_.unbounded() || gate_.between(middleOf(a), -1, middleOf(b), 1)))
-            open[corner] = true;
+    std::vector<char> sides(before_.corners, 0);  // of its cells, as bits
+    const auto each = [&](const auto& visit) {
+      for (Index c = 0; c < cells.size(); ++c) {
+        if (cells[c].isBridge(c)) continue;
+        const bool above = sideOf(c) > 0;
+        for (const Index corner : cells[c].corners) visit(corner, c, above);
+      }
+    };
+    each([&](Index corner, Index, bool above) { sides[corner] |= above ? 2 : 1; });
+    std::map<Index, std::array<std::vector<Index>, 2>> on;
+    each([&](Index corner, Index c, bool above) {
+      if (!open[corner] && sides[corner] == 3) on[corner][above].push_back(c);
+    });
+    std::map<Index, Vec3> middles;
+    const auto middle = [&](Index c) {
+      const auto [known, is_new] = middles.try_emplace(c);
+      if (is_new) known->second = middleOf(c);
+      return known->second;
+    };
+    for (const auto& [corner, both] : on)
+      for (const Index a : both[0])
+        for (const Index b : both[1])
+          if (!open[corner] && (gate_.unbounded() || gate_.between(middle(a), -1, middle(b), 1))) open[corner] = true;
   }
 
   void joinCorners() {

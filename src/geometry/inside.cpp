@@ -65,7 +65,9 @@ bool rayMeetsBox(const Vec3& p, const Vec3& inverse, const Box& box) {
   return near <= far * (1.0 + 1e-12);
 }
 
-bool segmentMeetsBox(const Vec3& middle, const Vec3& half, const Vec3& abs_half, const Box& box) {
+bool segmentMeetsBox(const Vec3& middle, const Vec3& half, const Vec3& abs_half, const Box& bounds, const Box& box) {
+  for (int k = 0; k < 3; ++k)
+    if (box.min[k] > bounds.max[k] || box.max[k] < bounds.min[k]) return false;
   const Vec3 centre = middle - 0.5 * (box.min + box.max);
   const Vec3 extent = 0.5 * (box.max - box.min);
   const double slack = 1e-12 * (extent.sum() + abs_half.sum());
@@ -81,8 +83,9 @@ bool segmentMeetsBox(const Vec3& middle, const Vec3& half, const Vec3& abs_half,
 /// Strictly through the triangle's plane by more than `flat`, inside the triangle or on its rim.
 bool segmentMeetsTriangle(const Vec3& p, const Vec3& q, const Corners& t, double flat) {
   const Vec3 normal = (t.b - t.a).cross(t.c - t.a);
-  const double limit = flat * normal.norm();
   const double at_p = normal.dot(p - t.a), at_q = normal.dot(q - t.a);
+  if (at_p * at_q > 0.0) return false;  // as most are
+  const double limit = flat * normal.norm();
   if (!(std::min(at_p, at_q) < -limit && std::max(at_p, at_q) > limit)) return false;
   const Vec3 pa = t.a - p, pb = t.b - p, pc = t.c - p, d = q - p;
   const double ab = d.dot(pa.cross(pb)), bc = d.dot(pb.cross(pc)), ca = d.dot(pc.cross(pa));
@@ -103,32 +106,41 @@ struct SolidQuery::Data {
   Box bounds;
   double flat = 0.0;  // [m] a segment that stays closer to a triangle's plane than this lies in it
 
-  void build(std::vector<Index>& order, const std::vector<Corners>& source, std::size_t begin, std::size_t end) {
+  struct Centre {
+    Vec3 thrice;  // [m] the sum of the corners
+    Index triangle;
+  };
+
+  /// Returns the node.
+  Index build(std::vector<Centre>& centres, const std::vector<Corners>& source, std::size_t begin, std::size_t end) {
     const Index at = static_cast<Index>(nodes.size());
     nodes.emplace_back();
-    Box box, centres;
-    for (std::size_t k = begin; k < end; ++k) {
-      const Corners& t = source[order[k]];
-      for (const Vec3& p : {t.a, t.b, t.c}) box.extend(p);
-      centres.extend((t.a + t.b + t.c) / 3.0);
-    }
-    nodes[at].box = box;
     if (end - begin <= kLeafSize) {
       nodes[at].first = static_cast<Index>(begin);
       nodes[at].count = static_cast<Index>(end - begin);
-      return;
+      for (std::size_t k = begin; k < end; ++k) {
+        const Corners& t = source[centres[k].triangle];
+        for (const Vec3& p : {t.a, t.b, t.c}) nodes[at].box.extend(p);
+      }
+      return at;
     }
+    Box bounds;
+    for (std::size_t k = begin; k < end; ++k) bounds.extend(centres[k].thrice);
     int axis = 0;
-    (centres.max - centres.min).maxCoeff(&axis);
-    const std::size_t middle = begin + (end - begin) / 2;
-    const auto centre = [&](Index i) { return source[i].a[axis] + source[i].b[axis] + source[i].c[axis]; };
-    std::nth_element(order.begin() + begin, order.begin() + middle, order.begin() + end, [&](Index i, Index j) {
-      const double ci = centre(i), cj = centre(j);
-      return ci != cj ? ci < cj : i < j;
-    });
-    build(order, source, begin, middle);
-    nodes[at].right = static_cast<Index>(nodes.size());
-    build(order, source, middle, end);
+    (bounds.max / 3.0 - bounds.min / 3.0).maxCoeff(&axis);
+    const auto middle = centres.begin() + static_cast<std::ptrdiff_t>(begin + (end - begin) / 2);
+    std::nth_element(centres.begin() + static_cast<std::ptrdiff_t>(begin), middle,
+                     centres.begin() + static_cast<std::ptrdiff_t>(end), [axis](const Centre& a, const Centre& b) {
+                       return a.thrice[axis] != b.thrice[axis] ? a.thrice[axis] < b.thrice[axis]
+                                                               : a.triangle < b.triangle;
+                     });
+    const Index left = build(centres, source, begin, begin + (end - begin) / 2);
+    const Index right = build(centres, source, begin + (end - begin) / 2, end);
+    nodes[at].right = right;
+    nodes[at].box = nodes[left].box;
+    nodes[at].box.extend(nodes[right].box.min);
+    nodes[at].box.extend(nodes[right].box.max);
+    return at;
   }
 
   /// Calls leaf(triangle) -> bool (stop) for every triangle in nodes that enter(box) lets through; true when stopped.
@@ -202,12 +214,13 @@ SolidQuery::SolidQuery(const TriangleMesh& mesh) : data_(std::make_unique<Data>(
     source.push_back(corners);
   }
   if (source.empty()) return;
-  std::vector<Index> order(source.size());
-  for (std::size_t k = 0; k < order.size(); ++k) order[k] = static_cast<Index>(k);
+  std::vector<Data::Centre> centres;
+  centres.reserve(source.size());
+  for (const Corners& t : source) centres.push_back({t.a + t.b + t.c, static_cast<Index>(centres.size())});
   data_->nodes.reserve(source.size());
-  data_->build(order, source, 0, source.size());
+  data_->build(centres, source, 0, source.size());
   data_->triangles.reserve(source.size());
-  for (const Index k : order) data_->triangles.push_back(source[k]);
+  for (const Data::Centre& c : centres) data_->triangles.push_back(source[c.triangle]);
   data_->bounds = data_->nodes[0].box;
   data_->flat = 1e-12 * data_->bounds.diagonal();
 }
@@ -233,13 +246,13 @@ bool SolidQuery::crosses(const Vec3& a, const Vec3& b) const {
   constexpr double kShortening = 1e-6;
   const Vec3 p = a + kShortening * (b - a), q = b - kShortening * (b - a);
   const Vec3 middle = 0.5 * (p + q), half = 0.5 * (q - p), abs_half = half.cwiseAbs();
-  return data_->visit([&](const Box& box) { return segmentMeetsBox(middle, half, abs_half, box); },
+  Box bounds;
+  for (const Vec3& end : {p, q}) bounds.extend(end);
+  return data_->visit([&](const Box& box) { return segmentMeetsBox(middle, half, abs_half, bounds, box); },
                       [&](const Corners& t) { return segmentMeetsTriangle(p, q, t, data_->flat); });
 }
 
-double SolidQuery::distance(const Vec3& p) const {
-  return data_->nodes.empty() ? kInfinity : (nearest(p) - p).norm();
-}
+double SolidQuery::distance(const Vec3& p) const { return data_->nodes.empty() ? kInfinity : (nearest(p) - p).norm(); }
 
 Vec3 SolidQuery::nearest(const Vec3& p) const {
   if (data_->nodes.empty()) return p;

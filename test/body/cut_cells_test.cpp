@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "meshless_surgery/body/cell_blend.h"
 #include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/body/filled_cells.h"
@@ -305,6 +306,54 @@ TEST(CutCells, PiecesOfRandomOrgansWeighWhatTheirVolumesDo) {
                   0.1 * model.rest_volume + model.rest_area * model.spacing / 24.0)
           << seed << ": " << model.rest_volume / std::pow(model.spacing, 3) << " cells";
     }
+  }
+}
+
+void expectRowsAsMadeAnew(const CellLattice& lattice, const Points& rest, const SurfaceBinding& binding) {
+  const SurfaceBinding anew = bindToCells(lattice, rest, binding.turners);
+  ASSERT_EQ(binding.offsets, anew.offsets);
+  ASSERT_EQ(binding.carriers, anew.carriers);
+  for (std::size_t k = 0; k < anew.weights.size(); ++k) ASSERT_NEAR(binding.weights[k], anew.weights[k], 1e-12);
+}
+
+// Away from the blade vertices keep what they follow; it is what a search would find.
+TEST(CutCells, WhatASurfaceFollowsIsAsIfItWereMadeAnew) {
+  Random random(7);
+  for (int round = 0; round < 6; ++round) {
+    SCOPED_TRACE(round);
+    const TriangleMesh mesh = round % 4 == 0   ? boxMesh(Vec3(0.2, 0.11, 0.09), 20, 10, 10)
+                              : round % 4 == 1 ? sphereMesh(0.1, 0.012)
+                                               : *randomOrgan(static_cast<std::uint64_t>(round), round % 3, 0.2, 2000);
+    std::vector<PreparedBody> bodies{prepared(filled(mesh, 0.0109, round % 3 != 2))};
+    for (int n = 0; n < 4; ++n) {
+      std::vector<PreparedBody> next;
+      for (PreparedBody& body : bodies) {
+        const Vec3 normal = random.unit(), at = solidCentroid(mesh) + random.vector(0.03);
+        Blade blade;
+        blade.x_axis = normal.unitOrthogonal();
+        blade.y_axis = normal.cross(blade.x_axis);
+        blade.length = 0.5;
+        blade.depth = 0.3;
+        blade.origin = at - 0.25 * blade.x_axis;
+        std::vector<BodyPiece> pieces;
+        if (n % 2) {
+          if (Result<CutBody> cut = cutBody(*body.model, body.state, {normal, at}); cut.ok())
+            pieces = std::move(cut->pieces);
+        } else if (Result<IncisedBody> incised = inciseBody(*body.model, body.state, blade); incised.ok()) {
+          pieces = std::move(incised->pieces);
+        }
+        for (BodyPiece& piece : pieces) {
+          const BodyModel& model = *piece.model;
+          expectRowsAsMadeAnew(*model.lattice, model.surface.vertices, model.binding);
+          if (model.collision)
+            expectRowsAsMadeAnew(*model.lattice, model.collision->mesh.vertices, model.collision->binding);
+          next.push_back({BodyDef(), std::move(piece.model), std::move(piece.state)});
+        }
+        if (pieces.empty()) next.push_back(std::move(body));
+      }
+      bodies = std::move(next);
+    }
+    EXPECT_GT(bodies.size(), 1u);
   }
 }
 

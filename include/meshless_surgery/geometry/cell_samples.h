@@ -36,7 +36,12 @@ inline int countSamples(SampleSet samples) { return __builtin_popcountll(samples
 inline int lowestSample(SampleSet samples) { return __builtin_ctzll(samples); }
 
 /// Place of a sample in its cell, each coordinate 0..1.
-Vec3 samplePlace(int bit);
+inline Vec3 samplePlace(int bit) {
+  static_assert(kCellSamples == 4);
+  return Vec3((bit & 3) + 0.5, (bit >> 2 & 3) + 0.5, (bit >> 4) + 0.5) / kCellSamples;
+}
+/// The lowest of those nearest to a place in the cell, of a set that is not empty.
+int nearestSample(SampleSet samples, const Vec3& at);
 
 /// The samples of `within` that hang together with its lowest one by links that are not in `parted`.
 SampleSet connectedPart(SampleSet within, const LinkSet& parted);
