@@ -71,11 +71,11 @@ Clamp::Clamp(const CellLattice& lattice, const std::vector<ClampPoint>& points, 
 
 void ClampStep::hold(const std::shared_ptr<const Clamp>& clamp, double share, const Points& rest, const Pose& placed,
                      Points& positions) {
-  const int level = static_cast<int>(std::lround(std::log2(std::clamp(share, 1e-9, 1.0))));
-  if (clamp_ != clamp || level_ != level) {
+  share = std::clamp(share, 1e-9, 1.0);
+  if (clamp_ != clamp || share_ != share) {
     clamp_ = clamp;
-    level_ = level;
-    factorise(*clamp, std::exp2(level));
+    share_ = share;
+    factorise(*clamp, share);
   }
   const std::size_t n = order_.size();
   for (std::size_t i = 0; i < n; ++i) found_[i] = masses_[i] * (positions[order_[i]] - placed * rest[order_[i]]);

@@ -235,7 +235,8 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
       x[i] = scratch.previous[i];
     }
   if (model.clamp) {
-    const double part = h / longestSubstep(model, state);
+    // As stiff as ever, whatever the body's stretch and substep: springs that stiffen and soften in turns give energy.
+    const double part = h / (state.stretch * longestSubstep(model, state));
     scratch.clamp.hold(model.clamp, part > 0.0 ? part * part : 1.0, model.rest, state.placed, x);
   }
 }

@@ -7,6 +7,7 @@
 
 #include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/body/deform.h"
+#include "meshless_surgery/geometry/random_organ.h"
 #include "support/bodies.h"
 
 namespace meshless {
@@ -67,6 +68,36 @@ TEST(Clamp, HoldsWhatIsBelowAPlaneWhereverItIs) {
       EXPECT_GT(most, 1e-4);
       EXPECT_LT(std::sqrt(border / area), 0.01 * most) << normal.transpose() << " at " << at;
     }
+}
+
+// Stretched tissue has another highest frequency and takes other substeps, as it moves. What holds it gives it no
+// energy by that.
+TEST(Clamp, WhatHangsComesToRest) {
+  for (const int seed : {1, 2}) {
+    BodyDef def = test::defOf(*randomOrgan(static_cast<std::uint64_t>(seed), seed - 1, 0.1, 1000));
+    def.spacing = 0.01;
+    def.material.youngs_modulus = 2500.0;
+    def.material.poissons_ratio = 0.45;
+    def.material.damping = 10.0;
+    def.fixed = {{Region::below({Vec3(1, 0.3, 0.1).normalized(), Vec3(-0.02, 0, 0)}), false}};
+    const PreparedBody body = test::prepared(def);
+    for (double pull = 3.9; pull < 8.0; pull *= 1.06) {
+      SCOPED_TRACE("organ " + std::to_string(seed) + " at " + std::to_string(pull) + " m/s^2");
+      BodyState state = body.state;
+      StepScratch scratch;
+      MatchCounters counters;
+      for (int frame = 0; frame < 240; ++frame) {
+        const double substeps = substepsNeeded(*body.model, state, 1.0 / 120.0), h = 1.0 / (120.0 * substeps);
+        for (int k = 0; k < substeps; ++k) {
+          matchAndMove(*body.model, def.material, pull * Vec3(1.0, 0.0, -0.3), h, state, scratch, counters);
+          velocitiesFromPositions(h, state, scratch);
+        }
+      }
+      double fastest = 0.0;
+      for (const Vec3& v : state.velocities) fastest = std::max(fastest, v.norm());
+      EXPECT_LT(fastest, 1e-3);
+    }
+  }
 }
 
 // The body, its clamp and what pulls are turned: all that follows is turned, to rounding.

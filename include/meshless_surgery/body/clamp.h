@@ -38,10 +38,10 @@ struct Clamp {
 };
 
 /// Takes the springs' part of a step, implicitly: corners go where, by their masses and the springs, the least is
-/// missing. Kept between steps, since it factorises the system anew where the step has changed by more than half.
+/// missing. Kept between steps, since it factorises the system anew where the step has changed.
 class ClampStep {
  public:
-  /// `share`: the square of the step over the longest; the springs are as stiff in every step.
+  /// `share`: the square of the step over the longest at rest, so that the springs are as stiff in every step.
   void hold(const std::shared_ptr<const Clamp>& clamp, double share, const Points& rest, const Pose& placed,
             Points& positions);
   std::size_t bytes() const;
@@ -50,7 +50,7 @@ class ClampStep {
   void factorise(const Clamp& clamp, double share);
 
   std::shared_ptr<const Clamp> clamp_;
-  int level_ = 0;
+  double share_ = 0.0;
   // M + share sum of springs = P^T L L^T P; L by columns, the diagonal first.
   std::vector<Index> order_;  // of P: corners
   std::vector<double> masses_;
