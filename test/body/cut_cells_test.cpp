@@ -17,7 +17,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace cut_cells_test {
 
 using test::prepared;
 using test::Random;
@@ -308,5 +308,5 @@ TEST(CutCells, PiecesOfRandomOrgansWeighWhatTheirVolumesDo) {
   }
 }
 
-}  // namespace
+}  // namespace cut_cells_test
 }  // namespace meshless

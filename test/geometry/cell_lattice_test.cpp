@@ -8,7 +8,7 @@
 #include "support/shapes.h"
 
 namespace meshless {
-namespace {
+namespace cell_lattice_test {
 
 Result<CellLattice> divided(const TriangleMesh& mesh, double spacing) {
   return divideIntoCells(mesh, SolidQuery(mesh), spacing);
@@ -99,5 +99,5 @@ TEST(DivideIntoCells, RefusesWhatItCannotDivide) {
   }
 }
 
-}  // namespace
+}  // namespace cell_lattice_test
 }  // namespace meshless

@@ -13,7 +13,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace wounds_test {
 
 using Map = Eigen::Matrix<double, 3, 2>;
 
@@ -181,5 +181,5 @@ TEST(Wounds, AFineSurfaceHasHardlyAFoldAfterACut) {
   EXPECT_LE(folds, 16);
 }
 
-}  // namespace
+}  // namespace wounds_test
 }  // namespace meshless
