@@ -13,7 +13,7 @@
 namespace meshless::bench {
 namespace {
 
-constexpr int kSettling = 300, kMeasured = 20, kNext = 5;  // frames
+constexpr int kFalling = 300, kUsual = 20, kNext = 5;  // frames
 
 std::shared_ptr<const PreparedBody> prepared(const char* name, TriangleMesh mesh, double spacing, double height,
                                              double youngs_modulus) {
@@ -51,8 +51,8 @@ AfterCutTimes timeAfterCut(const AfterCut& of) {
   settings.threads = of.threads;
   World world(settings);
   if (!bed || !ball || !world.addSceneBody(bed).ok() || !world.addSceneBody(ball).ok()) return times;
-  for (int n = 0; n < kSettling; ++n) world.step();
-  const double before = medianStep(world, kMeasured);
+  for (int n = 0; n < kFalling; ++n) world.step();
+  const double before = medianStep(world, kUsual);
   CutCommand cut;
   cut.bodies = {"ball"};
   cut.blades.origin = Vec3(-10.0, of.upright ? 0.01 : 0.0, of.upright ? 0.1 : 0.17);

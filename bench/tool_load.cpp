@@ -14,9 +14,9 @@
 namespace meshless::bench {
 namespace {
 
-constexpr double kAtRest = 2e-4;       // of the largest displacement, in a time constant
-constexpr int kMostTimes = 80;         // time constants
-constexpr double kBlockEdge = 0.0125;  // [m] as a user's model of a block could have it
+constexpr double kPushedToRest = 2e-4;  // of the largest displacement, in a time constant
+constexpr int kMostPushed = 80;         // time constants
+constexpr double kBlockEdge = 0.0125;   // [m] as a user's model of a block could have it
 
 struct Placed {
   Points own;  // vertices as they were given, in the world
@@ -78,7 +78,7 @@ struct Rest {
   double step_ms = 0.0;
 };
 
-// Steps until nothing moves by more than kAtRest * largest within a time constant.
+// Steps until nothing moves by more than kPushedToRest * largest within a time constant.
 template <typename Measure>
 Rest untilAtRest(World& world, double rate, double largest, const Measure& measure) {
   Rest rest;
@@ -88,7 +88,7 @@ Rest untilAtRest(World& world, double rate, double largest, const Measure& measu
   rest.body = world.snapshot(wants).bodies[0];
   const auto start = std::chrono::steady_clock::now();
   int steps = 0;
-  for (; steps < kMostTimes * between && !rest.at_rest; steps += between) {
+  for (; steps < kMostPushed * between && !rest.at_rest; steps += between) {
     rest.force = 0.0;
     for (int step = 0; step < between; ++step) {
       world.step();
@@ -99,7 +99,7 @@ Rest untilAtRest(World& world, double rate, double largest, const Measure& measu
     double moving = 0.0;
     for (std::size_t i = 0; i < before.size(); ++i)
       moving = std::max(moving, (rest.body.particles[i] - before[i]).norm() / largest);
-    rest.at_rest = moving < kAtRest;
+    rest.at_rest = moving < kPushedToRest;
   }
   rest.step_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count() / steps;
   return rest;

@@ -88,7 +88,7 @@ buildPackage() {
 buildSanitized() {
   build "the core with sanitizers" "$output/sanitized" "${@:2}" -- -DMESHLESS_SURGERY_CORE_ONLY=ON \
     -DMESHLESS_SURGERY_SANITIZE=ON "-DMESHLESS_SURGERY_SANITIZE_ALL=$1" -DBUILD_TESTING=ON \
-    -DCMAKE_BUILD_TYPE=RelWithDebInfo "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -g1"
+    -DCMAKE_UNITY_BUILD=OFF -DCMAKE_BUILD_TYPE=RelWithDebInfo "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -g1"
 }
 
 # buildSanitizedNode: the node and the replay under the same two, in a folder that rostest can be run from.

@@ -26,13 +26,13 @@ Box boxOf(const Vec3& p, const Vec3& q) {
   return box;
 }
 
-constexpr int kPlaces = 16;  // along an edge
+constexpr int kSteps = 16;  // along an edge
 
 /// How deep any of the places between two ends is inside [m].
 double depthOf(const Vec3& p, const Vec3& q, const SolidQuery& solid) {
   double deepest = 0.0;
-  for (int n = 1; n < kPlaces; ++n) {
-    const Vec3 at = p + (q - p) * n / kPlaces;
+  for (int n = 1; n < kSteps; ++n) {
+    const Vec3 at = p + (q - p) * n / kSteps;
     if (solid.contains(at)) deepest = std::max(deepest, solid.distance(at));
   }
   return deepest;

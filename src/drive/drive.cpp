@@ -20,7 +20,7 @@
 namespace meshless {
 namespace {
 
-constexpr double kShortest = 5.0, kLongest = 20.0;  // [s] alone
+constexpr double kShortest = 5.0, kLongestAlone = 20.0;  // [s] alone
 constexpr double kDecays = 20.0;  // so many times the energy of what damps least falls to 1/e until then
 constexpr int kLooksASecond = 12;
 
@@ -46,7 +46,7 @@ class Run {
 
   Status setUp(const DriveScene& scene) {
     for (const BodyDef& def : scene.def.bodies) {
-      alone_for_ = std::clamp(kDecays / def.material.damping, alone_for_, kLongest);
+      alone_for_ = std::clamp(kDecays / def.material.damping, alone_for_, kLongestAlone);
       Result<PreparedBody> body = prepareBody(def);
       if (!body) return body.error();
       const auto added = world_.addSceneBody(std::make_shared<const PreparedBody>(std::move(*body)));

@@ -10,7 +10,7 @@
 namespace meshless {
 namespace {
 
-constexpr int kMostNumbered = 9;      // processes with autosaves of one name
+constexpr int kMostProcesses = 9;     // processes with autosaves of one name
 constexpr int kMostAside = 5;         // that are kept of one name
 constexpr int kMostTimesTakenUp = 3;  // without anything being written since
 constexpr std::size_t kLongestNode = 64, kKeptOfLong = 46;
@@ -89,7 +89,7 @@ Result<SavedWorldPtr> AutosaveFile::readState(const std::string& name, const std
 
 // A node that had to go on under another name, and was killed, finds its own there.
 bool AutosaveFile::findOwn(const std::string& origin) {
-  for (int number = 1; number <= kMostNumbered; ++number) {
+  for (int number = 1; number <= kMostProcesses; ++number) {
     if (!folder_.has(numbered(number))) continue;
     const Result<bool> taken = tryName(number);
     if (!taken.ok() || !*taken) continue;
@@ -117,7 +117,7 @@ Status AutosaveFile::takeName(std::chrono::milliseconds patience, const Say& say
   }
   if (taken.ok() && *taken) return Done{};
   const std::string why = taken.ok() ? holder() : taken.error().detail;
-  for (int number = 2; number <= kMostNumbered; ++number) {
+  for (int number = 2; number <= kMostProcesses; ++number) {
     const Result<bool> other = tryName(number);
     if (!other.ok() || !*other) continue;
     say(why + "; this node's autosave is " + name_);

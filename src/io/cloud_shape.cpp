@@ -29,8 +29,8 @@ constexpr double kLargest = 10.0;
 constexpr double kCells = 60.0;        // along the diagonal, where no voxel is given
 constexpr double kMostCells = 1000.0;  // along it, whatever is given: PCL counts cells in 32 bits
 constexpr int kNeighbours = 16;
-constexpr double kLink = 1.5;   // cell of a part, in distances to the 16th neighbour: parts are one to two cells apart
-constexpr double kPart = 0.05;  // of the largest part's points; groups with fewer are strays
+constexpr double kLink = 1.5;  // cell of a part, in distances to the 16th neighbour: parts are one to two cells apart
+constexpr double kLeastPart = 0.05;   // of the largest part's points; groups with fewer are strays
 constexpr std::size_t kAsked = 2000;  // points whose neighbours are looked up
 constexpr double kFar = 1e6;          // [m] from the middle: no unit of length makes that a body
 
@@ -101,7 +101,7 @@ Points withoutStrays(const Points& cloud, std::vector<std::string>& notes) {
     }
   std::vector<std::size_t> points_of(cells.size(), 0);
   for (const std::size_t c : cell_of) ++points_of[find(c)];
-  const double least = kPart * static_cast<double>(*std::max_element(points_of.begin(), points_of.end()));
+  const double least = kLeastPart * static_cast<double>(*std::max_element(points_of.begin(), points_of.end()));
   const auto isPart = [&](std::size_t n) { return static_cast<double>(n) >= least; };
   Points kept;
   for (std::size_t k = 0; k < near.size(); ++k)

@@ -17,10 +17,6 @@
 namespace meshless {
 namespace {
 
-Error unreadable(const std::string& name, const std::string& what) {
-  return {ErrorCode::kUnreadable, "'" + name + "' " + what};
-}
-
 Result<PromisedCounts> checkStl(const std::string& name, std::string_view text) {
   const std::uint64_t bytes = text.size();
   const bool whole_header = bytes >= 84;

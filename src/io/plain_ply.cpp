@@ -10,10 +10,6 @@
 namespace meshless {
 namespace {
 
-Error unreadable(const std::string& name, const std::string& what) {
-  return {ErrorCode::kUnreadable, "'" + name + "' " + what};
-}
-
 /// Bytes of a PLY type; 0 where there is none of this name.
 std::size_t plyBytes(const std::string& type) {
   for (const char* one : {"char", "uchar", "int8", "uint8"})

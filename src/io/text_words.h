@@ -11,6 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include "meshless_surgery/base/result.h"
+
 namespace meshless {
 
 constexpr std::size_t kMaxHeader = 1 << 16;  // bytes
@@ -83,6 +85,11 @@ inline std::string printable(std::string text) {
   for (char& c : text)
     if (!std::isprint(static_cast<unsigned char>(c))) c = '?';
   return text;
+}
+
+/// Of a file of this name.
+inline Error unreadable(const std::string& name, const std::string& what) {
+  return {ErrorCode::kUnreadable, "'" + name + "' " + what};
 }
 
 inline std::string lowerCase(std::string_view text) {

@@ -21,7 +21,7 @@ using meshless_surgery::CutFeedback;
 using meshless_surgery::InciseFeedback;
 using meshless_surgery::SpawnFeedback;
 using meshless_surgery::StepFeedback;
-using Clock = std::chrono::steady_clock;
+using SteadyClock = std::chrono::steady_clock;
 using Phase = Progress::Phase;
 
 constexpr std::size_t kMostGoals = 1000;  // of an action that are not done
@@ -176,7 +176,7 @@ class Server {
     all_done_.wait_for(lock, kLongestEnd, [this] { return open_.empty(); });
   }
 
-  std::optional<Clock::time_point> lastAnswer() const {
+  std::optional<SteadyClock::time_point> lastAnswer() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return last_answer_;
   }
@@ -189,7 +189,7 @@ class Server {
       const std::string many = std::to_string(open_.size()) + " goals are not done; accepted: up to " +
                                std::to_string(kMostGoals) + " at once";
       goal->answerUnlessBegun(ending_ ? "the node is shutting down" : many, true);
-      last_answer_ = Clock::now();
+      last_answer_ = SteadyClock::now();
       return;
     }
     open_[goal->id()] = goal;
@@ -222,7 +222,7 @@ class Server {
   }
 
   auto closed(typename std::map<std::string, OpenGoalPtr>::iterator open) {
-    last_answer_ = Clock::now();
+    last_answer_ = SteadyClock::now();
     const auto next = open_.erase(open);
     if (open_.empty()) all_done_.notify_all();
     return next;
@@ -234,7 +234,7 @@ class Server {
   mutable std::mutex mutex_;  // before that of a goal
   std::condition_variable all_done_;
   std::map<std::string, OpenGoalPtr> open_;  // by id
-  std::optional<Clock::time_point> last_answer_;
+  std::optional<SteadyClock::time_point> last_answer_;
   bool ending_ = false;
   actionlib::ActionServer<Action> server_;
 };

@@ -6,7 +6,7 @@
 namespace meshless {
 namespace {
 
-constexpr double kPoll = 1e-3;        // [s] between two looks at a source that may stand still
+constexpr double kLookAgain = 1e-3;   // [s] between two looks at a source that may stand still
 constexpr double kLongestBack = 1e3;  // [s]
 
 // ros::Duration throws beyond 68 years, and a clock may be set by more.
@@ -39,12 +39,12 @@ double Clock::now() const {
 ros::Time Clock::stampOf(double time) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   const double ahead = std::max(time - elapsed_, -kLongestBack);
-  return said_.toSec() + ahead > kPoll ? said_ + ros::Duration(ahead) : said_;  // there is no time below 0
+  return said_.toSec() + ahead > kLookAgain ? said_ + ros::Duration(ahead) : said_;  // there is no time below 0
 }
 
 double Clock::wallUntil(double due) const {
   const double wait = std::max(0.0, due - now());
-  return may_stand_ ? std::min(wait, kPoll) : wait;
+  return may_stand_ ? std::min(wait, kLookAgain) : wait;
 }
 
 }  // namespace meshless

@@ -11,7 +11,7 @@ namespace {
 using visualization_msgs::Marker;
 
 constexpr double kCentre = 0.3;           // diameter in particle spacings
-constexpr double kLine = 0.04;            // width in particle spacings
+constexpr double kClusterLine = 0.04;     // width in particle spacings
 constexpr double kGoldenTurn = 0.618034;  // of the hues: neighbours in the list differ
 
 std_msgs::ColorRGBA hue(Index number) {
@@ -35,7 +35,7 @@ visualization_msgs::MarkerArray clusterMarkers(const WorldSnapshot& snapshot, co
     Marker centres = newMarker(header, "centres", id, Marker::SPHERE_LIST);
     centres.scale.x = centres.scale.y = centres.scale.z = kCentre * body.model->spacing;
     Marker members = newMarker(header, "members", id, Marker::LINE_LIST);
-    members.scale.x = kLine * body.model->spacing;
+    members.scale.x = kClusterLine * body.model->spacing;
     for (Index c = 0; c < clusters.size(); ++c) {
       Vec3 centre = Vec3::Zero();
       double mass = 0.0;

@@ -9,7 +9,7 @@ namespace {
 
 using visualization_msgs::Marker;
 
-constexpr double kLine = 0.04;  // width in particle spacings
+constexpr double kEdgeLine = 0.04;  // width in particle spacings
 
 }  // namespace
 
@@ -19,7 +19,7 @@ visualization_msgs::MarkerArray collisionMarkers(const WorldSnapshot& snapshot, 
   for (const BodySnapshot& body : snapshot.bodies) {
     if (!body.model->collision) continue;
     Marker edges = newMarker(header, "collision", static_cast<int>(body.number), Marker::LINE_LIST);
-    edges.scale.x = kLine * body.model->spacing;
+    edges.scale.x = kEdgeLine * body.model->spacing;
     edges.color.r = edges.color.g = 1.0f;
     edges.color.a = 1.0f;
     const Points places = collisionShape(body);

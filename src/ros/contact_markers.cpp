@@ -10,8 +10,8 @@ namespace {
 
 using visualization_msgs::Marker;
 
-constexpr double kPoint = 0.25;  // diameter in particle spacings
-constexpr double kLine = 0.06;   // width in particle spacings
+constexpr double kPoint = 0.25;      // diameter in particle spacings
+constexpr double kForceLine = 0.06;  // width in particle spacings
 
 Marker markerOf(const std_msgs::Header& header, const std::string& ns, int type, double size) {
   Marker marker = newMarker(header, ns, 0, type);
@@ -31,7 +31,7 @@ visualization_msgs::MarkerArray contactMarkers(const WorldSnapshot& snapshot, co
   for (const ContactPoint& point : snapshot.contacts) most = std::max(most, point.force);
   if (snapshot.contacts.empty() || !(most > 0.0)) return array;
   Marker points = markerOf(header, "points", Marker::SPHERE_LIST, kPoint * spacing);
-  Marker forces = markerOf(header, "forces", Marker::LINE_LIST, kLine * spacing);
+  Marker forces = markerOf(header, "forces", Marker::LINE_LIST, kForceLine * spacing);
   for (const ContactPoint& point : snapshot.contacts) {
     points.points.push_back(toPoint(point.position));
     forces.points.push_back(toPoint(point.position));

@@ -11,6 +11,8 @@
 #include <OgreSceneNode.h>
 #include <OgreTechnique.h>
 
+#include "ogre_convert.h"
+
 namespace meshless {
 namespace {
 
@@ -22,10 +24,6 @@ constexpr double kSeenThrough = 0.6;  // opacity up to which what is inside of a
 constexpr std::uint32_t kNoPlace = std::numeric_limits<std::uint32_t>::max();
 
 Ogre::ColourValue toColour(const std_msgs::ColorRGBA& c) { return Ogre::ColourValue(c.r, c.g, c.b, c.a); }
-
-Ogre::Vector3 vertexOf(const meshless_surgery::Surface& surface, std::uint32_t v) {
-  return Ogre::Vector3(surface.vertices[3 * v], surface.vertices[3 * v + 1], surface.vertices[3 * v + 2]);
-}
 
 }  // namespace
 

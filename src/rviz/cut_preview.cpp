@@ -3,14 +3,10 @@
 #include <algorithm>
 #include <limits>
 
+#include "ogre_convert.h"
+
 namespace meshless {
 namespace {
-
-constexpr float kLineWidth = 0.0015f;  // [m]
-
-Ogre::Vector3 vertexOf(const meshless_surgery::Surface& surface, std::uint32_t v) {
-  return Ogre::Vector3(surface.vertices[3 * v], surface.vertices[3 * v + 1], surface.vertices[3 * v + 2]);
-}
 
 /// Keeps of from..to the shares [first, last] where low <= a + share * (b - a) <= high.
 void clip(double a, double b, double low, double high, double& first, double& last) {

@@ -9,6 +9,8 @@
 
 namespace meshless {
 
+constexpr float kLineWidth = 0.0015f;  // [m]
+
 /// The blades as in ~cut, in the frame of the surfaces.
 struct PreviewBlades {
   Ogre::Vector3 pivot = Ogre::Vector3::ZERO;

@@ -15,11 +15,9 @@
 namespace meshless {
 namespace {
 
-constexpr double kOpen = 0.5;         // [rad]
-constexpr double kInFront = 0.03;     // [m] of the pivot before the tissue: half of the node's default blades
-constexpr double kFirstYaw = 0.6;     // [rad] seen along themselves the blades would be two lines
-constexpr double kWheelStep = 0.005;  // [m] a notch
-constexpr double kNotch = 120.0;
+constexpr double kOpen = 0.5;      // [rad]
+constexpr double kInFront = 0.03;  // [m] of the pivot before the tissue: half of the node's default blades
+constexpr double kFirstYaw = 0.6;  // [rad] seen along themselves the blades would be two lines
 constexpr double kRadiansPerPixel = 0.008;
 constexpr double kRoll = 0.13;         // [rad] a notch
 constexpr double kDepthFactor = 1.15;  // a notch
@@ -27,8 +25,6 @@ constexpr double kShallowest = 0.001;  // [m]
 constexpr double kDeepest = 0.2;       // [m]
 constexpr double kShortest = 0.002;    // [m] of an incision; below it, the mouse only clicked
 constexpr double kMargin = 0.002;      // [m] of the scalpel above the tissue
-constexpr double kAfterStream = 0.15;  // [s] a message of the stream that comes after the lifting brings them back
-constexpr float kLineWidth = 0.0015f;  // [m]
 constexpr float kLineOver = 0.002f;    // [m] above the tissue
 
 Ogre::Quaternion firstTurn() {

@@ -23,6 +23,10 @@ class StringProperty;
 
 namespace meshless {
 
+constexpr double kWheelStep = 0.005;   // [m] a notch
+constexpr double kNotch = 120.0;       // Qt's unit of a notch
+constexpr double kAfterStream = 0.15;  // [s] a message of the stream that comes after a lifting brings the tool back
+
 class HandTool : public rviz::Tool {
   Q_OBJECT
 

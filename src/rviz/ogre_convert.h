@@ -6,12 +6,17 @@
 #include <geometry_msgs/Point.h>
 #include <geometry_msgs/Quaternion.h>
 #include <geometry_msgs/Vector3.h>
+#include <meshless_surgery/Surface.h>
 
 namespace meshless {
 
 inline Ogre::Vector3 toOgre(const geometry_msgs::Point& p) { return Ogre::Vector3(p.x, p.y, p.z); }
 inline Ogre::Vector3 toOgre(const geometry_msgs::Vector3& v) { return Ogre::Vector3(v.x, v.y, v.z); }
 inline Ogre::Quaternion toOgre(const geometry_msgs::Quaternion& q) { return Ogre::Quaternion(q.w, q.x, q.y, q.z); }
+
+inline Ogre::Vector3 vertexOf(const meshless_surgery::Surface& surface, std::uint32_t v) {
+  return Ogre::Vector3(surface.vertices[3 * v], surface.vertices[3 * v + 1], surface.vertices[3 * v + 2]);
+}
 
 inline geometry_msgs::Point toPoint(const Ogre::Vector3& v) {
   geometry_msgs::Point point;

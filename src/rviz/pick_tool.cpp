@@ -14,12 +14,10 @@
 namespace meshless {
 namespace {
 
-constexpr double kReach = 0.002;      // [m] beside the surface that still grabs
-constexpr double kWheelStep = 0.005;  // [m] a notch
-constexpr double kNotch = 120.0;      // Qt's unit of a notch
-constexpr double kSphere = 0.009;     // [m] diameter: a little more than the end of a spring in the markers
-constexpr double kNear = 14.0;        // [px] from the middle of a locked sphere
-constexpr double kSayAgain = 0.1;     // [s]
+constexpr double kReach = 0.002;   // [m] beside the surface that still grabs
+constexpr double kSphere = 0.009;  // [m] diameter: a little more than the end of a spring in the markers
+constexpr double kNear = 14.0;     // [px] from the middle of a locked sphere
+constexpr double kSayAgain = 0.1;  // [s]
 
 }  // namespace
 

@@ -13,14 +13,11 @@
 namespace meshless {
 namespace {
 
-constexpr double kWheelStep = 0.005;  // [m] a notch
-constexpr double kNotch = 120.0;
 constexpr double kRadiusFactor = 1.15;  // a notch
 constexpr double kSmallest = 0.002;     // [m]
 constexpr double kLargest = 0.2;        // [m]
 constexpr double kLeastFacing = 0.3;    // cosine between the tissue's normal and the view
 constexpr double kSpeed = 1.0;          // [m/s] where its size changes while it is solid
-constexpr double kAfterStream = 0.15;   // [s] a message of the stream that comes after the lifting brings it back
 
 }  // namespace
 

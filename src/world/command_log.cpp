@@ -4,14 +4,12 @@
 
 #include <istream>
 
-#include <zlib.h>
-
 #include "saved_world_impl.h"
 
 namespace meshless {
 namespace {
 
-constexpr std::uint32_t kVersion = 2;  // of the hashes in it, too
+constexpr std::uint32_t kLogVersion = 2;  // of the hashes in it, too
 constexpr std::size_t kRecordHeader = 8, kReadAtOnce = 1 << 20;
 // Of simulated time between records. World::step writes a hash every second, and nodes have always done so; a step more
 // is what their sums of steps have come to.
@@ -29,11 +27,6 @@ enum class RecordKind : std::uint8_t {
   kHash,
   kEnd
 };
-
-std::uint32_t checksum(std::string_view bytes) {
-  return static_cast<std::uint32_t>(
-      crc32_z(crc32_z(0, nullptr, 0), reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
-}
 
 }  // namespace
 
@@ -166,7 +159,7 @@ void World::record(RecordSink sink) {
   std::string head;
   OutArchive archive(head);
   archive.put(kCommandLogMagic.data(), kCommandLogMagic.size());
-  archive(kVersion);
+  archive(kLogVersion);
   w.record_sink(std::move(head));
   emit(w.record_sink, RecordKind::kStart, w.step, encode(*capture()));
 }
@@ -213,14 +206,14 @@ Result<ReplayReport> replay(std::istream& log, int threads, const std::function<
   WorldSettings settings;
   settings.threads = threads;
   World world(settings);
-  const std::string head = readUpTo(log, kCommandLogMagic.size() + sizeof kVersion);
-  if (head.size() < kCommandLogMagic.size() + sizeof kVersion ||
+  const std::string head = readUpTo(log, kCommandLogMagic.size() + sizeof kLogVersion);
+  if (head.size() < kCommandLogMagic.size() + sizeof kLogVersion ||
       std::string_view(head).substr(0, kCommandLogMagic.size()) != kCommandLogMagic)
     return damaged("it does not begin with " + std::string(kCommandLogMagic) + ", as logs do");
   std::uint32_t version = 0;
   std::memcpy(&version, head.data() + kCommandLogMagic.size(), sizeof version);
-  if (version != kVersion)
-    return damaged("it is of version " + std::to_string(version) + "; accepted: " + std::to_string(kVersion));
+  if (version != kLogVersion)
+    return damaged("it is of version " + std::to_string(version) + "; accepted: " + std::to_string(kLogVersion));
   bool started = false;
   for (std::uint64_t number = 0;; ++number) {
     const std::string header = readUpTo(log, kRecordHeader);

@@ -4,8 +4,6 @@
 
 #include <algorithm>
 
-#include <zlib.h>
-
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/cell_regions.h"
 #include "meshless_surgery/geometry/cut_lattice.h"
@@ -18,11 +16,6 @@ namespace {
 constexpr std::string_view kMagic = "MLSSTATE";
 constexpr std::uint32_t kVersion = 16;
 constexpr std::uint64_t kMostModels = 1u << 20;
-
-std::uint32_t checksum(std::string_view bytes) {
-  uLong sum = crc32_z(0, nullptr, 0);
-  return static_cast<std::uint32_t>(crc32_z(sum, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
-}
 
 /// What follows the magic, of at least kStateHeaderBytes.
 struct StateHeader {

@@ -2,12 +2,19 @@
 // that is added and not kept does not compile.
 #pragma once
 
+#include <zlib.h>
+
 #include "meshless_surgery/base/archive.h"
 #include "meshless_surgery/geometry/cell_regions.h"
 #include "meshless_surgery/world/saved_world.h"
 #include "world_impl.h"
 
 namespace meshless {
+
+inline std::uint32_t checksum(std::string_view bytes) {
+  return static_cast<std::uint32_t>(
+      crc32_z(crc32_z(0, nullptr, 0), reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
 
 struct SavedBody {
   BodyId id;

@@ -12,7 +12,8 @@ constexpr std::size_t kLanes = 64;           // side by side
 constexpr std::size_t kLeastBodies = 32;     // fewer are not worth going there and back
 constexpr std::size_t kMostParticles = 256;  // larger ones fill the lanes by themselves
 constexpr double kMostUneven = 1e4;  // longest over shortest axis of the rest shape, squared: float fits no more
-constexpr double kFarthest = 200.0;  // radii of its rest shape that a body may reach in float, or go in a substep
+constexpr double kFarthestInFloat =
+    200.0;  // radii of its rest shape that a body may reach in float, or go in a substep
 
 // One particle a hundred sizes away leaves nothing of the others in a moment of floats.
 bool fitsEvenly(const BodyModel& model) {
@@ -40,7 +41,7 @@ bool alike(const WorldBody& a, const WorldBody& b) {
 // What is drawn out or thrown apart without measure is left to double: rounding to float would make it spin, and it
 // would never be whole again. What becomes stiffer is of another stiffness in every substep.
 bool fitsFloat(const WorldBody& body, double h) {
-  const double most = kFarthest * body.model->shape.clusters[0].radius;
+  const double most = kFarthestInFloat * body.model->shape.clusters[0].radius;
   return body.state.stiffened == 1.0 && extentOf(body.state.positions).diagonal() <= most &&
          0.5 * h * extentOf(body.state.velocities).diagonal() <= most;
 }

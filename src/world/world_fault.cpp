@@ -6,7 +6,7 @@
 namespace meshless {
 namespace {
 
-constexpr double kFarthest = 1e12;  // [m]
+constexpr double kFarthestPlace = 1e12;  // [m]
 
 void restAnew(WorldBody& body) {
   const BodyModel& model = *body.model;
@@ -16,8 +16,8 @@ void restAnew(WorldBody& body) {
   for (const Vec3& p : model.rest) at_rest.extend(placed * p);
   Vec3 shift = Vec3::Zero();
   // Fixed particles are where they are at rest. Others stay about where they last were.
-  if (!model.any_fixed && body.bounds.min.cwiseAbs().maxCoeff() < kFarthest &&
-      body.bounds.max.cwiseAbs().maxCoeff() < kFarthest && !body.bounds.empty())
+  if (!model.any_fixed && body.bounds.min.cwiseAbs().maxCoeff() < kFarthestPlace &&
+      body.bounds.max.cwiseAbs().maxCoeff() < kFarthestPlace && !body.bounds.empty())
     shift = 0.5 * (body.bounds.min + body.bounds.max) - 0.5 * (at_rest.min + at_rest.max);
   for (std::size_t i = 0; i < model.rest.size(); ++i) state.positions[i] = placed * model.rest[i] + shift;
   state.velocities.assign(model.rest.size(), Vec3::Zero());
@@ -39,7 +39,7 @@ void restAnew(WorldBody& body) {
 void World::Impl::mendFaults() {
   faulty.assign(awake.size(), false);
   forNumbers(awake.size(), [this](std::size_t b) {
-    faulty[b] = !allWithin(awake[b]->state.positions, kFarthest);  // velocities are made of them
+    faulty[b] = !allWithin(awake[b]->state.positions, kFarthestPlace);  // velocities are made of them
   });
   bool any = false;
   for (std::size_t b = 0; b < awake.size(); ++b) {

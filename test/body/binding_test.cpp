@@ -5,7 +5,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace binding_test {
 
 Points moved(const Points& points, const Mat3& map, const Vec3& shift) {
   Points result;
@@ -167,5 +167,5 @@ TEST(BindSurface, WithoutEmbeddedVerticesThereIsNothingToFollow) {
   EXPECT_TRUE(body.model->binding.carriers.empty());
 }
 
-}  // namespace
+}  // namespace binding_test
 }  // namespace meshless

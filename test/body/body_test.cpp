@@ -8,7 +8,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace body_test {
 
 using test::defOf;
 using test::prepared;
@@ -219,5 +219,5 @@ TEST(WithMaterial, DensityScalesMassAndTheRestStays) {
   EXPECT_EQ(withMaterial(body.model, body.def.material, body.def.material), body.model);
 }
 
-}  // namespace
+}  // namespace body_test
 }  // namespace meshless

@@ -13,7 +13,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace cell_blend_test {
 
 PreparedBody block(double edge) {
   BodyDef def = test::defOf(boxMesh(Vec3(0.12, 0.08, 0.06), edge));
@@ -99,5 +99,5 @@ TEST(CellBlend, DoesNotReachAcrossAWound) {
   for (const Index i : above) EXPECT_EQ(below.count(i), 0u) << model.rest[i].transpose();
 }
 
-}  // namespace
+}  // namespace cell_blend_test
 }  // namespace meshless

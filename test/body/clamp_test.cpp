@@ -11,7 +11,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace clamp_test {
 
 BodyDef barHeldBelow(const Plane& plane) {
   BodyDef def = test::defOf(boxMesh(Vec3(0.08, 0.031, 0.027), 0.006));
@@ -164,5 +164,5 @@ TEST(Clamp, HoldsItsPieceAfterACut) {
   EXPECT_TRUE(held.clamp);
 }
 
-}  // namespace
+}  // namespace clamp_test
 }  // namespace meshless

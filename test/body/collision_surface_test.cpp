@@ -12,7 +12,7 @@
 #include "support/mesh_laws.h"
 
 namespace meshless {
-namespace {
+namespace collision_surface_test {
 
 BodyDef tissue(const TriangleMesh& mesh, double cells = 600.0) {
   BodyDef def = test::defOf(mesh);
@@ -174,5 +174,5 @@ TEST(CollisionSurface, IsIncisedByTheSameBlade) {
   }
 }
 
-}  // namespace
+}  // namespace collision_surface_test
 }  // namespace meshless

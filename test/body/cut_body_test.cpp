@@ -9,7 +9,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace cut_body_test {
 
 using test::prepared;
 using test::Random;
@@ -210,5 +210,5 @@ TEST(CutBody, AHundredCutsToCrumbsKeepMassVolumeAndParticles) {
   EXPECT_NEAR(volume, whole.model->rest_volume, 1e-9 * volume);
 }
 
-}  // namespace
+}  // namespace cut_body_test
 }  // namespace meshless

@@ -18,7 +18,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace cut_cells_test {
 
 using test::prepared;
 using test::Random;
@@ -357,5 +357,5 @@ TEST(CutCells, WhatASurfaceFollowsIsAsIfItWereMadeAnew) {
   }
 }
 
-}  // namespace
+}  // namespace cut_cells_test
 }  // namespace meshless

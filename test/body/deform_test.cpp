@@ -4,7 +4,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace deform_test {
 
 using test::prepared;
 using test::Random;
@@ -193,5 +193,5 @@ TEST(RigidMotionOf, FindsDriftAndSpin) {
   EXPECT_LT((motion.velocity - drift).norm(), 1e-9);
 }
 
-}  // namespace
+}  // namespace deform_test
 }  // namespace meshless

@@ -6,7 +6,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace ease_test {
 
 constexpr double kStep = 1.0 / 120;  // [s]
 
@@ -152,5 +152,5 @@ TEST(EaseRelease, ABodyAtRestHasNothingToEase) {
   for (const BodyPiece& piece : eased(body, false)) EXPECT_TRUE(piece.state.eased.empty());
 }
 
-}  // namespace
+}  // namespace ease_test
 }  // namespace meshless

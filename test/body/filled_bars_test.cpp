@@ -7,7 +7,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace filled_bars_test {
 
 constexpr double kCell = 0.01, kLength = 24 * kCell, kWidth = 2 * kCell, kHeight = 8 * kCell;
 constexpr double kYoungs = 1e4, kDensity = 1000.0;
@@ -107,5 +107,5 @@ TEST(FilledBars, ThinOnesBendAsBeamsDo) {
     EXPECT_NEAR(shaved(layers), 1.0, layers > 1.0 ? 0.06 : 0.12) << layers;
 }
 
-}  // namespace
+}  // namespace filled_bars_test
 }  // namespace meshless

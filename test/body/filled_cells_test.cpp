@@ -12,7 +12,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace filled_cells_test {
 
 using test::Random;
 
@@ -145,5 +145,5 @@ TEST(FilledCells, AClampHoldsTissueAlone) {
       << refused.error().detail;
 }
 
-}  // namespace
+}  // namespace filled_cells_test
 }  // namespace meshless

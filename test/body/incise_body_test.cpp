@@ -6,7 +6,7 @@
 #include "support/mesh_laws.h"
 
 namespace meshless {
-namespace {
+namespace incise_body_test {
 
 using test::prepared;
 
@@ -162,5 +162,5 @@ TEST(InciseBody, RefusesWhatDoesNotReachTheSurfaceAndShells) {
             ErrorCode::kUnsuitableShape);
 }
 
-}  // namespace
+}  // namespace incise_body_test
 }  // namespace meshless

@@ -10,7 +10,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace plastic_test {
 
 using test::prepared;
 using test::Random;
@@ -251,5 +251,5 @@ TEST(Flow, PiecesOfACutKeepTheirShape) {
   }
 }
 
-}  // namespace
+}  // namespace plastic_test
 }  // namespace meshless

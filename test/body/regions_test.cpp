@@ -9,7 +9,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace regions_test {
 
 Material tissue(const std::string& name, double youngs_modulus, double poissons_ratio, double density) {
   Material material;
@@ -190,5 +190,5 @@ TEST(Regions, ABarOfTwoHalvesHangsAsLongAsItShould) {
   }
 }
 
-}  // namespace
+}  // namespace regions_test
 }  // namespace meshless

@@ -9,7 +9,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace broad_phase_test {
 
 using Pairs = std::vector<std::array<Index, 2>>;
 
@@ -143,5 +143,5 @@ TEST(BroadPhase, ComparesFewWhereFewAreNear) {
   EXPECT_LT(broad.tested(), 1000u);
 }
 
-}  // namespace
+}  // namespace broad_phase_test
 }  // namespace meshless

@@ -9,7 +9,7 @@
 #include "meshless_surgery/geometry/primitives.h"
 
 namespace meshless {
-namespace {
+namespace feature_pairs_test {
 
 /// A surface whose vertices are particles, somewhere.
 struct Placed {
@@ -257,5 +257,5 @@ TEST(FeaturePairs, FacesWhoseCornersLieOnASphereHaveTheirChordToGo) {
   EXPECT_FALSE(pairs.empty());
 }
 
-}  // namespace
+}  // namespace feature_pairs_test
 }  // namespace meshless

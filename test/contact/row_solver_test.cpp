@@ -8,7 +8,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace row_solver_test {
 
 constexpr double kH = 0.01;
 
@@ -398,5 +398,5 @@ TEST(SurfaceContacts, WhatIsForgottenIsFoundAnewWithoutForces) {
   for (const ContactRow& row : rowsOf(contacts)) EXPECT_EQ(row.impulse, Vec3::Zero());
 }
 
-}  // namespace
+}  // namespace row_solver_test
 }  // namespace meshless

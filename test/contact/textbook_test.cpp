@@ -12,7 +12,7 @@
 #include "meshless_surgery/geometry/tetrahedralize.h"
 
 namespace meshless {
-namespace {
+namespace textbook_test {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -413,5 +413,5 @@ TEST(TextbookRows, AreNotMadeWithoutADirection) {
   EXPECT_TRUE(set.rows.empty());
 }
 
-}  // namespace
+}  // namespace textbook_test
 }  // namespace meshless

@@ -8,7 +8,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace clusters_test {
 
 // A lattice of nx x ny x nz points at distance 1; `linked` says which neighbours hold together.
 struct Lattice {
@@ -197,5 +197,5 @@ TEST(SplitClusters, SplittingAgainAndAgainDoesNotBreedClusters) {
   EXPECT_LE(rest.size(), 3u);
 }
 
-}  // namespace
+}  // namespace clusters_test
 }  // namespace meshless

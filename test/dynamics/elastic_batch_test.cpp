@@ -11,7 +11,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace elastic_batch_test {
 
 using test::Random;
 
@@ -393,5 +393,5 @@ TEST(ElasticBatch, RotationsGoInAndOutAsTheyAre) {
   for (std::size_t c = 0; c < poses.size(); ++c) EXPECT_EQ(poses[c].rotation.coeffs(), body.poses[c].rotation.coeffs());
 }
 
-}  // namespace
+}  // namespace elastic_batch_test
 }  // namespace meshless

@@ -11,7 +11,7 @@
 #include "support/cells.h"
 
 namespace meshless {
-namespace {
+namespace elastic_cells_test {
 
 using test::CellBody;
 using test::cutCells;
@@ -386,5 +386,5 @@ TEST(ElasticCells, InVectorsAreTheReference) {
   EXPECT_LT(ElasticBatch(cutCells(3, 2, 2, 1).cells).boxes(), 12u);
 }
 
-}  // namespace
+}  // namespace elastic_cells_test
 }  // namespace meshless

@@ -5,7 +5,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace elastic_test {
 
 // A block of nx x ny x nz cells of edge d, every particle with its share of the cells' masses.
 struct Lattice {
@@ -194,5 +194,5 @@ TEST(HighestFrequency, IsWhereAStepOfOneOverItIsStable) {
   }
 }
 
-}  // namespace
+}  // namespace elastic_test
 }  // namespace meshless

@@ -6,7 +6,7 @@
 #include <random>
 
 namespace meshless {
-namespace {
+namespace extent_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN(), kInfinite = std::numeric_limits<double>::infinity();
 
@@ -44,5 +44,5 @@ TEST(Extent, OneCoordinateBeyondIsSeenWhereverItIs) {
         }
 }
 
-}  // namespace
+}  // namespace extent_test
 }  // namespace meshless

@@ -11,7 +11,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace match_batch_test {
 
 using test::Random;
 
@@ -440,5 +440,5 @@ TEST(BodyBatch, FallsBackWhereTheRankIsMissing) {
   }
 }
 
-}  // namespace
+}  // namespace match_batch_test
 }  // namespace meshless

@@ -5,7 +5,7 @@
 #include <limits>
 
 namespace meshless {
-namespace {
+namespace material_test {
 
 TEST(Material, RefusesEachValueOutOfRangeByNameAndRange) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -41,5 +41,5 @@ TEST(StiffnessGain, IsAlphaAtTheReferenceStepBoundedAndOfOneStiffnessBelow) {
   EXPECT_EQ(stiffnessGain(1.0, 1e-3), 1.0);
 }
 
-}  // namespace
+}  // namespace material_test
 }  // namespace meshless

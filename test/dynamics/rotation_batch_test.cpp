@@ -14,7 +14,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace rotation_batch_test {
 
 using test::Random;
 
@@ -420,5 +420,5 @@ TEST(RotationBatch, AnEmptyBatchAndMissingOutputsAreFine) {
   EXPECT_FLOAT_EQ(quaternions[3], std::sqrt(0.5f));
 }
 
-}  // namespace
+}  // namespace rotation_batch_test
 }  // namespace meshless

@@ -7,7 +7,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace rotation_test {
 
 using test::Random;
 
@@ -99,5 +99,5 @@ TEST(NearestRotation, PlanarInvertedAndHostileInputGivesRotations) {
   }
 }
 
-}  // namespace
+}  // namespace rotation_test
 }  // namespace meshless

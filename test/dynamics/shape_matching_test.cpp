@@ -5,7 +5,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace shape_matching_test {
 
 using test::Random;
 
@@ -243,5 +243,5 @@ TEST(MatchShapes, WhatIsNotNeededIsNotFormed) {
   EXPECT_EQ(counters.quadratic_moments, 0u);
 }
 
-}  // namespace
+}  // namespace shape_matching_test
 }  // namespace meshless

@@ -9,7 +9,7 @@
 #include "support/shapes.h"
 
 namespace meshless {
-namespace {
+namespace cell_lattice_test {
 
 Result<CellLattice> divided(const TriangleMesh& mesh, double spacing) {
   return divideIntoCells(mesh, SolidQuery(mesh), spacing);
@@ -117,5 +117,5 @@ TEST(DivideIntoCells, RefusesWhatItCannotDivide) {
   }
 }
 
-}  // namespace
+}  // namespace cell_lattice_test
 }  // namespace meshless

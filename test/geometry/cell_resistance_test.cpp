@@ -8,7 +8,7 @@
 #include "meshless_surgery/geometry/primitives.h"
 
 namespace meshless {
-namespace {
+namespace cell_resistance_test {
 
 struct Moments {
   double volume = 0.0;
@@ -72,5 +72,5 @@ TEST(CellResistance, OfABallIsItsVolume) {
   }
 }
 
-}  // namespace
+}  // namespace cell_resistance_test
 }  // namespace meshless

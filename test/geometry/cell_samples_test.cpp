@@ -8,7 +8,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace cell_samples_test {
 
 SampleSet bitsOf(test::Random& random) {
   SampleSet bits = 0;
@@ -93,5 +93,5 @@ TEST(CellSamples, AConnectedPartIsWhatLinksReachOneByOne) {
   }
 }
 
-}  // namespace
+}  // namespace cell_samples_test
 }  // namespace meshless

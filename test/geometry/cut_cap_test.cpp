@@ -11,7 +11,7 @@
 #include "support/mesh_laws.h"
 
 namespace meshless {
-namespace {
+namespace cut_cap_test {
 
 constexpr std::uint32_t kCap = 7;
 
@@ -324,5 +324,5 @@ TEST(CutCap, InnerVerticesLieInThePlaneWithoutParents) {
   EXPECT_GT(inside, 200u);
 }
 
-}  // namespace
+}  // namespace cut_cap_test
 }  // namespace meshless

@@ -10,7 +10,7 @@
 #include "support/mesh_laws.h"
 
 namespace meshless {
-namespace {
+namespace cut_fuzz_test {
 
 long numberFrom(const char* variable, long fallback) {
   const char* text = std::getenv(variable);
@@ -129,5 +129,5 @@ TEST_F(CutFuzz, TouchingAndCrossingSolids) {
   EXPECT_LE(refused_, 0.05 * static_cast<double>(cuts_ / 8));
 }
 
-}  // namespace
+}  // namespace cut_fuzz_test
 }  // namespace meshless

@@ -10,7 +10,7 @@
 #include "support/shapes.h"
 
 namespace meshless {
-namespace {
+namespace cut_lattice_test {
 
 using test::Random;
 
@@ -245,5 +245,5 @@ TEST(CutLattice, ABladeBesideTheSolidChangesNothing) {
   for (const bool changed : cut.changed) EXPECT_FALSE(changed);
 }
 
-}  // namespace
+}  // namespace cut_lattice_test
 }  // namespace meshless

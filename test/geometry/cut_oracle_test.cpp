@@ -13,7 +13,7 @@
 #include "support/mesh_laws.h"
 
 namespace meshless {
-namespace {
+namespace cut_oracle_test {
 
 namespace pmp = CGAL::Polygon_mesh_processing;
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
@@ -138,5 +138,5 @@ TEST(CutOracle, RoughPiecesAreClosedAndDoNotCrossThemselves) {
   std::printf("%d rough vertices in %d cuts, %d of them without any faces that touch\n", rough, cuts, clean);
 }
 
-}  // namespace
+}  // namespace cut_oracle_test
 }  // namespace meshless

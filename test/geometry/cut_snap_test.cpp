@@ -11,7 +11,7 @@
 #include "support/mesh_laws.h"
 
 namespace meshless {
-namespace {
+namespace cut_snap_test {
 
 CutOptions snapping(double within) {
   CutOptions options;
@@ -160,5 +160,5 @@ TEST(CutSnap, ASliceThatIsThinnerThanItsReachIsCutAllTheSame) {
   }
 }
 
-}  // namespace
+}  // namespace cut_snap_test
 }  // namespace meshless

@@ -10,7 +10,7 @@
 #include "support/mesh_laws.h"
 
 namespace meshless {
-namespace {
+namespace cut_test {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
@@ -455,5 +455,5 @@ TEST(Cut, APlateOfOneLayerIsCutThroughItsGrid) {
   }
 }
 
-}  // namespace
+}  // namespace cut_test
 }  // namespace meshless

@@ -15,7 +15,7 @@
 #include "support/shapes.h"
 
 namespace meshless {
-namespace {
+namespace even_surface_test {
 
 constexpr std::size_t kMost = 200000;
 
@@ -180,5 +180,5 @@ TEST(EvenSurface, WhatIsFinerThanTheEdgeIsDoneWithHalfOfItOrRefused) {
   EXPECT_NEAR(signedVolume(fine->mesh), signedVolume(thin), 0.05 * signedVolume(thin));
 }
 
-}  // namespace
+}  // namespace even_surface_test
 }  // namespace meshless

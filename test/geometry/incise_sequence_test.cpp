@@ -8,7 +8,7 @@
 #include "geometry/incise_laws.h"
 
 namespace meshless {
-namespace {
+namespace incise_sequence_test {
 
 struct Tally {
   int sequences = 0, blades = 0, opened = 0, missed = 0, refused = 0, apart = 0;
@@ -259,5 +259,5 @@ TEST(InciseSequences, Torus) { expectFewRefused(runSequences(torusMesh(0.1, 0.03
 TEST(InciseSequences, ThinSlab) { expectFewRefused(runSequences(boxMesh(Vec3(0.2, 0.2, 0.004), 0.02), 100, 40000)); }
 TEST(InciseSequences, Liver) { expectFewRefused(runSequences(liverMesh(), 150, 50000)); }
 
-}  // namespace
+}  // namespace incise_sequence_test
 }  // namespace meshless

@@ -7,7 +7,7 @@
 #include "geometry/incise_laws.h"
 
 namespace meshless {
-namespace {
+namespace incise_test {
 
 using shapes::bladeAt;
 
@@ -384,5 +384,5 @@ TEST(Incise, RealLiver) {
   EXPECT_GE(opened, 30) << missed << " missed, " << refused << " refused";
 }
 
-}  // namespace
+}  // namespace incise_test
 }  // namespace meshless

@@ -10,7 +10,7 @@
 #include "support/shapes.h"
 
 namespace meshless {
-namespace {
+namespace inside_test {
 
 Points randomPoints(const Box& box, std::size_t count, unsigned seed) {
   std::mt19937 random(seed);
@@ -176,5 +176,5 @@ TEST(Inside, RealLiverThatCrossesItselfHasASensibleInside) {
     EXPECT_EQ(query.contains(p), windingNumber(liver, p) > 0.5);
 }
 
-}  // namespace
+}  // namespace inside_test
 }  // namespace meshless

@@ -6,7 +6,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace main_axes_test {
 
 // The same directions, in any order and with any sign.
 double off(const Mat3& axes, const Mat3& wanted) {
@@ -33,5 +33,5 @@ TEST(MainAxes, WhatLiesAlongItsOwnAxesKeepsThemToTheBit) {
   EXPECT_EQ(mainAxes(sphereMesh(0.1, 0.02)), Mat3(Mat3::Identity()));
 }
 
-}  // namespace
+}  // namespace main_axes_test
 }  // namespace meshless

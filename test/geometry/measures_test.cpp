@@ -6,7 +6,7 @@
 #include "support/shapes.h"
 
 namespace meshless {
-namespace {
+namespace measures_test {
 
 TEST(Measures, OfABoxAreThoseOfTheFormula) {
   const TriangleMesh box = boxMesh(Vec3(0.2, 0.3, 0.5), 3, 4, 5);
@@ -40,5 +40,5 @@ TEST(Measures, MoveTurnAndScaleWithTheShape) {
   }
 }
 
-}  // namespace
+}  // namespace measures_test
 }  // namespace meshless

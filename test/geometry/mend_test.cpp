@@ -7,7 +7,7 @@
 #include "support/shapes.h"
 
 namespace meshless {
-namespace {
+namespace mend_test {
 
 constexpr MeshRepair kAll[] = {MeshRepair::kNone, MeshRepair::kMend, MeshRepair::kWrap};
 
@@ -231,5 +231,5 @@ TEST(Mend, ScaleChangesNothing) {
   }
 }
 
-}  // namespace
+}  // namespace mend_test
 }  // namespace meshless

@@ -10,7 +10,7 @@
 #include "support/shapes.h"
 
 namespace meshless {
-namespace {
+namespace mesh_check_test {
 
 bool says(const RepairedMesh& mesh, const std::string& part) {
   return std::any_of(mesh.notes.begin(), mesh.notes.end(),
@@ -351,5 +351,5 @@ TEST(MeshCheck, RealMeshes) {
   EXPECT_TRUE(embedded->notes.empty()) << notes(*embedded);
 }
 
-}  // namespace
+}  // namespace mesh_check_test
 }  // namespace meshless

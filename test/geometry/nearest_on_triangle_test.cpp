@@ -5,7 +5,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace nearest_on_triangle_test {
 
 TEST(NearestOnTriangle, NoSampleOfTheTriangleIsNearer) {
   test::Random random(7);
@@ -35,5 +35,5 @@ TEST(NearestOnTriangle, APointOnItIsItself) {
   EXPECT_EQ(nearestWeights(a, a, a, a), Vec3(1, 0, 0));
 }
 
-}  // namespace
+}  // namespace nearest_on_triangle_test
 }  // namespace meshless

@@ -7,7 +7,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace nearest_test {
 
 TEST(NearestPoints, AgreeWithLookingAtEveryPoint) {
   test::Random random(1);
@@ -44,5 +44,5 @@ TEST(NearestPoints, OfNothingAreNone) {
   EXPECT_TRUE(nearest.within(Vec3::Zero(), 1.0).empty());
 }
 
-}  // namespace
+}  // namespace nearest_test
 }  // namespace meshless

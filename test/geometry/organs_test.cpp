@@ -13,7 +13,7 @@
 #include "support/shapes.h"
 
 namespace meshless {
-namespace {
+namespace organs_test {
 
 std::vector<shapes::Shape> organs(unsigned seed) {
   return {{"liver", liverMesh(seed)}, {"kidney", kidneyMesh(seed)}, {"fish", fishMesh(seed)}};
@@ -211,5 +211,5 @@ TEST(Organs, ShippedMeshesAreTheGenerators) {
   }
 }
 
-}  // namespace
+}  // namespace organs_test
 }  // namespace meshless

@@ -10,7 +10,7 @@
 #include "support/shapes.h"
 
 namespace meshless {
-namespace {
+namespace primitives_test {
 
 constexpr double kPi = 3.14159265358979323846;
 
@@ -113,5 +113,5 @@ TEST(Primitives, NothingForSizesThatAreNotPositive) {
   EXPECT_TRUE(torusMesh(0.1, 0.1, 0.02).empty());
 }
 
-}  // namespace
+}  // namespace primitives_test
 }  // namespace meshless

@@ -7,7 +7,7 @@
 #include "meshless_surgery/geometry/primitives.h"
 
 namespace meshless {
-namespace {
+namespace random_organ_test {
 
 void expectWhatWasAskedFor(std::uint64_t first_seed, std::uint64_t last_seed,
                            const std::vector<std::size_t>& all_triangles) {
@@ -58,5 +58,5 @@ TEST(GenusOf, KnowsBallsAndRings) {
   EXPECT_EQ(genusOf(torusMesh(0.1, 0.03, 0.02)), 1);
 }
 
-}  // namespace
+}  // namespace random_organ_test
 }  // namespace meshless

@@ -7,7 +7,7 @@
 #include "meshless_surgery/geometry/primitives.h"
 
 namespace meshless {
-namespace {
+namespace refine_test {
 
 double longestEdge(const TriangleMesh& mesh) {
   double longest = 0.0;
@@ -50,5 +50,5 @@ TEST(Refine, WhatIsFineStaysAsItIs) {
   EXPECT_EQ(same.triangles, mesh.triangles);
 }
 
-}  // namespace
+}  // namespace refine_test
 }  // namespace meshless

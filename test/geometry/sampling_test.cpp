@@ -9,7 +9,7 @@
 #include "support/shapes.h"
 
 namespace meshless {
-namespace {
+namespace sampling_test {
 
 TEST(Sampling, EveryPointIsInsideAndClear) {
   for (const auto& [name, mesh] : shapes::allShapes()) {
@@ -85,5 +85,5 @@ TEST(Sampling, NothingForASpacingThatIsNotPositive) {
   EXPECT_TRUE(sampleInterior(box, query, 0.1, 0.0, 0).points.empty());
 }
 
-}  // namespace
+}  // namespace sampling_test
 }  // namespace meshless

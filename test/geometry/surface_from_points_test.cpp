@@ -21,7 +21,7 @@
 #include "support/shapes.h"
 
 namespace meshless {
-namespace {
+namespace surface_from_points_test {
 
 /// `count` points, evenly likely over the area.
 Points sampled(const TriangleMesh& mesh, std::size_t count, unsigned seed) {
@@ -349,5 +349,5 @@ TEST(SurfaceFromPoints, RealMeshes) {
   }
 }
 
-}  // namespace
+}  // namespace surface_from_points_test
 }  // namespace meshless

@@ -15,7 +15,7 @@
 #include "support/shapes.h"
 
 namespace meshless {
-namespace {
+namespace tetrahedralize_test {
 
 double volumeOf(const Points& points, const Tetrahedron& t) {
   const Vec3& a = points[t[0]];
@@ -162,5 +162,5 @@ TEST(Tetrahedralize, TheSamePointsGiveTheSameOrder) {
   EXPECT_TRUE(std::is_sorted(first.begin(), first.end()));
 }
 
-}  // namespace
+}  // namespace tetrahedralize_test
 }  // namespace meshless

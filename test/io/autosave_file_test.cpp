@@ -20,7 +20,7 @@
 #include "support/forged.h"
 
 namespace meshless {
-namespace {
+namespace autosave_file_test {
 
 namespace fs = std::filesystem;
 using std::chrono::milliseconds;
@@ -303,5 +303,5 @@ TEST_F(AutosaveFileTest, AFolderThatCannotBe) {
   }
 }
 
-}  // namespace
+}  // namespace autosave_file_test
 }  // namespace meshless

@@ -10,7 +10,7 @@
 #include "meshless_surgery/geometry/primitives.h"
 
 namespace meshless {
-namespace {
+namespace cloud_shape_test {
 
 /// What a noisy sensor sees of a sphere of 0.1 m: `stray` points are anywhere in a box of 0.4 m.
 Points seen(std::size_t count, std::size_t stray, const Vec3& centre = Vec3::Zero()) {
@@ -127,5 +127,5 @@ TEST(CloudShape, OtherUnitsAndOddValuesAreRefused) {
   expectRefused(flat, {}, ErrorCode::kUnsuitableShape, "points that are left");
 }
 
-}  // namespace
+}  // namespace cloud_shape_test
 }  // namespace meshless

@@ -17,7 +17,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace files_test {
 
 namespace fs = std::filesystem;
 
@@ -885,5 +885,5 @@ TEST_F(Access, NamesThatAreNoPathsAreRefused) {
   EXPECT_EQ(refusal(inside), ErrorCode::kForbidden);
 }
 
-}  // namespace
+}  // namespace files_test
 }  // namespace meshless

@@ -18,7 +18,7 @@
 #include "meshless_surgery/io/scene.h"
 
 namespace meshless {
-namespace {
+namespace hostile_files_test {
 
 namespace fs = std::filesystem;
 
@@ -383,5 +383,5 @@ TEST(LargeFiles, DataThatPromisesMoreThanItHolds) {
   }
 }
 
-}  // namespace
+}  // namespace hostile_files_test
 }  // namespace meshless

@@ -15,7 +15,7 @@
 #include "meshless_surgery/io/scene.h"
 
 namespace meshless {
-namespace {
+namespace scene_keys_test {
 
 template <class... Values>
 std::string text(const Values&... values) {
@@ -324,5 +324,5 @@ TEST_F(SceneKeys, EachMapThatTheParserReadsHasRows) {
   EXPECT_EQ(read, tried);
 }
 
-}  // namespace
+}  // namespace scene_keys_test
 }  // namespace meshless

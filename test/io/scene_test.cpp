@@ -14,7 +14,7 @@
 #include "meshless_surgery/geometry/sampling.h"
 
 namespace meshless {
-namespace {
+namespace scene_test {
 
 bool says(const Error& error, const std::string& words) { return error.detail.find(words) != std::string::npos; }
 
@@ -472,5 +472,5 @@ TEST_F(Shipped, ThePileStartsWithoutOverlap) {
   }
 }
 
-}  // namespace
+}  // namespace scene_test
 }  // namespace meshless

@@ -9,7 +9,7 @@
 #include "meshless_surgery/world/world.h"
 
 namespace meshless {
-namespace {
+namespace scene_work_test {
 
 constexpr int kSteps = 90;
 
@@ -116,5 +116,5 @@ TEST(SceneWork, EachShippedSceneDoesWhatItUsesAndNothingElse) {
   }
 }
 
-}  // namespace
+}  // namespace scene_work_test
 }  // namespace meshless

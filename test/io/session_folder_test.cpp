@@ -15,7 +15,7 @@
 #include "io/temporary_folder.h"
 
 namespace meshless {
-namespace {
+namespace session_folder_test {
 
 namespace fs = std::filesystem;
 
@@ -198,5 +198,5 @@ TEST_F(SessionFolderTest, NewFilesNeverReplaceOldOnes) {
   }
 }
 
-}  // namespace
+}  // namespace session_folder_test
 }  // namespace meshless

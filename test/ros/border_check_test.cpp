@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 namespace meshless {
-namespace {
+namespace border_check_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
@@ -139,5 +139,5 @@ TEST(Printable, IsUtf8WhateverComes) {
   EXPECT_EQ("aa\xe2\x82\xac", printable("aa\xe2\x82\xac", 5));
 }
 
-}  // namespace
+}  // namespace border_check_test
 }  // namespace meshless

@@ -5,7 +5,7 @@
 #include "ros/hand_clock.h"
 
 namespace meshless {
-namespace {
+namespace clock_test {
 
 TEST(Clock, CountsFromTheFirstTimeThatWasTold) {
   HandClock hand;
@@ -58,5 +58,5 @@ TEST(Clock, OneThatMayStandIsLookedAtOften) {
   EXPECT_GT(wallClock().wallUntil(wallClock().now() + 100.0), 90.0);
 }
 
-}  // namespace
+}  // namespace clock_test
 }  // namespace meshless

@@ -5,7 +5,7 @@
 #include "ros/scene_support.h"
 
 namespace meshless {
-namespace {
+namespace convert_test {
 
 std_msgs::Header header() {
   std_msgs::Header h;
@@ -117,5 +117,5 @@ TEST(Convert, AMeshKeepsItsVerticesAndTheirOrder) {
     for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(box.triangles[t][k], mesh.triangles[t].vertex_indices[k]);
 }
 
-}  // namespace
+}  // namespace convert_test
 }  // namespace meshless

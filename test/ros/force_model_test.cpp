@@ -8,7 +8,7 @@
 #include "ros/scene_support.h"
 
 namespace meshless {
-namespace {
+namespace force_model_test {
 
 constexpr double kStep = 1.0 / 120.0;    // [s]
 constexpr double kTick = 1.0 / 500.0;    // [s]
@@ -271,5 +271,5 @@ TEST(ForceModel, TheSumOverAPressIsTheChangeOfMomentum) {
   }
 }
 
-}  // namespace
+}  // namespace force_model_test
 }  // namespace meshless

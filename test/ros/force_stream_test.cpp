@@ -4,7 +4,7 @@
 #include "support/falls_short.h"
 
 namespace meshless {
-namespace {
+namespace force_stream_test {
 
 constexpr std::size_t kPick = 0, kPush = 1;
 constexpr double kRates[] = {120.0, 30.0};  // [Hz] of steps
@@ -158,5 +158,5 @@ TEST(ForceStream, ACoarseClockMakesNoHoles) {
   for (int i = 0; i < 100; ++i) EXPECT_FALSE(stream.next(1.0, {}));
 }
 
-}  // namespace
+}  // namespace force_stream_test
 }  // namespace meshless

@@ -8,7 +8,7 @@
 #include "meshless_surgery/base/types.h"
 
 namespace meshless {
-namespace {
+namespace hole_bridge_test {
 
 constexpr double kTick = 0.002;  // [s]
 
@@ -80,5 +80,5 @@ TEST(HoleBridge, WhatOnlyPushesDoesNotPull) {
   EXPECT_EQ(bridge.across(0.26, Vec3::Zero()), Vec3::Zero()) << "exactly zero again";
 }
 
-}  // namespace
+}  // namespace hole_bridge_test
 }  // namespace meshless

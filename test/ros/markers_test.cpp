@@ -6,7 +6,7 @@
 #include "ros/scene_support.h"
 
 namespace meshless {
-namespace {
+namespace markers_test {
 
 using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
@@ -165,5 +165,5 @@ TEST(Markers, ToolsComeAndGo) {
   EXPECT_EQ((std::set<int>{2}), ids(Marker::ADD));
 }
 
-}  // namespace
+}  // namespace markers_test
 }  // namespace meshless

@@ -3,7 +3,7 @@
 #include "ros/scene_support.h"
 
 namespace meshless {
-namespace {
+namespace moving_surfaces_test {
 
 WorldSnapshot shown(World& world) {
   SnapshotWants wants;
@@ -112,5 +112,5 @@ TEST(MovingSurfaces, BodiesThatDoNotMoveAreLeftOutUnlessAllAreAskedFor) {
   EXPECT_EQ(3u, cut.bodies.size());
 }
 
-}  // namespace
+}  // namespace moving_surfaces_test
 }  // namespace meshless

@@ -7,7 +7,7 @@
 #include "ros/scene_support.h"
 
 namespace meshless {
-namespace {
+namespace runner_test {
 
 RunnerSettings pausedAtStart() {
   RunnerSettings settings;
@@ -388,5 +388,5 @@ TEST(Runner, StepsThatTakeLongerThanTheySimulateAreReported) {
   EXPECT_TRUE(said);
 }
 
-}  // namespace
+}  // namespace runner_test
 }  // namespace meshless

@@ -3,7 +3,7 @@
 #include "ros/tool_bench.h"
 
 namespace meshless {
-namespace {
+namespace streamed_tools_test {
 
 constexpr double kSpeed = 0.5;  // [m/s]
 constexpr std::size_t kPick = 0, kPush = 1, kScissors = 2;
@@ -385,5 +385,5 @@ TEST(StreamedTools, CommandsThatDoNotFitAreRefusedWithThoseThatDo) {
   EXPECT_EQ("", refusal("home"));
 }
 
-}  // namespace
+}  // namespace streamed_tools_test
 }  // namespace meshless

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace meshless {
-namespace {
+namespace tool_motion_test {
 
 Pose at(double x, double angle = 0.0) {
   Pose pose;
@@ -104,5 +104,5 @@ TEST(ToolMotion, WithoutALimitItMayBeSilent) {
   EXPECT_EQ(silentAt(motion, 0.0, 1000.0), 1000.0);
 }
 
-}  // namespace
+}  // namespace tool_motion_test
 }  // namespace meshless

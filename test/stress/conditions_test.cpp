@@ -5,7 +5,7 @@
 #include "support/stress_cases.h"
 
 namespace meshless::stress {
-namespace {
+namespace conditions_test {
 
 constexpr double kRestored = 1e-3;  // of the size
 
@@ -147,5 +147,5 @@ TEST_P(Conditions, LetGoGoesBack) {
 INSTANTIATE_TEST_SUITE_P(Stress, Conditions, testing::ValuesIn(crossed(allKinds(), allConditions())),
                          crossedName<Condition>);
 
-}  // namespace
+}  // namespace conditions_test
 }  // namespace meshless::stress

@@ -6,7 +6,7 @@
 #include "fuzz/targets.h"
 
 namespace meshless {
-namespace {
+namespace fuzz_corpus_test {
 
 using Target = void (*)(const std::uint8_t*, std::size_t);
 
@@ -28,5 +28,5 @@ TEST(FuzzCorpus, MeshFiles) { EXPECT_GE(replay("mesh_file", fuzz::meshFile), 5u)
 TEST(FuzzCorpus, SceneFiles) { EXPECT_GE(replay("scene_file", fuzz::sceneFile), 3u); }
 TEST(FuzzCorpus, Cuts) { EXPECT_GE(replay("cut_plane", fuzz::cutPlane), 3u); }
 
-}  // namespace
+}  // namespace fuzz_corpus_test
 }  // namespace meshless

@@ -5,7 +5,7 @@
 #include "support/stress.h"
 
 namespace meshless::stress {
-namespace {
+namespace heap_test {
 
 constexpr int kBars = 40;
 constexpr double kStep = 1.0 / 120.0;  // [s]
@@ -60,5 +60,5 @@ TEST(Heap, OfFastBarsIsQueriedByVertices) {
   if (resting == 60) EXPECT_LT(energy, 0.5 * first);
 }
 
-}  // namespace
+}  // namespace heap_test
 }  // namespace meshless::stress

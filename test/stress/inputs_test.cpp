@@ -5,7 +5,7 @@
 #include "support/stress_cases.h"
 
 namespace meshless::stress {
-namespace {
+namespace inputs_test {
 
 constexpr double kRestored = 1e-3;  // of the size
 constexpr double kBodyStep = 0.3;   // [m] between bodies of a batch
@@ -257,5 +257,5 @@ TEST_P(Inputs, AreSurvived) {
 
 INSTANTIATE_TEST_SUITE_P(Stress, Inputs, testing::ValuesIn(crossed(allKinds(), allInputs())), crossedName<Input>);
 
-}  // namespace
+}  // namespace inputs_test
 }  // namespace meshless::stress

@@ -4,7 +4,7 @@
 #include "support/stress.h"
 
 namespace meshless::stress {
-namespace {
+namespace jump_test {
 
 struct Fastest {
   double held = 0.0;      // the patch that the pick holds, over the speed of the jump within a step
@@ -58,5 +58,5 @@ TEST(Jump, IsFollowedEvenlyOverTheStep) {
   }
 }
 
-}  // namespace
+}  // namespace jump_test
 }  // namespace meshless::stress

@@ -5,7 +5,7 @@
 #include "support/stress.h"
 
 namespace meshless::stress {
-namespace {
+namespace many_cuts_test {
 
 /// Through the middle of the largest body, and through that alone.
 CutCommand cutLargest(World& world, test::Random& random) {
@@ -158,5 +158,5 @@ TEST(ManyCuts, SixtyIncisionsOfABodyThatMeetsItself) {
   inciseOneBody(std::max(20, static_cast<int>(60.0 * std::min(1.0, share()))), ContactMethod::kSurface);
 }
 
-}  // namespace
+}  // namespace many_cuts_test
 }  // namespace meshless::stress

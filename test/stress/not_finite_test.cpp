@@ -4,7 +4,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace not_finite_test {
 
 struct Broken {
   const char* name;
@@ -50,5 +50,5 @@ TEST(NotFinite, ABodyStartsAnewAndOthersAreLeftAlone) {
       for (const bool elastic : {true, false}) breakAndStep(broken, velocity, elastic);
 }
 
-}  // namespace
+}  // namespace not_finite_test
 }  // namespace meshless

@@ -5,7 +5,7 @@
 #include "support/stress_cases.h"
 
 namespace meshless::stress {
-namespace {
+namespace odd_clouds_test {
 
 constexpr double kSize = 0.1;       // [m] of a cloud
 constexpr double kRestored = 1e-3;  // of the size
@@ -197,5 +197,5 @@ TEST_P(OddClouds, FallAndComeToRest) {
 
 INSTANTIATE_TEST_SUITE_P(Stress, OddClouds, testing::ValuesIn(crossed(cloudKinds(), allClouds())), crossedName<Cloud>);
 
-}  // namespace
+}  // namespace odd_clouds_test
 }  // namespace meshless::stress

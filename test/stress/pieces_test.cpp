@@ -5,7 +5,7 @@
 #include "support/stress_cases.h"
 
 namespace meshless::stress {
-namespace {
+namespace pieces_test {
 
 constexpr double kEdge = 0.1;               // [m]
 constexpr double kRestored = 1e-3 * kEdge;  // [m]
@@ -116,5 +116,5 @@ INSTANTIATE_TEST_SUITE_P(Stress, Pieces, testing::ValuesIn(crossed(kindsAlone(),
                                            std::to_string(std::get<1>(info.param)));
                          });
 
-}  // namespace
+}  // namespace pieces_test
 }  // namespace meshless::stress

@@ -6,7 +6,7 @@
 #include "support/stress_cases.h"
 
 namespace meshless::stress {
-namespace {
+namespace random_commands_test {
 
 int firstRun() {
   const char* text = std::getenv("MESHLESS_SURGERY_STRESS_RUN");
@@ -167,5 +167,5 @@ TEST(RandomCommands, ThatFailedOnceAreSurvived) {
   for (const int run : {179, 201, 682, 1263, 1297, 1501}) surviveWithContact(scene, run, kRun);
 }
 
-}  // namespace
+}  // namespace random_commands_test
 }  // namespace meshless::stress

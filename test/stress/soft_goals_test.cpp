@@ -5,7 +5,7 @@
 #include "support/stress_cases.h"
 
 namespace meshless::stress {
-namespace {
+namespace soft_goals_test {
 
 constexpr int kSteps = 360;
 constexpr double kBeta = 0.95;  // the most that acts
@@ -96,5 +96,5 @@ TEST_P(SoftGoals, LieOnTheGroundAndDoNotSpread) {
 
 INSTANTIATE_TEST_SUITE_P(Stress, SoftGoals, testing::ValuesIn(crossed(linearKinds(), allSofts())), crossedName<Soft>);
 
-}  // namespace
+}  // namespace soft_goals_test
 }  // namespace meshless::stress

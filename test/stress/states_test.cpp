@@ -5,7 +5,7 @@
 #include "support/stress_cases.h"
 
 namespace meshless::stress {
-namespace {
+namespace states_test {
 
 constexpr double kRestored = 1e-3;  // of the size
 constexpr double kLongest = 30.0;   // [s] that a body may take to be back
@@ -125,5 +125,5 @@ TEST_P(States, LetGoGoesBack) {
 
 INSTANTIATE_TEST_SUITE_P(Stress, States, testing::ValuesIn(crossed(allKinds(), allStates())), crossedName<State>);
 
-}  // namespace
+}  // namespace states_test
 }  // namespace meshless::stress

@@ -6,7 +6,7 @@
 #include "support/stress_cases.h"
 
 namespace meshless::stress {
-namespace {
+namespace stiff_picks_test {
 
 constexpr int kDragged = 60, kHeld = 60, kFree = 180;  // steps
 // [J] kinetic. All three blocks (6 kg) as fast as the target's longest jump (1.73 m) within a step have 1.3e5 J: what a
@@ -128,5 +128,5 @@ INSTANTIATE_TEST_SUITE_P(Stress, HeldInTheGround, testing::ValuesIn(crossed(kind
 INSTANTIATE_TEST_SUITE_P(Stress, StiffPicks, testing::ValuesIn(crossed(kindsAlone(), allStiffPicks())),
                          crossedName<StiffPick>);
 
-}  // namespace
+}  // namespace stiff_picks_test
 }  // namespace meshless::stress

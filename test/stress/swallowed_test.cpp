@@ -5,7 +5,7 @@
 #include "support/stress_cases.h"
 
 namespace meshless::stress {
-namespace {
+namespace swallowed_test {
 
 constexpr double kSize = 0.25;  // [m] diagonal of a block
 
@@ -134,5 +134,5 @@ TEST_P(Swallowed, ABodyHalfInsideAHugeOneComesOut) {
 INSTANTIATE_TEST_SUITE_P(Stress, Swallowed, testing::ValuesIn(kindsAlone()),
                          [](const auto& info) { return testName(info.param.name); });
 
-}  // namespace
+}  // namespace swallowed_test
 }  // namespace meshless::stress

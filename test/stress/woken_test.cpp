@@ -3,7 +3,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace woken_test {
 
 BodyDef boxAt(const std::string& name, const Vec3& at, int parts) {
   BodyDef def = test::defOf(boxMesh(Vec3::Constant(0.1), parts, parts, parts), name);
@@ -41,5 +41,5 @@ TEST(Woken, WhileBodiesGo) {
   EXPECT_TRUE(woke);
 }
 
-}  // namespace
+}  // namespace woken_test
 }  // namespace meshless

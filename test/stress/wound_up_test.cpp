@@ -6,7 +6,7 @@
 #include "support/stress_cases.h"
 
 namespace meshless::stress {
-namespace {
+namespace wound_up_test {
 
 constexpr double kRestored = 1e-3;  // of the size
 
@@ -194,5 +194,5 @@ TEST(Unwinding, LeavesAloneWhatIsBent) {
   }
 }
 
-}  // namespace
+}  // namespace wound_up_test
 }  // namespace meshless::stress

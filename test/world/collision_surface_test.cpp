@@ -6,7 +6,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace collision_surface_test {
 
 BodyDef organ(CollisionChoice::Kind kind) {
   BodyDef def = test::defOf(*randomOrgan(1, 0, 0.2, 20000), "organ");
@@ -76,5 +76,5 @@ TEST(CollisionSurfaces, KeepTheirPiecesApartAndWhole) {
   EXPECT_LT(even.deepest, 0.2 * even.spacing);
 }
 
-}  // namespace
+}  // namespace collision_surface_test
 }  // namespace meshless

@@ -12,7 +12,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace command_log_test {
 
 void run(World& world, int steps) {
   for (int i = 0; i < steps; ++i) world.step();
@@ -339,5 +339,5 @@ TEST(CommandLog, ForgedAtRandom) {
   }
 }
 
-}  // namespace
+}  // namespace command_log_test
 }  // namespace meshless

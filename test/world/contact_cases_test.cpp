@@ -10,7 +10,7 @@
 #include "support/shapes.h"
 
 namespace meshless {
-namespace {
+namespace contact_cases_test {
 
 using test::replyOf;
 
@@ -272,5 +272,5 @@ TEST(ContactCases, WhoIsSpawnedInsideIsLetOutSlowly) {
   EXPECT_EQ(refused, 8) << "both guests in the middle of the box";
 }
 
-}  // namespace
+}  // namespace contact_cases_test
 }  // namespace meshless

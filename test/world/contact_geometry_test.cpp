@@ -6,7 +6,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace contact_geometry_test {
 
 constexpr double kPi = 3.14159265358979323846;
 
@@ -110,5 +110,5 @@ TEST(ContactGeometry, CubesStackedExactlyAlongEachOtherStand) {
   }
 }
 
-}  // namespace
+}  // namespace contact_geometry_test
 }  // namespace meshless

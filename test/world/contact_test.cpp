@@ -8,7 +8,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace contact_test {
 
 constexpr double kPi = 3.14159265358979323846;
 
@@ -462,5 +462,5 @@ TEST(Contact, PiecesThatLieOnTheGroundAreNotSeenBelowIt) {
   }
 }
 
-}  // namespace
+}  // namespace contact_test
 }  // namespace meshless

@@ -7,7 +7,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace cut_continuity_test {
 
 /// A motion of points as a whole: the rigid one nearest to it in the least squares, and what it leaves.
 struct Rest {
@@ -204,5 +204,5 @@ TEST(CutContinuity, TheNextStepOfFilledCellsIsAnotherBesideTheCutAlone) {
   }
 }
 
-}  // namespace
+}  // namespace cut_continuity_test
 }  // namespace meshless

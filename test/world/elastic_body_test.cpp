@@ -7,7 +7,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace elastic_body_test {
 
 using test::prepared;
 using test::replyOf;
@@ -242,5 +242,5 @@ TEST(ElasticBody, IsPickedPushedCutAndComesToRest) {
   EXPECT_NEAR(mass, 1000.0 * 0.12 * 0.04 * 0.04, 1e-9);
 }
 
-}  // namespace
+}  // namespace elastic_body_test
 }  // namespace meshless

@@ -11,7 +11,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace filled_cells_test {
 
 using test::replyOf;
 
@@ -182,5 +182,5 @@ TEST(FilledCellsInAWorld, ACutIsTakenBack) {
   ASSERT_TRUE(world.apply(cutThrough(Vec3(0.013, 0.002, 0), Vec3(1.0, 0.3, 0.2).normalized())).ok());
 }
 
-}  // namespace
+}  // namespace filled_cells_test
 }  // namespace meshless

@@ -9,7 +9,7 @@
 #include "support/stress.h"
 
 namespace meshless {
-namespace {
+namespace material_change_test {
 
 using test::replyOf;
 
@@ -193,5 +193,5 @@ TEST(MaterialChange, TakesHoldAtOnceWhereItGivesNothing) {
   }
 }
 
-}  // namespace
+}  // namespace material_change_test
 }  // namespace meshless

@@ -5,7 +5,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace measures_law_test {
 
 constexpr double kG = 9.81;     // [m/s^2]
 constexpr double kRate = 1000;  // [Hz] of steps short enough that an elastic body needs no substeps
@@ -206,5 +206,5 @@ TEST(ContactPointLaw, ForcesAlongNormalsThatPointOutOfTheSupportCarryTheWeight) 
     }
 }
 
-}  // namespace
+}  // namespace measures_law_test
 }  // namespace meshless

@@ -4,7 +4,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace memory_test {
 
 BodyDef block(int edge, const std::string& name, const Vec3& at, bool elastic) {
   BodyDef def = test::defOf(boxMesh(Vec3::Constant(0.1), edge, edge, edge), name);
@@ -90,5 +90,5 @@ TEST(Memory, IsWhatTheAllocatorHasGivenOut) {
 }
 #endif
 
-}  // namespace
+}  // namespace memory_test
 }  // namespace meshless

@@ -13,7 +13,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace physics_test {
 
 using test::Random;
 using test::replyOf;
@@ -463,5 +463,5 @@ TEST(Physics, VolumeIsHeldAsTheCurveSaysAndThatGivesNoSpeed) {
                 [](auto&... a) { return response(a...).speed; });
 }
 
-}  // namespace
+}  // namespace physics_test
 }  // namespace meshless

@@ -12,7 +12,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace saved_world_test {
 
 using test::replyOf;
 
@@ -499,5 +499,5 @@ TEST(DamagedState, ForgedAtRandom) {
   EXPECT_GT(read, 0);
 }
 
-}  // namespace
+}  // namespace saved_world_test
 }  // namespace meshless

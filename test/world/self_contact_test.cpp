@@ -2,7 +2,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace self_contact_test {
 
 constexpr double kLength = 0.3, kWidth = 0.06;  // [m]
 
@@ -161,5 +161,5 @@ TEST(SelfContact, AStripIsFoldedOntoItselfNotIntoItself) {
   EXPECT_LE(foldedInto(SelfContact::kAll), 1);
 }
 
-}  // namespace
+}  // namespace self_contact_test
 }  // namespace meshless

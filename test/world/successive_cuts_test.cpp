@@ -4,7 +4,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace successive_cuts_test {
 
 constexpr int kCuts = 100;
 constexpr double kSlice = 0.03;    // [m]
@@ -158,5 +158,5 @@ TEST(SuccessiveCuts, VerticesStayWithTheirTissueWhereItLiesInItself) {
   }
 }
 
-}  // namespace
+}  // namespace successive_cuts_test
 }  // namespace meshless

@@ -9,7 +9,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace surface_contact_test {
 
 using test::replyOf;
 
@@ -722,5 +722,5 @@ TEST_P(SlowedBodies, ComeToRestWhereEnoughSubstepsWouldBringThem) {
 INSTANTIATE_TEST_SUITE_P(Scenes, SlowedBodies, ::testing::Values("stacked", "held", "hung", "pressed", "pressed_held"),
                          [](const auto& info) { return std::string(info.param); });
 
-}  // namespace
+}  // namespace surface_contact_test
 }  // namespace meshless

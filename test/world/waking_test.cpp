@@ -6,7 +6,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace waking_test {
 
 using Names = std::set<std::string>;
 using Act = std::function<void(World&)>;
@@ -269,5 +269,5 @@ TEST(Waking, WhoIsTouchedWithItsIslandAndNobodyElse) {
   }
 }
 
-}  // namespace
+}  // namespace waking_test
 }  // namespace meshless

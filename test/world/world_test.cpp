@@ -10,7 +10,7 @@
 #include "support/random.h"
 
 namespace meshless {
-namespace {
+namespace world_test {
 
 using test::replyOf;
 
@@ -739,5 +739,5 @@ TEST(World, TheRestShapeIsWhereTheBodyWasPut) {
   }
 }
 
-}  // namespace
+}  // namespace world_test
 }  // namespace meshless

@@ -5,7 +5,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace world_undo_test {
 
 using test::replyOf;
 
@@ -195,5 +195,5 @@ TEST(Probe, SaysWhatARayMeetsAndChangesNothing) {
   EXPECT_EQ(world.stateHash(), before);
 }
 
-}  // namespace
+}  // namespace world_undo_test
 }  // namespace meshless
