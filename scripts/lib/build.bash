@@ -111,7 +111,7 @@ thread_tests='^(world|dynamics|stress)$'
 # buildThreadSanitized: those under ThreadSanitizer, without ROS.
 buildThreadSanitized() {
   build "the core with ThreadSanitizer" "$output/tsan" all -- -DMESHLESS_SURGERY_CORE_ONLY=ON \
-    -DMESHLESS_SURGERY_TSAN=ON -DBUILD_TESTING=ON -DCMAKE_BUILD_TYPE=RelWithDebInfo \
+    -DMESHLESS_SURGERY_TSAN=ON -DBUILD_TESTING=ON -DCMAKE_UNITY_BUILD=OFF -DCMAKE_BUILD_TYPE=RelWithDebInfo \
     "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -g1"
 }
 

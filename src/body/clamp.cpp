@@ -10,7 +10,7 @@
 namespace meshless {
 namespace {
 
-constexpr double kStiff = 20.0;  // layers of cells that a spring is as heavy as
+constexpr double kStiff = 40.0;  // layers of cells that a spring is as heavy as
 constexpr double kTouch = 1e-6;  // of the spacing: so near is on the border
 constexpr int kHalvings = 40;
 
