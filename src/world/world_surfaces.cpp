@@ -425,7 +425,7 @@ void World::Impl::keepSizes(SurfaceWork& work) {
   if (std::none_of(work.bodies.begin(), work.bodies.end(), [&](const WorldBody* body) { return keeps(*body); })) return;
   for (std::size_t n = 0; n < work.member_count; ++n)
     surface_contacts.eachPressed(work.members[n].island,
-                                 [&](Index b, const RowEntry& entry, const Vec3& normal, double) {
+                                 [&](Index b, const RowEntry& entry, const ContactRow&, const Vec3& normal) {
                                    if (b < bodies.size() && !bodies[b]->asleep && keeps(*bodies[b]))
                                      bodies[b]->scratch.touched.push_back({entry.particle, normal});
                                  });
@@ -433,15 +433,17 @@ void World::Impl::keepSizes(SurfaceWork& work) {
     if (keeps(*body)) preserve(*body->model, body->material, body->state, body->scratch, work.preserve_counters);
 }
 
+// The push sphere is left out: on who rolls over it, it would not feel what that costs.
 void World::Impl::findLoads(const SurfaceWork& work) {
   for (std::size_t n = 0; n < work.member_count; ++n) {
     if (!surface_contacts.islands()[work.members[n].island].held) continue;
-    surface_contacts.eachPressed(work.members[n].island, [&](Index b, const RowEntry& entry, const Vec3&, double load) {
-      if (b >= bodies.size() || bodies[b]->asleep) return;
-      const double share = load * std::abs(entry.coefficient);
-      bodies[b]->scratch.load += share;
-      bodies[b]->scratch.load_at += share * bodies[b]->state.positions[entry.particle];
-    });
+    surface_contacts.eachPressed(
+        work.members[n].island, [&](Index b, const RowEntry& entry, const ContactRow& row, const Vec3&) {
+          if (row.kind == FeaturePair::Kind::kSphere || b >= bodies.size() || bodies[b]->asleep) return;
+          const double share = row.normal.dot(row.impulse) * std::abs(entry.coefficient);
+          bodies[b]->scratch.load += share;
+          bodies[b]->scratch.load_at += share * bodies[b]->state.positions[entry.particle];
+        });
   }
   for (WorldBody* body : work.bodies)
     if (body->scratch.load > 0.0) body->scratch.load_at /= body->scratch.load;

@@ -91,16 +91,14 @@ class SurfaceContacts {
                    SolverCounters& counters, const ForEach& for_each = oneAfterAnother);
   /// [kg m] that the push sphere gave the bodies of an island in the last substep.
   Vec3 sphereImpulse(Index island) const;
-  /// visit(collider, entry, unit normal out of what it presses on, force): of rows of an island that press. The force
-  /// is in N between frames.
+  /// visit(collider, entry, row, unit normal out of what it presses on): of rows of an island that press.
   template <class Visit>
   void eachPressed(Index island, const Visit& visit) const {
     for (const SolverRows& rows : islands_[island].rows)
       for (const ContactRow& row : rows.set->rows) {
-        const double load = row.normal.dot(row.impulse);
-        if (!(load > 0.0)) continue;
-        for (Index k = row.begin; k < row.middle; ++k) visit(rows.a, rows.set->entries[k], row.normal, load);
-        for (Index k = row.middle; k < row.end; ++k) visit(rows.b, rows.set->entries[k], Vec3(-row.normal), load);
+        if (!(row.normal.dot(row.impulse) > 0.0)) continue;
+        for (Index k = row.begin; k < row.middle; ++k) visit(rows.a, rows.set->entries[k], row, row.normal);
+        for (Index k = row.middle; k < row.end; ++k) visit(rows.b, rows.set->entries[k], row, Vec3(-row.normal));
       }
   }
   /// One a collider: whether the sphere presses on it.
