@@ -502,7 +502,7 @@ class CellCutter {
       for (const Triangle& t : sources_[p].mesh.triangles)
         for (int k = 0; k < 3; ++k) {
           const Index a = carriers_[p][t[k]], b = carriers_[p][t[(k + 1) % 3]];
-          if (component_[a] != component_[b]) joinCells(a, b);
+          if (a != b && (gate_.unbounded() || component_[a] != component_[b])) joinCells(a, b);
         }
     // What no vertex is in holds to its neighbours in the piece.
     std::vector<std::vector<Index>> users(before_.corners);

@@ -1,5 +1,7 @@
 // Bodies of filled cells that a blade parts: copies of cells, and what they keep.
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include <gtest/gtest.h>
@@ -277,36 +279,83 @@ TEST(CutCells, ManyCutsAfterEachOther) {
   EXPECT_GT(cuts, 100);
 }
 
+// What four planes near its middle leave of an organ.
+std::vector<PreparedBody> slicesOf(std::uint64_t seed, std::size_t triangles, double spacing) {
+  const Result<TriangleMesh> mesh = randomOrgan(seed, static_cast<int>(seed % 3), 0.2, triangles);
+  EXPECT_TRUE(mesh.ok());
+  std::vector<PreparedBody> pieces;
+  if (!mesh) return pieces;
+  Random random(static_cast<std::uint32_t>(seed));
+  pieces.push_back(prepared(filled(*mesh, spacing)));
+  for (int cut = 0; cut < 4; ++cut) {
+    const Plane plane{random.unit(), solidCentroid(*mesh) + random.vector(0.003)};
+    std::vector<PreparedBody> next;
+    for (PreparedBody& piece : pieces) {
+      Result<CutBody> parts = cutBody(*piece.model, piece.state, plane);
+      if (!parts.ok()) {
+        EXPECT_EQ(parts.error().code, ErrorCode::kMissed) << parts.error().detail;
+        next.push_back(std::move(piece));
+        continue;
+      }
+      for (BodyPiece& part : parts->pieces) next.push_back({BodyDef(), std::move(part.model), std::move(part.state)});
+    }
+    pieces = std::move(next);
+  }
+  EXPECT_GT(pieces.size(), 8u);
+  return pieces;
+}
+
 // Thin slices among them: films that go from cell to cell by corners that no sample is next to.
 TEST(CutCells, PiecesOfRandomOrgansWeighWhatTheirVolumesDo) {
-  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    const Result<TriangleMesh> mesh = randomOrgan(seed, static_cast<int>(seed % 3), 0.2, 2000);
-    ASSERT_TRUE(mesh.ok());
-    Random random(static_cast<std::uint32_t>(seed));
-    std::vector<PreparedBody> pieces{prepared(filled(*mesh, 0.0109))};
-    for (int cut = 0; cut < 4; ++cut) {
-      const Plane plane{random.unit(), solidCentroid(*mesh) + random.vector(0.003)};
-      std::vector<PreparedBody> next;
-      for (PreparedBody& piece : pieces) {
-        Result<CutBody> parts = cutBody(*piece.model, piece.state, plane);
-        if (!parts.ok() && parts.error().code == ErrorCode::kMissed) {
-          next.push_back(std::move(piece));
-          continue;
-        }
-        ASSERT_TRUE(parts.ok()) << parts.error().detail;
-        for (BodyPiece& part : parts->pieces) next.push_back({BodyDef(), std::move(part.model), std::move(part.state)});
-      }
-      pieces = std::move(next);
-    }
-    EXPECT_GT(pieces.size(), 8u);
-    for (const PreparedBody& piece : pieces) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed)
+    for (const PreparedBody& piece : slicesOf(seed, 2000, 0.0109)) {
       const BodyModel& model = *piece.model;
       // By samples: of a layer of a quarter of a cell all or nothing is counted.
       EXPECT_NEAR(model.mass / 1000.0, model.rest_volume,
                   0.1 * model.rest_volume + model.rest_area * model.spacing / 24.0)
           << seed << ": " << model.rest_volume / std::pow(model.spacing, 3) << " cells";
     }
-  }
+}
+
+// Edges of a surface whose ends are in cells that do not hang together near it: by corners, through cells within a
+// place of either.
+std::size_t seamsOf(const BodyModel& model) {
+  const CellLattice& lattice = *model.lattice;
+  const CornerUses uses = cornerUses(lattice);
+  const auto hangTogether = [&](Index from, Index to) {
+    const auto isNear = [&](Index c) {
+      for (int k = 0; k < 3; ++k) {
+        const auto [low, high] = std::minmax({lattice.cells[from].place[k], lattice.cells[to].place[k]});
+        if (lattice.cells[c].place[k] < low - 1 || lattice.cells[c].place[k] > high + 1) return false;
+      }
+      return true;
+    };
+    std::vector<Index> reached{from};
+    std::set<Index> seen{from};
+    for (std::size_t n = 0; n < reached.size(); ++n)
+      for (const Index corner : lattice.cells[reached[n]].corners)
+        for (Index u = uses.offsets[corner]; u < uses.offsets[corner + 1]; ++u)
+          if (isNear(uses.cells[u]) && seen.insert(uses.cells[u]).second) reached.push_back(uses.cells[u]);
+    return seen.count(to) > 0;
+  };
+  std::map<std::pair<Index, Index>, bool> known;
+  std::size_t seams = 0;
+  for (const Triangle& t : model.surface.triangles)
+    for (int k = 0; k < 3; ++k) {
+      const Index a = model.binding.turners[t[k]], b = model.binding.turners[t[(k + 1) % 3]];
+      if (a >= b) continue;
+      const auto [found, is_new] = known.emplace(std::pair(a, b), false);
+      if (is_new) found->second = hangTogether(a, b);
+      seams += !found->second;
+    }
+  return seams;
+}
+
+// Thin sheets whose samples fall apart, while their surface does not: it would be torn open there.
+TEST(CutCells, TissueThatASurfaceEnclosesHangsTogetherAlongIt) {
+  for (const std::uint64_t seed : {6, 26})
+    for (const PreparedBody& piece : slicesOf(seed, 4120, 0.011))
+      EXPECT_EQ(seamsOf(*piece.model), 0u) << seed << ": " << piece.model->mass;
 }
 
 void expectRowsAsMadeAnew(const CellLattice& lattice, const Points& rest, const SurfaceBinding& binding) {
