@@ -31,7 +31,7 @@ void makeClamp(BodyModel& model) {
   model.clamp.reset();
   if (model.clamp_points.empty()) return;
   const double density = model.cell_mass / std::pow(model.lattice->spacing, 3.0);
-  model.clamp = std::make_shared<Clamp>(*model.lattice, model.clamp_points, model.fixed, model.masses, density);
+  model.clamp = std::make_shared<Clamp>(*model.lattice, model.clamp_points, model.masses, density);
   model.any_fixed = true;
 }
 
@@ -91,10 +91,8 @@ RegionTissue regionTissue(const Material& own, const Material& body) {
 
 double heldShare(const BodyModel& model) {
   double held = 0.0;
-  for (std::size_t i = 0; i < model.masses.size(); ++i) {
-    const double share = model.lattice ? (model.carried.empty() ? 0.0 : model.carried[i]) : model.fixed[i] ? 1.0 : 0.0;
-    held += share * model.masses[i];
-  }
+  for (std::size_t i = 0; i < model.masses.size(); ++i)
+    if (model.fixed[i]) held += model.masses[i];
   return std::min(1.0, held / model.mass);
 }
 
@@ -132,8 +130,7 @@ void updateSurface(const BodyModel& model, BodyState& state) {
     fitClusters(matchInput(model, state), state.positions, model.binding.lever_clusters, poses);
   }
   for (Index r = 0; r < model.binding.embedded.size(); ++r)
-    state.surface[model.binding.embedded[r]] =
-        embeddedPosition(model.binding, state.positions, poses, r);
+    state.surface[model.binding.embedded[r]] = embeddedPosition(model.binding, state.positions, poses, r);
 }
 
 BodyMeasures measureBody(const BodyModel& model, const BodyState& state) {

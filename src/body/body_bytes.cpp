@@ -22,7 +22,7 @@ std::size_t bytesOf(const BodyModel& model) {
          bytesOf(model.shape.clusters, model.shape.quadratic) +
          (model.lattice ? bytesOf(model.lattice->cells, model.tissue) : 0) +
          (model.lattice && model.lattice->regions ? bytesOf(model.lattice->regions->parts(), model.regions) : 0) +
-         (model.clamp ? model.clamp->bytes() + bytesOf(model.clamp_points, model.carried) : 0) +
+         (model.clamp ? model.clamp->bytes() + bytesOf(model.clamp_points) : 0) +
          (model.cells ? bytesOf(model.cells->cells, model.cells->masses) : 0) +
          (model.elastic_batch ? model.elastic_batch->bytes() : 0) +
          bytesOf(model.surface.vertices, model.surface.triangles, model.surface.patches) +

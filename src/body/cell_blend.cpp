@@ -57,7 +57,8 @@ struct Tissue {
   LinkSet parted{};
   std::vector<Index> cells;
   bool joined[3] = {false, false, false};  // to the next place along an axis
-  bool severed = false;                    // something here is parted, or there are several cells
+  bool held = false, free = false;         // there is such a cell
+  bool severed = false;                    // something here is parted, or there are several cells of either
 };
 
 // A crumb has those of the cell that it came from.
@@ -93,13 +94,14 @@ class TissueGrid {
       }
       Tissue& tissue = all_[number];
       tissue.cells.push_back(c);
+      tissue.severed = tissue.severed || (cell.held ? tissue.held : tissue.free);
+      (cell.held ? tissue.held : tissue.free) = true;
       tissue.present |= samplesOf(cell);
       for (int axis = 0; axis < 3; ++axis) tissue.parted[axis] |= samplesOf(cell) & cell.parted[axis];
     }
     for (std::size_t i = 0; i < count; ++i) {
       if (!number_[i]) continue;
       Tissue& tissue = all_[number_[i]];
-      tissue.severed = tissue.cells.size() > 1;
       for (int axis = 0; axis < 3; ++axis) {
         const SampleSet next = all_[number_[i + stride_[axis]]].present;
         const SampleSet across = faceLinks(tissue.present, next, axis);
@@ -124,10 +126,6 @@ class TissueGrid {
   std::size_t count() const { return all_.size(); }
 
  private:
-  static SampleSet faceLinks(SampleSet lower, SampleSet upper, int axis) {
-    return lower & kUpperLayer[axis] & ((upper & kLowerLayer[axis]) << (kCellSamples - 1) * kSampleStride[axis]);
-  }
-
   std::array<std::int32_t, 3> lower_{};
   std::array<std::size_t, 3> stride_{};
   std::array<std::size_t, kPlaces> offsets_{};  // of the places of a window
@@ -215,7 +213,6 @@ class Blender {
     TissueGrid grid;
     std::vector<CellMap> maps;
     std::vector<std::vector<Index>> parts;  // of a bridge: what it joins
-    std::vector<bool> held;                 // no corner of a cell can move
   };
   struct Rows {
     std::vector<Index> lengths, carriers;
@@ -234,8 +231,8 @@ class Blender {
     for (; from != to; ++from) {
       const Vec3& p = rest[*from];
       const double to_own = awayFrom(cell, p), reach = reachOf(to_own), far = kBeyond * spacing * reach;
-      // What is held with all around it stays.
-      const bool held = of_.held[cell], direct = held || (!(reach > kReach) && isOpen(own.place));
+      // What is held stays.
+      const bool held = own.held, direct = held || (!(reach > kReach) && isOpen(own.place));
       const int bit = direct ? 0 : nearestSample(samplesOf(own), of_.lattice.placeIn(own, p));
       double all = 0.0;
       for (const Candidate& c : candidates_) {
@@ -400,19 +397,11 @@ std::vector<CellMap> mapsOf(const CellLattice& lattice) {
   return maps;
 }
 
-std::vector<bool> heldCells(const CellLattice& lattice) {
-  const std::vector<bool> moves = movingCorners(lattice);
-  std::vector<bool> held;
-  for (const LatticeCell& cell : lattice.cells)
-    held.push_back(std::none_of(cell.corners.begin(), cell.corners.end(), [&](Index corner) { return moves[corner]; }));
-  return held;
-}
-
 }  // namespace
 
 SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const std::vector<Index>& cell,
                            const KeptRows& kept) {
-  Blender::Lattice of{lattice, TissueGrid(lattice), mapsOf(lattice), {}, heldCells(lattice)};
+  Blender::Lattice of{lattice, TissueGrid(lattice), mapsOf(lattice), {}};
   of.parts.resize(lattice.cells.size());
   for (Index c = 0; c < lattice.cells.size(); ++c)
     if (const Index bridge = lattice.cells[c].bridge; bridge != kNoIndex && bridge != c) of.parts[bridge].push_back(c);

@@ -21,7 +21,8 @@ std::vector<ClampPoint> findClampPoints(const CellLattice& lattice, const SolidQ
   const double step = lattice.spacing / kCellSamples, touch = kTouch * lattice.spacing;
   for (Index c = 0; c < lattice.cells.size(); ++c) {
     const LatticeCell& cell = lattice.cells[c];
-    for (SampleSet left = cell.samples & ~cell.held; left; left &= left - 1) {
+    if (cell.held) continue;
+    for (SampleSet left = cell.samples; left; left &= left - 1) {
       const Vec3 from = lattice.restPlace(cell, samplePlace(lowestSample(left)));
       for (int axis = 0; axis < 3; ++axis)
         for (const double way : {-step, step}) {
@@ -46,14 +47,14 @@ std::vector<ClampPoint> findClampPoints(const CellLattice& lattice, const SolidQ
   return points;
 }
 
-Clamp::Clamp(const CellLattice& lattice, const std::vector<ClampPoint>& points, const std::vector<bool>& fixed,
+Clamp::Clamp(const CellLattice& lattice, const std::vector<ClampPoint>& points,
              const std::vector<double>& corner_masses, double density) {
   std::vector<Index> number(lattice.corners, kNoIndex);
   std::map<std::pair<Index, Index>, double> sums;  // by column, then row
   for (const ClampPoint& point : points) {
     const LatticeCell& cell = lattice.cells[point.cell];
     for (const Index corner : cell.corners)
-      if (!fixed[corner] && number[corner] == kNoIndex) {
+      if (number[corner] == kNoIndex) {
         number[corner] = static_cast<Index>(corners.size());
         corners.push_back(corner);
         masses.push_back(corner_masses[corner]);
@@ -62,7 +63,7 @@ Clamp::Clamp(const CellLattice& lattice, const std::vector<ClampPoint>& points, 
     for (int a = 0; a < 8; ++a)
       for (int b = 0; b < 8; ++b) {
         const Index row = number[cell.corners[a]], column = number[cell.corners[b]];
-        if (row == kNoIndex || column == kNoIndex || row < column) continue;
+        if (row < column) continue;
         sums[{column, row}] += mass * trilinearWeight(a, point.at) * trilinearWeight(b, point.at);
       }
   }

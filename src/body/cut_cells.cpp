@@ -348,6 +348,7 @@ class CellCutter {
     UnionFind corners(cut_.lattice.corners);
     for (const LatticeCell& cell : cells())
       for (int k = 1; k < 8; ++k) corners.join(cell.corners[0], cell.corners[k]);
+    joinAtTheClamp(corners);
     std::map<Index, Index> names;
     for (const LatticeCell& cell : cells())
       component_.push_back(
@@ -396,6 +397,36 @@ class CellCutter {
       }
     }
     for (int& piece : piece_of_) piece = std::max(piece, 0);
+  }
+
+  // What is held has no corner in common with what is free. Links on one side of the blade hold them together.
+  void joinAtTheClamp(UnionFind& corners) {
+    for (Index held = 0; held < cells().size(); ++held) {
+      const LatticeCell& cell = cells()[held];
+      if (!cell.held) continue;
+      for (int axis = 0; axis < 3; ++axis)
+        for (const int step : {-1, 0, 1}) {
+          std::array<std::int32_t, 3> place = cell.place;
+          place[axis] += step;
+          for (const Index free : finder_.at(place)) {
+            if (cells()[free].held) continue;
+            const auto linked = [&](bool above) {
+              const auto side = [&](Index c) { return cells()[c].samples & (above ? cut_.above[c] : ~cut_.above[c]); };
+              const SampleSet a = side(held), b = side(free);
+              return step > 0   ? faceLinks(a, b, axis) != kNoSample
+                     : step < 0 ? faceLinks(b, a, axis) != kNoSample
+                                : linksWithin(a, b, axis);
+            };
+            if (linked(false) || linked(true)) corners.join(cell.corners[0], cells()[free].corners[0]);
+          }
+        }
+    }
+  }
+  static bool linksWithin(SampleSet a, SampleSet b, int axis) {
+    const auto from = [&](SampleSet low, SampleSet high) {
+      return low & ~kUpperLayer[axis] & (high >> kSampleStride[axis]);
+    };
+    return from(a, b) || from(b, a);
   }
 
   // --- the surface; what has no cell gets crumbs
@@ -474,6 +505,13 @@ class CellCutter {
     LatticeCell crumb = before_.cells[was];
     crumb.samples = kNoSample;
     crumb.bridge = kNoIndex;
+    bool alone = true, beside_held = false;
+    for (Index c = 0; c < cells().size(); ++c)
+      if (piece_of_[component_[c]] == piece) {
+        alone = false;
+        beside_held = beside_held || cells()[c].held;
+      }
+    crumb.held = crumb.held && (alone || beside_held);  // a blade next to the clamp leaves a film on the other side
     for (Index& corner : crumb.corners) {
       cut_.parent_corner.push_back(corner);
       corner = cut_.lattice.corners++;
@@ -796,11 +834,21 @@ class CellCutter {
     return now;
   }
 
+  // Between what is free and the clamp the blade parts no links of a cell.
+  bool isPartedFrom(Index cell, const ClampPoint& point) const {
+    const SampleSet samples = cut_.lattice.cells[cell].samples;
+    if (cut_.changed[cell] || !samples) return false;
+    const Vec3 border = presentPlace({point.cell, point.at}),
+               tissue = presentPlace({point.cell, samplePlace(nearestSample(samples, point.at))});
+    const int from = gate_.height(border) >= 0.0 ? 1 : -1, to = gate_.height(tissue) >= 0.0 ? 1 : -1;
+    return from != to && (gate_.unbounded() || gate_.between(border, from, tissue, to));
+  }
+
   // What is held stays held.
   void inheritClamp(BodyModel& child, const std::vector<Index>& renumbered) const {
     for (ClampPoint point : model_.clamp_points) {
       const Index best = heirOf({point.cell, point.at});
-      if (best == kNoIndex || renumbered[best] == kNoIndex) continue;
+      if (best == kNoIndex || renumbered[best] == kNoIndex || isPartedFrom(best, point)) continue;
       point.cell = renumbered[best];
       child.clamp_points.push_back(point);
     }

@@ -222,12 +222,6 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
     v[i] = faster;
     x[i] = at + h * faster;
   }
-  if (!model.carried.empty())
-    for (std::size_t i = 0; i < n; ++i) {
-      const Vec3 carried = h * model.carried[i] * weight;
-      v[i] -= carried;
-      x[i] -= h * carried;
-    }
   if (model.any_fixed)
     for (std::size_t i = 0; i < n; ++i) {
       if (!model.fixed[i]) continue;

@@ -14,8 +14,9 @@ namespace {
 constexpr double kFarthestCentroid = 0.9;  // [half edges] a fit nearer to a face would need weights near zero
 constexpr int kWellFilled = 16;            // of 64 samples
 
-// What some samples of a cell weigh goes to its corners.
-void addMass(const BodyModel& model, const LatticeCell& cell, SampleSet samples, std::vector<double>& masses) {
+// What a cell weighs goes to its corners.
+void addMass(const BodyModel& model, const LatticeCell& cell, std::vector<double>& masses) {
+  SampleSet samples = cell.filled;
   const auto add = [&](SampleSet part, double density) {
     if (!part) return;
     const FilledMoments moments = momentsOf(part);
@@ -35,8 +36,7 @@ void addMass(const BodyModel& model, const LatticeCell& cell, SampleSet samples,
 ElasticMix mixOf(const BodyModel& model, const LatticeCell& cell) {
   ElasticMix mix;
   if (!model.lattice->regions) return mix;
-  SampleSet own = cell.filled & ~cell.held;
-  if (!own) own = cell.filled;
+  SampleSet own = cell.filled;
   const double all = countSamples(own);
   for (const CellRegions::Part& part : model.lattice->regions->at(cell.place)) {
     const RegionTissue& tissue = model.regions[part.region];
@@ -89,38 +89,26 @@ void makeParticlesOfCells(BodyModel& model) {
   const CellLattice& lattice = *model.lattice;
   model.rest = cornerPlaces(lattice);
   model.masses.assign(lattice.corners, 0.0);
-  std::vector<double> held(lattice.corners, 0.0);
   model.tissue = cornersWithTissue(lattice);
   ClusterSet& clusters = model.clusters;
   clusters = ClusterSet();
   clusters.offsets.push_back(0);
   for (const LatticeCell& cell : lattice.cells) {
-    addMass(model, cell, cell.filled & cell.held, held);
-    addMass(model, cell, cell.filled, model.masses);
+    addMass(model, cell, model.masses);
     clusters.members.insert(clusters.members.end(), cell.corners.begin(), cell.corners.end());
     clusters.offsets.push_back(static_cast<Index>(clusters.members.size()));
     clusters.seeds.push_back(cell.corners[0]);
     clusters.radii.push_back(1.01 * std::sqrt(3.0) * lattice.spacing);
   }
   clusters.weights.assign(clusters.members.size(), 0.0);
-  model.carried.clear();
-  if (std::any_of(held.begin(), held.end(), [](double mass) { return mass > 0.0; }))
-    for (Index i = 0; i < lattice.corners; ++i) model.carried.push_back(std::min(1.0, held[i] / model.masses[i]));
   model.graph = alongEdges(lattice, model.rest);
 }
 
-std::vector<bool> movingCorners(const CellLattice& lattice) {
-  std::vector<bool> moves(lattice.corners, false);
-  for (const LatticeCell& cell : lattice.cells)
-    if ((cell.samples ? cell.samples : cell.filled) & ~cell.held)
-      for (const Index corner : cell.corners) moves[corner] = true;
-  return moves;
-}
-
 void holdCorners(BodyModel& model) {
-  model.fixed = movingCorners(*model.lattice);
-  model.fixed.flip();
-  model.any_fixed = std::find(model.fixed.begin(), model.fixed.end(), true) != model.fixed.end();
+  model.fixed.assign(model.lattice->corners, false);
+  for (const LatticeCell& cell : model.lattice->cells)
+    if (cell.held)
+      for (const Index corner : cell.corners) model.fixed[corner] = model.any_fixed = true;
 }
 
 void weighCells(BodyModel& model, bool elastic) {

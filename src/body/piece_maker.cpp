@@ -17,7 +17,6 @@
 namespace meshless {
 namespace {
 
-
 template <class Get>
 Vec3 interpolate(const VertexOrigin& origin, const Get& get) {
   Vec3 sum = Vec3::Zero();

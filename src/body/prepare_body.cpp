@@ -315,7 +315,7 @@ Status checkHeld(const BodyDef& def, const Pose& placed, const Pose& pose, const
     for (const ClampPoint& point : model.clamp_points)
       held.push_back(model.lattice->restPlace(model.lattice->cells[point.cell], point.at));
     for (const LatticeCell& cell : model.lattice->cells)
-      for (SampleSet left = cell.samples & cell.held; left; left &= left - 1)
+      for (SampleSet left = cell.held ? cell.samples : kNoSample; left; left &= left - 1)
         held.push_back(model.lattice->restPlace(cell, samplePlace(lowestSample(left))));
   } else {
     for (std::size_t i = 0; i < model.rest.size(); ++i)

@@ -38,8 +38,7 @@ double freeShare(const std::vector<RowEntry>& entries, Index begin, Index end, c
   for (Index k = begin; k < end; ++k) {
     const double share = std::abs(entries[k].coefficient);
     all += share;
-    const Index i = entries[k].particle;
-    held += share * (body.inverse_masses[i] > 0.0 ? (body.carried ? body.carried[i] : 0.0) : 1.0);
+    if (!(body.inverse_masses[entries[k].particle] > 0.0)) held += share;
   }
   return all > 0.0 ? 1.0 - held / all : 0.0;
 }

@@ -236,8 +236,8 @@ void SurfaceContacts::makeRows(const SurfaceScene& scene, const std::vector<Coll
   const double friction = std::sqrt(a.friction * other_friction);
   const double restitution = restitutionOf(a, b);
   const double skin = b ? kSkin * std::min(a.edge_length, b->edge_length) : 0.0;
-  RowBody of_a{a.surface, a.positions, frames_[pair.a].vertices.data(), a.inverse_masses, a.carried}, of_b;
-  if (b) of_b = {b->surface, b->positions, frames_[pair.b].vertices.data(), b->inverse_masses, b->carried};
+  RowBody of_a{a.surface, a.positions, frames_[pair.a].vertices.data(), a.inverse_masses}, of_b;
+  if (b) of_b = {b->surface, b->positions, frames_[pair.b].vertices.data(), b->inverse_masses};
   static thread_local std::vector<ContactRow> old;
   old.swap(pair.set.rows);
   pair.set.clear();

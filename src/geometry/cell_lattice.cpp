@@ -109,11 +109,6 @@ CornerUses cornerUses(const CellLattice& lattice) {
   return uses;
 }
 
-SampleSet faceLinks(const LatticeCell& lower, const LatticeCell& upper, int axis) {
-  const int across = (kCellSamples - 1) * kSampleStride[axis];
-  return lower.samples & kUpperLayer[axis] & ((upper.samples & kLowerLayer[axis]) << across);
-}
-
 Result<CellLattice> divideIntoCells(const TriangleMesh& mesh, const SolidQuery& solid, double spacing,
                                     std::size_t max_cells) {
   const Box bounds = boundsOf(mesh.vertices);
@@ -168,7 +163,7 @@ Result<CellLattice> divideIntoCells(const TriangleMesh& mesh, const SolidQuery& 
       const std::size_t next =
           at(lower.place[0] + (axis == 0), lower.place[1] + (axis == 1), lower.place[2] + (axis == 2));
       for (Index b = first[next]; b < first[next + 1]; ++b)
-        if (faceLinks(lower, lattice.cells[b], axis)) joiner.join(a, b);
+        if (faceLinks(lower.samples, lattice.cells[b].samples, axis)) joiner.join(a, b);
     }
   }
   joiner.joinCrumbs([&](const std::array<std::int32_t, 3>& place) {

@@ -8,7 +8,7 @@ namespace meshless {
 namespace {
 
 constexpr double kFictitious =
-    1e-6;  // what a cell of held tissue alone resists with (finite cell method: Parvizian et al. 2007)
+    1e-6;  // what a cell of held tissue resists with (finite cell method: Parvizian et al. 2007)
 
 // Sums over what a cell resists with.
 struct Sums {
@@ -22,6 +22,7 @@ class ResistanceFinder {
       : solid_(solid), held_(held), lattice_(lattice), step_(lattice.spacing / kCellSamples) {}
 
   void run() {
+    if (held_) partAtTheBorder();
     makeTable();
     sums_.resize(lattice_.cells.size());
     for (std::int32_t z = 0; z < size_[2]; ++z)
@@ -32,6 +33,33 @@ class ResistanceFinder {
 
  private:
   using Place = std::array<std::int32_t, 3>;
+
+  void partAtTheBorder() {
+    std::vector<LatticeCell>& cells = lattice_.cells;
+    for (Index c = 0, count = static_cast<Index>(cells.size()); c < count; ++c) {
+      SampleSet held = kNoSample;
+      for (SampleSet left = cells[c].samples; left; left &= left - 1)
+        if (held_(lattice_.restPlace(cells[c], samplePlace(lowestSample(left)))) <= 0.0) held |= left & ~(left - 1);
+      if (!held) continue;
+      if (held != cells[c].samples) {
+        LatticeCell free = cells[c];
+        free.samples = free.filled = cells[c].samples & ~held;
+        cells.push_back(free);
+      }
+      cells[c].samples = cells[c].filled = held;
+      cells[c].held = true;
+    }
+    std::vector<bool> moves(lattice_.corners, false);
+    for (const LatticeCell& cell : cells)
+      for (const Index corner : cell.corners) moves[corner] = moves[corner] || !cell.held;
+    std::vector<Index> stays(lattice_.corners, kNoIndex);
+    for (LatticeCell& cell : cells)
+      for (Index& corner : cell.corners) {
+        if (!cell.held || !moves[corner]) continue;
+        if (stays[corner] == kNoIndex) stays[corner] = lattice_.corners++;
+        corner = stays[corner];
+      }
+  }
 
   // Cells at each place, and one more place all around.
   void makeTable() {
@@ -77,8 +105,7 @@ class ResistanceFinder {
       const auto owner =
           std::find_if(here.begin(), here.end(), [&](Index c) { return lattice_.cells[c].samples >> bit & 1; });
       const bool inside = owner != here.end();
-      if (inside && held_ && held_(p) <= 0.0) lattice_.cells[*owner].held |= SampleSet{1} << bit;
-      addSample(at, bit, p, inside, surface, border, inside ? *owner : kNoIndex);
+      addSample(at, bit, p, inside, surface, border, inside && !lattice_.cells[*owner].held ? *owner : kNoIndex);
     }
   }
 
@@ -124,7 +151,7 @@ class ResistanceFinder {
     sums_[owner].second += volume * (in.cwiseAbs2() + Vec3::Constant(own));
   }
 
-  // The cell with the nearest sample, of those beside this one.
+  // The cell with the nearest free sample, of those beside this one.
   Index nearest(const Place& at, int bit) const {
     Index best = kNoIndex;
     int least = 4;  // [samples squared]
@@ -141,7 +168,7 @@ class ResistanceFinder {
       }
       if (squared >= least || !isPlace(cell_at)) continue;
       for (const Index c : table_[indexOf(cell_at)])
-        if (lattice_.cells[c].samples >> sampleBit(place[0], place[1], place[2]) & 1) {
+        if (!lattice_.cells[c].held && lattice_.cells[c].samples >> sampleBit(place[0], place[1], place[2]) & 1) {
           best = c;
           least = squared;
         }
@@ -173,11 +200,10 @@ class ResistanceFinder {
 }  // namespace
 
 Resistance resistanceOf(const LatticeCell& before, SampleSet filled) {
-  if (filled == before.filled) return before.resists;
-  const SampleSet was = before.filled & ~before.held, is = filled & ~before.held;
-  if (!was || !is) return {kFictitious, Vec3::Zero(), Vec3::Constant(1.0 / 3.0)};
-  const FilledMoments moments = momentsOf(is);
-  return {moments.fraction * before.resists.fraction / momentsOf(was).fraction, moments.centroid, moments.variance};
+  if (filled == before.filled || before.held) return before.resists;
+  const FilledMoments moments = momentsOf(filled);
+  return {moments.fraction * before.resists.fraction / momentsOf(before.filled).fraction, moments.centroid,
+          moments.variance};
 }
 
 void findResistance(const SolidQuery& solid, const HeldHeight& held, CellLattice& lattice) {

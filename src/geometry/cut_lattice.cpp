@@ -185,8 +185,8 @@ class Cutter {
   void cutFace(Family& lower, Index p, Family& upper, Index q, int axis) {
     const LatticeCell &a = before_.cells[p], &b = before_.cells[q];
     const int across = (kCellSamples - 1) * kSampleStride[axis];
-    const SampleSet crossing =
-        faceLinks(a, b, axis) & ~lower.parted[axis] & (above_[p] ^ ((above_[q] & kLowerLayer[axis]) << across));
+    const SampleSet crossing = faceLinks(a.samples, b.samples, axis) & ~lower.parted[axis] &
+                               (above_[p] ^ ((above_[q] & kLowerLayer[axis]) << across));
     if (!crossing) return;
     SampleSet cut = throughBlade(crossing, a, above_[p], b, above_[q], axis, true);
     const bool plane_in_face =
@@ -202,7 +202,7 @@ class Cutter {
     if (!cut) return;
     lower.parted[axis] |= cut;
     if (lower.face == axis) {
-      lower.face_links = faceLinks(a, b, axis);
+      lower.face_links = faceLinks(a.samples, b.samples, axis);
       lower.face_left = lower.face_links & ~lower.parted[axis];
     }
     lower.face_cut = upper.face_cut = true;
@@ -348,7 +348,7 @@ class Cutter {
     if (axis < 0) return false;
     const bool up = cb.place[axis] > ca.place[axis];
     const LatticeCell &lower = up ? ca : cb, &upper = up ? cb : ca;
-    return lower.face != axis && (faceLinks(lower, upper, axis) & ~lower.parted[axis]);
+    return lower.face != axis && (faceLinks(lower.samples, upper.samples, axis) & ~lower.parted[axis]);
   }
 
   // The corner of a cell that each corner of a bridge is, 8 c + k: of the parts that it joins, or of the cell across
@@ -383,7 +383,7 @@ class Cutter {
         int most = -1;  // links that hold; a blade leaves a copy of that cell on either side
         for (const Index q : across->second) {
           if (!isAcross(cells[c], cells[q], axis)) continue;
-          const int holds = countSamples(faceLinks(cells[c], cells[q], axis) & ~cells[c].parted[axis]);
+          const int holds = countSamples(faceLinks(cells[c].samples, cells[q].samples, axis) & ~cells[c].parted[axis]);
           if (holds <= most) continue;
           most = holds;
           found[c][k] = 8 * q + (k ^ 1u << axis);

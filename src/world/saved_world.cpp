@@ -14,7 +14,7 @@ namespace meshless {
 namespace {
 
 constexpr std::string_view kMagic = "MLSSTATE";
-constexpr std::uint32_t kVersion = 16;
+constexpr std::uint32_t kVersion = 17;
 constexpr std::uint64_t kMostModels = 1u << 20;
 
 /// What follows the magic, of at least kStateHeaderBytes.
@@ -268,7 +268,6 @@ std::string faultOf(const BodyModel& m) {
         if (!((m.rest[cell.corners[k]] - m.lattice->restPlace(cell, Vec3(k & 1, k >> 1 & 1, k >> 2 & 1))).norm() <=
               1e-6 * m.lattice->spacing))
           return "a body's particles do not rest at the corners of its cells";
-    if (!m.carried.empty() && m.carried.size() != particles) return "what is carried is not a body's particles";
     for (const ClampPoint& point : m.clamp_points)
       if (!(point.cell < cells.size()) || !point.at.allFinite() || !(point.area > 0.0 && point.area < 1e12))
         return "a clamp holds nothing of its body's cells";

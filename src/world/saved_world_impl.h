@@ -196,14 +196,14 @@ void serialize(A& archive, CollisionSurface& v) {
 template <class A>
 void serialize(A& archive, BodyModel& v) {
   auto& [rest, masses, match_masses, fixed, any_fixed, graph, clusters, shape, elastic, elastic_batch, lattice,
-         cell_mass, regions, cells, clamp_points, clamp, carried, tissue, most_spread_inverse, specific_stiffness,
+         cell_mass, regions, cells, clamp_points, clamp, tissue, most_spread_inverse, specific_stiffness,
          poissons_ratio, highest_frequency, surface, binding, collision, solid, incised, spacing, rest_volume,
          rest_area, mass, next_patch] = v;
   (void)elastic_batch, (void)cells, (void)clamp, (void)tissue;
   auto of_contact = collision ? *collision : CollisionSurface();
   auto of_cells = lattice ? *lattice : CellLattice();
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
-  archive(of_cells, cell_mass, regions, clamp_points, carried);
+  archive(of_cells, cell_mass, regions, clamp_points);
   archive(rest, masses, match_masses, held, any_fixed, graph, clusters, shape, elastic, endless(most_spread_inverse),
           specific_stiffness, poissons_ratio, highest_frequency, surface, binding, of_contact, solid, incised, spacing,
           rest_volume, rest_area, mass, next_patch);

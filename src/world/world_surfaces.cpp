@@ -249,7 +249,6 @@ void World::Impl::findSurfaceContacts(double h) {
       const SurfaceModel& model = surfaceModel(*bodies[b]);
       colliders[b].surface = &model.surface;
       colliders[b].inverse_masses = model.inverse_masses.data();
-      if (!model.model->carried.empty()) colliders[b].carried = model.model->carried.data();
     }
     surface_contacts.findMoved(scene, colliders);
     forNumbers(bodies.size(), [&](std::size_t b) {

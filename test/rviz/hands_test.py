@@ -451,8 +451,9 @@ class HandsTest(unittest.TestCase):
         heights = [(self.body(b.name) - vector(pose.position)).dot(normal) for b in bodies]
         upper = heights[0] if heights[0].mean() > heights[1].mean() else heights[1]
         lower = heights[1] if upper is heights[0] else heights[0]
-        self.assertGreater(upper.min(), -1e-4)
-        self.assertLess(lower.max(), 1e-4)
+        # The surface follows the tissue of its own side from the cut on, which may draw it over by parts of a millimetre.
+        self.assertGreater(upper.min(), -1e-3)
+        self.assertLess(lower.max(), 1e-3)
         call('pause', SetBool, data=False)
         rospy.sleep(1.0)
         self.mouse.move((place[0] + 150, place[1] + 200))

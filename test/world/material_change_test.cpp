@@ -111,9 +111,9 @@ TEST(MaterialChange, LiftsNothingAndEndsWhereTheNewMaterialWould) {
         EXPECT_LT(leap, change.to.elastic() ? 1e-3 : 2e-3);
         // By friction a ball that rolls, and who carries another, come to rest in more than one way.
         if (setting != Setting::kClamped && (round || setting == Setting::kLoaded)) continue;
-        run(world, 1.0);
+        run(world, 2.0);
         World fresh = worldOf(setting, round, change.to);
-        run(fresh, 3.0);
+        run(fresh, 4.0);
         EXPECT_NEAR(height(world) / height(fresh), 1.0, setting == Setting::kLying ? 0.02 : 0.005);
       }
 }

@@ -64,7 +64,6 @@ struct BodyModel {
   std::vector<ClampPoint> clamp_points;               // of it: where free tissue ends at what is held
   std::shared_ptr<const Clamp> clamp;                 // of them; null where there are none
   bool isHeld() const { return any_fixed || clamp; }  // it has no rigid motion of its own
-  std::vector<double> carried;  // of a corner's weight, by what holds it; empty where nothing does
   std::vector<bool> tissue;     // one a corner of it: no ghost; empty where all particles are tissue
   /// [1/m^2] norm of ElasticRest::spread_inverse: what a cut leaves of a cell can be narrower, so that its stress would
   /// need a shorter step. It resists as a flat cluster does.

@@ -28,11 +28,11 @@ struct Clamp {
   std::vector<double> masses;  // [kg] of them
   std::vector<Entry> springs;
 
-  /// `fixed` corners stay where they were put. A spring of area A weighs as much as kStiff layers of cells,
-  /// kStiff A spacing density: softer ones let the body sink, stiffer ones at an angle to the lattice lock its cells,
-  /// which cannot bend along the border (docs/method.md, Clamps).
-  Clamp(const CellLattice& lattice, const std::vector<ClampPoint>& points, const std::vector<bool>& fixed,
-        const std::vector<double>& corner_masses, double density);
+  /// A spring of area A weighs as much as kStiff layers of cells, kStiff A spacing density: softer ones let the body
+  /// sink, stiffer ones at an angle to the lattice lock its cells, which cannot bend along the border (docs/method.md,
+  /// Clamps).
+  Clamp(const CellLattice& lattice, const std::vector<ClampPoint>& points, const std::vector<double>& corner_masses,
+        double density);
 
   std::size_t bytes() const { return corners.size() * 12 + springs.size() * sizeof(Entry); }
 };

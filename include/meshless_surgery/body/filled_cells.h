@@ -13,10 +13,7 @@ namespace meshless {
 /// clusters are made by weighCells().
 void makeParticlesOfCells(BodyModel& model);
 
-/// One a corner: false where all of the tissue around it is held.
-std::vector<bool> movingCorners(const CellLattice& lattice);
-
-/// fixed and any_fixed: corners stay where all of the tissue around them is held.
+/// fixed and any_fixed, of the corners of cells that are held.
 void holdCorners(BodyModel& model);
 
 /// Weights of the clusters of model.lattice. Elastic: those that make a cell's affine fit the trilinear map's gradient

@@ -48,7 +48,6 @@ struct RowBody {
   const Vec3* positions = nullptr;         // [m] particles now
   const Vec3* vertices = nullptr;          // [m] as contact sees them
   const double* inverse_masses = nullptr;  // [1/kg] of particles, 0 where they are held
-  const double* carried = nullptr;         // 0..1, of their tissue, what is held; null: none is
 };
 
 /// Appends the row of a pair, or none (null) where both of its points hang mostly on particles that are held: the few

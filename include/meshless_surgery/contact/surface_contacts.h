@@ -28,7 +28,6 @@ struct Collider {
   Vec3* positions = nullptr;               // [m] one a particle
   const Vec3* velocities = nullptr;        // [m/s]; null: of an obstacle
   const double* inverse_masses = nullptr;  // [1/kg] 0: held
-  const double* carried = nullptr;         // 0..1, of the tissue of a particle, what is held; null: none is
   Index particles = 0;
   double friction = 0.5;
   double restitution = 0.0;  // 0..1

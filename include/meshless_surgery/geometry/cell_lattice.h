@@ -10,7 +10,7 @@
 
 namespace meshless {
 
-/// How much of a cell resists, and where, in units of momentsOf(): what is filled and not held.
+/// How much of a cell resists, and where, in units of momentsOf(): what is filled, and of what is held nothing.
 struct Resistance {
   double fraction = 1.0;
   Vec3 centroid = Vec3::Zero();
@@ -18,13 +18,14 @@ struct Resistance {
 };
 
 /// A copy of a lattice cell: one for each part of the solid in it that hangs together (two fingers, the walls of a
-/// slit, the sides of a cut), with all eight corners. Nesme et al. 2009; Sifakis et al. 2007.
+/// slit, the sides of a cut, what is held and what is free), with all eight corners. Nesme et al. 2009; Sifakis et al.
+/// 2007.
 struct LatticeCell {
   std::array<Index, 8> corners{};       // bits 0, 1, 2 of the position: upper end along x, y, z
   std::array<std::int32_t, 3> place{};  // in the lattice
   SampleSet samples = kNoSample;        // the part; none of a crumb that is smaller than a sample
   SampleSet filled = kNoSample;         // what its moments are of: the part, or of a crumb the part that it came from
-  SampleSet held = kNoSample;           // samples in what is held in place: they weigh, and do not resist
+  bool held = false;                    // its tissue is held in place: it weighs, and does not resist
   Resistance resists;                   // of `filled`
   LinkSet parted{};                     // links of its samples that a blade has cut
   double mass_share = 1.0;              // of what `filled` weighs; 0 of a bridge
@@ -74,17 +75,14 @@ struct CornerUses {
 };
 CornerUses cornerUses(const CellLattice& lattice);
 
-/// The links across the face between two cells of which `upper` is next to `lower` along the axis, in bits of `lower`.
-SampleSet faceLinks(const LatticeCell& lower, const LatticeCell& upper, int axis);
-
 /// What is left of a cell's resistance by a blade that leaves it `filled`.
 Resistance resistanceOf(const LatticeCell& before, SampleSet filled);
 
 /// [m] from a place to what is held, below 0 in it.
 using HeldHeight = std::function<double(const Vec3& rest)>;
-/// Which samples are held, and what resists, finer than by whole samples: how far the surface and what is held reach
-/// into the eighth of a sample. Tissue that no sample sees counts with the nearest cell that has one. `held` may be
-/// null.
+/// Parts each cell into what is held and what is free, which have no corner in common, and finds what resists, finer
+/// than by whole samples: how far the surface and what is held reach into the eighth of a sample. Tissue that no sample
+/// sees counts with the nearest cell that has one. `held` may be null.
 void findResistance(const SolidQuery& solid, const HeldHeight& held, CellLattice& lattice);
 
 /// The lattice is centred on the bounds; a box whose edges are whole multiples of the spacing is filled exactly. Gaps

@@ -64,4 +64,9 @@ inline double trilinearWeight(int corner, const Vec3& at) {
          (corner & 4 ? at.z() : 1.0 - at.z());
 }
 
+/// The links across the face between two places of which `upper` is next to `lower` along the axis, in bits of `lower`.
+constexpr SampleSet faceLinks(SampleSet lower, SampleSet upper, int axis) {
+  return lower & kUpperLayer[axis] & ((upper & kLowerLayer[axis]) << (kCellSamples - 1) * kSampleStride[axis]);
+}
+
 }  // namespace meshless
