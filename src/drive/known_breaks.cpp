@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <istream>
+#include <set>
 
 #include "words.h"
 
@@ -21,6 +22,7 @@ std::string trimmed(const std::string& text) {
 
 Result<std::vector<KnownBreak>> readKnownBreaks(std::istream& in) {
   std::vector<KnownBreak> known;
+  std::set<std::string> seeds;
   std::string text;
   for (std::size_t line = 1; std::getline(in, text); ++line) {
     text = trimmed(text);
@@ -40,7 +42,9 @@ Result<std::vector<KnownBreak>> readKnownBreaks(std::istream& in) {
       for (const char* name : kLawNames) accepted += (accepted.empty() ? "" : ", ") + std::string(name);
       return malformed(line, "law is '" + parts[1] + "'; accepted: " + accepted);
     }
-    if (known.size() == kMostKnownBreaks) return malformed(line, words("more than ", kMostKnownBreaks, " are known"));
+    seeds.insert(parts[0]);
+    if (seeds.size() > kMostKnownBreaks)
+      return malformed(line, words("more than ", kMostKnownBreaks, " scenes are known"));
     known.push_back({std::stoull(parts[0]), static_cast<Law>(law - kLawNames.begin()), parts[2]});
   }
   return known;

@@ -16,7 +16,7 @@ struct KnownBreak {
 constexpr std::size_t kMostKnownBreaks = 3;
 
 /// Lines "SEED | LAW | REASON"; empty ones and those that begin with # are left out. Refuses (kInvalidArgument) another
-/// form, a law that is not there, no reason, and more than kMostKnownBreaks lines.
+/// form, a law that is not there, no reason, and more than kMostKnownBreaks scenes.
 Result<std::vector<KnownBreak>> readKnownBreaks(std::istream& in);
 
 /// What is not as it is known: a law that breaks and is not listed, one that is listed and holds, a scene that was
