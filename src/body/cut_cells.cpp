@@ -505,13 +505,6 @@ class CellCutter {
     LatticeCell crumb = before_.cells[was];
     crumb.samples = kNoSample;
     crumb.bridge = kNoIndex;
-    bool alone = true, beside_held = false;
-    for (Index c = 0; c < cells().size(); ++c)
-      if (piece_of_[component_[c]] == piece) {
-        alone = false;
-        beside_held = beside_held || cells()[c].held;
-      }
-    crumb.held = crumb.held && (alone || beside_held);  // a blade next to the clamp leaves a film on the other side
     for (Index& corner : crumb.corners) {
       cut_.parent_corner.push_back(corner);
       corner = cut_.lattice.corners++;

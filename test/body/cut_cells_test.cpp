@@ -212,17 +212,42 @@ TEST(CutCells, APieceAtRestStaysAtRest) {
   }
 }
 
-// A clamp holds the copies that have tissue; the other side of the cut goes free.
+// A clamp holds what is on its side of a cut, and the other side goes free.
 TEST(CutCells, AClampHoldsTheSideThatItIsOn) {
   BodyDef def = filled(boxMesh(Vec3(0.2, 0.09, 0.09), 8, 4, 4), 0.03);
   def.fixed = {{Vec3(-1, -1, -1), Vec3(-0.0905, 1, 1)}};
   const PreparedBody body = prepared(def);
   ASSERT_TRUE(body.model->any_fixed);
-  const Result<CutBody> cut = cutBody(*body.model, body.state, Plane{Vec3::UnitX(), Vec3(-0.09, 0, 0)});
-  ASSERT_TRUE(cut.ok());
-  ASSERT_EQ(cut->pieces.size(), 2u);
-  EXPECT_FALSE(cut->pieces[0].model->any_fixed);
-  EXPECT_TRUE(cut->pieces[1].model->any_fixed);
+  for (const double at : {-0.0903, -0.09, -0.0888, -0.0886, -0.085, -0.07, -0.05})
+    for (const double slope : {0.0, 0.002}) {
+      SCOPED_TRACE(std::to_string(at) + ", " + std::to_string(slope));
+      const Plane plane{Vec3(1.0, slope, 0.0).normalized(), Vec3(at, 0, 0)};
+      const Result<CutBody> cut = cutBody(*body.model, body.state, plane);
+      ASSERT_TRUE(cut.ok());
+      ASSERT_EQ(cut->pieces.size(), 2u);
+      EXPECT_FALSE(cut->pieces[0].model->any_fixed);
+      EXPECT_TRUE(cut->pieces[1].model->any_fixed);
+    }
+}
+
+// No vertex of the surface lies in it.
+TEST(CutCells, WhatIsHeldInTheMiddleStaysInItsPiece) {
+  BodyDef def = filled(boxMesh(Vec3(0.2, 0.09, 0.09), 8, 4, 4), 0.01);
+  def.fixed = {{Region::sphere(Vec3(0.01, 0, 0), 0.025), false}};
+  const PreparedBody body = prepared(def);
+  for (const double at : {-0.06, 0.08}) {
+    const Result<CutBody> cut =
+        cutBody(*body.model, body.state, Plane{Vec3(1.0, 0.1, 0.2).normalized(), Vec3(at, 0, 0)});
+    ASSERT_TRUE(cut.ok());
+    ASSERT_EQ(cut->pieces.size(), 2u);
+    for (const BodyPiece& piece : cut->pieces) {
+      const bool with_it = piece.model->rest_volume > 0.5 * body.model->rest_volume;
+      EXPECT_EQ(piece.model->any_fixed, with_it) << at;
+      EXPECT_NEAR(piece.model->mass / body.model->mass, piece.model->rest_volume / body.model->rest_volume, 0.01) << at;
+      EXPECT_NEAR(heldShare(*piece.model) * piece.model->mass,
+                  with_it ? heldShare(*body.model) * body.model->mass : 0.0, 1e-12);
+    }
+  }
 }
 
 // Slices thinner than a sample: no cell sees them, and they are bodies with mass all the same.
