@@ -6,10 +6,6 @@
 namespace meshless {
 namespace {
 
-// Of the tissue at both places together, what is free: with less, one does not give way to the other. Pressed all the
-// same, what is free of it would have to go many times as far in its stead.
-constexpr double kFree = 0.9;
-
 // Of one body, merged: vertices share particles.
 void addEntries(const FeaturePair& pair, int from, int to, const ContactSurface& surface,
                 std::vector<RowEntry>& entries) {
@@ -32,15 +28,9 @@ void addEntries(const FeaturePair& pair, int from, int to, const ContactSurface&
   }
 }
 
-/// Of the tissue at a body's places, 0..1.
-double freeShare(const std::vector<RowEntry>& entries, Index begin, Index end, const RowBody& body) {
-  double held = 0.0, all = 0.0;
-  for (Index k = begin; k < end; ++k) {
-    const double share = std::abs(entries[k].coefficient);
-    all += share;
-    if (!(body.inverse_masses[entries[k].particle] > 0.0)) held += share;
-  }
-  return all > 0.0 ? 1.0 - held / all : 0.0;
+bool anyMoves(const std::vector<RowEntry>& entries, Index begin, Index end, const RowBody& body) {
+  return std::any_of(entries.begin() + begin, entries.begin() + end,
+                     [&](const RowEntry& entry) { return body.inverse_masses[entry.particle] > 0.0; });
 }
 
 }  // namespace
@@ -53,9 +43,7 @@ ContactRow* makeRow(const FeaturePair& pair, const RowBody& a, const RowBody& b,
   row.middle = static_cast<Index>(set.entries.size());
   if (pair.of_b > 0 && !with_itself) addEntries(pair, pair.of_a, pair.of_a + pair.of_b, *b.surface, set.entries);
   row.end = static_cast<Index>(set.entries.size());
-  const double free_a = freeShare(set.entries, row.begin, row.middle, a);
-  const double free_b = with_itself ? free_a : freeShare(set.entries, row.middle, row.end, b);
-  if (!(free_a + free_b > kFree)) {
+  if (!anyMoves(set.entries, row.begin, row.middle, a) && !anyMoves(set.entries, row.middle, row.end, b)) {
     set.entries.resize(row.begin);
     return nullptr;
   }
