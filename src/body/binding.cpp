@@ -11,6 +11,7 @@
 #include <optional>
 
 #include <tbb/enumerable_thread_specific.h>
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
 #include "meshless_surgery/geometry/nearest.h"
@@ -21,6 +22,7 @@ namespace {
 
 constexpr std::size_t kCarriers = 12;
 constexpr std::size_t kEnoughCarriers = 9;    // that a cut leaves of a vertex: no others are searched for
+constexpr std::size_t kFewCarriers = 8;       // as a cell has corners: smooth surfaces have three times as many
 constexpr std::size_t kMostCarriers = 40;     // of a vertex that twelve would amplify
 constexpr double kSoft[] = {0.01, 0.1, 1.0};  // the softer, the less do the nearest carriers outweigh the others
 constexpr std::size_t kChunk = 64;            // embedded vertices
@@ -349,6 +351,49 @@ SurfaceBinding bindSurface(const Points& rest, const ParticleGraph& graph, const
   binding.lever_clusters.erase(std::unique(binding.lever_clusters.begin(), binding.lever_clusters.end()),
                                binding.lever_clusters.end());
   return binding;
+}
+
+SurfaceBinding fewerCarriers(const SurfaceBinding& binding, const Points& rest, double spacing) {
+  struct Carrier {
+    Index particle;
+    double weight;
+    Eigen::Vector4d terms;  // 1, and where it is from the vertex
+  };
+  std::vector<Carrier> carriers;
+  SurfaceBinding fewer = binding;
+  fewer.carriers.clear();
+  fewer.weights.clear();
+  for (Index r = 0; r < binding.embedded.size(); ++r) {
+    Vec3 place = Vec3::Zero();
+    for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k)
+      place += binding.weights[k] * rest[binding.carriers[k]];
+    carriers.clear();
+    for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k) {
+      carriers.push_back({binding.carriers[k], binding.weights[k], Eigen::Vector4d::UnitX()});
+      carriers.back().terms.tail<3>() = (rest[binding.carriers[k]] - place) / spacing;
+    }
+    std::stable_sort(carriers.begin(), carriers.end(),
+                     [](const Carrier& a, const Carrier& b) { return std::abs(a.weight) > std::abs(b.weight); });
+    Eigen::Vector4d lacking = Eigen::Vector4d::UnitX();
+    Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
+    const std::size_t count = std::min(carriers.size(), kFewCarriers);
+    for (std::size_t k = 0; k < count; ++k) {
+      lacking -= carriers[k].weight * carriers[k].terms;
+      moments += std::abs(carriers[k].weight) * carriers[k].terms * carriers[k].terms.transpose();
+    }
+    const Eigen::LDLT<Eigen::Matrix4d> solver(moments);
+    if (count < carriers.size() && solver.rcond() > kRank * kRank) {
+      carriers.resize(count);
+      const Eigen::Vector4d more = solver.solve(lacking);
+      for (Carrier& carrier : carriers) carrier.weight += std::abs(carrier.weight) * more.dot(carrier.terms);
+    }
+    for (const Carrier& carrier : carriers) {
+      fewer.carriers.push_back(carrier.particle);
+      fewer.weights.push_back(carrier.weight);
+    }
+    fewer.offsets[r + 1] = static_cast<Index>(fewer.carriers.size());
+  }
+  return fewer;
 }
 
 Points collisionPlaces(const BodyModel& model, const Points& positions) {

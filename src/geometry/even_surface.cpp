@@ -158,6 +158,9 @@ Status checkSame(const TriangleMesh& surface, const TriangleMesh& even) {
 }  // namespace
 
 Result<EvenSurface> evenSurface(const TriangleMesh& surface, double edge, std::size_t most_triangles) {
+  const MeshReport report = inspectMesh(surface, false);
+  if (surface.triangles.empty() || report.non_finite_vertices > 0 || report.bad_indices > 0)
+    return unsuitable("it has no triangles, or some with corners that are not there or not finite");
   const double area = surfaceArea(surface), least = std::sqrt(area / (0.25 * std::sqrt(3.0) * most_triangles));
   if (!(edge > 0.0) || !std::isfinite(edge) || edge < least) {
     std::ostringstream text;
@@ -165,9 +168,6 @@ Result<EvenSurface> evenSurface(const TriangleMesh& surface, double edge, std::s
          << " m, which makes " << most_triangles << " triangles";
     return Error{ErrorCode::kInvalidArgument, text.str()};
   }
-  const MeshReport report = inspectMesh(surface, false);
-  if (surface.triangles.empty() || report.non_finite_vertices > 0 || report.bad_indices > 0)
-    return unsuitable("it has no triangles, or some with corners that are not there or not finite");
   if (report.degenerate_triangles > 0)
     return unsuitable(std::to_string(report.degenerate_triangles) + " of its triangles have no area");
   const Box bounds = boundsOf(surface.vertices);

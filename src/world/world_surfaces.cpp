@@ -6,6 +6,7 @@
 #include <numeric>
 #include <sstream>
 
+#include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/body/preserve.h"
 #include "meshless_surgery/dynamics/extent.h"
 #include "meshless_surgery/geometry/measures.h"
@@ -24,7 +25,8 @@ constexpr double kSlowedMass = 0.05;  // of an island, at most: slivers are slow
 // Bodies without a surface meet others by their particles.
 ContactSurface surfaceOf(const BodyModel& model) {
   if (model.surface.vertices.empty()) return {TriangleMesh(), ownSupports(static_cast<Index>(model.rest.size()))};
-  const SurfaceBinding& binding = model.collision ? model.collision->binding : model.binding;
+  const SurfaceBinding binding =
+      model.collision ? fewerCarriers(model.collision->binding, model.rest, model.spacing) : model.binding;
   const TriangleMesh& mesh = model.collision ? model.collision->mesh : model.surface;
   const Index count = static_cast<Index>(mesh.vertices.size());
   VertexSupports supports;

@@ -44,6 +44,11 @@ inline Vec3 embeddedPosition(const SurfaceBinding& binding, const Points& positi
   return sum;
 }
 
+/// The same by at most eight carriers a vertex: those that carry most, with weights that leave it where it is wherever
+/// the body moves affinely (moving least squares of degree one, about the weights that they had). Where eight lie in a
+/// plane, all stay. For contact, which asks how a vertex moves in every substep, and wants no smooth surface.
+SurfaceBinding fewerCarriers(const SurfaceBinding& binding, const Points& rest, double spacing);
+
 /// Where contact takes the vertices of model.collision to be, which must be there [m].
 Points collisionPlaces(const BodyModel& model, const Points& positions);
 
