@@ -24,7 +24,7 @@ namespace meshless {
 namespace {
 
 constexpr double kBeneath = 1e-3;      // [spacing]
-constexpr double kCrumb = 1.0 / 64.0;  // of a cell, for a piece of it that no sample sees
+constexpr double kCrumb = 1.0 / 64.0;  // of a cell: what a sample stands for, and what tissue gets that none sees
 constexpr std::size_t kChunk = 256;    // vertices
 
 // A vertex of a piece, or of its surface for contact, whose new cell is not known yet.
@@ -355,9 +355,10 @@ class CellCutter {
           names.emplace(corners.find(cell.corners[0]), static_cast<Index>(names.size())).first->second);
     piece_of_.assign(names.size(), sources_.size() == 1 ? 0 : -1);
     seen_.assign(names.size(), false);
+    for (std::size_t p = 0; p < sources_.size(); ++p) crumb_.push_back(isCrumb(surfaces_[p].mesh));
     std::vector<std::map<int, int>> votes(names.size());
     for (std::size_t p = 0; p < sources_.size(); ++p)
-      for (Index v = 0; v < surfaces_[p].embedded.size(); ++v)
+      for (Index v = 0; v < surfaces_[p].embedded.size() && !crumb_[p]; ++v)
         if (const Index c = surfaces_[p].cells[v]; c != kNoIndex && !surfaces_[p].embedded[v].made())
           ++votes[component_[c]][static_cast<int>(p)];
     for (Index n = 0; n < names.size(); ++n) {
@@ -399,6 +400,11 @@ class CellCutter {
     for (int& piece : piece_of_) piece = std::max(piece, 0);
   }
 
+  // Less tissue than a sample stands for.
+  bool isCrumb(const TriangleMesh& rest) const {
+    return sources_.size() > 1 && signedVolume(rest) < kCrumb * std::pow(before_.spacing, 3);
+  }
+
   // What is held has no corner in common with what is free. Links on one side of the blade hold them together.
   void joinAtTheClamp(UnionFind& corners) {
     for (Index held = 0; held < cells().size(); ++held) {
@@ -435,6 +441,10 @@ class CellCutter {
     carriers_.resize(sources_.size());
     for (std::size_t p = 0; p < sources_.size(); ++p) {
       const std::vector<EmbeddedVertex>& embedded = surfaces_[p].embedded;
+      if (crumb_[p]) {  // it goes as a whole
+        carriers_[p].assign(embedded.size(), addCrumb(withMass(embedded.front().was), static_cast<int>(p)));
+        continue;
+      }
       carriers_[p] = cellsOf(surfaces_[p], static_cast<int>(p));
       std::map<Index, Index> crumbs;
       for (Index v = 0; v < embedded.size(); ++v) {
@@ -453,6 +463,7 @@ class CellCutter {
     collisions_.resize(sources_.size());
     for (std::size_t s = sources_.size(); s < surfaces_.size(); ++s) {
       const RestSurface& surface = surfaces_[s];
+      if (isCrumb(surface.mesh)) continue;
       std::vector<Index> votes(sources_.size(), 0);
       for (Index v = 0; v < surface.embedded.size(); ++v)
         if (const Index c = surface.cells[v]; c != kNoIndex && !surface.embedded[v].made())
@@ -882,6 +893,7 @@ class CellCutter {
   std::vector<int> piece_of_;                 // of each component
   Index sampled_ = 0;                         // cells before crumbs were made
   std::vector<bool> seen_;                    // a vertex is in it
+  std::vector<bool> crumb_;                   // of each source: less tissue than a sample stands for
   std::vector<std::vector<Index>> carriers_;  // of each source's vertices
   std::vector<Index> heir_;                   // of each of the parent's corners
 };

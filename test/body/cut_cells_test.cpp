@@ -267,6 +267,26 @@ TEST(CutCells, SliversHaveCellsOfTheirOwn) {
   }
 }
 
+// Two splinters off the edges of a bar, seven cells long, each of less tissue than a sample stands for: hinged in
+// every cell they would flap about, and weigh seven times as much.
+TEST(CutCells, SplintersOfLessThanASampleAreOneCell) {
+  const PreparedBody body = prepared(filled(boxMesh(Vec3(0.2, 0.09, 0.09), 16, 8, 8), 0.03));
+  const double cell = 1000.0 * std::pow(0.03, 3);  // [kg]
+  for (const double side : {-1.0, 1.0}) {
+    const Vec3 normal = Vec3(0, side, 1).normalized();
+    const Result<CutBody> cut =
+        cutBody(*body.model, body.state, Plane{normal, Vec3(0, 0.045 * side, 0.045) - 0.001 * normal});
+    ASSERT_TRUE(cut.ok()) << cut.error().detail;
+    ASSERT_EQ(cut->pieces.size(), 2u);
+    for (const BodyPiece& piece : cut->pieces) {
+      expectSound(piece, *body.model, body.state);
+      if (piece.model->rest_volume > 1e-5) continue;
+      EXPECT_EQ(piece.model->lattice->cells.size(), 1u);
+      EXPECT_LE(piece.model->mass, cell / 64.0);
+    }
+  }
+}
+
 TEST(CutCells, ManyCutsAfterEachOther) {
   Random random(5);
   PreparedBody whole = prepared(filled(sphereMesh(0.1, 0.02), 0.02));
