@@ -77,6 +77,7 @@ void ClampStep::hold(const std::shared_ptr<const Clamp>& clamp, double share, co
     clamp_ = clamp;
     share_ = share;
     factorise(*clamp, share);
+    ++factorised_;
   }
   const std::size_t n = order_.size();
   for (std::size_t i = 0; i < n; ++i) found_[i] = masses_[i] * (positions[order_[i]] - placed * rest[order_[i]]);

@@ -230,7 +230,7 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
     }
   if (model.clamp) {
     // As stiff as ever, whatever the body's stretch and substep: springs that stiffen and soften in turns give energy.
-    const double part = h / (state.stretch * longestSubstep(model, state));
+    const double part = h * kMargin * model.highest_frequency / kMostGain;
     scratch.clamp.hold(model.clamp, part > 0.0 ? part * part : 1.0, model.rest, state.placed, x);
   }
 }

@@ -44,6 +44,7 @@ class ClampStep {
   /// `share`: the square of the step over the longest at rest, so that the springs are as stiff in every step.
   void hold(const std::shared_ptr<const Clamp>& clamp, double share, const Points& rest, const Pose& placed,
             Points& positions);
+  std::size_t factorised() const { return factorised_; }  // so many times
   std::size_t bytes() const;
 
  private:
@@ -51,6 +52,7 @@ class ClampStep {
 
   std::shared_ptr<const Clamp> clamp_;
   double share_ = 0.0;
+  std::size_t factorised_ = 0;
   // M + share sum of springs = P^T L L^T P; L by columns, the diagonal first.
   std::vector<Index> order_;  // of P: corners
   std::vector<double> masses_;
