@@ -63,6 +63,11 @@ double embeddedReachOf(const BodyModel& model) {
   return 2.0 * std::min(std::sqrt(farthest), model.spacing);
 }
 
+// Thinner than the samples of its cells: both of its sides hang on the same particles, which cannot part them.
+bool isFilm(const BodyModel& model) {
+  return model.lattice && 2.0 * model.rest_volume * kCellSamples < model.rest_area * model.spacing;
+}
+
 // [m] of what meets others beyond the bounds of the particles, at most.
 double contactReachOf(const BodyModel& model) {
   return embeddedReachOf(model) + (model.collision ? model.collision->distance : 0.0);
@@ -155,6 +160,7 @@ void World::Impl::fillCollider(WorldBody& body, double h_frame, Collider& collid
   collider.bounds = body.bounds;
   const SelfContact wanted = body.material.self_contact;
   if (!body.material.bends() || body.model->clusters.size() == 1 || wanted == SelfContact::kNone) return;
+  if (isFilm(*body.model)) return;
   if (wanted == SelfContact::kAll) collider.self = PairSearch::Self::kAll;
   if (wanted == SelfContact::kWoundFaces && body.model->incised) collider.self = PairSearch::Self::kCuts;
 }

@@ -1,4 +1,7 @@
 // A body that meets itself: wound faces of an incision, and a strip that is folded over.
+#include <random>
+
+#include "meshless_surgery/geometry/random_organ.h"
 #include "support/bodies.h"
 
 namespace meshless {
@@ -154,6 +157,44 @@ int foldedInto(SelfContact self_contact) {
     if (mesh.vertices[v].x() > 0.2)
       deep += windings(body.surface, mesh.triangles, body.surface[v] - 0.001 * normals[v].normalized()) > 1.5;
   return deep;
+}
+
+// Films between two cuts, thinner than samples see. Both sides of one hang on the same particles: who parts them by
+// these turns it inside out.
+TEST(SelfContact, FilmsBetweenCutsKeepTheirVolume) {
+  for (const std::uint64_t seed : {4u, 20u}) {
+    BodyDef def = test::defOf(*randomOrgan(seed, 0, 0.1, 16000), "organ");
+    def.pose.translation.z() = 0.03 - boundsOf(def.mesh.vertices).min.z();
+    def.spacing = 0.01;
+    def.material.youngs_modulus = 4500.0;
+    def.material.density = 1060.0;
+    def.material.damping = 4.0;
+    def.material.friction = 0.3;
+    World world{WorldSettings()};
+    ASSERT_TRUE(world.addSceneBody(std::make_shared<const PreparedBody>(test::prepared(def))).ok());
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    for (int cut = 0; cut < 4; ++cut) {
+      Vec3 centre = Vec3::Zero(), across;
+      double mass = 0.0;
+      for (const BodySnapshot& body : world.snapshot({false, false, true}).bodies) {
+        centre += body.model->mass * body.measures.centre_of_mass;
+        mass += body.model->mass;
+      }
+      normal.reset();
+      for (int k = 2; k >= 0; --k) across[k] = normal(random);
+      CutCommand command;
+      command.blades.x_axis = across.normalized().unitOrthogonal();
+      command.blades.y_axis = across.normalized().cross(command.blades.x_axis);
+      command.blades.origin = centre / mass - 10.0 * command.blades.x_axis;
+      ASSERT_TRUE(world.apply(command).ok());
+    }
+    for (int step = 0; step < 60; ++step) world.step();
+    const WorldSnapshot seen = world.snapshot({true, false, true});
+    EXPECT_GT(seen.bodies.size(), 10u);
+    for (const BodySnapshot& body : seen.bodies)
+      EXPECT_GT(body.measures.volume, 0.7 * body.model->rest_volume) << seed << ", " << body.name;
+  }
 }
 
 TEST(SelfContact, AStripIsFoldedOntoItselfNotIntoItself) {
