@@ -252,18 +252,22 @@ void registerRows() {
   const auto material = [](double youngs_modulus, double friction) {
     Material of_organ;
     of_organ.youngs_modulus = youngs_modulus;
+    of_organ.poissons_ratio = 0.45;
     of_organ.density = 1060.0;
-    of_organ.damping = 4.0;
+    of_organ.damping = 10.0;
     of_organ.friction = friction;
     return of_organ;
   };
-  const std::tuple<const char*, Pieces> organs[] = {{"elastic_liver/4", {1, 0, 4, material(4500.0, 0.3), 1}},
-                                                    {"elastic_liver/4/20k", {1, 0, 4, material(4500.0, 0.3), 1, 20000}},
-                                                    {"elastic_liver/4/60k", {1, 0, 4, material(4500.0, 0.3), 1, 60000}},
-                                                    {"elastic_liver/6", {2, 0, 6, material(4500.0, 0.3), 1}},
-                                                    {"elastic_kidney/3", {3, 2, 3, material(5000.0, 0.3), 1}},
-                                                    {"elastic_muscle/1", {4, 0, 1, material(11100.0, 0.4), 1}},
-                                                    {"default/6", {5, 0, 6, Material(), 1}}};
+  const Material liver = material(4500.0, 0.3);  // as shipped
+  std::vector<std::pair<std::string, Pieces>> organs;
+  for (const auto& [name, triangles] : {std::pair("", 4120), std::pair("/20k", 20000), std::pair("/60k", 60000)})
+    for (const unsigned seed : {1, 2, 3, 4, 5})
+      organs.push_back(
+          {std::string("elastic_liver/4") + name + "/seed" + std::to_string(seed), {seed, 0, 4, liver, 1, triangles}});
+  organs.push_back({"elastic_liver/8", {1, 0, 8, liver, 1}});
+  organs.push_back({"elastic_kidney/3", {3, 2, 3, material(5000.0, 0.3), 1}});
+  organs.push_back({"elastic_muscle/1", {4, 0, 1, material(11100.0, 0.4), 1}});
+  organs.push_back({"default/6", {5, 0, 6, Material(), 1}});
   for (const auto& [name, pieces] : organs)
     for (const int threads : {1, 2}) {
       Pieces on_threads = pieces;

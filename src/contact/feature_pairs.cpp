@@ -416,9 +416,9 @@ void findNear(const PairSearch& search, SearchScratch& scratch) {
   scratch.met.clear();
   scratch.first.assign(search.a.surface->vertices(), kNoIndex);
   const SurfaceFrame &a = *search.a.frame, &b = *search.b.frame;
-  const auto mayMeet = [&](Index mine, Index theirs) {
-    return search.self == PairSearch::Self::kNo ||
-           a.point_turns.nodes[mine].leastDot(b.face_turns.nodes[theirs]) < -kSelfOpposed;
+  const auto mayMeet = [&](Index mine, Index child, Index theirs) {
+    if (search.self == PairSearch::Self::kNo) return ~0u;
+    return b.face_turns.nodes[theirs].dotBelow(a.point_turns.nodes[mine].box(static_cast<int>(child)), -kSelfOpposed);
   };
   const float by = static_cast<float>(searchMargin(search.length));
   search.a.surface->vertex_tree.queryTree(a.points, search.b.surface->tree, b.faces, by, scratch.stack, mayMeet,

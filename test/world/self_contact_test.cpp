@@ -1,6 +1,7 @@
 // A body that meets itself: wound faces of an incision, and a strip that is folded over.
 #include <random>
 
+#include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/random_organ.h"
 #include "support/bodies.h"
 
@@ -193,7 +194,7 @@ TEST(SelfContact, FilmsBetweenCutsKeepTheirVolume) {
     const WorldSnapshot seen = world.snapshot({true, false, true});
     EXPECT_GT(seen.bodies.size(), 10u);
     for (const BodySnapshot& body : seen.bodies)
-      EXPECT_GT(body.measures.volume, 0.7 * body.model->rest_volume) << seed << ", " << body.name;
+      EXPECT_GT(body.measures.volume, 0.5 * body.model->rest_volume) << seed << ", " << body.name;
   }
 }
 

@@ -28,23 +28,53 @@ struct FloatBox {
     min = lesser(o.min, min);
     max = greater(o.max, max);
   }
-  /// Or is nearer than `by` [m] along each axis. Without branches: which axis parts two boxes cannot be foretold.
-  bool overlaps(const FloatBox& o, float by = 0.0f) const {
-    const auto does = (min - by <= o.max) & (o.min - by <= max);
-    return (does[0] & does[1] & does[2]) != 0;
+};
+
+/// Four boxes side by side: one comparison for all of them, without branches, since which axis parts two boxes cannot
+/// be foretold.
+struct FourBoxes {
+  using Four = FloatBox::Four;
+  using Mask = int __attribute__((vector_size(16)));
+  std::array<Four, 3> min, max;  // [axis], one a box
+
+  void put(int k, const FloatBox& box) {
+    for (int axis = 0; axis < 3; ++axis) {
+      min[axis][k] = box.min[axis];
+      max[axis][k] = box.max[axis];
+    }
   }
-  /// The least dot product of a point in this box and one in the other.
-  float leastDot(const FloatBox& o) const {
-    const Four least = lesser(lesser(min * o.min, min * o.max), lesser(max * o.min, max * o.max));
-    return least[0] + least[1] + least[2];
+  FloatBox box(int k) const {
+    FloatBox box;
+    box.min = Four{min[0][k], min[1][k], min[2][k], 0.0f};
+    box.max = Four{max[0][k], max[1][k], max[2][k], 0.0f};
+    return box;
   }
-  /// The sum of its three edges.
-  float edgeSum() const { return (max[0] - min[0]) + (max[1] - min[1]) + (max[2] - min[2]); }
+  /// Bit k: the box k overlaps another or is nearer than `by` [m] along each axis.
+  unsigned overlapping(const FloatBox& o, float by = 0.0f) const {
+    Mask all{-1, -1, -1, -1};
+    for (int axis = 0; axis < 3; ++axis) all &= (min[axis] - by <= o.max[axis]) & (o.min[axis] - by <= max[axis]);
+    return bitsOf(all);
+  }
+  /// Bit k: a point in the box k and one in the other have a dot product below `limit`.
+  unsigned dotBelow(const FloatBox& o, float limit) const {
+    Four sum{};
+    for (int axis = 0; axis < 3; ++axis)
+      sum += FloatBox::lesser(FloatBox::lesser(min[axis] * o.min[axis], min[axis] * o.max[axis]),
+                              FloatBox::lesser(max[axis] * o.min[axis], max[axis] * o.max[axis]));
+    return bitsOf(sum < limit);
+  }
+
+ private:
+  static unsigned bitsOf(const Mask& mask) {
+    const Mask bits = mask & Mask{1, 2, 4, 8};
+    return static_cast<unsigned>((bits[0] | bits[1]) | (bits[2] | bits[3]));
+  }
 };
 
 /// Boxes of a frame.
 struct TreeBoxes {
-  std::vector<FloatBox> items, nodes;
+  std::vector<FloatBox> items;
+  std::vector<FourBoxes> nodes;  // of their children
   std::size_t bytes() const { return bytesOf(items, nodes); }
 };
 
@@ -66,20 +96,18 @@ class BoxTree {
     stack[depth++] = 0;
     while (depth > 0) {
       const Index at = stack[--depth];
-      if (!boxes.nodes[at].overlaps(box)) continue;
       const Node& node = nodes_[at];
-      if (node.count == 0) {
-        stack[depth++] = node.first;
-        stack[depth++] = node.first + 1;
-        continue;
-      }
-      for (Index k = node.first; k < node.first + node.count; ++k)
-        if (boxes.items[items_[k]].overlaps(box)) visit(items_[k]);
+      eachBit(boxes.nodes[at].overlapping(box), [&](Index k) {
+        if (node.leaf)
+          visit(items_[node.first + k]);
+        else
+          stack[depth++] = node.first + k;
+      });
     }
   }
 
   /// visit(item, other's item) for each two whose boxes are nearer than `by` [m], in an order that depends on the
-  /// topologies alone. may_meet(node, other's node) leaves out what is below both.
+  /// topologies alone. may_meet(node, child, other's node): bits of the other's children that the child may meet.
   template <class MayMeet, class Visit>
   void queryTree(const TreeBoxes& boxes, const BoxTree& other, const TreeBoxes& other_boxes, float by,
                  std::vector<std::array<Index, 2>>& stack, const MayMeet& may_meet, const Visit& visit) const {
@@ -88,22 +116,20 @@ class BoxTree {
     while (!stack.empty()) {
       const auto [mine, theirs] = stack.back();
       stack.pop_back();
-      if (!boxes.nodes[mine].overlaps(other_boxes.nodes[theirs], by) || !may_meet(mine, theirs)) continue;
       const Node &a = nodes_[mine], &b = other.nodes_[theirs];
-      if (a.count > 0 && b.count > 0) {
-        for (Index i = a.first; i < a.first + a.count; ++i) {
-          if (!boxes.items[items_[i]].overlaps(other_boxes.nodes[theirs], by)) continue;
-          for (Index j = b.first; j < b.first + b.count; ++j)
-            if (boxes.items[items_[i]].overlaps(other_boxes.items[other.items_[j]], by))
-              visit(items_[i], other.items_[j]);
-        }
-      } else if (b.count == 0 && (a.count > 0 || boxes.nodes[mine].edgeSum() < other_boxes.nodes[theirs].edgeSum())) {
-        stack.push_back({mine, b.first});
-        stack.push_back({mine, b.first + 1});
-      } else {
-        stack.push_back({a.first, theirs});
-        stack.push_back({a.first + 1, theirs});
+      unsigned any = 0;  // of theirs
+      for (Index i = 0; i < a.count; ++i) {
+        unsigned bits = other_boxes.nodes[theirs].overlapping(boxes.nodes[mine].box(i), by);
+        if (bits != 0) bits &= may_meet(mine, i, theirs);
+        any |= bits;
+        if (a.leaf && b.leaf)
+          eachBit(bits, [&](Index j) { visit(items_[a.first + i], other.items_[b.first + j]); });
+        else if (!a.leaf && b.leaf && bits != 0)
+          stack.push_back({a.first + i, theirs});
+        else if (!a.leaf && !b.leaf)
+          eachBit(bits, [&](Index j) { stack.push_back({a.first + i, b.first + j}); });
       }
+      if (a.leaf && !b.leaf) eachBit(any, [&](Index j) { stack.push_back({mine, b.first + j}); });
     }
   }
 
@@ -111,9 +137,16 @@ class BoxTree {
 
  private:
   struct Node {
-    Index first = 0, count = 0;  // of items; count 0: of two children
+    Index first = 0, count = 0;  // of its children, up to four, one after the other: items or nodes
+    bool leaf = true;
   };
   void split(Index node, Index begin, Index end, const Points& centres);
+  Index halve(Index begin, Index end, const Points& centres);
+
+  template <class Visit>
+  static void eachBit(unsigned bits, const Visit& visit) {
+    for (; bits != 0; bits &= bits - 1) visit(static_cast<Index>(__builtin_ctz(bits)));
+  }
 
   std::vector<Node> nodes_;  // children after their parents
   std::vector<Index> items_;

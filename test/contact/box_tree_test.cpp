@@ -1,0 +1,106 @@
+#include "meshless_surgery/contact/box_tree.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "meshless_surgery/base/random.h"
+
+namespace meshless {
+namespace {
+
+struct Boxes {
+  BoxTree tree;
+  TreeBoxes boxes;
+};
+
+/// So many in a unit cube; some of no size, some empty.
+Boxes randomBoxes(std::size_t count, double size, Random& random) {
+  Points centres;
+  Boxes made;
+  for (std::size_t n = 0; n < count; ++n) {
+    const Vec3 at = random.inCube(0.5);
+    const Vec3 half = n % 5 == 0 ? Vec3(Vec3::Zero()) : Vec3(random.inCube(size).cwiseAbs());
+    centres.push_back(at);
+    FloatBox box;
+    if (n % 17 != 16) {
+      box.extend(at - half);
+      box.extend(at + half);
+    }
+    made.boxes.items.push_back(box);
+  }
+  made.tree = BoxTree(centres);
+  made.tree.refit(made.boxes);
+  return made;
+}
+
+bool meet(const FloatBox& a, const FloatBox& b, float by) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(a.min[axis] - by <= b.max[axis] && b.min[axis] - by <= a.max[axis])) return false;
+  return true;
+}
+
+constexpr std::size_t kCounts[] = {0, 1, 3, 4, 5, 8, 9, 17, 64, 65, 1000};
+
+TEST(BoxTree, FindsWhatOverlapsABoxOnceAndNothingElse) {
+  Random random(1);
+  for (const std::size_t count : kCounts) {
+    const Boxes some = randomBoxes(count, 0.05, random);
+    for (const FloatBox& box : randomBoxes(40, 0.2, random).boxes.items) {
+      std::multiset<Index> found, expected;
+      some.tree.query(some.boxes, box, [&](Index item) { found.insert(item); });
+      for (Index n = 0; n < count; ++n)
+        if (meet(some.boxes.items[n], box, 0.0f)) expected.insert(n);
+      EXPECT_EQ(found, expected) << count << " boxes";
+    }
+  }
+}
+
+TEST(BoxTree, FindsPairsOfTwoTreesOnceAndNothingElse) {
+  Random random(2);
+  std::vector<std::array<Index, 2>> stack;
+  for (const std::size_t count : kCounts)
+    for (const std::size_t others : kCounts) {
+      const Boxes a = randomBoxes(count, 0.02, random), b = randomBoxes(others, 0.03, random);
+      std::multiset<std::array<Index, 2>> found, expected;
+      const auto all = [](Index, Index, Index) { return ~0u; };
+      a.tree.queryTree(a.boxes, b.tree, b.boxes, 0.01f, stack, all, [&](Index i, Index j) { found.insert({i, j}); });
+      for (Index i = 0; i < count; ++i)
+        for (Index j = 0; j < others; ++j)
+          if (meet(a.boxes.items[i], b.boxes.items[j], 0.01f)) expected.insert({i, j});
+      EXPECT_EQ(found, expected) << count << " and " << others << " boxes";
+    }
+}
+
+// Boxes of normals leave out who looks the same way, and nobody else.
+TEST(BoxTree, LeavesOutWhatTheCallerSaysAndNothingElse) {
+  Random random(3);
+  std::vector<std::array<Index, 2>> stack;
+  const std::size_t count = 300;
+  const Boxes a = randomBoxes(count, 0.05, random), b = randomBoxes(count, 0.05, random);
+  TreeBoxes turns_a, turns_b;
+  for (TreeBoxes* const turns : {&turns_a, &turns_b})
+    for (std::size_t n = 0; n < count; ++n) turns->items.emplace_back().extend(random.inCube(1.0).normalized());
+  a.tree.refit(turns_a);
+  b.tree.refit(turns_b);
+  std::multiset<std::array<Index, 2>> found, expected;
+  a.tree.queryTree(
+      a.boxes, b.tree, b.boxes, 0.0f, stack,
+      [&](Index mine, Index child, Index theirs) {
+        return turns_b.nodes[theirs].dotBelow(turns_a.nodes[mine].box(static_cast<int>(child)), -0.3f);
+      },
+      [&](Index i, Index j) {
+        found.insert({i, j});
+      });
+  for (Index i = 0; i < count; ++i)
+    for (Index j = 0; j < count; ++j) {
+      const FloatBox::Four product = turns_a.items[i].min * turns_b.items[j].min;
+      if (meet(a.boxes.items[i], b.boxes.items[j], 0.0f) && product[0] + product[1] + product[2] < -0.3f)
+        expected.insert({i, j});
+    }
+  EXPECT_FALSE(expected.empty());
+  EXPECT_EQ(found, expected);
+}
+
+}  // namespace
+}  // namespace meshless
