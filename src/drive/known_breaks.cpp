@@ -54,16 +54,18 @@ std::vector<std::string> unlikeKnown(const std::vector<DriveReport>& reports, co
   std::vector<std::string> said;
   for (const DriveReport& report : reports) {
     if (!report.refused.empty()) said.push_back(words("seed ", report.seed, " was refused: ", report.refused));
-    for (std::size_t n = 0; n < kLaws; ++n) {
-      const Finding& finding = report.findings[n];
-      const bool listed = std::any_of(known.begin(), known.end(), [&](const KnownBreak& one) {
-        return one.seed == report.seed && one.law == static_cast<Law>(n);
-      });
-      if (finding.broken() && !listed)
-        said.push_back(words("seed ", report.seed, " breaks ", kLawNames[n], ": ", finding.text));
-      if (!finding.broken() && listed && report.finished)
-        said.push_back(words("seed ", report.seed, " holds ", kLawNames[n], ": take it off the list"));
+    const auto broken = [&report](Law law) { return report.findings[static_cast<std::size_t>(law)].broken(); };
+    bool listed = false, breaks = false;
+    for (const KnownBreak& one : known) {
+      if (one.seed != report.seed) continue;
+      listed = true;
+      breaks = breaks || broken(one.law);
     }
+    if (listed && !breaks && report.finished)
+      said.push_back(words("seed ", report.seed, " holds what it is known to break: take it off the list"));
+    for (std::size_t n = 0; n < kLaws && !listed; ++n)
+      if (broken(static_cast<Law>(n)))
+        said.push_back(words("seed ", report.seed, " breaks ", kLawNames[n], ": ", report.findings[n].text));
   }
   return said;
 }

@@ -233,7 +233,10 @@ TEST(KnownBreaks, AreExpectedAndNoOthers) {
   EXPECT_EQ(unlikeKnown(reports, {}).at(0), "seed 1 breaks depth: 2 s: deep");
   const auto other = knownOf("1 | depth | a\n 3 | rest | it swings");
   ASSERT_TRUE(other.ok());
-  EXPECT_EQ(unlikeKnown(reports, *other).at(0), "seed 3 holds rest: take it off the list");
+  EXPECT_EQ(unlikeKnown(reports, *other).at(0), "seed 3 holds what it is known to break: take it off the list");
+  const auto more = knownOf("1 | depth | a\n 1 | rest | it swings");
+  ASSERT_TRUE(more.ok());
+  EXPECT_TRUE(unlikeKnown(reports, *more).empty()) << "what a listed scene breaks may depend on how far it came";
   reports[1].refused = "no shape";
   EXPECT_EQ(unlikeKnown(reports, *known).at(0), "seed 2 was refused: no shape");
 }

@@ -19,8 +19,9 @@ constexpr std::size_t kMostKnownBreaks = 3;
 /// form, a law that is not there, no reason, and more than kMostKnownBreaks scenes.
 Result<std::vector<KnownBreak>> readKnownBreaks(std::istream& in);
 
-/// What is not as it is known: a law that breaks and is not listed, one that is listed and holds, a scene that was
-/// refused. Scenes that did not finish are held to what they did. A sentence each; none: all is as known.
+/// What is not as it is known: a law that breaks in a scene that is not listed, a listed scene that holds all laws it is
+/// listed with, a scene that was refused. Scenes that did not finish are held to what they did; which laws a listed one
+/// breaks then depends on how far it came. A sentence each; none: all is as known.
 std::vector<std::string> unlikeKnown(const std::vector<DriveReport>& reports, const std::vector<KnownBreak>& known);
 
 }  // namespace meshless
