@@ -133,7 +133,7 @@ double viscosityTime(const BodyModel& model, const BodyState& state, double h) {
 }
 
 void matchAndMove(const BodyModel& model, const Material& material, const Vec3& gravity, double h, BodyState& state,
-                  StepScratch& scratch, MatchCounters& counters) {
+                  StepScratch& scratch, MatchCounters& counters, const ForEach& for_each) {
   Points& x = state.positions;
   Points& v = state.velocities;
   const std::size_t n = x.size();
@@ -185,8 +185,8 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
                                                          counters, state.swelling);
     } else {
       if (!scratch.under_way) model.elastic_batch->setRotations(state.poses, scratch.elastic);
-      state.stretch =
-          model.elastic_batch->accelerate(input, parameters, y, scratch.elastic, pull, counters, state.swelling);
+      state.stretch = model.elastic_batch->accelerate(input, parameters, y, scratch.elastic, pull, counters,
+                                                      state.swelling, widestInstructionSet(), for_each);
       if (scratch.last) model.elastic_batch->getRotations(scratch.elastic, state.poses);
     }
   } else if (gain > 0.0) {

@@ -272,7 +272,7 @@ struct World::Impl {
   void clearForces();
   void takeStep();
   void finishStep(double h_frame);
-  void matchAlone(WorldBody& body, double h, MatchCounters& counters) const;
+  void matchAlone(WorldBody& body, double h, MatchCounters& counters, const ForEach& each) const;
   std::unique_ptr<BatchLanes> borrowLanes(WorldBatch& batch);
   void giveBackLanes(WorldBatch& batch, std::unique_ptr<BatchLanes> lanes);
   void findLoads(const SurfaceWork& work);

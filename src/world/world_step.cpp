@@ -90,11 +90,11 @@ void World::Impl::finishStep(double h_frame) {
   report.tetrahedralizations = tetrahedralizations;
 }
 
-void World::Impl::matchAlone(WorldBody& body, double h, MatchCounters& counters) const {
+void World::Impl::matchAlone(WorldBody& body, double h, MatchCounters& counters, const ForEach& each) const {
   if (body.state.unwinding)
     unwind(*body.model, settings.gravity, h, body.state, body.scratch);
   else
-    matchAndMove(*body.model, body.material, settings.gravity, h, body.state, body.scratch, counters);
+    matchAndMove(*body.model, body.material, settings.gravity, h, body.state, body.scratch, counters, each);
 }
 
 // As many as the stiffest body needs.

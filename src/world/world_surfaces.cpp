@@ -501,7 +501,8 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
     runEach(each, work.alone.size(), [&](std::size_t b) {
       work.each_counters[b] = MatchCounters();
       work.alone[b]->scratch.last = substep + 1 == substeps;
-      matchAlone(*work.alone[b], h, work.each_counters[b]);
+      const bool most = 2 * work.alone[b]->state.positions.size() > work.particles;  // of the work is this body's
+      matchAlone(*work.alone[b], h, work.each_counters[b], most ? each : oneAfterAnother);
     });
     for (const MatchCounters& counters : work.each_counters) work.match_counters += counters;
     work.match += secondsSince(last);

@@ -37,8 +37,9 @@ struct StepScratch {
 /// ever. So every step is stable, and equilibria are the material's (Olovsson et al. 2005, "Selective mass scaling for
 /// explicit finite element analyses"). What else acts on particles has to do likewise: it moves them by stiffnessFactor
 /// of what their masses say, and a body that is free as a whole by the rest.
+/// for_each: spreads the cells of an elastic body over threads.
 void matchAndMove(const BodyModel& model, const Material& material, const Vec3& gravity, double h, BodyState& state,
-                  StepScratch& scratch, MatchCounters& counters);
+                  StepScratch& scratch, MatchCounters& counters, const ForEach& for_each = nullptr);
 
 /// [s] in which an elastic body, as it is stretched now, deforms as fast as its material; infinity for the others.
 double longestSubstep(const BodyModel& model, const BodyState& state);
