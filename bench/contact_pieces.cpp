@@ -4,14 +4,12 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
-#include <random>
 
 #include "meshless_surgery/body/body.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/organs.h"
 #include "meshless_surgery/geometry/primitives.h"
 #include "meshless_surgery/geometry/random_organ.h"
-#include "meshless_surgery/world/world.h"
 
 namespace meshless::bench {
 namespace {
@@ -22,7 +20,8 @@ double secondsOf(World& world, int steps) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// Through the centre of mass of all.
+}  // namespace
+
 bool cutAll(World& world, std::mt19937_64& random) {
   Vec3 centre = Vec3::Zero();
   double mass = 0.0;
@@ -38,8 +37,6 @@ bool cutAll(World& world, std::mt19937_64& random) {
   cut.blades.origin = centre / mass - 10.0 * cut.blades.x_axis;
   return world.apply(cut).ok();
 }
-
-}  // namespace
 
 PiecesTimes timePieces(const Pieces& of) {
   PiecesTimes times;

@@ -2,10 +2,15 @@
 #pragma once
 
 #include <cstdint>
+#include <random>
 
 #include "meshless_surgery/dynamics/material.h"
+#include "meshless_surgery/world/world.h"
 
 namespace meshless::bench {
+
+/// Cuts whatever a random plane through the centre of mass of all bodies meets. False where it was refused.
+bool cutAll(World& world, std::mt19937_64& random);
 
 struct Pieces {
   std::uint64_t seed = 1;  // of the organ and of the planes
