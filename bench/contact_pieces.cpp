@@ -1,10 +1,10 @@
 #include "contact_pieces.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <memory>
 
+#include "clock.h"
 #include "meshless_surgery/body/body.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/organs.h"
@@ -12,15 +12,12 @@
 #include "meshless_surgery/geometry/random_organ.h"
 
 namespace meshless::bench {
-namespace {
 
 double secondsOf(World& world, int steps) {
-  const auto start = std::chrono::steady_clock::now();
+  const double start = now();
   for (int n = 0; n < steps; ++n) world.step();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return now() - start;
 }
-
-}  // namespace
 
 bool cutAll(World& world, std::mt19937_64& random) {
   Vec3 centre = Vec3::Zero();

@@ -9,6 +9,9 @@
 
 namespace meshless::bench {
 
+/// [s] of wall time that so many steps take.
+double secondsOf(World& world, int steps);
+
 /// Cuts whatever a random plane through the centre of mass of all bodies meets. False where it was refused.
 bool cutAll(World& world, std::mt19937_64& random);
 

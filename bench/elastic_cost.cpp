@@ -1,7 +1,6 @@
 #include "elastic_cost.h"
 
 #include <algorithm>
-#include <chrono>
 
 namespace meshless::bench {
 namespace {
@@ -39,11 +38,9 @@ constexpr double kBoxOperations = kGather + kFitBox + kNewton + kStress + kPushB
 constexpr double kCellOperations = kGather + kFitCell + kNewton + kStress + kMix + kPushCell + kSum;
 constexpr double kParticleOperations = 3;  // times the inverse mass
 
-constexpr int kPasses = 7;
-constexpr double kShortest = 0.05;  // [s] of a pass
-constexpr double kTurn = 1e-3;      // [rad] from call to call, and as much strain
-
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+constexpr int kForcePasses = 7;
+constexpr double kShortestPass = 0.05;  // [s] of a pass
+constexpr double kTurn = 1e-3;          // [rad] from call to call, and as much strain
 
 }  // namespace
 
@@ -67,12 +64,12 @@ ElasticTime timeElastic(const BodyModel& model, const Material& material) {
   model.elastic_batch->setRotations(std::vector<ClusterPose>(model.clusters.size()), state);
   int calls = 2;
   ElasticTime time;
-  for (int pass = 0; pass < kPasses;) {
+  for (int pass = 0; pass < kForcePasses;) {
     const double start = now();
     for (int n = 0; n < calls; ++n)
       model.elastic_batch->accelerate(matchInput(model), parameters, places[n % 2], state, accelerations, counters);
     const double seconds = now() - start;
-    if (seconds < kShortest) {
+    if (seconds < kShortestPass) {
       calls *= 2;
       continue;
     }

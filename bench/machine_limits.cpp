@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <vector>
 
 #include "meshless_surgery/dynamics/rotation_batch.h"
@@ -19,6 +18,7 @@ namespace {
 
 namespace baseline {
 #define LIMITS_BYTES 16
+#include "clock.h"
 #include "machine_kernels.h"
 #undef LIMITS_BYTES
 }  // namespace baseline
@@ -28,6 +28,7 @@ namespace baseline {
 #pragma GCC target("avx2,fma")
 namespace avx2 {
 #define LIMITS_BYTES 32
+#include "clock.h"
 #include "machine_kernels.h"
 #undef LIMITS_BYTES
 }  // namespace avx2
@@ -37,6 +38,7 @@ namespace avx2 {
 #pragma GCC target("avx512f,avx512dq,avx512vl,avx512bw,fma,prefer-vector-width=512")
 namespace avx512 {
 #define LIMITS_BYTES 64
+#include "clock.h"
 #include "machine_kernels.h"
 #undef LIMITS_BYTES
 }  // namespace avx512
@@ -60,8 +62,6 @@ Kernels widestKernels() {
 #endif
   return {};
 }
-
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 volatile double result = 0.0;  // so that no loop is left out
 

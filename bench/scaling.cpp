@@ -18,7 +18,6 @@
 // In the plots, "ideal" has exponent 1 through the largest point of one thread (a cell's substep 0; threads -1 through
 // the first).
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -32,6 +31,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "clock.h"
 #include "contact_pieces.h"
 #include "elastic_cost.h"
 #include "machine_limits.h"
@@ -46,18 +46,10 @@ constexpr double kLongRun = 8.0;                           // [s] of pieces
 constexpr int kFewest = 2, kMost = 1200, kSettling = 120;  // steps
 constexpr std::uint64_t kSeed = 1;                         // of the planes
 
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
-
 double median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   const std::size_t n = values.size();
   return n == 0 ? 0.0 : 0.5 * (values[(n - 1) / 2] + values[n / 2]);
-}
-
-double secondsOf(World& world, int steps) {
-  const double start = now();
-  for (int n = 0; n < steps; ++n) world.step();
-  return now() - start;
 }
 
 using Curve = std::vector<std::pair<double, double>>;  // x, seconds

@@ -10,7 +10,7 @@
 namespace meshless::bench {
 namespace {
 
-constexpr std::uint64_t kSeed = 1;
+constexpr std::uint64_t kOrganSeed = 1;
 constexpr double kSize = 0.2, kAbove = 0.002, kCube = 0.1;  // [m]
 constexpr std::size_t kTriangles = 4120;
 constexpr int kTries = 6;  // of a spacing
@@ -34,7 +34,7 @@ Material elasticLiver() {
 }
 
 BodyPtr makeOrgan(std::size_t triangles, double spacing) {
-  Result<TriangleMesh> mesh = randomOrgan(kSeed, 0, kSize, triangles);
+  Result<TriangleMesh> mesh = randomOrgan(kOrganSeed, 0, kSize, triangles);
   if (!mesh) return nullptr;
   BodyDef def;
   def.name = "organ";
@@ -46,7 +46,7 @@ BodyPtr makeOrgan(std::size_t triangles, double spacing) {
 }
 
 BodyPtr makeOrganOf(std::size_t wanted, const std::function<std::size_t(const BodyModel&)>& count) {
-  const Result<TriangleMesh> mesh = randomOrgan(kSeed, 0, kSize, kTriangles);
+  const Result<TriangleMesh> mesh = randomOrgan(kOrganSeed, 0, kSize, kTriangles);
   if (!mesh) return nullptr;
   double spacing = std::cbrt(signedVolume(*mesh) / static_cast<double>(wanted));
   BodyPtr body;

@@ -28,12 +28,14 @@ constexpr double kAutoCells = 1600.0;              // of a lattice, likewise, at
 // [1/s] Of an elastic body: its cells times how often a pressure wave crosses one in a second. A cell takes about two
 // substeps for each crossing, and each of them a tenth of a microsecond: a twentieth of one thread's time.
 constexpr double kCrossings = 4e5;
-constexpr double kThinnest = 0.75;       // of a body's mean thickness: its cells are no wider
-constexpr double kResolutionStep = 1.5;  // of the spacing, from one resolution to the next
-constexpr double kReach = 1.75;          // of the spacing: how far neighbours along the body may be
-constexpr std::size_t kMostLinks = 40;   // of the nearest: vertices finer than the spacing have thousands
-constexpr double kLeastMassShare = 0.1;  // of the mean: no particle is so light that contacts throw it
-constexpr double kCollisionEdge = 0.8;   // of the spacing
+constexpr double kThinnest = 0.75;                  // of a body's mean thickness: its cells are no wider
+constexpr double kResolutionStep = 1.5;             // of the spacing, from one resolution to the next
+constexpr double kReach = 1.75;                     // of the spacing: how far neighbours along the body may be
+constexpr std::size_t kMostLinks = 40;              // of the nearest: vertices finer than the spacing have thousands
+constexpr double kLeastMassShare = 0.1;             // of the mean: no particle is so light that contacts throw it
+constexpr double kSmallest = 1e-3, kLargest = 2.0;  // [m] of organs
+constexpr double kUsual = 2e-2;                     // [m] the least that a scale is proposed for
+constexpr double kCollisionEdge = 0.8;              // of the spacing
 constexpr std::size_t kMostCollisionTriangles = 200000;
 constexpr double kLongestEdge = 1.5;  // of the spacing: the surface bends as finely as its cells
 
@@ -382,6 +384,22 @@ Status makeCollision(BodyDef& def, BodyModel& model) {
   return Done{};
 }
 
+/// What is no size of an organ is most often in other units than metres; empty where it is one.
+std::string sizeWarning(double longest) {
+  if (longest >= kSmallest && longest <= kLargest) return "";
+  std::ostringstream text;
+  text << std::setprecision(3) << "it is " << longest << " m long; organs are " << kSmallest << " to " << kLargest
+       << " m";
+  for (const auto& [units, scale] :
+       {std::pair("units: mm, or ", 1e-3), std::pair("units: cm, or ", 1e-2), std::pair("", 1e2), std::pair("", 1e3)}) {
+    const double scaled = longest * scale;
+    if (!(scaled >= kUsual && scaled <= kLargest)) continue;
+    text << "; " << units << "scale: " << scale << " makes it " << scaled << " m long";
+    break;
+  }
+  return text.str();
+}
+
 }  // namespace
 
 Result<PreparedBody> prepareBody(BodyDef def) {
@@ -410,6 +428,8 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   const double edge = meanEdgeLength(surface);
   const Box bounds = boundsOf(surface.vertices);
   if (!(edge > 0.0)) return Error{ErrorCode::kUnsuitableShape, "body '" + def.name + "' has no extent"};
+  if (const std::string warning = sizeWarning((bounds.max - bounds.min).maxCoeff()); !warning.empty())
+    def.warnings.push_back(warning);
   const double volume = def.solid ? signedVolume(surface) : 0.0;
   if (def.solid && !(volume > 1e-12 * std::pow(bounds.diagonal(), 3.0))) {
     std::ostringstream text;

@@ -241,6 +241,14 @@ CollisionChoice readCollision(YamlSource& source, const YAML::Node& node) {
   return choice;
 }
 
+/// [m] of one unit of a file's or primitive's lengths.
+double readUnits(YamlMap& map) {
+  std::vector<std::string> names;
+  for (const auto& [name, metres] : kLengthUnits) names.push_back(name);
+  const int chosen = map.choice("units", names);
+  return chosen < 0 ? 1.0 : kLengthUnits[static_cast<std::size_t>(chosen)].second;
+}
+
 class SceneReader {
  public:
   SceneReader(YamlSource& source, std::string folder, const FileAccess& access, SceneDef& scene)
@@ -279,6 +287,7 @@ class SceneReader {
     map.text("name", def.name);
     double scale = 1.0, edge = 0.0;
     map.number("scale", {0.0, 1e6, true}, scale);
+    scale *= readUnits(map);
     map.number("spacing", lengths(0.0, true), def.spacing);
     if (const int chosen = map.choice("resolution", {"coarse", "medium", "fine"}); chosen >= 0)
       def.resolution = static_cast<Resolution>(chosen);
@@ -339,6 +348,7 @@ class SceneReader {
     double scale = 1.0, edge = 0.0;
     map.text("name", shape.name);
     map.number("scale", {0.0, 1e6, true}, scale);
+    scale *= readUnits(map);
     map.number("edge", lengths(0.0, true), edge);
     const MeshRepair repair = readRepair(map);
     map.number("friction", {0.0, 10.0}, def.friction);

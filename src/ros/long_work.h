@@ -31,6 +31,17 @@ inline MeshRepair repairOf(const std::string& name, BorderCheck& check) {
   return MeshRepair::kMend;
 }
 
+/// [m] of one.
+inline double unitOf(const std::string& name, BorderCheck& check) {
+  std::vector<std::string> names;
+  for (const auto& [unit, metres] : kLengthUnits) {
+    if (name.empty() || name == unit) return metres;
+    names.push_back(unit);
+  }
+  check.fault("units is '" + printable(name) + "'; accepted: " + joined(names));
+  return 1.0;
+}
+
 template <class Response, class = void>
 struct HasStepsDone : std::false_type {};  // the service's answer
 template <class Response>
@@ -140,6 +151,7 @@ struct LongWork : Answers {
     const Pose local = check.pose("pose.pose", request.pose.pose);
     wanted.scale = check.number("scale", request.scale, 0.0, kMaxScale, "");
     if (wanted.scale == 0.0) wanted.scale = 1.0;
+    wanted.scale *= unitOf(request.units, check);
     wanted.material = request.material;
     wanted.repair = repairOf(request.repair, check);
     if (wanted.file.empty()) {
@@ -198,6 +210,10 @@ struct LongWork : Answers {
         [&](World& world) { response.info = toInfo(spawned.name, *command.body->model, world.settings()); });
     std::string message = "added " + spawned.name;
     for (const std::string& note : command.body->def.notes) message += "; " + note;
+    for (const std::string& warning : command.body->def.warnings) {
+      message += "; " + warning;
+      ROS_WARN_STREAM("body " << spawned.name << ": " << warning);
+    }
     return accept(response, message);
   }
 

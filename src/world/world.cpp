@@ -153,7 +153,9 @@ Result<SpawnReply> World::Impl::spawn(const PreparedBody& body) {
                  "the name '" + name + "' is in use or was retired in this run; " + knownBodies()};
   if (Status apart = liesApart(body); !apart) return apart.error();
   WorldBody& admitted = admit(name, body.def.material, body.model, body.state);
-  say(EventType::kSpawned, name, 0, "spawned " + name);
+  std::string text = "spawned " + name;
+  for (const std::string& warning : body.def.warnings) text += "; " + warning;
+  say(EventType::kSpawned, name, 0, text);
   return SpawnReply{admitted.id, name, admitted.model->rest.size(), admitted.model->surface.triangles.size(),
                     admitted.model->clusters.size()};
 }

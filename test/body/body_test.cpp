@@ -1,6 +1,7 @@
 #include "meshless_surgery/body/body.h"
 
 #include <limits>
+#include <tuple>
 
 #include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/geometry/inside.h"
@@ -38,6 +39,27 @@ TEST(PrepareBody, KeepsTheSurfaceAndSharesTheMassForEveryShape) {
       for (std::size_t v = 0; v < shape.mesh.vertices.size(); ++v)
         EXPECT_LT((body.state.surface[v] - shape.mesh.vertices[v]).norm(), 1e-12 * size);
     }
+  }
+}
+
+TEST(PrepareBody, SaysWhatIsTooLargeOrTooSmallForAnOrganAndWhatWouldMakeItOne) {
+  const std::tuple<double, const char*> proposed[] = {{0.001, ""},
+                                                      {0.1, ""},
+                                                      {2.0, ""},
+                                                      {100.0,
+                                                       "it is 100 m long; organs are 0.001 to 2 m; units: mm, or "
+                                                       "scale: 0.001 makes it 0.1 m long"},
+                                                      {12.0, "units: cm, or scale: 0.01 makes it 0.12 m long"},
+                                                      {1e-4, "it is 0.0001 m long"},
+                                                      {2e-4, "scale: 100 makes it 0.02 m long"},
+                                                      {1e5, "organs are 0.001 to 2 m"}};
+  for (const auto& [size, expected] : proposed) {
+    SCOPED_TRACE(size);
+    BodyDef def = test::defOf(boxMesh(Vec3(size, 0.5 * size, 0.5 * size), 4, 2, 2));
+    def.spacing = 0.25 * size;
+    const std::vector<std::string> warnings = test::prepared(def).def.warnings;
+    ASSERT_EQ(warnings.size(), *expected == 0 ? 0u : 1u);
+    if (*expected != 0) EXPECT_NE(warnings[0].find(expected), std::string::npos) << warnings[0];
   }
 }
 

@@ -152,6 +152,7 @@ TEST_F(Scene, FaultsAreNamedWithFileLineValueAndRange) {
       {"bodies:\n  - name: a\n", 2, {"no file and no primitive"}},
       {"bodies:\n  - {file: ../cube.obj, primitive: {sphere: 1}}\n", 2, {"file and primitive"}},
       {body + "    scale: 0\n", 3, {"scale is 0", "above 0"}},
+      {body + "    units: inch\n", 3, {"units", "inch", "m, cm, mm"}},
       {body + "    spacing: -0.1\n", 3, {"spacing is -0.1"}},
       {body + "    resolution: high\n", 3, {"resolution", "high", "coarse, medium, fine"}},
       {body + "    spacing: 0.1\n    resolution: fine\n", 4, {"spacing and resolution", "one of them"}},

@@ -1,7 +1,9 @@
 // Which files may be read, and meshes and clouds from them.
 #pragma once
 
+#include <array>
 #include <functional>
+#include <utility>
 
 #include "meshless_surgery/base/result.h"
 #include "meshless_surgery/geometry/mend.h"
@@ -25,6 +27,9 @@ struct FileAccess {
 /// points, more than 2,000,000 points, 8,000,000 faces or 32,000,000 corners of them). Non-finite points are left to
 /// repairMesh to name, for surfaces; in clouds they are dropped.
 Result<TriangleMesh> readMeshFile(const std::string& real_path);
+
+/// Of the lengths of a file or primitive, as scenes and ~spawn name them; the first is what no word means.
+constexpr std::array<std::pair<const char*, double>, 3> kLengthUnits{{{"m", 1.0}, {"cm", 0.01}, {"mm", 0.001}}};
 
 /// A mesh or cloud from a file made into what a body needs: scaled, a cloud turned into a closed surface, repaired as
 /// far as `repair` goes. notes say what was done.
