@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "clock.h"
+
 namespace meshless::bench {
 namespace {
 
