@@ -13,10 +13,10 @@ Result<LoadedShape> loadShape(const std::string& real_path, double scale, MeshRe
     text << "scale is " << scale << "; accepted: above 0, finite";
     return Error{ErrorCode::kInvalidArgument, text.str()};
   }
-  Result<TriangleMesh> read = readMeshFile(real_path);
+  LoadedShape shape;
+  Result<TriangleMesh> read = readMeshFile(real_path, &shape.notes);
   if (!read) return read.error();
   const std::string name = std::filesystem::path(real_path).filename().string();
-  LoadedShape shape;
   TriangleMesh mesh = std::move(*read);
   for (Vec3& p : mesh.vertices) p *= scale;
   if (mesh.triangles.empty()) {

@@ -76,7 +76,9 @@ Result<MeshFormat> meshFormatOf(const std::string& name) {
   if (ending == ".stl") return MeshFormat::kStl;
   if (ending == ".vtk") return MeshFormat::kVtk;
   if (ending == ".off") return MeshFormat::kOff;
-  return unreadable(name, "is of an unknown kind; accepted endings: .pcd, .ply, .obj, .stl, .vtk, .off");
+  if (ending == ".vtu") return MeshFormat::kVtu;
+  if (ending == ".msh") return MeshFormat::kMsh;
+  return unreadable(name, "is of an unknown kind; accepted endings: .pcd, .ply, .obj, .stl, .vtk, .off, .vtu, .msh");
 }
 
 Result<PromisedCounts> checkBeforeReading(const std::string& name, std::string_view text, MeshFormat format) {
@@ -90,6 +92,8 @@ Result<PromisedCounts> checkBeforeReading(const std::string& name, std::string_v
     case MeshFormat::kVtk:
     case MeshFormat::kObj:
     case MeshFormat::kOff:
+    case MeshFormat::kVtu:
+    case MeshFormat::kMsh:
       break;
   }
   return PromisedCounts{};

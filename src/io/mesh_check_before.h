@@ -22,7 +22,7 @@ constexpr std::size_t kMaxFaces = 8000000;     // a closed surface has twice as 
 constexpr std::size_t kMaxCorners = 32000000;  // of all faces together
 constexpr std::size_t kMaxPolygon = 1000;      // corners of one face
 
-enum class MeshFormat { kPcd, kPly, kObj, kStl, kVtk, kOff };
+enum class MeshFormat { kPcd, kPly, kObj, kStl, kVtk, kOff, kVtu, kMsh };
 
 /// By the file's ending, in any case.
 Result<MeshFormat> meshFormatOf(const std::string& name);

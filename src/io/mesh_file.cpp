@@ -10,6 +10,7 @@
 #include <mutex>
 #include <string_view>
 #include <utility>
+#include <variant>
 
 #include <pcl/PCLPointCloud2.h>
 #include <pcl/PolygonMesh.h>
@@ -19,6 +20,7 @@
 #include <pcl/io/ply_io.h>
 #include <pcl/io/vtk_lib_io.h>
 
+#include "cells_of_file.h"
 #include "mesh_check_before.h"
 #include "meshless_surgery/io/files.h"
 #include "opened_file.h"
@@ -103,32 +105,6 @@ bool copyPoints(const pcl::PCLPointCloud2& cloud, Points& points) {
   return true;
 }
 
-/// A fan of triangles from a corner that sees the others, so that a polygon that is not convex keeps its shape if it
-/// can.
-void addPolygon(const std::vector<Index>& corners, TriangleMesh& mesh) {
-  const std::size_t n = corners.size();
-  if (n < 3) return;
-  const bool known = std::all_of(corners.begin(), corners.end(), [&](Index k) { return k < mesh.vertices.size(); });
-  std::size_t start = 0;
-  if (known && n > 3) {
-    const auto at = [&](std::size_t k) -> const Vec3& { return mesh.vertices[corners[k % n]]; };
-    Vec3 normal = Vec3::Zero();
-    for (std::size_t k = 1; k + 1 < n; ++k) normal += (at(k) - at(0)).cross(at(k + 1) - at(0));
-    double best = 0.0;
-    for (std::size_t s = 0; s < std::min<std::size_t>(n, 64); ++s) {
-      double least = 1e300;
-      for (std::size_t k = 1; k + 1 < n; ++k)
-        least = std::min(least, (at(s + k) - at(s)).cross(at(s + k + 1) - at(s)).dot(normal));
-      if (s == 0 || least > best + 1e-9 * std::abs(best)) {
-        best = least;
-        start = s;
-      }
-    }
-  }
-  for (std::size_t k = 1; k + 1 < n; ++k)
-    mesh.triangles.push_back({corners[start], corners[(start + k) % n], corners[(start + k + 1) % n]});
-}
-
 /// Through PCL; false where it failed.
 bool readWithPcl(const std::string& path, MeshFormat format, pcl::PolygonMesh& mesh) {
   const QuietPcl quiet;
@@ -145,8 +121,24 @@ bool readWithPcl(const std::string& path, MeshFormat format, pcl::PolygonMesh& m
       return pcl::io::loadPolygonFileSTL(path, mesh) > 0;
     case MeshFormat::kVtk:
       return pcl::io::loadPolygonFileVTK(path, mesh) >= 0;
+    case MeshFormat::kVtu:  // not PCL's
+    case MeshFormat::kMsh:
+      break;
   }
   return false;
+}
+
+/// Without the points of a cloud that are not finite.
+Result<TriangleMesh> checked(const std::string& name, TriangleMesh&& mesh) {
+  if (mesh.triangles.empty())
+    mesh.vertices.erase(
+        std::remove_if(mesh.vertices.begin(), mesh.vertices.end(), [](const Vec3& p) { return !p.allFinite(); }),
+        mesh.vertices.end());
+  if (mesh.vertices.empty())
+    return Error{ErrorCode::kUnsuitableShape, "'" + name + "' has no points (or none that is finite)"};
+  if (Status status = checkCounts(name, static_cast<double>(mesh.vertices.size()), 0.0, 0.0); !status)
+    return status.error();
+  return std::move(mesh);
 }
 
 Result<TriangleMesh> convert(const pcl::PolygonMesh& read, const PromisedCounts& promised, const std::string& name) {
@@ -167,23 +159,44 @@ Result<TriangleMesh> convert(const pcl::PolygonMesh& read, const PromisedCounts&
     for (const auto corner : polygon.vertices) corners.push_back(static_cast<Index>(corner));
     addPolygon(corners, mesh);
   }
-  if (mesh.triangles.empty())
-    mesh.vertices.erase(
-        std::remove_if(mesh.vertices.begin(), mesh.vertices.end(), [](const Vec3& p) { return !p.allFinite(); }),
-        mesh.vertices.end());
-  if (mesh.vertices.empty())
-    return Error{ErrorCode::kUnsuitableShape, "'" + name + "' has no points (or none that is finite)"};
-  if (Status status = checkCounts(name, static_cast<double>(mesh.vertices.size()), 0.0, 0.0); !status)
-    return status.error();
-  return mesh;
+  return checked(name, std::move(mesh));
 }
 
-/// What PCL is to read, in memory: the file as it is, or rewritten. What was read of the file is gone afterwards.
-Result<MemoryFile> fileForPcl(const std::string& real_path, const std::string& name, MeshFormat format,
-                              PromisedCounts& promised) {
+Result<TriangleMesh> surfaceOfCells(const std::string& name, CellsOfFile&& cells, std::vector<std::string>* notes) {
+  std::vector<std::string> said;
+  Result<TriangleMesh> mesh = surfaceOf(name, std::move(cells), said);
+  if (!mesh) return mesh.error();
+  if (notes) notes->insert(notes->end(), said.begin(), said.end());
+  return checked(name, std::move(*mesh));
+}
+
+/// Whether it is of cells, which PCL does not read.
+bool hasCells(std::string_view text, MeshFormat format) {
+  return format == MeshFormat::kVtu || format == MeshFormat::kMsh ||
+         (format == MeshFormat::kVtk && isUnstructuredGrid(text));
+}
+
+Result<CellsOfFile> readCellsFile(const std::string& name, std::string_view text, MeshFormat format) {
+  if (text.empty()) return Error{ErrorCode::kUnreadable, "'" + name + "' is empty"};
+  return format == MeshFormat::kVtu   ? readVtuCells(name, text)
+         : format == MeshFormat::kMsh ? readGmshCells(name, text)
+                                      : readVtkCells(name, text);
+}
+
+/// What PCL is to read, in memory: the file as it is, or rewritten.
+using Opened = std::variant<MemoryFile, CellsOfFile>;
+
+/// What was read of the file is gone afterwards.
+Result<Opened> openFile(const std::string& real_path, const std::string& name, MeshFormat format,
+                        PromisedCounts& promised) {
   const Result<FileBytes> read = readFile(real_path, kMaxMeshBytes);
   if (!read) return Error{read.error().code, "'" + name + "' " + read.error().detail};
   std::string_view text = read->text();
+  if (hasCells(text, format)) {
+    Result<CellsOfFile> cells = readCellsFile(name, text, format);
+    if (!cells) return cells.error();
+    return Opened(std::move(*cells));
+  }
   std::string rewritten;
   if (format == MeshFormat::kPly) {
     Result<std::string> shape_alone = withoutOtherElements(name, text);
@@ -191,30 +204,32 @@ Result<MemoryFile> fileForPcl(const std::string& real_path, const std::string& n
     rewritten = std::move(*shape_alone);
     if (!rewritten.empty()) text = rewritten;
   }
-  const Result<PromisedCounts> checked = checkBeforeReading(name, text, format);
-  if (!checked) return checked.error();
-  promised = *checked;
+  const Result<PromisedCounts> header = checkBeforeReading(name, text, format);
+  if (!header) return header.error();
+  promised = *header;
   if (format == MeshFormat::kPly || format == MeshFormat::kStl)
-    return MemoryFile(text.substr(0, promised.bytes.value_or(text.size())));
+    return Opened(MemoryFile(text.substr(0, promised.bytes.value_or(text.size()))));
   const Result<std::string> plain = format == MeshFormat::kObj   ? plainObj(name, text)
                                     : format == MeshFormat::kOff ? plainOff(name, text, promised)
                                     : format == MeshFormat::kVtk ? plainVtk(name, text, promised)
                                                                  : plainPcd(name, text, promised);
   if (!plain) return plain.error();
-  return MemoryFile(*plain);
+  return Opened(MemoryFile(*plain));
 }
 
 }  // namespace
 
-Result<TriangleMesh> readMeshFile(const std::string& real_path) {
+Result<TriangleMesh> readMeshFile(const std::string& real_path, std::vector<std::string>* notes) {
   const std::string name = std::filesystem::path(real_path).filename().string();
   const Result<MeshFormat> format = meshFormatOf(name);
   if (!format) return format.error();
   // PCL and VTK throw for bad input, and for memory.
   try {
     PromisedCounts promised;
-    const Result<MemoryFile> file = fileForPcl(real_path, name, *format, promised);
-    if (!file) return file.error();
+    Result<Opened> opened = openFile(real_path, name, *format, promised);
+    if (!opened) return opened.error();
+    if (auto* cells = std::get_if<CellsOfFile>(&*opened)) return surfaceOfCells(name, std::move(*cells), notes);
+    const auto* file = std::get_if<MemoryFile>(&*opened);
     if (!file->ok()) return Error{ErrorCode::kFailed, "there is no memory to read '" + name + "'"};
     pcl::PolygonMesh mesh;
     bool read = false;

@@ -33,8 +33,8 @@ inline std::string write(const std::string& name, const std::uint8_t* data, std:
 /// The first byte chooses the ending, the rest is the file.
 inline void meshFile(const std::uint8_t* data, std::size_t size) {
   if (size < 1) return;
-  const char* const endings[] = {"obj", "ply", "stl", "pcd", "vtk", "off"};
-  const Result<TriangleMesh> read = readMeshFile(write(std::string("m.") + endings[data[0] % 6], data + 1, size - 1));
+  const char* const endings[] = {"obj", "ply", "stl", "pcd", "vtk", "off", "vtu", "msh"};
+  const Result<TriangleMesh> read = readMeshFile(write(std::string("m.") + endings[data[0] % 8], data + 1, size - 1));
   if (!read) {
     demand(!read.error().detail.empty(), "a refusal says why");
     return;

@@ -21,12 +21,14 @@ struct FileAccess {
   Result<std::string> resolve(const std::string& path, const std::string& base_folder) const;
 };
 
-/// Through PCL: PCD, PLY, OBJ, STL, VTK, OFF by the file's ending. Polygons are split into triangles. A file without
-/// faces is a cloud: mesh.triangles is empty. `real_path` has no links in it, as FileAccess::resolve gives it. Refuses
-/// kUnreadable (missing, replaced meanwhile, truncated, unknown ending, more than 512 MiB) and kUnsuitableShape (no
-/// points, more than 2,000,000 points, 8,000,000 faces or 32,000,000 corners of them). Non-finite points are left to
-/// repairMesh to name, for surfaces; in clouds they are dropped.
-Result<TriangleMesh> readMeshFile(const std::string& real_path);
+/// By the file's ending: PCD, PLY, OBJ, STL, VTK, OFF through PCL; of VTK's unstructured grids (.vtk, .vtu) and Gmsh's
+/// .msh the outer surface of the volumes, or without any their triangles and quads. Polygons are split into triangles.
+/// A file without faces is a cloud: mesh.triangles is empty. `real_path` has no links in it, as FileAccess::resolve
+/// gives it. `notes` gets a sentence where the surface was taken of volumes. Refuses kUnreadable (missing, replaced
+/// meanwhile, truncated, unknown ending, more than 512 MiB) and kUnsuitableShape (no points, more than 2,000,000
+/// points, 8,000,000 faces or cells or 32,000,000 corners of them; a face of more than two volumes). Non-finite points
+/// are left to repairMesh to name, for surfaces; in clouds they are dropped; volumes with such corners are refused.
+Result<TriangleMesh> readMeshFile(const std::string& real_path, std::vector<std::string>* notes = nullptr);
 
 /// Of the lengths of a file or primitive, as scenes and ~spawn name them; the first is what no word means.
 constexpr std::array<std::pair<const char*, double>, 3> kLengthUnits{{{"m", 1.0}, {"cm", 0.01}, {"mm", 0.001}}};

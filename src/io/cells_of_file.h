@@ -1,0 +1,56 @@
+// What a file of cells holds: volumes such as tetrahedra, and surfaces such as triangles, as Slicer, ParaView, SOFA and
+// Gmsh write them. Each of its readers looks at every number itself and takes no memory that the file does not pay for.
+// VTK has readers for two of these kinds. Those of VTK 9.1 give no error for most truncated files; damaged counts and
+// bytes end the process: the one for legacy files reads outside of its arrays, the one for XML divides by zero. To hold
+// every array against what the file can hold before they see it is to read it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "meshless_surgery/base/result.h"
+#include "meshless_surgery/geometry/outer_surface.h"
+
+namespace meshless {
+
+struct CellsOfFile {
+  Points points;
+  VolumeCells volumes;
+  std::vector<Index> polygons;  // of each surface cell the number of its corners, then these
+  std::size_t polygon_count = 0;
+  std::size_t curved = 0;  // volume cells with nodes beside their corners
+
+  /// A cell of a type of VTK with `nodes`, corners first; of curved cells these alone are kept, points and lines are
+  /// left out. What is wrong with it, for a message behind the number of the cell; empty where nothing is.
+  std::string add(int vtk_type, const std::int64_t* nodes, std::size_t count);
+};
+
+/// VTK's type of a surface or volume of as many corners.
+constexpr int kVtkTriangle = 5, kVtkQuad = 9, kVtkTetrahedron = 10, kVtkHexahedron = 12, kVtkWedge = 13,
+              kVtkPyramid = 14, kVtkLine = 3, kVtkVertex = 1;
+
+// Each refuses kUnreadable and kUnsuitableShape; `name` is for messages.
+
+/// A legacy VTK file, versions up to 5.1, with a DATASET UNSTRUCTURED_GRID.
+Result<CellsOfFile> readVtkCells(const std::string& name, std::string_view text);
+/// Whether its header says so.
+bool isUnstructuredGrid(std::string_view text);
+
+/// VTK's XML of type UnstructuredGrid: numbers as text, base64 or appended, plain or compressed by zlib.
+Result<CellsOfFile> readVtuCells(const std::string& name, std::string_view text);
+
+/// Gmsh's own format, versions 2 to 2.2 and 4.1, ASCII and binary.
+Result<CellsOfFile> readGmshCells(const std::string& name, std::string_view text);
+
+/// The outer surface of the volumes; without any the surface cells; without these a cloud. A note says which volumes
+/// there were.
+Result<TriangleMesh> surfaceOf(const std::string& name, CellsOfFile&& cells, std::vector<std::string>& notes);
+
+/// A fan of triangles from a corner that sees the others, so that a polygon that is not convex keeps its shape if it
+/// can.
+void addPolygon(const std::vector<Index>& corners, TriangleMesh& mesh);
+
+}  // namespace meshless
