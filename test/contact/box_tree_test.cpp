@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <set>
 
 #include "meshless_surgery/base/random.h"
@@ -41,6 +42,21 @@ bool meet(const FloatBox& a, const FloatBox& b, float by) {
 }
 
 constexpr std::size_t kCounts[] = {0, 1, 3, 4, 5, 8, 9, 17, 64, 65, 1000};
+
+TEST(FloatBox, HoldsThePointsThatItWasExtendedBy) {
+  Random random(4);
+  for (const double size : {1e-6, 1.0, 1e6})
+    for (int n = 0; n < 1000; ++n) {
+      const Vec3 p = random.inCube(size);
+      FloatBox box;
+      box.extend(p);
+      for (int axis = 0; axis < 3; ++axis) {
+        EXPECT_LE(static_cast<double>(box.min[axis]), p[axis]);
+        EXPECT_GE(static_cast<double>(box.max[axis]), p[axis]);
+        EXPECT_LE(static_cast<double>(box.max[axis] - box.min[axis]), 1e-6 * std::abs(p[axis]));
+      }
+    }
+}
 
 TEST(BoxTree, FindsWhatOverlapsABoxOnceAndNothingElse) {
   Random random(1);
