@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -56,6 +57,27 @@ TEST(FloatBox, HoldsThePointsThatItWasExtendedBy) {
         EXPECT_LE(static_cast<double>(box.max[axis] - box.min[axis]), 1e-6 * std::abs(p[axis]));
       }
     }
+}
+
+TEST(FourBoxes, SayWhichHoldAPointWhoseDotProductWithOneOfAnotherIsBelowALimit) {
+  Random random(5);
+  for (int n = 0; n < 2000; ++n) {
+    FloatBox one, other;
+    for (FloatBox* const box : {&one, &other}) {
+      const Vec3 at = random.inCube(1.0);
+      box->extend(at);
+      box->extend(at + random.inCube(0.3));
+    }
+    double least = 0.0;  // at corners
+    for (int axis = 0; axis < 3; ++axis)
+      least += std::min(
+          {static_cast<double>(one.min[axis]) * other.min[axis], static_cast<double>(one.min[axis]) * other.max[axis],
+           static_cast<double>(one.max[axis]) * other.min[axis], static_cast<double>(one.max[axis]) * other.max[axis]});
+    FourBoxes four;
+    for (int k = 0; k < 4; ++k) four.put(k, k == n % 4 ? one : FloatBox());
+    EXPECT_EQ(four.dotBelow(other, static_cast<float>(least + 1e-5)) >> n % 4 & 1u, 1u);
+    EXPECT_EQ(four.dotBelow(other, static_cast<float>(least - 1e-5)) >> n % 4 & 1u, 0u);
+  }
 }
 
 TEST(BoxTree, FindsWhatOverlapsABoxOnceAndNothingElse) {
