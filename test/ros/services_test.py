@@ -7,6 +7,7 @@ import tempfile
 import threading
 
 from geometry_msgs.msg import Point, Vector3
+from meshless_surgery.msg import Event
 from meshless_surgery.srv import CutResponse, SpawnResponse, StepResponse
 from shape_msgs.msg import SolidPrimitive
 
@@ -245,10 +246,12 @@ class BodiesTest(DeformerTestCase):
         self.assertAlmostEqual(volumes[0] / 8.0, volumes[2], places=12)
 
     def test_what_is_no_size_of_an_organ_is_said_and_units_are_known(self):
+        events = self.deformer.recorder('events', Event)
+        self.addCleanup(events.close)
         large = self.good('spawn', file='tetrahedron.obj', pose=pose_stamped(0, 0, 500), scale=1000.0)
         self.assertIn('it is 100 m long', large.message)
         self.assertIn('units: mm', large.message)
-        self.events.wait(lambda event: event.body == large.name and 'it is 100 m long' in event.text)
+        events.wait(lambda event: event.body == large.name and 'it is 100 m long' in event.text)
         organ = self.good('spawn', name='organ', file='tetrahedron.obj', pose=pose_stamped(0, 0, 1), scale=1000.0, units='mm')
         self.assertNotIn('long', organ.message)
         self.assertAlmostEqual(0.1 ** 3 / 6.0, self.good('get_body', name='organ').volume, places=9)
