@@ -12,7 +12,8 @@ namespace {
 
 constexpr double kOutTime = 0.03;  // [s] in which an overlap falls to 1/e
 constexpr double kOutSpeed = 0.5;  // [1/s] mean edges: overlap is removed no faster
-constexpr int kSweeps = 4;         // fewer kick aside what lands flat, and let it creep on a slope
+constexpr int kSweeps = 4;         // at most; fewer kick aside what lands flat, and let it creep on a slope
+constexpr double kSolved = 1e-4;   // of the largest impulse: a sweep that changes less is the last
 constexpr double kSlop = 0.01;     // mean edges of overlap that stay: stacks that are lifted out of it sway
 
 #pragma GCC diagnostic ignored "-Wpsabi"  // all of it is inlined
@@ -34,24 +35,39 @@ Four four(const Vec3& v) { return Four{v[0], v[1], v[2], 0.0}; }
   return even + odd;
 }
 
+/// By how much points go with a body that is shifted [m] and turned [rad] about a centre [m].
+struct RigidShift {
+  Four centre, shift, turned[3];
+
+  RigidShift(const Vec3& about, const Vec3& by, const Vec3& turn)
+      : centre(four(about)),
+        shift(four(by)),
+        turned{four(turn.cross(Vec3::UnitX())), four(turn.cross(Vec3::UnitY())), four(turn.cross(Vec3::UnitZ()))} {}
+  Four at(const Slot& slot) const {
+    const Four arm = four(slot) - centre;
+    return shift + arm[0] * turned[0] + arm[1] * turned[1] + arm[2] * turned[2];
+  }
+};
+
 /// Mass, centre and inertia of points, added up about one of them.
 struct MassMoments {
-  Vec3 about;                  // [m]
-  double mass = 0.0;           // [kg]
-  Vec3 sum = Vec3::Zero();     // [kg m]
-  Mat3 moment = Mat3::Zero();  // [kg m^2]
+  Vec3 about;         // [m]
+  double mass = 0.0;  // [kg]
+  Four sum{};         // [kg m]
+  Four moment[3]{};   // [kg m^2] columns
 
-  void add(double of_mass, const Vec3& place) {
-    const Vec3 arm = place - about;
+  void add(double of_mass, const Slot& slot) {
+    const Four arm = four(slot) - four(about), weighed = of_mass * arm;
     mass += of_mass;
-    sum += of_mass * arm;
-    moment += of_mass * arm * arm.transpose();
+    sum += weighed;
+    for (int k = 0; k < 3; ++k) moment[k] += arm[k] * weighed;
   }
-  Vec3 centre() const { return about + sum / mass; }
+  Vec3 centre() const { return about + vec3(sum) / mass; }
   /// Of the inertia about the centre; directions below 1e-12 of the largest stay 0.
   Mat3 inverseInertia() const {
-    const Vec3 mean = sum / mass;
-    const Mat3 spread = moment - mass * mean * mean.transpose();
+    const Vec3 mean = vec3(sum) / mass;
+    Mat3 spread = -mass * mean * mean.transpose();
+    for (int k = 0; k < 3; ++k) spread.col(k) += vec3(moment[k]);
     const Mat3 inertia = spread.trace() * Mat3::Identity() - spread;
     const double scale = inertia.trace();
     if (!(scale > 0.0)) return Mat3::Zero();
@@ -187,7 +203,8 @@ class Solver {
     if (!row.impulse.isZero(0.0)) push(active, row.impulse);
   }
 
-  void visit(const Active& active) {
+  /// [kg^2 m^2] what is new of its impulse, squared.
+  double visit(const Active& active) {
     ContactRow& row = *active.row;
     const Vec3 now = sum(active, false) + moved(active);
     const double gap = row.normal.dot(now) + row.constant, pressed = row.normal.dot(row.impulse);
@@ -206,6 +223,7 @@ class Solver {
     const Vec3 more = impulse - row.impulse;
     row.impulse = impulse;
     if (!more.isZero(0.0)) push(active, more);
+    return more.squaredNorm();
   }
 
   void activate(const SpringRow& spring) {
@@ -232,7 +250,7 @@ class Solver {
     scratch_.pulls.push_back(pull);
   }
 
-  void visit(SpringRow& spring, const SolverScratch::Pull& pull, double h) {
+  double visit(SpringRow& spring, const SolverScratch::Pull& pull, double h) {
     SolverBody& body = bodies_[spring.body];
     const std::vector<Index>& patch = *spring.patch;
     const std::vector<double>& weights = *spring.weights;
@@ -247,6 +265,7 @@ class Solver {
       four(slot) += weights[k] * slot.inverse_mass * way;
     }
     pushLevers(body, pull.levers, pull.end, more);
+    return more.squaredNorm();
   }
 
   double edgeOf(const Active& of) const { return std::min(bodies_[of.a].edge_length, bodies_[of.b].edge_length); }
@@ -257,10 +276,10 @@ class Solver {
       GroupMotion& motion = body.motions[g];
       if (!motion.current) continue;
       motion.current = false;
+      const RigidShift shift(motion.centre, motion.shift, motion.turn);
       for (Index k = body.groups->offsets[g]; k < body.groups->offsets[g + 1]; ++k) {
         const Index i = body.groups->members[k];
-        const Four way = four(
-            Vec3(body.groups->weights[k] * (motion.shift + motion.turn.cross(body.before[i].place() - motion.centre))));
+        const Four way = body.groups->weights[k] * shift.at(body.before[i]);
         four(body.now[i]) += way;
         if (both) four(body.before[i]) += way;
       }
@@ -292,7 +311,7 @@ class Solver {
     MassMoments moments{body.before[groups.members[groups.offsets[group]]].place()};
     for (Index k = groups.offsets[group]; k < groups.offsets[group + 1]; ++k) {
       const Index i = groups.members[k];
-      moments.add(groups.weights[k] * groups.masses[i], body.before[i].place());
+      moments.add(groups.weights[k] * groups.masses[i], body.before[i]);
     }
     GroupMotion motion;
     motion.current = true;
@@ -355,10 +374,9 @@ void leak(SolverBody& body, double sign) {
 void spinBack(SolverBody& body) {
   if (body.leaked.isZero(0.0)) return;
   MassMoments moments{body.before[0].place()};
-  for (Index i = 0; i < body.particles; ++i) moments.add(1.0 / body.now[i].inverse_mass, body.before[i].place());
-  const Vec3 turn = moments.inverseInertia() * -body.leaked;
-  for (Index i = 0; i < body.particles; ++i)
-    four(body.now[i]) += four(Vec3(turn.cross(body.before[i].place() - moments.centre())));
+  for (Index i = 0; i < body.particles; ++i) moments.add(1.0 / body.now[i].inverse_mass, body.before[i]);
+  const RigidShift back(moments.centre(), Vec3::Zero(), moments.inverseInertia() * -body.leaked);
+  for (Index i = 0; i < body.particles; ++i) four(body.now[i]) += back.at(body.before[i]);
   body.leaked.setZero();
 }
 
@@ -407,8 +425,16 @@ inline void solve(const std::vector<SolverRows>& sets, std::vector<SpringRow>& s
   // Contacts have the last word. Always in the same order: in turns, what the last impulses leave over changes from
   // substep to substep, and stacks of stiff bodies sway.
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
-    for (std::size_t n = 0; n < springs.size(); ++n) solver.visit(springs[n], scratch.pulls[n], step.h);
-    for (const auto& active : scratch.active) solver.visit(active);
+    double changed = 0.0, most = 0.0;  // [kg^2 m^2]
+    for (std::size_t n = 0; n < springs.size(); ++n) {
+      changed = std::max(changed, solver.visit(springs[n], scratch.pulls[n], step.h));
+      most = std::max(most, springs[n].impulse.squaredNorm());
+    }
+    for (const auto& active : scratch.active) {
+      changed = std::max(changed, solver.visit(active));
+      most = std::max(most, active.row->impulse.squaredNorm());
+    }
+    if (!(changed > kSolved * kSolved * most)) break;
   }
   solver.moveGroups(sets, false);
   for (const SpringRow& spring : springs) Solver::moveGroups(bodies[spring.body], false);

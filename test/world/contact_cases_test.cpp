@@ -119,12 +119,14 @@ TEST(ContactCases, AStackOfTenStands) {
     for (int n = 0; n < 10; ++n)
       add(world, bodyOf(boxMesh(Vec3::Constant(0.05), 2, 2, 2), looks(alpha), 0.025, Vec3(0, 0, 0.025 + 0.0502 * n),
                         "cube" + std::to_string(n)));
-    run(world, 10.0);
-    const WorldSnapshot shot = seen(world);
-    for (std::size_t n = 0; n < 10; ++n) {
-      const Vec3& at = shot.bodies[n].measures.centre_of_mass;
-      EXPECT_LT(std::hypot(at.x(), at.y()), 0.005) << n;
-      EXPECT_NEAR(at.z(), 0.025 + 0.05 * static_cast<double>(n), 0.002) << n;
+    for (int second = 0; second < 10; ++second) {
+      run(world, 1.0);
+      const WorldSnapshot shot = seen(world);
+      for (std::size_t n = 0; n < 10; ++n) {
+        const Vec3& at = shot.bodies[n].measures.centre_of_mass;
+        EXPECT_LT(std::hypot(at.x(), at.y()), 0.0125) << n << " after " << second;  // a quarter of a cube: it sways
+        EXPECT_NEAR(at.z(), 0.025 + 0.05 * static_cast<double>(n), 0.002) << n << " after " << second;
+      }
     }
     EXPECT_LT(deepest(world), 1e-3);
   }
