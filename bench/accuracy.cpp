@@ -443,6 +443,9 @@ int main(int argc, char** argv) {
   CLI::Option* const only_tools =
       app.add_option("--tools", tools, "only bodies under tools whose case's name has this in it");
   app.add_flag("--stiff", stiff, "only a bar from soft to stiff");
+  std::vector<double> finer = {1.0, 1.26, 1.59, 2.0};
+  app.add_option("--finer", finer, "the spacings of --settled and --tools: how many times as fine as the default")
+      ->check(CLI::Range(0.1, 10.0));
   CLI11_PARSE(app, argc, argv);
   Table table;
   table.file.open(out + "/accuracy.csv");
@@ -452,14 +455,13 @@ int main(int argc, char** argv) {
   }
   table.file << "benchmark,case,mode,setting,run_time_ms,error\n";
   if (stiff) return stiffRows(table, truth) && plots(table, out) ? 0 : 1;
-  if (only->count() > 0) return settledRows(table, truth, settled, {1.0, 1.26, 1.59, 2.0}) ? 0 : 1;
-  if (only_tools->count() > 0) return toolRows(table, truth, tools, {1.0, 1.26, 1.59, 2.0}) ? 0 : 1;
+  if (only->count() > 0) return settledRows(table, truth, settled, finer) ? 0 : 1;
+  if (only_tools->count() > 0) return toolRows(table, truth, tools, finer) ? 0 : 1;
+  if (quick) finer = {1.0};
   const std::vector<double> spacings =
       quick ? std::vector<double>{0.0125} : std::vector<double>{0.025, 0.0125, 0.05 / 7.0, 0.00625};
-  if (!settledRows(table, truth, "", quick ? std::vector<double>{1.0} : std::vector<double>{1.0, 1.26, 1.59, 2.0}))
-    return 1;
-  if (!toolRows(table, truth, "", quick ? std::vector<double>{1.0} : std::vector<double>{1.0, 1.26, 1.59, 2.0}))
-    return 1;
+  if (!settledRows(table, truth, "", finer)) return 1;
+  if (!toolRows(table, truth, "", finer)) return 1;
   if (!quick && !stiffRows(table, truth)) return 1;
   if (!elasticRows(table, truth, spacings)) return 1;
   if (!quick && !appearanceRows(table, truth, 0.0125)) return 1;
