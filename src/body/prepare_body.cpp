@@ -16,6 +16,7 @@
 #include "meshless_surgery/geometry/nearest.h"
 #include "meshless_surgery/geometry/refine.h"
 #include "meshless_surgery/geometry/sampling.h"
+#include "meshless_surgery/geometry/thicken.h"
 
 namespace meshless {
 namespace {
@@ -92,6 +93,32 @@ Status validate(const BodyDef& def) {
                    "' has regions; accepted: those of a closed body of an elastic material, with " +
                    "clusters: auto or cells");
   return def.material.validate();
+}
+
+// An open surface with a thickness is a solid.
+Status makeLayer(BodyDef& def) {
+  if (def.thickness == 0.0 || def.mesh.empty()) return Done{};
+  Result<TriangleMesh> layer = thickened(def.mesh, def.thickness);
+  if (!layer) return Error{layer.error().code, "body '" + def.name + "': " + layer.error().detail};
+  std::ostringstream text;
+  text << (def.solid ? "its surface is the outside of a wall of " : "its open surface is the middle of a layer of ")
+       << def.thickness << " m";
+  def.notes.push_back(text.str());
+  def.mesh = std::move(*layer);
+  def.solid = true;
+  return Done{};
+}
+
+// Too few cells in a layer's thickness bend wrongly.
+void warnOfThinLayer(BodyDef& def, const BodyModel& model) {
+  const double wanted = kThinnest * def.thickness;
+  if (!(def.thickness > 0.0) || model.spacing <= wanted) return;
+  std::ostringstream text;
+  text << std::setprecision(3) << "its layer of " << def.thickness << " m has " << def.thickness / model.spacing
+       << " cells of " << model.spacing
+       << " m in its thickness, so that it bends up to a third too easily; spacing: " << wanted << " gives it about "
+       << std::round(model.rest_volume / std::pow(wanted, 3.0)) << " cells";
+  def.warnings.push_back(text.str());
 }
 
 // [m/s]
@@ -403,6 +430,7 @@ std::string sizeWarning(double longest) {
 }  // namespace
 
 Result<PreparedBody> prepareBody(BodyDef def) {
+  if (Status made = makeLayer(def); !made) return made.error();
   if (Status status = validate(def); !status) return status.error();
   auto model = std::make_shared<BodyModel>();
   TriangleMesh& surface = model->surface;
@@ -441,8 +469,10 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   model->rest_volume = volume;
   model->rest_area = surfaceArea(surface);
   model->spacing = def.spacing;
-  if (!(model->spacing > 0.0))
+  if (!(model->spacing > 0.0)) {
     model->spacing = def.solid ? chooseSpacing(def, cells, edge, volume, model->rest_area) : edge;
+    warnOfThinLayer(def, *model);
+  }
   if (def.solid && volume / std::pow(model->spacing, 3.0) > static_cast<double>(kMaxParticles)) {
     std::ostringstream text;
     text << "spacing " << model->spacing << " m would give body '" << def.name << "' about "

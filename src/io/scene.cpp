@@ -289,6 +289,7 @@ class SceneReader {
     map.number("scale", {0.0, 1e6, true}, scale);
     scale *= readUnits(map);
     map.number("spacing", lengths(0.0, true), def.spacing);
+    map.number("thickness", lengths(0.0, true), def.thickness);
     if (const int chosen = map.choice("resolution", {"coarse", "medium", "fine"}); chosen >= 0)
       def.resolution = static_cast<Resolution>(chosen);
     if (map.has("spacing") && map.has("resolution"))

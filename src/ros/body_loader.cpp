@@ -41,6 +41,7 @@ Result<std::shared_ptr<const PreparedBody>> BodyLoader::load(const SpawnRequest&
   };
   BodyDef def;
   def.pose = request.pose;
+  def.thickness = request.thickness;
 
   auto chosen = material(request.material);
   if (!chosen.ok()) return chosen.error();

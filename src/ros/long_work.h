@@ -152,6 +152,7 @@ struct LongWork : Answers {
     wanted.scale = check.number("scale", request.scale, 0.0, kMaxScale, "");
     if (wanted.scale == 0.0) wanted.scale = 1.0;
     wanted.scale *= unitOf(request.units, check);
+    wanted.thickness = check.number("thickness", request.thickness, 0.0, kMaxLength, "m");
     wanted.material = request.material;
     wanted.repair = repairOf(request.repair, check);
     if (wanted.file.empty()) {

@@ -260,9 +260,9 @@ void serialize(A& archive, CollisionChoice& v) {
 }
 template <class A>
 void serialize(A& archive, BodyDef& v) {
-  auto& [name, mesh, solid, pose, spacing, resolution, clusters, collision, material, fixed, regions, copy, notes,
-         warnings] = v;
-  (void)regions;  // the model has them
+  auto& [name, mesh, solid, thickness, pose, spacing, resolution, clusters, collision, material, fixed, regions, copy,
+         notes, warnings] = v;
+  (void)regions, (void)thickness;  // the model has them
   archive(name, mesh, solid, pose, spacing, choice(resolution, Resolution::kFine), clusters, collision, material, fixed,
           copy, notes, warnings);
 }

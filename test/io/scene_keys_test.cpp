@@ -122,6 +122,7 @@ std::vector<Row> rows() {
       {"a body", "scale: 0.5, file: ../box.obj", "file: ../box.obj", READ(volume(s.body.mesh)), "0.75"},
       {"a body", "units: cm", "", READ(volume(s.body.mesh)), "1e-06"},
       {"a body", "spacing: 0.02", "", READ(s.body.spacing), "0.02"},
+      {"a body", "thickness: 0.02", "", READ(s.body.thickness), "0.02"},
       {"a body", "resolution: fine", "", READ(static_cast<int>(s.body.resolution)), "2"},
       {"a body", "edge: 0.4, primitive: {sphere: 1}", "primitive: {sphere: 1}", READ(triangles(s.body.mesh)),
        text(trianglesOfSphere(0.4))},

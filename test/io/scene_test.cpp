@@ -154,6 +154,8 @@ TEST_F(Scene, FaultsAreNamedWithFileLineValueAndRange) {
       {body + "    scale: 0\n", 3, {"scale is 0", "above 0"}},
       {body + "    units: inch\n", 3, {"units", "inch", "m, cm, mm"}},
       {body + "    spacing: -0.1\n", 3, {"spacing is -0.1"}},
+      {body + "    thickness: 0\n", 3, {"thickness is 0", "above 0"}},
+      {body + "    thickness: .nan\n", 3, {"thickness is", "above 0"}},
       {body + "    resolution: high\n", 3, {"resolution", "high", "coarse, medium, fine"}},
       {body + "    spacing: 0.1\n    resolution: fine\n", 4, {"spacing and resolution", "one of them"}},
       {body + "    cells: half\n", 3, {"cells is 'half'", "filled"}},

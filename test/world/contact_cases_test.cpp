@@ -225,6 +225,37 @@ TEST(ContactCases, ACollapsedBladderIsCut) {
   }
 }
 
+// A membrane that is as thin as one of its cells is wide.
+TEST(ContactCases, AMembraneLiesOverABallAndIsCut) {
+  const double thickness = 0.003, radius = 0.03;
+  World world(without(0.0));
+  add(world, "ball", sphereMesh(radius, 0.006), Vec3(0.0, 0.0, radius));
+  BodyDef def;
+  def.mesh.vertices = {{-0.05, -0.05, 0}, {0.05, -0.05, 0}, {0.05, 0.05, 0}, {-0.05, 0.05, 0}};
+  def.mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  def = bodyOf(def.mesh, elastic(1e4), thickness, Vec3(0.0, 0.0, 2.0 * radius + 0.005), "membrane");
+  def.solid = false;
+  def.thickness = thickness;
+  add(world, def);
+  run(world, 1.0);
+  CutCommand cut;
+  cut.blades.x_axis = Vec3::UnitX();
+  cut.blades.y_axis = Vec3(0.0, 0.6, 0.8);
+  cut.blades.origin = Vec3(-1.0, 0.003, 2.0 * radius);
+  ASSERT_EQ(replyOf<CutReply>(world.apply(cut)).new_bodies.size(), 2u);
+  for (int n = 0; n < 6; ++n) {
+    run(world, 0.25);
+    const WorldSnapshot shot = seen(world);
+    for (const BodySnapshot& body : shot.bodies) {
+      EXPECT_NEAR(body.measures.volume, body.model->rest_volume, 0.05 * body.model->rest_volume);
+      for (const Vec3& p : body.surface) {
+        EXPECT_GT(p.z(), -0.001);
+        EXPECT_GT((p - Vec3(0.0, 0.0, radius)).norm(), radius - 0.0015) << p.transpose();
+      }
+    }
+  }
+}
+
 // Bodies of any shape, spawned inside of others and of obstacles, are refused where they are wholly inside. Others are
 // not thrown out; who is half inside what is convex comes out.
 TEST(ContactCases, WhoIsSpawnedInsideIsLetOutSlowly) {

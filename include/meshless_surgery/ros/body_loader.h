@@ -19,6 +19,7 @@ struct SpawnRequest {
   Pose pose;
   std::string material;                   // empty: "default"
   MeshRepair repair = MeshRepair::kMend;  // of a file's surface
+  double thickness = 0.0;                 // [m] of BodyDef
 };
 
 struct CloudRequest {
