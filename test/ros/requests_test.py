@@ -437,7 +437,7 @@ LAWS = [
     Law('spawn', 'pose', NEW['pose'], dict(primitive=box()), centre, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)),
     Law('spawn', 'scale', 2.0, NEW, volume, 0.2 ** 3, 0.1 ** 3),
     Law('spawn', 'units', 'cm', dict(scale=200.0, **NEW), volume, 0.2 ** 3, 20.0 ** 3),
-    Law('spawn', 'thickness', 0.02, NEW, volume, within(0.98 * (0.1 ** 3 - 0.06 ** 3), 1.02 * (0.1 ** 3 - 0.06 ** 3)),
+    Law('spawn', 'thickness', 0.02, NEW, volume, within(0.95 * (0.1 ** 3 - 0.06 ** 3), 1.1 * (0.1 ** 3 - 0.06 ** 3)),
         0.1 ** 3),
     Law('spawn', 'material', 'stiff', NEW, mass, 2.0, 1.0),
     Law('spawn', 'repair', 'wrap', dict(file='dirty.obj', pose=NEW['pose']), triangles, within(100, 1e5), 4),
