@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <sstream>
 #include <utility>
 
@@ -22,6 +23,7 @@
 #endif
 
 #include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/unite_parts.h"
 
 namespace meshless {
 namespace {
@@ -38,6 +40,7 @@ constexpr double kFinestWrap = 0.01;       // of the bounds' diagonal, as the ne
 constexpr double kCoarsestWrap = 0.05;
 constexpr double kWrapOffset = 0.05;  // of the wrap's edge length
 constexpr double kSameVolume = 1e-9;
+constexpr double kMillilitre = 1e-6;  // [m^3]
 
 Error refuse(const std::string& why) { return {ErrorCode::kUnsuitableShape, why}; }
 
@@ -247,6 +250,47 @@ RepairedMesh noted(RepairedMesh repaired, std::vector<std::string> notes, double
   return repaired;
 }
 
+/// With its parts that overlap made one; nothing where there is nothing to do, or it fails: `why` says so.
+std::optional<RepairedMesh> united(const TriangleMesh& mesh, RepairRules rules, std::string& why) {
+  rules.turn_outwards = false;
+  const Result<RepairedMesh> parts = repairMesh(mesh, rules);
+  if (!parts.ok() || !parts->solid || parts->components < 2) return std::nullopt;
+  const Result<UnitedParts> made = uniteParts(parts->mesh);
+  if (!made.ok()) why = made.error().detail;
+  if (!made.ok() || !made->changed()) return std::nullopt;
+  Result<RepairedMesh> one = repairMesh(made->mesh, RepairRules{false, false, true});
+  if (!one.ok()) return std::nullopt;
+  std::vector<std::string> notes = parts->notes;
+  std::ostringstream note;
+  if (made->turned > 0)
+    notes.push_back(std::to_string(made->turned) + (made->turned == 1 ? " part was" : " parts were") +
+                    " inside-out and turned");
+  if (made->overlapping > 0) {
+    note << made->overlapping << " parts that overlap were united"
+         << (made->solids > 1 ? " into " + std::to_string(made->solids) : "") << ": volume "
+         << made->volume / kMillilitre << " ml";
+    notes.push_back(note.str());
+  }
+  if (made->swallowed > 0)
+    notes.push_back(std::to_string(made->swallowed) +
+                    (made->swallowed == 1
+                         ? " part inside of another is turned as it is, and became tissue of it"
+                         : " parts inside of others are turned as they are, and became tissue of them") +
+                    " (turned against it, it would be a cavity)");
+  notes.insert(notes.end(), one->notes.begin(), one->notes.end());
+  one->notes = std::move(notes);
+  return std::move(*one);
+}
+
+/// The same, or else `plain` with a word why.
+RepairedMesh unitedOr(RepairedMesh plain, const TriangleMesh& mesh, const RepairRules& rules) {
+  std::string why;
+  if (std::optional<RepairedMesh> one = united(mesh, rules, why)) return std::move(*one);
+  if (!why.empty())
+    plain.notes.push_back("its parts cannot be united, and stay as they are: " + why + "; repair wrap may help");
+  return plain;
+}
+
 Result<RepairedMesh> wrap(const Mending& mended, double before) {
 #if CGAL_VERSION_NR >= 1050500000
   const TriangleMesh& mesh = mended.mesh;
@@ -291,12 +335,22 @@ Result<RepairedMesh> repairMesh(const TriangleMesh& mesh, MeshRepair how) {
                     " of its edges have a triangle on one side only; accepted with repair none: a closed surface (mend "
                     "fills holes, wrap closes anything)");
     }
+    if (plain.ok() && plain->self_intersecting && plain->components > 1)
+      plain->notes.push_back("it has " + std::to_string(plain->components) +
+                             " parts: repair mend unites those that overlap");
     return plain;
   }
   if (!plain.ok() && !hasSoundTriangles(mesh)) return plain;
   const double before = volumeOf(mesh);
-  if (plain.ok() && plain->solid && (how == MeshRepair::kMend || !plain->self_intersecting))
-    return noted(std::move(*plain), {}, before);
+  const bool sound = plain.ok() && plain->solid && !plain->self_intersecting;
+  if (sound && (how == MeshRepair::kWrap || plain->components == 1)) return noted(std::move(*plain), {}, before);
+  if (how == MeshRepair::kMend) {
+    // Parts as the file has them: where they touch, merged vertices would join them.
+    std::string why;
+    if (std::optional<RepairedMesh> one = united(mesh, RepairRules{false, false, false}, why))
+      return noted(std::move(*one), {}, before);
+    if (plain.ok() && plain->solid) return noted(unitedOr(std::move(*plain), mesh, rules), {}, before);
+  }
   Mending mending(mesh);
   if (mending.mesh.empty()) return plain;
   mending.fillHoles();
@@ -308,7 +362,7 @@ Result<RepairedMesh> repairMesh(const TriangleMesh& mesh, MeshRepair how) {
     if (plain.ok()) return plain;  // a shell
     return refuse(plain.error().detail + "; mending did not help, repair wrap may");
   }
-  return noted(std::move(*mended), std::move(mending.notes), before);
+  return noted(unitedOr(std::move(*mended), mending.mesh, rules), std::move(mending.notes), before);
 }
 
 }  // namespace meshless

@@ -9,9 +9,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include <CGAL/box_intersection_d.h>
-
-#include "exact.h"
+#include "crossings.h"
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
 
@@ -137,36 +135,9 @@ Orientation orient(const std::vector<Triangle>& triangles, const std::vector<Sid
   return result;
 }
 
-/// Exact: meet in more than the corners and the edge that they share.
-bool trianglesCross(const Points& points, const Triangle& s, const Triangle& t) {
-  const auto corners = [&](Index a, Index b, Index c) { return exact::Corners{points[a], points[b], points[c]}; };
-  if (exact::onALine(corners(s[0], s[1], s[2])) || exact::onALine(corners(t[0], t[1], t[2]))) return false;
-  std::vector<Index> first, second;  // the common ones, then the others
-  for (const Index v : s)
-    if (std::find(t.begin(), t.end(), v) != t.end()) first.push_back(v);
-  second = first;
-  const std::size_t common = first.size();
-  for (const Index v : s)
-    if (std::find(t.begin(), t.end(), v) == t.end()) first.push_back(v);
-  for (const Index v : t)
-    if (std::find(s.begin(), s.end(), v) == s.end()) second.push_back(v);
-  return common < 3 && exact::meet(corners(first[0], first[1], first[2]), corners(second[0], second[1], second[2]),
-                                   static_cast<int>(common));
-}
-
-std::size_t crossingPairs(const Points& points, const std::vector<Triangle>& triangles) {
-  using TriangleBox = CGAL::Box_intersection_d::Box_with_info_d<double, 3, Index>;
-  std::vector<TriangleBox> boxes;
-  boxes.reserve(triangles.size());
-  for (Index f = 0; f < triangles.size(); ++f) {
-    Box box;
-    for (const Index v : triangles[f]) box.extend(points[v]);
-    boxes.emplace_back(CGAL::Bbox_3(box.min.x(), box.min.y(), box.min.z(), box.max.x(), box.max.y(), box.max.z()), f);
-  }
+std::size_t countCrossings(const Points& points, const std::vector<Triangle>& triangles) {
   std::size_t pairs = 0;
-  CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const TriangleBox& a, const TriangleBox& b) {
-    if (trianglesCross(points, triangles[a.info()], triangles[b.info()])) ++pairs;
-  });
+  forEachCrossing(points, triangles, [&](Index, Index) { ++pairs; });
   return pairs;
 }
 
@@ -241,12 +212,13 @@ class Repair {
     const std::size_t open = openEdges();
     result_.solid = open == 0;
     result_.open_edges = open;
-    turnOutwards();
+    result_.components = components_;
+    if (rules_.turn_outwards) turnOutwards();
     dropVertices();
     if (open > 0)
       note("the surface is open: " + count(open, "edge has", "edges have") +
            " a triangle on one side only; it cannot be filled, given a volume or cut as a solid");
-    const std::size_t crossings = crossingPairs(points_, triangles_);
+    const std::size_t crossings = rules_.turn_outwards ? countCrossings(points_, triangles_) : 0;
     result_.self_intersecting = crossings > 0;
     if (crossings > 0)
       note("the surface crosses itself: " + count(crossings, "pair of triangles meets", "pairs of triangles meet") +
@@ -625,7 +597,7 @@ MeshReport inspectMesh(const TriangleMesh& mesh, bool check_intersections) {
   report.non_manifold_edges += orientation.conflicts;
   report.components = orientation.components;
   report.signed_volume = signedVolume(mesh.vertices, sound);
-  if (check_intersections) report.self_intersections = crossingPairs(mesh.vertices, sound);
+  if (check_intersections) report.self_intersections = countCrossings(mesh.vertices, sound);
   return report;
 }
 

@@ -143,7 +143,7 @@ TEST(Mend, AFinIsTakenOff) {
   expectSolid(repairMesh(fin, MeshRepair::kWrap), signedVolume(ball()), 0.05, "wrapped fin");
 }
 
-TEST(Mend, BodiesThatShareAnEdgeOrAFaceBecomeTwo) {
+TEST(Mend, BodiesThatShareAnEdgeOrAFaceAreMended) {
   const double volume = 2e-3;
   for (const Vec3& shift : {Vec3(0.1, 0.1, 0.0), Vec3(0.1, 0.0, 0.0), Vec3(0.1, 0.1, 0.1)}) {
     const TriangleMesh pair = boxesApart(shift);
@@ -173,12 +173,10 @@ TEST(Mend, AllAtOnce) {
 TEST(Mend, CrossingsAreWrappedAway) {
   TriangleMesh crossing = ball();
   shapes::append(crossing, ball(), Vec3(0.08, 0.0, 0.0));
-  for (const MeshRepair how : {MeshRepair::kNone, MeshRepair::kMend}) {
-    const auto repaired = repairMesh(crossing, how);
-    ASSERT_TRUE(repaired.ok());
-    EXPECT_TRUE(repaired->self_intersecting);
-    EXPECT_TRUE(says(*repaired, "crosses itself"));
-  }
+  const auto none = repairMesh(crossing, MeshRepair::kNone);
+  ASSERT_TRUE(none.ok());
+  EXPECT_TRUE(none->self_intersecting);
+  EXPECT_TRUE(says(*none, "crosses itself"));
   const auto wrapped = repairMesh(crossing, MeshRepair::kWrap);
   // Of two spheres, r = 1 and d = 0.8 apart: pi (4 + d / 2)(2 - d)^2 / 12 is in both.
   const double both = M_PI / 12.0 * 4.4 * 1.2 * 1.2 * 1e-3;

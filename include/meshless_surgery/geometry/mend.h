@@ -18,9 +18,10 @@ enum class MeshRepair { kNone, kMend, kWrap };
 /// each piece sewn up by itself (CGAL, Polygon Mesh Processing); holes are filled whose patches have less than a
 /// quarter of their component's area; pieces that stay open are dropped where others are closed and they have less than
 /// a quarter of all area. What is open then is a shell, as with repairMesh; what is not manifold then is refused.
-/// kWrap: of a surface that crosses itself, too, holes are filled as by kMend, and another surface is wrapped around
-/// all of it (Portaneri et al. 2022): closed and free of crossings, a twentieth of its edge length outside, concave
-/// edges rounded.
+/// Closed parts that overlap or lie in each other are united (uniteParts); where that fails they stay, and a note says
+/// why. kWrap: of a surface that crosses itself, too, holes are filled as by kMend, and another surface is wrapped
+/// around all of it (Portaneri et al. 2022): closed and free of crossings, a twentieth of its edge length outside,
+/// concave edges rounded.
 Result<RepairedMesh> repairMesh(const TriangleMesh& mesh, MeshRepair how);
 
 /// For messages and files: none, mend, wrap.

@@ -11,11 +11,11 @@ struct MeshReport {
   std::size_t bad_indices = 0;           // triangles that name a vertex that is not there
   std::size_t degenerate_triangles = 0;  // two equal corners, or zero area
   std::size_t duplicate_triangles = 0;
-  std::size_t boundary_edges = 0;        // used by one triangle
-  std::size_t non_manifold_edges = 0;    // used by more than two, or by two that cannot be turned to the same side
-  std::size_t components = 0;            // joined by edges
-  std::size_t self_intersections = 0;    // pairs of triangles that meet elsewhere than in a shared edge or corner
-  double signed_volume = 0.0;            // [m^3] of the triangles as they are turned now
+  std::size_t boundary_edges = 0;      // used by one triangle
+  std::size_t non_manifold_edges = 0;  // used by more than two, or by two that cannot be turned to the same side
+  std::size_t components = 0;          // joined by edges
+  std::size_t self_intersections = 0;  // pairs of triangles that meet elsewhere than in a shared edge or corner
+  double signed_volume = 0.0;          // [m^3] of the triangles as they are turned now
 
   bool closed() const { return boundary_edges == 0 && non_manifold_edges == 0; }
 };
@@ -31,6 +31,7 @@ struct RepairedMesh {
   bool solid = true;               // closed and oriented: can be filled, cut, given a volume
   bool self_intersecting = false;  // loaded all the same
   std::size_t open_edges = 0;      // with a triangle on one side only
+  std::size_t components = 0;      // joined by edges
   std::vector<std::string> notes;
 };
 
@@ -46,6 +47,7 @@ struct RepairedMesh {
 struct RepairRules {
   bool merge_vertices = true;
   bool close_holes = true;
+  bool turn_outwards = true;  // false: components stay turned as they are, and crossings are not looked for
 };
 Result<RepairedMesh> repairMesh(const TriangleMesh& mesh, const RepairRules& rules = {});
 
