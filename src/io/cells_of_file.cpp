@@ -132,6 +132,9 @@ void addPolygon(const std::vector<Index>& corners, TriangleMesh& mesh) {
 
 Result<TriangleMesh> surfaceOf(const std::string& name, CellsOfFile&& cells, std::vector<std::string>& notes) {
   if (cells.points.empty()) return Error{ErrorCode::kUnsuitableShape, "'" + name + "' has no points"};
+  if (cells.repeated > 0)
+    notes.push_back(name + ": " + counted(cells.repeated, "element", "elements") +
+                    " that repeat others, as for several physical groups, were left out");
   if (!cells.volumes.empty()) {
     Result<TriangleMesh> surface = outerSurface(cells.points, cells.volumes);
     if (!surface) return Error{surface.error().code, "'" + name + "': " + surface.error().detail};

@@ -21,7 +21,8 @@ struct CellsOfFile {
   VolumeCells volumes;
   std::vector<Index> polygons;  // of each surface cell the number of its corners, then these
   std::size_t polygon_count = 0;
-  std::size_t curved = 0;  // volume cells with nodes beside their corners
+  std::size_t curved = 0;    // volume cells with nodes beside their corners
+  std::size_t repeated = 0;  // cells, points and lines that were left out as they are there already
 
   /// A cell of a type of VTK with `nodes`, corners first; of curved cells these alone are kept, points and lines are
   /// left out. What is wrong with it, for a message behind the number of the cell; empty where nothing is.

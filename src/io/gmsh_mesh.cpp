@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -292,9 +293,27 @@ class GmshReader {
         return unreadable(name_, "is damaged: its element " + std::to_string(tag) + " has the node " +
                                      std::to_string(node) + ", which is not there");
     }
+    // Version 2 writes an element anew for each physical group that it is in.
+    if (version_ < 4.0 && !seen_.insert(keyOf(type, nodes)).second) {
+      ++found_.repeated;
+      return Done{};
+    }
     if (const std::string fault = found_.add(type.vtk, nodes, type.nodes); !fault.empty())
       return unreadable(name_, "is damaged: its element " + std::to_string(tag) + " " + fault);
     return Done{};
+  }
+
+  /// The same for the same nodes, in whatever order.
+  static std::uint64_t keyOf(const GmshType& type, const std::int64_t* nodes) {
+    std::int64_t sorted[125];
+    std::copy(nodes, nodes + type.nodes, sorted);
+    std::sort(sorted, sorted + type.nodes);
+    std::uint64_t key = static_cast<std::uint64_t>(type.gmsh);
+    for (std::size_t k = 0; k < type.nodes; ++k) {
+      key = (key ^ static_cast<std::uint64_t>(sorted[k])) * 0x9e3779b97f4a7c15ull;
+      key ^= key >> 32;
+    }
+    return key;
   }
 
   Status readElements2() {
@@ -342,6 +361,7 @@ class GmshReader {
   double version_ = 0.0;
   bool binary_ = false, swapped_ = false;
   NodeNumbers numbers_;
+  std::unordered_set<std::uint64_t> seen_;
   CellsOfFile found_;
 };
 

@@ -658,6 +658,38 @@ TEST(VolumeMesh, PointsThatAreNotFiniteAreRefused) {
   }
 }
 
+// Gmsh writes an element of version 2 for each of its physical groups.
+TEST(VolumeMesh, ElementsOfSeveralPhysicalGroupsAreReadOnce) {
+  const TemporaryFolder folder;
+  const Grid once = thing();
+  Grid twice, flat;
+  twice.points = flat.points = once.points;
+  for (const Cell& cell : once.cells) {
+    twice.cells.push_back(cell);
+    twice.cells.push_back(cell);
+    if (cell.vtk == kTriangle || cell.vtk == kQuad) flat.cells.insert(flat.cells.end(), {cell, cell});
+  }
+  twice.cells.insert(twice.cells.end(), once.cells.begin(), once.cells.end());  // a group after another
+  for (const bool binary : {false, true}) {
+    const std::string of = binary ? "_binary" : "_ascii";
+    std::vector<std::string> notes;
+    const auto plain = readMeshFile(folder.write("once" + of + ".msh", mshFile(once, "2.2", binary)));
+    const auto read = readMeshFile(folder.write("twice" + of + ".msh", mshFile(twice, "2.2", binary)), &notes);
+    ASSERT_TRUE(read.ok()) << read.error().detail;
+    EXPECT_EQ(read->vertices, plain->vertices);
+    EXPECT_EQ(read->triangles, plain->triangles);
+    ASSERT_EQ(notes.size(), 2u);
+    EXPECT_TRUE(says(notes[0], ": 50 elements that repeat others, as for several physical groups, were left out"))
+        << notes[0];
+    EXPECT_TRUE(says(notes[1], kNote)) << notes[1];
+    const auto surface = readMeshFile(folder.write("flat" + of + ".msh", mshFile(flat, "2.2", binary)));
+    ASSERT_TRUE(surface.ok()) << surface.error().detail;
+    EXPECT_EQ(surface->triangles.size(), 3u);
+  }
+  // In version 4.1 each is there once, and one that is not is a fault.
+  EXPECT_FALSE(readMeshFile(folder.write("twice.msh", mshFile(twice, "4.1", false))).ok());
+}
+
 TEST(VolumeMesh, AFaceOfThreeCellsIsRefused) {
   const TemporaryFolder folder;
   Grid grid = thing();
