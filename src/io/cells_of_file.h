@@ -46,6 +46,9 @@ Result<CellsOfFile> readVtuCells(const std::string& name, std::string_view text)
 /// Gmsh's own format, versions 2 to 2.2 and 4.1, ASCII and binary.
 Result<CellsOfFile> readGmshCells(const std::string& name, std::string_view text);
 
+/// The vertices and faces of a PLY file, ASCII and binary.
+Result<CellsOfFile> readPlyCells(const std::string& name, std::string_view text);
+
 /// The outer surface of the volumes; without any the surface cells; without these a cloud. A note says which volumes
 /// there were.
 Result<TriangleMesh> surfaceOf(const std::string& name, CellsOfFile&& cells, std::vector<std::string>& notes);

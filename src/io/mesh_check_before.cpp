@@ -17,12 +17,19 @@
 namespace meshless {
 namespace {
 
+bool isBinaryStl(std::string_view text) {
+  std::uint32_t faces = 0;
+  if (text.size() < 84) return false;
+  std::memcpy(&faces, text.data() + 80, sizeof faces);
+  return 84 + 50ull * faces == text.size();
+}
+
 Result<PromisedCounts> checkStl(const std::string& name, std::string_view text) {
   const std::uint64_t bytes = text.size();
   const bool whole_header = bytes >= 84;
   std::uint32_t faces = 0;
   if (whole_header) std::memcpy(&faces, text.data() + 80, sizeof faces);
-  if (whole_header && 84 + 50ull * faces == bytes) {
+  if (isBinaryStl(text)) {
     if (faces == 0) return Error{ErrorCode::kUnsuitableShape, "'" + name + "' has no triangles"};
     if (Status status = checkCounts(name, 3.0 * faces / 4.0, faces, 0.0); !status) return status.error();
     return PromisedCounts{};
@@ -84,19 +91,33 @@ Result<MeshFormat> meshFormatOf(const std::string& name) {
 Result<PromisedCounts> checkBeforeReading(const std::string& name, std::string_view text, MeshFormat format) {
   if (text.empty()) return unreadable(name, "is empty");
   switch (format) {
-    case MeshFormat::kPly:
-      return checkPly(name, text);
     case MeshFormat::kStl:
       return checkStl(name, text);
     case MeshFormat::kPcd:  // for these, what makes them plain looks at every number
     case MeshFormat::kVtk:
     case MeshFormat::kObj:
     case MeshFormat::kOff:
+    case MeshFormat::kPly:
     case MeshFormat::kVtu:
     case MeshFormat::kMsh:
       break;
   }
   return PromisedCounts{};
+}
+
+std::string plainStl(std::string_view text) {
+  if (isBinaryStl(text) || lowerCase(text.substr(0, 5)) != "solid") return "";
+  const bool lower = text.substr(0, 5) == "solid";
+  if (lower && std::all_of(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 127; }))
+    return "";
+  std::string plain;
+  for (std::string_view line; nextLine(text, line);) {
+    std::string_view rest = line.substr(0, 60);
+    const std::string word = lowerCase(nextWord(rest));
+    plain += word == "solid" || word == "endsolid" ? word : lowerCase(line);
+    plain += '\n';
+  }
+  return plain;
 }
 
 Result<std::string> plainObj(const std::string& name, std::string_view text) {

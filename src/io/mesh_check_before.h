@@ -2,7 +2,7 @@
 // for them), and the one for OBJ writes past its array where there are more normals than vertices and opens the
 // material files that are named; VTK's follows damaged cells out of its arrays, and PCD's damaged headers. So counts
 // are held against the file's size first, and PCD, OBJ and VTK are handed over rewritten, as their points and faces
-// alone; OFF, which PCL does not know, as OBJ. Everything works on the bytes that were read once: `name` is for
+// alone; OFF, which PCL does not know, as OBJ. PLY is not given to it (cells_of_file.h). Everything works on the bytes that were read once: `name` is for
 // messages.
 #pragma once
 
@@ -30,7 +30,6 @@ Result<MeshFormat> meshFormatOf(const std::string& name);
 /// What the file's header promises; empty where the format promises nothing.
 struct PromisedCounts {
   std::optional<std::size_t> points, faces;
-  std::optional<std::size_t> bytes;  // with the header; the file may be longer
 };
 
 // Each refuses kUnreadable and kUnsuitableShape.
@@ -42,12 +41,9 @@ Result<PromisedCounts> checkBeforeReading(const std::string& name, std::string_v
 /// header. `promised` gets their number.
 Result<std::string> plainPcd(const std::string& name, std::string_view text, PromisedCounts& promised);
 
-/// For PLY, what checkBeforeReading finds.
-Result<PromisedCounts> checkPly(const std::string& name, std::string_view text);
-
-/// A PLY file without the elements that are not its shape, such as edges; empty where it has none, or where
-/// checkBeforeReading is to say what is wrong with its header.
-Result<std::string> withoutOtherElements(const std::string& name, std::string_view text);
+/// A text STL file in lower case and without the names of its solids, which may be of any letters: the reader takes
+/// others than ASCII for a binary file. Empty where nothing is to be changed.
+std::string plainStl(std::string_view text);
 
 /// The points, polygons and triangle strips of a legacy VTK file (versions up to 5.1, POLYDATA) as a binary one of
 /// version 3.0 that holds nothing else. `promised` gets what it holds.

@@ -17,7 +17,6 @@
 #include <pcl/console/print.h>
 #include <pcl/io/obj_io.h>
 #include <pcl/io/pcd_io.h>
-#include <pcl/io/ply_io.h>
 #include <pcl/io/vtk_lib_io.h>
 
 #include "cells_of_file.h"
@@ -111,8 +110,6 @@ bool readWithPcl(const std::string& path, MeshFormat format, pcl::PolygonMesh& m
   switch (format) {
     case MeshFormat::kPcd:
       return pcl::io::loadPCDFile(path, mesh.cloud) == 0;
-    case MeshFormat::kPly:
-      return pcl::io::loadPLYFile(path, mesh) == 0;
     case MeshFormat::kObj:
     case MeshFormat::kOff:  // rewritten as OBJ
       return pcl::io::loadOBJFile(path, mesh) == 0;
@@ -121,7 +118,8 @@ bool readWithPcl(const std::string& path, MeshFormat format, pcl::PolygonMesh& m
       return pcl::io::loadPolygonFileSTL(path, mesh) > 0;
     case MeshFormat::kVtk:
       return pcl::io::loadPolygonFileVTK(path, mesh) >= 0;
-    case MeshFormat::kVtu:  // not PCL's
+    case MeshFormat::kPly:  // not PCL's
+    case MeshFormat::kVtu:
     case MeshFormat::kMsh:
       break;
   }
@@ -172,13 +170,14 @@ Result<TriangleMesh> surfaceOfCells(const std::string& name, CellsOfFile&& cells
 
 /// Whether it is of cells, which PCL does not read.
 bool hasCells(std::string_view text, MeshFormat format) {
-  return format == MeshFormat::kVtu || format == MeshFormat::kMsh ||
+  return format == MeshFormat::kPly || format == MeshFormat::kVtu || format == MeshFormat::kMsh ||
          (format == MeshFormat::kVtk && isUnstructuredGrid(text));
 }
 
 Result<CellsOfFile> readCellsFile(const std::string& name, std::string_view text, MeshFormat format) {
   if (text.empty()) return Error{ErrorCode::kUnreadable, "'" + name + "' is empty"};
-  return format == MeshFormat::kVtu   ? readVtuCells(name, text)
+  return format == MeshFormat::kPly   ? readPlyCells(name, text)
+         : format == MeshFormat::kVtu ? readVtuCells(name, text)
          : format == MeshFormat::kMsh ? readGmshCells(name, text)
                                       : readVtkCells(name, text);
 }
@@ -197,18 +196,12 @@ Result<Opened> openFile(const std::string& real_path, const std::string& name, M
     if (!cells) return cells.error();
     return Opened(std::move(*cells));
   }
-  std::string rewritten;
-  if (format == MeshFormat::kPly) {
-    Result<std::string> shape_alone = withoutOtherElements(name, text);
-    if (!shape_alone) return shape_alone.error();
-    rewritten = std::move(*shape_alone);
-    if (!rewritten.empty()) text = rewritten;
-  }
+  const std::string lower = format == MeshFormat::kStl ? plainStl(text) : "";
+  if (!lower.empty()) text = lower;
   const Result<PromisedCounts> header = checkBeforeReading(name, text, format);
   if (!header) return header.error();
   promised = *header;
-  if (format == MeshFormat::kPly || format == MeshFormat::kStl)
-    return Opened(MemoryFile(text.substr(0, promised.bytes.value_or(text.size()))));
+  if (format == MeshFormat::kStl) return Opened(MemoryFile(text));
   const Result<std::string> plain = format == MeshFormat::kObj   ? plainObj(name, text)
                                     : format == MeshFormat::kOff ? plainOff(name, text, promised)
                                     : format == MeshFormat::kVtk ? plainVtk(name, text, promised)

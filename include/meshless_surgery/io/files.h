@@ -21,7 +21,7 @@ struct FileAccess {
   Result<std::string> resolve(const std::string& path, const std::string& base_folder) const;
 };
 
-/// By the file's ending: PCD, PLY, OBJ, STL, VTK, OFF through PCL; of VTK's unstructured grids (.vtk, .vtu) and Gmsh's
+/// By the file's ending: PCD, OBJ, STL, VTK, OFF through PCL; PLY; of VTK's unstructured grids (.vtk, .vtu) and Gmsh's
 /// .msh the outer surface of the volumes, or without any their triangles and quads. Polygons are split into triangles.
 /// A file without faces is a cloud: mesh.triangles is empty. `real_path` has no links in it, as FileAccess::resolve
 /// gives it. `notes` gets a sentence where the surface was taken of volumes. Refuses kUnreadable (missing, replaced
