@@ -536,7 +536,7 @@ class Repair {
     if (inside_out > 0 && parts.size() == 1) note("the surface was inside-out and has been turned");
     if (inside_out > 0 && parts.size() > 1)
       note(count(inside_out, "component", "components") + " of " + std::to_string(parts.size()) +
-           " was inside-out and has been turned");
+           (inside_out == 1 ? " was inside-out and has been turned" : " were inside-out and have been turned"));
     if (cavities > 0) note("turned " + count(cavities, "component", "components") + " inside another into a cavity");
   }
 
