@@ -13,7 +13,7 @@ from meshless_surgery.errors import Refused, Unanswered
 from meshless_surgery.goals import Goals
 from meshless_surgery.msg import Info, State
 from meshless_surgery.poses import blade_pose, blades_pose, pose_stamped
-from meshless_surgery.srv import (Cut, GetBody, Hash, Incise, LoadState, Lock, MovePick, Pick, Probe, Push, Release, Remove,
+from meshless_surgery.srv import (Attach, Cut, Detach, GetBody, Hash, Incise, LoadState, Lock, MovePick, Pick, Probe, Push, Release, Remove,
                                   SaveState, SetMaterial, Spawn, SpawnCloud, Step)
 from meshless_surgery.streams import ToolStream
 
@@ -165,6 +165,18 @@ class Surgeon:
 
     def set_material(self, body, yaml):
         return self.call('set_material', SetMaterial, body=body, yaml=yaml)
+
+    # what holds bodies together
+    def attach(self, body, other, stiffness, distance=0.0, strength=0.0, centre=(0, 0, 0), radius=0.0, name='', frame=None):
+        """Joins two bodies, or a body and an obstacle or 'world', where they are within `distance`; only where the body's
+        surface is in the sphere of `radius` about `centre`, if there is one. `stiffness` in N/m^3; `strength` in Pa, 0: it
+        does not tear."""
+        return self.call('attach', Attach, header=self._header(frame), name=name, body=body, other=other, distance=distance,
+                         stiffness=stiffness, strength=strength, centre=Point(*centre), radius=radius)
+
+    def detach(self, name, centre=(0, 0, 0), radius=0.0, frame=None):
+        """All of an attachment, or its fibres in a sphere."""
+        return self.call('detach', Detach, header=self._header(frame), name=name, centre=Point(*centre), radius=radius)
 
     # the world
     def state(self):

@@ -14,6 +14,7 @@ constexpr double kOutTime = 0.03;  // [s] in which an overlap falls to 1/e
 constexpr double kOutSpeed = 0.5;  // [1/s] mean edges: overlap is removed no faster
 constexpr int kSweeps = 4;         // at most; fewer kick aside what lands flat, and let it creep on a slope
 constexpr double kSolved = 1e-4;   // of the largest impulse: a sweep that changes less is the last
+constexpr double kLag = 0.01;      // [s] of a fibre, by which its stretch follows its tension: else what hangs bounces
 constexpr double kSlop = 0.01;     // mean edges of overlap that stay: stacks that are lifted out of it sway
 
 #pragma GCC diagnostic ignored "-Wpsabi"  // all of it is inlined
@@ -226,11 +227,29 @@ class Solver {
     return more.squaredNorm();
   }
 
-  void activate(const SpringRow& spring) {
-    SolverBody& body = bodies_[spring.body];
-    const std::vector<Index>& patch = *spring.patch;
-    const std::vector<double>& weights = *spring.weights;
-    SolverScratch::Pull pull;
+  using Pull = SolverScratch::Pull;
+
+  void activate(const SpringRow& spring) { addPull(spring.body, *spring.patch, *spring.weights); }
+
+  void activate(FibreRow& fibre, const SolverStep& step) {
+    addPull(fibre.a, fibre.at_a->particles, fibre.at_a->weights);
+    if (fibre.b != kNoIndex)
+      addPull(fibre.b, fibre.at_b->particles, fibre.at_b->weights);
+    else
+      scratch_.pulls.push_back({Mat3::Zero(), 0, 0});
+    // Kelvin and Voigt: tension = stiffness (stretch + lag * its rate), where it is taut.
+    const double lags = kLag / step.h, before = std::max(fibre.rest, spanBefore(fibre).norm());
+    fibre.stiff = fibre.stiffness * step.h * step.h * (1.0 + lags);
+    fibre.from = (fibre.rest + lags * before) / (1.0 + lags);
+    fibre.impulse *= step.warm;
+    const std::size_t last = scratch_.pulls.size() - 1;
+    if (!fibre.impulse.isZero(0.0)) push(fibre, &scratch_.pulls[last - 1], fibre.impulse);
+  }
+
+  /// How a point answers an impulse.
+  void addPull(Index of_body, const std::vector<Index>& patch, const std::vector<double>& weights) {
+    SolverBody& body = bodies_[of_body];
+    Pull pull;
     pull.levers = static_cast<Index>(scratch_.levers.size());
     addLevers(body, [&](const auto& visit) {
       for (std::size_t k = 0; k < patch.size(); ++k) visit(patch[k], weights[k]);
@@ -250,22 +269,48 @@ class Solver {
     scratch_.pulls.push_back(pull);
   }
 
-  double visit(SpringRow& spring, const SolverScratch::Pull& pull, double h) {
-    SolverBody& body = bodies_[spring.body];
-    const std::vector<Index>& patch = *spring.patch;
-    const std::vector<double>& weights = *spring.weights;
-    Vec3 stretch = spring.end - leversMoved(body, pull.levers, pull.end);
-    for (std::size_t k = 0; k < patch.size(); ++k) stretch -= weights[k] * body.now[patch[k]].place();
+  double visit(SpringRow& spring, const Pull& pull, double h) {
+    const Vec3 stretch = spring.end - placeOf(spring.body, *spring.patch, *spring.weights, pull);
     const double stiff = spring.stiffness * h * h;
     const Vec3 more = (Mat3::Identity() + stiff * pull.answer).inverse() * (stiff * stretch - spring.impulse);
     spring.impulse += more;
-    const Four way = four(Vec3((1.0 - body.rigid_share) * more));
-    for (std::size_t k = 0; k < patch.size(); ++k) {
-      Slot& slot = body.now[patch[k]];
-      four(slot) += weights[k] * slot.inverse_mass * way;
-    }
-    pushLevers(body, pull.levers, pull.end, more);
+    push(spring.body, *spring.patch, *spring.weights, pull, more);
     return more.squaredNorm();
+  }
+
+  /// What the fibre would be without its impulse decides what that is: the one that leaves it as long as it then is.
+  double visit(FibreRow& fibre, const Pull* pulls) {
+    const Mat3 answer = pulls[0].answer + pulls[1].answer;
+    const Vec3 loose = spanOf(fibre, pulls) - answer * fibre.impulse;
+    const double length = loose.norm(), stiff = fibre.stiff, rest = fibre.from;
+    Vec3 impulse = Vec3::Zero();
+    if (length > rest) {
+      // As if it answered along itself alone; what it answers across turns it, and is seen to once more.
+      const double along = stiff * loose.dot(answer * loose) / (length * length);
+      double share = stiff * (length - rest) / (length + along * rest);  // tension over length
+      Vec3 span = (Mat3::Identity() + share * answer).inverse() * loose;
+      if (pulls[0].levers < pulls[0].end || pulls[1].levers < pulls[1].end) {
+        const double now = span.norm(), answers = span.dot(answer * span) / (now * now);
+        const double more = (stiff * (now - rest) - share * now) / (1.0 + stiff * answers);
+        const double tension = share * now + more, then = now - answers * more;
+        if (tension > 0.0 && then > 0.0) {
+          share = tension / then;
+          span = (Mat3::Identity() + share * answer).inverse() * loose;
+        }
+      }
+      impulse = -share * span;
+    }
+    const Vec3 more = impulse - fibre.impulse;
+    fibre.impulse = impulse;
+    if (!more.isZero(0.0)) push(fibre, pulls, more);
+    return more.squaredNorm();
+  }
+
+  /// [m] from b to a at the start of the substep.
+  Vec3 spanBefore(const FibreRow& fibre) const {
+    const Vec3 a = meanOf(bodies_[fibre.a].before, fibre.at_a->particles, fibre.at_a->weights);
+    if (fibre.b == kNoIndex) return a - fibre.place;
+    return a - meanOf(bodies_[fibre.b].before, fibre.at_b->particles, fibre.at_b->weights);
   }
 
   double edgeOf(const Active& of) const { return std::min(bodies_[of.a].edge_length, bodies_[of.b].edge_length); }
@@ -292,6 +337,42 @@ class Solver {
   }
 
  private:
+  static Vec3 meanOf(const Slot* slots, const std::vector<Index>& patch, const std::vector<double>& weights) {
+    Vec3 sum = Vec3::Zero();
+    for (std::size_t k = 0; k < patch.size(); ++k) sum += weights[k] * slots[patch[k]].place();
+    return sum;
+  }
+
+  /// [m] of a point now.
+  Vec3 placeOf(Index of_body, const std::vector<Index>& patch, const std::vector<double>& weights,
+               const Pull& pull) const {
+    const SolverBody& body = bodies_[of_body];
+    return meanOf(body.now, patch, weights) + leversMoved(body, pull.levers, pull.end);
+  }
+
+  /// [m] from b to a now.
+  Vec3 spanOf(const FibreRow& fibre, const Pull* pulls) const {
+    const Vec3 a = placeOf(fibre.a, fibre.at_a->particles, fibre.at_a->weights, pulls[0]);
+    if (fibre.b == kNoIndex) return a - fibre.place;
+    return a - placeOf(fibre.b, fibre.at_b->particles, fibre.at_b->weights, pulls[1]);
+  }
+
+  void push(const FibreRow& fibre, const Pull* pulls, const Vec3& impulse) {
+    push(fibre.a, fibre.at_a->particles, fibre.at_a->weights, pulls[0], impulse);
+    if (fibre.b != kNoIndex) push(fibre.b, fibre.at_b->particles, fibre.at_b->weights, pulls[1], -impulse);
+  }
+
+  void push(Index of_body, const std::vector<Index>& patch, const std::vector<double>& weights, const Pull& pull,
+            const Vec3& impulse) {
+    SolverBody& body = bodies_[of_body];
+    const Four way = four(Vec3((1.0 - body.rigid_share) * impulse));
+    for (std::size_t k = 0; k < patch.size(); ++k) {
+      Slot& slot = body.now[patch[k]];
+      four(slot) += weights[k] * slot.inverse_mass * way;
+    }
+    pushLevers(body, pull.levers, pull.end, impulse);
+  }
+
   void pushParticles(const Active& active, const Vec3& impulse, Slot* SolverBody::*slots) {
     const ContactRow& row = *active.row;
     const auto each = [&](const SolverBody& body, Index begin, Index end) {
@@ -380,9 +461,9 @@ void spinBack(SolverBody& body) {
   body.leaked.setZero();
 }
 
-inline void solve(const std::vector<SolverRows>& sets, std::vector<SpringRow>& springs, std::vector<SolverBody>& bodies,
-                  const SolverStep& step, const std::vector<Index>& free, SolverScratch& scratch,
-                  SolverCounters& counters) {
+inline void solve(const std::vector<SolverRows>& sets, std::vector<SpringRow>& springs, std::vector<FibreRow>& fibres,
+                  std::vector<SolverBody>& bodies, const SolverStep& step, const std::vector<Index>& free,
+                  SolverScratch& scratch, SolverCounters& counters) {
   Solver solver(bodies, scratch);
   const auto wayOf = [&step](const ContactRow& row) {
     return row.kind == FeaturePair::Kind::kSphere ? Vec3(step.sphere_to - step.sphere_from) : Vec3(Vec3::Zero());
@@ -417,6 +498,8 @@ inline void solve(const std::vector<SolverRows>& sets, std::vector<SpringRow>& s
           !row.impulse.isZero(0.0) || !(row.normal.dot(solver.sum(active, false)) + row.constant > 0.0))
         solver.activate(active, wayOf(row), step);
   for (const SpringRow& spring : springs) solver.activate(spring);
+  for (FibreRow& fibre : fibres) solver.activate(fibre, step);
+  counters.fibres += fibres.size();
   counters.active += scratch.active.size();
   for (const auto& active : scratch.active) {
     counters.ground += active.row->kind == FeaturePair::Kind::kPlane;
@@ -426,19 +509,28 @@ inline void solve(const std::vector<SolverRows>& sets, std::vector<SpringRow>& s
   // substep to substep, and stacks of stiff bodies sway.
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
     double changed = 0.0, most = 0.0;  // [kg^2 m^2]
-    for (std::size_t n = 0; n < springs.size(); ++n) {
-      changed = std::max(changed, solver.visit(springs[n], scratch.pulls[n], step.h));
-      most = std::max(most, springs[n].impulse.squaredNorm());
-    }
-    for (const auto& active : scratch.active) {
-      changed = std::max(changed, solver.visit(active));
-      most = std::max(most, active.row->impulse.squaredNorm());
-    }
+    const auto count = [&](double squared, const Vec3& impulse) {
+      changed = std::max(changed, squared);
+      most = std::max(most, impulse.squaredNorm());
+    };
+    for (std::size_t n = 0; n < springs.size(); ++n)
+      count(solver.visit(springs[n], scratch.pulls[n], step.h), springs[n].impulse);
+    for (std::size_t n = 0; n < fibres.size(); ++n)
+      count(solver.visit(fibres[n], &scratch.pulls[springs.size() + 2 * n]), fibres[n].impulse);
+    for (const auto& active : scratch.active) count(solver.visit(active), active.row->impulse);
     if (!(changed > kSolved * kSolved * most)) break;
   }
   solver.moveGroups(sets, false);
   for (const SpringRow& spring : springs) Solver::moveGroups(bodies[spring.body], false);
+  for (const FibreRow& fibre : fibres)
+    for (const Index b : {fibre.a, fibre.b})
+      if (b != kNoIndex) Solver::moveGroups(bodies[b], false);
   if (free.empty()) return;
+  for (const FibreRow& fibre : fibres) {  // it pulls along what it is in the end, not at the start
+    const Vec3 couple = solver.spanBefore(fibre).cross(fibre.impulse);
+    bodies[fibre.a].leaked += 0.5 * couple;
+    bodies[fibre.b].leaked += 0.5 * couple;
+  }
   for (const auto& active : scratch.active) {
     if (active.start.norm() > solver.edgeOf(active)) continue;  // of who is deep inside it would throw it
     const Vec3 couple = active.start.cross(active.row->impulse);
@@ -468,13 +560,13 @@ RigidGroups::RigidGroups(const std::vector<Index>& group_offsets, const std::vec
   compressRows(masses.size(), each, of_offsets, of_members);
 }
 
-void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& springs, std::vector<SolverBody>& bodies,
-               const SolverStep& step, const std::vector<Index>& free, SolverScratch& scratch,
-               SolverCounters& counters) {
+void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& springs, std::vector<FibreRow>& fibres,
+               std::vector<SolverBody>& bodies, const SolverStep& step, const std::vector<Index>& free,
+               SolverScratch& scratch, SolverCounters& counters) {
 #ifdef __x86_64__
-  if (__builtin_cpu_supports("avx2")) return solveWide(sets, springs, bodies, step, free, scratch, counters);
+  if (__builtin_cpu_supports("avx2")) return solveWide(sets, springs, fibres, bodies, step, free, scratch, counters);
 #endif
-  solve(sets, springs, bodies, step, free, scratch, counters);
+  solve(sets, springs, fibres, bodies, step, free, scratch, counters);
 }
 
 }  // namespace meshless

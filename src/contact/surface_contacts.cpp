@@ -7,7 +7,6 @@
 namespace meshless {
 namespace {
 
-constexpr double kSkin = 0.01;                           // of the mean edge: surfaces rest so far above each other
 constexpr std::uint64_t kGroundKey = ~std::uint64_t{0};  // beyond those of bodies and obstacles
 constexpr std::uint64_t kSphereKey = kGroundKey - 1;
 
@@ -191,7 +190,7 @@ void SurfaceContacts::find(const SurfaceScene& scene, const std::vector<Collider
     if (pair->stale) counters.queries += pair->queried;
   }
   listReached(scene, colliders);
-  joinIslands(colliders);
+  joinIslands(scene, colliders);
 }
 
 void SurfaceContacts::findPair(const SurfaceScene& scene, const std::vector<Collider>& colliders, Pair& pair) {
@@ -274,7 +273,7 @@ void SurfaceContacts::listReached(const SurfaceScene& scene, const std::vector<C
   reached_.erase(std::unique(reached_.begin(), reached_.end()), reached_.end());
 }
 
-void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
+void SurfaceContacts::joinIslands(const SurfaceScene& scene, const std::vector<Collider>& colliders) {
   const Index count = static_cast<Index>(colliders.size());
   fillSlots(colliders);
   joined_.reset(count);
@@ -282,6 +281,8 @@ void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
   const auto moves = [&](Index c) { return c != kNoIndex && colliders[c].moves; };
   for (const Pair* pair : pairs_)
     if (moves(pair->a) && moves(pair->b) && !pair->set.rows.empty()) joined_.join(pair->a, pair->b);
+  for (const SurfaceScene::Join& join : scene.joins)
+    if (moves(join.a) && moves(join.b)) joined_.join(join.a, join.b);
   Index islands = 0;
   for (Index c = 0; c < count; ++c) {
     if (!moves(c)) continue;
@@ -291,7 +292,7 @@ void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
       if (island == islands_.size()) islands_.emplace_back();
       islands_[island].bodies.clear();
       islands_[island].rows.clear();
-      islands_[island].held = false;
+      islands_[island].held = islands_[island].joined = false;
     }
     islands_[island].bodies.push_back(c);
     islands_[island].held = islands_[island].held || colliders[c].held;
@@ -303,6 +304,12 @@ void SurfaceContacts::joinIslands(const std::vector<Collider>& colliders) {
     Island& island = islands_[island_of_[joined_.find(of)]];
     island.rows.push_back({&pair->set, pair->a, pair->b});
     island.held = island.held || !moves(pair->a) || !moves(pair->b);
+  }
+  for (const SurfaceScene::Join& join : scene.joins) {
+    if (!moves(join.a)) continue;
+    Island& island = islands_[island_of_[joined_.find(join.a)]];
+    island.joined = true;
+    island.held = island.held || !moves(join.b);
   }
 }
 
@@ -341,10 +348,10 @@ void SurfaceContacts::setRigidShare(Index collider, const RigidGroups* groups, d
 
 void SurfaceContacts::solveIsland(Index island_number, SolverStep step, int number,
                                   const std::vector<Collider>& colliders, const std::vector<Vec3*>& previous,
-                                  std::vector<SpringRow>& springs, SolverScratch& scratch, SolverCounters& counters,
-                                  const ForEach& for_each) {
+                                  std::vector<SpringRow>& springs, std::vector<FibreRow>& fibres,
+                                  SolverScratch& scratch, SolverCounters& counters, const ForEach& for_each) {
   Island& island = islands_[island_number];
-  if (island.rows.empty() && springs.empty()) return;
+  if (island.rows.empty() && springs.empty() && fibres.empty()) return;
   step.warm = number == 0 ? step.h * step.h : 1.0;
   step.number = number;
   runEach(for_each, island.bodies.size(), [&](std::size_t n) {
@@ -356,7 +363,7 @@ void SurfaceContacts::solveIsland(Index island_number, SolverStep step, int numb
     }
   });
   static const std::vector<Index> kNone;
-  solveRows(island.rows, springs, solver_bodies_, step, springs.empty() && !island.held ? island.bodies : kNone,
+  solveRows(island.rows, springs, fibres, solver_bodies_, step, springs.empty() && !island.held ? island.bodies : kNone,
             scratch, counters);
   runEach(for_each, island.bodies.size(), [&](std::size_t n) {
     const SolverBody& body = solver_bodies_[island.bodies[n]];

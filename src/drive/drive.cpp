@@ -56,6 +56,8 @@ class Run {
     }
     for (const ObstacleDef& def : scene.def.obstacles)
       if (Status added = world_.addObstacle(def); !added) return added.error();
+    for (const AttachCommand& attachment : scene.def.attachments)
+      if (const auto added = world_.addSceneAttachment(attachment); !added) return added.error();
     report_.bodies = world_.bodyCount();
     if (options_.record) world_.record([this](std::string bytes) { report_.log += bytes; });
     start_ = booksOf(see(world_, false));

@@ -17,6 +17,7 @@ namespace fs = std::filesystem;
 constexpr double kMaxLength = 1000.0;  // [m] of anything in a scene
 constexpr int kMaxBodies = 10000;
 constexpr std::size_t kMaxObstacles = 100;
+constexpr std::size_t kMaxAttachments = 1000;
 
 NumberRange lengths(double from = -kMaxLength, bool open = false) { return {from, kMaxLength, open, "m"}; }
 
@@ -261,6 +262,7 @@ class SceneReader {
     if (const YAML::Node materials = map.get("materials"); materials.IsDefined())
       readMaterialMap(source_, materials, scene_.materials);
     const YAML::Node bodies = map.get("bodies"), obstacles = map.get("obstacles");
+    const YAML::Node attachments = map.get("attachments");
     map.finish();
     if (!bodies.IsSequence() || bodies.size() > kMaxBodies) {
       source_.fail(bodies.IsDefined() ? bodies : root, "bodies is " + shown(bodies), "a list of up to 10000 bodies");
@@ -270,12 +272,20 @@ class SceneReader {
       if (source_.fault) return;  // later bodies may take seconds to load
       readBody(body);
     }
-    if (!obstacles.IsDefined()) return;
-    if (!obstacles.IsSequence() || obstacles.size() > kMaxObstacles)
-      return source_.fail(obstacles, "obstacles is " + shown(obstacles), "a list of up to 100 obstacles");
-    for (const auto& obstacle : obstacles) {
+    if (obstacles.IsDefined()) {
+      if (!obstacles.IsSequence() || obstacles.size() > kMaxObstacles)
+        return source_.fail(obstacles, "obstacles is " + shown(obstacles), "a list of up to 100 obstacles");
+      for (const auto& obstacle : obstacles) {
+        if (source_.fault) return;
+        readObstacle(obstacle);
+      }
+    }
+    if (!attachments.IsDefined()) return;
+    if (!attachments.IsSequence() || attachments.size() > kMaxAttachments)
+      return source_.fail(attachments, "attachments is " + shown(attachments), "a list of up to 1000 attachments");
+    for (const auto& attachment : attachments) {
       if (source_.fault) return;
-      readObstacle(obstacle);
+      readAttachment(attachment);
     }
   }
 
@@ -378,6 +388,50 @@ class SceneReader {
     def.mesh = std::move(shape.mesh);
     for (Vec3& p : def.mesh.vertices) p = shape.pose * p;
     scene_.obstacles.push_back(std::move(def));
+  }
+
+  void readAttachment(const YAML::Node& node) {
+    YamlMap map(source_, node, "an attachment");
+    AttachCommand attachment;
+    map.text("name", attachment.name);
+    const YAML::Node ends = map.get("bodies"), region = map.get("region");
+    map.number("distance", lengths(0.0, true), attachment.distance);
+    map.number("stiffness", {0.0, 1e15, true, "N/m^3"}, attachment.stiffness);
+    double strength = 0.0;
+    map.number("strength", {0.0, 1e15, true, "Pa"}, strength);
+    if (map.has("strength")) attachment.strength = strength;
+    if (!map.has("stiffness")) source_.fail(node, "an attachment has no stiffness", "above 0 to 1e15 N/m^3");
+    map.finish();
+    if (!map.has("name")) attachment.name.clear();
+    if (map.has("name") && !isPlainName(attachment.name))
+      source_.fail(node, "the attachment's name is '" + attachment.name.substr(0, 60) + "'", kPlainName);
+    if (!ends.IsSequence() || ends.size() != 2)
+      return source_.fail(node, "bodies of an attachment is " + shown(ends),
+                          "a list of two names, of bodies or obstacles, or one of them world");
+    for (std::size_t k = 0; k < 2; ++k) {
+      std::string& name = k == 0 ? attachment.body : attachment.other;
+      if (!readText(source_, ends[k], "bodies of an attachment", name)) return;
+      if (name != kWorldEnd && names_.count(name) == 0)
+        return source_.fail(ends[k],
+                            "there is no body and no obstacle " + shown(ends[k]) + ", did you mean '" +
+                                nearestWord(name, {names_.begin(), names_.end()}) + "'?",
+                            "names of this scene, or world", ErrorCode::kUnknownName);
+    }
+    if (attachment.body != kWorldEnd && attachment.other != kWorldEnd && !map.has("distance"))
+      return source_.fail(node, "an attachment has no distance", lengths(0.0, true).text());
+    if (region.IsDefined()) {
+      YamlMap shape(source_, region, "region");
+      const YAML::Node box = shape.get("box"), plane = shape.get("plane"), sphere = shape.get("sphere");
+      shape.finish();
+      if (box.IsDefined() + plane.IsDefined() + sphere.IsDefined() != 1)
+        return source_.fail(region, "region of an attachment has no shape or several",
+                            "{box: {min, max}}, {plane: {point, normal}} or {sphere: {centre, radius}}");
+      if (source_.fault) return;
+      if (box.IsDefined()) attachment.region = readBox(source_, box);
+      if (plane.IsDefined()) attachment.region = Region::below(readPlane(source_, plane));
+      if (sphere.IsDefined()) attachment.region = readSphere(source_, sphere);
+    }
+    scene_.attachments.push_back(std::move(attachment));
   }
 
   void readBodyMaterial(const YAML::Node& node, Material& material) {

@@ -135,6 +135,16 @@ meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatu
     state.bodies.push_back(std::move(message));
   }
   state.picks = toPicks(snapshot);
+  for (const AttachmentSnapshot& attachment : snapshot.attachments) {
+    meshless_surgery::AttachmentState message;
+    message.name = attachment.name;
+    message.ends = attachment.ends;
+    message.fibres = static_cast<std::uint32_t>(attachment.fibres);
+    message.made = static_cast<std::uint32_t>(attachment.made);
+    message.area = attachment.area;
+    message.force = attachment.force;
+    state.attachments.push_back(std::move(message));
+  }
   return state;
 }
 

@@ -209,6 +209,12 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   for (ObstacleDef& def : scene->obstacles)
     if (const Status added = world->addObstacle(std::move(def)); !added.ok())
       return Error{added.error().code, *file + ": " + added.error().detail};
+  for (const AttachCommand& attachment : scene->attachments) {
+    const auto added = world->addSceneAttachment(attachment);
+    if (!added.ok()) return Error{added.error().code, *file + ": attachments: " + added.error().detail};
+    ROS_INFO_STREAM("attachment " << added->name << ": " << added->fibres << " fibres on " << 1e4 * added->area
+                                  << " cm^2");
+  }
 
   auto session = std::make_unique<Session>(sessionSettings(*settings, *file));
   const auto taken_up = session->takeUp(*world);

@@ -2,7 +2,9 @@
 
 #include <chrono>
 
+#include <meshless_surgery/Attach.h>
 #include <meshless_surgery/Cut.h>
+#include <meshless_surgery/Detach.h>
 #include <meshless_surgery/GetBody.h>
 #include <meshless_surgery/Hash.h>
 #include <meshless_surgery/Incise.h>
@@ -31,6 +33,7 @@ namespace {
 
 constexpr double kMaxSpeed = 1e3;                           // [m/s]
 constexpr double kMaxStiffness = 1e9;                       // [N/m]
+constexpr double kMaxPerArea = 1e15;                        // [N/m^3], [Pa]
 constexpr double kMaxCloudTimeout = 60.0;                   // [s]
 constexpr double kCloudTimeout = 5.0;                       // [s]
 constexpr double kCloudPoll = 0.05;                         // [s]
@@ -62,6 +65,8 @@ struct Services::Handlers : Answers {
     advertise(private_handle, "push", &Handlers::push);
     advertise(private_handle, "incise", &Handlers::incise);
     advertise(private_handle, "remove", &Handlers::remove);
+    advertise(private_handle, "attach", &Handlers::attach);
+    advertise(private_handle, "detach", &Handlers::detach);
     advertise(private_handle, "set_material", &Handlers::setMaterial);
     advertise(private_handle, "get_body", &Handlers::getBody);
     advertise(private_handle, "pause", &Handlers::pause);
@@ -284,6 +289,57 @@ struct Services::Handlers : Answers {
     RemoveCommand command;
     command.body = request.name;
     return applied(response, "remove", command, "removed " + request.name);
+  }
+
+  /// The sphere of centre and radius; none where the radius is 0.
+  template <class Request>
+  Result<std::optional<Region>> regionOf(const Request& request, BorderCheck& check) const {
+    const Vec3 centre = check.point("centre", request.centre);
+    const double radius = check.number("radius", request.radius, 0.0, kMaxLength, "m");
+    if (!check.ok()) return check.error();
+    if (radius == 0.0) return std::optional<Region>();
+    const auto frame = frames.toWorld(request.header);
+    if (!frame.ok()) return frame.error();
+    return std::optional<Region>(Region::sphere(*frame * centre, radius));
+  }
+
+  bool attach(meshless_surgery::Attach::Request& request, meshless_surgery::Attach::Response& response) {
+    BorderCheck check;
+    AttachCommand command;
+    command.name = check.newName("name", request.name);
+    command.body = check.names("body", {request.body}).front();
+    command.other = check.names("other", {request.other}).front();
+    command.distance = check.number("distance", request.distance, 0.0, kMaxLength, "m");
+    command.stiffness = check.number("stiffness", request.stiffness, 0.0, kMaxPerArea, "N/m^3");
+    const double strength = check.number("strength", request.strength, 0.0, kMaxPerArea, "Pa");
+    if (strength > 0.0) command.strength = strength;
+    const auto region = regionOf(request, check);
+    if (!region.ok()) return refuse(response, "attach", region.error());
+    command.region = *region;
+    const auto reply = runner.apply(command);
+    if (!reply.ok()) return refuse(response, "attach", reply.error());
+    const auto& attached = std::get<AttachReply>(*reply);
+    response.name = attached.name;
+    response.fibres = static_cast<std::uint32_t>(attached.fibres);
+    response.area = attached.area;
+    return accept(response, "attached " + command.body + " to " + command.other + " by " +
+                                std::to_string(attached.fibres) + " fibres of '" + attached.name + "'");
+  }
+
+  bool detach(meshless_surgery::Detach::Request& request, meshless_surgery::Detach::Response& response) {
+    BorderCheck check;
+    DetachCommand command;
+    command.name = request.name;
+    const auto region = regionOf(request, check);
+    if (!region.ok()) return refuse(response, "detach", region.error());
+    command.region = *region;
+    const auto reply = runner.apply(command);
+    if (!reply.ok()) return refuse(response, "detach", reply.error());
+    const auto& detached = std::get<DetachReply>(*reply);
+    response.gone = static_cast<std::uint32_t>(detached.gone);
+    response.left = static_cast<std::uint32_t>(detached.left);
+    return accept(response, "detached " + std::to_string(detached.gone) + " fibres of '" + command.name + "'; " +
+                                std::to_string(detached.left) + " are left");
   }
 
   bool setMaterial(meshless_surgery::SetMaterial::Request& request, meshless_surgery::SetMaterial::Response& response) {

@@ -18,6 +18,7 @@ namespace meshless {
 namespace {
 
 constexpr float kSpringWidth = 0.0015f;  // [m]
+constexpr float kFibreWidth = 0.0005f;   // [m]
 constexpr float kSpringEnd = 0.007f;     // [m] diameter
 constexpr double kShownReach = 0.1;      // [m] of blades without an end
 constexpr double kBladeWidth = 0.12;     // of the blade's length
@@ -49,6 +50,8 @@ ToolsShape::ToolsShape(Ogre::SceneManager* scene_manager, Ogre::SceneNode* paren
   const std::string name = "meshless_scissors_" + std::to_string(count++);
   springs_ = std::make_unique<rviz::BillboardLine>(scene_manager_, node_);
   springs_->setLineWidth(kSpringWidth);
+  fibres_ = std::make_unique<rviz::BillboardLine>(scene_manager_, node_);
+  fibres_->setLineWidth(kFibreWidth);
   push_ = std::make_unique<rviz::Shape>(rviz::Shape::Sphere, scene_manager_, node_);
   push_->getRootNode()->setVisible(false);
   scissors_material_ =
@@ -67,6 +70,7 @@ ToolsShape::~ToolsShape() {
   scene_manager_->destroySceneNode(scissors_node);
   Ogre::MaterialManager::getSingleton().remove(scissors_material_);
   springs_.reset();
+  fibres_.reset();
   ends_.clear();
   push_.reset();
   scene_manager_->destroySceneNode(node_);
@@ -81,6 +85,19 @@ void ToolsShape::show(const meshless_surgery::Surfaces& surfaces, double full_fo
     surfaces.push_touching ? push_->setColor(0.95f, 0.75f, 0.3f, 0.85f) : push_->setColor(0.7f, 0.75f, 0.8f, 0.85f);
   }
   showScissors(surfaces);
+  showFibres(surfaces.fibres);
+}
+
+void ToolsShape::showFibres(const std::vector<geometry_msgs::Point>& ends) {
+  fibres_->clear();
+  const std::size_t lines = ends.size() / 2;
+  fibres_->setNumLines(std::max<std::uint32_t>(1, static_cast<std::uint32_t>(lines)));
+  fibres_->setMaxPointsPerLine(2);
+  for (std::size_t i = 0; i < lines; ++i) {
+    if (i > 0) fibres_->newLine();
+    for (std::size_t k = 2 * i; k < 2 * i + 2; ++k)
+      fibres_->addPoint(toOgre(ends[k]), Ogre::ColourValue(0.95f, 0.9f, 0.75f));
+  }
 }
 
 void ToolsShape::showSprings(const std::vector<meshless_surgery::PickState>& picks, double full_force) {

@@ -14,7 +14,7 @@ namespace meshless {
 namespace {
 
 constexpr std::string_view kMagic = "MLSSTATE";
-constexpr std::uint32_t kVersion = 17;
+constexpr std::uint32_t kVersion = 18;
 constexpr std::uint64_t kMostModels = 1u << 20;
 
 /// What follows the magic, of at least kStateHeaderBytes.
@@ -79,8 +79,9 @@ SavedBody loadBody(InArchive& archive, const ModelTable& models) {
 template <class Archive, class World>
 void rest(Archive& archive, World& world) {
   archive(world.step, world.batches_current, world.batches, world.generations, world.free_slots, world.next_number,
-          world.used_names, world.picks, world.next_pick, world.push, world.scissors, world.closing, world.next_ticket,
-          world.next_sleep_group, world.surface_contacts);
+          world.used_names, world.picks, world.next_pick, world.attachments, world.used_attachments,
+          world.scene_attachments, world.push, world.scissors, world.closing, world.next_ticket, world.next_sleep_group,
+          world.surface_contacts);
 }
 
 void checkSlots(const SavedWorld& world) {
@@ -122,6 +123,24 @@ void checkTools(const SavedWorld& world) {
                     (pick.place.cell == kNoIndex ||
                      (body.model->lattice && pick.place.cell < body.model->lattice->cells.size())),
                 "a pick holds what is not there");
+  }
+  for (const Attachment& attachment : world.attachments) {
+    require(world.used_attachments.count(attachment.name) > 0 && attachment.fibres.size() <= attachment.made &&
+                attachment.stiffness > 0.0 && attachment.stiffness <= 1e15 &&
+                (!attachment.strength || *attachment.strength > 0.0),
+            "an attachment is none");
+    const auto holds = [&](const BodyId& id, const BodyPoint& at) {
+      const auto body =
+          std::find_if(world.bodies.begin(), world.bodies.end(), [&](const SavedBody& b) { return b.id == id; });
+      return body != world.bodies.end() && !at.particles.empty() && at.particles.size() == at.weights.size() &&
+             allBelow(at.particles, body->model->rest.size());
+    };
+    for (const Fibre& fibre : attachment.fibres)
+      require(
+          holds(fibre.a, fibre.at_a) &&
+              (fibre.b == BodyId() ? !attachment.other.empty() : fibre.b != fibre.a && holds(fibre.b, fibre.at_b)) &&
+              fibre.area > 0.0 && fibre.rest >= 0.0,
+          "a fibre joins what is not there");
   }
   for (const ClosingCut& cut : world.closing) require(cut.done_at > cut.started_at, "blades close in no time");
 }
@@ -468,6 +487,9 @@ std::shared_ptr<const SavedWorld> World::capture() const {
   for (const auto& obstacle : w.obstacles) saved->obstacles.push_back(obstacle->def);
   saved->picks = w.picks;
   saved->next_pick = w.next_pick;
+  saved->attachments = w.attachments;
+  saved->used_attachments = w.used_attachments;
+  saved->scene_attachments = w.scene_attachments;
   saved->push = w.push;
   saved->scissors = w.scissors;
   saved->closing = w.closing;
@@ -521,6 +543,10 @@ void World::restore(const SavedWorld& saved) {
   for (const auto& obstacle : saved.obstacles) w.obstacles.push_back(std::make_shared<WorldObstacle>(*obstacle));
   w.picks = saved.picks;
   w.next_pick = saved.next_pick;
+  w.attachments = saved.attachments;
+  w.used_attachments = saved.used_attachments;
+  w.scene_attachments = saved.scene_attachments;
+  w.listFibres();
   w.push = saved.push;
   w.scissors = saved.scissors;
   w.closing = saved.closing;
@@ -581,12 +607,23 @@ std::uint64_t World::stateHash() const {
             body.still_for, body.rest_from, body.sleep_group, body.batch);
     archive(known.of(body.model));
   }
+  const auto numbered = [&](const BodyId& id) {
+    const auto body = std::find_if(saved->bodies.begin(), saved->bodies.end(),
+                                   [&](const SavedBody& other) { return other.id == id; });
+    return BodyId{static_cast<std::uint32_t>(body - saved->bodies.begin()), 0};
+  };
   for (Pick pick : saved->picks) {
-    const auto held = std::find_if(saved->bodies.begin(), saved->bodies.end(),
-                                   [&](const SavedBody& body) { return body.id == pick.body; });
-    pick.body = BodyId{static_cast<std::uint32_t>(held - saved->bodies.begin()), 0};
+    pick.body = numbered(pick.body);
     archive(pick);
   }
+  for (Attachment attachment : saved->attachments) {
+    for (Fibre& fibre : attachment.fibres) {
+      fibre.a = numbered(fibre.a);
+      if (fibre.b != BodyId()) fibre.b = numbered(fibre.b);
+    }
+    archive(attachment);
+  }
+  archive(saved->used_attachments);
   for (ClosingCut cut : saved->closing) {
     cut.ticket = 0;
     archive(cut);

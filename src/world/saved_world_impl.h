@@ -47,6 +47,9 @@ struct SavedWorld {
   std::vector<std::shared_ptr<const ObstacleDef>> obstacles;
   std::vector<Pick> picks;
   PickId next_pick = 1;
+  std::vector<Attachment> attachments;
+  std::set<std::string> used_attachments;
+  std::vector<AttachCommand> scene_attachments;
   PushSphere push;
   Scissors scissors;
   std::vector<ClosingCut> closing;
@@ -289,6 +292,31 @@ void serialize(A& archive, Pick& v) {
   auto& [id, body, particle, place, patch, weights, offset, target, reached, locked, stiffness, position, force] = v;
   archive(id, body, particle, place.cell, place.at, patch, weights, offset, target, reached, locked, stiffness,
           position, force);
+}
+template <class A>
+void serialize(A& archive, BodyPoint& v) {
+  auto& [particles, weights] = v;
+  archive(particles, weights);
+}
+template <class A>
+void serialize(A& archive, Fibre& v) {
+  auto& [a, b, at_a, at_b, place, area, rest, force, tension] = v;
+  archive(a, b, at_a, at_b, place, area, rest, force, tension);
+}
+template <class A>
+void serialize(A& archive, Attachment& v) {
+  auto& [name, other, stiffness, strength, made, torn, fibres] = v;
+  archive(name, other, stiffness, strength, made, torn, fibres);
+}
+template <class A>
+void serialize(A& archive, AttachCommand& v) {
+  auto& [name, body, other, distance, stiffness, strength, region] = v;
+  archive(name, body, other, distance, stiffness, strength, region);
+}
+template <class A>
+void serialize(A& archive, DetachCommand& v) {
+  auto& [name, region] = v;
+  archive(name, region);
 }
 template <class A>
 void serialize(A& archive, PushSphere& v) {

@@ -57,6 +57,12 @@ const char* toString(EventType type) {
       return "lifted";
     case EventType::kLoaded:
       return "loaded";
+    case EventType::kAttached:
+      return "attached";
+    case EventType::kDetached:
+      return "detached";
+    case EventType::kTorn:
+      return "torn";
   }
   return "unknown";
 }
@@ -243,6 +249,8 @@ void World::reset() {
   while (!w.bodies.empty()) w.retire(w.bodies.back()->id);
   w.used_names.clear();
   w.picks.clear();
+  w.attachments.clear();
+  w.used_attachments.clear();
   w.surface_contacts.clear();
   w.next_sleep_group = 1;
   w.undo.clear();
@@ -253,6 +261,8 @@ void World::reset() {
   ++w.run;
   w.say(EventType::kReset, "", 0, "back to the scene's start");
   for (const auto& body : w.scene) w.admit(body->def.name, body->def.material, body->model, body->state);
+  for (const AttachCommand& attachment : w.scene_attachments)
+    if (const auto made = w.attach(attachment); !made) w.say(EventType::kFault, "", 0, made.error().detail);
 }
 
 WorldSnapshot World::snapshot(const SnapshotWants& wants) {
@@ -288,6 +298,7 @@ WorldSnapshot World::snapshot(const SnapshotWants& wants) {
   shot.picks = w.picks;
   for (const Pick& pick : w.picks)
     if (const WorldBody* body = w.find(pick.body)) shot.pick_bodies[pick.id] = body->name;
+  w.showAttachments(wants, shot.attachments);
   shot.push = w.push;
   shot.scissors = w.scissors;
   shot.report = w.report;

@@ -287,6 +287,12 @@ Result<Reply> World::Impl::apply(const RemoveCommand& command) {
   for (const Pick& pick : picks)
     if (pick.body == id) say(EventType::kReleased, command.body, pick.id, "released: its body was removed");
   picks.erase(std::remove_if(picks.begin(), picks.end(), [&](const Pick& p) { return p.body == id; }), picks.end());
+  for (Attachment& attachment : attachments)
+    loseFibres(attachment, EventType::kDetached, "went with " + command.body,
+               [&](const Fibre& fibre) { return fibre.a == id || fibre.b == id; });
+  attachments.erase(std::remove_if(attachments.begin(), attachments.end(),
+                                   [](const Attachment& attachment) { return attachment.fibres.empty(); }),
+                    attachments.end());
   wake(*body);
   retire(id);
   say(EventType::kRemoved, command.body, 0, "removed " + command.body);

@@ -158,7 +158,10 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
       reply.notes.push_back(refused);
     }
   }
-  if (severed.empty()) {
+  std::vector<BodyId> whole;
+  for (const Severed& s : severed) whole.push_back(s.parent);
+  const std::vector<std::vector<char>> parted = partedBy(command.blades, command.bodies, whole);
+  if (severed.empty() && !anyIn(parted)) {
     if (!refused.empty()) return Error{ErrorCode::kUnsuitableShape, refused};
     return Error{ErrorCode::kMissed, command.bodies.empty() ? "the blades met no body; " + knownBodies()
                                                             : "the blades met none of the bodies named"};
@@ -173,6 +176,7 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
 
   // From here nothing fails: parents are retired and their pieces admitted.
   CutUndo before = beforeCut();
+  for (std::string& note : partFibres(parted)) reply.notes.push_back(std::move(note));
   for (Severed& s : severed) {
     const std::string parent_name = find(s.parent)->name;
     const std::vector<std::string> names = replaceByPieces(s.parent, std::move(s.cut.pieces));
@@ -224,6 +228,9 @@ std::vector<std::string> World::Impl::replaceByPieces(const BodyId& parent_id, s
     names.push_back(name);
   }
   followPieces(parent_id, find(parent_id)->state.positions, descents);
+  std::vector<BodyId> children;
+  for (const Descent& descent : descents) children.push_back(descent.child);
+  followFibres(parent_id, *find(parent_id)->model, find(parent_id)->state.positions, children);
   retire(parent_id);
   return names;
 }

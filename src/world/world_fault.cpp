@@ -54,6 +54,11 @@ void World::Impl::mendFaults() {
         "the coordinates of " + body->name + " were not finite any more; it starts anew from rest");
   }
   if (!any) return;
+  for (Attachment& attachment : attachments)
+    for (Fibre& fibre : attachment.fibres) {
+      fibre.force.setZero();
+      fibre.tension = 0.0;
+    }
   surface_contacts.clear();
   contacts_current = false;
   batches_current = false;

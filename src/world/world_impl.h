@@ -40,9 +40,9 @@ struct WorldBody {
   bool surface_current = true;                        // state.surface fits state.positions
   std::shared_ptr<const ContactMesh> mesh;            // made when something first comes near
   std::shared_ptr<const SurfaceModel> surface_model;  // made when something first comes near
-  BodyModelPtr measured;       // the model that these two are of
-  double edge_length = 0.0;    // [m] mean, of the surface
-  double surface_reach = 0.0;  // [m] how far the surface is beyond the particles, at most
+  BodyModelPtr measured;                              // the model that these two are of
+  double edge_length = 0.0;                           // [m] mean, of the surface
+  double surface_reach = 0.0;                         // [m] how far the surface is beyond the particles, at most
   bool touched_by_push = false;
   double stiffness_factor = 1.0;
   Box bounds;              // [m] of particles and surface, at the start of the last frame in which it was awake
@@ -79,6 +79,8 @@ struct SurfaceWork {
     std::vector<Vec3*> previous;     // [m] one a body
     std::vector<Pick*> picks;
     std::vector<SpringRow> springs;  // one a pick
+    std::vector<Fibre*> fibres;
+    std::vector<FibreRow> fibre_rows;  // one a fibre
   };
   std::vector<Member> members;
   std::size_t member_count = 0;                       // of them in use
@@ -115,6 +117,7 @@ ForEach makeForEach(int threads);
 /// The state before a cut or an incision. Models are shared, so that this is the states alone.
 struct CutUndo {
   struct Body {
+    BodyId id;
     std::string name;
     std::uint32_t number = 0;
     Material material;
@@ -125,8 +128,9 @@ struct CutUndo {
   std::vector<Body> bodies;  // all of them, in their order
   std::vector<Pick> picks;
   std::vector<std::string> pick_bodies;  // one a pick
-  std::vector<std::string> cut;          // bodies that were cut or opened
-  std::vector<std::string> pieces;       // what they came apart into
+  std::vector<Attachment> attachments;
+  std::vector<std::string> cut;     // bodies that were cut or opened
+  std::vector<std::string> pieces;  // what they came apart into
 };
 
 /// What is drawn out or thrown apart without measure is matched in double.
@@ -171,6 +175,19 @@ struct World::Impl {
   std::vector<std::shared_ptr<WorldObstacle>> obstacles;
   std::vector<Pick> picks;
   PickId next_pick = 1;
+  std::vector<Attachment> attachments;     // in the order in which they came
+  std::set<std::string> used_attachments;  // names of this run
+  std::vector<AttachCommand> scene_attachments;
+  struct AttachedFibre {
+    Fibre* fibre = nullptr;
+    double stiffness = 0.0;     // [N/m]
+    Index a = 0, b = kNoIndex;  // bodies
+  };
+  struct AttachedFibres {  // of a step, by their first bodies
+    std::vector<AttachedFibre> all;
+    std::vector<Index> offsets, of_body;  // compressed rows, one a body; empty where there are none
+  };
+  AttachedFibres attached;
   PushSphere push;
   Scissors scissors;
   std::vector<ClosingCut> closing;
@@ -232,6 +249,8 @@ struct World::Impl {
   Result<Reply> apply(const SetMaterialCommand& command);
   Result<Reply> apply(const SpawnCommand& command);
   Result<Reply> apply(const RemoveCommand& command);
+  Result<Reply> apply(const AttachCommand& command);
+  Result<Reply> apply(const DetachCommand& command);
   /// What the command would change, or why it is refused.
   Result<std::vector<MaterialChange>> changesOf(const SetMaterialCommand& command) const;
   std::string letGo(const Pick& pick);  // one of picks; the name of its body
@@ -258,6 +277,28 @@ struct World::Impl {
   /// Picks of a body go where the tissue goes that they hold; `before` [m]: of its particles.
   void followPieces(const BodyId& parent, const Points& before, const std::vector<Descent>& pieces);
   void followTissue(Pick& pick, const Points& before, const Descent& piece, const TissuePlace& place);
+
+  // attachments
+  Result<AttachReply> attach(const AttachCommand& command);
+  /// Fibres that `gone` says, with an event that says why.
+  std::size_t loseFibres(Attachment& attachment, EventType type, const std::string& why,
+                         const std::function<bool(const Fibre&)>& gone);
+  Points fibreEnds(const Fibre& fibre);  // [m] two
+  std::string firstBodyOf(const Attachment& attachment);
+  void showAttachments(const SnapshotWants& wants, std::vector<AttachmentSnapshot>& shown);
+  /// Those of the bodies named (none: of all) that the blades part, which sever the bodies of those ids along their
+  /// whole plane.
+  std::vector<std::vector<char>> partedBy(const ScissorBlades& blades, const std::vector<std::string>& of,
+                                          const std::vector<BodyId>& severed);
+  static bool anyIn(const std::vector<std::vector<char>>& parted);
+  /// Sentences, one an attachment.
+  std::vector<std::string> partFibres(const std::vector<std::vector<char>>& parted);
+  /// Of a body that was of that model, with its particles there [m], and has become these.
+  void followFibres(const BodyId& parent, const BodyModel& model, const Points& before,
+                    const std::vector<BodyId>& pieces);
+  void listFibres();
+  void wakeAttached();
+  void tearFibres();
 
   // the log of commands, where there is one
   void record(const Command& command) const;

@@ -59,7 +59,11 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
       reply.notes.push_back(refused->detail);
     }
   }
-  if (all.empty()) {
+  const Blade& blade = command.blade;
+  const ScissorBlades rectangle{blade.origin - 0.5 * blade.depth * blade.y_axis, blade.x_axis, blade.y_axis,
+                                blade.length, blade.depth};
+  const std::vector<std::vector<char>> parted = partedBy(rectangle, command.bodies, {});
+  if (all.empty() && !anyIn(parted)) {
     if (refused) return *refused;
     if (!missed.empty()) return Error{ErrorCode::kMissed, missed};
     return Error{ErrorCode::kMissed, command.bodies.empty() ? "the blade met no body; " + knownBodies()
@@ -75,6 +79,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
 
   // From here nothing fails.
   CutUndo before = beforeCut();
+  for (std::string& note : partFibres(parted)) reply.notes.push_back(std::move(note));
   for (Opened& opened : all) {
     WorldBody& body = *find(opened.id);
     const std::string name = body.name;
@@ -86,9 +91,10 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
       const Points positions = body.state.positions;
       Descent descent = descentOf(opened.body.pieces[0]);
       descent.child = body.id;
-      body.model = std::move(opened.body.pieces[0].model);
+      const BodyModelPtr whole = std::exchange(body.model, std::move(opened.body.pieces[0].model));
       body.state = std::move(opened.body.pieces[0].state);
       if (body.model->lattice) followPieces(body.id, positions, {descent});
+      followFibres(body.id, *whole, positions, {body.id});
       body.mesh.reset();
       body.surface_current = true;
       surface_contacts.forget(body.number);

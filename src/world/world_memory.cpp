@@ -17,6 +17,16 @@ MemoryUse World::memory() const {
     if (first(body->mesh.get()))
       use.contact += sizeof *body->mesh + bytesOf(body->mesh->tetrahedra, body->mesh->faces, body->mesh->edges);
   }
+  const auto bytesOfAll = [](const std::vector<Attachment>& attachments) {
+    std::size_t sum = bytesOf(attachments);
+    for (const Attachment& attachment : attachments) {
+      sum += bytesOf(attachment.fibres);
+      for (const Fibre& fibre : attachment.fibres)
+        for (const BodyPoint* end : {&fibre.at_a, &fibre.at_b}) sum += bytesOf(end->particles, end->weights);
+    }
+    return sum;
+  };
+  use.states += bytesOfAll(w.attachments) + bytesOf(w.attached.all, w.attached.offsets, w.attached.of_body);
   for (const WorldBatch& batch : w.batches) {
     use.states += bytesOf(batch.bodies, batch.spare);
     for (const auto& lanes : batch.spare)
@@ -33,13 +43,14 @@ MemoryUse World::memory() const {
                    bytesOf(work.solver_scratch.active, work.solver_scratch.levers);
     for (const auto& some : work.side_by_side) use.contact += bytesOf(some);
     for (const SurfaceWork::Member& member : work.members)
-      use.contact += bytesOf(member.previous, member.picks, member.springs);
+      use.contact += bytesOf(member.previous, member.picks, member.springs, member.fibres, member.fibre_rows);
   }
   for (const auto& body : w.scene) {
     if (!first(body.get())) continue;
     if (first(body->model.get())) use.kept += bytesOf(*body->model);
     use.kept += sizeof *body + bytesOf(body->state);
   }
+  for (const CutUndo& undo : w.undo) use.kept += bytesOfAll(undo.attachments);
   for (const CutUndo& undo : w.undo)
     for (const CutUndo::Body& body : undo.bodies) {
       if (first(body.model.get())) use.kept += bytesOf(*body.model);

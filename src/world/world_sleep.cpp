@@ -77,6 +77,12 @@ void World::Impl::fallAsleep(double h_frame) {
     else
       joined.join(a, b);
   }
+  for (const AttachedFibre& fibre : attached.all) {
+    if (fibre.b == kNoIndex)
+      held[fibre.a] = 1;
+    else
+      joined.join(fibre.a, fibre.b);
+  }
   for (const Pick& pick : picks)
     for (Index b = 0; b < bodies.size(); ++b)
       if (bodies[b]->id == pick.body) held[b] = 1;

@@ -35,6 +35,8 @@ void World::Impl::takeStep() {
   const double h_frame = 1.0 / settings.step_rate;
   closeBlades();
   wakePushed(h_frame);
+  listFibres();
+  wakeAttached();
   listAwake();
   groupBatches();
   clearForces();
@@ -79,6 +81,7 @@ void World::Impl::clearForces() {
 
 void World::Impl::finishStep(double h_frame) {
   mendFaults();
+  tearFibres();
   findWound();
   for (Pick& pick : picks)
     if (const WorldBody* body = find(pick.body)) pick.position = graspMean(pick, body->state.positions) + pick.offset;

@@ -193,6 +193,13 @@ void World::Impl::findNear(double h) {
   for (const Pick& pick : picks)
     for (std::size_t b = 0; b < bodies.size(); ++b)
       if (bodies[b]->id == pick.body) colliders[b].grasped = true;
+  for (const AttachedFibre& fibre : attached.all) {
+    if (bodies[fibre.a]->asleep) continue;
+    for (const Index b : {fibre.a, fibre.b})
+      if (b != kNoIndex) colliders[b].grasped = true;
+    if (scene.joins.empty() || scene.joins.back().a != fibre.a || scene.joins.back().b != fibre.b)
+      scene.joins.push_back({fibre.a, fibre.b});
+  }
   scene.surfaces = settings.contact == ContactMethod::kSurface;
   if (settings.contact == ContactMethod::kTextbook) findTextbook(h);
   surface_contacts.findPairs(scene, colliders, report.contact_counters);
@@ -330,7 +337,7 @@ void World::Impl::stepSurfaces(double h_frame, int parts, int parts_left) {
   for (Index n = 0; n < islands.size(); ++n) {
     some.clear();
     for (const Index b : islands[n].bodies) some.push_back(bodies[b].get());
-    const int substeps = substepsOf(some, !islands[n].rows.empty(), h_frame, parts);
+    const int substeps = substepsOf(some, !islands[n].rows.empty() || islands[n].joined, h_frame, parts);
     addWork(n, substeps);
     report.substeps = std::max(report.substeps, static_cast<std::size_t>(substeps * parts));
     for (const Index b : islands[n].bodies) {
@@ -362,6 +369,7 @@ void World::Impl::stepSurfaces(double h_frame, int parts, int parts_left) {
     report.preserve_counters += work.preserve_counters;
     report.contact_counters.corrected += work.solver_counters.active;
     report.ground_contacts += work.solver_counters.ground;
+    report.fibres += work.solver_counters.fibres;
     report.match += work.match;
     report.contact += work.contact;
     if (!work.touched) continue;
@@ -402,6 +410,8 @@ void World::Impl::addWork(Index island, int substeps) {
   member.begin = work->bodies.size();
   member.picks.clear();
   member.springs.clear();
+  member.fibres.clear();
+  member.fibre_rows.clear();
   const std::vector<Index>& of_island = surface_contacts.islands()[island].bodies;
   for (const Index b : of_island) {
     work->bodies.push_back(bodies[b].get());
@@ -418,6 +428,22 @@ void World::Impl::addWork(Index island, int substeps) {
       spring.weights = &pick.weights;
       spring.stiffness = pick.stiffness;
       member.springs.push_back(spring);
+    }
+  if (attached.all.empty()) return;
+  for (const Index b : of_island)
+    for (Index k = attached.offsets[b]; k < attached.offsets[b + 1]; ++k) {
+      const AttachedFibre& fibre = attached.all[attached.of_body[k]];
+      member.fibres.push_back(fibre.fibre);
+      FibreRow row;
+      row.a = fibre.a;
+      row.b = fibre.b;
+      row.at_a = &fibre.fibre->at_a;
+      row.at_b = &fibre.fibre->at_b;
+      row.place = fibre.fibre->place;
+      row.rest = fibre.fibre->rest;
+      row.stiffness = fibre.stiffness;
+      row.impulse = fibre.fibre->force;
+      member.fibre_rows.push_back(row);
     }
 }
 
@@ -519,7 +545,9 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
         member.springs[p].impulse.setZero();
       }
       surface_contacts.solveIsland(member.island, step, substep, colliders, member.previous, member.springs,
-                                   work.solver_scratch, work.solver_counters, each);
+                                   member.fibre_rows, work.solver_scratch, work.solver_counters, each);
+      for (std::size_t f = 0; f < member.fibres.size(); ++f)
+        member.fibres[f]->tension += member.fibre_rows[f].impulse.norm() / (h * h * substeps * parts);
       for (std::size_t p = 0; p < member.picks.size(); ++p)
         member.picks[p]->force += member.springs[p].impulse / (h * h * substeps * parts);
       if (push.enabled) {
@@ -534,7 +562,12 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
             [&](std::size_t b) { velocitiesFromPositions(h, work.bodies[b]->state, work.bodies[b]->scratch); });
     work.match += secondsSince(last);
   }
-  for (std::size_t n = 0; n < work.member_count; ++n) surface_contacts.finishIsland(work.members[n].island, h);
+  for (std::size_t n = 0; n < work.member_count; ++n) {
+    SurfaceWork::Member& member = work.members[n];
+    surface_contacts.finishIsland(member.island, h);
+    for (std::size_t f = 0; f < member.fibres.size(); ++f)
+      member.fibres[f]->force = member.fibre_rows[f].impulse / (h * h);
+  }
   for (std::size_t n = 0; n < batches.size(); ++n)
     if (work.lanes[n]) giveBackLanes(batches[n], std::move(work.lanes[n]));
 }

@@ -18,13 +18,14 @@ CutUndo World::Impl::beforeCut() const {
   CutUndo before;
   for (const auto& body : bodies)
     before.bodies.push_back(
-        {body->name, body->number, body->material, body->model, body->state, body->surface_current});
+        {body->id, body->name, body->number, body->material, body->model, body->state, body->surface_current});
   before.picks = picks;
   for (const Pick& pick : picks) {
     const auto held =
         std::find_if(bodies.begin(), bodies.end(), [&](const auto& body) { return body->id == pick.body; });
     before.pick_bodies.push_back(held != bodies.end() ? (*held)->name : std::string());
   }
+  before.attachments = attachments;
   return before;
 }
 
@@ -95,6 +96,23 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
     picks.push_back(before.picks[i]);
     picks.back().body = body->id;
   }
+  // Bodies that the cut has made anew have other ids; those that were removed since stay so.
+  std::map<BodyId, BodyId> now;
+  for (const CutUndo::Body& was : before.bodies)
+    if (const WorldBody* body = find(was.name)) now[was.id] = body->id;
+  attachments = std::move(before.attachments);
+  for (Attachment& attachment : attachments) {
+    std::vector<Fibre> left;
+    for (Fibre& fibre : attachment.fibres) {
+      const bool joins = fibre.b != BodyId();
+      if (!now.count(fibre.a) || (joins && !now.count(fibre.b))) continue;
+      fibre.a = now[fibre.a];
+      if (joins) fibre.b = now[fibre.b];
+      left.push_back(std::move(fibre));
+    }
+    attachment.fibres = std::move(left);
+  }
+  if (before.cut.empty()) say(EventType::kUndone, "", 0, "as before the cut");
   for (const std::string& name : before.cut) say(EventType::kUndone, name, 0, "as before the cut");
   return Reply(UndoCutReply{before.cut});
 }

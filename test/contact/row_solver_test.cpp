@@ -67,11 +67,13 @@ struct Clash {
   SolverCounters move(SurfaceContacts& contacts) {
     for (int n = 0; n < 2; ++n) std::copy(after[n].begin(), after[n].end(), places[n].begin());
     std::vector<SpringRow> springs;
+    std::vector<FibreRow> fibres;
     SolverScratch scratch;
     SolverCounters counters;
     SolverStep step;
     step.h = kH;
-    contacts.solveIsland(0, step, 0, colliders, {before[0].data(), before[1].data()}, springs, scratch, counters);
+    contacts.solveIsland(0, step, 0, colliders, {before[0].data(), before[1].data()}, springs, fibres, scratch,
+                         counters);
     for (int n = 0; n < 2; ++n) after[n] = places[n];
     return counters;
   }
@@ -174,6 +176,7 @@ TEST(RowSolver, ASpringMovesTheBodyAsAWholeAndTheRestByItsShare) {
     const std::vector<Index> patch = {1, 3};
     const std::vector<double> weights = {0.75, 0.25};
     std::vector<SpringRow> springs(1);
+    std::vector<FibreRow> fibres;
     springs[0].patch = &patch;
     springs[0].weights = &weights;
     springs[0].end = Vec3(0.8, 0.3, 0.2);
@@ -183,7 +186,7 @@ TEST(RowSolver, ASpringMovesTheBodyAsAWholeAndTheRestByItsShare) {
     SolverScratch scratch;
     SolverCounters counters;
     std::vector<SolverRows> none;
-    solveRows(none, springs, bodies, step, {}, scratch, counters);
+    solveRows(none, springs, fibres, bodies, step, {}, scratch, counters);
     Vec3 impulse = Vec3::Zero(), couple = Vec3::Zero(), mean = Vec3::Zero();
     for (std::size_t i = 0; i < 4; ++i) {
       const Vec3 way = Vec3(now[i].x, now[i].y, now[i].z) - places[i];
@@ -217,11 +220,12 @@ TEST(RowSolver, AGapThatAlmostAllHeldParticlesLackThrowsNobody) {
     bodies[0].particles = 2;
     bodies[0].edge_length = 0.01;
     std::vector<SpringRow> springs;
+    std::vector<FibreRow> fibres;
     SolverStep step;
     step.h = kH;
     SolverScratch scratch;
     SolverCounters counters;
-    solveRows({{&set, 0, kNoIndex}}, springs, bodies, step, {}, scratch, counters);
+    solveRows({{&set, 0, kNoIndex}}, springs, fibres, bodies, step, {}, scratch, counters);
     EXPECT_EQ(counters.active, 0u);
     EXPECT_EQ(now[1].z, 0.0);
   }
@@ -249,13 +253,14 @@ TEST(RowSolver, OverlapsFadeWithoutSpeedAndBuildNothingUp) {
     bodies[0].particles = 1;
     bodies[0].edge_length = 0.01;
     std::vector<SpringRow> springs;
+    std::vector<FibreRow> fibres;
     SolverStep step;
     step.h = step.frame = 1e-3;
     SolverScratch scratch;
     SolverCounters counters;
     double last = 0.0;
     for (int n = 0; n < 600; ++n) {
-      solveRows({{&set, 0, kNoIndex}}, springs, bodies, step, {}, scratch, counters);
+      solveRows({{&set, 0, kNoIndex}}, springs, fibres, bodies, step, {}, scratch, counters);
       EXPECT_EQ(now[0].z, before[0].z);  // no speed
       for (const ContactRow& row : set.rows) EXPECT_LT(row.impulse.norm(), 1e-12);
       EXPECT_LE(now[0].z - last, 0.5 * 0.01 * step.h * (1.0 + 1e-12));

@@ -75,6 +75,30 @@ struct SpringRow {
   Vec3 impulse = Vec3::Zero();  // [kg m] on the tissue, in this substep
 };
 
+/// A point of a body: the weighted mean of some of its particles.
+struct BodyPoint {
+  std::vector<Index> particles;
+  std::vector<double> weights;  // add up to 1
+
+  Vec3 of(const Points& positions) const {
+    Vec3 sum = Vec3::Zero();
+    for (std::size_t k = 0; k < particles.size(); ++k) sum += weights[k] * positions[particles[k]];
+    return sum;
+  }
+};
+
+/// Joins a point of a body to one of another body, or to a place: it pulls along itself where it is longer than at
+/// rest.
+struct FibreRow {
+  Index a = 0, b = kNoIndex;  // bodies; b is kNoIndex where the other end is a place
+  const BodyPoint *at_a = nullptr, *at_b = nullptr;
+  Vec3 place = Vec3::Zero();       // [m] that place
+  double rest = 0.0;               // [m]
+  double stiffness = 0.0;          // [N/m]
+  Vec3 impulse = Vec3::Zero();     // [kg m] on a in a substep; between frames the force [N]
+  double stiff = 0.0, from = 0.0;  // of the solver, in a substep: [kg] per length beyond that [m]
+};
+
 struct SolverStep {
   double h = 0.0;      // [s] of the substep
   double frame = 0.0;  // [s] of the frame, in whose first substep old overlap is let out
@@ -88,6 +112,7 @@ struct SolverStep {
 struct SolverCounters {
   std::size_t active = 0;  // rows that could carry load
   std::size_t ground = 0;  // of them, those of the ground
+  std::size_t fibres = 0;  // that could pull
 };
 
 /// Scratch of one thread.
@@ -108,18 +133,18 @@ struct SolverScratch {
     double sideways;            // [kg] the same across the normal, for a slide of 1 m
   };
   struct Pull {
-    Mat3 answer;  // [m/(kg m)] of the grasp to an impulse
+    Mat3 answer;  // [m/(kg m)] of the point to an impulse
     Index levers, end;
   };
   std::vector<Active> active;
-  std::vector<Pull> pulls;  // one a spring
+  std::vector<Pull> pulls;  // one a spring, then two a fibre
   std::vector<Lever> levers;
 };
 
-/// Solves the rows, and springs, for the bodies that they name. Impulses are read as a start and written. free: those
-/// that move, if nothing holds them, so that angular momentum is worth keeping; else empty.
-void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& springs, std::vector<SolverBody>& bodies,
-               const SolverStep& step, const std::vector<Index>& free, SolverScratch& scratch,
-               SolverCounters& counters);
+/// Solves the rows, springs and fibres for the bodies that they name. Impulses of rows and fibres are read as a start
+/// and written. free: those that move, if nothing holds them, so that angular momentum is worth keeping; else empty.
+void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& springs, std::vector<FibreRow>& fibres,
+               std::vector<SolverBody>& bodies, const SolverStep& step, const std::vector<Index>& free,
+               SolverScratch& scratch, SolverCounters& counters);
 
 }  // namespace meshless

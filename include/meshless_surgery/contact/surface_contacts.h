@@ -54,7 +54,13 @@ struct SurfaceScene {
     RowSet set;
   };
   std::vector<Given> given;
+  struct Join {  // fibres between two colliders, or of one and what does not move
+    Index a = 0, b = kNoIndex;
+  };
+  std::vector<Join> joins;
 };
+
+constexpr double kSkin = 0.01;  // of the mean edge: surfaces rest so far above each other
 
 class SurfaceContacts {
  public:
@@ -75,7 +81,8 @@ class SurfaceContacts {
   struct Island {
     std::vector<Index> bodies;
     std::vector<SolverRows> rows;
-    bool held = false;  // some of it, or by others
+    bool held = false;    // some of it, or by others
+    bool joined = false;  // by fibres
   };
   /// Each collider that moves is in one; in the order of their first bodies.
   const std::vector<Island>& islands() const { return islands_; }
@@ -86,8 +93,8 @@ class SurfaceContacts {
   /// After the bodies of an island have moved by a substep, the number-th of the frame. previous: [m] at its start, one
   /// a particle of each body of the island. step.warm and step.number are set here. colliders: as find() got them.
   void solveIsland(Index island, SolverStep step, int number, const std::vector<Collider>& colliders,
-                   const std::vector<Vec3*>& previous, std::vector<SpringRow>& springs, SolverScratch& scratch,
-                   SolverCounters& counters, const ForEach& for_each = oneAfterAnother);
+                   const std::vector<Vec3*>& previous, std::vector<SpringRow>& springs, std::vector<FibreRow>& fibres,
+                   SolverScratch& scratch, SolverCounters& counters, const ForEach& for_each = oneAfterAnother);
   /// [kg m] that the push sphere gave the bodies of an island in the last substep.
   Vec3 sphereImpulse(Index island) const;
   /// visit(collider, entry, row, unit normal out of what it presses on): of rows of an island that press.
@@ -134,7 +141,7 @@ class SurfaceContacts {
   void makeRows(const SurfaceScene& scene, const std::vector<Collider>& colliders,
                 const std::vector<FeaturePair>& found, Pair& pair) const;
   void listReached(const SurfaceScene& scene, const std::vector<Collider>& colliders);
-  void joinIslands(const std::vector<Collider>& colliders);
+  void joinIslands(const SurfaceScene& scene, const std::vector<Collider>& colliders);
   void fillSlots(const std::vector<Collider>& colliders);
 
   BroadPhase broad_phase_;

@@ -26,6 +26,8 @@ namespace meshless {
 ///   NAME_1,
 ///                 NAME_2 ..., in cells of a grid (x first) `offset` apart, each moved by up to `jitter` [m] along
 ///                 every axis and turned by up to `turn` [rad] about any, by a generator that `seed` starts
+/// attachments: a list of {bodies: [name, name], distance, stiffness, strength, region: {box | plane | sphere}, name};
+///              one of the names may be an obstacle's or `world`
 Result<SceneDef> readScene(const std::string& file, const FileAccess& access);
 
 /// Every *.yaml of a folder, by name: a map of names to materials each; later files override earlier ones.

@@ -11,6 +11,7 @@
 #include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/geometry/cut.h"
 #include "meshless_surgery/geometry/incise.h"
+#include "meshless_surgery/geometry/region.h"
 
 namespace meshless {
 
@@ -42,8 +43,8 @@ struct PushCommand {
 };
 struct CutCommand {
   ScissorBlades blades;
-  double close_time = 0.0;  // [s] >= 0 of simulated time
-  double roughness = 0.0;   // [m] amplitude of the fractal displacement of the cut
+  double close_time = 0.0;          // [s] >= 0 of simulated time
+  double roughness = 0.0;           // [m] amplitude of the fractal displacement of the cut
   std::vector<std::string> bodies;  // empty: all that the blades meet
 };
 /// Opens the scissors: cuts whose blades are closing are called off.
@@ -67,7 +68,7 @@ struct InciseCommand {
   std::vector<std::string> bodies;  // empty: all that the blade meets
 };
 struct SetMaterialCommand {
-  std::string body;  // empty: all
+  std::string body;                                         // empty: all
   std::function<Result<Material>(const Material&)> change;  // the new material from the present one
 };
 struct SpawnCommand {
@@ -76,10 +77,25 @@ struct SpawnCommand {
 struct RemoveCommand {
   std::string body;
 };
+/// Joins two bodies where their surfaces face each other, or a body and an obstacle, or fixes a body's surface where it
+/// is ("world").
+struct AttachCommand {
+  std::string name;                // empty: one is chosen
+  std::string body, other;         // one of them may be an obstacle or "world"
+  double distance = 0.0;           // [m] > 0: how far from each other they are joined; of no matter for the world
+  double stiffness = 0.0;          // [N/m^3] > 0: per area
+  std::optional<double> strength;  // [Pa] > 0; empty: it does not tear
+  std::optional<Region> region;    // of the first body's surface, in the world frame; no mesh
+};
+struct DetachCommand {
+  std::string name;
+  std::optional<Region> region;  // in which one of its ends is; empty: all of it
+};
 
-using Command = std::variant<PickCommand, MovePickCommand, LockCommand, ReleaseCommand, ClearPicksCommand, PushCommand,
-                             CutCommand, OpenScissorsCommand, InciseCommand, SetMaterialCommand, SpawnCommand, RemoveCommand,
-                             LiftCommand, UndoCutCommand, OpenBladesCommand>;
+using Command =
+    std::variant<PickCommand, MovePickCommand, LockCommand, ReleaseCommand, ClearPicksCommand, PushCommand, CutCommand,
+                 OpenScissorsCommand, InciseCommand, SetMaterialCommand, SpawnCommand, RemoveCommand, LiftCommand,
+                 UndoCutCommand, OpenBladesCommand, AttachCommand, DetachCommand>;
 
 struct PickReply {
   PickId pick = 0;
@@ -90,10 +106,10 @@ struct PickReply {
 struct CutReply {
   std::vector<std::string> cut_bodies;  // retired
   std::vector<std::string> new_bodies;
-  double cap_area = 0.0;                // [m^2] of one side, over all bodies cut
-  CutWork work;                         // over all bodies cut
-  double duration = 0.0;                // [s] wall time
-  std::vector<std::string> notes;       // bodies that the blades met and that could not be cut, and why
+  double cap_area = 0.0;           // [m^2] of one side, over all bodies cut
+  CutWork work;                    // over all bodies cut
+  double duration = 0.0;           // [s] wall time
+  std::vector<std::string> notes;  // bodies that the blades met and that could not be cut, and why
 };
 /// The blades are closing; World::finishedCut answers with the ticket once they met.
 struct CutStarted {
@@ -102,10 +118,10 @@ struct CutStarted {
 struct InciseReply {
   std::vector<std::string> cut_bodies;  // opened; one that came apart is retired
   std::vector<std::string> new_bodies;
-  double opened_area = 0.0;             // [m^2] of one wound face, over all bodies
-  CutWork work;                         // over all bodies
-  double duration = 0.0;                // [s] wall time
-  std::vector<std::string> notes;       // bodies that the blade met and that could not be opened, and why
+  double opened_area = 0.0;        // [m^2] of one wound face, over all bodies
+  CutWork work;                    // over all bodies
+  double duration = 0.0;           // [s] wall time
+  std::vector<std::string> notes;  // bodies that the blade met and that could not be opened, and why
 };
 struct SpawnReply {
   BodyId id;
@@ -117,6 +133,16 @@ struct UndoCutReply {
   std::vector<std::string> bodies;  // that were cut, and are whole again
 };
 
-using Reply = std::variant<Done, PickReply, CutReply, CutStarted, InciseReply, SpawnReply, UndoCutReply>;
+struct AttachReply {
+  std::string name;
+  std::size_t fibres = 0;
+  double area = 0.0;  // [m^2] that they stand for
+};
+struct DetachReply {
+  std::size_t gone = 0, left = 0;  // fibres
+};
+
+using Reply = std::variant<Done, PickReply, CutReply, CutStarted, InciseReply, SpawnReply, UndoCutReply, AttachReply,
+                           DetachReply>;
 
 }  // namespace meshless

@@ -7,6 +7,7 @@
 
 #include "meshless_surgery/body/preserve.h"
 #include "meshless_surgery/contact/deformable.h"
+#include "meshless_surgery/tools/attachment.h"
 #include "meshless_surgery/tools/tools.h"
 
 namespace meshless {
@@ -49,6 +50,7 @@ struct SceneDef {
   std::map<std::string, Material> materials;
   std::vector<BodyDef> bodies;
   std::vector<ObstacleDef> obstacles;
+  std::vector<AttachCommand> attachments;
   std::vector<std::string> warnings;  // of keys that mean something else now
 };
 
@@ -68,7 +70,10 @@ enum class EventType {
   kFault,
   kUndone,
   kLifted,
-  kLoaded
+  kLoaded,
+  kAttached,
+  kDetached,
+  kTorn
 };
 const char* toString(EventType type);
 
@@ -95,6 +100,8 @@ struct StepReport {
   std::size_t contact_shapes = 0;       // surfaces prepared for contact in this step
   std::size_t ground_contacts = 0;
   std::size_t push_contacts = 0;
+  std::size_t fibres = 0;     // solved in a substep, over all of them
+  std::size_t torn = 0;       // fibres
   std::size_t mended = 0;     // bodies whose coordinates were not finite, and that start anew from rest
   std::size_t unwinding = 0;  // bodies that were wound up in themselves, and are led back to their shape
 };
@@ -140,6 +147,15 @@ struct BodySnapshot {
   double stiffness_factor = 1.0;  // (substeps given / needed)^2 of an elastic material, at most 1
 };
 
+struct AttachmentSnapshot {
+  std::string name;
+  std::vector<std::string> ends;           // bodies that its fibres join, then the obstacle or "world" if it is one
+  std::size_t fibres = 0, made = 0;        // whole, and at the start
+  double area = 0.0;                       // [m^2] of those that are whole
+  double force = 0.0;                      // [N] sum of their tensions
+  std::vector<std::array<Vec3, 2>> lines;  // [m] their ends; where surfaces are wanted
+};
+
 struct WorldSnapshot {
   std::uint64_t step = 0;
   double sim_time = 0.0;
@@ -149,6 +165,7 @@ struct WorldSnapshot {
   std::vector<ContactPoint> contacts;  // where wanted
   std::vector<Pick> picks;
   std::map<PickId, std::string> pick_bodies;
+  std::vector<AttachmentSnapshot> attachments;
   PushSphere push;
   Scissors scissors;
   StepReport report;
@@ -195,6 +212,8 @@ class World {
   /// Stays for good. Bodies meet it with ContactMethod::kSurface alone.
   /// method. Refuses an empty or open surface, a friction outside of 0..10, and a name in use.
   Status addObstacle(ObstacleDef obstacle);
+  /// Like AttachCommand, and made again by reset. Bodies and obstacles come before.
+  Result<AttachReply> addSceneAttachment(const AttachCommand& attachment);
 
   /// Bodies in the order in which they came.
   WorldSnapshot snapshot(const SnapshotWants& wants);

@@ -1,0 +1,570 @@
+// What holds organs together: fibres are made, drawn, cut, torn, and follow the pieces of a body.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "meshless_surgery/base/compressed_rows.h"
+#include "meshless_surgery/geometry/nearest_on_triangle.h"
+#include "world_impl.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kFacing = -0.5;       // cosine: faces are joined that face each other by this or less
+constexpr double kLongFace = 2.0;      // edges of contact: longer faces are divided
+constexpr int kMostParts = 100;        // of a face's edge
+constexpr std::size_t kLongName = 90;  // of a name that is chosen, at most
+
+/// A surface as it is now, or at rest.
+struct Shown {
+  const ContactSurface* surface = nullptr;
+  Points vertices;  // [m]
+
+  Vec3 corner(Index face, int k) const { return vertices[surface->triangles[face][k]]; }
+  Vec3 at(Index face, const Vec3& shares) const {
+    return shares[0] * corner(face, 0) + shares[1] * corner(face, 1) + shares[2] * corner(face, 2);
+  }
+  Vec3 areaOf(Index face) const {
+    return 0.5 * (corner(face, 1) - corner(face, 0)).cross(corner(face, 2) - corner(face, 0));
+  }
+};
+
+struct NearestFace {
+  Index face = kNoIndex;
+  Vec3 shares = Vec3::Zero();  // of its corners
+  double distance = std::numeric_limits<double>::infinity();
+};
+
+class FaceSearch {
+ public:
+  explicit FaceSearch(const Shown& shown) : shown_(shown) {
+    for (const Triangle& t : shown.surface->triangles) {
+      FloatBox box;
+      for (const Index v : t) box.extend(shown.vertices[v]);
+      boxes_.items.push_back(box);
+    }
+    shown.surface->tree.refit(boxes_);
+  }
+
+  /// Of those that are no farther than `most` [m]; none: face is kNoIndex.
+  NearestFace within(const Vec3& p, double most) const {
+    NearestFace nearest;
+    nearest.distance = most;
+    FloatBox box;
+    for (const double by : {-most, most}) box.extend(p.array() + by);
+    shown_.surface->tree.query(boxes_, box, [&](Index face) {
+      const Vec3 shares = nearestWeights(p, shown_.corner(face, 0), shown_.corner(face, 1), shown_.corner(face, 2));
+      const double distance = (shown_.at(face, shares) - p).norm();
+      if (distance < nearest.distance || (nearest.face == kNoIndex && distance == nearest.distance))
+        nearest = {face, shares, distance};
+    });
+    if (nearest.face == kNoIndex) nearest.distance = std::numeric_limits<double>::infinity();
+    return nearest;
+  }
+
+  /// However far; `guess` [m] > 0.
+  NearestFace nearest(const Vec3& p, double guess) const {
+    for (double most = guess; most < 1e30; most *= 2.0)
+      if (const NearestFace found = within(p, most); found.face != kNoIndex) return found;
+    return {};
+  }
+
+ private:
+  const Shown& shown_;
+  TreeBoxes boxes_;
+};
+
+/// A mean of vertices, by what carries them.
+class PointMaker {
+ public:
+  explicit PointMaker(const VertexSupports& supports) : supports_(supports) {}
+
+  void add(Index vertex, double weight) {
+    for (Index k = supports_.offsets[vertex]; k < supports_.offsets[vertex + 1]; ++k)
+      weights_[supports_.particles[k]] += weight * supports_.weights[k];
+    total_ += weight;
+  }
+  BodyPoint make() const {
+    BodyPoint point;
+    for (const auto& [particle, weight] : weights_) {
+      point.particles.push_back(particle);
+      point.weights.push_back(weight / total_);
+    }
+    return point;
+  }
+
+ private:
+  const VertexSupports& supports_;
+  std::map<Index, double> weights_;
+  double total_ = 0.0;
+};
+
+BodyPoint pointOn(const ContactSurface& surface, const NearestFace& on) {
+  PointMaker maker(surface.supports);
+  for (int k = 0; k < 3; ++k) maker.add(surface.triangles[on.face][k], on.shares[k]);
+  return maker.make();
+}
+
+/// The middles of n^2 equal parts of a triangle, as shares of its corners.
+template <class Visit>
+void eachPart(int n, const Visit& visit) {
+  const auto put = [&](double x, double y) { visit(Vec3(1.0 - (x + y) / n, x / n, y / n)); };
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; i + j < n; ++j) {
+      put(i + 1.0 / 3.0, j + 1.0 / 3.0);
+      if (i + j + 1 < n) put(i + 2.0 / 3.0, j + 2.0 / 3.0);
+    }
+}
+
+/// The part of a body's surface that one fibre stands for.
+struct Part {
+  double area = 0.0;                          // [m^2]
+  std::vector<std::pair<Index, Vec3>> faces;  // and their corners' areas [m^2]
+};
+
+bool isOpen(const WorldBody* body) { return body && !body->model->solid; }
+
+/// The way from a to b passes through the rectangle of the blades, or where `whole`, through its plane.
+bool crosses(const ScissorBlades& blades, bool whole, const Vec3& a, const Vec3& b) {
+  const Plane plane = blades.plane();
+  const double of_a = plane.height(a), of_b = plane.height(b);
+  if ((of_a > 0.0 && of_b > 0.0) || (of_a < 0.0 && of_b < 0.0)) return false;
+  if (whole) return true;
+  const double between = std::abs(of_a) + std::abs(of_b);
+  const Vec3 at = a + (between > 0.0 ? std::abs(of_a) / between : 0.5) * (b - a) - blades.origin;
+  const double along = at.dot(blades.x_axis), beside = std::abs(at.dot(blades.y_axis));
+  return along >= 0.0 && (blades.length == 0.0 || along <= blades.length) &&
+         (blades.width == 0.0 || beside <= 0.5 * blades.width);
+}
+
+std::string number(double value) {
+  std::ostringstream text;
+  text << value;
+  return text.str();
+}
+
+Status checkNumbers(const AttachCommand& command, bool to_world) {
+  if (!(command.stiffness > 0.0 && command.stiffness <= 1e15))
+    return outOfRange("stiffness", command.stiffness, "above 0 to 1e15 N/m^3");
+  if (command.strength && !(*command.strength > 0.0 && *command.strength <= 1e15))
+    return outOfRange("strength", *command.strength, "above 0 to 1e15 Pa, or none");
+  if (!to_world && !(command.distance > 0.0 && command.distance <= 1000.0))
+    return outOfRange("distance", command.distance, "above 0 to 1000 m");
+  return Done{};
+}
+
+Status checkRegion(const std::optional<Region>& region) {
+  if (!region) return Done{};
+  switch (region->kind) {
+    case Region::Kind::kBox:
+      if (!region->box.min.allFinite() || !region->box.max.allFinite()) return notFinite("the box of region");
+      return Done{};
+    case Region::Kind::kPlane:
+      if (!region->plane.point.allFinite() || !region->plane.normal.allFinite())
+        return notFinite("the plane of region");
+      return Done{};
+    case Region::Kind::kSphere:
+      if (!region->centre.allFinite()) return notFinite("the centre of region");
+      if (!(region->radius > 0.0 && region->radius <= 1e6))
+        return outOfRange("the radius of region", region->radius, "above 0 to 1e6 m");
+      return Done{};
+    case Region::Kind::kMesh:
+      break;
+  }
+  return Error{ErrorCode::kUnsupported, "region is " + region->text() + "; accepted: a box, a plane or a sphere"};
+}
+
+}  // namespace
+
+Result<AttachReply> World::Impl::attach(const AttachCommand& command) {
+  const auto obstacleOf = [this](const std::string& name) -> const WorldObstacle* {
+    for (const auto& obstacle : obstacles)
+      if (obstacle->def->name == name) return obstacle.get();
+    return nullptr;
+  };
+  std::string names[] = {command.body, command.other};
+  for (const std::string& name : names) {
+    if (find(name) || obstacleOf(name) || name == kWorldEnd) continue;
+    std::string known = knownBodies();
+    for (const auto& obstacle : obstacles) known += "; obstacle " + obstacle->def->name;
+    return Error{ErrorCode::kUnknownName, "there is no body '" + name + "'; " + known + "; or '" + kWorldEnd + "'"};
+  }
+  if (names[0] == names[1])
+    return Error{ErrorCode::kInvalidArgument, "'" + names[0] + "' is to be attached to itself; accepted: two bodies"};
+  if (!find(names[0])) std::swap(names[0], names[1]);
+  WorldBody* const a = find(names[0]);
+  if (!a)
+    return Error{ErrorCode::kInvalidArgument,
+                 "neither '" + command.body + "' nor '" + command.other + "' is a body; " + knownBodies()};
+  WorldBody* const b = find(names[1]);
+  const WorldObstacle* const obstacle = b ? nullptr : obstacleOf(names[1]);
+  const bool to_world = !b && !obstacle;
+  if (Status numbers = checkNumbers(command, to_world); !numbers) return numbers.error();
+  if (Status region = checkRegion(command.region); !region) return region.error();
+  Attachment made;
+  made.name = command.name;
+  if (!made.name.empty() && used_attachments.count(made.name))
+    return Error{ErrorCode::kDuplicateName,
+                 "the attachment '" + made.name + "' is there or was there in this run; accepted: another name"};
+  if (made.name.empty()) {
+    const std::string chosen = names[0] + "-" + names[1];
+    const std::string stem = chosen.size() <= kLongName ? chosen : "attachment";
+    made.name = stem;
+    for (int n = 2; used_attachments.count(made.name); ++n) made.name = stem + "_" + std::to_string(n);
+  }
+  made.stiffness = command.stiffness;
+  made.strength = command.strength;
+  if (!b) made.other = names[1];
+
+  const auto shownNow = [this](WorldBody& body) {
+    measureSurface(body);
+    Shown shown;
+    shown.surface = &surfaceModel(body).surface;
+    if (body.model->collision) {
+      for (Index v = 0; v < shown.surface->vertices(); ++v)
+        shown.vertices.push_back(shown.surface->supports.sum(v, body.state.positions.data()));
+    } else {
+      refreshSurface(body);
+      shown.vertices = body.state.surface;
+    }
+    return shown;
+  };
+  const Shown of_a = shownNow(*a);
+  Shown of_b;
+  if (b) of_b = shownNow(*b);
+  if (obstacle) of_b = {&obstacle->surface, obstacle->def->mesh.vertices};
+  if (of_a.surface->triangles.empty() || (b && of_b.surface->triangles.empty()))
+    return Error{ErrorCode::kUnsuitableShape, "a body without a surface cannot be attached"};
+  std::optional<FaceSearch> search;
+  if (!to_world) search.emplace(of_b);
+  const bool open = isOpen(a) || isOpen(b);  // whose faces face both ways
+
+  // A fibre stands for what lies in a cube of an edge: surfaces may be much finer, or coarser, than the tissue is.
+  const double edge = a->edge_length;
+  std::map<std::array<long long, 3>, Part> parts;
+  bool in_region = false;
+  double gap = std::numeric_limits<double>::infinity();  // [m]
+  const auto eachSample = [&](const auto& visit) {
+    for (Index face = 0; face < of_a.surface->triangles.size(); ++face) {
+      const Vec3 area = of_a.areaOf(face);
+      double longest = 0.0;
+      for (int k = 0; k < 3; ++k)
+        longest = std::max(longest, (of_a.corner(face, (k + 1) % 3) - of_a.corner(face, k)).norm());
+      const int n = static_cast<int>(std::clamp(std::ceil(longest / (kLongFace * edge)), 1.0, double(kMostParts)));
+      eachPart(n, [&](const Vec3& shares) {
+        const Vec3 p = of_a.at(face, shares);
+        if (!command.region || command.region->contains(p)) visit(face, shares, p, Vec3(area / (n * n)));
+      });
+    }
+  };
+  eachSample([&](Index face, const Vec3& shares, const Vec3& p, const Vec3& area) {
+    in_region = true;
+    if (!to_world) {
+      const NearestFace there = search->within(p, command.distance);
+      if (there.face == kNoIndex) return;
+      gap = std::min(gap, there.distance);
+      const Vec3 other = of_b.areaOf(there.face);
+      if (!open && !(other.dot(area) <= kFacing * other.norm() * area.norm())) return;
+    }
+    std::array<long long, 3> cube;
+    for (int k = 0; k < 3; ++k) cube[k] = std::llround(std::floor(p[k] / edge));
+    Part& part = parts[cube];
+    part.area += area.norm();
+    part.faces.push_back({face, area.norm() * shares});
+  });
+  for (const auto& [cube, part] : parts) {
+    if (!(part.area > 0.0)) continue;
+    Fibre fibre;
+    fibre.a = a->id;
+    fibre.area = part.area;
+    PointMaker maker(of_a.surface->supports);
+    Vec3 shown = Vec3::Zero();
+    for (const auto& [face, shares] : part.faces) {
+      for (int k = 0; k < 3; ++k) maker.add(of_a.surface->triangles[face][k], shares[k]);
+      shown += of_a.at(face, shares) / part.area;
+    }
+    fibre.at_a = maker.make();
+    const Vec3 at = fibre.at_a.of(a->state.positions);
+    fibre.place = at;
+    double skin = 0.0;
+    if (!to_world) {
+      const NearestFace there = search->nearest(shown, command.distance);
+      if (there.face == kNoIndex) continue;
+      fibre.place = of_b.at(there.face, there.shares);
+      skin = kSkin * std::min(edge, b ? b->edge_length : obstacle->surface.edge_length);
+      if (b) {
+        fibre.b = b->id;
+        fibre.at_b = pointOn(*of_b.surface, there);
+        fibre.place = fibre.at_b.of(b->state.positions);
+      }
+      fibre.rest = std::max((at - fibre.place).norm(), skin);  // contact keeps them a skin apart
+      if (b) fibre.place.setZero();
+    }
+    made.fibres.push_back(std::move(fibre));
+  }
+  if (made.fibres.empty()) {
+    if (!in_region)
+      return Error{ErrorCode::kMissed, "no surface of '" + names[0] + "' lies in " + command.region->text()};
+    if (std::isfinite(gap))
+      return Error{ErrorCode::kMissed, "'" + names[0] + "' and '" + names[1] + "' are " + number(gap) +
+                                           " m apart, but do not face each other there"};
+    eachSample([&](Index, const Vec3&, const Vec3& p, const Vec3&) {
+      gap = std::min(gap, search->nearest(p, command.distance).distance);
+    });
+    return Error{ErrorCode::kMissed, "'" + names[0] + "' and '" + names[1] + "' are " + number(gap) + " m apart" +
+                                         (command.region ? " in " + command.region->text() : std::string()) +
+                                         "; distance is " + number(command.distance) + " m"};
+  }
+
+  // From here nothing fails.
+  made.made = static_cast<std::uint32_t>(made.fibres.size());
+  AttachReply reply{made.name, made.fibres.size(), 0.0};
+  for (const Fibre& fibre : made.fibres) reply.area += fibre.area;
+  wake(*a);
+  if (b) wake(*b);
+  used_attachments.insert(made.name);
+  say(EventType::kAttached, a->name, 0,
+      "'" + made.name + "': " + names[0] + " is attached to " + names[1] + " by " + std::to_string(reply.fibres) +
+          " fibres");
+  attachments.push_back(std::move(made));
+  return reply;
+}
+
+Result<AttachReply> World::addSceneAttachment(const AttachCommand& attachment) {
+  Result<AttachReply> reply = impl_->attach(attachment);
+  if (!reply) return reply;
+  impl_->scene_attachments.push_back(attachment);
+  impl_->scene_attachments.back().name = reply->name;
+  return reply;
+}
+
+Result<Reply> World::Impl::apply(const AttachCommand& command) {
+  Result<AttachReply> reply = attach(command);
+  if (!reply) return reply.error();
+  return Reply(*reply);
+}
+
+Result<Reply> World::Impl::apply(const DetachCommand& command) {
+  const auto found = std::find_if(attachments.begin(), attachments.end(),
+                                  [&](const Attachment& attachment) { return attachment.name == command.name; });
+  if (found == attachments.end()) {
+    std::string known;
+    for (std::size_t n = 0; n < attachments.size() && n < 20; ++n) known += (n ? ", " : "") + attachments[n].name;
+    return Error{ErrorCode::kUnknownName, "there is no attachment '" + command.name + "'; " +
+                                              (known.empty() ? "there are none" : "attachments are: " + known)};
+  }
+  if (Status region = checkRegion(command.region); !region) return region.error();
+  const auto lies = [&](const Fibre& fibre) {
+    if (!command.region) return true;
+    const Points ends = fibreEnds(fibre);
+    return command.region->contains(ends[0]) || command.region->contains(ends[1]);
+  };
+  if (command.region && std::none_of(found->fibres.begin(), found->fibres.end(), lies))
+    return Error{ErrorCode::kMissed, "no fibre of '" + command.name + "' is in " + command.region->text()};
+  DetachReply reply;
+  reply.gone = loseFibres(*found, EventType::kDetached, "were detached", lies);
+  reply.left = found->fibres.size();
+  if (found->fibres.empty()) attachments.erase(found);
+  return Reply(reply);
+}
+
+Points World::Impl::fibreEnds(const Fibre& fibre) {
+  const WorldBody* const b = find(fibre.b);
+  return {fibre.at_a.of(find(fibre.a)->state.positions), b ? fibre.at_b.of(b->state.positions) : fibre.place};
+}
+
+std::string World::Impl::firstBodyOf(const Attachment& attachment) {
+  const WorldBody* const body = attachment.fibres.empty() ? nullptr : find(attachment.fibres.front().a);
+  return body ? body->name : std::string();
+}
+
+std::size_t World::Impl::loseFibres(Attachment& attachment, EventType type, const std::string& why,
+                                    const std::function<bool(const Fibre&)>& gone) {
+  const std::string body = firstBodyOf(attachment);
+  std::vector<Fibre> left;
+  for (Fibre& fibre : attachment.fibres) {
+    if (!gone(fibre)) {
+      left.push_back(std::move(fibre));
+      continue;
+    }
+    for (const BodyId& id : {fibre.a, fibre.b})
+      if (WorldBody* const end = find(id)) wake(*end);
+  }
+  const std::size_t lost = attachment.fibres.size() - left.size();
+  attachment.fibres = std::move(left);
+  if (lost > 0)
+    say(type, body, 0,
+        "'" + attachment.name + "': " + std::to_string(lost) + " fibres " + why + ", " +
+            std::to_string(attachment.fibres.size()) + " of " + std::to_string(attachment.made) + " are left");
+  return lost;
+}
+
+void World::Impl::showAttachments(const SnapshotWants& wants, std::vector<AttachmentSnapshot>& shown) {
+  for (const Attachment& attachment : attachments) {
+    AttachmentSnapshot snapshot;
+    snapshot.name = attachment.name;
+    snapshot.fibres = attachment.fibres.size();
+    snapshot.made = attachment.made;
+    std::vector<BodyId> ends;
+    for (const Fibre& fibre : attachment.fibres) {
+      snapshot.area += fibre.area;
+      snapshot.force += fibre.tension;
+      for (const BodyId& id : {fibre.a, fibre.b})
+        if (std::find(ends.begin(), ends.end(), id) == ends.end()) ends.push_back(id);
+      if (!wants.surfaces) continue;
+      const Points line = fibreEnds(fibre);
+      snapshot.lines.push_back({line[0], line[1]});
+    }
+    for (const BodyId& id : ends)
+      if (const WorldBody* const body = find(id)) snapshot.ends.push_back(body->name);
+    if (!attachment.other.empty()) snapshot.ends.push_back(attachment.other);
+    shown.push_back(std::move(snapshot));
+  }
+}
+
+// --- cuts
+
+std::vector<std::vector<char>> World::Impl::partedBy(const ScissorBlades& blades, const std::vector<std::string>& of,
+                                                     const std::vector<BodyId>& severed) {
+  const auto isIn = [](const auto& list, const auto& value) {
+    return std::find(list.begin(), list.end(), value) != list.end();
+  };
+  std::vector<std::vector<char>> parted;
+  for (const Attachment& attachment : attachments) {
+    std::vector<char> gone;
+    for (const Fibre& fibre : attachment.fibres) {
+      bool meant = of.empty(), whole = false;
+      for (const BodyId& id : {fibre.a, fibre.b}) {
+        const WorldBody* const body = find(id);
+        meant = meant || (body && isIn(of, body->name));
+        whole = whole || isIn(severed, id);
+      }
+      const Points ends = fibreEnds(fibre);
+      gone.push_back(meant && crosses(blades, whole, ends[0], ends[1]));
+    }
+    parted.push_back(std::move(gone));
+  }
+  return parted;
+}
+
+bool World::Impl::anyIn(const std::vector<std::vector<char>>& parted) {
+  return std::any_of(parted.begin(), parted.end(), [](const std::vector<char>& gone) {
+    return std::find(gone.begin(), gone.end(), 1) != gone.end();
+  });
+}
+
+std::vector<std::string> World::Impl::partFibres(const std::vector<std::vector<char>>& parted) {
+  std::vector<std::string> notes;
+  for (std::size_t n = 0; n < parted.size(); ++n) {
+    std::size_t at = 0;
+    const std::size_t lost = loseFibres(attachments[n], EventType::kDetached, "were cut",
+                                        [&](const Fibre&) { return parted[n][at++] != 0; });
+    if (lost > 0) notes.push_back("cut " + std::to_string(lost) + " fibres of '" + attachments[n].name + "'");
+  }
+  return notes;
+}
+
+// By where their ends are at rest, on the surface of the piece that is there.
+void World::Impl::followFibres(const BodyId& parent, const BodyModel& model, const Points& before,
+                               const std::vector<BodyId>& pieces) {
+  const auto isOf = [&](const Fibre& fibre) { return fibre.a == parent || fibre.b == parent; };
+  if (std::none_of(attachments.begin(), attachments.end(), [&](const Attachment& attachment) {
+        return std::any_of(attachment.fibres.begin(), attachment.fibres.end(), isOf);
+      }))
+    return;
+  std::vector<Shown> shown(pieces.size());
+  std::vector<FaceSearch> searches;
+  for (std::size_t p = 0; p < pieces.size(); ++p) {
+    const ContactSurface& surface = surfaceModel(*find(pieces[p])).surface;
+    shown[p] = {&surface, surface.rest};
+    searches.emplace_back(shown[p]);
+  }
+  for (Attachment& attachment : attachments)
+    for (Fibre& fibre : attachment.fibres) {
+      if (!isOf(fibre)) continue;
+      const bool is_a = fibre.a == parent;
+      BodyPoint& end = is_a ? fibre.at_a : fibre.at_b;
+      BodyId& id = is_a ? fibre.a : fibre.b;
+      const Vec3 rest = end.of(model.rest), was = end.of(before);
+      NearestFace nearest;
+      std::size_t of = 0;
+      for (std::size_t p = 0; p < pieces.size(); ++p) {
+        if (shown[p].surface->triangles.empty()) continue;
+        const NearestFace found = nearest.face == kNoIndex ? searches[p].nearest(rest, model.spacing)
+                                                           : searches[p].within(rest, nearest.distance);
+        if (!(found.distance < nearest.distance)) continue;
+        nearest = found;
+        of = p;
+      }
+      if (nearest.face == kNoIndex) continue;
+      id = pieces[of];
+      end = pointOn(*shown[of].surface, nearest);
+      // So that nothing jumps where the new point is a little beside the old one.
+      const Points ends = fibreEnds(fibre);
+      const Vec3 other = is_a ? ends[1] : ends[0], now = is_a ? ends[0] : ends[1];
+      fibre.rest = std::max(0.0, fibre.rest + (now - other).norm() - (was - other).norm());
+    }
+}
+
+// --- a step
+
+void World::Impl::listFibres() {
+  attached.all.clear();
+  attached.offsets.clear();
+  attached.of_body.clear();
+  std::vector<Index> body_in(generations.size(), kNoIndex);  // by slots
+  bool any = false;
+  for (Attachment& attachment : attachments)
+    for (Fibre& fibre : attachment.fibres) {
+      if (!any)
+        for (Index b = 0; b < bodies.size(); ++b) body_in[bodies[b]->id.slot] = b;
+      any = true;
+      const Index b = fibre.b.slot < body_in.size() ? body_in[fibre.b.slot] : kNoIndex;
+      attached.all.push_back({&fibre, attachment.stiffness * fibre.area, body_in[fibre.a.slot], b});
+    }
+  if (!any) return;
+  const auto each = [this](const auto& visit) {
+    for (Index n = 0; n < attached.all.size(); ++n) visit(attached.all[n].a, n);
+  };
+  compressRows(bodies.size(), each, attached.offsets, attached.of_body);
+}
+
+// Who is joined sleeps and wakes together.
+void World::Impl::wakeAttached() {
+  for (bool woken = true; woken;) {
+    woken = false;
+    for (const AttachedFibre& fibre : attached.all) {
+      if (fibre.b == kNoIndex || bodies[fibre.a]->asleep == bodies[fibre.b]->asleep) continue;
+      wake(*bodies[bodies[fibre.a]->asleep ? fibre.a : fibre.b]);
+      woken = true;
+    }
+  }
+  for (const AttachedFibre& fibre : attached.all)
+    if (!bodies[fibre.a]->asleep) fibre.fibre->tension = 0.0;
+}
+
+void World::Impl::tearFibres() {
+  const std::size_t before = report.torn;
+  for (Attachment& attachment : attachments) {
+    if (!attachment.strength) continue;
+    const auto tears = [&](const Fibre& fibre) { return fibre.tension > *attachment.strength * fibre.area; };
+    const auto first = std::find_if(attachment.fibres.begin(), attachment.fibres.end(), tears);
+    if (first == attachment.fibres.end()) continue;
+    const std::string body = firstBodyOf(attachment);
+    for (auto fibre = first; fibre != attachment.fibres.end(); ++fibre) {
+      if (!tears(*fibre)) continue;
+      ++report.torn;
+      for (const BodyId& id : {fibre->a, fibre->b})
+        if (WorldBody* const end = find(id)) wake(*end);
+    }
+    attachment.fibres.erase(std::remove_if(first, attachment.fibres.end(), tears), attachment.fibres.end());
+    if (!std::exchange(attachment.torn, true))
+      say(EventType::kTorn, body, 0, "'" + attachment.name + "' begins to tear");
+    if (attachment.fibres.empty())
+      say(EventType::kTorn, body, 0, "'" + attachment.name + "' is torn off: no fibre is left");
+  }
+  if (report.torn != before) listFibres();
+}
+
+}  // namespace meshless
