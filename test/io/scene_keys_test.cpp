@@ -33,6 +33,8 @@ std::string triangles(const TriangleMesh& mesh) { return std::to_string(mesh.tri
 
 /// Each map by its name in messages, and scenes with it: its keys stand at @, copies of a body may be asked for at $.
 const std::string kBody = "{bodies: [{primitive: {box: [1, 1, 1]}, $";
+const std::string kTwoBodies =
+    "{bodies: [{name: a, primitive: {box: [1, 1, 1]}}, {name: b, primitive: {box: [1, 1, 1]}}], ";
 const std::map<std::string, std::vector<std::string>> kMaps = {
     {"the scene", {"{@}"}},
     {"world", {"{bodies: [], world: {@}}"}},
@@ -40,6 +42,8 @@ const std::map<std::string, std::vector<std::string>> kMaps = {
     {"push", {"{bodies: [], world: {push: {@}}}"}},
     {"a body", {"{materials: {m: {alpha: 0.3}}, bodies: [{$ @}]}"}},
     {"an obstacle", {"{bodies: [], obstacles: [{@}]}"}},
+    {"an attachment", {kTwoBodies + "attachments: [{@}]}"}},
+    {"region", {kTwoBodies + "attachments: [{bodies: [a, b], stiffness: 1, distance: 1, region: {@}}]}"}},
     {"primitive", {"{bodies: [{$ primitive: {@}}]}"}},
     {"pose", {kBody + "pose: {@}}]}"}},
     {"clusters", {kBody + "clusters: {@}}]}"}},
@@ -83,6 +87,8 @@ std::string spread(const Seen& seen, double jitter, double turn) {
   return text(used(moved, jitter), used(turned, turn));
 }
 
+const AttachCommand& attachmentOf(const Seen& seen) { return seen.scene.attachments.at(0); }
+
 #define READ(...) [](const Seen& s) { return text(__VA_ARGS__); }
 #define SETTING(key) READ(s.scene.world.key)
 #define MATERIAL(key) READ(s.material.key)
@@ -94,6 +100,28 @@ std::vector<Row> rows() {
       {"the scene", "materials: {m: {alpha: 0.3}}, bodies: []", "bodies: []", READ(s.scene.materials.count("m")), "1"},
       {"the scene", "obstacles: [{primitive: {sphere: 1}}], bodies: []", "bodies: []", READ(s.scene.obstacles.size()),
        "1"},
+      {"the scene",
+       "attachments: [{bodies: [a, world], stiffness: 1}], bodies: [{name: a, primitive: {box: [1, 1, 1]}}]",
+       "bodies: [{name: a, primitive: {box: [1, 1, 1]}}]", READ(s.scene.attachments.size()), "1"},
+
+      {"an attachment", "bodies: [b, a], stiffness: 1, distance: 1", "bodies: [a, b], stiffness: 1, distance: 1",
+       READ(attachmentOf(s).body, attachmentOf(s).other), "b a"},
+      {"an attachment", "name: bed, bodies: [a, b], stiffness: 1, distance: 1",
+       "bodies: [a, b], stiffness: 1, distance: 1", READ(attachmentOf(s).name), "bed"},
+      {"an attachment", "distance: 0.5, bodies: [a, b], stiffness: 1", "bodies: [a, b], stiffness: 1, distance: 1",
+       READ(attachmentOf(s).distance), "0.5"},
+      {"an attachment", "stiffness: 5, bodies: [a, b], distance: 1", "bodies: [a, b], stiffness: 1, distance: 1",
+       READ(attachmentOf(s).stiffness), "5"},
+      {"an attachment", "strength: 7, bodies: [a, b], stiffness: 1, distance: 1",
+       "bodies: [a, b], stiffness: 1, distance: 1", READ(attachmentOf(s).strength.value_or(-1.0)), "7"},
+      {"an attachment", "region: {sphere: {centre: [0, 0, 0], radius: 2}}, bodies: [a, b], stiffness: 1, distance: 1",
+       "bodies: [a, b], stiffness: 1, distance: 1", READ(attachmentOf(s).region.has_value()), "1"},
+      {"region", "box: {min: [0, 0, 0], max: [1, 2, 3]}", "sphere: {centre: [0, 0, 0], radius: 2}",
+       READ(attachmentOf(s).region->box.max), "1 2 3"},
+      {"region", "sphere: {centre: [0, 0, 0], radius: 2}", "box: {min: [0, 0, 0], max: [1, 2, 3]}",
+       READ(attachmentOf(s).region->radius), "2"},
+      {"region", "plane: {point: [0, 0, 1], normal: [0, 0, 1]}", "box: {min: [0, 0, 0], max: [1, 2, 3]}",
+       READ(attachmentOf(s).region->plane.point), "0 0 1"},
 
       {"world", "gravity: [0.1, 0.2, -1.6]", "", READ(s.scene.world.gravity), "0.1 0.2 -1.6"},
       {"world", "ground: -0.5", "", READ(s.scene.world.ground.value_or(9.0)), "-0.5"},

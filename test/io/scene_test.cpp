@@ -59,6 +59,39 @@ TEST_F(Scene, EachBodySaysHowFarItsFileIsRepaired) {
   EXPECT_NE(bad("bodies:\n  - {primitive: {sphere: 1}, repair: mend}\n").detail.find("with a file"), std::string::npos);
 }
 
+TEST_F(Scene, AttachmentsJoinWhatIsThere) {
+  const std::string bodies =
+      "bodies:\n  - {name: a, file: ../cube.obj}\n  - {name: b, file: ../cube.obj, pose: {position: [0, 0, 1.1]}}\n"
+      "obstacles:\n  - {name: tray, primitive: {box: [1, 1, 1]}, pose: {position: [0, 0, -3]}}\nattachments:\n";
+  const SceneDef scene = good(
+      bodies + "  - {bodies: [a, tray], distance: 0.2, stiffness: 1e6}\n  - {bodies: [b, world], stiffness: 10}\n");
+  ASSERT_EQ(scene.attachments.size(), 2u);
+  EXPECT_TRUE(scene.attachments[0].name.empty());
+  EXPECT_FALSE(scene.attachments[0].strength.has_value());
+  const std::map<std::string, std::string> wrong = {
+      {"{bodies: [a, c], distance: 1, stiffness: 1}", "'c', did you mean"},
+      {"{bodies: [a], distance: 1, stiffness: 1}", "a list of two names"},
+      {"{bodies: a, distance: 1, stiffness: 1}", "a list of two names"},
+      {"{distance: 1, stiffness: 1}", "a list of two names"},
+      {"{bodies: [a, b], stiffness: 1}", "distance"},
+      {"{bodies: [a, b], distance: 0, stiffness: 1}", "distance"},
+      {"{bodies: [a, b], distance: 1}", "stiffness"},
+      {"{bodies: [a, b], distance: 1, stiffness: -1}", "stiffness is -1"},
+      {"{bodies: [a, b], distance: 1, stiffness: .inf}", "stiffness"},
+      {"{bodies: [a, b], distance: 1, stiffness: 1, strength: .nan}", "strength"},
+      {"{bodies: [a, b], distance: 1, stiffness: 1, strength: 0}", "strength"},
+      {"{bodies: [a, b], distance: 1, stiffness: 1, region: {}}", "no shape"},
+      {"{bodies: [a, b], distance: 1, stiffness: 1, region: 7}", "region"},
+      {"{bodies: [a, b], distance: 1, stiffness: 1, name: 'a b'}", "name"},
+      {"{bodies: [a, b], distance: 1, stifness: 1}", "stiffness"}};
+  for (const auto& [attachment, word] : wrong) {
+    const Error refused = bad(bodies + "  - " + attachment + "\n");
+    EXPECT_NE(refused.detail.find(word), std::string::npos) << attachment << ": " << refused.detail;
+    EXPECT_NE(refused.detail.find("s.yaml:7: "), std::string::npos) << refused.detail;
+  }
+  bad("bodies: []\nattachments: 3\n");
+}
+
 TEST_F(Scene, DefaultsForEverythingButBodies) {
   const SceneDef scene = good("bodies:\n  - file: ../cube.obj\n");
   const WorldSettings defaults;
