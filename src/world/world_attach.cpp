@@ -47,27 +47,19 @@ class FaceSearch {
     shown.surface->tree.refit(boxes_);
   }
 
-  /// Of those that are no farther than `most` [m]; none: face is kNoIndex.
-  NearestFace within(const Vec3& p, double most) const {
+  /// Of those that are nearer than `most` [m]; none: face is kNoIndex.
+  NearestFace nearest(const Vec3& p, double most = std::numeric_limits<double>::infinity()) const {
     NearestFace nearest;
-    nearest.distance = most;
-    FloatBox box;
-    for (const double by : {-most, most}) box.extend(p.array() + by);
-    shown_.surface->tree.query(boxes_, box, [&](Index face) {
-      const Vec3 shares = nearestWeights(p, shown_.corner(face, 0), shown_.corner(face, 1), shown_.corner(face, 2));
-      const double distance = (shown_.at(face, shares) - p).norm();
-      if (distance < nearest.distance || (nearest.face == kNoIndex && distance == nearest.distance))
-        nearest = {face, shares, distance};
-    });
-    if (nearest.face == kNoIndex) nearest.distance = std::numeric_limits<double>::infinity();
+    const auto sharesOf = [&](Index face) {
+      return nearestWeights(p, shown_.corner(face, 0), shown_.corner(face, 1), shown_.corner(face, 2));
+    };
+    double squared = most * most;
+    nearest.face = shown_.surface->tree.nearest(
+        boxes_, p, squared, [&](Index face) { return (shown_.at(face, sharesOf(face)) - p).squaredNorm(); });
+    if (nearest.face == kNoIndex) return nearest;
+    nearest.shares = sharesOf(nearest.face);
+    nearest.distance = std::sqrt(squared);
     return nearest;
-  }
-
-  /// However far; `guess` [m] > 0.
-  NearestFace nearest(const Vec3& p, double guess) const {
-    for (double most = guess; most < 1e30; most *= 2.0)
-      if (const NearestFace found = within(p, most); found.face != kNoIndex) return found;
-    return {};
   }
 
  private:
@@ -243,25 +235,14 @@ Result<AttachReply> World::Impl::attach(const AttachCommand& command) {
   // A fibre stands for what lies in a cube of an edge: surfaces may be much finer, or coarser, than the tissue is.
   const double edge = a->edge_length;
   std::map<std::array<long long, 3>, Part> parts;
-  bool in_region = false;
+  Points samples;                                        // [m]
   double gap = std::numeric_limits<double>::infinity();  // [m]
-  const auto eachSample = [&](const auto& visit) {
-    for (Index face = 0; face < of_a.surface->triangles.size(); ++face) {
-      const Vec3 area = of_a.areaOf(face);
-      double longest = 0.0;
-      for (int k = 0; k < 3; ++k)
-        longest = std::max(longest, (of_a.corner(face, (k + 1) % 3) - of_a.corner(face, k)).norm());
-      const int n = static_cast<int>(std::clamp(std::ceil(longest / (kLongFace * edge)), 1.0, double(kMostParts)));
-      eachPart(n, [&](const Vec3& shares) {
-        const Vec3 p = of_a.at(face, shares);
-        if (!command.region || command.region->contains(p)) visit(face, shares, p, Vec3(area / (n * n)));
-      });
-    }
-  };
-  eachSample([&](Index face, const Vec3& shares, const Vec3& p, const Vec3& area) {
-    in_region = true;
+  const auto addSample = [&](Index face, const Vec3& shares, const Vec3& area) {
+    const Vec3 p = of_a.at(face, shares);
+    if (command.region && !command.region->contains(p)) return;
+    samples.push_back(p);
     if (!to_world) {
-      const NearestFace there = search->within(p, command.distance);
+      const NearestFace there = search->nearest(p, command.distance);
       if (there.face == kNoIndex) return;
       gap = std::min(gap, there.distance);
       const Vec3 other = of_b.areaOf(there.face);
@@ -272,7 +253,15 @@ Result<AttachReply> World::Impl::attach(const AttachCommand& command) {
     Part& part = parts[cube];
     part.area += area.norm();
     part.faces.push_back({face, area.norm() * shares});
-  });
+  };
+  for (Index face = 0; face < of_a.surface->triangles.size(); ++face) {
+    double longest = 0.0;
+    for (int k = 0; k < 3; ++k)
+      longest = std::max(longest, (of_a.corner(face, (k + 1) % 3) - of_a.corner(face, k)).norm());
+    const int n = static_cast<int>(std::clamp(std::ceil(longest / (kLongFace * edge)), 1.0, double(kMostParts)));
+    const Vec3 area = of_a.areaOf(face) / (n * n);
+    eachPart(n, [&](const Vec3& shares) { addSample(face, shares, area); });
+  }
   for (const auto& [cube, part] : parts) {
     if (!(part.area > 0.0)) continue;
     Fibre fibre;
@@ -289,7 +278,7 @@ Result<AttachReply> World::Impl::attach(const AttachCommand& command) {
     fibre.place = at;
     double skin = 0.0;
     if (!to_world) {
-      const NearestFace there = search->nearest(shown, command.distance);
+      const NearestFace there = search->nearest(shown);
       if (there.face == kNoIndex) continue;
       fibre.place = of_b.at(there.face, there.shares);
       skin = kSkin * std::min(edge, b ? b->edge_length : obstacle->surface.edge_length);
@@ -304,14 +293,12 @@ Result<AttachReply> World::Impl::attach(const AttachCommand& command) {
     made.fibres.push_back(std::move(fibre));
   }
   if (made.fibres.empty()) {
-    if (!in_region)
+    if (samples.empty())
       return Error{ErrorCode::kMissed, "no surface of '" + names[0] + "' lies in " + command.region->text()};
     if (std::isfinite(gap))
       return Error{ErrorCode::kMissed, "'" + names[0] + "' and '" + names[1] + "' are " + number(gap) +
                                            " m apart, but do not face each other there"};
-    eachSample([&](Index, const Vec3&, const Vec3& p, const Vec3&) {
-      gap = std::min(gap, search->nearest(p, command.distance).distance);
-    });
+    for (const Vec3& p : samples) gap = std::min(gap, search->nearest(p, gap).distance);
     return Error{ErrorCode::kMissed, "'" + names[0] + "' and '" + names[1] + "' are " + number(gap) + " m apart" +
                                          (command.region ? " in " + command.region->text() : std::string()) +
                                          "; distance is " + number(command.distance) + " m"};
@@ -491,8 +478,7 @@ void World::Impl::followFibres(const BodyId& parent, const BodyModel& model, con
       std::size_t of = 0;
       for (std::size_t p = 0; p < pieces.size(); ++p) {
         if (shown[p].surface->triangles.empty()) continue;
-        const NearestFace found = nearest.face == kNoIndex ? searches[p].nearest(rest, model.spacing)
-                                                           : searches[p].within(rest, nearest.distance);
+        const NearestFace found = searches[p].nearest(rest, nearest.distance);
         if (!(found.distance < nearest.distance)) continue;
         nearest = found;
         of = p;

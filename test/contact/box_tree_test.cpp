@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "meshless_surgery/base/random.h"
@@ -90,6 +91,38 @@ TEST(BoxTree, FindsWhatOverlapsABoxOnceAndNothingElse) {
       for (Index n = 0; n < count; ++n)
         if (meet(some.boxes.items[n], box, 0.0f)) expected.insert(n);
       EXPECT_EQ(found, expected) << count << " boxes";
+    }
+  }
+}
+
+TEST(BoxTree, FindsTheNearest) {
+  Random random(3);
+  for (const std::size_t count : kCounts) {
+    const Boxes some = randomBoxes(count, 0.05, random);
+    for (int n = 0; n < 40; ++n) {
+      const Vec3 p = random.inCube(1.0);
+      const auto squared = [&](Index item) {
+        const FloatBox& box = some.boxes.items[item];
+        double sum = 0.0;
+        for (int axis = 0; axis < 3; ++axis) {
+          const double by = std::max({box.min[axis] - p[axis], p[axis] - box.max[axis], 0.0});
+          sum += by * by;
+        }
+        return sum;
+      };
+      double expected = std::numeric_limits<double>::infinity();
+      for (Index item = 0; item < count; ++item) expected = std::min(expected, squared(item));
+      double least = std::numeric_limits<double>::infinity();
+      std::size_t asked = 0;
+      const Index found = some.tree.nearest(some.boxes, p, least, [&](Index item) {
+        ++asked;
+        return squared(item);
+      });
+      EXPECT_EQ(least, expected);
+      EXPECT_EQ(found == kNoIndex, std::isinf(expected));
+      if (found != kNoIndex) EXPECT_EQ(squared(found), expected);
+      EXPECT_LE(asked, std::max<std::size_t>(64, count / 4));
+      EXPECT_EQ(some.tree.nearest(some.boxes, p, least, squared), kNoIndex) << "none is nearer than itself";
     }
   }
 }

@@ -538,6 +538,24 @@ class MessagesLawTest(DeformerTestCase):
             bits = numpy.ascontiguousarray(points['rgb'][points['body'] == body.id]).view(numpy.uint32)
             self.assertEqual({color[0] << 16 | color[1] << 8 | color[2]}, set(bits.tolist()))
 
+    def test_an_attachment_carries_the_weight_that_hangs_on_it(self):
+        answer = self.good('attach', name='bed', body='hangs', other='world', stiffness=1e6)
+        whole, = self.state().attachments
+        self.holds(whole, 'area', 0.06, 1e-9)
+        self.assertAlmostEqual(0.06, answer.area, delta=1e-9)
+        asked = rospy.Time.now()
+        part = self.good('detach', name='bed', centre=Point(-1.0, 0.0, 1.95), radius=0.06)
+        self.good('step', steps=480)
+        bed, = self.state().attachments
+        self.assertGreater(part.gone, 0)
+        self.says(bed, name='bed', ends=['hangs', 'world'], made=answer.fibres, fibres=answer.fibres - part.gone,
+                  force=(MASSES['hangs'] * G, 0.01 * MASSES['hangs'] * G))
+        shown = self.fresh('surfaces', Surfaces, lambda m: m.header.stamp > asked and len(m.fibres) == 2 * bed.fibres)
+        ends = plain(shown.fibres).reshape(-1, 2, 3)
+        drawn = ends[:, 1] - ends[:, 0]  # from the tissue up to where it was
+        self.assertAlmostEqual(MASSES['hangs'] * G / (1e6 * bed.area), drawn[:, 2].mean(), delta=1e-5)
+        held.update({('meshless_surgery/State', 'attachments'), (shown._type, 'fibres')})
+
     def test_events_and_rates(self):
         self.good('step', steps=3)
         events = self.deformer.recorder('events', Event)

@@ -395,7 +395,51 @@ def later(test):
     return dict(topic='/late_camera')
 
 
+def joined_area(test, answer):
+    return answer.area
+
+
+def ends(test, answer):
+    return list(test.state().attachments[0].ends)
+
+
+def tension(test, answer):
+    """Once the pick has drawn the fibres out."""
+    test.good('step', steps=20)
+    return test.state().attachments[0].force
+
+
+def torn(test, answer):
+    test.good('step', steps=20)
+    return test.state().attachments[0].fibres < answer.fibres
+
+
+def fibres_left(test, answer):
+    return sum(attachment.fibres for attachment in test.state().attachments)
+
+
+def joined(**fields):
+    """The left box, where it is."""
+    def prepare(test):
+        test.good('attach', body='left', other='world', stiffness=1e6)
+        return fields
+    return prepare
+
+
+TO_WORLD = dict(body='left', other='world', stiffness=1e6)
+CORNER = Point(-0.15, 0.05, 0.15)
 LAWS = [
+    Law('attach', 'name', 'mine', TO_WORLD, name_of, 'mine', 'left-world'),
+    Law('attach', 'body', 'left', TO_WORLD, ends, ['left', 'world'], Refusal(INVALID)),
+    Law('attach', 'other', 'world', TO_WORLD, ends, ['left', 'world'], Refusal(INVALID)),
+    Law('attach', 'distance', 0.31, dict(TO_WORLD, other='right'), joined_area, 0.01, Refusal(INVALID)),
+    Law('attach', 'stiffness', 1e6, drawn_out(body='left', other='world'), tension, within(0.1, 100.0), Refusal(INVALID)),
+    Law('attach', 'strength', 1.0, drawn_out(**TO_WORLD), torn, True, False),
+    Law('attach', 'centre', CORNER, dict(TO_WORLD, radius=0.06), joined_area, within(0.002, 0.01), Refusal(MISSED)),
+    Law('attach', 'radius', 0.06, dict(TO_WORLD, centre=CORNER), joined_area, within(0.002, 0.01), 0.06),
+    Law('detach', 'name', 'left-world', joined(), fibres_left, 0, Refusal(UNKNOWN)),
+    Law('detach', 'centre', CORNER, joined(name='left-world', radius=0.06), fibres_left, within(10, 1000), Refusal(MISSED)),
+    Law('detach', 'radius', 0.06, joined(name='left-world', centre=CORNER), fibres_left, within(10, 1000), 0),
     Law('cut', 'blades', FLAT['blades'], with_middle(), cut_bodies, ['left', 'right'], ['middle']),
     Law('cut', 'length', 0.2, FLAT, cut_bodies, ['left'], ['left', 'right']),
     Law('cut', 'width', 0.2, dict(blades=pose_stamped(-0.2, -1.0, 0.1, ALONG_Y)), cut_bodies, ['left'], ['left', 'right']),
@@ -458,6 +502,8 @@ LAWS = [
 
 # A request in each place where one is said in a frame: oblique, so that rounding decides nothing.
 FRAMED = {
+    'attach': dict(header=Header(), body='left', other='world', stiffness=1e6, centre=Point(-0.151, 0.033, 0.143), radius=0.0617),
+    'detach': dict(header=Header(), name='left-world', centre=Point(-0.151, 0.033, 0.143), radius=0.0617),
     'cut': dict(blades=pose_stamped(-0.3, 0.012, 0.093, TURNED), length=0.25, width=0.3),
     'incise': dict(blade=blade_pose((-0.23, 0.013, 0.151), (1, 0.1, 0.02), (0.05, 0.1, 1)), length=0.061, depth=0.032),
     'pick': dict(header=Header(), point=Point(-0.61, 0.013, -0.11), direction=Vector3(2.03, 0.02, 1.01)),
@@ -606,6 +652,8 @@ class RequestsTest(Asked):
         fields = {field: said_in(frame, stamp, value) for field, value in dict(FRAMED[service], **other).items()}
         if service in NEEDS_A_PICK:
             fields['pick_id'] = self.pick_left().pick_id
+        if service == 'detach':
+            self.good('attach', body='left', other='world', stiffness=1e6)
         answer = self.ask(name, fields)
         self.assertTrue(answer.success, answer.message)
         if service == 'pick':

@@ -257,6 +257,62 @@ TEST(Attachment, AStiffStripIsPeeledByTheForceOfALever) {
       }
 }
 
+/// Two soft beams that are attached face to face, and whose ends are drawn apart: the force [N] at which the first
+/// fibre tears, and how far that fibre is from the ends.
+std::pair<double, double> drawApart(double spacing, double youngs_modulus, double stiffness, double strength) {
+  WorldSettings settings = noGround(false);
+  settings.pick_radius = 0.5 * spacing;
+  World world(settings);
+  for (const double side : {-1.0, 1.0})
+    add(world, boxOf(side < 0.0 ? "lower" : "upper", Vec3(0.12, 0.012, 0.008), Vec3(0, 0, side * 0.0042),
+                     elastic(youngs_modulus), spacing));
+  const std::size_t made = attach(world, attachment("lower", "upper", 0.001, stiffness, strength)).fibres;
+  double nearest = 1.0;
+  for (const auto& line : seen(world).attachments[0].lines) nearest = std::min(nearest, line[0].x() + 0.06);
+  std::vector<PickReply> picked;
+  for (const double side : {-1.0, 1.0}) {
+    PickCommand pick;
+    pick.point = Vec3(-0.06, 0.0, side * 0.0042);
+    pick.max_distance = 0.05;
+    pick.stiffness = 1e3;
+    pick.body = side < 0.0 ? "lower" : "upper";
+    picked.push_back(test::replyOf<PickReply>(world.apply(pick)));
+  }
+  double most = 0.0;
+  for (int step = 0; step < 2400; ++step) {
+    for (int k = 0; k < 2; ++k) {
+      MovePickCommand move;
+      move.pick = picked[k].pick;
+      move.target = picked[k].position + Vec3(0, 0, (k == 0 ? -1e-5 : 1e-5) * step);
+      EXPECT_TRUE(world.apply(move).ok());
+    }
+    world.step();
+    const WorldSnapshot shot = world.snapshot({});
+    if (shot.attachments[0].fibres < made) return {most, nearest};
+    most = 0.5 * (shot.picks[1].force.z() - shot.picks[0].force.z());
+  }
+  ADD_FAILURE() << "none tore";
+  return {most, nearest};
+}
+
+TEST(Attachment, SoftBeamsComeApartAsBeamsOnElasticGroundDo) {
+  for (const double spacing : {0.003, 0.004})
+    for (const double stiffness : {5e4, 2e5}) {
+      SCOPED_TRACE(std::to_string(spacing) + " " + std::to_string(stiffness));
+      const double youngs_modulus = 1e5, strength = 100.0, width = 0.012, thick = 0.008;
+      const auto [force, nearest] = drawApart(spacing, youngs_modulus, stiffness, strength);
+      // Hetenyi 1946: drawn at its end by P, a long beam is drawn out by 2 P beta / k there, and less farther on. Half
+      // of a fibre's length is each beam's.
+      const double k = 2.0 * stiffness * width, flexural = youngs_modulus * width * std::pow(thick, 3) / 12.0;
+      const double beta = std::pow(k / (4.0 * flexural), 0.25);
+      const double there = std::exp(-beta * nearest) * std::cos(beta * nearest);
+      const double theory = strength * width / (2.0 * beta * there);
+      std::cout << "beams: spacing " << spacing << ", k " << stiffness << ": force " << force << " N, theory " << theory
+                << ", beta " << beta << ", nearest " << nearest << "\n";
+      EXPECT_NEAR(force, theory, 0.2 * theory);
+    }
+}
+
 TEST(Attachment, ABlockIsPulledOffByStrengthTimesArea) {
   for (const bool is_elastic : {false, true})
     for (const double stiffness : {1e6, 1e8}) {

@@ -1,6 +1,10 @@
 // A tree of boxes over faces, bodies or others: its topology is made once, its boxes anew whenever they have moved.
 #pragma once
 
+#include <algorithm>
+#include <functional>
+#include <utility>
+
 #include "meshless_surgery/base/bytes.h"
 #include "meshless_surgery/base/float_box.h"
 
@@ -39,6 +43,37 @@ class BoxTree {
           stack[depth++] = node.first + k;
       });
     }
+  }
+
+  /// The item for which squared(item) is least, or kNoIndex where none is below `least` [m^2], which it then becomes;
+  /// squared: the squared distance of p from what the item's box holds.
+  template <class Squared>
+  Index nearest(const TreeBoxes& boxes, const Vec3& p, double& least, const Squared& squared) const {
+    Index found = kNoIndex;
+    std::vector<std::pair<double, Index>> heap;  // nodes, the nearest on top
+    if (!nodes_.empty()) heap.push_back({0.0, 0});
+    while (!heap.empty() && heap.front().first < least) {
+      std::pop_heap(heap.begin(), heap.end(), std::greater<>());
+      const Index at = heap.back().second;
+      heap.pop_back();
+      const Node& node = nodes_[at];
+      for (Index k = 0; k < node.count; ++k) {
+        double away = 0.0;
+        for (int axis = 0; axis < 3; ++axis) {
+          const double by = std::max(boxes.nodes[at].min[axis][k] - p[axis], p[axis] - boxes.nodes[at].max[axis][k]);
+          if (by > 0.0) away += by * by;
+        }
+        if (!(away < least)) continue;
+        if (!node.leaf) {
+          heap.push_back({away, node.first + k});
+          std::push_heap(heap.begin(), heap.end(), std::greater<>());
+        } else if (const double now = squared(items_[node.first + k]); now < least) {
+          least = now;
+          found = items_[node.first + k];
+        }
+      }
+    }
+    return found;
   }
 
   /// visit(item, other's item) for each two whose boxes are nearer than `by` [m], in an order that depends on the
