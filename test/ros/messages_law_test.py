@@ -553,7 +553,7 @@ class MessagesLawTest(DeformerTestCase):
         shown = self.fresh('surfaces', Surfaces, lambda m: m.header.stamp > asked and len(m.fibres) == 2 * bed.fibres)
         ends = plain(shown.fibres).reshape(-1, 2, 3)
         drawn = ends[:, 1] - ends[:, 0]  # from the tissue up to where it was
-        self.assertAlmostEqual(MASSES['hangs'] * G / (1e6 * bed.area), drawn[:, 2].mean(), delta=1e-5)
+        self.assertAlmostEqual(MASSES['hangs'] * G / (1e6 * bed.area), drawn[:, 2].mean(), delta=1e-4)  # some stand for more than others
         held.update({('meshless_surgery/State', 'attachments'), (shown._type, 'fibres')})
 
     def test_events_and_rates(self):

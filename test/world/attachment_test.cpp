@@ -296,21 +296,18 @@ std::pair<double, double> drawApart(double spacing, double youngs_modulus, doubl
 }
 
 TEST(Attachment, SoftBeamsComeApartAsBeamsOnElasticGroundDo) {
-  for (const double spacing : {0.003, 0.004})
-    for (const double stiffness : {5e4, 2e5}) {
-      SCOPED_TRACE(std::to_string(spacing) + " " + std::to_string(stiffness));
-      const double youngs_modulus = 1e5, strength = 100.0, width = 0.012, thick = 0.008;
-      const auto [force, nearest] = drawApart(spacing, youngs_modulus, stiffness, strength);
-      // Hetenyi 1946: drawn at its end by P, a long beam is drawn out by 2 P beta / k there, and less farther on. Half
-      // of a fibre's length is each beam's.
-      const double k = 2.0 * stiffness * width, flexural = youngs_modulus * width * std::pow(thick, 3) / 12.0;
-      const double beta = std::pow(k / (4.0 * flexural), 0.25);
-      const double there = std::exp(-beta * nearest) * std::cos(beta * nearest);
-      const double theory = strength * width / (2.0 * beta * there);
-      std::cout << "beams: spacing " << spacing << ", k " << stiffness << ": force " << force << " N, theory " << theory
-                << ", beta " << beta << ", nearest " << nearest << "\n";
-      EXPECT_NEAR(force, theory, 0.2 * theory);
-    }
+  const double youngs_modulus = 1e5, stiffness = 5e4, strength = 100.0, width = 0.012, thick = 0.008;
+  for (const auto& [spacing, within] : {std::pair(0.003, 0.1), std::pair(0.004, 0.2)}) {
+    SCOPED_TRACE(spacing);
+    const auto [force, nearest] = drawApart(spacing, youngs_modulus, stiffness, strength);
+    // Hetenyi 1946: drawn at its end by P, a long beam is drawn out by 2 P beta / k there, and less farther on. Half of
+    // a fibre's length is each beam's.
+    const double k = 2.0 * stiffness * width, flexural = youngs_modulus * width * std::pow(thick, 3) / 12.0;
+    const double beta = std::pow(k / (4.0 * flexural), 0.25);
+    const double there = std::exp(-beta * nearest) * std::cos(beta * nearest);
+    const double theory = strength * width / (2.0 * beta * there);
+    EXPECT_NEAR(force, theory, within * theory);
+  }
 }
 
 TEST(Attachment, ABlockIsPulledOffByStrengthTimesArea) {
