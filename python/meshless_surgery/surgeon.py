@@ -138,10 +138,10 @@ class Surgeon:
     # bodies
     def spawn(self, name='', file='', box=None, sphere=None, cylinder=None, position=(0, 0, 0),
               orientation=(0, 0, 0, 1), scale=0.0, material='', repair='', frame=None, units='',
-              thickness=0.0):
+              thickness=0.0, cavities=''):
         """A body from a file, or one of `box` (x, y, z), `sphere` radius, `cylinder` (height, radius), its lengths in `units`:
         m, cm, mm; empty: m. `repair` of a file's surface: none, mend, wrap; empty: mend. `thickness` [m] makes a layer of an open
-        surface and a wall of a closed one."""
+        surface and a wall of a closed one. `cavities`: what fills them, as in a scene, such as '{pressure: 1000}'; empty: nothing."""
         shapes = {SolidPrimitive.BOX: box, SolidPrimitive.SPHERE: None if sphere is None else (sphere,),
                   SolidPrimitive.CYLINDER: cylinder}
         given = [(kind, list(sizes)) for kind, sizes in shapes.items() if sizes is not None]
@@ -149,7 +149,8 @@ class Surgeon:
             raise ValueError('%d shapes are given; accepted: one of file, box, sphere, cylinder' % (len(given) + bool(file)))
         primitive = SolidPrimitive(type=given[0][0], dimensions=given[0][1]) if given else SolidPrimitive()
         return self.call('spawn', Spawn, name=name, file=file, primitive=primitive, scale=scale, material=material,
-                         repair=repair, units=units, thickness=thickness, pose=pose_stamped(position, orientation, self._frame(frame)))
+                         repair=repair, units=units, thickness=thickness, cavities=cavities,
+                         pose=pose_stamped(position, orientation, self._frame(frame)))
 
     def spawn_cloud(self, name='', cloud=None, topic='', timeout=0.0, scale=0.0, voxel=0.0, outliers=0.0, material=''):
         """A body from a sensor_msgs/PointCloud2, or from the next one of a topic."""

@@ -396,12 +396,26 @@ SurfaceBinding fewerCarriers(const SurfaceBinding& binding, const Points& rest, 
   return fewer;
 }
 
-Points collisionPlaces(const BodyModel& model, const Points& positions) {
-  const SurfaceBinding& binding = model.collision->binding;
-  Points places(model.collision->mesh.vertices.size(), Vec3::Zero());
+void addToParticles(const SurfaceBinding& binding, const Points& of_vertices, Points& of_particles) {
+  for (std::size_t v = 0; v < of_vertices.size(); ++v)
+    if (binding.particle[v] != kNoIndex) of_particles[binding.particle[v]] += of_vertices[v];
+  for (Index r = 0; r < binding.embedded.size(); ++r)
+    for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k)
+      of_particles[binding.carriers[k]] += binding.weights[k] * of_vertices[binding.embedded[r]];
+}
+
+void carriedPlaces(const SurfaceBinding& binding, const Points& positions, Points& places) {
+  places.resize(binding.particle.size());
+  for (std::size_t v = 0; v < places.size(); ++v)
+    places[v] = binding.particle[v] != kNoIndex ? positions[binding.particle[v]] : Vec3(Vec3::Zero());
   for (Index r = 0; r < binding.embedded.size(); ++r)
     for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k)
       places[binding.embedded[r]] += binding.weights[k] * positions[binding.carriers[k]];
+}
+
+Points collisionPlaces(const BodyModel& model, const Points& positions) {
+  Points places;
+  carriedPlaces(model.collision->binding, positions, places);
   return places;
 }
 

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/body/cavities.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/cell_regions.h"
 #include "meshless_surgery/geometry/measures.h"
@@ -148,6 +149,7 @@ BodyMeasures measureBody(const BodyModel& model, const BodyState& state) {
   m.velocity = m.linear_momentum / model.mass;
   for (std::size_t i = 0; i < state.positions.size(); ++i)
     m.angular_momentum += model.masses[i] * (state.positions[i] - m.centre_of_mass).cross(state.velocities[i]);
+  m.cavities = measureCavities(model, state.cavities, state.positions);
   return m;
 }
 

@@ -11,6 +11,13 @@ std::size_t bytesOf(const CollisionSurface& collision) {
                                               binding.embedded, binding.offsets, binding.carriers, binding.weights,
                                               binding.levers, binding.turners, binding.lever_clusters);
 }
+std::size_t bytesOf(const Cavities& cavities) {
+  const SurfaceBinding& binding = cavities.binding;
+  std::size_t sum = sizeof cavities + meshless::bytesOf(binding.particle, binding.embedded, binding.offsets,
+                                                        binding.carriers, binding.weights, cavities.shells);
+  for (const Cavities::Shell& shell : cavities.shells) sum += meshless::bytesOf(shell.triangles);
+  return sum;
+}
 }  // namespace
 
 std::size_t bytesOf(const BodyModel& model) {
@@ -26,18 +33,21 @@ std::size_t bytesOf(const BodyModel& model) {
          (model.cells ? bytesOf(model.cells->cells, model.cells->masses) : 0) +
          (model.elastic_batch ? model.elastic_batch->bytes() : 0) +
          bytesOf(model.surface.vertices, model.surface.triangles, model.surface.patches) +
-         (model.collision ? bytesOf(*model.collision) : 0) +
+         (model.collision ? bytesOf(*model.collision) : 0) + (model.cavities ? bytesOf(*model.cavities) : 0) +
          bytesOf(binding.particle, binding.embedded, binding.offsets, binding.carriers, binding.weights, binding.levers,
                  binding.turners, binding.lever_clusters);
 }
 
 std::size_t bytesOf(const BodyState& state) {
-  return bytesOf(state.positions, state.velocities, state.poses, state.surface, state.plastic, state.eased);
+  return bytesOf(state.positions, state.velocities, state.poses, state.surface, state.plastic, state.eased,
+                 state.cavities);
 }
 
 std::size_t bytesOf(const StepScratch& scratch) {
   const ElasticBatchState& elastic = scratch.elastic;
-  return scratch.clamp.bytes() + bytesOf(scratch.previous, scratch.predicted, scratch.goals, scratch.touched) +
+  return scratch.clamp.bytes() +
+         bytesOf(scratch.previous, scratch.predicted, scratch.goals, scratch.touched, scratch.cavity,
+                 scratch.cavity_pull) +
          bytesOf(elastic.rotations, elastic.others, elastic.forces, elastic.largest, elastic.cold);
 }
 

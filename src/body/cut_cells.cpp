@@ -12,6 +12,7 @@
 #include <Eigen/Dense>
 
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/body/cavities.h"
 #include "meshless_surgery/body/cell_blend.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/cut_lattice.h"
@@ -148,6 +149,7 @@ class CellCutter {
       surface.mesh.vertices.push_back(surface.embedded.back().rest);
     }
     surface.mesh.triangles = source.mesh.triangles;
+    if (!state_.cavities.empty()) surface.mesh.patches = source.mesh.patches;
     return surface;
   }
 
@@ -473,6 +475,8 @@ class CellCutter {
       const Index first = static_cast<Index>(piece.mesh.vertices.size());
       for (const Triangle& t : surface.mesh.triangles)
         piece.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+      for (const std::uint32_t patch : surface.mesh.patches)  // contact knows no other ones
+        piece.mesh.patches.push_back(isCavityPatch(patch) ? patch : kOuterPatch);
       piece.mesh.vertices.insert(piece.mesh.vertices.end(), surface.mesh.vertices.begin(), surface.mesh.vertices.end());
       std::vector<Index> cells = cellsOf(surface, static_cast<int>(p));
       for (Index v = 0; v < cells.size(); ++v)
@@ -734,6 +738,8 @@ class CellCutter {
     piece.state.pace = state_.pace;
     piece.state.stiffened = state_.stiffened;
     piece.state.placed = state_.placed;
+    if (!state_.cavities.empty()) makeCavities(*child);
+    piece.state.cavities = inheritedCavities(state_.cavities, *child);
     updateSurface(*child, piece.state);
     piece.model = std::move(child);
     return piece;
@@ -913,7 +919,8 @@ TriangleMesh presentCollision(const BodyModel& model, const BodyState& state) {
   if (!model.collision) return present;
   present.vertices = collisionPlaces(model, state.positions);
   present.triangles = model.collision->mesh.triangles;
-  present.patches.assign(present.triangles.size(), kOuterPatch);
+  present.patches = model.collision->mesh.patches;
+  present.patches.resize(present.triangles.size(), kOuterPatch);
   return present;
 }
 

@@ -6,6 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "meshless_surgery/body/cavities.h"
 #include "meshless_surgery/body/ease.h"
 #include "meshless_surgery/dynamics/plastic.h"
 
@@ -222,6 +223,7 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
     v[i] = faster;
     x[i] = at + h * faster;
   }
+  if (!state.cavities.empty()) pressCavities(model, factor, h, state, scratch);
   if (model.any_fixed)
     for (std::size_t i = 0; i < n; ++i) {
       if (!model.fixed[i]) continue;

@@ -17,6 +17,7 @@ constexpr double kAtOnce = 0.99;      // so much of it may come at once
 Points ownAccelerations(const BodyModel& model, BodyState state, const Material& material, double h) {
   StepScratch scratch;
   MatchCounters uncounted;
+  state.cavities.clear();  // what fills them goes on
   Points accelerations = state.velocities;
   matchAndMove(model, material, Vec3::Zero(), h, state, scratch, uncounted);
   for (std::size_t i = 0; i < accelerations.size(); ++i)

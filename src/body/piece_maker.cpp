@@ -10,6 +10,7 @@
 #include <unordered_set>
 
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/body/cavities.h"
 #include "meshless_surgery/dynamics/plastic.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "side_by_side.h"
@@ -206,6 +207,8 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, RestShape rest, const std
   piece.state.pace = state_.pace;
   piece.state.stiffened = state_.stiffened;
   piece.state.placed = state_.placed;
+  if (!state_.cavities.empty()) makeCavities(*child);
+  piece.state.cavities = inheritedCavities(state_.cavities, *child);
   updateSurface(*child, piece.state);
   piece.model = std::move(child);
   return piece;

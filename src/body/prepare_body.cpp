@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/body/cavities.h"
 #include "meshless_surgery/body/cell_blend.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/cell_regions.h"
@@ -38,7 +39,8 @@ constexpr double kSmallest = 1e-3, kLargest = 2.0;  // [m] of organs
 constexpr double kUsual = 2e-2;                     // [m] the least that a scale is proposed for
 constexpr double kCollisionEdge = 0.8;              // of the spacing
 constexpr std::size_t kMostCollisionTriangles = 200000;
-constexpr double kLongestEdge = 1.5;  // of the spacing: the surface bends as finely as its cells
+constexpr std::size_t kMostNamed = 5;  // cavities
+constexpr double kLongestEdge = 1.5;   // of the spacing: the surface bends as finely as its cells
 
 Error invalid(const std::string& what) { return {ErrorCode::kInvalidArgument, what}; }
 
@@ -92,6 +94,8 @@ Status validate(const BodyDef& def) {
     return invalid("body '" + def.name +
                    "' has regions; accepted: those of a closed body of an elastic material, with " +
                    "clusters: auto or cells");
+  if (const Status valid = def.cavities.validate(); !valid)
+    return invalid("body '" + def.name + "': " + valid.error().detail);
   return def.material.validate();
 }
 
@@ -411,6 +415,31 @@ Status makeCollision(BodyDef& def, BodyModel& model) {
   return Done{};
 }
 
+/// Which cavities it has is said where they are empty, and marked in its surface where they are to be filled.
+Status findCavities(BodyDef& def, TriangleMesh& surface) {
+  TriangleMesh marked;
+  marked.vertices = surface.vertices;
+  marked.triangles = surface.triangles;
+  const std::vector<double> volumes = def.solid ? markCavities(marked) : std::vector<double>();
+  if (def.cavities.empty()) {
+    if (volumes.empty()) return Done{};
+    std::ostringstream text;
+    text << std::setprecision(3) << "it has " << volumes.size()
+         << (volumes.size() == 1 ? " cavity of " : " cavities of ");
+    for (std::size_t c = 0; c < volumes.size() && c < kMostNamed; ++c) text << (c > 0 ? ", " : "") << 1e6 * volumes[c];
+    text << (volumes.size() > kMostNamed ? " ... ml" : " ml")
+         << (volumes.size() == 1 ? ", that is empty" : ", that are empty");
+    def.notes.push_back(text.str());
+    return Done{};
+  }
+  if (volumes.empty())
+    return Error{ErrorCode::kUnsuitableShape,
+                 "body '" + def.name + "': cavities are to be filled, and it has none; accepted: a closed surface " +
+                     "with another one inside of it"};
+  surface.patches = std::move(marked.patches);
+  return Done{};
+}
+
 /// What is no size of an organ is most often in other units than metres; empty where it is one.
 std::string sizeWarning(double longest) {
   if (longest >= kSmallest && longest <= kLargest) return "";
@@ -465,6 +494,7 @@ Result<PreparedBody> prepareBody(BodyDef def) {
          << "diagonal cubed";
     return Error{ErrorCode::kUnsuitableShape, text.str()};
   }
+  if (const Status found = findCavities(def, surface); !found) return found.error();
   model->solid = def.solid;
   model->rest_volume = volume;
   model->rest_area = surfaceArea(surface);
@@ -505,6 +535,22 @@ Result<PreparedBody> prepareBody(BodyDef def) {
         bindSurface(model->rest, model->graph, model->clusters, surface.vertices, std::move(vertex_particle));
   }
 
+  Result<std::vector<FilledCavity>> filled = std::vector<FilledCavity>();
+  if (!def.cavities.empty()) {
+    if (model->collision) {
+      auto collision = std::make_shared<CollisionSurface>(*model->collision);
+      if (markCavities(surface, collision->mesh)) model->collision = std::move(collision);
+    }
+    makeCavities(*model);
+    filled = filledCavities(*model, def.cavities);
+    if (!filled) return Error{filled.error().code, "body '" + def.name + "': " + filled.error().detail};
+    std::ostringstream text;
+    text << std::setprecision(3);
+    for (const Cavities::Shell& shell : model->cavities->shells)
+      text << (text.tellp() > 0 ? ", " : "its filled cavities hold ") << 1e6 * shell.rest_volume;
+    def.notes.push_back(text.str() + " ml at rest");
+  }
+
   if (!def.fixed.empty()) {
     std::ostringstream text;
     text << std::setprecision(3) << 100.0 * heldShare(*model) << " % of it is held";
@@ -524,6 +570,7 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   body.state.velocities.assign(model->rest.size(), Vec3::Zero());
   body.state.poses.resize(model->clusters.size());
   for (ClusterPose& cluster : body.state.poses) cluster.rotation = placed.rotation;
+  body.state.cavities = std::move(*filled);
   updateSurface(*model, body.state);
   body.def = std::move(def);
   body.model = std::move(model);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/geometry/measures.h"
 
 namespace meshless {
@@ -12,17 +13,6 @@ constexpr int kSweeps = 2;
 constexpr double kSwellingRate = 0.3;  // of the relative error, a third for each axis, in one substep
 constexpr double kLeastSwelling = 0.6, kMostSwelling = 1.6;
 constexpr double kMostOfSpacing = 0.1;  // [spacing] that a particle moves in a sweep
-
-Points volumeGradient(const Points& x, const std::vector<Triangle>& triangles) {
-  Points gradient(x.size(), Vec3::Zero());
-  for (const Triangle& t : triangles) {
-    const Vec3 &a = x[t[0]], &b = x[t[1]], &c = x[t[2]];
-    gradient[t[0]] += (b - a).cross(c - a) / 6.0;
-    gradient[t[1]] += (b - a).cross(c - a) / 6.0;
-    gradient[t[2]] += (b - a).cross(c - a) / 6.0;
-  }
-  return gradient;
-}
 
 Points areaGradient(const Points& x, const std::vector<Triangle>& triangles) {
   Points gradient(x.size(), Vec3::Zero());
@@ -35,15 +25,9 @@ Points areaGradient(const Points& x, const std::vector<Triangle>& triangles) {
   return gradient;
 }
 
-// From vertices to the particles that they are, or to their carriers.
 Points onParticles(const BodyModel& model, const Points& of_vertices) {
-  const SurfaceBinding& binding = model.binding;
   Points gradient(model.rest.size(), Vec3::Zero());
-  for (std::size_t v = 0; v < of_vertices.size(); ++v)
-    if (binding.particle[v] != kNoIndex) gradient[binding.particle[v]] += of_vertices[v];
-  for (Index r = 0; r < binding.embedded.size(); ++r)
-    for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k)
-      gradient[binding.carriers[k]] += binding.weights[k] * of_vertices[binding.embedded[r]];
+  addToParticles(model.binding, of_vertices, gradient);
   return gradient;
 }
 

@@ -78,7 +78,7 @@ ContactSurface::ContactSurface(const TriangleMesh& mesh, VertexSupports vertex_s
   Points centres;
   for (Index f = 0; f < triangles.size(); ++f) {
     const Triangle& t = triangles[f];
-    cut_faces[f] = mesh.patchOf(f) != kOuterPatch;
+    cut_faces[f] = isCutPatch(mesh.patchOf(f));
     if (cut_faces[f])
       for (Index v : t) cut_vertices[v] = 1;
     centres.push_back((rest[t[0]] + rest[t[1]] + rest[t[2]]) / 3.0);

@@ -18,6 +18,15 @@ double signedVolume(const Points& vertices, const std::vector<Triangle>& triangl
   return six_fold / 6.0;
 }
 
+Points volumeGradient(const Points& x, const std::vector<Triangle>& triangles) {
+  Points gradient(x.size(), Vec3::Zero());
+  for (const Triangle& t : triangles) {
+    const Vec3 third = (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]) / 6.0;
+    for (const Index v : t) gradient[v] += third;
+  }
+  return gradient;
+}
+
 Vec3 solidCentroid(const Points& vertices, const std::vector<Triangle>& triangles) {
   if (vertices.empty()) return Vec3::Zero();
   const Vec3 origin = triangles.empty() ? vertices[0] : vertices[triangles[0][0]];

@@ -90,6 +90,18 @@ TriangleMesh fishMesh(unsigned seed) {
   return organ(field, {Vec3(-0.19, -0.09, -0.04), Vec3(0.18, 0.09, 0.04)}, Vec3(0.0088, 0.0088, 0.0068));
 }
 
+TriangleMesh bladderMesh() {
+  constexpr double kWall = 0.003;
+  const Vec3 half(0.03, 0.025, 0.022);
+  const TriangleMesh ball = sphereMesh(1.0, 0.11);
+  TriangleMesh mesh = ball;
+  const Index first = static_cast<Index>(ball.vertices.size());
+  for (Vec3& p : mesh.vertices) p = half.cwiseProduct(p);
+  for (const Vec3& p : ball.vertices) mesh.vertices.push_back((half - Vec3::Constant(kWall)).cwiseProduct(p));
+  for (const Triangle& t : ball.triangles) mesh.triangles.push_back({t[0] + first, t[2] + first, t[1] + first});
+  return mesh;
+}
+
 TriangleMesh skinSlabMesh() { return boxMesh(Vec3(0.2, 0.2, 0.01), 40, 40, 2); }
 
 TriangleMesh block32Mesh() { return boxMesh(Vec3(0.1, 0.1, 0.05), 2, 2, 1); }

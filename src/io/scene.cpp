@@ -242,6 +242,31 @@ CollisionChoice readCollision(YamlSource& source, const YAML::Node& node) {
   return choice;
 }
 
+CavityFill readCavities(YamlSource& source, const YAML::Node& node) {
+  CavityFill fill;
+  const std::string accepted = "empty, {pressure: Pa}, or {volume: ml, compliance: ml/Pa} with one of them or both";
+  if (node.IsScalar() && node.Scalar() == "empty") return fill;
+  if (!node.IsMap()) {
+    source.fail(node, "cavities is " + shown(node), accepted);
+    return fill;
+  }
+  YamlMap map(source, node, "cavities");
+  const bool pressure = map.has("pressure"), volume = map.has("volume") || map.has("compliance");
+  if (pressure == volume)
+    source.fail(node,
+                pressure ? "cavities has pressure, and volume or compliance" : "cavities has no pressure and no volume",
+                accepted);
+  fill.kind = pressure ? CavityFill::Kind::kPressure : CavityFill::Kind::kVolume;
+  map.number("pressure", {0.0, 1e6, false, "Pa"}, fill.pressure);
+  map.number("volume", {0.0, 1e9, true, "ml"}, fill.volume);
+  map.number("compliance", {0.0, 1e6, true, "ml/Pa"}, fill.compliance);
+  fill.volume *= 1e-6;
+  fill.compliance *= 1e-6;
+  map.number("leak", {0.0, 3600.0, true, "s"}, fill.leak);
+  map.finish();
+  return fill;
+}
+
 /// [m] of one unit of a file's or primitive's lengths.
 double readUnits(YamlMap& map) {
   std::vector<std::string> names;
@@ -319,6 +344,8 @@ class SceneReader {
       def.collision = readCollision(source_, collision);
     readBodyMaterial(map.get("material"), def.material);
     if (const YAML::Node fixed = map.get("fixed"); fixed.IsDefined()) def.fixed = readFixed(source_, fixed);
+    if (const YAML::Node cavities = map.get("cavities"); cavities.IsDefined())
+      def.cavities = readCavities(source_, cavities);
     if (const YAML::Node regions = map.get("regions"); regions.IsDefined()) readRegions(regions, scale, def);
     std::vector<Pose> poses{def.pose};
     const YAML::Node copies = map.get("copies");
@@ -585,6 +612,21 @@ Status readMaterialFolders(const std::string& scene_folder, const FileAccess& ac
 }
 
 }  // namespace
+
+Result<CavityFill> readCavityFill(const std::string& yaml) {
+  if (yaml.empty()) return CavityFill();
+  const Result<YAML::Node> root = parseYaml(yaml, "cavities");
+  if (!root) return root.error();
+  YamlSource source{"cavities", {}};
+  CavityFill fill;
+  try {
+    fill = readCavities(source, *root);
+  } catch (const YAML::Exception& e) {
+    source.fail(*root, e.what(), "YAML");
+  }
+  if (source.fault) return *source.fault;
+  return fill;
+}
 
 Result<SceneDef> readScene(const std::string& file, const FileAccess& access) {
   std::error_code failed;

@@ -46,6 +46,7 @@ Result<std::shared_ptr<const PreparedBody>> BodyLoader::load(const SpawnRequest&
   auto chosen = material(request.material);
   if (!chosen.ok()) return chosen.error();
   def.material = std::move(*chosen);
+  def.cavities = request.cavities;
 
   if (request.file.empty()) {
     std::vector<double> sizes = request.sizes;

@@ -84,6 +84,17 @@ ScissorBlades bladesAt(const Pose& pose, double length, double width) {
   return blades;
 }
 
+std::vector<meshless_surgery::CavityState> toCavities(const BodyMeasures& measures) {
+  std::vector<meshless_surgery::CavityState> cavities;
+  for (const BodyMeasures::Cavity& cavity : measures.cavities) {
+    cavities.emplace_back();
+    cavities.back().volume = cavity.volume;
+    cavities.back().pressure = cavity.pressure;
+    cavities.back().open = cavity.open;
+  }
+  return cavities;
+}
+
 std::vector<meshless_surgery::PickState> toPicks(const WorldSnapshot& snapshot) {
   std::vector<meshless_surgery::PickState> picks;
   picks.reserve(snapshot.picks.size());
@@ -132,6 +143,7 @@ meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatu
     message.beta = body.material.beta;
     message.damping = body.material.damping;
     message.youngs_modulus = body.material.youngs_modulus;
+    message.cavities = toCavities(body.measures);
     state.bodies.push_back(std::move(message));
   }
   state.picks = toPicks(snapshot);

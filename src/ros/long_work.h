@@ -31,6 +31,17 @@ inline MeshRepair repairOf(const std::string& name, BorderCheck& check) {
   return MeshRepair::kMend;
 }
 
+inline CavityFill fillOf(const std::string& yaml, BorderCheck& check) {
+  constexpr std::size_t kMost = 1024;
+  if (yaml.size() > kMost) {
+    check.fault("cavities has " + std::to_string(yaml.size()) + " bytes; accepted: up to " + std::to_string(kMost));
+    return {};
+  }
+  const Result<CavityFill> fill = readCavityFill(yaml);
+  if (!fill) check.fault(fill.error().detail);
+  return fill ? *fill : CavityFill();
+}
+
 /// [m] of one.
 inline double unitOf(const std::string& name, BorderCheck& check) {
   std::vector<std::string> names;
@@ -155,6 +166,7 @@ struct LongWork : Answers {
     wanted.thickness = check.number("thickness", request.thickness, 0.0, kMaxLength, "m");
     wanted.material = request.material;
     wanted.repair = repairOf(request.repair, check);
+    wanted.cavities = fillOf(request.cavities, check);
     if (wanted.file.empty()) {
       switch (request.primitive.type) {
         case shape_msgs::SolidPrimitive::BOX:

@@ -88,7 +88,7 @@ void addBody(const BodySnapshot& body, Marker& marker) {
   regions.resize(body.surface.size(), 0);
   // Normals are smooth over the outer surface and over all cut faces, each on their own: the rim between stays sharp.
   Shading shadings[2];
-  const bool any_cut = std::any_of(mesh.patches.begin(), mesh.patches.end(), [](auto p) { return p != kOuterPatch; });
+  const bool any_cut = std::any_of(mesh.patches.begin(), mesh.patches.end(), isCutPatch);
   for (const bool cut : {false, true})
     if (!cut || any_cut) shadings[cut].normals.assign(body.surface.size(), Vec3::Zero());
   Points areas;
@@ -97,7 +97,7 @@ void addBody(const BodySnapshot& body, Marker& marker) {
     const Triangle& corners = mesh.triangles[t];
     const Vec3& a = body.surface[corners[0]];
     areas.push_back((body.surface[corners[1]] - a).cross(body.surface[corners[2]] - a));
-    for (const Index v : corners) shadings[mesh.patchOf(t) != kOuterPatch].normals[v] += areas.back();
+    for (const Index v : corners) shadings[isCutPatch(mesh.patchOf(t))].normals[v] += areas.back();
   }
   for (Shading& shading : shadings) shading.finish();
   marker.points.reserve(3 * mesh.triangles.size());
@@ -106,7 +106,7 @@ void addBody(const BodySnapshot& body, Marker& marker) {
     const Triangle& corners = mesh.triangles[t];
     const double area = areas[t].norm();
     if (!hasArea(area, body.surface[corners[0]], body.surface[corners[1]], body.surface[corners[2]])) continue;
-    const bool cut = mesh.patchOf(t) != kOuterPatch;
+    const bool cut = isCutPatch(mesh.patchOf(t));
     const Vec3 flat = areas[t] / area;
     for (const Index v : corners) {
       const bool smooth = shadings[cut].normals[v].dot(flat) > kSmoothUpTo;

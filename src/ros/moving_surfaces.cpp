@@ -26,7 +26,7 @@ meshless_surgery::BodyTopology toTopology(const BodySnapshot& body) {
   message.cut.reserve(mesh.triangles.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     for (const Index v : mesh.triangles[t]) message.triangles.push_back(static_cast<std::uint32_t>(v));
-    message.cut.push_back(mesh.patchOf(t) != kOuterPatch ? 1 : 0);
+    message.cut.push_back(isCutPatch(mesh.patchOf(t)) ? 1 : 0);
   }
   message.regions = surfaceRegions(*body.model);
   message.region_colors = regionColors(*body.model);

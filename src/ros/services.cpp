@@ -372,6 +372,7 @@ struct Services::Handlers : Answers {
     response.mass = body->model->mass;
     response.clusters = body->model->clusters.size();
     response.tetrahedra = static_cast<std::uint32_t>(body->tetrahedra);
+    response.cavities = toCavities(body->measures);
     return accept(response, request.name + (request.rest ? " at rest" : " as it is now"));
   }
 

@@ -40,7 +40,7 @@ bool writeObj(const std::string& path, const std::string& comment, const Triangl
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Writes liver.obj, kidney.obj, fish.obj, skin.obj and block.obj.");
+  CLI::App app("Writes liver.obj, kidney.obj, fish.obj, bladder.obj, skin.obj and block.obj.");
   std::string folder;
   unsigned seed = 1;
   app.add_option("--out", folder, "folder to write into; it must exist")->required()->check(CLI::ExistingDirectory);
@@ -52,6 +52,7 @@ int main(int argc, char** argv) {
   const bool written = writeObj(folder + "/liver.obj", seeded, meshless::liverMesh(seed)) &&
                        writeObj(folder + "/kidney.obj", seeded, meshless::kidneyMesh(seed)) &&
                        writeObj(folder + "/fish.obj", seeded, meshless::fishMesh(seed)) &&
+                       writeObj(folder + "/bladder.obj", fixed, meshless::bladderMesh()) &&
                        writeObj(folder + "/skin.obj", fixed, meshless::skinSlabMesh()) &&
                        writeObj(folder + "/block.obj", fixed, meshless::block32Mesh());
   return written ? 0 : 1;

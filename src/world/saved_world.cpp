@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "meshless_surgery/body/cavities.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/cell_regions.h"
 #include "meshless_surgery/geometry/cut_lattice.h"
@@ -328,6 +329,14 @@ std::string faultOf(const BodyModel& m, const BodyState& s) {
       s.surface.size() != m.surface.vertices.size() || (!s.plastic.empty() && s.plastic.size() != clusters) ||
       (!s.eased.empty() && s.eased.size() != particles))
     return "a body's state is not that of its model";
+  for (const FilledCavity& c : s.cavities) {
+    const bool there = m.cavities && std::any_of(m.cavities->shells.begin(), m.cavities->shells.end(),
+                                                 [&](const Cavities::Shell& shell) { return shell.patch == c.patch; });
+    if (!there || !(std::abs(c.pressure) <= 1e50) || !(c.content >= 0.0 && c.content <= 1e50) ||
+        !(c.compliance >= 0.0 && c.compliance <= 1e50) || !(c.leak > 0.0 && c.leak <= 3600.0) ||
+        !(c.filled_for >= 0.0) || !(c.open_for >= 0.0))
+      return "a body's cavities are filled with what cannot be";
+  }
   if (s.unwinding && (m.any_fixed || clusters < 2)) return "a body that is held or of one cluster unwinds";
   return "";
 }
@@ -375,6 +384,7 @@ void ModelTable::readOne(InArchive& archive) {
     model->tissue = cornersWithTissue(*model->lattice);
     makeClamp(*model);
   }
+  makeCavities(*model);
   if (!model->elastic.empty() && model->lattice) {
     model->cells = std::make_shared<ElasticCells>(elasticCellsOf(*model));
     model->elastic_batch = std::make_shared<ElasticBatch>(*model->cells);

@@ -195,14 +195,15 @@ void serialize(A& archive, CollisionSurface& v) {
   auto& [mesh, binding, distance] = v;
   archive(mesh, binding, distance);
 }
-/// elastic_batch, cells, clamp and tissue are made again by whoever reads, once all is checked; empty until then.
+/// elastic_batch, cells, clamp, tissue and cavities are made again by whoever reads, once all is checked; empty until
+/// then.
 template <class A>
 void serialize(A& archive, BodyModel& v) {
   auto& [rest, masses, match_masses, fixed, any_fixed, graph, clusters, shape, elastic, elastic_batch, lattice,
          cell_mass, regions, cells, clamp_points, clamp, tissue, most_spread_inverse, specific_stiffness,
-         poissons_ratio, highest_frequency, surface, binding, collision, solid, incised, spacing, rest_volume,
+         poissons_ratio, highest_frequency, surface, binding, collision, cavities, solid, incised, spacing, rest_volume,
          rest_area, mass, next_patch] = v;
-  (void)elastic_batch, (void)cells, (void)clamp, (void)tissue;
+  (void)elastic_batch, (void)cells, (void)clamp, (void)tissue, (void)cavities;
   auto of_contact = collision ? *collision : CollisionSurface();
   auto of_cells = lattice ? *lattice : CellLattice();
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
@@ -231,13 +232,18 @@ void serialize(A& archive, PlasticShape& v) {
   archive(stretch, inverse, stiffening);
 }
 template <class A>
+void serialize(A& archive, FilledCavity& v) {
+  auto& [patch, pressure, content, compliance, leak, filled_for, open_for] = v;
+  archive(patch, pressure, content, compliance, leak, filled_for, open_for);
+}
+template <class A>
 void serialize(A& archive, BodyState& v) {
   auto& [positions, velocities, poses, surface, swelling, stretch, pace, stiffened, substep, plastic, eased, eased_for,
-         eased_whole, unwinding, placed] = v;
+         eased_whole, unwinding, cavities, placed] = v;
   // Whether the surface is up to date depends on when it was read. The fields that follow do not.
   if constexpr (!std::is_same_v<A, HashArchive>) archive(surface);
   archive(positions, velocities, poses, swelling, stretch, pace, stiffened, substep, plastic, eased, eased_for,
-          eased_whole, unwinding, placed);
+          eased_whole, unwinding, cavities, placed);
 }
 template <class A>
 void serialize(A& archive, ClusterOptions& v) {
@@ -262,12 +268,17 @@ void serialize(A& archive, CollisionChoice& v) {
   archive(choice(v.kind, CollisionChoice::Kind::kEdge), v.edge);
 }
 template <class A>
+void serialize(A& archive, CavityFill& v) {
+  auto& [kind, pressure, volume, compliance, leak] = v;
+  archive(choice(kind, CavityFill::Kind::kVolume), pressure, volume, compliance, leak);
+}
+template <class A>
 void serialize(A& archive, BodyDef& v) {
-  auto& [name, mesh, solid, thickness, pose, spacing, resolution, clusters, collision, material, fixed, regions, copy,
-         notes, warnings] = v;
+  auto& [name, mesh, solid, thickness, pose, spacing, resolution, clusters, collision, material, fixed, cavities,
+         regions, copy, notes, warnings] = v;
   (void)regions, (void)thickness;  // the model has them
   archive(name, mesh, solid, pose, spacing, choice(resolution, Resolution::kFine), clusters, collision, material, fixed,
-          copy, notes, warnings);
+          cavities, copy, notes, warnings);
 }
 template <class A>
 void serialize(A& archive, ObstacleDef& v) {

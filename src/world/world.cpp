@@ -5,6 +5,7 @@
 #include <cstring>
 #include <sstream>
 
+#include "meshless_surgery/body/cavities.h"
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/tetrahedralize.h"
@@ -63,6 +64,8 @@ const char* toString(EventType type) {
       return "detached";
     case EventType::kTorn:
       return "torn";
+    case EventType::kLeak:
+      return "leak";
   }
   return "unknown";
 }
@@ -328,6 +331,7 @@ Result<BodySnapshot> World::inspect(const std::string& name, bool rest) {
       for (Vec3& p : *points) p = placed * p;
     b.measures.volume = body->model->rest_volume;
     b.measures.area = surfaceArea(body->model->surface);
+    b.measures.cavities = measureCavities(*body->model, body->state.cavities, body->model->rest);
   }
   b.tetrahedra = body->mesh->tetrahedra.size();
   return b;

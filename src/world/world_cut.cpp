@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <sstream>
 
+#include "meshless_surgery/body/cavities.h"
 #include "meshless_surgery/body/ease.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
@@ -191,6 +193,18 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
   return reply;
 }
 
+void World::Impl::sayLeaks(const std::string& name, const BodyModel& model, const BodyState& state) {
+  const std::vector<BodyMeasures::Cavity> measures = measureCavities(model, state.cavities, state.positions);
+  for (std::size_t c = 0; c < measures.size(); ++c) {
+    const FilledCavity& cavity = state.cavities[c];
+    if (!measures[c].open || cavity.open_for > 0.0) continue;
+    std::ostringstream text;
+    text << "a cavity of " << name << " is open: its pressure of " << cavity.pressure << " Pa falls to 0 in "
+         << cavity.leak << " s";
+    say(EventType::kLeak, name, 0, text.str());
+  }
+}
+
 Status World::Impl::checkPieces(std::size_t gone, std::size_t come) const {
   std::size_t pieces = 0;
   for (const auto& body : bodies) pieces += body->model->next_patch > 1;
@@ -223,6 +237,7 @@ std::vector<std::string> World::Impl::replaceByPieces(const BodyId& parent_id, s
     while (used_names.count(name));
     descents.push_back(descentOf(piece));
     WorldBody& child = admit(name, material, std::move(piece.model), std::move(piece.state));
+    sayLeaks(name, *child.model, child.state);
     child.touched_by_push = touched;
     descents.back().child = child.id;
     names.push_back(name);

@@ -1,5 +1,7 @@
 // The last line: a body whose coordinates are no numbers any more, or out of all bounds, starts anew from rest where it
 // was. Nothing is known to bring it about but what overflows, and a trainee's scene must outlive that too.
+#include <cmath>
+
 #include "meshless_surgery/dynamics/extent.h"
 #include "world_impl.h"
 
@@ -31,6 +33,10 @@ void restAnew(WorldBody& body) {
   state.plastic.clear();
   state.eased.clear();
   state.eased_for = 0.0;
+  for (FilledCavity& cavity : state.cavities) {
+    if (cavity.compliance > 0.0 || !std::isfinite(cavity.pressure)) cavity.pressure = 0.0;
+    cavity.filled_for = 0.0;
+  }
   state.unwinding = false;
 }
 

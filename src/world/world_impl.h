@@ -324,6 +324,9 @@ struct World::Impl {
   void wakePushed(double h_frame);
   void fallAsleep(double h_frame);
   void mendFaults();
+  void emptyCavities();
+  /// Of a body that a blade has just made or opened.
+  void sayLeaks(const std::string& name, const BodyModel& model, const BodyState& state);
   void findWound();
   void closeBlades();
   void showBlades(const ClosingCut& cut);

@@ -100,6 +100,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
       surface_contacts.forget(body.number);
       batches_current = contacts_current = false;  // they are of the old model
       say(EventType::kIncised, name, 0, "opened");
+      sayLeaks(name, *body.model, body.state);
     } else {
       const std::vector<std::string> names = replaceByPieces(opened.id, std::move(opened.body.pieces));
       reply.new_bodies.insert(reply.new_bodies.end(), names.begin(), names.end());

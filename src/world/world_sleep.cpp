@@ -26,6 +26,11 @@ double wayFromRest(const WorldBody& body) {
   return std::sqrt(most);
 }
 
+bool leaks(const WorldBody& body) {
+  return std::any_of(body.state.cavities.begin(), body.state.cavities.end(),
+                     [](const FilledCavity& cavity) { return cavity.open_for > 0.0; });
+}
+
 /// Less than a cell of tissue: it rocks on a point, and whoever sleeps on it does not mind.
 bool isCrumb(const WorldBody& body) {
   return body.model->mass < body.material.density * std::pow(body.model->spacing, 3);
@@ -100,7 +105,7 @@ void World::Impl::fallAsleep(double h_frame) {
     const Index r = joined.find(b);
     double most = size[r];
     if (gravity > 0.0) most = std::min(most, 0.5 * gravity * kStillFor * kStillFor);
-    if (wayFromRest(body) <= kStillShare * most) {
+    if (wayFromRest(body) <= kStillShare * most && !leaks(body)) {
       body.still_for += h_frame;
     } else {
       body.still_for = 0.0;

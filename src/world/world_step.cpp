@@ -82,6 +82,7 @@ void World::Impl::clearForces() {
 void World::Impl::finishStep(double h_frame) {
   mendFaults();
   tearFibres();
+  emptyCavities();
   findWound();
   for (Pick& pick : picks)
     if (const WorldBody* body = find(pick.body)) pick.position = graspMean(pick, body->state.positions) + pick.offset;
@@ -91,6 +92,19 @@ void World::Impl::finishStep(double h_frame) {
   report.bodies = bodies.size();
   for (const auto& body : bodies) report.asleep += body->asleep;
   report.tetrahedralizations = tetrahedralizations;
+}
+
+// What was opened and has no pressure left is filled no more.
+void World::Impl::emptyCavities() {
+  for (WorldBody* body : awake) {
+    std::vector<FilledCavity>& cavities = body->state.cavities;
+    if (cavities.empty()) continue;
+    const auto gone = std::remove_if(cavities.begin(), cavities.end(),
+                                     [](const FilledCavity& cavity) { return cavity.open_for >= cavity.leak; });
+    for (auto cavity = gone; cavity != cavities.end(); ++cavity)
+      say(EventType::kLeak, body->name, 0, "a cavity of " + body->name + " has leaked out");
+    cavities.erase(gone, cavities.end());
+  }
 }
 
 void World::Impl::matchAlone(WorldBody& body, double h, MatchCounters& counters, const ForEach& each) const {

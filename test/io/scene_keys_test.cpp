@@ -47,6 +47,7 @@ const std::map<std::string, std::vector<std::string>> kMaps = {
     {"primitive", {"{bodies: [{$ primitive: {@}}]}"}},
     {"pose", {kBody + "pose: {@}}]}"}},
     {"clusters", {kBody + "clusters: {@}}]}"}},
+    {"cavities", {kBody + "cavities: {@}}]}"}},
     {"copies", {kBody + "copies: {@}}]}"}},
     {"fixed", {kBody + "fixed: [{@}]}]}"}},
     {"regions", {kBody + "regions: [{@}]}]}"}},
@@ -151,6 +152,7 @@ std::vector<Row> rows() {
       {"a body", "units: cm", "", READ(volume(s.body.mesh)), "1e-06"},
       {"a body", "spacing: 0.02", "", READ(s.body.spacing), "0.02"},
       {"a body", "thickness: 0.02", "", READ(s.body.thickness), "0.02"},
+      {"a body", "cavities: {pressure: 20}", "", READ(s.body.cavities.pressure), "20"},
       {"a body", "resolution: fine", "", READ(static_cast<int>(s.body.resolution)), "2"},
       {"a body", "edge: 0.4, primitive: {sphere: 1}", "primitive: {sphere: 1}", READ(triangles(s.body.mesh)),
        text(trianglesOfSphere(0.4))},
@@ -254,6 +256,11 @@ std::vector<Row> rows() {
       {"plasticity", "yield: 0.123", "", MATERIAL(plasticity.yield), "0.123"},
       {"plasticity", "creep: 3", "", MATERIAL(plasticity.creep), "3"},
       {"plasticity", "maximum: 0.123", "", MATERIAL(plasticity.maximum), "0.123"},
+
+      {"cavities", "pressure: 20", "volume: 20", READ(s.body.cavities.pressure), "20"},
+      {"cavities", "volume: 20", "compliance: 0.5", READ(s.body.cavities.volume), "2e-05"},
+      {"cavities", "compliance: 0.5", "volume: 20", READ(s.body.cavities.compliance), "5e-07"},
+      {"cavities", "leak: 3, volume: 20", "volume: 20", READ(s.body.cavities.leak), "3"},
 
       {"an obstacle", "name: abc", "", READ(s.scene.obstacles.at(0).name), "abc"},
       {"an obstacle", "file: ../box.obj", "primitive: {sphere: 1}", READ(volume(s.scene.obstacles.at(0).mesh)), "6"},

@@ -49,6 +49,13 @@ inline Vec3 embeddedPosition(const SurfaceBinding& binding, const Points& positi
 /// plane, all stay. For contact, which asks how a vertex moves in every substep, and wants no smooth surface.
 SurfaceBinding fewerCarriers(const SurfaceBinding& binding, const Points& rest, double spacing);
 
+/// Where the carriers have the vertices, without levers [m].
+void carriedPlaces(const SurfaceBinding& binding, const Points& positions, Points& places);
+
+/// What pulls at vertices, as what pulls at the particles that they follow: adds it. Without levers it has the same
+/// force and torque.
+void addToParticles(const SurfaceBinding& binding, const Points& of_vertices, Points& of_particles);
+
 /// Where contact takes the vertices of model.collision to be, which must be there [m].
 Points collisionPlaces(const BodyModel& model, const Points& positions);
 

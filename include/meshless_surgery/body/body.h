@@ -41,6 +41,20 @@ struct CollisionSurface {
   double distance = 0.0;  // [m] from the visual surface, at most
 };
 
+/// The filled cavities of a body as surfaces of their own, which turn and move with its particles: no levers. They are
+/// of the surface for contact, or of the visual one where there is no other.
+struct Cavities {
+  struct Shell {
+    std::uint32_t patch = kCavityPatch;  // of its faces
+    std::vector<Triangle> triangles;     // closed, outwards of the cavity: where it is open, with lids
+    bool open = false;                   // a blade has joined it with the outside
+    double rest_volume = 0.0;            // [m^3] of the visual surface
+    double share = 1.0;                  // that over the volume within `triangles` at rest
+  };
+  std::vector<Shell> shells;  // patches ascending
+  SurfaceBinding binding;     // of their vertices
+};
+
 /// Constant while it lives: rest shape, topology, clusters, masses.
 struct BodyModel {
   Points rest;                 // [m] particles
@@ -64,7 +78,7 @@ struct BodyModel {
   std::vector<ClampPoint> clamp_points;               // of it: where free tissue ends at what is held
   std::shared_ptr<const Clamp> clamp;                 // of them; null where there are none
   bool isHeld() const { return any_fixed || clamp; }  // it has no rigid motion of its own
-  std::vector<bool> tissue;     // one a corner of it: no ghost; empty where all particles are tissue
+  std::vector<bool> tissue;  // one a corner of it: no ghost; empty where all particles are tissue
   /// [1/m^2] norm of ElasticRest::spread_inverse: what a cut leaves of a cell can be narrower, so that its stress would
   /// need a shorter step. It resists as a flat cluster does.
   double most_spread_inverse = std::numeric_limits<double>::infinity();
@@ -74,6 +88,7 @@ struct BodyModel {
   TriangleMesh surface;             // rest positions of the vertices [m]
   SurfaceBinding binding;
   std::shared_ptr<const CollisionSurface> collision;  // null: contact takes the visual surface
+  std::shared_ptr<const Cavities> cavities;           // null: none is filled
   bool solid = true;
   bool incised = false;          // it has wound faces, which can press on each other
   double spacing = 0.0;          // [m] between interior particles
@@ -106,6 +121,19 @@ std::vector<std::uint8_t> surfaceRegions(const BodyModel& model);
 
 using BodyModelPtr = std::shared_ptr<const BodyModel>;
 
+/// What fills a cavity.
+struct FilledCavity {
+  std::uint32_t patch = kCavityPatch;  // of its faces, one of those of BodyModel::cavities
+  double pressure = 0.0;               // [Pa] more than around the body; of an open one: when it was opened
+  double content = 0.0;                // [m^3] without pressure
+  double compliance = 0.0;             // [m^3/Pa] 0: the pressure is held
+  double leak = 1.0;                   // [s]
+  double filled_for = 0.0;             // [s]
+  double open_for = 0.0;               // [s]
+
+  double pressureNow() const;  // [Pa]
+};
+
 /// Changes with every step.
 struct BodyState {
   Points positions;   // [m]
@@ -120,9 +148,10 @@ struct BodyState {
   std::vector<PlasticShape> plastic;  // one a cluster once something has flowed; empty before
   Points eased;            // [m/s^2] one a particle where a cut lets go of it little by little, else empty; see ease.h
   double eased_for = 0.0;  // [s] since that cut
-  bool eased_whole = false;  // what is eased may have a force and a torque
-  bool unwinding = false;    // it was wound up in itself, and goes back to its shape; see unwind.h
-  Pose placed;               // where the rest shape was put: what is held stays there
+  bool eased_whole = false;            // what is eased may have a force and a torque
+  bool unwinding = false;              // it was wound up in itself, and goes back to its shape; see unwind.h
+  std::vector<FilledCavity> cavities;  // those that are filled still
+  Pose placed;                         // where the rest shape was put: what is held stays there
 };
 
 inline MatchInput matchInput(const BodyModel& model, const BodyState& state) {
@@ -159,6 +188,12 @@ struct BodyMeasures {
   Vec3 linear_momentum = Vec3::Zero();   // [kg m/s]
   Vec3 angular_momentum = Vec3::Zero();  // [kg m^2/s] about the centre of mass
   double kinetic_energy = 0.0;           // [J]
+  struct Cavity {
+    double volume = 0.0;    // [m^3]
+    double pressure = 0.0;  // [Pa]
+    bool open = false;
+  };
+  std::vector<Cavity> cavities;  // that are filled
 };
 /// Needs state.surface to be up to date for volume and area.
 BodyMeasures measureBody(const BodyModel& model, const BodyState& state);

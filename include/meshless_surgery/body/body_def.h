@@ -1,6 +1,7 @@
 // What a user chose of a body, before anything is built from it.
 #pragma once
 
+#include "meshless_surgery/base/result.h"
 #include "meshless_surgery/dynamics/clusters.h"
 #include "meshless_surgery/dynamics/material.h"
 #include "meshless_surgery/geometry/region.h"
@@ -34,6 +35,23 @@ struct CollisionChoice {
   double edge = 0.0;
 };
 
+/// What fills the cavities of a body.
+struct CavityFill {
+  enum class Kind { kEmpty, kPressure, kVolume };
+  Kind kind = Kind::kEmpty;
+  double pressure = 0.0;  // [Pa] 0..1e6, more than around the body: held
+  /// [m^3] above 0 to 1e3, of what fills all of them together, each by its share of their volume, where it is under no
+  /// pressure; 0: as much as they hold at rest.
+  double volume = 0.0;
+  double compliance = 0.0;  // [m^3/Pa] above 0 to 1, of each; 0: kCavityCompliance of its volume at rest
+  double leak = 1.0;        // [s] above 0 to 3600 in which the pressure falls to 0 once a cavity is open
+
+  bool empty() const { return kind == Kind::kEmpty; }
+  Status validate() const;
+};
+/// [1/Pa] Much more than water's, little enough that a thousand Pa take a thousandth of the volume.
+constexpr double kCavityCompliance = 1e-6;
+
 /// How finely a body is divided where no spacing is given: medium keeps an elastic body to a twentieth of one thread's
 /// time, the others are 1.5 times as coarse or as fine.
 enum class Resolution { kCoarse, kMedium, kFine };
@@ -50,6 +68,7 @@ struct BodyDef {
   CollisionChoice collision;
   Material material;
   std::vector<HeldRegion> fixed;
+  CavityFill cavities;
   std::vector<TissueRegion> regions;  // where several are, the last one counts; up to 100
   bool copy = false;                  // the same as the body before it in its scene, but for name and pose
   std::vector<std::string> notes;     // what reading and repairing said

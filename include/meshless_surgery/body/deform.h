@@ -18,13 +18,14 @@ struct StepScratch {
   Points goals;
   ClampStep clamp;
   ElasticBatchState elastic;
+  Points cavity, cavity_pull;            // of its vertices, and of the particles
   std::vector<TouchedParticle> touched;  // of a body that preserves its size
   /// Of a row of substeps in which nobody else reads or writes poses: whether this is the last one, and then they are
   /// written. Until then rotations stay in `elastic`.
   bool last = true;
   bool under_way = false;
-  double load = 0.0;             // [N] that presses a body which lies on what does not move
-  Vec3 load_at = Vec3::Zero();   // [m] the middle of it
+  double load = 0.0;            // [N] that presses a body which lies on what does not move
+  Vec3 load_at = Vec3::Zero();  // [m] the middle of it
 };
 
 /// Reads positions and velocities; writes positions, velocities, poses and scratch.previous: matches at y = x + h v,

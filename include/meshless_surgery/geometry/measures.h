@@ -10,6 +10,8 @@ namespace meshless {
 double surfaceArea(const Points& vertices, const std::vector<Triangle>& triangles);
 /// [m^3]; negative for an inside-out surface.
 double signedVolume(const Points& vertices, const std::vector<Triangle>& triangles);
+/// [m^2] how the volume of a closed surface grows as each vertex moves.
+Points volumeGradient(const Points& vertices, const std::vector<Triangle>& triangles);
 /// [m] of the enclosed solid; the mean of the vertices where the volume is zero.
 Vec3 solidCentroid(const Points& vertices, const std::vector<Triangle>& triangles);
 Box boundsOf(const Points& points);

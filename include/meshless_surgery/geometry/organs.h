@@ -10,6 +10,7 @@ namespace meshless {
 TriangleMesh liverMesh(unsigned seed = 1);   // about 0.22 m wide, two lobes, at least 4,000 triangles
 TriangleMesh kidneyMesh(unsigned seed = 1);  // about 0.11 m long, with its hilum
 TriangleMesh fishMesh(unsigned seed = 1);    // about 0.3 m long, head at +x, fins
+TriangleMesh bladderMesh();                  // 0.06 m long, hollow, its wall 3 mm thick
 TriangleMesh skinSlabMesh();                 // 0.2 x 0.2 x 0.01 m
 TriangleMesh block32Mesh();                  // 0.1 x 0.1 x 0.05 m; 32 triangles, and 32 tetrahedra about its centre
 

@@ -7,6 +7,10 @@ namespace meshless {
 
 /// The patch of triangles that came with the mesh; every cut adds patches of its own.
 constexpr std::uint32_t kOuterPatch = 0;
+/// The first of those of a body's filled cavities, which came with the mesh too.
+constexpr std::uint32_t kCavityPatch = std::uint32_t{1} << 31;
+inline bool isCavityPatch(std::uint32_t patch) { return patch >= kCavityPatch; }
+inline bool isCutPatch(std::uint32_t patch) { return patch != kOuterPatch && !isCavityPatch(patch); }
 
 struct TriangleMesh {
   Points vertices;                     // [m]

@@ -36,6 +36,9 @@ Result<std::map<std::string, Material>> readMaterials(const std::string& folder)
 /// `base` with the keys of a YAML map changed (mode, alpha, beta, density, damping, friction, color, inside_color).
 Result<Material> changeMaterial(const Material& base, const std::string& yaml);
 
+/// `empty`, or a YAML map {pressure: Pa}, {volume: ml, compliance: ml/Pa}, with leak: s. An empty text: empty.
+Result<CavityFill> readCavityFill(const std::string& yaml);
+
 /// Closed surface of a box {x, y, z}, sphere {radius} or cylinder {height, radius} [m], centred at the origin, with
 /// triangles of about `edge` [m]; 0: about 600 of them. Refuses other kinds and sizes that are not 1e-4 to 1000 m.
 Result<TriangleMesh> primitiveMesh(const std::string& kind, const std::vector<double>& sizes, double edge = 0.0);

@@ -20,6 +20,7 @@ struct SpawnRequest {
   std::string material;                   // empty: "default"
   MeshRepair repair = MeshRepair::kMend;  // of a file's surface
   double thickness = 0.0;                 // [m] of BodyDef
+  CavityFill cavities;
 };
 
 struct CloudRequest {

@@ -22,6 +22,7 @@ std_msgs::ColorRGBA toColor(const Color& color);
 Pose poseOf(const ScissorBlades& blades);
 ScissorBlades bladesAt(const Pose& pose, double length, double width);
 
+std::vector<meshless_surgery::CavityState> toCavities(const BodyMeasures& measures);
 std::vector<meshless_surgery::PickState> toPicks(const WorldSnapshot& snapshot);
 /// Needs a snapshot with measures.
 meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatus& status,

@@ -73,7 +73,8 @@ enum class EventType {
   kLoaded,
   kAttached,
   kDetached,
-  kTorn
+  kTorn,
+  kLeak
 };
 const char* toString(EventType type);
 

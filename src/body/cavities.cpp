@@ -1,0 +1,355 @@
+#include "meshless_surgery/body/cavities.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/nearest.h"
+#include "meshless_surgery/geometry/union_find.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kFillTime = 0.2;                           // [s] in which what fills a cavity comes in
+constexpr double kLeastContent = 0.1, kMostContent = 10.0;  // of the volume at rest
+
+// Which part of the surface each triangle is of: what hangs together by edges.
+std::vector<Index> partsOf(const std::vector<Triangle>& triangles) {
+  std::vector<std::array<Index, 3>> half;
+  half.reserve(3 * triangles.size());
+  for (Index t = 0; t < triangles.size(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      const auto [a, b] = std::minmax(triangles[t][k], triangles[t][(k + 1) % 3]);
+      half.push_back({a, b, t});
+    }
+  std::sort(half.begin(), half.end());
+  UnionFind parts(triangles.size());
+  for (std::size_t n = 1; n < half.size(); ++n)
+    if (half[n][0] == half[n - 1][0] && half[n][1] == half[n - 1][1]) parts.join(half[n][2], half[n - 1][2]);
+  std::vector<Index> part;
+  for (Index t = 0; t < triangles.size(); ++t) part.push_back(parts.find(t));
+  return part;
+}
+
+std::vector<Triangle> chosen(const std::vector<Triangle>& triangles, const std::vector<Index>& which) {
+  std::vector<Triangle> some;
+  for (const Index t : which) some.push_back(triangles[t]);
+  return some;
+}
+
+// The walls of a cavity, outwards of it, with a lid over each hole: a fan about the middle of its rim.
+struct Closed {
+  std::vector<Triangle> triangles;       // vertices from the mesh's count on are middles
+  std::vector<std::vector<Index>> rims;  // of each lid
+};
+
+Closed closedWalls(const TriangleMesh& mesh, std::uint32_t patch) {
+  Closed closed;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    if (mesh.patchOf(t) == patch)
+      closed.triangles.push_back({mesh.triangles[t][0], mesh.triangles[t][2], mesh.triangles[t][1]});
+  std::map<std::array<Index, 2>, int> edges;  // how often from the lower to the higher, less the other way round
+  for (const Triangle& t : closed.triangles)
+    for (int k = 0; k < 3; ++k) {
+      const Index a = t[k], b = t[(k + 1) % 3];
+      edges[{std::min(a, b), std::max(a, b)}] += a < b ? 1 : -1;
+    }
+  UnionFind rims(mesh.vertices.size());
+  for (const auto& [edge, count] : edges)
+    if (count != 0) rims.join(edge[0], edge[1]);
+  std::map<Index, Index> lid_of;  // of a rim
+  for (const auto& [edge, count] : edges) {
+    if (count == 0) continue;
+    const Index lid = lid_of.emplace(rims.find(edge[0]), static_cast<Index>(lid_of.size())).first->second;
+    if (lid == closed.rims.size()) closed.rims.emplace_back();
+    closed.rims[lid].insert(closed.rims[lid].end(), edge.begin(), edge.end());
+    const Index middle = static_cast<Index>(mesh.vertices.size()) + lid;
+    for (int n = 0; n < std::abs(count); ++n)
+      closed.triangles.push_back(count > 0 ? Triangle{edge[1], edge[0], middle} : Triangle{edge[0], edge[1], middle});
+  }
+  for (std::vector<Index>& rim : closed.rims) {
+    std::sort(rim.begin(), rim.end());
+    rim.erase(std::unique(rim.begin(), rim.end()), rim.end());
+  }
+  return closed;
+}
+
+double volumeWithin(const TriangleMesh& mesh, const Closed& closed) {
+  Points places = mesh.vertices;
+  for (const std::vector<Index>& rim : closed.rims) {
+    places.push_back(Vec3::Zero());
+    for (const Index v : rim) places.back() += mesh.vertices[v] / static_cast<double>(rim.size());
+  }
+  return signedVolume(places, closed.triangles);
+}
+
+// Vertices of walls and lids one after another, bound as those of a surface are.
+class WallBinder {
+ public:
+  WallBinder(const SurfaceBinding& surface, std::size_t vertices)
+      : surface_(surface), row_(vertices, kNoIndex), number_(vertices, kNoIndex) {
+    for (Index r = 0; r < surface.embedded.size(); ++r) row_[surface.embedded[r]] = r;
+    walls_.offsets.push_back(0);
+  }
+
+  std::vector<Triangle> add(const Closed& closed) {
+    std::vector<Index> middles;
+    for (const std::vector<Index>& rim : closed.rims) {
+      middles.push_back(static_cast<Index>(walls_.particle.size()));
+      walls_.embedded.push_back(middles.back());
+      walls_.particle.push_back(kNoIndex);
+      std::map<Index, double> weights;
+      for (const Index v : rim)
+        each(v, [&](Index particle, double weight) { weights[particle] += weight / static_cast<double>(rim.size()); });
+      for (const auto& [particle, weight] : weights) addCarrier(particle, weight);
+      walls_.offsets.push_back(static_cast<Index>(walls_.carriers.size()));
+    }
+    std::vector<Triangle> triangles = closed.triangles;
+    for (Triangle& t : triangles)
+      for (Index& v : t) v = v < number_.size() ? numberOf(v) : middles[v - number_.size()];
+    return triangles;
+  }
+
+  SurfaceBinding finish() { return std::move(walls_); }
+
+ private:
+  template <class Visit>
+  void each(Index v, const Visit& visit) const {
+    if (surface_.particle[v] != kNoIndex) return visit(surface_.particle[v], 1.0);
+    for (Index k = surface_.offsets[row_[v]]; k < surface_.offsets[row_[v] + 1]; ++k)
+      visit(surface_.carriers[k], surface_.weights[k]);
+  }
+  void addCarrier(Index particle, double weight) {
+    walls_.carriers.push_back(particle);
+    walls_.weights.push_back(weight);
+  }
+  Index numberOf(Index v) {
+    if (number_[v] != kNoIndex) return number_[v];
+    number_[v] = static_cast<Index>(walls_.particle.size());
+    walls_.particle.push_back(surface_.particle[v]);
+    if (surface_.particle[v] == kNoIndex) {
+      walls_.embedded.push_back(number_[v]);
+      each(v, [&](Index particle, double weight) { addCarrier(particle, weight); });
+      walls_.offsets.push_back(static_cast<Index>(walls_.carriers.size()));
+    }
+    return number_[v];
+  }
+
+  const SurfaceBinding& surface_;
+  std::vector<Index> row_, number_;
+  SurfaceBinding walls_;
+};
+
+std::set<std::uint32_t> cavityPatches(const TriangleMesh& mesh) {
+  std::set<std::uint32_t> patches;
+  for (const std::uint32_t patch : mesh.patches)
+    if (isCavityPatch(patch)) patches.insert(patch);
+  return patches;
+}
+
+const Cavities::Shell* shellOf(const BodyModel& model, std::uint32_t patch) {
+  if (!model.cavities) return nullptr;
+  for (const Cavities::Shell& shell : model.cavities->shells)
+    if (shell.patch == patch) return &shell;
+  return nullptr;
+}
+
+// 0..1 of what is to come in.
+double filledShare(const FilledCavity& cavity) {
+  return cavity.filled_for < kFillTime ? 0.5 - 0.5 * std::cos(M_PI * cavity.filled_for / kFillTime) : 1.0;
+}
+
+}  // namespace
+
+Status CavityFill::validate() const {
+  const auto outOfRange = [](const std::string& key, double value, const std::string& accepted) {
+    std::ostringstream text;
+    text << "cavities: " << key << " is " << value << "; accepted: " << accepted;
+    return Error{ErrorCode::kInvalidArgument, text.str()};
+  };
+  if (!(pressure >= 0.0 && pressure <= 1e6)) return outOfRange("pressure", pressure, "0 to 1e6 Pa");
+  if (!(volume >= 0.0 && volume <= 1e3)) return outOfRange("volume", volume, "above 0 to 1e3 m^3");
+  if (!(compliance >= 0.0 && compliance <= 1.0)) return outOfRange("compliance", compliance, "above 0 to 1 m^3/Pa");
+  if (!(leak > 0.0 && leak <= 3600.0)) return outOfRange("leak", leak, "above 0 to 3600 s");
+  return Done{};
+}
+
+double FilledCavity::pressureNow() const {
+  return pressure * (compliance > 0.0 ? 1.0 : filledShare(*this)) * std::max(0.0, 1.0 - open_for / leak);
+}
+
+std::vector<std::vector<Index>> cavitiesOf(const TriangleMesh& mesh) {
+  const std::vector<Index> part = partsOf(mesh.triangles);
+  std::map<Index, std::vector<Index>> triangles;  // a part's number is its first triangle
+  for (Index t = 0; t < part.size(); ++t) triangles[part[t]].push_back(t);
+  std::vector<std::vector<Index>> cavities;
+  if (triangles.size() < 2) return cavities;
+  for (auto& [first, all] : triangles)
+    if (signedVolume(mesh.vertices, chosen(mesh.triangles, all)) < 0.0) cavities.push_back(std::move(all));
+  return cavities;
+}
+
+std::vector<double> markCavities(TriangleMesh& mesh) {
+  std::vector<double> volumes;
+  mesh.patches.resize(mesh.triangles.size(), kOuterPatch);
+  for (const std::vector<Index>& cavity : cavitiesOf(mesh)) {
+    for (const Index t : cavity) mesh.patches[t] = kCavityPatch + static_cast<std::uint32_t>(volumes.size());
+    volumes.push_back(-signedVolume(mesh.vertices, chosen(mesh.triangles, cavity)));
+  }
+  return volumes;
+}
+
+bool markCavities(const TriangleMesh& visual, TriangleMesh& collision) {
+  const std::vector<std::vector<Index>> cavities = cavitiesOf(collision);
+  const std::set<std::uint32_t> patches = cavityPatches(visual);
+  if (cavities.size() != patches.size()) return false;
+  Points walls;
+  std::vector<std::uint32_t> patch_of;
+  for (std::size_t t = 0; t < visual.triangles.size(); ++t)
+    if (isCavityPatch(visual.patches[t]))
+      for (const Index v : visual.triangles[t]) {
+        walls.push_back(visual.vertices[v]);
+        patch_of.push_back(visual.patches[t]);
+      }
+  const NearestPoints nearest(walls);
+  std::vector<std::uint32_t> marks(collision.triangles.size(), kOuterPatch);
+  std::set<std::uint32_t> found;
+  for (const std::vector<Index>& cavity : cavities) {
+    std::map<std::uint32_t, std::size_t> votes;
+    for (const Index t : cavity)
+      ++votes[patch_of[nearest.nearest(collision.vertices[collision.triangles[t][0]], 1)[0]]];
+    const auto most =
+        std::max_element(votes.begin(), votes.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+    for (const Index t : cavity) marks[t] = most->first;
+    found.insert(most->first);
+  }
+  if (found != patches) return false;
+  collision.patches = std::move(marks);
+  return true;
+}
+
+void makeCavities(BodyModel& model) {
+  model.cavities.reset();
+  const std::set<std::uint32_t> patches = cavityPatches(model.surface);
+  if (patches.empty()) return;
+  const std::vector<Index> part = partsOf(model.surface.triangles);
+  std::vector<char> outside(part.size(), 0);  // of a part: it has faces that no cavity and no blade has made
+  for (std::size_t t = 0; t < part.size(); ++t)
+    if (model.surface.patches[t] == kOuterPatch) outside[part[t]] = 1;
+  std::set<std::uint32_t> open;
+  for (std::size_t t = 0; t < part.size(); ++t)
+    if (isCavityPatch(model.surface.patches[t]) && outside[part[t]]) open.insert(model.surface.patches[t]);
+
+  const bool by_contact = model.collision && cavityPatches(model.collision->mesh) == patches;
+  const TriangleMesh& carrier = by_contact ? model.collision->mesh : model.surface;
+  WallBinder binder(by_contact ? model.collision->binding : model.binding, carrier.vertices.size());
+  auto cavities = std::make_shared<Cavities>();
+  for (const std::uint32_t patch : patches) {
+    const Closed walls = closedWalls(carrier, patch);
+    Cavities::Shell shell;
+    shell.patch = patch;
+    shell.open = open.count(patch) > 0;
+    const double carried = volumeWithin(carrier, walls);
+    shell.rest_volume = by_contact ? volumeWithin(model.surface, closedWalls(model.surface, patch)) : carried;
+    const double share = shell.rest_volume / carried;
+    if (share > 0.5 && share < 2.0) shell.share = share;
+    shell.triangles = binder.add(walls);
+    cavities->shells.push_back(std::move(shell));
+  }
+  cavities->binding = fewerCarriers(binder.finish(), model.rest, model.spacing);
+  model.cavities = std::move(cavities);
+}
+
+Result<std::vector<FilledCavity>> filledCavities(const BodyModel& model, const CavityFill& fill) {
+  std::vector<FilledCavity> filled;
+  if (fill.empty() || !model.cavities) return filled;
+  double all = 0.0;
+  for (const Cavities::Shell& shell : model.cavities->shells) all += shell.rest_volume;
+  const double wanted = fill.volume > 0.0 ? fill.volume / all : 1.0;
+  if (!(wanted >= kLeastContent && wanted <= kMostContent)) {
+    std::ostringstream text;
+    text << "cavities: volume is " << 1e6 * fill.volume << " ml; accepted: " << 1e6 * kLeastContent * all << " to "
+         << 1e6 * kMostContent * all << " ml, for they hold " << 1e6 * all << " ml at rest";
+    return Error{ErrorCode::kInvalidArgument, text.str()};
+  }
+  for (const Cavities::Shell& shell : model.cavities->shells) {
+    FilledCavity cavity;
+    cavity.patch = shell.patch;
+    cavity.leak = fill.leak;
+    if (fill.kind == CavityFill::Kind::kPressure) {
+      cavity.pressure = fill.pressure;
+    } else {
+      cavity.content = wanted * shell.rest_volume;
+      cavity.compliance = fill.compliance > 0.0 ? fill.compliance : kCavityCompliance * shell.rest_volume;
+    }
+    filled.push_back(cavity);
+  }
+  return filled;
+}
+
+std::vector<FilledCavity> inheritedCavities(const std::vector<FilledCavity>& parent, const BodyModel& piece) {
+  std::vector<FilledCavity> filled;
+  for (FilledCavity cavity : parent) {
+    const Cavities::Shell* shell = shellOf(piece, cavity.patch);
+    if (!shell) continue;
+    if (shell->open && !(cavity.open_for > 0.0)) {
+      cavity.pressure = cavity.pressureNow();
+      cavity.compliance = 0.0;
+      cavity.filled_for = kFillTime;
+    }
+    filled.push_back(cavity);
+  }
+  return filled;
+}
+
+void pressCavities(const BodyModel& model, double factor, double h, BodyState& state, StepScratch& scratch) {
+  const Points& before = scratch.previous;
+  Points& x = state.positions;
+  Points& pull = scratch.cavity_pull;
+  carriedPlaces(model.cavities->binding, before, scratch.cavity);
+  for (FilledCavity& cavity : state.cavities) {
+    const Cavities::Shell& shell = *shellOf(model, cavity.patch);
+    pull.assign(x.size(), Vec3::Zero());
+    addToParticles(model.cavities->binding, volumeGradient(scratch.cavity, shell.triangles), pull);
+    if (cavity.filled_for < kFillTime) cavity.filled_for += h;
+    if (shell.open) cavity.open_for += h;
+    double pressure = cavity.pressureNow();
+    if (cavity.compliance > 0.0) {
+      const double share = shell.share;  // of what is reported over what these walls hold
+      double on_its_way = share * signedVolume(scratch.cavity, shell.triangles), mobility = 0.0;
+      for (std::size_t i = 0; i < x.size(); ++i) {
+        on_its_way += share * pull[i].dot(x[i] - before[i]);
+        if (!model.fixed[i]) mobility += pull[i].squaredNorm() / model.masses[i];
+      }
+      const double content = shell.rest_volume + filledShare(cavity) * (cavity.content - shell.rest_volume);
+      pressure = (content - on_its_way) / (cavity.compliance + factor * h * h * share * mobility);
+      cavity.pressure = pressure;
+    }
+    const double rate = factor * h * pressure;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      if (model.fixed[i]) continue;
+      const Vec3 faster = rate / model.masses[i] * pull[i];
+      state.velocities[i] += faster;
+      x[i] += h * faster;
+    }
+  }
+}
+
+std::vector<BodyMeasures::Cavity> measureCavities(const BodyModel& model, const std::vector<FilledCavity>& filled,
+                                                  const Points& positions) {
+  std::vector<BodyMeasures::Cavity> measures;
+  if (filled.empty()) return measures;
+  Points places;
+  carriedPlaces(model.cavities->binding, positions, places);
+  for (const FilledCavity& cavity : filled) {
+    const Cavities::Shell& shell = *shellOf(model, cavity.patch);
+    measures.push_back({shell.share * signedVolume(places, shell.triangles), cavity.pressureNow(), shell.open});
+  }
+  return measures;
+}
+
+}  // namespace meshless
