@@ -87,7 +87,7 @@ double volumeWithin(const TriangleMesh& mesh, const Closed& closed) {
   return signedVolume(places, closed.triangles);
 }
 
-// Vertices of walls and lids one after another, bound as those of a surface are.
+// Vertices of walls, bound as those of a surface are, and then the middles of lids.
 class WallBinder {
  public:
   WallBinder(const SurfaceBinding& surface, std::size_t vertices)
@@ -96,44 +96,65 @@ class WallBinder {
     walls_.offsets.push_back(0);
   }
 
+  /// Vertices from kMiddle on are middles.
   std::vector<Triangle> add(const Closed& closed) {
-    std::vector<Index> middles;
-    for (const std::vector<Index>& rim : closed.rims) {
-      middles.push_back(static_cast<Index>(walls_.particle.size()));
-      walls_.embedded.push_back(middles.back());
-      walls_.particle.push_back(kNoIndex);
-      std::map<Index, double> weights;
-      for (const Index v : rim)
-        each(v, [&](Index particle, double weight) { weights[particle] += weight / static_cast<double>(rim.size()); });
-      for (const auto& [particle, weight] : weights) addCarrier(particle, weight);
-      walls_.offsets.push_back(static_cast<Index>(walls_.carriers.size()));
-    }
     std::vector<Triangle> triangles = closed.triangles;
+    const Index vertices = static_cast<Index>(number_.size()), middles = static_cast<Index>(rims_.size());
     for (Triangle& t : triangles)
-      for (Index& v : t) v = v < number_.size() ? numberOf(v) : middles[v - number_.size()];
+      for (Index& v : t) v = v < vertices ? numberOf(v) : kMiddle + middles + (v - vertices);
+    for (std::vector<Index> rim : closed.rims) {
+      for (Index& v : rim) v = numberOf(v);
+      rims_.push_back(std::move(rim));
+    }
     return triangles;
   }
 
-  SurfaceBinding finish() { return std::move(walls_); }
+  SurfaceBinding finish(const Points& rest, double spacing, std::vector<Cavities::Shell>& shells) {
+    // A middle is the mean of its rim, however many particles carry that.
+    SurfaceBinding binding = fewerCarriers(walls_, rest, spacing);
+    const SurfaceBinding walls = binding;
+    const Index first = static_cast<Index>(walls.particle.size());
+    std::vector<Index> row(first, kNoIndex);
+    for (Index r = 0; r < walls.embedded.size(); ++r) row[walls.embedded[r]] = r;
+    for (const std::vector<Index>& rim : rims_) {
+      std::map<Index, double> weights;
+      const double share = 1.0 / static_cast<double>(rim.size());
+      for (const Index v : rim) {
+        if (row[v] == kNoIndex) {
+          weights[walls.particle[v]] += share;
+          continue;
+        }
+        for (Index k = walls.offsets[row[v]]; k < walls.offsets[row[v] + 1]; ++k)
+          weights[walls.carriers[k]] += share * walls.weights[k];
+      }
+      binding.embedded.push_back(static_cast<Index>(binding.particle.size()));
+      binding.particle.push_back(kNoIndex);
+      for (const auto& [particle, weight] : weights) {
+        binding.carriers.push_back(particle);
+        binding.weights.push_back(weight);
+      }
+      binding.offsets.push_back(static_cast<Index>(binding.carriers.size()));
+    }
+    for (Cavities::Shell& shell : shells)
+      for (Triangle& t : shell.triangles)
+        for (Index& v : t)
+          if (v >= kMiddle) v = first + (v - kMiddle);
+    return binding;
+  }
 
  private:
-  template <class Visit>
-  void each(Index v, const Visit& visit) const {
-    if (surface_.particle[v] != kNoIndex) return visit(surface_.particle[v], 1.0);
-    for (Index k = surface_.offsets[row_[v]]; k < surface_.offsets[row_[v] + 1]; ++k)
-      visit(surface_.carriers[k], surface_.weights[k]);
-  }
-  void addCarrier(Index particle, double weight) {
-    walls_.carriers.push_back(particle);
-    walls_.weights.push_back(weight);
-  }
+  static constexpr Index kMiddle = Index{1} << 31;
+
   Index numberOf(Index v) {
     if (number_[v] != kNoIndex) return number_[v];
     number_[v] = static_cast<Index>(walls_.particle.size());
     walls_.particle.push_back(surface_.particle[v]);
-    if (surface_.particle[v] == kNoIndex) {
+    if (row_[v] != kNoIndex) {
       walls_.embedded.push_back(number_[v]);
-      each(v, [&](Index particle, double weight) { addCarrier(particle, weight); });
+      for (Index k = surface_.offsets[row_[v]]; k < surface_.offsets[row_[v] + 1]; ++k) {
+        walls_.carriers.push_back(surface_.carriers[k]);
+        walls_.weights.push_back(surface_.weights[k]);
+      }
       walls_.offsets.push_back(static_cast<Index>(walls_.carriers.size()));
     }
     return number_[v];
@@ -142,6 +163,7 @@ class WallBinder {
   const SurfaceBinding& surface_;
   std::vector<Index> row_, number_;
   SurfaceBinding walls_;
+  std::vector<std::vector<Index>> rims_;
 };
 
 std::set<std::uint32_t> cavityPatches(const TriangleMesh& mesh) {
@@ -176,10 +198,6 @@ Status CavityFill::validate() const {
   if (!(compliance >= 0.0 && compliance <= 1.0)) return outOfRange("compliance", compliance, "above 0 to 1 m^3/Pa");
   if (!(leak > 0.0 && leak <= 3600.0)) return outOfRange("leak", leak, "above 0 to 3600 s");
   return Done{};
-}
-
-double FilledCavity::pressureNow() const {
-  return pressure * (compliance > 0.0 ? 1.0 : filledShare(*this)) * std::max(0.0, 1.0 - open_for / leak);
 }
 
 std::vector<std::vector<Index>> cavitiesOf(const TriangleMesh& mesh) {
@@ -260,7 +278,7 @@ void makeCavities(BodyModel& model) {
     shell.triangles = binder.add(walls);
     cavities->shells.push_back(std::move(shell));
   }
-  cavities->binding = fewerCarriers(binder.finish(), model.rest, model.spacing);
+  cavities->binding = binder.finish(model.rest, model.spacing, cavities->shells);
   model.cavities = std::move(cavities);
 }
 
@@ -291,13 +309,17 @@ Result<std::vector<FilledCavity>> filledCavities(const BodyModel& model, const C
   return filled;
 }
 
-std::vector<FilledCavity> inheritedCavities(const std::vector<FilledCavity>& parent, const BodyModel& piece) {
+std::vector<FilledCavity> inheritedCavities(const std::vector<FilledCavity>& parent, const BodyModel& piece,
+                                            const Points& positions) {
   std::vector<FilledCavity> filled;
   for (FilledCavity cavity : parent) {
     const Cavities::Shell* shell = shellOf(piece, cavity.patch);
     if (!shell) continue;
-    if (shell->open && !(cavity.open_for > 0.0)) {
-      cavity.pressure = cavity.pressureNow();
+    if (shell->open) {
+      Points places;
+      carriedPlaces(piece.cavities->binding, positions, places);
+      cavity.content = shell->share * signedVolume(places, shell->triangles);
+      if (!(cavity.open_for > 0.0)) cavity.pressure = cavity.acting;
       cavity.compliance = 0.0;
       cavity.filled_for = kFillTime;
     }
@@ -317,21 +339,28 @@ void pressCavities(const BodyModel& model, double factor, double h, BodyState& s
     addToParticles(model.cavities->binding, volumeGradient(scratch.cavity, shell.triangles), pull);
     if (cavity.filled_for < kFillTime) cavity.filled_for += h;
     if (shell.open) cavity.open_for += h;
-    double pressure = cavity.pressureNow();
-    if (cavity.compliance > 0.0) {
-      const double share = shell.share;  // of what is reported over what these walls hold
-      double on_its_way = share * signedVolume(scratch.cavity, shell.triangles), mobility = 0.0;
-      for (std::size_t i = 0; i < x.size(); ++i) {
-        on_its_way += share * pull[i].dot(x[i] - before[i]);
-        if (!model.fixed[i]) mobility += pull[i].squaredNorm() / model.masses[i];
-      }
-      const double content = shell.rest_volume + filledShare(cavity) * (cavity.content - shell.rest_volume);
-      pressure = (content - on_its_way) / (cavity.compliance + factor * h * h * share * mobility);
-      cavity.pressure = pressure;
-    }
-    const double rate = factor * h * pressure;
+    double volume = signedVolume(scratch.cavity, shell.triangles), mobility = 0.0;
     for (std::size_t i = 0; i < x.size(); ++i) {
-      if (model.fixed[i]) continue;
+      if (pull[i].isZero(0.0)) continue;
+      volume += pull[i].dot(x[i] - before[i]);
+      if (!model.fixed[i]) mobility += pull[i].squaredNorm() / model.masses[i];
+    }
+    volume *= shell.share;  // where the substep leads without pressure
+    mobility *= factor * h * h * shell.share;
+    if (!(mobility > 0.0)) continue;
+    if (cavity.compliance > 0.0) {
+      const double content = shell.rest_volume + filledShare(cavity) * (cavity.content - shell.rest_volume);
+      cavity.acting = (content - volume) / (cavity.compliance + mobility);
+    } else {
+      // A wall that gives way without end is held. What is open lets out, and so takes no more in.
+      const double most = shell.open ? cavity.content : kMostContent * shell.rest_volume;
+      const double wanted = cavity.pressure * filledShare(cavity) * std::max(0.0, 1.0 - cavity.open_for / cavity.leak);
+      const double bound = (most - volume) / mobility;
+      cavity.acting = wanted > 0.0 ? std::min(wanted, std::max(0.0, bound)) : std::max(wanted, std::min(0.0, bound));
+    }
+    const double rate = factor * h * cavity.acting;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      if (model.fixed[i] || pull[i].isZero(0.0)) continue;
       const Vec3 faster = rate / model.masses[i] * pull[i];
       state.velocities[i] += faster;
       x[i] += h * faster;
@@ -347,7 +376,7 @@ std::vector<BodyMeasures::Cavity> measureCavities(const BodyModel& model, const 
   carriedPlaces(model.cavities->binding, positions, places);
   for (const FilledCavity& cavity : filled) {
     const Cavities::Shell& shell = *shellOf(model, cavity.patch);
-    measures.push_back({shell.share * signedVolume(places, shell.triangles), cavity.pressureNow(), shell.open});
+    measures.push_back({shell.share * signedVolume(places, shell.triangles), cavity.acting, shell.open});
   }
   return measures;
 }

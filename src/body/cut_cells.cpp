@@ -739,7 +739,7 @@ class CellCutter {
     piece.state.stiffened = state_.stiffened;
     piece.state.placed = state_.placed;
     if (!state_.cavities.empty()) makeCavities(*child);
-    piece.state.cavities = inheritedCavities(state_.cavities, *child);
+    piece.state.cavities = inheritedCavities(state_.cavities, *child, piece.state.positions);
     updateSurface(*child, piece.state);
     piece.model = std::move(child);
     return piece;

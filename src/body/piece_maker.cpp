@@ -208,7 +208,7 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, RestShape rest, const std
   piece.state.stiffened = state_.stiffened;
   piece.state.placed = state_.placed;
   if (!state_.cavities.empty()) makeCavities(*child);
-  piece.state.cavities = inheritedCavities(state_.cavities, *child);
+  piece.state.cavities = inheritedCavities(state_.cavities, *child, piece.state.positions);
   updateSurface(*child, piece.state);
   piece.model = std::move(child);
   return piece;

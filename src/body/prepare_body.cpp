@@ -416,7 +416,7 @@ Status makeCollision(BodyDef& def, BodyModel& model) {
 }
 
 /// Which cavities it has is said where they are empty, and marked in its surface where they are to be filled.
-Status findCavities(BodyDef& def, TriangleMesh& surface) {
+Status findCavities(BodyDef& def, bool cells, TriangleMesh& surface) {
   TriangleMesh marked;
   marked.vertices = surface.vertices;
   marked.triangles = surface.triangles;
@@ -436,6 +436,9 @@ Status findCavities(BodyDef& def, TriangleMesh& surface) {
     return Error{ErrorCode::kUnsuitableShape,
                  "body '" + def.name + "': cavities are to be filled, and it has none; accepted: a closed surface " +
                      "with another one inside of it"};
+  if (!cells)
+    return invalid("body '" + def.name + "': cavities are to be filled; accepted: those of an elastic material, or " +
+                   "with clusters: cells");
   surface.patches = std::move(marked.patches);
   return Done{};
 }
@@ -494,7 +497,7 @@ Result<PreparedBody> prepareBody(BodyDef def) {
          << "diagonal cubed";
     return Error{ErrorCode::kUnsuitableShape, text.str()};
   }
-  if (const Status found = findCavities(def, surface); !found) return found.error();
+  if (const Status found = findCavities(def, cells, surface); !found) return found.error();
   model->solid = def.solid;
   model->rest_volume = volume;
   model->rest_area = surfaceArea(surface);

@@ -233,8 +233,8 @@ void serialize(A& archive, PlasticShape& v) {
 }
 template <class A>
 void serialize(A& archive, FilledCavity& v) {
-  auto& [patch, pressure, content, compliance, leak, filled_for, open_for] = v;
-  archive(patch, pressure, content, compliance, leak, filled_for, open_for);
+  auto& [patch, pressure, content, compliance, leak, filled_for, open_for, acting] = v;
+  archive(patch, pressure, content, compliance, leak, filled_for, open_for, acting);
 }
 template <class A>
 void serialize(A& archive, BodyState& v) {

@@ -34,8 +34,9 @@ void restAnew(WorldBody& body) {
   state.eased.clear();
   state.eased_for = 0.0;
   for (FilledCavity& cavity : state.cavities) {
-    if (cavity.compliance > 0.0 || !std::isfinite(cavity.pressure)) cavity.pressure = 0.0;
-    cavity.filled_for = 0.0;
+    cavity.filled_for = cavity.acting = 0.0;
+    if (!std::isfinite(cavity.pressure)) cavity.pressure = 0.0;
+    if (!std::isfinite(cavity.content)) cavity.content = 0.0;
   }
   state.unwinding = false;
 }

@@ -124,14 +124,13 @@ using BodyModelPtr = std::shared_ptr<const BodyModel>;
 /// What fills a cavity.
 struct FilledCavity {
   std::uint32_t patch = kCavityPatch;  // of its faces, one of those of BodyModel::cavities
-  double pressure = 0.0;               // [Pa] more than around the body; of an open one: when it was opened
-  double content = 0.0;                // [m^3] without pressure
-  double compliance = 0.0;             // [m^3/Pa] 0: the pressure is held
-  double leak = 1.0;                   // [s]
-  double filled_for = 0.0;             // [s]
-  double open_for = 0.0;               // [s]
-
-  double pressureNow() const;  // [Pa]
+  double pressure = 0.0;    // [Pa] more than around the body, where it is held; of an open one: when it was opened
+  double content = 0.0;     // [m^3] of a volume, without pressure; of an open one: when it was opened
+  double compliance = 0.0;  // [m^3/Pa] 0: the pressure is held
+  double leak = 1.0;        // [s]
+  double filled_for = 0.0;  // [s]
+  double open_for = 0.0;    // [s]
+  double acting = 0.0;      // [Pa] in the last substep
 };
 
 /// Changes with every step.

@@ -22,13 +22,15 @@ void makeCavities(BodyModel& model);
 /// they hold at rest, or more than ten times that.
 Result<std::vector<FilledCavity>> filledCavities(const BodyModel& model, const CavityFill& fill);
 
-/// Of a piece of a body. What the blade has opened leaks from now on.
-std::vector<FilledCavity> inheritedCavities(const std::vector<FilledCavity>& parent, const BodyModel& piece);
+/// Of a piece of a body with its particles at `positions` [m]. What the blade has opened leaks from now on.
+std::vector<FilledCavity> inheritedCavities(const std::vector<FilledCavity>& parent, const BodyModel& piece,
+                                            const Points& positions);
 
 /// The part of matchAndMove() for filled cavities: moves particles from where they are without it. The walls at the
 /// start of the substep, scratch.previous, say which way, so that angular momentum stays to the bit. A volume with
-/// compliance is solved with the way that the walls go by themselves (one constraint, implicit): stable at any h.
-/// factor: of stiffnessFactor().
+/// compliance is solved with the way that the walls go by themselves (one constraint, implicit): stable at any h. A
+/// pressure that is held widens no cavity to more than ten times its volume at rest, and an open one no more than it
+/// was. factor: of stiffnessFactor().
 void pressCavities(const BodyModel& model, double factor, double h, BodyState& state, StepScratch& scratch);
 
 /// Volumes at present places, or [m] other ones of the particles.
