@@ -3,6 +3,12 @@
 #include <algorithm>
 
 namespace meshless {
+namespace {
+
+// Beyond it lies infinity in float, where what is in the tree is no longer told from its empty places.
+constexpr double kFarthest = 1e38;  // [m]
+
+}  // namespace
 
 const std::vector<std::array<Index, 2>>& BroadPhase::find(const std::vector<Box>& boxes,
                                                           const std::vector<char>& active) {
@@ -15,8 +21,8 @@ const std::vector<std::array<Index, 2>>& BroadPhase::find(const std::vector<Box>
     const Box& box = boxes[i];
     if (box.empty() || !box.min.allFinite() || !box.max.allFinite()) continue;
     centres_[i] = 0.5 * (box.min + box.max);
-    tree_boxes_.items[i].extend(box.min);
-    tree_boxes_.items[i].extend(box.max);
+    for (const Vec3& corner : {box.min, box.max})
+      tree_boxes_.items[i].extend(corner.cwiseMax(-kFarthest).cwiseMin(kFarthest));
   }
   tree_.build(centres_);
   tree_.refit(tree_boxes_);

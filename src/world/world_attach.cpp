@@ -499,17 +499,15 @@ void World::Impl::listFibres() {
   attached.all.clear();
   attached.offsets.clear();
   attached.of_body.clear();
+  if (attachments.empty()) return;
   std::vector<Index> body_in(generations.size(), kNoIndex);  // by slots
-  bool any = false;
+  for (Index b = 0; b < bodies.size(); ++b) body_in[bodies[b]->id.slot] = b;
   for (Attachment& attachment : attachments)
     for (Fibre& fibre : attachment.fibres) {
-      if (!any)
-        for (Index b = 0; b < bodies.size(); ++b) body_in[bodies[b]->id.slot] = b;
-      any = true;
       const Index b = fibre.b.slot < body_in.size() ? body_in[fibre.b.slot] : kNoIndex;
       attached.all.push_back({&fibre, attachment.stiffness * fibre.area, body_in[fibre.a.slot], b});
     }
-  if (!any) return;
+  if (attached.all.empty()) return;
   const auto each = [this](const auto& visit) {
     for (Index n = 0; n < attached.all.size(); ++n) visit(attached.all[n].a, n);
   };

@@ -134,6 +134,14 @@ TEST(BroadPhase, OneFarAwayChangesNothingForTheOthers) {
   }
 }
 
+TEST(BroadPhase, BoxesBeyondAllBoundsMeetWhatTheyHold) {
+  for (const double far : {1e30, 1e38, 1e39, 1e300}) {
+    std::vector<Box> boxes = {boxAt(Vec3::Zero(), Vec3::Constant(far)), boxAt(Vec3::Zero(), Vec3::Ones())};
+    BroadPhase broad;
+    EXPECT_EQ(broad.find(boxes, {1, 1}), (Pairs{{0, 1}})) << far;
+  }
+}
+
 TEST(BroadPhase, ComparesFewWhereFewAreNear) {
   std::vector<Box> boxes;
   for (int k = 0; k < 1000; ++k)

@@ -157,6 +157,7 @@ std::vector<Row> rows(const Kind& kind, const Vec3& pressed) {
   const SpawnCommand above{test::shared(cube(kind, "stone", Vec3(0, 0, 2.6 * kEdge)))};
   const SpawnCommand aside{test::shared(cube(kind, "stone", Vec3(-2.0 * kApart, 0, 2.5 * kEdge)))};
   const Names pieces{"low.1", "low.2", "high"};
+  const AttachCommand joined{"", "low", "high", 0.01, 1e3, {}, {}}, tied{"", "low", "under", 2.0 * kApart, 1.0, {}, {}};
   return {
       {"pick", pick, kTower},
       {"pick moved", MovePickCommand{kPick, kPulled + Vec3(0, 0, 0.001)}, kHeld},
@@ -204,6 +205,12 @@ std::vector<Row> rows(const Kind& kind, const Vec3& pressed) {
       {"spawn onto", onto, {"low", "high", "stone"}, {}, 10},
       {"spawn above", above, {"stone"}, {}, 3},
       {"spawn aside", aside, {"stone"}, {}, 10},
+      {"attach", joined, kTower},
+      {"attach to another pile", tied, both(kTower, kHeld)},
+      {"attach refused", AttachCommand{"", "low", "low", 0.01, 1e3, {}, {}}, {}, {}, 1, true},
+      {"detach", DetachCommand{"low-high", {}}, kTower, {joined}},
+      {"detach when all sleep again", DetachCommand{"low-high", {}}, kTower, {joined}, 1, false, true},
+      {"detach of nothing", DetachCommand{"low-high", {}}, {}, {}, 1, true},
       {"removal from below", RemoveCommand{"low"}, {"high"}},
       {"removal from above", RemoveCommand{"high"}, {"low"}},
       {"removal of what is picked", RemoveCommand{"held"}, {"under"}},
