@@ -1,8 +1,12 @@
 // What holds organs together: fibres are made, drawn, cut, torn, and follow the pieces of a body.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
+#include <sstream>
+#include <utility>
 
 #include "meshless_surgery/base/compressed_rows.h"
 #include "meshless_surgery/geometry/nearest_on_triangle.h"

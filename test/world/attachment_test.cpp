@@ -1,9 +1,12 @@
 // Laws of what holds organs together.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <sstream>
+#include <stdexcept>
 
 #include "meshless_surgery/world/command_log.h"
 #include "meshless_surgery/world/saved_world.h"
