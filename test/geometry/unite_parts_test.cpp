@@ -182,6 +182,12 @@ TEST(UniteParts, CavitiesThatOverlapAreOneAndAThirdPartFillsThem) {
   const double into = all - (both - inner);
   mended(together({{outer, Vec3::Zero()}, {hole, Vec3::Zero()}, {ball(0.03), Vec3(0.02, 0.01, 0)}}), into, 1e-9,
          "lump");
+  // One that a part from outside covers whole is gone.
+  const TriangleMesh cover = ball(0.06), small = shapes::turnedInsideOut(ball(0.02));
+  const TriangleMesh covered = together({{outer, Vec3::Zero()}, {cover, Vec3(0.06, 0, 0)}});
+  TriangleMesh with_cavity = covered;
+  shapes::append(with_cavity, small, Vec3(0.05, 0, 0));
+  mended(with_cavity, signedVolume(repairMesh(covered, MeshRepair::kMend)->mesh), 1e-9, "covered");
   const TriangleMesh rod = boxMesh(Vec3(0.3, 0.01, 0.01), 0.01);
   const double rod_alone =
       signedVolume(repairMesh(together({{outer, Vec3::Zero()}, {rod, Vec3::Zero()}}), MeshRepair::kMend)->mesh);
