@@ -378,6 +378,7 @@ class Uniting {
       append(solid, *hollow);
       solids.push_back(toExact(solid));
     }
+    if (solids.empty()) return refuse("they enclose no volume");
     Result<ExactSurface> united = unionOf(std::move(solids));
     if (!united) return united.error();
     const TriangleMesh rounded = toRounded(*united);
