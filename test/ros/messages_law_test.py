@@ -584,6 +584,26 @@ class MessagesLawTest(DeformerTestCase):
         held.add(('meshless_surgery/BodyState', 'asleep'))
 
 
+    def test_cavities_have_the_volume_within_their_walls_and_the_pressure_that_was_asked_for(self):
+        pressure = 20.0
+        self.good('spawn', name='bladder', file='package://meshless_surgery/config/meshes/bladder.obj', pose=pose_stamped(0, 0, 5),
+                  material='elastic_muscle', cavities='{pressure: %g}' % pressure)
+        self.good('step', steps=60)
+        answer, body = self.good('get_body', name='bladder'), self.body(self.state(), 'bladder')
+        vertices, triangles = mesh_of(answer)
+        a, b, c = (vertices[triangles[:, k]] for k in range(3))
+        inner = (numpy.cross(b - a, c - a) * ((a + b + c) / 3.0 - vertices.mean(0))).sum(1) < 0.0
+        within = -solid(vertices, triangles[inner])[0]
+        for message in (answer, body):
+            cavity, = message.cavities
+            self.says(cavity, volume=(within, 0.01 * within), pressure=(pressure, 1e-9), open=False)
+            held.add((message._type, 'cavities'))
+        cut = self.good('cut', blades=pose_stamped(-1.0, 0.0, body.centre_of_mass.z), bodies=['bladder'])
+        for name in cut.new_bodies:
+            cavity, = self.good('get_body', name=name).cavities
+            self.says(cavity, volume=(0.5 * within, 0.1 * within), pressure=(pressure, 1e-9), open=True)
+
+
 class EveryFieldTest(unittest.TestCase):
 
     def test_every_field_of_every_message_has_a_law(self):

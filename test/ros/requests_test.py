@@ -327,6 +327,10 @@ def volume(test, answer):
     return test.good('get_body', name=answer.name).volume
 
 
+def filled(test, answer):
+    return len(test.good('get_body', name=answer.name).cavities)
+
+
 def mass(test, answer):
     return test.good('get_body', name=answer.name).mass
 
@@ -483,6 +487,8 @@ LAWS = [
     Law('spawn', 'units', 'cm', dict(scale=200.0, **NEW), volume, 0.2 ** 3, 20.0 ** 3),
     Law('spawn', 'thickness', 0.02, NEW, volume, within(0.95 * (0.1 ** 3 - 0.06 ** 3), 1.1 * (0.1 ** 3 - 0.06 ** 3)),
         0.1 ** 3),
+    Law('spawn', 'cavities', '{volume: 50}', dict(file='package://meshless_surgery/config/meshes/bladder.obj', pose=NEW['pose'],
+                                                  material='elastic_muscle'), filled, 1, 0),
     Law('spawn', 'material', 'stiff', NEW, mass, 2.0, 1.0),
     Law('spawn', 'repair', 'wrap', dict(file='dirty.obj', pose=NEW['pose']), triangles, within(100, 1e5), 4),
     Law('spawn_cloud', 'name', 'mine', dict(cloud=cloud_of(ball())), name_of, 'mine', 'cloud'),

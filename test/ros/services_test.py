@@ -257,6 +257,37 @@ class BodiesTest(DeformerTestCase):
         self.assertAlmostEqual(0.1 ** 3 / 6.0, self.good('get_body', name='organ').volume, places=9)
         self.refused(["units is 'inch'", 'm, cm, mm'], 'spawn', file='tetrahedron.obj', pose=pose_stamped(0, 0, 1), units='inch')
 
+    def test_a_bladder_is_filled_and_a_cut_lets_it_out(self):
+        events = self.deformer.recorder('events', Event)
+        self.addCleanup(events.close)
+        bladder = dict(file='package://meshless_surgery/config/meshes/bladder.obj', pose=pose_stamped(0, 0, 10),
+                       material='elastic_muscle')
+        empty = self.good('spawn', name='empty', **bladder)
+        self.assertIn('it has 1 cavity of 47 ml, that is empty', empty.message)
+        self.good('remove', name='empty')
+        self.refused(['pressure is -1', '0 to 1e+06 Pa'], 'spawn', cavities='{pressure: -1}', **bladder)
+        self.refused(['volume is 1000 ml', '47.0133 ml at rest'], 'spawn', cavities='{volume: 1000}', **bladder)
+        self.refused(['cavities has'], 'spawn', cavities=' ' * 2000, **bladder)
+        self.refused(['it has none'], 'spawn', file='tetrahedron.obj', pose=pose_stamped(0, 0, 10), cavities='{pressure: 1}')
+        self.good('spawn', name='bladder', cavities='{pressure: 100, leak: 0.2}', **bladder)
+        self.good('step', steps=60)
+        cavity, = self.good('get_body', name='bladder').cavities
+        self.assertAlmostEqual(100.0, cavity.pressure)
+        self.assertFalse(cavity.open)
+        self.assertGreater(cavity.volume, 47e-6)
+        rest, = self.good('get_body', name='bladder', rest=True).cavities
+        self.assertAlmostEqual(47.0133e-6, rest.volume, places=9)
+        state = self.state()
+        self.assertEqual([1], [len(body.cavities) for body in state.bodies if body.name == 'bladder'])
+        centre = [body.centre_of_mass.z for body in state.bodies if body.name == 'bladder'][0]
+        cut = self.good('cut', blades=pose_stamped(-1, 0, centre), bodies=['bladder'])
+        self.assertEqual(2, len(cut.new_bodies))
+        events.wait(lambda event: event.type == Event.LEAK and event.body == cut.new_bodies[0] and 'is open' in event.text)
+        self.assertTrue(all(self.good('get_body', name=name).cavities[0].open for name in cut.new_bodies))
+        self.good('step', steps=25)
+        self.assertEqual([[], []], [self.good('get_body', name=name).cavities for name in cut.new_bodies])
+        events.wait(lambda event: event.type == Event.LEAK and event.body == cut.new_bodies[1] and 'leaked out' in event.text)
+
     def test_a_dirty_file_is_repaired_as_far_as_asked(self):
         at = pose_stamped(0, 0, 1)
         for repair in ('', 'mend'):

@@ -177,6 +177,30 @@ TEST(FilledCavity, FillingMovesAndTurnsNothing) {
   }
 }
 
+CutReply cutAt(World& world, const Vec3& point, const Vec3& along, const Vec3& normal);
+
+// Nor do the lids of what leaks.
+TEST(FilledCavity, LeakingMovesAndTurnsNothing) {
+  WorldSettings settings = test::weightless();
+  settings.contact = ContactMethod::kNone;
+  World world = worldOf(bladder(0.004), settings);
+  run(world, 0.3);
+  const Vec3 normal = Vec3(0.3, 0.1, 1.0).normalized();
+  const CutReply reply = cutAt(world, Vec3(0, 0, 0.03), normal.unitOrthogonal(), normal);
+  ASSERT_EQ(reply.new_bodies.size(), 2u);
+  std::vector<BodyMeasures> before;
+  for (std::size_t n = 0; n < 2; ++n) before.push_back(bodyOf(world, n).measures);
+  run(world, 0.4);
+  for (std::size_t n = 0; n < 2; ++n) {
+    const BodyMeasures after = bodyOf(world, n).measures;
+    ASSERT_EQ(after.cavities.size(), 1u);
+    EXPECT_NE(after.cavities[0].volume, before[n].cavities[0].volume);
+    const double mass = bodyOf(world, n).model->mass;
+    EXPECT_LT((after.linear_momentum - before[n].linear_momentum).norm(), 1e-11 * mass);
+    EXPECT_LT((after.angular_momentum - before[n].angular_momentum).norm(), 1e-12 * mass);
+  }
+}
+
 CutReply cutAt(World& world, const Vec3& point, const Vec3& along, const Vec3& normal) {
   CutCommand cut;
   cut.blades.origin = point - along;
