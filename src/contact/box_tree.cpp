@@ -1,12 +1,21 @@
 #include "meshless_surgery/contact/box_tree.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace meshless {
 namespace {
 
 constexpr Index kChildren = 4;  // of a node, at most
+
+// Of a child that is not there: it overlaps nothing, whatever is asked, and extends nothing.
+FloatBox nowhere() {
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  FloatBox box;
+  box.min = box.max = FloatBox::Four{kNone, kNone, kNone, 0.0f};
+  return box;
+}
 
 }  // namespace
 
@@ -57,7 +66,7 @@ void BoxTree::refit(TreeBoxes& boxes) const {
   for (std::size_t n = nodes_.size(); n-- > 0;) {
     const Node& node = nodes_[n];
     for (Index k = 0; k < kChildren; ++k) {
-      FloatBox box;
+      FloatBox box = k < node.count ? FloatBox() : nowhere();
       if (k < node.count && node.leaf) box = boxes.items[items_[node.first + k]];
       if (k < node.count && !node.leaf)
         for (Index child = 0; child < kChildren; ++child) box.extend(boxes.nodes[node.first + k].box(child));

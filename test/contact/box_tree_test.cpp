@@ -95,6 +95,24 @@ TEST(BoxTree, FindsWhatOverlapsABoxOnceAndNothingElse) {
   }
 }
 
+// What goes beyond the range of float: children that are not there are no place to look into.
+TEST(BoxTree, ABoxWithoutEndFindsEachOnce) {
+  constexpr float kInfinity = FloatBox::kInfinity;
+  FloatBox all;
+  all.min = FloatBox::Four{-kInfinity, -kInfinity, -kInfinity, 0.0f};
+  all.max = FloatBox::Four{kInfinity, kInfinity, kInfinity, 0.0f};
+  Random random(6);
+  for (const std::size_t count : kCounts) {
+    const Boxes of = randomBoxes(count, 0.1, random);
+    std::multiset<Index> found;
+    of.tree.query(of.boxes, all, [&](Index item) {
+      ASSERT_LT(item, count);
+      found.insert(item);
+    });
+    for (Index item = 0; item < count; ++item) EXPECT_EQ(found.count(item), 1u) << item << " of " << count;
+  }
+}
+
 TEST(BoxTree, FindsTheNearest) {
   Random random(3);
   for (const std::size_t count : kCounts) {
