@@ -270,7 +270,7 @@ std::string mshFile(const Grid& grid, const std::string& version, bool binary, b
     }
   };
   const auto line = [&] { out += binary ? "" : "\n"; };
-  const auto tag = [](int node) { return static_cast<std::size_t>(100000 - 3 * node); };
+  const auto tag = [](int node) { return static_cast<std::size_t>(100000 - 3 * std::int64_t{node}); };
   if (binary) {
     put(out, std::int32_t{1}, big_endian);
     out += "\n";

@@ -271,7 +271,8 @@ std::pair<double, double> drawApart(double spacing, double youngs_modulus, doubl
                      elastic(youngs_modulus), spacing));
   const std::size_t made = attach(world, attachment("lower", "upper", 0.001, stiffness, strength)).fibres;
   double nearest = 1.0;
-  for (const auto& line : seen(world).attachments[0].lines) nearest = std::min(nearest, line[0].x() + 0.06);
+  const WorldSnapshot start = seen(world);
+  for (const auto& line : start.attachments[0].lines) nearest = std::min(nearest, line[0].x() + 0.06);
   std::vector<PickReply> picked;
   for (const double side : {-1.0, 1.0}) {
     PickCommand pick;
