@@ -48,7 +48,7 @@ constexpr double kTurn = 1e-3;          // [rad] from call to call, and as much 
 
 ElasticWork elasticWork(const BodyModel& model) {
   const double cells = static_cast<double>(model.cells->cells.size());
-  const double boxes = model.elastic_batch->boxes(), filled = cells - boxes;
+  const double boxes = model.elastic_batch->whole(), filled = cells - boxes;
   const double particles = static_cast<double>(model.rest.size());
   return {cells * kBoxBytes + filled * kFilling + particles * kParticleBytes,
           boxes * kBoxOperations + filled * kCellOperations + particles * kParticleOperations};

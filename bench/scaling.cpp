@@ -330,13 +330,13 @@ void runRoofline(Run& run) {
         "# %.0f cells (%u whole), %zu particles, %.1f MB: %.0f bytes and %.0f operations a cell in %.1f ns: %.1f GB/s "
         "(as many bytes at best: %.1f, in memory: %.1f), %.1f GFLOP/s (at best: %.1f); a substep of the world: %.1f "
         "ns\n",
-        cells, model.elastic_batch->boxes(), particlesOf(model), 1e-6 * work.bytes, work.bytes / cells,
+        cells, model.elastic_batch->whole(), particlesOf(model), 1e-6 * work.bytes, work.bytes / cells,
         work.operations / cells, 1e9 * time.seconds / cells, 1e-9 * work.bytes / time.seconds, 1e-9 * same, 1e-9 * far,
         1e-9 * work.operations / time.seconds, 1e-9 * peak, 1e9 * in_world / cells);
     if (time.cold > 0) std::printf("# %zu rotations were cold\n", time.cold);
     char line[300];
     std::snprintf(line, sizeof line, "%.0f,%zu,%u,%.2f,%.0f,%.0f,%.2f,%.2f,%.2f,%.2f,%.2f,%.2f,%.2f,%.2f", cells,
-                  particlesOf(model), model.elastic_batch->boxes(), 1e-6 * work.bytes, work.bytes / cells,
+                  particlesOf(model), model.elastic_batch->whole(), 1e-6 * work.bytes, work.bytes / cells,
                   work.operations / cells, 1e9 * time.seconds / cells, 1e-9 * work.bytes / time.seconds,
                   1e-9 * work.operations / time.seconds, 1e-9 * near, 1e-9 * same, 1e-9 * far, 1e-9 * peak,
                   1e9 * in_world / cells);

@@ -12,7 +12,6 @@ namespace meshless {
 namespace {
 
 constexpr double kFarthestCentroid = 0.9;  // [half edges] a fit nearer to a face would need weights near zero
-constexpr int kWellFilled = 16;            // of 64 samples
 
 // What a cell weighs goes to its corners.
 void addMass(const BodyModel& model, const LatticeCell& cell, std::vector<double>& masses) {
@@ -137,11 +136,8 @@ ElasticCells elasticCellsOf(const BodyModel& model) {
   elastic.masses = model.match_masses;
   for (std::size_t c = 0; c < lattice.cells.size(); ++c) {
     const Resistance& resists = lattice.cells[c].resists;
-    // What a hardly filled cell has of its own does not hold its far corners, and what touches the surface throws them.
-    Vec3 variance = resists.variance;
-    if (resists.fraction < kWellFilled / 64.0) variance = variance.cwiseMax(Resistance().variance);
-    elastic.cells.push_back({lattice.cells[c].corners, model.shape.clusters[c].mass, centroidOf(resists), variance,
-                             mixOf(model, lattice.cells[c])});
+    elastic.cells.push_back({lattice.cells[c].corners, model.shape.clusters[c].mass, centroidOf(resists),
+                             resists.variance, mixOf(model, lattice.cells[c])});
   }
   return elastic;
 }

@@ -31,6 +31,9 @@ constexpr double kAutoCells = 1600.0;              // of a lattice, likewise, at
 // substeps for each crossing, and each of them a tenth of a microsecond: a twentieth of one thread's time.
 constexpr double kCrossings = 4e5;
 constexpr double kThinnest = 0.75;                  // of a body's mean thickness: its cells are no wider
+constexpr double kWidestLayer = 3.5;                // thicknesses: samples of wider cells would miss a layer
+constexpr double kFlat = 0.98;                      // of alongAxes(): a layer that lies along its lattice
+constexpr double kSlanted = 1.5;                    // by statics of layers at 45 degrees, 0.5 to 4 cells wide
 constexpr double kResolutionStep = 1.5;             // of the spacing, from one resolution to the next
 constexpr double kReach = 1.75;                     // of the spacing: how far neighbours along the body may be
 constexpr std::size_t kMostLinks = 40;              // of the nearest: vertices finer than the spacing have thousands
@@ -113,14 +116,17 @@ Status makeLayer(BodyDef& def) {
   return Done{};
 }
 
-// Too few cells in a layer's thickness bend wrongly.
-void warnOfThinLayer(BodyDef& def, const BodyModel& model) {
-  const double wanted = kThinnest * def.thickness;
-  if (!(def.thickness > 0.0) || model.spacing <= wanted) return;
+// A layer along the lattice bends right however wide the cells are; across them it is too stiff. `surface`: along the
+// axes of the lattice.
+void warnOfSlantedLayer(BodyDef& def, const BodyModel& model) {
+  const double wanted = 0.5 * def.thickness;
+  if (!(def.thickness > 0.0) || model.spacing <= wanted || alongAxes(model.surface) > kFlat) return;
+  const double wide = model.spacing / def.thickness;
   std::ostringstream text;
-  text << std::setprecision(3) << "its layer of " << def.thickness << " m has " << def.thickness / model.spacing
-       << " cells of " << model.spacing
-       << " m in its thickness, so that it bends up to a third too easily; spacing: " << wanted << " gives it about "
+  text << std::setprecision(3) << "where its layer of " << def.thickness << " m lies slanted in its cells of "
+       << model.spacing << " m it bends too stiffly, at 45 degrees about " << std::setprecision(2)
+       << 1.0 + kSlanted * wide * wide << " times; it stretches right. With spacing: " << std::setprecision(3) << wanted
+       << " it is " << std::setprecision(2) << 1.0 + 0.25 * kSlanted << " times, of about "
        << std::round(model.rest_volume / std::pow(wanted, 3.0)) << " cells";
   def.warnings.push_back(text.str());
 }
@@ -139,8 +145,12 @@ double chooseSpacing(const BodyDef& def, bool cells, double edge, double volume,
     for (const TissueRegion& region : def.regions) speed = std::max(speed, pressureWaveSpeed(region.material));
     const double affordable = std::pow(volume * speed / kCrossings, 0.25), thickness = 2.0 * volume / area;
     spacing = std::max(spacing, std::min(affordable, kThinnest * thickness));
+    // A layer that is thinner than its cells has one of them across.
+    if (affordable > def.thickness && def.thickness > 0.0)
+      spacing = std::cbrt(volume / def.thickness * speed / kCrossings);
   }
-  return spacing * std::pow(kResolutionStep, 1 - static_cast<int>(def.resolution));
+  spacing *= std::pow(kResolutionStep, 1 - static_cast<int>(def.resolution));
+  return def.thickness > 0.0 ? std::min(spacing, kWidestLayer * def.thickness) : spacing;
 }
 
 // Vertices that become particles: all, or for fine surfaces a subset about `spacing` apart.
@@ -504,7 +514,7 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   model->spacing = def.spacing;
   if (!(model->spacing > 0.0)) {
     model->spacing = def.solid ? chooseSpacing(def, cells, edge, volume, model->rest_area) : edge;
-    warnOfThinLayer(def, *model);
+    warnOfSlantedLayer(def, *model);
   }
   if (def.solid && volume / std::pow(model->spacing, 3.0) > static_cast<double>(kMaxParticles)) {
     std::ostringstream text;

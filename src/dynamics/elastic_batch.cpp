@@ -15,29 +15,8 @@ using elastic_sets::kBlock;
 using elastic_sets::kCorners;
 
 constexpr double kHourglass = 0.3;       // as in elastic.cpp
-constexpr double kSameBox = 1e-10;       // relative to the edge
+constexpr double kWhole = 1e-10;         // in half edges: of a whole cell's centroid and variance
 constexpr std::size_t kSumChunk = 1024;  // particles at a time
-
-// The corner of a box at q by the signs of its coordinates.
-int cornerAt(const Vec3& q) { return (q.x() > 0.0 ? 1 : 0) + (q.y() > 0.0 ? 2 : 0) + (q.z() > 0.0 ? 4 : 0); }
-
-// Half the edges of an axis-aligned box with equal masses at its corners; zero for another cluster.
-Vec3 boxOf(const MatchInput& in, Index c) {
-  const Index begin = in.clusters.offsets[c];
-  if (in.clusters.offsets[c + 1] - begin != kCorners) return Vec3::Zero();
-  const ClusterRest& rest = in.shape.clusters[c];
-  const Vec3 half = (in.rest[in.clusters.members[begin]] - rest.centre).cwiseAbs();
-  int seen = 0;
-  for (Index k = begin; k < begin + kCorners; ++k) {
-    const Index i = in.clusters.members[k];
-    const Vec3 q = in.rest[i] - rest.centre;
-    seen |= 1 << cornerAt(q);
-    if (!((q.cwiseAbs() - half).cwiseAbs().maxCoeff() <= kSameBox * half.minCoeff())) return Vec3::Zero();
-    const double share = in.masses[i] * in.clusters.weights[k] / rest.mass;
-    if (!(std::abs(share - 0.125) < 1e-12)) return Vec3::Zero();
-  }
-  return seen == 0xff ? half : Vec3::Zero();
-}
 
 elastic_sets::BlockResult accelerateBlock(const elastic_sets::Block& block, InstructionSet set) {
 #if MESHLESS_ROTATION_X86
@@ -50,21 +29,14 @@ elastic_sets::BlockResult accelerateBlock(const elastic_sets::Block& block, Inst
 }  // namespace
 
 ElasticBatch::ElasticBatch(const MatchInput& in, const std::vector<ElasticRest>& elastic) {
-  std::vector<Index> box_clusters, small_clusters;
+  std::vector<Index> small_clusters;
   others_.offsets.push_back(0);
   for (Index c = 0; c < in.clusters.size(); ++c) {
     const ClusterRest& rest = in.shape.clusters[c];
     const Index begin = in.clusters.offsets[c], end = in.clusters.offsets[c + 1];
     if (!(elastic[c].spread > 0.0)) continue;  // one point: nothing to deform
     if (rest.linear_rank && end - begin <= kCorners) {
-      const Vec3 half = boxOf(in, c);
-      if (half.minCoeff() > 0.0 && box_clusters.empty()) {
-        half_edges_ = half;
-        softness_ = 3.0 / half.squaredNorm();
-      }
-      const bool same = (half - half_edges_).cwiseAbs().maxCoeff() <= kSameBox * half_edges_.minCoeff();
-      (!box_clusters.empty() || half.minCoeff() > 0.0) && same ? box_clusters.push_back(c)
-                                                               : small_clusters.push_back(c);
+      small_clusters.push_back(c);
       continue;
     }
     other_clusters_.push_back(c);
@@ -76,10 +48,9 @@ ElasticBatch::ElasticBatch(const MatchInput& in, const std::vector<ElasticRest>&
     other_shape_.clusters.push_back(rest);
     other_elastic_.push_back(elastic[c]);
   }
-  makeBlocks(box_clusters.size(), small_clusters.size());
-  shapes_.assign((blocks_ - box_blocks_) * kBlock * elastic_sets::kShapeRows, 0.0);
-  addLanes(in, elastic, box_clusters, true);
-  addLanes(in, elastic, small_clusters, false);
+  makeBlocks(0, small_clusters.size());
+  shapes_.assign(blocks_ * kBlock * elastic_sets::kShapeRows, 0.0);
+  addLanes(in, elastic, small_clusters);
 
   findForces(
       in.rest.size(), [&](Index c) { return in.clusters.offsets[c + 1] - in.clusters.offsets[c]; }, in.masses);
@@ -87,18 +58,19 @@ ElasticBatch::ElasticBatch(const MatchInput& in, const std::vector<ElasticRest>&
 
 ElasticBatch::ElasticBatch(const ElasticCells& body) {
   others_.offsets.push_back(0);
-  half_edges_ = Vec3::Constant(body.half_edge);
-  softness_ = 1.0 / (body.half_edge * body.half_edge);
+  half_edge_ = body.half_edge;
   std::vector<Index> whole, partial;
   for (Index c = 0; c < body.cells.size(); ++c) {
     const ElasticCell& cell = body.cells[c];
-    const bool is_whole = cell.centroid.cwiseAbs().maxCoeff() < kSameBox &&
-                          (cell.variance - Vec3::Constant(1.0 / 3.0)).cwiseAbs().maxCoeff() < kSameBox &&
+    const bool is_whole = cell.centroid.cwiseAbs().maxCoeff() < kWhole &&
+                          (cell.variance - Vec3::Constant(1.0 / 3.0)).cwiseAbs().maxCoeff() < kWhole &&
                           cell.mix.isOwn();
     (is_whole ? whole : partial).push_back(c);
   }
   makeBlocks(whole.size(), partial.size());
-  cells_.assign((blocks_ - box_blocks_) * kBlock * elastic_sets::kCellRows, 0.0);
+  cells_.assign((blocks_ - whole_blocks_) * kBlock * elastic_sets::kCellRows, 0.0);
+  if (std::any_of(body.cells.begin(), body.cells.end(), [](const ElasticCell& cell) { return !cell.mix.isOwn(); }))
+    mixes_.assign((blocks_ - whole_blocks_) * kBlock * elastic_sets::kMixRows, 0.0);
   const auto add = [&](const std::vector<Index>& cells, std::size_t first) {
     for (std::size_t n = 0; n < (cells.size() + kBlock - 1) / kBlock * kBlock; ++n) {
       const std::size_t block = first + n / kBlock, i = n % kBlock;
@@ -107,29 +79,28 @@ ElasticBatch::ElasticBatch(const ElasticCells& body) {
       if (n < cells.size()) clusters_[block * kBlock + i] = c;
       masses_[block * kBlock + i] = cell.mass;
       for (int k = 0; k < kCorners; ++k) particles_[(block * kCorners + k) * kBlock + i] = cell.corners[k];
-      if (block < box_blocks_) continue;
-      double* const rows = cells_.data() + (block - box_blocks_) * kBlock * elastic_sets::kCellRows + i;
+      if (block < whole_blocks_) continue;
+      double* const rows = cells_.data() + (block - whole_blocks_) * kBlock * elastic_sets::kCellRows + i;
       for (int axis = 0; axis < 3; ++axis) rows[(elastic_sets::kCentroidRow + axis) * kBlock] = cell.centroid[axis];
-      for (int m = 0; m < 4; ++m)
-        rows[(elastic_sets::kModeRow + m) * kBlock] =
-            (cell.mix.own + cell.mix.youngs) *
-            elastic_law::hourglassStiffness(cell.variance, elastic_law::kHourglassModes[m]) / kHourglass;
-      rows[elastic_sets::kOwnRow * kBlock] = cell.mix.own;
-      rows[elastic_sets::kShearRow * kBlock] = 2.0 * cell.mix.mu;
-      rows[elastic_sets::kPressureRow * kBlock] = cell.mix.lambda;
+      for (int axis = 0; axis < 3; ++axis) rows[(elastic_sets::kVarianceRow + axis) * kBlock] = cell.variance[axis];
+      if (mixes_.empty()) continue;
+      double* const mix = mixes_.data() + (block - whole_blocks_) * kBlock * elastic_sets::kMixRows + i;
+      mix[elastic_sets::kOwnRow * kBlock] = cell.mix.own;
+      mix[elastic_sets::kShearRow * kBlock] = 2.0 * cell.mix.mu;
+      mix[elastic_sets::kPressureRow * kBlock] = cell.mix.lambda;
     }
   };
   add(whole, 0);
-  add(partial, box_blocks_);
+  add(partial, whole_blocks_);
   findForces(
       body.masses.size(), [](Index) { return Index{kCorners}; }, body.masses);
 }
 
-void ElasticBatch::makeBlocks(std::size_t boxes, std::size_t others) {
-  boxes_ = static_cast<Index>(boxes);
+void ElasticBatch::makeBlocks(std::size_t whole, std::size_t others) {
+  whole_ = static_cast<Index>(whole);
   small_ = static_cast<Index>(others);
-  box_blocks_ = (boxes + kBlock - 1) / kBlock;
-  blocks_ = box_blocks_ + (others + kBlock - 1) / kBlock;
+  whole_blocks_ = (whole + kBlock - 1) / kBlock;
+  blocks_ = whole_blocks_ + (others + kBlock - 1) / kBlock;
   clusters_.assign(blocks_ * kBlock, kNoIndex);
   particles_.assign(blocks_ * kBlock * kCorners, 0);
   masses_.assign(blocks_ * kBlock, 0.0);
@@ -152,26 +123,17 @@ void ElasticBatch::findForces(std::size_t particles, const std::function<Index(I
 }
 
 void ElasticBatch::addLanes(const MatchInput& in, const std::vector<ElasticRest>& elastic,
-                            const std::vector<Index>& clusters, bool boxes) {
+                            const std::vector<Index>& clusters) {
   if (clusters.empty()) return;
-  const std::size_t first = boxes ? 0 : box_blocks_;
-  const std::size_t end = ((clusters.size() + kBlock - 1) / kBlock) * kBlock;
-  for (std::size_t n = 0; n < end; ++n) {
-    const std::size_t block = first + n / kBlock, i = n % kBlock;
+  for (std::size_t n = 0; n < blocks_ * kBlock; ++n) {
+    const std::size_t block = n / kBlock, i = n % kBlock;
     const Index c = clusters[std::min(n, clusters.size() - 1)];
-    if (n < clusters.size()) clusters_[block * kBlock + i] = c;
+    if (n < clusters.size()) clusters_[n] = c;
     const ClusterRest& rest = in.shape.clusters[c];
-    masses_[block * kBlock + i] = rest.mass;
+    masses_[n] = rest.mass;
     const Index begin = in.clusters.offsets[c], members = in.clusters.offsets[c + 1] - begin;
     std::uint32_t* const particles = particles_.data() + block * kCorners * kBlock + i;
-    if (boxes) {
-      for (Index k = begin; k < begin + members; ++k) {
-        const Index particle = in.clusters.members[k];
-        particles[cornerAt(in.rest[particle] - rest.centre) * kBlock] = particle;
-      }
-      continue;
-    }
-    double* const shape = shapes_.data() + (block - box_blocks_) * kBlock * elastic_sets::kShapeRows + i;
+    double* const shape = shapes_.data() + block * kBlock * elastic_sets::kShapeRows + i;
     for (Index k = 0; k < kCorners; ++k) {
       // A corner that is missing has no mass and lies on another.
       const Index particle = in.clusters.members[begin + (k < members ? k : 0)];
@@ -243,19 +205,20 @@ double ElasticBatch::accelerate(const MatchInput& in, const ElasticParameters& m
                                    state.others, accelerations, counters, swelling);
   const auto solve = [&](std::size_t index) {
     elastic_sets::Block block;
-    const std::size_t box_lanes = boxes_, small_lanes = small_;
-    const bool boxes = index < box_blocks_;
-    const std::size_t left = boxes ? box_lanes - index * kBlock : small_lanes - (index - box_blocks_) * kBlock;
+    const std::size_t whole_lanes = whole_, small_lanes = small_;
+    const bool whole = index < whole_blocks_;
+    const std::size_t left = whole ? whole_lanes - index * kBlock : small_lanes - (index - whole_blocks_) * kBlock;
     block.count = static_cast<int>(std::min<std::size_t>(left, kBlock));
     block.positions = y.data()->data();
     block.particles = particles_.data() + index * kCorners * kBlock;
     block.masses = masses_.data() + index * kBlock;
-    if (!boxes && cells_.empty())
-      block.shape = shapes_.data() + (index - box_blocks_) * kBlock * elastic_sets::kShapeRows;
-    else if (!boxes)
-      block.cells = cells_.data() + (index - box_blocks_) * kBlock * elastic_sets::kCellRows;
-    for (int k = 0; k < 3; ++k) block.half_edges[k] = half_edges_[k];
-    block.softness = softness_;
+    if (!shapes_.empty())
+      block.shape = shapes_.data() + index * kBlock * elastic_sets::kShapeRows;
+    else if (!whole)
+      block.cells = cells_.data() + (index - whole_blocks_) * kBlock * elastic_sets::kCellRows;
+    if (!whole && !mixes_.empty())
+      block.mixes = mixes_.data() + (index - whole_blocks_) * kBlock * elastic_sets::kMixRows;
+    block.half_edge = half_edge_;
     block.shrink = 1.0 / swelling;
     block.shear = 2.0 * material.mu / material.density;
     block.pressure = material.lambda / material.density;
@@ -283,14 +246,14 @@ double ElasticBatch::accelerate(const MatchInput& in, const ElasticParameters& m
     most = std::max(most, state.largest[b]);
     counters.cold_rotations += state.cold[b];
   }
-  counters.clusters += boxes_ + small_;
-  counters.rotations += boxes_ + small_;
-  counters.linear_fits += boxes_ + small_;
+  counters.clusters += whole_ + small_;
+  counters.rotations += whole_ + small_;
+  counters.linear_fits += whole_ + small_;
   return std::max(stretch, std::sqrt(most / 3.0));
 }
 
 std::size_t ElasticBatch::bytes() const {
-  return sizeof *this + bytesOf(clusters_, particles_, masses_, shapes_, cells_) +
+  return sizeof *this + bytesOf(clusters_, particles_, masses_, shapes_, cells_, mixes_) +
          bytesOf(force_offsets_, force_places_, inverse_masses_) +
          bytesOf(others_.offsets, others_.members, others_.weights, others_.seeds, others_.radii) +
          bytesOf(other_clusters_, other_shape_.clusters, other_shape_.quadratic, other_elastic_);

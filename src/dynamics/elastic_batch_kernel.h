@@ -59,6 +59,8 @@ struct Matrix {
   Pack m[3][3];
 };
 
+constexpr int kModes[4] = {3, 5, 6, 7};  // by the bits of their coordinates
+
 // Between the two passes over a block.
 struct alignas(64) Fits {
   double gradient[9][kBlock];  // F, row by row
@@ -126,46 +128,27 @@ void gather(const Block& b) {
 #endif
 }
 
-// F and centre of a box: sums and differences of its corners.
-MESHLESS_INLINE Matrix fitBox(const Block& b, Fits& fits, int i) {
-  const Pack scale[3] = {all(0.125 / b.half_edges[0]), all(0.125 / b.half_edges[1]), all(0.125 / b.half_edges[2])};
-  Matrix f;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double* const p = b.forces + axis * kBlock + i;
-    const Pack p0 = get(p), p1 = get(p + 3 * kBlock), p2 = get(p + 6 * kBlock), p3 = get(p + 9 * kBlock);
-    const Pack p4 = get(p + 12 * kBlock), p5 = get(p + 15 * kBlock), p6 = get(p + 18 * kBlock);
-    const Pack p7 = get(p + 21 * kBlock);
-    const Pack s0 = p0 + p1, s1 = p2 + p3, s2 = p4 + p5, s3 = p6 + p7;
-    const Pack t0 = s0 + s1, t1 = s2 + s3;
-    put(0.125 * (t0 + t1), fits.centre[axis] + i);
-    f.m[axis][0] = scale[0] * (((p1 - p0) + (p3 - p2)) + ((p5 - p4) + (p7 - p6)));
-    f.m[axis][1] = scale[1] * ((s1 - s0) + (s3 - s2));
-    f.m[axis][2] = scale[2] * (t1 - t0);
-  }
-  return f;
-}
-
-// F of a cell that is filled in part: axis by axis its corners become their mean at the centroid and half their
-// difference. The coefficients of the hourglass modes replace the positions of the corners 3, 5, 6, 7.
+// F of a cell: axis by axis its corners become their mean at the centroid and half their difference. The coefficients
+// of the products of two and three coordinates, over half an edge, replace the positions of the corners 3, 5, 6, 7.
+template <bool kWhole>
 MESHLESS_INLINE Matrix fitCell(const Block& b, int i) {
-  const double* const cell = b.cells + i;
-  const Pack scale = all(1.0 / b.half_edges[0]);
+  const Pack scale = all(0.125 / b.half_edge);
   Matrix f;
   for (int axis = 0; axis < 3; ++axis) {
     double* const p = b.forces + axis * kBlock + i;
     Pack a[kCorners];
     for (int k = 0; k < kCorners; ++k) a[k] = get(p + 3 * k * kBlock);
     for (int d = 0; d < 3; ++d) {
-      const Pack at = get(cell + (kCentroidRow + d) * kBlock);
+      const Pack at = kWhole ? Pack{} : get(b.cells + i + (kCentroidRow + d) * kBlock);
       for (int k = 0; k < kCorners; ++k) {
         if (k >> d & 1) continue;
-        const Pack low = a[k], high = a[k | 1 << d], half = 0.5 * (high - low);
-        a[k] = 0.5 * (low + high) + at * half;
-        a[k | 1 << d] = half;
+        const Pack low = a[k], high = a[k | 1 << d], difference = high - low;
+        a[k] = kWhole ? low + high : low + high + at * difference;
+        a[k | 1 << d] = difference;
       }
     }
     f.m[axis][0] = scale * a[1], f.m[axis][1] = scale * a[2], f.m[axis][2] = scale * a[4];
-    put(a[3], p + 9 * kBlock), put(a[5], p + 15 * kBlock), put(a[6], p + 18 * kBlock), put(a[7], p + 21 * kBlock);
+    for (const int mode : kModes) put(scale * a[mode], p + 3 * mode * kBlock);
   }
   return f;
 }
@@ -305,8 +288,22 @@ MESHLESS_INLINE void holdLess(const Matrix& f, Pack norm2, Pack& j, Matrix& slop
   j *= share;
 }
 
+// Lame's constants over density, and what they give.
+struct Lame {
+  Pack shear, pressure;  // 2 mu, lambda
+  Pack coupling;         // lambda / (lambda + 2 mu)
+};
+MESHLESS_INLINE Lame lameOf(const Block& b, int i) {
+  if (!b.mixes) return {all(b.shear), all(b.pressure), all(b.pressure / (b.pressure + b.shear))};
+  const double* const mix = b.mixes + i;
+  const Pack own = get(mix + kOwnRow * kBlock);
+  const Pack shear = own * b.shear + b.youngs * get(mix + kShearRow * kBlock);
+  const Pack pressure = own * b.pressure + b.youngs * get(mix + kPressureRow * kBlock);
+  return {shear, pressure, pressure / (pressure + shear)};
+}
+
 // Stress over density, and the steepness of the pressure (stress() of elastic.cpp) into most where it is larger.
-MESHLESS_INLINE Matrix stress(const Block& b, const Matrix& gradient, int i, Pack& most) {
+MESHLESS_INLINE Matrix stress(const Block& b, const Matrix& gradient, const Lame& lame, int i, Pack& most) {
   Matrix f;
   for (int row = 0; row < 3; ++row)
     for (int c = 0; c < 3; ++c) f.m[row][c] = b.shrink * gradient.m[row][c];
@@ -325,44 +322,18 @@ MESHLESS_INLINE Matrix stress(const Block& b, const Matrix& gradient, int i, Pac
   Pack share = all(1.0);
   holdLess(f, norm2, j, slope, share);
   const Pack strain = volumeStrain(j);
-  Pack shear = all(b.shear), pressure = all(b.pressure);
-  if (b.cells) {
-    const double* const cell = b.cells + i;
-    const Pack own = get(cell + kOwnRow * kBlock);
-    shear = own * shear + b.youngs * get(cell + kShearRow * kBlock);
-    pressure = own * pressure + b.youngs * get(cell + kPressureRow * kBlock);
-  }
-  pressure *= strain;
+  const Pack pressure = lame.pressure * strain;
   Pack steepness = choose(strain < 0.0, -strain, strain) * (share * squareRoot(norm2));
   for (int row = 0; row < 3; ++row)
     for (int c = 0; c < 3; ++c) steepness += slope.m[row][c] * slope.m[row][c];
   most = steepness > most ? steepness : most;
   Matrix p;
   for (int row = 0; row < 3; ++row)
-    for (int c = 0; c < 3; ++c) p.m[row][c] = shear * (f.m[row][c] - r.m[row][c]) + pressure * slope.m[row][c];
+    for (int c = 0; c < 3; ++c) p.m[row][c] = lame.shear * (f.m[row][c] - r.m[row][c]) + pressure * slope.m[row][c];
   return p;
 }
 
 // The forces [N] of a cluster on its corners, less their sign: m_ic (P S q + k (p - F q)). They replace the positions.
-MESHLESS_INLINE void pushBox(const Block& b, const Fits& fits, const Matrix& f, const Matrix& p, int i) {
-  const Pack mass = 0.125 * get(b.masses + i);
-  const Pack k = (b.hourglass * b.softness) * mass;
-  for (int axis = 0; axis < 3; ++axis) {
-    Pack h[3];
-    for (int c = 0; c < 3; ++c)
-      h[c] = (mass * (1.0 / b.half_edges[c])) * p.m[axis][c] - (k * b.half_edges[c]) * f.m[axis][c];
-    const Pack middle = -k * get(fits.centre[axis] + i);
-    const Pack low = middle - h[2], high = middle + h[2], sum = h[0] + h[1], difference = h[0] - h[1];
-    double* const to = b.forces + axis * kBlock + i;
-    const auto push = [&](int corner, Pack rest) __attribute__((always_inline)) {
-      double* const at = to + 3 * corner * kBlock;
-      put(k * get(at) + rest, at);
-    };
-    push(0, low - sum), push(1, low + difference), push(2, low - difference), push(3, low + sum);
-    push(4, high - sum), push(5, high + difference), push(6, high - difference), push(7, high + sum);
-  }
-}
-
 MESHLESS_INLINE void pushAny(const Block& b, const Fits& fits, const Matrix& f, const Matrix& p, int i) {
   const double* const shape = b.shape + i;
   const Pack mass = get(b.masses + i);
@@ -385,21 +356,91 @@ MESHLESS_INLINE void pushAny(const Block& b, const Fits& fits, const Matrix& f, 
   }
 }
 
+// bending() of elastic_law.h over density: its slopes by the modes replace them, those by the gradient are added to p.
+template <bool kWhole>
+MESHLESS_INLINE void bend(const Block& b, const Matrix& f, const Lame& lame, Matrix& p, int i) {
+  double* const modes = b.forces + i;
+  const auto at = [&](int mode, int axis) __attribute__((always_inline)) { return modes + (3 * mode + axis) * kBlock; };
+  Pack stiffness[3];
+  for (int k = 0; k < 3; ++k)
+    stiffness[k] = kWhole ? (1.0 / 3.0) * lame.shear : lame.shear * get(b.cells + i + (kVarianceRow + k) * kBlock);
+  Pack square = {};
+  for (int row = 0; row < 3; ++row)
+    for (int c = 0; c < 3; ++c) square += f.m[row][c] * f.m[row][c];
+  const Pack inverse = choose(square > 0.0, 1.0 / square, Pack{});
+  const Pack scale2 = 3.0 * inverse;      // of along and of slope, which are not scaled
+  constexpr int kWithout[3] = {6, 5, 3};  // the mode without axis n
+  Pack m[3][3], along[3][3], slope[3][3];
+  for (int n = 0; n < 3; ++n) {
+    for (int axis = 0; axis < 3; ++axis) m[n][axis] = get(at(kWithout[n], axis));
+    for (int c = 0; c < 3; ++c) along[n][c] = f.m[0][c] * m[n][0] + f.m[1][c] * m[n][1] + f.m[2][c] * m[n][2];
+  }
+  Pack twist[3];
+  for (int k = 0; k < 3; ++k) {
+    const int i1 = (k + 1) % 3, i2 = (k + 2) % 3;  // mode i1 k is the one without i2
+    const Pack both = lame.coupling * (along[i2][i1] + along[i1][i2]);
+    twist[k] = 0.5 * stiffness[k] * (along[i1][i1] + along[i2][i2]);
+    slope[i2][i1] = stiffness[k] * (along[i2][i1] + both);
+    slope[i1][i2] = stiffness[k] * (along[i1][i2] + both);
+  }
+  Pack twice = {};
+  for (int n = 0; n < 3; ++n) {
+    slope[n][n] = twist[(n + 1) % 3] + twist[(n + 2) % 3];
+    for (int c = 0; c < 3; ++c) {
+      twice += along[n][c] * slope[n][c];
+      slope[n][c] *= scale2;
+    }
+  }
+  twice *= scale2 * inverse;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int c = 0; c < 3; ++c)
+      p.m[axis][c] +=
+          m[0][axis] * slope[0][c] + m[1][axis] * slope[1][c] + m[2][axis] * slope[2][c] - twice * f.m[axis][c];
+    for (int n = 0; n < 3; ++n)
+      put(f.m[axis][0] * slope[n][0] + f.m[axis][1] * slope[n][1] + f.m[axis][2] * slope[n][2], at(kWithout[n], axis));
+  }
+  Pack least = stiffness[0];
+  if (!kWhole) {
+    least = least < stiffness[1] ? least : stiffness[1];
+    least = least < stiffness[2] ? least : stiffness[2];
+  }
+  for (int axis = 0; axis < 3; ++axis) put(least * get(at(7, axis)), at(7, axis));
+}
+
 // The transpose of fitCell().
+template <bool kWhole>
 MESHLESS_INLINE void pushCell(const Block& b, const Matrix& p, int i) {
-  constexpr int kModes[4] = {3, 5, 6, 7};
-  const double* const cell = b.cells + i;
-  const Pack mass = get(b.masses + i);
-  const Pack pull = mass * (1.0 / b.half_edges[0]), stiffness = (b.hourglass * b.softness) * mass;
+  const Pack pull = get(b.masses + i) * (0.125 / b.half_edge);
   for (int axis = 0; axis < 3; ++axis) {
     double* const to = b.forces + axis * kBlock + i;
     Pack a[kCorners];
     a[0] = Pack{};
     a[1] = pull * p.m[axis][0], a[2] = pull * p.m[axis][1], a[4] = pull * p.m[axis][2];
-    for (int m = 0; m < 4; ++m)
-      a[kModes[m]] = stiffness * get(cell + (kModeRow + m) * kBlock) * get(to + 3 * kModes[m] * kBlock);
+    for (const int mode : kModes) a[mode] = pull * get(to + 3 * mode * kBlock);
     for (int d = 0; d < 3; ++d) {
-      const Pack at = get(cell + (kCentroidRow + d) * kBlock);
+      const Pack at = kWhole ? Pack{} : get(b.cells + i + (kCentroidRow + d) * kBlock);
+      for (int k = 0; k < kCorners; ++k) {
+        if (k >> d & 1) continue;
+        const Pack mean = a[k], apart = kWhole ? a[k | 1 << d] : at * mean + a[k | 1 << d];
+        a[k] = mean - apart;
+        a[k | 1 << d] = mean + apart;
+      }
+    }
+    for (int k = 0; k < kCorners; ++k) put(a[k], to + 3 * k * kBlock);
+  }
+}
+
+// The transpose of fitCell().
+MESHLESS_INLINE void pushCell(const Block& b, const Matrix& p, int i) {
+  const Pack pull = get(b.masses + i) * (1.0 / b.half_edge);
+  for (int axis = 0; axis < 3; ++axis) {
+    double* const to = b.forces + axis * kBlock + i;
+    Pack a[kCorners];
+    a[0] = Pack{};
+    a[1] = pull * p.m[axis][0], a[2] = pull * p.m[axis][1], a[4] = pull * p.m[axis][2];
+    for (const int mode : kModes) a[mode] = pull * get(to + 3 * mode * kBlock);
+    for (int d = 0; d < 3; ++d) {
+      const Pack at = b.cells ? get(b.cells + i + (kCentroidRow + d) * kBlock) : Pack{};
       for (int k = 0; k < kCorners; ++k) {
         if (k >> d & 1) continue;
         const Pack half = 0.5 * a[k], apart = at * half + 0.5 * a[k | 1 << d];
@@ -413,12 +454,21 @@ MESHLESS_INLINE void pushCell(const Block& b, const Matrix& p, int i) {
 
 }  // namespace
 
-BlockResult accelerate(const Block& b) {
+namespace {
+
+enum class Kind { kCluster, kWhole, kPartial };
+
+template <Kind kKind>
+MESHLESS_INLINE BlockResult accelerateOf(const Block& b) {
   BlockResult result;
   Fits fits;
   gather(b);
   for (int i = 0; i < b.count; i += kLanes) {
-    const Matrix f = b.cells ? fitCell(b, i) : b.shape ? fitAny(b, fits, i) : fitBox(b, fits, i);
+    Matrix f;
+    if constexpr (kKind == Kind::kCluster)
+      f = fitAny(b, fits, i);
+    else
+      f = fitCell<kKind == Kind::kWhole>(b, i);
     putMatrix(f, fits.gradient, i);
     rotate(b, f, fits, i);
   }
@@ -426,17 +476,25 @@ BlockResult accelerate(const Block& b) {
   Pack most = {};
   for (int i = 0; i < b.count; i += kLanes) {
     const Matrix f = matrixAt(fits.gradient, i);
-    const Matrix p = stress(b, f, i, most);
-    if (b.cells)
-      pushCell(b, p, i);
-    else if (b.shape)
+    const Lame lame = lameOf(b, i);
+    Matrix p = stress(b, f, lame, i, most);
+    if constexpr (kKind == Kind::kCluster) {
       pushAny(b, fits, f, p, i);
-    else
-      pushBox(b, fits, f, p, i);
+    } else {
+      bend<kKind == Kind::kWhole>(b, f, lame, p, i);
+      pushCell<kKind == Kind::kWhole>(b, p, i);
+    }
   }
   for (int l = 0; l < kLanes; ++l)
     if (most[l] > result.most) result.most = most[l];
   return result;
+}
+
+}  // namespace
+
+BlockResult accelerate(const Block& b) {
+  if (b.shape) return accelerateOf<Kind::kCluster>(b);
+  return b.cells ? accelerateOf<Kind::kPartial>(b) : accelerateOf<Kind::kWhole>(b);
 }
 
 }  // namespace meshless::elastic_sets::MESHLESS_ELASTIC_SET

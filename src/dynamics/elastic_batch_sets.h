@@ -21,16 +21,19 @@ constexpr int kSoftnessRow = kInverseRow + 6;       // 1 / spread [1/m^2]
 constexpr int kShapeRows = kSoftnessRow + 1;
 
 // Rows of kBlock values in Block::cells.
-constexpr int kCentroidRow = 0;             // half edges
-constexpr int kModeRow = kCentroidRow + 3;  // stiffness of modes xy, xz, yz, xyz over that of a whole cell
-constexpr int kOwnRow = kModeRow + 4;       // share of the material of the block
-constexpr int kShearRow = kOwnRow + 1;      // what others add to `shear` over `youngs`, and to `pressure`
-constexpr int kPressureRow = kShearRow + 1;
-constexpr int kCellRows = kPressureRow + 1;
+constexpr int kCentroidRow = 0;  // half edges
+constexpr int kVarianceRow = kCentroidRow + 3;
+constexpr int kCellRows = kVarianceRow + 3;
 
-/// Clusters of at most eight members that span space; `shape` is null where all are boxes of one size, their corners in
-/// the order of the bits of x, y, z and of equal mass. `cells`: of cubes that are filled in part, corners in that
-/// order. Lanes from count to kBlock repeat a cluster.
+// Rows of kBlock values in Block::mixes.
+constexpr int kOwnRow = 0;              // share of the material of the block
+constexpr int kShearRow = kOwnRow + 1;  // what others add to `shear` over `youngs`, and to `pressure`
+constexpr int kPressureRow = kShearRow + 1;
+constexpr int kMixRows = kPressureRow + 1;
+
+/// Clusters of at most eight members that span space, by their `shape`; or, where that is null, cubes of one size,
+/// their corners in the order of the bits of x, y, z: filled in part as `cells` says, or whole and of the body's
+/// material where that is null too. Lanes from count to kBlock repeat a cluster.
 struct Block {
   int count = 0;
   const double* positions = nullptr;         // xyz of every particle
@@ -38,8 +41,8 @@ struct Block {
   const double* masses = nullptr;            // [kBlock]
   const double* shape = nullptr;             // [kShapeRows][kBlock]
   const double* cells = nullptr;             // [kCellRows][kBlock]
-  double half_edges[3] = {1.0, 1.0, 1.0};    // [m] of the boxes
-  double softness = 0.0;                     // 1 / spread of the boxes
+  const double* mixes = nullptr;             // [kMixRows][kBlock]; null where all is of the body's material
+  double half_edge = 1.0;                    // [m] of the cubes
   double shrink = 1.0;                       // strain is that of F times this
   double shear = 0.0;                        // 2 mu / rho
   double pressure = 0.0;                     // lambda / rho

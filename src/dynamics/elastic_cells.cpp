@@ -12,7 +12,12 @@ namespace {
 
 // Of the trilinear map about the centroid, each the coefficient of the product of the coordinates whose bits are set:
 // 0 the centroid itself, 1, 2 and 4 the gradient's columns, the others hourglass modes.
-using Coefficients = std::array<Vec3, 8>;
+struct Coefficients {
+  Vec3 of[8];
+
+  Vec3& operator[](int k) { return of[k]; }
+  const Vec3& operator[](int k) const { return of[k]; }
+};
 
 // Axis by axis the two ends become their weighted mean and half their difference.
 Coefficients coefficientsOf(const ElasticCell& cell, const Points& y, const Vec3& origin) {
@@ -42,22 +47,27 @@ void addForces(const ElasticCell& cell, Coefficients f, Points& forces) {
   for (int k = 0; k < 8; ++k) forces[cell.corners[k]] += f[k];
 }
 
+// In half edges.
+elastic_law::Bending bendingOf(const ElasticCells& body, const ElasticCell& cell, const ElasticParameters& material,
+                               const Mat3& gradient, Coefficients a) {
+  for (Vec3& coefficient : a.of) coefficient /= body.half_edge;
+  return elastic_law::bending(material, gradient, cell.variance, a.of);
+}
+
 Mat3 gradientOf(const Coefficients& a, double half_edge) {
   Mat3 gradient;
   gradient << a[1], a[2], a[4];
   return gradient / half_edge;
 }
 
-// The derivatives of the energy by the coefficients, for what it is by the gradient (times the volume).
+// The derivatives of the energy by the coefficients; `stress` is what it is by the gradient, but for bending.
 Coefficients slopes(const ElasticCells& body, const ElasticCell& cell, const ElasticParameters& material,
-                    const Coefficients& a, const Mat3& by_gradient) {
-  const double volume = cell.mass / material.density;
+                    const Mat3& stress, const elastic_law::Bending& bending) {
+  const double pull = cell.mass / material.density / body.half_edge;
   Coefficients f;
   f[0].setZero();
-  for (int axis = 0; axis < 3; ++axis) f[1 << axis] = (volume / body.half_edge) * by_gradient.col(axis);
-  const double stiffness = material.youngs * volume / (body.half_edge * body.half_edge);
-  for (int mode : elastic_law::kHourglassModes)
-    f[mode] = stiffness * elastic_law::hourglassStiffness(cell.variance, mode) * a[mode];
+  for (int axis = 0; axis < 3; ++axis) f[1 << axis] = pull * (stress + bending.by_gradient).col(axis);
+  for (const int mode : {3, 5, 6, 7}) f[mode] = pull * bending.by_mode[mode];
   return f;
 }
 
@@ -110,7 +120,8 @@ double elasticAccelerations(const ElasticCells& body, const ElasticParameters& m
       steepness *= shape->stiffening * shape->stiffening;
     }
     most = std::max(most, steepness);
-    addForces(cell, slopes(body, cell, mixed, f.coefficients, by_gradient), forces);
+    const elastic_law::Bending bending = bendingOf(body, cell, mixed, poses[c].deformation, f.coefficients);
+    addForces(cell, slopes(body, cell, mixed, by_gradient, bending), forces);
   }
   for (std::size_t i = 0; i < forces.size(); ++i) accelerations[i] = -forces[i] / body.masses[i];
   return std::sqrt(most / 3.0);
@@ -126,11 +137,8 @@ double elasticEnergy(const ElasticCells& body, const ElasticParameters& material
     // By F, not F / swelling: the factor is the derivative's.
     const ElasticParameters mixed = cell.mix.of(material);
     const double volume = cell.mass / mixed.density;
-    energy += volume * swelling * elastic_law::energyDensity(mixed, f.strained, f.rotation);
-    const double stiffness = mixed.youngs * volume / (body.half_edge * body.half_edge);
-    for (int mode : elastic_law::kHourglassModes)
-      energy +=
-          0.5 * stiffness * elastic_law::hourglassStiffness(cell.variance, mode) * f.coefficients[mode].squaredNorm();
+    energy += volume * (swelling * elastic_law::energyDensity(mixed, f.strained, f.rotation) +
+                        bendingOf(body, cell, mixed, poses[c].deformation, f.coefficients).energy);
   }
   return energy;
 }
@@ -144,7 +152,9 @@ double highestFrequency(const ElasticCells& body, const ElasticParameters& mater
       const Mat3 g = gradientOf(a, body.half_edge);
       const ElasticParameters mixed = cell.mix.of(material);
       const Mat3 by_gradient = mixed.mu * (g + g.transpose()) + mixed.lambda * g.trace() * Mat3::Identity();
-      addForces(cell, slopes(body, cell, mixed, a, by_gradient), forces);
+      elastic_law::Bending bending = bendingOf(body, cell, mixed, Mat3::Identity(), a);
+      bending.by_gradient.setZero();  // of the second order
+      addForces(cell, slopes(body, cell, mixed, by_gradient, bending), forces);
     }
     for (std::size_t i = 0; i < forces.size(); ++i) accelerations[i] = -forces[i] / body.masses[i];
   });

@@ -62,13 +62,46 @@ inline double energyDensity(const ElasticParameters& material, const Mat3& f, co
   return material.mu * (f - rotation).squaredNorm() + material.lambda * volumeEnergy(heldVolume(f).j);
 }
 
-// Of a cell's hourglass mode in units of E: the product of the coordinates whose bits are set in `mode`.
-constexpr int kHourglassModes[4] = {3, 5, 6, 7};
-inline double hourglassStiffness(const Vec3& variance, int mode) {
-  double least = variance.maxCoeff();
-  for (int axis = 0; axis < 3; ++axis)
-    if (mode >> axis & 1) least = std::min(least, variance[axis]);
-  return 0.9 * least;
+// Of a cell: how its energy per volume changes with the coefficients of the products of two or three coordinates, each
+// named by the bits of its axes, and through what measures them with the gradient. Lengths in half edges.
+struct Bending {
+  Vec3 by_mode[8];
+  Mat3 by_gradient;
+  double energy = 0.0;
+};
+
+// The cell is three plates at once: how strain along two axes varies along the third costs what it costs a plate in
+// plane stress. Strain is measured along the columns of F, over their mean length: so the energy turns with the cell,
+// and does not grow with its stretch.
+inline Bending bending(const ElasticParameters& material, const Mat3& f, const Vec3& variance, const Vec3 (&modes)[8]) {
+  Bending result;
+  const double square = f.squaredNorm(), scale = square > 0.0 ? std::sqrt(3.0 / square) : 0.0;
+  const double coupling = material.lambda / (material.lambda + 2.0 * material.mu);
+  Vec3 b[8], slope[8];
+  for (const int mode : {3, 5, 6}) {
+    b[mode] = scale * (f.transpose() * modes[mode]);
+    slope[mode].setZero();
+  }
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3, ik = 1 << i | 1 << k, jk = 1 << j | 1 << k;
+    const double stiffness = 2.0 * material.mu * variance[k];
+    const double both = coupling * (b[ik][i] + b[jk][j]), twist = 0.5 * stiffness * (b[jk][i] + b[ik][j]);
+    slope[ik][i] += stiffness * (b[ik][i] + both);
+    slope[jk][j] += stiffness * (b[jk][j] + both);
+    slope[jk][i] += twist;
+    slope[ik][j] += twist;
+  }
+  result.by_gradient.setZero();
+  double twice = 0.0;
+  for (const int mode : {3, 5, 6}) {
+    result.by_mode[mode] = scale * (f * slope[mode]);
+    result.by_gradient += scale * modes[mode] * slope[mode].transpose();
+    twice += b[mode].dot(slope[mode]);
+  }
+  if (square > 0.0) result.by_gradient -= twice / square * f;
+  result.by_mode[7] = 2.0 * material.mu * variance.minCoeff() * modes[7];
+  result.energy = 0.5 * (twice + result.by_mode[7].dot(modes[7]));
+  return result;
 }
 
 }  // namespace meshless::elastic_law

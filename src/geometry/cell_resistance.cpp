@@ -125,30 +125,44 @@ class ResistanceFinder {
     const double depth = surface ? (inside ? 1.0 : -1.0) * solid_.distance(p) : inside ? reach : -reach;
     const double height = held_ ? border ? held_(p) : held_(p) <= 0.0 ? -reach : reach : reach;
     if (depth <= -reach || height <= -reach) return;
-    if (depth >= reach && height >= reach) return add(at, bit, p, 1.0, 1.0, owner);
+    if (depth >= reach && height >= reach) return add(at, bit, {p, Vec3::Constant(step_)}, 1.0, owner);
     const double edge = 0.5 * step_;
     for (int k = 0; k < 8; ++k) {
-      const Vec3 part = p + 0.5 * edge * Vec3(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1);
+      Part part{p + 0.5 * edge * Vec3(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1), Vec3::Constant(edge)};
       double share = 1.0;
-      if (std::abs(depth) < reach) {
-        const double far = solid_.distance(part);
-        share = shareWithin(solid_.contains(part) ? far : -far, edge);
-      }
-      if (share > 0.0 && std::abs(height) < reach) share *= shareWithin(held_(part), edge);
-      if (share > 0.0) add(at, bit, part, 0.5, share, owner);
+      if (std::abs(height) < reach) share = shareWithin(held_(part.middle), edge);
+      if (share > 0.0 && std::abs(depth) < reach) part = withinSurface(part, edge);
+      if (share > 0.0 && part.size.minCoeff() > 0.0) add(at, bit, part, share, owner);
     }
   }
 
-  // A share of a cube about p, whose edge is `edge` samples long.
-  void add(const Place& at, int bit, const Vec3& p, double edge, double share, Index owner) {
+  // A box [m].
+  struct Part {
+    Vec3 middle, size;
+  };
+  // Of a cube what is inside, as if the surface lay across the axis that leads to it most.
+  Part withinSurface(const Part& cube, double edge) const {
+    const Vec3 way = solid_.nearest(cube.middle) - cube.middle;
+    const bool inside = solid_.contains(cube.middle);
+    const double share = shareWithin(inside ? way.norm() : -way.norm(), edge);
+    Part part = cube;
+    Eigen::Index axis = 0;
+    way.cwiseAbs().maxCoeff(&axis);
+    part.size[axis] *= share;
+    // The surface is ahead of what is inside, and behind what is outside of it.
+    if (way[axis] != 0.0) part.middle[axis] -= (inside == way[axis] > 0.0 ? 0.5 : -0.5) * (1.0 - share) * edge;
+    return part;
+  }
+
+  void add(const Place& at, int bit, const Part& part, double share, Index owner) {
     if (owner == kNoIndex) owner = nearest(at, bit);
     if (owner == kNoIndex) return;
-    const Vec3 in = 2.0 * lattice_.placeIn(lattice_.cells[owner], p) - Vec3::Ones();
-    const double volume = share * std::pow(edge / kCellSamples, 3.0),
-                 own = edge * edge / (3.0 * kCellSamples * kCellSamples);
+    const Vec3 in = 2.0 * lattice_.placeIn(lattice_.cells[owner], part.middle) - Vec3::Ones();
+    const Vec3 size = 2.0 / lattice_.spacing * part.size;
+    const double volume = 0.125 * share * size.prod();
     sums_[owner].volume += volume;
     sums_[owner].first += volume * in;
-    sums_[owner].second += volume * (in.cwiseAbs2() + Vec3::Constant(own));
+    sums_[owner].second += volume * (in.cwiseAbs2() + size.cwiseAbs2() / 12.0);
   }
 
   // The cell with the nearest free sample, of those beside this one.
@@ -201,9 +215,11 @@ class ResistanceFinder {
 
 Resistance resistanceOf(const LatticeCell& before, SampleSet filled) {
   if (filled == before.filled || before.held) return before.resists;
-  const FilledMoments moments = momentsOf(filled);
-  return {moments.fraction * before.resists.fraction / momentsOf(before.filled).fraction, moments.centroid,
-          moments.variance};
+  // Finer than samples see it was known before: of that as much as of the samples.
+  const FilledMoments moments = momentsOf(filled), all = momentsOf(before.filled);
+  return {before.resists.fraction * moments.fraction / all.fraction,
+          before.resists.centroid + moments.centroid - all.centroid,
+          before.resists.variance.cwiseProduct(moments.variance).cwiseQuotient(all.variance)};
 }
 
 void findResistance(const SolidQuery& solid, const HeldHeight& held, CellLattice& lattice) {

@@ -83,4 +83,9 @@ Mat3 mainAxes(const TriangleMesh& mesh) {
   return best;
 }
 
+double alongAxes(const TriangleMesh& mesh) {
+  const Quartic surface(mesh);
+  return surface.area() > 0.0 ? surface.fit(Mat3::Identity()) / surface.area() : 0.0;
+}
+
 }  // namespace meshless

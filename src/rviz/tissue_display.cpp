@@ -1,5 +1,7 @@
 #include "tissue_display.h"
 
+#include <algorithm>
+#include <limits>
 #include <set>
 
 #include <OgreSceneNode.h>
@@ -15,6 +17,22 @@ namespace meshless {
 namespace {
 
 enum Colouring { kByMaterial, kByStrain };
+
+constexpr float kSmallest = 1e-3f, kLargest = 2.0f;  // [m] of organs
+
+// [m] the longest side of what it spans.
+float lengthOf(const meshless_surgery::Surface& surface) {
+  float longest = 0.0f;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    float low = std::numeric_limits<float>::max(), high = std::numeric_limits<float>::lowest();
+    for (std::size_t i = axis; i < surface.vertices.size(); i += 3) {
+      low = std::min(low, surface.vertices[i]);
+      high = std::max(high, surface.vertices[i]);
+    }
+    longest = std::max(longest, high - low);
+  }
+  return longest;
+}
 
 }  // namespace
 
@@ -98,13 +116,18 @@ void TissueDisplay::draw() {
   look.wire = wire_->getBool();
   std::set<std::uint32_t> seen;
   std::size_t triangles = 0;
+  bool others = false;
   for (const auto& surface : surfaces_->bodies) {
     seen.insert(surface.id);
     triangles += surface.cut.size();
     auto& shape = bodies_[surface.id];
-    if (!shape) shape = std::make_unique<BodyShape>(scene_manager_, scene_node_);
+    if (!shape) {
+      shape = std::make_unique<BodyShape>(scene_manager_, scene_node_);
+      others = true;
+    }
     shape->show(surface, look);
   }
+  if (others) warnOfSize();
   for (auto it = bodies_.begin(); it != bodies_.end();)
     it = seen.count(it->first) > 0 ? std::next(it) : bodies_.erase(it);
   if (tools_shown_->getBool()) {
@@ -116,6 +139,24 @@ void TissueDisplay::draw() {
   setStatus(rviz::StatusProperty::Ok, "Topic",
             QString("%1 bodies, %2 triangles").arg(surfaces_->bodies.size()).arg(triangles));
   context_->queueRender();
+}
+
+// A mesh in millimetres fills the view, or is a dot in it.
+void TissueDisplay::warnOfSize() {
+  const meshless_surgery::Surface* largest = nullptr;
+  float length = 0.0f;
+  for (const auto& surface : surfaces_->bodies)
+    if (const float here = lengthOf(surface); here > length) {
+      largest = &surface;
+      length = here;
+    }
+  if (!largest || (length >= kSmallest && length <= kLargest)) return deleteStatus("Size");
+  setStatus(rviz::StatusProperty::Warn, "Size",
+            QString("%1 is %2 m long; organs are %3 to %4 m: see scale and units")
+                .arg(QString::fromStdString(largest->name))
+                .arg(length, 0, 'g', 3)
+                .arg(kSmallest)
+                .arg(kLargest));
 }
 
 }  // namespace meshless

@@ -44,6 +44,7 @@ class TissueDisplay : public rviz::Display {
 
  private:
   void draw();
+  void warnOfSize();
 
   rviz::StringProperty* node_;
   rviz::EnumProperty* colour_;

@@ -192,9 +192,7 @@ std::vector<Body> bodies() {
   return all;
 }
 
-TEST(ElasticBatch, TakesTheFastestPathWhereItCan) {
-  EXPECT_EQ(ElasticBatch(lattice(3, 2, 2).input(), lattice(3, 2, 2).elastic).boxes(), 12u);
-  EXPECT_EQ(ElasticBatch(lattice(3, 2, 2, 0.1).input(), lattice(3, 2, 2, 0.1).elastic).boxes(), 0u);
+TEST(ElasticBatch, LeavesWhatIsLargeToTheReference) {
   const Body mixed = mixture(0);
   EXPECT_GT(ElasticBatch(mixed.input(), mixed.elastic).others(), 1u);
 }

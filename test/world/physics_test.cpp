@@ -193,10 +193,10 @@ TEST(Physics, SlidingStartsAndGoesAsCoulombSays) {
     std::vector<Figure> sliding, sticking;
   } cases[] = {
       {Below::kGround,
-       {{kElastic, 1.9e-4}, {kLooks, 2e-7}, {kOne, 1.3e-7}},
+       {{kElastic, 6e-4}, {kLooks, 2e-7}, {kOne, 1.3e-7}},
        {{kElastic, 3.4e-9}, {kLooks, 0.0}, {kOne, 1.5e-8}}},
       {Below::kObstacle,
-       {{kElastic, 1.1e-4}, {kLooks, 4e-8}, {kOne, 4.3e-10}},
+       {{kElastic, 3.1e-4}, {kLooks, 4e-8}, {kOne, 4.3e-10}},
        {{kElastic, 1.9e-8}, {kLooks, 0.0}, {kOne, 0.0}}},
       {Below::kBody,
        {{kElastic, 0.0027}, {kLooks, 0.0019}, {kOne, 0.0012}},

@@ -19,13 +19,13 @@ struct ElasticBatchState {
 };
 
 /// A body's rest shape as structures of arrays. Clusters of at most eight members that span space are lanes of vectors;
-/// boxes of one size with equal masses, as uncut cells are, need no constants of their own. The reference computes the
-/// others. Constant: one object may serve many bodies of the same shape, on many threads.
+/// cells that are whole need no constants of their own. The reference computes the others. Constant: one object may
+/// serve many bodies of the same shape, on many threads.
 class ElasticBatch {
  public:
   /// `elastic` is makeElasticRest() of input.shape. Keeps no reference.
   ElasticBatch(const MatchInput& input, const std::vector<ElasticRest>& elastic);
-  /// Of cells that are filled in part; those that are whole are boxes. Keeps no reference.
+  /// Of cells that are filled in part or whole. Keeps no reference.
   explicit ElasticBatch(const ElasticCells& body);
 
   /// The rotations of poses into a state, made to fit this batch, and back. Nothing else of a pose is read or written.
@@ -41,28 +41,28 @@ class ElasticBatch {
                     ElasticBatchState& state, Points& accelerations, MatchCounters& counters, double swelling = 1.0,
                     InstructionSet set = widestInstructionSet(), const ForEach& for_each = nullptr) const;
 
-  Index boxes() const { return boxes_; }           // clusters on the fastest path
+  Index whole() const { return whole_; }           // cells on the fastest path
   std::size_t bytes() const;                       // that it holds
   Index others() const { return others_.size(); }  // clusters on the slowest
 
  private:
-  void addLanes(const MatchInput& input, const std::vector<ElasticRest>& elastic, const std::vector<Index>& clusters,
-                bool boxes);
-  void makeBlocks(std::size_t boxes, std::size_t others);
+  void addLanes(const MatchInput& input, const std::vector<ElasticRest>& elastic, const std::vector<Index>& clusters);
+  void makeBlocks(std::size_t whole, std::size_t others);
   void findForces(std::size_t particles, const std::function<Index(Index cluster)>& members,
                   const std::vector<double>& masses);
   void sumForces(std::size_t first, std::size_t last, const double* forces, Points& accelerations) const;
 
-  // Blocks of lanes: first those of boxes alone. `clusters_` names a lane's cluster, kNoIndex where a block is padded.
-  std::size_t blocks_ = 0, box_blocks_ = 0;
-  Index boxes_ = 0, small_ = 0;
+  // Blocks of lanes: first those of whole cells alone. `clusters_` names a lane's cluster, kNoIndex where a block is
+  // padded.
+  std::size_t blocks_ = 0, whole_blocks_ = 0;
+  Index whole_ = 0, small_ = 0;
   std::vector<Index> clusters_;
   std::vector<std::uint32_t> particles_;
   std::vector<double> masses_;
-  std::vector<double> shapes_;  // of blocks that are not of boxes
-  std::vector<double> cells_;   // likewise, of cells that are filled in part
-  Vec3 half_edges_ = Vec3::Ones();
-  double softness_ = 0.0;
+  std::vector<double> shapes_;  // of clusters
+  std::vector<double> cells_;   // of blocks of cells that are filled in part
+  std::vector<double> mixes_;   // of these, where there are several materials
+  double half_edge_ = 1.0;
   // Where the forces on a particle lie, in the order of its clusters' lanes.
   std::vector<std::uint32_t> force_offsets_;
   std::vector<std::uint32_t> force_places_;

@@ -1,5 +1,5 @@
 // Elasticity of hexahedral cells that are filled in part: Young's modulus and Poisson's ratio by one integration point
-// at the centroid of what fills a cell, and a stiffness against the modes that this point does not see.
+// at the centroid of what fills a cell, and by how strain varies across the cell, as in plates.
 #pragma once
 
 #include <array>
@@ -26,14 +26,16 @@ struct ElasticCells {
 
 /// Acceleration of every particle [m/s^2] at the positions y: less the gradient of elasticEnergy() over its mass. A
 /// cell of volume V = mass / density holds, with the constants of its mix,
-///   V [mu |F - R|^2 + lambda U(J)] + V/2 sum k_m |a_m|^2 / half_edge^2.
+///   V [mu |F - R|^2 + lambda U(J)] + V mu sum_k var_k [e_k : e_k + q tr(e_k)^2] + V mu min(var) |a_xyz|^2.
 /// F is the trilinear map's gradient at the centroid, R its rotation; U and what bounds it are those of
-/// elasticAccelerations() in elastic.h. a_m are the coefficients of the map's products of two or three coordinates,
-/// taken from the centroid: hourglass modes, with k_xy = 0.9 E min(var_x, var_y), likewise yz and zx, and k_xyz = 0.9 E
-/// min(var_x, var_y, var_z): 0.3 E in a whole cell. Conserves linear and angular momentum to rounding. poses, one a
-/// cell: the rotation is read (where the search starts) and written, as centre (the centroid [m]) and deformation (F)
-/// are. swelling: strain is that of F / swelling. plastic: one a cell; null or empty where nothing has flowed. Returns
-/// how much faster than at rest the highest frequency may be, as in elastic.h.
+/// elasticAccelerations() in elastic.h. e_k (2x2) is how the strain along the two other axes varies along axis k, by
+/// the coefficients of the map's products of two coordinates about the centroid, measured along the columns of F over
+/// |F|/sqrt(3); with q = lambda / (lambda + 2 mu) it costs what it costs a plate. No shear across it is counted twice:
+/// thin plates do not lock (MITC4: Dvorkin and Bathe 1984). The last term holds the product of all three. Conserves
+/// linear and angular momentum to rounding. poses, one a cell: the rotation is read (where the search starts) and
+/// written, as centre (the centroid [m]) and deformation (F) are. swelling: strain is that of F / swelling. plastic:
+/// one a cell; null or empty where nothing has flowed. Returns how much faster than at rest the highest frequency may
+/// be, as in elastic.h.
 double elasticAccelerations(const ElasticCells& cells, const ElasticParameters& material, const Points& y,
                             std::vector<ClusterPose>& poses, Points& accelerations, MatchCounters& counters,
                             double swelling = 1.0, const std::vector<PlasticShape>* plastic = nullptr);

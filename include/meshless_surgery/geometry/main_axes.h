@@ -10,4 +10,8 @@ namespace meshless {
 /// than the mesh's own (a ball), these. Turns with the mesh, but for the order and signs of the axes.
 Mat3 mainAxes(const TriangleMesh& mesh);
 
+/// That mean of nx^4 + ny^4 + nz^4 over the surface: 1 where all faces lie along and across the axes of coordinates,
+/// and never below 1/3. 0 without area.
+double alongAxes(const TriangleMesh& mesh);
+
 }  // namespace meshless
