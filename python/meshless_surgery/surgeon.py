@@ -13,8 +13,8 @@ from meshless_surgery.errors import Refused, Unanswered
 from meshless_surgery.goals import Goals
 from meshless_surgery.msg import Info, State
 from meshless_surgery.poses import blade_pose, blades_pose, pose_stamped
-from meshless_surgery.srv import (Attach, Cut, Detach, GetBody, Hash, Incise, LoadState, Lock, MovePick, Pick, Probe, Push, Release, Remove,
-                                  SaveState, SetMaterial, Spawn, SpawnCloud, Step)
+from meshless_surgery.srv import (Attach, Clip, Cut, Detach, GetBody, Hash, Incise, LoadState, Lock, MovePick, Pick, Probe, Push,
+                                  Release, Remove, SaveState, SetMaterial, Spawn, SpawnCloud, Step, Unclip)
 from meshless_surgery.streams import ToolStream
 
 
@@ -178,6 +178,15 @@ class Surgeon:
     def detach(self, name, centre=(0, 0, 0), radius=0.0, frame=None):
         """All of an attachment, or its fibres in a sphere."""
         return self.call('detach', Detach, header=self._header(frame), name=name, centre=Point(*centre), radius=radius)
+
+    def clip(self, point, direction, width=0.0, opening=0.0, body='', name='', frame=None):
+        """Closes what is hollow at `point` between jaws that close along `direction`, across the vessel: `width` (0: 5 mm) along
+        it, and up to `opening` (0: 20 mm) thick. It stays closed until unclip(name)."""
+        return self.call('clip', Clip, header=self._header(frame), name=name, body=body, point=Point(*point),
+                         direction=Vector3(*direction), width=width, opening=opening)
+
+    def unclip(self, name):
+        return self.call('unclip', Unclip, name=name)
 
     # the world
     def state(self):

@@ -237,6 +237,7 @@ class Solver {
       addPull(fibre.b, fibre.at_b->particles, fibre.at_b->weights);
     else
       scratch_.pulls.push_back({Mat3::Zero(), 0, 0});
+    if (fibre.b == fibre.a) scratch_.pulls.back().answer -= 2.0 * sharedAnswer(fibre) * Mat3::Identity();
     // Kelvin and Voigt: tension = stiffness (stretch + lag * its rate), where it is taut.
     const double lags = kLag / step.h, before = std::max(fibre.rest, spanBefore(fibre).norm());
     fibre.stiff = fibre.stiffness * step.h * step.h * (1.0 + lags);
@@ -244,6 +245,18 @@ class Solver {
     fibre.impulse *= step.warm;
     const std::size_t last = scratch_.pulls.size() - 1;
     if (!fibre.impulse.isZero(0.0)) push(fibre, &scratch_.pulls[last - 1], fibre.impulse);
+  }
+
+  /// [1/kg] by which one end of a fibre within a body goes with the other: of particles that both have.
+  double sharedAnswer(const FibreRow& fibre) const {
+    const SolverBody& body = bodies_[fibre.a];
+    double shared = 0.0;
+    const std::vector<Index>&a = fibre.at_a->particles, &b = fibre.at_b->particles;  // in their order
+    for (std::size_t k = 0, n = 0; k < a.size() && n < b.size();) {
+      if (a[k] == b[n]) shared += fibre.at_a->weights[k] * fibre.at_b->weights[n] * body.now[a[k]].inverse_mass;
+      a[k] < b[n] ? ++k : ++n;
+    }
+    return (1.0 - body.rigid_share) * shared;
   }
 
   /// How a point answers an impulse.

@@ -155,6 +155,7 @@ meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatu
     message.made = static_cast<std::uint32_t>(attachment.made);
     message.area = attachment.area;
     message.force = attachment.force;
+    message.jaws = attachment.jaws.value_or(0.0);
     state.attachments.push_back(std::move(message));
   }
   return state;

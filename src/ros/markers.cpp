@@ -18,6 +18,7 @@ constexpr double kShownReach = 0.1;      // [m] of blades without an end
 constexpr double kSpringWidth = 0.0015;  // [m]
 constexpr double kSpringEnd = 0.006;     // [m] diameter
 constexpr double kFibreWidth = 0.0005;   // [m]
+constexpr double kJawWidth = 0.0015;     // [m] of a line on a clip
 constexpr double kBladeWidth = 0.12;     // of the blade's length
 
 bool hasArea(double area, const Vec3& a, const Vec3& b, const Vec3& c) {
@@ -155,10 +156,14 @@ void MarkerBuilder::addTools(const WorldSnapshot& snapshot, const std_msgs::Head
   Marker fibres = newMarker(header, "tools", 4, Marker::LINE_LIST);
   fibres.scale.x = kFibreWidth;
   fibres.color = toColor({0.95f, 0.9f, 0.75f, 1.0f});
+  Marker clips = newMarker(header, "tools", 5, Marker::LINE_LIST);
+  clips.scale.x = kJawWidth;
+  clips.color = toColor({0.78f, 0.82f, 0.88f, 1.0f});
   for (const AttachmentSnapshot& attachment : snapshot.attachments)
     for (const auto& line : attachment.lines)
-      for (const Vec3& end : line) fibres.points.push_back(toPoint(end));
+      for (const Vec3& end : line) (attachment.jaws ? clips : fibres).points.push_back(toPoint(end));
   if (!fibres.points.empty()) array.markers.push_back(std::move(fibres));
+  if (!clips.points.empty()) array.markers.push_back(std::move(clips));
   if (snapshot.push.enabled) {
     Marker sphere = newMarker(header, "tools", 2, Marker::SPHERE);
     sphere.pose.position = toPoint(snapshot.push.position);

@@ -1,8 +1,10 @@
 #include "meshless_surgery/ros/services.h"
 
 #include <chrono>
+#include <sstream>
 
 #include <meshless_surgery/Attach.h>
+#include <meshless_surgery/Clip.h>
 #include <meshless_surgery/Cut.h>
 #include <meshless_surgery/Detach.h>
 #include <meshless_surgery/GetBody.h>
@@ -21,6 +23,7 @@
 #include <meshless_surgery/Spawn.h>
 #include <meshless_surgery/SpawnCloud.h>
 #include <meshless_surgery/Step.h>
+#include <meshless_surgery/Unclip.h>
 #include <ros/names.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
@@ -67,6 +70,8 @@ struct Services::Handlers : Answers {
     advertise(private_handle, "remove", &Handlers::remove);
     advertise(private_handle, "attach", &Handlers::attach);
     advertise(private_handle, "detach", &Handlers::detach);
+    advertise(private_handle, "clip", &Handlers::clip);
+    advertise(private_handle, "unclip", &Handlers::unclip);
     advertise(private_handle, "set_material", &Handlers::setMaterial);
     advertise(private_handle, "get_body", &Handlers::getBody);
     advertise(private_handle, "pause", &Handlers::pause);
@@ -340,6 +345,41 @@ struct Services::Handlers : Answers {
     response.left = static_cast<std::uint32_t>(detached.left);
     return accept(response, "detached " + std::to_string(detached.gone) + " fibres of '" + command.name + "'; " +
                                 std::to_string(detached.left) + " are left");
+  }
+
+  bool clip(meshless_surgery::Clip::Request& request, meshless_surgery::Clip::Response& response) {
+    BorderCheck check;
+    ClipCommand command;
+    command.name = check.newName("name", request.name);
+    if (!request.body.empty()) command.body = check.names("body", {request.body}).front();
+    const Vec3 point = check.point("point", request.point);
+    const Vec3 direction = check.direction("direction", request.direction);
+    const double width = check.number("width", request.width, 0.0, kMaxLength, "m");
+    const double opening = check.number("opening", request.opening, 0.0, kMaxLength, "m");
+    if (width > 0.0) command.width = width;
+    if (opening > 0.0) command.opening = opening;
+    if (!check.ok()) return refuse(response, "clip", check.error());
+    const auto frame = frames.toWorld(request.header);
+    if (!frame.ok()) return refuse(response, "clip", frame.error());
+    command.point = *frame * point;
+    command.direction = frame->rotation * direction;
+    const auto reply = runner.apply(command);
+    if (!reply.ok()) return refuse(response, "clip", reply.error());
+    const auto& clipped = std::get<ClipReply>(*reply);
+    response.name = clipped.name;
+    response.body = clipped.body;
+    response.fibres = static_cast<std::uint32_t>(clipped.fibres);
+    response.lumen = clipped.lumen;
+    std::ostringstream lumen;
+    lumen << 1e3 * clipped.lumen;
+    return accept(response, "clip '" + clipped.name + "' closes a lumen of " + clipped.body + " that is " +
+                                lumen.str() + " mm wide");
+  }
+
+  bool unclip(meshless_surgery::Unclip::Request& request, meshless_surgery::Unclip::Response& response) {
+    DetachCommand command;
+    command.name = request.name;
+    return applied(response, "unclip", command, "took clip '" + request.name + "' off");
   }
 
   bool setMaterial(meshless_surgery::SetMaterial::Request& request, meshless_surgery::SetMaterial::Response& response) {

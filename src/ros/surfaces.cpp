@@ -61,7 +61,7 @@ meshless_surgery::Surfaces toSurfaces(const WorldSnapshot& snapshot, const std_m
   message.picks = toPicks(snapshot);
   for (const AttachmentSnapshot& attachment : snapshot.attachments)
     for (const auto& line : attachment.lines)
-      for (const Vec3& end : line) message.fibres.push_back(toPoint(end));
+      for (const Vec3& end : line) (attachment.jaws ? message.clips : message.fibres).push_back(toPoint(end));
   message.push_shown = snapshot.push.enabled;
   message.push_position = toPoint(snapshot.push.position);
   message.push_radius = snapshot.push.radius;

@@ -19,6 +19,7 @@ namespace {
 
 constexpr float kSpringWidth = 0.0015f;  // [m]
 constexpr float kFibreWidth = 0.0005f;   // [m]
+constexpr float kJawWidth = 0.0015f;     // [m] of a line on a clip
 constexpr float kSpringEnd = 0.007f;     // [m] diameter
 constexpr double kShownReach = 0.1;      // [m] of blades without an end
 constexpr double kBladeWidth = 0.12;     // of the blade's length
@@ -52,6 +53,8 @@ ToolsShape::ToolsShape(Ogre::SceneManager* scene_manager, Ogre::SceneNode* paren
   springs_->setLineWidth(kSpringWidth);
   fibres_ = std::make_unique<rviz::BillboardLine>(scene_manager_, node_);
   fibres_->setLineWidth(kFibreWidth);
+  clips_ = std::make_unique<rviz::BillboardLine>(scene_manager_, node_);
+  clips_->setLineWidth(kJawWidth);
   push_ = std::make_unique<rviz::Shape>(rviz::Shape::Sphere, scene_manager_, node_);
   push_->getRootNode()->setVisible(false);
   scissors_material_ =
@@ -71,6 +74,7 @@ ToolsShape::~ToolsShape() {
   Ogre::MaterialManager::getSingleton().remove(scissors_material_);
   springs_.reset();
   fibres_.reset();
+  clips_.reset();
   ends_.clear();
   push_.reset();
   scene_manager_->destroySceneNode(node_);
@@ -85,18 +89,19 @@ void ToolsShape::show(const meshless_surgery::Surfaces& surfaces, double full_fo
     surfaces.push_touching ? push_->setColor(0.95f, 0.75f, 0.3f, 0.85f) : push_->setColor(0.7f, 0.75f, 0.8f, 0.85f);
   }
   showScissors(surfaces);
-  showFibres(surfaces.fibres);
+  showLines(*fibres_, surfaces.fibres, {0.95f, 0.9f, 0.75f});
+  showLines(*clips_, surfaces.clips, {0.78f, 0.82f, 0.88f});
 }
 
-void ToolsShape::showFibres(const std::vector<geometry_msgs::Point>& ends) {
-  fibres_->clear();
+void ToolsShape::showLines(rviz::BillboardLine& shape, const std::vector<geometry_msgs::Point>& ends,
+                           const Ogre::ColourValue& color) {
+  shape.clear();
   const std::size_t lines = ends.size() / 2;
-  fibres_->setNumLines(std::max<std::uint32_t>(1, static_cast<std::uint32_t>(lines)));
-  fibres_->setMaxPointsPerLine(2);
+  shape.setNumLines(std::max<std::uint32_t>(1, static_cast<std::uint32_t>(lines)));
+  shape.setMaxPointsPerLine(2);
   for (std::size_t i = 0; i < lines; ++i) {
-    if (i > 0) fibres_->newLine();
-    for (std::size_t k = 2 * i; k < 2 * i + 2; ++k)
-      fibres_->addPoint(toOgre(ends[k]), Ogre::ColourValue(0.95f, 0.9f, 0.75f));
+    if (i > 0) shape.newLine();
+    for (std::size_t k = 2 * i; k < 2 * i + 2; ++k) shape.addPoint(toOgre(ends[k]), color);
   }
 }
 

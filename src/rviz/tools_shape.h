@@ -27,11 +27,12 @@ class ToolsShape {
  private:
   void showSprings(const std::vector<meshless_surgery::PickState>& picks, double full_force);
   void showScissors(const meshless_surgery::Surfaces& surfaces);
-  void showFibres(const std::vector<geometry_msgs::Point>& ends);
+  static void showLines(rviz::BillboardLine& shape, const std::vector<geometry_msgs::Point>& ends,
+                        const Ogre::ColourValue& color);
 
   Ogre::SceneManager* scene_manager_;
   Ogre::SceneNode* node_;
-  std::unique_ptr<rviz::BillboardLine> springs_, fibres_;
+  std::unique_ptr<rviz::BillboardLine> springs_, fibres_, clips_;
   std::vector<std::unique_ptr<rviz::Shape>> ends_;
   std::unique_ptr<rviz::Shape> push_;
   Ogre::ManualObject* scissors_;

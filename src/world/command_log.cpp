@@ -9,7 +9,7 @@
 namespace meshless {
 namespace {
 
-constexpr std::uint32_t kLogVersion = 3;  // of the hashes in it, too
+constexpr std::uint32_t kLogVersion = 4;  // of the hashes in it, too
 constexpr std::size_t kRecordHeader = 8, kReadAtOnce = 1 << 20;
 // Of simulated time between records. World::step writes a hash every second, and nodes have always done so; a step more
 // is what their sums of steps have come to.

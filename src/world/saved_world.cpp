@@ -15,7 +15,7 @@ namespace meshless {
 namespace {
 
 constexpr std::string_view kMagic = "MLSSTATE";
-constexpr std::uint32_t kVersion = 18;
+constexpr std::uint32_t kVersion = 19;
 constexpr std::uint64_t kMostModels = 1u << 20;
 
 /// What follows the magic, of at least kStateHeaderBytes.
@@ -128,7 +128,8 @@ void checkTools(const SavedWorld& world) {
   for (const Attachment& attachment : world.attachments) {
     require(world.used_attachments.count(attachment.name) > 0 && attachment.fibres.size() <= attachment.made &&
                 attachment.stiffness > 0.0 && attachment.stiffness <= 1e15 &&
-                (!attachment.strength || *attachment.strength > 0.0),
+                (!attachment.strength || *attachment.strength > 0.0) &&
+                (!attachment.clip || (attachment.clip->jaws >= 0.0 && attachment.clip->closed >= 0.0)),
             "an attachment is none");
     const auto holds = [&](const BodyId& id, const BodyPoint& at) {
       const auto body =
@@ -137,11 +138,11 @@ void checkTools(const SavedWorld& world) {
              allBelow(at.particles, body->model->rest.size());
     };
     for (const Fibre& fibre : attachment.fibres)
-      require(
-          holds(fibre.a, fibre.at_a) &&
-              (fibre.b == BodyId() ? !attachment.other.empty() : fibre.b != fibre.a && holds(fibre.b, fibre.at_b)) &&
-              fibre.area > 0.0 && fibre.rest >= 0.0,
-          "a fibre joins what is not there");
+      require(holds(fibre.a, fibre.at_a) &&
+                  (fibre.b == BodyId() ? !attachment.other.empty()
+                                       : (attachment.clip || fibre.b != fibre.a) && holds(fibre.b, fibre.at_b)) &&
+                  fibre.area > 0.0 && fibre.rest >= 0.0,
+              "a fibre joins what is not there");
   }
   for (const ClosingCut& cut : world.closing) require(cut.done_at > cut.started_at, "blades close in no time");
 }

@@ -315,9 +315,14 @@ void serialize(A& archive, Fibre& v) {
   archive(a, b, at_a, at_b, place, area, rest, force, tension);
 }
 template <class A>
+void serialize(A& archive, Clip& v) {
+  auto& [jaws, closed, tissue] = v;
+  archive(jaws, closed, tissue);
+}
+template <class A>
 void serialize(A& archive, Attachment& v) {
-  auto& [name, other, stiffness, strength, made, torn, fibres] = v;
-  archive(name, other, stiffness, strength, made, torn, fibres);
+  auto& [name, other, stiffness, strength, made, torn, clip, fibres] = v;
+  archive(name, other, stiffness, strength, made, torn, clip, fibres);
 }
 template <class A>
 void serialize(A& archive, AttachCommand& v) {
@@ -328,6 +333,11 @@ template <class A>
 void serialize(A& archive, DetachCommand& v) {
   auto& [name, region] = v;
   archive(name, region);
+}
+template <class A>
+void serialize(A& archive, ClipCommand& v) {
+  auto& [name, body, point, direction, width, opening] = v;
+  archive(name, body, point, direction, width, opening);
 }
 template <class A>
 void serialize(A& archive, PushSphere& v) {

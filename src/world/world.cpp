@@ -66,6 +66,8 @@ const char* toString(EventType type) {
       return "torn";
     case EventType::kLeak:
       return "leak";
+    case EventType::kClipped:
+      return "clipped";
   }
   return "unknown";
 }

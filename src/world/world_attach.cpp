@@ -20,88 +20,6 @@ constexpr double kLongFace = 2.0;      // edges of contact: longer faces are div
 constexpr int kMostParts = 100;        // of a face's edge
 constexpr std::size_t kLongName = 90;  // of a name that is chosen, at most
 
-/// A surface as it is now, or at rest.
-struct Shown {
-  const ContactSurface* surface = nullptr;
-  Points vertices;  // [m]
-
-  Vec3 corner(Index face, int k) const { return vertices[surface->triangles[face][k]]; }
-  Vec3 at(Index face, const Vec3& shares) const {
-    return shares[0] * corner(face, 0) + shares[1] * corner(face, 1) + shares[2] * corner(face, 2);
-  }
-  Vec3 areaOf(Index face) const {
-    return 0.5 * (corner(face, 1) - corner(face, 0)).cross(corner(face, 2) - corner(face, 0));
-  }
-};
-
-struct NearestFace {
-  Index face = kNoIndex;
-  Vec3 shares = Vec3::Zero();  // of its corners
-  double distance = std::numeric_limits<double>::infinity();
-};
-
-class FaceSearch {
- public:
-  explicit FaceSearch(const Shown& shown) : shown_(shown) {
-    for (const Triangle& t : shown.surface->triangles) {
-      FloatBox box;
-      for (const Index v : t) box.extend(shown.vertices[v]);
-      boxes_.items.push_back(box);
-    }
-    shown.surface->tree.refit(boxes_);
-  }
-
-  /// Of those that are nearer than `most` [m]; none: face is kNoIndex.
-  NearestFace nearest(const Vec3& p, double most = std::numeric_limits<double>::infinity()) const {
-    NearestFace nearest;
-    const auto sharesOf = [&](Index face) {
-      return nearestWeights(p, shown_.corner(face, 0), shown_.corner(face, 1), shown_.corner(face, 2));
-    };
-    double squared = most * most;
-    nearest.face = shown_.surface->tree.nearest(
-        boxes_, p, squared, [&](Index face) { return (shown_.at(face, sharesOf(face)) - p).squaredNorm(); });
-    if (nearest.face == kNoIndex) return nearest;
-    nearest.shares = sharesOf(nearest.face);
-    nearest.distance = std::sqrt(squared);
-    return nearest;
-  }
-
- private:
-  const Shown& shown_;
-  TreeBoxes boxes_;
-};
-
-/// A mean of vertices, by what carries them.
-class PointMaker {
- public:
-  explicit PointMaker(const VertexSupports& supports) : supports_(supports) {}
-
-  void add(Index vertex, double weight) {
-    for (Index k = supports_.offsets[vertex]; k < supports_.offsets[vertex + 1]; ++k)
-      weights_[supports_.particles[k]] += weight * supports_.weights[k];
-    total_ += weight;
-  }
-  BodyPoint make() const {
-    BodyPoint point;
-    for (const auto& [particle, weight] : weights_) {
-      point.particles.push_back(particle);
-      point.weights.push_back(weight / total_);
-    }
-    return point;
-  }
-
- private:
-  const VertexSupports& supports_;
-  std::map<Index, double> weights_;
-  double total_ = 0.0;
-};
-
-BodyPoint pointOn(const ContactSurface& surface, const NearestFace& on) {
-  PointMaker maker(surface.supports);
-  for (int k = 0; k < 3; ++k) maker.add(surface.triangles[on.face][k], on.shares[k]);
-  return maker.make();
-}
-
 /// The middles of n^2 equal parts of a triangle, as shares of its corners.
 template <class Visit>
 void eachPart(int n, const Visit& visit) {
@@ -199,35 +117,15 @@ Result<AttachReply> World::Impl::attach(const AttachCommand& command) {
   if (Status numbers = checkNumbers(command, to_world); !numbers) return numbers.error();
   if (Status region = checkRegion(command.region); !region) return region.error();
   Attachment made;
-  made.name = command.name;
-  if (!made.name.empty() && used_attachments.count(made.name))
-    return Error{ErrorCode::kDuplicateName,
-                 "the attachment '" + made.name + "' is there or was there in this run; accepted: another name"};
-  if (made.name.empty()) {
-    const std::string chosen = names[0] + "-" + names[1];
-    const std::string stem = chosen.size() <= kLongName ? chosen : "attachment";
-    made.name = stem;
-    for (int n = 2; used_attachments.count(made.name); ++n) made.name = stem + "_" + std::to_string(n);
-  }
+  Result<std::string> name = newAttachmentName(command.name, names[0] + "-" + names[1]);
+  if (!name) return name.error();
+  made.name = *name;
   made.stiffness = command.stiffness;
   made.strength = command.strength;
   if (!b) made.other = names[1];
 
-  const auto shownNow = [this](WorldBody& body) {
-    measureSurface(body);
-    Shown shown;
-    shown.surface = &surfaceModel(body).surface;
-    if (body.model->collision) {
-      for (Index v = 0; v < shown.surface->vertices(); ++v)
-        shown.vertices.push_back(shown.surface->supports.sum(v, body.state.positions.data()));
-    } else {
-      refreshSurface(body);
-      shown.vertices = body.state.surface;
-    }
-    return shown;
-  };
-  const Shown of_a = shownNow(*a);
-  Shown of_b;
+  const ShownSurface of_a = shownNow(*a);
+  ShownSurface of_b;
   if (b) of_b = shownNow(*b);
   if (obstacle) of_b = {&obstacle->surface, obstacle->def->mesh.vertices};
   if (of_a.surface->triangles.empty() || (b && of_b.surface->triangles.empty()))
@@ -322,6 +220,31 @@ Result<AttachReply> World::Impl::attach(const AttachCommand& command) {
   return reply;
 }
 
+Result<std::string> World::Impl::newAttachmentName(const std::string& wanted, const std::string& stem) const {
+  if (!wanted.empty() && used_attachments.count(wanted))
+    return Error{ErrorCode::kDuplicateName,
+                 "the attachment '" + wanted + "' is there or was there in this run; accepted: another name"};
+  if (!wanted.empty()) return wanted;
+  const std::string chosen = stem.size() <= kLongName ? stem : "attachment";
+  std::string name = chosen;
+  for (int n = 2; used_attachments.count(name); ++n) name = chosen + "_" + std::to_string(n);
+  return name;
+}
+
+ShownSurface World::Impl::shownNow(WorldBody& body) {
+  measureSurface(body);
+  ShownSurface shown;
+  shown.surface = &surfaceModel(body).surface;
+  if (body.model->collision) {
+    for (Index v = 0; v < shown.surface->vertices(); ++v)
+      shown.vertices.push_back(shown.surface->supports.sum(v, body.state.positions.data()));
+  } else {
+    refreshSurface(body);
+    shown.vertices = body.state.surface;
+  }
+  return shown;
+}
+
 Result<AttachReply> World::addSceneAttachment(const AttachCommand& attachment) {
   Result<AttachReply> reply = impl_->attach(attachment);
   if (!reply) return reply;
@@ -403,12 +326,16 @@ void World::Impl::showAttachments(const SnapshotWants& wants, std::vector<Attach
       snapshot.force += fibre.tension;
       for (const BodyId& id : {fibre.a, fibre.b})
         if (std::find(ends.begin(), ends.end(), id) == ends.end()) ends.push_back(id);
-      if (!wants.surfaces) continue;
+      if (!wants.surfaces || attachment.clip) continue;
       const Points line = fibreEnds(fibre);
       snapshot.lines.push_back({line[0], line[1]});
     }
     for (const BodyId& id : ends)
       if (const WorldBody* const body = find(id)) snapshot.ends.push_back(body->name);
+    if (attachment.clip) {
+      snapshot.jaws = attachment.clip->jaws;
+      if (wants.surfaces) snapshot.lines = jawLines(attachment);
+    }
     if (!attachment.other.empty()) snapshot.ends.push_back(attachment.other);
     shown.push_back(std::move(snapshot));
   }
@@ -432,6 +359,7 @@ std::vector<std::vector<char>> World::Impl::partedBy(const ScissorBlades& blades
         whole = whole || isIn(severed, id);
       }
       const Points ends = fibreEnds(fibre);
+      meant = meant && !attachment.clip;  // no blade cuts a clip
       gone.push_back(meant && crosses(blades, whole, ends[0], ends[1]));
     }
     parted.push_back(std::move(gone));
@@ -464,36 +392,43 @@ void World::Impl::followFibres(const BodyId& parent, const BodyModel& model, con
         return std::any_of(attachment.fibres.begin(), attachment.fibres.end(), isOf);
       }))
     return;
-  std::vector<Shown> shown(pieces.size());
+  std::vector<ShownSurface> shown(pieces.size());
   std::vector<FaceSearch> searches;
   for (std::size_t p = 0; p < pieces.size(); ++p) {
     const ContactSurface& surface = surfaceModel(*find(pieces[p])).surface;
     shown[p] = {&surface, surface.rest};
     searches.emplace_back(shown[p]);
   }
+  const auto follow = [&](BodyId& id, BodyPoint& end) {
+    const Vec3 rest = end.of(model.rest);
+    NearestFace nearest;
+    std::size_t of = 0;
+    for (std::size_t p = 0; p < pieces.size(); ++p) {
+      if (shown[p].surface->triangles.empty()) continue;
+      const NearestFace found = searches[p].nearest(rest, nearest.distance);
+      if (!(found.distance < nearest.distance)) continue;
+      nearest = found;
+      of = p;
+    }
+    if (nearest.face == kNoIndex) return;
+    id = pieces[of];
+    end = pointOn(*shown[of].surface, nearest);
+  };
   for (Attachment& attachment : attachments)
     for (Fibre& fibre : attachment.fibres) {
       if (!isOf(fibre)) continue;
-      const bool is_a = fibre.a == parent;
-      BodyPoint& end = is_a ? fibre.at_a : fibre.at_b;
-      BodyId& id = is_a ? fibre.a : fibre.b;
-      const Vec3 rest = end.of(model.rest), was = end.of(before);
-      NearestFace nearest;
-      std::size_t of = 0;
-      for (std::size_t p = 0; p < pieces.size(); ++p) {
-        if (shown[p].surface->triangles.empty()) continue;
-        const NearestFace found = searches[p].nearest(rest, nearest.distance);
-        if (!(found.distance < nearest.distance)) continue;
-        nearest = found;
-        of = p;
-      }
-      if (nearest.face == kNoIndex) continue;
-      id = pieces[of];
-      end = pointOn(*shown[of].surface, nearest);
+      const auto endBefore = [&](const BodyId& id, const BodyPoint& at) {
+        if (id == parent) return at.of(before);
+        const WorldBody* const other = find(id);
+        return other ? at.of(other->state.positions) : fibre.place;
+      };
+      const double was = (endBefore(fibre.a, fibre.at_a) - endBefore(fibre.b, fibre.at_b)).norm();  // [m]
+      const bool follows[] = {fibre.a == parent, fibre.b == parent};
+      for (int e = 0; e < 2; ++e)
+        if (follows[e]) follow(e == 0 ? fibre.a : fibre.b, e == 0 ? fibre.at_a : fibre.at_b);
       // So that nothing jumps where the new point is a little beside the old one.
       const Points ends = fibreEnds(fibre);
-      const Vec3 other = is_a ? ends[1] : ends[0], now = is_a ? ends[0] : ends[1];
-      fibre.rest = std::max(0.0, fibre.rest + (now - other).norm() - (was - other).norm());
+      fibre.rest = std::max(0.0, fibre.rest + (ends[0] - ends[1]).norm() - was);
     }
 }
 

@@ -11,6 +11,7 @@
 #include "meshless_surgery/contact/textbook.h"
 #include "meshless_surgery/dynamics/match_batch.h"
 #include "meshless_surgery/world/world.h"
+#include "shown_surface.h"
 #include "surface_model.h"
 
 namespace meshless {
@@ -251,6 +252,7 @@ struct World::Impl {
   Result<Reply> apply(const RemoveCommand& command);
   Result<Reply> apply(const AttachCommand& command);
   Result<Reply> apply(const DetachCommand& command);
+  Result<Reply> apply(const ClipCommand& command);
   /// What the command would change, or why it is refused.
   Result<std::vector<MaterialChange>> changesOf(const SetMaterialCommand& command) const;
   std::string letGo(const Pick& pick);  // one of picks; the name of its body
@@ -296,6 +298,13 @@ struct World::Impl {
   /// Of a body that was of that model, with its particles there [m], and has become these.
   void followFibres(const BodyId& parent, const BodyModel& model, const Points& before,
                     const std::vector<BodyId>& pieces);
+  /// As it is now.
+  ShownSurface shownNow(WorldBody& body);
+  /// Of an attachment: the one that is wanted, or one that is chosen after `stem`.
+  Result<std::string> newAttachmentName(const std::string& wanted, const std::string& stem) const;
+  /// On the outside of what a clip holds.
+  std::vector<std::array<Vec3, 2>> jawLines(const Attachment& clip);
+  void closeClips(double h_frame);
   void listFibres();
   void wakeAttached();
   void tearFibres();

@@ -35,6 +35,7 @@ void World::Impl::takeStep() {
   const double h_frame = 1.0 / settings.step_rate;
   closeBlades();
   wakePushed(h_frame);
+  closeClips(h_frame);
   listFibres();
   wakeAttached();
   listAwake();

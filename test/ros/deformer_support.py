@@ -13,15 +13,15 @@ import rosunit
 from genpy.dynamic import generate_dynamic
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
 from meshless_surgery.msg import Event, State
-from meshless_surgery.srv import (Attach, Cut, Detach, GetBody, Hash, Incise, LoadState, Lock, MovePick, Pick, Probe, Push, Release, Remove,
-                                  SaveState, SetMaterial, Spawn, SpawnCloud, Step)
+from meshless_surgery.srv import (Attach, Clip, Cut, Detach, GetBody, Hash, Incise, LoadState, Lock, MovePick, Pick, Probe, Push,
+                                  Release, Remove, SaveState, SetMaterial, Spawn, SpawnCloud, Step, Unclip)
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
 
 TYPES = {
-    'attach': Attach, 'detach': Detach, 'pick': Pick, 'move_pick': MovePick, 'lock': Lock, 'release': Release, 'clear_picks': Trigger, 'push': Push,
+    'attach': Attach, 'detach': Detach, 'clip': Clip, 'unclip': Unclip, 'pick': Pick, 'move_pick': MovePick, 'lock': Lock, 'release': Release, 'clear_picks': Trigger, 'push': Push,
     'cut': Cut, 'open_scissors': Trigger, 'incise': Incise, 'spawn': Spawn, 'spawn_cloud': SpawnCloud, 'remove': Remove, 'set_material': SetMaterial, 'get_body': GetBody,
     'lift_scissors': Trigger, 'undo_cut': Trigger, 'probe': Probe, 'pause': SetBool, 'step': Step, 'reset': Trigger, 'save': SaveState, 'load': LoadState, 'hash': Hash,
 }

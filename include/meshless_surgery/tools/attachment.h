@@ -20,6 +20,13 @@ struct Fibre {
   double tension = 0.0;       // [N] mean over the last step
 };
 
+/// What makes an attachment of a body to itself a clip: two jaws that close what is hollow between them.
+struct Clip {
+  double jaws = 0.0;    // [m] how wide what is between them may be; falls to `closed`
+  double closed = 0.0;  // [m]
+  double tissue = 0.0;  // [m] between the jaws, when they are closed
+};
+
 struct Attachment {
   std::string name;
   std::string other;               // the obstacle, or "world"; empty between bodies
@@ -27,6 +34,7 @@ struct Attachment {
   std::optional<double> strength;  // [Pa] at which a fibre tears; empty: never
   std::uint32_t made = 0;          // fibres
   bool torn = false;               // some of it
+  std::optional<Clip> clip;        // its fibres are between walls of a lumen
   std::vector<Fibre> fibres;       // that are whole
 };
 

@@ -92,10 +92,20 @@ struct DetachCommand {
   std::optional<Region> region;  // in which one of its ends is; empty: all of it
 };
 
+/// Closes what is hollow between two jaws, and holds it closed.
+struct ClipCommand {
+  std::string name;                // empty: one is chosen
+  std::string body;                // empty: the nearest
+  Vec3 point = Vec3::Zero();       // [m] on the vessel
+  Vec3 direction = Vec3::UnitZ();  // in which the jaws close, across the vessel; of any length above 0
+  double width = 0.005;            // [m] > 0 of the jaws, along the vessel
+  double opening = 0.02;           // [m] > 0 of the jaws, and their length across
+};
+
 using Command =
     std::variant<PickCommand, MovePickCommand, LockCommand, ReleaseCommand, ClearPicksCommand, PushCommand, CutCommand,
                  OpenScissorsCommand, InciseCommand, SetMaterialCommand, SpawnCommand, RemoveCommand, LiftCommand,
-                 UndoCutCommand, OpenBladesCommand, AttachCommand, DetachCommand>;
+                 UndoCutCommand, OpenBladesCommand, AttachCommand, DetachCommand, ClipCommand>;
 
 struct PickReply {
   PickId pick = 0;
@@ -141,8 +151,13 @@ struct AttachReply {
 struct DetachReply {
   std::size_t gone = 0, left = 0;  // fibres
 };
+struct ClipReply {
+  std::string name, body;
+  std::size_t fibres = 0;
+  double lumen = 0.0;  // [m] its widest, which the jaws close
+};
 
 using Reply = std::variant<Done, PickReply, CutReply, CutStarted, InciseReply, SpawnReply, UndoCutReply, AttachReply,
-                           DetachReply>;
+                           DetachReply, ClipReply>;
 
 }  // namespace meshless

@@ -74,7 +74,8 @@ enum class EventType {
   kAttached,
   kDetached,
   kTorn,
-  kLeak
+  kLeak,
+  kClipped
 };
 const char* toString(EventType type);
 
@@ -154,7 +155,8 @@ struct AttachmentSnapshot {
   std::size_t fibres = 0, made = 0;        // whole, and at the start
   double area = 0.0;                       // [m^2] of those that are whole
   double force = 0.0;                      // [N] sum of their tensions
-  std::vector<std::array<Vec3, 2>> lines;  // [m] their ends; where surfaces are wanted
+  std::optional<double> jaws;              // [m] of a clip: how wide it still may be between them
+  std::vector<std::array<Vec3, 2>> lines;  // [m] ends of fibres, of a clip lines on its jaws; where surfaces are wanted
 };
 
 struct WorldSnapshot {
