@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "meshless_surgery/geometry/hollow_organs.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/organs.h"
 
@@ -40,7 +41,10 @@ bool writeObj(const std::string& path, const std::string& comment, const Triangl
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Writes liver.obj, kidney.obj, fish.obj, bladder.obj, skin.obj and block.obj.");
+  CLI::App app(
+      "Writes liver.obj, kidney.obj, fish.obj, bladder.obj, skin.obj, block.obj, gallbladder.obj, stomach.obj, "
+      "vessel.obj "
+      "and omentum.obj.");
   std::string folder;
   unsigned seed = 1;
   app.add_option("--out", folder, "folder to write into; it must exist")->required()->check(CLI::ExistingDirectory);
@@ -54,6 +58,10 @@ int main(int argc, char** argv) {
                        writeObj(folder + "/fish.obj", seeded, meshless::fishMesh(seed)) &&
                        writeObj(folder + "/bladder.obj", fixed, meshless::bladderMesh()) &&
                        writeObj(folder + "/skin.obj", fixed, meshless::skinSlabMesh()) &&
-                       writeObj(folder + "/block.obj", fixed, meshless::block32Mesh());
+                       writeObj(folder + "/block.obj", fixed, meshless::block32Mesh()) &&
+                       writeObj(folder + "/gallbladder.obj", fixed, meshless::gallbladderMesh()) &&
+                       writeObj(folder + "/stomach.obj", fixed, meshless::stomachMesh()) &&
+                       writeObj(folder + "/vessel.obj", fixed, meshless::vesselMesh()) &&
+                       writeObj(folder + "/omentum.obj", fixed, meshless::omentumMesh());
   return written ? 0 : 1;
 }
