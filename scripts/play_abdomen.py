@@ -23,18 +23,17 @@ def middle(surgeon, name, x):
     return now[numpy.abs(rest[:, 0] - x) < STRIP].mean(axis=0)
 
 
-def opening(surgeon, names, x):
-    """[m] How wide the lumen is where x is in the rest shape, as it was and now, over the pieces of a vessel."""
+def lumen(surgeon, names, x):
+    """[m] How far apart opposite walls are, in the mean, near x in the rest shape: there, and now, over the pieces of a vessel."""
     rest, now = (numpy.concatenate([points(surgeon.body(name, rest).surface.vertices) for name in names]) for rest in (True, False))
     near = numpy.abs(rest[:, 0] - x) < STRIP
     rest, now = rest[near], now[near]
-    radius = numpy.linalg.norm((rest - rest.mean(axis=0))[:, 1:], axis=1)
-    walls = radius < 0.75 * radius.max()  # inner ones
-    middle_of = numpy.abs(rest[:, 1] - rest[:, 1].mean()) < 0.001  # above and below each other
-    chosen = walls & middle_of
-    above = chosen & (rest[:, 2] > rest[:, 2].mean())
-    below = chosen & (rest[:, 2] < rest[:, 2].mean())
-    return [float(p[above][:, 2].mean() - p[below][:, 2].mean()) for p in (rest, now)]
+    arm = (rest - rest.mean(axis=0))[:, 1:]
+    radius = numpy.linalg.norm(arm, axis=1)
+    above = numpy.flatnonzero((radius < 0.8 * radius.max()) & (arm[:, 1] > 0.2 * radius.max()))
+    # Of each inner place above, the one below it.
+    below = [numpy.linalg.norm(rest - rest[i] + (0, 0, 2 * arm[i, 1]), axis=1).argmin() for i in above]
+    return [float(numpy.abs(ends[above] - ends[below])[:, 2].mean()) for ends in (rest, now)]
 
 
 def clips_of(state, prefix):
@@ -51,8 +50,8 @@ def divide(surgeon, play, name):
         surgeon.clip(tuple(middle(surgeon, name, x)), UP, width=0.004, body=name)
     surgeon.live(0.7)
     for x in CLIPS[name]:
-        was, now = opening(surgeon, [name], x)
-        play.check(now < 0.15 * was, 'the %s is closed at x = %.0f mm: %.2f of %.2f mm are left' % (name, 1e3 * x, 1e3 * now, 1e3 * was))
+        was, now = lumen(surgeon, [name], x)
+        play.check(now < 0.2 * was, 'the %s is closed at x = %.0f mm: %.2f of %.2f mm are left' % (name, 1e3 * x, 1e3 * now, 1e3 * was))
     between = middle(surgeon, name, sum(CLIPS[name]) / 2)
     with surgeon.still():
         cut = surgeon.cut(pivot=tuple(between - numpy.array((0, 0.02, 0))), reach=(0, 1, 0), normal=ALONG, length=0.04, width=0.02,
@@ -74,11 +73,12 @@ def scenario(surgeon, play):
     neck = max(surgeon.body('gallbladder').surface.vertices, key=lambda v: v.x)
     pick = surgeon.pick((neck.x, neck.y, neck.z), body='gallbladder')
     at = numpy.array((pick.position.x, pick.position.y, pick.position.z))
-    for k in range(12):
-        at += (-0.0015, -0.001, -0.003)
+    drawn = whole
+    while drawn > 0.7 * whole and at[2] > 0.04:
+        at += (-0.0005, 0.0, -0.001)
         surgeon.move(pick.pick_id, tuple(at))
-        surgeon.live(0.15)
-    drawn = bed(surgeon).fibres
+        surgeon.live(0.05)
+        drawn = bed(surgeon).fibres
     play.check(drawn < whole, 'the pull at the neck has torn %d of %d fibres' % (whole - drawn, whole))
     surgeon.push((0.03, -0.02, 0.122), radius=0.008)
     surgeon.push((-0.06, -0.02, 0.114), radius=0.008, speed=0.04)
@@ -86,29 +86,31 @@ def scenario(surgeon, play):
     peeled = bed(surgeon).fibres
     play.check(peeled < drawn, 'the sphere between gallbladder and liver has peeled off %d more' % (drawn - peeled))
     surgeon.lift_push()
-    for k in range(40):
-        if k > 12 and bed(surgeon).fibres == 0:
-            break
-        at += (0.0, -0.003, -0.002 if at[2] > 0.06 else 0.0)
+    while at[2] > 0.05 or bed(surgeon).fibres and at[2] > 0.02:  # down, off what is left of the bed
+        at[2] -= 0.002
         surgeon.move(pick.pick_id, tuple(at))
-        surgeon.live(0.1)
+        surgeon.live(0.06)
+    while at[1] > -0.14:  # and out to the front
+        at[1] -= 0.003
+        surgeon.move(pick.pick_id, tuple(at))
+        surgeon.live(0.06)
     surgeon.lock(pick.pick_id, tuple(at))
     surgeon.live(1.0)
 
     state, after, liver = surgeon.state(), surgeon.body('gallbladder'), surgeon.body('liver')
     play.check(bed(surgeon).fibres == 0, 'no fibre of the bed is left')
-    top = max(v.y for v in after.surface.vertices)
+    back = numpy.mean([v.y for v in after.surface.vertices])
     front = min(v.y for v in liver.surface.vertices)
-    play.say('the gallbladder is at y = %.0f mm and before, the liver begins at %.0f mm' % (1e3 * top, 1e3 * front))
-    low = max(v.z for v in after.surface.vertices) < min(v.z for v in liver.surface.vertices)
-    play.check(top < front or low, 'it is out from under the liver')
+    play.check(back < front, 'its middle is at y = %.0f mm, in front of the liver, which begins at %.0f mm' % (1e3 * back, 1e3 * front))
     cavity = after.cavities[0]
     play.check(not cavity.open and abs(cavity.volume / before.cavities[0].volume - 1) < 0.05,
                'it is whole, and holds %.1f ml' % (1e6 * cavity.volume))
     play.check([b.name for b in state.bodies if b.name.startswith('liver')] == ['liver'], 'the liver is whole')
     for name, names in pieces.items():
-        for x in CLIPS[name]:
-            was, now = opening(surgeon, names, x)
+        clips = clips_of(state, name)
+        play.check(len(clips) == 2 and all(c.fibres == c.made for c in clips.values()), 'both clips of the %s hold' % name)
+        for x in CLIPS[name][1:]:  # of what stays
+            was, now = lumen(surgeon, names, x)
             play.check(now < 0.2 * was, 'the %s is still closed at x = %.0f mm: %.2f of %.2f mm' % (name, 1e3 * x, 1e3 * now, 1e3 * was))
     play.say('real-time factor %.2f' % state.real_time_factor)
 

@@ -232,12 +232,13 @@ class Solver {
   void activate(const SpringRow& spring) { addPull(spring.body, *spring.patch, *spring.weights); }
 
   void activate(FibreRow& fibre, const SolverStep& step) {
-    addPull(fibre.a, fibre.at_a->particles, fibre.at_a->weights);
+    const bool within = fibre.a == fibre.b;  // moves nothing as a whole
+    addPull(fibre.a, fibre.at_a->particles, fibre.at_a->weights, !within);
     if (fibre.b != kNoIndex)
-      addPull(fibre.b, fibre.at_b->particles, fibre.at_b->weights);
+      addPull(fibre.b, fibre.at_b->particles, fibre.at_b->weights, !within);
     else
       scratch_.pulls.push_back({Mat3::Zero(), 0, 0});
-    if (fibre.b == fibre.a) scratch_.pulls.back().answer -= 2.0 * sharedAnswer(fibre) * Mat3::Identity();
+    if (within) scratch_.pulls.back().answer -= 2.0 * sharedAnswer(fibre) * Mat3::Identity();
     // Kelvin and Voigt: tension = stiffness (stretch + lag * its rate), where it is taut.
     const double lags = kLag / step.h, before = std::max(fibre.rest, spanBefore(fibre).norm());
     fibre.stiff = fibre.stiffness * step.h * step.h * (1.0 + lags);
@@ -259,14 +260,16 @@ class Solver {
     return (1.0 - body.rigid_share) * shared;
   }
 
-  /// How a point answers an impulse.
-  void addPull(Index of_body, const std::vector<Index>& patch, const std::vector<double>& weights) {
+  /// How a point answers an impulse: `rigidly` with its body or its groups, too.
+  void addPull(Index of_body, const std::vector<Index>& patch, const std::vector<double>& weights,
+               bool rigidly = true) {
     SolverBody& body = bodies_[of_body];
     Pull pull;
     pull.levers = static_cast<Index>(scratch_.levers.size());
-    addLevers(body, [&](const auto& visit) {
-      for (std::size_t k = 0; k < patch.size(); ++k) visit(patch[k], weights[k]);
-    });
+    if (rigidly)
+      addLevers(body, [&](const auto& visit) {
+        for (std::size_t k = 0; k < patch.size(); ++k) visit(patch[k], weights[k]);
+      });
     pull.end = static_cast<Index>(scratch_.levers.size());
     double own = 0.0;
     for (std::size_t k = 0; k < patch.size(); ++k) own += weights[k] * weights[k] * body.now[patch[k]].inverse_mass;
@@ -540,7 +543,8 @@ inline void solve(const std::vector<SolverRows>& sets, std::vector<SpringRow>& s
       if (b != kNoIndex) Solver::moveGroups(bodies[b], false);
   if (free.empty()) return;
   for (const FibreRow& fibre : fibres) {  // it pulls along what it is in the end, not at the start
-    const Vec3 couple = solver.spanBefore(fibre).cross(fibre.impulse);
+    Vec3 couple = solver.spanBefore(fibre).cross(fibre.impulse);
+    if (fibre.a == fibre.b) couple *= 1.0 - bodies[fibre.a].rigid_share;
     bodies[fibre.a].leaked += 0.5 * couple;
     bodies[fibre.b].leaked += 0.5 * couple;
   }

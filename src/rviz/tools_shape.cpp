@@ -89,8 +89,8 @@ void ToolsShape::show(const meshless_surgery::Surfaces& surfaces, double full_fo
     surfaces.push_touching ? push_->setColor(0.95f, 0.75f, 0.3f, 0.85f) : push_->setColor(0.7f, 0.75f, 0.8f, 0.85f);
   }
   showScissors(surfaces);
-  showLines(*fibres_, surfaces.fibres, {0.95f, 0.9f, 0.75f});
-  showLines(*clips_, surfaces.clips, {0.78f, 0.82f, 0.88f});
+  showLines(*fibres_, surfaces.fibres, Ogre::ColourValue(0.95f, 0.9f, 0.75f));
+  showLines(*clips_, surfaces.clips, Ogre::ColourValue(0.78f, 0.82f, 0.88f));
 }
 
 void ToolsShape::showLines(rviz::BillboardLine& shape, const std::vector<geometry_msgs::Point>& ends,

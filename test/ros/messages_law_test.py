@@ -556,6 +556,21 @@ class MessagesLawTest(DeformerTestCase):
         self.assertAlmostEqual(MASSES['hangs'] * G / (1e6 * bed.area), drawn[:, 2].mean(), delta=1e-4)  # some stand for more than others
         held.update({('meshless_surgery/State', 'attachments'), (shown._type, 'fibres')})
 
+    def test_a_clip_closes_what_it_says(self):
+        self.good('spawn', file='package://meshless_surgery/config/meshes/bladder.obj', pose=pose_stamped(3.0, 0.0, 1.0),
+                  material='elastic_muscle')
+        answer = self.good('clip', point=Point(3.0, 0.0, 1.02), direction=Vector3(0, 0, 1), width=0.01, opening=0.06)
+        self.holds(answer, 'lumen', 0.038, 0.001)
+        asked = rospy.Time.now()
+        self.good('step', steps=12)
+        clip, = self.state().attachments
+        self.says(clip, name='bladder-clip', ends=['bladder'], made=answer.fibres, fibres=answer.fibres,
+                  jaws=(answer.lumen - 0.02 * 0.1, 1e-6))
+        shown = self.fresh('surfaces', Surfaces, lambda m: m.header.stamp > asked and len(m.clips) > 0)
+        self.assertLess(np.abs(plain(shown.clips) - (3.0, 0.0, 1.0)).max(), 0.06)
+        self.good('unclip', name='bladder-clip')
+        held.update({(answer._type, 'name'), (answer._type, 'body'), (answer._type, 'fibres'), (shown._type, 'clips')})
+
     def test_events_and_rates(self):
         self.good('step', steps=3)
         events = self.deformer.recorder('events', Event)

@@ -430,7 +430,27 @@ def joined(**fields):
     return prepare
 
 
+def hollow(position=(0.0, 0.0, 1.0), **fields):
+    """A bladder of 60 x 50 x 44 mm."""
+    def prepare(test):
+        test.good('spawn', file='package://meshless_surgery/config/meshes/bladder.obj', pose=pose_stamped(*position),
+                  material='elastic_muscle')
+        return fields
+    return prepare
+
+
+def clipped(test):
+    """The bladder, clipped."""
+    test.good('clip', **hollow(**CLIP)(test))
+    return {}
+
+
+def lumen(test, answer):
+    return answer.lumen
+
+
 TO_WORLD = dict(body='left', other='world', stiffness=1e6)
+CLIP = dict(point=Point(0.0, 0.0, 1.02), direction=Vector3(0, 0, 1), width=0.01, opening=0.06)
 CORNER = Point(-0.15, 0.05, 0.15)
 LAWS = [
     Law('attach', 'name', 'mine', TO_WORLD, name_of, 'mine', 'left-world'),
@@ -444,6 +464,14 @@ LAWS = [
     Law('detach', 'name', 'left-world', joined(), fibres_left, 0, Refusal(UNKNOWN)),
     Law('detach', 'centre', CORNER, joined(name='left-world', radius=0.06), fibres_left, within(10, 1000), Refusal(MISSED)),
     Law('detach', 'radius', 0.06, joined(name='left-world', centre=CORNER), fibres_left, within(10, 1000), 0),
+    Law('clip', 'name', 'mine', hollow(**CLIP), name_of, 'mine', 'bladder-clip'),
+    Law('clip', 'body', 'bladder', hollow(**dict(CLIP, position=(-0.2, 0.0, 0.18), point=Point(-0.2, 0.0, 0.152), opening=0.1)),
+        body_of, 'bladder', Refusal(MISSED)),
+    Law('clip', 'point', CLIP['point'], hollow(**CLIP), lumen, within(0.037, 0.039), Refusal(MISSED)),
+    Law('clip', 'direction', Vector3(1, 0, 0), hollow(**dict(CLIP, opening=0.07)), lumen, within(0.05, 0.055), Refusal(INVALID)),
+    Law('clip', 'width', 0.01, hollow(**CLIP), lambda test, answer: answer.fibres, within(50, 80), within(20, 40)),
+    Law('clip', 'opening', 0.06, hollow(**CLIP), lumen, within(0.037, 0.039), Refusal(MISSED)),
+    Law('unclip', 'name', 'bladder-clip', clipped, lambda test, answer: len(test.state().attachments), 0, Refusal(UNKNOWN)),
     Law('cut', 'blades', FLAT['blades'], with_middle(), cut_bodies, ['left', 'right'], ['middle']),
     Law('cut', 'length', 0.2, FLAT, cut_bodies, ['left'], ['left', 'right']),
     Law('cut', 'width', 0.2, dict(blades=pose_stamped(-0.2, -1.0, 0.1, ALONG_Y)), cut_bodies, ['left'], ['left', 'right']),
@@ -510,6 +538,8 @@ LAWS = [
 FRAMED = {
     'attach': dict(header=Header(), body='left', other='world', stiffness=1e6, centre=Point(-0.151, 0.033, 0.143), radius=0.0617),
     'detach': dict(header=Header(), name='left-world', centre=Point(-0.151, 0.033, 0.143), radius=0.0617),
+    'clip': dict(header=Header(), body='bladder', point=Point(0.001, 0.002, 1.019), direction=Vector3(0.1, 0.2, 1.0), width=0.011,
+                 opening=0.061),
     'cut': dict(blades=pose_stamped(-0.3, 0.012, 0.093, TURNED), length=0.25, width=0.3),
     'incise': dict(blade=blade_pose((-0.23, 0.013, 0.151), (1, 0.1, 0.02), (0.05, 0.1, 1)), length=0.061, depth=0.032),
     'pick': dict(header=Header(), point=Point(-0.61, 0.013, -0.11), direction=Vector3(2.03, 0.02, 1.01)),
@@ -658,6 +688,8 @@ class RequestsTest(Asked):
         fields = {field: said_in(frame, stamp, value) for field, value in dict(FRAMED[service], **other).items()}
         if service in NEEDS_A_PICK:
             fields['pick_id'] = self.pick_left().pick_id
+        if service == 'clip':
+            hollow()(self)
         if service == 'detach':
             self.good('attach', body='left', other='world', stiffness=1e6)
         answer = self.ask(name, fields)

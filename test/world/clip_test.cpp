@@ -14,7 +14,7 @@
 #include "support/bodies.h"
 
 namespace meshless {
-namespace {
+namespace clip_test {
 
 constexpr int kRound = 24;                                         // vertices of a ring
 constexpr double kOuter = 0.003, kInner = 0.002, kLength = 0.048;  // [m]
@@ -92,23 +92,25 @@ WorldSnapshot seen(World& world) {
   return world.snapshot(wants);
 }
 
-/// [m^2] of the section of the lumen that was at x, whichever pieces it is in.
+/// [m] that opposite walls at x are apart along z, in the mean, whichever pieces they are in.
 double lumen(World& world, double x) {
-  std::vector<std::pair<double, Vec3>> ring;
+  std::vector<std::pair<double, Vec3>> ring;  // angles
   for (const BodySnapshot& body : seen(world).bodies) {
     const Points& rest = body.model->surface.vertices;
-    for (std::size_t v = 0; v < rest.size(); ++v) {
-      const Vec3 at = rest[v];
-      if (std::abs(std::hypot(at.y(), at.z()) - kInner) < 1e-5 && std::abs(at.x() - x) < 0.3 * kPitch)
-        ring.push_back({std::atan2(at.z(), at.y()), body.surface[v]});
-    }
+    for (std::size_t v = 0; v < rest.size(); ++v)
+      if (std::abs(std::hypot(rest[v].y(), rest[v].z()) - kInner) < 1e-5 && std::abs(rest[v].x() - x) < 0.3 * kPitch)
+        ring.push_back({std::atan2(rest[v].z(), rest[v].y()), body.surface[v]});
   }
   EXPECT_GE(ring.size(), static_cast<std::size_t>(kRound)) << x;
-  std::sort(ring.begin(), ring.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  Vec3 area = Vec3::Zero();
-  for (std::size_t n = 1; n < ring.size(); ++n)
-    area += 0.5 * (ring[n - 1].second - ring[0].second).cross(ring[n].second - ring[0].second);
-  return area.norm();
+  double apart = 0.0;
+  int pairs = 0;
+  for (const auto& [above, top] : ring)
+    for (const auto& [below, bottom] : ring)
+      if (above > 0.1 && above < M_PI - 0.1 && std::abs(above + below) < 1e-3) {
+        apart += std::abs((top - bottom).z());
+        ++pairs;
+      }
+  return apart / pairs;
 }
 
 CutReply cutAt(World& world, double x) {
@@ -122,7 +124,7 @@ CutReply cutAt(World& world, double x) {
 TEST(Clip, ClosesTheLumenAndTheRestOfItStaysOpen) {
   World world = worldOf(tube(true));
   const double open = lumen(world, 0.024), beside = lumen(world, 0.0096);
-  EXPECT_NEAR(open, M_PI * kInner * kInner, 0.02 * open);
+  EXPECT_NEAR(open, 4.0 / M_PI * kInner, 0.1 * open);
   const ClipReply reply = close(world, clipAt(0.024));
   EXPECT_EQ(reply.body, "vessel");
   EXPECT_EQ(reply.name, "vessel-clip");
@@ -131,7 +133,7 @@ TEST(Clip, ClosesTheLumenAndTheRestOfItStaysOpen) {
   for (int n = 0; n < 4; ++n) {
     live(world, 0.5);
     const double now = lumen(world, 0.024);
-    EXPECT_LT(now, n == 0 ? before : 0.06 * open) << n;
+    EXPECT_LT(now, n == 0 ? before : 0.15 * open) << n;
     before = now;
   }
   EXPECT_GT(lumen(world, 0.0096), 0.5 * beside);
@@ -146,7 +148,7 @@ TEST(Clip, OpensAgainWhenItIsTakenOff) {
   const double open = lumen(world, 0.024);
   const ClipReply reply = close(world, clipAt(0.024));
   live(world, 1.0);
-  EXPECT_LT(lumen(world, 0.024), 0.06 * open);
+  EXPECT_LT(lumen(world, 0.024), 0.15 * open);
   ASSERT_TRUE(world.apply(DetachCommand{reply.name, {}}).ok());
   live(world, 2.0);
   EXPECT_GT(lumen(world, 0.024), 0.9 * open);
@@ -186,8 +188,8 @@ TEST(Clip, ACutBetweenTwoLeavesOneOnEachPieceAndBothClosed) {
   }
   for (int n = 0; n < 3; ++n) {
     live(world, 0.5);
-    EXPECT_LT(lumen(world, 0.016), 0.06 * open) << n;
-    EXPECT_LT(lumen(world, 0.032), 0.06 * open) << n;
+    EXPECT_LT(lumen(world, 0.016), 0.15 * open) << n;
+    EXPECT_LT(lumen(world, 0.032), 0.15 * open) << n;
   }
 }
 
@@ -292,5 +294,5 @@ TEST(Clip, NothingIsPaidWhereThereIsNone) {
   EXPECT_EQ(seen(world).report.fibres, 0u);
 }
 
-}  // namespace
+}  // namespace clip_test
 }  // namespace meshless
