@@ -11,7 +11,7 @@ import meshless_surgery.msg
 import numpy
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import Point, PoseStamped, WrenchStamped
+from geometry_msgs.msg import Point, PoseStamped, Vector3, WrenchStamped
 from meshless_surgery.msg import Event, Info, State, Surfaces, Topology, Vertices
 from meshless_surgery.srv import GetBodyResponse
 from sensor_msgs.msg import JointState, PointCloud2
@@ -567,9 +567,9 @@ class MessagesLawTest(DeformerTestCase):
         self.says(clip, name='bladder-clip', ends=['bladder'], made=answer.fibres, fibres=answer.fibres,
                   jaws=(answer.lumen - 0.02 * 0.1, 1e-6))
         shown = self.fresh('surfaces', Surfaces, lambda m: m.header.stamp > asked and len(m.clips) > 0)
-        self.assertLess(np.abs(plain(shown.clips) - (3.0, 0.0, 1.0)).max(), 0.06)
+        self.assertLess(numpy.abs(plain(shown.clips) - (3.0, 0.0, 1.0)).max(), 0.06)
         self.good('unclip', name='bladder-clip')
-        held.update({(answer._type, 'name'), (answer._type, 'body'), (answer._type, 'fibres'), (shown._type, 'clips')})
+        held.add((shown._type, 'clips'))
 
     def test_events_and_rates(self):
         self.good('step', steps=3)

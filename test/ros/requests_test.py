@@ -468,7 +468,7 @@ LAWS = [
     Law('clip', 'body', 'bladder', hollow(**dict(CLIP, position=(-0.2, 0.0, 0.18), point=Point(-0.2, 0.0, 0.152), opening=0.1)),
         body_of, 'bladder', Refusal(MISSED)),
     Law('clip', 'point', CLIP['point'], hollow(**CLIP), lumen, within(0.037, 0.039), Refusal(MISSED)),
-    Law('clip', 'direction', Vector3(1, 0, 0), hollow(**dict(CLIP, opening=0.07)), lumen, within(0.05, 0.055), Refusal(INVALID)),
+    Law('clip', 'direction', Vector3(0, 1, 0), hollow(**CLIP), lumen, within(0.042, 0.045), Refusal(INVALID)),
     Law('clip', 'width', 0.01, hollow(**CLIP), lambda test, answer: answer.fibres, within(50, 80), within(20, 40)),
     Law('clip', 'opening', 0.06, hollow(**CLIP), lumen, within(0.037, 0.039), Refusal(MISSED)),
     Law('unclip', 'name', 'bladder-clip', clipped, lambda test, answer: len(test.state().attachments), 0, Refusal(UNKNOWN)),
