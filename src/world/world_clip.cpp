@@ -13,8 +13,8 @@
 namespace meshless {
 namespace {
 
-constexpr int kAcross = 20;             // fibres, where a lumen is as wide as the jaws open
-constexpr int kMostRows = 200;          // of fibres along the vessel
+constexpr int kAcross = 30;             // fibres, where a lumen is as wide as the jaws open
+constexpr int kMostRows = 300;          // of fibres along the vessel
 constexpr double kJawSpeed = 0.02;      // [m/s] at which they close, so that no energy jumps in
 constexpr double kShut = 0.03;          // of the lumen's width stays, so that contact within does not fight the jaws
 constexpr double kStiffness = 20.0;     // of the jaws, in that of tissue as thick as the lumen is wide
@@ -137,6 +137,13 @@ Jaws jawsAt(const ShownSurface& shown, const Vec3& at, const Vec3& direction, do
   jaws.axes[1] = jaws.axes[2].cross(jaws.axes[0]);
   middle /= area;
   jaws.centre = middle + (at - middle).dot(jaws.axes[0]) * jaws.axes[0];
+  for (const int k : {2, 1}) {  // of what was near, to the middle of the whole
+    const Jaws turned{jaws.centre, {jaws.axes[(k + 1) % 3], jaws.axes[(k + 2) % 3], jaws.axes[k]}};
+    Box met;
+    for (const Crossing& crossing : LineSearch(shown, turned, 0.0, 0.0).through(0.0, 0.0))
+      if (std::abs(crossing.at) <= 2.0 * reach) met.extend(Vec3::Constant(crossing.at));
+    if (!met.empty()) jaws.centre += 0.5 * (met.min.x() + met.max.x()) * jaws.axes[k];
+  }
   return jaws;
 }
 

@@ -469,7 +469,7 @@ LAWS = [
         body_of, 'bladder', Refusal(MISSED)),
     Law('clip', 'point', CLIP['point'], hollow(**CLIP), lumen, within(0.037, 0.039), Refusal(MISSED)),
     Law('clip', 'direction', Vector3(0, 1, 0), hollow(**CLIP), lumen, within(0.042, 0.045), Refusal(INVALID)),
-    Law('clip', 'width', 0.01, hollow(**CLIP), lambda test, answer: answer.fibres, within(50, 80), within(20, 40)),
+    Law('clip', 'width', 0.01, hollow(**CLIP), lambda test, answer: answer.fibres, within(90, 130), within(50, 80)),
     Law('clip', 'opening', 0.06, hollow(**CLIP), lumen, within(0.037, 0.039), Refusal(MISSED)),
     Law('unclip', 'name', 'bladder-clip', clipped, lambda test, answer: len(test.state().attachments), 0, Refusal(UNKNOWN)),
     Law('cut', 'blades', FLAT['blades'], with_middle(), cut_bodies, ['left', 'right'], ['middle']),

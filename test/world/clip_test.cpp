@@ -288,6 +288,24 @@ TEST(Clip, RefusesWhatIsWrongAndChangesNothing) {
   refuses(with([&](ClipCommand& c) { c.point = Vec3(0, 0, 0.311); }), ErrorCode::kMissed, "hollow");
 }
 
+TEST(Clip, WakesWhatItHoldsAndNobodyElse) {
+  World world = worldOf(tube(true));
+  BodyDef other = tube(true);
+  other.name = "other";
+  other.pose.translation.y() += 0.1;
+  other.fixed.front() = HeldRegion(Vec3::Constant(-1.0), Vec3::Constant(1.0));
+  other.fixed.pop_back();
+  ASSERT_TRUE(world.addSceneBody(test::shared(other)).ok());
+  live(world, 2.0);
+  EXPECT_EQ(seen(world).report.asleep, 2u);
+  close(world, clipAt(0.024));
+  world.step();
+  EXPECT_EQ(seen(world).report.asleep, 1u);
+  EXPECT_FALSE(seen(world).bodies[0].asleep);
+  live(world, 4.0);
+  EXPECT_EQ(seen(world).report.asleep, 2u) << "a clipped vessel comes to rest";
+}
+
 TEST(Clip, NothingIsPaidWhereThereIsNone) {
   World world = worldOf(tube(true));
   live(world, 0.1);

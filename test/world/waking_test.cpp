@@ -156,6 +156,9 @@ std::vector<Row> rows(const Kind& kind, const Vec3& pressed) {
   const SpawnCommand onto{test::shared(cube(kind, "stone", Vec3(0, 0, 2.503 * kEdge)))};
   const SpawnCommand above{test::shared(cube(kind, "stone", Vec3(0, 0, 2.6 * kEdge)))};
   const SpawnCommand aside{test::shared(cube(kind, "stone", Vec3(-2.0 * kApart, 0, 2.5 * kEdge)))};
+  ClipCommand clip;  // what is hollow wakes: clip_test.cpp
+  clip.body = "high";
+  clip.opening = 4.0 * kEdge;
   const Names pieces{"low.1", "low.2", "high"};
   const AttachCommand joined{"", "low", "high", 0.01, 1e3, {}, {}}, tied{"", "low", "under", 2.0 * kApart, 1.0, {}, {}};
   return {
@@ -211,6 +214,7 @@ std::vector<Row> rows(const Kind& kind, const Vec3& pressed) {
       {"detach", DetachCommand{"low-high", {}}, kTower, {joined}},
       {"detach when all sleep again", DetachCommand{"low-high", {}}, kTower, {joined}, 1, false, true},
       {"detach of nothing", DetachCommand{"low-high", {}}, {}, {}, 1, true},
+      {"clip of what is not hollow", clip, {}, {}, 1, true},
       {"removal from below", RemoveCommand{"low"}, {"high"}},
       {"removal from above", RemoveCommand{"high"}, {"low"}},
       {"removal of what is picked", RemoveCommand{"held"}, {"under"}},
