@@ -198,7 +198,10 @@ TEST(Clip, NoBladeCutsIt) {
   const ClipReply reply = close(world, clipAt(0.024));
   live(world, 1.0);
   CutCommand along;  // through the clip, along the vessel and across the fibres
-  along.blades.origin = kAt + Vec3(-0.1, 0, 0);
+  Vec3 middle = Vec3::Zero();
+  const auto lines = seen(world).attachments[0].lines;
+  for (const auto& line : lines) middle += (line[0] + line[1]) / (2.0 * static_cast<double>(lines.size()));
+  along.blades.origin = Vec3(-0.1, 0, middle.z());
   along.blades.x_axis = Vec3::UnitX();
   along.blades.y_axis = Vec3::UnitY();
   const CutReply cut = test::replyOf<CutReply>(world.apply(along));
