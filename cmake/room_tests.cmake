@@ -72,6 +72,7 @@ set(links_io ${PROJECT_NAME}_io ZLIB::ZLIB)
 set(links_world ${PROJECT_NAME}_drive ZLIB::ZLIB)  # its bowl; forged states have the right checksum
 set(links_stress ${PROJECT_NAME}_io)
 set(links_drive ${PROJECT_NAME}_drive)
+set(links_training ${PROJECT_NAME}_training)
 set(links_accuracy bench_truth bench_pile)
 
 # The accuracy tests are many steps of plain arithmetic: nothing that sanitizers have not seen in the rooms.

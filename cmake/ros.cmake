@@ -21,7 +21,7 @@ install(TARGETS ${PROJECT_NAME}_ros
   ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
-install(TARGETS deformer_node drive make_meshes replay ${bench_targets}
+install(TARGETS deformer_node drive make_meshes replay report ${bench_targets}
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 install(DIRECTORY bench/truth/data bench/truth/calculix
   DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/bench/truth)

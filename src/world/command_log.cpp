@@ -248,6 +248,7 @@ Result<ReplayReport> replay(std::istream& log, int threads, const std::function<
       for (; started && world.stepCount() < step; ++report.steps) {
         world.step();
         if (after_step) after_step(world);
+        (void)world.takeEvents();
       }
       switch (static_cast<RecordKind>(kind)) {
         case RecordKind::kStart:
@@ -313,7 +314,7 @@ Result<ReplayReport> replay(std::istream& log, int threads, const std::function<
     } catch (const ArchiveFault& fault) {
       return damaged("record " + std::to_string(number) + ": " + fault.what());
     }
-    (void)world.takeEvents();
+    if (!after_step) (void)world.takeEvents();
   }
   if (!started) return damaged("it has no start");
   report.last_step = world.stepCount();

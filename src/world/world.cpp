@@ -288,6 +288,7 @@ WorldSnapshot World::snapshot(const SnapshotWants& wants) {
     if (wants.surfaces) b.surface = body->state.surface;
     if (wants.particles) b.particles = body->state.positions;
     if (wants.measures) b.measures = measureBody(*body->model, body->state);
+    b.placed = body->state.placed;
     // Of its last step, or of one that is still to come.
     b.stiffness_factor = std::min(body->stiffness_factor, stiffnessFactor(*body->model, body->state, shortest));
     b.asleep = body->asleep;
@@ -325,6 +326,7 @@ Result<BodySnapshot> World::inspect(const std::string& name, bool rest) {
   b.surface = body->state.surface;
   b.particles = body->state.positions;
   b.measures = measureBody(*body->model, body->state);
+  b.placed = body->state.placed;
   if (rest) {  // where it was put: the model's frame may be another one
     const Pose& placed = body->state.placed;
     b.surface = body->model->surface.vertices;

@@ -31,7 +31,8 @@ struct ReplayReport {
 
 /// Refuses (kUnreadable) what World::record did not write. The same build gives the same hashes on any number of
 /// threads (1..64). A damaged record in the middle ends the replay with an error.
-/// `after_step` may look at the world, and must not change it.
+/// `after_step` may look at the world and take its events, those of the commands before the step too. It must not change
+/// it otherwise.
 Result<ReplayReport> replay(std::istream& log, int threads = 1,
                             const std::function<void(World& world)>& after_step = {});
 

@@ -147,6 +147,7 @@ struct BodySnapshot {
   std::size_t tetrahedra = 0;  // 0 until something needs them
   bool asleep = false;
   double stiffness_factor = 1.0;  // (substeps given / needed)^2 of an elastic material, at most 1
+  Pose placed;                    // from the model's frame to where the rest shape was put
 };
 
 struct AttachmentSnapshot {

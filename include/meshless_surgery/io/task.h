@@ -1,0 +1,35 @@
+// Task files (YAML), and reports that were written before.
+#pragma once
+
+#include "meshless_surgery/io/scene.h"
+#include "meshless_surgery/training/report.h"
+
+namespace meshless {
+
+struct LoadedTask {
+  TaskDef task;
+  SceneDef scene;
+};
+
+/// Reads a task and its scene. `file` is a path. The scene is a name of `scene_folder`, or a path from the task's
+/// folder on. Errors read "<file>:<line>: <what>; accepted: <range>"; a task that its scene does not allow
+/// (findTaskFault) is refused likewise.
+///
+/// scene, brief
+/// plan: {body, origin, along, out, length, depth, tolerance}       in the rest shape where the scene puts it
+/// target: {body, box | sphere | plane}                             likewise
+/// tray: {min, max}                                                 in the world
+/// stages: a list of {name, brief, hold_for, and one of
+///   reach: {tool, box | sphere}, stretch_to: {body, distance}, press_to: {force, tool, box | sphere},
+///   cut_along: {share}, separate: [a, b], remove_to: tray, leave_nothing: {share}, let_go: all}
+/// limits: {time, force, strain, forbidden: [{name, body | box | sphere}], end: [time, force, strain, forbidden]}
+/// metrics: {NAME: {weight, good, bad, pass}}
+/// pass_mark
+Result<LoadedTask> readTask(const std::string& file, const std::string& scene_folder, const FileAccess& access);
+
+/// Of the folders in `folder` that have a report.json of that trainee and task, by name; `but`: not that folder. What
+/// is no report is passed over.
+std::vector<EarlierReport> readEarlierReports(const std::string& folder, const std::string& trainee,
+                                              const std::string& task, const std::string& but);
+
+}  // namespace meshless

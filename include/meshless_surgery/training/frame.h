@@ -1,0 +1,74 @@
+// What metrics and tasks are told of a world, once a step. The running node and a replay of its log make it by the same
+// function, so that what is computed from it is equal to the bit.
+#pragma once
+
+#include <optional>
+
+#include "meshless_surgery/world/world.h"
+
+namespace meshless {
+
+/// A hand is a tool that is moved: of the picks that are not locked the oldest, and the next one; the push sphere; the
+/// scissors.
+enum class Hand { kPick, kSecondPick, kPush, kScissors };
+constexpr std::size_t kHands = 4;
+const char* toString(Hand hand);
+
+struct TrainingFrame {
+  struct Tool {
+    ToolKind kind = ToolKind::kPick;
+    PickId pick = 0;
+    bool locked = false;           // of a pick
+    std::string body;              // that a pick holds
+    Vec3 position = Vec3::Zero();  // [m] of the hand: the free end, the centre, the pivot
+    std::optional<Quat> turned;    // of the scissors
+    Vec3 tissue = Vec3::Zero();    // [m] of a pick's end in the tissue
+    double force = 0.0;            // [N] between tool and tissue, mean over the step
+  };
+  struct Body {
+    std::string name;
+    std::uint32_t number = 0;
+    BodyModelPtr model;
+    Pose placed;                 // from the model's frame to the rest shape's place
+    Vec3 centre = Vec3::Zero();  // [m] of mass, now; where wanted
+  };
+  struct Joint {
+    std::string name;
+    std::vector<std::string> ends;
+    std::size_t fibres = 0;
+  };
+  struct Strain {
+    double largest = 0.0;  // [1] of a principal direction, in any cluster: |stretch - 1|
+    double volume = 0.0;   // [m^3] at rest, of the clusters in which it is beyond the limit
+  };
+
+  std::uint64_t step = 0;
+  std::uint32_t run = 0;  // grows with each reset and each loaded state
+  double time = 0.0;      // [s] simulated
+  double dt = 0.0;        // [s] of the step
+  std::vector<Tool> tools;
+  std::vector<Body> bodies;
+  std::vector<Joint> joints;  // attachments
+  std::vector<Event> events;  // since the frame before
+  bool sampled = false;       // centres and strain are there
+  std::optional<Strain> strain;
+};
+
+/// What costs something, and is looked at ten times a second where a task needs it.
+struct FrameWants {
+  bool centres = false;
+  std::optional<double> strain_limit;  // [1]
+
+  bool any() const { return centres || strain_limit; }
+};
+
+/// After a step. `events`: what World::takeEvents has given since the frame before.
+TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants& wants);
+
+/// A piece of `whole`, or itself: names of pieces are those of their parents and a number.
+bool isOf(const std::string& body, const std::string& whole);
+
+/// Of a body whose particles are at `positions`.
+TrainingFrame::Strain strainOf(const BodyModel& model, const Points& positions, double limit);
+
+}  // namespace meshless

@@ -1,0 +1,91 @@
+// The numbers that say how a task was done. Fed with frames alone: live and replayed they are equal to the bit.
+#pragma once
+
+#include <array>
+#include <limits>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "meshless_surgery/training/hand_motion.h"
+#include "meshless_surgery/training/rest_tissue.h"
+
+namespace meshless {
+
+enum class Better { kLower, kHigher };
+
+struct MetricRow {
+  const char* name;
+  const char* unit;  // "1": a number
+  Better better;
+  bool per_hand;        // then its name is followed by a point and a hand's
+  const char* formula;  // in words
+  const char* source;
+};
+/// Every metric; docs/metrics.md shows it.
+const std::vector<MetricRow>& metricTable();
+/// Every name that a value has, in the table's order: those of hands for each hand.
+const std::vector<std::string>& metricNames();
+/// By one of those names; null without.
+const MetricRow* findMetric(const std::string& name);
+
+struct MetricValue {
+  std::string name;
+  double value = std::numeric_limits<double>::quiet_NaN();  // NaN: there was nothing to measure
+};
+
+/// Where tools must not be: a body's tissue, or a region of the world.
+struct Forbidden {
+  std::string name;
+  std::string body;  // empty: the region
+  Region region;
+};
+
+/// What metrics are measured against.
+struct MetricLimits {
+  double force = std::numeric_limits<double>::infinity();  // [N]
+  double strain = 0.5;                                     // [1]
+  std::vector<Forbidden> forbidden;
+};
+
+class Metrics {
+ public:
+  explicit Metrics(MetricLimits limits) : limits_(std::move(limits)) {}
+
+  void feed(const TrainingFrame& frame);
+  /// There are no more frames: movements that go on end here.
+  void end();
+
+  double time() const { return time_; }             // [s]
+  double force() const { return force_; }           // [N] the largest of the tools' in the last step
+  double forcePeak() const { return force_peak_; }  // [N]
+  double strainPeak() const { return strain_peak_; }
+  /// Tools that are where they must not be, now: the names of the limits.
+  const std::set<std::string>& touched() const { return touched_; }
+  const HandMotion& motion(Hand hand) const { return hands_[static_cast<std::size_t>(hand)]; }
+  /// Of the last step; none where there is no such hand.
+  const std::optional<Vec3>& place(Hand hand) const { return places_[static_cast<std::size_t>(hand)]; }
+
+  /// In the order of metricNames(). `stages`: how many were met.
+  std::vector<MetricValue> values(const RestTissue& tissue, std::size_t stages) const;
+
+ private:
+  void feedHands(const TrainingFrame& frame);
+  void feedEvents(const TrainingFrame& frame);
+  void feedForbidden(const TrainingFrame& frame);
+
+  MetricLimits limits_;
+  std::array<HandMotion, kHands> hands_;
+  std::array<PickId, 2> picks_{};  // in the two hands that pick
+  std::array<std::optional<Vec3>, kHands> places_;
+  double dt_ = 1.0, time_ = 0.0, idle_ = 0.0, any_moves_ = 0.0, both_move_ = 0.0;
+  double force_ = 0.0, force_peak_ = 0.0, force_sum_ = 0.0, force_for_ = 0.0, force_above_ = 0.0;
+  double strain_peak_ = 0.0, strained_ = 0.0;
+  bool strain_known_ = false;
+  std::size_t cuts_ = 0, strokes_ = 0, undos_ = 0, torn_ = 0, leaks_ = 0, drops_ = 0, forbidden_ = 0;
+  std::uint64_t last_cut_ = ~std::uint64_t{0}, last_stroke_ = ~std::uint64_t{0}, last_undo_ = ~std::uint64_t{0};
+  double forbidden_for_ = 0.0;
+  std::set<std::string> touched_;
+};
+
+}  // namespace meshless

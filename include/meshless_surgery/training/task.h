@@ -1,0 +1,126 @@
+// A task: what is to be done, stage by stage, within which limits, and what counts. A file says it (io/task.h).
+#pragma once
+
+#include <variant>
+
+#include "meshless_surgery/training/metrics.h"
+
+namespace meshless {
+
+// Conditions of a stage.
+
+/// A hand of that tool is in the region of the world.
+struct Reach {
+  ToolKind tool = ToolKind::kPick;
+  Region region;
+};
+/// A pick of the body holds its tissue that far from where it was when it was grabbed.
+struct StretchTo {
+  std::string body;
+  double distance = 0.0;  // [m] > 0
+};
+/// The push sphere presses, or a pick pulls, at least so hard, in the region of the world if there is one.
+struct PressTo {
+  ToolKind tool = ToolKind::kPush;
+  double force = 0.0;  // [N] > 0
+  std::optional<Region> region;
+};
+/// A cut has come within the plan's tolerance of that share of the plan.
+struct CutAlong {
+  double share = 0.9;  // above 0 to 1
+};
+/// No attachment joins them any more.
+struct Separate {
+  std::string a, b;
+};
+/// The piece that has the target's middle lies in the task's tray, or was removed.
+struct RemoveToTray {};
+/// Of the target there is no more than that share left.
+struct LeaveNothing {
+  double share = 0.05;  // 0 to below 1
+};
+/// Every pick is let go of, and the push sphere is gone.
+struct LetGo {};
+
+using Condition = std::variant<Reach, StretchTo, PressTo, CutAlong, Separate, RemoveToTray, LeaveNothing, LetGo>;
+
+struct Stage {
+  std::string name, brief;
+  Condition condition;
+  double hold_for = 0.0;  // [s] without a break
+};
+
+/// What ends a task as failed.
+enum class LimitKind { kTime, kForce, kStrain, kForbidden };
+const char* toString(LimitKind kind);
+
+struct TaskLimits {
+  std::optional<double> time;  // [s] > 0
+  MetricLimits measured;
+  bool strain_limited = false;
+  std::set<LimitKind> ends{LimitKind::kTime};
+};
+
+/// A metric that counts: full marks at `good`, none at `bad`, even in between.
+struct WeightedMetric {
+  std::string name;
+  double weight = 1.0;  // > 0
+  double good = 0.0, bad = 0.0;
+  std::optional<double> pass;  // what it must reach
+};
+
+struct TaskDef {
+  std::string name, scene, brief;
+  std::vector<Stage> stages;
+  TaskLimits limits;
+  std::optional<CutPlan> plan;
+  std::optional<Target> target;
+  std::optional<Box> tray;
+  std::vector<WeightedMetric> metrics;
+  double pass_mark = 0.0;  // 0..100
+
+  /// Strain costs something, and is looked at where it is limited or counts.
+  bool wantsStrain() const;
+};
+
+/// What is wrong with a task, and where: "plan", "target", "limits", or "stages" and the number of one.
+struct TaskFault {
+  std::string where;
+  std::size_t stage = 0;
+  std::string what, accepted;
+};
+/// Whether the task can be done in that scene: it has the bodies, the plan meets its body, the target has tissue, every
+/// stage can be met within the limits and after those before it. nullopt: it can, as far as is known beforehand.
+std::optional<TaskFault> findTaskFault(const TaskDef& task, const SceneDef& scene);
+
+/// 0..1 for one metric; 0 where there was nothing to measure.
+double scoreOf(const WeightedMetric& metric, double value);
+/// Whether it reaches what it must.
+bool passes(const WeightedMetric& metric, double value);
+
+/// The stages of a task, one after the other.
+class TaskProgress {
+ public:
+  explicit TaskProgress(const TaskDef& task) : task_(task) {}
+
+  void feed(const TrainingFrame& frame, const Metrics& metrics, const RestTissue& tissue);
+
+  std::size_t stage() const { return times_.size(); }  // that is to be met now; their number once all are
+  bool done() const { return times_.size() == task_.stages.size(); }
+  const std::string& failed() const { return failed_; }  // why; empty: it has not
+  bool over() const { return done() || !failed_.empty(); }
+  double heldFor() const { return held_for_; }                 // [s] of the present stage
+  const std::vector<double>& times() const { return times_; }  // [s] when each was met
+
+ private:
+  bool meets(const Condition& condition, const TrainingFrame& frame, const RestTissue& tissue) const;
+  std::string broken(const Metrics& metrics) const;
+
+  const TaskDef& task_;
+  std::map<PickId, Vec3> grabbed_;  // [m] where
+  double held_for_ = 0.0;
+  std::vector<double> times_;
+  std::string failed_;
+};
+
+}  // namespace meshless

@@ -1,0 +1,344 @@
+#include "meshless_surgery/io/task.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "region_yaml.h"
+
+namespace meshless {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMostStages = 100, kMostForbidden = 100;
+const std::vector<std::string> kTools{"pick", "push", "scissors"};
+
+/// A box or a sphere, of the keys of `map`; a plane too where it may be one.
+std::optional<Region> readRegionKeys(YamlSource& source, YamlMap& map, const YAML::Node& at, bool plane_too,
+                                     bool needed) {
+  const YAML::Node box = map.get("box"), sphere = map.get("sphere");
+  const YAML::Node plane = plane_too ? map.get("plane") : YAML::Node(YAML::NodeType::Undefined);
+  const std::string accepted = std::string("{box: {min, max}} or {sphere: {centre, radius}}") +
+                               (plane_too ? ", or {plane: {point, normal}} (what is below it)" : "");
+  const int shapes = box.IsDefined() + sphere.IsDefined() + plane.IsDefined();
+  if (shapes > 1) source.fail(at, map.what() + " has several shapes", accepted);
+  if (shapes == 0 && needed) source.fail(at, map.what() + " has no region", accepted);
+  if (source.fault || shapes == 0) return std::nullopt;
+  if (box.IsDefined()) return Region(readBox(source, box));
+  if (sphere.IsDefined()) return readSphere(source, sphere);
+  return Region::below(readPlane(source, plane));
+}
+
+class TaskReader {
+ public:
+  TaskReader(YamlSource& source, TaskDef& task) : source_(source), task_(task) {}
+
+  /// Where the parts of the task are, for faults that are found later.
+  YAML::Node at(const TaskFault& fault) const {
+    if (fault.where == "stages" && fault.stage < stages_.size()) return stages_[fault.stage];
+    const auto found = parts_.find(fault.where);
+    return found == parts_.end() ? root_ : found->second;
+  }
+
+  void read(const YAML::Node& root) {
+    root_.reset(root);
+    YamlMap map(source_, root, "the task");
+    map.text("scene", task_.scene);
+    map.text("brief", task_.brief);
+    map.number("pass_mark", {0.0, 100.0}, task_.pass_mark);
+    for (const char* part : {"plan", "target", "tray", "stages", "limits", "metrics"})
+      if (const YAML::Node node = map.get(part); node.IsDefined()) parts_[part].reset(node);
+    map.finish();
+    if (task_.scene.empty()) source_.fail(root, "the task has no scene", "a name of config/scenes, or a path");
+    if (parts_.count("plan")) readPlan(parts_["plan"]);
+    if (parts_.count("target")) readTarget(parts_["target"]);
+    if (parts_.count("tray")) task_.tray = readBox(source_, parts_["tray"]);
+    if (parts_.count("limits")) readLimits(parts_["limits"]);
+    if (!parts_.count("stages")) source_.fail(root, "the task has no stages", "a list of 1 to 100 stages");
+    if (source_.fault) return;
+    readStages(parts_["stages"]);
+    if (parts_.count("metrics")) readMetrics(parts_["metrics"]);
+  }
+
+ private:
+  void readPlan(const YAML::Node& node) {
+    CutPlan plan;
+    YamlMap map(source_, node, "plan");
+    for (const char* key : {"body", "origin", "along", "out", "length", "depth"})
+      if (!map.has(key))
+        source_.fail(node, std::string("plan has no ") + key, "body, origin, along, out, length, depth");
+    map.text("body", plan.body);
+    map.vector("origin", lengths(), plan.origin);
+    readDirection(map, "along", plan.along);
+    readDirection(map, "out", plan.out);
+    map.number("length", lengths(0.0, true), plan.length);
+    map.number("depth", lengths(0.0, true), plan.depth);
+    map.number("tolerance", lengths(0.0, true), plan.tolerance);
+    map.finish();
+    if (source_.fault) return;
+    if (!(std::abs(plan.along.dot(plan.out)) <= 1e-3))
+      return source_.fail(map.get("out"), "out is not at a right angle to along", "a direction that is, to 0.001");
+    plan.out = (plan.out - plan.out.dot(plan.along) * plan.along).normalized();
+    task_.plan = plan;
+  }
+
+  void readDirection(YamlMap& map, const char* key, Vec3& direction) {
+    map.vector(key, {-1000.0, 1000.0}, direction);
+    if (!(direction.norm() > 1e-6))
+      return source_.fail(map.get(key), std::string(key) + " has the length 0", "a direction, longer than 1e-6");
+    direction.normalize();
+  }
+
+  void readTarget(const YAML::Node& node) {
+    Target target;
+    YamlMap map(source_, node, "target");
+    if (!map.has("body")) source_.fail(node, "target has no body", "the name of a body");
+    map.text("body", target.body);
+    const std::optional<Region> region = readRegionKeys(source_, map, node, true, true);
+    map.finish();
+    if (!region) return;
+    target.region = *region;
+    task_.target = target;
+  }
+
+  void readLimits(const YAML::Node& node) {
+    TaskLimits& limits = task_.limits;
+    YamlMap map(source_, node, "limits");
+    double time = 0.0;
+    map.number("time", {0.0, 86400.0, true, "s"}, time);
+    if (map.has("time")) limits.time = time;
+    map.number("force", {0.0, 1e6, true, "N"}, limits.measured.force);
+    map.number("strain", {0.0, 100.0, true}, limits.measured.strain);
+    limits.strain_limited = map.has("strain");
+    const YAML::Node forbidden = map.get("forbidden"), end = map.get("end");
+    map.finish();
+    if (forbidden.IsDefined()) {
+      if (!forbidden.IsSequence() || forbidden.size() > kMostForbidden)
+        return source_.fail(forbidden, "forbidden is " + shown(forbidden),
+                            "a list of up to 100 of {name, body | box | sphere}");
+      for (const auto& entry : forbidden) readForbidden(entry);
+    }
+    if (!end.IsDefined() || source_.fault) return;
+    const std::string accepted = "a list of some of time, force, strain, forbidden, which limits gives";
+    if (!end.IsSequence() || end.size() > 4) return source_.fail(end, "end is " + shown(end), accepted);
+    limits.ends.clear();
+    for (const auto& entry : end) {
+      std::string word;
+      if (!readText(source_, entry, "end", word)) return;
+      if (word == "time" && limits.time)
+        limits.ends.insert(LimitKind::kTime);
+      else if (word == "force" && std::isfinite(limits.measured.force))
+        limits.ends.insert(LimitKind::kForce);
+      else if (word == "strain" && limits.strain_limited)
+        limits.ends.insert(LimitKind::kStrain);
+      else if (word == "forbidden" && !limits.measured.forbidden.empty())
+        limits.ends.insert(LimitKind::kForbidden);
+      else
+        return source_.fail(entry, "end has " + shown(entry), accepted);
+    }
+  }
+
+  void readForbidden(const YAML::Node& node) {
+    Forbidden forbidden;
+    YamlMap map(source_, node, "an entry of forbidden");
+    map.text("name", forbidden.name);
+    map.text("body", forbidden.body);
+    const bool body = map.has("body");
+    const std::optional<Region> region = readRegionKeys(source_, map, node, false, !body);
+    map.finish();
+    if (body && region) source_.fail(node, "an entry of forbidden has a body and a region", "one of them");
+    if (region) forbidden.region = *region;
+    if (forbidden.name.empty())
+      forbidden.name = body ? forbidden.body : "region " + std::to_string(task_.limits.measured.forbidden.size() + 1);
+    task_.limits.measured.forbidden.push_back(std::move(forbidden));
+  }
+
+  void readStages(const YAML::Node& node) {
+    if (!node.IsSequence() || node.size() == 0 || node.size() > kMostStages)
+      return source_.fail(node, "stages is " + shown(node), "a list of 1 to 100 stages");
+    for (const auto& entry : node) {
+      if (source_.fault) return;
+      stages_.push_back(entry);
+      readStage(entry);
+    }
+  }
+
+  void readStage(const YAML::Node& node) {
+    const std::vector<std::string> kinds{"reach",    "stretch_to", "press_to",      "cut_along",
+                                         "separate", "remove_to",  "leave_nothing", "let_go"};
+    Stage stage;
+    YamlMap map(source_, node, "a stage");
+    map.text("name", stage.name);
+    map.text("brief", stage.brief);
+    map.number("hold_for", {0.0, 3600.0, false, "s"}, stage.hold_for);
+    std::string kind, accepted;
+    for (const std::string& word : kinds) {
+      accepted += (accepted.empty() ? "" : ", ") + word;
+      if (!map.has(word)) continue;
+      if (!kind.empty()) source_.fail(node, "a stage has " + kind + " and " + word, "one condition");
+      kind = word;
+    }
+    map.finish();
+    if (kind.empty()) source_.fail(node, "a stage has no condition", "one of " + accepted);
+    if (source_.fault) return;
+    if (stage.name.empty()) stage.name = kind;
+    const YAML::Node value = map.get(kind);
+    if (kind == "separate") {
+      Separate separate;
+      if (!value.IsSequence() || value.size() != 2)
+        return source_.fail(value, "separate is " + shown(value), "a list of two names, of the ends of an attachment");
+      if (!readText(source_, value[0], "separate", separate.a) || !readText(source_, value[1], "separate", separate.b))
+        return;
+      stage.condition = separate;
+    } else if (kind == "remove_to" || kind == "let_go") {
+      const std::string word = kind == "remove_to" ? "tray" : "all";
+      if (map.choice(kind, {word}) < 0) return;
+      if (kind == "remove_to")
+        stage.condition = RemoveToTray{};
+      else
+        stage.condition = LetGo{};
+    } else {
+      readCondition(kind, value, stage.condition);
+    }
+    if (!source_.fault) task_.stages.push_back(std::move(stage));
+  }
+
+  void readCondition(const std::string& kind, const YAML::Node& node, Condition& condition) {
+    YamlMap map(source_, node, kind);
+    if (kind == "reach") {
+      Reach reach;
+      if (const int tool = map.choice("tool", kTools); tool >= 0) reach.tool = static_cast<ToolKind>(tool);
+      if (!map.has("tool")) source_.fail(node, "reach has no tool", "pick, push, scissors");
+      if (const auto region = readRegionKeys(source_, map, node, false, true)) reach.region = *region;
+      condition = reach;
+    } else if (kind == "stretch_to") {
+      StretchTo stretch;
+      if (!map.has("body") || !map.has("distance")) source_.fail(node, "stretch_to has no body or no distance", "both");
+      map.text("body", stretch.body);
+      map.number("distance", lengths(0.0, true), stretch.distance);
+      condition = stretch;
+    } else if (kind == "press_to") {
+      PressTo press;
+      if (!map.has("force")) source_.fail(node, "press_to has no force", "above 0 to 1e6 N");
+      map.number("force", {0.0, 1e6, true, "N"}, press.force);
+      if (const int tool = map.choice("tool", {"pick", "push"}); tool >= 0) press.tool = static_cast<ToolKind>(tool);
+      press.region = readRegionKeys(source_, map, node, false, false);
+      condition = press;
+    } else if (kind == "cut_along") {
+      CutAlong cut;
+      map.number("share", {0.0, 1.0, true}, cut.share);
+      condition = cut;
+    } else {
+      LeaveNothing leave;
+      map.number("share", {0.0, 0.99}, leave.share);
+      condition = leave;
+    }
+    map.finish();
+  }
+
+  void readMetrics(const YAML::Node& node) {
+    if (!node.IsMap()) return source_.fail(node, "metrics is " + shown(node), "a map of names of docs/metrics.md");
+    std::set<std::string> seen;
+    for (const auto& entry : node) {
+      WeightedMetric metric;
+      if (!readText(source_, entry.first, "a metric's name", metric.name)) return;
+      const MetricRow* row = findMetric(metric.name);
+      if (!row)
+        return source_.fail(entry.first,
+                            "unknown metric " + shown(entry.first) + ", did you mean '" +
+                                nearestWord(metric.name, metricNames()) + "'?",
+                            "a name of docs/metrics.md; those of hands with .pick, .pick_2, .push or .scissors",
+                            ErrorCode::kUnknownName);
+      if (!seen.insert(metric.name).second)
+        return source_.fail(entry.first, "metrics has " + shown(entry.first) + " twice", "each once");
+      YamlMap map(source_, entry.second, "metric " + metric.name);
+      const NumberRange any{-1e12, 1e12, false, row->unit};
+      if (!map.has("good") || !map.has("bad"))
+        source_.fail(entry.second, "metric " + metric.name + " has no good or no bad", "both");
+      map.number("weight", {0.0, 1e6, true}, metric.weight);
+      map.number("good", any, metric.good);
+      map.number("bad", any, metric.bad);
+      double pass = 0.0;
+      map.number("pass", any, pass);
+      if (map.has("pass")) metric.pass = pass;
+      map.finish();
+      if (source_.fault) return;
+      if (metric.good == metric.bad)
+        return source_.fail(entry.second, "good and bad of " + metric.name + " are the same", "two values");
+      task_.metrics.push_back(std::move(metric));
+    }
+  }
+
+  YamlSource& source_;
+  TaskDef& task_;
+  YAML::Node root_;
+  std::map<std::string, YAML::Node> parts_;
+  std::vector<YAML::Node> stages_;
+};
+
+}  // namespace
+
+Result<LoadedTask> readTask(const std::string& file, const std::string& scene_folder, const FileAccess& access) {
+  std::error_code failed;
+  const fs::path real = fs::canonical(file, failed);
+  if (failed || !fs::is_regular_file(real, failed))
+    return Error{ErrorCode::kUnreadable, "there is no task '" + file + "'; accepted: a YAML file"};
+  const Result<YAML::Node> root = readYamlFile(real.string(), file);
+  if (!root) return root.error();
+  if (!root->IsMap())
+    return Error{ErrorCode::kInvalidArgument, file + ": the task is not a map; accepted: a map of keys and values"};
+  YamlSource source{file, {}};
+  LoadedTask loaded;
+  loaded.task.name = real.stem().string();
+  TaskReader reader(source, loaded.task);
+  try {
+    reader.read(*root);
+  } catch (const YAML::Exception& e) {
+    source.fail(*root, e.what(), "YAML");
+  }
+  if (source.fault) return *source.fault;
+
+  const std::string& named = loaded.task.scene;
+  const bool is_path = named.find('/') != std::string::npos || fs::path(named).extension() == ".yaml";
+  const fs::path scene_file = is_path ? real.parent_path() / named : fs::path(scene_folder) / (named + ".yaml");
+  Result<SceneDef> scene = readScene(scene_file.string(), access);
+  if (!scene) return Error{scene.error().code, file + ": its scene: " + scene.error().detail};
+  loaded.scene = std::move(*scene);
+  if (const auto fault = findTaskFault(loaded.task, loaded.scene)) {
+    source.fail(reader.at(*fault), fault->what, fault->accepted);
+    return *source.fault;
+  }
+  return loaded;
+}
+
+std::vector<EarlierReport> readEarlierReports(const std::string& folder, const std::string& trainee,
+                                              const std::string& task, const std::string& but) {
+  std::map<std::string, EarlierReport> found;
+  std::error_code failed;
+  for (fs::directory_iterator at(folder, failed), end; !failed && at != end; at.increment(failed)) {
+    const std::string name = at->path().filename().string();
+    if (name == but) continue;
+    std::error_code missing;
+    const fs::path real = fs::canonical(at->path() / "report.json", missing);
+    if (missing || !fs::is_regular_file(real, missing)) continue;
+    const Result<YAML::Node> root = readYamlFile(real.string(), name);  // JSON is YAML
+    if (!root || !root->IsMap()) continue;
+    try {
+      const YAML::Node& report = *root;
+      if (report["trainee"].as<std::string>() != trainee || report["task"].as<std::string>() != task) continue;
+      EarlierReport earlier;
+      earlier.name = name;
+      earlier.score = report["score"].as<double>();
+      earlier.passed = report["passed"].as<bool>();
+      for (const auto& metric : report["metrics"])
+        if (!metric["value"].IsNull()) earlier.values[metric["name"].as<std::string>()] = metric["value"].as<double>();
+      found.emplace(name, std::move(earlier));
+    } catch (const YAML::Exception&) {
+    }
+  }
+  std::vector<EarlierReport> all;
+  for (auto& [name, earlier] : found) all.push_back(std::move(earlier));
+  return all;
+}
+
+}  // namespace meshless

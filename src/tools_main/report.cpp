@@ -1,0 +1,104 @@
+// Does again what a log of commands says, and writes how a task was done in it.
+#include <cinttypes>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "meshless_surgery/base/share_folder.h"
+#include "meshless_surgery/io/session_folder.h"
+#include "meshless_surgery/io/task.h"
+#include "meshless_surgery/world/command_log.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string configFolder() {
+#ifdef CONFIG_FOLDER
+  return CONFIG_FOLDER;  // of the checkout: a build without ROS has no share folder
+#else
+  return meshless::shareFolder() + "/config";
+#endif
+}
+
+int refuse(const std::string& why) {
+  std::fprintf(stderr, "report: %s\n", why.c_str());
+  return 2;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Replays a log of commands (the parameter command_log of deformer_node) and writes how a task was done in it: "
+      "report.html, report.json and report.csv in a folder of the log's name below --out. Where the world was reset in "
+      "the log, the task begins anew there: the report is of the last time. Exit status: 0 passed, 1 not passed, 2 no "
+      "report could be made.");
+  std::string log_file, task_name, out = ".", trainee;
+  double until = 1e300;
+  int threads = 1;
+  app.add_option("log", log_file, "the log")->required()->check(CLI::ExistingFile);
+  app.add_option("--task", task_name, "a name of config/tasks, or a task file")->required();
+  app.add_option("--out", out, "the folder of reports")->capture_default_str();
+  app.add_option("--trainee", trainee, "whose report it is; earlier ones of the same name are compared with it");
+  app.add_option("--until", until, "[s] after the task's start: what comes later does not count");
+  app.add_option("--threads", threads, "1..64; the result does not depend on it")->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;  // --help is no error
+  }
+
+  const bool is_file = task_name.find('/') != std::string::npos || fs::path(task_name).extension() == ".yaml";
+  const std::string task_file = is_file ? task_name : configFolder() + "/tasks/" + task_name + ".yaml";
+  meshless::FileAccess access;
+  access.folders = {configFolder()};
+  access.find_package = [](const std::string& package) {
+    return package == "meshless_surgery" ? fs::path(configFolder()).parent_path().string() : std::string();
+  };
+  auto loaded = meshless::readTask(task_file, configFolder() + "/scenes", access);
+  if (!loaded.ok()) return refuse(loaded.error().detail);
+
+  meshless::Training training(std::move(loaded->task));
+  std::optional<meshless::Error> misfit;
+  std::ifstream log(log_file, std::ios::binary);
+  const auto replayed = meshless::replay(log, threads, [&](meshless::World& world) {
+    std::vector<meshless::Event> events = world.takeEvents();
+    if (misfit) return;
+    const meshless::Status fed = training.feed(meshless::frameOf(world, std::move(events), training.wants()));
+    if (!fed.ok()) misfit = fed.error();
+    if (training.metrics().time() >= until - 1e-9) training.stop();
+  });
+  if (!replayed.ok()) return refuse(log_file + ": " + replayed.error().detail);
+  if (misfit) return refuse(log_file + ": " + misfit->detail);
+  if (!training.begun()) return refuse(log_file + ": the log has no step; accepted: a log in which time has passed");
+
+  training.stop();
+
+  const std::string name = fs::path(log_file).filename().string();
+  if (const meshless::Status fits = meshless::SessionFolder::checkName(name); !fits.ok())
+    return refuse(fits.error().detail);
+  meshless::ReportHead head{trainee, name, !replayed->difference, {}};
+  head.earlier = meshless::readEarlierReports(out, trainee, training.task().name, name);
+  const meshless::SessionFolder folder((fs::path(out) / name).string());
+  const std::pair<const char*, std::string> files[] = {{"report.json", meshless::reportJson(training, head)},
+                                                       {"report.csv", meshless::reportCsv(training)},
+                                                       {"report.html", meshless::reportHtml(training, head)}};
+  for (const auto& [file, bytes] : files)
+    if (const meshless::Status written = folder.write(file, bytes); !written.ok())
+      return refuse(written.error().detail);
+
+  std::printf("%s: %zu of %zu stages, %.1f s, %.1f of 100 (pass mark %.1f): %s\n", training.task().name.c_str(),
+              training.progress().stage(), training.task().stages.size(), training.metrics().time(), training.score(),
+              training.task().pass_mark, training.passed() ? "passed" : "not passed");
+  if (!training.progress().failed().empty()) std::printf("failed: %s\n", training.progress().failed().c_str());
+  if (!replayed->ended) std::printf("the log breaks off; the report is of what there is\n");
+  if (replayed->difference)
+    std::printf("DIFFERENT from step %" PRIu64 " on: the report is of another session than the one that was recorded\n",
+                replayed->difference->step);
+  std::printf("%s/report.html\n", folder.folder().c_str());
+  return training.passed() ? 0 : 1;
+}

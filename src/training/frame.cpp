@@ -1,0 +1,119 @@
+#include "meshless_surgery/training/frame.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+namespace meshless {
+namespace {
+
+constexpr double kSampleRate = 10.0;  // [Hz] of what costs something
+
+bool isSampled(std::uint64_t step, double step_rate) {
+  const auto every = static_cast<std::uint64_t>(std::max(1.0, std::round(step_rate / kSampleRate)));
+  return step % every == 0;
+}
+
+Quat orientationOf(const ScissorBlades& blades) {
+  Mat3 axes;
+  axes << blades.x_axis, blades.y_axis, blades.x_axis.cross(blades.y_axis);
+  return Quat(axes).normalized();
+}
+
+Vec3 centreOfMass(const BodyModel& model, const Points& positions) {
+  Vec3 sum = Vec3::Zero();
+  double mass = 0.0;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    sum += model.masses[i] * positions[i];
+    mass += model.masses[i];
+  }
+  return mass > 0.0 ? Vec3(sum / mass) : sum;
+}
+
+}  // namespace
+
+const char* toString(Hand hand) {
+  switch (hand) {
+    case Hand::kPick:
+      return "pick";
+    case Hand::kSecondPick:
+      return "pick_2";
+    case Hand::kPush:
+      return "push";
+    case Hand::kScissors:
+      return "scissors";
+  }
+  return "unknown";
+}
+
+bool isOf(const std::string& body, const std::string& whole) {
+  return body.compare(0, whole.size(), whole) == 0 && (body.size() == whole.size() || body[whole.size()] == '.');
+}
+
+TrainingFrame::Strain strainOf(const BodyModel& model, const Points& positions, double limit) {
+  TrainingFrame::Strain strain;
+  double all = 0.0, beyond = 0.0;
+  for (Index c = 0; c < model.clusters.size(); ++c) {
+    const ClusterRest& rest = model.shape.clusters[c];
+    all += rest.mass;
+    if (!rest.linear_rank) continue;
+    // Of a crumb of tissue little is told by the corners of its cell.
+    if (model.lattice && (model.lattice->cells[c].samples == kNoSample || model.lattice->cells[c].isBridge(c)))
+      continue;
+    Mat3 moment = Mat3::Zero();
+    for (Index k = model.clusters.offsets[c]; k < model.clusters.offsets[c + 1]; ++k) {
+      const Index i = model.clusters.members[k];
+      moment +=
+          model.match_masses[i] * model.clusters.weights[k] * positions[i] * (model.rest[i] - rest.centre).transpose();
+    }
+    const Mat3 deformation = moment * rest.moment_inverse;
+    const Vec3 squares = Eigen::SelfAdjointEigenSolver<Mat3>()
+                             .computeDirect(deformation.transpose() * deformation, Eigen::EigenvaluesOnly)
+                             .eigenvalues();
+    const double largest = (squares.cwiseMax(0.0).cwiseSqrt().array() - 1.0).abs().maxCoeff();
+    strain.largest = std::max(strain.largest, largest);
+    if (largest > limit) beyond += rest.mass;
+  }
+  if (all > 0.0) strain.volume = beyond / all * model.rest_volume;
+  return strain;
+}
+
+TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants& wants) {
+  TrainingFrame frame;
+  SnapshotWants parts;
+  frame.sampled = wants.any() && isSampled(world.stepCount(), world.settings().step_rate);
+  parts.particles = frame.sampled;
+  const WorldSnapshot shot = world.snapshot(parts);
+  frame.step = shot.step;
+  frame.run = shot.run;
+  frame.time = shot.sim_time;
+  frame.dt = 1.0 / world.settings().step_rate;
+  frame.events = std::move(events);
+  for (const Pick& pick : shot.picks) {
+    const auto body = shot.pick_bodies.find(pick.id);
+    frame.tools.push_back({ToolKind::kPick, pick.id, pick.locked, body == shot.pick_bodies.end() ? "" : body->second,
+                           pick.target, std::nullopt, pick.position, pick.force.norm()});
+  }
+  if (shot.push.enabled)
+    frame.tools.push_back(
+        {ToolKind::kPush, 0, false, "", shot.push.position, std::nullopt, shot.push.position, shot.push.force.norm()});
+  if (shot.scissors.shown)
+    frame.tools.push_back({ToolKind::kScissors, 0, false, "", shot.scissors.blades.origin,
+                           orientationOf(shot.scissors.blades), shot.scissors.blades.origin, 0.0});
+  if (frame.sampled && wants.strain_limit) frame.strain.emplace();
+  for (const BodySnapshot& body : shot.bodies) {
+    frame.bodies.push_back({body.name, body.number, body.model, body.placed, Vec3::Zero()});
+    if (!frame.sampled) continue;
+    if (wants.centres) frame.bodies.back().centre = centreOfMass(*body.model, body.particles);
+    if (!wants.strain_limit) continue;
+    const TrainingFrame::Strain strain = strainOf(*body.model, body.particles, *wants.strain_limit);
+    frame.strain->largest = std::max(frame.strain->largest, strain.largest);
+    frame.strain->volume += strain.volume;
+  }
+  for (const AttachmentSnapshot& joint : shot.attachments)
+    frame.joints.push_back({joint.name, joint.ends, joint.fibres});
+  return frame;
+}
+
+}  // namespace meshless

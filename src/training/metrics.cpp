@@ -1,0 +1,277 @@
+#include "meshless_surgery/training/metrics.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace meshless {
+namespace {
+
+constexpr double kPressing = 1e-6;  // [N] above this a tool is at work
+
+const char* const kSmooth = "Balasubramanian et al. 2012, 2015";
+const char* const kUsual = "usual in skill assessment: Reiley et al. 2011";
+const char* const kNeuro = "NeuroTouch: Alotaibi et al. 2015";
+const char* const kOwn = "this package";
+
+}  // namespace
+
+const std::vector<MetricRow>& metricTable() {
+  constexpr auto kLower = Better::kLower, kHigher = Better::kHigher;
+  static const std::vector<MetricRow> table{
+      {"time", "s", kLower, false, "simulated time since the task's start", kUsual},
+      {"idle_time", "s", kLower, false, "time in which no hand moves: none gets on by 5 mm/s over 0.1 s", kUsual},
+      {"stages", "1", kHigher, false, "stages of the task that were met", kOwn},
+      {"path_length", "m", kLower, true, "sum of the hand's ways from step to step, while it is there", kUsual},
+      {"economy", "1", kHigher, true,
+       "straight distances over path length; a straight distance goes from where the hand comes to where it leaves",
+       kUsual},
+      {"workspace", "m^3", kLower, true,
+       "volume of the evenly filled ellipsoid that has the covariance of the hand's positions", kOwn},
+      {"mean_speed", "m/s", kHigher, true, "path while the hand moves over the time in which it does", kUsual},
+      {"movements", "1", kLower, true, "times that the hand begins to move (5 mm/s over 0.1 s)", kUsual},
+      {"sparc", "1", kHigher, true,
+       "minus the arc length of the speed's normalised magnitude spectrum, up to 10 Hz and down to 0.05, mean over the "
+       "movements by their durations; a movement is cut after 10 s",
+       kSmooth},
+      {"ldlj", "1", kHigher, true,
+       "-ln(T^3 / v_peak^2 * integral of the squared jerk), mean over the movements by their durations", kSmooth},
+      {"tremor", "m", kLower, true,
+       "root of 2 times the mean square of the hand's motion from 4 to 14 Hz: the amplitude of a sine; windows of 2 s, "
+       "half overlapping, of Hann, without their trend",
+       kOwn},
+      {"angular_path", "rad", kLower, true,
+       "sum of the turns from step to step; of scissors alone, others have no direction", kUsual},
+      {"force_mean", "N", kLower, false, "mean of the largest force of a tool, over the time in which there is one",
+       kNeuro},
+      {"force_peak", "N", kLower, false, "largest force of a tool in any step", kNeuro},
+      {"impulse", "N s", kLower, false, "integral of the largest force of a tool over time", kNeuro},
+      {"force_time_above", "s", kLower, false, "time in which the largest force of a tool is above the limit", kNeuro},
+      {"strain_peak", "1", kLower, false,
+       "largest |stretch - 1| along a principal direction in any cell or cluster, ten times a second", kOwn},
+      {"strained_volume", "m^3", kLower, false, "largest volume at rest that is strained beyond the limit at a time",
+       kOwn},
+      {"volume_removed", "m^3", kLower, false,
+       "volume at rest of the target's body, or without a target of any, that was removed or lies in the tray", kNeuro},
+      {"healthy_share", "1", kLower, false, "share of the volume removed that is not of the target", kNeuro},
+      {"target_left", "1", kLower, false, "share of the target that was not removed", kNeuro},
+      {"cut_area", "m^2", kLower, false, "area at rest of one side of all cut faces", kOwn},
+      {"cuts", "1", kLower, false, "times that scissors severed something; in one step once", kOwn},
+      {"strokes", "1", kLower, false, "times that a blade opened something; in one step once", kOwn},
+      {"plan_rms", "m", kLower, false,
+       "root of the mean, by area, of the squared distance of the cut faces at rest from the plan's rectangle", kOwn},
+      {"plan_hausdorff", "m", kLower, false,
+       "the larger of: the farthest of the cut from the plan; the farthest of the plan within the body from the cut",
+       kOwn},
+      {"off_plan_area", "m^2", kLower, false,
+       "area of one side of the cut that is farther from the plan than its tolerance", "LapGym: Scheikl et al. 2023"},
+      {"margin_least", "m", kHigher, false,
+       "least distance at rest of the cut from the target; below 0 it goes through it", kOwn},
+      {"margin_mean", "m", kHigher, false, "mean of that distance, by area", kOwn},
+      {"drops", "1", kLower, false, "picks that ended because their hand's stream fell silent", kOwn},
+      {"undos", "1", kLower, false, "cuts that were taken back", kOwn},
+      {"torn", "1", kLower, false, "events of attachments that tore", kOwn},
+      {"leaks", "1", kLower, false, "filled cavities that were opened", kOwn},
+      {"forbidden_contacts", "1", kLower, false,
+       "times that a tool came to where it must not be, or that forbidden tissue was cut", kUsual},
+      {"forbidden_time", "s", kLower, false, "time in which a tool is where it must not be", kUsual},
+      {"hands_share", "1", kHigher, false,
+       "path of the second longest of the hands over the path of all: 0.5 where two do the same", kOwn},
+      {"hands_overlap", "1", kHigher, false, "time in which two hands move or more, over the time in which one does",
+       kOwn},
+  };
+  return table;
+}
+
+const std::vector<std::string>& metricNames() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (const MetricRow& row : metricTable()) {
+      if (!row.per_hand) all.push_back(row.name);
+      for (std::size_t h = 0; row.per_hand && h < kHands; ++h)
+        all.push_back(std::string(row.name) + "." + toString(static_cast<Hand>(h)));
+    }
+    return all;
+  }();
+  return names;
+}
+
+const MetricRow* findMetric(const std::string& name) {
+  if (std::find(metricNames().begin(), metricNames().end(), name) == metricNames().end()) return nullptr;
+  const std::string row_name = name.substr(0, name.find('.'));
+  for (const MetricRow& row : metricTable())
+    if (row_name == row.name) return &row;
+  return nullptr;
+}
+
+void Metrics::end() {
+  for (HandMotion& hand : hands_) hand.end(dt_);
+}
+
+void Metrics::feed(const TrainingFrame& frame) {
+  dt_ = frame.dt;
+  time_ += frame.dt;
+  feedHands(frame);
+  force_ = 0.0;
+  for (const TrainingFrame::Tool& tool : frame.tools) force_ = std::max(force_, tool.force);
+  if (force_ > kPressing) {
+    force_peak_ = std::max(force_peak_, force_);
+    force_sum_ += force_ * frame.dt;
+    force_for_ += frame.dt;
+    if (force_ > limits_.force) force_above_ += frame.dt;
+  }
+  if (frame.strain) {
+    strain_known_ = true;
+    strain_peak_ = std::max(strain_peak_, frame.strain->largest);
+    strained_ = std::max(strained_, frame.strain->volume);
+  }
+  feedEvents(frame);
+  if (!limits_.forbidden.empty()) feedForbidden(frame);
+}
+
+void Metrics::feedHands(const TrainingFrame& frame) {
+  std::array<const TrainingFrame::Tool*, kHands> tools{};
+  // A pick stays in its hand; a new one comes into the first that is empty.
+  for (PickId& held : picks_) {
+    const auto still = std::find_if(frame.tools.begin(), frame.tools.end(), [&](const TrainingFrame::Tool& tool) {
+      return tool.kind == ToolKind::kPick && !tool.locked && tool.pick == held;
+    });
+    if (still == frame.tools.end()) held = 0;
+  }
+  for (const TrainingFrame::Tool& tool : frame.tools) {
+    if (tool.kind == ToolKind::kPush) tools[static_cast<std::size_t>(Hand::kPush)] = &tool;
+    if (tool.kind == ToolKind::kScissors) tools[static_cast<std::size_t>(Hand::kScissors)] = &tool;
+    if (tool.kind != ToolKind::kPick || tool.locked) continue;
+    auto hand = std::find(picks_.begin(), picks_.end(), tool.pick);
+    if (hand == picks_.end()) hand = std::find(picks_.begin(), picks_.end(), PickId{0});
+    if (hand == picks_.end()) continue;  // a third one
+    *hand = tool.pick;
+    tools[static_cast<std::size_t>(hand - picks_.begin())] = &tool;
+  }
+  std::size_t moving = 0;
+  for (std::size_t h = 0; h < kHands; ++h) {
+    places_[h] = tools[h] ? std::optional<Vec3>(tools[h]->position) : std::nullopt;
+    hands_[h].feed(places_[h], tools[h] ? tools[h]->turned : std::nullopt, frame.dt);
+    moving += hands_[h].moves();
+  }
+  (moving == 0 ? idle_ : any_moves_) += frame.dt;
+  if (moving > 1) both_move_ += frame.dt;
+}
+
+void Metrics::feedEvents(const TrainingFrame& frame) {
+  const auto once = [](std::size_t& count, std::uint64_t& last, std::uint64_t step) {
+    count += last != step;
+    last = step;
+  };
+  for (const Event& event : frame.events) switch (event.type) {
+      case EventType::kCut:
+        once(cuts_, last_cut_, event.step);
+        break;
+      case EventType::kIncised:
+        once(strokes_, last_stroke_, event.step);
+        break;
+      case EventType::kUndone:
+        once(undos_, last_undo_, event.step);
+        break;
+      case EventType::kTorn:
+        ++torn_;
+        break;
+      case EventType::kLeak:
+        leaks_ += event.text.find(" is open") != std::string::npos;
+        break;
+      case EventType::kLifted:
+        drops_ += event.pick != 0;
+        break;
+      default:
+        break;
+    }
+}
+
+void Metrics::feedForbidden(const TrainingFrame& frame) {
+  std::set<std::string> touched;
+  for (const Forbidden& forbidden : limits_.forbidden) {
+    for (const TrainingFrame::Tool& tool : frame.tools)
+      if (forbidden.body.empty() ? forbidden.region.contains(tool.position) : isOf(tool.body, forbidden.body))
+        touched.insert(forbidden.name);
+    if (forbidden.body.empty()) continue;
+    for (const Event& event : frame.events)
+      if ((event.type == EventType::kCut || event.type == EventType::kIncised) && isOf(event.body, forbidden.body)) {
+        ++forbidden_;
+        touched.insert(forbidden.name);
+      }
+  }
+  for (const std::string& name : touched) {
+    const bool by_cut = std::any_of(frame.events.begin(), frame.events.end(), [](const Event& event) {
+      return event.type == EventType::kCut || event.type == EventType::kIncised;
+    });
+    if (touched_.count(name) == 0 && !by_cut) ++forbidden_;
+  }
+  if (!touched.empty()) forbidden_for_ += frame.dt;
+  touched_ = std::move(touched);
+}
+
+std::vector<MetricValue> Metrics::values(const RestTissue& tissue, std::size_t stages) const {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  std::vector<MetricValue> all;
+  all.reserve(metricNames().size());
+  for (const std::string& name : metricNames()) all.push_back({name, kNone});
+  const auto set = [&](const char* name, double value) {
+    const auto found =
+        std::find_if(all.begin(), all.end(), [&](const MetricValue& metric) { return metric.name == name; });
+    assert(found != all.end());
+    found->value = value;
+  };
+  double paths = 0.0;
+  std::array<double, kHands> sorted{};
+  for (std::size_t h = 0; h < kHands; ++h) {
+    const HandMotion& hand = hands_[h];
+    sorted[h] = hand.path();
+    paths += hand.path();
+    if (!hand.seen()) continue;
+    const auto of = [&](const char* row, double value) {
+      set((std::string(row) + "." + toString(static_cast<Hand>(h))).c_str(), value);
+    };
+    of("path_length", hand.path());
+    of("economy", hand.economy());
+    of("workspace", hand.workspace());
+    of("mean_speed", hand.meanSpeed());
+    of("movements", static_cast<double>(hand.movements()));
+    of("sparc", hand.sparc());
+    of("ldlj", hand.jerk());
+    of("tremor", hand.tremor());
+    if (static_cast<Hand>(h) == Hand::kScissors) of("angular_path", hand.angularPath());
+  }
+  std::sort(sorted.begin(), sorted.end());
+  set("time", time_);
+  set("idle_time", idle_);
+  set("stages", static_cast<double>(stages));
+  set("force_mean", force_for_ > 0.0 ? force_sum_ / force_for_ : kNone);
+  set("force_peak", force_peak_);
+  set("impulse", force_sum_);
+  if (std::isfinite(limits_.force)) set("force_time_above", force_above_);
+  if (strain_known_) {
+    set("strain_peak", strain_peak_);
+    set("strained_volume", strained_);
+  }
+  set("volume_removed", tissue.volumeRemoved());
+  set("healthy_share", tissue.healthyShare());
+  set("target_left", tissue.targetLeft());
+  set("cut_area", tissue.cutArea());
+  set("cuts", static_cast<double>(cuts_));
+  set("strokes", static_cast<double>(strokes_));
+  set("plan_rms", tissue.planRms());
+  set("plan_hausdorff", tissue.planHausdorff());
+  set("off_plan_area", tissue.offPlanArea());
+  set("margin_least", tissue.marginLeast());
+  set("margin_mean", tissue.marginMean());
+  set("drops", static_cast<double>(drops_));
+  set("undos", static_cast<double>(undos_));
+  set("torn", static_cast<double>(torn_));
+  set("leaks", static_cast<double>(leaks_));
+  set("forbidden_contacts", limits_.forbidden.empty() ? kNone : static_cast<double>(forbidden_));
+  set("forbidden_time", limits_.forbidden.empty() ? kNone : forbidden_for_);
+  set("hands_share", paths > 0.0 ? sorted[kHands - 2] / paths : kNone);
+  set("hands_overlap", any_moves_ > 0.0 ? both_move_ / any_moves_ : kNone);
+  return all;
+}
+
+}  // namespace meshless

@@ -1,0 +1,259 @@
+#include "meshless_surgery/training/task.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "meshless_surgery/training/volume_within.h"
+
+namespace meshless {
+namespace {
+
+std::string numberText(double value) {
+  std::ostringstream text;
+  text << value;
+  return text.str();
+}
+
+TriangleMesh placedMesh(const BodyDef& body) {
+  TriangleMesh mesh = body.mesh;
+  for (Vec3& p : mesh.vertices) p = body.pose * p;
+  return mesh;
+}
+
+const BodyDef* bodyOf(const SceneDef& scene, const std::string& name) {
+  for (const BodyDef& body : scene.bodies)
+    if (body.name == name) return &body;
+  return nullptr;
+}
+
+std::string bodiesOf(const SceneDef& scene) {
+  std::string text;
+  for (std::size_t k = 0; k < scene.bodies.size() && k < 20; ++k) text += (k ? ", " : "") + scene.bodies[k].name;
+  return text.empty() ? "none, for the scene has no bodies" : "bodies of the scene: " + text;
+}
+
+// A box or a sphere that lies wholly within another region.
+bool liesWithin(const Region& inner, const Region& outer) {
+  if (inner.kind == Region::Kind::kSphere) return outer.height(inner.centre) <= -inner.radius;
+  if (inner.kind != Region::Kind::kBox) return false;
+  for (int corner = 0; corner < 8; ++corner) {
+    Vec3 p;
+    for (int k = 0; k < 3; ++k) p[k] = (corner >> k & 1) ? inner.box.max[k] : inner.box.min[k];
+    if (!outer.contains(p)) return false;
+  }
+  return outer.kind != Region::Kind::kMesh;
+}
+
+class FaultFinder {
+ public:
+  FaultFinder(const TaskDef& task, const SceneDef& scene) : task_(task), scene_(scene) {}
+
+  std::optional<TaskFault> find() {
+    if (task_.stages.empty()) return TaskFault{"stages", 0, "there are no stages", "at least one"};
+    if (task_.plan) {
+      if (auto fault = needsBody("plan", 0, task_.plan->body)) return fault;
+      const BodyDef& body = *bodyOf(scene_, task_.plan->body);
+      if (planPointsIn(*task_.plan, placedMesh(body)).empty())
+        return TaskFault{"plan", 0, "no part of the plan is in '" + body.name + "' at rest",
+                         "a rectangle that meets it"};
+    }
+    if (task_.target) {
+      if (auto fault = needsBody("target", 0, task_.target->body)) return fault;
+      const BodyDef& body = *bodyOf(scene_, task_.target->body);
+      if (!(volumeWithin(placedMesh(body), task_.target->region) > 0.0))
+        return TaskFault{"target", 0, "no tissue of '" + body.name + "' is in the target at rest",
+                         "a region that has some"};
+    }
+    for (const Forbidden& forbidden : task_.limits.measured.forbidden)
+      if (!forbidden.body.empty())
+        if (auto fault = needsBody("limits", 0, forbidden.body)) return fault;
+    double held = 0.0;
+    for (std::size_t k = 0; k < task_.stages.size(); ++k) {
+      const Stage& stage = task_.stages[k];
+      held += stage.hold_for;
+      if (task_.limits.time && ends(LimitKind::kTime) && held > *task_.limits.time)
+        return TaskFault{"stages", k,
+                         "the stages up to this one are to be held for " + numberText(held) +
+                             " s together, and time is " + numberText(*task_.limits.time) + " s",
+                         "less than that"};
+      if (auto fault = std::visit([&](const auto& condition) { return check(k, condition); }, stage.condition))
+        return fault;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  std::optional<TaskFault> needsBody(const std::string& where, std::size_t stage, const std::string& name) const {
+    if (bodyOf(scene_, name)) return std::nullopt;
+    return TaskFault{where, stage, "there is no body '" + name + "' in the scene", bodiesOf(scene_)};
+  }
+  bool ends(LimitKind kind) const { return task_.limits.ends.count(kind) > 0; }
+  std::optional<TaskFault> never(std::size_t stage, const std::string& why, const std::string& accepted) const {
+    return TaskFault{"stages", stage, "this stage can never be met: " + why, accepted};
+  }
+  std::optional<TaskFault> inForbidden(std::size_t stage, const Region& region) const {
+    if (ends(LimitKind::kForbidden))
+      for (const Forbidden& forbidden : task_.limits.measured.forbidden)
+        if (forbidden.body.empty() && liesWithin(region, forbidden.region))
+          return never(stage, "its region lies in the forbidden region '" + forbidden.name + "'",
+                       "a region outside of it");
+    return std::nullopt;
+  }
+
+  std::optional<TaskFault> check(std::size_t k, const Reach& reach) const { return inForbidden(k, reach.region); }
+  std::optional<TaskFault> check(std::size_t k, const StretchTo& stretch) const {
+    if (auto fault = needsBody("stages", k, stretch.body)) return fault;
+    if (ends(LimitKind::kForbidden))
+      for (const Forbidden& forbidden : task_.limits.measured.forbidden)
+        if (!forbidden.body.empty() && isOf(stretch.body, forbidden.body))
+          return never(k, "'" + stretch.body + "' is forbidden", "another body");
+    return std::nullopt;
+  }
+  std::optional<TaskFault> check(std::size_t k, const PressTo& press) const {
+    if (ends(LimitKind::kForce) && press.force > task_.limits.measured.force)
+      return never(k,
+                   "force is " + numberText(press.force) + " N, and a force above " +
+                       numberText(task_.limits.measured.force) + " N ends the task",
+                   "up to that");
+    return press.region ? inForbidden(k, *press.region) : std::nullopt;
+  }
+  std::optional<TaskFault> check(std::size_t k, const CutAlong&) const {
+    if (!task_.plan) return never(k, "the task has no plan", "a task with plan");
+    if (ends(LimitKind::kForbidden))
+      for (const Forbidden& forbidden : task_.limits.measured.forbidden)
+        if (!forbidden.body.empty() && isOf(task_.plan->body, forbidden.body))
+          return never(k, "the body of the plan is forbidden", "a plan in another body");
+    return std::nullopt;
+  }
+  std::optional<TaskFault> check(std::size_t k, const Separate& separate) const {
+    for (const std::string& name : {separate.a, separate.b}) {
+      const bool obstacle = std::any_of(scene_.obstacles.begin(), scene_.obstacles.end(),
+                                        [&](const ObstacleDef& def) { return def.name == name; });
+      if (!obstacle && name != kWorldEnd)
+        if (auto fault = needsBody("stages", k, name)) return fault;
+    }
+    for (const AttachCommand& joint : scene_.attachments)
+      if ((joint.body == separate.a && joint.other == separate.b) ||
+          (joint.body == separate.b && joint.other == separate.a))
+        return std::nullopt;
+    return TaskFault{
+        "stages", k,
+        "no attachment joins '" + separate.a + "' and '" + separate.b + "': this stage is met from the start",
+        "two ends of an attachment of the scene"};
+  }
+  std::optional<TaskFault> check(std::size_t k, const RemoveToTray&) const {
+    if (!task_.target) return never(k, "the task has no target", "a task with target");
+    if (!task_.tray) return TaskFault{"stages", k, "the task has no tray", "a task with tray"};
+    return std::nullopt;
+  }
+  std::optional<TaskFault> check(std::size_t k, const LeaveNothing&) const {
+    if (!task_.target) return never(k, "the task has no target", "a task with target");
+    return std::nullopt;
+  }
+  std::optional<TaskFault> check(std::size_t, const LetGo&) const { return std::nullopt; }
+
+  const TaskDef& task_;
+  const SceneDef& scene_;
+};
+
+}  // namespace
+
+const char* toString(LimitKind kind) {
+  switch (kind) {
+    case LimitKind::kTime:
+      return "time";
+    case LimitKind::kForce:
+      return "force";
+    case LimitKind::kStrain:
+      return "strain";
+    case LimitKind::kForbidden:
+      return "forbidden";
+  }
+  return "unknown";
+}
+
+bool TaskDef::wantsStrain() const {
+  if (limits.strain_limited) return true;
+  return std::any_of(metrics.begin(), metrics.end(), [](const WeightedMetric& metric) {
+    return metric.name == "strain_peak" || metric.name == "strained_volume";
+  });
+}
+
+std::optional<TaskFault> findTaskFault(const TaskDef& task, const SceneDef& scene) {
+  return FaultFinder(task, scene).find();
+}
+
+double scoreOf(const WeightedMetric& metric, double value) {
+  if (!std::isfinite(value)) return 0.0;
+  return std::clamp((value - metric.bad) / (metric.good - metric.bad), 0.0, 1.0);
+}
+
+bool passes(const WeightedMetric& metric, double value) {
+  if (!metric.pass) return true;
+  return metric.good < metric.bad ? value <= *metric.pass : value >= *metric.pass;  // NaN: no
+}
+
+void TaskProgress::feed(const TrainingFrame& frame, const Metrics& metrics, const RestTissue& tissue) {
+  if (over()) return;
+  for (const TrainingFrame::Tool& tool : frame.tools)
+    if (tool.kind == ToolKind::kPick) grabbed_.emplace(tool.pick, tool.tissue);
+  failed_ = broken(metrics);
+  if (!failed_.empty()) return;
+  // Two stages are never met in one step: the next one begins with the next.
+  const Stage& stage = task_.stages[times_.size()];
+  if (!meets(stage.condition, frame, tissue)) {
+    held_for_ = 0.0;
+    return;
+  }
+  held_for_ += frame.dt;
+  if (!(held_for_ >= stage.hold_for - 1e-9)) return;
+  times_.push_back(metrics.time());
+  held_for_ = 0.0;
+}
+
+bool TaskProgress::meets(const Condition& condition, const TrainingFrame& frame, const RestTissue& tissue) const {
+  const auto anyTool = [&](const auto& test) { return std::any_of(frame.tools.begin(), frame.tools.end(), test); };
+  if (const auto* reach = std::get_if<Reach>(&condition))
+    return anyTool([&](const auto& tool) { return tool.kind == reach->tool && reach->region.contains(tool.position); });
+  if (const auto* stretch = std::get_if<StretchTo>(&condition))
+    return anyTool([&](const TrainingFrame::Tool& tool) {
+      return tool.kind == ToolKind::kPick && isOf(tool.body, stretch->body) &&
+             (tool.tissue - grabbed_.at(tool.pick)).norm() >= stretch->distance;
+    });
+  if (const auto* press = std::get_if<PressTo>(&condition))
+    return anyTool([&](const auto& tool) {
+      return tool.kind == press->tool && tool.force >= press->force &&
+             (!press->region || press->region->contains(tool.position));
+    });
+  if (const auto* cut = std::get_if<CutAlong>(&condition)) return tissue.planDone() >= cut->share;
+  if (const auto* separate = std::get_if<Separate>(&condition)) {
+    const auto has = [](const TrainingFrame::Joint& joint, const std::string& name) {
+      return std::any_of(joint.ends.begin(), joint.ends.end(), [&](const std::string& end) { return isOf(end, name); });
+    };
+    return std::none_of(frame.joints.begin(), frame.joints.end(), [&](const TrainingFrame::Joint& joint) {
+      return joint.fibres > 0 && has(joint, separate->a) && has(joint, separate->b);
+    });
+  }
+  if (std::holds_alternative<RemoveToTray>(condition)) return tissue.targetRemoved();
+  if (const auto* leave = std::get_if<LeaveNothing>(&condition)) return tissue.targetLeft() <= leave->share;
+  return !anyTool([](const auto& tool) { return tool.kind != ToolKind::kScissors; });
+}
+
+std::string TaskProgress::broken(const Metrics& metrics) const {
+  const TaskLimits& limits = task_.limits;
+  const auto ends = [&](LimitKind kind) { return limits.ends.count(kind) > 0; };
+  if (limits.time && ends(LimitKind::kTime) && metrics.time() > *limits.time + 1e-9)
+    return "the time of " + numberText(*limits.time) + " s is over";
+  if (ends(LimitKind::kForce) && metrics.force() > limits.measured.force)
+    return "a force of " + numberText(metrics.force()) + " N is above the limit of " +
+           numberText(limits.measured.force) + " N";
+  if (ends(LimitKind::kStrain) && limits.strain_limited && metrics.strainPeak() > limits.measured.strain)
+    return "a strain of " + numberText(metrics.strainPeak()) + " is above the limit of " +
+           numberText(limits.measured.strain);
+  if (ends(LimitKind::kForbidden) && !metrics.touched().empty())
+    return "a tool was where it must not be: " + *metrics.touched().begin();
+  return "";
+}
+
+}  // namespace meshless

@@ -1,0 +1,282 @@
+#include "meshless_surgery/io/task.h"
+
+#include <filesystem>
+#include <fstream>
+
+#include "support/bodies.h"
+#include "io/temporary_folder.h"
+
+namespace meshless {
+namespace task_file_test {
+
+const std::string kScene = R"(
+bodies:
+  - {name: pad, primitive: {box: [0.1, 0.1, 0.04]}, pose: {position: [0, 0, 0.2]}}
+)";
+const std::string kTask = R"(scene: scene
+brief: what to do
+plan: {body: pad, origin: [0, -1, 1], along: [0, 1, 0], out: [0, 0, 1], length: 2, depth: 2, tolerance: 0.003}
+target: {body: pad, sphere: {centre: [0.03, 0, 0.2], radius: 0.01}}
+tray: {min: [1, 1, 0], max: [2, 2, 1]}
+stages:
+  - {name: press, press_to: {force: 0.5, box: {min: [0, 0, 0], max: [1, 1, 1]}}, hold_for: 2}
+  - cut_along: {share: 0.8}
+  - remove_to: tray
+  - leave_nothing: {share: 0.02}
+  - {stretch_to: {body: pad, distance: 0.01}}
+  - {reach: {tool: pick, sphere: {centre: [0, 0, 0], radius: 1}}}
+  - let_go: all
+limits: {time: 60, force: 2, strain: 0.4, forbidden: [{name: bed, box: {min: [3, 3, 0], max: [4, 4, 1]}}, {body: pad}], end: [time, force]}
+metrics:
+  plan_rms: {weight: 2, good: 0.001, bad: 0.004, pass: 0.003}
+  sparc.pick: {good: -1.5, bad: -4}
+pass_mark: 55
+)";
+
+class TaskFile : public ::testing::Test {
+ protected:
+  Result<LoadedTask> read(const std::string& text) {
+    std::ofstream(folder_.path() + "/scene.yaml") << kScene;
+    std::ofstream(folder_.path() + "/task.yaml") << text;
+    return readTask(folder_.path() + "/task.yaml", folder_.path(), FileAccess());
+  }
+  /// The error of the task with `from` replaced.
+  std::string errorOf(const std::string& from, const std::string& to) {
+    std::string text = kTask;
+    const std::size_t at = text.find(from);
+    EXPECT_NE(std::string::npos, at) << from;
+    text.replace(at, from.size(), to);
+    const auto loaded = read(text);
+    EXPECT_FALSE(loaded.ok()) << to;
+    return loaded.ok() ? "" : loaded.error().detail;
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(TaskFile, IsReadWhole) {
+  const auto loaded = read(kTask);
+  ASSERT_TRUE(loaded.ok()) << loaded.error().detail;
+  const TaskDef& task = loaded->task;
+  EXPECT_EQ("task", task.name);
+  EXPECT_EQ("scene", loaded->scene.name);
+  ASSERT_EQ(7u, task.stages.size());
+  EXPECT_EQ("press", task.stages[0].name);
+  EXPECT_EQ(2.0, task.stages[0].hold_for);
+  EXPECT_EQ(0.5, std::get<PressTo>(task.stages[0].condition).force);
+  EXPECT_TRUE(std::get<PressTo>(task.stages[0].condition).region.has_value());
+  EXPECT_EQ("cut_along", task.stages[1].name);
+  EXPECT_EQ(0.8, std::get<CutAlong>(task.stages[1].condition).share);
+  EXPECT_TRUE(std::holds_alternative<RemoveToTray>(task.stages[2].condition));
+  EXPECT_EQ(0.02, std::get<LeaveNothing>(task.stages[3].condition).share);
+  EXPECT_EQ(ToolKind::kPick, std::get<Reach>(task.stages[5].condition).tool);
+  EXPECT_TRUE(std::holds_alternative<LetGo>(task.stages[6].condition));
+  EXPECT_EQ(60.0, task.limits.time);
+  EXPECT_EQ(2.0, task.limits.measured.force);
+  EXPECT_EQ((std::set<LimitKind>{LimitKind::kTime, LimitKind::kForce}), task.limits.ends);
+  ASSERT_EQ(2u, task.limits.measured.forbidden.size());
+  EXPECT_EQ("pad", task.limits.measured.forbidden[1].body);
+  EXPECT_EQ(0.003, task.plan->tolerance);
+  ASSERT_EQ(2u, task.metrics.size());
+  EXPECT_EQ(0.003, task.metrics[0].pass);
+  EXPECT_EQ(1.0, task.metrics[1].weight);
+  EXPECT_EQ(55.0, task.pass_mark);
+}
+
+TEST_F(TaskFile, ErrorsNameLineKeyAndWhatIsAccepted) {
+  struct Wrong {
+    std::string from, to, line, says, accepted;
+  };
+  const Wrong wrong[] = {
+      {"scene: scene", "scene: scena", "", "there is no scene", "YAML"},
+      {"brief: what", "breif: what", ":2:", "did you mean 'brief'", "pass_mark"},
+      {"plan: {body: pad", "plan: {body: pat", ":3:", "no body 'pat'", "pad"},
+      {"origin: [0, -1, 1]", "origin: [0.3, -1, 1]", ":3:", "no part of the plan", "meets"},
+      {"out: [0, 0, 1]", "out: [0, 1, 0]", ":3:", "right angle", "direction"},
+      {"tolerance: 0.003", "tolerance: .nan", ":3:", "tolerance is .nan", "above 0"},
+      {"target: {body: pad, ", "target: {body: pad, box: {min: [0, 0, 0], max: [1, 1, 1]}, ", ":4:", "several shapes",
+       "sphere"},
+      {"centre: [0.03, 0, 0.2]", "centre: [0.3, 0, 0.2]", ":4:", "no tissue of 'pad'", "region"},
+      {"tray: {min: [1, 1, 0]", "tray: {min: [9, 1, 0]", ":5:", "min above its max", "up to max"},
+      {"tray: {min: [1, 1, 0], max: [2, 2, 1]}", "pass_mork: 3", "", "did you mean 'pass_mark'", "stages"},
+      {"force: 0.5", "force: 2.5", ":7:", "can never be met", "up to that"},
+      {"hold_for: 2", "hold_for: 61", ":7:", "61 s", "less"},
+      {"cut_along: {share: 0.8}", "cut_along: {share: 1.8}", ":8:", "share is 1.8", "above 0 to 1"},
+      {"cut_along: {share: 0.8}", "cut_alone: {share: 0.8}", ":8:", "did you mean 'cut_along'", "reach"},
+      {"cut_along: {share: 0.8}", "{name: nothing}", ":8:", "no condition", "reach"},
+      {"remove_to: tray", "remove_to: bin", ":9:", "remove_to is 'bin'", "tray"},
+      {"stretch_to: {body: pad", "stretch_to: {body: bad", ":11:", "no body 'bad'", "pad"},
+      {"tool: pick", "tool: pik", ":12:", "tool is 'pik'", "pick, push, scissors"},
+      {"let_go: all", "separate: [pad, world]", ":13:", "no attachment joins", "attachment"},
+      {"end: [time, force]", "end: [time, farce]", ":14:", "'farce'", "strain"},
+      {"strain: 0.4", "strain: -1", ":14:", "strain is -1", "above 0"},
+      {"{body: pad}]", "{body: pet}]", ":14:", "no body 'pet'", "pad"},
+      {"plan_rms:", "plan_rmse:", ":16:", "did you mean 'plan_rms'", "docs/metrics.md"},
+      {"sparc.pick:", "sparc:", ":17:", "did you mean 'sparc.p", "docs/metrics.md"},
+      {"good: -1.5", "good: -4", ":17:", "the same", "two"},
+      {"pass_mark: 55", "pass_mark: 155", ":18:", "pass_mark is 155", "0 to 100"},
+  };
+  for (const Wrong& w : wrong) {
+    const std::string error = errorOf(w.from, w.to);
+    EXPECT_NE(std::string::npos, error.find("task.yaml" + w.line)) << w.to << ": " << error;
+    EXPECT_NE(std::string::npos, error.find(w.says)) << w.to << ": " << error;
+    EXPECT_NE(std::string::npos, error.find("accepted: ")) << w.to << ": " << error;
+    EXPECT_NE(std::string::npos, error.find(w.accepted)) << w.to << ": " << error;
+  }
+}
+
+TEST_F(TaskFile, EarlierReportsAreThoseOfTheTrainee) {
+  const auto write = [&](const std::string& name, const std::string& text) {
+    std::filesystem::create_directories(folder_.path() + "/" + name);
+    std::ofstream(folder_.path() + "/" + name + "/report.json") << text;
+  };
+  const auto report = [](const std::string& trainee, const std::string& task, const std::string& score) {
+    return "{\"trainee\": \"" + trainee + "\", \"task\": \"" + task + "\", \"score\": " + score +
+           ", \"passed\": true, \"metrics\": [{\"name\": \"time\", \"value\": 1.5}, {\"name\": \"ldlj.pick\", "
+           "\"value\": null}]}";
+  };
+  write("b", report("Ann", "resect", "70.5"));
+  write("a", report("Ann", "resect", "60"));
+  write("c", report("Bob", "resect", "10"));
+  write("d", report("Ann", "incise", "20"));
+  write("e", report("Ann", "resect", "99"));
+  write("f", "{\"trainee\": ");
+  write("g", "{}");
+  write("h", report("Ann", "resect", "\"many\""));
+  const auto found = readEarlierReports(folder_.path(), "Ann", "resect", "e");
+  ASSERT_EQ(2u, found.size());
+  EXPECT_EQ("a", found[0].name);
+  EXPECT_EQ(70.5, found[1].score);
+  EXPECT_EQ((std::map<std::string, double>{{"time", 1.5}}), found[1].values);
+  EXPECT_TRUE(readEarlierReports(folder_.path() + "/none", "Ann", "resect", "").empty());
+}
+
+// --- those that ship, done by a script
+
+class ShippedTask {
+ public:
+  explicit ShippedTask(const std::string& name) {
+    const std::string config = std::string(SOURCE_DIR) + "/config";
+    FileAccess access;
+    access.folders = {config};
+    auto loaded = readTask(config + "/tasks/" + name + ".yaml", config + "/scenes", access);
+    EXPECT_TRUE(loaded.ok()) << (loaded.ok() ? "" : loaded.error().detail);
+    if (!loaded.ok()) return;
+    world = std::make_unique<World>(loaded->scene.world);
+    for (BodyDef& def : loaded->scene.bodies)
+      EXPECT_TRUE(world->addSceneBody(std::make_shared<const PreparedBody>(test::prepared(def))).ok());
+    training = std::make_unique<Training>(loaded->task);
+  }
+  void seconds(double time) {
+    const int steps = static_cast<int>(std::lround(time * world->settings().step_rate));
+    for (int k = 0; k < steps && !training->over(); ++k) {
+      world->step();
+      ASSERT_TRUE(training->feed(frameOf(*world, world->takeEvents(), training->wants())).ok());
+    }
+  }
+  template <class T>
+  T apply(const Command& command) {
+    return test::replyOf<T>(world->apply(command));
+  }
+  /// A pick's hand goes there along a straight line, smoothly.
+  void carry(const PickReply& pick, const Vec3& from, const Vec3& to, double time) {
+    const int steps = static_cast<int>(std::lround(time * 120.0));
+    for (int k = 1; k <= steps; ++k) {
+      const double u = static_cast<double>(k) / steps, s = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+      apply<Done>(MovePickCommand{pick.pick, from + s * (to - from)});
+      seconds(1.0 / 120.0);
+    }
+  }
+  double value(const std::string& name) const {
+    for (const MetricValue& metric : training->values())
+      if (metric.name == name) return metric.value;
+    return std::nan("");
+  }
+  std::string told() const {
+    std::string text = "score " + std::to_string(training->score()) + " " + training->progress().failed();
+    for (const MetricValue& metric : training->values())
+      if (std::isfinite(metric.value)) text += "\n  " + metric.name + " " + std::to_string(metric.value);
+    return text;
+  }
+
+  std::unique_ptr<World> world;
+  std::unique_ptr<Training> training;
+};
+
+TEST(ShippedTasks, Palpate) {
+  ShippedTask task("palpate");
+  PushCommand push;
+  push.radius = 0.010;
+  push.position = Vec3(0.015, 0.010, 0.075);
+  task.apply<Done>(push);
+  task.seconds(0.5);
+  push.position.z() = 0.066;
+  push.speed = 0.02;
+  task.apply<Done>(push);
+  task.seconds(2.0);
+  EXPECT_EQ(1u, task.training->progress().stage()) << task.told();
+  push.enable = false;
+  task.apply<Done>(push);
+  PickCommand pick;
+  pick.point = Vec3(0.015, 0.010, 0.1);
+  pick.direction = -Vec3::UnitZ();
+  task.apply<PickReply>(pick);
+  task.seconds(1.0);
+  EXPECT_TRUE(task.training->passed()) << task.told();
+}
+
+TEST(ShippedTasks, Retract) {
+  ShippedTask task("retract");
+  task.seconds(1.0);
+  PickCommand pick;
+  pick.point = Vec3(-0.05, -0.06, 0.2);
+  pick.direction = -Vec3::UnitZ();
+  const auto picked = task.apply<PickReply>(pick);
+  task.carry(picked, picked.position, picked.position + Vec3(0, 0.01, 0.035), 2.0);
+  task.seconds(11.0);
+  EXPECT_EQ(1u, task.training->progress().stage()) << task.told();
+  task.apply<Done>(ReleaseCommand{picked.pick});
+  task.seconds(0.1);
+  EXPECT_TRUE(task.training->passed()) << task.told();
+}
+
+TEST(ShippedTasks, Incise) {
+  ShippedTask task("incise");
+  task.seconds(1.0);
+  const auto top = task.world->probe(Vec3(0, 0, 0.2), -Vec3::UnitZ());
+  ASSERT_TRUE(top.ok());
+  InciseCommand incise;
+  incise.blade = {Vec3(-0.04, 0, top->position.z() + 0.01), Vec3::UnitX(), Vec3::UnitZ(), 0.08, 0.01 + 0.013};
+  task.apply<InciseReply>(incise);
+  task.seconds(0.5);
+  EXPECT_TRUE(task.training->passed()) << task.told();
+}
+
+TEST(ShippedTasks, Resect) {
+  ShippedTask task("resect");
+  // The plan is in the rest shape: the organ hangs as soon as time passes, so it is cut at once.
+  task.seconds(1.0 / 120.0);
+  CutCommand cut;
+  const Vec3 normal = Vec3(0.9578263, 0, 0.2873479).normalized();
+  cut.blades.origin = Vec3(-0.045, 0, 0.06) - Vec3(-0.2873479, 0, 0.9578263) - Vec3::UnitY();
+  cut.blades.x_axis = Vec3::UnitY();
+  cut.blades.y_axis = Vec3::UnitY().cross(normal).normalized();
+  const auto reply = task.apply<CutReply>(cut);
+  ASSERT_EQ(2u, reply.new_bodies.size());
+  task.seconds(0.5);
+  EXPECT_EQ(1u, task.training->progress().stage()) << task.told();
+  PickCommand pick;
+  pick.point = Vec3(-0.075, -0.005, 0.06);
+  pick.max_distance = 0.05;
+  pick.body = reply.new_bodies[1];
+  const auto picked = task.apply<PickReply>(pick);
+  task.carry(picked, picked.position, picked.position + Vec3(-0.05, 0, 0.05), 1.0);
+  task.carry(picked, picked.position + Vec3(-0.05, 0, 0.05), picked.position + Vec3(-0.2, 0, 0.05), 2.0);
+  task.seconds(1.0);
+  EXPECT_EQ(2u, task.training->progress().stage()) << task.told();
+  task.apply<Done>(ReleaseCommand{picked.pick});
+  task.seconds(0.2);
+  EXPECT_TRUE(task.training->passed()) << task.told();
+}
+
+}  // namespace task_file_test
+}  // namespace meshless
