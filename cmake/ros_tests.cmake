@@ -7,7 +7,7 @@ endif()
 file(GLOB ros_unit_tests CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/test/ros/*_test.cpp)
 add_test_program(ros 1 SOURCES ${ros_unit_tests} LABELS ros LINKS ${PROJECT_NAME}_ros ${catkin_LIBRARIES})
 target_include_directories(ros_tests SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
-add_dependencies(check_ros deformer_node make_meshes replay ${PROJECT_NAME}_generate_messages)
+add_dependencies(check_ros deformer_node make_meshes replay report ${PROJECT_NAME}_generate_messages)
 add_dependencies(check_drive drive)  # scripts/check plays random scenes with it
 add_custom_target(check_rviz DEPENDS deformer_node ${PROJECT_NAME}_generate_messages)
 if(TARGET ${PROJECT_NAME}_rviz)
@@ -27,7 +27,7 @@ set(full_tests display ending forces fuzz hands network parameters play_abdomen 
   play_skin robust scenes session shown_block shown_fish shown_skin soak)
 # A node keeps one processor busy, and a screen is drawn by software: tests run alone. These wait for what they ask for,
 # however long it takes, or hold the clock themselves.
-set(patient_tests actions client clock contacts forces lab messages_law network own_organ parameters publish_clock requests scenes services session spawn_cloud stations streams testing time tools)
+set(patient_tests actions client clock contacts forces lab messages_law network own_organ parameters publish_clock requests scenes services session spawn_cloud stations streams testing time tools training)
 file(GLOB ros_tests RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS test/ros/*.test test/rviz/*.test)
 set(known_tests ${ros_tests})
 list(TRANSFORM known_tests REPLACE ".*/(.*)\\.test$" "\\1")

@@ -14,7 +14,7 @@ from meshless_surgery.goals import Goals
 from meshless_surgery.msg import Info, State
 from meshless_surgery.poses import blade_pose, blades_pose, pose_stamped
 from meshless_surgery.srv import (Attach, Clip, Cut, Detach, GetBody, Hash, Incise, LoadState, Lock, MovePick, Pick, Probe, Push,
-                                  Release, Remove, SaveState, SetMaterial, Spawn, SpawnCloud, Step, Unclip)
+                                  Release, Remove, Report, SaveState, SetMaterial, Spawn, SpawnCloud, StartTask, Step, Unclip)
 from meshless_surgery.streams import ToolStream
 
 
@@ -204,6 +204,15 @@ class Surgeon:
 
     def load(self, file):
         return self.call('load', LoadState, file=file)
+
+    def start_task(self, task, trainee=''):
+        return self.call('start_task', StartTask, task=task, trainee=trainee)
+
+    def stop_task(self):
+        return self.call('stop_task', Trigger)
+
+    def report(self, name=''):
+        return self.call('report', Report, name=name)
 
     def hash(self):
         """A number for the whole state: equal for equal histories."""

@@ -13,6 +13,16 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMostStages = 100, kMostForbidden = 100;
 const std::vector<std::string> kTools{"pick", "push", "scissors"};
 
+std::string tasksIn(const fs::path& folder) {
+  std::set<std::string> names;
+  std::error_code failed;
+  for (fs::directory_iterator at(folder, failed), end; !failed && at != end; at.increment(failed))
+    if (at->path().extension() == ".yaml") names.insert(at->path().stem().string());
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text.empty() ? "those of config/tasks" : text;
+}
+
 /// A box or a sphere, of the keys of `map`; a plane too where it may be one.
 std::optional<Region> readRegionKeys(YamlSource& source, YamlMap& map, const YAML::Node& at, bool plane_too,
                                      bool needed) {
@@ -282,7 +292,8 @@ Result<LoadedTask> readTask(const std::string& file, const std::string& scene_fo
   std::error_code failed;
   const fs::path real = fs::canonical(file, failed);
   if (failed || !fs::is_regular_file(real, failed))
-    return Error{ErrorCode::kUnreadable, "there is no task '" + file + "'; accepted: a YAML file"};
+    return Error{ErrorCode::kUnreadable, "there is no task '" + file + "'; accepted: a YAML file, or one of " +
+                                             tasksIn(fs::path(file).parent_path())};
   const Result<YAML::Node> root = readYamlFile(real.string(), file);
   if (!root) return root.error();
   if (!root->IsMap())
@@ -304,6 +315,7 @@ Result<LoadedTask> readTask(const std::string& file, const std::string& scene_fo
   Result<SceneDef> scene = readScene(scene_file.string(), access);
   if (!scene) return Error{scene.error().code, file + ": its scene: " + scene.error().detail};
   loaded.scene = std::move(*scene);
+  loaded.scene_file = scene_file.string();
   if (const auto fault = findTaskFault(loaded.task, loaded.scene)) {
     source.fail(reader.at(*fault), fault->what, fault->accepted);
     return *source.fault;
@@ -313,7 +325,7 @@ Result<LoadedTask> readTask(const std::string& file, const std::string& scene_fo
 
 std::vector<EarlierReport> readEarlierReports(const std::string& folder, const std::string& trainee,
                                               const std::string& task, const std::string& but) {
-  std::map<std::string, EarlierReport> found;
+  std::map<std::pair<fs::file_time_type, std::string>, EarlierReport> found;
   std::error_code failed;
   for (fs::directory_iterator at(folder, failed), end; !failed && at != end; at.increment(failed)) {
     const std::string name = at->path().filename().string();
@@ -332,7 +344,7 @@ std::vector<EarlierReport> readEarlierReports(const std::string& folder, const s
       earlier.passed = report["passed"].as<bool>();
       for (const auto& metric : report["metrics"])
         if (!metric["value"].IsNull()) earlier.values[metric["name"].as<std::string>()] = metric["value"].as<double>();
-      found.emplace(name, std::move(earlier));
+      found.emplace(std::make_pair(fs::last_write_time(real, missing), name), std::move(earlier));
     } catch (const YAML::Exception&) {
     }
   }

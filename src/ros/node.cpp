@@ -13,6 +13,7 @@
 #include "meshless_surgery/ros/clock_publisher.h"
 #include "meshless_surgery/ros/convert.h"
 #include "meshless_surgery/ros/force_publisher.h"
+#include "meshless_surgery/ros/live_training.h"
 #include "meshless_surgery/ros/publishers.h"
 #include "meshless_surgery/ros/services.h"
 #include "meshless_surgery/ros/session.h"
@@ -69,6 +70,13 @@ Result<std::string> sceneFile(const std::string& scene, const std::string& packa
   return realPath(path);
 }
 
+/// A name of config/tasks, or a path: who starts the node may name any.
+Result<LoadedTask> parameterTask(const std::string& task, const TrainingFolders& folders, FileAccess access) {
+  const bool is_path = task.find('/') != std::string::npos || fs::path(task).extension() == ".yaml";
+  access.folders = {fs::path(folders.scenes).parent_path().string()};
+  return readTask(is_path ? task : folders.tasks + "/" + task + ".yaml", folders.scenes, access);
+}
+
 void applyOverrides(const NodeSettings& settings, WorldSettings& world) {
   if (settings.pick_max_distance) world.pick_max_distance = *settings.pick_max_distance;
   if (settings.pick_stiffness) world.pick_stiffness = *settings.pick_stiffness;
@@ -118,6 +126,7 @@ struct DeformerNode::Parts {
     session->endLog(runner);
     // First the world, so that whoever waits for it gets an answer; the services last, as a body may be being prepared.
     runner.stop();
+    if (training) training->stop();
     publishers.stop();
     forces.stop();
     session->stop();
@@ -136,6 +145,7 @@ struct DeformerNode::Parts {
   ToolInputs inputs;
   Publishers publishers;
   ForcePublisher forces;
+  std::unique_ptr<LiveTraining> training;
   std::unique_ptr<Services> services;
 };
 
@@ -157,12 +167,23 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   }
 
   const std::string package_folder = ros::package::getPath(kPackage);
+  FileAccess access;
+  access.find_package = [](const std::string& package) { return ros::package::getPath(package); };
+  TrainingFolders training_folders;
+  training_folders.scenes = package_folder + "/config/scenes";
+  training_folders.tasks = package_folder + "/config/tasks";
+  std::optional<TaskDef> task;
+  if (!settings->task.empty()) {
+    auto loaded = parameterTask(settings->task, training_folders, access);
+    if (!loaded.ok()) return Error{loaded.error().code, "parameter ~task: " + loaded.error().detail};
+    task = std::move(loaded->task);
+    settings->scene = loaded->scene_file;
+  }
   const auto file = sceneFile(settings->scene, package_folder);
   if (!file.ok()) return file.error();
   settings->scene = *file;
   const std::string scene_folder = fs::path(*file).parent_path().string();
 
-  FileAccess access;
   access.folders = {realPath(package_folder), scene_folder};
   for (const std::string& folder : settings->data_folders) {
     std::error_code missing;
@@ -172,7 +193,6 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
     }
     access.folders.push_back(realPath(folder));
   }
-  access.find_package = [](const std::string& package) { return ros::package::getPath(package); };
 
   auto scene = readScene(*file, access);
   if (!scene.ok()) return scene.error();
@@ -216,7 +236,11 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
                                   << " cm^2");
   }
 
-  auto session = std::make_unique<Session>(sessionSettings(*settings, *file));
+  const SessionSettings session_settings = sessionSettings(*settings, *file);
+  training_folders.access = access;
+  training_folders.scene_file = *file;
+  training_folders.reports = session_settings.folder + "/reports";
+  auto session = std::make_unique<Session>(session_settings);
   const auto taken_up = session->takeUp(*world);
   if (!taken_up.ok()) {
     return Error{taken_up.error().code,
@@ -230,11 +254,18 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   auto parts = std::make_unique<Parts>(private_handle, *settings, std::move(world),
                                        BodyLoader(access, scene_folder, std::move(scene->materials)),
                                        std::move(session), std::move(rejections), std::move(clock_publisher));
+  parts->training = std::make_unique<LiveTraining>(private_handle, parts->runner, std::move(training_folders),
+                                                   settings->world_frame, *parts->rejections);
+  if (task) parts->training->begin(std::move(*task), settings->trainee);
   parts->runner.setEventSink(
-      [publishers = &parts->publishers](std::vector<Event> events) { publishers->queueEvents(std::move(events)); });
-  parts->runner.setStepSink([forces = &parts->forces, kept = parts->session.get(),
-                             clock = parts->clock_publisher.get()](const World& world_now, double dt) {
+      [publishers = &parts->publishers, training = parts->training.get()](std::vector<Event> events) {
+        training->heard(events);
+        publishers->queueEvents(std::move(events));
+      });
+  parts->runner.setStepSink([forces = &parts->forces, kept = parts->session.get(), training = parts->training.get(),
+                             clock = parts->clock_publisher.get()](World& world_now, double dt) {
     if (clock != nullptr && dt > 0.0) clock->advance(dt);
+    training->changed(world_now, dt);
     forces->changed(world_now, dt);
     kept->changed(world_now, dt);
   });
@@ -242,6 +273,7 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   parts->runner.start();
   parts->publishers.start();
   parts->forces.start();
+  parts->training->start();
   // Last, so that who finds them finds a world that runs.
   parts->services = std::make_unique<Services>(private_handle, parts->runner, parts->frames, parts->loader,
                                                *parts->rejections, *parts->session);

@@ -367,6 +367,7 @@ void WorldRunner::stepOnce() {
   try {
     world_->step();
     ++revision_;
+    handOverEvents();
     if (step_sink_) step_sink_(*world_, dt_);
   } catch (const std::exception& e) {
     ++revision_;

@@ -138,6 +138,8 @@ Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std
   reader.read("world_frame", settings.world_frame);
   reader.read("tf_prefix", settings.tf_prefix);
   reader.read("scene", settings.scene);
+  reader.read("task", settings.task);
+  reader.read("trainee", settings.trainee);
   reader.read("data_folders", settings.data_folders);
   reader.read("session_directory", settings.session_directory);
   reader.read("command_log", settings.command_log);
@@ -181,6 +183,8 @@ Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std
     const Status name = SessionFolder::checkName(settings.command_log);
     if (!name.ok()) reader.check.fault("parameter ~command_log: " + name.error().detail);
   }
+  if (settings.trainee.size() > kMaxName || settings.trainee != printable(settings.trainee))
+    reader.check.fault("parameter ~trainee is '" + printable(settings.trainee) + "'; accepted: a name in one line");
   if (settings.scene.empty()) {
     reader.check.fault("parameter ~scene is empty; accepted: a scene's name, a path or package://");
   }

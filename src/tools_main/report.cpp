@@ -34,9 +34,9 @@ int refuse(const std::string& why) {
 int main(int argc, char** argv) {
   CLI::App app(
       "Replays a log of commands (the parameter command_log of deformer_node) and writes how a task was done in it: "
-      "report.html, report.json and report.csv in a folder of the log's name below --out. Where the world was reset in "
-      "the log, the task begins anew there: the report is of the last time. Exit status: 0 passed, 1 not passed, 2 no "
-      "report could be made.");
+      "report.html, report.json and report.csv in the folder LOG.report below --out. Where the world was reset in the "
+      "log, the task begins anew there: the report is of the last time. Exit status: 0 passed, 1 not passed, 2 no report "
+      "could be made.");
   std::string log_file, task_name, out = ".", trainee;
   double until = 1e300;
   int threads = 1;
@@ -78,10 +78,10 @@ int main(int argc, char** argv) {
 
   training.stop();
 
-  const std::string name = fs::path(log_file).filename().string();
+  const std::string log_name = fs::path(log_file).filename().string(), name = log_name + ".report";
   if (const meshless::Status fits = meshless::SessionFolder::checkName(name); !fits.ok())
     return refuse(fits.error().detail);
-  meshless::ReportHead head{trainee, name, !replayed->difference, {}};
+  meshless::ReportHead head{trainee, log_name, !replayed->difference, {}};
   head.earlier = meshless::readEarlierReports(out, trainee, training.task().name, name);
   const meshless::SessionFolder folder((fs::path(out) / name).string());
   const std::pair<const char*, std::string> files[] = {{"report.json", meshless::reportJson(training, head)},

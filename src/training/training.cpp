@@ -63,9 +63,15 @@ Status Training::begin(const TrainingFrame& frame) {
   return Done{};
 }
 
-Status Training::feed(const TrainingFrame& frame) {
+Status Training::feed(TrainingFrame frame) {
   if (!begun_ || frame.run != run_) {
     if (Status status = begin(frame); !status) return status;
+    // What came before the reset is not of this run.
+    for (std::size_t k = frame.events.size(); k-- > 0;) {
+      if (frame.events[k].type != EventType::kReset && frame.events[k].type != EventType::kLoaded) continue;
+      frame.events.erase(frame.events.begin(), frame.events.begin() + static_cast<std::ptrdiff_t>(k) + 1);
+      break;
+    }
   }
   if (over()) return Done{};
   Now& now = *now_;

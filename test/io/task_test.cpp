@@ -1,10 +1,11 @@
 #include "meshless_surgery/io/task.h"
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 
-#include "support/bodies.h"
 #include "io/temporary_folder.h"
+#include "support/bodies.h"
 
 namespace meshless {
 namespace task_file_test {
@@ -135,6 +136,8 @@ TEST_F(TaskFile, EarlierReportsAreThoseOfTheTrainee) {
            "\"value\": null}]}";
   };
   write("b", report("Ann", "resect", "70.5"));
+  const std::string oldest = folder_.path() + "/b/report.json";
+  std::filesystem::last_write_time(oldest, std::filesystem::last_write_time(oldest) - std::chrono::hours(1));
   write("a", report("Ann", "resect", "60"));
   write("c", report("Bob", "resect", "10"));
   write("d", report("Ann", "incise", "20"));
@@ -144,8 +147,9 @@ TEST_F(TaskFile, EarlierReportsAreThoseOfTheTrainee) {
   write("h", report("Ann", "resect", "\"many\""));
   const auto found = readEarlierReports(folder_.path(), "Ann", "resect", "e");
   ASSERT_EQ(2u, found.size());
-  EXPECT_EQ("a", found[0].name);
-  EXPECT_EQ(70.5, found[1].score);
+  EXPECT_EQ("b", found[0].name);  // the oldest
+  EXPECT_EQ(70.5, found[0].score);
+  EXPECT_EQ("a", found[1].name);
   EXPECT_EQ((std::map<std::string, double>{{"time", 1.5}}), found[1].values);
   EXPECT_TRUE(readEarlierReports(folder_.path() + "/none", "Ann", "resect", "").empty());
 }

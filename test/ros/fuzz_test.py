@@ -268,6 +268,10 @@ class Fuzzer:
             return dict(data=True)
         if service in ('save', 'load'):
             return dict(file=r.choice(['state', 'other', self.string()]))
+        if service == 'start_task':
+            return dict(task=r.choice(['palpate', 'none', self.string()]), trainee=self.string())
+        if service == 'report':
+            return dict(name=r.choice(['', 'mine', self.string()]))
         return {}
 
     def amount(self):

@@ -12,7 +12,7 @@ import numpy
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Point, PoseStamped, Vector3, WrenchStamped
-from meshless_surgery.msg import Event, Info, State, Surfaces, Topology, Vertices
+from meshless_surgery.msg import Event, Info, Metrics, State, Surfaces, TaskState, Topology, Vertices
 from meshless_surgery.srv import GetBodyResponse
 from sensor_msgs.msg import JointState, PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
@@ -618,6 +618,36 @@ class MessagesLawTest(DeformerTestCase):
         for name in cut.new_bodies:
             cavity, = self.good('get_body', name=name).cavities
             self.says(cavity, volume=(0.5 * within, 0.1 * within), pressure=(pressure, 1e-9), open=True)
+
+
+    def test_a_task_says_how_far_it_is(self):
+        asked = rospy.Time.now()
+        tasks, metrics = self.deformer.recorder('task', TaskState), self.deformer.recorder('metrics', Metrics)
+        self.addCleanup(tasks.close)
+        self.addCleanup(metrics.close)
+        self.good('start_task', task='tasks/messages.yaml', trainee='Ann')
+        self.good('step', steps=36)  # of 240 a second: the first stage takes a tenth of one
+        now = metrics.wait(lambda m: m.time > 0.149)
+        self.heads(now, asked)
+        self.says(now, time=(36 / RATE, 1e-9), held_for=(12 / RATE, 1e-9))
+        values = dict(zip(now.names, now.values))
+        self.assertEqual(len(now.names), len(now.values))
+        self.assertAlmostEqual(36 / RATE, values['time'])
+        self.assertEqual(1.0, values['stages'])
+        self.assertTrue(numpy.isnan(values['path_length.pick']))
+        held.update((now._type, field) for field in ('names', 'values'))
+        task = tasks.wait(lambda t: t.stage == 1)
+        self.heads(task, asked)
+        self.says(task, task='messages', brief='keep off', trainee='Ann', running=True, stage=1, stage_brief='then', time_limit=1.0,
+                  force_limit=2.0, score=50.0, passed=False)
+        self.assertEqual(['wait', 'again'], task.stages)
+        held.add((task._type, 'stages'))
+        self.good('step', steps=37)
+        self.says(tasks.wait(lambda t: not t.running and t.task), stage=2, score=100.0, passed=True, failed='')
+        self.good('start_task', task='tasks/messages.yaml')
+        self.good('pick', point=Point(-1.0, 0.0, 2.05), body='hangs', max_distance=0.02)
+        self.good('step', steps=250)
+        self.says(tasks.wait(lambda t: t.failed), failed='the time of 1 s is over', passed=False, running=False)
 
 
 class EveryFieldTest(unittest.TestCase):

@@ -452,6 +452,17 @@ def lumen(test, answer):
 TO_WORLD = dict(body='left', other='world', stiffness=1e6)
 CLIP = dict(point=Point(0.0, 0.0, 1.02), direction=Vector3(0, 0, 1), width=0.01, opening=0.06)
 CORNER = Point(-0.15, 0.05, 0.15)
+def report_of(test, answer):
+    test.good('step', steps=1)
+    return os.path.basename(test.good('report').folder).rsplit('_', 1)[0]
+
+
+def begun_task(test):
+    test.good('start_task', task='tasks/boxes.yaml')
+    test.good('step', steps=1)
+    return {}
+
+
 LAWS = [
     Law('attach', 'name', 'mine', TO_WORLD, name_of, 'mine', 'left-world'),
     Law('attach', 'body', 'left', TO_WORLD, ends, ['left', 'world'], Refusal(INVALID)),
@@ -531,6 +542,9 @@ LAWS = [
     Law('spawn_cloud', 'material', 'stiff', dict(cloud=cloud_of(ball())), mass, within(1.9 * BALL * 1e3, 2.1 * BALL * 1e3),
         within(0.95 * BALL * 1e3, 1.05 * BALL * 1e3)),
     Law('step', 'steps', 7, {}, lambda test, answer: (120.0 * answer.sim_time, test.state().step), (7.0, 7), Refusal(INVALID)),
+    Law('start_task', 'task', 'tasks/boxes.yaml', {}, lambda test, answer: 'boxes' in answer.message, True, Refusal(INVALID)),
+    Law('start_task', 'trainee', 'Ann', dict(task='tasks/boxes.yaml'), report_of, 'Ann_boxes', 'boxes'),
+    Law('report', 'name', 'mine', begun_task, lambda test, answer: os.path.basename(answer.folder).split('_')[0], 'mine', 'boxes'),
     Law('pause', 'data', True, running(), lambda test, answer: test.state().paused, True, False),
 ]
 

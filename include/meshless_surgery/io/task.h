@@ -9,6 +9,7 @@ namespace meshless {
 struct LoadedTask {
   TaskDef task;
   SceneDef scene;
+  std::string scene_file;  // a path
 };
 
 /// Reads a task and its scene. `file` is a path. The scene is a name of `scene_folder`, or a path from the task's
@@ -27,8 +28,8 @@ struct LoadedTask {
 /// pass_mark
 Result<LoadedTask> readTask(const std::string& file, const std::string& scene_folder, const FileAccess& access);
 
-/// Of the folders in `folder` that have a report.json of that trainee and task, by name; `but`: not that folder. What
-/// is no report is passed over.
+/// Of the folders in `folder` that have a report.json of that trainee and task, the oldest file first; `but`: not that
+/// folder. What is no report is passed over.
 std::vector<EarlierReport> readEarlierReports(const std::string& folder, const std::string& trainee,
                                               const std::string& task, const std::string& but);
 

@@ -47,9 +47,10 @@ class WorldRunner {
 
   /// Called on the runner's thread: must only put the events aside. To be set before start.
   void setEventSink(EventSink sink) { event_sink_ = std::move(sink); }
-  /// Called on the runner's thread after every step, with what it simulated [s], and with 0 after every job that may
-  /// have changed the world: must be fast. A step fails where it throws. To be set before start.
-  using StepSink = std::function<void(const World&, double)>;
+  /// Called on the runner's thread after every step and its events, with what it simulated [s], and with 0 after every
+  /// job that may have changed the world: must be fast, and only look. A step fails where it throws. To be set before
+  /// start.
+  using StepSink = std::function<void(World&, double)>;
   void setStepSink(StepSink sink) { step_sink_ = std::move(sink); }
   void start();
   /// Ends the thread; whoever waits gets kFailed.

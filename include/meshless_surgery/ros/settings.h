@@ -15,6 +15,8 @@ struct NodeSettings {
   std::string world_frame = "world";
   std::string tf_prefix;                   // before the published frames' names, with a slash between
   std::string scene = "liver";             // a name in config/scenes, a path or package://
+  std::string task;                        // a name in config/tasks or a path; then the scene is the task's; empty: none
+  std::string trainee;                     // for its report
   std::vector<std::string> data_folders;   // below which mesh files may be read, besides the package and the scene
   std::string session_directory;           // files are written below it; empty: meshless_surgery below ROS's own folder
   std::string command_log;                 // a file's name there; empty: no log

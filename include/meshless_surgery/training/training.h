@@ -29,7 +29,7 @@ class Training {
   /// What the next frame should have.
   FrameWants wants() const;
   /// Refuses kUnknownName, and stays as it was, where the first frame lacks a body of the task.
-  Status feed(const TrainingFrame& frame);
+  Status feed(TrainingFrame frame);
   /// The task is over, whatever was reached: what comes later is not looked at.
   void stop();
 

@@ -1,0 +1,271 @@
+#include "meshless_surgery/ros/live_training.h"
+
+#include <atomic>
+#include <cctype>
+#include <cmath>
+#include <filesystem>
+
+#include <meshless_surgery/Metrics.h>
+#include <meshless_surgery/Report.h>
+#include <meshless_surgery/StartTask.h>
+#include <meshless_surgery/TaskState.h>
+#include <ros/publisher.h>
+#include <std_srvs/Trigger.h>
+
+#include "answers.h"
+#include "meshless_surgery/io/session_folder.h"
+
+namespace meshless {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kMetricsRate = 10.0;  // [Hz]
+constexpr std::size_t kMostTrainee = 100;
+constexpr int kMostReports = 100000;
+
+bool sameFile(const std::string& a, const std::string& b) {
+  std::error_code failed;
+  return fs::equivalent(a, b, failed) && !failed;
+}
+
+}  // namespace
+
+Result<LoadedTask> loadTask(const std::string& task, const TrainingFolders& folders) {
+  const bool is_file = task.find('/') != std::string::npos || fs::path(task).extension() == ".yaml";
+  std::string file = folders.tasks + "/" + task + ".yaml";
+  if (is_file) {
+    auto resolved = folders.access.resolve(task, fs::path(folders.scene_file).parent_path().string());
+    if (!resolved.ok()) return resolved.error();
+    file = *resolved;
+  } else if (const Status name = SessionFolder::checkName(task); !name.ok()) {
+    return name.error();
+  }
+  return readTask(file, folders.scenes, folders.access);
+}
+
+struct LiveTraining::Handlers : Answers {
+  Handlers(const ros::NodeHandle& private_handle, WorldRunner& runner_in, TrainingFolders folders_in,
+           std::string world_frame_in, Rejections& rejections_in)
+      : Answers{rejections_in},
+        handle(private_handle),
+        runner(runner_in),
+        folders(std::move(folders_in)),
+        world_frame(std::move(world_frame_in)) {
+    handle.setCallbackQueue(&queue);
+  }
+
+  void start() {
+    task_topic = handle.advertise<meshless_surgery::TaskState>("task", 1, true);
+    metrics_topic = handle.advertise<meshless_surgery::Metrics>("metrics", 10);
+    servers = {handle.advertiseService("start_task", &Handlers::startTask, this),
+               handle.advertiseService("stop_task", &Handlers::stopTask, this),
+               handle.advertiseService("report", &Handlers::report, this)};
+    timer = handle.createWallTimer(ros::WallDuration(1.0 / kMetricsRate), &Handlers::publish, this);
+    spinner.start();
+  }
+
+  // --- on the runner's thread
+
+  void take(TaskDef task, const std::string& of) {
+    trainee = of;
+    training = std::make_unique<Training>(std::move(task));
+    stopped = false;
+    ++version;
+  }
+
+  void changed(World& world, double dt) {
+    if (!training || stopped || !(dt > 0.0)) return;
+    const std::size_t stage = training->progress().stage();
+    const bool was_over = training->begun() && training->over(), had_begun = training->begun();
+    const Status fed = training->feed(frameOf(world, std::exchange(events, {}), training->wants()));
+    if (!fed.ok()) {
+      rejections.count("~task", fed.error().detail);
+      training.reset();
+      ++version;
+    } else if (!had_begun || stage != training->progress().stage() || was_over != training->over()) {
+      ++version;
+    }
+  }
+
+  void fill(meshless_surgery::TaskState& state, meshless_surgery::Metrics& now) const {
+    state.trainee = trainee;
+    if (training) {
+      const TaskDef& task = training->task();
+      state.task = task.name;
+      state.brief = task.brief;
+      state.running = !training->over();
+      for (const Stage& stage : task.stages) state.stages.push_back(stage.name);
+      state.stage = static_cast<std::uint32_t>(training->progress().stage());
+      if (state.stage < task.stages.size()) state.stage_brief = task.stages[state.stage].brief;
+      state.failed = training->progress().failed();
+      if (task.limits.time) state.time_limit = *task.limits.time;
+      if (std::isfinite(task.limits.measured.force)) state.force_limit = task.limits.measured.force;
+      state.score = training->score();
+      state.passed = training->passed();
+      now.time = training->metrics().time();
+      now.held_for = training->progress().heldFor();
+      for (MetricValue& value : training->values()) {
+        now.names.push_back(std::move(value.name));
+        now.values.push_back(value.value);
+      }
+    }
+  }
+
+  // --- on this thread
+
+  void publish(const ros::WallTimerEvent&) {
+    const bool news = !said_any || version.load() != said_version;
+    if (!news && metrics_topic.getNumSubscribers() == 0) return;
+    meshless_surgery::TaskState state;
+    meshless_surgery::Metrics now;
+    std::uint64_t present = 0;
+    const Status looked = runner.look([&](World&) {
+      fill(state, now);
+      present = version.load();
+    });
+    if (!looked.ok()) return;
+    state.header.stamp = now.header.stamp = ros::Time::now();
+    state.header.frame_id = now.header.frame_id = world_frame;
+    if (news) task_topic.publish(state);
+    if (!now.names.empty() && (news || now.time != said_time)) metrics_topic.publish(now);
+    said_any = true;
+    said_version = present;
+    said_time = now.time;
+  }
+
+  bool startTask(meshless_surgery::StartTask::Request& request, meshless_surgery::StartTask::Response& response) {
+    if (request.trainee.size() > kMostTrainee || request.trainee != printable(request.trainee, kMostTrainee))
+      return refuse(response, "start_task",
+                    {ErrorCode::kInvalidArgument,
+                     "trainee is '" + printable(request.trainee) + "'; accepted: up to 100 characters in one line"});
+    auto loaded = loadTask(request.task, folders);
+    if (!loaded.ok()) return refuse(response, "start_task", loaded.error());
+    if (!sameFile(loaded->scene_file, folders.scene_file))
+      return refuse(response, "start_task",
+                    {ErrorCode::kInvalidArgument,
+                     "task '" + loaded->task.name + "' is of the scene '" + loaded->task.scene +
+                         "'; accepted: tasks of the scene that runs, " + fs::path(folders.scene_file).stem().string()});
+    const std::string name = loaded->task.name;
+    // First the task, then the reset: it begins with the first step of the new run, as it does in a replay.
+    const Status taken = runner.look([&](World&) { take(std::move(loaded->task), request.trainee); });
+    if (!taken.ok()) return refuse(response, "start_task", taken.error());
+    const Status reset = runner.reset();
+    if (!reset.ok()) return refuse(response, "start_task", reset.error());
+    return accept(response, "the task '" + name + "' begins");
+  }
+
+  bool stopTask(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+    bool runs = false;
+    const Status done = runner.look([&](World&) {
+      runs = training && training->begun() && !stopped;
+      if (!runs) return;
+      training->stop();
+      stopped = true;
+      ++version;
+    });
+    if (!done.ok()) return refuse(response, "stop_task", done.error());
+    if (!runs) return refuse(response, "stop_task", {ErrorCode::kMissed, "no task runs; start_task begins one"});
+    return accept(response, "the task was stopped; report writes how it was done");
+  }
+
+  bool report(meshless_surgery::Report::Request& request, meshless_surgery::Report::Response& response) {
+    std::string json, csv, html, name = request.name;
+    if (!name.empty())
+      if (const Status valid = SessionFolder::checkName(name); !valid.ok())
+        return refuse(response, "report", valid.error());
+    bool there = false;
+    ReportHead head;
+    std::string task;
+    const auto look = [&](World&) {
+      there = training && training->begun();
+      if (!there) return;
+      task = training->task().name;
+      head.trainee = trainee;
+      if (html.empty() && head.log.empty()) return;  // the first look
+      json = reportJson(*training, head);
+      csv = reportCsv(*training);
+      html = reportHtml(*training, head);
+      response.score = training->score();
+      response.passed = training->passed();
+    };
+    Status done = runner.look(look);
+    if (!done.ok()) return refuse(response, "report", done.error());
+    if (!there) return refuse(response, "report", {ErrorCode::kMissed, "no task was begun; start_task begins one"});
+    if (name.empty()) name = freeName(head.trainee, task);
+    head.log = name;
+    head.earlier = readEarlierReports(folders.reports, head.trainee, task, name);
+    done = runner.look(look);
+    if (!done.ok()) return refuse(response, "report", done.error());
+    if (!there) return refuse(response, "report", {ErrorCode::kMissed, "no task was begun; start_task begins one"});
+    response.folder = folders.reports + "/" + name;
+    const SessionFolder folder(response.folder);
+    for (const auto& [file, bytes] :
+         {std::make_pair("report.json", &json), {"report.csv", &csv}, {"report.html", &html}})
+      if (const Status written = folder.write(file, *bytes); !written.ok())
+        return refuse(response, "report", written.error());
+    return accept(response, "wrote " + response.folder + "/report.html");
+  }
+
+  /// TRAINEE_TASK and the first number that no folder has.
+  std::string freeName(const std::string& of, const std::string& task) const {
+    std::string start;
+    for (const char c : of.empty() ? task : of + "_" + task)
+      start += std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-' ? c : '_';
+    start = start.substr(0, 80);
+    for (int number = 1;; ++number) {
+      const std::string name = start + "_" + std::to_string(number);
+      std::error_code failed;
+      if (number >= kMostReports || !fs::exists(folders.reports + "/" + name, failed)) return name;
+    }
+  }
+
+  ros::NodeHandle handle;
+  WorldRunner& runner;
+  const TrainingFolders folders;
+  const std::string world_frame;
+  ros::CallbackQueue queue;
+  ros::AsyncSpinner spinner{1, &queue};
+  ros::Publisher task_topic, metrics_topic;
+  std::vector<ros::ServiceServer> servers;
+  ros::WallTimer timer;
+
+  // of the runner's thread
+  std::unique_ptr<Training> training;
+  std::string trainee;
+  bool stopped = false;
+  std::vector<Event> events;  // since the last step
+
+  std::atomic<std::uint64_t> version{0};  // of what ~task says
+
+  // of the timer
+  std::uint64_t said_version = 0;
+  bool said_any = false;
+  double said_time = -1.0;
+};
+
+LiveTraining::LiveTraining(const ros::NodeHandle& private_handle, WorldRunner& runner, TrainingFolders folders,
+                           std::string world_frame, Rejections& rejections)
+    : handlers_(
+          std::make_unique<Handlers>(private_handle, runner, std::move(folders), std::move(world_frame), rejections)) {}
+
+LiveTraining::~LiveTraining() { stop(); }
+
+void LiveTraining::begin(TaskDef task, const std::string& trainee) { handlers_->take(std::move(task), trainee); }
+
+void LiveTraining::start() { handlers_->start(); }
+
+void LiveTraining::stop() {
+  handlers_->spinner.stop();
+  handlers_->servers.clear();
+  handlers_->timer.stop();
+}
+
+void LiveTraining::heard(const std::vector<Event>& events) {
+  if (handlers_->training && !handlers_->stopped)
+    handlers_->events.insert(handlers_->events.end(), events.begin(), events.end());
+}
+
+void LiveTraining::changed(World& world, double dt) { handlers_->changed(world, dt); }
+
+}  // namespace meshless

@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+"""Tasks on the running node: begun, watched, stopped and reported; and the report of its log has the same values to the bit."""
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import roslib.packages
+import rospy
+from geometry_msgs.msg import Point, Vector3
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from deformer_support import LONG, OwnNode, pose_stamped, run  # noqa: E402
+from meshless_surgery.msg import TaskState  # noqa: E402
+
+REPORT = roslib.packages.find_node('meshless_surgery', 'report')[0]
+
+
+def report_of(folder):
+    with open(os.path.join(folder, 'report.json'), encoding='utf-8') as file:
+        return json.load(file)
+
+
+class TrainingTest(unittest.TestCase):
+
+    def setUp(self):
+        self.folder = tempfile.mkdtemp()
+
+    def node(self, **parameters):
+        return OwnNode(paused=True, session_directory=self.folder, **parameters)
+
+    def palpate(self, node):
+        """Presses above the lump and marks the place, as config/tasks/palpate.yaml wants it."""
+        node.good('push', enable=True, radius=0.01, pose=pose_stamped(0.015, 0.010, 0.075))
+        node.good('step', steps=60)
+        node.good('push', enable=True, radius=0.01, speed=0.02, pose=pose_stamped(0.015, 0.010, 0.066))
+        node.good('step', steps=240)
+        node.good('push', enable=False)
+        node.good('pick', point=Point(0.015, 0.010, 0.1), direction=Vector3(0, 0, -1))
+        node.good('step', steps=120)
+
+    def test_a_task_is_begun_done_and_reported_and_its_log_says_the_same(self):
+        with self.node(scene='lump', command_log='log') as node:
+            for service in ('stop_task', 'report'):
+                self.assertFalse(node.call(service).success, service)
+            for task, said in (('none', 'palpate'), ('retract', 'lump'), ('/etc/hostname', 'outside'), ('', 'name')):
+                refused = node.call('start_task', task=task)
+                self.assertFalse(refused.success, task)
+                self.assertIn(said, refused.message)
+            node.good('step', steps=50)
+            node.good('pick', point=Point(0.0, 0.0, 0.1), direction=Vector3(0, 0, -1))  # is not of the task
+            node.good('start_task', task='palpate', trainee='Ann B')
+            self.palpate(node)
+            answer = node.good('report')
+            self.assertTrue(answer.passed, answer.message)
+            self.assertEqual(os.path.join(self.folder, 'reports', 'Ann_B_palpate_1'), answer.folder)
+            self.assertEqual(['report.csv', 'report.html', 'report.json'], sorted(os.listdir(answer.folder)))
+            again = node.good('report')
+            self.assertTrue(again.folder.endswith('Ann_B_palpate_2'))
+            with open(os.path.join(again.folder, 'report.html'), encoding='utf-8') as page:
+                self.assertIn('Ann_B_palpate_1', page.read())  # an earlier one
+            self.assertFalse(node.call('report', name='../x').success)
+        done = subprocess.run([REPORT, os.path.join(self.folder, 'log'), '--task', 'palpate', '--trainee', 'Ann B', '--out', self.folder],
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=LONG, text=True)
+        self.assertEqual(0, done.returncode, done.stdout)
+        live, replayed = report_of(answer.folder), report_of(os.path.join(self.folder, 'log.report'))
+        for report in (live, replayed):
+            del report['log']
+        self.assertEqual(live, replayed)  # all digits
+
+    def test_the_task_of_the_parameter_brings_its_scene_and_can_be_stopped(self):
+        with self.node(task='retract', trainee='Bob') as node:
+            task = rospy.wait_for_message(node.name + '/task', TaskState, LONG)
+            self.assertEqual(('retract', 'Bob', ['hold', 'let go']), (task.task, task.trainee, task.stages))
+            node.good('step', steps=10)
+            node.good('stop_task')
+            node.good('step', steps=10)
+            report = report_of(node.good('report', name='mine').folder)
+            self.assertEqual('unfinished', report['outcome'])
+            self.assertEqual(10, report['last_step'])
+            self.assertFalse(node.call('stop_task').success)
+
+    def test_a_task_that_cannot_be_read_ends_the_node(self):
+        node = self.node(task='retrakt')
+        self.assertEqual(1, node.process.wait(LONG))
+        self.assertIn('retract', node.output())
+        node.__exit__()
+
+
+if __name__ == '__main__':
+    run('training', TrainingTest)
