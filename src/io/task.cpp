@@ -288,7 +288,8 @@ class TaskReader {
 
 }  // namespace
 
-Result<LoadedTask> readTask(const std::string& file, const std::string& scene_folder, const FileAccess& access) {
+Result<LoadedTask> readTask(const std::string& file, const std::string& scene_folder, const FileAccess& access,
+                            const std::string& only_scene) {
   std::error_code failed;
   const fs::path real = fs::canonical(file, failed);
   if (failed || !fs::is_regular_file(real, failed))
@@ -312,6 +313,10 @@ Result<LoadedTask> readTask(const std::string& file, const std::string& scene_fo
   const std::string& named = loaded.task.scene;
   const bool is_path = named.find('/') != std::string::npos || fs::path(named).extension() == ".yaml";
   const fs::path scene_file = is_path ? real.parent_path() / named : fs::path(scene_folder) / (named + ".yaml");
+  if (!only_scene.empty() && !(fs::equivalent(scene_file, only_scene, failed) && !failed))
+    return Error{ErrorCode::kInvalidArgument, file + ": the task is of the scene '" + named +
+                                                  "'; accepted: tasks of the scene that runs, " +
+                                                  fs::path(only_scene).stem().string()};
   Result<SceneDef> scene = readScene(scene_file.string(), access);
   if (!scene) return Error{scene.error().code, file + ": its scene: " + scene.error().detail};
   loaded.scene = std::move(*scene);

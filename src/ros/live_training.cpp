@@ -24,11 +24,6 @@ constexpr double kMetricsRate = 10.0;  // [Hz]
 constexpr std::size_t kMostTrainee = 100;
 constexpr int kMostReports = 100000;
 
-bool sameFile(const std::string& a, const std::string& b) {
-  std::error_code failed;
-  return fs::equivalent(a, b, failed) && !failed;
-}
-
 }  // namespace
 
 Result<LoadedTask> loadTask(const std::string& task, const TrainingFolders& folders) {
@@ -41,7 +36,7 @@ Result<LoadedTask> loadTask(const std::string& task, const TrainingFolders& fold
   } else if (const Status name = SessionFolder::checkName(task); !name.ok()) {
     return name.error();
   }
-  return readTask(file, folders.scenes, folders.access);
+  return readTask(file, folders.scenes, folders.access, folders.scene_file);
 }
 
 struct LiveTraining::Handlers : Answers {
@@ -141,11 +136,6 @@ struct LiveTraining::Handlers : Answers {
                      "trainee is '" + printable(request.trainee) + "'; accepted: up to 100 characters in one line"});
     auto loaded = loadTask(request.task, folders);
     if (!loaded.ok()) return refuse(response, "start_task", loaded.error());
-    if (!sameFile(loaded->scene_file, folders.scene_file))
-      return refuse(response, "start_task",
-                    {ErrorCode::kInvalidArgument,
-                     "task '" + loaded->task.name + "' is of the scene '" + loaded->task.scene +
-                         "'; accepted: tasks of the scene that runs, " + fs::path(folders.scene_file).stem().string()});
     const std::string name = loaded->task.name;
     // First the task, then the reset: it begins with the first step of the new run, as it does in a replay.
     const Status taken = runner.look([&](World&) { take(std::move(loaded->task), request.trainee); });

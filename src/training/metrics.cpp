@@ -187,25 +187,22 @@ void Metrics::feedEvents(const TrainingFrame& frame) {
 }
 
 void Metrics::feedForbidden(const TrainingFrame& frame) {
-  std::set<std::string> touched;
+  std::set<std::string> touched, cut;
   for (const Forbidden& forbidden : limits_.forbidden) {
-    for (const TrainingFrame::Tool& tool : frame.tools)
-      if (forbidden.body.empty() ? forbidden.region.contains(tool.position) : isOf(tool.body, forbidden.body))
-        touched.insert(forbidden.name);
-    if (forbidden.body.empty()) continue;
-    for (const Event& event : frame.events)
-      if ((event.type == EventType::kCut || event.type == EventType::kIncised) && isOf(event.body, forbidden.body)) {
-        ++forbidden_;
-        touched.insert(forbidden.name);
-      }
-  }
-  for (const std::string& name : touched) {
-    const bool by_cut = std::any_of(frame.events.begin(), frame.events.end(), [](const Event& event) {
-      return event.type == EventType::kCut || event.type == EventType::kIncised;
+    const bool there = std::any_of(frame.tools.begin(), frame.tools.end(), [&](const TrainingFrame::Tool& tool) {
+      return forbidden.body.empty() ? forbidden.region.contains(tool.position) : isOf(tool.body, forbidden.body);
     });
-    if (touched_.count(name) == 0 && !by_cut) ++forbidden_;
+    if (there && touched.insert(forbidden.name).second) forbidden_ += !touched_.count(forbidden.name);
+    if (forbidden.body.empty()) continue;
+    for (const Event& event : frame.events) {
+      if (event.type != EventType::kCut && event.type != EventType::kIncised) continue;
+      if (!isOf(event.body, forbidden.body)) continue;
+      ++forbidden_;
+      cut.insert(forbidden.name);
+    }
   }
   if (!touched.empty()) forbidden_for_ += frame.dt;
+  touched.insert(cut.begin(), cut.end());
   touched_ = std::move(touched);
 }
 

@@ -178,8 +178,13 @@ TEST(Training, BeginsAnewWithAReset) {
   ASSERT_TRUE(played.world.addSceneBody(test::shared(test::ball("tissue"))).ok());
   played.begin();
   played.step(50);
+  CutCommand cut;
+  cut.blades = {Vec3(-1, 0, 0.2), Vec3::UnitX(), Vec3::UnitY(), 0.0, 0.0};
+  played.apply<CutReply>(cut);  // between two steps, and before the reset
   played.world.reset();
   played.step(7);
+  EXPECT_EQ(0.0, played.value("cuts"));
+  EXPECT_EQ(0.0, played.value("cut_area"));
   EXPECT_NEAR(7 / 120.0, played.value("time"), 1e-12);
   test::expectSame(played.training, *played.replayed());
 }
