@@ -176,7 +176,9 @@ TEST(PlantedErrors, APathOfKnownLength) {
     const auto picked = played.apply<PickReply>(pick);
     played.step(30);
     // Along three edges of a square of 0.06 m, in a second each, with a rest of a quarter of a second between.
-    const Vec3 corners[] = {Vec3(0, 0, 0), Vec3(0.06, 0, 0), Vec3(0.06, 0.06, 0), Vec3(0, 0.06, 0)};
+    const Quat turn(Eigen::AngleAxisd(0.6, Vec3(0.3, -0.5, 0.8).normalized()));
+    const Vec3 corners[] = {Vec3(0, 0, 0), turn * Vec3(0.06, 0, 0), turn * Vec3(0.06, 0.06, 0),
+                            turn * Vec3(0, 0.06, 0)};
     for (int edge = 0; edge < 3; ++edge) {
       for (int k = 1; k <= 120; ++k) {
         const double u = k / 120.0, s = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
