@@ -146,7 +146,7 @@ TEST(TaskProgress, FailsWithTheReason) {
     }
     EXPECT_EQ(ends, there.training.over());
     EXPECT_EQ(ends ? 1.0 : 2.0, there.value("forbidden_contacts"));
-    if (!ends) EXPECT_NEAR(0.2, there.value("forbidden_time"), 1e-9);
+    EXPECT_NEAR(ends ? 1.0 / 120.0 : 0.2, there.value("forbidden_time"), 1e-9);
   }
 }
 
