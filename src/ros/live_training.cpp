@@ -1,5 +1,6 @@
 #include "meshless_surgery/ros/live_training.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cctype>
 #include <cmath>
@@ -11,6 +12,7 @@
 #include <meshless_surgery/TaskState.h>
 #include <ros/publisher.h>
 #include <std_srvs/Trigger.h>
+#include <visualization_msgs/MarkerArray.h>
 
 #include "answers.h"
 #include "meshless_surgery/io/session_folder.h"
@@ -23,6 +25,64 @@ namespace fs = std::filesystem;
 constexpr double kMetricsRate = 10.0;  // [Hz]
 constexpr std::size_t kMostTrainee = 100;
 constexpr int kMostReports = 100000;
+constexpr double kPlanAbove = 0.003;  // [m] that the plan is drawn beyond the tissue, so that its edge is seen
+constexpr double kPlanLine = 0.0015;  // [m]
+
+visualization_msgs::Marker markerOf(const std::string& ns, int type, float r, float g, float b, float a) {
+  visualization_msgs::Marker marker;
+  marker.ns = ns;
+  marker.type = type;
+  marker.pose.orientation.w = 1.0;
+  marker.color.r = r;
+  marker.color.g = g;
+  marker.color.b = b;
+  marker.color.a = a;
+  return marker;
+}
+
+void setSize(visualization_msgs::Marker& marker, const Vec3& size) {
+  marker.scale.x = size.x();
+  marker.scale.y = size.y();
+  marker.scale.z = size.z();
+}
+
+/// What a trainee sees of the task: plan and target where they are in the tissue at rest, the tray.
+visualization_msgs::MarkerArray toMarkers(const Training& training) {
+  visualization_msgs::MarkerArray array;
+  array.markers.emplace_back();
+  array.markers.back().action = visualization_msgs::Marker::DELETEALL;
+  const TaskDef& task = training.task();
+  const Points& inside = training.tissue().planPoints();
+  if (task.plan && !inside.empty()) {
+    double s0 = task.plan->length, s1 = 0.0, t0 = 0.0, t1 = -task.plan->depth;
+    for (const Vec3& p : inside) {
+      const double s = (p - task.plan->origin).dot(task.plan->along), t = (p - task.plan->origin).dot(task.plan->out);
+      s0 = std::min(s0, s);
+      s1 = std::max(s1, s);
+      t0 = std::min(t0, t);
+      t1 = std::max(t1, t);
+    }
+    t1 += kPlanAbove;
+    visualization_msgs::Marker plan = markerOf("plan", visualization_msgs::Marker::LINE_STRIP, 0.1f, 0.3f, 1.0f, 1.0f);
+    plan.scale.x = kPlanLine;
+    for (const auto& [s, t] : {std::make_pair(s0, t1), {s1, t1}, {s1, t0}, {s0, t0}, {s0, t1}})
+      plan.points.push_back(toPoint(task.plan->origin + s * task.plan->along + t * task.plan->out));
+    array.markers.push_back(std::move(plan));
+  }
+  if (task.target && task.target->region.kind == Region::Kind::kSphere) {
+    visualization_msgs::Marker target = markerOf("target", visualization_msgs::Marker::SPHERE, 0.9f, 0.75f, 0.2f, 0.6f);
+    target.pose.position = toPoint(task.target->region.centre);
+    setSize(target, Vec3::Constant(2.0 * task.target->region.radius));
+    array.markers.push_back(std::move(target));
+  }
+  if (task.tray) {
+    visualization_msgs::Marker tray = markerOf("tray", visualization_msgs::Marker::CUBE, 0.3f, 0.7f, 0.4f, 0.2f);
+    tray.pose.position = toPoint(0.5 * (task.tray->min + task.tray->max));
+    setSize(tray, task.tray->max - task.tray->min);
+    array.markers.push_back(std::move(tray));
+  }
+  return array;
+}
 
 }  // namespace
 
@@ -52,6 +112,7 @@ struct LiveTraining::Handlers : Answers {
 
   void start() {
     task_topic = handle.advertise<meshless_surgery::TaskState>("task", 1, true);
+    markers_topic = handle.advertise<visualization_msgs::MarkerArray>("task_markers", 1, true);
     metrics_topic = handle.advertise<meshless_surgery::Metrics>("metrics", 10);
     servers = {handle.advertiseService("start_task", &Handlers::startTask, this),
                handle.advertiseService("stop_task", &Handlers::stopTask, this),
@@ -114,15 +175,21 @@ struct LiveTraining::Handlers : Answers {
     if (!news && metrics_topic.getNumSubscribers() == 0) return;
     meshless_surgery::TaskState state;
     meshless_surgery::Metrics now;
+    visualization_msgs::MarkerArray markers;
     std::uint64_t present = 0;
     const Status looked = runner.look([&](World&) {
       fill(state, now);
+      if (training && news) markers = toMarkers(*training);
       present = version.load();
     });
     if (!looked.ok()) return;
     state.header.stamp = now.header.stamp = ros::Time::now();
     state.header.frame_id = now.header.frame_id = world_frame;
-    if (news) task_topic.publish(state);
+    if (news) {
+      task_topic.publish(state);
+      for (visualization_msgs::Marker& marker : markers.markers) marker.header = state.header;
+      markers_topic.publish(markers);
+    }
     if (!now.names.empty() && (news || now.time != said_time)) metrics_topic.publish(now);
     said_any = true;
     said_version = present;
@@ -216,7 +283,7 @@ struct LiveTraining::Handlers : Answers {
   const std::string world_frame;
   ros::CallbackQueue queue;
   ros::AsyncSpinner spinner{1, &queue};
-  ros::Publisher task_topic, metrics_topic;
+  ros::Publisher task_topic, metrics_topic, markers_topic;
   std::vector<ros::ServiceServer> servers;
   ros::WallTimer timer;
 

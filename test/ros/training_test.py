@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 import roslib.packages
@@ -14,6 +15,7 @@ from geometry_msgs.msg import Point, Vector3
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from deformer_support import LONG, OwnNode, pose_stamped, run  # noqa: E402
 from meshless_surgery.msg import TaskState  # noqa: E402
+from visualization_msgs.msg import MarkerArray  # noqa: E402
 
 REPORT = roslib.packages.find_node('meshless_surgery', 'report')[0]
 
@@ -81,6 +83,29 @@ class TrainingTest(unittest.TestCase):
             self.assertEqual('unfinished', report['outcome'])
             self.assertEqual(10, report['last_step'])
             self.assertFalse(node.call('stop_task').success)
+
+    def test_plan_target_and_tray_are_shown(self):
+        with self.node(task='resect') as node:
+            node.good('step', steps=1)
+            shown = self.markers(node)
+            self.assertEqual({'plan', 'target', 'tray'}, set(shown))
+            self.assertAlmostEqual(-0.068, shown['target'].pose.position.x)
+            self.assertAlmostEqual(0.024, shown['target'].scale.x)
+            self.assertAlmostEqual(-0.29, shown['tray'].pose.position.x)
+            for p in shown['plan'].points:
+                self.assertAlmostEqual(-0.016, 0.5 * p.x + 0.75 ** 0.5 * p.y, delta=1e-5)  # in its plane
+                self.assertTrue(-0.12 < p.x < 0.12 and 0.0 < p.z < 0.12)  # and in the tissue
+
+    def markers(self, node):
+        heard = []
+        topic = rospy.Subscriber(node.name + '/task_markers', MarkerArray, lambda array: heard.append(
+            {marker.ns: marker for marker in array.markers if marker.ns}))
+        end = time.monotonic() + LONG
+        while not (heard and 'plan' in heard[-1]):  # once the first step has been
+            self.assertLess(time.monotonic(), end, heard)
+            time.sleep(0.05)
+        topic.unregister()
+        return heard[-1]
 
     def test_a_task_that_cannot_be_read_ends_the_node(self):
         node = self.node(task='retrakt')
