@@ -77,6 +77,16 @@ Vec3 centroidOf(const Resistance& resists) {
   return resists.centroid.cwiseMax(-kFarthestCentroid).cwiseMin(kFarthestCentroid);
 }
 
+// A crumb, or a strip along an edge of the tissue, does not hold the far corners of its cell, and what touches the
+// surface throws them: it is as stiff against bending as what fills a cell. A slice does hold them.
+Vec3 varianceOf(const Resistance& resists) {
+  constexpr double kHardlyFilled = 0.25;
+  const Vec3 whole = Resistance().variance;
+  int thin = 0;
+  for (int axis = 0; axis < 3; ++axis) thin += resists.variance[axis] < 0.5 * whole[axis] ? 1 : 0;
+  return resists.fraction < kHardlyFilled && thin >= 2 ? resists.variance.cwiseMax(whole) : resists.variance;
+}
+
 }  // namespace
 
 double squaredToSamples(SampleSet samples, const Vec3& at) {
@@ -137,7 +147,7 @@ ElasticCells elasticCellsOf(const BodyModel& model) {
   for (std::size_t c = 0; c < lattice.cells.size(); ++c) {
     const Resistance& resists = lattice.cells[c].resists;
     elastic.cells.push_back({lattice.cells[c].corners, model.shape.clusters[c].mass, centroidOf(resists),
-                             resists.variance, mixOf(model, lattice.cells[c])});
+                             varianceOf(resists), mixOf(model, lattice.cells[c])});
   }
   return elastic;
 }
