@@ -32,7 +32,7 @@ def scenario(surgeon, play):
     surgeon.live(1.0)
     nearest = min(distance(v, Point(*centre)) for v in surgeon.body("liver").surface.vertices)
     off = surgeon.info().bodies[0].collision_distance
-    play.check(nearest >= 0.015 - 1e-3 - off,
+    play.check(nearest >= 0.015 - 2e-3 - off,  # 1 % of the liver
                "the push sphere is not entered: nearest vertex at %.2f mm of 15 mm; contact's surface is up to %.2f mm off" % (
                    1e3 * nearest, 1e3 * off))
     surgeon.lift_push()

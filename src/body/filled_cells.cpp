@@ -77,14 +77,11 @@ Vec3 centroidOf(const Resistance& resists) {
   return resists.centroid.cwiseMax(-kFarthestCentroid).cwiseMin(kFarthestCentroid);
 }
 
-// A crumb, or a strip along an edge of the tissue, does not hold the far corners of its cell, and what touches the
-// surface throws them: it is as stiff against bending as what fills a cell. A slice does hold them.
+// What fills a cell hardly does not hold its far corners, and what touches the surface throws them: it is as stiff
+// against bending as what fills a cell.
 Vec3 varianceOf(const Resistance& resists) {
-  constexpr double kHardlyFilled = 0.25;
-  const Vec3 whole = Resistance().variance;
-  int thin = 0;
-  for (int axis = 0; axis < 3; ++axis) thin += resists.variance[axis] < 0.5 * whole[axis] ? 1 : 0;
-  return resists.fraction < kHardlyFilled && thin >= 2 ? resists.variance.cwiseMax(whole) : resists.variance;
+  constexpr double kHardlyFilled = 0.24;
+  return resists.fraction < kHardlyFilled ? resists.variance.cwiseMax(Resistance().variance) : resists.variance;
 }
 
 }  // namespace

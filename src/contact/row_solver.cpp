@@ -14,8 +14,9 @@ constexpr double kOutTime = 0.03;  // [s] in which an overlap falls to 1/e
 constexpr double kOutSpeed = 0.5;  // [1/s] mean edges: overlap is removed no faster
 constexpr int kSweeps = 4;         // at most; fewer kick aside what lands flat, and let it creep on a slope
 constexpr double kSolved = 1e-4;   // of the largest impulse: a sweep that changes less is the last
-constexpr double kLag = 0.01;      // [s] of a fibre, by which its stretch follows its tension: else what hangs bounces
-constexpr double kSlop = 0.01;     // mean edges of overlap that stay: stacks that are lifted out of it sway
+constexpr double kThinnest = 1e-6;
+constexpr double kLag = 0.01;   // [s] of a fibre, by which its stretch follows its tension: else what hangs bounces
+constexpr double kSlop = 0.01;  // mean edges of overlap that stay: stacks that are lifted out of it sway
 
 #pragma GCC diagnostic ignored "-Wpsabi"  // all of it is inlined
 using Four = double __attribute__((vector_size(32), may_alias));
@@ -64,7 +65,8 @@ struct MassMoments {
     for (int k = 0; k < 3; ++k) moment[k] += arm[k] * weighed;
   }
   Vec3 centre() const { return about + vec3(sum) / mass; }
-  /// Of the inertia about the centre; directions below 1e-12 of the largest stay 0.
+  /// Of the inertia about the centre; 0 about an axis with less than kThinnest of its trace: what lies in a line to a
+  /// thousandth of its length would roll on its own rounding, and no friction held it.
   Mat3 inverseInertia() const {
     const Vec3 mean = vec3(sum) / mass;
     Mat3 spread = -mass * mean * mean.transpose();
@@ -72,11 +74,11 @@ struct MassMoments {
     const Mat3 inertia = spread.trace() * Mat3::Identity() - spread;
     const double scale = inertia.trace();
     if (!(scale > 0.0)) return Mat3::Zero();
-    if (inertia.determinant() > 1e-9 * scale * scale * scale) return inertia.inverse();
+    if (inertia.determinant() > kThinnest * scale * scale * scale) return inertia.inverse();
     const Eigen::SelfAdjointEigenSolver<Mat3> solver(inertia / scale);
     Mat3 inverse = Mat3::Zero();
     for (int k = 0; k < 3; ++k)
-      if (solver.eigenvalues()[k] > 1e-12)
+      if (solver.eigenvalues()[k] > kThinnest)
         inverse +=
             solver.eigenvectors().col(k) * solver.eigenvectors().col(k).transpose() / (solver.eigenvalues()[k] * scale);
     return inverse;
