@@ -80,7 +80,7 @@ Vec3 centroidOf(const Resistance& resists) {
 // What fills a cell hardly does not hold its far corners, and what touches the surface throws them: it is as stiff
 // against bending as what fills a cell.
 Vec3 varianceOf(const Resistance& resists) {
-  constexpr double kHardlyFilled = 0.24;
+  constexpr double kHardlyFilled = 0.26;
   return resists.fraction < kHardlyFilled ? resists.variance.cwiseMax(Resistance().variance) : resists.variance;
 }
 

