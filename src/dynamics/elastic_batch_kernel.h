@@ -18,6 +18,7 @@ constexpr int kLanes = MESHLESS_ELASTIC_BYTES / 8;
 // As in elastic.cpp.
 constexpr double kLeastVolume = -0.8;
 constexpr double kMostVolume = 1.5;
+constexpr double kModeSquare = 2.0 / 3.0;
 constexpr double kDrawnOut = 12.0;
 
 constexpr int kMostSteps = 4;     // of Newton's method; from one substep to the next two do
@@ -364,17 +365,33 @@ MESHLESS_INLINE void bend(const Block& b, const Matrix& f, const Lame& lame, Mat
   Pack stiffness[3];
   for (int k = 0; k < 3; ++k)
     stiffness[k] = kWhole ? (1.0 / 3.0) * lame.shear : lame.shear * get(b.cells + i + (kVarianceRow + k) * kBlock);
-  Pack square = {};
-  for (int row = 0; row < 3; ++row)
-    for (int c = 0; c < 3; ++c) square += f.m[row][c] * f.m[row][c];
-  const Pack inverse = choose(square > 0.0, 1.0 / square, Pack{});
-  const Pack scale2 = 3.0 * inverse;      // of along and of slope, which are not scaled
+  Pack common = stiffness[0];
+  if (!kWhole) {
+    common = common < stiffness[1] ? common : stiffness[1];
+    common = common < stiffness[2] ? common : stiffness[2];
+  }
+  common *= 0.5;
+  Pack products[3][3], columns = {}, fourth = {};
+  for (int c = 0; c < 3; ++c) {
+    for (int d = 0; d <= c; ++d) {
+      const Pack product = f.m[0][c] * f.m[0][d] + f.m[1][c] * f.m[1][d] + f.m[2][c] * f.m[2][d];
+      products[c][d] = products[d][c] = product;
+      fourth += (c == d ? 1.0 : 2.0) * (product * product);
+    }
+    columns += products[c][c];
+  }
+  const Pack by_columns = choose(columns > 0.0, 1.0 / columns, Pack{}), longest = fourth * by_columns;
+  Pack square = longest;
   constexpr int kWithout[3] = {6, 5, 3};  // the mode without axis n
   Pack m[3][3], along[3][3], slope[3][3];
   for (int n = 0; n < 3; ++n) {
-    for (int axis = 0; axis < 3; ++axis) m[n][axis] = get(at(kWithout[n], axis));
+    for (int axis = 0; axis < 3; ++axis) {
+      m[n][axis] = get(at(kWithout[n], axis));
+      square += kModeSquare * (m[n][axis] * m[n][axis]);
+    }
     for (int c = 0; c < 3; ++c) along[n][c] = f.m[0][c] * m[n][0] + f.m[1][c] * m[n][1] + f.m[2][c] * m[n][2];
   }
+  const Pack inverse = choose(square > 0.0, 1.0 / square, Pack{});
   Pack twist[3];
   for (int k = 0; k < 3; ++k) {
     const int i1 = (k + 1) % 3, i2 = (k + 2) % 3;  // mode i1 k is the one without i2
@@ -387,24 +404,26 @@ MESHLESS_INLINE void bend(const Block& b, const Matrix& f, const Lame& lame, Mat
   for (int n = 0; n < 3; ++n) {
     slope[n][n] = twist[(n + 1) % 3] + twist[(n + 2) % 3];
     for (int c = 0; c < 3; ++c) {
+      slope[n][c] -= common * along[n][c];
       twice += along[n][c] * slope[n][c];
-      slope[n][c] *= scale2;
+      slope[n][c] *= inverse;  // of along and of slope, which are not scaled
     }
   }
-  twice *= scale2 * inverse;
+  twice *= inverse * inverse;
+  const Pack of_columns = twice * by_columns;
   for (int axis = 0; axis < 3; ++axis) {
-    for (int c = 0; c < 3; ++c)
-      p.m[axis][c] +=
-          m[0][axis] * slope[0][c] + m[1][axis] * slope[1][c] + m[2][axis] * slope[2][c] - twice * f.m[axis][c];
+    for (int c = 0; c < 3; ++c) {
+      const Pack along_columns =
+          f.m[axis][0] * products[0][c] + f.m[axis][1] * products[1][c] + f.m[axis][2] * products[2][c];
+      p.m[axis][c] += m[0][axis] * slope[0][c] + m[1][axis] * slope[1][c] + m[2][axis] * slope[2][c] -
+                      of_columns * (2.0 * along_columns - longest * f.m[axis][c]);
+    }
     for (int n = 0; n < 3; ++n)
-      put(f.m[axis][0] * slope[n][0] + f.m[axis][1] * slope[n][1] + f.m[axis][2] * slope[n][2], at(kWithout[n], axis));
+      put(f.m[axis][0] * slope[n][0] + f.m[axis][1] * slope[n][1] + f.m[axis][2] * slope[n][2] +
+              (common - kModeSquare * twice) * m[n][axis],
+          at(kWithout[n], axis));
   }
-  Pack least = stiffness[0];
-  if (!kWhole) {
-    least = least < stiffness[1] ? least : stiffness[1];
-    least = least < stiffness[2] ? least : stiffness[2];
-  }
-  for (int axis = 0; axis < 3; ++axis) put(least * get(at(7, axis)), at(7, axis));
+  for (int axis = 0; axis < 3; ++axis) put(2.0 * common * get(at(7, axis)), at(7, axis));
 }
 
 // The transpose of fitCell().

@@ -62,6 +62,8 @@ inline double energyDensity(const ElasticParameters& material, const Mat3& f, co
   return material.mu * (f - rotation).squaredNorm() + material.lambda * volumeEnergy(heldVolume(f).j);
 }
 
+constexpr double kModeSquare = 2.0 / 3.0;  // of an edge along each of two axes, in the mean over three
+
 // Of a cell: how its energy per volume changes with the coefficients of the products of two or three coordinates, each
 // named by the bits of its axes, and through what measures them with the gradient. Lengths in half edges.
 struct Bending {
@@ -71,16 +73,23 @@ struct Bending {
 };
 
 // The cell is three plates at once: how strain along two axes varies along the third costs what it costs a plate in
-// plane stress. Strain is measured along the columns of F, over their mean length: so the energy turns with the cell,
-// and does not grow with its stretch.
+// plane stress. Strain is measured along the columns of F, over a length of the cell's edges, so that the energy turns
+// with the cell and does not grow with its stretch. That length is nearly the longest stretch of F, and counts how the
+// edges differ; and what all directions have in common needs no columns. So no state is much stiffer than rest, and
+// none softens so much that the viscosity would feed what was crushed or thrown apart.
 inline Bending bending(const ElasticParameters& material, const Mat3& f, const Vec3& variance, const Vec3 (&modes)[8]) {
   Bending result;
-  const double square = f.squaredNorm(), scale = square > 0.0 ? std::sqrt(3.0 / square) : 0.0;
+  const Mat3 products = f.transpose() * f;
+  const double columns = f.squaredNorm(), longest = columns > 0.0 ? products.squaredNorm() / columns : 0.0;
+  double square = longest;
+  for (const int mode : {3, 5, 6}) square += kModeSquare * modes[mode].squaredNorm();
+  const double scale = square > 0.0 ? 1.0 / std::sqrt(square) : 0.0;
   const double coupling = material.lambda / (material.lambda + 2.0 * material.mu);
+  const double common = material.mu * variance.minCoeff();  // the least that any direction costs
   Vec3 b[8], slope[8];
   for (const int mode : {3, 5, 6}) {
     b[mode] = scale * (f.transpose() * modes[mode]);
-    slope[mode].setZero();
+    slope[mode] = -common * b[mode];
   }
   for (int k = 0; k < 3; ++k) {
     const int i = (k + 1) % 3, j = (k + 2) % 3, ik = 1 << i | 1 << k, jk = 1 << j | 1 << k;
@@ -94,13 +103,17 @@ inline Bending bending(const ElasticParameters& material, const Mat3& f, const V
   result.by_gradient.setZero();
   double twice = 0.0;
   for (const int mode : {3, 5, 6}) {
-    result.by_mode[mode] = scale * (f * slope[mode]);
     result.by_gradient += scale * modes[mode] * slope[mode].transpose();
     twice += b[mode].dot(slope[mode]);
   }
-  if (square > 0.0) result.by_gradient -= twice / square * f;
-  result.by_mode[7] = 2.0 * material.mu * variance.minCoeff() * modes[7];
-  result.energy = 0.5 * (twice + result.by_mode[7].dot(modes[7]));
+  if (columns > 0.0) result.by_gradient -= twice / (square * columns) * (2.0 * f * products - longest * f);
+  const double less = square > 0.0 ? kModeSquare * twice / square : 0.0;
+  for (const int mode : {3, 5, 6}) {
+    result.by_mode[mode] = scale * (f * slope[mode]) + (common - less) * modes[mode];
+    result.energy += 0.5 * common * modes[mode].squaredNorm();
+  }
+  result.by_mode[7] = 2.0 * common * modes[7];
+  result.energy += 0.5 * (twice + result.by_mode[7].dot(modes[7]));
   return result;
 }
 

@@ -493,7 +493,6 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
   work.touched = false;
   for (std::size_t n = 0; n < work.member_count; ++n) {
     SurfaceWork::Member& member = work.members[n];
-    const SurfaceContacts::Island& island = surface_contacts.islands()[member.island];
     member.previous.resize(member.end - member.begin);
     for (std::size_t b = member.begin; b < member.end; ++b) {
       WorldBody& body = *work.bodies[b];

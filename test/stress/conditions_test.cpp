@@ -124,7 +124,7 @@ TEST_P(Conditions, LetGoGoesBack) {
     twins.spawn(std::make_shared<const PreparedBody>(std::move(body)));
   }
   const double h = 1.0 / settings.step_rate / settings.substeps;
-  EnergyLaw law(condition.swing);
+  EnergyLaw law(condition.swing, settings.step_rate);
   double farthest = 1.0;
   const int most = static_cast<int>(condition.seconds * settings.step_rate), least = std::min(most, 120);
   for (int step = 0; step < most && (step < least || !(farthest < kRestored)); ++step) {

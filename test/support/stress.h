@@ -196,18 +196,19 @@ inline double reachOf(const Points& x, const Vec3& from) {
   return most;
 }
 
-/// Without input the energy of a step swings by a little around what falls: its maximum over a quarter of a second must
-/// not be above that of any quarter before.
+/// Without input the energy of a step swings by a little around what falls: its maximum over a quarter of a second, or
+/// 30 longer steps, must not be above that of any quarter before.
 class EnergyLaw {
  public:
   /// swing: how much of a rise is what the measure misses, with goals that are no potential's.
-  explicit EnergyLaw(double swing = 1.001) : swing_(swing) {}
+  explicit EnergyLaw(double swing = 1.001, double step_rate = 120.0)
+      : swing_(swing), window_steps_(std::max(30, static_cast<int>(0.25 * step_rate))) {}
 
   testing::AssertionResult holds(double energy) {
     if (!std::isfinite(energy)) return testing::AssertionFailure() << "the energy is " << energy;
     if (steps_ == 0) first_ = energy;
     window_ = std::max(window_, energy);
-    if (++steps_ % kWindow == 0) {
+    if (++steps_ % window_steps_ == 0) {
       lowest_ = std::min(lowest_, window_);
       window_ = 0.0;
     }
@@ -218,11 +219,10 @@ class EnergyLaw {
   double first() const { return first_; }
 
  private:
-  static constexpr int kWindow = 30;         // steps
   static constexpr double kRounding = 1e-9;  // of the first: floats round relative to it
   static constexpr double kNothing = 1e-12;  // [J]
   double swing_;
-  int steps_ = 0;
+  int window_steps_, steps_ = 0;
   double first_ = 0.0, window_ = 0.0, lowest_ = 1e300;
 };
 
