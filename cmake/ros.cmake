@@ -11,6 +11,7 @@ target_link_libraries(${PROJECT_NAME}_ros PRIVATE utf8cpp)
 target_compile_definitions(${PROJECT_NAME}_ros PRIVATE MESHLESS_SURGERY_VERSION="${${PROJECT_NAME}_VERSION}")
 
 target_include_directories(deformer_node PRIVATE include)
+target_include_directories(review_node PRIVATE include)
 
 # --- install
 # scripts/train and scripts/check are for a checkout; tests and clients are installed by catkin_install_python below.
@@ -21,7 +22,7 @@ install(TARGETS ${PROJECT_NAME}_ros
   ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
-install(TARGETS deformer_node drive make_meshes replay report ${bench_targets}
+install(TARGETS deformer_node review_node drive make_meshes replay report ${bench_targets}
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 install(DIRECTORY bench/truth/data bench/truth/calculix
   DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/bench/truth)

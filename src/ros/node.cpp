@@ -1,6 +1,5 @@
 #include "meshless_surgery/ros/node.h"
 
-#include <cstdlib>
 #include <filesystem>
 #include <set>
 
@@ -87,16 +86,7 @@ void applyOverrides(const NodeSettings& settings, WorldSettings& world) {
 /// by another launch.
 SessionSettings sessionSettings(const NodeSettings& settings, const std::string& scene_file) {
   SessionSettings session;
-  session.folder = settings.session_directory;
-  if (session.folder.empty()) {
-    const char* ros_home = std::getenv("ROS_HOME");
-    const char* home = std::getenv("HOME");
-    if (ros_home != nullptr && *ros_home != '\0') {
-      session.folder = std::string(ros_home) + "/meshless_surgery";
-    } else if (home != nullptr && *home != '\0') {
-      session.folder = std::string(home) + "/.ros/meshless_surgery";
-    }
-  }
+  session.folder = sessionFolderOf(settings.session_directory);
   session.command_log = settings.command_log;
   session.autosave_period = settings.autosave_period;
   session.autosave_name = autosaveNameOf(ros::this_node::getName());
@@ -257,11 +247,12 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   parts->training = std::make_unique<LiveTraining>(private_handle, parts->runner, std::move(training_folders),
                                                    settings->world_frame, *parts->rejections);
   if (task) parts->training->begin(std::move(*task), settings->trainee);
-  parts->runner.setEventSink(
-      [publishers = &parts->publishers, training = parts->training.get()](std::vector<Event> events) {
-        training->heard(events);
-        publishers->queueEvents(std::move(events));
-      });
+  parts->runner.setEventSink([publishers = &parts->publishers, training = parts->training.get(),
+                              kept = parts->session.get()](std::vector<Event> events) {
+    training->heard(events);
+    kept->heard(events);
+    publishers->queueEvents(std::move(events));
+  });
   parts->runner.setStepSink([forces = &parts->forces, kept = parts->session.get(), training = parts->training.get(),
                              clock = parts->clock_publisher.get()](World& world_now, double dt) {
     if (clock != nullptr && dt > 0.0) clock->advance(dt);

@@ -228,19 +228,23 @@ Status WorldRunner::reset() {
 }
 
 Status WorldRunner::restore(std::shared_ptr<const SavedWorld> saved, const Job& then) {
+  return change([&](World& world) {
+    world.restore(*saved);
+    then(world);
+  });
+}
+
+Status WorldRunner::change(const Job& job) {
   return run(
       [&](World& world) {
-        world.restore(*saved);
+        job(world);
         answerCuts();
         giveUp("another state was loaded meanwhile");
         mended();
         due_ = clock_.now();
         dt_ = 1.0 / world.settings().step_rate;
-        {
-          const std::lock_guard<std::mutex> lock(status_mutex_);
-          world_settings_ = world.settings();
-        }
-        then(world);
+        const std::lock_guard<std::mutex> lock(status_mutex_);
+        world_settings_ = world.settings();
       },
       true);
 }
@@ -314,7 +318,7 @@ void WorldRunner::loop() {
     const double before = wallSeconds();
     stepOnce();
     const double took = wallSeconds() - before;
-    due_ += dt_;
+    due_ += dt_ / speed_;
     const double late = clock_.now() - due_ - settings_.max_backlog;
     {
       const std::lock_guard<std::mutex> lock(status_mutex_);
@@ -365,7 +369,7 @@ void WorldRunner::stepOnce() {
   const double before = wallSeconds();
   tellCuts();
   try {
-    world_->step();
+    if (!step_(*world_)) return pauseAtEnd();
     ++revision_;
     handOverEvents();
     if (step_sink_) step_sink_(*world_, dt_);
@@ -375,6 +379,13 @@ void WorldRunner::stepOnce() {
   }
   record(wallSeconds() - before);
   answerCuts();
+}
+
+void WorldRunner::pauseAtEnd() {
+  paused_ = true;
+  giveUp("there are no more steps");
+  const std::lock_guard<std::mutex> lock(status_mutex_);
+  status_.paused = true;
 }
 
 void WorldRunner::tellCuts() {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 
 #include <ros/console.h>
 
@@ -22,6 +23,14 @@ constexpr std::chrono::seconds kPatience{5};                   // with an older 
 bool beginsAsAutosave(const std::string& name) { return name.compare(0, kAutosavePrefix.size(), kAutosavePrefix) == 0; }
 
 }  // namespace
+
+std::string sessionFolderOf(const std::string& session_directory) {
+  if (!session_directory.empty()) return session_directory;
+  const char* ros_home = std::getenv("ROS_HOME");
+  if (ros_home != nullptr && *ros_home != '\0') return std::string(ros_home) + "/meshless_surgery";
+  const char* home = std::getenv("HOME");
+  return home != nullptr && *home != '\0' ? std::string(home) + "/.ros/meshless_surgery" : std::string();
+}
 
 Session::Session(SessionSettings settings)
     : settings_(std::move(settings)), folder_(settings_.folder), autosave_(folder_, settings_.autosave_name) {}
@@ -47,10 +56,16 @@ Result<std::string> Session::startLog(World& world) {
                                             "that does not begin with " + kAutosavePrefix};
   const auto file = folder_.create(settings_.command_log);
   if (!file.ok()) return file.error();
-  log_file_ = file->descriptor;
+  log_.descriptor = file->descriptor;
   log_name_ = file->name;
+  folder_.remove(log_name_ + kLogIndexSuffix);  // of an older log of that name, which is gone
+  const auto index = folder_.create(log_name_ + kLogIndexSuffix);
+  if (!index.ok()) return index.error();
+  index_.descriptor = index->descriptor;
   logger_ = std::thread([this] { writeLoop(); });
-  world.record([this](std::string bytes) { append(std::move(bytes)); });
+  world.record([this](std::string bytes) { append(log_, std::move(bytes)); });
+  index_writer_ =
+      std::make_unique<LogIndexWriter>(world, [this](std::string bytes) { append(index_, std::move(bytes)); });
   return file->name;
 }
 
@@ -81,12 +96,13 @@ void Session::stop() {
   }
   log_grown_.notify_all();
   if (logger_.joinable()) logger_.join();
-  if (log_file_ >= 0) ::close(std::exchange(log_file_, -1));
+  for (GrowingFile* file : {&log_, &index_})
+    if (file->descriptor >= 0) ::close(std::exchange(file->descriptor, -1));
 }
 
 Result<std::size_t> Session::save(WorldRunner& runner, const std::string& name) {
   if (Status valid = SessionFolder::checkName(name); !valid.ok()) return valid.error();
-  if (beginsAsAutosave(name) || (!log_name_.empty() && name == log_name_))
+  if (beginsAsAutosave(name) || (!log_name_.empty() && (name == log_name_ || name == log_name_ + kLogIndexSuffix)))
     return Error{ErrorCode::kForbidden, "file is '" + name + "', which the node itself writes; accepted: another name"};
   if (folder_.beginsWith(name, kCommandLogMagic))
     return Error{ErrorCode::kForbidden, "file is '" + name + "', which is a log of commands; accepted: another name"};
@@ -123,7 +139,12 @@ Result<Session::Loaded> Session::load(WorldRunner& runner, const std::string& na
   return loaded;
 }
 
-void Session::changed(const World& world, double dt) {
+void Session::heard(const std::vector<Event>& events) {
+  if (index_writer_) index_writer_->heard(events);
+}
+
+void Session::changed(World& world, double dt) {
+  if (index_writer_ && dt > 0.0) index_writer_->stepped(world);
   if (!(settings_.autosave_period > 0.0)) return;
   since_save_ += dt;
   // Half a step early: so much is lost at most, whatever rounding does.
@@ -184,40 +205,48 @@ bool Session::waitForWork(bool failed, SavedWorldPtr& saved) {
   return !stopping_;
 }
 
-void Session::append(std::string bytes) {
+void Session::append(GrowingFile& file, std::string bytes) {
   {
     const std::lock_guard<std::mutex> lock(log_mutex_);
-    if (log_failed_) return;
-    if (log_buffer_.size() + bytes.size() > kMostBuffered && !log_buffer_.empty()) {
-      log_failed_ = true;
-      ROS_ERROR_STREAM("the log of commands ends here: the disk is too slow for it");
+    if (file.failed) return;
+    if (file.buffer.size() + bytes.size() > kMostBuffered && !file.buffer.empty()) {
+      file.failed = true;
+      ROS_ERROR_STREAM(file.what << " ends here: the disk is too slow for it");
       return;
     }
-    log_buffer_ += bytes;
-    if (log_buffer_.size() < kWriteAtOnce) return;
+    file.buffer += bytes;
+    if (file.buffer.size() < kWriteAtOnce) return;
   }
   log_grown_.notify_all();
 }
 
+void Session::write(GrowingFile& file, const std::string& bytes) {
+  const Status written = writeAll(file.descriptor, bytes);
+  if (written.ok()) return;
+  const std::lock_guard<std::mutex> lock(log_mutex_);
+  if (!file.failed) ROS_ERROR_STREAM(file.what << " ends here: cannot write it: " << written.error().detail);
+  file.failed = true;  // what follows a gap could not be replayed
+  file.buffer.clear();
+}
+
 void Session::writeLoop() {
   while (true) {
-    std::string bytes;
+    std::string log, index;
     bool ending = false;
     {
       std::unique_lock<std::mutex> lock(log_mutex_);
-      log_grown_.wait_for(lock, kWriteEvery, [this] { return log_ending_ || log_buffer_.size() >= kWriteAtOnce; });
-      bytes.swap(log_buffer_);
+      log_grown_.wait_for(lock, kWriteEvery, [this] {
+        return log_ending_ || std::max(log_.buffer.size(), index_.buffer.size()) >= kWriteAtOnce;
+      });
+      log.swap(log_.buffer);
+      index.swap(index_.buffer);
       ending = log_ending_;
     }
-    if (const Status written = writeAll(log_file_, bytes); !written.ok()) {
-      const std::lock_guard<std::mutex> lock(log_mutex_);
-      if (!log_failed_) ROS_ERROR_STREAM("the log of commands ends here: cannot write it: " << written.error().detail);
-      log_failed_ = true;  // what follows a gap could not be replayed
-      log_buffer_.clear();
-    }
+    write(log_, log);
+    write(index_, index);
     if (ending) break;
   }
-  (void)::fsync(log_file_);
+  for (const GrowingFile* file : {&log_, &index_}) (void)::fsync(file->descriptor);
 }
 
 }  // namespace meshless

@@ -116,4 +116,14 @@ TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants&
   return frame;
 }
 
+bool isError(EventType type) {
+  return type == EventType::kLifted || type == EventType::kUndone || type == EventType::kLeak ||
+         type == EventType::kTorn;
+}
+
+bool isShown(EventType type) {
+  return isError(type) || type == EventType::kPicked || type == EventType::kLocked || type == EventType::kReleased ||
+         type == EventType::kCut || type == EventType::kIncised || type == EventType::kRemoved;
+}
+
 }  // namespace meshless

@@ -11,16 +11,6 @@ constexpr std::size_t kMostMoments = 36000;  // an hour; then each stands for tw
 constexpr std::size_t kMostEvents = 10000;
 constexpr std::size_t kOutline = 1500;  // points
 
-bool isError(EventType type) {
-  return type == EventType::kLifted || type == EventType::kUndone || type == EventType::kLeak ||
-         type == EventType::kTorn;
-}
-
-bool isShown(EventType type) {
-  return isError(type) || type == EventType::kPicked || type == EventType::kLocked || type == EventType::kReleased ||
-         type == EventType::kCut || type == EventType::kIncised || type == EventType::kRemoved;
-}
-
 }  // namespace
 
 Training::Training(TaskDef task) : task_(std::move(task)), now_(std::make_unique<Now>(task_)) {}

@@ -15,7 +15,6 @@ namespace meshless {
 namespace {
 
 constexpr std::string_view kMagic = "MLSSTATE";
-constexpr std::uint32_t kVersion = 19;
 constexpr std::uint64_t kMostModels = 1u << 20;
 
 /// What follows the magic, of at least kStateHeaderBytes.
@@ -147,53 +146,86 @@ void checkTools(const SavedWorld& world) {
   for (const ClosingCut& cut : world.closing) require(cut.done_at > cut.started_at, "blades close in no time");
 }
 
-SavedWorldPtr readWorld(InArchive& archive) {
-  auto world = std::make_shared<SavedWorld>();
-  archive(world->settings);
-  const Status settings = world->settings.validate();
-  if (!settings.ok()) throw ArchiveFault(settings.error().detail);
-  ModelTable models;
-  models.read(archive);
+std::uint64_t readCount(InArchive& archive) {
   std::uint64_t count = 0;
   archive(count);
   archive.need(count, 1);
-  for (std::uint64_t i = 0; i < count; ++i) world->bodies.push_back(loadBody(archive, models));
-  archive(count);
-  archive.need(count, 1);
-  for (std::uint64_t i = 0; i < count; ++i) world->scene.push_back(loadPrepared(archive, models));
-  archive(count);
-  archive.need(count, 1);
+  return count;
+}
+
+SavedWorldPtr readWorld(InArchive& archive) {
+  auto world = std::make_shared<SavedWorld>();
+  readSettings(archive, *world);
+  ModelTable models;
+  models.read(archive);
+  readBodies(archive, models, *world);
+  readScene(archive, models, *world);
+  readRest(archive, *world);
+  return world;
+}
+
+}  // namespace
+
+void readSettings(InArchive& archive, SavedWorld& world) {
+  archive(world.settings);
+  const Status settings = world.settings.validate();
+  if (!settings.ok()) throw ArchiveFault(settings.error().detail);
+}
+
+void readBodies(InArchive& archive, const ModelTable& models, SavedWorld& world) {
+  for (std::uint64_t i = readCount(archive); i > 0; --i) world.bodies.push_back(loadBody(archive, models));
+}
+
+void readScene(InArchive& archive, const ModelTable& models, SavedWorld& world) {
+  for (std::uint64_t i = readCount(archive); i > 0; --i) world.scene.push_back(loadPrepared(archive, models));
   std::set<std::string> names;
-  for (std::uint64_t i = 0; i < count; ++i) {
+  for (std::uint64_t i = readCount(archive); i > 0; --i) {
     ObstacleDef obstacle;
     archive(obstacle);
     requireNone(faultOf(obstacle));
     require(names.insert(obstacle.name).second, "two obstacles have the same name");
-    world->obstacles.push_back(std::make_shared<const ObstacleDef>(std::move(obstacle)));
+    world.obstacles.push_back(std::make_shared<const ObstacleDef>(std::move(obstacle)));
   }
-  rest(archive, *world);
-  archive(world->tetrahedralizations);
+}
+
+void readRest(InArchive& archive, SavedWorld& world) {
+  rest(archive, world);
+  archive(world.tetrahedralizations);
   require(archive.left() == 0, std::to_string(archive.left()) + " bytes are left over");
-  checkSlots(*world);
-  checkBatches(*world);
-  checkTools(*world);
+  checkSlots(world);
+  checkBatches(world);
+  checkTools(world);
   std::map<std::uint64_t, SurfaceMemory::Known> colliders;
-  for (const SavedBody& body : world->bodies) {
+  for (const SavedBody& body : world.bodies) {
     const BodyModel& model = *body.model;
     const std::size_t particles = model.rest.size();
     const std::size_t vertices =
         model.collision ? model.collision->mesh.vertices.size() : model.surface.vertices.size();
     colliders[body.number] = {particles, vertices > 0 ? vertices : particles};
   }
-  for (std::size_t i = 0; i < world->obstacles.size(); ++i) {
-    const std::size_t vertices = world->obstacles[i]->mesh.vertices.size();
+  for (std::size_t i = 0; i < world.obstacles.size(); ++i) {
+    const std::size_t vertices = world.obstacles[i]->mesh.vertices.size();
     colliders[kObstacleKey + i] = {vertices, vertices};
   }
-  requireNone(world->surface_contacts.fault(colliders));
-  return world;
+  requireNone(world.surface_contacts.fault(colliders));
 }
 
-}  // namespace
+void writeBodies(OutArchive& archive, ModelTable& models, const SavedWorld& world) {
+  archive(static_cast<std::uint64_t>(world.bodies.size()));
+  for (const SavedBody& body : world.bodies) saveBody(archive, body, models.add(body.model));
+}
+
+void writeScene(OutArchive& archive, ModelTable& models, const SavedWorld& world) {
+  archive(static_cast<std::uint64_t>(world.scene.size()));
+  for (const auto& body : world.scene) savePrepared(archive, *body, models.add(body->model));
+  archive(static_cast<std::uint64_t>(world.obstacles.size()));
+  for (const auto& obstacle : world.obstacles) archive(*obstacle);
+}
+
+void writeRest(OutArchive& archive, const SavedWorld& world) {
+  rest(archive, world);
+  archive(world.tetrahedralizations);
+}
 
 // --- checks
 
@@ -420,20 +452,15 @@ std::string encode(const SavedWorld& world, const std::string& origin) {
   for (const auto& body : world.scene) models.add(body->model);
   archive(static_cast<std::uint64_t>(models.models().size()));
   for (const BodyModelPtr& model : models.models()) archive(*model);
-  archive(static_cast<std::uint64_t>(world.bodies.size()));
-  for (const SavedBody& body : world.bodies) saveBody(archive, body, models.add(body.model));
-  archive(static_cast<std::uint64_t>(world.scene.size()));
-  for (const auto& body : world.scene) savePrepared(archive, *body, models.add(body->model));
-  archive(static_cast<std::uint64_t>(world.obstacles.size()));
-  for (const auto& obstacle : world.obstacles) archive(*obstacle);
-  rest(archive, world);
-  archive(world.tetrahedralizations);
+  writeBodies(archive, models, world);
+  writeScene(archive, models, world);
+  writeRest(archive, world);
 
   std::string header;
   OutArchive head(header);
   head.put(kMagic.data(), kMagic.size());
   const std::string_view payload = std::string_view(bytes).substr(kStateHeaderBytes);
-  head(kVersion, checksum(payload), static_cast<std::uint64_t>(payload.size()));
+  head(kStateVersion, checksum(payload), static_cast<std::uint64_t>(payload.size()));
   bytes.replace(0, kStateHeaderBytes, header);
   return bytes;
 }
@@ -445,8 +472,9 @@ Status checkStateHeader(std::string_view header, std::uint64_t file_bytes) {
     return unreadable("it has " + std::to_string(file_bytes) + " bytes; accepted: at least " +
                       std::to_string(kStateHeaderBytes));
   const StateHeader head(header);
-  if (head.version != kVersion)
-    return unreadable("it is of version " + std::to_string(head.version) + "; accepted: " + std::to_string(kVersion));
+  if (head.version != kStateVersion)
+    return unreadable("it is of version " + std::to_string(head.version) +
+                      "; accepted: " + std::to_string(kStateVersion));
   const std::uint64_t payload_bytes = file_bytes - kStateHeaderBytes;
   if (payload_bytes != head.length)
     return unreadable("it holds " + std::to_string(payload_bytes) + " bytes of " + std::to_string(head.length) +

@@ -11,6 +11,8 @@
 
 namespace meshless {
 
+constexpr std::uint32_t kStateVersion = 19;
+
 inline std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(
       crc32_z(crc32_z(0, nullptr, 0), reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
@@ -384,6 +386,16 @@ class ModelTable {
   std::vector<BodyModelPtr> models_;
   std::map<const BodyModel*, std::uint32_t> places_;
 };
+
+// The parts of a file of states. Bodies and scenes name models by their place in the table.
+void writeBodies(OutArchive& archive, ModelTable& models, const SavedWorld& world);
+void writeScene(OutArchive& archive, ModelTable& models, const SavedWorld& world);
+void writeRest(OutArchive& archive, const SavedWorld& world);
+void readSettings(InArchive& archive, SavedWorld& world);
+void readBodies(InArchive& archive, const ModelTable& models, SavedWorld& world);
+void readScene(InArchive& archive, const ModelTable& models, SavedWorld& world);
+/// The last part; checks the whole.
+void readRest(InArchive& archive, SavedWorld& world);
 
 /// A prepared body with its model.
 void savePrepared(OutArchive& archive, const PreparedBody& body, std::uint32_t model);

@@ -209,7 +209,7 @@ class SaveTest(SessionCase):
             self.assertIn('state', answer.message)
             self.assertEqual(before, node.hash())
             self.assertEqual(old, self.read('state'))
-            self.assertEqual(['log', 'state'], sorted(os.listdir(self.folder)))
+            self.assertEqual(['log', 'log.index', 'state'], sorted(os.listdir(self.folder)))
             # The log of commands has ended, and says so; the node has not.
             node.good('step', steps=10)
             end = time.monotonic() + LONG

@@ -52,6 +52,11 @@ class WorldRunner {
   /// start.
   using StepSink = std::function<void(World&, double)>;
   void setStepSink(StepSink sink) { step_sink_ = std::move(sink); }
+  /// What a step is, instead of World::step; false: there is none, and the world is paused. To be set before start.
+  using Step = std::function<bool(World&)>;
+  void setStep(Step step) { step_ = std::move(step); }
+  /// [1] of simulated time over the clock's; above 0.
+  void setSpeed(double speed) { speed_ = speed; }
   void start();
   /// Ends the thread; whoever waits gets kFailed.
   void stop();
@@ -80,6 +85,8 @@ class WorldRunner {
   Status reset();
   /// Becomes the saved state, as reset() does; `then` is done before anything else is.
   Status restore(std::shared_ptr<const SavedWorld> saved, const Job& then);
+  /// A job that makes another state of the world, as restore() does.
+  Status change(const Job& job);
   /// A job that only reads.
   Status look(const Job& job);
   std::shared_ptr<const WorldSnapshot> snapshot(const SnapshotWants& wants);  // null once stopped
@@ -116,6 +123,7 @@ class WorldRunner {
   void loop();
   void doJobs();
   void stepOnce();
+  void pauseAtEnd();
   void tellCuts();
   void answerCuts();
   void giveUp(const std::string& why);
@@ -131,6 +139,11 @@ class WorldRunner {
   const Clock& clock_;
   EventSink event_sink_;
   StepSink step_sink_;
+  Step step_ = [](World& world) {
+    world.step();
+    return true;
+  };
+  std::atomic<double> speed_{1.0};
 
   // of the runner's thread alone
   std::deque<ClosingCut> closing_;

@@ -1,4 +1,5 @@
-// What outlives the node: saved states, the autosave, the log of commands. All files are below one folder.
+// What outlives the node: saved states, the autosave, the log of commands and its index. All files are below one
+// folder.
 #pragma once
 
 #include <condition_variable>
@@ -9,9 +10,13 @@
 #include "meshless_surgery/io/autosave_file.h"
 #include "meshless_surgery/io/session_folder.h"
 #include "meshless_surgery/ros/runner.h"
+#include "meshless_surgery/world/log_index.h"
 #include "meshless_surgery/world/saved_world.h"
 
 namespace meshless {
+
+/// The parameter's, or where it is empty meshless_surgery below ROS_HOME or ~/.ros.
+std::string sessionFolderOf(const std::string& session_directory);
 
 struct SessionSettings {
   std::string folder;
@@ -50,14 +55,25 @@ class Session {
   Result<Loaded> load(WorldRunner& runner, const std::string& name);
 
   /// On the runner's thread, after every step and every job; see WorldRunner::StepSink.
-  void changed(const World& world, double dt);
+  void changed(World& world, double dt);
+  /// On the runner's thread: see WorldRunner::EventSink.
+  void heard(const std::vector<Event>& events);
 
  private:
   Result<std::string> encoded(const SavedWorld& world) const;
   void saveLoop();
   bool waitForWork(bool failed, SavedWorldPtr& saved);
   void writeLoop();
-  void append(std::string bytes);
+  /// A file that grows as the session goes on.
+  struct GrowingFile {
+    explicit GrowingFile(const char* of) : what(of) {}
+    const char* what;
+    int descriptor = -1;
+    std::string buffer;
+    bool failed = false;
+  };
+  void append(GrowingFile& file, std::string bytes);
+  void write(GrowingFile& file, const std::string& bytes);
 
   const SessionSettings settings_;
   const SessionFolder folder_;
@@ -74,13 +90,12 @@ class Session {
   bool stopping_ = false;
   std::thread saver_;
 
-  // the log
+  // the log and its index
   std::mutex log_mutex_;
   std::condition_variable log_grown_;
-  std::string log_buffer_;
-  int log_file_ = -1;
+  GrowingFile log_{"the log of commands"}, index_{"the index of the log"};
+  std::unique_ptr<LogIndexWriter> index_writer_;  // of the runner's thread
   std::string log_name_;
-  bool log_failed_ = false;
   bool log_ending_ = false;
   std::thread logger_;
 };

@@ -71,4 +71,9 @@ bool isOf(const std::string& body, const std::string& whole);
 /// Of a body whose particles are at `positions`.
 TrainingFrame::Strain strainOf(const BodyModel& model, const Points& positions, double limit);
 
+/// What should not happen to a trainee.
+bool isError(EventType type);
+/// Worth a mark on a line of time.
+bool isShown(EventType type);
+
 }  // namespace meshless

@@ -1,0 +1,297 @@
+// Layout: magic (8 bytes), version of states (4), hash of the log's start (8), then records (records.h): kind (1),
+// steps since the log's start (8), payload. States and scenes name the models that they need, which have records of
+// their own.
+#include "meshless_surgery/world/log_index.h"
+
+#include <istream>
+
+#include "records.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kMomentEvery = 0.1;                          // [s]
+constexpr std::size_t kHead = kLogIndexMagic.size() + 4 + 8;  // bytes
+constexpr std::size_t kRecordStart = 1 + 8;                   // bytes of kind and time
+constexpr std::size_t kMostEntries = 10000000;                // of a kind
+
+enum class EntryKind : std::uint8_t { kModel, kScene, kState, kMoment, kEvent };
+
+Error badIndex(const std::string& why) {
+  return {ErrorCode::kUnreadable, "this is no index of a log that can be read: " + why};
+}
+
+}  // namespace
+
+template <class A>
+void serialize(A& archive, LogTool& v) {
+  auto& [kind, pick, position, force] = v;
+  archive(choice(kind, ToolKind::kScissors), pick, position, force);
+}
+template <class A>
+void serialize(A& archive, Event& v) {
+  auto& [type, step, sim_time, body, pick, text] = v;
+  archive(choice(type, EventType::kClipped), step, sim_time, body, pick, text);
+}
+
+// --- writing
+
+struct LogIndexWriter::Known {
+  std::map<const BodyModel*, std::pair<std::weak_ptr<const BodyModel>, std::uint32_t>> models;
+  std::uint32_t next_model = 0, next_scene = 0;
+  std::vector<std::shared_ptr<const PreparedBody>> scene;
+  std::vector<std::shared_ptr<const ObstacleDef>> obstacles;
+};
+
+LogIndexWriter::LogIndexWriter(const World& world, Sink sink, double state_every)
+    : sink_(std::move(sink)), state_every_(state_every), known_(std::make_unique<Known>()) {
+  std::string head;
+  OutArchive archive(head);
+  archive.put(kLogIndexMagic.data(), kLogIndexMagic.size());
+  archive(kStateVersion, world.stateHash());
+  sink_(std::move(head));
+}
+
+LogIndexWriter::~LogIndexWriter() = default;
+
+void LogIndexWriter::write(std::string record) {
+  bytes_ += record.size();
+  sink_(std::move(record));
+}
+
+void LogIndexWriter::heard(const std::vector<Event>& events) {
+  heard_.insert(heard_.end(), events.begin(), events.end());
+}
+
+void LogIndexWriter::stepped(World& world) {
+  ++at_;
+  const WorldSnapshot now = world.snapshot({});
+  for (const Event& event : heard_) {
+    write(recordOf(static_cast<std::uint8_t>(EntryKind::kEvent), at_, event));
+    undone_ = undone_ || event.type == EventType::kUndone;
+  }
+  heard_.clear();
+  since_moment_ += 1.0 / world.settings().step_rate;
+  if (since_moment_ > kMomentEvery - 1e-9) {
+    since_moment_ = 0.0;
+    std::vector<LogTool> tools;
+    for (const Pick& pick : now.picks) tools.push_back({ToolKind::kPick, pick.id, pick.position, pick.force.norm()});
+    if (now.push.enabled) tools.push_back({ToolKind::kPush, 0, now.push.position, now.push.force.norm()});
+    if (now.scissors.shown) tools.push_back({ToolKind::kScissors, 0, now.scissors.blades.origin, 0.0});
+    if (!tools.empty() || had_tools_) write(recordOf(static_cast<std::uint8_t>(EntryKind::kMoment), at_, tools));
+    had_tools_ = !tools.empty();
+  }
+  since_state_ += now.report.total;
+  const double every = state_every_ * std::pow(2.0, static_cast<double>(bytes_ / kThinAfter));
+  // What a cut has taken away cannot be undone from a state that was kept between the two.
+  if (since_state_ > every || undone_) keepState(world);
+}
+
+void LogIndexWriter::keepState(const World& world) {
+  since_state_ = 0.0;
+  undone_ = false;
+  Known& known = *known_;
+  const SavedWorldPtr saved = world.capture();
+  const auto placesOf = [&](const ModelTable& models) {
+    std::vector<std::uint32_t> places;
+    for (const BodyModelPtr& model : models.models()) {
+      auto& [owner, place] = known.models[model.get()];
+      if (owner.lock() != model) {
+        owner = model;
+        place = known.next_model++;
+        write(recordOf(static_cast<std::uint8_t>(EntryKind::kModel), at_, *model));
+      }
+      places.push_back(place);
+    }
+    return places;
+  };
+  for (auto it = known.models.begin(); it != known.models.end();)
+    it = it->second.first.expired() ? known.models.erase(it) : std::next(it);
+  if (known.next_scene == 0 || known.scene != saved->scene || known.obstacles != saved->obstacles) {
+    known.scene = saved->scene;
+    known.obstacles = saved->obstacles;
+    ModelTable models;
+    std::string scene;
+    OutArchive archive(scene);
+    writeScene(archive, models, *saved);
+    const std::vector<std::uint32_t> places = placesOf(models);
+    ++known.next_scene;
+    write(recordOf(static_cast<std::uint8_t>(EntryKind::kScene), at_, places, scene));
+  }
+  ModelTable models;
+  std::string state;
+  OutArchive archive(state);
+  archive(saved->settings);
+  writeBodies(archive, models, *saved);
+  writeRest(archive, *saved);
+  const std::vector<std::uint32_t> places = placesOf(models);
+  write(recordOf(static_cast<std::uint8_t>(EntryKind::kState), at_, places, known.next_scene - 1, state));
+}
+
+// --- reading
+
+struct LogIndex::Contents {
+  struct Place {
+    std::streamoff offset = 0;  // of the record
+    std::uint64_t at = 0;
+  };
+  std::unique_ptr<std::istream> file;
+  std::uint64_t start_hash = 0;
+  std::vector<LogMoment> moments;
+  std::vector<LogEvent> events;
+  std::vector<Place> models, scenes, states;
+  std::map<std::uint32_t, std::weak_ptr<const BodyModel>> loaded;
+  SavedWorldPtr scene;  // the last one that was read
+  std::uint32_t scene_number = kNoIndex;
+
+  ReadRecord recordAt(const std::vector<Place>& places, std::size_t number) {
+    if (number >= places.size()) throw ArchiveFault("it needs what is not there");
+    file->clear();
+    file->seekg(places[number].offset);
+    ReadRecord record = readRecord(*file);
+    if (!record.there) throw ArchiveFault("it is shorter than it was");
+    return record;
+  }
+  InArchive payloadOf(const ReadRecord& record) const {
+    return InArchive(std::string_view(record.body).substr(kRecordStart));
+  }
+
+  ModelTable tableOf(const std::vector<std::uint32_t>& numbers) {
+    ModelTable table;
+    for (const std::uint32_t number : numbers) {
+      BodyModelPtr model = loaded[number].lock();
+      if (!model) {
+        const ReadRecord record = recordAt(models, number);
+        InArchive archive = payloadOf(record);
+        ModelTable read;
+        read.readOne(archive);
+        loaded[number] = model = read.at(0);
+      }
+      table.add(model);
+    }
+    return table;
+  }
+
+  void needScene(std::uint32_t number) {
+    if (scene && scene_number == number) return;
+    const ReadRecord record = recordAt(scenes, number);
+    InArchive archive = payloadOf(record);
+    std::vector<std::uint32_t> numbers;
+    std::string bytes;
+    archive(numbers, bytes);
+    auto read = std::make_shared<SavedWorld>();
+    InArchive of_scene(bytes);
+    readScene(of_scene, tableOf(numbers), *read);
+    scene = std::move(read);
+    scene_number = number;
+  }
+
+  SavedWorldPtr state(std::size_t k) {
+    const ReadRecord record = recordAt(states, k);
+    InArchive archive = payloadOf(record);
+    std::vector<std::uint32_t> numbers;
+    std::uint32_t of_scene = 0;
+    std::string bytes;
+    archive(numbers, of_scene, bytes);
+    needScene(of_scene);
+    auto world = std::make_shared<SavedWorld>();
+    world->scene = scene->scene;
+    world->obstacles = scene->obstacles;
+    InArchive of_state(bytes);
+    readSettings(of_state, *world);
+    readBodies(of_state, tableOf(numbers), *world);
+    readRest(of_state, *world);
+    return world;
+  }
+};
+
+LogIndex::LogIndex(std::unique_ptr<Contents> contents) : contents_(std::move(contents)) {}
+LogIndex::LogIndex(LogIndex&&) noexcept = default;
+LogIndex& LogIndex::operator=(LogIndex&&) noexcept = default;
+LogIndex::~LogIndex() = default;
+
+std::uint64_t LogIndex::startHash() const { return contents_->start_hash; }
+const std::vector<LogMoment>& LogIndex::moments() const { return contents_->moments; }
+const std::vector<LogEvent>& LogIndex::events() const { return contents_->events; }
+
+Result<LogIndex> LogIndex::read(std::unique_ptr<std::istream> file) {
+  auto contents = std::make_unique<Contents>();
+  try {
+    const std::string head = readUpTo(*file, kHead);
+    if (head.size() < kHead || std::string_view(head).substr(0, kLogIndexMagic.size()) != kLogIndexMagic)
+      return badIndex("it does not begin with " + std::string(kLogIndexMagic) + ", as indices do");
+    InArchive archive(std::string_view(head).substr(kLogIndexMagic.size()));
+    std::uint32_t version = 0;
+    archive(version, contents->start_hash);
+    if (version != kStateVersion)
+      return badIndex("it is of version " + std::to_string(version) + "; accepted: " + std::to_string(kStateVersion));
+    file->seekg(0, std::ios::end);
+    const std::streamoff length = file->tellg();
+    std::uint64_t last = 0;
+    for (std::streamoff offset = kHead;;) {
+      file->clear();
+      file->seekg(offset);
+      // States and models are read when they are needed.
+      const std::string start = readUpTo(*file, kRecordHeader + kRecordStart);
+      if (start.size() < kRecordHeader + kRecordStart) break;
+      InArchive record(start);
+      std::uint32_t bytes = 0, sum = 0;
+      std::uint8_t kind = 0;
+      std::uint64_t at = 0;
+      record(bytes, sum, kind, at);
+      if (offset + static_cast<std::streamoff>(kRecordHeader + bytes) > length) break;  // torn
+      if (bytes < kRecordStart || kind > static_cast<std::uint8_t>(EntryKind::kEvent) || at < last)
+        return badIndex("a record has been damaged");
+      last = at;
+      std::vector<Contents::Place>* places = nullptr;
+      switch (static_cast<EntryKind>(kind)) {
+        case EntryKind::kModel:
+          places = &contents->models;
+          break;
+        case EntryKind::kScene:
+          places = &contents->scenes;
+          break;
+        case EntryKind::kState:
+          places = &contents->states;
+          break;
+        case EntryKind::kMoment:
+        case EntryKind::kEvent: {
+          file->seekg(offset);
+          const ReadRecord read = readRecord(*file);
+          InArchive payload = contents->payloadOf(read);
+          if (static_cast<EntryKind>(kind) == EntryKind::kMoment) {
+            contents->moments.push_back({at, {}});
+            payload(contents->moments.back().tools);
+          } else {
+            contents->events.push_back({at, {}});
+            payload(contents->events.back().event);
+          }
+          break;
+        }
+      }
+      if (places) places->push_back({offset, at});
+      if (contents->moments.size() > kMostEntries || contents->events.size() > kMostEntries)
+        return badIndex("it has more than " + std::to_string(kMostEntries) + " entries");
+      offset += static_cast<std::streamoff>(kRecordHeader + bytes);
+    }
+  } catch (const ArchiveFault& fault) {
+    return badIndex(fault.what());
+  }
+  contents->file = std::move(file);
+  return LogIndex(std::move(contents));
+}
+
+Result<LogIndex::Kept> LogIndex::stateAt(std::uint64_t at, std::uint64_t above) {
+  Contents& c = *contents_;
+  const auto after = std::upper_bound(c.states.begin(), c.states.end(), at,
+                                      [](std::uint64_t when, const Contents::Place& place) { return when < place.at; });
+  if (after == c.states.begin() || std::prev(after)->at <= above) return Kept();
+  const std::size_t k = static_cast<std::size_t>(after - c.states.begin()) - 1;
+  try {
+    return Kept{c.state(k), c.states[k].at};
+  } catch (const ArchiveFault& fault) {
+    return badIndex(std::string("a state in it: ") + fault.what());
+  }
+}
+
+}  // namespace meshless

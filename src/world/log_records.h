@@ -1,0 +1,93 @@
+// What a log of commands is made of. Magic (8 bytes), version (4), then records (records.h): kind (1), step (8),
+// payload.
+#pragma once
+
+#include "records.h"
+#include "saved_world_impl.h"
+
+namespace meshless {
+
+constexpr std::uint32_t kLogVersion = 4;  // of the hashes in it, too
+
+enum class RecordKind : std::uint8_t {
+  kStart,
+  kCommand,
+  kMaterials,
+  kScissors,
+  kHideScissors,
+  kReset,
+  kState,
+  kHash,
+  kEnd
+};
+
+// Commands as they are logged; those of materials and bodies have their own way.
+template <class A>
+void serialize(A& archive, PickCommand& v) {
+  auto& [point, direction, body, max_distance, stiffness] = v;
+  archive(point, direction, body, max_distance, stiffness);
+}
+template <class A>
+void serialize(A& archive, MovePickCommand& v) {
+  auto& [pick, target] = v;
+  archive(pick, target);
+}
+template <class A>
+void serialize(A& archive, LockCommand& v) {
+  auto& [pick, target] = v;
+  archive(pick, target);
+}
+template <class A>
+void serialize(A& archive, ReleaseCommand& v) {
+  auto& [pick] = v;
+  archive(pick);
+}
+template <class A>
+void serialize(A&, ClearPicksCommand&) {}
+template <class A>
+void serialize(A&, OpenScissorsCommand&) {}
+template <class A>
+void serialize(A&, UndoCutCommand&) {}
+template <class A>
+void serialize(A& archive, OpenBladesCommand& v) {
+  auto& [ticket] = v;
+  archive(ticket);
+}
+template <class A>
+void serialize(A& archive, PushCommand& v) {
+  auto& [enable, radius, position, speed, streamed] = v;
+  archive(enable, radius, position, speed, streamed);
+}
+template <class A>
+void serialize(A& archive, InciseCommand& v) {
+  auto& [blade, bodies] = v;
+  archive(blade, bodies);
+}
+template <class A>
+void serialize(A& archive, LiftCommand& v) {
+  auto& [tool, streamed_only, why] = v;
+  archive(choice(tool, ToolKind::kScissors), streamed_only, why);
+}
+template <class A>
+void serialize(A& archive, RemoveCommand& v) {
+  auto& [body] = v;
+  archive(body);
+}
+inline void save(OutArchive& archive, const SpawnCommand& v) {
+  archive(*v.body->model);
+  savePrepared(archive, *v.body, 0);
+}
+inline void load(InArchive& archive, SpawnCommand& v) {
+  ModelTable models;
+  models.readOne(archive);
+  v.body = loadPrepared(archive, models);
+}
+// Materials are logged as they came out, see record().
+inline void save(OutArchive&, const SetMaterialCommand&) { assert(false); }
+inline void load(InArchive&, SetMaterialCommand&) { throw ArchiveFault("a material's change is no command of a log"); }
+template <class A>
+void serialize(A& archive, MaterialChange& v) {
+  archive(v.body, v.material);
+}
+
+}  // namespace meshless

@@ -1,0 +1,213 @@
+#!/usr/bin/env python3
+"""A logged session is looked back at: any moment is what it was, whoever asks and in whatever order."""
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+import roslib.packages
+import rospy
+from geometry_msgs.msg import Point
+from meshless_surgery.msg import Bookmarks, Review, Surfaces
+from meshless_surgery.srv import Hash, Play, Seek
+from visualization_msgs.msg import MarkerArray
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from deformer_support import ACROSS_X, LONG, OwnNode, Recorder, pose_stamped, run  # noqa: E402
+
+SCENES = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'scenes')
+BOXES = os.path.join(SCENES, 'boxes.yaml')
+
+
+class ReviewNode:
+    """A review_node of this test; `refused` waits for its end instead."""
+
+    count = 0
+
+    def __init__(self, **parameters):
+        ReviewNode.count += 1
+        self.name = '/own_review_%d' % ReviewNode.count
+        for key, value in parameters.items():
+            rospy.set_param('%s/%s' % (self.name, key), value)
+        binary = roslib.packages.find_node('meshless_surgery', 'review_node')[0]
+        self.log = tempfile.TemporaryFile(mode='w+', errors='replace')
+        self.process = subprocess.Popen([binary, '__name:=' + self.name[1:]], stdout=self.log, stderr=self.log)
+
+    def output(self):
+        number = self.log.fileno()
+        return os.pread(number, os.fstat(number).st_size, 0).decode(errors='replace')
+
+    def call(self, service, kind, **fields):
+        name = self.name + '/' + service
+        end = time.monotonic() + LONG
+        while True:
+            if self.process.poll() is not None:
+                raise AssertionError('the node has ended: ' + self.output())
+            try:
+                rospy.wait_for_service(name, 0.5)
+                return rospy.ServiceProxy(name, kind)(**fields)
+            except rospy.ROSException:
+                if time.monotonic() > end:
+                    raise
+
+    def hash(self):
+        answer = self.call('hash', Hash)
+        assert answer.success, answer.message
+        return answer.hash
+
+    def seek(self, when):
+        answer = self.call('seek', Seek, time=when)
+        assert answer.success, answer.message
+        return answer
+
+    def recorder(self, topic, kind):
+        return Recorder(self.name + '/' + topic, kind)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *failure):
+        if self.process.poll() is None:
+            self.process.send_signal(15)
+        self.code = self.process.wait(LONG)
+        self.log.close()
+
+
+class ReviewTest(unittest.TestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        """A session of some seconds: picked, cut, undone, cut again, pushed. Of some of its moments the hash is known."""
+        cls.folder = tempfile.mkdtemp(prefix='meshless_review_')
+        cls.known = {}  # steps since the start: hash
+        with OwnNode(scene=BOXES, session_directory=cls.folder, command_log='monday', paused=True) as node:
+            steps = 0
+
+            def go(count):
+                nonlocal steps
+                node.good('step', steps=count)
+                steps += count
+                cls.known[steps] = node.hash()
+
+            go(60)
+            pick = node.good('pick', point=Point(-0.2, 0.0, 0.15), max_distance=0.1)
+            for k in range(30):
+                node.good('move_pick', pick_id=pick.pick_id, target=Point(-0.2, 0.01 * k, 0.15))
+                go(4)
+            cut = node.good('cut', blades=pose_stamped(0.2, -1.0, 0.1, ACROSS_X), bodies=['right'])
+            assert cut.new_bodies
+            go(30)
+            node.good('undo_cut')
+            go(30)
+            node.good('cut', blades=pose_stamped(0.22, -1.0, 0.1, ACROSS_X), bodies=['right'])
+            go(60)
+            node.good('release', pick_id=pick.pick_id)
+            go(60)
+            node.good('reset')
+            go(60)
+            cls.length = steps
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.folder, ignore_errors=True)
+
+    def rate(self):
+        return 120.0
+
+    def look_everywhere(self, review):
+        moments = list(self.known)
+        random.Random(3).shuffle(moments)
+        for steps in moments:
+            review.seek(steps / self.rate())
+            self.assertEqual(self.known[steps], review.hash(), 'after %d steps' % steps)
+
+    def test_any_moment_is_what_it_was(self):
+        with ReviewNode(session_directory=self.folder, log='monday') as review:
+            self.look_everywhere(review)
+            self.assertNotIn('is made now', review.output())
+
+    def test_without_an_index_one_is_made(self):
+        other = tempfile.mkdtemp(prefix='meshless_review_')
+        self.addCleanup(shutil.rmtree, other, True)
+        path = os.path.join(other, 'copied')
+        shutil.copy(os.path.join(self.folder, 'monday'), path)
+        with ReviewNode(log=path) as review:
+            self.look_everywhere(review)
+            self.assertIn('one is made now', review.output())
+        # Of another log: not used. The next one finds what was made.
+        with ReviewNode(log=path) as review:
+            self.look_everywhere(review)
+            self.assertNotIn('one is made now', review.output())
+        with open(path + '.index', 'r+b') as index:
+            index.seek(13)
+            index.write(b'other!')
+        with ReviewNode(log=path) as review:
+            self.look_everywhere(review)
+            self.assertIn('of another log', review.output())
+
+    def test_it_plays_stands_still_and_ends(self):
+        with ReviewNode(session_directory=self.folder, log='monday') as review:
+            review.seek(0.0)
+            told = review.recorder('review', Review)
+            first = told.wait(lambda now: now.speed == 0.0)
+            self.assertEqual('monday', first.log)
+            self.assertAlmostEqual(self.length / self.rate(), first.length, 6)
+            self.assertTrue(review.call('play', Play, speed=4.0).success)
+            told.wait(lambda now: now.speed == 4.0 and now.time > 0.5)
+            self.assertTrue(review.call('play', Play, speed=0.0).success)
+            still = told.wait(lambda now: now.speed == 0.0, since=told.count() - 1) if told.count() else None
+            self.assertIsNotNone(still)
+            self.assertTrue(review.call('play', Play, speed=100.0).success)
+            end = told.wait(lambda now: now.speed == 0.0 and now.time == now.length)
+            self.assertEqual(self.known[self.length], review.hash())
+            # Once more, from the start.
+            since = told.count()
+            self.assertTrue(review.call('play', Play, speed=1.0).success)
+            told.wait(lambda now: now.speed == 1.0 and now.time < 0.5 * end.length, since=since)
+
+    def test_bodies_paths_and_bookmarks_are_shown(self):
+        with ReviewNode(session_directory=self.folder, log='monday') as review:
+            review.seek(0.5)
+            surfaces = review.recorder('surfaces', Surfaces)
+            before = surfaces.wait()
+            after = review.seek((60 + 120 + 30) / self.rate())
+            self.assertLess(len(before.bodies), len(surfaces.wait(lambda seen: len(seen.bodies) > len(before.bodies)).bodies),
+                            after.message)
+            marks = review.recorder('bookmarks', Bookmarks).wait()
+            self.assertEqual(len(marks.times), len(marks.errors))
+            cuts = [k for k, text in enumerate(marks.texts) if 'cut' in text]
+            self.assertTrue(cuts)
+            undone = [k for k, error in enumerate(marks.errors) if error]
+            self.assertTrue(undone, marks.texts)
+            self.assertTrue(any(abs(marks.times[k] - (60 + 120 + 30 + 1) / self.rate()) < 0.02 for k in undone), marks)
+            paths = review.recorder('hand_paths', MarkerArray).wait().markers
+            points = [p for path in paths if path.ns == 'pick' for p in path.points]
+            self.assertGreater(max(p.y for p in points), 0.2)
+            self.assertEqual(len(points), sum(len(path.colors) for path in paths if path.ns == 'pick'))
+
+    def test_what_cannot_be_is_refused(self):
+        with ReviewNode(session_directory=self.folder, log='monday') as review:
+            held = review.hash()
+            for when in (-0.1, 1e9, float('nan')):
+                answer = review.call('seek', Seek, time=when)
+                self.assertFalse(answer.success)
+                self.assertIn('accepted: 0 to ', answer.message)
+            for speed in (-1.0, 1e3, float('nan')):
+                answer = review.call('play', Play, speed=speed)
+                self.assertFalse(answer.success)
+                self.assertIn('accepted: 0 or 0.01 to 100', answer.message)
+            self.assertEqual(held, review.hash())
+        for parameters, words in ((dict(), 'parameter ~log is missing'),
+                                  (dict(log='nowhere', session_directory=self.folder), 'there is no log'),
+                                  (dict(log=BOXES), 'does not begin with')):
+            with ReviewNode(**parameters) as refused:
+                self.assertEqual(1, refused.process.wait(LONG))
+                self.assertIn(words, refused.output())
+
+
+if __name__ == '__main__':
+    run('review', ReviewTest)

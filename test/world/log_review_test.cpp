@@ -1,0 +1,203 @@
+#include "meshless_surgery/world/log_review.h"
+
+#include <sstream>
+
+#include "recorded_session.h"
+#include "support/random.h"
+
+namespace meshless {
+namespace log_review_test {
+
+using command_log_test::session;
+
+LogPlayer playerOf(const std::string& log) {
+  std::istringstream stream(log);
+  auto player = LogPlayer::open(stream);
+  EXPECT_TRUE(player.ok()) << player.error().detail;
+  return std::move(*player);
+}
+
+/// As the running node writes it, with a state after each `state_every` seconds of work.
+std::string indexOf(const std::string& log, double state_every) {
+  LogPlayer player = playerOf(log);
+  World world{WorldSettings()};
+  player.begin(world);
+  std::string bytes;
+  LogIndexWriter writer(
+      world, [&](std::string piece) { bytes += piece; }, state_every);
+  while (true) {
+    const auto stepped = player.step(world);
+    EXPECT_TRUE(stepped.ok());
+    if (!stepped.ok() || !*stepped) return bytes;
+    writer.heard(world.takeEvents());
+    writer.stepped(world);
+  }
+}
+
+Result<LogIndex> read(const std::string& bytes) { return LogIndex::read(std::make_unique<std::istringstream>(bytes)); }
+
+/// The hash after each number of steps, as they come.
+std::vector<std::uint64_t> hashesOf(const std::string& log) {
+  LogPlayer player = playerOf(log);
+  World world{WorldSettings()};
+  player.begin(world);
+  std::vector<std::uint64_t> hashes{world.stateHash()};
+  while (*player.step(world)) hashes.push_back(world.stateHash());
+  return hashes;
+}
+
+constexpr double kEachStep = 1e-12, kNever = 1e9;
+
+void expectEveryMoment(const std::string& log, const std::string& index, unsigned seed) {
+  const std::vector<std::uint64_t> hashes = hashesOf(log);
+  auto opened = read(index);
+  ASSERT_TRUE(opened.ok()) << opened.error().detail;
+  LogReview review(playerOf(log), std::move(*opened));
+  World world{WorldSettings()};
+  review.begin(world);
+  EXPECT_EQ(review.index().startHash(), world.stateHash());
+  test::Random random(seed);
+  for (int k = 0; k < 60; ++k) {
+    const auto at = static_cast<std::uint64_t>(random.integer(0, static_cast<int>(hashes.size()) - 1));
+    const auto found = review.seek(world, at);
+    ASSERT_TRUE(found.ok()) << found.error().detail;
+    ASSERT_EQ(at, review.player().at());
+    ASSERT_EQ(hashes[at], world.stateHash()) << at;
+    for (std::uint64_t next = at + 1; next < std::min<std::uint64_t>(at + 4, hashes.size()); ++next) {
+      const auto stepped = review.step(world);
+      ASSERT_TRUE(stepped.ok() && *stepped);
+      ASSERT_EQ(hashes[next], world.stateHash()) << next << " on from " << at;
+    }
+  }
+  ASSERT_TRUE(review.seek(world, review.player().end()).ok());
+  EXPECT_FALSE(*review.step(world));
+}
+
+TEST(LogReview, FindsEveryMomentAsItWas) {
+  const auto s = session();
+  expectEveryMoment(s.log, indexOf(s.log, kEachStep), 1);
+  expectEveryMoment(s.log, indexOf(s.log, 2e-3), 2);
+  expectEveryMoment(s.log, indexOf(s.log, kNever), 3);  // states after what was undone alone
+}
+
+TEST(LogReview, ComputesNoMoreThanSinceTheStateThatWasKept) {
+  const auto s = session();
+  auto index = read(indexOf(s.log, kEachStep));
+  ASSERT_TRUE(index.ok());
+  LogReview review(playerOf(s.log), std::move(*index));
+  World world{WorldSettings()};
+  review.begin(world);
+  for (const std::uint64_t at : {100, 20, 60, 61, 5}) {
+    const auto computed = review.seek(world, at);
+    ASSERT_TRUE(computed.ok());
+    EXPECT_LE(*computed, 1u) << at;
+  }
+  // Nor where the present is nearer than any that was kept.
+  auto bare = read(indexOf(s.log, kNever));
+  LogReview far(playerOf(s.log), std::move(*bare));
+  far.begin(world);
+  EXPECT_EQ(10u, *far.seek(world, 10));
+  EXPECT_EQ(5u, *far.seek(world, 15));
+  EXPECT_EQ(0u, *far.seek(world, 0));
+}
+
+TEST(LogReview, WhatWasLostWhenTheWriterWasKilledIsComputed) {
+  const auto s = session();
+  const std::string index = indexOf(s.log, 1e-3);
+  test::Random random(5);
+  for (int k = 0; k < 6; ++k) {
+    const auto kept = static_cast<std::size_t>(random.integer(20, static_cast<int>(index.size()) - 1));
+    expectEveryMoment(s.log, index.substr(0, kept), 10 + static_cast<unsigned>(k));
+  }
+}
+
+TEST(LogReview, RefusesAnIndexThatWasDamaged) {
+  const auto s = session();
+  const std::string index = indexOf(s.log, kEachStep);
+  EXPECT_FALSE(read("").ok());
+  EXPECT_FALSE(read("MLSSTATE" + index.substr(8)).ok());
+  std::string version = index;
+  version[8] = static_cast<char>(version[8] + 1);
+  EXPECT_FALSE(read(version).ok());
+  const std::vector<std::uint64_t> hashes = hashesOf(s.log);
+  test::Random random(7);
+  int refused = 0;
+  for (int k = 0; k < 100; ++k) {
+    std::string damaged = index;
+    const auto place = static_cast<std::size_t>(random.integer(20, static_cast<int>(index.size()) - 1));
+    damaged[place] = static_cast<char>(damaged[place] ^ (1 << random.integer(0, 7)));
+    auto opened = read(damaged);
+    if (!opened.ok()) {
+      ++refused;
+      continue;
+    }
+    LogReview review(playerOf(s.log), std::move(*opened));
+    World world{WorldSettings()};
+    review.begin(world);
+    for (const std::uint64_t at : {90, 40, 140}) {
+      const auto found = review.seek(world, at);
+      refused += !found.ok();
+      if (found.ok()) EXPECT_EQ(hashes[at], world.stateHash());
+    }
+  }
+  EXPECT_GT(refused, 0);
+}
+
+TEST(LogReview, SaysWhatToolsDidAndWhatHappened) {
+  const auto s = session();
+  auto index = read(indexOf(s.log, kNever));
+  ASSERT_TRUE(index.ok());
+  std::map<EventType, int> events;
+  for (const LogEvent& event : index->events()) ++events[event.event.type];
+  EXPECT_GT(events[EventType::kCut], 0);
+  EXPECT_EQ(1, events[EventType::kUndone]);
+  EXPECT_EQ(1, events[EventType::kReset]);
+  LogReview review(playerOf(s.log), std::move(*index));
+  World world{WorldSettings()};
+  review.begin(world);
+  std::size_t picks = 0, pushes = 0, gone = 0;
+  for (const LogMoment& moment : review.index().moments()) {
+    ASSERT_TRUE(review.seek(world, moment.at).ok());
+    const WorldSnapshot now = world.snapshot({});
+    ASSERT_EQ(now.picks.size() + now.push.enabled + now.scissors.shown, moment.tools.size()) << moment.at;
+    gone += moment.tools.empty();
+    for (const LogTool& tool : moment.tools) {
+      if (tool.kind == ToolKind::kPick) {
+        ++picks;
+        EXPECT_EQ(now.picks[0].position, tool.position);
+        EXPECT_EQ(now.picks[0].force.norm(), tool.force);
+      } else if (tool.kind == ToolKind::kPush) {
+        ++pushes;
+        EXPECT_EQ(now.push.position, tool.position);
+      }
+    }
+  }
+  EXPECT_GT(picks, 2u);
+  EXPECT_GT(pushes, 2u);
+  EXPECT_GT(gone, 0u);  // where a tool was taken away, its path ends
+}
+
+TEST(LogReview, AnIndexIsMadeOfALogAfterwards) {
+  const auto s = session();
+  LogPlayer player = playerOf(s.log);
+  std::string bytes;
+  ASSERT_TRUE(writeLogIndex(player, 1, [&](std::string piece) { bytes += piece; }).ok());
+  EXPECT_FALSE(player.report().difference.has_value());
+  expectEveryMoment(s.log, bytes, 4);
+}
+
+TEST(LogReview, RefusesAMomentBeyondTheEnd) {
+  const auto s = session();
+  auto index = read(indexOf(s.log, kNever));
+  LogReview review(playerOf(s.log), std::move(*index));
+  World world{WorldSettings()};
+  review.begin(world);
+  const std::uint64_t hash = world.stateHash();
+  const auto found = review.seek(world, review.player().end() + 1);
+  ASSERT_FALSE(found.ok());
+  EXPECT_NE(std::string::npos, found.error().detail.find("accepted: 0 to " + std::to_string(review.player().end())));
+  EXPECT_EQ(hash, world.stateHash());
+}
+
+}  // namespace log_review_test
+}  // namespace meshless
