@@ -2,8 +2,13 @@
 
 #include <algorithm>
 
+#include <OgreAxisAlignedBox.h>
 #include <meshless_surgery/Play.h>
 #include <meshless_surgery/Seek.h>
+#include <rviz/properties/property.h>
+#include <rviz/view_controller.h>
+#include <rviz/view_manager.h>
+#include <rviz/visualization_manager.h>
 #include <QComboBox>
 #include <QHBoxLayout>
 #include <QLabel>
@@ -18,6 +23,7 @@ namespace meshless {
 namespace {
 
 constexpr int kTicks = 10000;         // of the slider
+constexpr float kViewFrom = 1.6f;     // lengths of what is seen
 constexpr double kStep = 1.0 / 30.0;  // [s]
 
 QString clockText(double seconds) {
@@ -99,6 +105,7 @@ void ReviewPanel::save(rviz::Config config) const {
 void ReviewPanel::changeNodes() {
   review_.shutdown();
   events_.shutdown();
+  surfaces_.shutdown();
   for (NodeLink* link : links_) delete link;
   links_.clear();
   asked_ = 0;
@@ -114,6 +121,8 @@ void ReviewPanel::changeNodes() {
       first.nameOf("review"), 5, [this](const meshless_surgery::Review::ConstPtr& review) { show(*review); });
   events_ = first.handle().subscribe<meshless_surgery::Bookmarks>(
       first.nameOf("bookmarks"), 1, [this](const meshless_surgery::Bookmarks::ConstPtr& marks) { list(*marks); });
+  surfaces_ = first.handle().subscribe<meshless_surgery::Surfaces>(
+      first.nameOf("surfaces"), 1, [this](const meshless_surgery::Surfaces::ConstPtr& surfaces) { face(*surfaces); });
 }
 
 void ReviewPanel::show(const meshless_surgery::Review& review) {
@@ -134,6 +143,18 @@ void ReviewPanel::list(const meshless_surgery::Bookmarks& bookmarks) {
     item->setData(Qt::UserRole, bookmarks.times[k]);
     if (bookmarks.errors[k]) item->setForeground(QColor(190, 40, 30));
   }
+}
+
+void ReviewPanel::face(const meshless_surgery::Surfaces& surfaces) {
+  rviz::ViewController* view = vis_manager_ ? vis_manager_->getViewManager()->getCurrent() : nullptr;
+  Ogre::AxisAlignedBox box;
+  for (const auto& body : surfaces.bodies)
+    for (std::size_t i = 0; i + 2 < body.vertices.size(); i += 3)
+      box.merge(Ogre::Vector3(body.vertices[i], body.vertices[i + 1], body.vertices[i + 2]));
+  if (!view || !box.isFinite()) return;
+  view->subProp("Distance")->setValue(kViewFrom * box.getSize().length());
+  view->lookAt(box.getCenter());
+  surfaces_.shutdown();
 }
 
 // Of the moments that a slider passes while a node is at work the last one is asked for.

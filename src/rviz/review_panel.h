@@ -8,6 +8,7 @@
 #ifndef Q_MOC_RUN
 #include <meshless_surgery/Bookmarks.h>
 #include <meshless_surgery/Review.h>
+#include <meshless_surgery/Surfaces.h>
 
 #include "node_link.h"
 #endif
@@ -36,6 +37,8 @@ class ReviewPanel : public rviz::Panel {
  private:
   void show(const meshless_surgery::Review& review);
   void list(const meshless_surgery::Bookmarks& bookmarks);
+  /// Turns the view to the bodies.
+  void face(const meshless_surgery::Surfaces& surfaces);
   /// Of all nodes.
   void seek(double time);
   void seekNext();
@@ -49,8 +52,8 @@ class ReviewPanel : public rviz::Panel {
   QLabel* time_;
   QListWidget* bookmarks_;
   QLabel* message_;
-  std::vector<NodeLink*> links_;  // of the first node the time is shown
-  ros::Subscriber review_, events_;
+  std::vector<NodeLink*> links_;                // of the first node the time is shown
+  ros::Subscriber review_, events_, surfaces_;  // the last one until a view faces them
   double now_ = 0.0, length_ = 0.0, plays_ = 0.0;
   int asked_ = 0;                 // answers that are still to come
   std::optional<double> wanted_;  // meanwhile

@@ -57,8 +57,6 @@ TissueDisplay::TissueDisplay() {
 
 TissueDisplay::~TissueDisplay() = default;
 
-void TissueDisplay::onInitialize() { tools_ = std::make_unique<ToolsShape>(scene_manager_, scene_node_); }
-
 void TissueDisplay::onEnable() { listen(); }
 
 void TissueDisplay::onDisable() {

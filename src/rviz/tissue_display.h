@@ -30,7 +30,6 @@ class TissueDisplay : public rviz::Display {
   TissueDisplay();
   ~TissueDisplay() override;
 
-  void onInitialize() override;
   void update(float wall_dt, float ros_dt) override;
   void reset() override;
 
