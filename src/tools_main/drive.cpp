@@ -99,7 +99,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option(
          "--known", known_file,
-         "file with lines SEED | LAW | REASON, at most three: these breaks are expected, and no others; what did "
+         "file with lines SEED | LAW | REASON, at most four: these breaks are expected, and no others; what did "
          "not finish is no break")
       ->check(CLI::ExistingFile);
   app.add_flag("--no-cuts", no_cuts, "the hand waits where it would cut");

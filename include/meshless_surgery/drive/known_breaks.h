@@ -13,7 +13,7 @@ struct KnownBreak {
   std::string reason;
 };
 
-constexpr std::size_t kMostKnownBreaks = 3;
+constexpr std::size_t kMostKnownBreaks = 4;
 
 /// Lines "SEED | LAW | REASON"; empty ones and those that begin with # are left out. Refuses (kInvalidArgument) another
 /// form, a law that is not there, no reason, and more than kMostKnownBreaks scenes.
