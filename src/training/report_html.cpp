@@ -167,6 +167,11 @@ std::string views(const Training& training) {
   for (const Vec3& p : training.tissue().planPoints()) bounds.extend(p);
   for (const Vec3& p : training.tissue().cut().points) bounds.extend(p);
   if (bounds.empty()) return "";
+  const Vec3 around = Vec3::Constant(0.5 * (bounds.max - bounds.min).maxCoeff());  // hands farther away are not shown
+  const Box near{bounds.min - around, bounds.max + around};
+  for (const TrainingMoment& moment : training.moments())
+    for (const auto& place : moment.place)
+      if (place && near.contains(*place)) bounds.extend(*place);
   const double scale = (kSide - 40.0) / std::max(1e-9, (bounds.max - bounds.min).maxCoeff());
   const Vec3 middle = 0.5 * (bounds.min + bounds.max);
   std::string out = "<div class=\"views\">";
