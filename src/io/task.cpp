@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "opened_file.h"
 #include "region_yaml.h"
 
 namespace meshless {
@@ -11,6 +12,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostStages = 100, kMostForbidden = 100;
+constexpr std::size_t kMostPicture = 2 << 20;  // bytes
 const std::vector<std::string> kTools{"pick", "push", "scissors"};
 
 std::string tasksIn(const fs::path& folder) {
@@ -21,6 +23,19 @@ std::string tasksIn(const fs::path& folder) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
   return text.empty() ? "those of config/tasks" : text;
+}
+
+std::string base64(std::string_view bytes) {
+  constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t k = 0; k < bytes.size(); k += 3) {
+    std::uint32_t group = 0;
+    const std::size_t count = std::min<std::size_t>(3, bytes.size() - k);
+    for (std::size_t n = 0; n < 3; ++n)
+      group = group << 8 | (n < count ? static_cast<unsigned char>(bytes[k + n]) : 0u);
+    for (std::size_t n = 0; n < 4; ++n) text += n <= count ? kDigits[group >> (18 - 6 * n) & 63u] : '=';
+  }
+  return text;
 }
 
 /// A box or a sphere, of the keys of `map`; a plane too where it may be one.
@@ -41,7 +56,9 @@ std::optional<Region> readRegionKeys(YamlSource& source, YamlMap& map, const YAM
 
 class TaskReader {
  public:
-  TaskReader(YamlSource& source, TaskDef& task) : source_(source), task_(task) {}
+  /// Pictures are read from `folder` on.
+  TaskReader(YamlSource& source, TaskDef& task, std::string folder, const FileAccess& access)
+      : source_(source), task_(task), folder_(std::move(folder)), access_(access) {}
 
   /// Where the parts of the task are, for faults that are found later.
   YAML::Node at(const TaskFault& fault) const {
@@ -55,6 +72,9 @@ class TaskReader {
     YamlMap map(source_, root, "the task");
     map.text("scene", task_.scene);
     map.text("brief", task_.brief);
+    std::string picture;
+    map.text("picture", picture);
+    if (!picture.empty()) readPicture(map.get("picture"), picture);
     map.number("pass_mark", {0.0, 100.0}, task_.pass_mark);
     for (const char* part : {"plan", "target", "tray", "stages", "limits", "metrics"})
       if (const YAML::Node node = map.get(part); node.IsDefined()) parts_[part].reset(node);
@@ -71,6 +91,19 @@ class TaskReader {
   }
 
  private:
+  void readPicture(const YAML::Node& node, const std::string& path) {
+    const std::string accepted = "a PNG or JPEG file of up to 2 MiB, from the task's folder on";
+    const auto resolved = access_.resolve(path, folder_);
+    if (!resolved.ok())
+      return source_.fail(node, "picture: " + resolved.error().detail, accepted, resolved.error().code);
+    const auto read = readFile(*resolved, kMostPicture);
+    if (!read.ok()) return source_.fail(node, "picture: " + read.error().detail, accepted, read.error().code);
+    const std::string_view bytes = read->text();
+    const bool png = bytes.substr(0, 8) == "\x89PNG\r\n\x1a\n", jpeg = bytes.substr(0, 3) == "\xff\xd8\xff";
+    if (!png && !jpeg) return source_.fail(node, "picture is no PNG and no JPEG", accepted, ErrorCode::kUnreadable);
+    task_.picture = std::string("data:image/") + (png ? "png" : "jpeg") + ";base64," + base64(bytes);
+  }
+
   void readPlan(const YAML::Node& node) {
     CutPlan plan;
     YamlMap map(source_, node, "plan");
@@ -175,7 +208,8 @@ class TaskReader {
 
   void readStage(const YAML::Node& node) {
     const std::vector<std::string> kinds{"reach",    "stretch_to", "press_to",      "cut_along",
-                                         "separate", "remove_to",  "leave_nothing", "let_go"};
+                                         "separate", "remove_to",  "leave_nothing", "let_go",
+                                         "clip",     "hold",       "hand_over",     "put_back"};
     Stage stage;
     YamlMap map(source_, node, "a stage");
     map.text("name", stage.name);
@@ -238,12 +272,37 @@ class TaskReader {
       CutAlong cut;
       map.number("share", {0.0, 1.0, true}, cut.share);
       condition = cut;
+    } else if (kind == "clip") {
+      Clipped clipped;
+      readBody(map, node, kind, clipped.body);
+      clipped.region = readRegionKeys(source_, map, node, false, false);
+      condition = clipped;
+    } else if (kind == "hold") {
+      Hold hold;
+      readBody(map, node, kind, hold.body);
+      map.whole("picks", 1, 10, hold.picks);
+      condition = hold;
+    } else if (kind == "hand_over") {
+      HandOver over;
+      readBody(map, node, kind, over.body);
+      condition = over;
+    } else if (kind == "put_back") {
+      PutBack back;
+      readBody(map, node, kind, back.body);
+      if (!map.has("distance")) source_.fail(node, "put_back has no distance", "above 0 to 1000 m");
+      map.number("distance", lengths(0.0, true), back.distance);
+      condition = back;
     } else {
       LeaveNothing leave;
       map.number("share", {0.0, 0.99}, leave.share);
       condition = leave;
     }
     map.finish();
+  }
+
+  void readBody(YamlMap& map, const YAML::Node& node, const std::string& kind, std::string& body) {
+    if (!map.has("body")) source_.fail(node, kind + " has no body", "the name of a body");
+    map.text("body", body);
   }
 
   void readMetrics(const YAML::Node& node) {
@@ -281,6 +340,8 @@ class TaskReader {
 
   YamlSource& source_;
   TaskDef& task_;
+  const std::string folder_;
+  const FileAccess& access_;
   YAML::Node root_;
   std::map<std::string, YAML::Node> parts_;
   std::vector<YAML::Node> stages_;
@@ -302,7 +363,7 @@ Result<LoadedTask> readTask(const std::string& file, const std::string& scene_fo
   YamlSource source{file, {}};
   LoadedTask loaded;
   loaded.task.name = real.stem().string();
-  TaskReader reader(source, loaded.task);
+  TaskReader reader(source, loaded.task, real.parent_path().string(), access);
   try {
     reader.read(*root);
   } catch (const YAML::Exception& e) {

@@ -9,6 +9,7 @@ namespace meshless {
 namespace {
 
 constexpr double kSampleRate = 10.0;  // [Hz] of what costs something
+constexpr double kShaft = 0.0025;     // [m] radius: instruments are 5 mm thick
 
 bool isSampled(std::uint64_t step, double step_rate) {
   const auto every = static_cast<std::uint64_t>(std::max(1.0, std::round(step_rate / kSampleRate)));
@@ -93,14 +94,16 @@ TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants&
   for (const Pick& pick : shot.picks) {
     const auto body = shot.pick_bodies.find(pick.id);
     frame.tools.push_back({ToolKind::kPick, pick.id, pick.locked, body == shot.pick_bodies.end() ? "" : body->second,
-                           pick.target, std::nullopt, pick.position, pick.force.norm()});
+                           pick.target, std::nullopt, pick.position, kShaft, pick.force.norm()});
   }
   if (shot.push.enabled)
-    frame.tools.push_back(
-        {ToolKind::kPush, 0, false, "", shot.push.position, std::nullopt, shot.push.position, shot.push.force.norm()});
-  if (shot.scissors.shown)
-    frame.tools.push_back({ToolKind::kScissors, 0, false, "", shot.scissors.blades.origin,
-                           orientationOf(shot.scissors.blades), shot.scissors.blades.origin, 0.0});
+    frame.tools.push_back({ToolKind::kPush, 0, false, "", shot.push.position, std::nullopt, shot.push.position,
+                           shot.push.radius, shot.push.force.norm()});
+  if (shot.scissors.shown) {
+    const ScissorBlades& blades = shot.scissors.blades;
+    frame.tools.push_back({ToolKind::kScissors, 0, false, "", blades.origin, orientationOf(blades),
+                           blades.origin + blades.length * blades.x_axis, kShaft, 0.0});
+  }
   if (frame.sampled && wants.strain_limit) frame.strain.emplace();
   for (const BodySnapshot& body : shot.bodies) {
     frame.bodies.push_back({body.name, body.number, body.model, body.placed, Vec3::Zero()});
@@ -112,7 +115,8 @@ TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants&
     frame.strain->volume += strain.volume;
   }
   for (const AttachmentSnapshot& joint : shot.attachments)
-    frame.joints.push_back({joint.name, joint.ends, joint.fibres});
+    frame.joints.push_back(
+        {joint.name, joint.ends, joint.fibres, joint.jaws ? std::optional<Vec3>(joint.rest_place) : std::nullopt});
   return frame;
 }
 
@@ -123,7 +127,8 @@ bool isError(EventType type) {
 
 bool isShown(EventType type) {
   return isError(type) || type == EventType::kPicked || type == EventType::kLocked || type == EventType::kReleased ||
-         type == EventType::kCut || type == EventType::kIncised || type == EventType::kRemoved;
+         type == EventType::kCut || type == EventType::kIncised || type == EventType::kRemoved ||
+         type == EventType::kClipped;
 }
 
 }  // namespace meshless

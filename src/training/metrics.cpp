@@ -71,9 +71,18 @@ const std::vector<MetricRow>& metricTable() {
       {"undos", "1", kLower, false, "cuts that were taken back", kOwn},
       {"torn", "1", kLower, false, "events of attachments that tore", kOwn},
       {"leaks", "1", kLower, false, "filled cavities that were opened", kOwn},
+      {"bleeding_time", "s", kLower, false,
+       "time in which a piece of a vessel has been cut and bears no clip; vessels are the bodies that stages want "
+       "clips on",
+       kOwn},
       {"forbidden_contacts", "1", kLower, false,
        "times that a tool came to where it must not be, or that forbidden tissue was cut", kUsual},
       {"forbidden_time", "s", kLower, false, "time in which a tool is where it must not be", kUsual},
+      {"instrument_crossings", "1", kLower, false,
+       "times that two tools meet: the lines from their hands to where they work come nearer to each other than their "
+       "radii together, in a step or on the way of it; 2.5 mm, of an instrument of 5 mm, and of the push sphere its "
+       "own",
+       kOwn},
       {"hands_share", "1", kHigher, false,
        "path of the second longest of the hands over the path of all: 0.5 where two do the same", kOwn},
       {"hands_overlap", "1", kHigher, false, "time in which two hands move or more, over the time in which one does",
@@ -125,6 +134,8 @@ void Metrics::feed(const TrainingFrame& frame) {
     strained_ = std::max(strained_, frame.strain->volume);
   }
   feedEvents(frame);
+  crossings_.feed(frame.tools);
+  if (bleeds(frame)) bled_for_ += frame.dt;
   if (!limits_.forbidden.empty()) feedForbidden(frame);
 }
 
@@ -206,6 +217,22 @@ void Metrics::feedForbidden(const TrainingFrame& frame) {
   touched_ = std::move(touched);
 }
 
+bool Metrics::bleeds(const TrainingFrame& frame) const {
+  const auto isVessel = [&](const TrainingFrame::Body& body) {
+    return std::any_of(limits_.vessels.begin(), limits_.vessels.end(),
+                       [&](const std::string& vessel) { return isOf(body.name, vessel); });
+  };
+  const auto isClipped = [&](const TrainingFrame::Body& body) {
+    return std::any_of(frame.joints.begin(), frame.joints.end(), [&](const TrainingFrame::Joint& joint) {
+      return joint.clip && std::find(joint.ends.begin(), joint.ends.end(), body.name) != joint.ends.end();
+    });
+  };
+  if (limits_.vessels.empty()) return false;
+  return std::any_of(frame.bodies.begin(), frame.bodies.end(), [&](const TrainingFrame::Body& body) {
+    return body.model->next_patch > 1 && isVessel(body) && !isClipped(body);
+  });
+}
+
 std::vector<MetricValue> Metrics::values(const RestTissue& tissue, std::size_t stages) const {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   std::vector<MetricValue> all;
@@ -264,6 +291,8 @@ std::vector<MetricValue> Metrics::values(const RestTissue& tissue, std::size_t s
   set("undos", static_cast<double>(undos_));
   set("torn", static_cast<double>(torn_));
   set("leaks", static_cast<double>(leaks_));
+  set("bleeding_time", limits_.vessels.empty() ? kNone : bled_for_);
+  set("instrument_crossings", static_cast<double>(crossings_.count()));
   set("forbidden_contacts", limits_.forbidden.empty() ? kNone : static_cast<double>(forbidden_));
   set("forbidden_time", limits_.forbidden.empty() ? kNone : forbidden_for_);
   set("hands_share", paths > 0.0 ? sorted[kHands - 2] / paths : kNone);

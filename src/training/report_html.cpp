@@ -303,6 +303,8 @@ std::string reportHtml(const Training& training, const ReportHead& head) {
       "#ddd}tr.now{font-weight:bold}.good{color:#1c7a2c}.bad{color:#b0201"
       "0}.big{font-size:22px}.key{color:#555}td svg{width:200px}</style></head><body>\n";
   out += "<h1>" + escaped(task.name) + "</h1><p>" + escaped(task.brief) + "</p>\n";
+  if (!task.picture.empty())
+    out += "<p><img alt=\"what is to be done\" style=\"max-width:100%\" src=\"" + escaped(task.picture) + "\"></p>\n";
   out += "<p>" + (head.trainee.empty() ? "" : "Trainee: <b>" + escaped(head.trainee) + "</b>. ") +
          "Scene: " + escaped(task.scene) + (head.log.empty() ? "" : ". Log: " + escaped(head.log)) + ".</p>\n";
   if (!head.hashes_met)

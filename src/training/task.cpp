@@ -101,14 +101,18 @@ class FaultFinder {
     return std::nullopt;
   }
 
-  std::optional<TaskFault> check(std::size_t k, const Reach& reach) const { return inForbidden(k, reach.region); }
-  std::optional<TaskFault> check(std::size_t k, const StretchTo& stretch) const {
-    if (auto fault = needsBody("stages", k, stretch.body)) return fault;
+  std::optional<TaskFault> heldForbidden(std::size_t k, const std::string& body) const {
+    if (auto fault = needsBody("stages", k, body)) return fault;
     if (ends(LimitKind::kForbidden))
       for (const Forbidden& forbidden : task_.limits.measured.forbidden)
-        if (!forbidden.body.empty() && isOf(stretch.body, forbidden.body))
-          return never(k, "'" + stretch.body + "' is forbidden", "another body");
+        if (!forbidden.body.empty() && isOf(body, forbidden.body))
+          return never(k, "'" + body + "' is forbidden", "another body");
     return std::nullopt;
+  }
+
+  std::optional<TaskFault> check(std::size_t k, const Reach& reach) const { return inForbidden(k, reach.region); }
+  std::optional<TaskFault> check(std::size_t k, const StretchTo& stretch) const {
+    return heldForbidden(k, stretch.body);
   }
   std::optional<TaskFault> check(std::size_t k, const PressTo& press) const {
     if (ends(LimitKind::kForce) && press.force > task_.limits.measured.force)
@@ -152,6 +156,21 @@ class FaultFinder {
     return std::nullopt;
   }
   std::optional<TaskFault> check(std::size_t, const LetGo&) const { return std::nullopt; }
+  std::optional<TaskFault> check(std::size_t k, const Clipped& clipped) const {
+    if (auto fault = needsBody("stages", k, clipped.body)) return fault;
+    const TriangleMesh mesh = placedMesh(*bodyOf(scene_, clipped.body));
+    if (clipped.region && !(volumeWithin(mesh, *clipped.region) > 0.0))
+      return never(k, "no tissue of '" + clipped.body + "' is in its region at rest", "a region that has some");
+    return std::nullopt;
+  }
+  std::optional<TaskFault> check(std::size_t k, const Hold& hold) const { return heldForbidden(k, hold.body); }
+  std::optional<TaskFault> check(std::size_t k, const HandOver& over) const { return heldForbidden(k, over.body); }
+  std::optional<TaskFault> check(std::size_t k, const PutBack& back) const {
+    if (auto fault = needsBody("stages", k, back.body)) return fault;
+    if (k > 0) return std::nullopt;
+    return TaskFault{"stages", k, "put_back is the first stage: it is met from the start",
+                     "a stage before it, in which '" + back.body + "' is moved"};
+  }
 
   const TaskDef& task_;
   const SceneDef& scene_;
@@ -180,6 +199,33 @@ bool TaskDef::wantsStrain() const {
   });
 }
 
+bool TaskDef::wantsCentres() const {
+  return std::any_of(stages.begin(), stages.end(),
+                     [](const Stage& stage) { return std::holds_alternative<PutBack>(stage.condition); });
+}
+
+std::vector<std::string> TaskDef::vessels() const {
+  std::vector<std::string> all;
+  for (const Stage& stage : stages)
+    if (const auto* clipped = std::get_if<Clipped>(&stage.condition)) all.push_back(clipped->body);
+  return all;
+}
+
+std::vector<std::string> TaskDef::bodies() const {
+  std::vector<std::string> all = vessels();
+  if (plan) all.push_back(plan->body);
+  if (target) all.push_back(target->body);
+  for (const Forbidden& forbidden : limits.measured.forbidden)
+    if (!forbidden.body.empty()) all.push_back(forbidden.body);
+  for (const Stage& stage : stages) {
+    if (const auto* stretch = std::get_if<StretchTo>(&stage.condition)) all.push_back(stretch->body);
+    if (const auto* hold = std::get_if<Hold>(&stage.condition)) all.push_back(hold->body);
+    if (const auto* over = std::get_if<HandOver>(&stage.condition)) all.push_back(over->body);
+    if (const auto* back = std::get_if<PutBack>(&stage.condition)) all.push_back(back->body);
+  }
+  return all;
+}
+
 std::optional<TaskFault> findTaskFault(const TaskDef& task, const SceneDef& scene) {
   return FaultFinder(task, scene).find();
 }
@@ -198,6 +244,7 @@ void TaskProgress::feed(const TrainingFrame& frame, const Metrics& metrics, cons
   if (over()) return;
   for (const TrainingFrame::Tool& tool : frame.tools)
     if (tool.kind == ToolKind::kPick) grabbed_.emplace(tool.pick, tool.tissue);
+  for (const Stage& stage : task_.stages) watch(stage.condition, frame);
   failed_ = broken(metrics);
   if (!failed_.empty()) return;
   // Two stages are never met in one step: the next one begins with the next.
@@ -210,6 +257,34 @@ void TaskProgress::feed(const TrainingFrame& frame, const Metrics& metrics, cons
   if (!(held_for_ >= stage.hold_for - 1e-9)) return;
   times_.push_back(metrics.time());
   held_for_ = 0.0;
+}
+
+// What a stage that comes later has to know of now.
+void TaskProgress::watch(const Condition& condition, const TrainingFrame& frame) {
+  if (const auto* over = std::get_if<HandOver>(&condition)) {
+    Hands& hands = hands_[over->body];
+    std::vector<PickId> held;
+    for (const TrainingFrame::Tool& tool : frame.tools)
+      if (tool.kind == ToolKind::kPick && isOf(tool.body, over->body)) held.push_back(tool.pick);
+    std::sort(held.begin(), held.end());
+    if (held.empty())
+      hands.taken_over = false;
+    else if (!hands.held.empty() && held.front() != hands.held.front())
+      hands.taken_over = std::find(hands.held.begin(), hands.held.end(), held.front()) != hands.held.end();
+    hands.held = std::move(held);
+  }
+  if (const auto* back = std::get_if<PutBack>(&condition); back && frame.sampled) {
+    Vec3 sum = Vec3::Zero();
+    double volume = 0.0;
+    for (const TrainingFrame::Body& body : frame.bodies) {
+      if (!isOf(body.name, back->body)) continue;
+      sum += body.model->rest_volume * body.centre;
+      volume += body.model->rest_volume;
+    }
+    if (!(volume > 0.0)) return;
+    const auto [found, is_new] = whereabouts_.try_emplace(back->body, Whereabouts{sum / volume, sum / volume});
+    if (!is_new) found->second.now = sum / volume;
+  }
 }
 
 bool TaskProgress::meets(const Condition& condition, const TrainingFrame& frame, const RestTissue& tissue) const {
@@ -237,6 +312,24 @@ bool TaskProgress::meets(const Condition& condition, const TrainingFrame& frame,
   }
   if (std::holds_alternative<RemoveToTray>(condition)) return tissue.targetRemoved();
   if (const auto* leave = std::get_if<LeaveNothing>(&condition)) return tissue.targetLeft() <= leave->share;
+  if (const auto* clipped = std::get_if<Clipped>(&condition))
+    return std::any_of(frame.joints.begin(), frame.joints.end(), [&](const TrainingFrame::Joint& joint) {
+      return joint.clip && (!clipped->region || clipped->region->contains(*joint.clip)) &&
+             std::any_of(joint.ends.begin(), joint.ends.end(),
+                         [&](const std::string& end) { return isOf(end, clipped->body); });
+    });
+  const auto holders = [&](const std::string& body) {
+    return std::count_if(frame.tools.begin(), frame.tools.end(), [&](const TrainingFrame::Tool& tool) {
+      return tool.kind == ToolKind::kPick && isOf(tool.body, body);
+    });
+  };
+  if (const auto* hold = std::get_if<Hold>(&condition)) return holders(hold->body) >= hold->picks;
+  if (const auto* over = std::get_if<HandOver>(&condition))
+    return holders(over->body) == 1 && hands_.at(over->body).taken_over;
+  if (const auto* back = std::get_if<PutBack>(&condition)) {
+    const auto found = whereabouts_.find(back->body);
+    return found != whereabouts_.end() && (found->second.now - found->second.at_start).norm() <= back->distance;
+  }
   return !anyTool([](const auto& tool) { return tool.kind != ToolKind::kScissors; });
 }
 

@@ -13,26 +13,31 @@ constexpr std::size_t kOutline = 1500;  // points
 
 }  // namespace
 
+Training::Now::Now(const TaskDef& task)
+    : metrics([&] {
+        MetricLimits limits = task.limits.measured;
+        limits.vessels = task.vessels();
+        return limits;
+      }()),
+      tissue(task.plan, task.target, task.tray),
+      progress(task) {}
+
 Training::Training(TaskDef task) : task_(std::move(task)), now_(std::make_unique<Now>(task_)) {}
 
 FrameWants Training::wants() const {
   FrameWants wants;
   if (over()) return wants;
-  wants.centres = now_->tissue.wantsCentres();
+  wants.centres = now_->tissue.wantsCentres() || task_.wantsCentres();
   if (task_.wantsStrain()) wants.strain_limit = task_.limits.measured.strain;
   return wants;
 }
 
 Status Training::begin(const TrainingFrame& frame) {
   const auto known = [&](const std::string& name) {
-    return name.empty() || std::any_of(frame.bodies.begin(), frame.bodies.end(),
-                                       [&](const TrainingFrame::Body& body) { return isOf(body.name, name); });
+    return std::any_of(frame.bodies.begin(), frame.bodies.end(),
+                       [&](const TrainingFrame::Body& body) { return isOf(body.name, name); });
   };
-  std::vector<std::string> names{task_.plan ? task_.plan->body : "", task_.target ? task_.target->body : ""};
-  for (const Forbidden& forbidden : task_.limits.measured.forbidden) names.push_back(forbidden.body);
-  for (const Stage& stage : task_.stages)
-    if (const auto* stretch = std::get_if<StretchTo>(&stage.condition)) names.push_back(stretch->body);
-  for (const std::string& name : names) {
+  for (const std::string& name : task_.bodies()) {
     if (known(name)) continue;
     std::string bodies;
     for (const TrainingFrame::Body& body : frame.bodies) bodies += (bodies.empty() ? "" : ", ") + body.name;

@@ -314,6 +314,14 @@ std::size_t World::Impl::loseFibres(Attachment& attachment, EventType type, cons
   return lost;
 }
 
+Vec3 World::Impl::restPlace(const Attachment& clip) {
+  Vec3 sum = Vec3::Zero();
+  for (const Fibre& fibre : clip.fibres)
+    for (const auto& [id, at] : {std::make_pair(fibre.a, &fibre.at_a), {fibre.b, &fibre.at_b}})
+      if (const WorldBody* const body = find(id)) sum += body->state.placed * at->of(body->model->rest);
+  return clip.fibres.empty() ? sum : Vec3(sum / (2.0 * static_cast<double>(clip.fibres.size())));
+}
+
 void World::Impl::showAttachments(const SnapshotWants& wants, std::vector<AttachmentSnapshot>& shown) {
   for (const Attachment& attachment : attachments) {
     AttachmentSnapshot snapshot;
@@ -334,6 +342,7 @@ void World::Impl::showAttachments(const SnapshotWants& wants, std::vector<Attach
       if (const WorldBody* const body = find(id)) snapshot.ends.push_back(body->name);
     if (attachment.clip) {
       snapshot.jaws = attachment.clip->jaws;
+      snapshot.rest_place = restPlace(attachment);
       if (wants.surfaces) snapshot.lines = jawLines(attachment);
     }
     if (!attachment.other.empty()) snapshot.ends.push_back(attachment.other);

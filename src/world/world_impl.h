@@ -288,6 +288,7 @@ struct World::Impl {
   Points fibreEnds(const Fibre& fibre);  // [m] two
   std::string firstBodyOf(const Attachment& attachment);
   void showAttachments(const SnapshotWants& wants, std::vector<AttachmentSnapshot>& shown);
+  Vec3 restPlace(const Attachment& clip);
   /// Those of the bodies named (none: of all) that the blades part, which sever the bodies of those ids along their
   /// whole plane.
   std::vector<std::vector<char>> partedBy(const ScissorBlades& blades, const std::vector<std::string>& of,

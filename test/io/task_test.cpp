@@ -27,6 +27,10 @@ stages:
   - {stretch_to: {body: pad, distance: 0.01}}
   - {reach: {tool: pick, sphere: {centre: [0, 0, 0], radius: 1}}}
   - let_go: all
+  - clip: {body: pad, box: {min: [0, 0, 0], max: [1, 1, 1]}}
+  - hold: {body: pad, picks: 2}
+  - hand_over: {body: pad}
+  - put_back: {body: pad, distance: 0.01}
 limits: {time: 60, force: 2, strain: 0.4, forbidden: [{name: bed, box: {min: [3, 3, 0], max: [4, 4, 1]}}, {body: pad}], end: [time, force]}
 metrics:
   plan_rms: {weight: 2, good: 0.001, bad: 0.004, pass: 0.003}
@@ -60,7 +64,7 @@ TEST_F(TaskFile, IsReadWhole) {
   const TaskDef& task = loaded->task;
   EXPECT_EQ("task", task.name);
   EXPECT_EQ("scene", loaded->scene.name);
-  ASSERT_EQ(7u, task.stages.size());
+  ASSERT_EQ(11u, task.stages.size());
   EXPECT_EQ("press", task.stages[0].name);
   EXPECT_EQ(2.0, task.stages[0].hold_for);
   EXPECT_EQ(0.5, std::get<PressTo>(task.stages[0].condition).force);
@@ -71,6 +75,11 @@ TEST_F(TaskFile, IsReadWhole) {
   EXPECT_EQ(0.02, std::get<LeaveNothing>(task.stages[3].condition).share);
   EXPECT_EQ(ToolKind::kPick, std::get<Reach>(task.stages[5].condition).tool);
   EXPECT_TRUE(std::holds_alternative<LetGo>(task.stages[6].condition));
+  EXPECT_EQ("pad", std::get<Clipped>(task.stages[7].condition).body);
+  EXPECT_TRUE(std::get<Clipped>(task.stages[7].condition).region.has_value());
+  EXPECT_EQ(2, std::get<Hold>(task.stages[8].condition).picks);
+  EXPECT_EQ("pad", std::get<HandOver>(task.stages[9].condition).body);
+  EXPECT_EQ(0.01, std::get<PutBack>(task.stages[10].condition).distance);
   EXPECT_EQ(60.0, task.limits.time);
   EXPECT_EQ(2.0, task.limits.measured.force);
   EXPECT_EQ((std::set<LimitKind>{LimitKind::kTime, LimitKind::kForce}), task.limits.ends);
@@ -108,13 +117,27 @@ TEST_F(TaskFile, ErrorsNameLineKeyAndWhatIsAccepted) {
       {"stretch_to: {body: pad", "stretch_to: {body: bad", ":11:", "no body 'bad'", "pad"},
       {"tool: pick", "tool: pik", ":12:", "tool is 'pik'", "pick, push, scissors"},
       {"let_go: all", "separate: [pad, world]", ":13:", "no attachment joins", "attachment"},
-      {"end: [time, force]", "end: [time, farce]", ":14:", "'farce'", "strain"},
-      {"strain: 0.4", "strain: -1", ":14:", "strain is -1", "above 0"},
-      {"{body: pad}]", "{body: pet}]", ":14:", "no body 'pet'", "pad"},
-      {"plan_rms:", "plan_rmse:", ":16:", "did you mean 'plan_rms'", "docs/metrics.md"},
-      {"sparc.pick:", "sparc:", ":17:", "unknown metric 'sparc'", "docs/metrics.md"},
-      {"good: -1.5", "good: -4", ":17:", "the same", "two"},
-      {"pass_mark: 55", "pass_mark: 155", ":18:", "pass_mark is 155", "0 to 100"},
+      {"clip: {body: pad, box: {min: [0, 0, 0]", "clip: {body: bad, box: {min: [0, 0, 0]", ":14:", "no body 'bad'",
+       "pad"},
+      {"clip: {body: pad, box: {min: [0, 0, 0]", "clip: {body: pad, box: {min: [0.9, 0, 0]",
+       ":14:", "no tissue of 'pad'", "region"},
+      {"clip: {body: pad, ", "clip: {", ":14:", "clip has no body", "name"},
+      {"hold: {body: pad, picks: 2}", "hold: {body: pid, picks: 2}", ":15:", "no body 'pid'", "pad"},
+      {"hold: {body: pad, picks: 2}", "hold: {body: pad, picks: 0}", ":15:", "picks is '0'", "1 to 10"},
+      {"hand_over: {body: pad}", "hand_over: {body: pod}", ":16:", "no body 'pod'", "pad"},
+      {"hand_over: {body: pad}", "hand_over: {bode: pad}", ":16:", "hand_over has no body", "name"},
+      {"put_back: {body: pad", "put_back: {body: pud", ":17:", "no body 'pud'", "pad"},
+      {"body: pad, distance: 0.01}\nlimits", "body: pad}\nlimits", ":17:", "no distance", "above 0"},
+      {"- {name: press", "- put_back: {body: pad, distance: 1}\n  - {name: press", ":7:", "met from the start",
+       "a stage before it"},
+      {"end: [time, force]", "end: [time, forbidden]", ":8:", "the body of the plan is forbidden", "another body"},
+      {"end: [time, force]", "end: [time, farce]", ":18:", "'farce'", "strain"},
+      {"strain: 0.4", "strain: -1", ":18:", "strain is -1", "above 0"},
+      {"{body: pad}]", "{body: pet}]", ":18:", "no body 'pet'", "pad"},
+      {"plan_rms:", "plan_rmse:", ":20:", "did you mean 'plan_rms'", "docs/metrics.md"},
+      {"sparc.pick:", "sparc:", ":21:", "unknown metric 'sparc'", "docs/metrics.md"},
+      {"good: -1.5", "good: -4", ":21:", "the same", "two"},
+      {"pass_mark: 55", "pass_mark: 155", ":22:", "pass_mark is 155", "0 to 100"},
   };
   for (const Wrong& w : wrong) {
     const std::string error = errorOf(w.from, w.to);
@@ -122,6 +145,29 @@ TEST_F(TaskFile, ErrorsNameLineKeyAndWhatIsAccepted) {
     EXPECT_NE(std::string::npos, error.find(w.says)) << w.to << ": " << error;
     EXPECT_NE(std::string::npos, error.find("accepted: ")) << w.to << ": " << error;
     EXPECT_NE(std::string::npos, error.find(w.accepted)) << w.to << ": " << error;
+  }
+}
+
+TEST_F(TaskFile, APictureIsInTheReport) {
+  FileAccess access;
+  access.folders = {folder_.path()};
+  std::ofstream(folder_.path() + "/scene.yaml") << kScene;
+  std::ofstream(folder_.path() + "/a.png") << "\x89PNG\r\n\x1a\nxyz";
+  std::ofstream(folder_.path() + "/b.png") << "GIF89a";
+  std::ofstream(folder_.path() + "/c.png") << "\x89PNG\r\n\x1a\n" << std::string(2 << 20, 'x');
+  const auto with = [&](const std::string& picture) {
+    std::ofstream(folder_.path() + "/task.yaml") << "picture: " << picture << "\n" << kTask;
+    return readTask(folder_.path() + "/task.yaml", folder_.path(), access);
+  };
+  const auto loaded = with("a.png");
+  ASSERT_TRUE(loaded.ok()) << loaded.error().detail;
+  EXPECT_EQ("data:image/png;base64,iVBORw0KGgp4eXo=", loaded->task.picture);
+  EXPECT_NE(std::string::npos, reportHtml(Training(loaded->task), {}).find("src=\"data:image/png;base64,iVBOR"));
+  for (const char* wrong : {"b.png", "c.png", "d.png", "/etc/hostname"}) {
+    const auto refused = with(wrong);
+    ASSERT_FALSE(refused.ok()) << wrong;
+    EXPECT_NE(std::string::npos, refused.error().detail.find("task.yaml:1: picture")) << refused.error().detail;
+    EXPECT_NE(std::string::npos, refused.error().detail.find("accepted: a PNG or JPEG")) << refused.error().detail;
   }
 }
 
@@ -168,6 +214,9 @@ class ShippedTask {
     world = std::make_unique<World>(loaded->scene.world);
     for (BodyDef& def : loaded->scene.bodies)
       EXPECT_TRUE(world->addSceneBody(std::make_shared<const PreparedBody>(test::prepared(def))).ok());
+    for (ObstacleDef& def : loaded->scene.obstacles) EXPECT_TRUE(world->addObstacle(std::move(def)).ok());
+    for (const AttachCommand& attachment : loaded->scene.attachments)
+      EXPECT_TRUE(world->addSceneAttachment(attachment).ok());
     training = std::make_unique<Training>(loaded->task);
   }
   void seconds(double time) {
@@ -194,6 +243,17 @@ class ShippedTask {
     for (const MetricValue& metric : training->values())
       if (metric.name == name) return metric.value;
     return std::nan("");
+  }
+  /// The vertex of a body's surface that is farthest in that direction now.
+  Vec3 farthest(const std::string& name, const Vec3& direction) {
+    SnapshotWants wants;
+    wants.surfaces = true;
+    std::optional<Vec3> found;
+    for (const BodySnapshot& body : world->snapshot(wants).bodies)
+      for (const Vec3& p : body.surface)
+        if (body.name == name && (!found || p.dot(direction) > found->dot(direction))) found = p;
+    EXPECT_TRUE(found.has_value()) << name;
+    return found.value_or(Vec3::Zero());
   }
   std::string told() const {
     std::string text = "score " + std::to_string(training->score()) + " " + training->progress().failed();
@@ -277,6 +337,89 @@ TEST(ShippedTasks, Resect) {
   task.seconds(1.0);
   EXPECT_EQ(2u, task.training->progress().stage()) << task.told();
   task.apply<Done>(ReleaseCommand{picked.pick});
+  task.seconds(0.2);
+  EXPECT_TRUE(task.training->passed()) << task.told();
+}
+
+TEST(ShippedTasks, Transect) {
+  // Clips first; and cut at once, which bleeds until they are on.
+  for (const bool clips_first : {true, false}) {
+    SCOPED_TRACE(clips_first ? "clipped, then cut" : "cut, then clipped");
+    ShippedTask task("transect");
+    task.seconds(0.5);
+    const auto clip = [&](double x) {
+      ClipCommand command;
+      command.point = Vec3(x, 0, 0.05);
+      command.width = 0.004;
+      task.apply<ClipReply>(command);
+      task.seconds(0.4);
+    };
+    const auto cut = [&] {
+      CutCommand command;
+      command.blades = {Vec3(0, -0.02, 0.05), Vec3::UnitY(), Vec3::UnitZ(), 0.04, 0.02};
+      EXPECT_EQ(2u, task.apply<CutReply>(command).new_bodies.size());
+      task.seconds(0.1);
+    };
+    if (!clips_first) cut();
+    clip(-0.008);
+    EXPECT_EQ(1u, task.training->progress().stage()) << task.told();
+    clip(0.008);
+    if (clips_first) cut();
+    task.seconds(2.0);
+    EXPECT_TRUE(task.training->progress().done()) << task.told();
+    EXPECT_EQ(clips_first, task.training->passed()) << task.told();
+    if (clips_first) EXPECT_EQ(0.0, task.value("bleeding_time"));
+    if (!clips_first) EXPECT_NEAR(0.5, task.value("bleeding_time"), 0.02);
+  }
+}
+
+TEST(ShippedTasks, HandOver) {
+  ShippedTask task("hand_over");
+  task.seconds(0.5);
+  PickCommand pick;
+  pick.body = "block";
+  pick.point = task.farthest("block", Vec3(-1, 0, 0.5));
+  const auto first = task.apply<PickReply>(pick);
+  task.carry(first, first.position, first.position + Vec3(0.05, 0, 0.08), 1.5);
+  task.seconds(0.5);
+  EXPECT_EQ(2u, task.training->progress().stage()) << task.told();
+  pick.point = task.farthest("block", Vec3(0, 0, -1));  // it hangs
+  const auto second = task.apply<PickReply>(pick);
+  task.seconds(0.3);
+  task.apply<Done>(ReleaseCommand{first.pick});
+  task.seconds(0.3);
+  EXPECT_EQ(4u, task.training->progress().stage()) << task.told();
+  task.carry(second, second.position, Vec3(0.09, 0, 0.06), 2.0);
+  task.carry(second, Vec3(0.09, 0, 0.06), Vec3(0.09, 0, 0.02), 0.5);
+  task.seconds(0.5);
+  EXPECT_EQ(5u, task.training->progress().stage()) << task.told();
+  task.apply<Done>(ReleaseCommand{second.pick});
+  task.seconds(0.2);
+  EXPECT_TRUE(task.training->passed()) << task.told();
+  EXPECT_EQ(0.0, task.value("instrument_crossings"));
+}
+
+TEST(ShippedTasks, Dissect) {
+  ShippedTask task("dissect");
+  task.seconds(0.5);
+  const auto fibres = [&] {
+    for (const AttachmentSnapshot& joint : task.world->snapshot({}).attachments)
+      if (joint.name == "bed") return joint.fibres;
+    return std::size_t{0};
+  };
+  // The fundus is drawn down, off the bed.
+  PickCommand pick;
+  pick.body = "gallbladder";
+  pick.point = task.farthest("gallbladder", Vec3(-1, 0, -0.3));
+  const auto picked = task.apply<PickReply>(pick);
+  Vec3 at = picked.position;
+  EXPECT_GT(fibres(), 20u);
+  for (int k = 0; k < 30 && fibres() > 0; ++k) {
+    task.carry(picked, at, at + Vec3(0.0005, 0, -0.0025), 0.1);
+    at += Vec3(0.0005, 0, -0.0025);
+  }
+  EXPECT_EQ(1u, task.training->progress().stage()) << task.told();
+  task.apply<Done>(ClearPicksCommand{});
   task.seconds(0.2);
   EXPECT_TRUE(task.training->passed()) << task.told();
 }

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "meshless_surgery/geometry/hollow_organs.h"
 #include "meshless_surgery/geometry/primitives.h"
 #include "training/played.h"
 
@@ -48,6 +49,21 @@ TEST(TaskFault, NamesWhatCanNeverBe) {
   EXPECT_NE(std::string::npos, faultOf(withStage(RemoveToTray{})).find("no target"));
   EXPECT_NE(std::string::npos, faultOf(withStage(LeaveNothing{0.1})).find("no target"));
   EXPECT_NE(std::string::npos, faultOf(withStage(Separate{"tissue", "other"})).find("no attachment joins"));
+
+  for (const Condition& unknown : {Condition(Clipped{"vein", {}}), Condition(Hold{"vein", 1}),
+                                   Condition(HandOver{"vein"}), Condition(PutBack{"vein", 0.01})})
+    EXPECT_NE(std::string::npos, faultOf(withStage(unknown)).find("no body 'vein'"));
+  EXPECT_EQ("", faultOf(withStage(Clipped{"tissue", Region(Vec3(0, 0, 0.3), Vec3(1, 1, 1))})));
+  EXPECT_NE(std::string::npos,
+            faultOf(withStage(Clipped{"tissue", Region(Vec3(0.5, 0, 0.3), Vec3(1, 1, 1))})).find("can never be met"));
+  EXPECT_NE(std::string::npos, faultOf(withStage(PutBack{"tissue", 0.01})).find("met from the start"));
+  for (const Condition& held : {Condition(Hold{"tissue", 1}), Condition(HandOver{"tissue"})}) {
+    TaskDef held_task = withStage(held);
+    held_task.limits.measured.forbidden.push_back({"tissue", "tissue", {}});
+    EXPECT_EQ("", faultOf(held_task));
+    held_task.limits.ends.insert(LimitKind::kForbidden);
+    EXPECT_NE(std::string::npos, faultOf(held_task).find("can never be met"));
+  }
 
   TaskDef plan = withStage(CutAlong{0.9});
   plan.plan = middlePlan();
@@ -170,6 +186,145 @@ TEST(TaskProgress, SeparatesTwoBodies) {
   ASSERT_TRUE(played.world.apply(cut).ok());
   played.step(2);
   EXPECT_TRUE(played.training.progress().done());
+  test::expectSame(played.training, *played.replayed());
+}
+
+PickReply pickAt(Played& played, const Vec3& point) {
+  PickCommand pick;
+  pick.point = point;
+  pick.max_distance = 0.2;
+  return played.apply<PickReply>(pick);
+}
+
+TEST(TaskProgress, HandsOverOnlyFromOneThatHeldItToAnother) {
+  struct Case {
+    std::string name, acts;  // a, b, c: that pick takes hold; A, B, C: it lets go
+    bool met;
+  };
+  for (const Case& c : {Case{"one hand", "a", false}, Case{"two hands", "ab", false}, Case{"handed over", "abA", true},
+                        Case{"the second lets go again", "abB", false}, Case{"dropped and taken up", "aAb", false},
+                        Case{"dropped after it", "abABc", false}, Case{"on to a third", "abAcB", true},
+                        Case{"a third helps", "abAc", false}, Case{"back to a fourth act", "abcA", false},
+                        Case{"two of three let go", "abcAB", true}}) {
+    SCOPED_TRACE(c.name);
+    Played played(test::weightless(), withStage(HandOver{"tissue"}, 0.1));
+    ASSERT_TRUE(played.world.addSceneBody(test::shared(test::ball("tissue"))).ok());
+    played.begin();
+    const Vec3 places[] = {Vec3(0.1, 0, 0.2), Vec3(-0.1, 0, 0.2), Vec3(0, 0.1, 0.2)};
+    std::map<char, PickReply> picks;
+    for (const char act : c.acts) {
+      const char low = static_cast<char>(std::tolower(act));
+      if (act == low)
+        picks[low] = pickAt(played, places[low - 'a']);
+      else
+        played.apply<Done>(ReleaseCommand{picks.at(low).pick});
+      played.step(4);
+    }
+    played.step(10);
+    EXPECT_EQ(c.met, played.training.progress().done());
+    test::expectSame(played.training, *played.replayed());
+  }
+}
+
+TEST(TaskProgress, HoldCountsThePicksOfTheBodyAlone) {
+  Played played(test::weightless(), withStage(Hold{"tissue", 2}));
+  ASSERT_TRUE(played.world.addSceneBody(test::shared(test::ball("tissue"))).ok());
+  ASSERT_TRUE(played.world.addSceneBody(test::shared(test::ball("other", Vec3(0.5, 0, 0.2)))).ok());
+  played.begin();
+  pickAt(played, Vec3(0.1, 0, 0.2));
+  pickAt(played, Vec3(0.5, 0, 0.3));
+  played.step(3);
+  EXPECT_FALSE(played.training.over());
+  pickAt(played, Vec3(-0.1, 0, 0.2));
+  played.step(1);
+  EXPECT_TRUE(played.training.progress().done());
+}
+
+TEST(TaskProgress, PutsBackWhereTheBodyWas) {
+  TaskDef task = withStage(StretchTo{"tissue", 0.04});
+  task.stages.push_back({"back", "", PutBack{"tissue", 0.005}, 0.5});
+  Played played(test::weightless(), task);
+  ASSERT_TRUE(played.world.addSceneBody(test::shared(test::ball("tissue"))).ok());
+  played.begin();
+  played.step(30);
+  const PickReply picked = pickAt(played, Vec3(0.1, 0, 0.2));
+  Vec3 at = Vec3::Zero();
+  const auto go = [&](const Vec3& to) {  // slowly
+    for (int k = 1; k <= 240; ++k) {
+      played.apply<Done>(MovePickCommand{picked.pick, picked.position + at + k / 240.0 * (to - at)});
+      played.step();
+    }
+    at = to;
+    played.step(240);
+  };
+  go(Vec3(0.06, 0, 0));
+  EXPECT_EQ(1u, played.training.progress().stage());
+  go(Vec3(0.008, 0, 0));
+  EXPECT_FALSE(played.training.over());
+  go(Vec3(0.003, 0, 0));
+  EXPECT_TRUE(played.training.progress().done());
+  test::expectSame(played.training, *played.replayed());
+}
+
+TEST(TaskProgress, AClipCountsWhereItIsAtRest) {
+  // The vessel lies turned, and is drawn aside before it is clipped: what counts is the place in the tissue.
+  BodyDef def = test::defOf(vesselMesh(), "vessel");
+  def.spacing = 0.002;
+  def.material.youngs_modulus = 2e4;
+  def.material.damping = 20.0;
+  def.pose.translation = Vec3(0.3, 0.1, 0.2);
+  def.pose.rotation = Quat(Eigen::AngleAxisd(0.5 * M_PI, Vec3::UnitZ()));
+  for (const double y : {0.075, 0.125})
+    def.fixed.push_back(HeldRegion(Vec3(0.29, y - 0.004, 0.19), Vec3(0.31, y + 0.004, 0.21)));
+  TaskDef task = withStage(Clipped{"vessel", Region(Vec3(0.29, 0.103, 0.198), Vec3(0.31, 0.115, 0.202))});
+  task.stages.push_back({"never", "", Reach{ToolKind::kPush, Region::sphere(Vec3(9, 9, 9), 0.1)}, 0.0});
+  WorldSettings settings = test::weightless();
+  settings.max_substeps = 8;
+  Played played(settings, task);
+  ASSERT_TRUE(played.world.addSceneBody(test::shared(def)).ok());
+  played.begin();
+  const PickReply picked = pickAt(played, Vec3(0.3, 0.1, 0.203));
+  for (int k = 1; k <= 30; ++k) {
+    played.apply<Done>(MovePickCommand{picked.pick, picked.position + k * Vec3(0, 0, 0.0003)});
+    played.step();
+  }
+  const auto clip = [&](double y) {
+    ClipCommand command;
+    command.point = Vec3(0.3, y, 0.206);
+    command.width = 0.004;
+    const auto reply = played.apply<ClipReply>(command);
+    played.step(2);
+    return reply.name;
+  };
+  const std::string beside = clip(0.092);
+  EXPECT_EQ(0u, played.training.progress().stage());
+  SnapshotWants wants;
+  wants.surfaces = true;
+  const WorldSnapshot shot = played.world.snapshot(wants);
+  ASSERT_EQ(1u, shot.attachments.size());
+  EXPECT_LT((shot.attachments[0].rest_place - Vec3(0.3, 0.092, 0.2)).norm(), 0.001)
+      << shot.attachments[0].rest_place.transpose();
+  Vec3 now = Vec3::Zero();
+  for (const auto& line : shot.attachments[0].lines)
+    now += 0.5 * (line[0] + line[1]) / static_cast<double>(shot.attachments[0].lines.size());
+  EXPECT_GT(now.z(), 0.203);  // it was drawn aside
+  clip(0.108);
+  EXPECT_EQ(1u, played.training.progress().stage());
+  EXPECT_EQ(0.0, played.value("bleeding_time"));
+  // Cut between them nothing bleeds; where one is taken off, its piece does, for as long as it is off.
+  CutCommand cut;
+  cut.blades.origin = Vec3(-1, 0.1, 0.2);
+  cut.blades.x_axis = Vec3::UnitX();
+  cut.blades.y_axis = Vec3::UnitZ();
+  ASSERT_EQ(2u, played.apply<CutReply>(cut).new_bodies.size());
+  played.step(12);
+  EXPECT_EQ(0.0, played.value("bleeding_time"));
+  played.apply<DetachReply>(DetachCommand{beside, std::nullopt});
+  played.step(30);
+  EXPECT_NEAR(0.25, played.value("bleeding_time"), 1e-9);
+  clip(0.092);
+  played.step(10);
+  EXPECT_NEAR(0.25, played.value("bleeding_time"), 1e-9);
   test::expectSame(played.training, *played.replayed());
 }
 

@@ -22,8 +22,9 @@ struct TrainingFrame {
     std::string body;              // that a pick holds
     Vec3 position = Vec3::Zero();  // [m] of the hand: the free end, the centre, the pivot
     std::optional<Quat> turned;    // of the scissors
-    Vec3 tissue = Vec3::Zero();    // [m] of a pick's end in the tissue
-    double force = 0.0;            // [N] between tool and tissue, mean over the step
+    Vec3 tissue = Vec3::Zero();  // [m] where it works: a pick's end in the tissue, the tips of blades that have an end
+    double radius = 0.0;         // [m] of what is solid about the line from `position` to there
+    double force = 0.0;          // [N] between tool and tissue, mean over the step
   };
   struct Body {
     std::string name;
@@ -36,6 +37,7 @@ struct TrainingFrame {
     std::string name;
     std::vector<std::string> ends;
     std::size_t fibres = 0;
+    std::optional<Vec3> clip;  // [m] of a clip: the middle of its jaws in the rest shape, where it was put
   };
   struct Strain {
     double largest = 0.0;  // [1] of a principal direction, in any cluster: |stretch - 1|

@@ -9,6 +9,7 @@
 
 #include "meshless_surgery/training/hand_motion.h"
 #include "meshless_surgery/training/rest_tissue.h"
+#include "meshless_surgery/training/tool_crossings.h"
 
 namespace meshless {
 
@@ -46,6 +47,7 @@ struct MetricLimits {
   double force = std::numeric_limits<double>::infinity();  // [N]
   double strain = 0.5;                                     // [1]
   std::vector<Forbidden> forbidden;
+  std::vector<std::string> vessels;  // bodies that bleed where they are cut and bear no clip
 };
 
 class Metrics {
@@ -73,6 +75,7 @@ class Metrics {
   void feedHands(const TrainingFrame& frame);
   void feedEvents(const TrainingFrame& frame);
   void feedForbidden(const TrainingFrame& frame);
+  bool bleeds(const TrainingFrame& frame) const;
 
   MetricLimits limits_;
   std::array<HandMotion, kHands> hands_;
@@ -84,7 +87,8 @@ class Metrics {
   bool strain_known_ = false;
   std::size_t cuts_ = 0, strokes_ = 0, undos_ = 0, torn_ = 0, leaks_ = 0, drops_ = 0, forbidden_ = 0;
   std::uint64_t last_cut_ = ~std::uint64_t{0}, last_stroke_ = ~std::uint64_t{0}, last_undo_ = ~std::uint64_t{0};
-  double forbidden_for_ = 0.0;
+  double forbidden_for_ = 0.0, bled_for_ = 0.0;
+  ToolCrossings crossings_;
   std::set<std::string> touched_;
 };
 

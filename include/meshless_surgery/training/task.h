@@ -41,8 +41,29 @@ struct LeaveNothing {
 };
 /// Every pick is let go of, and the push sphere is gone.
 struct LetGo {};
+/// A clip is on the body, or on a piece of it; the middle of its jaws in the rest shape is in the region, if there is
+/// one.
+struct Clipped {
+  std::string body;
+  std::optional<Region> region;
+};
+/// So many picks hold the body, or pieces of it.
+struct Hold {
+  std::string body;
+  int picks = 1;  // 1 to 10, at least
+};
+/// One pick alone holds the body, and took it over from another: both held it when that one let go.
+struct HandOver {
+  std::string body;
+};
+/// The centre of mass of the body, or of its pieces, is so near to where it was when the task began.
+struct PutBack {
+  std::string body;
+  double distance = 0.0;  // [m] > 0
+};
 
-using Condition = std::variant<Reach, StretchTo, PressTo, CutAlong, Separate, RemoveToTray, LeaveNothing, LetGo>;
+using Condition = std::variant<Reach, StretchTo, PressTo, CutAlong, Separate, RemoveToTray, LeaveNothing, LetGo,
+                               Clipped, Hold, HandOver, PutBack>;
 
 struct Stage {
   std::string name, brief;
@@ -71,6 +92,7 @@ struct WeightedMetric {
 
 struct TaskDef {
   std::string name, scene, brief;
+  std::string picture;  // a data: URI; empty: none
   std::vector<Stage> stages;
   TaskLimits limits;
   std::optional<CutPlan> plan;
@@ -81,6 +103,12 @@ struct TaskDef {
 
   /// Strain costs something, and is looked at where it is limited or counts.
   bool wantsStrain() const;
+  /// So does where bodies are: where a stage puts one back.
+  bool wantsCentres() const;
+  /// That stages want clips on.
+  std::vector<std::string> vessels() const;
+  /// That the world has to have.
+  std::vector<std::string> bodies() const;
 };
 
 /// What is wrong with a task, and where: "plan", "target", "limits", or "stages" and the number of one.
@@ -113,11 +141,22 @@ class TaskProgress {
   const std::vector<double>& times() const { return times_; }  // [s] when each was met
 
  private:
+  void watch(const Condition& condition, const TrainingFrame& frame);
   bool meets(const Condition& condition, const TrainingFrame& frame, const RestTissue& tissue) const;
   std::string broken(const Metrics& metrics) const;
 
   const TaskDef& task_;
+  /// Who holds what is to be handed over; picks have their numbers in the order in which they came.
+  struct Hands {
+    std::vector<PickId> held;
+    bool taken_over = false;  // from one that came before those who hold it
+  };
   std::map<PickId, Vec3> grabbed_;  // [m] where
+  std::map<std::string, Hands> hands_;
+  struct Whereabouts {
+    Vec3 at_start, now;  // [m]
+  };
+  std::map<std::string, Whereabouts> whereabouts_;  // of bodies that are to be put back, once they were looked at
   double held_for_ = 0.0;
   std::vector<double> times_;
   std::string failed_;

@@ -53,8 +53,7 @@ class Training {
 
  private:
   struct Now {
-    explicit Now(const TaskDef& task)
-        : metrics(task.limits.measured), tissue(task.plan, task.target, task.tray), progress(task) {}
+    explicit Now(const TaskDef& task);
     Metrics metrics;
     RestTissue tissue;
     TaskProgress progress;

@@ -157,6 +157,7 @@ struct AttachmentSnapshot {
   double area = 0.0;                       // [m^2] of those that are whole
   double force = 0.0;                      // [N] sum of their tensions
   std::optional<double> jaws;              // [m] of a clip: how wide it still may be between them
+  Vec3 rest_place = Vec3::Zero();          // [m] of a clip: the middle of its jaws in the rest shape, where it was put
   std::vector<std::array<Vec3, 2>> lines;  // [m] ends of fibres, of a clip lines on its jaws; where surfaces are wanted
 };
 
