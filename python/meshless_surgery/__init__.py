@@ -8,7 +8,7 @@
 """
 
 _PLACES = {'Surgeon': 'surgeon', 'ToolStream': 'streams', 'SurgeryError': 'errors', 'Refused': 'errors',
-           'Cancelled': 'errors', 'Goal': 'goals',
+           'Cancelled': 'errors', 'Goal': 'goals', 'Environment': 'environment',
            'Unanswered': 'errors', 'ErrorCode': 'errors'}
 
 

@@ -13,7 +13,7 @@ from meshless_surgery.errors import Refused, Unanswered
 from meshless_surgery.goals import Goals
 from meshless_surgery.msg import Info, State
 from meshless_surgery.poses import blade_pose, blades_pose, pose_stamped
-from meshless_surgery.srv import (Attach, Clip, Cut, Detach, GetBody, Hash, Incise, LoadState, Lock, MovePick, Pick, Probe, Push,
+from meshless_surgery.srv import (Attach, Clip, Cut, Detach, GetBody, Hash, Incise, LoadState, Lock, MovePick, Observe, Pick, Probe, Push,
                                   Release, Remove, Report, SaveState, SetMaterial, Spawn, SpawnCloud, StartTask, Step, Unclip)
 from meshless_surgery.streams import ToolStream
 
@@ -213,6 +213,10 @@ class Surgeon:
 
     def report(self, name=''):
         return self.call('report', Report, name=name)
+
+    def observe(self, points=()):
+        """Task, metrics, tools, and the places of `points`, (body, particle) each, all of the same moment."""
+        return self.call('observe', Observe, bodies=[body for body, _ in points], particles=[particle for _, particle in points])
 
     def hash(self):
         """A number for the whole state: equal for equal histories."""

@@ -34,13 +34,16 @@ class RunningScene:
 
     _count = 0
 
-    def __init__(self, scene, **parameters):
-        """`scene` and `parameters` are the node's; two underscores stand for a slash: tools__silence=0."""
+    def __init__(self, scene, /, listens=True, **parameters):
+        """`scene` and `parameters` are the node's; two underscores stand for a slash: tools__silence=0. An empty scene
+        is that of the parameter `task`. Without `listens` `events` stays empty."""
         if not rospy.core.is_initialized():
             rospy.init_node('scene_test', anonymous=True)
         RunningScene._count += 1
         self.name = '/scene_%d_%d' % (os.getpid(), RunningScene._count)
-        parameters = dict({'scene': scene, 'paused': True}, **parameters)
+        parameters = dict({'paused': True}, **parameters)
+        if scene:
+            parameters['scene'] = scene
         for key, value in parameters.items():
             rospy.set_param('%s/%s' % (self.name, key.replace('__', '/')), value)
         programs = roslib.packages.find_node('meshless_surgery', 'deformer_node')
@@ -50,7 +53,7 @@ class RunningScene:
         self._process = subprocess.Popen([programs[0], '__name:=' + self.name[1:]], stdout=self._log, stderr=self._log)
         self.events = []
         self._changed = threading.Condition()
-        self._subscriber = rospy.Subscriber(self.name + '/events', Event, self._hear, queue_size=1000)
+        self._subscriber = rospy.Subscriber(self.name + '/events', Event, self._hear, queue_size=1000) if listens else None
         try:
             self._wait()
         except BaseException:
@@ -69,7 +72,7 @@ class RunningScene:
                 raise RuntimeError('the node does not answer: ' + self.output())
             try:
                 rospy.wait_for_service(self.name + '/load', 0.2)  # the last that it offers
-                ready = self._subscriber.get_num_connections() > 0
+                ready = self._subscriber is None or self._subscriber.get_num_connections() > 0
             except rospy.ROSException:
                 pass
 
@@ -97,7 +100,8 @@ class RunningScene:
         return os.pread(number, os.fstat(number).st_size, 0).decode(errors='replace')
 
     def close(self):
-        self._subscriber.unregister()
+        if self._subscriber is not None:
+            self._subscriber.unregister()
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGTERM)
             try:

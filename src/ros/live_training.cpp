@@ -5,8 +5,10 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 
 #include <meshless_surgery/Metrics.h>
+#include <meshless_surgery/Observe.h>
 #include <meshless_surgery/Report.h>
 #include <meshless_surgery/StartTask.h>
 #include <meshless_surgery/TaskState.h>
@@ -25,6 +27,7 @@ namespace fs = std::filesystem;
 constexpr double kMetricsRate = 10.0;  // [Hz]
 constexpr std::size_t kMostTrainee = 100;
 constexpr int kMostReports = 100000;
+constexpr std::size_t kMostPlaces = 10000;
 constexpr double kPlanAbove = 0.003;  // [m] that the plan is drawn beyond the tissue, so that its edge is seen
 constexpr double kPlanLine = 0.0015;  // [m]
 
@@ -116,7 +119,8 @@ struct LiveTraining::Handlers : Answers {
     metrics_topic = handle.advertise<meshless_surgery::Metrics>("metrics", 10);
     servers = {handle.advertiseService("start_task", &Handlers::startTask, this),
                handle.advertiseService("stop_task", &Handlers::stopTask, this),
-               handle.advertiseService("report", &Handlers::report, this)};
+               handle.advertiseService("report", &Handlers::report, this),
+               handle.advertiseService("observe", &Handlers::observe, this)};
     timer = handle.createWallTimer(ros::WallDuration(1.0 / kMetricsRate), &Handlers::publish, this);
     spinner.start();
   }
@@ -224,6 +228,39 @@ struct LiveTraining::Handlers : Answers {
     if (!done.ok()) return refuse(response, "stop_task", done.error());
     if (!runs) return refuse(response, "stop_task", {ErrorCode::kMissed, "no task runs; start_task begins one"});
     return accept(response, "the task was stopped; report writes how it was done");
+  }
+
+  bool observe(meshless_surgery::Observe::Request& request, meshless_surgery::Observe::Response& response) {
+    if (request.bodies.size() != request.particles.size() || request.bodies.size() > kMostPlaces)
+      return refuse(response, "observe",
+                    {ErrorCode::kInvalidArgument, std::to_string(request.bodies.size()) + " bodies and " +
+                                                      std::to_string(request.particles.size()) +
+                                                      " particles; accepted: one body a particle, up to 10000"});
+    std::shared_ptr<const WorldSnapshot> shot;
+    const Status done = runner.look([&](World& world) {
+      SnapshotWants wants;
+      wants.particles = !request.bodies.empty();
+      shot = std::make_shared<const WorldSnapshot>(world.snapshot(wants));
+      fill(response.task, response.metrics);
+    });
+    if (!done.ok()) return refuse(response, "observe", done.error());
+    response.step = shot->step;
+    response.sim_time = shot->sim_time;
+    response.picks = toPicks(*shot);
+    response.push = shot->push.enabled;
+    response.push_position = toPoint(shot->push.position);
+    response.push_force = toVector(shot->push.force);
+    response.points.reserve(request.bodies.size());
+    for (std::size_t k = 0; k < request.bodies.size(); ++k) {
+      Vec3 place = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
+      for (const BodySnapshot& body : shot->bodies)
+        if (body.name == request.bodies[k] && request.particles[k] < body.particles.size())
+          place = body.particles[request.particles[k]];
+      response.points.push_back(toPoint(place));
+    }
+    response.task.header.stamp = response.metrics.header.stamp = ros::Time::now();
+    response.task.header.frame_id = response.metrics.header.frame_id = world_frame;
+    return accept(response, "step " + std::to_string(shot->step));
   }
 
   bool report(meshless_surgery::Report::Request& request, meshless_surgery::Report::Response& response) {

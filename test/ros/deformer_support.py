@@ -13,7 +13,7 @@ import rosunit
 from genpy.dynamic import generate_dynamic
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
 from meshless_surgery.msg import Event, State
-from meshless_surgery.srv import (Attach, Clip, Cut, Detach, GetBody, Hash, Incise, LoadState, Lock, MovePick, Pick, Probe, Push,
+from meshless_surgery.srv import (Attach, Clip, Cut, Detach, GetBody, Hash, Incise, LoadState, Lock, MovePick, Observe, Pick, Probe, Push,
                                   Release, Remove, Report, SaveState, SetMaterial, Spawn, SpawnCloud, StartTask, Step, Unclip)
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
@@ -24,7 +24,7 @@ TYPES = {
     'attach': Attach, 'detach': Detach, 'clip': Clip, 'unclip': Unclip, 'pick': Pick, 'move_pick': MovePick, 'lock': Lock, 'release': Release, 'clear_picks': Trigger, 'push': Push,
     'cut': Cut, 'open_scissors': Trigger, 'incise': Incise, 'spawn': Spawn, 'spawn_cloud': SpawnCloud, 'remove': Remove, 'set_material': SetMaterial, 'get_body': GetBody,
     'lift_scissors': Trigger, 'undo_cut': Trigger, 'probe': Probe, 'pause': SetBool, 'step': Step, 'reset': Trigger, 'save': SaveState, 'load': LoadState, 'hash': Hash,
-    'start_task': StartTask, 'stop_task': Trigger, 'report': Report,
+    'start_task': StartTask, 'stop_task': Trigger, 'report': Report, 'observe': Observe,
 }
 HEADER = '=' * 80 + '\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n'
 # As in crtk_msgs, which is not needed: the topics' types and sums are the same.

@@ -270,6 +270,9 @@ class Fuzzer:
             return dict(file=r.choice(['state', 'other', self.string()]))
         if service == 'start_task':
             return dict(task=r.choice(['palpate', 'none', self.string()]), trainee=self.string())
+        if service == 'observe':
+            bodies = [self.maybe_name() for _ in range(r.choice([0, 1, 3, 10001]))]
+            return dict(bodies=bodies, particles=[r.choice([0, 5, 0xffffffff]) for _ in bodies][r.choice([0, 0, 1]):])
         if service == 'report':
             return dict(name=r.choice(['', 'mine', self.string()]))
         return {}
@@ -360,7 +363,7 @@ class ServicesTest(FuzzCase):
                 faults.append('it says %d characters' % len(answer.message))
             if '\ufffd' in answer.message:  # what rospy makes of bytes that are no UTF-8
                 faults.append('it says what is no text')
-            if after != before and (not answer.success or service in ('get_body', 'probe', 'pause', 'save')):
+            if after != before and (not answer.success or service in ('get_body', 'observe', 'probe', 'pause', 'save')):
                 faults.append('the state has changed')
             if faults:  # only then put into words: there are 100 MB in some requests
                 self.fail('call %d: ~%s %.300r: %r: %s' % (number, service, fields, answer.message[:300], faults))

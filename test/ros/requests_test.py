@@ -463,6 +463,13 @@ def begun_task(test):
     return {}
 
 
+def places(test, answer):
+    """How many of the places are those of ~get_body, and of how many."""
+    cloud = test.good('get_body', name='left').particles
+    there = np.frombuffer(cloud.data, np.float32).reshape(len(cloud.data) // cloud.point_step, -1)[3, :3]
+    return sum(bool(np.allclose(xyz(p), there, atol=1e-6)) for p in answer.points), len(answer.points)
+
+
 LAWS = [
     Law('attach', 'name', 'mine', TO_WORLD, name_of, 'mine', 'left-world'),
     Law('attach', 'body', 'left', TO_WORLD, ends, ['left', 'world'], Refusal(INVALID)),
@@ -545,6 +552,8 @@ LAWS = [
     Law('start_task', 'task', 'tasks/boxes.yaml', {}, lambda test, answer: 'boxes' in answer.message, True, Refusal(INVALID)),
     Law('start_task', 'trainee', 'Ann', dict(task='tasks/boxes.yaml'), report_of, 'Ann_boxes', 'boxes'),
     Law('report', 'name', 'mine', begun_task, lambda test, answer: os.path.basename(answer.folder).split('_')[0], 'mine', 'boxes'),
+    Law('observe', 'bodies', ['left', 'none'], dict(particles=[3, 3]), places, (1, 2), Refusal(INVALID)),
+    Law('observe', 'particles', [3, 100000], dict(bodies=['left', 'left']), places, (1, 2), Refusal(INVALID)),
     Law('pause', 'data', True, running(), lambda test, answer: test.state().paused, True, False),
 ]
 

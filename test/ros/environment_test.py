@@ -1,0 +1,128 @@
+#!/usr/bin/env python3
+"""A task as an environment: in lock step, the same to the bit for the same seed and actions, its reward that of the task."""
+import os
+import re
+import sys
+import unittest
+
+import numpy
+import rospkg
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from deformer_support import OwnNode, run  # noqa: E402
+from meshless_surgery import Environment, Refused  # noqa: E402
+from meshless_surgery.environment import PlainBox, potential  # noqa: E402
+
+HANDS = [('pick', (-0.05, -0.06, 0.07)), ('push', (0.06, -0.05, 0.12))]
+POINTS = [('liver', (-0.05, -0.06, 0.07)), ('liver', (0.05, 0.0, 0.06))]
+
+
+class EnvironmentTest(unittest.TestCase):
+
+    def play(self, environment, seed, actions):
+        """Observations, rewards and the last info."""
+        observation, info = environment.reset(seed=seed)
+        told = [observation]
+        rewards = []
+        for action in actions:
+            observation, reward, terminated, truncated, info = environment.step(action)
+            told.append(observation)
+            rewards.append(reward)
+            if terminated or truncated:
+                break
+        return numpy.array(told), numpy.array(rewards), info
+
+    def test_the_same_seed_and_actions_give_the_same_observations_to_the_bit(self):
+        environment = Environment('retract', hands=HANDS, points=POINTS, spread=0.003, reach=0.03)
+        try:
+            environment.action_space.seed(7)
+            actions = [environment.action_space.sample() for _ in range(70)]
+            first = self.play(environment, 5, actions)
+            again = self.play(environment, 5, actions)
+            other = self.play(environment, 6, actions)
+            self.assertEqual(first[0].tobytes(), again[0].tobytes())
+            self.assertEqual(first[1].tobytes(), again[1].tobytes())
+            self.assertNotEqual(first[0][0].tobytes(), other[0][0].tobytes())  # hands start elsewhere
+            self.assertEqual((71,) + environment.observation_space.shape, first[0].shape)
+            self.assertTrue(numpy.isfinite(first[0]).all())
+            # Each action is so many steps: not one more or less.
+            self.assertEqual(1 + 4 * 70, first[2]['step'])
+            self.assertTrue(numpy.allclose(first[0][:, -3], (1 + 4 * numpy.arange(71)) / 120.0))
+            held, forces = first[0][:, 9] > 0, numpy.abs(first[0][:, 6:9]).sum(axis=1)
+            self.assertTrue(held.any() and not held.all())  # it takes hold and lets go
+            self.assertTrue((forces[held] > 0).all() and (forces[~held] == 0).all())
+            self.assertGreater(numpy.abs(first[0][-1, 20:26] - first[0][0, 20:26]).max(), 1e-5)  # the liver sags
+        finally:
+            environment.close()
+        # A node of its own each: the same.
+        environment = Environment('retract', hands=HANDS, points=POINTS, spread=0.003, reach=0.03)
+        try:
+            self.assertEqual(first[0].tobytes(), self.play(environment, 5, actions)[0].tobytes())
+        finally:
+            environment.close()
+
+    def test_a_policy_that_retracts_is_rewarded_and_ends_the_task(self):
+        with OwnNode(scene='liver', paused=True).wait() as node:
+            environment = Environment('retract', node=node.name, hands=HANDS[:1], points=POINTS, reach=0.03, steps=12, move=0.005)
+            with self.assertRaises(RuntimeError):
+                environment.step(numpy.zeros(4))
+            environment.reset(seed=1)
+            begin = potential(environment._seen)
+            rewards, terminated = [], False
+            for number in range(140):
+                lift = 0.4 if 5 <= number < 19 else 0.0
+                action = (0, 0.3 * lift, lift, 1.0 if number < 130 else -1.0)
+                _, reward, terminated, truncated, info = environment.step(action)
+                rewards.append(reward)
+                self.assertFalse(truncated)
+                if terminated:
+                    break
+            self.assertTrue(terminated, info)
+            self.assertTrue(info['passed'], info)
+            self.assertEqual(2, info['stage'])
+            self.assertAlmostEqual(sum(rewards), 1.0 + info['score'] / 100.0 - begin)  # all stages, and the score
+            self.assertEqual(info['time'], info['metrics']['time'])
+            with self.assertRaises(RuntimeError):
+                environment.step(numpy.zeros(4))
+            environment.reset()
+            for wrong in (numpy.zeros(3), (0, 0, float('nan'), 0)):
+                with self.assertRaises(ValueError):
+                    environment.step(wrong)
+            environment.close()
+            self.assertTrue(node.good('observe').success)  # another's node lives on
+
+    def test_an_episode_is_truncated_and_wrong_arguments_are_refused(self):
+        with OwnNode(scene='liver', paused=True).wait() as node:
+            environment = Environment('retract', node=node.name, horizon=3, reward=lambda before, after: after.step - before.step)
+            environment.reset(seed=1)
+            told = [environment.step(numpy.zeros(4)) for _ in range(3)]
+            self.assertEqual([(4.0, False, False), (4.0, False, False), (4.0, False, True)], [step[1:4] for step in told])
+            for wrong in (dict(hands=[]), dict(hands=[('foot', (0, 0, 0))]), dict(hands=[('pick', (0, 0))]), dict(steps=0),
+                          dict(move=float('nan')), dict(spread=-1.0), dict(hands=[HANDS[1], HANDS[1]])):
+                with self.assertRaises(ValueError):
+                    Environment('retract', node=node.name, **wrong)
+            with self.assertRaises(Refused):
+                Environment('palpate', node=node.name).reset()  # of another scene
+            with self.assertRaises(Refused):
+                Environment('retract', node=node.name, points=[('spleen', (0, 0, 0))]).reset()
+
+    def test_spaces_without_gymnasium(self):
+        box = PlainBox(-1.0, 1.0, (5,))
+        box.seed(3)
+        first = [box.sample() for _ in range(20)]
+        box.seed(3)
+        self.assertEqual([v.tobytes() for v in first], [box.sample().tobytes() for _ in range(20)])
+        self.assertTrue(all(box.contains(value) for value in first))
+        self.assertFalse(box.contains(numpy.full(5, 1.1)) or box.contains(numpy.zeros(4)))
+
+    def test_the_example_of_the_docs_runs(self):
+        with open(os.path.join(rospkg.RosPack().get_path('meshless_surgery'), 'docs', 'interface.md'), encoding='utf-8') as file:
+            page = file.read()
+        example = re.search(r'```python\n(#!/usr/bin/python3\nfrom meshless_surgery import Environment\n.*?)```', page, re.DOTALL).group(1)
+        said = []
+        exec(compile(example, 'example', 'exec'), {'print': lambda *words: said.append(words), '__name__': 'example'})
+        self.assertEqual(1, len(said))
+
+
+if __name__ == '__main__':
+    run('environment', EnvironmentTest)
