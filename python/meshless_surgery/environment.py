@@ -94,7 +94,7 @@ class Environment(Base):
         self._task, self._steps, self._move, self._reach = task, int(steps), move, reach
         self._horizon, self._spread = int(horizon), spread
         self._reward = reward or (lambda before, after: potential(after) - potential(before))
-        self._running = None
+        self._running, self._was_paused = None, True
         if node:
             self.surgeon = Surgeon(node)
             self._was_paused = self.surgeon.state().paused
@@ -110,7 +110,7 @@ class Environment(Base):
         self._seen, self._over, self._done = None, True, 0
         self.np_random = numpy.random.default_rng()
         self.action_space = Box(-1.0, 1.0, (sum(KINDS[hand.kind] for hand in self._hands),), dtype=numpy.float64)
-        length = 10 * len(self._hands) + 3 * len(self._places) + 3
+        length = 10 * len(self._hands) + 4 * len(self._places) + 3
         self.observation_space = Box(-numpy.inf, numpy.inf, (length,), dtype=numpy.float64)
 
     def reset(self, *, seed=None, options=None):
@@ -206,7 +206,8 @@ class Environment(Base):
             for part in (position, works_at, force, (holds,)):
                 numbers.extend(part)
         for point in self._seen.points:
-            numbers.extend(_xyz(point))
+            there = point.x == point.x  # NaN where its body is no more
+            numbers.extend(_xyz(point) + (1.0,) if there else (0.0, 0.0, 0.0, 0.0))
         task = self._seen.task
         numbers += [self._seen.metrics.time, task.stage / len(task.stages), self._seen.metrics.held_for]
         return numpy.array(numbers, numpy.float64)

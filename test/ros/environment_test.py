@@ -2,7 +2,9 @@
 """A task as an environment: in lock step, the same to the bit for the same seed and actions, its reward that of the task."""
 import os
 import re
+import subprocess
 import sys
+import tempfile
 import unittest
 
 import numpy
@@ -51,7 +53,7 @@ class EnvironmentTest(unittest.TestCase):
             held, forces = first[0][:, 9] > 0, numpy.abs(first[0][:, 6:9]).sum(axis=1)
             self.assertTrue(held.any() and not held.all())  # it takes hold and lets go
             self.assertTrue((forces[held] > 0).all() and (forces[~held] == 0).all())
-            self.assertGreater(numpy.abs(first[0][-1, 20:26] - first[0][0, 20:26]).max(), 1e-5)  # the liver sags
+            self.assertGreater(numpy.abs(first[0][-1, 20:28] - first[0][0, 20:28]).max(), 1e-5)  # the liver sags
         finally:
             environment.close()
         # A node of its own each: the same.
@@ -94,6 +96,8 @@ class EnvironmentTest(unittest.TestCase):
     def test_an_episode_is_truncated_and_wrong_arguments_are_refused(self):
         with OwnNode(scene='liver', paused=True).wait() as node:
             environment = Environment('retract', node=node.name, horizon=3, reward=lambda before, after: after.step - before.step)
+            for _ in range(2):
+                environment.close()  # twice is no harm
             environment.reset(seed=1)
             told = [environment.step(numpy.zeros(4)) for _ in range(3)]
             self.assertEqual([(4.0, False, False), (4.0, False, False), (4.0, False, True)], [step[1:4] for step in told])
@@ -105,6 +109,29 @@ class EnvironmentTest(unittest.TestCase):
                 Environment('palpate', node=node.name).reset()  # of another scene
             with self.assertRaises(Refused):
                 Environment('retract', node=node.name, points=[('spleen', (0, 0, 0))]).reset()
+
+    def test_a_point_whose_body_was_cut_is_told(self):
+        with OwnNode(scene='liver', paused=True).wait() as node:
+            environment = Environment('retract', node=node.name, points=POINTS)
+            observation, _ = environment.reset(seed=1)
+            self.assertTrue(numpy.allclose((-0.05, -0.06, 0.07), observation[10:13], atol=0.02))
+            self.assertEqual((1.0, 1.0), (observation[13], observation[17]))
+            environment.surgeon.cut(pivot=(0, -1, 0), reach=(0, 1, 0), normal=(1, 0, 0))
+            observation = environment.step(numpy.zeros(4))[0]
+            self.assertEqual([0.0] * 8, list(observation[10:18]))
+            self.assertTrue(environment.observation_space.contains(observation))
+            environment.close()
+
+    def test_it_is_gymnasiums_where_that_is_installed(self):
+        with tempfile.TemporaryDirectory() as folder:
+            os.mkdir(os.path.join(folder, 'gymnasium'))
+            with open(os.path.join(folder, 'gymnasium', '__init__.py'), 'w', encoding='utf-8') as file:
+                file.write('class Env: pass\nclass spaces:\n    class Box: pass\n')
+            said = subprocess.run(
+                [sys.executable, '-c', 'import gymnasium\nfrom meshless_surgery import environment as e\n'
+                 'print(issubclass(e.Environment, gymnasium.Env), e.Box is gymnasium.spaces.Box)'],
+                env=dict(os.environ, PYTHONPATH=folder + ':' + os.environ['PYTHONPATH']), stdout=subprocess.PIPE, text=True, check=True)
+        self.assertEqual('True True', said.stdout.strip())
 
     def test_spaces_without_gymnasium(self):
         box = PlainBox(-1.0, 1.0, (5,))

@@ -198,27 +198,29 @@ PickReply pickAt(Played& played, const Vec3& point) {
 
 TEST(TaskProgress, HandsOverOnlyFromOneThatHeldItToAnother) {
   struct Case {
-    std::string name, acts;  // a, b, c: that pick takes hold; A, B, C: it lets go
+    std::string name, acts;  // a, b, c: that pick takes hold; A, B, C: it lets go; +: in the same step as what follows
     bool met;
   };
   for (const Case& c : {Case{"one hand", "a", false}, Case{"two hands", "ab", false}, Case{"handed over", "abA", true},
                         Case{"the second lets go again", "abB", false}, Case{"dropped and taken up", "aAb", false},
-                        Case{"dropped after it", "abABc", false}, Case{"on to a third", "abAcB", true},
-                        Case{"a third helps", "abAc", false}, Case{"back to a fourth act", "abcA", false},
-                        Case{"two of three let go", "abcAB", true}}) {
+                        Case{"dropped after it", "abABc", false}, Case{"let go and taken within a step", "aA+b", false},
+                        Case{"on to a third", "abAcB", true}, Case{"a third helps", "abAc", false},
+                        Case{"back to a fourth act", "abcA", false}, Case{"two of three let go", "abcAB", true}}) {
     SCOPED_TRACE(c.name);
     Played played(test::weightless(), withStage(HandOver{"tissue"}, 0.1));
     ASSERT_TRUE(played.world.addSceneBody(test::shared(test::ball("tissue"))).ok());
     played.begin();
     const Vec3 places[] = {Vec3(0.1, 0, 0.2), Vec3(-0.1, 0, 0.2), Vec3(0, 0.1, 0.2)};
     std::map<char, PickReply> picks;
-    for (const char act : c.acts) {
+    for (std::size_t k = 0; k < c.acts.size(); ++k) {
+      const char act = c.acts[k];
+      if (act == '+') continue;
       const char low = static_cast<char>(std::tolower(act));
       if (act == low)
         picks[low] = pickAt(played, places[low - 'a']);
       else
         played.apply<Done>(ReleaseCommand{picks.at(low).pick});
-      played.step(4);
+      if (k + 1 == c.acts.size() || c.acts[k + 1] != '+') played.step(4);
     }
     played.step(10);
     EXPECT_EQ(c.met, played.training.progress().done());
