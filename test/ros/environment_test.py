@@ -50,6 +50,9 @@ class EnvironmentTest(unittest.TestCase):
             # Each action is so many steps: not one more or less.
             self.assertEqual(1 + 4 * 70, first[2]['step'])
             self.assertTrue(numpy.allclose(first[0][:, -3], (1 + 4 * numpy.arange(71)) / 120.0))
+            way = 0.002 * numpy.cumsum(actions, axis=0)
+            self.assertTrue(numpy.allclose(first[0][1:, 0:3] - first[0][0, 0:3], way[:, 0:3]))
+            self.assertTrue(numpy.allclose(first[0][1:, 10:13] - first[0][0, 10:13], way[:, 4:7]))  # the sphere has arrived
             held, forces = first[0][:, 9] > 0, numpy.abs(first[0][:, 6:9]).sum(axis=1)
             self.assertTrue(held.any() and not held.all())  # it takes hold and lets go
             self.assertTrue((forces[held] > 0).all() and (forces[~held] == 0).all())
@@ -74,8 +77,12 @@ class EnvironmentTest(unittest.TestCase):
             for number in range(140):
                 lift = 0.4 if 5 <= number < 19 else 0.0
                 action = (0, 0.3 * lift, lift, 1.0 if number < 130 else -1.0)
-                _, reward, terminated, truncated, info = environment.step(action)
+                observation, reward, terminated, truncated, info = environment.step(action)
                 rewards.append(reward)
+                if number == 125:  # at rest: the force of the spring
+                    spring = 500.0 * (observation[0:3] - observation[3:6])
+                    self.assertGreater(numpy.linalg.norm(spring), 1.0)
+                    self.assertTrue(numpy.allclose(spring, observation[6:9], rtol=0.02, atol=0.02), observation[:10])
                 self.assertFalse(truncated)
                 if terminated:
                     break
