@@ -2,9 +2,11 @@
 """Clips with the mouse: where a pick is locked on a vessel (rviz: right click while it pulls), a clip closes the vessel there and the
 pick is let go of. Locks on other tissue stay. Ends with Ctrl-C."""
 import argparse
+import queue
 
 import rospy
 from meshless_surgery import Refused, Surgeon, SurgeryError
+from meshless_surgery.msg import State
 
 ACROSS = ((0, 0, 1), (0, 1, 0))  # one of them is across the vessel
 
@@ -26,21 +28,24 @@ def main():
     parser.add_argument('--width', type=float, default=0.004, help='[m] of the jaws along the vessel (default: %(default)s)')
     arguments = parser.parse_args(rospy.myargv()[1:])
     rospy.init_node('clip_by_lock', anonymous=True)
-    surgeon, refused = Surgeon(arguments.node), set()
+    surgeon, states, done = Surgeon(arguments.node), queue.Queue(), set()
+    rospy.Subscriber(arguments.node + '/state', State, states.put)
     print('where a pick is locked on a vessel, a clip is put on', flush=True)
     while not rospy.is_shutdown():
         try:
-            for pick in surgeon.state().picks:
-                if not pick.locked or pick.pick_id in refused:
-                    continue
+            state = states.get(timeout=0.2)
+        except queue.Empty:
+            continue
+        for pick in state.picks:
+            if not pick.locked or pick.pick_id in done:
+                continue
+            done.add(pick.pick_id)  # an older message may still have it
+            try:
                 name, why = clip(surgeon, pick, arguments.width)
                 print(('%s is on' % name) if name else 'no clip: ' + why, flush=True)
                 if name:
                     surgeon.release(pick.pick_id)
-                else:
-                    refused.add(pick.pick_id)
-        except (SurgeryError, rospy.ROSException) as error:
-            if not rospy.is_shutdown():
+            except (SurgeryError, rospy.ROSException) as error:
                 print(error, flush=True)
 
 
