@@ -665,6 +665,7 @@ class CellCutter {
     auto child = std::make_shared<BodyModel>();
     child->solid = true;
     child->spacing = model_.spacing;
+    child->own = model_.own;
     child->next_patch = model_.next_patch + 1;
     child->incised = model_.incised || !gate_.unbounded();
     child->surface.triangles = from.mesh.triangles;

@@ -487,7 +487,9 @@ Result<PreparedBody> prepareBody(BodyDef def) {
     const Mat3 axes = mainAxes(surface);
     for (Vec3& v : surface.vertices) v = axes.transpose() * v;
     placed = {pose.rotation * Quat(axes), pose.translation};
+    model->own.rotation = Quat(axes);
   } else {
+    model->own = {pose.rotation.conjugate(), pose.rotation.conjugate() * -pose.translation};
     for (Vec3& v : surface.vertices) v = pose * v;
   }
   for (const Vec3& v : surface.vertices)

@@ -89,6 +89,8 @@ Status Material::validate() const {
   for (const Color& c : {color, inside_color})
     for (float channel : {c.r, c.g, c.b, c.a})
       if (!(channel >= 0.0f && channel <= 1.0f)) return outOfRange("a colour's channel", channel, "0 to 1");
+  if (Status status = appearance.outer.validate("outer"); !status) return status;
+  if (Status status = appearance.inner.validate("inner"); !status) return status;
   return Done{};
 }
 

@@ -69,6 +69,40 @@ void readPlasticity(YamlMap& map, Plasticity& plasticity) {
   inner.finish();
 }
 
+void readLook(YamlMap& map, Look& look) {
+  std::vector<std::string> names;
+  for (const Noise noise : kNoises) names.push_back(toString(noise));
+  if (const int noise = map.choice("noise", names); noise >= 0) look.noise = kNoises[noise];
+  readColor(map, "second", look.second);
+  map.number("scale", {1e-5, 1.0, false, "m"}, look.scale);
+  map.number("wetness", {0.0, 1.0}, look.wetness);
+  map.number("bump", {0.0, 1.0}, look.bump);
+  map.finish();
+}
+
+void readAppearance(YamlMap& map, Appearance& appearance) {
+  const YAML::Node node = map.get("appearance");
+  if (!node.IsDefined()) return;
+  if (node.IsNull() || (node.IsScalar() && node.Scalar() == "none")) {
+    appearance = Appearance();
+    return;
+  }
+  if (!node.IsMap()) {
+    map.source().fail(node, "appearance is " + shown(node), "{outer: {}, inner: {}} or none");
+    return;
+  }
+  YamlMap sides(map.source(), node, "appearance");
+  if (const YAML::Node of = sides.get("outer"); of.IsDefined()) {
+    YamlMap outer(map.source(), of, "outer");
+    readLook(outer, appearance.outer);
+  }
+  if (const YAML::Node of = sides.get("inner"); of.IsDefined()) {
+    YamlMap inner(map.source(), of, "inner");
+    readLook(inner, appearance.inner);
+  }
+  sides.finish();
+}
+
 }  // namespace
 
 const char* const kPlainName = "1 to 64 letters, digits, '_', '-' or '.'";
@@ -110,6 +144,7 @@ void readMaterial(YamlSource& source, const YAML::Node& node, const std::string&
   readPlasticity(map, material.plasticity);
   readColor(map, "color", material.color);
   readColor(map, "inside_color", material.inside_color);
+  readAppearance(map, material.appearance);
   map.finish();
   if (source.fault) return;
   // The ranges above are the material's own; this keeps them so.

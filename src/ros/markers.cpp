@@ -79,14 +79,15 @@ struct Shading {
   }
 };
 
-void addBody(const BodySnapshot& body, Marker& marker) {
+void addBody(const BodySnapshot& body, const VertexColors& baked, Marker& marker) {
   const TriangleMesh& mesh = body.model->surface;
   marker.color = toColor(body.material.color);
   marker.scale.x = marker.scale.y = marker.scale.z = 1.0;
-  std::vector<std_msgs::ColorRGBA> inside{toColor(body.material.inside_color)};
-  for (const auto& color : regionColors(*body.model)) inside.push_back(color);
-  std::vector<std::uint8_t> regions = surfaceRegions(*body.model);
-  regions.resize(body.surface.size(), 0);
+  const auto inside = toColor(body.material.inside_color);
+  const auto colorOf = [&](Index v, bool cut) {
+    const std::vector<Color>& colors = cut ? baked.inside : baked.outer;
+    return colors.empty() ? (cut ? inside : marker.color) : toColor(colors[v]);
+  };
   // Normals are smooth over the outer surface and over all cut faces, each on their own: the rim between stays sharp.
   Shading shadings[2];
   const bool any_cut = std::any_of(mesh.patches.begin(), mesh.patches.end(), isCutPatch);
@@ -113,7 +114,7 @@ void addBody(const BodySnapshot& body, Marker& marker) {
       const bool smooth = shadings[cut].normals[v].dot(flat) > kSmoothUpTo;
       const double light = smooth ? shadings[cut].lights[v] : lightOn(flat);
       marker.points.push_back(toPoint(body.surface[v]));
-      marker.colors.push_back(shaded(cut ? inside[regions[v]] : marker.color, light));
+      marker.colors.push_back(shaded(colorOf(v, cut), light));
     }
   }
 }
@@ -207,10 +208,11 @@ visualization_msgs::MarkerArray MarkerBuilder::build(const WorldSnapshot& snapsh
     shown_.clear();
     run_ = snapshot.run;
   }
+  baked_.update(snapshot);
   const std::size_t first = array.markers.size();
   for (const BodySnapshot& body : snapshot.bodies) {
     Marker surface = newMarker(header, "bodies", static_cast<int>(body.number), Marker::TRIANGLE_LIST);
-    addBody(body, surface);
+    addBody(body, baked_.of(body), surface);
     if (!surface.points.empty()) array.markers.push_back(std::move(surface));
   }
   addObstacles(snapshot, header, array);

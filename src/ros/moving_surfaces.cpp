@@ -10,11 +10,45 @@ namespace {
 
 constexpr double kFinest = 65535.0;
 
-bool same(const Color& one, const Color& other) {
-  return one.r == other.r && one.g == other.g && one.b == other.b && one.a == other.a;
+std::vector<std::uint8_t> toBytes(const std::vector<Color>& colors) {
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(3 * colors.size());
+  for (const Color& c : colors)
+    for (const float channel : {c.r, c.g, c.b})
+      bytes.push_back(static_cast<std::uint8_t>(std::lround(255.0f * channel)));
+  return bytes;
 }
 
-meshless_surgery::BodyTopology toTopology(const BodySnapshot& body) {
+meshless_surgery::Look toLook(const Look& look, const Color& base) {
+  meshless_surgery::Look message;
+  message.noise = static_cast<std::uint8_t>(look.noise);
+  message.color = toColor(base);
+  message.second = toColor(look.second);
+  message.scale = static_cast<float>(look.scale);
+  message.wetness = static_cast<float>(look.wetness);
+  message.bump = static_cast<float>(look.bump);
+  return message;
+}
+
+void addLooks(const BodySnapshot& body, const VertexColors& baked, meshless_surgery::BodyTopology& message) {
+  const Material& own = body.material;
+  message.looks = {toLook(own.appearance.outer, own.color), toLook(own.appearance.inner, own.inside_color)};
+  bool by_place = needsPlace(own.appearance.outer) || needsPlace(own.appearance.inner);
+  for (const RegionTissue& region : body.model->regions) {
+    message.looks.push_back(toLook(region.material.appearance.inner, region.material.inside_color));
+    by_place = by_place || needsPlace(region.material.appearance.inner);
+  }
+  message.colors = toBytes(baked.outer);
+  message.inside_colors = toBytes(baked.inside);
+  if (!by_place) return;
+  message.rest.reserve(3 * body.model->surface.vertices.size());
+  for (const Vec3& v : body.model->surface.vertices) {
+    const Vec3 place = body.model->own * v;
+    for (int axis = 0; axis < 3; ++axis) message.rest.push_back(static_cast<float>(place[axis]));
+  }
+}
+
+meshless_surgery::BodyTopology toTopology(const BodySnapshot& body, const VertexColors& baked) {
   const TriangleMesh& mesh = body.model->surface;
   meshless_surgery::BodyTopology message;
   message.id = body.number;
@@ -30,6 +64,7 @@ meshless_surgery::BodyTopology toTopology(const BodySnapshot& body) {
   }
   message.regions = surfaceRegions(*body.model);
   message.region_colors = regionColors(*body.model);
+  addLooks(body, baked, message);
   return message;
 }
 
@@ -56,11 +91,7 @@ meshless_surgery::BodyVertices toVertices(const BodySnapshot& body) {
 bool MovingSurfaces::isKnown(const WorldSnapshot& snapshot) const {
   if (topology_ == 0 || run_ != snapshot.run || known_.size() != snapshot.bodies.size()) return false;
   for (std::size_t i = 0; i < known_.size(); ++i) {
-    const BodySnapshot& body = snapshot.bodies[i];
-    if (known_[i].number != body.number || known_[i].model != body.model ||
-        !same(known_[i].color, body.material.color) || !same(known_[i].inside_color, body.material.inside_color)) {
-      return false;
-    }
+    if (!known_[i].isOf(snapshot.bodies[i])) return false;
   }
   return true;
 }
@@ -75,9 +106,10 @@ std::optional<meshless_surgery::Topology> MovingSurfaces::change(const WorldSnap
   message.run = run_;
   message.topology = ++topology_;
   message.bodies.reserve(snapshot.bodies.size());
+  baked_.update(snapshot);
   for (const BodySnapshot& body : snapshot.bodies) {
-    known_.push_back({body.number, body.model, body.material.color, body.material.inside_color});
-    message.bodies.push_back(toTopology(body));
+    known_.emplace_back(body);
+    message.bodies.push_back(toTopology(body, baked_.of(body)));
   }
   return message;
 }

@@ -218,7 +218,7 @@ void Publishers::publishTick(Clock::time_point now) {
     markers_revision_ = revision;
     markers_topic_.publish(markers_.build(*snapshot, header.stamp, markers_fresh));
   }
-  if (info || vertices) publishTopology(*snapshot, header);
+  if (info || vertices || surfaces) publishTopology(*snapshot, header);
   if (vertices) {
     ++vertices_built_;
     vertices_revision_ = revision;
@@ -282,9 +282,13 @@ void Publishers::publishTopology(const WorldSnapshot& snapshot, const std_msgs::
 
 void Publishers::publishSurfaces(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
   ++surfaces_built_;
-  if (surfaces_topic_.getNumSubscribers() > 0) surfaces_topic_.publish(toSurfaces(snapshot, header, false));
-  if (strained_surfaces_topic_.getNumSubscribers() > 0)
-    strained_surfaces_topic_.publish(toSurfaces(snapshot, header, true));
+  for (const bool strain : {false, true}) {
+    const ros::Publisher& topic = strain ? strained_surfaces_topic_ : surfaces_topic_;
+    if (topic.getNumSubscribers() == 0) continue;
+    auto message = toSurfaces(snapshot, header, strain);
+    message.topology = moving_.topology();
+    topic.publish(message);
+  }
 }
 
 void Publishers::publishTools(const WorldSnapshot& snapshot, const ros::Time& stamp) {

@@ -11,7 +11,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kStateVersion = 19;
+constexpr std::uint32_t kStateVersion = 20;
 
 inline std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(
@@ -106,12 +106,22 @@ void serialize(A& archive, Plasticity& v) {
   archive(yield, creep, maximum);
 }
 template <class A>
+void serialize(A& archive, Look& v) {
+  auto& [noise, second, scale, wetness, bump] = v;
+  archive(choice(noise, kNoises.back()), second, scale, wetness, bump);
+}
+template <class A>
+void serialize(A& archive, Appearance& v) {
+  auto& [outer, inner] = v;
+  archive(outer, inner);
+}
+template <class A>
 void serialize(A& archive, Material& v) {
   auto& [name, youngs_modulus, poissons_ratio, mode, alpha, beta, density, damping, friction, restitution, self_contact,
-         volume, area, plasticity, color, inside_color] = v;
+         volume, area, plasticity, color, inside_color, appearance] = v;
   archive(name, youngs_modulus, poissons_ratio, choice(mode, MatchMode::kQuadratic), alpha, beta, density, damping,
-          friction, restitution, choice(self_contact, SelfContact::kAll), volume, area, plasticity, color,
-          inside_color);
+          friction, restitution, choice(self_contact, SelfContact::kAll), volume, area, plasticity, color, inside_color,
+          appearance);
 }
 template <class A>
 void serialize(A& archive, WorldSettings& v) {
@@ -203,16 +213,16 @@ template <class A>
 void serialize(A& archive, BodyModel& v) {
   auto& [rest, masses, match_masses, fixed, any_fixed, graph, clusters, shape, elastic, elastic_batch, lattice,
          cell_mass, regions, cells, clamp_points, clamp, tissue, most_spread_inverse, specific_stiffness,
-         poissons_ratio, highest_frequency, surface, binding, collision, cavities, solid, incised, spacing, rest_volume,
-         rest_area, mass, next_patch] = v;
+         poissons_ratio, highest_frequency, own, surface, binding, collision, cavities, solid, incised, spacing,
+         rest_volume, rest_area, mass, next_patch] = v;
   (void)elastic_batch, (void)cells, (void)clamp, (void)tissue, (void)cavities;
   auto of_contact = collision ? *collision : CollisionSurface();
   auto of_cells = lattice ? *lattice : CellLattice();
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
   archive(of_cells, cell_mass, regions, clamp_points);
   archive(rest, masses, match_masses, held, any_fixed, graph, clusters, shape, elastic, endless(most_spread_inverse),
-          specific_stiffness, poissons_ratio, highest_frequency, surface, binding, of_contact, solid, incised, spacing,
-          rest_volume, rest_area, mass, next_patch);
+          specific_stiffness, poissons_ratio, highest_frequency, own, surface, binding, of_contact, solid, incised,
+          spacing, rest_volume, rest_area, mass, next_patch);
   if constexpr (std::is_same_v<A, InArchive>) {
     if (!of_contact.mesh.vertices.empty()) collision = std::make_shared<CollisionSurface>(std::move(of_contact));
     if (!of_cells.cells.empty()) lattice = std::make_shared<CellLattice>(std::move(of_cells));

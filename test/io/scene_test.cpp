@@ -353,6 +353,13 @@ TEST(ChangeMaterial, ChangesTheKeysItIsGiven) {
   EXPECT_NEAR(held->volume.at(0.1), 0.55, 1e-15);
   EXPECT_EQ(held->area.at(3.0), 0.5);
   EXPECT_TRUE(changeMaterial(*held, "volume: none")->volume.points.empty());
+  const Result<Material> patterned = changeMaterial(base, "appearance: {outer: {noise: fat, scale: 0.01}}");
+  ASSERT_TRUE(patterned.ok());
+  const Result<Material> coarser = changeMaterial(*patterned, "appearance: {outer: {scale: 0.02}}");
+  ASSERT_TRUE(coarser.ok());
+  EXPECT_EQ(Noise::kFat, coarser->appearance.outer.noise);
+  EXPECT_EQ(0.02, coarser->appearance.outer.scale);
+  EXPECT_TRUE(changeMaterial(*coarser, "appearance: none")->appearance == Appearance());
 }
 
 TEST(ChangeMaterial, RefusesWhatItDoesNotKnow) {
@@ -374,6 +381,16 @@ TEST(ChangeMaterial, RefusesWhatItDoesNotKnow) {
       {"plasticity: {yeild: 1}", "did you mean 'yield'"},
       {"plasticity: {maximum: 4}", "maximum is 4"},
       {"plasticity: 3", "plasticity is '3'"},
+      {"appearance: 3", "appearance is '3'"},
+      {"appearance: {outer: 3}", "outer is"},
+      {"appearance: {outside: {}}", "unknown key 'outside'"},
+      {"appearance: {outer: {noise: clouds}}", "noise is 'clouds'"},
+      {"appearance: {outer: {image: liver.png}}", "unknown key 'image'"},
+      {"appearance: {inner: {scale: 0}}", "scale is 0"},
+      {"appearance: {inner: {scale: .nan}}", "scale is"},
+      {"appearance: {inner: {wetness: 1.5}}", "wetness is 1.5"},
+      {"appearance: {inner: {bump: -1}}", "bump is -1"},
+      {"appearance: {inner: {second: [0.1, 2, 0.1]}}", "second[1] is 2"},
       {"youngs_modulus: 1e4\npoissons_ratio: 0.5", "material:2: poissons_ratio is 0.5"},
       {"name: other", "unknown key 'name'"}};
   for (const auto& one : cases) {

@@ -85,6 +85,7 @@ struct BodyModel {
   double specific_stiffness = 0.0;  // [m^2/s^2] Young's modulus over density; 0 of an appearance material
   double poissons_ratio = 0.0;      // of an elastic material
   double highest_frequency = 0.0;   // [rad/s] of an elastic material: see longestSubstep()
+  Pose own;                         // from the frame of rest positions to the body's own, that of its file
   TriangleMesh surface;             // rest positions of the vertices [m]
   SurfaceBinding binding;
   std::shared_ptr<const CollisionSurface> collision;  // null: contact takes the visual surface

@@ -1,6 +1,7 @@
 // What a body is made of.
 #pragma once
 
+#include "meshless_surgery/appearance/look.h"
 #include "meshless_surgery/base/result.h"
 #include "meshless_surgery/base/types.h"
 
@@ -56,6 +57,7 @@ struct Material {
   Plasticity plasticity;
   Color color{0.62f, 0.22f, 0.18f, 1.0f};         // of the outer surface
   Color inside_color{0.85f, 0.45f, 0.40f, 1.0f};  // of cut faces
+  Appearance appearance;                          // patterns over both
 
   bool bends() const { return elastic() || mode != MatchMode::kRigid; }
   bool elastic() const { return youngs_modulus > 0.0; }

@@ -5,6 +5,7 @@
 
 #include <visualization_msgs/MarkerArray.h>
 
+#include "meshless_surgery/ros/baked_colors.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless {
@@ -18,10 +19,10 @@ class MarkerBuilder {
   explicit MarkerBuilder(std::string world_frame) : world_frame_(std::move(world_frame)) {}
 
   /// Needs a snapshot with surfaces. One TRIANGLE_LIST a body: ns "bodies", id the body's number, a colour for each
-  /// point: the outer colour (which is also the marker's) or for faces of cuts the inside colour, times the light
-  /// there. No triangle without an area. Obstacles in ns "obstacles", numbered. Tools in ns "tools": springs 0, their
-  /// ends 1, push sphere 2, scissors 3, fibres of attachments 4. `fresh` (someone new listens) and a reset begin with
-  /// DELETEALL. A DELETE is said in 30 arrays on end: a slow listener may lose one.
+  /// point: the outer colour (which is also the marker's) or for faces of cuts the inside colour, each with the
+  /// pattern of its look, times the light there. No triangle without an area. Obstacles in ns "obstacles", numbered.
+  /// Tools in ns "tools": springs 0, their ends 1, push sphere 2, scissors 3, fibres of attachments 4. `fresh` (someone
+  /// new listens) and a reset begin with DELETEALL. A DELETE is said in 30 arrays on end: a slow listener may lose one.
   visualization_msgs::MarkerArray build(const WorldSnapshot& snapshot, const ros::Time& stamp, bool fresh);
   /// A DELETE is still to be said again.
   bool deleting() const;
@@ -34,6 +35,7 @@ class MarkerBuilder {
 
   std::string world_frame_;
   std::optional<std::uint32_t> run_;
+  BakedColors baked_;
   std::map<Key, int> shown_;  // how often a DELETE is still to be said
 };
 

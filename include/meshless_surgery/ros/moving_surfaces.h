@@ -7,6 +7,7 @@
 #include <meshless_surgery/Topology.h>
 #include <meshless_surgery/Vertices.h>
 
+#include "meshless_surgery/ros/baked_colors.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless {
@@ -19,15 +20,14 @@ class MovingSurfaces {
   /// Needs a snapshot with surfaces, the one of the last change().
   meshless_surgery::Vertices vertices(const WorldSnapshot& snapshot, const std_msgs::Header& header, bool complete);
 
+  /// The number of the last change(); 0: none yet.
+  std::uint32_t topology() const { return topology_; }
+
  private:
-  struct Known {
-    std::uint32_t number;
-    BodyModelPtr model;  // held, so that its address is not another one's
-    Color color, inside_color;
-  };
   bool isKnown(const WorldSnapshot& snapshot) const;
 
-  std::vector<Known> known_;
+  std::vector<BakedBody> known_;
+  BakedColors baked_;
   std::uint32_t run_ = 0;
   std::uint32_t topology_ = 0;                                    // 0: none yet
   std::uint32_t said_topology_ = 0;                               // of the last vertices

@@ -1,0 +1,48 @@
+// How tissue looks: two colours mixed by a pattern that fills space. It is a function of the place at rest, so it is
+// the same on every mesh, needs no texture coordinates, and goes on across cuts.
+#pragma once
+
+#include "meshless_surgery/base/result.h"
+#include "meshless_surgery/base/types.h"
+
+namespace meshless {
+
+/// kPlain: one colour. The others: thin branching lines, cells of a tint each, globules with walls between, strands
+/// along x, a hard ground with pits.
+enum class Noise { kPlain, kVeins, kLobules, kFat, kFibres, kBone };
+constexpr std::array<Noise, 6> kNoises{Noise::kPlain, Noise::kVeins,  Noise::kLobules,
+                                       Noise::kFat,   Noise::kFibres, Noise::kBone};
+
+const char* toString(Noise noise);
+
+struct Look {
+  Noise noise = Noise::kPlain;
+  Color second{0.5f, 0.15f, 0.12f, 1.0f};  // where the pattern is full; its opacity does not count
+  double scale = 0.004;                    // [m] 1e-5..1, of a cell of the pattern
+  double wetness = 0.5;                    // 0..1: how bright and how sharp lamps are mirrored
+  double bump = 0.0;                       // 0..1: how uneven it is to light
+
+  /// Why it is not usable, naming key, value and range; else Done.
+  Status validate(const std::string& of) const;
+};
+bool operator==(const Look& one, const Look& other);
+inline bool operator!=(const Look& one, const Look& other) { return !(one == other); }
+
+struct Appearance {
+  Look outer;  // over the material's color
+  Look inner;  // of the faces of cuts, over its inside_color
+};
+bool operator==(const Appearance& one, const Appearance& other);
+inline bool operator!=(const Appearance& one, const Appearance& other) { return !(one == other); }
+
+/// It looks different at different places.
+inline bool needsPlace(const Look& look) { return look.noise != Noise::kPlain || look.bump > 0.0; }
+
+/// 0..1: how full the pattern is at a place [m] of the body's own frame. It repeats after 289 cells. The display's
+/// shader (media/tissue.frag) has the same functions.
+double patternAt(const Look& look, const Vec3& place);
+
+/// Between `base` and the look's second colour in each channel; the base's opacity.
+Color colorAt(const Look& look, const Color& base, const Vec3& place);
+
+}  // namespace meshless

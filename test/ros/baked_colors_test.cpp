@@ -1,0 +1,148 @@
+#include "meshless_surgery/ros/baked_colors.h"
+
+#include <map>
+
+#include "meshless_surgery/ros/markers.h"
+#include "meshless_surgery/ros/moving_surfaces.h"
+#include "ros/scene_support.h"
+
+namespace meshless {
+namespace baked_colors_test {
+
+SnapshotWants surfaces() {
+  SnapshotWants wants;
+  wants.surfaces = true;
+  return wants;
+}
+
+void setLooks(World& world, const std::string& body, double scale) {
+  SetMaterialCommand command;
+  command.body = body;
+  command.change = [scale](const Material& present) {
+    Material other = present;
+    other.appearance.outer.noise = Noise::kLobules;
+    other.appearance.outer.second = {0.1f, 0.9f, 0.1f, 1.0f};
+    other.appearance.outer.scale = scale;
+    other.appearance.outer.wetness = 0.75;
+    other.appearance.inner.noise = Noise::kFat;
+    other.appearance.inner.second = {0.1f, 0.1f, 0.9f, 1.0f};
+    other.appearance.inner.bump = 0.25;
+    return Result<Material>(other);
+  };
+  ASSERT_TRUE(world.apply(command).ok());
+}
+
+TEST(BakedColors, AreTheLooksAtTheVertices) {
+  const auto world = twoBoxes();
+  setLooks(*world, "a", 0.02);
+  ASSERT_TRUE(world->apply(cutAcross(0.01)).ok());
+  std::size_t patterned = 0;
+  for (const BodySnapshot& body : world->snapshot(surfaces()).bodies) {
+    const VertexColors colors = bakeColors(*body.model, body.material);
+    const Points& rest = body.model->surface.vertices;
+    if (body.name == "b") {
+      EXPECT_TRUE(colors.outer.empty() && colors.inside.empty());
+      continue;
+    }
+    ++patterned;
+    ASSERT_EQ(rest.size(), colors.outer.size());
+    ASSERT_EQ(rest.size(), colors.inside.size());
+    std::vector<bool> on_cut(rest.size(), false);
+    for (std::size_t t = 0; t < body.model->surface.triangles.size(); ++t)
+      for (const Index v : body.model->surface.triangles[t])
+        if (isCutPatch(body.model->surface.patchOf(t))) on_cut[v] = true;
+    for (std::size_t v = 0; v < rest.size(); ++v) {
+      const Vec3 place = body.model->own * rest[v];
+      const Color out = colorAt(body.material.appearance.outer, body.material.color, place),
+                  in = colorAt(body.material.appearance.inner, body.material.inside_color, place);
+      EXPECT_EQ(out.g, colors.outer[v].g);
+      EXPECT_EQ(on_cut[v] ? in.b : 0.0f, colors.inside[v].b);
+    }
+  }
+  EXPECT_EQ(2u, patterned);
+}
+
+TEST(BakedColors, AreBakedWhereSomethingIsNewAlone) {
+  const auto world = twoBoxes();
+  setLooks(*world, "", 0.02);
+  BakedColors baked;
+  const auto addresses = [&] {
+    const WorldSnapshot snapshot = world->snapshot(surfaces());
+    baked.update(snapshot);
+    std::map<std::string, const Color*> found;
+    for (const BodySnapshot& body : snapshot.bodies) found[body.name] = baked.of(body).outer.data();
+    return found;
+  };
+  const auto first = addresses();
+  world->step();
+  EXPECT_EQ(first, addresses());
+  setLooks(*world, "a", 0.01);
+  const auto other = addresses();
+  EXPECT_NE(first.at("a"), other.at("a"));
+  EXPECT_EQ(first.at("b"), other.at("b"));
+  ASSERT_TRUE(world->apply(cutAcross(0.01)).ok());
+  const auto cut = addresses();
+  EXPECT_EQ(3u, cut.size());
+  EXPECT_EQ(first.at("b"), cut.at("b"));
+}
+
+TEST(BakedColors, MarkersHaveThemInTheLightThereIs) {
+  const auto world = twoBoxes();
+  setLooks(*world, "a", 0.02);
+  ASSERT_TRUE(world->apply(cutAcross(0.01)).ok());
+  const WorldSnapshot snapshot = world->snapshot(surfaces());
+  MarkerBuilder builder("world");
+  const auto array = builder.build(snapshot, ros::Time(), false);
+  for (const BodySnapshot& body : snapshot.bodies) {
+    const auto marker = std::find_if(array.markers.begin(), array.markers.end(), [&](const auto& m) {
+      return m.ns == "bodies" && m.action == 0 && m.id == static_cast<int>(body.number);
+    });
+    ASSERT_NE(array.markers.end(), marker);
+    ASSERT_EQ(3 * body.model->surface.triangles.size(), marker->colors.size());
+    const VertexColors colors = bakeColors(*body.model, body.material);
+    for (std::size_t c = 0; c < marker->colors.size(); ++c) {
+      const std::size_t t = c / 3;
+      const Index v = body.model->surface.triangles[t][c % 3];
+      const bool cut = isCutPatch(body.model->surface.patchOf(t));
+      const Color plain = cut ? body.material.inside_color : body.material.color;
+      const std::vector<Color>& baked = cut ? colors.inside : colors.outer;
+      const Color wanted = baked.empty() ? plain : baked[v];
+      const Vec3 shade(marker->colors[c].r, marker->colors[c].g, marker->colors[c].b);
+      ASSERT_LT(shade.cross(Vec3(wanted.r, wanted.g, wanted.b)).norm(), 1e-5) << body.name << " " << c;
+    }
+  }
+}
+
+TEST(BakedColors, TheTopologyHasThemAndIsNewWhereALookIs) {
+  const auto world = twoBoxes();
+  MovingSurfaces moving;
+  const auto plain = moving.change(world->snapshot(surfaces()), {});
+  ASSERT_TRUE(plain);
+  ASSERT_EQ(2u, plain->bodies[0].looks.size());
+  EXPECT_TRUE(plain->bodies[0].rest.empty() && plain->bodies[0].colors.empty());
+  setLooks(*world, "a", 0.02);
+  const WorldSnapshot snapshot = world->snapshot(surfaces());
+  const auto patterned = moving.change(snapshot, {});
+  ASSERT_TRUE(patterned);
+  EXPECT_EQ(patterned->topology, moving.topology());
+  const auto& body = patterned->bodies[0];
+  EXPECT_EQ(static_cast<std::uint8_t>(meshless_surgery::Look::LOBULES), body.looks[0].noise);
+  EXPECT_EQ(static_cast<std::uint8_t>(meshless_surgery::Look::FAT), body.looks[1].noise);
+  EXPECT_FLOAT_EQ(0.02f, body.looks[0].scale);
+  EXPECT_FLOAT_EQ(0.75f, body.looks[0].wetness);
+  EXPECT_FLOAT_EQ(0.25f, body.looks[1].bump);
+  EXPECT_TRUE(patterned->bodies[1].rest.empty());
+  const BodyModel& model = *snapshot.bodies[0].model;
+  const VertexColors colors = bakeColors(model, snapshot.bodies[0].material);
+  ASSERT_EQ(3 * colors.outer.size(), body.colors.size());
+  ASSERT_EQ(3 * colors.outer.size(), body.rest.size());
+  EXPECT_TRUE(body.inside_colors.empty());  // nothing is cut
+  for (std::size_t v = 0; v < colors.outer.size(); ++v) {
+    EXPECT_NEAR(255.0f * colors.outer[v].g, body.colors[3 * v + 1], 0.5001f);
+    EXPECT_NEAR((model.own * model.surface.vertices[v]).z(), body.rest[3 * v + 2], 1e-6);
+  }
+  EXPECT_FALSE(moving.change(world->snapshot(surfaces()), {}));
+}
+
+}  // namespace baked_colors_test
+}  // namespace meshless
