@@ -1,17 +1,22 @@
 #include "body_shape.h"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 #include <string>
 
-#include <OgreManualObject.h>
+#include <OgreAxisAlignedBox.h>
+#include <OgreGpuProgramParams.h>
+#include <OgreHardwareBufferManager.h>
 #include <OgreMaterialManager.h>
 #include <OgreResourceGroupManager.h>
 #include <OgreSceneManager.h>
 #include <OgreSceneNode.h>
+#include <OgreSimpleRenderable.h>
 #include <OgreTechnique.h>
 
 #include "ogre_convert.h"
+#include "tissue_program.h"
 
 namespace meshless {
 namespace {
@@ -21,11 +26,63 @@ constexpr float kSelfLight =
     0.25f;                      // share of the colour that is there without a light: rviz has a lamp and no daylight
 constexpr float kLamp = 0.85f;  // share of the colour that the lamp adds
 constexpr double kSeenThrough = 0.6;  // opacity up to which what is inside of a body shows, whatever is drawn first
-constexpr std::uint32_t kNoPlace = std::numeric_limits<std::uint32_t>::max();
+constexpr float kDry = 0.1f;          // wetness of what is shown by strain
+constexpr std::uint32_t kNoCorner = std::numeric_limits<std::uint32_t>::max();
 
 Ogre::ColourValue toColour(const std_msgs::ColorRGBA& c) { return Ogre::ColourValue(c.r, c.g, c.b, c.a); }
 
+const meshless_surgery::Look& plainLook() {
+  static const meshless_surgery::Look look = [] {
+    meshless_surgery::Look plain;
+    plain.scale = 1.0f;
+    plain.wetness = 0.5f;
+    return plain;
+  }();
+  return look;
+}
+
 }  // namespace
+
+/// Triangles of one material over the vertices of a body.
+class BodyPart : public Ogre::SimpleRenderable {
+ public:
+  BodyPart(const std::string& name, Ogre::VertexData* vertices) : Ogre::SimpleRenderable(name) {
+    mRenderOp.operationType = Ogre::RenderOperation::OT_TRIANGLE_LIST;
+    mRenderOp.useIndexes = true;
+    mRenderOp.vertexData = vertices;
+    mRenderOp.indexData = &indices_;
+    mMaterial =
+        Ogre::MaterialManager::getSingleton().create(name, Ogre::ResourceGroupManager::DEFAULT_RESOURCE_GROUP_NAME);
+    mMaterial->setReceiveShadows(false);
+  }
+  ~BodyPart() override {
+    detachFromParent();
+    Ogre::MaterialManager::getSingleton().remove(mMaterial);
+  }
+
+  void setTriangles(const std::vector<std::uint32_t>& corners) {
+    indices_.indexStart = 0;
+    indices_.indexCount = corners.size();
+    indices_.indexBuffer = Ogre::HardwareBufferManager::getSingleton().createIndexBuffer(
+        Ogre::HardwareIndexBuffer::IT_32BIT, corners.size(), Ogre::HardwareBuffer::HBU_STATIC_WRITE_ONLY);
+    indices_.indexBuffer->writeData(0, corners.size() * sizeof corners[0], corners.data(), true);
+  }
+  void setBounds(const Ogre::AxisAlignedBox& box) {
+    setBoundingBox(box);
+    radius_ = std::max(box.getMinimum().length(), box.getMaximum().length());
+    if (getParentSceneNode()) getParentSceneNode()->needUpdate();
+  }
+  Ogre::Pass* pass() { return mMaterial->getTechnique(0)->getPass(0); }
+
+  Ogre::Real getBoundingRadius() const override { return radius_; }
+  Ogre::Real getSquaredViewDepth(const Ogre::Camera* camera) const override {
+    return getParentSceneNode()->getSquaredViewDepth(camera);
+  }
+
+ private:
+  Ogre::IndexData indices_;
+  Ogre::Real radius_ = 0.0f;
+};
 
 Ogre::ColourValue heatColour(double share) {
   const auto s = static_cast<float>(std::clamp(share, 0.0, 1.0));
@@ -36,148 +93,243 @@ Ogre::ColourValue heatColour(double share) {
 BodyShape::BodyShape(Ogre::SceneManager* scene_manager, Ogre::SceneNode* parent)
     : scene_manager_(scene_manager), node_(parent->createChildSceneNode()) {
   static int count = 0;
-  const std::string name = "meshless_body_" + std::to_string(count++);
-  material_ =
-      Ogre::MaterialManager::getSingleton().create(name, Ogre::ResourceGroupManager::DEFAULT_RESOURCE_GROUP_NAME);
-  material_->setReceiveShadows(false);
-  Ogre::Pass* pass = material_->getTechnique(0)->getPass(0);
-  pass->setLightingEnabled(true);
-  pass->setVertexColourTracking(Ogre::TVC_AMBIENT | Ogre::TVC_DIFFUSE);
-  pass->setSpecular(0.25f, 0.25f, 0.25f, 1.0f);  // tissue is wet
-  pass->setShininess(40.0f);
-  object_ = scene_manager_->createManualObject(name);
-  object_->setDynamic(true);
-  node_->attachObject(object_);
+  name_ = "meshless_body_" + std::to_string(count++);
 }
 
 BodyShape::~BodyShape() {
-  scene_manager_->destroyManualObject(object_);
+  parts_.clear();
   scene_manager_->destroySceneNode(node_);
-  Ogre::MaterialManager::getSingleton().remove(material_);
 }
 
-void BodyShape::findCorners(const meshless_surgery::Surface& surface) {
-  const std::size_t vertices = surface.vertices.size() / 3;
-  const std::size_t triangles = surface.cut.size();
-  faces_.resize(triangles);
-  starts_.assign(vertices + 1, 0);
-  for (int cut = 0; cut < 2; ++cut) {
-    normals_[cut].assign(vertices, Ogre::Vector3::ZERO);
-    place_[cut].assign(vertices, kNoPlace);
-  }
-  for (std::size_t t = 0; t < triangles; ++t) {
+bool BodyShape::sameTriangles(const meshless_surgery::Surface& surface) const {
+  return data_ && surface.triangles == triangles_ && surface.cut == cut_ && surface.regions == regions_;
+}
+
+void BodyShape::findFaces(const meshless_surgery::Surface& surface) {
+  faces_.resize(surface.cut.size());
+  for (std::size_t t = 0; t < faces_.size(); ++t) {
     const std::uint32_t* corner = &surface.triangles[3 * t];
     const Ogre::Vector3 a = vertexOf(surface, corner[0]);
     faces_[t] = (vertexOf(surface, corner[1]) - a).crossProduct(vertexOf(surface, corner[2]) - a);  // by its area
-    for (int k = 0; k < 3; ++k) {
-      normals_[surface.cut[t] != 0][corner[k]] += faces_[t];
-      ++starts_[corner[k] + 1];
-    }
   }
-  for (auto& normals : normals_)
-    for (Ogre::Vector3& normal : normals) normal.normalise();
-  for (std::size_t v = 0; v < vertices; ++v) starts_[v + 1] += starts_[v];
-  around_.resize(3 * triangles);
-  next_.assign(starts_.begin(), starts_.end() - 1);
-  for (std::size_t c = 0; c < 3 * triangles; ++c)
-    around_[next_[surface.triangles[c]]++] = static_cast<std::uint32_t>(c / 3);
+}
 
+std::uint32_t BodyShape::addCorner(std::uint32_t v, std::uint32_t part, const std::vector<std::uint32_t>& faces) {
+  corners_.push_back({v, part});
+  around_.insert(around_.end(), faces.begin(), faces.end());
+  starts_.push_back(static_cast<std::uint32_t>(around_.size()));
+  return static_cast<std::uint32_t>(corners_.size() - 1);
+}
+
+// Which faces share a normal is found where the triangles are new, and kept while they deform.
+void BodyShape::findCorners(const meshless_surgery::Surface& surface) {
+  triangles_ = surface.triangles;
+  cut_ = surface.cut;
+  regions_ = surface.regions;
+  const std::size_t vertices = surface.vertices.size() / 3, triangles = cut_.size();
+  const bool regional = regions_.size() == vertices &&
+                        std::all_of(regions_.begin(), regions_.end(),
+                                    [&](std::uint8_t region) { return region <= surface.region_colors.size(); });
+  // Triangles around a vertex: fan[first[v] .. first[v + 1])
+  std::vector<std::uint32_t> first(vertices + 1, 0), fan(3 * triangles);
+  for (const std::uint32_t v : triangles_) ++first[v + 1];
+  for (std::size_t v = 0; v < vertices; ++v) first[v + 1] += first[v];
+  std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
+  for (std::size_t c = 0; c < 3 * triangles; ++c) fan[next[triangles_[c]]++] = static_cast<std::uint32_t>(c / 3);
+
+  const auto partOf = [&](std::size_t t) -> std::uint32_t {
+    if (cut_[t] == 0) return 0;
+    return regional ? 1u + regions_[triangles_[3 * t]] : 1u;
+  };
+  const auto along = [&](std::uint32_t s, const Ogre::Vector3& normal) {
+    return faces_[s].dotProduct(normal) >= kSmoothUpTo * faces_[s].length() * normal.length();
+  };
   corners_.clear();
-  indices_.clear();
-  indices_.reserve(3 * triangles);
+  around_.clear();
+  starts_.assign(1, 0);
+  indices_.assign(2 + (regional ? surface.region_colors.size() : 0), {});
+  std::vector<std::uint32_t> smooth[2];  // of a vertex: its one corner of the outer surface, of cuts
+  for (auto& corners : smooth) corners.assign(vertices, kNoCorner);
+  std::vector<std::uint32_t> faces;
   for (std::size_t t = 0; t < triangles; ++t) {
-    const bool cut = surface.cut[t] != 0;
+    const std::uint32_t part = partOf(t);
     for (int k = 0; k < 3; ++k) {
-      const std::uint32_t v = surface.triangles[3 * t + k];
-      std::uint32_t at = place_[cut][v];
-      if (at == kNoPlace) {
-        at = static_cast<std::uint32_t>(corners_.size());
-        if (isSmooth(surface, v, cut)) {
-          corners_.push_back({v, normals_[cut][v], cut});
-          place_[cut][v] = at;
-        } else {
-          corners_.push_back({v, creasedNormal(surface, t, v), cut});
+      const std::uint32_t v = triangles_[3 * t + k];
+      std::uint32_t& one = smooth[cut_[t] != 0][v];
+      std::uint32_t corner = one;
+      if (corner == kNoCorner) {
+        faces.clear();
+        Ogre::Vector3 normal = Ogre::Vector3::ZERO;
+        for (std::uint32_t i = first[v]; i < first[v + 1]; ++i)
+          if ((cut_[fan[i]] != 0) == (cut_[t] != 0)) {
+            faces.push_back(fan[i]);
+            normal += faces_[fan[i]];
+          }
+        if (std::all_of(faces.begin(), faces.end(), [&](std::uint32_t s) { return along(s, normal); })) {
+          corner = one = addCorner(v, part, faces);
+        } else {  // a crease: those that are nearly in the triangle's plane
+          faces.erase(std::remove_if(faces.begin(), faces.end(),
+                                     [&](std::uint32_t s) { return s != t && !along(s, faces_[t]); }),
+                      faces.end());
+          corner = addCorner(v, part, faces);
         }
       }
-      indices_.push_back(at);
+      indices_[part].push_back(corner);
     }
   }
 }
 
-bool BodyShape::isSmooth(const meshless_surgery::Surface& surface, std::uint32_t v, bool cut) const {
-  for (std::uint32_t i = starts_[v]; i < starts_[v + 1]; ++i) {
-    const std::uint32_t t = around_[i];
-    if ((surface.cut[t] != 0) == cut && faces_[t].dotProduct(normals_[cut][v]) < kSmoothUpTo * faces_[t].length())
-      return false;
+void BodyShape::makeBuffers() {
+  auto& manager = Ogre::HardwareBufferManager::getSingleton();
+  data_ = std::make_unique<Ogre::VertexData>();
+  data_->vertexCount = corners_.size();
+  Ogre::VertexDeclaration* layout = data_->vertexDeclaration;
+  layout->addElement(0, 0, Ogre::VET_FLOAT3, Ogre::VES_POSITION);
+  layout->addElement(0, 3 * sizeof(float), Ogre::VET_FLOAT3, Ogre::VES_NORMAL);
+  layout->addElement(1, 0, Ogre::VET_UBYTE4_NORM, Ogre::VES_DIFFUSE);
+  layout->addElement(2, 0, Ogre::VET_FLOAT3, Ogre::VES_TEXTURE_COORDINATES, 0);
+  places_ = manager.createVertexBuffer(6 * sizeof(float), corners_.size(),
+                                       Ogre::HardwareBuffer::HBU_DYNAMIC_WRITE_ONLY_DISCARDABLE);
+  colours_ = manager.createVertexBuffer(4, corners_.size(), Ogre::HardwareBuffer::HBU_DYNAMIC_WRITE_ONLY);
+  rests_ = manager.createVertexBuffer(3 * sizeof(float), corners_.size(), Ogre::HardwareBuffer::HBU_STATIC_WRITE_ONLY);
+  data_->vertexBufferBinding->setBinding(0, places_);
+  data_->vertexBufferBinding->setBinding(1, colours_);
+  data_->vertexBufferBinding->setBinding(2, rests_);
+}
+
+void BodyShape::makeParts() {
+  parts_.clear();
+  for (std::size_t p = 0; p < indices_.size(); ++p) {
+    parts_.push_back(nullptr);
+    if (indices_[p].empty()) continue;
+    parts_[p] = std::make_unique<BodyPart>(name_ + "_" + std::to_string(p), data_.get());
+    parts_[p]->setTriangles(indices_[p]);
+    node_->attachObject(parts_[p].get());
   }
-  return true;
 }
 
-Ogre::Vector3 BodyShape::creasedNormal(const meshless_surgery::Surface& surface, std::size_t t, std::uint32_t v) const {
-  Ogre::Vector3 normal = faces_[t];
-  for (std::uint32_t i = starts_[v]; i < starts_[v + 1]; ++i) {
-    const std::uint32_t other = around_[i];
-    if (other == t || (surface.cut[other] != 0) != (surface.cut[t] != 0)) continue;
-    if (faces_[other].dotProduct(faces_[t]) > kSmoothUpTo * faces_[other].length() * faces_[t].length())
-      normal += faces_[other];
-  }
-  return normal.normalisedCopy();
-}
-
-void BodyShape::applyLook(const meshless_surgery::Surface& surface, const BodyLook& look) {
-  Ogre::Pass* pass = material_->getTechnique(0)->getPass(0);
-  const double opacity = look.opacity * static_cast<double>(surface.color.a);
-  const bool clear = opacity < 0.998;
-  pass->setSceneBlending(clear ? Ogre::SBT_TRANSPARENT_ALPHA : Ogre::SBT_REPLACE);
-  pass->setDepthWriteEnabled(opacity > kSeenThrough);
-  // Through clear tissue what is behind it shows, not its own back side: that would be drawn in any order.
-  // Otherwise shells are seen from both sides.
-  pass->setCullingMode(clear ? Ogre::CULL_CLOCKWISE : Ogre::CULL_NONE);
-  pass->setSelfIllumination(look.by_strain ? Ogre::ColourValue(0.12f, 0.12f, 0.12f)
-                                           : toColour(surface.color) * kSelfLight);
-  pass->setPolygonMode(look.wire ? Ogre::PM_WIREFRAME : Ogre::PM_SOLID);
-}
-
-void BodyShape::show(const meshless_surgery::Surface& surface, const BodyLook& look) {
+void BodyShape::setColours(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
+                           const BodyLook& look) {
   const std::size_t vertices = surface.vertices.size() / 3;
-  const bool whole = 3 * surface.cut.size() == surface.triangles.size() &&
-                     std::all_of(surface.triangles.begin(), surface.triangles.end(),
-                                 [vertices](std::uint32_t v) { return v < vertices; });
-  node_->setVisible(whole && !surface.triangles.empty());
-  if (!whole || surface.triangles.empty()) return;
-  findCorners(surface);
-  applyLook(surface, look);
-  const bool regional = surface.regions.size() == vertices &&
-                        std::all_of(surface.regions.begin(), surface.regions.end(),
-                                    [&](std::uint8_t region) { return region <= surface.region_colors.size(); });
   const bool strained = look.by_strain && surface.strain.size() == vertices;
   std::vector<Ogre::ColourValue> colours{toColour(surface.color), toColour(surface.inside_color)};
   for (const auto& colour : surface.region_colors) colours.push_back(toColour(colour));
-  for (Ogre::ColourValue& colour : colours) colour.a *= static_cast<float>(look.opacity);
-
-  object_->estimateVertexCount(corners_.size());
-  object_->estimateIndexCount(indices_.size());
-  if (!begun_) {
-    begun_ = true;
-    object_->begin(material_->getName(), Ogre::RenderOperation::OT_TRIANGLE_LIST,
-                   Ogre::ResourceGroupManager::DEFAULT_RESOURCE_GROUP_NAME);
-  } else {
-    object_->beginUpdate(0);
-  }
-  for (const Corner& corner : corners_) {
-    object_->position(vertexOf(surface, corner.vertex));
-    object_->normal(corner.normal);
-    const std::size_t region = corner.cut && regional ? surface.regions[corner.vertex] : 0;
-    Ogre::ColourValue colour = colours[region > 0 ? 1 + region : corner.cut];
+  std::vector<std::uint8_t> bytes(4 * corners_.size());
+  for (std::size_t c = 0; c < corners_.size(); ++c) {
+    const Corner& corner = corners_[c];
+    Ogre::ColourValue colour = colours[corner.part];
     if (strained) {
       colour = heatColour(surface.strain[corner.vertex] / look.full_strain);
-      colour.a = static_cast<float>(look.opacity);
+    } else if (patterns && !look.shine) {  // which finds the patterns by itself
+      const auto& baked = corner.part > 0 ? patterns->inside_colors : patterns->colors;
+      if (baked.size() == 3 * vertices)
+        for (int k = 0; k < 3; ++k) colour[k] = static_cast<float>(baked[3 * corner.vertex + k]) / 255.0f;
     }
-    const Ogre::ColourValue lit = colour * kLamp;
-    object_->colour(lit.r, lit.g, lit.b, colour.a);
+    const float lamp = look.shine ? 1.0f : kLamp;
+    const float channels[] = {
+        lamp * colour.r, lamp * colour.g, lamp * colour.b,
+        strained ? static_cast<float>(look.opacity) : colour.a * static_cast<float>(look.opacity)};
+    for (int k = 0; k < 4; ++k)
+      bytes[4 * c + k] = static_cast<std::uint8_t>(255.0f * std::clamp(channels[k], 0.0f, 1.0f) + 0.5f);
   }
-  for (const std::uint32_t index : indices_) object_->index(index);
-  object_->end();
+  colours_->writeData(0, bytes.size(), bytes.data(), true);
+
+  bytes_.assign(3 * corners_.size(), 0.0f);
+  if (patterns && patterns->rest.size() == 3 * vertices)
+    for (std::size_t c = 0; c < corners_.size(); ++c)
+      std::copy_n(&patterns->rest[3 * corners_[c].vertex], 3, &bytes_[3 * c]);
+  rests_->writeData(0, bytes_.size() * sizeof(float), bytes_.data(), true);
+}
+
+void BodyShape::setMaterials(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
+                             const BodyLook& look) {
+  const double opacity = look.opacity * static_cast<double>(surface.color.a);
+  const bool clear = opacity < 0.998;
+  for (std::size_t p = 0; p < parts_.size(); ++p) {
+    if (!parts_[p]) continue;
+    Ogre::Pass* pass = parts_[p]->pass();
+    pass->setSceneBlending(clear ? Ogre::SBT_TRANSPARENT_ALPHA : Ogre::SBT_REPLACE);
+    pass->setDepthWriteEnabled(opacity > kSeenThrough);
+    // Through clear tissue what is behind it shows, not its own back side: that would be drawn in any order.
+    // Otherwise shells are seen from both sides.
+    pass->setCullingMode(clear ? Ogre::CULL_CLOCKWISE : Ogre::CULL_NONE);
+    pass->setPolygonMode(look.wire ? Ogre::PM_WIREFRAME : Ogre::PM_SOLID);
+    const meshless_surgery::Look& tissue = patterns && p < patterns->looks.size() ? patterns->looks[p] : plainLook();
+    const float wetness = look.by_strain ? kDry : tissue.wetness;
+    if (look.shine) {
+      const TissueProgram& program = tissueProgram();
+      const bool patterned = patterns && !patterns->rest.empty() && !look.by_strain && tissue.scale > 0.0f;
+      pass->setVertexProgram(program.vertex);
+      pass->setFragmentProgram(program.fragment);
+      const auto vertex = pass->getVertexProgramParameters();
+      vertex->setNamedAutoConstant("worldviewproj_matrix", Ogre::GpuProgramParameters::ACT_WORLDVIEWPROJ_MATRIX);
+      vertex->setNamedAutoConstant("worldview_matrix", Ogre::GpuProgramParameters::ACT_WORLDVIEW_MATRIX);
+      vertex->setNamedAutoConstant("view_matrix", Ogre::GpuProgramParameters::ACT_VIEW_MATRIX);
+      const auto fragment = pass->getFragmentProgramParameters();
+      fragment->setNamedConstant("noise", patterned ? static_cast<float>(tissue.noise) : 0.0f);
+      fragment->setNamedConstant("second", toColour(tissue.second));
+      fragment->setNamedConstant("scale", patterned ? tissue.scale : 1.0f);
+      fragment->setNamedConstant("wetness", wetness);
+      fragment->setNamedConstant("bump", patterned ? tissue.bump : 0.0f);
+      continue;
+    }
+    pass->setVertexProgram("");
+    pass->setFragmentProgram("");
+    pass->setLightingEnabled(true);
+    pass->setVertexColourTracking(Ogre::TVC_AMBIENT | Ogre::TVC_DIFFUSE);
+    const float mirror = 0.5f * wetness;
+    pass->setSpecular(mirror, mirror, mirror, 1.0f);
+    pass->setShininess(80.0f * wetness);
+    pass->setSelfIllumination(look.by_strain ? Ogre::ColourValue(0.12f, 0.12f, 0.12f)
+                                             : toColour(surface.color) * kSelfLight);
+  }
+}
+
+void BodyShape::place(const meshless_surgery::Surface& surface) {
+  bytes_.resize(6 * corners_.size());
+  Ogre::AxisAlignedBox box;
+  float* to = bytes_.data();
+  for (std::size_t c = 0; c < corners_.size(); ++c) {
+    const Ogre::Vector3 at = vertexOf(surface, corners_[c].vertex);
+    Ogre::Vector3 normal = Ogre::Vector3::ZERO;
+    for (std::uint32_t i = starts_[c]; i < starts_[c + 1]; ++i) normal += faces_[around_[i]];
+    normal.normalise();
+    box.merge(at);
+    for (const Ogre::Vector3& v : {at, normal})
+      for (int axis = 0; axis < 3; ++axis) *to++ = v[axis];
+  }
+  places_->writeData(0, bytes_.size() * sizeof(float), bytes_.data(), true);
+  for (const auto& part : parts_)
+    if (part) part->setBounds(box);
+}
+
+void BodyShape::show(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
+                     const BodyLook& look) {
+  const std::size_t vertices = surface.vertices.size() / 3;
+  const bool same = sameTriangles(surface);
+  const bool whole = same || (3 * surface.cut.size() == surface.triangles.size() &&
+                              std::all_of(surface.triangles.begin(), surface.triangles.end(),
+                                          [vertices](std::uint32_t v) { return v < vertices; }));
+  node_->setVisible(whole && !surface.triangles.empty());
+  if (!whole || surface.triangles.empty()) return;
+  findFaces(surface);
+  const bool new_look = !same || (patterns != nullptr) != patterned_ || !(look == look_) || surface.color != color_ ||
+                        surface.inside_color != inside_color_;
+  if (!same) {
+    findCorners(surface);
+    parts_.clear();
+    makeBuffers();
+    makeParts();
+  }
+  if (new_look || look.by_strain) setColours(surface, patterns, look);
+  if (new_look) {
+    setMaterials(surface, patterns, look);
+    patterned_ = patterns != nullptr;
+    look_ = look;
+    color_ = surface.color;
+    inside_color_ = surface.inside_color;
+  }
+  place(surface);
 }
 
 }  // namespace meshless

@@ -1,16 +1,22 @@
-// One body, drawn with smooth normals over its outer surface and, on their own, over the faces of cuts.
+// One body, drawn with smooth normals over its outer surface and, on their own, over the faces of cuts. What stays
+// while it deforms (triangles, which corners share a normal, colours) is uploaded where it changes; places and normals
+// in each frame.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include <OgreColourValue.h>
+#include <OgreHardwareVertexBuffer.h>
 #include <OgreMaterial.h>
+#include <OgreVector.h>
+#include <meshless_surgery/BodyTopology.h>
 #include <meshless_surgery/Surface.h>
 
 namespace Ogre {
-class ManualObject;
 class SceneManager;
 class SceneNode;
+class VertexData;
 }  // namespace Ogre
 
 namespace meshless {
@@ -20,8 +26,17 @@ struct BodyLook {
   bool by_strain = false;    // by Surface.strain, where the message has it
   double full_strain = 0.3;  // shown red
   double opacity = 1.0;
-  bool wire = false;  // edges of the triangles alone
+  bool wire = false;           // edges of the triangles alone
+  bool shine = false;          // patterns for each pixel, lamps and a wet film: needs tissueProgram()
+  std::uint32_t topology = 0;  // the number of the one that the patterns are of
+
+  bool operator==(const BodyLook& o) const {
+    return by_strain == o.by_strain && full_strain == o.full_strain && opacity == o.opacity && wire == o.wire &&
+           shine == o.shine && topology == o.topology;
+  }
 };
+
+class BodyPart;
 
 class BodyShape {
  public:
@@ -30,34 +45,48 @@ class BodyShape {
   BodyShape(const BodyShape&) = delete;
   BodyShape& operator=(const BodyShape&) = delete;
 
-  void show(const meshless_surgery::Surface& surface, const BodyLook& look);
+  /// `patterns` is of the same topology as the surface; null: plain colours.
+  void show(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
+            const BodyLook& look);
 
  private:
+  /// A vertex where faces share a normal.
   struct Corner {
     std::uint32_t vertex = 0;
-    Ogre::Vector3 normal;
-    bool cut = false;
+    std::uint32_t part = 0;  // 0: of the outer surface, 1: of cut faces, 2 ..: of those in the regions 1 ..
   };
 
+  bool sameTriangles(const meshless_surgery::Surface& surface) const;
+  void findFaces(const meshless_surgery::Surface& surface);
   void findCorners(const meshless_surgery::Surface& surface);
-  bool isSmooth(const meshless_surgery::Surface& surface, std::uint32_t v, bool cut) const;
-  /// At a crease: of triangle t and of those around its vertex v that are nearly in its plane.
-  Ogre::Vector3 creasedNormal(const meshless_surgery::Surface& surface, std::size_t t, std::uint32_t v) const;
-  void applyLook(const meshless_surgery::Surface& surface, const BodyLook& look);
+  std::uint32_t addCorner(std::uint32_t v, std::uint32_t part, const std::vector<std::uint32_t>& faces);
+  void makeBuffers();
+  void makeParts();
+  void setColours(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
+                  const BodyLook& look);
+  void setMaterials(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
+                    const BodyLook& look);
+  void place(const meshless_surgery::Surface& surface);
 
   Ogre::SceneManager* scene_manager_;
   Ogre::SceneNode* node_;
-  Ogre::ManualObject* object_;
-  Ogre::MaterialPtr material_;
-  bool begun_ = false;  // the object has its section
-  // kept, so that a frame allocates nothing
-  std::vector<Ogre::Vector3> normals_[2];  // of the outer surface, and of cuts
-  std::vector<std::uint32_t> place_[2];    // of a vertex among the corners, where one normal will do
-  std::vector<Ogre::Vector3> faces_;       // normals, as long as twice the area
-  std::vector<std::uint32_t> starts_, next_,
-      around_;  // triangles around a vertex: around_[starts_[v] .. starts_[v + 1])
+  std::string name_;
+  std::unique_ptr<Ogre::VertexData> data_;  // of all parts
+  Ogre::HardwareVertexBufferSharedPtr places_, colours_, rests_;
+  std::vector<std::unique_ptr<BodyPart>> parts_;
+  // of the topology that is shown
+  std::vector<std::uint32_t> triangles_;
+  std::vector<std::uint8_t> cut_, regions_;
   std::vector<Corner> corners_;
-  std::vector<std::uint32_t> indices_;
+  std::vector<std::uint32_t> starts_, around_;  // faces of a corner's normal: around_[starts_[c] .. starts_[c + 1])
+  std::vector<std::vector<std::uint32_t>> indices_;  // of each part
+  // and how
+  bool patterned_ = false;
+  BodyLook look_;
+  std_msgs::ColorRGBA color_, inside_color_;
+  // kept, so that a frame allocates nothing
+  std::vector<Ogre::Vector3> faces_;  // normals, as long as twice the area
+  std::vector<float> bytes_;
 };
 
 /// Blue at 0 over green to red at 1 and above.

@@ -13,11 +13,14 @@
 #include <rviz/properties/string_property.h>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "tissue_program.h"
+
 namespace meshless {
 namespace {
 
 enum Colouring { kByMaterial, kByStrain };
 
+constexpr float kLongestWait = 0.5f;                 // [s] for the topology of a surface, before it is shown plain
 constexpr float kSmallest = 1e-3f, kLargest = 2.0f;  // [m] of organs
 
 // [m] the longest side of what it spans.
@@ -49,6 +52,11 @@ TissueDisplay::TissueDisplay() {
   opacity_->setMin(0.05f);
   opacity_->setMax(1.0f);
   wire_ = new rviz::BoolProperty("Wireframe", false, "The edges of the triangles alone.", this, SLOT(changeLook()));
+  shine_ =
+      new rviz::BoolProperty("Shine", true,
+                             "Lamps at the camera and above, wet tissue, patterns for each pixel. Without it: rviz's "
+                             "light, patterns for each vertex.",
+                             this, SLOT(changeLook()));
   tools_shown_ = new rviz::BoolProperty("Tools", true, "Springs, push sphere and scissors.", this, SLOT(changeLook()));
   full_force_ = new rviz::FloatProperty("Full force", 20.0f, "Force [N] of a spring that is shown red.", tools_shown_,
                                         SLOT(changeLook()), this);
@@ -61,6 +69,7 @@ void TissueDisplay::onEnable() { listen(); }
 
 void TissueDisplay::onDisable() {
   subscriber_.shutdown();
+  topology_subscriber_.shutdown();
   bodies_.clear();
 }
 
@@ -68,6 +77,8 @@ void TissueDisplay::reset() {
   Display::reset();
   bodies_.clear();
   surfaces_.reset();
+  patterns_.clear();
+  topology_.reset();
 }
 
 void TissueDisplay::listen() {
@@ -85,11 +96,16 @@ void TissueDisplay::listen() {
         surfaces_ = surfaces;
         fresh_ = true;
       });
+  topology_subscriber_ = update_nh_.subscribe<meshless_surgery::Topology>(
+      ros::names::resolve(node) + "/topology", 1, [this](const meshless_surgery::Topology::ConstPtr& topology) {
+        next_topology_ = topology;
+        changeLook();
+      });
 }
 
 void TissueDisplay::changeLook() { fresh_ = surfaces_ != nullptr; }
 
-void TissueDisplay::update(float, float) {
+void TissueDisplay::update(float wall_dt, float) {
   if (!surfaces_) return;
   Ogre::Vector3 position;
   Ogre::Quaternion orientation;
@@ -101,8 +117,22 @@ void TissueDisplay::update(float, float) {
   deleteStatus("Transform");
   scene_node_->setPosition(position);
   scene_node_->setOrientation(orientation);
-  // Once a frame, however fast messages come.
-  if (fresh_) draw();
+  // Once a frame, however fast messages come. Pieces wait for their looks, which come on a topic of their own.
+  if (!fresh_) return;
+  const bool known = findPatterns();
+  waited_ = known ? 0.0f : waited_ + wall_dt;
+  if (known || waited_ > kLongestWait) draw();
+}
+
+bool TissueDisplay::findPatterns() {
+  if (surfaces_->topology == 0) return true;  // of a node that has none
+  if (next_topology_ && next_topology_ != topology_ && next_topology_->run == surfaces_->run &&
+      next_topology_->topology == surfaces_->topology) {
+    topology_ = next_topology_;
+    patterns_.clear();
+    for (const auto& body : topology_->bodies) patterns_[body.id] = &body;
+  }
+  return topology_ && topology_->run == surfaces_->run && topology_->topology == surfaces_->topology;
 }
 
 void TissueDisplay::draw() {
@@ -112,6 +142,13 @@ void TissueDisplay::draw() {
   look.full_strain = full_strain_->getFloat();
   look.opacity = opacity_->getFloat();
   look.wire = wire_->getBool();
+  look.shine = shine_->getBool() && tissueProgram().usable();
+  if (shine_->getBool() && !look.shine)
+    setStatus(rviz::StatusProperty::Warn, "Shine", QString::fromStdString(tissueProgram().refused));
+  else
+    deleteStatus("Shine");
+  const bool known = findPatterns();
+  look.topology = known ? surfaces_->topology : 0;
   std::set<std::uint32_t> seen;
   std::size_t triangles = 0;
   bool others = false;
@@ -123,7 +160,8 @@ void TissueDisplay::draw() {
       shape = std::make_unique<BodyShape>(scene_manager_, scene_node_);
       others = true;
     }
-    shape->show(surface, look);
+    const auto patterns = known ? patterns_.find(surface.id) : patterns_.end();
+    shape->show(surface, patterns == patterns_.end() ? nullptr : patterns->second, look);
   }
   if (others) warnOfSize();
   for (auto it = bodies_.begin(); it != bodies_.end();)

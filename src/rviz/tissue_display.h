@@ -6,8 +6,10 @@
 #ifndef Q_MOC_RUN
 #include <map>
 #include <memory>
+#include <unordered_map>
 
 #include <meshless_surgery/Surfaces.h>
+#include <meshless_surgery/Topology.h>
 #include <ros/ros.h>
 
 #include "body_shape.h"
@@ -43,6 +45,8 @@ class TissueDisplay : public rviz::Display {
 
  private:
   void draw();
+  /// Of the bodies that are shown, by their ids; empty where it has not come.
+  bool findPatterns();
   void warnOfSize();
 
   rviz::StringProperty* node_;
@@ -50,10 +54,14 @@ class TissueDisplay : public rviz::Display {
   rviz::FloatProperty* full_strain_;
   rviz::FloatProperty* opacity_;
   rviz::BoolProperty* wire_;
+  rviz::BoolProperty* shine_;
   rviz::BoolProperty* tools_shown_;
   rviz::FloatProperty* full_force_;
-  ros::Subscriber subscriber_;
+  ros::Subscriber subscriber_, topology_subscriber_;
   meshless_surgery::Surfaces::ConstPtr surfaces_;
+  meshless_surgery::Topology::ConstPtr topology_, next_topology_;  // of what is shown, and the last that has come
+  std::unordered_map<std::uint32_t, const meshless_surgery::BodyTopology*> patterns_;  // of topology_, by the body's id
+  float waited_ = 0.0f;  // [s] for the topology of surfaces_
   bool fresh_ = false;
   std::map<std::uint32_t, std::unique_ptr<BodyShape>> bodies_;
   std::unique_ptr<ToolsShape> tools_;

@@ -1,0 +1,144 @@
+#version 120
+// Tissue: two colours mixed by the pattern of include/meshless_surgery/appearance/look.h, uneven to light, under a film of
+// water. Two lamps: one at the camera, as an endoscope has it, and one above.
+
+uniform float noise;   // as in Look.msg
+uniform vec4 second;
+uniform float scale;   // [m] of a cell of the pattern
+uniform float wetness;
+uniform float bump;
+
+varying vec3 seen_at;
+varying vec3 normal;
+varying vec3 above;
+varying vec3 place;
+
+const float PERIOD = 289.0;
+const float JITTER = 0.3;
+
+// --- the same functions as in src/appearance/look.cpp
+
+vec4 remainderOf(vec4 x) { return x - floor(x / PERIOD) * PERIOD; }
+vec4 permuted(vec4 x) { return remainderOf((34.0 * x + 1.0) * x); }
+// Of the four cells that begin at one and go on along x and y, and of those beyond them along z.
+void hashesOf(vec3 cell, out vec4 near, out vec4 beyond)
+{
+  vec4 x = remainderOf(cell.xxxx + vec4(0.0, 1.0, 0.0, 1.0)), y = remainderOf(cell.yyyy + vec4(0.0, 0.0, 1.0, 1.0));
+  vec4 z = remainderOf(cell.zzzz + vec4(0.0, 1.0, 0.0, 0.0)), columns = permuted(permuted(x) + y);
+  near = permuted(columns + z.x);
+  beyond = permuted(columns + z.y);
+}
+vec3 vectorOf(float hash) { return 2.0 * fract(vec3(0.618034, 0.754878, 0.569840) * hash) - 1.0; }
+
+float along(float hash, vec3 from) { return dot(vectorOf(hash), from); }
+float gradientNoise(vec3 p)
+{
+  vec3 cell = floor(p), i = p - cell, j = i - 1.0;
+  vec3 f = i * i * i * (i * (6.0 * i - 15.0) + 10.0);
+  vec4 near, beyond;
+  hashesOf(cell, near, beyond);
+  vec4 low = vec4(along(near.x, i), along(near.y, vec3(j.x, i.yz)), along(near.z, vec3(i.x, j.y, i.z)),
+                  along(near.w, vec3(j.xy, i.z)));
+  vec4 high = vec4(along(beyond.x, vec3(i.xy, j.z)), along(beyond.y, vec3(j.x, i.y, j.z)),
+                   along(beyond.z, vec3(i.x, j.yz)), along(beyond.w, j));
+  vec4 plane = mix(low, high, f.z);
+  vec2 line = mix(plane.xy, plane.zw, f.y);
+  return mix(line.x, line.y, f.x);
+}
+
+// x, y: how far the nearest and the next seed are, squared; z: the nearest one's hash.
+void meet(float hash, vec3 from, inout vec3 seeds)
+{
+  vec3 to = from + JITTER * vectorOf(hash);
+  float far = dot(to, to);
+  seeds.z = far < seeds.x ? hash : seeds.z;
+  seeds.y = min(seeds.y, max(seeds.x, far));
+  seeds.x = min(seeds.x, far);
+}
+// How far beyond the wall of its cell, and the cell's tint.
+vec2 cellsAt(vec3 p)
+{
+  vec3 first = floor(p - 0.5), i = first + 0.5 - p, j = i + 1.0;
+  vec4 near, beyond;
+  hashesOf(first, near, beyond);
+  vec3 seeds = vec3(1e9, 1e9, 0.0);
+  meet(near.x, i, seeds);
+  meet(near.y, vec3(j.x, i.yz), seeds);
+  meet(near.z, vec3(i.x, j.y, i.z), seeds);
+  meet(near.w, vec3(j.xy, i.z), seeds);
+  meet(beyond.x, vec3(i.xy, j.z), seeds);
+  meet(beyond.y, vec3(j.x, i.y, j.z), seeds);
+  meet(beyond.z, vec3(i.x, j.yz), seeds);
+  meet(beyond.w, j, seeds);
+  return vec2(sqrt(seeds.y) - sqrt(seeds.x), seeds.z / PERIOD);
+}
+
+// x: how full the pattern is; y: how high the surface stands, in cells; z: how full it is on the whole.
+vec3 patternAt(vec3 p)
+{
+  if (noise < 0.5) return vec3(0.0, bump > 0.0 ? 0.3 * gradientNoise(p) : 0.0, 0.0);
+  if (noise < 1.5) {
+    float base = gradientNoise(p), vessel = 1.0 - smoothstep(0.02, 0.10, abs(base));
+    float t = vessel * smoothstep(-0.15, 0.25, gradientNoise(0.37 * p + 7.3));
+    return vec3(t, 0.15 * t + 0.1 * base, 0.15);
+  }
+  if (noise < 3.5) {
+    vec2 cell = cellsAt(p);
+    if (noise < 2.5) {
+      float ground = 0.25 * cell.y + 0.5 * clamp(0.45 + gradientNoise(0.13 * p), 0.0, 1.0);
+      return vec3(mix(ground, 1.0, 1.0 - smoothstep(0.0, 0.35, cell.x)), 0.3 * min(cell.x, 0.4), 0.6);
+    }
+    return vec3(mix(0.3 * cell.y, 1.0, 1.0 - smoothstep(0.0, 0.14, cell.x)), 0.3 * smoothstep(0.0, 0.5, cell.x), 0.3);
+  }
+  if (noise < 4.5) {
+    vec3 strand = vec3(0.08 * p.x, p.yz);
+    float t = clamp(0.5 + 0.8 * gradientNoise(strand) + 0.5 * gradientNoise(2.3 * strand), 0.0, 1.0);
+    return vec3(t, -0.25 * t, 0.5);
+  }
+  float pit = smoothstep(0.2, 0.4, gradientNoise(p));
+  return vec3(clamp(0.3 + 0.6 * gradientNoise(0.25 * p), 0.0, 0.5) + 0.5 * pit, -0.2 * pit, 0.35);
+}
+
+// --- light
+
+// GGX: how much of a lamp is mirrored where the half vector is that far from the normal, over pi.
+float mirrored(float cosine, float roughness)
+{
+  float a = roughness * roughness * roughness * roughness;
+  float d = cosine * cosine * (a - 1.0) + 1.0;
+  return a / (d * d);
+}
+
+void main()
+{
+  vec3 n = normalize(normal), eye = normalize(-seen_at), up = normalize(above);
+  if (dot(n, eye) < 0.0) n = -n;  // shells are seen from both sides
+
+  vec3 p = place / scale;
+  vec3 colour = gl_Color.rgb;
+  if (noise > 0.5 || bump > 0.0) {
+    vec3 pattern = patternAt(p);
+    // Cells smaller than a pixel are their mean.
+    vec3 width = fwidth(p);
+    float coarse = smoothstep(0.5, 1.2, max(width.x, max(width.y, width.z)));
+    if (noise > 0.5) colour = mix(colour, second.rgb, mix(pattern.x, pattern.z, coarse));
+    // Mikkelsen 2010, Bump mapping unparametrized surfaces on the GPU.
+    float height = bump * scale * pattern.y;
+    vec3 dx = dFdx(seen_at), dy = dFdy(seen_at);
+    vec3 r1 = cross(dy, n), r2 = cross(n, dx);
+    float area = dot(dx, r1);
+    vec3 slope = sign(area) * (dFdx(height) * r1 + dFdy(height) * r2) / max(abs(area), 1e-12);
+    n = normalize(n - (1.0 - coarse) * slope);
+  }
+
+  float facing = max(dot(n, eye), 0.0), raised = dot(n, up);
+  vec3 lit = colour * (0.28 + 0.50 * facing + 0.16 * (1.0 + raised));
+  lit.r += 0.05 * colour.r * (1.0 - facing);  // light that has gone through tissue is red
+
+  float roughness = mix(0.75, 0.22, wetness);
+  vec3 half_up = normalize(eye + up);
+  float film = 0.010 * mirrored(facing, roughness) +
+               0.008 * mirrored(max(dot(n, half_up), 0.0), roughness) * step(0.0, raised) +
+               0.12 * pow(1.0 - facing, 4.0);
+  gl_FragColor = vec4(lit + vec3(0.95, 0.97, 1.0) * wetness * min(film, 0.9), gl_Color.a);
+}

@@ -1,0 +1,21 @@
+#version 120
+// Tissue: what media/tissue.frag lights.
+
+uniform mat4 worldviewproj_matrix;
+uniform mat4 worldview_matrix;
+uniform mat4 view_matrix;
+
+varying vec3 seen_at;  // [m] from the camera
+varying vec3 normal;
+varying vec3 above;    // where up is, for the camera
+varying vec3 place;    // [m] of the body at rest
+
+void main()
+{
+  gl_Position = worldviewproj_matrix * gl_Vertex;
+  seen_at = (worldview_matrix * gl_Vertex).xyz;
+  normal = (worldview_matrix * vec4(gl_Normal, 0.0)).xyz;
+  above = (view_matrix * vec4(0.0, 0.0, 1.0, 0.0)).xyz;
+  place = gl_MultiTexCoord0.xyz;
+  gl_FrontColor = gl_Color;
+}
