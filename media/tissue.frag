@@ -1,8 +1,8 @@
 #version 120
 // Tissue: two colours mixed by the pattern of include/meshless_surgery/appearance/look.h, uneven to light, under a film of
-// water. Two lamps: one at the camera, as an endoscope has it, and one above.
+// water. Two lamps: one at the camera, as an endoscope has it, and one above. A program for each pattern: software GL
+// takes every branch. NOISE is as in Look.msg, -1 for what is plain and even.
 
-uniform float noise;   // as in Look.msg
 uniform vec4 second;
 uniform float scale;   // [m] of a cell of the pattern
 uniform float wetness;
@@ -76,27 +76,27 @@ vec2 cellsAt(vec3 p)
 // x: how full the pattern is; y: how high the surface stands, in cells; z: how full it is on the whole.
 vec3 patternAt(vec3 p)
 {
-  if (noise < 0.5) return vec3(0.0, bump > 0.0 ? 0.3 * gradientNoise(p) : 0.0, 0.0);
-  if (noise < 1.5) {
-    float base = gradientNoise(p), vessel = 1.0 - smoothstep(0.02, 0.10, abs(base));
-    float t = vessel * smoothstep(-0.15, 0.25, gradientNoise(0.37 * p + 7.3));
-    return vec3(t, 0.15 * t + 0.1 * base, 0.15);
-  }
-  if (noise < 3.5) {
-    vec2 cell = cellsAt(p);
-    if (noise < 2.5) {
-      float ground = 0.25 * cell.y + 0.5 * clamp(0.45 + gradientNoise(0.13 * p), 0.0, 1.0);
-      return vec3(mix(ground, 1.0, 1.0 - smoothstep(0.0, 0.35, cell.x)), 0.3 * min(cell.x, 0.4), 0.6);
-    }
-    return vec3(mix(0.3 * cell.y, 1.0, 1.0 - smoothstep(0.0, 0.14, cell.x)), 0.3 * smoothstep(0.0, 0.5, cell.x), 0.3);
-  }
-  if (noise < 4.5) {
-    vec3 strand = vec3(0.08 * p.x, p.yz);
-    float t = clamp(0.5 + 0.8 * gradientNoise(strand) + 0.5 * gradientNoise(2.3 * strand), 0.0, 1.0);
-    return vec3(t, -0.25 * t, 0.5);
-  }
+#if NOISE == 1
+  float base = gradientNoise(p), vessel = 1.0 - smoothstep(0.02, 0.10, abs(base));
+  float t = vessel * smoothstep(-0.15, 0.25, gradientNoise(0.37 * p + 7.3));
+  return vec3(t, 0.15 * t + 0.1 * base, 0.15);
+#elif NOISE == 2
+  vec2 cell = cellsAt(p);
+  float ground = 0.25 * cell.y + 0.5 * clamp(0.45 + gradientNoise(0.13 * p), 0.0, 1.0);
+  return vec3(mix(ground, 1.0, 1.0 - smoothstep(0.0, 0.35, cell.x)), 0.3 * min(cell.x, 0.4), 0.6);
+#elif NOISE == 3
+  vec2 cell = cellsAt(p);
+  return vec3(mix(0.3 * cell.y, 1.0, 1.0 - smoothstep(0.0, 0.14, cell.x)), 0.3 * smoothstep(0.0, 0.5, cell.x), 0.3);
+#elif NOISE == 4
+  vec3 strand = vec3(0.08 * p.x, p.yz);
+  float t = clamp(0.5 + 0.8 * gradientNoise(strand) + 0.5 * gradientNoise(2.3 * strand), 0.0, 1.0);
+  return vec3(t, -0.25 * t, 0.5);
+#elif NOISE == 5
   float pit = smoothstep(0.2, 0.4, gradientNoise(p));
   return vec3(clamp(0.3 + 0.6 * gradientNoise(0.25 * p), 0.0, 0.5) + 0.5 * pit, -0.2 * pit, 0.35);
+#else
+  return vec3(0.0, 0.3 * gradientNoise(p), 0.0);
+#endif
 }
 
 // --- light
@@ -114,31 +114,31 @@ void main()
   vec3 n = normalize(normal), eye = normalize(-seen_at), up = normalize(above);
   if (dot(n, eye) < 0.0) n = -n;  // shells are seen from both sides
 
-  vec3 p = place / scale;
   vec3 colour = gl_Color.rgb;
-  if (noise > 0.5 || bump > 0.0) {
-    vec3 pattern = patternAt(p);
-    // Cells smaller than a pixel are their mean.
-    vec3 width = fwidth(p);
-    float coarse = smoothstep(0.5, 1.2, max(width.x, max(width.y, width.z)));
-    if (noise > 0.5) colour = mix(colour, second.rgb, mix(pattern.x, pattern.z, coarse));
-    // Mikkelsen 2010, Bump mapping unparametrized surfaces on the GPU.
-    float height = bump * scale * pattern.y;
-    vec3 dx = dFdx(seen_at), dy = dFdy(seen_at);
-    vec3 r1 = cross(dy, n), r2 = cross(n, dx);
-    float area = dot(dx, r1);
-    vec3 slope = sign(area) * (dFdx(height) * r1 + dFdy(height) * r2) / max(abs(area), 1e-12);
-    n = normalize(n - (1.0 - coarse) * slope);
-  }
+#if NOISE >= 0
+  vec3 p = place / scale;
+  vec3 pattern = patternAt(p);
+  // Cells smaller than a pixel are their mean.
+  vec3 width = fwidth(p);
+  float coarse = smoothstep(0.5, 1.2, max(width.x, max(width.y, width.z)));
+  colour = mix(colour, second.rgb, mix(pattern.x, pattern.z, coarse));
+  // Mikkelsen 2010, Bump mapping unparametrized surfaces on the GPU.
+  float height = bump * scale * pattern.y;
+  vec3 dx = dFdx(seen_at), dy = dFdy(seen_at);
+  vec3 r1 = cross(dy, n), r2 = cross(n, dx);
+  float area = dot(dx, r1);
+  vec3 slope = sign(area) * (dFdx(height) * r1 + dFdy(height) * r2) / max(abs(area), 1e-12);
+  n = normalize(n - (1.0 - coarse) * slope);
+#endif
 
   float facing = max(dot(n, eye), 0.0), raised = dot(n, up);
   vec3 lit = colour * (0.28 + 0.50 * facing + 0.16 * (1.0 + raised));
   lit.r += 0.05 * colour.r * (1.0 - facing);  // light that has gone through tissue is red
 
-  float roughness = mix(0.75, 0.22, wetness);
+  float rim = (1.0 - facing) * (1.0 - facing), roughness = mix(0.75, 0.22, wetness);
   vec3 half_up = normalize(eye + up);
   float film = 0.010 * mirrored(facing, roughness) +
                0.008 * mirrored(max(dot(n, half_up), 0.0), roughness) * step(0.0, raised) +
-               0.12 * pow(1.0 - facing, 4.0);
+               0.12 * rim * rim;
   gl_FragColor = vec4(lit + vec3(0.95, 0.97, 1.0) * wetness * min(film, 0.9), gl_Color.a);
 }

@@ -31,6 +31,21 @@ constexpr std::uint32_t kNoCorner = std::numeric_limits<std::uint32_t>::max();
 
 Ogre::ColourValue toColour(const std_msgs::ColorRGBA& c) { return Ogre::ColourValue(c.r, c.g, c.b, c.a); }
 
+/// Each edge is met as often one way as the other.
+bool isClosed(const std::vector<std::uint32_t>& triangles) {
+  std::vector<std::uint64_t> there, back;
+  there.reserve(triangles.size());
+  back.reserve(triangles.size());
+  for (std::size_t c = 0; c < triangles.size(); ++c) {
+    const std::uint64_t a = triangles[c], b = triangles[c % 3 == 2 ? c - 2 : c + 1];
+    there.push_back(a << 32 | b);
+    back.push_back(b << 32 | a);
+  }
+  std::sort(there.begin(), there.end());
+  std::sort(back.begin(), back.end());
+  return there == back;
+}
+
 const meshless_surgery::Look& plainLook() {
   static const meshless_surgery::Look look = [] {
     meshless_surgery::Look plain;
@@ -114,8 +129,8 @@ void BodyShape::findFaces(const meshless_surgery::Surface& surface) {
   }
 }
 
-std::uint32_t BodyShape::addCorner(std::uint32_t v, std::uint32_t part, const std::vector<std::uint32_t>& faces) {
-  corners_.push_back({v, part});
+std::uint32_t BodyShape::addCorner(std::uint32_t v, std::uint32_t tissue, const std::vector<std::uint32_t>& faces) {
+  corners_.push_back({v, tissue});
   around_.insert(around_.end(), faces.begin(), faces.end());
   starts_.push_back(static_cast<std::uint32_t>(around_.size()));
   return static_cast<std::uint32_t>(corners_.size() - 1);
@@ -137,9 +152,9 @@ void BodyShape::findCorners(const meshless_surgery::Surface& surface) {
   std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
   for (std::size_t c = 0; c < 3 * triangles; ++c) fan[next[triangles_[c]]++] = static_cast<std::uint32_t>(c / 3);
 
-  const auto partOf = [&](std::size_t t) -> std::uint32_t {
-    if (cut_[t] == 0) return 0;
-    return regional ? 1u + regions_[triangles_[3 * t]] : 1u;
+  closed_ = isClosed(triangles_);
+  const auto tissueOf = [&](std::size_t t, std::uint32_t v) -> std::uint32_t {
+    return cut_[t] == 0 ? 0u : regional ? 1u + regions_[v] : 1u;
   };
   const auto along = [&](std::uint32_t s, const Ogre::Vector3& normal) {
     return faces_[s].dotProduct(normal) >= kSmoothUpTo * faces_[s].length() * normal.length();
@@ -152,7 +167,7 @@ void BodyShape::findCorners(const meshless_surgery::Surface& surface) {
   for (auto& corners : smooth) corners.assign(vertices, kNoCorner);
   std::vector<std::uint32_t> faces;
   for (std::size_t t = 0; t < triangles; ++t) {
-    const std::uint32_t part = partOf(t);
+    const std::uint32_t part = tissueOf(t, triangles_[3 * t]);
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t v = triangles_[3 * t + k];
       std::uint32_t& one = smooth[cut_[t] != 0][v];
@@ -166,12 +181,12 @@ void BodyShape::findCorners(const meshless_surgery::Surface& surface) {
             normal += faces_[fan[i]];
           }
         if (std::all_of(faces.begin(), faces.end(), [&](std::uint32_t s) { return along(s, normal); })) {
-          corner = one = addCorner(v, part, faces);
+          corner = one = addCorner(v, tissueOf(t, v), faces);
         } else {  // a crease: those that are nearly in the triangle's plane
           faces.erase(std::remove_if(faces.begin(), faces.end(),
                                      [&](std::uint32_t s) { return s != t && !along(s, faces_[t]); }),
                       faces.end());
-          corner = addCorner(v, part, faces);
+          corner = addCorner(v, tissueOf(t, v), faces);
         }
       }
       indices_[part].push_back(corner);
@@ -217,11 +232,11 @@ void BodyShape::setColours(const meshless_surgery::Surface& surface, const meshl
   std::vector<std::uint8_t> bytes(4 * corners_.size());
   for (std::size_t c = 0; c < corners_.size(); ++c) {
     const Corner& corner = corners_[c];
-    Ogre::ColourValue colour = colours[corner.part];
+    Ogre::ColourValue colour = colours[corner.tissue];
     if (strained) {
       colour = heatColour(surface.strain[corner.vertex] / look.full_strain);
     } else if (patterns && !look.shine) {  // which finds the patterns by itself
-      const auto& baked = corner.part > 0 ? patterns->inside_colors : patterns->colors;
+      const auto& baked = corner.tissue > 0 ? patterns->inside_colors : patterns->colors;
       if (baked.size() == 3 * vertices)
         for (int k = 0; k < 3; ++k) colour[k] = static_cast<float>(baked[3 * corner.vertex + k]) / 255.0f;
     }
@@ -251,26 +266,27 @@ void BodyShape::setMaterials(const meshless_surgery::Surface& surface, const mes
     pass->setSceneBlending(clear ? Ogre::SBT_TRANSPARENT_ALPHA : Ogre::SBT_REPLACE);
     pass->setDepthWriteEnabled(opacity > kSeenThrough);
     // Through clear tissue what is behind it shows, not its own back side: that would be drawn in any order.
-    // Otherwise shells are seen from both sides.
-    pass->setCullingMode(clear ? Ogre::CULL_CLOCKWISE : Ogre::CULL_NONE);
+    // Otherwise what is open is seen from both sides.
+    pass->setCullingMode(clear || closed_ ? Ogre::CULL_CLOCKWISE : Ogre::CULL_NONE);
     pass->setPolygonMode(look.wire ? Ogre::PM_WIREFRAME : Ogre::PM_SOLID);
     const meshless_surgery::Look& tissue = patterns && p < patterns->looks.size() ? patterns->looks[p] : plainLook();
     const float wetness = look.by_strain ? kDry : tissue.wetness;
     if (look.shine) {
       const TissueProgram& program = tissueProgram();
-      const bool patterned = patterns && !patterns->rest.empty() && !look.by_strain && tissue.scale > 0.0f;
+      const bool patterned = patterns && !patterns->rest.empty() && !look.by_strain && tissue.scale > 0.0f &&
+                             tissue.noise < program.patterned.size() && (tissue.noise > 0 || tissue.bump > 0.0f);
       pass->setVertexProgram(program.vertex);
-      pass->setFragmentProgram(program.fragment);
+      pass->setFragmentProgram(patterned ? program.patterned[tissue.noise] : program.even);
       const auto vertex = pass->getVertexProgramParameters();
       vertex->setNamedAutoConstant("worldviewproj_matrix", Ogre::GpuProgramParameters::ACT_WORLDVIEWPROJ_MATRIX);
       vertex->setNamedAutoConstant("worldview_matrix", Ogre::GpuProgramParameters::ACT_WORLDVIEW_MATRIX);
       vertex->setNamedAutoConstant("view_matrix", Ogre::GpuProgramParameters::ACT_VIEW_MATRIX);
       const auto fragment = pass->getFragmentProgramParameters();
-      fragment->setNamedConstant("noise", patterned ? static_cast<float>(tissue.noise) : 0.0f);
+      fragment->setIgnoreMissingParams(true);
       fragment->setNamedConstant("second", toColour(tissue.second));
-      fragment->setNamedConstant("scale", patterned ? tissue.scale : 1.0f);
+      fragment->setNamedConstant("scale", tissue.scale);
+      fragment->setNamedConstant("bump", tissue.bump);
       fragment->setNamedConstant("wetness", wetness);
-      fragment->setNamedConstant("bump", patterned ? tissue.bump : 0.0f);
       continue;
     }
     pass->setVertexProgram("");

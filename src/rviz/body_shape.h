@@ -53,13 +53,13 @@ class BodyShape {
   /// A vertex where faces share a normal.
   struct Corner {
     std::uint32_t vertex = 0;
-    std::uint32_t part = 0;  // 0: of the outer surface, 1: of cut faces, 2 ..: of those in the regions 1 ..
+    std::uint32_t tissue = 0;  // 0: of the outer surface, 1: of cut faces, 2 ..: of those in the regions 1 ..
   };
 
   bool sameTriangles(const meshless_surgery::Surface& surface) const;
   void findFaces(const meshless_surgery::Surface& surface);
   void findCorners(const meshless_surgery::Surface& surface);
-  std::uint32_t addCorner(std::uint32_t v, std::uint32_t part, const std::vector<std::uint32_t>& faces);
+  std::uint32_t addCorner(std::uint32_t v, std::uint32_t tissue, const std::vector<std::uint32_t>& faces);
   void makeBuffers();
   void makeParts();
   void setColours(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
@@ -78,6 +78,7 @@ class BodyShape {
   std::vector<std::uint32_t> triangles_;
   std::vector<std::uint8_t> cut_, regions_;
   std::vector<Corner> corners_;
+  bool closed_ = false;                         // it has no edge, so its back side is never seen
   std::vector<std::uint32_t> starts_, around_;  // faces of a corner's normal: around_[starts_[c] .. starts_[c + 1])
   std::vector<std::vector<std::uint32_t>> indices_;  // of each part
   // and how

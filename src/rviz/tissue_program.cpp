@@ -12,29 +12,46 @@
 namespace meshless {
 namespace {
 
-/// Why it cannot be used; empty: it can.
-std::string load(const std::string& name, Ogre::GpuProgramType type, const std::string& file) {
-  std::ifstream stream(file);
-  std::ostringstream source;
-  source << stream.rdbuf();
-  if (!stream) return "cannot read " + file;
-  try {
-    const auto program = Ogre::HighLevelGpuProgramManager::getSingleton().createProgram(
-        name, Ogre::ResourceGroupManager::DEFAULT_RESOURCE_GROUP_NAME, "glsl", type);
-    program->setSource(source.str());
-    program->load();
-    if (!program->isSupported() || program->hasCompileError()) return "the driver does not take " + file;
-  } catch (const Ogre::Exception& e) {
-    return file + ": " + e.getDescription();
+class Loader {
+ public:
+  /// The program's name; `refused` says where there is none. What is defined comes after the first line, the version.
+  std::string load(const std::string& file, Ogre::GpuProgramType type, const std::string& name,
+                   const std::string& defined = "") {
+    if (!refused.empty()) return "";
+    std::ifstream stream(ros::package::getPath("meshless_surgery") + "/media/" + file);
+    std::string version;
+    std::getline(stream, version);
+    std::ostringstream source;
+    source << version << "\n" << defined << stream.rdbuf();
+    if (!stream) refused = "cannot read media/" + file;
+    if (!refused.empty()) return "";
+    try {
+      const auto program = Ogre::HighLevelGpuProgramManager::getSingleton().createProgram(
+          name, Ogre::ResourceGroupManager::DEFAULT_RESOURCE_GROUP_NAME, "glsl", type);
+      program->setSource(source.str());
+      program->load();
+      if (!program->isSupported() || program->hasCompileError()) refused = "the driver does not take media/" + file;
+    } catch (const Ogre::Exception& e) {
+      refused = file + ": " + e.getDescription();
+    }
+    return name;
   }
-  return "";
-}
+
+  std::string refused;
+};
 
 TissueProgram loaded() {
-  TissueProgram program{"meshless_tissue_vertex", "meshless_tissue_fragment", ""};
-  const std::string folder = ros::package::getPath("meshless_surgery") + "/media/";
-  program.refused = load(program.vertex, Ogre::GPT_VERTEX_PROGRAM, folder + "tissue.vert");
-  if (program.usable()) program.refused = load(program.fragment, Ogre::GPT_FRAGMENT_PROGRAM, folder + "tissue.frag");
+  TissueProgram program;
+  Loader loader;
+  program.vertex = loader.load("tissue.vert", Ogre::GPT_VERTEX_PROGRAM, "meshless_tissue_vertex");
+  const auto fragment = [&loader](int noise) {
+    return loader.load("tissue.frag", Ogre::GPT_FRAGMENT_PROGRAM, "meshless_tissue_" + std::to_string(noise),
+                       "#define NOISE " + std::to_string(noise) + "\n");
+  };
+  for (std::size_t noise = 0; noise < program.patterned.size(); ++noise)
+    program.patterned[noise] = fragment(static_cast<int>(noise));
+  program.even = fragment(-1);
+  program.refused = loader.refused;
   return program;
 }
 

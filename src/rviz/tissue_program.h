@@ -1,13 +1,16 @@
 // The plugin's programs for the graphics card, from media/.
 #pragma once
 
+#include <array>
 #include <string>
 
 namespace meshless {
 
 /// Names of Ogre's programs; where the driver does not take them, why.
 struct TissueProgram {
-  std::string vertex, fragment;
+  std::string vertex;
+  std::array<std::string, 6> patterned;  // by Look.noise
+  std::string even;                      // without a pattern or bumps
   std::string refused;
 
   bool usable() const { return refused.empty(); }
