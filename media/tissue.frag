@@ -1,7 +1,7 @@
 #version 120
 // Tissue: two colours mixed by the pattern of include/meshless_surgery/appearance/look.h, uneven to light, under a film of
 // water. Two lamps: one at the camera, as an endoscope has it, and one above. A program for each pattern: software GL
-// takes every branch. NOISE is as in Look.msg, -1 for what is plain and even.
+// takes every branch. NOISE is as in Look.msg, 6 for what is plain and even.
 
 uniform vec4 second;
 uniform float scale;   // [m] of a cell of the pattern
@@ -115,7 +115,7 @@ void main()
   if (dot(n, eye) < 0.0) n = -n;  // shells are seen from both sides
 
   vec3 colour = gl_Color.rgb;
-#if NOISE >= 0
+#if NOISE != 6
   vec3 p = place / scale;
   vec3 pattern = patternAt(p);
   // Cells smaller than a pixel are their mean.

@@ -48,9 +48,10 @@ TissueProgram loaded() {
     return loader.load("tissue.frag", Ogre::GPT_FRAGMENT_PROGRAM, "meshless_tissue_" + std::to_string(noise),
                        "#define NOISE " + std::to_string(noise) + "\n");
   };
+  // Ogre's preprocessor knows no negative numbers.
   for (std::size_t noise = 0; noise < program.patterned.size(); ++noise)
     program.patterned[noise] = fragment(static_cast<int>(noise));
-  program.even = fragment(-1);
+  program.even = fragment(static_cast<int>(program.patterned.size()));
   program.refused = loader.refused;
   return program;
 }
