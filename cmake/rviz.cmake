@@ -2,6 +2,7 @@
 # found: a machine that only simulates needs neither rviz nor Qt.
 find_package(rviz QUIET)
 find_package(pluginlib QUIET)
+find_package(roslib QUIET)  # rviz needs it, too
 find_package(Qt5 QUIET COMPONENTS Widgets)
 if(NOT rviz_FOUND OR NOT pluginlib_FOUND OR NOT Qt5_FOUND)
   message(STATUS "rviz, pluginlib or Qt5 was not found: the rviz plugin is not built")
@@ -14,8 +15,8 @@ set_target_properties(${PROJECT_NAME}_rviz PROPERTIES AUTOMOC ON)
 target_compile_definitions(${PROJECT_NAME}_rviz PRIVATE QT_NO_KEYWORDS)
 target_compile_options(${PROJECT_NAME}_rviz PRIVATE -Wall -Wextra -Wpedantic)
 target_include_directories(${PROJECT_NAME}_rviz SYSTEM PRIVATE
-  ${catkin_INCLUDE_DIRS} ${rviz_INCLUDE_DIRS} ${pluginlib_INCLUDE_DIRS} ${OGRE_INCLUDE_DIRS})
-target_link_libraries(${PROJECT_NAME}_rviz PRIVATE ${catkin_LIBRARIES} ${rviz_LIBRARIES} ${pluginlib_LIBRARIES} Qt5::Widgets)
+  ${catkin_INCLUDE_DIRS} ${rviz_INCLUDE_DIRS} ${pluginlib_INCLUDE_DIRS} ${roslib_INCLUDE_DIRS} ${OGRE_INCLUDE_DIRS})
+target_link_libraries(${PROJECT_NAME}_rviz PRIVATE ${catkin_LIBRARIES} ${rviz_LIBRARIES} ${pluginlib_LIBRARIES} ${roslib_LIBRARIES} Qt5::Widgets)
 add_dependencies(${PROJECT_NAME}_rviz ${PROJECT_NAME}_generate_messages_cpp ${catkin_EXPORTED_TARGETS})
 
 install(TARGETS ${PROJECT_NAME}_rviz

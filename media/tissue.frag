@@ -12,6 +12,7 @@ varying vec3 seen_at;
 varying vec3 normal;
 varying vec3 above;
 varying vec3 place;
+varying float growth;
 
 const float PERIOD = 289.0;
 const float JITTER = 0.3;
@@ -130,6 +131,10 @@ void main()
   vec3 slope = sign(area) * (dFdx(height) * r1 + dFdy(height) * r2) / max(abs(area), 1e-12);
   n = normalize(n - (1.0 - coarse) * slope);
 #endif
+
+  // Stretched or pressed in, tissue holds less blood.
+  float blanched = 0.5 * smoothstep(1.15, 2.0, growth);
+  colour = mix(colour, vec3(0.55, 0.48, 0.44) + 0.45 * colour, blanched);
 
   float facing = max(dot(n, eye), 0.0), raised = dot(n, up);
   vec3 lit = colour * (0.28 + 0.50 * facing + 0.16 * (1.0 + raised));

@@ -115,7 +115,7 @@ class DisplayTest(unittest.TestCase):
         build = subprocess.run(['cmake', '--build', folder + '/build', '--target', 'install'], stdout=subprocess.PIPE,
                                stderr=subprocess.STDOUT, universal_newlines=True)
         self.assertEqual(0, build.returncode, build.stdout[-4000:])
-        for name in ('lib/libmeshless_surgery_rviz.so', 'share/meshless_surgery/rviz_plugin.xml', 'include/meshless_surgery/Pick.h',
+        for name in ('lib/libmeshless_surgery_rviz.so', 'share/meshless_surgery/rviz_plugin.xml', 'share/meshless_surgery/media/tissue.frag', 'include/meshless_surgery/Pick.h',
                      'lib/python3/dist-packages/meshless_surgery/surgeon.py', 'share/meshless_surgery/config/rviz/liver.rviz'):
             self.assertTrue(os.path.exists(os.path.join(folder, 'space', name)), name)
         needed = subprocess.check_output(['objdump', '-p', folder + '/space/lib/libmeshless_surgery_rviz.so'], universal_newlines=True)

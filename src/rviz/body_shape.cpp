@@ -201,9 +201,10 @@ void BodyShape::makeBuffers() {
   Ogre::VertexDeclaration* layout = data_->vertexDeclaration;
   layout->addElement(0, 0, Ogre::VET_FLOAT3, Ogre::VES_POSITION);
   layout->addElement(0, 3 * sizeof(float), Ogre::VET_FLOAT3, Ogre::VES_NORMAL);
+  layout->addElement(0, 6 * sizeof(float), Ogre::VET_FLOAT1, Ogre::VES_TEXTURE_COORDINATES, 1);
   layout->addElement(1, 0, Ogre::VET_UBYTE4_NORM, Ogre::VES_DIFFUSE);
   layout->addElement(2, 0, Ogre::VET_FLOAT3, Ogre::VES_TEXTURE_COORDINATES, 0);
-  places_ = manager.createVertexBuffer(6 * sizeof(float), corners_.size(),
+  places_ = manager.createVertexBuffer(7 * sizeof(float), corners_.size(),
                                        Ogre::HardwareBuffer::HBU_DYNAMIC_WRITE_ONLY_DISCARDABLE);
   colours_ = manager.createVertexBuffer(4, corners_.size(), Ogre::HardwareBuffer::HBU_DYNAMIC_WRITE_ONLY);
   rests_ = manager.createVertexBuffer(3 * sizeof(float), corners_.size(), Ogre::HardwareBuffer::HBU_STATIC_WRITE_ONLY);
@@ -256,6 +257,27 @@ void BodyShape::setColours(const meshless_surgery::Surface& surface, const meshl
   rests_->writeData(0, bytes_.size() * sizeof(float), bytes_.data(), true);
 }
 
+// What the faces around a corner measure at rest; nothing where that is not known, or of no account.
+void BodyShape::findRestAreas(const meshless_surgery::BodyTopology* patterns, const BodyLook& look) {
+  rest_areas_.clear();
+  if (!look.shine || look.by_strain || !patterns || patterns->rest.empty()) return;
+  const auto restOf = [&](std::size_t corner) {
+    const float* at = &patterns->rest[3 * triangles_[corner]];
+    return Ogre::Vector3(at[0], at[1], at[2]);
+  };
+  std::vector<float> areas(cut_.size());
+  for (std::size_t t = 0; t < areas.size(); ++t) {
+    const Ogre::Vector3 a = restOf(3 * t);
+    areas[t] = (restOf(3 * t + 1) - a).crossProduct(restOf(3 * t + 2) - a).length();
+  }
+  rest_areas_.resize(corners_.size());
+  for (std::size_t c = 0; c < corners_.size(); ++c) {
+    float area = 0.0f;
+    for (std::uint32_t i = starts_[c]; i < starts_[c + 1]; ++i) area += areas[around_[i]];
+    rest_areas_[c] = std::max(area, std::numeric_limits<float>::min());
+  }
+}
+
 void BodyShape::setMaterials(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
                              const BodyLook& look) {
   const double opacity = look.opacity * static_cast<double>(surface.color.a);
@@ -302,17 +324,22 @@ void BodyShape::setMaterials(const meshless_surgery::Surface& surface, const mes
 }
 
 void BodyShape::place(const meshless_surgery::Surface& surface) {
-  bytes_.resize(6 * corners_.size());
+  bytes_.resize(7 * corners_.size());
   Ogre::AxisAlignedBox box;
   float* to = bytes_.data();
   for (std::size_t c = 0; c < corners_.size(); ++c) {
     const Ogre::Vector3 at = vertexOf(surface, corners_[c].vertex);
     Ogre::Vector3 normal = Ogre::Vector3::ZERO;
-    for (std::uint32_t i = starts_[c]; i < starts_[c + 1]; ++i) normal += faces_[around_[i]];
+    float area = 0.0f;
+    for (std::uint32_t i = starts_[c]; i < starts_[c + 1]; ++i) {
+      normal += faces_[around_[i]];
+      if (!rest_areas_.empty()) area += faces_[around_[i]].length();
+    }
     normal.normalise();
     box.merge(at);
     for (const Ogre::Vector3& v : {at, normal})
       for (int axis = 0; axis < 3; ++axis) *to++ = v[axis];
+    *to++ = rest_areas_.empty() ? 1.0f : area / rest_areas_[c];
   }
   places_->writeData(0, bytes_.size() * sizeof(float), bytes_.data(), true);
   for (const auto& part : parts_)
@@ -322,6 +349,7 @@ void BodyShape::place(const meshless_surgery::Surface& surface) {
 void BodyShape::show(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
                      const BodyLook& look) {
   const std::size_t vertices = surface.vertices.size() / 3;
+  if (patterns && !patterns->rest.empty() && patterns->rest.size() != surface.vertices.size()) patterns = nullptr;
   const bool same = sameTriangles(surface);
   const bool whole = same || (3 * surface.cut.size() == surface.triangles.size() &&
                               std::all_of(surface.triangles.begin(), surface.triangles.end(),
@@ -339,6 +367,7 @@ void BodyShape::show(const meshless_surgery::Surface& surface, const meshless_su
   }
   if (new_look || look.by_strain) setColours(surface, patterns, look);
   if (new_look) {
+    findRestAreas(patterns, look);
     setMaterials(surface, patterns, look);
     patterned_ = patterns != nullptr;
     look_ = look;

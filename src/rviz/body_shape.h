@@ -64,6 +64,7 @@ class BodyShape {
   void makeParts();
   void setColours(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
                   const BodyLook& look);
+  void findRestAreas(const meshless_surgery::BodyTopology* patterns, const BodyLook& look);
   void setMaterials(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
                     const BodyLook& look);
   void place(const meshless_surgery::Surface& surface);
@@ -83,6 +84,7 @@ class BodyShape {
   std::vector<std::vector<std::uint32_t>> indices_;  // of each part
   // and how
   bool patterned_ = false;
+  std::vector<float> rest_areas_;  // around each corner, twice
   BodyLook look_;
   std_msgs::ColorRGBA color_, inside_color_;
   // kept, so that a frame allocates nothing

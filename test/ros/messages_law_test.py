@@ -435,12 +435,13 @@ class MessagesLawTest(DeformerTestCase):
         for message in (shown, strained, topology, vertices):
             self.heads(message, rospy.Time(1))
         for message in (shown, strained):
-            self.says(message, push_shown=True, push_position=([-1.0, 0.0, 1.921], 1e-9), push_radius=0.03, push_touching=True,
+            self.says(message, topology=topology.topology, push_shown=True, push_position=([-1.0, 0.0, 1.921], 1e-9), push_radius=0.03, push_touching=True,
                       scissors_shown=True, scissors=(plain(scissors.pose), 1e-9), scissors_length=0.3, scissors_width=0.25, scissors_angle=0.4)
             self.assertEqual(state.picks, message.picks)
             held.update((message._type, field) for field in ('picks', 'bodies'))
         runs = [shown.run]
         moved = {b.id: b for b in vertices.bodies}
+        self.seen = {}  # colours by place
         cap_area = 0.0
         for surface, still, stretched in zip(shown.bodies, topology.bodies, strained.bodies):
             answer, rest = (self.good('get_body', name=surface.name, rest=r) for r in (False, True))
@@ -469,6 +470,7 @@ class MessagesLawTest(DeformerTestCase):
                     held.add((message._type, 'regions'))
                 else:
                     self.assertEqual(0, numpy.count_nonzero(regions))
+            self.looks(still, root, rest_places, triangles, in_plane)
             self.holds(surface, 'vertices', places.ravel(), 2e-6)
             self.holds(still, 'vertices', len(places))
             self.assertEqual(0, len(surface.strain))
@@ -481,7 +483,7 @@ class MessagesLawTest(DeformerTestCase):
         held.update((m._type, 'bodies') for m in (topology, vertices))
         self.says(vertices, complete=True, topology=topology.topology, run=topology.run)
         self.assertAlmostEqual(2.0 * cut.cap_area, cap_area, delta=1e-6)
-        self.markers(state, shown)
+        self.markers(state, shown, topology)
         self.points(topology)
         self.good('lift_scissors')
         self.good('reset')
@@ -489,19 +491,60 @@ class MessagesLawTest(DeformerTestCase):
         self.assertEqual([runs[0] + 1] * 3, runs[1:])
         held.update((m._type, f) for m, f in ((shown, 'run'), (topology, 'run'), (topology, 'topology')))
 
-    def markers(self, state, shown):
+    def looks(self, still, root, rest_places, triangles, in_plane):
+        """Patterns fill the body's own frame, and mix the two colours of their look."""
+        if root != 'sags':
+            for field in ('rest', 'colors', 'inside_colors'):
+                self.assertEqual(0, len(getattr(still, field)), still.name)
+            self.assertEqual([0, 0], [look.noise for look in still.looks])
+            return
+        outer, inner, lump = still.looks
+        held.add((still._type, 'looks'))
+        self.says(outer, noise=outer.FIBRES, color=((0.6, 0.2, 0.1, 1.0), 1e-6), second=((0.2, 0.6, 0.3, 1.0), 1e-6), scale=(0.02, 1e-6),
+                  wetness=0.75, bump=0.25)
+        self.says(inner, noise=inner.FAT, color=((0.9, 0.5, 0.4, 1.0), 1e-6), second=((0.1, 0.2, 0.9, 1.0), 1e-6), scale=(0.03, 1e-6), wetness=0.625)
+        self.says(lump, noise=lump.BONE, color=(LUMP_INSIDE, 1e-6), scale=(0.01, 1e-6))
+        self.holds(still, 'rest', (rest_places - [0, 1, 1]).ravel(), 1e-6)
+        on_cut = numpy.zeros(len(rest_places), bool)
+        on_cut[triangles[in_plane].ravel()] = True
+        regions = plain(still.regions) > 0
+        inside, outside = (numpy.array(list(bytes(f)), float).reshape(-1, 3) / 255.0 for f in (still.inside_colors, still.colors))
+        self.assertTrue((inside[~on_cut] == 0.0).all())
+        for look, colours in ((outer, outside), (inner, inside[on_cut & ~regions]), (lump, inside[on_cut & regions])):
+            base, way = plain(look.color)[:3], plain(look.second)[:3] - plain(look.color)[:3]
+            if len(colours) == 0:
+                continue
+            shares = (colours - base).dot(way) / way.dot(way)
+            self.assertLess(numpy.abs(colours - base - shares[:, None] * way).max(), 0.004, 'between the two')
+            self.assertTrue(shares.min() > -0.01 and shares.max() < 1.01, shares)
+            if look is not lump:
+                self.assertGreater(shares.max() - shares.min(), 0.2, 'a pattern')
+        held.update((still._type, field) for field in ('colors', 'inside_colors'))
+        for colours, which in ((outside, numpy.ones(len(rest_places), bool)), (inside, on_cut)):
+            for place, colour in zip(numpy.round(rest_places[which], 6), colours[which]):
+                there = self.seen.setdefault((colours is inside, tuple(place)), colour)
+                self.assertLess(numpy.abs(there - colour).max(), 0.01, 'both faces of a cut look alike')
+
+    def markers(self, state, shown, topology):
         array = self.fresh('markers', MarkerArray, lambda a: len(of(a, 'tools')) == 4)
         bodies = {m.id: m for m in of(array, 'bodies')}
+        stills = {still.id: still for still in topology.bodies}
         for surface in shown.bodies:
             places = numpy.array(surface.vertices).reshape(-1, 3)[list(surface.triangles)]
+            baked = [numpy.array(list(bytes(f)), float).reshape(-1, 3) / 255.0 for f in (stills[surface.id].colors, stills[surface.id].inside_colors)]
             self.assertLess(numpy.abs(plain(bodies[surface.id].points) - places).max(), 1e-5, surface.name)
             inside = [False] * len(places)
             for at, cut in enumerate(numpy.repeat(numpy.frombuffer(surface.cut, numpy.uint8), 3)):
                 inside[at] = bool(cut)
             wanted = numpy.array([plain(surface.inside_color if i else surface.color)[:3] for i in inside])
             shades = plain(bodies[surface.id].colors)[:, :3]
-            if not len(surface.regions):
-                self.assertLess(numpy.abs(numpy.cross(wanted, shades)).max(), 1e-4, 'the same colour in another light')
+            for face, colours in enumerate(baked):
+                if len(colours):
+                    where = numpy.array(inside) == bool(face)
+                    wanted[where] = colours[list(surface.triangles)][where]
+            if not len(surface.regions) or len(baked[1]):
+                tolerance = 4e-3 if len(baked[0]) else 1e-4  # of bytes
+                self.assertLess(numpy.abs(numpy.cross(wanted, shades)).max(), tolerance, 'the same colour in another light')
         tools = {m.id: m for m in of(array, 'tools')}
         pick = state.picks[0]
         numpy.testing.assert_allclose(plain(tools[0].points), plain([pick.position, pick.target]), atol=1e-9)

@@ -94,6 +94,28 @@ class DisplayTest(unittest.TestCase):
         self.until(lambda: inside() > before + 500, 'no face of the cut is seen')
         self.save('inside')
 
+    def test_tissue_is_wet_and_patterned(self):
+        def without(display):
+            display['Shine'] = False
+
+        def look():
+            """Shares of the liver's pixels that mirror a lamp, and how much neighbours differ in the median."""
+            picture = self.pixels()
+            liver = (picture[:, :, 0] > picture[:, :, 2] + 35)
+            if liver.sum() < 2000:
+                return 0.0, 0.0
+            both = liver[:, 1:] & liver[:, :-1]
+            return (picture[liver][:, 1] > 110).mean(), numpy.median(numpy.abs(numpy.diff(picture[:, :, 0], axis=1))[both])
+        self.start(without)
+        self.until(lambda: look()[1] > 0.0, 'no liver')
+        dull, smooth = look()
+        self.doCleanups()
+        self.start()
+        self.until(lambda: look()[0] > dull + 0.002, 'no lamp is mirrored')
+        print('mirrored %.4f, without %.4f; neighbours differ by %.1f, without %.1f' % (look()[0], dull, look()[1], smooth))
+        self.assertGreater(look()[1], smooth + 1.0, 'no pattern')
+        self.save('shine')
+
     def test_strain_is_shown_where_tissue_is_pulled(self):
         def by_strain(display):
             display['Colour by'] = {'Value': 'Strain', 'Full strain': 0.3}
