@@ -243,7 +243,7 @@ TEST(KnownBreaks, AreExpectedAndNoOthers) {
 
 TEST(KnownBreaks, AreFewAndSaidInFull) {
   for (const char* text : {"1 | depth", "x | depth | why", "1 | deep | why", "1 | depth |  ", "| depth | why",
-                           "1 | depth | a\n2 | depth | a\n3 | depth | a\n4 | depth | a"}) {
+                           "1 | depth | a\n2 | depth | a\n3 | depth | a\n4 | depth | a\n5 | depth | a"}) {
     const auto known = knownOf(text);
     ASSERT_FALSE(known.ok()) << text;
     EXPECT_NE(known.error().detail.find("line "), std::string::npos) << known.error().detail;
