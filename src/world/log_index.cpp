@@ -3,6 +3,7 @@
 // their own.
 #include "meshless_surgery/world/log_index.h"
 
+#include <ctime>
 #include <istream>
 
 #include "records.h"
@@ -16,6 +17,13 @@ constexpr std::size_t kRecordStart = 1 + 8;                   // bytes of kind a
 constexpr std::size_t kMostEntries = 10000000;                // of a kind
 
 enum class EntryKind : std::uint8_t { kModel, kScene, kState, kMoment, kEvent };
+
+// Of this thread: what others do on the machine must not make the file larger.
+double processorSeconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
 
 Error badIndex(const std::string& why) {
   return {ErrorCode::kUnreadable, "this is no index of a log that can be read: " + why};
@@ -81,7 +89,9 @@ void LogIndexWriter::stepped(World& world) {
     if (!tools.empty() || had_tools_) write(recordOf(static_cast<std::uint8_t>(EntryKind::kMoment), at_, tools));
     had_tools_ = !tools.empty();
   }
-  since_state_ += now.report.total;
+  const double clock = processorSeconds();
+  since_state_ += clock - clock_.value_or(clock);
+  clock_ = clock;
   const double every = state_every_ * std::pow(2.0, static_cast<double>(bytes_ / kThinAfter));
   // What a cut has taken away cannot be undone from a state that was kept between the two.
   if (since_state_ > every || undone_) keepState(world);

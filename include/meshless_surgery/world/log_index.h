@@ -5,6 +5,7 @@
 #include <functional>
 #include <iosfwd>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -36,7 +37,7 @@ struct LogEvent {
 
 class LogIndexWriter {
  public:
-  /// A state is kept after so much time of steps [s]: no moment is longer to be computed.
+  /// A state is kept after so much processor time of the thread that steps [s]: no moment takes longer to be computed.
   static constexpr double kStateEvery = 0.4;
   /// From each such length on half as many [bytes].
   static constexpr std::uint64_t kThinAfter = std::uint64_t{1} << 30;
@@ -48,7 +49,7 @@ class LogIndexWriter {
 
   /// What World::takeEvents gave.
   void heard(const std::vector<Event>& events);
-  /// After each step, before anything else is done with the world.
+  /// After each step, before anything else is done with the world; always by the same thread.
   void stepped(World& world);
 
  private:
@@ -61,6 +62,7 @@ class LogIndexWriter {
   std::unique_ptr<Known> known_;  // models and scenes that are in the file
   std::uint64_t at_ = 0, bytes_ = 0;
   double since_state_ = 0.0, since_moment_ = 0.0;  // [s]
+  std::optional<double> clock_;                    // [s] of the thread, at the last step
   bool undone_ = false, had_tools_ = false;
   std::vector<Event> heard_;
 };
