@@ -26,6 +26,8 @@ TYPES = {
     'lift_scissors': Trigger, 'undo_cut': Trigger, 'probe': Probe, 'pause': SetBool, 'step': Step, 'reset': Trigger, 'save': SaveState, 'load': LoadState, 'hash': Hash,
     'start_task': StartTask, 'stop_task': Trigger, 'report': Report, 'observe': Observe,
 }
+# Messages and services of the other node: review_test.py has their laws.
+OF_REVIEW = ('Bookmarks', 'Play', 'Review', 'Seek')
 HEADER = '=' * 80 + '\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n'
 # As in crtk_msgs, which is not needed: the topics' types and sums are the same.
 CRTK = generate_dynamic('crtk_msgs/operating_state', 'std_msgs/Header header\nstring state\nbool is_homed\nbool is_busy\n' + HEADER)

@@ -9,6 +9,8 @@ import tempfile
 import time
 import unittest
 
+import meshless_surgery.msg
+import meshless_surgery.srv
 import roslib.packages
 import rospy
 from geometry_msgs.msg import Point
@@ -17,7 +19,7 @@ from meshless_surgery.srv import Hash, Play, Seek
 from visualization_msgs.msg import MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from deformer_support import ACROSS_X, LONG, OwnNode, Recorder, pose_stamped, run  # noqa: E402
+from deformer_support import ACROSS_X, LONG, OF_REVIEW, OwnNode, Recorder, pose_stamped, run  # noqa: E402
 
 SCENES = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'scenes')
 BOXES = os.path.join(SCENES, 'boxes.yaml')
@@ -188,6 +190,23 @@ class ReviewTest(unittest.TestCase):
             points = [p for path in paths if path.ns == 'pick' for p in path.points]
             self.assertGreater(max(p.y for p in points), 0.2)
             self.assertEqual(len(points), sum(len(path.colors) for path in paths if path.ns == 'pick'))
+
+    def test_each_field_has_a_law_here(self):
+        known = {'Review': ['header', 'log', 'time', 'length', 'speed'], 'Bookmarks': ['header', 'times', 'texts', 'errors'],
+                 'SeekRequest': ['time'], 'SeekResponse': ['success', 'message', 'time', 'took', 'error_code'],
+                 'PlayRequest': ['speed'], 'PlayResponse': ['success', 'message', 'error_code']}
+        for name in OF_REVIEW:
+            kinds = [getattr(meshless_surgery.msg, name)] if hasattr(meshless_surgery.msg, name) else [
+                getattr(meshless_surgery.srv, name + part) for part in ('Request', 'Response')]
+            for kind in kinds:
+                self.assertEqual(known[kind.__name__], kind.__slots__)
+        with ReviewNode(session_directory=self.folder, log='monday') as review:
+            answer = review.seek(0.5041)  # shows the step that is nearest
+            self.assertEqual(60 / self.rate(), answer.time)
+            self.assertEqual(self.known[60], review.hash())
+            self.assertGreaterEqual(answer.took, 0.0)
+            for topic, kind in (('review', Review), ('bookmarks', Bookmarks)):
+                self.assertEqual('world', review.recorder(topic, kind).wait().header.frame_id)
 
     def test_what_cannot_be_is_refused(self):
         with ReviewNode(session_directory=self.folder, log='monday') as review:
