@@ -1,5 +1,7 @@
 #include "meshless_surgery/world/log_review.h"
 
+#include "world_impl.h"
+
 namespace meshless {
 namespace {
 
