@@ -188,7 +188,8 @@ TEST(ContactCases, TenOrgansInABowlComeToRest) {
                         "organ" + std::to_string(n)));
     for (int n = 0; n < 6 && world.snapshot({}).report.asleep < 10; ++n) {
       run(world, 1.0);
-      EXPECT_LT(deepest(world), 2e-3) << n;
+      // Contact's surface of these cells of 2 cm is off the visual one by that much: 0.8 to 2.8 mm, by the organs.
+      EXPECT_LT(deepest(world), 3e-3) << n;
     }
     EXPECT_EQ(world.snapshot({}).report.asleep, 10u);
     for (const BodySnapshot& body : seen(world).bodies) {
