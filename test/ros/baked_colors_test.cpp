@@ -34,13 +34,13 @@ void setLooks(World& world, const std::string& body, double scale) {
 
 TEST(BakedColors, AreTheLooksAtTheVertices) {
   const auto world = twoBoxes();
-  setLooks(*world, "a", 0.02);
-  ASSERT_TRUE(world->apply(cutAcross(0.01)).ok());
+  setLooks(*world, "b", 0.02);  // which is not at the origin
+  ASSERT_TRUE(world->apply(cutAcross(0.51)).ok());
   std::size_t patterned = 0;
   for (const BodySnapshot& body : world->snapshot(surfaces()).bodies) {
     const VertexColors colors = bakeColors(*body.model, body.material);
     const Points& rest = body.model->surface.vertices;
-    if (body.name == "b") {
+    if (body.name == "a") {
       EXPECT_TRUE(colors.outer.empty() && colors.inside.empty());
       continue;
     }
