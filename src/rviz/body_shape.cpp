@@ -117,7 +117,8 @@ BodyShape::~BodyShape() {
 }
 
 bool BodyShape::sameTriangles(const meshless_surgery::Surface& surface) const {
-  return data_ && surface.triangles == triangles_ && surface.cut == cut_ && surface.regions == regions_;
+  return data_ && surface.vertices.size() == coordinates_ && surface.triangles == triangles_ && surface.cut == cut_ &&
+         surface.regions == regions_ && surface.region_colors.size() == region_colors_;
 }
 
 void BodyShape::findFaces(const meshless_surgery::Surface& surface) {
@@ -141,6 +142,8 @@ void BodyShape::findCorners(const meshless_surgery::Surface& surface) {
   triangles_ = surface.triangles;
   cut_ = surface.cut;
   regions_ = surface.regions;
+  coordinates_ = surface.vertices.size();
+  region_colors_ = surface.region_colors.size();
   const std::size_t vertices = surface.vertices.size() / 3, triangles = cut_.size();
   const bool regional = regions_.size() == vertices &&
                         std::all_of(regions_.begin(), regions_.end(),
@@ -250,11 +253,11 @@ void BodyShape::setColours(const meshless_surgery::Surface& surface, const meshl
   }
   colours_->writeData(0, bytes.size(), bytes.data(), true);
 
-  bytes_.assign(3 * corners_.size(), 0.0f);
+  floats_.assign(3 * corners_.size(), 0.0f);
   if (patterns && patterns->rest.size() == 3 * vertices)
     for (std::size_t c = 0; c < corners_.size(); ++c)
-      std::copy_n(&patterns->rest[3 * corners_[c].vertex], 3, &bytes_[3 * c]);
-  rests_->writeData(0, bytes_.size() * sizeof(float), bytes_.data(), true);
+      std::copy_n(&patterns->rest[3 * corners_[c].vertex], 3, &floats_[3 * c]);
+  rests_->writeData(0, floats_.size() * sizeof(float), floats_.data(), true);
 }
 
 // What the faces around a corner measure at rest; nothing where that is not known, or of no account.
@@ -324,9 +327,9 @@ void BodyShape::setMaterials(const meshless_surgery::Surface& surface, const mes
 }
 
 void BodyShape::place(const meshless_surgery::Surface& surface) {
-  bytes_.resize(7 * corners_.size());
+  floats_.resize(7 * corners_.size());
   Ogre::AxisAlignedBox box;
-  float* to = bytes_.data();
+  float* to = floats_.data();
   for (std::size_t c = 0; c < corners_.size(); ++c) {
     const Ogre::Vector3 at = vertexOf(surface, corners_[c].vertex);
     Ogre::Vector3 normal = Ogre::Vector3::ZERO;
@@ -341,7 +344,7 @@ void BodyShape::place(const meshless_surgery::Surface& surface) {
       for (int axis = 0; axis < 3; ++axis) *to++ = v[axis];
     *to++ = rest_areas_.empty() ? 1.0f : area / rest_areas_[c];
   }
-  places_->writeData(0, bytes_.size() * sizeof(float), bytes_.data(), true);
+  places_->writeData(0, floats_.size() * sizeof(float), floats_.data(), true);
   for (const auto& part : parts_)
     if (part) part->setBounds(box);
 }

@@ -78,6 +78,7 @@ class BodyShape {
   // of the topology that is shown
   std::vector<std::uint32_t> triangles_;
   std::vector<std::uint8_t> cut_, regions_;
+  std::size_t coordinates_ = 0, region_colors_ = 0;  // how many
   std::vector<Corner> corners_;
   bool closed_ = false;                         // it has no edge, so its back side is never seen
   std::vector<std::uint32_t> starts_, around_;  // faces of a corner's normal: around_[starts_[c] .. starts_[c + 1])
@@ -89,7 +90,7 @@ class BodyShape {
   std_msgs::ColorRGBA color_, inside_color_;
   // kept, so that a frame allocates nothing
   std::vector<Ogre::Vector3> faces_;  // normals, as long as twice the area
-  std::vector<float> bytes_;
+  std::vector<float> floats_;
 };
 
 /// Blue at 0 over green to red at 1 and above.
