@@ -53,6 +53,7 @@ class ClockTest(InStepTestCase):
         self.assertIn('no_such_frame', refused.message)
         stepped = self.deformer.call('step', steps=5)
         self.assertTrue(stepped.success, stepped.message)
+        self.states.wait(lambda state: state.step >= before + 5)  # older ones may still be under way
         self.assertEqual(before + 5, self.settled())
 
 
