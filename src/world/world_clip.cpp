@@ -139,8 +139,9 @@ Jaws jawsAt(const ShownSurface& shown, const Vec3& at, const Vec3& direction, do
   jaws.centre = middle + (at - middle).dot(jaws.axes[0]) * jaws.axes[0];
   for (const int k : {2, 1}) {  // of what was near, to the middle of the whole
     const Jaws turned{jaws.centre, {jaws.axes[(k + 1) % 3], jaws.axes[(k + 2) % 3], jaws.axes[k]}};
+    LineSearch line(shown, turned, 0.0, 0.0);
     Box met;
-    for (const Crossing& crossing : LineSearch(shown, turned, 0.0, 0.0).through(0.0, 0.0))
+    for (const Crossing& crossing : line.through(0.0, 0.0))
       if (std::abs(crossing.at) <= 2.0 * reach) met.extend(Vec3::Constant(crossing.at));
     if (!met.empty()) jaws.centre += 0.5 * (met.min.x() + met.max.x()) * jaws.axes[k];
   }
