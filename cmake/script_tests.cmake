@@ -3,6 +3,8 @@
 
 add_test(NAME include_direction
   COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/test/include_direction_test.py)
+add_test(NAME docs
+  COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/test/docs_test.py)
 add_test(NAME messages
   COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/test/messages_test.py)
 add_test(NAME package
@@ -22,7 +24,7 @@ if(NOT MESHLESS_SURGERY_CORE_ONLY)
     COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/scripts/lib/strict_rostest_test.py)
   set_tests_properties(strict_rostest PROPERTIES LABELS scripts)
 endif()
-set_tests_properties(include_direction messages package falls_short learning_curves test_summary loopback_by_default check_arguments PROPERTIES LABELS scripts)
+set_tests_properties(include_direction docs messages package falls_short learning_curves test_summary loopback_by_default check_arguments PROPERTIES LABELS scripts)
 # The headers' own documentation, without a warning.
 add_test(NAME doxygen COMMAND ${CMAKE_COMMAND} -E env DOXYGEN_OUTPUT=${CMAKE_BINARY_DIR}/api
   doxygen ${CMAKE_CURRENT_SOURCE_DIR}/docs/Doxyfile WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})

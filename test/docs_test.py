@@ -1,0 +1,156 @@
+#!/usr/bin/env python3
+"""The pages against the checkout: links, paths, and of docs/architecture.md names, rooms and threads."""
+import glob
+import os
+import re
+import unittest
+
+import include_direction_test
+
+CHECKOUT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+
+
+def read(path):
+    with open(os.path.join(CHECKOUT, path), encoding='utf-8') as file:
+        return file.read()
+
+
+def pages():
+    patterns = ('*.md', 'docs/*.md', 'bench/**/*.md')
+    return sorted(os.path.relpath(path, CHECKOUT) for pattern in patterns
+                  for path in glob.glob(os.path.join(CHECKOUT, pattern), recursive=True))
+
+
+def withoutCode(text):
+    return re.sub(r'^```.*?^```', '', text, flags=re.MULTILINE | re.DOTALL)
+
+
+def anchors(text):
+    """Those that GitHub makes of the headings."""
+    found = set()
+    for heading in re.findall(r'^#+ +(.*?)\s*$', withoutCode(text), re.MULTILINE):
+        slug = re.sub(r'[^\w\- ]', '', heading.lower()).replace(' ', '-')
+        number = 0
+        while slug + ('-%d' % number if number else '') in found:
+            number += 1
+        found.add(slug + ('-%d' % number if number else ''))
+    return found
+
+
+def brokenLinks(page, text):
+    """Of a page, relative to the checkout: links to files and headings that are not there."""
+    broken = []
+    for target in re.findall(r'\]\(([^)\s]+)\)', withoutCode(text)):
+        if re.match(r'[a-z]+:', target):
+            continue
+        path, _, anchor = target.partition('#')
+        file = os.path.normpath(os.path.join(os.path.dirname(page), path)) if path else page
+        if not os.path.exists(os.path.join(CHECKOUT, file)):
+            broken.append('%s: there is no %s' % (page, file))
+        elif anchor and anchor not in anchors(text if file == page else read(file)):
+            broken.append('%s: %s has no heading #%s' % (page, file, anchor))
+    return broken
+
+
+def missingPaths(text):
+    """Of the paths of sources and tests that a page names: those that are not there."""
+    ends = r'\.(?:cpp|h|py|yaml|txt|md|cmake|frag)'
+    named = set(re.findall(r'(?<![\w./{-])((?:[\w.-]+/)+[\w-]+%s)(?!\w)' % ends, text))
+    roots = ('', 'include/meshless_surgery')
+    named = {path for path in named if not re.search(r'^\.\.|NAME|ROOM|SUBJECT', path)}  # links, and what stands for many
+    return sorted(path for path in named if not any(os.path.exists(os.path.join(CHECKOUT, root, path)) for root in roots))
+
+
+def sources():
+    """The code without its comments: what a name is worth that stands in one alone."""
+    text = ''
+    for top in ('src', 'include', 'cmake', 'python', 'CMakeLists.txt'):
+        found = glob.glob(os.path.join(CHECKOUT, top, '**', '*'), recursive=True) + [os.path.join(CHECKOUT, top)]
+        for path in found:
+            if path.endswith(('.cpp', '.h', '.cmake', '.txt', '.py')):
+                text += re.sub(r'//.*', '', read(path))
+    return text
+
+
+def namesOf(text):
+    """Names of code: in backticks, and in blocks what is spelt as code is."""
+    named = set(re.findall(r'`([A-Za-z]\w{2,})`', text))
+    for name in re.findall(r'`([A-Za-z]\w+(?:::\w+)+)`', text):
+        named.update(name.split('::'))
+    for block in re.findall(r'^```.*?^```', text, re.MULTILINE | re.DOTALL):
+        named.update(re.findall(r'(?<![\w/])(?:[a-z]+[A-Z]\w*|(?:[A-Z][a-z]+){2,}\w*)(?![\w/.])', block))
+    return named
+
+
+def unknownNames(text, code):
+    words = set(re.findall(r'\w+', code))
+    return sorted(name for name in namesOf(text) if name not in words)
+
+
+def tableRows(text, section):
+    """The cells of the table's rows in a section, without its head."""
+    part = re.search(r'^## %s$(.*?)(?=^## |\Z)' % re.escape(section), text, re.MULTILINE | re.DOTALL).group(1)
+    rows = [re.split(r'(?<!\\)\|', line)[1:-1] for line in part.splitlines() if line.startswith('|')]
+    return [[cell.strip() for cell in row] for row in rows[2:]]
+
+
+def constant(name, text):
+    """The integer that a constant of the code is."""
+    value = re.search(r'\bconstexpr int %s = ([^;]+);' % name, text).group(1)
+    value = re.sub(r'(?:\w+::)?(k\w+)', lambda match: str(constant(match.group(1), text)), value)
+    return eval(value, {'__builtins__': {}})  # of numbers and signs
+
+
+class LinkTest(unittest.TestCase):
+    def testEveryLinkLeadsToAHeadingOrAFile(self):
+        self.assertIn('docs/method.md', pages())
+        self.assertEqual([], [broken for page in pages() for broken in brokenLinks(page, read(page))])
+
+    def testOneThatDoesNotIsFound(self):
+        for link in ('[a](no_such_page.md)', '[a](method.md#no-such-heading)', '[a](#nor-this)'):
+            self.assertEqual(1, len(brokenLinks('docs/architecture.md', '# Page\n' + link + '\n')), link)
+        self.assertEqual([], brokenLinks('docs/architecture.md', '# A page, *so*\n[a](#a-page-so) [b](method.md#symbols)'))
+
+
+class PathTest(unittest.TestCase):
+    def testThePathsOfMethodAndArchitectureAreThere(self):
+        for page in ('docs/method.md', 'docs/architecture.md', 'CONTRIBUTING.md'):
+            self.assertEqual([], missingPaths(read(page)), page)
+
+    def testOneThatIsNotIsFound(self):
+        self.assertEqual(['body/soul.h'], missingPaths('(`body/soul.h`), `body/body.h` and src/body/body.cpp'))
+
+
+class ArchitectureTest(unittest.TestCase):
+    def setUp(self):
+        self.page = read('docs/architecture.md')
+        self.code = sources()
+
+    def testItsNamesAreOfTheCode(self):
+        self.assertGreater(len(namesOf(self.page)), 60)
+        self.assertEqual([], unknownNames(self.page, self.code))
+
+    def testOneThatIsNotIsFound(self):
+        self.assertEqual(['World2', 'stepTheWorld'], unknownNames('`World2`, `World::step`\n```\nx  stepTheWorld\n```\n', self.code))
+
+    def testItsRoomsAreThoseOfTheIncludes(self):
+        listed = {row[0].strip('`'): set(re.findall(r'`(\w+)`', row[2])) for row in tableRows(self.page, 'Rooms')}
+        may = {room: others for room, others in include_direction_test.MAY_INCLUDE.items() if not room.endswith('_main')}
+        self.assertEqual(may, listed)
+
+    def testItsThreadsAreThoseOfTheNode(self):
+        code = ''.join(read(os.path.relpath(path, CHECKOUT)) for pattern in ('src/ros/*', 'src/node_main/deformer_node.cpp',
+                                                                            'include/meshless_surgery/ros/*.h')
+                       for path in glob.glob(os.path.join(CHECKOUT, pattern)) if 'review_node' not in path)
+        rows = tableRows(self.page, 'Threads')
+        total = sum(int(row[1]) for row in rows)
+        spinners = re.findall(r'ros::AsyncSpinner \w+[{(]([\w]+)', code)
+        self.assertEqual(sum(int(n) if n.isdigit() else constant(n, code) for n in spinners) +
+                         len(re.findall(r'std::thread \w+_;', code)), total)
+        for row in rows:
+            for name in re.findall(r'`(k\w+)`', row[0]):
+                self.assertEqual(constant(name, code), int(row[1]), row[0])
+
+
+if __name__ == '__main__':
+    unittest.main()
