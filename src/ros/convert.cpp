@@ -30,6 +30,8 @@ void setXyz(std::uint8_t* to, const Vec3& p) {
   std::memcpy(to, xyz, sizeof(xyz));
 }
 
+constexpr Color kHeldColor{0.1f, 0.4f, 1.0f, 1.0f};  // of particles that are held: no tissue is blue
+
 /// PCL's packing: 0x00rrggbb in the bits of a float.
 std::uint32_t packed(const Color& color) {
   const auto byte = [](float channel) {
@@ -248,12 +250,14 @@ sensor_msgs::PointCloud2 toCloud(const WorldSnapshot& snapshot, const std_msgs::
     for (Index i = 0; i < body.particles.size(); ++i) points += body.model->isTissue(i);
   layout.resize(points);
   std::uint8_t* to = cloud.data.data();
+  const std::uint32_t held = packed(kHeldColor);
   for (const BodySnapshot& body : snapshot.bodies) {
-    const std::uint32_t rgb = packed(body.material.color);
+    const std::uint32_t free = packed(body.material.color);
     for (Index i = 0; i < body.particles.size(); ++i) {
       if (!body.model->isTissue(i)) continue;
       setXyz(to, body.particles[i]);
       std::memcpy(to + 12, &body.number, sizeof(body.number));
+      const std::uint32_t rgb = body.model->fixed[i] ? held : free;
       std::memcpy(to + 16, &rgb, sizeof(rgb));
       to += cloud.point_step;
     }

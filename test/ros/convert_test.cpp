@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "ros/scene_support.h"
+#include "support/bodies.h"
 
 namespace meshless {
 namespace convert_test {
@@ -60,6 +61,33 @@ TEST(Convert, TheCloudHoldsEveryParticleWithItsBodyAndColour) {
   EXPECT_EQ(point, cloud.width);
   EXPECT_EQ(1u, cloud.height);
   EXPECT_EQ(cloud.data.size(), static_cast<std::size_t>(cloud.row_step) * cloud.height);
+}
+
+TEST(Convert, TheCloudShowsWhichParticlesAreHeld) {
+  for (const double youngs_modulus : {0.0, 5000.0}) {
+    BodyDef def = test::defOf(boxMesh(Vec3(0.1, 0.1, 0.1), 4, 4, 4));
+    def.material.youngs_modulus = youngs_modulus;
+    def.spacing = 0.025;
+    def.fixed.push_back({Vec3(-1, -1, -1), Vec3(1, 1, -0.02)});
+    World world(WorldSettings{});
+    ASSERT_TRUE(world.addSceneBody(test::shared(def)).ok());
+    SnapshotWants wants;
+    wants.particles = true;
+    const auto snapshot = world.snapshot(wants);
+    const auto cloud = toCloud(snapshot, header());
+    const BodyModel& model = *snapshot.bodies[0].model;
+    std::size_t point = 0, held = 0;
+    for (Index i = 0; i < model.rest.size(); ++i) {
+      if (!model.isTissue(i)) continue;
+      const auto rgb = at<std::uint32_t>(cloud, point++, "rgb");
+      const bool is_blue = (rgb & 255) > 200 && (rgb >> 16 & 255) < 50;
+      EXPECT_EQ(model.fixed[i], is_blue) << youngs_modulus << ", particle " << i;
+      held += is_blue;
+    }
+    EXPECT_EQ(cloud.width, point);
+    EXPECT_GT(held, 0u);
+    EXPECT_LT(held, cloud.width);
+  }
 }
 
 TEST(Convert, StateHasTheNumbersOfEveryBodyAndPick) {

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """Two stations in two namespaces do not see each other's worlds."""
+import glob
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -53,6 +55,17 @@ class StationsTest(unittest.TestCase):
             heard.wait(lambda m, frame=frame: any(t.child_frame_id == frame for t in m.transforms))
         self.assertFalse(any(t.child_frame_id == 'push_sphere' for m in heard.messages for t in m.transforms))
         heard.close()
+
+    def test_every_topic_of_a_view_is_led_to_the_station(self):
+        checkout = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..')
+        with open(os.path.join(checkout, 'launch', 'training.launch')) as file:
+            led = re.findall('<remap from="(/deformer[^"]*)"', file.read())
+        named = set()
+        for view in glob.glob(os.path.join(checkout, 'config', 'rviz', '*.rviz')):
+            with open(view) as file:
+                named.update(re.findall(r'Topic: (/deformer/\S+)', file.read()))
+        self.assertIn('/deformer/markers', named)
+        self.assertEqual(set(), named - set(led))
 
     def test_diagnostics_tell_them_apart(self):
         heard = Recorder('/diagnostics', DiagnosticArray)
