@@ -9,7 +9,7 @@
 
 _PLACES = {'Surgeon': 'surgeon', 'ToolStream': 'streams', 'SurgeryError': 'errors', 'Refused': 'errors',
            'Cancelled': 'errors', 'Goal': 'goals', 'Environment': 'environment',
-           'Unanswered': 'errors', 'ErrorCode': 'errors'}
+           'Unanswered': 'errors', 'Unreachable': 'errors', 'ErrorCode': 'errors'}
 
 
 def __getattr__(name):

@@ -1,5 +1,8 @@
 """What can go wrong, as exceptions."""
+import contextlib
 import enum
+
+import rospy
 
 from meshless_surgery.srv import ReleaseResponse
 
@@ -31,6 +34,21 @@ class Cancelled(SurgeryError):
         super().__init__('%s: %s' % (action, result.message))
         self.action = action
         self.result = result
+
+
+class Unreachable(SurgeryError, rospy.ROSException):
+    """No node offers what was asked for, or it says nothing: nothing was sent."""
+
+
+@contextlib.contextmanager
+def reaching(what):
+    """A wait of rospy's, which says nothing of who was waited for."""
+    try:
+        yield
+    except rospy.ROSInterruptException:
+        raise
+    except rospy.ROSException as error:
+        raise Unreachable('%s does not answer: does the node run? (%s)' % (what, error))
 
 
 class Unanswered(SurgeryError):

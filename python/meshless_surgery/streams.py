@@ -5,6 +5,7 @@ import rospy
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from sensor_msgs.msg import JointState
 
+from meshless_surgery.errors import Unreachable
 from meshless_surgery.poses import pose_stamped
 
 TOOLS = ('pick', 'push', 'scissors')
@@ -32,7 +33,7 @@ class ToolStream:
         end = time.monotonic() + self.timeout
         while publisher is not None and publisher.get_num_connections() == 0:
             if rospy.is_shutdown() or time.monotonic() > end:
-                raise rospy.ROSException('nobody listens to ' + publisher.resolved_name)
+                raise Unreachable('nobody listens to ' + publisher.resolved_name)
             time.sleep(0.005)
 
     def move(self, position, orientation=(0.0, 0.0, 0.0, 1.0), stamp=None):

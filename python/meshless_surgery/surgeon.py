@@ -9,7 +9,7 @@ from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
-from meshless_surgery.errors import Refused, Unanswered
+from meshless_surgery.errors import Refused, Unanswered, Unreachable, reaching
 from meshless_surgery.goals import Goals
 from meshless_surgery.msg import Info, State
 from meshless_surgery.poses import blade_pose, blades_pose, pose_stamped
@@ -38,7 +38,8 @@ class Surgeon:
         if name in self._proxies and self._ended(self._proxies[name]):
             del self._proxies[name]
         if name not in self._proxies:
-            rospy.wait_for_service(self.node + '/' + name, self.timeout)
+            with reaching(self.node + '/' + name):
+                rospy.wait_for_service(self.node + '/' + name, self.timeout)
             self._proxies[name] = rospy.ServiceProxy(self.node + '/' + name, service, persistent=True)
         try:
             reply = self._proxies[name](**fields)
@@ -71,7 +72,7 @@ class Surgeon:
     def _now(self):
         try:
             state = self.state()
-        except rospy.ROSException:
+        except Unreachable:
             return 'the node does not answer either: does it run?'
         return 'the world is at step %d, with the bodies %s and %d springs' % (
             state.step, ', '.join(body.name for body in state.bodies) or 'none', len(state.picks))
@@ -190,11 +191,13 @@ class Surgeon:
 
     # the world
     def state(self):
-        return rospy.wait_for_message(self.node + '/state', State, self.timeout)
+        with reaching(self.node + '/state'):
+            return rospy.wait_for_message(self.node + '/state', State, self.timeout)
 
     def info(self):
         """What runs there: scene, step rate, bodies."""
-        return rospy.wait_for_message(self.node + '/info', Info, self.timeout)
+        with reaching(self.node + '/info'):
+            return rospy.wait_for_message(self.node + '/info', Info, self.timeout)
 
     def reset(self):
         return self.call('reset', Trigger)
@@ -236,23 +239,24 @@ class Surgeon:
     @contextlib.contextmanager
     def still(self):
         """Time stands still inside: what is measured before and after an act then differs by the act alone."""
-        if not self._paused:
+        runs = not (self._paused or self.state().paused)
+        if runs:
             self.pause(True)
         try:
             yield
         finally:
-            if not self._paused:
+            if runs:
                 self.pause(False)
 
     def live(self, seconds, rate=None):
-        """Lets simulated time pass: while the world runs, by waiting for it; after stepped(), by stepping it."""
-        start = self.state()
-        if self._paused:
-            self.step(max(1, int(round(seconds * (rate or self.info().step_rate)))))
-            return
-        while not rospy.is_shutdown():
-            if self.state().sim_time - start.sim_time >= seconds:
+        """Lets simulated time pass: while the world runs, by waiting for it; while it is paused, by stepping it."""
+        state = self.state()
+        end = state.sim_time + seconds
+        while not (self._paused or state.paused):
+            if state.sim_time >= end or rospy.is_shutdown():
                 return
+            state = self.state()
+        self.step(max(1, int(round((end - state.sim_time) * (rate or self.info().step_rate)))))
 
     def stepped(self):
         """From here on time moves by live() and step() alone: the same on a slow machine as on a fast one."""

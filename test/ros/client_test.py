@@ -52,6 +52,23 @@ class ClientTest(unittest.TestCase):
             self.assertEqual(2, heard.count())
             heard.close()
 
+    def test_a_world_that_somebody_else_has_paused_lives_by_steps_and_stays_paused(self):
+        with OwnNode(scene=SCENE, paused=True) as node:
+            surgeon = Surgeon(node.name)
+            with surgeon.still():
+                pass
+            surgeon.live(0.5)
+            state = surgeon.state()
+            self.assertEqual((True, 15), (state.paused, state.step))
+
+    def test_who_asks_a_node_that_is_not_there_hears_so_as_of_any_error(self):
+        surgeon = Surgeon('/nowhere', timeout=0.2)
+        for ask in (surgeon.state, surgeon.info, surgeon.reset, lambda: surgeon.stream('pick'), lambda: surgeon.live(1.0)):
+            with self.assertRaises(SurgeryError) as raised:
+                ask()
+            self.assertIn('/nowhere', str(raised.exception))
+            self.assertIsInstance(raised.exception, rospy.ROSException)
+
     def test_a_request_without_an_answer_is_sent_once(self):
         asked = []
 
