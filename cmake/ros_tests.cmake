@@ -27,7 +27,7 @@ set(full_tests display ending forces fuzz hands network parameters play_abdomen 
   play_skin robust scenes session shown_block shown_fish shown_skin soak)
 # A node keeps one processor busy, and a screen is drawn by software: tests run alone. These wait for what they ask for,
 # however long it takes, or hold the clock themselves.
-set(patient_tests actions client clock contacts environment forces lab messages_law network own_organ parameters publish_clock requests scenes services session spawn_cloud stations streams testing time tools training)
+set(patient_tests actions client clock contacts environment forces lab messages_law network own_organ pages parameters publish_clock requests scenes services session spawn_cloud stations streams testing time tools training)
 file(GLOB ros_tests RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS test/ros/*.test test/rviz/*.test)
 set(known_tests ${ros_tests})
 list(TRANSFORM known_tests REPLACE ".*/(.*)\\.test$" "\\1")
