@@ -23,7 +23,7 @@ class Body:
 
     def __init__(self, data):
         for name, value in data.items():
-            setattr(self, name, np.array(value) if isinstance(value, list) else value)
+            setattr(self, name, np.array(value, dtype=None if value else int) if isinstance(value, list) else value)
         o, xi = 2 * BITS[None, None, :, :] - 1, self.xi[:, None, None, :]
         self.B = np.prod(np.where(BITS[None, :, None, :] == 1, o / 2, (1 + o * xi) / 2), axis=-1)  # (1)
         self.S = np.zeros((len(self.m), len(self.m)))
@@ -99,7 +99,7 @@ def forces(body, p, f):
     c = body.coefficients(p)
     F = gradient(c)
     R = rotations(F)
-    slope, steep = np.zeros_like(c), np.zeros_like(c)  # of W / V and of J
+    slope, steep = np.zeros_like(c), np.zeros_like(c)  # of W / vol and of J
     for product in AXES + PAIRS + [TRIPLE]:
         for d in range(3):
             shifted = c.astype(complex)
@@ -110,7 +110,7 @@ def forces(body, p, f):
     J, kappa = held_volume(F)
     z2 = square(steep) + abs(volume_strain(J)) * kappa * np.sqrt(square(F))
     total = np.zeros_like(p)
-    on_corners = -2 / body.s * f * np.einsum('c,cPk,cPd->ckd', body.V, body.B, slope)
+    on_corners = -2 / body.s * f * np.einsum('c,cPk,cPd->ckd', body.vol, body.B, slope)
     np.add.at(total, body.corners, on_corners)
     return total, np.sqrt(max(3, z2.max()) / 3)
 
