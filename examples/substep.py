@@ -32,6 +32,8 @@ class Body:
             corners = self.corners[cell]
             self.S[np.ix_(corners, corners)] += 40 * self.m0 / self.s ** 2 * area * np.outer(N, N)
         self.clamped = np.flatnonzero(np.diag(self.S))
+        self.answer = 1 / self.m  # (15)
+        self.answer[self.fixed] = 0
         self.held = len(self.clamped) > 0
 
     def coefficients(self, p):
@@ -159,13 +161,13 @@ def substep(body, state, u):
 def pull(body, r, y, f, u):
     """(18) and (15), of the spring of a pick."""
     on, b, stiff = body.grasp, body.w[:, None], body.K * body.h ** 2
-    A = f * np.sum(body.w ** 2 / body.m[on]) * np.eye(3)
+    A = f * np.sum(body.w ** 2 * body.answer[on]) * np.eye(3)
     if not body.held:
         M, turn, r_b = body.m.sum(), inverse_inertia(body, r), np.sum(b * r[on], axis=0)
         across = np.cross(np.eye(3), r_b)  # across @ j is r_b x j
         A += (1 - f) * (np.eye(3) / M - across @ turn @ across)
     j = np.linalg.solve(np.eye(3) + stiff * A, stiff * (u - np.sum(b * y[on], axis=0)))
-    y[on] += f * b * j / body.m[on][:, None]
+    y[on] += f * b * body.answer[on][:, None] * j
     return y if body.held else y + (1 - f) * (j / M + np.cross(turn @ np.cross(r_b, j), r))
 
 
