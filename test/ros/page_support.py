@@ -75,6 +75,8 @@ class PageTestCase(unittest.TestCase):
     @contextlib.contextmanager
     def running(self, command, until='/deformer/load'):
         """A command that starts a node; gives a function that ends it and returns what it has said."""
+        with contextlib.suppress(KeyError):
+            rospy.delete_param('/deformer')  # those of the node before
         with tempfile.TemporaryFile('w+', errors='replace') as log:
             launch = subprocess.Popen(['bash', '-c', 'exec ' + command], cwd=self.folder, env=self.environment(),
                                       stdout=log, stderr=subprocess.STDOUT)
