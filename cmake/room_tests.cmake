@@ -68,7 +68,7 @@ set(shares_body 2)
 set(shares_dynamics 2)
 set(shares_contact 2)
 
-set(links_io ${PROJECT_NAME}_io ZLIB::ZLIB)
+set(links_io ${PROJECT_NAME}_io JPEG::JPEG PNG::PNG ZLIB::ZLIB)
 set(links_world ${PROJECT_NAME}_drive ZLIB::ZLIB)  # its bowl; forged states have the right checksum
 set(links_stress ${PROJECT_NAME}_io)
 set(links_drive ${PROJECT_NAME}_drive)

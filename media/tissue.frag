@@ -1,17 +1,22 @@
 #version 120
-// Tissue: two colours mixed by the pattern of include/meshless_surgery/appearance/look.h, uneven to light, under a film of
-// water. Two lamps: one at the camera, as an endoscope has it, and one above. A program for each pattern: software GL
-// takes every branch. NOISE is as in Look.msg, 6 for what is plain and even.
+// Tissue: two colours mixed by the pattern of include/meshless_surgery/appearance/look.h, or an image, uneven to light,
+// under a film of water. Two lamps: one at the camera, as an endoscope has it, and one above. A program for each pattern:
+// software GL takes every branch. NOISE is as in Look.msg, 7 for what is plain and even.
 
 uniform vec4 second;
-uniform float scale;   // [m] of a cell of the pattern
+uniform float scale;   // [m] of a cell of the pattern, of the image's width
 uniform float wetness;
 uniform float bump;
+#if NOISE == 6
+uniform sampler2D image;
+uniform float aspect;  // width over height
+#endif
 
 varying vec3 seen_at;
 varying vec3 normal;
 varying vec3 above;
 varying vec3 place;
+varying vec3 turned;
 varying float growth;
 
 const float PERIOD = 289.0;
@@ -74,6 +79,18 @@ vec2 cellsAt(vec3 p)
   return vec2(sqrt(seeds.y) - sqrt(seeds.x), seeds.z / PERIOD);
 }
 
+#if NOISE == 6
+vec3 imageAt(vec3 p)
+{
+  vec3 shares = turned * turned;
+  shares *= shares;
+  shares /= max(shares.x + shares.y + shares.z, 1e-12);
+  vec2 up = vec2(1.0, -aspect);  // its first row is the upper one
+  return shares.x * texture2D(image, p.yz * up).rgb + shares.y * texture2D(image, p.xz * up).rgb +
+         shares.z * texture2D(image, p.xy * up).rgb;
+}
+#endif
+
 // x: how full the pattern is; y: how high the surface stands, in cells; z: how full it is on the whole.
 vec3 patternAt(vec3 p)
 {
@@ -116,13 +133,18 @@ void main()
   if (dot(n, eye) < 0.0) n = -n;  // shells are seen from both sides
 
   vec3 colour = gl_Color.rgb;
-#if NOISE != 6
+#if NOISE != 7
   vec3 p = place / scale;
-  vec3 pattern = patternAt(p);
   // Cells smaller than a pixel are their mean.
   vec3 width = fwidth(p);
   float coarse = smoothstep(0.5, 1.2, max(width.x, max(width.y, width.z)));
+#if NOISE == 6
+  colour = imageAt(p);
+  vec3 pattern = vec3(0.0, 0.03 * dot(colour, vec3(0.3, 0.6, 0.1)), 0.0);  // what is bright stands out
+#else
+  vec3 pattern = patternAt(p);
   colour = mix(colour, second.rgb, mix(pattern.x, pattern.z, coarse));
+#endif
   // Mikkelsen 2010, Bump mapping unparametrized surfaces on the GPU.
   float height = bump * scale * pattern.y;
   vec3 dx = dFdx(seen_at), dy = dFdy(seen_at);

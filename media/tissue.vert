@@ -9,6 +9,7 @@ varying vec3 seen_at;  // [m] from the camera
 varying vec3 normal;
 varying vec3 above;    // where up is, for the camera
 varying vec3 place;    // [m] of the body at rest
+varying vec3 turned;   // its normal there
 varying float growth;  // area over area at rest
 
 void main()
@@ -18,6 +19,7 @@ void main()
   normal = (worldview_matrix * vec4(gl_Normal, 0.0)).xyz;
   above = (view_matrix * vec4(0.0, 0.0, 1.0, 0.0)).xyz;
   place = gl_MultiTexCoord0.xyz;
+  turned = gl_MultiTexCoord2.xyz;
   growth = gl_MultiTexCoord1.x;
   gl_FrontColor = gl_Color;
 }

@@ -13,7 +13,7 @@ CHECKOUT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 INCLUDES = (
     (r'ros/package\.h', 'roslib'), (r'ros/|XmlRpcValue\.h', 'roscpp'), (r'(pluginlib|rviz|diagnostic_updater|tf2|tf2_eigen|tf2_ros|actionlib)/', None),
     (r'\w+_(msgs|srvs)/', None), (r'(Eigen|unsupported/Eigen)/', 'eigen'), (r'CGAL/', 'libcgal-dev'), (r'pcl/', 'libpcl-all-dev'),
-    (r'yaml-cpp/', 'yaml-cpp'), (r'tbb/', 'tbb'), (r'zlib\.h', 'zlib'), (r'nanoflann\.hpp', 'libnanoflann-dev'),
+    (r'yaml-cpp/', 'yaml-cpp'), (r'tbb/', 'tbb'), (r'zlib\.h', 'zlib'), (r'jpeglib\.h', 'libjpeg'), (r'png\.h', 'libpng-dev'), (r'nanoflann\.hpp', 'libnanoflann-dev'),
     (r'cereal/', 'libcereal-dev'), (r'utf8\.h$', 'libpcl-all-dev'), (r'CLI/', 'cli11'), (r'(Q[A-Z]\w*|Qt\w*/.*)$', 'qtbase5-dev'), (r'Ogre\w*\.h', 'rviz'),
     (r'gtest/', 'gtest'), (r'benchmark/', 'libbenchmark-dev'), (r'(BulletSoftBody/|bt\w+\.h)', 'bullet'),
     (r'(sys/\w+|unistd|immintrin|xmmintrin|fcntl|malloc|time|limits|dirent|execinfo|stdio|signal|poll|sched)(\.h)?$', ''),
@@ -21,7 +21,7 @@ INCLUDES = (
 )
 # What runs when a library of that header runs; the others are templates, or their run time has a name of its own.
 LINKED = {'roscpp', 'roslib', 'actionlib', 'diagnostic_updater', 'tf2', 'tf2_ros', 'libcgal-dev', 'libpcl-all-dev', 'yaml-cpp', 'tbb', 'zlib',
-          'pluginlib', 'rviz'}
+          'libjpeg', 'libpng-dev', 'pluginlib', 'rviz'}
 MODULES = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml', 'rospkg': 'python3-rospkg-modules', 'tf2_ros': 'tf2_ros'}
 ROS_MODULES = {'rospy', 'roslib', 'rosgraph', 'rosunit', 'rostest', 'tf2_ros', 'genpy', 'actionlib', 'rosbag', 'dynamic_reconfigure'}
 # Programs that tests and scripts start by name.
@@ -30,7 +30,7 @@ PROGRAMS = {'rosrun': 'rosbash', 'roslaunch': 'roslaunch', 'rosmaster': 'rosmast
 # Key of package.xml -> Debian's packages, where they have other names than the key of ROS.
 DEBIAN = {
     'catkin': ['catkin'], 'eigen': ['libeigen3-dev'], 'libcgal-dev': ['libcgal-dev'], 'libpcl-all-dev': ['libpcl-dev', 'libutfcpp-dev'],
-    'yaml-cpp': ['libyaml-cpp-dev'], 'tbb': ['libtbb-dev'], 'zlib': ['zlib1g-dev'], 'libnanoflann-dev': ['libnanoflann-dev'],
+    'yaml-cpp': ['libyaml-cpp-dev'], 'tbb': ['libtbb-dev'], 'zlib': ['zlib1g-dev'], 'libjpeg': ['libjpeg-dev'], 'libpng-dev': ['libpng-dev'], 'libnanoflann-dev': ['libnanoflann-dev'],
     'libcereal-dev': ['libcereal-dev'], 'cli11': ['libcli11-dev'], 'qtbase5-dev': ['qtbase5-dev'], 'libqt5-widgets': [],
     'gtest': ['libgtest-dev'], 'libbenchmark-dev': ['libbenchmark-dev'], 'bullet': ['libbullet-dev'], 'rviz': ['rviz', 'librviz-dev'],
     'pluginlib': ['pluginlib-dev'], 'python3-numpy': ['python3-numpy'], 'python3-yaml': ['python3-yaml'],
@@ -43,7 +43,7 @@ DEBIAN = {
 }
 # CMake's package -> the key. Those of catkin have the key's name.
 FOUND = {'Eigen3': 'eigen', 'CGAL': 'libcgal-dev', 'nanoflann': 'libnanoflann-dev', 'yaml-cpp': 'yaml-cpp', 'cereal': 'libcereal-dev',
-         'ZLIB': 'zlib', 'PCL': 'libpcl-all-dev', 'TBB': 'tbb', 'CLI11': 'cli11', 'Qt5': 'qtbase5-dev', 'GTest': 'gtest',
+         'ZLIB': 'zlib', 'JPEG': 'libjpeg', 'PNG': 'libpng-dev', 'PCL': 'libpcl-all-dev', 'TBB': 'tbb', 'CLI11': 'cli11', 'Qt5': 'qtbase5-dev', 'GTest': 'gtest',
          'benchmark': 'libbenchmark-dev', 'BULLET': 'bullet', 'utf8cpp': 'libpcl-all-dev', 'Threads': '', 'PkgConfig': ''}
 
 

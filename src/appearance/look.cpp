@@ -80,6 +80,25 @@ Status outOfRange(const std::string& key, double value, const char* accepted) {
 
 auto channels(const Color& c) { return std::tie(c.r, c.g, c.b, c.a); }
 
+bool sameImage(const ImagePtr& one, const ImagePtr& other) {
+  return one == other || (one && other && one->id() == other->id());
+}
+
+// Triplanar mapping: the image along each axis, the more of it the more the surface is turned there.
+Color imageAt(const Image& image, const Vec3& p, const Vec3& normal) {
+  Vec3 shares = normal.cwiseAbs2().cwiseAbs2();
+  shares = shares.sum() > 0.0 ? Vec3(shares / shares.sum()) : Vec3(Vec3::Constant(1.0 / 3.0));
+  const Color along[] = {image.at(p.y(), p.z()), image.at(p.x(), p.z()), image.at(p.x(), p.y())};
+  Color mixed{0.0f, 0.0f, 0.0f, 1.0f};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto share = static_cast<float>(shares[axis]);
+    mixed.r += share * along[axis].r;
+    mixed.g += share * along[axis].g;
+    mixed.b += share * along[axis].b;
+  }
+  return mixed;
+}
+
 }  // namespace
 
 const char* toString(Noise noise) {
@@ -96,6 +115,8 @@ const char* toString(Noise noise) {
       return "fibres";
     case Noise::kBone:
       return "bone";
+    case Noise::kImage:
+      return "image";
   }
   return "unknown";
 }
@@ -106,12 +127,15 @@ Status Look::validate(const std::string& of) const {
   if (!(bump >= 0.0 && bump <= 1.0)) return outOfRange(of + ".bump", bump, "0 to 1");
   for (const float channel : {second.r, second.g, second.b, second.a})
     if (!(channel >= 0.0f && channel <= 1.0f)) return outOfRange(of + ".second", channel, "0 to 1");
+  if ((noise == Noise::kImage) != (image != nullptr))
+    return Error{ErrorCode::kInvalidArgument, of + (image ? " has an image and a noise" : " has no image")};
   return Done{};
 }
 
 bool operator==(const Look& one, const Look& other) {
-  return channels(one.second) == channels(other.second) && one.noise == other.noise && one.scale == other.scale &&
-         one.wetness == other.wetness && one.bump == other.bump;
+  return channels(one.second) == channels(other.second) && one.noise == other.noise &&
+         sameImage(one.image, other.image) && one.scale == other.scale && one.wetness == other.wetness &&
+         one.bump == other.bump;
 }
 bool operator==(const Appearance& one, const Appearance& other) {
   return one.outer == other.outer && one.inner == other.inner;
@@ -121,6 +145,7 @@ double patternAt(const Look& look, const Vec3& place) {
   const Vec3 p = place / look.scale;
   switch (look.noise) {
     case Noise::kPlain:
+    case Noise::kImage:
       return 0.0;
     case Noise::kVeins:
       return (1.0 - smoothStep(0.02, 0.10, std::abs(gradientNoise(p)))) *
@@ -144,8 +169,13 @@ double patternAt(const Look& look, const Vec3& place) {
   return 0.0;
 }
 
-Color colorAt(const Look& look, const Color& base, const Vec3& place) {
+Color colorAt(const Look& look, const Color& base, const Vec3& place, const Vec3& normal) {
   if (look.noise == Noise::kPlain) return base;
+  if (look.noise == Noise::kImage) {
+    Color color = imageAt(*look.image, place / look.scale, normal);
+    color.a = base.a;
+    return color;
+  }
   const auto share = static_cast<float>(patternAt(look, place));
   const auto between = [share](float a, float b) {
     return std::clamp(a + share * (b - a), std::min(a, b), std::max(a, b));

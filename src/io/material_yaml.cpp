@@ -69,10 +69,42 @@ void readPlasticity(YamlMap& map, Plasticity& plasticity) {
   inner.finish();
 }
 
-void readLook(YamlMap& map, Look& look) {
+void readNoise(YamlMap& map, Look& look) {
+  std::string wanted;
+  map.text("noise", wanted);
+  if (!map.has("noise") || map.source().fault) return;
+  look.noise = Noise::kPlain;
+  look.image.reset();
   std::vector<std::string> names;
-  for (const Noise noise : kNoises) names.push_back(toString(noise));
-  if (const int noise = map.choice("noise", names); noise >= 0) look.noise = kNoises[noise];
+  std::string accepted;
+  for (const Noise noise : kNoises) {
+    names.push_back(toString(noise));
+    accepted += (accepted.empty() ? "" : ", ") + names.back();
+    if (names.back() == wanted) look.noise = noise;
+  }
+  if (look.noise == Noise::kPlain && wanted != names.front())
+    map.source().warn(map.get("noise"), "unknown noise " + shown(map.get("noise")) + " of " + map.what() +
+                                            ", did you mean '" + nearestWord(wanted, names) +
+                                            "'? The plain colour is used; accepted: " + accepted);
+}
+
+void readImage(YamlMap& map, const ImageFolder& images, Look& look) {
+  std::string path;
+  map.text("image", path);
+  if (!map.has("image") || map.source().fault) return;
+  const YAML::Node node = map.get("image");
+  if (map.has("noise")) return map.source().fail(node, map.what() + " has an image and a noise", "one of them");
+  const Result<ImagePtr> image = images.files.read(path, images.folder);
+  look.noise = image ? Noise::kImage : Noise::kPlain;
+  look.image = image ? *image : nullptr;
+  if (!image)
+    map.source().warn(node, "image of " + map.what() + ": " + image.error().detail + ". The plain colour is used");
+}
+
+// What cannot be had of a look ends no training: the plain colour is used.
+void readLook(YamlMap& map, const ImageFolder& images, Look& look) {
+  readNoise(map, look);
+  readImage(map, images, look);
   readColor(map, "second", look.second);
   map.number("scale", {1e-5, 1.0, false, "m"}, look.scale);
   map.number("wetness", {0.0, 1.0}, look.wetness);
@@ -80,7 +112,7 @@ void readLook(YamlMap& map, Look& look) {
   map.finish();
 }
 
-void readAppearance(YamlMap& map, Appearance& appearance) {
+void readAppearance(YamlMap& map, const ImageFolder& images, Appearance& appearance) {
   const YAML::Node node = map.get("appearance");
   if (!node.IsDefined()) return;
   if (node.IsNull() || (node.IsScalar() && node.Scalar() == "none")) {
@@ -94,11 +126,11 @@ void readAppearance(YamlMap& map, Appearance& appearance) {
   YamlMap sides(map.source(), node, "appearance");
   if (const YAML::Node of = sides.get("outer"); of.IsDefined()) {
     YamlMap outer(map.source(), of, "outer");
-    readLook(outer, appearance.outer);
+    readLook(outer, images, appearance.outer);
   }
   if (const YAML::Node of = sides.get("inner"); of.IsDefined()) {
     YamlMap inner(map.source(), of, "inner");
-    readLook(inner, appearance.inner);
+    readLook(inner, images, appearance.inner);
   }
   sides.finish();
 }
@@ -114,7 +146,8 @@ bool isPlainName(const std::string& name) {
   });
 }
 
-void readMaterial(YamlSource& source, const YAML::Node& node, const std::string& what, Material& material) {
+void readMaterial(YamlSource& source, const YAML::Node& node, const std::string& what, const ImageFolder& images,
+                  Material& material) {
   YamlMap map(source, node, what);
   const int mode = map.choice("mode", {"rigid", "linear", "quadratic"});
   if (mode == 0) material.mode = MatchMode::kRigid;
@@ -144,14 +177,15 @@ void readMaterial(YamlSource& source, const YAML::Node& node, const std::string&
   readPlasticity(map, material.plasticity);
   readColor(map, "color", material.color);
   readColor(map, "inside_color", material.inside_color);
-  readAppearance(map, material.appearance);
+  readAppearance(map, images, material.appearance);
   map.finish();
   if (source.fault) return;
   // The ranges above are the material's own; this keeps them so.
   if (const Status status = material.validate(); !status) source.fail(node, what + ": " + status.error().detail, "");
 }
 
-void readMaterialMap(YamlSource& source, const YAML::Node& node, std::map<std::string, Material>& materials) {
+void readMaterialMap(YamlSource& source, const YAML::Node& node, const ImageFolder& images,
+                     std::map<std::string, Material>& materials) {
   YamlMap map(source, node, "materials");
   if (!node.IsMap()) return;
   for (const auto& entry : node) {
@@ -160,13 +194,13 @@ void readMaterialMap(YamlSource& source, const YAML::Node& node, std::map<std::s
     if (!isPlainName(name)) source.fail(entry.first, "the material's name is " + shown(entry.first), kPlainName);
     Material material;
     material.name = name;
-    readMaterial(source, entry.second, "material '" + name + "'", material);
+    readMaterial(source, entry.second, "material '" + name + "'", images, material);
     if (source.fault) return;
     materials[name] = material;
   }
 }
 
-Result<std::map<std::string, Material>> readMaterials(const std::string& folder) {
+Status MaterialFiles::readFolder(const std::string& folder) {
   namespace fs = std::filesystem;
   std::vector<fs::path> files;
   std::error_code failed;
@@ -175,42 +209,49 @@ Result<std::map<std::string, Material>> readMaterials(const std::string& folder)
   if (failed)
     return Error{ErrorCode::kUnreadable, "cannot read the materials in '" + folder + "': " + failed.message()};
   std::sort(files.begin(), files.end());
-  std::map<std::string, Material> materials;
   for (const fs::path& file : files) {
     const fs::path real = fs::canonical(file, failed);
-    const Status read = failed ? Error{ErrorCode::kUnreadable, file.string() + ": is missing"}
-                               : readMaterialFile(real.string(), file.string(), materials);
-    if (!read) return read.error();
+    const Status done =
+        failed ? Error{ErrorCode::kUnreadable, file.string() + ": is missing"} : read(real.string(), file.string());
+    if (!done) return done;
   }
-  return materials;
+  return Done{};
 }
 
-Status readMaterialFile(const std::string& real_path, const std::string& name,
-                        std::map<std::string, Material>& materials) {
+Result<std::map<std::string, Material>> readMaterials(const std::string& folder) {
+  MaterialFiles files{ImageFiles(FileAccess())};
+  if (const Status read = files.readFolder(folder); !read) return read.error();
+  return std::move(files.materials);
+}
+
+Status MaterialFiles::read(const std::string& real_path, const std::string& name) {
   const Result<YAML::Node> root = readYamlFile(real_path, name);
   if (!root) return root.error();
   if (root->IsNull()) return Done{};  // only comments
   YamlSource source{name, {}};
   try {
-    readMaterialMap(source, *root, materials);
+    readMaterialMap(source, *root, {images, std::filesystem::path(real_path).parent_path().string()}, materials);
   } catch (const YAML::Exception& e) {
     source.fail(*root, e.what(), "YAML");
   }
   if (source.fault) return *source.fault;
+  warnings.insert(warnings.end(), source.warnings.begin(), source.warnings.end());
   return Done{};
 }
 
-Result<Material> changeMaterial(const Material& base, const std::string& yaml) {
+Result<Material> changeMaterial(const Material& base, const std::string& yaml, ImageFiles& images,
+                                const std::string& folder, std::vector<std::string>& warnings) {
   const Result<YAML::Node> root = parseYaml(yaml, "material");
   if (!root) return root.error();
   YamlSource source{"material", {}};
   Material changed = base;
   try {
-    readMaterial(source, *root, "the material", changed);
+    readMaterial(source, *root, "the material", {images, folder}, changed);
   } catch (const YAML::Exception& e) {
     source.fail(*root, e.what(), "YAML");
   }
   if (source.fault) return *source.fault;
+  warnings.insert(warnings.end(), source.warnings.begin(), source.warnings.end());
   return changed;
 }
 

@@ -242,15 +242,15 @@ double readUnits(YamlMap& map) {
 
 class SceneReader {
  public:
-  SceneReader(YamlSource& source, std::string folder, const FileAccess& access, SceneDef& scene)
-      : source_(source), folder_(std::move(folder)), access_(access), scene_(scene) {}
+  SceneReader(YamlSource& source, std::string folder, const FileAccess& access, ImageFiles& images, SceneDef& scene)
+      : source_(source), folder_(std::move(folder)), access_(access), images_{images, folder_}, scene_(scene) {}
 
   void read(const YAML::Node& root) {
     YamlMap map(source_, root, "the scene");
     if (const YAML::Node world = map.get("world"); world.IsDefined())
       readWorld(source_, world, scene_.world, scene_.warnings);
     if (const YAML::Node materials = map.get("materials"); materials.IsDefined())
-      readMaterialMap(source_, materials, scene_.materials);
+      readMaterialMap(source_, materials, images_, scene_.materials);
     const YAML::Node bodies = map.get("bodies"), obstacles = map.get("obstacles");
     const YAML::Node attachments = map.get("attachments");
     map.finish();
@@ -432,7 +432,7 @@ class SceneReader {
       if (found != scene_.materials.end()) material = found->second;
     } else if (node.IsMap()) {
       material.name = "own";
-      readMaterial(source_, node, "material", material);
+      readMaterial(source_, node, "material", images_, material);
     } else {
       std::string name;
       if (!readText(source_, node, "material", name)) return;
@@ -536,6 +536,7 @@ class SceneReader {
   YamlSource& source_;
   std::string folder_;
   const FileAccess& access_;
+  ImageFolder images_;
   SceneDef& scene_;
   std::set<std::string> names_;
   std::map<std::tuple<std::string, double, MeshRepair>, LoadedShape>
@@ -543,8 +544,7 @@ class SceneReader {
 };
 
 /// Adds the materials of config/materials of this package, and of the files in ../materials.
-Status readMaterialFolders(const std::string& scene_folder, const FileAccess& access,
-                           std::map<std::string, Material>& materials) {
+Status readMaterialFolders(const std::string& scene_folder, const FileAccess& access, MaterialFiles& materials) {
   const auto realFolder = [](const fs::path& folder) {
     std::error_code failed;
     const fs::path real = fs::canonical(folder, failed);
@@ -554,11 +554,8 @@ Status readMaterialFolders(const std::string& scene_folder, const FileAccess& ac
   if (access.find_package) {
     const std::string package = access.find_package("meshless_surgery");
     shared = package.empty() ? "" : realFolder(fs::path(package) / "config" / "materials");
-    if (!shared.empty()) {
-      Result<std::map<std::string, Material>> read = readMaterials(shared);
-      if (!read) return read.error();
-      materials = std::move(*read);
-    }
+    if (!shared.empty())
+      if (Status read = materials.readFolder(shared); !read) return read;
   }
   const std::string beside = realFolder(fs::path(scene_folder) / ".." / "materials");
   if (beside.empty() || beside == shared) return Done{};
@@ -572,7 +569,7 @@ Status readMaterialFolders(const std::string& scene_folder, const FileAccess& ac
     files[at->path().string()] = *real;
   }
   for (const auto& [name, real] : files)
-    if (Status read = readMaterialFile(real, name, materials); !read) return read;
+    if (Status read = materials.read(real, name); !read) return read;
   return Done{};
 }
 
@@ -603,8 +600,10 @@ Result<SceneDef> readScene(const std::string& file, const FileAccess& access) {
 
   SceneDef scene;
   scene.name = real.stem().string();
-  if (Status read = readMaterialFolders(real.parent_path().string(), scene_access, scene.materials); !read)
-    return read.error();
+  MaterialFiles files{ImageFiles(scene_access)};
+  if (Status read = readMaterialFolders(real.parent_path().string(), scene_access, files); !read) return read.error();
+  scene.materials = std::move(files.materials);
+  scene.warnings = std::move(files.warnings);
   const Result<YAML::Node> root = readYamlFile(real.string(), file);
   if (!root) return root.error();
   // What it is instead is not shown: any file may be named as the scene.
@@ -612,11 +611,12 @@ Result<SceneDef> readScene(const std::string& file, const FileAccess& access) {
     return Error{ErrorCode::kInvalidArgument, file + ": the scene is not a map; accepted: a map of keys and values"};
   YamlSource source{file, {}};
   try {
-    SceneReader(source, real.parent_path().string(), scene_access, scene).read(*root);
+    SceneReader(source, real.parent_path().string(), scene_access, files.images, scene).read(*root);
   } catch (const YAML::Exception& e) {
     source.fail(*root, e.what(), "YAML");
   }
   if (source.fault) return *source.fault;
+  scene.warnings.insert(scene.warnings.end(), source.warnings.begin(), source.warnings.end());
   return scene;
 }
 

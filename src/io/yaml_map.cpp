@@ -122,6 +122,10 @@ void YamlSource::fail(const YAML::Node& at, const std::string& what, const std::
   fault = Error{code, place + ": " + what + (accepted.empty() ? "" : "; accepted: " + accepted)};
 }
 
+void YamlSource::warn(const YAML::Node& at, const std::string& what) {
+  warnings.push_back(where(name, at.Mark()) + ": " + what);
+}
+
 Result<YAML::Node> parseYaml(const std::string& text, const std::string& name) {
   if (text.size() > kMaxBytes)
     return Error{ErrorCode::kUnreadable,

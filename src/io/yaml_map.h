@@ -14,11 +14,13 @@
 
 namespace meshless {
 
-/// The file's or text's name for messages, and the first fault found in it.
+/// The file's or text's name for messages, the first fault found in it, and what could be done without.
 struct YamlSource {
   std::string name;
   std::optional<Error> fault;
+  std::vector<std::string> warnings{};
 
+  void warn(const YAML::Node& at, const std::string& what);
   void fail(const YAML::Node& at, const std::string& what, const std::string& accepted,
             ErrorCode code = ErrorCode::kInvalidArgument);
 };

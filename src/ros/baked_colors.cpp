@@ -2,11 +2,23 @@
 
 #include <algorithm>
 
+#include "meshless_surgery/geometry/measures.h"
+
 namespace meshless {
 namespace {
 
 bool sameColor(const Color& one, const Color& other) {
   return one.r == other.r && one.g == other.g && one.b == other.b && one.a == other.a;
+}
+
+// At rest in the body's own frame, of the faces of cuts or of the others; empty where no look asks for them.
+Points normalsOf(const BodyModel& model, bool of_cuts, bool needed) {
+  if (!needed) return {};
+  TriangleMesh faces;
+  for (const Vec3& v : model.surface.vertices) faces.vertices.push_back(model.own * v);
+  for (std::size_t t = 0; t < model.surface.triangles.size(); ++t)
+    if (isCutPatch(model.surface.patchOf(t)) == of_cuts) faces.triangles.push_back(model.surface.triangles[t]);
+  return vertexNormals(faces);
 }
 
 }  // namespace
@@ -16,8 +28,11 @@ VertexColors bakeColors(const BodyModel& model, const Material& material) {
   const std::vector<std::uint32_t>& patches = model.surface.patches;
   VertexColors colors;
   if (const Look& look = material.appearance.outer; look.noise != Noise::kPlain) {
+    const Points normals = normalsOf(model, false, look.image != nullptr);
     colors.outer.reserve(rest.size());
-    for (const Vec3& v : rest) colors.outer.push_back(colorAt(look, material.color, model.own * v));
+    for (std::size_t v = 0; v < rest.size(); ++v)
+      colors.outer.push_back(
+          colorAt(look, material.color, model.own * rest[v], normals.empty() ? Vec3(Vec3::Zero()) : normals[v]));
   }
   std::vector<std::pair<const Look*, const Color*>> inside{{&material.appearance.inner, &material.inside_color}};
   for (const RegionTissue& region : model.regions)
@@ -30,11 +45,14 @@ VertexColors bakeColors(const BodyModel& model, const Material& material) {
       for (const Index v : model.surface.triangles[t]) on_cut[v] = true;
   std::vector<std::uint8_t> regions = surfaceRegions(model);
   regions.resize(rest.size(), 0);
+  const Points normals = normalsOf(model, true, std::any_of(inside.begin(), inside.end(), [](const auto& look) {
+                                     return look.first->image != nullptr;
+                                   }));
   colors.inside.assign(rest.size(), Color{0.0f, 0.0f, 0.0f, 1.0f});
   for (std::size_t v = 0; v < rest.size(); ++v)
     if (on_cut[v]) {
       const auto& [look, base] = inside[regions[v]];
-      colors.inside[v] = colorAt(*look, *base, model.own * rest[v]);
+      colors.inside[v] = colorAt(*look, *base, model.own * rest[v], normals.empty() ? Vec3(Vec3::Zero()) : normals[v]);
     }
   return colors;
 }

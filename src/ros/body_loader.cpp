@@ -33,6 +33,17 @@ Result<Material> BodyLoader::material(const std::string& name) const {
                "material is '" + printable(name) + "'; accepted: " + (known.empty() ? "default" : known)};
 }
 
+std::function<Result<Material>(const Material& present)> BodyLoader::materialChange(
+    const std::string& yaml, std::vector<std::string>& warnings) const {
+  const auto images = std::make_shared<ImageFiles>(access_);
+  // What is refused, it says where it is applied.
+  (void)changeMaterial(Material(), yaml, *images, scene_folder_, warnings);
+  return [yaml, images, folder = scene_folder_](const Material& present) {
+    std::vector<std::string> said_before;
+    return changeMaterial(present, yaml, *images, folder, said_before);
+  };
+}
+
 Result<std::shared_ptr<const PreparedBody>> BodyLoader::load(const SpawnRequest& request, Progress* progress) const {
   const auto at = [&](Progress::Phase phase) {
     if (progress == nullptr) return;

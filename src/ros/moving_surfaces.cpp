@@ -24,6 +24,7 @@ meshless_surgery::Look toLook(const Look& look, const Color& base) {
   message.noise = static_cast<std::uint8_t>(look.noise);
   message.color = toColor(base);
   message.second = toColor(look.second);
+  message.image = look.image ? look.image->id() : 0;
   message.scale = static_cast<float>(look.scale);
   message.wetness = static_cast<float>(look.wetness);
   message.bump = static_cast<float>(look.bump);
@@ -110,6 +111,32 @@ std::optional<meshless_surgery::Topology> MovingSurfaces::change(const WorldSnap
   for (const BodySnapshot& body : snapshot.bodies) {
     known_.emplace_back(body);
     message.bodies.push_back(toTopology(body, baked_.of(body)));
+  }
+  return message;
+}
+
+std::optional<meshless_surgery::TissueImages> MovingSurfaces::newImages(const WorldSnapshot& snapshot,
+                                                                        const std_msgs::Header& header) {
+  std::map<std::uint64_t, ImagePtr> now;
+  const auto add = [&now](const Look& look) {
+    if (look.image) now.emplace(look.image->id(), look.image);
+  };
+  for (const BodySnapshot& body : snapshot.bodies) {
+    add(body.material.appearance.outer);
+    add(body.material.appearance.inner);
+    for (const RegionTissue& region : body.model->regions) add(region.material.appearance.inner);
+  }
+  const auto same = [](const auto& one, const auto& other) { return one.first == other.first; };
+  if (std::equal(now.begin(), now.end(), images_.begin(), images_.end(), same)) return std::nullopt;
+  images_ = std::move(now);
+  meshless_surgery::TissueImages message;
+  message.header = header;
+  for (const auto& [id, image] : images_) {
+    message.images.emplace_back();
+    message.images.back().id = id;
+    message.images.back().width = image->width();
+    message.images.back().height = image->height();
+    message.images.back().rgb = image->rgb();
   }
   return message;
 }

@@ -82,6 +82,7 @@ Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings
   contacts_topic_ = handle.advertise<visualization_msgs::MarkerArray>(
       "contacts", 2, [this](const ros::SingleSubscriberPublisher&) { contacts_newcomer_ = true; });
   topology_topic_ = handle.advertise<meshless_surgery::Topology>("topology", 2, true);
+  images_topic_ = handle.advertise<meshless_surgery::TissueImages>("images", 1, true);
   vertices_topic_ = handle.advertise<meshless_surgery::Vertices>(
       "vertices", 5, [this](const ros::SingleSubscriberPublisher&) { vertices_newcomer_ = true; });
   info_topic_ = handle.advertise<meshless_surgery::Info>("info", 1, true);
@@ -277,7 +278,10 @@ void Publishers::publishInfo(const WorldSnapshot& snapshot, const std_msgs::Head
 }
 
 void Publishers::publishTopology(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
-  if (const auto changed = moving_.change(snapshot, header)) topology_topic_.publish(*changed);
+  const auto changed = moving_.change(snapshot, header);
+  if (!changed) return;
+  if (const auto images = moving_.newImages(snapshot, header)) images_topic_.publish(*images);
+  topology_topic_.publish(*changed);
 }
 
 void Publishers::publishSurfaces(const WorldSnapshot& snapshot, const std_msgs::Header& header) {

@@ -391,9 +391,11 @@ struct Services::Handlers : Answers {
     if (!check.ok()) return refuse(response, "set_material", check.error());
     SetMaterialCommand command;
     command.body = request.body;
-    command.change = [yaml = request.yaml](const Material& present) { return changeMaterial(present, yaml); };
-    return applied(response, "set_material", command,
-                   "changed the material of " + (request.body.empty() ? std::string("all bodies") : request.body));
+    std::vector<std::string> warnings;
+    command.change = work.loader.materialChange(request.yaml, warnings);
+    std::string said = "changed the material of " + (request.body.empty() ? std::string("all bodies") : request.body);
+    for (const std::string& warning : warnings) said += "; " + warning;
+    return applied(response, "set_material", command, said);
   }
 
   bool getBody(meshless_surgery::GetBody::Request& request, meshless_surgery::GetBody::Response& response) {

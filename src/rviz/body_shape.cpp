@@ -14,6 +14,7 @@
 #include <OgreSceneNode.h>
 #include <OgreSimpleRenderable.h>
 #include <OgreTechnique.h>
+#include <OgreTextureUnitState.h>
 
 #include "ogre_convert.h"
 #include "tissue_program.h"
@@ -207,10 +208,11 @@ void BodyShape::makeBuffers() {
   layout->addElement(0, 6 * sizeof(float), Ogre::VET_FLOAT1, Ogre::VES_TEXTURE_COORDINATES, 1);
   layout->addElement(1, 0, Ogre::VET_UBYTE4_NORM, Ogre::VES_DIFFUSE);
   layout->addElement(2, 0, Ogre::VET_FLOAT3, Ogre::VES_TEXTURE_COORDINATES, 0);
+  layout->addElement(2, 3 * sizeof(float), Ogre::VET_FLOAT3, Ogre::VES_TEXTURE_COORDINATES, 2);
   places_ = manager.createVertexBuffer(7 * sizeof(float), corners_.size(),
                                        Ogre::HardwareBuffer::HBU_DYNAMIC_WRITE_ONLY_DISCARDABLE);
   colours_ = manager.createVertexBuffer(4, corners_.size(), Ogre::HardwareBuffer::HBU_DYNAMIC_WRITE_ONLY);
-  rests_ = manager.createVertexBuffer(3 * sizeof(float), corners_.size(), Ogre::HardwareBuffer::HBU_STATIC_WRITE_ONLY);
+  rests_ = manager.createVertexBuffer(6 * sizeof(float), corners_.size(), Ogre::HardwareBuffer::HBU_STATIC_WRITE_ONLY);
   data_->vertexBufferBinding->setBinding(0, places_);
   data_->vertexBufferBinding->setBinding(1, colours_);
   data_->vertexBufferBinding->setBinding(2, rests_);
@@ -252,37 +254,44 @@ void BodyShape::setColours(const meshless_surgery::Surface& surface, const meshl
       bytes[4 * c + k] = static_cast<std::uint8_t>(255.0f * std::clamp(channels[k], 0.0f, 1.0f) + 0.5f);
   }
   colours_->writeData(0, bytes.size(), bytes.data(), true);
+}
 
-  floats_.assign(3 * corners_.size(), 0.0f);
-  if (patterns && patterns->rest.size() == 3 * vertices)
-    for (std::size_t c = 0; c < corners_.size(); ++c)
-      std::copy_n(&patterns->rest[3 * corners_[c].vertex], 3, &floats_[3 * c]);
+// Places and normals at rest, and what the faces around a corner measure there; nothing where that is not known, or of
+// no account.
+void BodyShape::setRest(const meshless_surgery::BodyTopology* patterns, const BodyLook& look) {
+  rest_areas_.clear();
+  floats_.assign(6 * corners_.size(), 0.0f);
+  if (look.shine && !look.by_strain && patterns && !patterns->rest.empty()) {
+    const auto restOf = [&](std::uint32_t v) {
+      const float* at = &patterns->rest[3 * v];
+      return Ogre::Vector3(at[0], at[1], at[2]);
+    };
+    std::vector<Ogre::Vector3> faces(cut_.size());
+    for (std::size_t t = 0; t < faces.size(); ++t) {
+      const std::uint32_t* corner = &triangles_[3 * t];
+      const Ogre::Vector3 a = restOf(corner[0]);
+      faces[t] = (restOf(corner[1]) - a).crossProduct(restOf(corner[2]) - a);
+    }
+    rest_areas_.resize(corners_.size());
+    float* to = floats_.data();
+    for (std::size_t c = 0; c < corners_.size(); ++c) {
+      Ogre::Vector3 normal = Ogre::Vector3::ZERO;
+      float area = 0.0f;
+      for (std::uint32_t i = starts_[c]; i < starts_[c + 1]; ++i) {
+        normal += faces[around_[i]];
+        area += faces[around_[i]].length();
+      }
+      normal.normalise();
+      rest_areas_[c] = std::max(area, std::numeric_limits<float>::min());
+      for (const Ogre::Vector3& v : {restOf(corners_[c].vertex), normal})
+        for (int axis = 0; axis < 3; ++axis) *to++ = v[axis];
+    }
+  }
   rests_->writeData(0, floats_.size() * sizeof(float), floats_.data(), true);
 }
 
-// What the faces around a corner measure at rest; nothing where that is not known, or of no account.
-void BodyShape::findRestAreas(const meshless_surgery::BodyTopology* patterns, const BodyLook& look) {
-  rest_areas_.clear();
-  if (!look.shine || look.by_strain || !patterns || patterns->rest.empty()) return;
-  const auto restOf = [&](std::size_t corner) {
-    const float* at = &patterns->rest[3 * triangles_[corner]];
-    return Ogre::Vector3(at[0], at[1], at[2]);
-  };
-  std::vector<float> areas(cut_.size());
-  for (std::size_t t = 0; t < areas.size(); ++t) {
-    const Ogre::Vector3 a = restOf(3 * t);
-    areas[t] = (restOf(3 * t + 1) - a).crossProduct(restOf(3 * t + 2) - a).length();
-  }
-  rest_areas_.resize(corners_.size());
-  for (std::size_t c = 0; c < corners_.size(); ++c) {
-    float area = 0.0f;
-    for (std::uint32_t i = starts_[c]; i < starts_[c + 1]; ++i) area += areas[around_[i]];
-    rest_areas_[c] = std::max(area, std::numeric_limits<float>::min());
-  }
-}
-
 void BodyShape::setMaterials(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
-                             const BodyLook& look) {
+                             const TissueTextures& textures, const BodyLook& look) {
   const double opacity = look.opacity * static_cast<double>(surface.color.a);
   const bool clear = opacity < 0.998;
   for (std::size_t p = 0; p < parts_.size(); ++p) {
@@ -296,10 +305,14 @@ void BodyShape::setMaterials(const meshless_surgery::Surface& surface, const mes
     pass->setPolygonMode(look.wire ? Ogre::PM_WIREFRAME : Ogre::PM_SOLID);
     const meshless_surgery::Look& tissue = patterns && p < patterns->looks.size() ? patterns->looks[p] : plainLook();
     const float wetness = look.by_strain ? kDry : tissue.wetness;
+    pass->removeAllTextureUnitStates();
     if (look.shine) {
       const TissueProgram& program = tissueProgram();
+      const bool of_image = tissue.noise == meshless_surgery::Look::IMAGE;
+      const Ogre::TexturePtr texture = of_image ? textures.find(tissue.image) : Ogre::TexturePtr();
       const bool patterned = patterns && !patterns->rest.empty() && !look.by_strain && tissue.scale > 0.0f &&
-                             tissue.noise < program.patterned.size() && (tissue.noise > 0 || tissue.bump > 0.0f);
+                             tissue.noise < program.patterned.size() && (tissue.noise > 0 || tissue.bump > 0.0f) &&
+                             (texture || !of_image);
       pass->setVertexProgram(program.vertex);
       pass->setFragmentProgram(patterned ? program.patterned[tissue.noise] : program.even);
       const auto vertex = pass->getVertexProgramParameters();
@@ -312,6 +325,14 @@ void BodyShape::setMaterials(const meshless_surgery::Surface& surface, const mes
       fragment->setNamedConstant("scale", tissue.scale);
       fragment->setNamedConstant("bump", tissue.bump);
       fragment->setNamedConstant("wetness", wetness);
+      if (patterned && texture) {
+        Ogre::TextureUnitState* unit = pass->createTextureUnitState();
+        unit->setTexture(texture);
+        unit->setTextureFiltering(Ogre::TFO_TRILINEAR);
+        fragment->setNamedConstant("image", 0);
+        fragment->setNamedConstant("aspect",
+                                   static_cast<float>(texture->getWidth()) / static_cast<float>(texture->getHeight()));
+      }
       continue;
     }
     pass->setVertexProgram("");
@@ -350,7 +371,7 @@ void BodyShape::place(const meshless_surgery::Surface& surface) {
 }
 
 void BodyShape::show(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
-                     const BodyLook& look) {
+                     const TissueTextures& textures, const BodyLook& look) {
   const std::size_t vertices = surface.vertices.size() / 3;
   if (patterns && !patterns->rest.empty() && patterns->rest.size() != surface.vertices.size()) patterns = nullptr;
   const bool same = sameTriangles(surface);
@@ -370,8 +391,8 @@ void BodyShape::show(const meshless_surgery::Surface& surface, const meshless_su
   }
   if (new_look || look.by_strain) setColours(surface, patterns, look);
   if (new_look) {
-    findRestAreas(patterns, look);
-    setMaterials(surface, patterns, look);
+    setRest(patterns, look);
+    setMaterials(surface, patterns, textures, look);
     patterned_ = patterns != nullptr;
     look_ = look;
     color_ = surface.color;

@@ -13,6 +13,8 @@
 #include <meshless_surgery/BodyTopology.h>
 #include <meshless_surgery/Surface.h>
 
+#include "tissue_textures.h"
+
 namespace Ogre {
 class SceneManager;
 class SceneNode;
@@ -29,10 +31,11 @@ struct BodyLook {
   bool wire = false;           // edges of the triangles alone
   bool shine = false;          // patterns for each pixel, lamps and a wet film: needs tissueProgram()
   std::uint32_t topology = 0;  // the number of the one that the patterns are of
+  std::uint32_t images = 0;    // how often they have come
 
   bool operator==(const BodyLook& o) const {
     return by_strain == o.by_strain && full_strain == o.full_strain && opacity == o.opacity && wire == o.wire &&
-           shine == o.shine && topology == o.topology;
+           shine == o.shine && topology == o.topology && images == o.images;
   }
 };
 
@@ -47,7 +50,7 @@ class BodyShape {
 
   /// `patterns` is of the same topology as the surface; null: plain colours.
   void show(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
-            const BodyLook& look);
+            const TissueTextures& textures, const BodyLook& look);
 
  private:
   /// A vertex where faces share a normal.
@@ -64,9 +67,9 @@ class BodyShape {
   void makeParts();
   void setColours(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
                   const BodyLook& look);
-  void findRestAreas(const meshless_surgery::BodyTopology* patterns, const BodyLook& look);
+  void setRest(const meshless_surgery::BodyTopology* patterns, const BodyLook& look);
   void setMaterials(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
-                    const BodyLook& look);
+                    const TissueTextures& textures, const BodyLook& look);
   void place(const meshless_surgery::Surface& surface);
 
   Ogre::SceneManager* scene_manager_;

@@ -20,8 +20,8 @@ namespace {
 
 enum Colouring { kByMaterial, kByStrain };
 
-constexpr float kLongestWait = 0.5f;                 // [s] for the topology of a surface, before it is shown plain
-constexpr float kSmallest = 1e-3f, kLargest = 2.0f;  // [m] of organs
+constexpr float kLongestWait = 0.5f;  // [s] for the topology of a surface, before it is shown plain
+constexpr float kSmallestOrgan = 1e-3f, kLargestOrgan = 2.0f;  // [m] of organs
 
 // [m] the longest side of what it spans.
 float lengthOf(const meshless_surgery::Surface& surface) {
@@ -70,6 +70,7 @@ void TissueDisplay::onEnable() { listen(); }
 void TissueDisplay::onDisable() {
   subscriber_.shutdown();
   topology_subscriber_.shutdown();
+  images_subscriber_.shutdown();
   bodies_.clear();
 }
 
@@ -99,6 +100,12 @@ void TissueDisplay::listen() {
   topology_subscriber_ = update_nh_.subscribe<meshless_surgery::Topology>(
       ros::names::resolve(node) + "/topology", 1, [this](const meshless_surgery::Topology::ConstPtr& topology) {
         next_topology_ = topology;
+        changeLook();
+      });
+  images_subscriber_ = update_nh_.subscribe<meshless_surgery::TissueImages>(
+      ros::names::resolve(node) + "/images", 1, [this](const meshless_surgery::TissueImages::ConstPtr& images) {
+        textures_.take(*images);
+        ++images_taken_;
         changeLook();
       });
 }
@@ -149,6 +156,7 @@ void TissueDisplay::draw() {
     deleteStatus("Shine");
   const bool known = findPatterns();
   look.topology = known ? surfaces_->topology : 0;
+  look.images = images_taken_;
   std::set<std::uint32_t> seen;
   std::size_t triangles = 0;
   bool others = false;
@@ -161,7 +169,7 @@ void TissueDisplay::draw() {
       others = true;
     }
     const auto patterns = known ? patterns_.find(surface.id) : patterns_.end();
-    shape->show(surface, patterns == patterns_.end() ? nullptr : patterns->second, look);
+    shape->show(surface, patterns == patterns_.end() ? nullptr : patterns->second, textures_, look);
   }
   if (others) warnOfSize();
   for (auto it = bodies_.begin(); it != bodies_.end();)
@@ -186,13 +194,13 @@ void TissueDisplay::warnOfSize() {
       largest = &surface;
       length = here;
     }
-  if (!largest || (length >= kSmallest && length <= kLargest)) return deleteStatus("Size");
+  if (!largest || (length >= kSmallestOrgan && length <= kLargestOrgan)) return deleteStatus("Size");
   setStatus(rviz::StatusProperty::Warn, "Size",
             QString("%1 is %2 m long; organs are %3 to %4 m: see scale and units")
                 .arg(QString::fromStdString(largest->name))
                 .arg(length, 0, 'g', 3)
-                .arg(kSmallest)
-                .arg(kLargest));
+                .arg(kSmallestOrgan)
+                .arg(kLargestOrgan));
 }
 
 }  // namespace meshless

@@ -9,10 +9,12 @@
 #include <unordered_map>
 
 #include <meshless_surgery/Surfaces.h>
+#include <meshless_surgery/TissueImages.h>
 #include <meshless_surgery/Topology.h>
 #include <ros/ros.h>
 
 #include "body_shape.h"
+#include "tissue_textures.h"
 #include "tools_shape.h"
 #endif
 
@@ -57,10 +59,12 @@ class TissueDisplay : public rviz::Display {
   rviz::BoolProperty* shine_;
   rviz::BoolProperty* tools_shown_;
   rviz::FloatProperty* full_force_;
-  ros::Subscriber subscriber_, topology_subscriber_;
+  ros::Subscriber subscriber_, topology_subscriber_, images_subscriber_;
   meshless_surgery::Surfaces::ConstPtr surfaces_;
   meshless_surgery::Topology::ConstPtr topology_, next_topology_;  // of what is shown, and the last that has come
   std::unordered_map<std::uint32_t, const meshless_surgery::BodyTopology*> patterns_;  // of topology_, by the body's id
+  TissueTextures textures_;
+  std::uint32_t images_taken_ = 0;
   float waited_ = 0.0f;  // [s] for the topology of surfaces_
   bool fresh_ = false;
   std::map<std::uint32_t, std::unique_ptr<BodyShape>> bodies_;

@@ -9,7 +9,7 @@ namespace meshless {
 /// Names of Ogre's programs; where the driver does not take them, why.
 struct TissueProgram {
   std::string vertex;
-  std::array<std::string, 6> patterned;  // by Look.noise
+  std::array<std::string, 7> patterned;  // by Look.noise
   std::string even;                      // without a pattern or bumps
   std::string refused;
 

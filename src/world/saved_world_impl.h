@@ -11,7 +11,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kStateVersion = 20;
+constexpr std::uint32_t kStateVersion = 21;
 
 inline std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(
@@ -105,10 +105,38 @@ void serialize(A& archive, Plasticity& v) {
   auto& [yield, creep, maximum] = v;
   archive(yield, creep, maximum);
 }
+/// Many materials share an image: a file has its pixels once, where it comes first.
+inline void save(OutArchive& archive, const ImagePtr& image) {
+  archive(image != nullptr);
+  if (!image) return;
+  const std::size_t known = archive.shared();
+  archive(archive.placeOf(image.get()));
+  if (archive.shared() > known) archive(image->width(), image->height(), image->rgb());
+}
+inline void save(HashArchive& archive, const ImagePtr& image) { archive(image ? image->id() : std::uint64_t{0}); }
+inline void load(InArchive& archive, ImagePtr& image) {
+  bool there = false;
+  archive(there);
+  image.reset();
+  if (!there) return;
+  std::uint32_t place = 0;
+  archive(place);
+  auto& known = archive.shared();
+  if (place > known.size()) throw ArchiveFault("an image is not there");
+  if (place == known.size()) {
+    std::uint32_t width = 0, height = 0;
+    std::vector<std::uint8_t> rgb;
+    archive(width, height, rgb);
+    auto made = Image::make(width, height, std::move(rgb));
+    if (!made) throw ArchiveFault(made.error().detail);
+    known.push_back(*made);
+  }
+  image = std::static_pointer_cast<const Image>(known[place]);
+}
 template <class A>
 void serialize(A& archive, Look& v) {
-  auto& [noise, second, scale, wetness, bump] = v;
-  archive(choice(noise, kNoises.back()), second, scale, wetness, bump);
+  auto& [noise, second, image, scale, wetness, bump] = v;
+  archive(choice(noise, Noise::kImage), second, image, scale, wetness, bump);
 }
 template <class A>
 void serialize(A& archive, Appearance& v) {

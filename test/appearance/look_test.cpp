@@ -31,7 +31,7 @@ TEST(Look, EveryColourIsBetweenTheTwo) {
   for (const Noise noise : kNoises)
     for (const double within : {0.003, 0.2, 1e4})
       for (const Vec3& p : places(3000, within)) {
-        const Color c = colorAt(lookOf(noise), kBase, p);
+        const Color c = colorAt(lookOf(noise), kBase, p, Vec3::UnitZ());
         ASSERT_TRUE(c.r >= 0.2f && c.r <= 0.8f) << toString(noise) << " " << c.r;
         ASSERT_TRUE(c.g >= 0.1f && c.g <= 0.6f) << toString(noise) << " " << c.g;
         ASSERT_EQ(0.3f, c.b) << toString(noise);

@@ -3,6 +3,7 @@
 
 #include "meshless_surgery/appearance/look.h"
 #include "support/bodies.h"
+#include "support/images.h"
 
 namespace meshless {
 namespace own_place_test {
@@ -88,8 +89,11 @@ TEST(OwnPlace, PiecesHaveTheirParentsColoursWhereTheyAreTheParent) {
       for (const Vec3& b : right)
         if ((a - b).norm() < 1e-9) {
           ++common;
-          const Color one = colorAt(lobules(), Color(), a), other = colorAt(lobules(), Color(), b);
-          ASSERT_NEAR(one.r, other.r, 1e-5f);
+          for (const Look& look : {lobules(), test::chequered(0.05)}) {  // the faces are turned against each other
+            const Color one = colorAt(look, Color(), a, Vec3::UnitX()),
+                        other = colorAt(look, Color(), b, -Vec3::UnitX());
+            ASSERT_NEAR(one.r, other.r, 1e-5f);
+          }
         }
     EXPECT_GT(common, 5u) << cells;
   }

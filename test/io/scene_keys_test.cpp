@@ -2,6 +2,7 @@
 // it lists them where it refuses an unknown one.
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <map>
@@ -262,11 +263,13 @@ std::vector<Row> rows() {
       {"appearance", "outer: {scale: 0.123}", "", MATERIAL(appearance.outer.scale), "0.123"},
       {"appearance", "inner: {scale: 0.123}", "", MATERIAL(appearance.inner.scale), "0.123"},
       {"outer", "noise: fat", "", READ(toString(s.material.appearance.outer.noise)), "fat"},
+      {"outer", "image: ../skin.png", "", READ(toString(s.material.appearance.outer.noise)), "image"},
       {"outer", "second: [0.1, 0.2, 0.3]", "", MATERIAL(appearance.outer.second), "0.1 0.2 0.3 1"},
       {"outer", "scale: 0.123", "", MATERIAL(appearance.outer.scale), "0.123"},
       {"outer", "wetness: 0.123", "", MATERIAL(appearance.outer.wetness), "0.123"},
       {"outer", "bump: 0.123", "", MATERIAL(appearance.outer.bump), "0.123"},
       {"inner", "noise: bone", "", READ(toString(s.material.appearance.inner.noise)), "bone"},
+      {"inner", "image: ../skin.png", "", READ(toString(s.material.appearance.inner.noise)), "image"},
       {"inner", "second: [0.1, 0.2, 0.3]", "", MATERIAL(appearance.inner.second), "0.1 0.2 0.3 1"},
       {"inner", "scale: 0.123", "", MATERIAL(appearance.inner.scale), "0.123"},
       {"inner", "wetness: 0.123", "", MATERIAL(appearance.inner.wetness), "0.123"},
@@ -306,6 +309,7 @@ class SceneKeys : public ::testing::Test {
     box.vertices.emplace_back(2.0, 2.0, 2.0);  // a fin, for repair
     box.triangles.push_back({0, 1, static_cast<Index>(box.vertices.size() - 1)});
     ASSERT_TRUE(writeObj(folder_.file("fin.obj"), box, "").ok());
+    std::filesystem::copy(std::string(SOURCE_DIR) + "/docs/images/endoscope.png", folder_.file("skin.png"));
   }
   Result<SceneDef> load(std::string scene, const Row& row, std::string keys, bool copied) {
     const bool shaped = keys.find("file:") != std::string::npos || keys.find("primitive:") != std::string::npos;

@@ -338,28 +338,34 @@ TEST_F(Scene, NotesOfTheMeshArePassedOn) {
   EXPECT_GT(signedVolume(scene.bodies[0].mesh), 0.0);
 }
 
+Result<Material> changed(const Material& base, const std::string& yaml) {
+  ImageFiles images{FileAccess()};
+  std::vector<std::string> warnings;
+  return changeMaterial(base, yaml, images, "", warnings);
+}
+
 TEST(ChangeMaterial, ChangesTheKeysItIsGiven) {
   Material base;
   base.name = "mine";
   base.density = 900.0;
-  const Result<Material> changed = changeMaterial(base, "{alpha: 0.9, mode: rigid}");
-  ASSERT_TRUE(changed.ok()) << changed.error().detail;
-  EXPECT_EQ(changed->name, "mine");
-  EXPECT_EQ(changed->alpha, 0.9);
-  EXPECT_EQ(changed->mode, MatchMode::kRigid);
-  EXPECT_EQ(changed->density, 900.0);
-  const Result<Material> held = changeMaterial(base, "{volume: [[0, 0.1], [0.2, 1]], area: 0.5}");
+  const Result<Material> rigid = changed(base, "{alpha: 0.9, mode: rigid}");
+  ASSERT_TRUE(rigid.ok()) << rigid.error().detail;
+  EXPECT_EQ(rigid->name, "mine");
+  EXPECT_EQ(rigid->alpha, 0.9);
+  EXPECT_EQ(rigid->mode, MatchMode::kRigid);
+  EXPECT_EQ(rigid->density, 900.0);
+  const Result<Material> held = changed(base, "{volume: [[0, 0.1], [0.2, 1]], area: 0.5}");
   ASSERT_TRUE(held.ok()) << held.error().detail;
   EXPECT_NEAR(held->volume.at(0.1), 0.55, 1e-15);
   EXPECT_EQ(held->area.at(3.0), 0.5);
-  EXPECT_TRUE(changeMaterial(*held, "volume: none")->volume.points.empty());
-  const Result<Material> patterned = changeMaterial(base, "appearance: {outer: {noise: fat, scale: 0.01}}");
+  EXPECT_TRUE(changed(*held, "volume: none")->volume.points.empty());
+  const Result<Material> patterned = changed(base, "appearance: {outer: {noise: fat, scale: 0.01}}");
   ASSERT_TRUE(patterned.ok());
-  const Result<Material> coarser = changeMaterial(*patterned, "appearance: {outer: {scale: 0.02}}");
+  const Result<Material> coarser = changed(*patterned, "appearance: {outer: {scale: 0.02}}");
   ASSERT_TRUE(coarser.ok());
   EXPECT_EQ(Noise::kFat, coarser->appearance.outer.noise);
   EXPECT_EQ(0.02, coarser->appearance.outer.scale);
-  EXPECT_TRUE(changeMaterial(*coarser, "appearance: none")->appearance == Appearance());
+  EXPECT_TRUE(changed(*coarser, "appearance: none")->appearance == Appearance());
 }
 
 TEST(ChangeMaterial, RefusesWhatItDoesNotKnow) {
@@ -384,8 +390,8 @@ TEST(ChangeMaterial, RefusesWhatItDoesNotKnow) {
       {"appearance: 3", "appearance is '3'"},
       {"appearance: {outer: 3}", "outer is"},
       {"appearance: {outside: {}}", "unknown key 'outside'"},
-      {"appearance: {outer: {noise: clouds}}", "noise is 'clouds'"},
-      {"appearance: {outer: {image: liver.png}}", "unknown key 'image'"},
+      {"appearance: {outer: {noise: [fat]}}", "noise is"},
+      {"appearance: {outer: {image: [a.png]}}", "image is"},
       {"appearance: {inner: {scale: 0}}", "scale is 0"},
       {"appearance: {inner: {scale: .nan}}", "scale is"},
       {"appearance: {inner: {wetness: 1.5}}", "wetness is 1.5"},
@@ -394,9 +400,9 @@ TEST(ChangeMaterial, RefusesWhatItDoesNotKnow) {
       {"youngs_modulus: 1e4\npoissons_ratio: 0.5", "material:2: poissons_ratio is 0.5"},
       {"name: other", "unknown key 'name'"}};
   for (const auto& one : cases) {
-    const Result<Material> changed = changeMaterial(base, one.first);
-    ASSERT_FALSE(changed.ok()) << one.first;
-    EXPECT_TRUE(says(changed.error(), one.second)) << changed.error().detail;
+    const Result<Material> refused = changed(base, one.first);
+    ASSERT_FALSE(refused.ok()) << one.first;
+    EXPECT_TRUE(says(refused.error(), one.second)) << refused.error().detail;
   }
 }
 

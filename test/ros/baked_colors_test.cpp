@@ -5,6 +5,7 @@
 #include "meshless_surgery/ros/markers.h"
 #include "meshless_surgery/ros/moving_surfaces.h"
 #include "ros/scene_support.h"
+#include "support/images.h"
 
 namespace meshless {
 namespace baked_colors_test {
@@ -53,8 +54,9 @@ TEST(BakedColors, AreTheLooksAtTheVertices) {
         if (isCutPatch(body.model->surface.patchOf(t))) on_cut[v] = true;
     for (std::size_t v = 0; v < rest.size(); ++v) {
       const Vec3 place = body.model->own * rest[v];
-      const Color out = colorAt(body.material.appearance.outer, body.material.color, place),
-                  in = colorAt(body.material.appearance.inner, body.material.inside_color, place);
+      const Vec3 none = Vec3::Zero();
+      const Color out = colorAt(body.material.appearance.outer, body.material.color, place, none),
+                  in = colorAt(body.material.appearance.inner, body.material.inside_color, place, none);
       EXPECT_EQ(out.g, colors.outer[v].g);
       EXPECT_EQ(on_cut[v] ? in.b : 0.0f, colors.inside[v].b);
     }
@@ -142,6 +144,74 @@ TEST(BakedColors, TheTopologyHasThemAndIsNewWhereALookIs) {
     EXPECT_NEAR((model.own * model.surface.vertices[v]).z(), body.rest[3 * v + 2], 1e-6);
   }
   EXPECT_FALSE(moving.change(world->snapshot(surfaces()), {}));
+}
+
+TEST(BakedColors, AnImageIsSeenFromTheSideThatASurfaceIsTurnedTo) {
+  const auto world = twoBoxes();
+  SetMaterialCommand command;  // of both
+  command.change = [](const Material& present) {
+    Material other = present;
+    other.appearance.outer = test::chequered(0.13);
+    return Result<Material>(other);
+  };
+  ASSERT_TRUE(world->apply(command).ok());
+  const WorldSnapshot snapshot = world->snapshot(surfaces());
+  const BodySnapshot& body = snapshot.bodies[0];
+  const VertexColors colors = bakeColors(*body.model, body.material);
+  Points places;
+  Box box;
+  for (const Vec3& v : body.model->surface.vertices) {
+    places.push_back(body.model->own * v);
+    box.extend(places.back());
+  }
+  std::size_t looked_at = 0;
+  for (std::size_t v = 0; v < places.size(); ++v) {
+    const Vec3 from_side = (places[v] - box.min).cwiseMin(box.max - places[v]);
+    Vec3 normal = Vec3::Zero();
+    for (int axis = 0; axis < 3; ++axis) normal[axis] = from_side[axis] < 1e-9 ? 1.0 : 0.0;
+    if (normal.sum() != 1.0) continue;  // on an edge
+    ++looked_at;
+    EXPECT_NEAR(colorAt(test::chequered(0.13), Color(), places[v], normal).r, colors.outer[v].r, 1e-5);
+  }
+  EXPECT_GT(looked_at, 5u);
+}
+
+TEST(MovingSurfaces, SayAnImageOnceHoweverManyShowIt) {
+  const auto world = twoBoxes();
+  MovingSurfaces moving;
+  EXPECT_FALSE(moving.newImages(world->snapshot(surfaces()), {}));
+  const auto show = [&](const std::string& body, const Look& look) {
+    SetMaterialCommand command;
+    command.body = body;
+    command.change = [look](const Material& present) {
+      Material other = present;
+      other.appearance.outer = look;
+      return Result<Material>(other);
+    };
+    ASSERT_TRUE(world->apply(command).ok());
+  };
+  show("a", test::chequered(0.02));
+  show("b", test::chequered(0.04));  // read anew, the same pixels
+  const auto images = moving.newImages(world->snapshot(surfaces()), {});
+  ASSERT_TRUE(images);
+  ASSERT_EQ(1u, images->images.size());
+  EXPECT_EQ(2u, images->images[0].width);
+  EXPECT_EQ(test::chequered(0.02).image->rgb(), images->images[0].rgb);
+  const auto topology = moving.change(world->snapshot(surfaces()), {});
+  ASSERT_TRUE(topology);
+  for (const auto& body : topology->bodies) {
+    EXPECT_EQ(static_cast<std::uint8_t>(meshless_surgery::Look::IMAGE), body.looks[0].noise);
+    EXPECT_EQ(images->images[0].id, body.looks[0].image);
+    EXPECT_EQ(0u, body.looks[1].image);
+    EXPECT_FALSE(body.rest.empty());
+  }
+  EXPECT_FALSE(moving.newImages(world->snapshot(surfaces()), {}));
+  show("a", Look());
+  EXPECT_FALSE(moving.newImages(world->snapshot(surfaces()), {}));  // one still shows it
+  show("b", Look());
+  const auto none = moving.newImages(world->snapshot(surfaces()), {});
+  ASSERT_TRUE(none);
+  EXPECT_TRUE(none->images.empty());
 }
 
 }  // namespace baked_colors_test

@@ -12,7 +12,7 @@ import numpy
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Point, PoseStamped, Vector3, WrenchStamped
-from meshless_surgery.msg import Event, Info, Metrics, State, Surfaces, TaskState, Topology, Vertices
+from meshless_surgery.msg import Event, Info, Metrics, State, Surfaces, TaskState, TissueImages, Topology, Vertices
 from meshless_surgery.srv import GetBodyResponse
 from sensor_msgs.msg import JointState, PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
@@ -30,6 +30,7 @@ SPACINGS = {'flat': 0.025, 'leans': 0.02, 'falls': 0.025, 'hangs': 0.05, 'sags':
 YOUNGS = {'sags': 2e4, 'stiff': 1e5, 'full': 2e4}  # [Pa] of those that are elastic
 # [kg]
 MASSES = {name: (1200 if name in ('flat', 'leans', 'falls', 'hangs') else 1000) * numpy.prod(size) for name, size in SIZES.items()}
+PIXELS = numpy.array([[[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 0]], [[0] * 3, [80] * 3, [160] * 3, [255] * 3]])  # of pixels.png
 held = set()  # (message, field) that a law holds for a value that is not the one of an empty message
 
 
@@ -64,6 +65,16 @@ def solid(vertices, triangles):
     parts = numpy.einsum('ij,ij->i', a - vertices[0], normals) / 6.0
     centre = vertices[0] + ((a + b + c - 3 * vertices[0]) / 4.0 * parts[:, None]).sum(0) / parts.sum()
     return parts.sum(), 0.5 * numpy.linalg.norm(normals, axis=1).sum(), centre
+
+
+def seen_at(x, y):
+    """The colour of pixels.png there, in its widths from the lower left corner on: between the middles of pixels."""
+    rows, columns = PIXELS.shape[:2]
+    at = [(-y * columns - 0.5), (x * columns - 0.5)]
+    first = [int(numpy.floor(a)) for a in at]
+    share = [a - f for a, f in zip(at, first)]
+    return sum((share[0] if down else 1 - share[0]) * (share[1] if right else 1 - share[1]) *
+               PIXELS[(first[0] + down) % rows, (first[1] + right) % columns] for down in (0, 1) for right in (0, 1))
 
 
 def mesh_of(answer):
@@ -432,7 +443,13 @@ class MessagesLawTest(DeformerTestCase):
         self.assertGreater(numpy.abs(self.wrench('push')).max(), 0.0)
         self.assertEqual([0.0] * 3, self.wrench('scissors').tolist(), 'blades part tissue, and feel nothing')
         state = self.state()
-        for message in (shown, strained, topology, vertices):
+        images = self.fresh('images', TissueImages)
+        self.says(images.images[0], width=4, height=2, rgb=PIXELS.ravel())
+        self.assertEqual(1, len(images.images))
+        held.add((images._type, 'images'))
+        self.image = images.images[0].id
+        held.add((images.images[0]._type, 'id'))
+        for message in (shown, strained, topology, vertices, images):
             self.heads(message, rospy.Time(1))
         for message in (shown, strained):
             self.says(message, topology=topology.topology, push_shown=True, push_position=([-1.0, 0.0, 1.921], 1e-9), push_radius=0.03, push_touching=True,
@@ -491,8 +508,27 @@ class MessagesLawTest(DeformerTestCase):
         self.assertEqual([runs[0] + 1] * 3, runs[1:])
         held.update((m._type, f) for m, f in ((shown, 'run'), (topology, 'run'), (topology, 'topology')))
 
+    def image_look(self, still, places):
+        """The image is seen along the axis that the surface is turned to."""
+        outer, inner = still.looks
+        self.says(outer, noise=outer.IMAGE, image=self.image, scale=(0.07, 1e-6))
+        self.says(inner, noise=inner.PLAIN, image=0)
+        self.holds(still, 'rest', places.ravel(), 1e-6)
+        colours = numpy.array(list(bytes(still.colors)), float).reshape(-1, 3)
+        half = numpy.array(SIZES['stiff']) / 2.0
+        outermost = numpy.abs(numpy.abs(places) - half) < 1e-6
+        looked_at = 0
+        for place, colour, on in zip(places, colours, outermost):
+            if on.sum() == 1:
+                across = numpy.delete(place, numpy.argmax(on)) / 0.07
+                self.assertLess(numpy.abs(colour - seen_at(*across)).max(), 1.0, place)
+                looked_at += 1
+        self.assertGreater(looked_at, 50)
+
     def looks(self, still, root, rest_places, triangles, in_plane):
         """Patterns fill the body's own frame, and mix the two colours of their look."""
+        if root == 'stiff':
+            return self.image_look(still, rest_places - [0, 2, 1])
         if root != 'sags':
             for field in ('rest', 'colors', 'inside_colors'):
                 self.assertEqual(0, len(getattr(still, field)), still.name)

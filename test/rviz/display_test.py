@@ -19,7 +19,7 @@ from virtual_display import VirtualDisplay, stop, wait_until  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion  # noqa: E402
 from meshless_surgery.msg import State  # noqa: E402
-from meshless_surgery.srv import Cut, Lock, Pick, Remove, Spawn  # noqa: E402
+from meshless_surgery.srv import Cut, Lock, Pick, Remove, SetMaterial, Spawn  # noqa: E402
 from shape_msgs.msg import SolidPrimitive  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
@@ -115,6 +115,42 @@ class DisplayTest(unittest.TestCase):
         print('mirrored %.4f, without %.4f; neighbours differ by %.1f, without %.1f' % (look()[0], dull, look()[1], smooth))
         self.assertGreater(look()[1], smooth + 1.0, 'no pattern')
         self.save('shine')
+
+    def test_tissue_shows_its_image(self):
+        image = os.path.join(rospkg.RosPack().get_path('meshless_surgery'), 'test', 'ros', 'scenes', 'pixels.png')
+
+        def of_each_colour():
+            """Pixels that are green, blue and yellow: nothing else in the picture is."""
+            red, green, blue = (self.pixels()[:, :, k] for k in range(3))
+            return min(((green > red + 40) & (green > blue + 40)).sum(), ((blue > red + 40) & (blue > green + 40)).sum(),
+                       ((red > blue + 60) & (green > blue + 60)).sum())
+        for shine in (True, False):
+            self.start(lambda display: display.update(Shine=shine))
+            self.until(lambda: (self.pixels()[:, :, 0] > 100).sum() > 2000, 'no liver')
+            self.assertLess(of_each_colour(), 50)
+            yaml_text = 'appearance: {outer: {image: "%s", scale: 0.12}}'
+            call('set_material', SetMaterial, body='liver', yaml=yaml_text % image)
+            self.until(lambda: of_each_colour() > 500, 'no image, shine %s' % shine)
+            self.save('image_%s' % shine)
+            # One that cannot be had is said, and the plain colour is shown.
+            answer = call('set_material', SetMaterial, body='liver', yaml=yaml_text % 'no_such.png')
+            self.assertIn("there is no file 'no_such.png'", answer.message)
+            self.until(lambda: of_each_colour() < 50, 'the image stays')
+            self.doCleanups()
+
+    def test_edges_of_cuts_are_bloody(self):
+        self.start()
+
+        def red():
+            picture = self.pixels()
+            return ((picture[:, :, 0] > 1.35 * picture[:, :, 1]) & (picture[:, :, 0] > 45)).sum()
+        call('set_material', SetMaterial, yaml='{color: [0.7, 0.7, 0.7], inside_color: [0.7, 0.7, 0.7], appearance: none}')
+        self.until(lambda: red() < 50, 'it is not grey')
+        before = red()
+        call('cut', Cut, blades=PoseStamped(pose=Pose(position=Point(0.0, -1, 0.1),
+                                                      orientation=Quaternion(0.5, 0.5, 0.5, 0.5))))
+        self.until(lambda: red() > before + 100, 'no blood at the edges')
+        self.save('edges')
 
     def test_strain_is_shown_where_tissue_is_pulled(self):
         def by_strain(display):

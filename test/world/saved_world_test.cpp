@@ -9,6 +9,7 @@
 #include "meshless_surgery/world/world.h"
 #include "support/bodies.h"
 #include "support/forged.h"
+#include "support/images.h"
 #include "support/random.h"
 
 namespace meshless {
@@ -316,6 +317,43 @@ TEST(SavedWorld, ModelsThatWereSharedAreSharedAgain) {
   for (const BodySnapshot& body : shot.bodies) EXPECT_EQ(shot.bodies[0].model, body.model);
 }
 
+// Of bodies that share it, before and after they were cut.
+World withImages(std::uint8_t blue) {
+  World world(test::weightless());
+  Look look;
+  look.noise = Noise::kImage;
+  look.image = *Image::make(40, 30, test::ramp(40, 30, blue));
+  for (int k = 0; k < 6; ++k) {
+    BodyDef def = test::ball("ball_" + std::to_string(k), Vec3(0.3 * k, 0, 0));
+    def.material.appearance.outer = def.material.appearance.inner = look;
+    EXPECT_TRUE(world.addSceneBody(test::shared(def)).ok());
+  }
+  EXPECT_TRUE(world.apply(cutThrough(Vec3(0, 0, 0), Vec3::UnitX())).ok());
+  return world;
+}
+
+TEST(SavedWorld, ImagesComeAlongOnce) {
+  const World world = withImages(7);
+  const std::size_t pixels = 40 * 30 * 3;
+  World plain(test::weightless());
+  for (int k = 0; k < 6; ++k)
+    ASSERT_TRUE(plain.addSceneBody(test::shared(test::ball("ball_" + std::to_string(k), Vec3(0.3 * k, 0, 0)))).ok());
+  ASSERT_TRUE(plain.apply(cutThrough(Vec3(0, 0, 0), Vec3::UnitX())).ok());
+  EXPECT_LT(encode(*world.capture()).size(), encode(*plain.capture()).size() + pixels + 1000);
+  World again = reloaded(world, 1);
+  EXPECT_EQ(world.stateHash(), again.stateHash());
+  again.reset();  // the scene's own bodies, too
+  const Image* first = nullptr;
+  for (const BodySnapshot& body : again.snapshot({}).bodies)
+    for (const Look& look : {body.material.appearance.outer, body.material.appearance.inner}) {
+      ASSERT_TRUE(look.image != nullptr) << body.name;
+      EXPECT_EQ(test::ramp(40, 30, 7), look.image->rgb());
+      EXPECT_TRUE(first == nullptr || first == look.image.get());
+      first = look.image.get();
+    }
+  EXPECT_NE(world.stateHash(), withImages(8).stateHash());
+}
+
 TEST(SavedWorld, ResetGoesToTheStartOfTheSceneThatWasSaved) {
   World world = elasticCut();
   World again = reloaded(world);
@@ -451,7 +489,7 @@ TEST(DamagedState, OfAnotherKindOrVersion) {
   expectRefused("solid ball\nfacet normal 0 0 1\n", "MLSSTATE");
   std::string bytes = bytesOf(ballThatFalls());
   bytes[8] = 9;
-  expectRefused(bytes, "version 9; accepted: 20");
+  expectRefused(bytes, "version 9; accepted: 21");
 }
 
 // The text at the start is of a length that is known to lie where it lies.

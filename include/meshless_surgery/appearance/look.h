@@ -1,15 +1,16 @@
-// How tissue looks: two colours mixed by a pattern that fills space. It is a function of the place at rest, so it is
-// the same on every mesh, needs no texture coordinates, and goes on across cuts.
+// How tissue looks: two colours mixed by a pattern that fills space, or an image seen along the three axes. Both are
+// functions of the place at rest, so they are the same on every mesh, need no texture coordinates, and go on across
+// cuts.
 #pragma once
 
-#include "meshless_surgery/base/result.h"
-#include "meshless_surgery/base/types.h"
+#include "meshless_surgery/appearance/image.h"
 
 namespace meshless {
 
 /// kPlain: one colour. The others: thin branching lines, cells of a tint each, globules with walls between, strands
-/// along x, a hard ground with pits.
-enum class Noise { kPlain, kVeins, kLobules, kFat, kFibres, kBone };
+/// along x, a hard ground with pits. kImage: the look's image.
+enum class Noise { kPlain, kVeins, kLobules, kFat, kFibres, kBone, kImage };
+/// Those that a name is enough for.
 constexpr std::array<Noise, 6> kNoises{Noise::kPlain, Noise::kVeins,  Noise::kLobules,
                                        Noise::kFat,   Noise::kFibres, Noise::kBone};
 
@@ -18,7 +19,8 @@ const char* toString(Noise noise);
 struct Look {
   Noise noise = Noise::kPlain;
   Color second{0.5f, 0.15f, 0.12f, 1.0f};  // where the pattern is full; its opacity does not count
-  double scale = 0.004;                    // [m] 1e-5..1, of a cell of the pattern
+  ImagePtr image;                          // of kImage, and of no other
+  double scale = 0.004;                    // [m] 1e-5..1, of a cell of the pattern, or of the image's width
   double wetness = 0.5;                    // 0..1: how bright and how sharp lamps are mirrored
   double bump = 0.0;                       // 0..1: how uneven it is to light
 
@@ -38,11 +40,13 @@ inline bool operator!=(const Appearance& one, const Appearance& other) { return 
 /// It looks different at different places.
 inline bool needsPlace(const Look& look) { return look.noise != Noise::kPlain || look.bump > 0.0; }
 
-/// 0..1: how full the pattern is at a place [m] of the body's own frame. It repeats after 289 cells. The display's
-/// shader (media/tissue.frag) has the same functions.
+/// 0..1: how full the pattern is at a place [m] of the body's own frame; 0 of an image. It repeats after 289 cells. The
+/// display's shader (media/tissue.frag) has the same functions.
 double patternAt(const Look& look, const Vec3& place);
 
-/// Between `base` and the look's second colour in each channel; the base's opacity.
-Color colorAt(const Look& look, const Color& base, const Vec3& place);
+/// Between `base` and the look's second colour in each channel; or the image's, as seen along the axes, by how far the
+/// surface is turned to each. `normal`: of the surface at rest in the body's own frame, outwards or inwards; of any
+/// length, zero where there is none. The base's opacity.
+Color colorAt(const Look& look, const Color& base, const Vec3& place, const Vec3& normal);
 
 }  // namespace meshless

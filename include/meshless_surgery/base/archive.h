@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <map>
+#include <memory>
 #include <optional>
 #include <set>
 #include <stdexcept>
@@ -32,9 +34,15 @@ class OutArchive : public ByteOutput<OutArchive> {
  public:
   explicit OutArchive(std::string& bytes) : ByteOutput<OutArchive>(this), bytes_(bytes) {}
   void put(const void* data, std::size_t size) { bytes_.append(static_cast<const char*>(data), size); }
+  /// Which of the shared values that is, in the order in which they come.
+  std::uint32_t placeOf(const void* shared) {
+    return places_.emplace(shared, static_cast<std::uint32_t>(places_.size())).first->second;
+  }
+  std::size_t shared() const { return places_.size(); }
 
  private:
   std::string& bytes_;
+  std::map<const void*, std::uint32_t> places_;
 };
 
 /// A hash of what would have been written. Not for security.
@@ -73,6 +81,8 @@ class InArchive : public cereal::InputArchive<InArchive, cereal::AllowEmptyClass
     left_.remove_prefix(size);
   }
   std::size_t left() const { return left_.size(); }
+  /// The shared values that have come; all of one type.
+  std::vector<std::shared_ptr<const void>>& shared() { return shared_; }
   /// Throws where `count` elements of at least `bytes` each cannot be there.
   void need(std::uint64_t count, std::size_t bytes) const {
     if (count > left_.size() / bytes)
@@ -82,6 +92,7 @@ class InArchive : public cereal::InputArchive<InArchive, cereal::AllowEmptyClass
 
  private:
   std::string_view left_;
+  std::vector<std::shared_ptr<const void>> shared_;
 };
 
 /// Values that are their bytes: numbers, and fixed arrays and matrices of them.

@@ -1,7 +1,7 @@
 // Scene and material files (YAML). Unknown keys are errors with file, line and the nearest known key.
 #pragma once
 
-#include "meshless_surgery/io/files.h"
+#include "meshless_surgery/io/image_file.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless {
@@ -14,7 +14,8 @@ namespace meshless {
 ///
 /// world: gravity [x, y, z], ground (a height or none), ground_friction, step_rate, substeps, contact (textbook, none),
 ///        pick: {max_distance, stiffness, radius}, push: {radius}
-/// materials: {NAME: {mode, alpha, beta, density, damping, friction, color, inside_color}}
+/// materials: {NAME: {mode, alpha, beta, density, damping, friction, color, inside_color, ...}}. A noise or an image
+///            of an appearance that cannot be had is a warning, and the look is plain
 /// bodies: a list of
 ///   name          absent: the file's name or the primitive's kind
 ///   file | primitive: {box: [x, y, z]} | {sphere: radius} | {cylinder: [height, radius]}, with edge: [m] of triangles
@@ -30,11 +31,14 @@ namespace meshless {
 ///              one of the names may be an obstacle's or `world`
 Result<SceneDef> readScene(const std::string& file, const FileAccess& access);
 
-/// Every *.yaml of a folder, by name: a map of names to materials each; later files override earlier ones.
+/// Every *.yaml of a folder, by name: a map of names to materials each; later files override earlier ones. Looks with
+/// images are plain.
 Result<std::map<std::string, Material>> readMaterials(const std::string& folder);
 
-/// `base` with the keys of a YAML map changed (mode, alpha, beta, density, damping, friction, color, inside_color).
-Result<Material> changeMaterial(const Material& base, const std::string& yaml);
+/// `base` with the keys of a YAML map changed (mode, alpha, beta, density, damping, friction, color, inside_color ...).
+/// Images are taken from `folder` on; `warnings` gets what could be done without.
+Result<Material> changeMaterial(const Material& base, const std::string& yaml, ImageFiles& images,
+                                const std::string& folder, std::vector<std::string>& warnings);
 
 /// `empty`, or a YAML map {pressure: Pa}, {volume: ml, compliance: ml/Pa}, with leak: s. An empty text: empty.
 Result<CavityFill> readCavityFill(const std::string& yaml);

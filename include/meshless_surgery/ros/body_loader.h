@@ -1,6 +1,7 @@
 // Bodies for ~spawn: from a file or a primitive to what the world admits. Thread-safe; takes up to seconds.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 
@@ -41,6 +42,11 @@ class BodyLoader {
 
   /// Its frame is the world's, at the middle of the cloud's surface. `left`: the points that were not filtered away.
   Result<std::shared_ptr<const PreparedBody>> load(const CloudRequest& request, std::size_t& left) const;
+
+  /// What changes a material by a YAML map. The images that the map names are read now, not where it is applied;
+  /// `warnings` gets what could be done without.
+  std::function<Result<Material>(const Material& present)> materialChange(const std::string& yaml,
+                                                                          std::vector<std::string>& warnings) const;
 
  private:
   Result<Material> material(const std::string& name) const;

@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 
+#include <meshless_surgery/TissueImages.h>
 #include <meshless_surgery/Topology.h>
 #include <meshless_surgery/Vertices.h>
 
@@ -16,6 +17,9 @@ class MovingSurfaces {
  public:
   /// The topology, where it is another one than at the last call. Needs no more than a snapshot's models.
   std::optional<meshless_surgery::Topology> change(const WorldSnapshot& snapshot, const std_msgs::Header& header);
+  /// The images that the looks name, where they are others than at the last call.
+  std::optional<meshless_surgery::TissueImages> newImages(const WorldSnapshot& snapshot,
+                                                          const std_msgs::Header& header);
   /// All bodies where that is wished or the topology has changed since the last call; else those that have moved since.
   /// Needs a snapshot with surfaces, the one of the last change().
   meshless_surgery::Vertices vertices(const WorldSnapshot& snapshot, const std_msgs::Header& header, bool complete);
@@ -28,6 +32,7 @@ class MovingSurfaces {
 
   std::vector<BakedBody> known_;
   BakedColors baked_;
+  std::map<std::uint64_t, ImagePtr> images_;  // by their ids
   std::uint32_t run_ = 0;
   std::uint32_t topology_ = 0;                                    // 0: none yet
   std::uint32_t said_topology_ = 0;                               // of the last vertices

@@ -70,7 +70,7 @@ class Publishers {
   MarkerBuilder markers_;
   MovingSurfaces moving_;
 
-  ros::Publisher topology_topic_, vertices_topic_;
+  ros::Publisher topology_topic_, images_topic_, vertices_topic_;
   ros::Publisher clusters_topic_, collision_topic_, contacts_topic_, surfaces_topic_, strained_surfaces_topic_;
   ros::Publisher markers_topic_, obstacles_topic_, points_topic_, state_topic_, events_topic_, info_topic_;
   struct ToolTopics {

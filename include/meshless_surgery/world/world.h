@@ -51,7 +51,7 @@ struct SceneDef {
   std::vector<BodyDef> bodies;
   std::vector<ObstacleDef> obstacles;
   std::vector<AttachCommand> attachments;
-  std::vector<std::string> warnings;  // of keys that mean something else now
+  std::vector<std::string> warnings;  // of what is not as it is written
 };
 
 enum class EventType {
