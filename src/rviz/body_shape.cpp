@@ -122,12 +122,12 @@ bool BodyShape::sameTriangles(const meshless_surgery::Surface& surface) const {
          surface.regions == regions_ && surface.region_colors.size() == region_colors_;
 }
 
-void BodyShape::findFaces(const meshless_surgery::Surface& surface) {
-  faces_.resize(surface.cut.size());
+void BodyShape::findFaces() {
+  faces_.resize(cut_.size());
   for (std::size_t t = 0; t < faces_.size(); ++t) {
-    const std::uint32_t* corner = &surface.triangles[3 * t];
-    const Ogre::Vector3 a = vertexOf(surface, corner[0]);
-    faces_[t] = (vertexOf(surface, corner[1]) - a).crossProduct(vertexOf(surface, corner[2]) - a);  // by its area
+    const std::uint32_t* corner = &triangles_[3 * t];
+    const Ogre::Vector3 a = vertexOf(at_, corner[0]);
+    faces_[t] = (vertexOf(at_, corner[1]) - a).crossProduct(vertexOf(at_, corner[2]) - a);  // by its area
   }
 }
 
@@ -144,6 +144,9 @@ void BodyShape::findCorners(const meshless_surgery::Surface& surface) {
   cut_ = surface.cut;
   regions_ = surface.regions;
   coordinates_ = surface.vertices.size();
+  at_ = to_ = surface.vertices;
+  moving_ = false;
+  findFaces();
   region_colors_ = surface.region_colors.size();
   const std::size_t vertices = surface.vertices.size() / 3, triangles = cut_.size();
   const bool regional = regions_.size() == vertices &&
@@ -262,10 +265,7 @@ void BodyShape::setRest(const meshless_surgery::BodyTopology* patterns, const Bo
   rest_areas_.clear();
   floats_.assign(6 * corners_.size(), 0.0f);
   if (look.shine && !look.by_strain && patterns && !patterns->rest.empty()) {
-    const auto restOf = [&](std::uint32_t v) {
-      const float* at = &patterns->rest[3 * v];
-      return Ogre::Vector3(at[0], at[1], at[2]);
-    };
+    const auto restOf = [&](std::uint32_t v) { return vertexOf(patterns->rest, v); };
     std::vector<Ogre::Vector3> faces(cut_.size());
     for (std::size_t t = 0; t < faces.size(); ++t) {
       const std::uint32_t* corner = &triangles_[3 * t];
@@ -347,12 +347,12 @@ void BodyShape::setMaterials(const meshless_surgery::Surface& surface, const mes
   }
 }
 
-void BodyShape::place(const meshless_surgery::Surface& surface) {
+void BodyShape::place() {
   floats_.resize(7 * corners_.size());
   Ogre::AxisAlignedBox box;
   float* to = floats_.data();
   for (std::size_t c = 0; c < corners_.size(); ++c) {
-    const Ogre::Vector3 at = vertexOf(surface, corners_[c].vertex);
+    const Ogre::Vector3 at = vertexOf(at_, corners_[c].vertex);
     Ogre::Vector3 normal = Ogre::Vector3::ZERO;
     float area = 0.0f;
     for (std::uint32_t i = starts_[c]; i < starts_[c + 1]; ++i) {
@@ -371,7 +371,7 @@ void BodyShape::place(const meshless_surgery::Surface& surface) {
 }
 
 void BodyShape::show(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
-                     const TissueTextures& textures, const BodyLook& look) {
+                     const TissueTextures& textures, const BodyLook& look, bool at_once) {
   const std::size_t vertices = surface.vertices.size() / 3;
   if (patterns && !patterns->rest.empty() && patterns->rest.size() != surface.vertices.size()) patterns = nullptr;
   const bool same = sameTriangles(surface);
@@ -380,7 +380,6 @@ void BodyShape::show(const meshless_surgery::Surface& surface, const meshless_su
                                           [vertices](std::uint32_t v) { return v < vertices; }));
   node_->setVisible(whole && !surface.triangles.empty());
   if (!whole || surface.triangles.empty()) return;
-  findFaces(surface);
   const bool new_look = !same || (patterns != nullptr) != patterned_ || !(look == look_) || surface.color != color_ ||
                         surface.inside_color != inside_color_;
   if (!same) {
@@ -398,7 +397,23 @@ void BodyShape::show(const meshless_surgery::Surface& surface, const meshless_su
     color_ = surface.color;
     inside_color_ = surface.inside_color;
   }
-  place(surface);
+  if (same && surface.vertices != to_) {
+    from_ = at_;
+    to_ = surface.vertices;
+    moving_ = true;
+  }
+  if (moving_ && at_once)
+    move(1.0f);
+  else if (!same || new_look)
+    place();
+}
+
+void BodyShape::move(float share) {
+  if (!moving_) return;
+  moving_ = share < 1.0f;
+  for (std::size_t k = 0; k < at_.size(); ++k) at_[k] = moving_ ? from_[k] + share * (to_[k] - from_[k]) : to_[k];
+  findFaces();
+  place();
 }
 
 }  // namespace meshless

@@ -48,9 +48,13 @@ class BodyShape {
   BodyShape(const BodyShape&) = delete;
   BodyShape& operator=(const BodyShape&) = delete;
 
-  /// `patterns` is of the same topology as the surface; null: plain colours.
+  /// `patterns` is of the same topology as the surface; null: plain colours. The surface is shown where it is at once;
+  /// or it goes there by move(), if it has the same triangles as the one before.
   void show(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
-            const TissueTextures& textures, const BodyLook& look);
+            const TissueTextures& textures, const BodyLook& look, bool at_once);
+  /// 0..1: how far it is on its way from where it was at show(). Costs nothing where it has not moved.
+  void move(float share);
+  bool moving() const { return moving_; }
 
  private:
   /// A vertex where faces share a normal.
@@ -60,7 +64,7 @@ class BodyShape {
   };
 
   bool sameTriangles(const meshless_surgery::Surface& surface) const;
-  void findFaces(const meshless_surgery::Surface& surface);
+  void findFaces();
   void findCorners(const meshless_surgery::Surface& surface);
   std::uint32_t addCorner(std::uint32_t v, std::uint32_t tissue, const std::vector<std::uint32_t>& faces);
   void makeBuffers();
@@ -70,7 +74,7 @@ class BodyShape {
   void setRest(const meshless_surgery::BodyTopology* patterns, const BodyLook& look);
   void setMaterials(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
                     const TissueTextures& textures, const BodyLook& look);
-  void place(const meshless_surgery::Surface& surface);
+  void place();
 
   Ogre::SceneManager* scene_manager_;
   Ogre::SceneNode* node_;
@@ -91,6 +95,9 @@ class BodyShape {
   std::vector<float> rest_areas_;  // around each corner, twice
   BodyLook look_;
   std_msgs::ColorRGBA color_, inside_color_;
+  // and where: three numbers a vertex
+  std::vector<float> at_, from_, to_;
+  bool moving_ = false;
   // kept, so that a frame allocates nothing
   std::vector<Ogre::Vector3> faces_;  // normals, as long as twice the area
   std::vector<float> floats_;

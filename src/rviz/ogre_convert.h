@@ -1,6 +1,8 @@
 // Messages to Ogre's values and back.
 #pragma once
 
+#include <vector>
+
 #include <OgreQuaternion.h>
 #include <OgreVector.h>
 #include <geometry_msgs/Point.h>
@@ -14,8 +16,12 @@ inline Ogre::Vector3 toOgre(const geometry_msgs::Point& p) { return Ogre::Vector
 inline Ogre::Vector3 toOgre(const geometry_msgs::Vector3& v) { return Ogre::Vector3(v.x, v.y, v.z); }
 inline Ogre::Quaternion toOgre(const geometry_msgs::Quaternion& q) { return Ogre::Quaternion(q.w, q.x, q.y, q.z); }
 
+inline Ogre::Vector3 vertexOf(const std::vector<float>& vertices, std::uint32_t v) {
+  return Ogre::Vector3(vertices[3 * v], vertices[3 * v + 1], vertices[3 * v + 2]);
+}
+
 inline Ogre::Vector3 vertexOf(const meshless_surgery::Surface& surface, std::uint32_t v) {
-  return Ogre::Vector3(surface.vertices[3 * v], surface.vertices[3 * v + 1], surface.vertices[3 * v + 2]);
+  return vertexOf(surface.vertices, v);
 }
 
 inline geometry_msgs::Point toPoint(const Ogre::Vector3& v) {

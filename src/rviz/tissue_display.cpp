@@ -57,6 +57,10 @@ TissueDisplay::TissueDisplay() {
                              "Lamps at the camera and above, wet tissue, patterns for each pixel. Without it: rviz's "
                              "light, patterns for each vertex.",
                              this, SLOT(changeLook()));
+  smooth_ = new rviz::BoolProperty("Smooth motion", true,
+                                   "Between two messages, what moves is shown on its way: one message late. Without "
+                                   "it: in steps, as messages come.",
+                                   this, SLOT(changeLook()));
   tools_shown_ = new rviz::BoolProperty("Tools", true, "Springs, push sphere and scissors.", this, SLOT(changeLook()));
   full_force_ = new rviz::FloatProperty("Full force", 20.0f, "Force [N] of a spring that is shown red.", tools_shown_,
                                         SLOT(changeLook()), this);
@@ -78,6 +82,7 @@ void TissueDisplay::reset() {
   Display::reset();
   bodies_.clear();
   surfaces_.reset();
+  drawn_.reset();
   patterns_.clear();
   topology_.reset();
 }
@@ -125,10 +130,12 @@ void TissueDisplay::update(float wall_dt, float) {
   scene_node_->setPosition(position);
   scene_node_->setOrientation(orientation);
   // Once a frame, however fast messages come. Pieces wait for their looks, which come on a topic of their own.
-  if (!fresh_) return;
-  const bool known = findPatterns();
-  waited_ = known ? 0.0f : waited_ + wall_dt;
-  if (known || waited_ > kLongestWait) draw();
+  if (fresh_) {
+    const bool known = findPatterns();
+    waited_ = known ? 0.0f : waited_ + wall_dt;
+    if (known || waited_ > kLongestWait) draw();
+  }
+  if (pace_.moving()) move(wall_dt);
 }
 
 bool TissueDisplay::findPatterns() {
@@ -157,6 +164,17 @@ void TissueDisplay::draw() {
   const bool known = findPatterns();
   look.topology = known ? surfaces_->topology : 0;
   look.images = images_taken_;
+  const bool another = surfaces_ != drawn_;
+  const bool follows = drawn_ && drawn_->run == surfaces_->run && drawn_->topology == surfaces_->topology;
+  const double interval = follows ? (surfaces_->header.stamp - drawn_->header.stamp).toSec() : 0.0;
+  if (another) pace_.next(smooth_->getBool() ? interval : 0.0);
+  if (another) {
+    tools_from_ = std::move(tools_between_);
+    tools_to_ = *surfaces_;
+    tools_to_.bodies.clear();
+    tools_between_ = tools_to_;
+  }
+  drawn_ = surfaces_;
   std::set<std::uint32_t> seen;
   std::size_t triangles = 0;
   bool others = false;
@@ -169,20 +187,36 @@ void TissueDisplay::draw() {
       others = true;
     }
     const auto patterns = known ? patterns_.find(surface.id) : patterns_.end();
-    shape->show(surface, patterns == patterns_.end() ? nullptr : patterns->second, textures_, look);
+    shape->show(surface, patterns == patterns_.end() ? nullptr : patterns->second, textures_, look,
+                !pace_.moving());
+  }
+  if (another && pace_.moving()) {
+    tools_from_.header = tools_to_.header;
+    const bool moving = !(tools_from_ == tools_to_) ||
+                        std::any_of(bodies_.begin(), bodies_.end(), [](const auto& body) { return body.second->moving(); });
+    if (!moving) pace_.next(0.0);
   }
   if (others) warnOfSize();
   for (auto it = bodies_.begin(); it != bodies_.end();)
     it = seen.count(it->first) > 0 ? std::next(it) : bodies_.erase(it);
-  if (tools_shown_->getBool()) {
-    if (!tools_) tools_ = std::make_unique<ToolsShape>(scene_manager_, scene_node_);
-    tools_->show(*surfaces_, full_force_->getFloat());
-  } else {
-    tools_.reset();
-  }
+  showTools();
   setStatus(rviz::StatusProperty::Ok, "Topic",
             QString("%1 bodies, %2 triangles").arg(surfaces_->bodies.size()).arg(triangles));
   context_->queueRender();
+}
+
+void TissueDisplay::move(float wall_dt) {
+  const float share = pace_.go(wall_dt);
+  for (const auto& body : bodies_) body.second->move(share);
+  moveTools(tools_from_, tools_to_, share, tools_between_);
+  showTools();
+  context_->queueRender();
+}
+
+void TissueDisplay::showTools() {
+  if (!tools_shown_->getBool()) return tools_.reset();
+  if (!tools_) tools_ = std::make_unique<ToolsShape>(scene_manager_, scene_node_);
+  tools_->show(tools_between_, full_force_->getFloat());
 }
 
 // A mesh in millimetres fills the view, or is a dot in it.

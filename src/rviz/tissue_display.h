@@ -13,6 +13,7 @@
 #include <meshless_surgery/Topology.h>
 #include <ros/ros.h>
 
+#include "between_states.h"
 #include "body_shape.h"
 #include "tissue_textures.h"
 #include "tools_shape.h"
@@ -47,6 +48,8 @@ class TissueDisplay : public rviz::Display {
 
  private:
   void draw();
+  void move(float wall_dt);
+  void showTools();
   /// Of the bodies that are shown, by their ids; empty where it has not come.
   bool findPatterns();
   void warnOfSize();
@@ -57,6 +60,7 @@ class TissueDisplay : public rviz::Display {
   rviz::FloatProperty* opacity_;
   rviz::BoolProperty* wire_;
   rviz::BoolProperty* shine_;
+  rviz::BoolProperty* smooth_;
   rviz::BoolProperty* tools_shown_;
   rviz::FloatProperty* full_force_;
   ros::Subscriber subscriber_, topology_subscriber_, images_subscriber_;
@@ -67,6 +71,9 @@ class TissueDisplay : public rviz::Display {
   std::uint32_t images_taken_ = 0;
   float waited_ = 0.0f;  // [s] for the topology of surfaces_
   bool fresh_ = false;
+  meshless_surgery::Surfaces::ConstPtr drawn_;                       // the last message that was
+  meshless_surgery::Surfaces tools_from_, tools_to_, tools_between_;  // without bodies
+  Pace pace_;
   std::map<std::uint32_t, std::unique_ptr<BodyShape>> bodies_;
   std::unique_ptr<ToolsShape> tools_;
 };
