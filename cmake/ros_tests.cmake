@@ -12,6 +12,10 @@ add_dependencies(check_drive drive)  # scripts/check plays random scenes with it
 add_custom_target(check_rviz DEPENDS deformer_node ${PROJECT_NAME}_generate_messages)
 if(TARGET ${PROJECT_NAME}_rviz)
   add_dependencies(check_rviz ${PROJECT_NAME}_rviz)
+  file(GLOB rviz_unit_tests CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/test/rviz/*_test.cpp)
+  add_test_program(rviz 1 SOURCES ${rviz_unit_tests} LABELS rviz LINKS ${PROJECT_NAME}_rviz ${catkin_LIBRARIES})
+  target_include_directories(rviz_tests PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/src/rviz)
+  target_include_directories(rviz_tests SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OGRE_INCLUDE_DIRS})
 endif()
 
 # Through catkin_install_python, which names the interpreter: another python3 may come first on the PATH.

@@ -18,9 +18,11 @@ varying vec3 above;
 varying vec3 place;
 varying vec3 turned;
 varying float growth;
+varying float from_rim;
 
 const float PERIOD = 289.0;
 const float JITTER = 0.3;
+const float RIM = 0.003;  // [m] how far from a cut's edge tissue is bloody
 
 // --- the same functions as in src/appearance/look.cpp
 
@@ -159,13 +161,17 @@ void main()
   colour = mix(colour, vec3(0.55, 0.48, 0.44) + 0.45 * colour, blanched);
 
   float facing = max(dot(n, eye), 0.0), raised = dot(n, up);
+  float bloody = 1.0 - smoothstep(0.2 * RIM, RIM, from_rim);
+  colour *= mix(vec3(1.0), vec3(0.72, 0.42, 0.42), bloody);
+  float wet = mix(wetness, 1.0, 0.7 * bloody);
+
   vec3 lit = colour * (0.28 + 0.50 * facing + 0.16 * (1.0 + raised));
   lit.r += 0.05 * colour.r * (1.0 - facing);  // light that has gone through tissue is red
 
-  float rim = (1.0 - facing) * (1.0 - facing), roughness = mix(0.75, 0.22, wetness);
+  float rim = (1.0 - facing) * (1.0 - facing), roughness = mix(0.75, 0.22, wet);
   vec3 half_up = normalize(eye + up);
   float film = 0.010 * mirrored(facing, roughness) +
                0.008 * mirrored(max(dot(n, half_up), 0.0), roughness) * step(0.0, raised) +
                0.12 * rim * rim;
-  gl_FragColor = vec4(lit + vec3(0.95, 0.97, 1.0) * wetness * min(film, 0.9), gl_Color.a);
+  gl_FragColor = vec4(lit + vec3(0.95, 0.97, 1.0) * wet * min(film, 0.9), gl_Color.a);
 }

@@ -11,6 +11,7 @@ varying vec3 above;    // where up is, for the camera
 varying vec3 place;    // [m] of the body at rest
 varying vec3 turned;   // its normal there
 varying float growth;  // area over area at rest
+varying float from_rim; // [m] to where a cut meets the outer surface
 
 void main()
 {
@@ -21,5 +22,6 @@ void main()
   place = gl_MultiTexCoord0.xyz;
   turned = gl_MultiTexCoord2.xyz;
   growth = gl_MultiTexCoord1.x;
+  from_rim = gl_MultiTexCoord2.w;
   gl_FrontColor = gl_Color;
 }

@@ -35,8 +35,8 @@ void moveTools(const meshless_surgery::Surfaces& from, const meshless_surgery::S
   if (from.push_shown && to.push_shown) move(from.push_position, to.push_position, share, between.push_position);
   if (from.scissors_shown && to.scissors_shown) {
     move(from.scissors.position, to.scissors.position, share, between.scissors.position);
-    between.scissors.orientation = toQuaternion(Ogre::Quaternion::nlerp(
-        share, toOgre(from.scissors.orientation), toOgre(to.scissors.orientation), true));
+    between.scissors.orientation = toQuaternion(
+        Ogre::Quaternion::nlerp(share, toOgre(from.scissors.orientation), toOgre(to.scissors.orientation), true));
     between.scissors_angle = from.scissors_angle + share * (to.scissors_angle - from.scissors_angle);
   }
   move(from.fibres, to.fibres, share, between.fibres);

@@ -17,6 +17,7 @@
 #include <OgreTextureUnitState.h>
 
 #include "ogre_convert.h"
+#include "rim_distance.h"
 #include "tissue_program.h"
 
 namespace meshless {
@@ -28,6 +29,7 @@ constexpr float kSelfLight =
 constexpr float kLamp = 0.85f;  // share of the colour that the lamp adds
 constexpr double kSeenThrough = 0.6;  // opacity up to which what is inside of a body shows, whatever is drawn first
 constexpr float kDry = 0.1f;          // wetness of what is shown by strain
+constexpr float kFarFromRim = 0.02f;  // [m] beyond what the shader asks for, in large triangles too
 constexpr std::uint32_t kNoCorner = std::numeric_limits<std::uint32_t>::max();
 
 Ogre::ColourValue toColour(const std_msgs::ColorRGBA& c) { return Ogre::ColourValue(c.r, c.g, c.b, c.a); }
@@ -211,11 +213,11 @@ void BodyShape::makeBuffers() {
   layout->addElement(0, 6 * sizeof(float), Ogre::VET_FLOAT1, Ogre::VES_TEXTURE_COORDINATES, 1);
   layout->addElement(1, 0, Ogre::VET_UBYTE4_NORM, Ogre::VES_DIFFUSE);
   layout->addElement(2, 0, Ogre::VET_FLOAT3, Ogre::VES_TEXTURE_COORDINATES, 0);
-  layout->addElement(2, 3 * sizeof(float), Ogre::VET_FLOAT3, Ogre::VES_TEXTURE_COORDINATES, 2);
+  layout->addElement(2, 3 * sizeof(float), Ogre::VET_FLOAT4, Ogre::VES_TEXTURE_COORDINATES, 2);
   places_ = manager.createVertexBuffer(7 * sizeof(float), corners_.size(),
                                        Ogre::HardwareBuffer::HBU_DYNAMIC_WRITE_ONLY_DISCARDABLE);
   colours_ = manager.createVertexBuffer(4, corners_.size(), Ogre::HardwareBuffer::HBU_DYNAMIC_WRITE_ONLY);
-  rests_ = manager.createVertexBuffer(6 * sizeof(float), corners_.size(), Ogre::HardwareBuffer::HBU_STATIC_WRITE_ONLY);
+  rests_ = manager.createVertexBuffer(7 * sizeof(float), corners_.size(), Ogre::HardwareBuffer::HBU_STATIC_WRITE_ONLY);
   data_->vertexBufferBinding->setBinding(0, places_);
   data_->vertexBufferBinding->setBinding(1, colours_);
   data_->vertexBufferBinding->setBinding(2, rests_);
@@ -259,33 +261,36 @@ void BodyShape::setColours(const meshless_surgery::Surface& surface, const meshl
   colours_->writeData(0, bytes.size(), bytes.data(), true);
 }
 
-// Places and normals at rest, and what the faces around a corner measure there; nothing where that is not known, or of
-// no account.
+// Places and normals at rest, what the faces around a corner measure there, and how far the edge of a cut is; nothing
+// where that is not known, or of no account.
 void BodyShape::setRest(const meshless_surgery::BodyTopology* patterns, const BodyLook& look) {
   rest_areas_.clear();
-  floats_.assign(6 * corners_.size(), 0.0f);
-  if (look.shine && !look.by_strain && patterns && !patterns->rest.empty()) {
-    const auto restOf = [&](std::uint32_t v) { return vertexOf(patterns->rest, v); };
-    std::vector<Ogre::Vector3> faces(cut_.size());
-    for (std::size_t t = 0; t < faces.size(); ++t) {
-      const std::uint32_t* corner = &triangles_[3 * t];
-      const Ogre::Vector3 a = restOf(corner[0]);
-      faces[t] = (restOf(corner[1]) - a).crossProduct(restOf(corner[2]) - a);
+  floats_.assign(7 * corners_.size(), 0.0f);
+  const bool wanted = look.shine && !look.by_strain, known = wanted && patterns && !patterns->rest.empty();
+  const std::vector<float>& rest = known ? patterns->rest : at_;
+  std::vector<float> from_rim(at_.size() / 3, kFarFromRim);
+  if (wanted) from_rim = rimDistances(rest, triangles_, cut_, kFarFromRim);
+  std::vector<Ogre::Vector3> faces(known ? cut_.size() : 0);
+  for (std::size_t t = 0; t < faces.size(); ++t) {
+    const std::uint32_t* corner = &triangles_[3 * t];
+    const Ogre::Vector3 a = vertexOf(rest, corner[0]);
+    faces[t] = (vertexOf(rest, corner[1]) - a).crossProduct(vertexOf(rest, corner[2]) - a);
+  }
+  if (known) rest_areas_.resize(corners_.size());
+  for (std::size_t c = 0; c < corners_.size(); ++c) {
+    float* to = &floats_[7 * c];
+    to[6] = from_rim[corners_[c].vertex];
+    if (!known) continue;
+    Ogre::Vector3 normal = Ogre::Vector3::ZERO;
+    float area = 0.0f;
+    for (std::uint32_t i = starts_[c]; i < starts_[c + 1]; ++i) {
+      normal += faces[around_[i]];
+      area += faces[around_[i]].length();
     }
-    rest_areas_.resize(corners_.size());
-    float* to = floats_.data();
-    for (std::size_t c = 0; c < corners_.size(); ++c) {
-      Ogre::Vector3 normal = Ogre::Vector3::ZERO;
-      float area = 0.0f;
-      for (std::uint32_t i = starts_[c]; i < starts_[c + 1]; ++i) {
-        normal += faces[around_[i]];
-        area += faces[around_[i]].length();
-      }
-      normal.normalise();
-      rest_areas_[c] = std::max(area, std::numeric_limits<float>::min());
-      for (const Ogre::Vector3& v : {restOf(corners_[c].vertex), normal})
-        for (int axis = 0; axis < 3; ++axis) *to++ = v[axis];
-    }
+    normal.normalise();
+    rest_areas_[c] = std::max(area, std::numeric_limits<float>::min());
+    for (const Ogre::Vector3& v : {vertexOf(rest, corners_[c].vertex), normal})
+      for (int axis = 0; axis < 3; ++axis) *to++ = v[axis];
   }
   rests_->writeData(0, floats_.size() * sizeof(float), floats_.data(), true);
 }

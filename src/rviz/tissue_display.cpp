@@ -187,13 +187,13 @@ void TissueDisplay::draw() {
       others = true;
     }
     const auto patterns = known ? patterns_.find(surface.id) : patterns_.end();
-    shape->show(surface, patterns == patterns_.end() ? nullptr : patterns->second, textures_, look,
-                !pace_.moving());
+    shape->show(surface, patterns == patterns_.end() ? nullptr : patterns->second, textures_, look, !pace_.moving());
   }
   if (another && pace_.moving()) {
     tools_from_.header = tools_to_.header;
-    const bool moving = !(tools_from_ == tools_to_) ||
-                        std::any_of(bodies_.begin(), bodies_.end(), [](const auto& body) { return body.second->moving(); });
+    const bool moving =
+        !(tools_from_ == tools_to_) ||
+        std::any_of(bodies_.begin(), bodies_.end(), [](const auto& body) { return body.second->moving(); });
     if (!moving) pace_.next(0.0);
   }
   if (others) warnOfSize();

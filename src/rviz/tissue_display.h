@@ -71,7 +71,7 @@ class TissueDisplay : public rviz::Display {
   std::uint32_t images_taken_ = 0;
   float waited_ = 0.0f;  // [s] for the topology of surfaces_
   bool fresh_ = false;
-  meshless_surgery::Surfaces::ConstPtr drawn_;                       // the last message that was
+  meshless_surgery::Surfaces::ConstPtr drawn_;                        // the last message that was
   meshless_surgery::Surfaces tools_from_, tools_to_, tools_between_;  // without bodies
   Pace pace_;
   std::map<std::uint32_t, std::unique_ptr<BodyShape>> bodies_;
