@@ -11,10 +11,12 @@ uniform float bump;
 uniform sampler2D image;
 uniform float aspect;  // width over height
 #endif
+uniform vec4 tips[4];  // of instruments, in the world, and how wide they are [m]; 0: none
 
 varying vec3 seen_at;
 varying vec3 normal;
 varying vec3 above;
+varying vec3 at;
 varying vec3 place;
 varying vec3 turned;
 varying float growth;
@@ -129,6 +131,13 @@ float mirrored(float cosine, float roughness)
   return a / (d * d);
 }
 
+// How much of the lamp above a tip hides: a spot below it, wider and fainter the farther it is.
+float shadowOf(vec4 tip)
+{
+  float high = tip.z - at.z, wide = max(tip.w + 0.2 * high, 1e-6);
+  return step(0.0, high) * tip.w / wide * (1.0 - smoothstep(0.3 * wide, wide, length(tip.xy - at.xy)));
+}
+
 void main()
 {
   vec3 n = normalize(normal), eye = normalize(-seen_at), up = normalize(above);
@@ -167,6 +176,9 @@ void main()
 
   vec3 lit = colour * (0.28 + 0.50 * facing + 0.16 * (1.0 + raised));
   lit.r += 0.05 * colour.r * (1.0 - facing);  // light that has gone through tissue is red
+
+  float shadow = max(max(shadowOf(tips[0]), shadowOf(tips[1])), max(shadowOf(tips[2]), shadowOf(tips[3])));
+  lit *= 1.0 - 0.65 * shadow * smoothstep(0.0, 0.2, raised);
 
   float rim = (1.0 - facing) * (1.0 - facing), roughness = mix(0.75, 0.22, wet);
   vec3 half_up = normalize(eye + up);

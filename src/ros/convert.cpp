@@ -158,6 +158,7 @@ meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatu
     message.area = attachment.area;
     message.force = attachment.force;
     message.jaws = attachment.jaws.value_or(0.0);
+    message.middle = toPoint(attachment.middle);
     state.attachments.push_back(std::move(message));
   }
   return state;

@@ -14,12 +14,10 @@ using visualization_msgs::Marker;
 constexpr int kSaidDeletes = 30;         // arrays: a second at the highest rate
 constexpr double kThinnest = 1e-8;       // a triangle's height over its longest edge: thinner ones have no area
 constexpr double kSmoothUpTo = 0.75;     // cosine between face and vertex normal: the edges of a box stay sharp
-constexpr double kShownReach = 0.1;      // [m] of blades without an end
 constexpr double kSpringWidth = 0.0015;  // [m]
 constexpr double kSpringEnd = 0.006;     // [m] diameter
 constexpr double kFibreWidth = 0.0005;   // [m]
 constexpr double kJawWidth = 0.0015;     // [m] of a line on a clip
-constexpr double kBladeWidth = 0.12;     // of the blade's length
 
 bool hasArea(double area, const Vec3& a, const Vec3& b, const Vec3& c) {
   return area > kThinnest * std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()});
@@ -119,15 +117,16 @@ void addBody(const BodySnapshot& body, const VertexColors& baked, Marker& marker
   }
 }
 
-void addBlade(const Pose& pose, double length, double angle, Marker& marker) {
-  // A slim triangle from the pivot, its straight edge where it cuts.
-  const double side = angle < 0.0 ? -1.0 : 1.0;
-  const Quat turned = pose.rotation * Quat(Eigen::AngleAxisd(angle, Vec3::UnitZ()));
-  const Vec3 tip = pose.translation + turned * Vec3(length, 0.0, 0.0);
-  const Vec3 back = pose.translation + turned * Vec3(0.0, side * kBladeWidth * length, 0.0);
-  marker.points.push_back(toPoint(pose.translation));
-  marker.points.push_back(toPoint(tip));
-  marker.points.push_back(toPoint(back));
+void addInstruments(const std::vector<meshless_surgery::InstrumentPart>& parts, const std_msgs::Header& header,
+                    visualization_msgs::MarkerArray& array) {
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    Marker marker = newMarker(header, "instruments", static_cast<int>(k), Marker::MESH_RESOURCE);
+    marker.mesh_resource = parts[k].mesh;
+    marker.pose = parts[k].pose;
+    marker.scale.x = marker.scale.y = marker.scale.z = parts[k].scale;
+    marker.color = parts[k].color;
+    array.markers.push_back(std::move(marker));
+  }
 }
 
 }  // namespace
@@ -172,17 +171,6 @@ void MarkerBuilder::addTools(const WorldSnapshot& snapshot, const std_msgs::Head
     sphere.color = toColor(snapshot.push.touching ? Color{0.95f, 0.75f, 0.3f, 0.85f} : Color{0.7f, 0.75f, 0.8f, 0.85f});
     array.markers.push_back(std::move(sphere));
   }
-  if (snapshot.scissors.shown) {
-    Marker blades = newMarker(header, "tools", 3, Marker::TRIANGLE_LIST);
-    blades.scale.x = blades.scale.y = blades.scale.z = 1.0;
-    blades.color = toColor({0.75f, 0.78f, 0.82f, 1.0f});
-    const Pose pose = poseOf(snapshot.scissors.blades);
-    const double length = snapshot.scissors.blades.length > 0.0 ? snapshot.scissors.blades.length : kShownReach;
-    const double half = 0.5 * std::max(0.0, snapshot.scissors.angle);
-    addBlade(pose, length, half, blades);
-    addBlade(pose, length, half > 0.0 ? -half : -1e-9, blades);
-    array.markers.push_back(std::move(blades));
-  }
 }
 
 visualization_msgs::MarkerArray obstacleMarkers(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
@@ -197,8 +185,8 @@ bool MarkerBuilder::deleting() const {
                      [](const auto& s) { return s.second > 0 && s.second < kSaidDeletes; });
 }
 
-visualization_msgs::MarkerArray MarkerBuilder::build(const WorldSnapshot& snapshot, const ros::Time& stamp,
-                                                     bool fresh) {
+visualization_msgs::MarkerArray MarkerBuilder::build(const WorldSnapshot& snapshot, const ros::Time& stamp, bool fresh,
+                                                     const std::vector<meshless_surgery::InstrumentPart>& instruments) {
   visualization_msgs::MarkerArray array;
   std_msgs::Header header;
   header.frame_id = world_frame_;
@@ -217,6 +205,7 @@ visualization_msgs::MarkerArray MarkerBuilder::build(const WorldSnapshot& snapsh
   }
   addObstacles(snapshot, header, array);
   addTools(snapshot, header, array);
+  addInstruments(instruments, header, array);
 
   std::map<Key, int> now;
   for (std::size_t m = first; m < array.markers.size(); ++m)

@@ -214,10 +214,13 @@ void Publishers::publishTick(Clock::time_point now) {
   header.frame_id = settings_.world_frame;
   const auto snapshot = runner_.snapshot(wants);
   if (!snapshot) return;
+  const auto instruments =
+      markers || surfaces ? instruments_.parts(*snapshot, tools_.hand(ToolKind::kPick), tools_.hand(ToolKind::kPush))
+                          : std::vector<meshless_surgery::InstrumentPart>();
   if (markers) {
     ++markers_built_;
     markers_revision_ = revision;
-    markers_topic_.publish(markers_.build(*snapshot, header.stamp, markers_fresh));
+    markers_topic_.publish(markers_.build(*snapshot, header.stamp, markers_fresh, instruments));
   }
   if (info || vertices || surfaces) publishTopology(*snapshot, header);
   if (vertices) {
@@ -228,7 +231,7 @@ void Publishers::publishTick(Clock::time_point now) {
   }
   if (surfaces) {
     surfaces_revision_ = revision;
-    publishSurfaces(*snapshot, header);
+    publishSurfaces(*snapshot, header, instruments);
   }
   if (clusters) {
     ++clusters_built_;
@@ -284,24 +287,23 @@ void Publishers::publishTopology(const WorldSnapshot& snapshot, const std_msgs::
   topology_topic_.publish(*changed);
 }
 
-void Publishers::publishSurfaces(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
+void Publishers::publishSurfaces(const WorldSnapshot& snapshot, const std_msgs::Header& header,
+                                 const std::vector<meshless_surgery::InstrumentPart>& instruments) {
   ++surfaces_built_;
   for (const bool strain : {false, true}) {
     const ros::Publisher& topic = strain ? strained_surfaces_topic_ : surfaces_topic_;
     if (topic.getNumSubscribers() == 0) continue;
     auto message = toSurfaces(snapshot, header, strain);
     message.topology = moving_.topology();
+    message.instruments = instruments;
     topic.publish(message);
   }
 }
 
 void Publishers::publishTools(const WorldSnapshot& snapshot, const ros::Time& stamp) {
   std::vector<geometry_msgs::TransformStamped> transforms;
-  // The pick in hand is the newest one that is not locked; without one, the hand is where its stream last was.
-  const Pick* in_hand = nullptr;
-  for (const Pick& pick : snapshot.picks) {
-    if (!pick.locked && (in_hand == nullptr || pick.id > in_hand->id)) in_hand = &pick;
-  }
+  // Without a pick, the hand is where its stream last was.
+  const Pick* in_hand = pickInHand(snapshot);
   auto cursor = tools_.hand(ToolKind::kPick);
   if (in_hand != nullptr) {
     if (!cursor) cursor = Pose{};

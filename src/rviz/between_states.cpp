@@ -21,6 +21,23 @@ void move(const std::vector<geometry_msgs::Point>& from, const std::vector<geome
   for (std::size_t k = 0; k < to.size(); ++k) move(from[k], to[k], share, now[k]);
 }
 
+void move(const geometry_msgs::Quaternion& from, const geometry_msgs::Quaternion& to, float share,
+          geometry_msgs::Quaternion& now) {
+  now = toQuaternion(Ogre::Quaternion::nlerp(share, toOgre(from), toOgre(to), true));
+}
+
+// They are listed tool by tool: where tools came or went, all are where the later message has them.
+void move(const std::vector<meshless_surgery::InstrumentPart>& from,
+          const std::vector<meshless_surgery::InstrumentPart>& to, float share,
+          std::vector<meshless_surgery::InstrumentPart>& now) {
+  const auto same_mesh = [](const auto& a, const auto& b) { return a.mesh == b.mesh; };
+  if (!std::equal(from.begin(), from.end(), to.begin(), to.end(), same_mesh)) return;
+  for (std::size_t k = 0; k < to.size(); ++k) {
+    move(from[k].pose.position, to[k].pose.position, share, now[k].pose.position);
+    move(from[k].pose.orientation, to[k].pose.orientation, share, now[k].pose.orientation);
+  }
+}
+
 }  // namespace
 
 void moveTools(const meshless_surgery::Surfaces& from, const meshless_surgery::Surfaces& to, float share,
@@ -35,12 +52,12 @@ void moveTools(const meshless_surgery::Surfaces& from, const meshless_surgery::S
   if (from.push_shown && to.push_shown) move(from.push_position, to.push_position, share, between.push_position);
   if (from.scissors_shown && to.scissors_shown) {
     move(from.scissors.position, to.scissors.position, share, between.scissors.position);
-    between.scissors.orientation = toQuaternion(
-        Ogre::Quaternion::nlerp(share, toOgre(from.scissors.orientation), toOgre(to.scissors.orientation), true));
+    move(from.scissors.orientation, to.scissors.orientation, share, between.scissors.orientation);
     between.scissors_angle = from.scissors_angle + share * (to.scissors_angle - from.scissors_angle);
   }
   move(from.fibres, to.fibres, share, between.fibres);
   move(from.clips, to.clips, share, between.clips);
+  move(from.instruments, to.instruments, share, between.instruments);
 }
 
 bool Pace::next(double interval) {

@@ -324,6 +324,7 @@ void BodyShape::setMaterials(const meshless_surgery::Surface& surface, const mes
       vertex->setNamedAutoConstant("worldviewproj_matrix", Ogre::GpuProgramParameters::ACT_WORLDVIEWPROJ_MATRIX);
       vertex->setNamedAutoConstant("worldview_matrix", Ogre::GpuProgramParameters::ACT_WORLDVIEW_MATRIX);
       vertex->setNamedAutoConstant("view_matrix", Ogre::GpuProgramParameters::ACT_VIEW_MATRIX);
+      vertex->setNamedAutoConstant("world_matrix", Ogre::GpuProgramParameters::ACT_WORLD_MATRIX);
       const auto fragment = pass->getFragmentProgramParameters();
       fragment->setIgnoreMissingParams(true);
       fragment->setNamedConstant("second", toColour(tissue.second));
@@ -350,6 +351,12 @@ void BodyShape::setMaterials(const meshless_surgery::Surface& surface, const mes
     pass->setSelfIllumination(look.by_strain ? Ogre::ColourValue(0.12f, 0.12f, 0.12f)
                                              : toColour(surface.color) * kSelfLight);
   }
+}
+
+void BodyShape::shade(const ShadowTips& tips) {
+  if (!look_.shine) return;
+  for (const auto& part : parts_)
+    if (part) part->pass()->getFragmentProgramParameters()->setNamedConstant("tips", tips[0].ptr(), tips.size());
 }
 
 void BodyShape::place() {

@@ -3,6 +3,7 @@
 // in each frame.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -39,6 +40,9 @@ struct BodyLook {
   }
 };
 
+/// Tips of instruments whose shadow falls on tissue: x, y, z in the world, and how wide they are [m]; 0: none.
+using ShadowTips = std::array<Ogre::Vector4, 4>;
+
 class BodyPart;
 
 class BodyShape {
@@ -55,6 +59,8 @@ class BodyShape {
   /// 0..1: how far it is on its way from where it was at show(). Costs nothing where it has not moved.
   void move(float share);
   bool moving() const { return moving_; }
+  /// After show(); nothing without shine.
+  void shade(const ShadowTips& tips);
 
  private:
   /// A vertex where faces share a normal.

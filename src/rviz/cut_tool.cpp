@@ -65,6 +65,7 @@ void CutTool::onActivate() {
 void CutTool::onDeactivate() {
   act_ = Act::kNone;
   shown_line_.reset();
+  scalpel_.reset();
   preview_.reset();
   surfaces_topic_.shutdown();
   surfaces_.reset();
@@ -207,11 +208,14 @@ void CutTool::showLine() {
   shown_line_->clear();
   shown_line_->setMaxPointsPerLine(static_cast<uint32_t>(line_.size()) + 1);
   for (const Touch& touch : line_) shown_line_->addPoint(touch.position + over);
+  if (!scalpel_) scalpel_ = std::make_unique<InstrumentsShape>(scene_manager_, scene_manager_->getRootSceneNode());
+  scalpel_->show(scalpelParts(line_.back().position, instrumentTurn()));
 }
 
 void CutTool::finishLine() {
   act_ = Act::kNone;
   shown_line_.reset();
+  scalpel_.reset();
   // Where exactly the tissue ends under the cursor is asked once more: what is known is some frames old.
   meshless_surgery::Probe question;
   question.request.header = header();
@@ -261,6 +265,7 @@ void CutTool::eventCame(const meshless_surgery::Event& event) {
 void CutTool::undoDrag() {
   say(act_ == Act::kDrawing ? "undone: no incision" : "undone: the blades open again");
   shown_line_.reset();
+  scalpel_.reset();
   act_ = Act::kOver;
 }
 

@@ -13,6 +13,7 @@
 #include <rviz/ogre_helpers/billboard_line.h>
 
 #include "cut_preview.h"
+#include "instruments_shape.h"
 #endif
 
 namespace rviz {
@@ -80,6 +81,7 @@ class CutTool : public HandTool {
   rviz::FloatProperty* close_time_ = nullptr;
   ros::Publisher pose_stream_, jaw_stream_;
   std::unique_ptr<rviz::BillboardLine> shown_line_;
+  std::unique_ptr<InstrumentsShape> scalpel_;
   ros::Subscriber surfaces_topic_;  // while the tool is in hand
   meshless_surgery::Surfaces::ConstPtr surfaces_;
   std::unique_ptr<CutPreview> preview_;

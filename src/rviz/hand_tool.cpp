@@ -182,6 +182,13 @@ Ogre::Quaternion HandTool::viewOrientation() const {
   return viewport_ ? viewport_->getCamera()->getDerivedOrientation() : Ogre::Quaternion(Ogre::Quaternion::IDENTITY);
 }
 
+Ogre::Quaternion HandTool::instrumentTurn() const {
+  // In the camera's frame: x right, y up, z back.
+  static const Ogre::Vector3 reach = Ogre::Vector3(-0.5f, 0.35f, -0.8f).normalisedCopy(),
+                             open = Ogre::Vector3::UNIT_Z.crossProduct(reach).normalisedCopy();
+  return viewOrientation() * Ogre::Quaternion(reach, open, reach.crossProduct(open));
+}
+
 Ogre::Vector3 HandTool::onPlane(const Ogre::Vector3& normal, const Ogre::Vector3& point) const {
   const auto met = ray_.intersects(Ogre::Plane(normal, point));
   return met.first ? ray_.getPoint(met.second) : point;

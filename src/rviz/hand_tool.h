@@ -1,4 +1,4 @@
-// What the three tools share: the ray under the cursor, what tissue it meets, planes that face the camera, keys, the
+// What the tools share: the ray under the cursor, what tissue it meets, planes that face the camera, keys, the
 // status line. Positions are in rviz's fixed frame.
 #pragma once
 
@@ -77,6 +77,8 @@ class HandTool : public rviz::Tool {
   /// Where the camera looks, and which way it is turned.
   Ogre::Vector3 viewDirection() const;
   Ogre::Quaternion viewOrientation() const;
+  /// An instrument in the hand reaches along its x, from the lower right into the view; its jaws open in the picture.
+  Ogre::Quaternion instrumentTurn() const;
   /// The cursor's ray and the plane through `point` that faces along `normal`; `point` where they do not meet.
   Ogre::Vector3 onPlane(const Ogre::Vector3& normal, const Ogre::Vector3& point) const;
   /// Distance on the screen between the cursor and a point; infinite where it is behind the camera.

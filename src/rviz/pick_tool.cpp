@@ -18,6 +18,7 @@ constexpr double kReach = 0.002;   // [m] beside the surface that still grabs
 constexpr double kSphere = 0.009;  // [m] diameter: a little more than the end of a spring in the markers
 constexpr double kNear = 14.0;     // [px] from the middle of a locked sphere
 constexpr double kSayAgain = 0.1;  // [s]
+constexpr float kOpenJaws = 0.8f;  // [rad] before they close on tissue; the node shows those that hold
 
 }  // namespace
 
@@ -31,6 +32,7 @@ void PickTool::onDeactivate() {
   if (dragging()) letGo();
   drag_ = Drag::kNone;
   sphere_.reset();
+  grasper_.reset();
   locked_.clear();
 }
 
@@ -170,13 +172,16 @@ void PickTool::hold(std::uint32_t pick_id, const Ogre::Vector3& point) {
 void PickTool::move() {
   target_ = onPlane(plane_normal_, plane_point_) + grip_;
   if (sphere_) sphere_->setPosition(target_);
-  stream_.publish(poseMessage(target_));
+  stream_.publish(poseMessage(target_, instrumentTurn()));
   since_said_ = 0.0;
 }
 
 void PickTool::onUpdate(double dt) {
   since_said_ += dt;
   if (drag_ == Drag::kHolding && since_said_ > kSayAgain) move();
+  if (drag_ != Drag::kNone || !seen() || !hover().over) return grasper_.reset();
+  if (!grasper_) grasper_ = std::make_unique<InstrumentsShape>(scene_manager_, scene_manager_->getRootSceneNode());
+  grasper_->show(grasperParts(hover().position, instrumentTurn(), kOpenJaws));
 }
 
 void PickTool::lock(const Ogre::Vector3& target) {

@@ -9,6 +9,8 @@
 
 #include <meshless_surgery/PickState.h>
 #include <rviz/ogre_helpers/shape.h>
+
+#include "instruments_shape.h"
 #endif
 
 namespace meshless {
@@ -68,6 +70,7 @@ class PickTool : public HandTool {
   std::vector<Locked> locked_;
   ros::Publisher stream_;
   std::unique_ptr<rviz::Shape> sphere_;
+  std::unique_ptr<InstrumentsShape> grasper_;  // over tissue that it could grab
 };
 
 }  // namespace meshless

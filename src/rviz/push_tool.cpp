@@ -140,7 +140,7 @@ void PushTool::leaveAt(const Ogre::Vector3& place) {
   link().call("push", wish, {}, kAfterStream);
 }
 
-void PushTool::move() { stream_.publish(poseMessage(centre())); }
+void PushTool::move() { stream_.publish(poseMessage(centre(), instrumentTurn())); }
 
 void PushTool::onUpdate(double) {
   if (drag_ == Drag::kSolid) move();

@@ -13,6 +13,7 @@
 #include <rviz/properties/string_property.h>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "ogre_convert.h"
 #include "tissue_program.h"
 
 namespace meshless {
@@ -21,6 +22,7 @@ namespace {
 enum Colouring { kByMaterial, kByStrain };
 
 constexpr float kLongestWait = 0.5f;  // [s] for the topology of a surface, before it is shown plain
+constexpr float kTipWidth = 0.004f;   // [m] of jaws and blades
 constexpr float kSmallestOrgan = 1e-3f, kLargestOrgan = 2.0f;  // [m] of organs
 
 // [m] the longest side of what it spans.
@@ -61,10 +63,13 @@ TissueDisplay::TissueDisplay() {
                                    "Between two messages, what moves is shown on its way: one message late. Without "
                                    "it: in steps, as messages come.",
                                    this, SLOT(changeLook()));
-  tools_shown_ = new rviz::BoolProperty("Tools", true, "Springs, push sphere and scissors.", this, SLOT(changeLook()));
+  tools_shown_ = new rviz::BoolProperty("Tools", true, "Instruments, springs, push sphere.", this, SLOT(changeLook()));
   full_force_ = new rviz::FloatProperty("Full force", 20.0f, "Force [N] of a spring that is shown red.", tools_shown_,
                                         SLOT(changeLook()), this);
   full_force_->setMin(0.001f);
+  shadows_ = new rviz::BoolProperty("Shadows", true,
+                                    "Of the tips of instruments on tissue below them, to judge depth. Needs Shine.",
+                                    tools_shown_, SLOT(changeLook()), this);
 }
 
 TissueDisplay::~TissueDisplay() = default;
@@ -214,9 +219,31 @@ void TissueDisplay::move(float wall_dt) {
 }
 
 void TissueDisplay::showTools() {
+  const ShadowTips tips = shadowTips();
+  for (const auto& body : bodies_) body.second->shade(tips);
   if (!tools_shown_->getBool()) return tools_.reset();
   if (!tools_) tools_ = std::make_unique<ToolsShape>(scene_manager_, scene_node_);
   tools_->show(tools_between_, full_force_->getFloat());
+}
+
+ShadowTips TissueDisplay::shadowTips() const {
+  ShadowTips tips;
+  tips.fill(Ogre::Vector4::ZERO);
+  if (!tools_shown_->getBool() || !shadows_->getBool()) return tips;
+  std::size_t count = 0;
+  const auto add = [&](const Ogre::Vector3& at, float wide) {
+    if (count == tips.size()) return;
+    const Ogre::Vector3 tip = scene_node_->getPosition() + scene_node_->getOrientation() * at;
+    tips[count++] = Ogre::Vector4(tip.x, tip.y, tip.z, wide);
+  };
+  const meshless_surgery::Surfaces& tools = tools_between_;
+  if (tools.scissors_shown)
+    add(toOgre(tools.scissors.position) +
+            toOgre(tools.scissors.orientation) * Ogre::Vector3(static_cast<float>(tools.scissors_length), 0, 0),
+        kTipWidth);
+  if (tools.push_shown) add(toOgre(tools.push_position), static_cast<float>(tools.push_radius));
+  for (const auto& pick : tools.picks) add(toOgre(pick.position), kTipWidth);
+  return tips;
 }
 
 // A mesh in millimetres fills the view, or is a dot in it.

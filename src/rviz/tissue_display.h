@@ -53,6 +53,7 @@ class TissueDisplay : public rviz::Display {
   /// Of the bodies that are shown, by their ids; empty where it has not come.
   bool findPatterns();
   void warnOfSize();
+  ShadowTips shadowTips() const;
 
   rviz::StringProperty* node_;
   rviz::EnumProperty* colour_;
@@ -63,6 +64,7 @@ class TissueDisplay : public rviz::Display {
   rviz::BoolProperty* smooth_;
   rviz::BoolProperty* tools_shown_;
   rviz::FloatProperty* full_force_;
+  rviz::BoolProperty* shadows_;
   ros::Subscriber subscriber_, topology_subscriber_, images_subscriber_;
   meshless_surgery::Surfaces::ConstPtr surfaces_;
   meshless_surgery::Topology::ConstPtr topology_, next_topology_;  // of what is shown, and the last that has come

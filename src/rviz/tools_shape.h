@@ -1,4 +1,4 @@
-// Springs, the push sphere and the scissors.
+// Springs, the push sphere, attachments and instruments.
 #pragma once
 
 #include <memory>
@@ -8,9 +8,7 @@
 #include <rviz/ogre_helpers/billboard_line.h>
 #include <rviz/ogre_helpers/shape.h>
 
-namespace Ogre {
-class ManualObject;
-}
+#include "instruments_shape.h"
 
 namespace meshless {
 
@@ -26,7 +24,6 @@ class ToolsShape {
 
  private:
   void showSprings(const std::vector<meshless_surgery::PickState>& picks, double full_force);
-  void showScissors(const meshless_surgery::Surfaces& surfaces);
   static void showLines(rviz::BillboardLine& shape, const std::vector<geometry_msgs::Point>& ends,
                         const Ogre::ColourValue& color);
 
@@ -35,9 +32,7 @@ class ToolsShape {
   std::unique_ptr<rviz::BillboardLine> springs_, fibres_, clips_;
   std::vector<std::unique_ptr<rviz::Shape>> ends_;
   std::unique_ptr<rviz::Shape> push_;
-  Ogre::ManualObject* scissors_;
-  Ogre::MaterialPtr scissors_material_;
-  bool begun_ = false;  // the scissors have their section
+  InstrumentsShape instruments_;
 };
 
 }  // namespace meshless

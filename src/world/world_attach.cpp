@@ -334,9 +334,9 @@ void World::Impl::showAttachments(const SnapshotWants& wants, std::vector<Attach
       snapshot.force += fibre.tension;
       for (const BodyId& id : {fibre.a, fibre.b})
         if (std::find(ends.begin(), ends.end(), id) == ends.end()) ends.push_back(id);
-      if (!wants.surfaces || attachment.clip) continue;
       const Points line = fibreEnds(fibre);
-      snapshot.lines.push_back({line[0], line[1]});
+      snapshot.middle += (line[0] + line[1]) / (2.0 * static_cast<double>(attachment.fibres.size()));
+      if (wants.surfaces && !attachment.clip) snapshot.lines.push_back({line[0], line[1]});
     }
     for (const BodyId& id : ends)
       if (const WorldBody* const body = find(id)) snapshot.ends.push_back(body->name);

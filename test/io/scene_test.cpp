@@ -493,6 +493,21 @@ TEST_F(Shipped, ScenesLoadAsClosedBodiesAboveTheGround) {
   }
 }
 
+TEST_F(Shipped, EveryBodyOfEverySceneHasALook) {
+  int scenes = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(package + "/config/scenes")) {
+    ++scenes;
+    const SceneDef def = scene(entry.path().stem().string());
+    for (const BodyDef& body : def.bodies) {
+      EXPECT_NE(Look{}, body.material.appearance.outer) << def.name << ": " << body.name;
+      EXPECT_NE(Look{}, body.material.appearance.inner) << def.name << ": " << body.name;
+      for (const auto& region : body.regions)
+        EXPECT_NE(Look{}, region.material.appearance.inner) << def.name << ": " << body.name;
+    }
+  }
+  EXPECT_GT(scenes, 10);
+}
+
 TEST_F(Shipped, TheLiverIsElasticUnderBothItsNamesAndTheOtherForLooks) {
   const SceneDef liver = scene("liver"), looks = scene("liver_looks");
   ASSERT_EQ(liver.bodies.size(), 1u);

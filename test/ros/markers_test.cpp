@@ -153,15 +153,13 @@ TEST(Markers, ToolsComeAndGo) {
   push.position = Vec3(0.0, 0.0, 1.0);
   push.radius = 0.03;
   ASSERT_TRUE(world->apply(push).ok());
-  world->setScissors(cutAcross(0.0).blades, 0.4);
-  EXPECT_EQ((std::set<int>{0, 1, 2, 3}), ids(Marker::ADD));
+  EXPECT_EQ((std::set<int>{0, 1, 2}), ids(Marker::ADD));
   const auto sphere = with(builder.build(world->snapshot(surfaces()), ros::Time(), false), "tools", Marker::ADD)[2];
   EXPECT_EQ(Marker::SPHERE, sphere.type);
   EXPECT_DOUBLE_EQ(0.06, sphere.scale.x);
   EXPECT_EQ(1.0, sphere.pose.position.z);
   ASSERT_TRUE(world->apply(ClearPicksCommand{}).ok());
-  world->hideScissors();
-  EXPECT_EQ((std::set<int>{0, 1, 3}), ids(Marker::DELETE));
+  EXPECT_EQ((std::set<int>{0, 1}), ids(Marker::DELETE));
   EXPECT_EQ((std::set<int>{2}), ids(Marker::ADD));
 }
 

@@ -9,6 +9,7 @@ import unittest
 
 import meshless_surgery.msg
 import numpy
+import rospkg
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Point, PoseStamped, Vector3, WrenchStamped
@@ -94,6 +95,12 @@ def strain(rest, now, triangles):
 
 def of(array, ns):
     return [m for m in array.markers if m.ns == ns and m.action == Marker.ADD]
+
+
+def reach_of(part):
+    """Where x of a part points to."""
+    q = part.pose.orientation
+    return numpy.array([1 - 2 * (q.y ** 2 + q.z ** 2), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y)])
 
 
 class MessagesLawTest(DeformerTestCase):
@@ -562,7 +569,7 @@ class MessagesLawTest(DeformerTestCase):
                 self.assertLess(numpy.abs(there - colour).max(), 0.01, 'both faces of a cut look alike')
 
     def markers(self, state, shown, topology):
-        array = self.fresh('markers', MarkerArray, lambda a: len(of(a, 'tools')) == 4)
+        array = self.fresh('markers', MarkerArray, lambda a: len(of(a, 'tools')) == 3)
         bodies = {m.id: m for m in of(array, 'bodies')}
         stills = {still.id: still for still in topology.bodies}
         for surface in shown.bodies:
@@ -587,11 +594,7 @@ class MessagesLawTest(DeformerTestCase):
         numpy.testing.assert_allclose(plain(tools[1].points), plain([pick.target]), atol=1e-9)
         numpy.testing.assert_allclose(plain(tools[2].pose.position), plain(shown.push_position), atol=1e-9)
         self.assertAlmostEqual(2.0 * shown.push_radius, tools[2].scale.x)
-        # The blades leave the pivot at half of the angle to either side: x is y of the world, and y is z.
-        blades = plain(tools[3].points) - numpy.array([5.0, 1.0, 0.7])
-        numpy.testing.assert_allclose(blades[[0, 3]], 0.0, atol=1e-9)
-        for tip, side in ((blades[1], 1.0), (blades[4], -1.0)):
-            numpy.testing.assert_allclose(tip, 0.3 * numpy.array([0.0, numpy.cos(0.2), side * numpy.sin(0.2)]), atol=1e-9)
+        self.instruments(state, shown, of(array, 'instruments'))
         late = self.fresh('obstacles', MarkerArray)
         for plate in (of(array, 'obstacles')[0], of(late, 'obstacles')[0]):
             corners = plain(plate.points) - numpy.array([1.0, 0.0, 0.5])
@@ -600,6 +603,33 @@ class MessagesLawTest(DeformerTestCase):
             numpy.testing.assert_allclose(own.max(0), [0.2, 0.15, 0.05], atol=1e-9)
             numpy.testing.assert_allclose(own.min(0), [-0.2, -0.15, -0.05], atol=1e-9)
             self.assertAlmostEqual(0.4 * 0.3 * 0.1, solid(own, numpy.arange(len(own)).reshape(-1, 3))[0], delta=1e-9)
+
+    def instruments(self, state, shown, markers):
+        """Scissors, probe and grasper, the same in both messages: a shaft and, but for the probe, two jaws."""
+        self.assertEqual(7, len(shown.instruments))
+        self.assertEqual(7, len(markers))
+        package = rospkg.RosPack().get_path('meshless_surgery')
+        for part, marker in zip(shown.instruments, markers):
+            self.assertEqual((Marker.MESH_RESOURCE, part.mesh), (marker.type, marker.mesh_resource))
+            self.assertTrue(os.path.exists(part.mesh.replace('package://meshless_surgery', package)), part.mesh)
+            self.says(part, pose=plain(marker.pose), scale=marker.scale.x, color=plain(marker.color))
+            held.add((part._type, 'mesh'))
+        held.add((shown._type, 'instruments'))
+        shaft, upper, lower, probe = shown.instruments[:4]
+        numpy.testing.assert_allclose(plain(shaft.pose), plain(shown.scissors), atol=1e-9)
+        # The blades leave the pivot at half of the angle to either side: x is y of the world, and y is z.
+        for blade, side in ((upper, 1.0), (lower, -1.0)):
+            numpy.testing.assert_allclose(plain(blade.pose.position), [5.0, 1.0, 0.7], atol=1e-9)
+            self.assertAlmostEqual(0.3, 0.06 * blade.scale)
+            numpy.testing.assert_allclose(reach_of(blade), [0.0, numpy.cos(0.2), side * numpy.sin(0.2)], atol=1e-9)
+        numpy.testing.assert_allclose(plain(probe.pose.position), plain(shown.push_position), atol=1e-9)
+        # What the pick holds is between the jaws, which are nearly closed.
+        shaft, upper, lower = shown.instruments[4:]
+        grip = plain(state.picks[0].position) - plain(shaft.pose.position)
+        numpy.testing.assert_allclose(grip, numpy.linalg.norm(grip) * reach_of(shaft), atol=1e-9)
+        self.assertAlmostEqual(0.015, numpy.linalg.norm(grip))
+        between = numpy.arccos(reach_of(upper).dot(reach_of(lower)))
+        self.assertTrue(0.0 < between < 0.3, between)
 
     def points(self, topology):
         message = self.fresh('points', PointCloud2)
@@ -631,6 +661,7 @@ class MessagesLawTest(DeformerTestCase):
                   force=(MASSES['hangs'] * G, 0.01 * MASSES['hangs'] * G))
         shown = self.fresh('surfaces', Surfaces, lambda m: m.header.stamp > asked and len(m.fibres) == 2 * bed.fibres)
         ends = plain(shown.fibres).reshape(-1, 2, 3)
+        self.holds(bed, 'middle', ends.mean(axis=(0, 1)), 1e-9)
         drawn = ends[:, 1] - ends[:, 0]  # from the tissue up to where it was
         self.assertAlmostEqual(MASSES['hangs'] * G / (1e6 * bed.area), drawn[:, 2].mean(), delta=1e-4)  # some stand for more than others
         held.update({('meshless_surgery/State', 'attachments'), (shown._type, 'fibres')})

@@ -142,17 +142,14 @@ class StreamTest(DeformerTestCase):
         jaw = self.stream('scissors/jaw/servo_js', JointState(name=['jaw'], position=[0.0]))
         # A jaw that was never open does not cut.
         markers = self.record('markers', MarkerArray)
-        markers.wait(lambda a: any(m.ns == 'tools' and m.id == 3 and m.action == Marker.ADD for m in a.markers))
+        markers.wait(lambda a: any(m.ns == 'instruments' and m.action == Marker.ADD for m in a.markers))
         self.assertEqual(['left', 'right'], sorted(b.name for b in self.state().bodies))
         jaw.message = JointState(name=['jaw'], position=[0.4])
         # Seen by the opening of the blades that are drawn.
         def opened(array):
-            for m in array.markers:
-                if m.ns == 'tools' and m.id == 3 and m.action == Marker.ADD:
-                    tips = m.points[1], m.points[4]
-                    gap = math.dist((tips[0].x, tips[0].y, tips[0].z), (tips[1].x, tips[1].y, tips[1].z))
-                    return abs(gap - 2 * 0.3 * math.sin(0.2)) < 1e-6
-            return False
+            blades = [m.pose.orientation for m in array.markers if m.ns == 'instruments' and 'blade' in m.mesh_resource]
+            along = [(1 - 2 * (q.y ** 2 + q.z ** 2), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y)) for q in blades]
+            return len(along) == 2 and abs(math.dist(*along) - 2 * math.sin(0.2)) < 1e-6
         markers.next(opened)
         jaw.message = JointState(name=['jaw'], position=[0.0])
         state = self.states.next(lambda s: len(s.bodies) == 3)

@@ -13,12 +13,11 @@ import rospy
 from geometry_msgs.msg import Point, Vector3
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from deformer_support import LONG, OwnNode, Recorder, pose_stamped, run  # noqa: E402
-from meshless_surgery.msg import State, TaskState  # noqa: E402
+from deformer_support import LONG, OwnNode, pose_stamped, run  # noqa: E402
+from meshless_surgery.msg import TaskState  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 
 REPORT = roslib.packages.find_node('meshless_surgery', 'report')[0]
-CLIP = roslib.packages.find_node('meshless_surgery', 'clip_by_lock.py')[0]
 
 
 def report_of(folder):
@@ -107,22 +106,6 @@ class TrainingTest(unittest.TestCase):
             time.sleep(0.05)
         topic.unregister()
         return heard[-1]
-
-    def test_a_pick_that_is_locked_on_a_vessel_becomes_a_clip(self):
-        with self.node(task='transect').wait() as node:
-            states = Recorder(node.name + '/state', State)
-            script = subprocess.Popen([CLIP, '--node', node.name], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-            try:
-                for count, x in enumerate((-0.008, 0.008), 1):
-                    pick = node.good('pick', point=Point(x, 0, 0.1), direction=Vector3(0, 0, -1)).pick_id
-                    node.good('lock', pick_id=pick)
-                    states.wait(lambda state: not state.picks and len([a for a in state.attachments if a.jaws > 0]) == count)
-                    node.good('step', steps=30)
-                    self.assertEqual(count, node.good('observe').task.stage)
-            finally:
-                script.terminate()
-                script.wait(LONG)
-                states.close()
 
     def test_a_task_that_cannot_be_read_ends_the_node(self):
         node = self.node(task='retrakt')

@@ -87,5 +87,27 @@ TEST(MoveTools, ScissorsTurnTheShortWay) {
   EXPECT_NEAR(0.4, between.scissors_angle, 1e-6);
 }
 
+TEST(MoveTools, PartsOfInstrumentsMoveWithTheirTools) {
+  const auto part = [](const char* mesh, double x, double turn) {
+    meshless_surgery::InstrumentPart made;
+    made.mesh = mesh;
+    made.pose.position.x = x;
+    made.pose.orientation.w = std::cos(0.5 * turn);
+    made.pose.orientation.z = std::sin(0.5 * turn);
+    return made;
+  };
+  meshless_surgery::Surfaces from, to;
+  from.instruments = {part("shaft", 0.0, 0.0), part("jaw", 0.0, 0.2)};
+  to.instruments = {part("shaft", 0.4, 0.0), part("jaw", 0.4, 0.6)};
+  auto between = to;
+  moveTools(from, to, 0.5f, between);
+  EXPECT_NEAR(0.2, between.instruments[0].pose.position.x, 1e-9);
+  EXPECT_NEAR(std::sin(0.2), between.instruments[1].pose.orientation.z, 1e-3);
+  from.instruments.push_back(part("shaft", 1.0, 0.0));  // another tool, which has gone
+  between = to;
+  moveTools(from, to, 0.5f, between);
+  EXPECT_EQ(0.4, between.instruments[0].pose.position.x);
+}
+
 }  // namespace between_states_test
 }  // namespace meshless

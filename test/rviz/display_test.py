@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The Tissue display: cut faces in their inside colour, strain and the force of springs by colour, and nothing is asked
-of the node while it is switched off."""
+"""The Tissue display: cut faces in their inside colour, strain and the force of springs by colour, instruments and the
+shadows of their tips, and nothing is asked of the node while it is switched off."""
 import os
 import sys
 import tempfile
@@ -13,13 +13,13 @@ import rostest
 import yaml
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from rviz_view import configured_view, project, view_rectangle  # noqa: E402
+from rviz_view import BACKGROUND, configured_view, project, view_rectangle  # noqa: E402
 from virtual_display import VirtualDisplay, stop, wait_until  # noqa: E402
 
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
-from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion  # noqa: E402
-from meshless_surgery.msg import State  # noqa: E402
-from meshless_surgery.srv import Cut, Lock, Pick, Remove, SetMaterial, Spawn  # noqa: E402
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3  # noqa: E402
+from meshless_surgery.msg import State, Surfaces  # noqa: E402
+from meshless_surgery.srv import Cut, Lock, Pick, Probe, Push, Remove, SetMaterial, Spawn  # noqa: E402
 from shape_msgs.msg import SolidPrimitive  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
@@ -37,14 +37,15 @@ def call(service, kind, **fields):
 
 
 class DisplayTest(unittest.TestCase):
-    def start(self, change=lambda display: None, name='Tissue', scene='liver'):
-        """rviz with the scene's configuration, whose display of that name `change` may alter."""
+    def start(self, change=lambda display: None, name='Tissue', scene='liver', more=()):
+        """rviz with the scene's configuration, whose display of that name (None: each) `change` may alter, and more displays."""
         file = os.path.join(rospkg.RosPack().get_path('meshless_surgery'), 'config', 'rviz', scene + '.rviz')
         with open(file) as text:
             config = yaml.safe_load(text)
         for display in config['Visualization Manager']['Displays']:
-            if display['Name'] == name:
+            if name in (None, display['Name']):
                 change(display)
+        config['Visualization Manager']['Displays'] += more
         with tempfile.NamedTemporaryFile('w', suffix='.rviz', delete=False) as changed:
             yaml.safe_dump(config, changed)
         self.addCleanup(os.remove, changed.name)
@@ -184,6 +185,96 @@ class DisplayTest(unittest.TestCase):
             return part[(part[:, 0] > 120) & (part[:, 1] < 0.5 * part[:, 0]) & (part[:, 2] < 0.5 * part[:, 0])]
         self.until(lambda: len(colour_along_spring()) > 3, 'no red spring in the picture')
         self.save('spring')
+
+    def show_probe(self, place=(0.0, -0.14, 0.12)):
+        """A small sphere in the air before the liver, at a shaft that comes along x."""
+        call('pause', SetBool, data=True)
+        call('push', Push, enable=True, radius=0.004, pose=PoseStamped(pose=Pose(position=Point(*place), orientation=Quaternion(w=1.0))))
+        return numpy.array(place)
+
+    def steel_along_shaft(self):
+        """The share of pixels along the shaft of the probe that are grey: its pose is what ~surfaces says."""
+        part, = rospy.wait_for_message('/deformer/surfaces', Surfaces, LONG).instruments
+        q = part.pose.orientation
+        reach = numpy.array([1 - 2 * (q.y ** 2 + q.z ** 2), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y)])
+        start = numpy.array([part.pose.position.x, part.pose.position.y, part.pose.position.z])
+        places = start - numpy.linspace(0.02, 0.1, 30)[:, None] * reach
+        rows, columns = project(places, self.view, self.rectangle).T
+        colours = self.display.screenshot()[rows, columns].astype(int)
+        background = numpy.abs(colours - BACKGROUND).max(axis=1) < 16
+        return ((colours.max(axis=1) - colours.min(axis=1) < 40) & ~background).mean()
+
+    def test_instruments_are_drawn_where_they_are(self):
+        def dull(display):
+            display['Shine'] = False
+
+        def markers_alone(display):
+            display['Enabled'] = display['Value'] = display['Name'] == 'Markers'
+
+        def without_tools(display):
+            display['Tools'] = {'Value': False}
+        for name, change, shown in (('Tissue', lambda display: None, True), ('Tissue', dull, True), (None, markers_alone, True),
+                                    ('Tissue', without_tools, False)):
+            self.start(change, name)
+            self.show_probe()
+            if shown:
+                self.until(lambda: self.steel_along_shaft() > 0.9, 'no shaft: %s' % change.__name__)
+            else:
+                rospy.sleep(2.0)
+                self.assertLess(self.steel_along_shaft(), 0.2)
+            self.save('instrument_' + change.__name__.strip('<>'))
+            self.doCleanups()
+
+    def test_tips_cast_shadows_on_tissue_below_them(self):
+        def without(display):
+            display['Tools'] = {'Value': True, 'Full force': 20, 'Shadows': False}
+
+        def brightness():
+            """Of the tissue below the sphere, and of that beside it: what is straight below is found by a ray."""
+            colours = []
+            for x in (-0.05, 0.0):
+                met = call('probe', Probe, point=Point(x, -0.02, 0.3), direction=Vector3(0, 0, -1)).position
+                row, column = project(numpy.array([[met.x, met.y, met.z]]), self.view, self.rectangle)[0]
+                colours.append(self.display.screenshot()[row - 3:row + 4, column - 3:column + 4].astype(float).mean())
+            return numpy.array(colours)
+        seen = []
+        for change in (without, lambda display: None):
+            self.start(change)
+            call('pause', SetBool, data=True)
+            self.until(lambda: brightness().min() > 20, 'no tissue')
+            call('push', Push, enable=True, radius=0.006, pose=PoseStamped(pose=Pose(position=Point(-0.05, -0.02, 0.125), orientation=Quaternion(w=1.0))))
+            rospy.sleep(2.0)
+            seen.append(brightness())
+            self.save('shadow_%d' % len(seen))
+            self.doCleanups()
+        lit, shaded = seen
+        print('below the tip and beside it: %s without shadows, %s with' % (lit, shaded))
+        self.assertLess(shaded[0], 0.85 * lit[0])
+        self.assertAlmostEqual(lit[1], shaded[1], delta=0.03 * lit[1])
+
+    def test_two_eyes_see_what_is_at_the_focal_distance_at_one_place(self):
+        eyes, distance = 0.02, configured_view('liver')['Distance']  # the liver is about there
+        for focus in (distance, 3.0 * distance):
+            self.start(more=[{'Class': 'meshless_surgery/Stereo', 'Name': 'Stereo', 'Enabled': True, 'Value': True,
+                              'Eye distance': eyes, 'Focal distance': focus}])
+            call('pause', SetBool, data=True)
+            rospy.sleep(1.0)
+
+            def columns():
+                """Where the tissue is, in the mean, in both halves; how much of it they have."""
+                picture = self.pixels()
+                half = picture.shape[1] // 2
+                halves = [(part[:, :, 0] > part[:, :, 2] + 35) for part in (picture[:, :half], picture[:, -half:])]
+                return [numpy.argwhere(part)[:, 1].mean() if part.any() else 0.0 for part in halves], [part.sum() for part in halves]
+            self.until(lambda: min(columns()[1]) > 2000, 'an eye sees no liver')
+            (left, right), (many, other) = columns()
+            self.save('stereo')
+            self.assertAlmostEqual(1.0, other / many, delta=0.05)
+            scale = 0.5 * (self.rectangle[1] - self.rectangle[0]) / numpy.tan(0.5 * self.view['Field of View'])
+            wanted = -eyes * (1.0 / distance - 1.0 / focus) * scale
+            print('the right eye sees it %.1f px beside where the left one does, wanted %.1f' % (right - left, wanted))
+            self.assertAlmostEqual(wanted, right - left, delta=4.0)
+            self.doCleanups()
 
     def test_contacts_are_shown_where_bodies_press(self):
         def on(display):

@@ -3,6 +3,7 @@
 
 #include <map>
 
+#include <meshless_surgery/InstrumentPart.h>
 #include <visualization_msgs/MarkerArray.h>
 
 #include "meshless_surgery/ros/baked_colors.h"
@@ -21,9 +22,11 @@ class MarkerBuilder {
   /// Needs a snapshot with surfaces. One TRIANGLE_LIST a body: ns "bodies", id the body's number, a colour for each
   /// point: the outer colour (which is also the marker's) or for faces of cuts the inside colour, each with the
   /// pattern of its look, times the light there. No triangle without an area. Obstacles in ns "obstacles", numbered.
-  /// Tools in ns "tools": springs 0, their ends 1, push sphere 2, scissors 3, fibres of attachments 4. `fresh` (someone
-  /// new listens) and a reset begin with DELETEALL. A DELETE is said in 30 arrays on end: a slow listener may lose one.
-  visualization_msgs::MarkerArray build(const WorldSnapshot& snapshot, const ros::Time& stamp, bool fresh);
+  /// Tools in ns "tools": springs 0, their ends 1, push sphere 2, fibres of attachments 4. Instruments in ns
+  /// "instruments", a MESH_RESOURCE a part. `fresh` (someone new listens) and a reset begin with DELETEALL. A DELETE is
+  /// said in 30 arrays on end: a slow listener may lose one.
+  visualization_msgs::MarkerArray build(const WorldSnapshot& snapshot, const ros::Time& stamp, bool fresh,
+                                        const std::vector<meshless_surgery::InstrumentPart>& instruments = {});
   /// A DELETE is still to be said again.
   bool deleting() const;
 

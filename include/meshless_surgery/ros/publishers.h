@@ -15,6 +15,7 @@
 #include <tf2_ros/transform_broadcaster.h>
 
 #include "meshless_surgery/ros/force_stream.h"
+#include "meshless_surgery/ros/instruments.h"
 #include "meshless_surgery/ros/markers.h"
 #include "meshless_surgery/ros/moving_surfaces.h"
 #include "meshless_surgery/ros/rejections.h"
@@ -52,7 +53,8 @@ class Publishers {
   void publishTick(Clock::time_point now);
   void publishInfo(const WorldSnapshot& snapshot, const std_msgs::Header& header);
   void publishTopology(const WorldSnapshot& snapshot, const std_msgs::Header& header);
-  void publishSurfaces(const WorldSnapshot& snapshot, const std_msgs::Header& header);
+  void publishSurfaces(const WorldSnapshot& snapshot, const std_msgs::Header& header,
+                       const std::vector<meshless_surgery::InstrumentPart>& instruments);
   void publishTools(const WorldSnapshot& snapshot, const ros::Time& stamp);
   struct Shown {  // where a tool is, and where it was told to go
     Pose measured, setpoint;
@@ -69,6 +71,7 @@ class Publishers {
   const Rejections& rejections_;
   MarkerBuilder markers_;
   MovingSurfaces moving_;
+  Instruments instruments_;
 
   ros::Publisher topology_topic_, images_topic_, vertices_topic_;
   ros::Publisher clusters_topic_, collision_topic_, contacts_topic_, surfaces_topic_, strained_surfaces_topic_;

@@ -156,6 +156,7 @@ struct AttachmentSnapshot {
   std::size_t fibres = 0, made = 0;        // whole, and at the start
   double area = 0.0;                       // [m^2] of those that are whole
   double force = 0.0;                      // [N] sum of their tensions
+  Vec3 middle = Vec3::Zero();              // [m] of its fibres, where they are now; zero where none is left
   std::optional<double> jaws;              // [m] of a clip: how wide it still may be between them
   Vec3 rest_place = Vec3::Zero();          // [m] of a clip: the middle of its jaws in the rest shape, where it was put
   std::vector<std::array<Vec3, 2>> lines;  // [m] ends of fibres, of a clip lines on its jaws; where surfaces are wanted
