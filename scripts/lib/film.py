@@ -96,19 +96,6 @@ def resection(surgeon):
             yield
 
 
-def liver(surgeon):
-    """Cut, and both pieces drawn aside."""
-    surgeon.live(1.5)
-    left = min(surgeon.body('liver').surface.vertices, key=lambda v: v.x)
-    pick = surgeon.pick((left.x, left.y, left.z))
-    surgeon.cut(pivot=(-0.02, -1, 0.1), reach=(0, 1, 0), normal=(1, 0, 0.2))
-    for at in between((left.x, left.y, left.z), (left.x - 0.05, left.y - 0.03, left.z + 0.05), 20):
-        surgeon.move(pick.pick_id, at)
-        yield
-    surgeon.live(1.0)
-    yield
-
-
 def incision(surgeon):
     """Skin, opened and spread by two graspers."""
     surgeon.live(1.0)
@@ -147,7 +134,6 @@ class Shot:
 
 SHOTS = {
     'resection': Shot('resection', resection, film=True, Distance=0.30, **{'Focal Point': {'X': -0.02, 'Y': 0.0, 'Z': 0.07}}),
-    'liver': Shot('liver', liver, Distance=0.34),
     'incision': Shot('incision', incision, Distance=0.22),
     'abdomen': Shot('abdomen', abdomen),
     'endoscope': Shot('abdomen', abdomen, 'endoscope'),
@@ -175,8 +161,7 @@ def stage(shot):
     """Node and rviz with the shot's scene; what takes a picture."""
     from rviz_view import view_rectangle
     from virtual_display import VirtualDisplay, stop, wait_until
-    display = VirtualDisplay(*WINDOW)
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, contextlib.closing(VirtualDisplay(*WINDOW)) as display:
         config, launch = (os.path.join(folder, name) for name in ('view.rviz', 'film.launch'))
         with open(config, 'w') as file:
             yaml.safe_dump(configuration(shot), file)
@@ -213,7 +198,6 @@ def stage(shot):
             yield picture
         finally:
             stop(process)
-            display.close()
 
 
 def convert(pictures, file, before=(), after=()):

@@ -48,7 +48,7 @@ TEST(InstrumentMeshes, JawsMeetWhereTheyClose) {
   for (const auto& [name, mesh, reach, length, jaw] : all()) {
     if (!jaw) continue;
     const Box box = boundsOf(mesh.vertices);
-    EXPECT_EQ(0.0, box.min.y()) << name << ": the other half, turned about x, is on the other side";
+    EXPECT_NEAR(0.0, box.min.y(), 1e-12) << name << ": the other half, turned about x, is on the other side";
     EXPECT_NEAR(-box.min.z(), box.max.z(), 1e-12) << name << ": and lies against this one";
   }
 }
