@@ -12,6 +12,7 @@
 
 #include "cut_preview.h"
 #include "ogre_convert.h"
+#include "tissue_display.h"
 
 namespace meshless {
 namespace {
@@ -57,6 +58,7 @@ void ClipTool::onInitialize() {
 
 void ClipTool::onActivate() {
   asking_ = removing_ = false;
+  surfaces_ = shownSurfaces(link().nameOf("surfaces"));
   surfaces_topic_ = link().handle().subscribe<meshless_surgery::Surfaces>(
       link().nameOf("surfaces"), 1,
       [this](const meshless_surgery::Surfaces::ConstPtr& surfaces) { surfaces_ = surfaces; });
@@ -116,10 +118,15 @@ std::optional<ClipTool::Jaws> ClipTool::jawsUnderCursor() const {
   if (!(jaws.across.normalise() > 0.1f)) return std::nullopt;
   const Ogre::Vector3 away = jaws.along.crossProduct(jaws.across);
   Ogre::Vector3 low(std::numeric_limits<float>::max()), high = -low;
-  for (std::uint32_t v = 0; v < surface->vertices.size() / 3; ++v) {
-    const Ogre::Vector3 way = vertexOf(*surface, v) - place;
-    if (std::abs(way.dotProduct(jaws.along)) > 0.5f * width_->getFloat() || way.length() > 2.0f * reach) continue;
-    const Ogre::Vector3 own(way.dotProduct(jaws.along), way.dotProduct(jaws.across), way.dotProduct(away));
+  // The vessel's section at the place.
+  for (std::size_t c = 0; c < surface->triangles.size(); ++c) {
+    const std::uint32_t next = surface->triangles[c % 3 == 2 ? c - 2 : c + 1];
+    const Ogre::Vector3 a = vertexOf(surface->vertices, surface->triangles[c]) - place, b = vertexOf(surface->vertices, next) - place;
+    const float from = a.dotProduct(jaws.along), to = b.dotProduct(jaws.along);
+    if ((from < 0.0f) == (to < 0.0f)) continue;
+    const Ogre::Vector3 way = a + (b - a) * (from / (from - to));
+    if (way.length() > 2.0f * reach) continue;
+    const Ogre::Vector3 own(0.0f, way.dotProduct(jaws.across), way.dotProduct(away));
     low.makeFloor(own);
     high.makeCeil(own);
   }

@@ -39,7 +39,17 @@ float lengthOf(const meshless_surgery::Surface& surface) {
   return longest;
 }
 
+std::map<std::string, meshless_surgery::Surfaces::ConstPtr>& heardSurfaces() {
+  static std::map<std::string, meshless_surgery::Surfaces::ConstPtr> heard;
+  return heard;
+}
+
 }  // namespace
+
+meshless_surgery::Surfaces::ConstPtr shownSurfaces(const std::string& topic) {
+  const auto found = heardSurfaces().find(topic);
+  return found != heardSurfaces().end() ? found->second : nullptr;
+}
 
 TissueDisplay::TissueDisplay() {
   node_ = new rviz::StringProperty("Node", "/deformer", "The deformer node that is shown.", this, SLOT(listen()));
@@ -72,11 +82,12 @@ TissueDisplay::TissueDisplay() {
                                     tools_shown_, SLOT(changeLook()), this);
 }
 
-TissueDisplay::~TissueDisplay() = default;
+TissueDisplay::~TissueDisplay() { heardSurfaces().erase(topic_); }
 
 void TissueDisplay::onEnable() { listen(); }
 
 void TissueDisplay::onDisable() {
+  heardSurfaces().erase(topic_);
   subscriber_.shutdown();
   topology_subscriber_.shutdown();
   images_subscriber_.shutdown();
@@ -98,11 +109,12 @@ void TissueDisplay::listen() {
   std::string node = node_->getStdString();
   if (node.empty() || !ros::names::validate(node, error)) node = "/deformer";
   // A remapping of the node's name alone moves the display, as it does the tools.
-  const std::string topic =
-      ros::names::resolve(node) + (colour_->getOptionInt() == kByStrain ? "/strained_surfaces" : "/surfaces");
-  setStatus(rviz::StatusProperty::Warn, "Topic", "no message from " + QString::fromStdString(topic) + " yet");
+  heardSurfaces().erase(topic_);
+  topic_ = ros::names::resolve(node) + (colour_->getOptionInt() == kByStrain ? "/strained_surfaces" : "/surfaces");
+  setStatus(rviz::StatusProperty::Warn, "Topic", "no message from " + QString::fromStdString(topic_) + " yet");
   subscriber_ = update_nh_.subscribe<meshless_surgery::Surfaces>(
-      topic, 1, [this](const meshless_surgery::Surfaces::ConstPtr& surfaces) {
+      topic_, 1, [this](const meshless_surgery::Surfaces::ConstPtr& surfaces) {
+        heardSurfaces()[topic_] = surfaces;
         if (!surfaces_ || surfaces_->run != surfaces->run) bodies_.clear();
         surfaces_ = surfaces;
         fresh_ = true;

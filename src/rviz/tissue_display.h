@@ -6,6 +6,7 @@
 #ifndef Q_MOC_RUN
 #include <map>
 #include <memory>
+#include <string>
 #include <unordered_map>
 
 #include <meshless_surgery/Surfaces.h>
@@ -27,6 +28,10 @@ class StringProperty;
 }  // namespace rviz
 
 namespace meshless {
+
+/// What a display has heard last on the topic; null where none listens to it. A tool that begins to listen where a
+/// display does shares its connection, and would hear nothing of a world that stands still.
+meshless_surgery::Surfaces::ConstPtr shownSurfaces(const std::string& topic);
 
 class TissueDisplay : public rviz::Display {
   Q_OBJECT
@@ -66,6 +71,7 @@ class TissueDisplay : public rviz::Display {
   rviz::FloatProperty* full_force_;
   rviz::BoolProperty* shadows_;
   ros::Subscriber subscriber_, topology_subscriber_, images_subscriber_;
+  std::string topic_;
   meshless_surgery::Surfaces::ConstPtr surfaces_;
   meshless_surgery::Topology::ConstPtr topology_, next_topology_;  // of what is shown, and the last that has come
   std::unordered_map<std::uint32_t, const meshless_surgery::BodyTopology*> patterns_;  // of topology_, by the body's id
