@@ -121,7 +121,7 @@ std::optional<ClipTool::Jaws> ClipTool::jawsUnderCursor() const {
   // The vessel's section at the place.
   for (std::size_t c = 0; c < surface->triangles.size(); ++c) {
     const std::uint32_t next = surface->triangles[c % 3 == 2 ? c - 2 : c + 1];
-    const Ogre::Vector3 a = vertexOf(surface->vertices, surface->triangles[c]) - place, b = vertexOf(surface->vertices, next) - place;
+    const Ogre::Vector3 a = vertexOf(*surface, surface->triangles[c]) - place, b = vertexOf(*surface, next) - place;
     const float from = a.dotProduct(jaws.along), to = b.dotProduct(jaws.along);
     if ((from < 0.0f) == (to < 0.0f)) continue;
     const Ogre::Vector3 way = a + (b - a) * (from / (from - to));

@@ -21,7 +21,7 @@ class ScenePageTest(PageTestCase):
         name, volume, low, high = re.search(r'(\w+): (\d+) ml, from z = (-?\d+) to (\d+) mm', said).groups()
         self.assertEqual(('sphere', '0'), (name, low.lstrip('-')))
         self.assertAlmostEqual(500, int(volume), delta=30)
-        self.assertLess(abs(100 - int(high)), 8)
+        self.assertTrue(70 < int(high) <= 101, said)  # it is soft
         with self.running(self.launch(1)):
             said = self.good('python3 table.py')
         liver = re.search(r'liver: \d+ ml, from z = (-?\d+) to (\d+) mm', said)
