@@ -6,7 +6,7 @@
 #include <meshless_surgery/InstrumentPart.h>
 #include <visualization_msgs/MarkerArray.h>
 
-#include "meshless_surgery/ros/baked_colors.h"
+#include "meshless_surgery/world/baked_colors.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless {

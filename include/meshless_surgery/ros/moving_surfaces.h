@@ -8,7 +8,7 @@
 #include <meshless_surgery/Topology.h>
 #include <meshless_surgery/Vertices.h>
 
-#include "meshless_surgery/ros/baked_colors.h"
+#include "meshless_surgery/world/baked_colors.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless {

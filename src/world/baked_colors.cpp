@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/baked_colors.h"
+#include "meshless_surgery/world/baked_colors.h"
 
 #include <algorithm>
 
