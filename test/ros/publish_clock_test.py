@@ -93,7 +93,8 @@ class PublishClockTest(unittest.TestCase):
         shown.wait(lambda message: message.header.stamp.is_zero())
         # By its own messages, as those of two topics come in any order.
         last = max(message.header.stamp for message in shown.messages if not message.header.stamp.is_zero())
-        self.assertGreater((last - self.begin).to_sec(), 0.45)
+        # A busy machine leaves messages out, so the last one may be older.
+        self.assertGreater((last - self.begin).to_sec(), 0.25)
         shown.close()
         publisher.unregister()
 
