@@ -449,28 +449,6 @@ MESHLESS_INLINE void pushCell(const Block& b, const Matrix& p, int i) {
   }
 }
 
-// The transpose of fitCell().
-MESHLESS_INLINE void pushCell(const Block& b, const Matrix& p, int i) {
-  const Pack pull = get(b.masses + i) * (1.0 / b.half_edge);
-  for (int axis = 0; axis < 3; ++axis) {
-    double* const to = b.forces + axis * kBlock + i;
-    Pack a[kCorners];
-    a[0] = Pack{};
-    a[1] = pull * p.m[axis][0], a[2] = pull * p.m[axis][1], a[4] = pull * p.m[axis][2];
-    for (const int mode : kModes) a[mode] = pull * get(to + 3 * mode * kBlock);
-    for (int d = 0; d < 3; ++d) {
-      const Pack at = b.cells ? get(b.cells + i + (kCentroidRow + d) * kBlock) : Pack{};
-      for (int k = 0; k < kCorners; ++k) {
-        if (k >> d & 1) continue;
-        const Pack half = 0.5 * a[k], apart = at * half + 0.5 * a[k | 1 << d];
-        a[k] = half - apart;
-        a[k | 1 << d] = half + apart;
-      }
-    }
-    for (int k = 0; k < kCorners; ++k) put(a[k], to + 3 * k * kBlock);
-  }
-}
-
 }  // namespace
 
 namespace {

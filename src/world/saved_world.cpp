@@ -653,6 +653,7 @@ std::uint64_t World::stateHash() const {
   };
   for (Pick pick : saved->picks) {
     pick.body = numbered(pick.body);
+    pick.id = 0;
     archive(pick);
   }
   for (Attachment attachment : saved->attachments) {
