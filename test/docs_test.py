@@ -16,7 +16,7 @@ def read(path):
 
 
 def pages():
-    patterns = ('*.md', 'docs/*.md', 'bench/**/*.md')
+    patterns = ('*.md', 'docs/**/*.md', 'bench/**/*.md')
     return sorted(os.path.relpath(path, CHECKOUT) for pattern in patterns
                   for path in glob.glob(os.path.join(CHECKOUT, pattern), recursive=True))
 

@@ -48,7 +48,7 @@ class ErrorCodeTest(unittest.TestCase):
                 self.assertEqual(wanted, [field for field in answer if field[2] is not None])
 
     def test_the_docs_have_each_code_with_its_number(self):
-        docs = text('docs/interface.md')
+        docs = text('docs/reference/services.md')
         for number, name in enumerate(['OK'] + enumerators('include/meshless_surgery/base/result.h', 'ErrorCode')):
             self.assertRegex(docs, r'\| `%s` \| %d \|' % (name, number))
 

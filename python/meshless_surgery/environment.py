@@ -5,7 +5,7 @@
     observation, reward, terminated, truncated, info = environment.step(environment.action_space.sample())
     environment.close()
 
-docs/interface.md says what is in an action, an observation and a reward.
+docs/reference/python.md says what is in an action, an observation and a reward.
 """
 import importlib.util
 

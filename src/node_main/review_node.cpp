@@ -1,4 +1,4 @@
-// The node that shows a log of commands; see docs/interface.md.
+// The node that shows a log of commands; see docs/reference/sessions.md.
 #include <ros/ros.h>
 
 #include "end_on_signal.h"

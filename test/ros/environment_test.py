@@ -150,7 +150,7 @@ class EnvironmentTest(unittest.TestCase):
         self.assertFalse(box.contains(numpy.full(5, 1.1)) or box.contains(numpy.zeros(4)))
 
     def test_the_example_of_the_docs_runs(self):
-        with open(os.path.join(rospkg.RosPack().get_path('meshless_surgery'), 'docs', 'interface.md'), encoding='utf-8') as file:
+        with open(os.path.join(rospkg.RosPack().get_path('meshless_surgery'), 'docs', 'reference', 'python.md'), encoding='utf-8') as file:
             page = file.read()
         example = re.search(r'```python\n(#!/usr/bin/python3\nfrom meshless_surgery import Environment\n.*?)```', page, re.DOTALL).group(1)
         said = []
