@@ -1,10 +1,15 @@
-# Tests that are neither gtest nor rostest: the include directions, and the scripts.
+# Tests that are neither gtest nor rostest: the include directions, the pages, and the scripts.
 # Included where tests are built, after enable_testing().
 
 add_test(NAME include_direction
   COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/test/include_direction_test.py)
 add_test(NAME docs
   COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/test/docs_test.py)
+foreach(test IN ITEMS reference reference_keys reference_limits)
+  add_test(NAME ${test}
+    COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/test/${test}_test.py)
+  set_tests_properties(${test} PROPERTIES LABELS scripts)
+endforeach()
 add_test(NAME messages
   COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/test/messages_test.py)
 add_test(NAME package
