@@ -133,10 +133,10 @@ class WordsTest(Compared, unittest.TestCase):
     """Lists of words: events, states of tools, what ships, parts of rviz, laws, exceptions, variables of the environment."""
     planted = (('`torn`', '`worn`'), ('| `PAUSED` |', '| `IDLE` |'), ('`dissect`', '`bisect`'), ('`pile`', '`heap`'), ('`fat`', '`fatt`'),
                ('surgery/Review`', 'surgery/View`'), ('| `folds` |', '| `creases` |'), ('| `Cancelled` |', '| `Called` |'),
-               ('`home`', '`go`'))
+               ('`home`', '`go`'), ('hand_over, dissect', 'dissect'))
 
     def text(self):
-        return '\n'.join(read(path) for path in files('docs/reference/*.md'))
+        return '\n'.join(read(path) for path in files('docs/reference/*.md') + ['README.md'])
 
     def code(self):
         streamed, materials = read('src/ros/streamed_tools.cpp'), ''.join(read(path) for path in files('config/materials/*.yaml'))
@@ -147,6 +147,7 @@ class WordsTest(Compared, unittest.TestCase):
                 'states': set(found(r'return "([A-Z]+)";', streamed)) | {only(r'fault \? "([A-Z]+)"', read('src/ros/publishers.cpp'))},
                 'state_command': set(found(r'word [!=]= "(\w+)"', streamed)),
                 'tasks': stems('config/tasks/*.yaml'), 'scenes': stems('config/scenes/*.yaml'),
+                'tasks of README': stems('config/tasks/*.yaml'), 'scenes of README': stems('config/scenes/*.yaml'),
                 'materials': set(found(r'(?m)^(\w+):', materials)) | {'default'},
                 'plays': {name[5:] for name in stems('scripts/play_*.py')},
                 'rviz': {entry.get('name').split('/')[1] for entry in plugin.iter('class')},
@@ -162,6 +163,8 @@ class WordsTest(Compared, unittest.TestCase):
         return {'events': set(named(events.split(':')[0])), 'states': {named(row[0])[0] for row in rows(text, 'CRTK', '`operating_state`')},
                 'state_command': set(named(commands)),
                 'tasks': words(r'`config/tasks` has(.*?)\.'), 'scenes': words(r'`config/scenes` has(.*?)\.'),
+                'tasks of README': set(re.findall(r'\w+', only(r'Tasks that ship:(.*?)\(', text))),
+                'scenes of README': {name for row in rows(text, 'Scenes', 'scene') for name in named(row[0])},
                 'materials': words(r'\*Appearance materials\* are(.*?)Their files') - {'mode', 'alpha', 'beta'},
                 'plays': words(r'\| plays (.*?) on the running scene') - {'liver_looks'},
                 'rviz': set(found(r'(?m)^\| `meshless_surgery/(\w+)` \|', text)),
