@@ -318,7 +318,7 @@ class ExitCodesTest(Compared, unittest.TestCase):
 
     def code(self):
         known = {}
-        for name in ('deformer_node', 'review_node', 'replay', 'report', 'drive', 'learning_curves.py', 'play_*.py', 'scripts/train',
+        for name in ('deformer_node', 'review_node', 'replay', 'report', 'drive', 'make_meshes', 'learning_curves.py', 'play_*.py', 'scripts/train',
                      'scripts/check'):
             path = PROGRAMS.get(name.replace('*', 'SCENE')) or 'src/node_main/%s.cpp' % name
             code = read(path)

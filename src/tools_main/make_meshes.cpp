@@ -84,7 +84,11 @@ int main(int argc, char** argv) {
   app.add_option("--out", folder, "folder to write into; it must exist")->required()->check(CLI::ExistingDirectory);
   app.add_option("--seed", seed, "same seed, same meshes")->capture_default_str();
   app.add_option("--instruments", drawn, "folder for the instruments; it must exist")->check(CLI::ExistingDirectory);
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;  // --help is no error
+  }
 
   const std::string seeded = "made by make_meshes --seed " + std::to_string(seed) + "; metres";
   const std::string fixed = "made by make_meshes (does not depend on the seed); metres";
