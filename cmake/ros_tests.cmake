@@ -16,6 +16,7 @@ if(TARGET ${PROJECT_NAME}_rviz)
   add_test_program(rviz 1 SOURCES ${rviz_unit_tests} LABELS rviz LINKS ${PROJECT_NAME}_rviz ${catkin_LIBRARIES})
   target_include_directories(rviz_tests PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/src/rviz)
   target_include_directories(rviz_tests SYSTEM PRIVATE ${catkin_INCLUDE_DIRS} ${OGRE_INCLUDE_DIRS})
+  target_link_libraries(rviz_tests Qt5::Widgets)
 endif()
 
 # Through catkin_install_python, which names the interpreter: another python3 may come first on the PATH.

@@ -35,19 +35,22 @@ Result<fs::path> expandPackage(const std::string& path, const FileAccess& access
 
 }  // namespace
 
+Result<std::string> FileAccess::located(const std::string& path, const std::string& base_folder) const {
+  if (path.compare(0, kPackageScheme.size(), kPackageScheme) != 0)
+    return (fs::path(base_folder) / path).string();  // an absolute path replaces the folder
+  const Result<fs::path> expanded = expandPackage(path, *this);
+  if (!expanded) return expanded.error();
+  return expanded->string();
+}
+
 Result<std::string> FileAccess::resolve(const std::string& path, const std::string& base_folder) const {
   if (path.empty()) return Error{ErrorCode::kInvalidArgument, "the file's name is empty; accepted: a path"};
   if (path.find('\0') != std::string::npos || path.size() > 4096)
     return Error{ErrorCode::kInvalidArgument,
                  "the file's name is no path; accepted: up to 4096 characters without NUL"};
-  fs::path wanted;
-  if (path.compare(0, kPackageScheme.size(), kPackageScheme) == 0) {
-    Result<fs::path> expanded = expandPackage(path, *this);
-    if (!expanded) return expanded.error();
-    wanted = *expanded;
-  } else {
-    wanted = fs::path(base_folder) / path;  // an absolute path replaces the folder
-  }
+  const Result<std::string> found = located(path, base_folder);
+  if (!found) return found.error();
+  const fs::path wanted = *found;
 
   // Links and ".." are resolved first: what is outside is refused without a word about what is there. Nor is a word
   // said about why a name leads nowhere, as it may do so outside.

@@ -56,9 +56,11 @@ std::optional<Region> readRegionKeys(YamlSource& source, YamlMap& map, const YAM
 
 class TaskReader {
  public:
-  /// Pictures are read from `folder` on.
-  TaskReader(YamlSource& source, TaskDef& task, std::string folder, const FileAccess& access)
-      : source_(source), task_(task), folder_(std::move(folder)), access_(access) {}
+  /// Pictures are read from `folder` on, and may lie there.
+  TaskReader(YamlSource& source, TaskDef& task, const std::string& folder, const FileAccess& access)
+      : source_(source), task_(task), folder_(folder), access_(access) {
+    access_.folders.push_back(folder);
+  }
 
   /// Where the parts of the task are, for faults that are found later.
   YAML::Node at(const TaskFault& fault) const {
@@ -341,7 +343,7 @@ class TaskReader {
   YamlSource& source_;
   TaskDef& task_;
   const std::string folder_;
-  const FileAccess& access_;
+  FileAccess access_;
   YAML::Node root_;
   std::map<std::string, YAML::Node> parts_;
   std::vector<YAML::Node> stages_;
@@ -349,8 +351,8 @@ class TaskReader {
 
 }  // namespace
 
-Result<LoadedTask> readTask(const std::string& file, const std::string& scene_folder, const FileAccess& access,
-                            const std::string& only_scene) {
+Result<LoadedTask> readTask(const std::string& file, const std::optional<std::string>& scene_folder,
+                            const FileAccess& access, const std::string& only_scene) {
   std::error_code failed;
   const fs::path real = fs::canonical(file, failed);
   if (failed || !fs::is_regular_file(real, failed))
@@ -370,18 +372,21 @@ Result<LoadedTask> readTask(const std::string& file, const std::string& scene_fo
     source.fail(*root, e.what(), "YAML");
   }
   if (source.fault) return *source.fault;
+  if (!scene_folder) return loaded;
 
   const std::string& named = loaded.task.scene;
   const bool is_path = named.find('/') != std::string::npos || fs::path(named).extension() == ".yaml";
-  const fs::path scene_file = is_path ? real.parent_path() / named : fs::path(scene_folder) / (named + ".yaml");
-  if (!only_scene.empty() && !(fs::equivalent(scene_file, only_scene, failed) && !failed))
+  const Result<std::string> scene_file =
+      is_path ? access.located(named, real.parent_path().string()) : *scene_folder + "/" + named + ".yaml";
+  if (!scene_file) return Error{scene_file.error().code, file + ": its scene: " + scene_file.error().detail};
+  if (!only_scene.empty() && !(fs::equivalent(*scene_file, only_scene, failed) && !failed))
     return Error{ErrorCode::kInvalidArgument, file + ": the task is of the scene '" + named +
                                                   "'; accepted: tasks of the scene that runs, " +
                                                   fs::path(only_scene).stem().string()};
-  Result<SceneDef> scene = readScene(scene_file.string(), access);
+  Result<SceneDef> scene = readScene(*scene_file, access);
   if (!scene) return Error{scene.error().code, file + ": its scene: " + scene.error().detail};
   loaded.scene = std::move(*scene);
-  loaded.scene_file = scene_file.string();
+  loaded.scene_file = *scene_file;
   if (const auto fault = findTaskFault(loaded.task, loaded.scene)) {
     source.fail(reader.at(*fault), fault->what, fault->accepted);
     return *source.fault;

@@ -43,22 +43,14 @@ std::string scenesIn(const std::string& folder) {
 }
 
 /// The file of a scene that was given as a name in config/scenes, a path or package://.
-Result<std::string> sceneFile(const std::string& scene, const std::string& package_folder) {
-  const std::string scheme = "package://";
-  std::string path;
-  if (scene.compare(0, scheme.size(), scheme) == 0) {
-    const std::size_t slash = scene.find('/', scheme.size());
-    const std::string package = scene.substr(scheme.size(), slash - scheme.size());
-    const std::string folder = ros::package::getPath(package);
-    if (folder.empty() || slash == std::string::npos) {
+Result<std::string> sceneFile(const std::string& scene, const std::string& package_folder, const FileAccess& access) {
+  std::string path = package_folder + "/config/scenes/" + scene + ".yaml";
+  if (scene.find('/') != std::string::npos || scene.find(".yaml") != std::string::npos) {
+    const Result<std::string> located = access.located(scene, "");
+    if (!located.ok())
       return Error{ErrorCode::kUnreadable,
                    "scene is '" + printable(scene) + "'; accepted: package://NAME/PATH of a package that is found"};
-    }
-    path = folder + scene.substr(slash);
-  } else if (scene.find('/') != std::string::npos || scene.find(".yaml") != std::string::npos) {
-    path = scene;
-  } else {
-    path = package_folder + "/config/scenes/" + scene + ".yaml";
+    path = *located;
   }
   std::error_code missing;
   if (!fs::is_regular_file(path, missing)) {
@@ -69,11 +61,12 @@ Result<std::string> sceneFile(const std::string& scene, const std::string& packa
   return realPath(path);
 }
 
-/// A name of config/tasks, or a path: who starts the node may name any.
-Result<LoadedTask> parameterTask(const std::string& task, const TrainingFolders& folders, FileAccess access) {
+/// A name of config/tasks, a path or package://: who starts the node may name any.
+Result<LoadedTask> parameterTask(const std::string& task, const TrainingFolders& folders, const FileAccess& access) {
   const bool is_path = task.find('/') != std::string::npos || fs::path(task).extension() == ".yaml";
-  access.folders = {fs::path(folders.scenes).parent_path().string()};
-  return readTask(is_path ? task : folders.tasks + "/" + task + ".yaml", folders.scenes, access);
+  const Result<std::string> file = is_path ? access.located(task, "") : folders.tasks + "/" + task + ".yaml";
+  if (!file.ok()) return file.error();
+  return readTask(*file, folders.scenes, access);
 }
 
 void applyOverrides(const NodeSettings& settings, WorldSettings& world) {
@@ -159,6 +152,15 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   const std::string package_folder = ros::package::getPath(kPackage);
   FileAccess access;
   access.find_package = [](const std::string& package) { return ros::package::getPath(package); };
+  access.folders = {realPath(package_folder)};
+  for (const std::string& folder : settings->data_folders) {
+    std::error_code missing;
+    if (!fs::is_directory(folder, missing)) {
+      return Error{ErrorCode::kUnreadable,
+                   "parameter ~data_folders names '" + printable(folder) + "'; accepted: folders that exist"};
+    }
+    access.folders.push_back(realPath(folder));
+  }
   TrainingFolders training_folders;
   training_folders.scenes = package_folder + "/config/scenes";
   training_folders.tasks = package_folder + "/config/tasks";
@@ -169,21 +171,12 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
     task = std::move(loaded->task);
     settings->scene = loaded->scene_file;
   }
-  const auto file = sceneFile(settings->scene, package_folder);
+  const auto file = sceneFile(settings->scene, package_folder, access);
   if (!file.ok()) return file.error();
   settings->scene = *file;
   const std::string scene_folder = fs::path(*file).parent_path().string();
 
-  access.folders = {realPath(package_folder), scene_folder};
-  for (const std::string& folder : settings->data_folders) {
-    std::error_code missing;
-    if (!fs::is_directory(folder, missing)) {
-      return Error{ErrorCode::kUnreadable,
-                   "parameter ~data_folders names '" + printable(folder) + "'; accepted: folders that exist"};
-    }
-    access.folders.push_back(realPath(folder));
-  }
-
+  access.folders.push_back(scene_folder);
   auto scene = readScene(*file, access);
   if (!scene.ok()) return scene.error();
   applyOverrides(*settings, scene->world);

@@ -20,6 +20,7 @@
 #include <pluginlib/class_list_macros.hpp>
 
 #include "step_plot.h"
+#include "task_text.h"
 
 namespace meshless {
 namespace {
@@ -83,6 +84,16 @@ ControlPanel::ControlPanel(QWidget* parent) : rviz::Panel(parent), link_(new Nod
           [this] { call("undo_cut"); });
   layout->addLayout(buttons);
 
+  const auto paragraph = [this] {
+    auto* made = new QLabel(this);
+    made->setWordWrap(true);
+    made->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Preferred);
+    return made;
+  };
+  task_ = paragraph();
+  task_->hide();
+  layout->addWidget(task_);
+
   time_ = new QLabel("no state from the node yet", this);
   // A longer number must not widen the panel, which would move the view.
   time_->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Preferred);
@@ -135,9 +146,7 @@ ControlPanel::ControlPanel(QWidget* parent) : rviz::Panel(parent), link_(new Nod
   knob("damping", kMostDamping, true, true, "[1/s] of the motion that deforms.");
   layout->addWidget(material_);
 
-  message_ = new QLabel(this);
-  message_->setWordWrap(true);
-  message_->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Preferred);
+  message_ = paragraph();
   layout->addWidget(message_);
 
   timer_ = new QTimer(this);
@@ -167,15 +176,21 @@ void ControlPanel::showEvent(QShowEvent* event) {
 void ControlPanel::hideEvent(QHideEvent* event) {
   rviz::Panel::hideEvent(event);
   timer_->stop();
-  subscriber_.shutdown();
+  state_subscriber_.shutdown();
+  task_subscriber_.shutdown();
 }
 
 void ControlPanel::listen() {
-  subscriber_ = link_->handle().subscribe<meshless_surgery::State>(
+  state_subscriber_ = link_->handle().subscribe<meshless_surgery::State>(
       link_->nameOf("state"), 5, [this](const meshless_surgery::State::ConstPtr& state) {
         state_ = state;
         fresh_ = true;
         if (!state->paused) plot_->add({state->mean_step, state->worst_step, state->real_time_factor});
+      });
+  task_subscriber_ = link_->handle().subscribe<meshless_surgery::TaskState>(
+      link_->nameOf("task"), 5, [this](const meshless_surgery::TaskState::ConstPtr& task) {
+        task_->setText(taskText(*task));
+        task_->setVisible(!task->task.empty());
       });
 }
 
@@ -185,6 +200,7 @@ void ControlPanel::changeNode() {
   if (link_->node() == before) return;
   state_.reset();
   plot_->clear();
+  task_->hide();
   bodies_->setRowCount(0);
   time_->setText("no state from the node yet");
   if (isVisible()) listen();

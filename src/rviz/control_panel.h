@@ -1,4 +1,4 @@
-// The panel: bodies, time, materials, and undo of the last cut.
+// The panel: what the task asks for, bodies, time, materials, and undo of the last cut.
 #pragma once
 
 #include <rviz/panel.h>
@@ -65,12 +65,13 @@ class ControlPanel : public rviz::Panel {
   QString selected() const;
 
   NodeLink* link_;
-  ros::Subscriber subscriber_;
+  ros::Subscriber state_subscriber_, task_subscriber_;
   meshless_surgery::State::ConstPtr state_;
   bool fresh_ = false;
   QLineEdit* node_;
   QPushButton* pause_;
   QLabel* time_;
+  QLabel* task_;
   StepPlot* plot_;
   QTableWidget* bodies_;
   QGroupBox* material_;

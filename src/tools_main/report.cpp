@@ -35,7 +35,8 @@ int main(int argc, char** argv) {
   CLI::App app(
       "Replays a log of commands (the parameter command_log of deformer_node) and writes how a task was done in it: "
       "report.html, report.json and report.csv in the folder LOG.report below --out. Where the world was reset in the "
-      "log, the task begins anew there: the report is of the last time. Exit status: 0 passed, 1 not passed, 2 no report "
+      "log, the task begins anew there: the report is of the last time. Exit status: 0 passed, 1 not passed, 2 no "
+      "report "
       "could be made.");
   std::string log_file, task_name, out = ".", trainee;
   double until = 1e300;
@@ -54,12 +55,7 @@ int main(int argc, char** argv) {
 
   const bool is_file = task_name.find('/') != std::string::npos || fs::path(task_name).extension() == ".yaml";
   const std::string task_file = is_file ? task_name : configFolder() + "/tasks/" + task_name + ".yaml";
-  meshless::FileAccess access;
-  access.folders = {configFolder()};
-  access.find_package = [](const std::string& package) {
-    return package == "meshless_surgery" ? fs::path(configFolder()).parent_path().string() : std::string();
-  };
-  auto loaded = meshless::readTask(task_file, configFolder() + "/scenes", access);
+  auto loaded = meshless::readTask(task_file, std::nullopt, meshless::FileAccess());
   if (!loaded.ok()) return refuse(loaded.error().detail);
 
   meshless::Training training(std::move(loaded->task));

@@ -19,12 +19,6 @@ constexpr int kMostSplits = 64;  // of an edge of a triangle
 
 double spacingFor(double area) { return std::max(kFinest, std::sqrt(area / kMostPoints)); }
 
-Vec3 middleOf(const Region& region) {
-  if (region.kind == Region::Kind::kSphere) return region.centre;
-  if (region.kind == Region::Kind::kBox) return 0.5 * (region.box.min + region.box.max);
-  return region.plane.point;
-}
-
 double cutAreaOf(const TriangleMesh& mesh) {
   std::vector<Triangle> cut;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
@@ -33,6 +27,12 @@ double cutAreaOf(const TriangleMesh& mesh) {
 }
 
 }  // namespace
+
+Vec3 Target::middle() const {
+  if (region.kind == Region::Kind::kSphere) return region.centre;
+  if (region.kind == Region::Kind::kBox) return 0.5 * (region.box.min + region.box.max);
+  return region.plane.point;
+}
 
 double CutPlan::distance(const Vec3& p) const {
   const Vec3 from = p - origin;
@@ -214,7 +214,7 @@ double RestTissue::targetIn(const Piece& piece) {
 
 bool RestTissue::hasTargetsMiddle(const Piece& piece) {
   const auto [found, is_new] = middles_.try_emplace(piece.model.get(), piece.model, false);
-  if (is_new) found->second.second = SolidQuery(piece.rest()).contains(middleOf(target_->region));
+  if (is_new) found->second.second = SolidQuery(piece.rest()).contains(target_->middle());
   return found->second.second;
 }
 

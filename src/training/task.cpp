@@ -4,6 +4,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "meshless_surgery/geometry/inside.h"
+#include "meshless_surgery/geometry/thicken.h"
 #include "meshless_surgery/training/volume_within.h"
 
 namespace meshless {
@@ -15,8 +17,11 @@ std::string numberText(double value) {
   return text.str();
 }
 
+/// The tissue's surface, where the scene puts it.
 TriangleMesh placedMesh(const BodyDef& body) {
   TriangleMesh mesh = body.mesh;
+  if (body.thickness > 0.0)
+    if (Result<TriangleMesh> layer = thickened(mesh, body.thickness)) mesh = std::move(*layer);
   for (Vec3& p : mesh.vertices) p = body.pose * p;
   return mesh;
 }
@@ -149,6 +154,8 @@ class FaultFinder {
   std::optional<TaskFault> check(std::size_t k, const RemoveToTray&) const {
     if (!task_.target) return never(k, "the task has no target", "a task with target");
     if (!task_.tray) return TaskFault{"stages", k, "the task has no tray", "a task with tray"};
+    if (!SolidQuery(placedMesh(*bodyOf(scene_, task_.target->body))).contains(task_.target->middle()))
+      return never(k, "the middle of the target is in no tissue at rest", "a target whose middle is in tissue");
     return std::nullopt;
   }
   std::optional<TaskFault> check(std::size_t k, const LeaveNothing&) const {

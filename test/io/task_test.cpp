@@ -149,15 +149,13 @@ TEST_F(TaskFile, ErrorsNameLineKeyAndWhatIsAccepted) {
 }
 
 TEST_F(TaskFile, APictureIsInTheReport) {
-  FileAccess access;
-  access.folders = {folder_.path()};
   std::ofstream(folder_.path() + "/scene.yaml") << kScene;
   std::ofstream(folder_.path() + "/a.png") << "\x89PNG\r\n\x1a\nxyz";
   std::ofstream(folder_.path() + "/b.png") << "GIF89a";
   std::ofstream(folder_.path() + "/c.png") << "\x89PNG\r\n\x1a\n" << std::string(2 << 20, 'x');
   const auto with = [&](const std::string& picture) {
     std::ofstream(folder_.path() + "/task.yaml") << "picture: " << picture << "\n" << kTask;
-    return readTask(folder_.path() + "/task.yaml", folder_.path(), access);
+    return readTask(folder_.path() + "/task.yaml", folder_.path(), FileAccess());
   };
   const auto loaded = with("a.png");
   ASSERT_TRUE(loaded.ok()) << loaded.error().detail;
@@ -169,6 +167,43 @@ TEST_F(TaskFile, APictureIsInTheReport) {
     EXPECT_NE(std::string::npos, refused.error().detail.find("task.yaml:1: picture")) << refused.error().detail;
     EXPECT_NE(std::string::npos, refused.error().detail.find("accepted: a PNG or JPEG")) << refused.error().detail;
   }
+}
+
+TEST_F(TaskFile, TheTissueOfAHollowOrganIsItsWall) {
+  std::ofstream(folder_.path() + "/hollow.yaml")
+      << "bodies: [{name: ball, primitive: {sphere: 0.04}, thickness: 0.005, material: elastic_liver}]";
+  const auto said = [&](const std::string& x, const std::string& radius) -> std::string {
+    std::ofstream(folder_.path() + "/task.yaml")
+        << "scene: hollow.yaml\ntarget: {body: ball, sphere: {centre: [" << x << ", 0, 0], radius: " << radius
+        << "}}\ntray: {min: [1, 1, 0], max: [2, 2, 1]}\nstages: [{remove_to: tray}]\n";
+    const auto loaded = readTask(folder_.path() + "/task.yaml", folder_.path(), FileAccess());
+    return loaded.ok() ? "" : loaded.error().detail;
+  };
+  EXPECT_NE(std::string::npos, said("0", "0.02").find("task.yaml:2: no tissue of 'ball' is in the target"))
+      << said("0", "0.02");
+  EXPECT_NE(std::string::npos,
+            said("0.03", "0.01").find("task.yaml:4: this stage can never be met: the middle of the target"))
+      << said("0.03", "0.01");
+  EXPECT_EQ("", said("0.0375", "0.01"));
+}
+
+TEST_F(TaskFile, ItsSceneMayBeOfAPackage) {
+  std::filesystem::create_directories(folder_.path() + "/trainer/scenes");
+  std::ofstream(folder_.path() + "/trainer/scenes/scene.yaml") << kScene;
+  std::string text = kTask;
+  text.replace(text.find("scene.yaml"), 10, "package://my_trainer/scenes/scene.yaml");
+  std::ofstream(folder_.path() + "/task.yaml") << text;
+  FileAccess access;
+  access.find_package = [&](const std::string& name) {
+    return name == "my_trainer" ? folder_.path() + "/trainer" : "";
+  };
+  const auto loaded = readTask(folder_.path() + "/task.yaml", folder_.path(), access);
+  ASSERT_TRUE(loaded.ok()) << loaded.error().detail;
+  EXPECT_EQ(folder_.path() + "/trainer/scenes/scene.yaml", loaded->scene_file);
+  access.find_package = [](const std::string&) { return ""; };
+  const auto refused = readTask(folder_.path() + "/task.yaml", folder_.path(), access);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(std::string::npos, refused.error().detail.find("no package 'my_trainer'")) << refused.error().detail;
 }
 
 TEST_F(TaskFile, EarlierReportsAreThoseOfTheTrainee) {

@@ -2,6 +2,7 @@
 """Tasks on the running node: begun, watched, stopped and reported; and the report of its log has the same values to the bit."""
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -83,6 +84,35 @@ class TrainingTest(unittest.TestCase):
             self.assertEqual('unfinished', report['outcome'])
             self.assertEqual(10, report['last_step'])
             self.assertFalse(node.call('stop_task').success)
+
+    def test_a_task_of_ones_own_has_its_meshes_and_picture_where_one_keeps_them(self):
+        package = os.path.join(self.folder, 'trainer')
+        for folder in ('tasks', 'scenes', 'meshes'):
+            os.makedirs(os.path.join(package, folder))
+        mesh = os.path.join(package, 'meshes', 'organ.obj')
+        shutil.copy(os.path.join(roslib.packages.get_pkg_dir('meshless_surgery'), 'config', 'meshes', 'block.obj'), mesh)
+        with open(os.path.join(package, 'scenes', 'own.yaml'), 'w') as file:
+            file.write('bodies: [{name: organ, file: ../meshes/organ.obj, pose: {position: [0, 0, 0.1]}}]')
+        with open(os.path.join(package, 'tasks', 'hint.png'), 'wb') as file:
+            file.write(b'\x89PNG\r\n\x1a\n')
+        task = os.path.join(package, 'tasks', 'own.yaml')
+        with open(task, 'w') as file:
+            file.write('scene: ../scenes/own.yaml\npicture: hint.png\n'
+                       'stages: [{hold: {body: organ}}]\n')
+        with self.node(task=task, data_folders=[os.path.join(package, 'meshes')], command_log='own') as node:
+            organ = node.good('get_body', name='organ')
+            at = organ.surface.vertices[0]
+            node.good('pick', point=Point(at.x, at.y, at.z))
+            node.good('step', steps=2)
+            self.assertTrue(node.good('report').passed)
+        os.remove(mesh)  # the log has it
+        done = subprocess.run([REPORT, os.path.join(self.folder, 'own'), '--task', task, '--out', self.folder],
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=LONG, text=True)
+        self.assertEqual(0, done.returncode, done.stdout)
+
+    def test_the_task_of_the_parameter_may_be_of_a_package(self):
+        with self.node(task='package://meshless_surgery/config/tasks/retract.yaml') as node:
+            self.assertEqual('retract', rospy.wait_for_message(node.name + '/task', TaskState, LONG).task)
 
     def test_plan_target_and_tray_are_shown(self):
         with self.node(task='resect') as node:

@@ -16,6 +16,8 @@ struct FileAccess {
   /// Folder of a package:// name, or empty where there is none. Not set: package:// is refused.
   std::function<std::string(const std::string& package)> find_package;
 
+  /// `path` with package:// written out; a relative one is taken from `base_folder`. Looks at no file.
+  Result<std::string> located(const std::string& path, const std::string& base_folder) const;
   /// The real path of an existing regular file below one of the folders. A relative path is taken from `base_folder`.
   /// What reads a file opens it once and refuses it where it does not lie at that very path any more.
   Result<std::string> resolve(const std::string& path, const std::string& base_folder) const;

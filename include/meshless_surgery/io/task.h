@@ -12,9 +12,10 @@ struct LoadedTask {
   std::string scene_file;  // a path
 };
 
-/// Reads a task and its scene. `file` is a path. The scene is a name of `scene_folder`, or a path from the task's
-/// folder on. Errors read "<file>:<line>: <what>; accepted: <range>"; a task that its scene does not allow
-/// (findTaskFault) is refused likewise. With `only_scene`, a path, no other scene is read.
+/// Reads a task and its scene. `file` is a path. The scene is a name of `scene_folder`, a path from the task's folder on,
+/// or package://. Errors read "<file>:<line>: <what>; accepted: <range>"; a task that its scene does not allow
+/// (findTaskFault) is refused likewise. With `only_scene`, a path, no other scene is read. Without `scene_folder` the
+/// task alone is read. What the task's own folder has may be read, whatever `access` says.
 ///
 /// scene, brief, picture
 /// plan: {body, origin, along, out, length, depth, tolerance}       in the rest shape where the scene puts it
@@ -27,8 +28,8 @@ struct LoadedTask {
 /// limits: {time, force, strain, forbidden: [{name, body | box | sphere}], end: [time, force, strain, forbidden]}
 /// metrics: {NAME: {weight, good, bad, pass}}
 /// pass_mark
-Result<LoadedTask> readTask(const std::string& file, const std::string& scene_folder, const FileAccess& access,
-                            const std::string& only_scene = "");
+Result<LoadedTask> readTask(const std::string& file, const std::optional<std::string>& scene_folder,
+                            const FileAccess& access, const std::string& only_scene = "");
 
 /// Of the folders in `folder` that have a report.json of that trainee and task, the oldest file first; `but`: not that
 /// folder. What is no report is passed over.

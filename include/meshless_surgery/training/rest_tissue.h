@@ -31,6 +31,7 @@ struct CutPlan {
 struct Target {
   std::string body;
   Region region;
+  Vec3 middle() const;  // [m] of a plane: its point
 };
 
 /// Points of cut faces that stand for even areas.

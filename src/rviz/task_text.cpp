@@ -1,0 +1,29 @@
+#include "task_text.h"
+
+#include <QStringList>
+
+namespace meshless {
+
+QString taskText(const meshless_surgery::TaskState& task) {
+  const auto text = [](const std::string& words) { return QString::fromStdString(words).toHtmlEscaped(); };
+  QStringList lines{"<b>" + text(task.task) + "</b>: " + text(task.brief)};
+  if (task.running && task.stage < task.stages.size()) {
+    const QString now = QString("<b>Now, %1 of %2: %3</b>")
+                            .arg(task.stage + 1)
+                            .arg(task.stages.size())
+                            .arg(text(task.stages[task.stage]));
+    lines << (task.stage_brief.empty() ? now : now + ". " + text(task.stage_brief));
+    QStringList limits;
+    if (task.time_limit > 0.0) limits << QString("%1 s").arg(task.time_limit);
+    if (task.force_limit > 0.0) limits << QString("%1 N").arg(task.force_limit);
+    if (!limits.isEmpty()) lines << "Limits: " + limits.join(", ");
+  } else if (!task.failed.empty()) {
+    lines << "<b>Failed</b>: " + text(task.failed);
+  } else {
+    const char* const end = task.stage < task.stages.size() ? "Stopped" : task.passed ? "Passed" : "Not passed";
+    lines << QString("<b>%1</b>, %2 of 100").arg(end).arg(task.score, 0, 'f', 0);
+  }
+  return lines.join("<br>");
+}
+
+}  // namespace meshless
