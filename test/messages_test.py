@@ -80,6 +80,8 @@ class EventTest(unittest.TestCase):
         constants = [(kind, name, value) for kind, name, value in fields(text('msg/Event.msg')) if value is not None]
         self.assertEqual(wanted, [name for _, name, _ in constants])
         self.assertEqual([('string', name, word) for name, word in zip(wanted, words.values())], constants)
+        last = re.search(r'kLastEvent = EventType::k(\w+);', text('include/meshless_surgery/world/world.h')).group(1)
+        self.assertEqual(list(words)[-1], last)  # what is read from files is checked against it
 
 
 if __name__ == '__main__':

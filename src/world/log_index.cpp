@@ -39,7 +39,7 @@ void serialize(A& archive, LogTool& v) {
 template <class A>
 void serialize(A& archive, Event& v) {
   auto& [type, step, sim_time, body, pick, text] = v;
-  archive(choice(type, EventType::kClipped), step, sim_time, body, pick, text);
+  archive(choice(type, kLastEvent), step, sim_time, body, pick, text);
 }
 
 // --- writing

@@ -360,8 +360,10 @@ class InStepTestCase(DeformerTestCase):
 
 
 def run(name, *cases):
-    """The main function of a rostest: all tests of all cases, with the result file that rostest asks for."""
+    """The main function of a rostest: all tests of all cases, with the result file that rostest asks for. MESHLESS_SURGERY_CASE
+    in the environment: those with it in their names alone."""
     rospy.init_node(name + '_test')
+    unittest.defaultTestLoader.testNamePatterns = ['*%s*' % os.environ.get('MESHLESS_SURGERY_CASE', '')]
     suite = unittest.TestSuite(unittest.defaultTestLoader.loadTestsFromTestCase(case) for case in cases)
     flag = '--gtest_output=xml:'
     files = [argument[len(flag):] for argument in sys.argv if argument.startswith(flag)]

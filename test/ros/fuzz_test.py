@@ -275,7 +275,23 @@ class Fuzzer:
             return dict(bodies=bodies, particles=[r.choice([0, 5, 0xffffffff]) for _ in bodies][r.choice([0, 0, 1]):])
         if service == 'report':
             return dict(name=r.choice(['', 'mine', self.string()]))
+        if service == 'attach':
+            return dict(header=self.header(), name=self.joint(), body=self.maybe_name(), other=r.choice(['world', self.maybe_name()]),
+                        distance=r.choice([0.0, 0.1, self.amount()]), stiffness=1e4 if self.sensible else self.amount(),
+                        strength=r.choice([0.0, self.amount()]), centre=self.point(), radius=r.choice([0.0, self.amount()]))
+        if service == 'detach':
+            return dict(header=self.header(), name=self.joint(), centre=self.point(), radius=r.choice([0.0, self.amount()]))
+        if service == 'clip':
+            return dict(header=self.header(), name=self.joint(), body=self.maybe_name(), point=self.point(),
+                        direction=Vector3(0, 0, 1) if self.sensible else self.vector(),
+                        width=r.choice([0.0, self.amount()]), opening=r.choice([0.0, self.amount()]))
+        if service == 'unclip':
+            return dict(name=self.joint())
+        assert not TYPES[service]._request_class.__slots__, '~%s has fields' % service
         return {}
+
+    def joint(self):
+        return self.rng.choice(['', 'joint', 'bed', self.string()])
 
     def amount(self):
         return abs(self.number()) if self.sensible else self.number()

@@ -15,6 +15,8 @@ int firstRun() {
 
 constexpr int kRun = 300;  // steps before the scene starts anew: cuts make more and more of it
 
+static_assert(std::variant_size_v<Command> == 18, "a new command has a case here, too");
+
 Command randomCommand(test::Random& random, int number, std::size_t bodies) {
   // Now and then a number that no hand gives.
   const auto size = [&random] {
@@ -22,7 +24,12 @@ Command randomCommand(test::Random& random, int number, std::size_t bodies) {
   };
   const auto place = [&] { return random.integer(0, 50) ? random.vector(0.6) : random.vector(size()); };
   const auto pick = [&] { return static_cast<PickId>(random.integer(1, 12)); };
-  switch (random.integer(0, 15)) {
+  const auto body = [&] { return "body" + std::to_string(random.integer(0, static_cast<int>(bodies) - 1)); };
+  const auto part = [&]() -> std::optional<Region> {
+    if (random.integer(0, 1)) return std::nullopt;
+    return Region::sphere(place(), size());
+  };
+  switch (random.integer(0, 18)) {
     case 0: {
       PickCommand command;
       command.point = place();
@@ -84,8 +91,7 @@ Command randomCommand(test::Random& random, int number, std::size_t bodies) {
       other.damping = random.uniform(0, 10);
       other.restitution = random.integer(0, 1) ? random.uniform(0, 1) : 0.0;
       other.youngs_modulus = random.integer(0, 2) ? 0.0 : std::pow(10.0, random.uniform(2, 5));
-      return SetMaterialCommand{"body" + std::to_string(random.integer(0, static_cast<int>(bodies) - 1)),
-                                [other](const Material&) -> Result<Material> { return other; }};
+      return SetMaterialCommand{body(), [other](const Material&) -> Result<Material> { return other; }};
     }
     case 14: {
       if (random.integer(0, 9)) return ReleaseCommand{pick()};
@@ -95,6 +101,29 @@ Command randomCommand(test::Random& random, int number, std::size_t bodies) {
       BodyDef def = blockOf(kind, "guest" + std::to_string(number), random.vector(0.3));
       def.pose.translation.z() += 0.4;
       return SpawnCommand{test::shared(def)};
+    }
+    case 15: {
+      AttachCommand command;
+      command.name = "joint" + std::to_string(number);
+      command.body = body();
+      command.other = random.integer(0, 1) ? body() : "world";
+      command.distance = random.integer(0, 1) ? 0.3 : size();
+      command.stiffness = std::pow(10.0, random.uniform(0, 9));
+      if (random.integer(0, 1)) command.strength = std::pow(10.0, random.uniform(0, 9));
+      command.region = part();
+      return command;
+    }
+    case 16:
+      return DetachCommand{"joint" + std::to_string(random.integer(0, number)), part()};
+    case 17: {
+      ClipCommand command;
+      command.name = "clip" + std::to_string(number);
+      if (random.integer(0, 1)) command.body = body();
+      command.point = place();
+      command.direction = random.unit();
+      command.width = size();
+      command.opening = size();
+      return command;
     }
     default:
       return RemoveCommand{"guest" + std::to_string(random.integer(0, number))};

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "meshless_surgery/world/command_log.h"
 #include "meshless_surgery/world/saved_world.h"
 #include "support/bodies.h"
@@ -32,7 +34,9 @@ inline Session session(bool ended = true, int threads = 1) {
     s.log += bytes;
     s.ends.push_back(s.log.size());
   });
-  const auto apply = [&world](const Command& command, bool accepted = true) {
+  std::set<std::size_t> kinds;
+  const auto apply = [&](const Command& command, bool accepted = true) {
+    kinds.insert(command.index());
     const auto reply = world.apply(command);
     EXPECT_EQ(accepted, reply.ok()) << command.index() << (reply.ok() ? "" : ": " + reply.error().detail);
   };
@@ -102,6 +106,18 @@ inline Session session(bool ended = true, int threads = 1) {
   run(world, 5);
   world.hideScissors();
   const auto middle = world.capture();
+  AttachCommand attach;
+  attach.name = "joint";
+  attach.body = "ball";
+  attach.other = "world";
+  attach.stiffness = 1e5;
+  apply(attach);
+  apply(attach, false);
+  ClipCommand clip;
+  clip.point = Vec3(9, 9, 9);
+  apply(clip, false);
+  run(world, 5);
+  apply(DetachCommand{"joint", {}});
   LiftCommand lift;
   lift.tool = ToolKind::kPush;
   apply(lift);
@@ -112,6 +128,7 @@ inline Session session(bool ended = true, int threads = 1) {
   RemoveCommand remove;
   remove.body = "ball";
   apply(remove);
+  EXPECT_EQ(std::variant_size_v<Command>, kinds.size());
   run(world, 10);
   world.reset();
   run(world, 10);

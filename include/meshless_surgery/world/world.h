@@ -77,6 +77,7 @@ enum class EventType {
   kLeak,
   kClipped
 };
+constexpr EventType kLastEvent = EventType::kClipped;
 const char* toString(EventType type);
 
 struct Event {
