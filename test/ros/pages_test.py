@@ -2,11 +2,15 @@
 """The pages for one task each: their files and commands as they are printed, and each of their mistakes."""
 import os
 import re
+import shutil
 import sys
 
+import rospy
+
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from deformer_support import run  # noqa: E402
-from page_support import PageTestCase  # noqa: E402
+from deformer_support import LONG, run  # noqa: E402
+from meshless_surgery.msg import TaskState  # noqa: E402
+from page_support import PACKAGE, PageTestCase  # noqa: E402
 
 
 class ScenePageTest(PageTestCase):
@@ -155,6 +159,67 @@ class TaskPageTest(PageTestCase):
         })
 
 
+class OwnPackagePageTest(PageTestCase):
+    """The page's files in a workspace of their own, on top of this package."""
+
+    name = 'own_package.md'
+
+    def setUp(self):
+        super().setUp()
+        self.workspace = os.path.join(self.folder, 'workspace')
+        package = os.path.join(self.workspace, 'src', 'my_trainer')
+        for folder in ('launch', 'scenes', 'tasks', 'meshes'):
+            os.makedirs(os.path.join(package, folder), exist_ok=True)
+        blocks = dict(re.findall(r'^`([\w/]+\.(?:xml|txt|launch|yaml))`[^`]*(?:`[^`\n]+`[^`]*)?```\w+\n(.*?)^```', self.page,
+                                 re.DOTALL | re.MULTILINE))
+        self.assertEqual({'package.xml', 'CMakeLists.txt', 'launch/train.launch', 'scenes/first.yaml', 'tasks/lift.yaml'}, set(blocks))
+        for name, text in blocks.items():
+            self.write('workspace/src/my_trainer/' + name, text)
+
+    def change(self, name, old, new):
+        name = os.path.join(self.workspace, 'src', 'my_trainer', name)
+        with open(name) as file:
+            text = file.read()
+        self.assertIn(old, text)
+        with open(name, 'w') as file:
+            file.write(text.replace(old, new))
+
+    def train(self):
+        return "bash -c 'cd workspace && source devel/setup.bash && exec %s rviz:=false'" % self.command('roslaunch my_trainer')
+
+    def said_at_launch(self):
+        with self.running(self.train()) as end:
+            return end()
+
+    def with_a_mesh(self, allowed):
+        shutil.copy(os.path.join(PACKAGE, 'config', 'meshes', 'block.obj'), os.path.join(self.workspace, 'src', 'my_trainer', 'meshes'))
+        self.change('scenes/first.yaml', 'primitive: {box: [0.12, 0.06, 0.01]}', 'file: ../meshes/block.obj')
+        self.change('scenes/first.yaml', '    fixed: [{box: {min: [-0.07, -0.04, -0.01], max: [-0.05, 0.04, 0.02]}}]\n', '')
+        if not allowed:
+            self.change('launch/train.launch', '<arg name="data_folders" value="[$(find my_trainer)]"/>', '')
+        return self.said_at_launch()
+
+    def of_another_body(self):
+        self.change('tasks/lift.yaml', 'body: flap', 'body: liver')
+        return self.said_at_launch()
+
+    def test_it_builds_trains_and_says_what_is_wrong(self):
+        self.good('cd workspace && ' + self.command('catkin_make'))
+        with self.running(self.train()):
+            task = rospy.wait_for_message('/deformer/task', TaskState, LONG)
+        self.assertEqual(('lift', 'ann', ['lift', 'lay down']), (task.task, task.trainee, task.stages))
+        self.assertNotIn('accepted', self.with_a_mesh(True))
+        self.said_of({
+            '`data_folders` left out, and a mesh in `meshes/`': lambda: self.with_a_mesh(False),
+            'the workspace was not sourced': self.not_sourced,
+            "a task of another scene's body": self.of_another_body,
+        })
+
+    def not_sourced(self):
+        with self.running(self.node('package://my_trainer/scenes/first.yaml')) as end:
+            return end()
+
+
 class RecordingPageTest(PageTestCase):
 
     name = 'recording.md'
@@ -210,4 +275,4 @@ class StationsPageTest(PageTestCase):
 
 
 if __name__ == '__main__':
-    run('pages', ScenePageTest, ClampPageTest, PythonPageTest, TaskPageTest, RecordingPageTest, StationsPageTest)
+    run('pages', ScenePageTest, ClampPageTest, PythonPageTest, TaskPageTest, OwnPackagePageTest, RecordingPageTest, StationsPageTest)
