@@ -19,6 +19,7 @@ namespace {
 constexpr int kContactSubsteps = 4;   // at least, where something may meet: in longer ones stacks of stiff bodies rock
 constexpr double kFarthest = 0.5;     // edges, between two searches
 constexpr double kMostSearches = 64;  // of a frame
+constexpr std::size_t kSharedParticles = 20000;  // of a body: less is done before another thread has begun
 constexpr std::size_t kWorkParticles = 512;  // of small islands together: what they read stays in the cache
 constexpr double kSlowedMass = 0.05;  // of an island, at most: slivers are slowed, instead of all taking their substeps
 
@@ -526,8 +527,8 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
     runEach(each, work.alone.size(), [&](std::size_t b) {
       work.each_counters[b] = MatchCounters();
       work.alone[b]->scratch.last = substep + 1 == substeps;
-      const bool most = 2 * work.alone[b]->state.positions.size() > work.particles;  // of the work is this body's
-      matchAlone(*work.alone[b], h, work.each_counters[b], most ? each : oneAfterAnother);
+      const bool shared = work.alone[b]->state.positions.size() >= kSharedParticles;
+      matchAlone(*work.alone[b], h, work.each_counters[b], shared ? each : oneAfterAnother);
     });
     for (const MatchCounters& counters : work.each_counters) work.match_counters += counters;
     work.match += secondsSince(last);
