@@ -137,14 +137,14 @@ def substep(body, state, u):
     x, v, z, f_last = state
     h, m = body.h, body.m[:, None]
     longest = 1.4 / (1.1 * z * body.omega)  # (7)
-    f, T = min(1, (longest / h) ** 2), max(h, longest) / 4
+    f, tau = min(1, (longest / h) ** 2), max(h, longest) / 4
     r = x - np.sum(m * x, axis=0) / m.sum()
     V = np.zeros_like(v)
     if not body.held:  # (8)
         turn = inverse_inertia(body, r)
         V = np.sum(m * v, axis=0) / m.sum() + np.cross(turn @ np.sum(m * np.cross(r, v), axis=0), r)
     v = V + np.exp(-body.d * h) * np.sqrt(f / f_last) * (v - V)
-    on_particles, z = forces(body, x + T * v, f)  # (9)
+    on_particles, z = forces(body, x + tau * v, f)  # (9)
     a = on_particles / m
     if not body.held:  # (10)
         a -= np.cross(turn @ np.sum(np.cross(r, m * a), axis=0), r)
