@@ -1,4 +1,5 @@
 """A tool that a stream of poses moves."""
+import threading
 import time
 
 import rospy
@@ -9,6 +10,37 @@ from meshless_surgery.errors import Unreachable
 from meshless_surgery.poses import pose_stamped
 
 TOOLS = ('pick', 'push', 'scissors')
+
+
+class _Heard:
+    """What a topic says from the first call of next() on: one subscription for all of them."""
+
+    def __init__(self, topic, kind):
+        self._topic, self._kind = topic, kind
+        self._changed = threading.Condition()
+        self._count, self._message, self._subscriber = 0, None, None
+
+    def _hear(self, message):
+        with self._changed:
+            self._count, self._message = self._count + 1, message
+            self._changed.notify_all()
+
+    def next(self, timeout):
+        end = time.monotonic() + timeout
+        with self._changed:
+            before = self._count
+            if self._subscriber is None:
+                self._subscriber = rospy.Subscriber(self._topic, self._kind, self._hear, queue_size=1, tcp_nodelay=True)
+            while self._count == before:
+                if rospy.is_shutdown() or time.monotonic() > end:
+                    raise Unreachable('%s says nothing' % self._subscriber.resolved_name)
+                self._changed.wait(0.1)
+            return self._message
+
+    def close(self):
+        if self._subscriber is not None:
+            self._subscriber.unregister()
+            self._subscriber = None
 
 
 class ToolStream:
@@ -26,6 +58,8 @@ class ToolStream:
         self._jaws = None
         if tool == 'scissors':
             self._jaws = rospy.Publisher(self._topic + 'jaw/servo_js', JointState, queue_size=10, tcp_nodelay=True)
+        self._measured = _Heard(self._topic + 'measured_cp', PoseStamped)
+        self._force = _Heard(self._topic + 'measured_cf', WrenchStamped)
         for publisher in (self._poses, self._jaws):
             self._connect(publisher)
 
@@ -50,13 +84,15 @@ class ToolStream:
 
     def measured(self):
         """The next PoseStamped of where the tool is."""
-        return rospy.wait_for_message(self._topic + 'measured_cp', PoseStamped, self.timeout)
+        return self._measured.next(self.timeout)
 
     def force(self):
         """The next WrenchStamped on the tool."""
-        return rospy.wait_for_message(self._topic + 'measured_cf', WrenchStamped, self.timeout)
+        return self._force.next(self.timeout)
 
     def close(self):
+        self._measured.close()
+        self._force.close()
         for publisher in (self._poses, self._jaws):
             if publisher is not None:
                 publisher.unregister()

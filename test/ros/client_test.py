@@ -6,6 +6,7 @@ import sys
 import tempfile
 import unittest
 
+import rosgraph
 import rospy
 import tf2_ros
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
@@ -178,6 +179,11 @@ class SurgeonTest(unittest.TestCase):
         self.surgeon.lift_scissors()
 
     def test_the_push_sphere(self):
+        with self.surgeon.stream('push') as push, self.assertRaises(SurgeryError) as raised:
+            push.timeout = 0.3
+            while True:  # it may say once that it is gone
+                push.measured()
+        self.assertIn('push/measured_cp says nothing', str(raised.exception))
         self.surgeon.push((0, 0, 1), radius=0.02)
         with self.surgeon.stream('push') as push:
             self.assertAlmostEqual(1.0, push.measured().pose.position.z)
@@ -193,15 +199,25 @@ class SurgeonTest(unittest.TestCase):
         self.surgeon.load('here.state')
         self.assertEqual(before, self.surgeon.hash())
 
+    def hears(self, topic):
+        """Whether this process subscribes to it."""
+        subscribers = dict(rosgraph.Master(rospy.get_name()).getSystemState()[1])
+        return rospy.get_name() in subscribers.get(self.running.name + '/' + topic, [])
+
     def test_streams_move_tools_and_cut(self):
         self.surgeon.pick((-0.15, 0, 0.1), max_distance=0.1)
         with self.surgeon.stream('pick') as hand:
             while abs(self.surgeon.state().picks[0].target.y - 0.02) > 1e-6:
                 hand.move((-0.15, 0.02, 0.1))
             self.assertAlmostEqual(0.02, hand.measured().pose.position.y)
+            self.assertFalse(self.hears('pick/measured_cf'))
+            stamps = [hand.force().header.stamp for _ in range(5)]
+            self.assertEqual(sorted(set(stamps)), stamps)  # each is the next
             self.assertTrue(math.isfinite(hand.force().wrench.force.y))
+            self.assertTrue(self.hears('pick/measured_cf'), 'it subscribes anew for each message')
             with self.assertRaises(ValueError):
                 hand.jaw(0.1)
+        self.assertFalse(self.hears('pick/measured_cf'))
         blades = blades_pose((-0.2, -0.05, 0.1), (0, 1, 0), (1, 0, 0)).pose.orientation
         with self.surgeon.stream('scissors') as scissors:
             angle = 0.5
