@@ -280,6 +280,21 @@ class PythonTest(Compared, unittest.TestCase):
         return known
 
 
+class EnvironmentTasksTest(Compared, unittest.TestCase):
+    """Tasks that ship, with their scenes and bodies."""
+    page, least, planted = 'python', 7, (('| `lump` | pad |', '| `liver` | pad |'), ('gallbladder, duct', 'duct'))
+
+    def code(self):
+        known = {}
+        for name in stems('config/tasks/*.yaml'):
+            scene = only(r'(?m)^scene: (\w+)$', read('config/tasks/%s.yaml' % name))
+            known[name] = (scene, found(r'(?m)^  - name: (\w+)', read('config/scenes/%s.yaml' % scene)))
+        return known
+
+    def said(self, text):
+        return {named(row[0])[0]: (named(row[1])[0], re.split(', ', row[2])) for row in rows(text, 'Environment', 'task')}
+
+
 SCRIPTS = {'scripts/' + name: 'scripts/' + name for name in ('train', 'check', 'soak', 'fuzz', 'film')}
 PROGRAMS = {**{name: 'src/tools_main/%s.cpp' % name for name in stems('src/tools_main/*.cpp')}, **SCRIPTS,
             **{name + '.py': 'scripts/%s.py' % name for name in stems('scripts/*.py') if not name.startswith(('play_', 'surgery_'))},
