@@ -46,6 +46,7 @@ LIMITS = (
     ('topics', 'opening [rad], -3.2 to N.', 'src/ros/tool_inputs.cpp', 'kMaxJaw', 1),
     ('topics', 'When it was above N and', 'include/meshless_surgery/ros/streamed_tools.h', 'kJawOpen', 1),
     ('topics', 'then falls below N,', 'include/meshless_surgery/ros/streamed_tools.h', 'kJawClosed', 1),
+    ('topics', 'The frame is read every N ms', 'src/ros/tool_inputs.cpp', 'kLookEvery', 0.001),
     ('topics', 'not at all while N other callers', 'include/meshless_surgery/ros/frames.h', 'kMostWaiting', 1),
     ('topics', 'in as much time as was lost, at most N ms', 'include/meshless_surgery/ros/force_stream.h', 'kMostLate', 0.001),
     ('topics', 'counts as N ms', 'include/meshless_surgery/ros/tool_motion.h', 'kLongestTick', 0.001),

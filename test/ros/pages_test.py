@@ -129,6 +129,58 @@ class PythonPageTest(PageTestCase):
         })
 
 
+    def test_force_grows_with_the_way_as_the_spring_has_it(self):
+        with self.running(self.launch() + ' paused:=true'):
+            said = self.good('python3 force.py')
+            self.assertEqual(said, self.good('python3 force.py'))
+        rows = [[float(word) for word in line.split()] for line in said.splitlines() if re.match(r' *\d', line)]
+        self.assertEqual([2.0 * n for n in range(1, 11)], [free for free, _, _ in rows])
+        forces = [force for _, _, force in rows]
+        self.assertEqual(sorted(forces), forces)
+        for free, tissue, force in rows:  # 500 N/m; the mean over a step lags behind the free end by half of 0.17 mm
+            self.assertTrue(0.0 < tissue < free, said)
+            self.assertAlmostEqual(0.5 * (free - tissue), force, delta=0.2, msg=said)
+
+
+class RobotPageTest(PageTestCase):
+
+    name = 'robot.md'
+
+    def node_of_the_page(self):
+        """Without the silence that ends a pick: on a machine that stands still, it would come between two poses."""
+        return self.command('rosrun meshless_surgery deformer_node') + ' _tools/silence:=0'
+
+    def test_the_hand_lifts_the_liver_and_feels_it(self):
+        self.check_setup()
+        with self.running(self.node_of_the_page()):
+            said = self.good('python3 robot.py')
+        up, most = re.fullmatch(r'tissue (\d+) mm up, (\d+\.\d+) N at most\n', said).groups()
+        self.assertTrue(3 < int(up) < 20, said)
+        self.assertTrue(0.2 < float(most) < 10.0, said)
+
+    def script(self, old='', new='', **parameters):
+        self.assertIn(old, self.files['robot.py'])
+        self.write('robot.py', self.files['robot.py'].replace(old, new))
+        with self.running(self.node('liver', **parameters)) as end:
+            return self.shell('python3 robot.py')[1] + end()
+
+    def follows(self):
+        with self.running(self.launch() + ' pick_frame:=tool0') as end:
+            return self.shell('python3 robot.py')[1] + end()
+
+    def test_what_is_said_of_each_mistake_is_what_the_page_says(self):
+        move = 'arm.move((at.x, at.y, at.z + 0.01 * min(t, 2.0)))'
+        self.said_of({
+            'a stream that stopped for more than half a second': lambda: self.script('rate.sleep()', 'surgeon.live(2.0)'),
+            'a frame without a transform': lambda: self.script("stream('pick')", "stream('pick', frame='base')"),
+            'a pose that is no number': lambda: self.script(move, "arm.move((at.x, at.y, float('nan')))"),
+            'stamps of two clocks': lambda: self.script(
+                move, 'arm.move((at.x, at.y, at.z)); arm.move((at.x, at.y, at.z), stamp=rospy.Time.now() - rospy.Duration(0.3))'),
+            'a stream to a tool that follows a frame': self.follows,
+            'a frame to follow that is not there': self.follows,
+        })
+
+
 class TaskPageTest(PageTestCase):
 
     name = 'own_task.md'
@@ -275,4 +327,5 @@ class StationsPageTest(PageTestCase):
 
 
 if __name__ == '__main__':
-    run('pages', ScenePageTest, ClampPageTest, PythonPageTest, TaskPageTest, OwnPackagePageTest, RecordingPageTest, StationsPageTest)
+    run('pages', ScenePageTest, ClampPageTest, PythonPageTest, RobotPageTest, TaskPageTest, OwnPackagePageTest, RecordingPageTest,
+        StationsPageTest)
