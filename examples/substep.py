@@ -3,9 +3,9 @@
 
     substep.py FILE...
 
-A FILE is JSON: a body, its state, and where the package led it (test/world/substep_test.cpp writes such files). Symbols,
-units and numbers in brackets are those of the page. Prints how far this script and the package are apart, over the
-longest way of a particle in the substep, and fails above 1e-9.
+A FILE is JSON: a body, its state, and where the package led it; held.json is one (test/world/substep_test.cpp writes
+them). Symbols, units and numbers in brackets are those of the page. Prints how far this script and the package are
+apart, over the longest way of a particle in the substep, and fails above 1e-9.
 """
 import json
 import sys
