@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "meshless_surgery/geometry/inside.h"
+#include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/thicken.h"
 #include "meshless_surgery/training/volume_within.h"
 
@@ -24,6 +25,11 @@ TriangleMesh placedMesh(const BodyDef& body) {
     if (Result<TriangleMesh> layer = thickened(mesh, body.thickness)) mesh = std::move(*layer);
   for (Vec3& p : mesh.vertices) p = body.pose * p;
   return mesh;
+}
+
+/// Whether a region has tissue: more than what rounding leaves.
+bool anyWithin(const TriangleMesh& tissue, const Region& region) {
+  return volumeWithin(tissue, region) > 1e-9 * std::abs(signedVolume(tissue));
 }
 
 const BodyDef* bodyOf(const SceneDef& scene, const std::string& name) {
@@ -66,7 +72,7 @@ class FaultFinder {
     if (task_.target) {
       if (auto fault = needsBody("target", 0, task_.target->body)) return fault;
       const BodyDef& body = *bodyOf(scene_, task_.target->body);
-      if (!(volumeWithin(placedMesh(body), task_.target->region) > 0.0))
+      if (!anyWithin(placedMesh(body), task_.target->region))
         return TaskFault{"target", 0, "no tissue of '" + body.name + "' is in the target at rest",
                          "a region that has some"};
     }
@@ -165,8 +171,7 @@ class FaultFinder {
   std::optional<TaskFault> check(std::size_t, const LetGo&) const { return std::nullopt; }
   std::optional<TaskFault> check(std::size_t k, const Clipped& clipped) const {
     if (auto fault = needsBody("stages", k, clipped.body)) return fault;
-    const TriangleMesh mesh = placedMesh(*bodyOf(scene_, clipped.body));
-    if (clipped.region && !(volumeWithin(mesh, *clipped.region) > 0.0))
+    if (clipped.region && !anyWithin(placedMesh(*bodyOf(scene_, clipped.body)), *clipped.region))
       return never(k, "no tissue of '" + clipped.body + "' is in its region at rest", "a region that has some");
     return std::nullopt;
   }

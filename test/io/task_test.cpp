@@ -171,7 +171,7 @@ TEST_F(TaskFile, APictureIsInTheReport) {
 
 TEST_F(TaskFile, TheTissueOfAHollowOrganIsItsWall) {
   std::ofstream(folder_.path() + "/hollow.yaml")
-      << "bodies: [{name: ball, primitive: {sphere: 0.04}, thickness: 0.005, material: elastic_liver}]";
+      << "bodies: [{name: ball, primitive: {sphere: 0.04}, thickness: 0.005}]";
   const auto said = [&](const std::string& x, const std::string& radius) -> std::string {
     std::ofstream(folder_.path() + "/task.yaml")
         << "scene: hollow.yaml\ntarget: {body: ball, sphere: {centre: [" << x << ", 0, 0], radius: " << radius
@@ -191,7 +191,7 @@ TEST_F(TaskFile, ItsSceneMayBeOfAPackage) {
   std::filesystem::create_directories(folder_.path() + "/trainer/scenes");
   std::ofstream(folder_.path() + "/trainer/scenes/scene.yaml") << kScene;
   std::string text = kTask;
-  text.replace(text.find("scene.yaml"), 10, "package://my_trainer/scenes/scene.yaml");
+  text.replace(text.find("scene: scene"), 12, "scene: package://my_trainer/scenes/scene.yaml");
   std::ofstream(folder_.path() + "/task.yaml") << text;
   FileAccess access;
   access.find_package = [&](const std::string& name) {
