@@ -87,7 +87,9 @@ ControlPanel::ControlPanel(QWidget* parent) : rviz::Panel(parent), link_(new Nod
   const auto paragraph = [this] {
     auto* made = new QLabel(this);
     made->setWordWrap(true);
-    made->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Preferred);
+    QSizePolicy whole(QSizePolicy::Ignored, QSizePolicy::Minimum);  // as high as its text is, however narrow
+    whole.setHeightForWidth(true);
+    made->setSizePolicy(whole);
     return made;
   };
   task_ = paragraph();
@@ -191,6 +193,7 @@ void ControlPanel::listen() {
       link_->nameOf("task"), 5, [this](const meshless_surgery::TaskState::ConstPtr& task) {
         task_->setText(taskText(*task));
         task_->setVisible(!task->task.empty());
+        material_->setVisible(!task->running);  // a trainee has other work
       });
 }
 
