@@ -87,12 +87,13 @@ ControlPanel::ControlPanel(QWidget* parent) : rviz::Panel(parent), link_(new Nod
   const auto paragraph = [this] {
     auto* made = new QLabel(this);
     made->setWordWrap(true);
-    QSizePolicy whole(QSizePolicy::Ignored, QSizePolicy::Minimum);  // as high as its text is, however narrow
-    whole.setHeightForWidth(true);
-    made->setSizePolicy(whole);
+    made->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Preferred);
     return made;
   };
   task_ = paragraph();
+  QSizePolicy whole(QSizePolicy::Ignored, QSizePolicy::Minimum);  // as high as its text is, however narrow
+  whole.setHeightForWidth(true);
+  task_->setSizePolicy(whole);
   task_->hide();
   layout->addWidget(task_);
 
