@@ -1,14 +1,17 @@
 #version 120
 // Tissue: two colours mixed by the pattern of include/meshless_surgery/appearance/look.h, or an image, uneven to light,
 // under a film of water. Two lamps: one at the camera, as an endoscope has it, and one above. A program for each pattern:
-// software GL takes every branch. NOISE is as in Look.msg, 7 for what is plain and even.
+// software GL takes every branch. NOISE is as in Look.msg, 7 for what is plain and even, 8 for an image by texture
+// coordinates, which `place` then has.
 
 uniform vec4 second;
 uniform float scale;   // [m] of a cell of the pattern, of the image's width
 uniform float wetness;
 uniform float bump;
-#if NOISE == 6
+#if NOISE == 6 || NOISE == 8
 uniform sampler2D image;
+#endif
+#if NOISE == 6
 uniform float aspect;  // width over height
 #endif
 uniform vec4 tips[4];  // of instruments, in the world, and how wide they are [m]; 0: none
@@ -93,6 +96,8 @@ vec3 imageAt(vec3 p)
   return shares.x * texture2D(image, p.yz * up).rgb + shares.y * texture2D(image, p.xz * up).rgb +
          shares.z * texture2D(image, p.xy * up).rgb;
 }
+#elif NOISE == 8
+vec3 imageAt(vec3 p) { return texture2D(image, p.xy * vec2(1.0, -1.0)).rgb; }
 #endif
 
 // x: how full the pattern is; y: how high the surface stands, in cells; z: how full it is on the whole.
@@ -149,7 +154,7 @@ void main()
   // Cells smaller than a pixel are their mean.
   vec3 width = fwidth(p);
   float coarse = smoothstep(0.5, 1.2, max(width.x, max(width.y, width.z)));
-#if NOISE == 6
+#if NOISE == 6 || NOISE == 8
   colour = imageAt(p);
   vec3 pattern = vec3(0.0, 0.03 * dot(colour, vec3(0.3, 0.6, 0.1)), 0.0);  // what is bright stands out
 #else
@@ -157,11 +162,17 @@ void main()
   colour = mix(colour, second.rgb, mix(pattern.x, pattern.z, coarse));
 #endif
   // Mikkelsen 2010, Bump mapping unparametrized surfaces on the GPU.
-  float height = bump * scale * pattern.y;
+  float height = bump * pattern.y;
   vec3 dx = dFdx(seen_at), dy = dFdy(seen_at);
+#if NOISE == 8  // as wide as the image is here [m]
+  vec2 px = dFdx(p.xy), py = dFdy(p.xy);
+  float cell = sqrt(length(cross(dx, dy)) / max(abs(px.x * py.y - px.y * py.x), 1e-12));
+#else
+  float cell = scale;
+#endif
   vec3 r1 = cross(dy, n), r2 = cross(n, dx);
   float area = dot(dx, r1);
-  vec3 slope = sign(area) * (dFdx(height) * r1 + dFdy(height) * r2) / max(abs(area), 1e-12);
+  vec3 slope = cell * sign(area) * (dFdx(height) * r1 + dFdy(height) * r2) / max(abs(area), 1e-12);
   n = normalize(n - (1.0 - coarse) * slope);
 #endif
 

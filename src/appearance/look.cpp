@@ -183,4 +183,11 @@ Color colorAt(const Look& look, const Color& base, const Vec3& place, const Vec3
   return {between(base.r, look.second.r), between(base.g, look.second.g), between(base.b, look.second.b), base.a};
 }
 
+Color colorAt(const Look& look, const Color& base, const std::array<float, 2>& at) {
+  const Image& image = *look.image;
+  Color color = image.at(at[0], static_cast<double>(at[1]) * image.height() / image.width());
+  color.a = base.a;
+  return color;
+}
+
 }  // namespace meshless

@@ -666,6 +666,7 @@ class CellCutter {
     child->solid = true;
     child->spacing = model_.spacing;
     child->own = model_.own;
+    child->texture = model_.texture;
     child->next_patch = model_.next_patch + 1;
     child->incised = model_.incised || !gate_.unbounded();
     child->surface.triangles = from.mesh.triangles;

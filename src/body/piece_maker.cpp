@@ -138,6 +138,7 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, RestShape rest, const std
   child->solid = true;
   child->spacing = model_.spacing;
   child->own = model_.own;
+  child->texture = model_.texture;
   child->next_patch = model_.next_patch + 1;
   child->incised = model_.incised || !torn_.empty();
   child->surface.triangles = from.mesh.triangles;

@@ -478,6 +478,7 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   TriangleMesh& surface = model->surface;
   surface = std::move(def.mesh);
   def.mesh = TriangleMesh();
+  model->texture = std::move(def.texture);
   const Pose pose{def.pose.rotation.normalized(), def.pose.translation};
   const bool cells = def.solid && (def.clusters.kind == ClusterOptions::Kind::kCells ||
                                    (def.clusters.kind == ClusterOptions::Kind::kAuto && def.material.elastic()));

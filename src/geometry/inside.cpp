@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "meshless_surgery/base/bytes.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/nearest_on_triangle.h"
 
@@ -102,6 +103,7 @@ double squaredDistance(const Vec3& p, const Box& box) {
 
 struct SolidQuery::Data {
   std::vector<Corners> triangles;  // in the order of the leaves
+  std::vector<Index> numbers;      // of them in the mesh
   std::vector<Node> nodes;
   Box bounds;
   double flat = 0.0;  // [m] a segment that stays closer to a triangle's plane than this lies in it
@@ -192,6 +194,9 @@ struct SolidQuery::Data {
     return !unsure;
   }
 
+  /// Its number in the mesh, and where on it; `place` stays where there is none.
+  Index nearest(const Vec3& p, Vec3& place) const;
+
   /// Jacobson et al. 2013; solid angles after van Oosterom and Strackee 1983.
   double windingBySum(const Vec3& p) const {
     double sum = 0.0;
@@ -206,12 +211,15 @@ struct SolidQuery::Data {
 
 SolidQuery::SolidQuery(const TriangleMesh& mesh) : data_(std::make_unique<Data>()) {
   std::vector<Corners> source;
+  std::vector<Index> numbers;
   source.reserve(mesh.triangles.size());
-  for (const Triangle& t : mesh.triangles) {
+  for (Index number = 0; number < mesh.triangles.size(); ++number) {
+    const Triangle& t = mesh.triangles[number];
     if (t[0] >= mesh.vertices.size() || t[1] >= mesh.vertices.size() || t[2] >= mesh.vertices.size()) continue;
     const Corners corners = {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
     if (!corners.a.allFinite() || !corners.b.allFinite() || !corners.c.allFinite()) continue;
     source.push_back(corners);
+    numbers.push_back(number);
   }
   if (source.empty()) return;
   std::vector<Data::Centre> centres;
@@ -220,7 +228,10 @@ SolidQuery::SolidQuery(const TriangleMesh& mesh) : data_(std::make_unique<Data>(
   data_->nodes.reserve(source.size());
   data_->build(centres, source, 0, source.size());
   data_->triangles.reserve(source.size());
-  for (const Data::Centre& c : centres) data_->triangles.push_back(source[c.triangle]);
+  for (const Data::Centre& c : centres) {
+    data_->triangles.push_back(source[c.triangle]);
+    data_->numbers.push_back(numbers[c.triangle]);
+  }
   data_->bounds = data_->nodes[0].box;
   data_->flat = 1e-12 * data_->bounds.diagonal();
 }
@@ -255,7 +266,22 @@ bool SolidQuery::crosses(const Vec3& a, const Vec3& b) const {
 double SolidQuery::distance(const Vec3& p) const { return data_->nodes.empty() ? kInfinity : (nearest(p) - p).norm(); }
 
 Vec3 SolidQuery::nearest(const Vec3& p) const {
-  if (data_->nodes.empty()) return p;
+  Vec3 place = p;
+  data_->nearest(p, place);
+  return place;
+}
+
+Index SolidQuery::nearestTriangle(const Vec3& p) const {
+  Vec3 place = p;
+  return data_->nearest(p, place);
+}
+
+std::size_t SolidQuery::bytes() const {
+  return sizeof *data_ + bytesOf(data_->triangles, data_->numbers, data_->nodes);
+}
+
+Index SolidQuery::Data::nearest(const Vec3& p, Vec3& place) const {
+  if (nodes.empty()) return kNoIndex;
   // Depth first, the nearer child first.
   struct Entry {
     Index node;
@@ -264,27 +290,28 @@ Vec3 SolidQuery::nearest(const Vec3& p) const {
   Entry stack[64];
   int depth = 0;
   double best = kInfinity;
-  Vec3 place = p;
-  stack[depth++] = {0, squaredDistance(p, data_->bounds)};
+  Index number = kNoIndex;
+  stack[depth++] = {0, squaredDistance(p, bounds)};
   while (depth > 0) {
     const Entry entry = stack[--depth];
     if (entry.squared >= best) continue;
-    const Node& node = data_->nodes[entry.node];
+    const Node& node = nodes[entry.node];
     for (Index k = 0; k < node.count; ++k) {
-      const Vec3 there = onTriangle(p, data_->triangles[node.first + k]);
+      const Vec3 there = onTriangle(p, triangles[node.first + k]);
       const double squared = (there - p).squaredNorm();
       if (!(squared < best)) continue;
       best = squared;
       place = there;
+      number = numbers[node.first + k];
     }
     if (node.count > 0) continue;
-    Entry left = {entry.node + 1, squaredDistance(p, data_->nodes[entry.node + 1].box)};
-    Entry right = {node.right, squaredDistance(p, data_->nodes[node.right].box)};
+    Entry left = {entry.node + 1, squaredDistance(p, nodes[entry.node + 1].box)};
+    Entry right = {node.right, squaredDistance(p, nodes[node.right].box)};
     if (left.squared < right.squared) std::swap(left, right);
     stack[depth++] = left;
     stack[depth++] = right;
   }
-  return place;
+  return number;
 }
 
 }  // namespace meshless

@@ -106,7 +106,8 @@ std::string CellsOfFile::add(int vtk_type, const std::int64_t* nodes, std::size_
   return "";
 }
 
-void addPolygon(const std::vector<Index>& corners, TriangleMesh& mesh) {
+void addPolygon(const std::vector<Index>& corners, const TexturePoint* points, TriangleMesh& mesh,
+                FileTexture& texture) {
   const std::size_t n = corners.size();
   if (n < 3) return;
   const bool known = std::all_of(corners.begin(), corners.end(), [&](Index k) { return k < mesh.vertices.size(); });
@@ -126,11 +127,16 @@ void addPolygon(const std::vector<Index>& corners, TriangleMesh& mesh) {
       }
     }
   }
-  for (std::size_t k = 1; k + 1 < n; ++k)
-    mesh.triangles.push_back({corners[start], corners[(start + k) % n], corners[(start + k + 1) % n]});
+  for (std::size_t k = 1; k + 1 < n; ++k) {
+    const std::array<std::size_t, 3> fan{start, (start + k) % n, (start + k + 1) % n};
+    mesh.triangles.push_back({corners[fan[0]], corners[fan[1]], corners[fan[2]]});
+    if (points)
+      for (const std::size_t corner : fan) texture.corners.push_back(points[corner]);
+  }
 }
 
-Result<TriangleMesh> surfaceOf(const std::string& name, CellsOfFile&& cells, std::vector<std::string>& notes) {
+Result<TriangleMesh> surfaceOf(const std::string& name, CellsOfFile&& cells, std::vector<std::string>& notes,
+                               FileTexture& texture) {
   if (cells.points.empty()) return Error{ErrorCode::kUnsuitableShape, "'" + name + "' has no points"};
   if (cells.repeated > 0)
     notes.push_back(name + ": " + counted(cells.repeated, "element", "elements") +
@@ -147,11 +153,14 @@ Result<TriangleMesh> surfaceOf(const std::string& name, CellsOfFile&& cells, std
   }
   TriangleMesh mesh;
   mesh.vertices = std::move(cells.points);
+  texture.fault = cells.texture.fault;
+  const TexturePoint* points = cells.texture.corners.empty() ? nullptr : cells.texture.corners.data();
   std::vector<Index> corners;
   for (std::size_t at = 0; at < cells.polygons.size(); at += 1 + cells.polygons[at]) {
     const auto first = cells.polygons.begin() + static_cast<std::ptrdiff_t>(at) + 1;
     corners.assign(first, first + cells.polygons[at]);
-    addPolygon(corners, mesh);
+    addPolygon(corners, points, mesh, texture);
+    if (points) points += corners.size();
   }
   return mesh;
 }

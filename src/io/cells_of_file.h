@@ -13,6 +13,7 @@
 
 #include "meshless_surgery/base/result.h"
 #include "meshless_surgery/geometry/outer_surface.h"
+#include "meshless_surgery/io/files.h"
 
 namespace meshless {
 
@@ -21,6 +22,7 @@ struct CellsOfFile {
   VolumeCells volumes;
   std::vector<Index> polygons;  // of each surface cell the number of its corners, then these
   std::size_t polygon_count = 0;
+  FileTexture texture;       // of the corners of `polygons`
   std::size_t curved = 0;    // volume cells with nodes beside their corners
   std::size_t repeated = 0;  // cells, points and lines that were left out as they are there already
 
@@ -50,11 +52,13 @@ Result<CellsOfFile> readGmshCells(const std::string& name, std::string_view text
 Result<CellsOfFile> readPlyCells(const std::string& name, std::string_view text);
 
 /// The outer surface of the volumes; without any the surface cells; without these a cloud. A note says which volumes
-/// there were.
-Result<TriangleMesh> surfaceOf(const std::string& name, CellsOfFile&& cells, std::vector<std::string>& notes);
+/// there were. `texture`: three points a triangle, where the surface cells have them.
+Result<TriangleMesh> surfaceOf(const std::string& name, CellsOfFile&& cells, std::vector<std::string>& notes,
+                               FileTexture& texture);
 
 /// A fan of triangles from a corner that sees the others, so that a polygon that is not convex keeps its shape if it
-/// can.
-void addPolygon(const std::vector<Index>& corners, TriangleMesh& mesh);
+/// can. `points`: of the corners, which `texture` gets for each triangle; or null.
+void addPolygon(const std::vector<Index>& corners, const TexturePoint* points, TriangleMesh& mesh,
+                FileTexture& texture);
 
 }  // namespace meshless

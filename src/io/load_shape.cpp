@@ -14,11 +14,20 @@ Result<LoadedShape> loadShape(const std::string& real_path, double scale, MeshRe
     return Error{ErrorCode::kInvalidArgument, text.str()};
   }
   LoadedShape shape;
-  Result<TriangleMesh> read = readMeshFile(real_path, &shape.notes);
+  FileTexture texture;
+  Result<TriangleMesh> read = readMeshFile(real_path, &shape.notes, &texture);
   if (!read) return read.error();
   const std::string name = std::filesystem::path(real_path).filename().string();
   TriangleMesh mesh = std::move(*read);
   for (Vec3& p : mesh.vertices) p *= scale;
+  if (!texture.corners.empty()) {
+    Result<TextureMapPtr> map = TextureMap::make(mesh, std::move(texture.corners));
+    if (map)
+      shape.texture = std::move(*map);
+    else
+      texture.fault = map.error().detail;
+  }
+  if (!texture.fault.empty()) shape.notes.push_back(name + ": its texture coordinates are not used: " + texture.fault);
   if (mesh.triangles.empty()) {
     std::vector<std::string> strays;
     mesh.vertices = withoutStrays(mesh.vertices, strays);

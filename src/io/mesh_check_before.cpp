@@ -59,6 +59,45 @@ bool continues(std::string_view line) {
   return !line.empty() && line.back() == '\\';
 }
 
+/// The texture coordinates of an OBJ file, as its lines come.
+class ObjTexture {
+ public:
+  explicit ObjTexture(FileTexture& to) : to_(to) {}
+
+  void addPoint(const std::vector<std::string>& vt) {
+    std::array<double, 2> at{};
+    for (std::size_t k = 1; k < std::min<std::size_t>(vt.size(), 3); ++k)
+      at[k - 1] = numberOf(vt[k]).value_or(std::nan(""));
+    points_.push_back({static_cast<float>(at[0]), static_cast<float>(at[1])});
+  }
+  /// `number`: what follows the vertex of a face's corner, as in 7/5/3.
+  void addCorner(const char* number, std::size_t line) {
+    long long point = *number == '/' ? std::strtoll(number + 1, nullptr, 10) : 0;  // 0 where there is none
+    if (point < 0) point += static_cast<long long>(points_.size()) + 1;
+    if (point > 0)
+      corners_.push_back(static_cast<Index>(std::min(point, static_cast<long long>(kNoIndex))));
+    else if (without_ == 0)
+      without_ = line;
+  }
+  void finish() {
+    if (corners_.empty()) return;
+    if (without_ > 0) to_.fault = "a corner of the face in line " + std::to_string(without_) + " has none";
+    for (const Index number : corners_) {
+      if (number > points_.size() && to_.fault.empty())
+        to_.fault = "a corner of a face has the number " + std::to_string(number) + "; accepted: 1 to " +
+                    std::to_string(points_.size()) + ", the number of vt lines";
+      if (!to_.fault.empty()) return to_.corners.clear();
+      to_.corners.push_back(points_[number - 1]);
+    }
+  }
+
+ private:
+  FileTexture& to_;
+  std::vector<TexturePoint> points_;
+  std::vector<Index> corners_;  // numbers from 1 on
+  std::size_t without_ = 0;     // the first line with a corner that has none
+};
+
 }  // namespace
 
 Status checkCounts(const std::string& name, double points, double faces, double corners) {
@@ -120,7 +159,7 @@ std::string plainStl(std::string_view text) {
   return plain;
 }
 
-Result<std::string> plainObj(const std::string& name, std::string_view text) {
+Result<std::string> plainObj(const std::string& name, std::string_view text, FileTexture& texture) {
   // Some programs write their whole buffer. More of them are a hole in a file, and no text.
   const std::size_t end = text.find_last_not_of('\0') + 1;  // 0: nothing else
   constexpr std::size_t kMostNuls = 65536;
@@ -132,6 +171,7 @@ Result<std::string> plainObj(const std::string& name, std::string_view text) {
     return unreadable(name, "line " + std::to_string(line_number) + ": " + what);
   };
   std::string joined;
+  ObjTexture texture_lines(texture);
   for (std::string_view line; nextLine(text, line);) {
     ++line_number;
     if (line.size() > kMaxLine) return bad("is longer than 65536 characters");
@@ -178,11 +218,13 @@ Result<std::string> plainObj(const std::string& name, std::string_view text) {
         long long absolute = corner < 0 ? static_cast<long long>(points) + 1 + corner : corner;
         if (absolute < 0 || absolute > static_cast<long long>(kMaxPoints)) absolute = 0;
         plain += " " + std::to_string(absolute);
+        texture_lines.addCorner(end, line_number);
       }
       plain += "\n";
       ++faces;
       corners += w.size() - 1;
     } else {
+      if (w[0] == "vt") texture_lines.addPoint(w);
       continue;
     }
     if (points > kMaxPoints || faces > kMaxFaces || corners > kMaxCorners) break;
@@ -191,6 +233,7 @@ Result<std::string> plainObj(const std::string& name, std::string_view text) {
           checkCounts(name, static_cast<double>(points), static_cast<double>(faces), static_cast<double>(corners));
       !status)
     return status.error();
+  texture_lines.finish();
   return plain;
 }
 

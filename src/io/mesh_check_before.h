@@ -2,8 +2,8 @@
 // for them), and the one for OBJ writes past its array where there are more normals than vertices and opens the
 // material files that are named; VTK's follows damaged cells out of its arrays, and PCD's damaged headers. So counts
 // are held against the file's size first, and PCD, OBJ and VTK are handed over rewritten, as their points and faces
-// alone; OFF, which PCL does not know, as OBJ. PLY is not given to it (cells_of_file.h). Everything works on the bytes that were read once: `name` is for
-// messages.
+// alone; OFF, which PCL does not know, as OBJ. PLY is not given to it (cells_of_file.h). Everything works on the bytes
+// that were read once: `name` is for messages.
 #pragma once
 
 #include <cstddef>
@@ -13,6 +13,7 @@
 #include <string_view>
 
 #include "meshless_surgery/base/result.h"
+#include "meshless_surgery/io/files.h"
 
 namespace meshless {
 
@@ -50,7 +51,8 @@ std::string plainStl(std::string_view text);
 Result<std::string> plainVtk(const std::string& name, std::string_view text, PromisedCounts& promised);
 
 /// The lines of an OBJ file that make its shape: "v x y z" and "f a b c ...", texture and normal numbers left out.
-Result<std::string> plainObj(const std::string& name, std::string_view text);
+/// `texture` gets the former.
+Result<std::string> plainObj(const std::string& name, std::string_view text, FileTexture& texture);
 
 /// An OFF file as OBJ: normals, colours and texture coordinates are left out. `promised` gets the number of points.
 Result<std::string> plainOff(const std::string& name, std::string_view text, PromisedCounts& promised);

@@ -139,7 +139,9 @@ Result<TriangleMesh> checked(const std::string& name, TriangleMesh&& mesh) {
   return std::move(mesh);
 }
 
-Result<TriangleMesh> convert(const pcl::PolygonMesh& read, const PromisedCounts& promised, const std::string& name) {
+/// `texture`: of the corners of the polygons, then of the triangles.
+Result<TriangleMesh> convert(const pcl::PolygonMesh& read, const PromisedCounts& promised, const std::string& name,
+                             FileTexture& texture) {
   TriangleMesh mesh;
   if (!copyPoints(read.cloud, mesh.vertices))
     return Error{ErrorCode::kUnreadable, "'" + name + "' has no points with x, y and z as float or double"};
@@ -151,18 +153,23 @@ Result<TriangleMesh> convert(const pcl::PolygonMesh& read, const PromisedCounts&
     return Error{ErrorCode::kUnreadable, "'" + name + "' is truncated: it holds " +
                                              std::to_string(read.polygons.size()) + " of " +
                                              std::to_string(*promised.faces) + " faces"};
+  const std::vector<TexturePoint> points = std::move(texture.corners);
+  texture.corners.clear();
   std::vector<Index> corners;
+  std::size_t before = 0;
   for (const pcl::Vertices& polygon : read.polygons) {
     corners.clear();
     for (const auto corner : polygon.vertices) corners.push_back(static_cast<Index>(corner));
-    addPolygon(corners, mesh);
+    const std::size_t first = std::exchange(before, before + corners.size());
+    addPolygon(corners, before <= points.size() ? &points[first] : nullptr, mesh, texture);
   }
   return checked(name, std::move(mesh));
 }
 
-Result<TriangleMesh> surfaceOfCells(const std::string& name, CellsOfFile&& cells, std::vector<std::string>* notes) {
+Result<TriangleMesh> surfaceOfCells(const std::string& name, CellsOfFile&& cells, std::vector<std::string>* notes,
+                                    FileTexture& texture) {
   std::vector<std::string> said;
-  Result<TriangleMesh> mesh = surfaceOf(name, std::move(cells), said);
+  Result<TriangleMesh> mesh = surfaceOf(name, std::move(cells), said, texture);
   if (!mesh) return mesh.error();
   if (notes) notes->insert(notes->end(), said.begin(), said.end());
   return checked(name, std::move(*mesh));
@@ -187,7 +194,7 @@ using Opened = std::variant<MemoryFile, CellsOfFile>;
 
 /// What was read of the file is gone afterwards.
 Result<Opened> openFile(const std::string& real_path, const std::string& name, MeshFormat format,
-                        PromisedCounts& promised) {
+                        PromisedCounts& promised, FileTexture& texture) {
   const Result<FileBytes> read = readFile(real_path, kMaxMeshBytes);
   if (!read) return Error{read.error().code, "'" + name + "' " + read.error().detail};
   std::string_view text = read->text();
@@ -202,7 +209,7 @@ Result<Opened> openFile(const std::string& real_path, const std::string& name, M
   if (!header) return header.error();
   promised = *header;
   if (format == MeshFormat::kStl) return Opened(MemoryFile(text));
-  const Result<std::string> plain = format == MeshFormat::kObj   ? plainObj(name, text)
+  const Result<std::string> plain = format == MeshFormat::kObj   ? plainObj(name, text, texture)
                                     : format == MeshFormat::kOff ? plainOff(name, text, promised)
                                     : format == MeshFormat::kVtk ? plainVtk(name, text, promised)
                                                                  : plainPcd(name, text, promised);
@@ -212,16 +219,19 @@ Result<Opened> openFile(const std::string& real_path, const std::string& name, M
 
 }  // namespace
 
-Result<TriangleMesh> readMeshFile(const std::string& real_path, std::vector<std::string>* notes) {
+Result<TriangleMesh> readMeshFile(const std::string& real_path, std::vector<std::string>* notes, FileTexture* texture) {
   const std::string name = std::filesystem::path(real_path).filename().string();
   const Result<MeshFormat> format = meshFormatOf(name);
   if (!format) return format.error();
+  FileTexture found;
+  if (!texture) texture = &found;
   // PCL and VTK throw for bad input, and for memory.
   try {
     PromisedCounts promised;
-    Result<Opened> opened = openFile(real_path, name, *format, promised);
+    Result<Opened> opened = openFile(real_path, name, *format, promised, *texture);
     if (!opened) return opened.error();
-    if (auto* cells = std::get_if<CellsOfFile>(&*opened)) return surfaceOfCells(name, std::move(*cells), notes);
+    if (auto* cells = std::get_if<CellsOfFile>(&*opened))
+      return surfaceOfCells(name, std::move(*cells), notes, *texture);
     const auto* file = std::get_if<MemoryFile>(&*opened);
     if (!file->ok()) return Error{ErrorCode::kFailed, "there is no memory to read '" + name + "'"};
     pcl::PolygonMesh mesh;
@@ -233,7 +243,7 @@ Result<TriangleMesh> readMeshFile(const std::string& real_path, std::vector<std:
       read = readWithPcl(file->path(), *format, mesh);
     }
     if (!read) return Error{ErrorCode::kUnreadable, "'" + name + "' cannot be read: it is truncated or damaged"};
-    return convert(mesh, promised, name);
+    return convert(mesh, promised, name, *texture);
   } catch (const std::exception& e) {
     return Error{ErrorCode::kUnreadable, "'" + name + "' cannot be read: " + e.what()};
   }

@@ -69,7 +69,8 @@ Result<std::string> plainOff(const std::string& name, std::string_view text, Pro
     }
     plain += "\n";
   }
-  return plainObj(name, plain);
+  FileTexture none;
+  return plainObj(name, plain, none);
 }
 
 }  // namespace meshless

@@ -215,19 +215,36 @@ class PlyReader {
     return Done{};
   }
 
+  /// u and v of vertices, by the names that programs give them.
+  static std::array<const char*, 2> textureNames(const PlyElement& element) {
+    constexpr std::array<const char*, 2> kNames[] = {
+        {"s", "t"}, {"u", "v"}, {"texture_u", "texture_v"}, {"texture_s", "texture_t"}};
+    const auto has = [&](const char* name) {
+      return std::any_of(element.properties.begin(), element.properties.end(), [&](const PlyProperty& one) {
+        return one.name == name && one.size == PlyType::kNone && isReal(one.type);
+      });
+    };
+    for (const auto& names : kNames)
+      if (has(names[0]) && has(names[1])) return names;
+    return {"", ""};
+  }
+
   Status readVertices(const PlyElement& element) {
-    std::vector<int> axis;
+    const std::array<const char*, 2> of_texture = textureNames(element);
+    const bool textured = *of_texture[0] != '\0';
+    std::vector<int> axis;  // x, y, z, u, v; below 0: none of them
     int found = 0;
     for (const PlyProperty& property : element.properties) {
       const std::size_t d = property.name.size() == 1 ? std::string("xyz").find(property.name) : std::string::npos;
       const bool is = d != std::string::npos && property.size == PlyType::kNone && isReal(property.type);
-      axis.push_back(is ? static_cast<int>(d) : -1);
+      const auto uv = std::find(of_texture.begin(), of_texture.end(), property.name) - of_texture.begin();
+      axis.push_back(is ? static_cast<int>(d) : uv < 2 ? 3 + static_cast<int>(uv) : -1);
       found += is;
     }
     if (found != 3)
       return unreadable(name_, "has a damaged header: its vertices have no x, y and z of float or double");
     for (double k = 0.0; k < element.count; ++k) {
-      Vec3 p;
+      Eigen::Matrix<double, 5, 1> p = Eigen::Matrix<double, 5, 1>::Zero();
       for (std::size_t n = 0; n < axis.size(); ++n) {
         if (axis[n] < 0) {
           if (!skip(element.properties[n])) return stopped(element, k);
@@ -237,9 +254,33 @@ class PlyReader {
         if (!x) return stopped(element, k);
         p[axis[n]] = *x;
       }
-      found_.points.push_back(p);
+      found_.points.push_back(p.head<3>());
+      if (textured) textures_.push_back({static_cast<float>(p[3]), static_cast<float>(p[4])});
     }
     return Done{};
+  }
+
+  bool readTexture(const PlyProperty& property, std::vector<float>& list) {
+    const std::optional<double> size = nextSize(property.size);
+    list.clear();
+    for (double k = 0.0; size && k < *size; ++k) {
+      const std::optional<double> x = next(property.type);
+      if (!x) return false;
+      list.push_back(static_cast<float>(*x));
+    }
+    return size.has_value();
+  }
+
+  /// Of a face: those in its list, or of its vertices.
+  void addTexture(const std::vector<std::int64_t>& nodes, const std::vector<float>* list) {
+    FileTexture& to = found_.texture;
+    if (list && list->size() != 2 * nodes.size())
+      to.fault = "a face of " + std::to_string(nodes.size()) + " corners has " + std::to_string(list->size()) +
+                 " numbers for them; accepted: two a corner";
+    if (!to.fault.empty()) return to.corners.clear();
+    for (std::size_t c = 0; c < nodes.size(); ++c)
+      to.corners.push_back(list ? TexturePoint{(*list)[2 * c], (*list)[2 * c + 1]}
+                                : textures_[static_cast<std::size_t>(nodes[c])]);
   }
 
   Status readFaces(const PlyElement& element) {
@@ -249,10 +290,19 @@ class PlyReader {
     });
     if (corners == element.properties.end() || corners->size == PlyType::kNone || isReal(corners->type))
       return unreadable(name_, "has a damaged header: its faces have no list of vertex_indices of a whole-number type");
+    const auto texture = std::find_if(element.properties.begin(), element.properties.end(), [](const PlyProperty& one) {
+      return one.name == "texcoord" && one.size != PlyType::kNone && isReal(one.type);
+    });
+    const bool listed = texture != element.properties.end();
     double all = 0.0;
     std::vector<std::int64_t> nodes;
+    std::vector<float> list;
     for (double k = 0.0; k < element.count; ++k) {
       for (const PlyProperty& property : element.properties) {
+        if (listed && &property == &*texture) {
+          if (!readTexture(property, list)) return stopped(element, k);
+          continue;
+        }
         if (&property != &*corners) {
           if (!skip(property)) return stopped(element, k);
           continue;
@@ -271,6 +321,7 @@ class PlyReader {
       if (nodes.size() < 3) continue;  // a point or an edge
       if (const std::string fault = found_.add(kVtkPolygon, nodes.data(), nodes.size()); !fault.empty())
         return unreadable(name_, "is damaged: its face " + std::to_string(static_cast<std::size_t>(k)) + " " + fault);
+      if (listed || !textures_.empty()) addTexture(nodes, listed ? &list : nullptr);
     }
     return Done{};
   }
@@ -282,6 +333,7 @@ class PlyReader {
   std::size_t line_ = 0;
   std::string damage_;
   std::vector<PlyElement> elements_;
+  std::vector<TexturePoint> textures_;  // of vertices; empty: they have none
   CellsOfFile found_;
 };
 

@@ -500,6 +500,7 @@ class SceneReader {
       found = shapes_.emplace(key, std::move(*loaded)).first;
     }
     def.mesh = found->second.mesh;
+    def.texture = found->second.texture;
     def.solid = found->second.solid;
     def.notes = found->second.notes;
     if (def.name.empty()) def.name = fs::path(*real).stem().string();

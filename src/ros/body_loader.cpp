@@ -73,6 +73,7 @@ Result<std::shared_ptr<const PreparedBody>> BodyLoader::load(const SpawnRequest&
     auto shape = loadShape(*path, request.scale, request.repair);
     if (!shape.ok()) return shape.error();
     def.mesh = std::move(shape->mesh);
+    def.texture = std::move(shape->texture);
     def.solid = shape->solid;
     def.notes = std::move(shape->notes);
     def.name = stem(*path);

@@ -41,6 +41,8 @@ void addLooks(const BodySnapshot& body, const VertexColors& baked, meshless_surg
   }
   message.colors = toBytes(baked.outer);
   message.inside_colors = toBytes(baked.inside);
+  message.uv.reserve(2 * baked.texture.size());
+  for (const TexturePoint& point : baked.texture) message.uv.insert(message.uv.end(), point.begin(), point.end());
   if (!by_place) return;
   message.rest.reserve(3 * body.model->surface.vertices.size());
   for (const Vec3& v : body.model->surface.vertices) {

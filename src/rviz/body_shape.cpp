@@ -4,6 +4,7 @@
 #include <cstring>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include <OgreAxisAlignedBox.h>
 #include <OgreGpuProgramParams.h>
@@ -134,7 +135,7 @@ void BodyShape::findFaces() {
 }
 
 std::uint32_t BodyShape::addCorner(std::uint32_t v, std::uint32_t tissue, const std::vector<std::uint32_t>& faces) {
-  corners_.push_back({v, tissue});
+  corners_.push_back({v, tissue, {}, kNoCorner});
   around_.insert(around_.end(), faces.begin(), faces.end());
   starts_.push_back(static_cast<std::uint32_t>(around_.size()));
   return static_cast<std::uint32_t>(corners_.size() - 1);
@@ -172,7 +173,7 @@ void BodyShape::findCorners(const meshless_surgery::Surface& surface) {
   around_.clear();
   starts_.assign(1, 0);
   indices_.assign(2 + (regional ? surface.region_colors.size() : 0), {});
-  std::vector<std::uint32_t> smooth[2];  // of a vertex: its one corner of the outer surface, of cuts
+  std::vector<std::uint32_t> smooth[2];  // of a vertex: its first corner of the outer surface, of cuts
   for (auto& corners : smooth) corners.assign(vertices, kNoCorner);
   std::vector<std::uint32_t> faces;
   for (std::size_t t = 0; t < triangles; ++t) {
@@ -180,8 +181,15 @@ void BodyShape::findCorners(const meshless_surgery::Surface& surface) {
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t v = triangles_[3 * t + k];
       std::uint32_t& one = smooth[cut_[t] != 0][v];
+      const std::size_t at = 6 * t + 2 * static_cast<std::size_t>(k);
+      const std::array<float, 2> uv = uv_.empty() ? std::array<float, 2>{} : std::array<float, 2>{uv_[at], uv_[at + 1]};
       std::uint32_t corner = one;
-      if (corner == kNoCorner) {
+      while (corner != kNoCorner && corners_[corner].uv != uv) corner = corners_[corner].next;
+      if (corner == kNoCorner && one != kNoCorner) {  // at a seam of the image
+        faces.assign(around_.begin() + starts_[one], around_.begin() + starts_[one + 1]);
+        corner = addCorner(v, corners_[one].tissue, faces);
+        corners_[corner].next = std::exchange(corners_[one].next, corner);
+      } else if (corner == kNoCorner) {
         faces.clear();
         Ogre::Vector3 normal = Ogre::Vector3::ZERO;
         for (std::uint32_t i = first[v]; i < first[v + 1]; ++i)
@@ -198,6 +206,7 @@ void BodyShape::findCorners(const meshless_surgery::Surface& surface) {
           corner = addCorner(v, tissueOf(t, v), faces);
         }
       }
+      corners_[corner].uv = uv;
       indices_[part].push_back(corner);
     }
   }
@@ -289,8 +298,10 @@ void BodyShape::setRest(const meshless_surgery::BodyTopology* patterns, const Bo
     }
     normal.normalise();
     rest_areas_[c] = std::max(area, std::numeric_limits<float>::min());
-    for (const Ogre::Vector3& v : {vertexOf(rest, corners_[c].vertex), normal})
-      for (int axis = 0; axis < 3; ++axis) *to++ = v[axis];
+    const auto& [u, v] = corners_[c].uv;
+    const bool by_uv = !uv_.empty() && corners_[c].tissue == 0;
+    for (const Ogre::Vector3& at : {by_uv ? Ogre::Vector3(u, v, 0.0f) : vertexOf(rest, corners_[c].vertex), normal})
+      for (int axis = 0; axis < 3; ++axis) *to++ = at[axis];
   }
   rests_->writeData(0, floats_.size() * sizeof(float), floats_.data(), true);
 }
@@ -319,7 +330,8 @@ void BodyShape::setMaterials(const meshless_surgery::Surface& surface, const mes
                              tissue.noise < program.patterned.size() && (tissue.noise > 0 || tissue.bump > 0.0f) &&
                              (texture || !of_image);
       pass->setVertexProgram(program.vertex);
-      pass->setFragmentProgram(patterned ? program.patterned[tissue.noise] : program.even);
+      const bool by_uv = patterned && p == 0 && !uv_.empty();
+      pass->setFragmentProgram(by_uv ? program.by_uv : patterned ? program.patterned[tissue.noise] : program.even);
       const auto vertex = pass->getVertexProgramParameters();
       vertex->setNamedAutoConstant("worldviewproj_matrix", Ogre::GpuProgramParameters::ACT_WORLDVIEWPROJ_MATRIX);
       vertex->setNamedAutoConstant("worldview_matrix", Ogre::GpuProgramParameters::ACT_WORLDVIEW_MATRIX);
@@ -328,7 +340,7 @@ void BodyShape::setMaterials(const meshless_surgery::Surface& surface, const mes
       const auto fragment = pass->getFragmentProgramParameters();
       fragment->setIgnoreMissingParams(true);
       fragment->setNamedConstant("second", toColour(tissue.second));
-      fragment->setNamedConstant("scale", tissue.scale);
+      fragment->setNamedConstant("scale", by_uv ? 1.0f : tissue.scale);
       fragment->setNamedConstant("bump", tissue.bump);
       fragment->setNamedConstant("wetness", wetness);
       if (patterned && texture) {
@@ -386,7 +398,11 @@ void BodyShape::show(const meshless_surgery::Surface& surface, const meshless_su
                      const TissueTextures& textures, const BodyLook& look, bool at_once) {
   const std::size_t vertices = surface.vertices.size() / 3;
   if (patterns && !patterns->rest.empty() && patterns->rest.size() != surface.vertices.size()) patterns = nullptr;
-  const bool same = sameTriangles(surface);
+  static const std::vector<float> none;
+  const bool by_uv = patterns && !patterns->rest.empty() && patterns->uv.size() == 2 * surface.triangles.size() &&
+                     !patterns->looks.empty() && patterns->looks[0].noise == meshless_surgery::Look::IMAGE;
+  const std::vector<float>& uv = by_uv ? patterns->uv : none;
+  const bool same = sameTriangles(surface) && uv == uv_;
   const bool whole = same || (3 * surface.cut.size() == surface.triangles.size() &&
                               std::all_of(surface.triangles.begin(), surface.triangles.end(),
                                           [vertices](std::uint32_t v) { return v < vertices; }));
@@ -395,6 +411,7 @@ void BodyShape::show(const meshless_surgery::Surface& surface, const meshless_su
   const bool new_look = !same || (patterns != nullptr) != patterned_ || !(look == look_) || surface.color != color_ ||
                         surface.inside_color != inside_color_;
   if (!same) {
+    uv_ = uv;
     findCorners(surface);
     parts_.clear();
     makeBuffers();

@@ -66,7 +66,9 @@ class BodyShape {
   /// A vertex where faces share a normal.
   struct Corner {
     std::uint32_t vertex = 0;
-    std::uint32_t tissue = 0;  // 0: of the outer surface, 1: of cut faces, 2 ..: of those in the regions 1 ..
+    std::uint32_t tissue = 0;   // 0: of the outer surface, 1: of cut faces, 2 ..: of those in the regions 1 ..
+    std::array<float, 2> uv{};  // its place in the image; at a seam a vertex has several, all with the same normal:
+    std::uint32_t next = 0;     // another of these; kNoCorner: it is the last
   };
 
   bool sameTriangles(const meshless_surgery::Surface& surface) const;
@@ -91,6 +93,7 @@ class BodyShape {
   // of the topology that is shown
   std::vector<std::uint32_t> triangles_;
   std::vector<std::uint8_t> cut_, regions_;
+  std::vector<float> uv_;                            // empty: the outer surface has no image, or no texture coordinates
   std::size_t coordinates_ = 0, region_colors_ = 0;  // how many
   std::vector<Corner> corners_;
   bool closed_ = false;                         // it has no edge, so its back side is never seen

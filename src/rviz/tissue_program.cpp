@@ -52,6 +52,7 @@ TissueProgram loaded() {
   for (std::size_t noise = 0; noise < program.patterned.size(); ++noise)
     program.patterned[noise] = fragment(static_cast<int>(noise));
   program.even = fragment(static_cast<int>(program.patterned.size()));
+  program.by_uv = fragment(static_cast<int>(program.patterned.size()) + 1);
   program.refused = loader.refused;
   return program;
 }

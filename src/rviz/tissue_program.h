@@ -11,6 +11,7 @@ struct TissueProgram {
   std::string vertex;
   std::array<std::string, 7> patterned;  // by Look.noise
   std::string even;                      // without a pattern or bumps
+  std::string by_uv;                     // an image by texture coordinates, which are in place of rest positions
   std::string refused;
 
   bool usable() const { return refused.empty(); }

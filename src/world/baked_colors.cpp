@@ -21,13 +21,32 @@ Points normalsOf(const BodyModel& model, bool of_cuts, bool needed) {
   return vertexNormals(faces);
 }
 
+std::vector<TexturePoint> textureOf(const BodyModel& model) {
+  std::vector<TexturePoint> points;
+  points.reserve(3 * model.surface.triangles.size());
+  for (std::size_t t = 0; t < model.surface.triangles.size(); ++t) {
+    std::array<TexturePoint, 3> corners{};
+    const Triangle& v = model.surface.triangles[t];
+    const auto place = [&](int k) { return model.own * model.surface.vertices[v[k]]; };
+    if (!isCutPatch(model.surface.patchOf(t))) corners = model.texture->of({place(0), place(1), place(2)});
+    points.insert(points.end(), corners.begin(), corners.end());
+  }
+  return points;
+}
+
 }  // namespace
 
 VertexColors bakeColors(const BodyModel& model, const Material& material) {
   const Points& rest = model.surface.vertices;
   const std::vector<std::uint32_t>& patches = model.surface.patches;
   VertexColors colors;
-  if (const Look& look = material.appearance.outer; look.noise != Noise::kPlain) {
+  if (const Look& look = material.appearance.outer; look.image && model.texture) {
+    colors.texture = textureOf(model);
+    colors.outer.assign(rest.size(), material.color);
+    for (std::size_t c = 0; c < colors.texture.size(); ++c)
+      if (!isCutPatch(model.surface.patchOf(c / 3)))
+        colors.outer[model.surface.triangles[c / 3][c % 3]] = colorAt(look, material.color, colors.texture[c]);
+  } else if (look.noise != Noise::kPlain) {
     const Points normals = normalsOf(model, false, look.image != nullptr);
     colors.outer.reserve(rest.size());
     for (std::size_t v = 0; v < rest.size(); ++v)

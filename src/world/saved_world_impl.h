@@ -11,7 +11,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kStateVersion = 21;
+constexpr std::uint32_t kStateVersion = 22;
 
 inline std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(
@@ -105,33 +105,59 @@ void serialize(A& archive, Plasticity& v) {
   auto& [yield, creep, maximum] = v;
   archive(yield, creep, maximum);
 }
-/// Many materials share an image: a file has its pixels once, where it comes first.
-inline void save(OutArchive& archive, const ImagePtr& image) {
-  archive(image != nullptr);
-  if (!image) return;
+/// What many share, a file has once, where it comes first: write() and read() are for that.
+template <class T, class Write>
+void saveShared(OutArchive& archive, const std::shared_ptr<const T>& value, const Write& write) {
+  archive(value != nullptr);
+  if (!value) return;
   const std::size_t known = archive.shared();
-  archive(archive.placeOf(image.get()));
-  if (archive.shared() > known) archive(image->width(), image->height(), image->rgb());
+  archive(archive.placeOf(value.get()));
+  if (archive.shared() > known) write();
 }
-inline void save(HashArchive& archive, const ImagePtr& image) { archive(image ? image->id() : std::uint64_t{0}); }
-inline void load(InArchive& archive, ImagePtr& image) {
+template <class T, class Read>
+void loadShared(InArchive& archive, std::shared_ptr<const T>& value, const Read& read) {
   bool there = false;
   archive(there);
-  image.reset();
+  value.reset();
   if (!there) return;
   std::uint32_t place = 0;
   archive(place);
   auto& known = archive.shared();
-  if (place > known.size()) throw ArchiveFault("an image is not there");
+  if (place > known.size()) throw ArchiveFault("what is shared is not there");
   if (place == known.size()) {
+    Result<std::shared_ptr<const T>> made = read();
+    if (!made) throw ArchiveFault(made.error().detail);
+    known.emplace_back(*made);
+  }
+  const auto* shared = std::any_cast<std::shared_ptr<const T>>(&known[place]);
+  if (!shared) throw ArchiveFault("what is shared is of another kind");
+  value = *shared;
+}
+inline void save(OutArchive& archive, const ImagePtr& image) {
+  saveShared(archive, image, [&] { archive(image->width(), image->height(), image->rgb()); });
+}
+inline void save(HashArchive& archive, const ImagePtr& image) { archive(image ? image->id() : std::uint64_t{0}); }
+inline void load(InArchive& archive, ImagePtr& image) {
+  loadShared(archive, image, [&archive] {
     std::uint32_t width = 0, height = 0;
     std::vector<std::uint8_t> rgb;
     archive(width, height, rgb);
-    auto made = Image::make(width, height, std::move(rgb));
-    if (!made) throw ArchiveFault(made.error().detail);
-    known.push_back(*made);
-  }
-  image = std::static_pointer_cast<const Image>(known[place]);
+    return Image::make(width, height, std::move(rgb));
+  });
+}
+inline void save(OutArchive& archive, const TextureMapPtr& texture) {
+  saveShared(archive, texture, [&] { archive(texture->surface(), texture->points()); });
+}
+inline void save(HashArchive& archive, const TextureMapPtr& texture) {
+  if (texture) archive(texture->surface(), texture->points());
+}
+inline void load(InArchive& archive, TextureMapPtr& texture) {
+  loadShared(archive, texture, [&archive] {
+    TriangleMesh surface;
+    std::vector<TexturePoint> points;
+    archive(surface, points);
+    return TextureMap::make(std::move(surface), std::move(points));
+  });
 }
 template <class A>
 void serialize(A& archive, Look& v) {
@@ -241,16 +267,16 @@ template <class A>
 void serialize(A& archive, BodyModel& v) {
   auto& [rest, masses, match_masses, fixed, any_fixed, graph, clusters, shape, elastic, elastic_batch, lattice,
          cell_mass, regions, cells, clamp_points, clamp, tissue, most_spread_inverse, specific_stiffness,
-         poissons_ratio, highest_frequency, own, surface, binding, collision, cavities, solid, incised, spacing,
-         rest_volume, rest_area, mass, next_patch] = v;
+         poissons_ratio, highest_frequency, own, surface, texture, binding, collision, cavities, solid, incised,
+         spacing, rest_volume, rest_area, mass, next_patch] = v;
   (void)elastic_batch, (void)cells, (void)clamp, (void)tissue, (void)cavities;
   auto of_contact = collision ? *collision : CollisionSurface();
   auto of_cells = lattice ? *lattice : CellLattice();
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
   archive(of_cells, cell_mass, regions, clamp_points);
   archive(rest, masses, match_masses, held, any_fixed, graph, clusters, shape, elastic, endless(most_spread_inverse),
-          specific_stiffness, poissons_ratio, highest_frequency, own, surface, binding, of_contact, solid, incised,
-          spacing, rest_volume, rest_area, mass, next_patch);
+          specific_stiffness, poissons_ratio, highest_frequency, own, surface, texture, binding, of_contact, solid,
+          incised, spacing, rest_volume, rest_area, mass, next_patch);
   if constexpr (std::is_same_v<A, InArchive>) {
     if (!of_contact.mesh.vertices.empty()) collision = std::make_shared<CollisionSurface>(std::move(of_contact));
     if (!of_cells.cells.empty()) lattice = std::make_shared<CellLattice>(std::move(of_cells));
@@ -314,9 +340,9 @@ void serialize(A& archive, CavityFill& v) {
 }
 template <class A>
 void serialize(A& archive, BodyDef& v) {
-  auto& [name, mesh, solid, thickness, pose, spacing, resolution, clusters, collision, material, fixed, cavities,
-         regions, copy, notes, warnings] = v;
-  (void)regions, (void)thickness;  // the model has them
+  auto& [name, mesh, texture, solid, thickness, pose, spacing, resolution, clusters, collision, material, fixed,
+         cavities, regions, copy, notes, warnings] = v;
+  (void)texture, (void)regions, (void)thickness;  // the model has them
   archive(name, mesh, solid, pose, spacing, choice(resolution, Resolution::kFine), clusters, collision, material, fixed,
           cavities, copy, notes, warnings);
 }

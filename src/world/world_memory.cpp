@@ -9,9 +9,14 @@ MemoryUse World::memory() const {
   MemoryUse use;
   std::set<const void*> seen;  // what is shared
   const auto first = [&seen](const void* part) { return part && seen.insert(part).second; };
+  const auto add = [&first](const BodyModelPtr& model, std::size_t& to) {
+    if (!first(model.get())) return;
+    to += bytesOf(*model);
+    if (first(model->texture.get())) to += model->texture->bytes();
+  };
   for (const auto& body : w.bodies) {
     use.particles += body->state.positions.size();
-    if (first(body->model.get())) use.models += bytesOf(*body->model);
+    add(body->model, use.models);
     use.states += sizeof *body + bytesOf(body->state) + bytesOf(body->scratch) + bytesOf(body->rest_from);
     if (first(body->surface_model.get())) use.contact += body->surface_model->bytes();
     if (first(body->mesh.get()))
@@ -47,13 +52,13 @@ MemoryUse World::memory() const {
   }
   for (const auto& body : w.scene) {
     if (!first(body.get())) continue;
-    if (first(body->model.get())) use.kept += bytesOf(*body->model);
+    add(body->model, use.kept);
     use.kept += sizeof *body + bytesOf(body->state);
   }
   for (const CutUndo& undo : w.undo) use.kept += bytesOfAll(undo.attachments);
   for (const CutUndo& undo : w.undo)
     for (const CutUndo::Body& body : undo.bodies) {
-      if (first(body.model.get())) use.kept += bytesOf(*body.model);
+      add(body.model, use.kept);
       use.kept += sizeof body + bytesOf(body.state);
     }
   return use;

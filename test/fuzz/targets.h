@@ -34,13 +34,17 @@ inline std::string write(const std::string& name, const std::uint8_t* data, std:
 inline void meshFile(const std::uint8_t* data, std::size_t size) {
   if (size < 1) return;
   const char* const endings[] = {"obj", "ply", "stl", "pcd", "vtk", "off", "vtu", "msh"};
-  const Result<TriangleMesh> read = readMeshFile(write(std::string("m.") + endings[data[0] % 8], data + 1, size - 1));
+  FileTexture texture;
+  const Result<TriangleMesh> read =
+      readMeshFile(write(std::string("m.") + endings[data[0] % 8], data + 1, size - 1), nullptr, &texture);
   if (!read) {
     demand(!read.error().detail.empty(), "a refusal says why");
     return;
   }
   demand(!read->vertices.empty(), "what was read has points");
   if (read->triangles.empty() || read->triangles.size() > 500 || read->vertices.size() > 1000) return;
+  const auto map = TextureMap::make(*read, texture.corners);
+  demand(map || texture.corners.size() == 3 * read->triangles.size() || texture.corners.empty(), "three a triangle");
   const Result<RepairedMesh> repaired = repairMesh(*read);
   if (!repaired) {
     demand(!repaired.error().detail.empty(), "a refusal says why");

@@ -6,6 +6,7 @@
 #include "meshless_surgery/ros/moving_surfaces.h"
 #include "ros/scene_support.h"
 #include "support/images.h"
+#include "support/textured.h"
 
 namespace meshless {
 namespace baked_colors_test {
@@ -174,6 +175,46 @@ TEST(BakedColors, AnImageIsSeenFromTheSideThatASurfaceIsTurnedTo) {
     EXPECT_NEAR(colorAt(test::chequered(0.13), Color(), places[v], normal).r, colors.outer[v].r, 1e-5);
   }
   EXPECT_GT(looked_at, 5u);
+}
+
+TEST(BakedColors, TheTopologySaysWhereTheImageOfAFileLies) {
+  const test::TexturedCube cube(0.1);
+  World world((WorldSettings()));
+  for (const bool mapped : {false, true}) {
+    BodyDef def;
+    def.name = mapped ? "mapped" : "plain";
+    def.mesh = cube.mesh;
+    if (mapped) def.texture = cube.map();
+    def.pose.translation.x() = mapped ? 0.0 : 1.0;
+    def.material.appearance.outer = test::sixColors();
+    ASSERT_TRUE(world.addSceneBody(std::make_shared<PreparedBody>(*prepareBody(def))).ok());
+  }
+  ASSERT_TRUE(world.apply(cutAcross(0.013)).ok());
+  MovingSurfaces moving;
+  const auto topology = moving.change(world.snapshot(surfaces()), {});
+  ASSERT_TRUE(topology);
+  ASSERT_EQ(3u, topology->bodies.size());
+  for (const auto& body : topology->bodies) {
+    EXPECT_EQ(body.vertices, body.colors.size() / 3);
+    if (body.name == "plain") {
+      EXPECT_TRUE(body.uv.empty());
+      continue;
+    }
+    ASSERT_EQ(2 * body.triangles.size(), body.uv.size());
+    Points rest;
+    for (std::size_t v = 0; v < body.vertices; ++v)
+      rest.emplace_back(body.rest[3 * v], body.rest[3 * v + 1], body.rest[3 * v + 2]);
+    for (std::size_t c = 0; c < body.triangles.size(); ++c) {
+      const std::size_t t = c / 3;
+      const Vec3 normal = test::TexturedCube::normal(
+          rest, {body.triangles[3 * t], body.triangles[3 * t + 1], body.triangles[3 * t + 2]});
+      const TexturePoint said{body.uv[2 * c], body.uv[2 * c + 1]};
+      if (body.cut[t] != 0)
+        EXPECT_EQ((TexturePoint{0.0f, 0.0f}), said);
+      else if (normal.norm() > 1e-8)
+        EXPECT_LT(test::apart(cube.at(test::sideOf(normal), rest[body.triangles[c]]), said), 1e-5f);
+    }
+  }
 }
 
 TEST(MovingSurfaces, SayAnImageOnceHoweverManyShowIt) {

@@ -20,6 +20,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from deformer_support import ACROSS_X, OF_REVIEW, DeformerTestCase, OwnNode, pose_stamped, run  # noqa: E402
+from mapped_cube import PIXELS, laid_at, seen_at  # noqa: E402
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 RATE, SUBSTEPS, MAX_SUBSTEPS, G, TILT = 240.0, 2, 3, 9.81, 0.2
@@ -31,7 +32,6 @@ SPACINGS = {'flat': 0.025, 'leans': 0.02, 'falls': 0.025, 'hangs': 0.05, 'sags':
 YOUNGS = {'sags': 2e4, 'stiff': 1e5, 'full': 2e4}  # [Pa] of those that are elastic
 # [kg]
 MASSES = {name: (1200 if name in ('flat', 'leans', 'falls', 'hangs') else 1000) * numpy.prod(size) for name, size in SIZES.items()}
-PIXELS = numpy.array([[[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 0]], [[0] * 3, [80] * 3, [160] * 3, [255] * 3]])  # of pixels.png
 HELD_COLOR = 0x1a66ff
 held = set()  # (message, field) that a law holds for a value that is not the one of an empty message
 
@@ -67,16 +67,6 @@ def solid(vertices, triangles):
     parts = numpy.einsum('ij,ij->i', a - vertices[0], normals) / 6.0
     centre = vertices[0] + ((a + b + c - 3 * vertices[0]) / 4.0 * parts[:, None]).sum(0) / parts.sum()
     return parts.sum(), 0.5 * numpy.linalg.norm(normals, axis=1).sum(), centre
-
-
-def seen_at(x, y):
-    """The colour of pixels.png there, in its widths from the lower left corner on: between the middles of pixels."""
-    rows, columns = PIXELS.shape[:2]
-    at = [(-y * columns - 0.5), (x * columns - 0.5)]
-    first = [int(numpy.floor(a)) for a in at]
-    share = [a - f for a, f in zip(at, first)]
-    return sum((share[0] if down else 1 - share[0]) * (share[1] if right else 1 - share[1]) *
-               PIXELS[(first[0] + down) % rows, (first[1] + right) % columns] for down in (0, 1) for right in (0, 1))
 
 
 def mesh_of(answer):
@@ -533,8 +523,27 @@ class MessagesLawTest(DeformerTestCase):
                 looked_at += 1
         self.assertGreater(looked_at, 50)
 
+    def laid_image(self, still, places, triangles):
+        """The image lies as the body's file says."""
+        self.says(still.looks[0], noise=still.looks[0].IMAGE, image=self.image)
+        wanted, shown = [], {}
+        for corners in triangles:
+            a, b, c = places[corners]
+            normal = numpy.cross(b - a, c - a)
+            axis = numpy.argmax(numpy.abs(normal))
+            for vertex in corners:
+                wanted.append(laid_at(2 * axis + (normal[axis] > 0), places[vertex]))
+                shown.setdefault(vertex, []).append(seen_at(wanted[-1][0], wanted[-1][1] / 2.0))
+        self.holds(still, 'uv', numpy.array(wanted).ravel(), 1e-5)
+        for vertex, colour in enumerate(numpy.array(list(bytes(still.colors)), float).reshape(-1, 3)):
+            # At an edge of the cube the one side's or the other's.
+            self.assertLess(min(numpy.abs(colour - side).max() for side in shown[vertex]), 1.0, places[vertex])
+
     def looks(self, still, root, rest_places, triangles, in_plane):
         """Patterns fill the body's own frame, and mix the two colours of their look."""
+        if root == 'hangs':
+            return self.laid_image(still, rest_places - [-1, 0, 2], triangles)
+        self.assertEqual(0, len(still.uv), still.name)
         if root == 'stiff':
             return self.image_look(still, rest_places - [0, 2, 1])
         if root != 'sags':

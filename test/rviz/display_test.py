@@ -13,6 +13,8 @@ import rostest
 import yaml
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+sys.path.append(os.path.join(os.path.dirname(os.path.dirname(os.path.realpath(__file__))), 'ros'))
+from mapped_cube import laid_at, seen_at  # noqa: E402
 from rviz_view import BACKGROUND, configured_view, project, view_rectangle  # noqa: E402
 from virtual_display import VirtualDisplay, stop, wait_until  # noqa: E402
 
@@ -138,6 +140,37 @@ class DisplayTest(unittest.TestCase):
             self.assertIn("there is no file 'no_such.png'", answer.message)
             self.until(lambda: of_each_colour() < 50, 'the image stays')
             self.doCleanups()
+
+    def test_a_file_lays_its_image_on_its_surface(self):
+        self.start()
+        call('pause', SetBool, data=True)
+        call('remove', Remove, name='liver')
+        scenes = os.path.join(rospkg.RosPack().get_path('meshless_surgery'), 'test', 'ros', 'scenes')
+        place = numpy.array([0.0, 0.0, 0.1])
+        call('spawn', Spawn, file=os.path.join(scenes, 'mapped.obj'), name='cube',
+             pose=PoseStamped(pose=Pose(position=Point(*place), orientation=Quaternion(w=1.0))))
+        call('set_material', SetMaterial, body='cube',
+             yaml='{inside_color: [0.1, 0.1, 0.1], appearance: {outer: {image: "%s", wetness: 0}}}' % os.path.join(scenes, 'pixels.png'))
+
+        def off():
+            """How far the colours of the sides +x, -y and +z are from those of the file's image, but for the light; 0 to 2."""
+            most, picture = 0.0, self.display.screenshot().astype(float)
+            for side, axis in ((1, 0), (2, 1), (5, 2)):
+                for right in (-0.6, -0.2, 0.3, 0.7):
+                    for up in (-0.6, 0.0, 0.6):
+                        at = 0.05 * numpy.roll([1.0 if side % 2 else -1.0, right, up], axis)
+                        row, column = project((place + at)[None], self.view, self.rectangle)[0]
+                        seen = picture[row - 1:row + 2, column - 1:column + 2].mean(axis=(0, 1))
+                        u, v = laid_at(side, at)
+                        wanted = seen_at(u, v / 2.0)
+                        most = max(most, numpy.abs(seen / max(numpy.linalg.norm(seen), 1.0) - wanted / numpy.linalg.norm(wanted)).sum())
+            return most
+        self.until(lambda: off() < 0.25, 'the image lies elsewhere')
+        call('cut', Cut, blades=PoseStamped(pose=Pose(position=Point(0.004, -1, 0.1), orientation=Quaternion(0.5, 0.5, 0.5, 0.5))))
+        wait_until(lambda: len(rospy.wait_for_message('/deformer/state', State, LONG).bodies) == 2, LONG)
+        rospy.sleep(1.0)
+        self.save('uv')
+        self.until(lambda: off() < 0.25, 'the image lies elsewhere on the pieces')
 
     def test_edges_of_cuts_are_bloody(self):
         self.start()

@@ -11,6 +11,7 @@
 #include "support/forged.h"
 #include "support/images.h"
 #include "support/random.h"
+#include "support/textured.h"
 
 namespace meshless {
 namespace saved_world_test {
@@ -442,7 +443,10 @@ std::string sealed(std::string bytes) {
 /// A state that is small enough for every byte and every bit of it to be tried.
 World oneSmallBox() {
   World world{WorldSettings()};
-  EXPECT_TRUE(world.addSceneBody(test::shared(test::defOf(boxMesh(Vec3(0.05, 0.05, 0.05), 1, 1, 1), "box"))).ok());
+  const test::TexturedCube cube(0.05, 1);
+  BodyDef def = test::defOf(cube.mesh, "box");
+  def.texture = cube.map();
+  EXPECT_TRUE(world.addSceneBody(test::shared(def)).ok());
   run(world, 3);
   return world;
 }
@@ -489,7 +493,7 @@ TEST(DamagedState, OfAnotherKindOrVersion) {
   expectRefused("solid ball\nfacet normal 0 0 1\n", "MLSSTATE");
   std::string bytes = bytesOf(ballThatFalls());
   bytes[8] = 9;
-  expectRefused(bytes, "version 9; accepted: 21");
+  expectRefused(bytes, "version 9; accepted: 22");
 }
 
 // The text at the start is of a length that is known to lie where it lies.
@@ -501,6 +505,25 @@ TEST(DamagedState, ThatClaimsMoreThanItHas) {
   }
 }
 
+TEST(DamagedState, WithTextureCoordinatesOfNoSurface) {
+  const std::string bytes = bytesOf(oneSmallBox());
+  const test::TexturedCube cube(0.05, 1);
+  const std::string points(reinterpret_cast<const char*>(cube.points.data()),
+                           sizeof(TexturePoint) * cube.points.size());
+  const std::size_t at = bytes.find(points), triangles = at - 16 - sizeof(Triangle) * cube.mesh.triangles.size();
+  ASSERT_NE(std::string::npos, at);
+  const auto forged = [&](std::size_t place, auto value) {
+    std::string other = bytes;
+    std::memcpy(&other[place], &value, sizeof value);
+    return sealed(other);
+  };
+  expectRefused(forged(at, std::numeric_limits<float>::quiet_NaN()), "one is not finite");
+  expectRefused(forged(triangles, Index{8}), "not there");
+  expectRefused(forged(triangles, kNoIndex), "not there");
+  expectRefused(forged(triangles - 16, 1e300), "a number is");
+  expectRefused(forged(at - 8, std::uint64_t{35}), "no state that can be read");
+}
+
 // Somebody forged it, checksum and all, with numbers that no world has: refused, or a world that steps within seconds
 // of the processor. Places are chosen where a number lies.
 TEST(DamagedState, ForgedAtRandom) {
@@ -509,7 +532,7 @@ TEST(DamagedState, ForgedAtRandom) {
   ASSERT_GT(seeds, 0);
   int refused = 0, read = 0;
   int scene = 0;
-  for (World (*make)() : {elasticCut, filledCells, filledCellsCut, everyTool, plastic}) {
+  for (World (*make)() : {elasticCut, filledCells, filledCellsCut, everyTool, plastic, oneSmallBox}) {
     ++scene;
     const std::string bytes = encode(*make().capture());
     for (int seed = 1; seed <= seeds; ++seed)

@@ -1,6 +1,6 @@
 // How tissue looks: two colours mixed by a pattern that fills space, or an image seen along the three axes. Both are
 // functions of the place at rest, so they are the same on every mesh, need no texture coordinates, and go on across
-// cuts.
+// cuts. Where a file has texture coordinates, its image lies as they say.
 #pragma once
 
 #include "meshless_surgery/appearance/image.h"
@@ -20,9 +20,9 @@ struct Look {
   Noise noise = Noise::kPlain;
   Color second{0.5f, 0.15f, 0.12f, 1.0f};  // where the pattern is full; its opacity does not count
   ImagePtr image;                          // of kImage, and of no other
-  double scale = 0.004;                    // [m] 1e-5..1, of a cell of the pattern, or of the image's width
-  double wetness = 0.5;                    // 0..1: how bright and how sharp lamps are mirrored
-  double bump = 0.0;                       // 0..1: how uneven it is to light
+  double scale = 0.004;  // [m] 1e-5..1, of a cell of the pattern, or of the image's width along the axes
+  double wetness = 0.5;  // 0..1: how bright and how sharp lamps are mirrored
+  double bump = 0.0;     // 0..1: how uneven it is to light
 
   /// Why it is not usable, naming key, value and range; else Done.
   Status validate(const std::string& of) const;
@@ -48,5 +48,7 @@ double patternAt(const Look& look, const Vec3& place);
 /// surface is turned to each. `normal`: of the surface at rest in the body's own frame, outwards or inwards; of any
 /// length, zero where there is none. The base's opacity.
 Color colorAt(const Look& look, const Color& base, const Vec3& place, const Vec3& normal);
+/// Of the look's image, so far to the right and up from its lower left corner; it is one wide and one high.
+Color colorAt(const Look& look, const Color& base, const std::array<float, 2>& at);
 
 }  // namespace meshless

@@ -2,6 +2,7 @@
 // size is checked against the bytes that are left before memory is taken, and every fault throws ArchiveFault.
 #pragma once
 
+#include <any>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -81,8 +82,8 @@ class InArchive : public cereal::InputArchive<InArchive, cereal::AllowEmptyClass
     left_.remove_prefix(size);
   }
   std::size_t left() const { return left_.size(); }
-  /// The shared values that have come; all of one type.
-  std::vector<std::shared_ptr<const void>>& shared() { return shared_; }
+  /// The shared values that have come.
+  std::vector<std::any>& shared() { return shared_; }
   /// Throws where `count` elements of at least `bytes` each cannot be there.
   void need(std::uint64_t count, std::size_t bytes) const {
     if (count > left_.size() / bytes)
@@ -92,7 +93,7 @@ class InArchive : public cereal::InputArchive<InArchive, cereal::AllowEmptyClass
 
  private:
   std::string_view left_;
-  std::vector<std::shared_ptr<const void>> shared_;
+  std::vector<std::any> shared_;
 };
 
 /// Values that are their bytes: numbers, and fixed arrays and matrices of them.

@@ -87,6 +87,7 @@ struct BodyModel {
   double highest_frequency = 0.0;   // [rad/s] of an elastic material: see longestSubstep()
   Pose own;                         // from the frame of rest positions to the body's own, that of its file
   TriangleMesh surface;             // rest positions of the vertices [m]
+  TextureMapPtr texture;            // of its file, which its pieces share; null: it has none
   SurfaceBinding binding;
   std::shared_ptr<const CollisionSurface> collision;  // null: contact takes the visual surface
   std::shared_ptr<const Cavities> cavities;           // null: none is filled

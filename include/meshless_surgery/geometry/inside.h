@@ -26,6 +26,10 @@ class SolidQuery {
   double distance(const Vec3& p) const;
   /// The place on it that is nearest to p; p where there is none.
   Vec3 nearest(const Vec3& p) const;
+  /// The triangle of the mesh that this is on; kNoIndex where there is none.
+  Index nearestTriangle(const Vec3& p) const;
+
+  std::size_t bytes() const;
 
  private:
   struct Data;

@@ -7,6 +7,7 @@
 
 #include "meshless_surgery/base/result.h"
 #include "meshless_surgery/geometry/mend.h"
+#include "meshless_surgery/geometry/texture_map.h"
 
 namespace meshless {
 
@@ -23,14 +24,23 @@ struct FileAccess {
   Result<std::string> resolve(const std::string& path, const std::string& base_folder) const;
 };
 
+/// The texture coordinates of a file: one a corner of its faces. Empty where there are none, or where something is
+/// wrong with them: `fault` says what.
+struct FileTexture {
+  std::vector<TexturePoint> corners;
+  std::string fault;
+};
+
 /// By the file's ending: PCD, OBJ, STL, VTK, OFF through PCL; PLY; of VTK's unstructured grids (.vtk, .vtu) and Gmsh's
 /// .msh the outer surface of the volumes, or without any their triangles and quads. Polygons are split into triangles.
 /// A file without faces is a cloud: mesh.triangles is empty. `real_path` has no links in it, as FileAccess::resolve
-/// gives it. `notes` gets a sentence where the surface was taken of volumes. Refuses kUnreadable (missing, replaced
-/// meanwhile, truncated, unknown ending, more than 512 MiB) and kUnsuitableShape (no points, more than 2,000,000
-/// points, 8,000,000 faces or cells or 32,000,000 corners of them; a face of more than two volumes). Non-finite points
-/// are left to repairMesh to name, for surfaces; in clouds they are dropped; volumes with such corners are refused.
-Result<TriangleMesh> readMeshFile(const std::string& real_path, std::vector<std::string>* notes = nullptr);
+/// gives it. `notes` gets a sentence where the surface was taken of volumes; `texture` the coordinates of OBJ and PLY,
+/// three a triangle. Refuses kUnreadable (missing, replaced meanwhile, truncated, unknown ending, more than 512 MiB)
+/// and kUnsuitableShape (no points, more than 2,000,000 points, 8,000,000 faces or cells or 32,000,000 corners of them;
+/// a face of more than two volumes). Non-finite points are left to repairMesh to name, for surfaces; in clouds they are
+/// dropped; volumes with such corners are refused.
+Result<TriangleMesh> readMeshFile(const std::string& real_path, std::vector<std::string>* notes = nullptr,
+                                  FileTexture* texture = nullptr);
 
 /// Of the lengths of a file or primitive, as scenes and ~spawn name them; the first is what no word means.
 constexpr std::array<std::pair<const char*, double>, 3> kLengthUnits{{{"m", 1.0}, {"cm", 0.01}, {"mm", 0.001}}};
@@ -39,6 +49,7 @@ constexpr std::array<std::pair<const char*, double>, 3> kLengthUnits{{{"m", 1.0}
 /// far as `repair` goes. notes say what was done.
 struct LoadedShape {
   TriangleMesh mesh;
+  TextureMapPtr texture;  // of the mesh as it was read, scaled; null: none, or a note says why it is not used
   bool solid = true;
   std::vector<std::string> notes;
 };

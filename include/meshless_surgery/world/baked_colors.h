@@ -1,4 +1,5 @@
-// The patterns of tissue as colours of vertices: computed where a surface or its look is new, not in each frame.
+// The patterns of tissue as colours of vertices, and where its image lies: computed where a surface or its look is new,
+// not in each frame.
 #pragma once
 
 #include <map>
@@ -12,6 +13,9 @@ namespace meshless {
 /// colour: the material's.
 struct VertexColors {
   std::vector<Color> outer, inside;
+  /// One a corner of each triangle, on faces of cuts (0, 0); empty where the outer surface has no image, or its file
+  /// no texture coordinates.
+  std::vector<TexturePoint> texture;
 };
 VertexColors bakeColors(const BodyModel& model, const Material& material);
 
