@@ -375,7 +375,7 @@ class MessagesLawTest(DeformerTestCase):
     def test_each_step_that_takes_longer_than_it_is_long_is_counted(self):
         with open(os.path.join(HERE, 'scenes', 'messages.yaml')) as scene:
             text = scene.read().replace('step_rate: 240, substeps: 2, max_substeps: 3', 'step_rate: 10000, substeps: 50')
-        with tempfile.NamedTemporaryFile('w', suffix='.yaml') as scene:
+        with tempfile.NamedTemporaryFile('w', suffix='.yaml', dir=os.path.join(HERE, 'scenes')) as scene:
             scene.write(text)
             scene.flush()
             with OwnNode(scene=scene.name, paused=True, state_rate=200) as own:

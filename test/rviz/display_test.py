@@ -13,7 +13,7 @@ import rostest
 import yaml
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-sys.path.append(os.path.join(os.path.dirname(os.path.dirname(os.path.realpath(__file__))), 'ros'))
+sys.path.insert(1, os.path.join(os.path.dirname(os.path.dirname(os.path.realpath(__file__))), 'ros'))
 from mapped_cube import laid_at, seen_at  # noqa: E402
 from rviz_view import BACKGROUND, configured_view, project, view_rectangle  # noqa: E402
 from virtual_display import VirtualDisplay, stop, wait_until  # noqa: E402
@@ -147,7 +147,7 @@ class DisplayTest(unittest.TestCase):
         call('remove', Remove, name='liver')
         scenes = os.path.join(rospkg.RosPack().get_path('meshless_surgery'), 'test', 'ros', 'scenes')
         place = numpy.array([0.0, 0.0, 0.1])
-        call('spawn', Spawn, file=os.path.join(scenes, 'mapped.obj'), name='cube',
+        call('spawn', Spawn, file=os.path.join(scenes, 'mapped.obj'), units='mm', name='cube',
              pose=PoseStamped(pose=Pose(position=Point(*place), orientation=Quaternion(w=1.0))))
         call('set_material', SetMaterial, body='cube',
              yaml='{inside_color: [0.1, 0.1, 0.1], appearance: {outer: {image: "%s", wetness: 0}}}' % os.path.join(scenes, 'pixels.png'))
