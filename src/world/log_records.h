@@ -22,57 +22,25 @@ enum class RecordKind : std::uint8_t {
 };
 
 // Commands as they are logged; those of materials and bodies have their own way.
-template <class A>
-void serialize(A& archive, PickCommand& v) {
-  auto& [point, direction, body, max_distance, stiffness] = v;
-  archive(point, direction, body, max_distance, stiffness);
-}
-template <class A>
-void serialize(A& archive, MovePickCommand& v) {
-  auto& [pick, target] = v;
-  archive(pick, target);
-}
-template <class A>
-void serialize(A& archive, LockCommand& v) {
-  auto& [pick, target] = v;
-  archive(pick, target);
-}
-template <class A>
-void serialize(A& archive, ReleaseCommand& v) {
-  auto& [pick] = v;
-  archive(pick);
-}
+MESHLESS_ARCHIVE(PickCommand, point, direction, body, max_distance, stiffness)
+MESHLESS_ARCHIVE(MovePickCommand, pick, target)
+MESHLESS_ARCHIVE(LockCommand, pick, target)
+MESHLESS_ARCHIVE(ReleaseCommand, pick)
 template <class A>
 void serialize(A&, ClearPicksCommand&) {}
 template <class A>
 void serialize(A&, OpenScissorsCommand&) {}
 template <class A>
 void serialize(A&, UndoCutCommand&) {}
-template <class A>
-void serialize(A& archive, OpenBladesCommand& v) {
-  auto& [ticket] = v;
-  archive(ticket);
-}
-template <class A>
-void serialize(A& archive, PushCommand& v) {
-  auto& [enable, radius, position, speed, streamed] = v;
-  archive(enable, radius, position, speed, streamed);
-}
-template <class A>
-void serialize(A& archive, InciseCommand& v) {
-  auto& [blade, bodies] = v;
-  archive(blade, bodies);
-}
+MESHLESS_ARCHIVE(OpenBladesCommand, ticket)
+MESHLESS_ARCHIVE(PushCommand, enable, radius, position, speed, streamed)
+MESHLESS_ARCHIVE(InciseCommand, blade, bodies)
 template <class A>
 void serialize(A& archive, LiftCommand& v) {
   auto& [tool, streamed_only, why] = v;
   archive(choice(tool, ToolKind::kScissors), streamed_only, why);
 }
-template <class A>
-void serialize(A& archive, RemoveCommand& v) {
-  auto& [body] = v;
-  archive(body);
-}
+MESHLESS_ARCHIVE(RemoveCommand, body)
 inline void save(OutArchive& archive, const SpawnCommand& v) {
   archive(*v.body->model);
   savePrepared(archive, *v.body, 0);

@@ -54,19 +54,23 @@ bool areTriangles(const TriangleMesh& mesh) {
          });
 }
 
-template <class Archive>
-void saveBody(Archive& archive, const SavedBody& body, std::uint32_t model) {
-  archive(body.id, body.number, body.name, body.material, model, body.state, body.surface_current, body.touched_by_push,
-          body.stiffness_factor, body.bounds, body.asleep, body.still_for, body.rest_from, body.sleep_group,
-          body.batch);
+template <class Of, class Kept>
+using As = std::conditional_t<std::is_const_v<Of>, const Kept, Kept>;
+
+/// With its model's place in the table instead of its model.
+template <class Archive, class Body, class Place>
+void keepBody(Archive& archive, Body& body, Place& place) {
+  auto& [id, number, name, material, model, state, surface_current, touched_by_push, stiffness_factor, bounds, asleep,
+         still_for, rest_from, sleep_group] = static_cast<As<Body, KeptBody>&>(body);
+  (void)model;
+  archive(id, number, name, material, place, state, surface_current, touched_by_push, stiffness_factor, bounds, asleep,
+          still_for, rest_from, sleep_group, body.batch);
 }
 
 SavedBody loadBody(InArchive& archive, const ModelTable& models) {
   SavedBody body;
   std::uint32_t model = 0;
-  archive(body.id, body.number, body.name, body.material, model, body.state, body.surface_current, body.touched_by_push,
-          body.stiffness_factor, body.bounds, body.asleep, body.still_for, body.rest_from, body.sleep_group,
-          body.batch);
+  keepBody(archive, body, model);
   body.model = models.at(model);
   requireNone(faultOf(*body.model, body.state));
   requireNone(faultOf(*body.model, body.material));
@@ -75,13 +79,16 @@ SavedBody loadBody(InArchive& archive, const ModelTable& models) {
   return body;
 }
 
-// Everything but bodies, scene and obstacles.
+// Everything but settings, bodies, scene and obstacles.
 template <class Archive, class World>
-void rest(Archive& archive, World& world) {
-  archive(world.step, world.batches_current, world.batches, world.generations, world.free_slots, world.next_number,
-          world.used_names, world.picks, world.next_pick, world.attachments, world.used_attachments,
-          world.scene_attachments, world.push, world.scissors, world.closing, world.next_ticket, world.next_sleep_group,
-          world.surface_contacts);
+void keepRest(Archive& archive, World& world) {
+  auto& [settings, step, batches_current, generations, free_slots, next_number, used_names, scene, picks, next_pick,
+         attachments, used_attachments, scene_attachments, push, scissors, closing, next_ticket, next_sleep_group,
+         tetrahedralizations] = static_cast<As<World, KeptWorld>&>(world);
+  (void)settings, (void)scene;
+  archive(step, batches_current, world.batches, generations, free_slots, next_number, used_names, picks, next_pick,
+          attachments, used_attachments, scene_attachments, push, scissors, closing, next_ticket, next_sleep_group,
+          world.surface_contacts, tetrahedralizations);
 }
 
 void checkSlots(const SavedWorld& world) {
@@ -189,8 +196,7 @@ void readScene(InArchive& archive, const ModelTable& models, SavedWorld& world) 
 }
 
 void readRest(InArchive& archive, SavedWorld& world) {
-  rest(archive, world);
-  archive(world.tetrahedralizations);
+  keepRest(archive, world);
   require(archive.left() == 0, std::to_string(archive.left()) + " bytes are left over");
   checkSlots(world);
   checkBatches(world);
@@ -212,7 +218,10 @@ void readRest(InArchive& archive, SavedWorld& world) {
 
 void writeBodies(OutArchive& archive, ModelTable& models, const SavedWorld& world) {
   archive(static_cast<std::uint64_t>(world.bodies.size()));
-  for (const SavedBody& body : world.bodies) saveBody(archive, body, models.add(body.model));
+  for (const SavedBody& body : world.bodies) {
+    const std::uint32_t model = models.add(body.model);
+    keepBody(archive, body, model);
+  }
 }
 
 void writeScene(OutArchive& archive, ModelTable& models, const SavedWorld& world) {
@@ -222,10 +231,7 @@ void writeScene(OutArchive& archive, ModelTable& models, const SavedWorld& world
   for (const auto& obstacle : world.obstacles) archive(*obstacle);
 }
 
-void writeRest(OutArchive& archive, const SavedWorld& world) {
-  rest(archive, world);
-  archive(world.tetrahedralizations);
-}
+void writeRest(OutArchive& archive, const SavedWorld& world) { keepRest(archive, world); }
 
 // --- checks
 
@@ -504,37 +510,16 @@ Result<DecodedWorld> decode(std::string_view bytes) {
 std::shared_ptr<const SavedWorld> World::capture() const {
   Impl& w = *impl_;
   auto saved = std::make_shared<SavedWorld>();
-  saved->settings = w.settings;
-  saved->step = w.step;
+  static_cast<KeptWorld&>(*saved) = w;
   std::map<const WorldBody*, std::uint32_t> batch_of;
   for (std::size_t i = 0; i < w.batches.size(); ++i)
     for (const WorldBody* body : w.batches[i].bodies) batch_of[body] = static_cast<std::uint32_t>(i);
-  saved->batches_current = w.batches_current;
   saved->batches = w.batches_current ? static_cast<std::uint32_t>(w.batches.size()) : 0;
   for (const auto& body : w.bodies) {
     const auto batch = batch_of.find(body.get());
-    saved->bodies.push_back({body->id, body->number, body->name, body->material, body->model, body->state,
-                             body->surface_current, body->touched_by_push, body->stiffness_factor, body->bounds,
-                             body->asleep, body->still_for, body->rest_from, body->sleep_group,
-                             w.batches_current && batch != batch_of.end() ? batch->second : kNoIndex});
+    saved->bodies.push_back({*body, w.batches_current && batch != batch_of.end() ? batch->second : kNoIndex});
   }
-  saved->generations = w.generations;
-  saved->free_slots = w.free_slots;
-  saved->next_number = w.next_number;
-  saved->used_names = w.used_names;
-  saved->scene = w.scene;
   for (const auto& obstacle : w.obstacles) saved->obstacles.push_back(obstacle->def);
-  saved->picks = w.picks;
-  saved->next_pick = w.next_pick;
-  saved->attachments = w.attachments;
-  saved->used_attachments = w.used_attachments;
-  saved->scene_attachments = w.scene_attachments;
-  saved->push = w.push;
-  saved->scissors = w.scissors;
-  saved->closing = w.closing;
-  saved->next_ticket = w.next_ticket;
-  saved->tetrahedralizations = w.tetrahedralizations;
-  saved->next_sleep_group = w.next_sleep_group;
   saved->surface_contacts = w.surface_contacts.memory();
   return saved;
 }
@@ -542,57 +527,25 @@ std::shared_ptr<const SavedWorld> World::capture() const {
 void World::restore(const SavedWorld& saved) {
   Impl& w = *impl_;
   w.recordState(saved);
-  const int threads = w.settings.threads;  // the machine's, not the state's
-  w.settings = saved.settings;
-  w.settings.threads = threads;
   for (const ClosingCut& c : w.closing)
     w.finished.emplace(c.ticket, Error{ErrorCode::kFailed, "another state was loaded before the blades met"});
   w.batches.clear();
   w.bodies.clear();
   for (const SavedBody& from : saved.bodies) {
-    auto body = std::make_unique<WorldBody>();
-    body->id = from.id;
-    body->number = from.number;
-    body->name = from.name;
-    body->material = from.material;
-    body->model = from.model;
-    body->state = from.state;
-    body->surface_current = from.surface_current;
-    body->touched_by_push = from.touched_by_push;
-    body->stiffness_factor = from.stiffness_factor;
-    body->bounds = from.bounds;
-    body->asleep = from.asleep;
-    body->still_for = from.still_for;
-    body->rest_from = from.rest_from;
-    body->sleep_group = from.sleep_group;
-    w.bodies.push_back(std::move(body));
+    w.bodies.push_back(std::make_unique<WorldBody>());
+    static_cast<KeptBody&>(*w.bodies.back()) = from;
   }
+  const int threads = w.settings.threads;  // the machine's, not the state's
+  static_cast<KeptWorld&>(w) = saved;
+  w.settings.threads = threads;
   // Who was matched together then is not who would be grouped now.
-  w.batches_current = saved.batches_current;
   std::vector<std::vector<WorldBody*>> groups(saved.batches);
   for (std::size_t b = 0; b < saved.bodies.size(); ++b)
     if (saved.bodies[b].batch != kNoIndex) groups[saved.bodies[b].batch].push_back(w.bodies[b].get());
   for (std::vector<WorldBody*>& group : groups) w.addBatch(std::move(group));
-  w.generations = saved.generations;
-  w.free_slots = saved.free_slots;
-  w.next_number = saved.next_number;
-  w.used_names = saved.used_names;
-  w.scene = saved.scene;
   w.obstacles.clear();
   for (const auto& obstacle : saved.obstacles) w.obstacles.push_back(std::make_shared<WorldObstacle>(*obstacle));
-  w.picks = saved.picks;
-  w.next_pick = saved.next_pick;
-  w.attachments = saved.attachments;
-  w.used_attachments = saved.used_attachments;
-  w.scene_attachments = saved.scene_attachments;
   w.listFibres();
-  w.push = saved.push;
-  w.scissors = saved.scissors;
-  w.closing = saved.closing;
-  w.next_ticket = saved.next_ticket;
-  w.tetrahedralizations = saved.tetrahedralizations;
-  w.next_sleep_group = saved.next_sleep_group;
-  w.step = saved.step;
   w.undo.clear();
   w.report = StepReport();
   w.awake.clear();

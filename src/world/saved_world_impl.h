@@ -18,61 +18,21 @@ inline std::uint32_t checksum(std::string_view bytes) {
       crc32_z(crc32_z(0, nullptr, 0), reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
-struct SavedBody {
-  BodyId id;
-  std::uint32_t number = 0;
-  std::string name;
-  Material material;
-  BodyModelPtr model;
-  BodyState state;
-  bool surface_current = true;
-  bool touched_by_push = false;
-  double stiffness_factor = 1.0;
-  Box bounds;
-  bool asleep = false;
-  double still_for = 0.0;
-  Points rest_from;
-  std::uint32_t sleep_group = 0;
+struct SavedBody : KeptBody {
   std::uint32_t batch = kNoIndex;  // which of World::Impl::batches it is in
 };
 
-struct SavedWorld {
-  WorldSettings settings;
-  std::uint64_t step = 0;
+struct SavedWorld : KeptWorld {
   std::vector<SavedBody> bodies;
-  bool batches_current = false;
   std::uint32_t batches = 0;
-  std::vector<std::uint32_t> generations, free_slots;
-  std::uint32_t next_number = 1;
-  std::set<std::string> used_names;
-  std::vector<std::shared_ptr<const PreparedBody>> scene;
   std::vector<std::shared_ptr<const ObstacleDef>> obstacles;
-  std::vector<Pick> picks;
-  PickId next_pick = 1;
-  std::vector<Attachment> attachments;
-  std::set<std::string> used_attachments;
-  std::vector<AttachCommand> scene_attachments;
-  PushSphere push;
-  Scissors scissors;
-  std::vector<ClosingCut> closing;
-  std::uint32_t next_ticket = 1;
-  std::uint64_t tetrahedralizations = 0;
-  std::uint32_t next_sleep_group = 1;
   SurfaceMemory surface_contacts;
 };
 
 // Writing goes over constant values: cereal takes the const away and hands them to serialize(), which only reads then.
 
-template <class A>
-void serialize(A& archive, BodyId& v) {
-  auto& [slot, generation] = v;
-  archive(slot, generation);
-}
-template <class A>
-void serialize(A& archive, Pose& v) {
-  auto& [rotation, translation] = v;
-  archive(rotation, translation);
-}
+MESHLESS_ARCHIVE(BodyId, slot, generation)
+MESHLESS_ARCHIVE(Pose, rotation, translation)
 template <class A>
 void serialize(A& archive, Box& v) {
   auto& [min, max] = v;
@@ -85,26 +45,10 @@ void serialize(A& archive, Box& v) {
     archive(min, max);
   }
 }
-template <class A>
-void serialize(A& archive, Color& v) {
-  auto& [r, g, b, a] = v;
-  archive(r, g, b, a);
-}
-template <class A>
-void serialize(A& archive, TriangleMesh& v) {
-  auto& [vertices, triangles, patches] = v;
-  archive(vertices, triangles, patches);
-}
-template <class A>
-void serialize(A& archive, ResponseCurve& v) {
-  auto& [points] = v;
-  archive(points);
-}
-template <class A>
-void serialize(A& archive, Plasticity& v) {
-  auto& [yield, creep, maximum] = v;
-  archive(yield, creep, maximum);
-}
+MESHLESS_ARCHIVE(Color, r, g, b, a)
+MESHLESS_ARCHIVE(TriangleMesh, vertices, triangles, patches)
+MESHLESS_ARCHIVE(ResponseCurve, points)
+MESHLESS_ARCHIVE(Plasticity, yield, creep, maximum)
 /// What many share, a file has once, where it comes first: write() and read() are for that.
 template <class T, class Write>
 void saveShared(OutArchive& archive, const std::shared_ptr<const T>& value, const Write& write) {
@@ -164,11 +108,7 @@ void serialize(A& archive, Look& v) {
   auto& [noise, second, image, scale, wetness, bump] = v;
   archive(choice(noise, Noise::kImage), second, image, scale, wetness, bump);
 }
-template <class A>
-void serialize(A& archive, Appearance& v) {
-  auto& [outer, inner] = v;
-  archive(outer, inner);
-}
+MESHLESS_ARCHIVE(Appearance, outer, inner)
 template <class A>
 void serialize(A& archive, Material& v) {
   auto& [name, youngs_modulus, poissons_ratio, mode, alpha, beta, density, damping, friction, restitution, self_contact,
@@ -187,61 +127,22 @@ void serialize(A& archive, WorldSettings& v) {
 
 // --- models
 
-template <class A>
-void serialize(A& archive, ParticleGraph& v) {
-  auto& [offsets, neighbours, lengths] = v;
-  archive(offsets, neighbours, lengths);
-}
+MESHLESS_ARCHIVE(ParticleGraph, offsets, neighbours, lengths)
 template <class A>
 void serialize(A& archive, ClusterSet& v) {
   auto& [offsets, members, weights, seeds, radii] = v;
   archive(offsets, members, weights, seeds, endless(radii));
 }
-template <class A>
-void serialize(A& archive, ClusterRest& v) {
-  auto& [mass, centre, size, linear_rank, quadratic_rank, moment_inverse] = v;
-  archive(mass, centre, size, linear_rank, quadratic_rank, moment_inverse);
-}
-template <class A>
-void serialize(A& archive, QuadraticRest& v) {
-  auto& [mean, moment_inverse] = v;
-  archive(mean, moment_inverse);
-}
-template <class A>
-void serialize(A& archive, RestShape& v) {
-  auto& [clusters, quadratic] = v;
-  archive(clusters, quadratic);
-}
-template <class A>
-void serialize(A& archive, ElasticRest& v) {
-  auto& [spread_inverse, spread] = v;
-  archive(spread_inverse, spread);
-}
-template <class A>
-void serialize(A& archive, SurfaceBinding& v) {
-  auto& [particle, embedded, offsets, carriers, weights, levers, turners, lever_clusters, bound] = v;
-  archive(particle, embedded, offsets, carriers, weights, levers, turners, lever_clusters, bound);
-}
-template <class A>
-void serialize(A& archive, Resistance& v) {
-  auto& [fraction, centroid, variance] = v;
-  archive(fraction, centroid, variance);
-}
-template <class A>
-void serialize(A& archive, ClampPoint& v) {
-  auto& [cell, at, area] = v;
-  archive(cell, at, area);
-}
-template <class A>
-void serialize(A& archive, LatticeCell& v) {
-  auto& [corners, place, samples, filled, held, resists, parted, mass_share, stiffness_share, bridge, face] = v;
-  archive(corners, place, samples, filled, held, resists, parted, mass_share, stiffness_share, bridge, face);
-}
-template <class A>
-void serialize(A& archive, CellRegions::Part& v) {
-  auto& [place, region, samples] = v;
-  archive(place, region, samples);
-}
+MESHLESS_ARCHIVE(ClusterRest, mass, centre, size, linear_rank, quadratic_rank, moment_inverse)
+MESHLESS_ARCHIVE(QuadraticRest, mean, moment_inverse)
+MESHLESS_ARCHIVE(RestShape, clusters, quadratic)
+MESHLESS_ARCHIVE(ElasticRest, spread_inverse, spread)
+MESHLESS_ARCHIVE(SurfaceBinding, particle, embedded, offsets, carriers, weights, levers, turners, lever_clusters, bound)
+MESHLESS_ARCHIVE(Resistance, fraction, centroid, variance)
+MESHLESS_ARCHIVE(ClampPoint, cell, at, area)
+MESHLESS_ARCHIVE(LatticeCell, corners, place, samples, filled, held, resists, parted, mass_share, stiffness_share,
+                 bridge, face)
+MESHLESS_ARCHIVE(CellRegions::Part, place, region, samples)
 template <class A>
 void serialize(A& archive, CellLattice& v) {
   auto& [spacing, origin, corners, cells, regions] = v;
@@ -251,16 +152,8 @@ void serialize(A& archive, CellLattice& v) {
   if constexpr (std::is_same_v<A, InArchive>)
     if (!parts.empty()) regions = std::make_shared<CellRegions>(std::move(parts));
 }
-template <class A>
-void serialize(A& archive, RegionTissue& v) {
-  auto& [material, density, mu, lambda, youngs] = v;
-  archive(material, density, mu, lambda, youngs);
-}
-template <class A>
-void serialize(A& archive, CollisionSurface& v) {
-  auto& [mesh, binding, distance] = v;
-  archive(mesh, binding, distance);
-}
+MESHLESS_ARCHIVE(RegionTissue, material, density, mu, lambda, youngs)
+MESHLESS_ARCHIVE(CollisionSurface, mesh, binding, distance)
 /// elastic_batch, cells, clamp, tissue and cavities are made again by whoever reads, once all is checked; empty until
 /// then.
 template <class A>
@@ -287,21 +180,9 @@ void serialize(A& archive, BodyModel& v) {
 
 // --- states
 
-template <class A>
-void serialize(A& archive, ClusterPose& v) {
-  auto& [centre, rotation, deformation] = v;
-  archive(centre, rotation, deformation);
-}
-template <class A>
-void serialize(A& archive, PlasticShape& v) {
-  auto& [stretch, inverse, stiffening] = v;
-  archive(stretch, inverse, stiffening);
-}
-template <class A>
-void serialize(A& archive, FilledCavity& v) {
-  auto& [patch, pressure, content, compliance, leak, filled_for, open_for, acting] = v;
-  archive(patch, pressure, content, compliance, leak, filled_for, open_for, acting);
-}
+MESHLESS_ARCHIVE(ClusterPose, centre, rotation, deformation)
+MESHLESS_ARCHIVE(PlasticShape, stretch, inverse, stiffening)
+MESHLESS_ARCHIVE(FilledCavity, patch, pressure, content, compliance, leak, filled_for, open_for, acting)
 template <class A>
 void serialize(A& archive, BodyState& v) {
   auto& [positions, velocities, poses, surface, swelling, stretch, pace, stiffened, substep, plastic, eased, eased_for,
@@ -316,11 +197,7 @@ void serialize(A& archive, ClusterOptions& v) {
   auto& [kind, grid, count, overlap] = v;
   archive(choice(kind, ClusterOptions::Kind::kCells), grid, count, overlap);
 }
-template <class A>
-void serialize(A& archive, Plane& v) {
-  auto& [normal, point] = v;
-  archive(normal, point);
-}
+MESHLESS_ARCHIVE(Plane, normal, point)
 template <class A>
 void serialize(A& archive, Region& v) {
   archive(choice(v.kind, Region::Kind::kSphere), v.box, v.plane, v.centre, v.radius);
@@ -346,85 +223,29 @@ void serialize(A& archive, BodyDef& v) {
   archive(name, mesh, solid, pose, spacing, choice(resolution, Resolution::kFine), clusters, collision, material, fixed,
           cavities, copy, notes, warnings);
 }
-template <class A>
-void serialize(A& archive, ObstacleDef& v) {
-  auto& [name, mesh, friction, color] = v;
-  archive(name, mesh, friction, color);
-}
+MESHLESS_ARCHIVE(ObstacleDef, name, mesh, friction, color)
 
 // --- tools and commands
 
-template <class A>
-void serialize(A& archive, ScissorBlades& v) {
-  auto& [origin, x_axis, y_axis, length, width] = v;
-  archive(origin, x_axis, y_axis, length, width);
-}
-template <class A>
-void serialize(A& archive, Blade& v) {
-  auto& [origin, x_axis, y_axis, length, depth] = v;
-  archive(origin, x_axis, y_axis, length, depth);
-}
+MESHLESS_ARCHIVE(ScissorBlades, origin, x_axis, y_axis, length, width)
+MESHLESS_ARCHIVE(Blade, origin, x_axis, y_axis, length, depth)
 template <class A>
 void serialize(A& archive, Pick& v) {
   auto& [id, body, particle, place, patch, weights, offset, target, reached, locked, stiffness, position, force] = v;
   archive(id, body, particle, place.cell, place.at, patch, weights, offset, target, reached, locked, stiffness,
           position, force);
 }
-template <class A>
-void serialize(A& archive, BodyPoint& v) {
-  auto& [particles, weights] = v;
-  archive(particles, weights);
-}
-template <class A>
-void serialize(A& archive, Fibre& v) {
-  auto& [a, b, at_a, at_b, place, area, rest, force, tension] = v;
-  archive(a, b, at_a, at_b, place, area, rest, force, tension);
-}
-template <class A>
-void serialize(A& archive, Clip& v) {
-  auto& [jaws, closed, tissue] = v;
-  archive(jaws, closed, tissue);
-}
-template <class A>
-void serialize(A& archive, Attachment& v) {
-  auto& [name, other, stiffness, strength, made, torn, clip, fibres] = v;
-  archive(name, other, stiffness, strength, made, torn, clip, fibres);
-}
-template <class A>
-void serialize(A& archive, AttachCommand& v) {
-  auto& [name, body, other, distance, stiffness, strength, region] = v;
-  archive(name, body, other, distance, stiffness, strength, region);
-}
-template <class A>
-void serialize(A& archive, DetachCommand& v) {
-  auto& [name, region] = v;
-  archive(name, region);
-}
-template <class A>
-void serialize(A& archive, ClipCommand& v) {
-  auto& [name, body, point, direction, width, opening] = v;
-  archive(name, body, point, direction, width, opening);
-}
-template <class A>
-void serialize(A& archive, PushSphere& v) {
-  auto& [enabled, radius, position, target, speed, streamed, touching, force] = v;
-  archive(enabled, radius, position, target, speed, streamed, touching, force);
-}
-template <class A>
-void serialize(A& archive, Scissors& v) {
-  auto& [shown, blades, angle] = v;
-  archive(shown, blades, angle);
-}
-template <class A>
-void serialize(A& archive, CutCommand& v) {
-  auto& [blades, close_time, roughness, bodies] = v;
-  archive(blades, close_time, roughness, bodies);
-}
-template <class A>
-void serialize(A& archive, ClosingCut& v) {
-  auto& [ticket, command, done_at, start_angle, started_at] = v;
-  archive(ticket, command, done_at, start_angle, started_at);
-}
+MESHLESS_ARCHIVE(BodyPoint, particles, weights)
+MESHLESS_ARCHIVE(Fibre, a, b, at_a, at_b, place, area, rest, force, tension)
+MESHLESS_ARCHIVE(Clip, jaws, closed, tissue)
+MESHLESS_ARCHIVE(Attachment, name, other, stiffness, strength, made, torn, clip, fibres)
+MESHLESS_ARCHIVE(AttachCommand, name, body, other, distance, stiffness, strength, region)
+MESHLESS_ARCHIVE(DetachCommand, name, region)
+MESHLESS_ARCHIVE(ClipCommand, name, body, point, direction, width, opening)
+MESHLESS_ARCHIVE(PushSphere, enabled, radius, position, target, speed, streamed, touching, force)
+MESHLESS_ARCHIVE(Scissors, shown, blades, angle)
+MESHLESS_ARCHIVE(CutCommand, blades, close_time, roughness, bodies)
+MESHLESS_ARCHIVE(ClosingCut, ticket, command, done_at, start_angle, started_at)
 
 // --- checks of what was read
 

@@ -31,28 +31,32 @@ struct WorldObstacle {
   Box bounds;
 };
 
-struct WorldBody {
+/// Of a body: what is kept from step to step, and in saved states.
+struct KeptBody {
   BodyId id;
   std::uint32_t number = 0;
   std::string name;
   Material material;
   BodyModelPtr model;
   BodyState state;
-  bool surface_current = true;                        // state.surface fits state.positions
+  bool surface_current = true;  // state.surface fits state.positions
+  bool touched_by_push = false;
+  double stiffness_factor = 1.0;
+  Box bounds;  // [m] of particles and surface, at the start of the last frame in which it was awake
+  bool asleep = false;
+  double still_for = 0.0;         // [s] that it has been near rest_from
+  Points rest_from;               // [m]
+  std::uint32_t sleep_group = 0;  // those that fell asleep together wake together
+};
+
+struct WorldBody : KeptBody {
   std::shared_ptr<const ContactMesh> mesh;            // made when something first comes near
   std::shared_ptr<const SurfaceModel> surface_model;  // made when something first comes near
   BodyModelPtr measured;                              // the model that these two are of
   double edge_length = 0.0;                           // [m] mean, of the surface
   double surface_reach = 0.0;                         // [m] how far the surface is beyond the particles, at most
-  bool touched_by_push = false;
-  double stiffness_factor = 1.0;
-  Box bounds;              // [m] of particles and surface, at the start of the last frame in which it was awake
-  double fastest = 0.0;    // [m/s] likewise: no particle is faster
-  Index batch = kNoIndex;  // matched with others of its kind: one of World::Impl::batches
-  bool asleep = false;
-  double still_for = 0.0;         // [s] that it has been near rest_from
-  Points rest_from;               // [m]
-  std::uint32_t sleep_group = 0;  // those that fell asleep together wake together
+  double fastest = 0.0;                               // [m/s] no particle is faster, as bounds
+  Index batch = kNoIndex;                             // matched with others of its kind: one of World::Impl::batches
   StepScratch scratch;
 };
 
@@ -153,8 +157,30 @@ class ContentHashes {
   std::unordered_map<const void*, Known> known_;
 };
 
-struct World::Impl {
+/// What is kept from step to step, and in saved states: beside bodies, obstacles and what contact remembers.
+struct KeptWorld {
   WorldSettings settings;
+  std::uint64_t step = 0;
+  bool batches_current = false;            // false: bodies or materials have changed
+  std::vector<std::uint32_t> generations;  // one a slot
+  std::vector<std::uint32_t> free_slots;
+  std::uint32_t next_number = 1;
+  std::set<std::string> used_names;  // living and retired of this run
+  std::vector<std::shared_ptr<const PreparedBody>> scene;
+  std::vector<Pick> picks;
+  PickId next_pick = 1;
+  std::vector<Attachment> attachments;     // in the order in which they came
+  std::set<std::string> used_attachments;  // names of this run
+  std::vector<AttachCommand> scene_attachments;
+  PushSphere push;
+  Scissors scissors;
+  std::vector<ClosingCut> closing;
+  std::uint32_t next_ticket = 1;
+  std::uint32_t next_sleep_group = 1;
+  std::uint64_t tetrahedralizations = 0;
+};
+
+struct World::Impl : KeptWorld {
   ContentHashes content_hashes;
   ForEach for_each = oneAfterAnother;
   /// work(n) for n below count, shared out over the threads.
@@ -165,20 +191,9 @@ struct World::Impl {
       for (std::size_t n = task * kTask; n < std::min(count, (task + 1) * kTask); ++n) work(n);
     });
   }
-  std::uint64_t step = 0;
   std::uint32_t run = 1;
   std::vector<std::unique_ptr<WorldBody>> bodies;  // in the order in which they came
-  std::vector<std::uint32_t> generations;          // one a slot
-  std::vector<std::uint32_t> free_slots;
-  std::uint32_t next_number = 1;
-  std::set<std::string> used_names;  // living and retired of this run
-  std::vector<std::shared_ptr<const PreparedBody>> scene;
   std::vector<std::shared_ptr<WorldObstacle>> obstacles;
-  std::vector<Pick> picks;
-  PickId next_pick = 1;
-  std::vector<Attachment> attachments;     // in the order in which they came
-  std::set<std::string> used_attachments;  // names of this run
-  std::vector<AttachCommand> scene_attachments;
   struct AttachedFibre {
     Fibre* fibre = nullptr;
     double stiffness = 0.0;     // [N/m]
@@ -189,20 +204,14 @@ struct World::Impl {
     std::vector<Index> offsets, of_body;  // compressed rows, one a body; empty where there are none
   };
   AttachedFibres attached;
-  PushSphere push;
-  Scissors scissors;
-  std::vector<ClosingCut> closing;
   std::map<std::uint32_t, Result<CutReply>> finished;
-  std::uint32_t next_ticket = 1;
   std::vector<Event> events;
   std::vector<CutUndo> undo;  // the last is the next to be undone
   StepReport report;
-  std::size_t tetrahedralizations = 0;
   std::vector<WorldBody*> awake;  // of this frame, in the order of bodies
   std::vector<char> faulty;       // one each: its coordinates are no numbers
   std::vector<WorldBody*> wound;  // in findWound()
-  std::uint32_t next_sleep_group = 1;
-  struct Sleepers {  // in fallAsleep(), one a body
+  struct Sleepers {               // in fallAsleep(), one a body
     UnionFind joined;
     std::vector<char> held, ready, whole;  // of an island's root
     std::vector<double> size;              // [m] of an island's largest
@@ -210,7 +219,6 @@ struct World::Impl {
   };
   Sleepers sleepers;
   std::vector<WorldBatch> batches;
-  bool batches_current = false;                 // false: bodies or materials have changed
   std::mutex lanes_mutex;                       // of the batches' spare lanes
   std::vector<std::pair<Index, Index>> loaded;  // in listLoaded()
   bool contacts_current = false;                // bodies are those of the last step

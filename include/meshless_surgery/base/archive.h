@@ -280,4 +280,13 @@ inline void load(InArchive& in, std::set<std::string>& values) {
 
 }  // namespace meshless
 
+/// Writes and reads a struct by its fields, all of them in their order: one that is added and not named does not
+/// compile.
+#define MESHLESS_ARCHIVE(Type, ...)         \
+  template <class A>                        \
+  void serialize(A& archive, Type& value) { \
+    auto& [__VA_ARGS__] = value;            \
+    archive(__VA_ARGS__);                   \
+  }
+
 CEREAL_SETUP_ARCHIVE_TRAITS(meshless::InArchive, meshless::OutArchive)

@@ -42,44 +42,17 @@ struct SurfaceMemory {
   std::string fault(const std::map<std::uint64_t, Known>& colliders) const;
 };
 
-template <class A>
-void serialize(A& archive, RowEntry& v) {
-  auto& [coefficient, particle] = v;
-  archive(coefficient, particle);
-}
-template <class A>
-void serialize(A& archive, ContactRow& v) {
-  auto& [normal, constant, rise, friction, restitution, impulse, begin, middle, end, kind, order, features] = v;
-  archive(normal, constant, rise, friction, restitution, impulse, begin, middle, end, kind, order, features);
-}
-template <class A>
-void serialize(A& archive, RowSet& v) {
-  auto& [rows, entries] = v;
-  archive(rows, entries);
-}
-template <class A>
-void serialize(A& archive, RememberedSide& v) {
-  auto& [vertex, depth, normal] = v;
-  archive(vertex, depth, normal);
-}
+MESHLESS_ARCHIVE(RowEntry, coefficient, particle)
+MESHLESS_ARCHIVE(ContactRow, normal, constant, rise, friction, restitution, impulse, begin, middle, end, kind, order,
+                 features)
+MESHLESS_ARCHIVE(RowSet, rows, entries)
+MESHLESS_ARCHIVE(RememberedSide, vertex, depth, normal)
 template <class A>
 void serialize(A& archive, WayBox& v) {
   archive(v.least, v.most);
 }
-template <class A>
-void serialize(A& archive, KeptPair& v) {
-  auto& [kind, key_a, key_b, found, way_a, way_b, set, sides] = v;
-  archive(kind, key_a, key_b, found, way_a, way_b, set, sides);
-}
-template <class A>
-void serialize(A& archive, KeptWay& v) {
-  auto& [key, last, gone] = v;
-  archive(key, last, gone);
-}
-template <class A>
-void serialize(A& archive, SurfaceMemory& v) {
-  auto& [pairs, ways] = v;
-  archive(pairs, ways);
-}
+MESHLESS_ARCHIVE(KeptPair, kind, key_a, key_b, found, way_a, way_b, set, sides)
+MESHLESS_ARCHIVE(KeptWay, key, last, gone)
+MESHLESS_ARCHIVE(SurfaceMemory, pairs, ways)
 
 }  // namespace meshless
