@@ -6,8 +6,8 @@
 #pragma GCC target("avx2,fma")
 #include <immintrin.h>
 
-#define MESHLESS_ELASTIC_SET avx2
-#define MESHLESS_ELASTIC_ENUM kAvx2
-#define MESHLESS_ELASTIC_BYTES 32
+#define MESHLESS_SET avx2
+#define MESHLESS_SET_ENUM kAvx2
+#define MESHLESS_BYTES 32
 #include "elastic_batch_kernel.h"
 #endif

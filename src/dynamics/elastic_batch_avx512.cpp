@@ -6,8 +6,8 @@
 #pragma GCC target("avx512f,avx512dq,avx512vl,avx512bw,fma,prefer-vector-width=512")
 #include <immintrin.h>
 
-#define MESHLESS_ELASTIC_SET avx512
-#define MESHLESS_ELASTIC_ENUM kAvx512
-#define MESHLESS_ELASTIC_BYTES 64
+#define MESHLESS_SET avx512
+#define MESHLESS_SET_ENUM kAvx512
+#define MESHLESS_BYTES 64
 #include "elastic_batch_kernel.h"
 #endif

@@ -5,7 +5,7 @@
 #include <immintrin.h>
 #endif
 
-#define MESHLESS_ELASTIC_SET baseline
-#define MESHLESS_ELASTIC_ENUM kBaseline
-#define MESHLESS_ELASTIC_BYTES 16
+#define MESHLESS_SET baseline
+#define MESHLESS_SET_ENUM kBaseline
+#define MESHLESS_BYTES 16
 #include "elastic_batch_kernel.h"

@@ -1,19 +1,14 @@
 // Elastic forces of a block of small clusters, compiled once for each instruction set: the including file sets the
-// target, MESHLESS_ELASTIC_SET and the width of a vector. A lane is a cluster; no lane sees its neighbours. In double:
-// the forces of a cluster then cancel to 1e-16, and in float it is no faster than what feeds it.
-#ifndef MESHLESS_ELASTIC_SET
-#error \
-    "set MESHLESS_ELASTIC_SET, MESHLESS_ELASTIC_ENUM and MESHLESS_ELASTIC_BYTES before including elastic_batch_kernel.h"
+// target, MESHLESS_SET and the width of a vector. A lane is a cluster; no lane sees its neighbours. In double: the
+// forces of a cluster then cancel to 1e-16, and in float it is no faster than what feeds it.
+#ifndef MESHLESS_SET
+#error "set MESHLESS_SET, MESHLESS_SET_ENUM and MESHLESS_BYTES before including elastic_batch_kernel.h"
 #endif
 
-namespace meshless::elastic_sets::MESHLESS_ELASTIC_SET {
+#include "double_pack.h"
+
+namespace meshless::elastic_sets::MESHLESS_SET {
 namespace {
-
-#define MESHLESS_INLINE inline __attribute__((always_inline))
-
-typedef double Pack __attribute__((vector_size(MESHLESS_ELASTIC_BYTES)));
-typedef long long Mask __attribute__((vector_size(MESHLESS_ELASTIC_BYTES)));
-constexpr int kLanes = MESHLESS_ELASTIC_BYTES / 8;
 
 // As in elastic.cpp.
 constexpr double kLeastVolume = -0.8;
@@ -25,36 +20,6 @@ constexpr int kMostSteps = 4;     // of Newton's method; from one substep to the
 constexpr double kStep6 = 1e-25;  // length^6 of the last step, times the condition number squared: 3e-13 rad are left
 constexpr double kConditioned = 1e-4;  // smallest eigenvalue of the Hessian over its trace
 constexpr double kLongestStep2 = 1.0;  // [rad^2] beyond it the quadratic model says nothing
-
-MESHLESS_INLINE Pack get(const double* from) {
-  Pack x;
-  __builtin_memcpy(&x, from, sizeof(x));
-  return x;
-}
-MESHLESS_INLINE void put(Pack x, double* to) { __builtin_memcpy(to, &x, sizeof(x)); }
-MESHLESS_INLINE Pack all(double x) { return Pack{} + x; }
-MESHLESS_INLINE Pack choose(Mask m, Pack yes, Pack no) { return m ? yes : no; }
-MESHLESS_INLINE bool any(Mask m) {
-#if MESHLESS_ELASTIC_BYTES == 64
-  return _mm512_movepi64_mask((__m512i)m) != 0;
-#elif MESHLESS_ELASTIC_BYTES == 32
-  return _mm256_movemask_pd((__m256d)m) != 0;
-#else
-  return (m[0] | m[1]) != 0;
-#endif
-}
-MESHLESS_INLINE Pack squareRoot(Pack x) {
-#if MESHLESS_ELASTIC_BYTES == 64
-  return _mm512_maskz_sqrt_pd(0xff, x);  // the unmasked one warns of an uninitialised value with GCC 12
-#elif MESHLESS_ELASTIC_BYTES == 32
-  return _mm256_sqrt_pd(x);
-#elif MESHLESS_ROTATION_X86
-  return _mm_sqrt_pd(x);
-#else
-  for (int l = 0; l < kLanes; ++l) x[l] = __builtin_sqrt(x[l]);
-  return x;
-#endif
-}
 
 struct Matrix {
   Pack m[3][3];
@@ -94,7 +59,7 @@ MESHLESS_INLINE Matrix rotationMatrix(Pack x, Pack y, Pack z, Pack w, Pack s) { 
 // Positions relative to the cluster's first corner, into the rows of `forces`.
 void gather(const Block& b) {
   const int end = (b.count + kLanes - 1) / kLanes * kLanes;
-#if MESHLESS_ELASTIC_BYTES >= 32
+#if MESHLESS_BYTES >= 32
   // Four particles at a time, transposed: instructions that gather are slower.
   const __m256i three = _mm256_setr_epi64x(-1, -1, -1, 0);
   for (int i = 0; i < end; i += 4) {
@@ -256,7 +221,7 @@ std::size_t rotateCold(const Block& b, const Fits& fits) {
   batch.matrices = matrices[0];
   batch.quaternions = quaternions[0];
   batch.matrix_stride = batch.quaternion_stride = kBlock;
-  nearestRotationsWarm(batch, InstructionSet::MESHLESS_ELASTIC_ENUM);
+  nearestRotationsWarm(batch, InstructionSet::MESHLESS_SET_ENUM);
   for (int n = 0; n < count; ++n)
     for (int k = 0; k < 4; ++k) b.rotations[k * kBlock + index[n]] = quaternions[k][n];
   return static_cast<std::size_t>(count);
@@ -494,4 +459,4 @@ BlockResult accelerate(const Block& b) {
   return b.cells ? accelerateOf<Kind::kPartial>(b) : accelerateOf<Kind::kWhole>(b);
 }
 
-}  // namespace meshless::elastic_sets::MESHLESS_ELASTIC_SET
+}  // namespace meshless::elastic_sets::MESHLESS_SET

@@ -4,7 +4,7 @@
 #if MESHLESS_ROTATION_X86
 #pragma GCC target("avx2,fma")
 
-#define MESHLESS_EXTENT_SET avx2
-#define MESHLESS_EXTENT_BYTES 32
+#define MESHLESS_SET avx2
+#define MESHLESS_BYTES 32
 #include "extent_kernel.h"
 #endif

@@ -1,13 +1,13 @@
-// Included once for each set of instructions, with MESHLESS_EXTENT_SET and MESHLESS_EXTENT_BYTES.
+// Included once for each set of instructions, with MESHLESS_SET and MESHLESS_BYTES.
 // No Eigen and no shared inline functions here: the linker could take a copy of one for the whole program.
 
-namespace meshless::extent_sets::MESHLESS_EXTENT_SET {
+namespace meshless::extent_sets::MESHLESS_SET {
 namespace {
 
-typedef double Pack __attribute__((vector_size(MESHLESS_EXTENT_BYTES)));
-typedef unsigned long long Bits __attribute__((vector_size(MESHLESS_EXTENT_BYTES)));
+typedef double Pack __attribute__((vector_size(MESHLESS_BYTES)));
+typedef unsigned long long Bits __attribute__((vector_size(MESHLESS_BYTES)));
 
-constexpr std::size_t kLanes = MESHLESS_EXTENT_BYTES / sizeof(double);
+constexpr std::size_t kLanes = MESHLESS_BYTES / sizeof(double);
 constexpr std::size_t kTogether = 12;  // coordinates: four points, whole packs of any width
 constexpr std::size_t kPacks = kTogether / kLanes;
 
@@ -63,4 +63,4 @@ bool within(const double* x, std::size_t count, double most) {
   return all >> 63 == 0;
 }
 
-}  // namespace meshless::extent_sets::MESHLESS_EXTENT_SET
+}  // namespace meshless::extent_sets::MESHLESS_SET

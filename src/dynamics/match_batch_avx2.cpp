@@ -5,7 +5,7 @@
 #if MESHLESS_ROTATION_X86
 #pragma GCC target("avx2,fma")
 
-#define MESHLESS_MATCH_SET avx2
-#define MESHLESS_MATCH_BYTES 32
+#define MESHLESS_SET avx2
+#define MESHLESS_BYTES 32
 #include "match_batch_kernel.h"
 #endif

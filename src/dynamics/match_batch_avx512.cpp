@@ -5,7 +5,7 @@
 #if MESHLESS_ROTATION_X86
 #pragma GCC target("avx512f,avx512dq,avx512vl,avx512bw,fma,prefer-vector-width=512")
 
-#define MESHLESS_MATCH_SET avx512
-#define MESHLESS_MATCH_BYTES 64
+#define MESHLESS_SET avx512
+#define MESHLESS_BYTES 64
 #include "match_batch_kernel.h"
 #endif

@@ -1,19 +1,19 @@
 // Vectorised steps of bodies, lanes across bodies, compiled once for each instruction set: the including file sets the
-// target, MESHLESS_MATCH_SET and the width of a vector. What is computed for a lane never depends on another lane;
+// target, MESHLESS_SET and the width of a vector. What is computed for a lane never depends on another lane;
 // branches only leave out work that no lane needs.
-#ifndef MESHLESS_MATCH_SET
-#error "set MESHLESS_MATCH_SET and MESHLESS_MATCH_BYTES before including match_batch_kernel.h"
+#ifndef MESHLESS_SET
+#error "set MESHLESS_SET and MESHLESS_BYTES before including match_batch_kernel.h"
 #endif
 
-namespace meshless::match_sets::MESHLESS_MATCH_SET {
+namespace meshless::match_sets::MESHLESS_SET {
 namespace {
 
 #define MESHLESS_INLINE inline __attribute__((always_inline))
 
-typedef float Pack __attribute__((vector_size(MESHLESS_MATCH_BYTES)));
-typedef int Mask __attribute__((vector_size(MESHLESS_MATCH_BYTES)));
+typedef float Pack __attribute__((vector_size(MESHLESS_BYTES)));
+typedef int Mask __attribute__((vector_size(MESHLESS_BYTES)));
 
-constexpr int kLanes = MESHLESS_MATCH_BYTES / 4;
+constexpr int kLanes = MESHLESS_BYTES / 4;
 
 constexpr float kFullBetaDeterminant = 0.1f;  // as in shape_matching.cpp
 constexpr int kVolumeSteps = 4;               // likewise
@@ -407,4 +407,4 @@ void moveBodies(const BodiesView& view, const StepNumbers& step, int first_block
         move<false, false>(view, step, first_block + b, lane, b * kBlock + lane, s);
 }
 
-}  // namespace meshless::match_sets::MESHLESS_MATCH_SET
+}  // namespace meshless::match_sets::MESHLESS_SET

@@ -6,7 +6,7 @@
 #pragma GCC target("avx2,fma")
 #include <immintrin.h>
 
-#define MESHLESS_ROTATION_SET avx2
-#define MESHLESS_ROTATION_BYTES 32
+#define MESHLESS_SET avx2
+#define MESHLESS_BYTES 32
 #include "rotation_kernel.h"
 #endif

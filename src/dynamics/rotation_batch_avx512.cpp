@@ -6,7 +6,7 @@
 #pragma GCC target("avx512f,avx512dq,avx512vl,avx512bw,fma,prefer-vector-width=512")
 #include <immintrin.h>
 
-#define MESHLESS_ROTATION_SET avx512
-#define MESHLESS_ROTATION_BYTES 64
+#define MESHLESS_SET avx512
+#define MESHLESS_BYTES 64
 #include "rotation_kernel.h"
 #endif

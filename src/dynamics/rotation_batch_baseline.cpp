@@ -5,6 +5,6 @@
 #include <immintrin.h>
 #endif
 
-#define MESHLESS_ROTATION_SET baseline
-#define MESHLESS_ROTATION_BYTES 16
+#define MESHLESS_SET baseline
+#define MESHLESS_BYTES 16
 #include "rotation_kernel.h"

@@ -1,21 +1,17 @@
 // The vectorised nearest rotation, compiled once for each instruction set: the including file sets the target,
-// MESHLESS_ROTATION_SET and the width of a vector. No branches and the same work for every lane, so that no item's
+// MESHLESS_SET and the width of a vector. No branches and the same work for every lane, so that no item's
 // result depends on its neighbours. Arithmetic is in double but for the first warm step: with the characteristic
 // polynomial in float, every matrix with a gap below about 0.1 |a| (a third of random ones) needs a second method.
-#ifndef MESHLESS_ROTATION_SET
-#error "set MESHLESS_ROTATION_SET and MESHLESS_ROTATION_BYTES before including rotation_kernel.h"
+#ifndef MESHLESS_SET
+#error "set MESHLESS_SET and MESHLESS_BYTES before including rotation_kernel.h"
 #endif
 
-namespace meshless::rotation_sets::MESHLESS_ROTATION_SET {
+#include "double_pack.h"
+
+namespace meshless::rotation_sets::MESHLESS_SET {
 namespace {
 
-#define MESHLESS_INLINE inline __attribute__((always_inline))
-
-typedef double Pack __attribute__((vector_size(MESHLESS_ROTATION_BYTES)));
-typedef float NarrowPack __attribute__((vector_size(MESHLESS_ROTATION_BYTES)));
-typedef long long Mask __attribute__((vector_size(MESHLESS_ROTATION_BYTES)));
-
-constexpr int kLanes = MESHLESS_ROTATION_BYTES / 8;
+typedef float NarrowPack __attribute__((vector_size(MESHLESS_BYTES)));
 constexpr int kNarrowLanes = 2 * kLanes;
 constexpr int kBlock = 128;  // items at a time: in the first-level cache, and enough that the exceptions fill vectors
 
@@ -52,34 +48,6 @@ struct alignas(64) Block {
   double state[kBlock];
   double unique[kBlock], warm[kBlock];  // 1 or 0
 };
-
-MESHLESS_INLINE Pack get(const double* from) {
-  Pack x;
-  __builtin_memcpy(&x, from, sizeof(x));
-  return x;
-}
-MESHLESS_INLINE void put(Pack x, double* to) { __builtin_memcpy(to, &x, sizeof(x)); }
-MESHLESS_INLINE Pack all(double x) { return Pack{} + x; }
-MESHLESS_INLINE Pack choose(Mask m, Pack yes, Pack no) { return m ? yes : no; }
-MESHLESS_INLINE Pack absolute(Pack x) { return (Pack)((Mask)x & 0x7fffffffffffffffLL); }
-MESHLESS_INLINE bool any(Mask m) {
-  long long sum = 0;
-  for (int l = 0; l < kLanes; ++l) sum |= m[l];
-  return sum != 0;
-}
-MESHLESS_INLINE Pack larger(Pack x, Pack y) { return x > y ? x : y; }
-MESHLESS_INLINE Pack squareRoot(Pack x) {
-#if MESHLESS_ROTATION_BYTES == 64
-  return _mm512_maskz_sqrt_pd(0xff, x);  // the unmasked one warns of an uninitialised value with GCC 12
-#elif MESHLESS_ROTATION_BYTES == 32
-  return _mm256_sqrt_pd(x);
-#elif MESHLESS_ROTATION_X86
-  return _mm_sqrt_pd(x);
-#else
-  for (int l = 0; l < kLanes; ++l) x[l] = __builtin_sqrt(x[l]);
-  return x;
-#endif
-}
 
 int padded(int count) { return (count + kNarrowLanes - 1) / kNarrowLanes * kNarrowLanes; }
 
@@ -501,4 +469,4 @@ void solveBatch(const RotationBatch<Scalar>& batch, bool warm) {
 void solve(const RotationBatch<float>& batch, bool warm) { solveBatch(batch, warm); }
 void solve(const RotationBatch<double>& batch, bool warm) { solveBatch(batch, warm); }
 
-}  // namespace meshless::rotation_sets::MESHLESS_ROTATION_SET
+}  // namespace meshless::rotation_sets::MESHLESS_SET
