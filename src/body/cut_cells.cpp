@@ -12,12 +12,12 @@
 #include <Eigen/Dense>
 
 #include "meshless_surgery/body/binding.h"
-#include "meshless_surgery/body/cavities.h"
 #include "meshless_surgery/body/cell_blend.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/cut_lattice.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/union_find.h"
+#include "piece_parts.h"
 #include "place_set.h"
 #include "side_by_side.h"
 
@@ -662,18 +662,7 @@ class CellCutter {
   BodyPiece make(std::size_t p, const std::vector<TissuePlace>& places, std::uint32_t new_patch, CutWork& work) {
     const CellPieceSource& from = sources_[p];
     BodyPiece piece;
-    auto child = std::make_shared<BodyModel>();
-    child->solid = true;
-    child->spacing = model_.spacing;
-    child->own = model_.own;
-    child->texture = model_.texture;
-    child->next_patch = model_.next_patch + 1;
-    child->incised = model_.incised || !gate_.unbounded();
-    child->surface.triangles = from.mesh.triangles;
-    child->surface.patches = from.mesh.patches;
-    child->surface.vertices = surfaces_[p].mesh.vertices;
-    child->rest_volume = signedVolume(child->surface);
-    child->rest_area = surfaceArea(child->surface);
+    auto child = beginPiece(model_, from.mesh, surfaces_[p].mesh.vertices, !gate_.unbounded());
 
     auto lattice = std::make_shared<CellLattice>();
     lattice->spacing = before_.spacing;
@@ -735,15 +724,7 @@ class CellCutter {
       work.new_vertices += embedded.made();
     }
     for (const std::uint32_t patch : from.mesh.patches) work.new_triangles += patch == new_patch;
-    piece.state.stretch = state_.stretch;
-    piece.state.swelling = state_.swelling;
-    piece.state.pace = state_.pace;
-    piece.state.stiffened = state_.stiffened;
-    piece.state.placed = state_.placed;
-    if (!state_.cavities.empty()) makeCavities(*child);
-    piece.state.cavities = inheritedCavities(state_.cavities, *child, piece.state.positions);
-    updateSurface(*child, piece.state);
-    piece.model = std::move(child);
+    finishPiece(state_, std::move(child), piece);
     return piece;
   }
 

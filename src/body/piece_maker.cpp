@@ -10,9 +10,9 @@
 #include <unordered_set>
 
 #include "meshless_surgery/body/binding.h"
-#include "meshless_surgery/body/cavities.h"
 #include "meshless_surgery/dynamics/plastic.h"
 #include "meshless_surgery/geometry/measures.h"
+#include "piece_parts.h"
 #include "side_by_side.h"
 
 namespace meshless {
@@ -134,18 +134,7 @@ std::vector<BodyPiece> PieceMaker::make(const std::vector<PieceSource>& sources)
 BodyPiece PieceMaker::makeOne(const PieceSource& from, RestShape rest, const std::vector<double>& masses,
                               const Crumb* crumb, CutWork& work) const {
   BodyPiece piece;
-  auto child = std::make_shared<BodyModel>();
-  child->solid = true;
-  child->spacing = model_.spacing;
-  child->own = model_.own;
-  child->texture = model_.texture;
-  child->next_patch = model_.next_patch + 1;
-  child->incised = model_.incised || !torn_.empty();
-  child->surface.triangles = from.mesh.triangles;
-  child->surface.patches = from.mesh.patches;
-  child->surface.vertices = std::move(rest.vertices);
-  child->rest_volume = signedVolume(child->surface);
-  child->rest_area = surfaceArea(child->surface);
+  auto child = beginPiece(model_, from.mesh, std::move(rest.vertices), !torn_.empty());
 
   piece.parent_particles = from.members;
   std::vector<Index> renumbered(model_.rest.size(), kNoIndex);
@@ -204,15 +193,7 @@ BodyPiece PieceMaker::makeOne(const PieceSource& from, RestShape rest, const std
   work.bound_embedded = child->binding.bound;
   work.kept_embedded = child->binding.embedded.size() - child->binding.bound;
   for (std::uint32_t patch : from.mesh.patches) work.new_triangles += patch == new_patch_;
-  piece.state.stretch = state_.stretch;
-  piece.state.swelling = state_.swelling;
-  piece.state.pace = state_.pace;
-  piece.state.stiffened = state_.stiffened;
-  piece.state.placed = state_.placed;
-  if (!state_.cavities.empty()) makeCavities(*child);
-  piece.state.cavities = inheritedCavities(state_.cavities, *child, piece.state.positions);
-  updateSurface(*child, piece.state);
-  piece.model = std::move(child);
+  finishPiece(state_, std::move(child), piece);
   return piece;
 }
 

@@ -6,7 +6,9 @@
 #include <cstring>
 #include <limits>
 
+#include <meshless_surgery/BodyTopology.h>
 #include <meshless_surgery/Release.h>
+#include <meshless_surgery/Surface.h>
 #include <sensor_msgs/point_cloud2_iterator.h>
 #include <tf2_eigen/tf2_eigen.h>
 
@@ -164,11 +166,27 @@ meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatu
   return state;
 }
 
-std::vector<std_msgs::ColorRGBA> regionColors(const BodyModel& model) {
-  std::vector<std_msgs::ColorRGBA> colors;
-  for (const RegionTissue& region : model.regions) colors.push_back(toColor(region.material.inside_color));
-  return colors;
+template <class Message>
+Message toSurfaceOf(const BodySnapshot& body) {
+  const TriangleMesh& mesh = body.model->surface;
+  Message message;
+  message.id = body.number;
+  message.name = body.name;
+  message.color = toColor(body.material.color);
+  message.inside_color = toColor(body.material.inside_color);
+  message.triangles.reserve(3 * mesh.triangles.size());
+  message.cut.reserve(mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (const Index v : mesh.triangles[t]) message.triangles.push_back(static_cast<std::uint32_t>(v));
+    message.cut.push_back(isCutPatch(mesh.patchOf(t)) ? 1 : 0);
+  }
+  message.regions = surfaceRegions(*body.model);
+  for (const RegionTissue& region : body.model->regions)
+    message.region_colors.push_back(toColor(region.material.inside_color));
+  return message;
 }
+template meshless_surgery::Surface toSurfaceOf(const BodySnapshot& body);
+template meshless_surgery::BodyTopology toSurfaceOf(const BodySnapshot& body);
 
 meshless_surgery::BodyInfo toInfo(const std::string& name, const BodyModel& model, const WorldSettings& settings) {
   meshless_surgery::BodyInfo message;

@@ -52,21 +52,8 @@ void addLooks(const BodySnapshot& body, const VertexColors& baked, meshless_surg
 }
 
 meshless_surgery::BodyTopology toTopology(const BodySnapshot& body, const VertexColors& baked) {
-  const TriangleMesh& mesh = body.model->surface;
-  meshless_surgery::BodyTopology message;
-  message.id = body.number;
-  message.name = body.name;
-  message.color = toColor(body.material.color);
-  message.inside_color = toColor(body.material.inside_color);
-  message.vertices = static_cast<std::uint32_t>(mesh.vertices.size());
-  message.triangles.reserve(3 * mesh.triangles.size());
-  message.cut.reserve(mesh.triangles.size());
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    for (const Index v : mesh.triangles[t]) message.triangles.push_back(static_cast<std::uint32_t>(v));
-    message.cut.push_back(isCutPatch(mesh.patchOf(t)) ? 1 : 0);
-  }
-  message.regions = surfaceRegions(*body.model);
-  message.region_colors = regionColors(*body.model);
+  auto message = toSurfaceOf<meshless_surgery::BodyTopology>(body);
+  message.vertices = static_cast<std::uint32_t>(body.model->surface.vertices.size());
   addLooks(body, baked, message);
   return message;
 }

@@ -8,24 +8,12 @@ namespace meshless {
 namespace {
 
 meshless_surgery::Surface toSurface(const BodySnapshot& body, bool strain) {
-  const TriangleMesh& mesh = body.model->surface;
-  meshless_surgery::Surface message;
-  message.id = body.number;
-  message.name = body.name;
-  message.color = toColor(body.material.color);
-  message.inside_color = toColor(body.material.inside_color);
+  auto message = toSurfaceOf<meshless_surgery::Surface>(body);
   message.vertices.reserve(3 * body.surface.size());
   for (const Vec3& v : body.surface)
     for (int axis = 0; axis < 3; ++axis) message.vertices.push_back(static_cast<float>(v[axis]));
-  message.triangles.reserve(3 * mesh.triangles.size());
-  message.cut.reserve(mesh.triangles.size());
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    for (const Index v : mesh.triangles[t]) message.triangles.push_back(static_cast<std::uint32_t>(v));
-    message.cut.push_back(isCutPatch(mesh.patchOf(t)) ? 1 : 0);
-  }
-  message.regions = surfaceRegions(*body.model);
-  message.region_colors = regionColors(*body.model);
-  if (strain) message.strain = surfaceStrain(mesh.vertices, body.surface, mesh.triangles);
+  const TriangleMesh& rest = body.model->surface;
+  if (strain) message.strain = surfaceStrain(rest.vertices, body.surface, rest.triangles);
   return message;
 }
 

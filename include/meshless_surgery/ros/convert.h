@@ -31,8 +31,9 @@ meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatu
 meshless_surgery::Info toInfo(const WorldSnapshot& snapshot, const WorldSettings& settings);
 /// Of a body at rest, before its first step.
 meshless_surgery::BodyInfo toInfo(const std::string& name, const BodyModel& model, const WorldSettings& settings);
-/// Of the faces of cuts in its regions.
-std::vector<std_msgs::ColorRGBA> regionColors(const BodyModel& model);
+/// What a surface, with its vertices and without, says of its body: instantiated for Surface and BodyTopology.
+template <class Message>
+Message toSurfaceOf(const BodySnapshot& body);
 /// The constant of every answer's error_code.
 std::int32_t toErrorCode(ErrorCode code);
 meshless_surgery::Event toEvent(const Event& event, const std_msgs::Header& header);

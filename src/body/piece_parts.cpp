@@ -1,0 +1,38 @@
+#include "piece_parts.h"
+
+#include <utility>
+
+#include "meshless_surgery/body/cavities.h"
+#include "meshless_surgery/geometry/measures.h"
+
+namespace meshless {
+
+std::shared_ptr<BodyModel> beginPiece(const BodyModel& parent, const TriangleMesh& present, Points rest, bool incised) {
+  auto piece = std::make_shared<BodyModel>();
+  piece->solid = true;
+  piece->spacing = parent.spacing;
+  piece->own = parent.own;
+  piece->texture = parent.texture;
+  piece->next_patch = parent.next_patch + 1;
+  piece->incised = parent.incised || incised;
+  piece->surface.triangles = present.triangles;
+  piece->surface.patches = present.patches;
+  piece->surface.vertices = std::move(rest);
+  piece->rest_volume = signedVolume(piece->surface);
+  piece->rest_area = surfaceArea(piece->surface);
+  return piece;
+}
+
+void finishPiece(const BodyState& parent, std::shared_ptr<BodyModel> model, BodyPiece& piece) {
+  piece.state.stretch = parent.stretch;
+  piece.state.swelling = parent.swelling;
+  piece.state.pace = parent.pace;
+  piece.state.stiffened = parent.stiffened;
+  piece.state.placed = parent.placed;
+  if (!parent.cavities.empty()) makeCavities(*model);
+  piece.state.cavities = inheritedCavities(parent.cavities, *model, piece.state.positions);
+  updateSurface(*model, piece.state);
+  piece.model = std::move(model);
+}
+
+}  // namespace meshless
