@@ -42,6 +42,7 @@ std::vector<Triangle> neighboursOf(const TriangleMesh& surface, const std::vecto
     if (!one.goesOn(other)) continue;
     neighbours[one.corner / 3][one.corner % 3] = other.corner / 3;
     neighbours[other.corner / 3][other.corner % 3] = one.corner / 3;
+    ++e;  // a third triangle at an edge has no other side
   }
   return neighbours;
 }
@@ -90,11 +91,14 @@ std::array<TexturePoint, 3> TextureMap::of(const std::array<Vec3, 3>& corners) c
     Place place = nearestIn(middle, corners[k]);
     for (bool nearer = true; nearer;) {
       nearer = false;
-      // Around a vertex that is nearest all triangles are as near, and the way on may be behind some of them.
+      // Around a vertex that is nearest all triangles are as near, and the way on may be behind some of them. They come
+      // by their steps from the first: whether one is known, those one step nearer to it and later tell.
       as_near.assign(1, place.triangle);
-      for (std::size_t n = 0; n < as_near.size() && !nearer; ++n)
+      std::size_t known = 0, step = 0, next_step = 1;  // where they begin
+      for (std::size_t n = 0; n < as_near.size() && !nearer; ++n) {
+        if (n == next_step) known = step, step = next_step, next_step = as_near.size();
         for (const Index next : neighbours_[as_near[n]]) {
-          if (next == kNoIndex || std::find(as_near.begin(), as_near.end(), next) != as_near.end()) continue;
+          if (next == kNoIndex || std::find(as_near.begin() + known, as_near.end(), next) != as_near.end()) continue;
           const Place there = nearestIn(next, corners[k]);
           if (!(there.squared <= place.squared)) continue;
           nearer = there.squared < place.squared;
@@ -104,6 +108,7 @@ std::array<TexturePoint, 3> TextureMap::of(const std::array<Vec3, 3>& corners) c
           }
           as_near.push_back(next);
         }
+      }
     }
     for (int axis = 0; axis < 2; ++axis) {
       double sum = 0.0;

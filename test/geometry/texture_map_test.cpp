@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 #include "support/random.h"
@@ -92,6 +93,31 @@ TEST(TextureMap, VerticesAtOnePlaceAreNoSeam) {
   const TextureMapPtr map = *TextureMap::make(apart, whole->points());
   const std::array<Vec3, 3> corners{Vec3(0.02, 0.1, 0), Vec3(0.45, 0.2, 0), Vec3(0.3, 0.9, 0)};
   for (int k = 0; k < 3; ++k) EXPECT_LT(test::apart(whole->of(corners)[k], map->of(corners)[k]), 1e-6f);
+}
+
+// The end of a cylinder, say: the way from one side to the other leads round its middle.
+TEST(TextureMap, GoesRoundAVertexOfManyTriangles) {
+  const Index n = 2000;
+  TriangleMesh fan;
+  std::vector<TexturePoint> points;
+  fan.vertices.push_back(Vec3::Zero());
+  for (Index k = 0; k < n; ++k) {
+    const double angle = 2.0 * M_PI * k / n;
+    fan.vertices.emplace_back(std::cos(angle), std::sin(angle), -0.1);
+    fan.triangles.push_back({0, 1 + k, 1 + (k + 1) % n});
+  }
+  for (const Triangle& t : fan.triangles)
+    for (const Index v : t)
+      points.push_back({static_cast<float>(fan.vertices[v].x()), static_cast<float>(fan.vertices[v].y())});
+  const TextureMapPtr map = *TextureMap::make(fan, points);
+  for (Index k = 0; k < n; ++k) {
+    const std::array<Vec3, 3> corners{Vec3(0.0, 0.0, 1e-9), fan.vertices[1 + k], fan.vertices[1 + (k + n / 2) % n]};
+    const auto found = map->of(corners);
+    for (int c = 0; c < 3; ++c) {
+      const TexturePoint wanted{static_cast<float>(corners[c].x()), static_cast<float>(corners[c].y())};
+      EXPECT_LT(test::apart(wanted, found[c]), 1e-5f) << k;
+    }
+  }
 }
 
 TEST(TextureMap, RefusesWhatIsNone) {
