@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """Frames a second of rviz, and its processor time for each, by triangles and settings of the Tissue display. A ball that
-waves takes the place of a node; rviz draws it on a display that nobody sees. Prints CSV. Needs a running roscore:
+waves takes the place of a node; in the last rows it is a soft body of deformer_node at its defaults, led round by a pick.
+rviz draws it on a display that nobody sees. Prints CSV. Needs a running roscore:
 
     bench/pictures.py --seconds 20 --pictures /tmp
 """
@@ -19,6 +20,7 @@ import numpy
 import rospkg
 import rospy
 import yaml
+from meshless_surgery import Surgeon
 from meshless_surgery.msg import BodyTopology, Look, Surface, Surfaces, TissueImage, TissueImages, Topology
 from std_msgs.msg import ColorRGBA
 
@@ -81,8 +83,11 @@ class Prepared(Surfaces):
         buff.write(self.prepared[:4] + struct.pack('<II', now.secs, now.nsecs) + self.prepared[12:])
 
 
-class Node:
+class Waves:
+    """A ball that waves, as a node would show it."""
+
     def __init__(self):
+        self.node = rospy.get_name()
         self.topology = rospy.Publisher('~topology', Topology, queue_size=1, latch=True)
         self.images = rospy.Publisher('~images', TissueImages, queue_size=1, latch=True)
         self.surfaces = rospy.Publisher('~surfaces', Prepared, queue_size=1, tcp_nodelay=True)
@@ -97,9 +102,10 @@ class Node:
             rest[:, 2] = numpy.minimum(rest[:, 2], 0.5 * RADIUS)
         self.number += 1
         red, pink, light = (ColorRGBA(*c, 1.0) for c in ((0.6, 0.2, 0.17), (0.8, 0.45, 0.4), (0.75, 0.4, 0.3)))
-        looks = [Look(noise=getattr(Look, look.upper()), color=color, second=light, scale=0.003, wetness=0.75, bump=0.1)
+        noise = Look.IMAGE if look == 'mapped' else getattr(Look, look.upper())
+        looks = [Look(noise=noise, color=color, second=light, scale=0.003, wetness=0.75, bump=0.1)
                  for color in (red, pink)]
-        if look == 'image':
+        if noise == Look.IMAGE:
             spots = numpy.random.RandomState(1).randint(60, 200, (16, 16, 3)).astype(numpy.uint8).repeat(16, 0).repeat(16, 1)
             self.images.publish(TissueImages(images=[TissueImage(id=1, width=256, height=256, rgb=spots.tobytes())]))
             for one in looks:
@@ -109,6 +115,8 @@ class Node:
         topology = Topology(run=1, topology=self.number)
         topology.header.frame_id = 'world'
         topology.bodies = [BodyTopology(vertices=len(rest), looks=looks, rest=rest.ravel().tolist(), **still_ball)]
+        if look == 'mapped':  # by texture coordinates, not along the axes
+            topology.bodies[0].uv = (0.6 / RADIUS * rest[corners][:, :, :2]).ravel().tolist()
         self.topology.publish(topology)
         self.messages = []
         for k in range(1 if still else WAVES):
@@ -131,29 +139,71 @@ class Node:
             said += 1
             pace.sleep()
 
+    def real_time(self):
+        return ''
+
+
+class Body:
+    """The node with a soft ball that is held below and led round by a pick above."""
+    node = '/deformer'
+
+    def show(self, triangles, look, cut, still):
+        self.folder = tempfile.TemporaryDirectory()
+        scene = os.path.join(self.folder.name, 'ball.yaml')
+        rest, corners = ball(triangles)
+        with open(os.path.join(self.folder.name, 'ball.obj'), 'w') as file:
+            file.writelines('v %r %r %r\n' % tuple(v) for v in rest.tolist())
+            file.writelines('f %d %d %d\n' % tuple(t) for t in (corners + 1).tolist())
+        with open(scene, 'w') as file:
+            yaml.safe_dump({'bodies': [{
+                'name': 'ball', 'file': 'ball.obj', 'pose': {'position': [0.0, 0.0, RADIUS]}, 'material': 'elastic_liver',
+                'fixed': [{'plane': {'normal': [0.0, 0.0, 1.0], 'point': [0.0, 0.0, 0.3 * RADIUS]}}]}]}, file)
+        self.process = subprocess.Popen(['rosrun', 'meshless_surgery', 'deformer_node', '__name:=' + self.node[1:], '_scene:=' + scene],
+                                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.surgeon = Surgeon(self.node)
+        self.start = numpy.array([0.0, 0.0, 2.0 * RADIUS])
+        self.pick = self.surgeon.pick(self.start + (0.0, 0.0, 0.02), (0.0, 0.0, -1.0), max_distance=0.05).pick_id
+        self.turned = 0.0
+
+    def say(self, rate, seconds):
+        pace = rospy.Rate(rate)
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.turned += 3.0 / rate
+            self.surgeon.move(self.pick, self.start + 0.03 * numpy.array([numpy.sin(self.turned), 1.0 - numpy.cos(self.turned), 0.0]))
+            pace.sleep()
+
+    def real_time(self):
+        return '%.2f' % self.surgeon.state().real_time_factor
+
+    def close(self):
+        self.process.send_signal(signal.SIGINT)
+        self.process.wait()
+        self.folder.cleanup()
+
 
 def processor_time(process):
     with open('/proc/%d/stat' % process.pid) as stat:
         return sum(int(ticks) for ticks in stat.read().rsplit(')', 1)[1].split()[11:13]) / os.sysconf('SC_CLK_TCK')
 
 
-def configuration(file, frame_rate, settings):
+def configuration(file, node, frame_rate, settings):
     with open(os.path.join(PACKAGE, 'config', 'rviz', 'liver.rviz')) as text:
         config = yaml.safe_load(text)
     manager = config['Visualization Manager']
     manager['Displays'] = [d for d in manager['Displays'] if d['Name'] == 'Tissue']
-    manager['Displays'][0].update(settings, Node=rospy.get_name())
+    manager['Displays'][0].update(settings, Node=node)
     manager['Global Options']['Frame Rate'] = frame_rate
     manager['Views']['Current'].update({'Focal Point': {'X': 0.0, 'Y': 0.0, 'Z': RADIUS}, 'Distance': 0.36, 'Yaw': 0.6, 'Pitch': 0.5})
     yaml.safe_dump(config, file)
     file.flush()
 
 
-def measure(node, display, counter, options, row):
+def measure(source, display, counter, options, row):
     triangles, rate, look, cut, still, settings = row
-    node.show(triangles, look, cut, still)
+    source.show(triangles, look, cut, still)
     with tempfile.TemporaryDirectory() as folder, open(os.path.join(folder, 'view.rviz'), 'w') as file:
-        configuration(file, options.frame_rate, settings)
+        configuration(file, source.node, options.frame_rate, settings)
         frames = os.path.join(folder, 'frames')
         open(frames, 'w').close()
         rviz = subprocess.Popen(['rviz', '-d', file.name], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
@@ -161,14 +211,14 @@ def measure(node, display, counter, options, row):
         try:
             counted = lambda: [float(line) for line in open(frames)]  # noqa: E731
             while len(counted()) < 2:
-                node.say(rate, 1.0)
-            node.say(rate, 3.0)
+                source.say(rate, 1.0)
+            source.say(rate, 3.0)
             before, since, spent = len(counted()), time.monotonic(), processor_time(rviz)
-            node.say(rate, options.seconds)
+            source.say(rate, options.seconds)
             seconds, spent = time.monotonic() - since, processor_time(rviz) - spent
             shown = statistics.median(counted()[before:])
-            print('%d,%g,%s,%d,%d,%s,%.1f,%.1f' % (triangles, rate, look, cut, still, ' '.join('%s=%s' % s for s in sorted(settings.items())),
-                                                   shown, 1e3 * spent / (shown * seconds)), flush=True)
+            print('%d,%g,%s,%d,%d,%s,%.1f,%.1f,%s' % (triangles, rate, look, cut, still, ' '.join('%s=%s' % s for s in sorted(settings.items())),
+                                                   shown, 1e3 * spent / (shown * seconds), source.real_time()), flush=True)
             if options.pictures:
                 display.save(os.path.join(options.pictures, '%s%s.png' % (look, '_cut' if cut else '')))
         finally:
@@ -183,20 +233,25 @@ def main():
     parser.add_argument('--pictures', help='a folder for a picture of each look')
     options = parser.parse_args(rospy.myargv()[1:])
     rospy.init_node('pictures')
-    node, display = Node(), VirtualDisplay()
+    waves, body, display = Waves(), Body(), VirtualDisplay()
     try:
         with tempfile.TemporaryDirectory() as folder:
             source, counter = os.path.join(folder, 'counter.c'), os.path.join(folder, 'counter.so')
             with open(source, 'w') as file:
                 file.write(COUNTER)
             subprocess.run(['cc', '-shared', '-fPIC', '-O1', '-o', counter, source, '-ldl'], check=True)
-            print('triangles,messages [1/s],look,cut,still,settings,frames [1/s],processor [ms a frame]')
+            print('triangles,messages [1/s],look,cut,still,settings,frames [1/s],processor [ms a frame],real time of a node')
             for triangles in (10000, 50000):
                 for row in [(60.0, 'lobules', False, False, {'Shine': shine}) for shine in (True, False)] + \
-                        [(60.0, look, cut, False, {}) for look, cut in (('plain', False), ('image', False), ('lobules', True))] + \
+                        [(60.0, look, cut, False, {}) for look, cut in (('plain', False), ('image', False), ('mapped', False), ('lobules', True))] + \
                         [(60.0, 'lobules', False, True, {})] + \
                         [(20.0, 'lobules', False, False, {'Smooth motion': smooth}) for smooth in (False, True)]:
-                    measure(node, display, counter, options, (triangles,) + row)
+                    measure(waves, display, counter, options, (triangles,) + row)
+                for shine in (True, False):
+                    try:
+                        measure(body, display, counter, options, (triangles, 60.0, 'node', False, False, {'Shine': shine}))
+                    finally:
+                        body.close()
     finally:
         display.close()
 
