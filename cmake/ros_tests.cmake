@@ -29,7 +29,7 @@ endif()
 
 # For scripts/check --full: what takes long for what it adds.
 set(full_tests clip display ending forces fuzz hands network own_organ pages parameters play_abdomen play_block play_fish play_incision play_liver_looks play_pile play_resection
-  play_skin robust scenes session shown_block shown_fish shown_skin soak)
+  play_skin requests robust scenes session shown_block shown_fish shown_skin soak stations)
 # A node keeps one processor busy, and a screen is drawn by software: tests run alone. These wait for what they ask for,
 # however long it takes, or hold the clock themselves.
 set(patient_tests actions client clock contacts environment forces lab messages_law network own_organ pages parameters publish_clock requests scenes services session spawn_cloud stations streams testing time tools training)

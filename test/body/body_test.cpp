@@ -14,7 +14,7 @@ namespace body_test {
 using test::defOf;
 using test::prepared;
 
-TEST(PrepareBody, KeepsTheSurfaceAndSharesTheMassForEveryShape) {
+TEST(PrepareBody, KeepsTheSurfaceAndSharesTheMassForEveryShape_Long) {
   for (const shapes::Shape& shape : shapes::allShapes()) {
     for (const double spacings : {5.0, 12.0}) {
       SCOPED_TRACE(shape.name + ", " + std::to_string(spacings) + " spacings");

@@ -140,7 +140,7 @@ std::map<std::string, Material> shippedMaterials() {
   return *materials;
 }
 
-TEST(DriveScenes, AreOfTheirSeedAloneAndKeepTheirBounds) {
+TEST(DriveScenes, AreOfTheirSeedAloneAndKeepTheirBounds_Long) {
   DriveChoices choices;
   choices.shipped = shippedMaterials();
   std::set<std::string> supports;

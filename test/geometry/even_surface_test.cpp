@@ -79,7 +79,7 @@ TEST(EvenSurface, EveryShapeIsTheSameSurfaceInEvenTriangles) {
   }
 }
 
-TEST(EvenSurface, RandomOrgansAreTheSameSurfaceInEvenTriangles) {
+TEST(EvenSurface, RandomOrgansAreTheSameSurfaceInEvenTriangles_Long) {
   for (int k = 0; k < 6; ++k) {
     const Result<TriangleMesh> organ = randomOrgan(100 + k, k % 3, 0.2, k < 3 ? 4000 : 15000);
     ASSERT_TRUE(organ.ok()) << organ.error().detail;

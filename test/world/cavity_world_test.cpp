@@ -117,7 +117,7 @@ Stretch cylinderStretch(double a, double b, double spacing) {
 }
 
 // Lame: thick walls, and thin ones, where it is Laplace's law. A coarse lattice is a little too stiff.
-TEST(FilledCavity, WallsStretchAsLameSays) {
+TEST(FilledCavity, WallsStretchAsLameSays_Long) {
   for (const auto& [spacing, most] : {std::pair(0.0035, 0.055), std::pair(0.0025, 0.03)}) {
     const Stretch thick = sphereStretch(0.015, 0.025, spacing), thin = sphereStretch(0.0225, 0.025, spacing),
                   tube = cylinderStretch(0.008, 0.014, spacing);

@@ -299,7 +299,7 @@ std::size_t workIn(const StepReport& report) {
          report.ground_contacts;
 }
 
-TEST(Sleep, APileOfAThousandFallsAsleepAndDoesNothing) {
+TEST(Sleep, APileOfAThousandFallsAsleepAndDoesNothing_Long) {
   bench::PileOptions options;
   if (!kCounts) options.bodies = 100;  // under the sanitizer
   options.sleeping = true;

@@ -125,7 +125,9 @@ void expectHardlyTorn(bool crossing, Resolution resolution, int in_one, int in_a
 // Wounds of 6 to 30 mm in cells of about 7 mm.
 TEST(Wounds, AnIncisionThatIsSpreadTearsHardlyATriangle) { expectHardlyTorn(false, Resolution::kMedium, 6, 24); }
 
-TEST(Wounds, CrossingIncisionsThatAreSpreadTearFewTriangles) { expectHardlyTorn(true, Resolution::kMedium, 8, 40); }
+TEST(Wounds, CrossingIncisionsThatAreSpreadTearFewTriangles_Long) {
+  expectHardlyTorn(true, Resolution::kMedium, 8, 40);
+}
 
 // And in cells of about 5 mm, which tear less and take most of the time.
 TEST(Wounds, AnIncisionInFineCellsTearsHardlyATriangle_Long) { expectHardlyTorn(false, Resolution::kFine, 3, 8); }
