@@ -56,6 +56,7 @@ struct WorldBody : KeptBody {
   double edge_length = 0.0;                           // [m] mean, of the surface
   double surface_reach = 0.0;                         // [m] how far the surface is beyond the particles, at most
   double fastest = 0.0;                               // [m/s] no particle is faster, as bounds
+  std::optional<std::uint64_t> slowed_at;             // the last step in which stiffness_factor was below 1
   Index batch = kNoIndex;                             // matched with others of its kind: one of World::Impl::batches
   StepScratch scratch;
 };
@@ -360,6 +361,7 @@ struct World::Impl : KeptWorld {
   void findSurfaceContacts(double h);
   Vec3 pushWay(double h_frame) const;                    // [m] of the push sphere in a frame
   std::vector<std::pair<double, std::size_t>> stiffest;  // of an island: less the substeps that a body needs, and which
+  void saySlowed(const WorldBody& body, int given, bool by_most, double factor);
   int substepsOf(const std::vector<WorldBody*>& some, bool may_meet, double h, int parts);
   /// One of so many parts of a frame, h [s] each; parts_left: with it.
   void stepSurfaces(double h, int parts, int parts_left);

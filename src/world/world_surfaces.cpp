@@ -291,8 +291,27 @@ Vec3 World::Impl::pushWay(double h_frame) const {
   return length > most ? Vec3(way * (most / length)) : way;
 }
 
+/// In substeps a step, as for a scene: how many parts a frame has is nothing that a user knows.
+void World::Impl::saySlowed(const WorldBody& body, int given, bool by_most, double factor) {
+  const double h_frame = 1.0 / settings.step_rate;
+  const double at_rest = substepsNeeded(*body.model, BodyState(), h_frame);
+  const double needed = substepsNeeded(*body.model, body.state, h_frame);
+  std::ostringstream text;
+  text << body.name << " needs " << needed << " substeps a step for its material";
+  if (needed > at_rest) text << " as it is stretched now (" << at_rest << " at rest)";
+  text << "; with " << given;
+  if (by_most) {
+    text << " (max_substeps is " << settings.max_substeps << ")";
+  } else {
+    text << " (it is a sliver: at most " << 100.0 * kSlowedMass
+         << " % of the mass of all that it touches or is joined to, which needs no more)";
+  }
+  text << " it deforms " << 1.0 / std::sqrt(factor) << " times as slowly, to where it would";
+  say(EventType::kOverBudget, body.name, 0, text.str());
+}
+
 /// Substeps of one of so many parts of a frame that the stiffest bodies of an island and its contacts need. Slivers are
-/// not asked, but where they are picked. What is taken from a body is said once.
+/// not asked, but where they are picked. That a body is slowed is said when it begins, at most once a second.
 int World::Impl::substepsOf(const std::vector<WorldBody*>& some, bool may_meet, double h_frame, int parts) {
   double needed = may_meet ? std::max(settings.substeps, kContactSubsteps) : settings.substeps;
   needed = std::ceil(needed / parts);
@@ -316,13 +335,10 @@ int World::Impl::substepsOf(const std::vector<WorldBody*>& some, bool may_meet, 
   const int substeps = needed < most ? static_cast<int>(needed) : most;  // NaN: most
   for (WorldBody* body : some) {
     const double factor = stiffnessFactor(*body->model, body->state, h_frame / substeps);
-    if (factor < 1.0 && !(body->stiffness_factor < 1.0)) {
-      std::ostringstream text;
-      text << body->name << " needs " << substepsNeeded(*body->model, body->state, h_frame)
-           << " substeps for its material; with " << substeps
-           << (substeps < most ? " (as those beside it, which are heavier)" : " (max_substeps)") << " it deforms "
-           << 1.0 / std::sqrt(factor) << " times as slowly, to where it would";
-      say(EventType::kOverBudget, body->name, 0, text.str());
+    if (factor < 1.0) {
+      const bool anew = !body->slowed_at || static_cast<double>(step - *body->slowed_at) > settings.step_rate;
+      if (anew && !(body->stiffness_factor < 1.0)) saySlowed(*body, substeps * parts, substeps == most, factor);
+      body->slowed_at = step;
     }
     body->stiffness_factor = factor;
   }

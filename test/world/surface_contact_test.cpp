@@ -1,6 +1,8 @@
 // Laws of contact in present space, on whole bodies in a world.
 #include <cmath>
+#include <cstdio>
 
+#include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/random_organ.h"
@@ -575,6 +577,71 @@ TEST(SurfaceContact, ASliverDoesNotMakeAllTakeItsSubsteps) {
   const std::size_t alone = substepsWith(false, false);
   EXPECT_LE(substepsWith(true, false), alone + 1);
   EXPECT_GE(substepsWith(true, true), 2 * alone);
+}
+
+/// What is said of bodies that are slowed, in the steps of a second.
+struct SaidSlowed {
+  double needed = 0.0, given = 0.0;  // substeps a step
+  std::string text;
+};
+std::vector<SaidSlowed> slowedWithin(World& world, const std::string& body, double seconds) {
+  std::vector<SaidSlowed> all;
+  const int steps = static_cast<int>(std::lround(seconds * world.settings().step_rate));
+  for (int n = 0; n < steps; ++n) {
+    world.step();
+    for (const Event& event : world.takeEvents()) {
+      if (event.type != EventType::kOverBudget || event.body != body) continue;
+      SaidSlowed said;
+      said.text = event.text;
+      EXPECT_EQ(std::sscanf(event.text.c_str() + body.size(), " needs %lf", &said.needed), 1) << event.text;
+      EXPECT_EQ(std::sscanf(event.text.c_str() + event.text.find("; with "), "; with %lf", &said.given), 1)
+          << event.text;
+      EXPECT_LE(said.given, static_cast<double>(seen(world).report.substeps)) << event.text;
+      all.push_back(said);
+    }
+  }
+  return all;
+}
+double neededAtRest(World& world, std::size_t body) {
+  return substepsNeeded(*seen(world).bodies[body].model, BodyState(), 1.0 / world.settings().step_rate);
+}
+
+// Not of max_substeps, of which there are enough.
+TEST(SurfaceContact, ASliverIsToldThatItIsOne) {
+  World world(surface());
+  add(world, block("slab", Vec3(0, 0, 0.051), Vec3(0.2, 0.2, 0.1)));
+  BodyDef hard = block("crumb", Vec3(0.01, 0.0, 0.118), Vec3::Constant(0.03));
+  hard.material.youngs_modulus = 5e4;
+  add(world, hard);
+  const std::vector<SaidSlowed> said = slowedWithin(world, "crumb", 1.0);
+  ASSERT_EQ(said.size(), 1u);
+  EXPECT_NE(said[0].text.find("it is a sliver: at most 5 % of the mass"), std::string::npos) << said[0].text;
+  EXPECT_EQ(said[0].text.find("max_substeps"), std::string::npos) << said[0].text;
+  EXPECT_GE(said[0].needed, neededAtRest(world, 1));
+  EXPECT_LT(said[0].given, said[0].needed);
+  EXPECT_LT(said[0].given, world.settings().max_substeps);
+}
+
+// A frame of what goes fast has several parts, and what swings needs now more and now less than there is.
+TEST(SurfaceContact, OfWhatIsSlowedIsSaidOnceASecondWhatAStepHas) {
+  for (const double speed : {0.0, 6.0, 12.0}) {
+    WorldSettings settings = surface();
+    World measured(settings);
+    add(measured, block("thrown", Vec3(0, 0, 0.2)));
+    settings.max_substeps = static_cast<int>(neededAtRest(measured, 0));
+    World world(settings);
+    add(world, block("thrown", Vec3(0, 0, 0.2)), Vec3(0, 0, -speed), Vec3(3, 40, 0));
+    add(world, block("wall", Vec3(0, 0, 0.0505), Vec3(0.2, 0.2, 0.1)));
+    const std::vector<SaidSlowed> said = slowedWithin(world, "thrown", 1.0);
+    std::string texts;
+    for (const SaidSlowed& one : said) texts += one.text + "\n";
+    ASSERT_EQ(said.size(), 1u) << texts;
+    EXPECT_GE(said[0].given, settings.max_substeps) << said[0].text;
+    EXPECT_GT(said[0].needed, said[0].given) << said[0].text;
+    EXPECT_NE(said[0].text.find("(max_substeps is " + std::to_string(settings.max_substeps) + ")"), std::string::npos)
+        << said[0].text;
+    EXPECT_NE(said[0].text.find(std::to_string(settings.max_substeps) + " at rest"), std::string::npos) << said[0].text;
+  }
 }
 
 // Walls of twelve triangles: along their upper edges nothing but the edges themselves holds the tissue.
