@@ -173,13 +173,6 @@ std::set<std::uint32_t> cavityPatches(const TriangleMesh& mesh) {
   return patches;
 }
 
-const Cavities::Shell* shellOf(const BodyModel& model, std::uint32_t patch) {
-  if (!model.cavities) return nullptr;
-  for (const Cavities::Shell& shell : model.cavities->shells)
-    if (shell.patch == patch) return &shell;
-  return nullptr;
-}
-
 // 0..1 of what is to come in.
 double filledShare(const FilledCavity& cavity) {
   return cavity.filled_for < kFillTime ? 0.5 - 0.5 * std::cos(M_PI * cavity.filled_for / kFillTime) : 1.0;
@@ -282,6 +275,13 @@ void makeCavities(BodyModel& model) {
   model.cavities = std::move(cavities);
 }
 
+const Cavities::Shell* shellOf(const BodyModel& model, std::uint32_t patch) {
+  if (!model.cavities) return nullptr;
+  for (const Cavities::Shell& shell : model.cavities->shells)
+    if (shell.patch == patch) return &shell;
+  return nullptr;
+}
+
 Result<std::vector<FilledCavity>> filledCavities(const BodyModel& model, const CavityFill& fill) {
   std::vector<FilledCavity> filled;
   if (fill.empty() || !model.cavities) return filled;
@@ -371,12 +371,13 @@ void pressCavities(const BodyModel& model, double factor, double h, BodyState& s
 std::vector<BodyMeasures::Cavity> measureCavities(const BodyModel& model, const std::vector<FilledCavity>& filled,
                                                   const Points& positions) {
   std::vector<BodyMeasures::Cavity> measures;
-  if (filled.empty()) return measures;
+  if (!model.cavities) return measures;
   Points places;
   carriedPlaces(model.cavities->binding, positions, places);
-  for (const FilledCavity& cavity : filled) {
-    const Cavities::Shell& shell = *shellOf(model, cavity.patch);
-    measures.push_back({shell.share * signedVolume(places, shell.triangles), cavity.acting, shell.open});
+  for (const Cavities::Shell& shell : model.cavities->shells) {
+    measures.push_back({shell.share * signedVolume(places, shell.triangles), 0.0, shell.open});
+    for (const FilledCavity& cavity : filled)
+      if (cavity.patch == shell.patch) measures.back().pressure = cavity.acting;
   }
   return measures;
 }

@@ -29,7 +29,7 @@ void finishPiece(const BodyState& parent, std::shared_ptr<BodyModel> model, Body
   piece.state.pace = parent.pace;
   piece.state.stiffened = parent.stiffened;
   piece.state.placed = parent.placed;
-  if (!parent.cavities.empty()) makeCavities(*model);
+  makeCavities(*model);
   piece.state.cavities = inheritedCavities(parent.cavities, *model, piece.state.positions);
   updateSurface(*model, piece.state);
   piece.model = std::move(model);

@@ -369,9 +369,7 @@ std::string faultOf(const BodyModel& m, const BodyState& s) {
       (!s.eased.empty() && s.eased.size() != particles))
     return "a body's state is not that of its model";
   for (const FilledCavity& c : s.cavities) {
-    const bool there = m.cavities && std::any_of(m.cavities->shells.begin(), m.cavities->shells.end(),
-                                                 [&](const Cavities::Shell& shell) { return shell.patch == c.patch; });
-    if (!there || !(std::abs(c.pressure) <= 1e50) || !(std::abs(c.content) <= 1e50) ||
+    if (!shellOf(m, c.patch) || !(std::abs(c.pressure) <= 1e50) || !(std::abs(c.content) <= 1e50) ||
         !(c.compliance >= 0.0 && c.compliance <= 1e50) || !(c.leak > 0.0 && c.leak <= 3600.0) ||
         !(c.filled_for >= 0.0) || !(c.open_for >= 0.0))
       return "a body's cavities are filled with what cannot be";

@@ -194,10 +194,8 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
 }
 
 void World::Impl::sayLeaks(const std::string& name, const BodyModel& model, const BodyState& state) {
-  const std::vector<BodyMeasures::Cavity> measures = measureCavities(model, state.cavities, state.positions);
-  for (std::size_t c = 0; c < measures.size(); ++c) {
-    const FilledCavity& cavity = state.cavities[c];
-    if (!measures[c].open || cavity.open_for > 0.0) continue;
+  for (const FilledCavity& cavity : state.cavities) {
+    if (!shellOf(model, cavity.patch)->open || cavity.open_for > 0.0) continue;
     std::ostringstream text;
     text << "a cavity of " << name << " is open: its pressure of " << cavity.pressure << " Pa falls to 0 in "
          << cavity.leak << " s";

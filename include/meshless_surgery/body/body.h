@@ -41,8 +41,8 @@ struct CollisionSurface {
   double distance = 0.0;  // [m] from the visual surface, at most
 };
 
-/// The filled cavities of a body as surfaces of their own, which turn and move with its particles: no levers. They are
-/// of the surface for contact, or of the visual one where there is no other.
+/// The cavities of a body that are or were filled, as surfaces of their own, which turn and move with its particles: no
+/// levers. They are of the surface for contact, or of the visual one where there is no other.
 struct Cavities {
   struct Shell {
     std::uint32_t patch = kCavityPatch;  // of its faces
@@ -194,7 +194,7 @@ struct BodyMeasures {
     double pressure = 0.0;  // [Pa]
     bool open = false;
   };
-  std::vector<Cavity> cavities;  // that are filled
+  std::vector<Cavity> cavities;  // one a shell of BodyModel::cavities
 };
 /// Needs state.surface to be up to date for volume and area.
 BodyMeasures measureBody(const BodyModel& model, const BodyState& state);

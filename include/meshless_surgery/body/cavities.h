@@ -18,6 +18,9 @@ bool markCavities(const TriangleMesh& visual, TriangleMesh& collision);
 /// model.cavities, from the patches of its surfaces and their binding; null where there are none.
 void makeCavities(BodyModel& model);
 
+/// Of a filled cavity; null where the model has none of that patch.
+const Cavities::Shell* shellOf(const BodyModel& model, std::uint32_t patch);
+
 /// What fills the cavities of a model at rest. Refuses (kInvalidArgument) a volume that is less than a tenth of what
 /// they hold at rest, or more than ten times that.
 Result<std::vector<FilledCavity>> filledCavities(const BodyModel& model, const CavityFill& fill);
@@ -33,7 +36,7 @@ std::vector<FilledCavity> inheritedCavities(const std::vector<FilledCavity>& par
 /// was. factor: of stiffnessFactor().
 void pressCavities(const BodyModel& model, double factor, double h, BodyState& state, StepScratch& scratch);
 
-/// Volumes at present places, or [m] other ones of the particles.
+/// Of all shells, those that have leaked out too, which have no pressure. Volumes at `positions` [m] of the particles.
 std::vector<BodyMeasures::Cavity> measureCavities(const BodyModel& model, const std::vector<FilledCavity>& filled,
                                                   const Points& positions);
 
