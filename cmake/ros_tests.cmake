@@ -9,7 +9,7 @@ add_test_program(ros 1 SOURCES ${ros_unit_tests} LABELS ros LINKS ${PROJECT_NAME
 target_include_directories(ros_tests SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
 add_dependencies(check_ros deformer_node review_node make_meshes replay report ${PROJECT_NAME}_generate_messages)
 add_dependencies(check_drive drive)  # scripts/check plays random scenes with it
-add_custom_target(check_rviz DEPENDS deformer_node ${PROJECT_NAME}_generate_messages)
+add_custom_target(check_rviz DEPENDS deformer_node review_node ${PROJECT_NAME}_generate_messages)
 if(TARGET ${PROJECT_NAME}_rviz)
   add_dependencies(check_rviz ${PROJECT_NAME}_rviz)
   file(GLOB rviz_unit_tests CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/test/rviz/*_test.cpp)
@@ -29,7 +29,7 @@ endif()
 
 # For scripts/check --full: what takes long for what it adds.
 set(full_tests clip display ending forces fuzz hands network own_organ pages parameters play_abdomen play_block play_fish play_incision play_liver_looks play_pile play_resection
-  play_skin requests robust scenes session shown_block shown_fish shown_skin soak stations)
+  play_skin requests robust scenes session shown_block shown_fish shown_review shown_skin soak stations)
 # A node keeps one processor busy, and a screen is drawn by software: tests run alone. These wait for what they ask for,
 # however long it takes, or hold the clock themselves.
 set(patient_tests actions client clock contacts environment forces lab messages_law network own_organ pages parameters publish_clock requests scenes services session spawn_cloud stations streams testing time tools training)

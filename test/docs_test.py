@@ -139,7 +139,7 @@ class ArchitectureTest(unittest.TestCase):
         self.assertEqual(may, listed)
 
     def testItsThreadsAreThoseOfTheNode(self):
-        code = ''.join(read(os.path.relpath(path, CHECKOUT)) for pattern in ('src/ros/*', 'src/node_main/deformer_node.cpp',
+        code = ''.join(read(os.path.relpath(path, CHECKOUT)) for pattern in ('src/ros/*', 'src/node_main/run_node.h',
                                                                             'include/meshless_surgery/ros/*.h')
                        for path in glob.glob(os.path.join(CHECKOUT, pattern)) if 'review_node' not in path)
         rows = tableRows(self.page, 'Threads')

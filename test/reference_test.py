@@ -183,12 +183,14 @@ class ParametersTest(Compared, unittest.TestCase):
         header = read('include/meshless_surgery/ros/settings.h')
         code = read('src/ros/settings.cpp') + read('include/meshless_surgery/ros/border_check.h')
         known, begins = {}, members('NodeSettings', header)
-        for _, (name, member, *numbers) in calls(r'reader\.read', code):
+        # What both nodes have, what the review node has, and the other one.
+        _, shared, review, own = re.split(r'\n(?=\S.* (?:readShared|readReviewSettings|readNodeSettings)\()', code)
+        for _, (name, member, *numbers) in calls(r'reader\.(?:read|frame)', shared + own):
             begin = begins[member.split('.')[1]] if member.count('.') == 1 else ''
             if re.search(r'std::optional<double> %s;' % member.split('.')[1], header):
                 begin = None  # the scene's
             known[name.strip('"')] = (numbers and (constant(numbers[0], code), constant(numbers[1], code), False) or None, begin)
-        return {**known, **{'review ' + name: (None, None) for name in found(r'getParam\("(\w+)"', read('src/ros/review_node.cpp'))}}
+        return {**known, **{'review ' + name: (None, None) for name in found(r'reader\.(?:read|frame)\("(\w+)"', shared + review)}}
 
     def said(self, text):
         known = {name: (rangeOf(row[2]) and rangeOf(row[2])[:3], valueOf(row[1]))
@@ -209,7 +211,8 @@ class LaunchTest(Compared, unittest.TestCase):
         known = {}
         for path in files('launch/*.launch'):
             for entry in xml.etree.ElementTree.parse(os.path.join(CHECKOUT, path)).getroot().findall('arg'):
-                known[os.path.basename(path), entry.get('name')] = entry.get('default')
+                if entry.get('value') is None:
+                    known[os.path.basename(path), entry.get('name')] = entry.get('default')
         return known
 
     def agree(self, code, said):
@@ -342,7 +345,8 @@ class ExitCodesTest(Compared, unittest.TestCase):
                 self.assertIn('argparse', code)
                 continue
             if path.endswith('.cpp'):
-                code += read('src/node_main/end_on_signal.cpp') if 'node_main' in path else ''
+                if 'node_main' in path:
+                    code += read('src/node_main/run_node.h') + read('src/node_main/end_on_signal.cpp')
                 taken = found(r'(?:\breturn|_exit\(|\?|:) ?(\d)(?= :|;|\);)', code)
             else:
                 taken = found(r'\bexit (\d)', re.sub(r'(?m)^ *(?:.*; then )?stop .*|^\(\(.*== 0\)\)$', 'exit 1', code))

@@ -3,11 +3,13 @@
 
 #include <type_traits>
 
+#include <meshless_surgery/Hash.h>
 #include <ros/console.h>
 
 #include "meshless_surgery/ros/border_check.h"
 #include "meshless_surgery/ros/convert.h"
 #include "meshless_surgery/ros/rejections.h"
+#include "meshless_surgery/ros/runner.h"
 
 namespace meshless {
 
@@ -41,6 +43,17 @@ struct Answers {
     response.message = message;
     if constexpr (HasErrorCode<Response>::value) response.error_code = 0;
     return true;
+  }
+
+  /// ~hash of both nodes.
+  bool answerHash(WorldRunner& runner, meshless_surgery::Hash::Response& response) const {
+    const Status done = runner.look([&](World& world) {
+      response.hash = world.stateHash();
+      response.step = world.stepCount();
+      response.sim_time = world.simTime();
+    });
+    if (!done.ok()) return refuse(response, "hash", done.error());
+    return accept(response, "the state before step " + std::to_string(response.step));
   }
 
   Rejections& rejections;

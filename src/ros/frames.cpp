@@ -28,12 +28,12 @@ Pose toPose(const geometry_msgs::TransformStamped& transform) {
   return pose;
 }
 
+}  // namespace
+
 std::string withoutSlash(const std::string& frame) {
   const std::size_t first = frame.find_first_not_of('/');
   return first == std::string::npos ? std::string() : frame.substr(first);
 }
-
-}  // namespace
 
 struct Frames::Listener {
   tf2::BufferCore buffer;
@@ -41,7 +41,7 @@ struct Frames::Listener {
   SteadyClock::time_point since = SteadyClock::now();
 };
 
-Frames::Frames(std::string world_frame) : world_frame_(withoutSlash(world_frame)) {}
+Frames::Frames(std::string world_frame) : world_frame_(std::move(world_frame)) {}
 Frames::~Frames() = default;
 
 bool Frames::isWorld(const std::string& frame) const { return frame.empty() || frame == world_frame_; }

@@ -5,12 +5,9 @@
 #include <fstream>
 
 #include <meshless_surgery/Bookmarks.h>
-#include <meshless_surgery/Hash.h>
 #include <meshless_surgery/Play.h>
 #include <meshless_surgery/Review.h>
 #include <meshless_surgery/Seek.h>
-#include <ros/callback_queue.h>
-#include <ros/spinner.h>
 
 #include "answers.h"
 #include "meshless_surgery/ros/publishers.h"
@@ -132,17 +129,12 @@ struct ReviewNode::Parts : Answers {
             settings, clock, [](const std::function<void(World&)>&) {}, [](const Error&) {}),
         publishers(private_handle, settings, runner, no_streams, rejections),
         handle(private_handle) {
-    handle.setCallbackQueue(&queue);
     review_topic = handle.advertise<meshless_surgery::Review>("review", 5, true);
     bookmarks_topic = handle.advertise<meshless_surgery::Bookmarks>("bookmarks", 1, true);
     paths_topic = handle.advertise<visualization_msgs::MarkerArray>("hand_paths", 1, true);
-    servers = {handle.advertiseService("seek", &Parts::seek, this), handle.advertiseService("play", &Parts::play, this),
-               handle.advertiseService("hash", &Parts::hash, this)};
-    timer = handle.createWallTimer(ros::WallDuration(1.0 / kReviewRate), &Parts::say, this);
   }
 
   ~Parts() {
-    spinner.stop();
     servers.clear();
     timer.stop();
     runner.stop();
@@ -159,7 +151,10 @@ struct ReviewNode::Parts : Answers {
     runner.start();
     publishers.start();
     sayWhole();
-    spinner.start();
+    timer = handle.createWallTimer(ros::WallDuration(1.0 / kReviewRate), &Parts::say, this);
+    // Last, so that who finds them finds a runner that answers.
+    servers = {handle.advertiseService("seek", &Parts::seek, this), handle.advertiseService("play", &Parts::play, this),
+               handle.advertiseService("hash", &Parts::hash, this)};
   }
 
   double rate() const { return review.player().stepRate(); }
@@ -246,12 +241,7 @@ struct ReviewNode::Parts : Answers {
   }
 
   bool hash(meshless_surgery::Hash::Request&, meshless_surgery::Hash::Response& response) {
-    const Status done = runner.look([&](World& world) {
-      response.hash = world.stateHash();
-      response.step = world.stepCount();
-    });
-    if (!done.ok()) return refuse(response, "hash", done.error());
-    return accept(response, "of the state that is shown");
+    return answerHash(runner, response);
   }
 
   std::unique_ptr<Rejections> owned_rejections;
@@ -263,8 +253,6 @@ struct ReviewNode::Parts : Answers {
   StreamedTools no_streams;
   Publishers publishers;
   ros::NodeHandle handle;
-  ros::CallbackQueue queue;
-  ros::AsyncSpinner spinner{1, &queue};
   ros::Publisher review_topic, bookmarks_topic, paths_topic;
   std::vector<ros::ServiceServer> servers;
   ros::WallTimer timer;
@@ -276,19 +264,14 @@ ReviewNode::ReviewNode(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) 
 ReviewNode::~ReviewNode() = default;
 
 Result<std::unique_ptr<ReviewNode>> ReviewNode::start(const ros::NodeHandle& private_handle) {
-  std::string log;
-  private_handle.getParam("log", log);
-  if (log.empty())
-    return Error{ErrorCode::kInvalidArgument,
-                 "parameter ~log is missing; accepted: the name of a log in the session directory, or a path"};
-  NodeSettings settings;
-  private_handle.getParam("world_frame", settings.world_frame);
-  private_handle.getParam("tf_prefix", settings.tf_prefix);
-  private_handle.getParam("session_directory", settings.session_directory);
-  const std::string file = logFile(log, sessionFolderOf(settings.session_directory));
+  std::vector<std::string> unknown;
+  auto settings = readReviewSettings(private_handle, unknown);
+  if (!settings.ok()) return settings.error();
+  for (const std::string& name : unknown) ROS_WARN_STREAM("parameter ~" << name << " is not known, and not used");
+  const std::string file = logFile(settings->command_log, sessionFolderOf(settings->session_directory));
   auto player = openLog(file);
   if (!player.ok()) return Error{player.error().code, "parameter ~log: " + file + ": " + player.error().detail};
-  settings.scene = file;
+  settings->scene = file;
   if (player->report().lost_bytes > 0) ROS_WARN_STREAM("the log breaks off; what there is is shown");
 
   WorldSettings world_settings;
@@ -311,7 +294,7 @@ Result<std::unique_ptr<ReviewNode>> ReviewNode::start(const ros::NodeHandle& pri
   ROS_INFO_STREAM("log " << file << ": " << static_cast<double>(review.player().end()) / review.player().stepRate()
                          << " s, " << review.index().events().size() << " events");
   std::unique_ptr<Parts> parts =
-      std::make_unique<Parts>(private_handle, settings, fs::path(file).filename().string(), std::move(review),
+      std::make_unique<Parts>(private_handle, *settings, fs::path(file).filename().string(), std::move(review),
                               std::move(world), std::make_unique<Rejections>());
   parts->start();
   return std::unique_ptr<ReviewNode>(new ReviewNode(std::move(parts)));

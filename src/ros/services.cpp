@@ -8,7 +8,6 @@
 #include <meshless_surgery/Cut.h>
 #include <meshless_surgery/Detach.h>
 #include <meshless_surgery/GetBody.h>
-#include <meshless_surgery/Hash.h>
 #include <meshless_surgery/Incise.h>
 #include <meshless_surgery/LoadState.h>
 #include <meshless_surgery/Lock.h>
@@ -448,13 +447,7 @@ struct Services::Handlers : Answers {
   }
 
   bool hash(meshless_surgery::Hash::Request&, meshless_surgery::Hash::Response& response) {
-    const Status done = runner.look([&](World& world) {
-      response.hash = world.stateHash();
-      response.step = world.stepCount();
-      response.sim_time = world.simTime();
-    });
-    if (!done.ok()) return refuse(response, "hash", done.error());
-    return accept(response, "the state before step " + std::to_string(response.step));
+    return answerHash(runner, response);
   }
 
   WorldRunner& runner;

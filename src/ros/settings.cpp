@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <set>
+#include <utility>
 
 #include <XmlRpcValue.h>
 #include <ros/names.h>
@@ -9,6 +10,7 @@
 
 #include "meshless_surgery/io/session_folder.h"
 #include "meshless_surgery/ros/border_check.h"
+#include "meshless_surgery/ros/frames.h"
 
 namespace meshless {
 namespace {
@@ -86,8 +88,12 @@ class Reader {
     }
   }
 
-  /// tf names are short and in one line.
-  void frame(const std::string& name, const std::string& value) {
+  /// tf names are short and in one line. Empty where the name may be left out.
+  void frame(const std::string& name, std::string& value) {
+    read(name, value);
+    const std::string given = std::exchange(value, withoutSlash(value));
+    if (value.empty() && !given.empty())
+      check.fault("parameter ~" + name + " is '" + printable(given) + "'; accepted: a frame's name");
     const bool plain = std::all_of(value.begin(), value.end(), [](unsigned char c) { return c >= ' ' && c != 0x7f; });
     if (plain && value.size() <= kMaxName) return;
     check.fault("parameter ~" + name + " is '" + printable(value) + "'; accepted: at most " + std::to_string(kMaxName) +
@@ -130,18 +136,37 @@ class Reader {
   std::set<std::string> known_{"diagnostic_period"};  // diagnostic_updater's
 };
 
+/// What both nodes have.
+void readShared(Reader& reader, NodeSettings& settings) {
+  reader.frame("world_frame", settings.world_frame);
+  if (settings.world_frame.empty()) reader.check.fault("parameter ~world_frame is ''; accepted: a frame's name");
+  reader.frame("tf_prefix", settings.tf_prefix);
+  reader.read("session_directory", settings.session_directory);
+}
+
 }  // namespace
+
+Result<NodeSettings> readReviewSettings(const ros::NodeHandle& private_handle, std::vector<std::string>& unknown) {
+  NodeSettings settings;
+  Reader reader(private_handle);
+  readShared(reader, settings);
+  reader.read("log", settings.command_log);
+  if (settings.command_log.empty()) {
+    reader.check.fault("parameter ~log is missing; accepted: the name of a log in the session directory, or a path");
+  }
+  if (!reader.check.ok()) return reader.check.error();
+  unknown = reader.unknown();
+  return settings;
+}
 
 Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std::vector<std::string>& unknown) {
   NodeSettings settings;
   Reader reader(private_handle);
-  reader.read("world_frame", settings.world_frame);
-  reader.read("tf_prefix", settings.tf_prefix);
+  readShared(reader, settings);
   reader.read("scene", settings.scene);
   reader.read("task", settings.task);
   reader.read("trainee", settings.trainee);
   reader.read("data_folders", settings.data_folders);
-  reader.read("session_directory", settings.session_directory);
   reader.read("command_log", settings.command_log);
   reader.read("autosave_period", settings.autosave_period, 0.0, 3600.0, "s");
   reader.read("paused", settings.paused);
@@ -154,9 +179,9 @@ Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std
   reader.read("state_rate", settings.state_rate, 0.1, 1000.0, "Hz");
   reader.read("tools_rate", settings.tools_rate, 0.1, 1000.0, "Hz");
   reader.read("force_rate", settings.force_rate, 1.0, 2000.0, "Hz");
-  reader.read("tools/pick/follow_frame", settings.pick.follow_frame);
-  reader.read("tools/push/follow_frame", settings.push.follow_frame);
-  reader.read("tools/scissors/follow_frame", settings.scissors.follow_frame);
+  reader.frame("tools/pick/follow_frame", settings.pick.follow_frame);
+  reader.frame("tools/push/follow_frame", settings.push.follow_frame);
+  reader.frame("tools/scissors/follow_frame", settings.scissors.follow_frame);
   reader.read("tools/pick/max_distance", settings.pick_max_distance, 1e-6, kMaxLength, "m");
   reader.read("tools/pick/stiffness", settings.pick_stiffness, 1e-3, 1e9, "N/m");
   reader.read("tools/push/radius", settings.push_radius, 1e-6, kMaxLength, "m");
@@ -166,14 +191,6 @@ Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std
   reader.read("tools/silence", settings.tools_silence, 0.0, 3600.0, "s");
   reader.read("tools/scissors/length", settings.scissors_length, 1e-6, kMaxLength, "m");
   reader.read("tools/scissors/width", settings.scissors_width, 1e-6, kMaxLength, "m");
-  if (settings.world_frame.find_first_not_of('/') == std::string::npos) {
-    reader.check.fault("parameter ~world_frame is '" + printable(settings.world_frame) + "'; accepted: a frame's name");
-  }
-  reader.frame("world_frame", settings.world_frame);
-  reader.frame("tf_prefix", settings.tf_prefix);
-  reader.frame("tools/pick/follow_frame", settings.pick.follow_frame);
-  reader.frame("tools/push/follow_frame", settings.push.follow_frame);
-  reader.frame("tools/scissors/follow_frame", settings.scissors.follow_frame);
   for (const char* group : {"tools", "tools/pick", "tools/push", "tools/scissors"}) reader.group(group);
   if (settings.autosave_period > 0.0 && settings.autosave_period < kShortestAutosave) {
     reader.check.fault("parameter ~autosave_period is " + formatNumber(settings.autosave_period) +

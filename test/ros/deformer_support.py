@@ -7,6 +7,7 @@ import threading
 import time
 import unittest
 
+import roslaunch.config
 import roslib.packages
 import rospy
 import rosunit
@@ -183,6 +184,13 @@ class OwnNode:
         self.log.close()
         if code not in ((0, 1, -9) if self.signal == 9 else (0, 1)) and not failure:
             raise AssertionError('the node ended with %s: %s' % (code, output))
+
+
+def launched(file, *arguments):
+    """The nodes of a launch file of the package, by name: their arguments."""
+    path = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'launch', file)
+    config = roslaunch.config.load_config_default([(path, list(arguments))], None)
+    return {node.namespace + node.name: node.args.split() for node in config.nodes}
 
 
 def law_holds(law, holds):

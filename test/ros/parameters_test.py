@@ -4,12 +4,17 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
+import genpy
+import roslib.message
 import roslib.packages
 import rospy
-from geometry_msgs.msg import Point, PoseStamped
+import tf2_ros
+from geometry_msgs.msg import Point, PoseStamped, TransformStamped
 from meshless_surgery.msg import State
+from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
@@ -83,6 +88,8 @@ class RefusalTest(unittest.TestCase):
     def test_folders_and_frames(self):
         self.refused(['/no/such/folder'], scene=BOXES, data_folders=['/no/such/folder'])
         self.refused(['~world_frame'], scene=BOXES, world_frame='')
+        for name in ('world_frame', 'tf_prefix', 'tools__pick__follow_frame'):
+            self.refused(['~' + name.replace('__', '/'), "is '//'", "accepted: a frame's name"], scene=BOXES, **{name: '//'})
 
 
 class EffectTest(unittest.TestCase):
@@ -100,6 +107,49 @@ class EffectTest(unittest.TestCase):
             self.assertIn("'world'", refused.message)
             for recorder in (states, markers):
                 recorder.close()
+
+    def frames_of(self, message):
+        """All names of frames in it."""
+        if isinstance(message, (list, tuple)):
+            return [frame for one in message for frame in self.frames_of(one)]
+        if not isinstance(message, genpy.Message):
+            return []
+        named = [getattr(message, slot) for slot in message.__slots__ if slot in ('frame_id', 'child_frame_id', 'world_frame')]
+        return named + self.frames_of([getattr(message, slot) for slot in message.__slots__])
+
+    def test_no_frame_is_published_with_a_slash_before_its_name(self):
+        # As tf1 wrote them, and as people still do. tf2 and rviz do not know such a name.
+        with Node(scene=BOXES, world_frame='/table', tf_prefix='/left', tools__push__follow_frame='/ball') as deformer:
+            heard = []
+            kinds = {topic: roslib.message.get_message_class(kind) for topic, kind in rospy.get_published_topics(deformer.node)}
+            kinds['/tf'] = TFMessage
+            for topic, kind in kinds.items():
+                if kind:  # not of crtk_msgs, which need not be there
+                    heard.append(Recorder(topic, kind, connected=topic != '/tf'))
+            picked = deformer.call('pick', header=header('//table'), point=Point(-0.15, 0.0, 0.1))
+            self.assertTrue(picked.success, picked.message)
+            ball = TransformStamped(header=header('/table'), child_frame_id='/ball')
+            ball.transform.translation.z, ball.transform.rotation.w = 1.0, 1.0
+            broadcaster = tf2_ros.TransformBroadcaster()
+            children, end = set(), time.monotonic() + LONG
+            while not {'left/pick_cursor', 'left/push_sphere'} <= children:
+                self.assertLess(time.monotonic(), end, children)
+                ball.header.stamp = rospy.Time.now()
+                broadcaster.sendTransform(ball)
+                time.sleep(0.02)
+                children = {t.child_frame_id for recorder in heard for m in list(recorder.messages) if recorder.topic == '/tf'
+                            for t in m.transforms}
+            with_frames = set()
+            for recorder in heard:
+                if recorder.topic == '/tf':
+                    self.assertLessEqual(children, {'left/pick_cursor', 'left/push_sphere', '/ball'})
+                    continue
+                for frame in self.frames_of(list(recorder.messages)):
+                    self.assertEqual('table', frame, recorder.topic)
+                    with_frames.add(recorder.topic[len(deformer.node) + 1:])
+                recorder.close()
+            self.assertLessEqual({'state', 'markers', 'points', 'surfaces', 'topology', 'vertices', 'info', 'events', 'clusters', 'contacts',
+                                  'pick/measured_cp', 'pick/measured_cf', 'push/measured_cp', 'push/setpoint_cp', 'task'}, with_frames)
 
     def test_tool_defaults(self):
         with Node(scene=BOXES, paused=True, tools__pick__max_distance=0.2, tools__push__radius=0.07) as deformer:

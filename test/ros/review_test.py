@@ -2,6 +2,7 @@
 """A logged session is looked back at: any moment is what it was, whoever asks and in whatever order."""
 import os
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -14,12 +15,13 @@ import meshless_surgery.srv
 import roslib.packages
 import rospy
 from geometry_msgs.msg import Point
-from meshless_surgery.msg import Bookmarks, Review, Surfaces
+from meshless_surgery.msg import Bookmarks, Info, Review, State, Surfaces, Topology, Vertices
 from meshless_surgery.srv import Hash, Play, Seek
+from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from deformer_support import ACROSS_X, LONG, OF_REVIEW, OwnNode, Recorder, pose_stamped, run  # noqa: E402
+from deformer_support import ACROSS_X, LONG, OF_REVIEW, OwnNode, Recorder, launched, pose_stamped, run  # noqa: E402
 
 SCENES = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'scenes')
 BOXES = os.path.join(SCENES, 'boxes.yaml')
@@ -127,6 +129,26 @@ class ReviewTest(unittest.TestCase):
             review.seek(steps / self.rate())
             self.assertEqual(self.known[steps], review.hash(), 'after %d steps' % steps)
 
+    def test_who_comes_late_gets_all_while_it_stands_still(self):
+        topics = {'surfaces': Surfaces, 'strained_surfaces': Surfaces, 'vertices': Vertices, 'markers': MarkerArray, 'points': PointCloud2,
+                  'clusters': MarkerArray, 'collision_surfaces': MarkerArray, 'contacts': MarkerArray, 'topology': Topology,
+                  'info': Info, 'state': State, 'review': Review}
+        with ReviewNode(session_directory=self.folder, log='monday') as review:
+            for _ in range(2):  # a display that is switched off and on
+                for topic, kind in topics.items():
+                    recorder = review.recorder(topic, kind)
+                    recorder.wait()
+                    recorder.close()
+
+    def test_the_hash_says_of_which_step_and_time_it_is(self):
+        with ReviewNode(session_directory=self.folder, log='monday') as review:
+            for steps in (60, 180):  # before the reset
+                review.seek(steps / self.rate())
+                answer = review.call('hash', Hash)
+                self.assertEqual((True, steps, self.known[steps], 0), (answer.success, answer.step, answer.hash, answer.error_code))
+                self.assertAlmostEqual(steps / self.rate(), answer.sim_time)
+                self.assertIn(str(steps), answer.message)
+
     def test_any_moment_is_what_it_was(self):
         with ReviewNode(session_directory=self.folder, log='monday') as review:
             self.look_everywhere(review)
@@ -191,6 +213,22 @@ class ReviewTest(unittest.TestCase):
             self.assertGreater(max(p.y for p in points), 0.2)
             self.assertEqual(len(points), sum(len(path.colors) for path in paths if path.ns == 'pick'))
 
+    def test_rviz_shows_the_nodes_that_are_launched_and_no_others(self):
+        for given, nodes in (((), {'/review'}), (('other:=tuesday',), {'/review', '/review_other'})):
+            rviz = launched('review.launch', 'log:=monday', *given)
+            self.assertEqual(nodes, {name for name in rviz if name.startswith('/review')})
+            with open(rviz['/rviz'][rviz['/rviz'].index('-d') + 1]) as view:
+                named = re.findall(r'(?:Node|Nodes|Topic): (/.*)', view.read())
+            self.assertEqual(nodes, {re.match('/[a-z_]+', name).group() for names in named for name in names.split()
+                                     if name != '/clicked_point'})
+
+    def test_rviz_looks_from_a_frame_without_a_slash(self):
+        # tf1 had one; rviz does not find it.
+        for file, given in (('review.launch', ('log:=monday',)), ('training.launch', ('tf_prefix:=/left',))):
+            nodes = launched(file, 'world_frame:=/table', *given)
+            self.assertEqual(['-f', 'table'], nodes['/rviz'][-2:])
+            self.assertEqual(['table', 'left/scene' if file == 'training.launch' else 'scene'], nodes['/scene_frame'][-2:])
+
     def test_each_field_has_a_law_here(self):
         known = {'Review': ['header', 'log', 'time', 'length', 'speed'], 'Bookmarks': ['header', 'times', 'texts', 'errors'],
                  'SeekRequest': ['time'], 'SeekResponse': ['success', 'message', 'time', 'took', 'error_code'],
@@ -205,8 +243,10 @@ class ReviewTest(unittest.TestCase):
             self.assertEqual(60 / self.rate(), answer.time)
             self.assertEqual(self.known[60], review.hash())
             self.assertGreaterEqual(answer.took, 0.0)
-            for topic, kind in (('review', Review), ('bookmarks', Bookmarks)):
-                self.assertEqual('world', review.recorder(topic, kind).wait().header.frame_id)
+        with ReviewNode(session_directory=self.folder, log='monday', world_frame='/table') as review:
+            for topic, kind in (('review', Review), ('bookmarks', Bookmarks), ('surfaces', Surfaces)):
+                self.assertEqual('table', review.recorder(topic, kind).wait().header.frame_id)
+            self.assertEqual('table', review.recorder('info', Info).wait().world_frame)
 
     def test_what_cannot_be_is_refused(self):
         with ReviewNode(session_directory=self.folder, log='monday') as review:
@@ -221,6 +261,8 @@ class ReviewTest(unittest.TestCase):
                 self.assertIn('accepted: 0 or 0.01 to 100', answer.message)
             self.assertEqual(held, review.hash())
         for parameters, words in ((dict(), 'parameter ~log is missing'),
+                                  (dict(log='monday', world_frame=''), 'parameter ~world_frame'),
+                                  (dict(log=[1.5]), 'parameter ~log is of the wrong type'),
                                   (dict(log='nowhere', session_directory=self.folder), 'there is no log'),
                                   (dict(log=BOXES), 'does not begin with')):
             with ReviewNode(**parameters) as refused:

@@ -14,6 +14,9 @@
 
 namespace meshless {
 
+/// tf2 knows no slash before a name, tf1 did: /world is world.
+std::string withoutSlash(const std::string& frame);
+
 class Frames {
  public:
   static constexpr int kMostWaiting = 12;  // callers at once

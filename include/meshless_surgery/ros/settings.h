@@ -46,5 +46,7 @@ struct NodeSettings {
 /// Refuses kInvalidArgument: a wrong type or a value out of range. Parameters that the node does not know are named in
 /// `unknown`: they are probably misspelt.
 Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std::vector<std::string>& unknown);
+/// The same of a review node, whose ~log is the command_log.
+Result<NodeSettings> readReviewSettings(const ros::NodeHandle& private_handle, std::vector<std::string>& unknown);
 
 }  // namespace meshless
