@@ -39,7 +39,7 @@ DEBIAN = {
     'roscpp': ['libroscpp-dev'], 'roslib': ['libroslib-dev'], 'rostest': ['librostest-dev', 'python3-rostest'],
     'tf2': ['libtf2-dev'], 'tf2_eigen': ['libtf2-eigen-dev'], 'tf2_ros': ['libtf2-ros-dev', 'python3-tf2-ros'], 'diagnostic_updater': ['libdiagnostic-updater-dev'],
     'actionlib': ['libactionlib-dev', 'python3-actionlib'],
-    'rosgraph_msgs': [], 'genpy': [], 'rosgraph': [], 'rosunit': [], 'tf2_msgs': ['ros-tf2-msgs'],  # come with rospy, rostest
+    'rosgraph_msgs': [], 'genpy': [], 'rosgraph': [], 'rosunit': [], 'tf2_msgs': ['libtf2-msgs-dev', 'ros-tf2-msgs'],  # come with rospy, rostest
 }
 # CMake's package -> the key. Those of catkin have the key's name.
 FOUND = {'Eigen3': 'eigen', 'CGAL': 'libcgal-dev', 'nanoflann': 'libnanoflann-dev', 'yaml-cpp': 'yaml-cpp', 'cereal': 'libcereal-dev',

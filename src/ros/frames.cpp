@@ -1,16 +1,23 @@
 #include "meshless_surgery/ros/frames.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <map>
 #include <thread>
 
+#include <ros/callback_queue.h>
+#include <ros/console.h>
 #include <ros/init.h>
+#include <ros/node_handle.h>
+#include <ros/spinner.h>
 #include <tf2/buffer_core.h>
 #include <tf2/exceptions.h>
 #include <tf2_eigen/tf2_eigen.h>
-#include <tf2_ros/transform_listener.h>
+#include <tf2_msgs/TFMessage.h>
 
 #include "meshless_surgery/ros/border_check.h"
+#include "meshless_surgery/ros/stamp_order.h"
 
 namespace meshless {
 namespace {
@@ -19,6 +26,7 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kWait(200);
 constexpr std::chrono::milliseconds kFirstWait(500);  // static transforms come with the connection
 constexpr std::chrono::milliseconds kPoll(5);
+constexpr double kWarnEvery = 5.0;  // [s]
 
 Pose toPose(const geometry_msgs::TransformStamped& transform) {
   Pose pose;
@@ -35,13 +43,59 @@ std::string withoutSlash(const std::string& frame) {
   return first == std::string::npos ? std::string() : frame.substr(first);
 }
 
+/// As tf2_ros::TransformListener. But tf2 takes the newest stamp for the latest, and what is 10 s older it does not
+/// take at all: a frame whose sender's clock is set back, or was wrong once, would stand still for as long.
 struct Frames::Listener {
+  explicit Listener(const Clock& clock_in) : clock(clock_in) {
+    handle.setCallbackQueue(&queue);
+    subscribers = {handle.subscribe("/tf", kQueue, &Listener::hear, this),
+                   handle.subscribe("/tf_static", kQueue, &Listener::hearStatic, this)};
+    spinner.start();
+  }
+
+  using Heard = ros::MessageEvent<const tf2_msgs::TFMessage>;
+  void hear(const Heard& heard) {
+    for (const geometry_msgs::TransformStamped& transform : heard.getMessage()->transforms) {
+      Frame& frame = frames[withoutSlash(transform.child_frame_id)];
+      const double before = frame.order.newest(), stamp = transform.header.stamp.toSec();
+      if (stamp > 0.0 && frame.order.hear(stamp, clock.now()) == StampOrder::Is::kAnew) {
+        ROS_WARN_STREAM_THROTTLE(kWarnEvery, "tf: the stamps of '" << printable(transform.child_frame_id)
+                                                                   << "' went back by " << before - stamp
+                                                                   << " s; those before are forgotten");
+        forget(frame);
+      }
+      frame.last = transform;
+      buffer.setTransform(transform, heard.getPublisherName(), false);
+    }
+  }
+  void hearStatic(const Heard& heard) {
+    for (const geometry_msgs::TransformStamped& transform : heard.getMessage()->transforms)
+      buffer.setTransform(transform, heard.getPublisherName(), true);
+  }
+
+  struct Frame {
+    StampOrder order;
+    geometry_msgs::TransformStamped last;  // as it came
+  };
+  /// tf2 can only forget all that moves: the others are said again.
+  void forget(const Frame& gone) {
+    buffer.clear();
+    for (const auto& [name, frame] : frames)
+      if (&frame != &gone) buffer.setTransform(frame.last, "", false);
+  }
+
+  static constexpr std::uint32_t kQueue = 100;  // messages
+  const Clock& clock;
   tf2::BufferCore buffer;
-  tf2_ros::TransformListener listener{buffer};
-  SteadyClock::time_point since = SteadyClock::now();
+  const SteadyClock::time_point since = SteadyClock::now();
+  std::map<std::string, Frame> frames;  // of the spinner's thread, by child
+  ros::NodeHandle handle;
+  ros::CallbackQueue queue;
+  std::array<ros::Subscriber, 2> subscribers;
+  ros::AsyncSpinner spinner{1, &queue};
 };
 
-Frames::Frames(std::string world_frame) : world_frame_(std::move(world_frame)) {}
+Frames::Frames(std::string world_frame, const Clock& clock) : world_frame_(std::move(world_frame)), clock_(clock) {}
 Frames::~Frames() = default;
 
 bool Frames::isWorld(const std::string& frame) const { return frame.empty() || frame == world_frame_; }
@@ -53,7 +107,7 @@ bool Frames::listening() const {
 
 Frames::Listener& Frames::listener() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!listener_) listener_ = std::make_unique<Listener>();
+  if (!listener_) listener_ = std::make_unique<Listener>(clock_);
   return *listener_;
 }
 

@@ -99,7 +99,7 @@ struct DeformerNode::Parts {
         clock_publisher(std::move(clock_publisher_in)),
         session(std::move(session_in)),
         runner(std::move(world), {settings.paused, settings.max_backlog}, clock_publisher ? wall : clock),
-        frames(settings.world_frame),
+        frames(settings.world_frame, clock),
         loader(std::move(loader_in)),
         inputs(handle, settings, clock, runner, frames, *rejections),
         publishers(handle, settings, runner, inputs.tools(), *rejections),

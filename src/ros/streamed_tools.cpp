@@ -10,6 +10,10 @@ namespace {
 
 constexpr double kTurnSpeed = 50.0;  // [rad/s]
 constexpr double kUnbounded = 1e12;
+constexpr double kHandSpeed = 5.0;  // [m/s] no hand is faster ...
+constexpr double kJitter = 0.005;   // [s] ... but stamps are coarse, and messages come in bursts
+
+const char* wayBack(Operating state) { return state == Operating::kPaused ? "resume" : "enable"; }
 
 }  // namespace
 
@@ -30,10 +34,12 @@ StreamedTools::StreamedTools(const NodeSettings& settings, const Clock& clock, P
       clock_(clock),
       post_(std::move(post)),
       refused_(std::move(refused)),
-      tools_{Tool{"pick", ToolKind::kPick, ToolMotion({settings.pick_max_speed, kTurnSpeed, settings.tools_silence})},
+      tools_{Tool{"pick", ToolKind::kPick, settings.pick_max_speed,
+                  ToolMotion({settings.pick_max_speed, kTurnSpeed, settings.tools_silence})},
              // The world itself holds the sphere to its speed, in simulated time.
-             Tool{"push", ToolKind::kPush, ToolMotion({kUnbounded, kUnbounded, settings.tools_silence})},
-             Tool{"scissors", ToolKind::kScissors,
+             Tool{"push", ToolKind::kPush, settings.push_max_speed,
+                  ToolMotion({kUnbounded, kUnbounded, settings.tools_silence})},
+             Tool{"scissors", ToolKind::kScissors, settings.scissors_max_speed,
                   ToolMotion({settings.scissors_max_speed, kTurnSpeed, settings.tools_silence})}} {}
 
 std::optional<Pose> StreamedTools::hand(ToolKind tool) const {
@@ -42,19 +48,37 @@ std::optional<Pose> StreamedTools::hand(ToolKind tool) const {
   return motion.alive() ? std::optional<Pose>(motion.wanted()) : std::nullopt;
 }
 
-Status StreamedTools::hear(ToolKind kind, const Pose& pose, double stamp) {
+Error StreamedTools::deaf(const Tool& tool) {
+  return {ErrorCode::kInvalidArgument, "the " + tool.name + " is " + toString(tool.state) +
+                                           "; accepted once its state_command was " + wayBack(tool.state)};
+}
+
+std::string StreamedTools::notEnabled() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::string text;
+  for (const Tool& tool : tools_)
+    if (tool.state != Operating::kEnabled)
+      text += "; the " + tool.name + " stays " + toString(tool.state) + " until its state_command is " +
+              wayBack(tool.state);
+  return text;
+}
+
+Result<std::string> StreamedTools::hear(ToolKind kind, const Pose& pose, double stamp) {
   Tool& tool = tools_[static_cast<std::size_t>(kind)];
+  std::string warning;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (tool.state != Operating::kEnabled) {
-      return Error{ErrorCode::kInvalidArgument, "the " + tool.name + " is " + toString(tool.state) +
-                                                    "; accepted once its state_command was " +
-                                                    (tool.state == Operating::kPaused ? "resume" : "enable")};
+    if (tool.state != Operating::kEnabled) return deaf(tool);
+    if (const Status heard = tool.motion.hear(pose, stamp, clock_.now()); !heard.ok()) return heard.error();
+    const ToolMotion::Way& way = tool.motion.way();
+    if (way.length > std::max(kHandSpeed, tool.max_speed) * (way.time + kJitter)) {
+      warning = "the pose jumps by " + formatNumber(way.length) + " m in " + formatNumber(way.time) + " s, and the " +
+                tool.name + " goes after it at up to " + formatNumber(tool.max_speed) + " m/s (tools/" + tool.name +
+                "/max_speed): does more than one node say where it is?";
     }
-    if (const Status heard = tool.motion.hear(pose, stamp, clock_.now()); !heard.ok()) return heard;
   }
   postMove(tool);
-  return Done{};
+  return warning;
 }
 
 Status StreamedTools::command(ToolKind kind, const std::string& word) {
@@ -190,22 +214,22 @@ void StreamedTools::lift(Tool& tool, const std::string& why) {
   });
 }
 
-void StreamedTools::hearJaw(double angle) {
+Status StreamedTools::hearJaw(double angle) {
   bool closes = false;
   Pose pose;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (tools_[static_cast<std::size_t>(ToolKind::kScissors)].state != Operating::kEnabled) return;
+    Tool& scissors = tools_[static_cast<std::size_t>(ToolKind::kScissors)];
+    if (scissors.state != Operating::kEnabled) return deaf(scissors);
     jaw_angle_ = angle;
     if (angle > kJawOpen) jaw_armed_ = true;
     if (angle < kJawClosed && jaw_armed_) {
       jaw_armed_ = false;
       closes = true;
     }
-    ToolMotion& motion = tools_[static_cast<std::size_t>(ToolKind::kScissors)].motion;
-    if (!motion.alive()) return;  // nobody said (yet, or any more) where the scissors are
-    motion.keepAlive(clock_.now());
-    pose = motion.pose();
+    if (!scissors.motion.alive()) return Done{};  // nobody said (yet, or any more) where the scissors are
+    scissors.motion.keepAlive(clock_.now());
+    pose = scissors.motion.pose();
   }
   const ScissorBlades blades = bladesAt(pose, settings_.scissors_length, settings_.scissors_width);
   post_([this, blades, angle, closes](World& world) {
@@ -217,6 +241,7 @@ void StreamedTools::hearJaw(double angle) {
     // Cutting the air is no fault of the input.
     if (!reply.ok() && reply.error().code != ErrorCode::kMissed) refused_(reply.error());
   });
+  return Done{};
 }
 
 }  // namespace meshless

@@ -88,8 +88,8 @@ void ToolInputs::follow(Input& input) {
   if (tools_.condition(input.tool).state != Operating::kEnabled) return;
   const auto latest = frames_.latest(input.follow_frame);
   if (!latest) {
-    ROS_WARN_STREAM_THROTTLE(kComplainEvery, input.name << ": tf2 cannot bring '" << input.follow_frame << "' to '"
-                                                        << frames_.worldFrame() << "' (yet)");
+    ROS_WARN_STREAM_DELAYED_THROTTLE(kComplainEvery, input.name << ": tf2 cannot bring '" << input.follow_frame
+                                                                << "' to '" << frames_.worldFrame() << "' (yet)");
     return;
   }
   // tf2 goes on to give the last transform when nobody says new ones. One that never moves has no stamp.
@@ -99,8 +99,12 @@ void ToolInputs::follow(Input& input) {
 }
 
 void ToolInputs::hear(const Input& input, const Pose& pose, const ros::Time& stamp) {
-  const Status heard = tools_.hear(input.tool, pose, stamp.toSec());
-  if (!heard.ok()) reject(input.name, heard.error());
+  const auto heard = tools_.hear(input.tool, pose, stamp.toSec());
+  if (!heard.ok()) {
+    reject(input.name, heard.error());
+  } else if (!heard->empty()) {
+    ROS_WARN_STREAM_THROTTLE(kComplainEvery, input.name << ": " << *heard);
+  }
 }
 
 void ToolInputs::look() {
@@ -123,7 +127,7 @@ void ToolInputs::onJaw(const std::string& topic, const sensor_msgs::JointState& 
     angle = check.number("position[0]", message.position[0], -kMaxJaw, kMaxJaw, "rad");
   }
   if (!check.ok()) return reject(topic, check.error());
-  tools_.hearJaw(std::max(0.0, angle));
+  if (const Status heard = tools_.hearJaw(std::max(0.0, angle)); !heard.ok()) reject(topic, heard.error());
 }
 
 }  // namespace meshless

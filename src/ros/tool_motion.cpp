@@ -6,15 +6,22 @@
 namespace meshless {
 
 Status ToolMotion::hear(const Pose& wanted, double stamp, double now) {
-  if (alive_ && stamp > 0.0 && stamp < stamp_ && stamp_ - stamp <= kRestart) {
+  keepAlive(now);
+  if (stamp > 0.0 && order_.hear(stamp, now) == StampOrder::Is::kLate) {
     std::ostringstream text;
-    text << "header.stamp is " << stamp_ - stamp
-         << " s older than that of the message before; accepted: stamps that grow";
+    text << "header.stamp is " << order_.newest() - stamp
+         << " s older than that of the newest message, which came less than " << StampOrder::kLongestLate
+         << " s ago; accepted: stamps that grow";
     return Error{ErrorCode::kInvalidArgument, text.str()};
   }
+  way_ = Way();
+  if (alive_) {
+    way_.length = (wanted.translation - wanted_.translation).norm();
+    way_.time = stamp > 0.0 && stamp_ > 0.0 && stamp >= stamp_ ? stamp - stamp_ : now - heard_;
+  }
   wanted_ = wanted;
-  if (stamp > 0.0) stamp_ = stamp;
-  keepAlive(now);
+  stamp_ = stamp;
+  heard_ = now;
   arrived_ = false;
   if (!alive_) {
     alive_ = true;
@@ -64,7 +71,7 @@ void ToolMotion::halt(const Vec3& place) {
 
 void ToolMotion::end() {
   alive_ = false;
-  stamp_ = 0.0;
+  order_ = StampOrder();
 }
 
 void ToolMotion::putAt(const Vec3& place) {

@@ -144,6 +144,54 @@ TEST(StreamedTools, LateMessagesChangeNothingAndAreRefused) {
   }
 }
 
+TEST(StreamedTools, APickIsHeldWhateverTheClockOfItsStreamDoes) {
+  for (const double jump : {-20.0, -0.95, -0.6, 0.6, 0.95, 20.0})
+    for (const bool once : {true, false}) {
+      SCOPED_TRACE(::testing::Message() << jump << (once ? " s once" : " s for good"));
+      ToolBench bench(slowTools());
+      const Vec3 start = bench.pick().position;
+      bench.hands[kPick] = [&](double time) { return poseAt(start + Vec3(0, 0.1 * time, 0)); };
+      bench.stamp = [&](double time) {
+        const bool jumps = once ? std::abs(time - 1.0) < 0.5 * ToolBench::kStream : time > 1.0;
+        return 100.0 + time + (jumps ? jump : 0.0);
+      };
+      double behind = 0.0;
+      bench.after_each = [&](double time) {
+        ASSERT_TRUE(bench.world->heldPick());
+        behind = std::max(behind, start.y() + 0.1 * time - bench.world->heldPick()->target.y());
+      };
+      bench.run(3.0);
+      EXPECT_TRUE(bench.said(EventType::kLifted).empty());
+      EXPECT_TRUE(bench.warned.empty());
+      // It stands still while late ones may be late, and one way of a message or two.
+      EXPECT_LT(behind, 0.1 * (StampOrder::kLongestLate + 4.0 * ToolBench::kStream));
+    }
+}
+
+// Two senders of one tool, 20 cm apart.
+TEST(StreamedTools, AJumpThatNoHandMakesIsNamed) {
+  for (const bool stamped : {true, false})
+    for (const std::size_t tool : {kPick, kPush, kScissors}) {
+      ToolBench bench(slowTools());
+      const Vec3 start = tool == kPick ? bench.pick().position : Vec3(0, 0, 1.0);
+      if (!stamped) bench.stamp = [](double) { return 0.0; };
+      // As fast as a hand goes, and a node that stands still for a moment.
+      bench.hands[tool] = [&](double time) { return poseAt(start + Vec3(0, 0.5 * std::sin(10.0 * time), 0)); };
+      bench.stands_still = [](double time) { return time > 0.4 && time < 0.42; };
+      bench.run(1.0);
+      EXPECT_TRUE(bench.warned.empty()) << bench.warned.size() << ": " << bench.warned[0];
+      bench.hands[tool] = still(start);
+      bench.run(0.1);
+      bench.warned.clear();
+      bool other = false;
+      bench.hands[tool] = [&](double) { return poseAt(start + Vec3(0, (other = !other) ? 0.2 : 0.0, 0)); };
+      bench.run(0.1);
+      ASSERT_GT(bench.warned.size(), 10u);
+      EXPECT_NE(bench.warned[1].find("the pose jumps by 0.2 m in 0.005 s"), std::string::npos) << bench.warned[1];
+      EXPECT_NE(bench.warned[1].find("up to 0.5 m/s (tools/"), std::string::npos) << bench.warned[1];
+    }
+}
+
 TEST(StreamedTools, GapsBelowTheSilenceLiftNothing) {
   ToolBench bench(slowTools());
   const Vec3 start = bench.pick().position;
@@ -257,17 +305,17 @@ TEST(StreamedTools, ASphereThatAServicePlacedStays) {
 
 TEST(StreamedTools, TheScissorsCutOnceWhenTheJawClosesAndAreLiftedOff) {
   ToolBench bench(slowTools());
-  bench.tools.hearJaw(0.6);  // nobody has said where the blades are
-  bench.tools.hearJaw(0.0);
+  EXPECT_TRUE(bench.tools.hearJaw(0.6).ok());  // nobody has said where the blades are
+  EXPECT_TRUE(bench.tools.hearJaw(0.0).ok());
   bench.run(0.1);
   EXPECT_TRUE(bench.said(EventType::kCut).empty());
   bench.hands[kScissors] = [](double) { return acrossX(0.01); };
   bench.run(0.1);
-  for (const double angle : {0.05, 0.0}) bench.tools.hearJaw(angle);  // was never open
+  for (const double angle : {0.05, 0.0}) EXPECT_TRUE(bench.tools.hearJaw(angle).ok());  // was never open
   bench.run(0.1);
   EXPECT_TRUE(bench.said(EventType::kCut).empty());
   for (const double angle : {0.6, 0.3, 0.05, 0.01, 0.0, 0.01, 0.05, 0.0}) {
-    bench.tools.hearJaw(angle);
+    EXPECT_TRUE(bench.tools.hearJaw(angle).ok());
     bench.run(0.01);
   }
   EXPECT_EQ(bench.said(EventType::kCut).size(), 1u);
@@ -276,7 +324,7 @@ TEST(StreamedTools, TheScissorsCutOnceWhenTheJawClosesAndAreLiftedOff) {
   bench.hands[kScissors] = {};
   for (int i = 0; i < 10; ++i) {
     bench.run(0.2);
-    bench.tools.hearJaw(0.6);
+    EXPECT_TRUE(bench.tools.hearJaw(0.6).ok());
   }
   EXPECT_TRUE(bench.world->scissors().shown);
   bench.run(0.6);
@@ -285,7 +333,7 @@ TEST(StreamedTools, TheScissorsCutOnceWhenTheJawClosesAndAreLiftedOff) {
   // A jaw that was open when they were lifted does not cut where they come back.
   bench.hands[kScissors] = [](double) { return acrossX(0.51); };
   bench.run(0.1);
-  bench.tools.hearJaw(0.0);
+  EXPECT_TRUE(bench.tools.hearJaw(0.0).ok());
   bench.run(0.1);
   EXPECT_EQ(bench.said(EventType::kCut).size(), 1u);
   EXPECT_TRUE(bench.refused.empty());
@@ -338,6 +386,18 @@ TEST(StreamedTools, APausedSphereStopsOnItsWay) {
   EXPECT_GT(bench.world->push().position.z(), stopped.z() + 0.05);
 }
 
+// A reset and a loaded state know nothing of the states of tools: what is left of them has to be said.
+TEST(StreamedTools, WhichToolsDoNotHearIsSaid) {
+  ToolBench bench(slowTools());
+  EXPECT_EQ("", bench.tools.notEnabled());
+  ASSERT_TRUE(bench.tools.command(ToolKind::kPick, "pause").ok());
+  ASSERT_TRUE(bench.tools.command(ToolKind::kScissors, "disable").ok());
+  EXPECT_EQ(
+      "; the pick stays PAUSED until its state_command is resume; the scissors stays DISABLED until its "
+      "state_command is enable",
+      bench.tools.notEnabled());
+}
+
 TEST(StreamedTools, ADisabledToolIsLiftedAndHearsNothing) {
   ToolBench bench(slowTools());
   bench.hands[kPush] = still(Vec3(0, 0, 1.0));
@@ -357,13 +417,15 @@ TEST(StreamedTools, ScissorsThatArePausedDoNotCut) {
   ToolBench bench(slowTools());
   bench.hands[kScissors] = [](double) { return acrossX(0.0); };
   bench.run(0.1);
-  bench.tools.hearJaw(0.5);
+  EXPECT_TRUE(bench.tools.hearJaw(0.5).ok());
   ASSERT_TRUE(bench.tools.command(ToolKind::kScissors, "pause").ok());
-  bench.tools.hearJaw(0.0);
+  const Status paused = bench.tools.hearJaw(0.0);
+  ASSERT_FALSE(paused.ok());
+  EXPECT_NE(paused.error().detail.find("accepted once its state_command was resume"), std::string::npos);
   bench.run(0.1);
   EXPECT_TRUE(bench.said(EventType::kCut).empty());
   ASSERT_TRUE(bench.tools.command(ToolKind::kScissors, "resume").ok());
-  bench.tools.hearJaw(0.0);
+  EXPECT_TRUE(bench.tools.hearJaw(0.0).ok());
   bench.run(0.1);
   EXPECT_EQ(1u, bench.said(EventType::kCut).size());
 }

@@ -292,12 +292,14 @@ class FollowTest(InStepTestCase):
         self.broadcaster = tf2_ros.TransformBroadcaster()
         super().setUp()
 
+    wrong = 0.0  # [s] by which the stamps of frames are
+
     def frames(self, **places):
         """Says where frames are, a moment."""
         transforms = []
         for name, place in places.items():
             message = TransformStamped()
-            message.header.stamp = self.clock.stamp()
+            message.header.stamp = self.clock.stamp() + rospy.Duration(self.wrong)
             message.header.frame_id = 'world'
             message.child_frame_id = name
             message.transform.translation = Vector3(*place)
@@ -345,6 +347,24 @@ class FollowTest(InStepTestCase):
             passed = (other.header.stamp - one.header.stamp).to_sec()
             self.assertLessEqual(other.picks[0].target.y - one.picks[0].target.y, 5.0 * (passed + TICK) + 1e-9)
         self.assertGreater(len({s.picks[0].target.y for s in states}), 3)
+
+    def test_no_jump_of_a_stamp_ends_what_is_followed(self):
+        others = dict(ball=(0.0, 0.0, 1.0), blades=(0.0, 0.0, 3.0))
+        self.pick_left()
+        y = 0.0
+        for jump, once in ((-0.95, False), (-20.0, False), (0.9, True), (20.0, True)):
+            y += 0.01
+            self.follow(lambda s, y=y: abs(s.picks[0].target.y - y) < 1e-6, 'no following', hand=(-0.1, y, 0.1), **others)
+            before = self.wrong
+            self.wrong += jump
+            y += 0.01
+            for _ in range(1 if once else 200):  # a second
+                self.frames(hand=(-0.1, y, 0.1), **others)
+            self.wrong = before if once else self.wrong
+            y += 0.01
+            self.follow(lambda s, y=y: abs(s.picks[0].target.y - y) < 1e-6, 'no following after %g s' % jump,
+                        hand=(-0.1, y, 0.1), **others)
+            self.assertEqual([], [e for e in self.events.messages if e.type == 'lifted'], jump)
 
 
 if __name__ == '__main__':

@@ -33,6 +33,8 @@ class ToolBench {
   /// What a stream says at a time; nothing: it is silent.
   using Hand = std::function<std::optional<Pose>(double)>;
   PerTool<Hand> hands;
+  /// The stamp of what is said at a time.
+  std::function<double(double)> stamp = [](double time) { return 100.0 + time; };
   /// The whole node stands still: what streams say meanwhile waits in their queues.
   std::function<bool(double)> stands_still = [](double) { return false; };
   /// Those alone who say the forces.
@@ -51,7 +53,7 @@ class ToolBench {
   // What was seen.
   std::vector<ForceStream::Tick> ticks;
   std::vector<Event> events;
-  std::vector<std::string> refused;                        // of the streams' messages
+  std::vector<std::string> refused, warned;                // of the streams' messages
   std::function<void(double)> after_each = [](double) {};  // quantum
 
   double now() const { return hand_clock.clock.now(); }
@@ -90,7 +92,7 @@ class ToolBench {
     if (isDue(said_, kStream, time)) {
       for (std::size_t t = 0; t < hands.size(); ++t) {
         const auto pose = hands[t] ? hands[t](time) : std::nullopt;
-        if (pose) queues_[t].push_back({*pose, 100.0 + time});
+        if (pose) queues_[t].push_back({*pose, stamp(time)});
         if (queues_[t].size() > kQueue) queues_[t].pop_front();
       }
     }
@@ -98,8 +100,9 @@ class ToolBench {
     for (std::size_t t = 0; t < hands.size(); ++t) {
       for (; !queues_[t].empty(); queues_[t].pop_front()) {
         const Message& message = queues_[t].front();
-        const Status heard = tools.hear(static_cast<ToolKind>(t), message.pose, message.stamp);
+        const auto heard = tools.hear(static_cast<ToolKind>(t), message.pose, message.stamp);
         if (!heard.ok()) refused.push_back(heard.error().detail);
+        if (heard.ok() && !heard->empty()) warned.push_back(*heard);
       }
     }
     if (isDue(looked_, kLook, time)) tools.look();

@@ -57,7 +57,7 @@ TEST(ToolMotion, WhoComesLateDoesNotJump) {
   EXPECT_NEAR(motion.pose().translation.x(), 0.05, 1e-12);
 }
 
-TEST(ToolMotion, OldMessagesAreRefusedUntilTheStreamBeginsAnew) {
+TEST(ToolMotion, OldMessagesAreRefusedWhileNewerOnesCome) {
   ToolMotion motion({1.0, 10.0, 0.5});
   ASSERT_TRUE(motion.hear(at(0.0), 50.00, 0.0).ok());
   ASSERT_TRUE(motion.hear(at(0.1), 50.01, 0.01).ok());
@@ -68,7 +68,43 @@ TEST(ToolMotion, OldMessagesAreRefusedUntilTheStreamBeginsAnew) {
   EXPECT_EQ(motion.wanted().translation.x(), 0.1);
   EXPECT_TRUE(motion.hear(at(0.2), 50.01, 0.03).ok());  // a coarse clock
   EXPECT_TRUE(motion.hear(at(0.3), 0.0, 0.04).ok());    // no stamp
-  EXPECT_TRUE(motion.hear(at(0.4), 20.0, 0.05).ok());   // played again
+  EXPECT_FALSE(motion.hear(at(0.4), 20.0, 0.05).ok());
+  EXPECT_TRUE(motion.hear(at(0.4), 20.0, 0.14).ok());  // played again
+}
+
+// Beside newer ones, however many: of a second sender whose clock is behind.
+TEST(ToolMotion, ASenderThatIsAlwaysLateIsNeverHeard) {
+  for (const double behind : {0.001, 0.3, 5.0}) {
+    ToolMotion motion({1.0, 10.0, 0.5});
+    for (int k = 0; k < 500; ++k) {
+      const double now = 0.02 * k;
+      ASSERT_TRUE(motion.hear(at(1.0), 100.0 + now, now).ok());
+      ASSERT_FALSE(motion.hear(at(2.0), 100.0 + now - behind, now + 0.01).ok());
+    }
+  }
+}
+
+// Whatever is wrong with stamps, once or for good.
+TEST(ToolMotion, NoJumpOfAStampEndsAStreamThatGoesOn) {
+  for (const double silence : {0.5, 0.1})
+    for (const double period : {0.002, 0.01, 0.05})
+      for (const double jump : {-90.0, -2.0, -0.95, -0.6, -0.3, -0.01, 0.01, 0.3, 0.6, 0.95, 2.0, 90.0, 1e9})
+        for (const bool once : {true, false}) {
+          SCOPED_TRACE(::testing::Message() << silence << " s, every " << period << " s, by " << jump << " s"
+                                            << (once ? ", once" : ", for good"));
+          ToolMotion motion({1.0, 10.0, silence});
+          double heard = 0.0, unheard = 0.0;  // [s] when it was last; without it, at most
+          for (int tick = 0; tick < 4000; ++tick) {
+            const double now = 0.001 * tick;
+            if (tick % static_cast<int>(1000 * period + 0.5) == 0) {
+              const bool jumps = once ? tick == 1000 : tick >= 1000;
+              if (motion.hear(at(now), 100.0 + now + (jumps ? jump : 0.0), now).ok()) heard = now;
+            }
+            unheard = std::max(unheard, now - heard);
+            ASSERT_FALSE(motion.fellSilent(now)) << "at " << now;
+          }
+          EXPECT_LE(unheard, StampOrder::kLongestLate + 2.0 * period);
+        }
 }
 
 /// Looked at every 10 ms; when it fell silent, or `until`.

@@ -10,6 +10,7 @@
 #include <ros/time.h>
 #include <std_msgs/Header.h>
 
+#include "meshless_surgery/ros/clock.h"
 #include "meshless_surgery/tools/command.h"
 
 namespace meshless {
@@ -21,7 +22,8 @@ class Frames {
  public:
   static constexpr int kMostWaiting = 12;  // callers at once
 
-  explicit Frames(std::string world_frame);
+  /// `clock` outlives it: of the stamps of frames, see StampOrder.
+  Frames(std::string world_frame, const Clock& clock);
   ~Frames();
 
   const std::string& worldFrame() const { return world_frame_; }
@@ -51,6 +53,7 @@ class Frames {
   bool isWorld(const std::string& frame) const;
 
   std::string world_frame_;
+  const Clock& clock_;
   mutable std::mutex mutex_;  // for the creation alone: tf2's buffer has its own
   std::unique_ptr<Listener> listener_;
   std::atomic<int> waiting_{0};

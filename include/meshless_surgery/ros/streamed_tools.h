@@ -31,10 +31,11 @@ class StreamedTools {
   StreamedTools(const NodeSettings& settings, const Clock& clock, Post post, Refused refused);
 
   /// What a stream said; `stamp` is its own [s], 0 where it has none. Refused as by ToolMotion::hear, and where the
-  /// tool is not enabled.
-  Status hear(ToolKind tool, const Pose& pose, double stamp);
-  /// The opening of the jaw [rad]. Closed after it was open: all that the blades meet is cut.
-  void hearJaw(double angle);
+  /// tool is not enabled. Else a warning for people: of a jump that no hand makes; empty: none.
+  Result<std::string> hear(ToolKind tool, const Pose& pose, double stamp);
+  /// The opening of the jaw [rad]. Closed after it was open: all that the blades meet is cut. Refused where the
+  /// scissors are not enabled.
+  Status hearJaw(double angle);
   /// To be called at least every ToolMotion::kLongestTick: tools go on, and those whose streams are silent are lifted.
   void look();
 
@@ -46,6 +47,9 @@ class StreamedTools {
     bool busy = false;  // it is on its way to where its stream wants it
   };
   Condition condition(ToolKind tool) const;
+  /// Which tools do not hear their streams: a part of a sentence that begins with "; ", empty where all do. A reset
+  /// leaves it so.
+  std::string notEnabled() const;
 
   /// Where its stream last wanted a tool, while the stream speaks.
   std::optional<Pose> hand(ToolKind tool) const;
@@ -54,11 +58,13 @@ class StreamedTools {
   struct Tool {
     std::string name;
     ToolKind kind;
+    double max_speed;  // [m/s]
     ToolMotion motion;
     Operating state = Operating::kEnabled;
     bool posted = false;  // a move waits for the world: no second one behind it
   };
 
+  static Error deaf(const Tool& tool);
   void postMove(Tool& tool);
   void move(Tool& tool, World& world);
   void movePick(Tool& tool, World& world);

@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "meshless_surgery/ros/stamp_order.h"
 #include "meshless_surgery/tools/command.h"
 
 namespace meshless {
@@ -21,10 +22,16 @@ class ToolMotion {
 
   explicit ToolMotion(const Limits& limits) : limits_(limits) {}
 
-  /// What the stream said. `stamp` is its own [s], 0 where it has none. Refused kInvalidArgument where it is older than
-  /// the one before, by up to kRestart: beyond that the stream has begun anew. The first pose after a silence is taken
-  /// at once.
+  /// What the stream said. `stamp` is its own [s], 0 where it has none. Refused kInvalidArgument where it is late, as
+  /// StampOrder says; the stream lives all the same. The first pose after a silence is taken at once.
   Status hear(const Pose& wanted, double stamp, double now);
+  /// How far the last pose is from the one before, and after what time: by their stamps, where both have some and they
+  /// grow, else by when they were heard.
+  struct Way {
+    double length = 0.0;  // [m]
+    double time = 0.0;    // [s]
+  };
+  const Way& way() const { return way_; }
   /// Another sign of life of the same tool, such as its jaw's.
   void keepAlive(double now);
   /// True once the silence has lasted: the tool is to be lifted. Once only; hear() begins anew. To be asked all the
@@ -47,11 +54,11 @@ class ToolMotion {
  private:
   Limits limits_;
   Pose wanted_, pose_;
-  double stamp_ = 0.0, looked_ = 0.0, silent_ = 0.0, advanced_ = 0.0;
+  StampOrder order_;
+  Way way_;
+  double stamp_ = 0.0, heard_ = 0.0, looked_ = 0.0, silent_ = 0.0, advanced_ = 0.0;
   bool alive_ = false;
   bool arrived_ = true;
 };
-
-constexpr double kRestart = 1.0;  // [s] back by more than that: a recording that is played again
 
 }  // namespace meshless
