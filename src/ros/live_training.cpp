@@ -104,8 +104,9 @@ Result<LoadedTask> loadTask(const std::string& task, const TrainingFolders& fold
 
 struct LiveTraining::Handlers : Answers {
   Handlers(const ros::NodeHandle& private_handle, WorldRunner& runner_in, TrainingFolders folders_in,
-           std::string world_frame_in, Rejections& rejections_in)
+           std::string world_frame_in, Rejections& rejections_in, const StreamedTools& tools_in)
       : Answers{rejections_in},
+        tools(tools_in),
         handle(private_handle),
         runner(runner_in),
         folders(std::move(folders_in)),
@@ -213,7 +214,7 @@ struct LiveTraining::Handlers : Answers {
     if (!taken.ok()) return refuse(response, "start_task", taken.error());
     const Status reset = runner.reset();
     if (!reset.ok()) return refuse(response, "start_task", reset.error());
-    return accept(response, "the task '" + name + "' begins");
+    return accept(response, "the task '" + name + "' begins" + tools.notEnabled());
   }
 
   bool stopTask(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
@@ -314,6 +315,7 @@ struct LiveTraining::Handlers : Answers {
     }
   }
 
+  const StreamedTools& tools;
   ros::NodeHandle handle;
   WorldRunner& runner;
   const TrainingFolders folders;
@@ -339,9 +341,9 @@ struct LiveTraining::Handlers : Answers {
 };
 
 LiveTraining::LiveTraining(const ros::NodeHandle& private_handle, WorldRunner& runner, TrainingFolders folders,
-                           std::string world_frame, Rejections& rejections)
-    : handlers_(
-          std::make_unique<Handlers>(private_handle, runner, std::move(folders), std::move(world_frame), rejections)) {}
+                           std::string world_frame, Rejections& rejections, const StreamedTools& tools)
+    : handlers_(std::make_unique<Handlers>(private_handle, runner, std::move(folders), std::move(world_frame),
+                                           rejections, tools)) {}
 
 LiveTraining::~LiveTraining() { stop(); }
 

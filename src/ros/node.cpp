@@ -238,7 +238,7 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
                                        BodyLoader(access, scene_folder, std::move(scene->materials)),
                                        std::move(session), std::move(rejections), std::move(clock_publisher));
   parts->training = std::make_unique<LiveTraining>(private_handle, parts->runner, std::move(training_folders),
-                                                   settings->world_frame, *parts->rejections);
+                                                   settings->world_frame, *parts->rejections, parts->inputs.tools());
   if (task) parts->training->begin(std::move(*task), settings->trainee);
   parts->runner.setEventSink([publishers = &parts->publishers, training = parts->training.get(),
                               kept = parts->session.get()](std::vector<Event> events) {
@@ -260,7 +260,7 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   parts->training->start();
   // Last, so that who finds them finds a world that runs.
   parts->services = std::make_unique<Services>(private_handle, parts->runner, parts->frames, parts->loader,
-                                               *parts->rejections, *parts->session);
+                                               *parts->rejections, *parts->session, parts->inputs.tools());
   ROS_INFO_STREAM("scene " << *file << ": " << bodies << " bodies, " << particles << " particles, " << clusters
                            << " clusters, " << scene->world.step_rate << " steps/s of " << scene->world.substeps
                            << " substeps" << (settings->paused ? ", paused" : ""));

@@ -48,11 +48,12 @@ constexpr int kSpawnThreads = 2;                            // a large body must
 
 struct Services::Handlers : Answers {
   Handlers(const ros::NodeHandle& private_handle, WorldRunner& runner_in, Frames& frames_in,
-           const BodyLoader& loader_in, Rejections& rejections_in, Session& session_in)
+           const BodyLoader& loader_in, Rejections& rejections_in, Session& session_in, const StreamedTools& tools_in)
       : Answers{rejections_in},
         runner(runner_in),
         frames(frames_in),
         session(session_in),
+        tools(tools_in),
         work(runner_in, frames_in, loader_in, rejections_in),
         actions(private_handle, work, {cut_queue, step_queue, spawn_queue}) {
     advertise(private_handle, "pick", &Handlers::pick);
@@ -430,7 +431,7 @@ struct Services::Handlers : Answers {
   bool reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
     const Status done = runner.reset();
     if (!done.ok()) return refuse(response, "reset", done.error());
-    return accept(response, "back to the scene's start");
+    return accept(response, "back to the scene's start" + tools.notEnabled());
   }
 
   bool save(meshless_surgery::SaveState::Request& request, meshless_surgery::SaveState::Response& response) {
@@ -443,7 +444,8 @@ struct Services::Handlers : Answers {
     const auto loaded = session.load(runner, request.file);
     if (!loaded.ok()) return refuse(response, "load", loaded.error());
     return accept(response, "loaded " + request.file + ": step " + std::to_string(loaded->step) + ", " +
-                                std::to_string(loaded->bodies) + " bodies; cuts before it cannot be undone");
+                                std::to_string(loaded->bodies) + " bodies; cuts before it cannot be undone" +
+                                tools.notEnabled());
   }
 
   bool hash(meshless_surgery::Hash::Request&, meshless_surgery::Hash::Response& response) {
@@ -453,6 +455,7 @@ struct Services::Handlers : Answers {
   WorldRunner& runner;
   Frames& frames;
   Session& session;
+  const StreamedTools& tools;
   const LongWork work;
   // Queues before servers before spinners: torn down in the other order.
   ros::CallbackQueue cut_queue, step_queue, spawn_queue, cloud_queue, session_queue;
@@ -466,8 +469,8 @@ struct Services::Handlers : Answers {
 };
 
 Services::Services(const ros::NodeHandle& private_handle, WorldRunner& runner, Frames& frames, const BodyLoader& loader,
-                   Rejections& rejections, Session& session)
-    : handlers_(std::make_unique<Handlers>(private_handle, runner, frames, loader, rejections, session)) {}
+                   Rejections& rejections, Session& session, const StreamedTools& tools)
+    : handlers_(std::make_unique<Handlers>(private_handle, runner, frames, loader, rejections, session, tools)) {}
 
 Services::~Services() = default;
 

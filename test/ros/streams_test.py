@@ -274,6 +274,23 @@ class CrtkTest(InStepTestCase):
         self.until(lambda s: len(s.bodies) == 3, 'nothing was cut')
         self.until_said(measured, lambda m: m.header.stamp.is_zero(), 'the jaw that is gone is not said so')
 
+    def test_what_stays_disabled_after_a_reset_is_said(self):
+        states = self.record('scissors/operating_state', OperatingState)
+        commands = self.publisher('scissors/state_command', StringStamped)
+        word = 'the scissors stays DISABLED until its state_command is enable'
+        commands.publish(StringStamped(string='disable'))
+        states.wait(lambda m: m.state == 'DISABLED')
+        self.assertIn(word, self.good('reset').message)
+        jaw = self.publisher('scissors/jaw/servo_jp', JointState)
+        diagnostics = self.record('/diagnostics', DiagnosticArray)
+        jaw.publish(JointState(name=['jaw'], position=[0.4]))
+        self.until_said(diagnostics, lambda array: any(
+            value.key == 'rejected by ~scissors/jaw/servo_jp' for status in array.status for value in status.values), 'not rejected')
+        since = states.count()
+        commands.publish(StringStamped(string='enable'))
+        states.wait(lambda m: m.state == 'ENABLED', since)
+        self.assertNotIn('stays', self.good('reset').message)
+
     def test_a_command_that_does_not_fit_is_rejected(self):
         states = self.record('pick/operating_state', OperatingState)
         diagnostics = self.record('/diagnostics', DiagnosticArray)

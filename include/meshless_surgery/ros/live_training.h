@@ -11,6 +11,7 @@
 #include "meshless_surgery/io/task.h"
 #include "meshless_surgery/ros/rejections.h"
 #include "meshless_surgery/ros/runner.h"
+#include "meshless_surgery/ros/streamed_tools.h"
 
 namespace meshless {
 
@@ -27,7 +28,7 @@ Result<LoadedTask> loadTask(const std::string& task, const TrainingFolders& fold
 class LiveTraining {
  public:
   LiveTraining(const ros::NodeHandle& private_handle, WorldRunner& runner, TrainingFolders folders,
-               std::string world_frame, Rejections& rejections);
+               std::string world_frame, Rejections& rejections, const StreamedTools& tools);
   ~LiveTraining();
 
   /// Before the runner starts: the task of the parameter.

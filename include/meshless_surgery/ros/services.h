@@ -12,6 +12,7 @@
 #include "meshless_surgery/ros/rejections.h"
 #include "meshless_surgery/ros/runner.h"
 #include "meshless_surgery/ros/session.h"
+#include "meshless_surgery/ros/streamed_tools.h"
 
 namespace meshless {
 
@@ -19,7 +20,7 @@ class Services {
  public:
   /// Services that may wait (cut, step, spawn, save and load) have threads of their own: a waiting one holds nobody else up.
   Services(const ros::NodeHandle& private_handle, WorldRunner& runner, Frames& frames, const BodyLoader& loader,
-           Rejections& rejections, Session& session);
+           Rejections& rejections, Session& session, const StreamedTools& tools);
   ~Services();
 
  private:
