@@ -12,7 +12,7 @@ _meshlessSurgerySetup() {
   checkout=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)
   # shellcheck source=scripts/lib/environment.bash
   source "$checkout/scripts/lib/environment.bash"
-  output=$(outputFolder)
+  output=$(outputFolder) || return 1
   if [[ -f $output/devel/setup.bash ]]; then
     useBuild "$output"
   else

@@ -103,11 +103,10 @@ class Environment(Base):
             self._running = RunningScene('', listens=False, task=task, **parameters)
             self.surgeon = self._running.surgeon
         self.surgeon.stepped()
-        self._step_rate = self.surgeon.info().step_rate
         self._name = None  # of the task, once it was started
         self._places = list(points)
         self._particles = []
-        self._seen, self._over, self._done = None, True, 0
+        self._seen, self._over, self._done, self._closed = None, True, 0, False
         self.np_random = numpy.random.default_rng()
         self.action_space = Box(-1.0, 1.0, (sum(KINDS[hand.kind] for hand in self._hands),), dtype=numpy.float64)
         length = 10 * len(self._hands) + 4 * len(self._places) + 3
@@ -115,6 +114,9 @@ class Environment(Base):
 
     def reset(self, *, seed=None, options=None):
         """The task from its start: (observation, info). Without a seed the numbers go on from the last one."""
+        if options:
+            raise ValueError('options are %s; accepted: none' % (options,))
+        self._require_open()
         if seed is not None:
             self.np_random = numpy.random.default_rng(seed)
         if self._name is None or self._seen.task.task != self._name:
@@ -135,12 +137,12 @@ class Environment(Base):
 
     def step(self, action):
         """(observation, reward, terminated: the task is done or failed, truncated, info)."""
+        self._require_open()
         if self._over:
             raise RuntimeError('the episode is over; reset() begins another')
         action = numpy.asarray(action, float)
-        if action.shape != self.action_space.shape or not numpy.isfinite(action).all():
+        if not self.action_space.contains(action):
             raise ValueError('an action is %s; accepted: %d numbers from -1 to 1' % (action, self.action_space.shape[0]))
-        action = numpy.clip(action, -1.0, 1.0)
         begin = 0
         for hand in self._hands:
             self._act(hand, action[begin:begin + KINDS[hand.kind]])
@@ -154,6 +156,7 @@ class Environment(Base):
         return self._observation(), float(self._reward(before, self._seen)), terminated, truncated, self._info()
 
     def close(self):
+        self._closed = True
         if self._running is not None:
             self._running.close()
             self._running = None
@@ -162,6 +165,10 @@ class Environment(Base):
 
     def render(self):
         """rviz shows the node."""
+
+    def _require_open(self):
+        if self._closed:
+            raise RuntimeError('the environment was closed; accepted: another one')
 
     def _nearest(self, body, place):
         from sensor_msgs import point_cloud2
@@ -174,7 +181,7 @@ class Environment(Base):
         if hand.kind == 'push':
             # It arrives with the last of the steps.
             way = numpy.linalg.norm(self._move * action[:3])
-            self.surgeon.push(to, speed=max(way * self._step_rate / self._steps, 1e-6))
+            self.surgeon.push(to, speed=max(way * self._seen.step / (self._seen.sim_time * self._steps), 1e-6))
             return
         if hand.pick is not None and action[3] <= 0.0:
             self.surgeon.release(hand.pick)
@@ -213,9 +220,11 @@ class Environment(Base):
         return numpy.array(numbers, numpy.float64)
 
     def _info(self):
+        """Without the metrics that have no value yet: NaN is not equal to itself."""
         task, metrics = self._seen.task, self._seen.metrics
         return {'step': self._seen.step, 'time': metrics.time, 'score': task.score, 'stage': task.stage, 'stages': list(task.stages),
-                'failed': task.failed, 'passed': task.passed, 'metrics': dict(zip(metrics.names, metrics.values))}
+                'failed': task.failed, 'passed': task.passed,
+                'metrics': {name: value for name, value in zip(metrics.names, metrics.values) if value == value}}
 
 
 def _xyz(value):

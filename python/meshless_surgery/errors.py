@@ -1,6 +1,8 @@
 """What can go wrong, as exceptions."""
 import contextlib
 import enum
+import os
+import threading
 
 import rospy
 
@@ -49,6 +51,30 @@ def reaching(what):
         raise
     except rospy.ROSException as error:
         raise Unreachable('%s does not answer: does the node run? (%s)' % (what, error))
+
+
+_forked_from_node = False
+
+
+def _after_fork():
+    """In the child: an answer of the master would come to either, by the connection of both, and topics to the parent's node."""
+    global _forked_from_node
+    _forked_from_node = rospy.core.is_initialized()
+    for proxy in rospy.core._xmlrpc_cache.values():
+        proxy._lock = threading.Lock()
+        proxy('close')()
+
+
+os.register_at_fork(after_in_child=_after_fork)
+
+
+def need_topics(what):
+    """Services need no rospy node of this process, topics do: one begins where there is none."""
+    if _forked_from_node:
+        raise Unreachable('%s cannot be heard or said: this process was forked from one that had a rospy node; accepted: services, '
+                          "or a process that was started by 'spawn' or 'forkserver'" % what)
+    if not rospy.core.is_initialized():
+        rospy.init_node('surgeon', anonymous=True, disable_signals=True)
 
 
 class Unanswered(SurgeryError):

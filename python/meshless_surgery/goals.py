@@ -7,7 +7,7 @@ from actionlib import ActionClient, CommState
 from actionlib_msgs.msg import GoalID, GoalStatus
 
 from meshless_surgery import msg
-from meshless_surgery.errors import Cancelled, ErrorCode, Refused, Unanswered
+from meshless_surgery.errors import Cancelled, ErrorCode, Refused, Unanswered, need_topics
 
 LOOK = 0.2  # [s] between looks whether the node is still there
 
@@ -21,6 +21,7 @@ class Goals:
         self._clients = {}
 
     def send(self, name, fields, feedback=None):
+        need_topics(self._node + '/actions')
         if name not in self._clients:
             self._clients[name] = ActionClient(self._node + '/actions/' + name, getattr(msg, name.capitalize() + 'Action'))
         return Goal(self._clients[name], name, getattr(msg, name.capitalize() + 'Goal')(**fields), feedback, self._timeout)

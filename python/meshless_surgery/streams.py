@@ -6,7 +6,7 @@ import rospy
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from sensor_msgs.msg import JointState
 
-from meshless_surgery.errors import Unreachable
+from meshless_surgery.errors import Unreachable, need_topics
 from meshless_surgery.poses import pose_stamped
 
 TOOLS = ('pick', 'push', 'scissors')
@@ -54,6 +54,7 @@ class ToolStream:
         self.frame = frame
         self.timeout = timeout
         self._topic = '%s/%s/' % (node, tool)
+        need_topics(self._topic)
         self._poses = rospy.Publisher(self._topic + 'servo_cp', PoseStamped, queue_size=10, tcp_nodelay=True)
         self._jaws = None
         if tool == 'scissors':

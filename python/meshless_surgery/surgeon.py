@@ -9,7 +9,7 @@ from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
-from meshless_surgery.errors import Refused, Unanswered, Unreachable, reaching
+from meshless_surgery.errors import Refused, Unanswered, Unreachable, need_topics, reaching
 from meshless_surgery.goals import Goals
 from meshless_surgery.msg import Info, State
 from meshless_surgery.poses import blade_pose, blades_pose, pose_stamped
@@ -191,13 +191,17 @@ class Surgeon:
 
     # the world
     def state(self):
-        with reaching(self.node + '/state'):
-            return rospy.wait_for_message(self.node + '/state', State, self.timeout)
+        return self._said('state', State)
 
     def info(self):
         """What runs there: scene, step rate, bodies."""
-        with reaching(self.node + '/info'):
-            return rospy.wait_for_message(self.node + '/info', Info, self.timeout)
+        return self._said('info', Info)
+
+    def _said(self, topic, kind):
+        topic = self.node + '/' + topic
+        need_topics(topic)
+        with reaching(topic):
+            return rospy.wait_for_message(topic, kind, self.timeout)
 
     def reset(self):
         return self.call('reset', Trigger)

@@ -20,9 +20,12 @@ import unittest
 import roslib.packages
 import rospy
 
-from meshless_surgery.errors import Refused
+from meshless_surgery.errors import Refused, need_topics
 from meshless_surgery.msg import Event
 from meshless_surgery.surgeon import Surgeon
+
+# Runs a node until it ends, this process does (its end of the pipe is closed then, however it ended) or SIGTERM comes.
+WITH_THIS_PROCESS = 'trap : TERM; exec 3<&0; "$@" 3<&- </dev/null & node=$!; read -r _ <&3 & wait -n; kill $node; wait $node'
 
 # [s] of wall time that a start, an answer or an event may take. No test measures it: it only ends a wait for ever.
 LONG = 120.0
@@ -37,10 +40,10 @@ class RunningScene:
     def __init__(self, scene, /, listens=True, **parameters):
         """`scene` and `parameters` are the node's; two underscores stand for a slash: tools__silence=0. An empty scene
         is that of the parameter `task`. Without `listens` `events` stays empty."""
-        if not rospy.core.is_initialized():
-            rospy.init_node('scene_test', anonymous=True)
         RunningScene._count += 1
         self.name = '/scene_%d_%d' % (os.getpid(), RunningScene._count)
+        if listens:
+            need_topics(self.name)
         parameters = dict({'paused': True}, **parameters)
         if scene:
             parameters['scene'] = scene
@@ -50,7 +53,8 @@ class RunningScene:
         if not programs:
             raise RuntimeError('meshless_surgery has no deformer_node here: is its setup.bash sourced?')
         self._log = tempfile.TemporaryFile(mode='w+', errors='replace')
-        self._process = subprocess.Popen([programs[0], '__name:=' + self.name[1:]], stdout=self._log, stderr=self._log)
+        self._process = subprocess.Popen(['bash', '-c', WITH_THIS_PROCESS, 'bash', programs[0], '__name:=' + self.name[1:]],
+                                         stdin=subprocess.PIPE, stdout=self._log, stderr=self._log, start_new_session=True)
         self.events = []
         self._changed = threading.Condition()
         self._subscriber = rospy.Subscriber(self.name + '/events', Event, self._hear, queue_size=1000) if listens else None
@@ -107,8 +111,9 @@ class RunningScene:
             try:
                 self._process.wait(LONG)
             except subprocess.TimeoutExpired:
-                self._process.kill()
+                os.killpg(self._process.pid, signal.SIGKILL)
                 self._process.wait()
+        self._process.stdin.close()
         self._log.close()
 
     def __enter__(self):

@@ -6,7 +6,7 @@ checkout=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd -P)
 # shellcheck source=scripts/lib/environment.bash
 source "$checkout/scripts/lib/environment.bash"
 
-output=$(outputFolder)
+output=$(outputFolder) || exit 2
 logs=$output/logs
 
 say() { printf '%s\n' "$*"; }

@@ -3,15 +3,18 @@
 # Sourced into the user's own terminal by scripts/setup.bash: it defines functions and runs nothing.
 
 # The build lives outside of the checkout: rosrun searches the whole package folder, and would find everything twice.
-# One folder for each checkout, so that two of them do not mix.
+# One folder for each checkout, so that two of them do not mix. It compares the first letters of paths alone, so that
+# CHECKOUT_out would be in CHECKOUT.
 outputFolder() {
-  if [[ -n ${MESHLESS_SURGERY_OUTPUT:-} ]]; then
-    realpath -m "$MESHLESS_SURGERY_OUTPUT"
-  else
-    local cache=${XDG_CACHE_HOME:-${HOME:-/var/tmp}/.cache}
-    printf '%s/meshless_surgery/%s-%s\n' "$cache" "$(basename "$checkout")" \
-      "$(printf '%s' "$checkout" | sha256sum | cut -c 1-8)"
+  local cache=${XDG_CACHE_HOME:-${HOME:-/var/tmp}/.cache} folder
+  folder=$cache/meshless_surgery/$(basename "$checkout")-$(printf '%s' "$checkout" | sha256sum | cut -c 1-8)
+  folder=$(realpath -m "${MESHLESS_SURGERY_OUTPUT:-$folder}")
+  if [[ $folder == "$checkout"* ]]; then
+    printf '%s\n' "The build would go to $folder, whose path begins with that of the checkout, $checkout: rosrun would" \
+      "find each script twice, and ask. Set MESHLESS_SURGERY_OUTPUT to a folder whose path begins otherwise." >&2
+    return 1
   fi
+  printf '%s\n' "$folder"
 }
 
 # Debian's ROS belongs to /usr/bin/python3; pyenv, conda and the like put another one before it.

@@ -51,5 +51,28 @@ class LoopbackTest(unittest.TestCase):
         self.assertIn('useBuild "$output"', lines[:launch])
 
 
+class OutputTest(unittest.TestCase):
+
+    def ended(self, folder, *command):
+        return subprocess.run(command, cwd=CHECKOUT, env=dict(os.environ, MESHLESS_SURGERY_OUTPUT=folder), check=False,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True, timeout=60)
+
+    def test_a_folder_that_begins_as_the_checkout_does_is_refused_at_once(self):
+        real = os.path.realpath(CHECKOUT)
+        for folder in (real, real + '_out', real + '/out', real + '/../' + os.path.basename(real) + '.out'):
+            for command, status in ((('bash', '-c', 'source scripts/setup.bash'), 1), (('scripts/check', 'base'), 2),
+                                    (('scripts/train', '--build-only'), 2)):
+                done = self.ended(folder, *command)
+                self.assertEqual(status, done.returncode, done.stdout)
+                self.assertIn('The build would go to ' + os.path.normpath(folder), done.stdout)
+                self.assertIn('MESHLESS_SURGERY_OUTPUT', done.stdout)
+        self.assertFalse(os.path.exists(real + '_out') or os.path.exists(real + '/out'))
+
+    def test_any_other_is_not(self):
+        real = os.path.realpath(CHECKOUT)
+        for folder in (os.path.dirname(real), os.path.dirname(real) + '/out_of_' + os.path.basename(real), '/tmp/other'):
+            self.assertEqual(0, self.ended(folder, 'scripts/check', '--help').returncode)
+
+
 if __name__ == '__main__':
     unittest.main()

@@ -4,6 +4,7 @@
 #include <iomanip>
 #include <iterator>
 #include <limits>
+#include <map>
 #include <sstream>
 
 #include "meshless_surgery/body/binding.h"
@@ -18,6 +19,7 @@
 #include "meshless_surgery/geometry/refine.h"
 #include "meshless_surgery/geometry/sampling.h"
 #include "meshless_surgery/geometry/thicken.h"
+#include "meshless_surgery/geometry/union_find.h"
 
 namespace meshless {
 namespace {
@@ -42,7 +44,7 @@ constexpr double kSmallest = 1e-3, kLargest = 2.0;  // [m] of organs
 constexpr double kUsual = 2e-2;                     // [m] the least that a scale is proposed for
 constexpr double kCollisionEdge = 0.8;              // of the spacing
 constexpr std::size_t kMostCollisionTriangles = 200000;
-constexpr std::size_t kMostNamed = 5;  // cavities
+constexpr std::size_t kMostNamed = 5;  // cavities, parts
 constexpr double kLongestEdge = 1.5;   // of the spacing: the surface bends as finely as its cells
 
 Error invalid(const std::string& what) { return {ErrorCode::kInvalidArgument, what}; }
@@ -453,6 +455,31 @@ Status findCavities(BodyDef& def, bool cells, TriangleMesh& surface) {
   return Done{};
 }
 
+/// Which parts it has that no cluster or cell joins; empty where it is one.
+std::string partsWarning(const BodyModel& model, const Pose& placed) {
+  UnionFind joined(model.rest.size());
+  for (Index c = 0; c < model.clusters.size(); ++c)
+    for (Index m = model.clusters.offsets[c]; m < model.clusters.offsets[c + 1]; ++m)
+      joined.join(model.clusters.members[model.clusters.offsets[c]], model.clusters.members[m]);
+  std::map<Index, std::pair<double, Vec3>> found;  // mass, and its product with the middle
+  for (Index i = 0; i < model.rest.size(); ++i) {
+    auto& [mass, middle] = found.emplace(joined.find(i), std::pair(0.0, Vec3(Vec3::Zero()))).first->second;
+    mass += model.masses[i];
+    middle += model.masses[i] * model.rest[i];
+  }
+  if (found.size() < 2) return "";
+  std::vector<std::pair<double, Vec3>> parts;
+  for (const auto& [root, part] : found) parts.push_back({part.first, placed * Vec3(part.second / part.first)});
+  std::stable_sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::ostringstream text;
+  text << std::setprecision(3) << "it has " << parts.size() << " parts that hang together with nothing:";
+  for (std::size_t k = 0; k < parts.size() && k < kMostNamed; ++k)
+    text << (k > 0 ? ", " : " ") << 100.0 * parts[k].first / model.mass << " % of its mass around ("
+         << parts[k].second.x() << ", " << parts[k].second.y() << ", " << parts[k].second.z() << ") m";
+  if (parts.size() > kMostNamed) text << " ...";
+  return text.str();
+}
+
 /// What is no size of an organ is most often in other units than metres; empty where it is one.
 std::string sizeWarning(double longest) {
   if (longest >= kSmallest && longest <= kLargest) return "";
@@ -550,6 +577,8 @@ Result<PreparedBody> prepareBody(BodyDef def) {
     model->binding =
         bindSurface(model->rest, model->graph, model->clusters, surface.vertices, std::move(vertex_particle));
   }
+
+  if (const std::string warning = partsWarning(*model, placed); !warning.empty()) def.warnings.push_back(warning);
 
   Result<std::vector<FilledCavity>> filled = std::vector<FilledCavity>();
   if (!def.cavities.empty()) {

@@ -215,8 +215,7 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   for (const AttachCommand& attachment : scene->attachments) {
     const auto added = world->addSceneAttachment(attachment);
     if (!added.ok()) return Error{added.error().code, *file + ": attachments: " + added.error().detail};
-    ROS_INFO_STREAM("attachment " << added->name << ": " << added->fibres << " fibres on " << 1e4 * added->area
-                                  << " cm^2");
+    ROS_INFO_STREAM("attachment " << added->name << ": " << added->text());
   }
 
   const SessionSettings session_settings = sessionSettings(*settings, *file);

@@ -54,12 +54,11 @@ Result<LogIndex> readIndex(const std::string& file) {
 Status makeIndex(LogPlayer& log, const std::string& file) {
   const std::string part = file + ".part";
   std::ofstream out(part, std::ios::binary | std::ios::trunc);
-  const Status written = writeLogIndex(
+  writeLogIndex(
       log, 2, [&](const std::string& bytes) { out << bytes; },
       [&](std::uint64_t done, std::uint64_t end) {
         ROS_INFO_STREAM_THROTTLE(2.0, "making the index of the log: " << 100 * done / end << " %");
       });
-  if (!written.ok()) return written;
   out.close();
   std::error_code failed;
   if (out) fs::rename(part, file, failed);
@@ -142,11 +141,7 @@ struct ReviewNode::Parts : Answers {
   }
 
   void start() {
-    runner.setStep([this](World& world) {
-      const auto stepped = review.step(world);
-      if (!stepped.ok()) throw std::runtime_error(stepped.error().detail);
-      return *stepped;
-    });
+    runner.setStep([this](World& world) { return review.step(world); });
     runner.setEventSink([this](std::vector<Event> events) { publishers.queueEvents(std::move(events)); });
     runner.start();
     publishers.start();
@@ -176,6 +171,11 @@ struct ReviewNode::Parts : Answers {
       const bool named = event.event.body.empty() || event.event.text.find(event.event.body) != std::string::npos;
       bookmarks.texts.push_back(event.event.text + (named ? "" : ": " + event.event.body));
       bookmarks.errors.push_back(isError(event.event.type));
+    }
+    if (const std::string lost = review.player().report().whatIsLost(); !lost.empty()) {
+      bookmarks.times.push_back(length());
+      bookmarks.texts.push_back(lost);
+      bookmarks.errors.push_back(true);
     }
     bookmarks_topic.publish(bookmarks);
     paths_topic.publish(toPaths(review.index(), review.player().end(), header()));
@@ -272,7 +272,8 @@ Result<std::unique_ptr<ReviewNode>> ReviewNode::start(const ros::NodeHandle& pri
   auto player = openLog(file);
   if (!player.ok()) return Error{player.error().code, "parameter ~log: " + file + ": " + player.error().detail};
   settings->scene = file;
-  if (player->report().lost_bytes > 0) ROS_WARN_STREAM("the log breaks off; what there is is shown");
+  const std::string lost = player->report().whatIsLost();
+  if (!lost.empty()) ROS_WARN_STREAM(lost);
 
   WorldSettings world_settings;
   world_settings.threads = 2;
@@ -280,9 +281,16 @@ Result<std::unique_ptr<ReviewNode>> ReviewNode::start(const ros::NodeHandle& pri
   player->begin(*world);
   const std::string index_file = file + kLogIndexSuffix;
   auto index = readIndex(index_file);
-  if (!index.ok() || index->startHash() != world->stateHash()) {
+  std::string unfit;
+  if (!index.ok())
+    unfit = index.error().detail;
+  else if (index->startHash() != world->stateHash())
+    unfit = "the one there is of another log";
+  else if (!index->ended() && (player->report().ended || index->end() + player->stepRate() < player->end()))  // 1 s
+    unfit = "the one there breaks off";
+  if (!unfit.empty()) {
     ROS_WARN_STREAM("no index of the log beside it ("
-                    << (index.ok() ? "the one there is of another log" : index.error().detail)
+                    << unfit
                     << "): one is made now, once for all; this takes about as long as the session was simulated");
     if (const Status made = makeIndex(*player, index_file); !made.ok()) return made.error();
     index = readIndex(index_file);

@@ -327,8 +327,8 @@ struct Services::Handlers : Answers {
     response.name = attached.name;
     response.fibres = static_cast<std::uint32_t>(attached.fibres);
     response.area = attached.area;
-    return accept(response, "attached " + command.body + " to " + command.other + " by " +
-                                std::to_string(attached.fibres) + " fibres of '" + attached.name + "'");
+    return accept(response, "attached " + command.body + " to " + command.other + " by '" + attached.name +
+                                "': " + attached.text());
   }
 
   bool detach(meshless_surgery::Detach::Request& request, meshless_surgery::Detach::Response& response) {

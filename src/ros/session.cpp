@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <utility>
 
 #include <ros/console.h>
 
@@ -77,7 +78,11 @@ void Session::start(WorldRunner& runner) {
 }
 
 void Session::endLog(WorldRunner& runner) {
-  if (logger_.joinable()) (void)runner.look([](World& world) { world.record(nullptr); });
+  if (!logger_.joinable()) return;
+  (void)runner.look([this](World& world) {
+    world.record(nullptr);
+    if (const auto writer = std::exchange(index_writer_, nullptr)) writer->end();
+  });
 }
 
 void Session::stop() {

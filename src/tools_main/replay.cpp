@@ -30,9 +30,7 @@ int main(int argc, char** argv) {
   }
   std::printf("%" PRIu64 " commands, %" PRIu64 " steps, %" PRIu64 " hashes compared\n", report->commands, report->steps,
               report->checks);
-  if (!report->ended)
-    std::printf("the log breaks off: the node was killed, or its disk was full (%" PRIu64 " bytes of a torn record)\n",
-                report->lost_bytes);
+  if (const std::string lost = report->whatIsLost(); !lost.empty()) std::printf("%s\n", lost.c_str());
   if (report->difference)
     std::printf("DIFFERENT at step %" PRIu64 ": recorded %016" PRIx64 ", replayed %016" PRIx64 "\n",
                 report->difference->step, report->difference->recorded, report->difference->found);

@@ -77,7 +77,8 @@ int main(int argc, char** argv) {
   const std::string log_name = fs::path(log_file).filename().string(), name = log_name + ".report";
   if (const meshless::Status fits = meshless::SessionFolder::checkName(name); !fits.ok())
     return refuse(fits.error().detail);
-  meshless::ReportHead head{trainee, log_name, !replayed->difference, {}};
+  const std::string lost = replayed->whatIsLost();
+  meshless::ReportHead head{trainee, log_name, !replayed->difference, lost, {}};
   head.earlier = meshless::readEarlierReports(out, trainee, training.task().name, name);
   const meshless::SessionFolder folder((fs::path(out) / name).string());
   const std::pair<const char*, std::string> files[] = {{"report.json", meshless::reportJson(training, head)},
@@ -91,7 +92,7 @@ int main(int argc, char** argv) {
               training.progress().stage(), training.task().stages.size(), training.metrics().time(), training.score(),
               training.task().pass_mark, training.passed() ? "passed" : "not passed");
   if (!training.progress().failed().empty()) std::printf("failed: %s\n", training.progress().failed().c_str());
-  if (!replayed->ended) std::printf("the log breaks off; the report is of what there is\n");
+  if (!lost.empty()) std::printf("%s; the report is of what there is\n", lost.c_str());
   if (replayed->difference)
     std::printf("DIFFERENT from step %" PRIu64 " on: the report is of another session than the one that was recorded\n",
                 replayed->difference->step);

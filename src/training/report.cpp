@@ -57,6 +57,7 @@ std::string reportJson(const Training& training, const ReportHead& head) {
   out += "  \"task\": " + quoted(task.name) + ",\n  \"scene\": " + quoted(task.scene) + ",\n";
   out += "  \"trainee\": " + quoted(head.trainee) + ",\n  \"log\": " + quoted(head.log) + ",\n";
   out += "  \"hashes_met\": " + std::string(head.hashes_met ? "true" : "false") + ",\n";
+  out += "  \"lost\": " + quoted(head.lost) + ",\n";
   out += "  \"first_step\": " + std::to_string(training.firstStep()) +
          ",\n  \"last_step\": " + std::to_string(training.lastStep()) + ",\n";
   out += "  \"outcome\": " + quoted(outcomeOf(training)) + ",\n  \"failed\": " + quoted(progress.failed()) + ",\n";

@@ -311,6 +311,7 @@ std::string reportHtml(const Training& training, const ReportHead& head) {
     out +=
         "<p class=\"bad\">The replay did not come to the states that were recorded: these numbers are of another "
         "session than the one that was seen.</p>\n";
+  if (!head.lost.empty()) out += "<p class=\"bad\">" + escaped(head.lost) + "; the report is of what there is.</p>\n";
   out += "<p class=\"big " + std::string(training.passed() ? "good" : "bad") + "\">" +
          (training.passed() ? "Passed" : "Not passed") + ": " + at(training.score()) + " of 100 (pass mark " +
          at(task.pass_mark) + "), " + outcomeOf(training) + " after " + at(training.metrics().time()) + " s</p>\n";

@@ -62,6 +62,12 @@ void World::Impl::recordState(const SavedWorld& saved) const {
   if (record_sink) emit(record_sink, RecordKind::kState, step, encode(saved));
 }
 
+std::string ReplayReport::whatIsLost() const {
+  if (damage.empty()) return ended ? "" : "the log breaks off: the node was killed, or its disk was full";
+  return "the log breaks off at " + damage + "; what comes before is whole, " + std::to_string(lost_bytes) +
+         " bytes are lost";
+}
+
 Result<ReplayReport> replay(std::istream& log, int threads, const std::function<void(World& world)>& after_step) {
   if (!(threads >= 1 && threads <= 64)) return outOfRange("threads", threads, "1 to 64");
   auto player = LogPlayer::open(log);
@@ -70,10 +76,7 @@ Result<ReplayReport> replay(std::istream& log, int threads, const std::function<
   settings.threads = threads;
   World world(settings);
   player->begin(world);
-  while (true) {
-    const auto stepped = player->step(world);
-    if (!stepped.ok()) return stepped.error();
-    if (!*stepped) break;
+  while (player->step(world)) {
     if (after_step) after_step(world);
     (void)world.takeEvents();
   }

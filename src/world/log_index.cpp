@@ -16,7 +16,7 @@ constexpr std::size_t kHead = kLogIndexMagic.size() + 4 + 8;  // bytes
 constexpr std::size_t kRecordStart = 1 + 8;                   // bytes of kind and time
 constexpr std::size_t kMostEntries = 10000000;                // of a kind
 
-enum class EntryKind : std::uint8_t { kModel, kScene, kState, kMoment, kEvent };
+enum class EntryKind : std::uint8_t { kModel, kScene, kState, kMoment, kEvent, kEnd };
 
 // Of this thread: what others do on the machine must not make the file larger.
 double processorSeconds() {
@@ -86,8 +86,7 @@ void LogIndexWriter::stepped(World& world) {
     for (const Pick& pick : now.picks) tools.push_back({ToolKind::kPick, pick.id, pick.position, pick.force.norm()});
     if (now.push.enabled) tools.push_back({ToolKind::kPush, 0, now.push.position, now.push.force.norm()});
     if (now.scissors.shown) tools.push_back({ToolKind::kScissors, 0, now.scissors.blades.origin, 0.0});
-    if (!tools.empty() || had_tools_) write(recordOf(static_cast<std::uint8_t>(EntryKind::kMoment), at_, tools));
-    had_tools_ = !tools.empty();
+    write(recordOf(static_cast<std::uint8_t>(EntryKind::kMoment), at_, tools));
   }
   const double clock = processorSeconds();
   since_state_ += clock - clock_.value_or(clock);
@@ -96,6 +95,8 @@ void LogIndexWriter::stepped(World& world) {
   // What a cut has taken away cannot be undone from a state that was kept between the two.
   if (since_state_ > every || undone_) keepState(world);
 }
+
+void LogIndexWriter::end() { write(recordOf(static_cast<std::uint8_t>(EntryKind::kEnd), at_)); }
 
 void LogIndexWriter::keepState(const World& world) {
   since_state_ = 0.0;
@@ -146,7 +147,8 @@ struct LogIndex::Contents {
     std::uint64_t at = 0;
   };
   std::unique_ptr<std::istream> file;
-  std::uint64_t start_hash = 0;
+  std::uint64_t start_hash = 0, end = 0;
+  bool ended = false;
   std::vector<LogMoment> moments;
   std::vector<LogEvent> events;
   std::vector<Place> models, scenes, states;
@@ -159,7 +161,7 @@ struct LogIndex::Contents {
     file->clear();
     file->seekg(places[number].offset);
     ReadRecord record = readRecord(*file);
-    if (!record.there) throw ArchiveFault("it is shorter than it was");
+    if (record.body.empty()) throw ArchiveFault("it is no longer there");
     return record;
   }
   InArchive payloadOf(const ReadRecord& record) const {
@@ -221,6 +223,8 @@ LogIndex& LogIndex::operator=(LogIndex&&) noexcept = default;
 LogIndex::~LogIndex() = default;
 
 std::uint64_t LogIndex::startHash() const { return contents_->start_hash; }
+std::uint64_t LogIndex::end() const { return contents_->end; }
+bool LogIndex::ended() const { return contents_->ended; }
 const std::vector<LogMoment>& LogIndex::moments() const { return contents_->moments; }
 const std::vector<LogEvent>& LogIndex::events() const { return contents_->events; }
 
@@ -235,54 +239,43 @@ Result<LogIndex> LogIndex::read(std::unique_ptr<std::istream> file) {
     archive(version, contents->start_hash);
     if (version != kStateVersion)
       return badIndex("it is of version " + std::to_string(version) + "; accepted: " + std::to_string(kStateVersion));
-    file->seekg(0, std::ios::end);
-    const std::streamoff length = file->tellg();
-    std::uint64_t last = 0;
-    for (std::streamoff offset = kHead;;) {
-      file->clear();
-      file->seekg(offset);
-      // States and models are read when they are needed.
-      const std::string start = readUpTo(*file, kRecordHeader + kRecordStart);
-      if (start.size() < kRecordHeader + kRecordStart) break;
-      InArchive record(start);
-      std::uint32_t bytes = 0, sum = 0;
+    std::streamoff offset = kHead;
+    for (ReadRecord record = readRecord(*file);; record = readRecord(*file)) {
+      if (!record.damage.empty()) return badIndex("a record of it is damaged: " + record.damage);
+      if (record.body.empty()) break;
       std::uint8_t kind = 0;
       std::uint64_t at = 0;
-      record(bytes, sum, kind, at);
-      if (offset + static_cast<std::streamoff>(kRecordHeader + bytes) > length) break;  // torn
-      if (bytes < kRecordStart || kind > static_cast<std::uint8_t>(EntryKind::kEvent) || at < last)
-        return badIndex("a record has been damaged");
-      last = at;
-      std::vector<Contents::Place>* places = nullptr;
+      InArchive payload(record.body);
+      payload(kind, at);
+      if (at < contents->end || contents->ended) throw ArchiveFault("a record of it is not in its place");
+      contents->end = at;
       switch (static_cast<EntryKind>(kind)) {
         case EntryKind::kModel:
-          places = &contents->models;
+          contents->models.push_back({offset, at});
           break;
         case EntryKind::kScene:
-          places = &contents->scenes;
+          contents->scenes.push_back({offset, at});
           break;
         case EntryKind::kState:
-          places = &contents->states;
+          contents->states.push_back({offset, at});
           break;
         case EntryKind::kMoment:
-        case EntryKind::kEvent: {
-          file->seekg(offset);
-          const ReadRecord read = readRecord(*file);
-          InArchive payload = contents->payloadOf(read);
-          if (static_cast<EntryKind>(kind) == EntryKind::kMoment) {
-            contents->moments.push_back({at, {}});
-            payload(contents->moments.back().tools);
-          } else {
-            contents->events.push_back({at, {}});
-            payload(contents->events.back().event);
-          }
+          contents->moments.push_back({at, {}});
+          payload(contents->moments.back().tools);
           break;
-        }
+        case EntryKind::kEvent:
+          contents->events.push_back({at, {}});
+          payload(contents->events.back().event);
+          break;
+        case EntryKind::kEnd:
+          contents->ended = true;
+          break;
+        default:
+          throw ArchiveFault("a record of it is of kind " + std::to_string(kind));
       }
-      if (places) places->push_back({offset, at});
       if (contents->moments.size() > kMostEntries || contents->events.size() > kMostEntries)
         return badIndex("it has more than " + std::to_string(kMostEntries) + " entries");
-      offset += static_cast<std::streamoff>(kRecordHeader + bytes);
+      offset += static_cast<std::streamoff>(kRecordHeader + record.body.size());
     }
   } catch (const ArchiveFault& fault) {
     return badIndex(fault.what());
@@ -291,17 +284,16 @@ Result<LogIndex> LogIndex::read(std::unique_ptr<std::istream> file) {
   return LogIndex(std::move(contents));
 }
 
-Result<LogIndex::Kept> LogIndex::stateAt(std::uint64_t at, std::uint64_t above) {
+LogIndex::Kept LogIndex::stateAt(std::uint64_t at, std::uint64_t above) {
   Contents& c = *contents_;
-  const auto after = std::upper_bound(c.states.begin(), c.states.end(), at,
-                                      [](std::uint64_t when, const Contents::Place& place) { return when < place.at; });
-  if (after == c.states.begin() || std::prev(after)->at <= above) return Kept();
-  const std::size_t k = static_cast<std::size_t>(after - c.states.begin()) - 1;
-  try {
-    return Kept{c.state(k), c.states[k].at};
-  } catch (const ArchiveFault& fault) {
-    return badIndex(std::string("a state in it: ") + fault.what());
+  for (std::size_t k = c.states.size(); k-- > 0 && c.states[k].at > above;) {
+    if (c.states[k].at > at) continue;
+    try {
+      return {c.state(k), c.states[k].at};
+    } catch (const ArchiveFault&) {  // the one before is as good
+    }
   }
+  return {};
 }
 
 }  // namespace meshless

@@ -1,6 +1,8 @@
 #include "meshless_surgery/world/log_player.h"
 
+#include <functional>
 #include <istream>
+#include <optional>
 
 #include "log_records.h"
 
@@ -11,36 +13,60 @@ namespace {
 // is what their sums of steps have come to.
 constexpr double kMostSeconds = 2.0;
 
+using Deed = std::function<void(World&)>;
+
 template <std::size_t kind = 0>
-Command readCommand(InArchive& archive, std::uint8_t wanted) {
+Deed readCommand(InArchive& archive, std::uint8_t wanted) {
   if constexpr (kind == std::variant_size_v<Command>) {
     throw ArchiveFault("a command is of kind " + std::to_string(wanted));
   } else {
     if (kind != wanted) return readCommand<kind + 1>(archive, wanted);
     std::variant_alternative_t<kind, Command> command;
     archive(command);
-    return command;
+    return [command](World& world) { (void)world.apply(command); };  // what was refused then is refused now
   }
 }
 
-Error damaged(const std::string& why) {
-  return {ErrorCode::kUnreadable, "this is no log of commands that can be read: " + why};
+Deed readMaterials(InArchive& archive) {
+  std::vector<MaterialChange> changes;
+  archive(changes);
+  return [changes](World& world) {
+    for (const MaterialChange& change : changes) {
+      SetMaterialCommand command;
+      command.body = change.body;
+      command.change = [&change](const Material&) -> Result<Material> { return change.material; };
+      (void)world.apply(command);
+    }
+  };
 }
 
-Error damaged(std::uint64_t number, const std::string& why) {
-  return damaged("record " + std::to_string(number) + " " + why);
+Deed readScissors(InArchive& archive) {
+  ScissorBlades blades;
+  double angle = 0.0;
+  archive(blades, angle);
+  return [blades, angle](World& world) { world.setScissors(blades, angle); };
+}
+
+SavedWorldPtr readState(InArchive& archive) {
+  std::string bytes;
+  archive(bytes);
+  auto decoded = decode(bytes);
+  if (!decoded.ok()) throw ArchiveFault(decoded.error().detail);
+  return decoded->world;
+}
+
+Error noLog(const std::string& why) {
+  return {ErrorCode::kUnreadable, "this is no log of commands that can be read: " + why};
 }
 
 }  // namespace
 
 struct LogPlayer::Record {
-  RecordKind kind = RecordKind::kEnd;
-  std::uint64_t number = 0;  // in the file
-  std::uint64_t step = 0;    // the world's
-  std::uint64_t at = 0;      // steps since the log's start
+  std::uint64_t step = 0;             // the world's
+  std::uint64_t at = 0;               // steps since the log's start
+  Deed deed;                          // or
+  std::optional<std::uint64_t> hash;  // to compare
   bool undo = false;
-  std::string payload;
-  SavedWorldPtr state;  // instead of the payload
 };
 
 LogPlayer::LogPlayer() = default;
@@ -52,78 +78,109 @@ Result<LogPlayer> LogPlayer::open(std::istream& log) {
   const std::string head = readUpTo(log, kCommandLogMagic.size() + sizeof kLogVersion);
   if (head.size() < kCommandLogMagic.size() + sizeof kLogVersion ||
       std::string_view(head).substr(0, kCommandLogMagic.size()) != kCommandLogMagic)
-    return damaged("it does not begin with " + std::string(kCommandLogMagic) + ", as logs do");
+    return noLog("it does not begin with " + std::string(kCommandLogMagic) + ", as logs do");
   std::uint32_t version = 0;
   std::memcpy(&version, head.data() + kCommandLogMagic.size(), sizeof version);
   if (version != kLogVersion)
-    return damaged("it is of version " + std::to_string(version) + "; accepted: " + std::to_string(kLogVersion));
+    return noLog("it is of version " + std::to_string(version) + "; accepted: " + std::to_string(kLogVersion));
   LogPlayer player;
-  std::uint64_t step = 0, at = 0;
-  double most = 0.0;  // steps between two records
-  for (std::uint64_t number = 0;; ++number) {
+  ReplayReport& report = player.report_;
+  std::uint64_t step = 0;  // of the record before
+  double most = 0.0;       // steps between two records
+  while (true) {
+    ReadRecord record = readRecord(log);
     try {
-      ReadRecord read = readRecord(log);
-      if (!read.there) {
-        player.report_.lost_bytes = read.lost_bytes;
-        break;
+      if (!record.body.empty()) {
+        player.add(record.body, step, most);
+        continue;
       }
-      InArchive archive(read.body);
-      std::uint8_t kind = 0;
-      Record record;
-      archive(kind, record.step);
-      if (kind > static_cast<std::uint8_t>(RecordKind::kEnd))
-        return damaged(number, "is of kind " + std::to_string(kind));
-      record.kind = static_cast<RecordKind>(kind);
-      record.number = number;
-      if ((record.kind == RecordKind::kStart) == (number > 0))
-        return damaged(number, number > 0 ? "starts again" : "is not the start");
-      if (number > 0) {
-        if (record.step < step) return damaged(number, "goes back to step " + std::to_string(record.step));
-        if (static_cast<double>(record.step - step) > most)
-          return damaged(number, "is " + std::to_string(record.step - step) +
-                                     " steps after the one before; accepted: up to 2 s of them, " +
-                                     std::to_string(static_cast<std::uint64_t>(most)));
-        at += record.step - step;
-        step = record.step;
-      }
-      record.at = at;
-      if (record.kind == RecordKind::kStart || record.kind == RecordKind::kState) {
-        std::string bytes;
-        archive(bytes);
-        if (archive.left() > 0) return damaged(number, "is too long");
-        auto decoded = decode(bytes);
-        if (!decoded.ok()) return decoded.error();
-        record.state = std::move(decoded->world);
-        step = record.state->step;
-        most = kMostSeconds * record.state->settings.step_rate;
-        if (record.kind == RecordKind::kStart) player.step_rate_ = record.state->settings.step_rate;
-      } else {
-        record.payload = read.body.substr(read.body.size() - archive.left());
-        record.undo = record.kind == RecordKind::kCommand && !record.payload.empty() &&
-                      static_cast<std::uint8_t>(record.payload[0]) == Command(UndoCutCommand()).index();
-      }
-      if (record.kind == RecordKind::kReset) step = 0;
-      player.records_.push_back(std::move(record));
     } catch (const ArchiveFault& fault) {
-      return damaged("record " + std::to_string(number) + ": " + fault.what());
+      record.damage = fault.what();
+      record.lost_bytes = kRecordHeader + record.body.size() + restOf(log);
     }
+    report.lost_bytes = record.lost_bytes;
+    if (record.lost_bytes > 0)
+      report.damage = "record " + std::to_string(player.records_.size() + (player.start_ ? 1 : 0)) + ": " +
+                      (record.damage.empty() ? "it is not whole" : record.damage);
+    break;
   }
-  if (player.records_.empty()) return damaged("it has no start");
-  player.end_ = at;
+  if (!player.start_) return noLog(report.damage.empty() ? "it has no start" : report.damage);
   return player;
+}
+
+void LogPlayer::add(std::string_view body, std::uint64_t& step, double& most) {
+  InArchive archive(body);
+  std::uint8_t number = 0;
+  Record record;
+  archive(number, record.step);
+  if (number > static_cast<std::uint8_t>(RecordKind::kEnd))
+    throw ArchiveFault("it is of kind " + std::to_string(number));
+  const auto kind = static_cast<RecordKind>(number);
+  if ((kind == RecordKind::kStart) == (start_ != nullptr))
+    throw ArchiveFault(start_ ? "it starts again" : "it is not the start");
+  if (start_) {
+    if (record.step < step) throw ArchiveFault("it goes back to step " + std::to_string(record.step));
+    if (static_cast<double>(record.step - step) > most)
+      throw ArchiveFault("it is " + std::to_string(record.step - step) +
+                         " steps after the one before; accepted: up to 2 s of them, " +
+                         std::to_string(static_cast<std::uint64_t>(most)));
+    record.at = end_ + record.step - step;
+  }
+  SavedWorldPtr state;
+  switch (kind) {
+    case RecordKind::kStart:
+    case RecordKind::kState:
+      state = readState(archive);
+      record.deed = [state](World& world) { world.restore(*state); };
+      break;
+    case RecordKind::kCommand: {
+      std::uint8_t command = 0;
+      archive(command);
+      record.deed = readCommand(archive, command);
+      record.undo = command == Command(UndoCutCommand()).index();
+      break;
+    }
+    case RecordKind::kMaterials:
+      record.deed = readMaterials(archive);
+      break;
+    case RecordKind::kScissors:
+      record.deed = readScissors(archive);
+      break;
+    case RecordKind::kHideScissors:
+      record.deed = &World::hideScissors;
+      break;
+    case RecordKind::kReset:
+      record.deed = &World::reset;
+      break;
+    case RecordKind::kHash:
+    case RecordKind::kEnd:
+      archive(record.hash.emplace());
+      break;
+  }
+  if (archive.left() > 0) throw ArchiveFault("it is too long");
+  step = state ? state->step : kind == RecordKind::kReset ? 0 : record.step;
+  if (state) most = kMostSeconds * state->settings.step_rate;
+  report_.ended = kind == RecordKind::kEnd;
+  end_ = record.at;
+  if (start_) {
+    records_.push_back(std::move(record));
+  } else {
+    start_ = std::move(state);
+    step_rate_ = start_->settings.step_rate;
+  }
 }
 
 void LogPlayer::begin(World& world) {
   at_ = 0;
-  next_ = 1;
-  world.restore(*records_.front().state);
+  next_ = 0;
+  world.restore(*start_);
 }
 
 void LogPlayer::resume(World& world, const SavedWorld& state, std::uint64_t at) {
   at_ = at;
   // What came before that step was done is in the state.
   next_ = static_cast<std::size_t>(
-      std::lower_bound(records_.begin() + 1, records_.end(), at,
+      std::lower_bound(records_.begin(), records_.end(), at,
                        [](const Record& record, std::uint64_t when) { return record.at < when; }) -
       records_.begin());
   world.restore(state);
@@ -135,79 +192,23 @@ bool LogPlayer::undoesNext() const {
   return false;
 }
 
-Result<bool> LogPlayer::step(World& world) {
+bool LogPlayer::step(World& world) {
   for (; next_ < records_.size() && records_[next_].at <= at_; ++next_) {
     const Record& record = records_[next_];
-    try {
-      if (const Status done = apply(world, record); !done.ok()) return done.error();
-    } catch (const ArchiveFault& fault) {
-      return damaged(record.number, std::string("cannot be read: ") + fault.what());
+    if (record.deed) {
+      record.deed(world);
+      ++report_.commands;
+      continue;
     }
+    ++report_.checks;
+    const std::uint64_t found = world.stateHash();
+    if (found != *record.hash && !report_.difference) report_.difference = {record.step, *record.hash, found};
   }
   if (at_ >= end_) return false;
   world.step();
   ++at_;
   ++report_.steps;
   return true;
-}
-
-Status LogPlayer::apply(World& world, const Record& record) {
-  InArchive archive(record.payload);
-  switch (record.kind) {
-    case RecordKind::kStart:
-      break;
-    case RecordKind::kState:
-      world.restore(*record.state);
-      ++report_.commands;
-      break;
-    case RecordKind::kCommand: {
-      std::uint8_t command = 0;
-      archive(command);
-      (void)world.apply(readCommand(archive, command));  // what was refused then is refused now
-      ++report_.commands;
-      break;
-    }
-    case RecordKind::kMaterials: {
-      std::vector<MaterialChange> changes;
-      archive(changes);
-      for (const MaterialChange& change : changes) {
-        SetMaterialCommand command;
-        command.body = change.body;
-        command.change = [&change](const Material&) -> Result<Material> { return change.material; };
-        (void)world.apply(command);
-      }
-      ++report_.commands;
-      break;
-    }
-    case RecordKind::kScissors: {
-      ScissorBlades blades;
-      double angle = 0.0;
-      archive(blades, angle);
-      world.setScissors(blades, angle);
-      ++report_.commands;
-      break;
-    }
-    case RecordKind::kHideScissors:
-      world.hideScissors();
-      ++report_.commands;
-      break;
-    case RecordKind::kReset:
-      world.reset();
-      ++report_.commands;
-      break;
-    case RecordKind::kHash:
-    case RecordKind::kEnd: {
-      std::uint64_t recorded = 0;
-      archive(recorded);
-      ++report_.checks;
-      const std::uint64_t found = world.stateHash();
-      if (found != recorded && !report_.difference) report_.difference = {record.step, recorded, found};
-      report_.ended = record.kind == RecordKind::kEnd;
-      break;
-    }
-  }
-  if (archive.left() > 0) return damaged(record.number, "is too long");
-  return Done{};
 }
 
 }  // namespace meshless

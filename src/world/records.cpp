@@ -1,5 +1,7 @@
 #include "records.h"
 
+#include <limits>
+
 namespace meshless {
 namespace {
 
@@ -28,15 +30,21 @@ ReadRecord readRecord(std::istream& file) {
   std::uint32_t length = 0, sum = 0;
   InArchive archive(header);
   archive(length, sum);
-  if (length > kMostRecord) throw ArchiveFault("it claims " + std::to_string(length) + " bytes");
-  record.body = readUpTo(file, length);
-  if (record.body.size() < length) {
-    record.lost_bytes = header.size() + record.body.size();
-    return record;
+  const bool possible = length > 0 && length <= kMostRecord;  // zeros have the checksum of nothing
+  if (possible) record.body = readUpTo(file, length);
+  const bool torn = possible && record.body.size() < length;
+  if (!torn && (!possible || checksum(record.body) != sum))
+    record.damage = possible ? "its checksum is wrong" : "it claims " + std::to_string(length) + " bytes";
+  if (torn || !record.damage.empty()) {
+    record.lost_bytes = header.size() + record.body.size() + restOf(file);
+    record.body.clear();
   }
-  if (checksum(record.body) != sum) throw ArchiveFault("its checksum is wrong");
-  record.there = true;
   return record;
+}
+
+std::uint64_t restOf(std::istream& file) {
+  file.ignore(std::numeric_limits<std::streamsize>::max());
+  return static_cast<std::uint64_t>(file.gcount());
 }
 
 }  // namespace meshless

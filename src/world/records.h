@@ -1,5 +1,5 @@
-// Files of records: length (4), checksum (4), and so many bytes. What a process could not write in full when it was
-// killed is the last one.
+// Files of records: length (4), checksum (4), and so many bytes, at least one. What a process could not write in full
+// when it was killed is the last one.
 #pragma once
 
 #include <istream>
@@ -29,11 +29,14 @@ std::string recordOf(const Parts&... parts) {
 std::string readUpTo(std::istream& file, std::size_t count);
 
 struct ReadRecord {
-  std::string body;
-  std::uint64_t lost_bytes = 0;  // of a torn one
-  bool there = false;            // and whole
+  std::string body;              // empty: it is not there, or not whole
+  std::uint64_t lost_bytes = 0;  // of a torn one; of a damaged one and all that follows
+  std::string damage;            // what is wrong with it
 };
-/// The next one; throws ArchiveFault where it claims too much, or has been damaged.
+/// The next one.
 ReadRecord readRecord(std::istream& file);
+
+/// How many bytes are left; goes to the end.
+std::uint64_t restOf(std::istream& file);
 
 }  // namespace meshless

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iomanip>
 #include <limits>
 #include <map>
 #include <optional>
@@ -10,6 +11,7 @@
 
 #include "meshless_surgery/base/compressed_rows.h"
 #include "meshless_surgery/geometry/nearest_on_triangle.h"
+#include "meshless_surgery/geometry/union_find.h"
 #include "world_impl.h"
 
 namespace meshless {
@@ -19,6 +21,7 @@ constexpr double kFacing = -0.5;       // cosine: faces are joined that face eac
 constexpr double kLongFace = 2.0;      // edges of contact: longer faces are divided
 constexpr int kMostParts = 100;        // of a face's edge
 constexpr std::size_t kLongName = 90;  // of a name that is chosen, at most
+constexpr std::size_t kMostNamed = 5;  // patches
 
 /// The middles of n^2 equal parts of a triangle, as shares of its corners.
 template <class Visit>
@@ -35,7 +38,33 @@ void eachPart(int n, const Visit& visit) {
 struct Part {
   double area = 0.0;                          // [m^2]
   std::vector<std::pair<Index, Vec3>> faces;  // and their corners' areas [m^2]
+  Vec3 middle = Vec3::Zero();                 // [m]
+  Index fibre = kNoIndex;
 };
+using Cube = std::array<long long, 3>;
+
+/// Whose faces share corners, the largest first.
+std::vector<AttachReply::Patch> patchesOf(const std::map<Cube, Part>& parts, const ShownSurface& of) {
+  UnionFind joined(parts.size());
+  std::vector<Index> first(of.vertices.size(), kNoIndex);  // fibre at each corner
+  for (const auto& [cube, part] : parts)
+    for (std::size_t f = 0; f < part.faces.size() && part.fibre != kNoIndex; ++f)
+      for (const Index v : of.surface->triangles[part.faces[f].first]) {
+        if (first[v] == kNoIndex) first[v] = part.fibre;
+        joined.join(first[v], part.fibre);
+      }
+  std::map<Index, AttachReply::Patch> found;
+  for (const auto& [cube, part] : parts) {
+    if (part.fibre == kNoIndex) continue;
+    AttachReply::Patch& patch = found[joined.find(part.fibre)];
+    patch.area += part.area;
+    patch.middle += part.area * part.middle;
+  }
+  std::vector<AttachReply::Patch> patches;
+  for (const auto& [root, patch] : found) patches.push_back({patch.area, patch.middle / patch.area});
+  std::stable_sort(patches.begin(), patches.end(), [](const auto& a, const auto& b) { return a.area > b.area; });
+  return patches;
+}
 
 bool isOpen(const WorldBody* body) { return body && !body->model->solid; }
 
@@ -91,6 +120,17 @@ Status checkRegion(const std::optional<Region>& region) {
 
 }  // namespace
 
+std::string AttachReply::text() const {
+  std::ostringstream text;
+  text << std::setprecision(3) << fibres << (fibres == 1 ? " fibre" : " fibres") << " on " << 1e4 * area << " cm^2, in "
+       << patches.size() << (patches.size() == 1 ? " patch" : " patches");
+  for (std::size_t k = 0; k < patches.size() && k < kMostNamed; ++k)
+    text << (k > 0 ? ", " : ": ") << 1e4 * patches[k].area << " cm^2 around (" << patches[k].middle.x() << ", "
+         << patches[k].middle.y() << ", " << patches[k].middle.z() << ") m";
+  if (patches.size() > kMostNamed) text << " ...";
+  return text.str();
+}
+
 Result<AttachReply> World::Impl::attach(const AttachCommand& command) {
   const auto obstacleOf = [this](const std::string& name) -> const WorldObstacle* {
     for (const auto& obstacle : obstacles)
@@ -136,7 +176,7 @@ Result<AttachReply> World::Impl::attach(const AttachCommand& command) {
 
   // A fibre stands for what lies in a cube of an edge: surfaces may be much finer, or coarser, than the tissue is.
   const double edge = a->edge_length;
-  std::map<std::array<long long, 3>, Part> parts;
+  std::map<Cube, Part> parts;
   Points samples;                                        // [m]
   double gap = std::numeric_limits<double>::infinity();  // [m]
   const auto addSample = [&](Index face, const Vec3& shares, const Vec3& area) {
@@ -150,7 +190,7 @@ Result<AttachReply> World::Impl::attach(const AttachCommand& command) {
       const Vec3 other = of_b.areaOf(there.face);
       if (!open && !(other.dot(area) <= kFacing * other.norm() * area.norm())) return;
     }
-    std::array<long long, 3> cube;
+    Cube cube;
     for (int k = 0; k < 3; ++k) cube[k] = std::llround(std::floor(p[k] / edge));
     Part& part = parts[cube];
     part.area += area.norm();
@@ -164,23 +204,22 @@ Result<AttachReply> World::Impl::attach(const AttachCommand& command) {
     const Vec3 area = of_a.areaOf(face) / (n * n);
     eachPart(n, [&](const Vec3& shares) { addSample(face, shares, area); });
   }
-  for (const auto& [cube, part] : parts) {
+  for (auto& [cube, part] : parts) {
     if (!(part.area > 0.0)) continue;
     Fibre fibre;
     fibre.a = a->id;
     fibre.area = part.area;
     PointMaker maker(of_a.surface->supports);
-    Vec3 shown = Vec3::Zero();
     for (const auto& [face, shares] : part.faces) {
       for (int k = 0; k < 3; ++k) maker.add(of_a.surface->triangles[face][k], shares[k]);
-      shown += of_a.at(face, shares) / part.area;
+      part.middle += of_a.at(face, shares) / part.area;
     }
     fibre.at_a = maker.make();
     const Vec3 at = fibre.at_a.of(a->state.positions);
     fibre.place = at;
     double skin = 0.0;
     if (!to_world) {
-      const NearestFace there = search->nearest(shown);
+      const NearestFace there = search->nearest(part.middle);
       if (there.face == kNoIndex) continue;
       fibre.place = of_b.at(there.face, there.shares);
       skin = kSkin * std::min(edge, b ? b->edge_length : obstacle->surface.edge_length);
@@ -192,6 +231,7 @@ Result<AttachReply> World::Impl::attach(const AttachCommand& command) {
       fibre.rest = std::max((at - fibre.place).norm(), skin);  // contact keeps them a skin apart
       if (b) fibre.place.setZero();
     }
+    part.fibre = static_cast<Index>(made.fibres.size());
     made.fibres.push_back(std::move(fibre));
   }
   if (made.fibres.empty()) {
@@ -208,7 +248,7 @@ Result<AttachReply> World::Impl::attach(const AttachCommand& command) {
 
   // From here nothing fails.
   made.made = static_cast<std::uint32_t>(made.fibres.size());
-  AttachReply reply{made.name, made.fibres.size(), 0.0};
+  AttachReply reply{made.name, made.fibres.size(), 0.0, patchesOf(parts, of_a)};
   for (const Fibre& fibre : made.fibres) reply.area += fibre.area;
   wake(*a);
   if (b) wake(*b);

@@ -1,5 +1,6 @@
 #include "meshless_surgery/body/body.h"
 
+#include <cstdio>
 #include <limits>
 #include <tuple>
 
@@ -60,6 +61,65 @@ TEST(PrepareBody, SaysWhatIsTooLargeOrTooSmallForAnOrganAndWhatWouldMakeItOne) {
     const std::vector<std::string> warnings = test::prepared(def).def.warnings;
     ASSERT_EQ(warnings.size(), *expected == 0 ? 0u : 1u);
     if (*expected != 0) EXPECT_NE(warnings[0].find(expected), std::string::npos) << warnings[0];
+  }
+}
+
+/// Share of the mass [%] and middle [m] of each part that a warning names.
+std::vector<std::pair<double, Vec3>> namedParts(const std::string& warning) {
+  std::vector<std::pair<double, Vec3>> parts;
+  for (std::size_t at = warning.find(" % of its mass"); at != std::string::npos;
+       at = warning.find(" % of its mass", at + 1)) {
+    std::pair<double, Vec3> part;
+    part.first = std::stod(warning.substr(warning.rfind(' ', at - 1)));
+    Vec3& p = part.second;
+    EXPECT_EQ(3, std::sscanf(warning.c_str() + at, " %% of its mass around (%lf, %lf, %lf) m", &p.x(), &p.y(), &p.z()));
+    parts.push_back(part);
+  }
+  return parts;
+}
+
+TEST(PrepareBody, WarnsOfPartsThatHangTogetherWithNothing) {
+  for (const bool elastic : {false, true}) {
+    SCOPED_TRACE(elastic);
+    const auto warningOf = [&](const TriangleMesh& mesh) {
+      BodyDef def = defOf(mesh);
+      def.pose = shapes::anyPose();
+      if (elastic) def.material.youngs_modulus = 1e4;
+      const std::vector<std::string> warnings = prepared(def).def.warnings;
+      for (const std::string& warning : warnings)
+        if (warning.find("hang together") != std::string::npos) return warning;
+      return std::string();
+    };
+    for (const shapes::Shape& shape : shapes::simpleShapes())
+      if (!elastic || shape.name == "hollow sphere" || shape.name == "arch")
+        EXPECT_EQ(shape.name == "two pieces", warningOf(shape.mesh) != "") << shape.name;
+    const TriangleMesh large = sphereMesh(0.05, 0.015);
+    const auto expectTwo = [&](const TriangleMesh& mesh, const TriangleMesh& small, const Vec3& at) {
+      const std::string warning = warningOf(mesh);
+      EXPECT_NE(std::string::npos, warning.find("it has 2 parts that hang together with nothing: ")) << warning;
+      const auto parts = namedParts(warning);
+      ASSERT_EQ(2u, parts.size());
+      const double share = 100.0 * signedVolume(small) / signedVolume(mesh);
+      EXPECT_NEAR(100.0, parts[0].first + parts[1].first, 0.2);
+      EXPECT_NEAR(share, parts[1].first, 1.0 + 0.1 * share);
+      EXPECT_LT((shapes::anyPose() * at - parts[1].second).norm(), 0.003);
+      EXPECT_LT((shapes::anyPose() * Vec3(0, 0, 0) - parts[0].second).norm(), 0.003);
+    };
+    const TriangleMesh island = sphereMesh(0.02, 0.01);
+    for (const Vec3& at : {Vec3(0.1, 0, 0.02), Vec3(0, -0.0701, 0)}) {
+      TriangleMesh two = large;
+      shapes::append(two, island, at);
+      expectTwo(two, island, at);
+    }
+    TriangleMesh stone = shapes::hollowSphere();  // in its cavity
+    shapes::append(stone, island, Vec3(0.01, 0, 0));
+    expectTwo(stone, island, Vec3(0.01, 0, 0));
+    TriangleMesh many = large;
+    for (int k = 0; k < 6; ++k) shapes::append(many, island, Vec3(0.1 + 0.05 * k, 0, 0));
+    const std::string warning = warningOf(many);
+    EXPECT_NE(std::string::npos, warning.find("it has 7 parts")) << warning;
+    EXPECT_EQ(5u, namedParts(warning).size());
+    EXPECT_EQ(" ...", warning.substr(warning.size() - 4));
   }
 }
 

@@ -153,6 +153,40 @@ TEST_F(AutosaveFileTest, TwoOfOneNameDoNotTouchEachOthers) {
   EXPECT_FALSE(folder_.has("autosave_a.state"));
 }
 
+// Names that others hold, and names whose lock cannot be taken, with an autosave or without.
+TEST_F(AutosaveFileTest, TheFirstNameThatIsFreeIsTaken) {
+  const auto block = [this](const std::string& name) {
+    fs::create_directory(temporary_.path() + "/." + name + ".lock");
+  };
+  for (const bool base_is_held : {true, false}) {
+    SCOPED_TRACE(base_is_held);
+    AutosaveFile first = file(), third = file(), last = file();
+    if (base_is_held) {
+      EXPECT_EQ(-1, claimed(first));
+      first.keep();
+      ASSERT_TRUE(first.write(states_[0]).ok());
+    } else {
+      block("autosave_a.state");
+    }
+    block("autosave_a.state.2");
+    ASSERT_TRUE(folder_.write("autosave_a.state.2", states_[1]).ok());
+    EXPECT_EQ(-1, claimed(third));
+    third.keep();
+    ASSERT_TRUE(third.write(states_[2]).ok());
+    EXPECT_EQ(states_[2], *folder_.read("autosave_a.state.3", kMostStateBytes));
+    block("autosave_a.state.4");
+    EXPECT_EQ(-1, claimed(last));
+    EXPECT_NE(std::string::npos, said_.find("this node's autosave is autosave_a.state.5")) << said_;
+    last.keep();
+    ASSERT_TRUE(last.write(states_[0]).ok());
+    EXPECT_EQ(states_[1], *folder_.read("autosave_a.state.2", kMostStateBytes));
+    EXPECT_EQ(states_[2], *folder_.read("autosave_a.state.3", kMostStateBytes));
+    EXPECT_EQ(states_[0], *folder_.read("autosave_a.state.5", kMostStateBytes));
+    for (AutosaveFile* one : {&first, &third, &last}) one->remove();
+    for (const std::string& name : files()) fs::remove_all(temporary_.path() + "/" + name);
+  }
+}
+
 TEST_F(AutosaveFileTest, WhoWroteUnderAnotherNameFindsItThere) {
   AutosaveFile first = file();
   claimed(first);

@@ -2,6 +2,7 @@
 """What holds bodies together, through the node: the scene's attachment, ~attach, ~detach, cuts, tears, and what is shown."""
 import os
 import sys
+import tempfile
 
 import rospy
 from geometry_msgs.msg import Point
@@ -10,9 +11,10 @@ from meshless_surgery.msg import Event
 from visualization_msgs.msg import MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from deformer_support import DeformerTestCase, run  # noqa: E402
+from deformer_support import DeformerTestCase, OwnNode, run  # noqa: E402
 
 NAN = float('nan')
+SCENES = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'scenes')
 
 
 class AttachTest(DeformerTestCase):
@@ -44,10 +46,26 @@ class AttachTest(DeformerTestCase):
         self.assertAlmostEqual(weight, bed.force, delta=0.05 * weight)
         self.assertEqual([2 * bed.fibres], self.shown())
 
+    def test_what_is_joined_and_what_is_not_is_said_at_the_start(self):
+        with OwnNode(scene=os.path.join(SCENES, 'attached.yaml'), paused=True).wait() as node:
+            self.assertRegex(node.output(), r'attachment bed: \d+ fibres on 24 cm\^2, in 1 patch: 24 cm\^2 around \(')
+        with tempfile.TemporaryDirectory() as folder:
+            with open(os.path.join(folder, 'two.obj'), 'w', encoding='ascii') as file:
+                for number, at in enumerate((0.0, 0.2)):
+                    for corner in range(8):
+                        file.write('v %g %g %g\n' % (at + 0.1 * (corner & 1), 0.05 * (corner & 2), 0.1 * (corner >> 2)))
+                    for face in ((1, 3, 4, 2), (5, 6, 8, 7), (1, 2, 6, 5), (3, 7, 8, 4), (1, 5, 7, 3), (2, 4, 8, 6)):
+                        file.write('f %d %d %d %d\n' % tuple(8 * number + k for k in face))
+            with open(os.path.join(folder, 'two.yaml'), 'w', encoding='ascii') as file:
+                file.write('bodies: [{name: two, file: two.obj, material: elastic_liver, pose: {position: [0, 0, 0.1]}}]\n')
+            with OwnNode(scene=os.path.join(folder, 'two.yaml'), paused=True).wait() as node:
+                self.assertRegex(node.output(), r'body two: it has 2 parts that hang together with nothing: 50 % of its mass around \(')
+
     def test_joining_and_taking_apart(self):
         more = self.surgeon.attach('liver', 'gallbladder', stiffness=1e5, distance=0.01)
         self.assertEqual('liver-gallbladder', more.name)
         self.assertGreater(more.fibres, 4)
+        self.assertIn('%d fibres on %.3g cm^2, in ' % (more.fibres, 1e4 * more.area), more.message)
         world = self.surgeon.attach('gallbladder', 'world', stiffness=1e5, centre=(0.03, 0, 0.16), radius=0.02)
         self.assertLess(world.area, more.area)
         self.assertEqual({'bed', more.name, world.name}, set(self.fibres()))

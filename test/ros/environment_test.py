@@ -1,18 +1,22 @@
 #!/usr/bin/env python3
 """A task as an environment: in lock step, the same to the bit for the same seed and actions, its reward that of the task."""
+import multiprocessing
 import os
 import re
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 import numpy
+import rosnode
 import rospkg
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from deformer_support import OwnNode, run  # noqa: E402
-from meshless_surgery import Environment, Refused  # noqa: E402
+import vector_worker  # noqa: E402
+from deformer_support import LONG, OwnNode, run  # noqa: E402
+from meshless_surgery import Environment, Refused, Surgeon, Unreachable  # noqa: E402
 from meshless_surgery.environment import PlainBox, potential  # noqa: E402
 
 HANDS = [('pick', (-0.05, -0.06, 0.07)), ('push', (0.06, -0.05, 0.12))]
@@ -66,6 +70,97 @@ class EnvironmentTest(unittest.TestCase):
         finally:
             environment.close()
 
+    def test_what_it_says_is_equal_for_the_same_seed_and_action(self):
+        """As check_env of Gymnasium compares: by ==, which NaN is not to itself."""
+        with OwnNode(scene='liver', paused=True).wait() as node:
+            environment = Environment('retract', node=node.name, hands=HANDS, points=POINTS)
+            told = []
+            for _ in range(2):
+                reset = environment.reset(seed=123)
+                environment.action_space.seed(123)
+                told.append((reset, environment.step(environment.action_space.sample())))
+            for first, again in zip(*told):
+                self.assertTrue(numpy.array_equal(first[0], again[0]))
+                self.assertEqual(first[1:], again[1:])
+                self.assertIn('time', first[-1]['metrics'])
+            environment.close()
+
+    def test_two_side_by_side_for_each_start_method(self):
+        """As Gymnasium's AsyncVectorEnv does it: one to ask for its spaces, closed again, then one a process. This process has a
+        rospy node too."""
+        probe = vector_worker.make()
+        probe.reset(seed=1)
+        probe.close()
+        told = {}
+        for method in ('fork', 'spawn', 'forkserver'):
+            context = multiprocessing.get_context(method)
+            pipes, processes = [], []
+            for _ in range(2):
+                pipe, theirs = context.Pipe()
+                process = context.Process(target=vector_worker.work, args=(theirs,), daemon=True)
+                process.start()
+                self.addCleanup(process.kill)
+                theirs.close()
+                pipes.append(pipe)
+                processes.append(process)
+
+            def answers():
+                for number, pipe in enumerate(pipes):
+                    self.assertTrue(pipe.poll(LONG), '%s: process %d does not answer' % (method, number))
+                said = [pipe.recv() for pipe in pipes]
+                self.assertFalse([text for text in said if isinstance(text, str) and text != 'closed'], method)
+                return said
+
+            def ask(name, *each):
+                for pipe, arguments in zip(pipes, each):
+                    pipe.send((name, arguments))
+                return answers()
+
+            self.assertEqual([(probe.action_space.shape, probe.observation_space.shape)] * 2, answers())
+            history = [[said[0]] for said in ask('reset', dict(seed=4), dict(seed=5))]
+            for number in range(12):
+                action = numpy.cos(number + numpy.arange(7.0))
+                for kept, said in zip(history, ask('step', dict(action=action), dict(action=action))):
+                    kept.append(said[0])
+            for pipe in pipes:
+                pipe.send(None)
+            self.assertEqual(['closed'] * 2, answers())
+            for process in processes:
+                process.join(LONG)
+                self.assertEqual(0, process.exitcode, method)
+            told[method] = [numpy.array(kept).tobytes() for kept in history]
+            self.assertNotEqual(told[method][0], told[method][1])
+        self.assertEqual(1, len(set(map(tuple, told.values()))))  # no method gives another result
+
+    def test_a_forked_process_hears_no_topics_and_says_so(self):
+        context = multiprocessing.get_context('fork')
+        pipe, theirs = context.Pipe()
+        with OwnNode(scene='liver', paused=True).wait() as node:
+            def ask():
+                surgeon = Surgeon(node.name)
+                theirs.send(surgeon.hash())
+                try:
+                    surgeon.state()
+                except Unreachable as unreachable:
+                    theirs.send(str(unreachable))
+            process = context.Process(target=ask)
+            process.start()
+            self.addCleanup(process.kill)
+            for wanted in (node.hash(), 'spawn'):
+                self.assertTrue(pipe.poll(LONG))
+                said = pipe.recv()
+                self.assertTrue(said == wanted or wanted in str(said), said)
+
+    def test_a_node_does_not_outlive_a_process_that_was_killed(self):
+        said = subprocess.run([sys.executable, vector_worker.__file__], stdout=subprocess.PIPE, text=True, check=False)
+        self.assertEqual(-9, said.returncode)
+        name = said.stdout.strip()
+        self.assertIn('/scene_', name)
+        end = time.monotonic() + LONG
+        while name in rosnode.get_node_names():  # it takes itself off in good order
+            self.assertLess(time.monotonic(), end, name + ' lives on')
+            time.sleep(0.1)
+
     def test_a_policy_that_retracts_is_rewarded_and_ends_the_task(self):
         with OwnNode(scene='liver', paused=True).wait() as node:
             environment = Environment('retract', node=node.name, hands=HANDS[:1], points=POINTS, reach=0.03, steps=12, move=0.005)
@@ -94,8 +189,8 @@ class EnvironmentTest(unittest.TestCase):
             with self.assertRaises(RuntimeError):
                 environment.step(numpy.zeros(4))
             environment.reset()
-            for wrong in (numpy.zeros(3), (0, 0, float('nan'), 0)):
-                with self.assertRaises(ValueError):
+            for wrong in (numpy.zeros(3), (0, 0, float('nan'), 0), (0, 1.01, 0, 0), (0, 0, 0, -float('inf'))):
+                with self.assertRaisesRegex(ValueError, 'accepted: 4 numbers from -1 to 1'):
                     environment.step(wrong)
             environment.close()
             self.assertTrue(node.good('observe').success)  # another's node lives on
@@ -103,8 +198,6 @@ class EnvironmentTest(unittest.TestCase):
     def test_an_episode_is_truncated_and_wrong_arguments_are_refused(self):
         with OwnNode(scene='liver', paused=True).wait() as node:
             environment = Environment('retract', node=node.name, horizon=3, reward=lambda before, after: after.step - before.step)
-            for _ in range(2):
-                environment.close()  # twice is no harm
             environment.reset(seed=1)
             told = [environment.step(numpy.zeros(4)) for _ in range(3)]
             self.assertEqual([(4.0, False, False), (4.0, False, False), (4.0, False, True)], [step[1:4] for step in told])
@@ -112,6 +205,15 @@ class EnvironmentTest(unittest.TestCase):
                           dict(move=float('nan')), dict(spread=-1.0), dict(hands=[HANDS[1], HANDS[1]])):
                 with self.assertRaises(ValueError):
                     Environment('retract', node=node.name, **wrong)
+            environment.reset(options={})
+            with self.assertRaises(ValueError):
+                environment.reset(options={'place': 1})
+            environment.reset()
+            for _ in range(2):
+                environment.close()  # twice is no harm
+            for call in (environment.reset, lambda: environment.step(numpy.zeros(4))):
+                with self.assertRaisesRegex(RuntimeError, 'closed'):
+                    call()
             with self.assertRaises(Refused):
                 Environment('palpate', node=node.name).reset()  # of another scene
             with self.assertRaises(Refused):

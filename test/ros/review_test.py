@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A logged session is looked back at: any moment is what it was, whoever asks and in whatever order."""
+import json
 import os
 import random
 import re
@@ -25,6 +26,16 @@ from deformer_support import ACROSS_X, LONG, OF_REVIEW, OwnNode, Recorder, launc
 
 SCENES = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'scenes')
 BOXES = os.path.join(SCENES, 'boxes.yaml')
+
+
+def read(path):
+    with open(path, 'rb') as file:
+        return file.read()
+
+
+def write(path, contents):
+    with open(path, 'wb') as file:
+        file.write(contents)
 
 
 class ReviewNode:
@@ -172,6 +183,69 @@ class ReviewTest(unittest.TestCase):
         with ReviewNode(log=path) as review:
             self.look_everywhere(review)
             self.assertIn('of another log', review.output())
+
+    def copied(self):
+        """A log with its index that may be damaged."""
+        other = tempfile.mkdtemp(prefix='meshless_review_')
+        self.addCleanup(shutil.rmtree, other, True)
+        for name in ('monday', 'monday.index'):
+            shutil.copy(os.path.join(self.folder, name), other)
+        return os.path.join(other, 'monday')
+
+    def test_a_damaged_index_is_made_anew(self):
+        path = self.copied()
+        whole = read(path + '.index')
+        turned = bytearray(whole)
+        turned[len(turned) // 2] ^= 4
+        for damaged, words in ((bytes(turned), 'checksum is wrong'), (whole[:len(whole) // 2], 'breaks off'),
+                               (whole + bytes(4096), 'claims 0 bytes'), (b'', 'does not begin with')):
+            write(path + '.index', damaged)
+            with ReviewNode(log=path) as review:
+                self.look_everywhere(review)
+                self.assertIn('one is made now', review.output())
+                self.assertIn(words, review.output())
+                marks = review.recorder('bookmarks', Bookmarks).wait()
+                self.assertTrue(any('cut' in text for text in marks.texts), marks.texts)
+            with ReviewNode(log=path) as review:
+                review.seek(0.5)
+                self.assertNotIn('one is made now', review.output())
+
+    def test_a_damaged_log_is_shown_up_to_there(self):
+        path = self.copied()
+        whole = read(path)
+        turned = bytearray(whole)
+        turned[-1] ^= 1  # of the last record, which tells that it ends
+        for damaged in (whole + bytes(4096), bytes(turned), whole[:-1]):
+            write(path, damaged)
+            with ReviewNode(log=path) as review:
+                length = review.recorder('review', Review).wait().length
+                for steps in [steps for steps in self.known if steps <= length * self.rate()]:
+                    review.seek(steps / self.rate())
+                    self.assertEqual(self.known[steps], review.hash(), 'after %d steps' % steps)
+                self.assertIn('the log breaks off at record', review.output())
+                self.assertNotIn('one is made now', review.output())
+                marks = review.recorder('bookmarks', Bookmarks).wait()
+                self.assertIn('the log breaks off at record', marks.texts[-1])
+                self.assertTrue(marks.errors[-1])
+                self.assertAlmostEqual(length, marks.times[-1])
+        self.assertGreater(length, 0.5 * self.length / self.rate())
+
+    def test_programs_replay_what_is_whole_of_a_damaged_log(self):
+        path = self.copied()
+        turned = bytearray(read(path))
+        turned[-1] ^= 1
+        write(path, bytes(turned))
+        task = os.path.join(os.path.dirname(path), 'task.yaml')
+        write(task, b'scene: boxes\nstages: [{let_go: all}]\n')
+        for program, words in (('replay', 'hashes compared'), ('report', 'the report is of what there is')):
+            told = subprocess.run([roslib.packages.find_node('meshless_surgery', program)[0], path] +
+                                  (['--task', task, '--out', os.path.dirname(path)] if program == 'report' else []),
+                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True, timeout=LONG, check=False)
+            self.assertIn(told.returncode, (0, 1), told.stdout)
+            self.assertIn('the log breaks off at record', told.stdout)
+            self.assertIn(words, told.stdout)
+        with open(path + '.report/report.json', encoding='utf-8') as report:
+            self.assertIn('breaks off', json.load(report)['lost'])
 
     def test_it_plays_stands_still_and_ends(self):
         with ReviewNode(session_directory=self.folder, log='monday') as review:

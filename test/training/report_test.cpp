@@ -49,7 +49,7 @@ bool balanced(const std::string& text, char open, char close) {
 
 TEST(Report, NeedsNoNetworkAndHasAllValues) {
   const auto played = aSession();
-  ReportHead head{"Ann <x>", "log", true, {{"earlier", 40.0, false, {{"time", 3.0}}}}};
+  ReportHead head{"Ann <x>", "log", true, "", {{"earlier", 40.0, false, {{"time", 3.0}}}}};
   const std::string html = reportHtml(played->training, head), json = reportJson(played->training, head),
                     csv = reportCsv(played->training);
   EXPECT_EQ(std::string::npos, html.find("http"));

@@ -121,6 +121,38 @@ Hung hang(const Material& material, double stiffness, double spacing, double sec
   return hung;
 }
 
+TEST(Attachment, SaysWhatItJoinedAndWhere) {
+  for (const double spacing : {0.008, 0.02, 0.04}) {
+    SCOPED_TRACE(spacing);
+    World world(noGround());
+    add(world, held(boxOf("above", Vec3(0.1, 0.1, 0.04), Vec3(0, 0, 0.2), elastic(1e6), spacing)));
+    add(world, boxOf("below", Vec3(0.06, 0.06, 0.04), Vec3(0.01, 0.005, 0.2 - 0.04 - 0.002), elastic(), spacing));
+    const AttachReply made = attach(world, attachment("below", "above", 0.004, 1e5));
+    ASSERT_EQ(1u, made.patches.size());
+    EXPECT_DOUBLE_EQ(made.area, made.patches[0].area);
+    EXPECT_LT((made.patches[0].middle - Vec3(0.01, 0.005, 0.178)).norm(), 1e-3);
+    EXPECT_NE(std::string::npos, made.text().find(" cm^2, in 1 patch: ")) << made.text();
+  }
+  // The feet of an arch, whose one leg is shorter; and all of it.
+  World world(noGround());
+  BodyDef arch = test::defOf(shapes::arch(), "arch");
+  arch.pose.rotation = Quat(Eigen::AngleAxisd(0.05, Vec3::UnitY()));
+  arch.spacing = 0.015;
+  add(world, arch);
+  AttachCommand feet = attachment("arch", "world", 0.0, 1e5);
+  feet.region = Region::below(Plane{Vec3::UnitZ(), Vec3(0, 0, 0.015)});
+  const AttachReply made = attach(world, feet);
+  ASSERT_EQ(2u, made.patches.size());
+  EXPECT_NEAR(made.area, made.patches[0].area + made.patches[1].area, 1e-12);
+  EXPECT_GE(made.patches[0].area, made.patches[1].area);
+  EXPECT_GT(made.patches[1].area, 0.0025);  // 5 by 6 cm
+  const double x[] = {made.patches[0].middle.x(), made.patches[1].middle.x()};
+  EXPECT_NEAR(-0.075, std::min(x[0], x[1]), 0.01);
+  EXPECT_NEAR(0.075, std::max(x[0], x[1]), 0.01);
+  EXPECT_NE(std::string::npos, made.text().find(" cm^2, in 2 patches: ")) << made.text();
+  EXPECT_EQ(1u, attach(world, attachment("arch", "world", 0.0, 1e5)).patches.size());
+}
+
 TEST(Attachment, ABlockHangsLowerByItsWeightOverStiffnessAndArea) {
   for (const bool is_elastic : {false, true})
     for (const double stiffness : {2e5, 2e6}) {

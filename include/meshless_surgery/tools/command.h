@@ -147,6 +147,13 @@ struct AttachReply {
   std::string name;
   std::size_t fibres = 0;
   double area = 0.0;  // [m^2] that they stand for
+  /// Of the surface, that hang together, the largest first.
+  struct Patch {
+    double area = 0.0;           // [m^2]
+    Vec3 middle = Vec3::Zero();  // [m]
+  };
+  std::vector<Patch> patches;
+  std::string text() const;  // for users
 };
 struct DetachReply {
   std::size_t gone = 0, left = 0;  // fibres

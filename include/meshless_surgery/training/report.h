@@ -16,6 +16,7 @@ struct EarlierReport {
 struct ReportHead {
   std::string trainee, log;
   bool hashes_met = true;              // the replay came to the recorded states
+  std::string lost;                    // a sentence, where the log is not whole
   std::vector<EarlierReport> earlier;  // oldest first
 };
 

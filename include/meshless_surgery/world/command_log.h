@@ -20,7 +20,10 @@ struct ReplayReport {
   std::uint64_t last_step = 0;  // the world's count at the end
   std::uint64_t hash = 0;       // at the end
   bool ended = false;  // the recording was ended; else its process was: what came after the last record is lost
-  std::uint64_t lost_bytes = 0;  // at the end of the file, of a record that was not written in full
+  std::uint64_t lost_bytes = 0;  // of a record that was not written in full, or from a damaged one on
+  std::string damage;            // which record that is, and what is wrong with it
+  /// A sentence for users where the log is not whole; else empty.
+  std::string whatIsLost() const;
 
   /// The first hash that is not the recorded one; what follows was still done.
   struct Difference {
@@ -29,10 +32,10 @@ struct ReplayReport {
   std::optional<Difference> difference;
 };
 
-/// Refuses (kUnreadable) what World::record did not write. The same build gives the same hashes on any number of
-/// threads (1..64). A damaged record in the middle ends the replay with an error.
-/// `after_step` may look at the world and take its events, those of the commands before the step too. It must not change
-/// it otherwise.
+/// Refuses (kUnreadable) what World::record did not write, and a log whose start is damaged. The same build gives the
+/// same hashes on any number of threads (1..64). All whole records before a damaged one are replayed.
+/// `after_step` may look at the world and take its events, those of the commands before the step too. It must not
+/// change it otherwise.
 Result<ReplayReport> replay(std::istream& log, int threads = 1,
                             const std::function<void(World& world)>& after_step = {});
 

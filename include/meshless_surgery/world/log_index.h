@@ -51,6 +51,8 @@ class LogIndexWriter {
   void heard(const std::vector<Event>& events);
   /// After each step, before anything else is done with the world; always by the same thread.
   void stepped(World& world);
+  /// The log ends here.
+  void end();
 
  private:
   struct Known;
@@ -63,20 +65,22 @@ class LogIndexWriter {
   std::uint64_t at_ = 0, bytes_ = 0;
   double since_state_ = 0.0, since_moment_ = 0.0;  // [s]
   std::optional<double> clock_;                    // [s] of the thread, at the last step
-  bool undone_ = false, had_tools_ = false;
+  bool undone_ = false;
   std::vector<Event> heard_;
 };
 
 class LogIndex {
  public:
-  /// Of a file, which it keeps to read states from. Refuses kUnreadable what no writer wrote; what was lost when the
-  /// writer was killed is not there.
+  /// Of a file, which it keeps to read states from. Refuses kUnreadable what no writer wrote, and what was damaged;
+  /// what was lost when the writer was killed is not there.
   static Result<LogIndex> read(std::unique_ptr<std::istream> file);
   LogIndex(LogIndex&&) noexcept;
   LogIndex& operator=(LogIndex&&) noexcept;
   ~LogIndex();
 
   std::uint64_t startHash() const;  // World::stateHash() at the log's start
+  std::uint64_t end() const;        // steps that it tells of
+  bool ended() const;               // by its writer; else the file breaks off
   const std::vector<LogMoment>& moments() const;
   const std::vector<LogEvent>& events() const;
 
@@ -84,8 +88,9 @@ class LogIndex {
     SavedWorldPtr state;
     std::uint64_t at = 0;  // steps since the log's start
   };
-  /// The last one that was kept after so many steps or fewer, but after more than `above`; null where there is none.
-  Result<Kept> stateAt(std::uint64_t at, std::uint64_t above = 0);
+  /// The last one that was kept after so many steps or fewer, but after more than `above`; null where there is none, or
+  /// the file has changed since it was read.
+  Kept stateAt(std::uint64_t at, std::uint64_t above = 0);
 
  private:
   struct Contents;

@@ -1,6 +1,7 @@
 // A log of commands that is played: step by step from its start, or from any state that was kept of it.
 #pragma once
 
+#include <string_view>
 #include <vector>
 
 #include "meshless_surgery/world/command_log.h"
@@ -10,7 +11,8 @@ namespace meshless {
 
 class LogPlayer {
  public:
-  /// Reads all of it; refuses (kUnreadable) what World::record did not write.
+  /// Reads all of it up to the first record that is not whole, which the report tells of; refuses (kUnreadable) what
+  /// World::record did not write, and a damaged start.
   static Result<LogPlayer> open(std::istream& log);
   LogPlayer(LogPlayer&&) noexcept;
   LogPlayer& operator=(LogPlayer&&) noexcept;
@@ -27,7 +29,7 @@ class LogPlayer {
   /// A cut is undone before the next step.
   bool undoesNext() const;
   /// The commands that come next, and a step; false at the end, where nothing is left but the last commands.
-  Result<bool> step(World& world);
+  bool step(World& world);
 
   /// Of what was played since it was opened; without the last step and hash.
   const ReplayReport& report() const { return report_; }
@@ -35,9 +37,11 @@ class LogPlayer {
  private:
   struct Record;
   LogPlayer();
-  Status apply(World& world, const Record& record);
+  /// A record, `step` being of the one before and `most` steps accepted between the two; throws ArchiveFault.
+  void add(std::string_view body, std::uint64_t& step, double& most);
 
-  std::vector<Record> records_;
+  SavedWorldPtr start_;
+  std::vector<Record> records_;  // that follow it
   std::size_t next_ = 0;
   std::uint64_t at_ = 0, end_ = 0;
   double step_rate_ = 0.0;

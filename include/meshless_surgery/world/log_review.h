@@ -17,20 +17,20 @@ class LogReview {
   /// The state at the log's start.
   void begin(World& world) { player_.begin(world); }
   /// A step on; false at the end.
-  Result<bool> step(World& world);
+  bool step(World& world);
   /// The state after so many steps since the log's start, up to player().end(): from the last state that was kept
   /// before, or from the present one where that is nearer. How many steps were computed.
   Result<std::uint64_t> seek(World& world, std::uint64_t at);
 
  private:
-  Status goOn(World& world, std::uint64_t at, std::uint64_t& done);
+  std::uint64_t goOn(World& world, std::uint64_t at);
 
   LogPlayer player_;
   LogIndex index_;
 };
 
 /// Plays a log to its end and writes its index; `done` of `end` steps is told now and then.
-Status writeLogIndex(LogPlayer& log, int threads, const LogIndexWriter::Sink& sink,
-                     const std::function<void(std::uint64_t done, std::uint64_t end)>& tell = {});
+void writeLogIndex(LogPlayer& log, int threads, const LogIndexWriter::Sink& sink,
+                   const std::function<void(std::uint64_t done, std::uint64_t end)>& tell = {});
 
 }  // namespace meshless
