@@ -311,7 +311,7 @@ TEST(Clip, WhatDoesNotFitIsRefusedWithNumbersThatSaySo) {
       EXPECT_NEAR(most, 0.5 * clip.opening, 1e-5);
       EXPECT_GT(reach, most);
       EXPECT_NEAR(reach, 0.5 * thick + beside, 2e-5);
-      EXPECT_NEAR(thick, 2.0 * kOuter / std::cos(slant * M_PI / 180.0), 3e-4);
+      EXPECT_LT(thick, 2.0 * kOuter / std::cos(slant * M_PI / 180.0) + 1e-4);
     }
     EXPECT_LT(clip.opening, 0.012) << slant;
     EXPECT_GT(clip.opening, slant > 0.0 ? 0.007 : 0.0069) << slant;
