@@ -46,6 +46,13 @@ const char* const kPressed[] = {"../calculix/press_1_nu30", "../calculix/press_3
                                 "../calculix/press_1_nu45", "../calculix/press_3_nu45", "../calculix/press_8_nu45",
                                 "../calculix/ball_above_1", "../calculix/ball_above",   "../calculix/ball_beside",
                                 "block_press_3_nu30",       "block_press_3_nu45"};
+// At several places: how the force depends on where the vertices of the surface and the cells lie under the sphere. The
+// edges are those of a user's block, of a cylinder primitive, and finer ones.
+const char* const kPlaced[] = {"../calculix/press_1_nu45", "block_press_3_nu45", "cylinder_press_1_nu45",
+                               "cylinder_press_4_nu45"};
+const double kEdges[] = {0.0, 0.005};  // [m]
+const Vec3 kBeside[] = {Vec3::Zero(), Vec3(0.003, 0, 0), Vec3(0.003, 0.002, 0), Vec3(0.006, 0.002, 0),
+                        Vec3(0.006, 0.006, 0)};
 const char* const kPulled[] = {"pull_nu30", "pull_nu45"};
 const char* const kIncised[] = {"half_cut_0", "half_cut_1",      "half_cut_2",
                                 "half_cut_3", "half_cut_within", "incision_0"};
@@ -209,6 +216,51 @@ bool settledRows(Table& table, const std::string& folder, const std::string& par
   return true;
 }
 
+// The sphere at several places of a surface: the error of its force at each, and of all places how many cells the
+// radius of the contact has, the least error, its mean, the largest, and the RMS.
+bool placeRows(Table& table, const std::string& file, const std::vector<double>& finer) {
+  const Result<TruthCase> truth = readTruthCase(file);
+  if (!truth) {
+    std::fprintf(stderr, "%s\n", truth.error().detail.c_str());
+    return false;
+  }
+  const double contact = std::sqrt(truth->number("sphere_radius") * truth->number("sphere_depth"));
+  for (const double times : finer) {
+    double least = 1e9, most = -1e9, sum = 0.0, squares = 0.0, cells = 0.0, step_ms = 0.0;
+    int count = 0;
+    for (const double edge : kEdges)
+      for (const Vec3& beside : kBeside) {
+        ToolOptions options;
+        options.finer = times;
+        options.edge = edge;
+        options.beside = beside;
+        const Result<ToolResult> result = press(*truth, options);
+        if (!result) {
+          std::fprintf(stderr, "%s\n", result.error().detail.c_str());
+          return false;
+        }
+        const double error = result->ratio - 1.0;
+        table.row("press_place", truth->text("case"), "filled",
+                  shortNumber(1000.0 * result->spacing) + " mm " + std::to_string(result->particles) + " edge " +
+                      shortNumber(1000.0 * edge) + " at " + shortNumber(1000.0 * beside.x()) + " " +
+                      shortNumber(1000.0 * beside.y()) + (result->at_rest ? "" : " not at rest"),
+                  result->step_ms, error);
+        least = std::min(least, error);
+        most = std::max(most, error);
+        sum += error;
+        squares += error * error;
+        cells = contact / result->spacing;
+        step_ms += result->step_ms;
+        ++count;
+      }
+    for (const auto& [name, value] : {std::pair("least", least), std::pair("mean", sum / count),
+                                      std::pair("most", most), std::pair("rms", std::sqrt(squares / count))})
+      table.row(std::string("press_places_") + name, truth->text("case"), "filled",
+                shortNumber(cells) + " cells in the contact's radius", step_ms / count, value);
+  }
+  return true;
+}
+
 // Bodies under tools, in a World with its defaults. The run time is that of a frame. `press`, `pull` and `incised` are
 // errors of the shape; with `_force`, `_tip` and `_mouth` the quotient to the truth, less one.
 bool toolRows(Table& table, const std::string& folder, const std::string& part, const std::vector<double>& finer) {
@@ -238,6 +290,8 @@ bool toolRows(Table& table, const std::string& folder, const std::string& part, 
     for (const double times : finer)
       if (chosen(name))
         read = add("press", name, "_force", [&](const TruthCase& t) { return press(t, {times, 0.0, 0.0}); }) && read;
+  for (const char* name : kPlaced)
+    if (chosen(name)) read = placeRows(table, folder + "/" + name + ".csv", finer) && read;
   for (const char* name : kPulled)
     for (const double times : finer)
       if (chosen(name))

@@ -345,9 +345,9 @@ double fittedOrder(const std::vector<double>& steps, const std::vector<double>& 
   return (n * xy - x * y) / (n * xx - x * x);
 }
 
-Ringing ringing(const Kind& kind, double rate) {
+Ringing ringing(const Kind& kind, double rate, double damping) {
   BodyDef def = block(kind, false);
-  def.material.damping = 0.8;
+  def.material.damping = damping;
   PreparedBody body = *prepareBody(std::move(def));
   const BodyModel& model = *body.model;
   for (Vec3& p : body.state.positions) p.x() *= 1.04;

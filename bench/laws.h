@@ -44,12 +44,12 @@ double fittedOrder(const std::vector<double>& steps, const std::vector<double>& 
 
 struct Ringing {
   double frequency = 0.0;  // [1/s]
-  double decay = 0.0;      // [1/s]
+  double decay = 0.0;      // [1/s] of the amplitude
   int half_waves = 0;      // seen
 };
 /// Of a free block's length after a stretch of 4 %, in frames of 1/rate [s] and the substeps that the material needs.
 /// Appearance materials: omega h = 0.1 at 1/60 s.
-Ringing ringing(const Kind& kind, double rate);
+Ringing ringing(const Kind& kind, double rate, double damping = 0.8);
 /// [m] of the free end of a block held at the other, at rest.
 double sag(const Kind& kind, double rate);
 

@@ -74,11 +74,11 @@ Result<SettledResult> settle(const TruthCase& truth, const std::string& folder, 
   const double slower =
       1.0 / std::sqrt(stiffnessFactor(*model, body->state, 1.0 / settings.step_rate / settings.max_substeps));
   rate /= slower;
-  body->def.material.damping = 2.0 * rate;
+  body->def.material.damping = options.sleeps ? 10.0 : 2.0 * rate;
   settings.ground.reset();
   settings.gravity = pose.rotation * gravity;
   settings.contact = ContactMethod::kNone;
-  settings.sleep = false;
+  settings.sleep = options.sleeps;
   World world(settings);
   const Result<SpawnReply> added = world.addSceneBody(std::make_shared<const PreparedBody>(std::move(*body)));
   if (!added) return added.error();

@@ -24,6 +24,7 @@ struct SettledOptions {
   double spacing = 0.0;  // [m] 0: by `finer`
   double stiffer = 1.0;  // Young's modulus and gravity over the truth's: the displacements are the same
   int max_substeps = 64;
+  bool sleeps = false;  // in a world with sleep, with the damping of the materials that ship
 };
 
 /// `folder` holds the surface.

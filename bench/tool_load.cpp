@@ -125,9 +125,13 @@ double blockRate(const TruthCase& truth, double height) {
 
 Result<ToolResult> press(const TruthCase& truth, const ToolOptions& options) {
   const Vec3 low = truth.vector("box_min"), high = truth.vector("box_max");
+  const double edge = options.edge > 0.0 ? options.edge : kBlockEdge;
   const WorldSettings settings = quietWorld();
-  const Result<Placed> placed = place(truth, boxMesh(high - low, options.edge > 0.0 ? options.edge : kBlockEdge),
-                                      0.5 * (low + high), options, blockRate(truth, high.z() - low.z()), settings);
+  const Result<Placed> placed =
+      place(truth,
+            truth.text("body") == "cylinder" ? cylinderMesh(high.z() - low.z(), 0.5 * (high.x() - low.x()), edge)
+                                             : boxMesh(high - low, edge),
+            0.5 * (low + high), options, blockRate(truth, high.z() - low.z()), settings);
   if (!placed) return placed.error();
   World world(settings);
   if (const Result<SpawnReply> added = world.addSceneBody(placed->body); !added) return added.error();
@@ -136,7 +140,7 @@ Result<ToolResult> press(const TruthCase& truth, const ToolOptions& options) {
   const double at = truth.has("sphere_at") ? truth.number("sphere_at") : truth.vector("sphere_center").x();
   PushCommand push;
   push.radius = radius;
-  push.position = Vec3(at, 0.0, high.z() + radius + 0.001);
+  push.position = Vec3(at, 0.0, high.z() + radius + 0.001) + options.beside;
   if (const Result<Reply> done = world.apply(push); !done) return done.error();
   push.position.z() = high.z() + radius - depth;
   push.speed = (depth + 0.001) * placed->rate / 10.0;  // in ten time constants

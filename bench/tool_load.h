@@ -21,9 +21,11 @@ struct ToolOptions {
   double finer = 1.0;    // the default spacing over that of the body
   double spacing = 0.0;  // [m] 0: by `finer`
   double edge = 0.0;     // [m] of the surface's triangles as given; 0: 12.5 mm
+  Vec3 beside = Vec3::Zero();  // [m] that the sphere comes down beside the place of the truth
 };
 
-/// The push sphere is lowered onto the block and into it. Force: of the sphere, mean over the last steps.
+/// The push sphere is lowered onto the block or cylinder and into it. Force: of the sphere, mean over the last steps.
+/// Shape and tip are those of `beside` zero.
 Result<ToolResult> press(const TruthCase& truth, const ToolOptions& options);
 
 /// A pick takes the block at the middle of its top and pulls it up. The truth is scaled to the pick's force, and

@@ -101,6 +101,47 @@ def constant(name, text):
     return eval(value, {'__builtins__': {}})  # of numbers and signs
 
 
+def spreads(page):
+    """Of the table of docs/accuracy.md, and of the file that it is made of: cells, least, mean and most of each row."""
+    with open(os.path.join(CHECKOUT, 'bench', 'results', 'accuracy_places.csv')) as file:
+        rows = [line.rstrip().split(',') for line in file]
+    measured = {}
+    for benchmark, case, _, setting, _, error in rows:
+        if benchmark.startswith('press_places_') and benchmark != 'press_places_rms':
+            measured.setdefault((case, float(setting.split()[0])), []).append('%+.0f %%' % (100 * float(error)))
+    return ([row[1:] for row in tableRows('## Where\n' + page.split('### Where the sphere presses')[1].split('\n- ')[0], 'Where')],
+            [['%.2g' % cells] + errors for (_, cells), errors in measured.items()])
+
+
+GREEK = 'alpha|beta|eps|gain|kappa|lambda|mu|omega|phi|sigma|tau|xi'
+
+
+def unknownSymbols(page):
+    """Of the equations: what has an index, a star or a prime, and Greek letters. An index is no part of the symbol."""
+    def bare(symbol):
+        return re.sub(r'_\w+', '', symbol)
+    listed = {bare(symbol) for row in tableRows(page, 'Symbols') for symbol in re.findall(r'`(.*?)`', row[0])}
+    equations = ''.join(re.findall(r'^```\n(.*?)^```', page, re.DOTALL | re.MULTILINE))
+    used = re.findall(r"\b(?:[A-Za-z](?:_\w+|\*|')|(?:%s)\b)" % GREEK, equations)
+    return {bare(symbol) for symbol in used} - listed
+
+
+class AccuracyTest(unittest.TestCase):
+    def testTheSpreadOverPlacesIsThatOfTheFile(self):
+        said, measured = spreads(read('docs/accuracy.md'))
+        self.assertGreater(len(said), 8)
+        self.assertEqual(measured, said)
+
+    def testWhatIsToBeQuotedBoundsEachRow(self):
+        page = read('docs/accuracy.md')
+        quoted = re.search(r'sqrt\(R d\): (.*?) \|', page).group(1)
+        bounds = [(float(cells), float(most)) for most, cells in re.findall(r'\+?(\d+) % with ([\d.]+)', quoted)]
+        self.assertEqual(sorted(bounds, reverse=True), bounds)
+        for cells, least, _, most in spreads(page)[0]:
+            bound = [most for of, most in bounds if float(cells) >= of][0]
+            self.assertLessEqual(max(abs(float(error.split()[0])) for error in (least, most)), bound, cells)
+
+
 class LinkTest(unittest.TestCase):
     def testEveryLinkLeadsToAHeadingOrAFile(self):
         self.assertIn('docs/method.md', pages())
@@ -119,6 +160,15 @@ class PathTest(unittest.TestCase):
 
     def testOneThatIsNotIsFound(self):
         self.assertEqual(['body/soul.h'], missingPaths('(`body/soul.h`), `body/body.h` and src/body/body.cpp'))
+
+
+class SymbolTest(unittest.TestCase):
+    def testEachOfTheEquationsIsInTheTable(self):
+        self.assertEqual(set(), unknownSymbols(read('docs/method.md')))
+
+    def testOneThatIsNotIsFound(self):
+        page = '## Symbols\n\n| symbol | unit | meaning |\n|---|---|---|\n| `x_i`, `h` | m, s | |\n\n```\n(1) y_i = alpha x_i + h* c\'\n```\n'
+        self.assertEqual({'y', 'alpha', 'h*', "c'"}, unknownSymbols(page))
 
 
 class ArchitectureTest(unittest.TestCase):

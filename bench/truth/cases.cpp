@@ -132,9 +132,8 @@ TruthCase stretch(double factor, double nu) {
 }
 
 /// `inner` is how much narrower elements are under the sphere.
-TruthCase pressed(const std::string& name, const Material& material, double depth, double inner,
+TruthCase pressed(const std::string& name, const Material& material, double radius, double depth, double inner,
                   const std::array<std::array<int, 3>, kLevels>& elements) {
-  constexpr double kRadius = 0.025;  // [m]
   TruthCase c;
   c.name = name;
   c.body = "block";
@@ -144,9 +143,9 @@ TruthCase pressed(const std::string& name, const Material& material, double dept
                   {"box_max", "0.05 0.05 0.05"},
                   {"fixed_axis", "z"},
                   {"fixed_below", "0"},
-                  {"sphere_radius", number(kRadius)},
+                  {"sphere_radius", number(radius)},
                   {"sphere_depth", number(depth)},
-                  {"sphere_center", vector({0.0, 0.0, kBlockHeight + kRadius - depth})},
+                  {"sphere_center", vector({0.0, 0.0, kBlockHeight + radius - depth})},
                   {"sphere_contact", "rigid, frictionless, on the face z = 0.05"}};
   c.fixed_axis = 2;
   c.mirrored = {true, true, false};
@@ -157,8 +156,8 @@ TruthCase pressed(const std::string& name, const Material& material, double dept
                        gradedLines(0.0, kBlockHeight, n[2], 0.2, inner)};
   };
   c.prescribed = [](const Vec3&, double) { return Vec3(Vec3::Zero()); };
-  c.sphere.radius = kRadius;
-  c.sphere.center = {0.0, 0.0, kBlockHeight + kRadius};
+  c.sphere.radius = radius;
+  c.sphere.center = {0.0, 0.0, kBlockHeight + radius};
   c.sphere_depth = depth;
   c.load_steps = 8;
   c.samples = gridSamples({-kBlockHalf, -kBlockHalf, 0.0}, {9, 9, 5});
@@ -166,13 +165,39 @@ TruthCase pressed(const std::string& name, const Material& material, double dept
 }
 
 TruthCase indentation(double nu) {
-  return pressed("block_indent", {1e4, nu}, 0.0125, 0.4, {{{4, 4, 4}, {8, 8, 8}, {12, 12, 12}}});
+  return pressed("block_indent", {1e4, nu}, 0.025, 0.0125, 0.4, {{{4, 4, 4}, {8, 8, 8}, {12, 12, 12}}});
 }
 
 /// As soft as tissue, and not as deep.
 TruthCase press(double nu, int millimetres) {
-  return pressed("block_press_" + std::to_string(millimetres), {5e3, nu}, 0.001 * millimetres, 0.8,
+  return pressed("block_press_" + std::to_string(millimetres), {5e3, nu}, 0.025, 0.001 * millimetres, 0.8,
                  {{{4, 4, 4}, {6, 6, 6}, {10, 10, 10}}});
+}
+
+/// The unit square onto the unit disc; the axes stay.
+Vec3 discPoint(const Vec3& p) {
+  return {kBlockHalf * p.x() * std::sqrt(1.0 - 0.5 * p.y() * p.y()),
+          kBlockHalf * p.y() * std::sqrt(1.0 - 0.5 * p.x() * p.x()), p.z()};
+}
+
+/// A cylinder as wide and as high as the block, under the push sphere of a scene that says nothing of it.
+TruthCase pressCylinder(double nu, int millimetres) {
+  TruthCase c = pressed("cylinder_press_" + std::to_string(millimetres), {5e3, nu}, 0.02, 0.001 * millimetres, 0.8,
+                        {{{4, 4, 4}, {6, 6, 6}, {10, 10, 10}}});
+  c.body = "cylinder";
+  c.lines = [](const std::array<int, 3>& n) {
+    return Mesh::Lines{gradedLines(0.0, 1.0, n[0], 0.8, 0.1), gradedLines(0.0, 1.0, n[1], 0.8, 0.1),
+                       gradedLines(0.0, kBlockHeight, n[2], 0.2, 0.8)};
+  };
+  c.map = discPoint;
+  c.samples.clear();
+  for (int i = -4; i <= 4; ++i)
+    for (int j = -4; j <= 4; ++j)
+      for (int k = 0; k <= 4; ++k) {
+        const Vec3 at(0.25 * i, 0.25 * j, kSampleSpacing * k);
+        c.samples.push_back({discPoint(at), at});
+      }
+  return c;
 }
 
 TruthCase organ(double nu) {
@@ -222,6 +247,8 @@ std::vector<TruthCase> allCases() {
                                  press(nu, 1),
                                  press(nu, 3),
                                  press(nu, 8),
+                                 pressCylinder(nu, 1),
+                                 pressCylinder(nu, 4),
                                  organ(nu)};
     for (TruthCase& c : of_nu) {
       c.name += nu == 0.3 ? "_nu30" : "_nu45";

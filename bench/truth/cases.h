@@ -19,7 +19,7 @@ struct SamplePoint {
 
 struct TruthCase {
   std::string name;
-  std::string body;  // bar, block or organ
+  std::string body;  // bar, block, cylinder or organ
   std::string load;  // for readers
   Material material;
   double density = 1000.0;  // [kg/m^3]

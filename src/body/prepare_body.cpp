@@ -106,6 +106,8 @@ Status validate(const BodyDef& def) {
 
 // An open surface with a thickness is a solid.
 Status makeLayer(BodyDef& def) {
+  if (def.thickness == 0.0 && !def.solid)
+    def.notes.push_back("with an open surface it cannot be filled, given a volume or cut as a solid");
   if (def.thickness == 0.0 || def.mesh.empty()) return Done{};
   Result<TriangleMesh> layer = thickened(def.mesh, def.thickness);
   if (!layer) return Error{layer.error().code, "body '" + def.name + "': " + layer.error().detail};
@@ -480,9 +482,11 @@ std::string partsWarning(const BodyModel& model, const Pose& placed) {
   return text.str();
 }
 
-/// What is no size of an organ is most often in other units than metres; empty where it is one.
-std::string sizeWarning(double longest) {
-  if (longest >= kSmallest && longest <= kLargest) return "";
+/// What is no size of an organ is most often in other units than metres; empty where it is one, or has no size.
+std::string sizeWarning(const Points& vertices) {
+  const Box bounds = boundsOf(vertices);
+  const double longest = (bounds.max - bounds.min).maxCoeff();
+  if (!(longest > 0.0 && std::isfinite(longest)) || (longest >= kSmallest && longest <= kLargest)) return "";
   std::ostringstream text;
   text << std::setprecision(3) << "it is " << longest << " m long; organs are " << kSmallest << " to " << kLargest
        << " m";
@@ -496,9 +500,7 @@ std::string sizeWarning(double longest) {
   return text.str();
 }
 
-}  // namespace
-
-Result<PreparedBody> prepareBody(BodyDef def) {
+Result<PreparedBody> prepared(BodyDef def) {
   if (Status made = makeLayer(def); !made) return made.error();
   if (Status status = validate(def); !status) return status.error();
   auto model = std::make_shared<BodyModel>();
@@ -528,8 +530,6 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   const double edge = meanEdgeLength(surface);
   const Box bounds = boundsOf(surface.vertices);
   if (!(edge > 0.0)) return Error{ErrorCode::kUnsuitableShape, "body '" + def.name + "' has no extent"};
-  if (const std::string warning = sizeWarning((bounds.max - bounds.min).maxCoeff()); !warning.empty())
-    def.warnings.push_back(warning);
   const double volume = def.solid ? signedVolume(surface) : 0.0;
   if (def.solid && !(volume > 1e-12 * std::pow(bounds.diagonal(), 3.0))) {
     std::ostringstream text;
@@ -548,6 +548,10 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   }
   if (def.solid && volume / std::pow(model->spacing, 3.0) > static_cast<double>(kMaxParticles)) {
     std::ostringstream text;
+    text << std::setprecision(3);
+    if (!(def.spacing > 0.0) && def.thickness > 0.0)
+      text << "its layer of " << def.thickness << " m takes a spacing of at most " << kWidestLayer * def.thickness
+           << " m: ";
     text << "spacing " << model->spacing << " m would give body '" << def.name << "' about "
          << volume / std::pow(model->spacing, 3.0) << " particles; accepted: up to " << kMaxParticles
          << ", a spacing of at least " << std::cbrt(volume / static_cast<double>(kMaxParticles)) << " m";
@@ -619,6 +623,17 @@ Result<PreparedBody> prepareBody(BodyDef def) {
   updateSurface(*model, body.state);
   body.def = std::move(def);
   body.model = std::move(model);
+  return body;
+}
+
+}  // namespace
+
+Result<PreparedBody> prepareBody(BodyDef def) {
+  const std::string size = sizeWarning(def.mesh.vertices);
+  if (!size.empty()) def.warnings.push_back(size);
+  Result<PreparedBody> body = prepared(std::move(def));
+  // Whatever is refused of it, its size is most often why.
+  if (!body && !size.empty()) return Error{body.error().code, body.error().detail + "; " + size};
   return body;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iomanip>
 #include <iterator>
 #include <map>
 #include <optional>
@@ -234,8 +235,9 @@ bool hasSoundTriangles(const TriangleMesh& mesh) {
 
 std::string volumeNote(double before, double after) {
   std::ostringstream note;
-  note << "the triangles enclosed " << before << " m^3, the surface now encloses " << after << " m^3";
-  if (before > 0.0) note << " (" << std::showpos << 100.0 * (after / before - 1.0) << " %)";
+  note << std::setprecision(3) << "the triangles enclosed " << before << " m^3, the surface now encloses " << after
+       << " m^3";
+  if (after < 2.0 * before) note << " (" << std::showpos << 100.0 * (after / before - 1.0) << " %)";
   return note.str();
 }
 
@@ -271,12 +273,18 @@ std::optional<RepairedMesh> united(const TriangleMesh& mesh, RepairRules rules, 
          << made->volume / kMillilitre << " ml";
     notes.push_back(note.str());
   }
+  if (made->filled > 0)
+    one->warnings.push_back(
+        std::to_string(made->filled) +
+        (made->filled == 1 ? " part is turned inwards as a cavity is, and reaches"
+                           : " parts are turned inwards as cavities are, and reach") +
+        " through the surface of another: tissue fills it; a cavity has to lie inside of the other");
   if (made->swallowed > 0)
-    notes.push_back(std::to_string(made->swallowed) +
-                    (made->swallowed == 1
-                         ? " part inside of another is turned as it is, and became tissue of it"
-                         : " parts inside of others are turned as they are, and became tissue of them") +
-                    " (turned against it, it would be a cavity)");
+    one->warnings.push_back(std::to_string(made->swallowed) +
+                            (made->swallowed == 1
+                                 ? " part inside of another is turned as it is, and became tissue of it"
+                                 : " parts inside of others are turned as they are, and became tissue of them") +
+                            " (turned against it, it would be a cavity)");
   notes.insert(notes.end(), one->notes.begin(), one->notes.end());
   one->notes = std::move(notes);
   return std::move(*one);

@@ -216,8 +216,7 @@ class Repair {
     if (rules_.turn_outwards) turnOutwards();
     dropVertices();
     if (open > 0)
-      note("the surface is open: " + count(open, "edge has", "edges have") +
-           " a triangle on one side only; it cannot be filled, given a volume or cut as a solid");
+      note("the surface is open: " + count(open, "edge has", "edges have") + " a triangle on one side only");
     const std::size_t crossings = rules_.turn_outwards ? countCrossings(points_, triangles_) : 0;
     result_.self_intersecting = crossings > 0;
     if (crossings > 0)

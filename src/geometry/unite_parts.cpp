@@ -314,6 +314,7 @@ class Uniting {
     findOwners();
     UnionFind groups(parts_.size());
     for (const auto& [a, b] : crossing_) groups.join(a, b);
+    result_.filled = filledCavities();
     for (Index c = 0; c < parts_.size(); ++c)
       if (owner_[c] != kNoIndex) groups.join(owner_[c], c);
     std::map<Index, std::vector<Index>> members;
@@ -336,16 +337,25 @@ class Uniting {
  private:
   /// What lies in no other is a solid, however it is turned; what it holds is turned with it.
   void turnOutermost() {
-    std::vector<char> turn(parts_.size(), 0);
+    turned_.assign(parts_.size(), false);
     for (Index c = 0; c < parts_.size(); ++c) {
       Index outermost = c;
       for (const Index outer : containers_[c])
         if (std::abs(parts_[outer].volume) > std::abs(parts_[outermost].volume)) outermost = outer;
-      turn[c] = !parts_[outermost].outwards();
-      result_.turned += turn[c] && outermost == c;
+      turned_[c] = !parts_[outermost].outwards();
+      result_.turned += turned_[c] && outermost == c;
     }
     for (Index c = 0; c < parts_.size(); ++c)
-      if (turn[c]) parts_[c].turn();
+      if (turned_[c]) parts_[c].turn();
+  }
+
+  /// What was turned against a larger solid that it crosses is most often a cavity that reaches through its surface.
+  std::size_t filledCavities() const {
+    std::set<Index> filled;
+    for (const auto& [a, b] : crossing_)
+      if (parts_[a].outwards() && parts_[b].outwards() && turned_[a] != turned_[b])
+        filled.insert(parts_[a].volume < parts_[b].volume ? a : b);
+    return filled.size();
   }
 
   /// Of a cavity the innermost solid that holds it.
@@ -395,6 +405,7 @@ class Uniting {
   std::vector<std::size_t> own_crossings_;
   PartPairs crossing_;
   std::vector<std::vector<Index>> containers_;
+  std::vector<bool> turned_;  // since the file
   std::vector<Index> owner_;  // of each cavity
   UnitedParts result_;
 };

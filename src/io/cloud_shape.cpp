@@ -198,6 +198,7 @@ Result<CloudShape> shapeOfCloud(const Points& cloud, const CloudFilter& filter) 
        << surface->mean_distance << " m";
   made.shape.notes.push_back(note.str());
   made.shape.notes.insert(made.shape.notes.end(), repaired->notes.begin(), repaired->notes.end());
+  made.shape.warnings = std::move(repaired->warnings);
   return made;
 }
 

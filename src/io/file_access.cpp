@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <filesystem>
+#include <set>
 
 #include "meshless_surgery/io/files.h"
 #include "opened_file.h"
@@ -57,18 +58,21 @@ Result<std::string> FileAccess::resolve(const std::string& path, const std::stri
   std::error_code failed;
   const fs::path real = fs::weakly_canonical(wanted, failed);
   const fs::path judged = failed ? wanted.lexically_normal() : real;
-  std::string known;
+  std::set<std::string> known;
   bool allowed = false;
   for (const std::string& folder : folders) {
     std::error_code missing;
     const fs::path real_folder = fs::canonical(folder, missing);
     if (missing) continue;
-    known += (known.empty() ? "" : ", ") + real_folder.string();
+    known.insert(real_folder.string());
     allowed = allowed || isBelow(judged, real_folder);
   }
-  if (!allowed)
+  if (!allowed) {
+    std::string accepted = known.empty() ? "none" : "";
+    for (const std::string& folder : known) accepted += (accepted.empty() ? "" : ", ") + folder;
     return Error{ErrorCode::kForbidden, "'" + path + "' is outside the folders that may be read; accepted: below " +
-                                            (known.empty() ? "none" : known)};
+                                            accepted + (more.empty() ? "" : ", or " + more)};
+  }
   if (failed) return Error{ErrorCode::kUnreadable, "cannot find '" + path + "'"};
   const FileKind kind = fileKind(real.string());
   if (kind == FileKind::kElsewhere) return Error{ErrorCode::kUnreadable, "there is no file '" + path + "'"};

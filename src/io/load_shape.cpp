@@ -45,6 +45,7 @@ Result<LoadedShape> loadShape(const std::string& real_path, double scale, MeshRe
   shape.mesh = std::move(repaired->mesh);
   shape.solid = repaired->solid;
   for (const std::string& note : repaired->notes) shape.notes.push_back(name + ": " + note);
+  for (const std::string& warning : repaired->warnings) shape.warnings.push_back(name + ": " + warning);
   return shape;
 }
 

@@ -503,6 +503,7 @@ class SceneReader {
     def.texture = found->second.texture;
     def.solid = found->second.solid;
     def.notes = found->second.notes;
+    def.warnings.insert(def.warnings.end(), found->second.warnings.begin(), found->second.warnings.end());
     if (def.name.empty()) def.name = fs::path(*real).stem().string();
   }
 
@@ -566,7 +567,10 @@ Status readMaterialFolders(const std::string& scene_folder, const FileAccess& ac
   for (fs::directory_iterator at(beside, failed), end; !failed && at != end; at.increment(failed)) {
     if (at->path().extension() != ".yaml") continue;
     const Result<std::string> real = access.resolve(at->path().string(), "");
-    if (!real) return Done{};
+    if (!real) {
+      materials.warnings.push_back("the materials in '" + beside + "' are not read: " + real.error().detail);
+      return Done{};
+    }
     files[at->path().string()] = *real;
   }
   for (const auto& [name, real] : files)
@@ -616,9 +620,10 @@ Result<SceneDef> readScene(const std::string& file, const FileAccess& access) {
   } catch (const YAML::Exception& e) {
     source.fail(*root, e.what(), "YAML");
   }
-  if (source.fault) return *source.fault;
   scene.warnings.insert(scene.warnings.end(), source.warnings.begin(), source.warnings.end());
-  return scene;
+  if (!source.fault) return scene;
+  for (const std::string& warning : scene.warnings) source.fault->detail += "; " + warning;
+  return *source.fault;
 }
 
 }  // namespace meshless

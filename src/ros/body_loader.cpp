@@ -76,6 +76,7 @@ Result<std::shared_ptr<const PreparedBody>> BodyLoader::load(const SpawnRequest&
     def.texture = std::move(shape->texture);
     def.solid = shape->solid;
     def.notes = std::move(shape->notes);
+    def.warnings = std::move(shape->warnings);
     def.name = stem(*path);
   }
   if (!request.name.empty()) def.name = request.name;
@@ -100,6 +101,7 @@ Result<std::shared_ptr<const PreparedBody>> BodyLoader::load(const CloudRequest&
   left = made->points;
   def.mesh = std::move(made->shape.mesh);
   def.notes = std::move(made->shape.notes);
+  def.warnings = std::move(made->shape.warnings);
   Vec3 low = def.mesh.vertices[0], high = low;
   for (const Vec3& p : def.mesh.vertices) {
     low = low.cwiseMin(p);

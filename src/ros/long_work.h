@@ -95,9 +95,10 @@ struct LongWork : Answers {
     response.duration = answer->reply.duration;
     response.kept_clusters = static_cast<std::uint32_t>(answer->reply.work.kept_clusters);
     response.rebuilt_clusters = static_cast<std::uint32_t>(answer->reply.work.rebuilt_clusters);
-    std::string message = "cut " + joined(answer->reply.cut_bodies) + " into " +
-                          std::to_string(answer->reply.new_bodies.size()) + " pieces; " +
-                          clustersOf(answer->reply.work);
+    std::string message = "no body was cut";
+    if (!answer->reply.cut_bodies.empty())
+      message = "cut " + joined(answer->reply.cut_bodies) + " into " + std::to_string(answer->reply.new_bodies.size()) +
+                " pieces; " + clustersOf(answer->reply.work);
     if (answer->closed_at_once) message += "; the world is paused, so the blades met at once (close_time was not used)";
     for (const std::string& note : answer->reply.notes) message += "; " + note;
     return accept(response, message);

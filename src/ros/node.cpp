@@ -153,6 +153,7 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   FileAccess access;
   access.find_package = [](const std::string& package) { return ros::package::getPath(package); };
   access.folders = {realPath(package_folder)};
+  access.more = "below a folder of the parameter data_folders";
   for (const std::string& folder : settings->data_folders) {
     std::error_code missing;
     if (!fs::is_directory(folder, missing)) {

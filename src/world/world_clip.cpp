@@ -1,6 +1,7 @@
 // Clips: two jaws that close what is hollow between them. Their fibres join opposite walls and draw them together.
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
 #include <optional>
 #include <sstream>
 #include <utility>
@@ -97,7 +98,7 @@ class LineSearch {
 
 std::string metres(double value) {
   std::ostringstream text;
-  text << value;
+  text << std::setprecision(3) << value;
   return text.str();
 }
 
@@ -192,7 +193,7 @@ Result<Reply> World::Impl::apply(const ClipCommand& command) {
     for (int column = 0; column < kAcross; ++column) {
       const double x = ((row + 0.5) / rows - 0.5) * command.width, y = (column + 0.5) * step - half;
       const std::vector<Crossing>& met = lines.through(x, y);
-      double tissue = 0.0;
+      double tissue = 0.0, low = half, high = -half;  // of what is not between the jaws alone
       bool within = true, hollow = false;
       for (std::size_t n = 0; n + 1 < met.size(); ++n) {
         if (met[n].in == met[n + 1].in) continue;
@@ -200,8 +201,11 @@ Result<Reply> World::Impl::apply(const ClipCommand& command) {
         const bool between = met[n].at >= -half && met[n + 1].at <= half;
         const bool touches = met[n].at < half && met[n + 1].at > -half;
         if (met[n].in) {
-          if (touches) tissue += length;
-          if (touches && !between) within = false;
+          if (!touches) continue;
+          tissue += length;
+          low = std::min(low, met[n].at);
+          high = std::max(high, met[n + 1].at);
+          within = within && between;
           continue;
         }
         if (!between) continue;
@@ -218,8 +222,11 @@ Result<Reply> World::Impl::apply(const ClipCommand& command) {
       }
       if (met.size() > 1) thickest = std::max(thickest, met.back().at - met.front().at);
       if (hollow && !within)
-        return Error{ErrorCode::kMissed, "'" + body->name + "' is " + metres(met.back().at - met.front().at) +
-                                             " m thick there; the jaws open to " + metres(command.opening) + " m"};
+        return Error{ErrorCode::kMissed, "'" + body->name + "' reaches " + metres(std::max(high, -low)) +
+                                             " m from the middle of the jaws: it is " + metres(high - low) +
+                                             " m thick there, and its middle " + metres(0.5 * std::abs(high + low)) +
+                                             " m beside theirs; accepted: up to " + metres(half) +
+                                             " m, half of opening, with direction across the vessel"};
       if (hollow && (column == 0 || column + 1 == kAcross))
         return Error{ErrorCode::kMissed, "'" + body->name + "' is wider there than the jaws, which reach across " +
                                              metres(command.opening) + " m"};

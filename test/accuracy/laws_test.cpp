@@ -67,6 +67,13 @@ TEST(Steps, RingingAndDecayAreTheSameAtAnyStep) {
   }
 }
 
+// As docs/reference/materials.md says of `damping`: speed decays at it, an amplitude at half of it, beside what decays
+// without.
+TEST(Steps, AnAmplitudeDecaysAtHalfOfTheDamping) {
+  for (const Kind& kind : kinds())
+    EXPECT_NEAR(ringing(kind, 960.0, 1.8).decay - ringing(kind, 960.0, 0.8).decay, 0.5, 0.05) << kind.name;
+}
+
 TEST(Steps, SagIsTheSameAtAnyStep) {
   for (const Kind& kind : kinds()) {
     const double finest = sag(kind, 1920.0);

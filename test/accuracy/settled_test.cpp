@@ -30,6 +30,17 @@ TEST(Settled, TheSurfaceOfABentBarWithin1PercentAndSmooth) {
   EXPECT_LT(result.slope, 0.02);
 }
 
+TEST(Settled, WhatFallsAsleepIsWithinAThousandthOfItsRest) {
+  SettledOptions options;
+  const Result<TruthCase> truth = readTruthCase(std::string(CALCULIX_FOLDER) + "/bar.csv");
+  ASSERT_TRUE(truth.ok()) << truth.error().detail;
+  const double rest = settle(*truth, CALCULIX_FOLDER, options)->tip;
+  options.sleeps = true;
+  const Result<SettledResult> asleep = settle(*truth, CALCULIX_FOLDER, options);
+  EXPECT_EQ(asleep->moving, 0.0) << "it sleeps";
+  EXPECT_NEAR(asleep->tip, rest, 1e-3 * rest);
+}
+
 // A spacing that divides neither the body nor the way to its clamp is as good as any.
 TEST(Settled, FinerIsNotWorse) {
   for (const double finer : {1.1, 1.26}) EXPECT_LT(settled("bar_awkward_260", finer).error, 0.005) << finer;

@@ -1,6 +1,8 @@
 // Bodies under tools, at the defaults, through World::step, against CalculiX.
 #include "tool_load.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 namespace meshless::bench {
@@ -20,6 +22,27 @@ TEST(Tools, TissueLiesOnTheSphereAndNotUnderItsTangents) {
     const ToolResult result = pressed("press_3_nu30", finer);
     EXPECT_NEAR(result.tip, 1.0, 0.03) << finer;
     EXPECT_NEAR(result.ratio, 1.0, 0.12) << finer;
+  }
+}
+
+// Wherever the sphere comes down and however fine the surface is, by the cells in the radius of the contact
+// (docs/accuracy.md#where-the-sphere-presses).
+TEST(Tools, TheForceOfTheSphereSpreadsByThePlaceAsFarAsThePageSays) {
+  for (const char* name : {CALCULIX_FOLDER "/press_1_nu45", TRUTH_FOLDER "/block_press_3_nu45",
+                           TRUTH_FOLDER "/cylinder_press_1_nu45", TRUTH_FOLDER "/cylinder_press_4_nu45"}) {
+    const Result<TruthCase> truth = readTruthCase(std::string(name) + ".csv");
+    ASSERT_TRUE(truth.ok()) << truth.error().detail;
+    const double contact = std::sqrt(truth->number("sphere_radius") * truth->number("sphere_depth"));
+    for (const double finer : {1.0, 1.26})
+      for (const double edge : {0.0, 0.005})
+        for (const Vec3& beside : {Vec3(0, 0, 0), Vec3(0.003, 0.002, 0), Vec3(0.006, 0.006, 0)}) {
+          const Result<ToolResult> result = press(*truth, {finer, 0.0, edge, beside});
+          ASSERT_TRUE(result.ok()) << result.error().detail;
+          const double cells = contact / result->spacing;
+          const double bound = cells >= 1.26 ? 0.1 : cells >= 0.95 ? 0.3 : cells >= 0.65 ? 0.55 : 1.5;
+          EXPECT_NEAR(result->ratio, 1.0, bound)
+              << name << ", " << cells << " cells, edge " << edge << ", beside " << beside.transpose();
+        }
   }
 }
 

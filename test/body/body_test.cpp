@@ -123,6 +123,45 @@ TEST(PrepareBody, WarnsOfPartsThatHangTogetherWithNothing) {
   }
 }
 
+// Millimetres taken for metres, with a wall or a clamp in metres: what is refused then is refused for its size.
+TEST(PrepareBody, WhatIsRefusedAndHasNoSizeOfAnOrganIsRefusedWithThatSize) {
+  TriangleMesh sheet;
+  sheet.vertices = {Vec3(0, 0, 0), Vec3(180, 0, 0), Vec3(180, 180, 0), Vec3(0, 180, 0)};
+  sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
+  BodyDef layer = test::defOf(sheet);
+  layer.solid = false;
+  layer.thickness = 0.05;
+  layer.material.youngs_modulus = 4500.0;
+  BodyDef held = test::defOf(boxMesh(Vec3(180.0, 90.0, 90.0), 4, 2, 2));
+  held.fixed.push_back(HeldRegion(Vec3::Constant(200.0), Vec3::Constant(201.0)));
+  BodyDef fine = test::defOf(boxMesh(Vec3(180.0, 90.0, 90.0), 4, 2, 2));
+  fine.spacing = 0.01;
+  for (const auto& [def, reason] :
+       {std::pair(&layer, "its layer of 0.05 m takes a spacing of at most 0.175 m"),
+        std::pair(&held, "holds nothing of it"), std::pair(&fine, "spacing 0.01 m would")}) {
+    const Result<PreparedBody> refused = prepareBody(*def);
+    ASSERT_FALSE(refused.ok()) << reason;
+    EXPECT_NE(refused.error().detail.find(reason), std::string::npos) << refused.error().detail;
+    EXPECT_NE(refused.error().detail.find("units: mm, or scale: 0.001 makes it 0.18 m long"), std::string::npos)
+        << refused.error().detail;
+  }
+}
+
+TEST(PrepareBody, AnOpenSurfaceIsNoSolidUnlessItBecomesALayer) {
+  TriangleMesh sheet;
+  sheet.vertices = {Vec3(0, 0, 0), Vec3(0.1, 0, 0), Vec3(0.1, 0.1, 0), Vec3(0, 0.1, 0)};
+  sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
+  for (const double thickness : {0.0, 0.01}) {
+    BodyDef def = test::defOf(sheet);
+    def.solid = false;
+    def.thickness = thickness;
+    std::string notes;
+    for (const std::string& note : test::prepared(def).def.notes) notes += note + "; ";
+    EXPECT_EQ(notes.find("cannot be filled, given a volume or cut") == std::string::npos, thickness > 0.0) << notes;
+    EXPECT_EQ(notes.find("is the middle of a layer") == std::string::npos, thickness == 0.0) << notes;
+  }
+}
+
 TEST(PrepareBody, ABallHasItsCentreOfMassInTheMiddle) {
   const PreparedBody body = prepared(test::ball("ball", Vec3::Zero()));
   EXPECT_LT(measureBody(*body.model, body.state).centre_of_mass.norm(), 0.0005);

@@ -94,6 +94,23 @@ TEST(Mend, ALargeHoleIsFilled) {
   }
 }
 
+// A share of next to nothing is no number: "+4.1e+17 %".
+TEST(Mend, AChangeOfVolumeIsAShareOnlyWhereItIsOne) {
+  for (const bool flat : {false, true}) {
+    TriangleMesh mesh = boxMesh(Vec3(0.1, 0.1, 0.1), 1, 1, 1);
+    if (flat)  // encloses nothing, but for rounding
+      mesh = shapes::moved(
+          {{Vec3(0, 0, 0), Vec3(0.1, 0, 0), Vec3(0.1, 0.1, 0), Vec3(0, 0.1, 0)}, {{0, 1, 2}, {0, 2, 3}}, {}},
+          shapes::anyPose());
+    else
+      shapes::append(mesh, boxMesh(Vec3(0.1, 0.1, 0.1), 1, 1, 1), Vec3(0.05, 0, 0));
+    const auto repaired = repairMesh(mesh, MeshRepair::kWrap);
+    ASSERT_TRUE(repaired.ok()) << repaired.error().detail;
+    EXPECT_TRUE(says(*repaired, "m^3, the surface now encloses")) << notesOf(*repaired);
+    EXPECT_EQ(says(*repaired, " %)"), !flat) << notesOf(*repaired);
+  }
+}
+
 // The time that a patch takes grows with the square of its rim.
 TEST(Mend, AHoleOfThousandsOfEdgesIsLeftOpen) {
   for (const Index edges : {100u, 3001u}) {

@@ -30,6 +30,7 @@ TriangleMesh together(const std::vector<std::pair<TriangleMesh, Vec3>>& parts) {
 std::string notesOf(const RepairedMesh& mesh) {
   std::string all;
   for (const std::string& note : mesh.notes) all += note + "; ";
+  for (const std::string& warning : mesh.warnings) all += "warning: " + warning + "; ";
   return all;
 }
 
@@ -156,7 +157,7 @@ TEST(UniteParts, InwardsIsACavityAndOutwardsIsTissue) {
     const auto swallowed =
         mended(turned(together({{lump, Vec3(0.02, 0, 0)}, {ball(), Vec3::Zero()}})), all, 1e-9, "lump");
     EXPECT_EQ(swallowed.components, 1u);
-    EXPECT_TRUE(says(swallowed, "1 part inside of another is turned as it is")) << notesOf(swallowed);
+    EXPECT_TRUE(says(swallowed, "warning: 1 part inside of another is turned as it is")) << notesOf(swallowed);
     // An island in a cavity, a cavity of a part that is swallowed.
     mended(turned(together({{ball(), Vec3::Zero()}, {hole, Vec3::Zero()}, {ball(0.02), Vec3::Zero()}})),
            all - inner + volumeOfBall(0.02), 1e-9, "island");
@@ -167,6 +168,25 @@ TEST(UniteParts, InwardsIsACavityAndOutwardsIsTissue) {
   // With none it is a cavity, however it is turned.
   const auto kept = repairMesh(together({{ball(), Vec3::Zero()}, {lump, Vec3::Zero()}}), MeshRepair::kNone);
   EXPECT_NEAR(signedVolume(kept->mesh), all - inner, 1e-9 * all);
+}
+
+// Walls of segmentations are thin, and their cavities reach through them. Lobes that are turned anyhow are no cavities
+// of each other, but nothing tells them apart.
+TEST(UniteParts, ACavityThatReachesThroughTheSurfaceIsFilledWithAWarning) {
+  const std::string filled = "warning: 1 part is turned inwards as a cavity is, and reaches through the surface";
+  for (const bool inside_out : {false, true}) {
+    const auto repaired = [&](const TriangleMesh& inner, double shift) {
+      const TriangleMesh both = together({{ball(0.04), Vec3::Zero()}, {inner, Vec3(shift, 0, 0)}});
+      return *repairMesh(inside_out ? shapes::turnedInsideOut(both) : both, MeshRepair::kMend);
+    };
+    const TriangleMesh hole = shapes::turnedInsideOut(ball(0.03));
+    const RepairedMesh through = repaired(hole, 0.0103), inside = repaired(hole, 0.003),
+                       lobe = repaired(ball(0.03), 0.0103);
+    EXPECT_TRUE(says(through, filled)) << notesOf(through);
+    EXPECT_GT(signedVolume(through.mesh), volumeOfBall(0.04)) << "as it is said";
+    EXPECT_TRUE(inside.warnings.empty()) << notesOf(inside);
+    EXPECT_TRUE(lobe.warnings.empty()) << notesOf(lobe);
+  }
 }
 
 TEST(UniteParts, CavitiesThatOverlapAreOneAndAThirdPartFillsThem) {

@@ -847,6 +847,14 @@ TEST_F(Access, EverythingElseIsForbidden) {
   EXPECT_EQ(refusal(folder.file("secret/none.obj")), ErrorCode::kForbidden);
 }
 
+TEST_F(Access, WhatIsForbiddenIsToldWhereFilesMayLieEachFolderOnceAndWhatAddsMore) {
+  access.folders.push_back(folder.file("allowed") + "/");
+  access.more = "below a folder of the parameter data_folders";
+  const std::string detail = access.resolve("/etc/passwd", "/").error().detail;
+  EXPECT_EQ(detail, "'/etc/passwd' is outside the folders that may be read; accepted: below " + folder.file("allowed") +
+                        ", " + folder.file("package") + ", or below a folder of the parameter data_folders");
+}
+
 TEST_F(Access, LinksAreFollowedBeforeTheyAreJudged) {
   fs::create_symlink(folder.file("secret/a.obj"), folder.file("allowed/link.obj"));
   fs::create_directory_symlink(folder.file("secret"), folder.file("allowed/way"));

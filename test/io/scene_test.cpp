@@ -323,7 +323,16 @@ TEST_F(Scene, MaterialsAreKnownFromThePackageTheFolderBesideAndTheSceneItself) {
   EXPECT_EQ(scene.materials.size(), 3u);
   // A folder beside the scene that may not be read is not.
   access.folders = {folder.file("package")};
-  EXPECT_EQ(good("bodies: [{primitive: {sphere: 1}, material: firm}]\n").bodies[0].material.alpha, 0.8);
+  const SceneDef without = good("bodies: [{primitive: {sphere: 1}, material: firm}]\n");
+  EXPECT_EQ(without.bodies[0].material.alpha, 0.8);
+  // That it is not is said, above all where a name is missing for it.
+  ASSERT_EQ(without.warnings.size(), 1u);
+  const std::string skipped = "the materials in '" + folder.file("materials") + "' are not read: '";
+  EXPECT_EQ(without.warnings[0].find(skipped), 0u) << without.warnings[0];
+  folder.write("materials/a.yaml", "firmer: {alpha: 0.85}\n");
+  const Error missing = bad("bodies: [{primitive: {sphere: 1}, material: firmer}]\n");
+  EXPECT_TRUE(says(missing, "unknown material 'firmer'")) << missing.detail;
+  EXPECT_TRUE(says(missing, skipped)) << missing.detail;
   // A fault in a file of materials is named with that file.
   folder.write("package/config/materials/z.yaml", "soft:\n  alpha: 2\n");
   EXPECT_TRUE(says(bad("bodies: []\n"), "z.yaml:2: alpha is 2"));

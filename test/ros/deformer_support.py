@@ -11,8 +11,8 @@ import roslaunch.config
 import roslib.packages
 import rospy
 import rosunit
-from genpy.dynamic import generate_dynamic
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
+from meshless_surgery.crtk import StringStamped, operating_state as OperatingState  # noqa: F401: for those who import this
 from meshless_surgery.msg import Event, State
 from meshless_surgery.srv import (Attach, Clip, Cut, Detach, GetBody, Hash, Incise, LoadState, Lock, MovePick, Observe, Pick, Probe, Push,
                                   Release, Remove, Report, SaveState, SetMaterial, Spawn, SpawnCloud, StartTask, Step, Unclip)
@@ -29,11 +29,6 @@ TYPES = {
 }
 # Messages and services of the other node: review_test.py has their laws.
 OF_REVIEW = ('Bookmarks', 'Play', 'Review', 'Seek')
-HEADER = '=' * 80 + '\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n'
-# As in crtk_msgs, which is not needed: the topics' types and sums are the same.
-CRTK = generate_dynamic('crtk_msgs/operating_state', 'std_msgs/Header header\nstring state\nbool is_homed\nbool is_busy\n' + HEADER)
-CRTK.update(generate_dynamic('crtk_msgs/StringStamped', 'std_msgs/Header header\nstring string\n' + HEADER))
-OperatingState, StringStamped = CRTK['crtk_msgs/operating_state'], CRTK['crtk_msgs/StringStamped']
 # A bound for things that should have happened long before; no test measures time.
 LONG = 120.0
 

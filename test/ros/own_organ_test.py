@@ -68,6 +68,24 @@ class OwnOrganTest(PageTestCase):
         self.assertGreater(min(volumes), 200)
         self.assertIn('of it is held', log)
 
+    def test_a_hollow_organ_grows_by_as_much_as_the_page_says(self):
+        stiff, grown = re.search(r'With r = 4 cm, t = 4 mm and 1 kPa, E = (\d+) kPa grows by (\d+) %', self.page).groups()
+        modulus, soft, formula = re.search(r'of liver \(([\d.]+) kPa\), 100 Pa make (\d+) %, where the formula has (\d+)', self.page).groups()
+        self.write('hollow.yaml', 'world: {ground: none, gravity: [0, 0, 0], contact: none}\nbodies:\n' + ''.join(
+            '  - {name: %s, primitive: {sphere: 0.04}, thickness: 0.004, cavities: {pressure: %s}, pose: {position: [%s, 0, 0]},\n'
+            '     material: {youngs_modulus: %s, poissons_ratio: 0.45, density: 1060, damping: 30}}\n' % body
+            for body in (('stiff', 1000, 0, 1e3 * float(stiff)), ('soft', 100, 1, 1e3 * float(modulus)))))
+        self.write('hollow.py', "import rospy\nfrom meshless_surgery import Surgeon\nrospy.init_node('hollow')\nsurgeon = Surgeon('/deformer')\n"
+                                "surgeon.step(1200)\nfor body in surgeon.state().bodies:\n"
+                                "    rest = surgeon.body(body.name, rest=True).cavities[0].volume\n"
+                                "    print('%s %.1f' % (body.name, 100 * (body.cavities[0].volume / rest - 1)))\n")
+        with self.running(self.node('$PWD/hollow.yaml', paused='true')):
+            said = dict(line.split() for line in self.good('python3 hollow.py').splitlines())
+        self.assertAlmostEqual(float(grown), float(said['stiff']), delta=0.7)
+        self.assertAlmostEqual(float(soft), float(said['soft']), delta=1.0)
+        for pressure, of, growth in ((1000, stiff, grown), (100, modulus, formula)):
+            self.assertAlmostEqual(float(growth), 100 * 3 * pressure * 0.04 * 0.55 / (2 * 1e3 * float(of) * 0.004), delta=0.5)
+
     def loaded(self, *clients, **files):
         """What the node says of the changed files, and the clients meanwhile."""
         for name, content in files.items():
@@ -82,9 +100,11 @@ class OwnOrganTest(PageTestCase):
                                               '(0, -1, 0.5), reach=(0, 1, 0), normal=(0, 0, 1)')
         far = self.files['cut.py'].replace('0.03), max_distance=0.1', '0.5), max_distance=0.05')
         lobe = moved(self.organ, 1.0, (0, 0, 15))
+        lumen = [t[::-1] for t in moved(self.organ, 0.9, (-2, 13, -84))]
         half = [t for t in self.organ if max(corner[2] for corner in t) < -890]
         self.said_of({
             '`units: mm` forgotten': lambda: self.loaded(organ_yaml=no_units),
+            'the same with a `thickness`': lambda: self.loaded(organ_yaml=no_units + '    thickness: 0.004\n'),
             '`pose` forgotten': lambda: self.loaded(organ_yaml=re.sub(r'    pose.*\n', '', scene)),
             'a lobe and its organ in one file': lambda: self.loaded(organ_stl=stl(self.organ + lobe)),
             'the same with `repair: none`':
@@ -95,6 +115,7 @@ class OwnOrganTest(PageTestCase):
             'a kind of file that is not read':
                 lambda: self.loaded(organ_yaml=scene.replace('organ.stl', 'organ.glb'), organ_glb='x'),
             'too fine': lambda: self.loaded(organ_yaml=scene.replace('resolution: medium', 'spacing: 0.0015')),
+            'the lumen reaches through the wall': lambda: self.loaded(organ_stl=stl(self.organ + lumen), organ_yaml=self.files['look.yaml']),
             'a misspelt material or key': lambda: self.loaded(organ_yaml=scene.replace('elastic_liver', 'elastc_liver')),
             'a cut or a pick beside the tissue': lambda: self.loaded('cut.py', 'far.py', cut_py=beside, far_py=far),
         })

@@ -158,6 +158,10 @@ class RobotPageTest(PageTestCase):
         self.assertTrue(3 < int(up) < 20, said)
         self.assertTrue(0.2 < float(most) < 10.0, said)
 
+    def test_the_blades_cut_by_topics_alone(self):
+        with self.running(self.node_of_the_page()):
+            self.assertEqual('the scissors are ENABLED\ncut into: liver.1 liver.2\n', self.good('python3 blades.py'))
+
     def script(self, old='', new='', **parameters):
         self.assertIn(old, self.files['robot.py'])
         self.write('robot.py', self.files['robot.py'].replace(old, new))
@@ -218,11 +222,12 @@ class OwnPackagePageTest(PageTestCase):
         super().setUp()
         self.workspace = os.path.join(self.folder, 'workspace')
         package = os.path.join(self.workspace, 'src', 'my_trainer')
-        for folder in ('launch', 'scenes', 'tasks', 'meshes'):
+        for folder in ('launch', 'scenes', 'tasks', 'materials', 'meshes'):
             os.makedirs(os.path.join(package, folder), exist_ok=True)
         blocks = dict(re.findall(r'^`([\w/]+\.(?:xml|txt|launch|yaml))`[^`]*(?:`[^`\n]+`[^`]*)?```\w+\n(.*?)^```', self.page,
                                  re.DOTALL | re.MULTILINE))
-        self.assertEqual({'package.xml', 'CMakeLists.txt', 'launch/train.launch', 'scenes/first.yaml', 'tasks/lift.yaml'}, set(blocks))
+        self.assertEqual({'package.xml', 'CMakeLists.txt', 'launch/train.launch', 'scenes/first.yaml', 'materials/tissue.yaml', 'tasks/lift.yaml'},
+                         set(blocks))
         for name, text in blocks.items():
             self.write('workspace/src/my_trainer/' + name, text)
 
@@ -234,19 +239,27 @@ class OwnPackagePageTest(PageTestCase):
         with open(name, 'w') as file:
             file.write(text.replace(old, new))
 
-    def train(self):
-        return "bash -c 'cd workspace && source devel/setup.bash && exec %s rviz:=false'" % self.command('roslaunch my_trainer')
+    def train(self, space='devel'):
+        return "bash -c 'cd workspace && source %s/setup.bash && exec %s rviz:=false'" % (space, self.command('roslaunch my_trainer'))
 
-    def said_at_launch(self):
-        with self.running(self.train()) as end:
+    def said_at_launch(self, space='devel'):
+        with self.running(self.train(space)) as end:
             return end()
 
+    def without_data_folders(self):
+        self.change('launch/train.launch', '<arg name="data_folders" value="[$(find my_trainer)]"/>', '')
+
+    def with_a_material(self):
+        self.without_data_folders()
+        return self.said_at_launch()
+
     def with_a_mesh(self, allowed):
+        self.change('scenes/first.yaml', 'flap_skin', 'elastic_skin')
         shutil.copy(os.path.join(PACKAGE, 'config', 'meshes', 'block.obj'), os.path.join(self.workspace, 'src', 'my_trainer', 'meshes'))
         self.change('scenes/first.yaml', 'primitive: {box: [0.12, 0.06, 0.01]}', 'file: ../meshes/block.obj')
         self.change('scenes/first.yaml', '    fixed: [{box: {min: [-0.07, -0.04, -0.01], max: [-0.05, 0.04, 0.02]}}]\n', '')
         if not allowed:
-            self.change('launch/train.launch', '<arg name="data_folders" value="[$(find my_trainer)]"/>', '')
+            self.without_data_folders()
         return self.said_at_launch()
 
     def of_another_body(self):
@@ -257,13 +270,24 @@ class OwnPackagePageTest(PageTestCase):
         self.good('cd workspace && ' + self.command('catkin_make'))
         with self.running(self.train()):
             task = rospy.wait_for_message('/deformer/task', TaskState, LONG)
+            self.assertEqual(0.03, rospy.get_param('/deformer/tools/scissors/length'))
         self.assertEqual(('lift', 'ann', ['lift', 'lay down']), (task.task, task.trainee, task.stages))
+        self.assertIn('-d /of/mine.rviz ', self.good("bash -c 'cd workspace && source devel/setup.bash && "
+                                                     "roslaunch --args /rviz my_trainer train.launch rviz_config:=/of/mine.rviz'"))
         self.assertNotIn('accepted', self.with_a_mesh(True))
         self.said_of({
             '`data_folders` left out, and a mesh in `meshes/`': lambda: self.with_a_mesh(False),
+            '`data_folders` left out, and a material in `materials/`': self.with_a_material,
             'the workspace was not sourced': self.not_sourced,
             "a task of another scene's body": self.of_another_body,
         })
+
+    def test_what_is_installed_is_whole(self):
+        self.with_a_mesh(True)
+        self.change('scenes/first.yaml', 'elastic_skin', 'flap_skin')
+        self.good('cd workspace && ' + self.command('catkin_make') + ' install')
+        shutil.rmtree(os.path.join(self.workspace, 'src'))
+        self.assertNotIn('accepted', self.said_at_launch('install'))
 
     def not_sourced(self):
         with self.running(self.node('package://my_trainer/scenes/first.yaml')) as end:
@@ -282,6 +306,11 @@ class RecordingPageTest(PageTestCase):
         self.check_setup()
         said = self.recorded()
         number = re.search(r'hash \w+', said).group()
+        sizes = {name: 1e-6 * os.path.getsize(os.path.join(self.folder, 'home', 'meshless_surgery', name)) for name in ('monday', 'monday.index')}
+        print('MB: %s' % sizes)
+        start = float(re.search(r'scene `liver` ([\d.]+) MB', self.page).group(1))
+        self.assertAlmostEqual(start, sizes['monday'], delta=0.2 * start)
+        self.assertGreater(sizes['monday.index'], 0.0)
         replayed = self.good(self.command('rosrun meshless_surgery replay'))
         self.assertIn(number, replayed)
         with self.running(self.command('roslaunch meshless_surgery review.launch') + ' rviz:=false', until='/review/seek'):

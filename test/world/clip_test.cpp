@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <sstream>
 #include <string>
@@ -289,6 +290,32 @@ TEST(Clip, RefusesWhatIsWrongAndChangesNothing) {
   refuses(with([&](ClipCommand& c) { c.point.z() += 0.05; }), ErrorCode::kMissed, "0.05");
   refuses(with([&](ClipCommand& c) { c.opening = 0.005; }), ErrorCode::kMissed, "0.00");
   refuses(with([&](ClipCommand& c) { c.point = Vec3(0, 0, 0.311); }), ErrorCode::kMissed, "hollow");
+}
+
+// "is 0.0092 m thick there; the jaws open to 0.012 m" is no reason.
+TEST(Clip, WhatDoesNotFitIsRefusedWithNumbersThatSaySo) {
+  World world = worldOf(tube(true));
+  for (const double slant : {0.0, 20.0, 35.0}) {
+    ClipCommand clip = clipAt(0.02);
+    clip.direction = Vec3(std::sin(slant * M_PI / 180.0), 0, std::cos(slant * M_PI / 180.0));
+    for (clip.opening = 0.007; clip.opening < 0.02; clip.opening += 0.0005) {
+      const auto reply = world.apply(clip);
+      if (reply.ok()) break;
+      SCOPED_TRACE(reply.error().detail);
+      double reach = 0.0, thick = 0.0, beside = 0.0, most = 0.0;
+      ASSERT_EQ(std::sscanf(reply.error().detail.c_str(),
+                            "'vessel' reaches %lf m from the middle of the jaws: it is %lf m thick there, and its "
+                            "middle %lf m beside theirs; accepted: up to %lf m",
+                            &reach, &thick, &beside, &most),
+                4);
+      EXPECT_NEAR(most, 0.5 * clip.opening, 1e-5);
+      EXPECT_GT(reach, most);
+      EXPECT_NEAR(reach, 0.5 * thick + beside, 2e-5);
+      EXPECT_LT(thick, 2.0 * kOuter / std::cos(slant * M_PI / 180.0) + 1e-4);
+    }
+    EXPECT_LT(clip.opening, 0.012) << slant;
+    EXPECT_GT(clip.opening, slant > 0.0 ? 0.007 : 0.0069) << slant;
+  }
 }
 
 TEST(Clip, WakesWhatItHoldsAndNobodyElse) {

@@ -215,6 +215,35 @@ TEST(Physics, SlidingStartsAndGoesAsCoulombSays) {
 }
 
 // A plane of many triangles is a plane.
+/// [m/s^2] of a block of soft tissue at its default spacing on a slope of 20 degrees, after two seconds.
+double softSlide(double friction) {
+  const double angle = 20.0 * M_PI / 180.0;
+  WorldSettings settings;
+  settings.sleep = false;
+  settings.gravity = kG * Vec3(std::sin(angle), 0.0, -std::cos(angle));
+  settings.ground_friction = friction;
+  World world(settings);
+  BodyDef def = test::defOf(boxMesh(Vec3(0.1, 0.1, 0.03), 0.0125), "block");
+  def.pose.translation.z() = 0.0151;
+  def.material.youngs_modulus = 5000.0;
+  def.material.poissons_ratio = 0.45;
+  def.material.damping = 10.0;
+  def.material.friction = friction;
+  add(world, def);
+  run(world, 1.5);
+  const double before = velocity(world).x();
+  run(world, 0.5);
+  return (velocity(world).x() - before) / 0.5;
+}
+
+// docs/method.md has these figures.
+TEST(Physics, SoftTissueSlidesALittleEasierThanCoulombSays) {
+  const double steep = std::tan(20.0 * M_PI / 180.0), across = kG * std::cos(20.0 * M_PI / 180.0);
+  for (const double friction : {0.1, 0.2, 0.3})
+    EXPECT_NEAR(softSlide(friction), across * (steep - friction), 0.05 * across * (steep - friction)) << friction;
+  EXPECT_NEAR(softSlide(0.45), 0.0, 1e-3);
+}
+
 TEST(Physics, SlidingDoesNotSeeEdgesWithinAPlane) {
   const auto most = [](const char* law, Below below) {
     double most = 0.0;

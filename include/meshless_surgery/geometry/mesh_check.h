@@ -33,6 +33,7 @@ struct RepairedMesh {
   std::size_t open_edges = 0;      // with a triangle on one side only
   std::size_t components = 0;      // joined by edges
   std::vector<std::string> notes;
+  std::vector<std::string> warnings;  // of what is most often not meant
 };
 
 /// Merges vertices nearer to each other than 1e-9 of the bounds' diagonal (STL has no shared ones), drops degenerate

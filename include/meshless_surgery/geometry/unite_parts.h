@@ -14,6 +14,7 @@ struct UnitedParts {
   double volume = 0.0;          // [m^3] of what they have become
   std::size_t swallowed = 0;    // parts inside of another that were turned as it is, and so bound nothing
   std::size_t turned = 0;       // parts inside of none that were inside out
+  std::size_t filled = 0;       // parts that were turned against a larger one that they cross, and are tissue now
 
   bool changed() const { return overlapping > 0 || swallowed > 0; }
 };

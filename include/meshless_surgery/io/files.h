@@ -14,6 +14,7 @@ namespace meshless {
 /// Folders below which files are read, links resolved; everything else is refused with kForbidden.
 struct FileAccess {
   std::vector<std::string> folders;
+  std::string more;  // what else could be allowed, in messages
   /// Folder of a package:// name, or empty where there is none. Not set: package:// is refused.
   std::function<std::string(const std::string& package)> find_package;
 
@@ -46,12 +47,12 @@ Result<TriangleMesh> readMeshFile(const std::string& real_path, std::vector<std:
 constexpr std::array<std::pair<const char*, double>, 3> kLengthUnits{{{"m", 1.0}, {"cm", 0.01}, {"mm", 0.001}}};
 
 /// A mesh or cloud from a file made into what a body needs: scaled, a cloud turned into a closed surface, repaired as
-/// far as `repair` goes. notes say what was done.
+/// far as `repair` goes. notes say what was done, warnings what is most often not meant.
 struct LoadedShape {
   TriangleMesh mesh;
   TextureMapPtr texture;  // of the mesh as it was read, scaled; null: none, or a note says why it is not used
   bool solid = true;
-  std::vector<std::string> notes;
+  std::vector<std::string> notes, warnings;
 };
 Result<LoadedShape> loadShape(const std::string& real_path, double scale, MeshRepair repair = MeshRepair::kMend);
 
