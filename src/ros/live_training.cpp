@@ -28,6 +28,7 @@ constexpr double kMetricsRate = 10.0;  // [Hz]
 constexpr std::size_t kMostTrainee = 100;
 constexpr int kMostReports = 100000;
 constexpr std::size_t kMostPlaces = 10000;
+constexpr std::size_t kLongestName = 200;  // bytes of a folder's name, before its number
 constexpr double kPlanAbove = 0.003;  // [m] that the plan is drawn beyond the tissue, so that its edge is seen
 constexpr double kPlanLine = 0.0015;  // [m]
 
@@ -204,7 +205,7 @@ struct LiveTraining::Handlers : Answers {
     if (request.trainee.size() > kMostTrainee || request.trainee != printable(request.trainee, kMostTrainee))
       return refuse(response, "start_task",
                     {ErrorCode::kInvalidArgument,
-                     "trainee is '" + printable(request.trainee) + "'; accepted: up to 100 characters in one line"});
+                     "trainee is '" + printable(request.trainee) + "'; accepted: up to 100 bytes of UTF-8 in one line"});
     auto loaded = loadTask(request.task, folders);
     if (!loaded.ok()) return refuse(response, "start_task", loaded.error());
     const std::string name = loaded->task.name;
@@ -301,12 +302,16 @@ struct LiveTraining::Handlers : Answers {
     return accept(response, "wrote " + response.folder + "/report.html");
   }
 
-  /// TRAINEE_TASK and the first number that no folder has.
+  /// TRAINEE_TASK and the first number that no folder has. Letters of all alphabets stay: names are UTF-8.
   std::string freeName(const std::string& of, const std::string& task) const {
     std::string start;
     for (const char c : of.empty() ? task : of + "_" + task)
-      start += std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-' ? c : '_';
-    start = start.substr(0, 80);
+      start += std::isalnum(static_cast<unsigned char>(c)) || (c & 0x80) || c == '_' || c == '-' ? c : '_';
+    if (start.size() > kLongestName) {
+      std::size_t size = kLongestName;
+      while (size > 0 && (start[size] & 0xc0) == 0x80) --size;  // whole letters
+      start.resize(size);
+    }
     for (int number = 1;; ++number) {
       const std::string name = start + "_" + std::to_string(number);
       std::error_code failed;
@@ -326,6 +331,7 @@ struct LiveTraining::Handlers : Answers {
 
   // of the runner's thread
   std::unique_ptr<Training> training;
+    head.date = dateText(std::chrono::system_clock::now());
   std::string trainee;
   bool stopped = false;
   std::vector<Event> events;  // since the last step

@@ -219,6 +219,13 @@ TEST_F(TaskFile, EarlierReportsAreThoseOfTheTrainee) {
   write("b", report("Ann", "resect", "70.5"));
   const std::string oldest = folder_.path() + "/b/report.json";
   std::filesystem::last_write_time(oldest, std::filesystem::last_write_time(oldest) - std::chrono::hours(1));
+  // What has a date is in its order, whenever its file was written.
+  const auto dated = [&](const std::string& score, const std::string& date) {
+    return report("Ann", "resect", score).insert(1, "\"date\": \"" + date + "\", ");
+  };
+  write("y", dated("1", "2026-03-01T14:05:09.250Z"));
+  write("x", dated("2", "2026-03-01T14:05:09.249Z"));
+  write("w", dated("3", "2026-02-28T23:05:09.999Z"));
   write("a", report("Ann", "resect", "60"));
   write("c", report("Bob", "resect", "10"));
   write("d", report("Ann", "incise", "20"));
@@ -227,17 +234,45 @@ TEST_F(TaskFile, EarlierReportsAreThoseOfTheTrainee) {
   write("g", "{}");
   write("h", report("Ann", "resect", "\"many\""));
   const auto found = readEarlierReports(folder_.path(), "Ann", "resect", "e");
-  ASSERT_EQ(2u, found.size());
-  EXPECT_EQ("b", found[0].name);  // the oldest
-  EXPECT_EQ(70.5, found[0].score);
-  EXPECT_EQ("a", found[1].name);
-  EXPECT_EQ((std::map<std::string, double>{{"time", 1.5}}), found[1].values);
+  ASSERT_EQ(5u, found.size());
+  std::vector<EarlierReport> undated;
+  std::string order;
+  for (const EarlierReport& earlier : found)
+    if (earlier.score > 9.0)
+      undated.push_back(earlier);
+    else
+      order += earlier.name;
+  EXPECT_EQ("wxy", order);
+  ASSERT_EQ(2u, undated.size());
+  EXPECT_EQ("b", undated[0].name);  // the oldest
+  EXPECT_EQ(70.5, undated[0].score);
+  EXPECT_EQ("a", undated[1].name);
+  EXPECT_EQ((std::map<std::string, double>{{"time", 1.5}}), undated[1].values);
   EXPECT_TRUE(readEarlierReports(folder_.path() + "/none", "Ann", "resect", "").empty());
 }
 
 // --- those that ship, done by a script
 
 class ShippedTask {
+TEST(Dates, AreInTheOrderOfTime) {
+  const auto at = [](long milliseconds) {
+    return dateText(std::chrono::system_clock::time_point(std::chrono::milliseconds(milliseconds)));
+  };
+  EXPECT_EQ("1970-01-01T00:00:00.000Z", at(0));
+  EXPECT_EQ("2026-03-01T14:05:09.250Z", at(1772373909250));
+  EXPECT_EQ("1969-12-31T23:59:59.999Z", at(-1));
+  std::string before;
+  for (const long time : {0L, 1L, 999L, 1000L, 86399999L, 86400000L, 951782400000L, 1772373909250L}) {
+    EXPECT_LT(before, at(time));
+    EXPECT_TRUE(isDate(at(time))) << at(time);
+    before = at(time);
+  }
+  for (const char* text : {"", "yesterday", "2026-03-01", "2026-13-01T14:05:09Z", "2026-03-01T24:05:09Z",
+                           "2026-03-01T14:05:09", "2026-03-01T14:05:09.25Z", "2026-03-01T14:05:09Z\n"})
+    EXPECT_FALSE(isDate(text)) << text;
+  EXPECT_TRUE(isDate("2026-03-01T14:05:09Z"));
+}
+
  public:
   explicit ShippedTask(const std::string& name) {
     const std::string config = std::string(SOURCE_DIR) + "/config";

@@ -55,6 +55,7 @@ class TrainingTest(unittest.TestCase):
             node.good('step', steps=50)
             node.good('pick', point=Point(0.0, 0.0, 0.1), direction=Vector3(0, 0, -1))  # is not of the task
             node.good('start_task', task='palpate', trainee='Ann B')
+            before = time.strftime('%Y-%m-%dT%H:%M:%S', time.gmtime())
             self.palpate(node)
             answer = node.good('report')
             self.assertTrue(answer.passed, answer.message)
@@ -65,14 +66,40 @@ class TrainingTest(unittest.TestCase):
             with open(os.path.join(again.folder, 'report.html'), encoding='utf-8') as page:
                 self.assertIn('Ann_B_palpate_1', page.read())  # an earlier one
             self.assertFalse(node.call('report', name='../x').success)
-        done = subprocess.run([REPORT, os.path.join(self.folder, 'log'), '--task', 'palpate', '--trainee', 'Ann B', '--out', self.folder],
-                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=LONG, text=True)
+        done = self.report_of_log('--trainee', 'Ann B')
         self.assertEqual(0, done.returncode, done.stdout)
         live, replayed = report_of(answer.folder), report_of(os.path.join(self.folder, 'log.report'))
         for report in (live, replayed):
+        self.assertLess(before, live['date'])
+        self.assertRegex(live['date'], r'^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z$')
+        self.assertIsNone(replayed['date'])
+        self.assertIn('no date', done.stdout)
             del report['log']
         self.assertEqual(live, replayed)  # all digits
 
+        self.assertEqual(2, self.report_of_log('--date', 'yesterday').returncode)
+        self.assertEqual(0, self.report_of_log('--date', '2026-03-01T14:05:09Z').returncode)
+        self.assertEqual('2026-03-01T14:05:09.000Z', report_of(os.path.join(self.folder, 'log.report'))['date'])
+
+    def report_of_log(self, *arguments):
+        return subprocess.run([REPORT, os.path.join(self.folder, 'log'), '--task', 'palpate', '--out', self.folder] + list(arguments),
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=LONG, text=True)
+
+    def test_names_keep_the_letters_of_their_alphabet(self):
+        with self.node(scene='block') as node:
+            for trainee, name in (('李雷', '李雷'), ('韩梅', '韩梅'), ('Zoë Ångström', 'Zoë_Ångström'), ('Иван', 'Иван'), ('ä' * 50, 'ä' * 50)):
+                node.good('start_task', task=self.task_of('block'), trainee=trainee)
+                node.good('step', steps=1)
+                folder = node.good('report').folder
+                self.assertEqual(name + '_own_1', os.path.basename(folder))
+                self.assertEqual(trainee, report_of(folder)['trainee'])
+            self.assertFalse(node.call('start_task', task=self.task_of('block'), trainee='ä' * 51).success)
+
+    def task_of(self, scene):
+        path = os.path.join(self.folder, 'own.yaml')
+        with open(path, 'w') as file:
+            file.write('scene: %s\nstages: [{let_go: all, hold_for: 1}]\n' % scene)
+        return path
     def test_the_task_of_the_parameter_brings_its_scene_and_can_be_stopped(self):
         with self.node(task='retract', trainee='Bob') as node:
             task = rospy.wait_for_message(node.name + '/task', TaskState, LONG)

@@ -17,9 +17,10 @@ struct ReportHead {
   std::string trainee, log;
   bool hashes_met = true;              // the replay came to the recorded states
   std::vector<EarlierReport> earlier;  // oldest first
+  std::string date;                    // when it was done, as dateText() (io/task.h) writes it; empty: not known
 };
 
-/// One object: task, trainee, log, outcome, stages, score, metrics with their goals, events.
+/// One object: task, trainee, log, date, outcome, stages, score, metrics with their goals, events.
 std::string reportJson(const Training& training, const ReportHead& head);
 /// A line a metric: name, unit, value, score, weight, good, bad, pass, passed. Empty where there is nothing.
 std::string reportCsv(const Training& training);
