@@ -69,6 +69,8 @@ const std::vector<MetricRow>& metricTable() {
       {"margin_mean", "m", kHigher, false, "mean of that distance, by area", kOwn},
       {"drops", "1", kLower, false, "picks that ended because their hand's stream fell silent", kOwn},
       {"undos", "1", kLower, false, "cuts that were taken back", kOwn},
+      {"plan_done", "1", kHigher, false,
+       "share of the plan within the body that a cut has come within its tolerance of", kOwn},
       {"torn", "1", kLower, false, "events of attachments that tore", kOwn},
       {"leaks", "1", kLower, false, "filled cavities that were opened", kOwn},
       {"bleeding_time", "s", kLower, false,
@@ -301,3 +303,4 @@ std::vector<MetricValue> Metrics::values(const RestTissue& tissue, std::size_t s
 }
 
 }  // namespace meshless
+  set("plan_done", tissue.planDone());
