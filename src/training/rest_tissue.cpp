@@ -175,9 +175,7 @@ void RestTissue::feed(const TrainingFrame& frame) {
     changed = pieces_[k].number != frame.bodies[k].number || pieces_[k].model != frame.bodies[k].model;
   if (changed) {
     for (const Event& event : frame.events) {
-      if (event.type == EventType::kRemoved)
-        for (const Piece& piece : pieces_)
-          if (piece.name == event.body) gone_.push_back(piece);
+      if (event.removed) gone_.push_back({event.body, 0, event.removed, event.placed});
       if (event.type == EventType::kUndone)  // what it was cut of is whole again
         gone_.erase(std::remove_if(gone_.begin(), gone_.end(),
                                    [&](const Piece& piece) { return isOf(piece.name, event.body); }),
@@ -205,10 +203,10 @@ void RestTissue::begin(const TrainingFrame& frame) {
   for (const TrainingFrame::Body& body : frame.bodies) {
     const Piece piece{body.name, body.number, body.model, body.placed};
     if (plan_ && isOf(body.name, plan_->body)) {
-      const Points outline = planOutlineOn(*plan_, piece.rest());
-      plan_outline_.insert(plan_outline_.end(), outline.begin(), outline.end());
       const Points inside = planPointsIn(*plan_, piece.rest());
       plan_points_.insert(plan_points_.end(), inside.begin(), inside.end());
+      const Points outline = planOutlineOn(*plan_, piece.rest());
+      plan_outline_.insert(plan_outline_.end(), outline.begin(), outline.end());
     }
     if (target_ && isOf(body.name, target_->body)) whole_target_ += targetIn(piece);
   }
@@ -245,7 +243,7 @@ void RestTissue::measureCut() {
       if (distance > plan_->tolerance) off_plan_ += area;
     }
     if (target_) {
-      const double margin = target_->region.height(cut_.points[k]);
+      const double margin = marginOf(target_->region, cut_.points[k]);
       margin_least_ = std::min(margin_least_, margin);
       margin_sum_ += area * margin;
       margin_area_ += area;
@@ -292,9 +290,9 @@ void RestTissue::measureRemoved() {
     }
 }
 
-double RestTissue::planDone() const { return plan_ ? plan_done_ : kNothing; }
 double RestTissue::planRms() const { return plan_area_ > 0.0 ? std::sqrt(plan_squares_ / plan_area_) : kNothing; }
 double RestTissue::planHausdorff() const { return plan_area_ > 0.0 ? plan_most_ : kNothing; }
+double RestTissue::planDone() const { return plan_ ? plan_done_ : kNothing; }
 double RestTissue::offPlanArea() const { return plan_ ? 0.5 * off_plan_ : kNothing; }
 double RestTissue::marginLeast() const { return margin_area_ > 0.0 ? margin_least_ : kNothing; }
 double RestTissue::marginMean() const { return margin_area_ > 0.0 ? margin_sum_ / margin_area_ : kNothing; }
