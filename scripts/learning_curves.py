@@ -4,6 +4,7 @@ import argparse
 import csv
 import os
 import sys
+import unicodedata
 
 from meshless_surgery import curves
 
@@ -29,10 +30,14 @@ def main():
         print('%s is passed over: %s' % (name, why), file=sys.stderr)
     tasks = sorted({run.task for run in runs})
     runs = [run for run in runs if wish.task in (None, run.task)]
+    undated = [run.folder for run in runs if run.date is None]
+    if undated:
+        print('%s: no date in the report; the time of the file is taken, which a copy changes' % ', '.join(undated), file=sys.stderr)
     if not runs:
         parser.error('no report%s in %s; %s' % (' of the task %s' % wish.task if wish.task else '', wish.folder,
                                                 'tasks there: %s' % ', '.join(tasks) if tasks else 'reports are made by ~report and the program report'))
     trainees = sorted({run.trainee for run in runs})
+    wish.experts = [unicodedata.normalize('NFC', name) for name in wish.experts]
     for name in wish.experts:
         if name not in trainees:
             parser.error("--experts: there is no run of '%s'; trainees: %s" % (name, ', '.join(trainees)))

@@ -14,8 +14,8 @@ sys.path.insert(0, os.path.join(CHECKOUT, 'python'))
 from meshless_surgery import curves  # noqa: E402
 
 
-def report(trainee, score, time, force, task='retract', outcome='done', passed=None):
-    return {'format': 1, 'task': task, 'scene': 'liver', 'trainee': trainee, 'log': 'x', 'hashes_met': True, 'first_step': 0,
+def report(trainee, score, time, force, task='retract', outcome='done', passed=None, **more):
+    return {**more, 'format': 1, 'task': task, 'scene': 'liver', 'trainee': trainee, 'log': 'x', 'hashes_met': True, 'first_step': 0,
             'last_step': 10, 'outcome': outcome, 'failed': '', 'score': score, 'pass_mark': 60.0,
             'passed': score >= 60.0 if passed is None else passed, 'stages': [], 'events': [],
             'metrics': [{'name': 'time', 'unit': 's', 'value': time, 'weight': 1.0, 'good': 15.0, 'bad': 60.0, 'score': 50.0},
@@ -63,6 +63,33 @@ class CurvesTest(unittest.TestCase):
         self.assertEqual((4, 2, 3, 40.0, 80.0), (ada['runs'], ada['passed'], ada['first_pass'], ada['first_score'], ada['best']))
         self.assertAlmostEqual((55.0 + 70.0 + 80.0) / 3.0, ada['lately'])
         self.assertIsNone(rows['incise', 'ada']['first_pass'])
+
+    def test_dates_say_what_came_first_and_a_copy_keeps_that(self):
+        for score, date in ((10.0, '2026-03-01T09:00:00.000Z'), (30.0, '2026-03-01T10:00:00Z'), (20.0, '2026-03-01T09:00:00.001Z')):
+            self.put('ada', score, 1.0, -2.0, date=date)
+        copy = os.path.join(tempfile.mkdtemp(), 'copy')
+        self.addCleanup(shutil.rmtree, os.path.dirname(copy))
+        shutil.copytree(self.folder, copy)
+        for age, name in enumerate(sorted(os.listdir(copy))):
+            os.utime(os.path.join(copy, name, 'report.json'), (1e9 + age, 1e9 + age))
+        for folder in (self.folder, copy):
+            self.assertEqual([10.0, 20.0, 30.0], [run.score for run in curves.read(folder)[0]])
+        self.assertEqual('', self.program().stderr)
+
+    def test_a_report_without_a_date_is_named(self):
+        self.put('ada', 10.0, 1.0, -2.0, date='2026-03-01T09:00:00.000Z')
+        self.put('ada', 20.0, 1.0, -2.0, date=None)
+        done = self.program()
+        self.assertEqual(0, done.returncode)
+        self.assertIn('97: no date', done.stderr)
+        self.put('ada', 30.0, 1.0, -2.0, date=20260301)
+        self.assertEqual(1, len(curves.read(self.folder)[1]))
+
+    def test_names_of_any_alphabet_are_told_apart(self):
+        for trainee in ('李雷', '韩梅', 'Zoe\u0308', 'Zo\u00eb'):  # the last two are one, typed on two machines
+            self.put(trainee, 50.0, 1.0, -2.0)
+        self.assertEqual({'李雷': 1, '韩梅': 1, 'Zo\u00eb': 2}, {row['trainee']: row['runs'] for row in curves.table(curves.read(self.folder)[0])})
+        self.assertEqual(0, self.program('--experts', 'Zoe\u0308').returncode)
 
     def test_pass_marks_are_the_experts_mean_and_deviation_towards_the_worse(self):
         self.fill()

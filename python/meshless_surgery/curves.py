@@ -12,6 +12,8 @@ import json
 import math
 import os
 import statistics
+import unicodedata
+from datetime import datetime, timezone
 
 FORMAT = 1       # of report.json
 LAST = 3         # runs that say how good one is now
@@ -19,11 +21,14 @@ COLOURS = ('#1b6ca8', '#c0392b', '#2d8a4e', '#8e44ad', '#d68910', '#16807a', '#7
 
 
 class Run:
-    """One report. `metrics` has what was measured, `goals` (good, bad) of those that count."""
+    """One report. `metrics` has what was measured, `goals` (good, bad) of those that count. `date` is None where the report has none."""
 
     def __init__(self, folder, report):
         self.folder = folder
-        self.task, self.trainee = report['task'], report['trainee'] or '(no name)'
+        self.task, self.trainee = report['task'], unicodedata.normalize('NFC', report['trainee']) or '(no name)'
+        self.date = report.get('date')
+        if not isinstance(self.date, (str, type(None))):
+            raise ValueError('date is %s; accepted: a text as 2026-03-01T14:05:09Z' % self.date)
         self.score, self.passed, self.pass_mark = report['score'], report['passed'], report['pass_mark']
         self.outcome = report['outcome']
         self.metrics = {m['name']: m['value'] for m in report['metrics'] if m['value'] is not None}
@@ -32,7 +37,8 @@ class Run:
 
 
 def read(folder):
-    """The reports in the folders of `folder`, the oldest file first, and a list of (folder, why) of those that are none."""
+    """The reports in the folders of `folder`, the oldest first, and a list of (folder, why) of those that are none. Their dates say
+    which is older; of a report without date that is when its file was written."""
     runs, faults = [], []
     for name in sorted(os.listdir(folder)):
         path = os.path.join(folder, name, 'report.json')
@@ -43,7 +49,10 @@ def read(folder):
                 report = json.load(file)
             if report['format'] != FORMAT:
                 raise ValueError('format is %s; accepted: %d' % (report['format'], FORMAT))
-            runs.append((os.stat(path).st_mtime_ns, name, Run(name, report)))
+            run = Run(name, report)
+            seconds, rest = divmod(os.stat(path).st_mtime_ns, 10 ** 9)
+            written = datetime.fromtimestamp(seconds, timezone.utc).strftime('%Y-%m-%dT%H:%M:%S') + '.%09dZ' % rest
+            runs.append((run.date or written, name, run))
         except (OSError, ValueError, KeyError, TypeError) as fault:
             faults.append((name, 'has no %s' % fault if isinstance(fault, KeyError) else str(fault)))
     return [run for _, _, run in sorted(runs, key=lambda entry: entry[:2])], faults

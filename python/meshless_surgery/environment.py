@@ -222,7 +222,12 @@ class Environment(Base):
     def _info(self):
         """Without the metrics that have no value yet: NaN is not equal to itself."""
         task, metrics = self._seen.task, self._seen.metrics
-        return {'step': self._seen.step, 'time': metrics.time, 'score': task.score, 'stage': task.stage, 'stages': list(task.stages),
+        shown = {}
+        if self._seen.plan:
+            shown['plan'] = numpy.array([_xyz(point) for point in self._seen.plan]).reshape(-1, 2, 3)
+        if self._seen.target.x == self._seen.target.x:
+            shown['target'] = numpy.array(_xyz(self._seen.target))
+        return {**shown, 'step': self._seen.step, 'time': metrics.time, 'score': task.score, 'stage': task.stage, 'stages': list(task.stages),
                 'failed': task.failed, 'passed': task.passed,
                 'metrics': {name: value for name, value in zip(metrics.names, metrics.values) if value == value}}
 

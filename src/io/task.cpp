@@ -1,7 +1,11 @@
 #include "meshless_surgery/io/task.h"
 
+#include <sys/stat.h>
+
 #include <algorithm>
+#include <ctime>
 #include <filesystem>
+#include <regex>
 
 #include "opened_file.h"
 #include "region_yaml.h"
@@ -394,9 +398,25 @@ Result<LoadedTask> readTask(const std::string& file, const std::optional<std::st
   return loaded;
 }
 
+std::string dateText(std::chrono::system_clock::time_point time) {
+  const auto since = std::chrono::floor<std::chrono::milliseconds>(time.time_since_epoch());
+  const std::time_t seconds = std::chrono::floor<std::chrono::seconds>(since).count();
+  std::tm parts{};
+  gmtime_r(&seconds, &parts);
+  char text[64];
+  const std::size_t size = std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &parts);
+  std::snprintf(text + size, sizeof text - size, ".%03dZ", static_cast<int>(since.count() - 1000 * seconds));
+  return text;
+}
+
+bool isDate(const std::string& text) {
+  static const std::regex form("\\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\\d|3[01])T([01]\\d|2[0-3])(:[0-5]\\d){2}(\\.\\d{3})?Z");
+  return std::regex_match(text, form);
+}
+
 std::vector<EarlierReport> readEarlierReports(const std::string& folder, const std::string& trainee,
                                               const std::string& task, const std::string& but) {
-  std::map<std::pair<fs::file_time_type, std::string>, EarlierReport> found;
+  std::map<std::pair<std::string, std::string>, EarlierReport> found;  // by date and name
   std::error_code failed;
   for (fs::directory_iterator at(folder, failed), end; !failed && at != end; at.increment(failed)) {
     const std::string name = at->path().filename().string();
@@ -415,7 +435,11 @@ std::vector<EarlierReport> readEarlierReports(const std::string& folder, const s
       earlier.passed = report["passed"].as<bool>();
       for (const auto& metric : report["metrics"])
         if (!metric["value"].IsNull()) earlier.values[metric["name"].as<std::string>()] = metric["value"].as<double>();
-      found.emplace(std::make_pair(fs::last_write_time(real, missing), name), std::move(earlier));
+      std::string date = report["date"] && !report["date"].IsNull() ? report["date"].as<std::string>() : "";
+      if (struct stat info {}; date.empty() && ::stat(real.c_str(), &info) == 0)
+        date = dateText(std::chrono::system_clock::from_time_t(info.st_mtime) +
+                        std::chrono::milliseconds(info.st_mtim.tv_nsec / 1000000));
+      found.emplace(std::make_pair(date, name), std::move(earlier));
     } catch (const YAML::Exception&) {
     }
   }

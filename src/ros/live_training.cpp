@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <optional>
 
 #include <meshless_surgery/Metrics.h>
 #include <meshless_surgery/Observe.h>
@@ -18,6 +19,7 @@
 
 #include "answers.h"
 #include "meshless_surgery/io/session_folder.h"
+#include "meshless_surgery/training/followed_places.h"
 
 namespace meshless {
 namespace {
@@ -26,10 +28,10 @@ namespace fs = std::filesystem;
 
 constexpr double kMetricsRate = 10.0;  // [Hz]
 constexpr std::size_t kMostTrainee = 100;
+constexpr std::size_t kLongestName = 200;  // bytes of a folder's name, before its number
 constexpr int kMostReports = 100000;
 constexpr std::size_t kMostPlaces = 10000;
-constexpr double kPlanAbove = 0.003;  // [m] that the plan is drawn beyond the tissue, so that its edge is seen
-constexpr double kPlanLine = 0.0015;  // [m]
+constexpr double kPlanLine = 0.002;  // [m] half of it is above the tissue
 
 visualization_msgs::Marker markerOf(const std::string& ns, int type, float r, float g, float b, float a) {
   visualization_msgs::Marker marker;
@@ -49,39 +51,60 @@ void setSize(visualization_msgs::Marker& marker, const Vec3& size) {
   marker.scale.z = size.z();
 }
 
-/// What a trainee sees of the task: plan and target where they are in the tissue at rest, the tray.
-visualization_msgs::MarkerArray toMarkers(const Training& training) {
+/// What of a task lies in the world: plan and target go with their tissue.
+struct ShownTask {
+  std::uint64_t version = ~std::uint64_t{0};
+  std::optional<Target> target;
+  std::optional<Box> tray;
+  FollowedPlaces plan, middle;
+
+  ShownTask() = default;
+  ShownTask(const Training& training, std::uint64_t version_in)
+      : version(version_in), target(training.task().target), tray(training.task().tray) {
+    if (const auto& of = training.task().plan)
+      plan = FollowedPlaces(of->body, training.tissue().planOutline(), of->along.cross(of->out));
+    if (target) middle = FollowedPlaces(target->body, {target->middle()}, Vec3::Zero());
+  }
+
+  /// Ends of lines, two each [m]; none where a line's tissue is gone.
+  Points planNow(const WorldSnapshot& shot) {
+    Points lines = plan.now(shot);
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k + 1 < lines.size(); k += 2) {
+      if (!lines[k].allFinite() || !lines[k + 1].allFinite()) continue;
+      lines[kept++] = lines[k];
+      lines[kept++] = lines[k + 1];
+    }
+    lines.resize(kept);
+    return lines;
+  }
+  /// [m] of the target's middle; NaN where there is none, or its tissue is gone.
+  Vec3 middleNow(const WorldSnapshot& shot) {
+    return target ? middle.now(shot)[0] : Vec3(Vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
+  }
+};
+
+visualization_msgs::MarkerArray toMarkers(ShownTask& shown, const WorldSnapshot& shot) {
   visualization_msgs::MarkerArray array;
   array.markers.emplace_back();
   array.markers.back().action = visualization_msgs::Marker::DELETEALL;
-  const TaskDef& task = training.task();
-  const Points& inside = training.tissue().planPoints();
-  if (task.plan && !inside.empty()) {
-    double s0 = task.plan->length, s1 = 0.0, t0 = 0.0, t1 = -task.plan->depth;
-    for (const Vec3& p : inside) {
-      const double s = (p - task.plan->origin).dot(task.plan->along), t = (p - task.plan->origin).dot(task.plan->out);
-      s0 = std::min(s0, s);
-      s1 = std::max(s1, s);
-      t0 = std::min(t0, t);
-      t1 = std::max(t1, t);
-    }
-    t1 += kPlanAbove;
-    visualization_msgs::Marker plan = markerOf("plan", visualization_msgs::Marker::LINE_STRIP, 0.1f, 0.3f, 1.0f, 1.0f);
+  if (const Points lines = shown.planNow(shot); !lines.empty()) {
+    visualization_msgs::Marker plan = markerOf("plan", visualization_msgs::Marker::LINE_LIST, 0.1f, 0.3f, 1.0f, 1.0f);
     plan.scale.x = kPlanLine;
-    for (const auto& [s, t] : {std::make_pair(s0, t1), {s1, t1}, {s1, t0}, {s0, t0}, {s0, t1}})
-      plan.points.push_back(toPoint(task.plan->origin + s * task.plan->along + t * task.plan->out));
+    for (const Vec3& p : lines) plan.points.push_back(toPoint(p));
     array.markers.push_back(std::move(plan));
   }
-  if (task.target && task.target->region.kind == Region::Kind::kSphere) {
+  if (const Vec3 middle = shown.middleNow(shot);
+      middle.allFinite() && shown.target->region.kind == Region::Kind::kSphere) {
     visualization_msgs::Marker target = markerOf("target", visualization_msgs::Marker::SPHERE, 0.9f, 0.75f, 0.2f, 0.6f);
-    target.pose.position = toPoint(task.target->region.centre);
-    setSize(target, Vec3::Constant(2.0 * task.target->region.radius));
+    target.pose.position = toPoint(middle);
+    setSize(target, Vec3::Constant(2.0 * shown.target->region.radius));
     array.markers.push_back(std::move(target));
   }
-  if (task.tray) {
+  if (shown.tray) {
     visualization_msgs::Marker tray = markerOf("tray", visualization_msgs::Marker::CUBE, 0.3f, 0.7f, 0.4f, 0.2f);
-    tray.pose.position = toPoint(0.5 * (task.tray->min + task.tray->max));
-    setSize(tray, task.tray->max - task.tray->min);
+    tray.pose.position = toPoint(0.5 * (shown.tray->min + shown.tray->max));
+    setSize(tray, shown.tray->max - shown.tray->min);
     array.markers.push_back(std::move(tray));
   }
   return array;
@@ -138,15 +161,25 @@ struct LiveTraining::Handlers : Answers {
   void changed(World& world, double dt) {
     if (!training || stopped || !(dt > 0.0)) return;
     const std::size_t stage = training->progress().stage();
+    const double planned = training->tissue().planDone();
     const bool was_over = training->begun() && training->over(), had_begun = training->begun();
     const Status fed = training->feed(frameOf(world, std::exchange(events, {}), training->wants()));
     if (!fed.ok()) {
       rejections.count("~task", fed.error().detail);
       training.reset();
       ++version;
-    } else if (!had_begun || stage != training->progress().stage() || was_over != training->over()) {
+    } else if (!had_begun || stage != training->progress().stage() || was_over != training->over() ||
+               (training->task().plan && planned != training->tissue().planDone())) {
       ++version;
     }
+  }
+
+  /// The world as it is now, with the tissue that something of the task is shown in.
+  WorldSnapshot see(World& world, SnapshotWants wants) {
+    const std::uint64_t present = version.load();
+    if (shown.version != present) shown = training ? ShownTask(*training, present) : ShownTask();
+    wants.particles = wants.particles || (training && (training->task().plan || training->task().target));
+    return world.snapshot(wants);
   }
 
   void fill(meshless_surgery::TaskState& state, meshless_surgery::Metrics& now) const {
@@ -164,6 +197,7 @@ struct LiveTraining::Handlers : Answers {
       if (std::isfinite(task.limits.measured.force)) state.force_limit = task.limits.measured.force;
       state.score = training->score();
       state.passed = training->passed();
+      state.plan_done = training->tissue().planDone();
       now.time = training->metrics().time();
       now.held_for = training->progress().heldFor();
       for (MetricValue& value : training->values()) {
@@ -177,21 +211,24 @@ struct LiveTraining::Handlers : Answers {
 
   void publish(const ros::WallTimerEvent&) {
     const bool news = !said_any || version.load() != said_version;
-    if (!news && metrics_topic.getNumSubscribers() == 0) return;
+    const bool seen = markers_topic.getNumSubscribers() > 0;
+    if (!news && !seen && metrics_topic.getNumSubscribers() == 0) return;
     meshless_surgery::TaskState state;
     meshless_surgery::Metrics now;
-    visualization_msgs::MarkerArray markers;
+    std::optional<WorldSnapshot> shot;
     std::uint64_t present = 0;
-    const Status looked = runner.look([&](World&) {
+    const Status looked = runner.look([&](World& world) {
       fill(state, now);
-      if (training && news) markers = toMarkers(*training);
+      if (news || seen) shot = see(world, {});
       present = version.load();
     });
     if (!looked.ok()) return;
     state.header.stamp = now.header.stamp = ros::Time::now();
     state.header.frame_id = now.header.frame_id = world_frame;
-    if (news) {
-      task_topic.publish(state);
+    if (news) task_topic.publish(state);
+    // Also where nothing moves: who comes late is to find what is there now.
+    if (shot) {
+      visualization_msgs::MarkerArray markers = toMarkers(shown, *shot);
       for (visualization_msgs::Marker& marker : markers.markers) marker.header = state.header;
       markers_topic.publish(markers);
     }
@@ -205,7 +242,7 @@ struct LiveTraining::Handlers : Answers {
     if (request.trainee.size() > kMostTrainee || request.trainee != printable(request.trainee, kMostTrainee))
       return refuse(response, "start_task",
                     {ErrorCode::kInvalidArgument,
-                     "trainee is '" + printable(request.trainee) + "'; accepted: up to 100 characters in one line"});
+                     "trainee is '" + printable(request.trainee) + "'; accepted: up to 100 bytes of UTF-8 in one line"});
     auto loaded = loadTask(request.task, folders);
     if (!loaded.ok()) return refuse(response, "start_task", loaded.error());
     const std::string name = loaded->task.name;
@@ -237,11 +274,11 @@ struct LiveTraining::Handlers : Answers {
                     {ErrorCode::kInvalidArgument, std::to_string(request.bodies.size()) + " bodies and " +
                                                       std::to_string(request.particles.size()) +
                                                       " particles; accepted: one body a particle, up to 10000"});
-    std::shared_ptr<const WorldSnapshot> shot;
+    std::optional<WorldSnapshot> shot;
     const Status done = runner.look([&](World& world) {
       SnapshotWants wants;
       wants.particles = !request.bodies.empty();
-      shot = std::make_shared<const WorldSnapshot>(world.snapshot(wants));
+      shot = see(world, wants);
       fill(response.task, response.metrics);
     });
     if (!done.ok()) return refuse(response, "observe", done.error());
@@ -259,6 +296,8 @@ struct LiveTraining::Handlers : Answers {
           place = body.particles[request.particles[k]];
       response.points.push_back(toPoint(place));
     }
+    for (const Vec3& p : shown.planNow(*shot)) response.plan.push_back(toPoint(p));
+    response.target = toPoint(shown.middleNow(*shot));
     response.task.header.stamp = response.metrics.header.stamp = ros::Time::now();
     response.task.header.frame_id = response.metrics.header.frame_id = world_frame;
     return accept(response, "step " + std::to_string(shot->step));
@@ -289,6 +328,7 @@ struct LiveTraining::Handlers : Answers {
     if (!there) return refuse(response, "report", {ErrorCode::kMissed, "no task was begun; start_task begins one"});
     if (name.empty()) name = freeName(head.trainee, task);
     head.log = name;
+    head.date = dateText(std::chrono::system_clock::now());
     head.earlier = readEarlierReports(folders.reports, head.trainee, task, name);
     done = runner.look(look);
     if (!done.ok()) return refuse(response, "report", done.error());
@@ -302,12 +342,16 @@ struct LiveTraining::Handlers : Answers {
     return accept(response, "wrote " + response.folder + "/report.html");
   }
 
-  /// TRAINEE_TASK and the first number that no folder has.
+  /// TRAINEE_TASK and the first number that no folder has. Letters of all alphabets stay: names are UTF-8.
   std::string freeName(const std::string& of, const std::string& task) const {
     std::string start;
     for (const char c : of.empty() ? task : of + "_" + task)
-      start += std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-' ? c : '_';
-    start = start.substr(0, 80);
+      start += std::isalnum(static_cast<unsigned char>(c)) || (c & 0x80) || c == '_' || c == '-' ? c : '_';
+    if (start.size() > kLongestName) {
+      std::size_t size = kLongestName;
+      while (size > 0 && (start[size] & 0xc0) == 0x80) --size;  // whole letters
+      start.resize(size);
+    }
     for (int number = 1;; ++number) {
       const std::string name = start + "_" + std::to_string(number);
       std::error_code failed;
@@ -333,6 +377,8 @@ struct LiveTraining::Handlers : Answers {
   std::vector<Event> events;  // since the last step
 
   std::atomic<std::uint64_t> version{0};  // of what ~task says
+
+  ShownTask shown;  // of the thread of the timer and the services
 
   // of the timer
   std::uint64_t said_version = 0;

@@ -1,5 +1,7 @@
 #include "task_text.h"
 
+#include <cmath>
+
 #include <QStringList>
 
 namespace meshless {
@@ -17,6 +19,7 @@ QString taskText(const meshless_surgery::TaskState& task) {
     if (task.time_limit > 0.0) limits << QString("%1 s").arg(task.time_limit);
     if (task.force_limit > 0.0) limits << QString("%1 N").arg(task.force_limit);
     if (!limits.isEmpty()) lines << "Limits: " + limits.join(", ");
+    if (std::isfinite(task.plan_done)) lines << QString("Plan: %1 % is cut").arg(100.0 * task.plan_done, 0, 'f', 0);
   } else if (!task.failed.empty()) {
     lines << "<b>Failed</b>: " + text(task.failed);
   } else {

@@ -38,13 +38,14 @@ int main(int argc, char** argv) {
       "log, the task begins anew there: the report is of the last time. Exit status: 0 passed, 1 not passed, 2 no "
       "report "
       "could be made.");
-  std::string log_file, task_name, out = ".", trainee;
+  std::string log_file, task_name, out = ".", trainee, date;
   double until = 1e300;
   int threads = 1;
   app.add_option("log", log_file, "the log")->required()->check(CLI::ExistingFile);
   app.add_option("--task", task_name, "a name of config/tasks, or a task file")->required();
   app.add_option("--out", out, "the folder of reports")->capture_default_str();
   app.add_option("--trainee", trainee, "whose report it is; earlier ones of the same name are compared with it");
+  app.add_option("--date", date, "when it was done, which the log does not know: as in 2026-03-01T14:05:09Z, in UTC");
   app.add_option("--until", until, "[s] after the task's start: what comes later does not count");
   app.add_option("--threads", threads, "1..64; the result does not depend on it")->capture_default_str();
   try {
@@ -53,6 +54,9 @@ int main(int argc, char** argv) {
     return app.exit(e) == 0 ? 0 : 2;  // --help is no error
   }
 
+  if (!date.empty() && !meshless::isDate(date))
+    return refuse("--date is '" + date + "'; accepted: a date and time in UTC, as in 2026-03-01T14:05:09Z");
+  if (date.size() == 20) date.insert(19, ".000");  // of the length of all others, for their order
   const bool is_file = task_name.find('/') != std::string::npos || fs::path(task_name).extension() == ".yaml";
   const std::string task_file = is_file ? task_name : configFolder() + "/tasks/" + task_name + ".yaml";
   auto loaded = meshless::readTask(task_file, std::nullopt, meshless::FileAccess());
@@ -78,7 +82,7 @@ int main(int argc, char** argv) {
   if (const meshless::Status fits = meshless::SessionFolder::checkName(name); !fits.ok())
     return refuse(fits.error().detail);
   const std::string lost = replayed->whatIsLost();
-  meshless::ReportHead head{trainee, log_name, !replayed->difference, lost, {}};
+  meshless::ReportHead head{trainee, log_name, !replayed->difference, lost, {}, date};
   head.earlier = meshless::readEarlierReports(out, trainee, training.task().name, name);
   const meshless::SessionFolder folder((fs::path(out) / name).string());
   const std::pair<const char*, std::string> files[] = {{"report.json", meshless::reportJson(training, head)},
@@ -92,6 +96,7 @@ int main(int argc, char** argv) {
               training.progress().stage(), training.task().stages.size(), training.metrics().time(), training.score(),
               training.task().pass_mark, training.passed() ? "passed" : "not passed");
   if (!training.progress().failed().empty()) std::printf("failed: %s\n", training.progress().failed().c_str());
+  if (date.empty()) std::printf("no date: a log has none; --date gives the report one, for learning curves\n");
   if (!lost.empty()) std::printf("%s; the report is of what there is\n", lost.c_str());
   if (replayed->difference)
     std::printf("DIFFERENT from step %" PRIu64 " on: the report is of another session than the one that was recorded\n",

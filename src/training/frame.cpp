@@ -52,12 +52,10 @@ bool isOf(const std::string& body, const std::string& whole) {
   return body.compare(0, whole.size(), whole) == 0 && (body.size() == whole.size() || body[whole.size()] == '.');
 }
 
-TrainingFrame::Strain strainOf(const BodyModel& model, const Points& positions, double limit) {
-  TrainingFrame::Strain strain;
-  double all = 0.0, beyond = 0.0;
+std::vector<double> strainsOf(const BodyModel& model, const Points& positions) {
+  std::vector<double> strains(model.clusters.size(), 0.0);
   for (Index c = 0; c < model.clusters.size(); ++c) {
     const ClusterRest& rest = model.shape.clusters[c];
-    all += rest.mass;
     if (!rest.linear_rank) continue;
     // Of a crumb of tissue little is told by the corners of its cell.
     if (model.lattice && (model.lattice->cells[c].samples == kNoSample || model.lattice->cells[c].isBridge(c)))
@@ -72,12 +70,9 @@ TrainingFrame::Strain strainOf(const BodyModel& model, const Points& positions, 
     const Vec3 squares = Eigen::SelfAdjointEigenSolver<Mat3>()
                              .computeDirect(deformation.transpose() * deformation, Eigen::EigenvaluesOnly)
                              .eigenvalues();
-    const double largest = (squares.cwiseMax(0.0).cwiseSqrt().array() - 1.0).abs().maxCoeff();
-    strain.largest = std::max(strain.largest, largest);
-    if (largest > limit) beyond += rest.mass;
+    strains[c] = (squares.cwiseMax(0.0).cwiseSqrt().array() - 1.0).abs().maxCoeff();
   }
-  if (all > 0.0) strain.volume = beyond / all * model.rest_volume;
-  return strain;
+  return strains;
 }
 
 TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants& wants) {
@@ -104,15 +99,11 @@ TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants&
     frame.tools.push_back({ToolKind::kScissors, 0, false, "", blades.origin, orientationOf(blades),
                            blades.origin + blades.length * blades.x_axis, kShaft, 0.0});
   }
-  if (frame.sampled && wants.strain_limit) frame.strain.emplace();
   for (const BodySnapshot& body : shot.bodies) {
-    frame.bodies.push_back({body.name, body.number, body.model, body.placed, Vec3::Zero()});
+    frame.bodies.push_back({body.name, body.number, body.model, body.placed, Vec3::Zero(), {}});
     if (!frame.sampled) continue;
     if (wants.centres) frame.bodies.back().centre = centreOfMass(*body.model, body.particles);
-    if (!wants.strain_limit) continue;
-    const TrainingFrame::Strain strain = strainOf(*body.model, body.particles, *wants.strain_limit);
-    frame.strain->largest = std::max(frame.strain->largest, strain.largest);
-    frame.strain->volume += strain.volume;
+    if (wants.strains) frame.bodies.back().strains = strainsOf(*body.model, body.particles);
   }
   for (const AttachmentSnapshot& joint : shot.attachments)
     frame.joints.push_back(

@@ -1,7 +1,10 @@
 #include "meshless_surgery/training/metrics.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
+
+#include "meshless_surgery/geometry/nearest.h"
 
 namespace meshless {
 namespace {
@@ -47,9 +50,11 @@ const std::vector<MetricRow>& metricTable() {
       {"impulse", "N s", kLower, false, "integral of the largest force of a tool over time", kNeuro},
       {"force_time_above", "s", kLower, false, "time in which the largest force of a tool is above the limit", kNeuro},
       {"strain_peak", "1", kLower, false,
-       "largest |stretch - 1| along a principal direction in any cell or cluster, ten times a second", kOwn},
-      {"strained_volume", "m^3", kLower, false, "largest volume at rest that is strained beyond the limit at a time",
+       "most by which |stretch - 1|, the largest of the principal directions, grows in any cell or cluster beyond what it "
+       "had before any tissue was touched; ten times a second",
        kOwn},
+      {"strained_volume", "m^3", kLower, false,
+       "largest volume at rest in which that growth is beyond the limit at a time", kOwn},
       {"volume_removed", "m^3", kLower, false,
        "volume at rest of the target's body, or without a target of any, that was removed or lies in the tray", kNeuro},
       {"healthy_share", "1", kLower, false, "share of the volume removed that is not of the target", kNeuro},
@@ -64,6 +69,8 @@ const std::vector<MetricRow>& metricTable() {
        kOwn},
       {"off_plan_area", "m^2", kLower, false,
        "area of one side of the cut that is farther from the plan than its tolerance", "LapGym: Scheikl et al. 2023"},
+      {"plan_done", "1", kHigher, false,
+       "share of the plan within the body that a cut has come within its tolerance of", kOwn},
       {"margin_least", "m", kHigher, false,
        "least distance at rest of the cut from the target; below 0 it goes through it", kOwn},
       {"margin_mean", "m", kHigher, false, "mean of that distance, by area", kOwn},
@@ -72,8 +79,8 @@ const std::vector<MetricRow>& metricTable() {
       {"torn", "1", kLower, false, "events of attachments that tore", kOwn},
       {"leaks", "1", kLower, false, "filled cavities that were opened", kOwn},
       {"bleeding_time", "s", kLower, false,
-       "time in which a piece of a vessel has been cut and bears no clip; vessels are the bodies that stages want "
-       "clips on",
+       "time in which a piece of a vessel has been cut, is held or attached somewhere and bears no clip; vessels are the "
+       "bodies that stages want clips on",
        kOwn},
       {"forbidden_contacts", "1", kLower, false,
        "times that a tool came to where it must not be, or that forbidden tissue was cut", kUsual},
@@ -128,12 +135,8 @@ void Metrics::feed(const TrainingFrame& frame) {
     force_for_ += frame.dt;
     if (force_ > limits_.force) force_above_ += frame.dt;
   }
-  if (frame.strain) {
-    strain_known_ = true;
-    strain_peak_ = std::max(strain_peak_, frame.strain->largest);
-    strained_ = std::max(strained_, frame.strain->volume);
-  }
   feedEvents(frame);
+  feedStrain(frame);
   crossings_.feed(frame.tools);
   if (bleeds(frame)) bled_for_ += frame.dt;
   if (!limits_.forbidden.empty()) feedForbidden(frame);
@@ -187,7 +190,9 @@ void Metrics::feedEvents(const TrainingFrame& frame) {
         ++torn_;
         break;
       case EventType::kLeak:
-        leaks_ += event.text.find(" is open") != std::string::npos;
+        // Pieces of one body, NAME.1 and NAME.2, each have a part of the same cavity.
+        if (event.text.find(" is open") != std::string::npos)
+          opened_.emplace(event.step, event.body.substr(0, event.body.rfind('.')), event.cavity);
         break;
       case EventType::kLifted:
         drops_ += event.pick != 0;
@@ -195,6 +200,46 @@ void Metrics::feedEvents(const TrainingFrame& frame) {
       default:
         break;
     }
+}
+
+void Metrics::feedStrain(const TrainingFrame& frame) {
+  touched_any_ = touched_any_ || force_ > kPressing ||
+                 std::any_of(frame.events.begin(), frame.events.end(), [](const Event& event) {
+                   return event.type == EventType::kPicked || event.type == EventType::kTouched ||
+                          event.type == EventType::kCut || event.type == EventType::kIncised ||
+                          event.type == EventType::kClipped || event.type == EventType::kDetached;
+                 });
+  double strained = 0.0;
+  for (const TrainingFrame::Body& body : frame.bodies) {
+    if (body.strains.empty()) continue;
+    strain_known_ = true;
+    OwnStrain& own = own_strains_[body.number];
+    if (own.model != body.model) own = ownStrainOf(body);
+    double all = 0.0, beyond = 0.0;
+    for (std::size_t c = 0; c < body.strains.size(); ++c) {
+      if (!touched_any_) own.most[c] = std::max(own.most[c], body.strains[c]);
+      const double more = body.strains[c] - own.most[c], mass = body.model->shape.clusters[c].mass;
+      strain_peak_ = std::max(strain_peak_, more);
+      all += mass;
+      if (more > limits_.strain) beyond += mass;
+    }
+    if (all > 0.0) strained += beyond / all * body.model->rest_volume;
+  }
+  strained_ = std::max(strained_, strained);
+}
+
+Metrics::OwnStrain Metrics::ownStrainOf(const TrainingFrame::Body& body) const {
+  OwnStrain own{body.name, body.model, {}, std::vector<double>(body.strains.size(), 0.0)};
+  for (const ClusterRest& cluster : body.model->shape.clusters) own.centres.push_back(body.placed * cluster.centre);
+  // The nearest of its parents.
+  const OwnStrain* parent = nullptr;
+  for (const auto& [number, other] : own_strains_)
+    if (other.model && isOf(body.name, other.body) && (!parent || other.body.size() > parent->body.size()))
+      parent = &other;
+  if (!parent) return own;
+  const NearestPoints nearest(parent->centres);
+  for (std::size_t c = 0; c < own.centres.size(); ++c) own.most[c] = parent->most[nearest.nearest(own.centres[c])];
+  return own;
 }
 
 void Metrics::feedForbidden(const TrainingFrame& frame) {
@@ -227,9 +272,17 @@ bool Metrics::bleeds(const TrainingFrame& frame) const {
       return joint.clip && std::find(joint.ends.begin(), joint.ends.end(), body.name) != joint.ends.end();
     });
   };
+  // What nothing holds any more, as what was cut out between two clips, is supplied by nothing.
+  const auto isSupplied = [&](const TrainingFrame::Body& body) {
+    return body.model->isHeld() ||
+           std::any_of(frame.joints.begin(), frame.joints.end(), [&](const TrainingFrame::Joint& joint) {
+             return !joint.clip && joint.fibres > 0 &&
+                    std::find(joint.ends.begin(), joint.ends.end(), body.name) != joint.ends.end();
+           });
+  };
   if (limits_.vessels.empty()) return false;
   return std::any_of(frame.bodies.begin(), frame.bodies.end(), [&](const TrainingFrame::Body& body) {
-    return body.model->next_patch > 1 && isVessel(body) && !isClipped(body);
+    return body.model->next_patch > 1 && isVessel(body) && isSupplied(body) && !isClipped(body);
   });
 }
 
@@ -285,12 +338,13 @@ std::vector<MetricValue> Metrics::values(const RestTissue& tissue, std::size_t s
   set("plan_rms", tissue.planRms());
   set("plan_hausdorff", tissue.planHausdorff());
   set("off_plan_area", tissue.offPlanArea());
+  set("plan_done", tissue.planDone());
   set("margin_least", tissue.marginLeast());
   set("margin_mean", tissue.marginMean());
   set("drops", static_cast<double>(drops_));
   set("undos", static_cast<double>(undos_));
   set("torn", static_cast<double>(torn_));
-  set("leaks", static_cast<double>(leaks_));
+  set("leaks", static_cast<double>(opened_.size()));
   set("bleeding_time", limits_.vessels.empty() ? kNone : bled_for_);
   set("instrument_crossings", static_cast<double>(crossings_.count()));
   set("forbidden_contacts", limits_.forbidden.empty() ? kNone : static_cast<double>(forbidden_));

@@ -56,6 +56,7 @@ std::string reportJson(const Training& training, const ReportHead& head) {
   std::string out = "{\n  \"format\": 1,\n";
   out += "  \"task\": " + quoted(task.name) + ",\n  \"scene\": " + quoted(task.scene) + ",\n";
   out += "  \"trainee\": " + quoted(head.trainee) + ",\n  \"log\": " + quoted(head.log) + ",\n";
+  out += "  \"date\": " + (head.date.empty() ? "null" : quoted(head.date)) + ",\n";
   out += "  \"hashes_met\": " + std::string(head.hashes_met ? "true" : "false") + ",\n";
   out += "  \"lost\": " + quoted(head.lost) + ",\n";
   out += "  \"first_step\": " + std::to_string(training.firstStep()) +

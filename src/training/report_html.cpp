@@ -306,7 +306,8 @@ std::string reportHtml(const Training& training, const ReportHead& head) {
   if (!task.picture.empty())
     out += "<p><img alt=\"what is to be done\" style=\"max-width:100%\" src=\"" + escaped(task.picture) + "\"></p>\n";
   out += "<p>" + (head.trainee.empty() ? "" : "Trainee: <b>" + escaped(head.trainee) + "</b>. ") +
-         "Scene: " + escaped(task.scene) + (head.log.empty() ? "" : ". Log: " + escaped(head.log)) + ".</p>\n";
+         "Scene: " + escaped(task.scene) + (head.log.empty() ? "" : ". Log: " + escaped(head.log)) +
+         ". Date: " + (head.date.empty() ? "not known" : escaped(head.date)) + ".</p>\n";
   if (!head.hashes_met)
     out +=
         "<p class=\"bad\">The replay did not come to the states that were recorded: these numbers are of another "

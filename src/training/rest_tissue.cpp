@@ -15,7 +15,8 @@ constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 constexpr double kFinest = 0.001;  // [m] between points
 constexpr double kMostPoints = 20000.0;
 constexpr std::size_t kCandidates = 8;
-constexpr int kMostSplits = 64;  // of an edge of a triangle
+constexpr int kMostSplits = 64;          // of an edge of a triangle
+constexpr double kOutlineParts = 200.0;  // of a body's diagonal
 
 double spacingFor(double area) { return std::max(kFinest, std::sqrt(area / kMostPoints)); }
 
@@ -24,6 +25,26 @@ double cutAreaOf(const TriangleMesh& mesh) {
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     if (isCutPatch(mesh.patchOf(t))) cut.push_back(mesh.triangles[t]);
   return surfaceArea(mesh.vertices, cut);
+}
+
+/// [m] from a region, below 0 inside. The height of a box is less than that beside its edges.
+double marginOf(const Region& region, const Vec3& p) {
+  const double height = region.height(p);
+  if (region.kind != Region::Kind::kBox || height <= 0.0) return height;
+  return (region.box.min - p).cwiseMax(p - region.box.max).cwiseMax(0.0).norm();
+}
+
+/// Of the plan's rectangle what is within the solid's bounds, so that a plan without end has as many points: from s0 to
+/// s1 along it, from t0 to t1 out of it.
+std::array<double, 4> rectangleWithin(const CutPlan& plan, const TriangleMesh& solid) {
+  double s0 = plan.length, s1 = 0.0, t0 = 0.0, t1 = -plan.depth;
+  for (const Vec3& p : solid.vertices) {
+    s0 = std::min(s0, (p - plan.origin).dot(plan.along));
+    s1 = std::max(s1, (p - plan.origin).dot(plan.along));
+    t0 = std::min(t0, (p - plan.origin).dot(plan.out));
+    t1 = std::max(t1, (p - plan.origin).dot(plan.out));
+  }
+  return {std::max(s0, 0.0), std::min(s1, plan.length), std::max(t0, -plan.depth), std::min(t1, 0.0)};
 }
 
 }  // namespace
@@ -44,18 +65,7 @@ double CutPlan::distance(const Vec3& p) const {
 Points planPointsIn(const CutPlan& plan, const TriangleMesh& solid) {
   Points inside;
   if (solid.empty()) return inside;
-  // The part of the rectangle within the solid's bounds, so that a plan without end has as many points.
-  double s0 = plan.length, s1 = 0.0, t0 = 0.0, t1 = -plan.depth;
-  for (const Vec3& p : solid.vertices) {
-    s0 = std::min(s0, (p - plan.origin).dot(plan.along));
-    s1 = std::max(s1, (p - plan.origin).dot(plan.along));
-    t0 = std::min(t0, (p - plan.origin).dot(plan.out));
-    t1 = std::max(t1, (p - plan.origin).dot(plan.out));
-  }
-  s0 = std::max(s0, 0.0);
-  s1 = std::min(s1, plan.length);
-  t0 = std::max(t0, -plan.depth);
-  t1 = std::min(t1, 0.0);
+  const auto [s0, s1, t0, t1] = rectangleWithin(plan, solid);
   if (!(s1 > s0 && t1 > t0)) return inside;
   const double spacing = std::max(kFinest, std::sqrt((s1 - s0) * (t1 - t0) / 4000.0));
   const int ns = std::max(1, static_cast<int>(std::ceil((s1 - s0) / spacing)));
@@ -68,6 +78,55 @@ Points planPointsIn(const CutPlan& plan, const TriangleMesh& solid) {
       if (query.contains(p)) inside.push_back(p);
     }
   return inside;
+}
+
+Points planOutlineOn(const CutPlan& plan, const TriangleMesh& solid) {
+  Points ends;
+  if (solid.empty()) return ends;
+  const Vec3 normal = plan.along.cross(plan.out);
+  const double spacing = std::max(kFinest, boundsOf(solid.vertices).diagonal() / kOutlineParts);
+  const auto add = [&](const Vec3& from, const Vec3& to, const auto& wanted) {
+    const int parts = std::max(1, static_cast<int>(std::ceil((to - from).norm() / spacing)));
+    for (int k = 0; k < parts; ++k) {
+      const Vec3 a = from + k * (to - from) / parts, b = from + (k + 1) * (to - from) / parts;
+      if (!wanted(a) || !wanted(b)) continue;
+      ends.push_back(a);
+      ends.push_back(b);
+    }
+  };
+  // On the surface. An edge in the plan is the upper side of one of its faces only.
+  for (const Triangle& triangle : solid.triangles) {
+    Points crossed;
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 &a = solid.vertices[triangle[k]], &b = solid.vertices[triangle[(k + 1) % 3]];
+      const double of_a = normal.dot(a - plan.origin), of_b = normal.dot(b - plan.origin);
+      if ((of_a >= 0.0) != (of_b >= 0.0)) crossed.push_back(a + of_a / (of_a - of_b) * (b - a));
+    }
+    if (crossed.size() != 2) continue;
+    double first = 0.0, last = 1.0;
+    const Vec3 way = crossed[1] - crossed[0];
+    const auto keepBelow = [&](double at, double slope, double most) {
+      if (at > most && !(slope < 0.0)) last = -1.0;
+      if (slope > 0.0) last = std::min(last, (most - at) / slope);
+      if (slope < 0.0) first = std::max(first, (most - at) / slope);
+    };
+    const double s = (crossed[0] - plan.origin).dot(plan.along), t = (crossed[0] - plan.origin).dot(plan.out);
+    keepBelow(s, way.dot(plan.along), plan.length);
+    keepBelow(-s, -way.dot(plan.along), 0.0);
+    keepBelow(t, way.dot(plan.out), plan.tolerance);
+    keepBelow(-t, -way.dot(plan.out), plan.depth);
+    if (last > first) add(crossed[0] + first * way, crossed[0] + last * way, [](const Vec3&) { return true; });
+  }
+  // Inside of it.
+  const auto [s0, s1, t0, t1] = rectangleWithin(plan, solid);
+  const SolidQuery query(solid);
+  const auto at = [&](double s, double t) -> Vec3 { return plan.origin + s * plan.along + t * plan.out; };
+  const auto inside = [&](const Vec3& p) { return query.contains(p); };
+  for (const double s : {0.0, plan.length})
+    if (t1 > t0) add(at(s, t0), at(s, t1), inside);
+  for (const double t : {0.0, -plan.depth})
+    if (s1 > s0) add(at(s0, t), at(s1, t), inside);
+  return ends;
 }
 
 void CutPoints::add(const CutPoints& other) {
@@ -116,9 +175,7 @@ void RestTissue::feed(const TrainingFrame& frame) {
     changed = pieces_[k].number != frame.bodies[k].number || pieces_[k].model != frame.bodies[k].model;
   if (changed) {
     for (const Event& event : frame.events) {
-      if (event.type == EventType::kRemoved)
-        for (const Piece& piece : pieces_)
-          if (piece.name == event.body) gone_.push_back(piece);
+      if (event.removed) gone_.push_back({event.body, 0, event.removed, event.placed});
       if (event.type == EventType::kUndone)  // what it was cut of is whole again
         gone_.erase(std::remove_if(gone_.begin(), gone_.end(),
                                    [&](const Piece& piece) { return isOf(piece.name, event.body); }),
@@ -148,6 +205,8 @@ void RestTissue::begin(const TrainingFrame& frame) {
     if (plan_ && isOf(body.name, plan_->body)) {
       const Points inside = planPointsIn(*plan_, piece.rest());
       plan_points_.insert(plan_points_.end(), inside.begin(), inside.end());
+      const Points outline = planOutlineOn(*plan_, piece.rest());
+      plan_outline_.insert(plan_outline_.end(), outline.begin(), outline.end());
     }
     if (target_ && isOf(body.name, target_->body)) whole_target_ += targetIn(piece);
   }
@@ -184,7 +243,7 @@ void RestTissue::measureCut() {
       if (distance > plan_->tolerance) off_plan_ += area;
     }
     if (target_) {
-      const double margin = target_->region.height(cut_.points[k]);
+      const double margin = marginOf(target_->region, cut_.points[k]);
       margin_least_ = std::min(margin_least_, margin);
       margin_sum_ += area * margin;
       margin_area_ += area;
@@ -233,6 +292,7 @@ void RestTissue::measureRemoved() {
 
 double RestTissue::planRms() const { return plan_area_ > 0.0 ? std::sqrt(plan_squares_ / plan_area_) : kNothing; }
 double RestTissue::planHausdorff() const { return plan_area_ > 0.0 ? plan_most_ : kNothing; }
+double RestTissue::planDone() const { return plan_ ? plan_done_ : kNothing; }
 double RestTissue::offPlanArea() const { return plan_ ? 0.5 * off_plan_ : kNothing; }
 double RestTissue::marginLeast() const { return margin_area_ > 0.0 ? margin_least_ : kNothing; }
 double RestTissue::marginMean() const { return margin_area_ > 0.0 ? margin_sum_ / margin_area_ : kNothing; }

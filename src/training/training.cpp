@@ -28,7 +28,7 @@ FrameWants Training::wants() const {
   FrameWants wants;
   if (over()) return wants;
   wants.centres = now_->tissue.wantsCentres() || task_.wantsCentres();
-  if (task_.wantsStrain()) wants.strain_limit = task_.limits.measured.strain;
+  wants.strains = task_.wantsStrain();
   return wants;
 }
 

@@ -294,8 +294,10 @@ Result<Reply> World::Impl::apply(const RemoveCommand& command) {
                                    [](const Attachment& attachment) { return attachment.fibres.empty(); }),
                     attachments.end());
   wake(*body);
-  retire(id);
   say(EventType::kRemoved, command.body, 0, "removed " + command.body);
+  events.back().removed = body->model;
+  events.back().placed = body->state.placed;
+  retire(id);
   return Reply(Done{});
 }
 

@@ -200,6 +200,7 @@ void World::Impl::sayLeaks(const std::string& name, const BodyModel& model, cons
     text << "a cavity of " << name << " is open: its pressure of " << cavity.pressure << " Pa falls to 0 in "
          << cavity.leak << " s";
     say(EventType::kLeak, name, 0, text.str());
+    events.back().cavity = cavity.patch;
   }
 }
 

@@ -4,7 +4,10 @@
 #include <filesystem>
 #include <fstream>
 
+#include <Eigen/Eigenvalues>
+
 #include "io/temporary_folder.h"
+#include "meshless_surgery/training/followed_places.h"
 #include "support/bodies.h"
 
 namespace meshless {
@@ -216,6 +219,13 @@ TEST_F(TaskFile, EarlierReportsAreThoseOfTheTrainee) {
            ", \"passed\": true, \"metrics\": [{\"name\": \"time\", \"value\": 1.5}, {\"name\": \"ldlj.pick\", "
            "\"value\": null}]}";
   };
+  // What has a date is in its order, whenever its file was written.
+  const auto dated = [&](const std::string& score, const std::string& date) {
+    return report("Ann", "resect", score).insert(1, "\"date\": \"" + date + "\", ");
+  };
+  write("y", dated("1", "2026-03-01T14:05:09.250Z"));
+  write("x", dated("2", "2026-03-01T14:05:09.249Z"));
+  write("w", dated("3", "2026-02-28T23:05:09.999Z"));
   write("b", report("Ann", "resect", "70.5"));
   const std::string oldest = folder_.path() + "/b/report.json";
   std::filesystem::last_write_time(oldest, std::filesystem::last_write_time(oldest) - std::chrono::hours(1));
@@ -227,12 +237,40 @@ TEST_F(TaskFile, EarlierReportsAreThoseOfTheTrainee) {
   write("g", "{}");
   write("h", report("Ann", "resect", "\"many\""));
   const auto found = readEarlierReports(folder_.path(), "Ann", "resect", "e");
-  ASSERT_EQ(2u, found.size());
-  EXPECT_EQ("b", found[0].name);  // the oldest
-  EXPECT_EQ(70.5, found[0].score);
-  EXPECT_EQ("a", found[1].name);
-  EXPECT_EQ((std::map<std::string, double>{{"time", 1.5}}), found[1].values);
+  ASSERT_EQ(5u, found.size());
+  std::vector<EarlierReport> undated;
+  std::string order;
+  for (const EarlierReport& earlier : found)
+    if (earlier.score > 9.0)
+      undated.push_back(earlier);
+    else
+      order += earlier.name;
+  EXPECT_EQ("wxy", order);
+  ASSERT_EQ(2u, undated.size());
+  EXPECT_EQ("b", undated[0].name);  // the oldest
+  EXPECT_EQ(70.5, undated[0].score);
+  EXPECT_EQ("a", undated[1].name);
+  EXPECT_EQ((std::map<std::string, double>{{"time", 1.5}}), undated[1].values);
   EXPECT_TRUE(readEarlierReports(folder_.path() + "/none", "Ann", "resect", "").empty());
+}
+
+TEST(Dates, AreInTheOrderOfTime) {
+  const auto at = [](long milliseconds) {
+    return dateText(std::chrono::system_clock::time_point(std::chrono::milliseconds(milliseconds)));
+  };
+  EXPECT_EQ("1970-01-01T00:00:00.000Z", at(0));
+  EXPECT_EQ("2026-03-01T14:05:09.250Z", at(1772373909250));
+  EXPECT_EQ("1969-12-31T23:59:59.999Z", at(-1));
+  std::string before;
+  for (const long time : {0L, 1L, 999L, 1000L, 86399999L, 86400000L, 951782400000L, 1772373909250L}) {
+    EXPECT_LT(before, at(time));
+    EXPECT_TRUE(isDate(at(time))) << at(time);
+    before = at(time);
+  }
+  for (const char* text : {"", "yesterday", "2026-03-01", "2026-13-01T14:05:09Z", "2026-03-01T24:05:09Z",
+                           "2026-03-01T14:05:09", "2026-03-01T14:05:09.25Z", "2026-03-01T14:05:09Z\n"})
+    EXPECT_FALSE(isDate(text)) << text;
+  EXPECT_TRUE(isDate("2026-03-01T14:05:09Z"));
 }
 
 // --- those that ship, done by a script
@@ -278,6 +316,19 @@ class ShippedTask {
     for (const MetricValue& metric : training->values())
       if (metric.name == name) return metric.value;
     return std::nan("");
+  }
+  /// Where the plan is drawn now, of those of its places that are so at rest.
+  Points drawn(const std::function<bool(const Vec3& rest)>& wanted = [](const Vec3&) { return true; }) {
+    const CutPlan& plan = *training->task().plan;
+    SnapshotWants wants;
+    wants.particles = true;
+    const Points& rest = training->tissue().planOutline();
+    const Points now = FollowedPlaces(plan.body, rest, plan.along.cross(plan.out)).now(world->snapshot(wants));
+    Points some;
+    for (std::size_t k = 0; k < rest.size(); ++k)
+      if (wanted(rest[k])) some.push_back(now[k]);
+    EXPECT_GT(some.size(), 20u);
+    return some;
   }
   /// The vertex of a body's surface that is farthest in that direction now.
   Vec3 farthest(const std::string& name, const Vec3& direction) {
@@ -339,25 +390,44 @@ TEST(ShippedTasks, Retract) {
 }
 
 TEST(ShippedTasks, Incise) {
+  // Along the line that is drawn on the skin, which sags.
   ShippedTask task("incise");
   task.seconds(1.0);
-  const auto top = task.world->probe(Vec3(0, 0, 0.2), -Vec3::UnitZ());
-  ASSERT_TRUE(top.ok());
+  const Points line = task.drawn([](const Vec3& rest) { return rest.z() > 0.0599; });
+  Vec3 left = line[0], right = line[0], lowest = line[0];
+  for (const Vec3& p : line) {
+    if (p.x() < left.x()) left = p;
+    if (p.x() > right.x()) right = p;
+    if (p.z() < lowest.z()) lowest = p;
+    const auto top = task.world->probe(p + 0.1 * Vec3::UnitZ(), -Vec3::UnitZ());
+    ASSERT_TRUE(top.ok());
+    EXPECT_LT((top->position - p).norm(), 0.0005) << p.transpose();
+  }
+  EXPECT_LT(lowest.z(), 0.055);
+  EXPECT_EQ(0.0, task.value("plan_done"));
   InciseCommand incise;
-  incise.blade = {Vec3(-0.04, 0, top->position.z() + 0.01), Vec3::UnitX(), Vec3::UnitZ(), 0.08, 0.01 + 0.013};
+  incise.blade = {left + 0.001 * Vec3::UnitZ(), (right - left).normalized(), Vec3::UnitZ(), (right - left).norm(),
+                  left.z() - lowest.z() + 0.001 + 0.013};
   task.apply<InciseReply>(incise);
   task.seconds(0.5);
   EXPECT_TRUE(task.training->passed()) << task.told();
+  EXPECT_GT(task.value("plan_done"), 0.9);
 }
 
 TEST(ShippedTasks, Resect) {
   ShippedTask task("resect");
-  // The plan is in the rest shape: the organ hangs as soon as time passes, so it is cut at once.
-  task.seconds(1.0 / 120.0);
+  // Along what is drawn on the organ, which hangs.
+  task.seconds(1.0);
+  const Points line = task.drawn();
+  Vec3 mean = Vec3::Zero();
+  for (const Vec3& p : line) mean += p / static_cast<double>(line.size());
+  Mat3 spread = Mat3::Zero();
+  for (const Vec3& p : line) spread += (p - mean) * (p - mean).transpose();
+  const Eigen::SelfAdjointEigenSolver<Mat3> axes(spread);
   CutCommand cut;
-  cut.blades.x_axis = Vec3(std::sqrt(0.75), -0.5, 0);
-  cut.blades.y_axis = Vec3::UnitZ();
-  cut.blades.origin = -0.016 * Vec3(0.5, std::sqrt(0.75), 0) - cut.blades.x_axis;
+  cut.blades.x_axis = axes.eigenvectors().col(2);
+  cut.blades.y_axis = axes.eigenvectors().col(1);
+  cut.blades.origin = mean - cut.blades.x_axis;
   const auto reply = task.apply<CutReply>(cut);
   ASSERT_EQ(2u, reply.new_bodies.size());
   task.seconds(0.5);
@@ -390,8 +460,11 @@ TEST(ShippedTasks, Transect) {
       task.seconds(0.4);
     };
     const auto cut = [&] {
+      Vec3 middle = Vec3::Zero();
+      const Points line = task.drawn();
+      for (const Vec3& p : line) middle += p / static_cast<double>(line.size());
       CutCommand command;
-      command.blades = {Vec3(0, -0.02, 0.05), Vec3::UnitY(), Vec3::UnitZ(), 0.04, 0.02};
+      command.blades = {middle - 0.02 * Vec3::UnitY(), Vec3::UnitY(), Vec3::UnitZ(), 0.04, 0.02};
       EXPECT_EQ(2u, task.apply<CutReply>(command).new_bodies.size());
       task.seconds(0.1);
     };

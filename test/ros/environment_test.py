@@ -219,6 +219,25 @@ class EnvironmentTest(unittest.TestCase):
             with self.assertRaises(Refused):
                 Environment('retract', node=node.name, points=[('spleen', (0, 0, 0))]).reset()
 
+    def test_plan_and_target_are_where_their_tissue_is(self):
+        with OwnNode(scene='blocks', paused=True).wait() as node:
+            environment = Environment('hand_over', node=node.name, hands=[('pick', (-0.08, 0.0, 0.03))], reach=0.03, move=0.005, steps=12)
+            _, before = environment.reset(seed=1)
+            for _ in range(10):
+                seen, _, _, _, info = environment.step((0, 0, 1.0, 1.0))
+            self.assertAlmostEqual(0.0105, before['target'][2], delta=0.001)
+            self.assertGreater(info['target'][2], 0.03)  # it hangs from the pick
+            self.assertNotIn('plan', info)
+        with OwnNode(scene='incision', paused=True).wait() as node:
+            environment = Environment('incise', node=node.name)
+            environment.reset(seed=1)
+            for _ in range(30):
+                _, _, _, _, info = environment.step(numpy.zeros(4))
+            self.assertNotIn('target', info)
+            self.assertEqual((2, 3), info['plan'].shape[1:])
+            highest = info['plan'][..., 2].max()
+            self.assertTrue(0.05 < highest < 0.058, highest)  # the skin sags from 0.06
+
     def test_a_point_whose_body_was_cut_is_told(self):
         with OwnNode(scene='liver', paused=True).wait() as node:
             environment = Environment('retract', node=node.name, points=POINTS)

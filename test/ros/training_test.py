@@ -9,6 +9,7 @@ import tempfile
 import time
 import unittest
 
+import numpy
 import roslib.packages
 import rospy
 from geometry_msgs.msg import Point, Vector3
@@ -54,6 +55,7 @@ class TrainingTest(unittest.TestCase):
                 self.assertIn(said, refused.message)
             node.good('step', steps=50)
             node.good('pick', point=Point(0.0, 0.0, 0.1), direction=Vector3(0, 0, -1))  # is not of the task
+            before = time.strftime('%Y-%m-%dT%H:%M:%S', time.gmtime())
             node.good('start_task', task='palpate', trainee='Ann B')
             self.palpate(node)
             answer = node.good('report')
@@ -65,13 +67,39 @@ class TrainingTest(unittest.TestCase):
             with open(os.path.join(again.folder, 'report.html'), encoding='utf-8') as page:
                 self.assertIn('Ann_B_palpate_1', page.read())  # an earlier one
             self.assertFalse(node.call('report', name='../x').success)
-        done = subprocess.run([REPORT, os.path.join(self.folder, 'log'), '--task', 'palpate', '--trainee', 'Ann B', '--out', self.folder],
-                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=LONG, text=True)
+        done = self.report_of_log('--trainee', 'Ann B')
         self.assertEqual(0, done.returncode, done.stdout)
         live, replayed = report_of(answer.folder), report_of(os.path.join(self.folder, 'log.report'))
+        self.assertLess(before, live['date'])
+        self.assertRegex(live['date'], r'^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z$')
+        self.assertIsNone(replayed['date'])
+        self.assertIn('no date', done.stdout)
         for report in (live, replayed):
-            del report['log']
+            del report['log'], report['date']
         self.assertEqual(live, replayed)  # all digits
+        self.assertEqual(2, self.report_of_log('--date', 'yesterday').returncode)
+        self.assertEqual(0, self.report_of_log('--date', '2026-03-01T14:05:09Z').returncode)
+        self.assertEqual('2026-03-01T14:05:09.000Z', report_of(os.path.join(self.folder, 'log.report'))['date'])
+
+    def report_of_log(self, *arguments):
+        return subprocess.run([REPORT, os.path.join(self.folder, 'log'), '--task', 'palpate', '--out', self.folder] + list(arguments),
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=LONG, text=True)
+
+    def test_names_keep_the_letters_of_their_alphabet(self):
+        with self.node(scene='block') as node:
+            for trainee, name in (('李雷', '李雷'), ('韩梅', '韩梅'), ('Zoë Ångström', 'Zoë_Ångström'), ('Иван', 'Иван'), ('ä' * 50, 'ä' * 50)):
+                node.good('start_task', task=self.task_of('block'), trainee=trainee)
+                node.good('step', steps=1)
+                folder = node.good('report').folder
+                self.assertEqual(name + '_own_1', os.path.basename(folder))
+                self.assertEqual(trainee, report_of(folder)['trainee'])
+            self.assertFalse(node.call('start_task', task=self.task_of('block'), trainee='ä' * 51).success)
+
+    def task_of(self, scene):
+        path = os.path.join(self.folder, 'own.yaml')
+        with open(path, 'w') as file:
+            file.write('scene: %s\nstages: [{let_go: all, hold_for: 1}]\n' % scene)
+        return path
 
     def test_the_task_of_the_parameter_brings_its_scene_and_can_be_stopped(self):
         with self.node(task='retract', trainee='Bob') as node:
@@ -119,12 +147,52 @@ class TrainingTest(unittest.TestCase):
             node.good('step', steps=1)
             shown = self.markers(node)
             self.assertEqual({'plan', 'target', 'tray'}, set(shown))
-            self.assertAlmostEqual(-0.068, shown['target'].pose.position.x)
+            self.assertAlmostEqual(-0.068, shown['target'].pose.position.x, delta=1e-4)
             self.assertAlmostEqual(0.024, shown['target'].scale.x)
             self.assertAlmostEqual(-0.29, shown['tray'].pose.position.x)
             for p in shown['plan'].points:
-                self.assertAlmostEqual(-0.016, 0.5 * p.x + 0.75 ** 0.5 * p.y, delta=1e-5)  # in its plane
-                self.assertTrue(-0.12 < p.x < 0.12 and 0.0 < p.z < 0.12)  # and in the tissue
+                self.assertAlmostEqual(-0.016, 0.5 * p.x + 0.75 ** 0.5 * p.y, delta=1e-4)  # in its plane
+            self.assertLess(self.off_the_surface(node, shown['plan'], 'liver'), 1e-4)
+            # The organ sags, and they go with it.
+            node.good('step', steps=120)
+            later = self.markers(node)
+            self.assertLess(later['target'].pose.position.z, shown['target'].pose.position.z - 0.002)
+            self.assertLess(self.off_the_surface(node, later['plan'], 'liver'), 5e-4)
+            self.assertGreater(max(abs(a.z - b.z) for a, b in zip(later['plan'].points, shown['plan'].points)), 0.002)
+            seen = node.good('observe')
+            self.assertEqual(later['plan'].points, seen.plan)
+            self.assertEqual(later['target'].pose.position, seen.target)
+            self.assertEqual(0.0, seen.task.plan_done)
+
+    def off_the_surface(self, node, marker, body):
+        """[m] the farthest that a point of the marker is from a body's surface."""
+        mesh = node.good('get_body', name=body).surface
+        corners = numpy.array([[(mesh.vertices[i].x, mesh.vertices[i].y, mesh.vertices[i].z) for i in t.vertex_indices] for t in mesh.triangles])
+        a, ab, ac = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        shares = numpy.array([(i / 6, j / 6) for i in range(7) for j in range(7 - i)])
+        near = a[:, None] + shares[:, :1] * ab[:, None] + shares[:, 1:] * ac[:, None]  # points of each triangle
+        normals = numpy.cross(ab, ac)
+        normals /= numpy.linalg.norm(normals, axis=1)[:, None]
+        most = 0.0
+        for p in marker.points:
+            away = near - (p.x, p.y, p.z)
+            nearest = (away ** 2).sum(2).min(1).argsort()[:8]
+            most = max(most, min(abs(away[t, 0] @ normals[t]) for t in nearest))
+        return most
+
+    def test_a_cut_along_the_drawn_line_is_on_the_plan(self):
+        with self.node(task='incise') as node:
+            node.good('step', steps=240)
+            line = [p for p in self.markers(node)['plan'].points if p.z > 0.05]  # not its edges in the depth
+            left, right = min(line, key=lambda p: (p.x, -p.z)), max(line, key=lambda p: (p.x, p.z))
+            lowest = min(p.z for p in line if abs(p.x) < 0.039)
+            self.assertLess(lowest, 0.055)  # the skin sags
+            blade = pose_stamped(left.x, left.y, left.z + 0.001, (0.5 ** 0.5, 0.0, 0.0, 0.5 ** 0.5))  # its y is up
+            node.good('incise', blade=blade, length=right.x - left.x, depth=left.z + 0.001 - lowest + 0.013)
+            node.good('step', steps=60)
+            task = node.good('observe').task
+            self.assertTrue(task.passed, node.good('observe'))
+            self.assertGreater(task.plan_done, 0.9)
 
     def markers(self, node):
         heard = []

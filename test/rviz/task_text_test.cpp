@@ -1,5 +1,7 @@
 #include "task_text.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 namespace meshless {
@@ -14,6 +16,7 @@ meshless_surgery::TaskState begun() {
   task.stage_brief = "nine tenths of the plane, <slowly>";
   task.time_limit = 300.0;
   task.force_limit = 2.5;
+  task.plan_done = std::nan("");
   return task;
 }
 
@@ -27,6 +30,12 @@ TEST(TaskText, SaysWhatIsToBeDoneNowAndWithinWhat) {
   task.stage_brief.clear();
   task.time_limit = task.force_limit = 0.0;
   EXPECT_EQ("<b>resect</b>: Cut the lump out.<br><b>Now, 2 of 2: lay aside</b>", taskText(task).toStdString());
+}
+
+TEST(TaskText, SaysWhatShareOfThePlanIsCut) {
+  auto task = begun();
+  task.plan_done = 0.447;
+  EXPECT_NE(std::string::npos, taskText(task).toStdString().find("<br>Plan: 45 % is cut"));
 }
 
 TEST(TaskText, SaysHowItEnded) {

@@ -62,6 +62,36 @@ TEST(RestTissue, WhatWasRemovedOfAnUndoneCutIsThereAgain) {
   test::expectSame(played.training, *played.replayed());
 }
 
+TEST(RestTissue, WhatIsCutAndRemovedInOneStepIsMeasured) {
+  // With a step between the two, and in one: the same.
+  std::vector<std::vector<MetricValue>> told;
+  for (const int between : {1, 0}) {
+    TaskDef task = test::openTask();
+    task.target = Target{"block", Region::sphere(Vec3(0.06, 0, 0.2), 0.02)};
+    Played played(test::weightless(), task);
+    ASSERT_TRUE(played.world.addSceneBody(test::shared(test::block("block", Vec3(0, 0, 0.2)))).ok());
+    played.begin();
+    played.step(3 - between);
+    const auto cut = played.apply<CutReply>(across(0.02));
+    played.step(between);
+    const WorldSnapshot shot = played.world.snapshot({});
+    ASSERT_EQ(2u, shot.bodies.size());
+    const bool first = shot.bodies[0].model->rest_volume < shot.bodies[1].model->rest_volume;
+    played.apply<Done>(RemoveCommand{shot.bodies[first ? 0 : 1].name});
+    played.step(1);
+    EXPECT_NEAR(0.08 * 0.1 * 0.1, played.value("volume_removed"), 1e-6);
+    EXPECT_NEAR(0.0, played.value("target_left"), 1e-3);
+    EXPECT_NEAR(0.01, played.value("cut_area"), 1e-5);
+    EXPECT_TRUE(played.training.tissue().targetRemoved());
+    told.push_back(played.training.values());
+    test::expectSame(played.training, *played.replayed());
+  }
+  for (std::size_t k = 0; k < told[0].size(); ++k)
+    EXPECT_TRUE(std::isnan(told[0][k].value) ? std::isnan(told[1][k].value)
+                                             : std::abs(told[0][k].value - told[1][k].value) < 1e-12)
+        << told[0][k].name << " " << told[0][k].value << " " << told[1][k].value;
+}
+
 TEST(RestTissue, TheTrayTakesWhatLiesInIt) {
   TaskDef task = test::openTask();
   task.target = Target{"block", Region::sphere(Vec3(0.06, 0, 0.2), 0.02)};

@@ -330,6 +330,51 @@ TEST(TaskProgress, AClipCountsWhereItIsAtRest) {
   test::expectSame(played.training, *played.replayed());
 }
 
+TEST(Metrics, StrainIsWhatIsDoneToTheTissue) {
+  // It hangs from one end, and swings.
+  BodyDef def = test::block("tissue");
+  def.material.youngs_modulus = 8e3;
+  def.material.damping = 2.0;
+  def.fixed.emplace_back(Vec3(-1, -1, -1), Vec3(-0.06, 1, 1));
+  TaskDef task = test::openTask();
+  task.limits.measured.strain = 0.02;
+  task.metrics.push_back({"strain_peak", 1.0, 0.1, 1.0, {}});
+  WorldSettings settings;
+  settings.ground.reset();
+  Played played(settings, task);
+  ASSERT_TRUE(played.world.addSceneBody(test::shared(def)).ok());
+  played.begin();
+  played.step(240);
+  const auto strainNow = [&] {
+    SnapshotWants wants;
+    wants.particles = true;
+    const BodySnapshot body = played.world.snapshot(wants).bodies[0];
+    const std::vector<double> strains = strainsOf(*body.model, body.particles);
+    return *std::max_element(strains.begin(), strains.end());
+  };
+  EXPECT_GT(strainNow(), 0.05);  // of its weight
+  EXPECT_EQ(0.0, played.value("strain_peak"));
+  EXPECT_EQ(0.0, played.value("strained_volume"));
+  // A pull of a trainee, and a cut, count; the weight still does not.
+  const PickReply picked = pickAt(played, Vec3(0.1, 0.0, 0.15));
+  played.step(12);
+  const double held = strainNow();
+  played.apply<Done>(MovePickCommand{picked.pick, picked.position + Vec3(0.12, 0, 0)});
+  played.step(120);
+  EXPECT_GT(played.value("strain_peak"), 0.1);
+  EXPECT_GT(played.value("strained_volume"), 1e-4);
+  EXPECT_LE(played.value("strain_peak"), strainNow() + 0.2);
+  EXPECT_GT(strainNow(), held);
+  played.apply<Done>(ReleaseCommand{picked.pick});
+  const double before = played.value("strain_peak");
+  CutCommand cut;
+  cut.blades = {Vec3(0.05, -1, 0.2), Vec3::UnitY(), Vec3::UnitZ(), 0.0, 0.0};
+  played.apply<CutReply>(cut);
+  played.step(240);
+  EXPECT_LT(played.value("strain_peak"), before + 0.2);  // pieces hang as their parent did
+  test::expectSame(played.training, *played.replayed());
+}
+
 TEST(Training, BeginsAnewWithAReset) {
   Played played(test::weightless(), test::openTask());
   ASSERT_TRUE(played.world.addSceneBody(test::shared(test::ball("tissue"))).ok());
@@ -363,7 +408,7 @@ TEST(Training, AsksForNothingThatItsTaskDoesNotNeed) {
   TaskDef task = test::openTask();
   EXPECT_FALSE(Training(task).wants().any());
   task.metrics.push_back({"strain_peak", 1.0, 0.1, 1.0, {}});
-  EXPECT_TRUE(Training(task).wants().strain_limit.has_value());
+  EXPECT_TRUE(Training(task).wants().strains);
   EXPECT_FALSE(Training(task).wants().centres);
 }
 

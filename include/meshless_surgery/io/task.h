@@ -1,6 +1,8 @@
 // Task files (YAML), and reports that were written before.
 #pragma once
 
+#include <chrono>
+
 #include "meshless_surgery/io/scene.h"
 #include "meshless_surgery/training/report.h"
 
@@ -31,8 +33,13 @@ struct LoadedTask {
 Result<LoadedTask> readTask(const std::string& file, const std::optional<std::string>& scene_folder,
                             const FileAccess& access, const std::string& only_scene = "");
 
-/// Of the folders in `folder` that have a report.json of that trainee and task, the oldest file first; `but`: not that
-/// folder. What is no report is passed over.
+/// In UTC, as in 2026-03-01T14:05:09.250Z: in the order of letters is the order of time.
+std::string dateText(std::chrono::system_clock::time_point time);
+/// Whether it is one, to the second or to the millisecond.
+bool isDate(const std::string& text);
+
+/// Of the folders in `folder` that have a report.json of that trainee and task, the oldest first, by their dates; one
+/// without has that of its file. `but`: not that folder. What is no report is passed over.
 std::vector<EarlierReport> readEarlierReports(const std::string& folder, const std::string& trainee,
                                               const std::string& task, const std::string& but);
 

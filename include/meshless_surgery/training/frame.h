@@ -32,6 +32,7 @@ struct TrainingFrame {
     BodyModelPtr model;
     Pose placed;                 // from the model's frame to the rest shape's place
     Vec3 centre = Vec3::Zero();  // [m] of mass, now; where wanted
+    std::vector<double> strains{};  // strainsOf() it; where wanted
   };
   struct Joint {
     std::string name;
@@ -39,11 +40,6 @@ struct TrainingFrame {
     std::size_t fibres = 0;
     std::optional<Vec3> clip;  // [m] of a clip: the middle of its jaws in the rest shape, where it was put
   };
-  struct Strain {
-    double largest = 0.0;  // [1] of a principal direction, in any cluster: |stretch - 1|
-    double volume = 0.0;   // [m^3] at rest, of the clusters in which it is beyond the limit
-  };
-
   std::uint64_t step = 0;
   std::uint32_t run = 0;  // grows with each reset and each loaded state
   double time = 0.0;      // [s] simulated
@@ -52,16 +48,14 @@ struct TrainingFrame {
   std::vector<Body> bodies;
   std::vector<Joint> joints;  // attachments
   std::vector<Event> events;  // since the frame before
-  bool sampled = false;       // centres and strain are there
-  std::optional<Strain> strain;
+  bool sampled = false;       // centres and strains are there, where they are wanted
 };
 
 /// What costs something, and is looked at ten times a second where a task needs it.
 struct FrameWants {
-  bool centres = false;
-  std::optional<double> strain_limit;  // [1]
+  bool centres = false, strains = false;
 
-  bool any() const { return centres || strain_limit; }
+  bool any() const { return centres || strains; }
 };
 
 /// After a step. `events`: what World::takeEvents has given since the frame before.
@@ -70,8 +64,9 @@ TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants&
 /// A piece of `whole`, or itself: names of pieces are those of their parents and a number.
 bool isOf(const std::string& body, const std::string& whole);
 
-/// Of a body whose particles are at `positions`.
-TrainingFrame::Strain strainOf(const BodyModel& model, const Points& positions, double limit);
+/// Of a body whose particles are at `positions`: |stretch - 1| [1] of each cluster, the largest of its principal
+/// directions; 0 of crumbs.
+std::vector<double> strainsOf(const BodyModel& model, const Points& positions);
 
 /// What should not happen to a trainee.
 bool isError(EventType type);

@@ -3,8 +3,10 @@
 
 #include <array>
 #include <limits>
+#include <map>
 #include <set>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "meshless_surgery/training/hand_motion.h"
@@ -75,6 +77,7 @@ class Metrics {
   void feedHands(const TrainingFrame& frame);
   void feedEvents(const TrainingFrame& frame);
   void feedForbidden(const TrainingFrame& frame);
+  void feedStrain(const TrainingFrame& frame);
   bool bleeds(const TrainingFrame& frame) const;
 
   MetricLimits limits_;
@@ -84,9 +87,19 @@ class Metrics {
   double dt_ = 1.0, time_ = 0.0, idle_ = 0.0, any_moves_ = 0.0, both_move_ = 0.0;
   double force_ = 0.0, force_peak_ = 0.0, force_sum_ = 0.0, force_for_ = 0.0, force_above_ = 0.0;
   double strain_peak_ = 0.0, strained_ = 0.0;
-  bool strain_known_ = false;
-  std::size_t cuts_ = 0, strokes_ = 0, undos_ = 0, torn_ = 0, leaks_ = 0, drops_ = 0, forbidden_ = 0;
+  bool strain_known_ = false, touched_any_ = false;  // any tissue, since the start
+  /// Of a body, one a cluster: the most that it had before any tissue was touched. Pieces have those of their parents.
+  struct OwnStrain {
+    std::string body;
+    BodyModelPtr model;
+    Points centres;  // [m] of the clusters in the rest shape, where the scene puts it
+    std::vector<double> most;
+  };
+  OwnStrain ownStrainOf(const TrainingFrame::Body& body) const;
+  std::map<std::uint32_t, OwnStrain> own_strains_;  // by the numbers of bodies
+  std::size_t cuts_ = 0, strokes_ = 0, undos_ = 0, torn_ = 0, drops_ = 0, forbidden_ = 0;
   std::uint64_t last_cut_ = ~std::uint64_t{0}, last_stroke_ = ~std::uint64_t{0}, last_undo_ = ~std::uint64_t{0};
+  std::set<std::tuple<std::uint64_t, std::string, std::uint32_t>> opened_;  // cavities: step, body, patch
   double forbidden_for_ = 0.0, bled_for_ = 0.0;
   ToolCrossings crossings_;
   std::set<std::string> touched_;

@@ -18,9 +18,10 @@ struct ReportHead {
   bool hashes_met = true;              // the replay came to the recorded states
   std::string lost;                    // a sentence, where the log is not whole
   std::vector<EarlierReport> earlier;  // oldest first
+  std::string date;                    // when it was done, as dateText() (io/task.h) writes it; empty: not known
 };
 
-/// One object: task, trainee, log, outcome, stages, score, metrics with their goals, events.
+/// One object: task, trainee, log, date, outcome, stages, score, metrics with their goals, events.
 std::string reportJson(const Training& training, const ReportHead& head);
 /// A line a metric: name, unit, value, score, weight, good, bad, pass, passed. Empty where there is nothing.
 std::string reportCsv(const Training& training);

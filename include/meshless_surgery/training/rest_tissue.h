@@ -60,9 +60,10 @@ class RestTissue {
   double planRms() const;        // [m] of the cut from the plan
   double planHausdorff() const;  // [m] the farther of: the cut from the plan, the plan in the body from the cut
   double offPlanArea() const;    // [m^2] of the cut, farther from the plan than its tolerance
-  /// 0..1: of the plan in the body, what a cut has come within the tolerance of.
-  double planDone() const { return plan_done_; }
-  const Points& planPoints() const { return plan_points_; }  // [m] in the body
+  /// 0..1: of the plan in the body, what a cut has come within the tolerance of. Before there is a cut: 0.
+  double planDone() const;
+  const Points& planPoints() const { return plan_points_; }    // [m] in the body
+  const Points& planOutline() const { return plan_outline_; }  // [m] ends of lines: planOutlineOn() it
   const CutPoints& cut() const { return cut_; }
 
   // Of the target; NaN without one.
@@ -93,7 +94,7 @@ class RestTissue {
   std::optional<Box> tray_;
   bool begun_ = false;
   std::vector<Piece> pieces_, gone_, in_tray_;
-  Points plan_points_;
+  Points plan_points_, plan_outline_;
   CutPoints cut_;
   double cut_area_ = 0.0, plan_squares_ = 0.0, plan_area_ = 0.0, plan_most_ = 0.0, off_plan_ = 0.0;
   double plan_done_ = 0.0, margin_least_ = 0.0, margin_sum_ = 0.0, margin_area_ = 0.0;
@@ -105,6 +106,9 @@ class RestTissue {
 
 /// The plan's points [m] inside a closed surface.
 Points planPointsIn(const CutPlan& plan, const TriangleMesh& solid);
+/// Ends of short lines [m], two each: where the plan meets a closed surface, up to its tolerance beyond its upper edge,
+/// and the plan's edges inside of it.
+Points planOutlineOn(const CutPlan& plan, const TriangleMesh& solid);
 /// Of the cut faces.
 CutPoints cutPointsOf(const TriangleMesh& mesh, double spacing);
 

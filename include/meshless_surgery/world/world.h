@@ -86,7 +86,10 @@ struct Event {
   double sim_time = 0.0;  // [s]
   std::string body;
   PickId pick = 0;
-  std::string text;  // a sentence
+  std::string text;           // a sentence
+  std::uint32_t cavity = 0;   // of kLeak: the patch of its faces, which all pieces share that have a part of it
+  BodyModelPtr removed = {};  // of kRemoved: the body that is no more, which may have come in the same step
+  Pose placed = {};           // of it, as BodySnapshot::placed
 };
 
 /// Times [s] and work of one step; counters that a scene does not use stay at zero.
