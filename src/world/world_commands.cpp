@@ -119,14 +119,15 @@ Result<Reply> World::Impl::apply(const PickCommand& command) {
   pick.id = next_pick++;
   pick.body = grabbed.body->id;
   pick.stiffness = command.stiffness > 0.0 ? command.stiffness : settings.pick_stiffness;
-  makeGrasp(*grabbed.body->model, grabbed.particle, graspRadius(*grabbed.body->model), pick);
-  pick.place = ray && grabbed.place.cell != kNoIndex ? grabbed.place : placeOf(*grabbed.body->model, grabbed.particle);
-  pick.target = pick.reached = pick.position = grabbed.point;
-  pick.offset = grabbed.point - graspMean(pick, grabbed.body->state.positions);
+  const BodyModel& model = *grabbed.body->model;
+  makeGrasp(model, grabbed.body->state.positions, grabbed.particle, graspRadius(model), grabbed.point, pick);
+  const bool moved = pick.particle != grabbed.particle;
+  pick.place = grabbed.place.cell == kNoIndex || moved ? placeOf(model, pick.particle) : grabbed.place;
+  pick.target = pick.reached = pick.position;
   picks.push_back(pick);
   wake(*grabbed.body);
   say(EventType::kPicked, grabbed.body->name, pick.id, "picked " + grabbed.body->name);
-  return Reply(PickReply{pick.id, grabbed.body->name, grabbed.particle, grabbed.point});
+  return Reply(PickReply{pick.id, grabbed.body->name, pick.particle, pick.position});
 }
 
 Result<Reply> World::Impl::apply(const MovePickCommand& command) {

@@ -286,7 +286,7 @@ struct World::Impl : KeptWorld {
   static Descent descentOf(BodyPiece& piece);
   /// Picks of a body go where the tissue goes that they hold; `before` [m]: of its particles.
   void followPieces(const BodyId& parent, const Points& before, const std::vector<Descent>& pieces);
-  void followTissue(Pick& pick, const Points& before, const Descent& piece, const TissuePlace& place);
+  Index centreIn(const Descent& piece, const TissuePlace& place, Index grabbed);
 
   // attachments
   Result<AttachReply> attach(const AttachCommand& command);
