@@ -266,6 +266,7 @@ struct World::Impl : KeptWorld {
   std::string letGo(const Pick& pick);  // one of picks; the name of its body
   void wakeAtSphere();
   void liftSphere();
+  Vec3 placeBeside(const Vec3& centre, double radius);  // [m] the nearest where a sphere is out of tissue
   CutUndo beforeCut() const;
   void rememberCut(CutUndo before, std::vector<std::string> cut, std::vector<std::string> pieces);
   Status checkCut(const CutCommand& command);
