@@ -80,7 +80,6 @@ TEST(Grasp, IsRoundInALattice) {
 
 TEST(Grasp, LeavesFixedTissueToWhatFixesIt) {
   BodyDef def = test::defOf(boxMesh(Vec3(0.1, 0.1, 0.1), 4, 4, 4));
-  def.material.youngs_modulus = 5000.0;
   def.spacing = 0.01;
   def.fixed.push_back(Box{Vec3(-1, -1, 0.0), Vec3(1, 1, 1)});
   const PreparedBody body = prepared(def);
