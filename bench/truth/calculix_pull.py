@@ -4,7 +4,8 @@
     bench/truth/calculix_pull.py [--out FOLDER] [part of a case's name]
 
 A grasp pulls with a force in the tissue around its middle: of a share that falls with the distance d as (1 - (d/r)^2)^2
-within its radius r (src/tools/grasp.cpp). A quarter of the block, elements as in calculix.py, small strains, two meshes.
+within its radius r, changed linearly with the depth so that its mean is the grasped point (src/tools/grasp.cpp). A
+quarter of the block, elements as in calculix.py, small strains, two meshes.
 """
 import argparse
 import pathlib
@@ -17,6 +18,9 @@ from calculix import Block, Mesh, even, graded, joined, shares
 RADIUS, FORCE = 0.02, 0.02        # [m] [N] small: 1 mm
 HALF, HEIGHT, YOUNG = 0.05, 0.05, 5000.0
 GRID = 0.005                      # [m] between the points of the surface
+# Of half a ball with those shares, over r: the mean depth, and by how much shares fall with the depth to have none.
+DEEP = 35 / 128
+SLOPE = DEEP / (1 / 9 - DEEP ** 2)
 GAUSS = ((-0.6 ** 0.5, 5 / 9), (0.0, 8 / 9), (0.6 ** 0.5, 5 / 9))
 
 
@@ -38,8 +42,9 @@ def solve(nu, level, folder):
                     volume = u * v * w
                     for a, b in zip(low, high):
                         volume *= 0.5 * (b - a)
+                    volume *= (1 - far) ** 2 * (1 + SLOPE * (DEEP - (HEIGHT - at[2]) / RADIUS))
                     for n, share in zip(element, shares((x, y, z))):
-                        loads[n] += volume * share * (1 - far) ** 2
+                        loads[n] += volume * share
     scale = 0.25 * FORCE / sum(loads)
     with open(folder / "case.inp", "w") as out:
         out.write("*NODE, NSET=ALL\n")

@@ -14,6 +14,18 @@ constexpr double kStiff = 40.0;  // layers of cells that a spring is as heavy as
 constexpr double kTouch = 1e-6;  // of the spacing: so near is on the border
 constexpr int kHalvings = 40;
 
+// How much of the link lies before what is held, which is no nearer than its height; above 1: all of it, or it is not
+// come upon, as where the link runs along the border.
+double startOfHeld(const HeldHeight& held, const Vec3& from, const Vec3& along, double touch) {
+  double way = 0.0;
+  for (int n = 0; n < kHalvings && way <= 1.0; ++n) {
+    const double height = held(from + way * along);
+    if (height <= touch) return way;
+    way += height / along.norm();
+  }
+  return 2.0;
+}
+
 }  // namespace
 
 std::vector<ClampPoint> findClampPoints(const CellLattice& lattice, const SolidQuery& solid, const HeldHeight& held) {
@@ -27,18 +39,20 @@ std::vector<ClampPoint> findClampPoints(const CellLattice& lattice, const SolidQ
       for (int axis = 0; axis < 3; ++axis)
         for (const double way : {-step, step}) {
           const Vec3 along = way * Vec3::Unit(axis);
-          if (!(held(from + along) <= touch)) continue;
           double out = 0.0, in = 1.0;
+          // What is held may be thinner than the link is long.
+          if (!(held(from + along) <= touch)) in = startOfHeld(held, from, along, touch);
+          if (!(in <= 1.0)) continue;
           for (int n = 0; n < kHalvings; ++n) {
             const double middle = 0.5 * (out + in);
             (held(from + middle * along) <= 0.0 ? in : out) = middle;
           }
           // Through the air nothing is held.
           if (solid.crosses(from, from + (1.0 - 1e-3) * in * along)) continue;
-          const Vec3 there = from + in * along;
+          const Vec3 there = from + in * along, before = there - 0.02 * along;
           Vec3 slope;
           for (int k = 0; k < 3; ++k)
-            slope[k] = held(there + 0.01 * step * Vec3::Unit(k)) - held(there - 0.01 * step * Vec3::Unit(k));
+            slope[k] = held(before + 0.01 * step * Vec3::Unit(k)) - held(before - 0.01 * step * Vec3::Unit(k));
           const double area = step * step * std::abs(slope[axis]) / std::max(slope.norm(), 1e-300);
           if (area > 0.0) points.push_back({c, lattice.placeIn(cell, there), area});
         }

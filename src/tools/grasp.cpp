@@ -6,11 +6,14 @@
 #include <map>
 #include <queue>
 
+#include <Eigen/QR>
+
 #include "meshless_surgery/body/filled_cells.h"
 
 namespace meshless {
 namespace {
 
+constexpr double kSpanned = 0.01;         // variance over the largest: in flatter directions a patch does not reach
 const double kLongestWay = std::sqrt(3.0);  // along the edges of a cubic lattice, over the straight one
 
 // Where some of it is fixed the rest would be drawn beyond the end, for the mean to come there.
@@ -29,6 +32,20 @@ void letGoOfFixed(const BodyModel& model, Pick& pick) {
   pick.weights.resize(kept);
 }
 
+void leadMeanTo(const Vec3& point, const Points& positions, Pick& pick) {
+  const Vec3 mean = graspMean(pick, positions);
+  Mat3 spread = Mat3::Zero();
+  for (std::size_t k = 0; k < pick.patch.size(); ++k) {
+    const Vec3 arm = positions[pick.patch[k]] - mean;
+    spread += pick.weights[k] * arm * arm.transpose();
+  }
+  Eigen::CompleteOrthogonalDecomposition<Mat3> spanned;
+  spanned.setThreshold(kSpanned);
+  const Vec3 slope = spanned.compute(spread).solve(point - mean);
+  for (std::size_t k = 0; k < pick.patch.size(); ++k)
+    pick.weights[k] *= 1.0 + slope.dot(positions[pick.patch[k]] - mean);
+}
+
 }  // namespace
 
 double graspInverseMass(const BodyModel& model, const Pick& pick) {
@@ -38,13 +55,13 @@ double graspInverseMass(const BodyModel& model, const Pick& pick) {
   return inverse_mass;
 }
 
-void makeGrasp(const BodyModel& model, Index centre, double radius, Pick& pick) {
+void makeGrasp(const BodyModel& model, const Points& positions, Index centre, double radius, const Vec3& point,
+               Pick& pick) {
   using Entry = std::pair<double, Index>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
   std::map<Index, double> distance;
   distance[centre] = 0.0;
   queue.push({0.0, centre});
-  pick.particle = centre;
   pick.patch.clear();
   pick.weights.clear();
   double total = 0.0;
@@ -70,6 +87,9 @@ void makeGrasp(const BodyModel& model, Index centre, double radius, Pick& pick) 
   }
   for (double& w : pick.weights) w /= total;
   letGoOfFixed(model, pick);
+  pick.particle = pick.patch[0];
+  leadMeanTo(pick.particle == centre ? point : positions[pick.particle], positions, pick);
+  pick.position = graspMean(pick, positions);
 }
 
 TissuePlace placeOf(const BodyModel& model, Index particle) {

@@ -11,7 +11,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kStateVersion = 22;
+constexpr std::uint32_t kStateVersion = 23;
 
 inline std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(
@@ -231,9 +231,9 @@ MESHLESS_ARCHIVE(ScissorBlades, origin, x_axis, y_axis, length, width)
 MESHLESS_ARCHIVE(Blade, origin, x_axis, y_axis, length, depth)
 template <class A>
 void serialize(A& archive, Pick& v) {
-  auto& [id, body, particle, place, patch, weights, offset, target, reached, locked, stiffness, position, force] = v;
-  archive(id, body, particle, place.cell, place.at, patch, weights, offset, target, reached, locked, stiffness,
-          position, force);
+  auto& [id, body, particle, place, patch, weights, target, reached, locked, stiffness, position, force] = v;
+  archive(id, body, particle, place.cell, place.at, patch, weights, target, reached, locked, stiffness, position,
+          force);
 }
 MESHLESS_ARCHIVE(BodyPoint, particles, weights)
 MESHLESS_ARCHIVE(Fibre, a, b, at_a, at_b, place, area, rest, force, tension)

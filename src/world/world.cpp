@@ -147,6 +147,7 @@ WorldBody& World::Impl::admit(std::string name, Material material, BodyModelPtr 
 void World::Impl::retire(const BodyId& id) {
   for (auto it = bodies.begin(); it != bodies.end(); ++it)
     if ((*it)->id == id) {
+      surface_contacts.forget((*it)->number);  // else the hash has it until the next search
       ++generations[id.slot];
       free_slots.push_back(id.slot);
       bodies.erase(it);

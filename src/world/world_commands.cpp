@@ -3,11 +3,17 @@
 #include <limits>
 
 #include "meshless_surgery/body/ease.h"
+#include "meshless_surgery/geometry/inside.h"
+#include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
 
 namespace meshless {
 namespace {
+
+constexpr double kEntryTime = 0.1;  // [s] for a radius, in which the push sphere goes into tissue where it is placed
+constexpr double kTouches = 1e-3;   // radii: so deep it does not need a way in
+constexpr int kMostWays = 20;       // between folds
 
 struct Grabbed {
   WorldBody* body = nullptr;
@@ -119,14 +125,15 @@ Result<Reply> World::Impl::apply(const PickCommand& command) {
   pick.id = next_pick++;
   pick.body = grabbed.body->id;
   pick.stiffness = command.stiffness > 0.0 ? command.stiffness : settings.pick_stiffness;
-  makeGrasp(*grabbed.body->model, grabbed.particle, graspRadius(*grabbed.body->model), pick);
-  pick.place = ray && grabbed.place.cell != kNoIndex ? grabbed.place : placeOf(*grabbed.body->model, grabbed.particle);
-  pick.target = pick.reached = pick.position = grabbed.point;
-  pick.offset = grabbed.point - graspMean(pick, grabbed.body->state.positions);
+  const BodyModel& model = *grabbed.body->model;
+  makeGrasp(model, grabbed.body->state.positions, grabbed.particle, graspRadius(model), grabbed.point, pick);
+  const bool moved = pick.particle != grabbed.particle;
+  pick.place = grabbed.place.cell == kNoIndex || moved ? placeOf(model, pick.particle) : grabbed.place;
+  pick.target = pick.reached = pick.position;
   picks.push_back(pick);
   wake(*grabbed.body);
   say(EventType::kPicked, grabbed.body->name, pick.id, "picked " + grabbed.body->name);
-  return Reply(PickReply{pick.id, grabbed.body->name, grabbed.particle, grabbed.point});
+  return Reply(PickReply{pick.id, grabbed.body->name, pick.particle, pick.position});
 }
 
 Result<Reply> World::Impl::apply(const MovePickCommand& command) {
@@ -205,12 +212,54 @@ Result<Reply> World::Impl::apply(const PushCommand& command) {
   if (!from_nowhere && radius == push.radius && command.position == push.target && push.position == push.target)
     return Reply(Done{});
   wakeAtSphere();
+  const bool placed = from_nowhere || command.speed == 0.0, larger = from_nowhere || radius > push.radius;
+  if (placed || larger) {
+    // Tissue that is inside of it all at once would not be pushed as it is on the way there. From where it is the way
+    // may be shorter, and it presses on.
+    const Vec3 place = placed ? command.position : push.position, beside = placeBeside(place, radius);
+    if (larger || (beside - place).norm() < (push.position - place).norm()) push.position = beside;
+    if (placed) push.speed = radius / kEntryTime;
+  }
   push.enabled = true;
   push.radius = radius;
   push.target = command.position;
-  if (from_nowhere || command.speed == 0.0) push.position = command.position;
   wakeAtSphere();
   return Reply(Done{});
+}
+
+Vec3 World::Impl::placeBeside(const Vec3& centre, double radius) {
+  struct Near {
+    ShownSurface shown;
+    SolidQuery query;
+    bool solid;
+  };
+  std::vector<Near> all;
+  Box sphere;
+  sphere.extend(centre.array() - radius);
+  sphere.extend(centre.array() + radius);
+  for (auto& body : bodies) {
+    if (body->model->surface.triangles.empty()) continue;
+    const ShownSurface shown = shownNow(*body);
+    if (!boundsOf(shown.vertices).overlaps(sphere)) continue;
+    all.push_back({shown, SolidQuery({shown.vertices, shown.surface->triangles, {}}), body->model->solid});
+  }
+  Vec3 place = centre;
+  for (int step = 0; step < kMostWays; ++step) {
+    double deepest = kTouches * radius;  // [m]
+    Vec3 out = Vec3::Zero();
+    for (const Near& near : all) {
+      const bool inside = near.solid && near.query.contains(place);
+      Vec3 way = (inside ? -1.0 : 1.0) * (place - near.query.nearest(place));
+      const double depth = inside ? radius + way.norm() : radius - way.norm();
+      if (!(depth > deepest)) continue;
+      deepest = depth;
+      if (!(way.norm() > kTouches * radius)) way = near.shown.areaOf(near.query.nearestTriangle(place));
+      out = depth * way.normalized();
+    }
+    if (out.isZero(0.0)) break;
+    place += out;
+  }
+  return place;
 }
 
 Result<Reply> World::Impl::apply(const LiftCommand& command) {

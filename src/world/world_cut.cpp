@@ -269,60 +269,39 @@ void World::Impl::followPieces(const BodyId& parent, const Points& before, const
   for (Pick& pick : picks) {
     if (pick.body != parent) continue;
     const std::size_t n = asked++;
+    const Vec3 grabbed = graspMean(pick, before);
+    const auto holdIn = [&](const Descent& piece, Index centre, const TissuePlace& place) {
+      const WorldBody& child = *find(piece.child);
+      makeGrasp(*child.model, child.state.positions, centre, graspRadius(*child.model), grabbed, pick);
+      pick.body = child.id;
+      pick.place = place;
+    };
     const auto holds = [&](const Descent& piece) {
       return n < piece.places.size() && piece.places[n].cell != kNoIndex;
     };
     if (const auto holder = std::find_if(pieces.begin(), pieces.end(), holds); holder != pieces.end()) {
-      followTissue(pick, before, *holder, holder->places[n]);
+      holdIn(*holder, centreIn(*holder, holder->places[n], pick.particle), holder->places[n]);
       continue;
     }
-    Pick followed = pick;
     for (const Descent& piece : pieces) {
-      const auto find_particle = [&](Index old) {
-        const auto it = std::find(piece.parent_particles.begin(), piece.parent_particles.end(), old);
-        return it == piece.parent_particles.end() ? kNoIndex : static_cast<Index>(it - piece.parent_particles.begin());
-      };
-      const Index centre = find_particle(pick.particle);
-      if (centre == kNoIndex) continue;
-      std::vector<Index> patch;  // what is left of it
-      std::vector<double> weights;
-      double total = 0.0;
-      for (std::size_t k = 0; k < pick.patch.size(); ++k) {
-        const Index now = find_particle(pick.patch[k]);
-        if (now == kNoIndex) continue;
-        patch.push_back(now);
-        weights.push_back(pick.weights[k]);
-        total += pick.weights[k];
-      }
-      if (patch.empty()) continue;
-      for (double& weight : weights) weight /= total;
-      followed.body = piece.child;
-      followed.particle = centre;
-      followed.patch = std::move(patch);
-      followed.weights = std::move(weights);
-      // The grabbed point is where it was; only the patch around it is smaller now.
-      followed.offset = pick.offset + graspMean(pick, before) - graspMean(followed, find(piece.child)->state.positions);
+      const std::vector<Index>& old = piece.parent_particles;
+      const auto centre = std::find(old.begin(), old.end(), pick.particle);
+      if (centre == old.end()) continue;
+      holdIn(piece, static_cast<Index>(centre - old.begin()), {});
+      break;
     }
-    pick = std::move(followed);
   }
 }
 
-// By the copy of the particle that was grabbed, or else by the corner nearest to the place, of the cell that has it.
-void World::Impl::followTissue(Pick& pick, const Points& before, const Descent& piece, const TissuePlace& place) {
-  WorldBody& child = *find(piece.child);
-  const LatticeCell& cell = child.model->lattice->cells[place.cell];
-  Index centre = cell.corners[0];
-  for (int k = 0, nearest = 0; k < 8; ++k) {
-    if (trilinearWeight(k, place.at) > trilinearWeight(nearest, place.at)) centre = cell.corners[nearest = k];
-    if (piece.copied_from[cell.corners[k]] != pick.particle) continue;
-    centre = cell.corners[k];
-    break;
+// The copy of the particle that was grabbed, or else the corner nearest to the place, of the cell that has it.
+Index World::Impl::centreIn(const Descent& piece, const TissuePlace& place, Index grabbed) {
+  const LatticeCell& cell = find(piece.child)->model->lattice->cells[place.cell];
+  int nearest = 0;
+  for (int k = 0; k < 8; ++k) {
+    if (piece.copied_from[cell.corners[k]] == grabbed) return cell.corners[k];
+    if (trilinearWeight(k, place.at) > trilinearWeight(nearest, place.at)) nearest = k;
   }
-  const Vec3 grabbed = pick.offset + graspMean(pick, before);
-  makeGrasp(*child.model, centre, graspRadius(*child.model), pick);
-  pick.body = child.id;
-  pick.place = place;
-  pick.offset = grabbed - graspMean(pick, child.state.positions);
+  return cell.corners[nearest];
 }
 
 }  // namespace meshless

@@ -267,6 +267,7 @@ struct World::Impl : KeptWorld {
   std::string letGo(const Pick& pick);  // one of picks; the name of its body
   void wakeAtSphere();
   void liftSphere();
+  Vec3 placeBeside(const Vec3& centre, double radius);  // [m] the nearest where a sphere is out of tissue
   CutUndo beforeCut() const;
   void rememberCut(CutUndo before, std::vector<std::string> cut, std::vector<std::string> pieces);
   Status checkCut(const CutCommand& command);
@@ -287,7 +288,7 @@ struct World::Impl : KeptWorld {
   static Descent descentOf(BodyPiece& piece);
   /// Picks of a body go where the tissue goes that they hold; `before` [m]: of its particles.
   void followPieces(const BodyId& parent, const Points& before, const std::vector<Descent>& pieces);
-  void followTissue(Pick& pick, const Points& before, const Descent& piece, const TissuePlace& place);
+  Index centreIn(const Descent& piece, const TissuePlace& place, Index grabbed);
 
   // attachments
   Result<AttachReply> attach(const AttachCommand& command);

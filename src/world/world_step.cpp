@@ -86,7 +86,7 @@ void World::Impl::finishStep(double h_frame) {
   emptyCavities();
   findWound();
   for (Pick& pick : picks)
-    if (const WorldBody* body = find(pick.body)) pick.position = graspMean(pick, body->state.positions) + pick.offset;
+    if (const WorldBody* body = find(pick.body)) pick.position = graspMean(pick, body->state.positions);
   fallAsleep(h_frame);
   contacts_current = !awake.empty() || contacts_current;
   ++step;

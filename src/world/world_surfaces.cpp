@@ -557,7 +557,7 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
       for (std::size_t p = 0; p < member.picks.size(); ++p) {
         const Pick& pick = *member.picks[p];
         const Vec3 there = (pick.target - pick.reached) / parts_left;
-        member.springs[p].end = pick.reached + (substep + 1) * there / substeps - pick.offset;
+        member.springs[p].end = pick.reached + (substep + 1) * there / substeps;
         member.springs[p].impulse.setZero();
       }
       surface_contacts.solveIsland(member.island, step, substep, colliders, member.previous, member.springs,

@@ -61,16 +61,12 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
       if (before.pick_bodies[i] == body.name) then.emplace_back(before.picks[i].id, before.picks[i].target);
     return now == then;
   };
-  // What pressed then is not what presses now.
-  const auto forgetContacts = [this](const WorldBody& body) { surface_contacts.forget(body.number); };
-
   std::size_t place = 0;  // in the order of bodies
   for (CutUndo::Body& was : before.bodies) {
     if (contains(before.cut, was.name)) {
       WorldBody& body = admit(was.name, std::move(was.material), std::move(was.model), std::move(was.state));
       body.number = was.number;  // the same body as before, not a new one
       body.surface_current = was.surface_current;
-      forgetContacts(body);
       std::rotate(bodies.begin() + static_cast<std::ptrdiff_t>(place), bodies.end() - 1, bodies.end());
       ++place;
     } else if (WorldBody* body = find(was.name)) {  // removed since: stays so
@@ -80,7 +76,7 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
       if ((!slept || !holdsAsThen(*body)) && body->state.positions.size() == was.state.positions.size()) {
         body->state = std::move(was.state);
         body->surface_current = was.surface_current;
-        forgetContacts(*body);
+        surface_contacts.forget(body->number);  // what pressed then is not what presses now
         wake(*body);
       }
       ++place;

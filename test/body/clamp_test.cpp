@@ -141,6 +141,34 @@ TEST(Clamp, HoldsBoxesAndBalls) {
   }
 }
 
+// A face is clamped by a box over it, however thin that is beside the samples: the bar hangs as from the half space there.
+TEST(Clamp, HoldsAFaceByABoxThatIsThinnerThanSamples) {
+  BodyDef def = barHeldBelow({Vec3::UnitX(), Vec3(-0.04, 0, 0)});
+  const Vec3 gravity(0, 0, -0.5);
+  const BodyState by_plane = stepped(test::prepared(def), gravity, 700);
+  double most = 0.0;
+  for (std::size_t v = 0; v < by_plane.surface.size(); ++v)
+    most = std::max(most, std::abs(by_plane.surface[v].z() - test::prepared(def).state.surface[v].z()));
+  ASSERT_GT(most, 1e-4);
+  for (const auto& [from, to] : {std::pair(-0.04005, -0.03995), {-0.0401, -0.04}}) {
+    SCOPED_TRACE(std::to_string(from) + " to " + std::to_string(to));
+    def.fixed = {{Region(Vec3(from, -1, -1), Vec3(to, 1, 1)), false}};
+    const BodyState by_box = stepped(test::prepared(def), gravity, 700);
+    double apart = 0.0;
+    for (std::size_t v = 0; v < by_plane.surface.size(); ++v)
+      apart = std::max(apart, (by_plane.surface[v] - by_box.surface[v]).norm());
+    EXPECT_LT(apart, 0.02 * most);
+  }
+  // Across the middle it holds both halves, also askew.
+  def.fixed = {{Region(Vec3(-5e-5, -1, -1), Vec3(5e-5, 1, 1)), true}};
+  def.pose.rotation = Quat::FromTwoVectors(Vec3(3, 1, 0.5), Vec3::UnitX());
+  const PreparedBody body = test::prepared(def);
+  const BodyState state = stepped(body, gravity, 700);
+  for (std::size_t v = 0; v < state.surface.size(); ++v)
+    if (std::abs(body.state.surface[v].x()) < 0.003)
+      EXPECT_LT((state.surface[v] - body.state.surface[v]).norm(), 1e-4) << body.state.surface[v].transpose();
+}
+
 TEST(Clamp, RefusesARegionThatHoldsNothing) {
   const BodyDef def = barHeldBelow({Vec3::UnitX(), Vec3(-0.05, 0, 0)});
   const Result<PreparedBody> refused = prepareBody(def);

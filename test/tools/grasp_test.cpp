@@ -1,5 +1,7 @@
 #include "meshless_surgery/tools/grasp.h"
 
+#include <numeric>
+
 #include "support/bodies.h"
 
 namespace meshless {
@@ -7,21 +9,54 @@ namespace {
 
 using test::prepared;
 
+// [m] from the mean of the patch to the point that is to be held.
+double missed(const Pick& pick, const Points& positions, const Vec3& point) {
+  EXPECT_EQ(pick.position, graspMean(pick, positions));
+  EXPECT_NEAR(std::accumulate(pick.weights.begin(), pick.weights.end(), 0.0), 1.0, 1e-12);
+  return (pick.position - point).norm();
+}
+
 TEST(Grasp, HoldsAPatchAroundItsParticle) {
   const PreparedBody body = prepared(test::ball());
+  const Points& now = body.state.positions;
   Pick pick;
-  makeGrasp(*body.model, 5, 0.06, pick);
+  makeGrasp(*body.model, now, 5, 0.06, now[5], pick);
   ASSERT_GT(pick.patch.size(), 3u);
+  EXPECT_EQ(pick.particle, 5u);
   EXPECT_EQ(pick.patch[0], 5u);
-  double sum = 0.0;
-  for (std::size_t k = 0; k < pick.patch.size(); ++k) {
-    EXPECT_GE(pick.weights[k], 0.0);
-    EXPECT_LE((body.model->rest[pick.patch[k]] - body.model->rest[5]).norm(), 0.06);
-    sum += pick.weights[k];
-  }
-  EXPECT_NEAR(sum, 1.0, 1e-12);
-  makeGrasp(*body.model, 5, 0.0, pick);
+  for (const Index i : pick.patch) EXPECT_LE((body.model->rest[i] - body.model->rest[5]).norm(), 0.06);
+  EXPECT_LT(missed(pick, now, now[5]), 1e-12);
+  makeGrasp(*body.model, now, 5, 0.0, now[5], pick);
   EXPECT_EQ(pick.patch.size(), 1u);
+  EXPECT_LT(missed(pick, now, now[5]), 1e-12);
+}
+
+// Its mean is the point at which it holds, and goes with that point of a body that is turned and stretched.
+TEST(Grasp, HoldsAPointHoweverTheTissueTurnsAndStretches) {
+  BodyDef def = test::defOf(boxMesh(Vec3(0.1, 0.08, 0.06), 4, 4, 4));
+  def.material.youngs_modulus = 5000.0;
+  def.spacing = 0.01;
+  for (const PreparedBody& body : {prepared(test::ball()), prepared(def)}) {
+    const Points& now = body.state.positions;
+    Mat3 map = Quat(Eigen::AngleAxisd(1.9, Vec3(1, 2, -1).normalized())).toRotationMatrix();
+    map.col(0) *= 1.7;
+    map.col(2) += 0.4 * map.col(1);
+    Points moved;
+    for (const Vec3& p : now) moved.push_back(map * p + Vec3(0.3, 0.1, -0.2));
+    for (Index i = 0; i < now.size(); i += 13) {
+      const Vec3 point = now[i] + 0.3 * body.model->spacing * Vec3(0.6, -0.5, 0.7);
+      Pick pick;
+      makeGrasp(*body.model, now, i, 4.0 * body.model->spacing, point, pick);
+      EXPECT_LT(missed(pick, now, point), 1e-12) << i;
+      EXPECT_LT((graspMean(pick, moved) - (map * point + Vec3(0.3, 0.1, -0.2))).norm(), 1e-12) << i;
+      double most = 0.0;
+      for (const double weight : pick.weights) most = std::max(most, std::abs(weight));
+      EXPECT_LT(most, 2.0) << i;
+      // Of one particle it is that particle, which does not turn.
+      makeGrasp(*body.model, now, i, 0.0, point, pick);
+      EXPECT_LT(missed(pick, now, now[i]), 1e-12) << i;
+    }
+  }
 }
 
 // Links of a lattice go along its axes: a way along them is longer than it is, and a grasp as far would be an
@@ -31,13 +66,13 @@ TEST(Grasp, IsRoundInALattice) {
   def.material.youngs_modulus = 5000.0;
   def.spacing = 0.01;
   const PreparedBody body = prepared(def);
-  const Points& rest = body.model->rest;
+  const Points &rest = body.model->rest, &now = body.state.positions;
   Index centre = 0;
   for (Index i = 0; i < rest.size(); ++i)
     if (rest[i].norm() < rest[centre].norm()) centre = i;
   const double radius = 0.035;
   Pick pick;
-  makeGrasp(*body.model, centre, radius, pick);
+  makeGrasp(*body.model, now, centre, radius, now[centre], pick);
   std::size_t within = 0;
   for (const Vec3& p : rest) within += (p - rest[centre]).norm() < radius * (1.0 - 1e-9);
   EXPECT_EQ(pick.patch.size(), within);
@@ -45,7 +80,6 @@ TEST(Grasp, IsRoundInALattice) {
 
 TEST(Grasp, LeavesFixedTissueToWhatFixesIt) {
   BodyDef def = test::defOf(boxMesh(Vec3(0.1, 0.1, 0.1), 4, 4, 4));
-  def.material.youngs_modulus = 5000.0;
   def.spacing = 0.01;
   def.fixed.push_back(Box{Vec3(-1, -1, 0.0), Vec3(1, 1, 1)});
   const PreparedBody body = prepared(def);
@@ -56,17 +90,19 @@ TEST(Grasp, LeavesFixedTissueToWhatFixesIt) {
       if ((model.rest[i] - to).norm() < (model.rest[best] - to).norm()) best = i;
     return best;
   };
+  const Points& now = body.state.positions;
   Pick pick;
-  makeGrasp(model, nearest(Vec3(0, 0, 0)), 0.025, pick);
+  Index centre = nearest(Vec3(0, 0, 0.05));
+  for (Index i = 0; i < model.rest.size(); ++i)  // at the border, in the middle
+    if (model.fixed[i] && model.rest[i].norm() < model.rest[centre].norm()) centre = i;
+  makeGrasp(model, now, centre, 0.025, now[centre], pick);
   ASSERT_FALSE(pick.patch.empty());
-  double sum = 0.0;
-  for (std::size_t k = 0; k < pick.patch.size(); ++k) {
-    EXPECT_FALSE(model.fixed[pick.patch[k]]);
-    sum += pick.weights[k];
-  }
-  EXPECT_NEAR(sum, 1.0, 1e-12);
+  for (const Index i : pick.patch) EXPECT_FALSE(model.fixed[i]);
+  EXPECT_EQ(pick.particle, pick.patch[0]);
+  EXPECT_LT(missed(pick, now, now[pick.particle]), 1e-12) << "the nearest that is free";
+  for (const double weight : pick.weights) EXPECT_LT(std::abs(weight), 2.0);
   // Where there is nothing else.
-  makeGrasp(model, nearest(Vec3(0, 0, 0.05)), 0.025, pick);
+  makeGrasp(model, now, nearest(Vec3(0, 0, 0.05)), 0.025, Vec3(0, 0, 0.05), pick);
   EXPECT_GT(pick.patch.size(), 1u);
   for (const Index i : pick.patch) EXPECT_TRUE(model.fixed[i]);
 }

@@ -188,7 +188,7 @@ Played play(const Case& of) {
     EXPECT_EQ(world.snapshot({}).report.substeps, 1u);
     Result<BodySnapshot> now = world.inspect(body->def.name, false);
     played.after.push_back(now->particles);
-    played.ends.push_back(pick.target - pick.offset);
+    played.ends.push_back(pick.target);
   }
   return played;
 }

@@ -5,16 +5,22 @@
 
 namespace meshless {
 
-/// Fills patch and weights with the particles within `radius` [m] of `centre`, shares falling to zero at the radius and
-/// proportional to mass: one particle alone would be pulled out of the tissue as a spike. Distances are straight where
-/// the way along the body is no longer than links of a cubic lattice make it, else that way over sqrt(3). Fixed
-/// particles are held by nothing else than what fixes them, but where there are no others.
-void makeGrasp(const BodyModel& model, Index centre, double radius, Pick& pick);
+/// Makes the pick hold `point` [m], which is at or beside the particle `centre`: fills particle, patch, weights and
+/// position. The patch are the particles within `radius` [m] of `centre`, shares falling to zero at the radius and
+/// proportional to mass: one particle alone would be pulled out of the tissue as a spike. Then shares change linearly
+/// with the place, the farthest below zero, until the mean is the point: it goes with the tissue at the point however
+/// that turns and stretches, and a force on it turns the body as one at the point does. In directions in which the patch
+/// does not reach (a single particle: all) the mean stays where it is. Distances are straight where the way along the
+/// body is no longer than links of a cubic lattice make it, else that way over sqrt(3). Fixed particles are held by
+/// nothing else than what fixes them, but where there are no others: in place of a fixed centre its nearest free one is
+/// held.
+void makeGrasp(const BodyModel& model, const Points& positions, Index centre, double radius, const Vec3& point,
+               Pick& pick);
 
 /// Where a particle of a body of cells is: in that of its cells whose tissue is nearest. Nowhere in other bodies.
 TissuePlace placeOf(const BodyModel& model, Index particle);
 
-/// Weighted mean of the patch [m].
+/// Weighted mean of the patch [m]: where the tissue is that it holds.
 Vec3 graspMean(const Pick& pick, const Points& positions);
 
 /// Of the mean of what the grasp holds [1/kg]; 0 where all of it is fixed.

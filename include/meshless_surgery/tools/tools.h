@@ -14,8 +14,7 @@ struct Pick {
   Index particle = 0;           // where the tissue was grabbed
   TissuePlace place;            // likewise, of a body of cells
   std::vector<Index> patch;     // particles that the grasp holds, the first is `particle`
-  std::vector<double> weights;  // add up to 1
-  Vec3 offset = Vec3::Zero();   // [m] grabbed point minus the patch's mean, kept so that nothing jumps
+  std::vector<double> weights;  // add up to 1; some are below 0
   Vec3 target = Vec3::Zero();   // [m] the free end
   Vec3 reached = Vec3::Zero();  // [m] where it was at the end of the last step: it moves evenly over the substeps
   bool locked = false;
