@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """A real mouse on a virtual display works with the tools of the rviz plugin: what the node says of its world, and what the
 picture shows, is what the hand did."""
+import contextlib
 import os
+import re
 import signal
 import sys
 import unittest
@@ -31,6 +33,10 @@ LOBE = (-0.05, -0.03, 0.075)
 def call(service, kind, **fields):
     rospy.wait_for_service(NODE + '/' + service, LONG)
     return rospy.ServiceProxy(NODE + '/' + service, kind)(**fields)
+
+
+def process_of(node):
+    return ServerProxy(rosgraph.Master('/hands_test').lookupNode(node)).getPid('/hands_test')[2]
 
 
 def vector(point):
@@ -187,6 +193,22 @@ class HandsTest(unittest.TestCase):
         place, grabbed = self.grab()
         start = vector(grabbed.target)
         self.mouse.wheel(4)  # away
+    def test_the_key_of_the_tool_in_hand_keeps_it(self):
+        for key in 'khx':
+            place = self.take(key)
+            over = self.display.cursor()
+            self.mouse.key('m')
+            self.until(lambda: self.display.cursor() != over, 'the cursor of rviz is that of ' + key)
+            self.mouse.key(key)
+            self.mouse.key(key)  # before the mouse has moved
+            self.mouse.move((place[0] + 2, place[1]))
+            self.until(lambda: self.display.cursor() == over, 'put away by its own key: ' + key)
+            self.mouse.key(key)
+            rospy.sleep(0.5)
+            self.mouse.move(place)
+            rospy.sleep(0.5)
+            self.assertEqual(over, self.display.cursor(), 'put away by its own key: ' + key)
+
         self.until(lambda: (vector(self.pick().target) - start).dot(back) < -0.015, 'the plane did not move away')
         self.assertAlmostEqual(-0.02, (vector(self.pick().target) - start).dot(back), delta=5e-4)
         self.mouse.wheel(-8)  # towards
@@ -312,9 +334,50 @@ class HandsTest(unittest.TestCase):
 
     def test_a_node_that_hangs_does_not_freeze_the_view(self):
         place, _ = self.grab()
-        process = ServerProxy(rosgraph.Master('/hands_test').lookupNode(NODE)).getPid('/hands_test')[2]
+        process = process_of(NODE)
         os.kill(process, signal.SIGSTOP)
         try:
+    def turns(self):
+        """How often the thread of rviz' windows has begun to wait, so far."""
+        rviz = process_of('/rviz')
+        with open('/proc/%d/task/%d/status' % (rviz, rviz)) as status:
+            return re.search(r'\nvoluntary_ctxt_switches:\s*(\d+)', status.read()).group(1)
+
+    @contextlib.contextmanager
+    def long_picture(self):
+        """One that takes far longer than the node waits for a stream."""
+        with self.display.stalled():
+            rospy.sleep(0.5)
+            before = self.turns()
+            rospy.sleep(1.5)
+            yield
+            self.assertEqual(before, self.turns(), 'rviz went on drawing: this is no test')
+        self.until(lambda: self.turns() != before, 'rviz does not go on')
+
+    def test_what_the_hand_holds_outlasts_a_picture_that_takes_long(self):
+        place, grabbed = self.grab()
+        self.mouse.move((place[0] - 60, place[1] - 40))
+        with self.long_picture():
+            self.assertEqual([grabbed.pick_id], [pick.pick_id for pick in self.state().picks], 'it was dropped')
+        self.mouse.move((place[0] - 90, place[1] - 60))
+        self.until(lambda: numpy.abs(self.pixel(vector(self.pick().target)) - (place[0] - 90, place[1] - 60)).max() < 4,
+                   'the free end does not follow any more')
+        self.let_go()
+        self.take('h')
+        self.mouse.down()
+        self.until(lambda: self.pushes(), 'no sphere')
+        with self.long_picture():
+            self.assertTrue(self.pushes(), 'the sphere is gone')
+        self.mouse.up()
+        self.until(lambda: not self.pushes(), 'the sphere was not lifted off')
+        self.take('x')
+        self.blades()
+        with self.long_picture():
+            self.poses['scissors'].clear()
+            rospy.sleep(0.5)
+            self.assertTrue(self.poses['scissors'], 'the scissors are gone')
+        self.assertEqual([], self.said('lifted'))
+
             self.mouse.move((place[0] - 60, place[1] - 40))  # a drag, to nobody
             self.mouse.wheel(2)
             self.mouse.click(3)                              # a lock that nobody answers
