@@ -15,12 +15,12 @@ import rospy
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from rviz_view import camera_axes, configured_view, project, view_rectangle  # noqa: E402
+from rviz_view import axes, camera_axes, configured_view, project, ray_through, view_rectangle  # noqa: E402
 from virtual_display import Mouse, VirtualDisplay, stop, wait_until  # noqa: E402
 
-from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion  # noqa: E402
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3  # noqa: E402
 from meshless_surgery.msg import Event, State  # noqa: E402
-from meshless_surgery.srv import Cut, GetBody, Remove, Spawn  # noqa: E402
+from meshless_surgery.srv import Cut, GetBody, Probe, Remove, Spawn  # noqa: E402
 from shape_msgs.msg import SolidPrimitive  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
 
@@ -94,6 +94,11 @@ class HandsTest(unittest.TestCase):
         top, bottom, left, right = cls.rectangle
         part = picture[top:bottom, left:right]
         return (part[:, :, 0] > part[:, :, 1] + 35) & (part[:, :, 0] > part[:, :, 2] + 35)
+
+    def ray(self, place):
+        """As ~probe wants it, through a pixel."""
+        origin, direction = ray_through(place, self.view, self.rectangle)
+        return {'point': Point(*origin), 'direction': Vector3(*direction)}
 
     def pixel(self, point):
         return project(numpy.array([point]), self.view, self.rectangle)[0]
@@ -188,11 +193,6 @@ class HandsTest(unittest.TestCase):
             self.mouse.move(corner)
             self.until(lambda: self.display.cursor() == air, 'the cursor over tissue stays in the air, with ' + key)
 
-    def test_the_wheel_moves_the_plane_and_keeps_its_normal(self):
-        back = camera_axes(self.view)[3]
-        place, grabbed = self.grab()
-        start = vector(grabbed.target)
-        self.mouse.wheel(4)  # away
     def test_the_key_of_the_tool_in_hand_keeps_it(self):
         for key in 'khx':
             place = self.take(key)
@@ -209,6 +209,11 @@ class HandsTest(unittest.TestCase):
             rospy.sleep(0.5)
             self.assertEqual(over, self.display.cursor(), 'put away by its own key: ' + key)
 
+    def test_the_wheel_moves_the_plane_and_keeps_its_normal(self):
+        back = camera_axes(self.view)[3]
+        place, grabbed = self.grab()
+        start = vector(grabbed.target)
+        self.mouse.wheel(4)  # away
         self.until(lambda: (vector(self.pick().target) - start).dot(back) < -0.015, 'the plane did not move away')
         self.assertAlmostEqual(-0.02, (vector(self.pick().target) - start).dot(back), delta=5e-4)
         self.mouse.wheel(-8)  # towards
@@ -495,8 +500,10 @@ class HandsTest(unittest.TestCase):
     def test_blades_that_meet_sever_what_they_hold_and_z_undoes_it(self):
         place = self.take('x')
         pose = self.blades()
-        # The pivot is in front of the tissue under the cursor.
-        self.assertLess(numpy.abs(self.pixel(vector(pose.position)) - place).max(), 30)
+        # Their middle is on the tissue under the cursor.
+        middle = call('probe', Probe, **self.ray(place))
+        self.assertTrue(middle.success)
+        self.assertLess(numpy.linalg.norm(vector(pose.position) + 0.03 * axes(pose)[0] - vector(middle.position)), 0.003)
         call('pause', SetBool, data=True)  # so that the pieces stay where they were cut
         self.addCleanup(call, 'pause', SetBool, data=False)
         volume = self.state().bodies[0].volume
@@ -509,8 +516,7 @@ class HandsTest(unittest.TestCase):
         self.assertAlmostEqual(1.0, sum(b.volume for b in bodies) / volume, delta=5e-4)
         # The plane of the blades lies between the pieces.
         pose = self.blades()
-        q = pose.orientation
-        normal = numpy.array([2 * (q.x * q.z + q.w * q.y), 2 * (q.y * q.z - q.w * q.x), 1 - 2 * (q.x ** 2 + q.y ** 2)])
+        normal = axes(pose)[2]
         heights = [(self.body(b.name) - vector(pose.position)).dot(normal) for b in bodies]
         upper = heights[0] if heights[0].mean() > heights[1].mean() else heights[1]
         lower = heights[1] if upper is heights[0] else heights[0]
@@ -548,8 +554,7 @@ class HandsTest(unittest.TestCase):
         self.save('cut_line')
         # Each of its pixels is beside an edge of the tissue that the plane of the blades goes through.
         pose = self.blades()
-        q = pose.orientation
-        normal = numpy.array([2 * (q.x * q.z + q.w * q.y), 2 * (q.y * q.z - q.w * q.x), 1 - 2 * (q.x ** 2 + q.y ** 2)])
+        normal = axes(pose)[2]
         surface = call('get_body', GetBody, name='liver').surface
         vertices = numpy.array([vector(v) for v in surface.vertices])
         triangles = numpy.array([t.vertex_indices for t in surface.triangles])
@@ -573,7 +578,6 @@ class HandsTest(unittest.TestCase):
         self.until(lambda: len(self.cut_line()) == 0, 'the line stays without the tool')
 
     def test_shift_drag_turns_the_blades_and_the_wheel_moves_them(self):
-        back = camera_axes(self.view)[3]
         place = self.take('x')
         before = self.blades()
         self.mouse.key_down('shift')
@@ -586,10 +590,13 @@ class HandsTest(unittest.TestCase):
         after = self.blades()
         dot = abs(sum(getattr(before.orientation, a) * getattr(after.orientation, a) for a in 'xyzw'))
         self.assertAlmostEqual(0.8, 2 * numpy.arccos(min(1.0, dot)), delta=0.05)  # 100 px of 0.008 rad
+        # About the tissue under the cursor.
+        middles = [vector(pose.position) + 0.03 * axes(pose)[0] for pose in (before, after)]
+        self.assertLess(numpy.linalg.norm(middles[1] - middles[0]), 0.003)
         self.mouse.wheel(3)
         rospy.sleep(0.5)
         moved = vector(self.blades().position) - vector(after.position)
-        self.assertAlmostEqual(-0.015, moved.dot(back), delta=0.004)
+        self.assertLess(numpy.linalg.norm(moved - 0.015 * axes(after)[0]), 0.003)  # along themselves
         self.assertEqual(['liver'], [b.name for b in self.state().bodies])
         self.mouse.key('m')
         rospy.sleep(1.0)
