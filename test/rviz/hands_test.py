@@ -337,11 +337,6 @@ class HandsTest(unittest.TestCase):
         # It has come back, up to what the first pixels of the drag were before the node had answered.
         self.until(lambda: (self.tissue() != before).sum() < 0.1 * before.sum(), 'the view is not as it was')
 
-    def test_a_node_that_hangs_does_not_freeze_the_view(self):
-        place, _ = self.grab()
-        process = process_of(NODE)
-        os.kill(process, signal.SIGSTOP)
-        try:
     def turns(self):
         """How often the thread of rviz' windows has begun to wait, so far."""
         rviz = process_of('/rviz')
@@ -383,6 +378,11 @@ class HandsTest(unittest.TestCase):
             self.assertTrue(self.poses['scissors'], 'the scissors are gone')
         self.assertEqual([], self.said('lifted'))
 
+    def test_a_node_that_hangs_does_not_freeze_the_view(self):
+        place, _ = self.grab()
+        process = process_of(NODE)
+        os.kill(process, signal.SIGSTOP)
+        try:
             self.mouse.move((place[0] - 60, place[1] - 40))  # a drag, to nobody
             self.mouse.wheel(2)
             self.mouse.click(3)                              # a lock that nobody answers
@@ -706,11 +706,19 @@ class HandsTest(unittest.TestCase):
 
     def test_the_panel_offers_of_an_elastic_material_what_it_uses(self):
         rospy.sleep(2.0)
-        before = self.state().bodies[0]
         sliders = self.panel()['sliders']
-        self.assertEqual(1, len(sliders), 'damping')
-        self.slide(sliders[0], 40)
-        self.until(lambda: self.state().bodies[0].damping > before.damping + 1.0, 'damping did not change')
+        self.assertEqual(3, len(sliders), "Young's modulus, Poisson's ratio and damping")
+        self.save('elastic')
+        numbers = 'youngs_modulus', 'poissons_ratio', 'damping', 'alpha', 'beta'
+        for moved, way, changed in ((0, 40, lambda old, new: new > 1.2 * old), (1, -40, lambda old, new: new < old - 0.02),
+                                    (2, 40, lambda old, new: new > old + 1.0)):
+            before = self.state().bodies[0]
+            self.slide(sliders[moved], way)
+            self.until(lambda: changed(*(getattr(body, numbers[moved]) for body in (before, self.state().bodies[0]))),
+                       numbers[moved] + ' did not change')
+            after = self.state().bodies[0]
+            for other in set(numbers) - {numbers[moved]}:
+                self.assertEqual(getattr(before, other), getattr(after, other), other)
 
 
 if __name__ == '__main__':
