@@ -252,6 +252,16 @@ Result<Material> changeMaterial(const Material& base, const std::string& yaml, I
   }
   if (source.fault) return *source.fault;
   warnings.insert(warnings.end(), source.warnings.begin(), source.warnings.end());
+  const bool elastic = changed.elastic();
+  const std::vector<std::string> of_looks = {"alpha", "beta", "mode"}, of_elastic = {"poissons_ratio"};
+  for (const std::string& key : elastic ? of_looks : of_elastic)
+    if (const YAML::Node node = (*root)[key]; node.IsDefined())
+      source.fail(node,
+                  key + " is " + shown(node) + ", which " + (elastic ? "an elastic" : "an appearance") +
+                      " material like '" + changed.name + "' does not use",
+                  elastic ? "youngs_modulus, poissons_ratio, damping and what both kinds have"
+                          : "alpha, beta, mode, damping and what both kinds have");
+  if (source.fault) return *source.fault;
   return changed;
 }
 

@@ -147,6 +147,7 @@ meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatu
     message.beta = body.material.beta;
     message.damping = body.material.damping;
     message.youngs_modulus = body.material.youngs_modulus;
+    message.poissons_ratio = body.material.poissons_ratio;
     message.cavities = toCavities(body.measures);
     state.bodies.push_back(std::move(message));
   }

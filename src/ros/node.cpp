@@ -1,5 +1,6 @@
 #include "meshless_surgery/ros/node.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <set>
 
@@ -189,6 +190,7 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   for (const std::string& warning : scene->warnings) ROS_WARN_STREAM(warning);
   const std::size_t bodies = scene->bodies.size();
   std::shared_ptr<const PreparedBody> first;  // of the copies that share its model
+  double blades = kBlades;                    // that fit every body
   for (BodyDef& def : scene->bodies) {
     const std::string name = def.name;
     std::shared_ptr<const PreparedBody> ready;
@@ -198,6 +200,7 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
       auto body = prepareBody(std::move(def));
       if (!body.ok()) return Error{body.error().code, *file + ": body " + name + ": " + body.error().detail};
       ready = first = std::make_shared<PreparedBody>(std::move(*body));
+      blades = std::min(blades, bladesFor(ready->model->surface.vertices));
       const auto info = toInfo(name, *ready->model, scene->world);
       ROS_INFO_STREAM("body " << name << ": " << info.particles << " particles, " << 1000.0 * info.spacing
                               << " mm apart, " << info.mass << " kg; needs " << info.substeps_needed
@@ -218,6 +221,9 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
     if (!added.ok()) return Error{added.error().code, *file + ": attachments: " + added.error().detail};
     ROS_INFO_STREAM("attachment " << added->name << ": " << added->text());
   }
+
+  for (std::optional<double>* size : {&settings->scissors_length, &settings->scissors_width})
+    if (!*size) *size = blades;
 
   const SessionSettings session_settings = sessionSettings(*settings, *file);
   training_folders.access = access;

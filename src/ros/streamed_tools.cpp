@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include <Eigen/Eigenvalues>
+
 #include "meshless_surgery/ros/border_check.h"
 #include "meshless_surgery/ros/convert.h"
 
@@ -14,8 +16,20 @@ constexpr double kHandSpeed = 5.0;  // [m/s] no hand is faster ...
 constexpr double kJitter = 0.005;   // [s] ... but stamps are coarse, and messages come in bursts
 
 const char* wayBack(Operating state) { return state == Operating::kPaused ? "resume" : "enable"; }
+constexpr double kBladesPerWidth = 3.0;
 
 }  // namespace
+
+double bladesFor(const Points& surface) {
+  Eigen::Matrix3Xd points(3, surface.size());
+  for (std::size_t i = 0; i < surface.size(); ++i) points.col(static_cast<Eigen::Index>(i)) = surface[i];
+  points.colwise() -= points.rowwise().mean().eval();
+  const Mat3 moment = points * points.transpose();
+  points = Eigen::SelfAdjointEigenSolver<Mat3>(moment).eigenvectors().transpose() * points;
+  Vec3 extents = points.rowwise().maxCoeff() - points.rowwise().minCoeff();
+  std::sort(extents.data(), extents.data() + 3);
+  return std::min(kBladesPerWidth * extents[1], kBlades);
+}
 
 const char* toString(Operating state) {
   switch (state) {
@@ -196,7 +210,11 @@ void StreamedTools::movePush(Tool& tool, World& world) {
 
 void StreamedTools::moveScissors(Tool& tool, World& world) {
   tool.motion.advance(clock_.now());
-  world.setScissors(bladesAt(tool.motion.pose(), settings_.scissors_length, settings_.scissors_width), jaw_angle_);
+  world.setScissors(blades(tool.motion.pose()), jaw_angle_);
+}
+
+ScissorBlades StreamedTools::blades(const Pose& pose) const {
+  return bladesAt(pose, settings_.scissors_length.value_or(kBlades), settings_.scissors_width.value_or(kBlades));
 }
 
 void StreamedTools::lift(Tool& tool, const std::string& why) {
@@ -231,12 +249,11 @@ Status StreamedTools::hearJaw(double angle) {
     scissors.motion.keepAlive(clock_.now());
     pose = scissors.motion.pose();
   }
-  const ScissorBlades blades = bladesAt(pose, settings_.scissors_length, settings_.scissors_width);
-  post_([this, blades, angle, closes](World& world) {
-    world.setScissors(blades, angle);
-    if (!closes) return;
+  post_([this, pose, angle, closes](World& world) {
     CutCommand command;
-    command.blades = blades;
+    command.blades = blades(pose);
+    world.setScissors(command.blades, angle);
+    if (!closes) return;
     const auto reply = world.apply(command);
     // Cutting the air is no fault of the input.
     if (!reply.ok() && reply.error().code != ErrorCode::kMissed) refused_(reply.error());

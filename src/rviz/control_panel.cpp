@@ -28,6 +28,8 @@ namespace {
 constexpr int kRefresh = 200;           // [ms]
 constexpr int kTicks = 1000;            // of a slider
 constexpr double kMostDamping = 100.0;  // [1/s] of the slider
+constexpr double kSoftest = 100.0, kHardest = 1.0e6;  // [Pa] of the slider
+constexpr double kMostPoisson = 0.49;
 constexpr double kUserHolds = 1.0;  // [s] that a slider stays where the user put it, before the node's value is shown
 
 enum Column { kName, kVolume, kParticles, kAsleep, kColumns };
@@ -36,18 +38,24 @@ enum Column { kName, kVolume, kParticles, kAsleep, kColumns };
 
 double ControlPanel::Knob::number() const {
   const double share = static_cast<double>(slider->value()) / kTicks;
-  return most * (squared ? share * share : share);
+  if (scale == Scale::kDecades) return least * std::pow(most / least, share);
+  return least + (most - least) * (scale == Scale::kSquared ? share * share : share);
 }
 
 void ControlPanel::Knob::set(double number) {
-  const double share = std::clamp(number / most, 0.0, 1.0);
+  const double within = std::clamp(number, least, most);
+  const double share =
+      scale == Scale::kDecades ? std::log(within / least) / std::log(most / least) : (within - least) / (most - least);
   slider->blockSignals(true);
-  slider->setValue(static_cast<int>(std::lround(kTicks * (squared ? std::sqrt(share) : share))));
+  slider->setValue(static_cast<int>(std::lround(kTicks * (scale == Scale::kSquared ? std::sqrt(share) : share))));
   slider->blockSignals(false);
-  value->setText(QString::number(number, 'g', 3));
+  label(number);
 }
 
-void ControlPanel::Knob::label() { value->setText(QString::number(number(), 'g', 3)); }
+void ControlPanel::Knob::label(double number) {
+  value->setText(unit == "Pa" ? QString::number(1e-3 * number, 'g', 3) + " kPa"
+                              : QString::number(number, 'g', 3) + (unit.isEmpty() ? unit : " " + unit));
+}
 
 ControlPanel::ControlPanel(QWidget* parent) : rviz::Panel(parent), link_(new NodeLink(this)) {
   auto* layout = new QVBoxLayout(this);
@@ -119,34 +127,38 @@ ControlPanel::ControlPanel(QWidget* parent) : rviz::Panel(parent), link_(new Nod
   });
 
   material_ = new QGroupBox("Material", this);
-  auto* form = new QFormLayout(material_);
-  const auto knob = [&](const QString& key, double most, bool squared, bool elastic, const QString& tip) {
+  form_ = new QFormLayout(material_);
+  using Body = meshless_surgery::BodyState;
+  const auto knob = [](const char* key, const char* unit, double (*of)(const Body&), double least, double most,
+                       Scale scale, Family family) {
     Knob made;
     made.key = key;
+    made.unit = unit;
+    made.of = of;
+    made.least = least;
     made.most = most;
-    made.squared = squared;
-    made.elastic = elastic;
-    made.slider = new QSlider(Qt::Horizontal, material_);
-    made.slider->setRange(0, kTicks);
-    made.slider->setToolTip(tip);
-    made.value = new QLabel("-", material_);
-    made.value->setMinimumWidth(48);
-    auto* row = new QHBoxLayout;
-    row->addWidget(made.slider, 1);
-    row->addWidget(made.value);
-    form->addRow(key, row);
-    const std::size_t index = knobs_.size();
-    connect(made.slider, &QSlider::valueChanged, this, [this, index] {
-      knobs_[index].changed = true;
-      knobs_[index].since_user = 0.0;
-      knobs_[index].label();
-    });
-    knobs_.push_back(made);
+    made.scale = scale;
+    made.family = family;
+    return made;
   };
-  knob("alpha", 1.0, false, false, "How far tissue goes towards its goal in 1/60 s: 1 is stiff. Appearance materials.");
-  knob("beta", 1.0, false, false,
-       "How much of a linear or quadratic deformation the goal may have. Appearance materials.");
-  knob("damping", kMostDamping, true, true, "[1/s] of the motion that deforms.");
+  addKnob(knob(
+              "alpha", "", [](const Body& body) { return body.alpha; }, 0.0, 1.0, Scale::kLinear, Family::kAppearance),
+          "How far tissue goes towards its goal in 1/60 s: 1 is stiff.");
+  addKnob(knob(
+              "beta", "", [](const Body& body) { return body.beta; }, 0.0, 1.0, Scale::kLinear, Family::kAppearance),
+          "How much of a linear or quadratic deformation the goal may have.");
+  addKnob(knob(
+              "youngs_modulus", "Pa", [](const Body& body) { return body.youngs_modulus; }, kSoftest, kHardest,
+              Scale::kDecades, Family::kElastic),
+          "How stiff tissue is.");
+  addKnob(knob(
+              "poissons_ratio", "", [](const Body& body) { return body.poissons_ratio; }, 0.0, kMostPoisson,
+              Scale::kLinear, Family::kElastic),
+          "How well tissue keeps its volume: near 0.5 it does.");
+  addKnob(knob(
+              "damping", "1/s", [](const Body& body) { return body.damping; }, 0.0, kMostDamping, Scale::kSquared,
+              Family::kAny),
+          "Of the motion that deforms.");
   layout->addWidget(material_);
 
   message_ = paragraph();
@@ -154,6 +166,27 @@ ControlPanel::ControlPanel(QWidget* parent) : rviz::Panel(parent), link_(new Nod
 
   timer_ = new QTimer(this);
   connect(timer_, &QTimer::timeout, this, &ControlPanel::refresh);
+}
+
+void ControlPanel::addKnob(Knob knob, const QString& tip) {
+  knob.row = new QWidget(material_);
+  knob.slider = new QSlider(Qt::Horizontal, knob.row);
+  knob.slider->setRange(0, kTicks);
+  knob.slider->setToolTip(tip);
+  knob.value = new QLabel("-", knob.row);
+  knob.value->setMinimumWidth(60);
+  auto* row = new QHBoxLayout(knob.row);
+  row->setContentsMargins(0, 0, 0, 0);
+  row->addWidget(knob.slider, 1);
+  row->addWidget(knob.value);
+  form_->addRow(knob.key, knob.row);
+  const std::size_t index = knobs_.size();
+  connect(knob.slider, &QSlider::valueChanged, this, [this, index] {
+    knobs_[index].changed = true;
+    knobs_[index].since_user = 0.0;
+    knobs_[index].label(knobs_[index].number());
+  });
+  knobs_.push_back(knob);
 }
 
 void ControlPanel::load(const rviz::Config& config) {
@@ -269,15 +302,13 @@ void ControlPanel::fillMaterial() {
     if (body.name == name) found = &body;
   material_->setEnabled(found != nullptr);
   if (!found) return;
-  const bool elastic = found->youngs_modulus > 0.0;
-  material_->setTitle(
-      "Material of " + selected() +
-      (elastic ? QString(", elastic, %1 kPa").arg(1e-3 * found->youngs_modulus, 0, 'g', 3) : QString()));
-  const double numbers[] = {found->alpha, found->beta, found->damping};
-  for (std::size_t i = 0; i < knobs_.size(); ++i) {
-    Knob& knob = knobs_[i];
-    knob.slider->setEnabled(knob.elastic || !elastic);
-    if (!knob.slider->isSliderDown() && knob.since_user > kUserHolds) knob.set(numbers[i]);
+  const Family family = found->youngs_modulus > 0.0 ? Family::kElastic : Family::kAppearance;
+  material_->setTitle("Material of " + selected() + (family == Family::kElastic ? ", elastic" : ""));
+  for (Knob& knob : knobs_) {
+    const bool used = knob.family == Family::kAny || knob.family == family;
+    knob.row->setVisible(used);
+    form_->labelForField(knob.row)->setVisible(used);
+    if (used && !knob.slider->isSliderDown() && knob.since_user > kUserHolds) knob.set(knob.of(*found));
   }
 }
 

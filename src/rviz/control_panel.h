@@ -9,6 +9,7 @@
 #include "node_link.h"
 #endif
 
+class QFormLayout;
 class QGroupBox;
 class QLabel;
 class QLineEdit;
@@ -41,12 +42,16 @@ class ControlPanel : public rviz::Panel {
   void sendMaterial();
 
  private:
+  enum class Scale { kLinear, kSquared, kDecades };   // squared: finer near zero
+  enum class Family { kAny, kAppearance, kElastic };  // of materials
   /// A material's number and its slider.
   struct Knob {
-    QString key;
-    double most = 1.0;
-    bool squared = false;  // finer near zero
-    bool elastic = true;   // whether an elastic material uses it
+    QString key, unit;
+    double (*of)(const meshless_surgery::BodyState& body) = nullptr;
+    double least = 0.0, most = 1.0;
+    Scale scale = Scale::kLinear;
+    Family family = Family::kAny;  // that uses it
+    QWidget* row = nullptr;
     QSlider* slider = nullptr;
     QLabel* value = nullptr;
     bool changed = false;     // by the user, and not sent yet
@@ -54,12 +59,13 @@ class ControlPanel : public rviz::Panel {
 
     double number() const;
     void set(double number);
-    void label();
+    void label(double number);
   };
 
   void listen();
   void call(const char* name);
   void fillBodies();
+  void addKnob(Knob knob, const QString& tip);
   void fillMaterial();
   void say(const QString& text);
   QString selected() const;
@@ -75,6 +81,7 @@ class ControlPanel : public rviz::Panel {
   StepPlot* plot_;
   QTableWidget* bodies_;
   QGroupBox* material_;
+  QFormLayout* form_;
   std::vector<Knob> knobs_;
   QLabel* message_;
   QTimer* timer_;

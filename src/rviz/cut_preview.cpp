@@ -64,6 +64,9 @@ std::vector<PreviewLine> linesOfCut(const meshless_surgery::Surfaces& surfaces, 
 CutPreview::CutPreview(Ogre::SceneManager* scene_manager) : shown_(scene_manager) {
   shown_.setLineWidth(kLineWidth);
   shown_.setMaxPointsPerLine(2);
+  // Over the blades, which lie on it.
+  shown_.getMaterial()->setDepthCheckEnabled(false);
+  shown_.getMaterial()->setSceneBlending(Ogre::SBT_TRANSPARENT_ALPHA);  // drawn after what is solid
 }
 
 void CutPreview::show(const std::vector<PreviewLine>& lines, const Ogre::Vector3& origin,

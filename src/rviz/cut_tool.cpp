@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <OgreSceneManager.h>
+#include <meshless_surgery/Cut.h>
 #include <rviz/properties/float_property.h>
 #include <sensor_msgs/JointState.h>
 #include <std_srvs/Trigger.h>
@@ -15,9 +16,10 @@
 namespace meshless {
 namespace {
 
-constexpr double kOpen = 0.5;      // [rad]
-constexpr double kInFront = 0.03;  // [m] of the pivot before the tissue: half of the node's default blades
-constexpr double kFirstYaw = 0.6;  // [rad] seen along themselves the blades would be two lines
+constexpr double kOpen = 0.5;         // [rad]
+constexpr double kLeastSaid = 0.05;   // [rad] below 0.02 the node would cut by the stream, which gets no answer
+constexpr double kFirstYaw = 0.3;     // [rad] seen along themselves the blades would be two lines
+constexpr double kPush = 1.0 / 12.0;  // lengths a notch
 constexpr double kRadiansPerPixel = 0.008;
 constexpr double kRoll = 0.13;         // [rad] a notch
 constexpr double kDepthFactor = 1.15;  // a notch
@@ -36,7 +38,7 @@ Ogre::Quaternion firstTurn() {
 
 }  // namespace
 
-CutTool::CutTool() : HandTool('x'), angle_(kOpen), reach_(-kInFront), turn_(firstTurn()) {}
+CutTool::CutTool() : HandTool('x'), angle_(kOpen), turn_(firstTurn()) {}
 
 void CutTool::onInitialize() {
   HandTool::onInitialize();
@@ -47,19 +49,21 @@ void CutTool::onInitialize() {
 }
 
 void CutTool::nodeChanged() {
-  pose_stream_ = link().handle().advertise<geometry_msgs::PoseStamped>(link().nameOf("scissors/servo_cp"), 10);
-  jaw_stream_ = link().handle().advertise<sensor_msgs::JointState>(link().nameOf("scissors/jaw/servo_js"), 10);
+  poses_ = link().handle().advertise<geometry_msgs::PoseStamped>(link().nameOf("scissors/servo_cp"), 10);
+  jaws_ = link().handle().advertise<sensor_msgs::JointState>(link().nameOf("scissors/jaw/servo_js"), 10);
 }
 
 void CutTool::onActivate() {
   act_ = Act::kNone;
   angle_ = kOpen;
-  reach_ = -kInFront;
+  length_ = pushed_ = 0.0;
   turn_ = firstTurn();
   placed_ = false;
   surfaces_topic_ = link().handle().subscribe<meshless_surgery::Surfaces>(
-      link().nameOf("surfaces"), 1,
-      [this](const meshless_surgery::Surfaces::ConstPtr& surfaces) { surfaces_ = surfaces; });
+      link().nameOf("surfaces"), 1, [this](const meshless_surgery::Surfaces::ConstPtr& surfaces) {
+        surfaces_ = surfaces;
+        if (surfaces->scissors_shown) length_ = surfaces->scissors_length;
+      });
 }
 
 void CutTool::onDeactivate() {
@@ -75,6 +79,7 @@ void CutTool::onDeactivate() {
 void CutTool::putAway() {
   if (lifted_) return;
   lifted_ = true;
+  stream().hush();
   link().call("lift_scissors", std_srvs::Trigger(), {}, kAfterStream);
 }
 
@@ -86,7 +91,7 @@ bool CutTool::onMouse(rviz::ViewportMouseEvent& event) {
     } else if (event.shift()) {
       turn_ = Ogre::Quaternion(Ogre::Radian(static_cast<float>(kRoll * notches)), Ogre::Vector3::UNIT_Z) * turn_;
     } else {
-      reach_ += notches * kWheelStep;
+      pushed_ += notches * kPush;
     }
     follow();
     return true;
@@ -105,6 +110,7 @@ bool CutTool::onMouse(rviz::ViewportMouseEvent& event) {
         act_ = Act::kTurning;
       } else if (event.leftDown()) {
         act_ = placed_ ? Act::kClosing : Act::kOver;
+        pressed_ = ros::WallTime::now();
       } else if (event.middle() || event.right()) {
         return false;
       } else {
@@ -148,48 +154,75 @@ void CutTool::follow() {
     placed_ = true;
     plane_point_ = hover().position;
   }
-  const Ogre::Vector3 view = viewDirection();
-  pivot_ = onPlane(view, plane_point_) + view * reach_;
+  place_ = onPlane(viewDirection(), plane_point_);
   orientation_ = viewOrientation() * turn_;
+}
+
+Ogre::Vector3 CutTool::pivot() const {
+  return place_ + orientation_ * Ogre::Vector3::UNIT_X * ((pushed_ - 0.5) * length_);
 }
 
 void CutTool::onUpdate(double dt) {
   const double speed = kOpen / std::max(0.1f, close_time_->getFloat());
-  angle_ = act_ == Act::kClosing ? std::max(0.0, angle_ - dt * speed) : std::min(kOpen, angle_ + 2.0 * dt * speed);
+  const bool open = angle_ > 0.0;
+  // Of the time since the last picture, only what has passed since the button was pressed.
+  angle_ = act_ == Act::kClosing
+               ? std::max(0.0, angle_ - std::min(dt, (ros::WallTime::now() - pressed_).toSec()) * speed)
+               : std::min(kOpen, angle_ + 2.0 * dt * speed);
+  if (open && !(angle_ > 0.0)) cut();
   if (act_ == Act::kNone) follow();
   if (act_ == Act::kDrawing) draw();
-  if (placed_ && act_ != Act::kDrawing) stream();
+  if (placed_ && act_ != Act::kDrawing) sayBlades();
   showPreview();
 }
 
 void CutTool::showPreview() {
-  // The size of the blades is known once the node has taken them up.
-  if (!placed_ || act_ == Act::kDrawing || !surfaces_ || !surfaces_->scissors_shown) {
-    preview_.reset();
-    return;
-  }
+  const auto shown = act_ == Act::kDrawing ? std::nullopt : blades();
+  if (!shown) return preview_.reset();
+  Ogre::Vector3 origin;
+  Ogre::Quaternion turn;
+  worldPose(origin, turn);
+  if (!preview_) preview_ = std::make_unique<CutPreview>(scene_manager_);
+  preview_->show(linesOfCut(*surfaces_, *shown), origin - viewDirection() * kLineOver, turn);
+}
+
+std::optional<PreviewBlades> CutTool::blades() const {
+  if (!placed_ || !surfaces_ || !surfaces_->scissors_shown) return std::nullopt;
   Ogre::Vector3 origin;
   Ogre::Quaternion turn;
   worldPose(origin, turn);
   const Ogre::Quaternion back = turn.Inverse();
   PreviewBlades blades;
-  blades.pivot = back * (pivot_ - origin);
+  blades.pivot = back * (pivot() - origin);
   blades.reach = back * (orientation_ * Ogre::Vector3::UNIT_X);
   blades.open = back * (orientation_ * Ogre::Vector3::UNIT_Y);
   blades.length = surfaces_->scissors_length;
   blades.width = surfaces_->scissors_width;
-  if (!preview_) preview_ = std::make_unique<CutPreview>(scene_manager_);
-  preview_->show(linesOfCut(*surfaces_, blades), origin - viewDirection() * kLineOver, turn);
+  return blades;
 }
 
-void CutTool::stream() {
+void CutTool::sayBlades() {
   lifted_ = false;
-  pose_stream_.publish(poseMessage(pivot_, orientation_));
   sensor_msgs::JointState jaw;
   jaw.header.stamp = ros::Time::now();
   jaw.name = {"jaw"};
-  jaw.position = {angle_};
-  jaw_stream_.publish(jaw);
+  jaw.position = {std::max(kLeastSaid, angle_)};
+  stream().say([poses = poses_, jaws = jaws_, pose = poseMessage(pivot(), orientation_), jaw] {
+    poses.publish(pose);
+    jaws.publish(jaw);
+  });
+}
+
+void CutTool::cut() {
+  const auto closed = blades();
+  if (!closed) return say("the node has no scissors");
+  meshless_surgery::Cut wish;
+  wish.request.blades = poseMessage(pivot(), orientation_);
+  wish.request.length = closed->length;
+  wish.request.width = closed->width;
+  link().call("cut", wish, [this](const meshless_surgery::Cut::Response& answer) {
+    if (!answer.success) say(QString::fromStdString(answer.message));
+  });
 }
 
 void CutTool::draw() {
@@ -282,7 +315,7 @@ QString CutTool::help() const {
       return "<b>Move:</b> the incision ends here, " + depth +
              " deep.  <b>Wheel:</b> deeper, shallower.  <b>Release left:</b> open it.  <b>Esc:</b> undo.";
     default:
-      return "<b>Hold left:</b> close the blades.  <b>Wheel:</b> away, towards.  <b>Shift+drag, shift+wheel:</b> turn. "
+      return "<b>Hold left:</b> close the blades.  <b>Wheel:</b> deeper, back.  <b>Shift+drag, shift+wheel:</b> turn. "
              " "
              "<b>Ctrl+drag:</b> incision, " +
              depth + " (Ctrl+wheel).  <b>Z:</b> undo cut.  <b>R:</b> clear springs.";

@@ -5,11 +5,13 @@
 
 #ifndef Q_MOC_RUN
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <meshless_surgery/Incise.h>
 #include <meshless_surgery/Probe.h>
 #include <meshless_surgery/Surfaces.h>
+#include <ros/time.h>
 #include <rviz/ogre_helpers/billboard_line.h>
 
 #include "cut_preview.h"
@@ -58,7 +60,11 @@ class CutTool : public HandTool {
   };
 
   void follow();
-  void stream();
+  Ogre::Vector3 pivot() const;
+  /// In the node's world frame, of the node's size; none while the node has no scissors.
+  std::optional<PreviewBlades> blades() const;
+  void sayBlades();
+  void cut();
   void showPreview();
   void putAway();
   void turn(int dx, int dy);
@@ -71,15 +77,17 @@ class CutTool : public HandTool {
   double angle_;           // [rad] between the blades
   bool lifted_ = true;     // the node has no scissors of ours
   bool placed_ = false;    // the cursor has been over tissue
-  double reach_;           // [m] that the wheel has moved the blades away, from the pivot on the tissue
+  double length_ = 0.0;    // [m] of the node's blades, once it has taken them up
+  double pushed_ = 0.0;    // lengths that the wheel has moved the blades along themselves
   double depth_ = 0.015;   // [m] of an incision
   Ogre::Quaternion turn_;  // of the blades, in the camera's frame
   Ogre::Vector3 plane_point_ = Ogre::Vector3::ZERO;
-  Ogre::Vector3 pivot_ = Ogre::Vector3::ZERO;
+  Ogre::Vector3 place_ = Ogre::Vector3::ZERO;  // under the cursor, where their middle is
   Ogre::Quaternion orientation_;
   std::vector<Touch> line_;
   rviz::FloatProperty* close_time_ = nullptr;
-  ros::Publisher pose_stream_, jaw_stream_;
+  ros::WallTime pressed_;
+  ros::Publisher poses_, jaws_;
   std::unique_ptr<rviz::BillboardLine> shown_line_;
   std::unique_ptr<InstrumentsShape> scalpel_;
   ros::Subscriber surfaces_topic_;  // while the tool is in hand

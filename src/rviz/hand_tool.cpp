@@ -10,6 +10,7 @@
 #include <rviz/frame_manager.h>
 #include <rviz/properties/string_property.h>
 #include <rviz/view_controller.h>
+#include <rviz/view_manager.h>
 #include <std_srvs/Trigger.h>
 #include <QKeyEvent>
 
@@ -48,6 +49,7 @@ void HandTool::updateNode() {
 void HandTool::activate() {
   active_ = true;
   hover_ = Hover();
+  listenTo(context_->getViewManager()->getRenderPanel());
   state_ = link_->handle().subscribe<meshless_surgery::State>(link_->nameOf("state"), 1,
                                                               [this](const meshless_surgery::State::ConstPtr& state) {
                                                                 world_frame_ = state->header.frame_id;
@@ -63,9 +65,9 @@ void HandTool::deactivate() {
   active_ = false;
   state_.shutdown();
   events_.shutdown();
+  stream_.hush();
   onDeactivate();
-  if (panel_) panel_->removeEventFilter(this);
-  panel_ = nullptr;
+  listenTo(nullptr);
   viewport_ = nullptr;
   seen_ = false;
 }
@@ -82,11 +84,7 @@ void HandTool::update(float wall_dt, float) {
 }
 
 int HandTool::processMouseEvent(rviz::ViewportMouseEvent& event) {
-  if (panel_ != event.panel) {
-    if (panel_) panel_->removeEventFilter(this);
-    panel_ = event.panel;
-    panel_->installEventFilter(this);
-  }
+  if (panel_ != event.panel) listenTo(event.panel);
   viewport_ = event.viewport;
   x_ = event.x;
   y_ = event.y;
@@ -115,13 +113,22 @@ bool HandTool::onKey(int) { return false; }
 
 bool HandTool::eventFilter(QObject* object, QEvent* event) {
   if (event->type() == QEvent::Leave && !dragging()) seen_ = false;
-  if (event->type() == QEvent::KeyPress && static_cast<QKeyEvent*>(event)->key() == Qt::Key_Escape && dragging()) {
+  if (event->type() != QEvent::KeyPress) return rviz::Tool::eventFilter(object, event);
+  const int key = static_cast<QKeyEvent*>(event)->key();
+  if (key == Qt::Key_Escape && dragging()) {
     undoDrag();
     showStatus();
     context_->queueRender();
     return true;
   }
+  if (key == QChar(shortcut_key_).toUpper().unicode()) return true;
   return rviz::Tool::eventFilter(object, event);
+}
+
+void HandTool::listenTo(rviz::RenderPanel* panel) {
+  if (panel_) panel_->removeEventFilter(this);
+  panel_ = panel;
+  if (panel_) panel_->installEventFilter(this);
 }
 
 void HandTool::probe() {

@@ -14,6 +14,7 @@
 #include <rviz/render_panel.h>
 #include <rviz/viewport_mouse_event.h>
 
+#include "hand_stream.h"
 #include "node_link.h"
 #endif
 
@@ -40,7 +41,7 @@ class HandTool : public rviz::Tool {
   void update(float wall_dt, float ros_dt) override;
   int processMouseEvent(rviz::ViewportMouseEvent& event) override;
   int processKeyEvent(QKeyEvent* event, rviz::RenderPanel* panel) override;
-  /// Escape undoes the present drag; without a drag rviz has it.
+  /// Escape undoes the present drag; without a drag rviz has it. The tool's own key keeps it: rviz would put it away.
   bool eventFilter(QObject* object, QEvent* event) override;
 
  protected:
@@ -70,6 +71,8 @@ class HandTool : public rviz::Tool {
 
   // --- for each tool
   NodeLink& link() { return *link_; }
+  /// Hushed when the tool is put away.
+  HandStream& stream() { return stream_; }
   const Ogre::Ray& ray() const { return ray_; }
   const Hover& hover() const { return hover_; }
   bool seen() const { return seen_; }
@@ -100,12 +103,14 @@ class HandTool : public rviz::Tool {
   void updateNode();
 
  private:
+  void listenTo(rviz::RenderPanel* panel);
   void probe();
   void showCursor();
 
   NodeLink* link_ = nullptr;
+  HandStream stream_;
   rviz::StringProperty* node_property_ = nullptr;
-  QPointer<rviz::RenderPanel> panel_;
+  QPointer<rviz::RenderPanel> panel_;  // whose keys come here first
   ros::Subscriber state_, events_;
   std::string world_frame_;  // of the node; empty until it is known
   Ogre::Ray ray_;

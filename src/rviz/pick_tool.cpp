@@ -17,7 +17,6 @@ namespace {
 constexpr double kReach = 0.002;   // [m] beside the surface that still grabs
 constexpr double kSphere = 0.009;  // [m] diameter: a little more than the end of a spring in the markers
 constexpr double kNear = 14.0;     // [px] from the middle of a locked sphere
-constexpr double kSayAgain = 0.1;  // [s]
 constexpr float kOpenJaws = 0.8f;  // [rad] before they close on tissue; the node shows those that hold
 
 }  // namespace
@@ -25,7 +24,7 @@ constexpr float kOpenJaws = 0.8f;  // [rad] before they close on tissue; the nod
 PickTool::PickTool() : HandTool('k') {}
 
 void PickTool::nodeChanged() {
-  stream_ = link().handle().advertise<geometry_msgs::PoseStamped>(link().nameOf("pick/servo_cp"), 10);
+  poses_ = link().handle().advertise<geometry_msgs::PoseStamped>(link().nameOf("pick/servo_cp"), 10);
 }
 
 void PickTool::onDeactivate() {
@@ -76,9 +75,9 @@ bool PickTool::onMouse(rviz::ViewportMouseEvent& event) {
     case Drag::kHolding:
       if (event.rightDown() && drag_ == Drag::kHolding) {
         move();
+        end();
         lock(target_);
         say("locked");
-        end();
       } else if (event.leftUp() || !event.left()) {
         if (drag_ == Drag::kHolding) move();
         letGo();
@@ -172,13 +171,10 @@ void PickTool::hold(std::uint32_t pick_id, const Ogre::Vector3& point) {
 void PickTool::move() {
   target_ = onPlane(plane_normal_, plane_point_) + grip_;
   if (sphere_) sphere_->setPosition(target_);
-  stream_.publish(poseMessage(target_, instrumentTurn()));
-  since_said_ = 0.0;
+  stream().say([poses = poses_, pose = poseMessage(target_, instrumentTurn())] { poses.publish(pose); });
 }
 
-void PickTool::onUpdate(double dt) {
-  since_said_ += dt;
-  if (drag_ == Drag::kHolding && since_said_ > kSayAgain) move();
+void PickTool::onUpdate(double) {
   if (drag_ != Drag::kNone || !seen() || !hover().over) return grasper_.reset();
   if (!grasper_) grasper_ = std::make_unique<InstrumentsShape>(scene_manager_, scene_manager_->getRootSceneNode());
   grasper_->show(grasperParts(hover().position, instrumentTurn(), kOpenJaws));
@@ -203,19 +199,21 @@ void PickTool::release(std::uint32_t pick_id) {
 
 void PickTool::letGo() {
   ++attempt_;  // an answer that is still under way is released when it comes
-  if (drag_ == Drag::kHolding) release(pick_id_);
+  const bool held = drag_ == Drag::kHolding;
   end();
+  if (held) release(pick_id_);
 }
 
 void PickTool::end() {
   drag_ = Drag::kOver;
+  stream().hush();
   sphere_.reset();
 }
 
 void PickTool::undoDrag() {
   if (drag_ == Drag::kHolding && taken_up_) {
-    lock(start_);
     end();
+    lock(start_);
     say("undone: locked where it was");
     return;
   }

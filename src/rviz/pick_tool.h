@@ -66,9 +66,8 @@ class PickTool : public HandTool {
   Ogre::Vector3 grip_ = Ogre::Vector3::ZERO;            // from the cursor's point to the free end
   Ogre::Vector3 start_ = Ogre::Vector3::ZERO;           // of the free end
   Ogre::Vector3 target_ = Ogre::Vector3::ZERO;
-  double since_said_ = 0.0;  // [s]
   std::vector<Locked> locked_;
-  ros::Publisher stream_;
+  ros::Publisher poses_;
   std::unique_ptr<rviz::Shape> sphere_;
   std::unique_ptr<InstrumentsShape> grasper_;  // over tissue that it could grab
 };

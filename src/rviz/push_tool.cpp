@@ -24,7 +24,7 @@ constexpr double kSpeed = 1.0;          // [m/s] where its size changes while it
 PushTool::PushTool() : HandTool('h') {}
 
 void PushTool::nodeChanged() {
-  stream_ = link().handle().advertise<geometry_msgs::PoseStamped>(link().nameOf("push/servo_cp"), 10);
+  poses_ = link().handle().advertise<geometry_msgs::PoseStamped>(link().nameOf("push/servo_cp"), 10);
 }
 
 void PushTool::onActivate() {
@@ -108,7 +108,7 @@ void PushTool::place(double speed) {
   link().call("push", wish, [this, attempt](const meshless_surgery::Push::Response& answer) {
     if (attempt != attempt_ || !dragging()) return;
     if (!answer.success) {
-      drag_ = Drag::kOver;
+      end();
       say(QString::fromStdString(answer.message));
     } else if (drag_ == Drag::kAsking) {
       drag_ = Drag::kSolid;  // only now: a stream alone would bring a sphere of the node's default size
@@ -117,20 +117,24 @@ void PushTool::place(double speed) {
   });
 }
 
-void PushTool::lift() {
+void PushTool::end() {
   ++attempt_;
-  standing_ = false;
   drag_ = Drag::kOver;
+  stream().hush();
+}
+
+void PushTool::lift() {
+  end();
+  standing_ = false;
   meshless_surgery::Push wish;
   wish.request.enable = false;
   link().call("push", wish, {}, kAfterStream);
 }
 
 void PushTool::leaveAt(const Ogre::Vector3& place) {
-  ++attempt_;
+  end();
   standing_ = true;
   standing_at_ = place;
-  drag_ = Drag::kOver;
   // By the service: what a stream has placed goes with its silence.
   meshless_surgery::Push wish;
   wish.request.enable = true;
@@ -140,10 +144,11 @@ void PushTool::leaveAt(const Ogre::Vector3& place) {
   link().call("push", wish, {}, kAfterStream);
 }
 
-void PushTool::move() { stream_.publish(poseMessage(centre(), instrumentTurn())); }
+void PushTool::move() {
+  stream().say([poses = poses_, pose = poseMessage(centre(), instrumentTurn())] { poses.publish(pose); });
+}
 
 void PushTool::onUpdate(double) {
-  if (drag_ == Drag::kSolid) move();
   if (drag_ == Drag::kNone) showGhost();
 }
 

@@ -38,6 +38,7 @@ class PushTool : public HandTool {
   Ogre::Vector3 centre() const;
   void press();
   void place(double speed);
+  void end();
   void lift();
   void leaveAt(const Ogre::Vector3& place);
   void move();
@@ -53,7 +54,7 @@ class PushTool : public HandTool {
   Ogre::Vector3 plane_point_ = Ogre::Vector3::ZERO;  // the centre lies in the plane through it that faces the camera
   Ogre::Vector3 plane_normal_ = Ogre::Vector3::UNIT_X;
   Ogre::Vector3 grip_ = Ogre::Vector3::ZERO;
-  ros::Publisher stream_;
+  ros::Publisher poses_;
   std::unique_ptr<rviz::Shape> ghost_;
 };
 

@@ -415,6 +415,28 @@ TEST(ChangeMaterial, RefusesWhatItDoesNotKnow) {
   }
 }
 
+TEST(ChangeMaterial, RefusesAKeyThatWouldChangeNothing) {
+  Material looks, elastic;
+  elastic.name = "soft";
+  elastic.youngs_modulus = 5000.0;
+  const std::vector<std::string> of_looks = {"alpha: 0.5", "beta: 0.5", "mode: rigid"},
+                                 of_elastic = {"poissons_ratio: 0.3"};
+  for (const std::string& key : of_looks) {
+    const Result<Material> refused = changed(elastic, "damping: 3\n" + key);
+    ASSERT_FALSE(refused.ok()) << key;
+    EXPECT_TRUE(says(refused.error(), "material:2: " + key.substr(0, key.find(':')) + " is "))
+        << refused.error().detail;
+    EXPECT_TRUE(says(refused.error(), "elastic material like 'soft'")) << refused.error().detail;
+    EXPECT_TRUE(changed(looks, key).ok()) << key;
+    EXPECT_TRUE(changed(elastic, "youngs_modulus: 0\n" + key).ok()) << key << ": it is of the other kind then";
+  }
+  for (const std::string& key : of_elastic) {
+    EXPECT_FALSE(changed(looks, key).ok()) << key;
+    EXPECT_TRUE(changed(elastic, key).ok()) << key;
+    EXPECT_TRUE(changed(looks, "youngs_modulus: 5000\n" + key).ok()) << key << ": it is of the other kind then";
+  }
+}
+
 TEST(ReadMaterials, AFolderThatIsMissingIsUnreadable) {
   const Result<std::map<std::string, Material>> read = readMaterials("/no/such/folder");
   ASSERT_FALSE(read.ok());

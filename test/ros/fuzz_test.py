@@ -252,7 +252,7 @@ class Fuzzer:
                 fields['rest'] = r.random() < 0.5
             return fields
         if service == 'set_material' and self.sensible:
-            return dict(body='', yaml='{%s: %.3f}' % (r.choice(['alpha', 'friction', 'damping']), r.random()))
+            return dict(body='', yaml='{%s: %.3f}' % (r.choice(['restitution', 'friction', 'damping']), r.random()))
         if service == 'set_material':
             yaml = r.choice(yaml_bombs()) if r.random() < 0.3 else '{%s: %s}' % (
                 r.choice(['alpha', 'beta', 'mode', 'density', 'youngs_modulus', 'friction', 'damping', 'colour',

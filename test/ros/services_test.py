@@ -353,6 +353,7 @@ class BodiesTest(DeformerTestCase):
         self.refused(['alpha', '1.5'], 'set_material', body='left', yaml='{alpha: 1.5}')
         self.refused(['alpha'], 'set_material', body='left', yaml='{alpha: .nan}')
         self.refused(['alpah', 'alpha'], 'set_material', body='left', yaml='{alpah: 0.5}')
+        self.refused(['poissons_ratio', '0.3', 'appearance'], 'set_material', body='left', yaml='{poissons_ratio: 0.3}')
         self.refused([], 'set_material', body='left', yaml='{alpha: [')
         self.refused([], 'set_material', yaml='just words')
 

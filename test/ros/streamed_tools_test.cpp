@@ -447,5 +447,19 @@ TEST(StreamedTools, CommandsThatDoNotFitAreRefusedWithThoseThatDo) {
   EXPECT_EQ("", refusal("home"));
 }
 
+TEST(StreamedTools, BladesFitABodyHoweverItLies) {
+  Quat turned;
+  turned = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized());
+  for (const Vec3& size : {Vec3(0.006, 0.05, 0.006), Vec3(0.05, 0.008, 0.007), Vec3(0.3, 0.2, 0.1)}) {
+    Points corners;
+    for (const double x : {-0.5, 0.5})
+      for (const double y : {-0.5, 0.5})
+        for (const double z : {-0.5, 0.5}) corners.push_back(Vec3(1, 2, 3) + turned * size.cwiseProduct(Vec3(x, y, z)));
+    Vec3 sorted = size;
+    std::sort(sorted.data(), sorted.data() + 3);
+    EXPECT_NEAR(std::min(3.0 * sorted[1], kBlades), bladesFor(corners), 1e-12) << size.transpose();
+  }
+}
+
 }  // namespace streamed_tools_test
 }  // namespace meshless

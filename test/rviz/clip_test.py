@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A real mouse on a virtual display puts clips on a vessel and takes them off: where it points, and where the preview was."""
+"""A real mouse on a virtual display puts clips on a vessel, takes them off and cuts it: where it points, and where the preview was."""
 import os
 import sys
 import unittest
@@ -9,12 +9,12 @@ import rospy
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from rviz_view import configured_view, project, view_rectangle  # noqa: E402
+from rviz_view import axes, configured_view, project, ray_through, view_rectangle  # noqa: E402
 from virtual_display import Mouse, VirtualDisplay, stop, wait_until  # noqa: E402
 
-from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion  # noqa: E402
-from meshless_surgery.msg import State  # noqa: E402
-from meshless_surgery.srv import GetBody, Spawn  # noqa: E402
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3  # noqa: E402
+from meshless_surgery.msg import State, TaskState  # noqa: E402
+from meshless_surgery.srv import GetBody, Probe, Report, Spawn, StartTask  # noqa: E402
 from shape_msgs.msg import SolidPrimitive  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
 
@@ -81,9 +81,12 @@ class ClipTest(unittest.TestCase):
     def pixel(self, place):
         return project(numpy.array([place]), self.view, self.rectangle)[0]
 
+    def vertices(self, name):
+        return numpy.array([xyz(v) for v in call('get_body', GetBody, name=name).surface.vertices])
+
     def middle(self, x):
         """Of the vessel's section at x, as it hangs."""
-        vertices = numpy.array([xyz(v) for v in call('get_body', GetBody, name='vessel').surface.vertices])
+        vertices = self.vertices('vessel')
         return vertices[numpy.abs(vertices[:, 0] - x) < 0.001].mean(axis=0)
 
     def preview(self):
@@ -153,23 +156,100 @@ class ClipTest(unittest.TestCase):
             self.mouse.key_up('shift')
         self.assertEqual([first.name], [clip.name for clip in self.clips()])
 
+    # --- scissors
+
+    def open_blades(self, x):
+        """Over the vessel at x, with their line on it; the pixel of the cursor, and the tissue under it."""
+        self.mouse.key('x')
+        row, column = self.point_at(self.middle(x))
+        rospy.sleep(0.5)
+        origin, direction = ray_through((row, column), self.view, self.rectangle)
+        met = call('probe', Probe, point=Point(*origin), direction=Vector3(*direction))
+        self.assertEqual('vessel', met.body)
+        return (row, column), xyz(met.position)
+
+    def bodies(self):
+        return sorted(body.name for body in self.state().bodies)
+
+    def test_scissors_cut_what_is_under_the_cursor(self):
+        for x in (-0.008, 0.0, 0.008):
+            cursor, tissue = self.open_blades(x)
+            line = self.preview()
+            self.save('scissors_%+d' % (1e3 * x))
+            self.assertLess(numpy.linalg.norm(line - cursor, axis=1).min(), 6, 'the line is beside the cursor')
+            pose = rospy.wait_for_message(NODE + '/scissors/measured_cp', PoseStamped, LONG).pose
+            normal = axes(pose)[2]
+            self.assertLess(abs((tissue - xyz(pose.position)).dot(normal)), 5e-4)
+            self.mouse.down()
+            self.until(lambda: self.bodies() == ['vessel.1', 'vessel.2'], 'not cut')
+            self.mouse.up()
+            sides = [(self.vertices(name) - tissue).dot(normal) for name in self.bodies()]
+            lower, upper = sorted(sides, key=lambda heights: heights.mean())
+            self.assertTrue(lower.max() < 1e-3 and upper.min() > -1e-3, (lower.max(), upper.min()))
+            self.assertTrue(call('undo_cut', Trigger).success)
+
+    def test_scissors_that_meet_nothing_say_so(self):
+        self.open_blades(0.0)
+        row, column = self.pixel(numpy.array([0.0, 0.0, 0.075]))  # above the vessel
+        self.mouse.move((row, column))
+        self.until(lambda: len(self.preview()) == 0, 'a line in the air')
+        help_text = self.quiet_status()
+        self.mouse.down()
+        rospy.sleep(1.5)
+        self.mouse.up()
+        self.until_said(help_text)
+        self.save('missed')
+        self.assertEqual(['vessel'], self.bodies())
+
+    def test_the_task_is_passed_by_what_its_brief_says(self):
+        self.assertTrue(call('start_task', StartTask, task='transect', trainee='mouse').success)
+        self.assertTrue(call('pause', SetBool, data=False).success)
+        rospy.sleep(1.0)  # it hangs
+        for x in (-0.009, 0.009):
+            self.mouse.key('m')
+            self.mouse.move(self.air())
+            self.mouse.key('l')
+            before = len(self.clips())
+            self.point_at(self.middle(x))
+            self.mouse.click()
+            self.until(lambda: len(self.clips()) == before + 1, 'no clip')
+        rospy.sleep(1.0)
+        self.open_blades(0.0)
+        self.save('transect')
+        self.mouse.down()
+        self.until(lambda: len(self.bodies()) == 2, 'not cut')
+        self.mouse.up()
+        task = [rospy.wait_for_message(NODE + '/task', TaskState, LONG)]
+
+        def done():
+            task.append(rospy.wait_for_message(NODE + '/task', TaskState, LONG))
+            return not task[-1].running
+        self.until(done, 'the task does not end')
+        print(task[-1], call('report', Report))
+        self.assertTrue(task[-1].passed, task[-1])
+
+    def quiet_status(self):
+        """The line of help, once what was said is gone."""
+        rospy.sleep(5.0)
+        return self.status()
+
+    def status(self):
+        return self.display.screenshot()[self.rectangle[1]:, :-150].astype(int)  # without the frames a second
+
+    def until_said(self, help_text):
+        """Something else is there for some time."""
+        self.until(lambda: (self.status() != help_text).any(axis=2).sum() > 200, 'nothing was said')
+        self.until(lambda: (self.status() != help_text).any(axis=2).sum() < 50, 'it is said for ever')
+
     def test_what_is_refused_is_said(self):
         bead = numpy.array([0.0, -0.02, 0.06])
         self.assertTrue(call('spawn', Spawn, name='bead', primitive=SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[0.004]),
                              pose=PoseStamped(pose=Pose(position=Point(*bead), orientation=Quaternion(w=1.0)))).success)
         self.point_at(bead)
-        rospy.sleep(0.5)
-        bottom = self.rectangle[1]
-
-        def status():
-            return self.display.screenshot()[bottom:, :-150].astype(int)  # without the frames a second
-        rospy.sleep(5.0)  # what was said before is gone
-        help_text = status()
+        help_text = self.quiet_status()
         self.mouse.click()  # nothing is hollow there
-        self.until(lambda: (status() != help_text).any(axis=2).sum() > 200, 'nothing was said')
-        self.save('refused')
+        self.until_said(help_text)
         self.assertEqual([], self.clips())
-        self.until(lambda: (status() != help_text).any(axis=2).sum() < 50, 'it is said for ever')
 
 
 if __name__ == '__main__':

@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """A real mouse on a virtual display works with the tools of the rviz plugin: what the node says of its world, and what the
 picture shows, is what the hand did."""
+import contextlib
 import os
+import re
 import signal
 import sys
 import unittest
@@ -13,12 +15,12 @@ import rospy
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from rviz_view import camera_axes, configured_view, project, view_rectangle  # noqa: E402
+from rviz_view import axes, camera_axes, configured_view, project, ray_through, view_rectangle  # noqa: E402
 from virtual_display import Mouse, VirtualDisplay, stop, wait_until  # noqa: E402
 
-from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion  # noqa: E402
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3  # noqa: E402
 from meshless_surgery.msg import Event, State  # noqa: E402
-from meshless_surgery.srv import Cut, GetBody, Remove, Spawn  # noqa: E402
+from meshless_surgery.srv import Cut, GetBody, Probe, Remove, Spawn  # noqa: E402
 from shape_msgs.msg import SolidPrimitive  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
 
@@ -31,6 +33,10 @@ LOBE = (-0.05, -0.03, 0.075)
 def call(service, kind, **fields):
     rospy.wait_for_service(NODE + '/' + service, LONG)
     return rospy.ServiceProxy(NODE + '/' + service, kind)(**fields)
+
+
+def process_of(node):
+    return ServerProxy(rosgraph.Master('/hands_test').lookupNode(node)).getPid('/hands_test')[2]
 
 
 def vector(point):
@@ -88,6 +94,11 @@ class HandsTest(unittest.TestCase):
         top, bottom, left, right = cls.rectangle
         part = picture[top:bottom, left:right]
         return (part[:, :, 0] > part[:, :, 1] + 35) & (part[:, :, 0] > part[:, :, 2] + 35)
+
+    def ray(self, place):
+        """As ~probe wants it, through a pixel."""
+        origin, direction = ray_through(place, self.view, self.rectangle)
+        return {'point': Point(*origin), 'direction': Vector3(*direction)}
 
     def pixel(self, point):
         return project(numpy.array([point]), self.view, self.rectangle)[0]
@@ -181,6 +192,22 @@ class HandsTest(unittest.TestCase):
                 self.mouse.up()
             self.mouse.move(corner)
             self.until(lambda: self.display.cursor() == air, 'the cursor over tissue stays in the air, with ' + key)
+
+    def test_the_key_of_the_tool_in_hand_keeps_it(self):
+        for key in 'khx':
+            place = self.take(key)
+            over = self.display.cursor()
+            self.mouse.key('m')
+            self.until(lambda: self.display.cursor() != over, 'the cursor of rviz is that of ' + key)
+            self.mouse.key(key)
+            self.mouse.key(key)  # before the mouse has moved
+            self.mouse.move((place[0] + 2, place[1]))
+            self.until(lambda: self.display.cursor() == over, 'put away by its own key: ' + key)
+            self.mouse.key(key)
+            rospy.sleep(0.5)
+            self.mouse.move(place)
+            rospy.sleep(0.5)
+            self.assertEqual(over, self.display.cursor(), 'put away by its own key: ' + key)
 
     def test_the_wheel_moves_the_plane_and_keeps_its_normal(self):
         back = camera_axes(self.view)[3]
@@ -310,9 +337,50 @@ class HandsTest(unittest.TestCase):
         # It has come back, up to what the first pixels of the drag were before the node had answered.
         self.until(lambda: (self.tissue() != before).sum() < 0.1 * before.sum(), 'the view is not as it was')
 
+    def turns(self):
+        """How often the thread of rviz' windows has begun to wait, so far."""
+        rviz = process_of('/rviz')
+        with open('/proc/%d/task/%d/status' % (rviz, rviz)) as status:
+            return re.search(r'\nvoluntary_ctxt_switches:\s*(\d+)', status.read()).group(1)
+
+    @contextlib.contextmanager
+    def long_picture(self):
+        """One that takes far longer than the node waits for a stream."""
+        with self.display.stalled():
+            rospy.sleep(0.5)
+            before = self.turns()
+            rospy.sleep(1.5)
+            yield
+            self.assertEqual(before, self.turns(), 'rviz went on drawing: this is no test')
+        self.until(lambda: self.turns() != before, 'rviz does not go on')
+
+    def test_what_the_hand_holds_outlasts_a_picture_that_takes_long(self):
+        place, grabbed = self.grab()
+        self.mouse.move((place[0] - 60, place[1] - 40))
+        with self.long_picture():
+            self.assertEqual([grabbed.pick_id], [pick.pick_id for pick in self.state().picks], 'it was dropped')
+        self.mouse.move((place[0] - 90, place[1] - 60))
+        self.until(lambda: numpy.abs(self.pixel(vector(self.pick().target)) - (place[0] - 90, place[1] - 60)).max() < 4,
+                   'the free end does not follow any more')
+        self.let_go()
+        self.take('h')
+        self.mouse.down()
+        self.until(lambda: self.pushes(), 'no sphere')
+        with self.long_picture():
+            self.assertTrue(self.pushes(), 'the sphere is gone')
+        self.mouse.up()
+        self.until(lambda: not self.pushes(), 'the sphere was not lifted off')
+        self.take('x')
+        self.blades()
+        with self.long_picture():
+            self.poses['scissors'].clear()
+            rospy.sleep(0.5)
+            self.assertTrue(self.poses['scissors'], 'the scissors are gone')
+        self.assertEqual([], self.said('lifted'))
+
     def test_a_node_that_hangs_does_not_freeze_the_view(self):
         place, _ = self.grab()
-        process = ServerProxy(rosgraph.Master('/hands_test').lookupNode(NODE)).getPid('/hands_test')[2]
+        process = process_of(NODE)
         os.kill(process, signal.SIGSTOP)
         try:
             self.mouse.move((place[0] - 60, place[1] - 40))  # a drag, to nobody
@@ -432,8 +500,10 @@ class HandsTest(unittest.TestCase):
     def test_blades_that_meet_sever_what_they_hold_and_z_undoes_it(self):
         place = self.take('x')
         pose = self.blades()
-        # The pivot is in front of the tissue under the cursor.
-        self.assertLess(numpy.abs(self.pixel(vector(pose.position)) - place).max(), 30)
+        # Their middle is on the tissue under the cursor.
+        middle = call('probe', Probe, **self.ray(place))
+        self.assertTrue(middle.success)
+        self.assertLess(numpy.linalg.norm(vector(pose.position) + 0.03 * axes(pose)[0] - vector(middle.position)), 0.003)
         call('pause', SetBool, data=True)  # so that the pieces stay where they were cut
         self.addCleanup(call, 'pause', SetBool, data=False)
         volume = self.state().bodies[0].volume
@@ -446,8 +516,7 @@ class HandsTest(unittest.TestCase):
         self.assertAlmostEqual(1.0, sum(b.volume for b in bodies) / volume, delta=5e-4)
         # The plane of the blades lies between the pieces.
         pose = self.blades()
-        q = pose.orientation
-        normal = numpy.array([2 * (q.x * q.z + q.w * q.y), 2 * (q.y * q.z - q.w * q.x), 1 - 2 * (q.x ** 2 + q.y ** 2)])
+        normal = axes(pose)[2]
         heights = [(self.body(b.name) - vector(pose.position)).dot(normal) for b in bodies]
         upper = heights[0] if heights[0].mean() > heights[1].mean() else heights[1]
         lower = heights[1] if upper is heights[0] else heights[0]
@@ -485,8 +554,7 @@ class HandsTest(unittest.TestCase):
         self.save('cut_line')
         # Each of its pixels is beside an edge of the tissue that the plane of the blades goes through.
         pose = self.blades()
-        q = pose.orientation
-        normal = numpy.array([2 * (q.x * q.z + q.w * q.y), 2 * (q.y * q.z - q.w * q.x), 1 - 2 * (q.x ** 2 + q.y ** 2)])
+        normal = axes(pose)[2]
         surface = call('get_body', GetBody, name='liver').surface
         vertices = numpy.array([vector(v) for v in surface.vertices])
         triangles = numpy.array([t.vertex_indices for t in surface.triangles])
@@ -510,7 +578,6 @@ class HandsTest(unittest.TestCase):
         self.until(lambda: len(self.cut_line()) == 0, 'the line stays without the tool')
 
     def test_shift_drag_turns_the_blades_and_the_wheel_moves_them(self):
-        back = camera_axes(self.view)[3]
         place = self.take('x')
         before = self.blades()
         self.mouse.key_down('shift')
@@ -523,10 +590,13 @@ class HandsTest(unittest.TestCase):
         after = self.blades()
         dot = abs(sum(getattr(before.orientation, a) * getattr(after.orientation, a) for a in 'xyzw'))
         self.assertAlmostEqual(0.8, 2 * numpy.arccos(min(1.0, dot)), delta=0.05)  # 100 px of 0.008 rad
+        # About the tissue under the cursor.
+        middles = [vector(pose.position) + 0.03 * axes(pose)[0] for pose in (before, after)]
+        self.assertLess(numpy.linalg.norm(middles[1] - middles[0]), 0.003)
         self.mouse.wheel(3)
         rospy.sleep(0.5)
         moved = vector(self.blades().position) - vector(after.position)
-        self.assertAlmostEqual(-0.015, moved.dot(back), delta=0.004)
+        self.assertLess(numpy.linalg.norm(moved - 0.015 * axes(after)[0]), 0.003)  # along themselves
         self.assertEqual(['liver'], [b.name for b in self.state().bodies])
         self.mouse.key('m')
         rospy.sleep(1.0)
@@ -636,11 +706,19 @@ class HandsTest(unittest.TestCase):
 
     def test_the_panel_offers_of_an_elastic_material_what_it_uses(self):
         rospy.sleep(2.0)
-        before = self.state().bodies[0]
         sliders = self.panel()['sliders']
-        self.assertEqual(1, len(sliders), 'damping')
-        self.slide(sliders[0], 40)
-        self.until(lambda: self.state().bodies[0].damping > before.damping + 1.0, 'damping did not change')
+        self.assertEqual(3, len(sliders), "Young's modulus, Poisson's ratio and damping")
+        self.save('elastic')
+        numbers = 'youngs_modulus', 'poissons_ratio', 'damping', 'alpha', 'beta'
+        for moved, way, changed in ((0, 40, lambda old, new: new > 1.2 * old), (1, -40, lambda old, new: new < old - 0.02),
+                                    (2, 40, lambda old, new: new > old + 1.0)):
+            before = self.state().bodies[0]
+            self.slide(sliders[moved], way)
+            self.until(lambda: changed(*(getattr(body, numbers[moved]) for body in (before, self.state().bodies[0]))),
+                       numbers[moved] + ' did not change')
+            after = self.state().bodies[0]
+            for other in set(numbers) - {numbers[moved]}:
+                self.assertEqual(getattr(before, other), getattr(after, other), other)
 
 
 if __name__ == '__main__':

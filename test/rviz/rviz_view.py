@@ -44,3 +44,19 @@ def project(points, view, rectangle):
     columns = 0.5 * (left + right) + scale * relative.dot(side) / depth
     rows = 0.5 * (top + bottom) - scale * relative.dot(up) / depth
     return numpy.rint(numpy.stack([rows, columns], axis=1)).astype(int)
+
+
+def ray_through(place, view, rectangle):
+    """Of the camera, through a pixel (row, column): from where, and which way."""
+    top, bottom, left, right = rectangle
+    eye, side, up, back = camera_axes(view)
+    scale = 0.5 * (bottom - top) / numpy.tan(0.5 * view['Field of View'])
+    return eye, ((place[1] - 0.5 * (left + right)) * side - (place[0] - 0.5 * (top + bottom)) * up) / scale - back
+
+
+def axes(pose):
+    """Of a pose: its x, y and z, as rows."""
+    q = pose.orientation
+    x = numpy.array([1 - 2 * (q.y ** 2 + q.z ** 2), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y)])
+    z = numpy.array([2 * (q.x * q.z + q.w * q.y), 2 * (q.y * q.z - q.w * q.x), 1 - 2 * (q.x ** 2 + q.y ** 2)])
+    return numpy.array([x, numpy.cross(z, x), z])

@@ -1,4 +1,5 @@
 """A display that nobody sees, rviz on it, and pictures of what it shows."""
+import contextlib
 import ctypes
 import os
 import re
@@ -82,6 +83,15 @@ class VirtualDisplay:
 
     def save(self, file):
         subprocess.run(['import', '-window', 'root', file], env=self.environment, check=True)
+
+    @contextlib.contextmanager
+    def stalled(self):
+        """It takes no picture: programs wait in the middle of their drawing."""
+        self.server.send_signal(signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            self.server.send_signal(signal.SIGCONT)
 
     def close(self):
         self.server.terminate()

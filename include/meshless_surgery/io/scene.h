@@ -36,7 +36,8 @@ Result<SceneDef> readScene(const std::string& file, const FileAccess& access);
 Result<std::map<std::string, Material>> readMaterials(const std::string& folder);
 
 /// `base` with the keys of a YAML map changed (mode, alpha, beta, density, damping, friction, color, inside_color ...).
-/// Images are taken from `folder` on; `warnings` gets what could be done without.
+/// Images are taken from `folder` on; `warnings` gets what could be done without. Refused too: a key that the changed
+/// material has no use for, as it is elastic or not.
 Result<Material> changeMaterial(const Material& base, const std::string& yaml, ImageFiles& images,
                                 const std::string& folder, std::vector<std::string>& warnings);
 

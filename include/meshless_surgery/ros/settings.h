@@ -39,8 +39,8 @@ struct NodeSettings {
   double pick_max_speed = 5.0;             // tools/pick/max_speed [m/s] at which the hand follows a stream
   double scissors_max_speed = 5.0;         // tools/scissors/max_speed [m/s]
   double tools_silence = 0.5;              // tools/silence [s] without a message after which a tool is lifted; 0: never
-  double scissors_length = 0.06;           // tools/scissors/length [m] of tracked blades
-  double scissors_width = 0.06;            // tools/scissors/width [m] of their opening
+  std::optional<double> scissors_length;   // tools/scissors/length [m] of tracked blades; absent: what fits the scene
+  std::optional<double> scissors_width;    // tools/scissors/width [m] of their opening; likewise
 };
 
 /// Refuses kInvalidArgument: a wrong type or a value out of range. Parameters that the node does not know are named in

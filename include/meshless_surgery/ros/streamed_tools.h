@@ -15,6 +15,11 @@ namespace meshless {
 
 constexpr double kJawOpen = 0.1;     // [rad] the jaw must have been opened beyond ...
 constexpr double kJawClosed = 0.02;  // [rad] ... and close below, to cut
+constexpr double kBlades = 0.06;     // [m] length and width of blades for large bodies
+
+/// Length and width of blades for a body [m]: three times what it is wide, which is the middle one of its extents along
+/// its principal axes; at most kBlades.
+double bladesFor(const Points& surface);
 
 /// Whether a tool hears its stream, in CRTK's words.
 enum class Operating { kDisabled, kEnabled, kPaused };
@@ -70,6 +75,7 @@ class StreamedTools {
   void movePick(Tool& tool, World& world);
   void movePush(Tool& tool, World& world);
   void moveScissors(Tool& tool, World& world);
+  ScissorBlades blades(const Pose& pose) const;
   void halt(Tool& tool);
   void lift(Tool& tool, const std::string& why);
 
