@@ -247,11 +247,11 @@ TEST(World, TheSameHistoryAfterAResetHasTheSameHash) {
     push.position = Vec3(0.05, 0, 0.23);
     after("push", push);
     InciseCommand incise;
-    incise.blade.origin = Vec3(0.07, -0.02, 0.23);
+    incise.blade.origin = Vec3(0.07, -0.2, 0.4);
     incise.blade.y_axis = Vec3::UnitZ();
     incise.blade.x_axis = Vec3::UnitY();
-    incise.blade.length = 0.04;
-    incise.blade.depth = 0.05;
+    incise.blade.length = 0.21;
+    incise.blade.depth = 0.3;
     incise.bodies = {"high"};
     after("incision", incise);
     after("cut", cutThrough(Vec3(0.03, 0, 0.1), Vec3(1, 0.2, 0.3).normalized()));
