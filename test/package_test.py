@@ -23,7 +23,7 @@ INCLUDES = (
 LINKED = {'roscpp', 'roslib', 'actionlib', 'diagnostic_updater', 'tf2', 'tf2_ros', 'libcgal-dev', 'libpcl-all-dev', 'yaml-cpp', 'tbb', 'zlib',
           'libjpeg', 'libpng-dev', 'pluginlib', 'rviz'}
 MODULES = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml', 'rospkg': 'python3-rospkg-modules', 'tf2_ros': 'tf2_ros'}
-ROS_MODULES = {'rospy', 'roslib', 'rosgraph', 'rosunit', 'rostest', 'tf2_ros', 'genpy', 'actionlib', 'rosbag', 'roslaunch', 'dynamic_reconfigure'}
+ROS_MODULES = {'rospy', 'roslib', 'rosgraph', 'rosunit', 'rostest', 'tf2_ros', 'genpy', 'actionlib', 'rosbag', 'roslaunch', 'rosnode', 'dynamic_reconfigure'}
 # Programs that tests and scripts start by name.
 PROGRAMS = {'rosrun': 'rosbash', 'roslaunch': 'roslaunch', 'rosmaster': 'rosmaster', 'rostest': 'rostest', 'rviz': 'rviz',
             'rosbag': 'rosbag', 'rosnode': 'rosnode', 'ip': '', 'Xvfb': 'xvfb', 'xdotool': 'xdotool', 'import': 'imagemagick'}

@@ -457,12 +457,21 @@ Status findCavities(BodyDef& def, bool cells, TriangleMesh& surface) {
   return Done{};
 }
 
-/// Which parts it has that no cluster or cell joins; empty where it is one.
+/// Which parts it has that no cluster, cell or clamp joins; empty where it is one.
 std::string partsWarning(const BodyModel& model, const Pose& placed) {
   UnionFind joined(model.rest.size());
   for (Index c = 0; c < model.clusters.size(); ++c)
     for (Index m = model.clusters.offsets[c]; m < model.clusters.offsets[c + 1]; ++m)
       joined.join(model.clusters.members[model.clusters.offsets[c]], model.clusters.members[m]);
+  // What is held hangs on what holds it, and free cells on the held ones that they border on.
+  Index held = kNoIndex;
+  const auto hold = [&](Index particle) {
+    if (held == kNoIndex) held = particle;
+    joined.join(held, particle);
+  };
+  for (Index i = 0; i < model.fixed.size(); ++i)
+    if (model.fixed[i]) hold(i);
+  for (const ClampPoint& point : model.clamp_points) hold(model.lattice->cells[point.cell].corners[0]);
   std::map<Index, std::pair<double, Vec3>> found;  // mass, and its product with the middle
   for (Index i = 0; i < model.rest.size(); ++i) {
     auto& [mass, middle] = found.emplace(joined.find(i), std::pair(0.0, Vec3(Vec3::Zero()))).first->second;

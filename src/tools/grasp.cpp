@@ -13,6 +13,7 @@
 namespace meshless {
 namespace {
 
+constexpr double kOnEdge = 1e-12;           // of a triangle: a ray along an edge meets both faces, and not neither
 constexpr double kSpanned = 0.01;         // variance over the largest: in flatter directions a patch does not reach
 const double kLongestWay = std::sqrt(3.0);  // along the edges of a cubic lattice, over the straight one
 
@@ -134,10 +135,10 @@ RayHit castRay(const Points& vertices, const std::vector<Triangle>& triangles, c
     if (det == 0.0) continue;
     const Vec3 s = origin - a;
     const double u = s.dot(p) / det;
-    if (!(u >= 0.0 && u <= 1.0)) continue;
+    if (!(u >= -kOnEdge && u <= 1.0 + kOnEdge)) continue;
     const Vec3 q = s.cross(e1);
     const double v = d.dot(q) / det;
-    if (!(v >= 0.0 && u + v <= 1.0)) continue;
+    if (!(v >= -kOnEdge && u + v <= 1.0 + kOnEdge)) continue;
     const double distance = e2.dot(q) / det;
     if (!(distance >= 0.0 && distance < best.distance)) continue;
     best.hit = true;

@@ -11,9 +11,10 @@
 namespace meshless {
 namespace {
 
-constexpr double kEntryTime = 0.1;  // [s] for a radius, in which the push sphere goes into tissue where it is placed
-constexpr double kTouches = 1e-3;   // radii: so deep it does not need a way in
-constexpr int kMostWays = 20;       // between folds
+constexpr double kEntryTime = 0.1;   // [s] for a radius, in which the push sphere goes into tissue where it is placed
+constexpr double kEntrySpeed = 5.0;  // [m/s] at most: no hand is faster
+constexpr double kTouches = 1e-3;    // radii: so deep it does not need a way in
+constexpr int kMostWays = 20;        // between folds
 
 struct Grabbed {
   WorldBody* body = nullptr;
@@ -218,7 +219,7 @@ Result<Reply> World::Impl::apply(const PushCommand& command) {
     // may be shorter, and it presses on.
     const Vec3 place = placed ? command.position : push.position, beside = placeBeside(place, radius);
     if (larger || (beside - place).norm() < (push.position - place).norm()) push.position = beside;
-    if (placed) push.speed = radius / kEntryTime;
+    if (placed) push.speed = std::min(radius / kEntryTime, kEntrySpeed);
   }
   push.enabled = true;
   push.radius = radius;
@@ -318,7 +319,7 @@ Result<Reply> World::Impl::apply(const SetMaterialCommand& command) {
     // Other masses move embedded vertices by a rounding. Whether the surface was read before must make no difference.
     body->surface_current = false;
     body->material = material;
-    body->state.pace = 1.0;  // of another material no velocity is won back
+    if (body->model != before) body->state.pace = 1.0;  // of another material no velocity is won back
   }
   return Reply(Done{});
 }

@@ -272,7 +272,21 @@ void World::Impl::followPieces(const BodyId& parent, const Points& before, const
     const Vec3 grabbed = graspMean(pick, before);
     const auto holdIn = [&](const Descent& piece, Index centre, const TissuePlace& place) {
       const WorldBody& child = *find(piece.child);
-      makeGrasp(*child.model, child.state.positions, centre, graspRadius(*child.model), grabbed, pick);
+      const std::vector<Index>& old = piece.parent_particles;
+      std::vector<Index> patch;
+      for (const Index particle : pick.patch)
+        if (const auto at = std::find(old.begin(), old.end(), particle); at != old.end())
+          patch.push_back(static_cast<Index>(at - old.begin()));
+      bool parted = patch.size() < pick.patch.size();
+      for (std::size_t i = 0; i < piece.copied_from.size() && !parted; ++i)
+        parted = old[i] == kNoIndex &&
+                 std::find(pick.patch.begin(), pick.patch.end(), piece.copied_from[i]) != pick.patch.end();
+      if (parted) {
+        makeGrasp(*child.model, child.state.positions, centre, graspRadius(*child.model), grabbed, pick);
+      } else {  // a cut elsewhere changes nothing of it
+        pick.patch = std::move(patch);
+        pick.particle = centre;
+      }
       pick.body = child.id;
       pick.place = place;
     };

@@ -97,6 +97,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
       followFibres(body.id, *whole, positions, {body.id});
       body.mesh.reset();
       body.surface_current = true;
+      body.rest_from.clear();  // it was of the old particles
       surface_contacts.forget(body.number);
       batches_current = contacts_current = false;  // they are of the old model
       say(EventType::kIncised, name, 0, "opened");

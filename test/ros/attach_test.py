@@ -48,7 +48,10 @@ class AttachTest(DeformerTestCase):
 
     def test_what_is_joined_and_what_is_not_is_said_at_the_start(self):
         with OwnNode(scene=os.path.join(SCENES, 'attached.yaml'), paused=True).wait() as node:
-            self.assertRegex(node.output(), r'attachment bed: \d+ fibres on 24 cm\^2, in 1 patch: 24 cm\^2 around \(')
+            self.assertEqual(0, node.end(2))
+            said = node.output()  # all of it, once the node has ended
+        self.assertRegex(said, r'attachment bed: \d+ fibres on 24 cm\^2, in 1 patch: 24 cm\^2 around \(')
+        self.assertNotIn('hang together with nothing', said)  # a clamp joins what it holds with the rest
         with tempfile.TemporaryDirectory() as folder:
             with open(os.path.join(folder, 'two.obj'), 'w', encoding='ascii') as file:
                 for number, at in enumerate((0.0, 0.2)):

@@ -281,6 +281,7 @@ class CrtkTest(InStepTestCase):
         commands.publish(StringStamped(string='disable'))
         states.wait(lambda m: m.state == 'DISABLED')
         self.assertIn(word, self.good('reset').message)
+        self.runs_since = None  # steps are counted anew
         jaw = self.publisher('scissors/jaw/servo_jp', JointState)
         diagnostics = self.record('/diagnostics', DiagnosticArray)
         jaw.publish(JointState(name=['jaw'], position=[0.4]))

@@ -86,7 +86,7 @@ class TrainingTest(unittest.TestCase):
                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=LONG, text=True)
 
     def test_names_keep_the_letters_of_their_alphabet(self):
-        with self.node(scene='block') as node:
+        with self.node(scene='block', data_folders=self.folder) as node:
             for trainee, name in (('李雷', '李雷'), ('韩梅', '韩梅'), ('Zoë Ångström', 'Zoë_Ångström'), ('Иван', 'Иван'), ('ä' * 50, 'ä' * 50)):
                 node.good('start_task', task=self.task_of('block'), trainee=trainee)
                 node.good('step', steps=1)
@@ -183,9 +183,11 @@ class TrainingTest(unittest.TestCase):
     def test_a_cut_along_the_drawn_line_is_on_the_plan(self):
         with self.node(task='incise') as node:
             node.good('step', steps=240)
-            line = [p for p in self.markers(node)['plan'].points if p.z > 0.05]  # not its edges in the depth
-            left, right = min(line, key=lambda p: (p.x, -p.z)), max(line, key=lambda p: (p.x, p.z))
-            lowest = min(p.z for p in line if abs(p.x) < 0.039)
+            plan = self.markers(node)['plan'].points
+            ends = [p for p in plan if abs(p.x) > max(abs(q.x) for q in plan) - 0.001]  # the tops of its edges in the depth
+            left = max((p for p in ends if p.x < 0.0), key=lambda p: p.z)
+            right = max((p for p in ends if p.x > 0.0), key=lambda p: p.z)
+            lowest = min(p.z for p in plan if abs(p.x) < 0.038 and p.z > 0.05)
             self.assertLess(lowest, 0.055)  # the skin sags
             blade = pose_stamped(left.x, left.y, left.z + 0.001, (0.5 ** 0.5, 0.0, 0.0, 0.5 ** 0.5))  # its y is up
             node.good('incise', blade=blade, length=right.x - left.x, depth=left.z + 0.001 - lowest + 0.013)
