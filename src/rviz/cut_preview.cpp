@@ -61,17 +61,12 @@ std::vector<PreviewLine> linesOfCut(const meshless_surgery::Surfaces& surfaces, 
   return lines;
 }
 
-CutPreview::CutPreview(Ogre::SceneManager* scene_manager) : shown_(scene_manager) {
-  shown_.setLineWidth(kLineWidth);
-  shown_.setMaxPointsPerLine(2);
-  // Over the blades, which lie on it.
-  shown_.getMaterial()->setDepthCheckEnabled(false);
-  shown_.getMaterial()->setSceneBlending(Ogre::SBT_TRANSPARENT_ALPHA);  // drawn after what is solid
-}
+CutPreview::CutPreview(Ogre::SceneManager* scene_manager) : shown_(scene_manager) { shown_.setMaxPointsPerLine(2); }
 
-void CutPreview::show(const std::vector<PreviewLine>& lines, const Ogre::Vector3& origin,
+void CutPreview::show(const std::vector<PreviewLine>& lines, float width, const Ogre::Vector3& origin,
                       const Ogre::Quaternion& turn) {
   shown_.clear();
+  shown_.setLineWidth(width);
   if (lines.size() > capacity_) {
     capacity_ = 2 * lines.size();
     shown_.setNumLines(static_cast<std::uint32_t>(capacity_));

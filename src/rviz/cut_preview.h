@@ -31,8 +31,9 @@ class CutPreview {
  public:
   explicit CutPreview(Ogre::SceneManager* scene_manager);
 
-  /// The lines' frame is at `origin`, turned by `turn`.
-  void show(const std::vector<PreviewLine>& lines, const Ogre::Vector3& origin, const Ogre::Quaternion& turn);
+  /// `width` [m]. The lines' frame is at `origin`, turned by `turn`.
+  void show(const std::vector<PreviewLine>& lines, float width, const Ogre::Vector3& origin,
+            const Ogre::Quaternion& turn);
 
  private:
   rviz::BillboardLine shown_;

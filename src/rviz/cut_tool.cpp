@@ -20,6 +20,7 @@ constexpr double kOpen = 0.5;         // [rad]
 constexpr double kLeastSaid = 0.05;   // [rad] below 0.02 the node would cut by the stream, which gets no answer
 constexpr double kFirstYaw = 0.3;     // [rad] seen along themselves the blades would be two lines
 constexpr double kPush = 1.0 / 12.0;  // lengths a notch
+constexpr float kPreview = 0.025f;    // lengths: width of the line
 constexpr double kRadiansPerPixel = 0.008;
 constexpr double kRoll = 0.13;         // [rad] a notch
 constexpr double kDepthFactor = 1.15;  // a notch
@@ -183,7 +184,9 @@ void CutTool::showPreview() {
   Ogre::Quaternion turn;
   worldPose(origin, turn);
   if (!preview_) preview_ = std::make_unique<CutPreview>(scene_manager_);
-  preview_->show(linesOfCut(*surfaces_, *shown), origin - viewDirection() * kLineOver, turn);
+  // As fine as the blades are, and above the tissue by no more.
+  const float width = kPreview * static_cast<float>(length_);
+  preview_->show(linesOfCut(*surfaces_, *shown), width, origin - viewDirection() * width, turn);
 }
 
 std::optional<PreviewBlades> CutTool::blades() const {

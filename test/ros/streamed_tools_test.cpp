@@ -450,7 +450,7 @@ TEST(StreamedTools, CommandsThatDoNotFitAreRefusedWithThoseThatDo) {
 TEST(StreamedTools, BladesFitABodyHoweverItLies) {
   Quat turned;
   turned = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized());
-  for (const Vec3& size : {Vec3(0.006, 0.05, 0.006), Vec3(0.05, 0.008, 0.007), Vec3(0.3, 0.2, 0.1)}) {
+  for (const Vec3& size : {Vec3(0.006, 0.05, 0.007), Vec3(0.05, 0.008, 0.007), Vec3(0.3, 0.2, 0.1)}) {
     Points corners;
     for (const double x : {-0.5, 0.5})
       for (const double y : {-0.5, 0.5})

@@ -14,7 +14,7 @@ from virtual_display import Mouse, VirtualDisplay, stop, wait_until  # noqa: E40
 
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3  # noqa: E402
 from meshless_surgery.msg import State, TaskState  # noqa: E402
-from meshless_surgery.srv import GetBody, Probe, Report, Spawn, StartTask  # noqa: E402
+from meshless_surgery.srv import GetBody, Probe, Spawn, StartTask  # noqa: E402
 from shape_msgs.msg import SolidPrimitive  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
 
@@ -181,7 +181,7 @@ class ClipTest(unittest.TestCase):
             normal = axes(pose)[2]
             self.assertLess(abs((tissue - xyz(pose.position)).dot(normal)), 5e-4)
             self.mouse.down()
-            self.until(lambda: self.bodies() == ['vessel.1', 'vessel.2'], 'not cut')
+            self.until(lambda: len(self.bodies()) == 2, 'not cut')
             self.mouse.up()
             sides = [(self.vertices(name) - tissue).dot(normal) for name in self.bodies()]
             lower, upper = sorted(sides, key=lambda heights: heights.mean())
@@ -225,7 +225,6 @@ class ClipTest(unittest.TestCase):
             task.append(rospy.wait_for_message(NODE + '/task', TaskState, LONG))
             return not task[-1].running
         self.until(done, 'the task does not end')
-        print(task[-1], call('report', Report))
         self.assertTrue(task[-1].passed, task[-1])
 
     def quiet_status(self):

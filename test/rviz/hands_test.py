@@ -198,6 +198,7 @@ class HandsTest(unittest.TestCase):
             place = self.take(key)
             over = self.display.cursor()
             self.mouse.key('m')
+            self.mouse.move((place[0] + 4, place[1]))
             self.until(lambda: self.display.cursor() != over, 'the cursor of rviz is that of ' + key)
             self.mouse.key(key)
             self.mouse.key(key)  # before the mouse has moved
