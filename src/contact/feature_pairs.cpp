@@ -179,18 +179,20 @@ class PointSearch {
     if (search_.self == PairSearch::Self::kCuts && !b_.surface->cut_faces[face]) return false;
     for (const Index corner : b_.surface->triangles[face])
       if (corner == point.vertices[0]) return false;
-    return b_.frame->face_normals[face].dot(point.normal) < -kSelfOpposed && !hasTissueBetween(point, face);
+    return b_.frame->face_normals[face].dot(point.normal) < -kSelfOpposed;
   }
 
-  // Who is behind a face at rest, and near it, comes before it only where the tissue between is turned inside out.
-  bool hasTissueBetween(const SurfacePoint& point, Index face) const {
-    const Triangle& t = b_.surface->triangles[face];
-    const Points& x = b_.surface->rest;
-    const Vec3& p = a_.surface->rest[point.vertices[0]];
-    const Vec3 weights = nearestWeights(p, x[t[0]], x[t[1]], x[t[2]]);
-    const Vec3 way = p - (weights[0] * x[t[0]] + weights[1] * x[t[1]] + weights[2] * x[t[2]]);
-    const Vec3 normal = (x[t[1]] - x[t[0]]).cross(x[t[2]] - x[t[0]]);
-    return way.norm() < search_.length && way.dot(normal) < -tie_ * normal.norm();
+  // A surface meets itself where, beyond what overlaps, one layer of tissue is behind the point and one behind the
+  // face. Elsewhere it is turned inside out, or has gone through itself, and a row would keep it so.
+  bool hasTissueBehind(const SurfacePoint& point, const NearFace& c) const {
+    if (search_.self == PairSearch::Self::kNo || !b_.surface->closed) return true;
+    const Vec3& normal = b_.frame->face_normals[c.face];
+    const Triangle& t = b_.surface->triangles[c.face];
+    const Points& x = b_.frame->vertices;
+    const Vec3 middle = (x[t[0]] + x[t[1]] + x[t[2]]) / 3.0;  // ends of a face may lie on a rim
+    const Vec3 overlap = std::max(0.0, normal.dot(c.point - point.place)) * normal;
+    return windingAround(middle - overlap - margin_ * normal) == 1 &&
+           windingAround(point.place + overlap - margin_ * point.normal) == 1;
   }
 
   void gather(const SurfacePoint& point, double within) {
@@ -212,7 +214,7 @@ class PointSearch {
     c.distance = way.norm();
     const double towards = std::max({way.dot(u[t[0]]), way.dot(u[t[1]]), way.dot(u[t[2]])}) - way.dot(point.velocity);
     c.reach = c.distance > 0.0 ? search_.h * std::max(0.0, towards / c.distance) : 0.0;
-    if (c.distance > within + c.reach) return;
+    if (c.distance > within + c.reach || !hasTissueBehind(point, c)) return;
     c.reach += margin_;
     c.corners = static_cast<int>((c.weights.array() > 0.0).count());
     candidates_.push_back(c);

@@ -68,6 +68,8 @@ const char* toString(EventType type) {
       return "leak";
     case EventType::kClipped:
       return "clipped";
+    case EventType::kCollapsed:
+      return "collapsed";
   }
   return "unknown";
 }

@@ -57,6 +57,7 @@ struct WorldBody : KeptBody {
   double surface_reach = 0.0;                         // [m] how far the surface is beyond the particles, at most
   double fastest = 0.0;                               // [m/s] no particle is faster, as bounds
   std::optional<std::uint64_t> slowed_at;             // the last step in which stiffness_factor was below 1
+  bool collapsed = false;                             // as was said; not saved: of a loaded body it is said again
   Index batch = kNoIndex;                             // matched with others of its kind: one of World::Impl::batches
   StepScratch scratch;
 };
@@ -348,6 +349,7 @@ struct World::Impl : KeptWorld {
   /// Of a body that a blade has just made or opened.
   void sayLeaks(const std::string& name, const BodyModel& model, const BodyState& state);
   void findWound();
+  void findCollapsed();
   void closeBlades();
   void showBlades(const ClosingCut& cut);
   double substepNow() const;                 // [s]

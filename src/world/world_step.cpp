@@ -2,13 +2,19 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <sstream>
+#include <utility>
 
 #include "meshless_surgery/body/unwind.h"
+#include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
 
 namespace meshless {
 namespace {
+
+constexpr double kCollapsed = 0.2;     // of its volume at rest: a body that has less is said to have collapsed
+constexpr double kCollapseTime = 0.1;  // [s] between two looks at one
 
 class Stopwatch {
  public:
@@ -85,6 +91,7 @@ void World::Impl::finishStep(double h_frame) {
   tearFibres();
   emptyCavities();
   findWound();
+  findCollapsed();
   for (Pick& pick : picks)
     if (const WorldBody* body = find(pick.body)) pick.position = graspMean(pick, body->state.positions);
   fallAsleep(h_frame);
@@ -93,6 +100,21 @@ void World::Impl::finishStep(double h_frame) {
   report.bodies = bodies.size();
   for (const auto& body : bodies) report.asleep += body->asleep;
   report.tetrahedralizations = tetrahedralizations;
+}
+
+// Each body in its turn: a volume takes the whole surface.
+void World::Impl::findCollapsed() {
+  const auto turns = static_cast<std::uint64_t>(std::max(1.0, kCollapseTime * settings.step_rate));
+  for (WorldBody* body : awake) {
+    if (!body->model->solid || (step + body->number) % turns != 0) continue;
+    refreshSurface(*body);
+    const double volume = signedVolume(body->state.surface, body->model->surface.triangles);
+    const bool said = std::exchange(body->collapsed, volume < kCollapsed * body->model->rest_volume);
+    if (!body->collapsed || said) continue;
+    std::ostringstream text;
+    text << body->name << " has " << std::max(0.0, volume / body->model->rest_volume) << " of its volume at rest";
+    say(EventType::kCollapsed, body->name, 0, text.str());
+  }
 }
 
 // What was opened and has no pressure left is filled no more.

@@ -190,17 +190,19 @@ TEST(FeaturePairs, AThinSlabDoesNotMeetItsOwnOtherSide) {
   EXPECT_TRUE(vertexFace(search).empty());
 }
 
-// Rows there would keep it so.
+// Rows there would keep it so, however thick it is at rest.
 TEST(FeaturePairs, ASlabThatIsTurnedInsideOutDoesNotMeetItself) {
-  Placed slab(boxMesh(Vec3(1, 1, 0.01), 8, 8, 1), Vec3::Zero());
-  Points inverted = slab.mesh.vertices;
-  for (Vec3& p : inverted) p.z() = -p.z();
-  const Points still(inverted.size(), Vec3::Zero());
-  placeFrame(slab.surface, inverted.data(), still.data(), 0.01, slab.frame);
-  placeNormalBoxes(slab.surface, slab.frame);
-  PairSearch search = between(slab, slab);
-  search.self = PairSearch::Self::kAll;
-  EXPECT_TRUE(vertexFace(search).empty());
+  for (const double thick : {0.01, 1.0}) {
+    Placed slab(boxMesh(Vec3(1, 1, thick), 8, 8, 1), Vec3::Zero());
+    Points inverted = slab.mesh.vertices;
+    for (Vec3& p : inverted) p.z() *= -0.01 / thick;
+    const Points still(inverted.size(), Vec3::Zero());
+    placeFrame(slab.surface, inverted.data(), still.data(), 0.01, slab.frame);
+    placeNormalBoxes(slab.surface, slab.frame);
+    PairSearch search = between(slab, slab);
+    search.self = PairSearch::Self::kAll;
+    EXPECT_TRUE(vertexFace(search).empty()) << thick;
+  }
 }
 
 // Two flaps of one surface, one over the other: each vertex that is near enough meets the other flap.

@@ -85,6 +85,7 @@ TEST(FilledCellsInAWorld, PicksNearABladeStayOnTheirSide) {
         for (const Vec3& p : body.surface) side += plane.height(p);
         ++picks;
         wrong += side * height.at(pick.id) < 0.0;
+        if (side * height.at(pick.id) < 0.0) std::printf("wrong: %g m from the blade, round %d\n", height.at(pick.id), round);
         EXPECT_LT((graspMean(pick, body.particles) - pick.position).norm(), 1e-9) << "nothing jumps";
       }
     }

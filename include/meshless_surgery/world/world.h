@@ -75,9 +75,10 @@ enum class EventType {
   kDetached,
   kTorn,
   kLeak,
-  kClipped
+  kClipped,
+  kCollapsed
 };
-constexpr EventType kLastEvent = EventType::kClipped;
+constexpr EventType kLastEvent = EventType::kCollapsed;
 const char* toString(EventType type);
 
 struct Event {
