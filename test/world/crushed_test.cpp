@@ -58,16 +58,23 @@ Seen fallen(const Shape& shape, const Fall& fall, double height) {
 }
 
 // Surfaces that were pressed through each other are not held on the wrong sides.
+void expectThatItUnfolds(const Shape& shape, const Fall& fall) {
+  SCOPED_TRACE(testing::Message() << shape.name << ", " << fall.youngs_modulus << " Pa, " << fall.poissons_ratio);
+  const Seen laid = fallen(shape, fall, 0.0005), after = fallen(shape, fall, fall.height);
+  EXPECT_NEAR(after.volume, laid.volume, 0.05 * laid.volume);
+  if (shape.round) EXPECT_GT(after.height, 0.9 * laid.height) << "higher where it bounces on";
+}
+
 TEST(Crushed, WhoFellIsSoonAsLargeAndAsHighAsWhoWasLaidDown) {
+  expectThatItUnfolds(shapes()[1], {1200.0, 0.3, 10.0, 0.3});
+  expectThatItUnfolds(shapes()[3], {3000.0, 0.3, 10.0, 1.0});
+}
+
+TEST(Crushed, WhateverFellIsSoonAsLargeAndAsHighAsWhatWasLaidDown_Long) {
   for (const Shape& shape : shapes())
     for (const Fall& fall : {Fall{1200.0, 0.3, 10.0, 0.3}, Fall{1000.0, 0.45, 10.0, 0.3}, Fall{3000.0, 0.3, 10.0, 1.0},
-                             Fall{3000.0, 0.45, 2.0, 1.0}}) {
-      SCOPED_TRACE(testing::Message() << shape.name << ", " << fall.youngs_modulus << " Pa, " << fall.poissons_ratio);
-      const Seen laid = fallen(shape, fall, 0.0005), after = fallen(shape, fall, fall.height);
-      EXPECT_NEAR(after.volume, laid.volume, 0.05 * laid.volume);
-      if (!shape.round) continue;
-      EXPECT_GT(after.height, 0.9 * laid.height) << "higher where it bounces on";
-    }
+                             Fall{3000.0, 0.45, 2.0, 1.0}})
+      expectThatItUnfolds(shape, fall);
 }
 
 TEST(Crushed, ABodyThatIsBelowAFifthOfItsVolumeSaysSo) {
