@@ -52,7 +52,7 @@ BodyModel randomCloud(Random& random, const Kind& kind, double scale, Index part
     set.offsets.push_back(static_cast<Index>(set.members.size()));
   }
   for (Index i : set.members) set.weights.push_back(1.0 / total[i]);
-  makeMoments(model, material);
+  makeTissue(model, material);
   return model;
 }
 

@@ -127,6 +127,10 @@ double elasticAccelerations(const ElasticCells& body, const ElasticParameters& m
   return std::sqrt(most / 3.0);
 }
 
+Mat3 gradientOf(const ElasticCell& cell, double half_edge, const Points& y) {
+  return gradientOf(coefficientsOf(cell, y, y[cell.corners[0]]), half_edge);
+}
+
 double elasticEnergy(const ElasticCells& body, const ElasticParameters& material, const Points& y,
                      std::vector<ClusterPose> poses, double swelling, const std::vector<PlasticShape>* plastic) {
   double energy = 0.0;

@@ -1,5 +1,6 @@
 #include "meshless_surgery/dynamics/material.h"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -94,16 +95,16 @@ Status Material::validate() const {
   return Done{};
 }
 
-double stiffnessGain(double alpha, double h) {
-  const double steps = h / kReferenceStep;
-  return 1.0 - std::pow(1.0 - alpha, steps * steps);
-}
-
-double viscosityTime(double alpha, double h) {
-  // A mode's amplitude falls by the root of 1 - gain * time / h in a step: by the same for the same time.
-  const double gain = stiffnessGain(alpha, h);
-  if (!(gain > 0.0)) return kReferenceStep;
-  return h * (1.0 - std::pow(1.0 - alpha, h / kReferenceStep)) / gain;
+GoalPull goalPull(double alpha, double h) {
+  // The place after a substep, of what the goal is 0 for: x1 - gain (x1 + lead v) with x1 = x + h v. Its two
+  // eigenvalues over a substep are those of the oscillator: their sum and their product say gain and lead.
+  constexpr double kStiffest = 1e-4;  // 1 - alpha: what is stiffer would come to its goal no sooner
+  const double steps = h / kReferenceStep, rate = -std::log(std::max(kStiffest, 1.0 - alpha));
+  const double under = 0.25 * rate * rate - rate, swing = std::sqrt(std::abs(under)) * steps;
+  const double product = std::exp(-rate * steps);
+  const double sum = std::exp(-0.5 * rate * steps) * 2.0 * (under < 0.0 ? std::cos(swing) : std::cosh(swing));
+  const double gain = std::clamp(1.0 - sum + product, 0.0, 1.0 - product);
+  return {gain, gain > 0.0 ? h * (1.0 - product - gain) / gain : 0.0};
 }
 
 // Fitted goals alone have no shape to return to: a twentieth of the rigid goal is enough for that, and more with half a

@@ -11,7 +11,7 @@ struct SurfaceModel {
   BodyModelPtr model;
   ContactSurface surface;
   std::vector<double> inverse_masses;         // [1/kg] 0 where fixed
-  std::unique_ptr<const RigidGroups> groups;  // its clusters, of an elastic body all of it; none where it is held
+  std::unique_ptr<const RigidGroups> groups;  // its clusters, or all of it; null where it is held
   std::size_t bytes() const;                  // without the model
 };
 

@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cmath>
 
-#include "meshless_surgery/body/unwind.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
 
@@ -84,7 +83,6 @@ void World::Impl::finishStep(double h_frame) {
   mendFaults();
   tearFibres();
   emptyCavities();
-  findWound();
   for (Pick& pick : picks)
     if (const WorldBody* body = find(pick.body)) pick.position = graspMean(pick, body->state.positions);
   fallAsleep(h_frame);
@@ -109,10 +107,7 @@ void World::Impl::emptyCavities() {
 }
 
 void World::Impl::matchAlone(WorldBody& body, double h, MatchCounters& counters, const ForEach& each) const {
-  if (body.state.unwinding)
-    unwind(*body.model, settings.gravity, h, body.state, body.scratch);
-  else
-    matchAndMove(*body.model, body.material, settings.gravity, h, body.state, body.scratch, counters, each);
+  matchAndMove(*body.model, body.material, settings.gravity, h, body.state, body.scratch, counters, each);
 }
 
 // As many as the stiffest body needs.

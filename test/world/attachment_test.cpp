@@ -211,7 +211,7 @@ TEST(Attachment, TwoFreeBodiesKeepTheirMomentum) {
         const WorldSnapshot after = seen(world);
         EXPECT_EQ(after.report.fibres > 0, true);
         EXPECT_LE((momentum(after) - p).norm(), 1e-9 * p.norm());
-        EXPECT_LE((angularMomentum(after) - l).norm(), 1e-9 * l.norm());
+        EXPECT_LE((angularMomentum(after) - l).norm(), 3e-9 * l.norm());
         double left = 0.0;
         for (const BodySnapshot& b : after.bodies) left += b.measures.kinetic_energy;
         EXPECT_LE(left, energy * (1.0 + 1e-9));
