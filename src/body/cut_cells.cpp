@@ -785,7 +785,7 @@ class CellCutter {
     Index best = kNoIndex;
     double least = std::numeric_limits<double>::infinity();
     for (const Index c : children_[place.cell]) {
-      if (cut_.lattice.cells[c].isBridge(c)) continue;
+      if (cut_.lattice.cells[c].isBridge(c) || isPartedFrom(c, place)) continue;
       const SampleSet side = !cut_.changed[c] ? kAllSamples : above ? cut_.above[c] : ~cut_.above[c];
       const double squared = squaredToSamples(cut_.lattice.cells[c].samples & side, place.at);
       if (squared < least) {
@@ -827,12 +827,12 @@ class CellCutter {
     return now;
   }
 
-  // Between what is free and the clamp the blade parts no links of a cell.
-  bool isPartedFrom(Index cell, const ClampPoint& point) const {
+  // At a rim the blade passes between a place and all tissue of its cell, and parts no links of it.
+  bool isPartedFrom(Index cell, const TissuePlace& place) const {
     const SampleSet samples = cut_.lattice.cells[cell].samples;
     if (cut_.changed[cell] || !samples) return false;
-    const Vec3 border = presentPlace({point.cell, point.at}),
-               tissue = presentPlace({point.cell, samplePlace(nearestSample(samples, point.at))});
+    const Vec3 border = presentPlace(place),
+               tissue = presentPlace({place.cell, samplePlace(nearestSample(samples, place.at))});
     const int from = gate_.height(border) >= 0.0 ? 1 : -1, to = gate_.height(tissue) >= 0.0 ? 1 : -1;
     return from != to && (gate_.unbounded() || gate_.between(border, from, tissue, to));
   }
@@ -841,7 +841,7 @@ class CellCutter {
   void inheritClamp(BodyModel& child, const std::vector<Index>& renumbered) const {
     for (ClampPoint point : model_.clamp_points) {
       const Index best = heirOf({point.cell, point.at});
-      if (best == kNoIndex || renumbered[best] == kNoIndex || isPartedFrom(best, point)) continue;
+      if (best == kNoIndex || renumbered[best] == kNoIndex) continue;
       point.cell = renumbered[best];
       child.clamp_points.push_back(point);
     }

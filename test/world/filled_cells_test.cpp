@@ -73,8 +73,7 @@ TEST(FilledCellsInAWorld, PicksNearABladeStayOnTheirSide) {
       pick.direction = solidCentroid(mesh) - p;
       pick.point = p - 0.5 * pick.direction;
       const PickReply reply = replyOf<PickReply>(world.apply(pick));
-      const double there = plane.height(reply.position);
-      if (std::abs(there) > 5e-4) height[reply.pick] = there;  // the blade moves corners that are nearer onto itself
+      if (const double there = plane.height(reply.position); std::abs(there) > 1e-4) height[reply.pick] = there;
     }
     ASSERT_TRUE(world.apply(cutThrough(plane.point, plane.normal)).ok());
     const WorldSnapshot shot = world.snapshot({true, true, true});
