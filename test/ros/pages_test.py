@@ -142,6 +142,36 @@ class PythonPageTest(PageTestCase):
             self.assertAlmostEqual(0.5 * (free - tissue), force, delta=0.2, msg=said)
 
 
+TWO_NODES = """
+import rospy
+import tf2_ros
+from geometry_msgs.msg import TransformStamped
+rospy.init_node('two')
+frames, at = tf2_ros.TransformBroadcaster(), TransformStamped(child_frame_id='tool0')
+at.header.frame_id = 'world'
+at.transform.rotation.w = 1.0
+for n in range(100):
+    at.header.stamp = rospy.Time.now()
+    at.transform.translation.x = 0.2 * (n % 2)
+    frames.sendTransform(at)
+    rospy.sleep(0.02)
+"""
+
+DISABLES = """
+import rospy
+from meshless_surgery.crtk import StringStamped, operating_state
+from std_srvs.srv import Trigger
+rospy.init_node('disables')
+command = rospy.Publisher('/deformer/scissors/state_command', StringStamped, queue_size=1)
+while not command.get_num_connections():
+    rospy.sleep(0.02)
+command.publish(StringStamped(string='disable'))
+while rospy.wait_for_message('/deformer/scissors/operating_state', operating_state, 10).state != 'DISABLED':
+    rospy.sleep(0.02)
+print(rospy.ServiceProxy('/deformer/reset', Trigger)().message)
+"""
+
+
 class RobotPageTest(PageTestCase):
 
     name = 'robot.md'
@@ -172,12 +202,21 @@ class RobotPageTest(PageTestCase):
         move = 'arm.move((at.x, at.y, at.z + 0.01 * min(t, 2.0)))'
         with self.running(self.launch() + ' pick_frame:=tool0') as end:
             follows = self.shell('python3 robot.py')[1] + end()
+        self.write('two.py', TWO_NODES)
+        with self.running(self.node('liver', **{'tools/pick/follow_frame': 'tool0'})) as end:
+            self.good('python3 two.py')
+            two = end()
+        self.write('disable.py', DISABLES)
+        with self.running(self.node('liver')):
+            disabled = self.good('python3 disable.py')
         self.said_of({
             'a stream that stopped for more than half a second': lambda: self.script('rate.sleep()', 'surgeon.live(2.0)'),
             'a frame without a transform': lambda: self.script("stream('pick')", "stream('pick', frame='base')"),
             'a pose that is no number': lambda: self.script(move, "arm.move((at.x, at.y, float('nan')))"),
             'stamps of two clocks': lambda: self.script(
                 move, 'arm.move((at.x, at.y, at.z)); arm.move((at.x, at.y, at.z), stamp=rospy.Time.now() - rospy.Duration(0.3))'),
+            'two nodes that say where one tool is': lambda: two,
+            'a tool that was disabled, and then a reset': lambda: disabled,
             'a stream to a tool that follows a frame': lambda: follows,
             'a frame to follow that is not there': lambda: follows,
         })
