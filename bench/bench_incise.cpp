@@ -10,7 +10,7 @@
 
 #include "meshless_surgery/geometry/incise.h"
 #include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/organs.h"
+#include "shapes/organs.h"
 #include "meshless_surgery/geometry/primitives.h"
 
 namespace meshless {

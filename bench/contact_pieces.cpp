@@ -7,9 +7,9 @@
 #include "clock.h"
 #include "meshless_surgery/body/body.h"
 #include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/organs.h"
+#include "shapes/organs.h"
 #include "meshless_surgery/geometry/primitives.h"
-#include "meshless_surgery/geometry/random_organ.h"
+#include "shapes/random_organ.h"
 
 namespace meshless::bench {
 

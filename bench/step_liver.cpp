@@ -1,7 +1,7 @@
 // Frames of the world: a liver with its ligament held, and a body with and without a fine surface embedded in it.
 #include <algorithm>
 
-#include "meshless_surgery/geometry/organs.h"
+#include "shapes/organs.h"
 #include "meshless_surgery/geometry/primitives.h"
 #include "meshless_surgery/world/world.h"
 #include "step_rows.h"

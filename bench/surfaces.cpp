@@ -9,11 +9,11 @@
 #include <CLI/CLI.hpp>
 
 #include "meshless_surgery/base/random.h"
-#include "meshless_surgery/drive/crossing_law.h"
-#include "meshless_surgery/drive/depth_law.h"
-#include "meshless_surgery/drive/fold_law.h"
+#include "drive/crossing_law.h"
+#include "drive/depth_law.h"
+#include "drive/fold_law.h"
 #include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/random_organ.h"
+#include "shapes/random_organ.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless::bench {

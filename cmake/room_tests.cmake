@@ -69,14 +69,14 @@ set(shares_dynamics 2)
 set(shares_contact 2)
 
 set(links_io ${PROJECT_NAME}_io JPEG::JPEG PNG::PNG ZLIB::ZLIB)
-set(links_world ${PROJECT_NAME}_drive ZLIB::ZLIB)  # its bowl; forged states have the right checksum
+set(links_world tried_drive ZLIB::ZLIB)  # its bowl; forged states have the right checksum
 set(links_stress ${PROJECT_NAME}_io)
-set(links_drive ${PROJECT_NAME}_drive)
+set(links_drive tried_drive)
 set(links_training ${PROJECT_NAME}_training)
 set(links_accuracy bench_truth bench_pile)
 
 # The accuracy tests are many steps of plain arithmetic: nothing that sanitizers have not seen in the rooms.
-set(test_rooms base ${core_rooms} stress)
+set(test_rooms base ${core_rooms} drive stress)
 if(NOT MESHLESS_SURGERY_SANITIZE)
   list(APPEND test_rooms accuracy)
 endif()
@@ -88,16 +88,16 @@ foreach(room IN LISTS test_rooms)
     set(shares_${room} 1)
   endif()
   add_test_program(${room} ${shares_${room}} SOURCES ${room_tests} LABELS ${room}
-    LINKS ${PROJECT_NAME}_world ${links_${room}})
+    LINKS ${PROJECT_NAME}_world tried_shapes ${links_${room}})
   if(NOT room STREQUAL accuracy)
     share_test_headers(${room}_tests)
   endif()
 endforeach()
 
-add_test_program(world_work 1 SOURCES test/world/work_test.cpp LABELS world LINKS ${PROJECT_NAME}_world bench_pile)
+add_test_program(world_work 1 SOURCES test/world/work_test.cpp LABELS world LINKS ${PROJECT_NAME}_world tried_shapes bench_pile)
 share_test_headers(world_work_tests)
 
 if(NOT MESHLESS_SURGERY_SANITIZE OR MESHLESS_SURGERY_SANITIZE_ALL)
   add_test_program(geometry_oracle 1 SOURCES test/geometry/cut_oracle_test.cpp LABELS geometry full
-    LINKS ${PROJECT_NAME}_world bench_clip CGAL::CGAL)
+    LINKS ${PROJECT_NAME}_world tried_shapes bench_clip CGAL::CGAL)
 endif()

@@ -56,7 +56,7 @@ def missingPaths(text):
     """Of the paths of sources and tests that a page names: those that are not there."""
     ends = r'\.(?:cpp|h|py|yaml|txt|md|cmake|frag)'
     named = set(re.findall(r'(?<![\w./{-])((?:[\w.-]+/)+[\w-]+%s)(?!\w)' % ends, text))
-    roots = ('', 'include/meshless_surgery')
+    roots = ('', 'include/meshless_surgery', 'src')
     named = {path for path in named if not re.search(r'^\.\.|NAME|ROOM|SUBJECT', path)}  # links, and what stands for many
     return sorted(path for path in named if not any(os.path.exists(os.path.join(CHECKOUT, root, path)) for root in roots))
 

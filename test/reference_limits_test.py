@@ -72,8 +72,8 @@ LIMITS = (
     ('parameters', 'at least N if not 0', 'src/ros/settings.cpp', 'kShortestAutosave', 1),
     ('parameters', '| empty | up to N characters', 'src/ros/live_training.cpp', 'kMostTrainee', 1),
     ('rviz', 'more than N s after the message before', 'src/rviz/between_states.cpp', 'kLongestInterval', 1),
-    ('programs', 'for N over its `damping`', 'src/drive/drive.cpp', 'kDecays', 1),
-    ('programs', 'over its `damping`, at most N s', 'src/drive/drive.cpp', 'kLongestAlone', 1),
+    ('programs', 'for N over its `damping`', 'test/drive/drive.cpp', 'kDecays', 1),
+    ('programs', 'over its `damping`, at most N s', 'test/drive/drive.cpp', 'kLongestAlone', 1),
 )
 
 

@@ -151,7 +151,7 @@ class WordsTest(Compared, unittest.TestCase):
                 'materials': set(found(r'(?m)^(\w+):', materials)) | {'default'},
                 'plays': {name[5:] for name in stems('scripts/play_*.py')},
                 'rviz': {entry.get('name').split('/')[1] for entry in plugin.iter('class')},
-                'laws': set(found(r'"(\w+)"', only(r'kLawNames\{(.*?)\}', read('include/meshless_surgery/drive/finding.h')))),
+                'laws': set(found(r'"(\w+)"', only(r'kLawNames\{(.*?)\}', read('test/drive/finding.h')))),
                 'exceptions': set(found(r'(?m)^class (\w+)\(', read('python/meshless_surgery/errors.py'))),
                 'variables': set(variables)}
 
@@ -300,6 +300,7 @@ class EnvironmentTasksTest(Compared, unittest.TestCase):
 
 SCRIPTS = {'scripts/' + name: 'scripts/' + name for name in ('train', 'check', 'soak', 'fuzz', 'film')}
 PROGRAMS = {**{name: 'src/tools_main/%s.cpp' % name for name in stems('src/tools_main/*.cpp')}, **SCRIPTS,
+            'drive': 'test/drive/drive_main.cpp', 'make_meshes': 'test/shapes/make_meshes_main.cpp',
             **{name + '.py': 'scripts/%s.py' % name for name in stems('scripts/*.py') if not name.startswith(('play_', 'surgery_'))},
             'play_SCENE.py': 'scripts/surgery_client.py'}
 

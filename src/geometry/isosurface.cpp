@@ -1,4 +1,4 @@
-#include "isosurface.h"
+#include "meshless_surgery/geometry/isosurface.h"
 
 #include <algorithm>
 #include <cmath>

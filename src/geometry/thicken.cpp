@@ -5,7 +5,7 @@
 #include <map>
 #include <sstream>
 
-#include "isosurface.h"
+#include "meshless_surgery/geometry/isosurface.h"
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/mend.h"

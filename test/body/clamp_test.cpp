@@ -8,7 +8,7 @@
 
 #include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/body/deform.h"
-#include "meshless_surgery/geometry/random_organ.h"
+#include "shapes/random_organ.h"
 #include "support/bodies.h"
 
 namespace meshless {

@@ -7,7 +7,7 @@
 #include "meshless_surgery/body/incise_body.h"
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/random_organ.h"
+#include "shapes/random_organ.h"
 #include "support/bodies.h"
 #include "support/mesh_laws.h"
 

@@ -7,7 +7,7 @@
 
 #include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/organs.h"
+#include "shapes/organs.h"
 #include "meshless_surgery/geometry/primitives.h"
 #include "support/random.h"
 

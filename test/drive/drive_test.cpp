@@ -1,11 +1,11 @@
 // Whole scenes: a sound one holds, faulty ones do not, and a seed says it all.
-#include "meshless_surgery/drive/drive.h"
+#include "drive/drive.h"
 
 #include <set>
 #include <sstream>
 
-#include "meshless_surgery/drive/drive_table.h"
-#include "meshless_surgery/drive/known_breaks.h"
+#include "drive/drive_table.h"
+#include "drive/known_breaks.h"
 #include "meshless_surgery/io/scene.h"
 #include "meshless_surgery/world/command_log.h"
 #include "seen_support.h"

@@ -2,15 +2,15 @@
 #include <cmath>
 #include <limits>
 
-#include "meshless_surgery/drive/crossing_law.h"
-#include "meshless_surgery/drive/depth_law.h"
-#include "meshless_surgery/drive/energy_law.h"
-#include "meshless_surgery/drive/finite_law.h"
-#include "meshless_surgery/drive/fold_law.h"
-#include "meshless_surgery/drive/mass_law.h"
-#include "meshless_surgery/drive/momentum_law.h"
-#include "meshless_surgery/drive/rest_law.h"
-#include "meshless_surgery/drive/volume_law.h"
+#include "drive/crossing_law.h"
+#include "drive/depth_law.h"
+#include "drive/energy_law.h"
+#include "drive/finite_law.h"
+#include "drive/fold_law.h"
+#include "drive/mass_law.h"
+#include "drive/momentum_law.h"
+#include "drive/rest_law.h"
+#include "drive/volume_law.h"
 #include "seen_support.h"
 #include "support/bodies.h"
 

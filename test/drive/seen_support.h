@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/drive/seen.h"
+#include "drive/seen.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/primitives.h"
 

@@ -1,11 +1,11 @@
 // Pieces of a cut organ under contact in present space.
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/drive/crossing_law.h"
-#include "meshless_surgery/drive/depth_law.h"
+#include "drive/crossing_law.h"
+#include "drive/depth_law.h"
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/random_organ.h"
+#include "shapes/random_organ.h"
 #include "support/bodies.h"
 
 namespace meshless {

@@ -7,7 +7,7 @@
 #include "meshless_surgery/geometry/cut.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/primitives.h"
-#include "meshless_surgery/geometry/random_organ.h"
+#include "shapes/random_organ.h"
 #include "support/mesh_laws.h"
 
 namespace meshless {

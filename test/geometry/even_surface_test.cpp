@@ -10,7 +10,7 @@
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/mesh_check.h"
-#include "meshless_surgery/geometry/random_organ.h"
+#include "shapes/random_organ.h"
 #include "support/mesh_laws.h"
 #include "support/shapes.h"
 

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "meshless_surgery/geometry/hollow_organs.h"
+#include "shapes/hollow_organs.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/mesh_check.h"
 

@@ -1,5 +1,5 @@
 // Parts of the instruments that are drawn.
-#include "meshless_surgery/geometry/instruments.h"
+#include "shapes/instruments.h"
 
 #include <gtest/gtest.h>
 

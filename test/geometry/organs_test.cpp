@@ -1,4 +1,4 @@
-#include "meshless_surgery/geometry/organs.h"
+#include "shapes/organs.h"
 
 #include <algorithm>
 #include <cmath>

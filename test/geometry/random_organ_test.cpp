@@ -1,4 +1,4 @@
-#include "meshless_surgery/geometry/random_organ.h"
+#include "shapes/random_organ.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "meshless_surgery/geometry/organs.h"
+#include "shapes/organs.h"
 #include "meshless_surgery/geometry/primitives.h"
 
 namespace meshless::shapes {

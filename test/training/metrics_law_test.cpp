@@ -5,7 +5,7 @@
 
 #include <Eigen/SVD>
 
-#include "meshless_surgery/geometry/hollow_organs.h"
+#include "shapes/hollow_organs.h"
 #include "training/played.h"
 
 namespace meshless {

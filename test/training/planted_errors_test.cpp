@@ -3,7 +3,7 @@
 
 #include "meshless_surgery/geometry/cut.h"
 #include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/organs.h"
+#include "shapes/organs.h"
 #include "meshless_surgery/geometry/primitives.h"
 #include "training/played.h"
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "meshless_surgery/geometry/hollow_organs.h"
+#include "shapes/hollow_organs.h"
 #include "meshless_surgery/geometry/primitives.h"
 #include "training/played.h"
 

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/random_organ.h"
+#include "shapes/random_organ.h"
 #include "support/bodies.h"
 
 namespace meshless {

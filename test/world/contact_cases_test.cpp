@@ -1,10 +1,10 @@
 // Cases of contact with a right answer: a pressed ball, a stack, a tray's edge, jaws, a bowl, a bladder, bodies inside.
 #include <cmath>
 
-#include "../../src/drive/supports.h"
+#include "drive/supports.h"
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/random_organ.h"
+#include "shapes/random_organ.h"
 #include "support/bodies.h"
 #include "support/random.h"
 #include "support/shapes.h"

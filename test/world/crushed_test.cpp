@@ -1,6 +1,6 @@
 // Soft bodies that a fall presses through themselves: what is crumpled unfolds.
 #include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/random_organ.h"
+#include "shapes/random_organ.h"
 #include "support/bodies.h"
 
 namespace meshless {

@@ -4,7 +4,7 @@
 #include <map>
 
 #include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/organs.h"
+#include "shapes/organs.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "meshless_surgery/world/world.h"
 #include "support/bodies.h"

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "meshless_surgery/geometry/organs.h"
+#include "shapes/organs.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "support/bodies.h"
 

@@ -1,5 +1,5 @@
 // The work of a cut depends on what it meets, not on the cuts before it. Counted, for clocks blur.
-#include "meshless_surgery/geometry/random_organ.h"
+#include "shapes/random_organ.h"
 #include "support/bodies.h"
 #include "support/random.h"
 

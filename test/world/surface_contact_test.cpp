@@ -5,7 +5,7 @@
 #include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/random_organ.h"
+#include "shapes/random_organ.h"
 #include "meshless_surgery/geometry/refine.h"
 #include "support/bodies.h"
 #include "support/random.h"

@@ -8,7 +8,7 @@
 
 #include "meshless_surgery/base/random.h"
 #include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/random_organ.h"
+#include "shapes/random_organ.h"
 #include "meshless_surgery/world/world.h"
 #include "support/bodies.h"
 
