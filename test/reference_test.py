@@ -51,7 +51,7 @@ class RangesTest(Compared, unittest.TestCase):
 
     def code(self):
         sources = [read('src/ros/' + name) for name in ('services.cpp', 'long_work.h')]
-        numbers, known = read('include/meshless_surgery/ros/border_check.h') + ''.join(sources), {}
+        numbers, known = read('src/ros/border_check.h') + ''.join(sources), {}
         for code in sources:
             parts = re.split(r'\n  (?:bool|Result<std::optional<Region>>) (\w+)\(', code)
             bodies = dict(zip(parts[1::2], parts[2::2]))
@@ -71,7 +71,7 @@ class RangesTest(Compared, unittest.TestCase):
 
 
 def typeOf(cpp):
-    header = read('include/meshless_surgery/ros/crtk_messages.h')
+    header = read('src/ros/crtk_messages.h')
     crtk = dict(found(r'DataType<meshless::(\w+)> \{\s+static const char\* value\(\) \{ return "([\w/]+)"', header))
     return crtk.get(cpp) or cpp.replace('meshless_surgery::', '').replace('::', '/')
 
@@ -180,8 +180,8 @@ class ParametersTest(Compared, unittest.TestCase):
                ('| `paused` | `false` |', '| `paused` | `true` |'), ('| `log` | required |', '| `logs` | required |'))
 
     def code(self):
-        header = read('include/meshless_surgery/ros/settings.h')
-        code = read('src/ros/settings.cpp') + read('include/meshless_surgery/ros/border_check.h')
+        header = read('src/ros/settings.h')
+        code = read('src/ros/settings.cpp') + read('src/ros/border_check.h')
         known, begins = {}, members('NodeSettings', header)
         # What both nodes have, what the review node has, and the other one.
         _, shared, review, own = re.split(r'\n(?=\S.* (?:readShared|readReviewSettings|readNodeSettings)\()', code)

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "meshless_surgery/body/cut_body.h"
-#include "meshless_surgery/body/rest_places.h"
+#include "rest_places.h"
 #include "meshless_surgery/geometry/incise.h"
 
 namespace meshless {

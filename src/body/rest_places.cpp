@@ -1,4 +1,4 @@
-#include "meshless_surgery/body/rest_places.h"
+#include "rest_places.h"
 
 #include <algorithm>
 #include <array>

@@ -24,7 +24,7 @@
 #endif
 
 #include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/unite_parts.h"
+#include "unite_parts.h"
 
 namespace meshless {
 namespace {

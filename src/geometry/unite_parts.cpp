@@ -1,4 +1,4 @@
-#include "meshless_surgery/geometry/unite_parts.h"
+#include "unite_parts.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,10 +6,10 @@
 #include <meshless_surgery/Hash.h>
 #include <ros/console.h>
 
-#include "meshless_surgery/ros/border_check.h"
-#include "meshless_surgery/ros/convert.h"
-#include "meshless_surgery/ros/rejections.h"
-#include "meshless_surgery/ros/runner.h"
+#include "border_check.h"
+#include "convert.h"
+#include "rejections.h"
+#include "runner.h"
 
 namespace meshless {
 

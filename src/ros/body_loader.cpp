@@ -1,6 +1,6 @@
-#include "meshless_surgery/ros/body_loader.h"
+#include "body_loader.h"
 
-#include "meshless_surgery/ros/border_check.h"
+#include "border_check.h"
 
 namespace meshless {
 namespace {

@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/border_check.h"
+#include "border_check.h"
 
 #include <algorithm>
 #include <cmath>

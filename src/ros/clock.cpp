@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/clock.h"
+#include "clock.h"
 
 #include <algorithm>
 #include <cmath>

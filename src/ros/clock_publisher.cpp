@@ -1,11 +1,11 @@
-#include "meshless_surgery/ros/clock_publisher.h"
+#include "clock_publisher.h"
 
 #include <ros/console.h>
 #include <ros/master.h>
 #include <ros/names.h>
 #include <ros/this_node.h>
 
-#include "meshless_surgery/ros/border_check.h"
+#include "border_check.h"
 
 namespace meshless {
 namespace {

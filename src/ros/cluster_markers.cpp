@@ -1,9 +1,9 @@
-#include "meshless_surgery/ros/cluster_markers.h"
+#include "cluster_markers.h"
 
 #include <cmath>
 
-#include "meshless_surgery/ros/convert.h"
-#include "meshless_surgery/ros/marker.h"
+#include "convert.h"
+#include "marker.h"
 
 namespace meshless {
 namespace {

@@ -1,7 +1,7 @@
-#include "meshless_surgery/ros/collision_markers.h"
+#include "collision_markers.h"
 
-#include "meshless_surgery/ros/convert.h"
-#include "meshless_surgery/ros/marker.h"
+#include "convert.h"
+#include "marker.h"
 #include "meshless_surgery/world/collision_shape.h"
 
 namespace meshless {

@@ -1,9 +1,9 @@
-#include "meshless_surgery/ros/contact_markers.h"
+#include "contact_markers.h"
 
 #include <algorithm>
 
-#include "meshless_surgery/ros/convert.h"
-#include "meshless_surgery/ros/marker.h"
+#include "convert.h"
+#include "marker.h"
 
 namespace meshless {
 namespace {

@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/convert.h"
+#include "convert.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/force_model.h"
+#include "force_model.h"
 
 #include <algorithm>
 #include <cmath>

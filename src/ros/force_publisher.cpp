@@ -1,11 +1,11 @@
-#include "meshless_surgery/ros/force_publisher.h"
+#include "force_publisher.h"
 
 #include <algorithm>
 #include <chrono>
 
 #include <geometry_msgs/WrenchStamped.h>
 
-#include "meshless_surgery/ros/convert.h"
+#include "convert.h"
 
 namespace meshless {
 

@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/force_stream.h"
+#include "force_stream.h"
 
 #include <algorithm>
 #include <cmath>

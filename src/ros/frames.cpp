@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/frames.h"
+#include "frames.h"
 
 #include <algorithm>
 #include <array>
@@ -16,8 +16,8 @@
 #include <tf2_eigen/tf2_eigen.h>
 #include <tf2_msgs/TFMessage.h>
 
-#include "meshless_surgery/ros/border_check.h"
-#include "meshless_surgery/ros/stamp_order.h"
+#include "border_check.h"
+#include "stamp_order.h"
 
 namespace meshless {
 namespace {

@@ -1,9 +1,9 @@
-#include "meshless_surgery/ros/instruments.h"
+#include "instruments.h"
 
 #include <algorithm>
 #include <string>
 
-#include "meshless_surgery/ros/convert.h"
+#include "convert.h"
 
 namespace meshless {
 namespace {

@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/live_training.h"
+#include "live_training.h"
 
 #include <algorithm>
 #include <atomic>

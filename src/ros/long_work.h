@@ -7,10 +7,10 @@
 #include <shape_msgs/SolidPrimitive.h>
 
 #include "answers.h"
-#include "meshless_surgery/ros/body_loader.h"
-#include "meshless_surgery/ros/convert.h"
-#include "meshless_surgery/ros/frames.h"
-#include "meshless_surgery/ros/runner.h"
+#include "body_loader.h"
+#include "convert.h"
+#include "frames.h"
+#include "runner.h"
 
 namespace meshless {
 

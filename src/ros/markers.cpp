@@ -1,10 +1,10 @@
-#include "meshless_surgery/ros/markers.h"
+#include "markers.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "meshless_surgery/ros/convert.h"
-#include "meshless_surgery/ros/marker.h"
+#include "convert.h"
+#include "marker.h"
 
 namespace meshless {
 namespace {

@@ -1,9 +1,9 @@
-#include "meshless_surgery/ros/moving_surfaces.h"
+#include "moving_surfaces.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "meshless_surgery/ros/convert.h"
+#include "convert.h"
 
 namespace meshless {
 namespace {

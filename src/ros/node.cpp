@@ -9,15 +9,15 @@
 #include <ros/param.h>
 #include <ros/this_node.h>
 
-#include "meshless_surgery/ros/border_check.h"
-#include "meshless_surgery/ros/clock_publisher.h"
-#include "meshless_surgery/ros/convert.h"
-#include "meshless_surgery/ros/force_publisher.h"
-#include "meshless_surgery/ros/live_training.h"
-#include "meshless_surgery/ros/publishers.h"
-#include "meshless_surgery/ros/services.h"
-#include "meshless_surgery/ros/session.h"
-#include "meshless_surgery/ros/tool_inputs.h"
+#include "border_check.h"
+#include "clock_publisher.h"
+#include "convert.h"
+#include "force_publisher.h"
+#include "live_training.h"
+#include "publishers.h"
+#include "services.h"
+#include "session.h"
+#include "tool_inputs.h"
 
 namespace meshless {
 namespace {

@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/progress.h"
+#include "progress.h"
 
 namespace meshless {
 

@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/publishers.h"
+#include "publishers.h"
 
 #include <algorithm>
 
@@ -6,13 +6,13 @@
 #include <ros/console.h>
 #include <sensor_msgs/JointState.h>
 
-#include "meshless_surgery/ros/border_check.h"
-#include "meshless_surgery/ros/cluster_markers.h"
-#include "meshless_surgery/ros/collision_markers.h"
-#include "meshless_surgery/ros/contact_markers.h"
-#include "meshless_surgery/ros/convert.h"
-#include "meshless_surgery/ros/crtk_messages.h"
-#include "meshless_surgery/ros/surfaces.h"
+#include "border_check.h"
+#include "cluster_markers.h"
+#include "collision_markers.h"
+#include "contact_markers.h"
+#include "convert.h"
+#include "crtk_messages.h"
+#include "surfaces.h"
 
 namespace meshless {
 namespace {

@@ -10,8 +10,8 @@
 #include <meshless_surgery/Seek.h>
 
 #include "answers.h"
-#include "meshless_surgery/ros/publishers.h"
-#include "meshless_surgery/ros/session.h"
+#include "publishers.h"
+#include "session.h"
 #include "meshless_surgery/training/frame.h"
 #include "meshless_surgery/world/log_review.h"
 

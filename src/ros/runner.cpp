@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/runner.h"
+#include "runner.h"
 
 #include <algorithm>
 #include <chrono>

@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/services.h"
+#include "services.h"
 
 #include <chrono>
 #include <sstream>

@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/session.h"
+#include "session.h"
 
 #include <unistd.h>
 

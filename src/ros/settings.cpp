@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/settings.h"
+#include "settings.h"
 
 #include <algorithm>
 #include <set>
@@ -9,8 +9,8 @@
 #include <ros/param.h>
 
 #include "meshless_surgery/io/session_folder.h"
-#include "meshless_surgery/ros/border_check.h"
-#include "meshless_surgery/ros/frames.h"
+#include "border_check.h"
+#include "frames.h"
 
 namespace meshless {
 namespace {

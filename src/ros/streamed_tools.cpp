@@ -1,11 +1,11 @@
-#include "meshless_surgery/ros/streamed_tools.h"
+#include "streamed_tools.h"
 
 #include <algorithm>
 
 #include <Eigen/Eigenvalues>
 
-#include "meshless_surgery/ros/border_check.h"
-#include "meshless_surgery/ros/convert.h"
+#include "border_check.h"
+#include "convert.h"
 
 namespace meshless {
 namespace {

@@ -1,8 +1,8 @@
-#include "meshless_surgery/ros/surfaces.h"
+#include "surfaces.h"
 
 #include <cmath>
 
-#include "meshless_surgery/ros/convert.h"
+#include "convert.h"
 
 namespace meshless {
 namespace {

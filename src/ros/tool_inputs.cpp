@@ -1,9 +1,9 @@
-#include "meshless_surgery/ros/tool_inputs.h"
+#include "tool_inputs.h"
 
 #include <ros/console.h>
 
-#include "meshless_surgery/ros/border_check.h"
-#include "meshless_surgery/ros/crtk_messages.h"
+#include "border_check.h"
+#include "crtk_messages.h"
 
 namespace meshless {
 namespace {

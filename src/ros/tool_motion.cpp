@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/tool_motion.h"
+#include "tool_motion.h"
 
 #include <algorithm>
 #include <sstream>

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "meshless_surgery/training/smoothness.h"
+#include "smoothness.h"
 
 namespace meshless {
 namespace {

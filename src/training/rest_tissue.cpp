@@ -6,7 +6,7 @@
 
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/nearest_on_triangle.h"
-#include "meshless_surgery/training/volume_within.h"
+#include "volume_within.h"
 
 namespace meshless {
 namespace {

@@ -1,4 +1,4 @@
-#include "meshless_surgery/training/smoothness.h"
+#include "smoothness.h"
 
 #include <algorithm>
 #include <cmath>

@@ -7,7 +7,7 @@
 #include "meshless_surgery/geometry/inside.h"
 #include "meshless_surgery/geometry/measures.h"
 #include "meshless_surgery/geometry/thicken.h"
-#include "meshless_surgery/training/volume_within.h"
+#include "volume_within.h"
 
 namespace meshless {
 namespace {

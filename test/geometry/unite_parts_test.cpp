@@ -1,4 +1,4 @@
-#include "meshless_surgery/geometry/unite_parts.h"
+#include "geometry/unite_parts.h"
 
 #include <gtest/gtest.h>
 

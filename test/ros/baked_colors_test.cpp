@@ -2,8 +2,8 @@
 
 #include <map>
 
-#include "meshless_surgery/ros/markers.h"
-#include "meshless_surgery/ros/moving_surfaces.h"
+#include "ros/markers.h"
+#include "ros/moving_surfaces.h"
 #include "ros/scene_support.h"
 #include "support/images.h"
 #include "support/textured.h"

@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/border_check.h"
+#include "ros/border_check.h"
 
 #include <limits>
 

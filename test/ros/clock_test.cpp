@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/clock.h"
+#include "ros/clock.h"
 
 #include <gtest/gtest.h>
 

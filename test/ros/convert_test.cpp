@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/convert.h"
+#include "ros/convert.h"
 
 #include <cstring>
 

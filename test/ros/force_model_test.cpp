@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/force_model.h"
+#include "ros/force_model.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/force_stream.h"
+#include "ros/force_stream.h"
 
 #include "ros/tool_bench.h"
 #include "support/falls_short.h"

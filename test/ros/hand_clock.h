@@ -3,7 +3,7 @@
 
 #include <atomic>
 
-#include "meshless_surgery/ros/clock.h"
+#include "ros/clock.h"
 
 namespace meshless {
 

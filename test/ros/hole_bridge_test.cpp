@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/hole_bridge.h"
+#include "ros/hole_bridge.h"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
 // What is drawn at the tools is where they are and open as they are.
-#include "meshless_surgery/ros/instruments.h"
+#include "ros/instruments.h"
 
 #include <fstream>
 
-#include "meshless_surgery/ros/convert.h"
-#include "meshless_surgery/ros/markers.h"
+#include "ros/convert.h"
+#include "ros/markers.h"
 #include "ros/scene_support.h"
 
 namespace meshless {

@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/markers.h"
+#include "ros/markers.h"
 
 #include <set>
 

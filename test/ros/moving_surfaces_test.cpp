@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/moving_surfaces.h"
+#include "ros/moving_surfaces.h"
 
 #include "ros/scene_support.h"
 

@@ -1,8 +1,8 @@
-#include "meshless_surgery/ros/runner.h"
+#include "ros/runner.h"
 
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
 
-#include "meshless_surgery/ros/publishers.h"
+#include "ros/publishers.h"
 #include "ros/hand_clock.h"
 #include "ros/scene_support.h"
 

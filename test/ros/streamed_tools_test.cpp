@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/streamed_tools.h"
+#include "ros/streamed_tools.h"
 
 #include "ros/tool_bench.h"
 

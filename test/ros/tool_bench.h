@@ -5,8 +5,8 @@
 #include <deque>
 #include <vector>
 
-#include "meshless_surgery/ros/force_stream.h"
-#include "meshless_surgery/ros/streamed_tools.h"
+#include "ros/force_stream.h"
+#include "ros/streamed_tools.h"
 #include "ros/hand_clock.h"
 #include "ros/scene_support.h"
 

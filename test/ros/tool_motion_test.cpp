@@ -1,4 +1,4 @@
-#include "meshless_surgery/ros/tool_motion.h"
+#include "ros/tool_motion.h"
 
 #include <gtest/gtest.h>
 

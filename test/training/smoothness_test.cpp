@@ -1,4 +1,4 @@
-#include "meshless_surgery/training/smoothness.h"
+#include "training/smoothness.h"
 
 #include <cmath>
 

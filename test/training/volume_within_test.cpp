@@ -1,4 +1,4 @@
-#include "meshless_surgery/training/volume_within.h"
+#include "training/volume_within.h"
 
 #include <cmath>
 

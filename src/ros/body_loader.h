@@ -7,7 +7,7 @@
 
 #include "meshless_surgery/io/cloud_shape.h"
 #include "meshless_surgery/io/scene.h"
-#include "meshless_surgery/ros/progress.h"
+#include "progress.h"
 
 namespace meshless {
 

@@ -10,11 +10,11 @@
 #include <ros/node_handle.h>
 #include <sensor_msgs/JointState.h>
 
-#include "meshless_surgery/ros/frames.h"
-#include "meshless_surgery/ros/rejections.h"
-#include "meshless_surgery/ros/runner.h"
-#include "meshless_surgery/ros/settings.h"
-#include "meshless_surgery/ros/streamed_tools.h"
+#include "frames.h"
+#include "rejections.h"
+#include "runner.h"
+#include "settings.h"
+#include "streamed_tools.h"
 
 namespace meshless {
 

@@ -5,9 +5,9 @@
 #include <array>
 #include <optional>
 
-#include "meshless_surgery/ros/force_model.h"
-#include "meshless_surgery/ros/hole_bridge.h"
-#include "meshless_surgery/ros/settings.h"
+#include "force_model.h"
+#include "hole_bridge.h"
+#include "settings.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless {

@@ -12,7 +12,7 @@
 #include <rosgraph_msgs/Clock.h>
 
 #include "meshless_surgery/base/result.h"
-#include "meshless_surgery/ros/rejections.h"
+#include "rejections.h"
 
 namespace meshless {
 

@@ -14,14 +14,14 @@
 #include <ros/node_handle.h>
 #include <tf2_ros/transform_broadcaster.h>
 
-#include "meshless_surgery/ros/force_stream.h"
-#include "meshless_surgery/ros/instruments.h"
-#include "meshless_surgery/ros/markers.h"
-#include "meshless_surgery/ros/moving_surfaces.h"
-#include "meshless_surgery/ros/rejections.h"
-#include "meshless_surgery/ros/runner.h"
-#include "meshless_surgery/ros/settings.h"
-#include "meshless_surgery/ros/streamed_tools.h"
+#include "force_stream.h"
+#include "instruments.h"
+#include "markers.h"
+#include "moving_surfaces.h"
+#include "rejections.h"
+#include "runner.h"
+#include "settings.h"
+#include "streamed_tools.h"
 
 namespace meshless {
 

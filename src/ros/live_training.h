@@ -9,9 +9,9 @@
 #include <ros/spinner.h>
 
 #include "meshless_surgery/io/task.h"
-#include "meshless_surgery/ros/rejections.h"
-#include "meshless_surgery/ros/runner.h"
-#include "meshless_surgery/ros/streamed_tools.h"
+#include "rejections.h"
+#include "runner.h"
+#include "streamed_tools.h"
 
 namespace meshless {
 

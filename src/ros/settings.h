@@ -3,7 +3,7 @@
 
 #include <ros/node_handle.h>
 
-#include "meshless_surgery/ros/runner.h"
+#include "runner.h"
 
 namespace meshless {
 

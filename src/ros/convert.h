@@ -9,7 +9,7 @@
 #include <shape_msgs/Mesh.h>
 #include <std_msgs/ColorRGBA.h>
 
-#include "meshless_surgery/ros/runner.h"
+#include "runner.h"
 
 namespace meshless {
 

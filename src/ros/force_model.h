@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "meshless_surgery/base/types.h"
-#include "meshless_surgery/ros/step_hold.h"
+#include "step_hold.h"
 
 namespace meshless {
 

@@ -9,8 +9,8 @@
 #include <mutex>
 #include <thread>
 
-#include "meshless_surgery/ros/clock.h"
-#include "meshless_surgery/ros/progress.h"
+#include "clock.h"
+#include "progress.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless {

@@ -7,12 +7,12 @@
 #include <ros/node_handle.h>
 #include <ros/spinner.h>
 
-#include "meshless_surgery/ros/body_loader.h"
-#include "meshless_surgery/ros/frames.h"
-#include "meshless_surgery/ros/rejections.h"
-#include "meshless_surgery/ros/runner.h"
-#include "meshless_surgery/ros/session.h"
-#include "meshless_surgery/ros/streamed_tools.h"
+#include "body_loader.h"
+#include "frames.h"
+#include "rejections.h"
+#include "runner.h"
+#include "session.h"
+#include "streamed_tools.h"
 
 namespace meshless {
 

@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "meshless_surgery/ros/stamp_order.h"
+#include "stamp_order.h"
 #include "meshless_surgery/tools/command.h"
 
 namespace meshless {

@@ -6,9 +6,9 @@
 #include <functional>
 #include <mutex>
 
-#include "meshless_surgery/ros/clock.h"
-#include "meshless_surgery/ros/settings.h"
-#include "meshless_surgery/ros/tool_motion.h"
+#include "clock.h"
+#include "settings.h"
+#include "tool_motion.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless {

@@ -10,7 +10,7 @@
 #include <ros/time.h>
 #include <std_msgs/Header.h>
 
-#include "meshless_surgery/ros/clock.h"
+#include "clock.h"
 #include "meshless_surgery/tools/command.h"
 
 namespace meshless {

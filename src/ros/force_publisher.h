@@ -8,8 +8,8 @@
 
 #include <ros/node_handle.h>
 
-#include "meshless_surgery/ros/force_stream.h"
-#include "meshless_surgery/ros/streamed_tools.h"
+#include "force_stream.h"
+#include "streamed_tools.h"
 
 namespace meshless {
 

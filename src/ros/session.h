@@ -9,7 +9,7 @@
 
 #include "meshless_surgery/io/autosave_file.h"
 #include "meshless_surgery/io/session_folder.h"
-#include "meshless_surgery/ros/runner.h"
+#include "runner.h"
 #include "meshless_surgery/world/log_index.h"
 #include "meshless_surgery/world/saved_world.h"
 
