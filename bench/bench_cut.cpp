@@ -17,9 +17,9 @@
 #include <benchmark/benchmark.h>
 
 #include "cut_rows.h"
-#include "meshless_surgery/geometry/cut.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/surgery/cut.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless::bench {

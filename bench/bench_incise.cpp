@@ -8,10 +8,10 @@
 
 #include <benchmark/benchmark.h>
 
-#include "meshless_surgery/geometry/incise.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/surgery/incise.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "shapes/organs.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 
 namespace meshless {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "meshless_surgery/body/body.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless::bench {

@@ -5,9 +5,9 @@
 #include <BulletSoftBody/btSoftRigidDynamicsWorld.h>
 #include <btBulletDynamicsCommon.h>
 
-#include "meshless_surgery/geometry/inside.h"
-#include "meshless_surgery/geometry/primitives.h"
-#include "meshless_surgery/geometry/tetrahedralize.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
+#include "meshless_surgery/geometry/mesh/tetrahedralize.h"
 
 namespace meshless::bench {
 namespace {

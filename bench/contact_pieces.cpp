@@ -6,9 +6,9 @@
 
 #include "clock.h"
 #include "meshless_surgery/body/body.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "shapes/organs.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "shapes/random_organ.h"
 
 namespace meshless::bench {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 
 namespace meshless::bench {
 namespace {

@@ -5,8 +5,8 @@
 #include <array>
 #include <cstddef>
 
-#include "meshless_surgery/geometry/plane.h"
-#include "meshless_surgery/geometry/triangle_mesh.h"
+#include "meshless_surgery/geometry/query/plane.h"
+#include "meshless_surgery/geometry/mesh/triangle_mesh.h"
 
 namespace meshless::bench {
 

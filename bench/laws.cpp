@@ -8,8 +8,8 @@
 #include "meshless_surgery/body/preserve.h"
 #include "meshless_surgery/dynamics/match_batch.h"
 #include "meshless_surgery/dynamics/rotation.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 
 namespace meshless::bench {
 namespace {

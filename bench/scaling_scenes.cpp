@@ -3,8 +3,8 @@
 #include <cmath>
 #include <string>
 
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "shapes/random_organ.h"
 
 namespace meshless::bench {

@@ -3,7 +3,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/world/world.h"
 #include "truth_samples.h"
 #include "truth_surface.h"

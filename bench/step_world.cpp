@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "meshless_surgery/world/world.h"
 #include "step_rows.h"
 

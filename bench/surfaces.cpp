@@ -12,7 +12,7 @@
 #include "drive/crossing_law.h"
 #include "drive/depth_law.h"
 #include "drive/fold_law.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "shapes/random_organ.h"
 #include "meshless_surgery/world/world.h"
 

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "meshless_surgery/body/deform.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "meshless_surgery/world/world.h"
 #include "truth_samples.h"
 #include "truth_surface.h"

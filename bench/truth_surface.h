@@ -4,7 +4,7 @@
 #include <string>
 
 #include "meshless_surgery/base/result.h"
-#include "meshless_surgery/geometry/triangle_mesh.h"
+#include "meshless_surgery/geometry/mesh/triangle_mesh.h"
 
 namespace meshless::bench {
 

@@ -119,23 +119,23 @@ class WrongIncludeTest(unittest.TestCase):
         self.assertEqual([], violations(path, '#include <vector>\n#include %s\n' % include))
 
     def testRooms(self):
-        self.assertWrong('src/geometry/cut.cpp', '"meshless_surgery/body/body.h"')
+        self.assertWrong('src/geometry/surgery/cut.cpp', '"meshless_surgery/body/body.h"')
         self.assertWrong('src/dynamics/clusters.cpp', '"meshless_surgery/contact/textbook.h"')
         self.assertWrong('include/meshless_surgery/contact/textbook.h', '"meshless_surgery/dynamics/clusters.h"')
         self.assertWrong('include/meshless_surgery/tools/tools.h', '"meshless_surgery/world/world.h"')
         self.assertWrong('src/world/world.cpp', '"meshless_surgery/io/scene.h"')
         self.assertWrong('src/rviz/pick_tool.cpp', '"meshless_surgery/base/types.h"')
         self.assertWrong('src/tools_main/replay.cpp', '"meshless_surgery/ros/runner.h"')
-        self.assertWrong('src/geometry/cut.cpp', '"meshless_surgery/attic/old.h"')
+        self.assertWrong('src/geometry/surgery/cut.cpp', '"meshless_surgery/attic/old.h"')
         self.assertWrong('src/attic/old.cpp', '<string>')
-        self.assertRight('src/geometry/cut.cpp', '"meshless_surgery/geometry/plane.h"')
+        self.assertRight('src/geometry/surgery/cut.cpp', '"meshless_surgery/geometry/query/plane.h"')
         self.assertRight('src/world/world.cpp', '"meshless_surgery/dynamics/rotation.h"')
 
     def testSpellings(self):
         self.assertWrong('src/base/ids.cpp', '  <meshless_surgery/world/world.h>')
         self.assertEqual(1, len(violations('src/base/ids.cpp', '  #  include\t<ros/ros.h>  // why\n')))
         self.assertEqual([], violations('src/base/ids.cpp', '// not #include <ros/ros.h>\n'))
-        self.assertWrong('src/geometry/cut.cpp', '"../geometry/private.h"')
+        self.assertWrong('src/geometry/surgery/cut.cpp', '"../geometry/private.h"')
 
     def testLibraries(self):
         for include in ('<ros/ros.h>', '<geometry_msgs/Point.h>', '<std_srvs/Trigger.h>', '<tf2_ros/buffer.h>',
@@ -143,12 +143,12 @@ class WrongIncludeTest(unittest.TestCase):
             self.assertWrong('src/world/world.cpp', include)
             self.assertRight('src/ros/node.cpp', include)
         for include in ('<pcl/io/pcd_io.h>', '<pcl/point_types.h>'):
-            self.assertWrong('include/meshless_surgery/geometry/nearest.h', include)
+            self.assertWrong('include/meshless_surgery/geometry/query/nearest.h', include)
             self.assertWrong('src/ros/node.cpp', include)
             self.assertRight('src/io/files.cpp', include)
-        self.assertWrong('include/meshless_surgery/geometry/tetrahedralize.h', '<CGAL/Delaunay_triangulation_3.h>')
+        self.assertWrong('include/meshless_surgery/geometry/mesh/tetrahedralize.h', '<CGAL/Delaunay_triangulation_3.h>')
         self.assertWrong('src/body/body.cpp', '<CGAL/Delaunay_triangulation_3.h>')
-        self.assertRight('src/geometry/tetrahedralize.cpp', '<CGAL/Delaunay_triangulation_3.h>')
+        self.assertRight('src/geometry/mesh/tetrahedralize.cpp', '<CGAL/Delaunay_triangulation_3.h>')
         self.assertWrong('src/ros/node.cpp', '<QWidget>')
         self.assertRight('src/rviz/pick_tool.cpp', '<QWidget>')
 

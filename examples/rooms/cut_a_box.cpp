@@ -1,7 +1,7 @@
 // A soft box falls onto the ground, and is cut in two.
 #include <cstdio>
 
-#include <meshless_surgery/geometry/primitives.h>
+#include <meshless_surgery/geometry/mesh/primitives.h>
 #include <meshless_surgery/world/world.h>
 
 int main() {

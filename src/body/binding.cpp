@@ -14,7 +14,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
-#include "meshless_surgery/geometry/nearest.h"
+#include "meshless_surgery/geometry/query/nearest.h"
 #include "side_by_side.h"
 
 namespace meshless {

@@ -7,8 +7,8 @@
 #include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/body/cavities.h"
 #include "meshless_surgery/body/filled_cells.h"
-#include "meshless_surgery/geometry/cell_regions.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/lattice/cell_regions.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 
 namespace meshless {
 

@@ -1,6 +1,6 @@
 #include "meshless_surgery/body/body_bytes.h"
 
-#include "meshless_surgery/geometry/cell_regions.h"
+#include "meshless_surgery/geometry/lattice/cell_regions.h"
 
 namespace meshless {
 

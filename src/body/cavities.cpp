@@ -7,9 +7,9 @@
 #include <sstream>
 
 #include "meshless_surgery/body/binding.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/nearest.h"
-#include "meshless_surgery/geometry/union_find.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/query/nearest.h"
+#include "meshless_surgery/geometry/query/union_find.h"
 
 namespace meshless {
 namespace {

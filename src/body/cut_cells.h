@@ -2,7 +2,7 @@
 #pragma once
 
 #include "meshless_surgery/body/cut_body.h"
-#include "meshless_surgery/geometry/blade_gate.h"
+#include "meshless_surgery/geometry/query/blade_gate.h"
 
 namespace meshless {
 

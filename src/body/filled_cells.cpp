@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "meshless_surgery/base/compressed_rows.h"
-#include "meshless_surgery/geometry/cell_regions.h"
-#include "meshless_surgery/geometry/cut_lattice.h"
+#include "meshless_surgery/geometry/lattice/cell_regions.h"
+#include "meshless_surgery/geometry/lattice/cut_lattice.h"
 
 namespace meshless {
 namespace {

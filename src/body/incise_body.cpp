@@ -4,7 +4,7 @@
 #include <map>
 
 #include "cut_cells.h"
-#include "meshless_surgery/geometry/nearest.h"
+#include "meshless_surgery/geometry/query/nearest.h"
 #include "piece_maker.h"
 #include "side_by_side.h"
 

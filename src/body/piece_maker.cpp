@@ -11,7 +11,7 @@
 
 #include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/dynamics/plastic.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "piece_parts.h"
 #include "side_by_side.h"
 

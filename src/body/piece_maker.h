@@ -6,7 +6,7 @@
 
 #include "meshless_surgery/body/cut_body.h"
 #include "rest_places.h"
-#include "meshless_surgery/geometry/incise.h"
+#include "meshless_surgery/geometry/surgery/incise.h"
 
 namespace meshless {
 

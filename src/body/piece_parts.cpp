@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "meshless_surgery/body/cavities.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 
 namespace meshless {
 

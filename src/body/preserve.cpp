@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "meshless_surgery/body/binding.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 
 namespace meshless {
 namespace {

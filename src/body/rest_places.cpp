@@ -7,7 +7,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "meshless_surgery/dynamics/rotation.h"
-#include "meshless_surgery/geometry/nearest.h"
+#include "meshless_surgery/geometry/query/nearest.h"
 #include "side_by_side.h"
 
 namespace meshless {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "meshless_surgery/geometry/nearest_on_triangle.h"
+#include "meshless_surgery/geometry/query/nearest_on_triangle.h"
 
 namespace meshless {
 namespace {

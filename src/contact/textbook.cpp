@@ -7,7 +7,7 @@
 
 #include "meshless_surgery/base/compressed_rows.h"
 #include "meshless_surgery/contact/broad_phase.h"
-#include "meshless_surgery/geometry/nearest_on_triangle.h"
+#include "meshless_surgery/geometry/query/nearest_on_triangle.h"
 
 namespace meshless {
 namespace {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "meshless_surgery/base/result.h"
-#include "meshless_surgery/geometry/outer_surface.h"
+#include "meshless_surgery/geometry/mesh/outer_surface.h"
 #include "meshless_surgery/io/files.h"
 
 namespace meshless {

@@ -14,8 +14,8 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/surface_from_points.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/surface_from_points.h"
 
 namespace meshless {
 namespace {

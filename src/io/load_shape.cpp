@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <sstream>
 
-#include "meshless_surgery/geometry/surface_from_points.h"
+#include "meshless_surgery/geometry/mesh/surface_from_points.h"
 #include "meshless_surgery/io/cloud_shape.h"
 
 namespace meshless {

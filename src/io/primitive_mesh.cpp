@@ -1,7 +1,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "meshless_surgery/io/scene.h"
 
 namespace meshless {

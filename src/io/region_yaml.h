@@ -1,7 +1,7 @@
 // Parts of space in YAML files.
 #pragma once
 
-#include "meshless_surgery/geometry/region.h"
+#include "meshless_surgery/geometry/query/region.h"
 #include "yaml_map.h"
 
 namespace meshless {

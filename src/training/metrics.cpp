@@ -4,7 +4,7 @@
 #include <cassert>
 #include <cmath>
 
-#include "meshless_surgery/geometry/nearest.h"
+#include "meshless_surgery/geometry/query/nearest.h"
 
 namespace meshless {
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/nearest_on_triangle.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/query/nearest_on_triangle.h"
 #include "volume_within.h"
 
 namespace meshless {

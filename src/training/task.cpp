@@ -4,9 +4,9 @@
 #include <cmath>
 #include <sstream>
 
-#include "meshless_surgery/geometry/inside.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/thicken.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/thicken.h"
 #include "volume_within.h"
 
 namespace meshless {

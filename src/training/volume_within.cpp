@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 
 namespace meshless {
 namespace {

@@ -1,8 +1,8 @@
 // How much of a solid lies in a region.
 #pragma once
 
-#include "meshless_surgery/geometry/region.h"
-#include "meshless_surgery/geometry/triangle_mesh.h"
+#include "meshless_surgery/geometry/query/region.h"
+#include "meshless_surgery/geometry/mesh/triangle_mesh.h"
 
 namespace meshless {
 

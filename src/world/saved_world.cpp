@@ -6,9 +6,9 @@
 
 #include "meshless_surgery/body/cavities.h"
 #include "meshless_surgery/body/filled_cells.h"
-#include "meshless_surgery/geometry/cell_regions.h"
-#include "meshless_surgery/geometry/cut_lattice.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/lattice/cell_regions.h"
+#include "meshless_surgery/geometry/lattice/cut_lattice.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "saved_world_impl.h"
 
 namespace meshless {

@@ -5,7 +5,7 @@
 #include <zlib.h>
 
 #include "meshless_surgery/base/archive.h"
-#include "meshless_surgery/geometry/cell_regions.h"
+#include "meshless_surgery/geometry/lattice/cell_regions.h"
 #include "meshless_surgery/world/saved_world.h"
 #include "world_impl.h"
 

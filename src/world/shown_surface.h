@@ -7,7 +7,7 @@
 
 #include "meshless_surgery/contact/row_solver.h"
 #include "meshless_surgery/contact/surface_contacts.h"
-#include "meshless_surgery/geometry/nearest_on_triangle.h"
+#include "meshless_surgery/geometry/query/nearest_on_triangle.h"
 
 namespace meshless {
 

@@ -6,9 +6,9 @@
 #include <sstream>
 
 #include "meshless_surgery/body/cavities.h"
-#include "meshless_surgery/geometry/inside.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/tetrahedralize.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/tetrahedralize.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
 

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "meshless_surgery/base/compressed_rows.h"
-#include "meshless_surgery/geometry/nearest_on_triangle.h"
-#include "meshless_surgery/geometry/union_find.h"
+#include "meshless_surgery/geometry/query/nearest_on_triangle.h"
+#include "meshless_surgery/geometry/query/union_find.h"
 #include "world_impl.h"
 
 namespace meshless {

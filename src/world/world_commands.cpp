@@ -3,8 +3,8 @@
 #include <limits>
 
 #include "meshless_surgery/body/ease.h"
-#include "meshless_surgery/geometry/inside.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
 

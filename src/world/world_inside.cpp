@@ -1,8 +1,8 @@
 // Nobody starts wholly inside another: contact knows no way out of there.
 #include <algorithm>
 
-#include "meshless_surgery/geometry/inside.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "world_impl.h"
 
 namespace meshless {

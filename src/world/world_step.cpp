@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "meshless_surgery/body/unwind.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
 

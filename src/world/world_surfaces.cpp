@@ -9,7 +9,7 @@
 #include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/body/preserve.h"
 #include "meshless_surgery/dynamics/extent.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
 

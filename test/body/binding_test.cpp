@@ -1,7 +1,7 @@
 #include "meshless_surgery/body/binding.h"
 
 #include "meshless_surgery/body/cut_body.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "support/bodies.h"
 
 namespace meshless {

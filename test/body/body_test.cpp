@@ -5,8 +5,8 @@
 #include <tuple>
 
 #include "meshless_surgery/body/deform.h"
-#include "meshless_surgery/geometry/inside.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "support/bodies.h"
 
 namespace meshless {

@@ -9,7 +9,7 @@
 #include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/body/incise_body.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "support/bodies.h"
 
 namespace meshless {

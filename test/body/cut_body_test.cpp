@@ -1,9 +1,9 @@
 #include "meshless_surgery/body/cut_body.h"
 
 #include "meshless_surgery/body/deform.h"
-#include "meshless_surgery/geometry/inside.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/nearest_on_triangle.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/query/nearest_on_triangle.h"
 #include "support/bodies.h"
 #include "support/mesh_laws.h"
 #include "support/random.h"

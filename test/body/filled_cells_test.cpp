@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 
 #include "meshless_surgery/body/deform.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "shapes/organs.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "support/random.h"
 
 namespace meshless {

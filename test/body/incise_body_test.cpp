@@ -1,7 +1,7 @@
 #include "meshless_surgery/body/incise_body.h"
 
 #include "meshless_surgery/body/deform.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "support/bodies.h"
 #include "support/mesh_laws.h"
 

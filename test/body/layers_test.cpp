@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "support/bodies.h"
 #include "support/statics.h"
 

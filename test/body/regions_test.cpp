@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "meshless_surgery/body/cut_body.h"
-#include "meshless_surgery/geometry/cell_regions.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/lattice/cell_regions.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "support/bodies.h"
 
 namespace meshless {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <set>
 
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 
 namespace meshless {
 namespace feature_pairs_test {

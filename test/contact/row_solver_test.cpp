@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "meshless_surgery/contact/surface_contacts.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "support/random.h"
 
 namespace meshless {

@@ -7,9 +7,9 @@
 #include <random>
 #include <set>
 
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/primitives.h"
-#include "meshless_surgery/geometry/tetrahedralize.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
+#include "meshless_surgery/geometry/mesh/tetrahedralize.h"
 
 namespace meshless {
 namespace textbook_test {

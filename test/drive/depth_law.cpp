@@ -4,8 +4,8 @@
 #include <map>
 #include <memory>
 
-#include "meshless_surgery/geometry/inside.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "drive/words.h"
 
 namespace meshless {

@@ -11,7 +11,7 @@ namespace meshless {
 double allowedDepth(double smaller_diagonal);
 
 /// No vertex of a body is deeper than that inside another one, an obstacle or the ground, and none of an obstacle
-/// inside a body. Inside is where the other surface winds around the vertex (geometry/inside.h); the depth is the
+/// inside a body. Inside is where the other surface winds around the vertex (geometry/query/inside.h); the depth is the
 /// distance to that surface. Surfaces are those that contact takes. Knows nothing of how contacts are found.
 Finding depthLaw(const Seen& seen);
 

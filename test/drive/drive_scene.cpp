@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "meshless_surgery/base/random.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "shapes/organs.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "shapes/random_organ.h"
 #include "drive/supports.h"
 #include "drive/words.h"

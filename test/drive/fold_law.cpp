@@ -8,8 +8,8 @@
 
 #include <Eigen/Dense>
 
-#include "meshless_surgery/geometry/cell_lattice.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/lattice/cell_lattice.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "drive/words.h"
 
 namespace meshless {

@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "drive/seen.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 
 namespace meshless::test {
 

@@ -1,7 +1,7 @@
 // Closed surfaces to put organs on. Private to this room.
 #pragma once
 
-#include "meshless_surgery/geometry/triangle_mesh.h"
+#include "meshless_surgery/geometry/mesh/triangle_mesh.h"
 
 namespace meshless {
 

@@ -3,8 +3,8 @@
 
 #include "drive/crossing_law.h"
 #include "drive/depth_law.h"
-#include "meshless_surgery/geometry/inside.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "shapes/random_organ.h"
 #include "support/bodies.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "drive/words.h"
 
 namespace meshless {

@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <iostream>
 
-#include "meshless_surgery/geometry/incise.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/surgery/incise.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "support/shapes.h"
 
 namespace meshless::fuzz {

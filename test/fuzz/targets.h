@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 #include "fuzz/cuts.h"
-#include "meshless_surgery/geometry/mesh_check.h"
+#include "meshless_surgery/geometry/mesh/mesh_check.h"
 #include "meshless_surgery/io/scene.h"
 
 namespace meshless::fuzz {

@@ -1,11 +1,11 @@
-#include "meshless_surgery/geometry/cell_lattice.h"
+#include "meshless_surgery/geometry/lattice/cell_lattice.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 #include <set>
 
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "support/shapes.h"
 
 namespace meshless {

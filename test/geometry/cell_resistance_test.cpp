@@ -3,9 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/cell_lattice.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/lattice/cell_lattice.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 
 namespace meshless {
 namespace cell_resistance_test {

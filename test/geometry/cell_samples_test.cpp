@@ -1,10 +1,10 @@
-#include "meshless_surgery/geometry/cell_samples.h"
+#include "meshless_surgery/geometry/lattice/cell_samples.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/union_find.h"
+#include "meshless_surgery/geometry/query/union_find.h"
 #include "support/random.h"
 
 namespace meshless {

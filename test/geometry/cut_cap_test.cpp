@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/cut.h"
-#include "meshless_surgery/geometry/mesh_check.h"
+#include "meshless_surgery/geometry/surgery/cut.h"
+#include "meshless_surgery/geometry/mesh/mesh_check.h"
 #include "support/cut_cases.h"
 #include "support/mesh_laws.h"
 

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/cut.h"
+#include "meshless_surgery/geometry/surgery/cut.h"
 #include "support/cut_cases.h"
 #include "support/mesh_laws.h"
 

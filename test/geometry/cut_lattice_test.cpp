@@ -1,11 +1,11 @@
-#include "meshless_surgery/geometry/cut_lattice.h"
+#include "meshless_surgery/geometry/lattice/cut_lattice.h"
 
 #include <gtest/gtest.h>
 
 #include <map>
 
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/union_find.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/query/union_find.h"
 #include "support/random.h"
 #include "support/shapes.h"
 

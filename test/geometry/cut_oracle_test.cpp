@@ -8,7 +8,7 @@
 #include <CGAL/Surface_mesh.h>
 
 #include "cut_rows.h"
-#include "meshless_surgery/geometry/cut.h"
+#include "meshless_surgery/geometry/surgery/cut.h"
 #include "support/cut_cases.h"
 #include "support/mesh_laws.h"
 

@@ -4,9 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/cut.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/surgery/cut.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "shapes/random_organ.h"
 #include "support/mesh_laws.h"
 

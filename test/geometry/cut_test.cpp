@@ -1,4 +1,4 @@
-#include "meshless_surgery/geometry/cut.h"
+#include "meshless_surgery/geometry/surgery/cut.h"
 
 #include <filesystem>
 #include <limits>

@@ -1,5 +1,5 @@
 // Surfaces in even triangles. Lengths are those of collision surfaces: a spacing makes 1,600 cells of the body.
-#include "meshless_surgery/geometry/even_surface.h"
+#include "meshless_surgery/geometry/mesh/even_surface.h"
 
 #include <gtest/gtest.h>
 
@@ -7,9 +7,9 @@
 #include <limits>
 #include <map>
 
-#include "meshless_surgery/geometry/inside.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/mesh_check.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/mesh_check.h"
 #include "shapes/random_organ.h"
 #include "support/mesh_laws.h"
 #include "support/shapes.h"

@@ -6,8 +6,8 @@
 #include <sstream>
 
 #include "shapes/hollow_organs.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/mesh_check.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/mesh_check.h"
 
 namespace meshless {
 namespace hollow_organs_test {

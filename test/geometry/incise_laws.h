@@ -3,7 +3,7 @@
 
 #include <set>
 
-#include "meshless_surgery/geometry/incise.h"
+#include "meshless_surgery/geometry/surgery/incise.h"
 #include "support/mesh_laws.h"
 #include "support/random.h"
 #include "support/shapes.h"

@@ -1,4 +1,4 @@
-#include "meshless_surgery/geometry/incise.h"
+#include "meshless_surgery/geometry/surgery/incise.h"
 
 #include <limits>
 

@@ -7,8 +7,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/mesh_check.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/mesh_check.h"
 
 namespace meshless {
 namespace instruments_test {

@@ -1,8 +1,8 @@
-#include "meshless_surgery/geometry/main_axes.h"
+#include "meshless_surgery/geometry/mesh/main_axes.h"
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "support/random.h"
 
 namespace meshless {

@@ -1,8 +1,8 @@
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "support/shapes.h"
 
 namespace meshless {

@@ -1,9 +1,9 @@
-#include "meshless_surgery/geometry/mend.h"
+#include "meshless_surgery/geometry/mesh/mend.h"
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "support/shapes.h"
 
 namespace meshless {

@@ -1,4 +1,4 @@
-#include "meshless_surgery/geometry/nearest_on_triangle.h"
+#include "meshless_surgery/geometry/query/nearest_on_triangle.h"
 
 #include <gtest/gtest.h>
 

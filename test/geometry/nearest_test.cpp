@@ -1,4 +1,4 @@
-#include "meshless_surgery/geometry/nearest.h"
+#include "meshless_surgery/geometry/query/nearest.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "meshless_surgery/geometry/outer_surface.h"
+#include "meshless_surgery/geometry/mesh/outer_surface.h"
 
 #include <algorithm>
 #include <array>
@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/tetrahedralize.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/tetrahedralize.h"
 #include "support/mesh_laws.h"
 #include "support/random.h"
 

@@ -1,10 +1,10 @@
-#include "meshless_surgery/geometry/refine.h"
+#include "meshless_surgery/geometry/mesh/refine.h"
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/mesh_check.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/mesh_check.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 
 namespace meshless {
 namespace refine_test {

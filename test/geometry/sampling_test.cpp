@@ -1,11 +1,11 @@
-#include "meshless_surgery/geometry/sampling.h"
+#include "meshless_surgery/geometry/mesh/sampling.h"
 
 #include <algorithm>
 #include <limits>
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "support/shapes.h"
 
 namespace meshless {

@@ -1,4 +1,4 @@
-#include "meshless_surgery/geometry/surface_from_points.h"
+#include "meshless_surgery/geometry/mesh/surface_from_points.h"
 
 #include <stdio.h>   // popen
 #include <unistd.h>  // readlink
@@ -15,9 +15,9 @@
 #include <CGAL/version.h>
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/inside.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/mesh_check.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/mesh_check.h"
 #include "support/shapes.h"
 
 namespace meshless {

@@ -1,4 +1,4 @@
-#include "meshless_surgery/geometry/tetrahedralize.h"
+#include "meshless_surgery/geometry/mesh/tetrahedralize.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,9 +9,9 @@
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/inside.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/sampling.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/sampling.h"
 #include "support/shapes.h"
 
 namespace meshless {

@@ -1,4 +1,4 @@
-#include "meshless_surgery/geometry/texture_map.h"
+#include "meshless_surgery/geometry/mesh/texture_map.h"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
-#include "meshless_surgery/geometry/thicken.h"
+#include "meshless_surgery/geometry/mesh/thicken.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/mesh_check.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/mesh_check.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 
 namespace meshless {
 namespace {

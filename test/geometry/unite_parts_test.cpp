@@ -1,4 +1,4 @@
-#include "geometry/unite_parts.h"
+#include "geometry/mesh/unite_parts.h"
 
 #include <gtest/gtest.h>
 
@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "meshless_surgery/geometry/cut.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/mend.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/surgery/cut.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/mend.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "support/mesh_laws.h"
 #include "support/random.h"
 #include "support/shapes.h"

@@ -6,8 +6,8 @@
 #include <sstream>
 
 #include "io/temporary_folder.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 
 namespace meshless {
 namespace cloud_shape_test {

@@ -11,9 +11,9 @@
 #include <sstream>
 
 #include "io/temporary_folder.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/mesh_check.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/mesh_check.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "support/random.h"
 
 namespace meshless {

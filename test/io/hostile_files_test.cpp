@@ -14,7 +14,7 @@
 #include <thread>
 
 #include "io/temporary_folder.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/io/scene.h"
 
 namespace meshless {

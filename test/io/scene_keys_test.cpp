@@ -11,8 +11,8 @@
 #include <sstream>
 
 #include "io/temporary_folder.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "meshless_surgery/io/scene.h"
 
 namespace meshless {

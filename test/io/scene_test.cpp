@@ -7,11 +7,11 @@
 #include <filesystem>
 
 #include "io/temporary_folder.h"
-#include "meshless_surgery/geometry/inside.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/mesh_check.h"
-#include "meshless_surgery/geometry/primitives.h"
-#include "meshless_surgery/geometry/sampling.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/mesh_check.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
+#include "meshless_surgery/geometry/mesh/sampling.h"
 
 namespace meshless {
 namespace scene_test {

@@ -15,8 +15,8 @@
 #include <zlib.h>
 
 #include "io/temporary_folder.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/mesh_check.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/mesh_check.h"
 #include "meshless_surgery/io/files.h"
 #include "support/mesh_laws.h"
 #include "support/random.h"

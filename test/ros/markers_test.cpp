@@ -2,7 +2,7 @@
 
 #include <set>
 
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "ros/scene_support.h"
 
 namespace meshless {

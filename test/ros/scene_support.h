@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless {

@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "shapes/implicit_shapes.h"
-#include "meshless_surgery/geometry/isosurface.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/isosurface.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 
 namespace meshless {
 namespace {

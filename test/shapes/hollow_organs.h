@@ -1,7 +1,7 @@
 // Generators of organs that are walls around a hollow, or sheets: what surrounds the liver in the scene abdomen.
 #pragma once
 
-#include "meshless_surgery/geometry/triangle_mesh.h"
+#include "meshless_surgery/geometry/mesh/triangle_mesh.h"
 
 namespace meshless {
 

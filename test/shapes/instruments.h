@@ -2,7 +2,7 @@
 // its joint or its tip at the origin, and is closed, oriented outwards, embedded, in metres.
 #pragma once
 
-#include "meshless_surgery/geometry/triangle_mesh.h"
+#include "meshless_surgery/geometry/mesh/triangle_mesh.h"
 
 namespace meshless {
 

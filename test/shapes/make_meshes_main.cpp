@@ -9,7 +9,7 @@
 
 #include "shapes/hollow_organs.h"
 #include "shapes/instruments.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "shapes/organs.h"
 
 namespace {

@@ -4,10 +4,10 @@
 #include <cmath>
 
 #include "shapes/implicit_shapes.h"
-#include "meshless_surgery/geometry/isosurface.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/mesh_check.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/isosurface.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/mesh_check.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 
 namespace meshless {
 namespace {

@@ -1,7 +1,7 @@
 // Seeded generators of the organ-like meshes that the package ships (config/meshes is written by make_meshes).
 #pragma once
 
-#include "meshless_surgery/geometry/triangle_mesh.h"
+#include "meshless_surgery/geometry/mesh/triangle_mesh.h"
 
 namespace meshless {
 

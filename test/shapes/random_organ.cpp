@@ -5,10 +5,10 @@
 #include <sstream>
 
 #include "shapes/implicit_shapes.h"
-#include "meshless_surgery/geometry/isosurface.h"
+#include "meshless_surgery/geometry/mesh/isosurface.h"
 #include "meshless_surgery/base/random.h"
-#include "meshless_surgery/geometry/measures.h"
-#include "meshless_surgery/geometry/mesh_check.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/mesh/mesh_check.h"
 
 namespace meshless {
 namespace {

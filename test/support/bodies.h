@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "meshless_surgery/body/body.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "meshless_surgery/world/world.h"
 #include "support/shapes.h"
 

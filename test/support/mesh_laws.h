@@ -10,8 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/cut.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/surgery/cut.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 
 namespace meshless::laws {
 

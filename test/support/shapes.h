@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "shapes/organs.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 
 namespace meshless::shapes {
 

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "meshless_surgery/appearance/look.h"
-#include "meshless_surgery/geometry/primitives.h"
-#include "meshless_surgery/geometry/texture_map.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
+#include "meshless_surgery/geometry/mesh/texture_map.h"
 
 namespace meshless::test {
 

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "meshless_surgery/geometry/inside.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "shapes/organs.h"
 #include "training/played.h"
 

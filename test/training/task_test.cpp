@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "shapes/hollow_organs.h"
-#include "meshless_surgery/geometry/primitives.h"
+#include "meshless_surgery/geometry/mesh/primitives.h"
 #include "training/played.h"
 
 namespace meshless {

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "meshless_surgery/body/cavities.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/world/saved_world.h"
 #include "support/bodies.h"
 

@@ -1,7 +1,7 @@
 // Organs whose surface is finer than their cells meet others by even triangles, before and after cuts.
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "shapes/random_organ.h"
 #include "support/bodies.h"
 

@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "meshless_surgery/dynamics/rotation.h"
-#include "meshless_surgery/geometry/inside.h"
+#include "meshless_surgery/geometry/query/inside.h"
 #include "support/bodies.h"
 
 namespace meshless {

@@ -1,8 +1,8 @@
 // Laws of contact, on whole bodies in a world.
 #include <cmath>
 
-#include "meshless_surgery/geometry/inside.h"
-#include "meshless_surgery/geometry/nearest_on_triangle.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/geometry/query/nearest_on_triangle.h"
 #include "meshless_surgery/world/saved_world.h"
 #include "support/bodies.h"
 #include "support/random.h"

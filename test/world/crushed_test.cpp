@@ -1,5 +1,5 @@
 // Soft bodies that a fall presses through themselves: what is crumpled unfolds.
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "shapes/random_organ.h"
 #include "support/bodies.h"
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <map>
 
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "shapes/organs.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "meshless_surgery/world/world.h"

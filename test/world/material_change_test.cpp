@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "support/bodies.h"
 #include "support/random.h"
 #include "support/stress.h"

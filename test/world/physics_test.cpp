@@ -7,7 +7,7 @@
 
 #include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/body/deform.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "support/bodies.h"
 #include "support/falls_short.h"
 #include "support/random.h"

@@ -1,7 +1,7 @@
 // A body that meets itself: wound faces of an incision, and a strip that is folded over.
 #include <random>
 
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "shapes/random_organ.h"
 #include "support/bodies.h"
 

@@ -3,10 +3,10 @@
 #include <cstdio>
 
 #include "meshless_surgery/body/deform.h"
-#include "meshless_surgery/geometry/inside.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "shapes/random_organ.h"
-#include "meshless_surgery/geometry/refine.h"
+#include "meshless_surgery/geometry/mesh/refine.h"
 #include "support/bodies.h"
 #include "support/random.h"
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <set>
 
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/world/baked_colors.h"
 #include "meshless_surgery/world/saved_world.h"
 #include "support/bodies.h"

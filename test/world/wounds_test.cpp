@@ -7,7 +7,7 @@
 #include <Eigen/SVD>
 
 #include "meshless_surgery/base/random.h"
-#include "meshless_surgery/geometry/measures.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "shapes/random_organ.h"
 #include "meshless_surgery/world/world.h"
 #include "support/bodies.h"

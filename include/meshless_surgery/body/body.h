@@ -9,7 +9,7 @@
 #include "meshless_surgery/body/clamp.h"
 #include "meshless_surgery/dynamics/elastic.h"
 #include "meshless_surgery/dynamics/elastic_batch.h"
-#include "meshless_surgery/geometry/cell_lattice.h"
+#include "meshless_surgery/geometry/lattice/cell_lattice.h"
 
 namespace meshless {
 

@@ -4,9 +4,9 @@
 #include "meshless_surgery/base/result.h"
 #include "meshless_surgery/dynamics/clusters.h"
 #include "meshless_surgery/dynamics/material.h"
-#include "meshless_surgery/geometry/region.h"
-#include "meshless_surgery/geometry/texture_map.h"
-#include "meshless_surgery/geometry/triangle_mesh.h"
+#include "meshless_surgery/geometry/query/region.h"
+#include "meshless_surgery/geometry/mesh/texture_map.h"
+#include "meshless_surgery/geometry/mesh/triangle_mesh.h"
 
 namespace meshless {
 
@@ -59,7 +59,7 @@ enum class Resolution { kCoarse, kMedium, kFine };
 
 struct BodyDef {
   std::string name;
-  TriangleMesh mesh;      // in the body's own frame, already scaled [m]; repaired (geometry/mesh_check.h)
+  TriangleMesh mesh;      // in the body's own frame, already scaled [m]; repaired (geometry/mesh/mesh_check.h)
   TextureMapPtr texture;  // of the mesh as it was read; null: its file has none
   bool solid = true;      // false: an open surface; no interior particles, no volume, cannot be cut
   double thickness = 0;   // [m] above 0: the mesh is the middle of a layer, or the outside of a wall; see thicken.h

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "meshless_surgery/body/body.h"
-#include "meshless_surgery/geometry/cell_lattice.h"
+#include "meshless_surgery/geometry/lattice/cell_lattice.h"
 
 namespace meshless {
 

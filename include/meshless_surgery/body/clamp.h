@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "meshless_surgery/geometry/cell_lattice.h"
+#include "meshless_surgery/geometry/lattice/cell_lattice.h"
 
 namespace meshless {
 

@@ -3,7 +3,7 @@
 
 #include "meshless_surgery/body/body.h"
 #include "meshless_surgery/body/tissue_place.h"
-#include "meshless_surgery/geometry/cut.h"
+#include "meshless_surgery/geometry/surgery/cut.h"
 
 namespace meshless {
 

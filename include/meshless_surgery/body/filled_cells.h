@@ -5,7 +5,7 @@
 #include <functional>
 
 #include "meshless_surgery/body/body.h"
-#include "meshless_surgery/geometry/cell_lattice.h"
+#include "meshless_surgery/geometry/lattice/cell_lattice.h"
 
 namespace meshless {
 

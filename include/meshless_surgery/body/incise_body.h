@@ -2,7 +2,7 @@
 #pragma once
 
 #include "meshless_surgery/body/cut_body.h"
-#include "meshless_surgery/geometry/incise.h"
+#include "meshless_surgery/geometry/surgery/incise.h"
 
 namespace meshless {
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "meshless_surgery/contact/box_tree.h"
-#include "meshless_surgery/geometry/triangle_mesh.h"
+#include "meshless_surgery/geometry/mesh/triangle_mesh.h"
 
 namespace meshless {
 

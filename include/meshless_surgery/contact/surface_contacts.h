@@ -12,7 +12,7 @@
 #include "meshless_surgery/contact/deformable.h"
 #include "meshless_surgery/contact/row_solver.h"
 #include "meshless_surgery/contact/surface_memory.h"
-#include "meshless_surgery/geometry/union_find.h"
+#include "meshless_surgery/geometry/query/union_find.h"
 
 namespace meshless {
 

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "meshless_surgery/base/result.h"
-#include "meshless_surgery/geometry/mend.h"
-#include "meshless_surgery/geometry/texture_map.h"
+#include "meshless_surgery/geometry/mesh/mend.h"
+#include "meshless_surgery/geometry/mesh/texture_map.h"
 
 namespace meshless {
 

@@ -9,9 +9,9 @@
 
 #include "meshless_surgery/base/ids.h"
 #include "meshless_surgery/body/cut_body.h"
-#include "meshless_surgery/geometry/cut.h"
-#include "meshless_surgery/geometry/incise.h"
-#include "meshless_surgery/geometry/region.h"
+#include "meshless_surgery/geometry/surgery/cut.h"
+#include "meshless_surgery/geometry/surgery/incise.h"
+#include "meshless_surgery/geometry/query/region.h"
 
 namespace meshless {
 

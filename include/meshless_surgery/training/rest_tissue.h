@@ -6,8 +6,8 @@
 #include <memory>
 #include <optional>
 
-#include "meshless_surgery/geometry/nearest.h"
-#include "meshless_surgery/geometry/region.h"
+#include "meshless_surgery/geometry/query/nearest.h"
+#include "meshless_surgery/geometry/query/region.h"
 #include "meshless_surgery/training/frame.h"
 
 namespace meshless {

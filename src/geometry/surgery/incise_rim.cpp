@@ -1,0 +1,406 @@
+// Where the blade's rectangle crosses the surface, and the triangles that are split there.
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "mesh/exact.h"
+#include "incise_parts.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+
+namespace meshless {
+namespace incising {
+namespace {
+
+enum class Reach { kInside, kBorder, kOutside };
+
+/// Corners of a triangle that has some above and some below. Along its outline the plane is passed downwards at `down`
+/// and upwards at `up`; then follow the corners above, then those below. down and up are corners on the plane or
+/// crossings of edges.
+struct Crossed {
+  Index triangle;
+  Index down, up;
+  std::array<Index, 2> above, below;  // in the triangle's direction; above after up, below after down
+  int above_count, below_count;
+  bool down_is_corner, up_is_corner;
+  Index chord_from = kNoIndex, chord_to = kNoIndex;  // the part within the blade, in the direction down -> up
+};
+
+/// An edge of a triangle with both ends on the plane.
+struct FlatEdge {
+  Index from, to, triangle;
+  bool upper;  // the triangle bounds the solid above the plane
+  bool coplanar;
+};
+
+/// Such an edge with both its triangles, the second one running to -> from.
+struct FlatRim {
+  Index from, to;
+  std::array<Index, 2> triangles;
+  RimEdge::Kind kind;
+};
+
+class Opener {
+ public:
+  explicit Opener(const TriangleMesh& mesh) : mesh_(mesh) {}
+
+  Result<SplitSurface> run(const Blade& blade, double band) {
+    placeFrame(blade, band);
+    const Status crossed = findCrossings();
+    if (!crossed) return crossed.error();
+    limitRectangle(blade);
+    if (!(surface_.frame.low.array() < surface_.frame.high.array()).all())
+      return Error{ErrorCode::kMissed, "the blade meets no tissue: it is beside the surface"};
+    for (const Index v : in_plane_) snap(surface_.places[v]);
+    for (Crossed& c : crossed_) section(c.down, c.up);
+    for (const FlatRim& e : flat_rim_)
+      if (e.kind == RimEdge::kCrossed) section(e.from, e.to);
+    markWithin();
+    splitTriangles();
+    return std::move(surface_);
+  }
+
+ private:
+  void placeFrame(const Blade& blade, double band) {
+    Frame& f = surface_.frame;
+    f.origin = blade.origin;
+    f.x_axis = blade.x_axis.normalized();
+    f.y_axis = (blade.y_axis - f.x_axis.dot(blade.y_axis) * f.x_axis).normalized();
+    f.normal = f.x_axis.cross(f.y_axis);
+    const Box box = boundsOf(mesh_.vertices);
+    const double farthest =
+        std::max({box.min.cwiseAbs().maxCoeff(), box.max.cwiseAbs().maxCoeff(), f.origin.cwiseAbs().maxCoeff()});
+    f.band = std::max(band * box.diagonal(), 1e-14 * farthest);
+    surface_.positions = mesh_.vertices;
+    surface_.mesh_vertices = static_cast<Index>(mesh_.vertices.size());
+    surface_.places.assign(mesh_.vertices.size(), Vec2::Zero());
+  }
+
+  /// The crossing of an edge, always computed from its upper end to its lower one: wound faces that lie on each other
+  /// are crossed at the same bits.
+  Index crossing(Index upper, Index lower) {
+    const auto [entry, fresh] = crossing_of_edge_.try_emplace(edgeKey(upper, lower), kNoIndex);
+    if (fresh) {
+      entry->second = surface_.addBetween(upper, lower, heights_[upper] / (heights_[upper] - heights_[lower]));
+      surface_.places[entry->second] = surface_.frame.flat(surface_.positions[entry->second]);
+      in_plane_.push_back(entry->second);
+    }
+    return entry->second;
+  }
+
+  Status findCrossings() {
+    const Frame& f = surface_.frame;
+    heights_.resize(mesh_.vertices.size());
+    states_.resize(mesh_.vertices.size());
+    for (Index v = 0; v < heights_.size(); ++v) {
+      heights_[v] = f.normal.dot(mesh_.vertices[v] - f.origin);
+      states_[v] = static_cast<signed char>((heights_[v] > f.band) - (heights_[v] < -f.band));
+      if (states_[v] != 0) continue;
+      surface_.places[v] = f.flat(mesh_.vertices[v]);
+      in_plane_.push_back(v);
+    }
+    std::vector<FlatEdge> flat_edges;
+    for (Index t = 0; t < mesh_.triangles.size(); ++t) {
+      const Triangle& v = mesh_.triangles[t];
+      const std::array<int, 3> s{states_[v[0]], states_[v[1]], states_[v[2]]};
+      const bool above = s[0] > 0 || s[1] > 0 || s[2] > 0, below = s[0] < 0 || s[1] < 0 || s[2] < 0;
+      if (above && below) {
+        addCrossed(t, s);
+        continue;
+      }
+      const int on = (s[0] == 0) + (s[1] == 0) + (s[2] == 0);
+      if (on < 2) continue;
+      const bool upper = above || (!below && !facesUp(v));
+      for (int k = 0; k < 3; ++k)
+        if (s[k] == 0 && s[(k + 1) % 3] == 0) flat_edges.push_back({v[k], v[(k + 1) % 3], t, upper, on == 3});
+      if (on == 3) coplanar_.push_back(t);
+    }
+    if (crossed_.empty() && flat_edges.empty())
+      return Error{ErrorCode::kMissed, "the blade meets no tissue: its plane is beside the surface"};
+    return findFlatRim(std::move(flat_edges));
+  }
+
+  /// A triangle that lies in the plane bounds the solid below it where it faces up. Exact on its places, as the wound
+  /// faces' triangulation is.
+  bool facesUp(const Triangle& v) const {
+    return exact::turn(surface_.places[v[0]], surface_.places[v[1]], surface_.places[v[2]]) > 0;
+  }
+
+  void addCrossed(Index t, const std::array<int, 3>& s) {
+    const Triangle& v = mesh_.triangles[t];
+    Crossed c{t, kNoIndex, kNoIndex, {}, {}, 0, 0, false, false};
+    for (int k = 0; k < 3; ++k) {
+      const int next = (k + 1) % 3, previous = (k + 2) % 3;
+      if (s[k] > 0 && s[next] < 0) c.down = crossing(v[k], v[next]);
+      if (s[k] < 0 && s[next] > 0) c.up = crossing(v[next], v[k]);
+      if (s[k] == 0) {
+        (s[previous] > 0 ? c.down : c.up) = v[k];
+        (s[previous] > 0 ? c.down_is_corner : c.up_is_corner) = true;
+      }
+      if (s[k] > 0 && s[previous] <= 0) {
+        c.above[c.above_count++] = v[k];
+        if (s[next] > 0) c.above[c.above_count++] = v[next];
+      }
+      if (s[k] < 0 && s[previous] >= 0) {
+        c.below[c.below_count++] = v[k];
+        if (s[next] < 0) c.below[c.below_count++] = v[next];
+      }
+    }
+    crossed_.push_back(c);
+  }
+
+  /// Flat edges where the surface goes through the plane or touches it.
+  Status findFlatRim(std::vector<FlatEdge> edges) {
+    std::sort(edges.begin(), edges.end(), [](const FlatEdge& p, const FlatEdge& q) {
+      const std::uint64_t a = edgeKey(p.from, p.to), b = edgeKey(q.from, q.to);
+      return a != b ? a < b : p.triangle < q.triangle;
+    });
+    for (std::size_t i = 0; i < edges.size(); i += 2) {
+      if (i + 1 == edges.size() || edges[i].from != edges[i + 1].to || edges[i].to != edges[i + 1].from ||
+          (i + 2 < edges.size() && edgeKey(edges[i].from, edges[i].to) == edgeKey(edges[i + 2].from, edges[i + 2].to)))
+        return Error{ErrorCode::kUnsuitableShape,
+                     "the surface is open, not oriented or branches at the edge between vertices " +
+                         std::to_string(edges[i].from) + " and " + std::to_string(edges[i].to)};
+      const FlatEdge &first = edges[i].upper ? edges[i] : edges[i + 1],
+                     &second = edges[i].upper ? edges[i + 1] : edges[i];
+      if (first.upper == second.upper && first.coplanar && second.coplanar) continue;
+      const RimEdge::Kind kind = !second.upper && first.upper ? RimEdge::kCrossed
+                                 : first.upper                ? RimEdge::kTouchedAbove
+                                                              : RimEdge::kTouchedBelow;
+      flat_rim_.push_back({first.from, first.to, {first.triangle, second.triangle}, kind});
+    }
+    return Done{};
+  }
+
+  /// A blade may be much larger than the body. What is cut off lies in the air.
+  void limitRectangle(const Blade& blade) {
+    Frame& f = surface_.frame;
+    Vec2 low = Vec2::Constant(1e300), high = Vec2::Constant(-1e300);
+    for (const Index v : in_plane_) {
+      low = low.cwiseMin(surface_.places[v]);
+      high = high.cwiseMax(surface_.places[v]);
+    }
+    const Vec2 margin = Vec2::Constant(0.05 * (high - low).norm() + 10.0 * f.band);
+    f.low = Vec2(0.0, -blade.depth).cwiseMax(low - margin);
+    f.high = Vec2(blade.length, 0.0).cwiseMin(high + margin);
+  }
+
+  Reach snap(Vec2& p) const {
+    const Frame& f = surface_.frame;
+    Reach reach = Reach::kInside;
+    for (int k = 0; k < 2; ++k) {
+      if (p[k] < f.low[k] - f.band || p[k] > f.high[k] + f.band) return Reach::kOutside;
+    }
+    for (int k = 0; k < 2; ++k) {
+      if (std::abs(p[k] - f.low[k]) <= f.band) {
+        p[k] = f.low[k];
+        reach = Reach::kBorder;
+      } else if (std::abs(p[k] - f.high[k]) <= f.band) {
+        p[k] = f.high[k];
+        reach = Reach::kBorder;
+      }
+    }
+    return reach;
+  }
+
+  void section(Index from, Index to) { surface_.section.push_back({surface_.places[from], surface_.places[to]}); }
+
+  /// The part of from -> to within the rectangle; end vertices are made where the border crosses it. False: nothing.
+  bool within(Index from, Index to, Index& first, Index& last) {
+    Vec2 a = surface_.places[from], b = surface_.places[to];
+    const Frame& f = surface_.frame;
+    const bool a_in = snap(a) != Reach::kOutside, b_in = snap(b) != Reach::kOutside;
+    first = from;
+    last = to;
+    if (a_in && b_in) return true;
+    // The same end, to the last bit, for a wound face that lies on this one and runs the other way.
+    const bool swapped = comesFirst(surface_.positions[to], surface_.positions[from]);
+    if (swapped) std::swap(a, b);
+    double enter = 0.0, leave = 1.0;
+    int enter_axis = 0, leave_axis = 0;
+    double enter_at = 0.0, leave_at = 0.0;
+    for (int k = 0; k < 2; ++k) {
+      const double step = b[k] - a[k];
+      if (step == 0.0) {
+        if (a[k] < f.low[k] || a[k] > f.high[k]) return false;
+        continue;
+      }
+      const double near = step > 0.0 ? f.low[k] : f.high[k], far = step > 0.0 ? f.high[k] : f.low[k];
+      if ((near - a[k]) / step > enter) {
+        enter = (near - a[k]) / step;
+        enter_axis = k;
+        enter_at = near;
+      }
+      if ((far - a[k]) / step < leave) {
+        leave = (far - a[k]) / step;
+        leave_axis = k;
+        leave_at = far;
+      }
+    }
+    if (!((leave - enter) * (b - a).norm() > 2.0 * f.band)) return false;
+    const Index start = swapped ? to : from, end = swapped ? from : to;
+    const bool start_in = swapped ? b_in : a_in, end_in = swapped ? a_in : b_in;
+    const auto endVertex = [&](double s, int axis, double at) {
+      const Index made = surface_.addBetween(start, end, s);
+      Vec2 place = a + s * (b - a);
+      place[axis] = at;
+      snap(place);
+      surface_.places[made] = place;
+      return made;
+    };
+    const Index near_end = start_in ? start : endVertex(enter, enter_axis, enter_at);
+    const Index far_end = end_in ? end : endVertex(leave, leave_axis, leave_at);
+    first = swapped ? far_end : near_end;
+    last = swapped ? near_end : far_end;
+    return true;
+  }
+
+  void markWithin() {
+    std::vector<Index> met;  // triangles
+    used_.assign(surface_.positions.size(), false);
+    for (Crossed& c : crossed_) {
+      Index first, last;
+      if (!within(c.down, c.up, first, last)) continue;
+      c.chord_from = first;
+      c.chord_to = last;
+      surface_.rim.push_back({first, last, RimEdge::kCrossed});
+      met.push_back(c.triangle);
+      for (const Index v : {first, last})
+        if (v < used_.size()) used_[v] = true;
+    }
+    for (const FlatRim& e : flat_rim_) {
+      Index first, last;
+      if (!within(e.from, e.to, first, last)) continue;
+      surface_.rim.push_back({first, last, e.kind});
+      surface_.along_edges = true;
+      met.insert(met.end(), e.triangles.begin(), e.triangles.end());
+      std::vector<Index> inner;
+      if (first != e.from) inner.push_back(first);
+      if (last != e.to) inner.push_back(last);
+      if (inner.empty()) continue;
+      if (e.from > e.to) std::reverse(inner.begin(), inner.end());
+      inside_edge_.emplace(edgeKey(e.from, e.to), std::move(inner));
+    }
+    double sum = 0.0;
+    for (const Index t : met) {
+      const Triangle& v = mesh_.triangles[t];
+      for (int k = 0; k < 3; ++k) sum += (mesh_.vertices[v[(k + 1) % 3]] - mesh_.vertices[v[k]]).norm();
+    }
+    if (!met.empty()) surface_.spacing = sum / (3.0 * static_cast<double>(met.size()));
+    for (const Index t : coplanar_) {
+      const Triangle& v = mesh_.triangles[t];
+      const Vec2 middle = (surface_.places[v[0]] + surface_.places[v[1]] + surface_.places[v[2]]) / 3.0;
+      if ((middle.array() > surface_.frame.low.array()).all() && (middle.array() < surface_.frame.high.array()).all())
+        surface_.lies_in_surface = true;
+    }
+  }
+
+  bool present(Index v, bool corner) const { return corner || used_[v]; }
+
+  void splitTriangles() {
+    surface_.triangles = mesh_.triangles;
+    surface_.patches = mesh_.patches;
+    if (surface_.patches.empty()) surface_.patches.assign(mesh_.triangles.size(), kOuterPatch);
+    std::vector<Triangle> parts;
+    const auto replace = [&](Index t) {
+      surface_.triangles[t] = parts[0];
+      for (std::size_t p = 1; p < parts.size(); ++p) {
+        surface_.triangles.push_back(parts[p]);
+        surface_.patches.push_back(surface_.patches[t]);
+      }
+    };
+    for (const Crossed& c : crossed_) {
+      parts.clear();
+      splitCrossed(c, parts);
+      if (!parts.empty()) replace(c.triangle);
+    }
+    if (!inside_edge_.empty()) splitAtEdges(surface_.triangles, surface_.patches, inside_edge_);
+  }
+
+  /// A convex polygon of three or four corners.
+  void addConvex(const std::array<Index, 4>& v, int count, std::vector<Triangle>& parts) const {
+    if (count == 3) return parts.push_back({v[0], v[1], v[2]});
+    const Points& p = surface_.positions;
+    const double diagonal_02 = (p[v[2]] - p[v[0]]).squaredNorm(), diagonal_13 = (p[v[3]] - p[v[1]]).squaredNorm();
+    bool first = diagonal_02 < diagonal_13;
+    // Wound faces that lie on each other must be split alike.
+    if (diagonal_02 == diagonal_13) {
+      const Vec3& low_02 = comesFirst(p[v[0]], p[v[2]]) ? p[v[0]] : p[v[2]];
+      const Vec3& low_13 = comesFirst(p[v[1]], p[v[3]]) ? p[v[1]] : p[v[3]];
+      first = comesFirst(low_02, low_13);
+    }
+    const int k = first ? 0 : 1;
+    parts.push_back({v[k], v[k + 1], v[k + 2]});
+    parts.push_back({v[(k + 2) % 4], v[(k + 3) % 4], v[k]});
+  }
+
+  void splitCrossed(const Crossed& c, std::vector<Triangle>& parts) const {
+    const bool down_present = present(c.down, c.down_is_corner), up_present = present(c.up, c.up_is_corner);
+    Index from = c.chord_from, to = c.chord_to;
+    if (from == kNoIndex) {
+      const bool down_used = down_present && !c.down_is_corner, up_used = up_present && !c.up_is_corner;
+      if (!down_used && !up_used) return;
+      if (down_present && up_present) {
+        from = c.down;
+        to = c.up;
+      } else {
+        const Index middle = down_used ? c.down : c.up;
+        const Index before = down_used ? c.above[c.above_count - 1] : c.below[c.below_count - 1];
+        const Index after = down_used ? c.below[0] : c.above[0];
+        const Triangle& v = mesh_.triangles[c.triangle];
+        const Index apex = v[0] != before && v[0] != after ? v[0] : v[1] != before && v[1] != after ? v[1] : v[2];
+        parts.push_back({before, middle, apex});
+        parts.push_back({middle, after, apex});
+        return;
+      }
+    }
+    std::array<Index, 4> polygon{};
+    int count = 0;
+    polygon[count++] = from;
+    polygon[count++] = to;
+    for (int k = 0; k < c.above_count; ++k) polygon[count++] = c.above[k];
+    addConvex(polygon, count, parts);
+    count = 0;
+    polygon[count++] = to;
+    polygon[count++] = from;
+    for (int k = 0; k < c.below_count; ++k) polygon[count++] = c.below[k];
+    addConvex(polygon, count, parts);
+    const Index last_above = c.above[c.above_count - 1], last_below = c.below[c.below_count - 1];
+    if (from != c.down) {
+      if (down_present) {
+        parts.push_back({last_above, c.down, from});
+        parts.push_back({c.down, c.below[0], from});
+      } else {
+        parts.push_back({last_above, c.below[0], from});
+      }
+    }
+    if (to != c.up) {
+      if (up_present) {
+        parts.push_back({last_below, c.up, to});
+        parts.push_back({c.up, c.above[0], to});
+      } else {
+        parts.push_back({last_below, c.above[0], to});
+      }
+    }
+  }
+
+  const TriangleMesh& mesh_;
+  SplitSurface surface_;
+  std::vector<double> heights_;
+  std::vector<signed char> states_;  // +1 above, -1 below, 0 on the plane
+  std::vector<Index> in_plane_;      // vertices
+  std::unordered_map<std::uint64_t, Index> crossing_of_edge_;
+  std::vector<Crossed> crossed_;
+  std::vector<FlatRim> flat_rim_;
+  std::vector<Index> coplanar_;  // triangles
+  std::vector<bool> used_;       // vertices that a chord ends at
+  InnerVertices inside_edge_;
+};
+
+}  // namespace
+
+Result<SplitSurface> splitAtBlade(const TriangleMesh& mesh, const Blade& blade, double band) {
+  return Opener(mesh).run(blade, band);
+}
+
+}  // namespace incising
+}  // namespace meshless
