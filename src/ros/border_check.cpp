@@ -8,14 +8,6 @@
 
 namespace meshless {
 
-std::string formatNumber(double value) {
-  if (std::isnan(value)) return "nan";
-  if (std::isinf(value)) return value > 0.0 ? "inf" : "-inf";
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.6g", value);
-  return text;
-}
-
 std::string printable(const std::string& text, std::size_t most) {
   std::string shown = text.substr(0, most + 3);  // with all of the character in which it is cut
   for (auto at = shown.begin(); (at = utf8::find_invalid(at, shown.end())) != shown.end();) *at = '?';
@@ -32,7 +24,7 @@ void BorderCheck::fault(const std::string& sentence) {
 
 double BorderCheck::number(const std::string& field, double value, double min, double max, const std::string& unit) {
   if (!(value >= min && value <= max)) {
-    fault(field + " is " + formatNumber(value) + "; accepted: " + formatNumber(min) + ".." + formatNumber(max) +
+    fault(field + " is " + numberText(value) + "; accepted: " + numberText(min) + ".." + numberText(max) +
           (unit.empty() ? "" : " " + unit));
   }
   return value;
@@ -61,8 +53,8 @@ Quat BorderCheck::rotation(const std::string& field, const geometry_msgs::Quater
   if (rotation.coeffs().isZero(0.0)) return Quat::Identity();
   const double norm = rotation.norm();
   if (!(norm >= kMinQuaternionNorm && std::isfinite(norm))) {
-    fault(field + " has the norm " + formatNumber(norm) + "; accepted: a quaternion x y z w of a norm of at least " +
-          formatNumber(kMinQuaternionNorm) + ", such as 0 0 0 1, or all zeros for it");
+    fault(field + " has the norm " + numberText(norm) + "; accepted: a quaternion x y z w of a norm of at least " +
+          numberText(kMinQuaternionNorm) + ", such as 0 0 0 1, or all zeros for it");
     return Quat::Identity();
   }
   return rotation.normalized();

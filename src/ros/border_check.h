@@ -8,6 +8,7 @@
 #include <geometry_msgs/Pose.h>
 #include <geometry_msgs/Vector3.h>
 
+#include "meshless_surgery/base/number_text.h"
 #include "meshless_surgery/tools/command.h"
 
 namespace meshless {
@@ -39,8 +40,6 @@ class BorderCheck {
   std::optional<Error> error_;
 };
 
-/// At most 6 digits, "nan" and "inf" as such.
-std::string formatNumber(double value);
 constexpr std::size_t kMaxName = 100;      // bytes of a name
 constexpr std::size_t kMaxNames = 100000;  // in a list
 /// For messages to people: control characters and what is no UTF-8 replaced, cut before `most` bytes are exceeded.

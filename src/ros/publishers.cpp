@@ -400,13 +400,13 @@ void Publishers::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   summarize(runner, diagnosed_overruns_, status);
   diagnosed_overruns_ = runner.overruns;
   status.add("steps", runner.steps);
-  status.add("step rate wanted [Hz]", formatNumber(runner_.worldSettings().step_rate));
-  status.add("step rate [Hz]", formatNumber(runner.step_rate));
-  status.add("real-time factor", formatNumber(runner.real_time_factor));
-  status.add("mean step [ms]", formatNumber(1e3 * runner.mean_step));
-  status.add("worst step [ms]", formatNumber(1e3 * runner.worst_step));
+  status.add("step rate wanted [Hz]", numberText(runner_.worldSettings().step_rate));
+  status.add("step rate [Hz]", numberText(runner.step_rate));
+  status.add("real-time factor", numberText(runner.real_time_factor));
+  status.add("mean step [ms]", numberText(1e3 * runner.mean_step));
+  status.add("worst step [ms]", numberText(1e3 * runner.worst_step));
   status.add("overruns", runner.overruns);
-  status.add("dropped [s]", formatNumber(runner.dropped));
+  status.add("dropped [s]", numberText(runner.dropped));
   status.add("rejected input", rejected.total);
   for (const auto& [where, count] : rejected.by_name) status.add("rejected by " + where, count);
   if (!rejected.last.empty()) status.add("last rejection", rejected.last);
@@ -419,13 +419,13 @@ void Publishers::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   MemoryUse memory;
   if (runner_.look([&memory](World& world) { memory = world.memory(); }).ok()) {
     constexpr double kMegabyte = 1e6;
-    const auto megabytes = [](std::size_t bytes) { return formatNumber(static_cast<double>(bytes) / kMegabyte); };
+    const auto megabytes = [](std::size_t bytes) { return numberText(static_cast<double>(bytes) / kMegabyte); };
     status.add("particles", memory.particles);
     status.add("memory of models [MB]", megabytes(memory.models));
     status.add("memory of states [MB]", megabytes(memory.states));
     status.add("memory of contact [MB]", megabytes(memory.contact));
     status.add("memory for reset and undo [MB]", megabytes(memory.kept));
-    status.add("memory per particle [bytes]", formatNumber(memory.perParticle()));
+    status.add("memory per particle [bytes]", numberText(memory.perParticle()));
   }
   status.add("marker arrays built", markers_built_);
   status.add("surfaces built", surfaces_built_);

@@ -28,7 +28,7 @@ constexpr double kFullForce = 5.0;                        // [N] that a path sho
 constexpr std::size_t kMostPathPoints = 200000;           // of a tool
 
 Error outOfRange(const std::string& name, double value, const std::string& accepted) {
-  return {ErrorCode::kInvalidArgument, name + " is " + formatNumber(value) + "; accepted: " + accepted};
+  return {ErrorCode::kInvalidArgument, name + " is " + numberText(value) + "; accepted: " + accepted};
 }
 
 /// A path, or a name in the session directory.
@@ -212,7 +212,7 @@ struct ReviewNode::Parts : Answers {
     const ros::WallTime before = ros::WallTime::now();
     // Half a step, as a length that was said is rounded.
     if (!(request.time >= 0.0 && request.time <= length() + 0.5 / rate()))
-      return refuse(response, "seek", outOfRange("time", request.time, "0 to " + formatNumber(length()) + " s"));
+      return refuse(response, "seek", outOfRange("time", request.time, "0 to " + numberText(length()) + " s"));
     const std::uint64_t at =
         std::min(static_cast<std::uint64_t>(std::llround(request.time * rate())), review.player().end());
     const auto found = show(at);

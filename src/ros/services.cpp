@@ -257,7 +257,7 @@ struct Services::Handlers : Answers {
       if (!heard) {
         return refuse(response, "spawn_cloud",
                       {ErrorCode::kMissed, "no sensor_msgs/PointCloud2 came on '" + printable(request.topic) +
-                                               "' within " + formatNumber(timeout > 0.0 ? timeout : kCloudTimeout) +
+                                               "' within " + numberText(timeout > 0.0 ? timeout : kCloudTimeout) +
                                                " s; accepted: a topic that is published"});
       }
     }

@@ -193,8 +193,8 @@ Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std
   reader.read("tools/scissors/width", settings.scissors_width, 1e-6, kMaxLength, "m");
   for (const char* group : {"tools", "tools/pick", "tools/push", "tools/scissors"}) reader.group(group);
   if (settings.autosave_period > 0.0 && settings.autosave_period < kShortestAutosave) {
-    reader.check.fault("parameter ~autosave_period is " + formatNumber(settings.autosave_period) +
-                       "; accepted: 0 (none) or " + formatNumber(kShortestAutosave) + "..3600 s");
+    reader.check.fault("parameter ~autosave_period is " + numberText(settings.autosave_period) +
+                       "; accepted: 0 (none) or " + numberText(kShortestAutosave) + "..3600 s");
   }
   if (!settings.command_log.empty()) {
     const Status name = SessionFolder::checkName(settings.command_log);

@@ -86,8 +86,8 @@ Result<std::string> StreamedTools::hear(ToolKind kind, const Pose& pose, double 
     if (const Status heard = tool.motion.hear(pose, stamp, clock_.now()); !heard.ok()) return heard.error();
     const ToolMotion::Way& way = tool.motion.way();
     if (way.length > std::max(kHandSpeed, tool.max_speed) * (way.time + kJitter)) {
-      warning = "the pose jumps by " + formatNumber(way.length) + " m in " + formatNumber(way.time) + " s, and the " +
-                tool.name + " goes after it at up to " + formatNumber(tool.max_speed) + " m/s (tools/" + tool.name +
+      warning = "the pose jumps by " + numberText(way.length) + " m in " + numberText(way.time) + " s, and the " +
+                tool.name + " goes after it at up to " + numberText(tool.max_speed) + " m/s (tools/" + tool.name +
                 "/max_speed): does more than one node say where it is?";
     }
   }
@@ -159,7 +159,7 @@ void StreamedTools::look() {
       under_way = tool.motion.alive() && !tool.motion.arrived();
       if (silent && tool.kind == ToolKind::kScissors) jaw_armed_ = false;
     }
-    if (silent) lift(tool, "its stream was silent for " + formatNumber(settings_.tools_silence) + " s");
+    if (silent) lift(tool, "its stream was silent for " + numberText(settings_.tools_silence) + " s");
     if (under_way) postMove(tool);
   }
 }

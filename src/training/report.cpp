@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "report_text.h"
+#include "meshless_surgery/base/number_text.h"
 
 namespace meshless {
 
@@ -15,10 +16,7 @@ std::string outcomeOf(const Training& training) {
 }
 
 std::string numberOf(double value) {
-  if (!std::isfinite(value)) return "";
-  char text[40];
-  std::snprintf(text, sizeof text, "%.17g", value);
-  return text;
+  return std::isfinite(value) ? numberText(value, 17) : "";
 }
 
 const WeightedMetric* weightedOf(const Training& training, const std::string& name) {

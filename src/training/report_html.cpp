@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "report_text.h"
+#include "meshless_surgery/base/number_text.h"
 
 namespace meshless {
 namespace {
@@ -34,10 +35,7 @@ std::string escaped(const std::string& text) {
 }
 
 std::string shortNumber(double value) {
-  if (!std::isfinite(value)) return "&ndash;";
-  char text[40];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
+  return std::isfinite(value) ? numberText(value, 4) : "&ndash;";
 }
 
 std::string at(double value) {

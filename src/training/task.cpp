@@ -4,6 +4,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "meshless_surgery/base/number_text.h"
 #include "meshless_surgery/geometry/query/inside.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/geometry/mesh/thicken.h"
@@ -11,12 +12,6 @@
 
 namespace meshless {
 namespace {
-
-std::string numberText(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
-}
 
 /// The tissue's surface, where the scene puts it.
 TriangleMesh placedMesh(const BodyDef& body) {

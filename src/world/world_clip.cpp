@@ -10,6 +10,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "world_impl.h"
+#include "meshless_surgery/base/number_text.h"
 
 namespace meshless {
 namespace {
@@ -96,11 +97,7 @@ class LineSearch {
   std::vector<Crossing> found_;
 };
 
-std::string metres(double value) {
-  std::ostringstream text;
-  text << std::setprecision(3) << value;
-  return text.str();
-}
+std::string metres(double value) { return numberText(value, 3); }
 
 Status check(const ClipCommand& command) {
   if (!command.point.allFinite()) return notFinite("point");

@@ -130,7 +130,7 @@ TEST(Wounds, CrossingIncisionsThatAreSpreadTearFewTriangles_Long) {
 }
 
 // And in cells of about 5 mm, which tear less and take most of the time.
-TEST(Wounds, AnIncisionInFineCellsTearsHardlyATriangle_Long) { expectHardlyTorn(false, Resolution::kFine, 3, 8); }
+TEST(Wounds, AnIncisionInFineCellsTearsHardlyATriangle_Long) { expectHardlyTorn(false, Resolution::kFine, 4, 8); }
 
 TEST(Wounds, CrossingIncisionsInFineCellsTearFewTriangles_Long) { expectHardlyTorn(true, Resolution::kFine, 6, 20); }
 

@@ -186,8 +186,8 @@ class Lattice {
   }
 
   void numberParts() {
-    Sets sets(core_.places.size());
-    for (const Triangle& t : core_.triangles) sets.unite(t);
+    UnionFind sets(core_.places.size());
+    for (const Triangle& t : core_.triangles) sets.join(t);
     const std::vector<Index>& roots = sets.flatten();
     core_.part_of_point.resize(roots.size());
     for (Index p = 0; p < roots.size(); ++p)

@@ -12,6 +12,7 @@
 #include "cut_pieces.h"
 #include "cut_rim.h"
 #include "mesh/edge_balance.h"
+#include "meshless_surgery/base/number_text.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 
 namespace meshless {
@@ -19,11 +20,7 @@ namespace {
 
 using namespace cutting;
 
-std::string number(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.12g", x);
-  return text;
-}
+std::string number(double x) { return numberText(x, 12); }
 
 /// Bounds [m] that are not finite where a point is not.
 Box boundsOfAll(const Points& points) {

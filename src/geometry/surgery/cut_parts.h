@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cut_snap.h"
+#include "meshless_surgery/geometry/query/union_find.h"
 #include "meshless_surgery/geometry/surgery/cut.h"
 #include "mesh/split_edges.h"
 
@@ -77,45 +78,6 @@ struct Workpiece {
 /// Refuses kMissed where no vertex is above or none below, kUnsuitableShape where the mesh is not closed and oriented.
 Result<Workpiece> splitAtPlane(const TriangleMesh& mesh, const std::vector<SnappedVertex>& snapped, const Plane& plane,
                                double relative_band, const Box& box);
-
-/// Union-find over numbers, the lowest of a set its root.
-class Sets {
- public:
-  explicit Sets(std::size_t count) : parents_(count) {
-    for (std::size_t i = 0; i < count; ++i) parents_[i] = static_cast<Index>(i);
-  }
-
-  Index rootOf(Index i) {
-    while (parents_[i] != i) i = parents_[i] = parents_[parents_[i]];
-    return i;
-  }
-  void unite(Index i, Index j) {
-    i = rootOf(i);
-    j = rootOf(j);
-    parents_[std::max(i, j)] = std::min(i, j);
-  }
-  /// Cheap for what mostly is one already.
-  void unite(const Triangle& t) {
-    const Index p = parents_[t[0]], q = parents_[t[1]], r = parents_[t[2]];
-    if (p == q && q == r) return;
-    if (parents_[p] == p && parents_[q] == q && parents_[r] == r) {
-      const Index lowest = std::min({p, q, r});
-      parents_[p] = parents_[q] = parents_[r] = lowest;
-      parents_[t[0]] = parents_[t[1]] = parents_[t[2]] = lowest;
-      return;
-    }
-    unite(t[0], t[1]);
-    unite(t[0], t[2]);
-  }
-  /// Afterwards every parent is a root.
-  const std::vector<Index>& flatten() {
-    for (Index& p : parents_) p = parents_[p];
-    return parents_;
-  }
-
- private:
-  std::vector<Index> parents_;
-};
 
 /// An edge with both ends on the plane. `net`: how often the upper surface runs it from `from` to `to`, less the times
 /// that it runs back; 0 where the surface only touches the plane there.

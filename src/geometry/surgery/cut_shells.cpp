@@ -212,18 +212,18 @@ struct Umbrellas {
 
 Umbrellas umbrellasOf(const Workpiece& work, const Pairing& pairing) {
   const std::size_t corners = pairing.partners.size();
-  Sets sets(corners);
+  UnionFind sets(corners);
   for (Corner c = 0; c < corners; ++c) {
     const Corner d = pairing.partners[c];
     if (d == kNoIndex || d < c) continue;
-    if (work.onRim(pairing.vertexOf(c))) sets.unite(c, nextCorner(d));
-    if (work.onRim(pairing.vertexOf(d))) sets.unite(d, nextCorner(c));
+    if (work.onRim(pairing.vertexOf(c))) sets.join(c, nextCorner(d));
+    if (work.onRim(pairing.vertexOf(d))) sets.join(d, nextCorner(c));
   }
   Umbrellas umbrellas;
   umbrellas.of_corner.assign(corners, kNoIndex);
   for (Corner c = 0; c < corners; ++c) {
     if (!work.onRim(pairing.ownVertex(c)) || pairing.collapsed(c / 3)) continue;
-    Index& number = umbrellas.of_corner[sets.rootOf(c)];  // the root is the lowest corner and so comes first
+    Index& number = umbrellas.of_corner[sets.find(c)];  // the root is the lowest corner and so comes first
     if (number == kNoIndex) {
       number = static_cast<Index>(umbrellas.vertices.size());
       umbrellas.vertices.push_back(pairing.ownVertex(c));
@@ -355,7 +355,7 @@ class Pieces {
   }
 
   void unite() {
-    Sets sets(elements_);
+    UnionFind sets(elements_);
     near_counts_.assign(elements_, 0);
     for (int side = 0; side < 2; ++side) {
       const std::vector<Triangle>& triangles = work_.sides[side].triangles;
@@ -363,7 +363,7 @@ class Pieces {
         if (pairings_[side].collapsed(t)) continue;
         Triangle numbers;
         for (Index k = 0; k < 3; ++k) numbers[k] = elementOf(side, triangles[t][k], 3 * t + k);
-        sets.unite(numbers);
+        sets.join(numbers);
         ++near_counts_[numbers[0]];
       }
       for (const Triangle& t : core_.triangles) ++near_counts_[first_core_[side] + core_.part_of_point[t[0]]];
@@ -371,7 +371,7 @@ class Pieces {
     shell_of_.assign(elements_, kNoIndex);
     shell_count_ = 0;
     for (Index e = 0; e < elements_; ++e) {
-      const Index root = sets.rootOf(e);
+      const Index root = sets.find(e);
       if (root == e) shell_of_[e] = shell_count_++;
       shell_of_[e] = shell_of_[root];
     }

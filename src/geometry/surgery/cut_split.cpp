@@ -64,7 +64,7 @@ Status sortTriangles(Workpiece& work) {
   const signed char* states = work.states.data();
   std::array<Index, 2> untouched{0, 0};
   std::uint64_t balance = 0;
-  Sets sets(mesh.vertices.size());
+  UnionFind sets(mesh.vertices.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const Triangle triangle = mesh.triangles[t];
     const std::uint64_t share = edgeBalance(triangle);
@@ -77,7 +77,7 @@ Status sortTriangles(Workpiece& work) {
     if (share == 0 && namesAVertexTwice(triangle))
       return Error{ErrorCode::kUnsuitableShape, "the surface has a triangle that names a vertex twice"};
     ++untouched[state > 0 ? kUpper : kLower];
-    sets.unite(triangle);
+    sets.join(triangle);
   }
   if (balance != 0)
     return Error{ErrorCode::kUnsuitableShape,

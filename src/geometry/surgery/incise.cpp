@@ -7,6 +7,7 @@
 
 #include "mesh/edge_balance.h"
 #include "incise_parts.h"
+#include "meshless_surgery/base/number_text.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 
 namespace meshless {
@@ -14,11 +15,7 @@ namespace {
 
 using namespace incising;
 
-std::string number(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.12g", x);
-  return text;
-}
+std::string number(double x) { return numberText(x, 12); }
 
 Status checkBlade(const Blade& blade, const InciseOptions& options) {
   if (!blade.origin.allFinite() || !blade.x_axis.allFinite() || !blade.y_axis.allFinite())

@@ -4,6 +4,7 @@
 #include <unordered_map>
 
 #include "incise_parts.h"
+#include "meshless_surgery/geometry/query/union_find.h"
 
 namespace meshless {
 namespace incising {
@@ -37,8 +38,8 @@ class Sealer {
     for (Corner c = 0; c < partners_.size(); ++c) {
       const Corner d = partners_[c];
       if (d == kNoIndex || d < c) continue;
-      unite(c, nextCorner(d));
-      unite(nextCorner(c), d);
+      corners_.join(c, nextCorner(d));
+      corners_.join(nextCorner(c), d);
     }
     build();
     const Status split = splitDoubleEdges();
@@ -65,8 +66,7 @@ class Sealer {
     }
     const std::size_t corners = 3 * (near_.size() + 2 * wound_.triangles.size());
     partners_.assign(corners, kNoIndex);
-    parents_.resize(corners);
-    std::iota(parents_.begin(), parents_.end(), Index{0});
+    corners_.reset(corners);
   }
 
   Index vertexOf(Corner c) const { return surface_.triangles[near_[c / 3]][c % 3]; }
@@ -86,16 +86,6 @@ class Sealer {
   void join(Corner c, Corner d) {
     partners_[c] = d;
     partners_[d] = c;
-  }
-
-  Index rootOf(Index i) {
-    while (parents_[i] != i) i = parents_[i] = parents_[parents_[i]];
-    return i;
-  }
-  void unite(Corner i, Corner j) {
-    i = rootOf(i);
-    j = rootOf(j);
-    parents_[std::max(i, j)] = std::min(i, j);
   }
 
   Status joinMesh() {
@@ -197,15 +187,15 @@ class Sealer {
     // Where vertices at the same place come together, the lowest stands for them.
     std::vector<Index> lowest(partners_.size(), kNoIndex);
     for (Corner c = 0; c < 3 * near_.size(); ++c)
-      if (on_rim_[vertexOf(c)]) lowest[rootOf(c)] = std::min(lowest[rootOf(c)], vertexOf(c));
+      if (on_rim_[vertexOf(c)]) lowest[corners_.find(c)] = std::min(lowest[corners_.find(c)], vertexOf(c));
     std::vector<Index> of_root(partners_.size(), kNoIndex);
     std::vector<bool> kept(surface_.positions.size(), false);
     for (Corner c = 0; c < partners_.size(); ++c) {
       const bool in_wound = isWoundFace(c);
       if (!in_wound && !on_rim_[vertexOf(c)]) continue;
-      Index& number = of_root[rootOf(c)];  // the root is the lowest corner and so comes first
+      Index& number = of_root[corners_.find(c)];  // the root is the lowest corner and so comes first
       if (number == kNoIndex) {
-        const Index v = in_wound ? wound_.nodes[nodeOf(c)].vertex : lowest[rootOf(c)];
+        const Index v = in_wound ? wound_.nodes[nodeOf(c)].vertex : lowest[corners_.find(c)];
         if (v == kNoIndex) {
           number = addVertex(surface_.frame.lifted(wound_.nodes[nodeOf(c)].place), VertexOrigin());
         } else if (in_wound || kept[v]) {
@@ -338,7 +328,7 @@ class Sealer {
   std::unordered_map<Index, std::array<Index, 2>> touched_;  // the face and edge that came first to a rim edge
   std::vector<Index> near_;                                  // triangles
   std::vector<Corner> partners_;
-  std::vector<Index> parents_;
+  UnionFind corners_;
   std::vector<Index> slots_;  // triangles of the result: near ones, lower face, upper face, then parts of those
   OpenedSurface out_;
 };

@@ -1,6 +1,7 @@
 // Disjoint sets of indices.
 #pragma once
 
+#include <algorithm>
 #include <numeric>
 #include <vector>
 
@@ -26,6 +27,24 @@ class UnionFind {
     b = find(b);
     if (a < b) parent_[b] = a;
     if (b < a) parent_[a] = b;
+  }
+
+  /// Cheap for what mostly is one already.
+  void join(const Triangle& t) {
+    const Index p = parent_[t[0]], q = parent_[t[1]], r = parent_[t[2]];
+    if (p == q && q == r) return;
+    if (parent_[p] == p && parent_[q] == q && parent_[r] == r) {
+      const Index lowest = std::min({p, q, r});
+      parent_[p] = parent_[q] = parent_[r] = parent_[t[0]] = parent_[t[1]] = parent_[t[2]] = lowest;
+      return;
+    }
+    join(t[0], t[1]);
+    join(t[0], t[2]);
+  }
+  /// The root of each.
+  const std::vector<Index>& flatten() {
+    for (Index& p : parent_) p = parent_[p];  // a parent is never higher, and so has its root
+    return parent_;
   }
 
   std::size_t bytes() const { return parent_.capacity() * sizeof(Index); }
