@@ -429,7 +429,6 @@ SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const
                        parts[from / kChunk]);
   });
   SurfaceBinding binding;
-  binding.particle.assign(rest.size(), kNoIndex);
   binding.offsets.assign(rest.size() + 1, 0);
   const Index* next = vertices.data();
   for (const Blender::Rows& part : parts)
@@ -458,10 +457,7 @@ SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const
     for (Index k = from; k < to; ++k)
       binding.carriers[binding.offsets[v] + k - from] = kept.particle[kept.parent->carriers[k]];
   });
-  for (Index v = 0; v < rest.size(); ++v) binding.embedded.push_back(v);
-  binding.levers.assign(rest.size(), Vec3::Zero());
-  binding.turners = cell;
-  binding.bound = static_cast<Index>(rest.size());
+  binding.cells = cell;
   return binding;
 }
 

@@ -5,7 +5,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "cofactor.h"
-#include "meshless_surgery/dynamics/rotation.h"
+#include "rotation.h"
 
 namespace meshless {
 namespace {

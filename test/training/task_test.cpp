@@ -263,7 +263,7 @@ TEST(TaskProgress, PutsBackWhereTheBodyWas) {
   EXPECT_EQ(1u, played.training.progress().stage());
   go(Vec3(0.008, 0, 0));
   EXPECT_FALSE(played.training.over());
-  go(Vec3(0.003, 0, 0));
+  go(Vec3(0.001, 0, 0));
   EXPECT_TRUE(played.training.progress().done());
   test::expectSame(played.training, *played.replayed());
 }
