@@ -23,6 +23,7 @@ import rospy
 from meshless_surgery.errors import Refused, need_topics
 from meshless_surgery.msg import Event
 from meshless_surgery.surgeon import Surgeon
+from meshless_surgery.topics import connected
 
 # Runs a node until it ends, this process does (its end of the pipe is closed then, however it ended) or SIGTERM comes.
 WITH_THIS_PROCESS = 'trap : TERM; exec 3<&0; "$@" 3<&- </dev/null & node=$!; read -r _ <&3 & wait -n; kill $node; wait $node'
@@ -76,7 +77,7 @@ class RunningScene:
                 raise RuntimeError('the node does not answer: ' + self.output())
             try:
                 rospy.wait_for_service(self.name + '/load', 0.2)  # the last that it offers
-                ready = self._subscriber is None or self._subscriber.get_num_connections() > 0
+                ready = self._subscriber is None or connected(self._subscriber)
             except rospy.ROSException:
                 pass
 

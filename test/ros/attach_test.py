@@ -8,6 +8,7 @@ import rospy
 from geometry_msgs.msg import Point
 from meshless_surgery import ErrorCode, Refused, Surgeon
 from meshless_surgery.msg import Event
+from meshless_surgery.topics import connected
 from visualization_msgs.msg import MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
@@ -116,7 +117,7 @@ class AttachTest(DeformerTestCase):
     def test_a_pull_tears_it_off_with_events(self):
         heard = []
         subscriber = rospy.Subscriber('/deformer/events', Event, heard.append, queue_size=100)
-        while subscriber.get_num_connections() == 0:
+        while not connected(subscriber):
             rospy.sleep(0.01)
         pick = self.surgeon.pick((-0.03, 0, 0.15), body='gallbladder', stiffness=2000)
         for k in range(60):

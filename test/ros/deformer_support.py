@@ -16,6 +16,7 @@ from meshless_surgery.crtk import StringStamped, operating_state as OperatingSta
 from meshless_surgery.msg import Event, State
 from meshless_surgery.srv import (Attach, Clip, Cut, Detach, GetBody, Hash, Incise, LoadState, Lock, MovePick, Observe, Pick, Probe, Push,
                                   Release, Remove, Report, SaveState, SetMaterial, Spawn, SpawnCloud, StartTask, Step, Unclip)
+from meshless_surgery.topics import connected
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
@@ -51,13 +52,13 @@ class Deformer:
 class Recorder:
     """Every message of a topic from now on, connected to a publisher before it is handed out."""
 
-    def __init__(self, topic, message_type, connected=True):
+    def __init__(self, topic, message_type, wait=True):
         self.topic = topic
         self.messages = []
         self.changed = threading.Condition()
         self.subscriber = rospy.Subscriber(topic, message_type, self._receive, queue_size=1000)
         end = time.monotonic() + LONG
-        while connected and self.subscriber.get_num_connections() == 0:
+        while wait and not connected(self.subscriber):
             if time.monotonic() > end:
                 raise AssertionError('nobody publishes ' + topic)
             time.sleep(0.005)

@@ -125,7 +125,7 @@ class EffectTest(unittest.TestCase):
             kinds['/tf'] = TFMessage
             for topic, kind in kinds.items():
                 if kind:  # not of crtk_msgs, which need not be there
-                    heard.append(Recorder(topic, kind, connected=topic != '/tf'))
+                    heard.append(Recorder(topic, kind, wait=topic != '/tf'))
             picked = deformer.call('pick', header=header('//table'), point=Point(-0.15, 0.0, 0.1))
             self.assertTrue(picked.success, picked.message)
             ball = TransformStamped(header=header('/table'), child_frame_id='/ball')

@@ -195,7 +195,7 @@ class ListenerTest(RobustCase):
             coming = []
             for _ in range(60):
                 topic, kind = rng.choice(topics)
-                coming.append(Recorder(node.name + '/' + topic, kind, connected=rng.random() < 0.5))
+                coming.append(Recorder(node.name + '/' + topic, kind, wait=rng.random() < 0.5))
                 if len(coming) > 5:
                     coming.pop(rng.randrange(len(coming))).close()
                 if rng.random() < 0.2:

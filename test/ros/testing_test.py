@@ -5,7 +5,9 @@ import re
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
+from unittest import mock
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, HERE)
@@ -13,6 +15,8 @@ from deformer_support import LONG, run  # noqa: E402
 from meshless_surgery import ErrorCode, Refused  # noqa: E402
 from meshless_surgery.msg import Event  # noqa: E402
 from meshless_surgery.testing import RunningScene, SceneTestCase  # noqa: E402
+from rospy.impl.tcpros_base import TCPROSTransport  # noqa: E402
+from rospy.impl.tcpros_pubsub import TCPROSSub  # noqa: E402
 
 SCENE = os.path.join(HERE, 'scenes', 'boxes.yaml')
 PACKAGE = '<package format="3"><name>my_package</name><version>0.1.0</version><description>of a user</description>' \
@@ -115,6 +119,20 @@ class FixtureTest(SceneTestCase):
         with self.assertRaises(RuntimeError) as raised:
             RunningScene('no_such_scene')
         self.assertIn('no_such_scene', str(raised.exception))
+
+    def test_the_first_event_is_heard_however_late_the_connection_is_made(self):
+        at_once = TCPROSTransport.connect
+
+        def late(transport, *arguments, **named):
+            if isinstance(transport.protocol, TCPROSSub):
+                time.sleep(3.0)
+            at_once(transport, *arguments, **named)
+
+        with mock.patch.object(TCPROSTransport, 'connect', late):
+            node = RunningScene(SCENE)
+            self.addCleanup(node.close)
+            node.surgeon.pick((-0.15, 0, 0.1), max_distance=0.1)
+            self.assertIsNotNone(node.wait_for_event(lambda event: event.type == Event.PICKED, timeout=10.0))
 
     def test_answers_without_a_code_have_none(self):
         with self.assertRaises(Refused) as refused:
