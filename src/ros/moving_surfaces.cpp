@@ -76,6 +76,14 @@ meshless_surgery::BodyVertices toVertices(const BodySnapshot& body) {
   return message;
 }
 
+// To what the message resolves: the rounding of a body that floats at rest is no motion.
+bool alike(const meshless_surgery::BodyVertices& one, const meshless_surgery::BodyVertices& other) {
+  const auto near = [](std::uint16_t a, std::uint16_t b) { return std::abs(int{a} - int{b}) <= 1; };
+  const Vec3 moved(one.origin.x - other.origin.x, one.origin.y - other.origin.y, one.origin.z - other.origin.z);
+  return moved.norm() <= other.step && std::abs(one.step - other.step) * kFinest <= other.step &&
+         std::equal(one.xyz.begin(), one.xyz.end(), other.xyz.begin(), other.xyz.end(), near);
+}
+
 }  // namespace
 
 bool MovingSurfaces::isKnown(const WorldSnapshot& snapshot) const {
@@ -142,7 +150,7 @@ meshless_surgery::Vertices MovingSurfaces::vertices(const WorldSnapshot& snapsho
   for (const BodySnapshot& body : snapshot.bodies) {
     auto now = toVertices(body);
     const auto before = said_.find(body.number);
-    const bool moved = before == said_.end() || !(before->second == now);
+    const bool moved = before == said_.end() || !alike(before->second, now);
     if (!moved && !message.complete) continue;
     message.bodies.push_back(now);
     if (moved) said_[body.number] = std::move(now);
