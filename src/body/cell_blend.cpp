@@ -19,7 +19,7 @@ constexpr double kReach = 1.2;           // [spacing] cells farther than this do
 constexpr double kBeyond = 1.0 + 1e-9;   // of the reach: out of it, whatever rounding does
 constexpr int kAround = 2;               // places on each side of a vertex's own: kReach, rounded up
 constexpr std::size_t kChunk = 16;       // cells
-constexpr std::size_t kMostWays = 1000;  // kept at a time: 12 kB each
+constexpr std::size_t kMostWays = 1000;  // kept from cell to cell: 12 kB each
 constexpr int kWide = 2 * kAround + 1, kPlaces = kWide * kWide * kWide, kMiddle = kPlaces / 2;
 constexpr int kStride[3] = {1, kWide, kWide* kWide};
 
@@ -227,6 +227,7 @@ class Blender {
     const LatticeCell& own = of_.lattice.cells[cell];
     of_.grid.window(of_.grid.indexOf(own.place), window_);
     choose(cell, from, to, rest);
+    if (ways_.size() > kMostWays) ways_.clear();  // not within a cell, whose vertices ask for the same ones
     const double spacing = of_.lattice.spacing;
     for (; from != to; ++from) {
       const Vec3& p = rest[*from];
@@ -356,7 +357,6 @@ class Blender {
     for (int axis = 0; axis < 3; ++axis)
       straight += std::abs(kCellSamples * (there.place[axis] - own.place[axis]) +
                            middle / kSampleStride[axis] % kCellSamples - bit / kSampleStride[axis] % kCellSamples);
-    if (ways_.size() > kMostWays) ways_.clear();
     Ways& ways = ways_.try_emplace(cell, of_.grid, there, middle).first->second;
     // From the cell a vertex's place is where the cell's is from the vertex's, turned round.
     const int steps =
@@ -429,7 +429,6 @@ SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const
                        parts[from / kChunk]);
   });
   SurfaceBinding binding;
-  binding.particle.assign(rest.size(), kNoIndex);
   binding.offsets.assign(rest.size() + 1, 0);
   const Index* next = vertices.data();
   for (const Blender::Rows& part : parts)
@@ -458,10 +457,7 @@ SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const
     for (Index k = from; k < to; ++k)
       binding.carriers[binding.offsets[v] + k - from] = kept.particle[kept.parent->carriers[k]];
   });
-  for (Index v = 0; v < rest.size(); ++v) binding.embedded.push_back(v);
-  binding.levers.assign(rest.size(), Vec3::Zero());
-  binding.turners = cell;
-  binding.bound = static_cast<Index>(rest.size());
+  binding.cells = cell;
   return binding;
 }
 
