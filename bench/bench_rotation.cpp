@@ -18,7 +18,7 @@
 
 #include <Eigen/SVD>
 
-#include "meshless_surgery/dynamics/rotation.h"
+#include "dynamics/rotation.h"
 #include "meshless_surgery/dynamics/rotation_batch.h"
 
 namespace meshless {

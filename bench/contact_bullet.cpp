@@ -65,8 +65,7 @@ BulletPile::BulletPile(const PileOptions& options, BulletWay way) : impl_(std::m
     body.m_cfg.kMT = kPoseMatching;
     body.m_cfg.kDF = kFriction;
     for (const Triangle& t : model.surface.triangles)
-      body.appendFace(static_cast<int>(model.binding.particle[t[0]]), static_cast<int>(model.binding.particle[t[1]]),
-                      static_cast<int>(model.binding.particle[t[2]]));
+      body.appendFace(static_cast<int>(t[0]), static_cast<int>(t[1]), static_cast<int>(t[2]));
     if (way == BulletWay::kLinks) {
       for (const auto& edge : edges) body.appendLink(static_cast<int>(edge[0]), static_cast<int>(edge[1]));
       body.m_cfg.collisions = btSoftBody::fCollision::SDF_RS | btSoftBody::fCollision::VF_SS;

@@ -32,7 +32,7 @@ struct PiecesTimes {
   std::size_t pieces = 0, asleep = 0;
 };
 
-/// A random organ of 0.2 m (test/shapes/random_organ.h) with the world's defaults at 120 Hz: two seconds
+/// A random organ of 0.2 m (geometry/random_organ.h) with the world's defaults at 120 Hz: two seconds
 /// on the ground, the cuts, three seconds alone. Negative times where something was refused.
 PiecesTimes timePieces(const Pieces& of);
 

@@ -7,7 +7,7 @@
 #include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/body/preserve.h"
 #include "meshless_surgery/dynamics/match_batch.h"
-#include "meshless_surgery/dynamics/rotation.h"
+#include "dynamics/rotation.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/geometry/mesh/primitives.h"
 
@@ -52,7 +52,7 @@ BodyModel randomCloud(Random& random, const Kind& kind, double scale, Index part
     set.offsets.push_back(static_cast<Index>(set.members.size()));
   }
   for (Index i : set.members) set.weights.push_back(1.0 / total[i]);
-  makeMoments(model, material);
+  makeTissue(model, material);
   return model;
 }
 

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/body/cell_blend.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
@@ -145,7 +144,7 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
   Points x = load.start, v(n, Vec3::Zero()), a;
   for (std::size_t i = 0; i < n; ++i)
     if (load.held[i]) x[i] = load.target[i];
-  std::vector<ClusterPose> poses = body->state.poses;
+  std::vector<ClusterPose> poses = material.elastic() ? body->state.cells : body->state.poses;
   MatchCounters counters;
   const ElasticParameters parameters =
       elasticParameters(material.youngs_modulus, material.poissons_ratio, material.density);
@@ -165,7 +164,7 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
   // Dynamic relaxation: damped as the Rayleigh quotient of the last motion says (Underwood 1983).
   StaticResult result;
   result.particles = n;
-  result.clusters = model.clusters.size();
+  result.clusters = model.groups();
   std::vector<double> times;
   Points last_a(n, Vec3::Zero()), moved(n, Vec3::Zero());
   Vec3 sphere_push = Vec3::Zero();
@@ -218,26 +217,18 @@ Result<StaticResult> solveStatic(const TruthCase& truth, const std::string& fold
   std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2), times.end());
   result.step_ms = times[times.size() / 2];
 
-  if (material.elastic()) model.elastic_batch->getRotations(state, poses);
-  fitClusters(matchInput(model), x, poses);  // for embedded vertices
-  SurfaceBinding samples;
-  if (model.lattice) {
-    const CellFinder finder(*model.lattice);
-    const Pose& placed = body->state.placed;
-    Points places;
-    std::vector<Index> cells;
-    for (const Vec3& p : truth.rest) {
-      places.push_back(placed.rotation.conjugate() * (p - placed.translation));
-      cells.push_back(finder.nearest(places.back()));
-    }
-    samples = bindToCells(*model.lattice, places, cells);
-  } else {
-    samples = bindSurface(model.rest, model.graph, model.clusters, truth.rest,
-                          std::vector<Index>(truth.rest.size(), kNoIndex));
+  const CellFinder finder(*model.lattice);
+  const Pose& placed = body->state.placed;
+  Points places;
+  std::vector<Index> cells;
+  for (const Vec3& p : truth.rest) {
+    places.push_back(placed.rotation.conjugate() * (p - placed.translation));
+    cells.push_back(finder.nearest(places.back()));
   }
+  const SurfaceBinding samples = bindToCells(*model.lattice, places, cells);
   double squares = 0.0;
   for (Index s = 0; s < truth.rest.size(); ++s) {
-    result.samples.push_back(embeddedPosition(samples, x, poses, s));
+    result.samples.push_back(samples.place(s, x));
     squares += (result.samples.back() - truth.rest[s] - truth.displacement[s]).squaredNorm();
   }
   result.largest = largest;

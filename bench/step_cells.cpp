@@ -42,9 +42,9 @@ std::shared_ptr<const Plain> makeCells() {
           model.masses[cells.back()[k]] += mass / 8.0;
         }
       }
-  model.clusters = clustersOfCells(cells, std::vector<double>(cells.size(), mass), model.masses, kSpacing);
+  model.clusters = clustersOfCells(cells, std::vector<double>(cells.size(), mass), model.masses);
   body->finish();
-  makeMoments(model, material);
+  makeTissue(model, material);
   Engine engine(2);
   throwIn(*body, engine, 0.5, 2.0);
   return body;

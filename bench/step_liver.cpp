@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "shapes/organs.h"
+#include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/geometry/mesh/primitives.h"
 #include "meshless_surgery/world/world.h"
 #include "step_rows.h"
@@ -52,7 +53,7 @@ std::shared_ptr<const PreparedBody> makeBall(bool elastic, bool surface) {
   PreparedBody without = *with;
   BodyModel model = *with->model;
   model.surface = TriangleMesh();
-  model.binding = SurfaceBinding();
+  model.binding = ownVertices(0);
   model.solid = false;
   without.model = std::make_shared<BodyModel>(std::move(model));
   without.state.surface.clear();
@@ -87,7 +88,7 @@ void runFrames(benchmark::State& state, const std::shared_ptr<const PreparedBody
   state.counters["substeps"] = substeps / frames;
   state.counters["particles"] = static_cast<double>(body->model->rest.size());
   state.counters["triangles"] = static_cast<double>(body->model->surface.triangles.size());
-  state.counters["riders"] = static_cast<double>(body->model->binding.embedded.size());
+  state.counters["riders"] = static_cast<double>(body->model->binding.size());
 }
 
 // The same body in a plain loop on elasticAccelerations(), with the substeps that the world takes and without the

@@ -4,7 +4,6 @@
 
 #include <Eigen/Geometry>
 
-#include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/body/cell_blend.h"
 #include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/body/filled_cells.h"
@@ -13,8 +12,6 @@ namespace meshless::bench {
 namespace {
 
 SurfaceBinding bindSamples(const BodyModel& model, const Points& places) {
-  if (!model.lattice)
-    return bindSurface(model.rest, model.graph, model.clusters, places, std::vector<Index>(places.size(), kNoIndex));
   const CellFinder finder(*model.lattice);
   std::vector<Index> cells;
   for (const Vec3& p : places) cells.push_back(finder.nearest(p));
@@ -63,11 +60,9 @@ Points movedSamples(const TruthCase& truth, const BodyModel& model, const Points
   Points places;
   for (const Vec3& p : truth.rest) places.push_back(rest_frame * p);
   const SurfaceBinding samples = bindSamples(model, places);
-  std::vector<ClusterPose> poses(model.clusters.size());
-  fitClusters(matchInput(model), particles, poses);  // for levers
   Points moved;
   for (Index s = 0; s < truth.rest.size(); ++s) {
-    const Vec3 now = embeddedPosition(samples, particles, poses, s);
+    const Vec3 now = samples.place(s, particles);
     moved.push_back(placed.rotation.conjugate() * (now - placed.translation) - truth.rest[s]);
   }
   return moved;

@@ -6,26 +6,71 @@
 
 #include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/body/cavities.h"
+#include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/lattice/cell_regions.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 
 namespace meshless {
 
+namespace {
+
+// Of the weight that presses on the bottom of a column as long as a body: so stiff are the cells under an appearance
+// material. A column of twice that stiffness is three quarters as high under its weight.
+constexpr double kCarriedWeight = 2.0;
+constexpr double kStandardGravity = 9.81;   // [m/s^2]
+constexpr double kCarryingPoisson = 0.45;    // of these cells
+
+// Of its length that a body may sink which stands on one of its particles, drawn to its only goal, where it needs no
+// cells to stand on.
+constexpr double kSinks = 0.05;
+
+constexpr double kNothing = 1e-9;     // of the spacing that a particle would move in a substep: not worth a ramp
+constexpr double kLeastStiffened = 1e-5;  // of its stiffness that a body has, whatever it was before
+constexpr double kAtOnce = 0.99;      // so much of it may come at once
+
+// [m/s^2] of every particle by what the body does to itself.
+Points ownAccelerations(const BodyModel& model, BodyState state, const Material& material, double h) {
+  StepScratch scratch;
+  MatchCounters uncounted;
+  state.cavities.clear();  // what fills them goes on
+  Points accelerations = state.velocities;
+  matchAndMove(model, material, Vec3::Zero(), h, state, scratch, uncounted);
+  for (std::size_t i = 0; i < accelerations.size(); ++i)
+    accelerations[i] = (state.velocities[i] - accelerations[i]) / h;
+  return accelerations;
+}
+
+// Few particles, all drawn to one stiff goal, move as one: a cube of a heap. What of a contact does not move all of them
+// is (1 - alpha)^2 of it (World::Impl::stepSurfaces).
+bool standsOnItsGoal(const BodyModel& model, const Material& material) {
+  if (material.elastic() || model.clusters.size() != 1 || model.isHeld() || !material.volume.points.empty()) return false;
+  const double yields = 1.0 - material.alpha, particles = static_cast<double>(model.rest.size());
+  return yields * yields * kStandardGravity * particles < kSinks * model.length * goalStiffness(material);
+}
+
+}  // namespace
+
+ElasticParameters elasticityOf(const Material& material, double length) {
+  if (material.elastic())
+    return elasticParameters(material.youngs_modulus, material.poissons_ratio, material.density);
+  return elasticParameters(kCarriedWeight * kStandardGravity * length * material.density, kCarryingPoisson,
+                           material.density);
+}
+
+ElasticParameters ownElasticity(const BodyModel& model, const Material& material, double factor) {
+  return elasticParameters(factor * model.specific_stiffness * material.density, model.poissons_ratio,
+                           material.density);
+}
+
 void makeElastic(BodyModel& model) {
-  model.elastic = makeElasticRest(model.shape);
   if (model.lattice) {
     model.cells = std::make_shared<ElasticCells>(elasticCellsOf(model));
     model.elastic_batch = std::make_shared<ElasticBatch>(*model.cells);
-    return;
+  } else {
+    model.elastic = makeElasticRest(model.shape);
+    model.elastic_batch = std::make_shared<ElasticBatch>(matchInput(model), model.elastic);
   }
-  for (std::size_t c = 0; c < model.elastic.size(); ++c)
-    if (model.elastic[c].spread_inverse.norm() > model.most_spread_inverse) {
-      model.elastic[c].spread_inverse.setZero();
-      model.shape.clusters[c].moment_inverse.setZero();
-      model.shape.clusters[c].linear_rank = false;
-    }
-  model.elastic_batch = std::make_shared<ElasticBatch>(matchInput(model), model.elastic);
 }
 
 void makeClamp(BodyModel& model) {
@@ -36,30 +81,33 @@ void makeClamp(BodyModel& model) {
   model.any_fixed = true;
 }
 
-void makeMoments(BodyModel& model, const Material& material) {
+void makeTissue(BodyModel& model, const Material& material) {
   constexpr double kHeld = 50.0;  // enough that a cluster follows its held part, little enough to stay well conditioned
-  model.match_masses = model.masses;
-  if (!material.elastic())  // stress already carries what is held
-    for (std::size_t i = 0; i < model.masses.size(); ++i)
-      if (model.fixed[i]) model.match_masses[i] *= kHeld;
-  if (model.lattice) weighCells(model, material.elastic());
   makeClamp(model);
-  model.shape = makeRestShape(model.rest, model.match_masses, model.clusters);
   model.elastic.clear();
   model.elastic_batch.reset();
   model.cells.reset();
   model.highest_frequency = 0.0;
-  model.specific_stiffness = material.youngs_modulus / material.density;
-  model.poissons_ratio = material.poissons_ratio;
-  if (material.elastic()) {
-    makeElastic(model);
-    const ElasticParameters parameters =
-        elasticParameters(material.youngs_modulus, material.poissons_ratio, material.density);
-    model.highest_frequency = model.cells ? highestFrequency(*model.cells, parameters)
-                                          : highestFrequency(matchInput(model), model.elastic, parameters);
-  } else if (material.mode == MatchMode::kQuadratic) {
-    addQuadraticRest(model.rest, model.match_masses, model.clusters, model.shape);
+  model.match_masses = model.masses;
+  if (material.elastic() && model.lattice) {
+    model.clusters = ClusterSet();
+    model.shape = RestShape();
+  } else {
+    if (!material.elastic())  // stress already carries what is held
+      for (std::size_t i = 0; i < model.masses.size(); ++i)
+        if (model.fixed[i]) model.match_masses[i] *= kHeld;
+    if (model.clusters.size() == 0) model.clusters = makeClusters(model.rest, model.graph, model.grouping);
+    model.shape = makeRestShape(model.rest, model.match_masses, model.clusters);
+    if (!material.elastic() && material.mode == MatchMode::kQuadratic)
+      addQuadraticRest(model.rest, model.match_masses, model.clusters, model.shape);
   }
+  const ElasticParameters own = elasticityOf(material, model.length);
+  model.specific_stiffness = own.youngs / own.density;
+  model.poissons_ratio = material.elastic() ? material.poissons_ratio : kCarryingPoisson;
+  if (!material.elastic() && (!model.lattice || standsOnItsGoal(model, material))) return;
+  makeElastic(model);
+  model.highest_frequency = model.cells ? highestFrequency(*model.cells, own)
+                                        : highestFrequency(matchInput(model), model.elastic, own);
 }
 
 BodyModelPtr withMaterial(const BodyModelPtr& model, const Material& before, const Material& after) {
@@ -68,7 +116,8 @@ BodyModelPtr withMaterial(const BodyModelPtr& model, const Material& before, con
                               (after.elastic() && before.poissons_ratio != after.poissons_ratio);
   const bool needs_quadratic =
       !after.elastic() && after.mode == MatchMode::kQuadratic && model->shape.quadratic.empty();
-  if (!new_masses && !new_elasticity && !needs_quadratic) return model;
+  const bool other_support = standsOnItsGoal(*model, before) != standsOnItsGoal(*model, after);
+  if (!new_masses && !new_elasticity && !needs_quadratic && !other_support) return model;
   auto changed = std::make_shared<BodyModel>(*model);
   const double ratio = after.density / before.density;
   changed->cell_mass *= ratio;
@@ -80,8 +129,53 @@ BodyModelPtr withMaterial(const BodyModelPtr& model, const Material& before, con
     makeParticlesOfCells(*changed);
     changed->mass = std::accumulate(changed->masses.begin(), changed->masses.end(), 0.0);
   }
-  makeMoments(*changed, after);
+  makeTissue(*changed, after);
   return changed;
+}
+
+BodyState restState(const BodyModel& model, const Pose& placed) {
+  BodyState state;
+  state.placed = placed;
+  for (const Vec3& p : model.rest) state.positions.push_back(placed * p);
+  state.velocities.assign(model.rest.size(), Vec3::Zero());
+  ClusterPose pose;
+  pose.rotation = placed.rotation;
+  state.poses.assign(model.clusters.size(), pose);
+  state.cells.assign(model.lattice ? model.lattice->cells.size() : 0, pose);
+  updateSurface(model, state);
+  return state;
+}
+
+void fitPoses(const BodyModel& model, BodyState& state) {
+  if (state.poses.size() == model.clusters.size()) return;
+  state.plastic.clear();
+  ClusterPose pose;
+  pose.rotation = state.placed.rotation;
+  state.poses.assign(model.clusters.size(), pose);
+  fitClusters(matchInput(model), state.positions, state.poses);
+}
+
+double stiffenedBy(const BodyModel& before, const Material& old, const BodyModel& model, const Material& material,
+                   double h, const BodyState& state) {
+  BodyState still = state;
+  for (Vec3& v : still.velocities) v.setZero();
+  const auto pulls = [&](const BodyModel& of, const Material& made_of) {  // where nothing is slowed
+    BodyState then = still;
+    fitPoses(of, then);
+    return ownAccelerations(of, then, made_of, std::min(h, longestSubstep(of, then)));
+  };
+  const Points then = pulls(before, old);
+  still.stiffened = 1.0;
+  const Points now = pulls(model, material);
+  double common = 0.0, squared = 0.0, most = 0.0;
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    if (model.fixed[i]) continue;
+    common += model.masses[i] * now[i].dot(then[i]);
+    squared += model.masses[i] * now[i].squaredNorm();
+    most = std::max(most, now[i].norm());
+  }
+  if (!(h * h * most > kNothing * model.spacing) || common > kAtOnce * squared) return 1.0;
+  return std::max(kLeastStiffened, common / squared);
 }
 
 RegionTissue regionTissue(const Material& own, const Material& body) {
@@ -122,16 +216,7 @@ std::vector<std::uint8_t> surfaceRegions(const BodyModel& model) {
 }
 
 void updateSurface(const BodyModel& model, BodyState& state) {
-  state.surface.resize(model.surface.vertices.size());
-  for (std::size_t v = 0; v < state.surface.size(); ++v)
-    if (model.binding.particle[v] != kNoIndex) state.surface[v] = state.positions[model.binding.particle[v]];
-  std::vector<ClusterPose> poses;
-  if (!model.binding.lever_clusters.empty()) {
-    poses = state.poses;  // a copy: a step's warm start must not depend on when the surface is read
-    fitClusters(matchInput(model, state), state.positions, model.binding.lever_clusters, poses);
-  }
-  for (Index r = 0; r < model.binding.embedded.size(); ++r)
-    state.surface[model.binding.embedded[r]] = embeddedPosition(model.binding, state.positions, poses, r);
+  carriedPlaces(model.binding, state.positions, state.surface);
 }
 
 BodyMeasures measureBody(const BodyModel& model, const BodyState& state) {

@@ -7,14 +7,13 @@ namespace meshless {
 namespace {
 std::size_t bytesOf(const CollisionSurface& collision) {
   const SurfaceBinding& binding = collision.binding;
-  return sizeof collision + meshless::bytesOf(collision.mesh.vertices, collision.mesh.triangles, binding.particle,
-                                              binding.embedded, binding.offsets, binding.carriers, binding.weights,
-                                              binding.levers, binding.turners, binding.lever_clusters);
+  return sizeof collision + meshless::bytesOf(collision.mesh.vertices, collision.mesh.triangles, binding.offsets,
+                                              binding.carriers, binding.weights, binding.cells);
 }
 std::size_t bytesOf(const Cavities& cavities) {
   const SurfaceBinding& binding = cavities.binding;
-  std::size_t sum = sizeof cavities + meshless::bytesOf(binding.particle, binding.embedded, binding.offsets,
-                                                        binding.carriers, binding.weights, cavities.shells);
+  std::size_t sum = sizeof cavities + meshless::bytesOf(binding.offsets, binding.carriers, binding.weights,
+                                                        cavities.shells);
   for (const Cavities::Shell& shell : cavities.shells) sum += meshless::bytesOf(shell.triangles);
   return sum;
 }
@@ -34,19 +33,18 @@ std::size_t bytesOf(const BodyModel& model) {
          (model.elastic_batch ? model.elastic_batch->bytes() : 0) +
          bytesOf(model.surface.vertices, model.surface.triangles, model.surface.patches) +
          (model.collision ? bytesOf(*model.collision) : 0) + (model.cavities ? bytesOf(*model.cavities) : 0) +
-         bytesOf(binding.particle, binding.embedded, binding.offsets, binding.carriers, binding.weights, binding.levers,
-                 binding.turners, binding.lever_clusters);
+         bytesOf(binding.offsets, binding.carriers, binding.weights, binding.cells);
 }
 
 std::size_t bytesOf(const BodyState& state) {
-  return bytesOf(state.positions, state.velocities, state.poses, state.surface, state.plastic, state.eased,
-                 state.cavities);
+  return bytesOf(state.positions, state.velocities, state.poses, state.cells, state.surface, state.plastic,
+                 state.plastic_cells, state.cavities);
 }
 
 std::size_t bytesOf(const StepScratch& scratch) {
   const ElasticBatchState& elastic = scratch.elastic;
   return scratch.clamp.bytes() +
-         bytesOf(scratch.previous, scratch.predicted, scratch.goals, scratch.touched, scratch.cavity,
+         bytesOf(scratch.previous, scratch.predicted, scratch.goals, scratch.matched, scratch.touched, scratch.cavity,
                  scratch.cavity_pull) +
          bytesOf(elastic.rotations, elastic.others, elastic.forces, elastic.largest, elastic.cold);
 }

@@ -91,8 +91,7 @@ double volumeWithin(const TriangleMesh& mesh, const Closed& closed) {
 class WallBinder {
  public:
   WallBinder(const SurfaceBinding& surface, std::size_t vertices)
-      : surface_(surface), row_(vertices, kNoIndex), number_(vertices, kNoIndex) {
-    for (Index r = 0; r < surface.embedded.size(); ++r) row_[surface.embedded[r]] = r;
+      : surface_(surface), number_(vertices, kNoIndex) {
     walls_.offsets.push_back(0);
   }
 
@@ -113,22 +112,12 @@ class WallBinder {
     // A middle is the mean of its rim, however many particles carry that.
     SurfaceBinding binding = fewerCarriers(walls_, rest, spacing);
     const SurfaceBinding walls = binding;
-    const Index first = static_cast<Index>(walls.particle.size());
-    std::vector<Index> row(first, kNoIndex);
-    for (Index r = 0; r < walls.embedded.size(); ++r) row[walls.embedded[r]] = r;
     for (const std::vector<Index>& rim : rims_) {
       std::map<Index, double> weights;
       const double share = 1.0 / static_cast<double>(rim.size());
-      for (const Index v : rim) {
-        if (row[v] == kNoIndex) {
-          weights[walls.particle[v]] += share;
-          continue;
-        }
-        for (Index k = walls.offsets[row[v]]; k < walls.offsets[row[v] + 1]; ++k)
+      for (const Index v : rim)
+        for (Index k = walls.offsets[v]; k < walls.offsets[v + 1]; ++k)
           weights[walls.carriers[k]] += share * walls.weights[k];
-      }
-      binding.embedded.push_back(static_cast<Index>(binding.particle.size()));
-      binding.particle.push_back(kNoIndex);
       for (const auto& [particle, weight] : weights) {
         binding.carriers.push_back(particle);
         binding.weights.push_back(weight);
@@ -138,7 +127,7 @@ class WallBinder {
     for (Cavities::Shell& shell : shells)
       for (Triangle& t : shell.triangles)
         for (Index& v : t)
-          if (v >= kMiddle) v = first + (v - kMiddle);
+          if (v >= kMiddle) v = walls.size() + (v - kMiddle);
     return binding;
   }
 
@@ -147,21 +136,17 @@ class WallBinder {
 
   Index numberOf(Index v) {
     if (number_[v] != kNoIndex) return number_[v];
-    number_[v] = static_cast<Index>(walls_.particle.size());
-    walls_.particle.push_back(surface_.particle[v]);
-    if (row_[v] != kNoIndex) {
-      walls_.embedded.push_back(number_[v]);
-      for (Index k = surface_.offsets[row_[v]]; k < surface_.offsets[row_[v] + 1]; ++k) {
-        walls_.carriers.push_back(surface_.carriers[k]);
-        walls_.weights.push_back(surface_.weights[k]);
-      }
-      walls_.offsets.push_back(static_cast<Index>(walls_.carriers.size()));
+    number_[v] = walls_.size();
+    for (Index k = surface_.offsets[v]; k < surface_.offsets[v + 1]; ++k) {
+      walls_.carriers.push_back(surface_.carriers[k]);
+      walls_.weights.push_back(surface_.weights[k]);
     }
+    walls_.offsets.push_back(static_cast<Index>(walls_.carriers.size()));
     return number_[v];
   }
 
   const SurfaceBinding& surface_;
-  std::vector<Index> row_, number_;
+  std::vector<Index> number_;
   SurfaceBinding walls_;
   std::vector<std::vector<Index>> rims_;
 };

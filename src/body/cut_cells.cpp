@@ -163,7 +163,7 @@ class CellCutter {
     for (int k = 1; k < 4; ++k)
       if (origin.parents[k] != kNoIndex && origin.weights[k] > origin.weights[heaviest]) heaviest = k;
     const Vec3& nearest = parent_rest[origin.parents[heaviest]];
-    embedded.was = parent.turners[origin.parents[heaviest]];
+    embedded.was = parent.cells[origin.parents[heaviest]];
     double all = 0.0;
     for (int k = 0; k < 4; ++k) {
       if (origin.parents[k] == kNoIndex) continue;
@@ -711,13 +711,13 @@ class CellCutter {
              holdCorners(*child);
              inheritClamp(*child, renumbered);
              for (const double m : child->masses) child->mass += m;
-             inheritMoments(*child, corner_of);
              for (const Index c : cell_of) {
-               piece.state.poses.push_back(state_.poses[cut_.parent_cell[c]]);
-               if (!state_.plastic.empty()) piece.state.plastic.push_back(state_.plastic[cut_.parent_cell[c]]);
+               piece.state.cells.push_back(state_.cells[cut_.parent_cell[c]]);
+               if (!state_.plastic_cells.empty())
+                 piece.state.plastic_cells.push_back(state_.plastic_cells[cut_.parent_cell[c]]);
                ++(cut_.changed[c] ? work.rebuilt_clusters : work.kept_clusters);
              }
-             fitClusters(matchInput(*child, piece.state), piece.state.positions, piece.state.poses);
+             inheritTissue(*child, piece);
            });
     for (const EmbeddedVertex& embedded : surfaces_[p].embedded) {
       ++(embedded.made() ? work.bound_embedded : work.kept_embedded);
@@ -758,7 +758,7 @@ class CellCutter {
   // The parent's vertex whose row one that is the same now and in a cell has too; kNoIndex: it is to be made.
   Index keptRow(const SurfaceBinding& parent, Index same, Index cell, const std::vector<bool>& untouched) const {
     const Index was = cut_.parent_cell[cell];
-    return same != kNoIndex && parent.turners[same] == was && untouched[was] ? same : kNoIndex;
+    return same != kNoIndex && parent.cells[same] == was && untouched[was] ? same : kNoIndex;
   }
 
   // The parent's cells around which, as far as bindToCells() looks from them, all tissue is in the piece as it was.
@@ -847,24 +847,26 @@ class CellCutter {
     }
   }
 
-  void inheritMoments(BodyModel& child, const std::vector<Index>& corner_of) const {
-    const bool elastic = !model_.elastic.empty();
-    child.match_masses = child.masses;
-    if (!elastic)
-      for (std::size_t i = 0; i < corner_of.size(); ++i) {
-        const Index parent = cut_.parent_corner[corner_of[i]];
-        if (child.fixed[i]) child.match_masses[i] *= model_.match_masses[parent] / model_.masses[parent];
-      }
-    weighCells(child, elastic);
+  void inheritTissue(BodyModel& child, BodyPiece& piece) const {
     makeClamp(child);
-    child.shape = makeRestShape(child.rest, child.match_masses, child.clusters);
-    if (!model_.shape.quadratic.empty()) addQuadraticRest(child.rest, child.match_masses, child.clusters, child.shape);
-    child.specific_stiffness = model_.specific_stiffness;
-    child.poissons_ratio = model_.poissons_ratio;
-    if (!elastic) return;
     makeElastic(child);
     child.highest_frequency =
         highestFrequency(*child.cells, elasticParameters(child.specific_stiffness, child.poissons_ratio, 1.0));
+    child.match_masses = child.masses;
+    if (model_.clusters.size() == 0) return;
+    for (std::size_t i = 0; i < child.fixed.size(); ++i) {
+      const Index parent = piece.copied_from[i];
+      if (child.fixed[i]) child.match_masses[i] *= model_.match_masses[parent] / model_.masses[parent];
+    }
+    PieceClusters clusters = splitClusters(model_.clusters, child.rest, child.graph, piece.copied_from);
+    child.clusters = std::move(clusters.clusters);
+    child.shape = makeRestShape(child.rest, child.match_masses, child.clusters);
+    if (!model_.shape.quadratic.empty()) addQuadraticRest(child.rest, child.match_masses, child.clusters, child.shape);
+    for (const Index c : clusters.origin) {
+      piece.state.poses.push_back(state_.poses[c]);
+      if (!state_.plastic.empty()) piece.state.plastic.push_back(state_.plastic[c]);
+    }
+    fitClusters(matchInput(child, piece.state), piece.state.positions, piece.state.poses);
   }
 
   const BodyModel& model_;

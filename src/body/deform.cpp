@@ -7,7 +7,6 @@
 #include <Eigen/Eigenvalues>
 
 #include "meshless_surgery/body/cavities.h"
-#include "meshless_surgery/body/ease.h"
 #include "meshless_surgery/dynamics/plastic.h"
 
 namespace meshless {
@@ -133,108 +132,155 @@ double viscosityTime(const BodyModel& model, const BodyState& state, double h) {
   return std::isfinite(longest) ? kLag * longest / std::sqrt(state.stiffened) : h;
 }
 
+namespace {
+
+// What the stages of a substep share.
+struct Substep {
+  const BodyModel& model;
+  const Material& material;
+  Vec3 gravity;
+  double h;  // [s]
+  BodyState& state;
+  StepScratch& scratch;
+  MatchCounters& counters;
+  const ForEach& for_each;
+  double factor = 1.0;     // stiffnessFactor()
+  double stiffened = 1.0;  // of the stiffness, in this substep
+  Whole whole{};           // at its start
+  RigidMotion rigid{};     // as damping leaves it
+
+  Vec3 weight() const { return (model.isHeld() ? factor : 1.0) * gravity; }  // it moves what is held but by deforming it
+  Points& pull() const { return scratch.goals; }  // [m/s^2] of all that the body does to itself
+};
+
+void becomeStiffer(Substep& s) {
+  s.stiffened = s.state.stiffened;
+  s.state.stiffened = std::min(1.0, s.stiffened * std::exp(kStiffening * s.h));
+}
+
+// Before the pull: after it, it would weaken the material. A body that is held has no rigid motion of its own. One that
+// lies on something kneads its tissue where it rolls or rocks: about that place.
+void damp(Substep& s) {
+  Points &x = s.state.positions, &v = s.state.velocities;
+  // What vibrates is given at most half of that share of its energy by becoming stiffer.
+  const double damped = std::exp(-s.h * (s.material.damping + (s.stiffened < 1.0 ? 2.0 * kStiffening : 0.0)));
+  // Where what deforms is slowed otherwise than before, its energy stays, and so do velocities over the pace.
+  const double pace = std::sqrt(s.factor), kept = s.state.pace > 0.0 ? damped * pace / s.state.pace : damped;
+  s.state.pace = pace;
+  if (!s.model.any_fixed) s.whole = Whole(s.model, x, v);
+  const RigidMotion before = s.rigid = s.whole.rigid;
+  const double spin_kept = s.scratch.load > 0.0 ? damped : 1.0;
+  if (s.scratch.load > 0.0) s.rigid.velocity -= (1.0 - spin_kept) * rollingOf(before, s.scratch.load_at);
+  s.rigid.spin *= spin_kept;
+  const Mat3 undamped = turning(s.rigid.spin - kept * before.spin);
+  const Vec3 drift = s.rigid.velocity - kept * before.velocity;
+  for (std::size_t i = 0; i < x.size(); ++i) v[i] = kept * v[i] + drift + undamped * (x[i] - before.centre);
+}
+
+// By the stress where velocities will have it in the lag: a viscosity.
+void stress(Substep& s) {
+  const BodyModel& model = s.model;
+  if (!model.elastic_batch) {
+    s.pull().assign(s.state.positions.size(), Vec3::Zero());
+    return;
+  }
+  const double lag = viscosityTime(model, s.state, s.h);
+  Points& y = s.scratch.predicted;
+  y.resize(s.state.positions.size());
+  for (std::size_t i = 0; i < y.size(); ++i) y[i] = s.state.positions[i] + lag * s.state.velocities[i];
+  const ElasticParameters parameters = ownElasticity(model, s.material, s.factor * s.stiffened);
+  const MatchInput input = matchInput(model, s.state);
+  std::vector<ClusterPose>& poses = model.cells ? s.state.cells : s.state.poses;
+  if (model.cells && (s.material.plastic() || !s.state.plastic_cells.empty())) {
+    s.state.stretch = elasticAccelerations(*model.cells, parameters, y, poses, s.pull(), s.counters, s.state.swelling,
+                                           &s.state.plastic_cells);
+  } else if (s.material.plastic() || !s.state.plastic.empty()) {
+    s.state.stretch =
+        elasticAccelerations(input, model.elastic, parameters, y, poses, s.pull(), s.counters, s.state.swelling);
+  } else {
+    if (!s.scratch.under_way) model.elastic_batch->setRotations(poses, s.scratch.elastic);
+    s.state.stretch = model.elastic_batch->accelerate(input, parameters, y, s.scratch.elastic, s.pull(), s.counters,
+                                                      s.state.swelling, widestInstructionSet(), s.for_each);
+    if (s.scratch.last) model.elastic_batch->getRotations(s.scratch.elastic, poses);
+  }
+  s.scratch.under_way = !s.scratch.last;
+}
+
+// To the goals of clusters, from where all else would have the particles. How far that is ahead of them must not change
+// how a body spins.
+void match(Substep& s) {
+  if (s.material.elastic()) return;
+  const double h = s.h;
+  GoalPull goal = goalPull(s.material.alpha, h * std::sqrt(s.factor));
+  goal.gain *= s.stiffened;
+  if (!(goal.gain > 0.0)) return;
+  const Points &x = s.state.positions, &v = s.state.velocities;
+  const Mat3 turn = turning(s.rigid.spin);
+  const Vec3 weight = s.weight(), falling = s.rigid.velocity + h * weight;
+  Points &y = s.scratch.predicted, &goals = s.scratch.matched;
+  y.resize(x.size());
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const Vec3 faster = v[i] + h * (s.pull()[i] + weight);
+    y[i] = x[i] + h * faster;
+    y[i] += goal.lead * (s.model.any_fixed ? faster : Vec3(faster - falling - turn * (x[i] - s.rigid.centre)));
+  }
+  matchShapes(matchInput(s.model, s.state), y, s.material.mode, actingBeta(s.material.beta, h), s.state.poses, goals,
+              s.counters, s.state.swelling, s.material.plastic());
+  for (std::size_t i = 0; i < x.size(); ++i) s.pull()[i] += goal.gain / (h * h) * (goals[i] - y[i]);
+}
+
+void flowPlastically(Substep& s) {
+  if (!s.material.plastic()) return;
+  const Plasticity& plasticity = s.material.plasticity;
+  if (s.model.cells) s.counters.plastic_flows += flow(plasticity, s.h, nullptr, s.state.cells, s.state.plastic_cells);
+  if (!s.model.cells || !s.material.elastic())
+    s.counters.plastic_flows += flow(plasticity, s.h, &s.model.shape, s.state.poses, s.state.plastic);
+}
+
+// The pull is free of torque where it was computed, but it acts where particles are: what it turns the body by is taken
+// back.
+void move(Substep& s) {
+  Points &x = s.state.positions, &v = s.state.velocities;
+  Mat3 leaked = Mat3::Zero();
+  const Vec3 centre = s.rigid.centre, weight = s.weight();
+  if (!s.model.any_fixed) leaked = s.h * turning(s.whole.spinFor(torqueOf(s.model, x, centre, s.pull())));
+  s.scratch.previous.resize(x.size());
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const Vec3 at = x[i], faster = v[i] + s.h * (s.pull()[i] + weight) - leaked * (at - centre);
+    s.scratch.previous[i] = at;
+    v[i] = faster;
+    x[i] = at + s.h * faster;
+  }
+}
+
+void hold(Substep& s) {
+  Points& x = s.state.positions;
+  if (s.model.any_fixed)
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      if (!s.model.fixed[i]) continue;
+      s.state.velocities[i].setZero();
+      x[i] = s.scratch.previous[i];
+    }
+  if (!s.model.clamp) return;
+  // As stiff as ever, whatever the body's stretch and substep: springs that stiffen and soften in turns give energy.
+  const double part = s.h * kMargin * s.model.highest_frequency / kMostGain;
+  s.scratch.clamp.hold(s.model.clamp, part > 0.0 ? part * part : 1.0, s.model.rest, s.state.placed, x);
+}
+
+}  // namespace
+
 void matchAndMove(const BodyModel& model, const Material& material, const Vec3& gravity, double h, BodyState& state,
                   StepScratch& scratch, MatchCounters& counters, const ForEach& for_each) {
-  Points& x = state.positions;
-  Points& v = state.velocities;
-  const std::size_t n = x.size();
-  const double factor = stiffnessFactor(model, state, h);
-  const double stiffened = state.stiffened;
-  const double ahead = material.elastic() ? viscosityTime(model, state, h) : viscosityTime(material.alpha, h);
-  // What vibrates is given at most half of that share of its energy by becoming stiffer.
-  const double damped = std::exp(-h * (material.damping + (stiffened < 1.0 ? 2.0 * kStiffening : 0.0)));
-  state.stiffened = std::min(1.0, stiffened * std::exp(kStiffening * h));
-  double kept = damped;
-  if (material.elastic()) {
-    // Where what deforms is slowed otherwise than before, its energy stays, and so do velocities over the pace.
-    const double pace = std::sqrt(factor);
-    if (state.pace > 0.0) kept *= pace / state.pace;
-    state.pace = pace;
-  }
-
-  // Damping comes before the pull: after it, it would weaken the material. A body that is held has no rigid motion of
-  // its own. One that lies on something kneads its tissue where it rolls or rocks: about that place.
-  const Whole whole = model.any_fixed ? Whole() : Whole(model, x, v);
-  RigidMotion rigid = whole.rigid;
-  const double spin_kept = scratch.load > 0.0 ? damped : 1.0;
-  const Mat3 turn = turning(rigid.spin);
-  if (scratch.load > 0.0) rigid.velocity -= (1.0 - spin_kept) * rollingOf(rigid, scratch.load_at);
-  const Mat3 undamped = (spin_kept - kept) * turn;
-  const Vec3 drift = rigid.velocity - kept * whole.rigid.velocity;
-  Points& y = scratch.predicted;
-  y.resize(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const Vec3 kept_v = kept * v[i] + drift + undamped * (x[i] - rigid.centre);
-    v[i] = kept_v;
-    y[i] = x[i] + ahead * kept_v;
-  }
-  // How far ahead what deforms is decides on the viscosity, and must not change how a body spins.
-  if (!material.elastic())
-    for (std::size_t i = 0; i < n; ++i)
-      y[i] += (h - ahead) * (rigid.velocity + spin_kept * (turn * (x[i] - rigid.centre)));
-
-  const MatchInput input = matchInput(model, state);
-  Points& pull = scratch.goals;  // [m/s^2]
-  const double gain = material.elastic() ? 0.0 : stiffened * stiffnessGain(material.alpha, h);
-  if (material.elastic()) {
-    const ElasticParameters parameters =
-        elasticParameters(factor * stiffened * material.youngs_modulus, material.poissons_ratio, material.density);
-    if (material.plastic() || !state.plastic.empty()) {
-      state.stretch = model.cells ? elasticAccelerations(*model.cells, parameters, y, state.poses, pull, counters,
-                                                         state.swelling, &state.plastic)
-                                  : elasticAccelerations(input, model.elastic, parameters, y, state.poses, pull,
-                                                         counters, state.swelling);
-    } else {
-      if (!scratch.under_way) model.elastic_batch->setRotations(state.poses, scratch.elastic);
-      state.stretch = model.elastic_batch->accelerate(input, parameters, y, scratch.elastic, pull, counters,
-                                                      state.swelling, widestInstructionSet(), for_each);
-      if (scratch.last) model.elastic_batch->getRotations(scratch.elastic, state.poses);
-    }
-  } else if (gain > 0.0) {
-    matchShapes(input, y, material.mode, actingBeta(material.beta, h), state.poses, pull, counters, state.swelling,
-                material.plastic());
-    for (std::size_t i = 0; i < n; ++i) pull[i] = gain / (h * h) * (pull[i] - y[i]);
-  } else {
-    pull.assign(n, Vec3::Zero());
-  }
-  const double share = easedShare(state.eased_for);
-  const auto ease = [&] {
-    for (std::size_t i = 0; i < state.eased.size(); ++i) pull[i] += share * state.eased[i];
-  };
-  if (!state.eased_whole) ease();
-  // The pull is free of torque about y, but it acts on x: what it turns the body by is taken back.
-  Mat3 leaked = Mat3::Zero();
-  if (!model.any_fixed) leaked = h * turning(whole.spinFor(torqueOf(model, x, rigid.centre, pull)));
-  if (state.eased_whole) ease();
-  if (!state.eased.empty()) {
-    state.eased_for += h;
-    if (!(easedShare(state.eased_for) > 0.0)) state.eased.clear();
-  }
-  if (material.plastic() && (material.elastic() || gain > 0.0))
-    counters.plastic_flows += flow(input, material.plasticity, h, state.poses, state.plastic);
-
-  // Of a body that is held gravity has nothing to move but what deforms.
-  const Vec3 weight = (model.isHeld() ? factor : 1.0) * gravity;
-  scratch.under_way = !scratch.last;
-  scratch.previous.resize(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const Vec3 at = x[i], faster = v[i] + h * (pull[i] + weight) - leaked * (at - rigid.centre);
-    scratch.previous[i] = at;
-    v[i] = faster;
-    x[i] = at + h * faster;
-  }
-  if (!state.cavities.empty()) pressCavities(model, factor, h, state, scratch);
-  if (model.any_fixed)
-    for (std::size_t i = 0; i < n; ++i) {
-      if (!model.fixed[i]) continue;
-      v[i].setZero();
-      x[i] = scratch.previous[i];
-    }
-  if (model.clamp) {
-    // As stiff as ever, whatever the body's stretch and substep: springs that stiffen and soften in turns give energy.
-    const double part = h * kMargin * model.highest_frequency / kMostGain;
-    scratch.clamp.hold(model.clamp, part > 0.0 ? part * part : 1.0, model.rest, state.placed, x);
-  }
+  Substep substep{model, material, gravity, h, state, scratch, counters, for_each};
+  substep.factor = stiffnessFactor(model, state, h);
+  becomeStiffer(substep);
+  damp(substep);
+  stress(substep);
+  match(substep);
+  flowPlastically(substep);
+  move(substep);
+  if (!state.cavities.empty()) pressCavities(model, substep.factor, h, state, scratch);
+  hold(substep);
 }
 
 void velocitiesFromPositions(double h, BodyState& state, const StepScratch& scratch) {

@@ -96,17 +96,7 @@ void makeParticlesOfCells(BodyModel& model) {
   model.rest = cornerPlaces(lattice);
   model.masses.assign(lattice.corners, 0.0);
   model.tissue = cornersWithTissue(lattice);
-  ClusterSet& clusters = model.clusters;
-  clusters = ClusterSet();
-  clusters.offsets.push_back(0);
-  for (const LatticeCell& cell : lattice.cells) {
-    addMass(model, cell, model.masses);
-    clusters.members.insert(clusters.members.end(), cell.corners.begin(), cell.corners.end());
-    clusters.offsets.push_back(static_cast<Index>(clusters.members.size()));
-    clusters.seeds.push_back(cell.corners[0]);
-    clusters.radii.push_back(1.01 * std::sqrt(3.0) * lattice.spacing);
-  }
-  clusters.weights.assign(clusters.members.size(), 0.0);
+  for (const LatticeCell& cell : lattice.cells) addMass(model, cell, model.masses);
   model.graph = alongEdges(lattice, model.rest);
 }
 
@@ -117,35 +107,14 @@ void holdCorners(BodyModel& model) {
       for (const Index corner : cell.corners) model.fixed[corner] = model.any_fixed = true;
 }
 
-void weighCells(BodyModel& model, bool elastic) {
-  const CellLattice& lattice = *model.lattice;
-  ClusterSet& clusters = model.clusters;
-  std::vector<double> sum(lattice.corners, 0.0);
-  for (std::size_t c = 0; c < lattice.cells.size(); ++c) {
-    const LatticeCell& cell = lattice.cells[c];
-    const FilledMoments moments = momentsOf(cell.filled);
-    const double mass = model.cell_mass * cell.stiffness_share * (elastic ? cell.resists.fraction : moments.fraction);
-    const Vec3 at = 0.5 * (centroidOf(cell.resists) + Vec3::Ones());
-    for (int k = 0; k < 8; ++k) {
-      double& weight = clusters.weights[8 * c + static_cast<std::size_t>(k)];
-      weight = mass * (elastic ? trilinearWeight(k, at) : moments.corner_shares[k]);
-      sum[cell.corners[k]] += weight;
-    }
-  }
-  for (std::size_t m = 0; m < clusters.members.size(); ++m)
-    clusters.weights[m] /= elastic ? model.masses[clusters.members[m]] : sum[clusters.members[m]];
-}
-
 ElasticCells elasticCellsOf(const BodyModel& model) {
   const CellLattice& lattice = *model.lattice;
   ElasticCells elastic;
   elastic.half_edge = 0.5 * lattice.spacing;
-  elastic.masses = model.match_masses;
-  for (std::size_t c = 0; c < lattice.cells.size(); ++c) {
-    const Resistance& resists = lattice.cells[c].resists;
-    elastic.cells.push_back({lattice.cells[c].corners, model.shape.clusters[c].mass, centroidOf(resists),
-                             varianceOf(resists), mixOf(model, lattice.cells[c])});
-  }
+  elastic.masses = model.masses;
+  for (const LatticeCell& cell : lattice.cells)
+    elastic.cells.push_back({cell.corners, model.cell_mass * cell.stiffness_share * cell.resists.fraction,
+                             centroidOf(cell.resists), varianceOf(cell.resists), mixOf(model, cell)});
   return elastic;
 }
 

@@ -12,6 +12,10 @@ std::shared_ptr<BodyModel> beginPiece(const BodyModel& parent, const TriangleMes
   piece->solid = true;
   piece->spacing = parent.spacing;
   piece->own = parent.own;
+  piece->grouping = parent.grouping;
+  piece->length = parent.length;
+  piece->specific_stiffness = parent.specific_stiffness;
+  piece->poissons_ratio = parent.poissons_ratio;
   piece->texture = parent.texture;
   piece->next_patch = parent.next_patch + 1;
   piece->incised = parent.incised || incised;

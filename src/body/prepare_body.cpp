@@ -1,4 +1,4 @@
-// From what a user chose to particles, masses, graph, clusters and binding.
+// From what a user chose to particles, masses, tissue and binding.
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
@@ -17,7 +17,6 @@
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/geometry/query/nearest.h"
 #include "meshless_surgery/geometry/mesh/refine.h"
-#include "meshless_surgery/geometry/mesh/sampling.h"
 #include "meshless_surgery/geometry/mesh/thicken.h"
 #include "meshless_surgery/geometry/query/union_find.h"
 
@@ -26,19 +25,17 @@ namespace {
 
 constexpr std::size_t kMaxParticles = 200000;
 constexpr std::size_t kMostRegions = 100;
-constexpr std::size_t kMaxVertexParticles = 6000;  // larger surfaces are embedded, but for a subset at the spacing
-constexpr double kAutoParticles = 2500.0;          // interior particles aimed at where no spacing is given
-constexpr double kAutoCells = 1600.0;              // of a lattice, likewise, at most
-// [1/s] Of an elastic body: its cells times how often a pressure wave crosses one in a second. A cell takes about two
+constexpr double kAutoCells = 1600.0;              // aimed at where no spacing is given, at most
+// [1/s] Of a solid: its cells times how often a pressure wave crosses one in a second. A cell takes about two
 // substeps for each crossing, and each of them a tenth of a microsecond: a twentieth of one thread's time.
 constexpr double kCrossings = 4e5;
 constexpr double kThinnest = 0.75;                  // of a body's mean thickness: its cells are no wider
+constexpr double kCoarsest = 1.5;                   // of it, where a surface is coarse: a cube has two cells a side
+constexpr double kFinest = 0.1;                     // of the spacing that was wanted
 constexpr double kWidestLayer = 3.5;                // thicknesses: samples of wider cells would miss a layer
 constexpr double kFlat = 0.98;                      // of alongAxes(): a layer that lies along its lattice
 constexpr double kSlanted = 1.5;                    // by statics of layers at 45 degrees, 0.5 to 4 cells wide
 constexpr double kResolutionStep = 1.5;             // of the spacing, from one resolution to the next
-constexpr double kReach = 1.75;                     // of the spacing: how far neighbours along the body may be
-constexpr std::size_t kMostLinks = 40;              // of the nearest: vertices finer than the spacing have thousands
 constexpr double kLeastMassShare = 0.1;             // of the mean: no particle is so light that contacts throw it
 constexpr double kSmallest = 1e-3, kLargest = 2.0;  // [m] of organs
 constexpr double kUsual = 2e-2;                     // [m] the least that a scale is proposed for
@@ -93,12 +90,8 @@ Status validate(const BodyDef& def) {
       return invalid(which + " is of the appearance material '" + material.name +
                      "'; accepted: elastic materials, with a youngs_modulus");
   }
-  if (!def.regions.empty() &&
-      !(def.solid && def.material.elastic() &&
-        (def.clusters.kind == ClusterOptions::Kind::kCells || def.clusters.kind == ClusterOptions::Kind::kAuto)))
-    return invalid("body '" + def.name +
-                   "' has regions; accepted: those of a closed body of an elastic material, with " +
-                   "clusters: auto or cells");
+  if (!def.regions.empty() && !(def.solid && def.material.elastic()))
+    return invalid("body '" + def.name + "' has regions; accepted: those of a closed body of an elastic material");
   if (const Status valid = def.cavities.validate(); !valid)
     return invalid("body '" + def.name + "': " + valid.error().detail);
   return def.material.validate();
@@ -136,78 +129,38 @@ void warnOfSlantedLayer(BodyDef& def, const BodyModel& model) {
 }
 
 // [m/s]
-double pressureWaveSpeed(const Material& material) {
-  const ElasticParameters p = elasticParameters(material.youngs_modulus, material.poissons_ratio, material.density);
-  return std::sqrt((p.lambda + 2.0 * p.mu) / p.density);
-}
+double pressureWaveSpeed(const ElasticParameters& p) { return std::sqrt((p.lambda + 2.0 * p.mu) / p.density); }
 
-// [m] Of an elastic body by what a simulated second of it costs, but finer where it is thin and kAutoCells allow it.
-double chooseSpacing(const BodyDef& def, bool cells, double edge, double volume, double area) {
-  double spacing = cells ? std::cbrt(volume / kAutoCells) : std::max(1.2 * edge, std::cbrt(volume / kAutoParticles));
-  if (cells && def.material.elastic()) {
-    double speed = pressureWaveSpeed(def.material);
-    for (const TissueRegion& region : def.regions) speed = std::max(speed, pressureWaveSpeed(region.material));
-    const double affordable = std::pow(volume * speed / kCrossings, 0.25), thickness = 2.0 * volume / area;
-    spacing = std::max(spacing, std::min(affordable, kThinnest * thickness));
-    // A layer that is thinner than its cells has one of them across.
-    if (affordable > def.thickness && def.thickness > 0.0)
-      spacing = std::cbrt(volume / def.thickness * speed / kCrossings);
-  }
+// [m] By what a simulated second of it costs, but finer where it is thin and kAutoCells allow it. One of an appearance
+// material needs no more cells than its surface has vertices.
+double chooseSpacing(const BodyDef& def, double length, double volume, double area, double edge) {
+  double speed = pressureWaveSpeed(elasticityOf(def.material, length));
+  for (const TissueRegion& region : def.regions)
+    speed = std::max(speed, pressureWaveSpeed(elasticityOf(region.material, length)));
+  const double affordable = std::pow(volume * speed / kCrossings, 0.25), thickness = 2.0 * volume / area;
+  double spacing = std::max(std::cbrt(volume / kAutoCells), std::min(affordable, kThinnest * thickness));
+  if (!def.material.elastic()) spacing = std::max(spacing, std::min(edge, kCoarsest * thickness));
+  // A layer that is thinner than its cells has one of them across.
+  if (affordable > def.thickness && def.thickness > 0.0)
+    spacing = std::cbrt(volume / def.thickness * speed / kCrossings);
   spacing *= std::pow(kResolutionStep, 1 - static_cast<int>(def.resolution));
   return def.thickness > 0.0 ? std::min(spacing, kWidestLayer * def.thickness) : spacing;
 }
 
-// Vertices that become particles: all, or for fine surfaces a subset about `spacing` apart.
-std::vector<Index> chooseVertexParticles(const Points& vertices, double spacing) {
-  std::vector<Index> particle(vertices.size(), kNoIndex);
-  Index next = 0;
-  if (vertices.size() <= kMaxVertexParticles) {
-    for (Index& p : particle) p = next++;
-    return particle;
-  }
-  const NearestPoints nearest(vertices);
-  const double apart = 0.8 * spacing;
-  std::vector<bool> shadowed(vertices.size(), false);
-  for (Index v = 0; v < vertices.size(); ++v) {
-    if (shadowed[v]) continue;
-    particle[v] = next++;
-    for (Index w : nearest.within(vertices[v], apart)) shadowed[w] = true;
-  }
-  return particle;
-}
-
-ParticleGraph linkParticles(const Points& rest, const TriangleMesh& mesh, const std::vector<Index>& vertex_particle,
-                            double reach, const SolidQuery* solid) {
+ParticleGraph linkVertices(const Points& rest, const TriangleMesh& mesh) {
   std::vector<std::array<Index, 2>> edges;
+  std::vector<bool> linked(rest.size(), false);
   for (const Triangle& t : mesh.triangles)
     for (int k = 0; k < 3; ++k) {
-      const Index a = vertex_particle[t[k]], b = vertex_particle[t[(k + 1) % 3]];
-      if (a != kNoIndex && b != kNoIndex) edges.push_back({std::min(a, b), std::max(a, b)});
+      edges.push_back({t[k], t[(k + 1) % 3]});
+      linked[t[k]] = true;
     }
-  const auto tidy = [](std::vector<std::array<Index, 2>>& pairs) {
-    std::sort(pairs.begin(), pairs.end());
-    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-  };
-  tidy(edges);
+  // A vertex on its own holds to its nearest neighbour.
   const NearestPoints nearest(rest);
-  if (solid) {
-    std::vector<std::array<Index, 2>> near, inner;
-    for (Index i = 0; i < rest.size(); ++i)
-      for (Index j : nearest.nearest(rest[i], kMostLinks + 1))
-        if (j != i && (rest[j] - rest[i]).norm() <= reach) near.push_back({std::min(i, j), std::max(i, j)});
-    tidy(near);
-    std::set_difference(near.begin(), near.end(), edges.begin(), edges.end(), std::back_inserter(inner));
-    for (const auto& [i, j] : inner)  // through the air is not along the body
-      if (solid->contains(0.5 * (rest[i] + rest[j])) && !solid->crosses(rest[i], rest[j])) edges.push_back({i, j});
-  }
-  std::vector<bool> linked(rest.size(), false);
-  for (const auto& [i, j] : edges) linked[i] = linked[j] = true;
-  // A particle on its own (a thin or coarse spot) holds to its nearest neighbour.
   for (Index i = 0; i < rest.size() && rest.size() > 1; ++i)
     if (!linked[i]) {
       const std::vector<Index> two = nearest.nearest(rest[i], 2);
-      const Index j = two[0] == i ? two[1] : two[0];
-      edges.push_back({std::min(i, j), std::max(i, j)});
+      edges.push_back({i, two[0] == i ? two[1] : two[0]});
     }
   return makeGraph(rest, std::move(edges));
 }
@@ -223,23 +176,14 @@ void giveToNearest(const NearestPoints& nearest, const Points& rest, const Vec3&
   for (std::size_t k = 0; k < equal; ++k) share[near[k]] += amount / static_cast<double>(equal);
 }
 
-// Each particle gets the mass of what is nearest to it.
-std::vector<double> shareMass(const BodyDef& def, const TriangleMesh& mesh, const SolidQuery* solid, const Points& rest,
-                              double volume, double spacing) {
+// Each particle gets the mass of what is nearest to it: an open surface is a shell as thick as its spacing.
+std::vector<double> shareMass(const BodyDef& def, const TriangleMesh& mesh, const Points& rest, double spacing) {
   std::vector<double> share(rest.size(), 0.0);
   const NearestPoints nearest(rest);
-  double total = def.material.density * volume;
-  if (solid) {
-    // A third of the spacing: samples half way between two particles would all fall to the same one. A little less, so
-    // that a layer in the faces of a box is inside of all of them, and not of some by rounding.
-    const LatticeSample lattice = sampleInterior(mesh, *solid, (1.0 - 1e-9) * spacing / 3.0, 0.0, kMaxParticles);
-    for (const Vec3& p : lattice.points) giveToNearest(nearest, rest, p, 1.0, share);
-  } else {  // an open surface is a shell as thick as its spacing
-    total = def.material.density * surfaceArea(mesh) * spacing;
-    for (const Triangle& t : mesh.triangles) {
-      const Vec3 &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
-      giveToNearest(nearest, rest, (a + b + c) / 3.0, (b - a).cross(c - a).norm(), share);
-    }
+  const double total = def.material.density * surfaceArea(mesh) * spacing;
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3 &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+    giveToNearest(nearest, rest, (a + b + c) / 3.0, (b - a).cross(c - a).norm(), share);
   }
   double sum = 0.0;
   for (double s : share) sum += s;
@@ -257,23 +201,15 @@ std::vector<double> shareMass(const BodyDef& def, const TriangleMesh& mesh, cons
 
 namespace {
 
-// The particles of a surface and of the space in it.
-Status makeParticles(const BodyDef& def, const SolidQuery* solid, BodyModel& model,
-                     std::vector<Index>& vertex_particle) {
-  const TriangleMesh& surface = model.surface;
-  vertex_particle = chooseVertexParticles(surface.vertices, model.spacing);
-  for (std::size_t v = 0; v < surface.vertices.size(); ++v)
-    if (vertex_particle[v] != kNoIndex) model.rest.push_back(surface.vertices[v]);
-  if (solid) {
-    const LatticeSample inner = sampleInterior(surface, *solid, model.spacing, 0.5 * model.spacing * (1.0 - 1e-9));
-    model.rest.insert(model.rest.end(), inner.points.begin(), inner.points.end());
-  }
+// The particles of an open surface: its vertices.
+Status makeSheet(const BodyDef& def, BodyModel& model) {
+  model.rest = model.surface.vertices;
   if (model.rest.size() > kMaxParticles)
     return invalid("body '" + def.name + "' has " + std::to_string(model.rest.size()) + " particles; accepted: up to " +
                    std::to_string(kMaxParticles));
-  model.masses = shareMass(def, surface, solid, model.rest, model.rest_volume, model.spacing);
-  model.graph = linkParticles(model.rest, surface, vertex_particle, kReach * model.spacing, solid);
-  model.clusters = makeClusters(model.rest, model.graph, def.clusters);
+  model.masses = shareMass(def, model.surface, model.rest, model.spacing);
+  model.graph = linkVertices(model.rest, model.surface);
+  model.binding = ownVertices(static_cast<Index>(model.rest.size()));
   return Done{};
 }
 
@@ -320,13 +256,12 @@ Status findRegions(const BodyDef& def, const Pose& placed, const Pose& pose, Cel
 
 // The corners of the lattice cells that the solid meets; the whole surface is embedded in them.
 Status makeLatticeParticles(const BodyDef& def, const SolidQuery& solid, const Pose& placed, const Pose& pose,
-                            BodyModel& model, std::vector<Index>& vertex_particle) {
+                            BodyModel& model) {
   Result<CellLattice> lattice = divideIntoCells(model.surface, solid, model.spacing);
   if (!lattice) return Error{lattice.error().code, "body '" + def.name + "': " + lattice.error().detail};
   if (lattice->corners > kMaxParticles)
     return invalid("body '" + def.name + "' has " + std::to_string(lattice->corners) + " particles; accepted: up to " +
                    std::to_string(kMaxParticles));
-  vertex_particle.assign(model.surface.vertices.size(), kNoIndex);
   double filled = 0.0;
   for (const LatticeCell& cell : lattice->cells) filled += momentsOf(cell.filled).fraction;
   model.cell_mass = def.material.density * model.rest_volume / filled;
@@ -430,7 +365,7 @@ Status makeCollision(BodyDef& def, BodyModel& model) {
 }
 
 /// Which cavities it has is said where they are empty, and marked in its surface where they are to be filled.
-Status findCavities(BodyDef& def, bool cells, TriangleMesh& surface) {
+Status findCavities(BodyDef& def, TriangleMesh& surface) {
   TriangleMesh marked;
   marked.vertices = surface.vertices;
   marked.triangles = surface.triangles;
@@ -450,19 +385,16 @@ Status findCavities(BodyDef& def, bool cells, TriangleMesh& surface) {
     return Error{ErrorCode::kUnsuitableShape,
                  "body '" + def.name + "': cavities are to be filled, and it has none; accepted: a closed surface " +
                      "with another one inside of it"};
-  if (!cells)
-    return invalid("body '" + def.name + "': cavities are to be filled; accepted: those of an elastic material, or " +
-                   "with clusters: cells");
   surface.patches = std::move(marked.patches);
   return Done{};
 }
 
-/// Which parts it has that no cluster, cell or clamp joins; empty where it is one.
+/// Which parts it has that no link and no clamp joins; empty where it is one.
 std::string partsWarning(const BodyModel& model, const Pose& placed) {
   UnionFind joined(model.rest.size());
-  for (Index c = 0; c < model.clusters.size(); ++c)
-    for (Index m = model.clusters.offsets[c]; m < model.clusters.offsets[c + 1]; ++m)
-      joined.join(model.clusters.members[model.clusters.offsets[c]], model.clusters.members[m]);
+  for (Index i = 0; i < model.graph.size(); ++i)
+    for (Index k = model.graph.offsets[i]; k < model.graph.offsets[i + 1]; ++k)
+      joined.join(i, model.graph.neighbours[k]);
   // What is held hangs on what holds it, and free cells on the held ones that they border on.
   Index held = kNoIndex;
   const auto hold = [&](Index particle) {
@@ -509,6 +441,36 @@ std::string sizeWarning(const Points& vertices) {
   return text.str();
 }
 
+// Cells, particles and binding. What is thinner than the samples of its cells gets finer ones.
+Status makeSolid(BodyDef& def, const Pose& placed, const Pose& pose, BodyModel& model) {
+  const SolidQuery solid(model.surface);
+  const double wanted = model.spacing;
+  Status first = Done{};
+  for (;;) {
+    BodyModel made = model;
+    Status status = makeLatticeParticles(def, solid, placed, pose, made);
+    if (status) {
+      // What touches a face between its corners dents it there.
+      made.surface = withShortEdges(std::move(made.surface), kLongestEdge * made.spacing);
+      status = bindFilled(def, made);
+    }
+    if (!status) {
+      if (first) first = status;
+      if (status.error().code != ErrorCode::kUnsuitableShape || model.spacing < kFinest * wanted) return first;
+      model.spacing *= 0.5;
+      continue;
+    }
+    if (model.spacing < wanted) {
+      std::ostringstream text;
+      text << std::setprecision(3) << "its spacing is " << model.spacing << " m: cells of " << wanted
+           << " m do not see what is thin of it";
+      def.warnings.push_back(text.str());
+    }
+    model = std::move(made);
+    return Done{};
+  }
+}
+
 Result<PreparedBody> prepared(BodyDef def) {
   if (Status made = makeLayer(def); !made) return made.error();
   if (Status status = validate(def); !status) return status.error();
@@ -518,11 +480,9 @@ Result<PreparedBody> prepared(BodyDef def) {
   def.mesh = TriangleMesh();
   model->texture = std::move(def.texture);
   const Pose pose{def.pose.rotation.normalized(), def.pose.translation};
-  const bool cells = def.solid && (def.clusters.kind == ClusterOptions::Kind::kCells ||
-                                   (def.clusters.kind == ClusterOptions::Kind::kAuto && def.material.elastic()));
   // A lattice lies along the body's own axes, so that turning the body turns all that is made of it.
   Pose placed;
-  if (cells) {
+  if (def.solid) {
     const Mat3 axes = mainAxes(surface);
     for (Vec3& v : surface.vertices) v = axes.transpose() * v;
     placed = {pose.rotation * Quat(axes), pose.translation};
@@ -546,13 +506,19 @@ Result<PreparedBody> prepared(BodyDef def) {
          << "diagonal cubed";
     return Error{ErrorCode::kUnsuitableShape, text.str()};
   }
-  if (const Status found = findCavities(def, cells, surface); !found) return found.error();
+  if (const Status found = findCavities(def, surface); !found) return found.error();
+  if (def.solid && def.material.elastic() && def.clusters.kind != ClusterOptions::Kind::kAuto &&
+      def.clusters.kind != ClusterOptions::Kind::kCells)
+    def.warnings.push_back("its clusters are for appearance materials: '" + def.material.name +
+                           "' is elastic, and has none");
   model->solid = def.solid;
+  model->grouping = def.clusters;
+  model->length = (bounds.max - bounds.min).maxCoeff();
   model->rest_volume = volume;
   model->rest_area = surfaceArea(surface);
   model->spacing = def.spacing;
   if (!(model->spacing > 0.0)) {
-    model->spacing = def.solid ? chooseSpacing(def, cells, edge, volume, model->rest_area) : edge;
+    model->spacing = def.solid ? chooseSpacing(def, model->length, volume, model->rest_area, edge) : edge;
     warnOfSlantedLayer(def, *model);
   }
   if (def.solid && volume / std::pow(model->spacing, 3.0) > static_cast<double>(kMaxParticles)) {
@@ -567,28 +533,18 @@ Result<PreparedBody> prepared(BodyDef def) {
     return invalid(text.str());
   }
 
-  std::unique_ptr<SolidQuery> solid;
-  if (def.solid) solid = std::make_unique<SolidQuery>(surface);
-  std::vector<Index> vertex_particle;
-  if (Status made = cells ? makeLatticeParticles(def, *solid, placed, pose, *model, vertex_particle)
-                          : makeParticles(def, solid.get(), *model, vertex_particle);
-      !made)
+  if (Status made = def.solid ? makeSolid(def, placed, pose, *model) : makeSheet(def, *model); !made)
     return made.error();
 
   for (double m : model->masses) model->mass += m;
   if (!model->lattice) holdParticles(def.fixed, pose, *model);
   if (Status holds = checkHeld(def, placed, pose, *model); !holds) return holds.error();
-  makeMoments(*model, def.material);
+  makeTissue(*model, def.material);
   if (model->lattice) {
-    // What touches a face between its corners dents it there.
-    surface = withShortEdges(std::move(surface), kLongestEdge * model->spacing);
-    if (Status bound = bindFilled(def, *model); !bound) return bound.error();
     if (Status made = makeCollision(def, *model); !made) return made.error();
   } else {
     if (def.collision.kind == CollisionChoice::Kind::kEdge)
-      def.warnings.push_back("contact takes the visual surface: collision is of bodies of cells");
-    model->binding =
-        bindSurface(model->rest, model->graph, model->clusters, surface.vertices, std::move(vertex_particle));
+      def.warnings.push_back("contact takes the visual surface: collision is of solids");
   }
 
   if (const std::string warning = partsWarning(*model, placed); !warning.empty()) def.warnings.push_back(warning);
@@ -623,13 +579,8 @@ Result<PreparedBody> prepared(BodyDef def) {
   }
 
   PreparedBody body;
-  body.state.placed = placed;
-  for (const Vec3& p : model->rest) body.state.positions.push_back(placed * p);
-  body.state.velocities.assign(model->rest.size(), Vec3::Zero());
-  body.state.poses.resize(model->clusters.size());
-  for (ClusterPose& cluster : body.state.poses) cluster.rotation = placed.rotation;
+  body.state = restState(*model, placed);
   body.state.cavities = std::move(*filled);
-  updateSurface(*model, body.state);
   body.def = std::move(def);
   body.model = std::move(model);
   return body;
@@ -652,13 +603,9 @@ PreparedBody placedCopy(const PreparedBody& body, std::string name, const Pose& 
   copy.def.pose = pose;
   const Quat turn = pose.rotation.normalized() * body.def.pose.rotation.normalized().conjugate();
   const Pose motion{turn, pose.translation - turn * body.def.pose.translation};
-  for (Vec3& p : copy.state.positions) p = motion * p;
-  copy.state.placed = {(turn * body.state.placed.rotation).normalized(), motion * body.state.placed.translation};
-  for (ClusterPose& cluster : copy.state.poses) {
-    cluster.centre = motion * cluster.centre;
-    cluster.rotation = turn * cluster.rotation;
-  }
-  updateSurface(*copy.model, copy.state);
+  copy.state = restState(*copy.model, {(turn * body.state.placed.rotation).normalized(),
+                                       motion * body.state.placed.translation});
+  copy.state.cavities = body.state.cavities;
   return copy;
 }
 

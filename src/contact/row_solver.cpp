@@ -5,8 +5,6 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "meshless_surgery/base/compressed_rows.h"
-
 namespace meshless {
 namespace {
 
@@ -93,7 +91,6 @@ class Solver {
   Solver(std::vector<SolverBody>& bodies, SolverScratch& scratch) : bodies_(bodies), scratch_(scratch) {
     scratch_.active.clear();
     scratch_.pulls.clear();
-    scratch_.levers.clear();
   }
 
   /// [m] of coefficient x, at the start of the substep or now.
@@ -104,19 +101,18 @@ class Solver {
                 sumOf(middle, entries + of.row->end, before ? b.before : b.now));
   }
 
-  /// [m] by what groups have moved.
+  /// [m] by what its bodies have moved as a whole.
   Vec3 moved(const Active& active) const {
-    return leversMoved(bodies_[active.a], active.levers, active.middle) +
-           leversMoved(bodies_[active.b], active.middle, active.end);
+    return moved(bodies_[active.a], active.on_a) + moved(bodies_[active.b], active.on_b);
   }
 
   /// Whether its bodies can answer a row.
   bool meet(Active& active) {
     const ContactRow& row = *active.row;
     const RowEntry* const entries = active.entries;
-    double answer = 0.0, farthest = 0.0;  // [1/kg]
-    const auto add = [&](SolverBody& body, Index begin, Index end) {
-      addLevers(body, [&](const auto& visit) {
+    double answer = 0.0, across = 0.0, farthest = 0.0;  // [1/kg]
+    const auto leverOf = [&](SolverBody& body, Index begin, Index end) {
+      const Lever lever = leverOn(body, [&](const auto& visit) {
         for (Index k = begin; k < end; ++k) visit(entries[k].particle, entries[k].coefficient);
       });
       double own = 0.0, most = 0.0;
@@ -125,29 +121,21 @@ class Solver {
         own += entries[k].coefficient * way;
         most = std::max(most, std::abs(way));
       }
-      answer += (1.0 - body.rigid_share) * own;
+      own *= 1.0 - body.rigid_share;
       farthest = std::max(farthest, (1.0 - body.rigid_share) * most);
-      return static_cast<Index>(scratch_.levers.size());
-    };
-    active.levers = static_cast<Index>(scratch_.levers.size());
-    active.middle = add(bodies_[active.a], row.begin, row.middle);
-    active.end = add(bodies_[active.b], row.middle, row.end);
-    double across = answer;
-    for (Index k = active.levers; k < active.end; ++k) {
-      const Lever& lever = scratch_.levers[k];
-      const SolverBody& body = bodies_[k < active.middle ? active.a : active.b];
-      const GroupMotion& motion = body.motions[lever.group];
-      const double straight = lever.share * lever.share * motion.inverse_mass;
+      const WholeMotion& whole = body.whole;
+      const double straight = lever.share * lever.share * whole.inverse_mass;
       const Vec3 about = lever.arm.cross(row.normal);
-      answer += straight + about.dot(motion.inverse_inertia * about);
+      answer += own + straight + about.dot(whole.inverse_inertia * about);
       // Of all directions together: none across answers more.
-      across += straight + lever.arm.squaredNorm() * motion.inverse_inertia.trace();
-    }
+      across += own + straight + lever.arm.squaredNorm() * whole.inverse_inertia.trace();
+      return lever;
+    };
+    active.on_a = leverOf(bodies_[active.a], row.begin, row.middle);
+    active.on_b = leverOf(bodies_[active.b], row.middle, row.end);
     active.mass = 1.0 / answer;
     active.sideways = 1.0 / across;
-    if (canAnswer(answer, farthest)) return true;
-    scratch_.levers.resize(active.levers);
-    return false;
+    return canAnswer(answer, farthest);
   }
 
   void activate(Active active, const Vec3& way, const SolverStep& step) {
@@ -185,15 +173,14 @@ class Solver {
       push(active, more);
       pushParticles(active, more, &SolverBody::before);
     }
-    moveGroups(sets, true);
+    moveWhole(sets, true);
     scratch_.active.clear();
-    scratch_.levers.clear();
   }
 
   void push(const Active& active, const Vec3& impulse) {
     pushParticles(active, impulse, &SolverBody::now);
-    pushLevers(bodies_[active.a], active.levers, active.middle, impulse);
-    pushLevers(bodies_[active.b], active.middle, active.end, impulse);
+    push(bodies_[active.a], active.on_a, impulse);
+    push(bodies_[active.b], active.on_b, impulse);
   }
 
   /// The last impulse, as far as it presses along the normal of now.
@@ -239,7 +226,7 @@ class Solver {
     if (fibre.b != kNoIndex)
       addPull(fibre.b, fibre.at_b->particles, fibre.at_b->weights, !within);
     else
-      scratch_.pulls.push_back({Mat3::Zero(), 0, 0});
+      scratch_.pulls.emplace_back();
     if (within) scratch_.pulls.back().answer -= 2.0 * sharedAnswer(fibre) * Mat3::Identity();
     // Kelvin and Voigt: tension = stiffness (stretch + lag * its rate), where it is taut.
     const double lags = kLag / step.h, before = std::max(fibre.rest, spanBefore(fibre).norm());
@@ -262,28 +249,23 @@ class Solver {
     return (1.0 - body.rigid_share) * shared;
   }
 
-  /// How a point answers an impulse: `rigidly` with its body or its groups, too.
+  /// How a point answers an impulse: `rigidly` with its body as a whole, too.
   void addPull(Index of_body, const std::vector<Index>& patch, const std::vector<double>& weights,
                bool rigidly = true) {
     SolverBody& body = bodies_[of_body];
     Pull pull;
-    pull.levers = static_cast<Index>(scratch_.levers.size());
     if (rigidly)
-      addLevers(body, [&](const auto& visit) {
+      pull.lever = leverOn(body, [&](const auto& visit) {
         for (std::size_t k = 0; k < patch.size(); ++k) visit(patch[k], weights[k]);
       });
-    pull.end = static_cast<Index>(scratch_.levers.size());
     double own = 0.0;
     for (std::size_t k = 0; k < patch.size(); ++k) own += weights[k] * weights[k] * body.now[patch[k]].inverse_mass;
     pull.answer = (1.0 - body.rigid_share) * own * Mat3::Identity();
-    for (Index k = pull.levers; k < pull.end; ++k) {
-      const Lever& lever = scratch_.levers[k];
-      const GroupMotion& motion = body.motions[lever.group];
-      Mat3 arm;
-      arm << 0.0, -lever.arm.z(), lever.arm.y(), lever.arm.z(), 0.0, -lever.arm.x(), -lever.arm.y(), lever.arm.x(), 0.0;
-      pull.answer += lever.share * lever.share * motion.inverse_mass * Mat3::Identity() +
-                     arm * motion.inverse_inertia * arm.transpose();
-    }
+    const Lever& lever = pull.lever;
+    Mat3 arm;
+    arm << 0.0, -lever.arm.z(), lever.arm.y(), lever.arm.z(), 0.0, -lever.arm.x(), -lever.arm.y(), lever.arm.x(), 0.0;
+    pull.answer += lever.share * lever.share * body.whole.inverse_mass * Mat3::Identity() +
+                   arm * body.whole.inverse_inertia * arm.transpose();
     scratch_.pulls.push_back(pull);
   }
 
@@ -307,7 +289,7 @@ class Solver {
       const double along = stiff * loose.dot(answer * loose) / (length * length);
       double share = stiff * (length - rest) / (length + along * rest);  // tension over length
       Vec3 span = (Mat3::Identity() + share * answer).inverse() * loose;
-      if (pulls[0].levers < pulls[0].end || pulls[1].levers < pulls[1].end) {
+      if (pulls[0].lever.share != 0.0 || pulls[1].lever.share != 0.0) {
         const double now = span.norm(), answers = span.dot(answer * span) / (now * now);
         const double more = (stiff * (now - rest) - share * now) / (1.0 + stiff * answers);
         const double tension = share * now + more, then = now - answers * more;
@@ -333,25 +315,21 @@ class Solver {
 
   double edgeOf(const Active& of) const { return std::min(bodies_[of.a].edge_length, bodies_[of.b].edge_length); }
 
-  /// What groups of a body have been moved by goes to their particles, and to where those were, if wanted.
-  static void moveGroups(SolverBody& body, bool both) {
-    for (Index g = 0; g < body.motions.size(); ++g) {
-      GroupMotion& motion = body.motions[g];
-      if (!motion.current) continue;
-      motion.current = false;
-      const RigidShift shift(motion.centre, motion.shift, motion.turn);
-      for (Index k = body.groups->offsets[g]; k < body.groups->offsets[g + 1]; ++k) {
-        const Index i = body.groups->members[k];
-        const Four way = body.groups->weights[k] * shift.at(body.before[i]);
-        four(body.now[i]) += way;
-        if (both) four(body.before[i]) += way;
-      }
+  /// What a body has been moved by as a whole goes to its particles, and to where those were, if wanted.
+  static void moveWhole(SolverBody& body, bool both) {
+    if (!body.whole.current) return;
+    body.whole.current = false;
+    const RigidShift shift(body.whole.centre, body.whole.shift, body.whole.turn);
+    for (Index i = 0; i < body.particles; ++i) {
+      const Four way = shift.at(body.before[i]);
+      four(body.now[i]) += way;
+      if (both) four(body.before[i]) += way;
     }
   }
-  void moveGroups(const std::vector<SolverRows>& sets, bool both) {
+  void moveWhole(const std::vector<SolverRows>& sets, bool both) {
     for (const SolverRows& rows : sets)
       for (const Index b : {rows.a, rows.b})
-        if (b != kNoIndex) moveGroups(bodies_[b], both);
+        if (b != kNoIndex) moveWhole(bodies_[b], both);
   }
 
  private:
@@ -365,7 +343,7 @@ class Solver {
   Vec3 placeOf(Index of_body, const std::vector<Index>& patch, const std::vector<double>& weights,
                const Pull& pull) const {
     const SolverBody& body = bodies_[of_body];
-    return meanOf(body.now, patch, weights) + leversMoved(body, pull.levers, pull.end);
+    return meanOf(body.now, patch, weights) + moved(body, pull.lever);
   }
 
   /// [m] from b to a now.
@@ -388,7 +366,7 @@ class Solver {
       Slot& slot = body.now[patch[k]];
       four(slot) += weights[k] * slot.inverse_mass * way;
     }
-    pushLevers(body, pull.levers, pull.end, impulse);
+    push(body, pull.lever, impulse);
   }
 
   void pushParticles(const Active& active, const Vec3& impulse, Slot* SolverBody::*slots) {
@@ -405,59 +383,37 @@ class Solver {
     each(bodies_[active.b], row.middle, row.end);
   }
 
-  static GroupMotion groupAt(const SolverBody& body, Index group) {
-    const RigidGroups& groups = *body.groups;
-    MassMoments moments{body.before[groups.members[groups.offsets[group]]].place()};
-    for (Index k = groups.offsets[group]; k < groups.offsets[group + 1]; ++k) {
-      const Index i = groups.members[k];
-      moments.add(groups.weights[k] * groups.masses[i], body.before[i]);
-    }
-    GroupMotion motion;
-    motion.current = true;
-    motion.inverse_mass = body.rigid_share / moments.mass;
-    motion.centre = moments.centre();
-    motion.inverse_inertia = body.rigid_share * moments.inverseInertia();
-    return motion;
+  static WholeMotion wholeAt(const SolverBody& body) {
+    MassMoments moments{body.before[0].place()};
+    for (Index i = 0; i < body.particles; ++i) moments.add(1.0 / body.before[i].inverse_mass, body.before[i]);
+    WholeMotion whole;
+    whole.current = true;
+    whole.inverse_mass = body.rigid_share / moments.mass;
+    whole.centre = moments.centre();
+    whole.inverse_inertia = body.rigid_share * moments.inverseInertia();
+    return whole;
   }
 
   /// each: calls what it gets with particles and coefficients.
   template <class Each>
-  void addLevers(SolverBody& body, const Each& each) {
-    if (body.motions.empty()) return;
-    const RigidGroups& groups = *body.groups;
-    const std::size_t first = scratch_.levers.size();
+  static Lever leverOn(SolverBody& body, const Each& each) {
+    Lever lever;
+    if (body.held || !(body.rigid_share > 0.0)) return lever;
+    if (!body.whole.current) body.whole = wholeAt(body);
     each([&](Index particle, double coefficient) {
-      for (Index n = groups.of_offsets[particle]; n < groups.of_offsets[particle + 1]; ++n) {
-        const Index member = groups.of_members[n], group = groups.groups[member];
-        GroupMotion& motion = body.motions[group];
-        if (!motion.current) motion = groupAt(body, group);
-        std::size_t place = first;
-        while (place < scratch_.levers.size() && scratch_.levers[place].group != group) ++place;
-        if (place == scratch_.levers.size()) scratch_.levers.push_back({group, 0.0, Vec3::Zero()});
-        const double share = groups.weights[member] * coefficient;
-        scratch_.levers[place].share += share;
-        scratch_.levers[place].arm += share * (body.before[particle].place() - motion.centre);
-      }
+      lever.share += coefficient;
+      lever.arm += coefficient * (body.before[particle].place() - body.whole.centre);
     });
+    return lever;
   }
 
-  Vec3 leversMoved(const SolverBody& body, Index begin, Index end) const {
-    Vec3 total = Vec3::Zero();
-    for (Index k = begin; k < end; ++k) {
-      const Lever& lever = scratch_.levers[k];
-      const GroupMotion& motion = body.motions[lever.group];
-      total += lever.share * motion.shift + motion.turn.cross(lever.arm);
-    }
-    return total;
+  static Vec3 moved(const SolverBody& body, const Lever& lever) {
+    return lever.share * body.whole.shift + body.whole.turn.cross(lever.arm);
   }
 
-  void pushLevers(SolverBody& body, Index begin, Index end, const Vec3& impulse) {
-    for (Index k = begin; k < end; ++k) {
-      const Lever& lever = scratch_.levers[k];
-      GroupMotion& motion = body.motions[lever.group];
-      motion.shift += lever.share * motion.inverse_mass * impulse;
-      motion.turn += motion.inverse_inertia * lever.arm.cross(impulse);
-    }
+  static void push(SolverBody& body, const Lever& lever, const Vec3& impulse) {
+    body.whole.shift += lever.share * body.whole.inverse_mass * impulse;
+    body.whole.turn += body.whole.inverse_inertia * lever.arm.cross(impulse);
   }
 
   std::vector<SolverBody>& bodies_;
@@ -538,11 +494,11 @@ inline void solve(const std::vector<SolverRows>& sets, std::vector<SpringRow>& s
     for (const auto& active : scratch.active) count(solver.visit(active), active.row->impulse);
     if (!(changed > kSolved * kSolved * most)) break;
   }
-  solver.moveGroups(sets, false);
-  for (const SpringRow& spring : springs) Solver::moveGroups(bodies[spring.body], false);
+  solver.moveWhole(sets, false);
+  for (const SpringRow& spring : springs) Solver::moveWhole(bodies[spring.body], false);
   for (const FibreRow& fibre : fibres)
     for (const Index b : {fibre.a, fibre.b})
-      if (b != kNoIndex) Solver::moveGroups(bodies[b], false);
+      if (b != kNoIndex) Solver::moveWhole(bodies[b], false);
   if (free.empty()) return;
   for (const FibreRow& fibre : fibres) {  // it pulls along what it is in the end, not at the start
     Vec3 couple = solver.spanBefore(fibre).cross(fibre.impulse);
@@ -568,16 +524,6 @@ __attribute__((target("avx2"), flatten)) void solveWide(All&... all) {
 #endif
 
 }  // namespace
-
-RigidGroups::RigidGroups(const std::vector<Index>& group_offsets, const std::vector<Index>& group_members,
-                         const std::vector<double>& group_weights, const std::vector<double>& particle_masses)
-    : offsets(group_offsets), members(group_members), weights(group_weights), masses(particle_masses) {
-  for (Index g = 0; g < size(); ++g) groups.insert(groups.end(), offsets[g + 1] - offsets[g], g);
-  const auto each = [this](const auto& visit) {
-    for (Index k = 0; k < members.size(); ++k) visit(members[k], k);
-  };
-  compressRows(masses.size(), each, of_offsets, of_members);
-}
 
 void solveRows(const std::vector<SolverRows>& sets, std::vector<SpringRow>& springs, std::vector<FibreRow>& fibres,
                std::vector<SolverBody>& bodies, const SolverStep& step, const std::vector<Index>& free,

@@ -328,9 +328,9 @@ void SurfaceContacts::fillSlots(const std::vector<Collider>& colliders) {
     body.particles = needed_[c] ? collider.particles : 0;
     body.moves = collider.moves;
     body.edge_length = collider.moves ? collider.edge_length : std::numeric_limits<double>::infinity();
-    body.groups = nullptr;
+    body.held = collider.held;
     body.rigid_share = 0.0;
-    body.motions.clear();
+    body.whole = WholeMotion();
     for (Index i = 0; i < body.particles; ++i) {
       const Vec3& p = collider.positions[i];
       body.now[i] = {p.x(), p.y(), p.z(), collider.moves ? collider.inverse_masses[i] : 0.0};
@@ -339,12 +339,7 @@ void SurfaceContacts::fillSlots(const std::vector<Collider>& colliders) {
   }
 }
 
-void SurfaceContacts::setRigidShare(Index collider, const RigidGroups* groups, double share) {
-  SolverBody& body = solver_bodies_[collider];
-  body.groups = groups;
-  body.rigid_share = share;
-  body.motions.assign(groups && share > 0.0 ? groups->size() : 0, GroupMotion());
-}
+void SurfaceContacts::setRigidShare(Index collider, double share) { solver_bodies_[collider].rigid_share = share; }
 
 void SurfaceContacts::solveIsland(Index island_number, SolverStep step, int number,
                                   const std::vector<Collider>& colliders, const std::vector<Vec3*>& previous,
@@ -472,7 +467,6 @@ std::size_t SurfaceContacts::bytes() const {
   for (const auto& [name, pair] : known_)
     sum += kNode + sizeof name + sizeof(Pair) + bytesOf(pair->set.rows, pair->set.entries, pair->sides);
   for (const auto& [key, way] : ways_) sum += kNode + sizeof way + bytesOf(way.last);
-  for (const SolverBody& body : solver_bodies_) sum += bytesOf(body.motions);
   for (const Points& velocities : velocities_) sum += bytesOf(velocities);
   for (const Island& island : islands_) sum += bytesOf(island.bodies, island.rows);
   return sum;

@@ -4,8 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <queue>
-#include <set>
 #include <utility>
+
+#include "meshless_surgery/base/compressed_rows.h"
 
 namespace meshless {
 namespace {
@@ -16,53 +17,9 @@ constexpr double kAutoRadiusEdges = 3.0;   // reach of an automatic cluster in m
 constexpr double kAutoRadiusOfSize = 0.2;  // ... or as a share of the bounds' diagonal, whichever is more
 constexpr double kLeastShare = 0.02;       // of a member at the border of a cluster
 
-struct Reached {
-  Index particle;
-  double distance;  // [m] along the body
-};
-
-// Distances along the graph from a few starts, out to `radius`; scratch arrays are reused between searches.
-class GraphSearch {
- public:
-  explicit GraphSearch(const ParticleGraph& graph) : graph_(graph), distance_(graph.size(), kInfinity) {}
-
-  std::vector<Reached> from(Index start, double radius) {
-    std::vector<Reached> reached;
-    Queue queue;
-    distance_[start] = 0.0;
-    queue.push({0.0, start});
-    touched_.push_back(start);
-    while (!queue.empty()) {
-      const auto [d, i] = queue.top();
-      queue.pop();
-      if (d > distance_[i]) continue;
-      reached.push_back({i, d});
-      for (Index k = graph_.offsets[i]; k < graph_.offsets[i + 1]; ++k) {
-        const Index j = graph_.neighbours[k];
-        const double there = d + graph_.lengths[k];
-        if (there > radius || !(there < distance_[j])) continue;
-        if (distance_[j] == kInfinity) touched_.push_back(j);
-        distance_[j] = there;
-        queue.push({there, j});
-      }
-    }
-    for (Index i : touched_) distance_[i] = kInfinity;
-    touched_.clear();
-    return reached;
-  }
-
- private:
-  using Entry = std::pair<double, Index>;
-  using Queue = std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>>;
-  const ParticleGraph& graph_;
-  std::vector<double> distance_;
-  std::vector<Index> touched_;
-};
-
 // A cluster under construction; `share` is not yet normalised over the clusters of a particle.
 struct Draft {
   Index seed = 0;
-  double radius = 0.0;
   std::vector<std::pair<Index, double>> members;  // particle, share
 };
 
@@ -75,15 +32,16 @@ double shareAt(double distance, double radius) {
 Draft grow(GraphSearch& search, Index seed, double radius) {
   Draft draft;
   draft.seed = seed;
-  draft.radius = radius;
   for (const Reached& r : search.from(seed, radius))
     draft.members.emplace_back(r.particle, shareAt(r.distance, radius));
   std::sort(draft.members.begin(), draft.members.end());
   return draft;
 }
 
-ClusterSet assemble(std::vector<Draft> drafts, Index particles) {
-  std::vector<double> total(particles, 0.0);
+ClusterSet assemble(std::vector<Draft> drafts, const ParticleGraph& graph) {
+  std::vector<double> total(graph.size(), 0.0);
+  std::vector<char> within(graph.size(), 0);
+  GraphSearch search(graph);
   for (const Draft& d : drafts)
     for (const auto& [i, share] : d.members) total[i] += share;
   ClusterSet set;
@@ -95,7 +53,11 @@ ClusterSet assemble(std::vector<Draft> drafts, Index particles) {
     }
     set.offsets.push_back(static_cast<Index>(set.members.size()));
     set.seeds.push_back(d.seed);
-    set.radii.push_back(d.radius);
+    for (const auto& member : d.members) within[member.first] = 1;
+    const std::vector<Reached> reached = search.from(d.seed, kInfinity, within);
+    for (const auto& member : d.members) within[member.first] = 0;
+    // One that does not hang together keeps to itself whatever is cut.
+    set.radii.push_back(reached.size() == d.members.size() ? reached.back().distance : kInfinity);
   }
   return set;
 }
@@ -113,12 +75,11 @@ Vec3 meanOf(const Points& rest) {
   return rest[0] + sum / static_cast<double>(rest.size());
 }
 
-ClusterSet oneCluster(const Points& rest) {
+ClusterSet oneCluster(const Points& rest, const ParticleGraph& graph) {
   Draft draft;
   draft.seed = nearestTo(rest, meanOf(rest));
-  draft.radius = kInfinity;
   for (Index i = 0; i < rest.size(); ++i) draft.members.emplace_back(i, 1.0);
-  return assemble({draft}, static_cast<Index>(rest.size()));
+  return assemble({draft}, graph);
 }
 
 // Seeds that are farthest from each other along the body, until `count` of them or until every particle is within
@@ -128,7 +89,6 @@ struct SeedSet {
   double cover = 0.0;  // [m] largest distance of a particle from its nearest seed
 };
 SeedSet farthestSeeds(const Points& rest, const ParticleGraph& graph, std::size_t count, double cover) {
-  using Entry = std::pair<double, Index>;
   std::vector<double> distance(rest.size(), kInfinity);
   SeedSet set;
   // The first is the particle farthest from the middle: ends of a body, not its middle, are what a second seed misses.
@@ -138,20 +98,7 @@ SeedSet farthestSeeds(const Points& rest, const ParticleGraph& graph, std::size_
     if ((rest[i] - middle).squaredNorm() > (rest[next] - middle).squaredNorm()) next = i;
   while (true) {
     set.seeds.push_back(next);
-    std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
-    distance[next] = 0.0;
-    queue.push({0.0, next});
-    while (!queue.empty()) {
-      const auto [d, i] = queue.top();
-      queue.pop();
-      if (d > distance[i]) continue;
-      for (Index k = graph.offsets[i]; k < graph.offsets[i + 1]; ++k) {
-        const Index j = graph.neighbours[k];
-        if (!(d + graph.lengths[k] < distance[j])) continue;
-        distance[j] = d + graph.lengths[k];
-        queue.push({distance[j], j});
-      }
-    }
+    lowerDistances(graph, next, kInfinity, {}, distance);
     next = static_cast<Index>(std::max_element(distance.begin(), distance.end()) - distance.begin());
     set.cover = distance[next];
     // Parts without any path to a seed get one however many were asked for: every particle needs a cluster.
@@ -164,7 +111,7 @@ ClusterSet clustersAround(const SeedSet& set, const ParticleGraph& graph, double
   GraphSearch search(graph);
   std::vector<Draft> drafts;
   for (Index seed : set.seeds) drafts.push_back(grow(search, seed, radius));
-  return assemble(std::move(drafts), graph.size());
+  return assemble(std::move(drafts), graph);
 }
 
 ClusterSet gridClusters(const Points& rest, const ParticleGraph& graph, const ClusterOptions& options) {
@@ -173,7 +120,6 @@ ClusterSet gridClusters(const Points& rest, const ParticleGraph& graph, const Cl
   const Vec3 cell = (bounds.max - bounds.min).cwiseQuotient(Vec3(options.grid[0], options.grid[1], options.grid[2]));
   std::vector<Draft> drafts;
   std::vector<int> part(rest.size(), -1);
-  std::vector<bool> covered(rest.size(), false);
   for (int z = 0; z < options.grid[2]; ++z)
     for (int y = 0; y < options.grid[1]; ++y)
       for (int x = 0; x < options.grid[0]; ++x) {
@@ -209,16 +155,14 @@ ClusterSet gridClusters(const Points& rest, const ParticleGraph& graph, const Cl
           if (!has_core) continue;
           std::sort(draft.members.begin(), draft.members.end());
           draft.seed = draft.members[0].first;
-          for (const auto& [i, share] : draft.members) {
-            covered[i] = true;
-            if ((rest[i] - centre).squaredNorm() < (rest[draft.seed] - centre).squaredNorm()) draft.seed = i;
-          }
-          draft.radius = reach.norm();
+          for (const auto& member : draft.members)
+            if ((rest[member.first] - centre).squaredNorm() < (rest[draft.seed] - centre).squaredNorm())
+              draft.seed = member.first;
           drafts.push_back(std::move(draft));
         }
         for (Index i : inside) part[i] = -1;
       }
-  return assemble(std::move(drafts), graph.size());
+  return assemble(std::move(drafts), graph);
 }
 
 double meanLength(const ParticleGraph& graph) {
@@ -248,15 +192,44 @@ ParticleGraph makeGraph(const Points& rest, std::vector<std::array<Index, 2>> ed
   return graph;
 }
 
+std::vector<Reached> lowerDistances(const ParticleGraph& graph, Index start, double radius,
+                                    const std::vector<char>& allowed, std::vector<double>& distances) {
+  using Entry = std::pair<double, Index>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
+  std::vector<Reached> reached;
+  distances[start] = 0.0;
+  queue.push({0.0, start});
+  while (!queue.empty()) {
+    const auto [d, i] = queue.top();
+    queue.pop();
+    if (d > distances[i]) continue;
+    reached.push_back({i, d});
+    for (Index k = graph.offsets[i]; k < graph.offsets[i + 1]; ++k) {
+      const Index j = graph.neighbours[k];
+      const double there = d + graph.lengths[k];
+      if (there > radius || !(there < distances[j]) || !(allowed.empty() || allowed[j])) continue;
+      distances[j] = there;
+      queue.push({there, j});
+    }
+  }
+  return reached;
+}
+
+std::vector<Reached> GraphSearch::from(Index start, double radius, const std::vector<char>& allowed) {
+  std::vector<Reached> reached = lowerDistances(graph_, start, radius, allowed, distances_);
+  for (const Reached& r : reached) distances_[r.particle] = kInfinity;
+  return reached;
+}
+
 ClusterSet makeClusters(const Points& rest, const ParticleGraph& graph, const ClusterOptions& options) {
   const Index particles = graph.size();
   switch (options.kind) {
     case ClusterOptions::Kind::kOne:
-      return oneCluster(rest);
+      return oneCluster(rest, graph);
     case ClusterOptions::Kind::kGrid:
       return gridClusters(rest, graph, options);
     case ClusterOptions::Kind::kCount: {
-      if (options.count <= 1) return oneCluster(rest);
+      if (options.count <= 1) return oneCluster(rest, graph);
       const SeedSet set = farthestSeeds(rest, graph, static_cast<std::size_t>(options.count), 0.0);
       return clustersAround(set, graph, (1.0 + options.overlap) * set.cover + 1e-12);
     }
@@ -264,7 +237,7 @@ ClusterSet makeClusters(const Points& rest, const ParticleGraph& graph, const Cl
     case ClusterOptions::Kind::kAuto:
       break;
   }
-  if (particles < kOneClusterBelow) return oneCluster(rest);
+  if (particles < kOneClusterBelow) return oneCluster(rest, graph);
   Box bounds;
   for (const Vec3& p : rest) bounds.extend(p);
   const double cover = std::max(kAutoRadiusEdges * meanLength(graph), kAutoRadiusOfSize * bounds.diagonal());
@@ -273,7 +246,7 @@ ClusterSet makeClusters(const Points& rest, const ParticleGraph& graph, const Cl
 }
 
 ClusterSet clustersOfCells(const std::vector<std::array<Index, 8>>& cells, const std::vector<double>& cell_masses,
-                           const std::vector<double>& particle_masses, double radius) {
+                           const std::vector<double>& particle_masses) {
   ClusterSet set;
   set.offsets.push_back(0);
   for (std::size_t c = 0; c < cells.size(); ++c) {
@@ -285,109 +258,65 @@ ClusterSet clustersOfCells(const std::vector<std::array<Index, 8>>& cells, const
     }
     set.offsets.push_back(static_cast<Index>(set.members.size()));
     set.seeds.push_back(members[0]);
-    set.radii.push_back(radius);
+    set.radii.push_back(kInfinity);
   }
   return set;
 }
 
-ParticleGraph subgraph(const ParticleGraph& parent, const std::vector<Index>& kept) {
-  std::vector<Index> renumbered(parent.size(), kNoIndex);
-  for (std::size_t i = 0; i < kept.size(); ++i) renumbered[kept[i]] = static_cast<Index>(i);
-  ParticleGraph graph;
-  graph.offsets.push_back(0);
-  for (Index old : kept) {
-    for (Index k = parent.offsets[old]; k < parent.offsets[old + 1]; ++k)
-      if (renumbered[parent.neighbours[k]] != kNoIndex) {
-        graph.neighbours.push_back(renumbered[parent.neighbours[k]]);
-        graph.lengths.push_back(parent.lengths[k]);
-      }
-    graph.offsets.push_back(static_cast<Index>(graph.neighbours.size()));
-  }
-  return graph;
-}
-
 PieceClusters splitClusters(const ClusterSet& parent, const Points& piece_rest, const ParticleGraph& piece_graph,
-                            const std::vector<Index>& kept, const std::vector<bool>& torn) {
-  const Index particles = piece_graph.size();
-  Index largest = 0;
-  for (Index i : kept) largest = std::max(largest, i + 1);
-  for (Index i : parent.members) largest = std::max(largest, i + 1);
-  std::vector<Index> renumbered(largest, kNoIndex);
-  for (std::size_t i = 0; i < kept.size(); ++i) renumbered[kept[i]] = static_cast<Index>(i);
-
+                            const std::vector<Index>& parent_particle) {
+  std::vector<Index> offsets, copies;  // of each of the parent's particles, those that the piece has of it
+  Index particles = 0;
+  for (const Index i : parent.members) particles = std::max(particles, i + 1);
+  compressRows(
+      particles,
+      [&](const auto& visit) {
+        for (Index i = 0; i < parent_particle.size(); ++i) visit(parent_particle[i], i);
+      },
+      offsets, copies);
   PieceClusters piece;
-  std::vector<Draft> drafts;
-  std::vector<bool> covered(particles, false);
-  struct Touched {
-    double radius;
-    Vec3 middle;                 // rest mean of the members that stayed
-    std::vector<Index> members;  // that are in the piece
-    std::size_t before;
-  };
-  std::vector<Touched> touched;
-  for (Index c = 0; c < parent.size(); ++c) {
-    Draft draft;
-    draft.radius = parent.radii[c];
-    const Index begin = parent.offsets[c], end = parent.offsets[c + 1];
-    for (Index k = begin; k < end; ++k)
-      if (renumbered[parent.members[k]] != kNoIndex)
-        draft.members.emplace_back(renumbered[parent.members[k]], parent.weights[k]);
-    if (draft.members.empty()) continue;
-    if (draft.members.size() == end - begin && (torn.empty() || !torn[c])) {
-      draft.seed = renumbered[parent.seeds[c]];
-      for (const auto& m : draft.members) covered[m.first] = true;
-      drafts.push_back(std::move(draft));
-      piece.origin.push_back(c);
-      ++piece.kept;
-      continue;
-    }
-    Touched t{parent.radii[c], Vec3::Zero(), {}, end - begin};
-    for (const auto& m : draft.members) t.members.push_back(m.first);
-    // The old seed where it is in the piece; else the middle of what is left of the cluster.
-    if (renumbered[parent.seeds[c]] != kNoIndex)
-      t.middle = piece_rest[renumbered[parent.seeds[c]]];
-    else
-      for (Index i : t.members) t.middle += piece_rest[i] / static_cast<double>(t.members.size());
-    touched.push_back(std::move(t));
-  }
-
+  piece.clusters.offsets.push_back(0);
   GraphSearch search(piece_graph);
-  std::set<std::vector<std::pair<Index, double>>> grown;  // two halves of one cluster may grow into the same set
-  const auto growFrom = [&](const std::vector<Index>& candidates, const Vec3& middle, double radius) {
-    Index seed = candidates[0];
-    for (Index i : candidates)
-      if ((piece_rest[i] - middle).squaredNorm() < (piece_rest[seed] - middle).squaredNorm()) seed = i;
-    Draft draft = grow(search, seed, radius);
-    covered[seed] = true;
-    for (const auto& m : draft.members) covered[m.first] = true;
-    std::vector<std::pair<Index, double>> key;
-    for (const auto& m : draft.members) key.emplace_back(m.first, 0.0);
-    if (!grown.insert(key).second) return;
-    drafts.push_back(std::move(draft));
-    ++piece.rebuilt;
-  };
-  // A cluster that lost most of itself grows only where something would be left without one.
-  for (const Touched& t : touched)
-    if (3 * t.members.size() >= t.before) growFrom(t.members, t.middle, t.radius);
-  for (const Touched& t : touched)
-    while (true) {
-      std::vector<Index> bare;
-      for (Index i : t.members)
-        if (!covered[i]) bare.push_back(i);
-      if (bare.empty()) break;
-      growFrom(bare, t.middle, t.radius);
+  std::vector<char> left(parent_particle.size(), 0);
+  std::vector<std::pair<Index, double>> members;  // of one of the parent's
+  for (Index c = 0; c < parent.size(); ++c) {
+    members.clear();
+    Vec3 middle = Vec3::Zero();
+    for (Index k = parent.offsets[c]; k < parent.offsets[c + 1]; ++k)
+      for (Index n = offsets[parent.members[k]]; n < offsets[parent.members[k] + 1]; ++n) {
+        members.emplace_back(copies[n], parent.weights[k]);
+        left[copies[n]] = 1;
+        middle += piece_rest[copies[n]];
+      }
+    std::sort(members.begin(), members.end());
+    middle /= static_cast<double>(members.size());
+    // From its seed where that is there, else from what is left around its middle.
+    if (const Index seed = parent.seeds[c]; seed < particles && offsets[seed] < offsets[seed + 1])
+      middle = piece_rest[copies[offsets[seed]]];
+    std::size_t of_it = 0, parts = 0;
+    while (of_it < members.size()) {
+      Index seed = kNoIndex;
+      for (const auto& [i, weight] : members)
+        if (left[i] &&
+            (seed == kNoIndex || (piece_rest[i] - middle).squaredNorm() < (piece_rest[seed] - middle).squaredNorm()))
+          seed = i;
+      const std::vector<Reached> reached = search.from(seed, parent.radii[c] * (1.0 + 1e-9), left);
+      for (const Reached& r : reached) left[r.particle] = 2;
+      for (const auto& [i, weight] : members) {
+        if (left[i] != 2) continue;
+        piece.clusters.members.push_back(i);
+        piece.clusters.weights.push_back(weight);
+        left[i] = 0;
+      }
+      piece.clusters.offsets.push_back(static_cast<Index>(piece.clusters.members.size()));
+      piece.clusters.seeds.push_back(seed);
+      piece.clusters.radii.push_back(parent.radii[c]);
+      piece.origin.push_back(c);
+      of_it += reached.size();
+      ++parts;
     }
-  std::vector<Index> bare;
-  for (Index i = 0; i < particles; ++i)
-    if (!covered[i]) bare.push_back(i);
-  if (!bare.empty()) {  // particles that the parent did not have
-    double radius = 0.0;
-    for (double r : parent.radii) radius = std::max(radius, r);
-    for (Index i : bare)
-      if (!covered[i]) growFrom({i}, piece_rest[i], radius);
+    piece.kept += parts == 1 && members.size() == parent.offsets[c + 1] - parent.offsets[c];
   }
-  piece.origin.resize(drafts.size(), kNoIndex);
-  piece.clusters = assemble(std::move(drafts), particles);
   return piece;
 }
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "elastic_law.h"
-#include "meshless_surgery/dynamics/rotation.h"
+#include "rotation.h"
 
 namespace meshless {
 namespace {

@@ -255,7 +255,7 @@ double ElasticBatch::accelerate(const MatchInput& in, const ElasticParameters& m
 std::size_t ElasticBatch::bytes() const {
   return sizeof *this + bytesOf(clusters_, particles_, masses_, shapes_, cells_, mixes_) +
          bytesOf(force_offsets_, force_places_, inverse_masses_) +
-         bytesOf(others_.offsets, others_.members, others_.weights, others_.seeds, others_.radii) +
+         bytesOf(others_.offsets, others_.members, others_.weights) +
          bytesOf(other_clusters_, other_shape_.clusters, other_shape_.quadratic, other_elastic_);
 }
 

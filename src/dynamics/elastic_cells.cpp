@@ -5,7 +5,7 @@
 
 #include "elastic_law.h"
 #include "lanczos.h"
-#include "meshless_surgery/dynamics/rotation.h"
+#include "rotation.h"
 
 namespace meshless {
 namespace {
@@ -125,6 +125,10 @@ double elasticAccelerations(const ElasticCells& body, const ElasticParameters& m
   }
   for (std::size_t i = 0; i < forces.size(); ++i) accelerations[i] = -forces[i] / body.masses[i];
   return std::sqrt(most / 3.0);
+}
+
+Mat3 gradientOf(const ElasticCell& cell, double half_edge, const Points& y) {
+  return gradientOf(coefficientsOf(cell, y, y[cell.corners[0]]), half_edge);
 }
 
 double elasticEnergy(const ElasticCells& body, const ElasticParameters& material, const Points& y,

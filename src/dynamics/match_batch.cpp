@@ -117,8 +117,9 @@ BatchStep batchStep(const Material& material, double h) {
   BatchStep step;
   step.h = h;
   step.mode = material.mode;
-  step.ahead = viscosityTime(material.alpha, h);
-  step.gain = stiffnessGain(material.alpha, h);
+  const GoalPull goal = goalPull(material.alpha, h);
+  step.ahead = h + goal.lead;
+  step.gain = goal.gain;
   step.beta = material.beta;
   step.damping = material.damping;
   return step;

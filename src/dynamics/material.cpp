@@ -1,5 +1,6 @@
 #include "meshless_surgery/dynamics/material.h"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -94,16 +95,24 @@ Status Material::validate() const {
   return Done{};
 }
 
-double stiffnessGain(double alpha, double h) {
-  const double steps = h / kReferenceStep;
-  return 1.0 - std::pow(1.0 - alpha, steps * steps);
+namespace {
+
+// [1/s] of velocities that goals take, times kReferenceStep; infinite at 1.
+double goalRate(double alpha) { return -std::log1p(-alpha); }
+
+}  // namespace
+
+double goalStiffness(const Material& material) {
+  const double fitted = material.mode == MatchMode::kRigid ? 0.0 : actingBeta(material.beta, kReferenceStep);
+  return (1.0 - fitted) * goalRate(material.alpha) / (kReferenceStep * kReferenceStep);
 }
 
-double viscosityTime(double alpha, double h) {
-  // A mode's amplitude falls by the root of 1 - gain * time / h in a step: by the same for the same time.
-  const double gain = stiffnessGain(alpha, h);
-  if (!(gain > 0.0)) return kReferenceStep;
-  return h * (1.0 - std::pow(1.0 - alpha, h / kReferenceStep)) / gain;
+GoalPull goalPull(double alpha, double h) {
+  // The place after a substep, of what the goal is 0 for: x1 - gain (x1 + lead v) with x1 = x + h v. gain says how far
+  // a steady push goes, and both how much of a velocity is left.
+  const double steps = h / kReferenceStep, rate = goalRate(alpha), left = std::exp(-rate * steps);
+  const double gain = std::min(rate * steps * steps, 1.0 - left);
+  return {gain, gain > 0.0 ? h * (1.0 - left - gain) / gain : 0.0};
 }
 
 // Fitted goals alone have no shape to return to: a twentieth of the rigid goal is enough for that, and more with half a

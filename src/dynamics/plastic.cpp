@@ -53,26 +53,21 @@ bool flowCluster(const Plasticity& plasticity, double share, ClusterPose& pose, 
 
 }  // namespace
 
-std::size_t flow(const MatchInput& in, const Plasticity& plasticity, double h, std::vector<ClusterPose>& poses,
+std::size_t flow(const Plasticity& plasticity, double h, const RestShape* rest, std::vector<ClusterPose>& poses,
                  std::vector<PlasticShape>& shapes) {
   const double share = 1.0 - std::exp(-h * plasticity.creep);
   if (!(share > 0.0) || !(plasticity.maximum > 0.0)) return 0;
   std::size_t flowed = 0;
-  for (Index c = 0; c < in.clusters.size(); ++c) {
-    if (!in.shape.clusters[c].linear_rank) continue;
+  for (std::size_t c = 0; c < poses.size(); ++c) {
+    if (rest && !rest->clusters[c].linear_rank) continue;
     PlasticShape shape;
     if (!shapes.empty()) shape = shapes[c];
     if (!flowCluster(plasticity, share, poses[c], shape)) continue;
-    if (shapes.empty()) shapes.resize(in.clusters.size());
+    if (shapes.empty()) shapes.resize(poses.size());
     shapes[c] = shape;
     ++flowed;
   }
   return flowed;
-}
-
-Mat3 logarithm(const PlasticShape& shape) {
-  const Solver solver(shape.stretch);
-  return rebuilt(solver.eigenvectors(), solver.eigenvalues().array().log());
 }
 
 PlasticShape plasticShape(const Mat3& logarithm) {
@@ -83,41 +78,6 @@ PlasticShape plasticShape(const Mat3& logarithm) {
   shape.inverse = rebuilt(solver.eigenvectors(), (-values).array().exp());
   shape.stiffening = std::exp(-values.minCoeff());
   return shape;
-}
-
-std::vector<PlasticShape> inheritShapes(const std::vector<PlasticShape>& parent, const ClusterSet& parent_clusters,
-                                        const ClusterSet& clusters, const std::vector<Index>& origin,
-                                        const std::vector<Index>& parent_particles) {
-  std::vector<PlasticShape> shapes;
-  if (parent.empty()) return shapes;
-  std::vector<Mat3> of_particles;
-  const auto formParticles = [&] {
-    Index count = 0;
-    for (Index i : parent_clusters.members) count = std::max(count, i + 1);
-    of_particles.assign(count, Mat3::Zero());
-    for (Index c = 0; c < parent_clusters.size(); ++c) {
-      const Mat3 l = logarithm(parent[c]);
-      for (Index k = parent_clusters.offsets[c]; k < parent_clusters.offsets[c + 1]; ++k)
-        of_particles[parent_clusters.members[k]] += parent_clusters.weights[k] * l;
-    }
-  };
-  for (Index c = 0; c < clusters.size(); ++c) {
-    if (origin[c] != kNoIndex) {
-      shapes.push_back(parent[origin[c]]);
-      continue;
-    }
-    if (of_particles.empty()) formParticles();
-    Mat3 sum = Mat3::Zero();
-    double count = 0.0;
-    for (Index k = clusters.offsets[c]; k < clusters.offsets[c + 1]; ++k) {
-      const Index i = parent_particles[clusters.members[k]];
-      if (i == kNoIndex) continue;
-      sum += of_particles[i];
-      count += 1.0;
-    }
-    shapes.push_back(plasticShape(count > 0.0 ? Mat3(sum / count) : sum));
-  }
-  return shapes;
 }
 
 }  // namespace meshless

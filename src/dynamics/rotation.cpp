@@ -1,4 +1,4 @@
-#include "meshless_surgery/dynamics/rotation.h"
+#include "rotation.h"
 
 #include <cmath>
 

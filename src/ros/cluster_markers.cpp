@@ -24,13 +24,26 @@ std_msgs::ColorRGBA hue(Index number) {
   return color;
 }
 
+// Clusters, or the cells where there are none.
+ClusterSet groupsOf(const BodyModel& model) {
+  if (model.clusters.size() > 0) return model.clusters;
+  ClusterSet cells;
+  cells.offsets.push_back(0);
+  for (const LatticeCell& cell : model.lattice->cells) {
+    cells.members.insert(cells.members.end(), cell.corners.begin(), cell.corners.end());
+    cells.offsets.push_back(static_cast<Index>(cells.members.size()));
+  }
+  cells.weights.assign(cells.members.size(), 1.0);
+  return cells;
+}
+
 }  // namespace
 
 visualization_msgs::MarkerArray clusterMarkers(const WorldSnapshot& snapshot, const std_msgs::Header& header) {
   visualization_msgs::MarkerArray array;
   array.markers.push_back(deleteAllMarkers(header));
   for (const BodySnapshot& body : snapshot.bodies) {
-    const ClusterSet& clusters = body.model->clusters;
+    const ClusterSet clusters = groupsOf(*body.model);
     const int id = static_cast<int>(body.number);
     Marker centres = newMarker(header, "centres", id, Marker::SPHERE_LIST);
     centres.scale.x = centres.scale.y = centres.scale.z = kCentre * body.model->spacing;

@@ -133,7 +133,7 @@ meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatu
     message.particles = static_cast<std::uint32_t>(body.model->rest.size());
     message.triangles = static_cast<std::uint32_t>(body.model->surface.triangles.size());
     message.tetrahedra = static_cast<std::uint32_t>(body.tetrahedra);
-    message.clusters = body.model->clusters.size();
+    message.clusters = body.model->groups();
     message.volume = body.measures.volume;
     message.rest_volume = body.model->rest_volume;
     message.area = body.measures.area;
@@ -197,7 +197,7 @@ meshless_surgery::BodyInfo toInfo(const std::string& name, const BodyModel& mode
   message.collision_triangles =
       model.collision ? static_cast<std::uint32_t>(model.collision->mesh.triangles.size()) : message.triangles;
   message.collision_distance = model.collision ? model.collision->distance : 0.0;
-  message.clusters = static_cast<std::uint32_t>(model.clusters.size());
+  message.clusters = static_cast<std::uint32_t>(model.groups());
   message.spacing = model.spacing;
   message.mass = model.mass;
   message.held = heldShare(model);

@@ -412,7 +412,7 @@ struct Services::Handlers : Answers {
     response.rest_volume = body->model->rest_volume;
     response.area = body->measures.area;
     response.mass = body->model->mass;
-    response.clusters = body->model->clusters.size();
+    response.clusters = body->model->groups();
     response.tetrahedra = static_cast<std::uint32_t>(body->tetrahedra);
     response.cavities = toCavities(body->measures);
     return accept(response, request.name + (request.rest ? " at rest" : " as it is now"));

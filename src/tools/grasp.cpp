@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
-#include <queue>
 
 #include <Eigen/QR>
 
@@ -33,6 +31,21 @@ void letGoOfFixed(const BodyModel& model, Pick& pick) {
   pick.weights.resize(kept);
 }
 
+// The free particle that is nearest to a fixed one, within a distance [m]; else that one. Cells in a clamp have particles
+// of their own, which no link joins to those beside it.
+Index freeNear(const BodyModel& model, Index particle, double within) {
+  Index nearest = particle;
+  double least = within;
+  if (!model.fixed[particle]) return particle;
+  for (Index i = 0; i < model.rest.size(); ++i) {
+    const double away = (model.rest[i] - model.rest[particle]).norm();
+    if (model.fixed[i] || !(away < least)) continue;
+    least = away;
+    nearest = i;
+  }
+  return nearest;
+}
+
 void leadMeanTo(const Vec3& point, const Points& positions, Pick& pick) {
   const Vec3 mean = graspMean(pick, positions);
   Mat3 spread = Mat3::Zero();
@@ -58,33 +71,17 @@ double graspInverseMass(const BodyModel& model, const Pick& pick) {
 
 void makeGrasp(const BodyModel& model, const Points& positions, Index centre, double radius, const Vec3& point,
                Pick& pick) {
-  using Entry = std::pair<double, Index>;
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
-  std::map<Index, double> distance;
-  distance[centre] = 0.0;
-  queue.push({0.0, centre});
   pick.patch.clear();
   pick.weights.clear();
   double total = 0.0;
-  while (!queue.empty()) {
-    const auto [d, i] = queue.top();
-    queue.pop();
-    if (d > distance[i]) continue;
-    const double straight = (model.rest[i] - model.rest[centre]).norm();
-    const double s = radius > 0.0 ? std::max(straight, d / kLongestWay) / radius : 0.0;
+  const Index middle = freeNear(model, centre, radius);
+  for (const auto& [i, along] : GraphSearch(model.graph).from(middle, kLongestWay * radius)) {
+    const double straight = (model.rest[i] - model.rest[middle]).norm();
+    const double s = radius > 0.0 ? std::max(straight, along / kLongestWay) / radius : 0.0;
     if (!(s < 1.0)) continue;
     pick.patch.push_back(i);
     pick.weights.push_back(model.masses[i] * (1.0 - s * s) * (1.0 - s * s));
     total += pick.weights.back();
-    for (Index k = model.graph.offsets[i]; k < model.graph.offsets[i + 1]; ++k) {
-      const Index j = model.graph.neighbours[k];
-      const double there = d + model.graph.lengths[k];
-      if (!(there < kLongestWay * radius)) continue;
-      const auto [it, is_new] = distance.emplace(j, there);
-      if (!is_new && !(there < it->second)) continue;
-      it->second = there;
-      queue.push({there, j});
-    }
   }
   for (double& w : pick.weights) w /= total;
   letGoOfFixed(model, pick);

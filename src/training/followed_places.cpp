@@ -1,9 +1,7 @@
 #include "meshless_surgery/training/followed_places.h"
 
 #include <limits>
-#include <optional>
 
-#include "meshless_surgery/body/binding.h"
 #include "meshless_surgery/body/cell_blend.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/training/frame.h"
@@ -28,10 +26,7 @@ Points FollowedPlaces::now(const WorldSnapshot& shot) {
   for (std::size_t k = 0; k < bodies.size(); ++k) {
     const Piece& piece = pieces_[k];
     const Points& particles = bodies[k]->particles;
-    std::vector<ClusterPose> poses(piece.model->clusters.size());
-    fitClusters(matchInput(*piece.model), particles, piece.binding.lever_clusters, poses);
-    for (Index n = 0; n < piece.which.size(); ++n)
-      places[piece.which[n]] = embeddedPosition(piece.binding, particles, poses, n);
+    for (Index n = 0; n < piece.which.size(); ++n) places[piece.which[n]] = piece.binding.place(n, particles);
   }
   return places;
 }
@@ -58,22 +53,22 @@ void FollowedPlaces::bind(const std::vector<const BodySnapshot*>& bodies) {
   for (std::size_t k = 0; k < bodies.size(); ++k) {
     const BodyModel& model = *bodies[k]->model;
     Piece piece{bodies[k]->number, bodies[k]->model, {}, {}};
-    std::optional<CellFinder> finder;
-    if (model.lattice) finder.emplace(*model.lattice);
+    if (!model.lattice) {  // nothing lies in what has no inside
+      pieces_.push_back(std::move(piece));
+      continue;
+    }
+    const CellFinder finder(*model.lattice);
     Points local;
     std::vector<Index> cells;
     for (Index n = 0; n < rest_.size(); ++n) {
       if (owner[n] != k) continue;
-      const Index cell = finder ? finder->nearest(aside(*bodies[k], n)) : 0;
+      const Index cell = finder.nearest(aside(*bodies[k], n));
       if (cell == kNoIndex) continue;
       cells.push_back(cell);
       local.push_back(bodies[k]->placed.rotation.conjugate() * (rest_[n] - bodies[k]->placed.translation));
       piece.which.push_back(n);
     }
-    if (!local.empty())
-      piece.binding = finder ? bindToCells(*model.lattice, local, cells)
-                             : bindSurface(model.rest, model.graph, model.clusters, local,
-                                           std::vector<Index>(local.size(), kNoIndex));
+    if (!local.empty()) piece.binding = bindToCells(*model.lattice, local, cells);
     pieces_.push_back(std::move(piece));
   }
 }

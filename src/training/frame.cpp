@@ -52,26 +52,39 @@ bool isOf(const std::string& body, const std::string& whole) {
   return body.compare(0, whole.size(), whole) == 0 && (body.size() == whole.size() || body[whole.size()] == '.');
 }
 
+// Largest change of a length, over that length.
+double strainOf(const Mat3& deformation) {
+  const Vec3 squares = Eigen::SelfAdjointEigenSolver<Mat3>()
+                           .computeDirect(deformation.transpose() * deformation, Eigen::EigenvaluesOnly)
+                           .eigenvalues();
+  return (squares.cwiseMax(0.0).cwiseSqrt().array() - 1.0).abs().maxCoeff();
+}
+
+Index tissueParts(const BodyModel& model) {
+  return model.cells ? static_cast<Index>(model.cells->cells.size()) : model.clusters.size();
+}
+
+TissuePart tissuePart(const BodyModel& model, Index part) {
+  if (!model.cells) return {model.shape.clusters[part].mass, model.shape.clusters[part].centre};
+  const ElasticCell& cell = model.cells->cells[part];
+  return {cell.mass, model.lattice->restPlace(model.lattice->cells[part], 0.5 * (cell.centroid + Vec3::Ones()))};
+}
+
 std::vector<double> strainsOf(const BodyModel& model, const Points& positions) {
-  std::vector<double> strains(model.clusters.size(), 0.0);
-  for (Index c = 0; c < model.clusters.size(); ++c) {
-    const ClusterRest& rest = model.shape.clusters[c];
-    if (!rest.linear_rank) continue;
-    // Of a crumb of tissue little is told by the corners of its cell.
-    if (model.lattice && (model.lattice->cells[c].samples == kNoSample || model.lattice->cells[c].isBridge(c)))
-      continue;
-    Mat3 moment = Mat3::Zero();
-    for (Index k = model.clusters.offsets[c]; k < model.clusters.offsets[c + 1]; ++k) {
-      const Index i = model.clusters.members[k];
-      moment +=
-          model.match_masses[i] * model.clusters.weights[k] * positions[i] * (model.rest[i] - rest.centre).transpose();
+  std::vector<double> strains(tissueParts(model), 0.0);
+  if (model.cells) {
+    for (Index c = 0; c < strains.size(); ++c) {
+      // Of a crumb of tissue little is told by the corners of its cell.
+      const LatticeCell& cell = model.lattice->cells[c];
+      if (cell.samples == kNoSample || cell.isBridge(c)) continue;
+      strains[c] = strainOf(gradientOf(model.cells->cells[c], model.cells->half_edge, positions));
     }
-    const Mat3 deformation = moment * rest.moment_inverse;
-    const Vec3 squares = Eigen::SelfAdjointEigenSolver<Mat3>()
-                             .computeDirect(deformation.transpose() * deformation, Eigen::EigenvaluesOnly)
-                             .eigenvalues();
-    strains[c] = (squares.cwiseMax(0.0).cwiseSqrt().array() - 1.0).abs().maxCoeff();
+    return strains;
   }
+  std::vector<ClusterPose> poses(model.clusters.size());
+  fitClusters(matchInput(model), positions, poses);
+  for (Index c = 0; c < strains.size(); ++c)
+    if (model.shape.clusters[c].linear_rank) strains[c] = strainOf(poses[c].deformation);
   return strains;
 }
 

@@ -218,7 +218,7 @@ void Metrics::feedStrain(const TrainingFrame& frame) {
     double all = 0.0, beyond = 0.0;
     for (std::size_t c = 0; c < body.strains.size(); ++c) {
       if (!touched_any_) own.most[c] = std::max(own.most[c], body.strains[c]);
-      const double more = body.strains[c] - own.most[c], mass = body.model->shape.clusters[c].mass;
+      const double more = body.strains[c] - own.most[c], mass = tissuePart(*body.model, static_cast<Index>(c)).mass;
       strain_peak_ = std::max(strain_peak_, more);
       all += mass;
       if (more > limits_.strain) beyond += mass;
@@ -230,7 +230,8 @@ void Metrics::feedStrain(const TrainingFrame& frame) {
 
 Metrics::OwnStrain Metrics::ownStrainOf(const TrainingFrame::Body& body) const {
   OwnStrain own{body.name, body.model, {}, std::vector<double>(body.strains.size(), 0.0)};
-  for (const ClusterRest& cluster : body.model->shape.clusters) own.centres.push_back(body.placed * cluster.centre);
+  for (Index c = 0; c < tissueParts(*body.model); ++c)
+    own.centres.push_back(body.placed * tissuePart(*body.model, c).centre);
   // The nearest of its parents.
   const OwnStrain* parent = nullptr;
   for (const auto& [number, other] : own_strains_)

@@ -240,25 +240,13 @@ namespace {
 // Of mass or length: its powers and its inverse are numbers.
 bool isQuantity(double value) { return value > 1e-50 && value < 1e50; }
 
-// Of a surface of so many vertices, bound to a body's particles and clusters.
-std::string faultOf(const SurfaceBinding& b, std::size_t vertices, std::size_t particles, std::size_t clusters) {
-  if (b.particle.size() != vertices || !allBelowOrNone(b.particle, particles) || !allBelow(b.embedded, vertices) ||
-      !std::is_sorted(b.embedded.begin(), b.embedded.end()) ||
-      !areRows(b.offsets, b.embedded.size(), b.carriers.size()) || b.weights.size() != b.carriers.size() ||
-      !allBelow(b.carriers, particles) || b.levers.size() != b.embedded.size() ||
-      b.turners.size() != b.embedded.size() || !allBelow(b.lever_clusters, clusters))
+// Of a surface of so many vertices, bound to a body's particles and cells.
+std::string faultOf(const SurfaceBinding& b, std::size_t vertices, std::size_t particles, std::size_t cells) {
+  if (!areRows(b.offsets, vertices, b.carriers.size()) || b.weights.size() != b.carriers.size() ||
+      !allBelow(b.carriers, particles))
     return "a body's surface is not bound to its particles";
-  std::size_t next_embedded = 0;
-  for (Index v = 0; v < vertices; ++v) {
-    const bool embedded = next_embedded < b.embedded.size() && b.embedded[next_embedded] == v;
-    if (embedded != (b.particle[v] == kNoIndex)) return "a vertex of a body is neither a particle nor embedded";
-    next_embedded += embedded;
-  }
-  if (next_embedded != b.embedded.size()) return "a vertex of a body is embedded twice";
-  for (std::size_t r = 0; r < b.embedded.size(); ++r)
-    if (!b.levers[r].isZero(0.0) &&
-        std::find(b.lever_clusters.begin(), b.lever_clusters.end(), b.turners[r]) == b.lever_clusters.end())
-      return "a lever turns with no cluster";
+  if (b.cells.size() != (cells > 0 ? vertices : 0) || !allBelow(b.cells, cells))
+    return "a body's surface is not embedded in its cells";
   return "";
 }
 
@@ -286,6 +274,7 @@ std::string faultOfRegions(const BodyModel& m) {
 
 std::string faultOf(const BodyModel& m) {
   const std::size_t particles = m.rest.size(), clusters = m.clusters.size(), vertices = m.surface.vertices.size();
+  const std::size_t count = m.lattice ? m.lattice->cells.size() : 0;
   if (particles == 0) return "a body has no particles";
   if (m.masses.size() != particles || m.match_masses.size() != particles || m.fixed.size() != particles)
     return "a body's masses are not those of its particles";
@@ -296,27 +285,27 @@ std::string faultOf(const BodyModel& m) {
     return "a body's graph is not that of its particles";
   if (!std::all_of(m.graph.lengths.begin(), m.graph.lengths.end(), [](double length) { return length >= 0.0; }))
     return "a body's graph has a length below nothing";
-  if (clusters == 0 || !areRows(m.clusters.offsets, clusters, m.clusters.members.size()) ||
-      m.clusters.weights.size() != m.clusters.members.size() || !allBelow(m.clusters.members, particles) ||
-      m.clusters.seeds.size() != clusters || m.clusters.radii.size() != clusters ||
-      !allBelowOrNone(m.clusters.seeds, particles))
+  if (clusters + count == 0 || !(m.length > 0.0) || !isQuantity(m.length)) return "a body has no tissue";
+  if (clusters > 0 && (!areRows(m.clusters.offsets, clusters, m.clusters.members.size()) ||
+                       m.clusters.weights.size() != m.clusters.members.size() ||
+                       !allBelow(m.clusters.members, particles) || m.clusters.seeds.size() != clusters ||
+                       m.clusters.radii.size() != clusters || !allBelow(m.clusters.seeds, particles)))
     return "a body's clusters are not those of its particles";
   for (std::size_t c = 0; c < clusters; ++c)
     if (m.clusters.offsets[c] == m.clusters.offsets[c + 1]) return "a cluster is empty";
   if (m.shape.clusters.size() != clusters || (!m.shape.quadratic.empty() && m.shape.quadratic.size() != clusters) ||
-      (!m.elastic.empty() && m.elastic.size() != clusters))
+      (!m.elastic.empty() && (m.elastic.size() != clusters || m.lattice)))
     return "a body's rest shape is not that of its clusters";
   if (m.lattice) {
     const std::vector<LatticeCell>& cells = m.lattice->cells;
-    if (cells.size() != clusters || m.clusters.members.size() != 8 * clusters || m.lattice->corners != particles ||
-        !isQuantity(m.lattice->spacing) || !isQuantity(m.cell_mass))
-      return "a body's lattice is not that of its clusters";
+    if (cells.empty() || m.lattice->corners != particles || !isQuantity(m.lattice->spacing) || !isQuantity(m.cell_mass))
+      return "a body's lattice is not that of its particles";
     for (Index c = 0; c < cells.size(); ++c) {
       const LatticeCell& cell = cells[c];
-      if (m.clusters.offsets[c] != 8 * c ||
-          !std::equal(cell.corners.begin(), cell.corners.end(), m.clusters.members.begin() + 8 * c) || !cell.filled ||
+      if (!std::all_of(cell.corners.begin(), cell.corners.end(), [&](Index i) { return i < particles; }) ||
+          !cell.filled ||
           (cell.bridge != kNoIndex && !(cell.bridge < cells.size() && cells[cell.bridge].bridge == cell.bridge)))
-        return "a body's lattice is not that of its clusters";
+        return "a body's lattice is not that of its particles";
       if (cell.face < -1 || cell.face > 2) return "a cell has a face that is none";
       if (!(cell.mass_share >= 0.0 && cell.mass_share <= 1.0) ||
           !(cell.stiffness_share > 0.0 && cell.stiffness_share <= 1.0))
@@ -345,28 +334,25 @@ std::string faultOf(const BodyModel& m) {
     if (!(boxes <= 4e6)) return "the cells of a body's lattice are far apart";
   }
   if (!areTriangles(m.surface)) return "a body's triangles are not those of its vertices";
-  const SurfaceBinding& b = m.binding;
-  if (std::string fault = faultOf(b, vertices, particles, clusters); !fault.empty()) return fault;
+  if (std::string fault = faultOf(m.binding, vertices, particles, count); !fault.empty()) return fault;
   if (m.collision) {
     const CollisionSurface& c = *m.collision;
     if (!areTriangles(c.mesh) || c.mesh.triangles.empty() || !(c.distance >= 0.0 && c.distance < 1e50))
       return "a body's surface for contact has no triangles of its vertices";
-    if (std::string fault = faultOf(c.binding, c.mesh.vertices.size(), particles, clusters); !fault.empty())
+    if (std::string fault = faultOf(c.binding, c.mesh.vertices.size(), particles, count); !fault.empty())
       return "for contact, " + fault;
-    if (!m.lattice || c.binding.embedded.size() != c.mesh.vertices.size() || !allBelow(c.binding.turners, clusters))
-      return "a body's surface for contact is not embedded in its cells";
+    if (!m.lattice) return "a body's surface for contact is not embedded in its cells";
   }
-  // The next cut asks for the cell of a vertex, whether it has a lever or not.
-  if (m.lattice && (b.embedded.size() != vertices || !allBelow(b.turners, clusters)))
-    return "a body's surface is not embedded in its cells";
   return "";
 }
 
 std::string faultOf(const BodyModel& m, const BodyState& s) {
   const std::size_t particles = m.rest.size(), clusters = m.clusters.size();
+  const std::size_t cells = m.lattice ? m.lattice->cells.size() : 0;
   if (s.positions.size() != particles || s.velocities.size() != particles || s.poses.size() != clusters ||
-      s.surface.size() != m.surface.vertices.size() || (!s.plastic.empty() && s.plastic.size() != clusters) ||
-      (!s.eased.empty() && s.eased.size() != particles))
+      s.cells.size() != cells || s.surface.size() != m.surface.vertices.size() ||
+      (!s.plastic.empty() && s.plastic.size() != clusters) ||
+      (!s.plastic_cells.empty() && s.plastic_cells.size() != cells))
     return "a body's state is not that of its model";
   for (const FilledCavity& c : s.cavities) {
     if (!shellOf(m, c.patch) || !(std::abs(c.pressure) <= 1e50) || !(std::abs(c.content) <= 1e50) ||
@@ -374,13 +360,13 @@ std::string faultOf(const BodyModel& m, const BodyState& s) {
         !(c.filled_for >= 0.0) || !(c.open_for >= 0.0))
       return "a body's cavities are filled with what cannot be";
   }
-  if (s.unwinding && (m.any_fixed || clusters < 2)) return "a body that is held or of one cluster unwinds";
   return "";
 }
 
 std::string faultOf(const BodyModel& m, const Material& material) {
   if (const Status valid = material.validate(); !valid.ok()) return valid.error().detail;
   if (material.elastic() && !m.elastic_batch) return "an elastic body has no rest shape for it";
+  if (material.elastic() != (m.clusters.size() == 0) && m.lattice) return "a body has clusters of another material";
   if (!material.elastic() && material.mode == MatchMode::kQuadratic && m.shape.quadratic.empty())
     return "a quadratic body has no rest shape for it";
   return "";
@@ -422,12 +408,7 @@ void ModelTable::readOne(InArchive& archive) {
     makeClamp(*model);
   }
   makeCavities(*model);
-  if (!model->elastic.empty() && model->lattice) {
-    model->cells = std::make_shared<ElasticCells>(elasticCellsOf(*model));
-    model->elastic_batch = std::make_shared<ElasticBatch>(*model->cells);
-  } else if (!model->elastic.empty()) {
-    model->elastic_batch = std::make_shared<ElasticBatch>(matchInput(*model), model->elastic);
-  }
+  if (model->highest_frequency > 0.0 && (model->lattice || !model->elastic.empty())) makeElastic(*model);
   add(model);
 }
 

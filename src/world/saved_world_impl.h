@@ -127,6 +127,11 @@ void serialize(A& archive, WorldSettings& v) {
 
 // --- models
 
+template <class A>
+void serialize(A& archive, ClusterOptions& v) {
+  auto& [kind, grid, count, overlap] = v;
+  archive(choice(kind, ClusterOptions::Kind::kCells), grid, count, overlap);
+}
 MESHLESS_ARCHIVE(ParticleGraph, offsets, neighbours, lengths)
 template <class A>
 void serialize(A& archive, ClusterSet& v) {
@@ -137,7 +142,7 @@ MESHLESS_ARCHIVE(ClusterRest, mass, centre, size, linear_rank, quadratic_rank, m
 MESHLESS_ARCHIVE(QuadraticRest, mean, moment_inverse)
 MESHLESS_ARCHIVE(RestShape, clusters, quadratic)
 MESHLESS_ARCHIVE(ElasticRest, spread_inverse, spread)
-MESHLESS_ARCHIVE(SurfaceBinding, particle, embedded, offsets, carriers, weights, levers, turners, lever_clusters, bound)
+MESHLESS_ARCHIVE(SurfaceBinding, offsets, carriers, weights, cells)
 MESHLESS_ARCHIVE(Resistance, fraction, centroid, variance)
 MESHLESS_ARCHIVE(ClampPoint, cell, at, area)
 MESHLESS_ARCHIVE(LatticeCell, corners, place, samples, filled, held, resists, parted, mass_share, stiffness_share,
@@ -158,16 +163,16 @@ MESHLESS_ARCHIVE(CollisionSurface, mesh, binding, distance)
 /// then.
 template <class A>
 void serialize(A& archive, BodyModel& v) {
-  auto& [rest, masses, match_masses, fixed, any_fixed, graph, clusters, shape, elastic, elastic_batch, lattice,
-         cell_mass, regions, cells, clamp_points, clamp, tissue, most_spread_inverse, specific_stiffness,
-         poissons_ratio, highest_frequency, own, surface, texture, binding, collision, cavities, solid, incised,
-         spacing, rest_volume, rest_area, mass, next_patch] = v;
+  auto& [rest, masses, fixed, any_fixed, graph, lattice, cell_mass, regions, cells, clamp_points, clamp, tissue,
+         grouping, clusters, shape, match_masses, elastic, elastic_batch, length, specific_stiffness, poissons_ratio,
+         highest_frequency, own, surface, texture, binding, collision, cavities, solid, incised, spacing, rest_volume,
+         rest_area, mass, next_patch] = v;
   (void)elastic_batch, (void)cells, (void)clamp, (void)tissue, (void)cavities;
   auto of_contact = collision ? *collision : CollisionSurface();
   auto of_cells = lattice ? *lattice : CellLattice();
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
   archive(of_cells, cell_mass, regions, clamp_points);
-  archive(rest, masses, match_masses, held, any_fixed, graph, clusters, shape, elastic, endless(most_spread_inverse),
+  archive(rest, masses, held, any_fixed, graph, grouping, clusters, shape, match_masses, elastic, length,
           specific_stiffness, poissons_ratio, highest_frequency, own, surface, texture, binding, of_contact, solid,
           incised, spacing, rest_volume, rest_area, mass, next_patch);
   if constexpr (std::is_same_v<A, InArchive>) {
@@ -185,17 +190,12 @@ MESHLESS_ARCHIVE(PlasticShape, stretch, inverse, stiffening)
 MESHLESS_ARCHIVE(FilledCavity, patch, pressure, content, compliance, leak, filled_for, open_for, acting)
 template <class A>
 void serialize(A& archive, BodyState& v) {
-  auto& [positions, velocities, poses, surface, swelling, stretch, pace, stiffened, substep, plastic, eased, eased_for,
-         eased_whole, unwinding, cavities, placed] = v;
+  auto& [positions, velocities, poses, cells, surface, swelling, stretch, pace, stiffened, substep, plastic,
+         plastic_cells, cavities, placed] = v;
   // Whether the surface is up to date depends on when it was read. The fields that follow do not.
   if constexpr (!std::is_same_v<A, HashArchive>) archive(surface);
-  archive(positions, velocities, poses, swelling, stretch, pace, stiffened, substep, plastic, eased, eased_for,
-          eased_whole, unwinding, cavities, placed);
-}
-template <class A>
-void serialize(A& archive, ClusterOptions& v) {
-  auto& [kind, grid, count, overlap] = v;
-  archive(choice(kind, ClusterOptions::Kind::kCells), grid, count, overlap);
+  archive(positions, velocities, poses, cells, swelling, stretch, pace, stiffened, substep, plastic, plastic_cells,
+          cavities, placed);
 }
 MESHLESS_ARCHIVE(Plane, normal, point)
 template <class A>

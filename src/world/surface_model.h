@@ -11,7 +11,6 @@ struct SurfaceModel {
   BodyModelPtr model;
   ContactSurface surface;
   std::vector<double> inverse_masses;         // [1/kg] 0 where fixed
-  std::unique_ptr<const RigidGroups> groups;  // its clusters, of an elastic body all of it; none where it is held
   std::size_t bytes() const;                  // without the model
 };
 

@@ -171,7 +171,7 @@ Result<SpawnReply> World::Impl::spawn(const PreparedBody& body) {
   for (const std::string& warning : body.def.warnings) text += "; " + warning;
   say(EventType::kSpawned, name, 0, text);
   return SpawnReply{admitted.id, name, admitted.model->rest.size(), admitted.model->surface.triangles.size(),
-                    admitted.model->clusters.size()};
+                    admitted.model->groups()};
 }
 
 void World::Impl::refreshSurface(WorldBody& body) {

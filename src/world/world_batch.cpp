@@ -24,7 +24,7 @@ bool fitsEvenly(const BodyModel& model) {
 bool suits(const WorldBody& body) {
   const BodyModel& model = *body.model;
   return !body.material.elastic() && !body.material.plastic() && body.state.plastic.empty() &&
-         body.state.eased.empty() && body.state.cavities.empty() && !model.any_fixed && body.state.swelling == 1.0 &&
+         !model.elastic_batch && body.state.cavities.empty() && !model.any_fixed && body.state.swelling == 1.0 &&
          body.material.volume.points.empty() && body.material.area.points.empty() &&
          model.rest.size() <= kMostParticles && model.rest.size() >= 4 && body.material.alpha > 0.0 &&
          BodyBatch::holds(matchInput(model, body.state)) && fitsEvenly(model);

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <limits>
 
-#include "meshless_surgery/body/ease.h"
 #include "meshless_surgery/geometry/query/inside.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/tools/grasp.h"
@@ -38,7 +37,7 @@ TissuePlace placeAt(const WorldBody& body, Index triangle, const Vec3& point) {
     all += area;
     if ((now[t[k]] - point).squaredNorm() < (now[nearest] - point).squaredNorm()) nearest = t[k];
   }
-  const Index cell = body.model->binding.turners[nearest];
+  const Index cell = body.model->binding.cells[nearest];
   return {cell, body.model->lattice->placeIn(body.model->lattice->cells[cell], all > 0.0 ? sum / all : rest[nearest])};
 }
 
@@ -316,6 +315,7 @@ Result<Reply> World::Impl::apply(const SetMaterialCommand& command) {
     body->model = withMaterial(before, body->material, material);
     const double h = body->state.substep > 0.0 ? body->state.substep : substepNow();
     body->state.stiffened = stiffenedBy(*before, body->material, *body->model, material, h, body->state);
+    fitPoses(*body->model, body->state);
     // Other masses move embedded vertices by a rounding. Whether the surface was read before must make no difference.
     body->surface_current = false;
     body->material = material;

@@ -5,7 +5,6 @@
 #include <sstream>
 
 #include "meshless_surgery/body/cavities.h"
-#include "meshless_surgery/body/ease.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
 
@@ -153,7 +152,6 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
         cutBody(*body->model, body->state, plane,
                 {command.roughness, static_cast<std::uint32_t>(next_ticket + step), picked(body->id)});
     if (cut) {
-      easeRelease(*body->model, body->state, body->material, substepNow(), heldBySprings(*body), cut->pieces);
       severed.push_back({body->id, std::move(*cut)});
     } else if (cut.error().code != ErrorCode::kMissed) {
       refused = body->name + " cannot be cut: " + cut.error().detail;
@@ -212,13 +210,6 @@ Status World::Impl::checkPieces(std::size_t gone, std::size_t come) const {
   return Error{ErrorCode::kFailed, "there would be " + std::to_string(pieces - gone + come) +
                                        " pieces; accepted: up to " + std::to_string(kMostPieces) +
                                        ": remove some, or name the bodies to be cut"};
-}
-
-std::vector<Index> World::Impl::heldBySprings(const WorldBody& body) const {
-  std::vector<Index> held;
-  for (const Pick& pick : picks)
-    if (pick.body == body.id) held.push_back(pick.particle);
-  return held;
 }
 
 std::vector<std::string> World::Impl::replaceByPieces(const BodyId& parent_id, std::vector<BodyPiece> pieces) {

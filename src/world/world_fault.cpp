@@ -14,31 +14,23 @@ void restAnew(WorldBody& body) {
   const BodyModel& model = *body.model;
   BodyState& state = body.state;
   Box at_rest;
-  const Pose& placed = state.placed;
+  const Pose placed = state.placed;
   for (const Vec3& p : model.rest) at_rest.extend(placed * p);
   Vec3 shift = Vec3::Zero();
   // Fixed particles are where they are at rest. Others stay about where they last were.
   if (!model.any_fixed && body.bounds.min.cwiseAbs().maxCoeff() < kFarthestPlace &&
       body.bounds.max.cwiseAbs().maxCoeff() < kFarthestPlace && !body.bounds.empty())
     shift = 0.5 * (body.bounds.min + body.bounds.max) - 0.5 * (at_rest.min + at_rest.max);
-  for (std::size_t i = 0; i < model.rest.size(); ++i) state.positions[i] = placed * model.rest[i] + shift;
-  state.velocities.assign(model.rest.size(), Vec3::Zero());
-  for (std::size_t c = 0; c < state.poses.size(); ++c) {
-    state.poses[c] = ClusterPose();
-    state.poses[c].centre = placed * model.shape.clusters[c].centre + shift;
-    state.poses[c].rotation = placed.rotation;
-  }
-  for (std::size_t v = 0; v < state.surface.size(); ++v) state.surface[v] = placed * model.surface.vertices[v] + shift;
-  state.swelling = state.stretch = state.pace = state.stiffened = 1.0;
-  state.plastic.clear();
-  state.eased.clear();
-  state.eased_for = 0.0;
+  BodyState anew = restState(model, {placed.rotation, placed.translation + shift});
+  anew.placed = placed;
+  anew.substep = state.substep;
+  anew.cavities = std::move(state.cavities);
+  state = std::move(anew);
   for (FilledCavity& cavity : state.cavities) {
     cavity.filled_for = cavity.acting = 0.0;
     if (!std::isfinite(cavity.pressure)) cavity.pressure = 0.0;
     if (!std::isfinite(cavity.content)) cavity.content = 0.0;
   }
-  state.unwinding = false;
 }
 
 }  // namespace

@@ -212,7 +212,6 @@ struct World::Impl : KeptWorld {
   StepReport report;
   std::vector<WorldBody*> awake;  // of this frame, in the order of bodies
   std::vector<char> faulty;       // one each: its coordinates are no numbers
-  std::vector<WorldBody*> wound;  // in findWound()
   struct Sleepers {               // in fallAsleep(), one a body
     UnionFind joined;
     std::vector<char> held, ready, whole;  // of an island's root
@@ -275,7 +274,6 @@ struct World::Impl : KeptWorld {
   Result<CutReply> cutNow(const CutCommand& command);
   /// Refuses what would leave more pieces than kMostPieces; `gone` of those there are go, `come` are made.
   Status checkPieces(std::size_t gone, std::size_t come) const;
-  std::vector<Index> heldBySprings(const WorldBody& body) const;  // particles in the middle of a grasp
   double graspRadius(const BodyModel& model) const;               // [m]
   std::vector<TissuePlace> picked(const BodyId& body) const;      // places of its picks, in their order
   /// Retires a body and admits its pieces in its place; their names.
@@ -348,7 +346,6 @@ struct World::Impl : KeptWorld {
   void emptyCavities();
   /// Of a body that a blade has just made or opened.
   void sayLeaks(const std::string& name, const BodyModel& model, const BodyState& state);
-  void findWound();
   void findCollapsed();
   void closeBlades();
   void showBlades(const ClosingCut& cut);

@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cmath>
 
-#include "meshless_surgery/body/ease.h"
 #include "meshless_surgery/body/incise_body.h"
 #include "world_impl.h"
 
@@ -50,7 +49,6 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
     if (!bounds.overlaps(reach)) continue;
     Result<IncisedBody> opened = inciseBody(*body->model, body->state, command.blade, picked(body->id));
     if (opened) {
-      easeRelease(*body->model, body->state, body->material, substepNow(), heldBySprings(*body), opened->pieces);
       all.push_back({body->id, std::move(*opened)});
     } else if (opened.error().code == ErrorCode::kMissed) {
       missed = body->name + ": " + opened.error().detail;
@@ -93,7 +91,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
       descent.child = body.id;
       const BodyModelPtr whole = std::exchange(body.model, std::move(opened.body.pieces[0].model));
       body.state = std::move(opened.body.pieces[0].state);
-      if (body.model->lattice) followPieces(body.id, positions, {descent});
+      followPieces(body.id, positions, {descent});
       followFibres(body.id, *whole, positions, {body.id});
       body.mesh.reset();
       body.surface_current = true;

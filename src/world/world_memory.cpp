@@ -45,7 +45,7 @@ MemoryUse World::memory() const {
   use.contact += w.surface_contacts.bytes() + bytesOf(w.colliders, w.loaded, w.surface_work, w.stiffest, w.members);
   for (const SurfaceWork& work : w.surface_work) {
     use.contact += bytesOf(work.members, work.bodies, work.alone, work.side_by_side, work.lanes, work.each_counters) +
-                   bytesOf(work.solver_scratch.active, work.solver_scratch.levers);
+                   bytesOf(work.solver_scratch.active, work.solver_scratch.pulls);
     for (const auto& some : work.side_by_side) use.contact += bytesOf(some);
     for (const SurfaceWork::Member& member : work.members)
       use.contact += bytesOf(member.previous, member.picks, member.springs, member.fibres, member.fibre_rows);

@@ -5,7 +5,6 @@
 #include <sstream>
 #include <utility>
 
-#include "meshless_surgery/body/unwind.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
@@ -90,7 +89,6 @@ void World::Impl::finishStep(double h_frame) {
   mendFaults();
   tearFibres();
   emptyCavities();
-  findWound();
   findCollapsed();
   for (Pick& pick : picks)
     if (const WorldBody* body = find(pick.body)) pick.position = graspMean(pick, body->state.positions);
@@ -131,10 +129,7 @@ void World::Impl::emptyCavities() {
 }
 
 void World::Impl::matchAlone(WorldBody& body, double h, MatchCounters& counters, const ForEach& each) const {
-  if (body.state.unwinding)
-    unwind(*body.model, settings.gravity, h, body.state, body.scratch);
-  else
-    matchAndMove(*body.model, body.material, settings.gravity, h, body.state, body.scratch, counters, each);
+  matchAndMove(*body.model, body.material, settings.gravity, h, body.state, body.scratch, counters, each);
 }
 
 // As many as the stiffest body needs.

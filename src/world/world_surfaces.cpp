@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <sstream>
 
 #include "meshless_surgery/body/binding.h"
@@ -26,39 +25,29 @@ constexpr double kSlowedMass = 0.05;  // of an island, at most: slivers are slow
 // Bodies without a surface meet others by their particles.
 ContactSurface surfaceOf(const BodyModel& model) {
   if (model.surface.vertices.empty()) return {TriangleMesh(), ownSupports(static_cast<Index>(model.rest.size()))};
-  const SurfaceBinding binding =
-      model.collision ? fewerCarriers(model.collision->binding, model.rest, model.spacing) : model.binding;
+  SurfaceBinding binding = model.collision ? model.collision->binding : model.binding;
+  if (model.lattice && !model.elastic_batch)
+    binding = cornerCarriers(binding, *model.lattice, model.rest);
+  else if (model.collision)
+    binding = fewerCarriers(binding, model.rest, model.spacing);
   const TriangleMesh& mesh = model.collision ? model.collision->mesh : model.surface;
-  const Index count = static_cast<Index>(mesh.vertices.size());
   VertexSupports supports;
-  std::vector<Index> embedded(count, kNoIndex);
-  for (Index r = 0; r < binding.embedded.size(); ++r) embedded[binding.embedded[r]] = r;
-  supports.offsets.push_back(0);
-  for (Index v = 0; v < count; ++v) {
-    if (embedded[v] == kNoIndex) {
-      supports.particles.push_back(binding.particle[v]);
-      supports.weights.push_back(1.0);
-    } else {
-      for (Index k = binding.offsets[embedded[v]]; k < binding.offsets[embedded[v] + 1]; ++k) {
-        supports.particles.push_back(binding.carriers[k]);
-        supports.weights.push_back(binding.weights[k]);
-      }
-    }
-    supports.offsets.push_back(static_cast<Index>(supports.particles.size()));
-  }
+  supports.offsets = std::move(binding.offsets);
+  supports.particles = std::move(binding.carriers);
+  supports.weights = std::move(binding.weights);
   return {mesh, std::move(supports)};
 }
 
-// [m] how far embedded vertices may be beyond the bounds of the particles. Two spacings, or less for crumbs, whose
-// whole surface is nearer to their few particles. Otherwise, where many crumbs lie together, each would be next to all.
+// [m] how far vertices may be beyond the bounds of the particles that they follow. Two spacings, or less for crumbs,
+// whose whole surface is nearer to their few particles. Otherwise, where many crumbs lie together, each would be next
+// to all.
 double embeddedReachOf(const BodyModel& model) {
   const SurfaceBinding& binding = model.binding;
-  double farthest = 0.0;  // squared, of an embedded vertex from its nearest carrier
-  for (Index r = 0; r < binding.embedded.size(); ++r) {
+  double farthest = 0.0;  // squared, of a vertex from its nearest carrier
+  for (Index v = 0; v < binding.size(); ++v) {
     double nearest = std::numeric_limits<double>::infinity();
-    for (Index k = binding.offsets[r]; k < binding.offsets[r + 1]; ++k)
-      nearest = std::min(nearest,
-                         (model.surface.vertices[binding.embedded[r]] - model.rest[binding.carriers[k]]).squaredNorm());
+    for (Index k = binding.offsets[v]; k < binding.offsets[v + 1]; ++k)
+      nearest = std::min(nearest, (model.surface.vertices[v] - model.rest[binding.carriers[k]]).squaredNorm());
     farthest = std::max(farthest, nearest);
   }
   return 2.0 * std::min(std::sqrt(farthest), model.spacing);
@@ -108,19 +97,10 @@ WorldObstacle::WorldObstacle(ObstacleDef of_def)
 SurfaceModel::SurfaceModel(BodyModelPtr of_model) : model(std::move(of_model)), surface(surfaceOf(*model)) {
   for (std::size_t i = 0; i < model->masses.size(); ++i)
     inverse_masses.push_back(model->fixed[i] ? 0.0 : 1.0 / model->masses[i]);
-  if (!(model->specific_stiffness > 0.0) && !model->isHeld()) {
-    groups = std::make_unique<RigidGroups>(model->clusters.offsets, model->clusters.members, model->clusters.weights,
-                                           model->masses);
-  } else if (!model->isHeld()) {
-    std::vector<Index> all(model->masses.size());
-    std::iota(all.begin(), all.end(), Index{0});
-    groups = std::make_unique<RigidGroups>(std::vector<Index>{0, static_cast<Index>(all.size())}, all,
-                                           std::vector<double>(all.size(), 1.0), model->masses);
-  }
 }
 
 std::size_t SurfaceModel::bytes() const {
-  return sizeof *this + surface.bytes() + bytesOf(inverse_masses) + (groups ? groups->bytes() : 0);
+  return sizeof *this + surface.bytes() + bytesOf(inverse_masses);
 }
 
 const SurfaceModel& World::Impl::surfaceModel(WorldBody& body) {
@@ -140,7 +120,9 @@ void World::Impl::fillCollider(WorldBody& body, double h_frame, Collider& collid
   collider.key = body.number;
   collider.moves = !body.asleep;
   collider.friction = body.material.friction;
-  collider.restitution = body.material.restitution;
+  // What is stepped by its cells bounces by itself: pressed on a contact, a vertex closes faster than any limit on what
+  // is an impact, and would be thrown back for ever.
+  collider.restitution = body.model->elastic_batch ? 0.0 : body.material.restitution;
   collider.edge_length = body.edge_length;
   collider.spacing = body.model->spacing;
   collider.positions = body.state.positions.data();
@@ -359,13 +341,14 @@ void World::Impl::stepSurfaces(double h_frame, int parts, int parts_left) {
     report.substeps = std::max(report.substeps, static_cast<std::size_t>(substeps * parts));
     for (const Index b : islands[n].bodies) {
       const WorldBody& body = *bodies[b];
-      // As what deforms answers its own stiffness (see matchAndMove): a body that is slowed, or clusters drawn to
-      // shape.
       if (!surface_contacts.needed()[b]) continue;
-      if (body.material.elastic())
-        surface_contacts.setRigidShare(b, body.surface_model->groups.get(), 1.0 - body.stiffness_factor);
-      else if (body.surface_model->groups)
-        surface_contacts.setRigidShare(b, body.surface_model->groups.get(), body.state.stiffened * body.material.alpha);
+      // As what deforms answers its own stiffness (see matchAndMove): a body that is slowed, or one with a single goal,
+      // whose particle under a contact has little mass of its own.
+      const bool drawn = !body.material.elastic() && body.model->clusters.size() == 1;
+      const double yields = drawn ? 1.0 - body.state.stiffened * body.material.alpha : 1.0;
+      // Attached by stiff fibres, a light body that answers as a whole by more than that gains energy.
+      const double soft = islands[n].joined ? yields : yields * yields;
+      surface_contacts.setRigidShare(b, 1.0 - body.stiffness_factor * soft);
     }
   }
   std::size_t largest = 0, total = 0;

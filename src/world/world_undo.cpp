@@ -75,6 +75,7 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
       const bool slept = body->asleep && body->state.positions == was.state.positions;
       if ((!slept || !holdsAsThen(*body)) && body->state.positions.size() == was.state.positions.size()) {
         body->state = std::move(was.state);
+        fitPoses(*body->model, body->state);  // of the material that it has now
         body->surface_current = was.surface_current;
         surface_contacts.forget(body->number);  // what pressed then is not what presses now
         wake(*body);

@@ -36,7 +36,7 @@ IncisedBody incised(const PreparedBody& body) {
   return std::move(*result);
 }
 
-Vec3 follow(const SurfaceBinding& binding, const Points& x, Index r) { return embeddedPosition(binding, x, {}, r); }
+Vec3 follow(const SurfaceBinding& binding, const Points& x, Index r) { return binding.place(r, x); }
 
 TEST(CellBlend, FollowsAffineMotionExactly) {
   Random random(5);
@@ -87,7 +87,7 @@ TEST(CellBlend, DoesNotReachAcrossAWound) {
   for (Index v = 0; v < model.surface.vertices.size(); ++v) {
     const Vec3& p = model.surface.vertices[v];
     if (!deep(p) || std::abs(p.y() - 0.0012) > 0.02) continue;
-    const LatticeCell& own = model.lattice->cells[model.binding.turners[v]];
+    const LatticeCell& own = model.lattice->cells[model.binding.cells[v]];
     double height = 0.0;  // of the tissue that it is of
     for (SampleSet left = own.samples; left; left &= left - 1)
       height += model.lattice->restPlace(own, samplePlace(lowestSample(left))).y() - 0.0012;

@@ -92,15 +92,16 @@ TEST(CollisionSurface, RefusesEdgesOutOfRange) {
   }
 }
 
-// Sheets on each other cannot be made even without crossing; appearance materials have no cells.
+// Sheets on each other cannot be made even without crossing; an open surface has no cells.
 TEST(CollisionSurface, WarnsWhereItCannotBeMade) {
-  BodyDef looks = tissue(sphereMesh(0.1, 0.01));
-  looks.material = Material();
-  looks.collision = {CollisionChoice::Kind::kEdge, 0.02};
-  const PreparedBody of_clusters = test::prepared(looks);
-  EXPECT_FALSE(of_clusters.model->collision);
-  ASSERT_EQ(of_clusters.def.warnings.size(), 1u);
-  EXPECT_NE(of_clusters.def.warnings[0].find("visual surface"), std::string::npos) << of_clusters.def.warnings[0];
+  BodyDef opened = test::defOf(sphereMesh(0.1, 0.01));
+  opened.mesh.triangles.pop_back();
+  opened.solid = false;
+  opened.collision = {CollisionChoice::Kind::kEdge, 0.02};
+  const PreparedBody open = test::prepared(opened);
+  EXPECT_FALSE(open.model->collision);
+  ASSERT_EQ(open.def.warnings.size(), 1u);
+  EXPECT_NE(open.def.warnings[0].find("visual surface"), std::string::npos) << open.def.warnings[0];
   BodyDef thin = tissue(boxMesh(Vec3(0.1, 0.1, 0.001), 0.002));
   thin.spacing = 0.002;
   thin.collision = {CollisionChoice::Kind::kEdge, 0.15};

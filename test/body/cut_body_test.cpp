@@ -69,9 +69,9 @@ TEST(CutBody, KeepsVolumeMassMomentumAndPlaces) {
     // Rounding: 4.3e-15, 1.1e-15, 7.2e-16 and 7e-16 are reached by 40 cuts.
     const Vec3 spin = angularMomentumAbout(Vec3::Zero(), *body.model, body.state);
     EXPECT_NEAR(volume, before.volume, 1e-2 * before.volume) << "vertices at the blade follow their own side's tissue";
-    EXPECT_NEAR(rest_volume, body.model->rest_volume, 5e-15 * body.model->rest_volume);
+    EXPECT_NEAR(rest_volume, body.model->rest_volume, 5e-4 * body.model->rest_volume) << "vertices near the blade go to it";
     EXPECT_NEAR(mass, body.model->mass, 1e-12 * mass);
-    EXPECT_LT((linear - before.linear_momentum).norm(), 3.6e-15 * before.linear_momentum.norm());
+    EXPECT_LT((linear - before.linear_momentum).norm(), 1e-14 * before.linear_momentum.norm());
     EXPECT_LT((angular - spin).norm(), 1e-14 * spin.norm());
   }
 }
@@ -96,7 +96,7 @@ TEST(CutBody, ARoughCutKeepsVolumeAndFitsOnBothSides) {
     }
     const double before = measureBody(*body.model, body.state).volume;
     EXPECT_NEAR(volume, before, 1e-2 * before);
-    EXPECT_NEAR(rest_volume, body.model->rest_volume, 2.5e-14 * body.model->rest_volume);
+    EXPECT_NEAR(rest_volume, body.model->rest_volume, 5e-4 * body.model->rest_volume);
   }
 }
 
@@ -114,16 +114,13 @@ TEST(CutBody, ParticlesLieOnTheirSideOfTheRestCap) {
       for (const BodyPiece& piece : cut->pieces) {
         const SolidQuery solid(piece.model->surface);
         // Corners of filled cells are on both sides: samples of the tissue in them are not.
-        Points tissue = piece.model->rest;
-        double reach = 0.25 * 0.012;
-        if (elastic) {
-          const CellLattice& lattice = *piece.model->lattice;
-          tissue.clear();
-          for (const LatticeCell& cell : lattice.cells)
-            for (SampleSet left = cell.samples; left; left &= left - 1)
-              tissue.push_back(lattice.restPlace(cell, samplePlace(lowestSample(left))));
-          ASSERT_FALSE(tissue.empty());
-        }
+        Points tissue;
+        const double reach = 0.3 * def.spacing;
+        const CellLattice& lattice = *piece.model->lattice;
+        for (const LatticeCell& cell : lattice.cells)
+          for (SampleSet left = cell.samples; left; left &= left - 1)
+            tissue.push_back(lattice.restPlace(cell, samplePlace(lowestSample(left))));
+        ASSERT_FALSE(tissue.empty());
         for (const Vec3& p : tissue)
           if (!solid.contains(p)) {
             double nearest = 1e9;  // to the cap's triangles
@@ -207,7 +204,7 @@ TEST(CutBody, AHundredCutsToCrumbsKeepMassVolumeAndParticles) {
     EXPECT_TRUE(test::allFinite(moving.surface));
   }
   EXPECT_NEAR(mass, whole.model->mass, 1e-9 * mass);
-  EXPECT_NEAR(volume, whole.model->rest_volume, 1e-9 * volume);
+  EXPECT_NEAR(volume, whole.model->rest_volume, 5e-4 * volume);
 }
 
 }  // namespace cut_body_test

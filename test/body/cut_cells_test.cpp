@@ -387,7 +387,7 @@ std::size_t seamsOf(const BodyModel& model) {
   std::size_t seams = 0;
   for (const Triangle& t : model.surface.triangles)
     for (int k = 0; k < 3; ++k) {
-      const Index a = model.binding.turners[t[k]], b = model.binding.turners[t[(k + 1) % 3]];
+      const Index a = model.binding.cells[t[k]], b = model.binding.cells[t[(k + 1) % 3]];
       if (a >= b) continue;
       const auto [found, is_new] = known.emplace(std::pair(a, b), false);
       if (is_new) found->second = hangTogether(a, b);
@@ -404,7 +404,7 @@ TEST(CutCells, TissueThatASurfaceEnclosesHangsTogetherAlongIt) {
 }
 
 void expectRowsAsMadeAnew(const CellLattice& lattice, const Points& rest, const SurfaceBinding& binding) {
-  const SurfaceBinding anew = bindToCells(lattice, rest, binding.turners);
+  const SurfaceBinding anew = bindToCells(lattice, rest, binding.cells);
   ASSERT_EQ(binding.offsets, anew.offsets);
   ASSERT_EQ(binding.carriers, anew.carriers);
   for (std::size_t k = 0; k < anew.weights.size(); ++k) ASSERT_NEAR(binding.weights[k], anew.weights[k], 1e-12);

@@ -178,7 +178,7 @@ TEST(RigidMotionOf, CarriesTheAngularMomentumOfWhatIsDrawnOutToALine) {
       wanted += arm.cross(velocities[i] - motion.velocity);
       carried += arm.cross(motion.spin.cross(positions[i] - motion.centre));
     }
-    EXPECT_LT((carried - wanted).norm(), 1e-9 * wanted.norm()) << "drawn out " << drawn_out << " times";
+    EXPECT_LT((carried - wanted).norm(), 3e-9 * wanted.norm()) << "drawn out " << drawn_out << " times";
   }
 }
 

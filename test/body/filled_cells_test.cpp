@@ -48,7 +48,7 @@ TEST(FilledCells, MassesAddUpToTheBodysAndEveryCornerHasSome) {
     const double mass = body.def.material.density * model.rest_volume;
     EXPECT_NEAR(model.mass, mass, 1e-12 * mass);
     for (const double m : model.masses) EXPECT_GT(m, 1e-4 * model.cell_mass / 8.0);
-    EXPECT_EQ(model.clusters.size(), model.lattice->cells.size());
+    EXPECT_EQ(model.cells->cells.size(), model.lattice->cells.size());
     bool ghosts = false;
     for (Index i = 0; i < model.rest.size(); ++i) ghosts = ghosts || !model.isTissue(i);
     EXPECT_TRUE(ghosts);
@@ -68,26 +68,6 @@ TEST(FilledCells, TheSurfaceIsWhereItWasAndFollowsEveryAffineMap) {
     updateSurface(*body.model, body.state);
     for (std::size_t v = 0; v < body.state.surface.size(); ++v)
       EXPECT_LT((body.state.surface[v] - map * body.model->surface.vertices[v] - shift).norm(), 1e-12 * size);
-  }
-}
-
-// The clusters' own fit, which levers and contacts use, is the cells' gradient for every motion.
-TEST(FilledCells, ClustersFitWhatTheirCellsDo) {
-  Random random(2);
-  for (const PreparedBody& body : bodies()) {
-    const BodyModel& model = *body.model;
-    if (!model.cells) continue;
-    Points y = model.rest;
-    for (Vec3& p : y) p += random.vector(0.002);
-    std::vector<ClusterPose> of_clusters(model.clusters.size()), of_cells = of_clusters;
-    Points a;
-    MatchCounters counters;
-    fitClusters(matchInput(model), y, of_clusters);
-    elasticAccelerations(*model.cells, elasticParameters(5e3, 0.4, 1000.0), y, of_cells, a, counters);
-    for (std::size_t c = 0; c < of_cells.size(); ++c) {
-      EXPECT_LT((of_clusters[c].deformation - of_cells[c].deformation).norm(), 1e-10);
-      EXPECT_LT((of_clusters[c].centre - of_cells[c].centre).norm(), 1e-13);
-    }
   }
 }
 

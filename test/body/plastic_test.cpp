@@ -69,7 +69,7 @@ TEST(Flow, StrainBeyondTheYieldDecaysAtItsRateWhateverTheStep) {
     fitClusters(matchInput(*body.model), held, state.poses);
     const int steps = static_cast<int>(std::lround(0.1 / h));
     for (int step = 0; step < steps; ++step) {
-      flow(matchInput(*body.model, state), body.def.material.plasticity, h, state.poses, state.plastic);
+      flow(body.def.material.plasticity, h, &body.model->shape, state.poses, state.plastic);
       fitClusters(matchInput(*body.model, state), held, state.poses);
     }
     const double left = strainLeft(state, 0);
@@ -84,7 +84,7 @@ TEST(Flow, EndsAtTheYieldAndNeverBelowEvenInOneHugeStep) {
   fitClusters(matchInput(*body.model), drawnOut(body.model->rest, 1.4), state.poses);
   Plasticity plasticity{0.1, 1e6, 3.0};
   for (int step = 0; step < 20; ++step) {
-    flow(matchInput(*body.model, state), plasticity, 1.0, state.poses, state.plastic);
+    flow(plasticity, 1.0, &body.model->shape, state.poses, state.plastic);
     for (std::size_t c = 0; c < state.plastic.size(); ++c) EXPECT_GE(strainLeft(state, c), 0.1 - 1e-6);
   }
   for (std::size_t c = 0; c < state.plastic.size(); ++c) EXPECT_NEAR(strainLeft(state, c), 0.1, 1e-6);
@@ -102,7 +102,7 @@ TEST(Flow, KeepsTheVolumeAndTheMaximum) {
     Points y;
     for (const Vec3& p : body.model->rest) y.push_back(f * p);
     fitClusters(matchInput(*body.model, state), y, state.poses);
-    flow(matchInput(*body.model, state), plasticity, 0.02, state.poses, state.plastic);
+    flow(plasticity, 0.02, &body.model->shape, state.poses, state.plastic);
     for (const PlasticShape& shape : state.plastic) {
       EXPECT_NEAR(shape.stretch.determinant(), 1.0, 1e-9);
       EXPECT_LE(strainOf(shape.stretch), 0.4 + 1e-9);
@@ -120,7 +120,7 @@ TEST(Flow, BelowTheYieldNothingChangesToTheBit) {
     body.state.positions = plain.state.positions = drawnOut(body.model->rest, 1.3);
     run(body, 60, 1.0 / 240);
     run(plain, 60, 1.0 / 240);
-    EXPECT_TRUE(body.state.plastic.empty());
+    EXPECT_TRUE(body.state.plastic.empty() && body.state.plastic_cells.empty());
     for (std::size_t i = 0; i < body.state.positions.size(); ++i)
       EXPECT_EQ(body.state.positions[i], plain.state.positions[i]);
   }
@@ -138,15 +138,15 @@ TEST(Flow, KeepsAShapeAfterRelease) {
         for (Vec3& v : body.state.velocities) v.setZero();
         run(body, 1, 1.0 / 500);
       }
-      ASSERT_FALSE(body.state.plastic.empty());
+      ASSERT_FALSE(body.state.plastic_cells.empty());
       run(body, 4000, 1.0 / 500);
       const double kept = lengthOf(body.state.positions) / rest;
       // What has not flowed springs back: the yield's strain and what the rate has left of the rest.
       const double back = strainOf(1.4 / kept), left = 0.1 + (strainOf(1.4) - 0.1) * std::exp(-10.0 * 0.8);
-      EXPECT_NEAR(back, left, 4e-5) << elastic << toString(mode);  // 8.2e-6
+      EXPECT_NEAR(back, left, elastic ? 4e-5 : 3e-3) << elastic << toString(mode);  // 8.2e-6, 1.5e-3: cells against goals
       updateSurface(*body.model, body.state);
       const double volume = measureBody(*body.model, body.state).volume / body.model->rest_volume;
-      EXPECT_NEAR(volume, 1.0, 3e-13);                                        // 6.4e-14
+      EXPECT_NEAR(volume, 1.0, elastic ? 3e-13 : 3e-4);                       // 6.4e-14, 9e-5
       EXPECT_LT(measureBody(*body.model, body.state).kinetic_energy, 1e-22);  // [J] rounding: 1.3e-26
     }
 }
@@ -165,14 +165,14 @@ TEST(Flow, LeavesMomentumAndTakesNoEnergyIn) {
     const ElasticParameters material = elasticParameters(5000.0, body.def.material.poissons_ratio, 1000.0);
     const auto energy = [&] {  // of looks without the stretch's, which has no measure
       const double moving = measureBody(*body.model, body.state).kinetic_energy;
-      const MatchInput input = matchInput(*body.model, body.state);
       if (!elastic) return moving;
-      return moving + elasticEnergy(input, body.model->elastic, material, body.state.positions, body.state.poses);
+      return moving + elasticEnergy(*body.model->cells, material, body.state.positions, body.state.cells, 1.0,
+                                    &body.state.plastic_cells);
     };
     const BodyMeasures before = measureBody(*body.model, body.state);
     const double energy_before = energy(), movement = std::sqrt(2.0 * body.model->mass * before.kinetic_energy);
     run(body, 2000, 1.0 / 1000);
-    ASSERT_FALSE(body.state.plastic.empty());
+    ASSERT_FALSE(body.state.plastic_cells.empty());
     updateSurface(*body.model, body.state);
     const BodyMeasures after = measureBody(*body.model, body.state);
     // Worst of 20 seeds: 2.2e-13, 9.2e-14, 0.054 of elastic tissue's energy, 1.30 of that of looks.
@@ -185,27 +185,28 @@ TEST(Flow, LeavesMomentumAndTakesNoEnergyIn) {
 TEST(Flow, ForcesAreTheGradientOfTheEnergyOfTheNewShape) {
   Random random(7);
   PreparedBody body = dough(true);
-  for (std::size_t c = 0; c < body.model->clusters.size(); ++c) {
+  for (std::size_t c = 0; c < body.model->cells->cells.size(); ++c) {
     Mat3 l = Mat3::Zero();
     for (int k = 0; k < 9; ++k) l(k) = random.uniform(-0.2, 0.2);
     l = Mat3(0.5 * (l + l.transpose()));
-    body.state.plastic.push_back(plasticShape(l - l.trace() / 3.0 * Mat3::Identity()));
+    body.state.plastic_cells.push_back(plasticShape(l - l.trace() / 3.0 * Mat3::Identity()));
   }
-  const MatchInput input = matchInput(*body.model, body.state);
+  const ElasticCells& cells = *body.model->cells;
+  const std::vector<PlasticShape>* shapes = &body.state.plastic_cells;
   const ElasticParameters material = elasticParameters(5000.0, 0.45, 1000.0);
   Points y = body.model->rest;
   for (Vec3& p : y) p += random.vector(0.002);
   Points a;
   MatchCounters counters;
-  elasticAccelerations(input, body.model->elastic, material, y, body.state.poses, a, counters);
+  elasticAccelerations(cells, material, y, body.state.cells, a, counters, 1.0, shapes);
   const double step = 1e-7;
   for (Index i = 0; i < y.size(); i += 7)
     for (int axis = 0; axis < 3; ++axis) {
       Points there = y;
       there[i][axis] += step;
-      const double up = elasticEnergy(input, body.model->elastic, material, there, body.state.poses);
+      const double up = elasticEnergy(cells, material, there, body.state.cells, 1.0, shapes);
       there[i][axis] -= 2.0 * step;
-      const double down = elasticEnergy(input, body.model->elastic, material, there, body.state.poses);
+      const double down = elasticEnergy(cells, material, there, body.state.cells, 1.0, shapes);
       const double force = -(up - down) / (2.0 * step);
       EXPECT_NEAR(body.model->masses[i] * a[i][axis], force, 1e-4 * (1.0 + std::abs(force)));
     }
@@ -217,10 +218,10 @@ TEST(Flow, FlatAndInvertedClustersKeepTheirShape) {
   Points y = body.model->rest;
   for (Vec3& p : y) p.z() = 0.0;
   fitClusters(matchInput(*body.model), y, state.poses);
-  EXPECT_EQ(flow(matchInput(*body.model, state), {0.01, 10.0, 1.0}, 0.1, state.poses, state.plastic), 0u);
+  EXPECT_EQ(flow({0.01, 10.0, 1.0}, 0.1, &body.model->shape, state.poses, state.plastic), 0u);
   for (std::size_t i = 0; i < y.size(); ++i) y[i] = -1.5 * body.model->rest[i];
   fitClusters(matchInput(*body.model), y, state.poses);
-  EXPECT_EQ(flow(matchInput(*body.model, state), {0.01, 10.0, 1.0}, 0.1, state.poses, state.plastic), 0u);
+  EXPECT_EQ(flow({0.01, 10.0, 1.0}, 0.1, &body.model->shape, state.poses, state.plastic), 0u);
   EXPECT_TRUE(state.plastic.empty());
 }
 
@@ -244,9 +245,10 @@ TEST(Flow, PiecesOfACutKeepTheirShape) {
       piece.model = from.model;
       piece.state = from.state;
       ASSERT_EQ(piece.state.plastic.size(), piece.model->clusters.size());
+      ASSERT_EQ(piece.state.plastic_cells.size(), piece.model->cells->cells.size());
       const double length = lengthOf(piece.state.positions);
       run(piece, 1000, 1.0 / 500);
-      EXPECT_NEAR(lengthOf(piece.state.positions), length, 2e-6 * length);  // 4.6e-7
+      EXPECT_NEAR(lengthOf(piece.state.positions), length, (elastic ? 2e-6 : 5e-4) * length);  // 4.6e-7, 1.9e-4
     }
   }
 }

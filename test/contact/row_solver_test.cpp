@@ -18,9 +18,6 @@ struct Clash {
     const Index count = static_cast<Index>(mesh.vertices.size());
     surface = std::make_unique<ContactSurface>(mesh, ownSupports(count));
     test::Random random(7);
-    std::vector<Index> members;
-    std::vector<double> weights(count, 1.0);
-    for (Index i = 0; i < count; ++i) members.push_back(i);
     for (int n = 0; n < 2; ++n) {
       for (Index i = 0; i < count; ++i) {
         masses[n].push_back(random.uniform(0.1, 0.5));
@@ -33,7 +30,6 @@ struct Clash {
         after[n].push_back(p + kH * velocities[n].back());
       }
       rigid_share = share;
-      groups[n] = std::make_unique<RigidGroups>(std::vector<Index>{0, count}, members, weights, masses[n]);
       Collider& c = colliders[static_cast<std::size_t>(n)];
       c.key = static_cast<std::uint64_t>(n + 1);
       for (const Vec3& p : before[n]) c.bounds.extend(p);
@@ -60,7 +56,7 @@ struct Clash {
     contacts.findPairs(scene, colliders, counters);
     contacts.findMoved(scene, colliders);
     contacts.find(scene, colliders, counters);
-    for (Index n = 0; n < 2; ++n) contacts.setRigidShare(n, groups[n].get(), rigid_share);
+    for (Index n = 0; n < 2; ++n) contacts.setRigidShare(n, rigid_share);
     return counters;
   }
   /// The bodies would be at `after`; where they come to be is written there.
@@ -107,7 +103,6 @@ struct Clash {
   std::unique_ptr<ContactSurface> surface;
   std::array<std::vector<double>, 2> masses, inverse;
   std::array<Points, 2> before, after, velocities, places;
-  std::array<std::unique_ptr<RigidGroups>, 2> groups;
   double rigid_share = 0.0;
   SurfaceScene scene;
   std::vector<Collider> colliders{2};
@@ -158,7 +153,6 @@ TEST(RowSolver, WhoIsHeldStaysAndTheOtherIsStopped) {
 TEST(RowSolver, ASpringMovesTheBodyAsAWholeAndTheRestByItsShare) {
   const std::vector<double> masses = {0.1, 0.2, 0.3, 0.4};
   const Points places = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};
-  const RigidGroups whole({0, 4}, {0, 1, 2, 3}, std::vector<double>(4, 1.0), masses);
   for (const bool held : {false, true}) {
     std::vector<Slot> now(4), before(4);
     for (std::size_t i = 0; i < 4; ++i)
@@ -169,10 +163,7 @@ TEST(RowSolver, ASpringMovesTheBodyAsAWholeAndTheRestByItsShare) {
     bodies[0].particles = 4;
     bodies[0].edge_length = 1.0;
     bodies[0].rigid_share = 0.9;
-    if (!held) {
-      bodies[0].groups = &whole;
-      bodies[0].motions.resize(1);
-    }
+    bodies[0].held = held;
     const std::vector<Index> patch = {1, 3};
     const std::vector<double> weights = {0.75, 0.25};
     std::vector<SpringRow> springs(1);

@@ -86,7 +86,7 @@ class TissueOfCells : public Tissue {
   std::vector<Index> followedBy(Index v) const {
     const auto begin = binding_.carriers.begin();
     const std::set<Index> carriers(begin + binding_.offsets[v], begin + binding_.offsets[v + 1]);
-    const std::array<std::int32_t, 3> own = lattice_.cells[binding_.turners[v]].place;
+    const std::array<std::int32_t, 3> own = lattice_.cells[binding_.cells[v]].place;
     std::vector<Index> cells;
     for (std::int32_t z = -2; z <= 2; ++z)
       for (std::int32_t y = -2; y <= 2; ++y)
@@ -123,23 +123,19 @@ class TissueOfCells : public Tissue {
   std::map<std::array<std::int32_t, 3>, std::vector<Index>> at_;
 };
 
-// That of a body of clusters: around the particle that a vertex is or follows most, and around its neighbours.
+// That of a body without an inside: around the particle that a vertex is or follows most, and around its neighbours.
 class TissueOfClusters : public Tissue {
  public:
   TissueOfClusters(const BodyModel& model, const Points& particles) : model_(model), particles_(particles) {
     const SurfaceBinding& binding = model.binding;
-    particle_ = binding.particle;
-    for (std::size_t n = 0; n < binding.embedded.size(); ++n) {
-      const auto begin = binding.weights.begin() + binding.offsets[n],
-                 end = binding.weights.begin() + binding.offsets[n + 1];
-      if (begin != end)
-        particle_[binding.embedded[n]] = binding.carriers[std::max_element(begin, end) - binding.weights.begin()];
+    for (Index v = 0; v < binding.size(); ++v) {
+      const auto begin = binding.weights.begin() + binding.offsets[v], end = binding.weights.begin() + binding.offsets[v + 1];
+      particle_.push_back(binding.carriers[std::max_element(begin, end) - binding.weights.begin()]);
     }
   }
 
   bool isFolded(Index v) const override {
     const Index own = particle_[v];
-    if (own == kNoIndex) return false;
     std::vector<Mat3> gradients{gradientAt(own)};
     const ParticleGraph& graph = model_.graph;
     for (Index k = graph.offsets[own]; k < graph.offsets[own + 1]; ++k)

@@ -57,7 +57,7 @@ Body lattice(int nx, int ny, int nz, double jitter = 0.0) {
     cell_masses.push_back(1000.0 * kEdge * kEdge * kEdge * random.uniform(0.3, 1.0));
     for (Index i : cell) body.masses[i] += cell_masses.back() / 8.0;
   }
-  body.clusters = clustersOfCells(cells, cell_masses, body.masses, kEdge);
+  body.clusters = clustersOfCells(cells, cell_masses, body.masses);
   body.finish();
   return body;
 }
@@ -77,8 +77,6 @@ Body mixture(unsigned seed) {
       total[i] += body.clusters.weights.back();
     }
     body.clusters.offsets.push_back(static_cast<Index>(body.clusters.members.size()));
-    body.clusters.seeds.push_back(members[0]);
-    body.clusters.radii.push_back(kEdge);
   };
   std::vector<Index> everything;
   for (Index i = 0; i < body.rest.size(); ++i) everything.push_back(i);
@@ -343,7 +341,7 @@ TEST(ElasticBatch, ACellFindsTheSameInEveryLane) {
     }
   }
   body.masses.assign(body.rest.size(), 1e-4);
-  body.clusters = clustersOfCells(cells, std::vector<double>(kCells, 8e-4), body.masses, kEdge);
+  body.clusters = clustersOfCells(cells, std::vector<double>(kCells, 8e-4), body.masses);
   body.finish();
   Points cell;
   for (int k = 0; k < 8; ++k) cell.push_back(body.rest[k] + random.vector(1e-3));

@@ -37,7 +37,7 @@ Lattice lattice(int nx, int ny, int nz, double d, double density) {
   l.masses.assign(l.rest.size(), 0.0);
   for (const auto& cell : cells)
     for (Index i : cell) l.masses[i] += mass / 8.0;
-  l.clusters = clustersOfCells(cells, std::vector<double>(cells.size(), mass), l.masses, d);
+  l.clusters = clustersOfCells(cells, std::vector<double>(cells.size(), mass), l.masses);
   l.shape = makeRestShape(l.rest, l.masses, l.clusters);
   l.elastic = makeElasticRest(l.shape);
   l.poses.resize(l.clusters.size());

@@ -162,7 +162,7 @@ double fallen(const BatchStep& step, int steps) { return 0.5 * step.gravity.norm
 
 TEST(BatchStep, KnowsHowFarAheadTheMatchLooks) {
   for (double h : {1.0 / 30.0, 1.0 / 60.0, 1.0 / 500.0})
-    EXPECT_EQ(batchStep(appearance(MatchMode::kLinear, 1.0), h).ahead, viscosityTime(0.6, h));
+    EXPECT_EQ(batchStep(appearance(MatchMode::kLinear, 1.0), h).ahead, h + goalPull(0.6, h).lead);
   // Forgotten, it shows.
   EXPECT_TRUE(std::isnan(BatchStep().ahead));
 }

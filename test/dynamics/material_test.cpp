@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <complex>
 #include <limits>
 
 namespace meshless {
@@ -28,17 +29,60 @@ TEST(Material, RefusesEachValueOutOfRangeByNameAndRange) {
     }
 }
 
-TEST(StiffnessGain, IsAlphaAtTheReferenceStepBoundedAndOfOneStiffnessBelow) {
-  for (double alpha : {0.0, 0.1, 0.5, 0.9, 1.0}) EXPECT_NEAR(stiffnessGain(alpha, 1.0 / 60.0), alpha, 1e-15);
-  for (double alpha : {0.1, 0.5, 0.9})
-    for (double h : {1e-5, 1e-3, 1.0 / 60.0, 0.1, 1.0}) {
-      EXPECT_GT(stiffnessGain(alpha, h), 0.0);
-      EXPECT_LE(stiffnessGain(alpha, h), 1.0);
+// [1] where a mode whose goal is 0 is after a while, let go at 1.
+double letGo(double alpha, double h, double time) {
+  const GoalPull goal = goalPull(alpha, h);
+  double before = 1.0, x = 1.0;
+  for (int step = 0; step < std::lround(time / h); ++step) {
+    const double v = (x - before) / h, there = x + h * v;
+    before = x;
+    x = there - goal.gain * (there + goal.lead * v);
+  }
+  return x;
+}
+
+TEST(GoalPull, SwingsAlikeWhateverTheStep) {
+  for (double alpha : {0.1, 0.5, 0.9, 0.99, 0.9999})
+    for (double time : {0.05, 0.2}) {
+      const double rate = -std::log1p(-alpha) * 60.0, fine = letGo(alpha, 1e-5, time);
+      const std::complex<double> root = std::sqrt(std::complex<double>(0.25 * rate * rate - 60.0 * rate));
+      const std::complex<double> a = -0.5 * rate + root, b = -0.5 * rate - root;
+      EXPECT_NEAR(fine, ((a * std::exp(b * time) - b * std::exp(a * time)) / (a - b)).real(), 1e-2) << alpha;
+      for (double h : {1e-4, 1e-3, 1.0 / 480, 1.0 / 120}) EXPECT_NEAR(letGo(alpha, h, time), fine, 60.0 * h) << alpha << ", " << h;
     }
-  // gain / h^2 is the squared frequency: it settles as the step shrinks.
-  const auto frequency = [](double h) { return stiffnessGain(0.5, h) / (h * h); };
-  EXPECT_NEAR(frequency(1e-4) / frequency(1e-5), 1.0, 1e-3);
-  EXPECT_EQ(stiffnessGain(1.0, 1e-3), 1.0);
+}
+
+// As much as under the spring's own stiffness, or less.
+TEST(GoalPull, CarriesASteadyLoadInAnyStep) {
+  for (double alpha : {0.1, 0.5, 0.9, 0.99, 0.9999})
+    for (double h : {1e-4, 1e-3, 1.0 / 480, 1.0 / 120, 1.0 / 60}) {
+      const GoalPull goal = goalPull(alpha, h);
+      double x = 0.0, v = 0.0;
+      for (int step = 0; step < 10.0 / h; ++step) {
+        v += h * 9.81;
+        const double there = x + h * v, moved = there - goal.gain * (there + goal.lead * v);
+        v = (moved - x) / h;
+        x = moved;
+      }
+      const double sag = 9.81 / (-std::log1p(-alpha) * 3600.0);
+      EXPECT_LT(x, 1.01 * sag) << alpha << ", " << h;
+      if (h <= 1e-4) EXPECT_GT(x, 0.9 * sag) << alpha;
+    }
+}
+
+TEST(GoalPull, NoStepMakesItSwingHigher) {
+  for (double alpha : {0.0, 0.01, 0.5, 0.9, 1.0})
+    for (double h : {1e-3, 1.0 / 60, 0.2, 1.0, 10.0}) {
+      const GoalPull goal = goalPull(alpha, h);
+      double x = 0.0, v = 1.0, fastest = 1.0;
+      for (int step = 0; step < 1000; ++step) {
+        const double there = x + h * v, moved = there - goal.gain * (there + goal.lead * v);
+        v = (moved - x) / h;
+        x = moved;
+        fastest = std::max(fastest, std::abs(v));
+      }
+      EXPECT_LE(fastest, 1.0 + 1e-12) << alpha << ", " << h;
+    }
 }
 
 }  // namespace material_test

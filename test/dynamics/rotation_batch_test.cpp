@@ -10,7 +10,7 @@
 
 #include <Eigen/SVD>
 
-#include "meshless_surgery/dynamics/rotation.h"
+#include "dynamics/rotation.h"
 #include "support/random.h"
 
 namespace meshless {

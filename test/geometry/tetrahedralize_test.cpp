@@ -11,7 +11,7 @@
 
 #include "meshless_surgery/geometry/query/inside.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
-#include "meshless_surgery/geometry/mesh/sampling.h"
+#include "shapes/sampling.h"
 #include "support/shapes.h"
 
 namespace meshless {

@@ -11,7 +11,7 @@
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/geometry/mesh/mesh_check.h"
 #include "meshless_surgery/geometry/mesh/primitives.h"
-#include "meshless_surgery/geometry/mesh/sampling.h"
+#include "shapes/sampling.h"
 
 namespace meshless {
 namespace scene_test {

@@ -44,7 +44,8 @@ class ClientTest(unittest.TestCase):
             for body in info.bodies:
                 self.assertGreater(body.particles, 100)
                 self.assertTrue(0.002 < body.spacing < 0.05, body.spacing)
-                self.assertEqual((0.0, 1, 1.0), (body.held, body.substeps_needed, body.stiffness_factor))
+                self.assertEqual((0.0, 1.0), (body.held, body.stiffness_factor))
+                self.assertTrue(1 <= body.substeps_needed <= 64, body.substeps_needed)
             heard = Recorder(node.name + '/info', Info)
             heard.wait()
             node.good('step', steps=30)  # nothing of it changes

@@ -673,7 +673,7 @@ class MessagesLawTest(DeformerTestCase):
         bed, = self.state().attachments
         self.assertGreater(part.gone, 0)
         self.says(bed, name='bed', ends=['hangs', 'world'], made=answer.fibres, fibres=answer.fibres - part.gone,
-                  force=(MASSES['hangs'] * G, 0.01 * MASSES['hangs'] * G))
+                  force=(MASSES['hangs'] * G, 0.06 * MASSES['hangs'] * G))  # it fell asleep as it still swung by 10 um
         shown = self.fresh('surfaces', Surfaces, lambda m: m.header.stamp > asked and len(m.fibres) == 2 * bed.fibres)
         ends = plain(shown.fibres).reshape(-1, 2, 3)
         self.holds(bed, 'middle', ends.mean(axis=(0, 1)), 1e-9)

@@ -109,13 +109,12 @@ PreparedBody bareBody(const Cloud& cloud, const Material& material, const std::s
       if (i != cluster[0]) links.push_back({cluster[0], i});
     }
     clusters.offsets.push_back(static_cast<Index>(clusters.members.size()));
-    clusters.seeds.push_back(cluster[0]);
-    clusters.radii.push_back(10.0 * kSize);
   }
   model->graph = makeGraph(model->rest, links);
   model->binding.offsets.push_back(0);
   model->solid = false;
-  makeMoments(*model, material);
+  model->length = kSize;
+  makeTissue(*model, material);
   PreparedBody body;
   body.def.name = name;
   body.def.material = material;

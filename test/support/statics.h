@@ -24,7 +24,7 @@ inline double workOf(const BodyModel& model, const ElasticParameters& material, 
     for (const Vec3& d : u) most = std::max(most, d.norm());
     const double tiny = kTiny * model.spacing / most;
     for (std::size_t i = 0; i < n; ++i) y[i] = model.rest[i] + tiny * u[i];
-    model.elastic_batch->setRotations(std::vector<ClusterPose>(model.clusters.size()), scratch);
+    model.elastic_batch->setRotations(std::vector<ClusterPose>(model.groups()), scratch);
     model.elastic_batch->accelerate(matchInput(model), material, y, scratch, a, counters);
     force.resize(n);
     for (std::size_t i = 0; i < n; ++i) force[i] = held[i] ? Vec3(Vec3::Zero()) : Vec3(-model.masses[i] / tiny * a[i]);

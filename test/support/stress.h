@@ -5,7 +5,7 @@
 #include <cstdlib>
 
 #include "meshless_surgery/dynamics/elastic.h"
-#include "meshless_surgery/dynamics/rotation.h"
+#include "dynamics/rotation.h"
 #include "support/bodies.h"
 #include "support/random.h"
 
@@ -111,16 +111,18 @@ inline std::shared_ptr<const PreparedBody> inState(PreparedBody body, const SetS
   return std::make_shared<const PreparedBody>(std::move(body));
 }
 
-/// Energy of deformation [J] at substeps of h [s]. For appearance materials that of springs from particles to the goals
+/// Energy of deformation [J]. Over that of cells, for appearance materials that of springs from particles to the goals
 /// of their clusters: exact for rigid goals, and what is near it for fitted ones.
 inline double deformationEnergy(const BodyModel& model, const Material& material, double h, const Points& x) {
   const MatchInput in = matchInput(model);
-  if (material.elastic())
-    return elasticEnergy(in, model.elastic,
-                         elasticParameters(material.youngs_modulus, material.poissons_ratio, material.density), x,
-                         std::vector<ClusterPose>(model.clusters.size()));
-  const double stiffness = stiffnessGain(material.alpha, h) / (h * h);
+  const ElasticParameters own = ownElasticity(model, material);
   double sum = 0.0;
+  if (model.cells)
+    sum = elasticEnergy(*model.cells, own, x, std::vector<ClusterPose>(model.cells->cells.size()));
+  else if (material.elastic())
+    sum = elasticEnergy(in, model.elastic, own, x, std::vector<ClusterPose>(model.clusters.size()));
+  if (material.elastic()) return sum;
+  const double stiffness = goalPull(material.alpha, h).gain / (h * h);
   for (Index c = 0; c < in.clusters.size(); ++c) {
     const ClusterRest& rest = in.shape.clusters[c];
     const Index begin = in.clusters.offsets[c], end = in.clusters.offsets[c + 1];
@@ -304,13 +306,13 @@ inline Twins stoppedAsAWhole(Twins& twins, const WorldSettings& settings, double
     body.def.name = now.name;
     body.def.material = now.material;
     body.model = now.model;
+    body.state = restState(*body.model, Pose());
     body.state.positions = now.particles;
     for (std::size_t i = 0; i < now.particles.size(); ++i)
-      body.state.velocities.push_back(settings.step_rate * (now.particles[i] - before.bodies[b].particles[i]));
+      body.state.velocities[i] = settings.step_rate * (now.particles[i] - before.bodies[b].particles[i]);
     const RigidMotion together = rigidMotionOf(*body.model, body.state.positions, body.state.velocities);
     for (std::size_t i = 0; i < now.particles.size(); ++i)
       body.state.velocities[i] -= together.velocity + together.spin.cross(now.particles[i] - together.centre);
-    body.state.poses.resize(body.model->clusters.size());
     updateSurface(*body.model, body.state);
     calm.spawn(std::make_shared<const PreparedBody>(std::move(body)));
   }

@@ -1,7 +1,7 @@
 // Contact of bodies that are bent, turned inside out, or lie exactly along each other.
 #include <cmath>
 
-#include "meshless_surgery/dynamics/rotation.h"
+#include "dynamics/rotation.h"
 #include "meshless_surgery/geometry/query/inside.h"
 #include "support/bodies.h"
 
@@ -49,7 +49,7 @@ TEST(ContactGeometry, BodiesThatWereTurnedInsideOutStayFiniteAndPart) {
       Vec3 momentum = Vec3::Zero();
       for (const BodySnapshot& b : shot.bodies) {
         ASSERT_TRUE(test::allFinite(b.particles)) << "step " << step;
-        ASSERT_LT(b.measures.velocity.norm(), 2.0) << "step " << step;
+        ASSERT_LT(b.measures.velocity.norm(), 3.0) << "step " << step;
         momentum += b.measures.linear_momentum;
       }
       ASSERT_NEAR((momentum - Vec3(0, 0, -0.2 * mass)).norm(), 0.0, 1e-9 * mass) << "step " << step;

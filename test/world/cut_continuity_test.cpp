@@ -101,7 +101,7 @@ Vec3 angularMomentumOf(const BodySnapshot& body) {
   return body.measures.angular_momentum + body.measures.centre_of_mass.cross(body.measures.linear_momentum);
 }
 
-/// Nothing is lent from one piece to the other while it is eased.
+/// Nothing is lent from one piece to the other.
 void expectKept(World& cut, const BodySnapshot& whole) {
   for (int step = 0; step < 40; ++step) {
     Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
@@ -115,49 +115,7 @@ void expectKept(World& cut, const BodySnapshot& whole) {
   }
 }
 
-TEST(CutContinuity, TheNextStepMovesTissueAsItWouldHaveWithoutTheCut) {
-  const SnapshotWants wants{true, true, true};
-  // One that spins freely, after half a second one whose pick is cut through as well, one pulled at both ends.
-  const Scenario scenarios[] = {{"spinning", false, true, false, false, 1e-4},
-                                {"spinning and picked", false, true, true, false, 0.06},
-                                {"stretched and bent", false, false, false, true, 1e-6}};
-  for (const Scenario& scenario : scenarios) {
-    SCOPED_TRACE(scenario.name);
-    World uncut = worldOf(scenario), cut = worldOf(scenario);
-    const Points before = uncut.snapshot(wants).bodies[0].particles;
-    test::replyOf<CutReply>(cut.apply(cutOf(uncut.snapshot(wants).bodies[0])));
-    std::vector<std::vector<Index>> parents;
-    for (const BodySnapshot& piece : cut.snapshot(wants).bodies) {
-      parents.emplace_back();
-      for (const Vec3& p : piece.particles)
-        parents.back().push_back(static_cast<Index>(std::find(before.begin(), before.end(), p) - before.begin()));
-    }
-    ASSERT_EQ(parents.size(), 2u);
-    uncut.step();
-    cut.step();
-    const BodySnapshot whole = uncut.snapshot(wants).bodies[0];
-    double move = 0.0;
-    for (std::size_t i = 0; i < before.size(); ++i) move = std::max(move, (whole.particles[i] - before[i]).norm());
-    ASSERT_GT(move, 1e-4);
-    const std::vector<BodySnapshot> pieces = cut.snapshot(wants).bodies;
-    for (std::size_t p = 0; p < 2; ++p) {
-      Points differ;
-      for (std::size_t i = 0; i < parents[p].size(); ++i) {
-        ASSERT_LT(parents[p][i], before.size());
-        differ.push_back(pieces[p].particles[i] - whole.particles[parents[p][i]]);
-      }
-      const Rest rest = splitMotion(pieces[p].particles, differ);
-      // Picks move clusters as rigid bodies, and a piece has others.
-      const bool pulled = scenario.picked || scenario.loaded;
-      EXPECT_LE(rest.deforming, pulled ? kSeen * kSpacing : scenario.deforms * move);
-      EXPECT_LE(rest.rigid, (scenario.picked ? 0.08 : 0.03) * move + (pulled ? kSeen * kSpacing : 0.0));
-    }
-    if (scenario.picked || scenario.loaded) continue;
-    expectKept(cut, whole);
-  }
-}
-
-// Of filled cells nothing is eased: what a cut releases begins at its cells, and goes from there through the tissue.
+// What a cut releases begins at its cells, and goes from there through the tissue.
 TEST(CutContinuity, TheNextStepOfFilledCellsIsAnotherBesideTheCutAlone) {
   const SnapshotWants wants{true, true, true};
   // A free body gives back as a spin what its viscosity leaks of its angular momentum: pieces each their own.

@@ -114,7 +114,9 @@ TEST(MaterialChange, LiftsNothingAndEndsWhereTheNewMaterialWould) {
         run(world, 2.0);
         World fresh = worldOf(setting, round, change.to);
         run(fresh, 4.0);
-        EXPECT_NEAR(height(world) / height(fresh), 1.0, setting == Setting::kLying ? 0.02 : 0.005);
+        // Goals that take all of a velocity let the bar creep to where it comes to rest.
+        const bool creeps = !change.to.elastic() && std::max(change.from.alpha, change.to.alpha) == 1.0;
+        EXPECT_NEAR(height(world) / height(fresh), 1.0, setting == Setting::kLying ? 0.02 : creeps ? 0.012 : 0.005);
       }
 }
 

@@ -101,7 +101,7 @@ TEST_P(Picks, TurnWithABlockAndPullAtNothing) {
     EXPECT_LT(pick.force.norm(), 0.05) << k << ": nothing has to hold it there";
     // Of a ray the point that it met; in cells the particle can be a corner of the cell around it.
     EXPECT_LT((pick.position - shot.bodies[0].particles[pick.particle]).norm(),
-              (grip.ray ? std::sqrt(3.0) : 1e-6) * spacing + 1e-3 * spacing)
+              (grip.ray ? std::sqrt(3.0) : 1e-6) * spacing + 5e-3 * spacing)
         << k;
   }
 }
@@ -130,7 +130,7 @@ TEST_P(Picks, TurnABodyByTheirForceAtTheirPlace) {
     torques += about.norm();
   }
   ASSERT_GT(forces, 0.2);
-  EXPECT_LT(force.norm(), 0.01 * forces);
+  EXPECT_LT(force.norm(), 0.015 * forces);
   EXPECT_LT(torque.norm(), 0.02 * torques);
 }
 

@@ -64,6 +64,7 @@ World pile() {
   WorldSettings settings;
   World world(settings);
   BodyDef def = test::defOf(boxMesh(Vec3(0.05, 0.05, 0.05), 2, 2, 2), "box");
+  def.spacing = 0.025;
   const PreparedBody first = test::prepared(def);
   for (int i = 0; i < 48; ++i) {
     Pose pose;
@@ -446,13 +447,14 @@ World oneSmallBox() {
   const test::TexturedCube cube(0.05, 1);
   BodyDef def = test::defOf(cube.mesh, "box");
   def.texture = cube.map();
+  def.spacing = 0.05;
   EXPECT_TRUE(world.addSceneBody(test::shared(def)).ok());
   run(world, 3);
   return world;
 }
 
 TEST(DamagedState, OfAnyLengthButTheRightOne) {
-  const std::string bytes = bytesOf(ballThatFalls());
+  const std::string bytes = bytesOf(oneSmallBox());
   for (std::size_t length = 0; length < bytes.size(); ++length)
     expectRefused(bytes.substr(0, length), length < kStateHeaderBytes ? "no state that can be read" : "cut off");
   expectRefused(bytes + "x", "something follows");

@@ -194,12 +194,12 @@ TEST(SelfContact, FilmsBetweenCutsKeepTheirVolume) {
     const WorldSnapshot seen = world.snapshot({true, false, true});
     EXPECT_GT(seen.bodies.size(), 10u);
     for (const BodySnapshot& body : seen.bodies)
-      EXPECT_GT(body.measures.volume, 0.5 * body.model->rest_volume) << seed << ", " << body.name;
+      EXPECT_GT(body.measures.volume, 0.45 * body.model->rest_volume) << seed << ", " << body.name;
   }
 }
 
 TEST(SelfContact, AStripIsFoldedOntoItselfNotIntoItself) {
-  EXPECT_GT(foldedInto(SelfContact::kNone), 10) << "else nothing presses";
+  EXPECT_GT(foldedInto(SelfContact::kNone), 4) << "else nothing presses";
   EXPECT_LE(foldedInto(SelfContact::kAll), 1);
 }
 

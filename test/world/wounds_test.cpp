@@ -22,7 +22,7 @@ double largestOf(const Map& map) { return Eigen::JacobiSVD<Map>(map).singularVal
 // The gradient of the map of the cell that a vertex follows, there.
 Mat3 tissueAt(const BodySnapshot& body, Index v) {
   const CellLattice& lattice = *body.model->lattice;
-  const LatticeCell& cell = lattice.cells[body.model->binding.turners[v]];
+  const LatticeCell& cell = lattice.cells[body.model->binding.cells[v]];
   const Vec3 at = lattice.placeIn(cell, body.model->surface.vertices[v]);
   Mat3 gradient = Mat3::Zero();
   for (int k = 0; k < 8; ++k) {

@@ -2,7 +2,6 @@
 // or is embedded between some.
 #pragma once
 
-#include <limits>
 #include <memory>
 
 #include "meshless_surgery/body/body_def.h"
@@ -13,17 +12,21 @@
 
 namespace meshless {
 
-/// How a surface vertex follows the particles.
+/// How the vertices of a surface follow the particles: a sparse matrix of weights that add up to 1 for a vertex. Those of
+/// a body without an inside are particles themselves.
 struct SurfaceBinding {
-  std::vector<Index> particle;        // one a vertex: the particle that it is, or kNoIndex for an embedded vertex
-  std::vector<Index> embedded;        // embedded vertices, ascending
-  std::vector<Index> offsets;         // one each, into the two below; and one more, their end
-  std::vector<Index> carriers;        // particles that the embedded vertices follow
-  std::vector<double> weights;        // add up to 1 for a vertex; some are negative where it lies outside of them
-  Points levers;                      // [m] one each: what the carriers do not span at rest (thin sheets, crumbs)
-  std::vector<Index> turners;         // one each: the cluster whose affine fit takes the lever along
-  std::vector<Index> lever_clusters;  // ascending: those that take a lever along; their poses are needed with positions
-  Index bound = 0;                    // embedded vertices whose carriers were searched for; the others have a parent's
+  std::vector<Index> offsets;   // vertices + 1
+  std::vector<Index> carriers;  // particles
+  std::vector<double> weights;  // some are negative where a vertex lies outside of its carriers
+  std::vector<Index> cells;     // one a vertex: whose tissue it is of; empty without cells
+
+  Index size() const { return offsets.empty() ? 0 : static_cast<Index>(offsets.size() - 1); }
+  /// Where its carriers have a vertex [m].
+  Vec3 place(Index vertex, const Points& positions) const {
+    Vec3 sum = Vec3::Zero();
+    for (Index k = offsets[vertex]; k < offsets[vertex + 1]; ++k) sum += weights[k] * positions[carriers[k]];
+    return sum;
+  }
 };
 
 /// What a region of a body is made of, and that over the body's own material.
@@ -41,8 +44,8 @@ struct CollisionSurface {
   double distance = 0.0;  // [m] from the visual surface, at most
 };
 
-/// The cavities of a body that are or were filled, as surfaces of their own, which turn and move with its particles: no
-/// levers. They are of the surface for contact, or of the visual one where there is no other.
+/// The cavities of a body that are or were filled, as surfaces of their own. They are of the surface for contact, or of
+/// the visual one where there is no other.
 struct Cavities {
   struct Shell {
     std::uint32_t patch = kCavityPatch;  // of its faces
@@ -55,39 +58,39 @@ struct Cavities {
   SurfaceBinding binding;     // of their vertices
 };
 
-/// Constant while it lives: rest shape, topology, clusters, masses.
+/// Constant while it lives: rest shape, topology, tissue, masses. The particles of a solid are the corners of filled
+/// cells, whatever its material; those of a body without an inside are the vertices of its surface or the points of its
+/// cloud.
 struct BodyModel {
   Points rest;                 // [m] particles
   std::vector<double> masses;  // [kg] > 0
-  /// What shapes are matched with: the masses, and of fixed particles a multiple, so that the body follows what holds
-  /// it.
-  std::vector<double> match_masses;
-  std::vector<bool> fixed;  // held in place
+  std::vector<bool> fixed;     // held in place
   bool any_fixed = false;
   ParticleGraph graph;
-  ClusterSet clusters;
-  RestShape shape;
-  std::vector<ElasticRest> elastic;                   // empty where the material is an appearance material
-  std::shared_ptr<const ElasticBatch> elastic_batch;  // the same, vectorised
-  /// Of a body whose cells know how far they are filled (CellFill::kFilled), else null. Cluster c is cell c, corner by
-  /// corner.
-  std::shared_ptr<const CellLattice> lattice;
+  // What pulls: cells, and over them clusters with goals where the material is one of appearance. Of a body without an
+  // inside its clusters, with goals or elastic.
+  std::shared_ptr<const CellLattice> lattice;         // of a solid, else null
   double cell_mass = 0.0;                             // [kg] of a whole cell of it, of the body's own material
   std::vector<RegionTissue> regions;                  // of lattice->regions
-  std::shared_ptr<const ElasticCells> cells;          // of it, where the material is elastic
+  std::shared_ptr<const ElasticCells> cells;          // of it
   std::vector<ClampPoint> clamp_points;               // of it: where free tissue ends at what is held
   std::shared_ptr<const Clamp> clamp;                 // of them; null where there are none
   bool isHeld() const { return any_fixed || clamp; }  // it has no rigid motion of its own
   std::vector<bool> tissue;  // one a corner of it: no ghost; empty where all particles are tissue
-  /// [1/m^2] norm of ElasticRest::spread_inverse: what a cut leaves of a cell can be narrower, so that its stress would
-  /// need a shorter step. It resists as a flat cluster does.
-  double most_spread_inverse = std::numeric_limits<double>::infinity();
-  double specific_stiffness = 0.0;  // [m^2/s^2] Young's modulus over density; 0 of an appearance material
-  double poissons_ratio = 0.0;      // of an elastic material
-  double highest_frequency = 0.0;   // [rad/s] of an elastic material: see longestSubstep()
-  Pose own;                         // from the frame of rest positions to the body's own, that of its file
-  TriangleMesh surface;             // rest positions of the vertices [m]
-  TextureMapPtr texture;            // of its file, which its pieces share; null: it has none
+  ClusterOptions grouping;   // how clusters are made where a material needs them
+  ClusterSet clusters;       // empty where the material of a solid is elastic
+  RestShape shape;
+  /// What clusters are matched with: the masses, and of fixed particles a multiple, so that goals follow what is held.
+  std::vector<double> match_masses;
+  std::vector<ElasticRest> elastic;                   // of clusters that are elastic
+  std::shared_ptr<const ElasticBatch> elastic_batch;  // of cells or elastic clusters, vectorised; null: there are none
+  double length = 0.0;              // [m] longest extent at rest, of a piece that of the body that was cut first
+  double specific_stiffness = 0.0;  // [m^2/s^2] Young's modulus over density
+  double poissons_ratio = 0.0;
+  double highest_frequency = 0.0;  // [rad/s] of cells or elastic clusters: see longestSubstep()
+  Pose own;                        // from the frame of rest positions to the body's own, that of its file
+  TriangleMesh surface;            // rest positions of the vertices [m]
+  TextureMapPtr texture;           // of its file, which its pieces share; null: it has none
   SurfaceBinding binding;
   std::shared_ptr<const CollisionSurface> collision;  // null: contact takes the visual surface
   std::shared_ptr<const Cavities> cavities;           // null: none is filled
@@ -101,18 +104,26 @@ struct BodyModel {
 
   /// False for a corner of a cell that no tissue is near: it carries what it must, and nobody shows or picks it.
   bool isTissue(Index particle) const { return tissue.empty() || tissue[particle]; }
+  /// Groups of particles that pull: clusters, or cells where there are none.
+  Index groups() const { return clusters.size() > 0 ? clusters.size() : static_cast<Index>(lattice->cells.size()); }
 };
 
 /// The model's view for dynamics/shape_matching.h, at rest.
 inline MatchInput matchInput(const BodyModel& model) {
   return {model.rest, model.match_masses, model.clusters, model.shape, nullptr};
 }
-/// Makes what the material needs of a model whose particles, masses and clusters are there: match_masses, shape,
-/// elastic and highest_frequency.
-void makeMoments(BodyModel& model, const Material& material);
+/// Makes what the material needs of a model whose particles and masses are there: cells, clusters (if there are none
+/// yet) with their moments, stiffness and frequency.
+void makeTissue(BodyModel& model, const Material& material);
+/// Lame's constants and density of the cells of a body of that longest extent [m]. Under the goals of an appearance
+/// material they are as stiff as carries the weight of a body as long as it is: how it wobbles and springs back is its
+/// goals' matter, and not whether it stands.
+ElasticParameters elasticityOf(const Material& material, double length);
+/// The same of what cells or elastic clusters are of, stiffened by a factor.
+ElasticParameters ownElasticity(const BodyModel& model, const Material& material, double factor = 1.0);
 /// clamp, from clamp_points.
 void makeClamp(BodyModel& model);
-/// elastic and elastic_batch from shape, whose clusters beyond most_spread_inverse lose their linear fit.
+/// cells and elastic_batch of the lattice, or of the clusters where they are elastic.
 void makeElastic(BodyModel& model);
 /// 0..1: share of the mass that is held in place.
 double heldShare(const BodyModel& model);
@@ -139,18 +150,16 @@ struct FilledCavity {
 struct BodyState {
   Points positions;   // [m]
   Points velocities;  // [m/s]
-  std::vector<ClusterPose> poses;
+  std::vector<ClusterPose> poses;     // of clusters
+  std::vector<ClusterPose> cells;     // of cells
   Points surface;                     // [m] present positions of the surface's vertices; see updateSurface
-  double swelling = 1.0;              // of goals, or of the size without stress, where the volume is held
-  double stretch = 1.0;               // of an elastic body: by how much its highest frequency has grown since rest
+  double swelling = 1.0;              // of goals, and of the size without stress, where the volume is held
+  double stretch = 1.0;               // by how much the highest frequency has grown since rest
   double pace = 1.0;                  // root of the stiffnessFactor that its velocities are of
-  double stiffened = 1.0;             // share of its material's stiffness that it has; see ease.h
+  double stiffened = 1.0;             // share of its material's stiffness that it has; see stiffenedBy()
   double substep = 0.0;               // [s] the last one; 0 before the first
   std::vector<PlasticShape> plastic;  // one a cluster once something has flowed; empty before
-  Points eased;            // [m/s^2] one a particle where a cut lets go of it little by little, else empty; see ease.h
-  double eased_for = 0.0;  // [s] since that cut
-  bool eased_whole = false;            // what is eased may have a force and a torque
-  bool unwinding = false;              // it was wound up in itself, and goes back to its shape; see unwind.h
+  std::vector<PlasticShape> plastic_cells;  // likewise
   std::vector<FilledCavity> cavities;  // those that are filled still
   Pose placed;                         // where the rest shape was put: what is held stays there
 };
@@ -165,7 +174,7 @@ struct PreparedBody {
   BodyState state;
 };
 
-/// Builds particles, masses, graph, clusters and binding; may take a second for large meshes. Refuses
+/// Builds particles, masses, tissue and binding; may take a second for large meshes. Refuses
 /// (kInvalidArgument) bad spacing, material, clusters or pose, (kUnsuitableShape) an empty or flat solid, or more than
 /// 200,000 particles.
 Result<PreparedBody> prepareBody(BodyDef def);
@@ -174,9 +183,21 @@ Result<PreparedBody> prepareBody(BodyDef def);
 /// for a body without fixed particles and in the state that prepareBody gave it.
 PreparedBody placedCopy(const PreparedBody& body, std::string name, const Pose& pose);
 
-/// The same rest shape with the masses of another density, and with the moments that the other material needs. Regions
+/// The same rest shape with the masses of another density, and with the tissue that the other material needs. Regions
 /// keep theirs; a body that has some stays elastic.
 BodyModelPtr withMaterial(const BodyModelPtr& model, const Material& before, const Material& after);
+
+/// The state that is at rest under `placed`.
+BodyState restState(const BodyModel& model, const Pose& placed);
+
+/// Clusters of a body that has changed its family of materials start where its particles are.
+void fitPoses(const BodyModel& model, BodyState& state);
+
+/// For BodyState::stiffened, once a body that was `before` of the `old` material is `model` of another one: the share
+/// of its stiffness with which it pulls as hard as until now, at most 1. All of it at once would give strained tissue
+/// energy. h: the last substep [s].
+double stiffenedBy(const BodyModel& before, const Material& old, const BodyModel& model, const Material& material,
+                   double h, const BodyState& state);
 
 /// Places state.surface for state.positions; changes nothing else.
 void updateSurface(const BodyModel& model, BodyState& state);

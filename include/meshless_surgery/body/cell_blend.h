@@ -15,14 +15,14 @@ struct KeptRows {
   std::vector<Index> particle{};           // of each of the parent's, the piece's
 };
 
-/// Binds places to the cells around them: every one is embedded and follows the blend of the cells' affine maps,
+/// Binds places to the cells around them: every one follows the blend of the cells' affine maps,
 ///   u(X) = sum_c w_c [x_c + F_c (X - X_c)] / sum_c w_c,   w_c = (1 - d_c^2 / r^2)^2 * what fills c
 /// with x_c and F_c place and gradient of a cell at the centroid X_c of what fills it. d_c is the way from X to X_c in
 /// spacings. Where tissue is in the way of nothing, that is the distance. Where a wound or a gap lies between, it is
 /// longer by the detour through the tissue, so that cells beyond it fade around its front and are gone where there is
 /// no way (Belytschko et al. 1996; Organ et al. 1996). Affine motion is followed exactly, weights add up to 1.
 ///
-/// rest: [m]; cell: of each, the copy of a cell whose tissue it belongs to (CellFinder). It is kept in `turners`.
+/// rest: [m]; cell: of each, the copy of a cell whose tissue it belongs to (CellFinder). It is kept in `cells`.
 ///
 /// kept: rows that are as they were.
 SurfaceBinding bindToCells(const CellLattice& lattice, const Points& rest, const std::vector<Index>& cell,

@@ -15,7 +15,7 @@ struct TouchedParticle {
 struct StepScratch {
   Points previous;  // [m] positions at the start of the substep
   Points predicted;
-  Points goals;
+  Points goals, matched;
   ClampStep clamp;
   ElasticBatchState elastic;
   Points cavity, cavity_pull;            // of its vertices, and of the particles
@@ -28,27 +28,27 @@ struct StepScratch {
   Vec3 load_at = Vec3::Zero();  // [m] the middle of it
 };
 
-/// Reads positions and velocities; writes positions, velocities, poses and scratch.previous: matches at y = x + h v,
-/// adds the pull, restores the angular momentum that evaluating at y would leak (not where particles are fixed), adds
-/// damping of the motion that deforms and gravity, and moves. Fixed particles stay. beta acts up to 0.95: without any
-/// rigid share energy could grow.
-/// An elastic material instead accelerates by its stress at y = x + v viscosityTime, whatever h is: a viscosity that
-/// calms the shortest waves and does not change with the step. Where h is more than longestSubstep, what deforms is
-/// slowed: it has 1 / stiffnessFactor of the inertia, and all that acts on a body moves it as a whole as
-/// ever. So every step is stable, and equilibria are the material's (Olovsson et al. 2005, "Selective mass scaling for
-/// explicit finite element analyses"). What else acts on particles has to do likewise: it moves them by stiffnessFactor
-/// of what their masses say, and a body that is free as a whole by the rest.
+/// Reads positions and velocities; writes positions, velocities, poses and scratch.previous. The body accelerates by
+/// its cells' stress at y = x + v viscosityTime, whatever h is: a viscosity that calms the shortest waves and does not
+/// change with the step. Where the material is one of appearance, particles are then drawn to the goals of their
+/// clusters, from where all else would have them. The angular momentum that evaluating elsewhere would leak is restored
+/// (not where particles are fixed), and damping of the motion that deforms and gravity are added. Fixed particles stay.
+/// beta acts up to 0.95: without any rigid share energy could grow.
+/// Where h is more than longestSubstep, what deforms is slowed: it has 1 / stiffnessFactor of the inertia, and all that
+/// acts on a body moves it as a whole as ever. So every step is stable, and equilibria are the material's (Olovsson et
+/// al. 2005, "Selective mass scaling for explicit finite element analyses"). What else acts on particles has to do
+/// likewise: it moves them by stiffnessFactor of what their masses say, and a body that is free as a whole by the rest.
 /// for_each: spreads the cells of an elastic body over threads.
 void matchAndMove(const BodyModel& model, const Material& material, const Vec3& gravity, double h, BodyState& state,
                   StepScratch& scratch, MatchCounters& counters, const ForEach& for_each = nullptr);
 
-/// [s] in which an elastic body, as it is stretched now, deforms as fast as its material; infinity for the others.
+/// [s] in which a body, as it is stretched now, deforms as fast as its cells do; infinity where there are none.
 double longestSubstep(const BodyModel& model, const BodyState& state);
 /// How many of them, at least one, take that time [s].
 double substepsNeeded(const BodyModel& model, const BodyState& state, double time);
-/// 0..1: mass over inertia of what deforms in an elastic body at substeps of h [s]; 1 for the others.
+/// 0..1: mass over inertia of what deforms at substeps of h [s].
 double stiffnessFactor(const BodyModel& model, const BodyState& state, double h);
-/// [s] by which the stress of an elastic body is ahead in substeps of h [s].
+/// [s] by which the stress of cells is ahead in substeps of h [s].
 double viscosityTime(const BodyModel& model, const BodyState& state, double h);
 
 /// v = (x - x_old) / h, after springs and contacts have moved positions.

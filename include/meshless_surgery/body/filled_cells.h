@@ -1,5 +1,5 @@
-// Bodies whose lattice knows how far each cell is filled: particles are its corners, masses and stiffness those of what
-// fills the cells, and the surface is embedded in them.
+// Solids: particles are the corners of the cells of a lattice, masses and stiffness those of what fills them, and the
+// surface is embedded in them.
 #pragma once
 
 #include <functional>
@@ -9,19 +9,13 @@
 
 namespace meshless {
 
-/// Rest places, masses, graph and clusters (one a cell, corner by corner) of model.lattice; needs cell_mass. Weights of
-/// clusters are made by weighCells().
+/// Rest positions, masses and graph of model.lattice; needs cell_mass.
 void makeParticlesOfCells(BodyModel& model);
 
 /// fixed and any_fixed, of the corners of cells that are held.
 void holdCorners(BodyModel& model);
 
-/// Weights of the clusters of model.lattice. Elastic: those that make a cell's affine fit the trilinear map's gradient
-/// at the centroid of what fills it, and its mass what it resists with; they need not add up to 1. Else every particle
-/// is shared out to its cells, in proportion to what they have of it.
-void weighCells(BodyModel& model, bool elastic);
-
-/// What an elastic step needs of model.lattice, for its clusters' masses.
+/// What an elastic step needs of model.lattice.
 ElasticCells elasticCellsOf(const BodyModel& model);
 
 /// Which cell a place in the rest shape belongs to: the one with the nearest sample.

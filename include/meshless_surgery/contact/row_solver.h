@@ -8,28 +8,8 @@
 
 namespace meshless {
 
-/// Groups of particles that answer a contact partly as rigid bodies: the clusters of an appearance material, which
-/// pulls them back to rigid shapes within a frame.
-struct RigidGroups {
-  /// Compressed rows of members with weights that add up to 1 over the groups of a particle; masses [kg] > 0 of
-  /// particles.
-  RigidGroups(const std::vector<Index>& group_offsets, const std::vector<Index>& group_members,
-              const std::vector<double>& group_weights, const std::vector<double>& particle_masses);
-
-  std::vector<Index> offsets, members;
-  std::vector<double> weights;
-  std::vector<double> masses;                 // [kg] of particles
-  std::vector<Index> groups;                  // of members
-  std::vector<Index> of_offsets, of_members;  // of each particle: which members it is, compressed rows
-
-  Index size() const { return static_cast<Index>(offsets.size() - 1); }
-  std::size_t bytes() const {
-    return sizeof *this + bytesOf(offsets, members, weights, masses, groups, of_offsets, of_members);
-  }
-};
-
-/// How a group has been moved in a substep, about its centre at the substep's start.
-struct GroupMotion {
+/// How a body has been moved as a rigid one in a substep, about its centre at the substep's start.
+struct WholeMotion {
   bool current = false;                 // mass, centre and inverse_inertia are of this substep
   double inverse_mass = 0.0;            // [1/kg] times the rigid share, as inverse_inertia
   Vec3 centre = Vec3::Zero();           // [m]
@@ -53,9 +33,9 @@ struct SolverBody {
   Index particles = 0;
   bool moves = true;
   double edge_length = 0.0;             // [m] mean; infinite where it does not move
-  const RigidGroups* groups = nullptr;  // that part of the answer moves as rigid bodies; null: it moves nothing
-  double rigid_share = 0.0;             // 0..1: that part
-  std::vector<GroupMotion> motions;     // one a group
+  double rigid_share = 0.0;             // 0..1: that part of its answer moves it as a rigid body; a held one not at all
+  bool held = false;
+  WholeMotion whole;
   Vec3 leaked = Vec3::Zero();           // [kg m^2] angular momentum times h to be given back
 };
 
@@ -117,28 +97,26 @@ struct SolverCounters {
 
 /// Scratch of one thread.
 struct SolverScratch {
-  struct Lever {  // of a row on a group
-    Index group;
-    double share;
-    Vec3 arm;  // [m] of its shares about the centre
+  struct Lever {  // of a row on a body as a whole
+    double share = 0.0;
+    Vec3 arm = Vec3::Zero();  // [m] of its shares about the centre
   };
   struct Active {
     ContactRow* row;
     const RowEntry* entries;
-    Index a, b;                 // bodies; the same where there is one
-    Index levers, middle, end;  // of a, then of b
+    Index a, b;  // bodies; the same where there is one
+    Lever on_a, on_b;
     Vec3 start;                 // [m] sum of coefficient x at the start of the substep
     double target;              // [m] gap that is asked for at least
     double mass;                // [kg] impulse for a gap that is 1 m short
     double sideways;            // [kg] the same across the normal, for a slide of 1 m
   };
   struct Pull {
-    Mat3 answer;  // [m/(kg m)] of the point to an impulse
-    Index levers, end;
+    Mat3 answer = Mat3::Zero();  // [m/(kg m)] of the point to an impulse
+    Lever lever{};
   };
   std::vector<Active> active;
   std::vector<Pull> pulls;  // one a spring, then two a fibre
-  std::vector<Lever> levers;
 };
 
 /// Solves the rows, springs and fibres for the bodies that they name. Impulses of rows and fibres are read as a start

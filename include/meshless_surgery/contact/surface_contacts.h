@@ -87,9 +87,9 @@ class SurfaceContacts {
   /// Each collider that moves is in one; in the order of their first bodies.
   const std::vector<Island>& islands() const { return islands_; }
 
-  /// Of the answer of a collider to rows and springs in this frame, the part 0..1 that moves `groups` (null: nothing)
-  /// as rigid bodies. None where it is not said.
-  void setRigidShare(Index collider, const RigidGroups* groups, double share);
+  /// Of the answer of a collider to rows and springs in this frame, the part 0..1 that moves it as a rigid body, and one
+  /// that is held not at all. None where it is not said.
+  void setRigidShare(Index collider, double share);
   /// After the bodies of an island have moved by a substep, the number-th of the frame. previous: [m] at its start, one
   /// a particle of each body of the island. step.warm and step.number are set here. colliders: as find() got them.
   void solveIsland(Index island, SolverStep step, int number, const std::vector<Collider>& colliders,

@@ -40,6 +40,9 @@ double elasticAccelerations(const ElasticCells& cells, const ElasticParameters& 
                             std::vector<ClusterPose>& poses, Points& accelerations, MatchCounters& counters,
                             double swelling = 1.0, const std::vector<PlasticShape>* plastic = nullptr);
 
+/// F of a cell of half_edge [m]: the gradient of its map at its centroid.
+Mat3 gradientOf(const ElasticCell& cell, double half_edge, const Points& y);
+
 /// The energy [J] whose gradient that is.
 double elasticEnergy(const ElasticCells& cells, const ElasticParameters& material, const Points& y,
                      std::vector<ClusterPose> poses, double swelling = 1.0,

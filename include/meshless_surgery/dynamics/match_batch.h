@@ -15,9 +15,9 @@ namespace meshless {
 /// What all bodies of a batch share in a substep. h, ahead and gain belong together: batchStep() sets them.
 struct BatchStep {
   double h = 1.0 / 60.0;                                    // [s] > 0
-  double ahead = std::numeric_limits<double>::quiet_NaN();  // [s] >= 0, see viscosityTime(); to be set
+  double ahead = std::numeric_limits<double>::quiet_NaN();  // [s] >= 0, h and the lead of goalPull(); to be set
   MatchMode mode = MatchMode::kLinear;
-  double gain = 0.9;     // 0..1, share of the way to the goal in h; see stiffnessGain()
+  double gain = 0.9;     // 0..1, share of the way to the goal in h; see goalPull()
   double beta = 0.2;     // 0..1, see actingBeta()
   double damping = 0.0;  // [1/s]
   Vec3 gravity = Vec3(0.0, 0.0, -9.81);

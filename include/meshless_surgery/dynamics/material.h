@@ -37,15 +37,15 @@ struct Plasticity {
   double maximum = 0.5;  // 0..3, strain of the rest shape
 };
 
-/// Two families. An appearance material has a youngs_modulus of 0: mode, alpha and beta are the paper's; alpha holds at
-/// the reference rate (see stiffnessGain). An elastic material has a youngs_modulus: the elastic constants of a
+/// Two families. An appearance material has a youngs_modulus of 0: mode, alpha and beta are the paper's; see goalPull for
+/// alpha. An elastic material has a youngs_modulus: the elastic constants of a
 /// textbook, without calibration (dynamics/elastic.h); mode, alpha and beta are then not used.
 struct Material {
   std::string name = "default";
   double youngs_modulus = 0.0;   // [Pa] 0: an appearance material
   double poissons_ratio = 0.45;  // 0..0.49
   MatchMode mode = MatchMode::kLinear;
-  double alpha = 0.9;                            // 0..1, fraction of the way to the goal in 1/60 s
+  double alpha = 0.9;                            // 0..1, how hard goals pull: see goalPull
   double beta = 0.2;                             // 0..1, share of the fitted linear or quadratic map in the goal
   double density = 1000.0;                       // [kg/m^3] > 0
   double damping = 1.0;                          // [1/s] >= 0, decay rate of the motion that deforms
@@ -66,13 +66,18 @@ struct Material {
   Status validate() const;
 };
 
-/// Share of the way to the goal that a substep of h [s] moves: 1 - (1 - alpha)^((h / reference)^2). alpha itself at the
-/// reference step 1/60 s, the same stiffness as h shrinks, never above 1.
-double stiffnessGain(double alpha, double h);
+/// How goals pull in a substep of h [s]: particles that would be at x with velocities v, by all else, are moved by
+/// gain times the way from x + lead v to the goal there. So they swing as on a spring of -ln(1 - alpha) / (1/60 s)^2
+/// for each unit of mass that takes 1 - alpha of a velocity in 1/60 s, whatever h is. Stable for every h, beside what
+/// is stable by itself.
+struct GoalPull {
+  double gain = 0.0;  // 0..1
+  double lead = 0.0;  // [s]
+};
+GoalPull goalPull(double alpha, double h);
 
-/// How far ahead of itself a shape is matched [s]: at x + viscosityTime v the pull damps what deforms as much as it
-/// does at the reference step, where this is h. So the decay does not depend on the step either; stable for every h.
-double viscosityTime(double alpha, double h);
+/// [1/s^2] With which goals pull back, of each unit of mass, what is out of shape.
+double goalStiffness(const Material& material);
 
 /// The share of the fitted goal that acts in a step of h [s]: beta up to 0.95, and less in steps above 0.2 s.
 double actingBeta(double beta, double h);

@@ -9,19 +9,12 @@ namespace meshless {
 /// Lets the rest shapes flow for the deformations in poses, as matchShapes() or elasticAccelerations() with the same
 /// `shapes` left them, over h [s]. The part beyond the yield strain decays at the rate `creep`; a shape's stretch keeps
 /// |U - 1| <= maximum and det U = 1. A pose's rotation becomes that of the new shape. `shapes` may be empty and is
-/// filled when something flows for the first time. Clusters that do not span space, or are nearly flat or inverted, do
-/// not flow. Returns how many have flowed.
-std::size_t flow(const MatchInput& input, const Plasticity& plasticity, double h, std::vector<ClusterPose>& poses,
+/// filled when something flows for the first time. Clusters that do not span space (in `rest`; null where all do), or
+/// are nearly flat or inverted, do not flow. Returns how many have flowed.
+std::size_t flow(const Plasticity& plasticity, double h, const RestShape* rest, std::vector<ClusterPose>& poses,
                  std::vector<PlasticShape>& shapes);
 
-/// Symmetric, logarithm of the stretch, and back.
-Mat3 logarithm(const PlasticShape& shape);
+/// The shape whose stretch has this logarithm: symmetric, without a trace.
 PlasticShape plasticShape(const Mat3& logarithm);
-
-/// Shapes of a piece's clusters: those of the parent's clusters that they were, and for the others (kNoIndex in
-/// `origin`) the mean of what their particles had. parent_particles: of each of the piece's, kNoIndex for new ones.
-std::vector<PlasticShape> inheritShapes(const std::vector<PlasticShape>& parent, const ClusterSet& parent_clusters,
-                                        const ClusterSet& clusters, const std::vector<Index>& origin,
-                                        const std::vector<Index>& parent_particles);
 
 }  // namespace meshless

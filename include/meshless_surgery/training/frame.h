@@ -64,7 +64,15 @@ TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants&
 /// A piece of `whole`, or itself: names of pieces are those of their parents and a number.
 bool isOf(const std::string& body, const std::string& whole);
 
-/// Of a body whose particles are at `positions`: |stretch - 1| [1] of each cluster, the largest of its principal
+/// The cells of a body, or its clusters where it has none.
+struct TissuePart {
+  double mass = 0.0;           // [kg]
+  Vec3 centre = Vec3::Zero();  // [m] at rest
+};
+Index tissueParts(const BodyModel& model);
+TissuePart tissuePart(const BodyModel& model, Index part);
+
+/// Of a body whose particles are at `positions`: |stretch - 1| [1] of each of its parts, the largest of its principal
 /// directions; 0 of crumbs.
 std::vector<double> strainsOf(const BodyModel& model, const Points& positions);
 

@@ -110,7 +110,6 @@ struct StepReport {
   std::size_t fibres = 0;     // solved in a substep, over all of them
   std::size_t torn = 0;       // fibres
   std::size_t mended = 0;     // bodies whose coordinates were not finite, and that start anew from rest
-  std::size_t unwinding = 0;  // bodies that were wound up in themselves, and are led back to their shape
 };
 
 /// Memory that a world holds [bytes]; what several bodies share counts once.

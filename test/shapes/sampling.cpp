@@ -1,4 +1,4 @@
-#include "meshless_surgery/geometry/mesh/sampling.h"
+#include "shapes/sampling.h"
 
 #include <cmath>
 
