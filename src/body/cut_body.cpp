@@ -8,7 +8,7 @@
 namespace meshless {
 namespace {
 
-constexpr double kSnap = 0.2;     // [spacing] shorter edges would cost contact much, and cells do not resolve them
+constexpr double kSnap = 0.2;  // [spacing] shorter edges would cost contact much, and cells do not resolve them
 
 }  // namespace
 
@@ -24,17 +24,16 @@ CutWork& CutWork::operator+=(const CutWork& other) {
 
 namespace {
 
-Result<CutBody> cutFilled(const BodyModel& model, const BodyState& state, const Plane& plane,
-                          const TriangleMesh& present, const CutOptions& options,
+Result<CutBody> cutFilled(const BodyModel& model, const BodyState& state, const Plane& plane, const CutOptions& options,
                           const std::vector<TissuePlace>& places) {
   Result<CutSurface> cut = Error(), cut_contact = Error();
-  const TriangleMesh for_contact = presentCollision(model, state);
-  atOnce([&] { cut = cutByPlane(present, plane, options); },
+  const MetBody met(model, state);
+  atOnce([&] { cut = cutByPlane(met.surface, plane, options); },
          [&] {
            if (!model.collision) return;
            CutOptions likewise = options;
            likewise.rest = &model.collision->mesh.vertices;
-           cut_contact = cutByPlane(for_contact, plane, likewise);
+           cut_contact = cutByPlane(met.collision, plane, likewise);
          });
   if (!cut) return cut.error();
   std::vector<CellPieceSource> sources, collision;
@@ -44,7 +43,7 @@ Result<CutBody> cutFilled(const BodyModel& model, const BodyState& state, const 
   CutBody result;
   result.cap_area = cut->cap_area;
   Result<std::vector<BodyPiece>> pieces =
-      cutCells(model, state, BladeGate(plane), sources, collision, places, options.cap_patch, result.work);
+      cutCells(model, state, met, BladeGate(plane), sources, collision, places, options.cap_patch, result.work);
   if (!pieces) return pieces.error();
   result.pieces = std::move(*pieces);
   return result;
@@ -56,10 +55,6 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
                         const CutBodyOptions& wanted) {
   if (!model.solid)
     return Error{ErrorCode::kUnsuitableShape, "its surface is open, so it cannot be cut into closed pieces"};
-  TriangleMesh present;
-  present.vertices = state.surface;
-  present.triangles = model.surface.triangles;
-  present.patches = model.surface.patches;
   CutOptions options;
   options.cap_patch = model.next_patch;
   options.cap_points = kUsualCapPoints;
@@ -68,7 +63,7 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Pl
   options.rest = &model.surface.vertices;
   options.apart = kOneTissue * model.spacing;
   options.snap = kSnap * model.spacing;
-  return cutFilled(model, state, plane, present, options, wanted.places);
+  return cutFilled(model, state, plane, options, wanted.places);
 }
 
 }  // namespace meshless

@@ -80,15 +80,16 @@ struct HashOfPlace {
 
 class CellCutter {
  public:
-  CellCutter(const BodyModel& model, const BodyState& state, const BladeGate& gate,
+  CellCutter(const BodyModel& model, const BodyState& state, const MetBody& met, const BladeGate& gate,
              const std::vector<CellPieceSource>& sources, const std::vector<CellPieceSource>& collision)
       : model_(model),
         state_(state),
+        positions_(met.positions),
         gate_(gate),
         sources_(sources),
         collision_(collision),
         before_(*model.lattice),
-        cut_(cutLattice(before_, state.positions, gate)),
+        cut_(cutLattice(before_, met.positions, gate)),
         finder_(cut_.lattice),
         children_(before_.cells.size()) {
     for (Index c = 0; c < cells().size(); ++c) children_[cut_.parent_cell[c]].push_back(c);
@@ -149,7 +150,7 @@ class CellCutter {
       surface.mesh.vertices.push_back(surface.embedded.back().rest);
     }
     surface.mesh.triangles = source.mesh.triangles;
-    if (!state_.cavities.empty()) surface.mesh.patches = source.mesh.patches;
+    surface.mesh.patches = source.mesh.patches;
     return surface;
   }
 
@@ -199,8 +200,8 @@ class CellCutter {
       Box box;
       Box heights;  // along x
       for (const Index corner : before_.cells[c].corners) {
-        box.extend(state_.positions[corner]);
-        heights.extend(Vec3(gate_.height(state_.positions[corner]), 0.0, 0.0));
+        box.extend(positions_[corner]);
+        heights.extend(Vec3(gate_.height(positions_[corner]), 0.0, 0.0));
       }
       const double wide = 0.5 * (box.max - box.min).norm();
       if (heights.min.x() <= wide && heights.max.x() >= -wide)
@@ -224,7 +225,7 @@ class CellCutter {
         const Vec3 wider = margin * (box.max - box.min);
         if (((q - box.min + wider).array() < 0.0).any() || ((box.max + wider - q).array() < 0.0).any()) continue;
         Vec3 at;
-        if (!invert(before_.cells[c], state_.positions, q, before_.spacing, at)) continue;
+        if (!invert(before_.cells[c], positions_, q, before_.spacing, at)) continue;
         // What lies in a cell and next to one of its samples is as good as what lies on it.
         const SampleSet samples = before_.cells[c].samples ? before_.cells[c].samples : before_.cells[c].filled;
         const double outside = (at - at.cwiseMax(0.0).cwiseMin(1.0)).norm();
@@ -475,8 +476,7 @@ class CellCutter {
       const Index first = static_cast<Index>(piece.mesh.vertices.size());
       for (const Triangle& t : surface.mesh.triangles)
         piece.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-      for (const std::uint32_t patch : surface.mesh.patches)  // contact knows no other ones
-        piece.mesh.patches.push_back(isCavityPatch(patch) ? patch : kOuterPatch);
+      piece.mesh.patches.insert(piece.mesh.patches.end(), surface.mesh.patches.begin(), surface.mesh.patches.end());
       piece.mesh.vertices.insert(piece.mesh.vertices.end(), surface.mesh.vertices.begin(), surface.mesh.vertices.end());
       std::vector<Index> cells = cellsOf(surface, static_cast<int>(p));
       for (Index v = 0; v < cells.size(); ++v)
@@ -822,8 +822,7 @@ class CellCutter {
 
   Vec3 presentPlace(const TissuePlace& place) const {
     Vec3 now = Vec3::Zero();
-    for (int k = 0; k < 8; ++k)
-      now += trilinearWeight(k, place.at) * state_.positions[before_.cells[place.cell].corners[k]];
+    for (int k = 0; k < 8; ++k) now += trilinearWeight(k, place.at) * positions_[before_.cells[place.cell].corners[k]];
     return now;
   }
 
@@ -871,6 +870,7 @@ class CellCutter {
 
   const BodyModel& model_;
   const BodyState& state_;
+  const Points& positions_;  // [m] of the particles, as the blade meets them
   const BladeGate& gate_;
   const std::vector<CellPieceSource>&sources_, &collision_;
   const CellLattice& before_;
@@ -891,22 +891,12 @@ class CellCutter {
 
 }  // namespace
 
-Result<std::vector<BodyPiece>> cutCells(const BodyModel& model, const BodyState& state, const BladeGate& gate,
-                                        const std::vector<CellPieceSource>& sources,
+Result<std::vector<BodyPiece>> cutCells(const BodyModel& model, const BodyState& state, const MetBody& met,
+                                        const BladeGate& gate, const std::vector<CellPieceSource>& sources,
                                         const std::vector<CellPieceSource>& collision,
                                         const std::vector<TissuePlace>& places, std::uint32_t new_patch,
                                         CutWork& work) {
-  return CellCutter(model, state, gate, sources, collision).run(places, new_patch, work);
-}
-
-TriangleMesh presentCollision(const BodyModel& model, const BodyState& state) {
-  TriangleMesh present;
-  if (!model.collision) return present;
-  present.vertices = collisionPlaces(model, state.positions);
-  present.triangles = model.collision->mesh.triangles;
-  present.patches = model.collision->mesh.patches;
-  present.patches.resize(present.triangles.size(), kOuterPatch);
-  return present;
+  return CellCutter(model, state, met, gate, sources, collision).run(places, new_patch, work);
 }
 
 }  // namespace meshless

@@ -3,6 +3,7 @@
 
 #include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/geometry/query/blade_gate.h"
+#include "met_body.h"
 
 namespace meshless {
 
@@ -11,26 +12,23 @@ namespace meshless {
 constexpr double kOneTissue = 4.0;
 
 struct CellPieceSource {
-  const TriangleMesh& mesh;      // present shape; patches filled
+  const TriangleMesh& mesh;      // as the blade met it; patches filled
   const VertexOrigins& origins;  // of its vertices
 };
 
-/// One piece a source, in their order. Particles of the parent go on in one piece each, where their tissue is, and come
-/// first, in their order; copies follow (BodyPiece::parent_particles has kNoIndex for them). Positions and velocities
-/// of copies are those of what they are copies of, and masses add up corner by corner: mass and momentum stay. Refuses
-/// (kUnsuitableShape) where a point that the blade made lies in none of the cells.
+/// The sources are of `met`. One piece a source, in their order. Particles of the parent go on in one piece each, where
+/// their tissue is, and come first, in their order; copies follow (BodyPiece::parent_particles has kNoIndex for them).
+/// Positions and velocities of copies are those of what they are copies of, and masses add up corner by corner: mass
+/// and momentum stay. Refuses (kUnsuitableShape) where a point that the blade made lies in none of the cells.
 ///
 /// collision: what the same blade made of the body's surface for contact, in any order. Each goes to the piece that
 /// most of its vertices are in. A piece that gets none, or one that is not all in its cells, meets others by what is
 /// seen.
 ///
 /// places: each goes on in the copy of its cell with the nearest tissue on its side of the blade, if there is any.
-Result<std::vector<BodyPiece>> cutCells(const BodyModel& model, const BodyState& state, const BladeGate& gate,
-                                        const std::vector<CellPieceSource>& sources,
+Result<std::vector<BodyPiece>> cutCells(const BodyModel& model, const BodyState& state, const MetBody& met,
+                                        const BladeGate& gate, const std::vector<CellPieceSource>& sources,
                                         const std::vector<CellPieceSource>& collision,
                                         const std::vector<TissuePlace>& places, std::uint32_t new_patch, CutWork& work);
-
-/// The surface for contact in its present shape [m]; empty where the body has none of its own.
-TriangleMesh presentCollision(const BodyModel& model, const BodyState& state);
 
 }  // namespace meshless

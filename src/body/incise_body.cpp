@@ -6,13 +6,15 @@
 namespace meshless {
 namespace {
 
+constexpr double kFollow = 0.05;  // [spacing] a blade that close to a wound that runs along it goes into it
+
 Result<IncisedBody> inciseFilled(const BodyModel& model, const BodyState& state, const Blade& blade,
-                                 const TriangleMesh& present, const InciseOptions& options,
-                                 const std::vector<TissuePlace>& places) {
+                                 const InciseOptions& options, const std::vector<TissuePlace>& places) {
   Result<Incision> incision = Error(), contact_incision = Error();
-  atOnce([&] { incision = incise(present, blade, options); },
+  const MetBody met(model, state);
+  atOnce([&] { incision = incise(met.surface, blade, options); },
          [&] {
-           if (model.collision) contact_incision = incise(presentCollision(model, state), blade, options);
+           if (model.collision) contact_incision = incise(met.collision, blade, options);
          });
   if (!incision) return incision.error();
   std::vector<CellPieceSource> sources, collision;
@@ -22,7 +24,7 @@ Result<IncisedBody> inciseFilled(const BodyModel& model, const BodyState& state,
   IncisedBody result;
   result.opened_area = incision->opened_area;
   Result<std::vector<BodyPiece>> pieces =
-      cutCells(model, state, BladeGate(blade), sources, collision, places, options.patch, result.work);
+      cutCells(model, state, met, BladeGate(blade), sources, collision, places, options.patch, result.work);
   if (!pieces) return pieces.error();
   result.pieces = std::move(*pieces);
   return result;
@@ -33,13 +35,10 @@ Result<IncisedBody> inciseFilled(const BodyModel& model, const BodyState& state,
 Result<IncisedBody> inciseBody(const BodyModel& model, const BodyState& state, const Blade& blade,
                                const std::vector<TissuePlace>& places) {
   if (!model.solid) return Error{ErrorCode::kUnsuitableShape, "its surface is open, so it has no inside to be opened"};
-  TriangleMesh present;
-  present.vertices = state.surface;
-  present.triangles = model.surface.triangles;
-  present.patches = model.surface.patches;
   InciseOptions options;
   options.patch = model.next_patch;
-  return inciseFilled(model, state, blade, present, options, places);
+  options.follow = kFollow * model.spacing;
+  return inciseFilled(model, state, blade, options, places);
 }
 
 }  // namespace meshless

@@ -222,7 +222,6 @@ class Cutter {
     result_.lattice.regions = before_.regions;
     for (const Family& f : families_) {
       const bool changed = f.inside_cut || f.face_cut;
-      const double share = before_.cells[f.parts[0]].mass_share;
       SampleSet left = cellOf(f).samples;
       if (!f.inside_cut || !left) {
         if (f.face >= 0 && f.face_links) {
@@ -250,7 +249,7 @@ class Cutter {
       while (left) {
         const SampleSet whole = connectedPart(left, f.parted);
         left &= ~whole;
-        addWhole(f, whole, altogether, share);
+        addWhole(f, whole, altogether);
       }
     }
   }
@@ -273,7 +272,7 @@ class Cutter {
   }
 
   // What hangs together of a family: one cell, or its parts across the plane and their bridge.
-  void addWhole(const Family& f, SampleSet whole, const LinkSet& altogether, double share) {
+  void addWhole(const Family& f, SampleSet whole, const LinkSet& altogether) {
     std::vector<SampleSet> parts;
     std::vector<Index> parents;
     for (const Index p : f.parts) {
@@ -301,22 +300,24 @@ class Cutter {
     if (one_parent && cut == 0) {
       cell.corners = before_.cells[parents[0]].corners;
       cell.samples = cell.filled = whole;
-      cell.mass_share = cell.stiffness_share = share;
+      cell.mass_share = cell.stiffness_share = before_.cells[parents[0]].mass_share;
       return add(cell, parents[0], true);
     }
     const double held = 1.0 - static_cast<double>(std::max(cut, 1)) / links;
     cell.bridge = static_cast<Index>(result_.lattice.cells.size() + parts.size());
+    double of_all = 0.0;
     for (std::size_t n = 0; n < parts.size(); ++n) {
       cell.corners = before_.cells[parents[n]].corners;
       cell.samples = cell.filled = parts[n];
-      cell.mass_share = share;
-      cell.stiffness_share = share * (1.0 - held * held);
+      cell.mass_share = before_.cells[parents[n]].mass_share;  // crumbs may have taken of one part and not of another
+      cell.stiffness_share = cell.mass_share * (1.0 - held * held);
+      of_all += cell.mass_share * countSamples(parts[n]) / countSamples(whole);
       add(cell, parents[n], true);
     }
     cell.corners = cellOf(f).corners;
     cell.samples = cell.filled = whole;
     cell.mass_share = 0.0;
-    cell.stiffness_share = share * held * held;
+    cell.stiffness_share = of_all * held * held;
     add(cell, f.whole, true);
   }
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "mesh/edge_balance.h"
 #include "incise_parts.h"
+#include "mesh/edge_balance.h"
 #include "meshless_surgery/base/number_text.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 
@@ -97,7 +97,7 @@ Status checkOpened(const TriangleMesh& mesh, const OpenedSurface& opened) {
 /// `in_surface`: set where triangles of the mesh lie in the blade.
 Result<Incision> inciseOnce(const TriangleMesh& mesh, const Blade& blade, const InciseOptions& options,
                             bool& in_surface) {
-  Result<SplitSurface> surface = splitAtBlade(mesh, blade, options.band);
+  Result<SplitSurface> surface = splitAtBlade(mesh, blade, options.band, options.follow);
   if (!surface) return surface.error();
   in_surface |= surface->lies_in_surface;
   // Fronts and rims of earlier incisions in the plane may lie on the rim, split in other places.

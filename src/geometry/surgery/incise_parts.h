@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <unordered_map>
 
-#include "meshless_surgery/geometry/surgery/incise.h"
 #include "mesh/split_edges.h"
+#include "meshless_surgery/geometry/surgery/incise.h"
 
 namespace meshless {
 namespace incising {
@@ -61,7 +61,7 @@ struct SplitSurface {
 bool splitRimAtVertices(SplitSurface& surface);
 
 /// Refuses kMissed where the plane or its rectangle is beside the mesh, kUnsuitableShape where the surface is open.
-Result<SplitSurface> splitAtBlade(const TriangleMesh& mesh, const Blade& blade, double band);
+Result<SplitSurface> splitAtBlade(const TriangleMesh& mesh, const Blade& blade, double band, double follow);
 
 struct WoundNode {
   Vec2 place;

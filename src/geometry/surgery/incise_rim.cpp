@@ -3,13 +3,15 @@
 #include <cmath>
 #include <unordered_map>
 
-#include "mesh/exact.h"
 #include "incise_parts.h"
+#include "mesh/exact.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 
 namespace meshless {
 namespace incising {
 namespace {
+
+constexpr double kAlong = 0.9;  // cosine between the normals of a blade and of a wound face that it follows
 
 enum class Reach { kInside, kBorder, kOutside };
 
@@ -43,8 +45,9 @@ class Opener {
  public:
   explicit Opener(const TriangleMesh& mesh) : mesh_(mesh) {}
 
-  Result<SplitSurface> run(const Blade& blade, double band) {
+  Result<SplitSurface> run(const Blade& blade, double band, double follow) {
     placeFrame(blade, band);
+    follow_ = std::max(follow, surface_.frame.band);
     const Status crossed = findCrossings();
     if (!crossed) return crossed.error();
     limitRectangle(blade);
@@ -91,9 +94,11 @@ class Opener {
     const Frame& f = surface_.frame;
     heights_.resize(mesh_.vertices.size());
     states_.resize(mesh_.vertices.size());
+    const std::vector<char> followed = followedVertices();
     for (Index v = 0; v < heights_.size(); ++v) {
       heights_[v] = f.normal.dot(mesh_.vertices[v] - f.origin);
-      states_[v] = static_cast<signed char>((heights_[v] > f.band) - (heights_[v] < -f.band));
+      const double band = followed[v] ? follow_ : f.band;
+      states_[v] = static_cast<signed char>((heights_[v] > band) - (heights_[v] < -band));
       if (states_[v] != 0) continue;
       surface_.places[v] = f.flat(mesh_.vertices[v]);
       in_plane_.push_back(v);
@@ -117,6 +122,22 @@ class Opener {
     if (crossed_.empty() && flat_edges.empty())
       return Error{ErrorCode::kMissed, "the blade meets no tissue: its plane is beside the surface"};
     return findFlatRim(std::move(flat_edges));
+  }
+
+  /// Vertices all of whose wound faces run along the plane.
+  std::vector<char> followedVertices() const {
+    std::vector<char> along(mesh_.vertices.size(), 0), across(mesh_.vertices.size(), 0);
+    if (mesh_.patches.empty() || !(follow_ > surface_.frame.band)) return along;
+    for (Index t = 0; t < mesh_.triangles.size(); ++t) {
+      if (!isCutPatch(mesh_.patches[t])) continue;
+      const Triangle& v = mesh_.triangles[t];
+      const Vec3 area =
+          (mesh_.vertices[v[1]] - mesh_.vertices[v[0]]).cross(mesh_.vertices[v[2]] - mesh_.vertices[v[0]]);
+      const bool is_along = std::abs(area.dot(surface_.frame.normal)) > kAlong * area.norm();
+      for (const Index k : v) (is_along ? along : across)[k] = 1;
+    }
+    for (std::size_t v = 0; v < along.size(); ++v) along[v] = along[v] && !across[v];
+    return along;
   }
 
   /// A triangle that lies in the plane bounds the solid below it where it faces up. Exact on its places, as the wound
@@ -384,6 +405,7 @@ class Opener {
   }
 
   const TriangleMesh& mesh_;
+  double follow_ = 0.0;  // [m]
   SplitSurface surface_;
   std::vector<double> heights_;
   std::vector<signed char> states_;  // +1 above, -1 below, 0 on the plane
@@ -398,8 +420,8 @@ class Opener {
 
 }  // namespace
 
-Result<SplitSurface> splitAtBlade(const TriangleMesh& mesh, const Blade& blade, double band) {
-  return Opener(mesh).run(blade, band);
+Result<SplitSurface> splitAtBlade(const TriangleMesh& mesh, const Blade& blade, double band, double follow) {
+  return Opener(mesh).run(blade, band, follow);
 }
 
 }  // namespace incising

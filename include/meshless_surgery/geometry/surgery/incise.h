@@ -3,9 +3,9 @@
 #pragma once
 
 #include "meshless_surgery/base/result.h"
-#include "meshless_surgery/geometry/surgery/cut.h"
-#include "meshless_surgery/geometry/query/plane.h"
 #include "meshless_surgery/geometry/mesh/triangle_mesh.h"
+#include "meshless_surgery/geometry/query/plane.h"
+#include "meshless_surgery/geometry/surgery/cut.h"
 
 namespace meshless {
 
@@ -23,6 +23,9 @@ struct Blade {
 
 struct InciseOptions {
   double band = 1e-7;  // what is closer to the blade's plane or border than this times the bounds' diagonal is on it
+  // [m] Earlier wound faces (isCutPatch) that run along the blade's plane no farther beside it than this are on it: the
+  // blade follows them, and leaves no sheet between.
+  double follow = 0.0;
   std::uint32_t patch = 1;        // the patch id of the wound faces
   double spacing = 0.0;           // [m] between the inner points; 0: the mean edge of the crossed triangles
   std::size_t max_points = 4000;  // inner points of one wound face; the spacing is widened to keep to it

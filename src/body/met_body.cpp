@@ -1,0 +1,174 @@
+#include "met_body.h"
+
+#include <algorithm>
+#include <array>
+#include <unordered_map>
+
+#include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/geometry/query/union_find.h"
+#include "place_set.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kClosed = 0.3;  // [spacing] sides that are no farther apart are closed
+
+std::array<std::int32_t, 3> cornerOf(const std::array<std::int32_t, 3>& place, int k) {
+  return {place[0] + (k & 1), place[1] + (k >> 1 & 1), place[2] + (k >> 2)};
+}
+
+class ClosedTissue {
+ public:
+  /// `positions` [m] of the particles.
+  ClosedTissue(const BodyModel& model, const Points& positions);
+
+  /// [m] of the particles.
+  const Points& positions() const { return positions_; }
+  /// [m] of the vertices of a surface, which are `present` and at `rest` follow these cells.
+  Points surface(const Points& rest, const std::vector<Index>& cells, const Points& present) const;
+
+ private:
+  using Corner = std::array<std::int32_t, 3>;  // of the lattice
+  struct Hash {
+    std::size_t operator()(const Corner& corner) const {
+      std::size_t hash = 0;
+      for (const std::int32_t k : corner) hash = hash * 0x9e3779b97f4a7c15u + static_cast<std::uint32_t>(k);
+      return hash;
+    }
+  };
+  struct Copies {
+    std::vector<Index> particles;
+    bool wounded = false;  // a cell at it is one of several at its place, or has links that a blade has cut
+  };
+
+  void findCopies();
+  void close();
+  /// [m] where the tissue of a cell has a corner of the lattice.
+  Vec3 positionOf(const Corner& corner, const Copies& copies, const LatticeCell& cell) const;
+
+  const CellLattice& lattice_;
+  Points positions_;
+  std::unordered_map<Corner, Copies, Hash> corners_;  // around wounds
+  Points tissue_;                                     // [m] from each particle there to the middle of its tissue
+  std::vector<bool> near_;                            // cells with a wound within two places
+};
+
+ClosedTissue::ClosedTissue(const BodyModel& model, const Points& positions)
+    : lattice_(*model.lattice), positions_(positions) {
+  findCopies();
+  close();
+}
+
+void ClosedTissue::findCopies() {
+  const std::vector<LatticeCell>& cells = lattice_.cells;
+  std::vector<PlaceSet::Place> places;
+  for (const LatticeCell& cell : cells) places.push_back(cell.place);
+  PlaceSet held(places, 3), wounded(places, 3);
+  for (Index c = 0; c < cells.size(); ++c) {
+    if (cells[c].isBridge(c)) continue;
+    const LinkSet& parted = cells[c].parted;
+    if (held.has(cells[c].place) || parted[0] || parted[1] || parted[2]) wounded.at(cells[c].place) = true;
+    held.at(cells[c].place) = true;
+  }
+  PlaceSet around = wounded;
+  around.widen(true);
+  PlaceSet near = around;
+  near.widen(true);
+  near_.reserve(cells.size());
+  tissue_.assign(positions_.size(), Vec3::Zero());
+  std::vector<int> uses(positions_.size(), 0);
+  for (Index c = 0; c < cells.size(); ++c) {
+    const LatticeCell& cell = cells[c];
+    near_.push_back(near.has(cell.place));
+    if (cell.isBridge(c) || !around.has(cell.place)) continue;
+    const Vec3 at = cell.filled ? Vec3(0.5 * (momentsOf(cell.filled).centroid + Vec3::Ones())) : Vec3::Constant(0.5);
+    Vec3 middle = Vec3::Zero();
+    for (int k = 0; k < 8; ++k) middle += trilinearWeight(k, at) * positions_[cell.corners[k]];
+    for (int k = 0; k < 8; ++k) {
+      const Index particle = cell.corners[k];
+      Copies& copies = corners_[cornerOf(cell.place, k)];
+      if (uses[particle]++ == 0) copies.particles.push_back(particle);
+      copies.wounded = copies.wounded || wounded.has(cell.place);
+      tissue_[particle] += middle - positions_[particle];
+    }
+  }
+  for (std::size_t p = 0; p < tissue_.size(); ++p)
+    if (uses[p] > 1) tissue_[p] /= uses[p];
+}
+
+void ClosedTissue::close() {
+  for (const auto& [corner, copies] : corners_) {
+    const std::vector<Index>& particles = copies.particles;
+    const Index count = static_cast<Index>(particles.size());
+    UnionFind sides(count);
+    for (Index i = 0; i < count; ++i)
+      for (Index j = i + 1; j < count; ++j) {
+        const Index a = particles[i], b = particles[j];
+        const Vec3 across = tissue_[b] - tissue_[a];
+        const double apart = (positions_[b] - positions_[a]).dot(across);
+        if (!(apart > kClosed * lattice_.spacing * across.norm())) sides.join(i, j);
+      }
+    std::vector<Vec3> sums(count, Vec3::Zero());
+    std::vector<int> members(count, 0);
+    for (Index i = 0; i < count; ++i) {
+      sums[sides.find(i)] += positions_[particles[i]];
+      ++members[sides.find(i)];
+    }
+    for (Index i = 0; i < count; ++i)
+      if (const Index side = sides.find(i); members[side] > 1) positions_[particles[i]] = sums[side] / members[side];
+  }
+}
+
+Vec3 ClosedTissue::positionOf(const Corner& corner, const Copies& copies, const LatticeCell& cell) const {
+  Vec3 there = Vec3::Zero();
+  const Vec3 at(corner[0] - cell.place[0], corner[1] - cell.place[1], corner[2] - cell.place[2]);
+  for (int k = 0; k < 8; ++k) there += trilinearWeight(k, at) * positions_[cell.corners[k]];
+  if (copies.particles.empty()) return there;
+  return positions_[*std::min_element(copies.particles.begin(), copies.particles.end(), [&](Index a, Index b) {
+    return (positions_[a] - there).squaredNorm() < (positions_[b] - there).squaredNorm();
+  })];
+}
+
+Points ClosedTissue::surface(const Points& rest, const std::vector<Index>& cells, const Points& present) const {
+  static const Copies kNone;
+  Points closed = present;
+  for (std::size_t v = 0; v < rest.size(); ++v) {
+    if (!near_[cells[v]]) continue;
+    const Corner place = lattice_.placeOf(rest[v]);
+    const Vec3 at = (rest[v] - lattice_.origin) / lattice_.spacing - Vec3(place[0], place[1], place[2]);
+    std::array<const Copies*, 8> copies;
+    double wounded = 0.0;  // 0..1
+    for (int k = 0; k < 8; ++k) {
+      const auto found = corners_.find(cornerOf(place, k));
+      copies[k] = found == corners_.end() ? &kNone : &found->second;
+      if (copies[k]->wounded) wounded += trilinearWeight(k, at);
+    }
+    if (!(wounded > 0.0)) continue;
+    Vec3 by_corners = Vec3::Zero();
+    for (int k = 0; k < 8; ++k)
+      by_corners += trilinearWeight(k, at) * positionOf(cornerOf(place, k), *copies[k], lattice_.cells[cells[v]]);
+    const bool all = std::all_of(copies.begin(), copies.end(), [](const Copies* c) { return c->wounded; });
+    closed[v] = all ? by_corners : Vec3(present[v] + wounded * (by_corners - present[v]));
+  }
+  return closed;
+}
+
+}  // namespace
+
+MetBody::MetBody(const BodyModel& model, const BodyState& state) : positions(state.positions) {
+  surface = {state.surface, model.surface.triangles, model.surface.patches};
+  if (model.collision) {
+    collision = {collisionPlaces(model, state.positions), model.collision->mesh.triangles,
+                 model.collision->mesh.patches};
+    collision.patches.resize(collision.triangles.size(), kOuterPatch);
+  }
+  if (!model.incised) return;
+  const ClosedTissue closed(model, state.positions);
+  positions = closed.positions();
+  surface.vertices = closed.surface(model.surface.vertices, model.binding.cells, surface.vertices);
+  if (model.collision)
+    collision.vertices =
+        closed.surface(model.collision->mesh.vertices, model.collision->binding.cells, collision.vertices);
+}
+
+}  // namespace meshless
