@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Plays the pile scene (Mueller et al. 2005, Fig. 8): blocks of 32 tetrahedra fall on each other and come to rest."""
+"""Plays the pile scene (Mueller et al. 2005, Fig. 8): blocks of 32 triangles fall on each other and come to rest."""
 import os
 import sys
 

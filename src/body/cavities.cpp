@@ -90,8 +90,7 @@ double volumeWithin(const TriangleMesh& mesh, const Closed& closed) {
 // Vertices of walls, bound as those of a surface are, and then the middles of lids.
 class WallBinder {
  public:
-  WallBinder(const SurfaceBinding& surface, std::size_t vertices)
-      : surface_(surface), number_(vertices, kNoIndex) {
+  WallBinder(const SurfaceBinding& surface, std::size_t vertices) : surface_(surface), number_(vertices, kNoIndex) {
     walls_.offsets.push_back(0);
   }
 
@@ -230,17 +229,29 @@ bool markCavities(const TriangleMesh& visual, TriangleMesh& collision) {
 
 void makeCavities(BodyModel& model) {
   model.cavities.reset();
-  const std::set<std::uint32_t> patches = cavityPatches(model.surface);
-  if (patches.empty()) return;
+  const std::set<std::uint32_t> made = cavityPatches(model.surface);
+  if (made.empty()) return;
   const std::vector<Index> part = partsOf(model.surface.triangles);
-  std::vector<char> outside(part.size(), 0);  // of a part: it has faces that no cavity and no blade has made
-  for (std::size_t t = 0; t < part.size(); ++t)
-    if (model.surface.patches[t] == kOuterPatch) outside[part[t]] = 1;
-  std::set<std::uint32_t> open;
-  for (std::size_t t = 0; t < part.size(); ++t)
-    if (isCavityPatch(model.surface.patches[t]) && outside[part[t]]) open.insert(model.surface.patches[t]);
+  std::map<Index, std::vector<Index>> triangles;
+  std::set<Index> outside;  // parts with faces that no cavity and no blade has made
+  for (Index t = 0; t < part.size(); ++t) {
+    triangles[part[t]].push_back(t);
+    if (model.surface.patches[t] == kOuterPatch) outside.insert(part[t]);
+  }
+  // A fold of the wall that a blade has taken off, with no face of the outside, is tissue and encloses nothing.
+  std::set<std::uint32_t> patches, open;
+  for (const auto& [first, all] : triangles) {
+    const bool is_outside = outside.count(first) > 0;
+    if (!is_outside && signedVolume(model.surface.vertices, chosen(model.surface.triangles, all)) > 0.0) continue;
+    for (const Index t : all) {
+      if (!isCavityPatch(model.surface.patches[t])) continue;
+      patches.insert(model.surface.patches[t]);
+      if (is_outside) open.insert(model.surface.patches[t]);
+    }
+  }
+  if (patches.empty()) return;
 
-  const bool by_contact = model.collision && cavityPatches(model.collision->mesh) == patches;
+  const bool by_contact = model.collision && cavityPatches(model.collision->mesh) == made;
   const TriangleMesh& carrier = by_contact ? model.collision->mesh : model.surface;
   WallBinder binder(by_contact ? model.collision->binding : model.binding, carrier.vertices.size());
   auto cavities = std::make_shared<Cavities>();

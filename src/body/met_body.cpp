@@ -120,9 +120,11 @@ void ClosedTissue::close() {
 }
 
 Vec3 ClosedTissue::positionOf(const Corner& corner, const Copies& copies, const LatticeCell& cell) const {
+  const std::array<std::int32_t, 3> at{corner[0] - cell.place[0], corner[1] - cell.place[1], corner[2] - cell.place[2]};
+  if (std::all_of(at.begin(), at.end(), [](std::int32_t n) { return n == 0 || n == 1; }))
+    return positions_[cell.corners[static_cast<std::size_t>(at[0] + 2 * at[1] + 4 * at[2])]];
   Vec3 there = Vec3::Zero();
-  const Vec3 at(corner[0] - cell.place[0], corner[1] - cell.place[1], corner[2] - cell.place[2]);
-  for (int k = 0; k < 8; ++k) there += trilinearWeight(k, at) * positions_[cell.corners[k]];
+  for (int k = 0; k < 8; ++k) there += trilinearWeight(k, Vec3(at[0], at[1], at[2])) * positions_[cell.corners[k]];
   if (copies.particles.empty()) return there;
   return positions_[*std::min_element(copies.particles.begin(), copies.particles.end(), [&](Index a, Index b) {
     return (positions_[a] - there).squaredNorm() < (positions_[b] - there).squaredNorm();

@@ -251,6 +251,29 @@ TEST(FilledCavity, ACutThroughItLetsItOut) {
   for (std::size_t n = 0; n < 4; ++n) leaked(n);
 }
 
+// Of the wall and the blade alone, with nothing of the outside.
+TEST(FilledCavity, AFoldThatIsTakenOffEnclosesNothing) {
+  TriangleMesh inner = sphereMesh(0.034, 0.005);
+  for (Vec3& p : inner.vertices)  // 16 mm inwards
+    p *= 1.0 - 0.47 * std::exp(-std::pow(std::acos(std::min(1.0, p.x() / p.norm())) / 0.4, 2));
+  BodyDef def = elastic(hollow(sphereMesh(0.04, 0.005), inner), 0.005, 2e4);
+  def.cavities.volume = 1.62e-4;
+  def.cavities.kind = CavityFill::Kind::kVolume;
+  World world = worldOf(def, test::weightless());
+  run(world, 0.5);
+  const BodySnapshot whole = bodyOf(world);
+  const CutReply reply = cutAt(world, whole.measures.centre_of_mass + Vec3(0.0235, 0, 0), Vec3::UnitY(), Vec3::UnitX());
+  ASSERT_EQ(reply.new_bodies.size(), 3u);
+  const BodySnapshot fold = bodyOf(world, 2);
+  EXPECT_LT(fold.model->rest_volume, 1e-6);
+  EXPECT_TRUE(fold.measures.cavities.empty());
+  EXPECT_EQ(leaks(world).size(), 2u);  // of the others
+  run(world, 0.5);
+  const BodySnapshot later = bodyOf(world, 2);
+  EXPECT_NEAR(later.measures.volume, later.model->rest_volume, 0.1 * later.model->rest_volume);
+  EXPECT_LT((later.measures.centre_of_mass - fold.measures.centre_of_mass).norm(), 0.1);
+}
+
 TEST(FilledCavity, AnIncisionIntoItLetsItOut) {
   for (const double depth : {0.003, 0.012}) {
     World world = worldOf(bladder(), WorldSettings());
