@@ -1,12 +1,16 @@
 #include "meshless_surgery/body/incise_body.h"
 
+#include <algorithm>
+
 #include "cut_cells.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "side_by_side.h"
 
 namespace meshless {
 namespace {
 
 constexpr double kFollow = 0.05;  // [spacing] a blade that close to a wound that runs along it goes into it
+constexpr double kBand = 3e-3;    // [spacing] vertices that close to a blade are on it: no edges are shorter than that
 
 Result<IncisedBody> inciseFilled(const BodyModel& model, const BodyState& state, const Blade& blade,
                                  const InciseOptions& options, const std::vector<TissuePlace>& places) {
@@ -38,6 +42,8 @@ Result<IncisedBody> inciseBody(const BodyModel& model, const BodyState& state, c
   InciseOptions options;
   options.patch = model.next_patch;
   options.follow = kFollow * model.spacing;
+  const double extent = boundsOf(state.surface).diagonal();
+  if (extent > 0.0) options.band = std::min(kBand * model.spacing / extent, 1e-3);
   return inciseFilled(model, state, blade, options, places);
 }
 

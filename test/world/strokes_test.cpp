@@ -132,6 +132,22 @@ TEST(Strokes, ThatASurgeonMakesAreAllMade) {
   EXPECT_GE(theatre.made, 17);
 }
 
+// As a scalpel that moves on makes it.
+TEST(Strokes, OneAfterAnotherMakeALine) {
+  int refused = 0, all = 0;
+  for (const double y : {0.0, 0.0013})
+    for (const auto& [pieces, overlap] : {std::pair(8, 0.001), std::pair(16, 0.002)}) {
+      Theatre theatre = skin();
+      for (int k = 0; k < pieces; ++k) {
+        const double from = -0.04 + 0.08 * k / pieces, to = from + 0.08 / pieces;
+        refused += !strokeOfSkin(theatre, {from - overlap, y}, {to, y}, 0.013);
+        ++all;
+      }
+      EXPECT_EQ(theatre.world.bodyCount(), 1u);
+    }
+  EXPECT_LE(refused, all / 50);
+}
+
 TEST(Strokes, AllOverASlabAreNotRefused) {
   Random random(911);
   Theatre theatre = skin();
