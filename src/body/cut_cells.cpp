@@ -24,9 +24,8 @@
 namespace meshless {
 namespace {
 
-constexpr double kBeneath = 1e-3;      // [spacing]
-constexpr double kCrumb = 1.0 / 64.0;  // of a cell: what a sample stands for, and what tissue gets that none sees
-constexpr std::size_t kChunk = 256;    // vertices
+constexpr double kBeneath = 1e-3;    // [spacing]
+constexpr std::size_t kChunk = 256;  // vertices
 
 // A vertex of a piece, or of its surface for contact, whose new cell is not known yet.
 struct EmbeddedVertex {

@@ -11,6 +11,9 @@ namespace meshless {
 /// shorter.
 constexpr double kOneTissue = 4.0;
 
+/// Of a cell: what a sample stands for, and what tissue gets that none sees.
+constexpr double kCrumb = 1.0 / 64.0;
+
 struct CellPieceSource {
   const TriangleMesh& mesh;      // as the blade met it; patches filled
   const VertexOrigins& origins;  // of its vertices

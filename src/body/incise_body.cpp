@@ -1,6 +1,7 @@
 #include "meshless_surgery/body/incise_body.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "cut_cells.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
@@ -12,6 +13,27 @@ namespace {
 constexpr double kFollow = 0.05;  // [spacing] a blade that close to a wound that runs along it goes into it
 constexpr double kBand = 3e-3;    // [spacing] vertices that close to a blade are on it: no edges are shorter than that
 
+/// What is less than `least` [m^3] stays with the largest piece, as a part of its surface: needles between strokes are
+/// no bodies.
+void keepCrumbs(double least, std::vector<IncisedPiece>& pieces) {
+  std::vector<IncisedPiece> kept;
+  for (IncisedPiece& piece : pieces) {
+    if (kept.empty() || signedVolume(piece.mesh) >= least) {
+      kept.push_back(std::move(piece));
+      continue;
+    }
+    IncisedPiece& main = kept.front();
+    const Index first = static_cast<Index>(main.mesh.vertices.size());
+    main.mesh.vertices.insert(main.mesh.vertices.end(), piece.mesh.vertices.begin(), piece.mesh.vertices.end());
+    for (const Triangle& t : piece.mesh.triangles)
+      main.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+    main.mesh.patches.insert(main.mesh.patches.end(), piece.mesh.patches.begin(), piece.mesh.patches.end());
+    main.facing.insert(main.facing.end(), piece.facing.begin(), piece.facing.end());
+    main.origins.append(piece.origins);
+  }
+  pieces = std::move(kept);
+}
+
 Result<IncisedBody> inciseFilled(const BodyModel& model, const BodyState& state, const Blade& blade,
                                  const InciseOptions& options, const std::vector<TissuePlace>& places) {
   Result<Incision> incision = Error(), contact_incision = Error();
@@ -21,6 +43,7 @@ Result<IncisedBody> inciseFilled(const BodyModel& model, const BodyState& state,
            if (model.collision) contact_incision = incise(met.collision, blade, options);
          });
   if (!incision) return incision.error();
+  keepCrumbs(kCrumb * std::pow(model.spacing, 3), incision->pieces);
   std::vector<CellPieceSource> sources, collision;
   for (const IncisedPiece& piece : incision->pieces) sources.push_back({piece.mesh, piece.origins});
   if (contact_incision)

@@ -130,6 +130,9 @@ TEST(Strokes, ThatASurgeonMakesAreAllMade) {
     expectMade("ray " + std::to_string(k) + " of a star", {0.03, -0.03},
                Vec2(0.03 + 0.015 * std::cos(0.8 * k), -0.03 + 0.015 * std::sin(0.8 * k)), 0.006);
   EXPECT_GE(theatre.made, 17);
+  // Three strokes through one point leave a needle there: it is no body.
+  EXPECT_EQ(theatre.world.bodyCount(), 1u);
+  EXPECT_EQ(theatre.body().name, "skin");
 }
 
 // As a scalpel that moves on makes it.

@@ -7,7 +7,8 @@
 namespace meshless {
 
 struct IncisedBody {
-  /// One where the body holds together: its particles are the parent's, in their order. Else largest volume first.
+  /// One where the body holds together: its particles are the parent's, in their order. Else largest volume first. What
+  /// is less than a sample of a cell comes apart from no piece: it stays with the largest.
   std::vector<BodyPiece> pieces;
   double opened_area = 0.0;  // [m^2] of one wound face
   CutWork work;
