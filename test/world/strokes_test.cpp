@@ -148,7 +148,9 @@ TEST(Strokes, OneAfterAnotherMakeALine) {
       }
       EXPECT_EQ(theatre.world.bodyCount(), 1u);
     }
-  EXPECT_LE(refused, all / 50);
+  // Without wounds that are closed for the blade every third is. Where the sides of an open one were split apart, some
+  // are.
+  EXPECT_LE(refused, all / 20);
 }
 
 TEST(Strokes, AllOverASlabAreNotRefused) {
