@@ -17,9 +17,9 @@
 #include <benchmark/benchmark.h>
 
 #include "cut_rows.h"
-#include "meshless_surgery/geometry/surgery/cut.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/geometry/mesh/primitives.h"
+#include "meshless_surgery/geometry/surgery/incise.h"
 #include "meshless_surgery/world/world.h"
 
 namespace meshless::bench {
@@ -45,13 +45,13 @@ Plane planeThrough(const TriangleMesh& mesh) {
 
 void cutRow(benchmark::State& state, const TriangleMesh& mesh, bool interior) {
   const Plane plane = planeThrough(mesh);
-  CutOptions options;
-  options.cap_patch = kCap;
-  options.cap_points = interior ? kUsualCapPoints : 0;
+  InciseOptions options;
+  options.patch = kCap;
+  if (!interior) options.max_points = 0;
   std::size_t pieces = 0, cap = 0;
   double volume = 0.0;
   for (auto _ : state) {
-    Result<CutSurface> cut = cutByPlane(mesh, plane, options);
+    Result<Incision> cut = incise(mesh, Blade::through(plane), options);
     benchmark::DoNotOptimize(cut.ok());
     state.PauseTiming();
     if (!cut) {
@@ -61,11 +61,11 @@ void cutRow(benchmark::State& state, const TriangleMesh& mesh, bool interior) {
     pieces = cut->pieces.size();
     cap = 0;
     volume = 0.0;
-    for (const CutPiece& piece : cut->pieces) {
+    for (const IncisedPiece& piece : cut->pieces) {
       volume += signedVolume(piece.mesh);
       for (const std::uint32_t patch : piece.mesh.patches) cap += patch == kCap;
     }
-    cut = CutSurface();
+    cut = Incision();
     state.ResumeTiming();
   }
   const double whole = signedVolume(mesh);

@@ -1,14 +1,39 @@
 #include "meshless_surgery/body/cut_body.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "cut_cells.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "side_by_side.h"
 
 namespace meshless {
 namespace {
 
-constexpr double kSnap = 0.2;  // [spacing] shorter edges would cost contact much, and cells do not resolve them
+constexpr double kFollow = 0.05;  // [spacing] a blade that close to a wound that runs along it goes into it
+constexpr double kApart = 4.0;    // [spacing] tissue that meets now and is farther apart at rest lies in itself
+constexpr double kBand = 3e-3;    // [spacing] vertices that close to a blade are on it: no edges are shorter than that
+
+/// What is less than `least` [m^3] stays with the largest piece, as a part of its surface: needles between strokes are
+/// no bodies.
+void keepCrumbs(double least, std::vector<IncisedPiece>& pieces) {
+  std::vector<IncisedPiece> kept;
+  for (IncisedPiece& piece : pieces) {
+    if (kept.empty() || signedVolume(piece.mesh) >= least) {
+      kept.push_back(std::move(piece));
+      continue;
+    }
+    IncisedPiece& main = kept.front();
+    const Index first = static_cast<Index>(main.mesh.vertices.size());
+    main.mesh.vertices.insert(main.mesh.vertices.end(), piece.mesh.vertices.begin(), piece.mesh.vertices.end());
+    for (const Triangle& t : piece.mesh.triangles)
+      main.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+    main.mesh.patches.insert(main.mesh.patches.end(), piece.mesh.patches.begin(), piece.mesh.patches.end());
+    main.facing.insert(main.facing.end(), piece.facing.begin(), piece.facing.end());
+    main.origins.append(piece.origins);
+  }
+  pieces = std::move(kept);
+}
 
 }  // namespace
 
@@ -22,48 +47,61 @@ CutWork& CutWork::operator+=(const CutWork& other) {
   return *this;
 }
 
-namespace {
-
-Result<CutBody> cutFilled(const BodyModel& model, const BodyState& state, const Plane& plane, const CutOptions& options,
-                          const std::vector<TissuePlace>& places) {
-  Result<CutSurface> cut = Error(), cut_contact = Error();
-  const MetBody met(model, state);
-  atOnce([&] { cut = cutByPlane(met.surface, plane, options); },
+Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Blade& blade,
+                        const CutBodyOptions& wanted) {
+  if (!model.solid) return Error{ErrorCode::kUnsuitableShape, "its surface is open, so it has no inside to be cut"};
+  InciseOptions options;
+  options.patch = model.next_patch;
+  options.roughness = wanted.roughness;
+  options.seed = wanted.seed;
+  options.apart = kApart * model.spacing;
+  options.follow = kFollow * model.spacing;
+  const double extent = boundsOf(state.surface).diagonal();
+  if (extent > 0.0) options.band = std::min(kBand * model.spacing / extent, 1e-3);
+  const auto opened = [&](const TriangleMesh& mesh, const Blade& by, const Points* rest) {
+    InciseOptions mine = options;
+    mine.rest = rest;
+    Result<Incision> incision = incise(mesh, by, mine);
+    if (incision || incision.error().code != ErrorCode::kUnsuitableShape) return incision;
+    // Vertices used where they are, a little off the blade, can make a sound rim cross itself.
+    mine.band = InciseOptions().band;
+    mine.follow = 0.0;
+    Result<Incision> again = incise(mesh, by, mine);
+    return again ? again : incision;
+  };
+  MetBody met(model, state);
+  Blade by = blade;
+  Result<Incision> seen = Error(), touched = Error();
+  atOnce([&] { seen = opened(met.surface, by, &model.surface.vertices); },
          [&] {
-           if (!model.collision) return;
-           CutOptions likewise = options;
-           likewise.rest = &model.collision->mesh.vertices;
-           cut_contact = cutByPlane(met.collision, plane, likewise);
+           if (model.collision) touched = opened(met.collision, by, &model.collision->mesh.vertices);
          });
-  if (!cut) return cut.error();
+  // Where tissue lies in itself within the blade, at rest it does not.
+  const bool clear = seen ? !seen->layered : seen.error().code != ErrorCode::kUnsuitableShape;
+  if (!clear)
+    if (const std::optional<Blade> led = bladeAtRest(model, state, blade)) {
+      MetBody at_rest(model);
+      Result<Incision> again = opened(at_rest.surface, *led, nullptr);
+      if (again && !again->layered) {
+        seen = std::move(again);
+        if (model.collision) touched = opened(at_rest.collision, *led, nullptr);
+        met = std::move(at_rest);
+        by = *led;
+      }
+    }
+  if (!seen) return seen.error();
+  if (blade.bounded()) keepCrumbs(kCrumb * std::pow(model.spacing, 3), seen->pieces);
   std::vector<CellPieceSource> sources, collision;
-  for (const CutPiece& piece : cut->pieces) sources.push_back({piece.mesh, piece.origins});
-  if (cut_contact)
-    for (const CutPiece& piece : cut_contact->pieces) collision.push_back({piece.mesh, piece.origins});
+  for (const IncisedPiece& piece : seen->pieces) sources.push_back({piece.mesh, piece.origins});
+  if (touched)
+    for (const IncisedPiece& piece : touched->pieces) collision.push_back({piece.mesh, piece.origins});
   CutBody result;
-  result.cap_area = cut->cap_area;
+  result.opened_area = seen->opened_area;
   Result<std::vector<BodyPiece>> pieces =
-      cutCells(model, state, met, BladeGate(plane), sources, collision, places, options.cap_patch, result.work);
+      cutCells(model, state, met, by, sources, collision, wanted.places, options.patch, result.work);
   if (!pieces) return pieces.error();
   result.pieces = std::move(*pieces);
   return result;
-}
-
-}  // namespace
-
-Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Plane& plane,
-                        const CutBodyOptions& wanted) {
-  if (!model.solid)
-    return Error{ErrorCode::kUnsuitableShape, "its surface is open, so it cannot be cut into closed pieces"};
-  CutOptions options;
-  options.cap_patch = model.next_patch;
-  options.cap_points = kUsualCapPoints;
-  options.roughness = wanted.roughness;
-  options.seed = wanted.seed;
-  options.rest = &model.surface.vertices;
-  options.apart = kOneTissue * model.spacing;
-  options.snap = kSnap * model.spacing;
-  return cutFilled(model, state, plane, options, wanted.places);
 }
 
 }  // namespace meshless

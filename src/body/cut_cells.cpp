@@ -79,16 +79,16 @@ struct HashOfPlace {
 
 class CellCutter {
  public:
-  CellCutter(const BodyModel& model, const BodyState& state, const MetBody& met, const BladeGate& gate,
+  CellCutter(const BodyModel& model, const BodyState& state, const MetBody& met, const Blade& blade,
              const std::vector<CellPieceSource>& sources, const std::vector<CellPieceSource>& collision)
       : model_(model),
         state_(state),
         positions_(met.positions),
-        gate_(gate),
+        blade_(blade),
         sources_(sources),
         collision_(collision),
         before_(*model.lattice),
-        cut_(cutLattice(before_, met.positions, gate)),
+        cut_(cutLattice(before_, met.positions, blade)),
         finder_(cut_.lattice),
         children_(before_.cells.size()) {
     for (Index c = 0; c < cells().size(); ++c) children_[cut_.parent_cell[c]].push_back(c);
@@ -156,24 +156,16 @@ class CellCutter {
   EmbeddedVertex embeddedOf(const CellPieceSource& source, Index v, const Points& parent_rest,
                             const SurfaceBinding& parent) const {
     const VertexOrigins& origins = source.origins;
-    EmbeddedVertex embedded{Vec3::Zero(), kNoIndex, origins.same(v), gate_.height(source.mesh.vertices[v]) >= 0.0};
+    EmbeddedVertex embedded{Vec3::Zero(), kNoIndex, origins.same(v), blade_.height(source.mesh.vertices[v]) >= 0.0};
     if (origins.insideCap(v)) return inside_.at(source.mesh.vertices[v]);
     const VertexOrigin origin = origins[v];
-    int heaviest = 0;
-    for (int k = 1; k < 4; ++k)
-      if (origin.parents[k] != kNoIndex && origin.weights[k] > origin.weights[heaviest]) heaviest = k;
-    const Vec3& nearest = parent_rest[origin.parents[heaviest]];
-    embedded.was = parent.cells[origin.parents[heaviest]];
-    double all = 0.0;
-    for (int k = 0; k < 4; ++k) {
-      if (origin.parents[k] == kNoIndex) continue;
-      // Where soft tissue lies in itself, edges of different parts of it meet.
-      const Vec3& rest = parent_rest[origin.parents[k]];
-      if (!((rest - nearest).norm() <= kOneTissue * before_.spacing)) continue;
-      embedded.rest += origin.weights[k] * rest;
-      all += origin.weights[k];
+    double most = 0.0;
+    for (int k = 0; k < 4 && origin.parents[k] != kNoIndex; ++k) {
+      embedded.rest += origin.weights[k] * parent_rest[origin.parents[k]];
+      if (!(origin.weights[k] > most)) continue;
+      most = origin.weights[k];
+      embedded.was = parent.cells[origin.parents[k]];
     }
-    if (all != 1.0) embedded.rest /= all;
     if (!embedded.made()) embedded.rest = parent_rest[origin.parents[0]];
     return embedded;
   }
@@ -200,7 +192,7 @@ class CellCutter {
       Box heights;  // along x
       for (const Index corner : before_.cells[c].corners) {
         box.extend(positions_[corner]);
-        heights.extend(Vec3(gate_.height(positions_[corner]), 0.0, 0.0));
+        heights.extend(Vec3(blade_.height(positions_[corner]), 0.0, 0.0));
       }
       const double wide = 0.5 * (box.max - box.min).norm();
       if (heights.min.x() <= wide && heights.max.x() >= -wide)
@@ -547,7 +539,7 @@ class CellCutter {
       for (const Triangle& t : sources_[p].mesh.triangles)
         for (int k = 0; k < 3; ++k) {
           const Index a = carriers_[p][t[k]], b = carriers_[p][t[(k + 1) % 3]];
-          if (a != b && (gate_.unbounded() || component_[a] != component_[b])) joinCells(a, b);
+          if (a != b && (!blade_.bounded() || component_[a] != component_[b])) joinCells(a, b);
         }
     // What no vertex is in holds to its neighbours in the piece.
     std::vector<std::vector<Index>> users(before_.corners);
@@ -661,7 +653,7 @@ class CellCutter {
   BodyPiece make(std::size_t p, const std::vector<TissuePlace>& places, std::uint32_t new_patch, CutWork& work) {
     const CellPieceSource& from = sources_[p];
     BodyPiece piece;
-    auto child = beginPiece(model_, from.mesh, surfaces_[p].mesh.vertices, !gate_.unbounded());
+    auto child = beginPiece(model_, from.mesh, surfaces_[p].mesh.vertices, blade_.bounded());
 
     auto lattice = std::make_shared<CellLattice>();
     lattice->spacing = before_.spacing;
@@ -780,7 +772,7 @@ class CellCutter {
   // The copy of its cell with the nearest tissue on its side of the blade; kNoIndex: there is none.
   Index heirOf(const TissuePlace& place) const {
     if (place.cell == kNoIndex) return kNoIndex;
-    const bool above = gate_.height(presentPlace(place)) >= 0.0;
+    const bool above = blade_.height(presentPlace(place)) >= 0.0;
     Index best = kNoIndex;
     double least = std::numeric_limits<double>::infinity();
     for (const Index c : children_[place.cell]) {
@@ -799,7 +791,7 @@ class CellCutter {
   Index heirNear(const TissuePlace& place) const {
     if (const Index own = heirOf(place); own != kNoIndex || place.cell == kNoIndex) return own;
     const LatticeCell& was = before_.cells[place.cell];
-    const bool above = gate_.height(presentPlace(place)) >= 0.0;
+    const bool above = blade_.height(presentPlace(place)) >= 0.0;
     Index best = kNoIndex;
     double least = std::numeric_limits<double>::infinity();
     const Vec3 rest = before_.restPlace(was, place.at);
@@ -811,7 +803,8 @@ class CellCutter {
       for (SampleSet left = cell.samples; left; left &= left - 1) {
         const Vec3 sample = samplePlace(lowestSample(left));
         const double squared = (sample - at).squaredNorm();
-        if (!(squared < least) || (gate_.height(presentPlace({cut_.parent_cell[c], sample})) >= 0.0) != above) continue;
+        if (!(squared < least) || (blade_.height(presentPlace({cut_.parent_cell[c], sample})) >= 0.0) != above)
+          continue;
         least = squared;
         best = c;
       }
@@ -831,8 +824,8 @@ class CellCutter {
     if (cut_.changed[cell] || !samples) return false;
     const Vec3 border = presentPlace(place),
                tissue = presentPlace({place.cell, samplePlace(nearestSample(samples, place.at))});
-    const int from = gate_.height(border) >= 0.0 ? 1 : -1, to = gate_.height(tissue) >= 0.0 ? 1 : -1;
-    return from != to && (gate_.unbounded() || gate_.between(border, from, tissue, to));
+    const int from = blade_.height(border) >= 0.0 ? 1 : -1, to = blade_.height(tissue) >= 0.0 ? 1 : -1;
+    return from != to && (!blade_.bounded() || blade_.passes(border, from, tissue, to));
   }
 
   // What is held stays held.
@@ -870,7 +863,7 @@ class CellCutter {
   const BodyModel& model_;
   const BodyState& state_;
   const Points& positions_;  // [m] of the particles, as the blade meets them
-  const BladeGate& gate_;
+  const Blade& blade_;
   const std::vector<CellPieceSource>&sources_, &collision_;
   const CellLattice& before_;
   CutLattice cut_;
@@ -891,11 +884,11 @@ class CellCutter {
 }  // namespace
 
 Result<std::vector<BodyPiece>> cutCells(const BodyModel& model, const BodyState& state, const MetBody& met,
-                                        const BladeGate& gate, const std::vector<CellPieceSource>& sources,
+                                        const Blade& blade, const std::vector<CellPieceSource>& sources,
                                         const std::vector<CellPieceSource>& collision,
                                         const std::vector<TissuePlace>& places, std::uint32_t new_patch,
                                         CutWork& work) {
-  return CellCutter(model, state, met, gate, sources, collision).run(places, new_patch, work);
+  return CellCutter(model, state, met, blade, sources, collision).run(places, new_patch, work);
 }
 
 }  // namespace meshless

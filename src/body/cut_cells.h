@@ -2,14 +2,10 @@
 #pragma once
 
 #include "meshless_surgery/body/cut_body.h"
-#include "meshless_surgery/geometry/query/blade_gate.h"
+#include "meshless_surgery/geometry/query/blade.h"
 #include "met_body.h"
 
 namespace meshless {
-
-/// [spacing] What is farther apart at rest and meets now are different parts of tissue that lies in itself: edges are
-/// shorter.
-constexpr double kOneTissue = 4.0;
 
 /// Of a cell: what a sample stands for, and what tissue gets that none sees.
 constexpr double kCrumb = 1.0 / 64.0;
@@ -30,7 +26,7 @@ struct CellPieceSource {
 ///
 /// places: each goes on in the copy of its cell with the nearest tissue on its side of the blade, if there is any.
 Result<std::vector<BodyPiece>> cutCells(const BodyModel& model, const BodyState& state, const MetBody& met,
-                                        const BladeGate& gate, const std::vector<CellPieceSource>& sources,
+                                        const Blade& blade, const std::vector<CellPieceSource>& sources,
                                         const std::vector<CellPieceSource>& collision,
                                         const std::vector<TissuePlace>& places, std::uint32_t new_patch, CutWork& work);
 

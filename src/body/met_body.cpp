@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <unordered_map>
 
 #include "meshless_surgery/body/binding.h"
@@ -12,6 +13,7 @@ namespace meshless {
 namespace {
 
 constexpr double kClosed = 0.3;  // [spacing] sides that are no farther apart are closed
+constexpr double kAround = 1.5;  // [spacing] tissue that close to a blade leads it to rest
 
 std::array<std::int32_t, 3> cornerOf(const std::array<std::int32_t, 3>& place, int k) {
   return {place[0] + (k & 1), place[1] + (k >> 1 & 1), place[2] + (k >> 2)};
@@ -155,15 +157,27 @@ Points ClosedTissue::surface(const Points& rest, const std::vector<Index>& cells
   return closed;
 }
 
+/// [m] from a point to the blade's rectangle.
+double distanceTo(const Blade& blade, const Vec3& p) {
+  const Vec3 r = p - blade.origin;
+  const double along = blade.x_axis.dot(r), up = blade.y_axis.dot(r);
+  const Vec2 beside(along - std::clamp(along, -blade.behind, blade.length),
+                    up - std::clamp(up, -blade.depth, blade.rise));
+  return std::hypot(blade.height(p), beside.norm());
+}
+
 }  // namespace
 
-MetBody::MetBody(const BodyModel& model, const BodyState& state) : positions(state.positions) {
-  surface = {state.surface, model.surface.triangles, model.surface.patches};
-  if (model.collision) {
-    collision = {collisionPlaces(model, state.positions), model.collision->mesh.triangles,
-                 model.collision->mesh.patches};
-    collision.patches.resize(collision.triangles.size(), kOuterPatch);
-  }
+MetBody::MetBody(const BodyModel& model) : positions(model.rest), surface(model.surface) {
+  if (!model.collision) return;
+  collision = model.collision->mesh;
+  collision.patches.resize(collision.triangles.size(), kOuterPatch);
+}
+
+MetBody::MetBody(const BodyModel& model, const BodyState& state) : MetBody(model) {
+  positions = state.positions;
+  surface.vertices = state.surface;
+  if (model.collision) collision.vertices = collisionPlaces(model, state.positions);
   if (!model.incised) return;
   const ClosedTissue closed(model, state.positions);
   positions = closed.positions();
@@ -171,6 +185,48 @@ MetBody::MetBody(const BodyModel& model, const BodyState& state) : positions(sta
   if (model.collision)
     collision.vertices =
         closed.surface(model.collision->mesh.vertices, model.collision->binding.cells, collision.vertices);
+}
+
+std::optional<Blade> bladeAtRest(const BodyModel& model, const BodyState& state, const Blade& blade) {
+  // The tissue that the blade meets first, and what is around that at rest: other tissue may lie in it now.
+  const double near = kAround * model.spacing, reach = std::hypot(blade.length, blade.depth) + near;
+  Index first = kNoIndex;
+  for (Index v = 0; v < state.surface.size(); ++v)
+    if (distanceTo(blade, state.surface[v]) < near &&
+        (first == kNoIndex || blade.y_axis.dot(state.surface[v] - state.surface[first]) > 0.0))
+      first = v;
+  if (first == kNoIndex) return std::nullopt;
+  std::vector<Index> around;
+  Vec3 middle = Vec3::Zero(), rest_middle = Vec3::Zero();
+  for (Index i = 0; i < model.rest.size(); ++i) {
+    if (!((model.rest[i] - model.surface.vertices[first]).norm() < reach)) continue;
+    if (!(distanceTo(blade, state.positions[i]) < near)) continue;
+    around.push_back(i);
+    middle += state.positions[i];
+    rest_middle += model.rest[i];
+  }
+  if (around.size() < 8) return std::nullopt;
+  middle /= static_cast<double>(around.size());
+  rest_middle /= static_cast<double>(around.size());
+  Mat3 now = Mat3::Zero(), both = Mat3::Zero();
+  for (const Index i : around) {
+    const Vec3 p = state.positions[i] - middle;
+    now += p * p.transpose();
+    both += (model.rest[i] - rest_middle) * p.transpose();
+  }
+  const Mat3 map = both * now.inverse();
+  if (!map.allFinite() || !(map.determinant() > 0.0)) return std::nullopt;
+  Blade led = blade;
+  led.origin = rest_middle + map * (blade.origin - middle);
+  const Vec3 along = map * blade.x_axis, up = map * blade.y_axis;
+  led.x_axis = along.normalized();
+  const Vec3 aside = up - up.dot(led.x_axis) * led.x_axis;
+  led.y_axis = aside.normalized();
+  led.length *= along.norm();
+  led.behind *= along.norm();
+  led.depth *= aside.norm();
+  led.rise *= aside.norm();
+  return led;
 }
 
 }  // namespace meshless

@@ -1,7 +1,10 @@
 // A body as a blade meets it: as it lies now, its wounds closed where they are closed.
 #pragma once
 
+#include <optional>
+
 #include "meshless_surgery/body/body.h"
+#include "meshless_surgery/geometry/query/blade.h"
 
 namespace meshless {
 
@@ -12,10 +15,16 @@ namespace meshless {
 /// wound is where it is.
 struct MetBody {
   MetBody(const BodyModel& model, const BodyState& state);
+  /// As it is at rest.
+  explicit MetBody(const BodyModel& model);
 
   Points positions;        // [m] of the particles
   TriangleMesh surface;    // patches filled
   TriangleMesh collision;  // likewise; empty where the body has none of its own
 };
+
+/// Where a blade is at rest that meets the present shape: by the affine map that fits the tissue around it best. None
+/// where too little is around it.
+std::optional<Blade> bladeAtRest(const BodyModel& model, const BodyState& state, const Blade& blade);
 
 }  // namespace meshless

@@ -11,7 +11,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kStateVersion = 23;
+constexpr std::uint32_t kStateVersion = 24;
 
 inline std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(
@@ -228,7 +228,7 @@ MESHLESS_ARCHIVE(ObstacleDef, name, mesh, friction, color)
 // --- tools and commands
 
 MESHLESS_ARCHIVE(ScissorBlades, origin, x_axis, y_axis, length, width)
-MESHLESS_ARCHIVE(Blade, origin, x_axis, y_axis, length, depth)
+MESHLESS_ARCHIVE(Blade, origin, x_axis, y_axis, length, depth, rise, behind)
 template <class A>
 void serialize(A& archive, Pick& v) {
   auto& [id, body, particle, place, patch, weights, target, reached, locked, stiffness, position, force] = v;

@@ -68,19 +68,6 @@ std::vector<AttachReply::Patch> patchesOf(const std::map<Cube, Part>& parts, con
 
 bool isOpen(const WorldBody* body) { return body && !body->model->solid; }
 
-/// The way from a to b passes through the rectangle of the blades, or where `whole`, through its plane.
-bool crosses(const ScissorBlades& blades, bool whole, const Vec3& a, const Vec3& b) {
-  const Plane plane = blades.plane();
-  const double of_a = plane.height(a), of_b = plane.height(b);
-  if ((of_a > 0.0 && of_b > 0.0) || (of_a < 0.0 && of_b < 0.0)) return false;
-  if (whole) return true;
-  const double between = std::abs(of_a) + std::abs(of_b);
-  const Vec3 at = a + (between > 0.0 ? std::abs(of_a) / between : 0.5) * (b - a) - blades.origin;
-  const double along = at.dot(blades.x_axis), beside = std::abs(at.dot(blades.y_axis));
-  return along >= 0.0 && (blades.length == 0.0 || along <= blades.length) &&
-         (blades.width == 0.0 || beside <= 0.5 * blades.width);
-}
-
 std::string number(double value) {
   std::ostringstream text;
   text << value;
@@ -392,11 +379,12 @@ void World::Impl::showAttachments(const SnapshotWants& wants, std::vector<Attach
 
 // --- cuts
 
-std::vector<std::vector<char>> World::Impl::partedBy(const ScissorBlades& blades, const std::vector<std::string>& of,
+std::vector<std::vector<char>> World::Impl::partedBy(const Blade& blade, const std::vector<std::string>& of,
                                                      const std::vector<BodyId>& severed) {
   const auto isIn = [](const auto& list, const auto& value) {
     return std::find(list.begin(), list.end(), value) != list.end();
   };
+  const Blade all = Blade::through(blade.plane());
   std::vector<std::vector<char>> parted;
   for (const Attachment& attachment : attachments) {
     std::vector<char> gone;
@@ -409,7 +397,7 @@ std::vector<std::vector<char>> World::Impl::partedBy(const ScissorBlades& blades
       }
       const Points ends = fibreEnds(fibre);
       meant = meant && !attachment.clip;  // no blade cuts a clip
-      gone.push_back(meant && crosses(blades, whole, ends[0], ends[1]));
+      gone.push_back(meant && (whole ? all : blade).passes(ends[0], ends[1]));
     }
     parted.push_back(std::move(gone));
   }

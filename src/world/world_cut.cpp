@@ -134,7 +134,8 @@ std::optional<Result<CutReply>> World::finishedCut(std::uint32_t ticket) {
 
 Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
   const auto start = std::chrono::steady_clock::now();
-  const Plane plane = command.blades.plane();
+  const Blade blades = command.blades.blade();
+  const Plane plane = blades.plane();
   std::vector<Severed> severed;
   CutReply reply;
   std::string refused;
@@ -147,9 +148,9 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
     TriangleMesh present;
     present.vertices = body->state.surface;
     present.triangles = body->model->surface.triangles;
-    if (!bladesMeet(present, command.blades)) continue;
+    if (!meets(present, blades)) continue;
     Result<CutBody> cut =
-        cutBody(*body->model, body->state, plane,
+        cutBody(*body->model, body->state, Blade::through(plane),
                 {command.roughness, static_cast<std::uint32_t>(next_ticket + step), picked(body->id)});
     if (cut) {
       severed.push_back({body->id, std::move(*cut)});
@@ -160,7 +161,7 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
   }
   std::vector<BodyId> whole;
   for (const Severed& s : severed) whole.push_back(s.parent);
-  const std::vector<std::vector<char>> parted = partedBy(command.blades, command.bodies, whole);
+  const std::vector<std::vector<char>> parted = partedBy(blades, command.bodies, whole);
   if (severed.empty() && !anyIn(parted)) {
     if (!refused.empty()) return Error{ErrorCode::kUnsuitableShape, refused};
     return Error{ErrorCode::kMissed, command.bodies.empty() ? "the blades met no body; " + knownBodies()
@@ -182,7 +183,7 @@ Result<CutReply> World::Impl::cutNow(const CutCommand& command) {
     const std::vector<std::string> names = replaceByPieces(s.parent, std::move(s.cut.pieces));
     reply.new_bodies.insert(reply.new_bodies.end(), names.begin(), names.end());
     reply.cut_bodies.push_back(parent_name);
-    reply.cap_area += s.cut.cap_area;
+    reply.cap_area += s.cut.opened_area;
     reply.work += s.cut.work;
     say(EventType::kCut, parent_name, 0, "cut into " + std::to_string(names.size()) + " pieces");
   }

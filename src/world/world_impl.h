@@ -274,8 +274,8 @@ struct World::Impl : KeptWorld {
   Result<CutReply> cutNow(const CutCommand& command);
   /// Refuses what would leave more pieces than kMostPieces; `gone` of those there are go, `come` are made.
   Status checkPieces(std::size_t gone, std::size_t come) const;
-  double graspRadius(const BodyModel& model) const;               // [m]
-  std::vector<TissuePlace> picked(const BodyId& body) const;      // places of its picks, in their order
+  double graspRadius(const BodyModel& model) const;           // [m]
+  std::vector<TissuePlace> picked(const BodyId& body) const;  // places of its picks, in their order
   /// Retires a body and admits its pieces in its place; their names.
   std::vector<std::string> replaceByPieces(const BodyId& parent, std::vector<BodyPiece> pieces);
   /// What becomes of a piece's particles and of places that were asked for, once the piece is a body.
@@ -300,7 +300,7 @@ struct World::Impl : KeptWorld {
   Vec3 restPlace(const Attachment& clip);
   /// Those of the bodies named (none: of all) that the blades part, which sever the bodies of those ids along their
   /// whole plane.
-  std::vector<std::vector<char>> partedBy(const ScissorBlades& blades, const std::vector<std::string>& of,
+  std::vector<std::vector<char>> partedBy(const Blade& blade, const std::vector<std::string>& of,
                                           const std::vector<BodyId>& severed);
   static bool anyIn(const std::vector<std::vector<char>>& parted);
   /// Sentences, one an attachment.

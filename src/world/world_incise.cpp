@@ -3,7 +3,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "meshless_surgery/body/incise_body.h"
+#include "meshless_surgery/body/cut_body.h"
 #include "world_impl.h"
 
 namespace meshless {
@@ -33,7 +33,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
 
   struct Opened {
     BodyId id;
-    IncisedBody body;
+    CutBody body;
   };
   std::vector<Opened> all;
   InciseReply reply;
@@ -47,7 +47,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
     Box bounds;
     for (const Vec3& p : body->state.surface) bounds.extend(p);
     if (!bounds.overlaps(reach)) continue;
-    Result<IncisedBody> opened = inciseBody(*body->model, body->state, command.blade, picked(body->id));
+    Result<CutBody> opened = cutBody(*body->model, body->state, command.blade, {0.0, 0, picked(body->id)});
     if (opened) {
       all.push_back({body->id, std::move(*opened)});
     } else if (opened.error().code == ErrorCode::kMissed) {
@@ -58,9 +58,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
     }
   }
   const Blade& blade = command.blade;
-  const ScissorBlades rectangle{blade.origin - 0.5 * blade.depth * blade.y_axis, blade.x_axis, blade.y_axis,
-                                blade.length, blade.depth};
-  const std::vector<std::vector<char>> parted = partedBy(rectangle, command.bodies, {});
+  const std::vector<std::vector<char>> parted = partedBy(blade, command.bodies, {});
   if (all.empty() && !anyIn(parted)) {
     if (refused) return *refused;
     if (!missed.empty()) return Error{ErrorCode::kMissed, missed};

@@ -7,8 +7,8 @@
 
 #include "meshless_surgery/base/random.h"
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/body/filled_cells.h"
-#include "meshless_surgery/body/incise_body.h"
 #include "meshless_surgery/geometry/mesh/primitives.h"
 #include "support/bodies.h"
 
@@ -24,14 +24,14 @@ PreparedBody block(double edge) {
   return test::prepared(def);
 }
 
-IncisedBody incised(const PreparedBody& body) {
+CutBody incised(const PreparedBody& body) {
   Blade blade;
   blade.origin = Vec3(-0.03, 0.0012, 0.031);
   blade.x_axis = Vec3::UnitX();
   blade.y_axis = Vec3::UnitZ();
   blade.length = 0.06;
   blade.depth = 0.04;
-  Result<IncisedBody> result = inciseBody(*body.model, body.state, blade);
+  Result<CutBody> result = cutBody(*body.model, body.state, blade);
   EXPECT_TRUE(result.ok());
   return std::move(*result);
 }
@@ -41,7 +41,7 @@ Vec3 follow(const SurfaceBinding& binding, const Points& x, Index r) { return bi
 TEST(CellBlend, FollowsAffineMotionExactly) {
   Random random(5);
   const PreparedBody whole = block(0.01);
-  const IncisedBody wounded = incised(whole);
+  const CutBody wounded = incised(whole);
   for (const BodyModel* model : {whole.model.get(), wounded.pieces[0].model.get()}) {
     Mat3 map;
     map << random.direction(), random.direction(), random.direction();
@@ -79,7 +79,7 @@ TEST(CellBlend, DoesNotJumpFromCellToCell) {
 // The two sides of a wound: where they are farther than two cells from its front, neither follows the other's tissue.
 TEST(CellBlend, DoesNotReachAcrossAWound) {
   const PreparedBody whole = block(0.006);
-  const IncisedBody wounded = incised(whole);
+  const CutBody wounded = incised(whole);
   const BodyModel& model = *wounded.pieces[0].model;
   Points x = model.rest;
   const auto deep = [](const Vec3& p) { return std::abs(p.x()) < 0.012 && p.z() > 0.012; };

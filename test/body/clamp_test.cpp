@@ -141,7 +141,8 @@ TEST(Clamp, HoldsBoxesAndBalls) {
   }
 }
 
-// A face is clamped by a box over it, however thin that is beside the samples: the bar hangs as from the half space there.
+// A face is clamped by a box over it, however thin that is beside the samples: the bar hangs as from the half space
+// there.
 TEST(Clamp, HoldsAFaceByABoxThatIsThinnerThanSamples) {
   BodyDef def = barHeldBelow({Vec3::UnitX(), Vec3(-0.04, 0, 0)});
   const Vec3 gravity(0, 0, -0.5);
@@ -181,7 +182,8 @@ TEST(Clamp, RefusesARegionThatHoldsNothing) {
 // Of a bar that is cut across, the part at the clamp hangs on, and the other one falls.
 TEST(Clamp, HoldsItsPieceAfterACut) {
   const PreparedBody body = test::prepared(barHeldBelow({Vec3::UnitX(), Vec3(-0.0284, 0, 0)}));
-  const Result<CutBody> cut = cutBody(*body.model, body.state, Plane{Vec3(1, 0.1, 0).normalized(), Vec3(0.01, 0, 0)});
+  const Result<CutBody> cut =
+      cutBody(*body.model, body.state, Blade::through(Plane{Vec3(1, 0.1, 0).normalized(), Vec3(0.01, 0, 0)}));
   ASSERT_TRUE(cut.ok());
   ASSERT_EQ(cut->pieces.size(), 2u);
   const auto lowest = [](const BodyPiece& piece) {

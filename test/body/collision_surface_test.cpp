@@ -4,9 +4,9 @@
 
 #include "meshless_surgery/base/random.h"
 #include "meshless_surgery/body/binding.h"
-#include "meshless_surgery/body/incise_body.h"
-#include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/query/inside.h"
 #include "shapes/random_organ.h"
 #include "support/bodies.h"
 #include "support/mesh_laws.h"
@@ -137,13 +137,14 @@ TEST(CollisionSurface, IsCutByTheSameBlade) {
     const Vec3 middle = 0.5 * (bounds.min + bounds.max);
     for (int round = 0; round < 3; ++round) {
       const Plane plane{random.direction(), middle + random.inCube(0.15 * bounds.diagonal())};
-      const Result<CutBody> cut = cutBody(*body.model, body.state, plane);
+      const Result<CutBody> cut = cutBody(*body.model, body.state, Blade::through(plane));
       if (!cut) continue;
       expectPieces(*body.model, cut->pieces, with, all);
       const BodyPiece& large = cut->pieces[0];
-      const Result<CutBody> again = cutBody(
-          *large.model, large.state,
-          Plane{random.direction(), boundsOf(large.state.surface).min * 0.5 + boundsOf(large.state.surface).max * 0.5});
+      const Result<CutBody> again =
+          cutBody(*large.model, large.state,
+                  Blade::through(Plane{random.direction(), boundsOf(large.state.surface).min * 0.5 +
+                                                               boundsOf(large.state.surface).max * 0.5}));
       if (again) expectPieces(*large.model, again->pieces, with, all);
     }
   }
@@ -163,7 +164,7 @@ TEST(CollisionSurface, IsIncisedByTheSameBlade) {
     blade.length = 0.06;
     blade.depth = 0.03;
     blade.origin = body.state.surface[top] + Vec3(-0.0303, 0.0011, 0.005);
-    const Result<IncisedBody> incised = inciseBody(*body.model, body.state, blade);
+    const Result<CutBody> incised = cutBody(*body.model, body.state, blade);
     ASSERT_TRUE(incised.ok()) << incised.error().detail;
     std::size_t with = 0, all = 0;
     expectPieces(*body.model, incised->pieces, with, all);

@@ -1,8 +1,8 @@
 #include "meshless_surgery/body/cut_body.h"
 
 #include "meshless_surgery/body/deform.h"
-#include "meshless_surgery/geometry/query/inside.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/query/inside.h"
 #include "meshless_surgery/geometry/query/nearest_on_triangle.h"
 #include "support/bodies.h"
 #include "support/mesh_laws.h"
@@ -38,7 +38,7 @@ TEST(CutBody, KeepsVolumeMassMomentumAndPlaces) {
     PreparedBody body = prepared(round % 2 ? test::ball("b", Vec3::Zero()) : test::block("b", Vec3::Zero()));
     disturb(body, random);
     const Plane plane{random.unit(), random.vector(0.04)};
-    const Result<CutBody> cut = cutBody(*body.model, body.state, plane);
+    const Result<CutBody> cut = cutBody(*body.model, body.state, Blade::through(plane));
     ASSERT_TRUE(cut.ok()) << cut.error().detail;
     ASSERT_GE(cut->pieces.size(), 2u);
     const BodyMeasures before = measureBody(*body.model, body.state);
@@ -69,7 +69,8 @@ TEST(CutBody, KeepsVolumeMassMomentumAndPlaces) {
     // Rounding: 4.3e-15, 1.1e-15, 7.2e-16 and 7e-16 are reached by 40 cuts.
     const Vec3 spin = angularMomentumAbout(Vec3::Zero(), *body.model, body.state);
     EXPECT_NEAR(volume, before.volume, 1e-2 * before.volume) << "vertices at the blade follow their own side's tissue";
-    EXPECT_NEAR(rest_volume, body.model->rest_volume, 5e-4 * body.model->rest_volume) << "vertices near the blade go to it";
+    EXPECT_NEAR(rest_volume, body.model->rest_volume, 5e-4 * body.model->rest_volume)
+        << "vertices near the blade go to it";
     EXPECT_NEAR(mass, body.model->mass, 1e-12 * mass);
     EXPECT_LT((linear - before.linear_momentum).norm(), 1e-14 * before.linear_momentum.norm());
     EXPECT_LT((angular - spin).norm(), 1e-14 * spin.norm());
@@ -84,7 +85,8 @@ TEST(CutBody, ARoughCutKeepsVolumeAndFitsOnBothSides) {
     CutBodyOptions options;
     options.roughness = 0.01;
     options.seed = static_cast<std::uint32_t>(round);
-    const Result<CutBody> cut = cutBody(*body.model, body.state, {random.unit(), random.vector(0.03)}, options);
+    const Result<CutBody> cut =
+        cutBody(*body.model, body.state, Blade::through({random.unit(), random.vector(0.03)}), options);
     ASSERT_TRUE(cut.ok()) << cut.error().detail;
     double volume = 0.0, rest_volume = 0.0;
     for (const BodyPiece& piece : cut->pieces) {
@@ -109,7 +111,8 @@ TEST(CutBody, ParticlesLieOnTheirSideOfTheRestCap) {
       if (elastic) def.material.youngs_modulus = 5000.0;
       PreparedBody body = prepared(def);
       disturb(body, random);  // bent: the cap is curved in the rest shape
-      const Result<CutBody> cut = cutBody(*body.model, body.state, {random.unit(), random.vector(0.03)});
+      const Result<CutBody> cut =
+          cutBody(*body.model, body.state, Blade::through({random.unit(), random.vector(0.03)}));
       ASSERT_TRUE(cut.ok());
       for (const BodyPiece& piece : cut->pieces) {
         const SolidQuery solid(piece.model->surface);
@@ -142,7 +145,7 @@ TEST(CutBody, FarClustersAreKept) {
   BodyDef def = test::defOf(boxMesh(Vec3(0.6, 0.05, 0.05), 36, 3, 3));
   PreparedBody body = prepared(def);
   ASSERT_GT(body.model->clusters.size(), 3u);
-  const Result<CutBody> cut = cutBody(*body.model, body.state, {Vec3::UnitX(), Vec3(0.22, 0, 0)});
+  const Result<CutBody> cut = cutBody(*body.model, body.state, Blade::through({Vec3::UnitX(), Vec3(0.22, 0, 0)}));
   ASSERT_TRUE(cut.ok());
   EXPECT_GT(cut->work.kept_clusters, 0u);
   EXPECT_GT(cut->work.rebuilt_clusters, 0u);
@@ -150,14 +153,14 @@ TEST(CutBody, FarClustersAreKept) {
 
 TEST(CutBody, AMissAndAnOpenSurfaceAreRefused) {
   PreparedBody body = prepared(test::ball("b", Vec3::Zero()));
-  const Result<CutBody> miss = cutBody(*body.model, body.state, {Vec3::UnitZ(), Vec3(0, 0, 1)});
+  const Result<CutBody> miss = cutBody(*body.model, body.state, Blade::through({Vec3::UnitZ(), Vec3(0, 0, 1)}));
   ASSERT_FALSE(miss.ok());
   EXPECT_EQ(miss.error().code, ErrorCode::kMissed);
   BodyDef open = test::ball();
   open.mesh.triangles.pop_back();
   open.solid = false;
   body = prepared(open);
-  const Result<CutBody> refused = cutBody(*body.model, body.state, {Vec3::UnitZ(), Vec3(0, 0, 0.2)});
+  const Result<CutBody> refused = cutBody(*body.model, body.state, Blade::through({Vec3::UnitZ(), Vec3(0, 0, 0.2)}));
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().code, ErrorCode::kUnsuitableShape);
 }
@@ -174,7 +177,7 @@ TEST(CutBody, AHundredCutsToCrumbsKeepMassVolumeAndParticles) {
       if (pieces[p].first->rest_volume > pieces[largest].first->rest_volume) largest = p;
     auto [model, state] = pieces[largest];
     const Vec3 centre = solidCentroid(state.surface, model->surface.triangles);
-    Result<CutBody> cut = cutBody(*model, state, {random.unit(), centre + random.vector(0.002)});
+    Result<CutBody> cut = cutBody(*model, state, Blade::through({random.unit(), centre + random.vector(0.002)}));
     if (!cut) {
       ++refused;
       continue;

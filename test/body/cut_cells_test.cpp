@@ -10,11 +10,10 @@
 #include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/body/filled_cells.h"
-#include "meshless_surgery/body/incise_body.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/query/union_find.h"
 #include "shapes/organs.h"
 #include "shapes/random_organ.h"
-#include "meshless_surgery/geometry/query/union_find.h"
 #include "support/bodies.h"
 #include "support/mesh_laws.h"
 #include "support/random.h"
@@ -116,7 +115,7 @@ TEST(CutCells, KeepMassMomentumVolumeAndPlaces) {
     PreparedBody body = bodyOf(round);
     bend(body, random);
     const Plane plane{random.unit(), Vec3(0.1, 0.2, 0.3) + random.vector(0.04)};
-    const Result<CutBody> cut = cutBody(*body.model, body.state, plane);
+    const Result<CutBody> cut = cutBody(*body.model, body.state, Blade::through(plane));
     ASSERT_TRUE(cut.ok()) << cut.error().detail;
     Sums before, after;
     before.add(*body.model, body.state);
@@ -146,7 +145,7 @@ TEST(CutCells, IncisionsKeepMassMomentumAndTheParticlesNumbers) {
     blade.length = random.uniform(0.05, 0.4);
     blade.depth = random.uniform(0.1, 0.3);
     blade.origin = Vec3(0.1, 0.2, 0.3) + random.vector(0.03) + blade.y_axis * 0.15 - 0.5 * blade.length * blade.x_axis;
-    const Result<IncisedBody> incised = inciseBody(*body.model, body.state, blade);
+    const Result<CutBody> incised = cutBody(*body.model, body.state, blade);
     if (!incised.ok()) continue;
     ++opened;
     Sums before, after;
@@ -178,12 +177,12 @@ TEST(CutCells, ABladeThroughAWoundGivesEachPieceItsTissue) {
       blade.y_axis = Vec3::UnitZ();
       blade.length = random.uniform(0.03, 0.06);
       blade.depth = random.uniform(0.02, 0.05);
-      const Result<IncisedBody> incised = inciseBody(*whole.model, whole.state, blade);
+      const Result<CutBody> incised = cutBody(*whole.model, whole.state, blade);
       ASSERT_TRUE(incised.ok());
       ASSERT_EQ(incised->pieces.size(), 1u);
       const Vec3 normal = (Vec3::UnitY() + random.vector(0.5)).normalized();
       const Result<CutBody> cut = cutBody(*incised->pieces[0].model, incised->pieces[0].state,
-                                          Plane{normal, Vec3(0.0, side, 0.0) + random.vector(0.01)});
+                                          Blade::through(Plane{normal, Vec3(0.0, side, 0.0) + random.vector(0.01)}));
       ASSERT_TRUE(cut.ok()) << cut.error().detail;
       for (const BodyPiece& piece : cut->pieces) {
         if (piece.model->rest_volume < 0.05 * whole.model->rest_volume) continue;
@@ -198,7 +197,8 @@ TEST(CutCells, ABladeThroughAWoundGivesEachPieceItsTissue) {
 // What nothing holds apart is not moved: each piece is accelerated as the whole was, but for what was cut.
 TEST(CutCells, APieceAtRestStaysAtRest) {
   PreparedBody body = prepared(filled(boxMesh(Vec3(0.2, 0.11, 0.09), 8, 4, 4), 0.03));
-  const Result<CutBody> cut = cutBody(*body.model, body.state, Plane{Vec3(1, 0.3, 0.1).normalized(), Vec3(0.01, 0, 0)});
+  const Result<CutBody> cut =
+      cutBody(*body.model, body.state, Blade::through(Plane{Vec3(1, 0.3, 0.1).normalized(), Vec3(0.01, 0, 0)}));
   ASSERT_TRUE(cut.ok());
   for (const BodyPiece& piece : cut->pieces) {
     BodyState state = piece.state;
@@ -222,7 +222,7 @@ TEST(CutCells, AClampHoldsTheSideThatItIsOn) {
     for (const double slope : {0.0, 0.002}) {
       SCOPED_TRACE(std::to_string(at) + ", " + std::to_string(slope));
       const Plane plane{Vec3(1.0, slope, 0.0).normalized(), Vec3(at, 0, 0)};
-      const Result<CutBody> cut = cutBody(*body.model, body.state, plane);
+      const Result<CutBody> cut = cutBody(*body.model, body.state, Blade::through(plane));
       ASSERT_TRUE(cut.ok());
       ASSERT_EQ(cut->pieces.size(), 2u);
       EXPECT_FALSE(cut->pieces[0].model->any_fixed);
@@ -237,7 +237,7 @@ TEST(CutCells, WhatIsHeldInTheMiddleStaysInItsPiece) {
   const PreparedBody body = prepared(def);
   for (const double at : {-0.06, 0.08}) {
     const Result<CutBody> cut =
-        cutBody(*body.model, body.state, Plane{Vec3(1.0, 0.1, 0.2).normalized(), Vec3(at, 0, 0)});
+        cutBody(*body.model, body.state, Blade::through(Plane{Vec3(1.0, 0.1, 0.2).normalized(), Vec3(at, 0, 0)}));
     ASSERT_TRUE(cut.ok());
     ASSERT_EQ(cut->pieces.size(), 2u);
     for (const BodyPiece& piece : cut->pieces) {
@@ -255,7 +255,7 @@ TEST(CutCells, SliversHaveCellsOfTheirOwn) {
   const PreparedBody body = prepared(filled(boxMesh(Vec3(0.2, 0.09, 0.09), 16, 8, 8), 0.03));
   for (const double at : {0.0999, 0.099, 0.097, 0.095}) {
     SCOPED_TRACE(at);
-    const Result<CutBody> cut = cutBody(*body.model, body.state, Plane{Vec3::UnitX(), Vec3(at, 0, 0)});
+    const Result<CutBody> cut = cutBody(*body.model, body.state, Blade::through(Plane{Vec3::UnitX(), Vec3(at, 0, 0)}));
     ASSERT_TRUE(cut.ok()) << cut.error().detail;
     Sums before, after;
     before.add(*body.model, body.state);
@@ -275,7 +275,7 @@ TEST(CutCells, SplintersOfLessThanASampleAreOneCell) {
   for (const double side : {-1.0, 1.0}) {
     const Vec3 normal = Vec3(0, side, 1).normalized();
     const Result<CutBody> cut =
-        cutBody(*body.model, body.state, Plane{normal, Vec3(0, 0.045 * side, 0.045) - 0.001 * normal});
+        cutBody(*body.model, body.state, Blade::through(Plane{normal, Vec3(0, 0.045 * side, 0.045) - 0.001 * normal}));
     ASSERT_TRUE(cut.ok()) << cut.error().detail;
     ASSERT_EQ(cut->pieces.size(), 2u);
     for (const BodyPiece& piece : cut->pieces) {
@@ -302,7 +302,7 @@ TEST(CutCells, ManyCutsAfterEachOther) {
     const Plane plane{random.unit(), random.vector(0.05)};
     std::vector<Part> next;
     for (Part& part : parts) {
-      Result<CutBody> cut = cutBody(*part.model, part.state, plane);
+      Result<CutBody> cut = cutBody(*part.model, part.state, Blade::through(plane));
       if (!cut.ok()) {
         EXPECT_EQ(cut.error().code, ErrorCode::kMissed) << cut.error().detail;
         next.push_back(std::move(part));
@@ -336,7 +336,7 @@ std::vector<PreparedBody> slicesOf(std::uint64_t seed, std::size_t triangles, do
     const Plane plane{random.unit(), solidCentroid(*mesh) + random.vector(0.003)};
     std::vector<PreparedBody> next;
     for (PreparedBody& piece : pieces) {
-      Result<CutBody> parts = cutBody(*piece.model, piece.state, plane);
+      Result<CutBody> parts = cutBody(*piece.model, piece.state, Blade::through(plane));
       if (!parts.ok()) {
         EXPECT_EQ(parts.error().code, ErrorCode::kMissed) << parts.error().detail;
         next.push_back(std::move(piece));
@@ -431,9 +431,9 @@ TEST(CutCells, WhatASurfaceFollowsIsAsIfItWereMadeAnew) {
         blade.origin = at - 0.25 * blade.x_axis;
         std::vector<BodyPiece> pieces;
         if (n % 2) {
-          if (Result<CutBody> cut = cutBody(*body.model, body.state, {normal, at}); cut.ok())
+          if (Result<CutBody> cut = cutBody(*body.model, body.state, Blade::through({normal, at})); cut.ok())
             pieces = std::move(cut->pieces);
-        } else if (Result<IncisedBody> incised = inciseBody(*body.model, body.state, blade); incised.ok()) {
+        } else if (Result<CutBody> incised = cutBody(*body.model, body.state, blade); incised.ok()) {
           pieces = std::move(incised->pieces);
         }
         for (BodyPiece& piece : pieces) {

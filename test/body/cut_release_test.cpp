@@ -49,7 +49,8 @@ TEST(CutRelease, CellsPullAsBeforeButForWhatWasCut) {
   const PreparedBody body = bent();
   const CellLattice& lattice = *body.model->lattice;
   {
-    const Result<CutBody> cut = cutBody(*body.model, body.state, {Vec3(1.0, 0.2, 0.1).normalized(), Vec3(0.01, 0, 0)});
+    const Result<CutBody> cut =
+        cutBody(*body.model, body.state, Blade::through({Vec3(1.0, 0.2, 0.1).normalized(), Vec3(0.01, 0, 0)}));
     ASSERT_TRUE(cut.ok());
     const std::vector<BodyPiece>& pieces = cut->pieces;
     double fastest = body.model->highest_frequency;

@@ -39,7 +39,7 @@ BodyDef bar() {
 double shaved(double layers) {
   const PreparedBody body = test::prepared(bar());
   const Result<CutBody> cut =
-      cutBody(*body.model, body.state, Plane{Vec3::UnitZ(), Vec3(0, 0, (layers - 4.0) * kCell)});
+      cutBody(*body.model, body.state, Blade::through(Plane{Vec3::UnitZ(), Vec3(0, 0, (layers - 4.0) * kCell)}));
   EXPECT_TRUE(cut.ok());
   for (const BodyPiece& piece : cut->pieces) {
     double low = 1.0;

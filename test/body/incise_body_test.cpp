@@ -1,4 +1,4 @@
-#include "meshless_surgery/body/incise_body.h"
+#include "meshless_surgery/body/cut_body.h"
 
 #include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
@@ -32,7 +32,7 @@ PreparedBody ball(bool elastic) {
 TEST(InciseBody, KeepsVolumeMassPlacesAndParticles) {
   for (bool elastic : {false, true}) {
     const PreparedBody body = ball(elastic);
-    const Result<IncisedBody> opened = inciseBody(*body.model, body.state, downwards(Vec3(-0.2, 0.0, 0.2), 0.4, 0.2));
+    const Result<CutBody> opened = cutBody(*body.model, body.state, downwards(Vec3(-0.2, 0.0, 0.2), 0.4, 0.2));
     ASSERT_TRUE(opened.ok()) << opened.error().detail;
     ASSERT_EQ(opened->pieces.size(), 1u);
     const BodyPiece& piece = opened->pieces[0];
@@ -67,7 +67,7 @@ TEST(InciseBody, KeepsVolumeMassPlacesAndParticles) {
 // Half cut, held on both sides of the wound and drawn apart: how wide the wound is in the end.
 double opening(const PreparedBody& start, bool clusters_kept) {
   PreparedBody body = start;
-  const Result<IncisedBody> opened = inciseBody(*body.model, body.state, downwards(Vec3(-0.2, 0.0, 0.2), 0.4, 0.2));
+  const Result<CutBody> opened = cutBody(*body.model, body.state, downwards(Vec3(-0.2, 0.0, 0.2), 0.4, 0.2));
   EXPECT_TRUE(opened.ok());
   if (!clusters_kept) {
     body.model = opened->pieces[0].model;
@@ -118,12 +118,12 @@ TEST(InciseBody, AHalfCutBallOpensTenTimesAsWideAsWithItsClustersKept) {
 TEST(InciseBody, ASecondBladeMakesItComeApart) {
   for (bool elastic : {false, true}) {
     PreparedBody body = ball(elastic);
-    Result<IncisedBody> first = inciseBody(*body.model, body.state, downwards(Vec3(-0.2, 0.004, 0.2), 0.4, 0.2));
+    Result<CutBody> first = cutBody(*body.model, body.state, downwards(Vec3(-0.2, 0.004, 0.2), 0.4, 0.2));
     ASSERT_TRUE(first.ok());
     Blade up = downwards(Vec3(-0.2, 0.004, -0.2), 0.4, 0.21);
     up.y_axis = -Vec3::UnitZ();
     const BodyPiece& half = first->pieces[0];
-    const Result<IncisedBody> second = inciseBody(*half.model, half.state, up);
+    const Result<CutBody> second = cutBody(*half.model, half.state, up);
     ASSERT_TRUE(second.ok()) << second.error().detail;
     ASSERT_EQ(second->pieces.size(), 2u);
     double mass = 0.0, volume = 0.0;
@@ -147,13 +147,13 @@ TEST(InciseBody, ASecondBladeMakesItComeApart) {
 
 TEST(InciseBody, RefusesWhatDoesNotReachTheSurfaceAndShells) {
   const PreparedBody body = ball(false);
-  const Result<IncisedBody> inside = inciseBody(*body.model, body.state, downwards(Vec3(-0.02, 0.0, 0.02), 0.04, 0.04));
+  const Result<CutBody> inside = cutBody(*body.model, body.state, downwards(Vec3(-0.02, 0.0, 0.02), 0.04, 0.04));
   ASSERT_FALSE(inside.ok());
   EXPECT_EQ(inside.error().code, ErrorCode::kMissed);
   EXPECT_NE(inside.error().detail.find("does not reach the surface"), std::string::npos) << inside.error().detail;
   BodyModel shell = *body.model;
   shell.solid = false;
-  EXPECT_EQ(inciseBody(shell, body.state, downwards(Vec3(-0.2, 0.0, 0.2), 0.4, 0.2)).error().code,
+  EXPECT_EQ(cutBody(shell, body.state, downwards(Vec3(-0.2, 0.0, 0.2), 0.4, 0.2)).error().code,
             ErrorCode::kUnsuitableShape);
 }
 

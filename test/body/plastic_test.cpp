@@ -143,7 +143,8 @@ TEST(Flow, KeepsAShapeAfterRelease) {
       const double kept = lengthOf(body.state.positions) / rest;
       // What has not flowed springs back: the yield's strain and what the rate has left of the rest.
       const double back = strainOf(1.4 / kept), left = 0.1 + (strainOf(1.4) - 0.1) * std::exp(-10.0 * 0.8);
-      EXPECT_NEAR(back, left, elastic ? 4e-5 : 3e-3) << elastic << toString(mode);  // 8.2e-6, 1.5e-3: cells against goals
+      EXPECT_NEAR(back, left, elastic ? 4e-5 : 3e-3)
+          << elastic << toString(mode);  // 8.2e-6, 1.5e-3: cells against goals
       updateSurface(*body.model, body.state);
       const double volume = measureBody(*body.model, body.state).volume / body.model->rest_volume;
       EXPECT_NEAR(volume, 1.0, elastic ? 3e-13 : 3e-4);                       // 6.4e-14, 9e-5
@@ -237,7 +238,7 @@ TEST(Flow, PiecesOfACutKeepTheirShape) {
     run(body, 4000, 1.0 / 500);
     updateSurface(*body.model, body.state);
     const Result<CutBody> cut =
-        cutBody(*body.model, body.state, Plane{Vec3(1, 0.1, 0).normalized(), Vec3(0.013, 0, 0)});
+        cutBody(*body.model, body.state, Blade::through(Plane{Vec3(1, 0.1, 0).normalized(), Vec3(0.013, 0, 0)}));
     ASSERT_TRUE(cut.ok());
     for (const BodyPiece& from : cut->pieces) {
       PreparedBody piece;

@@ -99,7 +99,7 @@ TEST(Regions, StayTheirOwnThroughCuts) {
   const PreparedBody body = test::prepared(block({{Region::sphere(Vec3(0.03, 0, 0), 0.03), kStiff}}));
   const double energy = energyOf(*body.model, kSoft, kStretch.asDiagonal());
   const Result<CutBody> cut =
-      cutBody(*body.model, body.state, Plane{Vec3(1.0, 0.3, -0.2).normalized(), Vec3(0.033, 0, 0)});
+      cutBody(*body.model, body.state, Blade::through(Plane{Vec3(1.0, 0.3, -0.2).normalized(), Vec3(0.033, 0, 0)}));
   ASSERT_TRUE(cut.ok()) << cut.error().detail;
   ASSERT_EQ(cut->pieces.size(), 2u);
   double mass = 0.0, sum = 0.0, stiff = 0.0;

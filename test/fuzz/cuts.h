@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <iostream>
 
-#include "meshless_surgery/geometry/surgery/incise.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
+#include "support/plane_cut.h"
 #include "support/shapes.h"
 
 namespace meshless::fuzz {
@@ -50,7 +50,6 @@ inline void cutPlane(const std::uint8_t* data, std::size_t size) {
       for (IncisedPiece& piece : opened->pieces) pieces.push_back(std::move(piece.mesh));
     } else {
       CutOptions options;
-      options.check_pieces = true;
       Result<CutSurface> cut = cutByPlane(mesh, {normal, point}, options);
       if (!cut) {
         demand(!cut.error().detail.empty(), "a refusal says why");

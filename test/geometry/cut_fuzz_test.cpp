@@ -5,9 +5,9 @@
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/surgery/cut.h"
 #include "support/cut_cases.h"
 #include "support/mesh_laws.h"
+#include "support/plane_cut.h"
 
 namespace meshless {
 namespace cut_fuzz_test {
@@ -65,7 +65,8 @@ TEST_F(CutFuzz, EmbeddedShapes) {
   for (long i = 0; i < cuts_ / 2; ++i) {
     const shapes::Shape& shape = all[static_cast<std::size_t>(i / 2) % all.size()];
     const TriangleMesh mesh = i % 2 ? shapes::moved(shape.mesh, shapes::anyPose(), 0.37) : shape.mesh;
-    pieces += static_cast<long>(cutAndCheck(mesh, shapes::hardPlane(mesh, random), optionsOf(i / 2, mesh), true, shape.name).size());
+    pieces += static_cast<long>(
+        cutAndCheck(mesh, shapes::hardPlane(mesh, random), optionsOf(i / 2, mesh), true, shape.name).size());
   }
   EXPECT_EQ(faults_, 0);
   EXPECT_GT(pieces, cuts_ / 2);

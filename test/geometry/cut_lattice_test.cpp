@@ -91,7 +91,7 @@ TEST(CutLattice, APlaneThroughCellsPartsABarAltogether) {
   const CellLattice bar = latticeOf(boxMesh(Vec3(0.2, 0.05, 0.05), 0.0125), 500.0);
   for (const double x : {0.0123, 0.0, 0.00625, -0.031}) {
     const Points corners = cornerPlaces(bar);
-    const CutLattice cut = cutLattice(bar, corners, BladeGate(Plane{Vec3::UnitX(), Vec3(x, 0, 0)}));
+    const CutLattice cut = cutLattice(bar, corners, Blade::through({Vec3::UnitX(), Vec3(x, 0, 0)}));
     expectSound(bar, cut);
     EXPECT_EQ(componentsOf(cut.lattice), 2u) << x;
     EXPECT_EQ(bridgesOf(cut.lattice), 0u);
@@ -123,8 +123,7 @@ TEST(CutLattice, ABladeBetweenCellsThatShareOneCornerAlonePartsThem) {
   blade.origin = shared - 0.01 * blade.x_axis + 0.01 * blade.y_axis;
   Blade beside = blade;
   beside.origin += 0.03 * blade.x_axis;
-  for (const auto& [gate, parts] :
-       {std::pair(BladeGate(Plane{across, shared}), 2u), {BladeGate(blade), 2u}, {BladeGate(beside), 1u}}) {
+  for (const auto& [gate, parts] : {std::pair(Blade::through({across, shared}), 2u), {blade, 2u}, {beside, 1u}}) {
     const CutLattice cut = cutLattice(lattice, corners, gate);
     expectSound(lattice, cut);
     EXPECT_EQ(componentsOf(cut.lattice), parts);
@@ -147,8 +146,8 @@ TEST(CutLattice, RandomCutsOfEveryShapeKeepEverySampleAndTheMassOfEveryCorner) {
       const Vec3 at = 0.5 * (bounds.min + bounds.max) + 0.2 * bounds.diagonal() * random.unit();
       const Mat3 turn = random.rotation().toRotationMatrix();
       const Blade blade{at, turn.col(0), turn.col(1), 0.3 * bounds.diagonal(), 0.2 * bounds.diagonal()};
-      const CutLattice cut = n % 2 ? cutLattice(lattice, corners, BladeGate(Plane{turn.col(2), at}))
-                                   : cutLattice(lattice, corners, BladeGate(blade));
+      const CutLattice cut =
+          n % 2 ? cutLattice(lattice, corners, Blade::through({turn.col(2), at})) : cutLattice(lattice, corners, blade);
       expectSound(lattice, cut);
       EXPECT_GE(componentsOf(cut.lattice), components);
       components = componentsOf(cut.lattice);
@@ -165,7 +164,7 @@ TEST(CutLattice, ATipInACellIsBridgedByWhatIsNotCut) {
   for (const double share : {0.25, 0.5, 0.75}) {  // of the third layer of cells from above
     const double depth = (2.0 + share) * bar.spacing;
     const Blade blade{Vec3(0.013, -0.1, 0.025), Vec3::UnitY(), Vec3::UnitZ(), 0.2, depth};
-    const CutLattice cut = cutLattice(bar, corners, BladeGate(blade));
+    const CutLattice cut = cutLattice(bar, corners, blade);
     expectSound(bar, cut);
     EXPECT_EQ(componentsOf(cut.lattice), 1u);
     EXPECT_GT(bridgesOf(cut.lattice), 0u);
@@ -178,11 +177,11 @@ TEST(CutLattice, ATipInACellIsBridgedByWhatIsNotCut) {
     // Deeper, and the bridges are further on; through, and there are none.
     Blade deeper = blade;
     deeper.depth += 1.0 * bar.spacing;
-    const CutLattice second = cutLattice(cut.lattice, follow(cut, corners), BladeGate(deeper));
+    const CutLattice second = cutLattice(cut.lattice, follow(cut, corners), deeper);
     expectSound(cut.lattice, second);
     EXPECT_EQ(bridgesOf(second.lattice), bridgesOf(cut.lattice));
     deeper.depth = 1.0;
-    const CutLattice through = cutLattice(second.lattice, follow(second, follow(cut, corners)), BladeGate(deeper));
+    const CutLattice through = cutLattice(second.lattice, follow(second, follow(cut, corners)), deeper);
     expectSound(second.lattice, through);
     EXPECT_EQ(componentsOf(through.lattice), 2u);
     EXPECT_EQ(bridgesOf(through.lattice), 0u);
@@ -196,7 +195,7 @@ TEST(CutLattice, AFaceThatABladeCoversInPartIsBridgedByWhatIsNotCovered) {
   for (const double share : {0.25, 0.5, 0.75}) {  // of the third layer of cells from above
     const double depth = (2.0 + share) * bar.spacing;
     const Blade blade{Vec3(0.01, -0.1, 0.025), Vec3::UnitY(), Vec3::UnitZ(), 0.2, depth};  // in a plane of the lattice
-    const CutLattice cut = cutLattice(bar, corners, BladeGate(blade));
+    const CutLattice cut = cutLattice(bar, corners, blade);
     expectSound(bar, cut);
     EXPECT_EQ(componentsOf(cut.lattice), 1u);
     EXPECT_EQ(bridgesOf(cut.lattice), 5u);  // one for each cell across the bar
@@ -220,17 +219,17 @@ TEST(CutLattice, AFaceThatABladeCoversInPartIsBridgedByWhatIsNotCovered) {
     }
     // Deeper, and the bridges are further on, whatever else is cut meanwhile; through, and there are none.
     const Blade elsewhere{Vec3(0.053, -0.1, 0.025), Vec3::UnitY(), Vec3::UnitZ(), 0.2, 0.007};
-    const CutLattice other = cutLattice(cut.lattice, follow(cut, corners), BladeGate(elsewhere));
+    const CutLattice other = cutLattice(cut.lattice, follow(cut, corners), elsewhere);
     expectSound(cut.lattice, other);
     const std::size_t more = bridgesOf(other.lattice) - 5u;
     const Points now = follow(other, follow(cut, corners));
     Blade deeper = blade;
     deeper.depth += bar.spacing;
-    const CutLattice second = cutLattice(other.lattice, now, BladeGate(deeper));
+    const CutLattice second = cutLattice(other.lattice, now, deeper);
     expectSound(other.lattice, second);
     EXPECT_EQ(bridgesOf(second.lattice), 5u + more);
     deeper.depth = 1.0;
-    const CutLattice through = cutLattice(second.lattice, follow(second, now), BladeGate(deeper));
+    const CutLattice through = cutLattice(second.lattice, follow(second, now), deeper);
     expectSound(second.lattice, through);
     EXPECT_EQ(componentsOf(through.lattice), 2u);
     EXPECT_EQ(bridgesOf(through.lattice), more);
@@ -239,8 +238,8 @@ TEST(CutLattice, AFaceThatABladeCoversInPartIsBridgedByWhatIsNotCovered) {
 
 TEST(CutLattice, ABladeBesideTheSolidChangesNothing) {
   const CellLattice bar = latticeOf(boxMesh(Vec3(0.2, 0.05, 0.05), 0.0125), 500.0);
-  const CutLattice cut = cutLattice(bar, cornerPlaces(bar),
-                                    BladeGate(Blade{Vec3(0.01, -0.1, 0.08), Vec3::UnitY(), Vec3::UnitZ(), 0.2, 0.02}));
+  const CutLattice cut =
+      cutLattice(bar, cornerPlaces(bar), Blade{Vec3(0.01, -0.1, 0.08), Vec3::UnitY(), Vec3::UnitZ(), 0.2, 0.02});
   EXPECT_EQ(cut.lattice.corners, bar.corners);
   for (const bool changed : cut.changed) EXPECT_FALSE(changed);
 }

@@ -8,9 +8,9 @@
 #include <CGAL/Surface_mesh.h>
 
 #include "cut_rows.h"
-#include "meshless_surgery/geometry/surgery/cut.h"
 #include "support/cut_cases.h"
 #include "support/mesh_laws.h"
+#include "support/plane_cut.h"
 
 namespace meshless {
 namespace cut_oracle_test {
@@ -116,7 +116,6 @@ TEST(CutOracle, RoughPiecesAreClosedAndDoNotCrossThemselves) {
       const Result<CutSurface> flat = cutByPlane(shape.mesh, plane, options);
       options.roughness = size * std::pow(10.0, -3.0 + 0.3 * i);  // up to twice the size
       options.seed = static_cast<std::uint32_t>(i);
-      options.check_pieces = true;
       const Result<CutSurface> cut = cutByPlane(shape.mesh, plane, options);
       ASSERT_TRUE(laws::cutObeysLaws(shape.mesh, plane, options, cut)) << "plane " << i;
       ASSERT_EQ(cut.ok(), flat.ok());

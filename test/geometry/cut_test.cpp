@@ -1,4 +1,4 @@
-#include "meshless_surgery/geometry/surgery/cut.h"
+#include "support/plane_cut.h"
 
 #include <filesystem>
 #include <limits>
@@ -6,11 +6,14 @@
 
 #include <gtest/gtest.h>
 
+#include "meshless_surgery/tools/command.h"
 #include "support/cut_cases.h"
 #include "support/mesh_laws.h"
 
 namespace meshless {
 namespace cut_test {
+
+bool bladesMeet(const TriangleMesh& mesh, const ScissorBlades& blades) { return meets(mesh, blades.blade()); }
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
@@ -170,7 +173,8 @@ TEST(Cut, SolidsThatCrossAreCappedLayerByLayer) {
     EXPECT_TRUE(laws::cutObeysLaws(crossing, plane, apart, parted, false));
     EXPECT_NEAR(parted->cap_area, oracle.area, 1e-9 * oracle.area);
     EXPECT_EQ(parted->pieces.size(), 4u);
-    apart.apart = 2.0;
+    // What lies in itself at rest, too, is one.
+    apart.rest = &crossing.vertices;
     EXPECT_EQ(cutByPlane(crossing, plane, apart)->pieces.size(), cut->pieces.size());
   }
 }

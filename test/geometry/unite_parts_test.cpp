@@ -10,11 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include "meshless_surgery/geometry/surgery/cut.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/geometry/mesh/mend.h"
 #include "meshless_surgery/geometry/mesh/primitives.h"
 #include "support/mesh_laws.h"
+#include "support/plane_cut.h"
 #include "support/random.h"
 #include "support/shapes.h"
 

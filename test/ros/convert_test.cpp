@@ -29,7 +29,7 @@ TEST(Convert, BladesAndPosesAreEachOthersInverse) {
   pose.rotation = Quat(0.5, -0.1, 0.7, 0.3).normalized();
   pose.translation = Vec3(0.1, -0.2, 0.3);
   const ScissorBlades blades = bladesAt(pose, 0.06, 0.02);
-  EXPECT_LT((blades.plane().normal - pose.rotation * Vec3::UnitZ()).norm(), 1e-12);
+  EXPECT_LT((blades.blade().plane().normal - pose.rotation * Vec3::UnitZ()).norm(), 1e-12);
   EXPECT_EQ(0.06, blades.length);
   EXPECT_EQ(0.02, blades.width);
   const Pose back = poseOf(blades);

@@ -7,7 +7,7 @@
 #include <map>
 #include <random>
 
-#include "meshless_surgery/geometry/surgery/cut.h"
+#include "support/plane_cut.h"
 #include "support/shapes.h"
 
 namespace meshless::shapes {

@@ -10,8 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/surgery/cut.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
+#include "support/plane_cut.h"
 
 namespace meshless::laws {
 

@@ -1,10 +1,10 @@
 // Errors of known size, made by commands in a world, must come out as large as they are, live as from the log.
 #include <cmath>
 
-#include "meshless_surgery/geometry/surgery/cut.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
-#include "shapes/organs.h"
 #include "meshless_surgery/geometry/mesh/primitives.h"
+#include "shapes/organs.h"
+#include "support/plane_cut.h"
 #include "training/played.h"
 
 namespace meshless {

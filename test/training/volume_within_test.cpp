@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/surgery/cut.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
+#include "support/plane_cut.h"
 #include "support/shapes.h"
 
 namespace meshless {

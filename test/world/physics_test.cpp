@@ -350,14 +350,15 @@ double lostByCrumbs(const Kind& kind, Random& random) {
     state.velocities[i] = speed + spin.cross(state.positions[i]);
   const double at = random.uniform(0.01, 0.015);
   const Vec3 out = Vec3(random.uniform(0.5, 1.0), random.uniform(0.5, 1.0), random.uniform(0.5, 1.0)).normalized();
-  const Result<CutBody> halves = cutBody(*body.model, state, {Vec3::UnitX(), Vec3(at, 0, 0)});
+  const Result<CutBody> halves = cutBody(*body.model, state, Blade::through({Vec3::UnitX(), Vec3(at, 0, 0)}));
   EXPECT_TRUE(halves.ok());
   double lost = 0.0;
   int crumbs = 0;
   for (const BodyPiece& half : halves->pieces) {
     const double side = half.state.surface[0].x() < 0.0 ? 1.0 : -1.0;
     const Vec3 there = out.cwiseProduct(Vec3(side, 1, 1));
-    const Result<CutBody> cut = cutBody(*half.model, half.state, {there, Vec3(at, 0.05, 0.05) - 0.002 * there});
+    const Result<CutBody> cut =
+        cutBody(*half.model, half.state, Blade::through({there, Vec3(at, 0.05, 0.05) - 0.002 * there}));
     EXPECT_TRUE(cut.ok());
     if (!cut.ok()) return 1.0;
     const Vec3 before = measureBody(*half.model, half.state).linear_momentum;
@@ -441,7 +442,7 @@ double swellingLost(const Kind& kind, Random& random) {
   const double whole = volumeOf(*body.model, state);
   // Quadratic fits take the volume of what they fit, so that it grows with what is grown.
   double lost = kind.mode == MatchMode::kQuadratic ? 1.0 - whole / wanted : std::abs(whole / wanted - 1.0);
-  const Result<CutBody> cut = cutBody(*body.model, state, {random.unit(), random.vector(0.01)});
+  const Result<CutBody> cut = cutBody(*body.model, state, Blade::through({random.unit(), random.vector(0.01)}));
   EXPECT_TRUE(cut.ok());
   if (!cut.ok()) return 1.0;
   for (const BodyPiece& piece : cut->pieces) {
@@ -489,8 +490,7 @@ Response response(const Kind& kind, Random& random) {
 }
 
 TEST(Physics, VolumeIsHeldAsTheCurveSaysAndThatGivesNoSpeed) {
-  expectReached("error left that is off", {{kElastic, 7e-4}},
-                [](auto&... a) { return response(a...).volume; });
+  expectReached("error left that is off", {{kElastic, 7e-4}}, [](auto&... a) { return response(a...).volume; });
   expectReached("speed [m/s]", {{kElastic, 0.0}}, [](auto&... a) { return response(a...).speed; });
 }
 

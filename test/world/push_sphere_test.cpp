@@ -50,7 +50,8 @@ Pressed pressed(World& world) {
     now.force += world.push().force.z();
   }
   now.force /= steps;
-  for (const Vec3& p : world.snapshot({true, true, false}).bodies[0].surface)
+  const WorldSnapshot shot = world.snapshot({true, true, false});
+  for (const Vec3& p : shot.bodies[0].surface)
     now.inside = std::max(now.inside, world.push().radius - (p - world.push().position).norm());
   return now;
 }

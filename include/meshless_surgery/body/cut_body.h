@@ -1,9 +1,9 @@
-// Severing a body along a plane: a new model and state for each piece.
+// A blade through a body, or into it: a new model and state for each piece.
 #pragma once
 
 #include "meshless_surgery/body/body.h"
 #include "meshless_surgery/body/tissue_place.h"
-#include "meshless_surgery/geometry/surgery/cut.h"
+#include "meshless_surgery/geometry/surgery/incise.h"
 
 namespace meshless {
 
@@ -29,21 +29,24 @@ struct CutWork {
 };
 
 struct CutBody {
-  std::vector<BodyPiece> pieces;  // largest volume first, at least two
-  double cap_area = 0.0;          // [m^2] of one side, present shape
+  /// One where the body holds together: its particles are the parent's, in their order. Else largest volume first. What
+  /// is less than a sample of a cell comes apart from no piece by a blade with bounds: it stays with the largest.
+  std::vector<BodyPiece> pieces;
+  double opened_area = 0.0;  // [m^2] of one wound face, present shape
   CutWork work;
 };
 
 struct CutBodyOptions {
-  double roughness = 0.0;           // [m] amplitude of the fractal displacement of the cut; 0: clean
+  double roughness = 0.0;           // [m] amplitude of the fractal displacement of the wound faces; 0: clean
   std::uint32_t seed = 0;           // of it
-  std::vector<TissuePlace> places;  // to be followed, in a body of cells
+  std::vector<TissuePlace> places;  // to be followed
 };
 
-/// The plane is in the world frame and meets the present shape. Rest positions, positions and velocities of new
-/// vertices are interpolated with the same weights; mass and momentum are kept. Refuses kMissed, or kUnsuitableShape
-/// where the body is no solid or no closed pieces can be made. state.surface must be up to date.
-Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Plane& plane,
+/// The blade is in the world frame and meets the present shape. Links between samples that pass through it are cut.
+/// Rest positions, positions and velocities of new vertices are interpolated with the same weights; vertices of a wound
+/// face follow only tissue on its side. Mass and momentum are kept. Refuses as incise() does, and a body that is no
+/// solid. state.surface must be up to date.
+Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Blade& blade,
                         const CutBodyOptions& options = {});
 
 }  // namespace meshless

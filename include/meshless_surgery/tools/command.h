@@ -9,8 +9,7 @@
 
 #include "meshless_surgery/base/ids.h"
 #include "meshless_surgery/body/cut_body.h"
-#include "meshless_surgery/geometry/surgery/cut.h"
-#include "meshless_surgery/geometry/surgery/incise.h"
+#include "meshless_surgery/geometry/query/blade.h"
 #include "meshless_surgery/geometry/query/region.h"
 
 namespace meshless {
@@ -41,6 +40,21 @@ struct PushCommand {
   double speed = 0.0;            // [m/s] >= 0; 0: placed there at once
   bool streamed = false;         // by a stream, whose silence lifts it
 };
+/// A pair of scissors' blades, in the plane of the cut: origin + s * x_axis + t * y_axis with 0 <= s <= length,
+/// |t| <= width / 2. They cut the whole plane of what they meet.
+struct ScissorBlades {
+  Vec3 origin = Vec3::Zero();
+  Vec3 x_axis = Vec3::UnitX();  // unit
+  Vec3 y_axis = Vec3::UnitY();  // unit, normal to x_axis
+  double length = 0.0;          // [m]; 0: unbounded
+  double width = 0.0;           // [m]; 0: unbounded
+
+  Blade blade() const {
+    const double side = width > 0.0 ? 0.5 * width : Blade::kUnbounded;
+    return {origin, x_axis, y_axis, length > 0.0 ? length : Blade::kUnbounded, side, side, 0.0};
+  }
+};
+
 struct CutCommand {
   ScissorBlades blades;
   double close_time = 0.0;          // [s] >= 0 of simulated time

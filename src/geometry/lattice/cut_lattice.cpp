@@ -41,8 +41,8 @@ Index partAt(const std::vector<LatticeCell>& cells, const std::vector<Index>& pa
 
 class Cutter {
  public:
-  Cutter(const CellLattice& lattice, const Points& corners, const BladeGate& gate)
-      : before_(lattice), x_(corners), gate_(gate) {}
+  Cutter(const CellLattice& lattice, const Points& corners, const Blade& blade)
+      : before_(lattice), x_(corners), blade_(blade) {}
 
   CutLattice run() {
     findSides();
@@ -78,7 +78,7 @@ class Cutter {
 
   void findSides() {
     std::vector<double> heights(x_.size());
-    for (std::size_t i = 0; i < x_.size(); ++i) heights[i] = gate_.height(x_[i]);
+    for (std::size_t i = 0; i < x_.size(); ++i) heights[i] = blade_.height(x_[i]);
     const double on = kOnPlane * before_.spacing;
     static const std::vector<std::array<double, 8>> kWeights = [] {
       std::vector<std::array<double, 8>> weights(64);
@@ -126,12 +126,12 @@ class Cutter {
   // Of the links in `crossing` of samples of `lower` along an axis, to samples of `upper`: those through the blade.
   SampleSet throughBlade(SampleSet crossing, const LatticeCell& lower, SampleSet lower_above, const LatticeCell& upper,
                          SampleSet upper_above, int axis, bool across) const {
-    if (gate_.unbounded()) return crossing;
+    if (!blade_.bounded()) return crossing;
     SampleSet through = kNoSample;
     for (SampleSet left = crossing; left; left &= left - 1) {
       const int bit = lowestSample(left);
       const int other = across ? bit - (kCellSamples - 1) * kSampleStride[axis] : bit + kSampleStride[axis];
-      if (gate_.between(positionOf(lower, bit), lower_above >> bit & 1 ? 1 : -1, positionOf(upper, other),
+      if (blade_.passes(positionOf(lower, bit), lower_above >> bit & 1 ? 1 : -1, positionOf(upper, other),
                         upper_above >> other & 1 ? 1 : -1))
         through |= SampleSet{1} << bit;
     }
@@ -326,7 +326,7 @@ class Cutter {
     const LatticeCell& cell = result_.lattice.cells[c];
     if (!cell.samples) {
       double sum = 0.0;
-      for (const Index corner : before_.cells[result_.parent_cell[c]].corners) sum += gate_.height(x_[corner]);
+      for (const Index corner : before_.cells[result_.parent_cell[c]].corners) sum += blade_.height(x_[corner]);
       return sum >= 0.0 ? 1 : -1;
     }
     return 2 * countSamples(cell.samples & result_.above[c]) >= countSamples(cell.samples) ? 1 : -1;
@@ -336,7 +336,7 @@ class Cutter {
   bool joined(Index a, Index b) const {
     const LatticeCell &ca = result_.lattice.cells[a], &cb = result_.lattice.cells[b];
     if (!ca.samples || !cb.samples) {  // a crumb goes with what is on its side
-      const bool bounded = !gate_.unbounded() && !(result_.changed[a] && result_.changed[b]);
+      const bool bounded = blade_.bounded() && !(result_.changed[a] && result_.changed[b]);
       return bounded || sideOf(a) == sideOf(b);
     }
     int axis = -1;
@@ -435,7 +435,7 @@ class Cutter {
     for (const auto& [corner, both] : on)
       for (const Index a : both[0])
         for (const Index b : both[1])
-          if (!open[corner] && (gate_.unbounded() || gate_.between(middle(a), -1, middle(b), 1))) open[corner] = true;
+          if (!open[corner] && (!blade_.bounded() || blade_.passes(middle(a), -1, middle(b), 1))) open[corner] = true;
   }
 
   void joinCorners() {
@@ -477,7 +477,7 @@ class Cutter {
 
   const CellLattice& before_;
   const Points& x_;
-  const BladeGate& gate_;
+  const Blade& blade_;
   std::vector<bool> near_;
   std::vector<SampleSet> above_;
   std::vector<Family> families_;
@@ -487,8 +487,8 @@ class Cutter {
 
 }  // namespace
 
-CutLattice cutLattice(const CellLattice& lattice, const Points& corners, const BladeGate& gate) {
-  return Cutter(lattice, corners, gate).run();
+CutLattice cutLattice(const CellLattice& lattice, const Points& corners, const Blade& blade) {
+  return Cutter(lattice, corners, blade).run();
 }
 
 std::vector<bool> cornersWithTissue(const CellLattice& lattice) {

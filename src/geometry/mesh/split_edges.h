@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <unordered_map>
 
-#include "meshless_surgery/geometry/surgery/cut.h"
+#include "meshless_surgery/geometry/mesh/vertex_origins.h"
 
 namespace meshless {
 

@@ -6,7 +6,7 @@
 #include <numeric>
 
 namespace meshless {
-namespace cutting {
+namespace surgery {
 namespace {
 
 struct Curve {
@@ -57,7 +57,10 @@ class Curves {
       for (const OutlineSegment& t : b.segments) {
         const Vec2 &u = nodes_[t.from], &v = nodes_[t.to];
         if (turn(p, q, u) * turn(p, q, v) > 0.0 || turn(u, v, p) * turn(u, v, q) > 0.0) continue;
-        if (!((rest_[s.from] - rest_[t.from]).norm() > apart_)) return Meeting::kJoined;
+        const double along = turn(u, v, p) - turn(u, v, q), beside = turn(p, q, u) - turn(p, q, v);
+        const Vec3 there = mixed(s, along != 0.0 ? turn(u, v, p) / along : 0.5),
+                   here = mixed(t, beside != 0.0 ? turn(p, q, u) / beside : 0.5);
+        if (!((here - there).norm() > apart_)) return Meeting::kJoined;
         meeting = Meeting::kApart;
       }
     }
@@ -78,6 +81,10 @@ class Curves {
   std::vector<Curve> curves;
 
  private:
+  Vec3 mixed(const OutlineSegment& s, double share) const {
+    return rest_[s.from] + share * (rest_[s.to] - rest_[s.from]);
+  }
+
   const std::vector<Vec2>& nodes_;
   const Points& rest_;
   const double apart_;
@@ -85,9 +92,8 @@ class Curves {
 
 }  // namespace
 
-std::vector<std::vector<OutlineSegment>> curvesApart(const std::vector<Vec2>& nodes,
-                                                     const std::vector<OutlineSegment>& segments, const Points& rest,
-                                                     double apart) {
+std::vector<Index> curvesApart(const std::vector<Vec2>& nodes, const std::vector<OutlineSegment>& segments,
+                               const Points& rest, double apart) {
   Curves all(nodes, segments, rest, apart);
   std::vector<Curve>& curves = all.curves;
   for (Index a = 0; a < curves.size(); ++a)
@@ -95,24 +101,27 @@ std::vector<std::vector<OutlineSegment>> curvesApart(const std::vector<Vec2>& no
       if (all.meet(curves[a], curves[b]) == Meeting::kJoined) return {};
   for (Curve& hole : curves) {
     if (hole.area > 0.0) continue;
-    const Vec2& at = nodes[hole.segments[0].from];
     for (Index n = 0; n < curves.size(); ++n) {
       const Curve& around = curves[n];
-      if (!(around.area > 0.0) || all.windingAround(around, at) <= 0 || all.meet(hole, around) != Meeting::kNone)
-        continue;
+      if (!(around.area > 0.0)) continue;
+      // A thin wall may be pressed through itself: most of the hole is inside.
+      std::size_t inside = 0;
+      for (const OutlineSegment& s : hole.segments) inside += all.windingAround(around, nodes[s.from]) > 0;
+      if (2 * inside <= hole.segments.size()) continue;
       if (hole.inside_of == kNoIndex || around.area < curves[hole.inside_of].area) hole.inside_of = n;
     }
     if (hole.inside_of == kNoIndex) return {};
   }
-  std::vector<std::vector<OutlineSegment>> groups;
+  Index groups = 0;
+  std::vector<Index> group_of_curve(curves.size(), kNoIndex), group_of_node(nodes.size(), kNoIndex);
+  for (Index n = 0; n < curves.size(); ++n)
+    if (curves[n].area > 0.0) group_of_curve[n] = groups++;
   for (Index n = 0; n < curves.size(); ++n) {
-    if (!(curves[n].area > 0.0)) continue;
-    groups.push_back(curves[n].segments);
-    for (const Curve& hole : curves)
-      if (hole.inside_of == n) groups.back().insert(groups.back().end(), hole.segments.begin(), hole.segments.end());
+    const Index group = group_of_curve[curves[n].area > 0.0 ? n : curves[n].inside_of];
+    for (const OutlineSegment& s : curves[n].segments) group_of_node[s.from] = group_of_node[s.to] = group;
   }
-  return groups.size() > 1 ? groups : std::vector<std::vector<OutlineSegment>>();
+  return group_of_node;
 }
 
-}  // namespace cutting
+}  // namespace surgery
 }  // namespace meshless

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cut_parts.h"
+#include "meshless_surgery/geometry/query/union_find.h"
 
 namespace meshless {
-namespace cutting {
+namespace surgery {
 namespace {
 
 constexpr double kRowHeight = 0.86602540378443865;  // of the spacing
@@ -227,5 +227,5 @@ CapCore coreOf(const std::vector<Vec2>& nodes, const std::vector<OutlineSegment>
   return {};
 }
 
-}  // namespace cutting
+}  // namespace surgery
 }  // namespace meshless

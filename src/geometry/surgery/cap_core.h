@@ -1,4 +1,4 @@
-// Points inside a section, off its rim. Private to geometry's cut_*.cpp and cap_*.cpp.
+// Points inside a section, off its rim. Private to this folder.
 #pragma once
 
 #include <utility>
@@ -6,7 +6,7 @@
 #include "meshless_surgery/base/types.h"
 
 namespace meshless {
-namespace cutting {
+namespace surgery {
 
 /// A piece of outline between two nodes: the winding number on its left is `weight` higher than on its right.
 struct OutlineSegment {
@@ -32,5 +32,5 @@ constexpr double kRimDistance = 0.6;
 CapCore coreOf(const std::vector<Vec2>& nodes, const std::vector<OutlineSegment>& segments, double spacing,
                std::size_t most);
 
-}  // namespace cutting
+}  // namespace surgery
 }  // namespace meshless

@@ -7,7 +7,7 @@
 #include "mesh/exact.h"
 
 namespace meshless {
-namespace cutting {
+namespace surgery {
 namespace {
 
 constexpr double kSteepest = 0.5;  // height over distance to the rim
@@ -117,9 +117,19 @@ bool meet(Corners c, Corners s) {
 
 class Roughness {
  public:
-  Roughness(Workpiece& work, const std::vector<Vec2>& nodes, const std::vector<OutlineSegment>& outline,
-            const CapCore& core, const std::vector<Triangle>& cap)
-      : work_(work), nodes_(nodes), outline_(outline), core_(core), cap_(cap), heights_(core.places.size(), 0.0) {
+  Roughness(const SplitSurface& surface, const std::vector<Vec2>& nodes, const std::vector<OutlineSegment>& outline,
+            const CapCore& core, Index first_node, std::size_t first_triangle, Wound& wound)
+      : split_(surface),
+        nodes_(nodes),
+        outline_(outline),
+        core_(core),
+        first_(first_node),
+        wound_(wound),
+        heights_(core.places.size(), 0.0) {
+    for (std::size_t t = first_triangle; t < wound.triangles.size(); ++t) {
+      const Triangle& n = wound.triangles[t].nodes;
+      if (inCore(n[0]) || inCore(n[1]) || inCore(n[2])) cap_.push_back(n);
+    }
     low_ = high_ = nodes[outline[0].from];
     for (const OutlineSegment& s : outline) {
       for (const Index n : {s.from, s.to}) {
@@ -160,7 +170,7 @@ class Roughness {
     for (Index t = 0; t < cap_.size(); ++t) {
       open.push_back(t);
       for (const Index v : cap_[t])
-        if (v >= work_.first_inner) cap_at[v - work_.first_inner].push_back(t);
+        if (inCore(v)) cap_at[v - first_].push_back(t);
     }
     std::vector<char> lowered;
     for (int round = 0; !open.empty(); ++round) {
@@ -168,7 +178,7 @@ class Roughness {
       for (const Index t : open)
         if (meetsSurface(t))
           for (const Index v : cap_[t])
-            if (v >= work_.first_inner) lowered[v - work_.first_inner] = heights_[v - work_.first_inner] != 0.0;
+            if (inCore(v)) lowered[v - first_] = heights_[v - first_] != 0.0;
       // A lower vertex changes all triangles around it.
       open.clear();
       for (Index p = 0; p < lowered.size(); ++p) {
@@ -183,21 +193,20 @@ class Roughness {
   }
 
  private:
-  void place(Index p) {
-    work_.new_positions[work_.first_inner - work_.mesh_vertices + p] =
-        work_.solid(core_.places[p]) + heights_[p] * work_.normal;
-  }
+  bool inCore(Index node) const { return node >= first_ && node - first_ < core_.places.size(); }
+  void place(Index p) { wound_.nodes[first_ + p].height = heights_[p]; }
 
   void addSurface(const Triangle& t, double reach) {
-    const Corners corners{work_.position(t[0]), work_.position(t[1]), work_.position(t[2])};
+    const Corners corners{split_.positions[t[0]], split_.positions[t[1]], split_.positions[t[2]]};
     double bottom = 1e300, top = -1e300;
     for (const Vec3& p : corners) {
-      const double height = work_.normal.dot(p - work_.center);
+      const double height = split_.frame.height(p);
       bottom = std::min(bottom, height);
       top = std::max(top, height);
     }
     if (bottom > reach || top < -reach) return;
-    const Vec2 a = work_.flat(t[0]), b = work_.flat(t[1]), c = work_.flat(t[2]);
+    const Frame& f = split_.frame;
+    const Vec2 a = f.flat(corners[0]), b = f.flat(corners[1]), c = f.flat(corners[2]);
     const Vec2 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
     if ((low.array() > high_.array()).any() || (high.array() < low_.array()).any()) return;
     surface_.push_back(corners);
@@ -210,36 +219,30 @@ class Roughness {
     double reach = 0.0;
     for (const double height : heights_) reach = std::max(reach, std::abs(height));
     reach *= 1.001;
-    std::size_t next_touched = 0;
-    for (Index t = 0; t < work_.mesh->triangles.size(); ++t) {
-      if (next_touched < work_.touched.size() && work_.touched[next_touched] == t) {
-        ++next_touched;
-      } else {
-        addSurface(work_.mesh->triangles[t], reach);
-      }
-    }
-    for (const SideSurface& side : work_.sides)
-      for (std::size_t t = 0; t + side.cap_layers.size() < side.triangles.size(); ++t)
-        addSurface(side.triangles[t], reach);
+    for (const Triangle& t : split_.triangles) addSurface(t, reach);
     grid_ = std::make_unique<PlaneGrid>(low_, high_, 2.0 * core_.spacing);
     for (Index s = 0; s < surface_.size(); ++s) grid_->add(surface_low_[s], surface_high_[s], s);
   }
 
   bool meetsSurface(Index t) {
     bool moved = false;
-    for (const Index v : cap_[t]) moved |= v >= work_.first_inner && heights_[v - work_.first_inner] != 0.0;
+    for (const Index v : cap_[t]) moved |= inCore(v) && heights_[v - first_] != 0.0;
     if (!moved) return false;
-    const Corners corners{work_.position(cap_[t][0]), work_.position(cap_[t][1]), work_.position(cap_[t][2])};
-    const Vec2 a = work_.flat(cap_[t][0]), b = work_.flat(cap_[t][1]), c = work_.flat(cap_[t][2]);
+    Corners corners;
+    for (int k = 0; k < 3; ++k) corners[k] = wound_.position(split_, cap_[t][k]);
+    const Frame& f = split_.frame;
+    const Vec2 a = f.flat(corners[0]), b = f.flat(corners[1]), c = f.flat(corners[2]);
     grid_->find(a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c), near_);
     return std::any_of(near_.begin(), near_.end(), [&](Index s) { return meet(corners, surface_[s]); });
   }
 
-  Workpiece& work_;
+  const SplitSurface& split_;
   const std::vector<Vec2>& nodes_;
   const std::vector<OutlineSegment>& outline_;
   const CapCore& core_;
-  const std::vector<Triangle>& cap_;
+  const Index first_;
+  Wound& wound_;
+  std::vector<Triangle> cap_;    // those with a point of the core
   Vec2 low_, high_;              // of the outline
   std::vector<double> heights_;  // [m] of the core's points
   std::vector<Corners> surface_;
@@ -250,13 +253,14 @@ class Roughness {
 
 }  // namespace
 
-void roughen(Workpiece& work, const std::vector<Vec2>& nodes, const std::vector<OutlineSegment>& outline,
-             const CapCore& core, const std::vector<Triangle>& cap, double amplitude, std::uint32_t seed) {
+void roughen(const SplitSurface& surface, const std::vector<Vec2>& places, const std::vector<OutlineSegment>& outline,
+             const CapCore& core, Index first_node, std::size_t first_triangle, double amplitude, std::uint32_t seed,
+             Wound& wound) {
   if (core.places.empty()) return;
-  Roughness roughness(work, nodes, outline, core, cap);
+  Roughness roughness(surface, places, outline, core, first_node, first_triangle, wound);
   roughness.chooseHeights(amplitude, seed);
   roughness.stayWithin();
 }
 
-}  // namespace cutting
+}  // namespace surgery
 }  // namespace meshless

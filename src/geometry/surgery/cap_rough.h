@@ -1,17 +1,19 @@
-// A cap that is not flat. Private to geometry's cut_*.cpp and cap_*.cpp.
+// A cap that is not flat. Private to this folder.
 #pragma once
 
 #include "cap_core.h"
-#include "cut_parts.h"
+#include "surgery_parts.h"
 
 namespace meshless {
-namespace cutting {
+namespace surgery {
 
-/// Moves the vertices inside the cap along the normal by up to `amplitude` [m], by fractal noise, rising from 0 at the
-/// rim over two spacings. `cap`: all triangles of the cap that have such a vertex. Where one of them would meet the
-/// surface, its vertices move less, or not at all: the cap stays within the solid.
-void roughen(Workpiece& work, const std::vector<Vec2>& nodes, const std::vector<OutlineSegment>& outline,
-             const CapCore& core, const std::vector<Triangle>& cap, double amplitude, std::uint32_t seed);
+/// Moves the points of the core along the normal by up to `amplitude` [m], by fractal noise, rising from 0 at the
+/// outline over two spacings. They are the wound's nodes from `first_node` on, in its triangles from `first_triangle`
+/// on. Where one of these would meet the surface, its points move less, or not at all: the wound faces stay within the
+/// solid. `places`: of the outline's nodes.
+void roughen(const SplitSurface& surface, const std::vector<Vec2>& places, const std::vector<OutlineSegment>& outline,
+             const CapCore& core, Index first_node, std::size_t first_triangle, double amplitude, std::uint32_t seed,
+             Wound& wound);
 
-}  // namespace cutting
+}  // namespace surgery
 }  // namespace meshless

@@ -5,19 +5,19 @@
 #include <cmath>
 #include <cstdio>
 
-#include "incise_parts.h"
 #include "mesh/edge_balance.h"
 #include "meshless_surgery/base/number_text.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
+#include "surgery_parts.h"
 
 namespace meshless {
 namespace {
 
-using namespace incising;
+using namespace surgery;
 
 std::string number(double x) { return numberText(x, 12); }
 
-Status checkBlade(const Blade& blade, const InciseOptions& options) {
+Status checkBlade(const Blade& blade) {
   if (!blade.origin.allFinite() || !blade.x_axis.allFinite() || !blade.y_axis.allFinite())
     return Error{ErrorCode::kInvalidArgument, "the blade's pose has a coordinate that is not finite"};
   if (!(std::abs(blade.x_axis.norm() - 1.0) < 1e-6 && std::abs(blade.y_axis.norm() - 1.0) < 1e-6))
@@ -27,18 +27,32 @@ Status checkBlade(const Blade& blade, const InciseOptions& options) {
     return Error{ErrorCode::kInvalidArgument, "the blade's axes have a dot product of " +
                                                   number(blade.x_axis.dot(blade.y_axis)) +
                                                   "; it must be 0 (within 1e-6)"};
+  const auto outOfRange = [](const char* what, double value, const char* bound) {
+    return Error{ErrorCode::kInvalidArgument,
+                 std::string("the blade's ") + what + " is " + number(value) + " m; it must be " + bound};
+  };
+  if (!blade.bounded()) return Done{};
   if (!(blade.length > 0.0) || !std::isfinite(blade.length))
-    return Error{ErrorCode::kInvalidArgument,
-                 "the blade's length is " + number(blade.length) + " m; it must be above 0 and finite"};
+    return outOfRange("length", blade.length, "above 0 and finite");
   if (!(blade.depth > 0.0) || !std::isfinite(blade.depth))
-    return Error{ErrorCode::kInvalidArgument,
-                 "the blade's depth is " + number(blade.depth) + " m; it must be above 0 and finite"};
+    return outOfRange("depth", blade.depth, "above 0 and finite");
+  if (!(blade.rise >= 0.0) || !std::isfinite(blade.rise))
+    return outOfRange("rise", blade.rise, "0 or above, and finite");
+  if (!(blade.behind >= 0.0) || !std::isfinite(blade.behind))
+    return outOfRange("reach behind its origin", blade.behind, "0 or above, and finite");
+  return Done{};
+}
+
+Status checkOptions(const InciseOptions& options) {
   if (!(options.band >= 1e-12 && options.band <= 1e-3))
     return Error{ErrorCode::kInvalidArgument,
-                 "the incision's band is " + number(options.band) + "; it must be within 1e-12 .. 1e-3"};
+                 "the blade's band is " + number(options.band) + "; it must be within 1e-12 .. 1e-3"};
   if (!(options.spacing >= 0.0) || !std::isfinite(options.spacing))
     return Error{ErrorCode::kInvalidArgument,
                  "the wound faces' spacing is " + number(options.spacing) + " m; it must be 0 or above, and finite"};
+  if (!(options.roughness >= 0.0 && options.roughness < 1e300))
+    return Error{ErrorCode::kInvalidArgument,
+                 "the cut's roughness is " + number(options.roughness) + " m; it must not be negative"};
   return Done{};
 }
 
@@ -70,84 +84,102 @@ Status checkMesh(const TriangleMesh& mesh) {
   return Done{};
 }
 
-double areaOf(const TriangleMesh& mesh, std::size_t t) {
-  const Triangle& v = mesh.triangles[t];
-  return 0.5 * (mesh.vertices[v[1]] - mesh.vertices[v[0]]).cross(mesh.vertices[v[2]] - mesh.vertices[v[0]]).norm();
+/// Bounds, and what rounding makes of a coordinate there: crumbs may lie far from the origin.
+struct Extent {
+  Box box;
+  double farthest;  // [m]
+};
+
+Extent extentOf(const TriangleMesh& mesh) {
+  const Box box = boundsOf(mesh.vertices);
+  return {box, std::max(box.min.cwiseAbs().maxCoeff(), box.max.cwiseAbs().maxCoeff())};
 }
 
-/// A last check of what would be handed out.
-Status checkOpened(const TriangleMesh& mesh, const OpenedSurface& opened) {
-  const double before = signedVolume(mesh), after = signedVolume(opened.mesh), area = surfaceArea(mesh);
-  const Box box = boundsOf(mesh.vertices);
-  // Crumbs far from the origin are only as exact as their coordinates.
-  const double rounding = 4e-16 * std::max(box.min.cwiseAbs().maxCoeff(), box.max.cwiseAbs().maxCoeff());
-  if (!(std::abs(after - before) <= 1e-9 * std::abs(before) + rounding * area))
-    return Error{ErrorCode::kUnsuitableShape,
-                 "the volume would become " + number(after) + " instead of " + number(before) + " m^3"};
-  const double least = 1e-13 * area / static_cast<double>(mesh.triangles.size());
-  for (std::size_t t = 0; t < opened.mesh.triangles.size(); ++t) {
-    if (t < mesh.triangles.size() && opened.mesh.triangles[t] == mesh.triangles[t]) continue;
-    if (areaOf(opened.mesh, t) > least) continue;
-    if (t < mesh.triangles.size() && !(areaOf(mesh, t) > 100.0 * least)) continue;  // it was like that
-    return Error{ErrorCode::kUnsuitableShape, "the incision would leave a triangle without area"};
+Frame frameOf(const Blade& blade, const Extent& extent) {
+  Frame f;
+  f.origin = blade.origin;
+  f.x_axis = blade.x_axis.normalized();
+  f.y_axis = (blade.y_axis - f.x_axis.dot(blade.y_axis) * f.x_axis).normalized();
+  f.normal = f.x_axis.cross(f.y_axis);
+  f.bounded = blade.bounded();
+  if (f.bounded) {
+    f.low = Vec2(-blade.behind, -blade.depth);
+    f.high = Vec2(blade.length, blade.rise);
+  } else {
+    // A plane given by a far point would cost digits at every vertex.
+    const Vec3 middle = 0.5 * (extent.box.min + extent.box.max);
+    f.origin = middle - f.normal.dot(middle - blade.origin) * f.normal;
   }
+  return f;
+}
+
+/// A plane that goes through a solid leaves something thicker than the band on both sides.
+Status checkSides(const std::vector<IncisedPiece>& pieces, const Frame& frame, double band) {
+  bool any_above = false, any_below = false;
+  for (const IncisedPiece& piece : pieces) {
+    double low = 0.0, high = 0.0;
+    for (Index v = 0; v < piece.mesh.vertices.size(); ++v) {
+      if (piece.origins.insideCap(v)) continue;
+      const double height = frame.height(piece.mesh.vertices[v]);
+      low = std::min(low, height);
+      high = std::max(high, height);
+    }
+    if (!(high > frame.band) && !(low < -frame.band))
+      return Error{ErrorCode::kMissed,
+                   "the plane only grazes the surface: a piece would be thinner than " + number(band) + " of its size"};
+    (high > -low ? any_above : any_below) = true;
+  }
+  if (!any_above || !any_below)
+    return Error{ErrorCode::kMissed, "the plane only grazes the surface: a side would be empty"};
   return Done{};
 }
 
-/// `in_surface`: set where triangles of the mesh lie in the blade.
-Result<Incision> inciseOnce(const TriangleMesh& mesh, const Blade& blade, const InciseOptions& options,
-                            bool& in_surface) {
-  Result<SplitSurface> surface = splitAtBlade(mesh, blade, options.band, options.follow);
+Result<Incision> inciseIn(const TriangleMesh& mesh, Frame frame, const Extent& extent, const InciseOptions& options) {
+  const double rounding = std::max(extent.farthest, frame.bounded ? frame.origin.cwiseAbs().maxCoeff() : 0.0);
+  frame.band = std::max(options.band * extent.box.diagonal(), 1e-14 * rounding);
+  Result<SplitSurface> surface = splitAtBlade(mesh, frame, options.follow);
   if (!surface) return surface.error();
-  in_surface |= surface->lies_in_surface;
-  // Fronts and rims of earlier incisions in the plane may lie on the rim, split in other places.
-  if (surface->along_edges) splitRimAtVertices(*surface);
-  Result<WoundFaces> wound = fillWoundFaces(*surface, options, true);
-  const auto failed = [&] { return !wound && wound.error().code == ErrorCode::kUnsuitableShape; };
-  if (failed() && splitRimAtVertices(*surface)) wound = fillWoundFaces(*surface, options, true);
-  // Where the rim crosses itself, what only touches the plane may be why.
-  if (failed()) wound = fillWoundFaces(*surface, options, false);
+  const Result<Wound> wound = fillWound(*surface, options);
   if (!wound) return wound.error();
-  const Result<OpenedSurface> opened = seal(*surface, *wound, options.patch);
-  if (!opened) return opened.error();
-  const Status sound = checkOpened(mesh, *opened);
-  if (!sound) return sound.error();
-  Result<std::vector<IncisedPiece>> pieces = separate(*opened);
-  if (!pieces) return pieces.error();
   Incision incision;
-  incision.pieces = std::move(*pieces);
-  for (std::size_t t = 0; t < opened->mesh.triangles.size(); ++t)
-    if (opened->facing[t] > 0) incision.opened_area += areaOf(opened->mesh, t);
+  for (const WoundTriangle& t : wound->triangles) incision.layered |= t.winding != 1;
+  const Result<OpenedSurface> opened = join(std::move(*surface), *wound, options.patch);
+  if (!opened) return opened.error();
+  std::array<double, 2> volumes;
+  incision.pieces = separate(*opened, frame, volumes);
+  const double before = signedVolume(mesh);
+  const double off = std::abs(volumes[0] - before);
+  if (!(off <= 1e-9 * volumes[1]) && !(off <= 1e-9 * volumes[1] + 4e-16 * extent.farthest * surfaceArea(mesh)))
+    return Error{ErrorCode::kUnsuitableShape, "the pieces' volumes would add up to " + number(volumes[0]) +
+                                                  " instead of " + number(before) +
+                                                  " m^3; the surface crosses itself too badly where it is cut"};
+  if (!frame.bounded) {
+    const Status sides = checkSides(incision.pieces, frame, options.band);
+    if (!sides) return sides.error();
+  }
+  std::array<double, 2> areas{0.0, 0.0};
+  for (std::size_t t = 0; t < opened->mesh.triangles.size(); ++t) {
+    if (opened->facing[t] == 0) continue;
+    // As they lie in the plane, however rough they are.
+    const Triangle& v = opened->mesh.triangles[t];
+    const Vec2 a = frame.flat(opened->mesh.vertices[v[0]]), b = frame.flat(opened->mesh.vertices[v[1]]) - a,
+               c = frame.flat(opened->mesh.vertices[v[2]]) - a;
+    areas[opened->facing[t] > 0] += 0.5 * std::abs(b.x() * c.y() - b.y() * c.x());
+  }
+  // A sheet without thickness between an earlier wound face and a new one is nothing that was opened.
+  incision.opened_area = std::min(areas[0], areas[1]);
   return incision;
 }
 
 }  // namespace
 
 Result<Incision> incise(const TriangleMesh& mesh, const Blade& blade, const InciseOptions& options) {
-  Status checked = checkBlade(blade, options);
+  Status checked = checkBlade(blade);
+  if (checked) checked = checkOptions(options);
   if (checked) checked = checkMesh(mesh);
   if (!checked) return checked.error();
-  bool in_surface = false;
-  Result<Incision> incision = inciseOnce(mesh, blade, options, in_surface);
-  const auto failed = [&] { return !incision && incision.error().code == ErrorCode::kUnsuitableShape; };
-  // Vertices used where they are, a little off the plane, can make a sound rim cross itself: a narrower band has fewer.
-  InciseOptions narrower = options;
-  for (int retry = 0; retry < 2 && failed(); ++retry) {
-    narrower.band *= 1e-2;
-    Result<Incision> again = inciseOnce(mesh, blade, narrower, in_surface);
-    if (again) return again;
-  }
-  // Wound faces that nearly lie in the blade's plane cross it wherever rounding has it; a little beside the plane they
-  // do not. This is not done where wound faces do lie in it: a second cut beside the first would part a sheet from the
-  // tissue.
-  for (int retry = 0; retry < 2 && failed() && !in_surface; ++retry) {
-    Blade beside = blade;
-    beside.origin +=
-        (retry == 0 ? 4.0 : -4.0) * options.band * boundsOf(mesh.vertices).diagonal() * blade.plane().normal;
-    Result<Incision> again = inciseOnce(mesh, beside, options, in_surface);
-    if (again) return again;
-  }
-  return incision;
+  const Extent extent = extentOf(mesh);
+  return inciseIn(mesh, frameOf(blade, extent), extent, options);
 }
 
 }  // namespace meshless

@@ -4,11 +4,11 @@
 #include <tuple>
 #include <unordered_map>
 
-#include "cut_cap.h"
+#include "cap_outline.h"
 #include "mesh/exact.h"
 
 namespace meshless {
-namespace cutting {
+namespace surgery {
 namespace {
 
 constexpr double kSnap = 1e-12;  // of the outline's size
@@ -247,19 +247,6 @@ double snapDistance(const std::vector<Vec2>& nodes) {
   return nodes.empty() ? 0.0 : std::max(kSnap * extentOf(nodes).norm(), 1e-300);
 }
 
-bool hasSlivers(const std::vector<Vec2>& nodes, const CapCore& core, const std::vector<CapTriangle>& cap) {
-  const double snap = snapDistance(nodes);
-  const auto placeOf = [&](Index n) -> const Vec2& {
-    return n < nodes.size() ? nodes[n] : core.places[n - nodes.size()];
-  };
-  for (const CapTriangle& t : cap) {
-    const Vec2 &a = placeOf(t.nodes[0]), &b = placeOf(t.nodes[1]), &c = placeOf(t.nodes[2]);
-    const double longest = std::sqrt(std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()}));
-    if (!(std::abs(cross(b - a, c - a)) > snap * longest)) return true;
-  }
-  return false;
-}
-
 SplitOutline splitOutline(const std::vector<Vec2>& nodes, const std::vector<OutlineSegment>& segments) {
   if (nodes.empty()) {
     SplitOutline nothing;
@@ -269,5 +256,5 @@ SplitOutline splitOutline(const std::vector<Vec2>& nodes, const std::vector<Outl
   return Splitter(nodes, segments).run();
 }
 
-}  // namespace cutting
+}  // namespace surgery
 }  // namespace meshless

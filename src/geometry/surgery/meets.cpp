@@ -1,18 +1,15 @@
-// Whether the blades' rectangle meets a body.
+// Whether a blade meets a body.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
-#include "meshless_surgery/geometry/surgery/cut.h"
+#include "meshless_surgery/geometry/surgery/incise.h"
 
 namespace meshless {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-/// The blades' rectangle in its own coordinates.
+/// The blade's rectangle in its own coordinates.
 struct Reach {
-  double max_s, max_t;  // 0 <= s <= max_s, |t| <= max_t
+  Vec2 low, high;
 
   /// True where the segment a b has a point in common with the rectangle.
   bool meets(const Vec2& a, const Vec2& b) const {
@@ -26,8 +23,8 @@ struct Reach {
       from = std::max(from, std::min(first, second));
       to = std::min(to, std::max(first, second));
     };
-    clip(a.x(), b.x() - a.x(), 0.0, max_s);
-    clip(a.y(), b.y() - a.y(), -max_t, max_t);
+    clip(a.x(), b.x() - a.x(), low.x(), high.x());
+    clip(a.y(), b.y() - a.y(), low.y(), high.y());
     return from <= to;
   }
 };
@@ -36,16 +33,15 @@ double cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(
 
 }  // namespace
 
-bool bladesMeet(const TriangleMesh& mesh, const ScissorBlades& blades) {
-  if (!blades.origin.allFinite() || !blades.x_axis.allFinite() || !blades.y_axis.allFinite()) return false;
-  if (!(blades.length >= 0.0) || !(blades.width >= 0.0)) return false;
-  const Reach reach{blades.length > 0.0 ? blades.length : kInfinity,
-                    blades.width > 0.0 ? 0.5 * blades.width : kInfinity};
-  const Plane plane = blades.plane();
+bool meets(const TriangleMesh& mesh, const Blade& blade) {
+  if (!blade.origin.allFinite() || !blade.x_axis.allFinite() || !blade.y_axis.allFinite()) return false;
+  if (!(std::min({blade.length, blade.depth, blade.rise, blade.behind}) >= 0.0)) return false;
+  const Reach reach{{-blade.behind, -blade.depth}, {blade.length, blade.rise}};
+  const Plane plane = blade.plane();
   std::vector<double> heights(mesh.vertices.size());
   for (std::size_t v = 0; v < heights.size(); ++v) heights[v] = plane.height(mesh.vertices[v]);
   const auto flat = [&](const Vec3& p) {
-    return Vec2(blades.x_axis.dot(p - blades.origin), blades.y_axis.dot(p - blades.origin));
+    return Vec2(blade.x_axis.dot(p - blade.origin), blade.y_axis.dot(p - blade.origin));
   };
 
   int winding = 0;  // of the section around the origin

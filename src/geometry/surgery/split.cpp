@@ -1,14 +1,14 @@
 // Where the blade's rectangle crosses the surface, and the triangles that are split there.
 #include <algorithm>
 #include <cmath>
-#include <unordered_map>
+#include <tuple>
 
-#include "incise_parts.h"
-#include "mesh/exact.h"
+#include "mesh/edge_table.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
+#include "surgery_parts.h"
 
 namespace meshless {
-namespace incising {
+namespace surgery {
 namespace {
 
 constexpr double kAlong = 0.9;  // cosine between the normals of a blade and of a wound face that it follows
@@ -29,105 +29,106 @@ struct Crossed {
 
 /// An edge of a triangle with both ends on the plane.
 struct FlatEdge {
-  Index from, to, triangle;
+  Index from, to;  // from < to
+  int direction;   // +1: the triangle runs from -> to
+  Index triangle;
   bool upper;  // the triangle bounds the solid above the plane
   bool coplanar;
 };
 
-/// Such an edge with both its triangles, the second one running to -> from.
-struct FlatRim {
-  Index from, to;
-  std::array<Index, 2> triangles;
-  RimEdge::Kind kind;
-};
-
 class Opener {
  public:
-  explicit Opener(const TriangleMesh& mesh) : mesh_(mesh) {}
+  Opener(const TriangleMesh& mesh, const Frame& frame) : mesh_(mesh) {
+    surface_.frame = frame;
+    surface_.positions = mesh.vertices;
+    surface_.mesh_vertices = static_cast<Index>(mesh.vertices.size());
+    surface_.places.assign(mesh.vertices.size(), Vec2::Zero());
+    surface_.within.assign(mesh.vertices.size(), 0);
+  }
 
-  Result<SplitSurface> run(const Blade& blade, double band, double follow) {
-    placeFrame(blade, band);
+  Result<SplitSurface> run(double follow) {
     follow_ = std::max(follow, surface_.frame.band);
     const Status crossed = findCrossings();
     if (!crossed) return crossed.error();
-    limitRectangle(blade);
+    limitRectangle();
     if (!(surface_.frame.low.array() < surface_.frame.high.array()).all())
       return Error{ErrorCode::kMissed, "the blade meets no tissue: it is beside the surface"};
-    for (const Index v : in_plane_) snap(surface_.places[v]);
-    for (Crossed& c : crossed_) section(c.down, c.up);
-    for (const FlatRim& e : flat_rim_)
-      if (e.kind == RimEdge::kCrossed) section(e.from, e.to);
+    for (const Index v : in_plane_) surface_.within[v] = snap(surface_.places[v]) != Reach::kOutside;
+    for (const Crossed& c : crossed_) surface_.section.push_back({c.down, c.up, 1});
+    surface_.section.insert(surface_.section.end(), flat_.begin(), flat_.end());
     markWithin();
     splitTriangles();
     return std::move(surface_);
   }
 
  private:
-  void placeFrame(const Blade& blade, double band) {
-    Frame& f = surface_.frame;
-    f.origin = blade.origin;
-    f.x_axis = blade.x_axis.normalized();
-    f.y_axis = (blade.y_axis - f.x_axis.dot(blade.y_axis) * f.x_axis).normalized();
-    f.normal = f.x_axis.cross(f.y_axis);
-    const Box box = boundsOf(mesh_.vertices);
-    const double farthest =
-        std::max({box.min.cwiseAbs().maxCoeff(), box.max.cwiseAbs().maxCoeff(), f.origin.cwiseAbs().maxCoeff()});
-    f.band = std::max(band * box.diagonal(), 1e-14 * farthest);
-    surface_.positions = mesh_.vertices;
-    surface_.mesh_vertices = static_cast<Index>(mesh_.vertices.size());
-    surface_.places.assign(mesh_.vertices.size(), Vec2::Zero());
-  }
-
   /// The crossing of an edge, always computed from its upper end to its lower one: wound faces that lie on each other
   /// are crossed at the same bits.
-  Index crossing(Index upper, Index lower) {
-    const auto [entry, fresh] = crossing_of_edge_.try_emplace(edgeKey(upper, lower), kNoIndex);
-    if (fresh) {
-      entry->second = surface_.addBetween(upper, lower, heights_[upper] / (heights_[upper] - heights_[lower]));
-      surface_.places[entry->second] = surface_.frame.flat(surface_.positions[entry->second]);
-      in_plane_.push_back(entry->second);
+  Index crossing(EdgeTable<Index>& crossings, Index upper, Index lower) {
+    Index& vertex = crossings.at(upper, lower);
+    if (vertex == kNoIndex) {
+      vertex = surface_.addBetween(upper, lower, heights_[upper] / (heights_[upper] - heights_[lower]));
+      surface_.places[vertex] = surface_.frame.flat(surface_.positions[vertex]);
+      in_plane_.push_back(vertex);
     }
-    return entry->second;
+    return vertex;
   }
 
   Status findCrossings() {
     const Frame& f = surface_.frame;
     heights_.resize(mesh_.vertices.size());
-    states_.resize(mesh_.vertices.size());
+    surface_.sides.resize(mesh_.vertices.size());
     const std::vector<char> followed = followedVertices();
+    bool any_above = false, any_below = false;
     for (Index v = 0; v < heights_.size(); ++v) {
-      heights_[v] = f.normal.dot(mesh_.vertices[v] - f.origin);
-      const double band = followed[v] ? follow_ : f.band;
-      states_[v] = static_cast<signed char>((heights_[v] > band) - (heights_[v] < -band));
-      if (states_[v] != 0) continue;
+      heights_[v] = f.height(mesh_.vertices[v]);
+      const double band = !followed.empty() && followed[v] ? follow_ : f.band;
+      const int side = (heights_[v] > band) - (heights_[v] < -band);
+      surface_.sides[v] = static_cast<signed char>(side);
+      any_above |= side > 0;
+      any_below |= side < 0;
+      if (side != 0) continue;
       surface_.places[v] = f.flat(mesh_.vertices[v]);
       in_plane_.push_back(v);
     }
+    if (!f.bounded && (!any_above || !any_below))
+      return Error{ErrorCode::kMissed, std::string("the plane misses the surface: nothing of it is ") +
+                                           (any_above ? "below" : "above") + " the plane by more than " +
+                                           std::to_string(1e3 * f.band) + " mm"};
+    std::vector<Index> mixed;
     std::vector<FlatEdge> flat_edges;
     for (Index t = 0; t < mesh_.triangles.size(); ++t) {
       const Triangle& v = mesh_.triangles[t];
-      const std::array<int, 3> s{states_[v[0]], states_[v[1]], states_[v[2]]};
+      const std::array<int, 3> s{surface_.sides[v[0]], surface_.sides[v[1]], surface_.sides[v[2]]};
+      if (s[0] == s[1] && s[1] == s[2] && s[0] != 0) continue;
       const bool above = s[0] > 0 || s[1] > 0 || s[2] > 0, below = s[0] < 0 || s[1] < 0 || s[2] < 0;
       if (above && below) {
-        addCrossed(t, s);
+        mixed.push_back(t);
         continue;
       }
       const int on = (s[0] == 0) + (s[1] == 0) + (s[2] == 0);
       if (on < 2) continue;
-      const bool upper = above || (!below && !facesUp(v));
-      for (int k = 0; k < 3; ++k)
-        if (s[k] == 0 && s[(k + 1) % 3] == 0) flat_edges.push_back({v[k], v[(k + 1) % 3], t, upper, on == 3});
+      const bool upper = surface_.isUpper(v);
+      for (int k = 0; k < 3; ++k) {
+        const Index a = v[k], b = v[(k + 1) % 3];
+        if (s[k] == 0 && s[(k + 1) % 3] == 0)
+          flat_edges.push_back({std::min(a, b), std::max(a, b), a < b ? 1 : -1, t, upper, on == 3});
+      }
       if (on == 3) coplanar_.push_back(t);
     }
-    if (crossed_.empty() && flat_edges.empty())
+    if (f.bounded && mixed.empty() && flat_edges.empty())
       return Error{ErrorCode::kMissed, "the blade meets no tissue: its plane is beside the surface"};
-    return findFlatRim(std::move(flat_edges));
+    EdgeTable<Index> crossings(2 * mixed.size() + 16, kNoIndex);
+    crossed_.reserve(mixed.size());
+    for (const Index t : mixed) addCrossed(t, crossings);
+    findFlat(std::move(flat_edges));
+    return Done{};
   }
 
   /// Vertices all of whose wound faces run along the plane.
   std::vector<char> followedVertices() const {
+    if (mesh_.patches.empty() || !(follow_ > surface_.frame.band)) return {};
     std::vector<char> along(mesh_.vertices.size(), 0), across(mesh_.vertices.size(), 0);
-    if (mesh_.patches.empty() || !(follow_ > surface_.frame.band)) return along;
     for (Index t = 0; t < mesh_.triangles.size(); ++t) {
       if (!isCutPatch(mesh_.patches[t])) continue;
       const Triangle& v = mesh_.triangles[t];
@@ -140,19 +141,14 @@ class Opener {
     return along;
   }
 
-  /// A triangle that lies in the plane bounds the solid below it where it faces up. Exact on its places, as the wound
-  /// faces' triangulation is.
-  bool facesUp(const Triangle& v) const {
-    return exact::turn(surface_.places[v[0]], surface_.places[v[1]], surface_.places[v[2]]) > 0;
-  }
-
-  void addCrossed(Index t, const std::array<int, 3>& s) {
+  void addCrossed(Index t, EdgeTable<Index>& crossings) {
     const Triangle& v = mesh_.triangles[t];
+    const std::array<int, 3> s{surface_.sides[v[0]], surface_.sides[v[1]], surface_.sides[v[2]]};
     Crossed c{t, kNoIndex, kNoIndex, {}, {}, 0, 0, false, false};
     for (int k = 0; k < 3; ++k) {
       const int next = (k + 1) % 3, previous = (k + 2) % 3;
-      if (s[k] > 0 && s[next] < 0) c.down = crossing(v[k], v[next]);
-      if (s[k] < 0 && s[next] > 0) c.up = crossing(v[next], v[k]);
+      if (s[k] > 0 && s[next] < 0) c.down = crossing(crossings, v[k], v[next]);
+      if (s[k] < 0 && s[next] > 0) c.up = crossing(crossings, v[next], v[k]);
       if (s[k] == 0) {
         (s[previous] > 0 ? c.down : c.up) = v[k];
         (s[previous] > 0 ? c.down_is_corner : c.up_is_corner) = true;
@@ -169,31 +165,26 @@ class Opener {
     crossed_.push_back(c);
   }
 
-  /// Flat edges where the surface goes through the plane or touches it.
-  Status findFlatRim(std::vector<FlatEdge> edges) {
+  /// Flat edges where the surface goes through the plane or touches it, and their triangles.
+  void findFlat(std::vector<FlatEdge> edges) {
     std::sort(edges.begin(), edges.end(), [](const FlatEdge& p, const FlatEdge& q) {
-      const std::uint64_t a = edgeKey(p.from, p.to), b = edgeKey(q.from, q.to);
-      return a != b ? a < b : p.triangle < q.triangle;
+      return std::tie(p.from, p.to, p.triangle) < std::tie(q.from, q.to, q.triangle);
     });
-    for (std::size_t i = 0; i < edges.size(); i += 2) {
-      if (i + 1 == edges.size() || edges[i].from != edges[i + 1].to || edges[i].to != edges[i + 1].from ||
-          (i + 2 < edges.size() && edgeKey(edges[i].from, edges[i].to) == edgeKey(edges[i + 2].from, edges[i + 2].to)))
-        return Error{ErrorCode::kUnsuitableShape,
-                     "the surface is open, not oriented or branches at the edge between vertices " +
-                         std::to_string(edges[i].from) + " and " + std::to_string(edges[i].to)};
-      const FlatEdge &first = edges[i].upper ? edges[i] : edges[i + 1],
-                     &second = edges[i].upper ? edges[i + 1] : edges[i];
-      if (first.upper == second.upper && first.coplanar && second.coplanar) continue;
-      const RimEdge::Kind kind = !second.upper && first.upper ? RimEdge::kCrossed
-                                 : first.upper                ? RimEdge::kTouchedAbove
-                                                              : RimEdge::kTouchedBelow;
-      flat_rim_.push_back({first.from, first.to, {first.triangle, second.triangle}, kind});
+    for (std::size_t begin = 0, end = 0; begin < edges.size(); begin = end) {
+      int weight = 0;
+      bool all_coplanar = true;
+      for (; end < edges.size() && edges[end].from == edges[begin].from && edges[end].to == edges[begin].to; ++end) {
+        if (edges[end].upper) weight += edges[end].direction;
+        all_coplanar &= edges[end].coplanar;
+      }
+      if (weight == 0 && all_coplanar) continue;
+      flat_.push_back({edges[begin].from, edges[begin].to, weight});
+      for (std::size_t e = begin; e < end; ++e) flat_triangles_.emplace_back(flat_.size() - 1, edges[e].triangle);
     }
-    return Done{};
   }
 
   /// A blade may be much larger than the body. What is cut off lies in the air.
-  void limitRectangle(const Blade& blade) {
+  void limitRectangle() {
     Frame& f = surface_.frame;
     Vec2 low = Vec2::Constant(1e300), high = Vec2::Constant(-1e300);
     for (const Index v : in_plane_) {
@@ -201,8 +192,8 @@ class Opener {
       high = high.cwiseMax(surface_.places[v]);
     }
     const Vec2 margin = Vec2::Constant(0.05 * (high - low).norm() + 10.0 * f.band);
-    f.low = Vec2(0.0, -blade.depth).cwiseMax(low - margin);
-    f.high = Vec2(blade.length, 0.0).cwiseMin(high + margin);
+    f.low = f.bounded ? f.low.cwiseMax(low - margin) : Vec2(low - margin);
+    f.high = f.bounded ? f.high.cwiseMin(high + margin) : Vec2(high + margin);
   }
 
   Reach snap(Vec2& p) const {
@@ -222,8 +213,6 @@ class Opener {
     }
     return reach;
   }
-
-  void section(Index from, Index to) { surface_.section.push_back({surface_.places[from], surface_.places[to]}); }
 
   /// The part of from -> to within the rectangle; end vertices are made where the border crosses it. False: nothing.
   bool within(Index from, Index to, Index& first, Index& last) {
@@ -266,6 +255,7 @@ class Opener {
       place[axis] = at;
       snap(place);
       surface_.places[made] = place;
+      surface_.section_of_made.emplace(made, start);
       return made;
     };
     const Index near_end = start_in ? start : endVertex(enter, enter_axis, enter_at);
@@ -277,36 +267,39 @@ class Opener {
 
   void markWithin() {
     std::vector<Index> met;  // triangles
-    used_.assign(surface_.positions.size(), false);
     for (Crossed& c : crossed_) {
       Index first, last;
       if (!within(c.down, c.up, first, last)) continue;
       c.chord_from = first;
       c.chord_to = last;
-      surface_.rim.push_back({first, last, RimEdge::kCrossed});
       met.push_back(c.triangle);
-      for (const Index v : {first, last})
-        if (v < used_.size()) used_[v] = true;
+      for (const Index v : {first, last}) surface_.within[v] = 1;
     }
-    for (const FlatRim& e : flat_rim_) {
+    std::vector<char> flat_met(flat_.size(), 0);
+    for (std::size_t i = 0; i < flat_.size(); ++i) {
+      const SectionEdge& e = flat_[i];
       Index first, last;
       if (!within(e.from, e.to, first, last)) continue;
-      surface_.rim.push_back({first, last, e.kind});
-      surface_.along_edges = true;
-      met.insert(met.end(), e.triangles.begin(), e.triangles.end());
+      flat_met[i] = 1;
       std::vector<Index> inner;
       if (first != e.from) inner.push_back(first);
       if (last != e.to) inner.push_back(last);
-      if (inner.empty()) continue;
-      if (e.from > e.to) std::reverse(inner.begin(), inner.end());
-      inside_edge_.emplace(edgeKey(e.from, e.to), std::move(inner));
+      for (const Index v : inner) surface_.within[v] = 1;
+      if (!inner.empty()) inside_edge_.emplace(edgeKey(e.from, e.to), std::move(inner));
     }
-    double sum = 0.0;
+    for (const auto& [edge, triangle] : flat_triangles_)
+      if (flat_met[edge]) met.push_back(triangle);
+    // By length: the short edges that earlier blades left must not make the wound faces finer and finer.
+    double lengths = 0.0, squares = 0.0;
     for (const Index t : met) {
       const Triangle& v = mesh_.triangles[t];
-      for (int k = 0; k < 3; ++k) sum += (mesh_.vertices[v[(k + 1) % 3]] - mesh_.vertices[v[k]]).norm();
+      for (int k = 0; k < 3; ++k) {
+        const double squared = (mesh_.vertices[v[(k + 1) % 3]] - mesh_.vertices[v[k]]).squaredNorm();
+        lengths += std::sqrt(squared);
+        squares += squared;
+      }
     }
-    if (!met.empty()) surface_.spacing = sum / (3.0 * static_cast<double>(met.size()));
+    if (lengths > 0.0) surface_.spacing = squares / lengths;
     for (const Index t : coplanar_) {
       const Triangle& v = mesh_.triangles[t];
       const Vec2 middle = (surface_.places[v[0]] + surface_.places[v[1]] + surface_.places[v[2]]) / 3.0;
@@ -315,9 +308,12 @@ class Opener {
     }
   }
 
-  bool present(Index v, bool corner) const { return corner || used_[v]; }
+  /// A crossing that is within the rectangle is one of the surface's vertices now.
+  bool present(Index v, bool corner) const { return corner || surface_.within[v] != 0; }
 
   void splitTriangles() {
+    surface_.triangles.reserve(mesh_.triangles.size() + 3 * crossed_.size());
+    surface_.patches.reserve(mesh_.triangles.size() + 3 * crossed_.size());
     surface_.triangles = mesh_.triangles;
     surface_.patches = mesh_.patches;
     if (surface_.patches.empty()) surface_.patches.assign(mesh_.triangles.size(), kOuterPatch);
@@ -408,21 +404,19 @@ class Opener {
   double follow_ = 0.0;  // [m]
   SplitSurface surface_;
   std::vector<double> heights_;
-  std::vector<signed char> states_;  // +1 above, -1 below, 0 on the plane
-  std::vector<Index> in_plane_;      // vertices
-  std::unordered_map<std::uint64_t, Index> crossing_of_edge_;
+  std::vector<Index> in_plane_;  // vertices
   std::vector<Crossed> crossed_;
-  std::vector<FlatRim> flat_rim_;
-  std::vector<Index> coplanar_;  // triangles
-  std::vector<bool> used_;       // vertices that a chord ends at
+  std::vector<SectionEdge> flat_;
+  std::vector<std::pair<std::size_t, Index>> flat_triangles_;  // of each of those
+  std::vector<Index> coplanar_;                                // triangles
   InnerVertices inside_edge_;
 };
 
 }  // namespace
 
-Result<SplitSurface> splitAtBlade(const TriangleMesh& mesh, const Blade& blade, double band, double follow) {
-  return Opener(mesh).run(blade, band, follow);
+Result<SplitSurface> splitAtBlade(const TriangleMesh& mesh, const Frame& frame, double follow) {
+  return Opener(mesh, frame).run(follow);
 }
 
-}  // namespace incising
+}  // namespace surgery
 }  // namespace meshless
