@@ -126,7 +126,7 @@ class StreamsTest(InStepTestCase):
         start = self.pick_left().position
         for _ in range(4):
             self.say('pick/servo_cp', [pose_stamped(start.x, start.y + 0.01, start.z) for _ in range(5)])
-            self.pass_time(0.4)  # eighty messages are missing
+            self.pass_time(0.3)  # sixty messages are missing; a busy machine adds to it
         self.assertEqual(1, len(self.state().picks))
         self.assertEqual([], self.lifts('pick'))
 
