@@ -4,7 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "mesh_check_before.h"
+#include "mesh_format.h"
+#include "polygon.h"
 
 namespace meshless {
 namespace {
@@ -46,7 +47,7 @@ constexpr CellType kCellTypes[] = {
     {79, CellUse::kVolume, kHex, 8, true},     {80, CellUse::kVolume, kWedge, 6, true},
     {81, CellUse::kVolume, kPyramid, 5, true},
 };
-constexpr int kVtkPixel = 8, kVtkVoxel = 11;
+constexpr int kVtkPixel = 8, kVtkVoxel = 11, kVtkStrip = 6;
 
 /// 1234567 as 1,234,567.
 std::string grouped(std::size_t n) {
@@ -76,6 +77,14 @@ std::string volumesInWords(const VolumeCells& cells) {
 }  // namespace
 
 std::string CellsOfFile::add(int vtk_type, const std::int64_t* nodes, std::size_t count) {
+  if (vtk_type == kVtkStrip) {
+    // Every second triangle has its first two corners swapped, so that all face one way.
+    for (std::size_t k = 0; k + 2 < count; ++k) {
+      const std::int64_t corners[3] = {nodes[k + k % 2], nodes[k + 1 - k % 2], nodes[k + 2]};
+      if (std::string fault = add(kVtkTriangle, corners, 3); !fault.empty()) return fault;
+    }
+    return "";
+  }
   const CellType* type = std::find_if(std::begin(kCellTypes), std::end(kCellTypes),
                                       [&](const CellType& one) { return one.vtk == vtk_type; });
   if (type == std::end(kCellTypes))
@@ -108,30 +117,10 @@ std::string CellsOfFile::add(int vtk_type, const std::int64_t* nodes, std::size_
 
 void addPolygon(const std::vector<Index>& corners, const TexturePoint* points, TriangleMesh& mesh,
                 FileTexture& texture) {
-  const std::size_t n = corners.size();
-  if (n < 3) return;
-  const bool known = std::all_of(corners.begin(), corners.end(), [&](Index k) { return k < mesh.vertices.size(); });
-  std::size_t start = 0;
-  if (known && n > 3) {
-    const auto at = [&](std::size_t k) -> const Vec3& { return mesh.vertices[corners[k % n]]; };
-    Vec3 normal = Vec3::Zero();
-    for (std::size_t k = 1; k + 1 < n; ++k) normal += (at(k) - at(0)).cross(at(k + 1) - at(0));
-    double best = 0.0;
-    for (std::size_t s = 0; s < std::min<std::size_t>(n, 64); ++s) {
-      double least = 1e300;
-      for (std::size_t k = 1; k + 1 < n; ++k)
-        least = std::min(least, (at(s + k) - at(s)).cross(at(s + k + 1) - at(s)).dot(normal));
-      if (s == 0 || least > best + 1e-9 * std::abs(best)) {
-        best = least;
-        start = s;
-      }
-    }
-  }
-  for (std::size_t k = 1; k + 1 < n; ++k) {
-    const std::array<std::size_t, 3> fan{start, (start + k) % n, (start + k + 1) % n};
-    mesh.triangles.push_back({corners[fan[0]], corners[fan[1]], corners[fan[2]]});
+  for (const std::array<std::size_t, 3>& triangle : trianglesOf(corners, mesh.vertices)) {
+    mesh.triangles.push_back({corners[triangle[0]], corners[triangle[1]], corners[triangle[2]]});
     if (points)
-      for (const std::size_t corner : fan) texture.corners.push_back(points[corner]);
+      for (const std::size_t corner : triangle) texture.corners.push_back(points[corner]);
   }
 }
 

@@ -37,13 +37,11 @@ constexpr int kVtkTriangle = 5, kVtkQuad = 9, kVtkTetrahedron = 10, kVtkHexahedr
 
 // Each refuses kUnreadable and kUnsuitableShape; `name` is for messages.
 
-/// A legacy VTK file, versions up to 5.1, with a DATASET UNSTRUCTURED_GRID.
+/// A legacy VTK file, versions up to 5.1, with a DATASET POLYDATA or UNSTRUCTURED_GRID.
 Result<CellsOfFile> readVtkCells(const std::string& name, std::string_view text);
-/// Whether its header says so.
-bool isUnstructuredGrid(std::string_view text);
 
-/// VTK's XML of type UnstructuredGrid: numbers as text, base64 or appended, plain or compressed by zlib.
-Result<CellsOfFile> readVtuCells(const std::string& name, std::string_view text);
+/// VTK's XML of type PolyData or UnstructuredGrid: numbers as text, base64 or appended, plain or compressed by zlib.
+Result<CellsOfFile> readVtkXmlCells(const std::string& name, std::string_view text);
 
 /// Gmsh's own format, versions 2 to 2.2 and 4.1, ASCII and binary.
 Result<CellsOfFile> readGmshCells(const std::string& name, std::string_view text);
@@ -51,13 +49,21 @@ Result<CellsOfFile> readGmshCells(const std::string& name, std::string_view text
 /// The vertices and faces of a PLY file, ASCII and binary.
 Result<CellsOfFile> readPlyCells(const std::string& name, std::string_view text);
 
+/// Wavefront OBJ; numbers of vertices that there are not are left for the check of the mesh.
+Result<CellsOfFile> readObjCells(const std::string& name, std::string_view text);
+
+/// STL, text and binary.
+Result<CellsOfFile> readStlCells(const std::string& name, std::string_view text);
+
+/// OFF in text; colours, normals and texture coordinates are left out.
+Result<CellsOfFile> readOffCells(const std::string& name, std::string_view text);
+
 /// The outer surface of the volumes; without any the surface cells; without these a cloud. A note says which volumes
 /// there were. `texture`: three points a triangle, where the surface cells have them.
 Result<TriangleMesh> surfaceOf(const std::string& name, CellsOfFile&& cells, std::vector<std::string>& notes,
                                FileTexture& texture);
 
-/// A fan of triangles from a corner that sees the others, so that a polygon that is not convex keeps its shape if it
-/// can. `points`: of the corners, which `texture` gets for each triangle; or null.
+/// As triangles (polygon.h). `points`: of the corners, which `texture` gets for each triangle; or null.
 void addPolygon(const std::vector<Index>& corners, const TexturePoint* points, TriangleMesh& mesh,
                 FileTexture& texture);
 

@@ -1,4 +1,4 @@
-// PCL's readers. It is the only file that includes them.
+// A mesh or cloud from a file, by the reader of its kind. PCL reads clouds; this is the only file that includes it.
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -10,19 +10,16 @@
 #include <mutex>
 #include <string_view>
 #include <utility>
-#include <variant>
 
 #include <pcl/PCLPointCloud2.h>
-#include <pcl/PolygonMesh.h>
 #include <pcl/console/print.h>
-#include <pcl/io/obj_io.h>
 #include <pcl/io/pcd_io.h>
-#include <pcl/io/vtk_lib_io.h>
 
 #include "cells_of_file.h"
-#include "mesh_check_before.h"
+#include "mesh_format.h"
 #include "meshless_surgery/io/files.h"
 #include "opened_file.h"
+#include "text_words.h"
 
 namespace meshless {
 namespace {
@@ -30,20 +27,13 @@ namespace {
 /// PCL's complaints would stand in front of ours.
 class QuietPcl {
  public:
-  QuietPcl() : level_(pcl::console::getVerbosityLevel()), vtk_(vtkObject::GetGlobalWarningDisplay()) {
-    pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);
-    vtkObject::GlobalWarningDisplayOff();
-  }
-  ~QuietPcl() {
-    pcl::console::setVerbosityLevel(level_);
-    vtkObject::SetGlobalWarningDisplay(vtk_);
-  }
+  QuietPcl() : level_(pcl::console::getVerbosityLevel()) { pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS); }
+  ~QuietPcl() { pcl::console::setVerbosityLevel(level_); }
   QuietPcl(const QuietPcl&) = delete;
   QuietPcl& operator=(const QuietPcl&) = delete;
 
  private:
   pcl::console::VERBOSITY_LEVEL level_;
-  int vtk_;
 };
 
 /// A text that only this process can open as a file, for readers that want a name.
@@ -104,28 +94,6 @@ bool copyPoints(const pcl::PCLPointCloud2& cloud, Points& points) {
   return true;
 }
 
-/// Through PCL; false where it failed.
-bool readWithPcl(const std::string& path, MeshFormat format, pcl::PolygonMesh& mesh) {
-  const QuietPcl quiet;
-  switch (format) {
-    case MeshFormat::kPcd:
-      return pcl::io::loadPCDFile(path, mesh.cloud) == 0;
-    case MeshFormat::kObj:
-    case MeshFormat::kOff:  // rewritten as OBJ
-      return pcl::io::loadOBJFile(path, mesh) == 0;
-    // These two return the number of polygons, 0 for a cloud and for a failure.
-    case MeshFormat::kStl:
-      return pcl::io::loadPolygonFileSTL(path, mesh) > 0;
-    case MeshFormat::kVtk:
-      return pcl::io::loadPolygonFileVTK(path, mesh) >= 0;
-    case MeshFormat::kPly:  // not PCL's
-    case MeshFormat::kVtu:
-    case MeshFormat::kMsh:
-      break;
-  }
-  return false;
-}
-
 /// Without the points of a cloud that are not finite.
 Result<TriangleMesh> checked(const std::string& name, TriangleMesh&& mesh) {
   if (mesh.triangles.empty())
@@ -139,33 +107,6 @@ Result<TriangleMesh> checked(const std::string& name, TriangleMesh&& mesh) {
   return std::move(mesh);
 }
 
-/// `texture`: of the corners of the polygons, then of the triangles.
-Result<TriangleMesh> convert(const pcl::PolygonMesh& read, const PromisedCounts& promised, const std::string& name,
-                             FileTexture& texture) {
-  TriangleMesh mesh;
-  if (!copyPoints(read.cloud, mesh.vertices))
-    return Error{ErrorCode::kUnreadable, "'" + name + "' has no points with x, y and z as float or double"};
-  if (promised.points && *promised.points != mesh.vertices.size())
-    return Error{ErrorCode::kUnreadable, "'" + name + "' is truncated: it holds " +
-                                             std::to_string(mesh.vertices.size()) + " of " +
-                                             std::to_string(*promised.points) + " points"};
-  if (promised.faces && *promised.faces > read.polygons.size())
-    return Error{ErrorCode::kUnreadable, "'" + name + "' is truncated: it holds " +
-                                             std::to_string(read.polygons.size()) + " of " +
-                                             std::to_string(*promised.faces) + " faces"};
-  const std::vector<TexturePoint> points = std::move(texture.corners);
-  texture.corners.clear();
-  std::vector<Index> corners;
-  std::size_t before = 0;
-  for (const pcl::Vertices& polygon : read.polygons) {
-    corners.clear();
-    for (const auto corner : polygon.vertices) corners.push_back(static_cast<Index>(corner));
-    const std::size_t first = std::exchange(before, before + corners.size());
-    addPolygon(corners, before <= points.size() ? &points[first] : nullptr, mesh, texture);
-  }
-  return checked(name, std::move(mesh));
-}
-
 Result<TriangleMesh> surfaceOfCells(const std::string& name, CellsOfFile&& cells, std::vector<std::string>* notes,
                                     FileTexture& texture) {
   std::vector<std::string> said;
@@ -175,46 +116,52 @@ Result<TriangleMesh> surfaceOfCells(const std::string& name, CellsOfFile&& cells
   return checked(name, std::move(*mesh));
 }
 
-/// Whether it is of cells, which PCL does not read.
-bool hasCells(std::string_view text, MeshFormat format) {
-  return format == MeshFormat::kPly || format == MeshFormat::kVtu || format == MeshFormat::kMsh ||
-         (format == MeshFormat::kVtk && isUnstructuredGrid(text));
-}
-
-Result<CellsOfFile> readCellsFile(const std::string& name, std::string_view text, MeshFormat format) {
-  if (text.empty()) return Error{ErrorCode::kUnreadable, "'" + name + "' is empty"};
-  return format == MeshFormat::kPly   ? readPlyCells(name, text)
-         : format == MeshFormat::kVtu ? readVtuCells(name, text)
-         : format == MeshFormat::kMsh ? readGmshCells(name, text)
-                                      : readVtkCells(name, text);
-}
-
-/// What PCL is to read, in memory: the file as it is, or rewritten.
-using Opened = std::variant<MemoryFile, CellsOfFile>;
-
-/// What was read of the file is gone afterwards.
-Result<Opened> openFile(const std::string& real_path, const std::string& name, MeshFormat format,
-                        PromisedCounts& promised, FileTexture& texture) {
-  const Result<FileBytes> read = readFile(real_path, kMaxMeshBytes);
-  if (!read) return Error{read.error().code, "'" + name + "' " + read.error().detail};
-  std::string_view text = read->text();
-  if (hasCells(text, format)) {
-    Result<CellsOfFile> cells = readCellsFile(name, text, format);
-    if (!cells) return cells.error();
-    return Opened(std::move(*cells));
+Result<CellsOfFile> readCells(const std::string& name, std::string_view text, MeshFormat format) {
+  switch (format) {
+    case MeshFormat::kPly:
+      return readPlyCells(name, text);
+    case MeshFormat::kObj:
+      return readObjCells(name, text);
+    case MeshFormat::kStl:
+      return readStlCells(name, text);
+    case MeshFormat::kVtk:
+      return readVtkCells(name, text);
+    case MeshFormat::kOff:
+      return readOffCells(name, text);
+    case MeshFormat::kVtkXml:
+      return readVtkXmlCells(name, text);
+    case MeshFormat::kMsh:
+      return readGmshCells(name, text);
+    case MeshFormat::kPcd:
+      break;
   }
-  const std::string lower = format == MeshFormat::kStl ? plainStl(text) : "";
-  if (!lower.empty()) text = lower;
-  const Result<PromisedCounts> header = checkBeforeReading(name, text, format);
-  if (!header) return header.error();
-  promised = *header;
-  if (format == MeshFormat::kStl) return Opened(MemoryFile(text));
-  const Result<std::string> plain = format == MeshFormat::kObj   ? plainObj(name, text, texture)
-                                    : format == MeshFormat::kOff ? plainOff(name, text, promised)
-                                    : format == MeshFormat::kVtk ? plainVtk(name, text, promised)
-                                                                 : plainPcd(name, text, promised);
+  return Error{ErrorCode::kFailed, "'" + name + "' is a cloud"};
+}
+
+/// By PCL, of a file in memory that holds checked numbers alone.
+Result<TriangleMesh> readCloud(const std::string& name, std::string_view text) {
+  std::optional<std::size_t> promised;
+  const Result<std::string> plain = plainPcd(name, text, promised);
   if (!plain) return plain.error();
-  return Opened(MemoryFile(*plain));
+  const MemoryFile file(*plain);
+  if (!file.ok()) return Error{ErrorCode::kFailed, "there is no memory to read '" + name + "'"};
+  pcl::PCLPointCloud2 cloud;
+  {
+    // What PCL says is the whole process's.
+    static std::mutex one_at_a_time;
+    const std::lock_guard<std::mutex> lock(one_at_a_time);
+    const QuietPcl quiet;
+    if (pcl::io::loadPCDFile(file.path(), cloud) != 0)
+      return Error{ErrorCode::kUnreadable, "'" + name + "' cannot be read: its compressed points are damaged"};
+  }
+  TriangleMesh mesh;
+  if (!copyPoints(cloud, mesh.vertices))
+    return Error{ErrorCode::kUnreadable, "'" + name + "' has no points with x, y and z as float or double"};
+  if (promised && *promised != mesh.vertices.size())
+    return Error{ErrorCode::kUnreadable, "'" + name + "' is truncated: it holds " +
+                                             std::to_string(mesh.vertices.size()) + " of " + std::to_string(*promised) +
+                                             " points"};
+  return checked(name, std::move(mesh));
 }
 
 }  // namespace
@@ -225,25 +172,16 @@ Result<TriangleMesh> readMeshFile(const std::string& real_path, std::vector<std:
   if (!format) return format.error();
   FileTexture found;
   if (!texture) texture = &found;
-  // PCL and VTK throw for bad input, and for memory.
+  // PCL throws for bad input, and everything for memory.
   try {
-    PromisedCounts promised;
-    Result<Opened> opened = openFile(real_path, name, *format, promised, *texture);
-    if (!opened) return opened.error();
-    if (auto* cells = std::get_if<CellsOfFile>(&*opened))
-      return surfaceOfCells(name, std::move(*cells), notes, *texture);
-    const auto* file = std::get_if<MemoryFile>(&*opened);
-    if (!file->ok()) return Error{ErrorCode::kFailed, "there is no memory to read '" + name + "'"};
-    pcl::PolygonMesh mesh;
-    bool read = false;
-    {
-      // What PCL and VTK say, and which readers VTK has, is the whole process's.
-      static std::mutex one_at_a_time;
-      const std::lock_guard<std::mutex> lock(one_at_a_time);
-      read = readWithPcl(file->path(), *format, mesh);
-    }
-    if (!read) return Error{ErrorCode::kUnreadable, "'" + name + "' cannot be read: it is truncated or damaged"};
-    return convert(mesh, promised, name, *texture);
+    const Result<FileBytes> read = readFile(real_path, kMaxMeshBytes);
+    if (!read) return Error{read.error().code, "'" + name + "' " + read.error().detail};
+    const std::string_view text = withoutMark(read->text());
+    if (text.empty()) return Error{ErrorCode::kUnreadable, "'" + name + "' is empty"};
+    if (*format == MeshFormat::kPcd) return readCloud(name, text);
+    Result<CellsOfFile> cells = readCells(name, text, *format);
+    if (!cells) return cells.error();
+    return surfaceOfCells(name, std::move(*cells), notes, *texture);
   } catch (const std::exception& e) {
     return Error{ErrorCode::kUnreadable, "'" + name + "' cannot be read: " + e.what()};
   }

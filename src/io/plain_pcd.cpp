@@ -4,7 +4,7 @@
 #include <cstring>
 #include <vector>
 
-#include "mesh_check_before.h"
+#include "mesh_format.h"
 #include "text_words.h"
 
 namespace meshless {
@@ -149,7 +149,7 @@ bool decode(const Header& header, std::string_view body, std::string& out) {
 
 }  // namespace
 
-Result<std::string> plainPcd(const std::string& name, std::string_view text, PromisedCounts& promised) {
+Result<std::string> plainPcd(const std::string& name, std::string_view text, std::optional<std::size_t>& points_in) {
   const auto unreadable = [&](const std::string& what) {
     return Error{ErrorCode::kUnreadable, "'" + name + "' " + what};
   };
@@ -157,7 +157,7 @@ Result<std::string> plainPcd(const std::string& name, std::string_view text, Pro
   std::string_view body = text;
   if (const std::string fault = readHeader(body, header); !fault.empty()) return unreadable(fault);
   if (Status status = checkCounts(name, header.points, 0.0, 0.0); !status) return status.error();
-  promised.points = static_cast<std::size_t>(header.points);
+  points_in = static_cast<std::size_t>(header.points);
   if (header.data == "binary_compressed") {
     std::uint32_t sizes[2] = {0, 0};  // packed, unpacked
     if (body.size() >= sizeof sizes) std::memcpy(sizes, body.data(), sizeof sizes);

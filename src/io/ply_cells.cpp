@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "cells_of_file.h"
-#include "mesh_check_before.h"
+#include "mesh_format.h"
 #include "text_words.h"
 
 namespace meshless {

@@ -21,13 +21,19 @@ constexpr std::size_t kMaxNumber = 4096;     // characters
 
 inline bool isBlank(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
-/// Takes the next line off `rest`, without its end; false where there is none.
+/// Takes the next line off `rest`, without its end: a line feed, a carriage return, or both; false where there is none.
 inline bool nextLine(std::string_view& rest, std::string_view& line) {
   if (rest.empty()) return false;
-  const std::size_t end = std::min(rest.find('\n'), rest.size());
+  const std::size_t end = std::min(rest.find_first_of("\r\n"), rest.size());
   line = rest.substr(0, end);
-  rest.remove_prefix(std::min(end + 1, rest.size()));
+  const bool both = end + 1 < rest.size() && rest[end] == '\r' && rest[end + 1] == '\n';
+  rest.remove_prefix(std::min(end + (both ? 2 : 1), rest.size()));
   return true;
+}
+
+/// Without a byte-order mark of UTF-8.
+inline std::string_view withoutMark(std::string_view text) {
+  return text.substr(0, 3) == "\xef\xbb\xbf" ? text.substr(3) : text;
 }
 
 /// Takes the next word off `rest`; empty where there is none.
@@ -62,10 +68,14 @@ inline std::string notText(std::string_view text, std::size_t from = 0) {
   return at == std::string_view::npos ? "" : "has the byte 0 at " + std::to_string(at) + "; accepted: text";
 }
 
-/// The number that the word is, or nothing.
+/// The number that the word is, or nothing. Also with a decimal comma, and with the exponents of Fortran, 1.5D+02.
 inline std::optional<double> numberOf(std::string_view word) {
   if (word.empty() || word.size() > kMaxNumber) return std::nullopt;
-  const std::string text(word);
+  std::string text(word);
+  if (text.find('.') == std::string::npos && std::count(text.begin(), text.end(), ',') == 1) text[text.find(',')] = '.';
+  const bool plain = text.find_first_not_of("+-.0123456789dD") == std::string::npos;
+  if (const std::size_t exponent = text.find_first_of("dD"); plain && exponent != std::string::npos && exponent > 0)
+    text[exponent] = 'e';
   char* end = nullptr;
   const double x = std::strtod(text.c_str(), &end);
   if (end != text.c_str() + text.size()) return std::nullopt;

@@ -12,7 +12,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "mesh_check_before.h"
+#include "mesh_format.h"
 #include "text_words.h"
 
 namespace meshless {

@@ -712,8 +712,8 @@ TEST(VolumeMesh, WhatIsNotReadIsNamed) {
     EXPECT_EQ(read.error().code, ErrorCode::kUnreadable);
     EXPECT_TRUE(says(read.error().detail, words)) << read.error().detail;
   };
-  for (const char* name : {"a.3mf", "a.gltf", "a.glb", "a.vtp", "a.mesh"})
-    refused(name, "x", "accepted endings: .pcd, .ply, .obj, .stl, .vtk, .off, .vtu, .msh");
+  for (const char* name : {"a.3mf", "a.gltf", "a.glb", "a.mesh"})
+    refused(name, "x", "accepted endings: .pcd, .ply, .obj, .stl, .vtk, .off, .vtu, .vtp, .msh");
   Grid grid = thing();
   grid.cells[0].vtk = 42;
   refused("a.vtk", vtkFile(grid, "3.0", true), "cell 0 is of VTK's type 42; accepted: tetrahedra");
@@ -726,7 +726,7 @@ TEST(VolumeMesh, WhatIsNotReadIsNamed) {
   refused("a.msh", "solid\n", "no Gmsh file");
   refused("a.vtu", replaced(vtuFile(thing(), {"binary", true, true}), "ZLib", "LZ4"),
           "accepted: vtkZLibDataCompressor");
-  refused("a.vtu", replaced(vtuFile(thing(), {}), "UnstructuredGrid", "PolyData"), "accepted: UnstructuredGrid");
+  refused("a.vtu", replaced(vtuFile(thing(), {}), "UnstructuredGrid", "ImageData"), "accepted: PolyData, UnstructuredGrid");
   refused("a.vtu", replaced(vtuFile(thing(), {}), "<!--", "<!DOCTYPE a [<!ENTITY b \"bb\">]><!--"), "document type");
   refused("a.vtu", "solid\n", "truncated");
   refused("a.vtk", replaced(vtkFile(thing(), "3.0", false), "UNSTRUCTURED", "STRUCTURED"), "accepted: these two");

@@ -32,14 +32,15 @@ struct FileTexture {
   std::string fault;
 };
 
-/// By the file's ending: PCD, OBJ, STL, VTK, OFF through PCL; PLY; of VTK's unstructured grids (.vtk, .vtu) and Gmsh's
-/// .msh the outer surface of the volumes, or without any their triangles and quads. Polygons are split into triangles.
-/// A file without faces is a cloud: mesh.triangles is empty. `real_path` has no links in it, as FileAccess::resolve
-/// gives it. `notes` gets a sentence where the surface was taken of volumes; `texture` the coordinates of OBJ and PLY,
-/// three a triangle. Refuses kUnreadable (missing, replaced meanwhile, truncated, unknown ending, more than 512 MiB)
-/// and kUnsuitableShape (no points, more than 2,000,000 points, 8,000,000 faces or cells or 32,000,000 corners of them;
-/// a face of more than two volumes). Non-finite points are left to repairMesh to name, for surfaces; in clouds they are
-/// dropped; volumes with such corners are refused.
+/// By the file's ending: PCD, which PCL reads; OBJ, STL, OFF, PLY, VTK's PolyData (.vtk, .vtp); of VTK's unstructured
+/// grids
+/// (.vtk, .vtu) and Gmsh's .msh the outer surface of the volumes, or without any their triangles and quads. Polygons
+/// are split into triangles. A file without faces is a cloud: mesh.triangles is empty. `real_path` has no links in it,
+/// as FileAccess::resolve gives it. `notes` gets a sentence where the surface was taken of volumes; `texture` the
+/// coordinates of OBJ and PLY, three a triangle. Refuses kUnreadable (missing, replaced meanwhile, truncated, unknown
+/// ending, more than 512 MiB) and kUnsuitableShape (no points, more than 2,000,000 points, 8,000,000 faces or cells or
+/// 32,000,000 corners of them; a face of more than two volumes). Non-finite points are left to repairMesh to name, for
+/// surfaces; in clouds they are dropped; volumes with such corners are refused.
 Result<TriangleMesh> readMeshFile(const std::string& real_path, std::vector<std::string>* notes = nullptr,
                                   FileTexture* texture = nullptr);
 

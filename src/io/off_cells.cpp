@@ -1,7 +1,8 @@
 #include <cmath>
 #include <vector>
 
-#include "mesh_check_before.h"
+#include "cells_of_file.h"
+#include "mesh_format.h"
 #include "text_words.h"
 
 namespace meshless {
@@ -19,7 +20,7 @@ std::vector<std::string> offWords(std::string_view& text, std::size_t& line_numb
 
 }  // namespace
 
-Result<std::string> plainOff(const std::string& name, std::string_view text, PromisedCounts& promised) {
+Result<CellsOfFile> readOffCells(const std::string& name, std::string_view text) {
   const auto unreadable = [&](const std::string& what) {
     return Error{ErrorCode::kUnreadable, "'" + name + "' " + what};
   };
@@ -43,16 +44,20 @@ Result<std::string> plainOff(const std::string& name, std::string_view text, Pro
   if (std::isnan(points) || std::isnan(faces))
     return bad("is no OFF file, or truncated: no numbers of points and faces");
   if (Status status = checkCounts(name, points, faces, 0.0); !status) return status.error();
-  promised.points = static_cast<std::size_t>(points);
-  std::string plain;
+  CellsOfFile found;
   for (double k = 0.0; k < points; ++k) {
     w = offWords(text, line_number);
     if (w.empty()) return bad("is truncated in its points");
     if (w.size() < 3) return bad("a point needs three numbers, it has " + std::to_string(w.size()));
-    for (std::size_t c = 0; c < 3; ++c)
-      if (!numberOf(w[c])) return bad("'" + printable(w[c]) + "' is no number");
-    plain += "v " + w[0] + " " + w[1] + " " + w[2] + "\n";
+    Vec3 p;
+    for (int c = 0; c < 3; ++c) {
+      const std::optional<double> x = numberOf(w[static_cast<std::size_t>(c)]);
+      if (!x) return bad("'" + printable(w[static_cast<std::size_t>(c)]) + "' is no number");
+      p[c] = *x;
+    }
+    found.points.push_back(p);
   }
+  double all_corners = 0.0;
   for (double k = 0.0; k < faces; ++k) {
     w = offWords(text, line_number);
     if (w.empty()) return bad("is truncated in its faces");
@@ -60,17 +65,18 @@ Result<std::string> plainOff(const std::string& name, std::string_view text, Pro
     if (!(corners <= static_cast<double>(w.size() - 1))) return bad("a face has fewer corners than it says");
     if (corners > static_cast<double>(kMaxPolygon)) return bad("a face has more than 1000 corners");
     if (corners < 3.0) continue;  // a point or an edge
-    plain += "f";
+    all_corners += corners;
+    if (Status status = checkCounts(name, 1.0, 0.0, all_corners); !status) return status.error();
+    found.polygons.push_back(static_cast<Index>(corners));
     for (std::size_t c = 1; static_cast<double>(c) <= corners; ++c) {
       const double corner = countOf(w[c]);
       if (std::isnan(corner)) return bad("'" + printable(w[c]) + "' is no number of a point");
-      // One that names no point becomes 0, for the check of the mesh to name.
-      plain += " " + (corner < points ? std::to_string(static_cast<std::size_t>(corner) + 1) : std::string("0"));
+      // One that names no point is left for the check of the mesh to name.
+      found.polygons.push_back(corner < points ? static_cast<Index>(corner) : kNoIndex);
     }
-    plain += "\n";
+    ++found.polygon_count;
   }
-  FileTexture none;
-  return plainObj(name, plain, none);
+  return found;
 }
 
 }  // namespace meshless

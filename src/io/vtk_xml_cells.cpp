@@ -1,4 +1,4 @@
-// VTK's XML format ("VTK File Formats", kitware), as far as an unstructured grid's points and cells go.
+// VTK's XML format ("VTK File Formats", kitware), as far as the points and cells of unstructured grids and PolyData go.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -11,7 +11,7 @@
 #include <zlib.h>
 
 #include "cells_of_file.h"
-#include "mesh_check_before.h"
+#include "mesh_format.h"
 #include "text_words.h"
 
 namespace meshless {
@@ -32,6 +32,7 @@ struct VtuArray {
 struct VtuPiece {
   Attributes attributes;
   VtuArray points, connectivity, offsets, types;
+  VtuArray polygons, polygon_ends, strips, strip_ends;  // of PolyData
 };
 
 /// What the tags say; nothing is decoded yet.
@@ -209,15 +210,21 @@ class VtuTags {
       file.head = std::move(attributes);
     } else if (name == "AppendedData") {
       file.appended = std::move(attributes);
-    } else if (name == "Piece" && parent == "UnstructuredGrid") {
+    } else if (name == "Piece" && (parent == "UnstructuredGrid" || parent == "PolyData")) {
       file.pieces.emplace_back();
       file.pieces.back().attributes = std::move(attributes);
-    } else if (name == "DataArray" && !file.pieces.empty() && (parent == "Points" || parent == "Cells")) {
+    } else if (name == "DataArray" && !file.pieces.empty() &&
+               (parent == "Points" || parent == "Cells" || parent == "Polys" || parent == "Strips")) {
       VtuPiece& piece = file.pieces.back();
       const std::string of = parent == "Points" ? parent : attribute(attributes, "Name");
+      const bool polys = parent == "Polys", strips = parent == "Strips";
       VtuArray* array = of == "Points"         ? &piece.points
-                        : of == "connectivity" ? &piece.connectivity
-                        : of == "offsets"      ? &piece.offsets
+                        : of == "connectivity" ? &(polys    ? piece.polygons
+                                                   : strips ? piece.strips
+                                                            : piece.connectivity)
+                        : of == "offsets"      ? &(polys    ? piece.polygon_ends
+                                                   : strips ? piece.strip_ends
+                                                            : piece.offsets)
                         : of == "types"        ? &piece.types
                                                : nullptr;
       if (!array) return "";
@@ -371,15 +378,51 @@ class VtuNumbers {
   bool swapped_, wide_, packed_;
 };
 
-Status readPiece(const std::string& name, const VtuPiece& piece, const VtuNumbers& numbers, CellsOfFile& found,
-                 double& cells, double& corners) {
-  const double n = countOf(attribute(piece.attributes, "NumberOfPoints")),
-               size = countOf(attribute(piece.attributes, "NumberOfCells"));
-  if (std::isnan(n) || std::isnan(size))
-    return unreadable(name, "has a Piece without NumberOfPoints and NumberOfCells; accepted: whole numbers");
-  if (n == 0.0 && size == 0.0) return Done{};
+/// So many cells: the end of each in `ends`, the corners in `connectivity`, `types` of VTK or all of one type.
+Status readCells(const std::string& name, const VtuNumbers& numbers, std::size_t size, const VtuArray& connectivity,
+                 const VtuArray& ends, const VtuArray* types, int type, std::int64_t first, CellsOfFile& found,
+                 double& corners) {
+  std::vector<std::int64_t> offsets, kinds, nodes;
+  if (Status status = numbers.read(ends, "offsets", size, offsets); !status) return status;
+  if (types)
+    if (Status status = numbers.read(*types, "types", size, kinds); !status) return status;
+  std::int64_t end = 0;
+  for (std::size_t k = 0; k < offsets.size(); ++k) {
+    if (offsets[k] < end)
+      return unreadable(name, "is damaged: the offset of cell " + std::to_string(k) + " is " +
+                                  std::to_string(offsets[k]) + "; accepted: not below " + std::to_string(end));
+    end = offsets[k];
+  }
+  corners += static_cast<double>(end);
+  if (Status status = checkCounts(name, 1.0, 0.0, corners); !status) return status;
+  if (Status status = numbers.read(connectivity, "connectivity", static_cast<std::size_t>(end), nodes); !status)
+    return status;
+  // Corners are counted within their piece.
+  const auto points = static_cast<std::int64_t>(found.points.size()) - first;
+  for (std::int64_t& node : nodes) node = node >= 0 && node < points ? node + first : -1;
+  std::int64_t from = 0;
+  for (std::size_t k = 0; k < offsets.size(); ++k) {
+    const auto count = static_cast<std::size_t>(offsets[k] - from);
+    const int kind = types ? static_cast<int>(std::min<std::int64_t>(kinds[k], 1000)) : type;
+    const std::string fault = types || count > 2 ? found.add(kind, nodes.data() + from, count) : "";
+    if (!fault.empty()) return unreadable(name, "is damaged: cell " + std::to_string(k) + " " + fault);
+    from = offsets[k];
+  }
+  return Done{};
+}
+
+Status readPiece(const std::string& name, const VtuPiece& piece, bool poly_data, const VtuNumbers& numbers,
+                 CellsOfFile& found, double& cells, double& corners) {
+  constexpr int kPolygon = 7, kStrip = 6;
+  const auto count = [&](const char* key) { return countOf(attribute(piece.attributes, key, poly_data ? "0" : "")); };
+  const double n = count("NumberOfPoints"), size = poly_data ? count("NumberOfPolys") : count("NumberOfCells"),
+               strips = poly_data ? count("NumberOfStrips") : 0.0;
+  if (std::isnan(n) || std::isnan(size) || std::isnan(strips))
+    return unreadable(name, std::string("has a Piece without NumberOfPoints and ") +
+                                (poly_data ? "NumberOfPolys" : "NumberOfCells") + "; accepted: whole numbers");
+  if (n == 0.0 && size == 0.0 && strips == 0.0) return Done{};
   const auto first = static_cast<std::int64_t>(found.points.size());
-  cells += size;
+  cells += size + strips;
   if (Status status = checkCounts(name, static_cast<double>(first) + n, cells, 0.0); !status) return status;
   const std::string components = attribute(piece.points.attributes, "NumberOfComponents", "3");
   if (components != "3") return unreadable(name, "has points of " + printable(components) + " numbers; accepted: 3");
@@ -390,40 +433,28 @@ Status readPiece(const std::string& name, const VtuPiece& piece, const VtuNumber
     for (std::size_t k = 0; k < points; ++k)
       found.points.emplace_back(coordinates[3 * k], coordinates[3 * k + 1], coordinates[3 * k + 2]);
   }
-  std::vector<std::int64_t> offsets, types, nodes;
-  if (Status status = numbers.read(piece.offsets, "offsets", static_cast<std::size_t>(size), offsets); !status)
-    return status;
-  if (Status status = numbers.read(piece.types, "types", static_cast<std::size_t>(size), types); !status) return status;
-  std::int64_t end = 0;
-  for (std::size_t k = 0; k < offsets.size(); ++k) {
-    if (offsets[k] < end)
-      return unreadable(name, "is damaged: the offset of cell " + std::to_string(k) + " is " +
-                                  std::to_string(offsets[k]) + "; accepted: not below " + std::to_string(end));
-    end = offsets[k];
-  }
-  corners += static_cast<double>(end);
-  if (Status status = checkCounts(name, 1.0, 0.0, corners); !status) return status;
-  if (Status status = numbers.read(piece.connectivity, "connectivity", static_cast<std::size_t>(end), nodes); !status)
-    return status;
-  // Corners are counted within their piece.
-  for (std::int64_t& node : nodes) node = node >= 0 && node < static_cast<std::int64_t>(points) ? node + first : -1;
-  std::int64_t from = 0;
-  for (std::size_t k = 0; k < offsets.size(); ++k) {
-    const std::string fault = found.add(static_cast<int>(std::min<std::int64_t>(types[k], 1000)), nodes.data() + from,
-                                        static_cast<std::size_t>(offsets[k] - from));
-    if (!fault.empty()) return unreadable(name, "is damaged: cell " + std::to_string(k) + " " + fault);
-    from = offsets[k];
-  }
+  const auto whole = static_cast<std::size_t>(size);
+  if (!poly_data)
+    return readCells(name, numbers, whole, piece.connectivity, piece.offsets, &piece.types, 0, first, found, corners);
+  if (whole > 0)
+    if (Status status = readCells(name, numbers, whole, piece.polygons, piece.polygon_ends, nullptr, kPolygon, first,
+                                  found, corners);
+        !status)
+      return status;
+  if (strips > 0.0)
+    return readCells(name, numbers, static_cast<std::size_t>(strips), piece.strips, piece.strip_ends, nullptr, kStrip,
+                     first, found, corners);
   return Done{};
 }
 
 }  // namespace
 
-Result<CellsOfFile> readVtuCells(const std::string& name, std::string_view text) {
+Result<CellsOfFile> readVtkXmlCells(const std::string& name, std::string_view text) {
   VtuFile file;
   if (const std::string fault = VtuTags(text).read(file); !fault.empty()) return unreadable(name, fault);
-  if (const std::string type = attribute(file.head, "type"); type != "UnstructuredGrid")
-    return unreadable(name, "is of the type '" + printable(type) + "'; accepted: UnstructuredGrid");
+  const std::string type = attribute(file.head, "type");
+  if (type != "UnstructuredGrid" && type != "PolyData")
+    return unreadable(name, "is of the type '" + printable(type) + "'; accepted: PolyData, UnstructuredGrid");
   const std::string compressor = attribute(file.head, "compressor", "vtkZLibDataCompressor");
   if (compressor != "vtkZLibDataCompressor")
     return unreadable(name,
@@ -432,7 +463,8 @@ Result<CellsOfFile> readVtuCells(const std::string& name, std::string_view text)
   CellsOfFile found;
   double cells = 0.0, corners = 0.0;
   for (const VtuPiece& piece : file.pieces)
-    if (Status status = readPiece(name, piece, numbers, found, cells, corners); !status) return status.error();
+    if (Status status = readPiece(name, piece, type == "PolyData", numbers, found, cells, corners); !status)
+      return status.error();
   if (found.points.empty()) return Error{ErrorCode::kUnsuitableShape, "'" + name + "' has no points"};
   return found;
 }
