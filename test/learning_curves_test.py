@@ -11,7 +11,7 @@ import unittest
 
 CHECKOUT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 sys.path.insert(0, os.path.join(CHECKOUT, 'python'))
-from meshless_surgery import curves  # noqa: E402
+from meshless_surgery import curves, validity  # noqa: E402
 
 
 def report(trainee, score, time, force, task='retract', outcome='done', passed=None, **more):
@@ -122,6 +122,68 @@ class CurvesTest(unittest.TestCase):
         self.assertEqual(2, page.count('class="band"/>'))
         with open(os.path.join(self.folder, 'table.csv'), encoding='utf-8') as file:
             self.assertEqual(3, len(file.read().splitlines()))
+
+    def test_domains_have_the_marks_of_their_metrics_and_say_what_is_not_measured(self):
+        self.put('ada', 50.0, 37.5, -2.8)
+        of = curves.domains(curves.read(self.folder)[0][0])
+        self.assertAlmostEqual(50.0, of['efficiency'])       # time from 15 to 60
+        self.assertAlmostEqual(50.0, of['robotic control'])  # sparc.pick from -1.6 to -4
+        for domain in ('depth perception', 'autonomy', 'bimanual dexterity'):
+            self.assertIsNone(of[domain])
+        self.assertEqual(0, self.program('--csv', os.path.join(self.folder, 'table.csv')).returncode)
+        with open(os.path.join(self.folder, 'table.csv'), encoding='utf-8') as file:
+            self.assertIn('robotic control', file.readline())
+
+    def test_two_groups_are_told_apart_by_what_is_known_of_them(self):
+        # Scores of three trainees each, in two runs: means 30, 40, 50 and 60, 70, 80.
+        for n, mean in enumerate((30.0, 40.0, 50.0)):
+            for way in (-2.0, 2.0):
+                self.put('novice %d' % n, mean + way, 60.0 - n, -2.0)
+                self.put('expert %d' % n, mean + 30.0 + way, 20.0 - n, -2.0)
+        runs = curves.read(self.folder)[0]
+        groups = [{'%s %d' % (kind, n) for n in range(3)} for kind in ('novice', 'expert')]
+        found = validity.compare(runs, *groups)['retract']
+        self.assertAlmostEqual(3.0 * (1.0 - 3.0 / 15.0), found['g'])  # 30 over a standard deviation of 10, for few
+        self.assertLess(found['interval'][0], found['g'])
+        self.assertAlmostEqual(55.0, found['pass_mark'])
+        self.assertEqual((0, 0), (found['novices_pass'], found['experts_fail']))
+        # Between trainees 2 * 1750 / 5 = 700, within 8.
+        self.assertAlmostEqual((700.0 - 8.0) / (700.0 + 8.0), found['icc'])
+        self.assertGreater(found['metrics']['time'][2], 3.0)
+        self.assertEqual(0.0, found['metrics']['sparc.pick'][2])
+        # Who is asked the other way round is told that experts are not better.
+        self.assertIsNone(validity.compare(runs, groups[1], groups[0])['retract']['pass_mark'])
+        with self.assertRaisesRegex(ValueError, 'has 1 of the experts'):
+            validity.compare(runs, groups[0], {'expert 1'})
+
+    def test_the_mark_lies_where_the_two_curves_meet(self):
+        worse, better = [10.0, 20.0, 30.0, 40.0], [80.0, 81.0, 82.0, 83.0]
+        mark = validity.contrasting(worse, better)
+        density = [math.exp(-0.5 * ((mark - m) / s) ** 2) / s for m, s in ((25.0, math.sqrt(500.0 / 3.0)), (81.5, math.sqrt(5.0 / 3.0)))]
+        self.assertAlmostEqual(density[0] / density[1], 1.0, places=6)
+        self.assertEqual(45.0, validity.contrasting([40.0, 40.0], [50.0, 50.0]))
+
+    def test_the_program_of_validity_prints_and_draws(self):
+        self.fill()
+        for n in range(2):
+            self.put('new %d' % n, 20.0 + n, 60.0, -3.0)
+        def run(*arguments):
+            return subprocess.run([sys.executable, os.path.join(CHECKOUT, 'scripts', 'validity.py'), self.folder, '--task', 'retract',
+                                   '--out', os.path.join(self.folder, 'v.html')] + list(arguments), text=True, stdout=subprocess.PIPE,
+                                  stderr=subprocess.PIPE, env=dict(os.environ, PYTHONPATH=os.path.join(CHECKOUT, 'python')))
+        done = run('--novices', 'new 0', 'new 1', '--experts', 'ada', '<expert>')
+        self.assertEqual(0, done.returncode, done.stderr)
+        self.assertIn("Hedges' g", done.stdout)
+        with open(os.path.join(self.folder, 'v.html'), encoding='utf-8') as file:
+            page = file.read()
+        self.assertEqual(4, page.count('<circle'))
+        self.assertNotIn('<expert>', page)
+        for arguments, words in ((('--novices', 'ada', 'new 1', '--experts', 'ada', '<expert>'), 'in both groups'),
+                                 (('--novices', 'bob', 'new 1', '--experts', 'ada', '<expert>'), "no run of 'bob'"),
+                                 (('--novices', 'new 1', '--experts', 'ada', '<expert>'), 'has 1 of the novices')):
+            refused = run(*arguments)
+            self.assertEqual(2, refused.returncode)
+            self.assertIn(words, refused.stderr)
 
     def test_a_run_alone_is_drawn_too(self):
         self.put('ada', 50.0, 20.0, -2.0)

@@ -20,6 +20,19 @@ LAST = 3         # runs that say how good one is now
 COLOURS = ('#1b6ca8', '#c0392b', '#2d8a4e', '#8e44ad', '#d68910', '#16807a', '#7f4f24', '#5d6d7e')
 
 
+# Of the rating scales that surgeons use, what a metric can stand for. What is empty is not measured.
+# GEARS: Goh et al. 2012, J. Urol. 187(1). GOALS: Vassiliou et al. 2005, Am. J. Surg. 190(1).
+DOMAINS = {
+    'depth perception': (),
+    'bimanual dexterity': ('hands_share', 'hands_overlap', 'path_length.pick_2'),
+    'efficiency': ('time', 'idle_time', 'economy', 'path_length', 'movements', 'cuts', 'strokes', 'grasps'),
+    'force sensitivity, tissue handling': ('force_peak', 'force_mean', 'force_together_peak', 'force_together_mean', 'force_time_above', 'strain_peak',
+                                           'torn', 'leaks', 'bleeding_time', 'drop_height', 'drops'),
+    'robotic control': ('sparc', 'ldlj', 'tremor', 'instrument_crossings', 'top_speed'),
+    'autonomy': (),
+}
+
+
 class Run:
     """One report. `metrics` has what was measured, `goals` (good, bad) of those that count. `date` is None where the report has none."""
 
@@ -58,6 +71,18 @@ def read(folder):
     return [run for _, _, run in sorted(runs, key=lambda entry: entry[:2])], faults
 
 
+def domains(run):
+    """{domain: mean of the marks, 0 to 100, of those of its metrics that count in the run's task; None: none does}."""
+    found = {}
+    for domain, metrics in DOMAINS.items():
+        gained = []
+        for name, (good, bad) in run.goals.items():
+            if (name in metrics or name.split('.')[0] in metrics) and name in run.metrics:
+                gained.append(100.0 * min(1.0, max(0.0, (run.metrics[name] - bad) / (good - bad))))
+        found[domain] = statistics.fmean(gained) if gained else None
+    return found
+
+
 def grouped(runs):
     """{task: {trainee: runs}}, in the order in which they came."""
     tasks = {}
@@ -68,15 +93,18 @@ def grouped(runs):
 
 def table(runs):
     """A row for each task and trainee: task, trainee, runs, passed, first pass (number of the run or None), first score,
-    best, mean of the last three."""
+    best, mean of the last three, and the mean of each of domains(), None where nothing of it counts or is measured."""
     rows = []
     for task, trainees in grouped(runs).items():
         for trainee, own in trainees.items():
             passes = [number for number, run in enumerate(own, 1) if run.passed]
             scores = [run.score for run in own]
+            found = [domains(run) for run in own]
+            of_domains = {domain: [marks[domain] for marks in found if marks[domain] is not None] for domain in DOMAINS}
             rows.append({'task': task, 'trainee': trainee, 'runs': len(own), 'passed': len(passes),
                          'first_pass': passes[0] if passes else None, 'first_score': scores[0], 'best': max(scores),
-                         'lately': statistics.fmean(scores[-LAST:])})
+                         'lately': statistics.fmean(scores[-LAST:]),
+                         **{domain: statistics.fmean(values) if values else None for domain, values in of_domains.items()}})
     return rows
 
 
@@ -118,15 +146,15 @@ def marks_yaml(found):
     return '\n'.join(lines)
 
 
-def _chart(title, unit, lines, band=None, mark=None):
+def _chart(title, unit, lines, band=None, mark=None, whole=None):
     """An SVG of values over the number of the run. lines: {trainee: [(number, value, passed)]}; band: (mean, sd)."""
     width, height, left, bottom, top = 460, 220, 58, 30, 24
     values = [value for points in lines.values() for _, value, _ in points]
     values += [band[0] - band[1], band[0] + band[1]] if band else []
     values += [mark] if mark is not None else []
-    low, high = min(values), max(values)
+    low, high = whole or (min(values), max(values))
     if high - low < 1e-9 * max(abs(high), 1e-12):
-        low, high = low - 0.5 * max(abs(low), 1e-6), high + 0.5 * max(abs(high), 1e-6)
+        low, high = low - 0.5 * (abs(low) or 1.0), high + 0.5 * (abs(high) or 1.0)
     last = max(number for points in lines.values() for number, _, _ in points)
 
     def x(number):
@@ -183,7 +211,7 @@ def page(runs, experts=()):
             '<span style="color:%s">&#9679; %s</span>' % (COLOURS[k % len(COLOURS)], html.escape(name)) for k, name in enumerate(trainees))))
         latest = [run for own in trainees.values() for run in own][-1]
         out.append(_chart('score', '', {name: [(n, run.score, run.passed) for n, run in enumerate(own, 1)]
-                                        for name, own in trainees.items()}, mark=latest.pass_mark))
+                                        for name, own in trainees.items()}, mark=latest.pass_mark, whole=(0.0, 100.0)))
         for metric in latest.goals:
             lines = {name: [(n, run.metrics[metric], run.passed) for n, run in enumerate(own, 1) if metric in run.metrics]
                      for name, own in trainees.items()}

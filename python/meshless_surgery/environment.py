@@ -48,7 +48,7 @@ else:
 
 
 def potential(seen):
-    """0 to 2: the score and the stages that were met, each 0 to 1. The default reward is by how much it has grown."""
+    """0 to 2: the stages that were met, and once all are the score, each 0 to 1. The default reward is by how much it has grown."""
     return seen.task.score / 100.0 + seen.task.stage / len(seen.task.stages)
 
 
@@ -102,6 +102,11 @@ class Environment(Base):
             from meshless_surgery.testing import RunningScene
             self._running = RunningScene('', listens=False, task=task, **parameters)
             self.surgeon = self._running.surgeon
+        if not self._was_paused:  # a task that runs by itself refuses a pause
+            try:
+                self.surgeon.stop_task()
+            except Refused:
+                pass  # none runs
         self.surgeon.stepped()
         self._name = None  # of the task, once it was started
         self._places = list(points)
@@ -120,7 +125,7 @@ class Environment(Base):
         if seed is not None:
             self.np_random = numpy.random.default_rng(seed)
         if self._name is None or self._seen.task.task != self._name:
-            self.surgeon.start_task(self._task)
+            self.surgeon.start_task(self._task, allow=['pause', 'slow'])
         else:
             self.surgeon.reset()
         self._particles = [self._nearest(body, place) for body, place in self._places]

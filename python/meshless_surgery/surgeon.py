@@ -212,8 +212,9 @@ class Surgeon:
     def load(self, file):
         return self.call('load', LoadState, file=file)
 
-    def start_task(self, task, trainee=''):
-        return self.call('start_task', StartTask, task=task, trainee=trainee)
+    def start_task(self, task, trainee='', allow=()):
+        """`allow`: what this run allows beside what the task does, as 'undo' or 'pause' (docs/reference/tasks.md)."""
+        return self.call('start_task', StartTask, task=task, trainee=trainee, allow=list(allow))
 
     def stop_task(self):
         return self.call('stop_task', Trigger)

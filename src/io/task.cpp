@@ -1,6 +1,7 @@
 #include "meshless_surgery/io/task.h"
 
 #include <sys/stat.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <ctime>
@@ -15,8 +16,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostStages = 100, kMostForbidden = 100;
-constexpr std::size_t kMostPicture = 2 << 20;  // bytes
+constexpr std::size_t kMostStages = 100, kMostForbidden = 100, kMostCorners = 1000;
+constexpr int kCircleParts = 72;
+constexpr std::size_t kMostPicture = 2 << 20, kMostTask = 1 << 20;  // bytes
 const std::vector<std::string> kTools{"pick", "push", "scissors"};
 
 std::string tasksIn(const fs::path& folder) {
@@ -82,7 +84,8 @@ class TaskReader {
     map.text("picture", picture);
     if (!picture.empty()) readPicture(map.get("picture"), picture);
     map.number("pass_mark", {0.0, 100.0}, task_.pass_mark);
-    for (const char* part : {"plan", "target", "tray", "stages", "limits", "metrics"})
+    map.number("settle", {0.0, 60.0, false, "s"}, task_.settle);
+    for (const char* part : {"plan", "target", "tray", "stages", "limits", "metrics", "allow"})
       if (const YAML::Node node = map.get(part); node.IsDefined()) parts_[part].reset(node);
     map.finish();
     if (task_.scene.empty()) source_.fail(root, "the task has no scene", "a name of config/scenes, or a path");
@@ -94,6 +97,7 @@ class TaskReader {
     if (source_.fault) return;
     readStages(parts_["stages"]);
     if (parts_.count("metrics")) readMetrics(parts_["metrics"]);
+    if (parts_.count("allow")) readAllow(parts_["allow"]);
   }
 
  private:
@@ -113,22 +117,72 @@ class TaskReader {
   void readPlan(const YAML::Node& node) {
     CutPlan plan;
     YamlMap map(source_, node, "plan");
-    for (const char* key : {"body", "origin", "along", "out", "length", "depth"})
-      if (!map.has(key))
-        source_.fail(node, std::string("plan has no ") + key, "body, origin, along, out, length, depth");
+    const bool line = map.has("line"), circle = map.has("circle");
+    const std::string accepted = "body, out, depth, and one of: origin with along and length, line, circle";
+    for (const char* key : {"body", "out", "depth"})
+      if (!map.has(key)) source_.fail(node, std::string("plan has no ") + key, accepted);
+    for (const char* key : {"origin", "along", "length"})
+      if (map.has(key) == (line || circle))
+        source_.fail(node, std::string("plan has ") + (map.has(key) ? "a line or a circle and " : "no ") + key,
+                     accepted);
+    if (line && circle) source_.fail(node, "plan has a line and a circle", accepted);
     map.text("body", plan.body);
-    map.vector("origin", lengths(), plan.origin);
-    readDirection(map, "along", plan.along);
     readDirection(map, "out", plan.out);
-    map.number("length", lengths(0.0, true), plan.length);
     map.number("depth", lengths(0.0, true), plan.depth);
     map.number("tolerance", lengths(0.0, true), plan.tolerance);
+    if (line) {
+      readLine(map.get("line"), plan);
+    } else if (circle) {
+      readCircle(map.get("circle"), plan);
+    } else {
+      map.vector("origin", lengths(), plan.origin);
+      readDirection(map, "along", plan.along);
+      map.number("length", lengths(0.0, true), plan.length);
+    }
     map.finish();
     if (source_.fault) return;
-    if (!(std::abs(plan.along.dot(plan.out)) <= 1e-3))
-      return source_.fail(map.get("out"), "out is not at a right angle to along", "a direction that is, to 0.001");
-    plan.out = (plan.out - plan.out.dot(plan.along) * plan.along).normalized();
+    for (const CutPlan& part : plan.parts())
+      if (!(std::abs(part.along.dot(plan.out)) <= 1e-3))
+        return source_.fail(map.get("out"),
+                            std::string("out is not at a right angle to ") + (line ? "the line" : "along"),
+                            "a direction that is, to 0.001");
+    plan.out = (plan.out - plan.out.dot(plan.parts()[0].along) * plan.parts()[0].along).normalized();
     task_.plan = plan;
+  }
+
+  void readLine(const YAML::Node& node, CutPlan& plan) {
+    const std::string accepted = "2 to 1000 places [x, y, z] of the world, none where the one before is";
+    if (!node.IsSequence() || node.size() < 2 || node.size() > kMostCorners)
+      return source_.fail(node, "line is " + shown(node), accepted);
+    for (const auto& corner : node) {
+      Vec3 p;
+      if (!corner.IsSequence() || corner.size() != 3)
+        return source_.fail(corner, "a place of line is " + shown(corner), accepted);
+      for (int k = 0; k < 3; ++k)
+        if (!readNumber(source_, corner[static_cast<std::size_t>(k)], "line", lengths(), p[k])) return;
+      if (!plan.line.empty() && !((p - plan.line.back()).norm() > 1e-9))
+        return source_.fail(corner, "a place of line is where the one before is", accepted);
+      plan.line.push_back(p);
+    }
+  }
+
+  /// As a line of so many corners that it is nowhere a thousandth of its radius off.
+  void readCircle(const YAML::Node& node, CutPlan& plan) {
+    Vec3 centre = Vec3::Zero();
+    double radius = 0.0;
+    YamlMap map(source_, node, "circle");
+    for (const char* key : {"centre", "radius"})
+      if (!map.has(key)) source_.fail(node, std::string("circle has no ") + key, "centre, radius");
+    map.vector("centre", lengths(), centre);
+    map.number("radius", lengths(0.0, true), radius);
+    map.finish();
+    if (source_.fault) return;
+    const Vec3 u = plan.out.unitOrthogonal(), v = plan.out.cross(u);
+    for (int k = 0; k < kCircleParts; ++k) {
+      const double turn = 2.0 * M_PI * k / kCircleParts;
+      plan.line.push_back(centre + radius * (std::cos(turn) * u + std::sin(turn) * v));
+    }
+    plan.line.push_back(plan.line.front());
   }
 
   void readDirection(YamlMap& map, const char* key, Vec3& direction) {
@@ -159,8 +213,9 @@ class TaskReader {
     map.number("force", {0.0, 1e6, true, "N"}, limits.measured.force);
     map.number("strain", {0.0, 100.0, true}, limits.measured.strain);
     limits.strain_limited = map.has("strain");
-    const YAML::Node forbidden = map.get("forbidden"), end = map.get("end");
+    const YAML::Node forbidden = map.get("forbidden"), end = map.get("end"), fail = map.get("fail");
     map.finish();
+    if (fail.IsDefined()) readFail(fail);
     if (forbidden.IsDefined()) {
       if (!forbidden.IsSequence() || forbidden.size() > kMostForbidden)
         return source_.fail(forbidden, "forbidden is " + shown(forbidden),
@@ -185,6 +240,49 @@ class TaskReader {
       else
         return source_.fail(entry, "end has " + shown(entry), accepted);
     }
+  }
+
+  void readFail(const YAML::Node& node) {
+    if (!node.IsMap())
+      return source_.fail(node, "fail is " + shown(node), "a map of names of docs/metrics.md and values");
+    for (const auto& entry : node) {
+      FailLimit limit;
+      const MetricRow* row = readMetricName(entry.first, limit.metric);
+      if (!row) return;
+      for (const FailLimit& other : task_.limits.fail)
+        if (other.metric == limit.metric)
+          return source_.fail(entry.first, "fail has " + shown(entry.first) + " twice", "each once");
+      if (!readNumber(source_, entry.second, limit.metric, {-1e12, 1e12, false, row->unit}, limit.value)) return;
+      task_.limits.fail.push_back(std::move(limit));
+    }
+  }
+
+  void readAllow(const YAML::Node& node) {
+    std::string accepted;
+    std::map<std::string, Intervention> words;
+    for (std::size_t k = 0; k < kInterventions; ++k) {
+      const auto intervention = static_cast<Intervention>(k);
+      words[toString(intervention)] = intervention;
+      accepted += (k ? ", " : "a list of ") + std::string(toString(intervention));
+    }
+    if (!node.IsSequence()) return source_.fail(node, "allow is " + shown(node), accepted);
+    for (const auto& entry : node) {
+      std::string word;
+      if (!readText(source_, entry, "allow", word)) return;
+      if (!words.count(word)) return source_.fail(entry, "allow has " + shown(entry), accepted);
+      task_.allow.insert(words[word]);
+    }
+  }
+
+  /// Null, and a fault, where there is no such metric.
+  const MetricRow* readMetricName(const YAML::Node& node, std::string& name) {
+    if (!readText(source_, node, "a metric's name", name)) return nullptr;
+    const MetricRow* row = findMetric(name);
+    if (!row)
+      source_.fail(node, "unknown metric " + shown(node) + ", did you mean '" + nearestWord(name, metricNames()) + "'?",
+                   "a name of docs/metrics.md; those of hands with .pick, .pick_2, .push or .scissors",
+                   ErrorCode::kUnknownName);
+    return row;
   }
 
   void readForbidden(const YAML::Node& node) {
@@ -273,6 +371,7 @@ class TaskReader {
       map.number("force", {0.0, 1e6, true, "N"}, press.force);
       if (const int tool = map.choice("tool", {"pick", "push"}); tool >= 0) press.tool = static_cast<ToolKind>(tool);
       press.region = readRegionKeys(source_, map, node, false, false);
+      if (const int at = map.choice("at", {"middle", "touch"}); at >= 0) press.touch = at == 1;
       condition = press;
     } else if (kind == "cut_along") {
       CutAlong cut;
@@ -287,6 +386,7 @@ class TaskReader {
       Hold hold;
       readBody(map, node, kind, hold.body);
       map.whole("picks", 1, 10, hold.picks);
+      hold.region = readRegionKeys(source_, map, node, false, false);
       condition = hold;
     } else if (kind == "hand_over") {
       HandOver over;
@@ -316,14 +416,8 @@ class TaskReader {
     std::set<std::string> seen;
     for (const auto& entry : node) {
       WeightedMetric metric;
-      if (!readText(source_, entry.first, "a metric's name", metric.name)) return;
-      const MetricRow* row = findMetric(metric.name);
-      if (!row)
-        return source_.fail(entry.first,
-                            "unknown metric " + shown(entry.first) + ", did you mean '" +
-                                nearestWord(metric.name, metricNames()) + "'?",
-                            "a name of docs/metrics.md; those of hands with .pick, .pick_2, .push or .scissors",
-                            ErrorCode::kUnknownName);
+      const MetricRow* row = readMetricName(entry.first, metric.name);
+      if (!row) return;
       if (!seen.insert(metric.name).second)
         return source_.fail(entry.first, "metrics has " + shown(entry.first) + " twice", "each once");
       YamlMap map(source_, entry.second, "metric " + metric.name);
@@ -362,13 +456,20 @@ Result<LoadedTask> readTask(const std::string& file, const std::optional<std::st
   if (failed || !fs::is_regular_file(real, failed))
     return Error{ErrorCode::kUnreadable, "there is no task '" + file + "'; accepted: a YAML file, or one of " +
                                              tasksIn(fs::path(file).parent_path())};
-  const Result<YAML::Node> root = readYamlFile(real.string(), file);
+  const Result<FileBytes> bytes = readFile(real.string(), kMostTask);
+  if (!bytes) return Error{bytes.error().code, file + ": " + bytes.error().detail};
+  const Result<YAML::Node> root = parseYaml(std::string(bytes->text()), file);
   if (!root) return root.error();
   if (!root->IsMap())
     return Error{ErrorCode::kInvalidArgument, file + ": the task is not a map; accepted: a map of keys and values"};
   YamlSource source{file, {}};
   LoadedTask loaded;
   loaded.task.name = real.stem().string();
+  char version[9];
+  std::snprintf(
+      version, sizeof version, "%08lx",
+      crc32(0, reinterpret_cast<const Bytef*>(bytes->text().data()), static_cast<uInt>(bytes->text().size())));
+  loaded.task.version = version;
   TaskReader reader(source, loaded.task, real.parent_path().string(), access);
   try {
     reader.read(*root);
@@ -409,8 +510,14 @@ std::string dateText(std::chrono::system_clock::time_point time) {
   return text;
 }
 
+std::string dateText(double seconds) {
+  return dateText(std::chrono::system_clock::time_point(
+      std::chrono::round<std::chrono::system_clock::duration>(std::chrono::duration<double>(seconds))));
+}
+
 bool isDate(const std::string& text) {
-  static const std::regex form("\\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\\d|3[01])T([01]\\d|2[0-3])(:[0-5]\\d){2}(\\.\\d{3})?Z");
+  static const std::regex form(
+      "\\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\\d|3[01])T([01]\\d|2[0-3])(:[0-5]\\d){2}(\\.\\d{3})?Z");
   return std::regex_match(text, form);
 }
 
@@ -436,7 +543,7 @@ std::vector<EarlierReport> readEarlierReports(const std::string& folder, const s
       for (const auto& metric : report["metrics"])
         if (!metric["value"].IsNull()) earlier.values[metric["name"].as<std::string>()] = metric["value"].as<double>();
       std::string date = report["date"] && !report["date"].IsNull() ? report["date"].as<std::string>() : "";
-      if (struct stat info {}; date.empty() && ::stat(real.c_str(), &info) == 0)
+      if (struct stat info{}; date.empty() && ::stat(real.c_str(), &info) == 0)
         date = dateText(std::chrono::system_clock::from_time_t(info.st_mtime) +
                         std::chrono::milliseconds(info.st_mtim.tv_nsec / 1000000));
       found.emplace(std::make_pair(date, name), std::move(earlier));

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <mutex>
 #include <optional>
+#include <set>
 
 #include <meshless_surgery/Metrics.h>
 #include <meshless_surgery/Observe.h>
@@ -62,7 +64,7 @@ struct ShownTask {
   ShownTask(const Training& training, std::uint64_t version_in)
       : version(version_in), target(training.task().target), tray(training.task().tray) {
     if (const auto& of = training.task().plan)
-      plan = FollowedPlaces(of->body, training.tissue().planOutline(), of->along.cross(of->out));
+      plan = FollowedPlaces(of->body, training.tissue().planOutline(), of->side());
     if (target) middle = FollowedPlaces(target->body, {target->middle()}, Vec3::Zero());
   }
 
@@ -125,6 +127,18 @@ Result<LoadedTask> loadTask(const std::string& task, const TrainingFolders& fold
   return readTask(file, folders.scenes, folders.access, folders.scene_file);
 }
 
+/// Which run of which task.
+struct RunId {
+  std::uint64_t taken = 0;
+  std::uint32_t run = 0;
+  bool operator==(const RunId& other) const { return taken == other.taken && run == other.run; }
+};
+struct EndedRun {
+  RunId id;
+  std::string trainee;
+  std::unique_ptr<Training> training;
+};
+
 struct LiveTraining::Handlers : Answers {
   Handlers(const ros::NodeHandle& private_handle, WorldRunner& runner_in, TrainingFolders folders_in,
            std::string world_frame_in, Rejections& rejections_in, const StreamedTools& tools_in)
@@ -152,26 +166,65 @@ struct LiveTraining::Handlers : Answers {
   // --- on the runner's thread
 
   void take(TaskDef task, const std::string& of) {
+    if (training) giveUp(nullptr);
     trainee = of;
     training = std::make_unique<Training>(std::move(task));
     stopped = false;
     ++version;
+    ++taken;
+    guard();
+  }
+
+  /// What a task that runs refuses.
+  void guard() {
+    const std::lock_guard<std::mutex> lock(guard_mutex);
+    guarded = training && !stopped && !training->over() ? training->task().name : "";
+    if (training) allowed = training->task().allow;
+    if (!training || !training->tried()) allowed.insert(Intervention::kPause);  // nothing has been done yet
+  }
+  std::optional<Error> refuses(Intervention intervention) const {
+    const std::lock_guard<std::mutex> lock(guard_mutex);
+    if (guarded.empty() || allowed.count(intervention)) return std::nullopt;
+    std::string words;
+    for (const Intervention one : allowed) words += (words.empty() ? "" : ", ") + std::string(toString(one));
+    return Error{ErrorCode::kForbidden,
+                 "the task '" + guarded + "' runs and does not allow " + toString(intervention) +
+                     "; accepted: " + (words.empty() ? "" : "what it allows (" + words + "), or ") +
+                     "once it is over or stop_task has ended it, or in a task that is begun with allow: [" +
+                     toString(intervention) + "]"};
+  }
+
+  /// A run that somebody has watched and done something in has a report, however it ends.
+  static bool isWorthAReport(const Training& of) { return of.tried() && of.metrics().wallTime() > 0.0; }
+  /// Another run begins: what is to be said of this one is.
+  void giveUp(std::unique_ptr<Training> next) {
+    training->stop();
+    if (training->begun() && isWorthAReport(*training)) {
+      const std::lock_guard<std::mutex> lock(ended_mutex);
+      ended.push_back({RunId{taken, training->run()}, trainee, std::move(training)});
+    }
+    training = std::move(next);
   }
 
   void changed(World& world, double dt) {
     if (!training || stopped || !(dt > 0.0)) return;
+    TrainingFrame frame = frameOf(world, std::exchange(events, {}), training->wants());
+    if (training->begun() && frame.run != training->run() && training->tried())
+      giveUp(std::make_unique<Training>(training->task(), true));
     const std::size_t stage = training->progress().stage();
     const double planned = training->tissue().planDone();
     const bool was_over = training->begun() && training->over(), had_begun = training->begun();
-    const Status fed = training->feed(frameOf(world, std::exchange(events, {}), training->wants()));
+    const bool settled = !training->settling();
+    const Status fed = training->feed(std::move(frame));
     if (!fed.ok()) {
       rejections.count("~task", fed.error().detail);
       training.reset();
       ++version;
-    } else if (!had_begun || stage != training->progress().stage() || was_over != training->over() ||
-               (training->task().plan && planned != training->tissue().planDone())) {
+    } else if (!had_begun || settled == training->settling() || stage != training->progress().stage() ||
+               was_over != training->over() || (training->task().plan && planned != training->tissue().planDone())) {
       ++version;
     }
+    guard();
   }
 
   /// The world as it is now, with the tissue that something of the task is shown in.
@@ -197,6 +250,9 @@ struct LiveTraining::Handlers : Answers {
       if (std::isfinite(task.limits.measured.force)) state.force_limit = task.limits.measured.force;
       state.score = training->score();
       state.passed = training->passed();
+      state.settling = training->settling();
+      state.not_counted = training->notCounted();
+      for (const Intervention one : task.allow) state.allowed.push_back(toString(one));
       state.plan_done = training->tissue().planDone();
       now.time = training->metrics().time();
       now.held_for = training->progress().heldFor();
@@ -210,6 +266,7 @@ struct LiveTraining::Handlers : Answers {
   // --- on this thread
 
   void publish(const ros::WallTimerEvent&) {
+    reportEnded();
     const bool news = !said_any || version.load() != said_version;
     const bool seen = markers_topic.getNumSubscribers() > 0;
     if (!news && !seen && metrics_topic.getNumSubscribers() == 0) return;
@@ -241,10 +298,20 @@ struct LiveTraining::Handlers : Answers {
   bool startTask(meshless_surgery::StartTask::Request& request, meshless_surgery::StartTask::Response& response) {
     if (request.trainee.size() > kMostTrainee || request.trainee != printable(request.trainee, kMostTrainee))
       return refuse(response, "start_task",
-                    {ErrorCode::kInvalidArgument,
-                     "trainee is '" + printable(request.trainee) + "'; accepted: up to 100 bytes of UTF-8 in one line"});
+                    {ErrorCode::kInvalidArgument, "trainee is '" + printable(request.trainee) +
+                                                      "'; accepted: up to 100 bytes of UTF-8 in one line"});
     auto loaded = loadTask(request.task, folders);
     if (!loaded.ok()) return refuse(response, "start_task", loaded.error());
+    for (const std::string& word : request.allow) {
+      std::string words;
+      std::size_t k = 0;
+      for (; k < kInterventions && word != toString(static_cast<Intervention>(k)); ++k)
+        words += (k ? ", " : "") + std::string(toString(static_cast<Intervention>(k)));
+      if (k == kInterventions)
+        return refuse(response, "start_task",
+                      {ErrorCode::kInvalidArgument, "allow has '" + printable(word) + "'; accepted: " + words});
+      loaded->task.allow.insert(static_cast<Intervention>(k));
+    }
     const std::string name = loaded->task.name;
     // First the task, then the reset: it begins with the first step of the new run, as it does in a replay.
     const Status taken = runner.look([&](World&) { take(std::move(loaded->task), request.trainee); });
@@ -257,11 +324,12 @@ struct LiveTraining::Handlers : Answers {
   bool stopTask(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
     bool runs = false;
     const Status done = runner.look([&](World&) {
-      runs = training && training->begun() && !stopped;
+      runs = training && !stopped;
       if (!runs) return;
       training->stop();
       stopped = true;
       ++version;
+      guard();
     });
     if (!done.ok()) return refuse(response, "stop_task", done.error());
     if (!runs) return refuse(response, "stop_task", {ErrorCode::kMissed, "no task runs; start_task begins one"});
@@ -304,42 +372,111 @@ struct LiveTraining::Handlers : Answers {
   }
 
   bool report(meshless_surgery::Report::Request& request, meshless_surgery::Report::Response& response) {
-    std::string json, csv, html, name = request.name;
-    if (!name.empty())
-      if (const Status valid = SessionFolder::checkName(name); !valid.ok())
+    if (!request.name.empty())
+      if (const Status valid = SessionFolder::checkName(request.name); !valid.ok())
         return refuse(response, "report", valid.error());
+    const auto written = reportNow(request.name);
+    if (!written.ok()) return refuse(response, "report", written.error());
+    response.score = written->score;
+    response.passed = written->passed;
+    response.folder = written->folder;
+    return accept(response, "wrote " + response.folder + "/report.html");
+  }
+
+  struct Pages {
+    std::string json, csv, html, folder;
+    double score = 0.0;
+    bool passed = false;
+  };
+  static Pages pagesOf(const Training& of, const ReportHead& head) {
+    return {reportJson(of, head), reportCsv(of), reportHtml(of, head), "", of.score(), of.passed()};
+  }
+
+  /// Of the run that goes on, or was the last. It keeps its folder, unless another name is asked for.
+  Result<Pages> reportNow(const std::string& wanted) {
     bool there = false;
     ReportHead head;
     std::string task;
-    const auto look = [&](World&) {
+    RunId run;
+    double started = 0.0;
+    Status done = runner.look([&](World&) {
       there = training && training->begun();
       if (!there) return;
       task = training->task().name;
+      run = {taken, training->run()};
+      started = training->startedAt();
       head.trainee = trainee;
-      if (html.empty() && head.log.empty()) return;  // the first look
-      json = reportJson(*training, head);
-      csv = reportCsv(*training);
-      html = reportHtml(*training, head);
-      response.score = training->score();
-      response.passed = training->passed();
-    };
-    Status done = runner.look(look);
-    if (!done.ok()) return refuse(response, "report", done.error());
-    if (!there) return refuse(response, "report", {ErrorCode::kMissed, "no task was begun; start_task begins one"});
-    if (name.empty()) name = freeName(head.trainee, task);
-    head.log = name;
-    head.date = dateText(std::chrono::system_clock::now());
-    head.earlier = readEarlierReports(folders.reports, head.trainee, task, name);
-    done = runner.look(look);
-    if (!done.ok()) return refuse(response, "report", done.error());
-    if (!there) return refuse(response, "report", {ErrorCode::kMissed, "no task was begun; start_task begins one"});
-    response.folder = folders.reports + "/" + name;
-    const SessionFolder folder(response.folder);
+    });
+    if (!done.ok()) return done.error();
+    if (!there) return Error{ErrorCode::kMissed, "no task was begun; start_task begins one"};
+    prepare(head, task, run, started, wanted);
+    Pages pages;
+    done = runner.look([&](World&) {
+      there = training && training->begun();
+      if (there) pages = pagesOf(*training, head);
+    });
+    if (!done.ok()) return done.error();
+    if (!there) return Error{ErrorCode::kMissed, "no task was begun; start_task begins one"};
+    return written(std::move(pages), head.log);
+  }
+
+  void prepare(ReportHead& head, const std::string& task, const RunId& run, double started,
+               const std::string& wanted = "") {
+    if (!wanted.empty())
+      name_of_run = wanted;
+    else if (!(named_run == run))
+      name_of_run = freeName(head.trainee, task);
+    named_run = run;
+    head.log = name_of_run;
+    head.date = std::isfinite(started) ? dateText(started) : dateText(std::chrono::system_clock::now());
+    head.earlier = readEarlierReports(folders.reports, head.trainee, task, head.log);
+  }
+
+  Result<Pages> written(Pages pages, const std::string& name) const {
+    pages.folder = folders.reports + "/" + name;
+    const SessionFolder folder(pages.folder);
     for (const auto& [file, bytes] :
-         {std::make_pair("report.json", &json), {"report.csv", &csv}, {"report.html", &html}})
-      if (const Status written = folder.write(file, *bytes); !written.ok())
-        return refuse(response, "report", written.error());
-    return accept(response, "wrote " + response.folder + "/report.html");
+         {std::make_pair("report.json", &pages.json), {"report.csv", &pages.csv}, {"report.html", &pages.html}})
+      if (const Status done = folder.write(file, *bytes); !done.ok()) return done.error();
+    return pages;
+  }
+
+  /// Those of runs that another one has followed, and that of a run that is over.
+  void reportEnded() {
+    std::vector<EndedRun> runs;
+    {
+      const std::lock_guard<std::mutex> lock(ended_mutex);
+      runs.swap(ended);
+    }
+    for (const EndedRun& run : runs) {
+      ReportHead head;
+      head.trainee = run.trainee;
+      prepare(head, run.training->task().name, run.id, run.training->startedAt());
+      say(written(pagesOf(*run.training, head), head.log));
+    }
+    RunId run;
+    bool due = false;
+    const Status done = runner.look([&](World&) {
+      if (!training || !training->begun()) return;
+      run = {taken, training->run()};
+      due = training->over() && isWorthAReport(*training);
+    });
+    if (!done.ok() || !due || run == reported_run) return;
+    reported_run = run;
+    say(reportNow(""));
+  }
+
+  static void say(const Result<Pages>& pages) {
+    if (pages.ok())
+      ROS_INFO_STREAM("the report is " << pages->folder << "/report.html");
+    else
+      ROS_WARN_STREAM("no report could be written: " << pages.error().detail);
+  }
+
+  /// Of what the node was in the middle of; nothing else runs any more.
+  void reportLast() {
+    if (training) giveUp(nullptr);
+    reportEnded();
   }
 
   /// TRAINEE_TASK and the first number that no folder has. Letters of all alphabets stay: names are UTF-8.
@@ -370,7 +507,18 @@ struct LiveTraining::Handlers : Answers {
   std::vector<ros::ServiceServer> servers;
   ros::WallTimer timer;
 
+  mutable std::mutex guard_mutex;
+  std::string guarded;  // the task that runs; empty: none
+  std::set<Intervention> allowed;
+  std::mutex ended_mutex;
+  std::vector<EndedRun> ended;
+
+  // of the timer and the services
+  RunId named_run, reported_run;
+  std::string name_of_run;
+
   // of the runner's thread
+  std::uint64_t taken = 0;  // tasks
   std::unique_ptr<Training> training;
   std::string trainee;
   bool stopped = false;
@@ -398,10 +546,14 @@ void LiveTraining::begin(TaskDef task, const std::string& trainee) { handlers_->
 void LiveTraining::start() { handlers_->start(); }
 
 void LiveTraining::stop() {
+  if (handlers_->servers.empty()) return;
   handlers_->spinner.stop();
   handlers_->servers.clear();
   handlers_->timer.stop();
+  handlers_->reportLast();
 }
+
+std::optional<Error> LiveTraining::refuses(Intervention intervention) const { return handlers_->refuses(intervention); }
 
 void LiveTraining::heard(const std::vector<Event>& events) {
   if (handlers_->training && !handlers_->stopped)

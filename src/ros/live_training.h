@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include <ros/callback_queue.h>
 #include <ros/node_handle.h>
@@ -33,6 +34,8 @@ class LiveTraining {
 
   /// Before the runner starts: the task of the parameter.
   void begin(TaskDef task, const std::string& trainee);
+  /// Why a task that runs refuses it; from any thread.
+  std::optional<Error> refuses(Intervention intervention) const;
   /// Services and topics, from now on.
   void start();
   /// No service is being answered any more, and none will be.

@@ -265,8 +265,9 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   parts->forces.start();
   parts->training->start();
   // Last, so that who finds them finds a world that runs.
-  parts->services = std::make_unique<Services>(private_handle, parts->runner, parts->frames, parts->loader,
-                                               *parts->rejections, *parts->session, parts->inputs.tools());
+  parts->services =
+      std::make_unique<Services>(private_handle, parts->runner, parts->frames, parts->loader, *parts->rejections,
+                                 *parts->session, parts->inputs.tools(), *parts->training);
   ROS_INFO_STREAM("scene " << *file << ": " << bodies << " bodies, " << particles << " particles, " << clusters
                            << " clusters, " << scene->world.step_rate << " steps/s of " << scene->world.substeps
                            << " substeps" << (settings->paused ? ", paused" : ""));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <exception>
 #include <sstream>
 
@@ -15,6 +16,7 @@ double wallSeconds() { return std::chrono::duration<double>(SteadyClock::now().t
 
 constexpr double kWindow = 1.0;           // [s] that rates are taken over
 constexpr double kOverBudgetEvery = 1.0;  // [s] between two events
+constexpr double kSayTimeEvery = 0.1;     // [s] between two times that are put into the log
 
 constexpr std::chrono::milliseconds kTellEvery(50);
 
@@ -291,7 +293,7 @@ void WorldRunner::loop() {
       if (stopping_) return;
     }
     if (!owed_.empty()) {
-      stepOnce();
+      stepOnce(false);
       due_ = std::max(due_, clock_.now());  // what they took is no backlog
       if (owed_.empty()) continue;          // the step failed
       OwedSteps& owed = owed_.front();
@@ -316,7 +318,7 @@ void WorldRunner::loop() {
       continue;
     }
     const double before = wallSeconds();
-    stepOnce();
+    stepOnce(true);
     const double took = wallSeconds() - before;
     due_ += dt_ / speed_;
     const double late = clock_.now() - due_ - settings_.max_backlog;
@@ -365,10 +367,20 @@ void WorldRunner::doJobs() {
   }
 }
 
-void WorldRunner::stepOnce() {
+void WorldRunner::sayTime(bool paced) {
+  if (!says_time_ || (!paced && std::isnan(said_time_))) return;
+  const double now = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  // A clock that is set back begins anew.
+  if (paced && now >= said_time_ && now < said_time_ + kSayTimeEvery) return;
+  said_time_ = paced ? now : std::numeric_limits<double>::quiet_NaN();
+  world_->setWallTime(said_time_);
+}
+
+void WorldRunner::stepOnce(bool paced) {
   const double before = wallSeconds();
   tellCuts();
   try {
+    sayTime(paced);
     if (!step_(*world_)) return pauseAtEnd();
     ++revision_;
     handOverEvents();

@@ -5,13 +5,14 @@
 #include <condition_variable>
 #include <deque>
 #include <future>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <thread>
 
 #include "clock.h"
-#include "progress.h"
 #include "meshless_surgery/world/world.h"
+#include "progress.h"
 
 namespace meshless {
 
@@ -54,7 +55,10 @@ class WorldRunner {
   void setStepSink(StepSink sink) { step_sink_ = std::move(sink); }
   /// What a step is, instead of World::step; false: there is none, and the world is paused. To be set before start.
   using Step = std::function<bool(World&)>;
-  void setStep(Step step) { step_ = std::move(step); }
+  void setStep(Step step) {
+    step_ = std::move(step);
+    says_time_ = false;
+  }
   /// [1] of simulated time over the clock's; above 0.
   void setSpeed(double speed) { speed_ = speed; }
   void start();
@@ -122,7 +126,8 @@ class WorldRunner {
   Status run(Job job, bool changes);
   void loop();
   void doJobs();
-  void stepOnce();
+  void stepOnce(bool paced);
+  void sayTime(bool paced);
   void pauseAtEnd();
   void tellCuts();
   void answerCuts();
@@ -149,7 +154,9 @@ class WorldRunner {
   std::deque<ClosingCut> closing_;
   std::deque<OwedSteps> owed_;
   bool paused_ = false;
-  double due_ = 0.0;  // [s] when the next step is; now at the start, after a pause and after a reset
+  double due_ = 0.0;       // [s] when the next step is; now at the start, after a pause and after a reset
+  bool says_time_ = true;  // World::setWallTime, of its own steps
+  double said_time_ = std::numeric_limits<double>::quiet_NaN();  // [s] since 1970
   std::vector<Event> own_events_;
   double last_over_budget_ = -1e300;
 

@@ -48,12 +48,14 @@ constexpr int kSpawnThreads = 2;                            // a large body must
 
 struct Services::Handlers : Answers {
   Handlers(const ros::NodeHandle& private_handle, WorldRunner& runner_in, Frames& frames_in,
-           const BodyLoader& loader_in, Rejections& rejections_in, Session& session_in, const StreamedTools& tools_in)
+           const BodyLoader& loader_in, Rejections& rejections_in, Session& session_in, const StreamedTools& tools_in,
+           const LiveTraining& training_in)
       : Answers{rejections_in},
         runner(runner_in),
         frames(frames_in),
         session(session_in),
         tools(tools_in),
+        training(training_in),
         work(runner_in, frames_in, loader_in, rejections_in),
         actions(private_handle, work, {cut_queue, step_queue, spawn_queue}) {
     advertise(private_handle, "pick", &Handlers::pick);
@@ -206,6 +208,7 @@ struct Services::Handlers : Answers {
   }
 
   bool undoCut(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+    if (const auto no = training.refuses(Intervention::kUndo)) return refuse(response, "undo_cut", *no);
     const auto reply = runner.apply(UndoCutCommand{});
     if (!reply.ok()) return refuse(response, "undo_cut", reply.error());
     return accept(response, "as before the cut: " + joined(std::get<UndoCutReply>(*reply).bodies));
@@ -230,10 +233,12 @@ struct Services::Handlers : Answers {
   }
 
   bool spawn(meshless_surgery::Spawn::Request& request, meshless_surgery::Spawn::Response& response) {
+    if (const auto no = training.refuses(Intervention::kSpawn)) return refuse(response, "spawn", *no);
     return work.spawn(request, response, "spawn");
   }
 
   bool spawnCloud(meshless_surgery::SpawnCloud::Request& request, meshless_surgery::SpawnCloud::Response& response) {
+    if (const auto no = training.refuses(Intervention::kSpawn)) return refuse(response, "spawn_cloud", *no);
     BorderCheck check;
     CloudRequest wanted;
     if (const std::string name = check.newName("name", request.name); !name.empty()) wanted.name = name;
@@ -291,6 +296,7 @@ struct Services::Handlers : Answers {
   }
 
   bool remove(meshless_surgery::Remove::Request& request, meshless_surgery::Remove::Response& response) {
+    if (const auto no = training.refuses(Intervention::kRemove)) return refuse(response, "remove", *no);
     RemoveCommand command;
     command.body = request.name;
     return applied(response, "remove", command, "removed " + request.name);
@@ -309,6 +315,7 @@ struct Services::Handlers : Answers {
   }
 
   bool attach(meshless_surgery::Attach::Request& request, meshless_surgery::Attach::Response& response) {
+    if (const auto no = training.refuses(Intervention::kAttach)) return refuse(response, "attach", *no);
     BorderCheck check;
     AttachCommand command;
     command.name = check.newName("name", request.name);
@@ -331,6 +338,15 @@ struct Services::Handlers : Answers {
                                 "': " + attached.text());
   }
 
+  bool isClip(const std::string& name) const {
+    bool clip = false;
+    (void)runner.look([&](World& world) {
+      for (const AttachmentSnapshot& joint : world.snapshot({}).attachments)
+        clip = clip || (joint.name == name && joint.jaws);
+    });
+    return clip;
+  }
+
   bool detach(meshless_surgery::Detach::Request& request, meshless_surgery::Detach::Response& response) {
     BorderCheck check;
     DetachCommand command;
@@ -338,6 +354,8 @@ struct Services::Handlers : Answers {
     const auto region = regionOf(request, check);
     if (!region.ok()) return refuse(response, "detach", region.error());
     command.region = *region;
+    if (!isClip(command.name))
+      if (const auto no = training.refuses(Intervention::kDetach)) return refuse(response, "detach", *no);
     const auto reply = runner.apply(command);
     if (!reply.ok()) return refuse(response, "detach", reply.error());
     const auto& detached = std::get<DetachReply>(*reply);
@@ -379,10 +397,13 @@ struct Services::Handlers : Answers {
   bool unclip(meshless_surgery::Unclip::Request& request, meshless_surgery::Unclip::Response& response) {
     DetachCommand command;
     command.name = request.name;
+    if (!isClip(command.name))
+      if (const auto no = training.refuses(Intervention::kDetach)) return refuse(response, "unclip", *no);
     return applied(response, "unclip", command, "took clip '" + request.name + "' off");
   }
 
   bool setMaterial(meshless_surgery::SetMaterial::Request& request, meshless_surgery::SetMaterial::Response& response) {
+    if (const auto no = training.refuses(Intervention::kMaterial)) return refuse(response, "set_material", *no);
     BorderCheck check;
     if (request.yaml.empty() || request.yaml.size() > kMaxYaml) {
       check.fault("yaml has " + std::to_string(request.yaml.size()) + " bytes; accepted: 1.." +
@@ -419,6 +440,8 @@ struct Services::Handlers : Answers {
   }
 
   bool pause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response) {
+    if (request.data && !runner.status().paused)
+      if (const auto no = training.refuses(Intervention::kPause)) return refuse(response, "pause", *no);
     const auto step = runner.setPaused(request.data);
     if (!step.ok()) return refuse(response, "pause", step.error());
     return accept(response, (request.data ? "paused at step " : "runs from step ") + std::to_string(*step));
@@ -441,6 +464,7 @@ struct Services::Handlers : Answers {
   }
 
   bool load(meshless_surgery::LoadState::Request& request, meshless_surgery::LoadState::Response& response) {
+    if (const auto no = training.refuses(Intervention::kLoad)) return refuse(response, "load", *no);
     const auto loaded = session.load(runner, request.file);
     if (!loaded.ok()) return refuse(response, "load", loaded.error());
     return accept(response, "loaded " + request.file + ": step " + std::to_string(loaded->step) + ", " +
@@ -456,6 +480,7 @@ struct Services::Handlers : Answers {
   Frames& frames;
   Session& session;
   const StreamedTools& tools;
+  const LiveTraining& training;
   const LongWork work;
   // Queues before servers before spinners: torn down in the other order.
   ros::CallbackQueue cut_queue, step_queue, spawn_queue, cloud_queue, session_queue;
@@ -469,8 +494,9 @@ struct Services::Handlers : Answers {
 };
 
 Services::Services(const ros::NodeHandle& private_handle, WorldRunner& runner, Frames& frames, const BodyLoader& loader,
-                   Rejections& rejections, Session& session, const StreamedTools& tools)
-    : handlers_(std::make_unique<Handlers>(private_handle, runner, frames, loader, rejections, session, tools)) {}
+                   Rejections& rejections, Session& session, const StreamedTools& tools, const LiveTraining& training)
+    : handlers_(
+          std::make_unique<Handlers>(private_handle, runner, frames, loader, rejections, session, tools, training)) {}
 
 Services::~Services() = default;
 

@@ -9,6 +9,7 @@
 
 #include "body_loader.h"
 #include "frames.h"
+#include "live_training.h"
 #include "rejections.h"
 #include "runner.h"
 #include "session.h"
@@ -18,9 +19,10 @@ namespace meshless {
 
 class Services {
  public:
-  /// Services that may wait (cut, step, spawn, save and load) have threads of their own: a waiting one holds nobody else up.
+  /// Services that may wait (cut, step, spawn, save and load) have threads of their own: a waiting one holds nobody
+  /// else up.
   Services(const ros::NodeHandle& private_handle, WorldRunner& runner, Frames& frames, const BodyLoader& loader,
-           Rejections& rejections, Session& session, const StreamedTools& tools);
+           Rejections& rejections, Session& session, const StreamedTools& tools, const LiveTraining& training);
   ~Services();
 
  private:

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include <meshless_surgery/Metrics.h>
 #include <meshless_surgery/SetMaterial.h>
 #include <meshless_surgery/Step.h>
 #include <std_srvs/SetBool.h>
@@ -214,6 +215,7 @@ void ControlPanel::hideEvent(QHideEvent* event) {
   timer_->stop();
   state_subscriber_.shutdown();
   task_subscriber_.shutdown();
+  metrics_subscriber_.shutdown();
 }
 
 void ControlPanel::listen() {
@@ -225,9 +227,17 @@ void ControlPanel::listen() {
       });
   task_subscriber_ = link_->handle().subscribe<meshless_surgery::TaskState>(
       link_->nameOf("task"), 5, [this](const meshless_surgery::TaskState::ConstPtr& task) {
+        task_now_ = task;
+        task_time_ = -1.0;
         task_->setText(taskText(*task));
         task_->setVisible(!task->task.empty());
         material_->setVisible(!task->running);  // a trainee has other work
+      });
+  metrics_subscriber_ = link_->handle().subscribe<meshless_surgery::Metrics>(
+      link_->nameOf("metrics"), 5, [this](const meshless_surgery::Metrics::ConstPtr& metrics) {
+        if (!task_now_ || std::floor(metrics->time) == task_time_) return;
+        task_time_ = std::floor(metrics->time);
+        task_->setText(taskText(*task_now_, task_time_));
       });
 }
 
@@ -238,6 +248,7 @@ void ControlPanel::changeNode() {
   state_.reset();
   plot_->clear();
   task_->hide();
+  task_now_.reset();
   bodies_->setRowCount(0);
   time_->setText("no state from the node yet");
   if (isVisible()) listen();

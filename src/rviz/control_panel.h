@@ -5,6 +5,7 @@
 
 #ifndef Q_MOC_RUN
 #include <meshless_surgery/State.h>
+#include <meshless_surgery/TaskState.h>
 
 #include "node_link.h"
 #endif
@@ -71,7 +72,9 @@ class ControlPanel : public rviz::Panel {
   QString selected() const;
 
   NodeLink* link_;
-  ros::Subscriber state_subscriber_, task_subscriber_;
+  ros::Subscriber state_subscriber_, task_subscriber_, metrics_subscriber_;
+  meshless_surgery::TaskState::ConstPtr task_now_;
+  double task_time_ = -1.0;  // [s]
   meshless_surgery::State::ConstPtr state_;
   bool fresh_ = false;
   QLineEdit* node_;

@@ -6,7 +6,7 @@
 
 namespace meshless {
 
-QString taskText(const meshless_surgery::TaskState& task) {
+QString taskText(const meshless_surgery::TaskState& task, double time) {
   const auto text = [](const std::string& words) { return QString::fromStdString(words).toHtmlEscaped(); };
   QStringList lines{"<b>" + text(task.task) + "</b>: " + text(task.brief)};
   if (task.running && task.stage < task.stages.size()) {
@@ -16,6 +16,8 @@ QString taskText(const meshless_surgery::TaskState& task) {
                             .arg(text(task.stages[task.stage]));
     lines << (task.stage_brief.empty() ? now : now + ". " + text(task.stage_brief));
     QStringList limits;
+    if (task.settling) lines << "The scene comes to rest first";
+    if (time >= 0.0 && !task.settling) lines << QString("Time: %1 s").arg(time, 0, 'f', 0);
     if (task.time_limit > 0.0) limits << QString("%1 s").arg(task.time_limit);
     if (task.force_limit > 0.0) limits << QString("%1 N").arg(task.force_limit);
     if (!limits.isEmpty()) lines << "Limits: " + limits.join(", ");
@@ -26,6 +28,7 @@ QString taskText(const meshless_surgery::TaskState& task) {
     const char* const end = task.stage < task.stages.size() ? "Stopped" : task.passed ? "Passed" : "Not passed";
     lines << QString("<b>%1</b>, %2 of 100").arg(end).arg(task.score, 0, 'f', 0);
   }
+  for (const std::string& why : task.not_counted) lines << "<b>Does not count</b>: " + text(why);
   return lines.join("<br>");
 }
 

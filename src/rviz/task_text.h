@@ -7,6 +7,7 @@
 namespace meshless {
 
 /// Rich text of a few lines: brief, the present stage, limits; once it is over, how it ended.
-QString taskText(const meshless_surgery::TaskState& task);
+/// `time`: [s] since its start; below 0: not known.
+QString taskText(const meshless_surgery::TaskState& task, double time = -1.0);
 
 }  // namespace meshless

@@ -1,8 +1,10 @@
 // Does again what a log of commands says, and writes how a task was done in it.
 #include <cinttypes>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -35,9 +37,8 @@ int main(int argc, char** argv) {
   CLI::App app(
       "Replays a log of commands (the parameter command_log of deformer_node) and writes how a task was done in it: "
       "report.html, report.json and report.csv in the folder LOG.report below --out. Where the world was reset in the "
-      "log, the task begins anew there: the report is of the last time. Exit status: 0 passed, 1 not passed, 2 no "
-      "report "
-      "could be made.");
+      "log, the task begins anew there: runs before the last one, in which something was done, have their reports in "
+      "LOG.run1.report and so on. Exit status: 0 the last one passed, 1 not passed, 2 no report could be made.");
   std::string log_file, task_name, out = ".", trainee, date;
   double until = 1e300;
   int threads = 1;
@@ -45,7 +46,7 @@ int main(int argc, char** argv) {
   app.add_option("--task", task_name, "a name of config/tasks, or a task file")->required();
   app.add_option("--out", out, "the folder of reports")->capture_default_str();
   app.add_option("--trainee", trainee, "whose report it is; earlier ones of the same name are compared with it");
-  app.add_option("--date", date, "when it was done, which the log does not know: as in 2026-03-01T14:05:09Z, in UTC");
+  app.add_option("--date", date, "when it was done, where the log does not say it: as in 2026-03-01T14:05:09Z, in UTC");
   app.add_option("--until", until, "[s] after the task's start: what comes later does not count");
   app.add_option("--threads", threads, "1..64; the result does not depend on it")->capture_default_str();
   try {
@@ -62,45 +63,60 @@ int main(int argc, char** argv) {
   auto loaded = meshless::readTask(task_file, std::nullopt, meshless::FileAccess());
   if (!loaded.ok()) return refuse(loaded.error().detail);
 
-  meshless::Training training(std::move(loaded->task));
+  std::vector<std::unique_ptr<meshless::Training>> runs;
+  runs.push_back(std::make_unique<meshless::Training>(loaded->task));
   std::optional<meshless::Error> misfit;
   std::ifstream log(log_file, std::ios::binary);
   const auto replayed = meshless::replay(log, threads, [&](meshless::World& world) {
-    std::vector<meshless::Event> events = world.takeEvents();
+    meshless::TrainingFrame frame = meshless::frameOf(world, world.takeEvents(), runs.back()->wants());
     if (misfit) return;
-    const meshless::Status fed = training.feed(meshless::frameOf(world, std::move(events), training.wants()));
+    if (runs.back()->begun() && frame.run != runs.back()->run()) {
+      if (!runs.back()->tried()) runs.pop_back();
+      if (!runs.empty()) runs.back()->stop();
+      runs.push_back(std::make_unique<meshless::Training>(loaded->task, true));
+    }
+    const meshless::Status fed = runs.back()->feed(std::move(frame));
     if (!fed.ok()) misfit = fed.error();
-    if (training.metrics().time() >= until - 1e-9) training.stop();
+    if (runs.back()->metrics().time() >= until - 1e-9) runs.back()->stop();
   });
   if (!replayed.ok()) return refuse(log_file + ": " + replayed.error().detail);
   if (misfit) return refuse(log_file + ": " + misfit->detail);
-  if (!training.begun()) return refuse(log_file + ": the log has no step; accepted: a log in which time has passed");
+  if (!runs.back()->begun())
+    return refuse(log_file + ": the log has no step; accepted: a log in which time has passed");
+  runs.back()->stop();
 
-  training.stop();
-
-  const std::string log_name = fs::path(log_file).filename().string(), name = log_name + ".report";
-  if (const meshless::Status fits = meshless::SessionFolder::checkName(name); !fits.ok())
-    return refuse(fits.error().detail);
+  const std::string log_name = fs::path(log_file).filename().string();
   const std::string lost = replayed->whatIsLost();
-  meshless::ReportHead head{trainee, log_name, !replayed->difference, lost, {}, date};
-  head.earlier = meshless::readEarlierReports(out, trainee, training.task().name, name);
-  const meshless::SessionFolder folder((fs::path(out) / name).string());
-  const std::pair<const char*, std::string> files[] = {{"report.json", meshless::reportJson(training, head)},
-                                                       {"report.csv", meshless::reportCsv(training)},
-                                                       {"report.html", meshless::reportHtml(training, head)}};
-  for (const auto& [file, bytes] : files)
-    if (const meshless::Status written = folder.write(file, bytes); !written.ok())
-      return refuse(written.error().detail);
-
-  std::printf("%s: %zu of %zu stages, %.1f s, %.1f of 100 (pass mark %.1f): %s\n", training.task().name.c_str(),
-              training.progress().stage(), training.task().stages.size(), training.metrics().time(), training.score(),
-              training.task().pass_mark, training.passed() ? "passed" : "not passed");
-  if (!training.progress().failed().empty()) std::printf("failed: %s\n", training.progress().failed().c_str());
-  if (date.empty()) std::printf("no date: a log has none; --date gives the report one, for learning curves\n");
-  if (!lost.empty()) std::printf("%s; the report is of what there is\n", lost.c_str());
-  if (replayed->difference)
-    std::printf("DIFFERENT from step %" PRIu64 " on: the report is of another session than the one that was recorded\n",
-                replayed->difference->step);
-  std::printf("%s/report.html\n", folder.folder().c_str());
-  return training.passed() ? 0 : 1;
+  for (std::size_t n = 0; n < runs.size(); ++n) {
+    const meshless::Training& training = *runs[n];
+    // The last one has the name that there always was.
+    const std::string name = log_name + (n + 1 < runs.size() ? ".run" + std::to_string(n + 1) : "") + ".report";
+    if (const meshless::Status fits = meshless::SessionFolder::checkName(name); !fits.ok())
+      return refuse(fits.error().detail);
+    meshless::ReportHead head{trainee, log_name, !replayed->difference, lost, {}, date};
+    if (date.empty() && std::isfinite(training.startedAt())) head.date = meshless::dateText(training.startedAt());
+    head.earlier = meshless::readEarlierReports(out, trainee, training.task().name, name);
+    const meshless::SessionFolder folder((fs::path(out) / name).string());
+    const std::pair<const char*, std::string> files[] = {{"report.json", meshless::reportJson(training, head)},
+                                                         {"report.csv", meshless::reportCsv(training)},
+                                                         {"report.html", meshless::reportHtml(training, head)}};
+    for (const auto& [file, bytes] : files)
+      if (const meshless::Status written = folder.write(file, bytes); !written.ok())
+        return refuse(written.error().detail);
+    if (runs.size() > 1) std::printf("run %zu of %zu\n", n + 1, runs.size());
+    std::printf("%s: %zu of %zu stages, %.1f s, %.1f of 100 (pass mark %.1f): %s\n", training.task().name.c_str(),
+                training.progress().stage(), training.task().stages.size(), training.metrics().time(), training.score(),
+                training.task().pass_mark, training.passed() ? "passed" : "not passed");
+    if (!training.progress().failed().empty()) std::printf("failed: %s\n", training.progress().failed().c_str());
+    if (head.date.empty())
+      std::printf("no date: nobody watched the steps; --date gives the report one, for learning curves\n");
+    if (!lost.empty()) std::printf("%s; the report is of what there is\n", lost.c_str());
+    if (replayed->difference)
+      std::printf("DIFFERENT from step %" PRIu64
+                  " on: the report is of another session than the one that was recorded\n",
+                  replayed->difference->step);
+    std::printf("%s/report.html\n", folder.folder().c_str());
+    for (const std::string& why : training.notCounted()) std::printf("does not count: %s\n", why.c_str());
+  }
+  return runs.back()->passed() ? 0 : 1;
 }

@@ -92,25 +92,33 @@ TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants&
   TrainingFrame frame;
   SnapshotWants parts;
   frame.sampled = wants.any() && isSampled(world.stepCount(), world.settings().step_rate);
+  frame.centres = frame.sampled && wants.centres;
   parts.particles = frame.sampled;
   const WorldSnapshot shot = world.snapshot(parts);
   frame.step = shot.step;
   frame.run = shot.run;
   frame.time = shot.sim_time;
   frame.dt = 1.0 / world.settings().step_rate;
+  frame.wall = world.wallTime();
+  if (world.settings().gravity.norm() > 0.0) frame.down = world.settings().gravity.normalized();
   frame.events = std::move(events);
   for (const Pick& pick : shot.picks) {
     const auto body = shot.pick_bodies.find(pick.id);
-    frame.tools.push_back({ToolKind::kPick, pick.id, pick.locked, body == shot.pick_bodies.end() ? "" : body->second,
-                           pick.target, std::nullopt, pick.position, kShaft, pick.force.norm()});
+    const std::string held = body == shot.pick_bodies.end() ? "" : body->second;
+    frame.tools.push_back({ToolKind::kPick, pick.id, pick.locked, held, pick.target, std::nullopt, pick.position,
+                           kShaft, pick.force.norm(), pick.position});
   }
-  if (shot.push.enabled)
+  if (shot.push.enabled) {
+    const Vec3& force = shot.push.force;  // on the sphere
+    const Vec3 foremost = force.norm() > 0.0 ? Vec3(-shot.push.radius * force.normalized()) : Vec3(Vec3::Zero());
     frame.tools.push_back({ToolKind::kPush, 0, false, "", shot.push.position, std::nullopt, shot.push.position,
-                           shot.push.radius, shot.push.force.norm()});
+                           shot.push.radius, force.norm(), shot.push.position + foremost});
+  }
   if (shot.scissors.shown) {
     const ScissorBlades& blades = shot.scissors.blades;
-    frame.tools.push_back({ToolKind::kScissors, 0, false, "", blades.origin, orientationOf(blades),
-                           blades.origin + blades.length * blades.x_axis, kShaft, 0.0});
+    const Vec3 tips = blades.origin + blades.length * blades.x_axis;
+    frame.tools.push_back(
+        {ToolKind::kScissors, 0, false, "", blades.origin, orientationOf(blades), tips, kShaft, 0.0, tips});
   }
   for (const BodySnapshot& body : shot.bodies) {
     frame.bodies.push_back({body.name, body.number, body.model, body.placed, Vec3::Zero(), {}});

@@ -20,7 +20,7 @@ constexpr double kTremorFrom = 4.0, kTremorTo = 14.0;  // [Hz]
 void HandMotion::feed(const std::optional<Vec3>& position, const std::optional<Quat>& turned, double dt) {
   const double rate = 1.0 / dt;
   if (!position) {
-    if (last_) leave(rate);
+    leave(dt);
     return;
   }
   if (!seen()) origin_ = *position;
@@ -38,6 +38,7 @@ void HandMotion::feed(const std::optional<Vec3>& position, const std::optional<Q
   }
   const Vec3 way = *position - *last_;
   path_ += way.norm();
+  fastest_ = std::max(fastest_, way.norm() * rate);
   last_ = position;
   if (turned && last_turned_) turn_ += last_turned_->angularDistance(*turned);
   last_turned_ = turned;
@@ -88,11 +89,9 @@ void HandMotion::endMovement(double rate) {
   velocities_.clear();
 }
 
-void HandMotion::end(double dt) {
-  if (last_) leave(1.0 / dt);
-}
+void HandMotion::end(double dt) { leave(dt); }
 
-void HandMotion::leave(double rate) {
+void HandMotion::leaveAt(double rate) {
   if (moves_) endMovement(rate);
   moves_ = false;
   straight_ += (*last_ - *start_).norm();

@@ -22,6 +22,10 @@ const std::vector<MetricRow>& metricTable() {
   constexpr auto kLower = Better::kLower, kHigher = Better::kHigher;
   static const std::vector<MetricRow> table{
       {"time", "s", kLower, false, "simulated time since the task's start", kUsual},
+      {"wall_time", "s", kLower, false, "time on the wall in which the world ran by itself, since the task's start",
+       kOwn},
+      {"real_time_factor", "1", kHigher, false, "simulated time over time on the wall, while the world ran by itself",
+       kOwn},
       {"idle_time", "s", kLower, false, "time in which no hand moves: none gets on by 5 mm/s over 0.1 s", kUsual},
       {"stages", "1", kHigher, false, "stages of the task that were met", kOwn},
       {"path_length", "m", kLower, true, "sum of the hand's ways from step to step, while it is there", kUsual},
@@ -31,6 +35,7 @@ const std::vector<MetricRow>& metricTable() {
       {"workspace", "m^3", kLower, true,
        "volume of the evenly filled ellipsoid that has the covariance of the hand's positions", kOwn},
       {"mean_speed", "m/s", kHigher, true, "path while the hand moves over the time in which it does", kUsual},
+      {"top_speed", "m/s", kLower, true, "fastest that the hand goes from one step to the next", kOwn},
       {"movements", "1", kLower, true, "times that the hand begins to move (5 mm/s over 0.1 s)", kUsual},
       {"sparc", "1", kHigher, true,
        "minus the arc length of the speed's normalised magnitude spectrum, up to 10 Hz and down to 0.05, mean over the "
@@ -48,9 +53,13 @@ const std::vector<MetricRow>& metricTable() {
        kNeuro},
       {"force_peak", "N", kLower, false, "largest force of a tool in any step", kNeuro},
       {"impulse", "N s", kLower, false, "integral of the largest force of a tool over time", kNeuro},
+      {"force_together_peak", "N", kLower, false, "largest sum of the forces of all tools in any step", kOwn},
+      {"force_together_mean", "N", kLower, false,
+       "mean of the sum of the forces of all tools, over the time in which there is one", kOwn},
       {"force_time_above", "s", kLower, false, "time in which the largest force of a tool is above the limit", kNeuro},
       {"strain_peak", "1", kLower, false,
-       "most by which |stretch - 1|, the largest of the principal directions, grows in any cell or cluster beyond what it "
+       "most by which |stretch - 1|, the largest of the principal directions, grows in any cell or cluster beyond what "
+       "it "
        "had before any tissue was touched; ten times a second",
        kOwn},
       {"strained_volume", "m^3", kLower, false,
@@ -60,8 +69,8 @@ const std::vector<MetricRow>& metricTable() {
       {"healthy_share", "1", kLower, false, "share of the volume removed that is not of the target", kNeuro},
       {"target_left", "1", kLower, false, "share of the target that was not removed", kNeuro},
       {"cut_area", "m^2", kLower, false, "area at rest of one side of all cut faces", kOwn},
-      {"cuts", "1", kLower, false, "times that scissors severed something; in one step once", kOwn},
-      {"strokes", "1", kLower, false, "times that a blade opened something; in one step once", kOwn},
+      {"cuts", "1", kLower, false, "times that scissors severed something; of one command once", kOwn},
+      {"strokes", "1", kLower, false, "times that a blade opened something; of one command once", kOwn},
       {"plan_rms", "m", kLower, false,
        "root of the mean, by area, of the squared distance of the cut faces at rest from the plan's rectangle", kOwn},
       {"plan_hausdorff", "m", kLower, false,
@@ -74,12 +83,21 @@ const std::vector<MetricRow>& metricTable() {
       {"margin_least", "m", kHigher, false,
        "least distance at rest of the cut from the target; below 0 it goes through it", kOwn},
       {"margin_mean", "m", kHigher, false, "mean of that distance, by area", kOwn},
+      {"clip_distance", "m", kLower, false,
+       "distance at rest of the middle of the target from that of the jaws of the farthest clip", kOwn},
       {"drops", "1", kLower, false, "picks that ended because their hand's stream fell silent", kOwn},
+      {"grasps", "1", kLower, false, "times that a pick took hold of tissue", kOwn},
+      {"picks_at_once", "1", kLower, false, "most picks that hold tissue at a time, locked ones too", kOwn},
+      {"drop_height", "m", kLower, false,
+       "most by which the centre of mass of a body that a pick has held sinks below where it has been since it was let "
+       "go of; ten times a second",
+       kOwn},
       {"undos", "1", kLower, false, "cuts that were taken back", kOwn},
       {"torn", "1", kLower, false, "events of attachments that tore", kOwn},
       {"leaks", "1", kLower, false, "filled cavities that were opened", kOwn},
       {"bleeding_time", "s", kLower, false,
-       "time in which a piece of a vessel has been cut, is held or attached somewhere and bears no clip; vessels are the "
+       "time in which a piece of a vessel has been cut, is held or attached somewhere and bears no clip; vessels are "
+       "the "
        "bodies that stages want clips on",
        kOwn},
       {"forbidden_contacts", "1", kLower, false,
@@ -126,17 +144,28 @@ void Metrics::end() {
 void Metrics::feed(const TrainingFrame& frame) {
   dt_ = frame.dt;
   time_ += frame.dt;
+  watch(frame, wall_, watched_);
   feedHands(frame);
   force_ = 0.0;
-  for (const TrainingFrame::Tool& tool : frame.tools) force_ = std::max(force_, tool.force);
+  double together = 0.0;
+  std::size_t picks = 0;
+  for (const TrainingFrame::Tool& tool : frame.tools) {
+    picks += tool.kind == ToolKind::kPick;
+    force_ = std::max(force_, tool.force);
+    together += tool.force;
+  }
+  picks_at_once_ = std::max(picks_at_once_, picks);
   if (force_ > kPressing) {
     force_peak_ = std::max(force_peak_, force_);
+    together_peak_ = std::max(together_peak_, together);
+    together_sum_ += together * frame.dt;
     force_sum_ += force_ * frame.dt;
     force_for_ += frame.dt;
     if (force_ > limits_.force) force_above_ += frame.dt;
   }
   feedEvents(frame);
   feedStrain(frame);
+  feedDrops(frame);
   crossings_.feed(frame.tools);
   if (bleeds(frame)) bled_for_ += frame.dt;
   if (!limits_.forbidden.empty()) feedForbidden(frame);
@@ -158,6 +187,7 @@ void Metrics::feedHands(const TrainingFrame& frame) {
     auto hand = std::find(picks_.begin(), picks_.end(), tool.pick);
     if (hand == picks_.end()) hand = std::find(picks_.begin(), picks_.end(), PickId{0});
     if (hand == picks_.end()) continue;  // a third one
+    if (*hand == 0) hands_[static_cast<std::size_t>(hand - picks_.begin())].leave(frame.dt);
     *hand = tool.pick;
     tools[static_cast<std::size_t>(hand - picks_.begin())] = &tool;
   }
@@ -172,19 +202,23 @@ void Metrics::feedHands(const TrainingFrame& frame) {
 }
 
 void Metrics::feedEvents(const TrainingFrame& frame) {
-  const auto once = [](std::size_t& count, std::uint64_t& last, std::uint64_t step) {
-    count += last != step;
-    last = step;
+  const auto once = [](std::size_t& count, std::optional<Deed>& last, const Event& event) {
+    const Deed deed(event.step, event.command);
+    count += last != deed;
+    last = deed;
   };
   for (const Event& event : frame.events) switch (event.type) {
       case EventType::kCut:
-        once(cuts_, last_cut_, event.step);
+        once(cuts_, last_cut_, event);
         break;
       case EventType::kIncised:
-        once(strokes_, last_stroke_, event.step);
+        once(strokes_, last_stroke_, event);
         break;
       case EventType::kUndone:
-        once(undos_, last_undo_, event.step);
+        once(undos_, last_undo_, event);
+        break;
+      case EventType::kPicked:
+        ++grasps_;
         break;
       case EventType::kTorn:
         ++torn_;
@@ -200,6 +234,33 @@ void Metrics::feedEvents(const TrainingFrame& frame) {
       default:
         break;
     }
+}
+
+void Metrics::watch(const TrainingFrame& frame, double& wall, double& watched) {
+  if (frame.wall >= wall_before_) wall += frame.wall - wall_before_;  // NaN: nobody watches
+  if (std::isfinite(frame.wall)) watched += frame.dt;
+  wall_before_ = frame.wall;
+}
+
+void Metrics::settle(const TrainingFrame& frame) {
+  watch(frame, settle_wall_, settle_watched_);
+  feedStrain(frame);
+}
+
+void Metrics::feedDrops(const TrainingFrame& frame) {
+  if (!frame.centres) return;
+  centres_known_ = true;
+  for (const TrainingFrame::Body& body : frame.bodies) {
+    const double height = -frame.down.dot(body.centre);
+    const bool held = std::any_of(frame.tools.begin(), frame.tools.end(), [&](const TrainingFrame::Tool& tool) {
+      return tool.kind == ToolKind::kPick && tool.body == body.name;
+    });
+    const auto found = held ? heights_.try_emplace(body.number).first : heights_.find(body.number);
+    if (found == heights_.end()) continue;
+    double& was = found->second;
+    was = held ? height : std::max(was, height);
+    dropped_ = std::max(dropped_, was - height);
+  }
 }
 
 void Metrics::feedStrain(const TrainingFrame& frame) {
@@ -312,6 +373,7 @@ std::vector<MetricValue> Metrics::values(const RestTissue& tissue, std::size_t s
     of("economy", hand.economy());
     of("workspace", hand.workspace());
     of("mean_speed", hand.meanSpeed());
+    of("top_speed", hand.fastest());
     of("movements", static_cast<double>(hand.movements()));
     of("sparc", hand.sparc());
     of("ldlj", hand.jerk());
@@ -320,11 +382,17 @@ std::vector<MetricValue> Metrics::values(const RestTissue& tissue, std::size_t s
   }
   std::sort(sorted.begin(), sorted.end());
   set("time", time_);
+  if (wall_ > 0.0) {
+    set("wall_time", wall_);
+    set("real_time_factor", realTimeFactor());
+  }
   set("idle_time", idle_);
   set("stages", static_cast<double>(stages));
   set("force_mean", force_for_ > 0.0 ? force_sum_ / force_for_ : kNone);
   set("force_peak", force_peak_);
   set("impulse", force_sum_);
+  set("force_together_peak", together_peak_);
+  set("force_together_mean", force_for_ > 0.0 ? together_sum_ / force_for_ : kNone);
   if (std::isfinite(limits_.force)) set("force_time_above", force_above_);
   if (strain_known_) {
     set("strain_peak", strain_peak_);
@@ -342,7 +410,11 @@ std::vector<MetricValue> Metrics::values(const RestTissue& tissue, std::size_t s
   set("plan_done", tissue.planDone());
   set("margin_least", tissue.marginLeast());
   set("margin_mean", tissue.marginMean());
+  set("clip_distance", tissue.clipDistance());
   set("drops", static_cast<double>(drops_));
+  set("picks_at_once", static_cast<double>(picks_at_once_));
+  set("grasps", static_cast<double>(grasps_));
+  if (centres_known_) set("drop_height", dropped_);
   set("undos", static_cast<double>(undos_));
   set("torn", static_cast<double>(torn_));
   set("leaks", static_cast<double>(opened_.size()));

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "report_text.h"
 #include "meshless_surgery/base/number_text.h"
+#include "report_text.h"
 
 namespace meshless {
 
@@ -15,14 +15,18 @@ std::string outcomeOf(const Training& training) {
   return "unfinished";
 }
 
-std::string numberOf(double value) {
-  return std::isfinite(value) ? numberText(value, 17) : "";
-}
+std::string numberOf(double value) { return std::isfinite(value) ? numberText(value, 17) : ""; }
 
 const WeightedMetric* weightedOf(const Training& training, const std::string& name) {
   for (const WeightedMetric& metric : training.task().metrics)
     if (metric.name == name) return &metric;
   return nullptr;
+}
+
+std::vector<std::string> allowedIn(const TaskDef& task) {
+  std::vector<std::string> words;
+  for (const Intervention intervention : task.allow) words.push_back(toString(intervention));
+  return words;
 }
 
 namespace {
@@ -44,6 +48,12 @@ std::string quoted(const std::string& text) {
   return out + '"';
 }
 
+std::string joinedText(const std::vector<std::string>& texts) {
+  std::string out;
+  for (const std::string& text : texts) out += (out.empty() ? "" : ", ") + quoted(text);
+  return out;
+}
+
 std::string numberOrNull(double value) { return std::isfinite(value) ? numberOf(value) : "null"; }
 
 }  // namespace
@@ -62,7 +72,11 @@ std::string reportJson(const Training& training, const ReportHead& head) {
   out += "  \"outcome\": " + quoted(outcomeOf(training)) + ",\n  \"failed\": " + quoted(progress.failed()) + ",\n";
   out +=
       "  \"score\": " + numberOrNull(training.score()) + ",\n  \"pass_mark\": " + numberOrNull(task.pass_mark) + ",\n";
-  out += "  \"passed\": " + std::string(training.passed() ? "true" : "false") + ",\n  \"stages\": [";
+  out += "  \"passed\": " + std::string(training.passed() ? "true" : "false") +
+         ",\n  \"counted\": " + (training.notCounted().empty() ? "true" : "false") + ",\n  \"not_counted\": [" +
+         joinedText(training.notCounted()) + "],\n  \"allowed\": [" + joinedText(allowedIn(task)) +
+         "],\n  \"package_version\": " + quoted(MESHLESS_SURGERY_VERSION) +
+         ",\n  \"task_version\": " + quoted(task.version) + ",\n  \"stages\": [";
   for (std::size_t s = 0; s < task.stages.size(); ++s)
     out += std::string(s ? "," : "") + "\n    {\"name\": " + quoted(task.stages[s].name) +
            ", \"met_at\": " + (s < progress.times().size() ? numberOf(progress.times()[s]) : "null") + "}";

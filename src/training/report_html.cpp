@@ -3,14 +3,15 @@
 #include <cmath>
 #include <cstdio>
 
-#include "report_text.h"
 #include "meshless_surgery/base/number_text.h"
+#include "report_text.h"
 
 namespace meshless {
 namespace {
 
 constexpr double kWidth = 960.0, kRow = 130.0, kLeft = 60.0, kRight = 20.0;
 constexpr std::size_t kMostColumns = 900, kMostMarks = 300;
+constexpr double kWell = 0.8;  // of a metric's marks
 const char* const kHandColors[kHands] = {"#1f6fb2", "#7a4fb0", "#2e8b57", "#c2571a"};
 
 std::string escaped(const std::string& text) {
@@ -35,13 +36,33 @@ std::string escaped(const std::string& text) {
 }
 
 std::string shortNumber(double value) {
-  return std::isfinite(value) ? numberText(value, 4) : "&ndash;";
+  return std::isfinite(value) ? numberText(value + 0.0, 3) : "&ndash;";  // no "-0"
 }
 
 std::string at(double value) {
   char text[40];
   std::snprintf(text, sizeof text, "%.1f", value);
-  return text;
+  return text == std::string("-0.0") ? "0.0" : text;
+}
+
+/// Units as surgeons use them.
+struct ShownUnit {
+  const char* name;
+  double per_si;
+};
+ShownUnit shownUnit(const std::string& unit) {
+  if (unit == "m") return {"mm", 1e3};
+  if (unit == "m/s") return {"mm/s", 1e3};
+  if (unit == "m^2") return {"cm&sup2;", 1e4};
+  if (unit == "m^3") return {"ml", 1e6};
+  if (unit == "rad") return {"&deg;", 180.0 / M_PI};
+  if (unit == "N s") return {"N s", 1.0};
+  if (unit == "N") return {"N", 1.0};
+  return unit == "s" ? ShownUnit{"s", 1.0} : ShownUnit{"", 1.0};
+}
+std::string shownValue(const MetricRow& row, double value, bool with_unit = false) {
+  const ShownUnit unit = shownUnit(row.unit);
+  return shortNumber(unit.per_si * value) + (with_unit && *unit.name ? std::string(" ") + unit.name : "");
 }
 
 std::string svg(double width, double height, const std::string& inside, const std::string& title) {
@@ -87,47 +108,53 @@ std::string frameOfRow(double top, const std::string& title, double most, const 
          label(kLeft, top - 5, title + " [" + unit + "]");
 }
 
+/// What there was nothing of is left out.
 std::string timeLine(const Training& training) {
   const double whole = std::max(training.metrics().time(), 1e-9);
   const double wide = kWidth - kLeft - kRight;
+  double top = 20.0;
   std::string inside;
   const std::vector<double> force = columns(training, [](const TrainingMoment& moment) { return moment.force; });
   double most = 0.0;
   for (const double f : force) most = std::max(most, f);
-  const double limit = training.task().limits.measured.force;
-  if (std::isfinite(limit)) most = std::max(most, 1.1 * limit);
-  inside += frameOfRow(20.0, "largest force of a tool", most, "N") + curve(force, 20.0, most, "#b22222");
-  if (std::isfinite(limit) && most > 0.0) {
-    const double y = 20.0 + (kRow - 30.0) * (1.0 - limit / most);
-    inside += line(kLeft, y, kWidth - kRight, y, "stroke=\"#b22222\" stroke-dasharray=\"6 4\"") +
-              label(kWidth - kRight - 4, y - 4, "limit", "end");
+  if (most > 0.0) {
+    const double limit = training.task().limits.measured.force;
+    if (std::isfinite(limit)) most = std::max(most, 1.1 * limit);
+    inside += frameOfRow(top, "largest force of a tool", most, "N") + curve(force, top, most, "#b22222");
+    if (std::isfinite(limit)) {
+      const double y = top + (kRow - 30.0) * (1.0 - limit / most);
+      inside += line(kLeft, y, kWidth - kRight, y, "stroke=\"#b22222\" stroke-dasharray=\"6 4\"") +
+                label(kWidth - kRight - 4, y - 4, "limit", "end");
+    }
+    top += kRow;
   }
   std::array<std::vector<double>, kHands> speeds;
   most = 0.0;
   for (std::size_t h = 0; h < kHands; ++h) {
-    speeds[h] = columns(training, [h](const TrainingMoment& moment) { return moment.speed[h]; });
+    speeds[h] = columns(training, [h](const TrainingMoment& moment) { return 1e3 * moment.speed[h]; });
     for (const double v : speeds[h]) most = std::max(most, v);
   }
-  const double second = 20.0 + kRow;
-  inside += frameOfRow(second, "speed of the hands", most, "m/s");
-  double legend = kLeft + 160.0;
-  for (std::size_t h = 0; h < kHands; ++h) {
-    if (!training.metrics().motion(static_cast<Hand>(h)).seen()) continue;
-    inside += curve(speeds[h], second, most, kHandColors[h]);
-    inside += line(legend, second - 9, legend + 18, second - 9,
-                   "stroke=\"" + std::string(kHandColors[h]) + "\" stroke-width=\"3\"");
-    inside += label(legend + 23, second - 5, toString(static_cast<Hand>(h)));
-    legend += 95.0;
+  if (most > 0.0) {
+    inside += frameOfRow(top, "speed of the hands", most, "mm/s");
+    double legend = kLeft + 170.0;
+    for (std::size_t h = 0; h < kHands; ++h) {
+      if (!training.metrics().motion(static_cast<Hand>(h)).seen()) continue;
+      inside += curve(speeds[h], top, most, kHandColors[h]);
+      inside += line(legend, top - 9, legend + 18, top - 9,
+                     "stroke=\"" + std::string(kHandColors[h]) + "\" stroke-width=\"3\"");
+      inside += label(legend + 23, top - 5, toString(static_cast<Hand>(h)));
+      legend += 95.0;
+    }
+    top += kRow;
   }
-  const double third = second + kRow;
-  inside += label(kLeft, third - 5, "stages met (green), what was done (grey), errors (red)");
+  inside += label(kLeft, top - 5, "stages met (green), what was done (grey), errors (red)");
   std::size_t marks = 0;
   for (const TrainingEvent& event : training.events()) {
     if (++marks > kMostMarks) break;
     const double x = kLeft + wide * std::min(1.0, event.time / whole);
     const bool stage = event.text.compare(0, 9, "stage met") == 0;
     inside += "<g><title>" + at(event.time) + " s: " + escaped(event.text) + "</title>" +
-              line(x, third, x, third + 22,
+              line(x, top, x, top + 22,
                    "stroke=\"" +
                        std::string(event.error ? "#c00"
                                    : stage     ? "#2a2"
@@ -136,8 +163,24 @@ std::string timeLine(const Training& training) {
               "</g>";
   }
   for (int k = 0; k <= 5; ++k)
-    inside += label(kLeft + wide * k / 5.0, third + 40, at(whole * k / 5.0) + " s", k == 5 ? "end" : "middle");
-  return svg(kWidth, third + 50.0, inside, "forces, speeds and events over time");
+    inside += label(kLeft + wide * k / 5.0, top + 40, at(whole * k / 5.0) + " s", k == 5 ? "end" : "middle");
+  return svg(kWidth, top + 50.0, inside, "what happened over time");
+}
+
+/// Where the stages are done.
+std::vector<Region> regionsOf(const TaskDef& task) {
+  std::vector<Region> all;
+  for (const Stage& stage : task.stages) {
+    if (const auto* reach = std::get_if<Reach>(&stage.condition)) all.push_back(reach->region);
+    const auto add = [&](const std::optional<Region>& region) {
+      if (region) all.push_back(*region);
+    };
+    if (const auto* press = std::get_if<PressTo>(&stage.condition)) add(press->region);
+    if (const auto* hold = std::get_if<Hold>(&stage.condition)) add(hold->region);
+    if (const auto* clipped = std::get_if<Clipped>(&stage.condition)) add(clipped->region);
+  }
+  if (task.tray) all.push_back(Region(*task.tray));
+  return all;
 }
 
 struct View {
@@ -186,6 +229,18 @@ std::string views(const Training& training) {
       inside += "<circle cx=\"" + at(p.x()) + "\" cy=\"" + at(p.y()) + "\" r=\"" + at(scale * region.radius) +
                 "\" fill=\"#e0c040\" fill-opacity=\"0.5\"/>";
     }
+    const std::string dashed = "fill=\"none\" stroke=\"#2a8a3a\" stroke-dasharray=\"4 3\"";
+    for (const Region& region : regionsOf(training.task())) {
+      if (region.kind == Region::Kind::kSphere && near.contains(region.centre)) {
+        const Vec2 p = place(region.centre, view);
+        inside += "<circle cx=\"" + at(p.x()) + "\" cy=\"" + at(p.y()) + "\" r=\"" + at(scale * region.radius) + "\" " +
+                  dashed + "/>";
+      } else if (region.kind == Region::Kind::kBox && near.contains(0.5 * (region.box.min + region.box.max))) {
+        const Vec2 a = place(region.box.min, view), b = place(region.box.max, view);
+        inside += "<rect x=\"" + at(a.x()) + "\" y=\"" + at(b.y()) + "\" width=\"" + at(b.x() - a.x()) +
+                  "\" height=\"" + at(a.y() - b.y()) + "\" " + dashed + "/>";
+      }
+    }
     inside += dots(training.tissue().planPoints(), view, place, "#1f6fb2", 3.0, 800);
     inside += dots(training.tissue().cut().points, view, place, "#c2271a", 1.8, 1200);
     for (std::size_t h = 0; h < kHands; ++h) {
@@ -208,11 +263,14 @@ std::string views(const Training& training) {
     const double centimetre = scale * 0.01;
     inside += line(10, kSide - 10, 10 + 2 * centimetre, kSide - 10, "stroke=\"#333\" stroke-width=\"2\"") +
               label(14 + 2 * centimetre, kSide - 6, "2 cm");
-    out += svg(kSide, kSide, inside, std::string("plan and cut ") + view.name);
+    out += svg(kSide, kSide, inside, std::string("the tissue ") + view.name);
   }
-  return out +
-         "</div><p class=\"key\">Tissue at rest (grey), <b style=\"color:#1f6fb2\">plan</b>, <b "
-         "style=\"color:#c2271a\">cut</b>, target (yellow), ways of the hands (thin).</p>\n";
+  out += "</div><p class=\"key\">Tissue at rest (grey)";
+  if (training.task().plan) out += ", <b style=\"color:#1f6fb2\">plan</b>";
+  if (!training.tissue().cut().points.empty()) out += ", <b style=\"color:#c2271a\">cut</b>";
+  if (training.task().target) out += ", target (yellow)";
+  if (!regionsOf(training.task()).empty()) out += ", where the task says (green, dashed)";
+  return out + ", ways of the hands (thin).</p>\n";
 }
 
 std::string metricRows(const Training& training, bool counting) {
@@ -222,7 +280,7 @@ std::string metricRows(const Training& training, bool counting) {
     if ((metric != nullptr) != counting || (!counting && !std::isfinite(value.value))) continue;
     const MetricRow& row = *findMetric(value.name);
     out += "<tr><td title=\"" + escaped(row.formula) + "\">" + value.name + "</td><td class=\"n\">" +
-           shortNumber(value.value) + "</td><td>" + (std::string(row.unit) == "1" ? "" : row.unit) + "</td>";
+           shownValue(row, value.value) + "</td><td>" + shownUnit(row.unit).name + "</td>";
     if (metric) {
       const double score = scoreOf(*metric, value.value);
       const bool good = passes(*metric, value.value);
@@ -232,7 +290,7 @@ std::string metricRows(const Training& training, bool counting) {
         const double x = 200.0 * scoreOf(*metric, *metric->pass);
         bar += line(x, -1, x, 13, "stroke=\"#000\" stroke-width=\"2\"");
       }
-      out += "<td class=\"n\">" + (metric->pass ? shortNumber(*metric->pass) : "") + "</td><td>" +
+      out += "<td class=\"n\">" + (metric->pass ? shownValue(row, *metric->pass) : "") + "</td><td>" +
              svg(200.0, 12.0, bar, value.name + ": " + at(100.0 * score) + " of 100") + "</td><td class=\"n\">" +
              at(100.0 * score) + "</td><td class=\"n\">" + shortNumber(metric->weight) + "</td>";
     }
@@ -264,7 +322,10 @@ std::string earlierReports(const Training& training, const ReportHead& head) {
             label(kWidth - kRight - 4, mark - 4, "pass mark", "end");
   std::string out = svg(kWidth, high + 10.0, inside, "scores of this trainee, oldest first");
   out += "<table><tr><th>report</th><th>score</th>";
-  for (const WeightedMetric& metric : training.task().metrics) out += "<th>" + metric.name + "</th>";
+  for (const WeightedMetric& metric : training.task().metrics) {
+    const ShownUnit unit = shownUnit(findMetric(metric.name)->unit);
+    out += "<th>" + metric.name + (*unit.name ? std::string(" [") + unit.name + "]" : "") + "</th>";
+  }
   out += "</tr>\n";
   const std::size_t first = head.earlier.size() > 20 ? head.earlier.size() - 20 : 0;
   for (std::size_t k = first; k < head.earlier.size(); ++k) {
@@ -272,7 +333,9 @@ std::string earlierReports(const Training& training, const ReportHead& head) {
     out += "<tr><td>" + escaped(earlier.name) + "</td><td class=\"n\">" + at(earlier.score) + "</td>";
     for (const WeightedMetric& metric : training.task().metrics) {
       const auto found = earlier.values.find(metric.name);
-      out += "<td class=\"n\">" + (found == earlier.values.end() ? "&ndash;" : shortNumber(found->second)) + "</td>";
+      out += "<td class=\"n\">" +
+             (found == earlier.values.end() ? "&ndash;" : shownValue(*findMetric(metric.name), found->second)) +
+             "</td>";
     }
     out += "</tr>\n";
   }
@@ -280,8 +343,65 @@ std::string earlierReports(const Training& training, const ReportHead& head) {
   const std::vector<MetricValue> all = training.values();
   for (const WeightedMetric& metric : training.task().metrics)
     for (const MetricValue& value : all)
-      if (value.name == metric.name) out += "<td class=\"n\">" + shortNumber(value.value) + "</td>";
+      if (value.name == metric.name)
+        out += "<td class=\"n\">" + shownValue(*findMetric(value.name), value.value) + "</td>";
   return out + "</tr></table>\n";
+}
+
+std::string items(const std::vector<std::string>& texts, const std::string& look) {
+  std::string out = "<ul>";
+  for (const std::string& text : texts) out += "<li class=\"" + look + "\">" + text + "</li>";
+  return out + "</ul>\n";
+}
+
+/// Why it is not passed; empty: it is.
+std::vector<std::string> whyNotPassed(const Training& training) {
+  std::vector<std::string> why;
+  const TaskDef& task = training.task();
+  if (training.passed()) return why;
+  for (const std::string& text : training.notCounted()) why.push_back("It does not count: " + escaped(text) + ".");
+  if (const std::string& failed = training.progress().failed(); !failed.empty()) why.push_back(escaped(failed) + ".");
+  for (std::size_t s = training.progress().stage(); s < task.stages.size(); ++s)
+    why.push_back("The stage <b>" + escaped(task.stages[s].name) + "</b> was not met" +
+                  (task.stages[s].brief.empty() ? "" : ": " + escaped(task.stages[s].brief)) + ".");
+  if (!training.progress().done()) return why;
+  for (const MetricValue& value : training.values()) {
+    const WeightedMetric* metric = weightedOf(training, value.name);
+    if (!metric || passes(*metric, value.value)) continue;
+    const MetricRow& row = *findMetric(value.name);
+    why.push_back("<b>" + value.name + "</b> is " + shownValue(row, value.value, true) + ", and must be " +
+                  (metric->good < metric->bad ? "at most " : "at least ") + shownValue(row, *metric->pass, true) +
+                  ": " + escaped(row.formula) + ".");
+  }
+  if (training.score() < task.pass_mark)
+    why.push_back("The score of " + at(training.score()) + " is below the pass mark of " + at(task.pass_mark) + ".");
+  return why;
+}
+
+/// What counts, in the order of the marks that it has gained or lost.
+std::string praise(const Training& training) {
+  if (!training.progress().done()) return "";
+  std::vector<std::pair<double, std::string>> well, badly;
+  for (const MetricValue& value : training.values()) {
+    const WeightedMetric* metric = weightedOf(training, value.name);
+    if (!metric || !std::isfinite(value.value)) continue;
+    const MetricRow& row = *findMetric(value.name);
+    const double score = scoreOf(*metric, value.value);
+    const std::string text = "<b>" + value.name + "</b>: " + shownValue(row, value.value, true) + " (full marks at " +
+                             shownValue(row, metric->good, true) + ")";
+    if (score >= kWell)
+      well.emplace_back(-metric->weight * score, text);
+    else
+      badly.emplace_back(-metric->weight * (1.0 - score), text);
+  }
+  const auto listed = [](std::vector<std::pair<double, std::string>>& all) {
+    std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::vector<std::string> texts;
+    for (std::size_t k = 0; k < all.size() && k < 5; ++k) texts.push_back(all[k].second);
+    return texts;
+  };
+  return (well.empty() ? "" : "<h2>Done well</h2>" + items(listed(well), "good")) +
+         (badly.empty() ? "" : "<h2>To work on</h2>" + items(listed(badly), ""));
 }
 
 }  // namespace
@@ -305,7 +425,18 @@ std::string reportHtml(const Training& training, const ReportHead& head) {
     out += "<p><img alt=\"what is to be done\" style=\"max-width:100%\" src=\"" + escaped(task.picture) + "\"></p>\n";
   out += "<p>" + (head.trainee.empty() ? "" : "Trainee: <b>" + escaped(head.trainee) + "</b>. ") +
          "Scene: " + escaped(task.scene) + (head.log.empty() ? "" : ". Log: " + escaped(head.log)) +
-         ". Date: " + (head.date.empty() ? "not known" : escaped(head.date)) + ".</p>\n";
+         ". Date: " + (head.date.empty() ? "not known" : escaped(head.date)) + ". Version " + MESHLESS_SURGERY_VERSION +
+         (task.version.empty() ? "" : ", task " + escaped(task.version)) + ".</p>\n";
+  if (const double wall = training.metrics().wallTime(); wall > 0.0)
+    out += "<p class=\"key\">" + at(wall) + " s on the wall, at " + shortNumber(training.metrics().realTimeFactor()) +
+           " of real time.</p>\n";
+  else
+    out += "<p class=\"key\">The steps were done by a script: there is no time on the wall.</p>\n";
+  if (!task.allow.empty()) {
+    std::string words;
+    for (const std::string& word : allowedIn(task)) words += (words.empty() ? "" : ", ") + word;
+    out += "<p class=\"key\">The task allows: " + words + ".</p>\n";
+  }
   if (!head.hashes_met)
     out +=
         "<p class=\"bad\">The replay did not come to the states that were recorded: these numbers are of another "
@@ -314,7 +445,9 @@ std::string reportHtml(const Training& training, const ReportHead& head) {
   out += "<p class=\"big " + std::string(training.passed() ? "good" : "bad") + "\">" +
          (training.passed() ? "Passed" : "Not passed") + ": " + at(training.score()) + " of 100 (pass mark " +
          at(task.pass_mark) + "), " + outcomeOf(training) + " after " + at(training.metrics().time()) + " s</p>\n";
-  if (!progress.failed().empty()) out += "<p class=\"bad\">" + escaped(progress.failed()) + "</p>\n";
+  out += praise(training);
+  if (const std::vector<std::string> why = whyNotPassed(training); !why.empty())
+    out += "<h2>Why it is not passed</h2>" + items(why, "bad");
   out += "<h2>Stages</h2><ol>\n";
   for (std::size_t s = 0; s < task.stages.size(); ++s)
     out += "<li>" + escaped(task.stages[s].name) +
@@ -330,7 +463,12 @@ std::string reportHtml(const Training& training, const ReportHead& head) {
         "<th>weight</th></tr>\n" +
         metricRows(training, true) + "</table>\n<p class=\"key\">A black mark is what must be reached.</p>\n";
   out += "<h2>Over time</h2>" + timeLine(training);
-  out += "<h2>Plan and cut</h2>" + views(training);
+  const bool cut = !training.tissue().cut().points.empty();
+  out += std::string("<h2>") +
+         (task.plan ? (cut ? "Plan and cut" : "The plan")
+          : cut     ? "The cut"
+                    : "Where it was done") +
+         "</h2>" + views(training);
   out += "<h2>Earlier reports</h2>" + earlierReports(training, head);
   out += "<h2>All that was measured</h2><table>" + metricRows(training, false) + "</table>\n<h2>Events</h2><table>\n";
   const std::size_t shown = std::min(kMostMarks, training.events().size());

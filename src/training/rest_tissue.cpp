@@ -55,6 +55,21 @@ Vec3 Target::middle() const {
   return region.plane.point;
 }
 
+std::vector<CutPlan> CutPlan::parts() const {
+  if (line.empty()) return {*this};
+  std::vector<CutPlan> all;
+  for (std::size_t k = 0; k + 1 < line.size(); ++k) {
+    CutPlan part = *this;
+    part.line.clear();
+    part.origin = line[k];
+    part.length = (line[k + 1] - line[k]).norm();
+    part.along = (line[k + 1] - line[k]) / part.length;
+    part.out = (out - out.dot(part.along) * part.along).normalized();
+    all.push_back(std::move(part));
+  }
+  return all;
+}
+
 double CutPlan::distance(const Vec3& p) const {
   const Vec3 from = p - origin;
   const double s = from.dot(along), t = from.dot(out);
@@ -62,8 +77,21 @@ double CutPlan::distance(const Vec3& p) const {
   return (from - nearest).norm();
 }
 
+double RestTissue::planDistance(const Vec3& p) const {
+  double least = std::numeric_limits<double>::infinity();
+  for (const CutPlan& rectangle : rectangles_) least = std::min(least, rectangle.distance(p));
+  return least;
+}
+
 Points planPointsIn(const CutPlan& plan, const TriangleMesh& solid) {
   Points inside;
+  if (!plan.line.empty()) {
+    for (const CutPlan& part : plan.parts()) {
+      const Points points = planPointsIn(part, solid);
+      inside.insert(inside.end(), points.begin(), points.end());
+    }
+    return inside;
+  }
   if (solid.empty()) return inside;
   const auto [s0, s1, t0, t1] = rectangleWithin(plan, solid);
   if (!(s1 > s0 && t1 > t0)) return inside;
@@ -80,7 +108,10 @@ Points planPointsIn(const CutPlan& plan, const TriangleMesh& solid) {
   return inside;
 }
 
-Points planOutlineOn(const CutPlan& plan, const TriangleMesh& solid) {
+namespace {
+
+/// Of one rectangle; with its edges in the depth, where the line begins and ends.
+Points outlineOf(const CutPlan& plan, const TriangleMesh& solid, bool begins, bool ends_here) {
   Points ends;
   if (solid.empty()) return ends;
   const Vec3 normal = plan.along.cross(plan.out);
@@ -122,10 +153,23 @@ Points planOutlineOn(const CutPlan& plan, const TriangleMesh& solid) {
   const SolidQuery query(solid);
   const auto at = [&](double s, double t) -> Vec3 { return plan.origin + s * plan.along + t * plan.out; };
   const auto inside = [&](const Vec3& p) { return query.contains(p); };
-  for (const double s : {0.0, plan.length})
-    if (t1 > t0) add(at(s, t0), at(s, t1), inside);
+  if (begins && t1 > t0) add(at(0.0, t0), at(0.0, t1), inside);
+  if (ends_here && t1 > t0) add(at(plan.length, t0), at(plan.length, t1), inside);
   for (const double t : {0.0, -plan.depth})
     if (s1 > s0) add(at(s0, t), at(s1, t), inside);
+  return ends;
+}
+
+}  // namespace
+
+Points planOutlineOn(const CutPlan& plan, const TriangleMesh& solid) {
+  if (plan.line.empty()) return outlineOf(plan, solid, true, true);
+  Points ends;
+  const std::vector<CutPlan> parts = plan.parts();
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const Points lines = outlineOf(parts[k], solid, k == 0 && !plan.closed(), k + 1 == parts.size() && !plan.closed());
+    ends.insert(ends.end(), lines.begin(), lines.end());
+  }
   return ends;
 }
 
@@ -196,6 +240,12 @@ void RestTissue::feed(const TrainingFrame& frame) {
     in_tray_ = std::move(lying);
   }
   if (moved) measureRemoved();
+  clip_distance_ = kNothing;
+  for (const TrainingFrame::Joint& joint : frame.joints)
+    if (target_ && joint.clip) {
+      const double away = (*joint.clip - target_->middle()).norm();
+      clip_distance_ = std::isnan(clip_distance_) ? away : std::max(clip_distance_, away);
+    }
 }
 
 void RestTissue::begin(const TrainingFrame& frame) {
@@ -236,7 +286,7 @@ void RestTissue::measureCut() {
   for (std::size_t k = 0; k < cut_.points.size(); ++k) {
     const double area = cut_.areas[k];
     if (plan_) {
-      const double distance = plan_->distance(cut_.points[k]);
+      const double distance = planDistance(cut_.points[k]);
       plan_squares_ += area * distance * distance;
       plan_area_ += area;
       plan_most_ = std::max(plan_most_, distance);

@@ -5,13 +5,15 @@
 #include <sstream>
 
 #include "meshless_surgery/base/number_text.h"
-#include "meshless_surgery/geometry/query/inside.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/geometry/mesh/thicken.h"
+#include "meshless_surgery/geometry/query/inside.h"
 #include "volume_within.h"
 
 namespace meshless {
 namespace {
+
+constexpr double kFailEvery = 0.1;  // [s]
 
 /// The tissue's surface, where the scene puts it.
 TriangleMesh placedMesh(const BodyDef& body) {
@@ -199,16 +201,44 @@ const char* toString(LimitKind kind) {
   return "unknown";
 }
 
+const char* toString(Intervention intervention) {
+  switch (intervention) {
+    case Intervention::kUndo:
+      return "undo";
+    case Intervention::kPause:
+      return "pause";
+    case Intervention::kSlow:
+      return "slow";
+    case Intervention::kLoad:
+      return "load";
+    case Intervention::kRemove:
+      return "remove";
+    case Intervention::kDetach:
+      return "detach";
+    case Intervention::kAttach:
+      return "attach";
+    case Intervention::kSpawn:
+      return "spawn";
+    case Intervention::kMaterial:
+      return "material";
+  }
+  return "unknown";
+}
+
+bool TaskDef::looksAt(const std::string& metric) const {
+  return std::any_of(metrics.begin(), metrics.end(), [&](const WeightedMetric& one) { return one.name == metric; }) ||
+         std::any_of(limits.fail.begin(), limits.fail.end(),
+                     [&](const FailLimit& one) { return one.metric == metric; });
+}
+
 bool TaskDef::wantsStrain() const {
-  if (limits.strain_limited) return true;
-  return std::any_of(metrics.begin(), metrics.end(), [](const WeightedMetric& metric) {
-    return metric.name == "strain_peak" || metric.name == "strained_volume";
-  });
+  return limits.strain_limited || looksAt("strain_peak") || looksAt("strained_volume");
 }
 
 bool TaskDef::wantsCentres() const {
-  return std::any_of(stages.begin(), stages.end(),
-                     [](const Stage& stage) { return std::holds_alternative<PutBack>(stage.condition); });
+  return looksAt("drop_height") || std::any_of(stages.begin(), stages.end(), [](const Stage& stage) {
+           return std::holds_alternative<PutBack>(stage.condition);
+         });
 }
 
 std::vector<std::string> TaskDef::vessels() const {
@@ -253,6 +283,9 @@ void TaskProgress::feed(const TrainingFrame& frame, const Metrics& metrics, cons
     if (tool.kind == ToolKind::kPick) grabbed_.emplace(tool.pick, tool.tissue);
   for (const Stage& stage : task_.stages) watch(stage.condition, frame);
   failed_ = broken(metrics);
+  // All metrics at once cost something.
+  const auto every = static_cast<std::uint64_t>(std::max(1.0, std::round(kFailEvery / frame.dt)));
+  if (failed_.empty() && frame.step % every == 0) failed_ = brokenMetric(metrics, tissue);
   if (!failed_.empty()) return;
   // Two stages are never met in one step: the next one begins with the next.
   const Stage& stage = task_.stages[times_.size()];
@@ -262,6 +295,8 @@ void TaskProgress::feed(const TrainingFrame& frame, const Metrics& metrics, cons
   }
   held_for_ += frame.dt;
   if (!(held_for_ >= stage.hold_for - 1e-9)) return;
+  if (times_.size() + 1 == task_.stages.size()) failed_ = brokenMetric(metrics, tissue);
+  if (!failed_.empty()) return;
   times_.push_back(metrics.time());
   held_for_ = 0.0;
 }
@@ -306,7 +341,7 @@ bool TaskProgress::meets(const Condition& condition, const TrainingFrame& frame,
   if (const auto* press = std::get_if<PressTo>(&condition))
     return anyTool([&](const auto& tool) {
       return tool.kind == press->tool && tool.force >= press->force &&
-             (!press->region || press->region->contains(tool.position));
+             (!press->region || press->region->contains(press->touch ? tool.touch : tool.position));
     });
   if (const auto* cut = std::get_if<CutAlong>(&condition)) return tissue.planDone() >= cut->share;
   if (const auto* separate = std::get_if<Separate>(&condition)) {
@@ -325,14 +360,14 @@ bool TaskProgress::meets(const Condition& condition, const TrainingFrame& frame,
              std::any_of(joint.ends.begin(), joint.ends.end(),
                          [&](const std::string& end) { return isOf(end, clipped->body); });
     });
-  const auto holders = [&](const std::string& body) {
+  const auto holders = [&](const std::string& body, const std::optional<Region>& region) {
     return std::count_if(frame.tools.begin(), frame.tools.end(), [&](const TrainingFrame::Tool& tool) {
-      return tool.kind == ToolKind::kPick && isOf(tool.body, body);
+      return tool.kind == ToolKind::kPick && isOf(tool.body, body) && (!region || region->contains(tool.tissue));
     });
   };
-  if (const auto* hold = std::get_if<Hold>(&condition)) return holders(hold->body) >= hold->picks;
+  if (const auto* hold = std::get_if<Hold>(&condition)) return holders(hold->body, hold->region) >= hold->picks;
   if (const auto* over = std::get_if<HandOver>(&condition))
-    return holders(over->body) == 1 && hands_.at(over->body).taken_over;
+    return holders(over->body, std::nullopt) == 1 && hands_.at(over->body).taken_over;
   if (const auto* back = std::get_if<PutBack>(&condition)) {
     const auto found = whereabouts_.find(back->body);
     return found != whereabouts_.end() && (found->second.now - found->second.at_start).norm() <= back->distance;
@@ -353,6 +388,22 @@ std::string TaskProgress::broken(const Metrics& metrics) const {
            numberText(limits.measured.strain);
   if (ends(LimitKind::kForbidden) && !metrics.touched().empty())
     return "a tool was where it must not be: " + *metrics.touched().begin();
+  return "";
+}
+
+std::string TaskProgress::brokenMetric(const Metrics& metrics, const RestTissue& tissue) const {
+  if (task_.limits.fail.empty()) return "";
+  const std::vector<MetricValue> values = metrics.values(tissue, times_.size());
+  for (const FailLimit& limit : task_.limits.fail)
+    for (const MetricValue& value : values) {
+      if (value.name != limit.metric) continue;
+      const MetricRow& row = *findMetric(value.name);
+      const bool above = row.better == Better::kLower;
+      if (!(above ? value.value > limit.value : value.value < limit.value)) continue;  // NaN: no
+      const std::string unit = row.unit == std::string("1") ? "" : std::string(" ") + row.unit;
+      return value.name + " is " + numberText(value.value, 3) + unit +
+             (above ? ", above the limit of " : ", below the limit of ") + numberText(limit.value) + unit;
+    }
   return "";
 }
 

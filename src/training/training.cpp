@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "meshless_surgery/base/number_text.h"
+
 namespace meshless {
 namespace {
 
@@ -10,6 +12,8 @@ constexpr double kMomentEvery = 0.1;         // [s]
 constexpr std::size_t kMostMoments = 36000;  // an hour; then each stands for twice as long
 constexpr std::size_t kMostEvents = 10000;
 constexpr std::size_t kOutline = 1500;  // points
+constexpr double kSlow = 0.5;           // [1] of real time
+constexpr double kWatchedFor = 2.0;     // [s] on the wall, before that is judged
 
 }  // namespace
 
@@ -22,7 +26,19 @@ Training::Now::Now(const TaskDef& task)
       tissue(task.plan, task.target, task.tray),
       progress(task) {}
 
-Training::Training(TaskDef task) : task_(std::move(task)), now_(std::make_unique<Now>(task_)) {}
+Training::Training(TaskDef task, bool after)
+    : task_(std::move(task)),
+      separates_(std::any_of(task_.stages.begin(), task_.stages.end(),
+                             [](const Stage& stage) { return std::holds_alternative<Separate>(stage.condition); })),
+      after_(after),
+      now_(std::make_unique<Now>(task_)) {}
+
+bool Training::tried() const {
+  if (!begun_) return false;
+  for (std::size_t h = 0; h < kHands; ++h)
+    if (metrics().motion(static_cast<Hand>(h)).seen()) return true;
+  return !events().empty() || progress().over();
+}
 
 FrameWants Training::wants() const {
   FrameWants wants;
@@ -49,6 +65,8 @@ Status Training::begin(const TrainingFrame& frame) {
   run_ = frame.run;
   now_ = std::make_unique<Now>(task_);
   now_->first_step = frame.step;
+  now_->started_at = frame.wall;
+  now_->settling = task_.settle > 0.0;
   std::size_t vertices = 0;
   for (const TrainingFrame::Body& body : frame.bodies) vertices += body.model->surface.vertices.size();
   const std::size_t every = std::max<std::size_t>(1, vertices / kOutline);
@@ -60,16 +78,40 @@ Status Training::begin(const TrainingFrame& frame) {
 
 Status Training::feed(TrainingFrame frame) {
   if (!begun_ || frame.run != run_) {
+    const bool again = begun_ || after_;
     if (Status status = begin(frame); !status) return status;
+    if (frame.step != 1)
+      intervened(Intervention::kLoad,
+                 "it begins at step " + std::to_string(frame.step - 1) + " of a state that was saved");
     // What came before the reset is not of this run.
     for (std::size_t k = frame.events.size(); k-- > 0;) {
-      if (frame.events[k].type != EventType::kReset && frame.events[k].type != EventType::kLoaded) continue;
+      const Event& event = frame.events[k];
+      if (event.type != EventType::kReset && event.type != EventType::kLoaded) continue;
+      now_->first_command = event.command;
+      if (again && event.type == EventType::kLoaded)
+        intervened(Intervention::kLoad, "it begins with a state that was loaded");
       frame.events.erase(frame.events.begin(), frame.events.begin() + static_cast<std::ptrdiff_t>(k) + 1);
       break;
     }
   }
   if (over()) return Done{};
   Now& now = *now_;
+  if (now.settling) {
+    now.settled += frame.dt;
+    const bool acts =
+        !frame.tools.empty() || std::any_of(frame.events.begin(), frame.events.end(),
+                                            [&](const Event& event) { return event.command > now.first_command; });
+    if (!acts && now.settled < task_.settle + 1e-9) {
+      now.last_step = frame.step;
+      now.tissue.feed(frame);
+      now.metrics.settle(frame);
+      return Done{};
+    }
+    now.settling = false;
+    now.first_step = frame.step;
+    now.started_at = frame.wall;
+  }
+  noteInterventions(frame);
   const std::size_t stage_before = now.progress.stage();
   now.last_step = frame.step;
   now.tissue.feed(frame);
@@ -86,6 +128,34 @@ void Training::stop() {
   now_->metrics.end();
 }
 
+void Training::noteInterventions(const TrainingFrame& frame) {
+  for (const Event& event : frame.events) {
+    if (event.command <= now_->first_command && event.type != EventType::kLoaded) continue;  // the scene's own
+    const std::string of = event.text + (event.text.find(event.body) == std::string::npos ? ": " + event.body : "");
+    if (event.type == EventType::kUndone) intervened(Intervention::kUndo, "a cut was taken back");
+    if (event.type == EventType::kRemoved) intervened(Intervention::kRemove, of);
+    if (event.type == EventType::kDetached && event.taken_apart) intervened(Intervention::kDetach, of);
+    if (event.type == EventType::kAttached) intervened(Intervention::kAttach, of);
+    if (event.type == EventType::kSpawned) intervened(Intervention::kSpawn, of);
+    if (event.type == EventType::kMaterial) intervened(Intervention::kMaterial, of);
+  }
+}
+
+void Training::intervened(Intervention intervention, const std::string& what) {
+  if (!begun_ || over() || task_.allow.count(intervention)) return;
+  const auto [found, is_new] = now_->interventions.try_emplace(intervention, what);
+  if (is_new) found->second += " (" + numberText(now_->metrics.time(), 3) + " s)";
+}
+
+std::vector<std::string> Training::notCounted() const {
+  std::vector<std::string> why;
+  for (const auto& [intervention, what] : now_->interventions)
+    why.push_back(what + "; the task does not allow " + toString(intervention));
+  if (metrics().slowerThan(kSlow, kWatchedFor) && !task_.allow.count(Intervention::kSlow))
+    why.push_back("the world ran at less than " + numberText(kSlow) + " of real time; the task does not allow slow");
+  return why;
+}
+
 void Training::note(const TrainingFrame& frame, std::size_t stage_before) {
   Now& now = *now_;
   const double time = now.metrics.time();
@@ -96,7 +166,7 @@ void Training::note(const TrainingFrame& frame, std::size_t stage_before) {
     if (isShown(event.type))
       say(event.text +
               (event.body.empty() || event.text.find(event.body) != std::string::npos ? "" : ": " + event.body),
-          isError(event.type));
+          isError(event.type) && !(event.type == EventType::kTorn && separates_));
   for (std::size_t s = stage_before; s < now.progress.stage(); ++s) say("stage met: " + task_.stages[s].name, false);
   if (!now.progress.failed().empty()) say("failed: " + now.progress.failed(), true);
   now.next.force = std::max(now.next.force, now.metrics.force());
@@ -116,6 +186,8 @@ void Training::note(const TrainingFrame& frame, std::size_t stage_before) {
 }
 
 double Training::score() const {
+  if (!notCounted().empty()) return 0.0;
+  if (!task_.metrics.empty() && !progress().done()) return 0.0;
   if (task_.metrics.empty())
     return 100.0 * static_cast<double>(progress().stage()) / static_cast<double>(task_.stages.size());
   const std::vector<MetricValue> all = values();
@@ -129,7 +201,7 @@ double Training::score() const {
 }
 
 bool Training::passed() const {
-  if (!progress().done() || !(score() >= task_.pass_mark)) return false;
+  if (!progress().done() || !notCounted().empty() || !(score() >= task_.pass_mark)) return false;
   const std::vector<MetricValue> all = values();
   for (const WeightedMetric& metric : task_.metrics)
     for (const MetricValue& value : all)

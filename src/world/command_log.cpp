@@ -1,5 +1,6 @@
 #include "meshless_surgery/world/command_log.h"
 
+#include <cmath>
 #include <istream>
 
 #include "log_records.h"
@@ -30,6 +31,13 @@ void World::record(RecordSink sink) {
 
 void World::recordHash() const {
   if (impl_->record_sink) emit(impl_->record_sink, RecordKind::kHash, impl_->step, stateHash());
+}
+
+void World::setWallTime(double seconds) {
+  impl_->wall_time = seconds;
+  // Archives hold finite numbers alone.
+  if (impl_->record_sink)
+    emit(impl_->record_sink, RecordKind::kWallTime, impl_->step, std::isnan(seconds) ? kNobodyWatches : seconds);
 }
 
 void World::Impl::record(const Command& command) const {

@@ -38,7 +38,8 @@ void serialize(A& archive, LogTool& v) {
 }
 template <class A>
 void serialize(A& archive, Event& v) {
-  auto& [type, step, sim_time, body, pick, text, cavity, removed, placed] = v;  // the last three: for who hears it at once
+  // The last ones are for who hears it at once.
+  auto& [type, step, sim_time, body, pick, text, cavity, removed, placed, taken_apart, command] = v;
   archive(choice(type, kLastEvent), step, sim_time, body, pick, text);
 }
 

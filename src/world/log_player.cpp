@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <istream>
+#include <limits>
 #include <optional>
 
 #include "log_records.h"
@@ -67,6 +68,7 @@ struct LogPlayer::Record {
   Deed deed;                          // or
   std::optional<std::uint64_t> hash;  // to compare
   bool undo = false;
+  bool is_time = false;  // and no command
 };
 
 LogPlayer::LogPlayer() = default;
@@ -113,7 +115,7 @@ void LogPlayer::add(std::string_view body, std::uint64_t& step, double& most) {
   std::uint8_t number = 0;
   Record record;
   archive(number, record.step);
-  if (number > static_cast<std::uint8_t>(RecordKind::kEnd))
+  if (number > static_cast<std::uint8_t>(RecordKind::kWallTime))
     throw ArchiveFault("it is of kind " + std::to_string(number));
   const auto kind = static_cast<RecordKind>(number);
   if ((kind == RecordKind::kStart) == (start_ != nullptr))
@@ -156,6 +158,14 @@ void LogPlayer::add(std::string_view body, std::uint64_t& step, double& most) {
     case RecordKind::kEnd:
       archive(record.hash.emplace());
       break;
+    case RecordKind::kWallTime: {
+      double seconds = 0.0;
+      archive(seconds);
+      if (seconds == kNobodyWatches) seconds = std::numeric_limits<double>::quiet_NaN();
+      record.deed = [seconds](World& world) { world.setWallTime(seconds); };
+      record.is_time = true;
+      break;
+    }
   }
   if (archive.left() > 0) throw ArchiveFault("it is too long");
   step = state ? state->step : kind == RecordKind::kReset ? 0 : record.step;
@@ -197,7 +207,7 @@ bool LogPlayer::step(World& world) {
     const Record& record = records_[next_];
     if (record.deed) {
       record.deed(world);
-      ++report_.commands;
+      report_.commands += !record.is_time;
       continue;
     }
     ++report_.checks;

@@ -7,7 +7,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kLogVersion = 8;  // of the hashes in it, too
+constexpr std::uint32_t kLogVersion = 9;  // of the hashes in it, too
 
 enum class RecordKind : std::uint8_t {
   kStart,
@@ -18,8 +18,11 @@ enum class RecordKind : std::uint8_t {
   kReset,
   kState,
   kHash,
-  kEnd
+  kEnd,
+  kWallTime
 };
+
+constexpr double kNobodyWatches = -1.0;  // of kWallTime
 
 // Commands as they are logged; those of materials and bodies have their own way.
 MESHLESS_ARCHIVE(PickCommand, point, direction, body, max_distance, stiffness)

@@ -6,9 +6,9 @@
 #include <sstream>
 
 #include "meshless_surgery/body/cavities.h"
-#include "meshless_surgery/geometry/query/inside.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/geometry/mesh/tetrahedralize.h"
+#include "meshless_surgery/geometry/query/inside.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
 
@@ -70,6 +70,8 @@ const char* toString(EventType type) {
       return "clipped";
     case EventType::kCollapsed:
       return "collapsed";
+    case EventType::kMaterial:
+      return "material";
   }
   return "unknown";
 }
@@ -114,6 +116,7 @@ Pick* World::Impl::findPick(PickId id) {
 
 void World::Impl::say(EventType type, const std::string& body, PickId pick, const std::string& text) {
   events.push_back({type, step, static_cast<double>(step) / settings.step_rate, body, pick, text});
+  events.back().command = commands;
 }
 
 std::string World::Impl::knownBodies() const {
@@ -209,9 +212,11 @@ std::size_t World::bodyCount() const { return impl_->bodies.size(); }
 bool World::nameUsed(const std::string& name) const { return impl_->used_names.count(name) > 0; }
 const PushSphere& World::push() const { return impl_->push; }
 const Scissors& World::scissors() const { return impl_->scissors; }
+double World::wallTime() const { return impl_->wall_time; }
 
 Result<Reply> World::apply(const Command& command) {
   impl_->record(command);
+  ++impl_->commands;
   return std::visit([this](const auto& c) { return impl_->apply(c); }, command);
 }
 

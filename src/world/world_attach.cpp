@@ -305,6 +305,7 @@ Result<Reply> World::Impl::apply(const DetachCommand& command) {
     return Error{ErrorCode::kMissed, "no fibre of '" + command.name + "' is in " + command.region->text()};
   DetachReply reply;
   reply.gone = loseFibres(*found, EventType::kDetached, "were detached", lies);
+  if (reply.gone > 0) events.back().taken_apart = !found->clip;
   reply.left = found->fibres.size();
   if (found->fibres.empty()) attachments.erase(found);
   return Reply(reply);

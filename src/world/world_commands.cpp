@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <limits>
 
-#include "meshless_surgery/geometry/query/inside.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/query/inside.h"
 #include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
 
@@ -320,6 +320,7 @@ Result<Reply> World::Impl::apply(const SetMaterialCommand& command) {
     body->surface_current = false;
     body->material = material;
     if (body->model != before) body->state.pace = 1.0;  // of another material no velocity is won back
+    say(EventType::kMaterial, name, 0, name + " is of another material");
   }
   return Reply(Done{});
 }

@@ -208,7 +208,9 @@ struct World::Impl : KeptWorld {
   AttachedFibres attached;
   std::map<std::uint32_t, Result<CutReply>> finished;
   std::vector<Event> events;
-  std::vector<CutUndo> undo;  // the last is the next to be undone
+  std::uint64_t commands = 0;                                   // that came, since the start of the process
+  double wall_time = std::numeric_limits<double>::quiet_NaN();  // [s] since 1970
+  std::vector<CutUndo> undo;                                    // the last is the next to be undone
   StepReport report;
   std::vector<WorldBody*> awake;  // of this frame, in the order of bodies
   std::vector<char> faulty;       // one each: its coordinates are no numbers

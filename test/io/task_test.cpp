@@ -4,10 +4,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include <Eigen/Eigenvalues>
-
+#include "io/shipped_task.h"
 #include "io/temporary_folder.h"
-#include "meshless_surgery/training/followed_places.h"
 #include "support/bodies.h"
 
 namespace meshless {
@@ -151,6 +149,72 @@ TEST_F(TaskFile, ErrorsNameLineKeyAndWhatIsAccepted) {
   }
 }
 
+TEST_F(TaskFile, ALineOrACircleIsAPlanToo) {
+  const auto read_plan = [&](const std::string& plan) {
+    std::string text = kTask;
+    const std::size_t from = text.find("plan: {"), to = text.find('\n', from);
+    return read(text.replace(from, to - from, "plan: {body: pad, out: [0, 0, 1], depth: 0.01, " + plan + "}"));
+  };
+  const auto circle = read_plan("circle: {centre: [0, 0, 0.22], radius: 0.03}");
+  ASSERT_TRUE(circle.ok()) << circle.error().detail;
+  EXPECT_TRUE(circle->task.plan->closed());
+  double length = 0.0;
+  for (const CutPlan& part : circle->task.plan->parts()) {
+    length += part.length;
+    EXPECT_NEAR(0.03, (part.origin - Vec3(0, 0, 0.22)).norm(), 1e-12);
+    EXPECT_NEAR(0.0, part.along.dot(part.out), 1e-12);
+  }
+  EXPECT_NEAR(2.0 * M_PI * 0.03, length, 1e-3 * length);
+  const auto line = read_plan("line: [[-0.03, 0, 0.22], [0.0, 0.02, 0.22], [0.03, 0, 0.22]]");
+  ASSERT_TRUE(line.ok()) << line.error().detail;
+  EXPECT_EQ(2u, line->task.plan->parts().size());
+  EXPECT_FALSE(line->task.plan->closed());
+  for (const auto& [plan, says] :
+       {std::make_pair("circle: {centre: [0, 0, 0.22]}", "circle has no radius"),
+        {"circle: {centre: [0, 0, 0.22], radius: -1}", "radius is -1"},
+        {"circle: {centre: [0, 0, 0.22], radius: 0.03}, length: 1", "and length"},
+        {"circle: {centre: [0, 0, 0.22], radius: 0.03}, line: [[0, 0, 0], [1, 0, 0]]", "a line and a circle"},
+        {"line: [[0, 0, 0.2]]", "line is a list of 1"},
+        {"line: [[0, 0, 0.2], [0, 0]]", "a place of line is a list of 2"},
+        {"line: [[0, 0, 0.2], [0, 0, 0.2]]", "where the one before is"},
+        {"line: [[0, 0, 0.2], [0, 0.1, 0.3]]", "not at a right angle to the line"},
+        {"length: 1", "no origin"}}) {
+    const auto refused = read_plan(plan);
+    ASSERT_FALSE(refused.ok()) << plan;
+    EXPECT_NE(std::string::npos, refused.error().detail.find(says)) << refused.error().detail;
+    EXPECT_NE(std::string::npos, refused.error().detail.find("accepted: ")) << refused.error().detail;
+  }
+}
+
+TEST_F(TaskFile, SaysWhatEndsItAndWhatItAllows) {
+  std::string text = kTask;
+  text.replace(text.find("limits: {"), 9,
+               "settle: 1.5\nallow: [undo, pause]\nlimits: {fail: {cuts: 0, top_speed.pick: 6}, ");
+  const auto loaded = read(text);
+  ASSERT_TRUE(loaded.ok()) << loaded.error().detail;
+  EXPECT_EQ(1.5, loaded->task.settle);
+  EXPECT_EQ((std::set<Intervention>{Intervention::kUndo, Intervention::kPause}), loaded->task.allow);
+  ASSERT_EQ(2u, loaded->task.limits.fail.size());
+  EXPECT_EQ("top_speed.pick", loaded->task.limits.fail[1].metric);
+  EXPECT_EQ(6.0, loaded->task.limits.fail[1].value);
+  EXPECT_EQ(8u, loaded->task.version.size());
+  EXPECT_NE(read(kTask)->task.version, loaded->task.version);
+  for (const auto& [from, to, says] :
+       {std::make_tuple("cuts: 0", "cut: 0", "unknown metric 'cut', did you mean 'cuts'"),
+        {"cuts: 0", "cuts: many", "cuts is 'many'"},
+        {"{cuts: 0, top_speed.pick: 6}", "[cuts]", "fail is a list of 1"},
+        {"cuts: 0, top_speed.pick: 6", "cuts: 0, cuts: 1", "twice"},
+        {"[undo, pause]", "[undo, cheat]", "allow has 'cheat'"},
+        {"[undo, pause]", "undo", "allow is 'undo'"},
+        {"settle: 1.5", "settle: 61", "settle is 61"}}) {
+    std::string wrong = text;
+    const auto refused = read(wrong.replace(wrong.find(from), std::string(from).size(), to));
+    ASSERT_FALSE(refused.ok()) << to;
+    EXPECT_NE(std::string::npos, refused.error().detail.find(says)) << refused.error().detail;
+    EXPECT_NE(std::string::npos, refused.error().detail.find("accepted: ")) << refused.error().detail;
+  }
+}
+
 TEST_F(TaskFile, APictureIsInTheReport) {
   std::ofstream(folder_.path() + "/scene.yaml") << kScene;
   std::ofstream(folder_.path() + "/a.png") << "\x89PNG\r\n\x1a\nxyz";
@@ -275,261 +339,23 @@ TEST(Dates, AreInTheOrderOfTime) {
 
 // --- those that ship, done by a script
 
-class ShippedTask {
- public:
-  explicit ShippedTask(const std::string& name) {
-    const std::string config = std::string(SOURCE_DIR) + "/config";
-    FileAccess access;
-    access.folders = {config};
-    auto loaded = readTask(config + "/tasks/" + name + ".yaml", config + "/scenes", access);
-    EXPECT_TRUE(loaded.ok()) << (loaded.ok() ? "" : loaded.error().detail);
-    if (!loaded.ok()) return;
-    world = std::make_unique<World>(loaded->scene.world);
-    for (BodyDef& def : loaded->scene.bodies)
-      EXPECT_TRUE(world->addSceneBody(std::make_shared<const PreparedBody>(test::prepared(def))).ok());
-    for (ObstacleDef& def : loaded->scene.obstacles) EXPECT_TRUE(world->addObstacle(std::move(def)).ok());
-    for (const AttachCommand& attachment : loaded->scene.attachments)
-      EXPECT_TRUE(world->addSceneAttachment(attachment).ok());
-    training = std::make_unique<Training>(loaded->task);
+TEST(ShippedTasks, ArePassedByWhoDoesThemAsTheySay) {
+  for (const auto& [name, play] : test::goodPlays()) {
+    SCOPED_TRACE(name);
+    test::ShippedTask task(name);
+    play(task);
+    EXPECT_TRUE(task.training->passed()) << task.told();
   }
-  void seconds(double time) {
-    const int steps = static_cast<int>(std::lround(time * world->settings().step_rate));
-    for (int k = 0; k < steps && !training->over(); ++k) {
-      world->step();
-      ASSERT_TRUE(training->feed(frameOf(*world, world->takeEvents(), training->wants())).ok());
-    }
-  }
-  template <class T>
-  T apply(const Command& command) {
-    return test::replyOf<T>(world->apply(command));
-  }
-  /// A pick's hand goes there along a straight line, smoothly.
-  void carry(const PickReply& pick, const Vec3& from, const Vec3& to, double time) {
-    const int steps = static_cast<int>(std::lround(time * 120.0));
-    for (int k = 1; k <= steps; ++k) {
-      const double u = static_cast<double>(k) / steps, s = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
-      apply<Done>(MovePickCommand{pick.pick, from + s * (to - from)});
-      seconds(1.0 / 120.0);
-    }
-  }
-  double value(const std::string& name) const {
-    for (const MetricValue& metric : training->values())
-      if (metric.name == name) return metric.value;
-    return std::nan("");
-  }
-  /// Where the plan is drawn now, of those of its places that are so at rest.
-  Points drawn(const std::function<bool(const Vec3& rest)>& wanted = [](const Vec3&) { return true; }) {
-    const CutPlan& plan = *training->task().plan;
-    SnapshotWants wants;
-    wants.particles = true;
-    const Points& rest = training->tissue().planOutline();
-    const Points now = FollowedPlaces(plan.body, rest, plan.along.cross(plan.out)).now(world->snapshot(wants));
-    Points some;
-    for (std::size_t k = 0; k < rest.size(); ++k)
-      if (wanted(rest[k])) some.push_back(now[k]);
-    EXPECT_GT(some.size(), 20u);
-    return some;
-  }
-  /// The vertex of a body's surface that is farthest in that direction now.
-  Vec3 farthest(const std::string& name, const Vec3& direction) {
-    SnapshotWants wants;
-    wants.surfaces = true;
-    std::optional<Vec3> found;
-    for (const BodySnapshot& body : world->snapshot(wants).bodies)
-      for (const Vec3& p : body.surface)
-        if (body.name == name && (!found || p.dot(direction) > found->dot(direction))) found = p;
-    EXPECT_TRUE(found.has_value()) << name;
-    return found.value_or(Vec3::Zero());
-  }
-  std::string told() const {
-    std::string text = "score " + std::to_string(training->score()) + " " + training->progress().failed();
-    for (const MetricValue& metric : training->values())
-      if (std::isfinite(metric.value)) text += "\n  " + metric.name + " " + std::to_string(metric.value);
-    return text;
-  }
-
-  std::unique_ptr<World> world;
-  std::unique_ptr<Training> training;
-};
-
-TEST(ShippedTasks, Palpate) {
-  ShippedTask task("palpate");
-  PushCommand push;
-  push.radius = 0.010;
-  push.position = Vec3(0.015, 0.010, 0.075);
-  task.apply<Done>(push);
-  task.seconds(0.5);
-  push.position.z() = 0.066;
-  push.speed = 0.02;
-  task.apply<Done>(push);
-  task.seconds(2.0);
-  EXPECT_EQ(1u, task.training->progress().stage()) << task.told();
-  push.enable = false;
-  task.apply<Done>(push);
-  PickCommand pick;
-  pick.point = Vec3(0.015, 0.010, 0.1);
-  pick.direction = -Vec3::UnitZ();
-  task.apply<PickReply>(pick);
-  task.seconds(1.0);
-  EXPECT_TRUE(task.training->passed()) << task.told();
 }
 
-TEST(ShippedTasks, Retract) {
-  ShippedTask task("retract");
-  task.seconds(1.0);
-  PickCommand pick;
-  pick.point = Vec3(-0.05, -0.06, 0.2);
-  pick.direction = -Vec3::UnitZ();
-  const auto picked = task.apply<PickReply>(pick);
-  task.carry(picked, picked.position, picked.position + Vec3(0, 0.01, 0.035), 2.0);
-  task.seconds(11.0);
-  EXPECT_EQ(1u, task.training->progress().stage()) << task.told();
-  task.apply<Done>(ReleaseCommand{picked.pick});
-  task.seconds(0.1);
-  EXPECT_TRUE(task.training->passed()) << task.told();
-}
-
-TEST(ShippedTasks, Incise) {
-  // Along the line that is drawn on the skin, which sags.
-  ShippedTask task("incise");
-  task.seconds(1.0);
-  const Points line = task.drawn([](const Vec3& rest) { return rest.z() > 0.0599; });
-  Vec3 left = line[0], right = line[0], lowest = line[0];
-  for (const Vec3& p : line) {
-    if (p.x() < left.x()) left = p;
-    if (p.x() > right.x()) right = p;
-    if (p.z() < lowest.z()) lowest = p;
-    const auto top = task.world->probe(p + 0.1 * Vec3::UnitZ(), -Vec3::UnitZ());
-    ASSERT_TRUE(top.ok());
-    EXPECT_LT((top->position - p).norm(), 0.0005) << p.transpose();
-  }
-  EXPECT_LT(lowest.z(), 0.055);
-  EXPECT_EQ(0.0, task.value("plan_done"));
-  InciseCommand incise;
-  incise.blade = {left + 0.001 * Vec3::UnitZ(), (right - left).normalized(), Vec3::UnitZ(), (right - left).norm(),
-                  left.z() - lowest.z() + 0.001 + 0.013};
-  task.apply<InciseReply>(incise);
-  task.seconds(0.5);
-  EXPECT_TRUE(task.training->passed()) << task.told();
-  EXPECT_GT(task.value("plan_done"), 0.9);
-}
-
-TEST(ShippedTasks, Resect) {
-  ShippedTask task("resect");
-  // Along what is drawn on the organ, which hangs.
-  task.seconds(1.0);
-  const Points line = task.drawn();
-  Vec3 mean = Vec3::Zero();
-  for (const Vec3& p : line) mean += p / static_cast<double>(line.size());
-  Mat3 spread = Mat3::Zero();
-  for (const Vec3& p : line) spread += (p - mean) * (p - mean).transpose();
-  const Eigen::SelfAdjointEigenSolver<Mat3> axes(spread);
-  CutCommand cut;
-  cut.blades.x_axis = axes.eigenvectors().col(2);
-  cut.blades.y_axis = axes.eigenvectors().col(1);
-  cut.blades.origin = mean - cut.blades.x_axis;
-  const auto reply = task.apply<CutReply>(cut);
-  ASSERT_EQ(2u, reply.new_bodies.size());
-  task.seconds(0.5);
-  EXPECT_EQ(1u, task.training->progress().stage()) << task.told();
-  PickCommand pick;
-  pick.point = Vec3(-0.075, -0.005, 0.06);
-  pick.max_distance = 0.05;
-  pick.body = reply.new_bodies[1];
-  const auto picked = task.apply<PickReply>(pick);
-  task.carry(picked, picked.position, picked.position + Vec3(-0.05, 0, 0.05), 1.0);
-  task.carry(picked, picked.position + Vec3(-0.05, 0, 0.05), picked.position + Vec3(-0.2, 0, 0.05), 2.0);
-  task.seconds(1.0);
-  EXPECT_EQ(2u, task.training->progress().stage()) << task.told();
-  task.apply<Done>(ReleaseCommand{picked.pick});
-  task.seconds(0.2);
-  EXPECT_TRUE(task.training->passed()) << task.told();
-}
-
-TEST(ShippedTasks, Transect) {
-  // Clips first; and cut at once, which bleeds until they are on.
+TEST(ShippedTasks, AVesselThatIsCutBeforeItIsClippedBleeds) {
   for (const bool clips_first : {true, false}) {
-    SCOPED_TRACE(clips_first ? "clipped, then cut" : "cut, then clipped");
-    ShippedTask task("transect");
-    task.seconds(0.5);
-    const auto clip = [&](double x) {
-      ClipCommand command;
-      command.point = Vec3(x, 0, 0.05);
-      command.width = 0.004;
-      task.apply<ClipReply>(command);
-      task.seconds(0.4);
-    };
-    const auto cut = [&] {
-      Vec3 middle = Vec3::Zero();
-      const Points line = task.drawn();
-      for (const Vec3& p : line) middle += p / static_cast<double>(line.size());
-      CutCommand command;
-      command.blades = {middle - 0.02 * Vec3::UnitY(), Vec3::UnitY(), Vec3::UnitZ(), 0.04, 0.02};
-      EXPECT_EQ(2u, task.apply<CutReply>(command).new_bodies.size());
-      task.seconds(0.1);
-    };
-    if (!clips_first) cut();
-    clip(-0.008);
-    EXPECT_EQ(1u, task.training->progress().stage()) << task.told();
-    clip(0.008);
-    if (clips_first) cut();
-    task.seconds(2.0);
-    EXPECT_TRUE(task.training->progress().done()) << task.told();
+    test::ShippedTask task("transect");
+    test::playTransect(task, clips_first);
     EXPECT_EQ(clips_first, task.training->passed()) << task.told();
     if (clips_first) EXPECT_EQ(0.0, task.value("bleeding_time"));
     if (!clips_first) EXPECT_NEAR(0.5, task.value("bleeding_time"), 0.02);
   }
-}
-
-TEST(ShippedTasks, HandOver) {
-  ShippedTask task("hand_over");
-  task.seconds(0.5);
-  PickCommand pick;
-  pick.body = "block";
-  pick.point = task.farthest("block", Vec3(-1, 0, 0.5));
-  const auto first = task.apply<PickReply>(pick);
-  task.carry(first, first.position, first.position + Vec3(0.05, 0, 0.08), 1.5);
-  task.seconds(0.5);
-  EXPECT_EQ(2u, task.training->progress().stage()) << task.told();
-  pick.point = task.farthest("block", Vec3(0, 0, -1));  // it hangs
-  const auto second = task.apply<PickReply>(pick);
-  task.seconds(0.3);
-  task.apply<Done>(ReleaseCommand{first.pick});
-  task.seconds(0.3);
-  EXPECT_EQ(4u, task.training->progress().stage()) << task.told();
-  task.carry(second, second.position, Vec3(0.09, 0, 0.06), 2.0);
-  task.carry(second, Vec3(0.09, 0, 0.06), Vec3(0.09, 0, 0.02), 0.5);
-  task.seconds(0.5);
-  EXPECT_EQ(5u, task.training->progress().stage()) << task.told();
-  task.apply<Done>(ReleaseCommand{second.pick});
-  task.seconds(0.2);
-  EXPECT_TRUE(task.training->passed()) << task.told();
-  EXPECT_EQ(0.0, task.value("instrument_crossings"));
-}
-
-TEST(ShippedTasks, Dissect) {
-  ShippedTask task("dissect");
-  task.seconds(0.5);
-  const auto fibres = [&] {
-    for (const AttachmentSnapshot& joint : task.world->snapshot({}).attachments)
-      if (joint.name == "bed") return joint.fibres;
-    return std::size_t{0};
-  };
-  // The fundus is drawn down, off the bed.
-  PickCommand pick;
-  pick.body = "gallbladder";
-  pick.point = task.farthest("gallbladder", Vec3(-1, 0, -0.3));
-  const auto picked = task.apply<PickReply>(pick);
-  Vec3 at = picked.position;
-  EXPECT_GT(fibres(), 20u);
-  for (int k = 0; k < 30 && fibres() > 0; ++k) {
-    task.carry(picked, at, at + Vec3(0.0005, 0, -0.0025), 0.1);
-    at += Vec3(0.0005, 0, -0.0025);
-  }
-  EXPECT_EQ(1u, task.training->progress().stage()) << task.told();
-  task.apply<Done>(ClearPicksCommand{});
-  task.seconds(0.2);
-  EXPECT_TRUE(task.training->passed()) << task.told();
 }
 
 }  // namespace task_file_test

@@ -216,6 +216,7 @@ class DeformerTestCase(unittest.TestCase):
 
     def setUp(self):
         self.deformer = Deformer(self.node)
+        self.call('stop_task')  # one that runs refuses a pause
         self.assertTrue(self.call('pause', data=True).success)
         self.assertTrue(self.call('reset').success)
         self.states = self.deformer.recorder('state', State)

@@ -750,7 +750,7 @@ class MessagesLawTest(DeformerTestCase):
         tasks, metrics = self.deformer.recorder('task', TaskState), self.deformer.recorder('metrics', Metrics)
         self.addCleanup(tasks.close)
         self.addCleanup(metrics.close)
-        self.good('start_task', task='tasks/messages.yaml', trainee='Ann')
+        self.good('start_task', task='tasks/messages.yaml', trainee='Ann', allow=['undo', 'load'])
         self.good('step', steps=36)  # of 240 a second: the first stage takes a tenth of one
         now = metrics.wait(lambda m: m.time > 0.149)
         self.heads(now, asked)
@@ -766,14 +766,25 @@ class MessagesLawTest(DeformerTestCase):
         self.says(task, task='messages', brief='keep off', trainee='Ann', running=True, stage=1, stage_brief='then', time_limit=1.0,
                   force_limit=2.0, score=50.0, passed=False)
         self.assertEqual(['wait', 'again'], task.stages)
+        self.assertEqual(['undo', 'load'], task.allowed)
+        self.assertFalse(task.settling)
         self.assertTrue(numpy.isnan(task.plan_done))  # without a plan: training_test.py has one
-        held.update((task._type, field) for field in ('stages', 'plan_done'))
+        held.update((task._type, field) for field in ('stages', 'plan_done', 'allowed', 'settling'))
         self.good('step', steps=37)
         self.says(tasks.wait(lambda t: not t.running and t.task), stage=2, score=100.0, passed=True, failed='')
         self.good('start_task', task='tasks/messages.yaml')
         self.good('pick', point=Point(-1.0, 0.0, 2.05), body='hangs', max_distance=0.02)
         self.good('step', steps=250)
         self.says(tasks.wait(lambda t: t.failed), failed='the time of 1 s is over', passed=False, running=False)
+        self.good('save', file='begun')
+        self.good('start_task', task='tasks/messages.yaml', allow=[])
+        self.good('step', steps=1)
+        self.good('stop_task')
+        self.good('load', file='begun')
+        self.good('start_task', task='tasks/messages.yaml')
+        task = tasks.wait(lambda t: t.running)
+        self.assertEqual([], task.not_counted)
+        held.add((task._type, 'not_counted'))  # training_test.py and counted_test.cpp have what is said
 
 
 class EveryFieldTest(unittest.TestCase):

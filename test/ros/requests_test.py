@@ -551,6 +551,8 @@ LAWS = [
         within(0.95 * BALL * 1e3, 1.05 * BALL * 1e3)),
     Law('step', 'steps', 7, {}, lambda test, answer: (120.0 * answer.sim_time, test.state().step), (7.0, 7), Refusal(INVALID)),
     Law('start_task', 'task', 'tasks/boxes.yaml', {}, lambda test, answer: 'boxes' in answer.message, True, Refusal(INVALID)),
+    Law('start_task', 'allow', ['undo'], dict(task='tasks/boxes.yaml'),
+        lambda test, answer: list(test.good('observe').task.allowed), ['undo'], []),
     Law('start_task', 'trainee', 'Ann', dict(task='tasks/boxes.yaml'), report_of, 'Ann_boxes', 'boxes'),
     Law('report', 'name', 'mine', begun_task, lambda test, answer: os.path.basename(answer.folder).split('_')[0], 'mine', 'boxes'),
     Law('observe', 'bodies', ['left', 'none'], dict(particles=[3, 3]), places, (1, 2), Refusal(INVALID)),
@@ -594,6 +596,7 @@ class Asked(InStepTestCase):
         self.pause(True)
 
     def fresh(self, name=''):
+        self.call('stop_task')  # one that runs refuses what no hand does
         if self.runs_since:
             self.pause(True)
         self.good('reset')

@@ -62,14 +62,19 @@ class TrainingTest(unittest.TestCase):
             self.assertTrue(answer.passed, answer.message)
             self.assertEqual(os.path.join(self.folder, 'reports', 'Ann_B_palpate_1'), answer.folder)
             self.assertEqual(['report.csv', 'report.html', 'report.json'], sorted(os.listdir(answer.folder)))
+            self.assertEqual(answer.folder, node.good('report').folder)  # of the same run
+            node.good('start_task', task='palpate', trainee='Ann B')
+            node.good('step', steps=1)
             again = node.good('report')
             self.assertTrue(again.folder.endswith('Ann_B_palpate_2'))
             with open(os.path.join(again.folder, 'report.html'), encoding='utf-8') as page:
                 self.assertIn('Ann_B_palpate_1', page.read())  # an earlier one
             self.assertFalse(node.call('report', name='../x').success)
         done = self.report_of_log('--trainee', 'Ann B')
-        self.assertEqual(0, done.returncode, done.stdout)
-        live, replayed = report_of(answer.folder), report_of(os.path.join(self.folder, 'log.report'))
+        self.assertEqual(1, done.returncode, done.stdout)  # the last run has done nothing
+        self.assertIn('run 2 of 2', done.stdout)
+        live, replayed = report_of(answer.folder), report_of(os.path.join(self.folder, 'log.run1.report'))
+        self.assertTrue(replayed['passed'])
         self.assertLess(before, live['date'])
         self.assertRegex(live['date'], r'^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z$')
         self.assertIsNone(replayed['date'])
@@ -78,8 +83,96 @@ class TrainingTest(unittest.TestCase):
             del report['log'], report['date']
         self.assertEqual(live, replayed)  # all digits
         self.assertEqual(2, self.report_of_log('--date', 'yesterday').returncode)
-        self.assertEqual(0, self.report_of_log('--date', '2026-03-01T14:05:09Z').returncode)
+        self.assertEqual(1, self.report_of_log('--date', '2026-03-01T14:05:09Z').returncode)
         self.assertEqual('2026-03-01T14:05:09.000Z', report_of(os.path.join(self.folder, 'log.report'))['date'])
+
+    def test_what_no_hand_does_is_refused_while_a_task_runs(self):
+        from std_srvs.srv import SetBool
+        with self.node(scene='blocks') as node:
+            def tries(allowed):
+                calls = {'undo': ('undo_cut', {}), 'remove': ('remove', dict(name='block')),
+                         'attach': ('attach', dict(body='block', other='world', stiffness=1e4)), 'detach': ('detach', dict(name='block-world')),
+                         'material': ('set_material', dict(yaml='{damping: 10}')), 'load': ('load', dict(file='state'))}
+                for word in ('attach', 'detach', 'material', 'remove', 'undo', 'load'):
+                    service, fields = calls[word]
+                    answer = node.call(service, **fields)
+                    refused = 'does not allow ' + word in answer.message
+                    self.assertEqual(word not in allowed, refused, (word, answer.message))
+                    if refused:
+                        self.assertIn('stop_task', answer.message)
+                pause = rospy.ServiceProxy(node.name + '/pause', SetBool)
+                node.call('pause', data=False)
+                answer = pause(True)
+                self.assertEqual('pause' in allowed, answer.success, answer.message)
+            node.good('save', file='state')
+            node.good('start_task', task='hand_over', trainee='Eve')
+            block = node.good('get_body', name='block').surface.vertices[0]
+            node.good('step', steps=1)
+            node.good('pick', point=Point(block.x, block.y, block.z), max_distance=0.02)  # a hand has done something
+            node.good('step', steps=1)
+            tries(())
+            self.assertFalse(node.call('start_task', task='hand_over', allow=['everything']).success)
+            words = ['undo', 'remove', 'attach', 'detach', 'material', 'load', 'pause']
+            node.good('start_task', task='hand_over', allow=words)
+            time.sleep(0.1)
+            tries(words)
+            self.assertEqual(set(words), set(node.good('observe').task.allowed))
+            node.good('stop_task')
+            self.assertNotIn('does not allow', node.call('undo_cut').message)
+
+    def test_each_run_that_somebody_has_watched_has_a_report_however_it_ends(self):
+        reports, task = os.path.join(self.folder, 'reports'), os.path.join(self.folder, 'own.yaml')
+        with open(task, 'w') as file:
+            file.write('scene: blocks\nstages: [{hold: {body: block}, hold_for: 0.1}, {let_go: all, hold_for: 0.1}]\n')
+        with OwnNode(scene='blocks', session_directory=self.folder, command_log='log', data_folders=self.folder) as node:
+
+            def begin():
+                node.good('start_task', task=task, trainee='Ann')
+
+            def pick():
+                at = node.good('get_body', name='block').surface.vertices[0]
+                node.good('pick', point=Point(at.x, at.y, at.z), max_distance=0.05)
+                time.sleep(0.3)
+
+            def wait_for(number):
+                end = time.monotonic() + LONG
+                path = os.path.join(reports, 'Ann_own_%d' % number)
+                while not os.path.isfile(os.path.join(path, 'report.html')):
+                    self.assertLess(time.monotonic(), end, os.listdir(self.folder))
+                    time.sleep(0.05)
+                time.sleep(0.3)
+                return report_of(path)
+            begin()
+            time.sleep(0.3)
+            begin()  # nothing was done in the first: no report
+            pick()
+            node.good('reset')
+            self.assertEqual('unfinished', wait_for(1)['outcome'])
+            pick()
+            node.good('stop_task')
+            stopped = wait_for(2)
+            self.assertGreater([m['value'] for m in stopped['metrics'] if m['name'] == 'wall_time'][0], 0.2)
+            self.assertEqual(os.path.join(reports, 'Ann_own_2'), node.good('report').folder)
+            begin()
+            pick()
+            node.good('clear_picks')
+            self.assertEqual('done', wait_for(3)['outcome'])
+            begin()
+            pick()
+        self.assertEqual('unfinished', wait_for(4)['outcome'])  # the node has ended
+        self.assertEqual(4, len(os.listdir(reports)))
+        done = subprocess.run([REPORT, os.path.join(self.folder, 'log'), '--task', task, '--out', self.folder],
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=LONG, text=True)
+        found = [report_of(os.path.join(self.folder, name)) for name in sorted(os.listdir(self.folder)) if name.endswith('.report')]
+        dates = [report['date'] for report in found]
+        for number in range(1, 5):
+            live = report_of(os.path.join(reports, 'Ann_own_%d' % number))
+            same = found[dates.index(live['date'])]
+            for report in (live, same):
+                for key in ('log', 'trainee', 'outcome'):
+                    report.pop(key)
+            if number != 2:  # the log goes on where the task was stopped
+                self.assertEqual(live, same)
 
     def report_of_log(self, *arguments):
         return subprocess.run([REPORT, os.path.join(self.folder, 'log'), '--task', 'palpate', '--out', self.folder] + list(arguments),

@@ -38,6 +38,16 @@ TEST(TaskText, SaysWhatShareOfThePlanIsCut) {
   EXPECT_NE(std::string::npos, taskText(task).toStdString().find("<br>Plan: 45 % is cut"));
 }
 
+TEST(TaskText, SaysHowLongItHasRunAndWhyItDoesNotCount) {
+  auto task = begun();
+  EXPECT_NE(std::string::npos, taskText(task, 12.0).toStdString().find("<br>Time: 12 s<br>Limits"));
+  task.settling = true;
+  EXPECT_NE(std::string::npos, taskText(task, 0.0).toStdString().find("<br>The scene comes to rest first<br>Limits"));
+  task.running = false;
+  task.not_counted = {"a cut was <taken> back"};
+  EXPECT_NE(std::string::npos, taskText(task).toStdString().find("<br><b>Does not count</b>: a cut was &lt;taken&gt; back"));
+}
+
 TEST(TaskText, SaysHowItEnded) {
   auto task = begun();
   task.running = false;

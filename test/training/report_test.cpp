@@ -70,6 +70,37 @@ TEST(Report, NeedsNoNetworkAndHasAllValues) {
   EXPECT_EQ(metricNames().size() + 1, static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')));
 }
 
+TEST(Report, SaysWhyItIsNotPassedInUnitsThatSurgeonsUse) {
+  const auto played = aSession();
+  const std::string html = reportHtml(played->training, {});
+  EXPECT_NE(std::string::npos, html.find("Why it is not passed"));
+  EXPECT_NE(std::string::npos, html.find("The stage <b>far away</b> was not met"));
+  EXPECT_EQ(std::string::npos, html.find(">m^3<"));
+  EXPECT_NE(std::string::npos, html.find(">ml<"));
+  EXPECT_EQ(std::string::npos, html.find("-0.0 of 100"));
+  EXPECT_EQ(std::string::npos, html.find("Done well"));
+  EXPECT_NE(std::string::npos, html.find("by a script"));
+  EXPECT_NE(std::string::npos, html.find("largest force of a tool [N]"));
+  EXPECT_NE(std::string::npos, html.find("<h2>The cut</h2>"));
+}
+
+TEST(Report, HasNoPlotOfNothingAndBeginsWithWhatWasDoneWell) {
+  TaskDef task;
+  task.name = "wait";
+  task.stages.push_back({"wait", "", LetGo{}, 0.1});
+  task.metrics = {{"time", 1.0, 0.2, 1.0, {}}, {"cuts", 1.0, -1.0, 0.0, 0.0}};
+  Played played(test::weightless(), task);
+  ASSERT_TRUE(played.world.addSceneBody(test::shared(test::ball())).ok());
+  played.begin();
+  played.step(20);
+  const std::string html = reportHtml(played.training, {});
+  EXPECT_EQ(std::string::npos, html.find("largest force of a tool [N]"));
+  EXPECT_EQ(std::string::npos, html.find("speed of the hands [mm/s]"));
+  EXPECT_LT(html.find("<h2>Done well</h2><ul><li class=\"good\"><b>time</b>"),
+            html.find("<h2>To work on</h2><ul><li class=\"\"><b>cuts</b>"));
+  EXPECT_NE(std::string::npos, html.find("<h2>Where it was done</h2>"));
+}
+
 TEST(Report, OfAReplayIsTheSameText) {
   const auto played = aSession();
   const auto replayed = played->replayed();

@@ -35,6 +35,7 @@ Result<LoadedTask> readTask(const std::string& file, const std::optional<std::st
 
 /// In UTC, as in 2026-03-01T14:05:09.250Z: in the order of letters is the order of time.
 std::string dateText(std::chrono::system_clock::time_point time);
+std::string dateText(double seconds);  // since 1970
 /// Whether it is one, to the second or to the millisecond.
 bool isDate(const std::string& text);
 

@@ -2,6 +2,7 @@
 // function, so that what is computed from it is equal to the bit.
 #pragma once
 
+#include <limits>
 #include <optional>
 
 #include "meshless_surgery/world/world.h"
@@ -25,13 +26,14 @@ struct TrainingFrame {
     Vec3 tissue = Vec3::Zero();  // [m] where it works: a pick's end in the tissue, the tips of blades that have an end
     double radius = 0.0;         // [m] of what is solid about the line from `position` to there
     double force = 0.0;          // [N] between tool and tissue, mean over the step
+    Vec3 touch = Vec3::Zero();   // [m] of the push sphere: the foremost place of it in the tissue; of others `tissue`
   };
   struct Body {
     std::string name;
     std::uint32_t number = 0;
     BodyModelPtr model;
-    Pose placed;                 // from the model's frame to the rest shape's place
-    Vec3 centre = Vec3::Zero();  // [m] of mass, now; where wanted
+    Pose placed;                    // from the model's frame to the rest shape's place
+    Vec3 centre = Vec3::Zero();     // [m] of mass, now; where wanted
     std::vector<double> strains{};  // strainsOf() it; where wanted
   };
   struct Joint {
@@ -41,14 +43,17 @@ struct TrainingFrame {
     std::optional<Vec3> clip;  // [m] of a clip: the middle of its jaws in the rest shape, where it was put
   };
   std::uint64_t step = 0;
-  std::uint32_t run = 0;  // grows with each reset and each loaded state
-  double time = 0.0;      // [s] simulated
-  double dt = 0.0;        // [s] of the step
+  std::uint32_t run = 0;                                   // grows with each reset and each loaded state
+  double time = 0.0;                                       // [s] simulated
+  double dt = 0.0;                                         // [s] of the step
+  double wall = std::numeric_limits<double>::quiet_NaN();  // [s] World::wallTime
+  Vec3 down = Vec3::Zero();                                // unit, that gravity has; zero without any
   std::vector<Tool> tools;
   std::vector<Body> bodies;
   std::vector<Joint> joints;  // attachments
   std::vector<Event> events;  // since the frame before
   bool sampled = false;       // centres and strains are there, where they are wanted
+  bool centres = false;       // they are there
 };
 
 /// What costs something, and is looked at ten times a second where a task needs it.

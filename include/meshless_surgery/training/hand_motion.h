@@ -16,12 +16,17 @@ class HandMotion {
   /// Once a step of `dt` [s]; without a position: there is no such hand, and where it comes back is no way of it.
   void feed(const std::optional<Vec3>& position, const std::optional<Quat>& turned, double dt);
 
+  /// Another hand comes in its place: from where the one was to where the other is, is no way.
+  void leave(double dt) {
+    if (last_) leaveAt(1.0 / dt);
+  }
   /// There is no more: the present movement ends.
   void end(double dt);
 
   bool seen() const { return seen_for_ > 0.0; }
   bool moves() const { return moves_; }
   double path() const { return path_; }            // [m]
+  double fastest() const { return fastest_; }      // [m/s] from one step to the next
   double angularPath() const { return turn_; }     // [rad]
   double movingFor() const { return moved_for_; }  // [s]
   std::size_t movements() const { return movements_; }
@@ -36,9 +41,10 @@ class HandMotion {
 
  private:
   void endMovement(double rate);
-  void leave(double rate);
+  void leaveAt(double rate);
 
-  double seen_for_ = 0.0, moved_for_ = 0.0, moved_path_ = 0.0, path_ = 0.0, straight_ = 0.0, turn_ = 0.0;
+  double seen_for_ = 0.0, moved_for_ = 0.0, moved_path_ = 0.0, path_ = 0.0, fastest_ = 0.0, straight_ = 0.0,
+         turn_ = 0.0;
   std::optional<Vec3> start_, last_;  // of the present way
   std::optional<Quat> last_turned_;
   std::deque<Vec3> lately_;  // of the last 0.1 s

@@ -57,11 +57,19 @@ class Metrics {
   explicit Metrics(MetricLimits limits) : limits_(std::move(limits)) {}
 
   void feed(const TrainingFrame& frame);
+  /// Instead of it before the task begins: what the scene does by itself.
+  void settle(const TrainingFrame& frame);
   /// There are no more frames: movements that go on end here.
   void end();
 
-  double time() const { return time_; }             // [s]
-  double force() const { return force_; }           // [N] the largest of the tools' in the last step
+  double time() const { return time_; }      // [s]
+  double force() const { return force_; }    // [N] the largest of the tools' in the last step
+  double wallTime() const { return wall_; }  // [s] that somebody could watch
+  double realTimeFactor() const { return wall_ > 0.0 ? watched_ / wall_ : 1.0; }
+  /// Whether the world, with what it did by itself before, ran slower than that over more than so many seconds.
+  bool slowerThan(double factor, double for_seconds) const {
+    return wall_ + settle_wall_ > for_seconds && watched_ + settle_watched_ < factor * (wall_ + settle_wall_);
+  }
   double forcePeak() const { return force_peak_; }  // [N]
   double strainPeak() const { return strain_peak_; }
   /// Tools that are where they must not be, now: the names of the limits.
@@ -74,10 +82,12 @@ class Metrics {
   std::vector<MetricValue> values(const RestTissue& tissue, std::size_t stages) const;
 
  private:
+  void watch(const TrainingFrame& frame, double& wall, double& watched);
   void feedHands(const TrainingFrame& frame);
   void feedEvents(const TrainingFrame& frame);
   void feedForbidden(const TrainingFrame& frame);
   void feedStrain(const TrainingFrame& frame);
+  void feedDrops(const TrainingFrame& frame);
   bool bleeds(const TrainingFrame& frame) const;
 
   MetricLimits limits_;
@@ -86,6 +96,9 @@ class Metrics {
   std::array<std::optional<Vec3>, kHands> places_;
   double dt_ = 1.0, time_ = 0.0, idle_ = 0.0, any_moves_ = 0.0, both_move_ = 0.0;
   double force_ = 0.0, force_peak_ = 0.0, force_sum_ = 0.0, force_for_ = 0.0, force_above_ = 0.0;
+  double together_peak_ = 0.0, together_sum_ = 0.0;                               // of all tools
+  double wall_ = 0.0, watched_ = 0.0, settle_wall_ = 0.0, settle_watched_ = 0.0;  // [s]
+  double wall_before_ = std::numeric_limits<double>::quiet_NaN();                 // [s]
   double strain_peak_ = 0.0, strained_ = 0.0;
   bool strain_known_ = false, touched_any_ = false;  // any tissue, since the start
   /// Of a body, one a cluster: the most that it had before any tissue was touched. Pieces have those of their parents.
@@ -97,8 +110,12 @@ class Metrics {
   };
   OwnStrain ownStrainOf(const TrainingFrame::Body& body) const;
   std::map<std::uint32_t, OwnStrain> own_strains_;  // by the numbers of bodies
-  std::size_t cuts_ = 0, strokes_ = 0, undos_ = 0, torn_ = 0, drops_ = 0, forbidden_ = 0;
-  std::uint64_t last_cut_ = ~std::uint64_t{0}, last_stroke_ = ~std::uint64_t{0}, last_undo_ = ~std::uint64_t{0};
+  std::map<std::uint32_t, double> heights_;  // [m] of bodies that were held: the highest since they were let go of
+  bool centres_known_ = false;
+  double dropped_ = 0.0;  // [m]
+  std::size_t cuts_ = 0, strokes_ = 0, undos_ = 0, torn_ = 0, drops_ = 0, grasps_ = 0, picks_at_once_ = 0, forbidden_ = 0;
+  using Deed = std::pair<std::uint64_t, std::uint64_t>;  // step and command
+  std::optional<Deed> last_cut_, last_stroke_, last_undo_;
   std::set<std::tuple<std::uint64_t, std::string, std::uint32_t>> opened_;  // cavities: step, body, patch
   double forbidden_for_ = 0.0, bled_for_ = 0.0;
   ToolCrossings crossings_;

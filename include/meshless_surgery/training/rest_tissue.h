@@ -2,6 +2,7 @@
 // lies.
 #pragma once
 
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -13,7 +14,8 @@
 namespace meshless {
 
 /// Where a cut should go, in the rest shape where the scene puts it: the rectangle origin + s * along + t * out with
-/// 0 <= s <= length, -depth <= t <= 0, as far as it is in the body.
+/// 0 <= s <= length, -depth <= t <= 0, as far as it is in the body. Of a line that has corners one such rectangle a
+/// part.
 struct CutPlan {
   std::string body;
   Vec3 origin = Vec3::Zero();  // [m]
@@ -22,9 +24,15 @@ struct CutPlan {
   double length = 0.0;         // [m] > 0
   double depth = 0.0;          // [m] > 0
   double tolerance = 0.002;    // [m] > 0
+  Points line;                 // [m] the corners, two or more; origin, along and length are then not used
 
-  /// [m] to the rectangle.
+  /// The rectangles.
+  std::vector<CutPlan> parts() const;
+  /// [m] to the one rectangle, without a line.
   double distance(const Vec3& p) const;
+  bool closed() const { return line.size() > 2 && line.front() == line.back(); }
+  /// Normal to the one rectangle; zero where there are several.
+  Vec3 side() const { return line.empty() ? Vec3(along.cross(out)) : Vec3(Vec3::Zero()); }
 };
 
 /// Tissue that is to be taken out: what of a body lies in a box, a sphere or below a plane, in the rest shape.
@@ -47,7 +55,9 @@ struct CutPoints {
 class RestTissue {
  public:
   RestTissue(std::optional<CutPlan> plan, std::optional<Target> target, std::optional<Box> tray)
-      : plan_(std::move(plan)), target_(std::move(target)), tray_(std::move(tray)) {}
+      : plan_(std::move(plan)), target_(std::move(target)), tray_(std::move(tray)) {
+    if (plan_) rectangles_ = plan_->parts();
+  }
 
   void feed(const TrainingFrame& frame);
   /// A frame needs centres for it: what lies in the tray counts as taken away.
@@ -72,6 +82,7 @@ class RestTissue {
   double targetLeft() const;                                // share of the target
   double marginLeast() const;                               // [m] from the target to the cut; below 0: through it
   double marginMean() const;
+  double clipDistance() const { return clip_distance_; }    // [m] of the farthest clip from the target's middle
   /// The piece that has the target's middle lies in the tray, or is gone.
   bool targetRemoved() const { return target_removed_; }
 
@@ -90,6 +101,8 @@ class RestTissue {
   bool hasTargetsMiddle(const Piece& piece);
 
   std::optional<CutPlan> plan_;
+  std::vector<CutPlan> rectangles_;
+  double planDistance(const Vec3& p) const;  // [m]
   std::optional<Target> target_;
   std::optional<Box> tray_;
   bool begun_ = false;
@@ -100,6 +113,7 @@ class RestTissue {
   double plan_done_ = 0.0, margin_least_ = 0.0, margin_sum_ = 0.0, margin_area_ = 0.0;
   double removed_volume_ = 0.0, removed_target_ = 0.0, whole_target_ = 0.0;
   bool target_removed_ = false;
+  double clip_distance_ = std::numeric_limits<double>::quiet_NaN();
   std::map<const BodyModel*, std::pair<BodyModelPtr, double>> targets_;  // kept alive, so that none is another's
   std::map<const BodyModel*, std::pair<BodyModelPtr, bool>> middles_;
 };

@@ -24,6 +24,7 @@ struct PressTo {
   ToolKind tool = ToolKind::kPush;
   double force = 0.0;  // [N] > 0
   std::optional<Region> region;
+  bool touch = false;  // in the region is the place where the tissue is touched; else the middle of the tool
 };
 /// A cut has come within the plan's tolerance of that share of the plan.
 struct CutAlong {
@@ -47,10 +48,11 @@ struct Clipped {
   std::string body;
   std::optional<Region> region;
 };
-/// So many picks hold the body, or pieces of it.
+/// So many picks hold the body, or pieces of it, by tissue that is in the region of the world if there is one.
 struct Hold {
   std::string body;
   int picks = 1;  // 1 to 10, at least
+  std::optional<Region> region;
 };
 /// One pick alone holds the body, and took it over from another: both held it when that one let go.
 struct HandOver {
@@ -75,12 +77,24 @@ struct Stage {
 enum class LimitKind { kTime, kForce, kStrain, kForbidden };
 const char* toString(LimitKind kind);
 
+/// A metric beyond which the task has failed: above it where lower is better, else below it.
+struct FailLimit {
+  std::string metric;
+  double value = 0.0;
+};
+
 struct TaskLimits {
   std::optional<double> time;  // [s] > 0
   MetricLimits measured;
   bool strain_limited = false;
   std::set<LimitKind> ends{LimitKind::kTime};
+  std::vector<FailLimit> fail;
 };
+
+/// What no hand of a trainee does. Where a task does not allow it, who has done it is not counted.
+enum class Intervention { kUndo, kPause, kSlow, kLoad, kRemove, kDetach, kAttach, kSpawn, kMaterial };
+constexpr std::size_t kInterventions = 9;
+const char* toString(Intervention intervention);
 
 /// A metric that counts: full marks at `good`, none at `bad`, even in between.
 struct WeightedMetric {
@@ -100,11 +114,16 @@ struct TaskDef {
   std::optional<Box> tray;
   std::vector<WeightedMetric> metrics;
   double pass_mark = 0.0;  // 0..100
+  double settle = 0.0;     // [s] >= 0 that the scene has to come to rest before the task begins
+  std::set<Intervention> allow;
+  std::string version;  // of the file: a checksum of its bytes
 
   /// Strain costs something, and is looked at where it is limited or counts.
   bool wantsStrain() const;
-  /// So does where bodies are: where a stage puts one back.
+  /// So does where bodies are: where a stage puts one back, or it is said how deep they fall.
   bool wantsCentres() const;
+  /// Whether a metric counts, or ends it.
+  bool looksAt(const std::string& metric) const;
   /// That stages want clips on.
   std::vector<std::string> vessels() const;
   /// That the world has to have.
@@ -144,6 +163,7 @@ class TaskProgress {
   void watch(const Condition& condition, const TrainingFrame& frame);
   bool meets(const Condition& condition, const TrainingFrame& frame, const RestTissue& tissue) const;
   std::string broken(const Metrics& metrics) const;
+  std::string brokenMetric(const Metrics& metrics, const RestTissue& tissue) const;
 
   const TaskDef& task_;
   /// Who holds what is to be handed over; picks have their numbers in the order in which they came.

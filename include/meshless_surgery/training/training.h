@@ -22,7 +22,8 @@ struct TrainingEvent {
 
 class Training {
  public:
-  explicit Training(TaskDef task);
+  /// `after`: another run of it came before.
+  explicit Training(TaskDef task, bool after = false);
   Training(const Training&) = delete;
   Training& operator=(const Training&) = delete;
 
@@ -35,6 +36,8 @@ class Training {
 
   const TaskDef& task() const { return task_; }
   bool begun() const { return begun_; }
+  /// The scene comes to rest, and the task begins after that, or when the trainee does something.
+  bool settling() const { return begun_ && now_->settling; }
   bool over() const { return stopped_ || now_->progress.over(); }
   const TaskProgress& progress() const { return now_->progress; }
   const Metrics& metrics() const { return now_->metrics; }
@@ -44,12 +47,21 @@ class Training {
   const Points& outline() const { return now_->outline; }  // [m] some points of the tissue at rest
   std::uint64_t firstStep() const { return now_->first_step; }
   std::uint64_t lastStep() const { return now_->last_step; }
+  std::uint32_t run() const { return run_; }             // of the world
+  double startedAt() const { return now_->started_at; }  // [s] since 1970; NaN where nobody watched
+  /// There is something to report: a hand was there, or tissue was cut, or it is over.
+  bool tried() const;
 
   std::vector<MetricValue> values() const { return metrics().values(tissue(), progress().stage()); }
-  /// 0..100: of those metrics that count; stages alone where none do.
+  /// 0..100: of those metrics that count, 0 until all stages were met; the share of the stages where none do. 0 where
+  /// it does not count.
   double score() const;
-  /// All stages were met, every metric reaches what it must, and the score the pass mark.
+  /// All stages were met, every metric reaches what it must, and the score the pass mark; and it counts.
   bool passed() const;
+  /// What was done that no hand of a trainee does, and the task does not allow: sentences. Empty: it counts.
+  std::vector<std::string> notCounted() const;
+  /// Likewise, by what does not show in the world. Nothing before the task was begun.
+  void intervened(Intervention intervention, const std::string& what);
 
  private:
   struct Now {
@@ -64,12 +76,19 @@ class Training {
     std::array<double, kHands> paths{};
     std::uint64_t first_step = 0, last_step = 0;
     double since = 0.0;
+    double started_at = std::numeric_limits<double>::quiet_NaN();
+    bool settling = false;
+    double settled = 0.0;             // [s]
+    std::uint64_t first_command = 0;  // what has this number is of the scene
+    std::map<Intervention, std::string> interventions;
   };
+  void noteInterventions(const TrainingFrame& frame);
   Status begin(const TrainingFrame& frame);
   void note(const TrainingFrame& frame, std::size_t stage_before);
 
   TaskDef task_;
-  bool begun_ = false, stopped_ = false;
+  bool separates_ = false;  // what tears is then the task, and no error
+  bool after_ = false, begun_ = false, stopped_ = false;
   std::uint32_t run_ = 0;
   std::unique_ptr<Now> now_;
 };

@@ -76,9 +76,10 @@ enum class EventType {
   kTorn,
   kLeak,
   kClipped,
-  kCollapsed
+  kCollapsed,
+  kMaterial
 };
-constexpr EventType kLastEvent = EventType::kCollapsed;
+constexpr EventType kLastEvent = EventType::kMaterial;
 const char* toString(EventType type);
 
 struct Event {
@@ -91,6 +92,8 @@ struct Event {
   std::uint32_t cavity = 0;   // of kLeak: the patch of its faces, which all pieces share that have a part of it
   BodyModelPtr removed = {};  // of kRemoved: the body that is no more, which may have come in the same step
   Pose placed = {};           // of it, as BodySnapshot::placed
+  bool taken_apart = false;   // of kDetached: by a command that is for it, and no clip
+  std::uint64_t command = 0;  // how many commands the world was given before: those of one have the same
 };
 
 /// Times [s] and work of one step; counters that a scene does not use stay at zero.
@@ -107,9 +110,9 @@ struct StepReport {
   std::size_t contact_shapes = 0;       // surfaces prepared for contact in this step
   std::size_t ground_contacts = 0;
   std::size_t push_contacts = 0;
-  std::size_t fibres = 0;     // solved in a substep, over all of them
-  std::size_t torn = 0;       // fibres
-  std::size_t mended = 0;     // bodies whose coordinates were not finite, and that start anew from rest
+  std::size_t fibres = 0;  // solved in a substep, over all of them
+  std::size_t torn = 0;    // fibres
+  std::size_t mended = 0;  // bodies whose coordinates were not finite, and that start anew from rest
 };
 
 /// Memory that a world holds [bytes]; what several bodies share counts once.
@@ -254,6 +257,10 @@ class World {
   void record(RecordSink sink);
   /// Puts the present hash into the log.
   void recordHash() const;
+  /// Says what time it is where somebody watches, and puts it into the log: [s] since 1970, NaN: nobody does, and steps
+  /// are done as fast as they can. No step depends on it, and no state has it.
+  void setWallTime(double seconds);
+  double wallTime() const;  // [s] as said last; NaN before
 
   // tracked tools
   void setScissors(const ScissorBlades& blades, double angle);  // shown from now on
