@@ -185,6 +185,17 @@ class CurvesTest(unittest.TestCase):
             self.assertEqual(2, refused.returncode)
             self.assertIn(words, refused.stderr)
 
+    def test_runs_that_do_not_count_are_left_out(self):
+        self.fill()
+        before = curves.marks([run for run in curves.read(self.folder)[0] if run.trainee == '<expert>'])
+        self.put('<expert>', 0.0, 90.0, -3.0, counted=False, passed=False)
+        runs = curves.read(self.folder)[0]
+        self.assertEqual(before, curves.marks([run for run in runs if run.trainee == '<expert>']))
+        row = next(row for row in curves.table(runs) if row['trainee'] == '<expert>')
+        self.assertEqual((4, 1, 90.0), (row['runs'], row['not_counted'], row['first_score']))
+        self.put('ada', None, 1.0, 1.0, passed=False)
+        self.assertIn('score is None', curves.read(self.folder)[1][0][1])
+
     def test_a_run_alone_is_drawn_too(self):
         self.put('ada', 50.0, 20.0, -2.0)
         self.assertEqual(0, self.program().returncode)

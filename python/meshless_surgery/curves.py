@@ -43,7 +43,10 @@ class Run:
         if not isinstance(self.date, (str, type(None))):
             raise ValueError('date is %s; accepted: a text as 2026-03-01T14:05:09Z' % self.date)
         self.score, self.passed, self.pass_mark = report['score'], report['passed'], report['pass_mark']
-        self.outcome = report['outcome']
+        for name, value in (('score', self.score), ('pass_mark', self.pass_mark)):
+            if isinstance(value, bool) or not isinstance(value, (int, float)):
+                raise ValueError('%s is %s; accepted: a number' % (name, value))
+        self.outcome, self.counted = report['outcome'], report.get('counted', True)
         self.metrics = {m['name']: m['value'] for m in report['metrics'] if m['value'] is not None}
         self.goals = {m['name']: (m['good'], m['bad']) for m in report['metrics'] if 'good' in m}
         self.units = {m['name']: m['unit'] for m in report['metrics']}
@@ -98,10 +101,10 @@ def table(runs):
     for task, trainees in grouped(runs).items():
         for trainee, own in trainees.items():
             passes = [number for number, run in enumerate(own, 1) if run.passed]
-            scores = [run.score for run in own]
+            scores = [run.score for run in own if run.counted] or [0.0]
             found = [domains(run) for run in own]
             of_domains = {domain: [marks[domain] for marks in found if marks[domain] is not None] for domain in DOMAINS}
-            rows.append({'task': task, 'trainee': trainee, 'runs': len(own), 'passed': len(passes),
+            rows.append({'task': task, 'trainee': trainee, 'runs': len(own), 'not_counted': sum(not run.counted for run in own), 'passed': len(passes),
                          'first_pass': passes[0] if passes else None, 'first_score': scores[0], 'best': max(scores),
                          'lately': statistics.fmean(scores[-LAST:]),
                          **{domain: statistics.fmean(values) if values else None for domain, values in of_domains.items()}})
@@ -114,7 +117,7 @@ def marks(runs):
     Of runs that met all stages; ValueError where a task has fewer than two."""
     found = {}
     for task, trainees in grouped(runs).items():
-        done = [run for own in trainees.values() for run in own if run.outcome == 'done']
+        done = [run for own in trainees.values() for run in own if run.outcome == 'done' and run.counted]
         if len(done) < 2:
             raise ValueError('task %s has %d runs of experts that met all stages; accepted: at least 2' % (task, len(done)))
         scores = [run.score for run in done]

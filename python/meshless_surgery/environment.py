@@ -124,7 +124,8 @@ class Environment(Base):
         self._require_open()
         if seed is not None:
             self.np_random = numpy.random.default_rng(seed)
-        if self._name is None or self._seen.task.task != self._name:
+        stopped = not self._over and self._seen is not None and not self._seen.task.running
+        if self._name is None or self._seen.task.task != self._name or stopped:
             self.surgeon.start_task(self._task, allow=['pause', 'slow'])
         else:
             self.surgeon.reset()

@@ -4,7 +4,7 @@
     runs, faults = curves.read(folder)
     validity.compare(runs, novices={'ann', 'bob'}, experts={'eve', 'zoe'})
 
-A trainee counts once, by the mean of their runs, however many these are. Needs neither ROS nor a network.
+Runs that do not count are left out. A trainee counts once, by the mean of their runs, however many these are. Needs neither ROS nor a network.
 """
 import html
 import math
@@ -63,7 +63,7 @@ def compare(runs, novices, experts):
     """{task: {'novices', 'experts': {trainee: mean score}, 'g', 'interval', 'icc', 'pass_mark', 'novices_pass', 'experts_fail',
     'metrics': {name: (mean of novices, of experts, g)}}}. ValueError where a group of a task has fewer than two trainees."""
     found = {}
-    for task, trainees in curves.grouped(runs).items():
+    for task, trainees in curves.grouped([run for run in runs if run.counted]).items():
         groups = {'novices': [t for t in trainees if t in novices], 'experts': [t for t in trainees if t in experts]}
         for group, names in groups.items():
             if len(names) < 2:

@@ -115,14 +115,21 @@ std::string CellsOfFile::add(int vtk_type, const std::int64_t* nodes, std::size_
   return "";
 }
 
-void addPolygon(const std::vector<Index>& corners, const TexturePoint* points, TriangleMesh& mesh,
-                FileTexture& texture) {
-  for (const std::array<std::size_t, 3>& triangle : trianglesOf(corners, mesh.vertices)) {
+namespace {
+
+constexpr double kMostWork = 1e9;  // looks at corners for the ears of a file's polygons: some seconds
+
+/// As triangles (polygon.h). `points`: of the corners, which `texture` gets for each triangle; or null.
+void addPolygon(const std::vector<Index>& corners, const TexturePoint* points, TriangleMesh& mesh, FileTexture& texture,
+                double& work) {
+  for (const std::array<std::size_t, 3>& triangle : trianglesOf(corners, mesh.vertices, work)) {
     mesh.triangles.push_back({corners[triangle[0]], corners[triangle[1]], corners[triangle[2]]});
     if (points)
       for (const std::size_t corner : triangle) texture.corners.push_back(points[corner]);
   }
 }
+
+}  // namespace
 
 Result<TriangleMesh> surfaceOf(const std::string& name, CellsOfFile&& cells, std::vector<std::string>& notes,
                                FileTexture& texture) {
@@ -145,10 +152,11 @@ Result<TriangleMesh> surfaceOf(const std::string& name, CellsOfFile&& cells, std
   texture.fault = cells.texture.fault;
   const TexturePoint* points = cells.texture.corners.empty() ? nullptr : cells.texture.corners.data();
   std::vector<Index> corners;
+  double work = kMostWork;
   for (std::size_t at = 0; at < cells.polygons.size(); at += 1 + cells.polygons[at]) {
     const auto first = cells.polygons.begin() + static_cast<std::ptrdiff_t>(at) + 1;
     corners.assign(first, first + cells.polygons[at]);
-    addPolygon(corners, points, mesh, texture);
+    addPolygon(corners, points, mesh, texture, work);
     if (points) points += corners.size();
   }
   return mesh;

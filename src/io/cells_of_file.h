@@ -63,8 +63,4 @@ Result<CellsOfFile> readOffCells(const std::string& name, std::string_view text)
 Result<TriangleMesh> surfaceOf(const std::string& name, CellsOfFile&& cells, std::vector<std::string>& notes,
                                FileTexture& texture);
 
-/// As triangles (polygon.h). `points`: of the corners, which `texture` gets for each triangle; or null.
-void addPolygon(const std::vector<Index>& corners, const TexturePoint* points, TriangleMesh& mesh,
-                FileTexture& texture);
-
 }  // namespace meshless

@@ -7,7 +7,7 @@
 
 namespace meshless {
 
-Result<LoadedShape> loadShape(const std::string& real_path, double scale, MeshRepair repair) {
+Result<LoadedShape> loadShape(const std::string& real_path, double scale, MeshRepair repair, const std::string& space) {
   if (!(scale > 0.0) || !std::isfinite(scale)) {
     std::ostringstream text;
     text << "scale is " << scale << "; accepted: above 0, finite";
@@ -15,11 +15,16 @@ Result<LoadedShape> loadShape(const std::string& real_path, double scale, MeshRe
   }
   LoadedShape shape;
   FileTexture texture;
-  Result<TriangleMesh> read = readMeshFile(real_path, &shape.notes, &texture);
+  Result<TriangleMesh> read = readMeshFile(real_path, &shape.notes, &texture, &shape.space);
   if (!read) return read.error();
   const std::string name = std::filesystem::path(real_path).filename().string();
   TriangleMesh mesh = std::move(*read);
   for (Vec3& p : mesh.vertices) p *= scale;
+  const bool turned = !space.empty() && !shape.space.empty() && space != shape.space;
+  if (turned)
+    for (Vec3& p : mesh.vertices) p = Vec3(-p.x(), -p.y(), p.z());
+  if (!shape.space.empty())
+    shape.notes.push_back(name + ": its coordinates are in " + shape.space + (turned ? ", turned to " + space : ""));
   if (!texture.corners.empty()) {
     Result<TextureMapPtr> map = TextureMap::make(mesh, std::move(texture.corners));
     if (map)

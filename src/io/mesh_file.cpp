@@ -116,6 +116,15 @@ Result<TriangleMesh> surfaceOfCells(const std::string& name, CellsOfFile&& cells
   return checked(name, std::move(*mesh));
 }
 
+/// In the head of a file, where comments and titles are.
+std::string spaceIn(std::string_view text) {
+  constexpr std::size_t kHead = 4096;
+  const std::string head(text.substr(0, kHead));
+  for (const char* space : kSpaces)
+    if (head.find(std::string("SPACE=") + space) != std::string::npos) return space;
+  return "";
+}
+
 Result<CellsOfFile> readCells(const std::string& name, std::string_view text, MeshFormat format) {
   switch (format) {
     case MeshFormat::kPly:
@@ -166,7 +175,8 @@ Result<TriangleMesh> readCloud(const std::string& name, std::string_view text) {
 
 }  // namespace
 
-Result<TriangleMesh> readMeshFile(const std::string& real_path, std::vector<std::string>* notes, FileTexture* texture) {
+Result<TriangleMesh> readMeshFile(const std::string& real_path, std::vector<std::string>* notes, FileTexture* texture,
+                                  std::string* space) {
   const std::string name = std::filesystem::path(real_path).filename().string();
   const Result<MeshFormat> format = meshFormatOf(name);
   if (!format) return format.error();
@@ -178,6 +188,7 @@ Result<TriangleMesh> readMeshFile(const std::string& real_path, std::vector<std:
     if (!read) return Error{read.error().code, "'" + name + "' " + read.error().detail};
     const std::string_view text = withoutMark(read->text());
     if (text.empty()) return Error{ErrorCode::kUnreadable, "'" + name + "' is empty"};
+    if (space) *space = spaceIn(text);
     if (*format == MeshFormat::kPcd) return readCloud(name, text);
     Result<CellsOfFile> cells = readCells(name, text, *format);
     if (!cells) return cells.error();

@@ -25,11 +25,13 @@ class ObjTexture {
  public:
   explicit ObjTexture(FileTexture& to) : to_(to) {}
 
-  void addPoint(const std::vector<std::string>& vt) {
+  /// False where there are too many.
+  bool addPoint(const std::vector<std::string>& vt) {
     std::array<double, 2> at{};
     for (std::size_t k = 1; k < std::min<std::size_t>(vt.size(), 3); ++k)
       at[k - 1] = numberOf(vt[k]).value_or(std::nan(""));
     points_.push_back({static_cast<float>(at[0]), static_cast<float>(at[1])});
+    return points_.size() <= kMaxCorners;
   }
   /// `number`: what follows the vertex of a face's corner, as in 7/5/3.
   void addCorner(const char* number, std::size_t line) {
@@ -118,7 +120,7 @@ Result<CellsOfFile> readObjCells(const std::string& name, std::string_view text)
       ++found.polygon_count;
       corners += w.size() - 1;
     } else {
-      if (w[0] == "vt") texture.addPoint(w);
+      if (w[0] == "vt" && !texture.addPoint(w)) return bad("there are more than 32000000 vt lines");
       continue;
     }
     if (found.points.size() > kMaxPoints || found.polygon_count > kMaxFaces || corners > kMaxCorners) break;

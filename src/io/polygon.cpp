@@ -45,11 +45,12 @@ bool isEar(const std::vector<Vec2>& at, const std::vector<std::size_t>& left, st
 
 /// The least height of the triangle over its longest side: slivers come last.
 double shape(const Vec2& a, const Vec2& b, const Vec2& c) {
-  return turn(a, b, c) / std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
+  const double longest = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
+  return longest > 0.0 ? turn(a, b, c) / longest : 0.0;
 }
 
-/// Empty where no ear is left before the end: the polygon crosses itself.
-std::vector<Corners> earsOf(const std::vector<Vec2>& at) {
+/// Empty where no ear is left before the end, as the polygon crosses itself, or no work.
+std::vector<Corners> earsOf(const std::vector<Vec2>& at, double& work) {
   std::vector<std::size_t> left(at.size());
   std::iota(left.begin(), left.end(), 0);
   std::vector<Corners> ears;
@@ -62,7 +63,11 @@ std::vector<Corners> earsOf(const std::vector<Vec2>& at) {
       shapes[k] = shape(at[left[(k + n - 1) % n]], at[left[k]], at[left[(k + 1) % n]]);
     }
     std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return shapes[a] > shapes[b]; });
-    const auto found = std::find_if(order.begin(), order.end(), [&](std::size_t k) { return isEar(at, left, k); });
+    const auto found = std::find_if(order.begin(), order.end(), [&](std::size_t k) {
+      work -= static_cast<double>(n);
+      return work < 0.0 || isEar(at, left, k);
+    });
+    if (work < 0.0) return {};
     if (found == order.end()) {
       // What is left may be without area, as the two sides of a bridge.
       const auto flat = std::find_if(order.begin(), order.end(), [&](std::size_t k) { return shapes[k] == 0.0; });
@@ -80,7 +85,7 @@ std::vector<Corners> earsOf(const std::vector<Vec2>& at) {
 
 }  // namespace
 
-std::vector<Corners> trianglesOf(const std::vector<Index>& corners, const Points& points) {
+std::vector<Corners> trianglesOf(const std::vector<Index>& corners, const Points& points, double& work) {
   const std::size_t n = corners.size();
   if (n < 3) return {};
   const bool known = std::all_of(corners.begin(), corners.end(), [&](Index k) { return k < points.size(); });
@@ -99,11 +104,11 @@ std::vector<Corners> trianglesOf(const std::vector<Index>& corners, const Points
       start = s;
     }
   }
-  if (best > 0.0 || n == 4 || !(normal.norm() > 0.0)) return fanFrom(start, n);
+  if (best > 0.0 || n == 4 || !(normal.norm() > 0.0) || work < 0.0) return fanFrom(start, n);
   const Vec3 u = normal.unitOrthogonal(), v = normal.normalized().cross(u);
   std::vector<Vec2> flat;
   for (std::size_t k = 0; k < n; ++k) flat.emplace_back((at(k) - at(0)).dot(u), (at(k) - at(0)).dot(v));
-  std::vector<Corners> ears = earsOf(flat);
+  std::vector<Corners> ears = earsOf(flat, work);
   return ears.empty() ? fanFrom(start, n) : ears;
 }
 

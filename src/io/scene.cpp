@@ -253,6 +253,8 @@ class SceneReader {
       readMaterialMap(source_, materials, images_, scene_.materials);
     const YAML::Node bodies = map.get("bodies"), obstacles = map.get("obstacles");
     const YAML::Node attachments = map.get("attachments");
+    if (const int space = map.choice("space", {kSpaces.begin(), kSpaces.end()}); space >= 0)
+      space_ = kSpaces[static_cast<std::size_t>(space)];
     map.finish();
     if (!bodies.IsSequence() || bodies.size() > kMaxBodies) {
       source_.fail(bodies.IsDefined() ? bodies : root, "bodies is " + shown(bodies), "a list of up to 10000 bodies");
@@ -495,8 +497,20 @@ class SceneReader {
     const auto key = std::make_tuple(*real, scale, repair);
     auto found = shapes_.find(key);
     if (found == shapes_.end()) {
-      Result<LoadedShape> loaded = loadShape(*real, scale, repair);
+      Result<LoadedShape> loaded = loadShape(*real, scale, repair, space_);
       if (!loaded) return source_.fail(node, loaded.error().detail, "", loaded.error().code);
+      const std::string file = fs::path(*real).filename().string();
+      if (space_.empty() && !loaded->space.empty()) {
+        if (first_space_.empty()) {
+          first_space_ = loaded->space;
+          first_of_space_ = file;
+        } else if (first_space_ != loaded->space) {
+          return source_.fail(node,
+                              "'" + file + "' has its coordinates in " + loaded->space + ", and '" + first_of_space_ +
+                                  "' in " + first_space_,
+                              "files of one space, or the scene's key space: LPS or RAS, to which all are turned");
+        }
+      }
       found = shapes_.emplace(key, std::move(*loaded)).first;
     }
     def.mesh = found->second.mesh;
@@ -541,6 +555,8 @@ class SceneReader {
   ImageFolder images_;
   SceneDef& scene_;
   std::set<std::string> names_;
+  std::string space_;                         // to which files are turned
+  std::string first_space_, first_of_space_;  // of the first file that says one, and its name
   std::map<std::tuple<std::string, double, MeshRepair>, LoadedShape>
       shapes_;  // copies and repeated files are read once
 };

@@ -24,6 +24,7 @@ class Triangles {
  public:
   explicit Triangles(CellsOfFile& to) : to_(to) {}
 
+  bool tooMany() const { return to_.points.size() > kMaxPoints; }
   /// One with two corners at one place is none.
   void add(const std::array<Vec3, 3>& corners) {
     Triangle t;
@@ -43,6 +44,10 @@ class Triangles {
     }
   };
   Index vertexAt(const Vec3& p) {
+    if (!p.allFinite()) {  // equal to no other one; the check of the mesh names it
+      to_.points.push_back(p);
+      return static_cast<Index>(to_.points.size() - 1);
+    }
     const auto [found, is_new] = vertices_.try_emplace(p + Vec3::Zero(), static_cast<Index>(to_.points.size()));
     if (is_new) to_.points.push_back(p);
     return found->second;
@@ -70,6 +75,7 @@ Status readBinary(const std::string& name, std::string_view text, Triangles& to)
     std::memcpy(numbers.data(), text.data() + kStlHead + kStlTriangle * k + 12, sizeof numbers);
     to.add({Vec3(numbers[0], numbers[1], numbers[2]), Vec3(numbers[3], numbers[4], numbers[5]),
             Vec3(numbers[6], numbers[7], numbers[8])});
+    if (to.tooMany()) break;
   }
   return Done{};
 }
@@ -83,26 +89,30 @@ Status readText(const std::string& name, std::string_view text, Triangles& to) {
   };
   for (std::string_view line; nextLine(text, line);) {
     ++line_number;
-    const std::string word = lowerCase(nextWord(line).substr(0, 20));
-    if (word == "endsolid") ended = true;
-    if (word == "solid") ended = false;
-    if (word == "endloop") {
-      if (corner != 3) return bad("a triangle has " + std::to_string(corner) + " corners; accepted: 3");
-      to.add(corners);
-      if (++faces > kMaxFaces) return checkCounts(name, 1.0, static_cast<double>(faces), 0.0).error();
+    for (std::string word; !(word = lowerCase(nextWord(line).substr(0, 20))).empty();) {
+      if (word == "solid" || word == "endsolid") {  // its name follows, of any words
+        ended = word == "endsolid";
+        break;
+      }
+      if (word == "endloop") {
+        if (corner != 3) return bad("a triangle has " + std::to_string(corner) + " corners; accepted: 3");
+        to.add(corners);
+        if (to.tooMany()) return Done{};
+        if (++faces > kMaxFaces) return checkCounts(name, 1.0, static_cast<double>(faces), 0.0).error();
+      }
+      if (word == "outer" || word == "endloop") corner = 0;
+      if (word != "vertex") continue;
+      if (corner == 3) return bad("a triangle has more than 3 corners");
+      for (int k = 0; k < 3; ++k) {
+        const std::string_view number = nextWord(line);
+        const std::optional<double> x = numberOf(number);
+        if (!x)
+          return bad(number.empty() ? "a corner has fewer than three numbers"
+                                    : "'" + printable(std::string(number.substr(0, 60))) + "' is no number");
+        corners[corner][k] = *x;
+      }
+      ++corner;
     }
-    if (word == "outer") corner = 0;
-    if (word != "vertex") continue;
-    if (corner == 3) return bad("a triangle has more than 3 corners");
-    for (int k = 0; k < 3; ++k) {
-      const std::string_view number = nextWord(line);
-      const std::optional<double> x = numberOf(number);
-      if (!x)
-        return bad(number.empty() ? "a corner has fewer than three numbers"
-                                  : "'" + printable(std::string(number.substr(0, 60))) + "' is no number");
-      corners[corner][k] = *x;
-    }
-    ++corner;
   }
   if (!ended)
     return unreadable(name, "has no endsolid behind its " + std::to_string(faces) + " triangles: it is truncated");

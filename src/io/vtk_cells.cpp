@@ -62,6 +62,10 @@ Result<CellsOfFile> readPolyData(const std::string& name, VtkText& text, const V
         if (count < 3) continue;
         if (const std::string fault = found.add(type, nodes.data(), nodes.size()); !fault.empty())
           return unreadable(name, "has damaged " + words[0] + ": one " + fault);
+        if (found.polygon_count > kMaxFaces || found.polygons.size() > kMaxFaces + kMaxCorners)
+          return checkCounts(name, 1.0, static_cast<double>(found.polygon_count),
+                             static_cast<double>(found.polygons.size()))
+              .error();
       }
       if (cells != (head.offsets ? std::max(0.0, n - 1.0) : n)) return damaged();
     }

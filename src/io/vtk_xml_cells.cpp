@@ -17,6 +17,7 @@
 namespace meshless {
 namespace {
 
+constexpr std::size_t kMostPieces = 10000;
 constexpr std::size_t kMaxTagDepth = 64;    // of tags in each other
 constexpr double kMostPacked = 1040.0;      // bytes that zlib makes of one, at most
 constexpr std::size_t kMaxBlock = 1 << 30;  // bytes
@@ -211,6 +212,7 @@ class VtuTags {
     } else if (name == "AppendedData") {
       file.appended = std::move(attributes);
     } else if (name == "Piece" && (parent == "UnstructuredGrid" || parent == "PolyData")) {
+      if (file.pieces.size() >= kMostPieces) return "has more than 10000 pieces";
       file.pieces.emplace_back();
       file.pieces.back().attributes = std::move(attributes);
     } else if (name == "DataArray" && !file.pieces.empty() &&
@@ -360,6 +362,8 @@ class VtuNumbers {
     std::size_t done = 0;
     std::string packed;
     for (const double packed_size : packed_sizes) {
+      if (!(packed_size <= static_cast<double>(compressBound(static_cast<uLong>(block)))))
+        return "have a block that is larger than its contents can be";
       if (!(packed_size <= source.most()) || !source.take(static_cast<std::size_t>(packed_size), packed))
         return "are truncated";
       const std::size_t wanted = std::min(static_cast<std::size_t>(block), size - done);
@@ -406,6 +410,7 @@ Status readCells(const std::string& name, const VtuNumbers& numbers, std::size_t
     const int kind = types ? static_cast<int>(std::min<std::int64_t>(kinds[k], 1000)) : type;
     const std::string fault = types || count > 2 ? found.add(kind, nodes.data() + from, count) : "";
     if (!fault.empty()) return unreadable(name, "is damaged: cell " + std::to_string(k) + " " + fault);
+    if (found.polygon_count > kMaxFaces) return checkCounts(name, 1.0, static_cast<double>(found.polygon_count), 0.0);
     from = offsets[k];
   }
   return Done{};

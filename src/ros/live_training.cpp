@@ -6,9 +6,11 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <set>
+#include <tuple>
 
 #include <meshless_surgery/Metrics.h>
 #include <meshless_surgery/Observe.h>
@@ -29,6 +31,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kMetricsRate = 10.0;  // [Hz]
+constexpr double kReportEvery = 5.0;   // [s]
 constexpr std::size_t kMostTrainee = 100;
 constexpr std::size_t kLongestName = 200;  // bytes of a folder's name, before its number
 constexpr int kMostReports = 100000;
@@ -131,6 +134,7 @@ Result<LoadedTask> loadTask(const std::string& task, const TrainingFolders& fold
 struct RunId {
   std::uint64_t taken = 0;
   std::uint32_t run = 0;
+  bool operator<(const RunId& other) const { return std::tie(taken, run) < std::tie(other.taken, other.run); }
   bool operator==(const RunId& other) const { return taken == other.taken && run == other.run; }
 };
 struct EndedRun {
@@ -412,22 +416,22 @@ struct LiveTraining::Handlers : Answers {
     prepare(head, task, run, started, wanted);
     Pages pages;
     done = runner.look([&](World&) {
-      there = training && training->begun();
+      there = training && training->begun() && run == RunId{taken, training->run()};
       if (there) pages = pagesOf(*training, head);
     });
     if (!done.ok()) return done.error();
-    if (!there) return Error{ErrorCode::kMissed, "no task was begun; start_task begins one"};
+    if (!there) return Error{ErrorCode::kMissed, "another run has begun meanwhile; report again"};
     return written(std::move(pages), head.log);
   }
 
   void prepare(ReportHead& head, const std::string& task, const RunId& run, double started,
                const std::string& wanted = "") {
+    std::string& name = names_of_runs[run];
     if (!wanted.empty())
-      name_of_run = wanted;
-    else if (!(named_run == run))
-      name_of_run = freeName(head.trainee, task);
-    named_run = run;
-    head.log = name_of_run;
+      name = wanted;
+    else if (name.empty())
+      name = freeName(head.trainee, task);
+    head.log = name;
     head.date = std::isfinite(started) ? dateText(started) : dateText(std::chrono::system_clock::now());
     head.earlier = readEarlierReports(folders.reports, head.trainee, task, head.log);
   }
@@ -449,10 +453,11 @@ struct LiveTraining::Handlers : Answers {
       runs.swap(ended);
     }
     for (const EndedRun& run : runs) {
+      if (reported.count(run.id)) continue;
       ReportHead head;
       head.trainee = run.trainee;
       prepare(head, run.training->task().name, run.id, run.training->startedAt());
-      say(written(pagesOf(*run.training, head), head.log));
+      if (say(written(pagesOf(*run.training, head), head.log))) reported.insert(run.id);
     }
     RunId run;
     bool due = false;
@@ -461,16 +466,16 @@ struct LiveTraining::Handlers : Answers {
       run = {taken, training->run()};
       due = training->over() && isWorthAReport(*training);
     });
-    if (!done.ok() || !due || run == reported_run) return;
-    reported_run = run;
-    say(reportNow(""));
+    if (!done.ok() || !due || reported.count(run)) return;
+    if (say(reportNow(""))) reported.insert(run);
   }
 
-  static void say(const Result<Pages>& pages) {
+  static bool say(const Result<Pages>& pages) {
     if (pages.ok())
       ROS_INFO_STREAM("the report is " << pages->folder << "/report.html");
     else
-      ROS_WARN_STREAM("no report could be written: " << pages.error().detail);
+      ROS_WARN_STREAM_THROTTLE(kReportEvery, "no report could be written: " << pages.error().detail);
+    return pages.ok();
   }
 
   /// Of what the node was in the middle of; nothing else runs any more.
@@ -514,8 +519,8 @@ struct LiveTraining::Handlers : Answers {
   std::vector<EndedRun> ended;
 
   // of the timer and the services
-  RunId named_run, reported_run;
-  std::string name_of_run;
+  std::map<RunId, std::string> names_of_runs;
+  std::set<RunId> reported;  // whole, as they are over
 
   // of the runner's thread
   std::uint64_t taken = 0;  // tasks

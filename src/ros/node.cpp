@@ -107,6 +107,7 @@ struct DeformerNode::Parts {
         forces(handle, settings, clock, inputs.tools()) {}
 
   ~Parts() {
+    (void)runner.setPaused(true);  // the log ends with the last step
     session->endLog(runner);
     // First the world, so that whoever waits for it gets an answer; the services last, as a body may be being prepared.
     runner.stop();

@@ -46,6 +46,7 @@ WorldRunner::~WorldRunner() { stop(); }
 
 void WorldRunner::start() {
   started_ = wallSeconds();
+  epoch_ = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count() - started_;
   due_ = clock_.now();
   thread_ = std::thread([this] { loop(); });
 }
@@ -207,6 +208,7 @@ Result<std::uint64_t> WorldRunner::setPaused(bool paused) {
       [&](World& world) {
         if (paused_ && !paused) due_ = clock_.now();
         paused_ = paused;
+        if (paused) sayTime(false);
         step = world.stepCount();
         if (!paused) mended();
         const std::lock_guard<std::mutex> lock(status_mutex_);
@@ -369,9 +371,8 @@ void WorldRunner::doJobs() {
 
 void WorldRunner::sayTime(bool paced) {
   if (!says_time_ || (!paced && std::isnan(said_time_))) return;
-  const double now = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-  // A clock that is set back begins anew.
-  if (paced && now >= said_time_ && now < said_time_ + kSayTimeEvery) return;
+  const double now = epoch_ + wallSeconds();  // a clock that is set does not matter
+  if (paced && now < said_time_ + kSayTimeEvery) return;
   said_time_ = paced ? now : std::numeric_limits<double>::quiet_NaN();
   world_->setWallTime(said_time_);
 }

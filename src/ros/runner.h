@@ -156,6 +156,7 @@ class WorldRunner {
   bool paused_ = false;
   double due_ = 0.0;       // [s] when the next step is; now at the start, after a pause and after a reset
   bool says_time_ = true;  // World::setWallTime, of its own steps
+  double epoch_ = 0.0;     // [s] since 1970, of the steady clock's zero
   double said_time_ = std::numeric_limits<double>::quiet_NaN();  // [s] since 1970
   std::vector<Event> own_events_;
   double last_over_budget_ = -1e300;

@@ -1,4 +1,5 @@
 // Does again what a log of commands says, and writes how a task was done in it.
+#include <algorithm>
 #include <cinttypes>
 #include <cmath>
 #include <cstdio>
@@ -40,6 +41,7 @@ int main(int argc, char** argv) {
       "log, the task begins anew there: runs before the last one, in which something was done, have their reports in "
       "LOG.run1.report and so on. Exit status: 0 the last one passed, 1 not passed, 2 no report could be made.");
   std::string log_file, task_name, out = ".", trainee, date;
+  std::vector<std::string> allow;
   double until = 1e300;
   int threads = 1;
   app.add_option("log", log_file, "the log")->required()->check(CLI::ExistingFile);
@@ -47,6 +49,11 @@ int main(int argc, char** argv) {
   app.add_option("--out", out, "the folder of reports")->capture_default_str();
   app.add_option("--trainee", trainee, "whose report it is; earlier ones of the same name are compared with it");
   app.add_option("--date", date, "when it was done, where the log does not say it: as in 2026-03-01T14:05:09Z, in UTC");
+  std::vector<std::string> words;
+  for (std::size_t k = 0; k < meshless::kInterventions; ++k)
+    words.emplace_back(toString(static_cast<meshless::Intervention>(k)));
+  app.add_option("--allow", allow, "what start_task allowed beside what the task does, which the log does not know")
+      ->check(CLI::IsMember(words));
   app.add_option("--until", until, "[s] after the task's start: what comes later does not count");
   app.add_option("--threads", threads, "1..64; the result does not depend on it")->capture_default_str();
   try {
@@ -63,18 +70,23 @@ int main(int argc, char** argv) {
   auto loaded = meshless::readTask(task_file, std::nullopt, meshless::FileAccess());
   if (!loaded.ok()) return refuse(loaded.error().detail);
 
+  for (std::size_t k = 0; k < meshless::kInterventions; ++k)
+    if (std::find(allow.begin(), allow.end(), words[k]) != allow.end())
+      loaded->task.allow.insert(static_cast<meshless::Intervention>(k));
+
   std::vector<std::unique_ptr<meshless::Training>> runs;
   runs.push_back(std::make_unique<meshless::Training>(loaded->task));
   std::optional<meshless::Error> misfit;
   std::ifstream log(log_file, std::ios::binary);
   const auto replayed = meshless::replay(log, threads, [&](meshless::World& world) {
-    meshless::TrainingFrame frame = meshless::frameOf(world, world.takeEvents(), runs.back()->wants());
+    std::vector<meshless::Event> events = world.takeEvents();
     if (misfit) return;
-    if (runs.back()->begun() && frame.run != runs.back()->run()) {
+    if (runs.back()->begun() && world.snapshot({}).run != runs.back()->run()) {
       if (!runs.back()->tried()) runs.pop_back();
       if (!runs.empty()) runs.back()->stop();
       runs.push_back(std::make_unique<meshless::Training>(loaded->task, true));
     }
+    meshless::TrainingFrame frame = meshless::frameOf(world, std::move(events), runs.back()->wants());
     const meshless::Status fed = runs.back()->feed(std::move(frame));
     if (!fed.ok()) misfit = fed.error();
     if (runs.back()->metrics().time() >= until - 1e-9) runs.back()->stop();

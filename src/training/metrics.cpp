@@ -173,17 +173,22 @@ void Metrics::feed(const TrainingFrame& frame) {
 
 void Metrics::feedHands(const TrainingFrame& frame) {
   std::array<const TrainingFrame::Tool*, kHands> tools{};
+  // Who moves a locked pick has it in the hand.
+  const auto stays = [&](const TrainingFrame::Tool& tool) {
+    const auto before = pick_places_.find(tool.pick);
+    return tool.locked && (before == pick_places_.end() || before->second == tool.position);
+  };
   // A pick stays in its hand; a new one comes into the first that is empty.
   for (PickId& held : picks_) {
     const auto still = std::find_if(frame.tools.begin(), frame.tools.end(), [&](const TrainingFrame::Tool& tool) {
-      return tool.kind == ToolKind::kPick && !tool.locked && tool.pick == held;
+      return tool.kind == ToolKind::kPick && !stays(tool) && tool.pick == held;
     });
     if (still == frame.tools.end()) held = 0;
   }
   for (const TrainingFrame::Tool& tool : frame.tools) {
     if (tool.kind == ToolKind::kPush) tools[static_cast<std::size_t>(Hand::kPush)] = &tool;
     if (tool.kind == ToolKind::kScissors) tools[static_cast<std::size_t>(Hand::kScissors)] = &tool;
-    if (tool.kind != ToolKind::kPick || tool.locked) continue;
+    if (tool.kind != ToolKind::kPick || stays(tool)) continue;
     auto hand = std::find(picks_.begin(), picks_.end(), tool.pick);
     if (hand == picks_.end()) hand = std::find(picks_.begin(), picks_.end(), PickId{0});
     if (hand == picks_.end()) continue;  // a third one
@@ -191,6 +196,9 @@ void Metrics::feedHands(const TrainingFrame& frame) {
     *hand = tool.pick;
     tools[static_cast<std::size_t>(hand - picks_.begin())] = &tool;
   }
+  pick_places_.clear();
+  for (const TrainingFrame::Tool& tool : frame.tools)
+    if (tool.kind == ToolKind::kPick) pick_places_[tool.pick] = tool.position;
   std::size_t moving = 0;
   for (std::size_t h = 0; h < kHands; ++h) {
     places_[h] = tools[h] ? std::optional<Vec3>(tools[h]->position) : std::nullopt;

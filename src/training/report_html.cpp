@@ -461,7 +461,8 @@ std::string reportHtml(const Training& training, const ReportHead& head) {
         "<h2>What counts</h2><table><tr><th>metric</th><th>value</th><th></th><th>must "
         "reach</th><th>score</th><th></th>"
         "<th>weight</th></tr>\n" +
-        metricRows(training, true) + "</table>\n<p class=\"key\">A black mark is what must be reached.</p>\n";
+        metricRows(training, true) + "</table>\n<p class=\"key\">A black mark is what must be reached." +
+        (progress.done() ? "" : " The score is 0 until all stages are met.") + "</p>\n";
   out += "<h2>Over time</h2>" + timeLine(training);
   const bool cut = !training.tissue().cut().points.empty();
   out += std::string("<h2>") +

@@ -129,6 +129,8 @@ void Training::stop() {
 }
 
 void Training::noteInterventions(const TrainingFrame& frame) {
+  if (std::isnan(frame.wall) && metrics().wallTime() > 0.0)
+    intervened(Intervention::kPause, "steps were done one by one while somebody watched");
   for (const Event& event : frame.events) {
     if (event.command <= now_->first_command && event.type != EventType::kLoaded) continue;  // the scene's own
     const std::string of = event.text + (event.text.find(event.body) == std::string::npos ? ": " + event.body : "");

@@ -161,6 +161,8 @@ void LogPlayer::add(std::string_view body, std::uint64_t& step, double& most) {
     case RecordKind::kWallTime: {
       double seconds = 0.0;
       archive(seconds);
+      if (!(seconds == kNobodyWatches || (seconds >= 0.0 && seconds <= kLastSecond)))
+        throw ArchiveFault("its time on the wall is " + std::to_string(seconds));
       if (seconds == kNobodyWatches) seconds = std::numeric_limits<double>::quiet_NaN();
       record.deed = [seconds](World& world) { world.setWallTime(seconds); };
       record.is_time = true;

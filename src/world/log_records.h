@@ -22,7 +22,8 @@ enum class RecordKind : std::uint8_t {
   kWallTime
 };
 
-constexpr double kNobodyWatches = -1.0;  // of kWallTime
+constexpr double kNobodyWatches = -1.0;         // of kWallTime
+constexpr double kLastSecond = 253402300799.0;  // [s] since 1970: of the year 9999
 
 // Commands as they are logged; those of materials and bodies have their own way.
 MESHLESS_ARCHIVE(PickCommand, point, direction, body, max_distance, stiffness)

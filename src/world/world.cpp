@@ -217,7 +217,9 @@ double World::wallTime() const { return impl_->wall_time; }
 Result<Reply> World::apply(const Command& command) {
   impl_->record(command);
   ++impl_->commands;
-  return std::visit([this](const auto& c) { return impl_->apply(c); }, command);
+  Result<Reply> reply = std::visit([this](const auto& c) { return impl_->apply(c); }, command);
+  if (!reply.ok()) --impl_->commands;  // a material's change that is refused is not in the log
+  return reply;
 }
 
 Result<SpawnReply> World::addSceneBody(std::shared_ptr<const PreparedBody> body) {

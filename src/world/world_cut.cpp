@@ -84,6 +84,7 @@ void World::Impl::closeBlades() {
       ++i;
       continue;
     }
+    ++commands;  // each is another one, though several meet in one step
     // Bodies may have been removed or cut by others while the blades closed: the names still there are cut.
     CutCommand command = c.command;
     std::string gone;

@@ -166,6 +166,14 @@ Cheats generalCheats(const std::function<void(ShippedTask&)>& good) {
                    task.seconds(longestHold(task));
                    end(task);
                  }});
+  all.push_back({"locked from place to place", [](ShippedTask& task) {
+                   const PickReply picked = grab(task, subjectOf(task), Vec3(0, -1, 0.3));
+                   for (int k = 1; k <= 4; ++k) {
+                     task.tries(LockCommand{picked.pick, picked.position + 0.05 * k * Vec3(0.5, 0, 0.5)});
+                     task.seconds(longestHold(task) / 4.0);
+                   }
+                   end(task);
+                 }});
   for (int axis = 0; axis < 3; ++axis)
     all.push_back({std::string("halved across ") + "xyz"[axis], [axis](ShippedTask& task) {
                      slice(task, axis, 1);

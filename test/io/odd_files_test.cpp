@@ -8,6 +8,7 @@
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/geometry/mesh/primitives.h"
 #include "meshless_surgery/io/files.h"
+#include "meshless_surgery/io/scene.h"
 
 namespace meshless {
 namespace odd_files_test {
@@ -92,6 +93,10 @@ TEST(OddFiles, AreReadRightAsTextComes) {
       {"capitals.stl", replaced(replaced(stl("SOLID ORGAN"), "vertex", "VERTEX"), "endsolid", "ENDSOLID")},
       {"mark.stl", mark + stl()},
       {"two.stl", stl().substr(0, stl().find("endsolid")) + "endsolid organ\nsolid other\nendsolid other\n"},
+      {"one_line.stl",
+       replaced(replaced(replaced(replaced(stl(), "0 0 0\nouter", "0 0 0 outer"), "\nvertex", " vertex"), "\nendloop",
+                         " endloop"),
+                "\nendfacet", " endfacet")},
       {"solid.stl", binaryStl("solid from a CAD program")},
       {"attribute.stl", binaryStl("x", 0, 0x7fff)},
       {"tail.stl", binaryStl("x", 0, 0, std::string(37, '\0'))},
@@ -131,6 +136,35 @@ TEST(OddFiles, AreRefusedByWhatIsWrongWithThem) {
   }
 }
 
+// Equal to nothing, not even to each other: each look for one would walk past all others.
+TEST(OddFiles, NumbersThatAreNoneTakeNoTime) {
+  const float none = std::nanf("");
+  std::string text(80, ' ');
+  const std::uint32_t count = 200000;
+  text.append(reinterpret_cast<const char*>(&count), 4);
+  for (std::uint32_t k = 0; k < count; ++k) {
+    for (int n = 0; n < 12; ++n) text.append(reinterpret_cast<const char*>(&none), 4);
+    text.append(2, '\0');
+  }
+  const TemporaryFolder folder;
+  EXPECT_FALSE(loadShape(folder.write("none.stl", text), 1.0).ok());
+}
+
+// A star that crosses itself has no ears to speak of: tens of thousands of them are given up as fans.
+TEST(OddFiles, FacesThatCrossThemselvesAreNotLookedAtForEver) {
+  std::string text;
+  for (int k = 0; k < 1000; ++k)
+    text += "v " + number("%.9f", std::cos(2.0 * M_PI * 333 * k / 1000.0)) + " " +
+            number("%.9f", std::sin(2.0 * M_PI * 333 * k / 1000.0)) + " 0\n";
+  std::string face = "f";
+  for (int k = 1; k <= 1000; ++k) face += " " + std::to_string(k);
+  for (int k = 0; k < 3000; ++k) text += face + "\n";
+  const TemporaryFolder folder;
+  const Result<TriangleMesh> read = readMeshFile(folder.write("star.obj", text));
+  ASSERT_TRUE(read.ok()) << read.error().detail;
+  EXPECT_EQ(3000u * 998u, read->triangles.size());
+}
+
 TEST(OddFiles, KeepAllDigits) {
   // A triangle of a millimetre in a frame of a map, 500 km and 5,000 km from its origin.
   const Vec3 far(500000.123456, 5000000.654321, 100.0);
@@ -156,6 +190,47 @@ TEST(OddFiles, KeepAllDigits) {
     ASSERT_EQ(3u, read->vertices.size()) << name;
     for (int k = 0; k < 3; ++k) EXPECT_EQ(corners[k], read->vertices[static_cast<std::size_t>(k)]) << name;
   }
+}
+
+// Slicer writes one lump in LPS and another in RAS, and says so in a comment.
+TEST(OddFiles, OfTwoSpacesAreBroughtTogetherOrRefused) {
+  const TemporaryFolder folder;
+  const auto written = [&](const std::string& name, const std::string& space, bool turned) {
+    std::string text = "# 3D Slicer output. SPACE=" + space + "\n";
+    for (const Vec3& p : ball().vertices) {
+      const Vec3 q = p + Vec3(0.1, 0.05, 0.02);
+      text += "v " + number("%.9f", turned ? -q.x() : q.x()) + " " + number("%.9f", turned ? -q.y() : q.y()) + " " +
+              number("%.9f", q.z()) + "\n";
+    }
+    for (const Triangle& t : ball().triangles)
+      text += "f " + std::to_string(t[0] + 1) + " " + std::to_string(t[1] + 1) + " " + std::to_string(t[2] + 1) + "\n";
+    folder.write(name, space.empty() ? text.substr(text.find('\n') + 1) : text);
+  };
+  written("ras.obj", "RAS", false);
+  written("lps.obj", "LPS", true);
+  written("none.obj", "", false);
+  const auto scene = [&](const std::string& text) {
+    FileAccess access;
+    access.folders = {folder.path()};
+    return readScene(folder.write("scene.yaml", text), access);
+  };
+  const std::string both = "bodies: [{file: ras.obj}, {file: lps.obj}, {file: none.obj}]\n";
+  const auto refused = scene(both);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(std::string::npos,
+            refused.error().detail.find("'lps.obj' has its coordinates in LPS, and 'ras.obj' in RAS"))
+      << refused.error().detail;
+  const auto together = scene(both + "space: RAS\n");
+  ASSERT_TRUE(together.ok()) << together.error().detail;
+  for (const BodyDef& body : together->bodies) {
+    Vec3 mean = Vec3::Zero();
+    for (const Vec3& p : body.mesh.vertices) mean += p / static_cast<double>(body.mesh.vertices.size());
+    EXPECT_NEAR(0.0, (mean - Vec3(0.1, 0.05, 0.02)).norm(), 1e-3) << body.name;
+    EXPECT_GT(signedVolume(body.mesh), 0.0) << body.name;
+  }
+  EXPECT_NE(std::string::npos, together->bodies[1].notes[0].find("in LPS, turned to RAS"));
+  EXPECT_TRUE(scene("bodies: [{file: lps.obj}, {file: none.obj}]").ok());
+  EXPECT_FALSE(scene(both + "space: XYZ\n").ok());
 }
 
 /// A prism of the outline, its caps one face each, as the format writes them; its volume.

@@ -105,6 +105,8 @@ std::vector<Row> rows() {
       {"the scene", "bodies: [{primitive: {sphere: 1}}]", "bodies: []", READ(s.scene.bodies.size()), "1"},
       {"the scene", "world: {substeps: 7}, bodies: []", "bodies: []", SETTING(substeps), "7"},
       {"the scene", "materials: {m: {alpha: 0.3}}, bodies: []", "bodies: []", READ(s.scene.materials.count("m")), "1"},
+      {"the scene", "space: RAS, bodies: [{file: ../lps.obj}]", "bodies: [{file: ../lps.obj}]",
+       READ(s.body.mesh.vertices.at(0).x() < 0.0), "1"},
       {"the scene", "obstacles: [{primitive: {sphere: 1}}], bodies: []", "bodies: []", READ(s.scene.obstacles.size()),
        "1"},
       {"the scene",
@@ -309,6 +311,9 @@ class SceneKeys : public ::testing::Test {
     box.vertices.emplace_back(2.0, 2.0, 2.0);  // a fin, for repair
     box.triangles.push_back({0, 1, static_cast<Index>(box.vertices.size() - 1)});
     ASSERT_TRUE(writeObj(folder_.file("fin.obj"), box, "").ok());
+    TriangleMesh beside = boxMesh(Vec3(1, 2, 3), 1, 1, 1);
+    for (Vec3& q : beside.vertices) q.x() += 5.0;
+    ASSERT_TRUE(writeObj(folder_.file("lps.obj"), beside, "SPACE=LPS").ok());
     std::filesystem::copy(std::string(SOURCE_DIR) + "/docs/images/endoscope.png", folder_.file("skin.png"));
   }
   Result<SceneDef> load(std::string scene, const Row& row, std::string keys, bool copied) {

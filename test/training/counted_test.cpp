@@ -1,4 +1,6 @@
 // What counts: when a task begins, what ends it as failed, and what no trainee's hand does.
+#include <limits>
+
 #include "meshless_surgery/world/saved_world.h"
 #include "training/played.h"
 
@@ -153,6 +155,35 @@ TEST(Counted, ASavedStateIsNoBegin) {
   ASSERT_TRUE(training.feed(frameOf(world, world.takeEvents(), training.wants())).ok());
   ASSERT_EQ(1u, training.notCounted().size());
   EXPECT_NE(std::string::npos, training.notCounted()[0].find("step 5"));
+}
+
+TEST(Counted, WhoStepsAWorldThatIsWatchedDoesNotCount) {
+  for (const bool watched : {false, true}) {
+    Session s(pickTask());
+    for (int k = 0; k < 20; ++k) {
+      if (watched) s.world.setWallTime(1e9 + k / 120.0);
+      s.step();
+    }
+    s.world.setWallTime(std::numeric_limits<double>::quiet_NaN());
+    s.pick();
+    s.step(20);
+    EXPECT_TRUE(s.training.progress().done());
+    EXPECT_EQ(!watched, s.training.passed());
+    EXPECT_EQ(watched ? 1u : 0u, s.training.notCounted().size());
+    test::expectSame(s.training, *s.replayed());
+  }
+}
+
+TEST(Counted, ALockedPickThatIsMovedIsAHand) {
+  Session s(pickTask());
+  const auto picked = s.pick();
+  s.apply<Done>(LockCommand{picked.pick, {}});
+  s.step(2);
+  s.apply<Done>(LockCommand{picked.pick, picked.position + Vec3(-0.1, 0, 0)});
+  s.step(2);
+  s.apply<Done>(LockCommand{picked.pick, picked.position + Vec3(-0.2, 0, 0)});
+  s.step(2);
+  EXPECT_TRUE(std::isfinite(s.value("top_speed.pick")));
 }
 
 TEST(Counted, EachUndoCountsThoughNoTimePasses) {

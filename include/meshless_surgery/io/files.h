@@ -41,8 +41,9 @@ struct FileTexture {
 /// ending, more than 512 MiB) and kUnsuitableShape (no points, more than 2,000,000 points, 8,000,000 faces or cells or
 /// 32,000,000 corners of them; a face of more than two volumes). Non-finite points are left to repairMesh to name, for
 /// surfaces; in clouds they are dropped; volumes with such corners are refused.
+/// `space` gets what a comment says of the coordinates: "SPACE=LPS", as Slicer writes it.
 Result<TriangleMesh> readMeshFile(const std::string& real_path, std::vector<std::string>* notes = nullptr,
-                                  FileTexture* texture = nullptr);
+                                  FileTexture* texture = nullptr, std::string* space = nullptr);
 
 /// Of the lengths of a file or primitive, as scenes and ~spawn name them; the first is what no word means.
 constexpr std::array<std::pair<const char*, double>, 3> kLengthUnits{{{"m", 1.0}, {"cm", 0.01}, {"mm", 0.001}}};
@@ -53,9 +54,15 @@ struct LoadedShape {
   TriangleMesh mesh;
   TextureMapPtr texture;  // of the mesh as it was read, scaled; null: none, or a note says why it is not used
   bool solid = true;
+  std::string space;  // of the coordinates in the file, kSpaces, as a comment in it says; empty: it says nothing
   std::vector<std::string> notes, warnings;
 };
-Result<LoadedShape> loadShape(const std::string& real_path, double scale, MeshRepair repair = MeshRepair::kMend);
+/// What a patient's coordinates may run to: x to the left, y to the back and z up (DICOM, ITK), or x to the right, y to
+/// the front and z up (Slicer, NIfTI).
+constexpr std::array<const char*, 2> kSpaces{{"LPS", "RAS"}};
+/// `space`: to which a file of the other one is turned, half a turn about z; empty: it stays as it is.
+Result<LoadedShape> loadShape(const std::string& real_path, double scale, MeshRepair repair = MeshRepair::kMend,
+                              const std::string& space = "");
 
 /// OBJ with 17 significant digits; written beside the file and renamed. false where the disk refuses.
 Status writeObj(const std::string& path, const TriangleMesh& mesh, const std::string& comment);

@@ -92,7 +92,8 @@ class Metrics {
 
   MetricLimits limits_;
   std::array<HandMotion, kHands> hands_;
-  std::array<PickId, 2> picks_{};  // in the two hands that pick
+  std::array<PickId, 2> picks_{};       // in the two hands that pick
+  std::map<PickId, Vec3> pick_places_;  // [m] of all, in the frame before
   std::array<std::optional<Vec3>, kHands> places_;
   double dt_ = 1.0, time_ = 0.0, idle_ = 0.0, any_moves_ = 0.0, both_move_ = 0.0;
   double force_ = 0.0, force_peak_ = 0.0, force_sum_ = 0.0, force_for_ = 0.0, force_above_ = 0.0;
@@ -113,7 +114,8 @@ class Metrics {
   std::map<std::uint32_t, double> heights_;  // [m] of bodies that were held: the highest since they were let go of
   bool centres_known_ = false;
   double dropped_ = 0.0;  // [m]
-  std::size_t cuts_ = 0, strokes_ = 0, undos_ = 0, torn_ = 0, drops_ = 0, grasps_ = 0, picks_at_once_ = 0, forbidden_ = 0;
+  std::size_t cuts_ = 0, strokes_ = 0, undos_ = 0, torn_ = 0, drops_ = 0, grasps_ = 0, picks_at_once_ = 0,
+              forbidden_ = 0;
   using Deed = std::pair<std::uint64_t, std::uint64_t>;  // step and command
   std::optional<Deed> last_cut_, last_stroke_, last_undo_;
   std::set<std::tuple<std::uint64_t, std::string, std::uint32_t>> opened_;  // cavities: step, body, patch
