@@ -117,7 +117,7 @@ std::string CellsOfFile::add(int vtk_type, const std::int64_t* nodes, std::size_
 
 namespace {
 
-constexpr double kMostWork = 1e9;  // looks at corners for the ears of a file's polygons: some seconds
+constexpr double kMostWork = 1e8;  // looks at corners for the ears of a file's polygons: some seconds
 
 /// As triangles (polygon.h). `points`: of the corners, which `texture` gets for each triangle; or null.
 void addPolygon(const std::vector<Index>& corners, const TexturePoint* points, TriangleMesh& mesh, FileTexture& texture,

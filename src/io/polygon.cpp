@@ -23,12 +23,13 @@ double turn(const Vec2& a, const Vec2& b, const Vec2& c) {
 
 /// Counted from a convex corner, whether another corner lies in the ear. One at the place of a corner of the ear, as a
 /// bridge has them, lies in it where its own corner opens into it.
-bool isEar(const std::vector<Vec2>& at, const std::vector<std::size_t>& left, std::size_t k) {
+bool isEar(const std::vector<Vec2>& at, const std::vector<std::size_t>& left, std::size_t k, double& work) {
   const std::size_t n = left.size(), before = (k + n - 1) % n, after = (k + 1) % n;
   const Vec2 &a = at[left[before]], &b = at[left[k]], &c = at[left[after]];
   if (!(turn(a, b, c) > 0.0)) return false;
   for (std::size_t m = 0; m < n; ++m) {
     if (m == before || m == k || m == after) continue;
+    work -= 1.0;
     const Vec2& p = at[left[m]];
     if (p == a || p == b || p == c) {
       // Its neighbours must not lie within the ear's angle there.
@@ -63,10 +64,9 @@ std::vector<Corners> earsOf(const std::vector<Vec2>& at, double& work) {
       shapes[k] = shape(at[left[(k + n - 1) % n]], at[left[k]], at[left[(k + 1) % n]]);
     }
     std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return shapes[a] > shapes[b]; });
-    const auto found = std::find_if(order.begin(), order.end(), [&](std::size_t k) {
-      work -= static_cast<double>(n);
-      return work < 0.0 || isEar(at, left, k);
-    });
+    work -= static_cast<double>(n);
+    const auto found =
+        std::find_if(order.begin(), order.end(), [&](std::size_t k) { return work < 0.0 || isEar(at, left, k, work); });
     if (work < 0.0) return {};
     if (found == order.end()) {
       // What is left may be without area, as the two sides of a bridge.
