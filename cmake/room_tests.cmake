@@ -72,6 +72,7 @@ set(shares_geometry 3)
 set(shares_body 2)
 set(shares_dynamics 2)
 set(shares_contact 2)
+set(shares_io 2)
 # Under sanitizers they take an hour and more: scripts/check --full runs one of four parts, another one each day.
 if(MESHLESS_SURGERY_SANITIZE)
   set(shares_world 16)
