@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "cut_cells.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
@@ -10,27 +11,18 @@
 namespace meshless {
 namespace {
 
-constexpr double kFollow = 0.05;  // [spacing] a blade that close to a wound that runs along it goes into it
-constexpr double kApart = 4.0;    // [spacing] tissue that meets now and is farther apart at rest lies in itself
-constexpr double kBand = 3e-3;    // [spacing] vertices that close to a blade are on it: no edges are shorter than that
+constexpr double kApart = 4.0;  // [spacing] tissue that meets now and is farther apart at rest lies in itself
+constexpr double kBand = 3e-3;  // [spacing] vertices that close to a blade are on it: no edges are shorter than that
 
 /// What is less than `least` [m^3] stays with the largest piece, as a part of its surface: needles between strokes are
 /// no bodies.
 void keepCrumbs(double least, std::vector<IncisedPiece>& pieces) {
   std::vector<IncisedPiece> kept;
   for (IncisedPiece& piece : pieces) {
-    if (kept.empty() || signedVolume(piece.mesh) >= least) {
+    if (kept.empty() || signedVolume(piece.mesh) >= least)
       kept.push_back(std::move(piece));
-      continue;
-    }
-    IncisedPiece& main = kept.front();
-    const Index first = static_cast<Index>(main.mesh.vertices.size());
-    main.mesh.vertices.insert(main.mesh.vertices.end(), piece.mesh.vertices.begin(), piece.mesh.vertices.end());
-    for (const Triangle& t : piece.mesh.triangles)
-      main.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-    main.mesh.patches.insert(main.mesh.patches.end(), piece.mesh.patches.begin(), piece.mesh.patches.end());
-    main.facing.insert(main.facing.end(), piece.facing.begin(), piece.facing.end());
-    main.origins.append(piece.origins);
+    else
+      kept.front().append(piece);
   }
   pieces = std::move(kept);
 }
@@ -91,14 +83,11 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Bl
     }
   if (!seen) return seen.error();
   if (blade.bounded()) keepCrumbs(kCrumb * std::pow(model.spacing, 3), seen->pieces);
-  std::vector<CellPieceSource> sources, collision;
-  for (const IncisedPiece& piece : seen->pieces) sources.push_back({piece.mesh, piece.origins});
-  if (touched)
-    for (const IncisedPiece& piece : touched->pieces) collision.push_back({piece.mesh, piece.origins});
   CutBody result;
   result.opened_area = seen->opened_area;
-  Result<std::vector<BodyPiece>> pieces =
-      cutCells(model, state, met, by, sources, collision, wanted.places, options.patch, result.work);
+  Result<std::vector<BodyPiece>> pieces = cutCells(model, state, met, by, std::move(seen->pieces),
+                                                   touched ? std::move(touched->pieces) : std::vector<IncisedPiece>(),
+                                                   wanted.places, options.patch, result.work);
   if (!pieces) return pieces.error();
   result.pieces = std::move(*pieces);
   return result;

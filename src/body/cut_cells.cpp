@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <sstream>
 #include <tuple>
@@ -24,15 +25,16 @@
 namespace meshless {
 namespace {
 
-constexpr double kBeneath = 1e-3;    // [spacing]
 constexpr std::size_t kChunk = 256;  // vertices
+constexpr int kAnyPiece = -1;
 
 // A vertex of a piece, or of its surface for contact, whose new cell is not known yet.
 struct EmbeddedVertex {
   Vec3 rest = Vec3::Zero();  // [m]
   Index was = kNoIndex;      // the parent's cell that it followed
   Index same = kNoIndex;     // the parent's vertex that it is; kNoIndex: this blade made it
-  bool above = false;        // on the side of its normal, of a vertex that it did not make
+  Vec3 now = Vec3::Zero();   // [m] as the blade met it
+  int side = 0;              // +1: that of the blade's normal, -1, or 0: both
 
   bool made() const { return same == kNoIndex; }
 };
@@ -62,13 +64,6 @@ bool invert(const LatticeCell& cell, const Points& x, const Vec3& q, double size
   return false;
 }
 
-// The surface for contact of a piece, at rest.
-struct PieceCollision {
-  TriangleMesh mesh;         // [m]
-  std::vector<Index> cells;  // of each vertex; kNoIndex where none of the piece's is near it
-  std::vector<Index> same;   // the parent's vertex that each is; kNoIndex: the blade made it
-};
-
 struct HashOfPlace {
   std::size_t operator()(const Vec3& p) const {
     std::size_t hash = 0;
@@ -80,13 +75,13 @@ struct HashOfPlace {
 class CellCutter {
  public:
   CellCutter(const BodyModel& model, const BodyState& state, const MetBody& met, const Blade& blade,
-             const std::vector<CellPieceSource>& sources, const std::vector<CellPieceSource>& collision)
+             std::vector<IncisedPiece> sources, std::vector<IncisedPiece> collision)
       : model_(model),
         state_(state),
         positions_(met.positions),
         blade_(blade),
-        sources_(sources),
-        collision_(collision),
+        sources_(std::move(sources)),
+        collision_(std::move(collision)),
         before_(*model.lattice),
         cut_(cutLattice(before_, met.positions, blade)),
         finder_(cut_.lattice),
@@ -115,10 +110,11 @@ class CellCutter {
            << " that lies in none of its cells";
       return Error{ErrorCode::kUnsuitableShape, text.str()};
     }
-    inChunks(surfaces_.size(), 1, [&](std::size_t s, std::size_t) { surfaces_[s].cells = cellsOf(surfaces_[s], -1); });
-    choosePieces();
-    bindCollision();
+    closeAtRest();
+    inChunks(surfaces_.size(), 1, [&](std::size_t s, std::size_t) { surfaces_[s].cells = cellsOf(surfaces_[s]); });
+    findPieces();
     sampled_ = static_cast<Index>(cells().size());
+    bindCollision();
     bind();
     joinThePieces();
     std::vector<BodyPiece> pieces(sources_.size());
@@ -137,15 +133,24 @@ class CellCutter {
   struct RestSurface {
     std::vector<EmbeddedVertex> embedded;
     TriangleMesh mesh;         // [m]
-    std::vector<Index> cells;  // of each vertex, in any piece
+    std::vector<Index> cells;  // of each vertex; kNoIndex: no tissue of its own is near
+
+    void append(const RestSurface& other) {
+      addPart(other.mesh, mesh);
+      embedded.insert(embedded.end(), other.embedded.begin(), other.embedded.end());
+      cells.insert(cells.end(), other.cells.begin(), other.cells.end());
+    }
   };
 
-  RestSurface surfaceOf(const CellPieceSource& source, const Points& parent_rest, const SurfaceBinding& parent) const {
+  RestSurface surfaceOf(const IncisedPiece& source, const Points& parent_rest, const SurfaceBinding& parent) const {
     RestSurface surface;
     surface.embedded.reserve(source.origins.size());
     surface.mesh.vertices.reserve(source.origins.size());
+    const std::vector<int> sides = sidesOf(source);
     for (Index v = 0; v < source.origins.size(); ++v) {
       surface.embedded.push_back(embeddedOf(source, v, parent_rest, parent));
+      surface.embedded.back().now = source.mesh.vertices[v];
+      surface.embedded.back().side = sides[v];
       surface.mesh.vertices.push_back(surface.embedded.back().rest);
     }
     surface.mesh.triangles = source.mesh.triangles;
@@ -153,10 +158,35 @@ class CellCutter {
     return surface;
   }
 
-  EmbeddedVertex embeddedOf(const CellPieceSource& source, Index v, const Points& parent_rest,
+  // A piece by a plane lies on one side of it. Else, of what is in a wound face along the blade by which way that
+  // faces, of the rest by its height.
+  std::vector<int> sidesOf(const IncisedPiece& source) const {
+    const Points& now = source.mesh.vertices;
+    std::vector<double> heights;
+    for (const Vec3& p : now) heights.push_back(blade_.height(p));
+    if (!blade_.bounded())
+      return std::vector<int>(now.size(), std::accumulate(heights.begin(), heights.end(), 0.0) >= 0.0 ? 1 : -1);
+    std::vector<char> beside(now.size(), 0);  // bits: tissue below, above
+    const double on = kFollow * before_.spacing;
+    for (std::size_t i = 0; i < source.mesh.triangles.size(); ++i) {
+      const Triangle& t = source.mesh.triangles[i];
+      double facing = source.facing[i];
+      if (facing == 0.0 && isCutPatch(source.mesh.patches[i]) &&
+          std::all_of(t.begin(), t.end(), [&](Index v) { return std::abs(heights[v]) <= on; }))
+        facing = (now[t[1]] - now[t[0]]).cross(now[t[2]] - now[t[0]]).dot(blade_.plane().normal);
+      if (facing != 0.0)
+        for (const Index v : t) beside[v] |= facing > 0.0 ? 1 : 2;
+    }
+    std::vector<int> sides;
+    for (std::size_t v = 0; v < now.size(); ++v)
+      sides.push_back(beside[v] == 0 ? heights[v] >= 0.0 ? 1 : -1 : beside[v] == 3 ? 0 : beside[v] == 2 ? 1 : -1);
+    return sides;
+  }
+
+  EmbeddedVertex embeddedOf(const IncisedPiece& source, Index v, const Points& parent_rest,
                             const SurfaceBinding& parent) const {
     const VertexOrigins& origins = source.origins;
-    EmbeddedVertex embedded{Vec3::Zero(), kNoIndex, origins.same(v), blade_.height(source.mesh.vertices[v]) >= 0.0};
+    EmbeddedVertex embedded{Vec3::Zero(), kNoIndex, origins.same(v)};
     if (origins.insideCap(v)) return inside_.at(source.mesh.vertices[v]);
     const VertexOrigin origin = origins[v];
     double most = 0.0;
@@ -170,6 +200,18 @@ class CellCutter {
     return embedded;
   }
 
+  // What the blade made in one place on both lips of a wound is in one place at rest too: no volume lies between.
+  void closeAtRest() {
+    std::unordered_map<Vec3, Vec3, HashOfPlace> places;
+    for (RestSurface& surface : surfaces_)
+      for (Index v = 0; v < surface.embedded.size(); ++v) {
+        EmbeddedVertex& vertex = surface.embedded[v];
+        if (!vertex.made()) continue;
+        const Vec3& first = places.emplace(vertex.now, vertex.rest).first->second;
+        if ((first - vertex.rest).norm() < kFollow * before_.spacing) vertex.rest = surface.mesh.vertices[v] = first;
+      }
+  }
+
   // Bounds of a cell as it is now.
   struct PresentBox {
     Box box;
@@ -181,7 +223,7 @@ class CellCutter {
   // Vertices inside the caps. Both sides of a cut get the same place.
   void findInside() {
     for (const auto* sources : {&sources_, &collision_})
-      for (const CellPieceSource& source : *sources)
+      for (const IncisedPiece& source : *sources)
         for (Index v = 0; v < source.origins.size(); ++v)
           if (source.origins.insideCap(v)) inside_.emplace(source.mesh.vertices[v], EmbeddedVertex());
     if (inside_.empty()) return;
@@ -232,113 +274,64 @@ class CellCutter {
 
   // --- cells that a vertex may follow
 
-  // The cells of the vertices of a surface among those of `piece` (any where it is negative).
-  std::vector<Index> cellsOf(const RestSurface& surface, int piece) const {
-    std::vector<Index> cells = surface.cells, open;
-    cells.resize(surface.embedded.size(), kNoIndex);
-    for (Index v = 0; v < cells.size(); ++v) {
-      if (piece < 0) cells[v] = cellAsBefore(surface.embedded[v]);
-      if (piece < 0 ? cells[v] != kNoIndex : cells[v] == kNoIndex || piece_of_[component_[cells[v]]] == piece) continue;
-      open.push_back(v);
-    }
-    if (open.empty()) return cells;
-    const TriangleMesh around = trianglesAround(surface, open);
-    Points normals;
-    std::optional<SolidQuery> solid;
-    atOnce([&] { solid.emplace(around); }, [&] { normals = vertexNormals(around); });
-    inChunks(open.size(), kChunk, [&](std::size_t from, std::size_t to) {
-      for (std::size_t n = from; n < to; ++n)
-        cells[open[n]] = nearestCell(surface.embedded[open[n]].rest, normals[open[n]], *solid, piece);
+  std::vector<Index> cellsOf(const RestSurface& surface) const {
+    std::vector<Index> cells(surface.embedded.size());
+    inChunks(cells.size(), kChunk, [&](std::size_t from, std::size_t to) {
+      for (std::size_t v = from; v < to; ++v) {
+        cells[v] = cellAsBefore(surface.embedded[v]);
+        if (cells[v] == kNoIndex) cells[v] = nearestCopy(surface.embedded[v]);
+      }
     });
     return cells;
   }
 
-  // A blade may leave a cell whole and part a vertex from it.
+  // A blade may leave a cell whole and part a vertex from it. Tissue that is in no sample is on one side of it.
   Index cellAsBefore(const EmbeddedVertex& embedded) const {
     const std::vector<Index>& copies = children_[embedded.was];
     if (embedded.made() || copies.size() != 1 || cut_.changed[copies[0]]) return kNoIndex;
-    const SampleSet above = cut_.above[copies[0]];
-    return cut_.lattice.cells[copies[0]].samples & (embedded.above ? ~above : above) ? kNoIndex : copies[0];
+    const Index c = copies[0];
+    const SampleSet above = cut_.above[c], samples = cut_.lattice.cells[c].samples;
+    const bool parted = samples                                ? samples & (embedded.side > 0 ? ~above : above)
+                        : embedded.side && sources_.size() > 1 ? isAbove(c) != (embedded.side > 0)
+                                                               : false;
+    return parted ? kNoIndex : c;
   }
 
-  // The triangles that reach into a place of the lattice that is next to a vertex's: no others are asked for.
-  TriangleMesh trianglesAround(const RestSurface& surface, const std::vector<Index>& vertices) const {
-    std::vector<PlaceSet::Place> places;
-    places.reserve(surface.mesh.vertices.size());
-    for (const Vec3& p : surface.mesh.vertices) places.push_back(before_.placeOf(p));
-    PlaceSet near(places, 1);
-    for (const Index v : vertices) near.at(places[v]) = true;
-    near.widen(true);
-    TriangleMesh around;
-    around.vertices = surface.mesh.vertices;
-    for (const Triangle& t : surface.mesh.triangles) {
-      PlaceSet::Place from = places[t[0]], to = from;
-      for (const Index v : t)
-        for (int k = 0; k < 3; ++k) {
-          from[k] = std::min(from[k], places[v][k]);
-          to[k] = std::max(to[k], places[v][k]);
-        }
-      bool reaches = false;
-      for (std::int32_t z = from[2]; z <= to[2]; ++z)
-        for (std::int32_t y = from[1]; y <= to[1]; ++y)
-          for (std::int32_t x = from[0]; x <= to[0]; ++x) reaches = reaches || near.has({x, y, z});
-      if (reaches) around.triangles.push_back(t);
-    }
-    return around;
+  // On which side of the blade most of a cell is.
+  bool isAbove(Index c) const {
+    const SampleSet tissue = cut_.lattice.cells[c].samples ? cut_.lattice.cells[c].samples : kAllSamples;
+    return 2 * countSamples(tissue & cut_.above[c]) >= countSamples(tissue);
   }
 
-  // That of the nearest sample which the surface does not hide from the tissue beneath the vertex.
-  Index nearestCell(const Vec3& rest, const Vec3& normal, const SolidQuery& solid, int piece) const {
-    // A cell by its nearest sample that is left, or at first by its box.
-    struct Near {
-      double squared, box;  // [spacing^2]
-      Index cell;
-      SampleSet left;
-      int bit = -1;  // not looked for yet
-      bool operator<(const Near& other) const {
-        return std::tie(squared, box, cell) < std::tie(other.squared, other.box, other.cell);
-      }
-    };
-    const Vec3 beneath = rest - kBeneath * before_.spacing * normal;
-    const std::array<std::int32_t, 3> own = before_.placeOf(rest);
-    const Vec3 place = (beneath - before_.origin) / before_.spacing;
-    const auto placeIn = [&](const LatticeCell& cell) {  // as CellLattice's
-      return Vec3(place - Vec3(cell.place[0], cell.place[1], cell.place[2]));
-    };
-    std::vector<Near> near;
-    near.reserve(64);
-    for (std::int32_t z = -1; z <= 1; ++z)
-      for (std::int32_t y = -1; y <= 1; ++y)
-        for (std::int32_t x = -1; x <= 1; ++x)
-          for (const Index c : finder_.at({own[0] + x, own[1] + y, own[2] + z})) {
-            const LatticeCell& cell = cut_.lattice.cells[c];
-            if (cell.isBridge(c) || (piece >= 0 && piece_of_[component_[c]] != piece)) continue;
-            const Vec3 within = placeIn(cell);
-            const double box = (within - within.cwiseMax(0.0).cwiseMin(1.0)).squaredNorm();
-            near.push_back({box, box, c, cell.samples});
-          }
-    while (!near.empty()) {
-      Near& next = *std::min_element(near.begin(), near.end());
-      const LatticeCell& cell = cut_.lattice.cells[next.cell];
-      if (next.bit >= 0) {
-        if (!solid.crosses(beneath, before_.restPlace(cell, samplePlace(next.bit)))) return next.cell;
-        next.left &= ~(SampleSet{1} << next.bit);
-      }
-      if (next.left) {
-        const Vec3 within = placeIn(cell);
-        next.bit = nearestSample(next.left, within);
-        next.squared = (samplePlace(next.bit) - within).squaredNorm();
-      } else {
-        next = near.back();
-        near.pop_back();
+  // The copy of its cell with the nearest tissue that the blade does not part from it; kNoIndex: there is none.
+  Index nearestCopy(const EmbeddedVertex& vertex) const {
+    Index best = kNoIndex;
+    double least = std::numeric_limits<double>::infinity();
+    const Vec3 at = before_.placeIn(before_.cells[vertex.was], vertex.rest);
+    for (const Index c : children_[vertex.was]) {
+      const LatticeCell& cell = cut_.lattice.cells[c];
+      if (cell.isBridge(c)) continue;
+      for (SampleSet left = cell.samples; left;) {
+        const int bit = nearestSample(left, at);
+        left &= ~(SampleSet{1} << bit);
+        const Vec3 sample = samplePlace(bit);
+        const double squared = (sample - at).squaredNorm();
+        if (!(squared < least)) break;
+        if (blade_.passes(vertex.now, vertex.side, presentPlace({vertex.was, sample}),
+                          cut_.above[c] >> bit & 1 ? 1 : -1))
+          continue;
+        least = squared;
+        best = c;
+        break;
       }
     }
-    return kNoIndex;
+    return best;
   }
 
   // --- which cells are in which piece
 
-  void choosePieces() {
+  // Surfaces and the tissue that they follow hang together. A vertex of both sides of the blade says nothing.
+  void findPieces() {
     UnionFind corners(cut_.lattice.corners);
     for (const LatticeCell& cell : cells())
       for (int k = 1; k < 8; ++k) corners.join(cell.corners[0], cell.corners[k]);
@@ -347,56 +340,63 @@ class CellCutter {
     for (const LatticeCell& cell : cells())
       component_.push_back(
           names.emplace(corners.find(cell.corners[0]), static_cast<Index>(names.size())).first->second);
-    piece_of_.assign(names.size(), sources_.size() == 1 ? 0 : -1);
-    seen_.assign(names.size(), false);
-    for (std::size_t p = 0; p < sources_.size(); ++p) crumb_.push_back(isCrumb(surfaces_[p].mesh));
-    std::vector<std::map<int, int>> votes(names.size());
-    for (std::size_t p = 0; p < sources_.size(); ++p)
-      for (Index v = 0; v < surfaces_[p].embedded.size() && !crumb_[p]; ++v)
-        if (const Index c = surfaces_[p].cells[v]; c != kNoIndex && !surfaces_[p].embedded[v].made())
-          ++votes[component_[c]][static_cast<int>(p)];
-    for (Index n = 0; n < names.size(); ++n) {
-      seen_[n] = !votes[n].empty();
-      int most = 0;
-      for (const auto& [p, count] : votes[n])
-        if (count > most) {
-          most = count;
-          piece_of_[n] = p;
+    const Index components = static_cast<Index>(names.size());
+    seen_.assign(components, false);
+    UnionFind pieces(components + sources_.size());
+    for (Index s = 0; s < sources_.size(); ++s)
+      for (std::size_t v = 0; v < surfaces_[s].cells.size(); ++v)
+        if (const Index c = surfaces_[s].cells[v]; c != kNoIndex && surfaces_[s].embedded[v].side != 0) {
+          seen_[component_[c]] = true;
+          pieces.join(component_[c], components + s);
         }
-    }
-    // What no vertex is in goes with most of its neighbours, of those on its side first.
-    const auto above = [&](Index c) {
-      return 2 * countSamples(cells()[c].samples & cut_.above[c]) >= countSamples(cells()[c].samples);
-    };
-    for (bool again = true; again;) {
-      again = false;
-      std::vector<std::map<int, int>> near(names.size());
-      std::vector<std::vector<Index>> users(before_.corners);
-      for (Index c = 0; c < cells().size(); ++c)
-        for (const Index corner : cells()[c].corners) users[cut_.parent_corner[corner]].push_back(c);
-      for (const std::vector<Index>& at : users)
-        for (const Index a : at) {
-          if (piece_of_[component_[a]] >= 0) continue;
-          for (const Index b : at)
-            if (piece_of_[component_[b]] >= 0)
-              near[component_[a]][piece_of_[component_[b]]] += above(a) == above(b) ? 1000 : 1;
-        }
-      for (Index n = 0; n < names.size(); ++n) {
-        int most = 0;
-        for (const auto& [p, count] : near[n])
-          if (count > most) {
-            most = count;
-            piece_of_[n] = p;
-            again = true;
-          }
+    std::vector<bool> enclosed = seen_;
+    for (const bool across : {false, true}) joinUnseen(pieces, enclosed, across);
+    std::map<Index, int> number;
+    std::vector<IncisedPiece> merged;
+    std::vector<RestSurface> surfaces;
+    for (Index s = 0; s < sources_.size(); ++s) {
+      const auto [known, is_new] = number.emplace(pieces.find(components + s), static_cast<int>(merged.size()));
+      if (is_new) {
+        merged.push_back(std::move(sources_[s]));
+        surfaces.push_back(std::move(surfaces_[s]));
+      } else {
+        merged[known->second].append(sources_[s]);
+        surfaces[known->second].append(surfaces_[s]);
       }
     }
-    for (int& piece : piece_of_) piece = std::max(piece, 0);
+    for (std::size_t s = sources_.size(); s < surfaces_.size(); ++s) surfaces.push_back(std::move(surfaces_[s]));
+    sources_ = std::move(merged);
+    surfaces_ = std::move(surfaces);
+    for (Index n = 0; n < components; ++n) {
+      const auto known = number.find(pieces.find(n));
+      piece_of_.push_back(known == number.end() ? 0 : known->second);
+    }
+    for (std::size_t p = 0; p < sources_.size(); ++p)
+      for (Index& c : surfaces_[p].cells)
+        if (c != kNoIndex && piece_of_[component_[c]] != static_cast<int>(p)) c = kNoIndex;
   }
 
-  // Less tissue than a sample stands for.
-  bool isCrumb(const TriangleMesh& rest) const {
-    return sources_.size() > 1 && signedVolume(rest) < kCrumb * std::pow(before_.spacing, 3);
+  // What no vertex is in goes with what it has a corner in common with: on its side of the blade or `across`.
+  void joinUnseen(UnionFind& pieces, std::vector<bool>& enclosed, bool across) {
+    const std::vector<std::vector<Index>> users = usersOfCorners();
+    for (bool again = true; again;) {
+      again = false;
+      for (const std::vector<Index>& at : users)
+        for (const Index a : at)
+          for (const Index b : at)
+            if (!enclosed[component_[a]] && enclosed[component_[b]] && (across || isAbove(a) == isAbove(b))) {
+              pieces.join(component_[a], component_[b]);
+              enclosed[component_[a]] = again = true;
+            }
+    }
+  }
+
+  // Of each of the parent's corners.
+  std::vector<std::vector<Index>> usersOfCorners() {
+    std::vector<std::vector<Index>> users(before_.corners);
+    for (Index c = 0; c < cells().size(); ++c)
+      for (const Index corner : cells()[c].corners) users[cut_.parent_corner[corner]].push_back(c);
+    return users;
   }
 
   // What is held has no corner in common with what is free. Links on one side of the blade hold them together.
@@ -431,52 +431,49 @@ class CellCutter {
 
   // --- the surface; what has no cell gets crumbs
 
+  // In a rim that is thinner than samples see: the nearest tissue of the piece, on the vertex's side.
+  Index beyondTheRim(const EmbeddedVertex& vertex, int piece) const {
+    return finder_.nearest(vertex.rest, [&](Index c) {
+      if (piece != kAnyPiece && piece_of_[component_[c]] != piece) return kNoSample;
+      const bool beside = blade_.bounded() && !cut_.changed[c];
+      const SampleSet side = beside || vertex.side == 0 ? kAllSamples
+                             : vertex.side > 0          ? cut_.above[c]
+                                                        : ~cut_.above[c];
+      return cut_.lattice.cells[c].samples & side;
+    });
+  }
+
   void bind() {
-    carriers_.resize(sources_.size());
+    const double least = kCrumb * std::pow(before_.spacing, 3);
     for (std::size_t p = 0; p < sources_.size(); ++p) {
-      const std::vector<EmbeddedVertex>& embedded = surfaces_[p].embedded;
-      if (crumb_[p]) {  // it goes as a whole
-        carriers_[p].assign(embedded.size(), addCrumb(withMass(embedded.front().was), static_cast<int>(p)));
-        continue;
-      }
-      carriers_[p] = cellsOf(surfaces_[p], static_cast<int>(p));
+      RestSurface& surface = surfaces_[p];
+      const bool one = signedVolume(surface.mesh) < least;  // less tissue than a sample stands for goes as a whole
       std::map<Index, Index> crumbs;
-      for (Index v = 0; v < embedded.size(); ++v) {
-        if (carriers_[p][v] != kNoIndex) continue;
-        const Index was = withMass(embedded[v].was);
+      for (Index v = 0; v < surface.cells.size(); ++v) {
+        Index& cell = surface.cells[v];
+        if (cell == kNoIndex) cell = beyondTheRim(surface.embedded[v], static_cast<int>(p));
+        if (cell != kNoIndex) continue;
+        const Index was = one && !crumbs.empty() ? crumbs.begin()->first : withMass(surface.embedded[v].was);
         const auto [known, is_new] = crumbs.emplace(was, static_cast<Index>(cells().size()));
-        carriers_[p][v] = known->second;
+        cell = known->second;
         if (is_new) addCrumb(was, static_cast<int>(p));
       }
     }
   }
 
-  // Which piece each part of the surface for contact is of, and the cells of its vertices there.
+  // The surface for contact goes with the tissue that it follows.
   void bindCollision() {
     if (surfaces_.size() == sources_.size()) return;
     collisions_.resize(sources_.size());
     for (std::size_t s = sources_.size(); s < surfaces_.size(); ++s) {
-      const RestSurface& surface = surfaces_[s];
-      if (isCrumb(surface.mesh)) continue;
-      std::vector<Index> votes(sources_.size(), 0);
-      for (Index v = 0; v < surface.embedded.size(); ++v)
-        if (const Index c = surface.cells[v]; c != kNoIndex && !surface.embedded[v].made())
-          ++votes[static_cast<std::size_t>(piece_of_[component_[c]])];
-      const std::size_t p = static_cast<std::size_t>(std::max_element(votes.begin(), votes.end()) - votes.begin());
-      PieceCollision& piece = collisions_[p];
-      const Index first = static_cast<Index>(piece.mesh.vertices.size());
-      for (const Triangle& t : surface.mesh.triangles)
-        piece.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-      piece.mesh.patches.insert(piece.mesh.patches.end(), surface.mesh.patches.begin(), surface.mesh.patches.end());
-      piece.mesh.vertices.insert(piece.mesh.vertices.end(), surface.mesh.vertices.begin(), surface.mesh.vertices.end());
-      std::vector<Index> cells = cellsOf(surface, static_cast<int>(p));
-      for (Index v = 0; v < cells.size(); ++v)
-        if (cells[v] == kNoIndex)  // in a rim that is thinner than samples see
-          cells[v] = finder_.nearest(surface.mesh.vertices[v], [&](Index c) {
-            return piece_of_[component_[c]] == static_cast<int>(p) ? cut_.lattice.cells[c].samples : kNoSample;
-          });
-      piece.cells.insert(piece.cells.end(), cells.begin(), cells.end());
-      for (const EmbeddedVertex& embedded : surface.embedded) piece.same.push_back(embedded.same);
+      RestSurface& surface = surfaces_[s];
+      const auto in = std::find_if(surface.cells.begin(), surface.cells.end(), [](Index c) { return c != kNoIndex; });
+      if (in == surface.cells.end()) continue;
+      const int p = piece_of_[component_[*in]];
+      for (Index v = 0; v < surface.cells.size(); ++v)
+        if (const Index c = surface.cells[v]; c == kNoIndex || piece_of_[component_[c]] != p)
+          surface.cells[v] = beyondTheRim(surface.embedded[v], p);
+      collisions_[static_cast<std::size_t>(p)].append(surface);
     }
   }
 
@@ -538,21 +535,17 @@ class CellCutter {
     for (std::size_t p = 0; p < sources_.size(); ++p)
       for (const Triangle& t : sources_[p].mesh.triangles)
         for (int k = 0; k < 3; ++k) {
-          const Index a = carriers_[p][t[k]], b = carriers_[p][t[(k + 1) % 3]];
+          const Index a = surfaces_[p].cells[t[k]], b = surfaces_[p].cells[t[(k + 1) % 3]];
           if (a != b && (!blade_.bounded() || component_[a] != component_[b])) joinCells(a, b);
         }
     // What no vertex is in holds to its neighbours in the piece.
-    std::vector<std::vector<Index>> users(before_.corners);
-    for (Index c = 0; c < cells().size(); ++c)
-      for (const Index corner : cells()[c].corners) users[cut_.parent_corner[corner]].push_back(c);
-    for (const std::vector<Index>& at : users)
+    for (const std::vector<Index>& at : usersOfCorners())
       for (const Index a : at)
         if (!seen_[component_[a]])
           for (const Index b : at)
             if (piece_of_[component_[a]] == piece_of_[component_[b]]) joinCells(a, b);
     for (std::size_t p = 0; p < sources_.size(); ++p)
-      while (joinByTheShortestWay(static_cast<int>(p), corners, joinCells, 4) ||
-             joinByTheShortestWay(static_cast<int>(p), corners, joinCells, 1)) {
+      while (joinByTheShortestWay(static_cast<int>(p), corners, joinCells)) {
       }
     shareWithCrumbs();
     std::vector<Index> number(cut_.lattice.corners, kNoIndex), parents;
@@ -571,9 +564,9 @@ class CellCutter {
   }
 
   // Two parts of a piece that nothing joins get crumbs of the parent's cells on the shortest way between, from face to
-  // face where they share at least 4 corners. False where there is one part, or no way.
+  // face. False where there is one part, or no way.
   template <class Join>
-  bool joinByTheShortestWay(int piece, UnionFind& corners, const Join& joinCells, int least_shared) {
+  bool joinByTheShortestWay(int piece, UnionFind& corners, const Join& joinCells) {
     UnionFind parts(component_.size());  // of components
     std::vector<Index> user(cut_.lattice.corners, kNoIndex);
     std::vector<Index> mine;
@@ -630,7 +623,7 @@ class CellCutter {
       for (const Index corner : before_.cells[at].corners)
         for (Index u = uses.offsets[corner]; u < uses.offsets[corner + 1]; ++u) ++shared[uses.cells[u]];
       for (const auto& [other, count] : shared)
-        if (count >= least_shared && from[other] == kNoIndex && !before_.cells[other].isBridge(other)) {
+        if (count >= 4 && from[other] == kNoIndex && !before_.cells[other].isBridge(other)) {
           from[other] = at;
           queue.push_back(other);
         }
@@ -651,7 +644,7 @@ class CellCutter {
   // --- bodies
 
   BodyPiece make(std::size_t p, const std::vector<TissuePlace>& places, std::uint32_t new_patch, CutWork& work) {
-    const CellPieceSource& from = sources_[p];
+    const IncisedPiece& from = sources_[p];
     BodyPiece piece;
     auto child = beginPiece(model_, from.mesh, surfaces_[p].mesh.vertices, blade_.bounded());
 
@@ -690,7 +683,11 @@ class CellCutter {
       piece.state.velocities.push_back(state_.velocities[parent]);
     }
     for (const TissuePlace& place : places) {
-      const Index c = heirNear(place);
+      Index c = kNoIndex;
+      if (place.cell != kNoIndex) {
+        c = nearestCopy(at(place));
+        if (c == kNoIndex) c = beyondTheRim(at(place), kAnyPiece);
+      }
       piece.places.push_back({c != kNoIndex ? renumbered[c] : kNoIndex, place.at});
     }
     child->lattice = lattice;
@@ -735,14 +732,14 @@ class CellCutter {
       }
       return bindToCells(*child.lattice, rest, numbers, kept);
     };
-    child.binding = bind(model_.binding, child.surface.vertices, carriers_[p],
+    child.binding = bind(model_.binding, child.surface.vertices, surfaces_[p].cells,
                          [&](Index v) { return surfaces_[p].embedded[v].same; });
     if (collisions_.empty() || collisions_[p].cells.empty()) return;
-    const PieceCollision& from = collisions_[p];
+    const RestSurface& from = collisions_[p];
     if (std::find(from.cells.begin(), from.cells.end(), kNoIndex) != from.cells.end()) return;
     child.collision = std::make_shared<CollisionSurface>(CollisionSurface{
         from.mesh,
-        bind(model_.collision->binding, from.mesh.vertices, from.cells, [&](Index v) { return from.same[v]; }),
+        bind(model_.collision->binding, from.mesh.vertices, from.cells, [&](Index v) { return from.embedded[v].same; }),
         model_.collision->distance});
   }
 
@@ -769,47 +766,11 @@ class CellCutter {
     return untouched;
   }
 
-  // The copy of its cell with the nearest tissue on its side of the blade; kNoIndex: there is none.
-  Index heirOf(const TissuePlace& place) const {
-    if (place.cell == kNoIndex) return kNoIndex;
-    const bool above = blade_.height(presentPlace(place)) >= 0.0;
-    Index best = kNoIndex;
-    double least = std::numeric_limits<double>::infinity();
-    for (const Index c : children_[place.cell]) {
-      if (cut_.lattice.cells[c].isBridge(c) || isPartedFrom(c, place)) continue;
-      const SampleSet side = !cut_.changed[c] ? kAllSamples : above ? cut_.above[c] : ~cut_.above[c];
-      const double squared = squaredToSamples(cut_.lattice.cells[c].samples & side, place.at);
-      if (squared < least) {
-        least = squared;
-        best = c;
-      }
-    }
-    return best;
-  }
-
-  // That, or else the cell with the nearest tissue on the place's side of the blade: at a rim its own may have none.
-  Index heirNear(const TissuePlace& place) const {
-    if (const Index own = heirOf(place); own != kNoIndex || place.cell == kNoIndex) return own;
-    const LatticeCell& was = before_.cells[place.cell];
-    const bool above = blade_.height(presentPlace(place)) >= 0.0;
-    Index best = kNoIndex;
-    double least = std::numeric_limits<double>::infinity();
-    const Vec3 rest = before_.restPlace(was, place.at);
-    for (Index c = 0; c < sampled_; ++c) {
-      const LatticeCell& cell = cut_.lattice.cells[c];
-      if (cell.isBridge(c)) continue;
-      const Vec3 at = before_.placeIn(cell, rest);
-      if ((at.array() < -1.0).any() || (at.array() > 2.0).any()) continue;
-      for (SampleSet left = cell.samples; left; left &= left - 1) {
-        const Vec3 sample = samplePlace(lowestSample(left));
-        const double squared = (sample - at).squaredNorm();
-        if (!(squared < least) || (blade_.height(presentPlace({cut_.parent_cell[c], sample})) >= 0.0) != above)
-          continue;
-        least = squared;
-        best = c;
-      }
-    }
-    return best;
+  EmbeddedVertex at(const TissuePlace& place) const {
+    EmbeddedVertex point{before_.restPlace(before_.cells[place.cell], place.at), place.cell};
+    point.now = presentPlace(place);
+    point.side = blade_.height(point.now) >= 0.0 ? 1 : -1;
+    return point;
   }
 
   Vec3 presentPlace(const TissuePlace& place) const {
@@ -818,20 +779,10 @@ class CellCutter {
     return now;
   }
 
-  // At a rim the blade passes between a place and all tissue of its cell, and parts no links of it.
-  bool isPartedFrom(Index cell, const TissuePlace& place) const {
-    const SampleSet samples = cut_.lattice.cells[cell].samples;
-    if (cut_.changed[cell] || !samples) return false;
-    const Vec3 border = presentPlace(place),
-               tissue = presentPlace({place.cell, samplePlace(nearestSample(samples, place.at))});
-    const int from = blade_.height(border) >= 0.0 ? 1 : -1, to = blade_.height(tissue) >= 0.0 ? 1 : -1;
-    return from != to && (!blade_.bounded() || blade_.passes(border, from, tissue, to));
-  }
-
   // What is held stays held.
   void inheritClamp(BodyModel& child, const std::vector<Index>& renumbered) const {
     for (ClampPoint point : model_.clamp_points) {
-      const Index best = heirOf({point.cell, point.at});
+      const Index best = point.cell == kNoIndex ? kNoIndex : nearestCopy(at({point.cell, point.at}));
       if (best == kNoIndex || renumbered[best] == kNoIndex) continue;
       point.cell = renumbered[best];
       child.clamp_points.push_back(point);
@@ -864,31 +815,28 @@ class CellCutter {
   const BodyState& state_;
   const Points& positions_;  // [m] of the particles, as the blade meets them
   const Blade& blade_;
-  const std::vector<CellPieceSource>&sources_, &collision_;
+  std::vector<IncisedPiece> sources_, collision_;
   const CellLattice& before_;
   CutLattice cut_;
   const CellFinder finder_;                   // knows no crumbs
   std::vector<std::vector<Index>> children_;  // of each of the parent's cells
-  std::vector<RestSurface> surfaces_;         // of each source, and then of those for contact, if they are in its cells
-  std::vector<PieceCollision> collisions_;    // of each source, or none
+  std::vector<RestSurface> surfaces_;         // of each source, then of each piece; and of what is for contact
+  std::vector<RestSurface> collisions_;       // of each piece, or none
   std::unordered_map<Vec3, EmbeddedVertex, HashOfPlace> inside_;
-  std::vector<Index> component_;              // of each cell
-  std::vector<int> piece_of_;                 // of each component
-  Index sampled_ = 0;                         // cells before crumbs were made
-  std::vector<bool> seen_;                    // a vertex is in it
-  std::vector<bool> crumb_;                   // of each source: less tissue than a sample stands for
-  std::vector<std::vector<Index>> carriers_;  // of each source's vertices
-  std::vector<Index> heir_;                   // of each of the parent's corners
+  std::vector<Index> component_;  // of each cell
+  std::vector<int> piece_of_;     // of each component
+  Index sampled_ = 0;             // cells before crumbs were made
+  std::vector<bool> seen_;        // a vertex is in it
+  std::vector<Index> heir_;       // of each of the parent's corners
 };
 
 }  // namespace
 
 Result<std::vector<BodyPiece>> cutCells(const BodyModel& model, const BodyState& state, const MetBody& met,
-                                        const Blade& blade, const std::vector<CellPieceSource>& sources,
-                                        const std::vector<CellPieceSource>& collision,
-                                        const std::vector<TissuePlace>& places, std::uint32_t new_patch,
-                                        CutWork& work) {
-  return CellCutter(model, state, met, blade, sources, collision).run(places, new_patch, work);
+                                        const Blade& blade, std::vector<IncisedPiece> sources,
+                                        std::vector<IncisedPiece> collision, const std::vector<TissuePlace>& places,
+                                        std::uint32_t new_patch, CutWork& work) {
+  return CellCutter(model, state, met, blade, std::move(sources), std::move(collision)).run(places, new_patch, work);
 }
 
 }  // namespace meshless

@@ -9,25 +9,26 @@ namespace meshless {
 
 /// Of a cell: what a sample stands for, and what tissue gets that none sees.
 constexpr double kCrumb = 1.0 / 64.0;
+/// [spacing] A blade that close to a wound that runs along it goes into it.
+constexpr double kFollow = 0.05;
 
-struct CellPieceSource {
-  const TriangleMesh& mesh;      // as the blade met it; patches filled
-  const VertexOrigins& origins;  // of its vertices
-};
-
-/// The sources are of `met`. One piece a source, in their order. Particles of the parent go on in one piece each, where
-/// their tissue is, and come first, in their order; copies follow (BodyPiece::parent_particles has kNoIndex for them).
-/// Positions and velocities of copies are those of what they are copies of, and masses add up corner by corner: mass
-/// and momentum stay. Refuses (kUnsuitableShape) where a point that the blade made lies in none of the cells.
+/// The sources are what the blade made of `met`. Surfaces and tissue that hang together are one piece: cells that links
+/// join, and all cells that a source's vertices follow. So what no sample parts stays one, and what less than a sample
+/// joins too. One piece for each such part, in the order of their first sources. A source that no tissue is in gets
+/// cells of its own, copies of those that its vertices followed, with a share of what they weigh.
 ///
-/// collision: what the same blade made of the body's surface for contact, in any order. Each goes to the piece that
-/// most of its vertices are in. A piece that gets none, or one that is not all in its cells, meets others by what is
-/// seen.
+/// Particles of the parent go on in one piece each, where their tissue is, and come first, in their order; copies
+/// follow (BodyPiece::parent_particles has kNoIndex for them). Positions and velocities of copies are those of what
+/// they are copies of, and masses add up corner by corner: mass and momentum stay. Refuses (kUnsuitableShape) where a
+/// point that the blade made lies in none of the cells.
+///
+/// collision: what the same blade made of the body's surface for contact, in any order. Each goes where its first
+/// vertex is. A piece that gets none, or one that is not all in its cells, meets others by what is seen.
 ///
 /// places: each goes on in the copy of its cell with the nearest tissue on its side of the blade, if there is any.
 Result<std::vector<BodyPiece>> cutCells(const BodyModel& model, const BodyState& state, const MetBody& met,
-                                        const Blade& blade, const std::vector<CellPieceSource>& sources,
-                                        const std::vector<CellPieceSource>& collision,
-                                        const std::vector<TissuePlace>& places, std::uint32_t new_patch, CutWork& work);
+                                        const Blade& blade, std::vector<IncisedPiece> sources,
+                                        std::vector<IncisedPiece> collision, const std::vector<TissuePlace>& places,
+                                        std::uint32_t new_patch, CutWork& work);
 
 }  // namespace meshless

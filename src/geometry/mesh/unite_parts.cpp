@@ -19,6 +19,7 @@
 #include <CGAL/boost/graph/Euler_operations.h>
 
 #include "crossings.h"
+#include "meshless_surgery/geometry/mesh/add_part.h"
 #include "meshless_surgery/geometry/query/inside.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/geometry/mesh/mesh_check.h"
@@ -112,12 +113,6 @@ std::vector<std::vector<Index>> containersOf(const std::vector<Part>& parts, con
     }
   }
   return containers;
-}
-
-void append(TriangleMesh& to, const TriangleMesh& mesh) {
-  const Index first = static_cast<Index>(to.vertices.size());
-  to.vertices.insert(to.vertices.end(), mesh.vertices.begin(), mesh.vertices.end());
-  for (const Triangle& t : mesh.triangles) to.triangles.push_back({first + t[0], first + t[1], first + t[2]});
 }
 
 ExactSurface toExact(const TriangleMesh& mesh) {
@@ -245,7 +240,7 @@ Result<TriangleMesh> cavitiesOf(const std::vector<Part>& parts, const std::vecto
   TriangleMesh all;
   for (const auto& [root, group] : members) {
     if (group.size() == 1) {
-      append(all, parts[root].mesh);
+      addPart(parts[root].mesh, all);
       continue;
     }
     std::vector<ExactSurface> turned;
@@ -258,7 +253,7 @@ Result<TriangleMesh> cavitiesOf(const std::vector<Part>& parts, const std::vecto
     if (!united) return united.error();
     TriangleMesh cavity = toRounded(*united);
     for (Triangle& t : cavity.triangles) std::swap(t[1], t[2]);
-    append(all, cavity);
+    addPart(cavity, all);
   }
   return all;
 }
@@ -276,7 +271,7 @@ std::size_t dropInner(TriangleMesh& mesh) {
     if ((around > 0) == (within > 0))
       ++dropped;
     else
-      append(kept, parts[c].mesh);
+      addPart(parts[c].mesh, kept);
   }
   if (dropped > 0) mesh = std::move(kept);
   return dropped;
@@ -323,7 +318,7 @@ class Uniting {
     for (const auto& [a, b] : crossing_) overlapping.insert({a, b});
     for (const auto& [root, group] : members) {
       if (std::none_of(group.begin(), group.end(), [&](Index c) { return overlapping.count(c) > 0; })) {
-        for (const Index c : group) append(result_.mesh, parts_[c].mesh);
+        for (const Index c : group) addPart(parts_[c].mesh, result_.mesh);
       } else if (Status united = unite(group); !united) {
         return united.error();
       }
@@ -373,7 +368,7 @@ class Uniting {
     TriangleMesh all;
     for (const Index c : group) {
       if (own_crossings_[c] > 0) return refuse(describe(parts_[c], own_crossings_[c]));
-      append(all, parts_[c].mesh);
+      addPart(parts_[c].mesh, all);
     }
     if (inspectMesh(all, false).degenerate_triangles > 0) return refuse("some have triangles without area");
     std::vector<ExactSurface> solids;
@@ -385,7 +380,7 @@ class Uniting {
       const Result<TriangleMesh> hollow = cavitiesOf(parts_, cavities, crossing_);
       if (!hollow) return hollow.error();
       TriangleMesh solid = parts_[c].mesh;
-      append(solid, *hollow);
+      addPart(*hollow, solid);
       solids.push_back(toExact(solid));
     }
     if (solids.empty()) return refuse("they enclose no volume");
@@ -397,7 +392,7 @@ class Uniting {
       return refuse("what they make together touches itself");
     for (const Part& part : partsOf(rounded).all) result_.solids += part.outwards();
     result_.volume += report.signed_volume;
-    append(result_.mesh, rounded);
+    addPart(rounded, result_.mesh);
     return Done{};
   }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "meshless_surgery/base/result.h"
+#include "meshless_surgery/geometry/mesh/add_part.h"
 #include "meshless_surgery/geometry/mesh/triangle_mesh.h"
 #include "meshless_surgery/geometry/mesh/vertex_origins.h"
 #include "meshless_surgery/geometry/query/blade.h"
@@ -41,6 +42,13 @@ struct IncisedPiece {
   VertexOrigins origins;            // one a vertex, on the parent; none (weights 0) for those inside the wound faces
   std::vector<std::int8_t> facing;  // one a triangle: +1 where it is of the new wound face that faces along the blade's
                                     // normal, -1 of the one that faces against it, 0 of neither
+
+  /// Another, as a part of it.
+  void append(const IncisedPiece& other) {
+    addPart(other.mesh, mesh);
+    origins.append(other.origins);
+    facing.insert(facing.end(), other.facing.begin(), other.facing.end());
+  }
 };
 
 struct Incision {
