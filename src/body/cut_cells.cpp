@@ -4,7 +4,6 @@
 #include <limits>
 #include <map>
 #include <numeric>
-#include <optional>
 #include <sstream>
 #include <tuple>
 #include <unordered_map>
@@ -26,6 +25,7 @@ namespace meshless {
 namespace {
 
 constexpr std::size_t kChunk = 256;  // vertices
+constexpr double kAlong = 0.9;  // cosine of the normals of a wound face that runs along the blade, and of the blade
 constexpr int kAnyPiece = -1;
 
 // A vertex of a piece, or of its surface for contact, whose new cell is not known yet.
@@ -35,6 +35,7 @@ struct EmbeddedVertex {
   Index same = kNoIndex;     // the parent's vertex that it is; kNoIndex: this blade made it
   Vec3 now = Vec3::Zero();   // [m] as the blade met it
   int side = 0;              // +1: that of the blade's normal, -1, or 0: both
+  bool kept = false;         // the blade left its cell whole
 
   bool made() const { return same == kNoIndex; }
 };
@@ -172,8 +173,11 @@ class CellCutter {
       const Triangle& t = source.mesh.triangles[i];
       double facing = source.facing[i];
       if (facing == 0.0 && isCutPatch(source.mesh.patches[i]) &&
-          std::all_of(t.begin(), t.end(), [&](Index v) { return std::abs(heights[v]) <= on; }))
-        facing = (now[t[1]] - now[t[0]]).cross(now[t[2]] - now[t[0]]).dot(blade_.plane().normal);
+          std::all_of(t.begin(), t.end(), [&](Index v) { return std::abs(heights[v]) <= on; })) {
+        const Vec3 area = (now[t[1]] - now[t[0]]).cross(now[t[2]] - now[t[0]]);
+        const double along = area.dot(blade_.plane().normal);
+        if (std::abs(along) > kAlong * area.norm()) facing = along;
+      }
       if (facing != 0.0)
         for (const Index v : t) beside[v] |= facing > 0.0 ? 1 : 2;
     }
@@ -274,12 +278,14 @@ class CellCutter {
 
   // --- cells that a vertex may follow
 
-  std::vector<Index> cellsOf(const RestSurface& surface) const {
+  std::vector<Index> cellsOf(RestSurface& surface) const {
     std::vector<Index> cells(surface.embedded.size());
     inChunks(cells.size(), kChunk, [&](std::size_t from, std::size_t to) {
       for (std::size_t v = from; v < to; ++v) {
-        cells[v] = cellAsBefore(surface.embedded[v]);
-        if (cells[v] == kNoIndex) cells[v] = nearestCopy(surface.embedded[v]);
+        EmbeddedVertex& vertex = surface.embedded[v];
+        cells[v] = cellAsBefore(vertex);
+        vertex.kept = cells[v] != kNoIndex;
+        if (!vertex.kept) cells[v] = nearestCopy(vertex);
       }
     });
     return cells;
@@ -291,16 +297,21 @@ class CellCutter {
     if (embedded.made() || copies.size() != 1 || cut_.changed[copies[0]]) return kNoIndex;
     const Index c = copies[0];
     const SampleSet above = cut_.above[c], samples = cut_.lattice.cells[c].samples;
-    const bool parted = samples                                ? samples & (embedded.side > 0 ? ~above : above)
-                        : embedded.side && sources_.size() > 1 ? isAbove(c) != (embedded.side > 0)
-                                                               : false;
+    const bool parted =
+        samples ? samples & (embedded.side > 0 ? ~above : above) : sources_.size() > 1 && isPartedFrom(c, embedded);
     return parted ? kNoIndex : c;
   }
 
   // On which side of the blade most of a cell is.
   bool isAbove(Index c) const {
-    const SampleSet tissue = cut_.lattice.cells[c].samples ? cut_.lattice.cells[c].samples : kAllSamples;
+    const SampleSet tissue = cut_.lattice.cells[c].samples;
+    if (!tissue) return blade_.height(middleOf(c)) >= 0.0;
     return 2 * countSamples(tissue & cut_.above[c]) >= countSamples(tissue);
+  }
+  Vec3 middleOf(Index c) const { return presentPlace({cut_.parent_cell[c], Vec3::Constant(0.5)}); }
+  // Of a cell that the blade left whole, or that no sample is in.
+  bool isPartedFrom(Index c, const EmbeddedVertex& vertex) const {
+    return blade_.passes(vertex.now, vertex.side, middleOf(c), isAbove(c) ? 1 : -1);
   }
 
   // The copy of its cell with the nearest tissue that the blade does not part from it; kNoIndex: there is none.
@@ -325,12 +336,16 @@ class CellCutter {
         break;
       }
     }
+    if (best == kNoIndex)  // tissue that no sample is in
+      for (const Index c : children_[vertex.was])
+        if (!cut_.lattice.cells[c].samples && !cut_.lattice.cells[c].isBridge(c) && !isPartedFrom(c, vertex)) best = c;
     return best;
   }
 
   // --- which cells are in which piece
 
-  // Surfaces and the tissue that they follow hang together. A vertex of both sides of the blade says nothing.
+  // Surfaces and the tissue that they follow hang together. Vertices whose cells the blade left whole say so; of tissue
+  // that none of these is in, the others that are on one side of the blade.
   void findPieces() {
     UnionFind corners(cut_.lattice.corners);
     for (const LatticeCell& cell : cells())
@@ -343,12 +358,17 @@ class CellCutter {
     const Index components = static_cast<Index>(names.size());
     seen_.assign(components, false);
     UnionFind pieces(components + sources_.size());
-    for (Index s = 0; s < sources_.size(); ++s)
-      for (std::size_t v = 0; v < surfaces_[s].cells.size(); ++v)
-        if (const Index c = surfaces_[s].cells[v]; c != kNoIndex && surfaces_[s].embedded[v].side != 0) {
+    for (const bool kept : {true, false}) {
+      const std::vector<bool> told = seen_;
+      for (Index s = 0; s < sources_.size(); ++s)
+        for (std::size_t v = 0; v < surfaces_[s].cells.size(); ++v) {
+          const Index c = surfaces_[s].cells[v];
+          const EmbeddedVertex& vertex = surfaces_[s].embedded[v];
+          if (c == kNoIndex || vertex.kept != kept || (!kept && (vertex.side == 0 || told[component_[c]]))) continue;
           seen_[component_[c]] = true;
           pieces.join(component_[c], components + s);
         }
+    }
     std::vector<bool> enclosed = seen_;
     for (const bool across : {false, true}) joinUnseen(pieces, enclosed, across);
     std::map<Index, int> number;
@@ -365,15 +385,33 @@ class CellCutter {
       }
     }
     for (std::size_t s = sources_.size(); s < surfaces_.size(); ++s) surfaces.push_back(std::move(surfaces_[s]));
-    sources_ = std::move(merged);
-    surfaces_ = std::move(surfaces);
+    const std::vector<Index> order = bySize(surfaces, merged.size());
+    for (std::size_t p = 0; p < merged.size(); ++p) {
+      sources_[p] = std::move(merged[order[p]]);
+      surfaces_[p] = std::move(surfaces[order[p]]);
+    }
+    for (std::size_t s = merged.size(); s < surfaces.size(); ++s) surfaces_[s] = std::move(surfaces[s]);
+    sources_.resize(merged.size());
+    surfaces_.resize(surfaces.size());
+    std::vector<int> place(order.size());
+    for (std::size_t p = 0; p < order.size(); ++p) place[order[p]] = static_cast<int>(p);
     for (Index n = 0; n < components; ++n) {
       const auto known = number.find(pieces.find(n));
-      piece_of_.push_back(known == number.end() ? 0 : known->second);
+      piece_of_.push_back(known == number.end() ? 0 : place[static_cast<std::size_t>(known->second)]);
     }
     for (std::size_t p = 0; p < sources_.size(); ++p)
       for (Index& c : surfaces_[p].cells)
         if (c != kNoIndex && piece_of_[component_[c]] != static_cast<int>(p)) c = kNoIndex;
+  }
+
+  // The first so many, largest volume first.
+  static std::vector<Index> bySize(const std::vector<RestSurface>& surfaces, std::size_t count) {
+    std::vector<double> volumes;
+    for (std::size_t p = 0; p < count; ++p) volumes.push_back(signedVolume(surfaces[p].mesh));
+    std::vector<Index> order(count);
+    std::iota(order.begin(), order.end(), Index{0});
+    std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return volumes[a] > volumes[b]; });
+    return order;
   }
 
   // What no vertex is in goes with what it has a corner in common with: on its side of the blade or `across`.
@@ -435,11 +473,10 @@ class CellCutter {
   Index beyondTheRim(const EmbeddedVertex& vertex, int piece) const {
     return finder_.nearest(vertex.rest, [&](Index c) {
       if (piece != kAnyPiece && piece_of_[component_[c]] != piece) return kNoSample;
-      const bool beside = blade_.bounded() && !cut_.changed[c];
-      const SampleSet side = beside || vertex.side == 0 ? kAllSamples
-                             : vertex.side > 0          ? cut_.above[c]
-                                                        : ~cut_.above[c];
-      return cut_.lattice.cells[c].samples & side;
+      const SampleSet samples = cut_.lattice.cells[c].samples;
+      if (vertex.side == 0) return samples;
+      if (blade_.bounded() && !cut_.changed[c]) return isPartedFrom(c, vertex) ? kNoSample : samples;
+      return samples & (vertex.side > 0 ? cut_.above[c] : ~cut_.above[c]);
     });
   }
 
@@ -467,9 +504,11 @@ class CellCutter {
     collisions_.resize(sources_.size());
     for (std::size_t s = sources_.size(); s < surfaces_.size(); ++s) {
       RestSurface& surface = surfaces_[s];
-      const auto in = std::find_if(surface.cells.begin(), surface.cells.end(), [](Index c) { return c != kNoIndex; });
-      if (in == surface.cells.end()) continue;
-      const int p = piece_of_[component_[*in]];
+      std::size_t first = 0;
+      while (first < surface.cells.size() && (surface.cells[first] == kNoIndex || surface.embedded[first].side == 0))
+        ++first;
+      if (first == surface.cells.size()) continue;
+      const int p = piece_of_[component_[surface.cells[first]]];
       for (Index v = 0; v < surface.cells.size(); ++v)
         if (const Index c = surface.cells[v]; c == kNoIndex || piece_of_[component_[c]] != p)
           surface.cells[v] = beyondTheRim(surface.embedded[v], p);
@@ -545,7 +584,8 @@ class CellCutter {
           for (const Index b : at)
             if (piece_of_[component_[a]] == piece_of_[component_[b]]) joinCells(a, b);
     for (std::size_t p = 0; p < sources_.size(); ++p)
-      while (joinByTheShortestWay(static_cast<int>(p), corners, joinCells)) {
+      while (joinByTheShortestWay(static_cast<int>(p), corners, joinCells, 4) ||
+             joinByTheShortestWay(static_cast<int>(p), corners, joinCells, 1)) {
       }
     shareWithCrumbs();
     std::vector<Index> number(cut_.lattice.corners, kNoIndex), parents;
@@ -563,10 +603,10 @@ class CellCutter {
     chooseHeirs();
   }
 
-  // Two parts of a piece that nothing joins get crumbs of the parent's cells on the shortest way between, from face to
-  // face. False where there is one part, or no way.
+  // Two parts of a piece that nothing joins get crumbs of the parent's cells on the shortest way between, over what
+  // has so many corners in common. False where there is one part, or no way.
   template <class Join>
-  bool joinByTheShortestWay(int piece, UnionFind& corners, const Join& joinCells) {
+  bool joinByTheShortestWay(int piece, UnionFind& corners, const Join& joinCells, int least_shared) {
     UnionFind parts(component_.size());  // of components
     std::vector<Index> user(cut_.lattice.corners, kNoIndex);
     std::vector<Index> mine;
@@ -623,7 +663,7 @@ class CellCutter {
       for (const Index corner : before_.cells[at].corners)
         for (Index u = uses.offsets[corner]; u < uses.offsets[corner + 1]; ++u) ++shared[uses.cells[u]];
       for (const auto& [other, count] : shared)
-        if (count >= 4 && from[other] == kNoIndex && !before_.cells[other].isBridge(other)) {
+        if (count >= least_shared && from[other] == kNoIndex && !before_.cells[other].isBridge(other)) {
           from[other] = at;
           queue.push_back(other);
         }

@@ -114,6 +114,7 @@ class PointSearch {
       if (scratch_.first[v] == kNoIndex && !inside && !mayBeginInside(a_.frame->vertices[v])) continue;
       if (search_.self == PairSearch::Self::kCuts && !a_.surface->cut_vertices[v]) continue;
       const SurfacePoint point = vertexOf(a_, v);
+      behind_point_ = SearchScratch::Behind::kUnknown;
       candidates_.clear();
       if (inside)
         gather(point, margin_ + remembered_->depth);
@@ -184,15 +185,25 @@ class PointSearch {
 
   // A surface meets itself where, beyond what overlaps, one layer of tissue is behind the point and one behind the
   // face. Elsewhere it is turned inside out, or has gone through itself, and a row would keep it so.
-  bool hasTissueBehind(const SurfacePoint& point, const NearFace& c) const {
+  bool hasTissueBehind(const SurfacePoint& point, const NearFace& c) {
     if (search_.self == PairSearch::Self::kNo || !b_.surface->closed) return true;
     const Vec3& normal = b_.frame->face_normals[c.face];
     const Triangle& t = b_.surface->triangles[c.face];
     const Points& x = b_.frame->vertices;
     const Vec3 middle = (x[t[0]] + x[t[1]] + x[t[2]]) / 3.0;  // ends of a face may lie on a rim
-    const Vec3 overlap = std::max(0.0, normal.dot(c.point - point.place)) * normal;
-    return windingAround(middle - overlap - margin_ * normal) == 1 &&
-           windingAround(point.place + overlap - margin_ * point.normal) == 1;
+    const double deep = normal.dot(c.point - point.place);
+    if (deep > 0.0)
+      return windingAround(middle - (deep + margin_) * normal) == 1 &&
+             windingAround(point.place + deep * normal - margin_ * point.normal) == 1;
+    // Where nothing overlaps, the point is asked once for all faces, and the face once for all points.
+    return isTissue(behind_point_, point.place - margin_ * point.normal) &&
+           isTissue(scratch_.behind[c.face], middle - margin_ * normal);
+  }
+
+  bool isTissue(SearchScratch::Behind& known, const Vec3& at) const {
+    using Behind = SearchScratch::Behind;
+    if (known == Behind::kUnknown) known = windingAround(at) == 1 ? Behind::kTissue : Behind::kNone;
+    return known == Behind::kTissue;
   }
 
   void gather(const SurfacePoint& point, double within) {
@@ -384,7 +395,8 @@ class PointSearch {
   const double tie_, margin_;
   std::vector<FeaturePair>& pairs_;
   std::vector<RememberedSide>& sides_;
-  const SearchScratch& scratch_;
+  SearchScratch& scratch_;
+  SearchScratch::Behind behind_point_ = SearchScratch::Behind::kUnknown;
   std::vector<NearFace>& candidates_;
   const RememberedSide* remembered_ = nullptr;
   std::size_t made_ = 0, queried_ = 0;
@@ -434,6 +446,8 @@ void findNear(const PairSearch& search, SearchScratch& scratch) {
 
 std::size_t findVertexFace(const PairSearch& search, SearchScratch& scratch) {
   findNear(search, scratch);
+  if (search.self != PairSearch::Self::kNo)
+    scratch.behind.assign(search.b.surface->triangles.size(), SearchScratch::Behind::kUnknown);
   PointSearch each(search, scratch);
   each.findVertices();
   if (search.self != PairSearch::Self::kNo) return each.queried();

@@ -40,9 +40,6 @@ template <class T>
 bool allBelow(const std::vector<T>& values, std::size_t end) {
   return std::all_of(values.begin(), values.end(), [end](T v) { return v < end; });
 }
-bool allBelowOrNone(const std::vector<Index>& values, std::size_t end) {
-  return std::all_of(values.begin(), values.end(), [end](Index v) { return v < end || v == kNoIndex; });
-}
 bool areRows(const std::vector<Index>& offsets, std::size_t rows, std::size_t entries) {
   return offsets.size() == rows + 1 && offsets.front() == 0 && offsets.back() == entries &&
          std::is_sorted(offsets.begin(), offsets.end());

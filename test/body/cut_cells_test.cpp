@@ -194,6 +194,33 @@ TEST(CutCells, ABladeThroughAWoundGivesEachPieceItsTissue) {
   EXPECT_GT(pieces, 60);
 }
 
+// A block that is cut down to its middle, and lies as it was, and then across above the wound's end: both halves of
+// what is above come off by themselves, whichever lip the vertices inside the cut are nearest to.
+TEST(CutCells, ACutAcrossAClosedWoundPartsBothSidesOfIt) {
+  for (const double edge : {0.011, 0.004})
+    for (const double askew : {0.0, 0.13, 0.5}) {
+      SCOPED_TRACE(edge);
+      SCOPED_TRACE(askew);
+      const PreparedBody body = prepared(filled(boxMesh(Vec3(0.12, 0.08, 0.08), edge), 0.02));
+      Blade down;
+      down.x_axis = Vec3(askew, 1.0, 0.0).normalized();
+      down.y_axis = Vec3::UnitZ();
+      down.origin = Vec3(0.003, 0.0, 0.05) - 0.15 * down.x_axis;
+      down.length = 0.3;
+      down.depth = 0.06;
+      const Result<CutBody> wounded = cutBody(*body.model, body.state, down);
+      ASSERT_TRUE(wounded.ok()) << wounded.error().detail;
+      ASSERT_EQ(wounded->pieces.size(), 1u);
+      const BodyPiece& whole = wounded->pieces[0];
+      const Result<CutBody> cut =
+          cutBody(*whole.model, whole.state, Blade::through({Vec3::UnitZ(), Vec3(0, 0, 0.007)}));
+      ASSERT_TRUE(cut.ok()) << cut.error().detail;
+      ASSERT_EQ(cut->pieces.size(), 3u);
+      for (const BodyPiece& piece : cut->pieces)
+        EXPECT_NEAR(piece.model->mass / body.model->mass, piece.model->rest_volume / body.model->rest_volume, 0.03);
+    }
+}
+
 // What nothing holds apart is not moved: each piece is accelerated as the whole was, but for what was cut.
 TEST(CutCells, APieceAtRestStaysAtRest) {
   PreparedBody body = prepared(filled(boxMesh(Vec3(0.2, 0.11, 0.09), 8, 4, 4), 0.03));

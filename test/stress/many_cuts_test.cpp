@@ -153,9 +153,10 @@ TEST(ManyCuts, AThousandShortIncisionsOfASlab) {
   RecordProperty("triangles", static_cast<int>(twins.world().snapshot({}).bodies[0].model->surface.triangles.size()));
 }
 
-// What lies against itself by thousands of slivers takes its time.
-TEST(ManyCuts, SixtyIncisionsOfABodyThatMeetsItself) {
-  inciseOneBody(std::max(20, static_cast<int>(60.0 * std::min(1.0, share()))), ContactMethod::kSurface);
+// Deep ones across each other: the triangles of 36 are 20,000, those of 60 are 170,000, and each step of these takes
+// minutes.
+TEST(ManyCuts, IncisionsOfABodyThatMeetsItself) {
+  inciseOneBody(std::max(20, static_cast<int>(36.0 * std::min(1.0, share()))), ContactMethod::kSurface);
 }
 
 }  // namespace many_cuts_test

@@ -30,7 +30,8 @@ struct CutWork {
 
 struct CutBody {
   /// One where the body holds together: its particles are the parent's, in their order. Else largest volume first. What
-  /// is less than a sample of a cell comes apart from no piece by a blade with bounds: it stays with the largest.
+  /// a surface or tissue joins is one piece (cut_cells.h). What is less than a sample of a cell comes apart from no
+  /// piece by a blade with bounds: it stays with the largest.
   std::vector<BodyPiece> pieces;
   double opened_area = 0.0;  // [m^2] of one wound face, present shape
   CutWork work;

@@ -49,6 +49,8 @@ struct SearchScratch {
   std::vector<Met> met;      // faces that vertices may meet
   std::vector<Index> first;  // one a vertex: of met; kNoIndex: none
   std::vector<std::array<Index, 2>> stack;
+  enum class Behind : std::uint8_t { kUnknown, kTissue, kNone };
+  std::vector<Behind> behind;  // one a face of a surface that meets itself
 };
 
 struct PairSearch {
