@@ -54,6 +54,7 @@ class ClipTest(unittest.TestCase):
         cls.display.close()
 
     def setUp(self):
+        call('stop_task', Trigger)  # one that runs refuses a pause
         self.assertTrue(call('pause', SetBool, data=False).success)
         self.assertTrue(call('reset', Trigger).success)
         rospy.sleep(1.0)  # it hangs
