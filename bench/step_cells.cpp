@@ -171,12 +171,12 @@ void runCells(benchmark::State& state, const Plain& body, InstructionSet set, bo
 }
 
 // What the world runs: matchAndMove() itself, on one thread.
-void runWorldCells(benchmark::State& state, const Plain& from) {
+void runWorldCells(benchmark::State& state, const Plain& from, const Material& material) {
   const BatchStep step = elasticStep(from);
   Plain body = from;
   int steps = 0;
   for (auto _ : state) {
-    body.step(softTissue(), step);
+    body.step(material, step);
     if (++steps % kRestart == 0) {
       state.PauseTiming();
       body.state = from.state;
@@ -243,7 +243,11 @@ void registerCells() {
   };
   add(row, [=](benchmark::State& s) { runCells(s, *body, widest, false); });
   add(row + "/2threads", [=](benchmark::State& s) { runCells(s, *body, widest, true); });
-  add(row + "/world", [=](benchmark::State& s) { runWorldCells(s, *body); });
+  add(row + "/world", [=](benchmark::State& s) { runWorldCells(s, *body, softTissue()); });
+  Material stiffening = softTissue();
+  stiffening.asymmetry = 10.0;
+  stiffening.stiffening = 5.0;
+  add(row + "/world/stiffening", [=](benchmark::State& s) { runWorldCells(s, *body, stiffening); });
   add("reference/" + row, [=](benchmark::State& s) { runPlainCells(s, *body); });
   for (InstructionSet set : {InstructionSet::kBaseline, InstructionSet::kAvx2})
     if (instructionSetAvailable(set))

@@ -19,9 +19,10 @@ function(add_bench_support name)
 endfunction()
 
 add_bench_support(bench_truth bench/static_load.cpp bench/settled_load.cpp bench/tool_load.cpp bench/truth_case.cpp
-  bench/truth_samples.cpp bench/truth_surface.cpp bench/laws.cpp)
+  bench/truth_samples.cpp bench/truth_surface.cpp bench/laws.cpp bench/measured.cpp)
 target_compile_definitions(bench_truth PUBLIC TRUTH_FOLDER="${CMAKE_CURRENT_SOURCE_DIR}/bench/truth/data"
-  CALCULIX_FOLDER="${CMAKE_CURRENT_SOURCE_DIR}/bench/truth/calculix")
+  CALCULIX_FOLDER="${CMAKE_CURRENT_SOURCE_DIR}/bench/truth/calculix"
+  MATERIALS_FOLDER="${CMAKE_CURRENT_SOURCE_DIR}/config/materials")
 add_bench_support(bench_pile bench/contact_pile.cpp)
 add_bench_support(bench_clip bench/cut_cgal_clip.cpp)
 target_link_libraries(bench_clip PRIVATE CGAL::CGAL)
@@ -32,6 +33,8 @@ endif()
 
 add_bench(accuracy bench/accuracy.cpp bench/plot.cpp)
 target_link_libraries(accuracy bench_truth CLI11::CLI11)
+add_bench(measured bench/measured_main.cpp)
+target_link_libraries(measured bench_truth ${PROJECT_NAME}_io CLI11::CLI11)
 add_bench(surfaces bench/surfaces.cpp)
 target_link_libraries(surfaces tried_drive CLI11::CLI11)
 add_bench(scaling bench/scaling.cpp bench/scaling_scenes.cpp bench/elastic_cost.cpp bench/machine_limits.cpp

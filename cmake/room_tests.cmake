@@ -84,7 +84,7 @@ set(links_world tried_drive ZLIB::ZLIB)  # its bowl; forged states have the righ
 set(links_stress ${PROJECT_NAME}_io)
 set(links_drive tried_drive)
 set(links_training ${PROJECT_NAME}_training)
-set(links_accuracy bench_truth bench_pile)
+set(links_accuracy bench_truth bench_pile ${PROJECT_NAME}_io)
 
 # The accuracy tests are many steps of plain arithmetic: nothing that sanitizers have not seen in the rooms.
 set(test_rooms base ${core_rooms} drive stress)

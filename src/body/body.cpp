@@ -18,16 +18,16 @@ namespace {
 // Of the weight that presses on the bottom of a column as long as a body: so stiff are the cells under an appearance
 // material. A column of twice that stiffness is three quarters as high under its weight.
 constexpr double kCarriedWeight = 2.0;
-constexpr double kStandardGravity = 9.81;   // [m/s^2]
-constexpr double kCarryingPoisson = 0.45;    // of these cells
+constexpr double kStandardGravity = 9.81;  // [m/s^2]
+constexpr double kCarryingPoisson = 0.45;  // of these cells
 
 // Of its length that a body may sink which stands on one of its particles, drawn to its only goal, where it needs no
 // cells to stand on.
 constexpr double kSinks = 0.05;
 
-constexpr double kNothing = 1e-9;     // of the spacing that a particle would move in a substep: not worth a ramp
+constexpr double kNothing = 1e-9;         // of the spacing that a particle would move in a substep: not worth a ramp
 constexpr double kLeastStiffened = 1e-5;  // of its stiffness that a body has, whatever it was before
-constexpr double kAtOnce = 0.99;      // so much of it may come at once
+constexpr double kAtOnce = 0.99;          // so much of it may come at once
 
 // [m/s^2] of every particle by what the body does to itself.
 Points ownAccelerations(const BodyModel& model, BodyState state, const Material& material, double h) {
@@ -41,10 +41,11 @@ Points ownAccelerations(const BodyModel& model, BodyState state, const Material&
   return accelerations;
 }
 
-// Few particles, all drawn to one stiff goal, move as one: a cube of a heap. What of a contact does not move all of them
-// is (1 - alpha)^2 of it (World::Impl::stepSurfaces).
+// Few particles, all drawn to one stiff goal, move as one: a cube of a heap. What of a contact does not move all of
+// them is (1 - alpha)^2 of it (World::Impl::stepSurfaces).
 bool standsOnItsGoal(const BodyModel& model, const Material& material) {
-  if (material.elastic() || model.clusters.size() != 1 || model.isHeld() || !material.volume.points.empty()) return false;
+  if (material.elastic() || model.clusters.size() != 1 || model.isHeld() || !material.volume.points.empty())
+    return false;
   const double yields = 1.0 - material.alpha, particles = static_cast<double>(model.rest.size());
   return yields * yields * kStandardGravity * particles < kSinks * model.length * goalStiffness(material);
 }
@@ -52,15 +53,16 @@ bool standsOnItsGoal(const BodyModel& model, const Material& material) {
 }  // namespace
 
 ElasticParameters elasticityOf(const Material& material, double length) {
-  if (material.elastic())
-    return elasticParameters(material.youngs_modulus, material.poissons_ratio, material.density);
+  if (material.elastic()) return elasticParameters(material.youngs_modulus, material.poissons_ratio, material.density);
   return elasticParameters(kCarriedWeight * kStandardGravity * length * material.density, kCarryingPoisson,
                            material.density);
 }
 
 ElasticParameters ownElasticity(const BodyModel& model, const Material& material, double factor) {
-  return elasticParameters(factor * model.specific_stiffness * material.density, model.poissons_ratio,
-                           material.density);
+  ElasticParameters own =
+      elasticParameters(factor * model.specific_stiffness * material.density, model.poissons_ratio, material.density);
+  if (material.elastic()) own.stiffening = material.stiffening, own.asymmetry = material.asymmetry;
+  return own;
 }
 
 void makeElastic(BodyModel& model) {
@@ -106,8 +108,8 @@ void makeTissue(BodyModel& model, const Material& material) {
   model.poissons_ratio = material.elastic() ? material.poissons_ratio : kCarryingPoisson;
   if (!material.elastic() && (!model.lattice || standsOnItsGoal(model, material))) return;
   makeElastic(model);
-  model.highest_frequency = model.cells ? highestFrequency(*model.cells, own)
-                                        : highestFrequency(matchInput(model), model.elastic, own);
+  model.highest_frequency =
+      model.cells ? highestFrequency(*model.cells, own) : highestFrequency(matchInput(model), model.elastic, own);
 }
 
 BodyModelPtr withMaterial(const BodyModelPtr& model, const Material& before, const Material& after) {
@@ -180,7 +182,10 @@ double stiffenedBy(const BodyModel& before, const Material& old, const BodyModel
 
 RegionTissue regionTissue(const Material& own, const Material& body) {
   const ElasticParameters parameters = elasticParameters(own.youngs_modulus, own.poissons_ratio, own.density);
-  return {own, own.density / body.density, parameters.mu / body.youngs_modulus, parameters.lambda / body.youngs_modulus,
+  return {own,
+          own.density / body.density,
+          parameters.mu / body.youngs_modulus,
+          parameters.lambda / body.youngs_modulus,
           parameters.youngs / body.youngs_modulus};
 }
 

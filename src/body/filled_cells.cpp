@@ -43,6 +43,8 @@ ElasticMix mixOf(const BodyModel& model, const LatticeCell& cell) {
     mix.mu += share * tissue.mu;
     mix.lambda += share * tissue.lambda;
     mix.youngs += share * tissue.youngs;
+    mix.stiffening += share * tissue.material.stiffening;
+    mix.asymmetry += share * tissue.material.asymmetry;
     own &= ~part.samples;
   }
   mix.own = countSamples(own) / all;

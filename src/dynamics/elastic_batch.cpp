@@ -88,6 +88,9 @@ ElasticBatch::ElasticBatch(const ElasticCells& body) {
       mix[elastic_sets::kOwnRow * kBlock] = cell.mix.own;
       mix[elastic_sets::kShearRow * kBlock] = 2.0 * cell.mix.mu;
       mix[elastic_sets::kPressureRow * kBlock] = cell.mix.lambda;
+      mix[elastic_sets::kStiffeningRow * kBlock] = cell.mix.stiffening;
+      mix[elastic_sets::kAsymmetryRow * kBlock] = cell.mix.asymmetry;
+      mix_stiffens_ = mix_stiffens_ || cell.mix.stiffens();
     }
   };
   add(whole, 0);
@@ -224,6 +227,9 @@ double ElasticBatch::accelerate(const MatchInput& in, const ElasticParameters& m
     block.pressure = material.lambda / material.density;
     block.hourglass = kHourglass * material.youngs / material.density;
     block.youngs = material.youngs / material.density;
+    block.stiffens = material.stiffens() || (block.mixes && mix_stiffens_);
+    block.stiffening = material.stiffening;
+    block.asymmetry = material.asymmetry;
     block.rotations = state.rotations.data() + index * 4 * kBlock;
     block.forces = state.forces.data() + index * 3 * kCorners * kBlock;
     const elastic_sets::BlockResult result = accelerateBlock(block, set);

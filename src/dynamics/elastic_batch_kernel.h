@@ -15,6 +15,10 @@ constexpr double kLeastVolume = -0.8;
 constexpr double kMostVolume = 1.5;
 constexpr double kModeSquare = 2.0 / 3.0;
 constexpr double kDrawnOut = 12.0;
+constexpr double kMostStiffening = 10.0;
+constexpr double kLevel = 40.0;
+constexpr double kFourth = 0.25;
+constexpr double kCurved = 40.0, kCurvedFrom = 4.0;
 
 constexpr int kMostSteps = 4;     // of Newton's method; from one substep to the next two do
 constexpr double kStep6 = 1e-25;  // length^6 of the last step, times the condition number squared: 3e-13 rad are left
@@ -268,8 +272,67 @@ MESHLESS_INLINE Lame lameOf(const Block& b, int i) {
   return {shear, pressure, pressure / (pressure + shear)};
 }
 
-// Stress over density, and the steepness of the pressure (stress() of elastic.cpp) into most where it is larger.
-MESHLESS_INLINE Matrix stress(const Block& b, const Matrix& gradient, const Lame& lame, int i, Pack& most) {
+// Of a lane, as ElasticParameters has them.
+struct Growth {
+  Pack stiffening, asymmetry;
+};
+MESHLESS_INLINE Growth growthOf(const Block& b, int i) {
+  if (!b.mixes) return {all(b.stiffening), all(b.asymmetry)};
+  const double* const mix = b.mixes + i;
+  const Pack own = get(mix + kOwnRow * kBlock);
+  return {own * b.stiffening + get(mix + kStiffeningRow * kBlock),
+          own * b.asymmetry + get(mix + kAsymmetryRow * kBlock)};
+}
+
+// distortion() of elastic_law.h: half its slope, and its curvature.
+MESHLESS_INLINE Matrix distort(const Matrix& f, const Matrix& r, const Growth& growth, Pack& curvature) {
+  Matrix d;
+  Pack trace = {};
+  for (int row = 0; row < 3; ++row)
+    for (int c = 0; c < 3; ++c) {
+      d.m[row][c] = f.m[row][c] - r.m[row][c];
+      trace += r.m[row][c] * d.m[row][c];
+    }
+  const Pack third = (1.0 / 3.0) * trace;
+  Pack m = {};
+  for (int row = 0; row < 3; ++row)
+    for (int c = 0; c < 3; ++c) {
+      d.m[row][c] -= third * r.m[row][c];
+      m += d.m[row][c] * d.m[row][c];
+    }
+  Matrix strain, square;
+  for (int row = 0; row < 3; ++row)
+    for (int c = 0; c < 3; ++c)
+      strain.m[row][c] = r.m[0][row] * d.m[0][c] + r.m[1][row] * d.m[1][c] + r.m[2][row] * d.m[2][c];
+  Pack cubed = {};
+  for (int row = 0; row < 3; ++row)
+    for (int c = 0; c < 3; ++c) {
+      square.m[row][c] = d.m[row][0] * strain.m[0][c] + d.m[row][1] * strain.m[1][c] + d.m[row][2] * strain.m[2][c];
+      cubed += square.m[row][c] * d.m[row][c];
+    }
+  const Pack a = growth.asymmetry, x = a * a * m;
+  const Pack level = 1.0 / (1.0 + (1.0 / kLevel) * x), u = squareRoot(level), fourth = kFourth * (x * level);
+  const Pack q = m + trace * third - a * cubed * u + fourth * m;
+  const Pack by_m = 1.0 + (0.5 / kLevel) * (a * a * a) * (cubed * u * level) + fourth * (1.0 + level), by_c = -a * u;
+  const Pack grown = 1.0 / (1.0 + (1.0 / (kMostStiffening - 1.0)) * (growth.stiffening * q));
+  const Pack steep = 1.0 + growth.stiffening * (q * grown);
+  const Pack turned = third - 0.5 * (by_c * m), squares = 1.5 * by_c;
+  Matrix half;
+  Pack norm2 = {};
+  for (int row = 0; row < 3; ++row)
+    for (int c = 0; c < 3; ++c) {
+      const Pack by_f = turned * r.m[row][c] + by_m * d.m[row][c] + squares * square.m[row][c];
+      norm2 += by_f * by_f;
+      half.m[row][c] = steep * by_f;
+    }
+  curvature =
+      steep * (2.0 + (kCurved - 2.0) * x / (kCurvedFrom + x)) + 4.0 * (growth.stiffening * (grown * grown)) * norm2;
+  return half;
+}
+
+// Stress over density, and the steepness, as stress() of elastic_law.h.
+template <bool kStiffens>
+MESHLESS_INLINE Matrix stress(const Block& b, const Matrix& gradient, const Lame& lame, int i, Pack& steepness) {
   Matrix f;
   for (int row = 0; row < 3; ++row)
     for (int c = 0; c < 3; ++c) f.m[row][c] = b.shrink * gradient.m[row][c];
@@ -289,13 +352,22 @@ MESHLESS_INLINE Matrix stress(const Block& b, const Matrix& gradient, const Lame
   holdLess(f, norm2, j, slope, share);
   const Pack strain = volumeStrain(j);
   const Pack pressure = lame.pressure * strain;
-  Pack steepness = choose(strain < 0.0, -strain, strain) * (share * squareRoot(norm2));
+  steepness = choose(strain < 0.0, -strain, strain) * (share * squareRoot(norm2));
   for (int row = 0; row < 3; ++row)
     for (int c = 0; c < 3; ++c) steepness += slope.m[row][c] * slope.m[row][c];
-  most = steepness > most ? steepness : most;
   Matrix p;
-  for (int row = 0; row < 3; ++row)
-    for (int c = 0; c < 3; ++c) p.m[row][c] = lame.shear * (f.m[row][c] - r.m[row][c]) + pressure * slope.m[row][c];
+  if constexpr (kStiffens) {
+    Pack curvature;
+    p = distort(f, r, growthOf(b, i), curvature);
+    const Pack grown =
+        (lame.pressure * steepness + 0.5 * (lame.shear * curvature)) / (lame.pressure + (1.0 / 3.0) * lame.shear);
+    steepness = grown > steepness ? grown : steepness;
+    for (int row = 0; row < 3; ++row)
+      for (int c = 0; c < 3; ++c) p.m[row][c] = lame.shear * p.m[row][c] + pressure * slope.m[row][c];
+  } else {
+    for (int row = 0; row < 3; ++row)
+      for (int c = 0; c < 3; ++c) p.m[row][c] = lame.shear * (f.m[row][c] - r.m[row][c]) + pressure * slope.m[row][c];
+  }
   return p;
 }
 
@@ -420,7 +492,7 @@ namespace {
 
 enum class Kind { kCluster, kWhole, kPartial };
 
-template <Kind kKind>
+template <Kind kKind, bool kStiffens>
 MESHLESS_INLINE BlockResult accelerateOf(const Block& b) {
   BlockResult result;
   Fits fits;
@@ -439,7 +511,11 @@ MESHLESS_INLINE BlockResult accelerateOf(const Block& b) {
   for (int i = 0; i < b.count; i += kLanes) {
     const Matrix f = matrixAt(fits.gradient, i);
     const Lame lame = lameOf(b, i);
-    Matrix p = stress(b, f, lame, i, most);
+    Pack steepness;
+    Matrix p = stress<kStiffens>(b, f, lame, i, steepness);
+    if (i + kLanes > b.count)  // what only fills up has no rotation of its own
+      for (int l = b.count - i; l < kLanes; ++l) steepness[l] = 0.0;
+    most = steepness > most ? steepness : most;
     if constexpr (kKind == Kind::kCluster) {
       pushAny(b, fits, f, p, i);
     } else {
@@ -452,11 +528,14 @@ MESHLESS_INLINE BlockResult accelerateOf(const Block& b) {
   return result;
 }
 
+template <bool kStiffens>
+MESHLESS_INLINE BlockResult accelerateBy(const Block& b) {
+  if (b.shape) return accelerateOf<Kind::kCluster, kStiffens>(b);
+  return b.cells ? accelerateOf<Kind::kPartial, kStiffens>(b) : accelerateOf<Kind::kWhole, kStiffens>(b);
+}
+
 }  // namespace
 
-BlockResult accelerate(const Block& b) {
-  if (b.shape) return accelerateOf<Kind::kCluster>(b);
-  return b.cells ? accelerateOf<Kind::kPartial>(b) : accelerateOf<Kind::kWhole>(b);
-}
+BlockResult accelerate(const Block& b) { return b.stiffens ? accelerateBy<true>(b) : accelerateBy<false>(b); }
 
 }  // namespace meshless::elastic_sets::MESHLESS_SET

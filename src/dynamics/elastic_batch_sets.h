@@ -29,7 +29,9 @@ constexpr int kCellRows = kVarianceRow + 3;
 constexpr int kOwnRow = 0;              // share of the material of the block
 constexpr int kShearRow = kOwnRow + 1;  // what others add to `shear` over `youngs`, and to `pressure`
 constexpr int kPressureRow = kShearRow + 1;
-constexpr int kMixRows = kPressureRow + 1;
+constexpr int kStiffeningRow = kPressureRow + 1;  // what others add to these
+constexpr int kAsymmetryRow = kStiffeningRow + 1;
+constexpr int kMixRows = kAsymmetryRow + 1;
 
 /// Clusters of at most eight members that span space, by their `shape`; or, where that is null, cubes of one size,
 /// their corners in the order of the bits of x, y, z: filled in part as `cells` says, or whole and of the body's
@@ -48,8 +50,11 @@ struct Block {
   double pressure = 0.0;                     // lambda / rho
   double hourglass = 0.0;                    // k E / rho
   double youngs = 0.0;                       // E / rho
-  double* rotations = nullptr;               // [4][kBlock] x y z w, unit
-  double* forces = nullptr;                  // [3 * kCorners][kBlock], written
+  bool stiffens = false;                     // where not, the two below are not read
+  double stiffening = 0.0;
+  double asymmetry = 0.0;
+  double* rotations = nullptr;  // [4][kBlock] x y z w, unit
+  double* forces = nullptr;     // [3 * kCorners][kBlock], written
 };
 
 struct BlockResult {

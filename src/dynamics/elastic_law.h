@@ -48,18 +48,59 @@ inline HeldVolume heldVolume(const Mat3& f) {
   return held;
 }
 
+constexpr double kMostStiffening = 10.0;  // the most that the slope of the energy by q grows
+constexpr double kLevel = 40.0;           // a^2 |d|^2 from which q grows with |d|^2 again: stress stays bounded
+constexpr double kFourth = 0.25;          // of a^2 |d|^4 in q; it is convex from 0.2 on
+constexpr double kCurved = 40.0,
+                 kCurvedFrom = 4.0;  // q'' is at most 2 + (kCurved - 2) x / (kCurvedFrom + x), x = a^2 |d|^2
+
+// What shear and stretch cost without change of volume: over mu.
+struct Distortion {
+  double energy = 0.0;
+  Mat3 slope = Mat3::Zero();  // by F
+  double curvature = 2.0;     // its second derivative by the strain, at most
+};
+inline Distortion distortion(const ElasticParameters& material, const Mat3& f, const Mat3& rotation) {
+  const Mat3 off = f - rotation;
+  if (!material.stiffens()) return {off.squaredNorm(), 2.0 * off, 2.0};
+  const double trace = rotation.cwiseProduct(off).sum();
+  const Mat3 d = off - trace / 3.0 * rotation, strain = rotation.transpose() * d, square = d * strain;  // R d, d, R d^2
+  const double m = d.squaredNorm(), c = square.cwiseProduct(d).sum(), a = material.asymmetry;
+  const double level = 1.0 / (1.0 + a * a * m / kLevel), u = std::sqrt(level), fourth = kFourth * a * a * m * level;
+  const double q = m + trace * trace / 3.0 - a * c * u + fourth * m;
+  const double by_m = 1.0 + 0.5 * a * c * u * level * a * a / kLevel + fourth * (1.0 + level), by_c = -a * u;
+  const double grown = 1.0 / (1.0 + material.stiffening * q / (kMostStiffening - 1.0));
+  const double steep = 1.0 + material.stiffening * q * grown;
+  const Mat3 by_f = (2.0 / 3.0 * trace - by_c * m) * rotation + 2.0 * by_m * d + 3.0 * by_c * square;
+  Distortion result;
+  result.slope = steep * by_f;
+  const double x = a * a * m;
+  result.curvature = steep * (2.0 + (kCurved - 2.0) * x / (kCurvedFrom + x)) +
+                     material.stiffening * grown * grown * by_f.squaredNorm();
+  const double rate = material.stiffening / (kMostStiffening - 1.0);
+  // The integral of W', by its series where the closed form cancels.
+  const double z = rate * q;
+  const double excess = z < 1e-3 ? z * z * (0.5 - z * (1.0 / 3.0 - z * (0.25 - 0.2 * z))) : z - std::log1p(z);
+  result.energy = q + (rate > 0.0 ? (kMostStiffening - 1.0) * excess / rate : 0.0);
+  return result;
+}
+
 // First Piola-Kirchhoff stress of the fixed-corotated law. `steepness`: the square of how much faster than at rest the
 // pressure makes the cluster, times 3.
 inline Mat3 stress(const ElasticParameters& material, const Mat3& f, const Mat3& rotation, double& steepness) {
   const HeldVolume held = heldVolume(f);
   const double strain = volumeStrain(held.j);
   steepness = held.slope.squaredNorm() + std::abs(strain) * held.share * f.norm();
-  return 2.0 * material.mu * (f - rotation) + material.lambda * strain * held.slope;
+  const Distortion distorted = distortion(material, f, rotation);
+  if (material.stiffens())
+    steepness = std::max(steepness, 3.0 * (material.lambda * steepness + material.mu * distorted.curvature) /
+                                        (3.0 * material.lambda + 2.0 * material.mu));
+  return material.mu * distorted.slope + material.lambda * strain * held.slope;
 }
 
 // Its energy per volume.
 inline double energyDensity(const ElasticParameters& material, const Mat3& f, const Mat3& rotation) {
-  return material.mu * (f - rotation).squaredNorm() + material.lambda * volumeEnergy(heldVolume(f).j);
+  return material.mu * distortion(material, f, rotation).energy + material.lambda * volumeEnergy(heldVolume(f).j);
 }
 
 constexpr double kModeSquare = 2.0 / 3.0;  // of an edge along each of two axes, in the mean over three

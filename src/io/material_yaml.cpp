@@ -164,6 +164,8 @@ void readMaterial(YamlSource& source, const YAML::Node& node, const std::string&
                 "alpha, of an appearance material, or youngs_modulus, of an elastic one");
   if (!map.has(youngs)) material.youngs_modulus = before;
   map.number("poissons_ratio", {0.0, 0.49}, material.poissons_ratio);
+  map.number("stiffening", {0.0, 1000.0}, material.stiffening);
+  map.number("asymmetry", {-30.0, 30.0}, material.asymmetry);
   map.number("alpha", {0.0, 1.0}, material.alpha);
   map.number("beta", {0.0, 1.0}, material.beta);
   map.number("density", {0.0, 1e6, true, "kg/m^3"}, material.density);
@@ -253,7 +255,8 @@ Result<Material> changeMaterial(const Material& base, const std::string& yaml, I
   if (source.fault) return *source.fault;
   warnings.insert(warnings.end(), source.warnings.begin(), source.warnings.end());
   const bool elastic = changed.elastic();
-  const std::vector<std::string> of_looks = {"alpha", "beta", "mode"}, of_elastic = {"poissons_ratio"};
+  const std::vector<std::string> of_looks = {"alpha", "beta", "mode"},
+                                 of_elastic = {"poissons_ratio", "stiffening", "asymmetry"};
   for (const std::string& key : elastic ? of_looks : of_elastic)
     if (const YAML::Node node = (*root)[key]; node.IsDefined())
       source.fail(node,

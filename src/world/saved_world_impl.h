@@ -11,7 +11,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kStateVersion = 24;
+constexpr std::uint32_t kStateVersion = 25;
 
 inline std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(
@@ -111,11 +111,11 @@ void serialize(A& archive, Look& v) {
 MESHLESS_ARCHIVE(Appearance, outer, inner)
 template <class A>
 void serialize(A& archive, Material& v) {
-  auto& [name, youngs_modulus, poissons_ratio, mode, alpha, beta, density, damping, friction, restitution, self_contact,
-         volume, area, plasticity, color, inside_color, appearance] = v;
-  archive(name, youngs_modulus, poissons_ratio, choice(mode, MatchMode::kQuadratic), alpha, beta, density, damping,
-          friction, restitution, choice(self_contact, SelfContact::kAll), volume, area, plasticity, color, inside_color,
-          appearance);
+  auto& [name, youngs_modulus, poissons_ratio, stiffening, asymmetry, mode, alpha, beta, density, damping, friction,
+         restitution, self_contact, volume, area, plasticity, color, inside_color, appearance] = v;
+  archive(name, youngs_modulus, poissons_ratio, stiffening, asymmetry, choice(mode, MatchMode::kQuadratic), alpha, beta,
+          density, damping, friction, restitution, choice(self_contact, SelfContact::kAll), volume, area, plasticity,
+          color, inside_color, appearance);
 }
 template <class A>
 void serialize(A& archive, WorldSettings& v) {

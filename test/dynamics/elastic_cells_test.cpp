@@ -1,6 +1,8 @@
 #include "meshless_surgery/dynamics/elastic_cells.h"
 
 #include <cmath>
+#include <deque>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -21,6 +23,17 @@ using test::Random;
 using test::wholeCells;
 
 const ElasticParameters kSoft = elasticParameters(5000.0, 0.4, kCellDensity);
+// Materials that stiffen: by all strain, where pressed, where pulled, as much as may be asked for.
+std::vector<ElasticParameters> stiffening() {
+  std::vector<ElasticParameters> all;
+  for (const auto& [stiffening, asymmetry] :
+       {std::pair{20.0, 0.0}, {0.0, 12.0}, {0.0, -12.0}, {10.0, 10.0}, {1000.0, 30.0}, {1000.0, -30.0}}) {
+    all.push_back(kSoft);
+    all.back().stiffening = stiffening;
+    all.back().asymmetry = asymmetry;
+  }
+  return all;
+}
 const double kScale = kSoft.youngs / (kSoft.density * kCellEdge);  // [m/s^2] of the material's accelerations
 
 Points accelerations(const CellBody& body, const Points& y, double swelling = 1.0,
@@ -233,6 +246,85 @@ TEST(ElasticCells, AreTheGradientOfTheEnergyAndKeepMomentum) {
   }
 }
 
+// By the strain's eigenvalues, as elastic.h has it: over mu, without lambda.
+double distortionOf(const Vec3& e, double stiffening, double asymmetry) {
+  const Vec3 d = e - Vec3::Constant(e.sum() / 3.0);
+  const double m = d.squaredNorm(), a = asymmetry, u = 1.0 / std::sqrt(1.0 + a * a * m / 40.0);
+  const double q = e.squaredNorm() - a * d.array().cube().sum() * u + 0.25 * a * a * m * m * u * u;
+  const double rate = stiffening / 9.0;
+  return q + (rate > 0.0 ? 9.0 * (q - std::log1p(rate * q) / rate) : 0.0);
+}
+
+TEST(ElasticCells, StiffenAsTheirLawSays) {
+  Random random(41);
+  const CellBody body = wholeCells(1, 1, 1);
+  const double volume = std::pow(kCellEdge, 3);
+  for (const ElasticParameters& soft : stiffening()) {
+    ElasticParameters material = elasticParameters(soft.youngs, 0.0, kCellDensity);
+    material.stiffening = soft.stiffening;
+    material.asymmetry = soft.asymmetry;
+    for (const double size : {0.01, 0.1, 0.4, 2.0})
+      for (int trial = 0; trial < 10; ++trial) {
+        const Vec3 stretch(std::exp(random.uniform(-size, size)), std::exp(random.uniform(-size, size)),
+                           std::exp(random.uniform(-size, size)));
+        const Mat3 turn = random.rotation().toRotationMatrix(), axes = random.rotation().toRotationMatrix();
+        const Mat3 map = turn * axes * stretch.asDiagonal() * axes.transpose();
+        const double expected =
+            volume * material.mu * distortionOf(stretch - Vec3::Ones(), material.stiffening, material.asymmetry);
+        const double found =
+            elasticEnergy(body.cells, material, moved(body, map, Vec3::Zero(), 0.0, random), body.poses);
+        EXPECT_NEAR(found, expected, 1e-7 * expected + 1e-15) << stretch.transpose();
+      }
+  }
+}
+
+// Tissue gives way nowhere: however it is strained, more strain costs more force.
+TEST(ElasticCells, NoStrainMakesWhatStiffensGiveWay) {
+  Random random(42);
+  for (int trial = 0; trial < 200000; ++trial) {
+    const double size = std::pow(10.0, random.uniform(-3.0, 1.0)), step = 1e-3 * size;
+    const double asymmetry = random.uniform(-30.0, 30.0), stiffening = std::pow(10.0, random.uniform(-2.0, 3.0));
+    Vec3 e = random.vector(size), along = random.vector(1.0).normalized();
+    if (trial % 2 == 0) e = size * random.uniform(0.0, 1.0) * Vec3(1.0, -0.5, -0.5) + 0.1 * e;
+    if (trial % 4 == 0) e = -e;
+    const auto at = [&](double t) { return distortionOf(e + t * along, stiffening, asymmetry); };
+    const double middle = at(0.0);
+    ASSERT_GT(at(step) - 2.0 * middle + at(-step), 0.2 * step * step - 1e-13 * middle)
+        << e.transpose() << ", " << asymmetry;
+  }
+}
+
+TEST(ElasticCells, WhatStiffensIsTheGradientOfItsEnergyAndKeepsMomentum) {
+  Random random(43);
+  int trial = 0;
+  for (const ElasticParameters& material : stiffening())
+    for (const double noise : {2e-4, 1.2e-3, 6e-3}) {
+      CellBody body = cutCells(2, 2, 1, 50 + ++trial);
+      if (trial % 3 == 2) body = mixed(body, 7);
+      const std::vector<PlasticShape> shapes = someShapes(trial % 2 == 0 ? 0 : body.cells.cells.size(), random);
+      const Points y = moved(body, random.rotation().toRotationMatrix(), Vec3::Zero(), noise, random);
+      std::vector<ClusterPose> poses = body.poses;
+      Points a;
+      MatchCounters counters;
+      elasticAccelerations(body.cells, material, y, poses, a, counters, 0.95, &shapes);
+      const Balance balance(body, y, a);
+      EXPECT_LT(balance.force.norm(), 1e-12 * balance.scale);
+      EXPECT_LT(balance.torque.norm(), 1e-12 * balance.scale * balance.reach);
+      for (std::size_t i = 0; i < y.size(); ++i)
+        for (int axis = 0; axis < 3; ++axis) {
+          const double step = 1e-8;
+          Points up = y, down = y;
+          up[i][axis] += step;
+          down[i][axis] -= step;
+          const double slope = (elasticEnergy(body.cells, material, up, poses, 0.95, &shapes) -
+                                elasticEnergy(body.cells, material, down, poses, 0.95, &shapes)) /
+                               (2.0 * step);
+          EXPECT_NEAR(-slope, body.cells.masses[i] * a[i][axis], 1e-5 * balance.scale)
+              << material.stiffening << " " << material.asymmetry << " " << noise;
+        }
+    }
+}
+
 TEST(ElasticCells, KeepMomentumWhateverTheMassesAreAndHoweverTheyAreThrown) {
   Random random(5);
   for (double noise : {1e-6, 1e-4, 1e-2, 1.0}) {
@@ -328,27 +420,30 @@ TEST(HighestFrequencyOfCells, IsTheLargestEigenvalueFromBelow) {
 TEST(HighestFrequencyOfCells, NoStepOfOneOverItMakesEnergyGrow) {
   // As body/deform.h steps: a margin of 1.1, the stretch of the last step, accelerations at x + v / frequency.
   Random random(8);
-  for (unsigned seed = 0; seed < 6; ++seed)
+  std::vector<ElasticParameters> materials = stiffening();
+  materials.push_back(kSoft);
+  for (unsigned seed = 0; seed < 7; ++seed)
     for (double noise : {1e-5, 5e-4, 5e-3}) {
+      const ElasticParameters& material = materials[seed];
       const CellBody body = cutCells(4, 3, 2, 30 + seed);
       const double frequency = highestFrequency(body.cells, kSoft);
       Points x = moved(body, Mat3::Identity(), Vec3::Zero(), noise, random), v(x.size(), Vec3::Zero()), a;
       std::vector<ClusterPose> poses = body.poses;
       MatchCounters counters;
-      double stretch = elasticAccelerations(body.cells, kSoft, x, poses, a, counters), before = 0.0;
-      const double start = elasticEnergy(body.cells, kSoft, x, poses);
+      double stretch = elasticAccelerations(body.cells, material, x, poses, a, counters), before = 0.0;
+      const double start = elasticEnergy(body.cells, material, x, poses);
       for (int step = 0; step < 300; ++step) {
         const double h = 1.0 / (1.1 * stretch * frequency);
         Points y = x;
         for (std::size_t i = 0; i < x.size(); ++i) y[i] += h * v[i];
-        stretch = elasticAccelerations(body.cells, kSoft, y, poses, a, counters);
+        stretch = elasticAccelerations(body.cells, material, y, poses, a, counters);
         double kinetic = 0.0;
         for (std::size_t i = 0; i < x.size(); ++i) {
           v[i] += h * a[i];
           x[i] += h * v[i];
           kinetic += 0.5 * body.cells.masses[i] * v[i].squaredNorm();
         }
-        before = kinetic + elasticEnergy(body.cells, kSoft, x, poses);
+        before = kinetic + elasticEnergy(body.cells, material, x, poses);
         ASSERT_LT(before, 1.001 * start) << "seed " << seed << " noise " << noise << " step " << step;
       }
       EXPECT_LT(before, 0.5 * start);
@@ -359,6 +454,8 @@ TEST(HighestFrequencyOfCells, NoStepOfOneOverItMakesEnergyGrow) {
 // has.
 TEST(ElasticCells, InVectorsAreTheReference) {
   Random random(31);
+  std::deque<ElasticParameters> materials(1, kSoft);
+  for (const ElasticParameters& material : stiffening()) materials.push_back(material);
   std::vector<CellBody> bodies = {wholeCells(3, 2, 2), cutCells(13, 5, 2, 3), mixed(wholeCells(5, 3, 2), 1),
                                   mixed(cutCells(9, 2, 2, 5), 2)};
   for (unsigned n = 1; n <= 17; ++n) bodies.push_back(cutCells(static_cast<int>(n), 1, 1, n));
@@ -367,11 +464,14 @@ TEST(ElasticCells, InVectorsAreTheReference) {
     EXPECT_EQ(batch.others(), 0u);
     for (const double noise : {0.0, 1e-5, 1e-3, 6e-3})
       for (const double swelling : {1.0, 1.1}) {
+        materials.push_back(materials.front());
+        materials.pop_front();
+        const ElasticParameters& material = materials.front();
         const Points y = moved(body, random.rotation().toRotationMatrix(), random.vector(0.1), noise, random);
         Points expected;
         MatchCounters counted;
         std::vector<ClusterPose> poses = body.poses;
-        const double stretch = elasticAccelerations(body.cells, kSoft, y, poses, expected, counted, swelling);
+        const double stretch = elasticAccelerations(body.cells, material, y, poses, expected, counted, swelling);
         double scale = kScale;
         for (const Vec3& a : expected) scale = std::max(scale, a.norm());
         for (const InstructionSet set : {InstructionSet::kBaseline, InstructionSet::kAvx2, InstructionSet::kAvx512}) {
@@ -380,9 +480,9 @@ TEST(ElasticCells, InVectorsAreTheReference) {
           Points found;
           MatchCounters counters;
           batch.setRotations(body.poses, state);
-          EXPECT_NEAR(
-              batch.accelerate({body.rest, body.cells.masses, {}, {}}, kSoft, y, state, found, counters, swelling, set),
-              stretch, 1e-9 * stretch);
+          EXPECT_NEAR(batch.accelerate({body.rest, body.cells.masses, {}, {}}, material, y, state, found, counters,
+                                       swelling, set),
+                      stretch, 1e-9 * stretch);
           ASSERT_EQ(found.size(), expected.size());
           for (std::size_t i = 0; i < y.size(); ++i) EXPECT_LE((found[i] - expected[i]).norm(), 1e-9 * scale);
           const Balance balance(body, y, found);

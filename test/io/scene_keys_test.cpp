@@ -246,6 +246,8 @@ std::vector<Row> rows() {
       {"material", "young: 5000", "", MATERIAL(youngs_modulus), "5000"},
       {"material", "youngs_modulus: 5000", "", MATERIAL(youngs_modulus), "5000"},
       {"material", "poissons_ratio: 0.123", "", MATERIAL(poissons_ratio), "0.123"},
+      {"material", "stiffening: 12.5", "", MATERIAL(stiffening), "12.5"},
+      {"material", "asymmetry: -7.5", "", MATERIAL(asymmetry), "-7.5"},
       {"material", "alpha: 0.123", "", MATERIAL(alpha), "0.123"},
       {"material", "beta: 0.123", "", MATERIAL(beta), "0.123"},
       {"material", "density: 950", "", MATERIAL(density), "950"},

@@ -89,8 +89,8 @@ inline CellBody cutCells(int nx, int ny, int nz, unsigned seed, double least = 0
 inline CellBody mixed(CellBody body, unsigned seed) {
   Random random(seed);
   for (std::size_t c = 0; c < body.cells.cells.size(); c += 2)
-    body.cells.cells[c].mix = {random.uniform(0.0, 1.0), random.uniform(0.0, 4.0), random.uniform(0.0, 9.0),
-                               random.uniform(0.0, 9.0)};
+    body.cells.cells[c].mix = {random.uniform(0.0, 1.0), random.uniform(0.0, 4.0),  random.uniform(0.0, 9.0),
+                               random.uniform(0.0, 9.0), random.uniform(0.0, 50.0), random.uniform(-9.0, 9.0)};
   return body;
 }
 

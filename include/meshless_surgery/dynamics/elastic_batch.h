@@ -62,6 +62,7 @@ class ElasticBatch {
   std::vector<double> shapes_;  // of clusters
   std::vector<double> cells_;   // of blocks of cells that are filled in part
   std::vector<double> mixes_;   // of these, where there are several materials
+  bool mix_stiffens_ = false;   // one of them
   double half_edge_ = 1.0;
   // Where the forces on a particle lie, in the order of its clusters' lanes.
   std::vector<std::uint32_t> force_offsets_;

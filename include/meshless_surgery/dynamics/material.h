@@ -37,13 +37,15 @@ struct Plasticity {
   double maximum = 0.5;  // 0..3, strain of the rest shape
 };
 
-/// Two families. An appearance material has a youngs_modulus of 0: mode, alpha and beta are the paper's; see goalPull for
-/// alpha. An elastic material has a youngs_modulus: the elastic constants of a
-/// textbook, without calibration (dynamics/elastic.h); mode, alpha and beta are then not used.
+/// Two families. An appearance material has a youngs_modulus of 0: mode, alpha and beta are the paper's; see goalPull
+/// for alpha. An elastic material has a youngs_modulus: the elastic constants of a textbook, without calibration
+/// (dynamics/elastic.h); mode, alpha and beta are then not used.
 struct Material {
   std::string name = "default";
   double youngs_modulus = 0.0;   // [Pa] 0: an appearance material
   double poissons_ratio = 0.45;  // 0..0.49
+  double stiffening = 0.0;       // 0..1000, how stress grows beyond small strain: dynamics/elastic.h
+  double asymmetry = 0.0;        // -30..30, how much more where pressed than where pulled, likewise
   MatchMode mode = MatchMode::kLinear;
   double alpha = 0.9;                            // 0..1, how hard goals pull: see goalPull
   double beta = 0.2;                             // 0..1, share of the fitted linear or quadratic map in the goal
