@@ -13,8 +13,8 @@ from meshless_surgery.errors import Refused, Unanswered, Unreachable, need_topic
 from meshless_surgery.goals import Goals
 from meshless_surgery.msg import Info, State
 from meshless_surgery.poses import blade_pose, blades_pose, pose_stamped
-from meshless_surgery.srv import (Attach, Clip, Cut, Detach, GetBody, Hash, Incise, LoadState, Lock, MovePick, Observe, Pick, Probe, Push,
-                                  Release, Remove, Report, SaveState, SetMaterial, Spawn, SpawnCloud, StartTask, Step, Unclip)
+from meshless_surgery.srv import (Attach, Clip, Cut, Detach, GetBody, GetLoad, Hash, Incise, LoadState, Lock, MovePick, Observe, Pick, Probe,
+                                  Push, Release, Remove, Report, SaveState, SetMaterial, Spawn, SpawnCloud, StartTask, Step, Unclip)
 from meshless_surgery.streams import ToolStream
 
 
@@ -164,6 +164,10 @@ class Surgeon:
     def body(self, name, rest=False):
         """Surface, particles and measures."""
         return self.call('get_body', GetBody, name=name, rest=rest)
+
+    def tissue_load(self, name, points=(), frame=None):
+        """Elastic energy, the forces of what holds the body, strain and stress of the cells at `points`, or of all."""
+        return self.call('get_load', GetLoad, header=self._header(frame), name=name, points=[Point(*p) for p in points])
 
     def set_material(self, body, yaml):
         return self.call('set_material', SetMaterial, body=body, yaml=yaml)

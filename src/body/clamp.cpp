@@ -54,11 +54,15 @@ std::vector<ClampPoint> findClampPoints(const CellLattice& lattice, const SolidQ
           for (int k = 0; k < 3; ++k)
             slope[k] = held(before + 0.01 * step * Vec3::Unit(k)) - held(before - 0.01 * step * Vec3::Unit(k));
           const double area = step * step * std::abs(slope[axis]) / std::max(slope.norm(), 1e-300);
-          if (area > 0.0) points.push_back({c, lattice.placeIn(cell, there), area});
+          if (area > 0.0) points.push_back({c, lattice.placeIn(cell, there), area, 0});
         }
     }
   }
   return points;
+}
+
+double springMass(const CellLattice& lattice, const ClampPoint& point, double density) {
+  return kStiff * density * lattice.spacing * point.area;
 }
 
 Clamp::Clamp(const CellLattice& lattice, const std::vector<ClampPoint>& points,
@@ -73,7 +77,7 @@ Clamp::Clamp(const CellLattice& lattice, const std::vector<ClampPoint>& points,
         corners.push_back(corner);
         masses.push_back(corner_masses[corner]);
       }
-    const double mass = kStiff * density * lattice.spacing * point.area;
+    const double mass = springMass(lattice, point, density);
     for (int a = 0; a < 8; ++a)
       for (int b = 0; b < 8; ++b) {
         const Index row = number[cell.corners[a]], column = number[cell.corners[b]];

@@ -127,6 +127,8 @@ double stiffnessFactor(const BodyModel& model, const BodyState& state, double h)
   return share < 1.0 ? share * share : 1.0;
 }
 
+double clampRate(const BodyModel& model) { return kMargin * model.highest_frequency / kMostGain; }
+
 double viscosityTime(const BodyModel& model, const BodyState& state, double h) {
   const double longest = std::max(h, longestSubstep(model, state));
   return std::isfinite(longest) ? kLag * longest / std::sqrt(state.stiffened) : h;
@@ -263,7 +265,7 @@ void hold(Substep& s) {
     }
   if (!s.model.clamp) return;
   // As stiff as ever, whatever the body's stretch and substep: springs that stiffen and soften in turns give energy.
-  const double part = s.h * kMargin * s.model.highest_frequency / kMostGain;
+  const double part = s.h * clampRate(s.model);
   s.scratch.clamp.hold(s.model.clamp, part > 0.0 ? part * part : 1.0, s.model.rest, s.state.placed, x);
 }
 

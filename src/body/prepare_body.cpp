@@ -225,6 +225,20 @@ HeldHeight heldHeight(const std::vector<HeldRegion>& regions, const Pose& placed
   };
 }
 
+// The one that is nearest to the place.
+std::uint32_t regionThatHolds(const std::vector<HeldRegion>& regions, const Pose& placed, const Pose& pose,
+                              const CellLattice& lattice, const ClampPoint& point) {
+  const Vec3 place = lattice.restPlace(lattice.cells[point.cell], point.at);
+  std::uint32_t nearest = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::uint32_t r = 0; r < regions.size(); ++r)
+    if (const double height = heldHeight({regions[r]}, placed, pose)(place); height < least) {
+      least = height;
+      nearest = r;
+    }
+  return nearest;
+}
+
 // Every region has tissue, or whoever wrote it is wrong about where the body is.
 Status findRegions(const BodyDef& def, const Pose& placed, const Pose& pose, CellLattice& lattice, BodyModel& model) {
   if (def.regions.empty()) return Done{};
@@ -271,6 +285,7 @@ Status makeLatticeParticles(const BodyDef& def, const SolidQuery& solid, const P
   const double unit = std::pow(model.spacing, 3.0) * filled / model.rest_volume;
   for (LatticeCell& cell : lattice->cells) cell.resists.fraction *= unit;
   if (held) model.clamp_points = findClampPoints(*lattice, solid, held);
+  for (ClampPoint& point : model.clamp_points) point.region = regionThatHolds(def.fixed, placed, pose, *lattice, point);
   if (const Status found = findRegions(def, placed, pose, *lattice, model); !found) return found;
   model.lattice = std::make_shared<CellLattice>(std::move(*lattice));
   makeParticlesOfCells(model);

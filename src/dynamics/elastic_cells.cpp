@@ -147,6 +147,22 @@ double elasticEnergy(const ElasticCells& body, const ElasticParameters& material
   return energy;
 }
 
+std::vector<Mat3> cellStresses(const ElasticCells& body, const ElasticParameters& material, const Points& y,
+                               std::vector<ClusterPose>& poses, double swelling,
+                               const std::vector<PlasticShape>* plastic) {
+  std::vector<Mat3> stresses;
+  MatchCounters uncounted;
+  for (std::size_t c = 0; c < body.cells.size(); ++c) {
+    const ElasticCell& cell = body.cells[c];
+    const PlasticShape* const shape = shapeOf(plastic, c);
+    const Fit f = fit(body, cell, y, swelling, shape, poses[c], uncounted);
+    double unused = 0.0;
+    stresses.push_back(elastic_law::stress(cell.mix.of(material), f.strained, f.rotation, unused));
+    if (shape) stresses.back() *= shape->inverse;
+  }
+  return stresses;
+}
+
 double highestFrequency(const ElasticCells& body, const ElasticParameters& material) {
   return highestFrequency(body.masses, [&](const Points& displacements, Points& accelerations) {
     Points& forces = accelerations;

@@ -8,6 +8,7 @@
 #include <meshless_surgery/Cut.h>
 #include <meshless_surgery/Detach.h>
 #include <meshless_surgery/GetBody.h>
+#include <meshless_surgery/GetLoad.h>
 #include <meshless_surgery/Incise.h>
 #include <meshless_surgery/LoadState.h>
 #include <meshless_surgery/Lock.h>
@@ -33,6 +34,7 @@
 namespace meshless {
 namespace {
 
+constexpr std::size_t kMaxLoadPoints = 10000;
 constexpr double kMaxSpeed = 1e3;                           // [m/s]
 constexpr double kMaxStiffness = 1e9;                       // [N/m]
 constexpr double kMaxPerArea = 1e15;                        // [N/m^3], [Pa]
@@ -76,6 +78,7 @@ struct Services::Handlers : Answers {
     advertise(private_handle, "unclip", &Handlers::unclip);
     advertise(private_handle, "set_material", &Handlers::setMaterial);
     advertise(private_handle, "get_body", &Handlers::getBody);
+    advertise(private_handle, "get_load", &Handlers::getLoad);
     advertise(private_handle, "pause", &Handlers::pause);
     advertise(private_handle, "reset", &Handlers::reset);
     advertise(private_handle, "hash", &Handlers::hash);
@@ -437,6 +440,41 @@ struct Services::Handlers : Answers {
     response.tetrahedra = static_cast<std::uint32_t>(body->tetrahedra);
     response.cavities = toCavities(body->measures);
     return accept(response, request.name + (request.rest ? " at rest" : " as it is now"));
+  }
+
+  bool getLoad(meshless_surgery::GetLoad::Request& request, meshless_surgery::GetLoad::Response& response) {
+    BorderCheck check;
+    if (request.points.size() > kMaxLoadPoints)
+      check.fault("points has " + std::to_string(request.points.size()) + " places; accepted: up to " +
+                  std::to_string(kMaxLoadPoints));
+    Points points;
+    for (std::size_t k = 0; k < request.points.size() && check.ok(); ++k)
+      points.push_back(check.point("points[" + std::to_string(k) + "]", request.points[k]));
+    if (!check.ok()) return refuse(response, "get_load", check.error());
+    const auto frame = frames.toWorld(request.header);
+    if (!frame.ok()) return refuse(response, "get_load", frame.error());
+    for (Vec3& p : points) p = *frame * p;
+    Result<BodyLoad> load = Error{};
+    const Status done = runner.look([&](World& world) { load = world.load(request.name, points); });
+    if (!done.ok()) return refuse(response, "get_load", done.error());
+    if (!load.ok()) return refuse(response, "get_load", load.error());
+    response.elastic_energy = load->elastic_energy;
+    for (const Wrench& clamp : load->clamps) {
+      response.clamps.emplace_back();
+      response.clamps.back().force = toVector(clamp.force);
+      response.clamps.back().torque = toVector(clamp.torque);
+    }
+    for (const CellLoad& cell : load->cells) {
+      response.places.push_back(toPoint(cell.place));
+      for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 3; ++column) response.deformation.push_back(cell.gradient(row, column));
+      const Mat3& stress = cell.stress;
+      for (const double component :
+           {stress(0, 0), stress(1, 1), stress(2, 2), stress(0, 1), stress(1, 2), stress(2, 0)})
+        response.stress.push_back(component);
+      response.pressure.push_back(-stress.trace() / 3.0);
+    }
+    return accept(response, request.name + ": " + std::to_string(load->cells.size()) + " cells");
   }
 
   bool pause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response) {

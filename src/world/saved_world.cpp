@@ -314,7 +314,8 @@ std::string faultOf(const BodyModel& m) {
               1e-6 * m.lattice->spacing))
           return "a body's particles do not rest at the corners of its cells";
     for (const ClampPoint& point : m.clamp_points)
-      if (!(point.cell < cells.size()) || !point.at.allFinite() || !(point.area > 0.0 && point.area < 1e12))
+      if (!(point.cell < cells.size()) || !point.at.allFinite() || !(point.area > 0.0 && point.area < 1e12) ||
+          point.region >= kMaxHeldRegions)
         return "a clamp holds nothing of its body's cells";
     for (const LatticeCell& cell : cells)
       if (!(cell.resists.fraction > 0.0) || !cell.resists.centroid.allFinite() ||

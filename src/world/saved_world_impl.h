@@ -144,7 +144,7 @@ MESHLESS_ARCHIVE(RestShape, clusters, quadratic)
 MESHLESS_ARCHIVE(ElasticRest, spread_inverse, spread)
 MESHLESS_ARCHIVE(SurfaceBinding, offsets, carriers, weights, cells)
 MESHLESS_ARCHIVE(Resistance, fraction, centroid, variance)
-MESHLESS_ARCHIVE(ClampPoint, cell, at, area)
+MESHLESS_ARCHIVE(ClampPoint, cell, at, area, region)
 MESHLESS_ARCHIVE(LatticeCell, corners, place, samples, filled, held, resists, parted, mass_share, stiffness_share,
                  bridge, face)
 MESHLESS_ARCHIVE(CellRegions::Part, place, region, samples)

@@ -259,6 +259,8 @@ class Fuzzer:
                           'volume']),
                 r.choice([self.number(), self.string()[:200], '[1, 2]', '[[0, 0.5]]', '{}']))
             return dict(body=self.maybe_name(), yaml=yaml)
+        if service == 'get_load':
+            return dict(name=self.maybe_name(), header=self.header(), points=[self.point() for _ in range(r.choice([0, 1, 3, 10001]))])
         if service == 'probe':
             return dict(header=self.header(), point=self.point(),
                         direction=Vector3(0, 0, -1) if self.sensible else self.vector())
@@ -379,7 +381,7 @@ class ServicesTest(FuzzCase):
                 faults.append('it says %d characters' % len(answer.message))
             if '\ufffd' in answer.message:  # what rospy makes of bytes that are no UTF-8
                 faults.append('it says what is no text')
-            if after != before and (not answer.success or service in ('get_body', 'observe', 'probe', 'pause', 'save')):
+            if after != before and (not answer.success or service in ('get_body', 'get_load', 'observe', 'probe', 'pause', 'save')):
                 faults.append('the state has changed')
             if faults:  # only then put into words: there are 100 MB in some requests
                 self.fail('call %d: ~%s %.300r: %r: %s' % (number, service, fields, answer.message[:300], faults))

@@ -125,6 +125,8 @@ def said_in(frame_id, stamp, value):
             pose.pose.position = said_in(frame_id, stamp, value.pose.position)
             pose.pose.orientation = quaternion(there[:3, :3] @ rotation_of(value.pose.orientation))
         return pose
+    if isinstance(value, list):
+        return [said_in(frame_id, stamp, part) for part in value]
     if isinstance(value, PointCloud2):
         return cloud_of(np.frombuffer(value.data).reshape(-1, 3) @ there[:3, :3].T + there[:3, 3], head)
     return value
@@ -450,6 +452,14 @@ def lumen(test, answer):
     return answer.lumen
 
 
+def elastic(**fields):
+    """The left box is of elastic tissue."""
+    def prepare(test):
+        test.good('set_material', body='left', yaml='{youngs_modulus: 20000}')
+        return fields
+    return prepare
+
+
 TO_WORLD = dict(body='left', other='world', stiffness=1e6)
 CLIP = dict(point=Point(0.0, 0.0, 1.02), direction=Vector3(0, 0, 1), width=0.01, opening=0.06)
 CORNER = Point(-0.15, 0.05, 0.15)
@@ -526,6 +536,9 @@ LAWS = [
     Law('set_material', 'yaml', '{density: 3000}', dict(body='left'), masses, (3.0, 1.0), Refusal(INVALID)),
     Law('get_body', 'name', 'right', {}, lowest_x, 0.15, Refusal(UNKNOWN)),
     Law('get_body', 'rest', True, drawn_out(name='left'), lowest_x, -0.25, within(-0.249, 0.0)),
+    Law('get_load', 'name', 'left', elastic(), lambda test, answer: len(answer.stress) // 6, within(8, 1e4), Refusal(UNKNOWN)),
+    Law('get_load', 'points', [Point(-0.2, 0.0, 0.1)] * 3, elastic(name='left'), lambda test, answer: len(answer.places), 3,
+        within(8, 1e4)),
     Law('spawn', 'name', 'mine', NEW, name_of, 'mine', 'box'),
     Law('spawn', 'file', 'tetrahedron.obj', NEW, volume, 0.1 ** 3 / 6, 0.1 ** 3),
     Law('spawn', 'primitive', box(), dict(pose=NEW['pose']), volume, 0.1 ** 3, Refusal(INVALID)),
@@ -571,6 +584,7 @@ FRAMED = {
     'pick': dict(header=Header(), point=Point(-0.61, 0.013, -0.11), direction=Vector3(2.03, 0.02, 1.01)),
     'move_pick': dict(header=Header(), target=Point(-0.31, 0.05, 0.17)),
     'lock': dict(header=Header(), target=Point(-0.31, 0.05, 0.17), at_target=True),
+    'get_load': dict(header=Header(), name='left', points=[Point(-0.231, 0.013, 0.117), Point(-0.152, -0.021, 0.081)]),
     'probe': dict(header=Header(), point=Point(-0.61, 0.013, -0.11), direction=Vector3(2.03, 0.02, 1.01)),
     'push': dict(enable=True, radius=0.05, pose=pose_stamped(-0.27, 0.013, 0.11, TURNED)),
     'spawn': dict(primitive=SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.1, 0.08, 0.06]),
@@ -717,6 +731,8 @@ class RequestsTest(Asked):
         fields = {field: said_in(frame, stamp, value) for field, value in dict(FRAMED[service], **other).items()}
         if service in NEEDS_A_PICK:
             fields['pick_id'] = self.pick_left().pick_id
+        if service == 'get_load':
+            elastic()(self)
         if service == 'clip':
             hollow()(self)
         if service == 'detach':

@@ -8,12 +8,19 @@
 
 namespace meshless {
 
+constexpr std::uint32_t kMaxHeldRegions = 1000;  // of a body
+
 /// A piece of the border at which free tissue ends at what is held.
 struct ClampPoint {
-  Index cell = 0;          // the free tissue's
-  Vec3 at = Vec3::Zero();  // in it, each coordinate 0..1 inside; by up to a quarter outside, to a sample that is held
-  double area = 0.0;       // [m^2]
+  Index cell = 0;            // the free tissue's
+  Vec3 at = Vec3::Zero();    // in it, each coordinate 0..1 inside; by up to a quarter outside, to a sample that is held
+  double area = 0.0;         // [m^2]
+  std::uint32_t region = 0;  // of those that hold the body: its number
 };
+/// [kg] of the spring there in the longest step: kStiff layers of cells, kStiff A spacing density. Softer ones let the
+/// body sink, stiffer ones at an angle to the lattice lock its cells, which cannot bend along the border
+/// (docs/method.md, Clamps).
+double springMass(const CellLattice& lattice, const ClampPoint& point, double density);
 
 /// Where links from samples that are free lead into what is held, or end in its border, as at a face that is held.
 std::vector<ClampPoint> findClampPoints(const CellLattice& lattice, const SolidQuery& solid, const HeldHeight& held);
@@ -28,9 +35,6 @@ struct Clamp {
   std::vector<double> masses;  // [kg] of them
   std::vector<Entry> springs;
 
-  /// A spring of area A weighs as much as kStiff layers of cells, kStiff A spacing density: softer ones let the body
-  /// sink, stiffer ones at an angle to the lattice lock its cells, which cannot bend along the border (docs/method.md,
-  /// Clamps).
   Clamp(const CellLattice& lattice, const std::vector<ClampPoint>& points, const std::vector<double>& corner_masses,
         double density);
 

@@ -51,6 +51,9 @@ double stiffnessFactor(const BodyModel& model, const BodyState& state, double h)
 /// [s] by which the stress of cells is ahead in substeps of h [s].
 double viscosityTime(const BodyModel& model, const BodyState& state, double h);
 
+/// [1/s] A spring of a clamp that weighs m pulls by m times its square: a step of one over it is the longest at rest.
+double clampRate(const BodyModel& model);
+
 /// v = (x - x_old) / h, after springs and contacts have moved positions.
 void velocitiesFromPositions(double h, BodyState& state, const StepScratch& scratch);
 

@@ -48,6 +48,11 @@ double elasticEnergy(const ElasticCells& cells, const ElasticParameters& materia
                      std::vector<ClusterPose> poses, double swelling = 1.0,
                      const std::vector<PlasticShape>* plastic = nullptr);
 
+/// [Pa] First Piola-Kirchhoff stress of each cell at its centroid, without that of bending. poses are written as above.
+std::vector<Mat3> cellStresses(const ElasticCells& cells, const ElasticParameters& material, const Points& y,
+                               std::vector<ClusterPose>& poses, double swelling = 1.0,
+                               const std::vector<PlasticShape>* plastic = nullptr);
+
 /// Highest angular frequency [rad/s] of the linearised body at rest, from below: by Lanczos' method, within a percent.
 /// 0 where there are no cells.
 double highestFrequency(const ElasticCells& cells, const ElasticParameters& material);

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "meshless_surgery/body/body_load.h"
 #include "meshless_surgery/body/preserve.h"
 #include "meshless_surgery/contact/deformable.h"
 #include "meshless_surgery/tools/attachment.h"
@@ -235,6 +236,9 @@ class World {
   Result<BodySnapshot> inspect(const std::string& name, bool rest);
   /// The first surface that the ray from `origin` meets; kMissed where it meets none. Nothing changes.
   Result<ProbeReply> probe(const Vec3& origin, const Vec3& direction);
+  /// What a body of elastic material bears now, of all its cells; or, where there are points [m], of the cell whose
+  /// middle is nearest to each, which is at most two spacings away (else kMissed). Nothing changes.
+  Result<BodyLoad> load(const std::string& name, const Points& points);
   /// What it holds now. Reads bodies, not their particles.
   MemoryUse memory() const;
   /// Events since the last call.
