@@ -38,7 +38,7 @@ std::size_t bytesOf(const BodyModel& model) {
 
 std::size_t bytesOf(const BodyState& state) {
   return bytesOf(state.positions, state.velocities, state.poses, state.cells, state.surface, state.plastic,
-                 state.plastic_cells, state.cavities);
+                 state.plastic_cells, state.relaxed, state.cavities);
 }
 
 std::size_t bytesOf(const StepScratch& scratch) {

@@ -37,12 +37,18 @@ Mat3 cauchyStress(const Mat3& stress, const Mat3& gradient) {
 BodyLoad loadOf(const BodyModel& model, const Material& material, const BodyState& state) {
   BodyLoad load;
   load.clamps = clampLoads(model, state);
-  const ElasticParameters parameters = ownElasticity(model, material, state.stiffened);
+  ElasticParameters parameters = ownElasticity(model, material, state.stiffened);
+  const std::vector<RelaxedStrain>* relaxed = nullptr;
+  if (material.relaxes() && !state.relaxed.empty()) {
+    parameters.relaxation = relaxationStep(material.relaxation, 0.0);
+    relaxed = &state.relaxed;
+  }
   std::vector<ClusterPose> poses = state.cells;
   const std::vector<PlasticShape>* const plastic = &state.plastic_cells;
-  load.elastic_energy = elasticEnergy(*model.cells, parameters, state.positions, poses, state.swelling, plastic);
+  load.elastic_energy =
+      elasticEnergy(*model.cells, parameters, state.positions, poses, state.swelling, plastic, relaxed);
   const std::vector<Mat3> stresses =
-      cellStresses(*model.cells, parameters, state.positions, poses, state.swelling, plastic);
+      cellStresses(*model.cells, parameters, state.positions, poses, state.swelling, plastic, relaxed);
   const Mat3 back = state.placed.rotation.toRotationMatrix().transpose();
   for (std::size_t c = 0; c < stresses.size(); ++c)
     load.cells.push_back(

@@ -743,6 +743,7 @@ class CellCutter {
                piece.state.cells.push_back(state_.cells[cut_.parent_cell[c]]);
                if (!state_.plastic_cells.empty())
                  piece.state.plastic_cells.push_back(state_.plastic_cells[cut_.parent_cell[c]]);
+               if (!state_.relaxed.empty()) piece.state.relaxed.push_back(state_.relaxed[cut_.parent_cell[c]]);
                ++(cut_.changed[c] ? work.rebuilt_clusters : work.kept_clusters);
              }
              inheritTissue(*child, piece);

@@ -190,20 +190,34 @@ void stress(Substep& s) {
   Points& y = s.scratch.predicted;
   y.resize(s.state.positions.size());
   for (std::size_t i = 0; i < y.size(); ++i) y[i] = s.state.positions[i] + lag * s.state.velocities[i];
-  const ElasticParameters parameters = ownElasticity(model, s.material, s.factor * s.stiffened);
+  ElasticParameters parameters = ownElasticity(model, s.material, s.factor * s.stiffened);
   const MatchInput input = matchInput(model, s.state);
   std::vector<ClusterPose>& poses = model.cells ? s.state.cells : s.state.poses;
+  std::vector<RelaxedStrain>* relaxed = nullptr;
+  if (model.cells && s.material.relaxes()) {
+    parameters.relaxation = relaxationStep(s.material.relaxation, s.h);
+    s.state.relaxed.resize(model.cells->cells.size());
+    relaxed = &s.state.relaxed;
+  } else {
+    s.state.relaxed.clear();
+  }
   if (model.cells && (s.material.plastic() || !s.state.plastic_cells.empty())) {
     s.state.stretch = elasticAccelerations(*model.cells, parameters, y, poses, s.pull(), s.counters, s.state.swelling,
-                                           &s.state.plastic_cells);
+                                           &s.state.plastic_cells, relaxed);
   } else if (s.material.plastic() || !s.state.plastic.empty()) {
     s.state.stretch =
         elasticAccelerations(input, model.elastic, parameters, y, poses, s.pull(), s.counters, s.state.swelling);
   } else {
-    if (!s.scratch.under_way) model.elastic_batch->setRotations(poses, s.scratch.elastic);
+    if (!s.scratch.under_way) {
+      model.elastic_batch->setRotations(poses, s.scratch.elastic);
+      model.elastic_batch->setRelaxed(s.state.relaxed, parameters.relaxation.branches, s.scratch.elastic);
+    }
     s.state.stretch = model.elastic_batch->accelerate(input, parameters, y, s.scratch.elastic, s.pull(), s.counters,
                                                       s.state.swelling, widestInstructionSet(), s.for_each);
-    if (s.scratch.last) model.elastic_batch->getRotations(s.scratch.elastic, poses);
+    if (s.scratch.last) {
+      model.elastic_batch->getRotations(s.scratch.elastic, poses);
+      model.elastic_batch->getRelaxed(s.scratch.elastic, s.state.relaxed);
+    }
   }
   s.scratch.under_way = !s.scratch.last;
 }

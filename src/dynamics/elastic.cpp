@@ -68,6 +68,17 @@ ElasticParameters elasticParameters(double youngs_modulus, double poissons_ratio
   return p;
 }
 
+RelaxationStep relaxationStep(const std::vector<Relaxation>& relaxation, double h) {
+  RelaxationStep step;
+  for (const Relaxation& branch : relaxation) {
+    step.shares[step.branches] = branch.share;
+    step.taken[step.branches] = -std::expm1(-h / branch.time);
+    step.all += branch.share;
+    ++step.branches;
+  }
+  return step;
+}
+
 std::vector<ElasticRest> makeElasticRest(const RestShape& shape) {
   std::vector<ElasticRest> elastic(shape.clusters.size());
   for (std::size_t c = 0; c < elastic.size(); ++c) {

@@ -183,6 +183,25 @@ void ElasticBatch::getRotations(const ElasticBatchState& state, std::vector<Clus
     poses[other_clusters_[n]].rotation = state.others[n].rotation;
 }
 
+void ElasticBatch::setRelaxed(const std::vector<RelaxedStrain>& relaxed, int branches, ElasticBatchState& state) const {
+  const std::size_t rows = elastic_sets::kStrainRows * static_cast<std::size_t>(branches);
+  state.relaxed.assign(blocks_ * rows * kBlock, 0.0);
+  for (std::size_t lane = 0; lane < clusters_.size(); ++lane)
+    if (clusters_[lane] != kNoIndex)
+      for (std::size_t row = 0; row < rows; ++row)
+        state.relaxed[(lane / kBlock * rows + row) * kBlock + lane % kBlock] =
+            relaxed[clusters_[lane]].of[row / elastic_sets::kStrainRows][row % elastic_sets::kStrainRows];
+}
+
+void ElasticBatch::getRelaxed(const ElasticBatchState& state, std::vector<RelaxedStrain>& relaxed) const {
+  const std::size_t rows = blocks_ > 0 ? state.relaxed.size() / (blocks_ * kBlock) : 0;
+  for (std::size_t lane = 0; lane < clusters_.size(); ++lane)
+    if (clusters_[lane] != kNoIndex)
+      for (std::size_t row = 0; row < rows; ++row)
+        relaxed[clusters_[lane]].of[row / elastic_sets::kStrainRows][row % elastic_sets::kStrainRows] =
+            state.relaxed[(lane / kBlock * rows + row) * kBlock + lane % kBlock];
+}
+
 void ElasticBatch::sumForces(std::size_t first, std::size_t last, const double* forces, Points& accelerations) const {
   for (std::size_t i = first; i < last; ++i) {
     double x = 0.0, y = 0.0, z = 0.0;
@@ -230,6 +249,11 @@ double ElasticBatch::accelerate(const MatchInput& in, const ElasticParameters& m
     block.stiffens = material.stiffens() || (block.mixes && mix_stiffens_);
     block.stiffening = material.stiffening;
     block.asymmetry = material.asymmetry;
+    if (!state.relaxed.empty()) {
+      block.relaxation = &material.relaxation;
+      block.relaxed = state.relaxed.data() + index * elastic_sets::kStrainRows *
+                                                 static_cast<std::size_t>(material.relaxation.branches) * kBlock;
+    }
     block.rotations = state.rotations.data() + index * 4 * kBlock;
     block.forces = state.forces.data() + index * 3 * kCorners * kBlock;
     const elastic_sets::BlockResult result = accelerateBlock(block, set);

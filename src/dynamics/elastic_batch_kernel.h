@@ -18,6 +18,7 @@ constexpr double kDrawnOut = 12.0;
 constexpr double kMostStiffening = 10.0;
 constexpr double kLevel = 40.0;
 constexpr double kFourth = 0.25;
+constexpr double kTurns = 1e-3;
 constexpr double kCurved = 40.0, kCurvedFrom = 4.0;
 
 constexpr int kMostSteps = 4;     // of Newton's method; from one substep to the next two do
@@ -330,6 +331,47 @@ MESHLESS_INLINE Matrix distort(const Matrix& f, const Matrix& r, const Growth& g
   return half;
 }
 
+// deviatorOf(), takeOn() and takenOn() of elastic_law.h, over mu.
+MESHLESS_INLINE Matrix relax(const Block& b, const Matrix& f, const Matrix& r, int i) {
+  Matrix s;
+  for (int row = 0; row < 3; ++row)
+    for (int c = 0; c < 3; ++c)
+      s.m[row][c] = r.m[0][row] * f.m[0][c] + r.m[1][row] * f.m[1][c] + r.m[2][row] * f.m[2][c];
+  const Pack trace = s.m[0][0] + s.m[1][1] + s.m[2][2], mean = (1.0 / 3.0) * trace;
+  const Pack xy = 0.5 * (s.m[0][1] + s.m[1][0]), yz = 0.5 * (s.m[1][2] + s.m[2][1]), zx = 0.5 * (s.m[2][0] + s.m[0][2]);
+  const Pack d[kStrainRows] = {s.m[0][0] - mean, s.m[1][1] - mean, s.m[2][2] - mean, xy, yz, zx};
+  Pack sum[kStrainRows] = {};
+  for (int k = 0; k < b.relaxation->branches; ++k)
+    for (int c = 0; c < kStrainRows; ++c) {
+      double* const at = b.relaxed + (k * kStrainRows + c) * kBlock + i;
+      const Pack before = get(at), taken = before + b.relaxation->taken[k] * (d[c] - before);
+      sum[c] += b.relaxation->shares[k] * taken;
+      put(taken, at);
+    }
+  Matrix a;
+  constexpr int kAt[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
+  for (int row = 0; row < 3; ++row)
+    for (int c = 0; c < 3; ++c) a.m[row][c] = sum[kAt[row][c]];
+  const auto turning = [&](int row, int c) __attribute__((always_inline)) {
+    return s.m[row][0] * a.m[0][c] + s.m[row][1] * a.m[1][c] + s.m[row][2] * a.m[2][c];
+  };
+  const Pack ax = turning(2, 1) - turning(1, 2), ay = turning(0, 2) - turning(2, 0), az = turning(1, 0) - turning(0, 1);
+  const Pack k00 = trace - s.m[0][0], k11 = trace - s.m[1][1], k22 = trace - s.m[2][2];
+  const Pack c00 = k11 * k22 - yz * yz, c01 = zx * yz + xy * k22, c02 = xy * yz + zx * k11;
+  const Pack c11 = k00 * k22 - zx * zx, c12 = xy * zx + yz * k00, c22 = k00 * k11 - xy * xy;
+  const Pack determinant = k00 * c00 - xy * c01 - zx * c02, both = 2.0 * trace;
+  const Pack inverse = choose(determinant > kTurns * (both * both * both), 1.0 / determinant, Pack{});
+  const Pack ux = inverse * (c00 * ax + c01 * ay + c02 * az), uy = inverse * (c01 * ax + c11 * ay + c12 * az);
+  const Pack uz = inverse * (c02 * ax + c12 * ay + c22 * az);
+  a.m[0][1] -= uz, a.m[0][2] += uy, a.m[1][2] -= ux;
+  a.m[1][0] += uz, a.m[2][0] -= uy, a.m[2][1] += ux;
+  Matrix by_f;
+  for (int row = 0; row < 3; ++row)
+    for (int c = 0; c < 3; ++c)
+      by_f.m[row][c] = r.m[row][0] * a.m[0][c] + r.m[row][1] * a.m[1][c] + r.m[row][2] * a.m[2][c];
+  return by_f;
+}
+
 // Stress over density, and the steepness, as stress() of elastic_law.h.
 template <bool kStiffens>
 MESHLESS_INLINE Matrix stress(const Block& b, const Matrix& gradient, const Lame& lame, int i, Pack& steepness) {
@@ -362,11 +404,20 @@ MESHLESS_INLINE Matrix stress(const Block& b, const Matrix& gradient, const Lame
     const Pack grown =
         (lame.pressure * steepness + 0.5 * (lame.shear * curvature)) / (lame.pressure + (1.0 / 3.0) * lame.shear);
     steepness = grown > steepness ? grown : steepness;
+    if (b.relaxation)
+      for (int row = 0; row < 3; ++row)
+        for (int c = 0; c < 3; ++c)
+          p.m[row][c] = (1.0 - b.relaxation->all) * p.m[row][c] + b.relaxation->all * (f.m[row][c] - r.m[row][c]);
     for (int row = 0; row < 3; ++row)
       for (int c = 0; c < 3; ++c) p.m[row][c] = lame.shear * p.m[row][c] + pressure * slope.m[row][c];
   } else {
     for (int row = 0; row < 3; ++row)
       for (int c = 0; c < 3; ++c) p.m[row][c] = lame.shear * (f.m[row][c] - r.m[row][c]) + pressure * slope.m[row][c];
+  }
+  if (b.relaxation) {
+    const Matrix taken = relax(b, f, r, i);
+    for (int row = 0; row < 3; ++row)
+      for (int c = 0; c < 3; ++c) p.m[row][c] -= lame.shear * taken.m[row][c];
   }
   return p;
 }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "meshless_surgery/dynamics/elastic.h"
 #include "meshless_surgery/dynamics/rotation_batch.h"
 #include "rotation_sets.h"
 
@@ -33,6 +34,8 @@ constexpr int kStiffeningRow = kPressureRow + 1;  // what others add to these
 constexpr int kAsymmetryRow = kStiffeningRow + 1;
 constexpr int kMixRows = kAsymmetryRow + 1;
 
+constexpr int kStrainRows = 6;  // in Block::relaxed, of a branch: xx yy zz xy yz zx
+
 /// Clusters of at most eight members that span space, by their `shape`; or, where that is null, cubes of one size,
 /// their corners in the order of the bits of x, y, z: filled in part as `cells` says, or whole and of the body's
 /// material where that is null too. Lanes from count to kBlock repeat a cluster.
@@ -53,8 +56,10 @@ struct Block {
   bool stiffens = false;                     // where not, the two below are not read
   double stiffening = 0.0;
   double asymmetry = 0.0;
-  double* rotations = nullptr;  // [4][kBlock] x y z w, unit
-  double* forces = nullptr;     // [3 * kCorners][kBlock], written
+  const RelaxationStep* relaxation = nullptr;  // null: nothing relaxes
+  double* relaxed = nullptr;                   // [branches][kStrainRows][kBlock], read and written
+  double* rotations = nullptr;                 // [4][kBlock] x y z w, unit
+  double* forces = nullptr;                    // [3 * kCorners][kBlock], written
 };
 
 struct BlockResult {

@@ -104,7 +104,8 @@ Fit fit(const ElasticCells& body, const ElasticCell& cell, const Points& y, doub
 
 double elasticAccelerations(const ElasticCells& body, const ElasticParameters& material, const Points& y,
                             std::vector<ClusterPose>& poses, Points& accelerations, MatchCounters& counters,
-                            double swelling, const std::vector<PlasticShape>* plastic) {
+                            double swelling, const std::vector<PlasticShape>* plastic,
+                            std::vector<RelaxedStrain>* relaxed) {
   Points& forces = accelerations;  // less their sign, until the end
   forces.assign(y.size(), Vec3::Zero());
   double most = 3.0;
@@ -114,7 +115,9 @@ double elasticAccelerations(const ElasticCells& body, const ElasticParameters& m
     const Fit f = fit(body, cell, y, swelling, shape, poses[c], counters);
     double steepness = 3.0;
     const ElasticParameters mixed = cell.mix.of(material);
-    Mat3 by_gradient = elastic_law::stress(mixed, f.strained, f.rotation, steepness);
+    RelaxedStrain* const taken = relaxed ? &(*relaxed)[c] : nullptr;
+    if (taken) elastic_law::takeOn(mixed.relaxation, elastic_law::deviatorOf(f.strained, f.rotation), *taken);
+    Mat3 by_gradient = elastic_law::stress(mixed, f.strained, f.rotation, steepness, taken);
     if (shape) {
       by_gradient *= shape->inverse;
       steepness *= shape->stiffening * shape->stiffening;
@@ -127,12 +130,30 @@ double elasticAccelerations(const ElasticCells& body, const ElasticParameters& m
   return std::sqrt(most / 3.0);
 }
 
+double relaxingShare(const ElasticCells& body, const RelaxationStep& relaxation, const Points& y,
+                     const std::vector<ClusterPose>& poses, const std::vector<RelaxedStrain>& relaxed, double swelling,
+                     const std::vector<PlasticShape>& plastic) {
+  double most = 0.0, largest = kLeastStrain;
+  for (std::size_t c = 0; c < body.cells.size(); ++c) {
+    Mat3 gradient = gradientOf(body.cells[c], body.half_edge, y) / swelling;
+    if (!plastic.empty()) gradient *= plastic[c].inverse;
+    const auto d = elastic_law::deviatorOf(gradient, poses[c].rotation.toRotationMatrix());
+    std::array<double, 6> left{};
+    for (int k = 0; k < relaxation.branches; ++k)
+      for (int n = 0; n < 6; ++n) left[n] += relaxation.shares[k] * (d[n] - relaxed[c].of[k][n]);
+    most = std::max(most, elastic_law::symmetric(left).norm());
+    largest = std::max(largest, elastic_law::symmetric(d).norm());
+  }
+  return most / largest;
+}
+
 Mat3 gradientOf(const ElasticCell& cell, double half_edge, const Points& y) {
   return gradientOf(coefficientsOf(cell, y, y[cell.corners[0]]), half_edge);
 }
 
 double elasticEnergy(const ElasticCells& body, const ElasticParameters& material, const Points& y,
-                     std::vector<ClusterPose> poses, double swelling, const std::vector<PlasticShape>* plastic) {
+                     std::vector<ClusterPose> poses, double swelling, const std::vector<PlasticShape>* plastic,
+                     const std::vector<RelaxedStrain>* relaxed) {
   double energy = 0.0;
   MatchCounters uncounted;
   for (std::size_t c = 0; c < body.cells.size(); ++c) {
@@ -141,7 +162,8 @@ double elasticEnergy(const ElasticCells& body, const ElasticParameters& material
     // By F, not F / swelling: the factor is the derivative's.
     const ElasticParameters mixed = cell.mix.of(material);
     const double volume = cell.mass / mixed.density;
-    energy += volume * (swelling * elastic_law::energyDensity(mixed, f.strained, f.rotation) +
+    energy += volume * (swelling * elastic_law::energyDensity(mixed, f.strained, f.rotation,
+                                                              relaxed ? &(*relaxed)[c] : nullptr) +
                         bendingOf(body, cell, mixed, poses[c].deformation, f.coefficients).energy);
   }
   return energy;
@@ -149,7 +171,7 @@ double elasticEnergy(const ElasticCells& body, const ElasticParameters& material
 
 std::vector<Mat3> cellStresses(const ElasticCells& body, const ElasticParameters& material, const Points& y,
                                std::vector<ClusterPose>& poses, double swelling,
-                               const std::vector<PlasticShape>* plastic) {
+                               const std::vector<PlasticShape>* plastic, const std::vector<RelaxedStrain>* relaxed) {
   std::vector<Mat3> stresses;
   MatchCounters uncounted;
   for (std::size_t c = 0; c < body.cells.size(); ++c) {
@@ -157,7 +179,8 @@ std::vector<Mat3> cellStresses(const ElasticCells& body, const ElasticParameters
     const PlasticShape* const shape = shapeOf(plastic, c);
     const Fit f = fit(body, cell, y, swelling, shape, poses[c], uncounted);
     double unused = 0.0;
-    stresses.push_back(elastic_law::stress(cell.mix.of(material), f.strained, f.rotation, unused));
+    stresses.push_back(
+        elastic_law::stress(cell.mix.of(material), f.strained, f.rotation, unused, relaxed ? &(*relaxed)[c] : nullptr));
     if (shape) stresses.back() *= shape->inverse;
   }
   return stresses;

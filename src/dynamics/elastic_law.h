@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "cofactor.h"
@@ -54,6 +55,8 @@ constexpr double kFourth = 0.25;          // of a^2 |d|^4 in q; it is convex fro
 constexpr double kCurved = 40.0,
                  kCurvedFrom = 4.0;  // q'' is at most 2 + (kCurved - 2) x / (kCurvedFrom + x), x = a^2 |d|^2
 
+constexpr double kTurns = 1e-3;  // the least determinant of tr S - S over its trace^3 at which a rotation has a slope
+
 // What shear and stretch cost without change of volume: over mu.
 struct Distortion {
   double energy = 0.0;
@@ -85,9 +88,52 @@ inline Distortion distortion(const ElasticParameters& material, const Mat3& f, c
   return result;
 }
 
+// Relaxation: of mu times what the deviator d of the strain costs, each branch has its share of |d - what it has taken
+// on|^2, and the law above has the rest. So energy never grows, as what a branch takes on follows d.
+inline std::array<double, 6> deviatorOf(const Mat3& f, const Mat3& rotation) {
+  const Mat3 strain = rotation.transpose() * f;
+  const double mean = strain.trace() / 3.0;
+  return {strain(0, 0) - mean,
+          strain(1, 1) - mean,
+          strain(2, 2) - mean,
+          0.5 * (strain(0, 1) + strain(1, 0)),
+          0.5 * (strain(1, 2) + strain(2, 1)),
+          0.5 * (strain(2, 0) + strain(0, 2))};
+}
+inline Mat3 symmetric(const std::array<double, 6>& v) {
+  Mat3 m;
+  m << v[0], v[3], v[5], v[3], v[1], v[4], v[5], v[4], v[2];
+  return m;
+}
+// The slope by F of sum of shares of (what a branch has taken on) : d. What was taken on need not have the axes of the
+// strain, so that the rotation of F counts: without it stress would turn the cell.
+inline Mat3 takenOn(const RelaxationStep& step, const RelaxedStrain& relaxed, const Mat3& f, const Mat3& rotation) {
+  std::array<double, 6> sum{};
+  for (int k = 0; k < step.branches; ++k)
+    for (int c = 0; c < 6; ++c) sum[c] += step.shares[k] * relaxed.of[k][c];
+  const Mat3 taken = symmetric(sum), stretch = rotation.transpose() * f, turning = stretch * taken;
+  Mat3 k = stretch.trace() * Mat3::Identity() - stretch;
+  k = 0.5 * (k + k.transpose()).eval();
+  const double determinant = k.determinant(), trace = k.trace();
+  Mat3 slope = taken;
+  if (determinant > kTurns * trace * trace * trace) {  // else the rotation is of no use
+    const Vec3 axis(turning(2, 1) - turning(1, 2), turning(0, 2) - turning(2, 0), turning(1, 0) - turning(0, 1));
+    const Vec3 u = cofactor(k) * axis / determinant;
+    slope(0, 1) -= u.z(), slope(0, 2) += u.y(), slope(1, 2) -= u.x();
+    slope(1, 0) += u.z(), slope(2, 0) -= u.y(), slope(2, 1) += u.x();
+  }
+  return rotation * slope;
+}
+// Exact where d stays: so stress after it has changed falls as the series says, whatever the step is.
+inline void takeOn(const RelaxationStep& step, const std::array<double, 6>& d, RelaxedStrain& relaxed) {
+  for (int k = 0; k < step.branches; ++k)
+    for (int c = 0; c < 6; ++c) relaxed.of[k][c] += step.taken[k] * (d[c] - relaxed.of[k][c]);
+}
+
 // First Piola-Kirchhoff stress of the fixed-corotated law. `steepness`: the square of how much faster than at rest the
 // pressure makes the cluster, times 3.
-inline Mat3 stress(const ElasticParameters& material, const Mat3& f, const Mat3& rotation, double& steepness) {
+inline Mat3 stress(const ElasticParameters& material, const Mat3& f, const Mat3& rotation, double& steepness,
+                   const RelaxedStrain* relaxed = nullptr) {
   const HeldVolume held = heldVolume(f);
   const double strain = volumeStrain(held.j);
   steepness = held.slope.squaredNorm() + std::abs(strain) * held.share * f.norm();
@@ -95,12 +141,30 @@ inline Mat3 stress(const ElasticParameters& material, const Mat3& f, const Mat3&
   if (material.stiffens())
     steepness = std::max(steepness, 3.0 * (material.lambda * steepness + material.mu * distorted.curvature) /
                                         (3.0 * material.lambda + 2.0 * material.mu));
-  return material.mu * distorted.slope + material.lambda * strain * held.slope;
+  Mat3 slope = distorted.slope;
+  if (relaxed) {
+    const double all = material.relaxation.all;
+    slope =
+        (1.0 - all) * slope + 2.0 * all * (f - rotation) - 2.0 * takenOn(material.relaxation, *relaxed, f, rotation);
+  }
+  return material.mu * slope + material.lambda * strain * held.slope;
 }
 
 // Its energy per volume.
-inline double energyDensity(const ElasticParameters& material, const Mat3& f, const Mat3& rotation) {
-  return material.mu * distortion(material, f, rotation).energy + material.lambda * volumeEnergy(heldVolume(f).j);
+inline double energyDensity(const ElasticParameters& material, const Mat3& f, const Mat3& rotation,
+                            const RelaxedStrain* relaxed = nullptr) {
+  double distorted = distortion(material, f, rotation).energy;
+  if (relaxed) {
+    const std::array<double, 6> d = deviatorOf(f, rotation);
+    const double trace = rotation.cwiseProduct(f).sum() - 3.0, all = material.relaxation.all;
+    distorted = (1.0 - all) * distorted + all * trace * trace / 3.0;
+    for (int k = 0; k < material.relaxation.branches; ++k) {
+      std::array<double, 6> left{};
+      for (int c = 0; c < 6; ++c) left[c] = d[c] - relaxed->of[k][c];
+      distorted += material.relaxation.shares[k] * symmetric(left).squaredNorm();
+    }
+  }
+  return material.mu * distorted + material.lambda * volumeEnergy(heldVolume(f).j);
 }
 
 constexpr double kModeSquare = 2.0 / 3.0;  // of an edge along each of two axes, in the mean over three

@@ -87,6 +87,17 @@ Status Material::validate() const {
     return outOfRange("creep", plasticity.creep, "0 (none) to 1e6 1/s");
   if (!(plasticity.maximum >= 0.0 && plasticity.maximum <= 3.0))
     return outOfRange("maximum", plasticity.maximum, "0 to 3");
+  if (relaxation.size() > kMostRelaxations)
+    return outOfRange("the number of relaxation's branches", static_cast<double>(relaxation.size()), "up to 3");
+  double shares = 0.0;
+  for (const Relaxation& branch : relaxation) {
+    if (!(branch.share > 0.0 && branch.share <= 0.99))
+      return outOfRange("relaxation's share", branch.share, "above 0 to 0.99");
+    if (!(branch.time >= 1e-4 && branch.time <= 1e6))
+      return outOfRange("relaxation's time", branch.time, "1e-4 to 1e6 s");
+    shares += branch.share;
+  }
+  if (!(shares <= 0.99)) return outOfRange("the sum of relaxation's shares", shares, "up to 0.99");
   if (Status status = volume.validate("volume"); !status) return status;
   if (Status status = area.validate("area"); !status) return status;
   for (const Color& c : {color, inside_color})

@@ -69,6 +69,28 @@ void readPlasticity(YamlMap& map, Plasticity& plasticity) {
   inner.finish();
 }
 
+void readRelaxation(YamlMap& map, std::vector<Relaxation>& relaxation) {
+  const YAML::Node node = map.get("relaxation");
+  if (!node.IsDefined()) return;
+  relaxation.clear();
+  if (node.IsNull() || (node.IsScalar() && node.Scalar() == "none")) return;
+  if (!node.IsSequence() || node.size() > kMostRelaxations) {
+    map.source().fail(node, "relaxation is " + shown(node), "a list of up to 3 of {share: , time: }, or none");
+    return;
+  }
+  for (const YAML::Node& entry : node) {
+    Relaxation branch;
+    YamlMap inner(map.source(), entry, "relaxation");
+    inner.number("share", {0.0, 0.99, true}, branch.share);
+    inner.number("time", {1e-4, 1e6, false, "s"}, branch.time);
+    inner.finish();
+    if (!inner.has("share")) map.source().fail(entry, "an entry of relaxation has no share", "{share: , time: }");
+    if (!inner.has("time")) map.source().fail(entry, "an entry of relaxation has no time", "{share: , time: }");
+    if (map.source().fault) return;
+    relaxation.push_back(branch);
+  }
+}
+
 void readNoise(YamlMap& map, Look& look) {
   std::string wanted;
   map.text("noise", wanted);
@@ -177,6 +199,7 @@ void readMaterial(YamlSource& source, const YAML::Node& node, const std::string&
   readCurve(map, "volume", material.volume);
   readCurve(map, "area", material.area);
   readPlasticity(map, material.plasticity);
+  readRelaxation(map, material.relaxation);
   readColor(map, "color", material.color);
   readColor(map, "inside_color", material.inside_color);
   readAppearance(map, images, material.appearance);
@@ -256,7 +279,7 @@ Result<Material> changeMaterial(const Material& base, const std::string& yaml, I
   warnings.insert(warnings.end(), source.warnings.begin(), source.warnings.end());
   const bool elastic = changed.elastic();
   const std::vector<std::string> of_looks = {"alpha", "beta", "mode"},
-                                 of_elastic = {"poissons_ratio", "stiffening", "asymmetry"};
+                                 of_elastic = {"poissons_ratio", "stiffening", "asymmetry", "relaxation"};
   for (const std::string& key : elastic ? of_looks : of_elastic)
     if (const YAML::Node node = (*root)[key]; node.IsDefined())
       source.fail(node,

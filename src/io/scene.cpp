@@ -485,6 +485,10 @@ class SceneReader {
         if (!source_.fault) region.region = Region::within(shape.mesh, shown(file));
       }
       if (source_.fault) return;
+      if (region.material.relaxes())
+        source_.warn(material,
+                     "the relaxation of a region's material is not used: all of a body relaxes as the body's "
+                     "own material does");
       def.regions.push_back(std::move(region));
     }
   }

@@ -350,7 +350,8 @@ std::string faultOf(const BodyModel& m, const BodyState& s) {
   if (s.positions.size() != particles || s.velocities.size() != particles || s.poses.size() != clusters ||
       s.cells.size() != cells || s.surface.size() != m.surface.vertices.size() ||
       (!s.plastic.empty() && s.plastic.size() != clusters) ||
-      (!s.plastic_cells.empty() && s.plastic_cells.size() != cells))
+      (!s.plastic_cells.empty() && s.plastic_cells.size() != cells) ||
+      (!s.relaxed.empty() && s.relaxed.size() != cells))
     return "a body's state is not that of its model";
   for (const FilledCavity& c : s.cavities) {
     if (!shellOf(m, c.patch) || !(std::abs(c.pressure) <= 1e50) || !(std::abs(c.content) <= 1e50) ||

@@ -48,6 +48,7 @@ void serialize(A& archive, Box& v) {
 MESHLESS_ARCHIVE(Color, r, g, b, a)
 MESHLESS_ARCHIVE(TriangleMesh, vertices, triangles, patches)
 MESHLESS_ARCHIVE(ResponseCurve, points)
+MESHLESS_ARCHIVE(Relaxation, share, time)
 MESHLESS_ARCHIVE(Plasticity, yield, creep, maximum)
 /// What many share, a file has once, where it comes first: write() and read() are for that.
 template <class T, class Write>
@@ -112,10 +113,10 @@ MESHLESS_ARCHIVE(Appearance, outer, inner)
 template <class A>
 void serialize(A& archive, Material& v) {
   auto& [name, youngs_modulus, poissons_ratio, stiffening, asymmetry, mode, alpha, beta, density, damping, friction,
-         restitution, self_contact, volume, area, plasticity, color, inside_color, appearance] = v;
+         restitution, self_contact, volume, area, plasticity, relaxation, color, inside_color, appearance] = v;
   archive(name, youngs_modulus, poissons_ratio, stiffening, asymmetry, choice(mode, MatchMode::kQuadratic), alpha, beta,
           density, damping, friction, restitution, choice(self_contact, SelfContact::kAll), volume, area, plasticity,
-          color, inside_color, appearance);
+          relaxation, color, inside_color, appearance);
 }
 template <class A>
 void serialize(A& archive, WorldSettings& v) {
@@ -187,15 +188,16 @@ void serialize(A& archive, BodyModel& v) {
 
 MESHLESS_ARCHIVE(ClusterPose, centre, rotation, deformation)
 MESHLESS_ARCHIVE(PlasticShape, stretch, inverse, stiffening)
+MESHLESS_ARCHIVE(RelaxedStrain, of)
 MESHLESS_ARCHIVE(FilledCavity, patch, pressure, content, compliance, leak, filled_for, open_for, acting)
 template <class A>
 void serialize(A& archive, BodyState& v) {
   auto& [positions, velocities, poses, cells, surface, swelling, stretch, pace, stiffened, substep, plastic,
-         plastic_cells, cavities, placed] = v;
+         plastic_cells, relaxed, cavities, placed] = v;
   // Whether the surface is up to date depends on when it was read. The fields that follow do not.
   if constexpr (!std::is_same_v<A, HashArchive>) archive(surface);
   archive(positions, velocities, poses, cells, swelling, stretch, pace, stiffened, substep, plastic, plastic_cells,
-          cavities, placed);
+          relaxed, cavities, placed);
 }
 MESHLESS_ARCHIVE(Plane, normal, point)
 template <class A>

@@ -12,6 +12,7 @@ namespace {
 // the way that it would fall meanwhile: at small loads that is less, and forces that are not in balance show there too.
 constexpr double kStillFor = 0.5;  // [s]
 constexpr double kStillShare = 1e-3;
+constexpr double kRelaxed = 0.01;  // of the strain: so much may still fade in who sleeps
 
 double sizeOf(const Box& box) { return (box.max - box.min).maxCoeff(); }
 
@@ -29,6 +30,14 @@ double wayFromRest(const WorldBody& body) {
 bool leaks(const WorldBody& body) {
   return std::any_of(body.state.cavities.begin(), body.state.cavities.end(),
                      [](const FilledCavity& cavity) { return cavity.open_for > 0.0; });
+}
+
+/// Whether it creeps, however slowly: stress that fades moves tissue later.
+bool relaxes(const WorldBody& body) {
+  const BodyState& state = body.state;
+  if (!body.material.relaxes() || state.relaxed.empty() || !body.model->cells) return false;
+  return relaxingShare(*body.model->cells, relaxationStep(body.material.relaxation, 0.0), state.positions, state.cells,
+                       state.relaxed, state.swelling, state.plastic_cells) > kRelaxed;
 }
 
 /// Less than a cell of tissue: it rocks on a point, and whoever sleeps on it does not mind.
@@ -112,6 +121,7 @@ void World::Impl::fallAsleep(double h_frame) {
       body.rest_from = body.state.positions;
     }
     if (!(body.still_for >= kStillFor) && !(whole[r] && isCrumb(body))) ready[r] = 0;
+    if (ready[r] && relaxes(body)) ready[r] = 0;
   }
   group.assign(bodies.size(), 0);
   for (Index b = 0; b < bodies.size(); ++b) {

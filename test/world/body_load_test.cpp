@@ -90,7 +90,8 @@ TEST(BodyLoad, StressIsTheWeightBelowOverTheSection) {
   World world = rested(def);
   const BodyLoad all = loadOf(world);
   double low = 1e300;
-  for (const Vec3& p : world.snapshot({true, false, false}).bodies[0].surface) low = std::min(low, p.z());
+  const WorldSnapshot shot = world.snapshot({true, false, false});
+  for (const Vec3& p : shot.bodies[0].surface) low = std::min(low, p.z());
   for (const double from_end : {0.03, 0.08, 0.13}) {
     const BodyLoad load = loadOf(world, "bar", {Vec3(0.0, 0.0, low + from_end)});
     ASSERT_EQ(load.cells.size(), 1u);

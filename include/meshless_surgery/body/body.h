@@ -160,6 +160,7 @@ struct BodyState {
   double substep = 0.0;               // [s] the last one; 0 before the first
   std::vector<PlasticShape> plastic;  // one a cluster once something has flowed; empty before
   std::vector<PlasticShape> plastic_cells;  // likewise
+  std::vector<RelaxedStrain> relaxed;       // one a cell of a material that relaxes, from the first substep on
   std::vector<FilledCavity> cavities;  // those that are filled still
   Pose placed;                         // where the rest shape was put: what is held stays there
 };

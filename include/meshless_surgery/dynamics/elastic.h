@@ -1,9 +1,26 @@
 // Elasticity with Young's modulus and Poisson's ratio on the moments of shape matching: elastic materials.
 #pragma once
 
+#include <array>
+
+#include "meshless_surgery/dynamics/material.h"
 #include "meshless_surgery/dynamics/shape_matching.h"
 
 namespace meshless {
+
+/// Strains that the branches of a relaxation have taken on: symmetric, without trace; xx yy zz xy yz zx.
+struct RelaxedStrain {
+  std::array<std::array<double, 6>, kMostRelaxations> of{};
+};
+
+/// A relaxation in a step of h [s].
+struct RelaxationStep {
+  int branches = 0;
+  std::array<double, kMostRelaxations> shares{};
+  std::array<double, kMostRelaxations> taken{};  // 1 - exp(-h / time)
+  double all = 0.0;                              // of shares
+};
+RelaxationStep relaxationStep(const std::vector<Relaxation>& relaxation, double h);
 
 /// Lame's constants of an isotropic material, its density, and how its stress grows beyond small strain.
 struct ElasticParameters {
@@ -13,6 +30,7 @@ struct ElasticParameters {
   double density = 0.0;     // [kg/m^3]
   double stiffening = 0.0;  // >= 0, see elasticAccelerations()
   double asymmetry = 0.0;   // likewise, any sign
+  RelaxationStep relaxation;
 
   bool stiffens() const { return stiffening != 0.0 || asymmetry != 0.0; }
 };
@@ -28,9 +46,13 @@ struct ElasticMix {
   bool isOwn() const { return own == 1.0 && mu == 0.0 && lambda == 0.0 && youngs == 0.0 && !stiffens(); }
   bool stiffens() const { return stiffening != 0.0 || asymmetry != 0.0; }
   ElasticParameters of(const ElasticParameters& body) const {
-    return {own * body.mu + mu * body.youngs,   own * body.lambda + lambda * body.youngs,
-            (own + youngs) * body.youngs,       body.density,
-            own * body.stiffening + stiffening, own * body.asymmetry + asymmetry};
+    return {own * body.mu + mu * body.youngs,
+            own * body.lambda + lambda * body.youngs,
+            (own + youngs) * body.youngs,
+            body.density,
+            own * body.stiffening + stiffening,
+            own * body.asymmetry + asymmetry,
+            body.relaxation};
   }
 };
 

@@ -12,6 +12,7 @@ namespace meshless {
 /// What changes from call to call: rotations are read and written, the rest is scratch. Of one batch at a time.
 struct ElasticBatchState {
   std::vector<double> rotations;
+  std::vector<double> relaxed;      // of lanes; empty where the material does not relax
   std::vector<ClusterPose> others;  // of clusters that the reference computes
   std::vector<double> forces;
   std::vector<double> largest;  // of each block
@@ -31,6 +32,10 @@ class ElasticBatch {
   /// The rotations of poses into a state, made to fit this batch, and back. Nothing else of a pose is read or written.
   void setRotations(const std::vector<ClusterPose>& poses, ElasticBatchState& state) const;
   void getRotations(const ElasticBatchState& state, std::vector<ClusterPose>& poses) const;
+
+  /// Likewise what cells have relaxed by, in `branches` of a relaxation; 0: nothing relaxes.
+  void setRelaxed(const std::vector<RelaxedStrain>& relaxed, int branches, ElasticBatchState& state) const;
+  void getRelaxed(const ElasticBatchState& state, std::vector<RelaxedStrain>& relaxed) const;
 
   /// As elasticAccelerations() for the input or the cells that this was made from (then input is not read), in double:
   /// what differs is rounding, and a rotation is found to 1e-12 rad. A particle that is not finite spoils its clusters'

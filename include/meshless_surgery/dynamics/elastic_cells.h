@@ -34,11 +34,20 @@ struct ElasticCells {
 /// thin plates do not lock (MITC4: Dvorkin and Bathe 1984). The last term holds the product of all three. Conserves
 /// linear and angular momentum to rounding. poses, one a cell: the rotation is read (where the search starts) and
 /// written, as centre (the centroid [m]) and deformation (F) are. swelling: strain is that of F / swelling. plastic:
-/// one a cell; null or empty where nothing has flowed. Returns how much faster than at rest the highest frequency may
-/// be, as in elastic.h.
+/// one a cell; null or empty where nothing has flowed. relaxed: one a cell where the material relaxes, with the part of
+/// material.relaxation in the energy; they go on by its step. Returns how much faster than at rest the highest
+/// frequency may be, as in elastic.h.
 double elasticAccelerations(const ElasticCells& cells, const ElasticParameters& material, const Points& y,
                             std::vector<ClusterPose>& poses, Points& accelerations, MatchCounters& counters,
-                            double swelling = 1.0, const std::vector<PlasticShape>* plastic = nullptr);
+                            double swelling = 1.0, const std::vector<PlasticShape>* plastic = nullptr,
+                            std::vector<RelaxedStrain>* relaxed = nullptr);
+
+/// How much of the strain still fades: the largest |sum of shares of what branches have still to take on| of a cell
+/// over the largest strain of one, or over kLeastStrain.
+constexpr double kLeastStrain = 1e-3;
+double relaxingShare(const ElasticCells& cells, const RelaxationStep& relaxation, const Points& y,
+                     const std::vector<ClusterPose>& poses, const std::vector<RelaxedStrain>& relaxed, double swelling,
+                     const std::vector<PlasticShape>& plastic);
 
 /// F of a cell of half_edge [m]: the gradient of its map at its centroid.
 Mat3 gradientOf(const ElasticCell& cell, double half_edge, const Points& y);
@@ -46,12 +55,14 @@ Mat3 gradientOf(const ElasticCell& cell, double half_edge, const Points& y);
 /// The energy [J] whose gradient that is.
 double elasticEnergy(const ElasticCells& cells, const ElasticParameters& material, const Points& y,
                      std::vector<ClusterPose> poses, double swelling = 1.0,
-                     const std::vector<PlasticShape>* plastic = nullptr);
+                     const std::vector<PlasticShape>* plastic = nullptr,
+                     const std::vector<RelaxedStrain>* relaxed = nullptr);
 
 /// [Pa] First Piola-Kirchhoff stress of each cell at its centroid, without that of bending. poses are written as above.
 std::vector<Mat3> cellStresses(const ElasticCells& cells, const ElasticParameters& material, const Points& y,
                                std::vector<ClusterPose>& poses, double swelling = 1.0,
-                               const std::vector<PlasticShape>* plastic = nullptr);
+                               const std::vector<PlasticShape>* plastic = nullptr,
+                               const std::vector<RelaxedStrain>* relaxed = nullptr);
 
 /// Highest angular frequency [rad/s] of the linearised body at rest, from below: by Lanczos' method, within a percent.
 /// 0 where there are no cells.

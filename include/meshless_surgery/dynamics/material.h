@@ -37,6 +37,15 @@ struct Plasticity {
   double maximum = 0.5;  // 0..3, strain of the rest shape
 };
 
+constexpr std::size_t kMostRelaxations = 3;
+
+/// A share of the stress without change of volume that fades with time: a Maxwell element. Of a Prony series
+/// G(t) = G (1 - sum of share (1 - exp(-t / time))), whose G is that of youngs_modulus.
+struct Relaxation {
+  double share = 0.0;  // above 0, all together at most 0.99
+  double time = 1.0;   // [s] 1e-4..1e6
+};
+
 /// Two families. An appearance material has a youngs_modulus of 0: mode, alpha and beta are the paper's; see goalPull
 /// for alpha. An elastic material has a youngs_modulus: the elastic constants of a textbook, without calibration
 /// (dynamics/elastic.h); mode, alpha and beta are then not used.
@@ -57,12 +66,14 @@ struct Material {
   ResponseCurve volume;                          // of the solid's volume
   ResponseCurve area;                            // of the surface
   Plasticity plasticity;
+  std::vector<Relaxation> relaxation;             // of an elastic material, at most kMostRelaxations
   Color color{0.62f, 0.22f, 0.18f, 1.0f};         // of the outer surface
   Color inside_color{0.85f, 0.45f, 0.40f, 1.0f};  // of cut faces
   Appearance appearance;                          // patterns over both
 
   bool bends() const { return elastic() || mode != MatchMode::kRigid; }
   bool elastic() const { return youngs_modulus > 0.0; }
+  bool relaxes() const { return elastic() && !relaxation.empty(); }
   bool plastic() const { return plasticity.creep > 0.0 && plasticity.maximum > 0.0; }
   /// Why the settings are not usable, naming key, value and range; else Done.
   Status validate() const;
