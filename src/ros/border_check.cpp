@@ -30,11 +30,25 @@ double BorderCheck::number(const std::string& field, double value, double min, d
   return value;
 }
 
+namespace {
+
+void checkEach(BorderCheck& check, const std::string& field, const Vec3& value, double most) {
+  for (int axis = 0; axis < 3; ++axis)
+    check.number(field + "." + std::string(1, "xyz"[axis]), value[axis], -most, most, "m");
+}
+
+}  // namespace
+
 Vec3 BorderCheck::point(const std::string& field, const geometry_msgs::Point& value) {
-  number(field + ".x", value.x, -kMaxCoordinate, kMaxCoordinate, "m");
-  number(field + ".y", value.y, -kMaxCoordinate, kMaxCoordinate, "m");
-  number(field + ".z", value.z, -kMaxCoordinate, kMaxCoordinate, "m");
-  return {value.x, value.y, value.z};
+  const Vec3 point(value.x, value.y, value.z);
+  checkEach(*this, field, point, kMaxSaid);
+  return point;
+}
+
+Vec3 BorderCheck::place(const std::string& field, const Pose& frame, const Vec3& said) {
+  const Vec3 place = frame * said;
+  checkEach(*this, "in the world frame, " + field, place, kMaxCoordinate);
+  return place;
 }
 
 Vec3 BorderCheck::direction(const std::string& field, const geometry_msgs::Vector3& value) {

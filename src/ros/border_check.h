@@ -14,6 +14,7 @@
 namespace meshless {
 
 constexpr double kMaxCoordinate = 1e6;  // [m] of any position: beyond it doubles lose the tissue's digits
+constexpr double kMaxSaid = 1e9;        // [m] of any position as it is said: frames of maps begin far away
 constexpr double kMaxLength = 1e3;      // [m] of any size or reach
 constexpr double kMinQuaternionNorm = 1e-6;
 
@@ -22,6 +23,8 @@ class BorderCheck {
   /// finite and min <= value <= max; unit is for the sentence ("m", "s", empty).
   double number(const std::string& field, double value, double min, double max, const std::string& unit);
   Vec3 point(const std::string& field, const geometry_msgs::Point& value);
+  /// [m] In the world: what was said in that frame.
+  Vec3 place(const std::string& field, const Pose& frame, const Vec3& said);
   /// A direction: any finite vector, zero too.
   Vec3 direction(const std::string& field, const geometry_msgs::Vector3& value);
   /// Normalised; all zeros were left out and are the identity. Another norm below kMinQuaternionNorm is a fault.

@@ -17,6 +17,7 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include "border_check.h"
+#include "meshless_surgery/base/number_text.h"
 #include "stamp_order.h"
 
 namespace meshless {
@@ -95,6 +96,26 @@ struct Frames::Listener {
   ros::AsyncSpinner spinner{1, &queue};
 };
 
+namespace {
+
+// A frame that is known, but not at that stamp.
+std::optional<Error> knownAtOtherTimes(const tf2::BufferCore& buffer, const std::string& world,
+                                       const std::string& frame, const ros::Time& stamp) {
+  if (stamp.isZero() || !buffer.canTransform(world, frame, ros::Time(0))) return std::nullopt;
+  try {
+    const double newest = buffer.lookupTransform(world, frame, ros::Time(0)).header.stamp.toSec();
+    const double ahead = stamp.toSec() - newest;
+    const std::string way = ahead > 0.0 ? numberText(ahead, 3) + " s ahead of" : numberText(-ahead, 3) + " s before";
+    return Error{ErrorCode::kUnknownName,
+                 "header.stamp is " + way + " the newest transform of '" + printable(frame) + "' to '" + world +
+                     "', and tf2 knows none of that time; accepted: " + "a stamp that it knows, or 0 for the newest"};
+  } catch (const tf2::TransformException&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
 Frames::Frames(std::string world_frame, const Clock& clock) : world_frame_(std::move(world_frame)), clock_(clock) {}
 Frames::~Frames() = default;
 
@@ -125,6 +146,7 @@ Result<Pose> Frames::lookUp(const std_msgs::Header& header) {
       why = e.what();
     }
   }
+  if (const std::optional<Error> other = knownAtOtherTimes(tf.buffer, world_frame_, frame, header.stamp)) return *other;
   return Error{ErrorCode::kUnknownName, "header.frame_id is '" + printable(header.frame_id) +
                                             "'; accepted: a frame that tf2 can bring to '" + world_frame_ +
                                             "', or empty for it" + (why.empty() ? "" : " (tf2: " + why + ")")};

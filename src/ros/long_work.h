@@ -85,7 +85,8 @@ struct LongWork : Answers {
     if (!frame.ok()) return refuse(response, caller, frame.error());
     Pose pose;
     pose.rotation = frame->rotation * local.rotation;
-    pose.translation = *frame * local.translation;
+    pose.translation = check.place("blades.pose.position", *frame, local.translation);
+    if (!check.ok()) return refuse(response, caller, check.error());
     command.blades = bladesAt(pose, length, width);
     const auto answer = runner.cut(std::move(command), progress);
     if (!answer.ok()) return refuse(response, caller, answer.error(), progress);
@@ -117,7 +118,8 @@ struct LongWork : Answers {
     const auto frame = frames.toWorld(request.blade.header);
     if (!frame.ok()) return refuse(response, caller, frame.error());
     const Mat3 axes = (frame->rotation * local.rotation).toRotationMatrix();
-    command.blade.origin = *frame * local.translation;
+    command.blade.origin = check.place("blade.pose.position", *frame, local.translation);
+    if (!check.ok()) return refuse(response, caller, check.error());
     command.blade.x_axis = axes.col(0);
     command.blade.y_axis = axes.col(1);
     const auto answer = runner.apply(command, progress);
@@ -189,7 +191,8 @@ struct LongWork : Answers {
     const auto frame = frames.toWorld(request.pose.header);
     if (!frame.ok()) return refuse(response, caller, frame.error());
     wanted.pose.rotation = frame->rotation * local.rotation;
-    wanted.pose.translation = *frame * local.translation;
+    wanted.pose.translation = check.place("pose.pose.position", *frame, local.translation);
+    if (!check.ok()) return refuse(response, caller, check.error());
     auto body = loader.load(wanted, progress);
     if (!body.ok()) return refuse(response, caller, body.error(), progress);
     return add(response, caller, *body, request.name.empty(), progress);

@@ -125,7 +125,8 @@ struct Services::Handlers : Answers {
     if (!check.ok()) return refuse(response, "pick", check.error());
     const auto frame = frames.toWorld(request.header);
     if (!frame.ok()) return refuse(response, "pick", frame.error());
-    command.point = *frame * point;
+    command.point = check.place("point", *frame, point);
+    if (!check.ok()) return refuse(response, "pick", check.error());
     command.direction = frame->rotation * direction;
     command.body = request.body;
     const auto reply = runner.apply(command);
@@ -146,7 +147,8 @@ struct Services::Handlers : Answers {
     if (!frame.ok()) return refuse(response, "move_pick", frame.error());
     MovePickCommand command;
     command.pick = request.pick_id;
-    command.target = *frame * target;
+    command.target = check.place("target", *frame, target);
+    if (!check.ok()) return refuse(response, "move_pick", check.error());
     return applied(response, "move_pick", command, "moved pick " + std::to_string(request.pick_id));
   }
 
@@ -159,7 +161,8 @@ struct Services::Handlers : Answers {
     if (request.at_target) {
       const auto frame = frames.toWorld(request.header);
       if (!frame.ok()) return refuse(response, "lock", frame.error());
-      command.target = *frame * target;
+      command.target = check.place("target", *frame, target);
+      if (!check.ok()) return refuse(response, "lock", check.error());
     }
     return applied(response, "lock", command, "locked pick " + std::to_string(request.pick_id));
   }
@@ -185,7 +188,8 @@ struct Services::Handlers : Answers {
     if (request.enable) {
       const auto frame = frames.toWorld(request.pose.header);
       if (!frame.ok()) return refuse(response, "push", frame.error());
-      command.position = *frame * pose.translation;
+      command.position = check.place("pose.pose.position", *frame, pose.translation);
+      if (!check.ok()) return refuse(response, "push", check.error());
     }
     if (!command.enable) return applied(response, "push", command, "removed the push sphere");
     return applied(response, "push", command,
@@ -224,9 +228,10 @@ struct Services::Handlers : Answers {
     if (!check.ok()) return refuse(response, "probe", check.error());
     const auto frame = frames.toWorld(request.header);
     if (!frame.ok()) return refuse(response, "probe", frame.error());
+    const Vec3 place = check.place("point", *frame, point);
+    if (!check.ok()) return refuse(response, "probe", check.error());
     Result<ProbeReply> met = Error{};
-    const Status done =
-        runner.look([&](World& world) { met = world.probe(*frame * point, frame->rotation * direction); });
+    const Status done = runner.look([&](World& world) { met = world.probe(place, frame->rotation * direction); });
     if (!done.ok()) return refuse(response, "probe", done.error());
     if (!met.ok()) return refuse(response, "probe", met.error());
     response.body = met->body;
@@ -314,7 +319,9 @@ struct Services::Handlers : Answers {
     if (radius == 0.0) return std::optional<Region>();
     const auto frame = frames.toWorld(request.header);
     if (!frame.ok()) return frame.error();
-    return std::optional<Region>(Region::sphere(*frame * centre, radius));
+    const Vec3 place = check.place("centre", *frame, centre);
+    if (!check.ok()) return check.error();
+    return std::optional<Region>(Region::sphere(place, radius));
   }
 
   bool attach(meshless_surgery::Attach::Request& request, meshless_surgery::Attach::Response& response) {
@@ -382,7 +389,8 @@ struct Services::Handlers : Answers {
     if (!check.ok()) return refuse(response, "clip", check.error());
     const auto frame = frames.toWorld(request.header);
     if (!frame.ok()) return refuse(response, "clip", frame.error());
-    command.point = *frame * point;
+    command.point = check.place("point", *frame, point);
+    if (!check.ok()) return refuse(response, "clip", check.error());
     command.direction = frame->rotation * direction;
     const auto reply = runner.apply(command);
     if (!reply.ok()) return refuse(response, "clip", reply.error());
@@ -453,7 +461,9 @@ struct Services::Handlers : Answers {
     if (!check.ok()) return refuse(response, "get_load", check.error());
     const auto frame = frames.toWorld(request.header);
     if (!frame.ok()) return refuse(response, "get_load", frame.error());
-    for (Vec3& p : points) p = *frame * p;
+    for (std::size_t k = 0; k < points.size() && check.ok(); ++k)
+      points[k] = check.place("points[" + std::to_string(k) + "]", *frame, points[k]);
+    if (!check.ok()) return refuse(response, "get_load", check.error());
     Result<BodyLoad> load = Error{};
     const Status done = runner.look([&](World& world) { load = world.load(request.name, points); });
     if (!done.ok()) return refuse(response, "get_load", done.error());

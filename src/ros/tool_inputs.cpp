@@ -72,8 +72,11 @@ void ToolInputs::hearWaiting(Input& input) {
     if (frame.ok()) {
       Pose pose;
       pose.rotation = frame->rotation * local.rotation;
-      pose.translation = *frame * local.translation;
-      hear(input, pose, message.header.stamp);
+      pose.translation = check.place("pose.position", *frame, local.translation);
+      if (check.ok())
+        hear(input, pose, message.header.stamp);
+      else
+        reject(input.name, check.error());
     } else if (!check.ok() || now >= next->until || input.waiting.size() > kMostWaiting) {
       reject(input.name, frame.error());
     } else {

@@ -85,6 +85,7 @@ def cart(moment):
 
 
 TRAY = frame_at(turn((-2, 1, 1), 2.0), (-0.1, 0.4, 0.2))  # on the cart
+MAP = np.linalg.inv(frame_at(turn((0, 0, 1), 0.3), (5.0e5, 5.2e6, 30.0)))  # a map's, whose origin is far away
 BEGIN, END = 1000.0, 1001.0  # [s] the cart is said at both, and moves in between
 
 
@@ -137,7 +138,7 @@ class Frames:
 
     def __init__(self):
         self.moving, self.fixed = tf2_ros.TransformBroadcaster(), tf2_ros.StaticTransformBroadcaster()
-        self.fixed.sendTransform(self.message('cart', 'tray', BEGIN, TRAY))
+        self.fixed.sendTransform([self.message('cart', 'tray', BEGIN, TRAY), self.message('world', 'map', BEGIN, MAP)])
 
     @staticmethod
     def message(parent, child, stamp, frame):
@@ -772,7 +773,27 @@ class RequestsTest(Asked):
             fields = dict(pick_id=pick) if service in NEEDS_A_PICK else {}
             with self.subTest(name=name):
                 self.refused(UNKNOWN, name, {**fields, **{f: said_in('nowhere', 0.0, v) for f, v in FRAMED[service].items()}})
-        self.refused(UNKNOWN, 'probe', {f: said_in('tray', BEGIN - 100.0, v) for f, v in FRAMED['probe'].items()})
+        for stamp, said in ((BEGIN - 100.0, '101 s before the newest transform'), (END + 7.0, '7 s ahead of the newest transform')):
+            answer = self.ask('probe', {f: said_in('tray', stamp, v) for f, v in FRAMED['probe'].items()})
+            self.assertEqual((False, UNKNOWN), (answer.success, answer.error_code))
+            self.assertIn(said, answer.message)
+
+    def test_a_place_in_a_frame_far_away_is_brought_to_the_world_first(self):
+        self.fresh()
+        here = self.good('pick', point=RAY['point'], direction=RAY['direction'])
+        there = np.linalg.inv(MAP)
+        said = dict(header=header('map'), point=Point(*(there @ (*xyz(RAY['point']), 1.0))[:3]),
+                    direction=Vector3(*(there[:3, :3] @ xyz(RAY['direction']))))
+        self.assertGreater(abs(said['point'].y), 5.0e6)
+        found = self.good('pick', **said)
+        self.assertEqual((here.body, here.particle), (found.body, found.particle))
+        target = there @ (-0.31, 0.05, 0.17, 1.0)
+        self.good('move_pick', pick_id=found.pick_id, header=header('map'), target=Point(*target[:3]))
+        moved, = [p for p in self.state().picks if p.pick_id == found.pick_id]
+        self.assertLess(np.linalg.norm(np.subtract(xyz(moved.target), (-0.31, 0.05, 0.17))), 1e-6)
+        answer = self.ask('probe', dict(header=header('map'), point=Point(1.0, 2.0, 3.0), direction=Vector3(0, 0, 1)))
+        self.assertEqual((False, INVALID), (answer.success, answer.error_code))
+        self.assertIn('in the world frame, point.', answer.message)
 
     def test_an_orientation_that_is_left_out_is_the_identity_and_one_that_is_none_is_refused(self):
         for name in self.named(*UNTURNED):
