@@ -91,7 +91,7 @@ TEST_F(CutFuzz, PiecesOfPieces) {
   }
   EXPECT_EQ(faults_, 0);
   EXPECT_LE(refused_, 0.002 * static_cast<double>(cuts_ / 4));
-  EXPECT_GT(with_inner_points_, cuts_ / 100);
+  EXPECT_GT(with_inner_points_, cuts_ / 4 / 50);
   RecordProperty("refused", static_cast<int>(refused_));
 }
 
