@@ -46,7 +46,7 @@ std::size_t bytesOf(const StepScratch& scratch) {
   return scratch.clamp.bytes() +
          bytesOf(scratch.previous, scratch.predicted, scratch.goals, scratch.matched, scratch.touched, scratch.cavity,
                  scratch.cavity_pull) +
-         bytesOf(elastic.rotations, elastic.others, elastic.forces, elastic.largest, elastic.cold);
+         bytesOf(elastic.rotations, elastic.relaxed, elastic.others, elastic.forces, elastic.largest, elastic.cold);
 }
 
 }  // namespace meshless

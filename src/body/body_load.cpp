@@ -12,12 +12,17 @@ namespace {
 std::vector<Wrench> clampLoads(const BodyModel& model, const BodyState& state) {
   std::vector<Wrench> loads;
   const double density = model.cell_mass / std::pow(model.lattice->spacing, 3.0), rate = clampRate(model);
+  // What the springs of a slowed body hold at rest is its softer stress (docs/method.md, 11 and 12); this is the true
+  // one.
+  double stiffness = rate * rate;
+  if (const double h = state.substep; h > 0.0)
+    stiffness = std::min(1.0 / (h * h), stiffness) / stiffnessFactor(model, state, h);
   for (const ClampPoint& point : model.clamp_points) {
     const LatticeCell& cell = model.lattice->cells[point.cell];
     Vec3 now = Vec3::Zero();
     for (int k = 0; k < 8; ++k) now += trilinearWeight(k, point.at) * state.positions[cell.corners[k]];
     const Vec3 held = state.placed * model.lattice->restPlace(cell, point.at);
-    const Vec3 force = rate * rate * springMass(*model.lattice, point, density) * (held - now);
+    const Vec3 force = stiffness * springMass(*model.lattice, point, density) * (held - now);
     if (loads.size() <= point.region) loads.resize(point.region + 1);
     loads[point.region].force += force;
     loads[point.region].torque += now.cross(force);

@@ -184,6 +184,7 @@ void stress(Substep& s) {
   const BodyModel& model = s.model;
   if (!model.elastic_batch) {
     s.pull().assign(s.state.positions.size(), Vec3::Zero());
+    s.state.relaxed.clear();
     return;
   }
   const double lag = viscosityTime(model, s.state, s.h);

@@ -15,9 +15,9 @@
 #include "meshless_surgery/geometry/mesh/even_surface.h"
 #include "meshless_surgery/geometry/mesh/main_axes.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
-#include "meshless_surgery/geometry/query/nearest.h"
 #include "meshless_surgery/geometry/mesh/refine.h"
 #include "meshless_surgery/geometry/mesh/thicken.h"
+#include "meshless_surgery/geometry/query/nearest.h"
 #include "meshless_surgery/geometry/query/union_find.h"
 
 namespace meshless {
@@ -25,7 +25,7 @@ namespace {
 
 constexpr std::size_t kMaxParticles = 200000;
 constexpr std::size_t kMostRegions = 100;
-constexpr double kAutoCells = 1600.0;              // aimed at where no spacing is given, at most
+constexpr double kAutoCells = 1600.0;  // aimed at where no spacing is given, at most
 // [1/s] Of a solid: its cells times how often a pressure wave crosses one in a second. A cell takes about two
 // substeps for each crossing, and each of them a tenth of a microsecond: a twentieth of one thread's time.
 constexpr double kCrossings = 4e5;
@@ -225,18 +225,19 @@ HeldHeight heldHeight(const std::vector<HeldRegion>& regions, const Pose& placed
   };
 }
 
-// The one that is nearest to the place.
-std::uint32_t regionThatHolds(const std::vector<HeldRegion>& regions, const Pose& placed, const Pose& pose,
-                              const CellLattice& lattice, const ClampPoint& point) {
-  const Vec3 place = lattice.restPlace(lattice.cells[point.cell], point.at);
-  std::uint32_t nearest = 0;
-  double least = std::numeric_limits<double>::infinity();
-  for (std::uint32_t r = 0; r < regions.size(); ++r)
-    if (const double height = heldHeight({regions[r]}, placed, pose)(place); height < least) {
-      least = height;
-      nearest = r;
+// Each gets the region that is nearest to it.
+void numberClampPoints(const std::vector<HeldRegion>& regions, const Pose& placed, const Pose& pose,
+                       const CellLattice& lattice, std::vector<ClampPoint>& points) {
+  std::vector<double> least(points.size(), std::numeric_limits<double>::infinity());
+  for (std::uint32_t r = 0; r < regions.size(); ++r) {
+    const HeldHeight height = heldHeight({regions[r]}, placed, pose);
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const double here = height(lattice.restPlace(lattice.cells[points[k].cell], points[k].at));
+      if (!(here < least[k])) continue;
+      least[k] = here;
+      points[k].region = r;
     }
-  return nearest;
+  }
 }
 
 // Every region has tissue, or whoever wrote it is wrong about where the body is.
@@ -285,7 +286,7 @@ Status makeLatticeParticles(const BodyDef& def, const SolidQuery& solid, const P
   const double unit = std::pow(model.spacing, 3.0) * filled / model.rest_volume;
   for (LatticeCell& cell : lattice->cells) cell.resists.fraction *= unit;
   if (held) model.clamp_points = findClampPoints(*lattice, solid, held);
-  for (ClampPoint& point : model.clamp_points) point.region = regionThatHolds(def.fixed, placed, pose, *lattice, point);
+  numberClampPoints(def.fixed, placed, pose, *lattice, model.clamp_points);
   if (const Status found = findRegions(def, placed, pose, *lattice, model); !found) return found;
   model.lattice = std::make_shared<CellLattice>(std::move(*lattice));
   makeParticlesOfCells(model);
@@ -618,8 +619,8 @@ PreparedBody placedCopy(const PreparedBody& body, std::string name, const Pose& 
   copy.def.pose = pose;
   const Quat turn = pose.rotation.normalized() * body.def.pose.rotation.normalized().conjugate();
   const Pose motion{turn, pose.translation - turn * body.def.pose.translation};
-  copy.state = restState(*copy.model, {(turn * body.state.placed.rotation).normalized(),
-                                       motion * body.state.placed.translation});
+  copy.state = restState(*copy.model,
+                         {(turn * body.state.placed.rotation).normalized(), motion * body.state.placed.translation});
   copy.state.cavities = body.state.cavities;
   return copy;
 }

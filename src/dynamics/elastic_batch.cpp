@@ -195,6 +195,7 @@ void ElasticBatch::setRelaxed(const std::vector<RelaxedStrain>& relaxed, int bra
 
 void ElasticBatch::getRelaxed(const ElasticBatchState& state, std::vector<RelaxedStrain>& relaxed) const {
   const std::size_t rows = blocks_ > 0 ? state.relaxed.size() / (blocks_ * kBlock) : 0;
+  std::fill(relaxed.begin(), relaxed.end(), RelaxedStrain());
   for (std::size_t lane = 0; lane < clusters_.size(); ++lane)
     if (clusters_[lane] != kNoIndex)
       for (std::size_t row = 0; row < rows; ++row)

@@ -10,7 +10,7 @@
 namespace meshless::elastic_sets::MESHLESS_SET {
 namespace {
 
-// As in elastic.cpp.
+// As in elastic_law.h.
 constexpr double kLeastVolume = -0.8;
 constexpr double kMostVolume = 1.5;
 constexpr double kModeSquare = 2.0 / 3.0;
@@ -19,7 +19,7 @@ constexpr double kMostStiffening = 10.0;
 constexpr double kLevel = 40.0;
 constexpr double kFourth = 0.25;
 constexpr double kTurns = 1e-3;
-constexpr double kCurved = 40.0, kCurvedFrom = 4.0;
+constexpr double kCurved = 40.0, kCurvedFrom = 3.0;
 
 constexpr int kMostSteps = 4;     // of Newton's method; from one substep to the next two do
 constexpr double kStep6 = 1e-25;  // length^6 of the last step, times the condition number squared: 3e-13 rad are left
@@ -232,7 +232,7 @@ std::size_t rotateCold(const Block& b, const Fits& fits) {
   return static_cast<std::size_t>(count);
 }
 
-// volumeStrain() of elastic.cpp.
+// volumeStrain() of elastic_law.h.
 MESHLESS_INLINE Pack volumeStrain(Pack j) {
   Pack strain = (j > kLeastVolume ? j : all(kLeastVolume)) - 1.0;
   const Mask torn = j > kMostVolume;
@@ -245,7 +245,7 @@ MESHLESS_INLINE Pack volumeStrain(Pack j) {
   return strain;
 }
 
-// heldVolume() of elastic.cpp: of what is drawn out far; j and its slope by F are those of the whole volume before.
+// heldVolume() of elastic_law.h: of what is drawn out far; j and its slope by F are those of the whole volume before.
 MESHLESS_INLINE void holdLess(const Matrix& f, Pack norm2, Pack& j, Matrix& slope, Pack& share) {
   const Pack beyond = norm2 * (1.0 / kDrawnOut) - 1.0;
   const Mask drawn = beyond > 0.0;
@@ -340,11 +340,13 @@ MESHLESS_INLINE Matrix relax(const Block& b, const Matrix& f, const Matrix& r, i
   const Pack trace = s.m[0][0] + s.m[1][1] + s.m[2][2], mean = (1.0 / 3.0) * trace;
   const Pack xy = 0.5 * (s.m[0][1] + s.m[1][0]), yz = 0.5 * (s.m[1][2] + s.m[2][1]), zx = 0.5 * (s.m[2][0] + s.m[0][2]);
   const Pack d[kStrainRows] = {s.m[0][0] - mean, s.m[1][1] - mean, s.m[2][2] - mean, xy, yz, zx};
+  const Pack size2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + 2.0 * (xy * xy + yz * yz + zx * zx);
+  const Pack share = choose(size2 > 1.0, 1.0 / squareRoot(size2), all(1.0));
   Pack sum[kStrainRows] = {};
   for (int k = 0; k < b.relaxation->branches; ++k)
     for (int c = 0; c < kStrainRows; ++c) {
       double* const at = b.relaxed + (k * kStrainRows + c) * kBlock + i;
-      const Pack before = get(at), taken = before + b.relaxation->taken[k] * (d[c] - before);
+      const Pack before = get(at), taken = before + b.relaxation->taken[k] * (share * d[c] - before);
       sum[c] += b.relaxation->shares[k] * taken;
       put(taken, at);
     }

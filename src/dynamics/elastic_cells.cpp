@@ -137,7 +137,7 @@ double relaxingShare(const ElasticCells& body, const RelaxationStep& relaxation,
   for (std::size_t c = 0; c < body.cells.size(); ++c) {
     Mat3 gradient = gradientOf(body.cells[c], body.half_edge, y) / swelling;
     if (!plastic.empty()) gradient *= plastic[c].inverse;
-    const auto d = elastic_law::deviatorOf(gradient, poses[c].rotation.toRotationMatrix());
+    const auto d = elastic_law::followed(elastic_law::deviatorOf(gradient, poses[c].rotation.toRotationMatrix()));
     std::array<double, 6> left{};
     for (int k = 0; k < relaxation.branches; ++k)
       for (int n = 0; n < 6; ++n) left[n] += relaxation.shares[k] * (d[n] - relaxed[c].of[k][n]);

@@ -53,7 +53,7 @@ constexpr double kMostStiffening = 10.0;  // the most that the slope of the ener
 constexpr double kLevel = 40.0;           // a^2 |d|^2 from which q grows with |d|^2 again: stress stays bounded
 constexpr double kFourth = 0.25;          // of a^2 |d|^4 in q; it is convex from 0.2 on
 constexpr double kCurved = 40.0,
-                 kCurvedFrom = 4.0;  // q'' is at most 2 + (kCurved - 2) x / (kCurvedFrom + x), x = a^2 |d|^2
+                 kCurvedFrom = 3.0;  // q'' is at most 2 + (kCurved - 2) x / (kCurvedFrom + x), x = a^2 |d|^2
 
 constexpr double kTurns = 1e-3;  // the least determinant of tr S - S over its trace^3 at which a rotation has a slope
 
@@ -124,10 +124,18 @@ inline Mat3 takenOn(const RelaxationStep& step, const RelaxedStrain& relaxed, co
   }
   return rotation * slope;
 }
+// What branches follow: d as far as a strain of 1. What was torn far and long would throw itself apart later.
+inline std::array<double, 6> followed(std::array<double, 6> d) {
+  if (const double size = symmetric(d).norm(); size > 1.0)
+    for (double& component : d) component /= size;
+  return d;
+}
 // Exact where d stays: so stress after it has changed falls as the series says, whatever the step is.
 inline void takeOn(const RelaxationStep& step, const std::array<double, 6>& d, RelaxedStrain& relaxed) {
+  const std::array<double, 6> goal = followed(d);
   for (int k = 0; k < step.branches; ++k)
-    for (int c = 0; c < 6; ++c) relaxed.of[k][c] += step.taken[k] * (d[c] - relaxed.of[k][c]);
+    for (int c = 0; c < 6; ++c) relaxed.of[k][c] += step.taken[k] * (goal[c] - relaxed.of[k][c]);
+  for (std::size_t k = static_cast<std::size_t>(step.branches); k < kMostRelaxations; ++k) relaxed.of[k] = {};
 }
 
 // First Piola-Kirchhoff stress of the fixed-corotated law. `steepness`: the square of how much faster than at rest the

@@ -131,7 +131,7 @@ std::vector<HeldRegion> readFixed(YamlSource& source, const YAML::Node& node) {
       "or "
       "body";
   std::vector<HeldRegion> regions;
-  if (!node.IsSequence() || node.size() > 1000) {
+  if (!node.IsSequence() || node.size() > kMaxHeldRegions) {
     source.fail(node, "fixed is " + shown(node), "a list of up to 1000 of " + accepted);
     return regions;
   }

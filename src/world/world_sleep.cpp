@@ -121,7 +121,10 @@ void World::Impl::fallAsleep(double h_frame) {
       body.rest_from = body.state.positions;
     }
     if (!(body.still_for >= kStillFor) && !(whole[r] && isCrumb(body))) ready[r] = 0;
-    if (ready[r] && relaxes(body)) ready[r] = 0;
+    if (ready[r] && body.still_for >= kStillFor && relaxes(body)) {  // asked again when it was still as long again
+      body.still_for = 0.0;
+      ready[r] = 0;
+    }
   }
   group.assign(bodies.size(), 0);
   for (Index b = 0; b < bodies.size(); ++b) {

@@ -154,6 +154,21 @@ TEST(BodyLoad, ClampsOfAnyOrganBearItsWeight) {
   }
 }
 
+// One that gets too few substeps bears as much.
+TEST(BodyLoad, AClampOfABodyThatIsSlowedBearsItsWeight) {
+  BodyDef def = bar();
+  def.material.asymmetry = 10.0;
+  def.fixed = {heldBox(Vec3(-1, -1, -1), Vec3(-0.06, 1, 1))};
+  WorldSettings settings;
+  settings.gravity = Vec3(0.0, 0.0, -1.0);
+  settings.max_substeps = 2;
+  settings.sleep = false;
+  World world = rested(def, settings, 30.0);
+  ASSERT_LT(world.snapshot({}).bodies[0].stiffness_factor, 0.5);
+  const double weight = kDensity * 0.16 * kSize.y() * kSize.z();
+  EXPECT_NEAR(loadOf(world).clamps[0].force.z(), weight, 0.01 * weight);
+}
+
 TEST(BodyLoad, PiecesKeepTheirClampAndItsNumber) {
   BodyDef def = bar();
   def.fixed = {heldBox(Vec3(-1, -1, -1), Vec3(-0.08, 1, 1)), heldBox(Vec3(0.08, -1, -1), Vec3(1, 1, 1))};

@@ -117,6 +117,10 @@ template <std::size_t n>
 void requireNumbers(const std::array<double, n>* values, std::size_t count) {
   if (count > 0) requireNumbers(values->data(), n * count, kMostNumber);
 }
+template <class T, std::size_t m, std::size_t n>
+void requireNumbers(const std::array<std::array<T, m>, n>* values, std::size_t count) {
+  if (count > 0) requireNumbers(values->data(), n * count);
+}
 template <int rows, int columns>
 void requireNumbers(const Eigen::Matrix<double, rows, columns>* values, std::size_t count) {
   if (count > 0)

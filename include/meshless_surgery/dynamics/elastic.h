@@ -75,12 +75,12 @@ std::vector<ElasticRest> makeElasticRest(const RestShape& shape);
 /// q is convex in e for every a: tissue that stiffens where it is pressed (a > 0) yields where it is pulled, and never
 /// gives way. W is Fung's exponential exp(b q) / b to the second order, with a slope of at most 10. Both leave Young's
 /// modulus and Poisson's ratio of small strain as they are.
-/// All of it is the gradient of
-/// an energy, conserves linear and angular momentum, and does not change with resolution. Clusters whose points do not
-/// span space resist as a rigid match would, with E/(rho s^2). poses is read (last rotation) and written. With cells of
-/// 2x2x2 particles it is the hexahedron with one integration point, k its hourglass stiffness. Returns how much faster
-/// than at rest the body's highest frequency may be, at least 1: the root of the largest (|dJ/dF|^2 + |g| |F|) / 3 of a
-/// cluster, never above 5; of what stiffens also of the most that its stress may grow by strain, over that at rest.
+/// All of it is the gradient of an energy, conserves linear and angular momentum, and does not change with resolution.
+/// Clusters whose points do not span space resist as a rigid match would, with E/(rho s^2). poses is read (last
+/// rotation) and written. With cells of 2x2x2 particles it is the hexahedron with one integration point, k its
+/// hourglass stiffness. Returns how much faster than at rest the body's highest frequency may be, at least 1: the root
+/// of the largest (|dJ/dF|^2 + |g| |F|) / 3 of a cluster, never above 5; of what stiffens also of the most that its
+/// stress may grow by strain, over that at rest.
 double elasticAccelerations(const MatchInput& input, const std::vector<ElasticRest>& elastic,
                             const ElasticParameters& material, const Points& y, std::vector<ClusterPose>& poses,
                             Points& accelerations, MatchCounters& counters, double swelling = 1.0);
