@@ -251,7 +251,10 @@ double ElasticBatch::accelerate(const MatchInput& in, const ElasticParameters& m
     block.stiffening = material.stiffening;
     block.asymmetry = material.asymmetry;
     if (!state.relaxed.empty()) {
-      block.relaxation = &material.relaxation;
+      block.branches = material.relaxation.branches;
+      block.shares = material.relaxation.shares.data();
+      block.taken = material.relaxation.taken.data();
+      block.share = material.relaxation.all;
       block.relaxed = state.relaxed.data() + index * elastic_sets::kStrainRows *
                                                  static_cast<std::size_t>(material.relaxation.branches) * kBlock;
     }

@@ -6,20 +6,12 @@
 #endif
 
 #include "double_pack.h"
+#include "elastic_constants.h"
 
 namespace meshless::elastic_sets::MESHLESS_SET {
 namespace {
 
-// As in elastic_law.h.
-constexpr double kLeastVolume = -0.8;
-constexpr double kMostVolume = 1.5;
-constexpr double kModeSquare = 2.0 / 3.0;
-constexpr double kDrawnOut = 12.0;
-constexpr double kMostStiffening = 10.0;
-constexpr double kLevel = 40.0;
-constexpr double kFourth = 0.25;
-constexpr double kTurns = 1e-3;
-constexpr double kCurved = 40.0, kCurvedFrom = 3.0;
+using namespace elastic_law;
 
 constexpr int kMostSteps = 4;     // of Newton's method; from one substep to the next two do
 constexpr double kStep6 = 1e-25;  // length^6 of the last step, times the condition number squared: 3e-13 rad are left
@@ -343,11 +335,11 @@ MESHLESS_INLINE Matrix relax(const Block& b, const Matrix& f, const Matrix& r, i
   const Pack size2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + 2.0 * (xy * xy + yz * yz + zx * zx);
   const Pack share = choose(size2 > 1.0, 1.0 / squareRoot(size2), all(1.0));
   Pack sum[kStrainRows] = {};
-  for (int k = 0; k < b.relaxation->branches; ++k)
+  for (int k = 0; k < b.branches; ++k)
     for (int c = 0; c < kStrainRows; ++c) {
       double* const at = b.relaxed + (k * kStrainRows + c) * kBlock + i;
-      const Pack before = get(at), taken = before + b.relaxation->taken[k] * (share * d[c] - before);
-      sum[c] += b.relaxation->shares[k] * taken;
+      const Pack before = get(at), taken = before + b.taken[k] * (share * d[c] - before);
+      sum[c] += b.shares[k] * taken;
       put(taken, at);
     }
   Matrix a;
@@ -406,17 +398,16 @@ MESHLESS_INLINE Matrix stress(const Block& b, const Matrix& gradient, const Lame
     const Pack grown =
         (lame.pressure * steepness + 0.5 * (lame.shear * curvature)) / (lame.pressure + (1.0 / 3.0) * lame.shear);
     steepness = grown > steepness ? grown : steepness;
-    if (b.relaxation)
+    if (b.branches > 0)
       for (int row = 0; row < 3; ++row)
-        for (int c = 0; c < 3; ++c)
-          p.m[row][c] = (1.0 - b.relaxation->all) * p.m[row][c] + b.relaxation->all * (f.m[row][c] - r.m[row][c]);
+        for (int c = 0; c < 3; ++c) p.m[row][c] = (1.0 - b.share) * p.m[row][c] + b.share * (f.m[row][c] - r.m[row][c]);
     for (int row = 0; row < 3; ++row)
       for (int c = 0; c < 3; ++c) p.m[row][c] = lame.shear * p.m[row][c] + pressure * slope.m[row][c];
   } else {
     for (int row = 0; row < 3; ++row)
       for (int c = 0; c < 3; ++c) p.m[row][c] = lame.shear * (f.m[row][c] - r.m[row][c]) + pressure * slope.m[row][c];
   }
-  if (b.relaxation) {
+  if (b.branches > 0) {
     const Matrix taken = relax(b, f, r, i);
     for (int row = 0; row < 3; ++row)
       for (int c = 0; c < 3; ++c) p.m[row][c] -= lame.shear * taken.m[row][c];

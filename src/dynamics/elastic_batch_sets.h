@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "meshless_surgery/dynamics/elastic.h"
 #include "meshless_surgery/dynamics/rotation_batch.h"
 #include "rotation_sets.h"
 
@@ -56,10 +55,13 @@ struct Block {
   bool stiffens = false;                     // where not, the two below are not read
   double stiffening = 0.0;
   double asymmetry = 0.0;
-  const RelaxationStep* relaxation = nullptr;  // null: nothing relaxes
-  double* relaxed = nullptr;                   // [branches][kStrainRows][kBlock], read and written
-  double* rotations = nullptr;                 // [4][kBlock] x y z w, unit
-  double* forces = nullptr;                    // [3 * kCorners][kBlock], written
+  int branches = 0;                // of a relaxation; 0: nothing relaxes
+  const double* shares = nullptr;  // of each, and their sum
+  const double* taken = nullptr;
+  double share = 0.0;
+  double* relaxed = nullptr;    // [branches][kStrainRows][kBlock], read and written
+  double* rotations = nullptr;  // [4][kBlock] x y z w, unit
+  double* forces = nullptr;     // [3 * kCorners][kBlock], written
 };
 
 struct BlockResult {

@@ -6,13 +6,10 @@
 #include <cmath>
 
 #include "cofactor.h"
+#include "elastic_constants.h"
 #include "meshless_surgery/dynamics/elastic.h"
 
 namespace meshless::elastic_law {
-
-constexpr double kLeastVolume = -0.8;  // J below which the pressure does not grow
-constexpr double kMostVolume = 1.5;    // J above which it falls
-constexpr double kDrawnOut = 12.0;     // |F|^2, 3 at rest, above which the volume counts less and less
 
 // Pressure over lambda, a function of J alone: so it has a potential, whatever the bounds. Above them it falls as cof F
 // grows, or a torn cell would stiffen without end.
@@ -48,14 +45,6 @@ inline HeldVolume heldVolume(const Mat3& f) {
   held.j *= held.share;
   return held;
 }
-
-constexpr double kMostStiffening = 10.0;  // the most that the slope of the energy by q grows
-constexpr double kLevel = 40.0;           // a^2 |d|^2 from which q grows with |d|^2 again: stress stays bounded
-constexpr double kFourth = 0.25;          // of a^2 |d|^4 in q; it is convex from 0.2 on
-constexpr double kCurved = 40.0,
-                 kCurvedFrom = 3.0;  // q'' is at most 2 + (kCurved - 2) x / (kCurvedFrom + x), x = a^2 |d|^2
-
-constexpr double kTurns = 1e-3;  // the least determinant of tr S - S over its trace^3 at which a rotation has a slope
 
 // What shear and stretch cost without change of volume: over mu.
 struct Distortion {
@@ -174,8 +163,6 @@ inline double energyDensity(const ElasticParameters& material, const Mat3& f, co
   }
   return material.mu * distorted + material.lambda * volumeEnergy(heldVolume(f).j);
 }
-
-constexpr double kModeSquare = 2.0 / 3.0;  // of an edge along each of two axes, in the mean over three
 
 // Of a cell: how its energy per volume changes with the coefficients of the products of two or three coordinates, each
 // named by the bits of its axes, and through what measures them with the gradient. Lengths in half edges.

@@ -50,7 +50,7 @@ TEST(BorderCheck, KeepsTheFirstFault) {
 
 TEST(BorderCheck, EachCoordinateOfAPointIsLookedAt) {
   for (int axis = 0; axis < 3; ++axis) {
-    for (const double bad : {kNan, kInf, -kInf, 2.0 * kMaxCoordinate}) {
+    for (const double bad : {kNan, kInf, -kInf, 2.0 * kMaxSaid}) {
       geometry_msgs::Point point;
       (axis == 0 ? point.x : axis == 1 ? point.y : point.z) = bad;
       BorderCheck check;
@@ -59,6 +59,18 @@ TEST(BorderCheck, EachCoordinateOfAPointIsLookedAt) {
       EXPECT_EQ(0u, check.error().detail.find(std::string("target.") + "xyz"[axis])) << check.error().detail;
     }
   }
+}
+
+// What counts is where it is in the world: a map's frame begins far away.
+TEST(BorderCheck, APlaceIsLookedAtInTheWorld) {
+  Pose map;
+  map.translation = Vec3(-5e5, -5.2e6, 0.0);
+  BorderCheck check;
+  EXPECT_EQ(Vec3(1.0, 2.0, 3.0), check.place("target", map, Vec3(500001.0, 5200002.0, 3.0)));
+  EXPECT_TRUE(check.ok());
+  check.place("target", map, Vec3::Zero());
+  ASSERT_FALSE(check.ok());
+  EXPECT_EQ("in the world frame, target.y is -5.2e+06; accepted: -1e+06..1e+06 m", check.error().detail);
 }
 
 TEST(BorderCheck, NormalisesQuaternionsAndRefusesThoseWithoutADirection) {
