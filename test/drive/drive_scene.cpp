@@ -134,10 +134,13 @@ Material makeMaterial(Random& random, const DriveChoices& choices, double size) 
   const bool shipped = random.chance(0.5) && !choices.shipped.empty(), elastic = random.chance(0.5);
   const std::uint64_t which = random.bits();
   std::vector<const Material*> candidates;
-  for (const auto& [name, material] : choices.shipped)
+  for (const auto& [name, material] : choices.shipped) {
+    const bool stiffens = material.stiffening != 0.0 || material.asymmetry != 0.0;
+    if (stiffens && choices.material != name) continue;  // those came later: a seed stays its scene
     if (choices.material.empty() || choices.material == name ||
         (choices.material == "elastic" ? material.elastic() : choices.material == "looks" && !material.elastic()))
       candidates.push_back(&material);
+  }
   const bool family = choices.material == "elastic" || choices.material == "looks";
   if (!candidates.empty() && (shipped || (!choices.material.empty() && !family)))
     return *candidates[which % candidates.size()];
