@@ -469,27 +469,15 @@ class CellCutter {
 
   // --- the surface; what has no cell gets crumbs
 
-  // In a rim that is thinner than samples see: the nearest tissue of the piece, on the vertex's side. At rest the other
-  // lip of an older wound is as near: what hangs together with the vertex's own cell comes first.
+  // In a rim that is thinner than samples see: the nearest tissue of the piece, on the vertex's side.
   Index beyondTheRim(const EmbeddedVertex& vertex, int piece) const {
-    for (const bool beside : {true, false}) {
-      const Index c = finder_.nearest(vertex.rest, [&](Index c) {
-        if (piece != kAnyPiece && piece_of_[component_[c]] != piece) return kNoSample;
-        if (beside && !haveACornerInCommon(cut_.parent_cell[c], vertex.was)) return kNoSample;
-        const SampleSet samples = cut_.lattice.cells[c].samples;
-        if (vertex.side == 0) return samples;
-        if (blade_.bounded() && !cut_.changed[c]) return isPartedFrom(c, vertex) ? kNoSample : samples;
-        return samples & (vertex.side > 0 ? cut_.above[c] : ~cut_.above[c]);
-      });
-      if (c != kNoIndex) return c;
-    }
-    return kNoIndex;
-  }
-
-  // Of the parent's cells.
-  bool haveACornerInCommon(Index a, Index b) const {
-    const std::array<Index, 8>&one = before_.cells[a].corners, &other = before_.cells[b].corners;
-    return std::find_first_of(one.begin(), one.end(), other.begin(), other.end()) != one.end();
+    return finder_.nearest(vertex.rest, [&](Index c) {
+      if (piece != kAnyPiece && piece_of_[component_[c]] != piece) return kNoSample;
+      const SampleSet samples = cut_.lattice.cells[c].samples;
+      if (vertex.side == 0) return samples;
+      if (blade_.bounded() && !cut_.changed[c]) return isPartedFrom(c, vertex) ? kNoSample : samples;
+      return samples & (vertex.side > 0 ? cut_.above[c] : ~cut_.above[c]);
+    });
   }
 
   void bind() {

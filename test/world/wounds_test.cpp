@@ -126,7 +126,7 @@ void expectHardlyTorn(bool crossing, Resolution resolution, int in_one, int in_a
 TEST(Wounds, AnIncisionThatIsSpreadTearsHardlyATriangle) { expectHardlyTorn(false, Resolution::kMedium, 6, 24); }
 
 TEST(Wounds, CrossingIncisionsThatAreSpreadTearFewTriangles_Long) {
-  expectHardlyTorn(true, Resolution::kMedium, 10, 40);
+  expectHardlyTorn(true, Resolution::kMedium, 8, 40);
 }
 
 // And in cells of about 5 mm, which tear less and take most of the time.
