@@ -469,15 +469,30 @@ class CellCutter {
 
   // --- the surface; what has no cell gets crumbs
 
-  // In a rim that is thinner than samples see: the nearest tissue of the piece, on the vertex's side.
+  // In a rim that is thinner than samples see: the nearest tissue of the piece, on the vertex's side. At rest the other
+  // lip of an older wound is as near: it comes last.
   Index beyondTheRim(const EmbeddedVertex& vertex, int piece) const {
-    return finder_.nearest(vertex.rest, [&](Index c) {
-      if (piece != kAnyPiece && piece_of_[component_[c]] != piece) return kNoSample;
-      const SampleSet samples = cut_.lattice.cells[c].samples;
-      if (vertex.side == 0) return samples;
-      if (blade_.bounded() && !cut_.changed[c]) return isPartedFrom(c, vertex) ? kNoSample : samples;
-      return samples & (vertex.side > 0 ? cut_.above[c] : ~cut_.above[c]);
-    });
+    for (const bool any : {false, true}) {
+      const Index c = finder_.nearest(vertex.rest, [&](Index c) {
+        if (piece != kAnyPiece && piece_of_[component_[c]] != piece) return kNoSample;
+        if (!any && areLips(cut_.parent_cell[c], vertex.was)) return kNoSample;
+        const SampleSet samples = cut_.lattice.cells[c].samples;
+        if (vertex.side == 0) return samples;
+        if (blade_.bounded() && !cut_.changed[c]) return isPartedFrom(c, vertex) ? kNoSample : samples;
+        return samples & (vertex.side > 0 ? cut_.above[c] : ~cut_.above[c]);
+      });
+      if (c != kNoIndex) return c;
+    }
+    return kNoIndex;
+  }
+
+  // Cells of the parent that are beside each other and have no corner in common: an older wound is between them.
+  bool areLips(Index a, Index b) const {
+    const LatticeCell &one = before_.cells[a], &other = before_.cells[b];
+    for (int k = 0; k < 3; ++k)
+      if (std::abs(one.place[k] - other.place[k]) > 1) return false;
+    return std::find_first_of(one.corners.begin(), one.corners.end(), other.corners.begin(), other.corners.end()) ==
+           one.corners.end();
   }
 
   void bind() {

@@ -459,7 +459,8 @@ inline void solve(const std::vector<SolverRows>& sets, std::vector<SpringRow>& s
         if (distance > 0.0) row.normal = from / distance;
         row.constant = row.rise - row.normal.dot(step.sphere_to) - step.sphere_radius;
       }
-      if (step.number == 0) solver.letOut(active, wayOf(row), step.frame);
+      // Not of a body with itself: at the lips of a wound rows come and go, and each time it would press tissue anew.
+      if (step.number == 0 && rows.a != rows.b) solver.letOut(active, wayOf(row), step.frame);
     }
   if (!scratch.active.empty()) {  // what is moved sideways takes angular momentum along
     for (const Index b : free) leak(bodies[b], -1.0);

@@ -1,6 +1,6 @@
 // A few sweeps of Gauss-Seidel over rows in each of many small steps: displacements that keep every gap open, with
-// friction. A gap that is open closes at most; an overlap gets no deeper, and is let out at a bounded speed, once a
-// frame (Macklin et al. 2019, "Small steps in physics simulation"). Conserves linear and, in bodies that nothing holds,
+// friction. A gap that is open closes at most; an overlap gets no deeper, and between two is let out at a bounded speed,
+// once a frame (Macklin et al. 2019, "Small steps in physics simulation"). Conserves linear and, in bodies that nothing holds,
 // angular momentum.
 #pragma once
 
