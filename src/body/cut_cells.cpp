@@ -345,7 +345,8 @@ class CellCutter {
   // --- which cells are in which piece
 
   // Surfaces and the tissue that they follow hang together. Vertices whose cells the blade left whole say so; of tissue
-  // that none of these is in, the others that are on one side of the blade.
+  // that none of these is in, the others that are on one side of the blade. What has no volume at rest says nothing, and
+  // is of the largest.
   void findPieces() {
     UnionFind corners(cut_.lattice.corners);
     for (const LatticeCell& cell : cells())
@@ -358,10 +359,15 @@ class CellCutter {
     const Index components = static_cast<Index>(names.size());
     seen_.assign(components, false);
     UnionFind pieces(components + sources_.size());
+    std::vector<bool> sheet(sources_.size());
+    for (Index s = 0; s < sources_.size(); ++s) {
+      sheet[s] = !(signedVolume(surfaces_[s].mesh) > kSheet * model_.rest_volume);
+      if (sheet[s]) pieces.join(components + s, components);
+    }
     for (const bool kept : {true, false}) {
       const std::vector<bool> told = seen_;
       for (Index s = 0; s < sources_.size(); ++s)
-        for (std::size_t v = 0; v < surfaces_[s].cells.size(); ++v) {
+        for (std::size_t v = 0; v < surfaces_[s].cells.size() && !sheet[s]; ++v) {
           const Index c = surfaces_[s].cells[v];
           const EmbeddedVertex& vertex = surfaces_[s].embedded[v];
           if (c == kNoIndex || vertex.kept != kept || (!kept && (vertex.side == 0 || told[component_[c]]))) continue;

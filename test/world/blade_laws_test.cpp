@@ -295,5 +295,11 @@ TEST(BladeLaws, NothingIsLostAndFewAreRefused) {
   EXPECT_LE(present, tried / 12);
 }
 
+// Between a stroke and one that runs along it a sheet was left as a body, of -1e-24 m^3.
+TEST(BladeLaws, ASheetBetweenTwoStrokesIsNoBody) {
+  Operation operation(80006);
+  for (int k = 0; k < kBlades; ++k) operation.blade();
+}
+
 }  // namespace blade_laws_test
 }  // namespace meshless

@@ -9,8 +9,6 @@ namespace meshless {
 namespace surgery {
 namespace {
 
-constexpr double kNothing = 1e-15;  // of all volume: what has less is a sheet
-
 struct Shell {
   double volume = 0.0;  // [m^3] signed
   Vec3 origin = Vec3::Zero();
@@ -98,7 +96,7 @@ std::vector<IncisedPiece> separate(const OpenedSurface& opened, const Frame& fra
     volumes[0] += shell.volume;
     volumes[1] += std::abs(shell.volume);
   }
-  findHolders(opened, frame, shell_of, kNothing * volumes[1], shells);
+  findHolders(opened, frame, shell_of, kSheet * volumes[1], shells);
   std::vector<double> whole;  // with hollows
   for (const Shell& shell : shells) whole.push_back(shell.volume);
   std::vector<Index> order;

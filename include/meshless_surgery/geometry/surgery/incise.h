@@ -35,6 +35,8 @@ struct InciseOptions {
   double apart = 0.0;
 };
 
+constexpr double kSheet = 1e-15;  // of all volume: what has less has none
+
 /// A connected solid, closed and oriented. What was there before keeps its order, new vertices follow. Where wound
 /// faces met at a point, one of the vertices there may stand for another at the same place.
 struct IncisedPiece {
