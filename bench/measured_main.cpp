@@ -1,12 +1,15 @@
 // What the elastic law gives beside what was measured: each point, with one number of a material and with three.
 #include <cstdio>
+#include <filesystem>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "measured.h"
+#include "meshless_surgery/base/share_folder.h"
 #include "meshless_surgery/io/scene.h"
+#include "truth_cube.h"
 
 namespace {
 
@@ -44,12 +47,46 @@ void print(const MeasuredTissue& tissue, const Material* shipped) {
   std::printf("\n");
 }
 
+bool printCube(const std::string& file) {
+  const auto beads = readTruthCube(file);
+  if (!beads) {
+    std::fprintf(stderr, "%s\n", beads.error().detail.c_str());
+    return false;
+  }
+  std::printf("\nTruth Cube, 245 beads between two layers that are led as measured\n");
+  std::printf("  %-9s %5s %6s %6s %10s %8s %8s %8s %8s %9s   lateral stretch of layers 1 to 7: measured, ours\n",
+              "nominal", "nu", "cell mm", "cells", "largest mm", "led mm", "rms mm", "worst mm", "rms %", "evenly %");
+  for (int k = 0; k < kCompressions; ++k)
+    for (const double nu : {0.3, 0.45, 0.49})
+      for (const double spacing : {0.01, 0.005}) {
+        const auto row = pressCube(*beads, k, nu, spacing);
+        if (!row) {
+          std::fprintf(stderr, "%s\n", row.error().detail.c_str());
+          return false;
+        }
+        std::printf("  %7.2f %% %5.2f %6.1f %6zu %10.2f %8.3f %8.3f %8.3f %8.2f %9.2f  ", 100.0 * kNominal[k], nu,
+                    1e3 * spacing, row->cells, 1e3 * row->largest, 1e3 * row->led, 1e3 * row->rms, 1e3 * row->worst,
+                    100.0 * row->rms / row->largest, 100.0 * row->uniform / row->largest);
+        for (int layer = 0; layer < kBeadsASide; ++layer)
+          std::printf(" %.3f %.3f", row->measured[layer], row->ours[layer]);
+        std::printf("\n");
+      }
+  return true;
+}
+
+// Of the checkout that it was built from, or where that is gone what was installed.
+std::string placeOf(const std::string& checkout, const std::string& shared) {
+  return std::filesystem::exists(checkout) ? checkout : shareFolder() + shared;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app("Tissue and rubber as measured, beside the elastic law.");
-  std::string materials = MATERIALS_FOLDER;
+  std::string materials = placeOf(MATERIALS_FOLDER, "/config/materials");
   app.add_option("--materials", materials, "folder of the materials that ship");
+  std::string beads = placeOf(MEASURED_FOLDER "/truth_cube.csv", "/bench/measured/truth_cube.csv");
+  app.add_option("--beads", beads, "of the Truth Cube");
   CLI11_PARSE(app, argc, argv);
   const auto shipped = readMaterials(materials);
   if (!shipped) {
@@ -64,5 +101,5 @@ int main(int argc, char** argv) {
       if (of == tissue.name) material = &shipped->at(name);
     print(tissue, material);
   }
-  return 0;
+  return printCube(beads) ? 0 : 2;
 }

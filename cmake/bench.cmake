@@ -19,8 +19,9 @@ function(add_bench_support name)
 endfunction()
 
 add_bench_support(bench_truth bench/static_load.cpp bench/settled_load.cpp bench/tool_load.cpp bench/truth_case.cpp
-  bench/truth_samples.cpp bench/truth_surface.cpp bench/laws.cpp bench/measured.cpp)
+  bench/truth_samples.cpp bench/truth_surface.cpp bench/laws.cpp bench/measured.cpp bench/truth_cube.cpp)
 target_compile_definitions(bench_truth PUBLIC TRUTH_FOLDER="${CMAKE_CURRENT_SOURCE_DIR}/bench/truth/data"
+  MEASURED_FOLDER="${CMAKE_CURRENT_SOURCE_DIR}/bench/measured"
   CALCULIX_FOLDER="${CMAKE_CURRENT_SOURCE_DIR}/bench/truth/calculix"
   MATERIALS_FOLDER="${CMAKE_CURRENT_SOURCE_DIR}/config/materials")
 add_bench_support(bench_pile bench/contact_pile.cpp)

@@ -26,6 +26,8 @@ install(TARGETS deformer_node review_node drive make_meshes replay report ${benc
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 install(DIRECTORY bench/truth/data bench/truth/calculix
   DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/bench/truth)
+install(DIRECTORY bench/measured
+  DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/bench)
 # Where programs of the devel space look for them, too.
 set(devel_share ${CATKIN_DEVEL_PREFIX}/share/${PROJECT_NAME})
 file(MAKE_DIRECTORY ${devel_share}/bench/truth)
