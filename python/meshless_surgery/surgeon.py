@@ -3,7 +3,7 @@ import contextlib
 import select
 
 import rospy
-from geometry_msgs.msg import Point, Vector3
+from geometry_msgs.msg import Point, Quaternion, Vector3
 from sensor_msgs.msg import PointCloud2
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Header
@@ -13,7 +13,7 @@ from meshless_surgery.errors import Refused, Unanswered, Unreachable, need_topic
 from meshless_surgery.goals import Goals
 from meshless_surgery.msg import Info, State
 from meshless_surgery.poses import blade_pose, blades_pose, pose_stamped
-from meshless_surgery.srv import (Attach, Clip, Cut, Detach, GetBody, GetLoad, Hash, Incise, LoadState, Lock, MovePick, Observe, Pick, Probe,
+from meshless_surgery.srv import (Attach, Clip, Cut, Detach, GetBody, GetLoad, Hash, Incise, LoadState, Lock, MoveClamp, MovePick, Observe, Pick, Probe,
                                   Push, Release, Remove, Report, SaveState, SetMaterial, Spawn, SpawnCloud, StartTask, Step, Unclip)
 from meshless_surgery.streams import ToolStream
 
@@ -168,6 +168,11 @@ class Surgeon:
     def tissue_load(self, name, points=(), frame=None):
         """Elastic energy, the forces of what holds the body, strain and stress of the cells at `points`, or of all."""
         return self.call('get_load', GetLoad, header=self._header(frame), name=name, points=[Point(*p) for p in points])
+
+    def move_clamp(self, name, clamp=0, shift=(0, 0, 0), turn=(0, 0, 0, 1), time=0.0, frame=None):
+        """Moves what entry `clamp` of `fixed` holds by `shift` and `turn` (x, y, z, w) from where it was put, in `time` seconds."""
+        return self.call('move_clamp', MoveClamp, header=self._header(frame), name=name, clamp=clamp, shift=Vector3(*shift),
+                         turn=Quaternion(*turn), time=time)
 
     def set_material(self, body, yaml):
         return self.call('set_material', SetMaterial, body=body, yaml=yaml)

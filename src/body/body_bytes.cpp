@@ -22,7 +22,7 @@ std::size_t bytesOf(const Cavities& cavities) {
 std::size_t bytesOf(const BodyModel& model) {
   const ClusterSet& clusters = model.clusters;
   const SurfaceBinding& binding = model.binding;
-  return sizeof model + bytesOf(model.rest, model.masses, model.match_masses, model.fixed, model.elastic) +
+  return sizeof model + bytesOf(model.rest, model.masses, model.match_masses, model.fixed, model.held_by, model.elastic) +
          bytesOf(model.graph.offsets, model.graph.neighbours, model.graph.lengths) +
          bytesOf(clusters.offsets, clusters.members, clusters.weights, clusters.seeds, clusters.radii) +
          bytesOf(model.shape.clusters, model.shape.quadratic) +
@@ -38,13 +38,13 @@ std::size_t bytesOf(const BodyModel& model) {
 
 std::size_t bytesOf(const BodyState& state) {
   return bytesOf(state.positions, state.velocities, state.poses, state.cells, state.surface, state.plastic,
-                 state.plastic_cells, state.relaxed, state.cavities);
+                 state.plastic_cells, state.relaxed, state.cavities, state.held);
 }
 
 std::size_t bytesOf(const StepScratch& scratch) {
   const ElasticBatchState& elastic = scratch.elastic;
   return scratch.clamp.bytes() +
-         bytesOf(scratch.previous, scratch.predicted, scratch.goals, scratch.matched, scratch.touched, scratch.cavity,
+         bytesOf(scratch.previous, scratch.predicted, scratch.goals, scratch.matched, scratch.touched, scratch.moved, scratch.cavity,
                  scratch.cavity_pull) +
          bytesOf(elastic.rotations, elastic.relaxed, elastic.others, elastic.forces, elastic.largest, elastic.cold);
 }

@@ -21,7 +21,8 @@ std::vector<Wrench> clampLoads(const BodyModel& model, const BodyState& state) {
     const LatticeCell& cell = model.lattice->cells[point.cell];
     Vec3 now = Vec3::Zero();
     for (int k = 0; k < 8; ++k) now += trilinearWeight(k, point.at) * state.positions[cell.corners[k]];
-    const Vec3 held = state.placed * model.lattice->restPlace(cell, point.at);
+    Vec3 held = state.placed * model.lattice->restPlace(cell, point.at);
+    if (point.region < state.held.size()) held = state.held[point.region](held);
     const Vec3 force = stiffness * springMass(*model.lattice, point, density) * (held - now);
     if (loads.size() <= point.region) loads.resize(point.region + 1);
     loads[point.region].force += force;

@@ -89,7 +89,7 @@ Clamp::Clamp(const CellLattice& lattice, const std::vector<ClampPoint>& points,
 }
 
 void ClampStep::hold(const std::shared_ptr<const Clamp>& clamp, double share, const Points& rest, const Pose& placed,
-                     Points& positions) {
+                     const Points& moved, Points& positions) {
   share = std::clamp(share, 1e-9, 1.0);
   if (clamp_ != clamp || share_ != share) {
     clamp_ = clamp;
@@ -99,6 +99,8 @@ void ClampStep::hold(const std::shared_ptr<const Clamp>& clamp, double share, co
   }
   const std::size_t n = order_.size();
   for (std::size_t i = 0; i < n; ++i) found_[i] = masses_[i] * (positions[order_[i]] - placed * rest[order_[i]]);
+  if (!moved.empty())
+    for (std::size_t i = 0; i < n; ++i) found_[i] += share * moved[order_[i]];
   for (std::size_t i = 0; i < n; ++i) {
     const Vec3 here = found_[i] / values_[columns_[i]];
     found_[i] = here;

@@ -742,6 +742,7 @@ class CellCutter {
       piece.copied_from.push_back(parent);
       piece.state.positions.push_back(state_.positions[parent]);
       piece.state.velocities.push_back(state_.velocities[parent]);
+      if (!model_.held_by.empty()) child->held_by.push_back(model_.held_by[parent]);
     }
     for (const TissuePlace& place : places) {
       Index c = kNoIndex;

@@ -1,6 +1,7 @@
 #include "meshless_surgery/body/deform.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -24,28 +25,59 @@ constexpr double kMostGain = 1.4;
 constexpr double kMargin = 1.1;
 constexpr double kLag = 0.25;
 
+constexpr std::size_t kChunk = 512;  // particles; sums are made of those of chunks, on however many threads
+
+// work(from, to) for each chunk.
+template <class Work>
+void inChunks(const ForEach& for_each, std::size_t count, const Work& work) {
+  const std::size_t chunks = (count + kChunk - 1) / kChunk;
+  const auto chunk = [&](std::size_t n) { work(n * kChunk, std::min(count, (n + 1) * kChunk)); };
+  if (chunks < 2 || !for_each) {
+    for (std::size_t n = 0; n < chunks; ++n) chunk(n);
+  } else {
+    runEach(for_each, chunks, chunk);
+  }
+}
+
+// The sum over all chunks, in their order.
+template <std::size_t kTerms, class Work>
+std::array<double, kTerms> sumOverChunks(const ForEach& for_each, std::size_t count, const Work& work) {
+  static thread_local std::vector<std::array<double, kTerms>> parts;
+  std::vector<std::array<double, kTerms>>& mine = parts;  // of the thread that calls
+  mine.resize((count + kChunk - 1) / kChunk);
+  inChunks(for_each, count, [&](std::size_t from, std::size_t to) { mine[from / kChunk] = work(from, to); });
+  std::array<double, kTerms> sum{};
+  for (const auto& part : mine)
+    for (std::size_t k = 0; k < kTerms; ++k) sum[k] += part[k];
+  return sum;
+}
+
 // A body as a whole: how it moves, and how hard it is to turn about its centre. Axis by axis: as one matrix, of a body
 // drawn out to a line, the rounding of the axis that turns easily would be a torque about the others.
 class Whole {
  public:
   Whole() = default;  // of a body that is held: it has no motion of its own
-  Whole(const BodyModel& model, const Points& positions, const Points& velocities) {
+  Whole(const BodyModel& model, const Points& positions, const Points& velocities, const ForEach& for_each) {
     // From the first particle, so that little cancels; numbers of their own instead of matrices: four times as fast.
     const Vec3 origin = positions[0], drift = velocities[0];
-    double x = 0.0, y = 0.0, z = 0.0, xx = 0.0, yy = 0.0, zz = 0.0, xy = 0.0, xz = 0.0, yz = 0.0;
-    double vx = 0.0, vy = 0.0, vz = 0.0, lx = 0.0, ly = 0.0, lz = 0.0;
-    for (std::size_t i = 0; i < positions.size(); ++i) {
-      const double m = model.masses[i];
-      const double rx = positions[i].x() - origin.x(), ry = positions[i].y() - origin.y();
-      const double rz = positions[i].z() - origin.z();
-      const double px = m * (velocities[i].x() - drift.x()), py = m * (velocities[i].y() - drift.y());
-      const double pz = m * (velocities[i].z() - drift.z());
-      const double mx = m * rx, my = m * ry, mz = m * rz;
-      x += mx, y += my, z += mz;
-      xx += mx * rx, yy += my * ry, zz += mz * rz, xy += mx * ry, xz += mx * rz, yz += my * rz;
-      vx += px, vy += py, vz += pz;
-      lx += ry * pz - rz * py, ly += rz * px - rx * pz, lz += rx * py - ry * px;
-    }
+    const auto sums = sumOverChunks<15>(for_each, positions.size(), [&](std::size_t from, std::size_t to) {
+      double x = 0.0, y = 0.0, z = 0.0, xx = 0.0, yy = 0.0, zz = 0.0, xy = 0.0, xz = 0.0, yz = 0.0;
+      double vx = 0.0, vy = 0.0, vz = 0.0, lx = 0.0, ly = 0.0, lz = 0.0;
+      for (std::size_t i = from; i < to; ++i) {
+        const double m = model.masses[i];
+        const double rx = positions[i].x() - origin.x(), ry = positions[i].y() - origin.y();
+        const double rz = positions[i].z() - origin.z();
+        const double px = m * (velocities[i].x() - drift.x()), py = m * (velocities[i].y() - drift.y());
+        const double pz = m * (velocities[i].z() - drift.z());
+        const double mx = m * rx, my = m * ry, mz = m * rz;
+        x += mx, y += my, z += mz;
+        xx += mx * rx, yy += my * ry, zz += mz * rz, xy += mx * ry, xz += mx * rz, yz += my * rz;
+        vx += px, vy += py, vz += pz;
+        lx += ry * pz - rz * py, ly += rz * px - rx * pz, lz += rx * py - ry * px;
+      }
+      return std::array<double, 15>{x, y, z, xx, yy, zz, xy, xz, yz, vx, vy, vz, lx, ly, lz};
+    });
+    const auto [x, y, z, xx, yy, zz, xy, xz, yz, vx, vy, vz, lx, ly, lz] = sums;
     const Vec3 centre = Vec3(x, y, z) / model.mass, velocity = Vec3(vx, vy, vz) / model.mass;
     rigid.centre = origin + centre;
     rigid.velocity = drift + velocity;
@@ -76,16 +108,20 @@ class Whole {
   Vec3 inverse_ = Vec3::Zero();  // [1/(kg m^2)], 0 where nothing turns
 };
 
-Vec3 torqueOf(const BodyModel& model, const Points& positions, const Vec3& centre, const Points& pull) {
-  double x = 0.0, y = 0.0, z = 0.0;
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    const double rx = positions[i].x() - centre.x(), ry = positions[i].y() - centre.y();
-    const double rz = positions[i].z() - centre.z();
-    const double fx = model.masses[i] * pull[i].x(), fy = model.masses[i] * pull[i].y();
-    const double fz = model.masses[i] * pull[i].z();
-    x += ry * fz - rz * fy, y += rz * fx - rx * fz, z += rx * fy - ry * fx;
-  }
-  return Vec3(x, y, z);
+Vec3 torqueOf(const BodyModel& model, const Points& positions, const Vec3& centre, const Points& pull,
+              const ForEach& for_each) {
+  const auto sums = sumOverChunks<3>(for_each, positions.size(), [&](std::size_t from, std::size_t to) {
+    double x = 0.0, y = 0.0, z = 0.0;
+    for (std::size_t i = from; i < to; ++i) {
+      const double rx = positions[i].x() - centre.x(), ry = positions[i].y() - centre.y();
+      const double rz = positions[i].z() - centre.z();
+      const double fx = model.masses[i] * pull[i].x(), fy = model.masses[i] * pull[i].y();
+      const double fz = model.masses[i] * pull[i].z();
+      x += ry * fz - rz * fy, y += rz * fx - rx * fz, z += rx * fy - ry * fx;
+    }
+    return std::array<double, 3>{x, y, z};
+  });
+  return Vec3(sums[0], sums[1], sums[2]);
 }
 
 // r times it is spin cross r.
@@ -106,11 +142,11 @@ Vec3 rollingOf(const RigidMotion& rigid, const Vec3& about) {
 }  // namespace
 
 RigidMotion rigidMotionOf(const BodyModel& model, const Points& positions, const Points& velocities) {
-  return Whole(model, positions, velocities).rigid;
+  return Whole(model, positions, velocities, nullptr).rigid;
 }
 
 Vec3 spinWith(const BodyModel& model, const Points& positions, const Vec3& momentum) {
-  return Whole(model, positions, positions).spinFor(momentum);
+  return Whole(model, positions, positions, nullptr).spinFor(momentum);
 }
 
 double longestSubstep(const BodyModel& model, const BodyState& state) {
@@ -151,7 +187,9 @@ struct Substep {
   Whole whole{};           // at its start
   RigidMotion rigid{};     // as damping leaves it
 
-  Vec3 weight() const { return (model.isHeld() ? factor : 1.0) * gravity; }  // it moves what is held but by deforming it
+  Vec3 weight() const {
+    return (model.isHeld() ? factor : 1.0) * gravity;
+  }                                               // it moves what is held but by deforming it
   Points& pull() const { return scratch.goals; }  // [m/s^2] of all that the body does to itself
 };
 
@@ -169,14 +207,16 @@ void damp(Substep& s) {
   // Where what deforms is slowed otherwise than before, its energy stays, and so do velocities over the pace.
   const double pace = std::sqrt(s.factor), kept = s.state.pace > 0.0 ? damped * pace / s.state.pace : damped;
   s.state.pace = pace;
-  if (!s.model.any_fixed) s.whole = Whole(s.model, x, v);
+  if (!s.model.any_fixed) s.whole = Whole(s.model, x, v, s.for_each);
   const RigidMotion before = s.rigid = s.whole.rigid;
   const double spin_kept = s.scratch.load > 0.0 ? damped : 1.0;
   if (s.scratch.load > 0.0) s.rigid.velocity -= (1.0 - spin_kept) * rollingOf(before, s.scratch.load_at);
   s.rigid.spin *= spin_kept;
   const Mat3 undamped = turning(s.rigid.spin - kept * before.spin);
   const Vec3 drift = s.rigid.velocity - kept * before.velocity;
-  for (std::size_t i = 0; i < x.size(); ++i) v[i] = kept * v[i] + drift + undamped * (x[i] - before.centre);
+  inChunks(s.for_each, x.size(), [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) v[i] = kept * v[i] + drift + undamped * (x[i] - before.centre);
+  });
 }
 
 // By the stress where velocities will have it in the lag: a viscosity.
@@ -190,7 +230,9 @@ void stress(Substep& s) {
   const double lag = viscosityTime(model, s.state, s.h);
   Points& y = s.scratch.predicted;
   y.resize(s.state.positions.size());
-  for (std::size_t i = 0; i < y.size(); ++i) y[i] = s.state.positions[i] + lag * s.state.velocities[i];
+  inChunks(s.for_each, y.size(), [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) y[i] = s.state.positions[i] + lag * s.state.velocities[i];
+  });
   ElasticParameters parameters = ownElasticity(model, s.material, s.factor * s.stiffened);
   const MatchInput input = matchInput(model, s.state);
   std::vector<ClusterPose>& poses = model.cells ? s.state.cells : s.state.poses;
@@ -260,28 +302,49 @@ void move(Substep& s) {
   Points &x = s.state.positions, &v = s.state.velocities;
   Mat3 leaked = Mat3::Zero();
   const Vec3 centre = s.rigid.centre, weight = s.weight();
-  if (!s.model.any_fixed) leaked = s.h * turning(s.whole.spinFor(torqueOf(s.model, x, centre, s.pull())));
+  if (!s.model.any_fixed) leaked = s.h * turning(s.whole.spinFor(torqueOf(s.model, x, centre, s.pull(), s.for_each)));
   s.scratch.previous.resize(x.size());
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    const Vec3 at = x[i], faster = v[i] + s.h * (s.pull()[i] + weight) - leaked * (at - centre);
-    s.scratch.previous[i] = at;
-    v[i] = faster;
-    x[i] = at + s.h * faster;
+  inChunks(s.for_each, x.size(), [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+      const Vec3 at = x[i], faster = v[i] + s.h * (s.pull()[i] + weight) - leaked * (at - centre);
+      s.scratch.previous[i] = at;
+      v[i] = faster;
+      x[i] = at + s.h * faster;
+    }
+  });
+}
+
+// The springs of entries that were moved, times how far.
+void moveClampPoints(const BodyModel& model, const BodyState& state, Points& moved) {
+  moved.clear();
+  if (state.held.empty()) return;
+  moved.assign(state.positions.size(), Vec3::Zero());
+  const CellLattice& lattice = *model.lattice;
+  const double density = model.cell_mass / std::pow(lattice.spacing, 3.0);
+  for (const ClampPoint& point : model.clamp_points) {
+    if (point.region >= state.held.size()) continue;
+    const LatticeCell& cell = lattice.cells[point.cell];
+    const Vec3 put = state.placed * lattice.restPlace(cell, point.at);
+    const Vec3 way = springMass(lattice, point, density) * (state.held[point.region](put) - put);
+    for (int k = 0; k < 8; ++k) moved[cell.corners[k]] += trilinearWeight(k, point.at) * way;
   }
 }
 
 void hold(Substep& s) {
   Points& x = s.state.positions;
+  for (HeldMotion& motion : s.state.held) motion.advance(s.h);
   if (s.model.any_fixed)
     for (std::size_t i = 0; i < x.size(); ++i) {
       if (!s.model.fixed[i]) continue;
       s.state.velocities[i].setZero();
-      x[i] = s.scratch.previous[i];
+      const std::uint32_t by = s.model.holderOf(static_cast<Index>(i));
+      x[i] = by < s.state.held.size() ? s.state.held[by](s.state.placed * s.model.rest[i]) : s.scratch.previous[i];
     }
   if (!s.model.clamp) return;
+  moveClampPoints(s.model, s.state, s.scratch.moved);
   // As stiff as ever, whatever the body's stretch and substep: springs that stiffen and soften in turns give energy.
   const double part = s.h * clampRate(s.model);
-  s.scratch.clamp.hold(s.model.clamp, part > 0.0 ? part * part : 1.0, s.model.rest, s.state.placed, x);
+  s.scratch.clamp.hold(s.model.clamp, part > 0.0 ? part * part : 1.0, s.model.rest, s.state.placed, s.scratch.moved, x);
 }
 
 }  // namespace
@@ -300,10 +363,11 @@ void matchAndMove(const BodyModel& model, const Material& material, const Vec3& 
   hold(substep);
 }
 
-void velocitiesFromPositions(double h, BodyState& state, const StepScratch& scratch) {
+void velocitiesFromPositions(double h, BodyState& state, const StepScratch& scratch, const ForEach& for_each) {
   const double rate = 1.0 / h;
-  for (std::size_t i = 0; i < state.positions.size(); ++i)
-    state.velocities[i] = rate * (state.positions[i] - scratch.previous[i]);
+  inChunks(for_each, state.positions.size(), [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) state.velocities[i] = rate * (state.positions[i] - scratch.previous[i]);
+  });
 }
 
 }  // namespace meshless

@@ -19,6 +19,7 @@ std::shared_ptr<BodyModel> beginPiece(const BodyModel& parent, const TriangleMes
   piece->texture = parent.texture;
   piece->next_patch = parent.next_patch + 1;
   piece->incised = parent.incised || incised;
+  piece->held_middles = parent.held_middles;
   piece->surface.triangles = present.triangles;
   piece->surface.patches = present.patches;
   piece->surface.vertices = std::move(rest);
@@ -33,6 +34,7 @@ void finishPiece(const BodyState& parent, std::shared_ptr<BodyModel> model, Body
   piece.state.pace = parent.pace;
   piece.state.stiffened = parent.stiffened;
   piece.state.placed = parent.placed;
+  piece.state.held = parent.held;
   makeCavities(*model);
   piece.state.cavities = inheritedCavities(parent.cavities, *model, piece.state.positions);
   updateSurface(*model, piece.state);

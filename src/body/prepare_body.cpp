@@ -306,6 +306,32 @@ void holdParticles(const std::vector<HeldRegion>& regions, const Pose& pose, Bod
     if (inside(model.rest[i])) model.fixed[i] = model.any_fixed = true;
 }
 
+// Which entry of `fixed` holds what, and the middle of it.
+void findHolders(const BodyDef& def, const Pose& placed, const Pose& pose, BodyModel& model) {
+  const std::size_t count = def.fixed.size();
+  std::vector<HeldHeight> heights;
+  for (const HeldRegion& region : def.fixed) heights.push_back(heldHeight({region}, placed, pose));
+  Points sums(count, Vec3::Zero());
+  std::vector<double> weights(count, 0.0);
+  const auto add = [&](std::uint32_t r, double weight, const Vec3& place) {
+    sums[r] += weight * place;
+    weights[r] += weight;
+  };
+  if (count > 1) model.held_by.assign(model.rest.size(), 0);
+  for (std::size_t i = 0; i < model.rest.size(); ++i) {
+    if (!model.fixed[i]) continue;
+    std::uint32_t by = 0;
+    for (std::uint32_t r = 1; r < count; ++r)
+      if (heights[r](model.rest[i]) < heights[by](model.rest[i])) by = r;
+    if (count > 1) model.held_by[i] = by;
+    if (model.clamp_points.empty()) add(by, 1.0, model.rest[i]);
+  }
+  for (const ClampPoint& point : model.clamp_points)
+    add(point.region, point.area, model.lattice->restPlace(model.lattice->cells[point.cell], point.at));
+  for (std::size_t r = 0; r < count; ++r)
+    model.held_middles.push_back(weights[r] > 0.0 ? Vec3(sums[r] / weights[r]) : Vec3(Vec3::Zero()));
+}
+
 // Every region holds something, or whoever wrote it is wrong about where the body is.
 Status checkHeld(const BodyDef& def, const Pose& placed, const Pose& pose, const BodyModel& model) {
   Points held;
@@ -555,6 +581,7 @@ Result<PreparedBody> prepared(BodyDef def) {
   for (double m : model->masses) model->mass += m;
   if (!model->lattice) holdParticles(def.fixed, pose, *model);
   if (Status holds = checkHeld(def, placed, pose, *model); !holds) return holds.error();
+  findHolders(def, placed, pose, *model);
   makeTissue(*model, def.material);
   if (model->lattice) {
     if (Status made = makeCollision(def, *model); !made) return made.error();

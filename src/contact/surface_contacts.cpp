@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::uint64_t kGroundKey = ~std::uint64_t{0};  // beyond those of bodies and obstacles
 constexpr std::uint64_t kSphereKey = kGroundKey - 1;
+constexpr Index kChunk = 1024;  // particles
 
 Box grown(const Box& box, double by) {
   Box larger = box;
@@ -349,10 +350,23 @@ void SurfaceContacts::solveIsland(Index island_number, SolverStep step, int numb
   if (island.rows.empty() && springs.empty() && fibres.empty()) return;
   step.warm = number == 0 ? step.h * step.h : 1.0;
   step.number = number;
-  runEach(for_each, island.bodies.size(), [&](std::size_t n) {
+  // Of all bodies, or of the only one in chunks.
+  const auto eachParticle = [&](const auto& visit) {
+    if (island.bodies.size() > 1) {
+      runEach(for_each, island.bodies.size(),
+              [&](std::size_t n) { visit(n, 0, solver_bodies_[island.bodies[n]].particles); });
+      return;
+    }
+    const Index all = solver_bodies_[island.bodies[0]].particles;
+    runEach(for_each, (all + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+      const Index from = static_cast<Index>(chunk) * kChunk;
+      visit(0, from, std::min(all, from + kChunk));
+    });
+  };
+  eachParticle([&](std::size_t n, Index from, Index to) {
     const SolverBody& body = solver_bodies_[island.bodies[n]];
     const Vec3* const positions = colliders[island.bodies[n]].positions;
-    for (Index i = 0; i < body.particles; ++i) {
+    for (Index i = from; i < to; ++i) {
       body.now[i].put(positions[i]);
       body.before[i].put(previous[n][i]);
     }
@@ -360,10 +374,10 @@ void SurfaceContacts::solveIsland(Index island_number, SolverStep step, int numb
   static const std::vector<Index> kNone;
   solveRows(island.rows, springs, fibres, solver_bodies_, step, springs.empty() && !island.held ? island.bodies : kNone,
             scratch, counters);
-  runEach(for_each, island.bodies.size(), [&](std::size_t n) {
+  eachParticle([&](std::size_t n, Index from, Index to) {
     const SolverBody& body = solver_bodies_[island.bodies[n]];
     Vec3* const positions = colliders[island.bodies[n]].positions;
-    for (Index i = 0; i < body.particles; ++i) {
+    for (Index i = from; i < to; ++i) {
       positions[i] = body.now[i].place();
       previous[n][i] = body.before[i].place();
     }

@@ -12,6 +12,7 @@
 #include <meshless_surgery/Incise.h>
 #include <meshless_surgery/LoadState.h>
 #include <meshless_surgery/Lock.h>
+#include <meshless_surgery/MoveClamp.h>
 #include <meshless_surgery/MovePick.h>
 #include <meshless_surgery/Pick.h>
 #include <meshless_surgery/Probe.h>
@@ -34,6 +35,8 @@
 namespace meshless {
 namespace {
 
+constexpr double kLongestMove = 3600.0;  // [s]
+static_assert(kLongestMove == kMaxClampTime);
 constexpr std::size_t kMaxLoadPoints = 10000;
 constexpr double kMaxSpeed = 1e3;                           // [m/s]
 constexpr double kMaxStiffness = 1e9;                       // [N/m]
@@ -76,6 +79,7 @@ struct Services::Handlers : Answers {
     advertise(private_handle, "detach", &Handlers::detach);
     advertise(private_handle, "clip", &Handlers::clip);
     advertise(private_handle, "unclip", &Handlers::unclip);
+    advertise(private_handle, "move_clamp", &Handlers::moveClamp);
     advertise(private_handle, "set_material", &Handlers::setMaterial);
     advertise(private_handle, "get_body", &Handlers::getBody);
     advertise(private_handle, "get_load", &Handlers::getLoad);
@@ -411,6 +415,26 @@ struct Services::Handlers : Answers {
     if (!isClip(command.name))
       if (const auto no = training.refuses(Intervention::kDetach)) return refuse(response, "unclip", *no);
     return applied(response, "unclip", command, "took clip '" + request.name + "' off");
+  }
+
+  bool moveClamp(meshless_surgery::MoveClamp::Request& request, meshless_surgery::MoveClamp::Response& response) {
+    if (const auto no = training.refuses(Intervention::kMoveClamp)) return refuse(response, "move_clamp", *no);
+    BorderCheck check;
+    MoveClampCommand command;
+    command.body = request.name;
+    command.clamp = request.clamp;
+    const Vec3 shift = check.direction("shift", request.shift);
+    const Quat turn = check.rotation("turn", request.turn);
+    command.time = check.number("time", request.time, 0.0, kLongestMove, "s");
+    if (!check.ok()) return refuse(response, "move_clamp", check.error());
+    const auto frame = frames.toWorld(request.header);
+    if (!frame.ok()) return refuse(response, "move_clamp", frame.error());
+    command.shift = frame->rotation * shift;
+    command.turn = (frame->rotation * turn * frame->rotation.conjugate()).normalized();
+    const auto reply = runner.apply(command);
+    if (!reply.ok()) return refuse(response, "move_clamp", reply.error());
+    response.middle = toPoint(std::get<MoveClampReply>(*reply).middle);
+    return accept(response, "moves what entry " + std::to_string(command.clamp) + " of `fixed` holds of " + command.body);
   }
 
   bool setMaterial(meshless_surgery::SetMaterial::Request& request, meshless_surgery::SetMaterial::Response& response) {

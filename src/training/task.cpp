@@ -221,6 +221,8 @@ const char* toString(Intervention intervention) {
       return "spawn";
     case Intervention::kMaterial:
       return "material";
+    case Intervention::kMoveClamp:
+      return "move_clamp";
   }
   return "unknown";
 }

@@ -140,6 +140,7 @@ void Training::noteInterventions(const TrainingFrame& frame) {
     if (event.type == EventType::kAttached) intervened(Intervention::kAttach, of);
     if (event.type == EventType::kSpawned) intervened(Intervention::kSpawn, of);
     if (event.type == EventType::kMaterial) intervened(Intervention::kMaterial, of);
+    if (event.type == EventType::kClampMoved) intervened(Intervention::kMoveClamp, of);
   }
 }
 

@@ -273,6 +273,8 @@ std::string faultOf(const BodyModel& m) {
   const std::size_t particles = m.rest.size(), clusters = m.clusters.size(), vertices = m.surface.vertices.size();
   const std::size_t count = m.lattice ? m.lattice->cells.size() : 0;
   if (particles == 0) return "a body has no particles";
+  if (m.held_middles.size() > kMaxHeldRegions || (!m.held_by.empty() && m.held_by.size() != particles))
+    return "a body is held by more than holds it";
   if (m.masses.size() != particles || m.match_masses.size() != particles || m.fixed.size() != particles)
     return "a body's masses are not those of its particles";
   for (std::size_t i = 0; i < particles; ++i)
@@ -353,6 +355,12 @@ std::string faultOf(const BodyModel& m, const BodyState& s) {
       (!s.plastic_cells.empty() && s.plastic_cells.size() != cells) ||
       (!s.relaxed.empty() && s.relaxed.size() != cells))
     return "a body's state is not that of its model";
+  if (s.held.size() > m.held_middles.size()) return "a clamp that is not there was moved";
+  for (const HeldMotion& motion : s.held)
+    for (const Pose& pose : {motion.now, motion.target})
+      if (!motion.middle.allFinite() || !pose.translation.allFinite() ||
+          !(std::abs(pose.rotation.norm() - 1.0) < 1e-6) || !(motion.left >= 0.0 && motion.left <= 1e9))
+        return "a clamp was moved to nowhere";
   for (const FilledCavity& c : s.cavities) {
     if (!shellOf(m, c.patch) || !(std::abs(c.pressure) <= 1e50) || !(std::abs(c.content) <= 1e50) ||
         !(c.compliance >= 0.0 && c.compliance <= 1e50) || !(c.leak > 0.0 && c.leak <= 3600.0) ||

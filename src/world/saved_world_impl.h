@@ -11,7 +11,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kStateVersion = 25;
+constexpr std::uint32_t kStateVersion = 26;
 
 inline std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(
@@ -164,15 +164,15 @@ MESHLESS_ARCHIVE(CollisionSurface, mesh, binding, distance)
 /// then.
 template <class A>
 void serialize(A& archive, BodyModel& v) {
-  auto& [rest, masses, fixed, any_fixed, graph, lattice, cell_mass, regions, cells, clamp_points, clamp, tissue,
-         grouping, clusters, shape, match_masses, elastic, elastic_batch, length, specific_stiffness, poissons_ratio,
-         highest_frequency, own, surface, texture, binding, collision, cavities, solid, incised, spacing, rest_volume,
+  auto& [rest, masses, fixed, any_fixed, graph, lattice, cell_mass, regions, cells, clamp_points, clamp,
+         held_middles, held_by, tissue, grouping, clusters, shape, match_masses, elastic, elastic_batch, length,
+         specific_stiffness, poissons_ratio, highest_frequency, own, surface, texture, binding, collision, cavities, solid, incised, spacing, rest_volume,
          rest_area, mass, next_patch] = v;
   (void)elastic_batch, (void)cells, (void)clamp, (void)tissue, (void)cavities;
   auto of_contact = collision ? *collision : CollisionSurface();
   auto of_cells = lattice ? *lattice : CellLattice();
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
-  archive(of_cells, cell_mass, regions, clamp_points);
+  archive(of_cells, cell_mass, regions, clamp_points, held_middles, held_by);
   archive(rest, masses, held, any_fixed, graph, grouping, clusters, shape, match_masses, elastic, length,
           specific_stiffness, poissons_ratio, highest_frequency, own, surface, texture, binding, of_contact, solid,
           incised, spacing, rest_volume, rest_area, mass, next_patch);
@@ -189,15 +189,16 @@ void serialize(A& archive, BodyModel& v) {
 MESHLESS_ARCHIVE(ClusterPose, centre, rotation, deformation)
 MESHLESS_ARCHIVE(PlasticShape, stretch, inverse, stiffening)
 MESHLESS_ARCHIVE(RelaxedStrain, of)
+MESHLESS_ARCHIVE(HeldMotion, middle, now, target, left)
 MESHLESS_ARCHIVE(FilledCavity, patch, pressure, content, compliance, leak, filled_for, open_for, acting)
 template <class A>
 void serialize(A& archive, BodyState& v) {
   auto& [positions, velocities, poses, cells, surface, swelling, stretch, pace, stiffened, substep, plastic,
-         plastic_cells, relaxed, cavities, placed] = v;
+         plastic_cells, relaxed, cavities, placed, held] = v;
   // Whether the surface is up to date depends on when it was read. The fields that follow do not.
   if constexpr (!std::is_same_v<A, HashArchive>) archive(surface);
   archive(positions, velocities, poses, cells, swelling, stretch, pace, stiffened, substep, plastic, plastic_cells,
-          relaxed, cavities, placed);
+          relaxed, cavities, placed, held);
 }
 MESHLESS_ARCHIVE(Plane, normal, point)
 template <class A>

@@ -1,21 +1,18 @@
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
+#include <algorithm>
+#include <thread>
 
-#include "meshless_surgery/base/hand_over.h"
+#include "team.h"
 #include "world_impl.h"
 
 namespace meshless {
 
+// No more than there are cores: one that watches for work on the core of one that works takes it away.
 ForEach makeForEach(int threads) {
+  const int cores = static_cast<int>(std::thread::hardware_concurrency());
+  if (cores > 0) threads = std::min(threads, cores);
   if (threads <= 1) return oneAfterAnother;
-  auto arena = std::make_shared<tbb::task_arena>(threads);
-  return [arena](std::size_t count, const std::function<void(std::size_t)>& work) {
-    if (count < 2) return oneAfterAnother(count, work);
-    HandOver hand_over;
-    arena->execute(
-        [&] { tbb::parallel_for(std::size_t{0}, count, [&](std::size_t n) { hand_over.run([&] { work(n); }); }); });
-    hand_over.finish();
-  };
+  auto team = std::make_shared<Team>(threads);
+  return [team](std::size_t count, const std::function<void(std::size_t)>& work) { team->run(count, work); };
 }
 
 }  // namespace meshless

@@ -72,6 +72,8 @@ const char* toString(EventType type) {
       return "collapsed";
     case EventType::kMaterial:
       return "material";
+    case EventType::kClampMoved:
+      return "clamp moved";
   }
   return "unknown";
 }

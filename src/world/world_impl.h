@@ -29,6 +29,7 @@ struct WorldObstacle {
   std::vector<double> inverse_masses;  // [1/kg] 0, one a vertex
   ContactSurface surface;
   Box bounds;
+  double thickness = 0.0;  // [m] of a plate of its volume and area
 };
 
 /// Of a body: what is kept from step to step, and in saved states.
@@ -264,6 +265,7 @@ struct World::Impl : KeptWorld {
   Result<Reply> apply(const AttachCommand& command);
   Result<Reply> apply(const DetachCommand& command);
   Result<Reply> apply(const ClipCommand& command);
+  Result<Reply> apply(const MoveClampCommand& command);
   /// What the command would change, or why it is refused.
   Result<std::vector<MaterialChange>> changesOf(const SetMaterialCommand& command) const;
   std::string letGo(const Pick& pick);  // one of picks; the name of its body

@@ -32,6 +32,12 @@ bool leaks(const WorldBody& body) {
                      [](const FilledCavity& cavity) { return cavity.open_for > 0.0; });
 }
 
+/// Whether what holds it is on its way.
+bool isBeingMoved(const WorldBody& body) {
+  return std::any_of(body.state.held.begin(), body.state.held.end(),
+                     [](const HeldMotion& motion) { return motion.left > 0.0; });
+}
+
 /// Whether it creeps, however slowly: stress that fades moves tissue later.
 bool relaxes(const WorldBody& body) {
   const BodyState& state = body.state;
@@ -114,7 +120,7 @@ void World::Impl::fallAsleep(double h_frame) {
     const Index r = joined.find(b);
     double most = size[r];
     if (gravity > 0.0) most = std::min(most, 0.5 * gravity * kStillFor * kStillFor);
-    if (wayFromRest(body) <= kStillShare * most && !leaks(body)) {
+    if (wayFromRest(body) <= kStillShare * most && !leaks(body) && !isBeingMoved(body)) {
       body.still_for += h_frame;
     } else {
       body.still_for = 0.0;

@@ -16,9 +16,10 @@ namespace meshless {
 namespace {
 
 constexpr int kContactSubsteps = 4;   // at least, where something may meet: in longer ones stacks of stiff bodies rock
-constexpr double kFarthest = 0.5;     // edges, between two searches
+// Edges, between two searches: as far as half of what is thinnest near, within these.
+constexpr double kNearest = 0.5, kFarthest = 1.0;
 constexpr double kMostSearches = 64;  // of a frame
-constexpr std::size_t kSharedParticles = 20000;  // of a body: less is done before another thread has begun
+constexpr std::size_t kSharedParticles = 4000;  // of a body: less is done before another thread has begun
 constexpr std::size_t kWorkParticles = 512;  // of small islands together: what they read stays in the cache
 constexpr double kSlowedMass = 0.05;  // of an island, at most: slivers are slowed, instead of all taking their substeps
 
@@ -92,6 +93,7 @@ WorldObstacle::WorldObstacle(ObstacleDef of_def)
       inverse_masses(def->mesh.vertices.size(), 0.0),
       surface(def->mesh, ownSupports(static_cast<Index>(def->mesh.vertices.size()))) {
   for (const Vec3& p : def->mesh.vertices) bounds.extend(p);
+  thickness = 2.0 * std::abs(signedVolume(def->mesh)) / surfaceArea(def->mesh);
 }
 
 SurfaceModel::SurfaceModel(BodyModelPtr of_model) : model(std::move(of_model)), surface(surfaceOf(*model)) {
@@ -220,22 +222,34 @@ void World::Impl::findTextbook(double h) {
 }
 
 /// A search finds what meets on straight ways. Between two of them nobody who may meet something, as findNear() says,
-/// goes farther than kFarthest, so that who is thrown off its way is found by the next.
+/// goes farther than that, so that who is thrown off its way is found by the next before it has passed what is thin.
 int World::Impl::searchesOf(double h_frame) {
   const auto edges = [h_frame](const WorldBody& body, double fastest) { return h_frame * fastest / body.edge_length; };
-  if (std::none_of(awake.begin(), awake.end(), [&](WorldBody* b) { return edges(*b, b->fastest) > kFarthest; }))
+  if (std::none_of(awake.begin(), awake.end(), [&](WorldBody* b) { return edges(*b, b->fastest) > kNearest; }))
     return 1;
-  double most = kFarthest;
+  const std::vector<char>& needed = surface_contacts.needed();
+  double thinnest = std::numeric_limits<double>::infinity();  // [m]
+  for (std::size_t c = 0; c < needed.size(); ++c) {
+    if (needed[c] != SurfaceContacts::kNear) continue;
+    if (c >= bodies.size())
+      thinnest = std::min(thinnest, obstacles[c - bodies.size()]->thickness);
+    else if (const BodyModel& model = *bodies[c]->model; model.solid)
+      thinnest = std::min(thinnest, 2.0 * model.rest_volume / model.rest_area);
+    else
+      thinnest = 0.0;
+  }
+  double most = 1.0;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     WorldBody& body = *bodies[b];
-    if (surface_contacts.needed()[b] != SurfaceContacts::kNear || body.asleep) continue;
+    if (needed[b] != SurfaceContacts::kNear || body.asleep) continue;
     const VertexSupports& supports = surfaceModel(body).surface.supports;
     double fastest = 0.0;
     for (Index v = 0; v + 1 < supports.offsets.size(); ++v)
       fastest = std::max(fastest, supports.sum(v, body.state.velocities.data()).squaredNorm());
-    most = std::max(most, edges(body, std::sqrt(fastest)));
+    const double farthest = std::clamp(0.5 * thinnest / body.edge_length, kNearest, kFarthest);
+    most = std::max(most, edges(body, std::sqrt(fastest)) / farthest);
   }
-  return static_cast<int>(std::min(std::ceil(most / kFarthest), kMostSearches));
+  return static_cast<int>(std::min(std::ceil(most), kMostSearches));
 }
 
 // Rows of those that are near. A body that is reached wakes, and then all is found again with its neighbours.
@@ -557,8 +571,10 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
     }
     work.contact += secondsSince(last);
     keepSizes(work);
-    runEach(each, work.bodies.size(),
-            [&](std::size_t b) { velocitiesFromPositions(h, work.bodies[b]->state, work.bodies[b]->scratch); });
+    runEach(each, work.bodies.size(), [&](std::size_t b) {
+      const bool shared = work.bodies[b]->state.positions.size() >= kSharedParticles;
+      velocitiesFromPositions(h, work.bodies[b]->state, work.bodies[b]->scratch, shared ? each : oneAfterAnother);
+    });
     work.match += secondsSince(last);
   }
   for (std::size_t n = 0; n < work.member_count; ++n) {

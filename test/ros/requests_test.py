@@ -119,6 +119,9 @@ def said_in(frame_id, stamp, value):
         return Point(*(there[:3, :3] @ xyz(value) + there[:3, 3])) if 'tray' in frame_id else value
     if isinstance(value, Vector3):
         return Vector3(*(there[:3, :3] @ xyz(value))) if 'tray' in frame_id else value
+    if isinstance(value, Quaternion):
+        turned = there[:3, :3] @ rotation_of(value) @ there[:3, :3].T
+        return quaternion(turned) if 'tray' in frame_id else value
     if isinstance(value, PoseStamped):
         pose = PoseStamped(header=head, pose=value.pose)
         if 'tray' in frame_id:
@@ -296,7 +299,28 @@ def bodies(test, answer):
 
 
 def masses(test, answer):
-    return tuple(body.mass for body in test.state().bodies)
+    """Of left and right."""
+    return tuple(body.mass for body in test.state().bodies[:2])
+
+
+def heights_of_held(test, side):
+    """The lowest and the highest vertex at one end, five steps later."""
+    test.good('step', steps=5)
+    rest, now = (test.good('get_body', name='held', rest=r).surface.vertices for r in (True, False))
+    there = [v.z for r, v in zip(rest, now) if side * r.x > 0.045]
+    return min(there), max(there)
+
+
+def middle_x(test, answer):
+    return answer.middle.x
+
+
+def lowest_left(test, answer):
+    return heights_of_held(test, -1)[0]
+
+
+def highest_right(test, answer):
+    return heights_of_held(test, 1)[1]
 
 
 def stiffness(test, answer):
@@ -470,7 +494,7 @@ def report_of(test, answer):
 
 
 def begun_task(test):
-    test.good('start_task', task='tasks/boxes.yaml')
+    test.good('start_task', task='tasks/requests.yaml')
     test.good('step', steps=1)
     return {}
 
@@ -533,6 +557,13 @@ LAWS = [
     Law('remove', 'name', 'left', {}, bodies, ['right'], Refusal(UNKNOWN)),
     Law('save', 'file', 'a.state', {}, lambda test, answer: test.call('load', file='a.state').success, True, Refusal(INVALID)),
     Law('load', 'file', 'three.state', saved_at_three, step_now, 3, Refusal(INVALID)),
+    Law('move_clamp', 'name', 'held', {}, middle_x, within(-0.0251, -0.0249), Refusal(UNKNOWN)),
+    Law('move_clamp', 'clamp', 1, dict(name='held'), middle_x, within(0.0249, 0.0251), within(-0.0251, -0.0249)),
+    Law('move_clamp', 'shift', Vector3(0, 0, 0.02), dict(name='held'), lowest_left, within(2.9699, 2.9701), within(2.9499, 2.9501)),
+    Law('move_clamp', 'turn', Quaternion(0, math.sin(0.25), 0, math.cos(0.25)), dict(name='held', clamp=1), highest_right, within(3.03, 3.034),
+        within(3.0499, 3.0501)),
+    Law('move_clamp', 'time', 1.0, dict(name='held', shift=Vector3(0, 0, 0.02)), lowest_left, within(2.9501, 2.951),
+        within(2.9699, 2.9701)),
     Law('set_material', 'body', 'left', dict(yaml='{density: 3000}'), masses, (3.0, 1.0), (3.0, 3.0)),
     Law('set_material', 'yaml', '{density: 3000}', dict(body='left'), masses, (3.0, 1.0), Refusal(INVALID)),
     Law('get_body', 'name', 'right', {}, lowest_x, 0.15, Refusal(UNKNOWN)),
@@ -564,11 +595,11 @@ LAWS = [
     Law('spawn_cloud', 'material', 'stiff', dict(cloud=cloud_of(ball())), mass, within(1.9 * BALL * 1e3, 2.1 * BALL * 1e3),
         within(0.95 * BALL * 1e3, 1.05 * BALL * 1e3)),
     Law('step', 'steps', 7, {}, lambda test, answer: (120.0 * answer.sim_time, test.state().step), (7.0, 7), Refusal(INVALID)),
-    Law('start_task', 'task', 'tasks/boxes.yaml', {}, lambda test, answer: 'boxes' in answer.message, True, Refusal(INVALID)),
-    Law('start_task', 'allow', ['undo'], dict(task='tasks/boxes.yaml'),
+    Law('start_task', 'task', 'tasks/requests.yaml', {}, lambda test, answer: 'requests' in answer.message, True, Refusal(INVALID)),
+    Law('start_task', 'allow', ['undo'], dict(task='tasks/requests.yaml'),
         lambda test, answer: list(test.good('observe').task.allowed), ['undo'], []),
-    Law('start_task', 'trainee', 'Ann', dict(task='tasks/boxes.yaml'), report_of, 'Ann_boxes', 'boxes'),
-    Law('report', 'name', 'mine', begun_task, lambda test, answer: os.path.basename(answer.folder).split('_')[0], 'mine', 'boxes'),
+    Law('start_task', 'trainee', 'Ann', dict(task='tasks/requests.yaml'), report_of, 'Ann_requests', 'requests'),
+    Law('report', 'name', 'mine', begun_task, lambda test, answer: os.path.basename(answer.folder).split('_')[0], 'mine', 'requests'),
     Law('observe', 'bodies', ['left', 'none'], dict(particles=[3, 3]), places, (1, 2), Refusal(INVALID)),
     Law('observe', 'particles', [3, 100000], dict(bodies=['left', 'left']), places, (1, 2), Refusal(INVALID)),
     Law('pause', 'data', True, running(), lambda test, answer: test.state().paused, True, False),
@@ -585,6 +616,7 @@ FRAMED = {
     'pick': dict(header=Header(), point=Point(-0.61, 0.013, -0.11), direction=Vector3(2.03, 0.02, 1.01)),
     'move_pick': dict(header=Header(), target=Point(-0.31, 0.05, 0.17)),
     'lock': dict(header=Header(), target=Point(-0.31, 0.05, 0.17), at_target=True),
+    'move_clamp': dict(header=Header(), name='held', clamp=1, shift=Vector3(0.011, 0.002, -0.007), turn=Quaternion(*TURNED), time=0.02),
     'get_load': dict(header=Header(), name='left', points=[Point(-0.231, 0.013, 0.117), Point(-0.152, -0.021, 0.081)]),
     'probe': dict(header=Header(), point=Point(-0.61, 0.013, -0.11), direction=Vector3(2.03, 0.02, 1.01)),
     'push': dict(enable=True, radius=0.05, pose=pose_stamped(-0.27, 0.013, 0.11, TURNED)),
@@ -668,6 +700,7 @@ class Asked(InStepTestCase):
 
 
 class RequestsTest(Asked):
+    scene = 'requests'
 
     @classmethod
     def setUpClass(cls):

@@ -21,6 +21,9 @@ struct Session : Played {
   explicit Session(const TaskDef& task) : Played(test::weightless(), task) {
     EXPECT_TRUE(world.addSceneBody(test::shared(test::block())).ok());
     EXPECT_TRUE(world.addSceneBody(test::shared(test::ball("ball", Vec3(1, 0, 0.2)))).ok());
+    BodyDef held = test::ball("held", Vec3(4, 0, 0.2));
+    held.fixed = {HeldRegion(Vec3(3, -1, -1), Vec3(4, 1, 1))};
+    EXPECT_TRUE(world.addSceneBody(test::shared(held)).ok());
     AttachCommand joint;
     joint.name = "joint";
     joint.body = "ball";
@@ -98,6 +101,13 @@ TEST(Counted, WhatNoHandDoesIsSaidAndDoesNotPass) {
          SetMaterialCommand command;
          command.change = [](const Material& now) -> Result<Material> { return now; };
          s.apply<Done>(command);
+       }},
+      {Intervention::kMoveClamp,
+       [](Session& s) {
+         MoveClampCommand command;
+         command.body = "held";
+         command.shift = Vec3(0, 0, 0.01);
+         s.apply<MoveClampReply>(command);
        }},
   };
   for (const auto& [intervention, act] : all)

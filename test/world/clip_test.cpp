@@ -189,8 +189,8 @@ TEST(Clip, ACutBetweenTwoLeavesOneOnEachPieceAndBothClosed) {
   }
   for (int n = 0; n < 3; ++n) {
     live(world, 0.5);
-    EXPECT_LT(lumen(world, 0.016), 0.15 * open) << n;
-    EXPECT_LT(lumen(world, 0.032), 0.15 * open) << n;
+    EXPECT_LT(lumen(world, 0.016), 0.17 * open) << n;
+    EXPECT_LT(lumen(world, 0.032), 0.17 * open) << n;
   }
 }
 

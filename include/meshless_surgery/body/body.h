@@ -6,6 +6,7 @@
 
 #include "meshless_surgery/body/body_def.h"
 #include "meshless_surgery/body/clamp.h"
+#include "meshless_surgery/body/held_motion.h"
 #include "meshless_surgery/dynamics/elastic.h"
 #include "meshless_surgery/dynamics/elastic_batch.h"
 #include "meshless_surgery/geometry/lattice/cell_lattice.h"
@@ -76,6 +77,9 @@ struct BodyModel {
   std::vector<ClampPoint> clamp_points;               // of it: where free tissue ends at what is held
   std::shared_ptr<const Clamp> clamp;                 // of them; null where there are none
   bool isHeld() const { return any_fixed || clamp; }  // it has no rigid motion of its own
+  Points held_middles;                  // [m] one an entry of `fixed`, of what it holds at rest
+  std::vector<std::uint32_t> held_by;   // one a particle, the entry that holds it if one does; empty: there is one entry
+  std::uint32_t holderOf(Index particle) const { return held_by.empty() ? 0 : held_by[particle]; }
   std::vector<bool> tissue;  // one a corner of it: no ghost; empty where all particles are tissue
   ClusterOptions grouping;   // how clusters are made where a material needs them
   ClusterSet clusters;       // empty where the material of a solid is elastic
@@ -162,7 +166,8 @@ struct BodyState {
   std::vector<PlasticShape> plastic_cells;  // likewise
   std::vector<RelaxedStrain> relaxed;       // one a cell of a material that relaxes, from the first substep on
   std::vector<FilledCavity> cavities;  // those that are filled still
-  Pose placed;                         // where the rest shape was put: what is held stays there
+  Pose placed;                         // where the rest shape was put: what is held stays there, but for `held`
+  std::vector<HeldMotion> held;        // by the entries of `fixed`; those from the last on that was moved are left out
 };
 
 inline MatchInput matchInput(const BodyModel& model, const BodyState& state) {

@@ -45,9 +45,10 @@ struct Clamp {
 /// missing. Kept between steps, since it factorises the system anew where the step has changed.
 class ClampStep {
  public:
-  /// `share`: the square of the step over the longest at rest, so that the springs are as stiff in every step.
+  /// `share`: the square of the step over the longest at rest, so that the springs are as stiff in every step. moved:
+  /// [kg m] of each corner, the springs times how far their places have been moved; empty: none has.
   void hold(const std::shared_ptr<const Clamp>& clamp, double share, const Points& rest, const Pose& placed,
-            Points& positions);
+            const Points& moved, Points& positions);
   std::size_t factorised() const { return factorised_; }  // so many times
   std::size_t bytes() const;
 

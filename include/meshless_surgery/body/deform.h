@@ -17,6 +17,7 @@ struct StepScratch {
   Points predicted;
   Points goals, matched;
   ClampStep clamp;
+  Points moved;  // [kg m] see ClampStep::hold
   ElasticBatchState elastic;
   Points cavity, cavity_pull;            // of its vertices, and of the particles
   std::vector<TouchedParticle> touched;  // of a body that preserves its size
@@ -38,7 +39,7 @@ struct StepScratch {
 /// acts on a body moves it as a whole as ever. So every step is stable, and equilibria are the material's (Olovsson et
 /// al. 2005, "Selective mass scaling for explicit finite element analyses"). What else acts on particles has to do
 /// likewise: it moves them by stiffnessFactor of what their masses say, and a body that is free as a whole by the rest.
-/// for_each: spreads the cells of an elastic body over threads.
+/// for_each: spreads cells and particles over threads; what comes out does not depend on it.
 void matchAndMove(const BodyModel& model, const Material& material, const Vec3& gravity, double h, BodyState& state,
                   StepScratch& scratch, MatchCounters& counters, const ForEach& for_each = nullptr);
 
@@ -55,7 +56,8 @@ double viscosityTime(const BodyModel& model, const BodyState& state, double h);
 double clampRate(const BodyModel& model);
 
 /// v = (x - x_old) / h, after springs and contacts have moved positions.
-void velocitiesFromPositions(double h, BodyState& state, const StepScratch& scratch);
+void velocitiesFromPositions(double h, BodyState& state, const StepScratch& scratch,
+                             const ForEach& for_each = nullptr);
 
 /// [m/s] angular velocity times lever of a body that turns as its particles do on the whole; 0 where it has no extent.
 struct RigidMotion {

@@ -116,10 +116,20 @@ struct ClipCommand {
   double opening = 0.02;           // [m] > 0 of the jaws, and their length across
 };
 
+constexpr double kMaxClampTime = 3600.0;  // [s]
+/// Moves what holds a body: an entry of `fixed`, evenly. Both are counted from where it was put.
+struct MoveClampCommand {
+  std::string body;
+  std::uint32_t clamp = 0;       // the entry, from 0 on
+  Vec3 shift = Vec3::Zero();     // [m] of the middle of what it holds
+  Quat turn = Quat::Identity();  // unit, about that middle
+  double time = 0.0;             // [s] 0..kMaxClampTime that it takes; less than a step is one
+};
+
 using Command =
     std::variant<PickCommand, MovePickCommand, LockCommand, ReleaseCommand, ClearPicksCommand, PushCommand, CutCommand,
                  OpenScissorsCommand, InciseCommand, SetMaterialCommand, SpawnCommand, RemoveCommand, LiftCommand,
-                 UndoCutCommand, OpenBladesCommand, AttachCommand, DetachCommand, ClipCommand>;
+                 UndoCutCommand, OpenBladesCommand, AttachCommand, DetachCommand, ClipCommand, MoveClampCommand>;
 
 struct PickReply {
   PickId pick = 0;
@@ -178,7 +188,11 @@ struct ClipReply {
   double lumen = 0.0;  // [m] its widest, which the jaws close
 };
 
+struct MoveClampReply {
+  Vec3 middle = Vec3::Zero();  // [m] where the middle of what it holds will be
+};
+
 using Reply = std::variant<Done, PickReply, CutReply, CutStarted, InciseReply, SpawnReply, UndoCutReply, AttachReply,
-                           DetachReply, ClipReply>;
+                           DetachReply, ClipReply, MoveClampReply>;
 
 }  // namespace meshless

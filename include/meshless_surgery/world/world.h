@@ -78,9 +78,10 @@ enum class EventType {
   kLeak,
   kClipped,
   kCollapsed,
-  kMaterial
+  kMaterial,
+  kClampMoved
 };
-constexpr EventType kLastEvent = EventType::kMaterial;
+constexpr EventType kLastEvent = EventType::kClampMoved;
 const char* toString(EventType type);
 
 struct Event {
