@@ -75,6 +75,15 @@ void makeElastic(BodyModel& model) {
   }
 }
 
+bool BodyModel::isHeldBy(std::uint32_t entry) const {
+  if (std::any_of(clamp_points.begin(), clamp_points.end(),
+                  [entry](const ClampPoint& point) { return point.region == entry; }))
+    return true;
+  for (Index i = 0; i < fixed.size(); ++i)
+    if (fixed[i] && holderOf(i) == entry) return true;
+  return false;
+}
+
 void makeClamp(BodyModel& model) {
   model.clamp.reset();
   if (model.clamp_points.empty()) return;

@@ -35,6 +35,8 @@ void finishPiece(const BodyState& parent, std::shared_ptr<BodyModel> model, Body
   piece.state.stiffened = parent.stiffened;
   piece.state.placed = parent.placed;
   piece.state.held = parent.held;
+  for (std::uint32_t entry = 0; entry < piece.state.held.size(); ++entry)
+    if (!model->isHeldBy(entry)) piece.state.held[entry].left = 0.0;
   makeCavities(*model);
   piece.state.cavities = inheritedCavities(parent.cavities, *model, piece.state.positions);
   updateSurface(*model, piece.state);

@@ -306,17 +306,22 @@ void holdParticles(const std::vector<HeldRegion>& regions, const Pose& pose, Bod
     if (inside(model.rest[i])) model.fixed[i] = model.any_fixed = true;
 }
 
-// Which entry of `fixed` holds what, and the middle of it.
+// Which entry of `fixed` holds what, and the middle of it: of the border at which free tissue ends, or where it has none
+// of what is held.
 void findHolders(const BodyDef& def, const Pose& placed, const Pose& pose, BodyModel& model) {
   const std::size_t count = def.fixed.size();
   std::vector<HeldHeight> heights;
   for (const HeldRegion& region : def.fixed) heights.push_back(heldHeight({region}, placed, pose));
-  Points sums(count, Vec3::Zero());
-  std::vector<double> weights(count, 0.0);
-  const auto add = [&](std::uint32_t r, double weight, const Vec3& place) {
-    sums[r] += weight * place;
-    weights[r] += weight;
+  struct Mean {
+    Vec3 sum = Vec3::Zero();
+    double weight = 0.0;
+
+    void add(double of, const Vec3& place) {
+      sum += of * place;
+      weight += of;
+    }
   };
+  std::vector<Mean> borders(count), particles(count);
   if (count > 1) model.held_by.assign(model.rest.size(), 0);
   for (std::size_t i = 0; i < model.rest.size(); ++i) {
     if (!model.fixed[i]) continue;
@@ -324,12 +329,14 @@ void findHolders(const BodyDef& def, const Pose& placed, const Pose& pose, BodyM
     for (std::uint32_t r = 1; r < count; ++r)
       if (heights[r](model.rest[i]) < heights[by](model.rest[i])) by = r;
     if (count > 1) model.held_by[i] = by;
-    if (model.clamp_points.empty()) add(by, 1.0, model.rest[i]);
+    particles[by].add(1.0, model.rest[i]);
   }
   for (const ClampPoint& point : model.clamp_points)
-    add(point.region, point.area, model.lattice->restPlace(model.lattice->cells[point.cell], point.at));
-  for (std::size_t r = 0; r < count; ++r)
-    model.held_middles.push_back(weights[r] > 0.0 ? Vec3(sums[r] / weights[r]) : Vec3(Vec3::Zero()));
+    borders[point.region].add(point.area, model.lattice->restPlace(model.lattice->cells[point.cell], point.at));
+  for (std::size_t r = 0; r < count; ++r) {
+    const Mean& mean = borders[r].weight > 0.0 ? borders[r] : particles[r];
+    model.held_middles.push_back(mean.weight > 0.0 ? Vec3(mean.sum / mean.weight) : Vec3(Vec3::Zero()));
+  }
 }
 
 // Every region holds something, or whoever wrote it is wrong about where the body is.

@@ -273,8 +273,11 @@ std::string faultOf(const BodyModel& m) {
   const std::size_t particles = m.rest.size(), clusters = m.clusters.size(), vertices = m.surface.vertices.size();
   const std::size_t count = m.lattice ? m.lattice->cells.size() : 0;
   if (particles == 0) return "a body has no particles";
-  if (m.held_middles.size() > kMaxHeldRegions || (!m.held_by.empty() && m.held_by.size() != particles))
-    return "a body is held by more than holds it";
+  if (m.held_middles.size() > kMaxHeldRegions || (!m.held_by.empty() && m.held_by.size() != particles) ||
+      !std::all_of(m.held_middles.begin(), m.held_middles.end(), [](const Vec3& p) { return p.allFinite(); }))
+    return "a body is held by what cannot hold it";
+  for (Index i = 0; i < particles; ++i)
+    if (m.fixed[i] && m.holderOf(i) >= m.held_middles.size()) return "a particle is held by nothing";
   if (m.masses.size() != particles || m.match_masses.size() != particles || m.fixed.size() != particles)
     return "a body's masses are not those of its particles";
   for (std::size_t i = 0; i < particles; ++i)
@@ -317,7 +320,7 @@ std::string faultOf(const BodyModel& m) {
           return "a body's particles do not rest at the corners of its cells";
     for (const ClampPoint& point : m.clamp_points)
       if (!(point.cell < cells.size()) || !point.at.allFinite() || !(point.area > 0.0 && point.area < 1e12) ||
-          point.region >= kMaxHeldRegions)
+          point.region >= m.held_middles.size())
         return "a clamp holds nothing of its body's cells";
     for (const LatticeCell& cell : cells)
       if (!(cell.resists.fraction > 0.0) || !cell.resists.centroid.allFinite() ||

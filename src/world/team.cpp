@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 namespace meshless {
 namespace {
@@ -54,23 +55,30 @@ void Team::run(std::size_t count, const std::function<void(std::size_t)>& work) 
   }
   take(0);
   offer_.fetch_and(~kOpen, std::memory_order_acq_rel);
-  for (int look = 0; (offer_.load(std::memory_order_acquire) & kInside) != 0; ++look) {
+  for (unsigned look = 0; (offer_.load(std::memory_order_acquire) & kInside) != 0; ++look) {
     relax();
     if (look % kLooks == kLooks - 1) std::this_thread::yield();  // to whom it waits for, if the core is all there is
   }
+  std::exception_ptr fault;
+  if (faulted_.exchange(false)) fault = std::exchange(fault_, nullptr);
   busy_.store(false, std::memory_order_release);
+  if (fault) std::rethrow_exception(fault);
 }
 
 void Team::take(std::size_t who) {
   at_work = true;
   const std::function<void(std::size_t)>& work = *work_;
-  for (std::size_t k = 0; k < parts_.size(); ++k) {
-    Part& part = parts_[(who + k) % parts_.size()];
-    for (;;) {
-      const std::size_t from = part.next.fetch_add(grain_, std::memory_order_relaxed);
-      if (from >= part.end) break;
-      for (std::size_t n = from; n < std::min(part.end, from + grain_); ++n) work(n);
+  try {
+    for (std::size_t k = 0; k < parts_.size(); ++k) {
+      Part& part = parts_[(who + k) % parts_.size()];
+      for (;;) {
+        const std::size_t from = part.next.fetch_add(grain_, std::memory_order_relaxed);
+        if (from >= part.end) break;
+        for (std::size_t n = from; n < std::min(part.end, from + grain_); ++n) work(n);
+      }
     }
+  } catch (...) {
+    if (!faulted_.exchange(true)) fault_ = std::current_exception();
   }
   at_work = false;
 }
@@ -79,7 +87,7 @@ void Team::standBy(std::size_t who) {
   std::uint64_t seen = 0;
   const auto isNew = [&seen](std::uint64_t offer) { return (offer & kOpen) && offer / kNext != seen; };
   auto since = std::chrono::steady_clock::now();
-  for (int look = 0; !end_.load(std::memory_order_relaxed); ++look) {
+  for (unsigned look = 0; !end_.load(std::memory_order_relaxed); ++look) {
     std::uint64_t offer = offer_.load(std::memory_order_acquire);
     if (isNew(offer)) {
       if (!offer_.compare_exchange_weak(offer, offer + 1, std::memory_order_acq_rel)) continue;
@@ -95,7 +103,10 @@ void Team::standBy(std::size_t who) {
     if (std::chrono::steady_clock::now() - since < kWatchFor) continue;
     std::unique_lock<std::mutex> lock(mutex_);
     asleep_.fetch_add(1, std::memory_order_seq_cst);
-    wake_.wait(lock, [&] { return end_.load() || isNew(offer_.load(std::memory_order_seq_cst)); });
+    // By a loop that is over, too: the next one comes soon.
+    wake_.wait(lock, [&, last = offer / kNext] {
+      return end_.load() || offer_.load(std::memory_order_seq_cst) / kNext != last;
+    });
     asleep_.fetch_sub(1, std::memory_order_seq_cst);
     since = std::chrono::steady_clock::now();
   }

@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <mutex>
 #include <thread>
@@ -22,7 +23,8 @@ class Team {
   Team(const Team&) = delete;
   Team& operator=(const Team&) = delete;
 
-  /// work(0) .. work(count - 1), on any of them; returns when all are done. Within such work it is a plain loop. One
+  /// work(0) .. work(count - 1), on any of them; returns when all are done, and throws what the
+  /// first of them threw. Within such work it is a plain loop. One
   /// caller at a time; others' loops are plain.
   void run(std::size_t count, const std::function<void(std::size_t)>& work);
 
@@ -45,7 +47,8 @@ class Team {
   alignas(64) const std::function<void(std::size_t)>* work_ = nullptr;
   std::size_t grain_ = 1;
   std::uint64_t shared_ = 0;
-  std::atomic<bool> busy_{false};
+  std::atomic<bool> busy_{false}, faulted_{false};
+  std::exception_ptr fault_;  // the first
   std::atomic<int> asleep_{0};
   std::atomic<bool> end_{false};
   std::mutex mutex_;

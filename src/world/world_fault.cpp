@@ -25,6 +25,10 @@ void restAnew(WorldBody& body) {
   anew.placed = placed;
   anew.substep = state.substep;
   anew.cavities = std::move(state.cavities);
+  anew.held = std::move(state.held);
+  for (Index i = 0; i < model.fixed.size(); ++i)
+    if (model.fixed[i] && model.holderOf(i) < anew.held.size())
+      anew.positions[i] = anew.held[model.holderOf(i)](anew.positions[i]);
   state = std::move(anew);
   for (FilledCavity& cavity : state.cavities) {
     cavity.filled_for = cavity.acting = 0.0;

@@ -11,19 +11,10 @@ namespace {
 constexpr double kFarthest = 1e3;  // [m]
 constexpr double kUnit = 1e-6;     // by which a turn's norm may differ from 1
 
-bool holds(const BodyModel& model, std::uint32_t clamp) {
-  if (std::any_of(model.clamp_points.begin(), model.clamp_points.end(),
-                  [&](const ClampPoint& point) { return point.region == clamp; }))
-    return true;
-  for (Index i = 0; i < model.fixed.size(); ++i)
-    if (model.fixed[i] && model.holderOf(i) == clamp) return true;
-  return false;
-}
-
 std::string heldText(const BodyModel& model) {
   std::string text;
   for (std::uint32_t clamp = 0; clamp < model.held_middles.size(); ++clamp)
-    if (holds(model, clamp)) text += (text.empty() ? "" : ", ") + std::to_string(clamp);
+    if (model.isHeldBy(clamp)) text += (text.empty() ? "" : ", ") + std::to_string(clamp);
   return text;
 }
 
@@ -49,7 +40,7 @@ Result<Reply> World::Impl::apply(const MoveClampCommand& command) {
   WorldBody* const body = find(command.body);
   if (!body) return Error{ErrorCode::kUnknownName, "there is no body '" + command.body + "'; " + knownBodies()};
   const BodyModel& model = *body->model;
-  if (!holds(model, command.clamp)) {
+  if (!model.isHeldBy(command.clamp)) {
     const std::string held = heldText(model);
     return Error{ErrorCode::kMissed,
                  held.empty() ? "nothing holds '" + command.body + "'; accepted: bodies with an entry of `fixed`"
@@ -67,6 +58,20 @@ Result<Reply> World::Impl::apply(const MoveClampCommand& command) {
   wake(*body);
   say(EventType::kClampMoved, body->name, 0, "what holds " + body->name + " moves");
   return Reply(MoveClampReply{motion.middle + command.shift});
+}
+
+// Contact sees the way of what is led before the first substep of it.
+void World::Impl::leadClamps(double h_frame) {
+  for (WorldBody* body : awake) {
+    BodyState& state = body->state;
+    if (std::none_of(state.held.begin(), state.held.end(), [](const HeldMotion& m) { return m.left > 0.0; })) continue;
+    std::vector<HeldMotion> then = state.held;
+    for (HeldMotion& motion : then) motion.advance(h_frame);
+    const BodyModel& model = *body->model;
+    for (Index i = 0; i < model.fixed.size(); ++i)
+      if (const std::uint32_t by = model.holderOf(i); model.fixed[i] && by < then.size())
+        state.velocities[i] = (then[by](state.placed * model.rest[i]) - state.positions[i]) / h_frame;
+  }
 }
 
 }  // namespace meshless

@@ -333,6 +333,7 @@ struct World::Impl : KeptWorld {
   void listAwake();
   void groupBatches();
   void addBatch(std::vector<WorldBody*> group);
+  void leadClamps(double h_frame);
   void clearForces();
   void takeStep();
   void finishStep(double h_frame);

@@ -44,6 +44,7 @@ void World::Impl::takeStep() {
   listFibres();
   wakeAttached();
   listAwake();
+  leadClamps(h_frame);
   groupBatches();
   clearForces();
   int parts = 1;

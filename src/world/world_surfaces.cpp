@@ -530,6 +530,15 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
   step.slow = 2.0 * surface_scene.gravity * h_frame;  // what gravity gives within a frame is no approach
   step.sphere_radius = push.radius;
   auto last = std::chrono::steady_clock::now();
+  // A large body is shared out among all threads, the others go to them one by one.
+  const auto eachBody = [&each](const std::vector<WorldBody*>& some, const auto& stage) {
+    const auto isLarge = [&](std::size_t b) { return some[b]->state.positions.size() >= kSharedParticles; };
+    for (std::size_t b = 0; b < some.size(); ++b)
+      if (isLarge(b)) stage(b, each);
+    runEach(each, some.size(), [&](std::size_t b) {
+      if (!isLarge(b)) stage(b, oneAfterAnother);
+    });
+  };
   for (int substep = 0; substep < substeps; ++substep) {
     for (std::size_t n = 0; n < batches.size(); ++n) {
       if (!work.lanes[n]) continue;
@@ -537,11 +546,10 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
       batch_step.gravity = settings.gravity;
       work.lanes[n]->step(work.side_by_side[n], batch_step, work.match_counters);
     }
-    runEach(each, work.alone.size(), [&](std::size_t b) {
+    eachBody(work.alone, [&](std::size_t b, const ForEach& within) {
       work.each_counters[b] = MatchCounters();
       work.alone[b]->scratch.last = substep + 1 == substeps;
-      const bool shared = work.alone[b]->state.positions.size() >= kSharedParticles;
-      matchAlone(*work.alone[b], h, work.each_counters[b], shared ? each : oneAfterAnother);
+      matchAlone(*work.alone[b], h, work.each_counters[b], within);
     });
     for (const MatchCounters& counters : work.each_counters) work.match_counters += counters;
     work.match += secondsSince(last);
@@ -571,9 +579,8 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
     }
     work.contact += secondsSince(last);
     keepSizes(work);
-    runEach(each, work.bodies.size(), [&](std::size_t b) {
-      const bool shared = work.bodies[b]->state.positions.size() >= kSharedParticles;
-      velocitiesFromPositions(h, work.bodies[b]->state, work.bodies[b]->scratch, shared ? each : oneAfterAnother);
+    eachBody(work.bodies, [&](std::size_t b, const ForEach& within) {
+      velocitiesFromPositions(h, work.bodies[b]->state, work.bodies[b]->scratch, within);
     });
     work.match += secondsSince(last);
   }

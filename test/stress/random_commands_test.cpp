@@ -15,7 +15,7 @@ int firstRun() {
 
 constexpr int kRun = 300;  // steps before the scene starts anew: cuts make more and more of it
 
-static_assert(std::variant_size_v<Command> == 18, "a new command has a case here, too");
+static_assert(std::variant_size_v<Command> == 19, "a new command has a case here, too");
 
 Command randomCommand(test::Random& random, int number, std::size_t bodies) {
   // Now and then a number that no hand gives.
@@ -29,7 +29,7 @@ Command randomCommand(test::Random& random, int number, std::size_t bodies) {
     if (random.integer(0, 1)) return std::nullopt;
     return Region::sphere(place(), size());
   };
-  switch (random.integer(0, 18)) {
+  switch (random.integer(0, 19)) {
     case 0: {
       PickCommand command;
       command.point = place();
@@ -123,6 +123,15 @@ Command randomCommand(test::Random& random, int number, std::size_t bodies) {
       command.direction = random.unit();
       command.width = size();
       command.opening = size();
+      return command;
+    }
+    case 18: {
+      MoveClampCommand command;
+      command.body = body();
+      command.clamp = static_cast<std::uint32_t>(random.integer(0, 1));
+      command.shift = random.integer(0, 3) ? random.vector(0.1) : random.vector(size());
+      command.turn = Quat(Eigen::AngleAxisd(random.uniform(-3.0, 3.0), random.unit()));
+      command.time = random.integer(0, 1) ? random.uniform(0.0, 1.0) : 0.0;
       return command;
     }
     default:

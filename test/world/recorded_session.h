@@ -116,6 +116,9 @@ inline Session session(bool ended = true, int threads = 1) {
   ClipCommand clip;
   clip.point = Vec3(9, 9, 9);
   apply(clip, false);
+  MoveClampCommand lead;
+  lead.body = "ball";
+  apply(lead, false);  // nothing holds it
   run(world, 5);
   apply(DetachCommand{"joint", {}});
   LiftCommand lift;

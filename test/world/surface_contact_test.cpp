@@ -329,7 +329,7 @@ TEST(SurfaceContact, ResultsDoNotDependOnThreads) {
     add(world, block("beside", Vec3(0.6, 0, 0.055)));
     BodyDef large = block("large, whose cells are shared out", Vec3(2.0, 0, 0.2));
     large.material.youngs_modulus = 5000.0;
-    large.spacing = 0.008;
+    large.spacing = 0.006;
     add(world, large, Vec3(0.1, 0.2, 0.3));
     run(world, 0.4);
     hash[threads - 1] = world.stateHash();

@@ -50,5 +50,35 @@ TEST(Team, TwoThatCallAtATimeBothGetTheirWorkDone) {
   for (const std::size_t sum : sums) EXPECT_EQ(sum, 500u * 64u * 63u / 2u);
 }
 
+TEST(Team, OthersTakeTheirPartAlsoAfterASleep) {
+  Team team(2);
+  for (int loop = 0; loop < 20; ++loop) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    std::atomic<bool> met{false};
+    // Long enough for the other to wake, however busy the machine is.
+    team.run(2, [&](std::size_t n) {
+      if (n == 1) met = true;
+      const auto since = std::chrono::steady_clock::now();
+      while (n == 0 && !met && std::chrono::steady_clock::now() - since < std::chrono::seconds(20)) {
+      }
+    });
+    EXPECT_TRUE(met) << loop;
+  }
+}
+
+TEST(Team, WhatWorkThrowsComesBackAndTheNextLoopIsWhole) {
+  Team team(2);
+  for (const std::size_t bad : {std::size_t{0}, std::size_t{99}}) {
+    EXPECT_THROW(team.run(100,
+                          [&](std::size_t n) {
+                            if (n == bad) throw std::runtime_error("no");
+                          }),
+                 std::runtime_error);
+    std::vector<int> done(100, 0);
+    team.run(100, [&](std::size_t n) { ++done[n]; });
+    for (const int times : done) EXPECT_EQ(times, 1);
+  }
+}
+
 }  // namespace team_test
 }  // namespace meshless

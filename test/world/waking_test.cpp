@@ -215,6 +215,7 @@ std::vector<Row> rows(const Kind& kind, const Vec3& pressed) {
       {"detach when all sleep again", DetachCommand{"low-high", {}}, kTower, {joined}, 1, false, true},
       {"detach of nothing", DetachCommand{"low-high", {}}, {}, {}, 1, true},
       {"clip of what is not hollow", clip, {}, {}, 1, true},
+      {"clamp of what is free", MoveClampCommand{"low", 0, Vec3(0.01, 0.0, 0.0), Quat::Identity(), 1.0}, {}, {}, 1, true},
       {"removal from below", RemoveCommand{"low"}, {"high"}},
       {"removal from above", RemoveCommand{"high"}, {"low"}},
       {"removal of what is picked", RemoveCommand{"held"}, {"under"}},

@@ -106,6 +106,8 @@ struct BodyModel {
   double mass = 0.0;             // [kg]
   std::uint32_t next_patch = 1;  // for the next cut
 
+  /// Whether an entry of `fixed` holds any of it; of a piece some do not.
+  bool isHeldBy(std::uint32_t entry) const;
   /// False for a corner of a cell that no tissue is near: it carries what it must, and nobody shows or picks it.
   bool isTissue(Index particle) const { return tissue.empty() || tissue[particle]; }
   /// Groups of particles that pull: clusters, or cells where there are none.
