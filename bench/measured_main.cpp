@@ -1,6 +1,5 @@
 // What the elastic law gives beside what was measured: each point, with one number of a material and with three.
 #include <cstdio>
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -74,18 +73,19 @@ bool printCube(const std::string& file) {
   return true;
 }
 
-// Of the checkout that it was built from, or where that is gone what was installed.
-std::string placeOf(const std::string& checkout, const std::string& shared) {
-  return std::filesystem::exists(checkout) ? checkout : shareFolder() + shared;
-}
+#ifdef OF_CHECKOUT  // a build without ROS has no share folder
+const std::string kMaterials = MATERIALS_FOLDER, kMeasured = MEASURED_FOLDER;
+#else
+const std::string kMaterials = shareFolder() + "/config/materials", kMeasured = shareFolder() + "/bench/measured";
+#endif
 
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app("Tissue and rubber as measured, beside the elastic law.");
-  std::string materials = placeOf(MATERIALS_FOLDER, "/config/materials");
+  std::string materials = kMaterials;
   app.add_option("--materials", materials, "folder of the materials that ship");
-  std::string beads = placeOf(MEASURED_FOLDER "/truth_cube.csv", "/bench/measured/truth_cube.csv");
+  std::string beads = kMeasured + "/truth_cube.csv";
   app.add_option("--beads", beads, "of the Truth Cube");
   CLI11_PARSE(app, argc, argv);
   const auto shipped = readMaterials(materials);

@@ -263,7 +263,7 @@ class Fuzzer:
             return dict(name=self.maybe_name(), header=self.header(), points=[self.point() for _ in range(r.choice([0, 1, 3, 10001]))])
         if service == 'move_clamp':
             return dict(name=self.maybe_name(), clamp=r.choice([0, 0, 1, 7, 0xffffffff]), header=self.header(), shift=self.vector(),
-                        turn=self.pose().orientation, time=self.number())
+                        turn=self.pose().pose.orientation, time=self.number())
         if service == 'probe':
             return dict(header=self.header(), point=self.point(),
                         direction=Vector3(0, 0, -1) if self.sensible else self.vector())
