@@ -92,7 +92,7 @@ class TopicsTest(Compared, unittest.TestCase):
     planted = (('| `~points` |', '| `~dots` |'), ('| `Info` | latched; ', '| `Info` | '), ('| `Event` |', '| `Info` |'))
 
     def code(self):
-        paths = [path for path in files('src/ros/*.cpp') if 'advertise<' in read(path) and 'review' not in path]
+        paths = [path for path in files('src/ros/*.cpp') if 'advertise<' in read(path) and 'review' not in path and 'named_' not in path]
         known = {name: facts for path in paths for name, facts in topics(path).items()}
         known['/diagnostics'] = ('diagnostic_msgs/DiagnosticArray', False)  # diagnostic_updater's
         return known
@@ -100,6 +100,17 @@ class TopicsTest(Compared, unittest.TestCase):
     def said(self, text):
         return {name: (named(row[1])[0], row[2].startswith('latched'))
                 for row in rows(text, 'Published topics', 'name') for name in named(row[0])}
+
+
+class InstrumentTopicsTest(Compared, unittest.TestCase):
+    page, least, planted = 'topics', 9, (('`~NAME/jaw/servo_jp` |', '`~NAME/jaw/servo_js` |'), ('| `geometry_msgs/TwistStamped` |', '| `geometry_msgs/Twist` |'))
+
+    def code(self):
+        said = re.findall(r'(?:advertise|subscribe)<([\w:]+)>\(\s*name \+ "(/[\w/]+)"', read('src/ros/named_instruments.cpp'))
+        return {'~NAME' + name: typeOf(kind) for kind, name in said}
+
+    def said(self, text):
+        return {name: named(row[1])[0] for row in rows(text, 'Instruments', 'name') for name in named(row[0])}
 
 
 class ReviewTest(Compared, unittest.TestCase):

@@ -44,12 +44,10 @@ class _Heard:
 
 
 class ToolStream:
-    """One of the tools `pick`, `push` and `scissors`, by its topics. The node lifts a tool off whose stream is silent for
-    `tools/silence` (0.5 s). Ends with close(), or as a context."""
+    """One of the tools `pick`, `push` and `scissors`, or an instrument by its name, by its topics. The node lifts a tool off
+    whose stream is silent for `tools/silence` (0.5 s); an instrument stays where it is. Ends with close(), or as a context."""
 
-    def __init__(self, node, tool, frame='', timeout=30.0):
-        if tool not in TOOLS:
-            raise ValueError("tool is '%s'; accepted: %s" % (tool, ', '.join(TOOLS)))
+    def __init__(self, node, tool, frame='', timeout=30.0, jaws=False):
         self.tool = tool
         self.frame = frame
         self.timeout = timeout
@@ -59,8 +57,10 @@ class ToolStream:
         self._jaws = None
         if tool == 'scissors':
             self._jaws = rospy.Publisher(self._topic + 'jaw/servo_js', JointState, queue_size=10, tcp_nodelay=True)
+        elif jaws:
+            self._jaws = rospy.Publisher(self._topic + 'jaw/servo_jp', JointState, queue_size=10, tcp_nodelay=True)
         self._measured = _Heard(self._topic + 'measured_cp', PoseStamped)
-        self._force = _Heard(self._topic + 'measured_cf', WrenchStamped)
+        self._force = _Heard(self._topic + ('measured_cf' if tool in TOOLS else 'body/measured_cf'), WrenchStamped)
         for publisher in (self._poses, self._jaws):
             self._connect(publisher)
 
@@ -78,7 +78,7 @@ class ToolStream:
         self._poses.publish(pose)
 
     def jaw(self, angle):
-        """Opening of the scissors [rad]: closed after they were open, they cut."""
+        """Opening of the jaws [rad]. Scissors that are closed after they were open cut."""
         if self._jaws is None:
             raise ValueError('the %s has no jaw' % self.tool)
         self._jaws.publish(JointState(name=['jaw'], position=[angle]))

@@ -13,9 +13,9 @@ from meshless_surgery.errors import Refused, Unanswered, Unreachable, need_topic
 from meshless_surgery.goals import Goals
 from meshless_surgery.msg import Info, State
 from meshless_surgery.poses import blade_pose, blades_pose, pose_stamped
-from meshless_surgery.srv import (Attach, Clip, Cut, Detach, GetBody, GetLoad, Hash, Incise, LoadState, Lock, MoveClamp, MovePick, Observe, Pick, Probe,
+from meshless_surgery.srv import (Attach, AttachInstrument, Clip, Cut, Detach, DetachInstrument, GetBody, GetLoad, Hash, Incise, LoadState, Lock, MoveClamp, MovePick, Observe, Pick, Probe,
                                   Push, Release, Remove, Report, SaveState, SetMaterial, Spawn, SpawnCloud, StartTask, Step, Unclip)
-from meshless_surgery.streams import ToolStream
+from meshless_surgery.streams import TOOLS, ToolStream
 
 
 class Surgeon:
@@ -240,8 +240,22 @@ class Surgeon:
         return self.call('hash', Hash).hash
 
     def stream(self, tool, frame=None):
-        """The topics of a tool: a ToolStream."""
-        return ToolStream(self.node, tool, self._frame(frame), self.timeout)
+        """The topics of a tool, or of an instrument by its name: a ToolStream."""
+        jaws = tool == 'scissors'
+        if tool not in TOOLS:
+            types = {instrument.name: instrument.type for instrument in self.state().instruments}
+            if tool not in types:
+                raise ValueError("tool is '%s'; accepted: %s" % (tool, ', '.join((*TOOLS, *sorted(types)))))
+            jaws = types[tool] == 'grasper'
+        return ToolStream(self.node, tool, self._frame(frame), self.timeout, jaws)
+
+    def attach_instrument(self, name, yaml, position, orientation=(0.0, 0.0, 0.0, 1.0), frame=None):
+        """Takes an instrument into a hand, with its tip there: yaml as an entry of `instruments` of a scene, '{type: grasper}'."""
+        return self.call('attach_instrument', AttachInstrument, name=name, yaml=yaml,
+                         pose=pose_stamped(position, orientation, self._frame(frame)))
+
+    def detach_instrument(self, name):
+        return self.call('detach_instrument', DetachInstrument, name=name)
 
     # time
     def pause(self, paused=True):

@@ -29,6 +29,9 @@ WayBox sinceOf(const WayBox& gone, const WayBox& then, const WayBox& ahead) {
 
 double farthestOf(const WayBox& way) { return way.least.cwiseAbs().cwiseMax(way.most.cwiseAbs()).norm(); }
 
+/// Whether it may be elsewhere after the frame.
+bool goes(const Collider& collider) { return collider.moves || (collider.led && collider.velocities); }
+
 // Rows ascend by their names, as features do.
 const ContactRow* rowOfName(const std::vector<ContactRow>& rows, const ContactRow& like) {
   const auto at = std::lower_bound(rows.begin(), rows.end(), like,
@@ -71,7 +74,7 @@ void SurfaceContacts::findPairs(const SurfaceScene& scene, const std::vector<Col
   for (Index c = 0; c < count; ++c) {
     const Collider& collider = colliders[c];
     numbers_.push_back({collider.key, c});
-    active_[c] = collider.moves;
+    active_[c] = goes(collider);
     needed_[c] = collider.grasped;
     if (collider.bounds.empty()) continue;
     boxes_[c] = grown(collider.bounds, searchMargin(collider.edge_length));
@@ -127,7 +130,7 @@ void SurfaceContacts::findMoved(const SurfaceScene& scene, const std::vector<Col
   velocities_.resize(count);
   for (Index c = 0; c < count; ++c) {
     const Collider& collider = colliders[c];
-    if (!needed_[c] || collider.obstacle) continue;
+    if (!needed_[c] || (collider.obstacle && !collider.led)) continue;
     KeptWay& way = ways_[collider.key];
     way.key = collider.key;
     const VertexSupports& supports = collider.surface->supports;
@@ -136,9 +139,9 @@ void SurfaceContacts::findMoved(const SurfaceScene& scene, const std::vector<Col
     way.last.resize(vertices, Vec3::Zero());
     velocities_[c].assign(vertices, Vec3::Zero());
     Box gone, velocities;
-    for (Index v = 0; v < vertices && (collider.moves || !known); ++v) {
+    for (Index v = 0; v < vertices && (goes(collider) || !known); ++v) {
       const Vec3 place = supports.sum(v, collider.positions);
-      if (collider.moves) {
+      if (goes(collider)) {
         Vec3& velocity = velocities_[c][v] = supports.sum(v, collider.velocities);
         // Who goes farther than an edge between two searches passes what is thin as it is.
         const double edges = scene.h * velocity.norm() / collider.edge_length;
@@ -177,10 +180,11 @@ void SurfaceContacts::find(const SurfaceScene& scene, const std::vector<Collider
   frame_of_.resize(colliders.size(), 0);
   runEach(for_each, colliders.size(), [&](std::size_t c) {
     const Collider& collider = colliders[c];
-    if (!moved_[c] || (collider.obstacle && frame_of_[c] == collider.key)) return;
-    frame_of_[c] = collider.obstacle ? collider.key : 0;
+    const bool stays = collider.obstacle && !collider.led;
+    if (!moved_[c] || (stays && frame_of_[c] == collider.key)) return;
+    frame_of_[c] = stays ? collider.key : 0;
     const Vec3* const vertices = collider.vertices ? collider.vertices : ways_.find(collider.key)->second.last.data();
-    placeFrame(*collider.surface, vertices, collider.moves ? velocities_[c].data() : nullptr, scene.h, frames_[c]);
+    placeFrame(*collider.surface, vertices, goes(collider) ? velocities_[c].data() : nullptr, scene.h, frames_[c]);
   });
   runEach(for_each, pairs_.size(), [&](std::size_t n) {
     if (pairs_[n]->stale) findPair(scene, colliders, *pairs_[n]);
@@ -256,15 +260,17 @@ void SurfaceContacts::listReached(const SurfaceScene& scene, const std::vector<C
     if (pair->b == kNoIndex) continue;
     const auto sleeps = [&](Index c) { return !colliders[c].moves && !colliders[c].obstacle; };
     if (!sleeps(pair->a) && !sleeps(pair->b)) continue;
+    const bool led = colliders[pair->a].led || colliders[pair->b].led;
     for (const ContactRow& row : pair->set.rows) {
       double gap = row.constant, approach = 0.0;
       for (Index k = row.begin; k < row.end; ++k) {
         const Collider& c = colliders[k < row.middle ? pair->a : pair->b];
         const RowEntry& entry = pair->set.entries[k];
         gap += entry.coefficient * row.normal.dot(c.positions[entry.particle]);
-        if (c.moves) approach += entry.coefficient * row.normal.dot(c.velocities[entry.particle]);
+        if (goes(c)) approach += entry.coefficient * row.normal.dot(c.velocities[entry.particle]);
       }
-      if (!(gap + scene.h * approach < 0.0)) continue;
+      // What is held by friction goes along.
+      if (!(gap + scene.h * approach < 0.0) && !(led && !row.impulse.isZero(0.0))) continue;
       for (const Index c : {pair->a, pair->b})
         if (sleeps(c)) reached_.push_back(c);
       break;
@@ -280,8 +286,10 @@ void SurfaceContacts::joinIslands(const SurfaceScene& scene, const std::vector<C
   joined_.reset(count);
   island_of_.assign(count, kNoIndex);
   const auto moves = [&](Index c) { return c != kNoIndex && colliders[c].moves; };
+  const auto joins = [&](Index c) { return colliders[c].moves || colliders[c].led; };
   for (const Pair* pair : pairs_)
-    if (moves(pair->a) && moves(pair->b) && !pair->set.rows.empty()) joined_.join(pair->a, pair->b);
+    if (pair->b != kNoIndex && joins(pair->a) && joins(pair->b) && !pair->set.rows.empty())
+      joined_.join(pair->a, pair->b);
   for (const SurfaceScene::Join& join : scene.joins)
     if (moves(join.a) && moves(join.b)) joined_.join(join.a, join.b);
   Index islands = 0;
@@ -292,6 +300,7 @@ void SurfaceContacts::joinIslands(const SurfaceScene& scene, const std::vector<C
       island = islands++;
       if (island == islands_.size()) islands_.emplace_back();
       islands_[island].bodies.clear();
+      islands_[island].led.clear();
       islands_[island].rows.clear();
       islands_[island].held = islands_[island].joined = false;
     }
@@ -299,6 +308,9 @@ void SurfaceContacts::joinIslands(const SurfaceScene& scene, const std::vector<C
     islands_[island].held = islands_[island].held || colliders[c].held;
   }
   islands_.resize(islands);
+  for (Index c = 0; c < count; ++c)
+    if (const Index island = island_of_[joined_.find(c)]; colliders[c].led && island != kNoIndex)
+      islands_[island].led.push_back(c);
   for (Pair* pair : pairs_) {
     const Index of = moves(pair->a) ? pair->a : pair->b;
     if (pair->set.rows.empty() || !moves(of)) continue;
@@ -337,6 +349,24 @@ void SurfaceContacts::fillSlots(const std::vector<Collider>& colliders) {
       body.now[i] = {p.x(), p.y(), p.z(), collider.moves ? collider.inverse_masses[i] : 0.0};
       before_[first_slots_[c] + i] = body.now[i];
     }
+  }
+}
+
+std::vector<std::uint64_t> SurfaceContacts::loadedBy(std::uint64_t key) const {
+  std::vector<std::uint64_t> loaded;
+  for (const auto& [name, pair] : known_)
+    if ((pair->key_a == key || pair->key_b == key) &&
+        std::any_of(pair->set.rows.begin(), pair->set.rows.end(),
+                    [](const ContactRow& row) { return !row.impulse.isZero(0.0); }))
+      loaded.push_back(pair->key_a == key ? pair->key_b : pair->key_a);
+  return loaded;
+}
+
+void SurfaceContacts::lead(Index collider, const Points& before, const Points& now) {
+  const SolverBody& body = solver_bodies_[collider];
+  for (Index i = 0; i < body.particles; ++i) {
+    body.before[i].put(before[i]);
+    body.now[i].put(now[i]);
   }
 }
 

@@ -240,6 +240,24 @@ double readUnits(YamlMap& map) {
   return chosen < 0 ? 1.0 : kLengthUnits[static_cast<std::size_t>(chosen)].second;
 }
 
+/// Without its name.
+InstrumentDef readInstrument(YamlSource& source, const YAML::Node& node) {
+  InstrumentDef def;
+  YamlMap map(source, node, "an instrument");
+  const int type = map.choice("type", {"probe", "grasper", "hook"});
+  if (!map.has("type")) source.fail(node, "an instrument has no type", "probe, grasper, hook");
+  def.type = static_cast<InstrumentType>(std::max(0, type));
+  if (const YAML::Node pose = map.get("pose"); pose.IsDefined()) def.pose = readPose(source, pose);
+  for (const InstrumentNumber& number : kInstrumentNumbers)
+    map.number(number.key, {number.least, number.most, false, number.unit}, def.*number.value);
+  if (map.has("remote_centre")) {
+    def.remote_centre = Vec3::Zero();
+    map.vector("remote_centre", lengths(), *def.remote_centre);
+  }
+  map.finish();
+  return def;
+}
+
 class SceneReader {
  public:
   SceneReader(YamlSource& source, std::string folder, const FileAccess& access, ImageFiles& images, SceneDef& scene)
@@ -252,7 +270,7 @@ class SceneReader {
     if (const YAML::Node materials = map.get("materials"); materials.IsDefined())
       readMaterialMap(source_, materials, images_, scene_.materials);
     const YAML::Node bodies = map.get("bodies"), obstacles = map.get("obstacles");
-    const YAML::Node attachments = map.get("attachments");
+    const YAML::Node attachments = map.get("attachments"), instruments = map.get("instruments");
     if (const int space = map.choice("space", {kSpaces.begin(), kSpaces.end()}); space >= 0)
       space_ = kSpaces[static_cast<std::size_t>(space)];
     map.finish();
@@ -272,7 +290,8 @@ class SceneReader {
         readObstacle(obstacle);
       }
     }
-    if (!attachments.IsDefined()) return;
+    if (instruments.IsDefined()) readInstruments(instruments);
+    if (!attachments.IsDefined() || source_.fault) return;
     if (!attachments.IsSequence() || attachments.size() > kMaxAttachments)
       return source_.fail(attachments, "attachments is " + shown(attachments), "a list of up to 1000 attachments");
     for (const auto& attachment : attachments) {
@@ -382,6 +401,26 @@ class SceneReader {
     def.mesh = std::move(shape.mesh);
     for (Vec3& p : def.mesh.vertices) p = shape.pose * p;
     scene_.obstacles.push_back(std::move(def));
+  }
+
+  void readInstruments(const YAML::Node& node) {
+    if (!node.IsMap() || node.size() > kMostInstruments)
+      return source_.fail(node, "instruments is " + shown(node), "a map of up to 20 names to instruments");
+    std::set<std::string> names;
+    for (const auto& entry : node) {
+      std::string name;
+      if (!readText(source_, entry.first, "the name of an instrument", name)) return;
+      if (!isInstrumentName(name))
+        return source_.fail(entry.first, "an instrument is named " + shown(entry.first), kInstrumentName);
+      if (!names.insert(name).second)
+        return source_.fail(entry.first, "two instruments are named '" + name + "'", "each name once",
+                            ErrorCode::kDuplicateName);
+      InstrumentDef def = readInstrument(source_, entry.second);
+      if (source_.fault) return;
+      def.name = name;
+      if (const Status valid = def.validate(); !valid) return source_.fail(entry.second, valid.error().detail, "");
+      scene_.instruments.push_back(std::move(def));
+    }
   }
 
   void readAttachment(const YAML::Node& node) {
@@ -599,6 +638,24 @@ Status readMaterialFolders(const std::string& scene_folder, const FileAccess& ac
 }
 
 }  // namespace
+
+Result<InstrumentDef> readInstrument(const std::string& name, const std::string& yaml) {
+  if (!isInstrumentName(name))
+    return Error{ErrorCode::kInvalidArgument, "name is '" + name.substr(0, 60) + "'; accepted: " + kInstrumentName};
+  const Result<YAML::Node> root = parseYaml(yaml, "settings");
+  if (!root) return root.error();
+  YamlSource source{"settings", {}};
+  InstrumentDef def;
+  try {
+    def = readInstrument(source, *root);
+  } catch (const YAML::Exception& e) {
+    source.fail(*root, e.what(), "YAML");
+  }
+  if (source.fault) return *source.fault;
+  def.name = name;
+  if (const Status valid = def.validate(); !valid) return valid.error();
+  return def;
+}
 
 Result<CavityFill> readCavityFill(const std::string& yaml) {
   if (yaml.empty()) return CavityFill();

@@ -152,6 +152,18 @@ meshless_surgery::State toState(const WorldSnapshot& snapshot, const RunnerStatu
     state.bodies.push_back(std::move(message));
   }
   state.picks = toPicks(snapshot);
+  for (const Instrument& instrument : snapshot.instruments) {
+    meshless_surgery::InstrumentState message;
+    message.name = instrument.def.name;
+    message.type = toString(instrument.def.type);
+    message.pose = toPose(instrument.pose);
+    message.jaw = instrument.jaw;
+    message.force = toVector(instrument.force);
+    message.torque = toVector(instrument.torque);
+    message.holds = instrument.holds;
+    message.grip = instrument.gripped;
+    state.instruments.push_back(std::move(message));
+  }
   for (const AttachmentSnapshot& attachment : snapshot.attachments) {
     meshless_surgery::AttachmentState message;
     message.name = attachment.name;
@@ -254,6 +266,8 @@ meshless_surgery::Event toEvent(const Event& event, const std_msgs::Header& head
   message.type = toString(event.type);
   message.body = event.body;
   message.pick_id = event.pick;
+  message.instrument = event.instrument;
+  message.force = event.force;
   message.step = event.step;
   message.sim_time = event.sim_time;
   message.text = event.text;

@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <map>
+#include <stdexcept>
 #include <thread>
 
 #include <ros/callback_queue.h>
@@ -38,6 +39,11 @@ Pose toPose(const geometry_msgs::TransformStamped& transform) {
 }
 
 }  // namespace
+
+std::string prefixed(const std::string& prefix, const std::string& frame) {
+  if (prefix.empty()) return frame;
+  return prefix.back() == '/' ? prefix + frame : prefix + "/" + frame;
+}
 
 std::string withoutSlash(const std::string& frame) {
   const std::size_t first = frame.find_first_not_of('/');
@@ -137,14 +143,14 @@ Result<Pose> Frames::lookUp(const std_msgs::Header& header) {
   if (isWorld(frame)) return Pose{};
   Listener& tf = listener();
   std::string why;
-  if (tf.buffer.canTransform(world_frame_, frame, header.stamp, &why)) {
-    try {
+  try {
+    if (tf.buffer.canTransform(world_frame_, frame, header.stamp, &why)) {
       const Pose pose = toPose(tf.buffer.lookupTransform(world_frame_, frame, header.stamp));
       if (pose.translation.allFinite() && pose.rotation.coeffs().allFinite()) return pose;
       why = "its transform is not finite";
-    } catch (const tf2::TransformException& e) {
-      why = e.what();
     }
+  } catch (const std::runtime_error& e) {  // tf2's, and of a stamp that is decades away from what it knows
+    why = e.what();
   }
   if (const std::optional<Error> other = knownAtOtherTimes(tf.buffer, world_frame_, frame, header.stamp)) return *other;
   return Error{ErrorCode::kUnknownName, "header.frame_id is '" + printable(header.frame_id) +

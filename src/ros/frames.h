@@ -17,6 +17,8 @@ namespace meshless {
 
 /// tf2 knows no slash before a name, tf1 did: /world is world.
 std::string withoutSlash(const std::string& frame);
+/// PREFIX/frame; frame alone where there is no prefix.
+std::string prefixed(const std::string& prefix, const std::string& frame);
 
 class Frames {
  public:

@@ -10,11 +10,12 @@ namespace {
 
 using Part = meshless_surgery::InstrumentPart;
 
-constexpr double kBladeLength = 0.06;  // [m] of the mesh
-constexpr double kShownReach = 0.1;    // [m] of blades without an end
-constexpr double kToGrip = 0.015;      // [m] from the joint of a grasper to what its jaws hold
-constexpr double kHolding = 0.15;      // [rad] between jaws that hold tissue
-constexpr double kNoTurn = 1e-9;       // [rad]
+// [m] of the meshes
+constexpr double kBladeLength = 0.06, kShaftRadius = 0.0025, kShaftLength = 0.3, kJawLength = 0.018;
+constexpr double kShownReach = 0.1;  // [m] of blades without an end
+constexpr double kToGrip = 0.015;    // [m] from the joint of a grasper to what its jaws hold
+constexpr double kHolding = 0.15;    // [rad] between jaws that hold tissue
+constexpr double kNoTurn = 1e-9;     // [rad]
 
 Part part(const std::string& mesh, const Pose& pose, double scale = 1.0) {
   Part made;
@@ -67,6 +68,23 @@ std::vector<Part> Instruments::parts(const WorldSnapshot& snapshot, const std::o
   } else {
     if (saysTurn(push_hand)) probe_turn_ = push_hand->rotation;
     parts.push_back(part("shaft", {probe_turn_.value_or(fromTheFront()), snapshot.push.position}));
+  }
+  for (const Instrument& instrument : snapshot.instruments) {
+    const InstrumentDef& def = instrument.def;
+    const double size = def.shaft_radius / kShaftRadius, turn = 0.5 * M_PI;
+    const auto placed = [&](const Vec3& at) { return Pose{instrument.pose.rotation, instrument.pose * at}; };
+    if (def.type == InstrumentType::kProbe) parts.push_back(part("shaft", instrument.pose, size));
+    if (def.type == InstrumentType::kHook) {
+      const Pose aside = placed(Vec3(-def.shaft_radius, 0.0, 0.0));
+      parts.push_back(part("shaft", placed(Vec3(0.0, -def.jaw_length, 0.0)), size));
+      parts.push_back(part("shaft", {aside.rotation * Eigen::AngleAxisd(turn, Vec3::UnitZ()), aside.translation},
+                           def.jaw_length / kShaftLength));
+    }
+    if (def.type != InstrumentType::kGrasper) continue;
+    const std::size_t first = parts.size();
+    addJaws("grasping_jaw", placed(Vec3(-def.jaw_length, 0.0, 0.0)), instrument.jaw, def.jaw_length / kJawLength,
+            parts);
+    parts[first].scale = size;
   }
   const Pick* in_hand = pickInHand(snapshot);
   std::map<PickId, Quat> turns;

@@ -103,7 +103,8 @@ struct DeformerNode::Parts {
         frames(settings.world_frame, clock),
         loader(std::move(loader_in)),
         inputs(handle, settings, clock, runner, frames, *rejections),
-        publishers(handle, settings, runner, inputs.tools(), *rejections),
+        named(handle, settings, clock, runner, frames, *rejections),
+        publishers(handle, settings, runner, inputs.tools(), &named, *rejections),
         forces(handle, settings, clock, inputs.tools()) {}
 
   ~Parts() {
@@ -128,6 +129,7 @@ struct DeformerNode::Parts {
   Frames frames;
   BodyLoader loader;
   ToolInputs inputs;
+  NamedInstruments named;
   Publishers publishers;
   ForcePublisher forces;
   std::unique_ptr<LiveTraining> training;
@@ -222,6 +224,10 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
     if (!added.ok()) return Error{added.error().code, *file + ": attachments: " + added.error().detail};
     ROS_INFO_STREAM("attachment " << added->name << ": " << added->text());
   }
+
+  for (const InstrumentDef& def : scene->instruments)
+    if (const Status added = world->addSceneInstrument(def); !added.ok())
+      return Error{added.error().code, *file + ": instruments: " + added.error().detail};
 
   for (std::optional<double>* size : {&settings->scissors_length, &settings->scissors_width})
     if (!*size) *size = blades;

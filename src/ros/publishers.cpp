@@ -30,11 +30,6 @@ std::chrono::steady_clock::duration periodOf(double rate) {
   return std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(1.0 / rate));
 }
 
-std::string prefixed(const std::string& prefix, const std::string& frame) {
-  if (prefix.empty()) return frame;
-  return prefix.back() == '/' ? prefix + frame : prefix + "/" + frame;
-}
-
 }  // namespace
 
 void summarize(const RunnerStatus& runner, std::uint64_t overruns_before,
@@ -58,10 +53,11 @@ bool Publishers::Cadence::due(Clock::time_point now) {
 }
 
 Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings& settings, WorldRunner& runner,
-                       const StreamedTools& tools, const Rejections& rejections)
+                       const StreamedTools& tools, NamedInstruments* named, const Rejections& rejections)
     : settings_(settings),
       runner_(runner),
       tools_(tools),
+      named_(named),
       rejections_(rejections),
       markers_(settings.world_frame),
       updater_(ros::NodeHandle(), private_handle) {
@@ -333,6 +329,7 @@ void Publishers::publishTools(const WorldSnapshot& snapshot, const ros::Time& st
   publishTool(ToolKind::kScissors, shown, stamp, transforms);
   publishJaw(snapshot.scissors, stamp);
   publishConditions(snapshot, stamp);
+  if (named_) named_->publish(snapshot, stamp, transforms);
   // A clock that stands still: tf2 complains of a stamp said twice.
   if (!transforms.empty() && stamp != last_transforms_) {
     last_transforms_ = stamp;

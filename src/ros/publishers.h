@@ -18,6 +18,7 @@
 #include "instruments.h"
 #include "markers.h"
 #include "moving_surfaces.h"
+#include "named_instruments.h"
 #include "rejections.h"
 #include "runner.h"
 #include "settings.h"
@@ -32,7 +33,7 @@ void summarize(const RunnerStatus& runner, std::uint64_t overruns_before,
 class Publishers {
  public:
   Publishers(const ros::NodeHandle& private_handle, const NodeSettings& settings, WorldRunner& runner,
-             const StreamedTools& tools, const Rejections& rejections);
+             const StreamedTools& tools, NamedInstruments* named, const Rejections& rejections);
   ~Publishers();
   void start();
   void stop();
@@ -68,6 +69,7 @@ class Publishers {
   NodeSettings settings_;
   WorldRunner& runner_;
   const StreamedTools& tools_;
+  NamedInstruments* const named_;  // null: they have no topics
   const Rejections& rejections_;
   MarkerBuilder markers_;
   MovingSurfaces moving_;

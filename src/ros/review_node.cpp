@@ -126,7 +126,7 @@ struct ReviewNode::Parts : Answers {
         runner(std::move(world), {true, settings_in.max_backlog}, clock),
         no_streams(
             settings, clock, [](const std::function<void(World&)>&) {}, [](const Error&) {}),
-        publishers(private_handle, settings, runner, no_streams, rejections),
+        publishers(private_handle, settings, runner, no_streams, nullptr, rejections),
         handle(private_handle) {
     review_topic = handle.advertise<meshless_surgery::Review>("review", 5, true);
     bookmarks_topic = handle.advertise<meshless_surgery::Bookmarks>("bookmarks", 1, true);

@@ -4,9 +4,11 @@
 #include <sstream>
 
 #include <meshless_surgery/Attach.h>
+#include <meshless_surgery/AttachInstrument.h>
 #include <meshless_surgery/Clip.h>
 #include <meshless_surgery/Cut.h>
 #include <meshless_surgery/Detach.h>
+#include <meshless_surgery/DetachInstrument.h>
 #include <meshless_surgery/GetBody.h>
 #include <meshless_surgery/GetLoad.h>
 #include <meshless_surgery/Incise.h>
@@ -80,6 +82,8 @@ struct Services::Handlers : Answers {
     advertise(private_handle, "clip", &Handlers::clip);
     advertise(private_handle, "unclip", &Handlers::unclip);
     advertise(private_handle, "move_clamp", &Handlers::moveClamp);
+    advertise(private_handle, "attach_instrument", &Handlers::attachInstrument);
+    advertise(private_handle, "detach_instrument", &Handlers::detachInstrument);
     advertise(private_handle, "set_material", &Handlers::setMaterial);
     advertise(private_handle, "get_body", &Handlers::getBody);
     advertise(private_handle, "get_load", &Handlers::getLoad);
@@ -435,6 +439,33 @@ struct Services::Handlers : Answers {
     if (!reply.ok()) return refuse(response, "move_clamp", reply.error());
     response.middle = toPoint(std::get<MoveClampReply>(*reply).middle);
     return accept(response, "moves what entry " + std::to_string(command.clamp) + " of `fixed` holds of " + command.body);
+  }
+
+  bool attachInstrument(meshless_surgery::AttachInstrument::Request& request,
+                        meshless_surgery::AttachInstrument::Response& response) {
+    if (const auto no = training.refuses(Intervention::kInstrument)) return refuse(response, "attach_instrument", *no);
+    BorderCheck check;
+    if (request.yaml.empty() || request.yaml.size() > kMaxYaml)
+      check.fault("yaml has " + std::to_string(request.yaml.size()) + " bytes; accepted: 1.." +
+                  std::to_string(kMaxYaml) + ", such as {type: grasper}");
+    const Pose local = check.pose("pose.pose", request.pose.pose);
+    if (!check.ok()) return refuse(response, "attach_instrument", check.error());
+    auto def = readInstrument(request.name, request.yaml);
+    if (!def.ok()) return refuse(response, "attach_instrument", def.error());
+    const auto frame = frames.toWorld(request.pose.header);
+    if (!frame.ok()) return refuse(response, "attach_instrument", frame.error());
+    def->pose.rotation = (frame->rotation * local.rotation).normalized();
+    def->pose.translation = check.place("pose.pose.position", *frame, local.translation);
+    if (!check.ok()) return refuse(response, "attach_instrument", check.error());
+    return applied(response, "attach_instrument", AttachInstrumentCommand{*def},
+                   "instrument " + request.name + " is in the hand");
+  }
+
+  bool detachInstrument(meshless_surgery::DetachInstrument::Request& request,
+                        meshless_surgery::DetachInstrument::Response& response) {
+    if (const auto no = training.refuses(Intervention::kInstrument)) return refuse(response, "detach_instrument", *no);
+    return applied(response, "detach_instrument", DetachInstrumentCommand{request.name},
+                   "instrument " + request.name + " was put away");
   }
 
   bool setMaterial(meshless_surgery::SetMaterial::Request& request, meshless_surgery::SetMaterial::Response& response) {

@@ -223,6 +223,8 @@ const char* toString(Intervention intervention) {
       return "material";
     case Intervention::kMoveClamp:
       return "move_clamp";
+    case Intervention::kInstrument:
+      return "instrument";
   }
   return "unknown";
 }

@@ -141,6 +141,7 @@ void Training::noteInterventions(const TrainingFrame& frame) {
     if (event.type == EventType::kSpawned) intervened(Intervention::kSpawn, of);
     if (event.type == EventType::kMaterial) intervened(Intervention::kMaterial, of);
     if (event.type == EventType::kClampMoved) intervened(Intervention::kMoveClamp, of);
+    if (event.type == EventType::kInstrument) intervened(Intervention::kInstrument, of);
   }
 }
 

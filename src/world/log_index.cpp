@@ -39,7 +39,8 @@ void serialize(A& archive, LogTool& v) {
 template <class A>
 void serialize(A& archive, Event& v) {
   // The last ones are for who hears it at once.
-  auto& [type, step, sim_time, body, pick, text, cavity, removed, placed, taken_apart, command] = v;
+  auto& [type, step, sim_time, body, pick, text, cavity, removed, placed, taken_apart, instrument, force,
+         command] = v;
   archive(choice(type, kLastEvent), step, sim_time, body, pick, text);
 }
 

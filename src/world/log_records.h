@@ -7,7 +7,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kLogVersion = 10;  // of the hashes in it, too
+constexpr std::uint32_t kLogVersion = 11;  // of the hashes in it, too
 
 enum class RecordKind : std::uint8_t {
   kStart,
@@ -45,6 +45,9 @@ void serialize(A& archive, LiftCommand& v) {
   archive(choice(tool, ToolKind::kScissors), streamed_only, why);
 }
 MESHLESS_ARCHIVE(RemoveCommand, body)
+MESHLESS_ARCHIVE(AttachInstrumentCommand, def)
+MESHLESS_ARCHIVE(DetachInstrumentCommand, name)
+MESHLESS_ARCHIVE(LeadInstrumentCommand, name, pose, jaw)
 MESHLESS_ARCHIVE(MoveClampCommand, body, clamp, shift, turn, time)
 inline void save(OutArchive& archive, const SpawnCommand& v) {
   archive(*v.body->model);

@@ -80,12 +80,12 @@ SavedBody loadBody(InArchive& archive, const ModelTable& models) {
 template <class Archive, class World>
 void keepRest(Archive& archive, World& world) {
   auto& [settings, step, batches_current, generations, free_slots, next_number, used_names, scene, picks, next_pick,
-         attachments, used_attachments, scene_attachments, push, scissors, closing, next_ticket, next_sleep_group,
-         tetrahedralizations] = static_cast<As<World, KeptWorld>&>(world);
+         attachments, used_attachments, scene_attachments, push, scissors, instruments, next_instrument,
+         scene_instruments, closing, next_ticket, next_sleep_group, tetrahedralizations] = static_cast<As<World, KeptWorld>&>(world);
   (void)settings, (void)scene;
   archive(step, batches_current, world.batches, generations, free_slots, next_number, used_names, picks, next_pick,
-          attachments, used_attachments, scene_attachments, push, scissors, closing, next_ticket, next_sleep_group,
-          world.surface_contacts, tetrahedralizations);
+          attachments, used_attachments, scene_attachments, push, scissors, instruments, next_instrument, scene_instruments,
+          closing, next_ticket, next_sleep_group, world.surface_contacts, tetrahedralizations);
 }
 
 void checkSlots(const SavedWorld& world) {
@@ -115,6 +115,23 @@ void checkBatches(const SavedWorld& world) {
             "body '" + body.name + "' does not fit into its batch");
   }
   for (const SavedBody* body : first) require(body != nullptr, "a batch is empty");
+}
+
+bool isThere(const Instrument& instrument) {
+  for (const Pose& pose : {instrument.target, instrument.hand, instrument.pose})
+    if (!(pose.translation.norm() <= 1e6) || !(std::abs(pose.rotation.norm() - 1.0) <= 1e-6)) return false;
+  for (const double jaw : {instrument.jaw_target, instrument.jaw_hand, instrument.jaw})
+    if (!(jaw >= 0.0 && jaw <= kWidestJaw)) return false;
+  const InstrumentLoad& load = instrument.load;
+  for (const Vec3& v : {instrument.velocity, instrument.spin, load.force, load.torque, instrument.force,
+                        instrument.torque})
+    if (!(v.norm() <= 1e12)) return false;
+  for (const double x : {instrument.jaw_rate, load.jaw, instrument.jaw_torque, instrument.gripped})
+    if (!(std::abs(x) <= 1e12)) return false;
+  for (const double x : {load.mass, load.inertia, load.jaw_inertia, instrument.jaw_stop, instrument.answers,
+                         instrument.closed_to, instrument.lost_for})
+    if (!(x >= 0.0 && x <= 1e15)) return false;
+  return true;
 }
 
 void checkTools(const SavedWorld& world) {
@@ -147,6 +164,18 @@ void checkTools(const SavedWorld& world) {
                   fibre.area > 0.0 && fibre.rest >= 0.0,
               "a fibre joins what is not there");
   }
+  std::set<std::string> names;
+  std::set<std::uint32_t> numbers;
+  for (const Instrument& instrument : world.instruments) {
+    const Status valid = instrument.def.validate();
+    require(valid.ok() && isInstrumentName(instrument.def.name) && isThere(instrument) && names.insert(instrument.def.name).second &&
+                numbers.insert(instrument.number).second && instrument.number < world.next_instrument,
+            "an instrument is none");
+  }
+  for (const InstrumentDef& def : world.scene_instruments)
+    require(def.validate().ok() && isInstrumentName(def.name), "an instrument is none");
+  require(world.instruments.size() <= kMostInstruments && world.scene_instruments.size() <= kMostInstruments,
+          "there are too many instruments");
   for (const ClosingCut& cut : world.closing) require(cut.done_at > cut.started_at, "blades close in no time");
 }
 
@@ -209,6 +238,10 @@ void readRest(InArchive& archive, SavedWorld& world) {
   for (std::size_t i = 0; i < world.obstacles.size(); ++i) {
     const std::size_t vertices = world.obstacles[i]->mesh.vertices.size();
     colliders[kObstacleKey + i] = {vertices, vertices};
+  }
+  for (const Instrument& instrument : world.instruments) {
+    const std::size_t vertices = shapeOf(instrument.def).mesh.vertices.size();
+    colliders[kInstrumentKey + instrument.number] = {vertices, vertices};
   }
   requireNone(world.surface_contacts.fault(colliders));
 }
@@ -534,6 +567,7 @@ void World::restore(const SavedWorld& saved) {
   for (std::vector<WorldBody*>& group : groups) w.addBatch(std::move(group));
   w.obstacles.clear();
   for (const auto& obstacle : saved.obstacles) w.obstacles.push_back(std::make_shared<WorldObstacle>(*obstacle));
+  w.makeInstrumentBodies();
   w.listFibres();
   w.undo.clear();
   w.report = StepReport();
@@ -567,7 +601,10 @@ std::uint64_t World::stateHash() const {
   const auto placeOf = [&](std::uint64_t key) {
     const auto body =
         std::find_if(saved->bodies.begin(), saved->bodies.end(), [&](const SavedBody& b) { return b.number == key; });
-    return body == saved->bodies.end() ? key : static_cast<std::uint64_t>(body - saved->bodies.begin());
+    if (body != saved->bodies.end()) return static_cast<std::uint64_t>(body - saved->bodies.begin());
+    for (std::size_t n = 0; n < saved->instruments.size(); ++n)
+      if (kInstrumentKey + saved->instruments[n].number == key) return kInstrumentKey + n;
+    return key;
   };
   SurfaceMemory surfaces = saved->surface_contacts;
   for (KeptPair& pair : surfaces.pairs) {
@@ -606,6 +643,10 @@ std::uint64_t World::stateHash() const {
     archive(attachment);
   }
   archive(saved->used_attachments);
+  for (Instrument instrument : saved->instruments) {
+    instrument.number = 0;
+    archive(instrument);
+  }
   for (ClosingCut cut : saved->closing) {
     cut.ticket = 0;
     archive(cut);

@@ -11,7 +11,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kStateVersion = 26;
+constexpr std::uint32_t kStateVersion = 27;
 
 inline std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(
@@ -247,6 +247,17 @@ MESHLESS_ARCHIVE(DetachCommand, name, region)
 MESHLESS_ARCHIVE(ClipCommand, name, body, point, direction, width, opening)
 MESHLESS_ARCHIVE(PushSphere, enabled, radius, position, target, speed, streamed, touching, force)
 MESHLESS_ARCHIVE(Scissors, shown, blades, angle)
+template <class A>
+void serialize(A& archive, InstrumentDef& v) {
+  auto& [name, type, pose, shaft_radius, shaft_length, jaw_length, jaw_width, jaw_thickness, friction, stiffness,
+         damping, angular_stiffness, angular_damping, max_force, max_torque, max_speed, grip, remote_centre, color] = v;
+  archive(name, choice(type, InstrumentType::kHook), pose, shaft_radius, shaft_length, jaw_length, jaw_width,
+          jaw_thickness, friction, stiffness, damping, angular_stiffness, angular_damping, max_force, max_torque,
+          max_speed, grip, remote_centre, color);
+}
+MESHLESS_ARCHIVE(InstrumentLoad, force, torque, jaw, mass, inertia, jaw_inertia)
+MESHLESS_ARCHIVE(Instrument, def, number, target, jaw_target, hand, jaw_hand, pose, jaw, velocity, spin, jaw_rate, jaw_stop, answers, load,
+                 force, torque, jaw_torque, holds, gripped, closed_to, lost_for)
 MESHLESS_ARCHIVE(CutCommand, blades, close_time, roughness, bodies)
 MESHLESS_ARCHIVE(ClosingCut, ticket, command, done_at, start_angle, started_at)
 

@@ -74,6 +74,12 @@ const char* toString(EventType type) {
       return "material";
     case EventType::kClampMoved:
       return "clamp moved";
+    case EventType::kInstrument:
+      return "instrument";
+    case EventType::kGrasped:
+      return "grasped";
+    case EventType::kDropped:
+      return "dropped";
   }
   return "unknown";
 }
@@ -273,6 +279,8 @@ void World::reset() {
   w.undo.clear();
   w.push = PushSphere();
   w.scissors = Scissors();
+  w.instruments.clear();
+  w.instrument_bodies.clear();
   w.step = 0;
   w.report = StepReport();
   ++w.run;
@@ -280,6 +288,9 @@ void World::reset() {
   for (const auto& body : w.scene) w.admit(body->def.name, body->def.material, body->model, body->state);
   for (const AttachCommand& attachment : w.scene_attachments)
     if (const auto made = w.attach(attachment); !made) w.say(EventType::kFault, "", 0, made.error().detail);
+  for (const InstrumentDef& def : w.scene_instruments)
+    if (const auto made = w.apply(AttachInstrumentCommand{def}); !made)
+      w.say(EventType::kFault, "", 0, made.error().detail);
 }
 
 WorldSnapshot World::snapshot(const SnapshotWants& wants) {
@@ -319,6 +330,8 @@ WorldSnapshot World::snapshot(const SnapshotWants& wants) {
   w.showAttachments(wants, shot.attachments);
   shot.push = w.push;
   shot.scissors = w.scissors;
+  shot.instruments = w.instruments;
+  for (const auto& body : w.instrument_bodies) shot.instrument_shapes.push_back(body->shape);
   shot.report = w.report;
   return shot;
 }

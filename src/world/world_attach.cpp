@@ -19,7 +19,8 @@ namespace {
 
 constexpr double kFacing = -0.5;       // cosine: faces are joined that face each other by this or less
 constexpr double kLongFace = 2.0;      // edges of contact: longer faces are divided
-constexpr int kMostParts = 100;        // of a face's edge
+constexpr double kMostParts = 100.0;   // of a face's edge
+constexpr double kMostSamples = 2e5;   // of faces that are divided
 constexpr std::size_t kLongName = 90;  // of a name that is chosen, at most
 constexpr std::size_t kMostNamed = 5;  // patches
 
@@ -183,11 +184,18 @@ Result<AttachReply> World::Impl::attach(const AttachCommand& command) {
     part.area += area.norm();
     part.faces.push_back({face, area.norm() * shares});
   };
-  for (Index face = 0; face < of_a.surface->triangles.size(); ++face) {
+  std::vector<double> divided(of_a.surface->triangles.size());  // parts of an edge of each face
+  double all = 0.0;
+  for (Index face = 0; face < divided.size(); ++face) {
     double longest = 0.0;
     for (int k = 0; k < 3; ++k)
       longest = std::max(longest, (of_a.corner(face, (k + 1) % 3) - of_a.corner(face, k)).norm());
-    const int n = static_cast<int>(std::clamp(std::ceil(longest / (kLongFace * edge)), 1.0, double(kMostParts)));
+    divided[face] = std::clamp(std::ceil(longest / (kLongFace * edge)), 1.0, kMostParts);
+    all += divided[face] * divided[face];
+  }
+  const double fewer = std::min(1.0, std::sqrt(kMostSamples / all));
+  for (Index face = 0; face < divided.size(); ++face) {
+    const int n = static_cast<int>(std::max(1.0, fewer * divided[face]));
     const Vec3 area = of_a.areaOf(face) / (n * n);
     eachPart(n, [&](const Vec3& shares) { addSample(face, shares, area); });
   }

@@ -14,6 +14,7 @@ constexpr double kEntryTime = 0.1;   // [s] for a radius, in which the push sphe
 constexpr double kEntrySpeed = 5.0;  // [m/s] at most: no hand is faster
 constexpr double kTouches = 1e-3;    // radii: so deep it does not need a way in
 constexpr int kMostWays = 20;        // between folds
+constexpr double kFarthestTarget = 1e6;  // [m] along each axis
 
 struct Grabbed {
   WorldBody* body = nullptr;
@@ -44,6 +45,13 @@ TissuePlace placeAt(const WorldBody& body, Index triangle, const Vec3& point) {
 double distanceToRay(const Vec3& p, const Vec3& origin, const Vec3& unit) {
   const double along = std::max(0.0, unit.dot(p - origin));
   return (p - origin - along * unit).norm();
+}
+
+Status checkTarget(const Vec3& target) {
+  if (!target.allFinite()) return notFinite("target");
+  const double farthest = target.cwiseAbs().maxCoeff();
+  if (!(farthest <= kFarthestTarget)) return outOfRange("a coordinate of target", farthest, "up to 1e6 m");
+  return Done{};
 }
 
 Error noPick(PickId id, const std::vector<Pick>& picks) {
@@ -137,7 +145,7 @@ Result<Reply> World::Impl::apply(const PickCommand& command) {
 }
 
 Result<Reply> World::Impl::apply(const MovePickCommand& command) {
-  if (!command.target.allFinite()) return notFinite("target");
+  if (const Status there = checkTarget(command.target); !there) return there.error();
   Pick* pick = findPick(command.pick);
   if (!pick) return noPick(command.pick, picks);
   const bool there = pick->target == command.target;  // a stream says over and over where it is
@@ -148,7 +156,8 @@ Result<Reply> World::Impl::apply(const MovePickCommand& command) {
 }
 
 Result<Reply> World::Impl::apply(const LockCommand& command) {
-  if (command.target && !command.target->allFinite()) return notFinite("target");
+  if (command.target)
+    if (const Status there = checkTarget(*command.target); !there) return there.error();
   Pick* pick = findPick(command.pick);
   if (!pick) return noPick(command.pick, picks);
   const bool moved = command.target && *command.target != pick->target;

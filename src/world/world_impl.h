@@ -11,6 +11,7 @@
 #include "meshless_surgery/contact/textbook.h"
 #include "meshless_surgery/dynamics/match_batch.h"
 #include "meshless_surgery/world/world.h"
+#include "instrument_body.h"
 #include "shown_surface.h"
 #include "surface_model.h"
 
@@ -118,6 +119,8 @@ struct ClosingCut {
 
 /// What contact calls obstacles: the first has this key, beyond the numbers of bodies.
 inline constexpr std::uint64_t kObstacleKey = std::uint64_t{1} << 40;
+/// Likewise with the number of an instrument.
+inline constexpr std::uint64_t kInstrumentKey = std::uint64_t{1} << 41;
 
 /// A loop on so many threads.
 ForEach makeForEach(int threads);
@@ -177,6 +180,9 @@ struct KeptWorld {
   std::vector<AttachCommand> scene_attachments;
   PushSphere push;
   Scissors scissors;
+  std::vector<Instrument> instruments;
+  std::uint32_t next_instrument = 1;
+  std::vector<InstrumentDef> scene_instruments;
   std::vector<ClosingCut> closing;
   std::uint32_t next_ticket = 1;
   std::uint32_t next_sleep_group = 1;
@@ -197,6 +203,7 @@ struct World::Impl : KeptWorld {
   std::uint32_t run = 1;
   std::vector<std::unique_ptr<WorldBody>> bodies;  // in the order in which they came
   std::vector<std::shared_ptr<WorldObstacle>> obstacles;
+  std::vector<std::shared_ptr<InstrumentBody>> instrument_bodies;  // one each of instruments
   struct AttachedFibre {
     Fibre* fibre = nullptr;
     double stiffness = 0.0;     // [N/m]
@@ -228,7 +235,7 @@ struct World::Impl : KeptWorld {
   bool contacts_current = false;                // bodies are those of the last step
   SurfaceContacts surface_contacts;
   SurfaceScene surface_scene;       // of this step
-  std::vector<Collider> colliders;  // bodies in their order, then obstacles
+  std::vector<Collider> colliders;  // bodies in their order, then obstacles, then instruments
   std::vector<SurfaceWork> surface_work;
   std::size_t work_count = 0;       // of it in use
   std::vector<WorldBody*> members;  // of an island: in stepSurfaces()
@@ -266,6 +273,9 @@ struct World::Impl : KeptWorld {
   Result<Reply> apply(const DetachCommand& command);
   Result<Reply> apply(const ClipCommand& command);
   Result<Reply> apply(const MoveClampCommand& command);
+  Result<Reply> apply(const AttachInstrumentCommand& command);
+  Result<Reply> apply(const DetachInstrumentCommand& command);
+  Result<Reply> apply(const LeadInstrumentCommand& command);
   /// What the command would change, or why it is refused.
   Result<std::vector<MaterialChange>> changesOf(const SetMaterialCommand& command) const;
   std::string letGo(const Pick& pick);  // one of picks; the name of its body
@@ -329,6 +339,28 @@ struct World::Impl : KeptWorld {
   void recordReset() const;
   void recordState(const SavedWorld& saved) const;
 
+  // instruments
+  Instrument* findInstrument(const std::string& name);
+  std::string knownInstruments() const;
+  void makeInstrumentBodies();
+  /// Else an instrument is in the tissue, or it is in one (kInvalidArgument).
+  Status liesApart(const Points& tissue, const BodyModel& model, const std::string& name) const;
+  static Status liesApart(const InstrumentBody& instrument, const std::string& instrument_name, const Points& tissue,
+                          const Box& bounds, const BodyModel& model, const std::string& name);
+  std::vector<WorldBody*> sleepersAt(std::size_t n);  // that press on an instrument
+  bool wakeInHands();
+  void leadInstruments(double h_frame);
+  /// Of a search for h [s], with h_left of the frame to come.
+  void fillInstrumentCollider(std::size_t n, double h, double h_left, Collider& collider);
+  /// The next of so many substeps of h [s] that are left in the frame.
+  void advanceInstrument(Index collider, double h, int left);
+  /// What an island presses on it after a substep of h [s], which is that share of the frame.
+  void feelInstrument(Index island, Index collider, double h, double share);
+  void forgetLoad(std::size_t n);
+  bool anyInstrumentGoes() const;
+  void stepFreeInstruments(double h, int parts, int parts_left);
+  void finishInstruments(double h_frame);
+
   // stages of a step
   void listAwake();
   void groupBatches();
@@ -361,9 +393,9 @@ struct World::Impl : KeptWorld {
   const SurfaceModel& surfaceModel(WorldBody& body);
   static void measureSurface(WorldBody& body);
   static void fillCollider(WorldBody& body, double h_frame, Collider& collider);
-  void findNear(double h);
+  void findNear(double h, int parts_left = 1);
   int searchesOf(double h_frame);
-  void findSurfaceContacts(double h);
+  void findSurfaceContacts(double h, int parts_left);
   Vec3 pushWay(double h_frame) const;                    // [m] of the push sphere in a frame
   std::vector<std::pair<double, std::size_t>> stiffest;  // of an island: less the substeps that a body needs, and which
   void saySlowed(const WorldBody& body, int given, bool by_most, double factor);

@@ -57,6 +57,7 @@ Status World::Impl::eachAround(const Box& box, const Check& check) {
 }
 
 Status World::Impl::liesApart(const PreparedBody& body) {
+  if (Status apart = liesApart(body.state.surface, *body.model, body.def.name); !apart) return apart;
   if (settings.contact == ContactMethod::kNone || !body.model->solid) return Done{};
   const Solid one{"body '" + body.def.name + "'", body.state.surface, body.model->surface.triangles,
                   boundsOf(body.state.surface)};

@@ -90,11 +90,17 @@ void World::Impl::fallAsleep(double h_frame) {
   whole.assign(bodies.size(), 0);
   for (Index b = 0; b < bodies.size(); ++b) held[b] = bodies[b]->model->any_fixed;
   listLoaded();
+  std::vector<Index> in_hand(instruments.size(), kNoIndex), led;  // a body each; bodies in hands that move
   for (const auto& [a, b] : loaded) {
     if (a >= bodies.size()) continue;
-    if (b >= bodies.size())  // the ground, or an obstacle
+    if (b >= bodies.size()) {  // the ground, an obstacle, or an instrument: whoever it touches moves with it
       held[a] = 1;
-    else
+      if (b == kNoIndex || b < bodies.size() + obstacles.size()) continue;
+      const std::size_t n = b - bodies.size() - obstacles.size();
+      if (!instrument_bodies[n]->still) led.push_back(a);
+      if (in_hand[n] != kNoIndex) joined.join(a, in_hand[n]);
+      in_hand[n] = a;
+    } else
       joined.join(a, b);
   }
   for (const AttachedFibre& fibre : attached.all) {
@@ -113,6 +119,7 @@ void World::Impl::fallAsleep(double h_frame) {
     whole[r] |= !isCrumb(*bodies[b]);
     size[r] = std::max(size[r], sizeOf(bodies[b]->bounds));
   }
+  for (const Index b : led) ready[joined.find(b)] = 0;
   const double gravity = settings.gravity.norm();
   for (Index b = 0; b < bodies.size(); ++b) {
     WorldBody& body = *bodies[b];

@@ -40,6 +40,7 @@ void World::Impl::takeStep() {
   const double h_frame = 1.0 / settings.step_rate;
   closeBlades();
   wakePushed(h_frame);
+  leadInstruments(h_frame);
   closeClips(h_frame);
   listFibres();
   wakeAttached();
@@ -48,21 +49,23 @@ void World::Impl::takeStep() {
   groupBatches();
   clearForces();
   int parts = 1;
-  if (!awake.empty()) {
+  const bool touches = !awake.empty() || anyInstrumentGoes();
+  if (touches) {
     const Stopwatch contact(report.contact);
     findNear(h_frame);
     parts = searchesOf(h_frame);
   }
   const double h = h_frame / parts;
   for (int part = 0; part < parts; ++part) {
-    if (!awake.empty()) {
+    if (touches) {
       {
         const Stopwatch contact(report.contact);
-        if (parts > 1) findNear(h);
-        findSurfaceContacts(h);
+        if (parts > 1) findNear(h, parts - part);
+        findSurfaceContacts(h, parts - part);
       }
       stepSurfaces(h, parts, parts - part);
     }
+    stepFreeInstruments(h, parts, parts - part);
     if (push.enabled) push.position += pushWay(h);
     // A target that jumps is followed evenly over the frame.
     for (Pick& pick : picks) pick.reached += (pick.target - pick.reached) / (parts - part);
@@ -93,6 +96,7 @@ void World::Impl::finishStep(double h_frame) {
   findCollapsed();
   for (Pick& pick : picks)
     if (const WorldBody* body = find(pick.body)) pick.position = graspMean(pick, body->state.positions);
+  finishInstruments(h_frame);
   fallAsleep(h_frame);
   contacts_current = !awake.empty() || contacts_current;
   ++step;

@@ -161,7 +161,7 @@ void World::Impl::measureSurface(WorldBody& body) {
   body.edge_length = std::max(body.edge_length, body.model->spacing);
 }
 
-void World::Impl::findNear(double h) {
+void World::Impl::findNear(double h, int parts_left) {
   SurfaceScene& scene = surface_scene;
   scene = SurfaceScene();
   scene.ground = settings.ground;
@@ -169,12 +169,14 @@ void World::Impl::findNear(double h) {
   scene.gravity = settings.gravity.norm();
   scene.h = h;
   if (push.enabled) scene.sphere = SurfaceScene::Sphere{push.position, pushWay(h), push.radius};
-  colliders.resize(bodies.size() + obstacles.size());
+  colliders.resize(bodies.size() + obstacles.size() + instruments.size());
   forNumbers(bodies.size(), [&](std::size_t b) {
     measureSurface(*bodies[b]);
     fillCollider(*bodies[b], h, colliders[b]);
   });
   for (std::size_t o = 0; o < obstacles.size(); ++o) colliders[bodies.size() + o] = colliderOf(*obstacles[o], o);
+  for (std::size_t n = 0; n < instruments.size(); ++n)
+    fillInstrumentCollider(n, h, parts_left * h, colliders[bodies.size() + obstacles.size() + n]);
   for (const Pick& pick : picks)
     for (std::size_t b = 0; b < bodies.size(); ++b)
       if (bodies[b]->id == pick.body) colliders[b].grasped = true;
@@ -225,13 +227,21 @@ void World::Impl::findTextbook(double h) {
 /// goes farther than that, so that who is thrown off its way is found by the next before it has passed what is thin.
 int World::Impl::searchesOf(double h_frame) {
   const auto edges = [h_frame](const WorldBody& body, double fastest) { return h_frame * fastest / body.edge_length; };
-  if (std::none_of(awake.begin(), awake.end(), [&](WorldBody* b) { return edges(*b, b->fastest) > kNearest; }))
-    return 1;
   const std::vector<char>& needed = surface_contacts.needed();
+  std::vector<double> led(instruments.size(), 0.0);  // [m] the farthest that a point of each goes, where it is near
+  bool slow = std::none_of(awake.begin(), awake.end(), [&](WorldBody* b) { return edges(*b, b->fastest) > kNearest; });
+  for (std::size_t n = 0; n < instruments.size(); ++n) {
+    if (instrument_bodies[n]->still || needed[bodies.size() + obstacles.size() + n] != SurfaceContacts::kNear) continue;
+    for (const Vec3& v : instrument_bodies[n]->velocities) led[n] = std::max(led[n], h_frame * v.norm());
+    slow = slow && !(led[n] > kNearest * instrument_bodies[n]->surface.edge_length);
+  }
+  if (slow) return 1;
   double thinnest = std::numeric_limits<double>::infinity();  // [m]
   for (std::size_t c = 0; c < needed.size(); ++c) {
     if (needed[c] != SurfaceContacts::kNear) continue;
-    if (c >= bodies.size())
+    if (c >= bodies.size() + obstacles.size())
+      thinnest = std::min(thinnest, instrument_bodies[c - bodies.size() - obstacles.size()]->shape->thickness);
+    else if (c >= bodies.size())
       thinnest = std::min(thinnest, obstacles[c - bodies.size()]->thickness);
     else if (const BodyModel& model = *bodies[c]->model; model.solid)
       thinnest = std::min(thinnest, 2.0 * model.rest_volume / model.rest_area);
@@ -249,11 +259,15 @@ int World::Impl::searchesOf(double h_frame) {
     const double farthest = std::clamp(0.5 * thinnest / body.edge_length, kNearest, kFarthest);
     most = std::max(most, edges(body, std::sqrt(fastest)) / farthest);
   }
+  for (std::size_t n = 0; n < instruments.size(); ++n) {
+    const double edge = instrument_bodies[n]->surface.edge_length;
+    most = std::max(most, led[n] / edge / std::clamp(0.5 * thinnest / edge, kNearest, kFarthest));
+  }
   return static_cast<int>(std::min(std::ceil(most), kMostSearches));
 }
 
 // Rows of those that are near. A body that is reached wakes, and then all is found again with its neighbours.
-void World::Impl::findSurfaceContacts(double h) {
+void World::Impl::findSurfaceContacts(double h, int parts_left) {
   SurfaceScene& scene = surface_scene;
   for (;;) {
     for (std::size_t b = 0; b < bodies.size(); ++b) {
@@ -275,9 +289,10 @@ void World::Impl::findSurfaceContacts(double h) {
       woken = woken || bodies[c]->asleep;
       wake(*bodies[c]);
     }
+    woken = wakeInHands() || woken;
     if (!woken) return;
     listAwake();
-    findNear(h);
+    findNear(h, parts_left);
   }
 }
 
@@ -565,8 +580,15 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
         member.springs[p].end = pick.reached + (substep + 1) * there / substeps;
         member.springs[p].impulse.setZero();
       }
+      const std::vector<Index>& led = surface_contacts.islands()[member.island].led;
+      for (const Index c : led) {
+        advanceInstrument(c, h, parts_left * substeps - substep);
+        const InstrumentBody& instrument = *instrument_bodies[c - bodies.size() - obstacles.size()];
+        surface_contacts.lead(c, instrument.before, instrument.positions);
+      }
       surface_contacts.solveIsland(member.island, step, substep, colliders, member.previous, member.springs,
                                    member.fibre_rows, work.solver_scratch, work.solver_counters, each);
+      for (const Index c : led) feelInstrument(member.island, c, h, 1.0 / (substeps * parts));
       for (std::size_t f = 0; f < member.fibres.size(); ++f)
         member.fibres[f]->tension += member.fibre_rows[f].impulse.norm() / (h * h * substeps * parts);
       for (std::size_t p = 0; p < member.picks.size(); ++p)

@@ -40,6 +40,14 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
   if (undo.empty())
     return Error{ErrorCode::kMissed, "there is no cut to undo; " + std::to_string(kMostUndone) +
                                          " are remembered, of the time since the start or the last reset"};
+  if (!instruments.empty())
+    for (const CutUndo::Body& was : undo.back().bodies) {
+      const bool comes = contains(undo.back().cut, was.name) || find(was.name) != nullptr;
+      BodyState then = was.state;
+      updateSurface(*was.model, then);
+      if (Status apart = comes ? liesApart(then.surface, *was.model, was.name) : Status(Done{}); !apart)
+        return apart.error();
+    }
   CutUndo before = std::move(undo.back());
   undo.pop_back();
 

@@ -44,6 +44,7 @@ const std::map<std::string, std::vector<std::string>> kMaps = {
     {"a body", {"{materials: {m: {alpha: 0.3}}, bodies: [{$ @}]}"}},
     {"an obstacle", {"{bodies: [], obstacles: [{@}]}"}},
     {"an attachment", {kTwoBodies + "attachments: [{@}]}"}},
+    {"an instrument", {"{bodies: [], instruments: {left: {@}}}"}},
     {"region", {kTwoBodies + "attachments: [{bodies: [a, b], stiffness: 1, distance: 1, region: {@}}]}"}},
     {"primitive", {"{bodies: [{$ primitive: {@}}]}"}},
     {"pose", {kBody + "pose: {@}}]}"}},
@@ -97,6 +98,7 @@ std::string spread(const Seen& seen, double jitter, double turn) {
   return text(used(moved, jitter), used(turned, turn));
 }
 
+const InstrumentDef& instrumentOf(const Seen& seen) { return seen.scene.instruments.at(0); }
 const AttachCommand& attachmentOf(const Seen& seen) { return seen.scene.attachments.at(0); }
 
 #define READ(...) [](const Seen& s) { return text(__VA_ARGS__); }
@@ -115,6 +117,32 @@ std::vector<Row> rows() {
       {"the scene",
        "attachments: [{bodies: [a, world], stiffness: 1}], bodies: [{name: a, primitive: {box: [1, 1, 1]}}]",
        "bodies: [{name: a, primitive: {box: [1, 1, 1]}}]", READ(s.scene.attachments.size()), "1"},
+      {"the scene", "instruments: {left: {type: probe}}, bodies: []", "bodies: []", READ(s.scene.instruments.size()),
+       "1"},
+
+      {"an instrument", "type: hook", "type: probe", READ(toString(instrumentOf(s).type)), "hook"},
+      {"an instrument", "pose: {position: [1, 2, 3]}, type: probe", "type: probe",
+       READ(instrumentOf(s).pose.translation), "1 2 3"},
+      {"an instrument", "remote_centre: [1, 2, 3], type: probe", "type: probe",
+       READ(instrumentOf(s).remote_centre.value_or(Vec3::Zero())), "1 2 3"},
+      {"an instrument", "shaft_radius: 0.004, type: grasper", "type: grasper", READ(instrumentOf(s).shaft_radius),
+       "0.004"},
+      {"an instrument", "shaft_length: 0.2, type: grasper", "type: grasper", READ(instrumentOf(s).shaft_length), "0.2"},
+      {"an instrument", "jaw_length: 0.02, type: grasper", "type: grasper", READ(instrumentOf(s).jaw_length), "0.02"},
+      {"an instrument", "jaw_width: 0.005, type: grasper", "type: grasper", READ(instrumentOf(s).jaw_width), "0.005"},
+      {"an instrument", "jaw_thickness: 0.003, type: grasper", "type: grasper", READ(instrumentOf(s).jaw_thickness),
+       "0.003"},
+      {"an instrument", "friction: 0.7, type: grasper", "type: grasper", READ(instrumentOf(s).friction), "0.7"},
+      {"an instrument", "stiffness: 3000, type: grasper", "type: grasper", READ(instrumentOf(s).stiffness), "3000"},
+      {"an instrument", "damping: 30, type: grasper", "type: grasper", READ(instrumentOf(s).damping), "30"},
+      {"an instrument", "angular_stiffness: 6, type: grasper", "type: grasper", READ(instrumentOf(s).angular_stiffness),
+       "6"},
+      {"an instrument", "angular_damping: 0.07, type: grasper", "type: grasper", READ(instrumentOf(s).angular_damping),
+       "0.07"},
+      {"an instrument", "max_force: 7, type: grasper", "type: grasper", READ(instrumentOf(s).max_force), "7"},
+      {"an instrument", "max_torque: 0.3, type: grasper", "type: grasper", READ(instrumentOf(s).max_torque), "0.3"},
+      {"an instrument", "max_speed: 0.8, type: grasper", "type: grasper", READ(instrumentOf(s).max_speed), "0.8"},
+      {"an instrument", "grip: 4, type: grasper", "type: grasper", READ(instrumentOf(s).grip), "4"},
 
       {"an attachment", "bodies: [b, a], stiffness: 1, distance: 1", "bodies: [a, b], stiffness: 1, distance: 1",
        READ(attachmentOf(s).body, attachmentOf(s).other), "b a"},

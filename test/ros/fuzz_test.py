@@ -264,6 +264,11 @@ class Fuzzer:
         if service == 'move_clamp':
             return dict(name=self.maybe_name(), clamp=r.choice([0, 0, 1, 7, 0xffffffff]), header=self.header(), shift=self.vector(),
                         turn=self.pose().pose.orientation, time=self.number())
+        if service == 'attach_instrument':
+            yaml = r.choice(['{type: grasper}', '{type: probe}', '{type: hook, max_force: %s}' % self.number(), '{type: %s}' % self.string()[:40], '[1]'])
+            return dict(name=r.choice(['left', 'right', 'push', self.string()[:60]]), yaml=yaml, pose=self.pose())
+        if service == 'detach_instrument':
+            return dict(name=r.choice(['left', 'right', self.string()[:60]]))
         if service == 'probe':
             return dict(header=self.header(), point=self.point(),
                         direction=Vector3(0, 0, -1) if self.sensible else self.vector())

@@ -33,6 +33,9 @@ YOUNGS = {'sags': 2e4, 'stiff': 1e5, 'full': 2e4}  # [Pa] of those that are elas
 # [kg]
 MASSES = {name: (1200 if name in ('flat', 'leans', 'falls', 'hangs') else 1000) * numpy.prod(size) for name, size in SIZES.items()}
 HELD_COLOR = 0x1a66ff
+# graspers_test.py has their laws.
+OF_GRASPERS = {'InstrumentState': ('name', 'type', 'pose', 'jaw', 'force', 'torque', 'holds', 'grip'), 'State': ('instruments',),
+               'Event': ('instrument', 'force')}
 held = set()  # (message, field) that a law holds for a value that is not the one of an empty message
 
 
@@ -794,6 +797,7 @@ class EveryFieldTest(unittest.TestCase):
         names = [os.path.basename(path)[:-4] for path in glob.glob(os.path.join(HERE, '..', '..', 'msg', '*.msg'))]
         self.assertGreater(len(names), 5)
         kinds = [getattr(meshless_surgery.msg, name) for name in names if name not in OF_REVIEW] + [GetBodyResponse]
+        held.update(('meshless_surgery/' + kind, field) for kind, fields in OF_GRASPERS.items() for field in fields)
         self.assertEqual([], sorted('%s.%s' % (k._type, f) for k in kinds for f in k.__slots__ if (k._type, f) not in held))
 
 

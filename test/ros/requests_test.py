@@ -315,6 +315,22 @@ def middle_x(test, answer):
     return answer.middle.x
 
 
+PROBE = dict(name='probe', yaml='{type: probe}', pose=pose_stamped(0.3, 0.2, 0.5))
+
+
+def instruments(test, answer):
+    return [instrument.name for instrument in test.state().instruments]
+
+
+def tip(test, answer):
+    return tuple(xyz(test.state().instruments[0].pose.position))
+
+
+def probing(test):
+    test.good('attach_instrument', **PROBE)
+    return {}
+
+
 def lowest_left(test, answer):
     return heights_of_held(test, -1)[0]
 
@@ -564,6 +580,10 @@ LAWS = [
         within(3.0499, 3.0501)),
     Law('move_clamp', 'time', 1.0, dict(name='held', shift=Vector3(0, 0, 0.02)), lowest_left, within(2.9501, 2.951),
         within(2.9699, 2.9701)),
+    Law('attach_instrument', 'name', 'probe', PROBE, instruments, ['probe'], Refusal(INVALID)),
+    Law('attach_instrument', 'yaml', '{type: probe}', PROBE, instruments, ['probe'], Refusal(INVALID)),
+    Law('attach_instrument', 'pose', PROBE['pose'], PROBE, tip, (0.3, 0.2, 0.5), (0.0, 0.0, 0.0)),
+    Law('detach_instrument', 'name', 'probe', probing, instruments, [], Refusal(UNKNOWN)),
     Law('set_material', 'body', 'left', dict(yaml='{density: 3000}'), masses, (3.0, 1.0), (3.0, 3.0)),
     Law('set_material', 'yaml', '{density: 3000}', dict(body='left'), masses, (3.0, 1.0), Refusal(INVALID)),
     Law('get_body', 'name', 'right', {}, lowest_x, 0.15, Refusal(UNKNOWN)),
@@ -617,6 +637,7 @@ FRAMED = {
     'move_pick': dict(header=Header(), target=Point(-0.31, 0.05, 0.17)),
     'lock': dict(header=Header(), target=Point(-0.31, 0.05, 0.17), at_target=True),
     'move_clamp': dict(header=Header(), name='held', clamp=1, shift=Vector3(0.011, 0.002, -0.007), turn=Quaternion(*TURNED), time=0.02),
+    'attach_instrument': dict(PROBE, pose=pose_stamped(0.01, 0.02, 0.5, TURNED)),
     'get_load': dict(header=Header(), name='left', points=[Point(-0.231, 0.013, 0.117), Point(-0.152, -0.021, 0.081)]),
     'probe': dict(header=Header(), point=Point(-0.61, 0.013, -0.11), direction=Vector3(2.03, 0.02, 1.01)),
     'push': dict(enable=True, radius=0.05, pose=pose_stamped(-0.27, 0.013, 0.11, TURNED)),
@@ -624,7 +645,7 @@ FRAMED = {
                   pose=pose_stamped(0.01, 0.02, 0.3, TURNED)),
     'spawn_cloud': dict(cloud=cloud_of(ball())),
 }
-UNTURNED = {'cut': ('blades', (-0.3, 0.012, 0.093)), 'incise': ('blade', (-0.23, -0.021, 0.1)), 'push': ('pose', (-0.27, 0.013, 0.11)),
+UNTURNED = {'attach_instrument': ('pose', (0.01, 0.02, 0.5)), 'cut': ('blades', (-0.3, 0.012, 0.093)), 'incise': ('blade', (-0.23, -0.021, 0.1)), 'push': ('pose', (-0.27, 0.013, 0.11)),
             'spawn': ('pose', (0.01, 0.02, 0.3))}
 NEEDS_A_PICK = ('move_pick', 'lock')
 STREAMS = {'pick/servo_cp': pose_stamped(-0.31, 0.05, 0.17, TURNED), 'push/servo_cp': pose_stamped(-0.2705, 0.013, 0.11, TURNED),
@@ -686,7 +707,7 @@ class Asked(InStepTestCase):
     def snapshot(self):
         state = self.state()
         surfaces = [self.good('get_body', name=body.name).surface.vertices for body in state.bodies]
-        return leaves([state.bodies, state.picks, surfaces])
+        return leaves([state.bodies, state.picks, state.instruments, surfaces])
 
     def assert_same(self, wanted, found, most=1e-9):
         self.assertEqual(len(wanted), len(found))
@@ -732,7 +753,9 @@ class RequestsTest(Asked):
                 self.assertFalse(has_header(kind) and field not in FRAMED[service], '%s of %s' % (field, name))
         self.assertEqual(wanted, fields)
         self.assertEqual({'actions/' + name for name in ACTIONS}, {name for name in requests() if '/' in name})
-        # And what the node has, it has from there.
+        # And what the node has, it has from there; topics of instruments go with them.
+        self.fresh()
+        self.until(lambda state: not any('probe/' in name for name, _ in rosgraph.Master('/requests').getSystemState()[1]), 'probe')
         _, subscribed, offered = rosgraph.Master('/requests').getSystemState()
         own = self.node + '/'
 

@@ -15,7 +15,7 @@ int firstRun() {
 
 constexpr int kRun = 300;  // steps before the scene starts anew: cuts make more and more of it
 
-static_assert(std::variant_size_v<Command> == 19, "a new command has a case here, too");
+static_assert(std::variant_size_v<Command> == 22, "a new command has a case here, too");
 
 Command randomCommand(test::Random& random, int number, std::size_t bodies) {
   // Now and then a number that no hand gives.
@@ -25,11 +25,15 @@ Command randomCommand(test::Random& random, int number, std::size_t bodies) {
   const auto place = [&] { return random.integer(0, 50) ? random.vector(0.6) : random.vector(size()); };
   const auto pick = [&] { return static_cast<PickId>(random.integer(1, 12)); };
   const auto body = [&] { return "body" + std::to_string(random.integer(0, static_cast<int>(bodies) - 1)); };
+  const auto tool = [&] { return "tool" + std::to_string(random.integer(0, 2)); };
+  const auto hand = [&] {
+    return Pose{Quat(Eigen::AngleAxisd(random.uniform(-3.0, 3.0), random.unit())), place()};
+  };
   const auto part = [&]() -> std::optional<Region> {
     if (random.integer(0, 1)) return std::nullopt;
     return Region::sphere(place(), size());
   };
-  switch (random.integer(0, 19)) {
+  switch (random.integer(0, 24)) {
     case 0: {
       PickCommand command;
       command.point = place();
@@ -132,6 +136,26 @@ Command randomCommand(test::Random& random, int number, std::size_t bodies) {
       command.shift = random.integer(0, 3) ? random.vector(0.1) : random.vector(size());
       command.turn = Quat(Eigen::AngleAxisd(random.uniform(-3.0, 3.0), random.unit()));
       command.time = random.integer(0, 1) ? random.uniform(0.0, 1.0) : 0.0;
+      return command;
+    }
+    case 20: {
+      AttachInstrumentCommand command;
+      command.def.name = tool();
+      command.def.type = static_cast<InstrumentType>(random.integer(0, 2));
+      command.def.pose = hand();
+      if (random.integer(0, 3) == 0) command.def.remote_centre = place();
+      if (random.integer(0, 3) == 0) command.def.max_force = size();
+      return command;
+    }
+    case 21:
+      return DetachInstrumentCommand{tool()};
+    case 22:
+    case 23:
+    case 24: {
+      LeadInstrumentCommand command;
+      command.name = tool();
+      if (random.integer(0, 3)) command.pose = hand();
+      if (random.integer(0, 1)) command.jaw = random.uniform(-0.1, 1.7);
       return command;
     }
     default:

@@ -109,6 +109,13 @@ TEST(Counted, WhatNoHandDoesIsSaidAndDoesNotPass) {
          command.shift = Vec3(0, 0, 0.01);
          s.apply<MoveClampReply>(command);
        }},
+      {Intervention::kInstrument,
+       [](Session& s) {
+         AttachInstrumentCommand command;
+         command.def.name = "left";
+         command.def.pose.translation = Vec3(0, 0, 5);
+         s.apply<Done>(command);
+       }},
   };
   for (const auto& [intervention, act] : all)
     for (const bool allowed : {false, true}) {

@@ -119,8 +119,18 @@ inline Session session(bool ended = true, int threads = 1) {
   MoveClampCommand lead;
   lead.body = "ball";
   apply(lead, false);  // nothing holds it
+  AttachInstrumentCommand probe;
+  probe.def.name = "probe";
+  probe.def.pose.translation = Vec3(-1, -1, 1);
+  apply(probe);
+  apply(probe, false);  // there is one
+  LeadInstrumentCommand hand;
+  hand.name = "probe";
+  hand.pose = Pose{Quat::Identity(), Vec3(-1, -1, 1.1)};
+  apply(hand);
   run(world, 5);
   apply(DetachCommand{"joint", {}});
+  apply(DetachInstrumentCommand{"probe"});
   LiftCommand lift;
   lift.tool = ToolKind::kPush;
   apply(lift);

@@ -131,6 +131,13 @@ SetMaterialCommand material(const std::string& body, double density) {
   return set;
 }
 
+InstrumentDef probeAt(const Vec3& place) {
+  InstrumentDef def;
+  def.name = "probe";
+  def.pose = {Quat(Eigen::AngleAxisd(0.5 * M_PI, Vec3::UnitY())), place};
+  return def;
+}
+
 const Names kTower{"low", "high"}, kHeld{"under", "held"}, kBeneath{"base", "pressed"};
 const Names kAll{"low", "high", "under", "held", "base", "pressed", "alone"};
 
@@ -215,7 +222,21 @@ std::vector<Row> rows(const Kind& kind, const Vec3& pressed) {
       {"detach when all sleep again", DetachCommand{"low-high", {}}, kTower, {joined}, 1, false, true},
       {"detach of nothing", DetachCommand{"low-high", {}}, {}, {}, 1, true},
       {"clip of what is not hollow", clip, {}, {}, 1, true},
-      {"clamp of what is free", MoveClampCommand{"low", 0, Vec3(0.01, 0.0, 0.0), Quat::Identity(), 1.0}, {}, {}, 1, true},
+      {"clamp of what is free",
+       MoveClampCommand{"low", 0, Vec3(0.01, 0.0, 0.0), Quat::Identity(), 1.0},
+       {},
+       {},
+       1,
+       true},
+      {"instrument into the air", AttachInstrumentCommand{probeAt(Vec3(0, 0, 1.0))}, {}, {}, 5},
+      {"instrument into tissue", AttachInstrumentCommand{probeAt(Vec3(0, 0, 0.5 * kEdge))}, {}, {}, 1, true},
+      {"instrument led into the air",
+       LeadInstrumentCommand{"probe", probeAt(Vec3(0, 0, 0.9)).pose, {}},
+       {},
+       {AttachInstrumentCommand{probeAt(Vec3(0, 0, 1.0))}},
+       20},
+      {"instrument of no name", DetachInstrumentCommand{"probe"}, {}, {}, 1, true},
+      {"instrument led by no name", LeadInstrumentCommand{"probe", {}, {}}, {}, {}, 1, true},
       {"removal from below", RemoveCommand{"low"}, {"high"}},
       {"removal from above", RemoveCommand{"high"}, {"low"}},
       {"removal of what is picked", RemoveCommand{"held"}, {"under"}},

@@ -26,13 +26,14 @@ struct Collider {
   // [m] now, one a vertex of the surface, for those that moved() says; null: they are where their supports put them
   const Vec3* vertices = nullptr;
   Vec3* positions = nullptr;               // [m] one a particle
-  const Vec3* velocities = nullptr;        // [m/s]; null: of an obstacle
+  const Vec3* velocities = nullptr;        // [m/s]; null: of what does not move
   const double* inverse_masses = nullptr;  // [1/kg] 0: held
   Index particles = 0;
   double friction = 0.5;
   double restitution = 0.0;  // 0..1
   PairSearch::Self self = PairSearch::Self::kNo;
   bool obstacle = false;  // friction and position alone
+  bool led = false;       // an obstacle that is moved from substep to substep by lead()
   bool moves = true;      // false: asleep, or an obstacle; its arrays are not written
   bool held = false;      // some of its particles are
   bool grasped = false;   // a spring pulls it
@@ -80,6 +81,7 @@ class SurfaceContacts {
 
   struct Island {
     std::vector<Index> bodies;
+    std::vector<Index> led;  // that these may meet, and no other island does
     std::vector<SolverRows> rows;
     bool held = false;    // some of it, or by others
     bool joined = false;  // by fibres
@@ -87,9 +89,36 @@ class SurfaceContacts {
   /// Each collider that moves is in one; in the order of their first bodies.
   const std::vector<Island>& islands() const { return islands_; }
 
-  /// Of the answer of a collider to rows and springs in this frame, the part 0..1 that moves it as a rigid body, and one
-  /// that is held not at all. None where it is not said.
+  /// Of the answer of a collider to rows and springs in this frame, the part 0..1 that moves it as a rigid body, and
+  /// one that is held not at all. None where it is not said.
   void setRigidShare(Index collider, double share);
+  /// Keys of those that press on a collider, and of those that sleep, as they did last.
+  std::vector<std::uint64_t> loadedBy(std::uint64_t key) const;
+  /// Where what is led is [m] before and after the next substep, one a vertex.
+  void lead(Index collider, const Points& before, const Points& now);
+  /// Of a row that bears load, what is on one side of it.
+  struct RowSide {
+    Index collider = 0;
+    const RowEntry *begin = nullptr, *end = nullptr;
+  };
+  /// visit(row, side of what is led, side of what it presses, [kg] the mass of this): after solveIsland().
+  template <class Visit>
+  void eachOnLed(Index island, Index collider, const Visit& visit) const {
+    for (const SolverRows& rows : islands_[island].rows) {
+      if ((rows.a != collider && rows.b != collider) || rows.b == kNoIndex) continue;
+      const RowEntry* const entries = rows.set->entries.data();
+      for (const ContactRow& row : rows.set->rows) {
+        if (row.impulse.isZero(0.0)) continue;
+        RowSide led{rows.a, entries + row.begin, entries + row.middle};
+        RowSide other{rows.b, entries + row.middle, entries + row.end};
+        if (rows.b == collider) std::swap(led, other);
+        double answer = 0.0;  // [1/kg]
+        for (const RowEntry* at = other.begin; at != other.end; ++at)
+          answer += at->coefficient * at->coefficient * solver_bodies_[other.collider].now[at->particle].inverse_mass;
+        visit(row, led, other, answer > 0.0 ? 1.0 / answer : 0.0);
+      }
+    }
+  }
   /// After the bodies of an island have moved by a substep, the number-th of the frame. previous: [m] at its start, one
   /// a particle of each body of the island. step.warm and step.number are set here. colliders: as find() got them.
   void solveIsland(Index island, SolverStep step, int number, const std::vector<Collider>& colliders,

@@ -27,6 +27,7 @@ namespace meshless {
 ///   NAME_1,
 ///                 NAME_2 ..., in cells of a grid (x first) `offset` apart, each moved by up to `jitter` [m] along
 ///                 every axis and turned by up to `turn` [rad] about any, by a generator that `seed` starts
+/// instruments: {NAME: {type: probe | grasper | hook, pose, max_force, grip, friction, remote_centre, ...}}
 /// attachments: a list of {bodies: [name, name], distance, stiffness, strength, region: {box | plane | sphere}, name};
 ///              one of the names may be an obstacle's or `world`
 Result<SceneDef> readScene(const std::string& file, const FileAccess& access);
@@ -40,6 +41,9 @@ Result<std::map<std::string, Material>> readMaterials(const std::string& folder)
 /// material has no use for, as it is elastic or not.
 Result<Material> changeMaterial(const Material& base, const std::string& yaml, ImageFiles& images,
                                 const std::string& folder, std::vector<std::string>& warnings);
+
+/// Of an entry of `instruments`: a YAML map {type: grasper, max_force: N, ...}.
+Result<InstrumentDef> readInstrument(const std::string& name, const std::string& yaml);
 
 /// `empty`, or a YAML map {pressure: Pa}, {volume: ml, compliance: ml/Pa}, with leak: s. An empty text: empty.
 Result<CavityFill> readCavityFill(const std::string& yaml);

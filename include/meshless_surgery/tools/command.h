@@ -11,6 +11,7 @@
 #include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/geometry/query/blade.h"
 #include "meshless_surgery/geometry/query/region.h"
+#include "meshless_surgery/tools/instrument.h"
 
 namespace meshless {
 
@@ -126,10 +127,25 @@ struct MoveClampCommand {
   double time = 0.0;             // [s] 0..kMaxClampTime that it takes; less than a step is one
 };
 
+/// Takes an instrument into the scene, outside of tissue.
+struct AttachInstrumentCommand {
+  InstrumentDef def;
+};
+struct DetachInstrumentCommand {
+  std::string name;
+};
+/// Where the hand of an instrument is wanted.
+struct LeadInstrumentCommand {
+  std::string name;
+  std::optional<Pose> pose;   // of the tip
+  std::optional<double> jaw;  // [rad] 0..kWidestJaw
+};
+
 using Command =
     std::variant<PickCommand, MovePickCommand, LockCommand, ReleaseCommand, ClearPicksCommand, PushCommand, CutCommand,
                  OpenScissorsCommand, InciseCommand, SetMaterialCommand, SpawnCommand, RemoveCommand, LiftCommand,
-                 UndoCutCommand, OpenBladesCommand, AttachCommand, DetachCommand, ClipCommand, MoveClampCommand>;
+                 UndoCutCommand, OpenBladesCommand, AttachCommand, DetachCommand, ClipCommand, MoveClampCommand,
+                 AttachInstrumentCommand, DetachInstrumentCommand, LeadInstrumentCommand>;
 
 struct PickReply {
   PickId pick = 0;

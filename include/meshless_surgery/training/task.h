@@ -92,8 +92,8 @@ struct TaskLimits {
 };
 
 /// What no hand of a trainee does. Where a task does not allow it, who has done it is not counted.
-enum class Intervention { kUndo, kPause, kSlow, kLoad, kRemove, kDetach, kAttach, kSpawn, kMaterial, kMoveClamp };
-constexpr std::size_t kInterventions = 10;
+enum class Intervention { kUndo, kPause, kSlow, kLoad, kRemove, kDetach, kAttach, kSpawn, kMaterial, kMoveClamp, kInstrument };
+constexpr std::size_t kInterventions = 11;
 const char* toString(Intervention intervention);
 
 /// A metric that counts: full marks at `good`, none at `bad`, even in between.

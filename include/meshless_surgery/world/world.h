@@ -52,6 +52,7 @@ struct SceneDef {
   std::vector<BodyDef> bodies;
   std::vector<ObstacleDef> obstacles;
   std::vector<AttachCommand> attachments;
+  std::vector<InstrumentDef> instruments;
   std::vector<std::string> warnings;  // of what is not as it is written
 };
 
@@ -79,9 +80,12 @@ enum class EventType {
   kClipped,
   kCollapsed,
   kMaterial,
-  kClampMoved
+  kClampMoved,
+  kInstrument,
+  kGrasped,
+  kDropped
 };
-constexpr EventType kLastEvent = EventType::kClampMoved;
+constexpr EventType kLastEvent = EventType::kDropped;
 const char* toString(EventType type);
 
 struct Event {
@@ -95,6 +99,8 @@ struct Event {
   BodyModelPtr removed = {};  // of kRemoved: the body that is no more, which may have come in the same step
   Pose placed = {};           // of it, as BodySnapshot::placed
   bool taken_apart = false;   // of kDetached: by a command that is for it, and no clip
+  std::string instrument = {};  // of kGrasped, kDropped, and of kReleased by jaws
+  double force = 0.0;           // [N] of kGrasped
   std::uint64_t command = 0;  // how many commands the world was given before: those of one have the same
 };
 
@@ -183,6 +189,8 @@ struct WorldSnapshot {
   std::vector<AttachmentSnapshot> attachments;
   PushSphere push;
   Scissors scissors;
+  std::vector<Instrument> instruments;
+  std::vector<std::shared_ptr<const InstrumentShape>> instrument_shapes;  // one each
   StepReport report;
 };
 
@@ -229,6 +237,9 @@ class World {
   Status addObstacle(ObstacleDef obstacle);
   /// Like AttachCommand, and made again by reset. Bodies and obstacles come before.
   Result<AttachReply> addSceneAttachment(const AttachCommand& attachment);
+
+  /// Like AttachInstrumentCommand, and brought back by reset. Bodies come before.
+  Status addSceneInstrument(const InstrumentDef& def);
 
   /// Bodies in the order in which they came.
   WorldSnapshot snapshot(const SnapshotWants& wants);

@@ -1,0 +1,124 @@
+// Instruments: named tools with a shape that touches tissue, each led by a hand. Their state and their laws; World
+// moves them. The frame of an instrument has its origin at the tip, x along the shaft out of the tip, and z along the
+// hinge of its jaws.
+#pragma once
+
+#include <optional>
+
+#include "meshless_surgery/base/result.h"
+#include "meshless_surgery/geometry/mesh/triangle_mesh.h"
+
+namespace meshless {
+
+/// A rod with a round tip; two jaws on a hinge; a rod whose tip is bent aside, to +y.
+enum class InstrumentType { kProbe, kGrasper, kHook };
+const char* toString(InstrumentType type);
+
+/// What a user chose. The hand is an impedance: a spring and a damper draw the instrument to where it is wanted, by no
+/// more than max_force and max_torque, so that it cannot be pulled through tissue.
+struct InstrumentDef {
+  std::string name;
+  InstrumentType type = InstrumentType::kProbe;
+  Pose pose;                          // of the tip, where it begins
+  double shaft_radius = 0.0025;       // [m]
+  double shaft_length = 0.3;          // [m]
+  double jaw_length = 0.018;          // [m] from hinge to tip; of a hook: how far it reaches aside
+  double jaw_width = 0.004;           // [m]
+  double jaw_thickness = 0.0019;      // [m] of each
+  double friction = 0.5;              // Coulomb, combined with the tissue's as that of two bodies
+  double stiffness = 2000.0;          // [N/m]
+  double damping = 20.0;              // [N s/m]
+  double angular_stiffness = 5.0;     // [N m/rad]
+  double angular_damping = 0.05;      // [N m s/rad]
+  double max_force = 10.0;            // [N]
+  double max_torque = 0.5;            // [N m]
+  double max_speed = 1.0;             // [m/s] of the hand: a pose farther away is gone to at this
+  double grip = 5.0;                  // [N] of each jaw, in its middle
+  std::optional<Vec3> remote_centre;  // [m] of a trocar, through which the shaft goes
+  Color color{0.75f, 0.78f, 0.82f, 1.0f};
+
+  bool hasJaws() const { return type == InstrumentType::kGrasper; }
+  double jawEdge() const;  // [m] of the triangles of a jaw
+  /// Names the value and what is accepted.
+  Status validate() const;
+};
+
+/// A number of an InstrumentDef, and what is accepted.
+struct InstrumentNumber {
+  const char* key;
+  double InstrumentDef::*value;
+  double least, most;
+  const char* unit;
+};
+extern const std::array<InstrumentNumber, 14> kInstrumentNumbers;
+
+/// It names topics and a tf frame.
+bool isInstrumentName(const std::string& name);
+inline const char* const kInstrumentName =
+    "a letter, then letters, digits and _, up to 40 of them, and not pick, push, scissors, pick_cursor, push_sphere or "
+    "world";
+constexpr std::size_t kMostInstruments = 20;
+constexpr double kWidestJaw = 1.6;     // [rad] between the jaws of an instrument
+constexpr double kFarthestHand = 1e3;  // [m] of a pose from the origin
+
+/// Its surface in its own frame, jaws closed. Vertices are finer than jaws are thick.
+struct InstrumentShape {
+  enum Part : std::uint8_t { kShaft, kUpperJaw, kLowerJaw };  // the upper one is turned to +y
+  TriangleMesh mesh;
+  std::vector<std::uint8_t> parts;  // one a vertex
+  Vec3 hinge = Vec3::Zero();        // [m]
+  double thickness = 0.0;           // [m] of what is thinnest
+
+  /// Where its vertices are [m], of an instrument there, open by `jaw` [rad].
+  void place(const Pose& pose, double jaw, Points& vertices) const;
+};
+InstrumentShape shapeOf(const InstrumentDef& def);
+
+/// What contact does to an instrument in a substep. Torques are about the tip.
+struct InstrumentLoad {
+  Vec3 force = Vec3::Zero();   // [N]
+  Vec3 torque = Vec3::Zero();  // [N m]
+  double jaw = 0.0;            // [N m] that opens
+  double mass = 0.0;           // [kg] of tissue that it moves
+  double inertia = 0.0;        // [kg m^2] of that about the tip
+  double jaw_inertia = 0.0;    // [kg m^2] of that for the angle between the jaws
+};
+
+struct Instrument {
+  InstrumentDef def;
+  std::uint32_t number = 0;                           // never used again
+  Pose target;                                        // where the hand is wanted
+  double jaw_target = 0.0;                            // [rad] 0..kWidestJaw
+  Pose hand;                                          // where the hand has got to
+  double jaw_hand = 0.0;                              // [rad]
+  Pose pose;                                          // where the instrument is
+  double jaw = 0.0;                                   // [rad]
+  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  // [m/s, rad/s] in the last substep
+  double jaw_rate = 0.0;                              // [rad/s]
+  double jaw_stop = 0.0;                              // [rad] they close no further
+  double answers = 0.0;        // [N/m] of force from outside, for the way that this moved it in the last substep
+  InstrumentLoad load;         // of the last substep
+  Vec3 force = Vec3::Zero();   // [N] on it, mean over the last step
+  Vec3 torque = Vec3::Zero();  // [N m] likewise
+  double jaw_torque = 0.0;     // [N m] likewise, that opens
+  std::string holds;           // the body between its jaws; empty: none
+  double gripped = 0.0;        // [N] with which the jaws press it, the weaker of them, mean over the last step
+  double closed_to = 0.0;      // [rad] the least that was wanted between the jaws meanwhile
+  double lost_for = 0.0;       // [s] that they have not
+
+  /// Where the hand goes within h [s]: no faster than it may.
+  Pose handAfter(double h) const;
+  double jawAfter(double h) const;  // [rad]
+  bool isFinite() const;
+  /// It is where its hand is, at rest and without load.
+  void comeBack();
+  /// Turns it so that its shaft goes through its trocar, where it has one.
+  void aim();
+  /// The next h [s], in which the hand gets there: Newton's law for the tissue that moves along, implicit in spring and
+  /// damper, with the load of the last substep.
+  void move(const Pose& hand_then, double jaw_then, double h);
+  /// Puts it back by what is in its way, within the substep of h [s]; the force [N] of that.
+  Vec3 block(const Vec3& by, double h);
+};
+
+}  // namespace meshless

@@ -1,0 +1,381 @@
+// Instruments in the world: how they are led through a frame, and what they feel.
+#include <algorithm>
+#include <cmath>
+
+#include "meshless_surgery/base/number_text.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "world_impl.h"
+
+namespace meshless {
+namespace {
+
+constexpr double kHolds = 0.01;   // [N] on each jaw: they hold what is between them
+constexpr double kLostFor = 0.1;  // [s] without: they have lost it
+constexpr double kCrushed = 0.1;  // of the angle at which jaws have met tissue: they close no further
+constexpr double kRests = 1e-6;   // [m/s] slower instruments wake nobody
+
+bool isHand(const Pose& pose) {
+  return pose.translation.norm() <= kFarthestHand && std::abs(pose.rotation.norm() - 1.0) <= 1e-3;
+}
+
+}  // namespace
+
+InstrumentBody::InstrumentBody(const InstrumentDef& def)
+    : shape(std::make_shared<const InstrumentShape>(shapeOf(def))),
+      surface(shape->mesh, ownSupports(static_cast<Index>(shape->mesh.vertices.size()))),
+      inverse_masses(shape->mesh.vertices.size(), 0.0) {}
+
+void InstrumentBody::place(const Instrument& of) { shape->place(of.pose, of.jaw, positions); }
+
+Instrument* World::Impl::findInstrument(const std::string& name) {
+  for (Instrument& instrument : instruments)
+    if (instrument.def.name == name) return &instrument;
+  return nullptr;
+}
+
+std::string World::Impl::knownInstruments() const {
+  std::string list;
+  for (const Instrument& instrument : instruments) list += (list.empty() ? "" : ", ") + instrument.def.name;
+  return list.empty() ? "there are no instruments" : "instruments are: " + list;
+}
+
+void World::Impl::makeInstrumentBodies() {
+  instrument_bodies.clear();
+  for (const Instrument& instrument : instruments) {
+    instrument_bodies.push_back(std::make_shared<InstrumentBody>(instrument.def));
+    instrument_bodies.back()->place(instrument);
+    instrument_bodies.back()->hand_then = instrument.hand;
+    instrument_bodies.back()->jaw_then = instrument.jaw_hand;
+  }
+}
+
+Status World::Impl::liesApart(const Points& tissue, const BodyModel& model, const std::string& name) const {
+  if (settings.contact != ContactMethod::kSurface || tissue.empty()) return Done{};
+  const Box bounds = boundsOf(tissue);
+  for (std::size_t n = 0; n < instruments.size(); ++n)
+    if (Status apart = liesApart(*instrument_bodies[n], instruments[n].def.name, tissue, bounds, model, name); !apart)
+      return apart;
+  return Done{};
+}
+
+Status World::Impl::liesApart(const InstrumentBody& instrument, const std::string& instrument_name,
+                              const Points& tissue, const Box& bounds, const BodyModel& model,
+                              const std::string& name) {
+  if (!boundsOf(instrument.positions).overlaps(bounds)) return Done{};
+  const SolidQuery metal({instrument.positions, instrument.shape->mesh.triangles, {}});
+  bool meets = std::any_of(tissue.begin(), tissue.end(), [&](const Vec3& p) { return metal.contains(p); });
+  if (model.solid && !meets) {
+    const SolidQuery solid({tissue, model.surface.triangles, {}});
+    const Points& points = instrument.positions;
+    meets = std::any_of(points.begin(), points.end(), [&](const Vec3& p) { return solid.contains(p); });
+  }
+  if (!meets) return Done{};
+  return Error{ErrorCode::kInvalidArgument, "instrument '" + instrument_name + "' would be inside of body '" + name +
+                                                "'; accepted: outside of tissue"};
+}
+
+Result<Reply> World::Impl::apply(const AttachInstrumentCommand& command) {
+  const InstrumentDef& def = command.def;
+  if (!isInstrumentName(def.name))
+    return Error{ErrorCode::kInvalidArgument,
+                 "name of the instrument is '" + def.name.substr(0, 60) + "'; accepted: " + kInstrumentName};
+  if (findInstrument(def.name))
+    return Error{ErrorCode::kDuplicateName, "there is an instrument '" + def.name + "' already; " + knownInstruments()};
+  if (instruments.size() >= kMostInstruments)
+    return Error{ErrorCode::kInvalidArgument, "there are " + std::to_string(instruments.size()) +
+                                                  " instruments; accepted: up to " + std::to_string(kMostInstruments)};
+  if (Status valid = def.validate(); !valid) return valid.error();
+  Instrument instrument;
+  instrument.def = def;
+  instrument.def.pose.rotation.normalize();
+  instrument.pose = instrument.def.pose;
+  instrument.aim();
+  instrument.hand = instrument.target = instrument.pose;
+  auto body = std::make_shared<InstrumentBody>(def);
+  body->place(instrument);
+  const double lowest = boundsOf(body->positions).min.z();
+  if (settings.ground && lowest < *settings.ground)
+    return Error{ErrorCode::kInvalidArgument, "instrument '" + def.name + "' would begin " +
+                                                  numberText(*settings.ground - lowest, 3) +
+                                                  " m below the ground; accepted: above it"};
+  for (const auto& other : bodies) {
+    if (settings.contact != ContactMethod::kSurface) break;
+    refreshSurface(*other);
+    const Points& tissue = other->state.surface;
+    if (tissue.empty()) continue;
+    if (Status apart = liesApart(*body, def.name, tissue, boundsOf(tissue), *other->model, other->name); !apart)
+      return apart.error();
+  }
+  body->hand_then = instrument.hand;
+  instrument.number = next_instrument++;
+  instruments.push_back(std::move(instrument));
+  instrument_bodies.push_back(std::move(body));
+  say(EventType::kInstrument, "", 0, "instrument " + def.name + " is in the hand");
+  return Reply(Done{});
+}
+
+Result<Reply> World::Impl::apply(const DetachInstrumentCommand& command) {
+  const Instrument* const instrument = findInstrument(command.name);
+  if (!instrument)
+    return Error{ErrorCode::kUnknownName, "there is no instrument '" + command.name + "'; " + knownInstruments()};
+  const auto place = instrument - instruments.data();
+  wakeWithin(boundsOf(instrument_bodies[place]->positions));
+  surface_contacts.forget(kInstrumentKey + instrument->number);
+  contacts_current = false;
+  instruments.erase(instruments.begin() + place);
+  instrument_bodies.erase(instrument_bodies.begin() + place);
+  say(EventType::kInstrument, "", 0, "instrument " + command.name + " was put away");
+  return Reply(Done{});
+}
+
+Result<Reply> World::Impl::apply(const LeadInstrumentCommand& command) {
+  Instrument* const instrument = findInstrument(command.name);
+  if (!instrument)
+    return Error{ErrorCode::kUnknownName, "there is no instrument '" + command.name + "'; " + knownInstruments()};
+  if (command.pose && !isHand(*command.pose))
+    return Error{ErrorCode::kInvalidArgument, "pose is none; accepted: within " + numberText(kFarthestHand) +
+                                                  " m of the origin, a quaternion of length 1"};
+  if (command.jaw && !instrument->def.hasJaws())
+    return Error{ErrorCode::kInvalidArgument,
+                 "instrument '" + command.name + "' is a " + toString(instrument->def.type) + ", which has no jaws"};
+  if (command.jaw && !(*command.jaw >= 0.0 && *command.jaw <= kWidestJaw))
+    return outOfRange("jaw", *command.jaw, "0 to " + numberText(kWidestJaw) + " rad");
+  if (command.pose) instrument->target = {command.pose->rotation.normalized(), command.pose->translation};
+  if (command.jaw) instrument->jaw_target = *command.jaw;
+  return Reply(Done{});
+}
+
+Status World::addSceneInstrument(const InstrumentDef& def) {
+  const Result<Reply> reply = impl_->apply(AttachInstrumentCommand{def});
+  if (!reply) return reply.error();
+  impl_->scene_instruments.push_back(def);
+  return Done{};
+}
+
+void World::Impl::leadInstruments(double h_frame) {
+  for (std::size_t n = 0; n < instruments.size(); ++n) {
+    Instrument& instrument = instruments[n];
+    InstrumentBody& body = *instrument_bodies[n];
+    body.hand_then = instrument.handAfter(h_frame);
+    body.jaw_then = instrument.jawAfter(h_frame);
+    const double reach = instrument.def.shaft_length + instrument.def.jaw_length;
+    body.still = body.hand_then.translation == instrument.hand.translation &&
+                 body.hand_then.rotation.coeffs() == instrument.hand.rotation.coeffs() &&
+                 body.jaw_then == instrument.jaw_hand && instrument.velocity.norm() <= kRests &&
+                 instrument.spin.norm() * reach <= kRests && std::abs(instrument.jaw_rate) * reach <= kRests;
+    body.felt = body.stepped = false;
+    body.rests = body.still && !sleepersAt(n).empty();
+  }
+}
+
+std::vector<WorldBody*> World::Impl::sleepersAt(std::size_t n) {
+  std::vector<WorldBody*> found;
+  const std::vector<std::uint64_t> keys = surface_contacts.loadedBy(kInstrumentKey + instruments[n].number);
+  for (const auto& body : bodies)
+    if (body->asleep && std::find(keys.begin(), keys.end(), body->number) != keys.end()) found.push_back(body.get());
+  return found;
+}
+
+// Who sleeps in a hand that somebody else moves wakes too.
+bool World::Impl::wakeInHands() {
+  bool woken = false;
+  for (const SurfaceContacts::Island& island : surface_contacts.islands())
+    for (const Index c : island.led) {
+      const std::size_t n = c - bodies.size() - obstacles.size();
+      for (WorldBody* body : sleepersAt(n)) {
+        wake(*body);
+        woken = true;
+      }
+      instrument_bodies[n]->rests = false;
+    }
+  return woken;
+}
+
+bool World::Impl::anyInstrumentGoes() const {
+  return std::any_of(instrument_bodies.begin(), instrument_bodies.end(), [](const auto& body) { return !body->still; });
+}
+
+void World::Impl::fillInstrumentCollider(std::size_t n, double h, double h_left, Collider& collider) {
+  const Instrument& instrument = instruments[n];
+  InstrumentBody& body = *instrument_bodies[n];
+  collider = Collider();
+  collider.key = kInstrumentKey + instrument.number;
+  collider.edge_length = body.surface.edge_length;
+  collider.surface = &body.surface;
+  collider.positions = body.positions.data();
+  collider.inverse_masses = body.inverse_masses.data();
+  collider.particles = body.surface.vertices();
+  collider.friction = instrument.def.friction;
+  collider.obstacle = collider.led = true;
+  collider.moves = false;
+  collider.bounds = boundsOf(body.positions);
+  if (body.still) {
+    body.velocities.clear();
+    return;
+  }
+  Instrument then = instrument;
+  then.move(body.hand_then, body.jaw_then, h_left);
+  if (settings.ground) {
+    body.shape->place(then.pose, then.jaw, body.velocities);
+    then.pose.translation.z() += std::max(0.0, *settings.ground - boundsOf(body.velocities).min.z());
+  }
+  body.shape->place(then.pose, then.jaw, body.velocities);
+  for (Index v = 0; v < body.positions.size(); ++v) {
+    body.velocities[v] = (body.velocities[v] - body.positions[v]) / h_left;
+    collider.bounds.extend(body.positions[v] + h * body.velocities[v]);
+  }
+  collider.velocities = body.velocities.data();
+}
+
+void World::Impl::advanceInstrument(Index collider, double h, int left) {
+  const std::size_t n = collider - bodies.size() - obstacles.size();
+  Instrument& instrument = instruments[n];
+  InstrumentBody& body = *instrument_bodies[n];
+  const double share = 1.0 / left;
+  Pose hand = instrument.hand;
+  hand.translation += share * (body.hand_then.translation - hand.translation);
+  hand.rotation =
+      left == 1 ? body.hand_then.rotation : hand.rotation.slerp(share, body.hand_then.rotation).normalized();
+  instrument.move(hand, instrument.jaw_hand + share * (body.jaw_then - instrument.jaw_hand), h);
+  body.before.swap(body.positions);
+  body.place(instrument);
+  body.blocked.setZero();
+  if (!settings.ground) return;
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const Vec3& p : body.positions) lowest = std::min(lowest, p.z());
+  if (!(lowest < *settings.ground)) return;
+  const Vec3 up = (*settings.ground - lowest) * Vec3::UnitZ();
+  body.blocked = instrument.block(up, h);
+  body.place(instrument);
+}
+
+void World::Impl::forgetLoad(std::size_t n) {
+  instruments[n].force.setZero();
+  instruments[n].torque.setZero();
+  instruments[n].jaw_torque = 0.0;
+  instrument_bodies[n]->pressed.clear();
+}
+
+void World::Impl::feelInstrument(Index island, Index collider, double h, double share) {
+  const std::size_t n = collider - bodies.size() - obstacles.size();
+  Instrument& instrument = instruments[n];
+  InstrumentBody& body = *instrument_bodies[n];
+  if (!std::exchange(body.felt, true)) forgetLoad(n);
+  InstrumentLoad load;
+  instrument.force += share * body.blocked;
+  const Vec3 hinge = instrument.pose * body.shape->hinge, axis = instrument.pose.rotation * Vec3::UnitZ();
+  std::vector<char>& met = body.met;
+  met.assign(bodies.size(), 0);
+  double most = 0.0;  // [kg] of all that it touches
+  using Side = SurfaceContacts::RowSide;
+  surface_contacts.eachOnLed(
+      island, collider, [&](const ContactRow& row, const Side& metal, const Side& tissue, double mass) {
+        if (!std::exchange(met[tissue.collider], 1)) most += bodies[tissue.collider]->model->mass;
+        double on_jaw[2] = {0.0, 0.0};  // [N]
+        for (const RowEntry* at = metal.begin; at != metal.end; ++at) {
+          const Vec3 on = at->coefficient / (h * h) * row.impulse;  // [N]
+          const Vec3 arm = body.positions[at->particle] - instrument.pose.translation;
+          const double moved = std::abs(at->coefficient) * mass;
+          load.force += on;
+          load.torque += arm.cross(on);
+          load.mass += moved;
+          load.inertia += moved * arm.squaredNorm();
+          const std::uint8_t part = body.shape->parts[at->particle];
+          if (part == InstrumentShape::kShaft) continue;
+          const double side = part == InstrumentShape::kUpperJaw ? 0.5 : -0.5;
+          const Vec3 lever = axis.cross(body.positions[at->particle] - hinge);  // [m] its way for 1 rad
+          load.jaw += side * lever.dot(on);
+          load.jaw_inertia += 0.25 * moved * lever.squaredNorm();
+          if (const double length = lever.norm(); length > 0.0)
+            on_jaw[part == InstrumentShape::kLowerJaw] += 2.0 * side * lever.dot(on) / length;
+        }
+        for (int k = 0; k < 2; ++k) {
+          if (on_jaw[k] == 0.0) continue;
+          auto pressed = std::find_if(body.pressed.begin(), body.pressed.end(),
+                                      [&](const InstrumentBody::Pressed& p) { return p.body == tissue.collider; });
+          if (pressed == body.pressed.end()) pressed = body.pressed.insert(pressed, {tissue.collider, {}});
+          pressed->on[k] += share * on_jaw[k];
+        }
+      });
+  if (load.mass > most) {  // rows share the particles that they move
+    const double part = most / load.mass;
+    load.mass *= part;
+    load.inertia *= part;
+    load.jaw_inertia *= part;
+  }
+  instrument.load = load;
+  instrument.force += share * load.force;
+  instrument.torque += share * load.torque;
+  instrument.jaw_torque += share * load.jaw;
+  body.stepped = true;
+}
+
+void World::Impl::stepFreeInstruments(double h, int parts, int parts_left) {
+  for (std::size_t n = 0; n < instruments.size(); ++n) {
+    InstrumentBody& body = *instrument_bodies[n];
+    // What sleeps in its hand is held as before.
+    if (std::exchange(body.stepped, false) || (body.rests && !body.felt)) continue;
+    if (!body.felt && parts_left == parts) forgetLoad(n);
+    instruments[n].load = InstrumentLoad();
+    advanceInstrument(static_cast<Index>(bodies.size() + obstacles.size() + n), h, parts_left);
+    instruments[n].force += body.blocked / parts;
+  }
+}
+
+void World::Impl::finishInstruments(double h_frame) {
+  for (std::size_t n = 0; n < instruments.size(); ++n) {
+    Instrument& instrument = instruments[n];
+    InstrumentBody& body = *instrument_bodies[n];
+    if (!instrument.isFinite()) {
+      instrument.comeBack();
+      body.place(instrument);
+      body.pressed.clear();
+      say(EventType::kFault, "", 0,
+          "the pose of instrument " + instrument.def.name + " was not finite any more; it is where its hand is");
+    }
+    if (!instrument.def.hasJaws() || (body.rests && !body.felt)) continue;
+    const bool pinches = std::any_of(body.pressed.begin(), body.pressed.end(),
+                                     [](const InstrumentBody::Pressed& p) { return p.on[0] > 0.0 && p.on[1] > 0.0; });
+    if (!pinches)
+      instrument.jaw_stop = 0.0;
+    else if (instrument.jaw_stop == 0.0)
+      instrument.jaw_stop = kCrushed * instrument.jaw;
+    const auto gripOn = [&](const InstrumentBody::Pressed& p) { return std::min(p.on[0], p.on[1]); };
+    instrument.gripped = 0.0;
+    const InstrumentBody::Pressed* most = nullptr;
+    for (const InstrumentBody::Pressed& p : body.pressed) {
+      if (bodies[p.body]->name == instrument.holds) instrument.gripped = gripOn(p);
+      if (!most || gripOn(p) > gripOn(*most)) most = &p;
+    }
+    if (!instrument.holds.empty()) {
+      if (instrument.gripped > 0.0) {
+        instrument.lost_for = 0.0;
+        instrument.closed_to = std::min(instrument.closed_to, instrument.jaw_target);
+        continue;
+      }
+      instrument.lost_for += h_frame;
+      const bool there = find(instrument.holds) != nullptr;
+      if (there && instrument.lost_for < kLostFor) continue;
+      const bool opened = instrument.jaw_target > instrument.closed_to;
+      if (there) {
+        say(opened ? EventType::kReleased : EventType::kDropped, instrument.holds, 0,
+            instrument.def.name + (opened ? " let go of " : " dropped ") + instrument.holds +
+                (opened ? "" : ": it slipped out of the jaws"));
+        events.back().instrument = instrument.def.name;
+      }
+      instrument.holds.clear();
+      instrument.lost_for = 0.0;
+    }
+    if (!most || !(gripOn(*most) > kHolds)) continue;
+    instrument.holds = bodies[most->body]->name;
+    instrument.gripped = gripOn(*most);
+    instrument.closed_to = instrument.jaw_target;
+    say(EventType::kGrasped, instrument.holds, 0,
+        instrument.def.name + " grasped " + instrument.holds + " with " + numberText(instrument.gripped, 3) + " N");
+    events.back().instrument = instrument.def.name;
+    events.back().force = instrument.gripped;
+  }
+}
+
+}  // namespace meshless
