@@ -24,9 +24,11 @@ RVIZ_CRASHED = re.compile(r'\[rviz-\d+\] process has died \[pid \d+, exit code -
 class VirtualDisplay:
     def __init__(self, width=1280, height=900):
         read_end, write_end = os.pipe()
+        # -noreset: without it the server starts anew whenever its last client leaves, a picture's `import` for example,
+        # and who connects at that moment is thrown out.
         self.server = subprocess.Popen(
             ['Xvfb', '-displayfd', str(write_end), '-screen', '0', '%dx%dx24' % (width, height), '+extension', 'GLX',
-             '-nolisten', 'tcp'], pass_fds=[write_end], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+             '-nolisten', 'tcp', '-noreset'], pass_fds=[write_end], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         os.close(write_end)
         with os.fdopen(read_end) as pipe:
             number = pipe.readline().strip()
@@ -47,7 +49,9 @@ class VirtualDisplay:
                 if wait_until(lambda: crashed() or shown(), seconds) and not crashed():
                     return process
                 again = attempt == 0 and crashed()
-            stop(process)
+                stop(process)
+                with open(output.name, errors='replace') as text:
+                    print(text.read()[-4000:])
             if not again:
                 raise AssertionError('rviz did not show its view')
             print('rviz crashed as it started, and is started once more')
