@@ -246,7 +246,7 @@ class Surgeon:
             types = {instrument.name: instrument.type for instrument in self.state().instruments}
             if tool not in types:
                 raise ValueError("tool is '%s'; accepted: %s" % (tool, ', '.join((*TOOLS, *sorted(types)))))
-            jaws = types[tool] == 'grasper'
+            jaws = types[tool] in ('grasper', 'scissors')
         return ToolStream(self.node, tool, self._frame(frame), self.timeout, jaws)
 
     def attach_instrument(self, name, yaml, position, orientation=(0.0, 0.0, 0.0, 1.0), frame=None):

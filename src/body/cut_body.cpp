@@ -61,15 +61,16 @@ Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Bl
     Result<Incision> again = incise(mesh, by, mine);
     return again ? again : incision;
   };
-  MetBody met(model, state);
+  MetBody met = wanted.at_rest ? MetBody(model) : MetBody(model, state);
+  const bool here = !wanted.at_rest;
   Blade by = blade;
   Result<Incision> seen = Error(), touched = Error();
-  atOnce([&] { seen = opened(met.surface, by, &model.surface.vertices); },
+  atOnce([&] { seen = opened(met.surface, by, here ? &model.surface.vertices : nullptr); },
          [&] {
-           if (model.collision) touched = opened(met.collision, by, &model.collision->mesh.vertices);
+           if (model.collision) touched = opened(met.collision, by, here ? &model.collision->mesh.vertices : nullptr);
          });
   // Where tissue lies in itself within the blade, at rest it does not.
-  const bool clear = seen ? !seen->layered : seen.error().code != ErrorCode::kUnsuitableShape;
+  const bool clear = !here || (seen ? !seen->layered : seen.error().code != ErrorCode::kUnsuitableShape);
   if (!clear)
     if (const std::optional<Blade> led = bladeAtRest(model, state, blade)) {
       MetBody at_rest(model);

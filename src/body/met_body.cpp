@@ -6,6 +6,7 @@
 #include <unordered_map>
 
 #include "meshless_surgery/body/binding.h"
+#include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/geometry/query/union_find.h"
 #include "place_set.h"
 

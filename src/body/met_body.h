@@ -1,8 +1,6 @@
 // A body as a blade meets it: as it lies now, its wounds closed where they are closed.
 #pragma once
 
-#include <optional>
-
 #include "meshless_surgery/body/body.h"
 #include "meshless_surgery/geometry/query/blade.h"
 
@@ -22,9 +20,5 @@ struct MetBody {
   TriangleMesh surface;    // patches filled
   TriangleMesh collision;  // likewise; empty where the body has none of its own
 };
-
-/// Where a blade is at rest that meets the present shape: by the affine map that fits the tissue around it best. None
-/// where too little is around it.
-std::optional<Blade> bladeAtRest(const BodyModel& model, const BodyState& state, const Blade& blade);
 
 }  // namespace meshless

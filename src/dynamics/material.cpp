@@ -82,6 +82,7 @@ Status Material::validate() const {
   if (!(damping >= 0.0 && damping <= 1e6)) return outOfRange("damping", damping, "0 to 1e6 1/s");
   if (!(friction >= 0.0 && friction <= 10.0)) return outOfRange("friction", friction, "0 to 10");
   if (!(restitution >= 0.0 && restitution <= 1.0)) return outOfRange("restitution", restitution, "0 to 1");
+  if (!(toughness >= 0.0 && toughness <= 1e6)) return outOfRange("toughness", toughness, "0 to 1e6 J/m^2");
   if (!(plasticity.yield >= 0.0 && plasticity.yield <= 10.0)) return outOfRange("yield", plasticity.yield, "0 to 10");
   if (!(plasticity.creep >= 0.0 && plasticity.creep <= 1e6))
     return outOfRange("creep", plasticity.creep, "0 (none) to 1e6 1/s");

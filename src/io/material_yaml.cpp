@@ -194,6 +194,7 @@ void readMaterial(YamlSource& source, const YAML::Node& node, const std::string&
   map.number("damping", {0.0, 1e6, false, "1/s"}, material.damping);
   map.number("friction", {0.0, 10.0}, material.friction);
   map.number("restitution", {0.0, 1.0}, material.restitution);
+  map.number("toughness", {0.0, 1e6, false, "J/m^2"}, material.toughness);
   const int self_contact = map.choice("self_contact", {"none", "lips", "all"});
   if (self_contact >= 0) material.self_contact = static_cast<SelfContact>(self_contact);
   readCurve(map, "volume", material.volume);

@@ -80,10 +80,11 @@ std::vector<Part> Instruments::parts(const WorldSnapshot& snapshot, const std::o
       parts.push_back(part("shaft", {aside.rotation * Eigen::AngleAxisd(turn, Vec3::UnitZ()), aside.translation},
                            def.jaw_length / kShaftLength));
     }
-    if (def.type != InstrumentType::kGrasper) continue;
+    if (!def.hasJaws()) continue;
     const std::size_t first = parts.size();
-    addJaws("grasping_jaw", placed(Vec3(-def.jaw_length, 0.0, 0.0)), instrument.jaw, def.jaw_length / kJawLength,
-            parts);
+    const bool blades = def.type == InstrumentType::kScissors;
+    addJaws(blades ? "scissors_blade" : "grasping_jaw", placed(Vec3(-def.jaw_length, 0.0, 0.0)), instrument.jaw,
+            def.jaw_length / (blades ? kBladeLength : kJawLength), parts);
     parts[first].scale = size;
   }
   const Pick* in_hand = pickInHand(snapshot);

@@ -86,6 +86,12 @@ struct Drawn {
     if (force <= most) return go;
     return (thrown + most / force * drawn) / (inert + damped);  // gives way, as slowly as it is damped
   }
+  /// What would hold it where it is [N], of the same.
+  Vec3 toHold(double mass, const Vec3& speed, const Vec3& load, const Vec3& behind, const Vec3& way, double h) const {
+    const Vec3 drawn = stiffness * (behind + way) + damping / h * way;
+    const double force = drawn.norm();
+    return -(mass / h * speed + load + (force > most ? most / force : 1.0) * drawn);
+  }
 };
 
 /// Turns what is there, as little as it takes, so that its shaft goes through a point.
@@ -121,6 +127,8 @@ const char* toString(InstrumentType type) {
       return "grasper";
     case InstrumentType::kHook:
       return "hook";
+    case InstrumentType::kScissors:
+      return "scissors";
   }
   return "unknown";
 }
@@ -133,7 +141,15 @@ bool isInstrumentName(const std::string& name) {
          std::all_of(name.begin(), name.end(), [&](char c) { return letter(c) || (c >= '0' && c <= '9') || c == '_'; });
 }
 
-double InstrumentDef::jawEdge() const { return 0.7 * std::min(jaw_thickness, jaw_width); }
+double InstrumentDef::jawEdge() const {
+  return 0.7 * std::min(jaw_thickness, type == InstrumentType::kScissors ? 0.5 * jaw_width : jaw_width);
+}
+
+double InstrumentDef::bladeOverlap() const {
+  return type == InstrumentType::kScissors ? std::min(0.1 * jaw_length, 0.5 * jaw_thickness) : 0.0;
+}
+
+double InstrumentDef::bladeReach() const { return bladeOverlap() + 0.5 * jaw_thickness; }
 
 Status InstrumentDef::validate() const {
   for (const auto& [key, member, least, most, unit] : kInstrumentNumbers)
@@ -188,15 +204,17 @@ InstrumentShape shapeOf(const InstrumentDef& def) {
     add(moved(capsule(-def.jaw_length, def.shaft_radius), byTurn(0.5 * kPi, Vec3(-def.shaft_radius, 0.0, 0.0))),
         InstrumentShape::kShaft);
   }
-  if (def.type == InstrumentType::kGrasper) {
+  if (def.hasJaws()) {
     shape.hinge = Vec3(-def.jaw_length, 0.0, 0.0);
-    shape.thickness = std::min(shape.thickness, def.jaw_thickness);
+    const bool blades = def.type == InstrumentType::kScissors;  // beside each other along the hinge
+    const double width = blades ? 0.5 * def.jaw_width : def.jaw_width;
+    shape.thickness = std::min({shape.thickness, def.jaw_thickness, width});
     add(moved(capsule(-def.shaft_length, def.shaft_radius), {Quat::Identity(), shape.hinge}), InstrumentShape::kShaft);
-    const Vec3 size(def.jaw_length, def.jaw_thickness, def.jaw_width);
+    const Vec3 size(def.jaw_length, def.jaw_thickness, width);
     const TriangleMesh jaw = boxMesh(size, def.jawEdge());
-    const Vec3 middle(-0.5 * def.jaw_length, 0.5 * def.jaw_thickness, 0.0);
+    const Vec3 middle(-0.5 * def.jaw_length, 0.5 * def.jaw_thickness - def.bladeOverlap(), blades ? 0.5 * width : 0.0);
     add(moved(jaw, {Quat::Identity(), middle}), InstrumentShape::kUpperJaw);
-    add(moved(jaw, {Quat::Identity(), Vec3(middle.x(), -middle.y(), 0.0)}), InstrumentShape::kLowerJaw);
+    add(moved(jaw, {Quat::Identity(), Vec3(middle.x(), -middle.y(), -middle.z())}), InstrumentShape::kLowerJaw);
   }
   return shape;
 }
@@ -221,14 +239,21 @@ bool Instrument::isFinite() const {
          velocity.allFinite() && spin.allFinite() && std::isfinite(jaw_rate) && load.force.allFinite() &&
          load.torque.allFinite() && std::isfinite(load.jaw) && std::isfinite(load.mass) &&
          std::isfinite(load.inertia) && std::isfinite(load.jaw_inertia) && force.allFinite() && torque.allFinite() &&
-         std::isfinite(jaw_torque);
+         std::isfinite(jaw_torque) && std::isfinite(resists) && std::isfinite(cut_torque) && std::isfinite(cut_work) &&
+         std::isfinite(owed);
+}
+
+double Instrument::cutsTo() const {
+  const double reach = def.bladeReach(), half = std::tan(0.5 * jaw);
+  return reach < def.jaw_length * half ? reach / half : def.jaw_length;
 }
 
 void Instrument::comeBack() {
   pose = hand;
   jaw = jaw_hand;
   velocity = spin = force = torque = Vec3::Zero();
-  jaw_rate = jaw_torque = jaw_stop = answers = 0.0;
+  jaw_rate = jaw_torque = jaw_stop = answers = cut_torque = cut_work = owed = resists = 0.0;
+  cut_to = cutsTo();
   load = InstrumentLoad();
   aim();
 }
@@ -255,11 +280,19 @@ void Instrument::move(const Pose& hand_then, double jaw_then, double h) {
     const double grip = 0.5 * def.grip * def.jaw_length, stiffness = grip / kJawYield;
     const Drawn jaws{stiffness, kJawTime * stiffness, grip};
     const Vec3 x = Vec3::UnitX();
-    const Vec3 opened = jaws.step(load.jaw_inertia, jaw_rate * x, load.jaw * x, (jaw_hand - jaw) * x,
-                                  (jaw_then - jaw_hand) * x, h, of_turn);
+    const Vec3 behind = (jaw_hand - jaw) * x, way = (jaw_then - jaw_hand) * x;
+    cut_torque = 0.0;
+    if (resists > 0.0 && cutsTo() < def.jaw_length) {
+      const double half = std::sin(0.5 * jaw),
+                   most = resists * 0.5 * def.bladeReach() / (half * half);  // work a radian
+      const double holds = jaws.toHold(load.jaw_inertia, jaw_rate * x, load.jaw * x, behind, way, h).x();
+      cut_torque = std::clamp(holds, 0.0, most);
+    }
+    const Vec3 opened = jaws.step(load.jaw_inertia, jaw_rate * x, (load.jaw + cut_torque) * x, behind, way, h, of_turn);
     const double jaw_before = jaw;
     jaw = std::clamp(jaw + opened.x(), std::min(jaw, jaw_stop), kWidestJaw);
     jaw_rate = (jaw - jaw_before) / h;
+    cut_work += cut_torque * std::max(0.0, jaw_before - jaw);
   }
   hand = hand_then;
   jaw_hand = jaw_then;

@@ -81,11 +81,12 @@ template <class Archive, class World>
 void keepRest(Archive& archive, World& world) {
   auto& [settings, step, batches_current, generations, free_slots, next_number, used_names, scene, picks, next_pick,
          attachments, used_attachments, scene_attachments, push, scissors, instruments, next_instrument,
-         scene_instruments, closing, next_ticket, next_sleep_group, tetrahedralizations] = static_cast<As<World, KeptWorld>&>(world);
+         scene_instruments, closing, next_ticket, next_sleep_group, tetrahedralizations] =
+      static_cast<As<World, KeptWorld>&>(world);
   (void)settings, (void)scene;
   archive(step, batches_current, world.batches, generations, free_slots, next_number, used_names, picks, next_pick,
-          attachments, used_attachments, scene_attachments, push, scissors, instruments, next_instrument, scene_instruments,
-          closing, next_ticket, next_sleep_group, world.surface_contacts, tetrahedralizations);
+          attachments, used_attachments, scene_attachments, push, scissors, instruments, next_instrument,
+          scene_instruments, closing, next_ticket, next_sleep_group, world.surface_contacts, tetrahedralizations);
 }
 
 void checkSlots(const SavedWorld& world) {
@@ -123,15 +124,19 @@ bool isThere(const Instrument& instrument) {
   for (const double jaw : {instrument.jaw_target, instrument.jaw_hand, instrument.jaw})
     if (!(jaw >= 0.0 && jaw <= kWidestJaw)) return false;
   const InstrumentLoad& load = instrument.load;
-  for (const Vec3& v : {instrument.velocity, instrument.spin, load.force, load.torque, instrument.force,
-                        instrument.torque})
+  for (const Vec3& v :
+       {instrument.velocity, instrument.spin, load.force, load.torque, instrument.force, instrument.torque})
     if (!(v.norm() <= 1e12)) return false;
-  for (const double x : {instrument.jaw_rate, load.jaw, instrument.jaw_torque, instrument.gripped})
+  for (const double x : {instrument.owed, instrument.jaw_rate, load.jaw, instrument.jaw_torque, instrument.gripped})
     if (!(std::abs(x) <= 1e12)) return false;
-  for (const double x : {load.mass, load.inertia, load.jaw_inertia, instrument.jaw_stop, instrument.answers,
-                         instrument.closed_to, instrument.lost_for})
+  for (const double x :
+       {load.mass, load.inertia, load.jaw_inertia, instrument.jaw_stop, instrument.cut_to, instrument.resists,
+        instrument.cut_torque, instrument.cut_work, instrument.answers, instrument.closed_to, instrument.lost_for})
     if (!(x >= 0.0 && x <= 1e15)) return false;
-  return true;
+  const BladeWound& wound = instrument.wound;
+  return wound.origin.norm() <= 1e9 && std::abs(wound.begin) <= 1e9 && std::abs(wound.end) <= 1e9 &&
+         std::abs(wound.x_axis.norm() - 1.0) <= 1e-6 && std::abs(wound.y_axis.norm() - 1.0) <= 1e-6 &&
+         std::abs(wound.x_axis.dot(wound.y_axis)) <= 1e-6;
 }
 
 void checkTools(const SavedWorld& world) {
@@ -168,8 +173,9 @@ void checkTools(const SavedWorld& world) {
   std::set<std::uint32_t> numbers;
   for (const Instrument& instrument : world.instruments) {
     const Status valid = instrument.def.validate();
-    require(valid.ok() && isInstrumentName(instrument.def.name) && isThere(instrument) && names.insert(instrument.def.name).second &&
-                numbers.insert(instrument.number).second && instrument.number < world.next_instrument,
+    require(valid.ok() && isInstrumentName(instrument.def.name) && isThere(instrument) &&
+                names.insert(instrument.def.name).second && numbers.insert(instrument.number).second &&
+                instrument.number < world.next_instrument,
             "an instrument is none");
   }
   for (const InstrumentDef& def : world.scene_instruments)

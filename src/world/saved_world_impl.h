@@ -113,9 +113,9 @@ MESHLESS_ARCHIVE(Appearance, outer, inner)
 template <class A>
 void serialize(A& archive, Material& v) {
   auto& [name, youngs_modulus, poissons_ratio, stiffening, asymmetry, mode, alpha, beta, density, damping, friction,
-         restitution, self_contact, volume, area, plasticity, relaxation, color, inside_color, appearance] = v;
+         restitution, toughness, self_contact, volume, area, plasticity, relaxation, color, inside_color, appearance] = v;
   archive(name, youngs_modulus, poissons_ratio, stiffening, asymmetry, choice(mode, MatchMode::kQuadratic), alpha, beta,
-          density, damping, friction, restitution, choice(self_contact, SelfContact::kAll), volume, area, plasticity,
+          density, damping, friction, restitution, toughness, choice(self_contact, SelfContact::kAll), volume, area, plasticity,
           relaxation, color, inside_color, appearance);
 }
 template <class A>
@@ -251,12 +251,13 @@ template <class A>
 void serialize(A& archive, InstrumentDef& v) {
   auto& [name, type, pose, shaft_radius, shaft_length, jaw_length, jaw_width, jaw_thickness, friction, stiffness,
          damping, angular_stiffness, angular_damping, max_force, max_torque, max_speed, grip, remote_centre, color] = v;
-  archive(name, choice(type, InstrumentType::kHook), pose, shaft_radius, shaft_length, jaw_length, jaw_width,
+  archive(name, choice(type, InstrumentType::kScissors), pose, shaft_radius, shaft_length, jaw_length, jaw_width,
           jaw_thickness, friction, stiffness, damping, angular_stiffness, angular_damping, max_force, max_torque,
           max_speed, grip, remote_centre, color);
 }
+MESHLESS_ARCHIVE(BladeWound, body, origin, x_axis, y_axis, begin, end)
 MESHLESS_ARCHIVE(InstrumentLoad, force, torque, jaw, mass, inertia, jaw_inertia)
-MESHLESS_ARCHIVE(Instrument, def, number, target, jaw_target, hand, jaw_hand, pose, jaw, velocity, spin, jaw_rate, jaw_stop, answers, load,
+MESHLESS_ARCHIVE(Instrument, def, number, target, jaw_target, hand, jaw_hand, pose, jaw, velocity, spin, jaw_rate, jaw_stop, cut_to, wound, resists, cut_torque, cut_work, owed, answers, load,
                  force, torque, jaw_torque, holds, gripped, closed_to, lost_for)
 MESHLESS_ARCHIVE(CutCommand, blades, close_time, roughness, bodies)
 MESHLESS_ARCHIVE(ClosingCut, ticket, command, done_at, start_angle, started_at)

@@ -9,8 +9,9 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "world_impl.h"
+#include "line_search.h"
 #include "meshless_surgery/base/number_text.h"
+#include "world_impl.h"
 
 namespace meshless {
 namespace {
@@ -23,79 +24,6 @@ constexpr double kStiffness = 20.0;     // of the jaws, in that of tissue as thi
 constexpr double kTissue = 1e5;         // [Pa] what counts for the modulus of an appearance material
 constexpr double kAlong = 0.8;          // cosine: jaws that close so nearly along the vessel are not across it
 constexpr double kBesideJaws = 2.5e-4;  // [m] that their lines are drawn beside the tissue
-
-/// Where a line goes into tissue, or comes out.
-struct Crossing {
-  double at = 0.0;  // [m] along it
-  bool in = false;
-  NearestFace face;
-};
-
-/// Where the jaws are: they close along z, and x is along the vessel.
-struct Jaws {
-  Vec3 centre;
-  Vec3 axes[3];
-
-  Vec3 of(const Vec3& p) const {
-    const Vec3 way = p - centre;
-    return {way.dot(axes[0]), way.dot(axes[1]), way.dot(axes[2])};
-  }
-};
-
-class LineSearch {
- public:
-  /// Faces that lines along z within so far of the middle can cross.
-  LineSearch(const ShownSurface& shown, const Jaws& jaws, double half_x, double half_y)
-      : triangles_(shown.surface->triangles) {
-    places_.reserve(shown.vertices.size());
-    for (const Vec3& p : shown.vertices) places_.push_back(jaws.of(p));
-    for (Index face = 0; face < triangles_.size(); ++face) {
-      Box box;
-      for (const Index v : triangles_[face]) box.extend(places_[v]);
-      if (box.min.x() <= half_x && box.max.x() >= -half_x && box.min.y() <= half_y && box.max.y() >= -half_y)
-        near_.push_back(face);
-    }
-  }
-
-  /// In their order along the line through (x, y).
-  const std::vector<Crossing>& through(double x, double y) {
-    found_.clear();
-    for (const Index face : near_) {
-      const Triangle& t = triangles_[face];
-      Vec3 sides;
-      bool in = false;
-      if (!covers(t, x, y, sides, in)) continue;
-      Crossing crossing;
-      crossing.in = in;
-      crossing.face.face = face;
-      crossing.face.shares = sides / sides.sum();
-      for (int k = 0; k < 3; ++k) crossing.at += crossing.face.shares[k] * places_[t[k]].z();
-      found_.push_back(crossing);
-    }
-    std::sort(found_.begin(), found_.end(), [](const Crossing& a, const Crossing& b) { return a.at < b.at; });
-    return found_;
-  }
-
- private:
-  // Faces that share an edge agree on which side of it the line is, so that none is missed and none is met twice.
-  bool covers(const Triangle& t, double x, double y, Vec3& sides, bool& in) const {
-    bool left[3];
-    for (int k = 0; k < 3; ++k) {
-      const Index a = t[(k + 1) % 3], b = t[(k + 2) % 3];
-      const Vec3 &p = places_[std::min(a, b)], &q = places_[std::max(a, b)];
-      const double side = (p.x() - x) * (q.y() - y) - (p.y() - y) * (q.x() - x);
-      left[k] = (side >= 0.0) == (a < b);
-      sides[k] = a < b ? side : -side;
-    }
-    in = !left[0];  // its normal faces against z
-    return left[0] == left[1] && left[1] == left[2] && sides.sum() != 0.0;
-  }
-
-  const std::vector<Triangle>& triangles_;
-  Points places_;  // [m] in the jaws' axes
-  std::vector<Index> near_;
-  std::vector<Crossing> found_;
-};
 
 std::string metres(double value) { return numberText(value, 3); }
 
@@ -113,8 +41,8 @@ Status check(const ClipCommand& command) {
 }
 
 /// Across the vessel, whose way is the one along which its surface is turned least; x is zero where it is none.
-Jaws jawsAt(const ShownSurface& shown, const Vec3& at, const Vec3& direction, double reach) {
-  Jaws jaws;
+LineFrame jawsAt(const ShownSurface& shown, const Vec3& at, const Vec3& direction, double reach) {
+  LineFrame jaws;
   Mat3 turns = Mat3::Zero();
   Vec3 middle = Vec3::Zero();
   double area = 0.0;
@@ -136,7 +64,7 @@ Jaws jawsAt(const ShownSurface& shown, const Vec3& at, const Vec3& direction, do
   middle /= area;
   jaws.centre = middle + (at - middle).dot(jaws.axes[0]) * jaws.axes[0];
   for (const int k : {2, 1}) {  // of what was near, to the middle of the whole
-    const Jaws turned{jaws.centre, {jaws.axes[(k + 1) % 3], jaws.axes[(k + 2) % 3], jaws.axes[k]}};
+    const LineFrame turned{jaws.centre, {jaws.axes[(k + 1) % 3], jaws.axes[(k + 2) % 3], jaws.axes[k]}};
     LineSearch line(shown, turned, 0.0, 0.0);
     Box met;
     for (const Crossing& crossing : line.through(0.0, 0.0))
@@ -175,7 +103,7 @@ Result<Reply> World::Impl::apply(const ClipCommand& command) {
                                          metres(nearest) + " m away"};
   if (!body->model->solid)
     return Error{ErrorCode::kUnsuitableShape, "'" + body->name + "' cannot be clipped: its surface is open"};
-  const Jaws jaws = jawsAt(shown, at, command.direction, half);
+  const LineFrame jaws = jawsAt(shown, at, command.direction, half);
   if (jaws.axes[0].isZero(0.0))
     return Error{ErrorCode::kInvalidArgument,
                  "direction lies along '" + body->name + "'; accepted: across it, for the jaws to close on it"};

@@ -286,6 +286,8 @@ struct World::Impl : KeptWorld {
   void rememberCut(CutUndo before, std::vector<std::string> cut, std::vector<std::string> pieces);
   Status checkCut(const CutCommand& command);
   Result<CutReply> cutNow(const CutCommand& command);
+  /// at_rest: the blade as the one body that is named has it at rest, where it is told.
+  Result<InciseReply> inciseNow(const InciseCommand& command, const Blade* at_rest = nullptr);
   /// Refuses what would leave more pieces than kMostPieces; `gone` of those there are go, `come` are made.
   Status checkPieces(std::size_t gone, std::size_t come) const;
   double graspRadius(const BodyModel& model) const;           // [m]
@@ -349,6 +351,9 @@ struct World::Impl : KeptWorld {
                           const Box& bounds, const BodyModel& model, const std::string& name);
   std::vector<WorldBody*> sleepersAt(std::size_t n);  // that press on an instrument
   bool wakeInHands();
+  /// Blades of instruments cut what they have crossed.
+  void cutByInstruments();
+  void snip(std::size_t n, WorldBody& body, double cuts_to, bool snips);
   void leadInstruments(double h_frame);
   /// Of a search for h [s], with h_left of the frame to come.
   void fillInstrumentCollider(std::size_t n, double h, double h_left, Collider& collider);

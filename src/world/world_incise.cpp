@@ -22,13 +22,19 @@ Status checkBlade(const Blade& b) {
 }  // namespace
 
 Result<Reply> World::Impl::apply(const InciseCommand& command) {
-  const auto start = std::chrono::steady_clock::now();
   if (Status status = checkBlade(command.blade); !status) return status.error();
   for (const std::string& name : command.bodies)
     if (!find(name)) return Error{ErrorCode::kUnknownName, "there is no body '" + name + "'; " + knownBodies()};
+  Result<InciseReply> reply = inciseNow(command);
+  if (!reply) return reply.error();
+  return Reply(*reply);
+}
+
+Result<InciseReply> World::Impl::inciseNow(const InciseCommand& command, const Blade* at_rest) {
+  const auto start = std::chrono::steady_clock::now();
   Box reach;
-  for (double s : {0.0, command.blade.length})
-    for (double t : {0.0, -command.blade.depth})
+  for (double s : {-command.blade.behind, command.blade.length})
+    for (double t : {command.blade.rise, -command.blade.depth})
       reach.extend(command.blade.origin + s * command.blade.x_axis + t * command.blade.y_axis);
 
   struct Opened {
@@ -47,7 +53,8 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
     Box bounds;
     for (const Vec3& p : body->state.surface) bounds.extend(p);
     if (!bounds.overlaps(reach)) continue;
-    Result<CutBody> opened = cutBody(*body->model, body->state, command.blade, {0.0, 0, picked(body->id)});
+    Result<CutBody> opened = cutBody(*body->model, body->state, at_rest ? *at_rest : command.blade,
+                                     {0.0, 0, picked(body->id), at_rest != nullptr});
     if (opened) {
       all.push_back({body->id, std::move(*opened)});
     } else if (opened.error().code == ErrorCode::kMissed) {
@@ -106,7 +113,7 @@ Result<Reply> World::Impl::apply(const InciseCommand& command) {
   }
   rememberCut(std::move(before), reply.cut_bodies, reply.new_bodies);
   reply.duration = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return Reply(reply);
+  return reply;
 }
 
 }  // namespace meshless

@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "line_search.h"
 #include "meshless_surgery/base/number_text.h"
+#include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/geometry/query/inside.h"
 #include "world_impl.h"
@@ -14,6 +16,10 @@ constexpr double kHolds = 0.01;   // [N] on each jaw: they hold what is between 
 constexpr double kLostFor = 0.1;  // [s] without: they have lost it
 constexpr double kCrushed = 0.1;  // of the angle at which jaws have met tissue: they close no further
 constexpr double kRests = 1e-6;   // [m/s] slower instruments wake nobody
+constexpr double kSnip = 0.125;   // of blades: they have closed on so much more before it is cut, or close no further
+constexpr double kJoins = 3e-4;   // [m] by which a snip goes over the last one, and beyond tissue
+constexpr double kGoesOn = 0.8;   // cosine: blades turned less go on with their wound
+constexpr int kLines = 5;         // along a snip, on which its tissue is looked for
 
 bool isHand(const Pose& pose) {
   return pose.translation.norm() <= kFarthestHand && std::abs(pose.rotation.norm() - 1.0) <= 1e-3;
@@ -92,6 +98,7 @@ Result<Reply> World::Impl::apply(const AttachInstrumentCommand& command) {
   instrument.pose = instrument.def.pose;
   instrument.aim();
   instrument.hand = instrument.target = instrument.pose;
+  instrument.cut_to = instrument.cutsTo();
   auto body = std::make_shared<InstrumentBody>(def);
   body->place(instrument);
   const double lowest = boundsOf(body->positions).min.z();
@@ -151,6 +158,161 @@ Status World::addSceneInstrument(const InstrumentDef& def) {
   if (!reply) return reply.error();
   impl_->scene_instruments.push_back(def);
   return Done{};
+}
+
+namespace {
+
+/// Tissue on a line across blades, that lies where their edges are.
+struct BetweenBlades {
+  double low = 0.0, high = 0.0;  // [m] along the line, from the middle of the blades
+  Points rest;                   // [m] where the line goes in and out
+  double thickness = 0.0;        // [m] at rest
+  Vec3 middle = Vec3::Zero();    // [m] likewise
+};
+
+BetweenBlades between(const std::vector<Crossing>& met, double gap, const ContactSurface& surface) {
+  BetweenBlades found;
+  const auto atRest = [&](const NearestFace& face) {
+    Vec3 sum = Vec3::Zero();
+    for (int k = 0; k < 3; ++k) sum += face.shares[k] * surface.rest[surface.triangles[face.face][k]];
+    return sum;
+  };
+  for (std::size_t n = 0; n + 1 < met.size(); ++n) {
+    if (!met[n].in || met[n + 1].in || met[n].at > gap || met[n + 1].at < -gap) continue;
+    const Vec3 from = atRest(met[n].face), to = atRest(met[n + 1].face);
+    found.low = std::min(found.low, met[n].at);
+    found.high = std::max(found.high, met[n + 1].at);
+    found.rest.insert(found.rest.end(), {from, to});
+    found.thickness += (to - from).norm();
+    found.middle += 0.5 * (to - from).norm() * (from + to);
+  }
+  if (found.thickness > 0.0) found.middle /= found.thickness;
+  return found;
+}
+
+}  // namespace
+
+void World::Impl::cutByInstruments() {
+  for (std::size_t n = 0; n < instruments.size(); ++n) {
+    Instrument& instrument = instruments[n];
+    const InstrumentDef& def = instrument.def;
+    if (def.type != InstrumentType::kScissors) continue;
+    instrument.resists = 0.0;
+    const double length = def.jaw_length, cuts_to = instrument.cutsTo();
+    if (cuts_to < instrument.cut_to) {  // they open
+      instrument.cut_to = cuts_to;
+      instrument.cut_work = instrument.owed = 0.0;
+    }
+    const double more = cuts_to - instrument.cut_to;
+    const bool closes = instrument.jaw_rate < -kRests / length;
+    const bool snips = more > 0.0 && (more >= kSnip * length || cuts_to == length || !closes);
+    if (!snips && !closes && !(instrument.jaw_target < instrument.jaw)) continue;
+    std::vector<std::string> near;
+    const Box blades = boundsOf(instrument_bodies[n]->positions);
+    for (const auto& body : bodies) {
+      if (!body->model->solid) continue;
+      refreshSurface(*body);
+      if (boundsOf(body->state.surface).overlaps(blades)) near.push_back(body->name);
+    }
+    for (const std::string& name : near) snip(n, *find(name), cuts_to, snips);
+    if (snips) {
+      instrument.cut_to = cuts_to;
+      instrument.owed -= std::exchange(instrument.cut_work, 0.0);
+    }
+    if (instrument.resists > 0.0)
+      instrument.resists = std::max(0.0, instrument.resists + instrument.owed / (kSnip * length));
+  }
+}
+
+void World::Impl::snip(std::size_t n, WorldBody& body, double cuts_to, bool snips) {
+  Instrument& instrument = instruments[n];
+  const InstrumentDef& def = instrument.def;
+  const double reach = def.bladeReach(), begins = instrument.cut_to, step = (cuts_to - begins) / (kLines - 1);
+  // Lines across the blades, in the plane on which they slide along each other.
+  const Mat3 axes = instrument.pose.rotation.toRotationMatrix();
+  const LineFrame frame{instrument.pose * instrument_bodies[n]->shape->hinge, {axes.col(0), -axes.col(2), axes.col(1)}};
+  const ShownSurface shown = shownNow(body);
+  LineSearch lines(shown, frame, def.jaw_length, 0.0);
+  const auto at = [&](double x) { return between(lines.through(x, 0.0), reach, *shown.surface); };
+  if (cuts_to < def.jaw_length && body.material.toughness > 0.0) {
+    // The area at rest that comes in this frame, for the way there.
+    Instrument then = instrument;
+    then.jaw += std::min(0.0, instrument.jaw_rate / settings.step_rate);
+    const double way = std::max(then.cutsTo() - cuts_to, kJoins), part = way / kLines;
+    double area = 0.0;
+    const auto uncut = [&](double x) {
+      const BladeWound& wound = instrument.wound;
+      BetweenBlades tissue = at(x);
+      const double along = wound.x_axis.dot(tissue.middle - wound.origin);
+      if (wound.body == body.name && along > wound.begin && along < wound.end) tissue.thickness = 0.0;
+      return tissue;
+    };
+    BetweenBlades last = uncut(cuts_to);
+    for (int k = 1; k <= kLines; ++k) {
+      const BetweenBlades next = uncut(cuts_to + k * part);
+      const bool both = last.thickness > 0.0 && next.thickness > 0.0;
+      area += 0.5 * (last.thickness + next.thickness) * (both ? (next.middle - last.middle).norm() : part);
+      last = next;
+    }
+    instrument.resists += body.material.toughness * area / way;
+  }
+  if (!snips) return;
+  double low = 0.0, high = 0.0;  // [m]
+  Points rest;
+  for (int k = 0; k < kLines; ++k) {
+    const BetweenBlades tissue = at(begins + k * step);
+    low = std::min(low, tissue.low);
+    high = std::max(high, tissue.high);
+    rest.insert(rest.end(), tissue.rest.begin(), tissue.rest.end());
+  }
+  if (rest.empty()) return;
+  const bool ends = at(cuts_to + kJoins).rest.empty();  // tissue does
+  InciseCommand command;
+  command.bodies = {body.name};
+  command.blade = {frame.centre + begins * axes.col(0),
+                   axes.col(0),
+                   axes.col(1),
+                   cuts_to - begins,
+                   kJoins - low,
+                   kJoins + high,
+                   0.0};
+  const std::optional<Blade> led = bladeAtRest(*body.model, body.state, command.blade);
+  if (!led) return;
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& p : rest) middle += p / static_cast<double>(rest.size());
+  const auto within = [&](const BladeWound& of) {
+    Box box;
+    for (const Vec3& p : rest) box.extend(Vec3((p - of.origin).dot(of.x_axis), (p - of.origin).dot(of.y_axis), 0.0));
+    return box;
+  };
+  // A wound is gone on with where the blades still are in its plane, and at it.
+  BladeWound& wound = instrument.wound;
+  const Vec3 normal = wound.x_axis.cross(wound.y_axis);
+  Box in_plane = within(wound);
+  const bool goes_on = wound.body == body.name && normal.dot(led->plane().normal) > kGoesOn &&
+                       std::abs(normal.dot(middle - wound.origin)) < 0.5 * def.jaw_width &&
+                       in_plane.max.x() > wound.begin && in_plane.min.x() < wound.end + kSnip * def.jaw_length;
+  if (!goes_on) {
+    wound = {body.name, middle, led->x_axis, led->y_axis, 0.0, 0.0};
+    in_plane = within(wound);
+  }
+  const Vec3 margin = 0.25 * (in_plane.max - in_plane.min) + Vec3::Constant(kJoins);
+  if (!goes_on) wound.begin = wound.end = in_plane.min.x() - margin.x();
+  const double from = std::min(wound.end, in_plane.min.x()) - kJoins;
+  const double to = in_plane.max.x() + (ends ? margin.x() : 0.0);
+  if (!(to > wound.end)) return;
+  Blade blade = {
+      wound.origin + from * wound.x_axis, wound.x_axis, wound.y_axis, to - from, margin.y() - in_plane.min.y(),
+      margin.y() + in_plane.max.y(),      0.0};
+  wound.end = to;
+  const std::size_t said = events.size();
+  ++commands;  // each is another one
+  const double toughness = body.material.toughness;
+  const Result<InciseReply> made = inciseNow(command, &blade);
+  if (!made) return;
+  instrument.owed += toughness * made->opened_area;
+  for (std::size_t e = said; e < events.size(); ++e)
+    if (events[e].type == EventType::kIncised) events[e].instrument = def.name;
 }
 
 void World::Impl::leadInstruments(double h_frame) {
@@ -305,6 +467,7 @@ void World::Impl::feelInstrument(Index island, Index collider, double h, double 
     load.jaw_inertia *= part;
   }
   instrument.load = load;
+  instrument.jaw_torque += share * instrument.cut_torque;
   instrument.force += share * load.force;
   instrument.torque += share * load.torque;
   instrument.jaw_torque += share * load.jaw;
@@ -320,6 +483,7 @@ void World::Impl::stepFreeInstruments(double h, int parts, int parts_left) {
     instruments[n].load = InstrumentLoad();
     advanceInstrument(static_cast<Index>(bodies.size() + obstacles.size() + n), h, parts_left);
     instruments[n].force += body.blocked / parts;
+    instruments[n].jaw_torque += instruments[n].cut_torque / parts;
   }
 }
 
@@ -334,7 +498,7 @@ void World::Impl::finishInstruments(double h_frame) {
       say(EventType::kFault, "", 0,
           "the pose of instrument " + instrument.def.name + " was not finite any more; it is where its hand is");
     }
-    if (!instrument.def.hasJaws() || (body.rests && !body.felt)) continue;
+    if (instrument.def.type != InstrumentType::kGrasper || (body.rests && !body.felt)) continue;
     const bool pinches = std::any_of(body.pressed.begin(), body.pressed.end(),
                                      [](const InstrumentBody::Pressed& p) { return p.on[0] > 0.0 && p.on[1] > 0.0; });
     if (!pinches)

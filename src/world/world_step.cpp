@@ -39,6 +39,7 @@ void World::Impl::takeStep() {
   const Stopwatch total(report.total);
   const double h_frame = 1.0 / settings.step_rate;
   closeBlades();
+  cutByInstruments();
   wakePushed(h_frame);
   leadInstruments(h_frame);
   closeClips(h_frame);

@@ -49,6 +49,7 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
         return apart.error();
     }
   CutUndo before = std::move(undo.back());
+  for (Instrument& instrument : instruments) instrument.wound = BladeWound();  // it may be no more
   undo.pop_back();
 
   // What the cut made, and what it opened without parting it, goes.

@@ -279,6 +279,7 @@ std::vector<Row> rows() {
       {"material", "poissons_ratio: 0.123", "", MATERIAL(poissons_ratio), "0.123"},
       {"material", "stiffening: 12.5", "", MATERIAL(stiffening), "12.5"},
       {"material", "asymmetry: -7.5", "", MATERIAL(asymmetry), "-7.5"},
+      {"material", "toughness: 250", "", MATERIAL(toughness), "250"},
       {"material", "relaxation: [{share: 0.25, time: 1.5}, {share: 0.5, time: 3}]", "", MATERIAL(relaxation.size()),
        "2"},
       {"material", "alpha: 0.123", "", MATERIAL(alpha), "0.123"},

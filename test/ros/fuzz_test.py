@@ -255,7 +255,7 @@ class Fuzzer:
             return dict(body='', yaml='{%s: %.3f}' % (r.choice(['restitution', 'friction', 'damping']), r.random()))
         if service == 'set_material':
             yaml = r.choice(yaml_bombs()) if r.random() < 0.3 else '{%s: %s}' % (
-                r.choice(['alpha', 'beta', 'mode', 'density', 'youngs_modulus', 'friction', 'damping', 'colour', 'stiffening', 'asymmetry', 'relaxation',
+                r.choice(['alpha', 'beta', 'mode', 'density', 'youngs_modulus', 'friction', 'damping', 'colour', 'stiffening', 'asymmetry', 'toughness', 'relaxation',
                           'volume']),
                 r.choice([self.number(), self.string()[:200], '[1, 2]', '[[0, 0.5]]', '{}']))
             return dict(body=self.maybe_name(), yaml=yaml)
@@ -265,7 +265,7 @@ class Fuzzer:
             return dict(name=self.maybe_name(), clamp=r.choice([0, 0, 1, 7, 0xffffffff]), header=self.header(), shift=self.vector(),
                         turn=self.pose().pose.orientation, time=self.number())
         if service == 'attach_instrument':
-            yaml = r.choice(['{type: grasper}', '{type: probe}', '{type: hook, max_force: %s}' % self.number(), '{type: %s}' % self.string()[:40], '[1]'])
+            yaml = r.choice(['{type: grasper}', '{type: probe}', '{type: hook, max_force: %s}' % self.number(), '{type: scissors, grip: %s}' % self.number(), '{type: %s}' % self.string()[:40], '[1]'])
             return dict(name=r.choice(['left', 'right', 'push', self.string()[:60]]), yaml=yaml, pose=self.pose())
         if service == 'detach_instrument':
             return dict(name=r.choice(['left', 'right', self.string()[:60]]))

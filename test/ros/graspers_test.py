@@ -72,6 +72,20 @@ class GraspersTest(DeformerTestCase):
             events.wait(lambda e: e.type == Event.RELEASED and e.body == 'block')
             self.state_where(lambda s: s.bodies[0].centre_of_mass.z < 0.03)
 
+    def test_scissors_cut_as_far_as_their_blades_close(self):
+        events = self.deformer.recorder('events', Event)
+        self.surgeon.attach_instrument('right', '{type: scissors, grip: 50, jaw_length: 0.03, jaw_thickness: 0.003}', (0, 0, 0.09), DOWN)
+        with self.surgeon.stream('right') as right:
+            self.lead(right, 0.09, 0.09, 1.2, 0.4)
+            self.state_where(lambda s: s.instruments[-1].jaw > 1.19)
+            self.lead(right, 0.09, 0.02, 1.2, 0.8)
+            self.lead(right, 0.02, 0.02, 0.0, 0.8)
+            cut = events.wait(lambda e: e.type == Event.INCISED and e.body == 'block')
+            self.assertEqual('right', cut.instrument)
+            self.lead(right, 0.02, 0.09, 0.0, 0.4)
+        self.good('undo_cut')
+        self.surgeon.detach_instrument('right')
+
     def test_its_topics_and_its_frame_say_where_it_is(self):
         buffer = tf2_ros.Buffer()
         listener = tf2_ros.TransformListener(buffer)
@@ -110,7 +124,7 @@ class GraspersTest(DeformerTestCase):
         for name, yaml, place, said in (
                 ('right', '{type: probe}', (0.3, 0, 0.2), "there is an instrument 'right' already"),
                 ('push', '{type: probe}', (0.3, 0, 0.2), 'not pick, push, scissors'),
-                ('new', '{type: laser}', (0.3, 0, 0.2), 'probe, grasper, hook'),
+                ('new', '{type: laser}', (0.3, 0, 0.2), 'probe, grasper, hook, scissors'),
                 ('new', '{type: probe, max_force: 0}', (0.3, 0, 0.2), 'max_force is 0; accepted: 0.01 to 10000 N'),
                 ('new', '{type: probe, max_forse: 1}', (0.3, 0, 0.2), "did you mean 'max_force'"),
                 ('new', '{type: probe}', (0, 0, 0.015), "would be inside of body 'block'")):

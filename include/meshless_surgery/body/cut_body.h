@@ -1,6 +1,8 @@
 // A blade through a body, or into it: a new model and state for each piece.
 #pragma once
 
+#include <optional>
+
 #include "meshless_surgery/body/body.h"
 #include "meshless_surgery/body/tissue_place.h"
 #include "meshless_surgery/geometry/surgery/incise.h"
@@ -41,6 +43,7 @@ struct CutBodyOptions {
   double roughness = 0.0;           // [m] amplitude of the fractal displacement of the wound faces; 0: clean
   std::uint32_t seed = 0;           // of it
   std::vector<TissuePlace> places;  // to be followed
+  bool at_rest = false;             // the blade is in the frame of the rest shape, and meets that
 };
 
 /// The blade is in the world frame and meets the present shape. Links between samples that pass through it are cut.
@@ -49,5 +52,9 @@ struct CutBodyOptions {
 /// solid. state.surface must be up to date.
 Result<CutBody> cutBody(const BodyModel& model, const BodyState& state, const Blade& blade,
                         const CutBodyOptions& options = {});
+
+/// Where a blade is at rest that meets the present shape: by the affine map that fits the tissue around it best. None
+/// where too little is around it.
+std::optional<Blade> bladeAtRest(const BodyModel& model, const BodyState& state, const Blade& blade);
 
 }  // namespace meshless

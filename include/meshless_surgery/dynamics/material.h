@@ -62,6 +62,7 @@ struct Material {
   double damping = 1.0;                          // [1/s] >= 0, decay rate of the motion that deforms
   double friction = 0.5;                         // 0..10, Coulomb
   double restitution = 0.0;                      // 0..1, share of the approach that a contact gives back
+  double toughness = 0.0;                        // [J/m^2] >= 0 of a new cut face pair, by blades that are felt
   SelfContact self_contact = SelfContact::kAll;  // never of a body that cannot bend
   ResponseCurve volume;                          // of the solid's volume
   ResponseCurve area;                            // of the surface

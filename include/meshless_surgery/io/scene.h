@@ -27,7 +27,7 @@ namespace meshless {
 ///   NAME_1,
 ///                 NAME_2 ..., in cells of a grid (x first) `offset` apart, each moved by up to `jitter` [m] along
 ///                 every axis and turned by up to `turn` [rad] about any, by a generator that `seed` starts
-/// instruments: {NAME: {type: probe | grasper | hook, pose, max_force, grip, friction, remote_centre, ...}}
+/// instruments: {NAME: {type: probe | grasper | hook | scissors, pose, max_force, grip, friction, remote_centre, ...}}
 /// attachments: a list of {bodies: [name, name], distance, stiffness, strength, region: {box | plane | sphere}, name};
 ///              one of the names may be an obstacle's or `world`
 Result<SceneDef> readScene(const std::string& file, const FileAccess& access);

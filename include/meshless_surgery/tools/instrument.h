@@ -10,8 +10,9 @@
 
 namespace meshless {
 
-/// A rod with a round tip; two jaws on a hinge; a rod whose tip is bent aside, to +y.
-enum class InstrumentType { kProbe, kGrasper, kHook };
+/// A rod with a round tip; two jaws on a hinge; a rod whose tip is bent aside, to +y; two blades on a hinge that slide
+/// along each other, the upper one on the side of +z.
+enum class InstrumentType { kProbe, kGrasper, kHook, kScissors };
 const char* toString(InstrumentType type);
 
 /// What a user chose. The hand is an impedance: a spring and a damper draw the instrument to where it is wanted, by no
@@ -37,8 +38,10 @@ struct InstrumentDef {
   std::optional<Vec3> remote_centre;  // [m] of a trocar, through which the shaft goes
   Color color{0.75f, 0.78f, 0.82f, 1.0f};
 
-  bool hasJaws() const { return type == InstrumentType::kGrasper; }
-  double jawEdge() const;  // [m] of the triangles of a jaw
+  bool hasJaws() const { return type == InstrumentType::kGrasper || type == InstrumentType::kScissors; }
+  double jawEdge() const;       // [m] of the triangles of a jaw
+  double bladeOverlap() const;  // [m] by which the edges of closed blades are past the middle
+  double bladeReach() const;    // [m] the same of where they cut
   /// Names the value and what is accepted.
   Status validate() const;
 };
@@ -84,6 +87,14 @@ struct InstrumentLoad {
   double jaw_inertia = 0.0;    // [kg m^2] of that for the angle between the jaws
 };
 
+/// A wound that blades make, snip by snip: in one plane of the body at rest.
+struct BladeWound {
+  std::string body;                                     // empty: none
+  Vec3 origin = Vec3::Zero();                           // [m]
+  Vec3 x_axis = Vec3::UnitX(), y_axis = Vec3::UnitY();  // unit; x: the way in which it grows
+  double begin = 0.0, end = 0.0;                                     // [m] along x
+};
+
 struct Instrument {
   InstrumentDef def;
   std::uint32_t number = 0;                           // never used again
@@ -96,6 +107,12 @@ struct Instrument {
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  // [m/s, rad/s] in the last substep
   double jaw_rate = 0.0;                              // [rad/s]
   double jaw_stop = 0.0;                              // [rad] they close no further
+  double cut_to = 0.0;         // [m] from the hinge to which blades have cut what is between them
+  BladeWound wound;            // that they go on with
+  double resists = 0.0;        // [N] of what they cut next: toughness times thickness
+  double cut_torque = 0.0;     // [N m] of that on the jaws in the last substep
+  double cut_work = 0.0;       // [J] of that since the last snip
+  double owed = 0.0;           // [J] that snips have taken more than that came to
   double answers = 0.0;        // [N/m] of force from outside, for the way that this moved it in the last substep
   InstrumentLoad load;         // of the last substep
   Vec3 force = Vec3::Zero();   // [N] on it, mean over the last step
@@ -110,6 +127,8 @@ struct Instrument {
   Pose handAfter(double h) const;
   double jawAfter(double h) const;  // [rad]
   bool isFinite() const;
+  /// [m] from the hinge to where the edges of blades are nearer to each other than they are thick: they cut so far.
+  double cutsTo() const;
   /// It is where its hand is, at rest and without load.
   void comeBack();
   /// Turns it so that its shaft goes through its trocar, where it has one.

@@ -99,7 +99,7 @@ struct Event {
   BodyModelPtr removed = {};  // of kRemoved: the body that is no more, which may have come in the same step
   Pose placed = {};           // of it, as BodySnapshot::placed
   bool taken_apart = false;   // of kDetached: by a command that is for it, and no clip
-  std::string instrument = {};  // of kGrasped, kDropped, and of kReleased by jaws
+  std::string instrument = {};  // of kGrasped, kDropped, kReleased by jaws, kIncised by blades
   double force = 0.0;           // [N] of kGrasped
   std::uint64_t command = 0;  // how many commands the world was given before: those of one have the same
 };
