@@ -44,6 +44,10 @@ const char* toString(Hand hand) {
       return "push";
     case Hand::kScissors:
       return "scissors";
+    case Hand::kInstrument:
+      return "instrument";
+    case Hand::kSecondInstrument:
+      return "instrument_2";
   }
   return "unknown";
 }
@@ -119,6 +123,11 @@ TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants&
     const Vec3 tips = blades.origin + blades.length * blades.x_axis;
     frame.tools.push_back(
         {ToolKind::kScissors, 0, false, "", blades.origin, orientationOf(blades), tips, kShaft, 0.0, tips});
+  }
+  for (const Instrument& of : shot.instruments) {
+    const Vec3 end = of.pose * Vec3(-of.def.shaft_length - (of.def.hasJaws() ? of.def.jaw_length : 0.0), 0.0, 0.0);
+    frame.tools.push_back({ToolKind::kInstrument, of.number, false, of.holds, of.pose.translation, of.pose.rotation,
+                           end, of.def.shaft_radius, of.force.norm(), of.pose.translation});
   }
   for (const BodySnapshot& body : shot.bodies) {
     frame.bodies.push_back({body.name, body.number, body.model, body.placed, Vec3::Zero(), {}});

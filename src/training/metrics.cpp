@@ -48,7 +48,7 @@ const std::vector<MetricRow>& metricTable() {
        "half overlapping, of Hann, without their trend",
        kOwn},
       {"angular_path", "rad", kLower, true,
-       "sum of the turns from step to step; of scissors alone, others have no direction", kUsual},
+       "sum of the turns from step to step; of scissors and instruments, others have no direction", kUsual},
       {"force_mean", "N", kLower, false, "mean of the largest force of a tool, over the time in which there is one",
        kNeuro},
       {"force_peak", "N", kLower, false, "largest force of a tool in any step", kNeuro},
@@ -70,7 +70,8 @@ const std::vector<MetricRow>& metricTable() {
       {"target_left", "1", kLower, false, "share of the target that was not removed", kNeuro},
       {"cut_area", "m^2", kLower, false, "area at rest of one side of all cut faces", kOwn},
       {"cuts", "1", kLower, false, "times that scissors severed something; of one command once", kOwn},
-      {"strokes", "1", kLower, false, "times that a blade opened something; of one command once", kOwn},
+      {"strokes", "1", kLower, false,
+       "times that a blade opened something; of one command once, of scissors in a hand each snip", kOwn},
       {"plan_rms", "m", kLower, false,
        "root of the mean, by area, of the squared distance of the cut faces at rest from the plan's rectangle", kOwn},
       {"plan_hausdorff", "m", kLower, false,
@@ -85,11 +86,13 @@ const std::vector<MetricRow>& metricTable() {
       {"margin_mean", "m", kHigher, false, "mean of that distance, by area", kOwn},
       {"clip_distance", "m", kLower, false,
        "distance at rest of the middle of the target from that of the jaws of the farthest clip", kOwn},
-      {"drops", "1", kLower, false, "picks that ended because their hand's stream fell silent", kOwn},
-      {"grasps", "1", kLower, false, "times that a pick took hold of tissue", kOwn},
+      {"drops", "1", kLower, false,
+       "picks that ended because their hand's stream fell silent, and tissue that slipped out of jaws", kOwn},
+      {"grasps", "1", kLower, false, "times that a pick or jaws took hold of tissue", kOwn},
       {"picks_at_once", "1", kLower, false, "most picks that hold tissue at a time, locked ones too", kOwn},
       {"drop_height", "m", kLower, false,
-       "most by which the centre of mass of a body that a pick has held sinks below where it has been since it was let "
+       "most by which the centre of mass of a body that a pick or jaws have held sinks below where it has been since "
+       "it was let "
        "go of; ten times a second",
        kOwn},
       {"undos", "1", kLower, false, "cuts that were taken back", kOwn},
@@ -188,6 +191,16 @@ void Metrics::feedHands(const TrainingFrame& frame) {
   for (const TrainingFrame::Tool& tool : frame.tools) {
     if (tool.kind == ToolKind::kPush) tools[static_cast<std::size_t>(Hand::kPush)] = &tool;
     if (tool.kind == ToolKind::kScissors) tools[static_cast<std::size_t>(Hand::kScissors)] = &tool;
+    if (tool.kind == ToolKind::kInstrument) {
+      const auto rest = rests_.emplace(tool.pick, tool.position).first;
+      auto held = std::find(instruments_.begin(), instruments_.end(), tool.pick);
+      if (held == instruments_.end() && rest->second != tool.position)
+        held = std::find(instruments_.begin(), instruments_.end(), std::nullopt);
+      if (held == instruments_.end()) continue;
+      *held = tool.pick;
+      tools[static_cast<std::size_t>(Hand::kInstrument) + static_cast<std::size_t>(held - instruments_.begin())] =
+          &tool;
+    }
     if (tool.kind != ToolKind::kPick || stays(tool)) continue;
     auto hand = std::find(picks_.begin(), picks_.end(), tool.pick);
     if (hand == picks_.end()) hand = std::find(picks_.begin(), picks_.end(), PickId{0});
@@ -226,6 +239,7 @@ void Metrics::feedEvents(const TrainingFrame& frame) {
         once(undos_, last_undo_, event);
         break;
       case EventType::kPicked:
+      case EventType::kGrasped:
         ++grasps_;
         break;
       case EventType::kTorn:
@@ -238,6 +252,9 @@ void Metrics::feedEvents(const TrainingFrame& frame) {
         break;
       case EventType::kLifted:
         drops_ += event.pick != 0;
+        break;
+      case EventType::kDropped:
+        ++drops_;
         break;
       default:
         break;
@@ -261,7 +278,7 @@ void Metrics::feedDrops(const TrainingFrame& frame) {
   for (const TrainingFrame::Body& body : frame.bodies) {
     const double height = -frame.down.dot(body.centre);
     const bool held = std::any_of(frame.tools.begin(), frame.tools.end(), [&](const TrainingFrame::Tool& tool) {
-      return tool.kind == ToolKind::kPick && tool.body == body.name;
+      return !tool.body.empty() && tool.body == body.name;
     });
     const auto found = held ? heights_.try_emplace(body.number).first : heights_.find(body.number);
     if (found == heights_.end()) continue;
@@ -275,8 +292,9 @@ void Metrics::feedStrain(const TrainingFrame& frame) {
   touched_any_ = touched_any_ || force_ > kPressing ||
                  std::any_of(frame.events.begin(), frame.events.end(), [](const Event& event) {
                    return event.type == EventType::kPicked || event.type == EventType::kTouched ||
-                          event.type == EventType::kCut || event.type == EventType::kIncised ||
-                          event.type == EventType::kClipped || event.type == EventType::kDetached;
+                          event.type == EventType::kGrasped || event.type == EventType::kCut ||
+                          event.type == EventType::kIncised || event.type == EventType::kClipped ||
+                          event.type == EventType::kDetached;
                  });
   double strained = 0.0;
   for (const TrainingFrame::Body& body : frame.bodies) {
@@ -386,7 +404,7 @@ std::vector<MetricValue> Metrics::values(const RestTissue& tissue, std::size_t s
     of("sparc", hand.sparc());
     of("ldlj", hand.jerk());
     of("tremor", hand.tremor());
-    if (static_cast<Hand>(h) == Hand::kScissors) of("angular_path", hand.angularPath());
+    if (static_cast<Hand>(h) >= Hand::kScissors) of("angular_path", hand.angularPath());
   }
   std::sort(sorted.begin(), sorted.end());
   set("time", time_);

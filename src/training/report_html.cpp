@@ -12,7 +12,7 @@ namespace {
 constexpr double kWidth = 960.0, kRow = 130.0, kLeft = 60.0, kRight = 20.0;
 constexpr std::size_t kMostColumns = 900, kMostMarks = 300;
 constexpr double kWell = 0.8;  // of a metric's marks
-const char* const kHandColors[kHands] = {"#1f6fb2", "#7a4fb0", "#2e8b57", "#c2571a"};
+const char* const kHandColors[kHands] = {"#1f6fb2", "#7a4fb0", "#2e8b57", "#c2571a", "#0b7a8c", "#8c6d0b"};
 
 std::string escaped(const std::string& text) {
   std::string out;

@@ -13,7 +13,8 @@
 namespace meshless {
 namespace {
 
-constexpr double kFailEvery = 0.1;  // [s]
+constexpr PickId kOfJaws = PickId{1} << 31;  // beyond the numbers of picks
+constexpr double kFailEvery = 0.1;           // [s]
 
 /// The tissue's surface, where the scene puts it.
 TriangleMesh placedMesh(const BodyDef& body) {
@@ -311,7 +312,7 @@ void TaskProgress::watch(const Condition& condition, const TrainingFrame& frame)
     Hands& hands = hands_[over->body];
     std::vector<PickId> held;
     for (const TrainingFrame::Tool& tool : frame.tools)
-      if (tool.kind == ToolKind::kPick && isOf(tool.body, over->body)) held.push_back(tool.pick);
+      if (isOf(tool.body, over->body)) held.push_back(tool.pick + (tool.kind == ToolKind::kInstrument ? kOfJaws : 0));
     std::sort(held.begin(), held.end());
     if (held.empty())
       hands.taken_over = false;
@@ -366,7 +367,9 @@ bool TaskProgress::meets(const Condition& condition, const TrainingFrame& frame,
     });
   const auto holders = [&](const std::string& body, const std::optional<Region>& region) {
     return std::count_if(frame.tools.begin(), frame.tools.end(), [&](const TrainingFrame::Tool& tool) {
-      return tool.kind == ToolKind::kPick && isOf(tool.body, body) && (!region || region->contains(tool.tissue));
+      const bool jaws = tool.kind == ToolKind::kInstrument;
+      return (jaws || tool.kind == ToolKind::kPick) && isOf(tool.body, body) &&
+             (!region || region->contains(jaws ? tool.position : tool.tissue));
     });
   };
   if (const auto* hold = std::get_if<Hold>(&condition)) return holders(hold->body, hold->region) >= hold->picks;
@@ -376,7 +379,9 @@ bool TaskProgress::meets(const Condition& condition, const TrainingFrame& frame,
     const auto found = whereabouts_.find(back->body);
     return found != whereabouts_.end() && (found->second.now - found->second.at_start).norm() <= back->distance;
   }
-  return !anyTool([](const auto& tool) { return tool.kind != ToolKind::kScissors; });
+  return !anyTool([](const auto& tool) {
+    return tool.kind == ToolKind::kInstrument ? !tool.body.empty() : tool.kind != ToolKind::kScissors;
+  });
 }
 
 std::string TaskProgress::broken(const Metrics& metrics) const {

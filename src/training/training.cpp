@@ -98,9 +98,13 @@ Status Training::feed(TrainingFrame frame) {
   Now& now = *now_;
   if (now.settling) {
     now.settled += frame.dt;
-    const bool acts =
-        !frame.tools.empty() || std::any_of(frame.events.begin(), frame.events.end(),
-                                            [&](const Event& event) { return event.command > now.first_command; });
+    const auto acts_by = [&](const TrainingFrame::Tool& tool) {  // an instrument lies there until it is moved
+      return tool.kind != ToolKind::kInstrument ||
+             now.rests.emplace(tool.pick, tool.position).first->second != tool.position;
+    };
+    const bool acts = std::any_of(frame.tools.begin(), frame.tools.end(), acts_by) ||
+                      std::any_of(frame.events.begin(), frame.events.end(),
+                                  [&](const Event& event) { return event.command > now.first_command; });
     if (!acts && now.settled < task_.settle + 1e-9) {
       now.last_step = frame.step;
       now.tissue.feed(frame);

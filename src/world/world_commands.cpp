@@ -291,6 +291,8 @@ Result<Reply> World::Impl::apply(const LiftCommand& command) {
       if (command.streamed_only && !closing.empty()) return Error{ErrorCode::kMissed, "a service closes the scissors"};
       scissors.shown = false;
       break;
+    case ToolKind::kInstrument:
+      return Error{ErrorCode::kInvalidArgument, "an instrument is put away by its name"};
   }
   if (!command.why.empty()) say(EventType::kLifted, body, id, command.why);
   return Reply(Done{});

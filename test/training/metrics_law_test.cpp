@@ -49,12 +49,18 @@ using Way = std::vector<std::optional<Vec3>>;  // of a hand, step by step
 
 Way wayOf(const Session& s, std::size_t hand) {
   Way way;
+  bool begun = false;  // an instrument is there from its first move on
   for (const WorldSnapshot& shot : s.steps) {
     std::optional<Vec3> at;
     for (const Pick& pick : shot.picks)
       if (hand < s.picks.size() && pick.id == s.picks[hand]) at = pick.target;
     if (hand == 2 && shot.push.enabled) at = shot.push.position;
     if (hand == 3 && shot.scissors.shown) at = shot.scissors.blades.origin;
+    for (std::size_t n = 0; n < shot.instruments.size() && hand >= 4; ++n) {
+      const Vec3& tip = shot.instruments[n].pose.translation;
+      if (n == hand - 4 && tip != shot.instruments[n].def.pose.translation) begun = true;
+      if (n == hand - 4 && begun) at = tip;
+    }
     way.push_back(at);
   }
   return way;
@@ -171,6 +177,7 @@ std::vector<double> forcesOf(const Session& s) {
   for (const WorldSnapshot& shot : s.steps) {
     double most = shot.push.enabled ? shot.push.force.norm() : 0.0;
     for (const Pick& pick : shot.picks) most = std::max(most, pick.force.norm());
+    for (const Instrument& of : shot.instruments) most = std::max(most, of.force.norm());
     forces.push_back(most);
   }
   return forces;
@@ -182,6 +189,7 @@ std::vector<double> togetherOf(const Session& s) {
   for (const WorldSnapshot& shot : s.steps) {
     double sum = shot.push.enabled ? shot.push.force.norm() : 0.0;
     for (const Pick& pick : shot.picks) sum += pick.force.norm();
+    for (const Instrument& of : shot.instruments) sum += of.force.norm();
     if (sum > 1e-6) forces.push_back(sum);
   }
   return forces;
@@ -245,6 +253,10 @@ std::vector<std::pair<std::string, Line>> toolsOf(const WorldSnapshot& shot) {
   const ScissorBlades& blades = shot.scissors.blades;
   if (shot.scissors.shown)
     tools.push_back({"scissors", {blades.origin, blades.origin + blades.length * blades.x_axis, 0.0025}});
+  for (const Instrument& of : shot.instruments) {
+    const double length = of.def.shaft_length + (of.def.type == InstrumentType::kGrasper ? of.def.jaw_length : 0.0);
+    tools.push_back({of.def.name, {of.pose.translation, of.pose * Vec3(-length, 0, 0), of.def.shaft_radius}});
+  }
   return tools;
 }
 double distance(const Line& a, const Line& b) {
@@ -384,7 +396,14 @@ const std::map<std::string, Compute>& laws() {
                a.x_axis.dot(b.x_axis) + a.y_axis.dot(b.y_axis) + a.x_axis.cross(a.y_axis).dot(b.x_axis.cross(b.y_axis));
            turned += std::acos(std::min(1.0, 0.5 * (trace - 1.0)));
          }
-         return Law{hand == 3 && any ? turned : kNone, 1e-6};
+         if (hand < 4) return Law{hand == 3 && any ? turned : kNone, 1e-6};
+         const Way way = wayOf(s, hand);
+         double by = 0.0;
+         for (std::size_t k = 1; k < way.size(); ++k)
+           if (way[k] && way[k - 1])
+             by += s.steps[k].instruments[hand - 4].pose.rotation.angularDistance(
+                 s.steps[k - 1].instruments[hand - 4].pose.rotation);
+         return Law{seen(way) ? by : kNone, 1e-6};
        }},
       {"force_mean",
        [](const Session& s, std::size_t) {
@@ -498,7 +517,8 @@ const std::map<std::string, Compute>& laws() {
          std::vector<double> paths;
          for (std::size_t hand = 0; hand < kHands; ++hand) paths.push_back(pathOf(wayOf(s, hand)));
          std::sort(paths.rbegin(), paths.rend());
-         const double all = paths[0] + paths[1] + paths[2] + paths[3];
+         double all = 0.0;
+         for (const double path : paths) all += path;
          return Law{all > 0.0 ? paths[1] / all : kNone};
        }},
       {"hands_overlap",
@@ -615,6 +635,28 @@ void ofHands() {
   push.enable = false;
   s.apply<Done>(push);
   s.step(30);
+  // Two instruments: one lies there, is taken up and turned, and crosses the other, which presses the block.
+  const Quat down(Eigen::AngleAxisd(0.5 * M_PI, Vec3::UnitY()));
+  for (const bool left : {true, false}) {
+    AttachInstrumentCommand attach;
+    attach.def.name = left ? "left" : "right";
+    attach.def.type = left ? InstrumentType::kGrasper : InstrumentType::kProbe;
+    attach.def.pose = {down, Vec3(left ? -0.2 : 0.2, 0.0, 0.35)};
+    s.apply<Done>(attach);
+  }
+  s.step(20);
+  for (int n = 1; n <= 240; ++n) {
+    const double u = smooth(n / 240.0);
+    LeadInstrumentCommand lead;
+    lead.name = "left";
+    lead.pose = Pose{Quat(Eigen::AngleAxisd(0.5 * M_PI + 0.8 * u, Vec3::UnitY())), Vec3(-0.2 + 0.2 * u, 0.02, 0.35)};
+    s.apply<Done>(lead);
+    lead.name = "right";
+    lead.pose = Pose{down, Vec3(0.2 - 0.17 * u, 0.02, 0.35 - 0.13 * smooth(std::min(1.0, n / 200.0)))};
+    s.apply<Done>(lead);
+    s.step();
+  }
+  s.step(20);
   s.played.training.stop();
   check(s);
 }

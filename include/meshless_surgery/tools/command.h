@@ -68,7 +68,7 @@ struct OpenScissorsCommand {};
 struct OpenBladesCommand {
   std::uint32_t ticket = 0;  // of its CutStarted
 };
-enum class ToolKind { kPick, kPush, kScissors };
+enum class ToolKind { kPick, kPush, kScissors, kInstrument };  // the last: any of those with names
 /// Takes a tool off the tissue: the pick in hand is released, the sphere removed, the scissors hidden (blades that a
 /// service closes go on). An event says why.
 struct LiftCommand {

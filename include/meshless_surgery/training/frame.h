@@ -10,23 +10,26 @@
 namespace meshless {
 
 /// A hand is a tool that is moved: of the picks that are not locked the oldest, and the next one; the push sphere; the
-/// scissors.
-enum class Hand { kPick, kSecondPick, kPush, kScissors };
-constexpr std::size_t kHands = 4;
+/// scissors; of the instruments the first two that have been moved.
+enum class Hand { kPick, kSecondPick, kPush, kScissors, kInstrument, kSecondInstrument };
+constexpr std::size_t kHands = 6;
 const char* toString(Hand hand);
 
 struct TrainingFrame {
   struct Tool {
     ToolKind kind = ToolKind::kPick;
-    PickId pick = 0;
+    std::uint32_t pick = 0;        // its number, as that of an instrument
     bool locked = false;           // of a pick
-    std::string body;              // that a pick holds
-    Vec3 position = Vec3::Zero();  // [m] of the hand: the free end, the centre, the pivot
-    std::optional<Quat> turned;    // of the scissors
-    Vec3 tissue = Vec3::Zero();  // [m] where it works: a pick's end in the tissue, the tips of blades that have an end
-    double radius = 0.0;         // [m] of what is solid about the line from `position` to there
-    double force = 0.0;          // [N] between tool and tissue, mean over the step
-    Vec3 touch = Vec3::Zero();   // [m] of the push sphere: the foremost place of it in the tissue; of others `tissue`
+    std::string body;              // that a pick or jaws hold
+    Vec3 position = Vec3::Zero();  // [m] of the hand: the free end, the centre, the pivot; of an instrument its tip
+    std::optional<Quat> turned;    // of the scissors and of instruments
+    // [m] where it works: a pick's end in the tissue, the tips of blades that have an end; of an instrument the other
+    // end of its shaft
+    Vec3 tissue = Vec3::Zero();
+    double radius = 0.0;  // [m] of what is solid about the line from `position` to there
+    double force = 0.0;   // [N] between tool and tissue, mean over the step
+    Vec3 touch =
+        Vec3::Zero();  // [m] of the push sphere: the foremost place of it in the tissue; of instruments the tip
   };
   struct Body {
     std::string name;

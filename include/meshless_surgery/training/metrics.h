@@ -92,8 +92,10 @@ class Metrics {
 
   MetricLimits limits_;
   std::array<HandMotion, kHands> hands_;
-  std::array<PickId, 2> picks_{};       // in the two hands that pick
-  std::map<PickId, Vec3> pick_places_;  // [m] of all, in the frame before
+  std::array<PickId, 2> picks_{};        // in the two hands that pick
+  std::map<std::uint32_t, Vec3> rests_;  // [m] where instruments were first, that have not been moved
+  std::array<std::optional<std::uint32_t>, 2> instruments_;  // the first two that were
+  std::map<PickId, Vec3> pick_places_;                       // [m] of all, in the frame before
   std::array<std::optional<Vec3>, kHands> places_;
   double dt_ = 1.0, time_ = 0.0, idle_ = 0.0, any_moves_ = 0.0, both_move_ = 0.0;
   double force_ = 0.0, force_peak_ = 0.0, force_sum_ = 0.0, force_for_ = 0.0, force_above_ = 0.0;

@@ -82,7 +82,7 @@ class RestTissue {
   double targetLeft() const;                                // share of the target
   double marginLeast() const;                               // [m] from the target to the cut; below 0: through it
   double marginMean() const;
-  double clipDistance() const { return clip_distance_; }    // [m] of the farthest clip from the target's middle
+  double clipDistance() const { return clip_distance_; }  // [m] of the farthest clip from the target's middle
   /// The piece that has the target's middle lies in the tray, or is gone.
   bool targetRemoved() const { return target_removed_; }
 

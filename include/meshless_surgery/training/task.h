@@ -92,7 +92,19 @@ struct TaskLimits {
 };
 
 /// What no hand of a trainee does. Where a task does not allow it, who has done it is not counted.
-enum class Intervention { kUndo, kPause, kSlow, kLoad, kRemove, kDetach, kAttach, kSpawn, kMaterial, kMoveClamp, kInstrument };
+enum class Intervention {
+  kUndo,
+  kPause,
+  kSlow,
+  kLoad,
+  kRemove,
+  kDetach,
+  kAttach,
+  kSpawn,
+  kMaterial,
+  kMoveClamp,
+  kInstrument
+};
 constexpr std::size_t kInterventions = 11;
 const char* toString(Intervention intervention);
 

@@ -72,7 +72,8 @@ class Training {
     std::vector<TrainingMoment> moments;
     std::vector<TrainingEvent> events;
     Points outline;
-    TrainingMoment next;  // being summed up
+    std::map<std::uint32_t, Vec3> rests;  // [m] where instruments lie
+    TrainingMoment next;                  // being summed up
     std::array<double, kHands> paths{};
     std::uint64_t first_step = 0, last_step = 0;
     double since = 0.0;
