@@ -24,7 +24,7 @@ COLOURS = ('#1b6ca8', '#c0392b', '#2d8a4e', '#8e44ad', '#d68910', '#16807a', '#7
 # GEARS: Goh et al. 2012, J. Urol. 187(1). GOALS: Vassiliou et al. 2005, Am. J. Surg. 190(1).
 DOMAINS = {
     'depth perception': (),
-    'bimanual dexterity': ('hands_share', 'hands_overlap', 'path_length.pick_2'),
+    'bimanual dexterity': ('hands_share', 'hands_overlap', 'path_length.pick_2', 'path_length.instrument_2'),
     'efficiency': ('time', 'idle_time', 'economy', 'path_length', 'movements', 'cuts', 'strokes', 'grasps'),
     'force sensitivity, tissue handling': ('force_peak', 'force_mean', 'force_together_peak', 'force_together_mean', 'force_time_above', 'strain_peak',
                                            'torn', 'leaks', 'bleeding_time', 'drop_height', 'drops'),

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMostStages = 100, kMostForbidden = 100, kMostCorners = 1000;
 constexpr int kCircleParts = 72;
 constexpr std::size_t kMostPicture = 2 << 20, kMostTask = 1 << 20;  // bytes
-const std::vector<std::string> kTools{"pick", "push", "scissors"};
+const std::vector<std::string> kTools{"pick", "push", "scissors", "instrument"};
 
 std::string tasksIn(const fs::path& folder) {
   std::set<std::string> names;
@@ -356,7 +356,7 @@ class TaskReader {
     if (kind == "reach") {
       Reach reach;
       if (const int tool = map.choice("tool", kTools); tool >= 0) reach.tool = static_cast<ToolKind>(tool);
-      if (!map.has("tool")) source_.fail(node, "reach has no tool", "pick, push, scissors");
+      if (!map.has("tool")) source_.fail(node, "reach has no tool", "pick, push, scissors, instrument");
       if (const auto region = readRegionKeys(source_, map, node, false, true)) reach.region = *region;
       condition = reach;
     } else if (kind == "stretch_to") {
@@ -369,7 +369,8 @@ class TaskReader {
       PressTo press;
       if (!map.has("force")) source_.fail(node, "press_to has no force", "above 0 to 1e6 N");
       map.number("force", {0.0, 1e6, true, "N"}, press.force);
-      if (const int tool = map.choice("tool", {"pick", "push"}); tool >= 0) press.tool = static_cast<ToolKind>(tool);
+      if (const int tool = map.choice("tool", {"pick", "push", "instrument"}); tool >= 0)
+        press.tool = tool == 2 ? ToolKind::kInstrument : static_cast<ToolKind>(tool);
       press.region = readRegionKeys(source_, map, node, false, false);
       if (const int at = map.choice("at", {"middle", "touch"}); at >= 0) press.touch = at == 1;
       condition = press;

@@ -242,6 +242,41 @@ TEST(TaskProgress, HoldCountsThePicksOfTheBodyAlone) {
   EXPECT_TRUE(played.training.progress().done());
 }
 
+// Jaws hold as picks do; an instrument that lies there begins nothing.
+TEST(TaskProgress, AnInstrumentReachesHoldsAndLetsGo) {
+  TaskDef task = withStage(Reach{ToolKind::kInstrument, Region::sphere(Vec3(0, 0, 0.22), 0.01)});
+  task.stages.push_back({"hold", "", Hold{"tissue", 1}, 0.1});
+  task.stages.push_back({"let go", "", LetGo{}, 0.0});
+  task.settle = 5.0;
+  Played played(test::weightless(), task);
+  BodyDef block = test::defOf(boxMesh(Vec3(0.03, 0.01, 0.03), 0.005), "tissue");
+  block.pose.translation = Vec3(0, 0, 0.2);
+  block.material.youngs_modulus = 1e4;
+  block.material.damping = 20.0;
+  ASSERT_TRUE(played.world.addSceneBody(test::shared(block)).ok());
+  InstrumentDef grasper;
+  grasper.name = "left";
+  grasper.type = InstrumentType::kGrasper;
+  grasper.pose = {Quat(Eigen::AngleAxisd(0.5 * M_PI, Vec3::UnitY())), Vec3(0, 0, 0.25)};
+  ASSERT_TRUE(played.world.addSceneInstrument(grasper).ok());
+  played.begin();
+  played.step(24);
+  EXPECT_EQ(0.0, played.training.metrics().time());
+  const auto lead = [&](double height, double jaw, int steps) {
+    played.apply<Done>(LeadInstrumentCommand{"left", Pose{grasper.pose.rotation, Vec3(0, 0, height)}, jaw});
+    played.step(steps);
+  };
+  lead(0.25, 1.2, 30);
+  lead(0.205, 1.2, 60);
+  EXPECT_EQ(1u, played.training.progress().stage());
+  EXPECT_GT(played.training.metrics().time(), 0.0);
+  lead(0.205, 0.0, 60);
+  EXPECT_EQ(2u, played.training.progress().stage());
+  lead(0.205, 1.2, 60);
+  EXPECT_TRUE(played.training.progress().done());
+  test::expectSame(played.training, *played.replayed());
+}
+
 TEST(TaskProgress, PutsBackWhereTheBodyWas) {
   TaskDef task = withStage(StretchTo{"tissue", 0.04});
   task.stages.push_back({"back", "", PutBack{"tissue", 0.005}, 0.5});
