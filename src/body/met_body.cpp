@@ -190,7 +190,7 @@ MetBody::MetBody(const BodyModel& model, const BodyState& state) : MetBody(model
 
 std::optional<Blade> bladeAtRest(const BodyModel& model, const BodyState& state, const Blade& blade) {
   // The tissue that the blade meets first, and what is around that at rest: other tissue may lie in it now.
-  const double near = kAround * model.spacing, reach = std::hypot(blade.length, blade.depth) + near;
+  const double near = kAround * model.spacing, reach = std::hypot(blade.length + blade.behind, blade.depth + blade.rise) + near;
   Index first = kNoIndex;
   for (Index v = 0; v < state.surface.size(); ++v)
     if (distanceTo(blade, state.surface[v]) < near &&

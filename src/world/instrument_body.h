@@ -21,7 +21,9 @@ struct InstrumentBody {
   bool rests = false;                  // so does all that it touches
   bool felt = false;                   // in this frame, what is awake
   bool stepped = false;                // in this part of the frame, with what it touches
-  Vec3 blocked = Vec3::Zero();         // [N] by the ground, in the last substep
+  Vec3 blocked = Vec3::Zero();         // [N] by the ground and obstacles, in the last substep
+  double gone = 0.0;                   // [m] farthest ways of vertices in substeps, summed up
+  std::vector<double> clear;           // [m] of `gone`, one a vertex: before it cannot be in an obstacle
   struct Pressed {
     Index body = 0;              // collider
     std::array<double, 2> on{};  // [N] on the inside of the jaws, mean over the step

@@ -133,10 +133,13 @@ bool isThere(const Instrument& instrument) {
        {load.mass, load.inertia, load.jaw_inertia, instrument.jaw_stop, instrument.cut_to, instrument.resists,
         instrument.cut_torque, instrument.cut_work, instrument.answers, instrument.closed_to, instrument.lost_for})
     if (!(x >= 0.0 && x <= 1e15)) return false;
-  const BladeWound& wound = instrument.wound;
-  return wound.origin.norm() <= 1e9 && std::abs(wound.begin) <= 1e9 && std::abs(wound.end) <= 1e9 &&
-         std::abs(wound.x_axis.norm() - 1.0) <= 1e-6 && std::abs(wound.y_axis.norm() - 1.0) <= 1e-6 &&
-         std::abs(wound.x_axis.dot(wound.y_axis)) <= 1e-6;
+  const auto isWound = [](const BladeWound& wound) {
+    return wound.origin.norm() <= 1e9 && wound.least.norm() <= 1e9 && wound.most.norm() <= 1e9 &&
+           std::abs(wound.x_axis.norm() - 1.0) <= 1e-6 && std::abs(wound.y_axis.norm() - 1.0) <= 1e-6 &&
+           std::abs(wound.x_axis.dot(wound.y_axis)) <= 1e-6;
+  };
+  return instrument.wounds.size() <= kMostWounds &&
+         std::all_of(instrument.wounds.begin(), instrument.wounds.end(), isWound);
 }
 
 void checkTools(const SavedWorld& world) {

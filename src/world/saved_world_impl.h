@@ -255,9 +255,9 @@ void serialize(A& archive, InstrumentDef& v) {
           jaw_thickness, friction, stiffness, damping, angular_stiffness, angular_damping, max_force, max_torque,
           max_speed, grip, remote_centre, color);
 }
-MESHLESS_ARCHIVE(BladeWound, body, origin, x_axis, y_axis, begin, end)
+MESHLESS_ARCHIVE(BladeWound, body, origin, x_axis, y_axis, least, most)
 MESHLESS_ARCHIVE(InstrumentLoad, force, torque, jaw, mass, inertia, jaw_inertia)
-MESHLESS_ARCHIVE(Instrument, def, number, target, jaw_target, hand, jaw_hand, pose, jaw, velocity, spin, jaw_rate, jaw_stop, cut_to, wound, resists, cut_torque, cut_work, owed, answers, load,
+MESHLESS_ARCHIVE(Instrument, def, number, target, jaw_target, hand, jaw_hand, pose, jaw, velocity, spin, jaw_rate, jaw_stop, cut_to, wounds, stroke, resists, cut_torque, cut_work, owed, answers, load,
                  force, torque, jaw_torque, holds, gripped, closed_to, lost_for)
 MESHLESS_ARCHIVE(CutCommand, blades, close_time, roughness, bodies)
 MESHLESS_ARCHIVE(ClosingCut, ticket, command, done_at, start_angle, started_at)

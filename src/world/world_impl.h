@@ -6,6 +6,7 @@
 #include <set>
 #include <unordered_map>
 
+#include "meshless_surgery/geometry/query/inside.h"
 #include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/contact/textbook.h"
@@ -29,6 +30,7 @@ struct WorldObstacle {
   std::shared_ptr<ObstacleDef> def;
   std::vector<double> inverse_masses;  // [1/kg] 0, one a vertex
   ContactSurface surface;
+  SolidQuery solid;
   Box bounds;
   double thickness = 0.0;  // [m] of a plate of its volume and area
 };
@@ -142,6 +144,7 @@ struct CutUndo {
   std::vector<Attachment> attachments;
   std::vector<std::string> cut;     // bodies that were cut or opened
   std::vector<std::string> pieces;  // what they came apart into
+  std::uint64_t stroke = 0;         // of blades in a hand; 0: of a command
 };
 
 /// What is drawn out or thrown apart without measure is matched in double.
@@ -283,6 +286,7 @@ struct World::Impl : KeptWorld {
   void liftSphere();
   Vec3 placeBeside(const Vec3& centre, double radius);  // [m] the nearest where a sphere is out of tissue
   CutUndo beforeCut() const;
+  std::uint64_t stroke_of_cut = 0;  // that is made: CutUndo::stroke
   void rememberCut(CutUndo before, std::vector<std::string> cut, std::vector<std::string> pieces);
   Status checkCut(const CutCommand& command);
   Result<CutReply> cutNow(const CutCommand& command);
@@ -353,7 +357,10 @@ struct World::Impl : KeptWorld {
   bool wakeInHands();
   /// Blades of instruments cut what they have crossed.
   void cutByInstruments();
-  void snip(std::size_t n, WorldBody& body, double cuts_to, bool snips);
+  /// Whether there was something to cut.
+  bool snip(std::size_t n, WorldBody& body, double cuts_to, bool snips);
+  /// [m] of what is deepest in an obstacle; zero: nothing is.
+  Vec3 wayOutOfObstacles(InstrumentBody& body) const;
   void leadInstruments(double h_frame);
   /// Of a search for h [s], with h_left of the frame to come.
   void fillInstrumentCollider(std::size_t n, double h, double h_left, Collider& collider);

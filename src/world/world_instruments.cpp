@@ -19,7 +19,10 @@ constexpr double kRests = 1e-6;   // [m/s] slower instruments wake nobody
 constexpr double kSnip = 0.125;   // of blades: they have closed on so much more before it is cut, or close no further
 constexpr double kJoins = 3e-4;   // [m] by which a snip goes over the last one, and beyond tissue
 constexpr double kGoesOn = 0.8;   // cosine: blades turned less go on with their wound
-constexpr int kLines = 5;         // along a snip, on which its tissue is looked for
+constexpr int kWaysOut = 4;       // of an instrument from obstacles, at most, in a step of
+constexpr double kStepOut = 1e-3, kMostStepsOut = 100.0;  // [m], of which a substep has at most so many
+constexpr int kMostLines = 100;
+constexpr int kLines = 5;  // along a snip, on which its tissue is looked for
 
 bool isHand(const Pose& pose) {
   return pose.translation.norm() <= kFarthestHand && std::abs(pose.rotation.norm() - 1.0) <= 1e-3;
@@ -114,6 +117,11 @@ Result<Reply> World::Impl::apply(const AttachInstrumentCommand& command) {
     if (Status apart = liesApart(*body, def.name, tissue, boundsOf(tissue), *other->model, other->name); !apart)
       return apart.error();
   }
+  for (const auto& obstacle : obstacles)
+    for (const Vec3& p : body->positions)
+      if (obstacle->surface.closed && obstacle->bounds.contains(p) && obstacle->solid.contains(p))
+        return Error{ErrorCode::kInvalidArgument, "instrument '" + def.name + "' would be inside of obstacle '" +
+                                                      obstacle->def->name + "'; accepted: outside"};
   body->hand_then = instrument.hand;
   instrument.number = next_instrument++;
   instruments.push_back(std::move(instrument));
@@ -162,10 +170,10 @@ Status World::addSceneInstrument(const InstrumentDef& def) {
 
 namespace {
 
-/// Tissue on a line across blades, that lies where their edges are.
+/// Tissue on a line across blades, that lies between their edges.
 struct BetweenBlades {
   double low = 0.0, high = 0.0;  // [m] along the line, from the middle of the blades
-  Points rest;                   // [m] where the line goes in and out
+  Points rest;                   // [m] where the line goes in and out, in pairs
   double thickness = 0.0;        // [m] at rest
   Vec3 middle = Vec3::Zero();    // [m] likewise
 };
@@ -190,6 +198,12 @@ BetweenBlades between(const std::vector<Crossing>& met, double gap, const Contac
   return found;
 }
 
+BladeWound* woundOf(Instrument& instrument, const std::string& body) {
+  for (BladeWound& wound : instrument.wounds)
+    if (wound.body == body) return &wound;
+  return nullptr;
+}
+
 }  // namespace
 
 void World::Impl::cutByInstruments() {
@@ -200,22 +214,25 @@ void World::Impl::cutByInstruments() {
     instrument.resists = 0.0;
     const double length = def.jaw_length, cuts_to = instrument.cutsTo();
     if (cuts_to < instrument.cut_to) {  // they open
+      if (cuts_to < instrument.cut_to - kJoins) ++instrument.stroke;
       instrument.cut_to = cuts_to;
       instrument.cut_work = instrument.owed = 0.0;
     }
     const double more = cuts_to - instrument.cut_to;
-    const bool closes = instrument.jaw_rate < -kRests / length;
-    const bool snips = more > 0.0 && (more >= kSnip * length || cuts_to == length || !closes);
-    if (!snips && !closes && !(instrument.jaw_target < instrument.jaw)) continue;
+    const bool whole = cuts_to == length, stops = !(instrument.jaw_rate < -kRests / length);
+    const bool snips = more > 0.0 && (more >= kSnip * length || whole || (stops && more >= kJoins));
+    const bool presses = !whole && instrument.jaw_target < instrument.jaw - kRests;
+    if (!snips && !presses) continue;
     std::vector<std::string> near;
     const Box blades = boundsOf(instrument_bodies[n]->positions);
     for (const auto& body : bodies) {
-      if (!body->model->solid) continue;
+      if (!body->model->solid || (!snips && body->material.toughness == 0.0)) continue;
       refreshSurface(*body);
       if (boundsOf(body->state.surface).overlaps(blades)) near.push_back(body->name);
     }
-    for (const std::string& name : near) snip(n, *find(name), cuts_to, snips);
-    if (snips) {
+    bool any = false;
+    for (const std::string& name : near) any = snip(n, *find(name), cuts_to, snips) || any;
+    if (snips && (any || whole)) {  // else there was air so far
       instrument.cut_to = cuts_to;
       instrument.owed -= std::exchange(instrument.cut_work, 0.0);
     }
@@ -224,29 +241,31 @@ void World::Impl::cutByInstruments() {
   }
 }
 
-void World::Impl::snip(std::size_t n, WorldBody& body, double cuts_to, bool snips) {
+bool World::Impl::snip(std::size_t n, WorldBody& body, double cuts_to, bool snips) {
   Instrument& instrument = instruments[n];
   const InstrumentDef& def = instrument.def;
-  const double reach = def.bladeReach(), begins = instrument.cut_to, step = (cuts_to - begins) / (kLines - 1);
   // Lines across the blades, in the plane on which they slide along each other.
   const Mat3 axes = instrument.pose.rotation.toRotationMatrix();
   const LineFrame frame{instrument.pose * instrument_bodies[n]->shape->hinge, {axes.col(0), -axes.col(2), axes.col(1)}};
   const ShownSurface shown = shownNow(body);
-  LineSearch lines(shown, frame, def.jaw_length, 0.0);
-  const auto at = [&](double x) { return between(lines.through(x, 0.0), reach, *shown.surface); };
+  LineSearch lines(shown, frame, def.jaw_length + kJoins, 0.0);
+  const double slope = std::tan(0.5 * instrument.jaw);
+  const auto at = [&](double x) {
+    const double gap = std::max(slope * x - def.bladeOverlap(), 0.4 * def.jaw_thickness);
+    return between(lines.through(x, 0.0), gap, *shown.surface);
+  };
+  const BladeWound* const known = woundOf(instrument, body.name);
   if (cuts_to < def.jaw_length && body.material.toughness > 0.0) {
     // The area at rest that comes in this frame, for the way there.
     Instrument then = instrument;
     then.jaw += std::min(0.0, instrument.jaw_rate / settings.step_rate);
     const double way = std::max(then.cutsTo() - cuts_to, kJoins), part = way / kLines;
-    double area = 0.0;
     const auto uncut = [&](double x) {
-      const BladeWound& wound = instrument.wound;
       BetweenBlades tissue = at(x);
-      const double along = wound.x_axis.dot(tissue.middle - wound.origin);
-      if (wound.body == body.name && along > wound.begin && along < wound.end) tissue.thickness = 0.0;
+      if (known && known->has(tissue.middle)) tissue.thickness = 0.0;
       return tissue;
     };
+    double area = 0.0;
     BetweenBlades last = uncut(cuts_to);
     for (int k = 1; k <= kLines; ++k) {
       const BetweenBlades next = uncut(cuts_to + k * part);
@@ -256,63 +275,92 @@ void World::Impl::snip(std::size_t n, WorldBody& body, double cuts_to, bool snip
     }
     instrument.resists += body.material.toughness * area / way;
   }
-  if (!snips) return;
+  if (!snips) return false;
+  const double begins = instrument.cut_to, more = cuts_to - begins;
+  const double apart = 0.5 * std::min(body.edge_length, def.jaw_thickness);
+  const int count = std::clamp(static_cast<int>(std::ceil(more / apart)), kLines, kMostLines);
   double low = 0.0, high = 0.0;  // [m]
-  Points rest;
-  for (int k = 0; k < kLines; ++k) {
-    const BetweenBlades tissue = at(begins + k * step);
+  Points met;
+  for (int k = 0; k < count; ++k) {
+    const BetweenBlades tissue = at(begins + more * k / (count - 1));
     low = std::min(low, tissue.low);
     high = std::max(high, tissue.high);
-    rest.insert(rest.end(), tissue.rest.begin(), tissue.rest.end());
+    met.insert(met.end(), tissue.rest.begin(), tissue.rest.end());
   }
-  if (rest.empty()) return;
-  const bool ends = at(cuts_to + kJoins).rest.empty();  // tissue does
+  if (met.empty()) return false;
   InciseCommand command;
   command.bodies = {body.name};
-  command.blade = {frame.centre + begins * axes.col(0),
-                   axes.col(0),
-                   axes.col(1),
-                   cuts_to - begins,
-                   kJoins - low,
-                   kJoins + high,
-                   0.0};
+  command.blade = {
+      frame.centre + begins * axes.col(0), axes.col(0), axes.col(1), more, kJoins - low, kJoins + high, 0.0};
   const std::optional<Blade> led = bladeAtRest(*body.model, body.state, command.blade);
-  if (!led) return;
-  Vec3 middle = Vec3::Zero();
-  for (const Vec3& p : rest) middle += p / static_cast<double>(rest.size());
-  const auto within = [&](const BladeWound& of) {
-    Box box;
-    for (const Vec3& p : rest) box.extend(Vec3((p - of.origin).dot(of.x_axis), (p - of.origin).dot(of.y_axis), 0.0));
-    return box;
-  };
+  if (!led) return true;
   // A wound is gone on with where the blades still are in its plane, and at it.
-  BladeWound& wound = instrument.wound;
-  const Vec3 normal = wound.x_axis.cross(wound.y_axis);
-  Box in_plane = within(wound);
-  const bool goes_on = wound.body == body.name && normal.dot(led->plane().normal) > kGoesOn &&
-                       std::abs(normal.dot(middle - wound.origin)) < 0.5 * def.jaw_width &&
-                       in_plane.max.x() > wound.begin && in_plane.min.x() < wound.end + kSnip * def.jaw_length;
-  if (!goes_on) {
-    wound = {body.name, middle, led->x_axis, led->y_axis, 0.0, 0.0};
-    in_plane = within(wound);
+  const auto extend = [&](const BladeWound& of, Vec2& least, Vec2& most) {
+    least.setConstant(std::numeric_limits<double>::infinity());
+    most = -least;
+    for (std::size_t k = 0; k + 1 < met.size(); k += 2) {
+      // Another layer of folded tissue is elsewhere at rest.
+      if (std::abs(of.beside(0.5 * (met[k] + met[k + 1]))) > def.jaw_width) continue;
+      for (const Vec3& p : {met[k], met[k + 1]}) {
+        least = least.cwiseMin(of.within(p));
+        most = most.cwiseMax(of.within(p));
+      }
+    }
+    return least.x() <= most.x();
+  };
+  BladeWound wound = {body.name, led->origin, led->x_axis, led->y_axis, Vec2::Zero(), Vec2::Zero()};
+  Vec2 least, most;
+  bool goes_on = known && std::abs(known->x_axis.cross(known->y_axis).dot(led->plane().normal)) > kGoesOn &&
+                 extend(*known, least, most);
+  if (goes_on) {
+    const double near = kSnip * def.jaw_length;
+    goes_on = least.x() < known->most.x() + near && most.x() > known->least.x() - near &&
+              least.y() < known->most.y() + near && most.y() > known->least.y() - near;
   }
-  const Vec3 margin = 0.25 * (in_plane.max - in_plane.min) + Vec3::Constant(kJoins);
-  if (!goes_on) wound.begin = wound.end = in_plane.min.x() - margin.x();
-  const double from = std::min(wound.end, in_plane.min.x()) - kJoins;
-  const double to = in_plane.max.x() + (ends ? margin.x() : 0.0);
-  if (!(to > wound.end)) return;
-  Blade blade = {
-      wound.origin + from * wound.x_axis, wound.x_axis, wound.y_axis, to - from, margin.y() - in_plane.min.y(),
-      margin.y() + in_plane.max.y(),      0.0};
-  wound.end = to;
+  if (goes_on)
+    wound = *known;
+  else if (!extend(wound, least, most))
+    return true;
+  const Vec2 margin = (0.25 * (most - least)).cwiseMin(Vec2::Constant(def.jaw_thickness)) + Vec2::Constant(kJoins);
+  const bool ends = at(cuts_to + kJoins).rest.empty();  // tissue does
+  const bool along = wound.x_axis.dot(led->x_axis) > 0.0;
+  Vec2 from = least - margin, to = most + margin;
+  if (!ends) (along ? to : from).x() = along ? most.x() : least.x();
+  if (goes_on && ends) {  // as a whole: it may part the body now
+    from = from.cwiseMin(wound.least);
+    to = to.cwiseMax(wound.most);
+  } else if (goes_on) {  // from where it ends
+    if (along)
+      from.x() = std::min(wound.most.x(), least.x());
+    else
+      to.x() = std::max(wound.least.x(), most.x());
+  }
+  const Blade blade = {
+      wound.origin + from.x() * wound.x_axis, wound.x_axis, wound.y_axis, to.x() - from.x(), -from.y(), to.y(), 0.0};
+  if (!goes_on) wound.least = from, wound.most = to;
+  wound.least = wound.least.cwiseMin(from);
+  wound.most = wound.most.cwiseMax(to);
   const std::size_t said = events.size();
   ++commands;  // each is another one
   const double toughness = body.material.toughness;
+  stroke_of_cut = (std::uint64_t{instrument.number} + 1) << 32 | instrument.stroke;
   const Result<InciseReply> made = inciseNow(command, &blade);
-  if (!made) return;
+  stroke_of_cut = 0;
+  if (!made) return true;  // all of it is open
   instrument.owed += toughness * made->opened_area;
+  std::vector<BladeWound>& wounds = instrument.wounds;
+  wounds.erase(std::remove_if(wounds.begin(), wounds.end(),
+                              [&](const BladeWound& of) { return of.body == wound.body || !find(of.body); }),
+               wounds.end());
+  std::vector<std::string> names = made->new_bodies;  // pieces keep the frame of rest
+  if (names.empty()) names = {wound.body};
+  for (const std::string& name : names) {
+    wound.body = name;
+    if (wounds.size() < kMostWounds) wounds.push_back(wound);
+  }
   for (std::size_t e = said; e < events.size(); ++e)
     if (events[e].type == EventType::kIncised) events[e].instrument = def.name;
+  return true;
 }
 
 void World::Impl::leadInstruments(double h_frame) {
@@ -399,17 +447,73 @@ void World::Impl::advanceInstrument(Index collider, double h, int left) {
   hand.translation += share * (body.hand_then.translation - hand.translation);
   hand.rotation =
       left == 1 ? body.hand_then.rotation : hand.rotation.slerp(share, body.hand_then.rotation).normalized();
+  const Pose before = instrument.pose;
   instrument.move(hand, instrument.jaw_hand + share * (body.jaw_then - instrument.jaw_hand), h);
   body.before.swap(body.positions);
   body.place(instrument);
   body.blocked.setZero();
-  if (!settings.ground) return;
-  double lowest = std::numeric_limits<double>::infinity();
-  for (const Vec3& p : body.positions) lowest = std::min(lowest, p.z());
-  if (!(lowest < *settings.ground)) return;
-  const Vec3 up = (*settings.ground - lowest) * Vec3::UnitZ();
-  body.blocked = instrument.block(up, h);
+  const double lowest = settings.ground ? boundsOf(body.positions).min.z() - *settings.ground : 0.0;
+  if (lowest < 0.0) {
+    body.blocked = instrument.block(-lowest * Vec3::UnitZ(), h);
+    body.place(instrument);
+  }
+  if (obstacles.empty()) return;
+  double way = 0.0;  // [m]
+  for (Index v = 0; v < body.positions.size(); ++v)
+    way = std::max(way, (body.positions[v] - body.before[v]).squaredNorm());
+  way = std::sqrt(way);
+  body.clear.resize(body.positions.size(), 0.0);
+  if (*std::min_element(body.clear.begin(), body.clear.end()) > body.gone + way) {
+    body.gone += way;
+    return;
+  }
+  // A hand that was held goes far at once: step by step nothing is passed.
+  const Pose then = instrument.pose;
+  const double steps = std::clamp(std::ceil(way / kStepOut), 1.0, kMostStepsOut);
+  Vec3 out = Vec3::Zero();
+  for (double k = 1.0; k <= steps; ++k) {
+    instrument.pose.translation = before.translation + k / steps * (then.translation - before.translation) + out;
+    instrument.pose.rotation = before.rotation.slerp(k / steps, then.rotation).normalized();
+    body.place(instrument);
+    body.gone += way / steps;
+    for (int pass = 0; pass < kWaysOut; ++pass) {
+      const Vec3 more = wayOutOfObstacles(body);
+      if (more.isZero(0.0)) break;
+      out += more;
+      body.gone += more.norm();
+      instrument.pose.translation += more;
+      body.place(instrument);
+    }
+  }
+  instrument.pose = then;
+  if (!out.isZero(0.0)) body.blocked += instrument.block(out, h);
   body.place(instrument);
+}
+
+Vec3 World::Impl::wayOutOfObstacles(InstrumentBody& body) const {
+  double deepest = 0.0;
+  Vec3 out = Vec3::Zero();
+  for (Index v = 0; v < body.positions.size(); ++v) {
+    if (body.clear[v] > body.gone) continue;
+    const Vec3& p = body.positions[v];
+    double least = std::numeric_limits<double>::infinity();
+    for (const auto& obstacle : obstacles) {
+      if (!obstacle->surface.closed) continue;
+      const Vec3 beside = (obstacle->bounds.min - p).cwiseMax(p - obstacle->bounds.max).cwiseMax(0.0);
+      if (!beside.isZero(0.0)) {
+        least = std::min(least, beside.norm());
+        continue;
+      }
+      const Vec3 way_out = obstacle->solid.nearest(p) - p;
+      const bool inside = obstacle->solid.contains(p);
+      least = std::min(least, inside ? 0.0 : way_out.norm());
+      if (!inside || !(way_out.norm() > deepest)) continue;
+      deepest = way_out.norm();
+      out = way_out;
+    }
+    body.clear[v] = body.gone + least;
+  }
+  return out;
 }
 
 void World::Impl::forgetLoad(std::size_t n) {

@@ -91,7 +91,8 @@ Collider colliderOf(const WorldObstacle& obstacle, std::size_t number) {
 WorldObstacle::WorldObstacle(ObstacleDef of_def)
     : def(std::make_shared<ObstacleDef>(std::move(of_def))),
       inverse_masses(def->mesh.vertices.size(), 0.0),
-      surface(def->mesh, ownSupports(static_cast<Index>(def->mesh.vertices.size()))) {
+      surface(def->mesh, ownSupports(static_cast<Index>(def->mesh.vertices.size()))),
+      solid(def->mesh) {
   for (const Vec3& p : def->mesh.vertices) bounds.extend(p);
   thickness = 2.0 * std::abs(signedVolume(def->mesh)) / surfaceArea(def->mesh);
 }

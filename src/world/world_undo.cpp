@@ -30,6 +30,14 @@ CutUndo World::Impl::beforeCut() const {
 }
 
 void World::Impl::rememberCut(CutUndo before, std::vector<std::string> cut, std::vector<std::string> pieces) {
+  before.stroke = stroke_of_cut;
+  if (stroke_of_cut != 0 && !undo.empty() && undo.back().stroke == stroke_of_cut) {  // a snip of the same stroke
+    CutUndo& whole = undo.back();
+    for (std::string& name : cut)
+      if (!contains(whole.pieces, name) && !contains(whole.cut, name)) whole.cut.push_back(std::move(name));
+    whole.pieces.insert(whole.pieces.end(), pieces.begin(), pieces.end());
+    return;
+  }
   before.cut = std::move(cut);
   before.pieces = std::move(pieces);
   undo.push_back(std::move(before));
@@ -49,7 +57,7 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
         return apart.error();
     }
   CutUndo before = std::move(undo.back());
-  for (Instrument& instrument : instruments) instrument.wound = BladeWound();  // it may be no more
+  for (Instrument& instrument : instruments) instrument.wounds.clear();  // they may be no more
   undo.pop_back();
 
   // What the cut made, and what it opened without parting it, goes.

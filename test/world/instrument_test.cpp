@@ -138,6 +138,39 @@ TEST(Instruments, TheGroundHoldsAnInstrumentWithAsMuchAsItsHandPresses) {
   EXPECT_NEAR(stateOf(world).force.z(), probe.max_force, 1e-3);
 }
 
+TEST(Instruments, ObstaclesHoldAnInstrumentWithAsMuchAsItsHandPresses) {
+  World world{test::weightless()};
+  for (const double z : {0.0, 0.3}) {
+    ObstacleDef box;
+    box.name = z > 0.0 ? "upper" : "lower";
+    box.mesh = boxMesh(Vec3(0.1, 0.1, 0.04), 0.02);
+    for (Vec3& p : box.mesh.vertices) p.z() += z;
+    ASSERT_TRUE(world.addObstacle(box).ok());
+  }
+  const InstrumentDef probe = instrument(InstrumentType::kProbe, Vec3(0.01, 0.02, 0.05));
+  InstrumentDef within = probe;
+  within.name = "within";
+  within.pose.translation.z() = 0.01;
+  const auto refused = world.apply(AttachInstrumentCommand{within});
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.error().detail.find("inside of obstacle 'lower'"), std::string::npos) << refused.error().detail;
+  InstrumentDef across = probe;  // its shaft does not go through the upper one
+  across.shaft_length = 0.15;
+  attach(world, across);
+  lead(world, Vec3(0.01, 0.02, 0.0175), 0.2);
+  run(world, 0.3);
+  EXPECT_NEAR(stateOf(world).pose.translation.z(), 0.02, 2e-4);
+  EXPECT_NEAR(stateOf(world).force.z(), 0.0025 * probe.stiffness, 0.5);
+  lead(world, Vec3(-0.02, 0.01, -0.3), 0.4);
+  run(world, 0.3);
+  EXPECT_NEAR(stateOf(world).pose.translation.z(), 0.02, 5e-4);
+  EXPECT_NEAR(stateOf(world).pose.translation.x(), -0.02, 1e-3);
+  EXPECT_NEAR(stateOf(world).force.z(), probe.max_force, 0.05 * probe.max_force);
+  // Beside it, and up: nothing is in the way.
+  lead(world, Vec3(-0.02, 0.01, 0.1), 0.4);
+  EXPECT_NEAR(stateOf(world).pose.translation.z(), 0.1, 1e-6);
+}
+
 TEST(Instruments, JawsThatPullAStripSlipAtTwiceTheFrictionOfTheirGrip) {
   constexpr double kWay = 2e-4;  // [m] in 50 ms
   for (const double friction : {0.1, 0.2, 0.4, 0.7, 1.0}) {

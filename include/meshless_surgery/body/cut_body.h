@@ -35,7 +35,7 @@ struct CutBody {
   /// a surface or tissue joins is one piece (cut_cells.h). What is less than a sample of a cell comes apart from no
   /// piece by a blade with bounds: it stays with the largest.
   std::vector<BodyPiece> pieces;
-  double opened_area = 0.0;  // [m^2] of one wound face, present shape
+  double opened_area = 0.0;  // [m^2] of one wound face, as the blade met it: now, or at rest
   CutWork work;
 };
 

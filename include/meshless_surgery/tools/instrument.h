@@ -89,11 +89,19 @@ struct InstrumentLoad {
 
 /// A wound that blades make, snip by snip: in one plane of the body at rest.
 struct BladeWound {
-  std::string body;                                     // empty: none
+  std::string body;
   Vec3 origin = Vec3::Zero();                           // [m]
-  Vec3 x_axis = Vec3::UnitX(), y_axis = Vec3::UnitY();  // unit; x: the way in which it grows
-  double begin = 0.0, end = 0.0;                                     // [m] along x
+  Vec3 x_axis = Vec3::UnitX(), y_axis = Vec3::UnitY();  // unit
+  Vec2 least = Vec2::Zero(), most = Vec2::Zero();       // [m] along these: where it is
+
+  Vec2 within(const Vec3& rest) const { return {x_axis.dot(rest - origin), y_axis.dot(rest - origin)}; }
+  double beside(const Vec3& rest) const { return x_axis.cross(y_axis).dot(rest - origin); }
+  bool has(const Vec3& rest) const {
+    const Vec2 p = within(rest);
+    return (p.array() > least.array()).all() && (p.array() < most.array()).all();
+  }
 };
+constexpr std::size_t kMostWounds = 50;
 
 struct Instrument {
   InstrumentDef def;
@@ -107,21 +115,22 @@ struct Instrument {
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  // [m/s, rad/s] in the last substep
   double jaw_rate = 0.0;                              // [rad/s]
   double jaw_stop = 0.0;                              // [rad] they close no further
-  double cut_to = 0.0;         // [m] from the hinge to which blades have cut what is between them
-  BladeWound wound;            // that they go on with
-  double resists = 0.0;        // [N] of what they cut next: toughness times thickness
-  double cut_torque = 0.0;     // [N m] of that on the jaws in the last substep
-  double cut_work = 0.0;       // [J] of that since the last snip
-  double owed = 0.0;           // [J] that snips have taken more than that came to
-  double answers = 0.0;        // [N/m] of force from outside, for the way that this moved it in the last substep
-  InstrumentLoad load;         // of the last substep
-  Vec3 force = Vec3::Zero();   // [N] on it, mean over the last step
-  Vec3 torque = Vec3::Zero();  // [N m] likewise
-  double jaw_torque = 0.0;     // [N m] likewise, that opens
-  std::string holds;           // the body between its jaws; empty: none
-  double gripped = 0.0;        // [N] with which the jaws press it, the weaker of them, mean over the last step
-  double closed_to = 0.0;      // [rad] the least that was wanted between the jaws meanwhile
-  double lost_for = 0.0;       // [s] that they have not
+  double cut_to = 0.0;             // [m] from the hinge to which blades have cut what is between them
+  std::vector<BladeWound> wounds;  // that they may go on with, one a body
+  std::uint32_t stroke = 0;        // how often they have opened
+  double resists = 0.0;            // [N] of what they cut next: toughness times thickness
+  double cut_torque = 0.0;         // [N m] of that on the jaws in the last substep
+  double cut_work = 0.0;           // [J] of that since the last snip
+  double owed = 0.0;               // [J] that snips have taken more than that came to
+  double answers = 0.0;            // [N/m] of force from outside, for the way that this moved it in the last substep
+  InstrumentLoad load;             // of the last substep
+  Vec3 force = Vec3::Zero();       // [N] on it, mean over the last step
+  Vec3 torque = Vec3::Zero();      // [N m] likewise
+  double jaw_torque = 0.0;         // [N m] likewise, that opens
+  std::string holds;               // the body between its jaws; empty: none
+  double gripped = 0.0;            // [N] with which the jaws press it, the weaker of them, mean over the last step
+  double closed_to = 0.0;          // [rad] the least that was wanted between the jaws meanwhile
+  double lost_for = 0.0;           // [s] that they have not
 
   /// Where the hand goes within h [s]: no faster than it may.
   Pose handAfter(double h) const;
