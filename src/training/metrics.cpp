@@ -9,7 +9,8 @@
 namespace meshless {
 namespace {
 
-constexpr double kPressing = 1e-6;  // [N] above this a tool is at work
+constexpr double kBetweenStrokes = 0.5;  // [s]
+constexpr double kPressing = 1e-6;       // [N] above this a tool is at work
 
 const char* const kSmooth = "Balasubramanian et al. 2012, 2015";
 const char* const kUsual = "usual in skill assessment: Reiley et al. 2011";
@@ -71,7 +72,9 @@ const std::vector<MetricRow>& metricTable() {
       {"cut_area", "m^2", kLower, false, "area at rest of one side of all cut faces", kOwn},
       {"cuts", "1", kLower, false, "times that scissors severed something; of one command once", kOwn},
       {"strokes", "1", kLower, false,
-       "times that a blade opened something; of one command once, of scissors in a hand each snip", kOwn},
+       "times that a blade opened something; of one command once; snips of scissors in a hand with less than half a "
+       "second between are one",
+       kOwn},
       {"plan_rms", "m", kLower, false,
        "root of the mean, by area, of the squared distance of the cut faces at rest from the plan's rectangle", kOwn},
       {"plan_hausdorff", "m", kLower, false,
@@ -166,6 +169,7 @@ void Metrics::feed(const TrainingFrame& frame) {
     force_for_ += frame.dt;
     if (force_ > limits_.force) force_above_ += frame.dt;
   }
+  findStrokes(frame);
   feedEvents(frame);
   feedStrain(frame);
   feedDrops(frame);
@@ -233,7 +237,7 @@ void Metrics::feedEvents(const TrainingFrame& frame) {
         once(cuts_, last_cut_, event);
         break;
       case EventType::kIncised:
-        once(strokes_, last_stroke_, event);
+        if (!goes_on_[static_cast<std::size_t>(&event - frame.events.data())]) once(strokes_, last_stroke_, event);
         break;
       case EventType::kUndone:
         once(undos_, last_undo_, event);
@@ -259,6 +263,16 @@ void Metrics::feedEvents(const TrainingFrame& frame) {
       default:
         break;
     }
+}
+
+void Metrics::findStrokes(const TrainingFrame& frame) {
+  goes_on_.clear();
+  for (const Event& event : frame.events) {
+    const bool blades = event.type == EventType::kIncised && !event.instrument.empty();
+    const auto before = blades ? snipped_.find(event.instrument) : snipped_.end();
+    goes_on_.push_back(before != snipped_.end() && event.sim_time < before->second + kBetweenStrokes);
+    if (blades) snipped_[event.instrument] = event.sim_time;
+  }
 }
 
 void Metrics::watch(const TrainingFrame& frame, double& wall, double& watched) {
@@ -341,7 +355,7 @@ void Metrics::feedForbidden(const TrainingFrame& frame) {
     for (const Event& event : frame.events) {
       if (event.type != EventType::kCut && event.type != EventType::kIncised) continue;
       if (!isOf(event.body, forbidden.body)) continue;
-      ++forbidden_;
+      forbidden_ += !goes_on_[static_cast<std::size_t>(&event - frame.events.data())];
       cut.insert(forbidden.name);
     }
   }

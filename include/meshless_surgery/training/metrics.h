@@ -84,6 +84,7 @@ class Metrics {
  private:
   void watch(const TrainingFrame& frame, double& wall, double& watched);
   void feedHands(const TrainingFrame& frame);
+  void findStrokes(const TrainingFrame& frame);
   void feedEvents(const TrainingFrame& frame);
   void feedForbidden(const TrainingFrame& frame);
   void feedStrain(const TrainingFrame& frame);
@@ -120,6 +121,8 @@ class Metrics {
               forbidden_ = 0;
   using Deed = std::pair<std::uint64_t, std::uint64_t>;  // step and command
   std::optional<Deed> last_cut_, last_stroke_, last_undo_;
+  std::map<std::string, double> snipped_;  // [s] when blades in a hand last cut, by the names of instruments
+  std::vector<char> goes_on_;              // one an event of the frame: such blades go on with their stroke
   std::set<std::tuple<std::uint64_t, std::string, std::uint32_t>> opened_;  // cavities: step, body, patch
   double forbidden_for_ = 0.0, bled_for_ = 0.0;
   ToolCrossings crossings_;
