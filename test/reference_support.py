@@ -49,7 +49,7 @@ def number(text):
 
 def rangeOf(cell):
     """(from, to, whether `from` is left out, unit), or None."""
-    match = re.search(r'(above )?(%s) to (%s)(?: (1/s|(?:m|s|rad|Hz|Pa|N|ml|kg)(?:/(?:m|s|Pa)[²³]?)?)(?!\w))?' % (NUMBER, NUMBER), cell)
+    match = re.search(r'(above )?(%s) to (%s)(?: (1/s|(?:m|s|rad|Hz|Pa|N|ml|kg|J)(?:/(?:m|s|Pa)[²³]?)?)(?!\w))?' % (NUMBER, NUMBER), cell)
     if not match:
         return None
     return number(match.group(2)), number(match.group(3)), bool(match.group(1)), match.group(4) or ''
