@@ -31,7 +31,7 @@ set(full_tests clip display ending forces fuzz hands network own_organ pages par
   play_skin requests robust scenes session shown_block shown_fish shown_review shown_skin soak stations)
 # A node keeps one processor busy, and a screen is drawn by software: tests run alone. These wait for what they ask for,
 # however long it takes, or hold the clock themselves.
-set(patient_tests actions client clock contacts environment forces lab messages_law network own_organ pages parameters publish_clock requests scenes services session spawn_cloud stations streams testing time tools training)
+set(patient_tests actions client clock contacts environment forces lab messages_law network own_organ pages parameters publish_clock requests scenes services session spawn_cloud stations testing time tools training)
 file(GLOB ros_tests RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS test/ros/*.test test/rviz/*.test)
 set(known_tests ${ros_tests})
 list(TRANSFORM known_tests REPLACE ".*/(.*)\\.test$" "\\1")
