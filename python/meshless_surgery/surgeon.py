@@ -1,6 +1,7 @@
 """The services of a running deformer as methods."""
 import contextlib
 import select
+import time
 
 import rospy
 from geometry_msgs.msg import Point, Quaternion, Vector3
@@ -243,7 +244,12 @@ class Surgeon:
         """The topics of a tool, or of an instrument by its name: a ToolStream."""
         jaws = tool == 'scissors'
         if tool not in TOOLS:
-            types = {instrument.name: instrument.type for instrument in self.state().instruments}
+            asked, end = rospy.Time.now(), time.monotonic() + 1.0
+            while True:  # one that has just been attached may not be in a state that was on the way
+                state = self.state()
+                types = {instrument.name: instrument.type for instrument in state.instruments}
+                if tool in types or state.header.stamp >= asked or time.monotonic() > end:
+                    break
             if tool not in types:
                 raise ValueError("tool is '%s'; accepted: %s" % (tool, ', '.join((*TOOLS, *sorted(types)))))
             jaws = types[tool] in ('grasper', 'scissors')
