@@ -11,7 +11,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kStateVersion = 27;
+constexpr std::uint32_t kStateVersion = 28;
 
 inline std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(
@@ -255,7 +255,7 @@ void serialize(A& archive, InstrumentDef& v) {
           jaw_thickness, friction, stiffness, damping, angular_stiffness, angular_damping, max_force, max_torque,
           max_speed, grip, remote_centre, color);
 }
-MESHLESS_ARCHIVE(BladeWound, body, origin, x_axis, y_axis, least, most)
+MESHLESS_ARCHIVE(BladeWound, body, origin, x_axis, y_axis, least, most, stroke)
 MESHLESS_ARCHIVE(InstrumentLoad, force, torque, jaw, mass, inertia, jaw_inertia)
 MESHLESS_ARCHIVE(Instrument, def, number, target, jaw_target, hand, jaw_hand, pose, jaw, velocity, spin, jaw_rate, jaw_stop, cut_to, wounds, stroke, resists, cut_torque, cut_work, owed, answers, load,
                  force, torque, jaw_torque, holds, gripped, closed_to, lost_for)

@@ -6,13 +6,13 @@
 #include <set>
 #include <unordered_map>
 
-#include "meshless_surgery/geometry/query/inside.h"
+#include "instrument_body.h"
 #include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/contact/textbook.h"
 #include "meshless_surgery/dynamics/match_batch.h"
+#include "meshless_surgery/geometry/query/inside.h"
 #include "meshless_surgery/world/world.h"
-#include "instrument_body.h"
 #include "shown_surface.h"
 #include "surface_model.h"
 
@@ -359,6 +359,8 @@ struct World::Impl : KeptWorld {
   void cutByInstruments();
   /// Whether there was something to cut.
   bool snip(std::size_t n, WorldBody& body, double cuts_to, bool snips);
+  bool cutWound(std::size_t n, WorldBody& body, BladeWound wound, const Vec2& from, const Vec2& to,
+                const InciseCommand& command);
   /// [m] of what is deepest in an obstacle; zero: nothing is.
   Vec3 wayOutOfObstacles(InstrumentBody& body) const;
   void leadInstruments(double h_frame);

@@ -52,7 +52,7 @@ Result<InciseReply> World::Impl::inciseNow(const InciseCommand& command, const B
     refreshSurface(*body);
     Box bounds;
     for (const Vec3& p : body->state.surface) bounds.extend(p);
-    if (!bounds.overlaps(reach)) continue;
+    if (!at_rest && !bounds.overlaps(reach)) continue;
     Result<CutBody> opened = cutBody(*body->model, body->state, at_rest ? *at_rest : command.blade,
                                      {0.0, 0, picked(body->id), at_rest != nullptr});
     if (opened) {

@@ -18,7 +18,7 @@ constexpr double kCrushed = 0.1;  // of the angle at which jaws have met tissue:
 constexpr double kRests = 1e-6;   // [m/s] slower instruments wake nobody
 constexpr double kSnip = 0.125;   // of blades: they have closed on so much more before it is cut, or close no further
 constexpr double kJoins = 3e-4;   // [m] by which a snip goes over the last one, and beyond tissue
-constexpr double kGoesOn = 0.8;   // cosine: blades turned less go on with their wound
+constexpr double kGoesOn = 0.8;   // cosine: blades turned less go on with the wound of an earlier stroke
 constexpr int kWaysOut = 4;       // of an instrument from obstacles, at most, in a step of
 constexpr double kStepOut = 1e-3, kMostStepsOut = 100.0;  // [m], of which a substep has at most so many
 constexpr int kMostLines = 100;
@@ -276,8 +276,8 @@ bool World::Impl::snip(std::size_t n, WorldBody& body, double cuts_to, bool snip
     instrument.resists += body.material.toughness * area / way;
   }
   if (!snips) return false;
-  const double begins = instrument.cut_to, more = cuts_to - begins;
-  const double apart = 0.5 * std::min(body.edge_length, def.jaw_thickness);
+  const double begins = instrument.cut_to, more = cuts_to - begins, thickness = def.jaw_thickness;
+  const double apart = 0.25 * std::min(body.edge_length, thickness);
   const int count = std::clamp(static_cast<int>(std::ceil(more / apart)), kLines, kMostLines);
   double low = 0.0, high = 0.0;  // [m]
   Points met;
@@ -287,66 +287,96 @@ bool World::Impl::snip(std::size_t n, WorldBody& body, double cuts_to, bool snip
     high = std::max(high, tissue.high);
     met.insert(met.end(), tissue.rest.begin(), tissue.rest.end());
   }
-  if (met.empty()) return false;
   InciseCommand command;
   command.bodies = {body.name};
-  command.blade = {
-      frame.centre + begins * axes.col(0), axes.col(0), axes.col(1), more, kJoins - low, kJoins + high, 0.0};
-  const std::optional<Blade> led = bladeAtRest(*body.model, body.state, command.blade);
-  if (!led) return true;
-  // A wound is gone on with where the blades still are in its plane, and at it.
+  command.blade = {frame.centre + begins * axes.col(0), axes.col(0), axes.col(1), more, kJoins, kJoins, 0.0};
+  const double margin = 2.0 * apart + kJoins;  // tissue is squeezed between two lines
+  const bool same_stroke = known && known->stroke == instrument.stroke;
+  const bool ends = at(cuts_to + kJoins).rest.empty();  // tissue does
+  if (met.empty()) {
+    // Blades that are through leave no thread between two lines, or beside them.
+    if (!same_stroke || !ends) return false;
+    BladeWound whole = *known;
+    --whole.stroke;  // once
+    whole.least -= Vec2::Constant(margin);
+    whole.most += Vec2::Constant(margin);
+    return cutWound(n, body, whole, whole.least, whole.most, command);
+  }
+  command.blade.depth -= low;
+  command.blade.rise += high;
+  // A wound is gone on with where what is between the blades is within their thickness of its plane, and at it; that of
+  // an earlier stroke, where the blades are in its plane too.
   const auto extend = [&](const BladeWound& of, Vec2& least, Vec2& most) {
     least.setConstant(std::numeric_limits<double>::infinity());
     most = -least;
+    double farthest = 0.0;
     for (std::size_t k = 0; k + 1 < met.size(); k += 2) {
-      // Another layer of folded tissue is elsewhere at rest.
-      if (std::abs(of.beside(0.5 * (met[k] + met[k + 1]))) > def.jaw_width) continue;
+      const double beside = std::abs(of.beside(0.5 * (met[k] + met[k + 1])));
+      if (beside > def.jaw_width) continue;  // another layer of folded tissue is elsewhere at rest
+      farthest = std::max(farthest, beside);
       for (const Vec3& p : {met[k], met[k + 1]}) {
         least = least.cwiseMin(of.within(p));
         most = most.cwiseMax(of.within(p));
       }
     }
-    return least.x() <= most.x();
+    return least.x() <= most.x() && farthest <= thickness;
   };
-  BladeWound wound = {body.name, led->origin, led->x_axis, led->y_axis, Vec2::Zero(), Vec2::Zero()};
   Vec2 least, most;
-  bool goes_on = known && std::abs(known->x_axis.cross(known->y_axis).dot(led->plane().normal)) > kGoesOn &&
-                 extend(*known, least, most);
+  std::optional<Blade> led;  // to a plane at rest
+  if (!same_stroke) led = bladeAtRest(*body.model, body.state, command.blade);
+  const auto turned = [&] { return std::abs(known->x_axis.cross(known->y_axis).dot(led->plane().normal)); };
+  bool goes_on = known && (same_stroke || (led && turned() > kGoesOn)) && extend(*known, least, most);
   if (goes_on) {
     const double near = kSnip * def.jaw_length;
     goes_on = least.x() < known->most.x() + near && most.x() > known->least.x() - near &&
               least.y() < known->most.y() + near && most.y() > known->least.y() - near;
   }
-  if (goes_on)
+  BladeWound wound;
+  bool along = true;  // the wound grows along its x axis
+  if (goes_on) {
     wound = *known;
-  else if (!extend(wound, least, most))
-    return true;
-  const Vec2 margin = (0.25 * (most - least)).cwiseMin(Vec2::Constant(def.jaw_thickness)) + Vec2::Constant(kJoins);
-  const bool ends = at(cuts_to + kJoins).rest.empty();  // tissue does
-  const bool along = wound.x_axis.dot(led->x_axis) > 0.0;
-  Vec2 from = least - margin, to = most + margin;
+    along = most.x() - wound.most.x() >= wound.least.x() - least.x();
+  } else {
+    if (same_stroke) led = bladeAtRest(*body.model, body.state, command.blade);
+    if (!led) return true;
+    wound = {body.name, led->origin, led->x_axis, led->y_axis, Vec2::Zero(), Vec2::Zero(), 0};
+    extend(wound, least, most);
+  }
+  if (!(least.x() <= most.x())) return true;
+  Vec2 from = least - Vec2::Constant(margin), to = most + Vec2::Constant(margin);
   if (!ends) (along ? to : from).x() = along ? most.x() : least.x();
   if (goes_on && ends) {  // as a whole: it may part the body now
     from = from.cwiseMin(wound.least);
     to = to.cwiseMax(wound.most);
   } else if (goes_on) {  // from where it ends
     if (along)
-      from.x() = std::min(wound.most.x(), least.x());
+      from.x() = least.x() < wound.least.x() ? from.x() : std::min(wound.most.x(), least.x());
     else
-      to.x() = std::max(wound.least.x(), most.x());
+      to.x() = most.x() > wound.most.x() ? to.x() : std::max(wound.least.x(), most.x());
   }
-  const Blade blade = {
-      wound.origin + from.x() * wound.x_axis, wound.x_axis, wound.y_axis, to.x() - from.x(), -from.y(), to.y(), 0.0};
-  if (!goes_on) wound.least = from, wound.most = to;
-  wound.least = wound.least.cwiseMin(from);
-  wound.most = wound.most.cwiseMax(to);
+  wound.least = goes_on ? Vec2(wound.least.cwiseMin(from)) : from;
+  wound.most = goes_on ? Vec2(wound.most.cwiseMax(to)) : to;
+  wound.stroke = instrument.stroke;
+  return cutWound(n, body, wound, from, to, command);
+}
+
+bool World::Impl::cutWound(std::size_t n, WorldBody& body, BladeWound wound, const Vec2& from, const Vec2& to,
+                           const InciseCommand& command) {
+  Instrument& instrument = instruments[n];
+  const Vec2 half = 0.5 * (to - from);
+  const Vec3 origin = wound.origin + from.x() * wound.x_axis + (from.y() + half.y()) * wound.y_axis;
+  const Blade blade = {origin, wound.x_axis, wound.y_axis, 2.0 * half.x(), half.y(), half.y(), 0.0};
   const std::size_t said = events.size();
   ++commands;  // each is another one
   const double toughness = body.material.toughness;
   stroke_of_cut = (std::uint64_t{instrument.number} + 1) << 32 | instrument.stroke;
   const Result<InciseReply> made = inciseNow(command, &blade);
   stroke_of_cut = 0;
-  if (!made) return true;  // all of it is open
+  if (!made) {  // all of it is open; what is refused is made with the next
+    BladeWound* const known = woundOf(instrument, wound.body);
+    if (known && made.error().code == ErrorCode::kUnsuitableShape) *known = wound;
+    return true;
+  }
   instrument.owed += toughness * made->opened_area;
   std::vector<BladeWound>& wounds = instrument.wounds;
   wounds.erase(std::remove_if(wounds.begin(), wounds.end(),
@@ -359,10 +389,9 @@ bool World::Impl::snip(std::size_t n, WorldBody& body, double cuts_to, bool snip
     if (wounds.size() < kMostWounds) wounds.push_back(wound);
   }
   for (std::size_t e = said; e < events.size(); ++e)
-    if (events[e].type == EventType::kIncised) events[e].instrument = def.name;
+    if (events[e].type == EventType::kIncised) events[e].instrument = instrument.def.name;
   return true;
 }
-
 void World::Impl::leadInstruments(double h_frame) {
   for (std::size_t n = 0; n < instruments.size(); ++n) {
     Instrument& instrument = instruments[n];

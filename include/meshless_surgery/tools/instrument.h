@@ -93,6 +93,7 @@ struct BladeWound {
   Vec3 origin = Vec3::Zero();                           // [m]
   Vec3 x_axis = Vec3::UnitX(), y_axis = Vec3::UnitY();  // unit
   Vec2 least = Vec2::Zero(), most = Vec2::Zero();       // [m] along these: where it is
+  std::uint32_t stroke = 0;                             // of the instrument, in which it was cut last
 
   Vec2 within(const Vec3& rest) const { return {x_axis.dot(rest - origin), y_axis.dot(rest - origin)}; }
   double beside(const Vec3& rest) const { return x_axis.cross(y_axis).dot(rest - origin); }
