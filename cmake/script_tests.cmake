@@ -18,6 +18,8 @@ add_test(NAME falls_short
   COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/test/falls_short_test.py)
 add_test(NAME learning_curves
   COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/test/learning_curves_test.py)
+add_test(NAME teleoperation
+  COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/test/teleoperation_test.py)
 add_test(NAME test_summary
   COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/scripts/lib/test_summary_test.py)
 add_test(NAME loopback_by_default
@@ -29,7 +31,7 @@ if(NOT MESHLESS_SURGERY_CORE_ONLY)
     COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/scripts/lib/strict_rostest_test.py)
   set_tests_properties(strict_rostest PROPERTIES LABELS scripts)
 endif()
-set_tests_properties(include_direction docs messages package falls_short learning_curves test_summary loopback_by_default check_arguments PROPERTIES LABELS scripts)
+set_tests_properties(include_direction docs messages package falls_short learning_curves teleoperation test_summary loopback_by_default check_arguments PROPERTIES LABELS scripts)
 # The headers' own documentation, without a warning.
 add_test(NAME doxygen COMMAND ${CMAKE_COMMAND} -E env DOXYGEN_OUTPUT=${CMAKE_BINARY_DIR}/api
   doxygen ${CMAKE_CURRENT_SOURCE_DIR}/docs/Doxyfile WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})

@@ -216,7 +216,7 @@ class LaunchTest(Compared, unittest.TestCase):
     least = 30
 
     def text(self):
-        return read('docs/reference/parameters.md') + read('docs/stations.md')
+        return read('docs/reference/parameters.md') + read('docs/stations.md') + read('docs/devices.md')
 
     def code(self):
         known = {}
@@ -233,12 +233,42 @@ class LaunchTest(Compared, unittest.TestCase):
     def said(self, text):
         known = {}
         for section, file in (('Launch arguments', 'training.launch'), ('Launch arguments', 'review.launch'),
-                              ('Several stations, several machines', 'lab.launch'), ('Recording', 'record.launch')):
+                              ('Several stations, several machines', 'lab.launch'), ('Recording', 'record.launch'), ('Arguments', 'device.launch')):
             for row in rows(text, section, 'argument of `%s`' % file):
                 names, words = named(row[0]), [word for word in re.split(r', ', row[1])]
                 for name, word in zip(names, words if len(words) == len(names) else words * len(names)):
                     known[file, name] = None if word == 'required' else re.sub('^(none|empty).*', '', word.strip('`'))
         return known
+
+
+class DeviceTest(Compared, unittest.TestCase):
+    """Parameters of scripts/device.py that are no arguments of its launch file, and numbers of those that are."""
+    planted = (('| `jaw_open` | 0.8 |', '| `jaw_open` | 0.7 |'), ('1 to 1000 Hz', '1 to 100 Hz'), ('| `joy_close` |', '| `joy_shut` |'),
+               ('| 0.01 to 100 |', '| 0.1 to 100 |'))
+    least = 12
+
+    def text(self):
+        return read('docs/devices.md')
+
+    def code(self):
+        settings = next(node.value for node in ast.parse(read('scripts/device.py')).body
+                        if isinstance(node, ast.Assign) and getattr(node.targets[0], 'id', '') == 'SETTINGS')
+        arguments, known = set(re.findall(r'<arg name="(\w+)"', read('launch/device.launch'))), {}
+        for key, reader in zip(settings.keys, settings.values):
+            name, default, *rest = (ast.literal_eval(argument) for argument in reader.args)
+            self.assertEqual(key.value, name)
+            is_number = reader.func.id == 'number'
+            ends = (*map(float, rest[:2]), False, ''.join(rest[2:])) if is_number else None
+            if name not in arguments | {'node', 'rviz_config'} or is_number:
+                known[name] = (None if name in arguments else float(default) if is_number else default, ends)
+        return known
+
+    def said(self, text):
+        own = {named(row[0])[0]: (valueOf(row[1]) if rangeOf(row[2]) else row[1].strip('`'), rangeOf(row[2]))
+               for row in rows(text, 'Arguments', 'parameter of `device.py`') if named(row[0])[0] not in ('node', 'rviz_config')}
+        launched = {named(row[0])[0]: (None, rangeOf(row[2])) for row in rows(text, 'Arguments', 'argument of `device.launch`')
+                    if rangeOf(row[2])}
+        return {**own, **launched}
 
 
 def signature(function):
@@ -312,7 +342,7 @@ class EnvironmentTasksTest(Compared, unittest.TestCase):
 SCRIPTS = {'scripts/' + name: 'scripts/' + name for name in ('train', 'check', 'soak', 'fuzz', 'film')}
 PROGRAMS = {**{name: 'src/tools_main/%s.cpp' % name for name in stems('src/tools_main/*.cpp')}, **SCRIPTS,
             'drive': 'test/drive/drive_main.cpp', 'make_meshes': 'test/shapes/make_meshes_main.cpp',
-            **{name + '.py': 'scripts/%s.py' % name for name in stems('scripts/*.py') if not name.startswith(('play_', 'surgery_'))},
+            **{name + '.py': 'scripts/%s.py' % name for name in stems('scripts/*.py') if not name.startswith(('play_', 'surgery_', 'device'))},
             'play_SCENE.py': 'scripts/surgery_client.py'}
 
 
@@ -348,15 +378,17 @@ class ExitCodesTest(Compared, unittest.TestCase):
 
     def code(self):
         known = {}
-        for name in ('deformer_node', 'review_node', 'replay', 'report', 'drive', 'make_meshes', 'learning_curves.py', 'play_*.py', 'scripts/train',
+        for name in ('deformer_node', 'review_node', 'replay', 'report', 'drive', 'make_meshes', 'learning_curves.py', 'play_*.py', 'device.py', 'scripts/train',
                      'scripts/check'):
-            path = PROGRAMS.get(name.replace('*', 'SCENE')) or 'src/node_main/%s.cpp' % name
+            path = PROGRAMS.get(name.replace('*', 'SCENE')) or ('scripts/' + name if name.endswith('.py') else 'src/node_main/%s.cpp' % name)
             code = read(path)
             if name == 'play_*.py' or name == 'learning_curves.py':
                 known[name] = {0, 2} | ({1} if 'return 1 if' in code else set())  # 2: argparse's
                 self.assertIn('argparse', code)
                 continue
-            if path.endswith('.cpp'):
+            if name == 'device.py':
+                taken = found(r'\breturn (\d)\n', code)
+            elif path.endswith('.cpp'):
                 if 'node_main' in path:
                     code += read('src/node_main/run_node.h') + read('src/node_main/end_on_signal.cpp')
                 taken = found(r'(?:\breturn|_exit\(|\?|:) ?(\d)(?= :|;|\);)', code)
