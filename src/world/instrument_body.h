@@ -1,6 +1,8 @@
 // An instrument as contact sees it.
 #pragma once
 
+#include <memory>
+
 #include "meshless_surgery/contact/contact_surface.h"
 #include "meshless_surgery/tools/instrument.h"
 
