@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "shapes/random_organ.h"
 #include "support/bodies.h"
 #include "support/random.h"
