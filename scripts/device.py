@@ -174,7 +174,7 @@ class Bridge:
                 self.lead()
 
     def has_jaws(self):
-        return self.type in ('grasper', 'scissors')
+        return self.type in ('grasper', 'scissors', 'clip_applier')
 
     def leads(self):
         return self.there and not self.clutched and not self.paused and self.enabled and not self.ended

@@ -14,8 +14,8 @@ from meshless_surgery.errors import Refused, Unanswered, Unreachable, need_topic
 from meshless_surgery.goals import Goals
 from meshless_surgery.msg import Info, State
 from meshless_surgery.poses import blade_pose, blades_pose, pose_stamped
-from meshless_surgery.srv import (Attach, AttachInstrument, Clip, Cut, Detach, DetachInstrument, GetBody, GetLoad, Hash, Incise, LoadState, Lock, MoveClamp, MovePick, Observe, Pick, Probe,
-                                  Push, Release, Remove, Report, SaveState, SetMaterial, Spawn, SpawnCloud, StartTask, Step, Unclip)
+from meshless_surgery.srv import (ApplyForce, Attach, AttachInstrument, Clip, Cut, Detach, DetachInstrument, GetBody, GetLoad, Hash, Incise, LoadState, Lock, MoveClamp, MovePick, Observe, Pick, Probe,
+                                  Push, Release, Remove, Report, ResetBodies, SaveState, SetGravity, SetMaterial, SetPose, Spawn, SpawnCloud, StartTask, Step, Unclip)
 from meshless_surgery.streams import TOOLS, ToolStream
 
 
@@ -175,6 +175,20 @@ class Surgeon:
         return self.call('move_clamp', MoveClamp, header=self._header(frame), name=name, clamp=clamp, shift=Vector3(*shift),
                          turn=Quaternion(*turn), time=time)
 
+    def apply_force(self, name, force, time, centre=(0, 0, 0), radius=0.0, frame=None):
+        """A `force` [N] on what lies in the sphere of `radius` about `centre` of the body's surface (0: on all of it), for `time`
+        seconds. It stays on its tissue."""
+        return self.call('apply_force', ApplyForce, header=self._header(frame), name=name, force=Vector3(*force), time=time,
+                         centre=Point(*centre), radius=radius)
+
+    def end_forces(self, name):
+        """Of all that apply_force() has put on the body."""
+        return self.call('apply_force', ApplyForce, name=name)
+
+    def set_pose(self, name, position, orientation=(0, 0, 0, 1), frame=None):
+        """Puts the body there, at rest and in its rest shape, with its cuts."""
+        return self.call('set_pose', SetPose, name=name, pose=pose_stamped(position, orientation, self._frame(frame)))
+
     def set_material(self, body, yaml):
         return self.call('set_material', SetMaterial, body=body, yaml=yaml)
 
@@ -202,6 +216,14 @@ class Surgeon:
     # the world
     def state(self):
         return self._said('state', State)
+
+    def set_gravity(self, gravity, frame=None):
+        """[m/s^2], until the next call or a reset."""
+        return self.call('set_gravity', SetGravity, header=self._header(frame), gravity=Vector3(*gravity))
+
+    def reset_bodies(self, *bodies):
+        """These bodies of the scene as it began, in place of what has become of them; without any: all of them."""
+        return self.call('reset_bodies', ResetBodies, bodies=list(bodies))
 
     def info(self):
         """What runs there: scene, step rate, bodies."""
@@ -252,7 +274,7 @@ class Surgeon:
                     break
             if tool not in types:
                 raise ValueError("tool is '%s'; accepted: %s" % (tool, ', '.join((*TOOLS, *sorted(types)))))
-            jaws = types[tool] in ('grasper', 'scissors')
+            jaws = types[tool] in ('grasper', 'scissors', 'clip_applier')
         return ToolStream(self.node, tool, self._frame(frame), self.timeout, jaws)
 
     def attach_instrument(self, name, yaml, position, orientation=(0.0, 0.0, 0.0, 1.0), frame=None):

@@ -244,8 +244,8 @@ double readUnits(YamlMap& map) {
 InstrumentDef readInstrument(YamlSource& source, const YAML::Node& node) {
   InstrumentDef def;
   YamlMap map(source, node, "an instrument");
-  const int type = map.choice("type", {"probe", "grasper", "hook", "scissors"});
-  if (!map.has("type")) source.fail(node, "an instrument has no type", "probe, grasper, hook, scissors");
+  const int type = map.choice("type", {"probe", "grasper", "hook", "scissors", "clip_applier"});
+  if (!map.has("type")) source.fail(node, "an instrument has no type", "probe, grasper, hook, scissors, clip_applier");
   def.type = static_cast<InstrumentType>(std::max(0, type));
   if (const YAML::Node pose = map.get("pose"); pose.IsDefined()) def.pose = readPose(source, pose);
   for (const InstrumentNumber& number : kInstrumentNumbers)

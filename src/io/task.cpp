@@ -450,6 +450,10 @@ class TaskReader {
 
 }  // namespace
 
+bool isTaskFile(const std::string& task) {
+  return task.find('/') != std::string::npos || std::filesystem::path(task).extension() == ".yaml";
+}
+
 Result<LoadedTask> readTask(const std::string& file, const std::optional<std::string>& scene_folder,
                             const FileAccess& access, const std::string& only_scene) {
   std::error_code failed;
@@ -471,6 +475,7 @@ Result<LoadedTask> readTask(const std::string& file, const std::optional<std::st
       version, sizeof version, "%08lx",
       crc32(0, reinterpret_cast<const Bytef*>(bytes->text().data()), static_cast<uInt>(bytes->text().size())));
   loaded.task.version = version;
+  loaded.file = real.string();
   TaskReader reader(source, loaded.task, real.parent_path().string(), access);
   try {
     reader.read(*root);

@@ -118,7 +118,7 @@ visualization_msgs::MarkerArray toMarkers(ShownTask& shown, const WorldSnapshot&
 }  // namespace
 
 Result<LoadedTask> loadTask(const std::string& task, const TrainingFolders& folders) {
-  const bool is_file = task.find('/') != std::string::npos || fs::path(task).extension() == ".yaml";
+  const bool is_file = isTaskFile(task);
   std::string file = folders.tasks + "/" + task + ".yaml";
   if (is_file) {
     auto resolved = folders.access.resolve(task, fs::path(folders.scene_file).parent_path().string());
@@ -318,7 +318,10 @@ struct LiveTraining::Handlers : Answers {
     }
     const std::string name = loaded->task.name;
     // First the task, then the reset: it begins with the first step of the new run, as it does in a replay.
-    const Status taken = runner.look([&](World&) { take(std::move(loaded->task), request.trainee); });
+    const Status taken = runner.look([&](World& world) {
+      take(std::move(loaded->task), request.trainee);
+      world.noteTask({true, isTaskFile(request.task) ? loaded->file : request.task, request.trainee, request.allow});
+    });
     if (!taken.ok()) return refuse(response, "start_task", taken.error());
     const Status reset = runner.reset();
     if (!reset.ok()) return refuse(response, "start_task", reset.error());
@@ -327,9 +330,10 @@ struct LiveTraining::Handlers : Answers {
 
   bool stopTask(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
     bool runs = false;
-    const Status done = runner.look([&](World&) {
+    const Status done = runner.look([&](World& world) {
       runs = training && !stopped;
       if (!runs) return;
+      world.noteTask({false, training->task().name, trainee, {}});
       training->stop();
       stopped = true;
       ++version;

@@ -10,6 +10,7 @@
 #include "body_loader.h"
 #include "convert.h"
 #include "frames.h"
+#include "live_training.h"
 #include "runner.h"
 
 namespace meshless {
@@ -60,8 +61,9 @@ struct HasStepsDone<Response, std::void_t<decltype(Response::steps_done)>> : std
 
 /// `caller` is the service or action as the diagnostics name it. Actions come with a `progress`.
 struct LongWork : Answers {
-  LongWork(WorldRunner& runner_in, Frames& frames_in, const BodyLoader& loader_in, Rejections& rejections_in)
-      : Answers{rejections_in}, runner(runner_in), frames(frames_in), loader(loader_in) {}
+  LongWork(WorldRunner& runner_in, Frames& frames_in, const BodyLoader& loader_in, Rejections& rejections_in,
+           const LiveTraining& training_in)
+      : Answers{rejections_in}, runner(runner_in), frames(frames_in), loader(loader_in), training(training_in) {}
 
   using Answers::refuse;
   /// What ended because it was cancelled is no rejection.
@@ -158,6 +160,7 @@ struct LongWork : Answers {
   template <class Request, class Response>
   bool spawn(const Request& request, Response& response, const std::string& caller,
              Progress* progress = nullptr) const {
+    if (const auto no = training.refuses(Intervention::kSpawn)) return refuse(response, caller, *no);
     BorderCheck check;
     SpawnRequest wanted;
     wanted.name = check.newName("name", request.name);
@@ -202,6 +205,8 @@ struct LongWork : Answers {
   template <class Response>
   bool add(Response& response, const std::string& caller, const std::shared_ptr<const PreparedBody>& body,
            bool numbered, Progress* progress = nullptr) const {
+    // A task may have begun while it was prepared.
+    if (const auto no = training.refuses(Intervention::kSpawn)) return refuse(response, caller, *no);
     SpawnCommand command;
     command.body = body;
     auto reply = runner.apply(command, progress);
@@ -237,6 +242,7 @@ struct LongWork : Answers {
   WorldRunner& runner;
   Frames& frames;
   const BodyLoader& loader;
+  const LiveTraining& training;
 };
 
 }  // namespace meshless

@@ -64,8 +64,7 @@ Result<std::string> sceneFile(const std::string& scene, const std::string& packa
 
 /// A name of config/tasks, a path or package://: who starts the node may name any.
 Result<LoadedTask> parameterTask(const std::string& task, const TrainingFolders& folders, const FileAccess& access) {
-  const bool is_path = task.find('/') != std::string::npos || fs::path(task).extension() == ".yaml";
-  const Result<std::string> file = is_path ? access.located(task, "") : folders.tasks + "/" + task + ".yaml";
+  const Result<std::string> file = isTaskFile(task) ? access.located(task, "") : folders.tasks + "/" + task + ".yaml";
   if (!file.ok()) return file.error();
   return readTask(*file, folders.scenes, access);
 }
@@ -170,9 +169,11 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   training_folders.scenes = package_folder + "/config/scenes";
   training_folders.tasks = package_folder + "/config/tasks";
   std::optional<TaskDef> task;
+  std::string task_file;
   if (!settings->task.empty()) {
     auto loaded = parameterTask(settings->task, training_folders, access);
     if (!loaded.ok()) return Error{loaded.error().code, "parameter ~task: " + loaded.error().detail};
+    task_file = isTaskFile(settings->task) ? loaded->file : settings->task;
     task = std::move(loaded->task);
     settings->scene = loaded->scene_file;
   }
@@ -246,6 +247,7 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   const auto log = session->startLog(*world);
   if (!log.ok()) return Error{log.error().code, "parameter ~command_log: " + log.error().detail};
   if (!log->empty()) ROS_INFO_STREAM("commands are logged to " << *log);
+  if (task) world->noteTask({true, task_file, settings->trainee, {}});
 
   auto parts = std::make_unique<Parts>(private_handle, *settings, std::move(world),
                                        BodyLoader(access, scene_folder, std::move(scene->materials)),

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <sstream>
 
+#include <meshless_surgery/ApplyForce.h>
 #include <meshless_surgery/Attach.h>
 #include <meshless_surgery/AttachInstrument.h>
 #include <meshless_surgery/Clip.h>
@@ -21,8 +22,11 @@
 #include <meshless_surgery/Push.h>
 #include <meshless_surgery/Release.h>
 #include <meshless_surgery/Remove.h>
+#include <meshless_surgery/ResetBodies.h>
 #include <meshless_surgery/SaveState.h>
+#include <meshless_surgery/SetGravity.h>
 #include <meshless_surgery/SetMaterial.h>
+#include <meshless_surgery/SetPose.h>
 #include <meshless_surgery/Spawn.h>
 #include <meshless_surgery/SpawnCloud.h>
 #include <meshless_surgery/Step.h>
@@ -39,6 +43,8 @@ namespace {
 
 constexpr double kLongestMove = 3600.0;  // [s]
 static_assert(kLongestMove == kMaxClampTime);
+constexpr double kLongestPush = 3600.0;  // [s]
+static_assert(kLongestPush == kLongestForce);
 constexpr std::size_t kMaxLoadPoints = 10000;
 constexpr double kMaxSpeed = 1e3;                           // [m/s]
 constexpr double kMaxStiffness = 1e9;                       // [N/m]
@@ -63,7 +69,7 @@ struct Services::Handlers : Answers {
         session(session_in),
         tools(tools_in),
         training(training_in),
-        work(runner_in, frames_in, loader_in, rejections_in),
+        work(runner_in, frames_in, loader_in, rejections_in, training_in),
         actions(private_handle, work, {cut_queue, step_queue, spawn_queue}) {
     advertise(private_handle, "pick", &Handlers::pick);
     advertise(private_handle, "move_pick", &Handlers::movePick);
@@ -82,6 +88,10 @@ struct Services::Handlers : Answers {
     advertise(private_handle, "clip", &Handlers::clip);
     advertise(private_handle, "unclip", &Handlers::unclip);
     advertise(private_handle, "move_clamp", &Handlers::moveClamp);
+    advertise(private_handle, "apply_force", &Handlers::applyForce);
+    advertise(private_handle, "set_gravity", &Handlers::setGravity);
+    advertise(private_handle, "set_pose", &Handlers::setPose);
+    advertise(private_handle, "reset_bodies", &Handlers::resetBodies);
     advertise(private_handle, "attach_instrument", &Handlers::attachInstrument);
     advertise(private_handle, "detach_instrument", &Handlers::detachInstrument);
     advertise(private_handle, "set_material", &Handlers::setMaterial);
@@ -249,7 +259,6 @@ struct Services::Handlers : Answers {
   }
 
   bool spawn(meshless_surgery::Spawn::Request& request, meshless_surgery::Spawn::Response& response) {
-    if (const auto no = training.refuses(Intervention::kSpawn)) return refuse(response, "spawn", *no);
     return work.spawn(request, response, "spawn");
   }
 
@@ -439,6 +448,68 @@ struct Services::Handlers : Answers {
     if (!reply.ok()) return refuse(response, "move_clamp", reply.error());
     response.middle = toPoint(std::get<MoveClampReply>(*reply).middle);
     return accept(response, "moves what entry " + std::to_string(command.clamp) + " of `fixed` holds of " + command.body);
+  }
+
+  bool applyForce(meshless_surgery::ApplyForce::Request& request, meshless_surgery::ApplyForce::Response& response) {
+    if (const auto no = training.refuses(Intervention::kForce)) return refuse(response, "apply_force", *no);
+    BorderCheck check;
+    ApplyForceCommand command;
+    command.body = request.name;
+    const Vec3 force = check.direction("force", request.force);
+    command.time = check.number("time", request.time, 0.0, kLongestPush, "s");
+    const auto region = regionOf(request, check);
+    if (!region.ok()) return refuse(response, "apply_force", region.error());
+    command.region = *region;
+    const auto frame = frames.toWorld(request.header);
+    if (!frame.ok()) return refuse(response, "apply_force", frame.error());
+    command.force = frame->rotation * force;
+    const auto reply = runner.apply(command);
+    if (!reply.ok()) return refuse(response, "apply_force", reply.error());
+    const auto& applied = std::get<ApplyForceReply>(*reply);
+    response.area = applied.area;
+    response.middle = toPoint(applied.middle);
+    if (command.force.isZero(0.0)) return accept(response, "no force acts on " + command.body + " any more");
+    return accept(response, numberText(command.force.norm(), 3) + " N act on " + numberText(1e4 * applied.area, 3) +
+                                " cm^2 of " + command.body + " for " + numberText(command.time, 4) + " s");
+  }
+
+  bool setGravity(meshless_surgery::SetGravity::Request& request, meshless_surgery::SetGravity::Response& response) {
+    if (const auto no = training.refuses(Intervention::kGravity)) return refuse(response, "set_gravity", *no);
+    BorderCheck check;
+    const Vec3 gravity = check.direction("gravity", request.gravity);
+    if (!check.ok()) return refuse(response, "set_gravity", check.error());
+    const auto frame = frames.toWorld(request.header);
+    if (!frame.ok()) return refuse(response, "set_gravity", frame.error());
+    return applied(response, "set_gravity", SetGravityCommand{frame->rotation * gravity}, "gravity is changed");
+  }
+
+  bool setPose(meshless_surgery::SetPose::Request& request, meshless_surgery::SetPose::Response& response) {
+    if (const auto no = training.refuses(Intervention::kPlace)) return refuse(response, "set_pose", *no);
+    BorderCheck check;
+    PlaceBodyCommand command;
+    command.body = request.name;
+    const Pose local = check.pose("pose.pose", request.pose.pose);
+    if (!check.ok()) return refuse(response, "set_pose", check.error());
+    const auto frame = frames.toWorld(request.pose.header);
+    if (!frame.ok()) return refuse(response, "set_pose", frame.error());
+    command.pose.rotation = (frame->rotation * local.rotation).normalized();
+    command.pose.translation = check.place("pose.pose.position", *frame, local.translation);
+    if (!check.ok()) return refuse(response, "set_pose", check.error());
+    return applied(response, "set_pose", command, request.name + " is there, at rest");
+  }
+
+  bool resetBodies(meshless_surgery::ResetBodies::Request& request, meshless_surgery::ResetBodies::Response& response) {
+    if (const auto no = training.refuses(Intervention::kResetBodies)) return refuse(response, "reset_bodies", *no);
+    BorderCheck check;
+    const std::vector<std::string> bodies = check.names("bodies", request.bodies);
+    if (!check.ok()) return refuse(response, "reset_bodies", check.error());
+    const auto reply = runner.apply(ResetBodiesCommand{bodies});
+    if (!reply.ok()) return refuse(response, "reset_bodies", reply.error());
+    const auto& [reset_bodies, notes] = std::get<ResetBodiesReply>(*reply);
+    response.reset_bodies = reset_bodies;
+    std::string message = "as the scene began: " + joined(reset_bodies);
+    for (const std::string& note : notes) message += "; " + note;
+    return accept(response, message);
   }
 
   bool attachInstrument(meshless_surgery::AttachInstrument::Request& request,

@@ -129,6 +129,8 @@ const char* toString(InstrumentType type) {
       return "hook";
     case InstrumentType::kScissors:
       return "scissors";
+    case InstrumentType::kClipApplier:
+      return "clip_applier";
   }
   return "unknown";
 }

@@ -45,14 +45,14 @@ int main(int argc, char** argv) {
   double until = 1e300;
   int threads = 1;
   app.add_option("log", log_file, "the log")->required()->check(CLI::ExistingFile);
-  app.add_option("--task", task_name, "a name of config/tasks, or a task file")->required();
+  app.add_option("--task", task_name, "a name of config/tasks, or a task file; by default those that the log says");
   app.add_option("--out", out, "the folder of reports")->capture_default_str();
-  app.add_option("--trainee", trainee, "whose report it is; earlier ones of the same name are compared with it");
+  app.add_option("--trainee", trainee, "whose report it is, by default whom the log says; earlier ones of the same name are compared with it");
   app.add_option("--date", date, "when it was done, where the log does not say it: as in 2026-03-01T14:05:09Z, in UTC");
   std::vector<std::string> words;
   for (std::size_t k = 0; k < meshless::kInterventions; ++k)
     words.emplace_back(toString(static_cast<meshless::Intervention>(k)));
-  app.add_option("--allow", allow, "what start_task allowed beside what the task does, which the log does not know")
+  app.add_option("--allow", allow, "what is allowed beside what the task and the log say")
       ->check(CLI::IsMember(words));
   app.add_option("--until", until, "[s] after the task's start: what comes later does not count");
   app.add_option("--threads", threads, "1..64; the result does not depend on it")->capture_default_str();
@@ -65,49 +65,93 @@ int main(int argc, char** argv) {
   if (!date.empty() && !meshless::isDate(date))
     return refuse("--date is '" + date + "'; accepted: a date and time in UTC, as in 2026-03-01T14:05:09Z");
   if (date.size() == 20) date.insert(19, ".000");  // of the length of all others, for their order
-  const bool is_file = task_name.find('/') != std::string::npos || fs::path(task_name).extension() == ".yaml";
-  const std::string task_file = is_file ? task_name : configFolder() + "/tasks/" + task_name + ".yaml";
-  auto loaded = meshless::readTask(task_file, std::nullopt, meshless::FileAccess());
-  if (!loaded.ok()) return refuse(loaded.error().detail);
-
-  for (std::size_t k = 0; k < meshless::kInterventions; ++k)
-    if (std::find(allow.begin(), allow.end(), words[k]) != allow.end())
-      loaded->task.allow.insert(static_cast<meshless::Intervention>(k));
-
-  std::vector<std::unique_ptr<meshless::Training>> runs;
-  runs.push_back(std::make_unique<meshless::Training>(loaded->task));
+  const auto allowIn = [&words](const std::vector<std::string>& what, meshless::TaskDef& task) {
+    for (std::size_t k = 0; k < meshless::kInterventions; ++k)
+      if (std::find(what.begin(), what.end(), words[k]) != what.end())
+        task.allow.insert(static_cast<meshless::Intervention>(k));
+  };
+  struct Run {
+    std::unique_ptr<meshless::Training> training;
+    std::string trainee;
+  };
+  std::vector<Run> runs;
+  std::optional<meshless::TaskDef> task;  // of the run that comes
+  std::string whose = trainee;
+  const auto take = [&](const std::string& of) -> meshless::Status {
+    auto loaded = meshless::readTask(meshless::isTaskFile(of) ? of : configFolder() + "/tasks/" + of + ".yaml",
+                                     std::nullopt, meshless::FileAccess());
+    if (!loaded.ok()) return loaded.error();
+    task = std::move(loaded->task);
+    allowIn(allow, *task);
+    return meshless::Done{};
+  };
+  const auto begin = [&](bool again) {
+    runs.push_back({std::make_unique<meshless::Training>(*task, again), whose});
+  };
+  if (!task_name.empty()) {
+    if (const meshless::Status taken = take(task_name); !taken.ok()) return refuse(taken.error().detail);
+    begin(false);
+  }
   std::optional<meshless::Error> misfit;
+  bool ended = false;  // by stop_task: what comes then is of no task
   std::ifstream log(log_file, std::ios::binary);
   const auto replayed = meshless::replay(log, threads, [&](meshless::World& world) {
     std::vector<meshless::Event> events = world.takeEvents();
     if (misfit) return;
-    if (runs.back()->begun() && world.snapshot({}).run != runs.back()->run()) {
-      if (!runs.back()->tried()) runs.pop_back();
-      if (!runs.empty()) runs.back()->stop();
-      runs.push_back(std::make_unique<meshless::Training>(loaded->task, true));
+    bool taken_anew = false;
+    for (const meshless::Event& event : events) {
+      if (!event.task) continue;
+      if (!event.task->begins) {
+        ended = true;
+        if (runs.empty()) continue;
+        runs.back().training->stop();
+        if (!runs.back().training->begun()) runs.pop_back();
+        continue;
+      }
+      ended = false;
+      if (!runs.empty()) runs.back().training->stop();
+      if (const meshless::Status taken = take(task_name.empty() ? event.task->task : task_name); !taken.ok()) {
+        misfit = meshless::Error{taken.error().code, "the task that the log says cannot be read: " + taken.error().detail +
+                                                         "; or --task says another one"};
+        return;
+      }
+      allowIn(event.task->allow, *task);
+      if (trainee.empty()) whose = event.task->trainee;
+      taken_anew = true;
+      if (!runs.empty() && !runs.back().training->begun()) runs.pop_back();
+      if (runs.empty()) begin(false);
     }
-    meshless::TrainingFrame frame = meshless::frameOf(world, std::move(events), runs.back()->wants());
-    const meshless::Status fed = runs.back()->feed(std::move(frame));
+    if (runs.empty() || ended) return;  // nobody has begun a task yet, or it was stopped
+    if (runs.back().training->begun() && world.snapshot({}).run != runs.back().training->run()) {
+      runs.back().training->stop();
+      if (!runs.back().training->tried()) runs.pop_back();
+      begin(!taken_anew);
+    }
+    meshless::Training& training = *runs.back().training;
+    meshless::TrainingFrame frame = meshless::frameOf(world, std::move(events), training.wants());
+    const meshless::Status fed = training.feed(std::move(frame));
     if (!fed.ok()) misfit = fed.error();
-    if (runs.back()->metrics().time() >= until - 1e-9) runs.back()->stop();
+    if (training.metrics().time() >= until - 1e-9) training.stop();
   });
   if (!replayed.ok()) return refuse(log_file + ": " + replayed.error().detail);
   if (misfit) return refuse(log_file + ": " + misfit->detail);
-  if (!runs.back()->begun())
+  if (runs.empty()) return refuse(log_file + ": the log says of no task; accepted: a log of a task, or --task");
+  if (!runs.back().training->begun())
     return refuse(log_file + ": the log has no step; accepted: a log in which time has passed");
-  runs.back()->stop();
+  runs.back().training->stop();
 
   const std::string log_name = fs::path(log_file).filename().string();
   const std::string lost = replayed->whatIsLost();
   for (std::size_t n = 0; n < runs.size(); ++n) {
-    const meshless::Training& training = *runs[n];
+    const auto& [of_run, of_whom] = runs[n];
+    const meshless::Training& training = *of_run;
     // The last one has the name that there always was.
     const std::string name = log_name + (n + 1 < runs.size() ? ".run" + std::to_string(n + 1) : "") + ".report";
     if (const meshless::Status fits = meshless::SessionFolder::checkName(name); !fits.ok())
       return refuse(fits.error().detail);
-    meshless::ReportHead head{trainee, log_name, !replayed->difference, lost, {}, date};
+    meshless::ReportHead head{of_whom, log_name, !replayed->difference, lost, {}, date};
     if (date.empty() && std::isfinite(training.startedAt())) head.date = meshless::dateText(training.startedAt());
-    head.earlier = meshless::readEarlierReports(out, trainee, training.task().name, name);
+    head.earlier = meshless::readEarlierReports(out, of_whom, training.task().name, name);
     const meshless::SessionFolder folder((fs::path(out) / name).string());
     const std::pair<const char*, std::string> files[] = {{"report.json", meshless::reportJson(training, head)},
                                                          {"report.csv", meshless::reportCsv(training)},
@@ -130,5 +174,5 @@ int main(int argc, char** argv) {
     std::printf("%s/report.html\n", folder.folder().c_str());
     for (const std::string& why : training.notCounted()) std::printf("does not count: %s\n", why.c_str());
   }
-  return runs.back()->passed() ? 0 : 1;
+  return runs.back().training->passed() ? 0 : 1;
 }

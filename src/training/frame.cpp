@@ -143,7 +143,7 @@ TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants&
 
 bool isError(EventType type) {
   return type == EventType::kLifted || type == EventType::kUndone || type == EventType::kLeak ||
-         type == EventType::kTorn;
+         type == EventType::kTorn || type == EventType::kMisfired;
 }
 
 bool isShown(EventType type) {

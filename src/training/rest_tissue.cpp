@@ -220,7 +220,7 @@ void RestTissue::feed(const TrainingFrame& frame) {
   if (changed) {
     for (const Event& event : frame.events) {
       if (event.removed) gone_.push_back({event.body, 0, event.removed, event.placed});
-      if (event.type == EventType::kUndone)  // what it was cut of is whole again
+      if (event.type == EventType::kUndone || event.type == EventType::kRestored)  // it is whole again
         gone_.erase(std::remove_if(gone_.begin(), gone_.end(),
                                    [&](const Piece& piece) { return isOf(piece.name, event.body); }),
                     gone_.end());

@@ -226,6 +226,14 @@ const char* toString(Intervention intervention) {
       return "move_clamp";
     case Intervention::kInstrument:
       return "instrument";
+    case Intervention::kGravity:
+      return "set_gravity";
+    case Intervention::kPlace:
+      return "set_pose";
+    case Intervention::kResetBodies:
+      return "reset_bodies";
+    case Intervention::kForce:
+      return "apply_force";
   }
   return "unknown";
 }

@@ -135,17 +135,23 @@ void Training::stop() {
 void Training::noteInterventions(const TrainingFrame& frame) {
   if (std::isnan(frame.wall) && metrics().wallTime() > 0.0)
     intervened(Intervention::kPause, "steps were done one by one while somebody watched");
+  std::uint64_t restored_by = 0;  // the scene's attachments come back with its bodies
   for (const Event& event : frame.events) {
     if (event.command <= now_->first_command && event.type != EventType::kLoaded) continue;  // the scene's own
     const std::string of = event.text + (event.text.find(event.body) == std::string::npos ? ": " + event.body : "");
     if (event.type == EventType::kUndone) intervened(Intervention::kUndo, "a cut was taken back");
     if (event.type == EventType::kRemoved) intervened(Intervention::kRemove, of);
     if (event.type == EventType::kDetached && event.taken_apart) intervened(Intervention::kDetach, of);
-    if (event.type == EventType::kAttached) intervened(Intervention::kAttach, of);
+    if (event.type == EventType::kRestored) restored_by = event.command;
+    if (event.type == EventType::kAttached && event.command != restored_by) intervened(Intervention::kAttach, of);
     if (event.type == EventType::kSpawned) intervened(Intervention::kSpawn, of);
     if (event.type == EventType::kMaterial) intervened(Intervention::kMaterial, of);
     if (event.type == EventType::kClampMoved) intervened(Intervention::kMoveClamp, of);
     if (event.type == EventType::kInstrument) intervened(Intervention::kInstrument, of);
+    if (event.type == EventType::kGravity) intervened(Intervention::kGravity, event.text);
+    if (event.type == EventType::kPlaced) intervened(Intervention::kPlace, of);
+    if (event.type == EventType::kRestored) intervened(Intervention::kResetBodies, of);
+    if (event.type == EventType::kForce && event.force > 0.0) intervened(Intervention::kForce, of);
   }
 }
 

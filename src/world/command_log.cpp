@@ -40,6 +40,14 @@ void World::setWallTime(double seconds) {
     emit(impl_->record_sink, RecordKind::kWallTime, impl_->step, std::isnan(seconds) ? kNobodyWatches : seconds);
 }
 
+void World::noteTask(TaskNote note) {
+  if (impl_->record_sink) emit(impl_->record_sink, RecordKind::kTask, impl_->step, note);
+  impl_->say(EventType::kTask, "", 0,
+             "the task " + note.task + (note.begins ? " begins" : " was stopped") +
+                 (note.trainee.empty() ? "" : ", of " + note.trainee));
+  impl_->events.back().task = std::make_shared<const TaskNote>(std::move(note));
+}
+
 void World::Impl::record(const Command& command) const {
   if (!record_sink) return;
   if (const auto* change = std::get_if<SetMaterialCommand>(&command)) {

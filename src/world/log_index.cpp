@@ -40,7 +40,7 @@ template <class A>
 void serialize(A& archive, Event& v) {
   // The last ones are for who hears it at once.
   auto& [type, step, sim_time, body, pick, text, cavity, removed, placed, taken_apart, instrument, force,
-         command] = v;
+         command, task] = v;
   archive(choice(type, kLastEvent), step, sim_time, body, pick, text);
 }
 

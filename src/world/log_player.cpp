@@ -68,7 +68,7 @@ struct LogPlayer::Record {
   Deed deed;                          // or
   std::optional<std::uint64_t> hash;  // to compare
   bool undo = false;
-  bool is_time = false;  // and no command
+  bool is_said = false;  // and no command
 };
 
 LogPlayer::LogPlayer() = default;
@@ -115,7 +115,7 @@ void LogPlayer::add(std::string_view body, std::uint64_t& step, double& most) {
   std::uint8_t number = 0;
   Record record;
   archive(number, record.step);
-  if (number > static_cast<std::uint8_t>(RecordKind::kWallTime))
+  if (number > static_cast<std::uint8_t>(RecordKind::kTask))
     throw ArchiveFault("it is of kind " + std::to_string(number));
   const auto kind = static_cast<RecordKind>(number);
   if ((kind == RecordKind::kStart) == (start_ != nullptr))
@@ -165,7 +165,14 @@ void LogPlayer::add(std::string_view body, std::uint64_t& step, double& most) {
         throw ArchiveFault("its time on the wall is " + std::to_string(seconds));
       if (seconds == kNobodyWatches) seconds = std::numeric_limits<double>::quiet_NaN();
       record.deed = [seconds](World& world) { world.setWallTime(seconds); };
-      record.is_time = true;
+      record.is_said = true;
+      break;
+    }
+    case RecordKind::kTask: {
+      TaskNote note;
+      archive(note);
+      record.deed = [note](World& world) { world.noteTask(note); };
+      record.is_said = true;
       break;
     }
   }
@@ -209,7 +216,7 @@ bool LogPlayer::step(World& world) {
     const Record& record = records_[next_];
     if (record.deed) {
       record.deed(world);
-      report_.commands += !record.is_time;
+      report_.commands += !record.is_said;
       continue;
     }
     ++report_.checks;

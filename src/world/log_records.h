@@ -7,7 +7,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kLogVersion = 11;  // of the hashes in it, too
+constexpr std::uint32_t kLogVersion = 12;  // of the hashes in it, too
 
 enum class RecordKind : std::uint8_t {
   kStart,
@@ -19,7 +19,8 @@ enum class RecordKind : std::uint8_t {
   kState,
   kHash,
   kEnd,
-  kWallTime
+  kWallTime,
+  kTask
 };
 
 constexpr double kNobodyWatches = -1.0;         // of kWallTime
@@ -49,6 +50,10 @@ MESHLESS_ARCHIVE(AttachInstrumentCommand, def)
 MESHLESS_ARCHIVE(DetachInstrumentCommand, name)
 MESHLESS_ARCHIVE(LeadInstrumentCommand, name, pose, jaw)
 MESHLESS_ARCHIVE(MoveClampCommand, body, clamp, shift, turn, time)
+MESHLESS_ARCHIVE(SetGravityCommand, gravity)
+MESHLESS_ARCHIVE(PlaceBodyCommand, body, pose)
+MESHLESS_ARCHIVE(ResetBodiesCommand, bodies)
+MESHLESS_ARCHIVE(ApplyForceCommand, body, region, force, time)
 inline void save(OutArchive& archive, const SpawnCommand& v) {
   archive(*v.body->model);
   savePrepared(archive, *v.body, 0);
@@ -61,6 +66,7 @@ inline void load(InArchive& archive, SpawnCommand& v) {
 // Materials are logged as they came out, see record().
 inline void save(OutArchive&, const SetMaterialCommand&) { assert(false); }
 inline void load(InArchive&, SetMaterialCommand&) { throw ArchiveFault("a material's change is no command of a log"); }
+MESHLESS_ARCHIVE(TaskNote, begins, task, trainee, allow)
 template <class A>
 void serialize(A& archive, MaterialChange& v) {
   archive(v.body, v.material);

@@ -57,10 +57,10 @@ using As = std::conditional_t<std::is_const_v<Of>, const Kept, Kept>;
 /// With its model's place in the table instead of its model.
 template <class Archive, class Body, class Place>
 void keepBody(Archive& archive, Body& body, Place& place) {
-  auto& [id, number, name, material, model, state, surface_current, touched_by_push, stiffness_factor, bounds, asleep,
+  auto& [id, number, name, root, material, model, state, surface_current, touched_by_push, stiffness_factor, bounds, asleep,
          still_for, rest_from, sleep_group] = static_cast<As<Body, KeptBody>&>(body);
   (void)model;
-  archive(id, number, name, material, place, state, surface_current, touched_by_push, stiffness_factor, bounds, asleep,
+  archive(id, number, name, root, material, place, state, surface_current, touched_by_push, stiffness_factor, bounds, asleep,
           still_for, rest_from, sleep_group, body.batch);
 }
 
@@ -79,13 +79,13 @@ SavedBody loadBody(InArchive& archive, const ModelTable& models) {
 // Everything but settings, bodies, scene and obstacles.
 template <class Archive, class World>
 void keepRest(Archive& archive, World& world) {
-  auto& [settings, step, batches_current, generations, free_slots, next_number, used_names, scene, picks, next_pick,
-         attachments, used_attachments, scene_attachments, push, scissors, instruments, next_instrument,
-         scene_instruments, closing, next_ticket, next_sleep_group, tetrahedralizations] =
+  auto& [settings, scene_gravity, step, batches_current, generations, free_slots, next_number, used_names, scene, picks,
+         next_pick, attachments, used_attachments, scene_attachments, forces, push, scissors, instruments,
+         next_instrument, scene_instruments, closing, next_ticket, next_sleep_group, tetrahedralizations] =
       static_cast<As<World, KeptWorld>&>(world);
   (void)settings, (void)scene;
-  archive(step, batches_current, world.batches, generations, free_slots, next_number, used_names, picks, next_pick,
-          attachments, used_attachments, scene_attachments, push, scissors, instruments, next_instrument,
+  archive(scene_gravity, step, batches_current, world.batches, generations, free_slots, next_number, used_names, picks,
+          next_pick, attachments, used_attachments, scene_attachments, forces, push, scissors, instruments, next_instrument,
           scene_instruments, closing, next_ticket, next_sleep_group, world.surface_contacts, tetrahedralizations);
 }
 
@@ -153,18 +153,25 @@ void checkTools(const SavedWorld& world) {
                      (body.model->lattice && pick.place.cell < body.model->lattice->cells.size())),
                 "a pick holds what is not there");
   }
+  const auto holds = [&](const BodyId& id, const BodyPoint& at) {
+    const auto body =
+        std::find_if(world.bodies.begin(), world.bodies.end(), [&](const SavedBody& b) { return b.id == id; });
+    return body != world.bodies.end() && !at.particles.empty() && at.particles.size() == at.weights.size() &&
+           allBelow(at.particles, body->model->rest.size());
+  };
+  require(world.scene_gravity.norm() <= 1e4 && world.forces.size() <= kMostForces, "a force or gravity is none");
+  for (const AppliedForce& force : world.forces) {
+    require(force.force.norm() <= kMostForce && force.left > 0.0 && force.left <= kLongestForce, "a force is none");
+    for (const AppliedForce::Point& point : force.points)
+      require(holds(point.body, point.at) && point.share > 0.0 && point.share <= 1.0 + 1e-9,
+              "a force acts on what is not there");
+  }
   for (const Attachment& attachment : world.attachments) {
     require(world.used_attachments.count(attachment.name) > 0 && attachment.fibres.size() <= attachment.made &&
                 attachment.stiffness > 0.0 && attachment.stiffness <= 1e15 &&
                 (!attachment.strength || *attachment.strength > 0.0) &&
                 (!attachment.clip || (attachment.clip->jaws >= 0.0 && attachment.clip->closed >= 0.0)),
             "an attachment is none");
-    const auto holds = [&](const BodyId& id, const BodyPoint& at) {
-      const auto body =
-          std::find_if(world.bodies.begin(), world.bodies.end(), [&](const SavedBody& b) { return b.id == id; });
-      return body != world.bodies.end() && !at.particles.empty() && at.particles.size() == at.weights.size() &&
-             allBelow(at.particles, body->model->rest.size());
-    };
     for (const Fibre& fibre : attachment.fibres)
       require(holds(fibre.a, fibre.at_a) &&
                   (fibre.b == BodyId() ? !attachment.other.empty()
@@ -630,7 +637,7 @@ std::uint64_t World::stateHash() const {
   for (const auto& obstacle : saved->obstacles) archive(known.of(obstacle));
   archive(saved->step, saved->batches_current, saved->batches, saved->used_names, saved->push, saved->scissors);
   for (const SavedBody& body : saved->bodies) {
-    archive(body.name, body.material, body.state, body.touched_by_push, body.stiffness_factor, body.bounds, body.asleep,
+    archive(body.name, body.root, body.material, body.state, body.touched_by_push, body.stiffness_factor, body.bounds, body.asleep,
             body.still_for, body.rest_from, body.sleep_group, body.batch);
     archive(known.of(body.model));
   }
@@ -652,6 +659,10 @@ std::uint64_t World::stateHash() const {
     archive(attachment);
   }
   archive(saved->used_attachments);
+  for (AppliedForce force : saved->forces) {
+    for (AppliedForce::Point& point : force.points) point.body = numbered(point.body);
+    archive(force);
+  }
   for (Instrument instrument : saved->instruments) {
     instrument.number = 0;
     archive(instrument);

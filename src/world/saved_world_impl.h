@@ -11,7 +11,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kStateVersion = 28;
+constexpr std::uint32_t kStateVersion = 29;
 
 inline std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(
@@ -242,6 +242,8 @@ MESHLESS_ARCHIVE(BodyPoint, particles, weights)
 MESHLESS_ARCHIVE(Fibre, a, b, at_a, at_b, place, area, rest, force, tension)
 MESHLESS_ARCHIVE(Clip, jaws, closed, tissue)
 MESHLESS_ARCHIVE(Attachment, name, other, stiffness, strength, made, torn, clip, fibres)
+MESHLESS_ARCHIVE(AppliedForce::Point, body, at, share)
+MESHLESS_ARCHIVE(AppliedForce, force, left, points)
 MESHLESS_ARCHIVE(AttachCommand, name, body, other, distance, stiffness, strength, region)
 MESHLESS_ARCHIVE(DetachCommand, name, region)
 MESHLESS_ARCHIVE(ClipCommand, name, body, point, direction, width, opening)
@@ -251,14 +253,14 @@ template <class A>
 void serialize(A& archive, InstrumentDef& v) {
   auto& [name, type, pose, shaft_radius, shaft_length, jaw_length, jaw_width, jaw_thickness, friction, stiffness,
          damping, angular_stiffness, angular_damping, max_force, max_torque, max_speed, grip, remote_centre, color] = v;
-  archive(name, choice(type, InstrumentType::kScissors), pose, shaft_radius, shaft_length, jaw_length, jaw_width,
+  archive(name, choice(type, InstrumentType::kClipApplier), pose, shaft_radius, shaft_length, jaw_length, jaw_width,
           jaw_thickness, friction, stiffness, damping, angular_stiffness, angular_damping, max_force, max_torque,
           max_speed, grip, remote_centre, color);
 }
 MESHLESS_ARCHIVE(BladeWound, body, origin, x_axis, y_axis, least, most, stroke)
 MESHLESS_ARCHIVE(InstrumentLoad, force, torque, jaw, mass, inertia, jaw_inertia)
 MESHLESS_ARCHIVE(Instrument, def, number, target, jaw_target, hand, jaw_hand, pose, jaw, velocity, spin, jaw_rate, jaw_stop, cut_to, wounds, stroke, resists, cut_torque, cut_work, owed, answers, load,
-                 force, torque, jaw_torque, holds, gripped, closed_to, lost_for)
+                 force, torque, jaw_torque, holds, gripped, closed_to, loaded, lost_for)
 MESHLESS_ARCHIVE(CutCommand, blades, close_time, roughness, bodies)
 MESHLESS_ARCHIVE(ClosingCut, ticket, command, done_at, start_angle, started_at)
 

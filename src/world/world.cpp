@@ -80,6 +80,18 @@ const char* toString(EventType type) {
       return "grasped";
     case EventType::kDropped:
       return "dropped";
+    case EventType::kGravity:
+      return "gravity";
+    case EventType::kPlaced:
+      return "placed";
+    case EventType::kRestored:
+      return "restored";
+    case EventType::kForce:
+      return "force";
+    case EventType::kMisfired:
+      return "misfired";
+    case EventType::kTask:
+      return "task";
   }
   return "unknown";
 }
@@ -147,7 +159,7 @@ WorldBody& World::Impl::admit(std::string name, Material material, BodyModelPtr 
   body->id.generation = generations[body->id.slot];
   body->number = next_number++;
   used_names.insert(name);
-  body->name = std::move(name);
+  body->name = body->root = std::move(name);
   body->material = std::move(material);
   body->model = std::move(model);
   body->state = std::move(state);
@@ -207,6 +219,7 @@ void World::Impl::needContactMesh(WorldBody& body) {
 
 World::World(WorldSettings settings) : impl_(std::make_unique<Impl>()) {
   impl_->settings = std::move(settings);
+  impl_->scene_gravity = impl_->settings.gravity;
   impl_->for_each = makeForEach(impl_->settings.threads);
 }
 World::~World() = default;
@@ -277,6 +290,8 @@ void World::reset() {
   w.surface_contacts.clear();
   w.next_sleep_group = 1;
   w.undo.clear();
+  w.forces.clear();
+  w.settings.gravity = w.scene_gravity;
   w.push = PushSphere();
   w.scissors = Scissors();
   w.instruments.clear();

@@ -12,40 +12,18 @@
 #include "meshless_surgery/base/compressed_rows.h"
 #include "meshless_surgery/geometry/query/nearest_on_triangle.h"
 #include "meshless_surgery/geometry/query/union_find.h"
+#include "surface_parts.h"
 #include "world_impl.h"
 
 namespace meshless {
 namespace {
 
 constexpr double kFacing = -0.5;       // cosine: faces are joined that face each other by this or less
-constexpr double kLongFace = 2.0;      // edges of contact: longer faces are divided
-constexpr double kMostParts = 100.0;   // of a face's edge
-constexpr double kMostSamples = 2e5;   // of faces that are divided
 constexpr std::size_t kLongName = 90;  // of a name that is chosen, at most
 constexpr std::size_t kMostNamed = 5;  // patches
 
-/// The middles of n^2 equal parts of a triangle, as shares of its corners.
-template <class Visit>
-void eachPart(int n, const Visit& visit) {
-  const auto put = [&](double x, double y) { visit(Vec3(1.0 - (x + y) / n, x / n, y / n)); };
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; i + j < n; ++j) {
-      put(i + 1.0 / 3.0, j + 1.0 / 3.0);
-      if (i + j + 1 < n) put(i + 2.0 / 3.0, j + 2.0 / 3.0);
-    }
-}
-
-/// The part of a body's surface that one fibre stands for.
-struct Part {
-  double area = 0.0;                          // [m^2]
-  std::vector<std::pair<Index, Vec3>> faces;  // and their corners' areas [m^2]
-  Vec3 middle = Vec3::Zero();                 // [m]
-  Index fibre = kNoIndex;
-};
-using Cube = std::array<long long, 3>;
-
 /// Whose faces share corners, the largest first.
-std::vector<AttachReply::Patch> patchesOf(const std::map<Cube, Part>& parts, const ShownSurface& of) {
+std::vector<AttachReply::Patch> patchesOf(const std::map<SurfaceCube, SurfacePart>& parts, const ShownSurface& of) {
   UnionFind joined(parts.size());
   std::vector<Index> first(of.vertices.size(), kNoIndex);  // fibre at each corner
   for (const auto& [cube, part] : parts)
@@ -85,6 +63,8 @@ Status checkNumbers(const AttachCommand& command, bool to_world) {
   return Done{};
 }
 
+}  // namespace
+
 Status checkRegion(const std::optional<Region>& region) {
   if (!region) return Done{};
   switch (region->kind) {
@@ -105,8 +85,6 @@ Status checkRegion(const std::optional<Region>& region) {
   }
   return Error{ErrorCode::kUnsupported, "region is " + region->text() + "; accepted: a box, a plane or a sphere"};
 }
-
-}  // namespace
 
 std::string AttachReply::text() const {
   std::ostringstream text;
@@ -162,54 +140,26 @@ Result<AttachReply> World::Impl::attach(const AttachCommand& command) {
   if (!to_world) search.emplace(of_b);
   const bool open = isOpen(a) || isOpen(b);  // whose faces face both ways
 
-  // A fibre stands for what lies in a cube of an edge: surfaces may be much finer, or coarser, than the tissue is.
   const double edge = a->edge_length;
-  std::map<Cube, Part> parts;
   Points samples;                                        // [m]
   double gap = std::numeric_limits<double>::infinity();  // [m]
-  const auto addSample = [&](Index face, const Vec3& shares, const Vec3& area) {
-    const Vec3 p = of_a.at(face, shares);
-    if (command.region && !command.region->contains(p)) return;
+  const auto faces = [&](const Vec3& p, Index, const Vec3& area) {
+    if (command.region && !command.region->contains(p)) return false;
     samples.push_back(p);
-    if (!to_world) {
-      const NearestFace there = search->nearest(p, command.distance);
-      if (there.face == kNoIndex) return;
-      gap = std::min(gap, there.distance);
-      const Vec3 other = of_b.areaOf(there.face);
-      if (!open && !(other.dot(area) <= kFacing * other.norm() * area.norm())) return;
-    }
-    Cube cube;
-    for (int k = 0; k < 3; ++k) cube[k] = std::llround(std::floor(p[k] / edge));
-    Part& part = parts[cube];
-    part.area += area.norm();
-    part.faces.push_back({face, area.norm() * shares});
+    if (to_world) return true;
+    const NearestFace there = search->nearest(p, command.distance);
+    if (there.face == kNoIndex) return false;
+    gap = std::min(gap, there.distance);
+    const Vec3 other = of_b.areaOf(there.face);
+    return open || other.dot(area) <= kFacing * other.norm() * area.norm();
   };
-  std::vector<double> divided(of_a.surface->triangles.size());  // parts of an edge of each face
-  double all = 0.0;
-  for (Index face = 0; face < divided.size(); ++face) {
-    double longest = 0.0;
-    for (int k = 0; k < 3; ++k)
-      longest = std::max(longest, (of_a.corner(face, (k + 1) % 3) - of_a.corner(face, k)).norm());
-    divided[face] = std::clamp(std::ceil(longest / (kLongFace * edge)), 1.0, kMostParts);
-    all += divided[face] * divided[face];
-  }
-  const double fewer = std::min(1.0, std::sqrt(kMostSamples / all));
-  for (Index face = 0; face < divided.size(); ++face) {
-    const int n = static_cast<int>(std::max(1.0, fewer * divided[face]));
-    const Vec3 area = of_a.areaOf(face) / (n * n);
-    eachPart(n, [&](const Vec3& shares) { addSample(face, shares, area); });
-  }
+  std::map<SurfaceCube, SurfacePart> parts = surfaceParts(
+      of_a, edge, [&](Index, double longest) { return longest / (kLongFace * edge); }, faces);
   for (auto& [cube, part] : parts) {
-    if (!(part.area > 0.0)) continue;
     Fibre fibre;
     fibre.a = a->id;
     fibre.area = part.area;
-    PointMaker maker(of_a.surface->supports);
-    for (const auto& [face, shares] : part.faces) {
-      for (int k = 0; k < 3; ++k) maker.add(of_a.surface->triangles[face][k], shares[k]);
-      part.middle += of_a.at(face, shares) / part.area;
-    }
-    fibre.at_a = maker.make();
+    fibre.at_a = pointOf(part, of_a);
     const Vec3 at = fibre.at_a.of(a->state.positions);
     fibre.place = at;
     double skin = 0.0;
@@ -247,18 +197,27 @@ Result<AttachReply> World::Impl::attach(const AttachCommand& command) {
   for (const Fibre& fibre : made.fibres) reply.area += fibre.area;
   wake(*a);
   if (b) wake(*b);
-  used_attachments.insert(made.name);
   say(EventType::kAttached, a->name, 0,
       "'" + made.name + "': " + names[0] + " is attached to " + names[1] + " by " + std::to_string(reply.fibres) +
           " fibres");
-  attachments.push_back(std::move(made));
+  keepAttachment(std::move(made));
   return reply;
 }
 
+void World::Impl::keepAttachment(Attachment made) {
+  used_attachments.insert(made.name);
+  attachments.erase(std::remove_if(attachments.begin(), attachments.end(),
+                                   [&](const Attachment& torn) { return torn.name == made.name; }),
+                    attachments.end());
+  attachments.push_back(std::move(made));
+}
+
 Result<std::string> World::Impl::newAttachmentName(const std::string& wanted, const std::string& stem) const {
-  if (!wanted.empty() && used_attachments.count(wanted))
+  const bool there = std::any_of(attachments.begin(), attachments.end(),
+                                 [&](const Attachment& of) { return of.name == wanted && !of.fibres.empty(); });
+  if (there)
     return Error{ErrorCode::kDuplicateName,
-                 "the attachment '" + wanted + "' is there or was there in this run; accepted: another name"};
+                 "the attachment '" + wanted + "' is there already; accepted: another name, or detach it first"};
   if (!wanted.empty()) return wanted;
   const std::string chosen = stem.size() <= kLongName ? stem : "attachment";
   std::string name = chosen;
@@ -434,7 +393,7 @@ std::vector<std::string> World::Impl::partFibres(const std::vector<std::vector<c
 void World::Impl::followFibres(const BodyId& parent, const BodyModel& model, const Points& before,
                                const std::vector<BodyId>& pieces) {
   const auto isOf = [&](const Fibre& fibre) { return fibre.a == parent || fibre.b == parent; };
-  if (std::none_of(attachments.begin(), attachments.end(), [&](const Attachment& attachment) {
+  if (!isForced(parent) && std::none_of(attachments.begin(), attachments.end(), [&](const Attachment& attachment) {
         return std::any_of(attachment.fibres.begin(), attachment.fibres.end(), isOf);
       }))
     return;
@@ -476,6 +435,9 @@ void World::Impl::followFibres(const BodyId& parent, const BodyModel& model, con
       const Points ends = fibreEnds(fibre);
       fibre.rest = std::max(0.0, fibre.rest + (ends[0] - ends[1]).norm() - was);
     }
+  for (AppliedForce& force : forces)
+    for (AppliedForce::Point& point : force.points)
+      if (point.body == parent) follow(point.body, point.at);
 }
 
 // --- a step

@@ -171,10 +171,9 @@ Result<Reply> World::Impl::apply(const ClipCommand& command) {
   made.clip = clip;
   ClipReply reply{made.name, body->name, made.fibres.size(), clip.jaws};
   wake(*body);
-  used_attachments.insert(made.name);
   say(EventType::kClipped, body->name, 0,
       "'" + made.name + "' closes a lumen of " + body->name + " that is " + metres(clip.jaws) + " m wide");
-  attachments.push_back(std::move(made));
+  keepAttachment(std::move(made));
   return Reply(reply);
 }
 

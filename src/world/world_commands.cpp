@@ -342,19 +342,25 @@ Result<Reply> World::Impl::apply(const SpawnCommand& command) {
   return Reply(*reply);
 }
 
-Result<Reply> World::Impl::apply(const RemoveCommand& command) {
-  WorldBody* body = find(command.body);
-  if (!body) return Error{ErrorCode::kUnknownName, "there is no body '" + command.body + "'; " + knownBodies()};
-  const BodyId id = body->id;
+void World::Impl::letGoOf(const WorldBody& body, const std::string& why) {
+  const BodyId id = body.id;
   for (const Pick& pick : picks)
-    if (pick.body == id) say(EventType::kReleased, command.body, pick.id, "released: its body was removed");
+    if (pick.body == id) say(EventType::kReleased, body.name, pick.id, "released: " + why);
   picks.erase(std::remove_if(picks.begin(), picks.end(), [&](const Pick& p) { return p.body == id; }), picks.end());
   for (Attachment& attachment : attachments)
-    loseFibres(attachment, EventType::kDetached, "went with " + command.body,
+    loseFibres(attachment, EventType::kDetached, "went with " + body.name,
                [&](const Fibre& fibre) { return fibre.a == id || fibre.b == id; });
   attachments.erase(std::remove_if(attachments.begin(), attachments.end(),
                                    [](const Attachment& attachment) { return attachment.fibres.empty(); }),
                     attachments.end());
+  forgetForces([&](const AppliedForce::Point& point) { return point.body == id; });
+}
+
+Result<Reply> World::Impl::apply(const RemoveCommand& command) {
+  WorldBody* body = find(command.body);
+  if (!body) return Error{ErrorCode::kUnknownName, "there is no body '" + command.body + "'; " + knownBodies()};
+  const BodyId id = body->id;
+  letGoOf(*body, "its body was removed");
   wake(*body);
   say(EventType::kRemoved, command.body, 0, "removed " + command.body);
   events.back().removed = body->model;

@@ -217,7 +217,7 @@ Status World::Impl::checkPieces(std::size_t gone, std::size_t come) const {
 std::vector<std::string> World::Impl::replaceByPieces(const BodyId& parent_id, std::vector<BodyPiece> pieces) {
   WorldBody& parent = *find(parent_id);
   wake(parent);
-  const std::string parent_name = parent.name;
+  const std::string parent_name = parent.name, root = parent.root;
   const Material material = parent.material;
   const bool touched = parent.touched_by_push;
   std::vector<std::string> names;
@@ -231,6 +231,7 @@ std::vector<std::string> World::Impl::replaceByPieces(const BodyId& parent_id, s
     WorldBody& child = admit(name, material, std::move(piece.model), std::move(piece.state));
     sayLeaks(name, *child.model, child.state);
     child.touched_by_push = touched;
+    child.root = root;
     descents.back().child = child.id;
     names.push_back(name);
   }

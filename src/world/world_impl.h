@@ -40,6 +40,7 @@ struct KeptBody {
   BodyId id;
   std::uint32_t number = 0;
   std::string name;
+  std::string root;  // the name under which it came, whole
   Material material;
   BodyModelPtr model;
   BodyState state;
@@ -131,7 +132,7 @@ ForEach makeForEach(int threads);
 struct CutUndo {
   struct Body {
     BodyId id;
-    std::string name;
+    std::string name, root;
     std::uint32_t number = 0;
     Material material;
     BodyModelPtr model;
@@ -169,6 +170,7 @@ class ContentHashes {
 /// What is kept from step to step, and in saved states: beside bodies, obstacles and what contact remembers.
 struct KeptWorld {
   WorldSettings settings;
+  Vec3 scene_gravity = Vec3::Zero();  // [m/s^2] to which a reset goes back
   std::uint64_t step = 0;
   bool batches_current = false;            // false: bodies or materials have changed
   std::vector<std::uint32_t> generations;  // one a slot
@@ -181,6 +183,7 @@ struct KeptWorld {
   std::vector<Attachment> attachments;     // in the order in which they came
   std::set<std::string> used_attachments;  // names of this run
   std::vector<AttachCommand> scene_attachments;
+  std::vector<AppliedForce> forces;
   PushSphere push;
   Scissors scissors;
   std::vector<Instrument> instruments;
@@ -276,12 +279,18 @@ struct World::Impl : KeptWorld {
   Result<Reply> apply(const DetachCommand& command);
   Result<Reply> apply(const ClipCommand& command);
   Result<Reply> apply(const MoveClampCommand& command);
+  Result<Reply> apply(const SetGravityCommand& command);
+  Result<Reply> apply(const PlaceBodyCommand& command);
+  Result<Reply> apply(const ResetBodiesCommand& command);
+  Result<Reply> apply(const ApplyForceCommand& command);
   Result<Reply> apply(const AttachInstrumentCommand& command);
   Result<Reply> apply(const DetachInstrumentCommand& command);
   Result<Reply> apply(const LeadInstrumentCommand& command);
   /// What the command would change, or why it is refused.
   Result<std::vector<MaterialChange>> changesOf(const SetMaterialCommand& command) const;
   std::string letGo(const Pick& pick);  // one of picks; the name of its body
+  /// Of picks and fibres of a body that goes; `why` follows on "released: ".
+  void letGoOf(const WorldBody& body, const std::string& why);
   void wakeAtSphere();
   void liftSphere();
   Vec3 placeBeside(const Vec3& centre, double radius);  // [m] the nearest where a sphere is out of tissue
@@ -332,12 +341,32 @@ struct World::Impl : KeptWorld {
   ShownSurface shownNow(WorldBody& body);
   /// Of an attachment: the one that is wanted, or one that is chosen after `stem`.
   Result<std::string> newAttachmentName(const std::string& wanted, const std::string& stem) const;
+  void keepAttachment(Attachment made);  // in place of one of that name that is torn off
   /// On the outside of what a clip holds.
   std::vector<std::array<Vec3, 2>> jawLines(const Attachment& clip);
   void closeClips(double h_frame);
   void listFibres();
   void wakeAttached();
   void tearFibres();
+
+  // forces that are applied
+  struct ForcedPoint {
+    Vec3 force;  // [N] mean over this step
+    const BodyPoint* at;
+  };
+  std::map<const WorldBody*, std::vector<ForcedPoint>> forced;  // of this step
+  bool isForced(const BodyId& body) const;
+  /// With an event for each body on which one ends.
+  void forgetForces(const std::function<bool(const AppliedForce::Point&)>& gone);
+  void sayForceEnds(const Vec3& force, const std::set<BodyId>& on);
+  void listForces();
+  /// In a substep of h [s], on bodies that have moved in it and whose velocities follow from that.
+  void applyForces(const std::vector<WorldBody*>& some, double h) const;
+  /// [m/s^2] The largest of a body as a whole, of those in that range.
+  double forcedAcceleration(const std::vector<WorldBody*>& some, std::size_t begin, std::size_t end) const;
+  void endForces(double h_frame);
+  /// Of jaws that hold the body; `why` follows on "let go of it: ".
+  void emptyJaws(const WorldBody& body, const std::string& why);
 
   // the log of commands, where there is one
   void record(const Command& command) const;
@@ -374,6 +403,8 @@ struct World::Impl : KeptWorld {
   bool anyInstrumentGoes() const;
   void stepFreeInstruments(double h, int parts, int parts_left);
   void finishInstruments(double h_frame);
+  /// Of a clip applier whose jaws have closed on a body.
+  void putOnClip(Instrument& instrument, const std::string& body);
 
   // stages of a step
   void listAwake();
@@ -413,6 +444,8 @@ struct World::Impl : KeptWorld {
   Vec3 pushWay(double h_frame) const;                    // [m] of the push sphere in a frame
   std::vector<std::pair<double, std::size_t>> stiffest;  // of an island: less the substeps that a body needs, and which
   void saySlowed(const WorldBody& body, int given, bool by_most, double factor);
+  /// Of what deforms a body, the share that it answers: the rest moves it as a whole.
+  static double yieldsOf(const WorldBody& body);
   int substepsOf(const std::vector<WorldBody*>& some, bool may_meet, double h, int parts);
   /// One of so many parts of a frame, h [s] each; parts_left: with it.
   void stepSurfaces(double h, int parts, int parts_left);
@@ -421,10 +454,10 @@ struct World::Impl : KeptWorld {
   /// Who presses on whom: for who sleeps, and who is wound up.
   void listLoaded();
   /// Else it or what is there lies wholly inside the other: refused (kInvalidArgument).
-  Status liesApart(const PreparedBody& body);
+  Status liesApart(const PreparedBody& body, const std::vector<BodyId>& but = {});
   Status liesApart(const WorldObstacle& obstacle);
   template <class Check>
-  Status eachAround(const Box& box, const Check& check);
+  Status eachAround(const Box& box, const std::vector<BodyId>& but, const Check& check);
 };
 
 /// Bodies that cuts have made or opened, at most: a blade through all of a heap of crumbs would double it, and each of
@@ -437,5 +470,7 @@ Status checkObstacle(const ObstacleDef& obstacle);
 /// "<name> is <value>; accepted: <range>"
 Error outOfRange(const std::string& name, double value, const std::string& accepted);
 Error notFinite(const std::string& name);
+/// No mesh, and of numbers.
+Status checkRegion(const std::optional<Region>& region);
 
 }  // namespace meshless

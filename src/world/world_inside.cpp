@@ -47,8 +47,9 @@ Solid solidOf(const WorldObstacle& obstacle) {
 
 // The first refusal of a solid body whose box holds this one, or lies in it.
 template <class Check>
-Status World::Impl::eachAround(const Box& box, const Check& check) {
+Status World::Impl::eachAround(const Box& box, const std::vector<BodyId>& but, const Check& check) {
   for (const auto& body : bodies) {
+    if (std::find(but.begin(), but.end(), body->id) != but.end()) continue;
     if (!body->model->solid || !(holds(body->bounds, box) || holds(box, body->bounds))) continue;
     refreshSurface(*body);
     if (Status status = check(*body); !status) return status;
@@ -56,7 +57,7 @@ Status World::Impl::eachAround(const Box& box, const Check& check) {
   return Done{};
 }
 
-Status World::Impl::liesApart(const PreparedBody& body) {
+Status World::Impl::liesApart(const PreparedBody& body, const std::vector<BodyId>& but) {
   if (Status apart = liesApart(body.state.surface, *body.model, body.def.name); !apart) return apart;
   if (settings.contact == ContactMethod::kNone || !body.model->solid) return Done{};
   const Solid one{"body '" + body.def.name + "'", body.state.surface, body.model->surface.triangles,
@@ -64,13 +65,13 @@ Status World::Impl::liesApart(const PreparedBody& body) {
   if (settings.contact == ContactMethod::kSurface)
     for (const auto& obstacle : obstacles)
       if (Status apart = areApart(one, solidOf(*obstacle)); !apart) return apart;
-  return eachAround(one.bounds, [&](const WorldBody& other) { return areApart(one, solidOf(other)); });
+  return eachAround(one.bounds, but, [&](const WorldBody& other) { return areApart(one, solidOf(other)); });
 }
 
 Status World::Impl::liesApart(const WorldObstacle& obstacle) {
   if (settings.contact != ContactMethod::kSurface) return Done{};
   const Solid one = solidOf(obstacle);
-  return eachAround(one.bounds, [&](const WorldBody& other) { return areApart(one, solidOf(other)); });
+  return eachAround(one.bounds, {}, [&](const WorldBody& other) { return areApart(one, solidOf(other)); });
 }
 
 }  // namespace meshless

@@ -15,6 +15,8 @@ namespace {
 constexpr double kHolds = 0.01;   // [N] on each jaw: they hold what is between them
 constexpr double kLostFor = 0.1;  // [s] without: they have lost it
 constexpr double kCrushed = 0.1;  // of the angle at which jaws have met tissue: they close no further
+constexpr double kFires = 0.5;    // of that angle: a clip applier has closed; likewise where it presses with so much of grip
+constexpr double kReloads = 0.1;  // [rad] that it opens before it has another clip
 constexpr double kRests = 1e-6;   // [m/s] slower instruments wake nobody
 constexpr double kSnip = 0.125;   // of blades: they have closed on so much more before it is cut, or close no further
 constexpr double kJoins = 3e-4;   // [m] by which a snip goes over the last one, and beyond tissue
@@ -631,7 +633,8 @@ void World::Impl::finishInstruments(double h_frame) {
       say(EventType::kFault, "", 0,
           "the pose of instrument " + instrument.def.name + " was not finite any more; it is where its hand is");
     }
-    if (instrument.def.type != InstrumentType::kGrasper || (body.rests && !body.felt)) continue;
+    const bool applies = instrument.def.type == InstrumentType::kClipApplier;
+    if ((instrument.def.type != InstrumentType::kGrasper && !applies) || (body.rests && !body.felt)) continue;
     const bool pinches = std::any_of(body.pressed.begin(), body.pressed.end(),
                                      [](const InstrumentBody::Pressed& p) { return p.on[0] > 0.0 && p.on[1] > 0.0; });
     if (!pinches)
@@ -644,6 +647,17 @@ void World::Impl::finishInstruments(double h_frame) {
     for (const InstrumentBody::Pressed& p : body.pressed) {
       if (bodies[p.body]->name == instrument.holds) instrument.gripped = gripOn(p);
       if (!most || gripOn(p) > gripOn(*most)) most = &p;
+    }
+    if (applies) {
+      if (!instrument.loaded) instrument.closed_to = std::min(instrument.closed_to, instrument.jaw);
+      if (!pinches) {
+        instrument.loaded = instrument.loaded || instrument.jaw > instrument.closed_to + kReloads;
+      } else if (instrument.loaded && gripOn(*most) > kHolds &&
+                 (instrument.jaw <= kFires * instrument.jaw_stop / kCrushed ||
+                  gripOn(*most) >= kFires * instrument.def.grip)) {
+        putOnClip(instrument, bodies[most->body]->name);
+      }
+      continue;
     }
     if (!instrument.holds.empty()) {
       if (instrument.gripped > 0.0) {
@@ -673,6 +687,32 @@ void World::Impl::finishInstruments(double h_frame) {
     events.back().instrument = instrument.def.name;
     events.back().force = instrument.gripped;
   }
+}
+
+void World::Impl::emptyJaws(const WorldBody& body, const std::string& why) {
+  for (Instrument& instrument : instruments) {
+    if (instrument.holds != body.name) continue;
+    instrument.holds.clear();
+    instrument.lost_for = 0.0;
+    say(EventType::kReleased, body.name, 0, instrument.def.name + " let go of " + body.name + ": " + why);
+    events.back().instrument = instrument.def.name;
+  }
+}
+
+void World::Impl::putOnClip(Instrument& instrument, const std::string& body) {
+  const InstrumentDef& def = instrument.def;
+  instrument.loaded = false;
+  instrument.closed_to = instrument.jaw;
+  ClipCommand command;
+  command.body = body;
+  command.point = instrument.pose * Vec3(-0.5 * def.jaw_length, 0.0, 0.0);
+  command.direction = instrument.pose.rotation * Vec3::UnitY();
+  command.width = def.jaw_width;
+  command.opening = def.jaw_length;
+  ++commands;  // each is another one
+  if (const Result<Reply> made = apply(command); !made)
+    say(EventType::kMisfired, body, 0, def.name + " put no clip on " + body + ": " + made.error().detail);
+  events.back().instrument = def.name;
 }
 
 }  // namespace meshless

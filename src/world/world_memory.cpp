@@ -31,6 +31,11 @@ MemoryUse World::memory() const {
     }
     return sum;
   };
+  use.states += bytesOf(w.forces);
+  for (const AppliedForce& force : w.forces) {
+    use.states += bytesOf(force.points);
+    for (const AppliedForce::Point& point : force.points) use.states += bytesOf(point.at.particles, point.at.weights);
+  }
   use.states += bytesOfAll(w.attachments) + bytesOf(w.attached.all, w.attached.offsets, w.attached.of_body);
   for (const WorldBatch& batch : w.batches) {
     use.states += bytesOf(batch.bodies, batch.spare);

@@ -127,7 +127,7 @@ void World::Impl::fallAsleep(double h_frame) {
     const Index r = joined.find(b);
     double most = size[r];
     if (gravity > 0.0) most = std::min(most, 0.5 * gravity * kStillFor * kStillFor);
-    if (wayFromRest(body) <= kStillShare * most && !leaks(body) && !isBeingMoved(body)) {
+    if (wayFromRest(body) <= kStillShare * most && !leaks(body) && !isBeingMoved(body) && forced.count(&body) == 0) {
       body.still_for += h_frame;
     } else {
       body.still_for = 0.0;

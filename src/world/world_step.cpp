@@ -47,6 +47,7 @@ void World::Impl::takeStep() {
   wakeAttached();
   listAwake();
   leadClamps(h_frame);
+  listForces();
   groupBatches();
   clearForces();
   int parts = 1;
@@ -99,6 +100,7 @@ void World::Impl::finishStep(double h_frame) {
     if (const WorldBody* body = find(pick.body)) pick.position = graspMean(pick, body->state.positions);
   finishInstruments(h_frame);
   fallAsleep(h_frame);
+  endForces(h_frame);
   contacts_current = !awake.empty() || contacts_current;
   ++step;
   report.bodies = bodies.size();

@@ -357,6 +357,13 @@ int World::Impl::substepsOf(const std::vector<WorldBody*>& some, bool may_meet, 
   return substeps;
 }
 
+// As what deforms answers its own stiffness (see matchAndMove): a body that is slowed, or one with a single goal, whose
+// particle under a contact has little mass of its own.
+double World::Impl::yieldsOf(const WorldBody& body) {
+  const bool drawn = !body.material.elastic() && body.model->clusters.size() == 1;
+  return drawn ? 1.0 - body.state.stiffened * body.material.alpha : 1.0;
+}
+
 // Islands know nothing of each other within a frame: each takes the substeps that it needs, small ones of the same
 // several at a time. Where one has most of the particles its bodies are shared out over threads, else the islands are.
 void World::Impl::stepSurfaces(double h_frame, int parts, int parts_left) {
@@ -372,10 +379,7 @@ void World::Impl::stepSurfaces(double h_frame, int parts, int parts_left) {
     for (const Index b : islands[n].bodies) {
       const WorldBody& body = *bodies[b];
       if (!surface_contacts.needed()[b]) continue;
-      // As what deforms answers its own stiffness (see matchAndMove): a body that is slowed, or one with a single goal,
-      // whose particle under a contact has little mass of its own.
-      const bool drawn = !body.material.elastic() && body.model->clusters.size() == 1;
-      const double yields = drawn ? 1.0 - body.state.stiffened * body.material.alpha : 1.0;
+      const double yields = yieldsOf(body);
       // Attached by stiff fibres, a light body that answers as a whole by more than that gains energy.
       const double soft = islands[n].joined ? yields : yields * yields;
       surface_contacts.setRigidShare(b, 1.0 - body.stiffness_factor * soft);
@@ -543,7 +547,6 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
   SolverStep step;
   step.h = h;
   step.frame = h_frame;
-  step.slow = 2.0 * surface_scene.gravity * h_frame;  // what gravity gives within a frame is no approach
   step.sphere_radius = push.radius;
   auto last = std::chrono::steady_clock::now();
   // A large body is shared out among all threads, the others go to them one by one.
@@ -568,11 +571,15 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
       matchAlone(*work.alone[b], h, work.each_counters[b], within);
     });
     for (const MatchCounters& counters : work.each_counters) work.match_counters += counters;
+    applyForces(work.bodies, h);
     work.match += secondsSince(last);
     step.sphere_from = push.position + substep * way / substeps;
     step.sphere_to = push.position + (substep + 1) * way / substeps;
     for (std::size_t n = 0; n < work.member_count; ++n) {
       SurfaceWork::Member& member = work.members[n];
+      // What gravity and forces give within a frame is no approach.
+      const double given = surface_scene.gravity + forcedAcceleration(work.bodies, member.begin, member.end);
+      step.slow = 2.0 * given * h_frame;
       for (std::size_t b = member.begin; b < member.end; ++b)
         member.previous[b - member.begin] = work.bodies[b]->scratch.previous.data();
       for (std::size_t p = 0; p < member.picks.size(); ++p) {

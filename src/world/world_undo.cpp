@@ -18,7 +18,7 @@ CutUndo World::Impl::beforeCut() const {
   CutUndo before;
   for (const auto& body : bodies)
     before.bodies.push_back(
-        {body->id, body->name, body->number, body->material, body->model, body->state, body->surface_current});
+        {body->id, body->name, body->root, body->number, body->material, body->model, body->state, body->surface_current});
   before.picks = picks;
   for (const Pick& pick : picks) {
     const auto held =
@@ -82,6 +82,7 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
   for (CutUndo::Body& was : before.bodies) {
     if (contains(before.cut, was.name)) {
       WorldBody& body = admit(was.name, std::move(was.material), std::move(was.model), std::move(was.state));
+      body.root = std::move(was.root);
       body.number = was.number;  // the same body as before, not a new one
       body.surface_current = was.surface_current;
       std::rotate(bodies.begin() + static_cast<std::ptrdiff_t>(place), bodies.end() - 1, bodies.end());
@@ -102,6 +103,7 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
   }
 
   contacts_current = false;
+  forgetForces([this](const AppliedForce::Point& point) { return !find(point.body); });
 
   picks.clear();
   for (std::size_t i = 0; i < before.picks.size(); ++i) {

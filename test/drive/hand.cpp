@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::uint64_t kHand = 300;     // purpose of the first slot's numbers
 constexpr double kLongest = 8.0;         // [s] of all that it does
-constexpr double kMostForce = 20.0;      // [N]: then a human hand pulls no farther
+constexpr double kHandForce = 20.0;      // [N]: then a human hand pulls no farther
 constexpr std::size_t kMostPieces = 12;  // it cuts no more then
 constexpr std::size_t kMostLocked = 4;
 
@@ -85,7 +85,7 @@ bool Hand::act(World& world) {
   ++total_;
   if (doing_ == Doing::kPulling) {
     const std::optional<Pick> held = world.heldPick();
-    if (held && held->id == pick_ && held->force.norm() < kMostForce) {
+    if (held && held->id == pick_ && held->force.norm() < kHandForce) {
       target_ += way_;
       (void)apply_(MovePickCommand{pick_, target_});
     }

@@ -14,8 +14,8 @@ import rosunit
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
 from meshless_surgery.crtk import StringStamped, operating_state as OperatingState  # noqa: F401: for those who import this
 from meshless_surgery.msg import Event, State
-from meshless_surgery.srv import (Attach, AttachInstrument, Clip, Cut, Detach, DetachInstrument, GetBody, GetLoad, Hash, Incise, LoadState, Lock, MoveClamp, MovePick, Observe, Pick, Probe, Push,
-                                  Release, Remove, Report, SaveState, SetMaterial, Spawn, SpawnCloud, StartTask, Step, Unclip)
+from meshless_surgery.srv import (ApplyForce, Attach, AttachInstrument, Clip, Cut, Detach, DetachInstrument, GetBody, GetLoad, Hash, Incise, LoadState, Lock, MoveClamp, MovePick, Observe, Pick, Probe, Push,
+                                  Release, Remove, Report, ResetBodies, SaveState, SetGravity, SetMaterial, SetPose, Spawn, SpawnCloud, StartTask, Step, Unclip)
 from meshless_surgery.topics import connected
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
@@ -27,6 +27,7 @@ TYPES = {
     'cut': Cut, 'open_scissors': Trigger, 'incise': Incise, 'spawn': Spawn, 'spawn_cloud': SpawnCloud, 'remove': Remove, 'set_material': SetMaterial, 'get_body': GetBody, 'get_load': GetLoad, 'move_clamp': MoveClamp,
     'lift_scissors': Trigger, 'undo_cut': Trigger, 'probe': Probe, 'pause': SetBool, 'step': Step, 'reset': Trigger, 'save': SaveState, 'load': LoadState, 'hash': Hash,
     'attach_instrument': AttachInstrument, 'detach_instrument': DetachInstrument,
+    'apply_force': ApplyForce, 'set_gravity': SetGravity, 'set_pose': SetPose, 'reset_bodies': ResetBodies,
     'start_task': StartTask, 'stop_task': Trigger, 'report': Report, 'observe': Observe,
 }
 # Messages and services of the other node: review_test.py has their laws.

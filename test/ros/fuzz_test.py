@@ -264,6 +264,15 @@ class Fuzzer:
         if service == 'move_clamp':
             return dict(name=self.maybe_name(), clamp=r.choice([0, 0, 1, 7, 0xffffffff]), header=self.header(), shift=self.vector(),
                         turn=self.pose().pose.orientation, time=self.number())
+        if service == 'apply_force':
+            return dict(name=self.maybe_name(), header=self.header(), centre=self.point(), radius=r.choice([0.0, self.amount()]),
+                        force=self.vector(), time=r.choice([0.1, 0.1, self.number()]))
+        if service == 'set_gravity':
+            return dict(header=self.header(), gravity=r.choice([Vector3(0, 0, -9.81), self.vector()]))
+        if service == 'set_pose':
+            return dict(name=self.maybe_name(), pose=self.pose())
+        if service == 'reset_bodies':
+            return dict(bodies=self.list_of_names())
         if service == 'attach_instrument':
             yaml = r.choice(['{type: grasper}', '{type: probe}', '{type: hook, max_force: %s}' % self.number(), '{type: scissors, grip: %s}' % self.number(), '{type: %s}' % self.string()[:40], '[1]'])
             return dict(name=r.choice(['left', 'right', 'push', self.string()[:60]]), yaml=yaml, pose=self.pose())

@@ -326,6 +326,32 @@ def tip(test, answer):
     return tuple(xyz(test.state().instruments[0].pose.position))
 
 
+DRAWN = dict(centre=Point(-0.15, 0.0, 0.1), radius=0.036, force=Vector3(10, 0, 0), time=1.0)  # by its side to the right
+
+
+def patch(test, answer):
+    return answer.area
+
+
+def left_a_while_later(test, answer):
+    test.good('step', steps=12)
+    return xyz(next(body for body in test.state().bodies if body.name == 'left').centre_of_mass)
+
+
+def left_x(test, answer):
+    return float(left_a_while_later(test, answer)[0])
+
+
+def risen(test, answer):
+    return float(left_a_while_later(test, answer)[2]) - 0.1
+
+
+def moved_both(test):
+    for name, x in (('left', -0.6), ('right', 0.6)):
+        test.good('set_pose', name=name, pose=pose_stamped(x, 0, 0.1))
+    return {}
+
+
 def probing(test):
     test.good('attach_instrument', **PROBE)
     return {}
@@ -580,6 +606,16 @@ LAWS = [
         within(3.0499, 3.0501)),
     Law('move_clamp', 'time', 1.0, dict(name='held', shift=Vector3(0, 0, 0.02)), lowest_left, within(2.9501, 2.951),
         within(2.9699, 2.9701)),
+    Law('apply_force', 'name', 'left', DRAWN, left_x, within(-0.17, -0.13), Refusal(UNKNOWN)),
+    Law('apply_force', 'centre', Point(-0.15, 0.0, 0.1), dict(DRAWN, name='left'), patch, within(0.0035, 0.0045), Refusal(MISSED)),
+    Law('apply_force', 'radius', 0.036, dict(DRAWN, name='left'), patch, within(0.0035, 0.0045), within(0.0599, 0.0601)),
+    Law('apply_force', 'force', Vector3(10, 0, 0), dict(DRAWN, name='left'), left_x, within(-0.17, -0.13), Refusal(MISSED)),
+    Law('apply_force', 'time', 0.05, dict(DRAWN, name='left'), left_x, within(-0.18, -0.14), Refusal(INVALID)),
+    Law('set_gravity', 'gravity', Vector3(0, 0, 12), {}, risen, within(0.05, 0.08), within(-1e-9, 1e-9)),
+    Law('set_pose', 'name', 'left', dict(pose=pose_stamped(0, 0, 0.5)), left_x, within(-1e-6, 1e-6), Refusal(UNKNOWN)),
+    Law('set_pose', 'pose', pose_stamped(0.3, 0.2, 0.5), dict(name='left'), left_x, within(0.2999, 0.3001), within(-1e-6, 1e-6)),
+    Law('reset_bodies', 'bodies', ['left'], moved_both, lambda test, answer: list(answer.reset_bodies), ['left'],
+        ['left', 'right', 'held']),
     Law('attach_instrument', 'name', 'probe', PROBE, instruments, ['probe'], Refusal(INVALID)),
     Law('attach_instrument', 'yaml', '{type: probe}', PROBE, instruments, ['probe'], Refusal(INVALID)),
     Law('attach_instrument', 'pose', PROBE['pose'], PROBE, tip, (0.3, 0.2, 0.5), (0.0, 0.0, 0.0)),
@@ -637,6 +673,9 @@ FRAMED = {
     'move_pick': dict(header=Header(), target=Point(-0.31, 0.05, 0.17)),
     'lock': dict(header=Header(), target=Point(-0.31, 0.05, 0.17), at_target=True),
     'move_clamp': dict(header=Header(), name='held', clamp=1, shift=Vector3(0.011, 0.002, -0.007), turn=Quaternion(*TURNED), time=0.02),
+    'apply_force': dict(header=Header(), name='left', centre=Point(-0.151, 0.033, 0.143), radius=0.0417, force=Vector3(0.3, 0.2, -0.1), time=0.1),
+    'set_gravity': dict(header=Header(), gravity=Vector3(0.3, 0.2, -9.1)),
+    'set_pose': dict(name='left', pose=pose_stamped(0.31, 0.22, 0.51, TURNED)),
     'attach_instrument': dict(PROBE, pose=pose_stamped(0.01, 0.02, 0.5, TURNED)),
     'get_load': dict(header=Header(), name='left', points=[Point(-0.231, 0.013, 0.117), Point(-0.152, -0.021, 0.081)]),
     'probe': dict(header=Header(), point=Point(-0.61, 0.013, -0.11), direction=Vector3(2.03, 0.02, 1.01)),
@@ -645,7 +684,7 @@ FRAMED = {
                   pose=pose_stamped(0.01, 0.02, 0.3, TURNED)),
     'spawn_cloud': dict(cloud=cloud_of(ball())),
 }
-UNTURNED = {'attach_instrument': ('pose', (0.01, 0.02, 0.5)), 'cut': ('blades', (-0.3, 0.012, 0.093)), 'incise': ('blade', (-0.23, -0.021, 0.1)), 'push': ('pose', (-0.27, 0.013, 0.11)),
+UNTURNED = {'set_pose': ('pose', (0.31, 0.22, 0.51)), 'attach_instrument': ('pose', (0.01, 0.02, 0.5)), 'cut': ('blades', (-0.3, 0.012, 0.093)), 'incise': ('blade', (-0.23, -0.021, 0.1)), 'push': ('pose', (-0.27, 0.013, 0.11)),
             'spawn': ('pose', (0.01, 0.02, 0.3))}
 NEEDS_A_PICK = ('move_pick', 'lock')
 STREAMS = {'pick/servo_cp': pose_stamped(-0.31, 0.05, 0.17, TURNED), 'push/servo_cp': pose_stamped(-0.2705, 0.013, 0.11, TURNED),

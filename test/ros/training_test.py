@@ -16,7 +16,10 @@ from geometry_msgs.msg import Point, Vector3
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from deformer_support import LONG, OwnNode, pose_stamped, run  # noqa: E402
+from meshless_surgery.errors import Refused  # noqa: E402
+from meshless_surgery.goals import Goals  # noqa: E402
 from meshless_surgery.msg import TaskState  # noqa: E402
+from shape_msgs.msg import SolidPrimitive  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 
 REPORT = roslib.packages.find_node('meshless_surgery', 'report')[0]
@@ -92,8 +95,16 @@ class TrainingTest(unittest.TestCase):
             def tries(allowed):
                 calls = {'undo': ('undo_cut', {}), 'remove': ('remove', dict(name='block')),
                          'attach': ('attach', dict(body='block', other='world', stiffness=1e4)), 'detach': ('detach', dict(name='block-world')),
-                         'material': ('set_material', dict(yaml='{damping: 10}')), 'load': ('load', dict(file='state'))}
-                for word in ('attach', 'detach', 'material', 'remove', 'undo', 'load'):
+                         'material': ('set_material', dict(yaml='{damping: 10}')), 'load': ('load', dict(file='state')),
+                         'set_gravity': ('set_gravity', dict(gravity=Vector3(0, 0, -9))),
+                         'set_pose': ('set_pose', dict(name='block', pose=pose_stamped(0, 0, 1))),
+                         'reset_bodies': ('reset_bodies', dict(bodies=['block'])),
+                         'apply_force': ('apply_force', dict(name='block', force=Vector3(0, 0, 0.1), time=0.1)),
+                         'spawn': ('spawn', dict(name='guest', primitive=SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[0.05]),
+                                                 pose=pose_stamped(0, 0, 2)))}
+                self.assertEqual(set(calls) | {'pause'}, set(words))
+                for word in ('attach', 'detach', 'material', 'set_gravity', 'set_pose', 'apply_force', 'reset_bodies', 'spawn', 'remove', 'undo',
+                             'load'):
                     service, fields = calls[word]
                     answer = node.call(service, **fields)
                     refused = 'does not allow ' + word in answer.message
@@ -104,6 +115,8 @@ class TrainingTest(unittest.TestCase):
                 node.call('pause', data=False)
                 answer = pause(True)
                 self.assertEqual('pause' in allowed, answer.success, answer.message)
+            words = ['undo', 'remove', 'attach', 'detach', 'material', 'load', 'pause', 'set_gravity', 'set_pose', 'reset_bodies', 'apply_force',
+                     'spawn']
             node.good('save', file='state')
             node.good('start_task', task='hand_over', trainee='Eve')
             block = node.good('get_body', name='block').surface.vertices[0]
@@ -111,8 +124,9 @@ class TrainingTest(unittest.TestCase):
             node.good('pick', point=Point(block.x, block.y, block.z), max_distance=0.02)  # a hand has done something
             node.good('step', steps=1)
             tries(())
+            with self.assertRaisesRegex(Refused, 'does not allow spawn'):
+                Goals(node.name, LONG).send('spawn', dict(name='guest')).result(LONG)
             self.assertFalse(node.call('start_task', task='hand_over', allow=['everything']).success)
-            words = ['undo', 'remove', 'attach', 'detach', 'material', 'load', 'pause']
             node.good('start_task', task='hand_over', allow=words)
             time.sleep(0.1)
             tries(words)
@@ -171,8 +185,37 @@ class TrainingTest(unittest.TestCase):
             for report in (live, same):
                 for key in ('log', 'trainee', 'outcome'):
                     report.pop(key)
-            if number != 2:  # the log goes on where the task was stopped
-                self.assertEqual(live, same)
+            self.assertEqual(live, same)
+
+    def test_the_log_knows_tasks_whose_they_are_what_they_allow_and_where_they_were_stopped(self):
+        def does(node, **fields):
+            node.good('start_task', task='hand_over', **fields)
+            block = node.good('get_body', name='block').surface.vertices[0]
+            node.good('step', steps=1)
+            node.good('pick', point=Point(block.x, block.y, block.z), max_distance=0.02)
+            node.good('step', steps=5)
+        with self.node(scene='blocks', command_log='log') as node:
+            node.good('step', steps=3)  # of no task
+            does(node, trainee='Eve', allow=['material'])
+            node.good('set_material', yaml='{damping: 10}')
+            node.good('step', steps=5)
+            node.good('stop_task')
+            node.good('remove', name='block')  # after it
+            node.good('step', steps=5)
+            live = report_of(node.good('report').folder)
+            node.good('reset')  # and that is no run
+            node.good('step', steps=5)
+            does(node, trainee='Bob')
+        self.assertEqual([], live['not_counted'])
+        done = subprocess.run([REPORT, os.path.join(self.folder, 'log'), '--out', self.folder], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                              timeout=LONG, text=True)
+        self.assertEqual(1, done.returncode, done.stdout)
+        replayed = report_of(os.path.join(self.folder, 'log.run1.report'))
+        self.assertEqual(('Eve', 'Bob'), (replayed['trainee'], report_of(os.path.join(self.folder, 'log.report'))['trainee']))
+        for report in (live, replayed):
+            for key in ('log', 'date', 'outcome'):
+                report.pop(key)
+        self.assertEqual(live, replayed)
 
     def report_of_log(self, *arguments):
         return subprocess.run([REPORT, os.path.join(self.folder, 'log'), '--task', 'palpate', '--out', self.folder] + list(arguments),

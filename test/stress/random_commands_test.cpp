@@ -15,7 +15,7 @@ int firstRun() {
 
 constexpr int kRun = 300;  // steps before the scene starts anew: cuts make more and more of it
 
-static_assert(std::variant_size_v<Command> == 22, "a new command has a case here, too");
+static_assert(std::variant_size_v<Command> == 26, "a new command has a case here, too");
 
 Command randomCommand(test::Random& random, int number, std::size_t bodies) {
   // Now and then a number that no hand gives.
@@ -33,7 +33,7 @@ Command randomCommand(test::Random& random, int number, std::size_t bodies) {
     if (random.integer(0, 1)) return std::nullopt;
     return Region::sphere(place(), size());
   };
-  switch (random.integer(0, 24)) {
+  switch (random.integer(0, 28)) {
     case 0: {
       PickCommand command;
       command.point = place();
@@ -138,10 +138,31 @@ Command randomCommand(test::Random& random, int number, std::size_t bodies) {
       command.time = random.integer(0, 1) ? random.uniform(0.0, 1.0) : 0.0;
       return command;
     }
+    case 25: {
+      SetGravityCommand command;
+      command.gravity = random.integer(0, 3) ? Vec3(0, 0, -9.81) : random.vector(20.0);
+      return command;
+    }
+    case 26: {
+      PlaceBodyCommand command;
+      command.body = body();
+      command.pose = hand();
+      return command;
+    }
+    case 27:
+      return random.integer(0, 3) ? ResetBodiesCommand{{body()}} : ResetBodiesCommand{};
+    case 28: {
+      ApplyForceCommand command;
+      command.body = body();
+      command.region = part();
+      if (random.integer(0, 4)) command.force = random.unit() * std::pow(10.0, random.uniform(-2, 4));
+      command.time = random.uniform(0.0, 0.5);
+      return command;
+    }
     case 20: {
       AttachInstrumentCommand command;
       command.def.name = tool();
-      command.def.type = static_cast<InstrumentType>(random.integer(0, 2));
+      command.def.type = static_cast<InstrumentType>(random.integer(0, 4));
       command.def.pose = hand();
       if (random.integer(0, 3) == 0) command.def.remote_centre = place();
       if (random.integer(0, 3) == 0) command.def.max_force = size();

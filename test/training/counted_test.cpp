@@ -109,6 +109,16 @@ TEST(Counted, WhatNoHandDoesIsSaidAndDoesNotPass) {
          command.shift = Vec3(0, 0, 0.01);
          s.apply<MoveClampReply>(command);
        }},
+      {Intervention::kGravity, [](Session& s) { s.apply<Done>(SetGravityCommand{Vec3(0, 0, -1e-3)}); }},
+      {Intervention::kPlace,
+       [](Session& s) {
+         s.apply<Done>(PlaceBodyCommand{"held", {Quat::Identity(), Vec3(5, 0, 0)}});
+       }},
+      {Intervention::kResetBodies, [](Session& s) { s.apply<ResetBodiesReply>(ResetBodiesCommand{{"ball"}}); }},
+      {Intervention::kForce,
+       [](Session& s) {
+         s.apply<ApplyForceReply>(ApplyForceCommand{"ball", {}, Vec3(0, 0, 1e-3), 0.1});
+       }},
       {Intervention::kInstrument,
        [](Session& s) {
          AttachInstrumentCommand command;

@@ -598,7 +598,7 @@ TEST(Attachment, ResetMakesThoseOfTheSceneAnew) {
   EXPECT_GT(bodyOf(seen(world), "below").measures.centre_of_mass.z(), 0.15);
 }
 
-TEST(Attachment, NamesAreChosenAndNeverUsedAgain) {
+TEST(Attachment, NamesThatAreChosenAreNeverUsedAgainAndOthersOnceTheirAttachmentIsGone) {
   World world(noGround());
   addSlabs(world, elastic(), 1e6);
   EXPECT_EQ(seen(world).attachments[0].name, "below-above");
@@ -607,6 +607,7 @@ TEST(Attachment, NamesAreChosenAndNeverUsedAgain) {
   EXPECT_EQ(attach(world, attachment("below", "above", 0.005, 1e6)).name, "below-above_3");
   AttachCommand again = attachment("below", "above", 0.005, 1e6);
   again.name = "below-above";
+  EXPECT_EQ(attach(world, again).name, "below-above");
   const auto refused = world.apply(again);
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().code, ErrorCode::kDuplicateName);

@@ -119,6 +119,22 @@ inline Session session(bool ended = true, int threads = 1) {
   MoveClampCommand lead;
   lead.body = "ball";
   apply(lead, false);  // nothing holds it
+  SetGravityCommand gravity;
+  gravity.gravity = Vec3(0.5, 0, -8);
+  apply(gravity);
+  gravity.gravity.x() = 1e5;
+  apply(gravity, false);
+  ApplyForceCommand force;
+  force.body = "ball";
+  force.force = Vec3(0, 0, 0.5);
+  force.time = 0.1;
+  apply(force);
+  run(world, 5);
+  PlaceBodyCommand place;
+  place.body = "ball";
+  apply(place, false);  // it is attached
+  apply(ResetBodiesCommand{{"block"}}, false);  // it was spawned
+  apply(ResetBodiesCommand{{"nobody"}}, false);
   AttachInstrumentCommand probe;
   probe.def.name = "probe";
   probe.def.pose.translation = Vec3(-1, -1, 1);
@@ -138,6 +154,11 @@ inline Session session(bool ended = true, int threads = 1) {
   release.pick = 1;
   apply(release);
   apply(ClearPicksCommand{});
+  place.pose.translation = Vec3(3, 3, 1);
+  apply(place);
+  run(world, 2);
+  apply(ResetBodiesCommand{{"ball"}});
+  run(world, 2);
   RemoveCommand remove;
   remove.body = "ball";
   apply(remove);

@@ -131,6 +131,10 @@ SetMaterialCommand material(const std::string& body, double density) {
   return set;
 }
 
+Pose at(const Vec3& place) { return {Quat::Identity(), place}; }
+
+ApplyForceCommand force(const std::string& body, const Vec3& of) { return {body, {}, of, 1.0}; }
+
 InstrumentDef probeAt(const Vec3& place) {
   InstrumentDef def;
   def.name = "probe";
@@ -228,6 +232,17 @@ std::vector<Row> rows(const Kind& kind, const Vec3& pressed) {
        {},
        1,
        true},
+      {"gravity", SetGravityCommand{Vec3(0, 0, -9.0)}, kAll},
+      {"gravity as it is", SetGravityCommand{Vec3(0, 0, -9.81)}, {}},
+      {"gravity that is none", SetGravityCommand{Vec3(0, 0, 1e5)}, {}, {}, 1, true},
+      {"body put elsewhere from below", PlaceBodyCommand{"low", at(Vec3(0, 0, 1.0))}, kTower},
+      {"body put onto another", PlaceBodyCommand{"alone", at(Vec3(0, 0, 2.503 * kEdge))}, {"low", "high", "alone"}, {}, 10},
+      {"body that is not there put elsewhere", PlaceBodyCommand{"nobody", at(Vec3(0, 0, 1.0))}, {}, {}, 1, true},
+      {"bodies as they began", ResetBodiesCommand{{"low"}}, kTower},
+      {"bodies that the scene has not", ResetBodiesCommand{{"nobody"}}, {}, {}, 1, true},
+      {"force", force("low", Vec3(0, 0, 1e-3)), kTower},
+      {"force that has ended", force("low", Vec3::Zero()), kTower, {force("low", Vec3(0, 0, 1e-3))}},
+      {"no force", force("low", Vec3::Zero()), {}, {}, 1, true},
       {"instrument into the air", AttachInstrumentCommand{probeAt(Vec3(0, 0, 1.0))}, {}, {}, 5},
       {"instrument into tissue", AttachInstrumentCommand{probeAt(Vec3(0, 0, 0.5 * kEdge))}, {}, {}, 1, true},
       {"instrument led into the air",

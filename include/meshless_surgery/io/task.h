@@ -12,7 +12,11 @@ struct LoadedTask {
   TaskDef task;
   SceneDef scene;
   std::string scene_file;  // a path
+  std::string file;        // a path
 };
+
+/// Else it is a name of config/tasks.
+bool isTaskFile(const std::string& task);
 
 /// Reads a task and its scene. `file` is a path. The scene is a name of `scene_folder`, a path from the task's folder on,
 /// or package://. Errors read "<file>:<line>: <what>; accepted: <range>"; a task that its scene does not allow

@@ -38,6 +38,18 @@ struct Attachment {
   std::vector<Fibre> fibres;       // that are whole
 };
 
+/// A force that was applied to a patch of tissue.
+struct AppliedForce {
+  struct Point {
+    BodyId body;
+    BodyPoint at;
+    double share = 0.0;  // of the force
+  };
+  Vec3 force = Vec3::Zero();  // [N]
+  double left = 0.0;          // [s]
+  std::vector<Point> points;
+};
+
 /// Other end of an attachment that is no body and no obstacle: places of the world.
 inline const std::string kWorldEnd = "world";
 

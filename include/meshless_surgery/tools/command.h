@@ -127,6 +127,32 @@ struct MoveClampCommand {
   double time = 0.0;             // [s] 0..kMaxClampTime that it takes; less than a step is one
 };
 
+/// Until the next, or a reset.
+struct SetGravityCommand {
+  Vec3 gravity = Vec3::Zero();  // [m/s^2] of a length up to 1e4
+};
+/// Puts a body elsewhere, at rest and in its rest shape, with its cuts: where its own frame (its file's) goes. What
+/// holds it goes along, its picks are let go of.
+struct PlaceBodyCommand {
+  std::string body;
+  Pose pose;
+};
+/// Bodies as the scene began, in place of what has become of them.
+struct ResetBodiesCommand {
+  std::vector<std::string> bodies;  // of the scene; empty: all of them
+};
+/// A force that acts on a patch of a body's surface for a while, spread evenly over its area. It stays on its tissue.
+/// Zero: ends all that act on the body.
+struct ApplyForceCommand {
+  std::string body;
+  std::optional<Region> region;  // in the world frame, no mesh; empty: all of the surface
+  Vec3 force = Vec3::Zero();     // [N] up to kMostForce
+  double time = 0.0;             // [s] above 0 to kLongestForce; not asked for where the force is zero
+};
+constexpr double kMostForce = 1e4;        // [N]
+constexpr double kLongestForce = 3600.0;  // [s]
+constexpr std::size_t kMostForces = 100;
+
 /// Takes an instrument into the scene, outside of tissue.
 struct AttachInstrumentCommand {
   InstrumentDef def;
@@ -145,7 +171,8 @@ using Command =
     std::variant<PickCommand, MovePickCommand, LockCommand, ReleaseCommand, ClearPicksCommand, PushCommand, CutCommand,
                  OpenScissorsCommand, InciseCommand, SetMaterialCommand, SpawnCommand, RemoveCommand, LiftCommand,
                  UndoCutCommand, OpenBladesCommand, AttachCommand, DetachCommand, ClipCommand, MoveClampCommand,
-                 AttachInstrumentCommand, DetachInstrumentCommand, LeadInstrumentCommand>;
+                 AttachInstrumentCommand, DetachInstrumentCommand, LeadInstrumentCommand, SetGravityCommand,
+                 PlaceBodyCommand, ResetBodiesCommand, ApplyForceCommand>;
 
 struct PickReply {
   PickId pick = 0;
@@ -208,7 +235,16 @@ struct MoveClampReply {
   Vec3 middle = Vec3::Zero();  // [m] where the middle of what it holds will be
 };
 
+struct ResetBodiesReply {
+  std::vector<std::string> bodies;  // that are as the scene began
+  std::vector<std::string> notes;   // attachments of the scene that could not be made again, and why
+};
+struct ApplyForceReply {
+  double area = 0.0;           // [m^2] of the patch
+  Vec3 middle = Vec3::Zero();  // [m] of it
+};
+
 using Reply = std::variant<Done, PickReply, CutReply, CutStarted, InciseReply, SpawnReply, UndoCutReply, AttachReply,
-                           DetachReply, ClipReply, MoveClampReply>;
+                           DetachReply, ClipReply, MoveClampReply, ResetBodiesReply, ApplyForceReply>;
 
 }  // namespace meshless

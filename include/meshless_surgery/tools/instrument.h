@@ -11,8 +11,8 @@
 namespace meshless {
 
 /// A rod with a round tip; two jaws on a hinge; a rod whose tip is bent aside, to +y; two blades on a hinge that slide
-/// along each other, the upper one on the side of +z.
-enum class InstrumentType { kProbe, kGrasper, kHook, kScissors };
+/// along each other, the upper one on the side of +z; two jaws that leave a clip on what they close on.
+enum class InstrumentType { kProbe, kGrasper, kHook, kScissors, kClipApplier };
 const char* toString(InstrumentType type);
 
 /// What a user chose. The hand is an impedance: a spring and a damper draw the instrument to where it is wanted, by no
@@ -38,7 +38,7 @@ struct InstrumentDef {
   std::optional<Vec3> remote_centre;  // [m] of a trocar, through which the shaft goes
   Color color{0.75f, 0.78f, 0.82f, 1.0f};
 
-  bool hasJaws() const { return type == InstrumentType::kGrasper || type == InstrumentType::kScissors; }
+  bool hasJaws() const { return type != InstrumentType::kProbe && type != InstrumentType::kHook; }
   double jawEdge() const;       // [m] of the triangles of a jaw
   double bladeOverlap() const;  // [m] by which the edges of closed blades are past the middle
   double bladeReach() const;    // [m] the same of where they cut
@@ -130,7 +130,9 @@ struct Instrument {
   double jaw_torque = 0.0;         // [N m] likewise, that opens
   std::string holds;               // the body between its jaws; empty: none
   double gripped = 0.0;            // [N] with which the jaws press it, the weaker of them, mean over the last step
-  double closed_to = 0.0;          // [rad] the least that was wanted between the jaws meanwhile
+  double closed_to = 0.0;          // [rad] the least that was wanted between the jaws meanwhile; of a clip applier,
+                                   // between them when they put on a clip
+  bool loaded = false;             // a clip applier has a clip in its jaws, from when they have opened
   double lost_for = 0.0;           // [s] that they have not
 
   /// Where the hand goes within h [s]: no faster than it may.

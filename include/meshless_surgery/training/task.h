@@ -103,9 +103,13 @@ enum class Intervention {
   kSpawn,
   kMaterial,
   kMoveClamp,
-  kInstrument
+  kInstrument,
+  kGravity,
+  kPlace,
+  kResetBodies,
+  kForce
 };
-constexpr std::size_t kInterventions = 11;
+constexpr std::size_t kInterventions = 15;
 const char* toString(Intervention intervention);
 
 /// A metric that counts: full marks at `good`, none at `bad`, even in between.

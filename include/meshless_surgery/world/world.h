@@ -83,10 +83,24 @@ enum class EventType {
   kClampMoved,
   kInstrument,
   kGrasped,
-  kDropped
+  kDropped,
+  kGravity,
+  kPlaced,
+  kRestored,
+  kForce,
+  kMisfired,
+  kTask
 };
-constexpr EventType kLastEvent = EventType::kDropped;
+constexpr EventType kLastEvent = EventType::kTask;
 const char* toString(EventType type);
+
+/// That somebody begins or ends a task, for who reads a log.
+struct TaskNote {
+  bool begins = true;
+  std::string task;                // a name of config/tasks, or a path
+  std::string trainee;             // may be empty
+  std::vector<std::string> allow;  // beside what the task does
+};
 
 struct Event {
   EventType type = EventType::kFault;
@@ -99,9 +113,10 @@ struct Event {
   BodyModelPtr removed = {};  // of kRemoved: the body that is no more, which may have come in the same step
   Pose placed = {};           // of it, as BodySnapshot::placed
   bool taken_apart = false;   // of kDetached: by a command that is for it, and no clip
-  std::string instrument = {};  // of kGrasped, kDropped, kReleased by jaws, kIncised by blades
-  double force = 0.0;           // [N] of kGrasped
+  std::string instrument = {};  // of kGrasped, kDropped, kMisfired, kReleased by jaws, kIncised by blades, kClipped
+  double force = 0.0;           // [N] of kGrasped; of kForce, that begins to act
   std::uint64_t command = 0;  // how many commands the world was given before: those of one have the same
+  std::shared_ptr<const TaskNote> task = {};  // of kTask
 };
 
 /// Times [s] and work of one step; counters that a scene does not use stay at zero.
@@ -277,6 +292,8 @@ class World {
   /// are done as fast as they can. No step depends on it, and no state has it.
   void setWallTime(double seconds);
   double wallTime() const;  // [s] as said last; NaN before
+  /// Says so with an event, and puts it into the log. No step depends on it, and no state has it.
+  void noteTask(TaskNote note);
 
   // tracked tools
   void setScissors(const ScissorBlades& blades, double angle);  // shown from now on
