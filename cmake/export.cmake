@@ -7,7 +7,10 @@ if(NOT rooms_version)  # without catkin
   file(STRINGS package.xml rooms_version REGEX "<version>")
   string(REGEX REPLACE ".*<version>(.*)</version>.*" "\\1" rooms_version "${rooms_version}")
 endif()
-set(rooms_folder lib/cmake/${PROJECT_NAME}_rooms)
+set(rooms_folder ${CMAKE_INSTALL_LIBDIR}/cmake/${PROJECT_NAME}_rooms)
+if(NOT CMAKE_INSTALL_LIBDIR)  # catkin names it where the prefix is /usr
+  set(rooms_folder lib/cmake/${PROJECT_NAME}_rooms)
+endif()
 
 set(room_targets)
 foreach(room IN LISTS core_rooms)
@@ -18,8 +21,8 @@ endforeach()
 # The linter does not look into add_room().
 #catkin_lint: ignore_once undefined_target
 install(TARGETS ${room_targets} EXPORT ${PROJECT_NAME}_rooms
-  ARCHIVE DESTINATION lib
-  LIBRARY DESTINATION lib
+  ARCHIVE DESTINATION ${MESHLESS_SURGERY_LIBRARY_FOLDER}
+  LIBRARY DESTINATION ${MESHLESS_SURGERY_LIBRARY_FOLDER}
   RUNTIME DESTINATION bin)
 install(DIRECTORY include/${PROJECT_NAME}/
   DESTINATION include/${PROJECT_NAME}

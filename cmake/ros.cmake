@@ -19,10 +19,16 @@ target_include_directories(review_node PRIVATE include)
 # The linter does not look into add_room().
 #catkin_lint: ignore_once undefined_target
 install(TARGETS ${PROJECT_NAME}_ros
-  ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
-  LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
+  ARCHIVE DESTINATION ${MESHLESS_SURGERY_LIBRARY_FOLDER}
+  LIBRARY DESTINATION ${MESHLESS_SURGERY_LIBRARY_FOLDER}
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
-install(TARGETS deformer_node review_node drive make_meshes replay report ${bench_targets}
+set(programs deformer_node review_node drive make_meshes replay report ${bench_targets})
+# Programs find the libraries of their own installation, wherever that lies, as the libraries find each other.
+file(RELATIVE_PATH to_libraries /${CATKIN_PACKAGE_BIN_DESTINATION} /${MESHLESS_SURGERY_LIBRARY_FOLDER})
+string(REGEX REPLACE "/$" "" to_libraries "$ORIGIN/${to_libraries}")
+set_target_properties(${programs} PROPERTIES INSTALL_RPATH ${to_libraries})
+set_target_properties(${PROJECT_NAME}_ros PROPERTIES INSTALL_RPATH "$ORIGIN")
+install(TARGETS ${programs}
   RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 install(DIRECTORY bench/truth/data bench/truth/calculix
   DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/bench/truth)

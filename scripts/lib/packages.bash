@@ -1,12 +1,12 @@
 # shellcheck shell=bash
 # Debian packages: what is missing, and installing it. Sourced after common.bash.
 
-package_list=$checkout/scripts/packages.txt
+package_lists=("$checkout/scripts/packages.txt")
 
-# missingPackages: those of packages.txt that are not installed, one a line. One call for all of them takes 50 ms.
+# missingPackages: those of the lists that are not installed, one a line. One call for all of them takes 50 ms.
 missingPackages() {
   local wanted
-  wanted=$(sed -e 's/#.*//' -e 's/[[:space:]]//g' -e '/^$/d' "$package_list" | LC_ALL=C sort -u)
+  wanted=$(sed -e 's/#.*//' -e 's/[[:space:]]//g' -e '/^$/d' "${package_lists[@]}" | LC_ALL=C sort -u)
   # dpkg-query complains of packages that it has never heard of: these are missing, which is what the list says.
   # shellcheck disable=SC2086
   LC_ALL=C comm -23 <(printf '%s\n' "$wanted") \
