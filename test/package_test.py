@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""package.xml, CMake and scripts/packages.txt declare what the sources use, and nothing else."""
+"""package.xml, CMake, scripts/packages.txt and debian/control declare what the sources use, and nothing else; all say one version."""
 import glob
 import os
 import re
@@ -41,6 +41,8 @@ DEBIAN = {
     'actionlib': ['libactionlib-dev', 'python3-actionlib'],
     'rosgraph_msgs': [], 'genpy': [], 'rosgraph': [], 'rosunit': [], 'tf2_msgs': ['libtf2-msgs-dev', 'ros-tf2-msgs'],  # come with rospy, rostest
 }
+# Debian's package for running, of keys whose libraries do not bring it along (${shlibs:Depends}); else python3-NAME.
+RUNNING = {'libqt5-widgets': None, 'rviz': 'rviz', 'message_runtime': 'ros-message-runtime', 'python3-numpy': 'python3-numpy', 'python3-yaml': 'python3-yaml'}
 # CMake's package -> the key. Those of catkin have the key's name.
 FOUND = {'Eigen3': 'eigen', 'CGAL': 'libcgal-dev', 'nanoflann': 'libnanoflann-dev', 'yaml-cpp': 'yaml-cpp', 'cereal': 'libcereal-dev',
          'ZLIB': 'zlib', 'JPEG': 'libjpeg', 'PNG': 'libpng-dev', 'PCL': 'libpcl-all-dev', 'TBB': 'tbb', 'CLI11': 'cli11', 'Qt5': 'qtbase5-dev', 'GTest': 'gtest',
@@ -104,6 +106,19 @@ def declared(*tags):
     return {entry.text for tag in tags for entry in root.findall(tag)}
 
 
+def debian(key):
+    """Debian's packages of a key of package.xml, as scripts/packages.txt lists them."""
+    name = key.replace('_', '-')
+    messages = re.search(r'_(msgs|srvs)$', key)
+    return DEBIAN.get(key, ['ros-' + name, 'lib%s-dev' % name, 'python3-' + name] if messages else ['python3-' + name])
+
+
+def control(field):
+    """The packages of a field of debian/control, without versions."""
+    text = re.search(r'^%s:(.*?)(?=^\S)' % field, read('debian/control') + 'End:', re.MULTILINE | re.DOTALL).group(1)
+    return {re.sub(r' *\(.*', '', name).strip() for name in text.split(',')} - {''}
+
+
 def in_messages():
     return {match for path in files('msg/*.msg', 'srv/*.srv', 'action/*.action')
             for match in re.findall(r'^(\w+)/\w+', read(path), re.MULTILINE)} | {'std_msgs', 'actionlib_msgs'}  # Header; each action
@@ -140,13 +155,41 @@ class PackageTest(unittest.TestCase):
         used = self.build | (included('test', 'bench') & set(FOUND.values())) | {'catkin', 'message_generation', 'rostest'}
         self.assertEqual(sorted(used), sorted(found - {''}))
 
+    def test_the_debian_package_builds_with_the_same(self):
+        tools = {'debhelper-compat', 'dh-sequence-python3', 'cmake', 'ninja-build', 'python3', 'python3-setuptools'}
+        wanted = set(tools)
+        for key in declared('depend', 'build_depend', 'buildtool_depend'):
+            wanted |= set(debian(key))
+        # What runs only, or comes with another.
+        wanted -= {name for name in wanted if name.startswith('python3-') and name not in tools} | {'rviz'}
+        self.assertEqual(sorted(wanted), sorted(control('Build-Depends')))
+
+    def test_the_debian_package_brings_what_running_needs(self):
+        depends = control('Depends')
+        for variable in ('${misc:Depends}', '${python3:Depends}', '${shlibs:Depends}'):
+            self.assertIn(variable, depends)
+        linked = {key for key in LINKED if key not in ('actionlib', 'tf2_ros', 'roslib', 'rviz')}
+        for key in sorted(declared('depend', 'exec_depend') - linked - {'rosgraph_msgs', 'tf2_msgs'}):  # these come with rospy and tf2_ros
+            name = RUNNING.get(key, 'python3-' + key.replace('_', '-'))
+            if name:
+                self.assertIn(name, depends, 'for %s of package.xml' % key)
+        # roslaunch starts static_transform_publisher, and rosrun the programs.
+        self.assertLessEqual({'tf2-tools', 'rosbash'}, depends)
+
+    def test_one_version(self):
+        version = xml.etree.ElementTree.parse(os.path.join(CHECKOUT, 'package.xml')).getroot().find('version').text
+        changelog = read('CHANGELOG.rst')
+        released = re.findall(r'^(\d+\.\d+\.\d+) \((\d{4}-\d\d-\d\d)\)\n-+$', changelog, re.MULTILINE)
+        self.assertRegex(changelog, r'\nForthcoming\n-+\n')
+        self.assertEqual(version, released[0][0], 'CHANGELOG.rst')
+        self.assertEqual(version, re.match(r'meshless-surgery \(([^)]+)\)', read('debian/changelog')).group(1), 'debian/changelog')
+        self.assertEqual(version, re.search(r'\*meshless_surgery\*, version (\S+),', read('README.md')).group(1), 'README.md')
+        self.assertEqual(sorted(released, key=lambda one: [int(part) for part in one[0].split('.')], reverse=True), released)
+
     def test_the_debian_packages_are_listed(self):
         listed = set(line for line in read('scripts/packages.txt').splitlines() if line and not line.startswith('#'))
         for key in sorted(declared('depend', 'build_depend', 'exec_depend', 'test_depend', 'buildtool_depend')):
-            name = key.replace('_', '-')
-            messages = re.search(r'_(msgs|srvs)$', key)
-            wanted = DEBIAN.get(key, ['ros-' + name, 'lib%s-dev' % name, 'python3-' + name] if messages else ['python3-' + name])
-            for package in wanted:
+            for package in debian(key):
                 self.assertIn(package, listed, 'for %s of package.xml' % key)
 
 

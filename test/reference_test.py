@@ -339,7 +339,7 @@ class EnvironmentTasksTest(Compared, unittest.TestCase):
         return {named(row[0])[0]: (named(row[1])[0], re.split(', ', row[2])) for row in rows(text, 'Environment', 'task')}
 
 
-SCRIPTS = {'scripts/' + name: 'scripts/' + name for name in ('train', 'check', 'soak', 'fuzz', 'film')}
+SCRIPTS = {'scripts/' + name: 'scripts/' + name for name in ('train', 'check', 'soak', 'fuzz', 'film', 'package_debian')}
 PROGRAMS = {**{name: 'src/tools_main/%s.cpp' % name for name in stems('src/tools_main/*.cpp')}, **SCRIPTS,
             'drive': 'test/drive/drive_main.cpp', 'make_meshes': 'test/shapes/make_meshes_main.cpp',
             **{name + '.py': 'scripts/%s.py' % name for name in stems('scripts/*.py') if not name.startswith(('play_', 'surgery_', 'device'))},
@@ -379,7 +379,7 @@ class ExitCodesTest(Compared, unittest.TestCase):
     def code(self):
         known = {}
         for name in ('deformer_node', 'review_node', 'replay', 'report', 'drive', 'make_meshes', 'learning_curves.py', 'play_*.py', 'device.py', 'scripts/train',
-                     'scripts/check'):
+                     'scripts/check', 'scripts/package_debian'):
             path = PROGRAMS.get(name.replace('*', 'SCENE')) or ('scripts/' + name if name.endswith('.py') else 'src/node_main/%s.cpp' % name)
             code = read(path)
             if name == 'play_*.py' or name == 'learning_curves.py':
