@@ -89,7 +89,7 @@ class PackagedTest(unittest.TestCase):
     def test_programs_run(self):
         programs = os.path.join(ROOT, 'usr/lib/meshless_surgery')
         nodes = {'deformer_node', 'review_node', 'device.py'}  # have no --help, and begin at once
-        named = sorted(name for name in os.listdir(programs) if '.so' not in name and name not in nodes)
+        named = sorted(name for name in os.listdir(programs) if os.access(os.path.join(programs, name), os.X_OK) and name not in nodes)
         for name in ('accuracy', 'drive', 'make_meshes', 'measured', 'replay', 'report', 'learning_curves.py', 'play_liver.py'):
             self.assertIn(name, named)
         for name in named:
@@ -100,14 +100,14 @@ class PackagedTest(unittest.TestCase):
                                       '--triangles', '2000', '--no-cuts', '--no-hands']).returncode, 2)
 
     def test_a_scene_is_launched_picked_and_cut(self):
-        launch = 'roslaunch -p %d meshless_surgery training.launch rviz:=false scene:=liver command_log:=log session_directory:=%s' % (PORT, self.folder)
-        script = launch + ' >log 2>&1 & /usr/bin/python3 -c "$SESSION"; status=$?; kill -INT %1; wait; cat log; exit $status'
+        launch = 'roslaunch -p %d meshless_surgery training.launch rviz:=false scene:=liver command_log:=session session_directory:=%s' % (PORT, self.folder)
+        script = launch + ' >said 2>&1 & /usr/bin/python3 -c "$SESSION"; status=$?; kill -INT %1; wait; cat said; exit $status'
         said = self.done(['bash', '-c', 'set -m; ' + script], SESSION=SESSION)
         self.assertIn('module %s/usr/lib/python3/dist-packages/meshless_surgery\n' % ROOT, said)
         self.assertIn('held liver 1\n', said)
         self.assertIn('bodies 2\n', said)
         # What the node has written, the programs read.
-        self.assertIn('steps', self.done(['rosrun', 'meshless_surgery', 'replay', os.path.join(self.folder, 'log.log')]))
+        self.assertIn('steps', self.done(['rosrun', 'meshless_surgery', 'replay', os.path.join(self.folder, 'session')]))
 
     def test_rviz_finds_the_plugins(self):
         described = os.path.join(ROOT, 'usr/share/meshless_surgery/rviz_plugin.xml')
