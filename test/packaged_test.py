@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import xml.etree.ElementTree
 
 CHECKOUT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 ROOT = os.path.realpath(sys.argv.pop(1)) if __name__ == '__main__' else ''
@@ -112,7 +113,8 @@ class PackagedTest(unittest.TestCase):
     def test_rviz_finds_the_plugins(self):
         described = os.path.join(ROOT, 'usr/share/meshless_surgery/rviz_plugin.xml')
         self.assertIn(described, self.done(['rospack', 'plugins', '--attrib=plugin', 'rviz']))
-        library, = glob.glob(ROOT + '/usr/lib/*/ros/libmeshless_surgery_rviz.so')
+        name = xml.etree.ElementTree.parse(described).getroot().get('path')
+        library, = glob.glob(ROOT + '/usr/lib/*/ros/%s.so' % name)  # where Debian's pluginlib looks, after the installation
         ctypes.CDLL(library, os.RTLD_NOW)  # all that it needs is there
 
     def test_an_outside_project_finds_the_rooms(self):
