@@ -29,7 +29,7 @@ pieces = surgeon.cut([0.0, 0.0, 0.3], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0])
 surgeon.step(10)
 print('module', os.path.dirname(meshless_surgery.__file__))
 print('held', held.body, held.pick_id)
-print('bodies', len(surgeon.info().bodies))
+print('pieces', *pieces.new_bodies)
 '''
 
 
@@ -106,7 +106,7 @@ class PackagedTest(unittest.TestCase):
         said = self.done(['bash', '-c', 'set -m; ' + script], SESSION=SESSION)
         self.assertIn('module %s/usr/lib/python3/dist-packages/meshless_surgery\n' % ROOT, said)
         self.assertIn('held liver 1\n', said)
-        self.assertIn('bodies 2\n', said)
+        self.assertIn('pieces liver.1 liver.2\n', said)
         # What the node has written, the programs read.
         self.assertIn('steps', self.done(['rosrun', 'meshless_surgery', 'replay', os.path.join(self.folder, 'session')]))
 
