@@ -81,6 +81,7 @@ class InstallTest(unittest.TestCase):
         self.assertIn('liver.obj', os.listdir(os.path.join(self.folder, 'meshes')))
         self.in_space('rosrun meshless_surgery drive --seed 1 --material elastic_liver --organs 1 --no-cuts --no-hands --budget 60; (( $? < 2 ))')
         self.in_space('rosrun meshless_surgery replay --help')
+        self.done([os.path.join(self.space, 'lib', 'meshless_surgery', 'replay'), '--help'])  # finds its libraries by itself
         self.in_space('rosrun meshless_surgery accuracy --help && test -d %s/share/meshless_surgery/bench/truth/data' % self.space)
 
     def test_the_node_runs_and_python_finds_it(self):
