@@ -162,7 +162,7 @@ void Publishers::publishEvents() {
   }
   for (const Event& event : events) {
     if (event.type == EventType::kFault) ROS_ERROR_STREAM(event.text);
-    if (event.type == EventType::kOverBudget && !event.body.empty())
+    if ((event.type == EventType::kOverBudget && !event.body.empty()) || event.type == EventType::kMisfired)
       ROS_WARN_STREAM(event.text);  // not of each late step
   }
   if (events.empty() || events_topic_.getNumSubscribers() == 0) return;

@@ -2,15 +2,11 @@
 """The pages for one task each: their files and commands as they are printed, and each of their mistakes."""
 import os
 import re
-import shutil
 import sys
 
-import rospy
-
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from deformer_support import LONG, run  # noqa: E402
-from meshless_surgery.msg import TaskState  # noqa: E402
-from page_support import PACKAGE, PageTestCase  # noqa: E402
+from deformer_support import run  # noqa: E402
+from page_support import PageTestCase  # noqa: E402
 
 
 class ScenePageTest(PageTestCase):
@@ -252,87 +248,6 @@ class TaskPageTest(PageTestCase):
         })
 
 
-class OwnPackagePageTest(PageTestCase):
-    """The page's files in a workspace of their own, on top of this package."""
-
-    name = 'own_package.md'
-
-    def setUp(self):
-        super().setUp()
-        self.workspace = os.path.join(self.folder, 'workspace')
-        package = os.path.join(self.workspace, 'src', 'my_trainer')
-        for folder in ('launch', 'scenes', 'tasks', 'materials', 'meshes'):
-            os.makedirs(os.path.join(package, folder), exist_ok=True)
-        blocks = dict(re.findall(r'^`([\w/]+\.(?:xml|txt|launch|yaml))`[^`]*(?:`[^`\n]+`[^`]*)?```\w+\n(.*?)^```', self.page,
-                                 re.DOTALL | re.MULTILINE))
-        self.assertEqual({'package.xml', 'CMakeLists.txt', 'launch/train.launch', 'scenes/first.yaml', 'materials/tissue.yaml', 'tasks/lift.yaml'},
-                         set(blocks))
-        for name, text in blocks.items():
-            self.write('workspace/src/my_trainer/' + name, text)
-
-    def change(self, name, old, new):
-        name = os.path.join(self.workspace, 'src', 'my_trainer', name)
-        with open(name) as file:
-            text = file.read()
-        self.assertIn(old, text)
-        with open(name, 'w') as file:
-            file.write(text.replace(old, new))
-
-    def train(self, space='devel'):
-        return "bash -c 'cd workspace && source %s/setup.bash && exec %s rviz:=false'" % (space, self.command('roslaunch my_trainer'))
-
-    def said_at_launch(self, space='devel'):
-        with self.running(self.train(space)) as end:
-            return end()
-
-    def without_data_folders(self):
-        self.change('launch/train.launch', '<arg name="data_folders" value="[$(find my_trainer)]"/>', '')
-
-    def with_a_material(self):
-        self.without_data_folders()
-        return self.said_at_launch()
-
-    def with_a_mesh(self, allowed):
-        self.change('scenes/first.yaml', 'flap_skin', 'elastic_skin')
-        shutil.copy(os.path.join(PACKAGE, 'config', 'meshes', 'block.obj'), os.path.join(self.workspace, 'src', 'my_trainer', 'meshes'))
-        self.change('scenes/first.yaml', 'primitive: {box: [0.12, 0.06, 0.01]}', 'file: ../meshes/block.obj')
-        self.change('scenes/first.yaml', '    fixed: [{box: {min: [-0.07, -0.04, -0.01], max: [-0.05, 0.04, 0.02]}}]\n', '')
-        if not allowed:
-            self.without_data_folders()
-        return self.said_at_launch()
-
-    def of_another_body(self):
-        self.change('tasks/lift.yaml', 'body: flap', 'body: liver')
-        return self.said_at_launch()
-
-    def test_it_builds_trains_and_says_what_is_wrong(self):
-        self.good('cd workspace && ' + self.command('catkin_make'))
-        with self.running(self.train()):
-            task = rospy.wait_for_message('/deformer/task', TaskState, LONG)
-            self.assertEqual(0.03, rospy.get_param('/deformer/tools/scissors/length'))
-        self.assertEqual(('lift', 'ann', ['lift', 'lay down']), (task.task, task.trainee, task.stages))
-        self.assertIn('-d /of/mine.rviz ', self.good("bash -c 'cd workspace && source devel/setup.bash && "
-                                                     "roslaunch --args /rviz my_trainer train.launch rviz_config:=/of/mine.rviz'"))
-        self.assertNotIn('accepted', self.with_a_mesh(True))
-        self.said_of({
-            '`data_folders` left out, and a mesh in `meshes/`': lambda: self.with_a_mesh(False),
-            '`data_folders` left out, and a material in `materials/`': self.with_a_material,
-            'the workspace was not sourced': self.not_sourced,
-            "a task of another scene's body": self.of_another_body,
-        })
-
-    def test_what_is_installed_is_whole(self):
-        self.with_a_mesh(True)
-        self.change('scenes/first.yaml', 'elastic_skin', 'flap_skin')
-        self.good('cd workspace && ' + self.command('catkin_make') + ' install')
-        shutil.rmtree(os.path.join(self.workspace, 'src'))
-        self.assertNotIn('accepted', self.said_at_launch('install'))
-
-    def not_sourced(self):
-        with self.running(self.node('package://my_trainer/scenes/first.yaml')) as end:
-            return end()
-
-
 class RecordingPageTest(PageTestCase):
 
     name = 'recording.md'
@@ -393,5 +308,4 @@ class StationsPageTest(PageTestCase):
 
 
 if __name__ == '__main__':
-    run('pages', ScenePageTest, ClampPageTest, PythonPageTest, RobotPageTest, TaskPageTest, OwnPackagePageTest, RecordingPageTest,
-        StationsPageTest)
+    run('pages', ScenePageTest, ClampPageTest, PythonPageTest, RobotPageTest, TaskPageTest, RecordingPageTest, StationsPageTest)
