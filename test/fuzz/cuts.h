@@ -1,20 +1,12 @@
 // The fuzzer of cuts and incisions; see targets.h.
 #pragma once
 
-#include <cstdlib>
-#include <iostream>
-
+#include "fuzz/demand.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "support/plane_cut.h"
 #include "support/shapes.h"
 
 namespace meshless::fuzz {
-
-inline void demand(bool law, const char* what) {
-  if (law) return;
-  std::cerr << "broken: " << what << std::endl;
-  std::abort();
-}
 
 /// The first byte chooses a shape. Then thirteen bytes a cut: what it is, and six numbers of its plane or blade.
 inline void cutPlane(const std::uint8_t* data, std::size_t size) {

@@ -90,7 +90,7 @@ TEST(Mend, ALargeHoleIsFilled) {
     // The cap is flat: without its spherical segment, which has 6 % of the volume.
     expectSolid(repaired, 0.94 * volume, 0.05, "open");
     EXPECT_TRUE(says(*repaired, "filled 1 hole of ")) << notesOf(*repaired);
-    EXPECT_TRUE(says(*repaired, "m^3, the surface now encloses")) << notesOf(*repaired);
+    EXPECT_TRUE(says(*repaired, "ml, the surface now encloses")) << notesOf(*repaired);
   }
 }
 
@@ -106,7 +106,7 @@ TEST(Mend, AChangeOfVolumeIsAShareOnlyWhereItIsOne) {
       shapes::append(mesh, boxMesh(Vec3(0.1, 0.1, 0.1), 1, 1, 1), Vec3(0.05, 0, 0));
     const auto repaired = repairMesh(mesh, MeshRepair::kWrap);
     ASSERT_TRUE(repaired.ok()) << repaired.error().detail;
-    EXPECT_TRUE(says(*repaired, "m^3, the surface now encloses")) << notesOf(*repaired);
+    EXPECT_TRUE(says(*repaired, "ml, the surface now encloses")) << notesOf(*repaired);
     EXPECT_EQ(says(*repaired, " %)"), !flat) << notesOf(*repaired);
   }
 }
@@ -155,7 +155,6 @@ TEST(Mend, AFinIsTakenOff) {
   const auto mended = repairMesh(fin, MeshRepair::kMend);
   expectSolid(mended, signedVolume(ball()), 1e-9, "fin");
   EXPECT_EQ(mended->mesh.triangles.size(), ball().triangles.size());
-  EXPECT_TRUE(says(*mended, "where it is not manifold")) << notesOf(*mended);
   EXPECT_TRUE(says(*mended, "dropped 1 open piece")) << notesOf(*mended);
   expectSolid(repairMesh(fin, MeshRepair::kWrap), signedVolume(ball()), 0.05, "wrapped fin");
 }

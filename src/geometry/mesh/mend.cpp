@@ -6,16 +6,11 @@
 #include <iomanip>
 #include <iterator>
 #include <map>
-#include <optional>
+#include <set>
 #include <sstream>
 #include <utility>
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Polygon_mesh_processing/manifoldness.h>
-#include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
-#include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
-#include <CGAL/Polygon_mesh_processing/repair_polygon_soup.h>
-#include <CGAL/Polygon_mesh_processing/stitch_borders.h>
 #include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/version.h>
@@ -23,7 +18,9 @@
 #include <CGAL/alpha_wrap_3.h>
 #endif
 
+#include "crossings.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/geometry/query/union_find.h"
 #include "unite_parts.h"
 
 namespace meshless {
@@ -83,54 +80,6 @@ double volumeOf(const TriangleMesh& mesh) {
   return std::abs(volume);
 }
 
-/// The pieces that hang together by edges.
-struct Pieces {
-  std::vector<Index> of;                              // one a triangle
-  std::vector<double> areas;                          // [m^2]
-  std::vector<std::vector<std::vector<Index>>> rims;  // against their triangles; of each piece
-};
-
-/// Of a surface whose edges have two triangles at the most.
-Pieces piecesOf(const TriangleMesh& mesh) {
-  std::map<std::pair<Index, Index>, Index> at;  // directed edge -> its triangle
-  for (Index f = 0; f < mesh.triangles.size(); ++f)
-    for (int k = 0; k < 3; ++k) at[{mesh.triangles[f][k], mesh.triangles[f][(k + 1) % 3]}] = f;
-  Pieces pieces;
-  pieces.of.assign(mesh.triangles.size(), kNoIndex);
-  for (Index seed = 0; seed < mesh.triangles.size(); ++seed) {
-    if (pieces.of[seed] != kNoIndex) continue;
-    const Index piece = static_cast<Index>(pieces.areas.size());
-    pieces.areas.push_back(0.0);
-    pieces.rims.emplace_back();
-    std::vector<Index> stack = {seed};
-    pieces.of[seed] = piece;
-    std::map<Index, Index> next;  // along the rim; a vertex has one fan, so it is left once
-    while (!stack.empty()) {
-      const Triangle t = mesh.triangles[stack.back()];
-      stack.pop_back();
-      pieces.areas[piece] += surfaceArea(mesh.vertices, {t});
-      for (int k = 0; k < 3; ++k) {
-        const auto other = at.find({t[(k + 1) % 3], t[k]});
-        if (other == at.end()) {
-          next[t[(k + 1) % 3]] = t[k];
-        } else if (pieces.of[other->second] == kNoIndex) {
-          pieces.of[other->second] = piece;
-          stack.push_back(other->second);
-        }
-      }
-    }
-    while (!next.empty()) {
-      std::vector<Index> rim;
-      for (auto step = next.begin(); step != next.end(); step = next.find(rim.back())) {
-        rim.push_back(step->second);
-        next.erase(step);
-      }
-      pieces.rims[piece].push_back(std::move(rim));
-    }
-  }
-  return pieces;
-}
-
 /// Nothing where there is none.
 std::vector<Triangle> patchOf(const TriangleMesh& mesh, const std::vector<Index>& rim) {
   if (rim.size() > kLongestRim) return {};
@@ -143,89 +92,94 @@ std::vector<Triangle> patchOf(const TriangleMesh& mesh, const std::vector<Index>
   return patch;
 }
 
-class Mending {
+/// The rims of its holes: from an edge that one triangle has around its end, over triangles that share an edge with one
+/// another alone, to the next one. A fin has none.
+class Rims {
  public:
-  explicit Mending(const TriangleMesh& mesh) { sew(mesh); }
-
-  TriangleMesh mesh;
-  std::vector<std::string> notes;  // what was done to it
-
-  void fillHoles() {
-    const Pieces pieces = piecesOf(mesh);
-    std::size_t filled = 0, rims = 0;
-    for (std::size_t p = 0; p < pieces.areas.size(); ++p) {
-      std::vector<Triangle> patches;
-      bool whole = true;
-      for (const auto& rim : pieces.rims[p]) {
-        const std::vector<Triangle> patch = patchOf(mesh, rim);
-        whole = whole && !patch.empty();
-        patches.insert(patches.end(), patch.begin(), patch.end());
+  /// Of triangles with three corners each, none of them twice.
+  explicit Rims(const std::vector<Triangle>& triangles) : triangles_(triangles), joined_(triangles.size()) {
+    for (Index t = 0; t < triangles.size(); ++t)
+      for (int k = 0; k < 3; ++k) {
+        std::vector<Index>& at = at_[key(triangles[t][k], triangles[t][(k + 1) % 3])];
+        at.push_back(t);
+        joined_.join(at.front(), t);
       }
-      if (!whole || patches.empty() || !(surfaceArea(mesh.vertices, patches) < kFillable * pieces.areas[p])) continue;
-      mesh.triangles.insert(mesh.triangles.end(), patches.begin(), patches.end());
-      for (const auto& rim : pieces.rims[p]) rims += rim.size();
-      filled += pieces.rims[p].size();
+    std::set<std::pair<Index, Index>> seen;
+    for (const auto& [edge, at] : at_) {
+      if (at.size() != 1 || seen.count(edge)) continue;
+      std::vector<Index> rim = {edge.first};
+      Index from = edge.first, to = edge.second, triangle = at.front();
+      while (seen.insert(key(from, to)).second) {
+        rim.push_back(to);
+        const Index pivot = to;
+        while (true) {  // around the pivot
+          const Triangle& t = triangles_[triangle];
+          to = t[0] + t[1] + t[2] - from - pivot;
+          const std::vector<Index>& sharing = at_.at(key(pivot, to));
+          if (sharing.size() != 2) break;
+          triangle = sharing[0] == triangle ? sharing[1] : sharing[0];
+          from = to;
+        }
+        from = pivot;
+        if (at_.at(key(from, to)).size() != 1) break;
+      }
+      if (rim.size() < 4 || rim.front() != rim.back() || key(from, to) != edge) continue;
+      rim.pop_back();
+      all.push_back({joined_.find(at.front()), rim});
     }
-    if (filled > 0)
-      notes.push_back("filled " + std::to_string(filled) + (filled == 1 ? " hole" : " holes") + " of " +
-                      std::to_string(rims) + " open edges in all");
   }
 
-  void dropOpenPieces() {
-    const Pieces pieces = piecesOf(mesh);
-    double all = 0.0, open = 0.0;
-    std::size_t count = 0;
-    for (std::size_t p = 0; p < pieces.areas.size(); ++p) {
-      all += pieces.areas[p];
-      if (pieces.rims[p].empty()) continue;
-      open += pieces.areas[p];
-      ++count;
-    }
-    if (count == 0 || count == pieces.areas.size() || !(open < kCrumbs * all)) return;
-    std::vector<Triangle> kept;
-    for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
-      if (pieces.rims[pieces.of[f]].empty()) kept.push_back(mesh.triangles[f]);
-    mesh.triangles = std::move(kept);
-    dropUnusedVertices();
-    std::ostringstream note;
-    note << "dropped " << count << (count == 1 ? " open piece" : " open pieces") << " with " << 100.0 * open / all
-         << " % of the area";
-    notes.push_back(note.str());
-  }
+  Index pieceOf(Index triangle) { return joined_.find(triangle); }
+
+  std::vector<std::pair<Index, std::vector<Index>>> all;  // with the piece that they are of: what hangs together by edges
 
  private:
-  void dropUnusedVertices() {
-    std::vector<Index> number(mesh.vertices.size(), kNoIndex);
-    Points used;
-    for (Triangle& t : mesh.triangles)
-      for (Index& v : t) {
-        if (number[v] == kNoIndex) {
-          number[v] = static_cast<Index>(used.size());
-          used.push_back(mesh.vertices[v]);
-        }
-        v = number[v];
-      }
-    mesh.vertices = std::move(used);
-  }
+  static std::pair<Index, Index> key(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }
 
-  /// A surface whose edges have one triangle or two, and whose vertices have one fan.
-  void sew(const TriangleMesh& dirty) {
-    Soup soup = toSoup(withMergedVertices(dirty));
-    pmp::repair_polygon_soup(soup.first, soup.second);
-    if (!pmp::orient_polygon_soup(soup.first, soup.second))
-      notes.push_back("cut the surface where it is not manifold, and sewed each piece up by itself");
-    Surface surface;
-    pmp::polygon_soup_to_polygon_mesh(soup.first, soup.second, surface);
-    // Where two bodies share an edge four sides lie on each other: only within one body it is clear which belong
-    // together.
-    pmp::stitch_borders(surface, CGAL::parameters::apply_per_connected_component(true));
-    const std::size_t doubled = pmp::duplicate_non_manifold_vertices(surface);
-    if (doubled > 0)
-      notes.push_back("doubled " + std::to_string(doubled) + (doubled == 1 ? " vertex" : " vertices") +
-                      " that several fans of triangles share");
-    mesh = toMesh(surface);
-  }
+  const std::vector<Triangle>& triangles_;
+  UnionFind joined_;
+  std::map<std::pair<Index, Index>, std::vector<Index>> at_;  // an edge's triangles
 };
+
+/// With patches in the holes of those pieces whose patches are small.
+TriangleMesh withHolesFilled(const TriangleMesh& mesh, std::vector<std::string>& notes) {
+  std::set<Triangle> seen;
+  std::vector<Triangle> triangles;
+  for (const Triangle& t : withMergedVertices(mesh).triangles) {
+    Triangle sorted = t;
+    std::sort(sorted.begin(), sorted.end());
+    if (sorted[0] != sorted[1] && sorted[1] != sorted[2] && seen.insert(sorted).second) triangles.push_back(t);
+  }
+  Rims rims(triangles);
+  std::map<Index, double> area;
+  for (Index t = 0; t < triangles.size(); ++t) area[rims.pieceOf(t)] += surfaceArea(mesh.vertices, {triangles[t]});
+  std::map<Index, std::vector<Triangle>> patches;
+  std::set<Index> left;  // pieces with a rim that nothing fills
+  for (const auto& [piece, rim] : rims.all) {
+    const std::vector<Triangle> patch = patchOf(mesh, rim);
+    if (patch.empty()) left.insert(piece);
+    patches[piece].insert(patches[piece].end(), patch.begin(), patch.end());
+  }
+  TriangleMesh filled = mesh;
+  filled.patches.clear();
+  std::size_t count = 0, edges = 0;
+  for (const auto& [piece, patch] : patches) {
+    if (left.count(piece) || !(surfaceArea(mesh.vertices, patch) < kFillable * area[piece])) {
+      left.insert(piece);
+      continue;
+    }
+    filled.triangles.insert(filled.triangles.end(), patch.begin(), patch.end());
+  }
+  for (const auto& [piece, rim] : rims.all) {
+    if (left.count(piece)) continue;
+    ++count;
+    edges += rim.size();
+  }
+  if (count > 0)
+    notes.push_back("filled " + std::to_string(count) + (count == 1 ? " hole" : " holes") + " of " +
+                    std::to_string(edges) + " open edges in all");
+  return filled;
+}
 
 bool hasSoundTriangles(const TriangleMesh& mesh) {
   const MeshReport report = inspectMesh(mesh, false);
@@ -235,8 +189,8 @@ bool hasSoundTriangles(const TriangleMesh& mesh) {
 
 std::string volumeNote(double before, double after) {
   std::ostringstream note;
-  note << std::setprecision(3) << "the triangles enclosed " << before << " m^3, the surface now encloses " << after
-       << " m^3";
+  note << std::setprecision(3) << "the triangles enclosed " << before / kMillilitre << " ml, the surface now encloses "
+       << after / kMillilitre << " ml";
   if (after < 2.0 * before) note << " (" << std::showpos << 100.0 * (after / before - 1.0) << " %)";
   return note.str();
 }
@@ -252,56 +206,28 @@ RepairedMesh noted(RepairedMesh repaired, std::vector<std::string> notes, double
   return repaired;
 }
 
-/// With its parts that overlap made one; nothing where there is nothing to do, or it fails: `why` says so.
-std::optional<RepairedMesh> united(const TriangleMesh& mesh, RepairRules rules, std::string& why) {
-  rules.turn_outwards = false;
-  const Result<RepairedMesh> parts = repairMesh(mesh, rules);
-  if (!parts.ok() || !parts->solid || parts->components < 2) return std::nullopt;
-  const Result<UnitedParts> made = uniteParts(parts->mesh);
-  if (!made.ok()) why = made.error().detail;
-  if (!made.ok() || !made->changed()) return std::nullopt;
-  Result<RepairedMesh> one = repairMesh(made->mesh, RepairRules{false, false, true});
-  if (!one.ok()) return std::nullopt;
-  std::vector<std::string> notes = parts->notes;
-  std::ostringstream note;
-  if (made->turned > 0)
-    notes.push_back(std::to_string(made->turned) + (made->turned == 1 ? " part was" : " parts were") +
-                    " inside-out and turned");
-  if (made->overlapping > 0) {
-    note << made->overlapping << " parts that overlap were united"
-         << (made->solids > 1 ? " into " + std::to_string(made->solids) : "") << ": volume "
-         << made->volume / kMillilitre << " ml";
-    notes.push_back(note.str());
-  }
-  if (made->filled > 0)
-    one->warnings.push_back(
-        std::to_string(made->filled) +
-        (made->filled == 1 ? " part is turned inwards as a cavity is, and reaches"
-                           : " parts are turned inwards as cavities are, and reach") +
-        " through the surface of another: tissue fills it; a cavity has to lie inside of the other");
-  if (made->swallowed > 0)
-    one->warnings.push_back(std::to_string(made->swallowed) +
-                            (made->swallowed == 1
-                                 ? " part inside of another is turned as it is, and became tissue of it"
-                                 : " parts inside of others are turned as they are, and became tissue of them") +
-                            " (turned against it, it would be a cavity)");
-  notes.insert(notes.end(), one->notes.begin(), one->notes.end());
-  one->notes = std::move(notes);
-  return std::move(*one);
+/// What its triangles bound together, with the notes of that; `plain` where that is sound and the same.
+Result<RepairedMesh> united(const TriangleMesh& mesh, const Result<RepairedMesh>& plain, std::vector<std::string> notes,
+                            double before) {
+  Result<UnitedParts> made = uniteParts(mesh);
+  if (!made) return made.error();
+  if (!(made->open_share < kCrumbs)) return refuse("most of its area bounds nothing");
+  if (!made->changed && plain.ok() && plain->solid && !plain->self_intersecting) return noted(*plain, {}, before);
+  Result<RepairedMesh> one = repairMesh(made->mesh, RepairRules{false, false, false});
+  if (!one) return one.error();
+  std::size_t crossings = 0;
+  forEachCrossing(one->mesh.vertices, withMergedVertices(one->mesh).triangles, [&](Index, Index) { ++crossings; });
+  one->self_intersecting = crossings > 0;
+  notes.insert(notes.end(), made->notes.begin(), made->notes.end());
+  one->warnings = std::move(made->warnings);
+  if (crossings > 0)
+    one->notes.push_back("rounding left " + std::to_string(crossings) + (crossings == 1 ? " pair" : " pairs") +
+                         " of triangles that cross; cuts there may be refused");
+  return noted(std::move(*one), std::move(notes), made->shared_walls ? std::abs(signedVolume(made->mesh)) : before);
 }
 
-/// The same, or else `plain` with a word why.
-RepairedMesh unitedOr(RepairedMesh plain, const TriangleMesh& mesh, const RepairRules& rules) {
-  std::string why;
-  if (std::optional<RepairedMesh> one = united(mesh, rules, why)) return std::move(*one);
-  if (!why.empty())
-    plain.notes.push_back("its parts cannot be united, and stay as they are: " + why + "; repair wrap may help");
-  return plain;
-}
-
-Result<RepairedMesh> wrap(const Mending& mended, double before) {
+Result<RepairedMesh> wrap(const TriangleMesh& mesh, std::vector<std::string> notes, double before) {
 #if CGAL_VERSION_NR >= 1050500000
-  const TriangleMesh& mesh = mended.mesh;
   double length = 0.0;
   for (const Triangle& t : mesh.triangles)
     for (int k = 0; k < 3; ++k) length += (mesh.vertices[t[(k + 1) % 3]] - mesh.vertices[t[k]]).norm();
@@ -314,13 +240,13 @@ Result<RepairedMesh> wrap(const Mending& mended, double before) {
   Result<RepairedMesh> wrapped = repairMesh(toMesh(surface));
   if (!wrapped.ok()) return wrapped.error();
   if (!wrapped->solid) return refuse("no closed surface could be wrapped around it");
-  std::vector<std::string> notes = mended.notes;
   std::ostringstream note;
   note << "wrapped it in a surface of edges of about " << edge << " m, " << kWrapOffset * edge << " m outside of it";
   notes.push_back(note.str());
   return noted(std::move(*wrapped), std::move(notes), before);
 #else
-  (void)mended;
+  (void)mesh;
+  (void)notes;
   (void)before;
   return refuse("to wrap it needs CGAL 5.5 or newer; accepted: repair none or mend");
 #endif
@@ -352,25 +278,18 @@ Result<RepairedMesh> repairMesh(const TriangleMesh& mesh, MeshRepair how) {
   const double before = volumeOf(mesh);
   const bool sound = plain.ok() && plain->solid && !plain->self_intersecting;
   if (sound && (how == MeshRepair::kWrap || plain->components == 1)) return noted(std::move(*plain), {}, before);
-  if (how == MeshRepair::kMend) {
-    // Parts as the file has them: where they touch, merged vertices would join them.
-    std::string why;
-    if (std::optional<RepairedMesh> one = united(mesh, RepairRules{false, false, false}, why))
-      return noted(std::move(*one), {}, before);
-    if (plain.ok() && plain->solid) return noted(unitedOr(std::move(*plain), mesh, rules), {}, before);
+  std::vector<std::string> notes;
+  const TriangleMesh filled = withHolesFilled(mesh, notes);
+  if (how == MeshRepair::kWrap) return wrap(filled, std::move(notes), before);
+  Result<RepairedMesh> one = united(filled, plain, std::move(notes), before);
+  if (one.ok()) return one;
+  if (plain.ok()) {  // a shell
+    if (plain->solid)
+      plain->notes.push_back("its parts cannot be united, and stay as they are: " + one.error().detail +
+                             "; repair wrap may help");
+    return plain;
   }
-  Mending mending(mesh);
-  if (mending.mesh.empty()) return plain;
-  mending.fillHoles();
-  if (how == MeshRepair::kWrap) return wrap(mending, before);
-  mending.dropOpenPieces();
-  rules.merge_vertices = false;  // what was cut apart lies in the same places
-  Result<RepairedMesh> mended = repairMesh(mending.mesh, rules);
-  if (!mended.ok() || !mended->solid) {
-    if (plain.ok()) return plain;  // a shell
-    return refuse(plain.error().detail + "; mending did not help, repair wrap may");
-  }
-  return noted(unitedOr(std::move(*mended), mending.mesh, rules), std::move(mending.notes), before);
+  return refuse(plain.error().detail + "; mending did not help (" + one.error().detail + "), repair wrap may");
 }
 
 }  // namespace meshless

@@ -1,32 +1,34 @@
-// Parts of a surface that overlap made into one, as segmentations need it that give a lobe with its organ.
+// The solid that triangles bound together: of parts that overlap, of regions that share walls, of hollow organs. Private
+// to this room.
 #pragma once
+
+#include <string>
+#include <vector>
 
 #include "meshless_surgery/base/result.h"
 #include "meshless_surgery/geometry/mesh/triangle_mesh.h"
 
 namespace meshless {
 
-/// What uniteParts gives. Without anything to do, the mesh is empty and all counts are 0.
 struct UnitedParts {
-  TriangleMesh mesh;            // closed, oriented outwards
-  std::size_t overlapping = 0;  // parts that crossed or touched another one
-  std::size_t solids = 0;       // what they have become
-  double volume = 0.0;          // [m^3] of what they have become
-  std::size_t swallowed = 0;    // parts inside of another that were turned as it is, and so bound nothing
-  std::size_t turned = 0;       // parts inside of none that were inside out
-  std::size_t filled = 0;       // parts that were turned against a larger one that they cross, and are tissue now
-
-  bool changed() const { return overlapping > 0 || swallowed > 0; }
+  TriangleMesh mesh;         // closed, manifold, turned outwards
+  bool changed = false;      // false: the triangles are those of the input, or turned
+  bool shared_walls = false; // some triangles had tissue on both sides, so that signs of volumes say nothing
+  double open_share = 0.0;   // of the area: of triangles that bound nothing
+  std::size_t doubled = 0;   // vertices where it touches itself
+  std::vector<std::string> notes, warnings;
 };
 
-/// The solid that closed parts make together: all that lies in at least one of them. A part inside of another and
-/// turned against it is a cavity, and stays one as far as no third part fills it; one that is turned as the other is
-/// vanishes in it. Parts that cross nothing keep their vertices. CGAL's corefinement (Polygon Mesh Processing), with
-/// exact numbers up to the end.
+/// All places that the parts wind around more often outwards than inwards. A part is what hangs together by edges: of
+/// the file, and where these have one triangle, of places. It counts as it is turned where most of it lies in a larger
+/// part; what lies mostly in none is tissue however it is turned, and what it holds turns with it. Triangles of a part
+/// that are turned against each other are turned as most of their neighbours are. Where a part has edges whose triangles
+/// cannot agree, as labels have that share walls, its cells are tissue, but for those that all triangles around them
+/// face. What is turned inwards stays a hole where it touches or crosses what is around it.
 ///
-/// Of a closed surface without vertices that parts share, as repairMesh gives it without turning. Refuses with
-/// kUnsuitableShape where a part that overlaps another crosses itself, or parts meet in edges alone, so that what they
-/// make is not manifold.
+/// Exact up to the rounding of the result: triangles are cut along each other, and cells counted (arrange()). Triangles
+/// that cross nothing stay as they are. Where the solid touches itself in an edge or a vertex, each side has its own.
+/// Vertices are finite, and those that triangles name are there. Refuses with kUnsuitableShape where nothing is enclosed.
 Result<UnitedParts> uniteParts(const TriangleMesh& mesh);
 
 }  // namespace meshless
