@@ -14,14 +14,12 @@ enum class MeshRepair { kNone, kMend, kWrap };
 /// refuse what repairMesh refuses, but for the surface that is not manifold.
 ///
 /// kNone: vertices at one place become one and triangles are turned to one side, as an STL file needs it; a surface
-/// that is not closed and manifold is refused. kMend: a non-manifold or one-sided surface is cut where it is so, and
-/// each piece sewn up by itself (CGAL, Polygon Mesh Processing); holes are filled whose patches have less than a
-/// quarter of their component's area; pieces that stay open are dropped where others are closed and they have less than
-/// a quarter of all area. What is open then is a shell, as with repairMesh; what is not manifold then is refused.
-/// Closed parts that overlap or lie in each other are united (uniteParts); where that fails they stay, and a note says
-/// why. kWrap: of a surface that crosses itself, too, holes are filled as by kMend, and another surface is wrapped
-/// around all of it (Portaneri et al. 2022): closed and free of crossings, a twentieth of its edge length outside,
-/// concave edges rounded.
+/// that is not closed and manifold is refused. kMend: holes are filled whose patches have less than a quarter of their
+/// component's area; then the triangles are cut along each other, and what they bound together is the solid (uniteParts).
+/// What bounds nothing is dropped where it has less than a quarter of all area. What is open then is a shell, as with
+/// repairMesh; what is not manifold then is refused. kWrap: of a surface that crosses itself, too, holes are filled as by
+/// kMend, and another surface is wrapped around all of it (Portaneri et al. 2022): closed and free of crossings, a
+/// twentieth of its edge length outside, concave edges rounded.
 Result<RepairedMesh> repairMesh(const TriangleMesh& mesh, MeshRepair how);
 
 /// For messages and files: none, mend, wrap.
