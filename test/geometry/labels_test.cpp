@@ -61,9 +61,7 @@ class Grid {
       for (int y = 0; y < size_; ++y)
         for (int z = 0; z < size_; ++z) visit({x, y, z});
   }
-  std::size_t index(const Voxel& v) const {
-    return static_cast<std::size_t>((v[0] * size_ + v[1]) * size_ + v[2]);
-  }
+  std::size_t index(const Voxel& v) const { return static_cast<std::size_t>((v[0] * size_ + v[1]) * size_ + v[2]); }
 
  private:
   int size_;
@@ -214,7 +212,8 @@ TriangleMesh wallsOf(const Grid& grid, test::Random& random) {
         if (grid.at(other) == 0) squares.add(v, axis, up);
         if (grid.at(other) == 0 || grid.at(other) == grid.at(v) || other < v) continue;
         // What other labels enclose would be a hole if all of its walls looked into it.
-        const std::pair<Index, Index> pair(std::min(regionAt(v), regionAt(other)), std::max(regionAt(v), regionAt(other)));
+        const std::pair<Index, Index> pair(std::min(regionAt(v), regionAt(other)),
+                                           std::max(regionAt(v), regionAt(other)));
         if (!turned.count(pair)) {
           const Index away = enclosed.count(pair.first) ? pair.first : pair.second;
           turned[pair] = enclosed.count(pair.first) || enclosed.count(pair.second) ? away == pair.second
@@ -292,15 +291,24 @@ TEST(Labels, HollowsOfVoxelsStayHoles) {
         high[d] = std::min(random.integer(low[d] + 1, low[d] + 3), 6);
       }
       Grid hollow(7);
-      std::size_t inside = 0, all = 0;
       hollow.forEach([&](const Voxel& v) {
-        for (int d = 0; d < 3; ++d)
-          if (v[d] < low[d] || v[d] > high[d]) return;
-        hollow.set(v, 1);
-        inside += organ.at(v) != 0;
-        ++all;
+        bool within = true;
+        for (int d = 0; d < 3; ++d) within = within && v[d] >= low[d] && v[d] <= high[d];
+        hollow.set(v, within);
       });
-      if (2 * inside > all) hollows.push_back(hollow);
+      hollows.push_back(hollow);
+    }
+    // Those that touch are one part in a soup, and a part is a hollow where most of it lies inside.
+    for (unsigned chosen = 1; chosen < 1u << hollows.size(); ++chosen) {
+      int within = 0, all = 0;
+      organ.forEach([&](const Voxel& v) {
+        bool any = false;
+        for (std::size_t k = 0; k < hollows.size(); ++k) any = any || ((chosen >> k & 1u) && hollows[k].at(v));
+        all += any;
+        within += any && organ.at(v);
+      });
+      if (2 * within > all) continue;
+      hollows.clear();
     }
     const auto inside = [&](const Voxel& v) {
       return organ.at(v) != 0 && std::none_of(hollows.begin(), hollows.end(), [&](const Grid& h) { return h.at(v); });
@@ -310,8 +318,8 @@ TEST(Labels, HollowsOfVoxelsStayHoles) {
     if (exact.triangles.empty() || hollows.empty()) continue;
     TriangleMesh file = place(surfaceOf(organ, [&](const Voxel& v) { return organ.at(v) != 0; }));
     for (const Grid& hollow : hollows)
-      shapes::append(file,
-                     shapes::turnedInsideOut(place(surfaceOf(hollow, [&](const Voxel& v) { return hollow.at(v) != 0; }))));
+      shapes::append(
+          file, shapes::turnedInsideOut(place(surfaceOf(hollow, [&](const Voxel& v) { return hollow.at(v) != 0; }))));
     const std::string seed = "seed " + std::to_string(firstSeed() + 1000u + static_cast<unsigned>(trial));
     expectSolid(repairMesh(file, MeshRepair::kMend), exact, organ, place, inside, seed);
     expectSolid(repairMesh(shapes::turnedInsideOut(file), MeshRepair::kMend), exact, organ, place, inside,
@@ -319,6 +327,41 @@ TEST(Labels, HollowsOfVoxelsStayHoles) {
     // Of a soup nobody knows which triangles are of which part.
     expectSolid(repairMesh(soupOf(file), MeshRepair::kMend), exact, organ, place, inside, seed + ", a soup");
   }
+}
+
+// A wall of no thickness is no wall.
+TEST(Labels, AHollowThatTouchesTheOutsideIsOpenThere) {
+  for (const int depth : {1, 0}) {
+    Grid grid(4);
+    grid.forEach([&](const Voxel& v) { grid.set(v, 1); });
+    const auto hollow = [&](const Voxel& v) { return v == Voxel{depth, 1, 1} || v == Voxel{depth + 1, 1, 1}; };
+    TriangleMesh file = surfaceOf(grid, [&](const Voxel& v) { return grid.at(v) == 1; });
+    shapes::append(file, shapes::turnedInsideOut(surfaceOf(grid, hollow)));
+    const auto inside = [&](const Voxel& v) { return grid.at(v) == 1 && !hollow(v); };
+    const auto one = repairMesh(file, MeshRepair::kMend);
+    expectSolid(one, surfaceOf(grid, inside), grid, {}, inside, "depth " + std::to_string(depth));
+    EXPECT_EQ(one->components, depth == 0 ? 1u : 2u);
+    EXPECT_EQ(says(*one, "turned inwards is a hole, and touches the surface: it is open there"), depth == 0)
+        << saidOf(*one);
+    EXPECT_EQ(one->warnings.size(), depth == 0 ? 1u : 0u) << saidOf(*one);
+  }
+}
+
+// A sheet through an organ bounds nothing, inside of it or outside.
+TEST(Labels, WhatBoundsNothingIsDroppedWithAWord) {
+  TriangleMesh file = boxMesh(Vec3(0.1, 0.1, 0.1), 0.05);
+  const double volume = signedVolume(file);
+  const Index first = static_cast<Index>(file.vertices.size());
+  for (const double y : {-0.02, 0.02})
+    for (const double x : {-0.06, 0.06}) file.vertices.emplace_back(x, y, 0.013);
+  file.triangles.push_back({first, first + 1, first + 2});
+  file.triangles.push_back({first + 1, first + 3, first + 2});
+  const auto one = repairMesh(file, MeshRepair::kMend);
+  ASSERT_TRUE(one.ok()) << one.error().detail;
+  EXPECT_TRUE(one->solid);
+  EXPECT_NEAR(signedVolume(one->mesh), volume, 1e-12 * volume);
+  // 0.12 x 0.04 of that and six sides of 0.1.
+  EXPECT_TRUE(says(*one, "dropped 1 open piece with 7.41 % of the area")) << saidOf(*one);
 }
 
 TriangleMesh ball(double radius) { return sphereMesh(radius, 0.25 * radius); }
@@ -329,8 +372,9 @@ int wrongPlaces(const TriangleMesh& mesh, const Box& box, test::Random& random,
   const SolidQuery query(mesh);
   int wrong = 0;
   for (int k = 0; k < 500; ++k) {
-    const Vec3 p = box.min + Vec3(random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1))
-                                 .cwiseProduct(box.max - box.min);
+    const Vec3 p =
+        box.min +
+        Vec3(random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)).cwiseProduct(box.max - box.min);
     const int answer = inside(p);
     wrong += answer >= 0 && query.contains(p) != (answer == 1);
   }

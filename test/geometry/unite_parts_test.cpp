@@ -171,8 +171,9 @@ TEST(UniteParts, ACavityThatReachesThroughTheSurfaceStaysAHoleAndALobeIsTissue) 
     const TriangleMesh hole = shapes::turnedInsideOut(ball(0.03));
     const RepairedMesh through = repaired(hole, 0.0103), inside = repaired(hole, 0.003),
                        tissue = repaired(ball(0.03), 0.0103), lobe = repaired(hole, 0.05);
-    EXPECT_TRUE(says(through, "warning: a part of 111 ml that is turned inwards is a hole, and reaches through the "
-                              "surface: 0.0461 ml of its 111 ml"))
+    EXPECT_TRUE(says(through,
+                     "warning: a part of 111 ml that is turned inwards is a hole, and reaches through the "
+                     "surface: 0.0461 ml of its 111 ml"))
         << notesOf(through);
     EXPECT_EQ(through.warnings.size(), 1u) << notesOf(through);
     EXPECT_NEAR(signedVolume(through.mesh), all - inner, 1e-3 * all) << "what lies outside is not taken off";

@@ -31,9 +31,7 @@ using Flat = CGAL::Constrained_triangulation_plus_2<CGAL::Constrained_Delaunay_t
     ExactKernel, CGAL::Triangulation_data_structure_2<FlatVertex, FlatFace>, CGAL::Exact_intersections_tag>>;
 
 struct ByPlace {
-  bool operator()(const ExactPoint& a, const ExactPoint& b) const {
-    return CGAL::compare_xyz(a, b) == CGAL::SMALLER;
-  }
+  bool operator()(const ExactPoint& a, const ExactPoint& b) const { return CGAL::compare_xyz(a, b) == CGAL::SMALLER; }
 };
 
 /// The front of a facet and its back are numbered 2 f and 2 f + 1.
@@ -72,9 +70,7 @@ class Arranging {
     return {p.x(), p.y(), p.z()};
   }
 
-  ExactTriangle exactTriangle(Index t) const {
-    return {exact(input_[t][0]), exact(input_[t][1]), exact(input_[t][2])};
-  }
+  ExactTriangle exactTriangle(Index t) const { return {exact(input_[t][0]), exact(input_[t][1]), exact(input_[t][2])}; }
 
   /// The vertex at that place, a new one where there is none.
   Index vertexAt(const ExactPoint& p) {
@@ -165,8 +161,7 @@ class Arranging {
         ExactKernel::FT at[3];
         at[u] = vertex->point().x();
         at[v] = vertex->point().y();
-        at[axis] = origin[axis] -
-                   (normal[u] * (at[u] - origin[u]) + normal[v] * (at[v] - origin[v])) / normal[axis];
+        at[axis] = origin[axis] - (normal[u] * (at[u] - origin[u]) + normal[v] * (at[v] - origin[v])) / normal[axis];
         vertex->info() = vertexAt(ExactPoint(at[0], at[1], at[2]));
       }
     }
@@ -175,8 +170,8 @@ class Arranging {
       const bool turned = CGAL::orientation(a, b, c) == CGAL::RIGHT_TURN;
       for (const Flat::Face_handle face : plan.finite_face_handles()) {
         if (members.size() > 1) {
-          const FlatPoint middle = CGAL::centroid(face->vertex(0)->point(), face->vertex(1)->point(),
-                                                  face->vertex(2)->point());
+          const FlatPoint middle =
+              CGAL::centroid(face->vertex(0)->point(), face->vertex(1)->point(), face->vertex(2)->point());
           const auto outside = turned ? CGAL::LEFT_TURN : CGAL::RIGHT_TURN;
           if (CGAL::orientation(a, b, middle) == outside || CGAL::orientation(b, c, middle) == outside ||
               CGAL::orientation(c, a, middle) == outside)
@@ -246,7 +241,9 @@ class Arranging {
     std::vector<Ray> rays;
     for (const auto& spoke : edge.spokes) {
       const Triangle& t = made_.facets[spoke.facet];
-      const Index tip = t[0] != edge.low && t[0] != edge.high ? t[0] : t[1] != edge.low && t[1] != edge.high ? t[1] : t[2];
+      const Index tip = t[0] != edge.low && t[0] != edge.high   ? t[0]
+                        : t[1] != edge.low && t[1] != edge.high ? t[1]
+                                                                : t[2];
       rays.push_back({exact(tip), 0, spoke.facet});
     }
     for (std::size_t k = 1; k < rays.size(); ++k) {
@@ -325,9 +322,8 @@ class Arranging {
     }
     // Around a piece lies minus the sum of what its other shells enclose.
     for (auto& [root, piece] : all)
-      piece.outer = *std::min_element(piece.shells.begin(), piece.shells.end(), [&](Index a, Index b) {
-        return shells[a].volume < shells[b].volume;
-      });
+      piece.outer = *std::min_element(piece.shells.begin(), piece.shells.end(),
+                                      [&](Index a, Index b) { return shells[a].volume < shells[b].volume; });
     const auto holds = [&](Shell& shell, const Vec3& p) {
       if (!shell.box.contains(p)) return false;
       if (!shell.query) {
@@ -349,7 +345,8 @@ class Arranging {
       for (auto& [other_root, other] : all) {
         if (other_root == root || !other.box.contains(piece.box.min) || !other.box.contains(piece.box.max)) continue;
         for (const Index s : other.shells)
-          if (s != other.outer && (holder == kNoIndex || shells[s].volume < shells[holder].volume) && holds(shells[s], p))
+          if (s != other.outer && (holder == kNoIndex || shells[s].volume < shells[holder].volume) &&
+              holds(shells[s], p))
             holder = s;
       }
       if (holder != kNoIndex) {

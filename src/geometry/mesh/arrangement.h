@@ -31,10 +31,10 @@ struct Arrangement {
 
   Points vertices;               // of the input, then those of crossings
   std::vector<Triangle> facets;  // no two have the same corners, none crosses another; where nothing meets, the input's
-  std::vector<std::vector<Use>> uses;          // of each facet
-  std::vector<std::array<Index, 2>> cells;     // of each facet: the one that its normal points to, the one behind
-  std::vector<double> volumes;                 // of each cell [m^3]; 0 of kOutside
-  std::vector<Edge> edges;                     // ordered by their vertices
+  std::vector<std::vector<Use>> uses;           // of each facet
+  std::vector<std::array<Index, 2>> cells;      // of each facet: the one that its normal points to, the one behind
+  std::vector<double> volumes;                  // of each cell [m^3]; 0 of kOutside
+  std::vector<Edge> edges;                      // ordered by their vertices
   std::vector<std::array<Index, 2>> crossings;  // triangles of the input that meet elsewhere than in what they share
 };
 

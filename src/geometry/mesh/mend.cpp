@@ -131,7 +131,8 @@ class Rims {
 
   Index pieceOf(Index triangle) { return joined_.find(triangle); }
 
-  std::vector<std::pair<Index, std::vector<Index>>> all;  // with the piece that they are of: what hangs together by edges
+  std::vector<std::pair<Index, std::vector<Index>>>
+      all;  // with the piece that they are of: what hangs together by edges
 
  private:
   static std::pair<Index, Index> key(Index a, Index b) { return {std::min(a, b), std::max(a, b)}; }

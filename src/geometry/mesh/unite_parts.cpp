@@ -156,11 +156,11 @@ class Uniting {
   struct Part {
     bool regions = false;  // its triangles cannot agree: cells are counted, not how often it winds around them
     bool turned = false;
-    double volume = 0.0;   // [m^3] signed as it was turned in the file
-    double extent = 0.0;   // [m^3] of the cells that it winds around
+    double volume = 0.0;  // [m^3] signed as it was turned in the file
+    double extent = 0.0;  // [m^3] of the cells that it winds around
     Index holder = kNoIndex;
-    double held = 0.0;      // [m^3] of it in the holder
-    bool touches = false;   // another one
+    double held = 0.0;          // [m^3] of it in the holder
+    bool touches = false;       // another one
     std::size_t crossings = 0;  // with itself
 
     bool inwards() const { return turned ? volume > 0.0 : volume < 0.0; }
@@ -170,6 +170,7 @@ class Uniting {
     Index part;
     int net = 0;  // how often more it is turned as the facet than against it
     bool both = false;
+    bool open = false;  // it does not part what this part divides space into
 
     int once() const { return (net > 0) - (net < 0); }
   };
@@ -266,7 +267,8 @@ class Uniting {
         }
     }
     if (turned > 0)
-      result_.notes.push_back("turned " + counted(turned, "triangle", "triangles") + " that faced against the neighbours");
+      result_.notes.push_back("turned " + counted(turned, "triangle", "triangles") +
+                              " that faced against the neighbours");
   }
 
   /// Parts that lie on another one, triangle on triangle.
@@ -395,7 +397,8 @@ class Uniting {
         const auto wall = wallOf(f);
         if (wall == walls_[f].end()) continue;
         const Index ahead = region[space_.cells[f][0]], behind = region[space_.cells[f][1]];
-        if (ahead == behind) continue;
+        wall->open = ahead == behind;
+        if (wall->open) continue;
         const bool both = wall->both || ahead == Arrangement::kOutside || behind == Arrangement::kOutside;
         tissue[ahead] |= both || wall->net < 0;
         tissue[behind] |= both || wall->net > 0;
@@ -407,9 +410,9 @@ class Uniting {
           filled.insert(region[cell]);
         }
       for (Index f = 0; f < walls_.size(); ++f)
-        result_.shared_walls |= wallOf(f) != walls_[f].end() && region[space_.cells[f][0]] != region[space_.cells[f][1]] &&
-                                filled.count(region[space_.cells[f][0]]) > 0 &&
-                                filled.count(region[space_.cells[f][1]]) > 0;
+        result_.shared_walls |=
+            wallOf(f) != walls_[f].end() && region[space_.cells[f][0]] != region[space_.cells[f][1]] &&
+            filled.count(region[space_.cells[f][0]]) > 0 && filled.count(region[space_.cells[f][1]]) > 0;
       if (filled.size() > 1) regions_ += filled.size();
     }
   }
@@ -473,8 +476,7 @@ class Uniting {
         std::size_t next = (k + 1) % edge.spokes.size();
         while (!isBoundary(edge.spokes[next].facet)) next = (next + 1) % edge.spokes.size();
         seams.push_back({edge.low, edge.high, here, edge.spokes[next].facet});
-        for (const Index v : {edge.low, edge.high})
-          corners.join(cornerAt(here, v), cornerAt(seams.back().there, v));
+        for (const Index v : {edge.low, edge.high}) corners.join(cornerAt(here, v), cornerAt(seams.back().there, v));
       }
     std::map<std::pair<Index, Index>, Index> number;  // of a vertex and a fan
     const auto numberOf = [&](Index corner) -> Index& {
@@ -530,7 +532,8 @@ class Uniting {
       else
         result_.mesh.triangles.insert(result_.mesh.triangles.end(), parts->second.begin(), parts->second.end());
     }
-    result_.changed = result_.changed || !space_.crossings.empty() || result_.mesh.triangles.size() != triangles_.size();
+    result_.changed =
+        result_.changed || !space_.crossings.empty() || result_.mesh.triangles.size() != triangles_.size();
     if (!space_.crossings.empty()) result_.mesh = withoutThin(result_.mesh);
   }
 
@@ -555,7 +558,8 @@ class Uniting {
       if (part.inwards()) continue;
       if (part.holder == kNoIndex && reachesAgainst(p))
         warn("a part of " + millilitres(part.extent) +
-             " is turned against a larger one that it reaches into, as a cavity is, but lies mostly outside of it: it is "
+             " is turned against a larger one that it reaches into, as a cavity is, but lies mostly outside of it: it "
+             "is "
              "tissue");
       if (!bounds[p] && part.holder != kNoIndex && !part.touches) {
         ++swallowed;
@@ -601,10 +605,14 @@ class Uniting {
   void describeOpen() {
     double all = 0.0, open = 0.0;
     UnionFind joined(walls_.size());
+    const auto isOpen = [&](Index f) {
+      return space_.cells[f][0] == space_.cells[f][1] ||
+             std::all_of(walls_[f].begin(), walls_[f].end(), [](const Wall& wall) { return wall.open; });
+    };
     for (const Arrangement::Edge& edge : space_.edges) {
       Index first = kNoIndex;
       for (const auto& spoke : edge.spokes) {
-        if (space_.cells[spoke.facet][0] != space_.cells[spoke.facet][1]) continue;
+        if (!isOpen(spoke.facet)) continue;
         if (first != kNoIndex) joined.join(first, spoke.facet);
         first = spoke.facet;
       }
@@ -613,7 +621,7 @@ class Uniting {
     for (Index f = 0; f < walls_.size(); ++f) {
       const double area = surfaceArea(space_.vertices, {space_.facets[f]});
       all += area;
-      if (space_.cells[f][0] != space_.cells[f][1]) continue;
+      if (!isOpen(f)) continue;
       open += area;
       pieces.insert(joined.find(f));
     }
@@ -629,7 +637,8 @@ class Uniting {
   void describeHoles() {
     UnionFind empty(solid_.size());
     for (Index f = 0; f < walls_.size(); ++f)
-      if (!solid_[space_.cells[f][0]] && !solid_[space_.cells[f][1]]) empty.join(space_.cells[f][0], space_.cells[f][1]);
+      if (!solid_[space_.cells[f][0]] && !solid_[space_.cells[f][1]])
+        empty.join(space_.cells[f][0], space_.cells[f][1]);
     for (Index p = 0; p < parts_.size(); ++p) {
       const Part& part = parts_[p];
       double outside = 0.0, filled = 0.0;
@@ -657,15 +666,15 @@ class Uniting {
 
   Points points_;
   std::vector<Triangle> triangles_;
-  std::vector<Side> places_;     // by merged vertices
-  std::vector<Index> part_of_;   // of each triangle
+  std::vector<Side> places_;    // by merged vertices
+  std::vector<Index> part_of_;  // of each triangle
   std::vector<Part> parts_;
   Arrangement space_;
-  std::vector<std::vector<Wall>> walls_;         // of each facet
-  std::vector<std::map<Index, int>> windings_;   // of each cell, by part, where not 0
-  std::vector<int> total_;                       // of each cell
-  std::vector<char> solid_;                      // of each cell
-  std::size_t regions_ = 0;                      // that share walls
+  std::vector<std::vector<Wall>> walls_;        // of each facet
+  std::vector<std::map<Index, int>> windings_;  // of each cell, by part, where not 0
+  std::vector<int> total_;                      // of each cell
+  std::vector<char> solid_;                     // of each cell
+  std::size_t regions_ = 0;                     // that share walls
   UnitedParts result_;
 };
 
