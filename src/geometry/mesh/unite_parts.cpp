@@ -156,14 +156,14 @@ class Uniting {
   struct Part {
     bool regions = false;  // its triangles cannot agree: cells are counted, not how often it winds around them
     bool turned = false;
-    double volume = 0.0;  // [m^3] signed as it was turned in the file
-    double extent = 0.0;  // [m^3] of the cells that it winds around
+    bool inside_out = false;  // in the file
+    double extent = 0.0;      // [m^3] of the cells that it winds around
     Index holder = kNoIndex;
     double held = 0.0;          // [m^3] of it in the holder
     bool touches = false;       // another one
     std::size_t crossings = 0;  // with itself
 
-    bool inwards() const { return turned ? volume > 0.0 : volume < 0.0; }
+    bool inwards() const { return turned != inside_out; }
   };
   /// Of a part, on a facet.
   struct Wall {
@@ -417,12 +417,37 @@ class Uniting {
     }
   }
 
+  /// Most of what one sees of a part from outside.
+  bool looksOutwards(Index p) const {
+    UnionFind apart(space_.volumes.size());  // by the part alone
+    const auto wallOf = [&](Index f) {
+      return std::find_if(walls_[f].begin(), walls_[f].end(), [&](const Wall& w) { return w.part == p && w.net != 0; });
+    };
+    for (Index f = 0; f < walls_.size(); ++f)
+      if (wallOf(f) == walls_[f].end()) apart.join(space_.cells[f][0], space_.cells[f][1]);
+    double outwards = 0.0;  // [m^2] less what looks inwards
+    for (Index f = 0; f < walls_.size(); ++f) {
+      const auto wall = wallOf(f);
+      if (wall == walls_[f].end()) continue;
+      const bool ahead = apart.find(space_.cells[f][0]) == Arrangement::kOutside,
+                 behind = apart.find(space_.cells[f][1]) == Arrangement::kOutside;
+      if (ahead == behind) continue;
+      const double area = surfaceArea(space_.vertices, {space_.facets[f]});
+      outwards += ahead == (wall->net > 0) ? area : -area;
+    }
+    return outwards > 0.0;
+  }
+
   void turnParts() {
+    std::vector<int> lowest(parts_.size(), 0), highest(parts_.size(), 0);
     for (Index cell = 1; cell < windings_.size(); ++cell)
       for (const auto& [part, winding] : windings_[cell]) {
-        parts_[part].volume += winding * space_.volumes[cell];
         parts_[part].extent += space_.volumes[cell];
+        lowest[part] = std::min(lowest[part], winding);
+        highest[part] = std::max(highest[part], winding);
       }
+    for (Index p = 0; p < parts_.size(); ++p)
+      parts_[p].inside_out = lowest[p] < 0 && (highest[p] <= 0 || !looksOutwards(p));
     std::vector<std::map<Index, double>> held(parts_.size());  // [m^3] of each part in others
     for (Index cell = 1; cell < windings_.size(); ++cell)
       for (const auto& [part, one] : windings_[cell])
@@ -440,7 +465,7 @@ class Uniting {
           part.holder = other;
           part.held = volume;
         }
-      part.turned = part.holder != kNoIndex ? parts_[part.holder].turned : part.volume < 0.0;
+      part.turned = part.holder != kNoIndex ? parts_[part.holder].turned : part.inside_out;
       if (part.regions) part.turned = false;
       known[p] = 1;
     }
