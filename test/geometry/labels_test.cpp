@@ -293,10 +293,11 @@ TEST(Labels, HollowsOfVoxelsStayHoles) {
   for (int trial = 0; trial < trials(40); ++trial) {
     test::Random random(firstSeed() + 1000u + static_cast<unsigned>(trial));
     Grid organ(7);
+    const bool gaps = random.integer(0, 1) == 1;
     organ.forEach([&](const Voxel& v) {
       bool within = true;
       for (const int x : v) within = within && x >= 1 && x <= 5;
-      organ.set(v, within && random.integer(0, 19) > 0);
+      organ.set(v, within && !(gaps && random.integer(0, 19) == 0));
     });
     std::vector<Grid> hollows;
     for (int k = random.integer(2, 6); k > 0 && hollows.size() < 3; --k) {
@@ -328,8 +329,9 @@ TEST(Labels, HollowsOfVoxelsStayHoles) {
     expectSolid(repairMesh(file, MeshRepair::kMend), exact, organ, place, inside, seed);
     expectSolid(repairMesh(shapes::turnedInsideOut(file), MeshRepair::kMend), exact, organ, place, inside,
                 seed + ", inside out");
-    // Of a soup nobody knows which triangles are of which part: what two hollows have both could be tissue inside out.
-    bool apart = true;
+    // Of a soup nobody knows which triangles are of which part: what two hollows have both, or one and a gap, could be
+    // tissue inside out.
+    bool apart = !gaps;
     organ.forEach([&](const Voxel& v) {
       apart = apart && std::count_if(hollows.begin(), hollows.end(), [&](const Grid& h) { return h.at(v) != 0; }) < 2;
     });
@@ -391,7 +393,7 @@ int wrongPlaces(const TriangleMesh& mesh, const Box& box, test::Random& random,
 
 // One lumen or several, deep inside, touching the wall, or through it at one place or more; each other, too.
 TEST(Labels, LumensThatGrazeOrReachThroughStayHoles) {
-  for (int trial = 0; trial < trials(40); ++trial) {
+  for (int trial = 0; trial < trials(12); ++trial) {
     test::Random random(firstSeed() + 2000u + static_cast<unsigned>(trial));
     const std::string what = "seed " + std::to_string(firstSeed() + 2000u + static_cast<unsigned>(trial));
     const Pose pose{random.rotation(), random.vector(0.1)};
