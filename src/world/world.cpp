@@ -339,6 +339,21 @@ WorldSnapshot World::snapshot(const SnapshotWants& wants) {
     w.surface_contacts.points(w.colliders, points);
     for (const SurfaceContacts::Point& p : points) shot.contacts.push_back({p.position, p.normal, p.force});
   }
+  if (wants.touches && w.contacts_current) {
+    const auto named = [&](Index collider) -> std::string {
+      const std::size_t bodies = w.bodies.size(), fixed = bodies + w.obstacles.size();
+      if (collider < bodies) return w.bodies[collider]->name;
+      if (collider < fixed) return w.obstacles[collider - bodies]->def->name;
+      return collider < fixed + w.instruments.size() ? w.instruments[collider - fixed].def.name : kGroundName;
+    };
+    std::vector<std::pair<Index, Index>> pairs;
+    w.surface_contacts.loadedSurfaces(pairs);
+    for (const auto& [a, b] : pairs) {
+      if (a == b) continue;
+      if (a < shot.bodies.size()) shot.bodies[a].touches.push_back(named(b));
+      if (b < shot.bodies.size()) shot.bodies[b].touches.push_back(named(a));
+    }
+  }
   shot.picks = w.picks;
   for (const Pick& pick : w.picks)
     if (const WorldBody* body = w.find(pick.body)) shot.pick_bodies[pick.id] = body->name;

@@ -108,14 +108,14 @@ struct Event {
   double sim_time = 0.0;  // [s]
   std::string body;
   PickId pick = 0;
-  std::string text;           // a sentence
-  std::uint32_t cavity = 0;   // of kLeak: the patch of its faces, which all pieces share that have a part of it
-  BodyModelPtr removed = {};  // of kRemoved: the body that is no more, which may have come in the same step
-  Pose placed = {};           // of it, as BodySnapshot::placed
-  bool taken_apart = false;   // of kDetached: by a command that is for it, and no clip
+  std::string text;             // a sentence
+  std::uint32_t cavity = 0;     // of kLeak: the patch of its faces, which all pieces share that have a part of it
+  BodyModelPtr removed = {};    // of kRemoved: the body that is no more, which may have come in the same step
+  Pose placed = {};             // of it, as BodySnapshot::placed
+  bool taken_apart = false;     // of kDetached: by a command that is for it, and no clip
   std::string instrument = {};  // of kGrasped, kDropped, kMisfired, kReleased by jaws, kIncised by blades, kClipped
   double force = 0.0;           // [N] of kGrasped; of kForce, that begins to act
-  std::uint64_t command = 0;  // how many commands the world was given before: those of one have the same
+  std::uint64_t command = 0;    // how many commands the world was given before: those of one have the same
   std::shared_ptr<const TaskNote> task = {};  // of kTask
 };
 
@@ -156,6 +156,7 @@ struct SnapshotWants {
   bool particles = false;
   bool measures = false;
   bool contacts = false;  // of the last step; none after a change of bodies
+  bool touches = false;   // likewise
 };
 
 /// A point of a body's surface that carries load.
@@ -178,7 +179,10 @@ struct BodySnapshot {
   bool asleep = false;
   double stiffness_factor = 1.0;  // (substeps given / needed)^2 of an elastic material, at most 1
   Pose placed;                    // from the model's frame to where the rest shape was put
+  // Where wanted: the names of other bodies, of obstacles and of instruments that press on it, and kGroundName.
+  std::vector<std::string> touches;
 };
+constexpr const char* kGroundName = "ground";
 
 struct AttachmentSnapshot {
   std::string name;
