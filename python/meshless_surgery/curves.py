@@ -27,7 +27,7 @@ DOMAINS = {
     'bimanual dexterity': ('hands_share', 'hands_overlap', 'path_length.pick_2', 'path_length.instrument_2'),
     'efficiency': ('time', 'idle_time', 'economy', 'path_length', 'movements', 'cuts', 'strokes', 'grasps'),
     'force sensitivity, tissue handling': ('force_peak', 'force_mean', 'force_together_peak', 'force_together_mean', 'force_time_above', 'strain_peak',
-                                           'torn', 'leaks', 'bleeding_time', 'drop_height', 'drops'),
+                                           'torn', 'leaks', 'bleeding_time', 'drop_height', 'drops', 'out_of_view'),
     'robotic control': ('sparc', 'ldlj', 'tremor', 'instrument_crossings', 'top_speed'),
     'autonomy': (),
 }

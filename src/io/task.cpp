@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostStages = 100, kMostForbidden = 100, kMostCorners = 1000;
+constexpr std::size_t kMostStages = 100, kMostForbidden = 100, kMostCorners = 1000, kMostNames = 100;
 constexpr int kCircleParts = 72;
 constexpr std::size_t kMostPicture = 2 << 20, kMostTask = 1 << 20;  // bytes
 const std::vector<std::string> kTools{"pick", "push", "scissors", "instrument"};
@@ -85,13 +85,14 @@ class TaskReader {
     if (!picture.empty()) readPicture(map.get("picture"), picture);
     map.number("pass_mark", {0.0, 100.0}, task_.pass_mark);
     map.number("settle", {0.0, 60.0, false, "s"}, task_.settle);
-    for (const char* part : {"plan", "target", "tray", "stages", "limits", "metrics", "allow"})
+    for (const char* part : {"plan", "target", "tray", "view", "stages", "limits", "metrics", "allow"})
       if (const YAML::Node node = map.get(part); node.IsDefined()) parts_[part].reset(node);
     map.finish();
     if (task_.scene.empty()) source_.fail(root, "the task has no scene", "a name of config/scenes, or a path");
     if (parts_.count("plan")) readPlan(parts_["plan"]);
     if (parts_.count("target")) readTarget(parts_["target"]);
     if (parts_.count("tray")) task_.tray = readBox(source_, parts_["tray"]);
+    if (parts_.count("view")) task_.view = readBox(source_, parts_["view"]);
     if (parts_.count("limits")) readLimits(parts_["limits"]);
     if (!parts_.count("stages")) source_.fail(root, "the task has no stages", "a list of 1 to 100 stages");
     if (source_.fault) return;
@@ -311,9 +312,9 @@ class TaskReader {
   }
 
   void readStage(const YAML::Node& node) {
-    const std::vector<std::string> kinds{"reach",    "stretch_to", "press_to",      "cut_along",
-                                         "separate", "remove_to",  "leave_nothing", "let_go",
-                                         "clip",     "hold",       "hand_over",     "put_back"};
+    const std::vector<std::string> kinds{"reach",     "stretch_to",    "press_to", "cut_along", "separate",
+                                         "remove_to", "leave_nothing", "let_go",   "clip",      "hold",
+                                         "hand_over", "put_back",      "put_on"};
     Stage stage;
     YamlMap map(source_, node, "a stage");
     map.text("name", stage.name);
@@ -399,12 +400,35 @@ class TaskReader {
       if (!map.has("distance")) source_.fail(node, "put_back has no distance", "above 0 to 1000 m");
       map.number("distance", lengths(0.0, true), back.distance);
       condition = back;
+    } else if (kind == "put_on") {
+      PutOn put;
+      readNames(map, node, "bodies", "names of bodies", put.bodies);
+      readNames(map, node, "obstacles", "names of obstacles", put.obstacles);
+      put.handed_over = map.choice("handed_over", {"false", "true"}) == 1;
+      condition = put;
     } else {
       LeaveNothing leave;
       map.number("share", {0.0, 0.99}, leave.share);
       condition = leave;
     }
     map.finish();
+  }
+
+  /// A list of 1 to 100 names, each once.
+  void readNames(YamlMap& map, const YAML::Node& at, const std::string& key, const std::string& what,
+                 std::vector<std::string>& names) {
+    const YAML::Node node = map.get(key);
+    const std::string accepted = "a list of 1 to 100 " + what + ", each once";
+    if (!node.IsDefined()) return source_.fail(at, map.what() + " has no " + key, accepted);
+    if (!node.IsSequence() || node.size() == 0 || node.size() > kMostNames)
+      return source_.fail(node, key + " is " + shown(node), accepted);
+    for (const auto& entry : node) {
+      std::string name;
+      if (!readText(source_, entry, key, name)) return;
+      if (std::find(names.begin(), names.end(), name) != names.end())
+        return source_.fail(entry, key + " has " + shown(entry) + " twice", accepted);
+      names.push_back(name);
+    }
   }
 
   void readBody(YamlMap& map, const YAML::Node& node, const std::string& kind, std::string& body) {

@@ -1,15 +1,19 @@
 #include "meshless_surgery/training/frame.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <Eigen/Eigenvalues>
+
+#include "meshless_surgery/geometry/mesh/measures.h"
 
 namespace meshless {
 namespace {
 
 constexpr double kSampleRate = 10.0;  // [Hz] of what costs something
 constexpr double kShaft = 0.0025;     // [m] radius: instruments are 5 mm thick
+constexpr int kDirections = 72;
 
 bool isSampled(std::uint64_t step, double step_rate) {
   const auto every = static_cast<std::uint64_t>(std::max(1.0, std::round(step_rate / kSampleRate)));
@@ -56,6 +60,53 @@ bool isOf(const std::string& body, const std::string& whole) {
   return body.compare(0, whole.size(), whole) == 0 && (body.size() == whole.size() || body[whole.size()] == '.');
 }
 
+namespace {
+
+// Whether a line goes through a triangle, so far from its origin.
+bool axisMeets(const Triangle& triangle, const Points& surface, const Vec3& origin, const Vec3& axis, double low,
+               double high) {
+  const Vec3 a = surface[triangle[0]] - origin, b = surface[triangle[1]] - origin, c = surface[triangle[2]] - origin;
+  const double parts[] = {axis.dot(b.cross(c)), axis.dot(c.cross(a)), axis.dot(a.cross(b))};
+  const double sum = parts[0] + parts[1] + parts[2];
+  if (sum == 0.0 || parts[0] * sum < 0.0 || parts[1] * sum < 0.0 || parts[2] * sum < 0.0) return false;
+  const double at = axis.dot(parts[0] * a + parts[1] * b + parts[2] * c) / sum;
+  return at >= low && at <= high;
+}
+
+}  // namespace
+
+bool isAround(const TriangleMesh& obstacle, const Points& surface, const std::vector<Triangle>& triangles) {
+  if (obstacle.vertices.empty()) return false;
+  Vec3 mean = Vec3::Zero();
+  for (const Vec3& p : obstacle.vertices) mean += p / static_cast<double>(obstacle.vertices.size());
+  Mat3 spread = Mat3::Zero();
+  for (const Vec3& p : obstacle.vertices) spread += (p - mean) * (p - mean).transpose();
+  const Eigen::SelfAdjointEigenSolver<Mat3> axes(spread);
+  const Vec3 axis = axes.eigenvectors().col(2), u = axes.eigenvectors().col(0), v = axis.cross(u);
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const Vec3& p : obstacle.vertices) {
+    low = std::min(low, axis.dot(p - mean));
+    high = std::max(high, axis.dot(p - mean));
+  }
+  // Directions from the axis in which there is tissue.
+  std::array<bool, kDirections> met{};
+  const auto between = [&](const Vec3& p) { return axis.dot(p - mean) >= low && axis.dot(p - mean) <= high; };
+  const auto direction = [&](const Vec3& p) { return std::atan2(v.dot(p - mean), u.dot(p - mean)); };
+  for (const Triangle& triangle : triangles) {
+    if (axisMeets(triangle, surface, mean, axis, low, high)) return false;
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 &a = surface[triangle[k]], &b = surface[triangle[(k + 1) % 3]];
+      if (!between(a) || !between(b)) continue;
+      const double from = direction(a), way = std::remainder(direction(b) - from, 2.0 * M_PI);
+      const double first = std::min(from, from + way) + 2.0 * M_PI, part = 2.0 * M_PI / kDirections;
+      const int last = static_cast<int>((first + std::abs(way)) / part);
+      for (int n = static_cast<int>(first / part); n <= last; ++n)
+        met[static_cast<std::size_t>(n % kDirections)] = true;
+    }
+  }
+  return std::all_of(met.begin(), met.end(), [](bool there) { return there; });
+}
+
 // Largest change of a length, over that length.
 double strainOf(const Mat3& deformation) {
   const Vec3 squares = Eigen::SelfAdjointEigenSolver<Mat3>()
@@ -92,12 +143,26 @@ std::vector<double> strainsOf(const BodyModel& model, const Points& positions) {
   return strains;
 }
 
+// The obstacles that a body is around.
+std::vector<std::string> aroundWhat(const WorldSnapshot& shot, const BodySnapshot& body) {
+  std::vector<std::string> names;
+  const Box box = boundsOf(body.surface);
+  for (const auto& obstacle : shot.obstacles)
+    if (boundsOf(obstacle->mesh.vertices).overlaps(box) &&
+        isAround(obstacle->mesh, body.surface, body.model->surface.triangles))
+      names.push_back(obstacle->name);
+  return names;
+}
+
 TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants& wants) {
   TrainingFrame frame;
   SnapshotWants parts;
   frame.sampled = wants.any() && isSampled(world.stepCount(), world.settings().step_rate);
   frame.centres = frame.sampled && wants.centres;
-  parts.particles = frame.sampled;
+  frame.places = frame.sampled && !wants.placed.empty();
+  parts.particles = frame.centres || (frame.sampled && wants.strains);
+  parts.surfaces = frame.places;
+  parts.touches = !wants.placed.empty();
   const WorldSnapshot shot = world.snapshot(parts);
   frame.step = shot.step;
   frame.run = shot.run;
@@ -130,7 +195,16 @@ TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants&
                            end, of.def.shaft_radius, of.force.norm(), of.pose.translation});
   }
   for (const BodySnapshot& body : shot.bodies) {
-    frame.bodies.push_back({body.name, body.number, body.model, body.placed, Vec3::Zero(), {}});
+    frame.bodies.push_back({body.name, body.number, body.model, body.placed, Vec3::Zero()});
+    const bool placed = std::any_of(wants.placed.begin(), wants.placed.end(),
+                                    [&](const std::string& whole) { return isOf(body.name, whole); });
+    if (placed) {
+      frame.bodies.back().supported = std::any_of(body.touches.begin(), body.touches.end(), [&](const auto& name) {
+        return std::none_of(shot.instruments.begin(), shot.instruments.end(),
+                            [&](const Instrument& of) { return of.def.name == name; });
+      });
+      if (frame.places) frame.bodies.back().around = aroundWhat(shot, body);
+    }
     if (!frame.sampled) continue;
     if (wants.centres) frame.bodies.back().centre = centreOfMass(*body.model, body.particles);
     if (wants.strains) frame.bodies.back().strains = strainsOf(*body.model, body.particles);

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kBetweenStrokes = 0.5;  // [s]
 constexpr double kPressing = 1e-6;       // [N] above this a tool is at work
+constexpr double kLaidDown = 0.5;        // [s] that what is let go of may take to come to its obstacle
 
 const char* const kSmooth = "Balasubramanian et al. 2012, 2015";
 const char* const kUsual = "usual in skill assessment: Reiley et al. 2011";
@@ -90,7 +91,15 @@ const std::vector<MetricRow>& metricTable() {
       {"clip_distance", "m", kLower, false,
        "distance at rest of the middle of the target from that of the jaws of the farthest clip", kOwn},
       {"drops", "1", kLower, false,
-       "picks that ended because their hand's stream fell silent, and tissue that slipped out of jaws", kOwn},
+       "picks that ended because their hand's stream fell silent, tissue that slipped out of jaws, and bodies of "
+       "put_on "
+       "that are on no obstacle half a second after they were let go of",
+       kOwn},
+      {"out_of_view", "1", kLower, false,
+       "times that a body that a pick or jaws have held, and that none holds any more, is outside of the task's view "
+       "by "
+       "its centre of mass; ten times a second",
+       kOwn},
       {"grasps", "1", kLower, false, "times that a pick or jaws took hold of tissue", kOwn},
       {"picks_at_once", "1", kLower, false, "most picks that hold tissue at a time, locked ones too", kOwn},
       {"drop_height", "m", kLower, false,
@@ -173,6 +182,8 @@ void Metrics::feed(const TrainingFrame& frame) {
   feedEvents(frame);
   feedStrain(frame);
   feedDrops(frame);
+  feedLaidDown(frame);
+  feedView(frame);
   crossings_.feed(frame.tools);
   if (bleeds(frame)) bled_for_ += frame.dt;
   if (!limits_.forbidden.empty()) feedForbidden(frame);
@@ -299,6 +310,44 @@ void Metrics::feedDrops(const TrainingFrame& frame) {
     double& was = found->second;
     was = held ? height : std::max(was, height);
     dropped_ = std::max(dropped_, was - height);
+  }
+}
+
+void Metrics::feedLaidDown(const TrainingFrame& frame) {
+  for (const std::string& name : limits_.placed) {
+    LaidDown& down = laid_down_[name];
+    const bool held = std::any_of(frame.tools.begin(), frame.tools.end(),
+                                  [&](const TrainingFrame::Tool& tool) { return tool.body == name; });
+    for (const Event& event : frame.events)
+      if (event.body == name && (event.type == EventType::kDropped || (event.type == EventType::kLifted && event.pick)))
+        down.slipped = true;
+    if (held) {
+      down.since.reset();
+      if (!down.held) down.slipped = false;
+    } else if (down.held && !down.slipped) {
+      down.since = time_;
+    }
+    down.held = held;
+    if (!down.since || !frame.places) continue;
+    const auto body = std::find_if(frame.bodies.begin(), frame.bodies.end(),
+                                   [&](const TrainingFrame::Body& one) { return one.name == name; });
+    const bool on = body != frame.bodies.end() && !body->around.empty();
+    const bool late = time_ > *down.since + kLaidDown - 1e-9;
+    if (!on && late) ++drops_;
+    if (on || late) down.since.reset();
+  }
+}
+
+void Metrics::feedView(const TrainingFrame& frame) {
+  if (!limits_.view || !frame.centres) return;
+  for (const TrainingFrame::Body& body : frame.bodies) {
+    const bool held = std::any_of(frame.tools.begin(), frame.tools.end(),
+                                  [&](const TrainingFrame::Tool& tool) { return tool.body == body.name; });
+    const auto found = held ? seen_.try_emplace(body.number, true).first : seen_.find(body.number);
+    if (found == seen_.end()) continue;
+    const bool seen = held || limits_.view->contains(body.centre);
+    out_of_view_ += found->second && !seen;
+    found->second = seen;
   }
 }
 
@@ -452,6 +501,7 @@ std::vector<MetricValue> Metrics::values(const RestTissue& tissue, std::size_t s
   set("margin_mean", tissue.marginMean());
   set("clip_distance", tissue.clipDistance());
   set("drops", static_cast<double>(drops_));
+  set("out_of_view", limits_.view && centres_known_ ? static_cast<double>(out_of_view_) : kNone);
   set("picks_at_once", static_cast<double>(picks_at_once_));
   set("grasps", static_cast<double>(grasps_));
   if (centres_known_) set("drop_height", dropped_);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <sstream>
 
 #include "meshless_surgery/base/number_text.h"
@@ -28,6 +29,15 @@ TriangleMesh placedMesh(const BodyDef& body) {
 /// Whether a region has tissue: more than what rounding leaves.
 bool anyWithin(const TriangleMesh& tissue, const Region& region) {
   return volumeWithin(tissue, region) > 1e-9 * std::abs(signedVolume(tissue));
+}
+
+/// Those that hold it, in the order of their numbers.
+std::vector<PickId> holdersOf(const std::string& body, const TrainingFrame& frame) {
+  std::vector<PickId> held;
+  for (const TrainingFrame::Tool& tool : frame.tools)
+    if (isOf(tool.body, body)) held.push_back(tool.pick + (tool.kind == ToolKind::kInstrument ? kOfJaws : 0));
+  std::sort(held.begin(), held.end());
+  return held;
 }
 
 const BodyDef* bodyOf(const SceneDef& scene, const std::string& name) {
@@ -182,6 +192,27 @@ class FaultFinder {
                      "a stage before it, in which '" + back.body + "' is moved"};
   }
 
+  std::optional<TaskFault> check(std::size_t k, const PutOn& put) const {
+    for (const std::string& body : put.bodies)
+      if (auto fault = heldForbidden(k, body)) return fault;
+    for (const std::string& name : put.obstacles) {
+      std::string known;
+      for (const ObstacleDef& obstacle : scene_.obstacles) known += (known.empty() ? "" : ", ") + obstacle.name;
+      if (std::none_of(scene_.obstacles.begin(), scene_.obstacles.end(),
+                       [&](const ObstacleDef& obstacle) { return obstacle.name == name; }))
+        return TaskFault{"stages", k, "there is no obstacle '" + name + "' in the scene",
+                         known.empty() ? "none, for the scene has no obstacles" : "obstacles of the scene: " + known};
+    }
+    if (put.obstacles.size() < put.bodies.size())
+      return never(k,
+                   numberText(static_cast<double>(put.bodies.size())) + " bodies are to be put on " +
+                       numberText(static_cast<double>(put.obstacles.size())) + " obstacles, one on each",
+                   "as many obstacles as bodies, or more");
+    if (scene_.world.contact != ContactMethod::kSurface)
+      return never(k, "bodies do not meet obstacles in this scene", "a scene with contact: surface");
+    return std::nullopt;
+  }
+
   const TaskDef& task_;
   const SceneDef& scene_;
 };
@@ -249,7 +280,7 @@ bool TaskDef::wantsStrain() const {
 }
 
 bool TaskDef::wantsCentres() const {
-  return looksAt("drop_height") || std::any_of(stages.begin(), stages.end(), [](const Stage& stage) {
+  return looksAt("drop_height") || view || std::any_of(stages.begin(), stages.end(), [](const Stage& stage) {
            return std::holds_alternative<PutBack>(stage.condition);
          });
 }
@@ -261,8 +292,18 @@ std::vector<std::string> TaskDef::vessels() const {
   return all;
 }
 
+std::vector<std::string> TaskDef::placed() const {
+  std::vector<std::string> all;
+  for (const Stage& stage : stages)
+    if (const auto* put = std::get_if<PutOn>(&stage.condition))
+      for (const std::string& body : put->bodies)
+        if (std::find(all.begin(), all.end(), body) == all.end()) all.push_back(body);
+  return all;
+}
+
 std::vector<std::string> TaskDef::bodies() const {
   std::vector<std::string> all = vessels();
+  for (const std::string& body : placed()) all.push_back(body);
   if (plan) all.push_back(plan->body);
   if (target) all.push_back(target->body);
   for (const Forbidden& forbidden : limits.measured.forbidden)
@@ -316,12 +357,10 @@ void TaskProgress::feed(const TrainingFrame& frame, const Metrics& metrics, cons
 
 // What a stage that comes later has to know of now.
 void TaskProgress::watch(const Condition& condition, const TrainingFrame& frame) {
+  if (const auto* put = std::get_if<PutOn>(&condition)) watch(*put, frame);
   if (const auto* over = std::get_if<HandOver>(&condition)) {
     Hands& hands = hands_[over->body];
-    std::vector<PickId> held;
-    for (const TrainingFrame::Tool& tool : frame.tools)
-      if (isOf(tool.body, over->body)) held.push_back(tool.pick + (tool.kind == ToolKind::kInstrument ? kOfJaws : 0));
-    std::sort(held.begin(), held.end());
+    std::vector<PickId> held = holdersOf(over->body, frame);
     if (held.empty())
       hands.taken_over = false;
     else if (!hands.held.empty() && held.front() != hands.held.front())
@@ -342,6 +381,47 @@ void TaskProgress::watch(const Condition& condition, const TrainingFrame& frame)
   }
 }
 
+void TaskProgress::watch(const PutOn& put, const TrainingFrame& frame) {
+  for (const std::string& name : put.bodies) {
+    const auto body = std::find_if(frame.bodies.begin(), frame.bodies.end(),
+                                   [&](const TrainingFrame::Body& one) { return one.name == name; });
+    Carried& carried = carried_[&put][name];
+    if (body == frame.bodies.end()) {  // cut, or gone
+      carried = Carried();
+      continue;
+    }
+    std::vector<PickId> held = holdersOf(name, frame);
+    if (held.size() == 1 && held.front() != carried.last) {
+      // Another hand alone: it took it over where both held it before, in the air.
+      const auto had = [&](PickId hand) {
+        return std::find(carried.held.begin(), carried.held.end(), hand) != carried.held.end();
+      };
+      carried.taken_over = had(held.front()) && had(carried.last) && !body->supported;
+      carried.last = held.front();
+    }
+    if (frame.places) {
+      const auto listed = [&](const std::string& obstacle) {
+        return std::find(put.obstacles.begin(), put.obstacles.end(), obstacle) != put.obstacles.end();
+      };
+      const auto on = std::find_if(body->around.begin(), body->around.end(), listed);
+      carried.on = on == body->around.end() ? "" : *on;
+      // Where it is put on another one, it comes from there anew.
+      if (held.empty() && carried.on.empty() && !body->around.empty()) carried.taken_over = false;
+    }
+    carried.held = std::move(held);
+  }
+}
+
+bool TaskProgress::meets(const PutOn& put) const {
+  std::set<std::string> taken;
+  for (const std::string& name : put.bodies) {
+    const Carried& carried = carried_.at(&put).at(name);
+    if (!carried.held.empty() || carried.on.empty() || !taken.insert(carried.on).second) return false;
+    if (put.handed_over && !carried.taken_over) return false;
+  }
+  return true;
+}
+
 bool TaskProgress::meets(const Condition& condition, const TrainingFrame& frame, const RestTissue& tissue) const {
   const auto anyTool = [&](const auto& test) { return std::any_of(frame.tools.begin(), frame.tools.end(), test); };
   if (const auto* reach = std::get_if<Reach>(&condition))
@@ -356,6 +436,7 @@ bool TaskProgress::meets(const Condition& condition, const TrainingFrame& frame,
       return tool.kind == press->tool && tool.force >= press->force &&
              (!press->region || press->region->contains(press->touch ? tool.touch : tool.position));
     });
+  if (const auto* put = std::get_if<PutOn>(&condition)) return meets(*put);
   if (const auto* cut = std::get_if<CutAlong>(&condition)) return tissue.planDone() >= cut->share;
   if (const auto* separate = std::get_if<Separate>(&condition)) {
     const auto has = [](const TrainingFrame::Joint& joint, const std::string& name) {

@@ -21,6 +21,8 @@ Training::Now::Now(const TaskDef& task)
     : metrics([&] {
         MetricLimits limits = task.limits.measured;
         limits.vessels = task.vessels();
+        limits.placed = task.placed();
+        limits.view = task.view;
         return limits;
       }()),
       tissue(task.plan, task.target, task.tray),
@@ -45,6 +47,7 @@ FrameWants Training::wants() const {
   if (over()) return wants;
   wants.centres = now_->tissue.wantsCentres() || task_.wantsCentres();
   wants.strains = task_.wantsStrain();
+  wants.placed = task_.placed();
   return wants;
 }
 

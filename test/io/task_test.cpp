@@ -186,6 +186,43 @@ TEST_F(TaskFile, ALineOrACircleIsAPlanToo) {
   }
 }
 
+TEST_F(TaskFile, SaysWhatIsToBePutOnWhat) {
+  const auto read_put_on = [&](const std::string& put_on, const std::string& view) {
+    std::ofstream(folder_.path() + "/pegs.yaml")
+        << kScene << "obstacles:\n  - {name: peg, primitive: {cylinder: [0.1, 0.01]}, pose: {position: [1, 1, 0.2]}}\n"
+        << "  - {name: bar, primitive: {box: [0.1, 0.1, 0.1]}, pose: {position: [2, 2, 0.2]}}\n";
+    std::ofstream(folder_.path() + "/task.yaml")
+        << "scene: pegs.yaml\nview: " << view << "\nstages:\n  - put_on: " << put_on << "\n";
+    return readTask(folder_.path() + "/task.yaml", folder_.path(), FileAccess());
+  };
+  const std::string view = "{min: [-1, -1, 0], max: [1, 1, 2]}";
+  const auto loaded = read_put_on("{bodies: [pad], obstacles: [peg, bar], handed_over: true}", view);
+  ASSERT_TRUE(loaded.ok()) << loaded.error().detail;
+  const auto& put = std::get<PutOn>(loaded->task.stages.at(0).condition);
+  EXPECT_EQ(std::vector<std::string>{"pad"}, put.bodies);
+  EXPECT_EQ((std::vector<std::string>{"peg", "bar"}), put.obstacles);
+  EXPECT_TRUE(put.handed_over);
+  EXPECT_EQ(2.0, loaded->task.view->max.z());
+  const auto alone = read_put_on("{bodies: [pad], obstacles: [peg]}", view);
+  ASSERT_TRUE(alone.ok()) << alone.error().detail;
+  EXPECT_FALSE(std::get<PutOn>(alone->task.stages.at(0).condition).handed_over);
+  for (const auto& [put_on, seen, says] :
+       {std::make_tuple("{bodies: [pad]}", view.c_str(), "task.yaml:4: put_on has no obstacles"),
+        {"{obstacles: [peg]}", view.c_str(), "put_on has no bodies"},
+        {"{bodies: pad, obstacles: [peg]}", view.c_str(), "bodies is 'pad'"},
+        {"{bodies: [pad, pad], obstacles: [peg, bar]}", view.c_str(), "bodies has 'pad' twice"},
+        {"{bodies: [ring], obstacles: [peg]}", view.c_str(), "no body 'ring'"},
+        {"{bodies: [pad], obstacles: [pag]}", view.c_str(), "no obstacle 'pag'"},
+        {"{bodies: [pad], obstacles: [peg], handed_over: perhaps}", view.c_str(), "handed_over is 'perhaps'"},
+        {"{bodies: [pad], obstacles: [peg], hand_over: true}", view.c_str(), "did you mean 'handed_over'"},
+        {"{bodies: [pad], obstacles: [peg]}", "{min: [1, 1, 1], max: [0, 2, 2]}", "min above its max"}}) {
+    const auto refused = read_put_on(put_on, seen);
+    ASSERT_FALSE(refused.ok()) << put_on;
+    EXPECT_NE(std::string::npos, refused.error().detail.find(says)) << refused.error().detail;
+    EXPECT_NE(std::string::npos, refused.error().detail.find("accepted: ")) << refused.error().detail;
+  }
+}
+
 TEST_F(TaskFile, SaysWhatEndsItAndWhatItAllows) {
   std::string text = kTask;
   text.replace(text.find("limits: {"), 9,

@@ -466,6 +466,7 @@ const std::map<std::string, Compute>& laws() {
       {"margin_mean", knownAs("margin_mean", kNone)},
       {"clip_distance", knownAs("clip_distance", kNone)},
       {"drops", knownAs("drops", 0.0)},
+      {"out_of_view", knownAs("out_of_view", kNone)},
       {"grasps", knownAs("grasps", 0.0)},
       {"picks_at_once",
        [](const Session& s, std::size_t) {
@@ -848,6 +849,8 @@ void ofVesselsCavitiesAndAttachments() {
 void ofFalls() {
   TaskDef def = task();
   def.metrics.push_back({"drop_height", 1.0, 0.0, 1.0, {}});
+  def.view = Box{Vec3(-1, -1, 0.1), Vec3(1, 1, 1)};
+  def.stages.push_back({"never", "", PutOn{{"block"}, {"peg"}, false}, 0.0});
   WorldSettings settings;
   settings.ground = 0.0;
   Session s(settings, def);
@@ -883,6 +886,8 @@ void ofFalls() {
   const double time = static_cast<double>(s.steps.size()) / kRate;
   s.known["stages"] = {1.0};
   s.known["grasps"] = {2.0};
+  s.known["drops"] = {1.0};  // the first time it was caught
+  s.known["out_of_view"] = {1.0};
   s.known["wall_time"] = {2.0 * time - 2.0 / kRate, 1e-6};  // from the first step on
   s.known["real_time_factor"] = {time / (2.0 * time - 2.0 / kRate), 1e-6};
   s.played.training.stop();

@@ -57,6 +57,13 @@ TEST(TaskFault, NamesWhatCanNeverBe) {
   EXPECT_NE(std::string::npos,
             faultOf(withStage(Clipped{"tissue", Region(Vec3(0.5, 0, 0.3), Vec3(1, 1, 1))})).find("can never be met"));
   EXPECT_NE(std::string::npos, faultOf(withStage(PutBack{"tissue", 0.01})).find("met from the start"));
+  SceneDef pegs = blockScene();
+  for (const char* name : {"peg_1", "peg_2"}) pegs.obstacles.push_back({name, cylinderMesh(0.1, 0.01, 0.01), 0.5, {}});
+  EXPECT_EQ("", faultOf(withStage(PutOn{{"tissue", "other"}, {"peg_1", "peg_2"}, true}), pegs));
+  EXPECT_NE(std::string::npos, faultOf(withStage(PutOn{{"ring"}, {"peg_1"}, true}), pegs).find("no body 'ring'"));
+  EXPECT_NE(std::string::npos, faultOf(withStage(PutOn{{"tissue"}, {"peg"}, true}), pegs).find("no obstacle 'peg'"));
+  EXPECT_NE(std::string::npos,
+            faultOf(withStage(PutOn{{"tissue", "other"}, {"peg_1"}, true}), pegs).find("2 bodies are to be put on 1"));
   for (const Condition& held : {Condition(Hold{"tissue", 1}), Condition(HandOver{"tissue"})}) {
     TaskDef held_task = withStage(held);
     held_task.limits.measured.forbidden.push_back({"tissue", "tissue", {}});

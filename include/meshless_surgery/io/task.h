@@ -26,11 +26,12 @@ bool isTaskFile(const std::string& task);
 /// scene, brief, picture
 /// plan: {body, origin, along, out, length, depth, tolerance}       in the rest shape where the scene puts it
 /// target: {body, box | sphere | plane}                             likewise
-/// tray: {min, max}                                                 in the world
+/// tray, view: {min, max}                                           in the world
 /// stages: a list of {name, brief, hold_for, and one of
 ///   reach: {tool, box | sphere}, stretch_to: {body, distance}, press_to: {force, tool, box | sphere},
 ///   cut_along: {share}, separate: [a, b], remove_to: tray, leave_nothing: {share}, let_go: all,
-///   clip: {body, box | sphere}, hold: {body, picks}, hand_over: {body}, put_back: {body, distance}}
+///   clip: {body, box | sphere}, hold: {body, picks}, hand_over: {body}, put_back: {body, distance},
+///   put_on: {bodies, obstacles, handed_over}}
 /// limits: {time, force, strain, forbidden: [{name, body | box | sphere}], end: [time, force, strain, forbidden]}
 /// metrics: {NAME: {weight, good, bad, pass}}
 /// pass_mark

@@ -38,6 +38,9 @@ struct TrainingFrame {
     Pose placed;                    // from the model's frame to the rest shape's place
     Vec3 centre = Vec3::Zero();     // [m] of mass, now; where wanted
     std::vector<double> strains{};  // strainsOf() it; where wanted
+    // Where what is put on obstacles is wanted: those that it is around, and whether anything but tools presses on it.
+    std::vector<std::string> around{};
+    bool supported = false;
   };
   struct Joint {
     std::string name;
@@ -57,13 +60,15 @@ struct TrainingFrame {
   std::vector<Event> events;  // since the frame before
   bool sampled = false;       // centres and strains are there, where they are wanted
   bool centres = false;       // they are there
+  bool places = false;        // what bodies are around is there
 };
 
 /// What costs something, and is looked at ten times a second where a task needs it.
 struct FrameWants {
   bool centres = false, strains = false;
+  std::vector<std::string> placed;  // bodies that are to be put on obstacles; what supports them is there in each step
 
-  bool any() const { return centres || strains; }
+  bool any() const { return centres || strains || !placed.empty(); }
 };
 
 /// After a step. `events`: what World::takeEvents has given since the frame before.
@@ -71,6 +76,11 @@ TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants&
 
 /// A piece of `whole`, or itself: names of pieces are those of their parents and a number.
 bool isOf(const std::string& body, const std::string& whole);
+
+/// Whether a surface is all around the axis of an obstacle, between its two ends: a ring that was put on a peg. The
+/// axis is along the longest extent of the obstacle, through its middle. Tissue beyond the ends does not count; where
+/// the axis meets tissue between them, that is on no peg.
+bool isAround(const TriangleMesh& obstacle, const Points& surface, const std::vector<Triangle>& triangles);
 
 /// The cells of a body, or its clusters where it has none.
 struct TissuePart {

@@ -50,6 +50,8 @@ struct MetricLimits {
   double strain = 0.5;                                     // [1]
   std::vector<Forbidden> forbidden;
   std::vector<std::string> vessels;  // bodies that bleed where they are cut and bear no clip
+  std::vector<std::string> placed;   // bodies that are to be put on obstacles
+  std::optional<Box> view;           // [m] what can be seen
 };
 
 class Metrics {
@@ -89,6 +91,8 @@ class Metrics {
   void feedForbidden(const TrainingFrame& frame);
   void feedStrain(const TrainingFrame& frame);
   void feedDrops(const TrainingFrame& frame);
+  void feedLaidDown(const TrainingFrame& frame);
+  void feedView(const TrainingFrame& frame);
   bool bleeds(const TrainingFrame& frame) const;
 
   MetricLimits limits_;
@@ -117,6 +121,14 @@ class Metrics {
   std::map<std::uint32_t, double> heights_;  // [m] of bodies that were held: the highest since they were let go of
   bool centres_known_ = false;
   double dropped_ = 0.0;  // [m]
+  /// Of a body that is to be put on an obstacle.
+  struct LaidDown {
+    bool held = false, slipped = false;  // slipped: its drop has been counted
+    std::optional<double> since;         // [s] it was let go of, and is on no obstacle yet
+  };
+  std::map<std::string, LaidDown> laid_down_;
+  std::map<std::uint32_t, bool> seen_;  // of bodies that were held, by their numbers: in view, or in a hand
+  std::size_t out_of_view_ = 0;
   std::size_t cuts_ = 0, strokes_ = 0, undos_ = 0, torn_ = 0, drops_ = 0, grasps_ = 0, picks_at_once_ = 0,
               forbidden_ = 0;
   using Deed = std::pair<std::uint64_t, std::uint64_t>;  // step and command

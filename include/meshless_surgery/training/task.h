@@ -64,8 +64,14 @@ struct PutBack {
   double distance = 0.0;  // [m] > 0
 };
 
+/// Each of the bodies is on one of the obstacles (isAround()), no two on one, and no hand holds one of them.
+struct PutOn {
+  std::vector<std::string> bodies, obstacles;
+  bool handed_over = false;  // and each came there by a hand that took it over from another one in the air
+};
+
 using Condition = std::variant<Reach, StretchTo, PressTo, CutAlong, Separate, RemoveToTray, LeaveNothing, LetGo,
-                               Clipped, Hold, HandOver, PutBack>;
+                               Clipped, Hold, HandOver, PutBack, PutOn>;
 
 struct Stage {
   std::string name, brief;
@@ -128,6 +134,7 @@ struct TaskDef {
   std::optional<CutPlan> plan;
   std::optional<Target> target;
   std::optional<Box> tray;
+  std::optional<Box> view;  // what can be seen
   std::vector<WeightedMetric> metrics;
   double pass_mark = 0.0;  // 0..100
   double settle = 0.0;     // [s] >= 0 that the scene has to come to rest before the task begins
@@ -142,6 +149,8 @@ struct TaskDef {
   bool looksAt(const std::string& metric) const;
   /// That stages want clips on.
   std::vector<std::string> vessels() const;
+  /// That stages want put on obstacles.
+  std::vector<std::string> placed() const;
   /// That the world has to have.
   std::vector<std::string> bodies() const;
 };
@@ -177,6 +186,8 @@ class TaskProgress {
 
  private:
   void watch(const Condition& condition, const TrainingFrame& frame);
+  void watch(const PutOn& put, const TrainingFrame& frame);
+  bool meets(const PutOn& put) const;
   bool meets(const Condition& condition, const TrainingFrame& frame, const RestTissue& tissue) const;
   std::string broken(const Metrics& metrics) const;
   std::string brokenMetric(const Metrics& metrics, const RestTissue& tissue) const;
@@ -192,6 +203,14 @@ class TaskProgress {
   struct Whereabouts {
     Vec3 at_start, now;  // [m]
   };
+  /// How a body comes to the obstacles of a stage.
+  struct Carried {
+    std::vector<PickId> held;
+    PickId last = 0;          // hand that held it
+    bool taken_over = false;  // in the air, by that hand
+    std::string on;           // the obstacle that it is on, as of the last frame that says so
+  };
+  std::map<const PutOn*, std::map<std::string, Carried>> carried_;
   std::map<std::string, Whereabouts> whereabouts_;  // of bodies that are to be put back, once they were looked at
   double held_for_ = 0.0;
   std::vector<double> times_;
