@@ -168,6 +168,23 @@ TEST(Organs, SlabAndBlock) {
   EXPECT_TRUE(sizeOf(block).isApprox(Vec3(0.1, 0.1, 0.05)));
 }
 
+TEST(Organs, ThePegTriangleIsARing) {
+  const TriangleMesh ring = pegTriangleMesh();
+  const MeshReport report = inspectMesh(ring);
+  EXPECT_TRUE(report.closed());
+  EXPECT_EQ(report.components, 1u);
+  EXPECT_EQ(report.self_intersections, 0u);
+  EXPECT_EQ(ring.vertices.size() * 2, ring.triangles.size()) << "as many handles as a torus";
+  const SolidQuery query(ring);
+  for (const double turn : {-0.25, 1.0 / 12.0, 5.0 / 12.0}) {  // the middles of the three walls
+    const Vec3 out(std::cos(2.0 * M_PI * turn), std::sin(2.0 * M_PI * turn), 0.0);
+    EXPECT_FALSE(query.contains(0.0047 * out));
+    EXPECT_TRUE(query.contains(0.006 * out));
+    EXPECT_FALSE(query.contains(0.0073 * out));
+  }
+  EXPECT_NEAR(report.signed_volume, 1.24e-6, 0.02e-6);
+}
+
 TEST(Organs, TheBladderIsHollow) {
   const MeshReport report = inspectMesh(bladderMesh());
   EXPECT_TRUE(report.closed());
@@ -194,6 +211,7 @@ TEST(Organs, ShippedMeshesAreTheGenerators) {
   all.push_back({"bladder", bladderMesh()});
   all.push_back({"skin", skinSlabMesh()});
   all.push_back({"block", block32Mesh()});
+  all.push_back({"peg_triangle", pegTriangleMesh()});
   for (const auto& [name, expected] : all) {
     std::ifstream in(std::string(SOURCE_DIR) + "/config/meshes/" + name + ".obj");
     ASSERT_TRUE(in.good()) << name;

@@ -532,6 +532,113 @@ Cheats cheatsOf(const std::string& name) {
                }
                task.seconds(2.0);
              }}};
+  if (name == "peg_transfer") {
+    // All six over and back, each in some other way than it is asked for.
+    using test::PegHands;
+    using Bring =
+        std::function<void(PegHands&, const std::string& body, const std::string& giver, const std::string& peg)>;
+    const auto overAndBack = [](ShippedTask& task, const Bring& bring, int count = 6) {
+      PegHands hands(task);
+      task.seconds(0.5);
+      for (const bool back : {false, true})
+        for (int k = 0; k < count; ++k) {
+          const int number = test::kPegOrder[static_cast<std::size_t>(back ? k : (k + 3) % 6)];
+          bring(hands, "triangle_" + std::to_string(test::kPegOrder[static_cast<std::size_t>(k)]),
+                back ? "right" : "left", (back ? "left_" : "right_") + std::to_string(number));
+        }
+      end(task);
+    };
+    const auto set_all = [](ShippedTask& task, const std::string& side) {
+      PegHands hands(task);
+      for (int k = 1; k <= 6; ++k) {
+        PlaceBodyCommand put;
+        put.body = "triangle_" + std::to_string(k);
+        put.pose.translation = hands.peg(side + "_" + std::to_string(k)) + 0.0046 * Vec3::UnitZ();
+        task.tries(put);
+      }
+      task.seconds(1.0);
+    };
+    const auto other = [](const std::string& hand) { return std::string(hand == "left" ? "right" : "left"); };
+    return {{"each by one hand alone",
+             [overAndBack](ShippedTask& task) {
+               overAndBack(task, [](PegHands& hands, const auto& body, const auto& giver, const auto& peg) {
+                 hands.take(giver, body, 0.03);
+                 hands.putOn(giver, body, hands.peg(peg));
+               });
+             }},
+            {"handed over on the board",
+             [overAndBack, other](ShippedTask& task) {
+               overAndBack(task, [other](PegHands& hands, const auto& body, const auto& giver, const auto& peg) {
+                 const Vec3 at = hands.take(giver, body, 0.0);
+                 hands.handOver(giver, other(giver), body, at, false);
+                 hands.take(other(giver), body, 0.03);
+                 hands.putOn(other(giver), body, hands.peg(peg));
+               });
+             }},
+            {"five of six",
+             [overAndBack](ShippedTask& task) {
+               overAndBack(
+                   task,
+                   [](PegHands& hands, const auto& body, const auto& giver, const auto& peg) {
+                     hands.transfer(body, giver, peg);
+                   },
+                   5);
+             }},
+            {"there, and not back",
+             [](ShippedTask& task) {
+               PegHands hands(task);
+               task.seconds(0.5);
+               for (std::size_t k = 0; k < 6; ++k)
+                 hands.transfer("triangle_" + std::to_string(test::kPegOrder[k]), "left",
+                                "right_" + std::to_string(test::kPegOrder[(k + 3) % 6]));
+               end(task);
+             }},
+            {"beside the pegs",
+             [overAndBack, other](ShippedTask& task) {
+               overAndBack(task, [other](PegHands& hands, const auto& body, const auto& giver, const auto& peg) {
+                 const Vec3 at = hands.take(giver, body, 0.03);
+                 hands.handOver(giver, other(giver), body, at, true);
+                 hands.putOn(other(giver), body, hands.peg(peg) + Vec3(0.0, 0.013, 0.0));
+               });
+             }},
+            {"let go of in the air",
+             [overAndBack, other](ShippedTask& task) {
+               overAndBack(task, [other](PegHands& hands, const auto& body, const auto& giver, const auto& peg) {
+                 const Vec3 at = hands.take(giver, body, 0.03);
+                 hands.handOver(giver, other(giver), body, at, true);
+                 hands.putOn(other(giver), body, 2.0 * hands.peg(peg), 0.03);
+               });
+             }},
+            {"put there by a service, and back",
+             [set_all](ShippedTask& task) {
+               task.seconds(1.2);
+               set_all(task, "right");
+               set_all(task, "left");
+               end(task);
+             }},
+            {"all on one peg",
+             [](ShippedTask& task) {
+               PegHands hands(task);
+               task.seconds(0.5);
+               for (const int k : test::kPegOrder) {
+                 hands.transfer("triangle_" + std::to_string(k), "left", "right_5");
+                 if (task.training->over()) break;
+               }
+               end(task);
+             }},
+            {"swept off the pegs", [](ShippedTask& task) {
+               task.seconds(0.5);
+               PushCommand push;
+               push.radius = 0.02;
+               push.position = Vec3(-0.1, 0, 0.02);
+               task.tries(push);
+               push.speed = 0.2;
+               push.position = Vec3(0.1, 0, 0.02);
+               task.tries(push);
+               task.seconds(2.0);
+               end(task);
+             }}};
+  }
   if (name == "cholecystectomy")
     return {{"torn out with duct and artery",
              [](ShippedTask& task) {

@@ -2,9 +2,12 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include <Eigen/Eigenvalues>
 
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/io/task.h"
 #include "meshless_surgery/training/followed_places.h"
 #include "support/bodies.h"
@@ -26,6 +29,7 @@ class ShippedTask {
     for (ObstacleDef& def : loaded->scene.obstacles) EXPECT_TRUE(world->addObstacle(std::move(def)).ok());
     for (const AttachCommand& attachment : loaded->scene.attachments)
       EXPECT_TRUE(world->addSceneAttachment(attachment).ok());
+    for (const InstrumentDef& def : loaded->scene.instruments) EXPECT_TRUE(world->addSceneInstrument(def).ok());
     training = std::make_unique<Training>(loaded->task);
   }
   void step() {
@@ -345,6 +349,158 @@ inline void playCholecystectomy(ShippedTask& task) {
   task.expect(task.training->passed(), "passed");
 }
 
+/// The two graspers of peg_transfer, each led from a side at 60 degrees to the board. They grasp triangles by the wall
+/// that faces them most, side by side.
+class PegHands {
+ public:
+  explicit PegHands(ShippedTask& task) : task_(task) {
+    for (const auto& obstacle : task_.world->snapshot({}).obstacles) {
+      const Box box = boundsOf(obstacle->mesh.vertices);
+      pegs_[obstacle->name] = 0.5 * (box.min + box.max);
+      pegs_[obstacle->name].z() = 0.0;
+    }
+  }
+  struct Lies {
+    Vec3 middle = Vec3::Zero();  // [m]
+    double yaw = 0.0;            // [rad]
+  };
+  struct Way {
+    std::string hand;
+    Vec3 to;
+    double yaw, jaw;
+  };
+
+  Lies whereIs(const std::string& name) {
+    SnapshotWants wants;
+    wants.surfaces = true;
+    Lies lies;
+    for (const BodySnapshot& body : task_.world->snapshot(wants).bodies) {
+      if (body.name != name) continue;
+      const Points &now = body.surface, &rest = body.model->surface.vertices;
+      for (const Vec3& p : now) lies.middle += p / static_cast<double>(now.size());
+      double sine = 0.0, cosine = 0.0;
+      for (std::size_t k = 0; k < now.size(); ++k) {
+        const Vec3 arm = now[k] - lies.middle;
+        cosine += rest[k].x() * arm.x() + rest[k].y() * arm.y();
+        sine += rest[k].x() * arm.y() - rest[k].y() * arm.x();
+      }
+      lies.yaw = std::atan2(sine, cosine);
+    }
+    return lies;
+  }
+  /// Hands go there together, smoothly.
+  void go(double time, const std::vector<Way>& ways) {
+    const int steps = std::max(1, static_cast<int>(std::lround(kHaste * time * task_.world->settings().step_rate)));
+    std::vector<Instrument> from;
+    for (const Way& way : ways)
+      for (const Instrument& one : task_.world->snapshot({}).instruments)
+        if (one.def.name == way.hand) from.push_back(one);
+    for (int k = 1; k <= steps && from.size() == ways.size(); ++k) {
+      const double u = static_cast<double>(k) / steps, s = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+      for (std::size_t n = 0; n < ways.size(); ++n) {
+        const Pose& begin = from[n].target;
+        LeadInstrumentCommand lead;
+        lead.name = ways[n].hand;
+        lead.pose = Pose{begin.rotation.slerp(s, turnOf(ways[n].hand, ways[n].yaw)),
+                         begin.translation + s * (ways[n].to - begin.translation)};
+        lead.jaw = from[n].jaw_target + s * (ways[n].jaw - from[n].jaw_target);
+        task_.apply<Done>(lead);
+      }
+      task_.seconds(1.0 / task_.world->settings().step_rate);
+    }
+  }
+  /// Grasps it where it lies, and lifts it by so much. Where the tip was then.
+  Vec3 take(const std::string& hand, const std::string& body, double lift) {
+    const Lies lies = whereIs(body);
+    const double yaw = yawOf(lies);
+    const Vec3 at = wallOf(lies, sideOf(hand) * kBeside);
+    go(0.5, {{hand, at - kAway * along(hand, yaw), yaw, kOpen}});
+    go(0.35, {{hand, at, yaw, kOpen}});
+    go(0.2, {{hand, at, yaw, 0.0}});
+    if (lift > 0.0) go(0.45, {{hand, at + lift * Vec3::UnitZ(), yaw, 0.0}});
+    return at + lift * Vec3::UnitZ();
+  }
+  /// To the other hand, in the middle between both sides, or where it is.
+  void handOver(const std::string& giver, const std::string& taker, const std::string& body, const Vec3& at,
+                bool in_the_middle) {
+    const double side = sideOf(giver), yaw = in_the_middle ? 0.0 : yawOf(whereIs(body));
+    const Vec3 middle = in_the_middle ? Vec3(side * 0.004, -0.006, at.z()) : at;
+    go(0.5,
+       {{giver, middle, yaw, 0.0}, {taker, middle - Vec3(side * 0.006, 0, 0) - kAway * along(taker, yaw), yaw, kOpen}});
+    const Lies lies = whereIs(body);
+    const double turned = yawOf(lies);
+    const Vec3 to = wallOf(lies, sideOf(taker) * kBeside);
+    go(0.35, {{taker, to, turned, kOpen}});
+    go(0.2, {{taker, to, turned, 0.0}});
+    go(0.15, {{giver, middle, yaw, kOpen}});
+    go(0.2, {{giver, middle - kAway * along(giver, yaw), yaw, kOpen}});
+  }
+  /// What the hand holds: to above a place of the board, down as far as it goes, and let go of.
+  void putOn(const std::string& hand, const std::string& body, const Vec3& place, double above = 0.009) {
+    const auto held = [&] {
+      for (const Instrument& one : task_.world->snapshot({}).instruments)
+        if (one.def.name == hand) return one.target;
+      return Pose();
+    };
+    const double yaw = yawOf(whereIs(body));
+    for (int turn = 0; turn < 2; ++turn) {  // it turns a little on the way
+      const Vec3 to = held().translation + place - whereIs(body).middle;
+      go(turn ? 0.1 : 0.5, {{hand, Vec3(to.x(), to.y(), held().translation.z()), yaw, 0.0}});
+    }
+    Vec3 to = held().translation;
+    to.z() -= std::max(0.0, whereIs(body).middle.z() - above);
+    go(0.4, {{hand, to, yaw, 0.0}});
+    go(0.15, {{hand, to, yaw, kOpen}});
+    go(0.25, {{hand, to - kAway * along(hand, yaw), yaw, kOpen}});
+  }
+  void transfer(const std::string& body, const std::string& giver, const std::string& peg) {
+    const std::string taker = giver == "left" ? "right" : "left";
+    const Vec3 at = take(giver, body, 0.03);
+    handOver(giver, taker, body, at, true);
+    putOn(taker, body, pegs_.at(peg));
+  }
+  const Vec3& peg(const std::string& name) const { return pegs_.at(name); }
+
+ private:
+  static constexpr double kHaste = 0.85, kOpen = 0.3, kWall = 0.006, kTop = 0.0045, kDepth = 0.0045, kBeside = 0.003,
+                          kAway = 0.025;
+  static double sideOf(const std::string& hand) { return hand == "left" ? -1.0 : 1.0; }
+  static Quat turnOf(const std::string& hand, double yaw) {
+    const double down = hand == "left" ? M_PI / 3.0 : 2.0 * M_PI / 3.0;
+    return Quat(Eigen::AngleAxisd(yaw, Vec3::UnitZ())) * Quat(Eigen::AngleAxisd(down, Vec3::UnitY()));
+  }
+  static Vec3 along(const std::string& hand, double yaw) { return turnOf(hand, yaw) * Vec3::UnitX(); }
+  static double yawOf(const Lies& lies) { return std::remainder(lies.yaw, 2.0 * M_PI / 3.0); }
+  static Vec3 wallOf(const Lies& lies, double beside) {
+    const double yaw = yawOf(lies);
+    return lies.middle + kWall * Vec3(std::sin(yaw), -std::cos(yaw), 0.0) +
+           beside * Vec3(std::cos(yaw), std::sin(yaw), 0.0) + (kTop - kDepth) * Vec3::UnitZ();
+  }
+
+  ShippedTask& task_;
+  std::map<std::string, Vec3> pegs_;  // [m] their feet
+};
+
+/// The triangles in the order of the script: those in the middle first.
+inline const std::array<int, 6> kPegOrder{4, 5, 6, 1, 2, 3};
+
+inline void playPegTransfer(ShippedTask& task) {
+  PegHands hands(task);
+  task.seconds(0.5);
+  for (const bool back : {false, true}) {
+    for (std::size_t k = 0; k < 6; ++k) {
+      // Over there those that are far away from the middle come first.
+      const int number = back ? kPegOrder[k] : kPegOrder[(k + 3) % 6];
+      hands.transfer("triangle_" + std::to_string(kPegOrder[k]), back ? "right" : "left",
+                     (back ? "left_" : "right_") + std::to_string(number));
+    }
+    task.seconds(0.3);
+    task.expect(task.training->progress().stage() == (back ? 2u : 1u), "all six");
+  }
+  task.seconds(1.0);
+  task.expect(task.training->passed(), "passed");
+}
+
 inline const std::vector<std::pair<std::string, std::function<void(ShippedTask&)>>>& goodPlays() {
   static const std::vector<std::pair<std::string, std::function<void(ShippedTask&)>>> plays{
       {"palpate", playPalpate},
@@ -356,6 +512,7 @@ inline const std::vector<std::pair<std::string, std::function<void(ShippedTask&)
       {"pattern_cut", playPatternCut},
       {"ligate", playLigate},
       {"cholecystectomy", playCholecystectomy},
+      {"peg_transfer", playPegTransfer},
       {"transect", [](ShippedTask& task) { playTransect(task); }}};
   return plays;
 }

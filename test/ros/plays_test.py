@@ -12,7 +12,7 @@ class PlayTest(unittest.TestCase):
     def test_everything_holds(self):
         client = rospy.get_param('~client')
         run = subprocess.run(['rosrun', 'meshless_surgery', client], stdout=subprocess.PIPE,
-                             stderr=subprocess.STDOUT, universal_newlines=True, timeout=240)
+                             stderr=subprocess.STDOUT, universal_newlines=True, timeout=480)
         print(run.stdout)
         self.assertEqual(0, run.returncode, run.stdout)
         self.assertIn('  ok    ', run.stdout)

@@ -7,9 +7,9 @@
 
 #include <CLI/CLI.hpp>
 
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "shapes/hollow_organs.h"
 #include "shapes/instruments.h"
-#include "meshless_surgery/geometry/mesh/measures.h"
 #include "shapes/organs.h"
 
 namespace {
@@ -77,8 +77,8 @@ bool writeObj(const std::string& path, const std::string& comment, const Triangl
 int main(int argc, char** argv) {
   CLI::App app(
       "Writes liver.obj, kidney.obj, fish.obj, bladder.obj, skin.obj, block.obj, gallbladder.obj, stomach.obj, "
-      "vessel.obj "
-      "and omentum.obj, and the parts of the instruments that are drawn.");
+      "vessel.obj, omentum.obj "
+      "and peg_triangle.obj, and the parts of the instruments that are drawn.");
   std::string folder, drawn;
   unsigned seed = 1;
   app.add_option("--out", folder, "folder to write into; it must exist")->required()->check(CLI::ExistingDirectory);
@@ -101,7 +101,8 @@ int main(int argc, char** argv) {
                        writeObj(folder + "/gallbladder.obj", fixed, meshless::gallbladderMesh()) &&
                        writeObj(folder + "/stomach.obj", fixed, meshless::stomachMesh()) &&
                        writeObj(folder + "/vessel.obj", fixed, meshless::vesselMesh()) &&
-                       writeObj(folder + "/omentum.obj", fixed, meshless::omentumMesh());
+                       writeObj(folder + "/omentum.obj", fixed, meshless::omentumMesh()) &&
+                       writeObj(folder + "/peg_triangle.obj", fixed, meshless::pegTriangleMesh());
   if (!written) return 1;
   if (drawn.empty()) return 0;
   const bool drawn_too = writeObj(drawn + "/shaft.obj", fixed, meshless::shaftMesh(), true) &&

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "shapes/implicit_shapes.h"
 #include "meshless_surgery/geometry/mesh/isosurface.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/geometry/mesh/mesh_check.h"
 #include "meshless_surgery/geometry/mesh/primitives.h"
+#include "shapes/implicit_shapes.h"
 
 namespace meshless {
 namespace {
@@ -103,6 +103,48 @@ TriangleMesh bladderMesh() {
 }
 
 TriangleMesh skinSlabMesh() { return boxMesh(Vec3(0.2, 0.2, 0.01), 40, 40, 2); }
+
+TriangleMesh pegTriangleMesh() {
+  constexpr double kOuter = 0.00725, kInner = 0.00475;        // [m] of the circles within
+  constexpr double kOuterRound = 0.003, kInnerRound = 0.001;  // [m] of the corners
+  constexpr double kHeight = 0.009, kTurn = 2.0 * 3.14159265358979323846;
+  constexpr int kAlong = 6, kCorner = 3, kUp = 4;
+  // The same number of places on both outlines, so that each has its partner.
+  const auto outline = [&](double within, double round) {
+    Points places;
+    for (int corner = 0; corner < 3; ++corner) {
+      const auto at = [&](int of, double turn) -> Vec3 {
+        const double angle = 0.25 * kTurn + of * kTurn / 3.0;
+        return 2.0 * (within - round) * Vec3(std::cos(angle), std::sin(angle), 0.0) +
+               round * Vec3(std::cos(angle + turn), std::sin(angle + turn), 0.0);
+      };
+      for (int k = 0; k <= kCorner; ++k) places.push_back(at(corner, kTurn / 3.0 * (double(k) / kCorner - 0.5)));
+      const Vec3 from = places.back(), way = at(corner + 1, -kTurn / 6.0) - from;
+      for (int k = 1; k < kAlong; ++k) places.push_back(from + double(k) / kAlong * way);
+    }
+    return places;
+  };
+  const Points walls[] = {outline(kInner, kInnerRound), outline(kOuter, kOuterRound)};
+  const auto count = static_cast<Index>(walls[0].size());
+  TriangleMesh mesh;
+  for (const Points& wall : walls)
+    for (int level = 0; level <= kUp; ++level)
+      for (const Vec3& p : wall) mesh.vertices.push_back(p + kHeight * (double(level) / kUp - 0.5) * Vec3::UnitZ());
+  const auto at = [&](Index wall, Index level, Index k) { return (wall * (kUp + 1) + level) * count + k % count; };
+  const auto add = [&](Index a, Index b, Index c, Index d) {
+    mesh.triangles.push_back({a, b, c});
+    mesh.triangles.push_back({a, c, d});
+  };
+  for (Index k = 0; k < count; ++k) {
+    for (Index level = 0; level < kUp; ++level) {
+      add(at(1, level, k), at(1, level, k + 1), at(1, level + 1, k + 1), at(1, level + 1, k));
+      add(at(0, level, k + 1), at(0, level, k), at(0, level + 1, k), at(0, level + 1, k + 1));
+    }
+    add(at(0, kUp, k), at(1, kUp, k), at(1, kUp, k + 1), at(0, kUp, k + 1));
+    add(at(1, 0, k), at(0, 0, k), at(0, 0, k + 1), at(1, 0, k + 1));
+  }
+  return mesh;
+}
 
 TriangleMesh block32Mesh() { return boxMesh(Vec3(0.1, 0.1, 0.05), 2, 2, 1); }
 

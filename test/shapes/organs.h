@@ -13,5 +13,7 @@ TriangleMesh fishMesh(unsigned seed = 1);    // about 0.3 m long, head at +x, fi
 TriangleMesh bladderMesh();                  // 0.06 m long, hollow, its wall 3 mm thick
 TriangleMesh skinSlabMesh();                 // 0.2 x 0.2 x 0.01 m
 TriangleMesh block32Mesh();                  // 0.1 x 0.1 x 0.05 m; 32 triangles, and 32 tetrahedra about its centre
+/// What is put on pegs: a ring of three straight walls about z, 9 mm high and 2.5 mm thick, with round corners.
+TriangleMesh pegTriangleMesh();
 
 }  // namespace meshless
