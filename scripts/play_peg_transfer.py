@@ -8,11 +8,12 @@ import sys
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from surgery_client import Play  # noqa: E402
 
-CHUNK = 1 / 30               # [s] between two poses
+STEPS, CHUNK = 4, 4 / 120    # of the world between two poses, and how long they take [s]
 OPEN = 0.3                   # [rad]
 WALL, TOP = 0.006, 0.0045    # [m] from the middle of a triangle to that of a wall, and up to its top
 DEPTH, BESIDE = 0.0045, 0.003  # [m] of the tips below the top, and beside the middle of the wall
 AWAY, LIFT = 0.025, 0.03     # [m] along the shaft, and up
+HASTE = 0.85                 # of the times below
 ORDER = (4, 5, 6, 1, 2, 3)   # those in the middle of the board first
 
 
@@ -72,33 +73,51 @@ class Hands:
 
     def go(self, seconds, ways):
         """Hands go together, smoothly: by hand a place, a yaw and an angle of the jaws."""
-        steps = max(1, int(round(seconds / CHUNK)))
-        begin = {hand: self.held[hand] for hand in ways}
-        for step in range(1, steps + 1):
-            u = step / steps
-            s = u * u * u * (10 - 15 * u + 6 * u * u)
+        seconds *= HASTE
+        stepped = self.surgeon.is_stepped
+        begun = 0.0 if stepped else self.surgeon.state().sim_time
+        u = sent = 0.0
+        while sent < 1:
+            sent = min(1.0, u + CHUNK / seconds)
+            s = sent * sent * sent * (10 - 15 * sent + 6 * sent * sent)
             for hand, (place, yaw, jaw) in ways.items():
-                was, was_yaw, was_jaw = begin[hand]
+                was, was_yaw, was_jaw = self.held[hand]
                 self.streams[hand].move(tuple(p + s * (q - p) for p, q in zip(was, place)),
                                         turned(hand, was_yaw + s * (yaw - was_yaw)))
                 self.streams[hand].jaw(was_jaw + s * (jaw - was_jaw))
-            self.surgeon.live(CHUNK)
+            if stepped:
+                self.surgeon.step(STEPS if sent < 1 else 2 * STEPS)  # a pose may come a little late
+                u = sent
+            else:
+                u = (self.surgeon.state().sim_time - begun) / seconds
         self.held.update(ways)
+
+    def holds(self, hand):
+        return next(i.holds for i in self.surgeon.state().instruments if i.name == hand)
+
+    def grasp(self, hand, name, near=False):
+        """By a wall, and once more where it was missed: where the tip is then, and how it is turned."""
+        for _ in range(3):
+            at, yaw = self.wall(name, hand)
+            if not near:
+                self.go(0.5, {hand: (add(at, back(hand, yaw, AWAY)), yaw, OPEN)})
+            self.go(0.35, {hand: (at, yaw, OPEN)})
+            self.go(0.2, {hand: (at, yaw, 0.0)})
+            if self.holds(hand) == name:
+                break
+            self.go(0.2, {hand: (at, yaw, OPEN)})
+            near = False
+        return at, yaw
 
     def transfer(self, name, giver, taker, peg):
         side = side_of(giver)
-        at, yaw = self.wall(name, giver)
-        self.go(0.5, {giver: (add(at, back(giver, yaw, AWAY)), yaw, OPEN)})
-        self.go(0.35, {giver: (at, yaw, OPEN)})
-        self.go(0.2, {giver: (at, yaw, 0.0)})
+        at, yaw = self.grasp(giver, name)
         at = add(at, (0, 0, LIFT))
         self.go(0.45, {giver: (at, yaw, 0.0)})
         middle = (side * 0.004, -0.006, at[2])
         self.go(0.5, {giver: (middle, 0.0, 0.0),
                       taker: (add(add(middle, (-side * 0.006, 0, 0)), back(taker, 0.0, AWAY)), 0.0, OPEN)})
-        to, yaw = self.wall(name, taker)
-        self.go(0.35, {taker: (to, yaw, OPEN)})
-        self.go(0.2, {taker: (to, yaw, 0.0)})
+        _, yaw = self.grasp(taker, name, near=True)
         self.go(0.2, {giver: (middle, 0.0, OPEN)})
         self.go(0.2, {giver: (add(middle, back(giver, 0.0, AWAY)), 0.0, OPEN)})
         for seconds in (0.5, 0.1):  # it turns a little on the way
