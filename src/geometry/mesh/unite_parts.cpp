@@ -159,7 +159,6 @@ class Uniting {
     bool inside_out = false;  // in the file
     double extent = 0.0;      // [m^3] of the cells that it winds around
     Index holder = kNoIndex;
-    double held = 0.0;          // [m^3] of it in the holder
     bool touches = false;       // another one
     std::size_t crossings = 0;  // with itself
 
@@ -461,10 +460,8 @@ class Uniting {
       Part& part = parts_[p];
       for (const auto& [other, volume] : held[p])
         if (known[other] && volume > 0.5 * part.extent &&
-            (part.holder == kNoIndex || parts_[other].extent > parts_[part.holder].extent)) {
+            (part.holder == kNoIndex || parts_[other].extent > parts_[part.holder].extent))
           part.holder = other;
-          part.held = volume;
-        }
       part.turned = part.holder != kNoIndex ? parts_[part.holder].turned : part.inside_out;
       if (part.regions) part.turned = false;
       known[p] = 1;
