@@ -49,7 +49,7 @@ TEST_F(Scene, EachBodySaysHowFarItsFileIsRepaired) {
       "  - {name: wrapped, file: ../fin.obj, repair: wrap}\n  - {name: cube, file: ../cube.obj, repair: none}\n");
   ASSERT_EQ(scene.bodies.size(), 3u);
   EXPECT_EQ(scene.bodies[0].mesh.triangles.size(), 12u);
-  EXPECT_NE(scene.bodies[0].notes.back().find("the surface now encloses 1 m^3"), std::string::npos)
+  EXPECT_NE(scene.bodies[0].notes.back().find("the surface now encloses 1e+06 ml"), std::string::npos)
       << scene.bodies[0].notes.back();
   EXPECT_GT(scene.bodies[1].mesh.triangles.size(), 500u);
   EXPECT_EQ(scene.bodies[2].mesh.triangles.size(), 48u);

@@ -96,13 +96,15 @@ TEST(SceneWork, EachShippedSceneDoesWhatItUsesAndNothingElse) {
   organs.insert({"bounds tested", "pairs", "queries", "fibres"});
   Names layers = held;
   layers.insert({"bounds tested", "pairs", "queries"});
+  Names on_pegs = on_ground;
+  on_pegs.insert({"bounds tested", "pairs", "queries"});
   const std::map<std::string, Names> expected = {{"abdomen.yaml", organs},      {"block.yaml", bending_on_ground},
                                                  {"fish.yaml", bending},        {"incision.yaml", held},
                                                  {"liver.yaml", on_ground},     {"liver_looks.yaml", on_ground},
                                                  {"lump.yaml", held},           {"pile.yaml", piled},
                                                  {"resection.yaml", on_ground}, {"skin.yaml", sheet},
                                                  {"vessel.yaml", held},         {"blocks.yaml", on_ground},
-                                                 {"gauze.yaml", layers}};
+                                                 {"gauze.yaml", layers},        {"peg_transfer.yaml", on_pegs}};
   EXPECT_EQ(shippedScenes().size(), expected.size()) << "a scene has no line here";
   for (const std::string& scene : shippedScenes()) {
     SCOPED_TRACE(scene);
