@@ -109,6 +109,20 @@ void holdCorners(BodyModel& model) {
       for (const Index corner : cell.corners) model.fixed[corner] = model.any_fixed = true;
 }
 
+std::vector<double> stiffnessOfParticles(const BodyModel& model) {
+  if (!model.lattice || !model.lattice->regions) return {};
+  std::vector<double> sums(model.lattice->corners, 0.0), counts(sums);
+  for (const LatticeCell& cell : model.lattice->cells) {
+    const ElasticMix mix = mixOf(model, cell);
+    for (const Index corner : cell.corners) {
+      sums[corner] += mix.own + mix.youngs;
+      counts[corner] += 1.0;
+    }
+  }
+  for (std::size_t i = 0; i < sums.size(); ++i) sums[i] = counts[i] > 0.0 ? sums[i] / counts[i] : 1.0;
+  return sums;
+}
+
 ElasticCells elasticCellsOf(const BodyModel& model) {
   const CellLattice& lattice = *model.lattice;
   ElasticCells elastic;

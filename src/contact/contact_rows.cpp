@@ -51,9 +51,9 @@ ContactRow* makeRow(const FeaturePair& pair, const RowBody& a, const RowBody& b,
   for (Index k = row.begin; k < row.end; ++k)
     sum += set.entries[k].coefficient * (k < row.middle ? a : b).positions[set.entries[k].particle];
   row.normal = pair.normal;
-  row.rise = pair.chord - skin - pair.normal.dot(sum);
+  row.rise = -skin - pair.normal.dot(sum);
   for (int n = 0; n < pair.of_a; ++n) row.rise += pair.shares[n] * pair.normal.dot(a.vertices[pair.vertices[n]]);
-  row.constant = pair.gap + pair.chord - skin - pair.normal.dot(sum);
+  row.constant = pair.gap - skin - pair.normal.dot(sum);
   row.kind = pair.kind;
   row.order = pair.order;
   row.features = pair.features;

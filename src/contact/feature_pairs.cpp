@@ -13,7 +13,12 @@ constexpr double kLeastOpposed = 0.05;  // cosine by which a direction has to op
 constexpr double kSameWay = 0.9;        // cosine from which a second direction of a vertex says nothing new
 constexpr double kFlat = 0.3;           // sine by which neighbours may be farther out than what sticks out
 constexpr double kMostRidgePoints = 1e6;
-constexpr double kSelfOpposed = 0.3;  // cosine by which faces of one body oppose each other where they may meet
+constexpr double kAcross = 2.0;        // points of the push sphere in the radius of its contact
+constexpr double kWidest = 0.7;        // spacings between them, at most
+constexpr double kWidestHard = 0.3;    // likewise of a surface that gives way as its vertices do, and not by cells
+constexpr double kMostAcross = 100.0;  // points across all that it touches
+constexpr double kLeastTouch = 0.03;   // spacings: the smallest such radius
+constexpr double kSelfOpposed = 0.3;   // cosine by which faces of one body oppose each other where they may meet
 
 FloatBox boxAround(const Vec3& p, const Vec3& q, double by) {
   FloatBox box;
@@ -474,55 +479,165 @@ void findPlane(const PairSearch& search, double height, std::vector<FeaturePair>
   }
 }
 
-void findSphere(const PairSearch& search, const Vec3& centre, double radius, const Vec3& way,
-                std::vector<FeaturePair>& pairs) {
+namespace {
+
+/// Directions from the centre of a sphere: an even hexagonal grid on each of its halves, wrapped around the ends of an
+/// axis.
+class RayGrid {
+ public:
+  RayGrid(const Vec3& axis, double radius, double apart) : radius_(radius), apart_(apart) {
+    // As the axis turns, the grid turns as little as it can: it is that about -z, brought along.
+    const Quat turn = Quat::FromTwoVectors(-Vec3::UnitZ(), axis);
+    halves_[0] = {axis, turn * Vec3::UnitX(), turn * -Vec3::UnitY()};
+    halves_[1] = {-axis, halves_[0][1], halves_[0][2]};
+  }
+
+  /// visit(name, direction, [m^2] of the sphere) of rays within an angle of a direction, by its cosine.
+  template <class Visit>
+  void eachWithin(const Vec3& direction, double cosine, const Visit& visit) const {
+    const double angle = std::acos(std::clamp(cosine, -1.0, 1.0));
+    for (int half = 0; half < 2; ++half) {
+      const auto& [axis, first, second] = halves_[half];
+      const double sine = std::hypot(direction.dot(first), direction.dot(second));
+      const double from_axis = std::atan2(sine, direction.dot(axis)), most = from_axis + angle;
+      if (from_axis - angle > 0.5 * M_PI) continue;
+      // Wrapping stretches across the radius: by angle over sine.
+      const double edge = 0.5 * M_PI * radius_, stretched = most < 2.0 ? most / std::sin(most) * angle : 2.0 * M_PI;
+      const double by = radius_ * stretched, out = sine > 0.0 ? radius_ * from_axis / sine : 0.0;
+      const double x = out * direction.dot(first), y = out * direction.dot(second);
+      const double height = std::sqrt(0.75) * apart_;
+      const int last = static_cast<int>(std::floor(std::min(y + by, edge) / height));
+      for (int j = static_cast<int>(std::ceil(std::max(y - by, -edge) / height)); j <= last; ++j) {
+        const double shift = 0.5 * (j & 1), v = height * j;
+        const int end = static_cast<int>(std::floor(std::min(x + by, edge) / apart_ - shift));
+        for (int i = static_cast<int>(std::ceil(std::max(x - by, -edge) / apart_ - shift)); i <= end; ++i) {
+          const double u = apart_ * (i + shift), r = std::hypot(u, v), theta = r / radius_;
+          if (theta > 0.5 * M_PI) continue;
+          const double shrunk = theta > 0.0 ? std::sin(theta) / theta : 1.0;
+          const Vec3 way = std::cos(theta) * axis + shrunk / radius_ * (u * first + v * second);
+          if (way.dot(direction) >= cosine) visit(nameOf(half, i, j), way, apart_ * height * shrunk);
+        }
+      }
+    }
+  }
+
+ private:
+  static std::array<Index, 2> nameOf(int half, int i, int j) {
+    constexpr int kMiddle = 1 << 29;
+    return {static_cast<Index>(j + kMiddle) + (half == 0 ? 0 : Index{1} << 31), static_cast<Index>(i + kMiddle)};
+  }
+
+  std::array<Vec3, 3> halves_[2];  // axis, and two across it
+  double radius_, apart_;
+};
+
+}  // namespace
+
+void findSphere(const PairSearch& search, const SphereTouch& touch, std::vector<FeaturePair>& pairs) {
   const SurfaceFrame& a = *search.a.frame;
   const ContactSurface& surface = *search.a.surface;
-  const double reach = radius + searchMargin(search.length);
-  const auto meet = [&](std::array<Index, 3> corners, Vec3 weights) {
-    // Only the corners that count, ascending: faces around a vertex find the same.
-    FeaturePair pair;
-    pair.kind = FeaturePair::Kind::kSphere;
-    pair.of_a = pair.of_b = 0;
-    pair.vertices.fill(kNoIndex);
-    for (int k = 0; k < 3; ++k) {
-      if (!(weights[k] > 0.0)) continue;
-      int at = pair.of_a++;
-      for (; at > 0 && pair.vertices[at - 1] > corners[k]; --at) {
-        pair.vertices[at] = pair.vertices[at - 1];
-        pair.shares[at] = pair.shares[at - 1];
-      }
-      pair.vertices[at] = corners[k];
-      pair.shares[at] = weights[k];
-    }
-    Vec3 point = Vec3::Zero(), velocity = Vec3::Zero();
-    for (int k = 0; k < pair.of_a; ++k) {
-      point += pair.shares[k] * a.vertices[pair.vertices[k]];
-      velocity += pair.shares[k] * a.velocities[pair.vertices[k]];
-    }
-    const double distance = (point - centre).norm();
-    if (distance > reach + (search.h * velocity - way).norm()) return;
-    pair.features = {pair.vertices[0], pair.vertices[1]};
-    pair.order = static_cast<std::uint8_t>(3 - pair.of_a);  // names ascend as vertices do
-    pair.normal = distance > 0.0 ? Vec3((point - centre) / distance) : Vec3(Vec3::UnitZ());
-    pair.gap = distance - radius;
-    double apart = 0.0;  // [m^2] mean square of the corners from the point
-    for (int k = 0; k < pair.of_a; ++k) apart += pair.shares[k] * (a.vertices[pair.vertices[k]] - point).squaredNorm();
-    if (apart < radius * radius) pair.chord = 0.5 * apart / radius * (1.0 - apart / (radius * radius));
-    pairs.push_back(pair);
+  const double radius = touch.radius;
+  // As it lies half way; what comes so fast that it jumps over tissue, as it starts.
+  const double half = 0.5 * std::min(touch.way.norm(), radius);
+  const Vec3 centre = touch.centre + half * touch.way.stableNormalized();
+  struct Near {
+    Index face;
+    double distance;
+    Vec3 to;  // from the centre to its nearest point
+    double approach;
   };
-  const FloatBox box = boxAround(centre, centre + way, reach);
+  static thread_local std::vector<Near> near;
+  near.clear();
+  const double margin = searchMargin(search.length);
+  const FloatBox box = boxAround(touch.centre, touch.centre + touch.way, radius + margin);
+  double swept = 0.0;
+  Box extent;
+  const Near* nearest = nullptr;
   surface.tree.query(a.faces, box, [&](Index face) {
     const Triangle& t = surface.triangles[face];
-    meet(t, nearestWeights(centre, a.vertices[t[0]], a.vertices[t[1]], a.vertices[t[2]]));
-    for (int k = 0; k < 3; ++k) meet({t[k], t[(k + 1) % 3], t[(k + 2) % 3]}, Vec3::UnitX());
+    const Vec3 w = nearestWeights(centre, a.vertices[t[0]], a.vertices[t[1]], a.vertices[t[2]]);
+    const Vec3 to = w[0] * a.vertices[t[0]] + w[1] * a.vertices[t[1]] + w[2] * a.vertices[t[2]] - centre;
+    const Vec3 velocity = w[0] * a.velocities[t[0]] + w[1] * a.velocities[t[1]] + w[2] * a.velocities[t[2]];
+    const double distance = to.norm();
+    const Vec3 by = touch.way - search.h * velocity;
+    const double approach = distance > 0.0 ? std::max(0.0, by.dot(to) / distance) : by.norm();
+    if (distance > radius + margin + approach + half) return;
+    near.push_back({face, distance, to, approach});
+    swept = std::max(swept, approach);
+    for (const Index v : t) extent.extend(a.vertices[v]);
   });
   if (surface.triangles.empty())
-    for (Index v = 0; v < a.vertices.size(); ++v) meet({v, kNoIndex, kNoIndex}, Vec3::UnitX());
-  std::sort(pairs.begin(), pairs.end(),
-            [](const FeaturePair& x, const FeaturePair& y) { return x.vertices < y.vertices; });
+    for (Index v = 0; v < a.vertices.size(); ++v) {
+      const Vec3 to = a.vertices[v] - centre;
+      const double distance = to.norm();
+      if (distance > radius + margin + (search.h * a.velocities[v] - touch.way).norm()) continue;
+      FeaturePair pair;
+      pair.kind = FeaturePair::Kind::kSphere;
+      pair.of_b = 0;
+      pair.features = {v, kNoIndex};
+      pair.vertices = {v, kNoIndex, kNoIndex, kNoIndex, kNoIndex};
+      pair.shares[0] = 1.0;
+      pair.normal = distance > 0.0 ? Vec3(to / distance) : Vec3(Vec3::UnitZ());
+      pair.gap = distance - radius;
+      pairs.push_back(pair);
+    }
+  if (near.empty()) return;
+  for (const Near& n : near)
+    if (!nearest || n.distance < nearest->distance) nearest = &n;
+  Vec3 axis = touch.force;
+  if (!(axis.norm() > 0.0)) axis = nearest->to;
+  if (!(axis.norm() > 0.0)) axis = -Vec3::UnitZ();
+  axis.normalize();
+  // Hertz: of the force of now, of what the sphere comes nearer in the frame, and of what it overlaps.
+  double contact = std::sqrt(radius * std::max(swept, radius - nearest->distance));
+  contact =
+      std::max(contact, touch.modulus > 0.0 ? std::cbrt(0.75 * touch.force.norm() * radius / touch.modulus) : radius);
+  contact = std::clamp(contact, std::min(radius, kLeastTouch * touch.spacing), radius);
+  const double seen = std::min(2.0 * M_PI, extent.diagonal() / std::max(nearest->distance, 1e-9 * radius));
+  const double apart =
+      std::max(std::min(contact / kAcross, (touch.modulus > 0.0 ? kWidest : kWidestHard) * touch.spacing),
+               radius * seen / kMostAcross);
+  const double over = 0.25 * contact * contact / radius;  // [m] that rows reach beyond what touches
+  const RayGrid grid(axis, radius, apart);
+  for (const Near& n : near) {
+    const double reach = radius + over + n.approach + half;
+    if (n.distance > reach) continue;
+    const Triangle& t = surface.triangles[n.face];
+    const Vec3 p = a.vertices[t[0]] - centre, q = a.vertices[t[1]] - centre, r = a.vertices[t[2]] - centre;
+    const double volume = p.dot(q.cross(r));
+    if (volume == 0.0) continue;
+    // No farther from its nearest point than its corners, and than it is in reach.
+    const Vec3 to = n.distance > 0.0 ? Vec3(n.to / n.distance) : axis;
+    const double corners = std::min({to.dot(p) / p.norm(), to.dot(q) / q.norm(), to.dot(r) / r.norm()});
+    grid.eachWithin(to, std::max(corners, n.distance / reach) - 1e-9,
+                    [&](const std::array<Index, 2>& name, const Vec3& way, double area) {
+                      Vec3 w(way.dot(q.cross(r)), way.dot(r.cross(p)), way.dot(p.cross(q)));
+                      w /= volume;  // barycentric over the distance along the ray
+                      const double sum = w.sum();
+                      if (!(sum > 0.0) || w.minCoeff() < -1e-9 * sum) return;
+                      const double distance = 1.0 / sum;
+                      if (distance > reach) return;
+                      FeaturePair pair;
+                      pair.kind = FeaturePair::Kind::kSphere;
+                      pair.of_a = 3;
+                      pair.of_b = 0;
+                      pair.features = name;
+                      pair.vertices = {t[0], t[1], t[2], kNoIndex, kNoIndex};
+                      w = w.cwiseMax(0.0);
+                      w /= w.sum();
+                      pair.shares = {w[0], w[1], w[2], 0.0, 0.0};
+                      pair.normal = way;
+                      pair.gap = distance - radius;
+                      pair.area = area;
+                      pairs.push_back(pair);
+                    });
+  }
+  // The first face that a ray meets.
+  std::sort(pairs.begin(), pairs.end(), [](const FeaturePair& x, const FeaturePair& y) {
+    return std::tie(x.features, x.gap, x.vertices) < std::tie(y.features, y.gap, y.vertices);
+  });
   pairs.erase(std::unique(pairs.begin(), pairs.end(),
-                          [](const FeaturePair& x, const FeaturePair& y) { return x.vertices == y.vertices; }),
+                          [](const FeaturePair& x, const FeaturePair& y) { return x.features == y.features; }),
               pairs.end());
 }
 

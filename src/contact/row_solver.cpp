@@ -138,7 +138,12 @@ class Solver {
     return canAnswer(answer, farthest);
   }
 
-  void activate(Active active, const Vec3& way, const SolverStep& step) {
+  /// [m] by which a row gives way beyond what particles show. worth: [1/s^2] force over impulse.
+  double givesWay(const SolverRows& rows, Index number, double worth) const {
+    return rows.fine ? rows.fine->of(number, rows.set->rows, worth) : 0.0;
+  }
+
+  void activate(Active active, const Vec3& way, const SolverStep& step, double gives) {
     ContactRow& row = *active.row;
     active.start = sum(active, true) + way;  // friction is about the motion relative to what moves
     if (!meet(active)) {
@@ -146,7 +151,10 @@ class Solver {
       return;
     }
     const double gap = row.normal.dot(active.start) + row.constant;
-    active.target = std::min(gap, 0.0);
+    active.target = std::min(gap + gives, 0.0);
+    active.worth = 1.0 / (step.h * step.h);
+    const FineAnswer* const fine = active.rows->fine;
+    active.given = fine ? active.worth * fine->entries[fine->offsets[active.number]].coefficient : 0.0;
     const double approach = gap - row.normal.dot(sum(active, false)) - row.constant;  // [m] in the substep
     if (row.restitution > 0.0 && approach > std::max(gap, step.h * step.slow))
       active.target = gap + row.restitution * approach;
@@ -155,10 +163,12 @@ class Solver {
 
   /// Takes a part of what overlaps away, at the start of the substep as at its end: that gives no speed. once: [s]
   /// since it was done last.
-  void letOut(Active active, const Vec3& way, double once) {
+  void letOut(Active active, const Vec3& way, double once, double gives) {
     const ContactRow& row = *active.row;
     active.start = sum(active, true);
-    const double edge = edgeOf(active), deep = -kSlop * edge - row.normal.dot(active.start + way) - row.constant;
+    const double edge = edgeOf(active);
+    const double slop = active.rows->fine ? 0.0 : kSlop * edge;
+    const double deep = -slop - row.normal.dot(active.start + way) - row.constant - gives;
     if (!(deep > 0.0) || !meet(active)) return;
     active.target = row.normal.dot(active.start) + row.constant + once * std::min(deep / kOutTime, kOutSpeed * edge);
     scratch_.active.push_back(active);
@@ -197,10 +207,13 @@ class Solver {
   double visit(const Active& active) {
     ContactRow& row = *active.row;
     const Vec3 now = sum(active, false) + moved(active);
-    const double gap = row.normal.dot(now) + row.constant, pressed = row.normal.dot(row.impulse);
+    const double gives = givesWay(*active.rows, active.number, active.worth);
+    const double gap = row.normal.dot(now) + row.constant + gives, pressed = row.normal.dot(row.impulse);
     // Nobody who is not dragged goes farther than an edge in a substep: more than that is not asked for at once.
     const double lacking = std::min(active.target - gap, edgeOf(active));
-    const double press = std::max(0.0, pressed + active.mass * lacking);
+    const bool more_given = active.given > 0.0 && gives < active.rows->fine->most;
+    const double mass = more_given ? 1.0 / (1.0 / active.mass + active.given) : active.mass;
+    const double press = std::max(0.0, pressed + mass * lacking);
     Vec3 impulse = Vec3::Zero();
     if (press > 0.0) {
       Vec3 slid = now - active.start;
@@ -439,12 +452,15 @@ inline void solve(const std::vector<SolverRows>& sets, std::vector<SpringRow>& s
                   std::vector<SolverBody>& bodies, const SolverStep& step, const std::vector<Index>& free,
                   SolverScratch& scratch, SolverCounters& counters) {
   Solver solver(bodies, scratch);
+  const double worth = step.warm / (step.h * step.h);  // force over last impulse
   const auto wayOf = [&step](const ContactRow& row) {
     return row.kind == FeaturePair::Kind::kSphere ? Vec3(step.sphere_to - step.sphere_from) : Vec3(Vec3::Zero());
   };
   const auto activeOf = [](const SolverRows& rows, ContactRow& row) {
     SolverScratch::Active active;
     active.row = &row;
+    active.rows = &rows;
+    active.number = static_cast<Index>(&row - rows.set->rows.data());
     active.entries = rows.set->entries.data();
     active.a = rows.a;
     active.b = rows.b == kNoIndex ? rows.a : rows.b;  // of which it has no entries
@@ -460,7 +476,8 @@ inline void solve(const std::vector<SolverRows>& sets, std::vector<SpringRow>& s
         row.constant = row.rise - row.normal.dot(step.sphere_to) - step.sphere_radius;
       }
       // Not of a body with itself: at the lips of a wound rows come and go, and each time it would press tissue anew.
-      if (step.number == 0 && rows.a != rows.b) solver.letOut(active, wayOf(row), step.frame);
+      if (step.number == 0 && rows.a != rows.b)
+        solver.letOut(active, wayOf(row), step.frame, solver.givesWay(rows, active.number, worth));
     }
   if (!scratch.active.empty()) {  // what is moved sideways takes angular momentum along
     for (const Index b : free) leak(bodies[b], -1.0);
@@ -468,10 +485,12 @@ inline void solve(const std::vector<SolverRows>& sets, std::vector<SpringRow>& s
     for (const Index b : free) leak(bodies[b], 1.0);
   }
   for (const SolverRows& rows : sets)
-    for (ContactRow& row : rows.set->rows)
-      if (const SolverScratch::Active active = activeOf(rows, row);
-          !row.impulse.isZero(0.0) || !(row.normal.dot(solver.sum(active, false)) + row.constant > 0.0))
-        solver.activate(active, wayOf(row), step);
+    for (ContactRow& row : rows.set->rows) {
+      const SolverScratch::Active active = activeOf(rows, row);
+      const double gives = solver.givesWay(rows, active.number, worth);
+      if (!row.impulse.isZero(0.0) || !(row.normal.dot(solver.sum(active, false)) + row.constant + gives > 0.0))
+        solver.activate(active, wayOf(row), step, gives);
+    }
   for (const SpringRow& spring : springs) solver.activate(spring);
   for (FibreRow& fibre : fibres) solver.activate(fibre, step);
   counters.fibres += fibres.size();

@@ -11,6 +11,7 @@ struct SurfaceModel {
   BodyModelPtr model;
   ContactSurface surface;
   std::vector<double> inverse_masses;         // [1/kg] 0 where fixed
+  std::vector<double> stiffness;              // stiffnessOfParticles()
   std::size_t bytes() const;                  // without the model
 };
 

@@ -203,6 +203,17 @@ void World::Impl::refreshSurface(WorldBody& body) {
   body.surface_current = true;
 }
 
+Points World::Impl::shownSurface(const WorldBody& body) const {
+  Points shown = body.state.surface;
+  if (!push.enabled || !body.model->elastic_batch) return shown;
+  for (Vec3& p : shown) {
+    const Vec3 way = p - push.position;
+    const double distance = way.norm();  // contact lets it in by a third of the radius
+    if (distance < push.radius && distance > 0.5 * push.radius) p = push.position + push.radius / distance * way;
+  }
+  return shown;
+}
+
 void World::Impl::needContactMesh(WorldBody& body) {
   if (body.mesh) return;
   auto mesh = std::make_shared<ContactMesh>();
@@ -323,7 +334,7 @@ WorldSnapshot World::snapshot(const SnapshotWants& wants) {
     b.material = body->material;
     b.model = body->model;
     if (wants.surfaces || wants.measures) w.refreshSurface(*body);
-    if (wants.surfaces) b.surface = body->state.surface;
+    if (wants.surfaces) b.surface = w.shownSurface(*body);
     if (wants.particles) b.particles = body->state.positions;
     if (wants.measures) b.measures = measureBody(*body->model, body->state);
     b.placed = body->state.placed;
@@ -378,7 +389,7 @@ Result<BodySnapshot> World::inspect(const std::string& name, bool rest) {
   b.name = body->name;
   b.material = body->material;
   b.model = body->model;
-  b.surface = body->state.surface;
+  b.surface = w.shownSurface(*body);
   b.particles = body->state.positions;
   b.measures = measureBody(*body->model, body->state);
   b.placed = body->state.placed;

@@ -256,6 +256,8 @@ struct World::Impl : KeptWorld {
   void retire(const BodyId& id);
   Result<SpawnReply> spawn(const PreparedBody& body);
   static void refreshSurface(WorldBody& body);
+  /// As it is shown: with what of the push sphere's dent cells are too coarse to carry.
+  Points shownSurface(const WorldBody& body) const;
   void needContactMesh(WorldBody& body);
   std::string knownBodies() const;
 

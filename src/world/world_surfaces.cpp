@@ -97,13 +97,14 @@ WorldObstacle::WorldObstacle(ObstacleDef of_def)
   thickness = 2.0 * std::abs(signedVolume(def->mesh)) / surfaceArea(def->mesh);
 }
 
-SurfaceModel::SurfaceModel(BodyModelPtr of_model) : model(std::move(of_model)), surface(surfaceOf(*model)) {
+SurfaceModel::SurfaceModel(BodyModelPtr of_model)
+    : model(std::move(of_model)), surface(surfaceOf(*model)), stiffness(stiffnessOfParticles(*model)) {
   for (std::size_t i = 0; i < model->masses.size(); ++i)
     inverse_masses.push_back(model->fixed[i] ? 0.0 : 1.0 / model->masses[i]);
 }
 
 std::size_t SurfaceModel::bytes() const {
-  return sizeof *this + surface.bytes() + bytesOf(inverse_masses);
+  return sizeof *this + surface.bytes() + bytesOf(inverse_masses, stiffness);
 }
 
 const SurfaceModel& World::Impl::surfaceModel(WorldBody& body) {
@@ -126,6 +127,8 @@ void World::Impl::fillCollider(WorldBody& body, double h_frame, Collider& collid
   // What is stepped by its cells bounces by itself: pressed on a contact, a vertex closes faster than any limit on what
   // is an impact, and would be thrown back for ever.
   collider.restitution = body.model->elastic_batch ? 0.0 : body.material.restitution;
+  if (body.model->elastic_batch)
+    collider.modulus = body.material.youngs_modulus / (1.0 - body.material.poissons_ratio * body.material.poissons_ratio);
   collider.edge_length = body.edge_length;
   collider.spacing = body.model->spacing;
   collider.positions = body.state.positions.data();
@@ -276,6 +279,7 @@ void World::Impl::findSurfaceContacts(double h, int parts_left) {
       const SurfaceModel& model = surfaceModel(*bodies[b]);
       colliders[b].surface = &model.surface;
       colliders[b].inverse_masses = model.inverse_masses.data();
+      colliders[b].stiffness = model.stiffness.empty() ? nullptr : model.stiffness.data();
     }
     surface_contacts.findMoved(scene, colliders);
     forNumbers(bodies.size(), [&](std::size_t b) {

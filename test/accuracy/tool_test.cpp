@@ -16,18 +16,18 @@ ToolResult pressed(const std::string& name, double finer) {
   return *result;
 }
 
-// Flat faces that may not cut the sphere hold the tissue under it 0.25 mm deeper: 28 % and 14 % more force.
-TEST(Tools, TissueLiesOnTheSphereAndNotUnderItsTangents) {
+// What cells are too coarse to show of the dent is in the force, and not in the surface.
+TEST(Tools, TheSpheresForceIsRightWhereItsDentIsShownToATenth) {
   for (const double finer : {1.0, 1.26}) {
     const ToolResult result = pressed("press_3_nu30", finer);
-    EXPECT_NEAR(result.tip, 1.0, 0.03) << finer;
-    EXPECT_NEAR(result.ratio, 1.0, 0.12) << finer;
+    EXPECT_NEAR(result.tip, 1.0, 0.12) << finer;
+    EXPECT_NEAR(result.ratio, 1.0, 0.05) << finer;
   }
 }
 
-// Wherever the sphere comes down and however fine the surface is, by the cells in the radius of the contact
-// (docs/accuracy.md#where-the-sphere-presses).
-TEST(Tools, TheForceOfTheSphereSpreadsByThePlaceAsFarAsThePageSays) {
+// Wherever the sphere comes down and however fine the surface is, with half a cell to one and a half in the radius of
+// the contact (docs/accuracy.md#where-the-sphere-presses).
+TEST(Tools, TheForceOfTheSphereDoesNotDependOnThePlace) {
   for (const char* name : {CALCULIX_FOLDER "/press_1_nu45", TRUTH_FOLDER "/block_press_3_nu45",
                            TRUTH_FOLDER "/cylinder_press_1_nu45", TRUTH_FOLDER "/cylinder_press_4_nu45"}) {
     const Result<TruthCase> truth = readTruthCase(std::string(name) + ".csv");
@@ -39,8 +39,7 @@ TEST(Tools, TheForceOfTheSphereSpreadsByThePlaceAsFarAsThePageSays) {
           const Result<ToolResult> result = press(*truth, {finer, 0.0, edge, beside});
           ASSERT_TRUE(result.ok()) << result.error().detail;
           const double cells = contact / result->spacing;
-          const double bound = cells >= 1.26 ? 0.1 : cells >= 0.95 ? 0.3 : cells >= 0.65 ? 0.55 : 1.5;
-          EXPECT_NEAR(result->ratio, 1.0, bound)
+          EXPECT_NEAR(result->ratio, 1.0, 0.15)
               << name << ", " << cells << " cells, edge " << edge << ", beside " << beside.transpose();
         }
   }

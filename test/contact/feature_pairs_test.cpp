@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <set>
 
+#include "meshless_surgery/base/random.h"
 #include "meshless_surgery/geometry/mesh/primitives.h"
 
 namespace meshless {
@@ -223,40 +224,100 @@ TEST(FeaturePairs, ASurfaceMeetsItselfWhereItsFlapsFaceEachOther) {
   }
 }
 
-TEST(FeaturePairs, ASphereMeetsEachFeatureOnce) {
-  const Placed block(boxMesh(Vec3(1, 1, 1), 2, 2, 2), Vec3::Zero());
-  PairSearch search = between(block, block);
-  std::vector<FeaturePair> pairs;
-  findSphere(search, Vec3(0.0, 0.0, 0.59), 0.1, Vec3::Zero(), pairs);
-  ASSERT_EQ(pairs.size(), 1u) << "the vertex below it, around which there are six faces";
-  EXPECT_NEAR(pairs[0].gap, -0.01, 1e-12);
-  EXPECT_NEAR((pairs[0].normal + Vec3::UnitZ()).norm(), 0.0, 1e-12);
+SphereTouch touchOf(const Vec3& centre, double radius, double spacing, double pressed) {
+  SphereTouch touch;
+  touch.centre = centre;
+  touch.radius = radius;
+  touch.spacing = spacing;
+  touch.modulus = 1e4;
+  // Hertz: as hard as makes a contact of that radius.
+  touch.force = -4.0 / 3.0 * touch.modulus / radius * pressed * pressed * pressed * Vec3::UnitZ();
+  return touch;
 }
 
-// What lies on a sphere with its corners does not lie in it, however coarse its faces are.
-TEST(FeaturePairs, FacesWhoseCornersLieOnASphereHaveTheirChordToGo) {
-  const double radius = 0.5, top = 0.5;
-  TriangleMesh mesh = boxMesh(Vec3(1, 1, 1), 10, 10, 10);
-  const Vec3 centre(0.02, 0.03, top + radius);
-  for (Vec3& v : mesh.vertices)
-    if (v.z() > top - 1e-9 && (v - centre).head<2>().norm() < 0.3)
-      v.z() = centre.z() - std::sqrt(radius * radius - (v - centre).head<2>().squaredNorm());
-  const Placed block(mesh, Vec3::Zero());
-  PairSearch search = between(block, block);
-  std::vector<FeaturePair> pairs;
-  findSphere(search, centre, radius, Vec3::Zero(), pairs);
-  int flat = 0;
-  for (const FeaturePair& pair : pairs) {
-    if (pair.of_a == 1 || !(pair.gap < -1e-4)) continue;
-    ++flat;
-    EXPECT_NEAR(pair.gap + pair.chord, 0.0, 0.1 * pair.chord);
+// Two in the radius of the contact, wherever it lies and however fine the faces are; they share its area out.
+TEST(FeaturePairs, ASphereMeetsEvenPointsOfWhatItTouches) {
+  Random random(7);
+  const double radius = 0.1, deep = 0.004, contact = std::sqrt(2.0 * radius * deep);
+  for (const int fineness : {1, 3, 12, 40}) {
+    const Placed block(boxMesh(Vec3(1, 1, 1), fineness, fineness, 2), Vec3::Zero());
+    const PairSearch search = between(block, block);
+    for (int k = 0; k < 20; ++k) {
+      const Vec3 below(random.between(-0.4, 0.4), random.between(-0.4, 0.4), 0.5);
+      std::vector<FeaturePair> pairs;
+      findSphere(search, touchOf(below + (radius - deep) * Vec3::UnitZ(), radius, 0.5, contact), pairs);
+      double area = 0.0;
+      Vec3 middle = Vec3::Zero();
+      int inside = 0;
+      std::set<std::array<Index, 2>> names;
+      for (const FeaturePair& pair : pairs) {
+        EXPECT_TRUE(names.insert(pair.features).second);
+        Vec3 at = Vec3::Zero();
+        for (int n = 0; n < pair.of_a; ++n) at += pair.shares[n] * block.frame.vertices[pair.vertices[n]];
+        EXPECT_NEAR(at.z(), 0.5, 1e-12);
+        EXPECT_NEAR(pair.gap, (at - below - (radius - deep) * Vec3::UnitZ()).norm() - radius, 1e-12);
+        if (pair.gap > 0.0) continue;
+        ++inside;
+        area += pair.area;
+        middle += pair.area * at;
+      }
+      EXPECT_GE(inside, 10);
+      EXPECT_LE(inside, 30);
+      EXPECT_LE(pairs.size(), 60u);
+      EXPECT_NEAR(area, M_PI * contact * contact, 0.35 * M_PI * contact * contact);
+      EXPECT_LT((middle / area - below).norm(), 0.02 * contact);
+    }
   }
-  EXPECT_GT(flat, 0);
-  // A sphere that is smaller than a face is stopped by it as it is.
+}
+
+// Ten spacings across: what carries a surface cannot tell more points from fewer.
+TEST(FeaturePairs, ALargeSphereMeetsPointsThatAreLittleNearerThanASpacing) {
+  const Placed block(boxMesh(Vec3(1, 1, 1), 10, 10, 10), Vec3::Zero());
+  std::vector<FeaturePair> pairs;
+  findSphere(between(block, block), touchOf(Vec3(0.0, 0.0, 1000.4999), 1000.0, 0.1, 0.7), pairs);
+  EXPECT_GT(pairs.size(), 150u);
+  EXPECT_LT(pairs.size(), 300u);
+}
+
+// From outside, from inside a hollow, and in a groove whose two walls it touches at once.
+TEST(FeaturePairs, ASphereMeetsWhatIsAroundIt) {
+  TriangleMesh hollow = boxMesh(Vec3(0.2, 0.2, 0.2), 4, 4, 4);
+  for (Triangle& t : hollow.triangles) std::swap(t[1], t[2]);
+  const Placed cave(hollow, Vec3::Zero());
+  std::vector<FeaturePair> pairs;
+  SphereTouch touch = touchOf(Vec3::Zero(), 0.101, 0.05, 0.01);
+  findSphere(between(cave, cave), touch, pairs);
+  std::array<int, 6> on{};
+  for (const FeaturePair& pair : pairs) {
+    Index axis = 0;
+    pair.normal.cwiseAbs().maxCoeff(&axis);
+    ++on[2 * axis + (pair.normal[axis] > 0.0)];
+  }
+  for (const int count : on) EXPECT_GT(count, 3);
+
+  TriangleMesh groove;
+  groove.vertices = {{-0.3, -0.3, 0.3}, {-0.3, 0.3, 0.3}, {0, -0.3, 0}, {0, 0.3, 0}, {0.3, -0.3, 0.3}, {0.3, 0.3, 0.3}};
+  groove.triangles = {{0, 2, 1}, {1, 2, 3}, {2, 4, 3}, {3, 4, 5}};
+  const Placed walls(groove, Vec3::Zero());
   pairs.clear();
-  findSphere(search, Vec3(0.45, 0.44, -0.02 - 0.5), 0.03, Vec3::Zero(), pairs);
-  for (const FeaturePair& pair : pairs) EXPECT_EQ(pair.chord, 0.0) << pair.gap;
-  EXPECT_FALSE(pairs.empty());
+  touch = touchOf(Vec3(0.002, 0.02, std::sqrt(0.5) * 0.19), 0.1, 0.05, 0.02);
+  touch.force = Vec3(0.0, 0.0, -1.0);  // of both
+  findSphere(between(walls, walls), touch, pairs);
+  std::array<int, 2> walls_met{};
+  for (const FeaturePair& pair : pairs) ++walls_met[pair.normal.x() > 0.0];
+  EXPECT_GT(walls_met[0], 3);
+  EXPECT_GT(walls_met[1], 3);
+}
+
+// What has no faces is met at its points.
+TEST(FeaturePairs, ASphereMeetsPointsOfACloud) {
+  TriangleMesh cloud;
+  cloud.vertices = {{0, 0, 0}, {0.01, 0, 0}, {1, 0, 0}};
+  const Placed points(cloud, Vec3::Zero());
+  std::vector<FeaturePair> pairs;
+  findSphere(between(points, points), touchOf(Vec3(0, 0, 0.09), 0.1, 0.05, 0.01), pairs);
+  ASSERT_EQ(pairs.size(), 2u);
+  EXPECT_NEAR(pairs[0].gap, -0.01, 1e-12);
 }
 
 }  // namespace feature_pairs_test

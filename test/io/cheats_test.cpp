@@ -365,7 +365,7 @@ Cheats cheatsOf(const std::string& name) {
                push.position = Vec3(0.015, 0.010, 0.075);
                task.apply<Done>(push);
                task.seconds(0.5);
-               push.position.z() = 0.066;
+               push.position.z() = 0.065;
                push.speed = 0.02;
                task.apply<Done>(push);
                task.seconds(2.0);
@@ -382,7 +382,7 @@ Cheats cheatsOf(const std::string& name) {
             {"pressed everywhere by one huge sphere", [](ShippedTask& task) {
                PushCommand push;
                push.radius = 0.05;
-               push.position = Vec3(0.015, 0.010, 0.066);
+               push.position = Vec3(0.015, 0.010, 0.065);
                task.apply<Done>(push);
                task.seconds(1.0);
                push.enable = false;

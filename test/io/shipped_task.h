@@ -109,7 +109,7 @@ inline void playPalpate(ShippedTask& task) {
   push.position = Vec3(0.015, 0.010, 0.075);
   task.apply<Done>(push);
   task.seconds(0.5);
-  push.position.z() = 0.066;
+  push.position.z() = 0.065;
   push.speed = 0.02;
   task.apply<Done>(push);
   task.seconds(2.0);

@@ -42,7 +42,7 @@ class TrainingTest(unittest.TestCase):
         """Presses above the lump and marks the place, as config/tasks/palpate.yaml wants it."""
         node.good('push', enable=True, radius=0.01, pose=pose_stamped(0.015, 0.010, 0.075))
         node.good('step', steps=60)
-        node.good('push', enable=True, radius=0.01, speed=0.02, pose=pose_stamped(0.015, 0.010, 0.066))
+        node.good('push', enable=True, radius=0.01, speed=0.02, pose=pose_stamped(0.015, 0.010, 0.065))
         node.good('step', steps=240)
         node.good('push', enable=False)
         node.good('pick', point=Point(0.015, 0.010, 0.1), direction=Vector3(0, 0, -1))

@@ -10,7 +10,7 @@ using test::replyOf;
 
 constexpr double kTop = 0.05;  // [m] of the pad
 
-World pad() {
+World pad(double friction) {
   WorldSettings settings;
   settings.sleep = false;
   World world(settings);
@@ -20,6 +20,7 @@ World pad() {
   def.material.youngs_modulus = 5000.0;
   def.material.poissons_ratio = 0.4;
   def.material.damping = 10.0;
+  def.material.friction = friction;
   def.fixed.push_back(Box{Vec3(-1, -1, -1), Vec3(1, 1, 0.004)});
   EXPECT_TRUE(world.addSceneBody(test::shared(def)).ok());
   return world;
@@ -58,13 +59,19 @@ Pressed pressed(World& world) {
 
 struct Press {
   double radius, depth;  // [m]
+  double friction, bound;
 };
 
-// To 15 mm, to the centre, beyond it, and a large one.
-const Press kPresses[] = {{0.02, 0.015}, {0.02, 0.02}, {0.01, 0.018}, {0.05, 0.03}};
+// To 15 mm, to the centre, beyond it, and a large one. Where it is slippery, there is one rest; where tissue sticks, it
+// sticks as it came, and that is a sixth of the force.
+const Press kPresses[] = {{0.02, 0.015, 0.0, 0.02},
+                          {0.02, 0.02, 0.0, 0.02},
+                          {0.01, 0.018, 0.0, 0.02},
+                          {0.05, 0.03, 0.0, 0.02},
+                          {0.02, 0.02, 0.5, 0.1}};
 
 Pressed slowly(const Press& press) {
-  World world = pad();
+  World world = pad(press.friction);
   replyOf<Done>(world.apply(at(press.radius, -0.001)));
   replyOf<Done>(world.apply(at(press.radius, press.depth, 0.03)));
   run(world, (press.depth + 0.001) / 0.03 + 1.0);
@@ -76,7 +83,7 @@ void expectAsSlowly(World& world, const Press& press, const Pressed& slow, const
   std::printf("%-10s r %.0f mm, %.0f mm deep: %.3f N for %.3f, %.2f mm inside for %.2f\n", how.c_str(),
               1e3 * press.radius, 1e3 * press.depth, now.force, slow.force, 1e3 * now.inside, 1e3 * slow.inside);
   EXPECT_EQ(world.push().position, at(press.radius, press.depth).position) << how;
-  EXPECT_NEAR(now.force, slow.force, 0.05 * slow.force) << how << ' ' << press.radius << ' ' << press.depth;
+  EXPECT_NEAR(now.force, slow.force, press.bound * slow.force) << how << ' ' << press.radius << ' ' << press.depth;
   EXPECT_LT(now.inside, slow.inside + 0.001) << how << ' ' << press.radius << ' ' << press.depth;
 }
 
@@ -86,7 +93,7 @@ TEST(PushSphere, EndsWithinASecondAsAfterASlowApproach) {
     ASSERT_GT(slow.force, 0.1);
     const PushCommand there = at(press.radius, press.depth);
     {
-      World world = pad();
+      World world = pad(press.friction);
       run(world, 0.5);
       replyOf<Done>(world.apply(there));
       run(world, 0.8);
@@ -108,7 +115,7 @@ TEST(PushSphere, EndsWithinASecondAsAfterASlowApproach) {
       }
     }
     {
-      World world = pad();
+      World world = pad(press.friction);
       replyOf<Done>(world.apply(at(press.radius, -0.01)));
       run(world, 0.5);
       replyOf<Done>(world.apply(there));
@@ -116,7 +123,7 @@ TEST(PushSphere, EndsWithinASecondAsAfterASlowApproach) {
       expectAsSlowly(world, press, slow, "jumps");
     }
     {
-      World world = pad();
+      World world = pad(press.friction);
       PushCommand small = there;
       small.radius = 0.6 * press.radius;
       small.position.z() += 0.002;
@@ -127,7 +134,7 @@ TEST(PushSphere, EndsWithinASecondAsAfterASlowApproach) {
       expectAsSlowly(world, press, slow, "grows");
     }
     {
-      World world = pad();  // a script that goes deeper bit by bit, each placed
+      World world = pad(press.friction);  // a script that goes deeper bit by bit, each placed
       for (double depth = 0.0; depth < press.depth; depth += 0.0005) {
         replyOf<Done>(world.apply(at(press.radius, depth)));
         world.step();
@@ -140,7 +147,7 @@ TEST(PushSphere, EndsWithinASecondAsAfterASlowApproach) {
 }
 
 TEST(PushSphere, IsPlacedAtOnceWhereThereIsNoTissue) {
-  World world = pad();
+  World world = pad(0.5);
   replyOf<Done>(world.apply(at(0.02, 0.015)));
   EXPECT_GT(world.push().position.z(), kTop + 0.02 - 0.002) << "beside the tissue, on its way in";
   replyOf<Done>(world.apply(at(0.02, -0.001)));

@@ -3,10 +3,10 @@
 #include <cstdio>
 
 #include "meshless_surgery/body/deform.h"
-#include "meshless_surgery/geometry/query/inside.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
-#include "shapes/random_organ.h"
 #include "meshless_surgery/geometry/mesh/refine.h"
+#include "meshless_surgery/geometry/query/inside.h"
+#include "shapes/random_organ.h"
 #include "support/bodies.h"
 #include "support/random.h"
 
@@ -784,9 +784,10 @@ TEST_P(SlowedBodies, ComeToRestWhereEnoughSubstepsWouldBringThem) {
   for (const int most : {meets ? 8 : 4, meets ? 4 : 2}) {
     const double found = restingAt(GetParam(), most, factor);
     EXPECT_LT(factor, 0.5);
-    // In the stack, 15 % are 0.1 mm: how deep rows lie in each other, up to the slop, depends on the substeps.
-    EXPECT_NEAR(found, expected, (scene == "stacked" ? 0.15 : 0.02) * std::abs(expected))
-        << most << " substeps, factor " << factor;
+    // How deep rows lie in each other, up to the slop, depends on the substeps: 0.1 mm are 15 % in the stack, and 10 %
+    // of how deep the sphere is in what lies loose on the ground.
+    const double bound = scene == "stacked" ? 0.15 : scene == "pressed" ? 0.1 : 0.02;
+    EXPECT_NEAR(found, expected, bound * std::abs(expected)) << most << " substeps, factor " << factor;
   }
 }
 

@@ -135,6 +135,8 @@ void makeElastic(BodyModel& model);
 double heldShare(const BodyModel& model);
 /// 0..1: share of the volume that lies in each region.
 std::vector<double> regionShares(const BodyModel& model);
+/// Young's modulus around each particle of a lattice, over that of the body's material. Empty without regions.
+std::vector<double> stiffnessOfParticles(const BodyModel& model);
 /// One a vertex of the surface: 0, or the number of the region that it lies in, from 1 on. Empty without regions.
 std::vector<std::uint8_t> surfaceRegions(const BodyModel& model);
 

@@ -1,6 +1,8 @@
 // Rows: what a pair of features asks of the particles that carry them, linear for as long as the row is kept.
 #pragma once
 
+#include <algorithm>
+
 #include "meshless_surgery/contact/feature_pairs.h"
 
 namespace meshless {
@@ -34,6 +36,25 @@ struct RowSet {
   void clear() {
     rows.clear();
     entries.clear();
+  }
+};
+
+/// How rows of a set give way where particles are too far apart to show it: row n by the sum of coefficient [m/N] times
+/// what the row `particle` presses with, of entries offsets[n] .. offsets[n + 1] - 1, the first of them its own, and by
+/// no more than `most`. Without offsets: by nothing.
+struct FineAnswer {
+  std::vector<RowEntry> entries;
+  std::vector<Index> offsets;
+  double most = 0.0;  // [m]
+
+  /// [m] worth: [1/s^2] force over impulse.
+  double of(Index row, const std::vector<ContactRow>& rows, double worth) const {
+    double sum = 0.0;
+    for (Index k = offsets[row]; k < offsets[row + 1]; ++k) {
+      const ContactRow& by = rows[entries[k].particle];
+      sum += entries[k].coefficient * std::max(0.0, by.normal.dot(by.impulse));
+    }
+    return std::min(worth * sum, most);
   }
 };
 

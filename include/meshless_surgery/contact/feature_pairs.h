@@ -20,7 +20,7 @@ struct FeaturePair {
   std::array<double, 5> shares{};   // of the vertices; add up to 1 for a, to -1 for b
   Vec3 normal = Vec3::UnitZ();      // unit, from b to a
   double gap = 0.0;                 // [m] along it; negative: inside
-  double chord = 0.0;               // [m] of kSphere: how far the point lies in a sphere that goes through its corners
+  double area = 0.0;                // [m^2] of kSphere: of the sphere, that the point stands for
 };
 
 /// The side on which a vertex of a was of b: its normal says where out is once it is inside.
@@ -81,10 +81,18 @@ std::size_t findVertexFace(const PairSearch& search, SearchScratch& scratch);
 /// Vertices of a over the plane z = height.
 void findPlane(const PairSearch& search, double height, std::vector<FeaturePair>& pairs);
 
-/// Features of a next to a sphere that moves by `way` [m] in the frame; a vertex, edge or face comes once. Where the
-/// corners of a face lie on the sphere, the tissue between them does, and the flat face cuts it off: that is its chord.
-/// It is smaller for faces nearly as large as the sphere, and zero for larger ones: those stop it as they are.
-void findSphere(const PairSearch& search, const Vec3& centre, double radius, const Vec3& way,
-                std::vector<FeaturePair>& pairs);
+/// A sphere that is pushed into a surface.
+struct SphereTouch {
+  Vec3 centre = Vec3::Zero(), way = Vec3::Zero();  // [m] at the start of the frame, and in it
+  double radius = 0.0;                             // [m]
+  Vec3 force = Vec3::Zero();  // [N] on the surface, when it was found last: says where its middle is, and how wide
+  double modulus = 0.0;       // [Pa] E / (1 - nu^2) of what is behind the surface; 0: nobody knows
+  double spacing = 0.0;       // [m] of what carries the surface
+};
+
+/// Points of a's faces where rays from the centre of a sphere meet them first, even and dense about the middle of what
+/// it touches: two in the radius of a Hertz contact, no farther apart than 0.7 spacings. So the force does not
+/// depend on where the sphere lies on the faces, and their number does not depend on how fine these are.
+void findSphere(const PairSearch& search, const SphereTouch& touch, std::vector<FeaturePair>& pairs);
 
 }  // namespace meshless

@@ -43,6 +43,7 @@ struct SolverBody {
 struct SolverRows {
   RowSet* set = nullptr;
   Index a = 0, b = kNoIndex;
+  const FineAnswer* fine = nullptr;  // null: none
 };
 
 /// A spring from the mean of a patch to a point: a compliant row of three components.
@@ -103,13 +104,17 @@ struct SolverScratch {
   };
   struct Active {
     ContactRow* row;
+    const SolverRows* rows;
+    Index number;  // of the row in them
     const RowEntry* entries;
     Index a, b;  // bodies; the same where there is one
     Lever on_a, on_b;
     Vec3 start;                 // [m] sum of coefficient x at the start of the substep
     double target;              // [m] gap that is asked for at least
     double mass;                // [kg] impulse for a gap that is 1 m short
+    double given;               // [m/(kg m)] by which the row gives way to its own impulse
     double sideways;            // [kg] the same across the normal, for a slide of 1 m
+    double worth;               // [1/s^2] force over impulse
   };
   struct Pull {
     Mat3 answer = Mat3::Zero();  // [m/(kg m)] of the point to an impulse

@@ -31,6 +31,8 @@ struct Collider {
   Index particles = 0;
   double friction = 0.5;
   double restitution = 0.0;  // 0..1
+  double modulus = 0.0;      // [Pa] E / (1 - nu^2) of tissue that cells carry; 0: of what has none
+  const double* stiffness = nullptr;  // of each particle, times the modulus; null: 1 of all
   PairSearch::Self self = PairSearch::Self::kNo;
   bool obstacle = false;  // friction and position alone
   bool led = false;       // an obstacle that is moved from substep to substep by lead()
@@ -161,6 +163,7 @@ class SurfaceContacts {
   struct Pair : KeptPair {
     Index a = 0, b = kNoIndex;  // colliders of this frame
     bool stale = true, near = false;
+    FineAnswer fine;
     std::size_t queried = 0;  // points, when it was found last
   };
   using PairName = std::tuple<std::uint64_t, std::uint64_t, Kind>;
