@@ -3,11 +3,14 @@
 import glob
 import os
 import re
+import sys
 import unittest
 
 import include_direction_test
 
 CHECKOUT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+sys.path.append(os.path.join(CHECKOUT, 'bench'))
+import orders  # noqa: E402
 
 
 def read(path):
@@ -126,11 +129,24 @@ def unknownSymbols(page):
     return {bare(symbol) for symbol in used} - listed
 
 
+def order(errors):
+    slope, clean = orders.order(errors)
+    return round(slope, 9), clean
+
+
 class AccuracyTest(unittest.TestCase):
     def testTheSpreadOverPlacesIsThatOfTheFile(self):
         said, measured = spreads(read('docs/accuracy.md'))
         self.assertGreater(len(said), 8)
         self.assertEqual(measured, said)
+
+    def testTheOrdersOfConvergenceAreThoseOfTheFiles(self):
+        part = read('docs/accuracy.md').split('## Order of convergence\n')[1].split('\n## ')[0]
+        self.assertEqual(orders.table(), re.findall(r'^\| `.*', part, re.MULTILINE))
+
+    def testAnOrderIsCleanOnlyWhereErrorsFallAlongALine(self):
+        self.assertEqual((2.0, True), order({1.0: 0.04, 2.0: 0.16, 4.0: 0.64}))
+        self.assertEqual([False, False], [order(errors)[1] for errors in ({1.0: 0.05, 2.0: 0.04, 4.0: 0.64}, {1.0: 0.04, 2.0: 0.6, 4.0: 0.64})])
 
     def testWhatIsToBeQuotedBoundsEachRow(self):
         page = read('docs/accuracy.md')
