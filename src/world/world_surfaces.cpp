@@ -119,6 +119,15 @@ const SurfaceModel& World::Impl::surfaceModel(WorldBody& body) {
   return *body.surface_model;
 }
 
+// [Pa] E / (1 - nu^2) of what is held for long: pressure does not relax.
+static double planeModulus(const Material& material) {
+  double left = 1.0;
+  for (const Relaxation& branch : material.relaxation) left -= branch.share;
+  const double e = material.youngs_modulus, nu = material.poissons_ratio;
+  const double shear = left * e / (2.0 * (1.0 + nu)), bulk = e / (3.0 * (1.0 - 2.0 * nu));
+  return 4.0 * shear * (3.0 * bulk + shear) / (3.0 * bulk + 4.0 * shear);
+}
+
 void World::Impl::fillCollider(WorldBody& body, double h_frame, Collider& collider) {
   collider = Collider();
   collider.key = body.number;
@@ -127,8 +136,7 @@ void World::Impl::fillCollider(WorldBody& body, double h_frame, Collider& collid
   // What is stepped by its cells bounces by itself: pressed on a contact, a vertex closes faster than any limit on what
   // is an impact, and would be thrown back for ever.
   collider.restitution = body.model->elastic_batch ? 0.0 : body.material.restitution;
-  if (body.model->elastic_batch)
-    collider.modulus = body.material.youngs_modulus / (1.0 - body.material.poissons_ratio * body.material.poissons_ratio);
+  if (body.model->elastic_batch) collider.modulus = planeModulus(body.material);
   collider.edge_length = body.edge_length;
   collider.spacing = body.model->spacing;
   collider.positions = body.state.positions.data();

@@ -16,19 +16,25 @@ double hertz(double radius, double depth) {
   return 4.0 / 3.0 * kYoungs / (1.0 - kPoisson * kPoisson) * std::sqrt(radius * depth) * depth;
 }
 
+Material tissue(double youngs = kYoungs, double poisson = kPoisson) {
+  Material material;
+  material.youngs_modulus = youngs;
+  material.poissons_ratio = poisson;
+  material.density = 1000.0;
+  material.friction = 0.0;
+  material.damping = 80.0;
+  return material;
+}
+
 /// A block of 100 x 100 x 50 mm that stands on what holds it, in a world that is turned.
 struct Pad {
-  /// within: [Pa] of all of it, as a region of a body of `youngs`.
-  Pad(double spacing, double edge, const Quat& turn, double youngs = kYoungs, double within = 0.0)
+  /// within: [Pa] of all of it, as a region of a body of that material.
+  Pad(double spacing, double edge, const Quat& turn, const Material& material = tissue(), double within = 0.0)
       : turned(turn), world(settings()) {
     BodyDef def = test::defOf(boxMesh(Vec3(0.1, 0.1, 0.05), edge), "pad");
     def.pose.rotation = turn;
     def.spacing = spacing;
-    def.material.youngs_modulus = youngs;
-    def.material.poissons_ratio = kPoisson;
-    def.material.density = 1000.0;
-    def.material.friction = 0.0;
-    def.material.damping = 80.0;
+    def.material = material;
     if (within > 0.0) {
       TissueRegion all{Region::sphere(Vec3::Zero(), 1.0), def.material};
       all.material.youngs_modulus = within;
@@ -115,7 +121,7 @@ TEST(Indentation, IsSteadyWhileTheSphereSlides) {
 TEST(Indentation, IsThatOfTheRegionUnderIt) {
   double force[2];
   for (const int within : {0, 1}) {
-    Pad pad(0.0, 0.0125, Quat::Identity(), within ? 0.1 * kYoungs : kYoungs, within ? kYoungs : 0.0);
+    Pad pad(0.0, 0.0125, Quat::Identity(), tissue(within ? 0.1 * kYoungs : kYoungs), within ? kYoungs : 0.0);
     pad.lead(0.01, Vec3(0.002, 0.001, 0.0005), 0.0);
     pad.lead(0.01, Vec3(0.002, 0.001, -0.001), 0.01);
     pad.run(0.6);
@@ -124,11 +130,29 @@ TEST(Indentation, IsThatOfTheRegionUnderIt) {
   EXPECT_NEAR(force[1] / force[0], 1.0, 0.01);
 }
 
+// A press that is held relaxes as the tissue does, where its contact is narrower than a cell too.
+TEST(Indentation, RelaxesAsTheTissueDoes) {
+  const double left = 0.5, shear = left * kYoungs / (2.0 * (1.0 + kPoisson)),
+               bulk = kYoungs / (3.0 * (1.0 - 2.0 * kPoisson));
+  const double relaxed = 9.0 * bulk * shear / (3.0 * bulk + shear);
+  double force[2];
+  for (const int relaxes : {0, 1}) {
+    Material material = relaxes ? tissue() : tissue(relaxed, 0.5 * relaxed / shear - 1.0);
+    if (relaxes) material.relaxation = {{1.0 - left, 0.1}};
+    Pad pad(0.0, 0.0125, Quat::Identity(), material);
+    pad.lead(0.01, Vec3(0.002, 0.001, 0.0005), 0.0);
+    pad.lead(0.01, Vec3(0.002, 0.001, -0.001), 0.01);
+    pad.run(1.5);
+    force[relaxes] = pad.force().z();
+  }
+  EXPECT_NEAR(force[1] / force[0], 1.0, 0.02);
+}
+
 // Ten times stiffer tissue presses ten times harder, and a sphere that is led away is let go of.
 TEST(Indentation, IsThatOfTheMaterialAndEndsWithTheTouch) {
   double force[2];
   for (const int stiff : {0, 1}) {
-    Pad pad(0.0, 0.0125, Quat::Identity(), stiff ? 10.0 * kYoungs : kYoungs);
+    Pad pad(0.0, 0.0125, Quat::Identity(), tissue(stiff ? 10.0 * kYoungs : kYoungs));
     pad.lead(0.01, Vec3(0.002, 0.001, 0.0005), 0.0);
     pad.lead(0.01, Vec3(0.002, 0.001, -0.001), 0.01);
     pad.run(0.6);

@@ -31,7 +31,7 @@ struct Collider {
   Index particles = 0;
   double friction = 0.5;
   double restitution = 0.0;  // 0..1
-  double modulus = 0.0;      // [Pa] E / (1 - nu^2) of tissue that cells carry; 0: of what has none
+  double modulus = 0.0;      // [Pa] E / (1 - nu^2) of relaxed tissue that cells carry; 0: of what has none
   const double* stiffness = nullptr;  // of each particle, times the modulus; null: 1 of all
   PairSearch::Self self = PairSearch::Self::kNo;
   bool obstacle = false;  // friction and position alone
