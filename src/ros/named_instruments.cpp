@@ -23,13 +23,15 @@ geometry_msgs::Wrench toWrench(const Vec3& force, const Vec3& torque) {
 }  // namespace
 
 NamedInstruments::NamedInstruments(const ros::NodeHandle& private_handle, const NodeSettings& settings,
-                                   const Clock& clock, WorldRunner& runner, Frames& frames, Rejections& rejections)
+                                   const Clock& clock, WorldRunner& runner, Frames& frames, Rejections& rejections,
+                                   StreamedTools& tools)
     : handle_(private_handle),
       settings_(settings),
       clock_(clock),
       runner_(runner),
       frames_(frames),
-      rejections_(rejections) {}
+      rejections_(rejections),
+      tools_(tools) {}
 
 NamedInstruments::~NamedInstruments() {
   for (auto& [name, topics] : topics_) topics->close();
@@ -152,6 +154,7 @@ void NamedInstruments::onCommand(const std::string& name, Topics& topics, const 
                                           " and the command is '" + printable(word) + "'; accepted: " + fits});
   }
   if (topics.operating != Operating::kEnabled) topics.alive = false;
+  tools_.noteInstrument(name, topics.operating);
 }
 
 void NamedInstruments::publish(const WorldSnapshot& snapshot, const ros::Time& stamp,
@@ -160,7 +163,10 @@ void NamedInstruments::publish(const WorldSnapshot& snapshot, const ros::Time& s
     const bool there = std::any_of(snapshot.instruments.begin(), snapshot.instruments.end(), [&](const Instrument& i) {
       return i.def.name == at->first && i.def.hasJaws() == at->second->has_jaws;
     });
-    if (!there) at->second->close();
+    if (!there) {
+      at->second->close();
+      tools_.noteInstrument(at->first, std::nullopt);
+    }
     at = there ? std::next(at) : topics_.erase(at);
   }
   const bool fault = !runner_.status().fault.empty();

@@ -23,7 +23,7 @@ namespace meshless {
 class NamedInstruments {
  public:
   NamedInstruments(const ros::NodeHandle& private_handle, const NodeSettings& settings, const Clock& clock,
-                   WorldRunner& runner, Frames& frames, Rejections& rejections);
+                   WorldRunner& runner, Frames& frames, Rejections& rejections, StreamedTools& tools);
 
   ~NamedInstruments();
   /// To be called at the rate at which tools are published, by one thread.
@@ -60,6 +60,7 @@ class NamedInstruments {
   WorldRunner& runner_;
   Frames& frames_;
   Rejections& rejections_;
+  StreamedTools& tools_;
   std::map<std::string, std::shared_ptr<Topics>> topics_;  // of the publishing thread
 };
 

@@ -102,7 +102,7 @@ struct DeformerNode::Parts {
         frames(settings.world_frame, clock),
         loader(std::move(loader_in)),
         inputs(handle, settings, clock, runner, frames, *rejections),
-        named(handle, settings, clock, runner, frames, *rejections),
+        named(handle, settings, clock, runner, frames, *rejections, inputs.tools()),
         publishers(handle, settings, runner, inputs.tools(), &named, *rejections),
         forces(handle, settings, clock, inputs.tools()) {}
 
@@ -160,8 +160,11 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   for (const std::string& folder : settings->data_folders) {
     std::error_code missing;
     if (!fs::is_directory(folder, missing)) {
-      return Error{ErrorCode::kUnreadable,
-                   "parameter ~data_folders names '" + printable(folder) + "'; accepted: folders that exist"};
+      return Error{
+          ErrorCode::kUnreadable,
+          "parameter ~data_folders names '" + printable(folder) + "'; accepted: folders that exist" +
+              (folder[0] == '[' ? ", a list of them from a launch file, and one without brackets from a line of rosrun"
+                                : "")};
     }
     access.folders.push_back(realPath(folder));
   }

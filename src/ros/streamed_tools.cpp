@@ -67,13 +67,23 @@ Error StreamedTools::deaf(const Tool& tool) {
                                            "; accepted once its state_command was " + wayBack(tool.state)};
 }
 
+void StreamedTools::noteInstrument(const std::string& name, std::optional<Operating> state) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!state || *state == Operating::kEnabled)
+    deaf_instruments_.erase(name);
+  else
+    deaf_instruments_[name] = *state;
+}
+
 std::string StreamedTools::notEnabled() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   std::string text;
+  const auto tell = [&text](const std::string& who, Operating state) {
+    text += "; the " + who + " stays " + toString(state) + " until its state_command is " + wayBack(state);
+  };
   for (const Tool& tool : tools_)
-    if (tool.state != Operating::kEnabled)
-      text += "; the " + tool.name + " stays " + toString(tool.state) + " until its state_command is " +
-              wayBack(tool.state);
+    if (tool.state != Operating::kEnabled) tell(tool.name, tool.state);
+  for (const auto& [name, state] : deaf_instruments_) tell("instrument " + name, state);
   return text;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <functional>
 #include <mutex>
 
@@ -52,7 +53,9 @@ class StreamedTools {
     bool busy = false;  // it is on its way to where its stream wants it
   };
   Condition condition(ToolKind tool) const;
-  /// Which tools do not hear their streams: a part of a sentence that begins with "; ", empty where all do. A reset
+  /// Of an instrument of the scene, which has its own streams; nothing: it is gone.
+  void noteInstrument(const std::string& name, std::optional<Operating> state);
+  /// Which tools and instruments do not hear their streams: a part of a sentence that begins with "; ", empty where all do. A reset
   /// leaves it so.
   std::string notEnabled() const;
 
@@ -86,6 +89,7 @@ class StreamedTools {
 
   mutable std::mutex mutex_;  // of all below; the posted jobs take it too
   std::array<Tool, 3> tools_;
+  std::map<std::string, Operating> deaf_instruments_;
   double jaw_angle_ = 0.5;  // [rad]
   bool jaw_armed_ = false;
 };

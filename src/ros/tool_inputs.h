@@ -23,7 +23,7 @@ class ToolInputs {
   ToolInputs(const ros::NodeHandle& private_handle, const NodeSettings& settings, const Clock& clock,
              WorldRunner& runner, Frames& frames, Rejections& rejections);
 
-  const StreamedTools& tools() const { return tools_; }
+  StreamedTools& tools() { return tools_; }
 
  private:
   struct Message {

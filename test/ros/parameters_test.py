@@ -66,6 +66,7 @@ class RefusalTest(unittest.TestCase):
 
     def test_scenes(self):
         self.refused(['no_such_scene', 'accepted'], scene='no_such_scene')
+        self.refused(['~data_folders', "'[/tmp]'", 'one without brackets'], scene=BOXES, data_folders='[/tmp]')
         self.refused(['/no/such/file.yaml'], scene='/no/such/file.yaml')
         self.refused(['scene'], scene='')
         self.refused(['broken.yaml:2', 'step_rat', 'step_rate'], scene=os.path.join(SCENES, 'broken.yaml'))

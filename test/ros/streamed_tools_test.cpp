@@ -390,6 +390,12 @@ TEST(StreamedTools, APausedSphereStopsOnItsWay) {
 TEST(StreamedTools, WhichToolsDoNotHearIsSaid) {
   ToolBench bench(slowTools());
   EXPECT_EQ("", bench.tools.notEnabled());
+  bench.tools.noteInstrument("left", Operating::kPaused);
+  EXPECT_EQ("; the instrument left stays PAUSED until its state_command is resume", bench.tools.notEnabled());
+  bench.tools.noteInstrument("left", Operating::kEnabled);
+  bench.tools.noteInstrument("right", Operating::kDisabled);
+  bench.tools.noteInstrument("right", std::nullopt);
+  EXPECT_EQ("", bench.tools.notEnabled());
   ASSERT_TRUE(bench.tools.command(ToolKind::kPick, "pause").ok());
   ASSERT_TRUE(bench.tools.command(ToolKind::kScissors, "disable").ok());
   EXPECT_EQ(
