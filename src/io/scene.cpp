@@ -125,11 +125,15 @@ ClusterOptions readClusters(YamlSource& source, const YAML::Node& node) {
   return options;
 }
 
+bool isFrameName(const std::string& text) {
+  return !text.empty() && text.size() <= 200 && text != "/" &&
+         std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isgraph(c); });
+}
+
 std::vector<HeldRegion> readFixed(YamlSource& source, const YAML::Node& node) {
   const std::string accepted =
-      "{box: {min, max}}, {plane: {point, normal}} (what is below it) or {sphere: {centre, radius}}, and frame: world "
-      "or "
-      "body";
+      "{box: {min, max}}, {plane: {point, normal}} (what is below it) or {sphere: {centre, radius}}, frame: world or "
+      "body, and follows: a frame of tf";
   std::vector<HeldRegion> regions;
   if (!node.IsSequence() || node.size() > kMaxHeldRegions) {
     source.fail(node, "fixed is " + shown(node), "a list of up to 1000 of " + accepted);
@@ -140,6 +144,9 @@ std::vector<HeldRegion> readFixed(YamlSource& source, const YAML::Node& node) {
     const YAML::Node box = map.get("box"), plane = map.get("plane"), sphere = map.get("sphere");
     HeldRegion read;
     read.in_world = map.choice("frame", {"world", "body"}) != 1;
+    map.text("follows", read.follows);
+    if (map.has("follows") && !isFrameName(read.follows))
+      source.fail(map.get("follows"), "follows is " + shown(map.get("follows")), "the name of a frame of tf");
     map.finish();
     const int shapes = box.IsDefined() + plane.IsDefined() + sphere.IsDefined();
     if (shapes == 0) source.fail(entry, "an entry of fixed has no box, no plane and no sphere", accepted);

@@ -10,6 +10,7 @@
 #include <ros/this_node.h>
 
 #include "border_check.h"
+#include "clamp_follower.h"
 #include "clock_publisher.h"
 #include "convert.h"
 #include "force_publisher.h"
@@ -94,7 +95,7 @@ SessionSettings sessionSettings(const NodeSettings& settings, const std::string&
 struct DeformerNode::Parts {
   Parts(const ros::NodeHandle& handle, const NodeSettings& settings, std::unique_ptr<World> world, BodyLoader loader_in,
         std::unique_ptr<Session> session_in, std::unique_ptr<Rejections> rejections_in,
-        std::unique_ptr<ClockPublisher> clock_publisher_in)
+        std::unique_ptr<ClockPublisher> clock_publisher_in, std::vector<ClampFollower::Followed> followed)
       : rejections(std::move(rejections_in)),
         clock_publisher(std::move(clock_publisher_in)),
         session(std::move(session_in)),
@@ -103,6 +104,7 @@ struct DeformerNode::Parts {
         loader(std::move(loader_in)),
         inputs(handle, settings, clock, runner, frames, *rejections),
         named(handle, settings, clock, runner, frames, *rejections, inputs.tools()),
+        follower(handle, std::move(followed), runner, frames),
         publishers(handle, settings, runner, inputs.tools(), &named, *rejections),
         forces(handle, settings, clock, inputs.tools()) {}
 
@@ -110,6 +112,7 @@ struct DeformerNode::Parts {
     (void)runner.setPaused(true);  // the log ends with the last step
     session->endLog(runner);
     // First the world, so that whoever waits for it gets an answer; the services last, as a body may be being prepared.
+    follower.stop();
     runner.stop();
     if (training) training->stop();
     publishers.stop();
@@ -129,6 +132,7 @@ struct DeformerNode::Parts {
   BodyLoader loader;
   ToolInputs inputs;
   NamedInstruments named;
+  ClampFollower follower;
   Publishers publishers;
   ForcePublisher forces;
   std::unique_ptr<LiveTraining> training;
@@ -198,8 +202,11 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   const std::size_t bodies = scene->bodies.size();
   std::shared_ptr<const PreparedBody> first;  // of the copies that share its model
   double blades = kBlades;                    // that fit every body
+  std::vector<ClampFollower::Followed> followed;
   for (BodyDef& def : scene->bodies) {
     const std::string name = def.name;
+    for (std::uint32_t clamp = 0; clamp < def.fixed.size(); ++clamp)
+      if (!def.fixed[clamp].follows.empty()) followed.push_back({name, clamp, def.fixed[clamp].follows});
     std::shared_ptr<const PreparedBody> ready;
     if (first && def.copy && def.fixed.empty()) {  // boxes fix what is in them: each copy is then another body
       ready = std::make_shared<PreparedBody>(placedCopy(*first, name, def.pose));
@@ -252,9 +259,9 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   if (!log->empty()) ROS_INFO_STREAM("commands are logged to " << *log);
   if (task) world->noteTask({true, task_file, settings->trainee, {}});
 
-  auto parts = std::make_unique<Parts>(private_handle, *settings, std::move(world),
-                                       BodyLoader(access, scene_folder, std::move(scene->materials)),
-                                       std::move(session), std::move(rejections), std::move(clock_publisher));
+  auto parts = std::make_unique<Parts>(
+      private_handle, *settings, std::move(world), BodyLoader(access, scene_folder, std::move(scene->materials)),
+      std::move(session), std::move(rejections), std::move(clock_publisher), std::move(followed));
   parts->training = std::make_unique<LiveTraining>(private_handle, parts->runner, std::move(training_folders),
                                                    settings->world_frame, *parts->rejections, parts->inputs.tools());
   if (task) parts->training->begin(std::move(*task), settings->trainee);

@@ -7,7 +7,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kLogVersion = 12;  // of the hashes in it, too
+constexpr std::uint32_t kLogVersion = 13;  // of the hashes in it, too
 
 enum class RecordKind : std::uint8_t {
   kStart,
@@ -49,7 +49,7 @@ MESHLESS_ARCHIVE(RemoveCommand, body)
 MESHLESS_ARCHIVE(AttachInstrumentCommand, def)
 MESHLESS_ARCHIVE(DetachInstrumentCommand, name)
 MESHLESS_ARCHIVE(LeadInstrumentCommand, name, pose, jaw)
-MESHLESS_ARCHIVE(MoveClampCommand, body, clamp, shift, turn, time)
+MESHLESS_ARCHIVE(MoveClampCommand, body, clamp, shift, turn, time, streamed)
 MESHLESS_ARCHIVE(SetGravityCommand, gravity)
 MESHLESS_ARCHIVE(PlaceBodyCommand, body, pose)
 MESHLESS_ARCHIVE(ResetBodiesCommand, bodies)

@@ -243,6 +243,7 @@ double World::simTime() const { return static_cast<double>(impl_->step) / impl_-
 std::size_t World::bodyCount() const { return impl_->bodies.size(); }
 bool World::nameUsed(const std::string& name) const { return impl_->used_names.count(name) > 0; }
 const PushSphere& World::push() const { return impl_->push; }
+std::uint32_t World::run() const { return impl_->run; }
 const Scissors& World::scissors() const { return impl_->scissors; }
 double World::wallTime() const { return impl_->wall_time; }
 

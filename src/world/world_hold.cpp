@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kFarthest = 1e3;  // [m]
 constexpr double kUnit = 1e-6;     // by which a turn's norm may differ from 1
+constexpr double kStill = 1e-6;    // [m], and rad: a frame that moves by less stands still
 
 std::string heldText(const BodyModel& model) {
   std::string text;
@@ -33,10 +34,41 @@ Status check(const MoveClampCommand& command) {
   return Done{};
 }
 
+HeldMotion& motionOf(WorldBody& body, std::uint32_t clamp) {
+  std::vector<HeldMotion>& held = body.state.held;
+  for (std::size_t r = held.size(); r <= clamp; ++r) {
+    held.emplace_back();
+    held.back().middle = body.state.placed * body.model->held_middles[r];
+  }
+  return held[clamp];
+}
+
 }  // namespace
+
+// Where nothing is new nobody wakes.
+void World::Impl::followClamps(const MoveClampCommand& command) {
+  for (const auto& body : bodies) {
+    if (body->root != command.body || !body->model->isHeldBy(command.clamp)) continue;
+    HeldMotion& motion = motionOf(*body, command.clamp);
+    const Quat turn = command.turn.normalized();
+    const Pose target = {turn, turn * motion.middle + command.shift - motion.middle};
+    if ((target.translation - motion.target.translation).norm() < kStill &&
+        target.rotation.angularDistance(motion.target.rotation) < kStill)
+      continue;
+    motion.target = target;
+    const double way = (target.translation - motion.now.translation).norm();
+    const double angle = target.rotation.angularDistance(motion.now.rotation);
+    motion.left = std::max({command.time, 1.0 / settings.step_rate, way / kFollowSpeed, angle / kFollowTurn});
+    wake(*body);
+  }
+}
 
 Result<Reply> World::Impl::apply(const MoveClampCommand& command) {
   if (const Status status = check(command); !status) return status.error();
+  if (command.streamed) {
+    followClamps(command);
+    return Reply(MoveClampReply{});
+  }
   WorldBody* const body = find(command.body);
   if (!body) return Error{ErrorCode::kUnknownName, "there is no body '" + command.body + "'; " + knownBodies()};
   const BodyModel& model = *body->model;
@@ -47,17 +79,22 @@ Result<Reply> World::Impl::apply(const MoveClampCommand& command) {
                               : "entry " + std::to_string(command.clamp) + " of `fixed` holds nothing of '" +
                                     command.body + "'; accepted: " + held};
   }
-  std::vector<HeldMotion>& held = body->state.held;
-  for (std::size_t r = held.size(); r <= command.clamp; ++r) {
-    held.emplace_back();
-    held.back().middle = body->state.placed * model.held_middles[r];
-  }
-  HeldMotion& motion = held[command.clamp];
+  HeldMotion& motion = motionOf(*body, command.clamp);
   motion.target = {command.turn.normalized(), command.shift};
   motion.left = std::max(command.time, 1.0 / settings.step_rate);
   wake(*body);
   say(EventType::kClampMoved, body->name, 0, "what holds " + body->name + " moves");
   return Reply(MoveClampReply{motion.middle + command.shift});
+}
+
+Pose World::clampMotion(const std::string& root, std::uint32_t clamp) const {
+  for (const auto& body : impl_->bodies) {
+    if (body->root != root || clamp >= body->state.held.size()) continue;
+    const HeldMotion& motion = body->state.held[clamp];
+    const Quat& turn = motion.target.rotation;
+    return {turn, motion.middle + motion.target.translation - turn * motion.middle};
+  }
+  return {};
 }
 
 // Contact sees the way of what is led before the first substep of it.

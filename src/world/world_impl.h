@@ -281,6 +281,7 @@ struct World::Impl : KeptWorld {
   Result<Reply> apply(const DetachCommand& command);
   Result<Reply> apply(const ClipCommand& command);
   Result<Reply> apply(const MoveClampCommand& command);
+  void followClamps(const MoveClampCommand& command);
   Result<Reply> apply(const SetGravityCommand& command);
   Result<Reply> apply(const PlaceBodyCommand& command);
   Result<Reply> apply(const ResetBodiesCommand& command);

@@ -252,6 +252,8 @@ std::vector<Row> rows() {
        READ(s.region.height(Vec3(9, 9, 3.5))), "0.5"},
       {"fixed", "sphere: {centre: [1, 2, 3], radius: 0.5}", "box: {min: [0, 0, 0], max: [1, 1, 1]}",
        READ(s.region.height(Vec3(1, 2, 4))), "0.5"},
+      {"fixed", "follows: arm, box: {min: [0, 0, 0], max: [1, 1, 1]}", "box: {min: [0, 0, 0], max: [1, 1, 1]}",
+       READ(s.body.fixed[0].follows), "arm"},
       {"fixed", "frame: body, box: {min: [0, 0, 0], max: [1, 1, 1]}", "box: {min: [0, 0, 0], max: [1, 1, 1]}",
        READ(s.body.fixed.at(0).in_world), "0"},
       {"regions", "box: {min: [0, 0, 0], max: [1, 2, 3]}, material: {}",

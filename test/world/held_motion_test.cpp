@@ -113,6 +113,50 @@ TEST(HeldMotion, ItGoesEvenlyWakesAndSleepsAgain) {
   EXPECT_NEAR(endOf(world), from, 1e-9);
 }
 
+// As a robot's arm would carry it: turned about the world's origin, in all pieces that a cut leaves, without a word.
+TEST(HeldMotion, AStreamLeadsAllThatABodyHasBecome) {
+  World world = worldOf(bar());
+  CutCommand cut;
+  cut.blades.origin = Vec3(-1.0, 0.2, 0.4);
+  cut.blades.x_axis = Vec3::UnitX();
+  cut.blades.y_axis = Vec3::UnitZ();
+  ASSERT_TRUE(world.apply(cut).ok());
+  ASSERT_EQ(world.bodyCount(), 2u);
+  run(world, 1.0);
+  const auto held = [&world] {
+    Points places;
+    for (const BodySnapshot& body : world.snapshot({false, true, false}).bodies)
+      for (Index i = 0; i < body.particles.size(); ++i)
+        if (body.model->fixed[i] && body.model->holderOf(i) == 1) places.push_back(body.particles[i]);
+    return places;
+  };
+  const Points before = held();
+  ASSERT_GT(before.size(), 20u);
+  (void)world.takeEvents();
+  const Pose arm = {Quat(Eigen::AngleAxisd(0.1, Vec3(1, 2, 3).normalized())), Vec3(0.01, -0.02, 0.03)};
+  MoveClampCommand lead = moving(1, arm.translation, 0.03, arm.rotation);
+  lead.streamed = true;
+  test::replyOf<MoveClampReply>(world.apply(lead));
+  EXPECT_EQ(world.clampMotion("bar", 1).translation, Vec3(arm.translation));
+  EXPECT_LT(world.clampMotion("bar", 1).rotation.angularDistance(arm.rotation), 1e-9);
+  run(world, 1.0);
+  const Points after = held();
+  ASSERT_EQ(after.size(), before.size());
+  for (Index i = 0; i < before.size(); ++i) EXPECT_LT((after[i] - arm * before[i]).norm(), 1e-9);
+  for (const Event& event : world.takeEvents()) EXPECT_NE(event.type, EventType::kClampMoved);
+  // A frame that stands still wakes nobody, and one that jumps is not followed faster than a hand goes.
+  run(world, 8.0);
+  test::replyOf<MoveClampReply>(world.apply(lead));
+  for (const BodySnapshot& body : world.snapshot({}).bodies) EXPECT_TRUE(body.asleep);
+  lead.shift += Vec3(0.5, 0.0, 0.0);
+  test::replyOf<MoveClampReply>(world.apply(lead));
+  run(world, 0.25);
+  EXPECT_NEAR((held()[0] - after[0]).x(), 0.25 * kFollowSpeed, 0.01);
+  // Of what the scene does not have nothing is led.
+  lead.body = "nobody";
+  EXPECT_TRUE(world.apply(lead).ok());
+}
+
 TEST(HeldMotion, ItIsSavedReplayedAndUndoneToTheBit) {
   World world = worldOf(bar());
   std::string log;

@@ -14,6 +14,7 @@ namespace meshless {
 struct HeldRegion {
   Region region;
   bool in_world = true;  // else it is in the body's own frame, and goes where the body is placed
+  std::string follows;   // name of a frame of the caller's, as which what is held moves from then on; empty: none
 
   HeldRegion() = default;
   HeldRegion(const Box& box) : region(box) {}

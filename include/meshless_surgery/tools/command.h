@@ -125,7 +125,12 @@ struct MoveClampCommand {
   Vec3 shift = Vec3::Zero();     // [m] of the middle of what it holds
   Quat turn = Quat::Identity();  // unit, about that middle
   double time = 0.0;             // [s] 0..kMaxClampTime that it takes; less than a step is one
+  // By a stream: of all that a body of the scene has become, where there is any, shift and turn of the world about its
+  // origin, at up to kFollowSpeed, and no event tells of it.
+  bool streamed = false;
 };
+constexpr double kFollowSpeed = 1.0;  // [m/s]
+constexpr double kFollowTurn = 5.0;   // [rad/s]
 
 /// Until the next, or a reset.
 struct SetGravityCommand {

@@ -308,6 +308,9 @@ class World {
   double heldStiffness() const;
   const PushSphere& push() const;
   const Scissors& scissors() const;
+  std::uint32_t run() const;  // see WorldSnapshot
+  /// How an entry of `fixed` of a body of the scene is moved, about the world's origin.
+  Pose clampMotion(const std::string& root, std::uint32_t clamp) const;
 
  private:
   struct Impl;
