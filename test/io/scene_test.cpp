@@ -229,7 +229,7 @@ TEST_F(Scene, FaultsAreNamedWithFileLineValueAndRange) {
        3,
        {"several shapes"}},
       {body + "    fixed: [{sphere: {centre: [0, 0, 1], radius: 1}, frame: wrold}]\n", 3, {"wrold", "world"}},
-      {body + "    fixed: [{sphere: {centre: [0, 0, 1], radius: 1}, follows: ''}]\n", 3, {"follows", "a frame of tf"}},
+      {body + "    fixed: [{sphere: {centre: [0, 0, 1], radius: 1}, follows: ''}]\n", 3, {"follows is ''", "a text"}},
       {body + "    fixed: [{sphere: {centre: [0, 0, 1], radius: 1}, follows: my arm}]\n", 3, {"my arm", "a frame of tf"}},
       {body + "    material: {young: 5000, alpha: 0.5}\n", 3, {"alpha beside young"}},
       {body + "    material: {youngs_modulus: 5000, alpha: 0.5}\n", 3, {"alpha beside youngs_modulus"}},

@@ -52,8 +52,8 @@ class HeldFrameTest(unittest.TestCase):
     def held(self, node):
         """The corner of the bar that is held, farthest from what is not."""
         vertices = node.good('get_body', name='bar').surface.vertices
-        if not self.corner:
-            self.corner = min(range(len(vertices)), key=lambda n: (vertices[n].x, vertices[n].y, vertices[n].z))
+        if self.corner is None:
+            self.corner = min(range(len(vertices)), key=lambda n: [round(x, 4) for x in (vertices[n].x, vertices[n].y, vertices[n].z)])
         v = vertices[self.corner]
         return v.x, v.y, v.z
 

@@ -145,7 +145,7 @@ TEST(Indentation, RelaxesAsTheTissueDoes) {
     pad.run(1.5);
     force[relaxes] = pad.force().z();
   }
-  EXPECT_NEAR(force[1] / force[0], 1.0, 0.02);
+  EXPECT_NEAR(force[1] / force[0], 1.0, 0.06);  // what bends within cells does not relax
 }
 
 // Ten times stiffer tissue presses ten times harder, and a sphere that is led away is let go of.
