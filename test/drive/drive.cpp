@@ -21,6 +21,7 @@ namespace meshless {
 namespace {
 
 constexpr double kShortest = 5.0, kLongestAlone = 20.0;  // [s] alone
+constexpr double kRelaxes = 8.0;  // times of the slowest branch, for what relaxes: it creeps more slowly than that
 constexpr double kDecays = 20.0;  // so many times the energy of what damps least falls to 1/e until then
 constexpr int kLooksASecond = 12;
 
@@ -46,7 +47,9 @@ class Run {
 
   Status setUp(const DriveScene& scene) {
     for (const BodyDef& def : scene.def.bodies) {
-      alone_for_ = std::clamp(kDecays / def.material.damping, alone_for_, kLongestAlone);
+      double settles = std::min(kDecays / def.material.damping, kLongestAlone);
+      for (const Relaxation& branch : def.material.relaxation) settles = std::max(settles, kRelaxes * branch.time);
+      alone_for_ = std::max(alone_for_, settles);
       Result<PreparedBody> body = prepareBody(def);
       if (!body) return body.error();
       const auto added = world_.addSceneBody(std::make_shared<const PreparedBody>(std::move(*body)));

@@ -111,7 +111,7 @@ class GraspersTest(DeformerTestCase):
             left.move((0, 0, 0.3), DOWN)
             rospy.sleep(0.3)
             self.assertAlmostEqual(0.08, self.state_where(lambda s: True).instruments[0].pose.position.z, 9)
-            self.assertIn('the instrument left stays DISABLED until its state_command is enable', self.deformer.good('reset').message)
+            self.assertIn('the instrument left stays DISABLED until its state_command is enable', self.deformer.call('reset').message)
             commands.publish(StringStamped(string='enable'))
             states.wait(lambda m: m.state == 'ENABLED', states.count() - 1)
             left.move((0, 0, 0.3), DOWN)
