@@ -352,7 +352,7 @@ void hold(Substep& s) {
 void matchAndMove(const BodyModel& model, const Material& material, const Vec3& gravity, double h, BodyState& state,
                   StepScratch& scratch, MatchCounters& counters, const ForEach& for_each) {
   Substep substep{model, material, gravity, h, state, scratch, counters, for_each};
-  substep.factor = stiffnessFactor(model, state, h);
+  substep.factor = scratch.factor = stiffnessFactor(model, state, h);
   becomeStiffer(substep);
   damp(substep);
   stress(substep);

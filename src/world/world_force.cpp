@@ -139,7 +139,7 @@ void World::Impl::applyForces(const std::vector<WorldBody*>& some, double h) con
     if (found == forced.end()) continue;
     const BodyModel& model = *body->model;
     Points& positions = body->state.positions;
-    const double yields = model.isHeld() ? 1.0 : yieldsOf(*body), share = body->stiffness_factor * yields * yields;
+    const double yields = model.isHeld() ? 1.0 : yieldsOf(*body), share = body->scratch.factor * yields * yields;
     const bool whole = share < 1.0 && !model.isHeld();
     Vec3 shift = Vec3::Zero(), turn = Vec3::Zero(), centre = Vec3::Zero();
     if (whole) {

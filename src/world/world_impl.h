@@ -452,6 +452,8 @@ struct World::Impl : KeptWorld {
   int substepsOf(const std::vector<WorldBody*>& some, bool may_meet, double h, int parts);
   /// One of so many parts of a frame, h [s] each; parts_left: with it.
   void stepSurfaces(double h, int parts, int parts_left);
+  /// How bodies of an island answer contact in this substep: by how far what deforms is slowed in it.
+  void shareAnswers(Index island);
   void addWork(Index island, int substeps);
   void stepWork(SurfaceWork& work, double h, int parts, int parts_left, const ForEach& each);
   /// Who presses on whom: for who sleeps, and who is wound up.

@@ -376,6 +376,17 @@ double World::Impl::yieldsOf(const WorldBody& body) {
   return drawn ? 1.0 - body.state.stiffened * body.material.alpha : 1.0;
 }
 
+void World::Impl::shareAnswers(Index number) {
+  const SurfaceContacts::Island& island = surface_contacts.islands()[number];
+  for (const Index b : island.bodies) {
+    if (!surface_contacts.needed()[b]) continue;
+    const double yields = yieldsOf(*bodies[b]);
+    // Attached by stiff fibres, a light body that answers as a whole by more than that gains energy.
+    const double soft = island.joined ? yields : yields * yields;
+    surface_contacts.setRigidShare(b, 1.0 - bodies[b]->scratch.factor * soft);
+  }
+}
+
 // Islands know nothing of each other within a frame: each takes the substeps that it needs, small ones of the same
 // several at a time. Where one has most of the particles its bodies are shared out over threads, else the islands are.
 void World::Impl::stepSurfaces(double h_frame, int parts, int parts_left) {
@@ -388,14 +399,6 @@ void World::Impl::stepSurfaces(double h_frame, int parts, int parts_left) {
     const int substeps = substepsOf(some, !islands[n].rows.empty() || islands[n].joined, h_frame, parts);
     addWork(n, substeps);
     report.substeps = std::max(report.substeps, static_cast<std::size_t>(substeps * parts));
-    for (const Index b : islands[n].bodies) {
-      const WorldBody& body = *bodies[b];
-      if (!surface_contacts.needed()[b]) continue;
-      const double yields = yieldsOf(body);
-      // Attached by stiff fibres, a light body that answers as a whole by more than that gains energy.
-      const double soft = islands[n].joined ? yields : yields * yields;
-      surface_contacts.setRigidShare(b, 1.0 - body.stiffness_factor * soft);
-    }
   }
   std::size_t largest = 0, total = 0;
   for (std::size_t n = 0; n < work_count; ++n) {
@@ -543,6 +546,7 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
     for (std::size_t b = member.begin; b < member.end; ++b) {
       WorldBody& body = *work.bodies[b];
       body.state.substep = h;
+      body.scratch.factor = 1.0;
       body.scratch.load = 0.0;
       body.scratch.load_at.setZero();
       if (body.batch != kNoIndex && fitsFloat(body, h))
@@ -589,6 +593,7 @@ void World::Impl::stepWork(SurfaceWork& work, double h_frame, int parts, int par
     step.sphere_to = push.position + (substep + 1) * way / substeps;
     for (std::size_t n = 0; n < work.member_count; ++n) {
       SurfaceWork::Member& member = work.members[n];
+      shareAnswers(member.island);
       // What gravity and forces give within a frame is no approach.
       const double given = surface_scene.gravity + forcedAcceleration(work.bodies, member.begin, member.end);
       step.slow = 2.0 * given * h_frame;

@@ -222,6 +222,38 @@ TEST(RowSolver, AGapThatAlmostAllHeldParticlesLackThrowsNobody) {
   }
 }
 
+// Tissue that hangs on held particles but for a rounding: who sleeps there would be woken by who does not, for ever.
+TEST(SurfaceContacts, WhoIsHeldIsNotWokenThere) {
+  for (const double share : {1e-12, 0.5}) {
+    Clash clash(0.0, 0.5);
+    const Index count = static_cast<Index>(clash.mesh.vertices.size());
+    VertexSupports supports = ownSupports(count);
+    for (Index v = count; v-- > 0;) {
+      supports.weights[v] = 1.0 - share;
+      supports.particles.insert(supports.particles.begin() + v + 1, count);
+      supports.weights.insert(supports.weights.begin() + v + 1, share);
+    }
+    for (Index v = 0; v <= count; ++v) supports.offsets[v] = 2 * v;
+    const ContactSurface surface(clash.mesh, supports);
+    for (int n = 0; n < 2; ++n) {
+      clash.inverse[n].assign(count, 0.0);
+      clash.inverse[n].push_back(1.0);
+      for (Points* points : {&clash.before[n], &clash.after[n], &clash.velocities[n]})
+        points->push_back(points->front());
+      Collider& c = clash.colliders[static_cast<std::size_t>(n)];
+      c.surface = &surface;
+      c.inverse_masses = clash.inverse[n].data();
+      c.vertices = clash.before[n].data();
+      c.velocities = clash.velocities[n].data();
+      c.particles = count + 1;
+    }
+    clash.colliders[0].moves = false;
+    SurfaceContacts contacts;
+    clash.find(contacts);
+    EXPECT_EQ(contacts.reached().empty(), share < 0.1);
+  }
+}
+
 // One overlap fades at no speed; where two push against each other nobody goes beyond either, and no impulse builds up
 // that would throw who is between them once they part.
 TEST(RowSolver, OverlapsFadeWithoutSpeedAndBuildNothingUp) {

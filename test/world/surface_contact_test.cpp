@@ -791,6 +791,41 @@ TEST_P(SlowedBodies, ComeToRestWhereEnoughSubstepsWouldBringThem) {
   }
 }
 
+// How far a soft body is slowed goes with how it is stretched, and so swings with it: contact has to follow within the
+// frame, else it feeds the swing.
+TEST(SurfaceContact, NothingFeedsTheSwingOfASlowedBody) {
+  for (const double youngs_modulus : {1200.0, 1500.0, 2000.0}) {
+    WorldSettings settings = surface();
+    settings.sleep = false;
+    World world(settings);
+    add(world, block("slab", Vec3(0, 0, 0.0405), Vec3(0.2, 0.2, 0.08)));
+    BodyDef ball = test::defOf(sphereMesh(0.025, 0.005), "ball");
+    ball.pose.translation = Vec3(0.03, 0.02, 0.109);
+    ball.material = block("", Vec3::Zero()).material;
+    ball.material.youngs_modulus = youngs_modulus;
+    ball.material.poissons_ratio = 0.45;
+    ball.material.damping = 0.5;
+    ball.material.friction = 0.7;
+    add(world, ball);
+    const auto fastest = [&] {  // [m/s] root mean square
+      double most = 0.0, slowed = 1.0;
+      for (int n = 0; n < 120; ++n) {
+        world.step();
+        const BodySnapshot now = seen(world).bodies[1];
+        most = std::max(most, std::sqrt(2.0 * now.measures.kinetic_energy / now.model->mass));
+        slowed = std::min(slowed, now.stiffness_factor);
+      }
+      EXPECT_LT(slowed, 0.95);
+      return most;
+    };
+    run(world, 2.0);
+    const double early = fastest();
+    run(world, 8.0);
+    const double late = fastest();
+    EXPECT_LT(late, 1.5 * std::exp(-0.5 * ball.material.damping * 9.0) * early) << youngs_modulus << " Pa: " << early;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Scenes, SlowedBodies, ::testing::Values("stacked", "held", "hung", "pressed", "pressed_held"),
                          [](const auto& info) { return std::string(info.param); });
 

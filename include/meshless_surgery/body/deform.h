@@ -25,6 +25,7 @@ struct StepScratch {
   /// written. Until then rotations stay in `elastic`.
   bool last = true;
   bool under_way = false;
+  double factor = 1.0;          // stiffnessFactor() of the substep
   double load = 0.0;            // [N] that presses a body which lies on what does not move
   Vec3 load_at = Vec3::Zero();  // [m] the middle of it
 };
@@ -38,7 +39,9 @@ struct StepScratch {
 /// Where h is more than longestSubstep, what deforms is slowed: it has 1 / stiffnessFactor of the inertia, and all that
 /// acts on a body moves it as a whole as ever. So every step is stable, and equilibria are the material's (Olovsson et
 /// al. 2005, "Selective mass scaling for explicit finite element analyses"). What else acts on particles has to do
-/// likewise: it moves them by stiffnessFactor of what their masses say, and a body that is free as a whole by the rest.
+/// likewise: it moves them by scratch.factor of what their masses say, and a body that is free as a whole by the rest.
+/// Another factor than the one of the substep would change where it rests with how it is stretched, and that feeds a
+/// swing.
 /// for_each: spreads cells and particles over threads; what comes out does not depend on it.
 void matchAndMove(const BodyModel& model, const Material& material, const Vec3& gravity, double h, BodyState& state,
                   StepScratch& scratch, MatchCounters& counters, const ForEach& for_each = nullptr);
