@@ -14,8 +14,9 @@ import numpy
 import rospy
 from meshless_surgery.testing import RunningScene
 
-THICKNESS, WIDTH, FREE, ROOT, CUBE = 0.006, 0.0302, 0.06, 0.05, 0.06  # [m]
-YOUNG, DENSITY, GRAVITY = 1e4, 1000.0, 0.02                           # [Pa], [kg/m^3], [m/s^2]
+THICKNESS, WIDTH = 0.006, 0.0302  # [m]
+YOUNG, DENSITY = 1e4, 1000.0      # [Pa], [kg/m^3]
+SINKS = 0.018                     # of its length: so far a beam would
 SCENE = """world: {ground: none, gravity: [0, 0, 0], contact: none, sleep: false}
 bodies:
   - name: plate
@@ -54,28 +55,29 @@ def write(name, triangles):
         file.write(bytes(80) + numpy.uint32(len(data)).tobytes() + data.tobytes())
 
 
-def stiffness(folder, angle, spacing, beside):
+def stiffness(folder, angle, spacing, beside, cube, free):
     """Over that of a beam. The plate's middle is `beside` the cube's, by a part of the spacing."""
+    root = 5 / 6 * cube                               # from the cube's middle to where the plate is free
+    gravity = SINKS * YOUNG * THICKNESS ** 2 / (1.5 * DENSITY * free ** 3)
     along = numpy.array((numpy.cos(angle), 0.0, numpy.sin(angle)))
     across = numpy.array((-numpy.sin(angle), 0.0, numpy.cos(angle)))
     turn = numpy.stack((along, (0, 1, 0), across))
     shift = beside * spacing * across
-    plate = box((0.001, -WIDTH / 2, -THICKNESS / 2), (ROOT + FREE, WIDTH / 2, THICKNESS / 2), (36, 10, 2)) @ turn + shift
-    cube = box((-CUBE / 2,) * 3, (CUBE / 2,) * 3, (10, 10, 10))
-    write(os.path.join(folder, 'plate.stl'), numpy.concatenate((cube, plate)))
-    held = ROOT * along
+    plate = box((0.001, -WIDTH / 2, -THICKNESS / 2), (root + free, WIDTH / 2, THICKNESS / 2), (36, 10, 2)) @ turn + shift
+    block = box((-cube / 2,) * 3, (cube / 2,) * 3, (10, 10, 10))
+    write(os.path.join(folder, 'plate.stl'), numpy.concatenate((block, plate)))
+    held = root * along
     with open(os.path.join(folder, 'scene.yaml'), 'w') as file:
         file.write(SCENE % (spacing, YOUNG, DENSITY, held[0], held[2], along[0], along[2]))
     scene = RunningScene(os.path.join(folder, 'scene.yaml'), listens=False)
     try:
         surgeon = scene.surgeon
-        rest, now = (None, None)
 
         def places(at_rest):
             return numpy.array([(v.x, v.y, v.z) for v in surgeon.body('plate', at_rest).surface.vertices])
         rest = places(True)
-        end = rest @ along > ROOT + FREE - 1e-4
-        surgeon.set_gravity(tuple(-GRAVITY * across))
+        end = rest @ along > root + free - 1e-4
+        surgeon.set_gravity(tuple(-gravity * across))
         sunk, before = 0.0, -1.0
         for _ in range(30):                           # until it rests
             surgeon.live(2.0)
@@ -85,7 +87,7 @@ def stiffness(folder, angle, spacing, beside):
                 break
     finally:
         scene.close()
-    return 1.5 * DENSITY * GRAVITY * FREE ** 4 / (YOUNG * THICKNESS ** 2) / sunk
+    return SINKS * free / sunk
 
 
 def main():
@@ -93,13 +95,16 @@ def main():
     parser.add_argument('--angles', type=float, nargs='+', default=[0.0, 30.0, 45.0], help='[degrees]')
     parser.add_argument('--spacings', type=float, nargs='+', default=[0.5, 1.0, 1.5, 2.0], help='in thicknesses')
     parser.add_argument('--beside', type=float, nargs='+', default=[0.0, 0.25, 0.5], help='in spacings')
+    parser.add_argument('--cube', type=float, default=0.06, help='[m] its edge')
+    parser.add_argument('--free', type=float, default=0.06, help='[m] of the plate')
     options = parser.parse_args()
     rospy.init_node('slanted_layer')
     print('angle  spacing over thickness  times as stiff as a beam, by where the lattice lies', flush=True)
     with tempfile.TemporaryDirectory() as folder:
         for angle in options.angles:
             for spacing in options.spacings:
-                found = [stiffness(folder, numpy.radians(angle), spacing * THICKNESS, beside) for beside in options.beside]
+                found = [stiffness(folder, numpy.radians(angle), spacing * THICKNESS, beside, options.cube, options.free)
+                         for beside in options.beside]
                 print('%5.0f  %22.2f  %s' % (angle, spacing, '  '.join('%.2f' % value for value in found)), flush=True)
 
 
