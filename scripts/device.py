@@ -441,6 +441,9 @@ class Bridge:
 
 
 def main():
+    if {'-h', '--help'} & set(sys.argv[1:]):
+        print(__doc__)
+        return 0
     # Not rospy's handlers, which run in the midst of what holds a lock.
     rospy.init_node('device', disable_signals=True)
     asked = threading.Event()

@@ -39,8 +39,16 @@ def pose_stamped(position, orientation=(0.0, 0.0, 0.0, 1.0), frame=''):
     return pose
 
 
+def at_an_angle(**directions):
+    """Raises ValueError where two directions, given by their names, span no plane."""
+    (one, a), (other, b) = directions.items()
+    if not sum(c * c for c in cross(a, b)) > 1e-18 * sum(c * c for c in a) * sum(c * c for c in b):
+        raise ValueError('%s is %s and %s is %s; accepted: two directions at an angle' % (one, tuple(a), other, tuple(b)))
+
+
 def blades_pose(pivot, reach, normal, frame=''):
     """Pose of blades that pivot at a point, reach along `reach` and cut the plane of `normal`."""
+    at_an_angle(reach=reach, normal=normal)
     z = normalised(normal)
     y = normalised(cross(z, reach))
     return pose_stamped(pivot, quaternion_of_axes(cross(y, z), y, z), frame)
@@ -48,6 +56,7 @@ def blades_pose(pivot, reach, normal, frame=''):
 
 def blade_pose(start, along, out, frame=''):
     """Pose of a blade whose edge outside of the tissue runs from `start` along `along`; `out` points out of the tissue."""
+    at_an_angle(along=along, out=out)
     x = normalised(along)
     y = normalised(cross(cross(x, out), x))
     return pose_stamped(start, quaternion_of_axes(x, y, cross(x, y)), frame)

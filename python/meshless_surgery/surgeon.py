@@ -3,6 +3,7 @@ import contextlib
 import select
 import time
 
+import genpy
 import rospy
 from geometry_msgs.msg import Point, Quaternion, Vector3
 from sensor_msgs.msg import PointCloud2
@@ -47,6 +48,11 @@ class Surgeon:
         except (rospy.ServiceException, rospy.exceptions.TransportException) as error:
             del self._proxies[name]
             raise Unanswered('%s was sent once and not answered (%s); %s' % (name, error, self._now()))
+        except (genpy.MessageException, rospy.exceptions.ROSSerializationException, AttributeError, TypeError) as error:
+            # A value of another type than its field: nothing was sent. What rospy has made of the request stays with the
+            # connection, and would come before the next one.
+            del self._proxies[name]
+            raise ValueError('%s was not sent: %s' % (name, error)) from error
         if not reply.success:
             raise Refused(name, reply.message, getattr(reply, 'error_code', None))
         return reply

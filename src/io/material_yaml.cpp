@@ -286,8 +286,8 @@ Result<Material> changeMaterial(const Material& base, const std::string& yaml, I
       source.fail(node,
                   key + " is " + shown(node) + ", which " + (elastic ? "an elastic" : "an appearance") +
                       " material like '" + changed.name + "' does not use",
-                  elastic ? "youngs_modulus, poissons_ratio, damping and what both kinds have"
-                          : "alpha, beta, mode, damping and what both kinds have");
+                  elastic ? "youngs_modulus, poissons_ratio, stiffening, asymmetry, relaxation and what both kinds have"
+                          : "alpha, beta, mode and what both kinds have");
   if (source.fault) return *source.fault;
   return changed;
 }

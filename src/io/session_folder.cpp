@@ -66,7 +66,7 @@ Status writeAll(int descriptor, std::string_view bytes) {
   return Done{};
 }
 
-Status SessionFolder::checkName(const std::string& name) {
+Status SessionFolder::checkName(const std::string& name, const std::string& field) {
   const auto plain = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
            c == '-';
@@ -77,7 +77,7 @@ Status SessionFolder::checkName(const std::string& name) {
   std::string shown = name.substr(0, kLongestName);
   std::replace_if(
       shown.begin(), shown.end(), [&](char c) { return !plain(c) && c != '/' && c != ' '; }, '?');
-  return Error{ErrorCode::kInvalidArgument, "file is '" + shown + (name.size() > shown.size() ? "...'" : "'") +
+  return Error{ErrorCode::kInvalidArgument, field + " is '" + shown + (name.size() > shown.size() ? "...'" : "'") +
                                                 "; accepted: a name of 1 to " + std::to_string(kLongestName) +
                                                 " letters, digits and ._- that does not begin with a dot, no path"};
 }

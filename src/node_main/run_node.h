@@ -2,6 +2,8 @@
 #pragma once
 
 #include <csignal>
+#include <cstdio>
+#include <string>
 
 #include <malloc.h>
 #include <ros/ros.h>
@@ -13,6 +15,15 @@ namespace meshless {
 /// `Node` has start(private_handle). Returns the exit code.
 template <class Node>
 int runNode(int argc, char** argv, const char* name) {
+  // Before anything waits for a master.
+  for (int k = 1; k < argc; ++k)
+    if (const std::string option = argv[k]; option == "--help" || option == "-h") {
+      std::printf(
+          "Usage: %s [__name:=NAME] [_PARAMETER:=VALUE ...]\n\nNeeds a roscore. The parameters of the node '%s' are in "
+          "docs/reference/parameters.md.\n",
+          argv[0], name);
+      return 0;
+    }
   constexpr int kKeptPiece = 8 << 20;  // bytes
   constexpr int kThreads = 16;         // some of which may wait for a transform; see Frames
   // Memory that a cut has used is kept for the next one: fetching it anew costs more than the cut. Larger pieces are

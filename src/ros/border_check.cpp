@@ -24,8 +24,10 @@ void BorderCheck::fault(const std::string& sentence) {
 
 double BorderCheck::number(const std::string& field, double value, double min, double max, const std::string& unit) {
   if (!(value >= min && value <= max)) {
-    fault(field + " is " + numberText(value) + "; accepted: " + numberText(min) + ".." + numberText(max) +
-          (unit.empty() ? "" : " " + unit));
+    const std::string least = numberText(min), most = numberText(max);
+    std::string said = numberText(value);
+    if (said == least || said == most) said = numberText(value, 12);  // just outside
+    fault(field + " is " + said + "; accepted: " + least + ".." + most + (unit.empty() ? "" : " " + unit));
   }
   return value;
 }

@@ -124,8 +124,9 @@ Result<LoadedTask> loadTask(const std::string& task, const TrainingFolders& fold
     auto resolved = folders.access.resolve(task, fs::path(folders.scene_file).parent_path().string());
     if (!resolved.ok()) return resolved.error();
     file = *resolved;
-  } else if (const Status name = SessionFolder::checkName(task); !name.ok()) {
-    return name.error();
+  } else if (!SessionFolder::checkName(task).ok()) {
+    return Error{ErrorCode::kInvalidArgument,
+                 "task is '" + printable(task) + "'; accepted: a name of config/tasks, a path, or package://"};
   }
   return readTask(file, folders.scenes, folders.access, folders.scene_file);
 }
@@ -381,7 +382,7 @@ struct LiveTraining::Handlers : Answers {
 
   bool report(meshless_surgery::Report::Request& request, meshless_surgery::Report::Response& response) {
     if (!request.name.empty())
-      if (const Status valid = SessionFolder::checkName(request.name); !valid.ok())
+      if (const Status valid = SessionFolder::checkName(request.name, "name"); !valid.ok())
         return refuse(response, "report", valid.error());
     const auto written = reportNow(request.name);
     if (!written.ok()) return refuse(response, "report", written.error());

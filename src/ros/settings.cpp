@@ -201,7 +201,8 @@ Result<NodeSettings> readNodeSettings(const ros::NodeHandle& private_handle, std
     if (!name.ok()) reader.check.fault("parameter ~command_log: " + name.error().detail);
   }
   if (settings.trainee.size() > kMaxName || settings.trainee != printable(settings.trainee))
-    reader.check.fault("parameter ~trainee is '" + printable(settings.trainee) + "'; accepted: a name in one line");
+    reader.check.fault("parameter ~trainee is '" + printable(settings.trainee) + "'; accepted: up to " +
+                       std::to_string(kMaxName) + " bytes of UTF-8 in one line");
   if (settings.scene.empty()) {
     reader.check.fault("parameter ~scene is empty; accepted: a scene's name, a path or package://");
   }

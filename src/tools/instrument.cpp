@@ -174,8 +174,10 @@ Status InstrumentDef::validate() const {
     return Error{ErrorCode::kInvalidArgument, "jaw_length of instrument '" + name + "' is " + numberText(jaw_length) +
                                                   " m; accepted: of a hook, at least two shaft_radius"};
   if (!(pose.translation.norm() <= kFarthestHand) || !(std::abs(pose.rotation.norm() - 1.0) <= 1e-3))
-    return Error{ErrorCode::kInvalidArgument, "pose of instrument '" + name + "' is none; accepted: within " +
-                                                  numberText(kFarthestHand) + " m, a quaternion of length 1"};
+    return Error{ErrorCode::kInvalidArgument,
+                 "pose of instrument '" + name + "' is " + numberText(pose.translation.norm()) +
+                     " m from the origin, with a quaternion of length " + numberText(pose.rotation.norm()) +
+                     "; accepted: up to " + numberText(kFarthestHand) + " m, a length of 1"};
   if (remote_centre && !(remote_centre->norm() <= kFarthestHand))
     return Error{ErrorCode::kInvalidArgument, "remote_centre of instrument '" + name + "' is none; accepted: within " +
                                                   numberText(kFarthestHand) + " m"};

@@ -151,8 +151,10 @@ Result<Reply> World::Impl::apply(const LeadInstrumentCommand& command) {
   if (!instrument)
     return Error{ErrorCode::kUnknownName, "there is no instrument '" + command.name + "'; " + knownInstruments()};
   if (command.pose && !isHand(*command.pose))
-    return Error{ErrorCode::kInvalidArgument, "pose is none; accepted: within " + numberText(kFarthestHand) +
-                                                  " m of the origin, a quaternion of length 1"};
+    return Error{ErrorCode::kInvalidArgument, "pose is " + numberText(command.pose->translation.norm()) +
+                                                  " m from the origin, with a quaternion of length " +
+                                                  numberText(command.pose->rotation.norm()) + "; accepted: up to " +
+                                                  numberText(kFarthestHand) + " m, a length of 1"};
   if (command.jaw && !instrument->def.hasJaws())
     return Error{ErrorCode::kInvalidArgument,
                  "instrument '" + command.name + "' is a " + toString(instrument->def.type) + ", which has no jaws"};

@@ -73,6 +73,12 @@ TEST(BorderCheck, APlaceIsLookedAtInTheWorld) {
   EXPECT_EQ("in the world frame, target.y is -5.2e+06; accepted: -1e+06..1e+06 m", check.error().detail);
 }
 
+TEST(BorderCheck, WhatIsJustOutsideIsSaidInAllItsDigits) {
+  BorderCheck check;
+  check.number("scale", 1000001.0, 0.0, 1e6, "");
+  EXPECT_EQ("scale is 1000001; accepted: 0..1e+06", check.error().detail);
+}
+
 TEST(BorderCheck, NormalisesQuaternionsAndRefusesThoseWithoutADirection) {
   for (const double scale : {1e-5, 1.0, 1e5}) {
     BorderCheck check;

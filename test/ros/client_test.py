@@ -160,6 +160,23 @@ class SurgeonTest(unittest.TestCase):
             with self.assertRaises(ValueError):
                 self.surgeon.spawn(name='x', **given)
 
+    def test_a_value_that_fits_no_field_is_not_sent_and_the_next_request_is_as_ever(self):
+        for wrong in (lambda: self.surgeon.step(1.5), lambda: self.surgeon.set_material('left', {'density': 500}),
+                      lambda: self.surgeon.remove(7)):
+            with self.assertRaisesRegex(ValueError, 'was not sent'):
+                wrong()
+        self.surgeon.step(1)
+        self.surgeon.set_material('left', '{density: 500}')
+        with self.assertRaises(Refused):
+            self.surgeon.remove('7')
+
+    def test_blades_without_a_plane_are_not_sent(self):
+        for reach, normal in (((0, 1, 0), (0, 2, 0)), ((0, 0, 0), (1, 0, 0)), ((0, 1, 0), (0, 0, 0)), ((0, 1, 0), (math.nan, 0, 0))):
+            with self.assertRaisesRegex(ValueError, 'accepted: two directions at an angle'):
+                self.surgeon.cut(pivot=(-0.2, -1, 0.1), reach=reach, normal=normal)
+        with self.assertRaisesRegex(ValueError, 'along is .* and out is .*; accepted: two directions at an angle'):
+            self.surgeon.incise(start=(-0.2, 0, 0.2), along=(1, 0, 0), out=(-1, 0, 0), length=0.1, depth=0.1)
+
     def test_cuts_incisions_and_back(self):
         across = dict(pivot=(-0.2, -1, 0.1), reach=(0, 1, 0), normal=(1, 0, 0), bodies=['left'])
         pieces = self.surgeon.cut(**across).new_bodies

@@ -277,6 +277,9 @@ class EnvironmentTest(unittest.TestCase):
         said = []
         exec(compile(example, 'example', 'exec'), {'print': lambda *words: said.append(words), '__name__': 'example'})
         self.assertEqual(1, len(said))
+        printed = re.search(r'It prints `(.*?)`', page).group(1)
+        self.assertEqual(re.sub(r'[\d.]+', '', printed), re.sub(r'[\d.]+', '', said[0][0]))
+        self.assertIn('stage 2 of 2', said[0][0])
 
 
 if __name__ == '__main__':

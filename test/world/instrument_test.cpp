@@ -514,7 +514,8 @@ TEST(Instruments, WhatCannotBeIsRefusedAndNothingHasChanged) {
   refused(DetachInstrumentCommand{"right"}, "there is no instrument 'right'; instruments are: left");
   refused(LeadInstrumentCommand{"right", {}, {}}, "there is no instrument 'right'");
   refused(LeadInstrumentCommand{"left", {}, 0.5}, "which has no jaws");
-  refused(LeadInstrumentCommand{"left", Pose{Quat(0, 0, 0, 0), Vec3::Zero()}, {}}, "pose is none");
+  refused(LeadInstrumentCommand{"left", Pose{Quat(0, 0, 0, 0), Vec3::Zero()}, {}},
+          "pose is 0 m from the origin, with a quaternion of length 0");
 }
 
 }  // namespace instrument_test

@@ -17,8 +17,9 @@ class SessionFolder {
   const std::string& folder() const { return folder_; }
   Status make() const;
 
-  /// Why it is not a file's name; names are 1 to 100 letters, digits and ._- and do not begin with a dot.
-  static Status checkName(const std::string& name);
+  /// Why it is not a file's name, of what the message calls `field`; names are 1 to 100 letters, digits and ._- and do
+  /// not begin with a dot.
+  static Status checkName(const std::string& name, const std::string& field = "file");
 
   /// Written beside it, brought to the disk, and renamed: whoever reads finds the old file or the new one. On failure
   /// (kFailed: the disk refuses) the old one is still there, unless the detail says that the new one is.
