@@ -195,7 +195,7 @@ TEST(Instruments, JawsThatPullAStripSlipAtTwiceTheFrictionOfTheirGrip) {
     EXPECT_EQ(stateOf(world).holds, "block");
     double sum = 0.0, end = 0.0;
     int count = 0;
-    for (int k = 0; k < 60 && count < 15; ++k) {
+    for (int k = 0; k < 90 && count < 15; ++k) {
       lead(world, Vec3(-0.025 - kWay * (k + 1), 0, 0), 0.05, 0.0, turn);
       const WorldSnapshot shot = world.snapshot({true});
       const Instrument& now = shot.instruments[0];
