@@ -561,19 +561,19 @@ void SurfaceContacts::loadedSurfaces(std::vector<std::pair<Index, Index>>& pairs
 void SurfaceContacts::points(const std::vector<Collider>& colliders, std::vector<Point>& points) const {
   points.clear();
   for (const Pair* pair : pairs_) {
-    if (pair->kind == Kind::kSphere) continue;
-    // The force is that on the body, which may be the second of the two.
-    const double side = pair->b != kNoIndex && colliders[pair->a].obstacle ? -1.0 : 1.0;
+    const bool second = pair->b != kNoIndex && colliders[pair->a].obstacle;
+    const double side = second ? -1.0 : 1.0;
     for (const ContactRow& row : pair->set.rows) {
-      const double force = row.normal.dot(row.impulse);
-      if (!(force > 0.0)) continue;
+      if (!(row.normal.dot(row.impulse) > 0.0)) continue;
       Vec3 at = Vec3::Zero();
       double share = 0.0;
       for (Index k = row.begin; k < row.middle; ++k) {
         at += pair->set.entries[k].coefficient * colliders[pair->a].positions[pair->set.entries[k].particle];
         share += pair->set.entries[k].coefficient;
       }
-      if (share > 0.5) points.push_back({at, side * row.normal, force});
+      if (!(share > 0.5)) continue;
+      points.push_back({second ? pair->b : pair->a, second ? pair->a : pair->b, pair->kind == Kind::kSphere, at,
+                        side * row.normal, side * row.impulse});
     }
   }
 }

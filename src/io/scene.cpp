@@ -257,6 +257,7 @@ InstrumentDef readInstrument(YamlSource& source, const YAML::Node& node) {
   if (const YAML::Node pose = map.get("pose"); pose.IsDefined()) def.pose = readPose(source, pose);
   for (const InstrumentNumber& number : kInstrumentNumbers)
     map.number(number.key, {number.least, number.most, false, number.unit}, def.*number.value);
+  def.latch = map.choice("grasp", {"friction", "latch"}) == 1;
   if (map.has("remote_centre")) {
     def.remote_centre = Vec3::Zero();
     map.vector("remote_centre", lengths(), *def.remote_centre);

@@ -77,6 +77,8 @@ Publishers::Publishers(const ros::NodeHandle& private_handle, const NodeSettings
       "collision_surfaces", 2, [this](const ros::SingleSubscriberPublisher&) { collision_newcomer_ = true; });
   contacts_topic_ = handle.advertise<visualization_msgs::MarkerArray>(
       "contacts", 2, [this](const ros::SingleSubscriberPublisher&) { contacts_newcomer_ = true; });
+  contact_forces_topic_ = handle.advertise<meshless_surgery::ContactForces>(
+      "contact_forces", 5, [this](const ros::SingleSubscriberPublisher&) { contact_forces_newcomer_ = true; });
   topology_topic_ = handle.advertise<meshless_surgery::Topology>("topology", 2, true);
   images_topic_ = handle.advertise<meshless_surgery::TissueImages>("images", 1, true);
   vertices_topic_ = handle.advertise<meshless_surgery::Vertices>(
@@ -192,20 +194,23 @@ void Publishers::publishTick(Clock::time_point now) {
   clusters = clusters && (clusters_newcomer_.exchange(false) || revision != clusters_revision_);
   bool collision = collision_due_.due(now) && collision_topic_.getNumSubscribers() > 0;
   collision = collision && (collision_newcomer_.exchange(false) || revision != collision_revision_);
-  bool contacts = contacts_due_.due(now) && contacts_topic_.getNumSubscribers() > 0;
+  const bool contacts_due = contacts_due_.due(now);
+  bool contacts = contacts_due && contacts_topic_.getNumSubscribers() > 0;
   contacts = contacts && (contacts_newcomer_.exchange(false) || revision != contacts_revision_);
+  bool forces = contacts_due && contact_forces_topic_.getNumSubscribers() > 0;
+  forces = forces && (contact_forces_newcomer_.exchange(false) || revision != contact_forces_revision_);
   const bool state = state_due_.due(now) && state_topic_.getNumSubscribers() > 0;
   const bool tools = tools_due_.due(now);
   const bool info = info_due_.due(now) && (revision != info_revision_ || info_.version.empty());
-  if (!info && !vertices && !markers && !surfaces && !clusters && !collision && !contacts && !points && !state &&
-      !tools)
+  if (!info && !vertices && !markers && !surfaces && !clusters && !collision && !contacts && !forces && !points &&
+      !state && !tools)
     return;
 
   SnapshotWants wants;
   wants.surfaces = markers || surfaces || vertices;
   wants.particles = points || clusters || collision;
   wants.measures = state;
-  wants.contacts = contacts;
+  wants.contacts = contacts || forces;
   // The stamp comes first: who sees one later than an answer sees what was answered.
   std_msgs::Header header;
   header.stamp = ros::Time::now();
@@ -245,6 +250,10 @@ void Publishers::publishTick(Clock::time_point now) {
     ++contacts_built_;
     contacts_revision_ = revision;
     contacts_topic_.publish(contactMarkers(*snapshot, header));
+  }
+  if (forces) {
+    contact_forces_revision_ = revision;
+    contact_forces_topic_.publish(toContactForces(*snapshot, header));
   }
   if (points) {
     ++points_built_;

@@ -76,7 +76,7 @@ class Publishers {
   Instruments instruments_;
 
   ros::Publisher topology_topic_, images_topic_, vertices_topic_;
-  ros::Publisher clusters_topic_, collision_topic_, contacts_topic_, surfaces_topic_, strained_surfaces_topic_;
+  ros::Publisher clusters_topic_, collision_topic_, contacts_topic_, contact_forces_topic_, surfaces_topic_, strained_surfaces_topic_;
   ros::Publisher markers_topic_, obstacles_topic_, points_topic_, state_topic_, events_topic_, info_topic_;
   struct ToolTopics {
     ros::Publisher measured, setpoint, state;
@@ -95,10 +95,10 @@ class Publishers {
   std::uint64_t vertices_revision_ = 0, vertices_built_ = 0;
   Cadence surfaces_due_, clusters_due_, collision_due_, contacts_due_;
   std::atomic<bool> surfaces_newcomer_{false}, clusters_newcomer_{false}, collision_newcomer_{false},
-      contacts_newcomer_{false};
+      contacts_newcomer_{false}, contact_forces_newcomer_{false};
   std::uint64_t clusters_revision_ = 0, clusters_built_ = 0;
   std::uint64_t collision_revision_ = 0, collision_built_ = 0;
-  std::uint64_t contacts_revision_ = 0, contacts_built_ = 0;
+  std::uint64_t contacts_revision_ = 0, contact_forces_revision_ = 0, contacts_built_ = 0;
   std::uint64_t surfaces_revision_ = 0, surfaces_built_ = 0;
   meshless_surgery::Info info_;                                // as it was said last
   std::vector<std::shared_ptr<const ObstacleDef>> obstacles_;  // likewise

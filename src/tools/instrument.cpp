@@ -170,6 +170,9 @@ Status InstrumentDef::validate() const {
     return Error{ErrorCode::kInvalidArgument, "instrument '" + name + "' is so long and thin that it has " +
                                                   numberText(points, 3) + " points; accepted: up to " +
                                                   numberText(kMostPoints)};
+  if (latch && type != InstrumentType::kGrasper)
+    return Error{ErrorCode::kInvalidArgument, "grasp of instrument '" + name + "', a " + toString(type) +
+                                                  ", is latch; accepted: of graspers alone"};
   if (type == InstrumentType::kHook && !(jaw_length >= 2.0 * shaft_radius))
     return Error{ErrorCode::kInvalidArgument, "jaw_length of instrument '" + name + "' is " + numberText(jaw_length) +
                                                   " m; accepted: of a hook, at least two shaft_radius"};

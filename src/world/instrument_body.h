@@ -29,6 +29,8 @@ struct InstrumentBody {
   struct Pressed {
     Index body = 0;              // collider
     std::array<double, 2> on{};  // [N] on the inside of the jaws, mean over the step
+    Vec3 at = Vec3::Zero();      // [m] where, in the mean: over `weight`
+    double weight = 0.0;
   };
   std::vector<Pressed> pressed;
   std::vector<char> met;  // one a body: scratch

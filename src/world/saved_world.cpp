@@ -125,7 +125,8 @@ bool isThere(const Instrument& instrument) {
     if (!(jaw >= 0.0 && jaw <= kWidestJaw)) return false;
   const InstrumentLoad& load = instrument.load;
   for (const Vec3& v :
-       {instrument.velocity, instrument.spin, load.force, load.torque, instrument.force, instrument.torque})
+       {instrument.velocity, instrument.spin, load.force, load.torque, instrument.force, instrument.torque,
+        instrument.latch_at, instrument.latch_force})
     if (!(v.norm() <= 1e12)) return false;
   for (const double x : {instrument.owed, instrument.jaw_rate, load.jaw, instrument.jaw_torque, instrument.gripped})
     if (!(std::abs(x) <= 1e12)) return false;
@@ -665,6 +666,7 @@ std::uint64_t World::stateHash() const {
   }
   for (Instrument instrument : saved->instruments) {
     instrument.number = 0;
+    instrument.latched = instrument.latched != 0;
     archive(instrument);
   }
   for (ClosingCut cut : saved->closing) {

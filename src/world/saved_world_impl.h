@@ -11,7 +11,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kStateVersion = 29;
+constexpr std::uint32_t kStateVersion = 30;
 
 inline std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(
@@ -234,8 +234,8 @@ MESHLESS_ARCHIVE(ScissorBlades, origin, x_axis, y_axis, length, width)
 MESHLESS_ARCHIVE(Blade, origin, x_axis, y_axis, length, depth, rise, behind)
 template <class A>
 void serialize(A& archive, Pick& v) {
-  auto& [id, body, particle, place, patch, weights, target, reached, locked, stiffness, position, force] = v;
-  archive(id, body, particle, place.cell, place.at, patch, weights, target, reached, locked, stiffness, position,
+  auto& [id, body, particle, place, patch, weights, target, reached, locked, latch, stiffness, position, force] = v;
+  archive(id, body, particle, place.cell, place.at, patch, weights, target, reached, locked, latch, stiffness, position,
           force);
 }
 MESHLESS_ARCHIVE(BodyPoint, particles, weights)
@@ -252,15 +252,15 @@ MESHLESS_ARCHIVE(Scissors, shown, blades, angle)
 template <class A>
 void serialize(A& archive, InstrumentDef& v) {
   auto& [name, type, pose, shaft_radius, shaft_length, jaw_length, jaw_width, jaw_thickness, friction, stiffness,
-         damping, angular_stiffness, angular_damping, max_force, max_torque, max_speed, grip, remote_centre, color] = v;
+         damping, angular_stiffness, angular_damping, max_force, max_torque, max_speed, grip, latch, remote_centre, color] = v;
   archive(name, choice(type, InstrumentType::kClipApplier), pose, shaft_radius, shaft_length, jaw_length, jaw_width,
           jaw_thickness, friction, stiffness, damping, angular_stiffness, angular_damping, max_force, max_torque,
-          max_speed, grip, remote_centre, color);
+          max_speed, grip, latch, remote_centre, color);
 }
 MESHLESS_ARCHIVE(BladeWound, body, origin, x_axis, y_axis, least, most, stroke)
 MESHLESS_ARCHIVE(InstrumentLoad, force, torque, jaw, mass, inertia, jaw_inertia)
 MESHLESS_ARCHIVE(Instrument, def, number, target, jaw_target, hand, jaw_hand, pose, jaw, velocity, spin, jaw_rate, jaw_stop, cut_to, wounds, stroke, resists, cut_torque, cut_work, owed, answers, load,
-                 force, torque, jaw_torque, holds, gripped, closed_to, loaded, lost_for)
+                 force, torque, jaw_torque, holds, gripped, closed_to, loaded, lost_for, latched, latch_at, latch_force)
 MESHLESS_ARCHIVE(CutCommand, blades, close_time, roughness, bodies)
 MESHLESS_ARCHIVE(ClosingCut, ticket, command, done_at, start_angle, started_at)
 

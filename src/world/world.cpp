@@ -2,7 +2,9 @@
 // world_commands.cpp, cuts in world_cut.cpp, time in world_step.cpp.
 #include "meshless_surgery/world/world.h"
 
+#include <algorithm>
 #include <cstring>
+#include <iterator>
 #include <sstream>
 
 #include "meshless_surgery/body/cavities.h"
@@ -130,7 +132,7 @@ WorldBody* World::Impl::find(const BodyId& id) {
 
 Pick* World::Impl::findPick(PickId id) {
   for (Pick& pick : picks)
-    if (pick.id == id) return &pick;
+    if (pick.id == id && !pick.latch) return &pick;
   return nullptr;
 }
 
@@ -346,18 +348,19 @@ WorldSnapshot World::snapshot(const SnapshotWants& wants) {
     shot.bodies.push_back(std::move(b));
   }
   for (const auto& obstacle : w.obstacles) shot.obstacles.push_back(obstacle->def);
+  const auto named = [&](Index collider) -> std::string {
+    const std::size_t bodies = w.bodies.size(), fixed = bodies + w.obstacles.size();
+    if (collider < bodies) return w.bodies[collider]->name;
+    if (collider < fixed) return w.obstacles[collider - bodies]->def->name;
+    return collider < fixed + w.instruments.size() ? w.instruments[collider - fixed].def.name : kGroundName;
+  };
   if (wants.contacts && w.contacts_current) {
     std::vector<SurfaceContacts::Point> points;
     w.surface_contacts.points(w.colliders, points);
-    for (const SurfaceContacts::Point& p : points) shot.contacts.push_back({p.position, p.normal, p.force});
+    for (const SurfaceContacts::Point& p : points)
+      shot.contacts.push_back({named(p.on), p.by_sphere ? kPushName : named(p.by), p.position, p.normal, p.force});
   }
   if (wants.touches && w.contacts_current) {
-    const auto named = [&](Index collider) -> std::string {
-      const std::size_t bodies = w.bodies.size(), fixed = bodies + w.obstacles.size();
-      if (collider < bodies) return w.bodies[collider]->name;
-      if (collider < fixed) return w.obstacles[collider - bodies]->def->name;
-      return collider < fixed + w.instruments.size() ? w.instruments[collider - fixed].def.name : kGroundName;
-    };
     std::vector<std::pair<Index, Index>> pairs;
     w.surface_contacts.loadedSurfaces(pairs);
     for (const auto& [a, b] : pairs) {
@@ -366,8 +369,8 @@ WorldSnapshot World::snapshot(const SnapshotWants& wants) {
       if (b < shot.bodies.size()) shot.bodies[b].touches.push_back(named(a));
     }
   }
-  shot.picks = w.picks;
-  for (const Pick& pick : w.picks)
+  std::copy_if(w.picks.begin(), w.picks.end(), std::back_inserter(shot.picks), [](const Pick& p) { return !p.latch; });
+  for (const Pick& pick : shot.picks)
     if (const WorldBody* body = w.find(pick.body)) shot.pick_bodies[pick.id] = body->name;
   w.showAttachments(wants, shot.attachments);
   shot.push = w.push;

@@ -55,11 +55,12 @@ Status checkTarget(const Vec3& target) {
 }
 
 Error noPick(PickId id, const std::vector<Pick>& picks) {
-  std::string text = "there is no pick " + std::to_string(id);
-  if (picks.empty()) return {ErrorCode::kUnknownName, text + "; no spring is set"};
-  text += "; springs are:";
-  for (std::size_t i = 0; i < picks.size() && i < 20; ++i) text += " " + std::to_string(picks[i].id);
-  return {ErrorCode::kUnknownName, text};
+  const std::string text = "there is no pick " + std::to_string(id);
+  std::string known;
+  std::size_t shown = 0;
+  for (const Pick& pick : picks)
+    if (!pick.latch && shown++ < 20) known += " " + std::to_string(pick.id);
+  return {ErrorCode::kUnknownName, text + (known.empty() ? "; no spring is set" : "; springs are:" + known)};
 }
 
 }  // namespace
@@ -177,7 +178,11 @@ Result<Reply> World::Impl::apply(const ReleaseCommand& command) {
 }
 
 Result<Reply> World::Impl::apply(const ClearPicksCommand&) {
-  while (!picks.empty()) letGo(picks.front());
+  for (std::size_t n = 0; n < picks.size();)
+    if (picks[n].latch)
+      ++n;
+    else
+      letGo(picks[n]);
   return Reply(Done{});
 }
 
@@ -345,7 +350,7 @@ Result<Reply> World::Impl::apply(const SpawnCommand& command) {
 void World::Impl::letGoOf(const WorldBody& body, const std::string& why) {
   const BodyId id = body.id;
   for (const Pick& pick : picks)
-    if (pick.body == id) say(EventType::kReleased, body.name, pick.id, "released: " + why);
+    if (pick.body == id && !pick.latch) say(EventType::kReleased, body.name, pick.id, "released: " + why);
   picks.erase(std::remove_if(picks.begin(), picks.end(), [&](const Pick& p) { return p.body == id; }), picks.end());
   for (Attachment& attachment : attachments)
     loseFibres(attachment, EventType::kDetached, "went with " + body.name,

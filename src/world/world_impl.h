@@ -250,7 +250,7 @@ struct World::Impl : KeptWorld {
 
   WorldBody* find(const std::string& name);
   WorldBody* find(const BodyId& id);
-  Pick* findPick(PickId id);
+  Pick* findPick(PickId id);  // no latch
   void say(EventType type, const std::string& body, PickId pick, const std::string& text);
   WorldBody& admit(std::string name, Material material, BodyModelPtr model, BodyState state);
   void retire(const BodyId& id);
@@ -406,6 +406,11 @@ struct World::Impl : KeptWorld {
   bool anyInstrumentGoes() const;
   void stepFreeInstruments(double h, int parts, int parts_left);
   void finishInstruments(double h_frame);
+  /// The spring of a latch; null where there is none any more.
+  Pick* latchOf(const Instrument& instrument);
+  void latch(Instrument& instrument, const WorldBody& body, const Vec3& at);
+  void unlatch(Instrument& instrument);
+  void addLatch(const Instrument& instrument, InstrumentLoad& load);
   /// Of a clip applier whose jaws have closed on a body.
   void putOnClip(Instrument& instrument, const std::string& body);
 

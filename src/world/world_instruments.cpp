@@ -7,6 +7,7 @@
 #include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/geometry/query/inside.h"
+#include "meshless_surgery/tools/grasp.h"
 #include "world_impl.h"
 
 namespace meshless {
@@ -137,6 +138,7 @@ Result<Reply> World::Impl::apply(const DetachInstrumentCommand& command) {
   if (!instrument)
     return Error{ErrorCode::kUnknownName, "there is no instrument '" + command.name + "'; " + knownInstruments()};
   const auto place = instrument - instruments.data();
+  unlatch(instruments[place]);
   wakeWithin(boundsOf(instrument_bodies[place]->positions));
   surface_contacts.forget(kInstrumentKey + instrument->number);
   contacts_current = false;
@@ -409,6 +411,14 @@ void World::Impl::leadInstruments(double h_frame) {
                  instrument.spin.norm() * reach <= kRests && std::abs(instrument.jaw_rate) * reach <= kRests;
     body.felt = body.stepped = false;
     body.rests = body.still && !sleepersAt(n).empty();
+    if (Pick* const held = latchOf(instrument)) {
+      Instrument then = instrument;
+      then.move(body.hand_then, body.jaw_then, h_frame);
+      if (!body.still) {
+        wake(*find(held->body));
+        held->target = then.pose * instrument.latch_at;
+      }
+    }
   }
 }
 
@@ -595,6 +605,11 @@ void World::Impl::feelInstrument(Index island, Index collider, double h, double 
                                       [&](const InstrumentBody::Pressed& p) { return p.body == tissue.collider; });
           if (pressed == body.pressed.end()) pressed = body.pressed.insert(pressed, {tissue.collider, {}});
           pressed->on[k] += share * on_jaw[k];
+          for (const RowEntry* at = metal.begin; at != metal.end; ++at) {
+            const double weight = std::abs(at->coefficient) * row.impulse.norm();
+            pressed->at += weight * body.positions[at->particle];
+            pressed->weight += weight;
+          }
         }
       });
   if (load.mass > most) {  // rows share the particles that they move
@@ -603,6 +618,7 @@ void World::Impl::feelInstrument(Index island, Index collider, double h, double 
     load.inertia *= part;
     load.jaw_inertia *= part;
   }
+  addLatch(instrument, load);
   instrument.load = load;
   instrument.jaw_torque += share * instrument.cut_torque;
   instrument.force += share * load.force;
@@ -618,6 +634,9 @@ void World::Impl::stepFreeInstruments(double h, int parts, int parts_left) {
     if (std::exchange(body.stepped, false) || (body.rests && !body.felt)) continue;
     if (!body.felt && parts_left == parts) forgetLoad(n);
     instruments[n].load = InstrumentLoad();
+    addLatch(instruments[n], instruments[n].load);
+    instruments[n].force += instruments[n].load.force / parts;
+    instruments[n].torque += instruments[n].load.torque / parts;
     advanceInstrument(static_cast<Index>(bodies.size() + obstacles.size() + n), h, parts_left);
     instruments[n].force += body.blocked / parts;
     instruments[n].jaw_torque += instruments[n].cut_torque / parts;
@@ -661,6 +680,17 @@ void World::Impl::finishInstruments(double h_frame) {
       }
       continue;
     }
+    if (instrument.latched != 0) {
+      const Pick* const held = latchOf(instrument);
+      if (held && !(instrument.jaw_target > instrument.closed_to)) {
+        instrument.holds = find(held->body)->name;
+        instrument.latch_force = -held->force;
+        instrument.closed_to = std::min(instrument.closed_to, instrument.jaw_target);
+        instrument.lost_for = 0.0;
+        continue;
+      }
+      unlatch(instrument);
+    }
     if (!instrument.holds.empty()) {
       if (instrument.gripped > 0.0) {
         instrument.lost_for = 0.0;
@@ -688,7 +718,61 @@ void World::Impl::finishInstruments(double h_frame) {
         instrument.def.name + " grasped " + instrument.holds + " with " + numberText(instrument.gripped, 3) + " N");
     events.back().instrument = instrument.def.name;
     events.back().force = instrument.gripped;
+    if (instrument.def.latch) latch(instrument, *bodies[most->body], most->at / most->weight);
   }
+}
+
+Pick* World::Impl::latchOf(const Instrument& instrument) {
+  if (instrument.latched == 0) return nullptr;
+  for (Pick& pick : picks)
+    if (pick.id == instrument.latched && find(pick.body)) return &pick;
+  return nullptr;
+}
+
+void World::Impl::latch(Instrument& instrument, const WorldBody& body, const Vec3& at) {
+  const BodyModel& model = *body.model;
+  Index nearest = kNoIndex;
+  double least = std::numeric_limits<double>::infinity();
+  for (Index i = 0; i < model.rest.size(); ++i) {
+    const double away = (body.state.positions[i] - at).squaredNorm();
+    if (!model.isTissue(i) || !(away < least)) continue;
+    least = away;
+    nearest = i;
+  }
+  if (nearest == kNoIndex) return;
+  Pick pick;
+  pick.id = next_pick++;
+  pick.body = body.id;
+  pick.locked = pick.latch = true;
+  pick.stiffness = instrument.def.stiffness;
+  makeGrasp(model, body.state.positions, nearest, graspRadius(model), at, pick);
+  pick.place = placeOf(model, pick.particle);
+  pick.target = pick.reached = pick.position;
+  instrument.latched = pick.id;
+  instrument.latch_at = instrument.pose.rotation.conjugate() * (pick.position - instrument.pose.translation);
+  instrument.latch_force.setZero();
+  picks.push_back(std::move(pick));
+}
+
+void World::Impl::unlatch(Instrument& instrument) {
+  if (Pick* const held = latchOf(instrument)) {
+    wake(*find(held->body));
+    picks.erase(picks.begin() + (held - picks.data()));
+  }
+  instrument.latched = 0;
+  instrument.latch_force.setZero();
+}
+
+void World::Impl::addLatch(const Instrument& instrument, InstrumentLoad& load) {
+  const Pick* const held = latchOf(instrument);
+  if (!held) return;
+  const double inverse = graspInverseMass(*find(held->body)->model, *held);  // [1/kg]
+  const Vec3 arm = held->position - instrument.pose.translation;
+  load.force += instrument.latch_force;
+  load.torque += arm.cross(instrument.latch_force);
+  if (!(inverse > 0.0)) return;
+  load.mass += 1.0 / inverse;
+  load.inertia += arm.squaredNorm() / inverse;
 }
 
 void World::Impl::emptyJaws(const WorldBody& body, const std::string& why) {

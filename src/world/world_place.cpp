@@ -76,7 +76,8 @@ Result<Reply> World::Impl::apply(const PlaceBodyCommand& command) {
     }
   wake(*body);
   for (const Pick& pick : picks)
-    if (pick.body == body->id) say(EventType::kReleased, body->name, pick.id, "released: its body was put elsewhere");
+    if (pick.body == body->id && !pick.latch)
+      say(EventType::kReleased, body->name, pick.id, "released: its body was put elsewhere");
   picks.erase(std::remove_if(picks.begin(), picks.end(), [&](const Pick& pick) { return pick.body == body->id; }),
               picks.end());
   emptyJaws(*body, "it was put elsewhere");

@@ -112,6 +112,13 @@ Result<Reply> World::Impl::apply(const UndoCutCommand&) {
     picks.push_back(before.picks[i]);
     picks.back().body = body->id;
   }
+  // Of jaws that have let go since.
+  picks.erase(std::remove_if(picks.begin(), picks.end(),
+                             [this](const Pick& pick) {
+                               return pick.latch && std::none_of(instruments.begin(), instruments.end(),
+                                                                 [&](const Instrument& of) { return of.latched == pick.id; });
+                             }),
+              picks.end());
   // Bodies that the cut has made anew have other ids; those that were removed since stay so.
   std::map<BodyId, BodyId> now;
   for (const CutUndo::Body& was : before.bodies)

@@ -142,6 +142,7 @@ std::vector<Row> rows() {
       {"an instrument", "max_force: 7, type: grasper", "type: grasper", READ(instrumentOf(s).max_force), "7"},
       {"an instrument", "max_torque: 0.3, type: grasper", "type: grasper", READ(instrumentOf(s).max_torque), "0.3"},
       {"an instrument", "max_speed: 0.8, type: grasper", "type: grasper", READ(instrumentOf(s).max_speed), "0.8"},
+      {"an instrument", "grasp: latch, type: grasper", "type: grasper", READ(instrumentOf(s).latch), "1"},
       {"an instrument", "grip: 4, type: grasper", "type: grasper", READ(instrumentOf(s).grip), "4"},
 
       {"an attachment", "bodies: [b, a], stiffness: 1, distance: 1", "bodies: [a, b], stiffness: 1, distance: 1",

@@ -13,7 +13,7 @@ import rospkg
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Point, PoseStamped, Vector3, WrenchStamped
-from meshless_surgery.msg import Event, Info, Metrics, State, Surfaces, TaskState, TissueImages, Topology, Vertices
+from meshless_surgery.msg import ContactForces, Event, Info, Metrics, State, Surfaces, TaskState, TissueImages, Topology, Vertices
 from meshless_surgery.srv import GetBodyResponse
 from sensor_msgs.msg import JointState, PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
@@ -259,8 +259,9 @@ class MessagesLawTest(DeformerTestCase):
 
     def carried(self):
         """What the contacts below carry after a while [N]."""
-        contacts = self.deformer.recorder('contacts', MarkerArray)
+        contacts, numbers = self.deformer.recorder('contacts', MarkerArray), self.deformer.recorder('contact_forces', ContactForces)
         self.addCleanup(contacts.close)
+        self.addCleanup(numbers.close)
         self.good('step', steps=100)
         asked = rospy.Time.now()
         self.good('step', steps=1)
@@ -272,6 +273,7 @@ class MessagesLawTest(DeformerTestCase):
         lengths = numpy.linalg.norm(arrows, axis=1)
         self.assertAlmostEqual(min(SPACINGS.values()), lengths.max(), delta=1e-9)
         up = numpy.array([0.0, -numpy.sin(TILT), numpy.cos(TILT)])
+        self.same_as_numbers(numbers.wait(lambda m: m.header.stamp >= asked), points, arrows / lengths[:, None], asked)
         carried = {}
         for name, normal, foot in (('flat', (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)), ('leans', up, numpy.array([1.0, 0.0, 0.5]) + 0.05 * up)):
             here = numpy.abs(points[:, 0] - foot[0]) < 0.3
@@ -281,6 +283,23 @@ class MessagesLawTest(DeformerTestCase):
             carried[name] = arrows[here].sum(0).dot(normal)
         # Arrows are as long as can be seen: the plate carries a weight that is known.
         return carried['flat'] / carried['leans'] * MASSES['leans'] * G * numpy.cos(TILT)
+
+    def same_as_numbers(self, message, points, normals, since):
+        """What ~contact_forces has of the markers' contacts; the forces on a body that lies are its weight."""
+        self.heads(message, since)
+        self.says(message, step=self.state().step, sim_time=(self.state().sim_time, 1e-12))
+        held.add((message._type, 'contacts'))
+        drawn = [c for c in message.contacts if c.other != 'push']
+        numpy.testing.assert_array_equal(points, plain([c.position for c in drawn]))
+        numpy.testing.assert_allclose(normals, plain([c.normal for c in drawn]), atol=1e-9)
+        for name, below in (('flat', 'ground'), ('leans', 'plate')):
+            on = [c for c in message.contacts if c.body == name]
+            self.assertEqual({below}, {c.other for c in on} - {'push'}, name)
+            force = plain([c.force for c in on]).sum(0)
+            print('%s is carried with %s N' % (name, force))
+            weight = MASSES[name] * G
+            numpy.testing.assert_allclose(force, [0.0, 0.0, weight], atol=0.005 * weight)
+        held.update((message.contacts[0]._type, field) for field in ('body', 'other', 'position', 'normal', 'force'))
 
     def test_contacts_carry_weights_out_of_what_is_below(self):
         weight = MASSES['flat'] * G

@@ -132,7 +132,7 @@ class EffectTest(unittest.TestCase):
             ball = TransformStamped(header=header('/table'), child_frame_id='/ball')
             ball.transform.translation.z, ball.transform.rotation.w = 1.0, 1.0
             broadcaster = tf2_ros.TransformBroadcaster()
-            wanted = {'state', 'markers', 'points', 'surfaces', 'topology', 'vertices', 'info', 'events', 'clusters', 'contacts', 'task',
+            wanted = {'state', 'markers', 'points', 'surfaces', 'topology', 'vertices', 'info', 'events', 'clusters', 'contacts', 'contact_forces', 'task',
                       'pick/measured_cp', 'pick/measured_cf', 'push/measured_cp', 'push/setpoint_cp', 'left/pick_cursor',
                       'left/push_sphere'}
             found, end = set(), time.monotonic() + LONG

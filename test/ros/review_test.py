@@ -16,7 +16,7 @@ import meshless_surgery.srv
 import roslib.packages
 import rospy
 from geometry_msgs.msg import Point
-from meshless_surgery.msg import Bookmarks, Info, Review, State, Surfaces, Topology, Vertices
+from meshless_surgery.msg import Bookmarks, ContactForces, Info, Review, State, Surfaces, Topology, Vertices
 from meshless_surgery.srv import Hash, Play, Seek
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
@@ -142,7 +142,7 @@ class ReviewTest(unittest.TestCase):
 
     def test_who_comes_late_gets_all_while_it_stands_still(self):
         topics = {'surfaces': Surfaces, 'strained_surfaces': Surfaces, 'vertices': Vertices, 'markers': MarkerArray, 'points': PointCloud2,
-                  'clusters': MarkerArray, 'collision_surfaces': MarkerArray, 'contacts': MarkerArray, 'topology': Topology,
+                  'clusters': MarkerArray, 'collision_surfaces': MarkerArray, 'contacts': MarkerArray, 'contact_forces': ContactForces, 'topology': Topology,
                   'info': Info, 'state': State, 'review': Review}
         with ReviewNode(session_directory=self.folder, log='monday') as review:
             for _ in range(2):  # a display that is switched off and on

@@ -116,7 +116,7 @@ TEST(Instruments, AProbePressesWithTheForceOfItsSpringAndNoMoreThanItMay) {
   double ground = 0.0;
   const WorldSnapshot shot = world.snapshot({false, false, false, true});
   for (const ContactPoint& point : shot.contacts)
-    if (point.normal.z() > 0.5) ground += point.force;
+    if (point.normal.z() > 0.5) ground += point.pressed();
   EXPECT_NEAR(ground, weight + pressed, 0.001 * ground);
   lead(world, Vec3(0, 0, -0.2), 1.0);
   run(world, 2.0);

@@ -1,6 +1,9 @@
 // What a snapshot says of bodies and contacts is what follows from the particles, their masses and the surface alone.
 #include <cmath>
 #include <functional>
+#include <map>
+#include <set>
+#include <string>
 
 #include "support/bodies.h"
 
@@ -179,18 +182,32 @@ TEST(ContactPointLaw, ForcesAlongNormalsThatPointOutOfTheSupportCarryTheWeight) 
       }
       const WorldSnapshot shot = seen(world);
       Load below, between;
+      const std::string ground = support == Support::kPlate ? "plate" : kGroundName;
+      std::map<std::string, Vec3> carried;  // [N]
+      std::set<std::string> known;
+      for (const BodySnapshot& body : shot.bodies) known.insert(body.name);
+      for (const std::string& name : {std::string("low"), std::string("high"), ground}) carried[name] = Vec3::Zero();
       for (const ContactPoint& point : contacts) {
         EXPECT_NEAR(point.normal.norm(), 1.0, 1e-9) << what;
-        EXPECT_GT(point.force, 0.0) << what;
+        EXPECT_GT(point.pressed(), 0.0) << what;
         const double height = (point.position - floor).dot(up);
         // Between two bodies the normal is that of either.
         const bool is_below = height < 0.02;
         Load& load = is_below ? below : between;
         if (is_below) EXPECT_GT(point.normal.dot(up), 0.999) << what;
         if (!is_below) EXPECT_NEAR(height, 0.05, 0.01) << what;
-        load.force += (!is_below && point.normal.dot(up) < 0.0 ? -1.0 : 1.0) * point.force / kSteps * point.normal;
+        load.force += (!is_below && point.normal.dot(up) < 0.0 ? -1.0 : 1.0) * point.pressed() / kSteps * point.normal;
         ++load.points;
+        // All of it is named, friction too: who lies is carried, and who carries is pressed by the opposite.
+        ASSERT_TRUE(known.count(point.body) && (known.count(point.other) || point.other == ground)) << what;
+        ASSERT_NE(point.body, point.other) << what;
+        EXPECT_EQ(is_below, point.other == ground) << what << " " << point.other;
+        carried[point.body] += point.force / kSteps;
+        carried[point.other] -= point.force / kSteps;
       }
+      for (const BodySnapshot& body : shot.bodies)
+        EXPECT_LT((carried[body.name] - Vec3(0, 0, body.model->mass * kG)).norm(), 6e-3 * body.model->mass * kG)
+            << what << " " << body.name << " " << carried[body.name].transpose();
       double mass = 0.0;
       for (const BodySnapshot& body : shot.bodies) mass += body.model->mass;
       const double weight = mass * kG * up.z();

@@ -115,7 +115,7 @@ Lying lying(const Kind& kind, Random& random) {
   const WorldSnapshot shot = world.snapshot({false, true, false, true});
   Lying result;
   Vec3 force = Vec3::Zero();
-  for (const ContactPoint& point : shot.contacts) force += point.force * point.normal;
+  for (const ContactPoint& point : shot.contacts) force += point.force;
   const double weight = shot.bodies[0].model->mass * kG;
   result.weight = (force - Vec3(0, 0, weight)).norm() / weight;
   for (std::size_t i = 0; i < before.size(); ++i)
@@ -124,7 +124,7 @@ Lying lying(const Kind& kind, Random& random) {
 }
 
 TEST(Physics, TheGroundCarriesTheWeight) {
-  expectReached("weight", {{kElastic, 0.0}, {kLooks, 0.0}, {kOne, 1.2e-10}},
+  expectReached("weight", {{kElastic, 1.7e-9}, {kLooks, 0.0}, {kOne, 1.2e-10}},
                 [](auto&... a) { return lying(a...).weight; });
 }
 

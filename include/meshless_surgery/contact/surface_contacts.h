@@ -146,8 +146,11 @@ class SurfaceContacts {
   /// Pairs that press on each other, the lower number first; the second is kNoIndex for the ground.
   void loadedSurfaces(std::vector<std::pair<Index, Index>>& pairs) const;
   struct Point {
-    Vec3 position, normal;
-    double force;  // [N]
+    Index on = 0;                     // never an obstacle where the other is a body
+    Index by = kNoIndex;              // kNoIndex: the ground, or the sphere
+    bool by_sphere = false;
+    Vec3 position, normal;            // [m]; unit, out of what presses
+    Vec3 force;                       // [N] on it, with friction
   };
   void points(const std::vector<Collider>& colliders, std::vector<Point>& points) const;
 

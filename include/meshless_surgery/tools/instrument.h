@@ -5,6 +5,7 @@
 
 #include <optional>
 
+#include "meshless_surgery/base/ids.h"
 #include "meshless_surgery/base/result.h"
 #include "meshless_surgery/geometry/mesh/triangle_mesh.h"
 
@@ -35,6 +36,7 @@ struct InstrumentDef {
   double max_torque = 0.5;            // [N m]
   double max_speed = 1.0;             // [m/s] of the hand: a pose farther away is gone to at this
   double grip = 5.0;                  // [N] of each jaw, in its middle
+  bool latch = false;  // of a grasper: what its jaws have grasped stays in them, by a spring, until they open
   std::optional<Vec3> remote_centre;  // [m] of a trocar, through which the shaft goes
   Color color{0.75f, 0.78f, 0.82f, 1.0f};
 
@@ -134,6 +136,9 @@ struct Instrument {
                                    // between them when they put on a clip
   bool loaded = false;             // a clip applier has a clip in its jaws, from when they have opened
   double lost_for = 0.0;           // [s] that they have not
+  PickId latched = 0;              // the spring that holds it; 0: none
+  Vec3 latch_at = Vec3::Zero();    // [m] where that ends, in the frame of the instrument
+  Vec3 latch_force = Vec3::Zero(); // [N] of it on the instrument, in the last step
 
   /// Where the hand goes within h [s]: no faster than it may.
   Pose handAfter(double h) const;

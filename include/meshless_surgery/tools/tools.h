@@ -18,6 +18,7 @@ struct Pick {
   Vec3 target = Vec3::Zero();   // [m] the free end
   Vec3 reached = Vec3::Zero();  // [m] where it was at the end of the last step: it moves evenly over the substeps
   bool locked = false;
+  bool latch = false;            // of the jaws of an instrument: nobody else moves it or lets it go
   double stiffness = 0.0;        // [N/m]
   Vec3 position = Vec3::Zero();  // [m] of the tissue's end
   Vec3 force = Vec3::Zero();     // [N] on the tissue, mean over the last step

@@ -159,11 +159,16 @@ struct SnapshotWants {
   bool touches = false;   // likewise
 };
 
-/// A point of a body's surface that carries load.
+constexpr const char *kGroundName = "ground", *kPushName = "push";
+
+/// A point of a body's surface that carries load, in the last substep; none of a body with itself.
 struct ContactPoint {
-  Vec3 position = Vec3::Zero();
-  Vec3 normal = Vec3::UnitZ();  // unit, of the force on the body
-  double force = 0.0;           // [N] along it, in the last substep
+  std::string body;              // on which the force is
+  std::string other;             // body, obstacle, instrument, kGroundName or kPushName
+  Vec3 position = Vec3::Zero();  // [m]
+  Vec3 normal = Vec3::UnitZ();   // unit, out of the other
+  Vec3 force = Vec3::Zero();     // [N] along it, and of friction
+  double pressed() const { return normal.dot(force); }  // [N]
 };
 
 struct BodySnapshot {
@@ -182,7 +187,6 @@ struct BodySnapshot {
   // Where wanted: the names of other bodies, of obstacles and of instruments that press on it, and kGroundName.
   std::vector<std::string> touches;
 };
-constexpr const char* kGroundName = "ground";
 
 struct AttachmentSnapshot {
   std::string name;
