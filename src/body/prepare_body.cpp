@@ -124,10 +124,11 @@ void warnOfSlantedLayer(BodyDef& def, const BodyModel& model) {
        << model.spacing << " m it bends too stiffly, at 45 degrees about " << std::setprecision(2)
        << 1.0 + kSlanted * wide * wide << " times";
   if (wide > 1.0)
-    text << ", or far too softly: it is thinner than a cell, and where cells meet in a row of corners alone it folds as "
-            "on a hinge";
-  text << "; it stretches right. With spacing: " << std::setprecision(3) << wanted
-       << " it is " << std::setprecision(2) << 1.0 + 0.25 * kSlanted << " times too stiff and has no hinges, of about "
+    text
+        << ", or far too softly: it is thinner than a cell, and where cells meet in a row of corners alone it folds as "
+           "on a hinge";
+  text << "; it stretches right. With spacing: " << std::setprecision(3) << wanted << " it is " << std::setprecision(2)
+       << 1.0 + 0.25 * kSlanted << " times too stiff and has no hinges, of about "
        << std::round(model.rest_volume / std::pow(wanted, 3.0)) << " cells";
   def.warnings.push_back(text.str());
 }

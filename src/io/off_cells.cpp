@@ -77,8 +77,8 @@ Result<CellsOfFile> readOffCells(const std::string& name, std::string_view text)
       const double corner = countOf(w[c]);
       if (std::isnan(corner)) return bad("'" + printable(w[c]) + "' is no number of a point");
       if (!(corner < points))
-        return unsuitable("face " + std::to_string(static_cast<std::size_t>(k)) + " has the corner " +
-                          printable(w[c]) + "; accepted: 0 to " + std::to_string(found.points.size() - 1));
+        return unsuitable("face " + std::to_string(static_cast<std::size_t>(k)) + " has the corner " + printable(w[c]) +
+                          "; accepted: 0 to " + std::to_string(found.points.size() - 1));
       found.polygons.push_back(static_cast<Index>(corner));
     }
     ++found.polygon_count;

@@ -49,8 +49,8 @@ ClipTool::ClipTool() : HandTool('l') {}
 void ClipTool::onInitialize() {
   HandTool::onInitialize();
   width_ = new rviz::FloatProperty("Width", kClipWidth, "[m] of the jaws, along the vessel.", getPropertyContainer());
-  opening_ =
-      new rviz::FloatProperty("Opening", kClipOpening, "[m] of the jaws; they reach as far across.", getPropertyContainer());
+  opening_ = new rviz::FloatProperty("Opening", kClipOpening, "[m] of the jaws; they reach as far across.",
+                                     getPropertyContainer());
   for (rviz::FloatProperty* length : {width_, opening_}) {
     length->setMin(0.0005f);
     length->setMax(0.1f);

@@ -19,8 +19,9 @@ Result<std::string> checkGround(const PreparedBody& body, const std::optional<do
   if (!(depth > most)) return std::string();
   const std::string begins = numberText(depth, 3) + " m below the ground, which is at z = " + numberText(*ground, 3);
   if (body.model->any_fixed)
-    return "it begins " + begins + " m and presses it up against what holds it; if that is not meant, put it higher or "
-                                   "take a scene with `ground: none`";
+    return "it begins " + begins +
+           " m and presses it up against what holds it; if that is not meant, put it higher or "
+           "take a scene with `ground: none`";
   return Error{ErrorCode::kInvalidArgument,
                "body '" + body.def.name + "' would begin " + begins + " m; accepted: up to " + numberText(most, 3) +
                    " m below it. Put it higher by " + numberText(depth, 3) + " m, or take a scene with `ground: none`"};
