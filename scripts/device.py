@@ -15,6 +15,7 @@ from geometry_msgs.msg import PoseStamped, WrenchStamped
 from meshless_surgery import Surgeon, SurgeryError
 from meshless_surgery.crtk import operating_state
 from meshless_surgery.devices import DEVICES, numbers
+from meshless_surgery.errors import need_master
 from meshless_surgery.msg import Event, State
 from meshless_surgery.poses import pose_stamped, quaternion_of_axes
 from meshless_surgery.teleoperation import HandMap, NO_TURN, limited, of_rpy, of_turn, product, turned, unit
@@ -444,6 +445,10 @@ def main():
     if {'-h', '--help'} & set(sys.argv[1:]):
         print(__doc__)
         return 0
+    try:
+        need_master()
+    except SurgeryError as error:
+        sys.exit(str(error))
     # Not rospy's handlers, which run in the midst of what holds a lock.
     rospy.init_node('device', disable_signals=True)
     asked = threading.Event()

@@ -12,6 +12,7 @@ import rosbag
 import rospy
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from meshless_surgery import Surgeon, SurgeryError
+from meshless_surgery.errors import need_master
 from sensor_msgs.msg import PointCloud2, PointField
 from tf2_msgs.msg import TFMessage
 
@@ -75,6 +76,11 @@ def main():
     parser.add_argument('--out', default='phantom.bag', help='the bag')
     parser.add_argument('--node', help='spawn it there')
     options = parser.parse_args(rospy.myargv()[1:])
+    if options.node:
+        try:
+            need_master()
+        except SurgeryError as error:
+            sys.exit(str(error))
     make_bag(options.out)
     print('%s has %s and /tf_static' % (options.out, CLOUD))
     if not options.node:

@@ -11,10 +11,19 @@ import sys
 import rospy
 
 from meshless_surgery import Refused, Surgeon, Unanswered
-from meshless_surgery.errors import SurgeryError
+from meshless_surgery.errors import SurgeryError, Unreachable, need_master
 from meshless_surgery.poses import blades_pose, quaternion_of_axes
 
-__all__ = ["Play", "Refused", "Surgeon", "Unanswered", "blades_pose", "distance", "lowest", "quaternion_of_axes"]
+__all__ = ["Play", "Refused", "Surgeon", "Unanswered", "begin", "blades_pose", "distance", "lowest", "quaternion_of_axes"]
+
+
+def begin(name):
+    """A rospy node; ends the script with a line where there is no master to begin it at."""
+    try:
+        need_master()
+    except Unreachable as error:
+        sys.exit(str(error))
+    rospy.init_node(name, anonymous=True)
 
 
 class Play:
@@ -26,7 +35,7 @@ class Play:
         parser.add_argument("--slow", action="store_true",
                             help="let the world run in real time, to watch; else it is stepped as fast as it goes")
         self.arguments = parser.parse_args(rospy.myargv()[1:])
-        rospy.init_node("play", anonymous=True)
+        begin("play")
         self.surgeon = Surgeon(self.arguments.node)
         self.failures = 0
 

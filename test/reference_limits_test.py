@@ -72,6 +72,10 @@ LIMITS = (
     ('parameters', 'at least N if not 0', 'src/ros/settings.cpp', 'kShortestAutosave', 1),
     ('parameters', '| empty | up to N characters', 'src/ros/live_training.cpp', 'kMostTrainee', 1),
     ('rviz', 'more than N s after the message before', 'src/rviz/between_states.cpp', 'kLongestInterval', 1),
+    ('rviz', '*Width* (N mm at first)', 'src/rviz/clip_tool.cpp', 'kClipWidth', 0.001),
+    ('rviz', '*Opening* (N cm)', 'src/rviz/clip_tool.cpp', 'kClipOpening', 0.01),
+    ('services', '| `~clip` | `width` | 0 to 1000 m; up to ten times `opening` | N m', 'src/rviz/clip_tool.cpp', 'kClipWidth', 1),
+    ('services', '| `~clip` | `opening` | 0 to 1000 m | N m', 'src/rviz/clip_tool.cpp', 'kClipOpening', 1),
     ('programs', 'for N over its `damping`', 'test/drive/drive.cpp', 'kDecays', 1),
     ('programs', 'over its `damping`, at most N s', 'test/drive/drive.cpp', 'kLongestAlone', 1),
 )
@@ -98,6 +102,11 @@ class LimitsTest(Compared, unittest.TestCase):
             part = only(r'PAGE %s\n(.*?)(?:PAGE |\Z)' % page, text)
             known[page, sentence] = number(only(re.sub(r'(?:\\ )', r'\\s+', words), part)) * unit
         return known
+
+    def test_a_clip_is_drawn_before_it_is_put_on_as_the_command_makes_it(self):
+        for name, drawn in (('width', 'kClipWidth'), ('opening', 'kClipOpening')):
+            made = only(r'struct ClipCommand \{[^}]*?double %s = ([\d.]+);' % name, re.sub(r'//.*', '', re.sub(r'\{\}', '', read('include/meshless_surgery/tools/command.h'))))
+            self.assertEqual(float(made), constant(drawn, read('src/rviz/clip_tool.cpp')), name)
 
 
 if __name__ == '__main__':

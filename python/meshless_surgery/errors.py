@@ -42,6 +42,16 @@ class Unreachable(SurgeryError, rospy.ROSException):
     """No node offers what was asked for, or it says nothing: nothing was sent."""
 
 
+def need_master():
+    """Raises Unreachable where no master answers: rospy.init_node would wait for one for ever."""
+    uri = os.environ.get('ROS_MASTER_URI', '')
+    try:
+        rospy.get_master().getPid()
+    except Exception as error:  # of the name, the connection, or what answers there
+        raise Unreachable('no master answers at ROS_MASTER_URI, which is %s (%s): start a launch file or roscore, or set it'
+                          % (uri or 'not set', error))
+
+
 @contextlib.contextmanager
 def reaching(what):
     """A wait of rospy's, which says nothing of who was waited for."""
@@ -50,6 +60,7 @@ def reaching(what):
     except rospy.ROSInterruptException:
         raise
     except rospy.ROSException as error:
+        need_master()
         raise Unreachable('%s does not answer: does the node run? (%s)' % (what, error))
 
 
@@ -74,6 +85,7 @@ def need_topics(what):
         raise Unreachable('%s cannot be heard or said: this process was forked from one that had a rospy node; accepted: services, '
                           "or a process that was started by 'spawn' or 'forkserver'" % what)
     if not rospy.core.is_initialized():
+        need_master()
         rospy.init_node('surgeon', anonymous=True, disable_signals=True)
 
 

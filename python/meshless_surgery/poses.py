@@ -1,7 +1,31 @@
 """Poses of blades, from the directions that a surgeon thinks in."""
 import math
 
-from geometry_msgs.msg import Point, PoseStamped, Quaternion
+from geometry_msgs.msg import Point, PoseStamped, Quaternion, Vector3
+
+
+def numbers(name, value, what='three numbers x, y, z'):
+    """As floats; raises ValueError with the name where it is not as many numbers as `what` begins with."""
+    count = ('one', 'two', 'three', 'four').index(what.split()[0]) + 1
+    try:
+        given = tuple(value)
+        if len(given) == count and not any(isinstance(each, (str, bytes)) for each in given):
+            return tuple(float(each) for each in given)
+    except (TypeError, ValueError):
+        pass
+    raise ValueError('%s is %s; accepted: %s' % (name, repr(value)[:60], what))
+
+
+def point(name, value):
+    return Point(*numbers(name, value))
+
+
+def vector(name, value):
+    return Vector3(*numbers(name, value))
+
+
+def rotation(name, value):
+    return Quaternion(*numbers(name, value, 'four numbers x, y, z, w of a quaternion'))
 
 
 def normalised(v):
@@ -34,16 +58,16 @@ def quaternion_of_axes(x, y, z):
 def pose_stamped(position, orientation=(0.0, 0.0, 0.0, 1.0), frame=''):
     pose = PoseStamped()
     pose.header.frame_id = frame
-    pose.pose.position = Point(*position)
-    pose.pose.orientation = Quaternion(*orientation)
+    pose.pose.position = point('position', position)
+    pose.pose.orientation = rotation('orientation', orientation)
     return pose
 
 
 def at_an_angle(**directions):
     """Raises ValueError where two directions, given by their names, span no plane."""
-    (one, a), (other, b) = directions.items()
+    (one, a), (other, b) = ((name, numbers(name, value)) for name, value in directions.items())
     if not sum(c * c for c in cross(a, b)) > 1e-18 * sum(c * c for c in a) * sum(c * c for c in b):
-        raise ValueError('%s is %s and %s is %s; accepted: two directions at an angle' % (one, tuple(a), other, tuple(b)))
+        raise ValueError('%s is %s and %s is %s; accepted: two directions at an angle' % (one, a, other, b))
 
 
 def blades_pose(pivot, reach, normal, frame=''):
@@ -51,7 +75,7 @@ def blades_pose(pivot, reach, normal, frame=''):
     at_an_angle(reach=reach, normal=normal)
     z = normalised(normal)
     y = normalised(cross(z, reach))
-    return pose_stamped(pivot, quaternion_of_axes(cross(y, z), y, z), frame)
+    return pose_stamped(numbers('pivot', pivot), quaternion_of_axes(cross(y, z), y, z), frame)
 
 
 def blade_pose(start, along, out, frame=''):
@@ -59,4 +83,4 @@ def blade_pose(start, along, out, frame=''):
     at_an_angle(along=along, out=out)
     x = normalised(along)
     y = normalised(cross(cross(x, out), x))
-    return pose_stamped(start, quaternion_of_axes(x, y, cross(x, y)), frame)
+    return pose_stamped(numbers('start', start), quaternion_of_axes(x, y, cross(x, y)), frame)

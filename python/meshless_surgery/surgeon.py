@@ -1,11 +1,12 @@
 """The services of a running deformer as methods."""
 import contextlib
+import math
 import select
 import time
+from numbers import Real
 
 import genpy
 import rospy
-from geometry_msgs.msg import Point, Quaternion, Vector3
 from sensor_msgs.msg import PointCloud2
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Header
@@ -14,7 +15,7 @@ from std_srvs.srv import SetBool, Trigger
 from meshless_surgery.errors import Refused, Unanswered, Unreachable, need_topics, reaching
 from meshless_surgery.goals import Goals
 from meshless_surgery.msg import Info, State
-from meshless_surgery.poses import blade_pose, blades_pose, pose_stamped
+from meshless_surgery.poses import blade_pose, blades_pose, numbers, point as point_of, pose_stamped, rotation, vector
 from meshless_surgery.srv import (ApplyForce, Attach, AttachInstrument, Clip, Cut, Detach, DetachInstrument, GetBody, GetLoad, Hash, Incise, LoadState, Lock, MoveClamp, MovePick, Observe, Pick, Probe,
                                   Push, Release, Remove, Report, ResetBodies, SaveState, SetGravity, SetMaterial, SetPose, Spawn, SpawnCloud, StartTask, Step, Unclip)
 from meshless_surgery.streams import TOOLS, ToolStream
@@ -92,15 +93,15 @@ class Surgeon:
 
     # springs
     def pick(self, point, direction=(0, 0, 0), body='', stiffness=0.0, max_distance=0.0, frame=None):
-        return self.call('pick', Pick, header=self._header(frame), point=Point(*point), direction=Vector3(*direction),
+        return self.call('pick', Pick, header=self._header(frame), point=point_of('point', point), direction=vector('direction', direction),
                          body=body, stiffness=stiffness, max_distance=max_distance)
 
     def move(self, pick_id, target, frame=None):
-        return self.call('move_pick', MovePick, header=self._header(frame), pick_id=pick_id, target=Point(*target))
+        return self.call('move_pick', MovePick, header=self._header(frame), pick_id=pick_id, target=point_of('target', target))
 
     def lock(self, pick_id, target=None, frame=None):
         return self.call('lock', Lock, header=self._header(frame), pick_id=pick_id, at_target=target is not None,
-                         target=Point(*(target or (0, 0, 0))))
+                         target=point_of('target', (0, 0, 0) if target is None else target))
 
     def release(self, pick_id):
         return self.call('release', Release, pick_id=pick_id)
@@ -110,7 +111,7 @@ class Surgeon:
 
     def probe(self, point, direction, frame=None):
         """What tissue a ray meets; Refused with MISSED where it meets none."""
-        return self.call('probe', Probe, header=self._header(frame), point=Point(*point), direction=Vector3(*direction))
+        return self.call('probe', Probe, header=self._header(frame), point=point_of('point', point), direction=vector('direction', direction))
 
     # push sphere
     def push(self, position, radius=0.0, speed=0.0, frame=None):
@@ -152,7 +153,9 @@ class Surgeon:
         surface and a wall of a closed one. `cavities`: what fills them, as in a scene, such as '{pressure: 1000}'; empty: nothing."""
         shapes = {SolidPrimitive.BOX: box, SolidPrimitive.SPHERE: None if sphere is None else (sphere,),
                   SolidPrimitive.CYLINDER: cylinder}
-        given = [(kind, list(sizes)) for kind, sizes in shapes.items() if sizes is not None]
+        lengths = {SolidPrimitive.BOX: ('box', 'three numbers x, y, z'), SolidPrimitive.SPHERE: ('sphere', 'one number, the radius'),
+                   SolidPrimitive.CYLINDER: ('cylinder', 'two numbers, height and radius')}
+        given = [(kind, numbers(lengths[kind][0], sizes, lengths[kind][1])) for kind, sizes in shapes.items() if sizes is not None]
         if len(given) + bool(file) != 1:
             raise ValueError('%d shapes are given; accepted: one of file, box, sphere, cylinder' % (len(given) + bool(file)))
         primitive = SolidPrimitive(type=given[0][0], dimensions=given[0][1]) if given else SolidPrimitive()
@@ -174,18 +177,18 @@ class Surgeon:
 
     def tissue_load(self, name, points=(), frame=None):
         """Elastic energy, the forces of what holds the body, strain and stress of the cells at `points`, or of all."""
-        return self.call('get_load', GetLoad, header=self._header(frame), name=name, points=[Point(*p) for p in points])
+        return self.call('get_load', GetLoad, header=self._header(frame), name=name, points=[point_of('points[%d]' % k, p) for k, p in enumerate(points)])
 
     def move_clamp(self, name, clamp=0, shift=(0, 0, 0), turn=(0, 0, 0, 1), time=0.0, frame=None):
         """Moves what entry `clamp` of `fixed` holds by `shift` and `turn` (x, y, z, w) from where it was put, in `time` seconds."""
-        return self.call('move_clamp', MoveClamp, header=self._header(frame), name=name, clamp=clamp, shift=Vector3(*shift),
-                         turn=Quaternion(*turn), time=time)
+        return self.call('move_clamp', MoveClamp, header=self._header(frame), name=name, clamp=clamp, shift=vector('shift', shift),
+                         turn=rotation('turn', turn), time=time)
 
     def apply_force(self, name, force, time, centre=(0, 0, 0), radius=0.0, frame=None):
         """A `force` [N] on what lies in the sphere of `radius` about `centre` of the body's surface (0: on all of it), for `time`
         seconds. It stays on its tissue."""
-        return self.call('apply_force', ApplyForce, header=self._header(frame), name=name, force=Vector3(*force), time=time,
-                         centre=Point(*centre), radius=radius)
+        return self.call('apply_force', ApplyForce, header=self._header(frame), name=name, force=vector('force', force), time=time,
+                         centre=point_of('centre', centre), radius=radius)
 
     def end_forces(self, name):
         """Of all that apply_force() has put on the body."""
@@ -204,17 +207,17 @@ class Surgeon:
         surface is in the sphere of `radius` about `centre`, if there is one. `stiffness` in N/m^3; `strength` in Pa, 0: it
         does not tear."""
         return self.call('attach', Attach, header=self._header(frame), name=name, body=body, other=other, distance=distance,
-                         stiffness=stiffness, strength=strength, centre=Point(*centre), radius=radius)
+                         stiffness=stiffness, strength=strength, centre=point_of('centre', centre), radius=radius)
 
     def detach(self, name, centre=(0, 0, 0), radius=0.0, frame=None):
         """All of an attachment, or its fibres in a sphere."""
-        return self.call('detach', Detach, header=self._header(frame), name=name, centre=Point(*centre), radius=radius)
+        return self.call('detach', Detach, header=self._header(frame), name=name, centre=point_of('centre', centre), radius=radius)
 
     def clip(self, point, direction, width=0.0, opening=0.0, body='', name='', frame=None):
         """Closes what is hollow at `point` between jaws that close along `direction`, across the vessel: `width` (0: 5 mm) along
         it, and up to `opening` (0: 20 mm) thick. It stays closed until unclip(name)."""
-        return self.call('clip', Clip, header=self._header(frame), name=name, body=body, point=Point(*point),
-                         direction=Vector3(*direction), width=width, opening=opening)
+        return self.call('clip', Clip, header=self._header(frame), name=name, body=body, point=point_of('point', point),
+                         direction=vector('direction', direction), width=width, opening=opening)
 
     def unclip(self, name):
         return self.call('unclip', Unclip, name=name)
@@ -225,7 +228,7 @@ class Surgeon:
 
     def set_gravity(self, gravity, frame=None):
         """[m/s^2], until the next call or a reset."""
-        return self.call('set_gravity', SetGravity, header=self._header(frame), gravity=Vector3(*gravity))
+        return self.call('set_gravity', SetGravity, header=self._header(frame), gravity=vector('gravity', gravity))
 
     def reset_bodies(self, *bodies):
         """These bodies of the scene as it began, in place of what has become of them; without any: all of them."""
@@ -312,6 +315,8 @@ class Surgeon:
 
     def live(self, seconds, rate=None):
         """Lets simulated time pass: while the world runs, by waiting for it; while it is paused, by stepping it."""
+        if not (isinstance(seconds, Real) and 0.0 <= seconds < math.inf):
+            raise ValueError('seconds is %r; accepted: a number, 0 or more' % (seconds,))
         state = self.state()
         end = state.sim_time + seconds
         while not (self._paused or state.paused):

@@ -113,8 +113,8 @@ Status makeLayer(BodyDef& def) {
   return Done{};
 }
 
-// A layer along the lattice bends right however wide the cells are; across them it is too stiff. `surface`: along the
-// axes of the lattice.
+// A layer along the lattice bends right however wide the cells are; across them it is too stiff, and too soft where
+// cells that are wider than it meet in a row of corners alone. `surface`: along the axes of the lattice.
 void warnOfSlantedLayer(BodyDef& def, const BodyModel& model) {
   const double wanted = 0.5 * def.thickness;
   if (!(def.thickness > 0.0) || model.spacing <= wanted || alongAxes(model.surface) > kFlat) return;
@@ -122,8 +122,13 @@ void warnOfSlantedLayer(BodyDef& def, const BodyModel& model) {
   std::ostringstream text;
   text << std::setprecision(3) << "where its layer of " << def.thickness << " m lies slanted in its cells of "
        << model.spacing << " m it bends too stiffly, at 45 degrees about " << std::setprecision(2)
-       << 1.0 + kSlanted * wide * wide << " times; it stretches right. With spacing: " << std::setprecision(3) << wanted
-       << " it is " << std::setprecision(2) << 1.0 + 0.25 * kSlanted << " times, of about "
+       << 1.0 + kSlanted * wide * wide << " times";
+  if (wide > 1.0)
+    text
+        << ", or far too softly: it is thinner than a cell, and where cells meet in a row of corners alone it folds as "
+           "on a hinge";
+  text << "; it stretches right. With spacing: " << std::setprecision(3) << wanted << " it is " << std::setprecision(2)
+       << 1.0 + 0.25 * kSlanted << " times too stiff and has no hinges, of about "
        << std::round(model.rest_volume / std::pow(wanted, 3.0)) << " cells";
   def.warnings.push_back(text.str());
 }

@@ -49,7 +49,7 @@ Result<CellsOfFile> readGmshCells(const std::string& name, std::string_view text
 /// The vertices and faces of a PLY file, ASCII and binary.
 Result<CellsOfFile> readPlyCells(const std::string& name, std::string_view text);
 
-/// Wavefront OBJ; numbers of vertices that there are not are left for the check of the mesh.
+/// Wavefront OBJ; faces and vertices are counted from 1, as in the file.
 Result<CellsOfFile> readObjCells(const std::string& name, std::string_view text);
 
 /// STL, text and binary.

@@ -14,8 +14,8 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
+#include "meshless_surgery/base/number_text.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
-#include "meshless_surgery/geometry/mesh/surface_from_points.h"
 
 namespace meshless {
 namespace {
@@ -32,6 +32,7 @@ constexpr int kNeighbours = 16;
 constexpr double kLink = 1.5;  // cell of a part, in distances to the 16th neighbour: parts are one to two cells apart
 constexpr double kLeastPart = 0.05;   // of the largest part's points; groups with fewer are strays
 constexpr std::size_t kAsked = 2000;  // points whose neighbours are looked up
+constexpr double kOnIt = 1e-9;        // of the bounds' diagonal: a rounding
 constexpr double kFar = 1e6;          // [m] from the middle: no unit of length makes that a body
 
 Error refuse(const std::string& why) { return {ErrorCode::kUnsuitableShape, why}; }
@@ -121,6 +122,14 @@ Points withoutStrays(const Points& cloud, std::vector<std::string>& notes) {
   return kept;
 }
 
+std::string surfaceInWords(const SurfaceFromPoints& surface) {
+  const std::string method = "surface by " + surface.method;
+  if (surface.max_distance <= kOnIt * boundsOf(surface.mesh.vertices).diagonal())
+    return method + "; all of them lie on it";
+  return method + "; the points are up to " + numberText(surface.max_distance, 3) + " m from it, on average " +
+         numberText(surface.mean_distance, 3) + " m";
+}
+
 Result<CloudShape> shapeOfCloud(const Points& cloud, const CloudFilter& filter) {
   if (cloud.size() > kMostRaw) {
     return refuse("the cloud has " + std::to_string(cloud.size()) + " points; accepted: up to " +
@@ -193,10 +202,7 @@ Result<CloudShape> shapeOfCloud(const Points& cloud, const CloudFilter& filter) 
        << " were outliers";
   made.shape.notes.push_back(note.str());
   made.shape.notes.insert(made.shape.notes.end(), strays.begin(), strays.end());
-  note.str("");
-  note << "surface by " << surface->method << ", points from it at most " << surface->max_distance << " m, on average "
-       << surface->mean_distance << " m";
-  made.shape.notes.push_back(note.str());
+  made.shape.notes.push_back(surfaceInWords(*surface));
   made.shape.notes.insert(made.shape.notes.end(), repaired->notes.begin(), repaired->notes.end());
   made.shape.warnings = std::move(repaired->warnings);
   return made;

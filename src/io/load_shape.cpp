@@ -38,10 +38,8 @@ Result<LoadedShape> loadShape(const std::string& real_path, double scale, MeshRe
     mesh.vertices = withoutStrays(mesh.vertices, strays);
     Result<SurfaceFromPoints> surface = surfaceFromPoints(mesh.vertices);
     if (!surface) return Error{surface.error().code, "'" + name + "': " + surface.error().detail};
-    std::ostringstream note;
-    note << name << " is a cloud of " << mesh.vertices.size() << " points; surface by " << surface->method
-         << ", points from it at most " << surface->max_distance << " m, on average " << surface->mean_distance << " m";
-    shape.notes.push_back(note.str());
+    shape.notes.push_back(name + " is a cloud of " + std::to_string(mesh.vertices.size()) + " points; " +
+                          surfaceInWords(*surface));
     for (const std::string& stray : strays) shape.notes.push_back(name + ": " + stray);
     mesh = std::move(surface->mesh);
   }

@@ -270,6 +270,11 @@ Result<Material> changeMaterial(const Material& base, const std::string& yaml, I
   const Result<YAML::Node> root = parseYaml(yaml, "material");
   if (!root) return root.error();
   YamlSource source{"material", {}};
+  if (root->IsNull() || (root->IsMap() && root->size() == 0)) {
+    source.fail(*root, "the material has no key, which would change nothing",
+                "a key and its value, such as {density: 900}");
+    return *source.fault;
+  }
   Material changed = base;
   try {
     readMaterial(source, *root, "the material", {images, folder}, changed);

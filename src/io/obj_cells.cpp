@@ -61,6 +61,30 @@ class ObjTexture {
   std::size_t without_ = 0;     // the first line with a corner that has none
 };
 
+/// Corners of faces whose vertex had not come yet: it may come later.
+class NamedVertices {
+ public:
+  /// Only those count that are beyond all before them: the first of these that does not come is the first of all.
+  void add(Index vertex, const std::string& word, std::size_t face, std::size_t line) {
+    if (named_.empty() || vertex > named_.back().vertex) named_.push_back({vertex, word, face, line});
+  }
+  std::string fault(std::size_t vertices) const {
+    for (const Named& one : named_)
+      if (one.vertex >= vertices)
+        return "line " + std::to_string(one.line) + ": face " + std::to_string(one.face) + " has the corner '" +
+               one.word + "'; accepted: 1 to " + std::to_string(vertices) + ", the number of vertices";
+    return "";
+  }
+
+ private:
+  struct Named {
+    Index vertex;
+    std::string word;
+    std::size_t face, line;
+  };
+  std::vector<Named> named_;
+};
+
 }  // namespace
 
 Result<CellsOfFile> readObjCells(const std::string& name, std::string_view text) {
@@ -74,6 +98,8 @@ Result<CellsOfFile> readObjCells(const std::string& name, std::string_view text)
   };
   std::string joined;
   ObjTexture texture(found.texture);
+  NamedVertices named;
+  std::string not_finite;  // the first vertex that is none, where
   for (std::string_view line; nextLine(text, line);) {
     ++line_number;
     if (line.size() > kMaxLine) return bad("is longer than 65536 characters");
@@ -101,6 +127,9 @@ Result<CellsOfFile> readObjCells(const std::string& name, std::string_view text)
         p[k] = *x;
       }
       found.points.push_back(p);
+      if (!p.allFinite() && not_finite.empty())
+        not_finite = "line " + std::to_string(line_number) + ": vertex " + std::to_string(found.points.size()) +
+                     " is not finite; accepted: finite numbers";
     } else if (w[0] == "f") {
       if (w.size() < 4) return bad("a face needs three corners, it has " + std::to_string(w.size() - 1));
       if (w.size() > kMaxPolygon + 1) return bad("a face has more than 1000 corners");
@@ -111,10 +140,12 @@ Result<CellsOfFile> readObjCells(const std::string& name, std::string_view text)
         const long long corner = std::strtoll(w[k].c_str(), &rest, 10);
         if (rest == w[k].c_str() || (*rest != '\0' && *rest != '/') || errno != 0)
           return bad("'" + w[k].substr(0, 30) + "' is no vertex number");
-        // Relative numbers become absolute ones; one that names no vertex is left for the check of the mesh to name.
+        // Relative numbers become absolute ones.
         const long long absolute = corner < 0 ? static_cast<long long>(found.points.size()) + 1 + corner : corner;
         const bool possible = absolute > 0 && absolute <= static_cast<long long>(kMaxPoints);
         found.polygons.push_back(possible ? static_cast<Index>(absolute - 1) : kNoIndex);
+        if (!possible || found.polygons.back() >= found.points.size())
+          named.add(found.polygons.back(), w[k].substr(0, 30), found.polygon_count + 1, line_number);
         texture.addCorner(rest, line_number);
       }
       ++found.polygon_count;
@@ -129,6 +160,11 @@ Result<CellsOfFile> readObjCells(const std::string& name, std::string_view text)
                                   static_cast<double>(found.polygon_count), static_cast<double>(corners));
       !status)
     return status.error();
+  // Of a cloud, points that are not finite are dropped.
+  if (found.polygon_count > 0 && !not_finite.empty())
+    return Error{ErrorCode::kUnsuitableShape, "'" + name + "' " + not_finite};
+  if (const std::string fault = named.fault(found.points.size()); !fault.empty())
+    return Error{ErrorCode::kUnsuitableShape, "'" + name + "' " + fault};
   texture.finish();
   return found;
 }

@@ -29,6 +29,9 @@ Result<CellsOfFile> readOffCells(const std::string& name, std::string_view text)
   const auto bad = [&](const std::string& what) {
     return unreadable("line " + std::to_string(line_number) + ": " + what);
   };
+  const auto unsuitable = [&](const std::string& what) {
+    return Error{ErrorCode::kUnsuitableShape, "'" + name + "' line " + std::to_string(line_number) + ": " + what};
+  };
   std::vector<std::string> w = offWords(text, line_number);
   if (!w.empty() && w[0].size() >= 3 && w[0].compare(w[0].size() - 3, 3, "OFF") == 0) {
     const std::string kind = w[0].substr(0, w[0].size() - 3);
@@ -55,6 +58,8 @@ Result<CellsOfFile> readOffCells(const std::string& name, std::string_view text)
       if (!x) return bad("'" + printable(w[static_cast<std::size_t>(c)]) + "' is no number");
       p[c] = *x;
     }
+    if (!p.allFinite() && faces > 0.0)  // of a cloud they are dropped
+      return unsuitable("point " + std::to_string(found.points.size()) + " is not finite; accepted: finite numbers");
     found.points.push_back(p);
   }
   double all_corners = 0.0;
@@ -71,8 +76,10 @@ Result<CellsOfFile> readOffCells(const std::string& name, std::string_view text)
     for (std::size_t c = 1; static_cast<double>(c) <= corners; ++c) {
       const double corner = countOf(w[c]);
       if (std::isnan(corner)) return bad("'" + printable(w[c]) + "' is no number of a point");
-      // One that names no point is left for the check of the mesh to name.
-      found.polygons.push_back(corner < points ? static_cast<Index>(corner) : kNoIndex);
+      if (!(corner < points))
+        return unsuitable("face " + std::to_string(static_cast<std::size_t>(k)) + " has the corner " + printable(w[c]) +
+                          "; accepted: 0 to " + std::to_string(found.points.size() - 1));
+      found.polygons.push_back(static_cast<Index>(corner));
     }
     ++found.polygon_count;
   }

@@ -418,7 +418,7 @@ struct LiveTraining::Handlers : Answers {
     });
     if (!done.ok()) return done.error();
     if (!there) return Error{ErrorCode::kMissed, "no task was begun; start_task begins one"};
-    prepare(head, task, run, started, wanted);
+    const std::string name = prepare(head, task, run, started, wanted);
     Pages pages;
     done = runner.look([&](World&) {
       there = training && training->begun() && run == RunId{taken, training->run()};
@@ -426,19 +426,21 @@ struct LiveTraining::Handlers : Answers {
     });
     if (!done.ok()) return done.error();
     if (!there) return Error{ErrorCode::kMissed, "another run has begun meanwhile; report again"};
-    return written(std::move(pages), head.log);
+    return written(std::move(pages), name);
   }
 
-  void prepare(ReportHead& head, const std::string& task, const RunId& run, double started,
-               const std::string& wanted = "") {
+  /// The name of the report's folder.
+  std::string prepare(ReportHead& head, const std::string& task, const RunId& run, double started,
+                      const std::string& wanted = "") {
     std::string& name = names_of_runs[run];
     if (!wanted.empty())
       name = wanted;
     else if (name.empty())
       name = freeName(head.trainee, task);
-    head.log = name;
+    head.log = folders.log;
     head.date = std::isfinite(started) ? dateText(started) : dateText(std::chrono::system_clock::now());
-    head.earlier = readEarlierReports(folders.reports, head.trainee, task, head.log);
+    head.earlier = readEarlierReports(folders.reports, head.trainee, task, name);
+    return name;
   }
 
   Result<Pages> written(Pages pages, const std::string& name) const {
@@ -461,8 +463,8 @@ struct LiveTraining::Handlers : Answers {
       if (reported.count(run.id)) continue;
       ReportHead head;
       head.trainee = run.trainee;
-      prepare(head, run.training->task().name, run.id, run.training->startedAt());
-      if (say(written(pagesOf(*run.training, head), head.log))) reported.insert(run.id);
+      const std::string name = prepare(head, run.training->task().name, run.id, run.training->startedAt());
+      if (say(written(pagesOf(*run.training, head), name))) reported.insert(run.id);
     }
     RunId run;
     bool due = false;

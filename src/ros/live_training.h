@@ -21,6 +21,7 @@ struct TrainingFolders {
   std::string scene_file;     // of the scene that runs; tasks of another one are refused
   std::string scenes, tasks;  // config/scenes, config/tasks
   std::string reports;        // made when the first is written
+  std::string log;            // the file's name that commands are logged to; empty: none
 };
 
 /// A name of config/tasks, or a file that may be read.

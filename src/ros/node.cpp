@@ -15,6 +15,7 @@
 #include "convert.h"
 #include "force_publisher.h"
 #include "live_training.h"
+#include "meshless_surgery/world/in_ground.h"
 #include "publishers.h"
 #include "services.h"
 #include "session.h"
@@ -224,6 +225,8 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
     }
     const auto added = world->addSceneBody(ready);
     if (!added.ok()) return Error{added.error().code, *file + ": body " + name + ": " + added.error().detail};
+    if (const auto in_ground = checkGround(*ready, scene->world.ground); in_ground && !in_ground->empty())
+      ROS_WARN_STREAM("body " << name << ": " << *in_ground);
     particles += added->particles;
     clusters += added->clusters;
   }
@@ -257,6 +260,7 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
   const auto log = session->startLog(*world);
   if (!log.ok()) return Error{log.error().code, "parameter ~command_log: " + log.error().detail};
   if (!log->empty()) ROS_INFO_STREAM("commands are logged to " << *log);
+  training_folders.log = *log;
   if (task) world->noteTask({true, task_file, settings->trainee, {}});
 
   auto parts = std::make_unique<Parts>(

@@ -178,18 +178,20 @@ void Publishers::publishTick(Clock::time_point now) {
   if (diagnostics_due_.due(now)) updater_.force_update();
 
   // What is due, and has both a listener and news.
-  const std::uint64_t revision = runner_.revision();
+  const std::uint64_t revision = runner_.revision(), commands = runner_.commands();
   bool markers = markers_due_.due(now) && markers_topic_.getNumSubscribers() > 0;
   const bool markers_fresh = markers && markers_newcomer_.exchange(false);
   markers = markers && (markers_fresh || revision != markers_revision_ || markers_.deleting());
   bool points = points_due_.due(now) && points_topic_.getNumSubscribers() > 0;
-  points = points && (points_newcomer_.exchange(false) || revision != points_revision_);
+  const bool points_fresh = points && points_newcomer_.exchange(false);
+  points = points && (points_fresh || revision != points_revision_);
   bool vertices = vertices_due_.due(now) && vertices_topic_.getNumSubscribers() > 0;
   const bool vertices_fresh = vertices && vertices_newcomer_.exchange(false);
   vertices = vertices && (vertices_fresh || revision != vertices_revision_);
   bool surfaces = surfaces_due_.due(now) &&
                   (surfaces_topic_.getNumSubscribers() > 0 || strained_surfaces_topic_.getNumSubscribers() > 0);
-  surfaces = surfaces && (surfaces_newcomer_.exchange(false) || revision != surfaces_revision_);
+  const bool surfaces_fresh = surfaces && surfaces_newcomer_.exchange(false);
+  surfaces = surfaces && (surfaces_fresh || revision != surfaces_revision_);
   bool clusters = clusters_due_.due(now) && clusters_topic_.getNumSubscribers() > 0;
   clusters = clusters && (clusters_newcomer_.exchange(false) || revision != clusters_revision_);
   bool collision = collision_due_.due(now) && collision_topic_.getNumSubscribers() > 0;
@@ -220,6 +222,16 @@ void Publishers::publishTick(Clock::time_point now) {
   const auto instruments =
       markers || surfaces ? instruments_.parts(*snapshot, tools_.hand(ToolKind::kPick), tools_.hand(ToolKind::kPush))
                           : std::vector<meshless_surgery::InstrumentPart>();
+  meshless_surgery::Surfaces tools_now;
+  if (markers || surfaces) tools_now = toolsIn(*snapshot);
+  tools_now.instruments = instruments;
+  const auto news = [&](Stillness& still, bool particles) {
+    return still.news(*snapshot, particles, particles ? meshless_surgery::Surfaces() : tools_now, commands, now);
+  };
+  // Each is asked, so that it knows what is published.
+  markers = markers && (news(markers_still_, false) || markers_fresh || markers_.deleting());
+  surfaces = surfaces && (news(surfaces_still_, false) || surfaces_fresh);
+  points = points && (news(points_still_, true) || points_fresh);
   if (markers) {
     ++markers_built_;
     markers_revision_ = revision;

@@ -22,6 +22,7 @@
 #include "rejections.h"
 #include "runner.h"
 #include "settings.h"
+#include "stillness.h"
 #include "streamed_tools.h"
 
 namespace meshless {
@@ -74,6 +75,7 @@ class Publishers {
   MarkerBuilder markers_;
   MovingSurfaces moving_;
   Instruments instruments_;
+  Stillness markers_still_, surfaces_still_, points_still_;
 
   ros::Publisher topology_topic_, images_topic_, vertices_topic_;
   ros::Publisher clusters_topic_, collision_topic_, contacts_topic_, contact_forces_topic_, surfaces_topic_, strained_surfaces_topic_;

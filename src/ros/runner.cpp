@@ -85,6 +85,7 @@ Status WorldRunner::run(Job job, bool changes) {
 void WorldRunner::post(Job job) {
   auto waiting = std::make_shared<Waiting>();
   waiting->job = std::move(job);
+  waiting->waited_for = false;
   {
     const std::lock_guard<std::mutex> lock(jobs_mutex_);
     if (stopping_) return;
@@ -360,6 +361,7 @@ void WorldRunner::doJobs() {
     }
     if (waiting->changes) {
       ++revision_;
+      if (waiting->waited_for) ++commands_;
       if (step_sink_) step_sink_(*world_, 0.0);
     }
     answerCuts();
@@ -384,6 +386,7 @@ void WorldRunner::stepOnce(bool paced) {
     sayTime(paced);
     if (!step_(*world_)) return pauseAtEnd();
     ++revision_;
+    if (!paced) ++commands_;
     handOverEvents();
     if (step_sink_) step_sink_(*world_, dt_);
   } catch (const std::exception& e) {

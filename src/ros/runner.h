@@ -101,6 +101,8 @@ class WorldRunner {
   RunnerStatus status() const;
   /// Grows with every step and every job that may have changed the world.
   std::uint64_t revision() const { return revision_.load(); }
+  /// Grows with those of them that somebody waits for: not with steps by the clock, nor with streams.
+  std::uint64_t commands() const { return commands_.load(); }
 
  private:
   struct Waiting {  // a caller
@@ -176,7 +178,7 @@ class WorldRunner {
   RunnerStatus status_;
   double started_ = 0.0;
 
-  std::atomic<std::uint64_t> revision_{0};
+  std::atomic<std::uint64_t> revision_{0}, commands_{0};
   std::thread thread_;
 };
 

@@ -192,7 +192,10 @@ struct Services::Handlers : Answers {
   }
 
   bool clearPicks(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
-    return applied(response, "clear_picks", ClearPicksCommand{}, "released all picks");
+    std::size_t picks = 0;
+    (void)runner.look([&](World& world) { picks = world.snapshot({}).picks.size(); });
+    return applied(response, "clear_picks", ClearPicksCommand{},
+                   picks == 0 ? "there was no pick to release" : "released all picks: " + std::to_string(picks));
   }
 
   bool push(meshless_surgery::Push::Request& request, meshless_surgery::Push::Response& response) {
@@ -209,11 +212,16 @@ struct Services::Handlers : Answers {
       command.position = check.place("pose.pose.position", *frame, pose.translation);
       if (!check.ok()) return refuse(response, "push", check.error());
     }
-    if (!command.enable) return applied(response, "push", command, "removed the push sphere");
-    return applied(response, "push", command,
-                   command.speed > 0.0
-                       ? "the push sphere goes there at its speed, or is placed there where there was none"
-                       : "placed the push sphere");
+    bool there = false;
+    (void)runner.look([&](World& world) { there = world.push().enabled; });
+    if (!command.enable)
+      return applied(response, "push", command,
+                     there ? "removed the push sphere" : "there was no push sphere to remove");
+    std::string done = "placed the push sphere";
+    if (command.speed > 0.0)
+      done = there ? "the push sphere goes there at " + numberText(command.speed, 3) + " m/s"
+                   : "placed the push sphere there: there was none that could go at a speed";
+    return applied(response, "push", command, done);
   }
 
   bool cut(meshless_surgery::Cut::Request& request, meshless_surgery::Cut::Response& response) {
@@ -229,7 +237,10 @@ struct Services::Handlers : Answers {
   }
 
   bool liftScissors(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
-    return applied(response, "lift_scissors", LiftCommand{}, "took the scissors away");
+    bool there = false;
+    (void)runner.look([&](World& world) { there = world.scissors().shown; });
+    return applied(response, "lift_scissors", LiftCommand{},
+                   there ? "took the scissors away" : "there were no scissors to take away");
   }
 
   bool undoCut(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {

@@ -41,11 +41,16 @@ std::vector<float> surfaceStrain(const Points& rest, const Points& present, cons
 }
 
 meshless_surgery::Surfaces toSurfaces(const WorldSnapshot& snapshot, const std_msgs::Header& header, bool strain) {
-  meshless_surgery::Surfaces message;
+  meshless_surgery::Surfaces message = toolsIn(snapshot);
   message.header = header;
-  message.run = snapshot.run;
   message.bodies.reserve(snapshot.bodies.size());
   for (const BodySnapshot& body : snapshot.bodies) message.bodies.push_back(toSurface(body, strain));
+  return message;
+}
+
+meshless_surgery::Surfaces toolsIn(const WorldSnapshot& snapshot) {
+  meshless_surgery::Surfaces message;
+  message.run = snapshot.run;
   message.picks = toPicks(snapshot);
   for (const AttachmentSnapshot& attachment : snapshot.attachments)
     for (const auto& line : attachment.lines)

@@ -18,6 +18,7 @@ namespace meshless {
 namespace {
 
 constexpr double kNearClip = 25.0;  // [px] from the middle of a clip
+constexpr double kClipWidth = 0.005, kClipOpening = 0.02;  // [m] as ~clip takes them where none are given
 constexpr float kBeside = 0.0006f;  // [m] that the jaws are drawn beside the tissue
 
 /// Which way a vessel runs at a place: along that, its surface is turned least. Zero where there is none within reach.
@@ -47,9 +48,9 @@ ClipTool::ClipTool() : HandTool('l') {}
 
 void ClipTool::onInitialize() {
   HandTool::onInitialize();
-  width_ = new rviz::FloatProperty("Width", 0.004f, "[m] of the jaws, along the vessel.", getPropertyContainer());
-  opening_ =
-      new rviz::FloatProperty("Opening", 0.02f, "[m] of the jaws; they reach as far across.", getPropertyContainer());
+  width_ = new rviz::FloatProperty("Width", kClipWidth, "[m] of the jaws, along the vessel.", getPropertyContainer());
+  opening_ = new rviz::FloatProperty("Opening", kClipOpening, "[m] of the jaws; they reach as far across.",
+                                     getPropertyContainer());
   for (rviz::FloatProperty* length : {width_, opening_}) {
     length->setMin(0.0005f);
     length->setMax(0.1f);

@@ -12,6 +12,7 @@
 #include "meshless_surgery/geometry/mesh/tetrahedralize.h"
 #include "meshless_surgery/geometry/query/inside.h"
 #include "meshless_surgery/tools/grasp.h"
+#include "meshless_surgery/world/in_ground.h"
 #include "world_impl.h"
 
 namespace meshless {
@@ -191,9 +192,12 @@ Result<SpawnReply> World::Impl::spawn(const PreparedBody& body) {
     return Error{ErrorCode::kDuplicateName,
                  "the name '" + name + "' is in use or was retired in this run; " + knownBodies()};
   if (Status apart = liesApart(body); !apart) return apart.error();
+  const Result<std::string> in_ground = checkGround(body, settings.ground);
+  if (!in_ground) return in_ground.error();
   WorldBody& admitted = admit(name, body.def.material, body.model, body.state);
   std::string text = "spawned " + name;
   for (const std::string& warning : body.def.warnings) text += "; " + warning;
+  if (!in_ground->empty()) text += "; " + *in_ground;
   say(EventType::kSpawned, name, 0, text);
   return SpawnReply{admitted.id, name, admitted.model->rest.size(), admitted.model->surface.triangles.size(),
                     admitted.model->groups()};

@@ -227,6 +227,14 @@ TEST(PrepareBody, AThicknessMakesASolidLayerOfAnOpenSurface) {
     ASSERT_EQ(body.def.warnings.size(), height > 0.0 ? 1u : 0u);
     if (height > 0.0)
       EXPECT_NE(body.def.warnings[0].find("spacing: 0.00075"), std::string::npos) << body.def.warnings[0];
+    // Its cells are wider than it, and may hang together by corners.
+    if (height > 0.0) EXPECT_NE(body.def.warnings[0].find("hinge"), std::string::npos) << body.def.warnings[0];
+    // Cells that it fills do not.
+    def.thickness = 0.006;
+    const PreparedBody thick = prepared(def);
+    EXPECT_LT(thick.model->spacing, def.thickness);
+    for (const std::string& warning : thick.def.warnings)
+      EXPECT_EQ(warning.find("hinge"), std::string::npos) << warning;
   }
 }
 

@@ -2,6 +2,7 @@
 """The Python client: it goes by what the node says of itself, and sends what changes something once."""
 import math
 import os
+import subprocess
 import sys
 import tempfile
 import unittest
@@ -70,6 +71,20 @@ class ClientTest(unittest.TestCase):
                 ask()
             self.assertIn('/nowhere', str(raised.exception))
             self.assertIsInstance(raised.exception, rospy.ROSException)
+
+    def test_scripts_without_a_master_say_so_in_a_line(self):
+        environment = dict(os.environ, ROS_MASTER_URI='http://127.0.0.1:1')
+        scripts = os.path.join(os.path.dirname(os.path.dirname(HERE)), 'scripts')
+        with tempfile.TemporaryDirectory() as folder:
+            for words in (['play_block.py'], ['play_lump.py', '--node', '/other'], ['device.py'],
+                          ['spawn_phantom.py', '--node', '/deformer', '--out', os.path.join(folder, 'x.bag')]):
+                done = subprocess.run([sys.executable, '-B', os.path.join(scripts, words[0])] + words[1:], env=environment,
+                                      stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=120)
+                self.assertEqual(1, done.returncode, words)
+                self.assertRegex(done.stderr, '^no master answers at ROS_MASTER_URI, which is http://127.0.0.1:1 .*\n$')
+        done = subprocess.run([sys.executable, '-B', '-c', 'from meshless_surgery import Surgeon\nSurgeon(timeout=0.5).clear()'],
+                              env=environment, stderr=subprocess.PIPE, text=True, timeout=120)
+        self.assertIn('Unreachable: no master answers at ROS_MASTER_URI', done.stderr.splitlines()[-1])
 
     def test_a_request_without_an_answer_is_sent_once(self):
         asked = []
@@ -169,6 +184,25 @@ class SurgeonTest(unittest.TestCase):
         self.surgeon.set_material('left', '{density: 500}')
         with self.assertRaises(Refused):
             self.surgeon.remove('7')
+
+    def test_what_is_no_point_and_no_time_is_not_sent_and_says_what_is_wanted(self):
+        three = '; accepted: three numbers x, y, z$'
+        surgeon = self.surgeon
+        for said, wrong in (("^point is 'left'" + three, lambda: surgeon.pick('left')),
+                            ('^gravity is 9.81' + three, lambda: surgeon.set_gravity(9.81)),
+                            (r'^target is \(1, 2\)' + three, lambda: surgeon.lock(1, (1, 2))),
+                            ('^position is None' + three, lambda: surgeon.push(None)),
+                            (r'^points\[1\] is 7' + three, lambda: surgeon.tissue_load('left', [(0, 0, 0), 7])),
+                            ("^reach is 'up'" + three, lambda: surgeon.cut((0, 0, 0), 'up', (0, 0, 1))),
+                            ('^box is 0.1' + three, lambda: surgeon.spawn(box=0.1)),
+                            (r'^turn is \(0, 0, 1\); accepted: four numbers', lambda: surgeon.move_clamp('left', turn=(0, 0, 1))),
+                            ('^seconds is -1; accepted: a number, 0 or more$', lambda: surgeon.live(-1)),
+                            ('^seconds is nan; accepted', lambda: surgeon.live(math.nan))):
+            with self.assertRaisesRegex(ValueError, said):
+                wrong()
+        step = surgeon.state().step
+        surgeon.live(0.05)
+        self.assertEqual(step + 6, surgeon.state().step)
 
     def test_blades_without_a_plane_are_not_sent(self):
         for reach, normal in (((0, 1, 0), (0, 2, 0)), ((0, 0, 0), (1, 0, 0)), ((0, 1, 0), (0, 0, 0)), ((0, 1, 0), (math.nan, 0, 0))):

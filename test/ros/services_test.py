@@ -54,6 +54,28 @@ class PickTest(DeformerTestCase):
         self.refused([], 'pick', point=Point(0.0, 5.0, 0.1), direction=Vector3(0, 1, 0))
 
 
+class NothingToDoTest(DeformerTestCase):
+    """What is so already is no error, but is said."""
+
+    def test_nothing_is_there(self):
+        for service, fields in (('clear_picks', {}), ('lift_scissors', {}), ('push', dict(enable=False))):
+            self.assertRegex(self.good(service, **fields).message, '^there (was|were) no .* to ', service)
+        self.pick_left()
+        self.assertEqual('released all picks: 1', self.good('clear_picks').message)
+        self.good('push', enable=True, radius=0.03, pose=pose_stamped(0.0, 0.0, 1.0))
+        self.assertEqual('removed the push sphere', self.good('push', enable=False).message)
+
+    def test_a_push_at_a_speed_says_whether_it_goes_or_is_placed(self):
+        there = dict(enable=True, radius=0.03, speed=0.25)
+        self.assertIn('placed the push sphere there: there was none', self.good('push', pose=pose_stamped(0.0, 0.0, 1.0), **there).message)
+        self.assertEqual('the push sphere goes there at 0.25 m/s', self.good('push', pose=pose_stamped(0.0, 0.0, 1.5), **there).message)
+        self.good('push', enable=False)
+
+    def test_a_material_of_no_key_is_refused(self):
+        for yaml in ('{}', '# nothing', 'null'):
+            self.refused(['no key', 'accepted', 'density'], 'set_material', body='left', yaml=yaml)
+
+
 class SpringTest(DeformerTestCase):
 
     def test_moving_pulls_the_tissue(self):

@@ -66,6 +66,9 @@ class TrainingTest(unittest.TestCase):
             self.assertEqual(os.path.join(self.folder, 'reports', 'Ann_B_palpate_1'), answer.folder)
             self.assertEqual(['report.csv', 'report.html', 'report.json'], sorted(os.listdir(answer.folder)))
             self.assertEqual(answer.folder, node.good('report').folder)  # of the same run
+            self.assertEqual('log', report_of(answer.folder)['log'])  # its file, not its trainee or its folder
+            with open(os.path.join(answer.folder, 'report.html'), encoding='utf-8') as page:
+                self.assertIn('Log: log.', page.read())
             node.good('start_task', task='palpate', trainee='Ann B')
             node.good('step', steps=1)
             again = node.good('report')

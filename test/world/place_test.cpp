@@ -112,6 +112,42 @@ TEST(SetGravity, WhatIsNoneIsRefused) {
 
 // --- a pose
 
+// A box of 0.1 m of which 6 cm are below the ground, or all of it, would be pressed up for minutes.
+TEST(BelowGround, ABodyIsRefusedWithTheDepthAndAHeldOneIsWarnedOf) {
+  for (const std::optional<double> ground : {std::optional<double>(0.0), std::optional<double>(-0.5), {}}) {
+    WorldSettings settings;
+    settings.ground = ground;
+    World world{settings};
+    const double floor = ground.value_or(0.0);
+    const auto spawned = [&](const std::string& name, double z, bool held) {
+      BodyDef def = test::defOf(boxMesh(Vec3(0.1, 0.1, 0.1), 0.02), name);
+      def.spacing = 0.02;
+      def.pose.translation = Vec3(0.3 * world.bodyCount(), 0, floor + z);
+      if (held) def.fixed = {HeldRegion(Vec3(-10, -10, -10), Vec3(10, 10, floor + z))};
+      return world.apply(SpawnCommand{test::shared(def)});
+    };
+    for (const double z : {-0.2, -0.01}) {
+      const auto reply = spawned("deep" + std::to_string(z), z, false);
+      EXPECT_EQ(reply.ok(), !ground) << z;
+      if (!ground) continue;
+      EXPECT_EQ(reply.error().code, ErrorCode::kInvalidArgument);
+      for (const std::string& said : {z < -0.1 ? "0.25 m below the ground" : "0.06 m below the ground",
+                                      ground == 0.0 ? "at z = 0 m" : "at z = -0.5 m", "up to 0.02 m", "ground: none"})
+        EXPECT_NE(reply.error().detail.find(said), std::string::npos) << reply.error().detail;
+    }
+    EXPECT_TRUE(spawned("flush", 0.05, false).ok());
+    EXPECT_TRUE(spawned("a little", 0.035, false).ok());
+    world.takeEvents();
+    EXPECT_TRUE(spawned("held", -0.01, true).ok()) << "tissue that is held there may be meant to be";
+    EXPECT_EQ(world.takeEvents().back().text.find("below the ground") != std::string::npos, ground.has_value());
+    const PlaceBodyCommand sinks{"flush", {Quat::Identity(), Vec3(0, 5, floor - 0.2)}};
+    if (ground)
+      refused(world, sinks, ErrorCode::kInvalidArgument, "0.25 m below the ground");
+    else
+      test::replyOf<Done>(world.apply(sinks));
+  }
+}
+
 // As if it had been spawned there: with its cuts, without its strain, its speed and the hands in it.
 TEST(PlaceBody, IsAsIfItHadComeThere) {
   for (std::uint64_t seed = 41; seed <= 46; ++seed) {

@@ -1,6 +1,7 @@
 // The points that a sensor saw of a body, made into its surface.
 #pragma once
 
+#include "meshless_surgery/geometry/mesh/surface_from_points.h"
 #include "meshless_surgery/io/files.h"
 
 namespace meshless {
@@ -19,6 +20,9 @@ struct CloudShape {
 /// group. How far apart is taken from the cloud: 1.5 times the distance to the 16th neighbour that three quarters of
 /// the points stay below. Larger groups are kept. `notes` get how many were dropped, and how many groups there are.
 Points withoutStrays(const Points& cloud, std::vector<std::string>& notes);
+
+/// How it was made and how far the points are from it.
+std::string surfaceInWords(const SurfaceFromPoints& surface);
 
 /// Points that are not finite are dropped, then strays (withoutStrays), so that they do not choose the grid, then those
 /// that PCL's voxel grid joins, then those whose mean distance to

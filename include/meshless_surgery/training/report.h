@@ -14,7 +14,7 @@ struct EarlierReport {
 };
 
 struct ReportHead {
-  std::string trainee, log;
+  std::string trainee, log;            // the file's name of the log; empty: none is written
   bool hashes_met = true;              // the replay came to the recorded states
   std::string lost;                    // a sentence, where the log is not whole
   std::vector<EarlierReport> earlier;  // oldest first
