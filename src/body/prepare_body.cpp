@@ -128,7 +128,7 @@ void warnOfSlantedLayer(BodyDef& def, const BodyModel& model) {
         << ", or far too softly: it is thinner than a cell, and where cells meet in a row of corners alone it folds as "
            "on a hinge";
   text << "; it stretches right. With spacing: " << std::setprecision(3) << wanted << " it is " << std::setprecision(2)
-       << 1.0 + 0.25 * kSlanted << " times too stiff and has no hinges, of about "
+       << 1.0 + 0.25 * kSlanted << " times" << (wide > 1.0 ? " and does not fold so" : "") << ", of about "
        << std::round(model.rest_volume / std::pow(wanted, 3.0)) << " cells";
   def.warnings.push_back(text.str());
 }

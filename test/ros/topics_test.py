@@ -9,9 +9,8 @@ import numpy
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point
-from meshless_surgery.msg import Event, State, Surfaces, Topology, Vertices
+from meshless_surgery.msg import Event, Surfaces, Topology, Vertices
 from meshless_surgery.surfaces import SurfaceReader
-from sensor_msgs.msg import PointCloud2
 from shape_msgs.msg import SolidPrimitive
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -122,39 +121,6 @@ class MarkersTest(DeformerTestCase):
             gone.update(m.id for m in of(array, 'tools', Marker.DELETE))
             return {0, 1, 2} <= gone
         self.markers.wait(all_gone, since)
-
-
-class AsleepTest(DeformerTestCase):
-    """While the world runs and its bodies sleep, what is drawn is said once a second: counted beside the state, which goes on."""
-
-    def heard_during(self, states):
-        """How many messages of each topic come while so many states do."""
-        kinds = {'markers': MarkerArray, 'surfaces': Surfaces, 'points': PointCloud2}
-        heard = {name: self.deformer.recorder(name, kind) for name, kind in kinds.items()}
-        state = self.deformer.recorder('state', State)
-        for recorder in heard.values():
-            recorder.wait()  # it has been noticed
-        before = {name: recorder.count() for name, recorder in heard.items()}
-        last = state.count() + states
-        state.wait(since=last)
-        counts = {name: recorder.count() - before[name] for name, recorder in heard.items()}
-        for recorder in (*heard.values(), state):
-            recorder.close()
-        return counts
-
-    def test_what_sleeps_is_said_seldom_and_what_wakes_at_once(self):
-        self.good('step', steps=120)
-        self.assertTrue(all(body.asleep for body in self.state().bodies))
-        self.good('pause', data=False)
-        self.addCleanup(self.good, 'pause', data=True)
-        rate = rospy.get_param(self.deformer.name + '/state_rate', 30.0)
-        for name, count in self.heard_during(int(4 * rate)).items():
-            self.assertLessEqual(count, 8, name)  # of four seconds
-            self.assertGreaterEqual(count, 2, name)
-        pick = self.pick_left()
-        self.good('move_pick', pick_id=pick.pick_id, target=Point(-0.1, 0.0, 0.3))
-        moved = self.heard_during(int(2 * rate))
-        self.assertGreater(min(moved.values()), 20, moved)
 
 
 class SurfacesTest(DeformerTestCase):
@@ -425,4 +391,4 @@ class DiagnosticsTest(DeformerTestCase):
 
 
 if __name__ == '__main__':
-    run('topics', MarkersTest, AsleepTest, SurfacesTest, MovingSurfacesTest, ClustersTest, StateTest, EventsTest, DiagnosticsTest)
+    run('topics', MarkersTest, SurfacesTest, MovingSurfacesTest, ClustersTest, StateTest, EventsTest, DiagnosticsTest)
