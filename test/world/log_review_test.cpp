@@ -1,5 +1,6 @@
 #include "meshless_surgery/world/log_review.h"
 
+#include <algorithm>
 #include <sstream>
 
 #include "recorded_session.h"
@@ -164,11 +165,12 @@ TEST(LogReview, SaysWhatToolsDidAndWhatHappened) {
   LogReview review(playerOf(s.log), std::move(*index));
   World world{WorldSettings()};
   review.begin(world);
-  std::size_t picks = 0, pushes = 0, gone = 0;
+  std::size_t picks = 0, pushes = 0, tips = 0, gone = 0;
   for (const LogMoment& moment : review.index().moments()) {
     ASSERT_TRUE(review.seek(world, moment.at).ok());
     const WorldSnapshot now = world.snapshot({});
-    ASSERT_EQ(now.picks.size() + now.push.enabled + now.scissors.shown, moment.tools.size()) << moment.at;
+    ASSERT_EQ(now.picks.size() + now.push.enabled + now.scissors.shown + now.instruments.size(), moment.tools.size())
+        << moment.at;
     gone += moment.tools.empty();
     for (const LogTool& tool : moment.tools) {
       if (tool.kind == ToolKind::kPick) {
@@ -178,11 +180,17 @@ TEST(LogReview, SaysWhatToolsDidAndWhatHappened) {
       } else if (tool.kind == ToolKind::kPush) {
         ++pushes;
         EXPECT_EQ(now.push.position, tool.position);
+      } else if (tool.kind == ToolKind::kInstrument) {
+        ++tips;
+        EXPECT_TRUE(std::any_of(now.instruments.begin(), now.instruments.end(), [&](const Instrument& one) {
+          return one.number == tool.pick && one.pose.translation == tool.position && one.force.norm() == tool.force;
+        })) << moment.at;
       }
     }
   }
   EXPECT_GT(picks, 2u);
   EXPECT_GT(pushes, 2u);
+  EXPECT_GT(tips, 2u);
   EXPECT_GT(gone, 0u);  // where a tool was taken away, its path ends
 }
 
