@@ -448,7 +448,8 @@ def main():
     try:
         need_master()
     except SurgeryError as error:
-        sys.exit(str(error))
+        print(error, file=sys.stderr)
+        return 1
     # Not rospy's handlers, which run in the midst of what holds a lock.
     rospy.init_node('device', disable_signals=True)
     asked = threading.Event()

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kToolNames[] = {"pick", "push", "scissors"};
+constexpr const char* kToolNames[] = {"pick", "push", "scissors", "instruments"};
 constexpr double kReviewRate = 10.0;                      // [Hz]
 constexpr double kLeastSpeed = 0.01, kMostSpeed = 100.0;  // of simulated over real time
 constexpr float kPathWidth = 0.0015f;                     // [m]

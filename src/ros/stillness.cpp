@@ -6,8 +6,14 @@ namespace meshless {
 namespace {
 
 constexpr std::chrono::seconds kStillPeriod{1};
+constexpr double kNoMotion = 1e-9;  // [m] the rounding of a body that floats at rest
 
 const Points& placesOf(const BodySnapshot& body, bool particles) { return particles ? body.particles : body.surface; }
+
+bool alike(const Points& said, const Points& now) {
+  return std::equal(said.begin(), said.end(), now.begin(), now.end(),
+                    [](const Vec3& a, const Vec3& b) { return (a - b).cwiseAbs().maxCoeff() <= kNoMotion; });
+}
 
 }  // namespace
 
@@ -15,7 +21,7 @@ bool Stillness::isSaid(const WorldSnapshot& snapshot, bool particles) const {
   return std::equal(bodies_.begin(), bodies_.end(), snapshot.bodies.begin(), snapshot.bodies.end(),
                     [&](const Body& said, const BodySnapshot& body) {
                       return said.number == body.number && said.model == body.model && said.asleep == body.asleep &&
-                             said.places == placesOf(body, particles);
+                             alike(said.places, placesOf(body, particles));
                     });
 }
 

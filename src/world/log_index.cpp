@@ -34,7 +34,7 @@ Error badIndex(const std::string& why) {
 template <class A>
 void serialize(A& archive, LogTool& v) {
   auto& [kind, pick, position, force] = v;
-  archive(choice(kind, ToolKind::kScissors), pick, position, force);
+  archive(choice(kind, ToolKind::kInstrument), pick, position, force);
 }
 template <class A>
 void serialize(A& archive, Event& v) {
@@ -88,6 +88,8 @@ void LogIndexWriter::stepped(World& world) {
     for (const Pick& pick : now.picks) tools.push_back({ToolKind::kPick, pick.id, pick.position, pick.force.norm()});
     if (now.push.enabled) tools.push_back({ToolKind::kPush, 0, now.push.position, now.push.force.norm()});
     if (now.scissors.shown) tools.push_back({ToolKind::kScissors, 0, now.scissors.blades.origin, 0.0});
+    for (const Instrument& one : now.instruments)
+      tools.push_back({ToolKind::kInstrument, one.number, one.pose.translation, one.force.norm()});
     write(recordOf(static_cast<std::uint8_t>(EntryKind::kMoment), at_, tools));
   }
   const double clock = processorSeconds();

@@ -168,7 +168,8 @@ TEST(LogReview, SaysWhatToolsDidAndWhatHappened) {
   for (const LogMoment& moment : review.index().moments()) {
     ASSERT_TRUE(review.seek(world, moment.at).ok());
     const WorldSnapshot now = world.snapshot({});
-    ASSERT_EQ(now.picks.size() + now.push.enabled + now.scissors.shown, moment.tools.size()) << moment.at;
+    ASSERT_EQ(now.picks.size() + now.push.enabled + now.scissors.shown + now.instruments.size(), moment.tools.size())
+        << moment.at;
     gone += moment.tools.empty();
     for (const LogTool& tool : moment.tools) {
       if (tool.kind == ToolKind::kPick) {
@@ -184,6 +185,44 @@ TEST(LogReview, SaysWhatToolsDidAndWhatHappened) {
   EXPECT_GT(picks, 2u);
   EXPECT_GT(pushes, 2u);
   EXPECT_GT(gone, 0u);  // where a tool was taken away, its path ends
+}
+
+TEST(LogReview, HasTheWaysOfTheTipsOfInstruments) {
+  World world{WorldSettings()};
+  ASSERT_TRUE(world.addSceneBody(test::shared(test::ball())).ok());
+  std::string log;
+  world.record([&](const std::string& bytes) { log += bytes; });
+  for (const char* name : {"left", "right"}) {
+    AttachInstrumentCommand taken;
+    taken.def.name = name;
+    taken.def.pose.translation = Vec3(name == std::string("left") ? -1 : 1, -1, 1);
+    test::replyOf<Done>(world.apply(taken));
+  }
+  for (int k = 0; k < 60; ++k) {
+    test::replyOf<Done>(
+        world.apply(LeadInstrumentCommand{"right", Pose{Quat::Identity(), Vec3(1, -1, 1 + 0.005 * k)}, {}}));
+    world.step();
+  }
+  world.record(nullptr);
+  auto index = read(indexOf(log, kNever));
+  ASSERT_TRUE(index.ok()) << index.error().detail;
+  LogReview review(playerOf(log), std::move(*index));
+  World again{WorldSettings()};
+  review.begin(again);
+  ASSERT_GE(review.index().moments().size(), 4u);
+  for (const LogMoment& moment : review.index().moments()) {
+    ASSERT_TRUE(review.seek(again, moment.at).ok());
+    const std::vector<Instrument> now = again.snapshot({}).instruments;
+    ASSERT_EQ(2u, moment.tools.size());
+    for (std::size_t k = 0; k < 2; ++k) {
+      EXPECT_EQ(ToolKind::kInstrument, moment.tools[k].kind);
+      EXPECT_EQ(now[k].number, moment.tools[k].pick);
+      EXPECT_EQ(now[k].pose.translation, moment.tools[k].position);
+    }
+  }
+  const auto &first = review.index().moments().front(), &last = review.index().moments().back();
+  EXPECT_EQ(first.tools[0].position, last.tools[0].position);
+  EXPECT_GT(last.tools[1].position.z(), first.tools[1].position.z() + 0.1);
 }
 
 TEST(LogReview, AnIndexIsMadeOfALogAfterwards) {

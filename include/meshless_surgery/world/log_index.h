@@ -19,8 +19,8 @@ inline constexpr const char* kLogIndexSuffix = ".index";        // of the file's
 
 struct LogTool {
   ToolKind kind = ToolKind::kPick;
-  PickId pick = 0;               // of a pick
-  Vec3 position = Vec3::Zero();  // [m] the free end, the centre, the pivot
+  PickId pick = 0;               // of a pick; of an instrument its number
+  Vec3 position = Vec3::Zero();  // [m] the free end, the centre, the pivot, the tip
   double force = 0.0;            // [N]
 };
 
