@@ -225,8 +225,8 @@ Result<std::unique_ptr<DeformerNode>> DeformerNode::start(const ros::NodeHandle&
     }
     const auto added = world->addSceneBody(ready);
     if (!added.ok()) return Error{added.error().code, *file + ": body " + name + ": " + added.error().detail};
-    if (const auto in_ground = checkGround(*ready, scene->world.ground); in_ground && !in_ground->empty())
-      ROS_WARN_STREAM("body " << name << ": " << *in_ground);
+    if (const std::string in_ground = warnOfGround(*ready, scene->world.ground); !in_ground.empty())
+      ROS_WARN_STREAM("body " << name << ": " << in_ground);
     particles += added->particles;
     clusters += added->clusters;
   }

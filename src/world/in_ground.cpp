@@ -12,19 +12,14 @@ constexpr double kLeastDepth = 1e-3;  // [m] that is put up with, as a cell's wi
 
 }  // namespace
 
-Result<std::string> checkGround(const PreparedBody& body, const std::optional<double>& ground) {
-  if (!ground || body.state.surface.empty()) return std::string();
+std::string warnOfGround(const PreparedBody& body, const std::optional<double>& ground) {
+  if (!ground || body.state.surface.empty()) return {};
   const double depth = *ground - boundsOf(body.state.surface).min.z();
-  const double most = std::max(kLeastDepth, body.model->spacing);
-  if (!(depth > most)) return std::string();
-  const std::string begins = numberText(depth, 3) + " m below the ground, which is at z = " + numberText(*ground, 3);
-  if (body.model->any_fixed)
-    return "it begins " + begins +
-           " m and presses it up against what holds it; if that is not meant, put it higher or "
-           "take a scene with `ground: none`";
-  return Error{ErrorCode::kInvalidArgument,
-               "body '" + body.def.name + "' would begin " + begins + " m; accepted: up to " + numberText(most, 3) +
-                   " m below it. Put it higher by " + numberText(depth, 3) + " m, or take a scene with `ground: none`"};
+  if (!(depth > std::max(kLeastDepth, body.model->spacing))) return {};
+  const std::string deep = numberText(depth, 3);
+  return "it begins " + deep + " m below the ground, which is at z = " + numberText(*ground, 3) + " m, and " +
+         (body.model->any_fixed ? "is pressed up against what holds it" : "comes up by some mm a second") +
+         "; put it higher by " + deep + " m, or take a scene with `ground: none`";
 }
 
 }  // namespace meshless

@@ -192,12 +192,10 @@ Result<SpawnReply> World::Impl::spawn(const PreparedBody& body) {
     return Error{ErrorCode::kDuplicateName,
                  "the name '" + name + "' is in use or was retired in this run; " + knownBodies()};
   if (Status apart = liesApart(body); !apart) return apart.error();
-  const Result<std::string> in_ground = checkGround(body, settings.ground);
-  if (!in_ground) return in_ground.error();
   WorldBody& admitted = admit(name, body.def.material, body.model, body.state);
   std::string text = "spawned " + name;
   for (const std::string& warning : body.def.warnings) text += "; " + warning;
-  if (!in_ground->empty()) text += "; " + *in_ground;
+  if (const std::string in_ground = warnOfGround(body, settings.ground); !in_ground.empty()) text += "; " + in_ground;
   say(EventType::kSpawned, name, 0, text);
   return SpawnReply{admitted.id, name, admitted.model->rest.size(), admitted.model->surface.triangles.size(),
                     admitted.model->groups()};

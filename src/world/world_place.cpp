@@ -60,7 +60,6 @@ Result<Reply> World::Impl::apply(const PlaceBodyCommand& command) {
   then.model = body->model;
   then.state = restState(model, times(put, model.own));
   if (Status apart = liesApart(then, {body->id}); !apart) return apart.error();
-  if (const auto in_ground = checkGround(then, settings.ground); !in_ground) return in_ground.error();
 
   // From here nothing fails. What it was at rest stays where it was put first, as what is measured there.
   const Pose placed = body->state.placed;
