@@ -127,5 +127,18 @@ TEST(CloudShape, OtherUnitsAndOddValuesAreRefused) {
   expectRefused(flat, {}, ErrorCode::kUnsuitableShape, "points that are left");
 }
 
+// A rounding is no distance: 4e-19 m is what points have that are the surface's own vertices.
+TEST(CloudShape, TheDistanceOfPointsFromTheSurfaceIsSaidWhereThereIsOne) {
+  SurfaceFromPoints surface;
+  surface.mesh = boxMesh(Vec3(0.1, 0.1, 0.1), 0.05);
+  surface.method = "alpha wrapping";
+  surface.max_distance = surface.mean_distance = 4.33681e-19;
+  EXPECT_EQ(surfaceInWords(surface), "surface by alpha wrapping; all of them lie on it");
+  surface.max_distance = 0.00123456;
+  surface.mean_distance = 0.0004;
+  EXPECT_EQ(surfaceInWords(surface),
+            "surface by alpha wrapping; the points are up to 0.00123 m from it, on average 0.0004 m");
+}
+
 }  // namespace cloud_shape_test
 }  // namespace meshless
