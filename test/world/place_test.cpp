@@ -1,7 +1,7 @@
 // Gravity that changes, bodies that are put elsewhere, and bodies of the scene as it began.
 #include <cmath>
-#include <tuple>
 #include <set>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -204,7 +204,8 @@ TEST(PlaceBody, ItsCutsGoAlong) {
   ASSERT_TRUE(world.addSceneBody(test::shared(test::block())).ok());
   test::replyOf<CutReply>(world.apply(cutThrough(Vec3(0.02, 0, 0.2), {})));
   const double volume = bodyOf(world, "block.1").measures.volume;
-  test::replyOf<Done>(world.apply(PlaceBodyCommand{"block.1", {Quat(Eigen::AngleAxisd(1.0, Vec3::UnitX())), Vec3(0, 0, 9)}}));
+  test::replyOf<Done>(
+      world.apply(PlaceBodyCommand{"block.1", {Quat(Eigen::AngleAxisd(1.0, Vec3::UnitX())), Vec3(0, 0, 9)}}));
   EXPECT_NEAR(bodyOf(world, "block.1").measures.volume, volume, 1e-12);
   const Box other = boundsOf(bodyOf(world, "block.2").surface);
   EXPECT_LT(other.max.z(), 0.3);
@@ -308,7 +309,8 @@ TEST(PlaceBody, WhatCannotBeIsRefusedAndChangesNothing) {
   refused(world, PlaceBodyCommand{"none", away}, ErrorCode::kUnknownName, "bodies are: block, large");
   refused(world, PlaceBodyCommand{"block", {Quat::Identity(), Vec3(5, 0, 0)}}, ErrorCode::kInvalidArgument,
           "lies wholly inside");
-  refused(world, PlaceBodyCommand{"block", {Quat(2, 0, 0, 0), Vec3::Zero()}}, ErrorCode::kInvalidArgument, "accepted: 1");
+  refused(world, PlaceBodyCommand{"block", {Quat(2, 0, 0, 0), Vec3::Zero()}}, ErrorCode::kInvalidArgument,
+          "accepted: 1");
   refused(world, PlaceBodyCommand{"block", {Quat::Identity(), Vec3(0, 2e6, 0)}}, ErrorCode::kInvalidArgument, "1e6 m");
   refused(world, PlaceBodyCommand{"block", {Quat::Identity(), Vec3(0, NAN, 0)}}, ErrorCode::kInvalidArgument, "finite");
   AttachCommand attach;
@@ -432,8 +434,8 @@ TEST(ResetBodies, WhatCannotBeIsRefusedAndChangesNothing) {
   refused(world, ResetBodiesCommand{{"block", "guest"}}, ErrorCode::kUnknownName, "the scene has no body 'guest'");
   // What has come to lie around it would hold it inside.
   test::replyOf<Done>(world.apply(PlaceBodyCommand{"block", {Quat::Identity(), Vec3(0, 0, 5)}}));
-  test::replyOf<SpawnReply>(world.apply(SpawnCommand{
-      test::shared(test::defOf(boxMesh(Vec3(2, 2, 2), 4, 4, 4), "large"))}));
+  test::replyOf<SpawnReply>(
+      world.apply(SpawnCommand{test::shared(test::defOf(boxMesh(Vec3(2, 2, 2), 4, 4, 4), "large"))}));
   refused(world, ResetBodiesCommand{}, ErrorCode::kInvalidArgument, "lies wholly inside");
 }
 
